@@ -1,0 +1,34 @@
+// anatomy: a soft body at rest, whoever made it (the bowel generator or the import of an organ surface).
+// Particles, clusters and surface are what the solver moves; the visible mesh is what the picture shows.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/math.h"
+#include "exchange/picture.h"
+#include "geometry/mesh.h"
+
+namespace catgut {
+
+// An opening of the body: particles in order round it, one loop per side of the wall. The first is on the outer side.
+struct Rim {
+  std::vector<uint32_t> outer, inner;
+};
+
+struct BodyRest {
+  std::string name;
+  std::vector<Vec3> position;      // [m] one per particle, neighbours close in memory (space-filling or lattice order)
+  std::vector<float> mass;         // [kg]
+  std::vector<uint8_t> pinned;     // 1: held by the surroundings, never moves
+  std::vector<TissueLayer> layer;  // serosa: outer side of the wall, mucosa: inner side
+  float radius = 0;                // [m] contact radius of a particle
+  std::vector<std::vector<uint32_t>> cluster;  // cluster c is centred on particle c; first member is c; at most 16 members
+  std::vector<Tet> tet;            // the wall's volume
+  std::vector<Triangle> surface;   // watertight, particle indices, counter-clockwise seen from outside the tissue
+  std::vector<Rim> rim;            // openings; rim[0] is the one the procedure works on
+  VisibleMesh visible;             // skin_particle indexes this body's particles
+};
+
+}  // namespace catgut

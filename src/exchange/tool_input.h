@@ -1,0 +1,29 @@
+// exchange: the only way into a tick. A device (or the scripted surgeon, or a recording) publishes one whole ToolInput per
+// hand; the host adds commands; together they are the TickInput.
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "core/math.h"
+
+namespace catgut {
+
+// Tool frame: origin at the grasp point between the jaw tips, -z the way the tool points (the shaft runs along +z toward the
+// hand), x the direction in which the jaws open.
+struct ToolInput {
+  Pose pose;                  // of the hand's tool frame, in world [m]
+  Vec3 velocity;              // [m/s]
+  Vec3 angular_velocity;      // [rad/s]
+  float jaw = 1;              // 0 closed .. 1 open
+  uint32_t buttons = 0;       // bit per button
+  uint64_t time_ns = 0;       // device clock, for latency tables only: never read by the physics
+  uint32_t sequence = 0;
+  uint32_t connected = 1;     // 0: no device; the tool stays where it is and touches nothing
+};
+
+struct TickInput {
+  uint64_t tick = 0;
+  std::array<ToolInput, 2> hand;  // 0 right (needle driver), 1 left (forceps)
+};
+
+}  // namespace catgut
