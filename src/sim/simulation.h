@@ -1,0 +1,47 @@
+// sim: the engine's face. `Model` never changes, `State` is all that does, `step` is the tick, and the same inputs give the same
+// bits for any number of workers. Everything above (command line, window, recording, embedding) is built on these few calls.
+#pragma once
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/jobs.h"
+#include "core/profile.h"
+#include "exchange/picture.h"
+#include "exchange/snapshot.h"
+#include "exchange/tool_input.h"
+#include "sim/scene.h"
+
+namespace catgut {
+
+struct Model;  // sim/model.h
+struct State;  // sim/state.h
+
+// Builds the scene. Throws InputError for what a scene may get wrong (mesh missing, too few particles, ...).
+std::shared_ptr<const Model> build_model(const SceneSpec& scene);
+const SceneSpec& scene_of(const Model& model);
+size_t particle_count(const Model& model);  // tissue + thread
+
+struct StateDeleter { void operator()(State*) const; };
+using StatePtr = std::unique_ptr<State, StateDeleter>;
+StatePtr initial_state(const Model& model);
+
+// One tick of 1 / tick_rate seconds. times may be null.
+void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times = nullptr);
+
+// Fills the snapshot (reusing its memory) with the state after the last tick.
+void publish(const Model& model, const State& state, Snapshot& snapshot);
+PictureModel picture_model(const Model& model);
+
+// The whole state as bytes (versioned by kStateVersion) and back. load_state throws InputError if the bytes do not fit the model.
+constexpr uint32_t kStateVersion = 1;
+std::vector<std::byte> save_state(const Model& model, const State& state);
+void load_state(const Model& model, State& state, const std::vector<std::byte>& bytes);
+uint64_t hash_state(const Model& model, const State& state);
+
+// True when nothing in the state is NaN or infinite and no particle is further than `limit` metres from the origin.
+bool state_is_sane(const Model& model, const State& state, float limit = 1.0f);
+double kinetic_energy(const Model& model, const State& state);  // [J]
+
+}  // namespace catgut

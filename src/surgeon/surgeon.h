@@ -1,0 +1,36 @@
+// surgeon: a scripted pair of hands. To the simulation it is just another device: it sees the published Snapshot and answers
+// with ToolInputs, like a human; it cannot reach into the state. Motion plans react to what they see.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "exchange/picture.h"
+#include "exchange/snapshot.h"
+#include "exchange/tool_input.h"
+
+namespace catgut {
+
+struct SurgeonSkill {
+  int bites = 12;
+  float edge_distance = 0.004f, bite_length = 0.007f;  // [m]
+  float tail = 0.045f;                                 // [m] free end left
+  float speed = 0.15f, drive_speed = 0.03f;            // [m/s]
+  float tremor = 0.0001f, aim_error = 0.0003f;         // [m] standard deviations
+  uint64_t seed = 1;
+};
+
+class Surgeon {
+ public:
+  virtual ~Surgeon() = default;
+  // The hands for the next tick, seeing the state after the last one. dt: length of a tick [s].
+  virtual std::array<ToolInput, 2> operate(const Snapshot& seen, float dt) = 0;
+  virtual bool done() const = 0;            // the plan is finished (or given up)
+  virtual std::string doing() const = 0;    // "bite 3 of 12: drive the needle", for progress lines
+};
+
+// The purse-string of paper 2.5.1. Throws std::invalid_argument for a technique without a script.
+std::unique_ptr<Surgeon> make_surgeon(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
+
+}  // namespace catgut
