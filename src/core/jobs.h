@@ -3,7 +3,9 @@
 // block is computed by one worker from start to end: the same bits for any worker count.
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <type_traits>
 
 namespace catgut {
 

@@ -59,7 +59,7 @@ struct SolverSpec {
   int contact_sweeps = 1;          // tools, thread and needle
   bool thread_direct = true;       // direct solve along the thread before the distance sweeps
   bool volume = false;             // tetrahedral volume constraints
-  float volume_compliance = 0;     // [m^3/N m^-... see docs] 0: incompressible
+  float volume_compliance = 0;     // [m^6/J] energy = (V - V0)^2 / (2 compliance); 0: incompressible
   float damping = 4;               // [1/s] of tissue velocities
   float thread_damping = 12;       // [1/s] of thread velocities
   Vec3 gravity{0, -9.81f, 0};      // [m/s^2]

@@ -1,0 +1,72 @@
+// solver/attach: reads attachments, moves tissue particles and rigid bodies alike. XPBD (Macklin et al. 2016) per attachment.
+#include "solver/attach.h"
+
+namespace catgut {
+
+float NeedleArc::nearest(Vec3 p) const {
+  float phi = std::atan2(p.y - centre.y, p.x - centre.x);
+  // Angles of the gap behind the arc belong to whichever end is nearer.
+  if (phi < 0 && phi < 0.5f * (arc - 2 * kPi)) phi += 2 * kPi;
+  return std::clamp(phi, 0.0f, arc);
+}
+
+void solve_attachment(Attachment& a, Vec4* x, const float* w, const std::vector<RigidModel>& model,
+                      std::vector<RigidBody>& body, float h) {
+  const Vec3 p = position_of(a.point, x);
+  const float alpha = a.compliance / (h * h);
+  float wsum = inverse_mass_of(a.point, w);
+  if (a.body < 0) {
+    if (wsum + alpha <= 0) return;
+    const Vec3 d = (a.target - p - alpha * a.lambda) / (wsum + alpha);
+    a.lambda += d;
+    push(a.point, x, w, d);
+    return;
+  }
+  RigidBody& b = body[static_cast<size_t>(a.body)];
+  const RigidModel& m = model[static_cast<size_t>(a.body)];
+  const Vec3 r = rotate(b.q, a.target);
+  const Vec3 residual = b.x + r - p - alpha * a.lambda;
+  const Vec3 n = normalized(residual);
+  if (length2(n) == 0) return;
+  wsum += inverse_mass_at(m, b, r, n);
+  const Vec3 d = residual / (wsum + alpha);
+  a.lambda += d;
+  push(a.point, x, w, d);
+  push(m, b, -d, r);
+}
+
+void solve_channel(ChannelPoint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model, RigidBody& needle,
+                   float h) {
+  const Vec3 p = position_of(c.point, x);
+  const Vec3 local = to_local(needle.pose(), p);
+  const float phi = arc.nearest(local);
+  const Vec3 on_arc = arc.point(phi);
+  const Vec3 tangent = rotate(needle.q, arc.tangent(phi));
+  const float wp = inverse_mass_of(c.point, w);
+  const float inv_h2 = 1.0f / (h * h);
+
+  const Vec3 r = rotate(needle.q, on_arc);
+  Vec3 gap = needle.x + r - p;
+  gap -= tangent * dot(gap, tangent);  // sideways only: beyond an end of the arc nothing pulls it back along the shaft
+  const float alpha = c.compliance * inv_h2;
+  const Vec3 residual = gap - alpha * c.lambda;
+  const Vec3 n = normalized(residual);
+  if (length2(n) > 0) {
+    const Vec3 d = residual / (wp + inverse_mass_at(model, needle, r, n) + alpha);
+    c.lambda += d;
+    push(c.point, x, w, d);
+    push(model, needle, -d, r);
+  }
+
+  // Drag: undo the slip since the start of the substep, as far as the largest force allows.
+  const float slip = arc.radius * (phi - c.at);  // tissue moved toward the tip by this
+  const float wt = wp + inverse_mass_at(model, needle, r, tangent);
+  const float limit = c.drag * h * h;
+  const float wanted = std::clamp(c.drag_lambda - slip / wt, -limit, limit);
+  const float d = wanted - c.drag_lambda;
+  c.drag_lambda = wanted;
+  push(c.point, x, w, tangent * d);
+  push(model, needle, tangent * -d, r);
+}
+
+}  // namespace catgut

@@ -1,0 +1,65 @@
+// solver/attach: compliant attachments of tissue. Points of tissue are weighted sums of up to three particles, so that a bite
+// sits where the needle went in and not on the nearest particle; the paper's nearest particle is the case of one weight 1.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "solver/particles.h"
+#include "solver/rigid.h"
+
+namespace catgut {
+
+struct TissuePoint {
+  std::array<uint32_t, 3> particle{};
+  std::array<float, 3> weight{};  // sum 1; unused: 0
+};
+inline Vec3 position_of(const TissuePoint& t, const Vec4* x) {
+  return xyz(x[t.particle[0]]) * t.weight[0] + xyz(x[t.particle[1]]) * t.weight[1] + xyz(x[t.particle[2]]) * t.weight[2];
+}
+inline float inverse_mass_of(const TissuePoint& t, const float* w) {
+  float s = 0;
+  for (int k = 0; k < 3; ++k) s += t.weight[k] * t.weight[k] * w[t.particle[k]];
+  return s;
+}
+// Applies the positional impulse p [kg m] at the point.
+inline void push(const TissuePoint& t, Vec4* x, const float* w, Vec3 p) {
+  for (int k = 0; k < 3; ++k) add(x[t.particle[k]], p * (w[t.particle[k]] * t.weight[k]));
+}
+
+// Particle (or weighted point) to a fixed place in the world, or to a place in a body's frame.
+struct Attachment {
+  TissuePoint point;
+  int body = -1;          // -1: the world
+  Vec3 target;            // [m] world, or body frame
+  float compliance = 0;   // [m/N]
+  Vec3 lambda;            // [N s^2] cleared at the start of a substep; acts on the tissue
+};
+
+// The shaft of the needle in its channel: the tissue point lies on the arc of the needle (particle-line attachment). It slides
+// along the arc against a Coulomb-like drag and is held sideways by `compliance`.
+struct ChannelPoint {
+  TissuePoint point;
+  float compliance = 0;   // [m/N] sideways
+  float drag = 0;         // [N] largest force along the shaft
+  float at = 0;           // [rad] where on the arc it was at the start of the substep
+  Vec3 lambda;            // sideways, cleared at the start of a substep
+  float drag_lambda = 0;  // along the shaft
+};
+
+// The needle's circle in its body frame: centre at `centre`, in the xy plane, from angle 0 (swage) to `arc` (tip).
+struct NeedleArc {
+  float radius = 0, arc = 0;
+  Vec3 centre;  // [m] body frame: the body's origin is the centre of mass
+  Vec3 point(float phi) const { return centre + Vec3{radius * std::cos(phi), radius * std::sin(phi), 0}; }
+  Vec3 tangent(float phi) const { return {-std::sin(phi), std::cos(phi), 0}; }  // toward the tip
+  // The angle of the point of the arc nearest to p (body frame), clamped to the arc.
+  float nearest(Vec3 p) const;
+};
+
+void solve_attachment(Attachment& a, Vec4* x, const float* w, const std::vector<RigidModel>& model,
+                      std::vector<RigidBody>& body, float h);
+void solve_channel(ChannelPoint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model, RigidBody& needle,
+                   float h);
+
+}  // namespace catgut

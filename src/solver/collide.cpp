@@ -1,0 +1,245 @@
+// solver/collide: reads positions, writes candidate lists. See the header for why they are reused.
+#include "solver/collide.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace catgut {
+namespace {
+
+constexpr uint32_t kBlock = 16;
+
+bool boxes_meet(Vec3 l0, Vec3 u0, Vec3 l1, Vec3 u1) {
+  return l0.x <= u1.x && l1.x <= u0.x && l0.y <= u1.y && l1.y <= u0.y && l0.z <= u1.z && l1.z <= u0.z;
+}
+Vec3 least(Vec3 a, Vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
+Vec3 most(Vec3 a, Vec3 b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
+Vec3 all(float s) { return {s, s, s}; }
+
+float distance_to_box2(Vec3 p, Vec3 l, Vec3 u) {
+  const Vec3 d = most(most(l - p, p - u), Vec3{});
+  return length2(d);
+}
+
+}  // namespace
+
+TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius,
+                                      std::span<const uint32_t> body, std::span<const float> rest_reach,
+                                      std::vector<Triangle> surface) {
+  TissueCollision t;
+  t.particles = static_cast<uint32_t>(rest.size());
+  t.radius.assign(radius.begin(), radius.end());
+  t.body.assign(body.begin(), body.end());
+  t.rest_reach.assign(rest_reach.begin(), rest_reach.end());
+  t.surface = std::move(surface);
+  for (float r : radius) t.largest_radius = std::max(t.largest_radius, r);
+  std::vector<uint32_t> count(t.particles + 1, 0);
+  for (const Triangle& k : t.surface)
+    for (uint32_t i : k) ++count[i + 1];
+  for (size_t i = 1; i < count.size(); ++i) count[i] += count[i - 1];
+  t.ring_first = count;
+  t.ring.resize(t.surface.size() * 3);
+  for (uint32_t f = 0; f < t.surface.size(); ++f)
+    for (uint32_t i : t.surface[f]) t.ring[count[i]++] = f;
+  return t;
+}
+
+void update_boxes(const TissueCollision& tissue, const Vec4* x, Candidates& c) {
+  const uint32_t blocks = (tissue.particles + kBlock - 1) / kBlock;
+  c.lower.resize(blocks);
+  c.upper.resize(blocks);
+  for (uint32_t b = 0; b < blocks; ++b) {
+    Vec3 lo = xyz(x[b * kBlock]), hi = lo;
+    const uint32_t end = std::min(tissue.particles, (b + 1) * kBlock);
+    for (uint32_t i = b * kBlock + 1; i < end; ++i) lo = least(lo, xyz(x[i])), hi = most(hi, xyz(x[i]));
+    c.lower[b] = lo;
+    c.upper[b] = hi;
+  }
+}
+
+void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Vec4* x, Candidates& c) {
+  const uint32_t n = tissue.particles;
+  if (c.built_at.size() == n) {
+    float worst = 0;
+    for (uint32_t i = 0; i < n; ++i) {
+      const float dx = x[i].x - c.built_at[i].x, dy = x[i].y - c.built_at[i].y, dz = x[i].z - c.built_at[i].z;
+      worst = std::max(worst, dx * dx + dy * dy + dz * dz);
+    }
+    if (worst < 0.25f * kPairMargin * kPairMargin) return;
+  }
+  c.built_at.assign(x, x + n);
+  c.pair.clear();
+  update_boxes(tissue, x, c);
+  const uint32_t blocks = static_cast<uint32_t>(c.lower.size());
+  const Vec3 grow = all(2 * tissue.largest_radius + kPairMargin);
+  for (uint32_t ba = 0; ba < blocks; ++ba)
+    for (uint32_t bb = ba; bb < blocks; ++bb) {
+      if (!boxes_meet(c.lower[ba], c.upper[ba], c.lower[bb] - grow, c.upper[bb] + grow)) continue;
+      const uint32_t ea = std::min(n, (ba + 1) * kBlock), eb = std::min(n, (bb + 1) * kBlock);
+      for (uint32_t i = ba * kBlock; i < ea; ++i) {
+        // Half the particles of a neighbouring block are out of reach: one test on the box saves sixteen.
+        const Vec3 p = xyz(x[i]);
+        if (ba != bb && distance_to_box2(p, c.lower[bb], c.upper[bb]) > grow.x * grow.x) continue;
+        for (uint32_t j = ba == bb ? i + 1 : bb * kBlock; j < eb; ++j) {
+          const float reach = tissue.radius[i] + tissue.radius[j] + kPairMargin;
+          if (length2(xyz(x[j]) - p) > reach * reach) continue;
+          if (tissue.body[i] == tissue.body[j]) {
+            const float apart = std::max(tissue.rest_reach[i], tissue.rest_reach[j]);
+            if (length2(xyz(rest[j]) - xyz(rest[i])) < apart * apart) continue;
+          }
+          c.pair.push_back({i, j});
+        }
+      }
+    }
+  std::sort(c.pair.begin(), c.pair.end(), [](PairCandidate a, PairCandidate b) { return a.a != b.a ? a.a < b.a : a.b < b.b; });
+}
+
+int nearest_particle(const TissueCollision& tissue, const Candidates& c, const Vec4* x, Vec3 p, float reach) {
+  float best = reach * reach;
+  int found = -1;
+  // Boxes may be a few substeps old: a pair margin covers what can have moved since.
+  const float slack = reach + kPairMargin;
+  for (uint32_t b = 0; b < c.lower.size(); ++b) {
+    if (distance_to_box2(p, c.lower[b], c.upper[b]) > slack * slack) continue;
+    const uint32_t end = std::min(tissue.particles, (b + 1) * kBlock);
+    for (uint32_t i = b * kBlock; i < end; ++i) {
+      const float d = length2(xyz(x[i]) - p);
+      if (d < best) best = d, found = static_cast<int>(i);
+    }
+  }
+  return found;
+}
+
+ClosestOnTriangle closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
+  // Ericson, Real-Time Collision Detection, 5.1.5: by Voronoi region.
+  const Vec3 ab = b - a, ac = c - a, ap = p - a;
+  const float d1 = dot(ab, ap), d2 = dot(ac, ap);
+  if (d1 <= 0 && d2 <= 0) return {a, {1, 0, 0}};
+  const Vec3 bp = p - b;
+  const float d3 = dot(ab, bp), d4 = dot(ac, bp);
+  if (d3 >= 0 && d4 <= d3) return {b, {0, 1, 0}};
+  const float vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
+    const float t = d1 / (d1 - d3);
+    return {a + ab * t, {1 - t, t, 0}};
+  }
+  const Vec3 cp = p - c;
+  const float d5 = dot(ab, cp), d6 = dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6) return {c, {0, 0, 1}};
+  const float vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
+    const float t = d2 / (d2 - d6);
+    return {a + ac * t, {1 - t, 0, t}};
+  }
+  const float va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    const float t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    return {b + (c - b) * t, {0, 1 - t, t}};
+  }
+  const float inv = 1.0f / (va + vb + vc);
+  const float v = vb * inv, w = vc * inv;
+  return {a + ab * v + ac * w, {1 - v - w, v, w}};
+}
+
+std::pair<float, float> closest_on_segments(Vec3 a0, Vec3 a1, Vec3 b0, Vec3 b1) {
+  // Ericson 5.1.9, with degenerate segments treated as points.
+  const Vec3 d1 = a1 - a0, d2 = b1 - b0, r = a0 - b0;
+  const float a = length2(d1), e = length2(d2), f = dot(d2, r);
+  if (a < 1e-16f && e < 1e-16f) return {0.0f, 0.0f};
+  if (a < 1e-16f) return {0.0f, std::clamp(f / e, 0.0f, 1.0f)};
+  const float c = dot(d1, r);
+  if (e < 1e-16f) return {std::clamp(-c / a, 0.0f, 1.0f), 0.0f};
+  const float b = dot(d1, d2), denominator = a * e - b * b;
+  float s = denominator > 1e-12f * a * e ? std::clamp((b * f - c * e) / denominator, 0.0f, 1.0f) : 0.0f;
+  float t = (b * s + f) / e;
+  if (t < 0) t = 0, s = std::clamp(-c / a, 0.0f, 1.0f);
+  else if (t > 1) t = 1, s = std::clamp((b - c) / a, 0.0f, 1.0f);
+  return {s, t};
+}
+
+void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* x, const ThreadModel& thread_model,
+                                     const Thread& thread, std::span<const uint8_t> thread_collides,
+                                     const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,
+                                     std::span<const uint8_t> body_collides, float margin, Candidates& c) {
+  c.tool.clear();
+  c.thread_tool.clear();
+  c.thread_tissue.clear();
+  c.thread_pair.clear();
+  update_boxes(tissue, x, c);
+  const uint32_t blocks = static_cast<uint32_t>(c.lower.size());
+  const size_t segments = thread.order.size() < 2 ? 0 : thread.order.size() - 1;
+  auto collides = [&](uint32_t slot) { return thread_collides[slot - thread_model.first_slot] != 0; };
+
+  for (uint32_t b = 0; b < body.size(); ++b) {
+    if (!body_collides[b]) continue;
+    for (uint32_t k = 0; k < model[b].capsule.size(); ++k) {
+      const Capsule& capsule = model[b].capsule[k];
+      const Vec3 p = transform(body[b].pose(), capsule.a), q = transform(body[b].pose(), capsule.b);
+      const float reach = capsule.radius + tissue.tool_radius + margin;
+      const Vec3 lo = least(p, q) - all(reach), hi = most(p, q) + all(reach);
+      for (uint32_t blk = 0; blk < blocks; ++blk) {
+        if (!boxes_meet(lo, hi, c.lower[blk], c.upper[blk])) continue;
+        const uint32_t end = std::min(tissue.particles, (blk + 1) * kBlock);
+        for (uint32_t i = blk * kBlock; i < end; ++i) {
+          const Vec3 at = xyz(x[i]), d = q - p;
+          const float t = std::clamp(dot(at - p, d) / std::max(length2(d), 1e-16f), 0.0f, 1.0f);
+          if (length2(at - (p + d * t)) < reach * reach) c.tool.push_back({b, k, i});
+        }
+      }
+      const float thread_reach = capsule.radius + thread_model.radius + margin;
+      for (size_t i = 0; i < segments; ++i) {
+        const uint32_t s0 = thread.order[i], s1 = thread.order[i + 1];
+        if (!collides(s0) || !collides(s1)) continue;
+        const Vec3 a0 = xyz(x[s0]), a1 = xyz(x[s1]);
+        const Vec3 l = least(a0, a1), u = most(a0, a1);
+        if (!boxes_meet(l, u, lo, hi)) continue;
+        const auto [s, t] = closest_on_segments(a0, a1, p, q);
+        if (length2(lerp(a0, a1, s) - lerp(p, q, t)) < thread_reach * thread_reach) c.thread_tool.push_back({b, k, s0});
+      }
+    }
+  }
+
+  // Thread on tissue: one triangle each, the nearest of those around the nearest particle; the substeps use its plane.
+  const float reach = 0.004f + margin;
+  for (uint32_t slot : thread.order) {
+    if (!collides(slot)) continue;
+    const Vec3 p = xyz(x[slot]);
+    const int near = nearest_particle(tissue, c, x, p, reach);
+    if (near < 0) continue;
+    float best = 1e30f;
+    uint32_t found = 0;
+    for (uint32_t r = tissue.ring_first[static_cast<size_t>(near)]; r < tissue.ring_first[static_cast<size_t>(near) + 1]; ++r) {
+      const Triangle& t = tissue.surface[tissue.ring[r]];
+      const float d = length2(closest_on_triangle(p, xyz(x[t[0]]), xyz(x[t[1]]), xyz(x[t[2]])).point - p);
+      if (d < best) best = d, found = tissue.ring[r];
+    }
+    if (best < margin * margin) c.thread_tissue.push_back({slot, found});
+  }
+
+  // Thread on itself: boxes of eight segments, so that a straight thread costs next to nothing.
+  constexpr size_t kRun = 8;
+  const size_t runs = (segments + kRun - 1) / kRun;
+  std::array<Vec3, 512> lo, hi;
+  if (runs > lo.size()) return;
+  const float grow = 2 * thread_model.radius + 0.002f;
+  for (size_t r = 0; r < runs; ++r) {
+    lo[r] = hi[r] = xyz(x[thread.order[r * kRun]]);
+    for (size_t i = r * kRun; i <= std::min(segments, (r + 1) * kRun); ++i)
+      lo[r] = least(lo[r], xyz(x[thread.order[i]])), hi[r] = most(hi[r], xyz(x[thread.order[i]]));
+  }
+  for (size_t ra = 0; ra < runs; ++ra)
+    for (size_t rb = ra; rb < runs; ++rb) {
+      if (!boxes_meet(lo[ra] - all(grow), hi[ra] + all(grow), lo[rb], hi[rb])) continue;
+      for (size_t i = ra * kRun; i < std::min(segments, (ra + 1) * kRun); ++i)
+        for (size_t j = std::max(rb * kRun, i + 4); j < std::min(segments, (rb + 1) * kRun); ++j) {
+          const uint32_t i0 = thread.order[i], i1 = thread.order[i + 1], j0 = thread.order[j], j1 = thread.order[j + 1];
+          if (!collides(i0) || !collides(i1) || !collides(j0) || !collides(j1)) continue;
+          const auto [s, t] = closest_on_segments(xyz(x[i0]), xyz(x[i1]), xyz(x[j0]), xyz(x[j1]));
+          if (length2(lerp(xyz(x[i0]), xyz(x[i1]), s) - lerp(xyz(x[j0]), xyz(x[j1]), t)) < grow * grow)
+            c.thread_pair.push_back({i0, j0});
+        }
+    }
+}
+
+}  // namespace catgut

@@ -1,0 +1,199 @@
+// solver/contact: reads candidates, moves particles and bodies. See the header.
+#include "solver/contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace catgut {
+namespace {
+
+constexpr float kLargestCorrection = 0.001f;  // [m] per contact and sweep: deep overlap is undone over some substeps
+
+// The part of the relative slip `slip` that friction undoes, given the normal correction.
+Vec3 friction_step(Vec3 slip, Vec3 n, float normal, float friction) {
+  const Vec3 t = slip - n * dot(slip, n);
+  const float l = length(t), most = friction * normal;
+  if (l < 1e-12f) return {};
+  return l <= most ? t : t * (most / l);
+}
+
+Vec3 moved(const ContactView& v, uint32_t i) { return xyz(v.x[i]) - xyz(v.prev[i]); }
+
+// Effective inverse masses of the two ends of a thread segment: locked ends do not give way here.
+struct Segment {
+  uint32_t s0, s1;
+  float w0, w1;
+};
+bool segment_after(const ContactView& v, uint32_t slot, Segment& out) {
+  const uint32_t first = v.thread_model->first_slot;
+  const int32_t node = v.node_of_slot[slot - first];
+  if (node < 0 || static_cast<size_t>(node) + 1 >= v.thread->order.size()) return false;
+  out.s0 = slot;
+  out.s1 = v.thread->order[static_cast<size_t>(node) + 1];
+  out.w0 = v.locked[out.s0 - first] ? 0 : v.thread_model->inv_mass;
+  out.w1 = v.locked[out.s1 - first] ? 0 : v.thread_model->inv_mass;
+  return true;
+}
+
+}  // namespace
+
+uint32_t solve_tissue_pairs(const ContactView& v, const TissueCollision& tissue, const std::vector<PairCandidate>& list,
+                            float friction) {
+  uint32_t touching = 0;
+  for (const PairCandidate& c : list) {
+    const Vec3 d = xyz(v.x[c.b]) - xyz(v.x[c.a]);
+    const float reach = tissue.radius[c.a] + tissue.radius[c.b], l2 = length2(d);
+    if (l2 >= reach * reach) continue;
+    const float wa = v.inv_mass[c.a], wb = v.inv_mass[c.b], w = wa + wb;
+    if (w == 0 || l2 < 1e-16f) continue;
+    ++touching;
+    const float l = std::sqrt(l2), depth = std::min(reach - l, kLargestCorrection);
+    const Vec3 n = d / l;
+    const Vec3 step = (n * depth - friction_step(moved(v, c.b) - moved(v, c.a), n, depth, friction)) / w;
+    add(v.x[c.a], step * -wa);
+    add(v.x[c.b], step * wb);
+  }
+  return touching;
+}
+
+uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tissue, const std::vector<ToolCandidate>& list,
+                               float friction) {
+  uint32_t touching = 0;
+  for (const ToolCandidate& c : list) {
+    RigidBody& b = (*v.body)[c.body];
+    const RigidModel& m = (*v.model)[c.body];
+    const Capsule& capsule = m.capsule[c.capsule];
+    const Vec3 p = transform(b.pose(), capsule.a), q = transform(b.pose(), capsule.b), axis = q - p, at = xyz(v.x[c.particle]);
+    const float t = std::clamp(dot(at - p, axis) / std::max(length2(axis), 1e-16f), 0.0f, 1.0f);
+    const Vec3 on = p + axis * t, d = at - on;
+    const float reach = capsule.radius + tissue.tool_radius, l2 = length2(d);
+    if (l2 >= reach * reach || l2 < 1e-16f) continue;
+    ++touching;
+    const float l = std::sqrt(l2), depth = std::min(reach - l, kLargestCorrection);
+    const Vec3 n = d / l, r = on - b.x;
+    const float wp = v.inv_mass[c.particle], w = wp + inverse_mass_at(m, b, r, n);
+    if (w <= 0) continue;
+    const Vec3 slip = moved(v, c.particle) - (on - previous_point(b, r));
+    const Vec3 impulse = (n * depth - friction_step(slip, n, depth, friction)) / w;
+    add(v.x[c.particle], impulse * wp);
+    push(m, b, -impulse, r);
+    (*v.on_body)[c.body].linear -= impulse;
+    (*v.on_body)[c.body].angular -= cross(r, impulse);
+  }
+  return touching;
+}
+
+uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float friction) {
+  uint32_t touching = 0;
+  for (const ThreadToolCandidate& c : list) {
+    Segment s;
+    if (!segment_after(v, c.slot, s) || s.w0 + s.w1 == 0) continue;
+    RigidBody& b = (*v.body)[c.body];
+    const RigidModel& m = (*v.model)[c.body];
+    const Capsule& capsule = m.capsule[c.capsule];
+    const Vec3 p = transform(b.pose(), capsule.a), q = transform(b.pose(), capsule.b);
+    const Vec3 x0 = xyz(v.x[s.s0]), x1 = xyz(v.x[s.s1]);
+    const auto [ts, tt] = closest_on_segments(x0, x1, p, q);
+    const Vec3 on = lerp(p, q, tt), d = lerp(x0, x1, ts) - on;
+    const float reach = capsule.radius + v.thread_model->radius, l2 = length2(d);
+    if (l2 >= reach * reach || l2 < 1e-16f) continue;
+    const float a0 = 1 - ts, a1 = ts, wt = s.w0 * a0 * a0 + s.w1 * a1 * a1;
+    const float l = std::sqrt(l2), depth = std::min(reach - l, kLargestCorrection);
+    const Vec3 n = d / l, r = on - b.x;
+    const float w = wt + inverse_mass_at(m, b, r, n);
+    if (wt <= 0) continue;
+    ++touching;
+    const Vec3 slip = moved(v, s.s0) * a0 + moved(v, s.s1) * a1 - (on - previous_point(b, r));
+    const Vec3 impulse = (n * depth - friction_step(slip, n, depth, friction)) / w;
+    add(v.x[s.s0], impulse * (s.w0 * a0));
+    add(v.x[s.s1], impulse * (s.w1 * a1));
+    push(m, b, -impulse, r);
+    (*v.on_body)[c.body].linear -= impulse;
+    (*v.on_body)[c.body].angular -= cross(r, impulse);
+  }
+  return touching;
+}
+
+uint32_t solve_thread_on_tissue(const ContactView& v, const TissueCollision& tissue,
+                                const std::vector<ThreadTissueCandidate>& list, float friction) {
+  uint32_t touching = 0;
+  const uint32_t first = v.thread_model->first_slot;
+  for (const ThreadTissueCandidate& c : list) {
+    if (v.locked[c.slot - first]) continue;
+    const Triangle& t = tissue.surface[c.triangle];
+    const Vec3 a = xyz(v.x[t[0]]), b = xyz(v.x[t[1]]), e = xyz(v.x[t[2]]), p = xyz(v.x[c.slot]);
+    const Vec3 n = normalized(cross(b - a, e - a));
+    // Beside the triangle's plane by more than the wall is thick: the thread is on another side, leave it.
+    const float gap = dot(p - a, n) - v.thread_model->radius;
+    if (gap >= 0 || gap < -0.002f) continue;
+    const ClosestOnTriangle near = closest_on_triangle(p, a, b, e);
+    if (length2(p - n * (gap + v.thread_model->radius) - near.point) > 1e-6f) continue;  // slid off the triangle by over 1 mm
+    const float wt = v.thread_model->inv_mass;
+    float w = wt;
+    for (int k = 0; k < 3; ++k) w += near.weight[static_cast<size_t>(k)] * near.weight[static_cast<size_t>(k)] * v.inv_mass[t[static_cast<size_t>(k)]];
+    ++touching;
+    Vec3 slip = moved(v, c.slot);
+    for (size_t k = 0; k < 3; ++k) slip -= moved(v, t[k]) * near.weight[k];
+    const float depth = std::min(-gap, kLargestCorrection);
+    const Vec3 impulse = (n * depth - friction_step(slip, n, depth, friction)) / w;
+    add(v.x[c.slot], impulse * wt);
+    for (size_t k = 0; k < 3; ++k) add(v.x[t[k]], impulse * (-v.inv_mass[t[k]] * near.weight[k]));
+  }
+  return touching;
+}
+
+uint32_t solve_thread_on_thread(const ContactView& v, const std::vector<ThreadPairCandidate>& list, float friction) {
+  uint32_t touching = 0;
+  for (const ThreadPairCandidate& c : list) {
+    Segment a, b;
+    if (!segment_after(v, c.a, a) || !segment_after(v, c.b, b)) continue;
+    const Vec3 a0 = xyz(v.x[a.s0]), a1 = xyz(v.x[a.s1]), b0 = xyz(v.x[b.s0]), b1 = xyz(v.x[b.s1]);
+    const auto [s, t] = closest_on_segments(a0, a1, b0, b1);
+    const Vec3 d = lerp(b0, b1, t) - lerp(a0, a1, s);
+    const float reach = 2 * v.thread_model->radius, l2 = length2(d);
+    if (l2 >= reach * reach || l2 < 1e-16f) continue;
+    const float w = a.w0 * (1 - s) * (1 - s) + a.w1 * s * s + b.w0 * (1 - t) * (1 - t) + b.w1 * t * t;
+    if (w <= 0) continue;
+    ++touching;
+    const float l = std::sqrt(l2), depth = reach - l;
+    const Vec3 n = d / l;
+    const Vec3 slip = moved(v, b.s0) * (1 - t) + moved(v, b.s1) * t - moved(v, a.s0) * (1 - s) - moved(v, a.s1) * s;
+    const Vec3 impulse = (n * depth - friction_step(slip, n, depth, friction)) / w;
+    add(v.x[a.s0], impulse * (-a.w0 * (1 - s)));
+    add(v.x[a.s1], impulse * (-a.w1 * s));
+    add(v.x[b.s0], impulse * (b.w0 * (1 - t)));
+    add(v.x[b.s1], impulse * (b.w1 * t));
+  }
+  return touching;
+}
+
+uint32_t solve_ground(const ContactView& v, float ground, float friction) {
+  uint32_t touching = 0;
+  const Vec3 n{0, 1, 0};
+  const uint32_t first = v.thread_model->first_slot;
+  for (uint32_t i = 0; i < v.thread_model->count; ++i) {
+    const uint32_t slot = first + i;
+    const float depth = ground + v.thread_model->radius - v.x[slot].y;
+    if (depth <= 0 || v.locked[i]) continue;
+    ++touching;
+    add(v.x[slot], n * depth - friction_step(moved(v, slot), n, depth, friction));
+  }
+  // Bodies that have weight of their own: the needle. Its ends and middle are enough for an arc of capsules.
+  for (size_t k = 0; k < v.body->size(); ++k) {
+    RigidBody& b = (*v.body)[k];
+    const RigidModel& m = (*v.model)[k];
+    if (!m.gravity) continue;
+    for (const Capsule& capsule : m.capsule) {
+      const Vec3 at = transform(b.pose(), capsule.a);
+      const float depth = ground + capsule.radius - at.y;
+      if (depth <= 0) continue;
+      ++touching;
+      const Vec3 r = at - b.x;
+      const float w = inverse_mass_at(m, b, r, n);
+      push(m, b, (n * depth - friction_step(at - previous_point(b, r), n, depth, friction)) / w, r);
+    }
+  }
+  return touching;
+}
+
+}  // namespace catgut

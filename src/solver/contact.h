@@ -1,0 +1,46 @@
+// solver/contact: unilateral contact with Coulomb friction in positions: tissue on tissue, tools on tissue, thread (as capsules)
+// on tools, on itself and on the tissue's surface, and the drape under everything.
+// Normal part: C = gap >= 0, undone at once (contacts are hard). Friction undoes the slip since the start of the substep, at
+// most friction times the normal correction.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "solver/collide.h"
+
+namespace catgut {
+
+struct Friction {
+  float tissue = 0, tool = 0, thread = 0;
+};
+// The force of contacts on each body in this substep: positional impulse sums [kg m]; divide by h^2 for newtons.
+struct BodyContact {
+  Vec3 linear, angular;
+};
+
+struct ContactView {  // what a contact kernel needs, gathered once per substep
+  Vec4* x;
+  const Vec4* prev;
+  const float* inv_mass;
+  const std::vector<RigidModel>* model;
+  std::vector<RigidBody>* body;
+  std::vector<BodyContact>* on_body;
+  const int32_t* node_of_slot;  // relative to first_slot; -1: not in the thread
+  const Thread* thread;
+  const ThreadModel* thread_model;
+  const uint8_t* locked;        // per thread slot (relative): position is somebody else's (anchor or hold)
+};
+
+// One sweep each; returns the number of touching candidates.
+uint32_t solve_tissue_pairs(const ContactView& v, const TissueCollision& tissue, const std::vector<PairCandidate>& list,
+                            float friction);
+uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tissue, const std::vector<ToolCandidate>& list,
+                               float friction);
+uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float friction);
+uint32_t solve_thread_on_tissue(const ContactView& v, const TissueCollision& tissue,
+                                const std::vector<ThreadTissueCandidate>& list, float friction);
+uint32_t solve_thread_on_thread(const ContactView& v, const std::vector<ThreadPairCandidate>& list, float friction);
+// The drape: a horizontal plane at height `ground` [m] for thread and needle.
+uint32_t solve_ground(const ContactView& v, float ground, float friction);
+
+}  // namespace catgut

@@ -1,0 +1,5 @@
+# The SIMD kernels use Highway: one source, every instruction set, chosen at run time.
+find_library(HWY_LIBRARY hwy REQUIRED)
+find_path(HWY_INCLUDE hwy/highway.h REQUIRED)
+target_include_directories(catgut_solver SYSTEM PUBLIC ${HWY_INCLUDE})
+target_link_libraries(catgut_solver PUBLIC ${HWY_LIBRARY})

@@ -1,0 +1,266 @@
+// solver/shape_match: see the header. Compiled once per instruction set (Highway) and chosen at run time. Multiplications and
+// additions are kept apart (no fused multiply-add) so that every instruction set gives the same bits.
+#include "solver/shape_match.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "solver/shape_match.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace catgut {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using D = hn::CappedTag<float, 16>;
+using D4 = hn::FixedTag<float, 4>;
+constexpr size_t kLanes = HWY_MIN(16, HWY_MAX_BYTES / sizeof(float));
+constexpr size_t kParts = 16 / kLanes;
+
+// Sum of `n` rows named by `index`; out is one row. n is a multiple of 4.
+HWY_INLINE void sum_rows(const Row* row, const uint32_t* index, uint32_t n, float* HWY_RESTRICT out) {
+  const D d;
+  // Four independent partial sums hide the latency of the additions.
+  hn::Vec<D> acc[4][kParts];
+  for (size_t k = 0; k < 4; ++k)
+    for (size_t p = 0; p < kParts; ++p) acc[k][p] = hn::Load(d, row[index[k]].f + p * kLanes);
+  for (uint32_t i = 4; i < n; i += 4)
+    for (size_t k = 0; k < 4; ++k)
+      for (size_t p = 0; p < kParts; ++p)
+        acc[k][p] = hn::Add(acc[k][p], hn::Load(d, row[index[i + k]].f + p * kLanes));
+  for (size_t p = 0; p < kParts; ++p)
+    hn::Store(hn::Add(hn::Add(acc[0][p], acc[1][p]), hn::Add(acc[2][p], acc[3][p])), d, out + p * kLanes);
+}
+
+void MakeRows(const ShapeModel& model, const Vec4* x, ShapeScratch& scratch, uint32_t first, uint32_t last) {
+  const D4 d;
+  for (uint32_t i = first; i < last; ++i) {
+    const auto p = hn::Mul(hn::Load(d, &x[i].x), hn::Set(d, model.relative_mass[i]));
+    const Vec4 q = model.rest[i];
+    float* row = scratch.row[i].f;  // column j holds m x q_j: the moment matrix by columns
+    hn::Store(hn::Mul(p, hn::Set(d, q.x)), d, row);
+    hn::Store(hn::Mul(p, hn::Set(d, q.y)), d, row + 4);
+    hn::Store(hn::Mul(p, hn::Set(d, q.z)), d, row + 8);
+    hn::Store(p, d, row + 12);
+  }
+}
+
+// Polar decomposition in lanes: rotates the frame q so that it is the rotation nearest to A (columns a0, a1, a2).
+template <class V>
+struct Lanes3 {
+  V x, y, z;
+};
+
+template <class Dx, class V = hn::Vec<Dx>>
+HWY_INLINE Lanes3<V> LCross(Lanes3<V> a, Lanes3<V> b) {
+  return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
+          hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
+}
+template <class Dx, class V = hn::Vec<Dx>>
+HWY_INLINE V LDot(Lanes3<V> a, Lanes3<V> b) {
+  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
+}
+
+// Columns of the rotation of a unit quaternion.
+template <class Dx, class V = hn::Vec<Dx>>
+HWY_INLINE void Columns(Dx d, V qx, V qy, V qz, V qw, Lanes3<V>& r0, Lanes3<V>& r1, Lanes3<V>& r2) {
+  const V one = hn::Set(d, 1.0f), two = hn::Set(d, 2.0f);
+  const V xx = hn::Mul(qx, qx), yy = hn::Mul(qy, qy), zz = hn::Mul(qz, qz);
+  const V xy = hn::Mul(qx, qy), xz = hn::Mul(qx, qz), yz = hn::Mul(qy, qz);
+  const V wx = hn::Mul(qw, qx), wy = hn::Mul(qw, qy), wz = hn::Mul(qw, qz);
+  r0 = {hn::Sub(one, hn::Mul(two, hn::Add(yy, zz))), hn::Mul(two, hn::Add(xy, wz)), hn::Mul(two, hn::Sub(xz, wy))};
+  r1 = {hn::Mul(two, hn::Sub(xy, wz)), hn::Sub(one, hn::Mul(two, hn::Add(xx, zz))), hn::Mul(two, hn::Add(yz, wx))};
+  r2 = {hn::Mul(two, hn::Add(xz, wy)), hn::Mul(two, hn::Sub(yz, wx)), hn::Sub(one, hn::Mul(two, hn::Add(xx, yy)))};
+}
+
+void Clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch& scratch, uint32_t first, uint32_t last) {
+  const D d;
+  const D4 d4;
+  using V = hn::Vec<D>;
+  alignas(64) float moment[16];
+  alignas(64) float column[4][16 * 4];  // column j of the moments of 16 clusters, four floats each
+  for (uint32_t base = first; base < last; base += 16) {
+    for (uint32_t c = 0; c < 16; ++c) {
+      // The last group may reach past the clusters: it repeats the last one and its results are dropped below.
+      const uint32_t id = HWY_MIN(base + c, model.clusters - 1);
+      sum_rows(scratch.row.data(), model.member.data() + size_t{id} * model.cluster_stride, model.cluster_stride, moment);
+      for (size_t j = 0; j < 4; ++j) hn::Store(hn::Load(d4, moment + 4 * j), d4, column[j] + 4 * c);
+    }
+    for (uint32_t c = 0; c < 16; c += kLanes) {
+      V mx[4], my[4], mz[4], mw[4];  // column j of the moments: (x, y, z, count)
+      for (size_t j = 0; j < 4; ++j) hn::LoadInterleaved4(d, column[j] + 4 * c, mx[j], my[j], mz[j], mw[j]);
+      const V one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f), tiny = hn::Set(d, 1e-30f);
+      const V inv = hn::Div(one, mw[3]);
+      const V cx = hn::Mul(mx[3], inv), cy = hn::Mul(my[3], inv), cz = hn::Mul(mz[3], inv);
+      // A = sum m (x - c) q^T: centred after summing.
+      Lanes3<V> a[3];
+      for (size_t j = 0; j < 3; ++j)
+        a[j] = {hn::Sub(mx[j], hn::Mul(cx, mw[j])), hn::Sub(my[j], hn::Mul(cy, mw[j])), hn::Sub(mz[j], hn::Mul(cz, mw[j]))};
+
+      const size_t at = base + c;
+      V qx = hn::Load(d, rotation.x.data() + at), qy = hn::Load(d, rotation.y.data() + at);
+      V qz = hn::Load(d, rotation.z.data() + at), qw = hn::Load(d, rotation.w.data() + at);
+      Lanes3<V> r0, r1, r2;
+      Columns(d, qx, qy, qz, qw, r0, r1, r2);
+      // B = R^T A in the cluster's own frame. At the optimum B is symmetric; the axial vector b of its antisymmetric part is
+      // the gradient and H = tr(B) 1 - sym(B) the Hessian of the rotation (Kugelstadt et al. 2018, analytic polar).
+      const V b00 = LDot<D>(r0, a[0]), b01 = LDot<D>(r0, a[1]), b02 = LDot<D>(r0, a[2]);
+      const V b10 = LDot<D>(r1, a[0]), b11 = LDot<D>(r1, a[1]), b12 = LDot<D>(r1, a[2]);
+      const V b20 = LDot<D>(r2, a[0]), b21 = LDot<D>(r2, a[1]), b22 = LDot<D>(r2, a[2]);
+      const Lanes3<V> g{hn::Sub(b21, b12), hn::Sub(b02, b20), hn::Sub(b10, b01)};
+      const V trace = hn::Add(hn::Add(b00, b11), b22);
+      const V h00 = hn::Sub(trace, b00), h11 = hn::Sub(trace, b11), h22 = hn::Sub(trace, b22);
+      const V h01 = hn::Neg(hn::Mul(half, hn::Add(b01, b10))), h02 = hn::Neg(hn::Mul(half, hn::Add(b02, b20)));
+      const V h12 = hn::Neg(hn::Mul(half, hn::Add(b12, b21)));
+      const V k00 = hn::Sub(hn::Mul(h11, h22), hn::Mul(h12, h12)), k01 = hn::Sub(hn::Mul(h02, h12), hn::Mul(h01, h22));
+      const V k02 = hn::Sub(hn::Mul(h01, h12), hn::Mul(h02, h11)), k11 = hn::Sub(hn::Mul(h00, h22), hn::Mul(h02, h02));
+      const V k12 = hn::Sub(hn::Mul(h01, h02), hn::Mul(h00, h12)), k22 = hn::Sub(hn::Mul(h00, h11), hn::Mul(h01, h01));
+      const V det = hn::Add(hn::Add(hn::Mul(h00, k00), hn::Mul(h01, k01)), hn::Mul(h02, k02));
+      const V size = hn::Max(hn::Abs(trace), tiny);
+      const V inv_det = hn::Div(one, hn::Max(det, tiny));
+      Lanes3<V> newton{
+          hn::Mul(inv_det, hn::Add(hn::Add(hn::Mul(k00, g.x), hn::Mul(k01, g.y)), hn::Mul(k02, g.z))),
+          hn::Mul(inv_det, hn::Add(hn::Add(hn::Mul(k01, g.x), hn::Mul(k11, g.y)), hn::Mul(k12, g.z))),
+          hn::Mul(inv_det, hn::Add(hn::Add(hn::Mul(k02, g.x), hn::Mul(k12, g.y)), hn::Mul(k22, g.z)))};
+      // Positive definite with some reserve and a step below half a radian, else the always-safe damped step g / tr.
+      const V relative = hn::Div(det, hn::Mul(size, hn::Mul(size, size)));
+      const auto safe = hn::And(hn::And(hn::Gt(trace, tiny), hn::Gt(relative, hn::Set(d, 1e-3f))),
+                                hn::Lt(LDot<D>(newton, newton), hn::Set(d, 0.25f)));
+      const V damp = hn::Div(one, size);
+      const V wx = hn::Mul(half, hn::IfThenElse(safe, newton.x, hn::Mul(damp, g.x)));
+      const V wy = hn::Mul(half, hn::IfThenElse(safe, newton.y, hn::Mul(damp, g.y)));
+      const V wz = hn::Mul(half, hn::IfThenElse(safe, newton.z, hn::Mul(damp, g.z)));
+      // q <- q (1, w/2), renormalised: the rotation is in the cluster's own frame, hence on the right.
+      const V nx = hn::Add(qx, hn::Add(hn::Mul(qw, wx), hn::Sub(hn::Mul(qy, wz), hn::Mul(qz, wy))));
+      const V ny = hn::Add(qy, hn::Add(hn::Mul(qw, wy), hn::Sub(hn::Mul(qz, wx), hn::Mul(qx, wz))));
+      const V nz = hn::Add(qz, hn::Add(hn::Mul(qw, wz), hn::Sub(hn::Mul(qx, wy), hn::Mul(qy, wx))));
+      const V nw = hn::Sub(qw, hn::Add(hn::Add(hn::Mul(qx, wx), hn::Mul(qy, wy)), hn::Mul(qz, wz)));
+      const V norm = hn::Div(one, hn::Sqrt(hn::Add(hn::Add(hn::Mul(nx, nx), hn::Mul(ny, ny)),
+                                                   hn::Add(hn::Mul(nz, nz), hn::Mul(nw, nw)))));
+      qx = hn::Mul(nx, norm), qy = hn::Mul(ny, norm), qz = hn::Mul(nz, norm), qw = hn::Mul(nw, norm);
+      hn::Store(qx, d, rotation.x.data() + at);
+      hn::Store(qy, d, rotation.y.data() + at);
+      hn::Store(qz, d, rotation.z.data() + at);
+      hn::Store(qw, d, rotation.w.data() + at);
+      Columns(d, qx, qy, qz, qw, r0, r1, r2);
+      // t = c - R c0
+      V c0x, c0y, c0z, unused;
+      hn::LoadInterleaved4(d, &model.rest_centre[at].x, c0x, c0y, c0z, unused);
+      const V tx = hn::Sub(cx, hn::Add(hn::Add(hn::Mul(r0.x, c0x), hn::Mul(r1.x, c0y)), hn::Mul(r2.x, c0z)));
+      const V ty = hn::Sub(cy, hn::Add(hn::Add(hn::Mul(r0.y, c0x), hn::Mul(r1.y, c0y)), hn::Mul(r2.y, c0z)));
+      const V tz = hn::Sub(cz, hn::Add(hn::Add(hn::Mul(r0.z, c0x), hn::Mul(r1.z, c0y)), hn::Mul(r2.z, c0z)));
+      const V zero = hn::Zero(d);
+      hn::StoreInterleaved4(r0.x, r0.y, r0.z, zero, d, column[0] + 4 * c);
+      hn::StoreInterleaved4(r1.x, r1.y, r1.z, zero, d, column[1] + 4 * c);
+      hn::StoreInterleaved4(r2.x, r2.y, r2.z, zero, d, column[2] + 4 * c);
+      hn::StoreInterleaved4(tx, ty, tz, zero, d, column[3] + 4 * c);
+    }
+    const uint32_t n = HWY_MIN(16u, last - base);
+    for (uint32_t c = 0; c < n; ++c)
+      for (size_t j = 0; j < 4; ++j) hn::Store(hn::Load(d4, column[j] + 4 * c), d4, scratch.transform[base + c].f + 4 * j);
+  }
+}
+
+void ShapeParticles(const ShapeModel& model, Vec4* x, const float* inv_mass, float stiffness, float relaxation,
+                    ShapeScratch& scratch, uint32_t first, uint32_t last) {
+  const D4 d;
+  alignas(64) float sum[16];
+  for (uint32_t i = first; i < last; ++i) {
+    if (inv_mass[i] > 0) {
+      sum_rows(scratch.transform.data(), model.holder.data() + size_t{i} * model.particle_stride, model.particle_stride, sum);
+      const Vec4 q = model.rest[i];
+      auto goal = hn::Add(hn::Add(hn::Mul(hn::Load(d, sum), hn::Set(d, q.x)), hn::Mul(hn::Load(d, sum + 4), hn::Set(d, q.y))),
+                          hn::Add(hn::Mul(hn::Load(d, sum + 8), hn::Set(d, q.z)), hn::Load(d, sum + 12)));
+      goal = hn::Mul(goal, hn::Set(d, model.inv_holders[i]));
+      const auto at = hn::Load(d, &x[i].x), moved = hn::Load(d, &scratch.moved[i].x);
+      // Lane 3 (the constant 1 of a position) must not move: the mask keeps it.
+      auto dx = hn::Mul(hn::Set(d, relaxation), hn::Sub(hn::Mul(hn::Set(d, stiffness), hn::Sub(goal, at)),
+                                                        hn::Mul(hn::Set(d, 1.0f - stiffness), moved)));
+      dx = hn::IfThenElseZero(hn::FirstN(d, 3), dx);
+      hn::Store(hn::Add(at, dx), d, &x[i].x);
+      hn::Store(hn::Add(moved, dx), d, &scratch.moved[i].x);
+    }
+  }
+  MakeRows(model, x, scratch, first, last);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace catgut
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+#include "core/check.h"
+
+namespace catgut {
+
+HWY_EXPORT(MakeRows);
+HWY_EXPORT(Clusters);
+HWY_EXPORT(ShapeParticles);
+
+void make_shape_rows(const ShapeModel& model, const Vec4* x, ShapeScratch& scratch, uint32_t first, uint32_t last) {
+  HWY_DYNAMIC_DISPATCH(MakeRows)(model, x, scratch, first, last);
+}
+void solve_shape_clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch& scratch, uint32_t first,
+                          uint32_t last) {
+  HWY_DYNAMIC_DISPATCH(Clusters)(model, rotation, scratch, first, last);
+}
+void solve_shape_particles(const ShapeModel& model, Vec4* x, const float* inv_mass, float stiffness, float relaxation,
+                           ShapeScratch& scratch, uint32_t first, uint32_t last) {
+  HWY_DYNAMIC_DISPATCH(ShapeParticles)(model, x, inv_mass, stiffness, relaxation, scratch, first, last);
+}
+
+void ClusterRotations::reset(uint32_t clusters) {
+  const size_t padded = (clusters + 15) / 16 * 16;
+  x.assign(padded, 0), y.assign(padded, 0), z.assign(padded, 0), w.assign(padded, 1);
+}
+
+void ShapeScratch::resize(const ShapeModel& model) {
+  row.assign(model.rest.size() + 1, Row{});
+  transform.assign(model.clusters + 1, Row{});
+  moved.assign(model.rest.size(), Vec4{});
+}
+
+ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> mass,
+                            std::span<const std::vector<uint32_t>> cluster) {
+  ShapeModel m;
+  const uint32_t particles = static_cast<uint32_t>(rest.size());
+  m.clusters = static_cast<uint32_t>(cluster.size());
+  double total = 0;
+  for (float k : mass) total += k;
+  for (uint32_t i = 0; i < particles; ++i) {
+    m.rest.push_back(point(rest[i]));
+    m.relative_mass.push_back(static_cast<float>(mass[i] * particles / total));
+  }
+  std::vector<std::vector<uint32_t>> holders(particles);
+  size_t widest = 4;
+  for (uint32_t c = 0; c < m.clusters; ++c) {
+    widest = std::max(widest, cluster[c].size());
+    for (uint32_t k : cluster[c]) holders[k].push_back(c);
+  }
+  m.cluster_stride = static_cast<uint32_t>((widest + 3) / 4 * 4);
+  m.member.assign(size_t{m.clusters} * m.cluster_stride, particles);
+  m.rest_centre.assign((m.clusters + 15) / 16 * 16, Vec4{});
+  for (uint32_t c = 0; c < m.clusters; ++c) {
+    double sum = 0, sx = 0, sy = 0, sz = 0;
+    for (size_t k = 0; k < cluster[c].size(); ++k) {
+      const uint32_t id = cluster[c][k];
+      m.member[size_t{c} * m.cluster_stride + k] = id;
+      const double w = m.relative_mass[id];
+      sum += w, sx += w * rest[id].x, sy += w * rest[id].y, sz += w * rest[id].z;
+    }
+    m.rest_centre[c] = {static_cast<float>(sx / sum), static_cast<float>(sy / sum), static_cast<float>(sz / sum), 0};
+  }
+  widest = 4;
+  for (const auto& h : holders) widest = std::max(widest, h.size());
+  m.particle_stride = static_cast<uint32_t>((widest + 3) / 4 * 4);
+  m.holder.assign(size_t{particles} * m.particle_stride, m.clusters);
+  for (uint32_t i = 0; i < particles; ++i) {
+    CATGUT_CHECK(!holders[i].empty());
+    for (size_t k = 0; k < holders[i].size(); ++k) m.holder[size_t{i} * m.particle_stride + k] = holders[i][k];
+    m.inv_holders.push_back(1.0f / static_cast<float>(holders[i].size()));
+  }
+  return m;
+}
+
+}  // namespace catgut
+#endif  // HWY_ONCE

@@ -1,0 +1,59 @@
+// solver/shape_match: shape matching over overlapping clusters (paper 2.1; Mueller et al. 2005), as an XPBD constraint
+// C_k = x_k - g_k per particle, where g_k is the mean of the goals of all clusters that hold k.
+// Both passes are sums of listed 64-byte rows in a fixed order: no gathers, no scatter, no atomics, the same bits for any
+// number of workers and any width of SIMD.
+#pragma once
+#include <cstdint>
+#include <span>
+
+#include "solver/particles.h"
+
+namespace catgut {
+
+struct alignas(64) Row {
+  float f[16] = {};
+};
+
+// Constant part. Lists are padded to a fixed stride with the index of a zero row, so that the sums are straight-line code.
+struct ShapeModel {
+  uint32_t clusters = 0;          // one per tissue particle
+  uint32_t cluster_stride = 16;   // members per cluster, padded; the pad is index `particles` (a zero row)
+  uint32_t particle_stride = 16;  // clusters per particle, padded with index `clusters`
+  Column<uint32_t> member;        // clusters x cluster_stride: particles
+  Column<uint32_t> holder;        // particles x particle_stride: clusters
+  Column<float> inv_holders;      // per particle: 1 / number of clusters that hold it
+  Column<Vec4> rest;              // per particle, (x, y, z, 1)
+  Column<float> relative_mass;    // per particle: m_k / mean m, the weights of the moments
+  Column<Vec4> rest_centre;       // per cluster: mass-weighted, w unused
+};
+ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> mass,
+                            std::span<const std::vector<uint32_t>> cluster);
+
+// Per-cluster rotation, structure of arrays, padded to a multiple of 16. Warm start of the next substep, hence state.
+struct ClusterRotations {
+  Column<float> x, y, z, w;
+  void reset(uint32_t clusters);
+};
+
+// Working memory of one sweep. Row `particles` and transform `clusters` stay zero.
+struct ShapeScratch {
+  Column<Row> row;        // per particle: m_k (x,1)(q,1)^T
+  Column<Row> transform;  // per cluster: columns of the 3x4 affine [R | t], 4 floats each
+  Column<Vec4> moved;     // per particle: what shape matching moved it this substep [m] (lambda = moved * mass)
+  void resize(const ShapeModel& model);
+};
+
+// Sweep, pass 1 over clusters [first, last): moments from rows, rotation by one warm Newton step of the polar decomposition
+// (error below 1e-5 rad; it falls back to the damped step of Mueller et al. 2016 where Newton's matrix is singular).
+// first must be a multiple of 16.
+void solve_shape_clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch& scratch, uint32_t first,
+                          uint32_t last);
+// Rows of particles [first, last) from their positions.
+void make_shape_rows(const ShapeModel& model, const Vec4* x, ShapeScratch& scratch, uint32_t first, uint32_t last);
+// Sweep, pass 2 over particles [first, last): dx = relaxation * (s (g - x) - (1 - s) moved), with s = w / (w + alpha / h^2)
+// per particle: the XPBD update of a constraint with compliance alpha and multiplier moved / w. Makes the next sweep's rows
+// too. Particles with inv_mass 0 stay.
+void solve_shape_particles(const ShapeModel& model, Vec4* x, const float* inv_mass, float stiffness, float relaxation,
+                           ShapeScratch& scratch, uint32_t first, uint32_t last);
+
+}  // namespace catgut

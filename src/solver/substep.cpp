@@ -1,0 +1,197 @@
+// solver/substep: reads the model; moves every particle and body of the state. Section 2.1 of the paper, with its order:
+// predict, shape (and volume), tissue contact, attachments and bodies, contacts of tools and thread, the thread itself, velocities.
+// The thread comes last so that what is drawn and felt is a thread of the right length.
+#include "solver/substep.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace catgut {
+namespace {
+
+constexpr size_t kParticleBlock = 256, kClusterBlock = 160;  // fixed: never a function of the number of workers
+constexpr float kTopSpeed = 5.0f;                            // [m/s] of a particle; a hand cannot throw tissue faster
+
+void clear_multipliers(SolverState& state, SolverScratch& scratch) {
+  for (Weld& w : state.weld) w.lambda = w.angular_lambda = {};
+  for (Attachment& a : state.attach) a.lambda = {};
+  for (ChannelPoint& c : state.channel) c.lambda = {}, c.drag_lambda = 0;
+  std::fill(scratch.volume_lambda.begin(), scratch.volume_lambda.end(), 0.0f);
+  std::fill(scratch.shape.moved.begin(), scratch.shape.moved.end(), Vec4{});
+  std::fill(scratch.on_body.begin(), scratch.on_body.end(), BodyContact{});
+  std::fill(scratch.thread.lambda.begin(), scratch.thread.lambda.end(), 0.0f);
+  std::fill(scratch.thread.bend_lambda.begin(), scratch.thread.bend_lambda.end(), 0.0f);
+}
+
+void predict_particles(const SolverModel& m, SolverState& s, SolverScratch& k, size_t first, size_t last) {
+  const Vec3 gh = m.gravity * m.h;
+  for (size_t i = first; i < last; ++i) {
+    k.prev[i] = s.x[i];
+    if (m.inv_mass[i] == 0) continue;
+    Vec3 v = xyz(s.v[i]) + gh;
+    const float speed2 = length2(v);
+    if (speed2 > kTopSpeed * kTopSpeed) v *= kTopSpeed / std::sqrt(speed2);
+    add(s.x[i], v * m.h);
+  }
+}
+
+void update_velocities(const SolverModel& m, SolverState& s, const SolverScratch& k, size_t first, size_t last) {
+  const float inv_h = 1.0f / m.h;
+  const float keep_tissue = inv_h / (1 + m.damping * m.h), keep_thread = inv_h / (1 + m.thread_damping * m.h);
+  for (size_t i = first; i < last; ++i) {
+    const float keep = i < m.tissue ? keep_tissue : keep_thread;
+    set(s.v[i], (xyz(s.x[i]) - xyz(k.prev[i])) * keep);
+  }
+}
+
+}  // namespace
+
+float stiffness_at(float stiffness, float h_reference, float h) {
+  if (stiffness >= 1) return 1;
+  if (stiffness <= 0) return 0;
+  const float alpha_over_w = (1 - stiffness) / stiffness * h_reference * h_reference;
+  return 1.0f / (1.0f + alpha_over_w / (h * h));
+}
+
+SolverState make_solver_state(const SolverModel& model, std::span<const Vec3> position) {
+  SolverState s;
+  s.x.resize(model.count);
+  s.v.resize(model.count);
+  for (uint32_t i = 0; i < model.count; ++i) s.x[i] = point(position[i]);
+  s.rotation.reset(model.shape.clusters);
+  s.body.resize(model.body.size());
+  s.thread_collides.assign(model.thread.count, 1);
+  s.body_collides.assign(model.body.size(), 1);
+  for (uint32_t i = 0; i < model.thread.count; ++i) s.thread.order.push_back(model.thread.first_slot + i);
+  s.thread.rest.assign(model.thread.count > 0 ? model.thread.count - 1 : 0, model.thread.spacing);
+  s.thread.tension.assign(s.thread.rest.size(), 0.0f);
+  return s;
+}
+
+void prepare_scratch(const SolverModel& model, SolverScratch& k) {
+  k.prev.assign(model.count, Vec4{});
+  k.shape.resize(model.shape);
+  k.volume_lambda.assign(model.volume.tet.size(), 0.0f);
+  k.thread.resize(model.thread.count);
+  k.candidates = {};
+  k.on_body.assign(model.body.size(), {});
+  k.node_of_slot.assign(model.thread.count, -1);
+  k.locked.assign(model.thread.count, 0);
+}
+
+void find_candidates(const SolverModel& m, const SolverState& s, SolverScratch& k, float margin, StageTimes* times) {
+  StageTimer timer(times, Stage::broadphase);
+  find_tool_and_thread_candidates(m.collision, s.x.data(), m.thread, s.thread, s.thread_collides, m.body, s.body,
+                                  s.body_collides, margin, k.candidates);
+}
+
+void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs, StageTimes* times) {
+  Vec4* x = s.x.data();
+  const float* w = m.inv_mass.data();
+  const float h = m.h;
+
+  clear_multipliers(s, k);
+  {
+    StageTimer timer(times, Stage::predict);
+    jobs.each(m.count, kParticleBlock, [&](size_t first, size_t last) {
+      predict_particles(m, s, k, first, last);
+      if (first < m.tissue) {
+        const uint32_t end = static_cast<uint32_t>(std::min<size_t>(last, m.tissue));
+        make_shape_rows(m.shape, x, k.shape, static_cast<uint32_t>(first), end);
+      }
+    });
+    for (size_t b = 0; b < s.body.size(); ++b) predict(m.body[b], s.body[b], m.gravity, h);
+  }
+  {
+    StageTimer timer(times, Stage::shape);
+    for (int sweep = 0; sweep < m.shape_sweeps; ++sweep) {
+      jobs.each(m.shape.clusters, kClusterBlock, [&](size_t first, size_t last) {
+        solve_shape_clusters(m.shape, s.rotation, k.shape, static_cast<uint32_t>(first), static_cast<uint32_t>(last));
+      });
+      jobs.each(m.tissue, kParticleBlock, [&](size_t first, size_t last) {
+        solve_shape_particles(m.shape, x, w, m.shape_stiffness, m.shape_relaxation, k.shape, static_cast<uint32_t>(first),
+                              static_cast<uint32_t>(last));
+      });
+    }
+  }
+  if (m.use_volume) {
+    StageTimer timer(times, Stage::volume);
+    for (int sweep = 0; sweep < m.volume_sweeps; ++sweep) {
+      uint32_t start = 0;
+      for (const uint32_t end : m.volume.colour_end) {
+        jobs.each(end - start, kParticleBlock, [&](size_t first, size_t last) {
+          solve_volume(m.volume, x, w, m.volume_compliance, h, k.volume_lambda.data(), start + static_cast<uint32_t>(first),
+                       start + static_cast<uint32_t>(last));
+        });
+        start = end;
+      }
+    }
+  }
+  ContactView view{x, k.prev.data(), w, &m.body, &s.body, &k.on_body, k.node_of_slot.data(), &s.thread, &m.thread, k.locked.data()};
+  uint32_t touching = 0;
+  {
+    StageTimer timer(times, Stage::broadphase);
+    find_tissue_pairs(m.collision, m.shape.rest.data(), x, k.candidates);
+  }
+  {
+    StageTimer timer(times, Stage::self_contact);
+    for (int sweep = 0; sweep < m.self_sweeps; ++sweep) {
+      const uint32_t n = solve_tissue_pairs(view, m.collision, k.candidates.pair, m.friction.tissue);
+      if (sweep == 0) touching += n;
+      if (n == 0) break;
+    }
+  }
+  {
+    StageTimer timer(times, Stage::attach);
+    for (Attachment& a : s.attach) solve_attachment(a, x, w, m.body, s.body, h);
+  }
+  {
+    StageTimer timer(times, Stage::rigid);
+    for (Weld& weld : s.weld) solve_weld(m.body, s.body, weld, h);
+    if (!s.channel.empty()) {
+      RigidBody& needle = s.body[kNeedle];
+      for (ChannelPoint& c : s.channel) {
+        c.at = m.needle_arc.nearest(rotate(conjugate(needle.prev_q),
+                                           Vec3{} + position_of(c.point, k.prev.data()) - needle.prev_x));
+        solve_channel(c, m.needle_arc, x, w, m.body[kNeedle], needle, h);
+      }
+    }
+  }
+  {
+    StageTimer timer(times, Stage::thread_contact);
+    std::fill(k.node_of_slot.begin(), k.node_of_slot.end(), -1);
+    std::fill(k.locked.begin(), k.locked.end(), uint8_t{0});
+    for (size_t i = 0; i < s.thread.order.size(); ++i) k.node_of_slot[s.thread.order[i] - m.thread.first_slot] = static_cast<int32_t>(i);
+    for (const ThreadAnchor& a : s.thread.anchor) k.locked[a.slot - m.thread.first_slot] = 1;
+    for (const ThreadHold& a : s.thread.hold) k.locked[a.slot - m.thread.first_slot] = 1;
+  }
+  for (int sweep = 0; sweep < m.contact_sweeps; ++sweep) {
+    uint32_t n = 0;
+    {
+      StageTimer timer(times, Stage::tool_contact);
+      n += solve_tools_on_tissue(view, m.collision, k.candidates.tool, m.friction.tool);
+    }
+    {
+      StageTimer timer(times, Stage::thread_contact);
+      n += solve_thread_on_tools(view, k.candidates.thread_tool, m.friction.thread);
+      n += solve_thread_on_tissue(view, m.collision, k.candidates.thread_tissue, m.friction.thread);
+      n += solve_thread_on_thread(view, k.candidates.thread_pair, m.friction.thread);
+      n += solve_ground(view, m.ground, m.friction.tissue);
+    }
+    if (sweep == 0) touching += n;
+    if (n == 0) break;
+  }
+  {
+    StageTimer timer(times, Stage::thread);
+    solve_thread(m.thread, s.thread, k.thread, x, w, m.body, s.body, h);
+  }
+  {
+    StageTimer timer(times, Stage::velocity);
+    jobs.each(m.count, kParticleBlock, [&](size_t first, size_t last) { update_velocities(m, s, k, first, last); });
+    for (size_t b = 0; b < s.body.size(); ++b) update_velocity(m.body[b], s.body[b], h, m.body_damping);
+  }
+  k.contacts = touching;
+  if (times) times->contacts = std::max(times->contacts, touching);
+}
+
+}  // namespace catgut

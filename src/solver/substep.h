@@ -1,0 +1,78 @@
+// solver/substep: THE loop. One call advances everything soft, rigid and thin by one substep of XPBD (Macklin et al. 2016;
+// small steps: Macklin et al. 2019). Multipliers are cleared here and nowhere else, at the start of a substep, and
+// accumulate over its sweeps: lambda / h^2 at its end is the force in newtons.
+#pragma once
+#include <vector>
+
+#include "core/jobs.h"
+#include "core/profile.h"
+#include "solver/attach.h"
+#include "solver/collide.h"
+#include "solver/contact.h"
+#include "solver/shape_match.h"
+#include "solver/thread.h"
+#include "solver/volume.h"
+
+namespace catgut {
+
+// Never changes during a run.
+struct SolverModel {
+  uint32_t tissue = 0;               // particles of soft bodies; thread particles follow
+  uint32_t count = 0;                // all particles
+  Column<float> inv_mass;            // [1/kg] per particle, 0: pinned
+  ShapeModel shape;
+  VolumeModel volume;
+  TissueCollision collision;
+  ThreadModel thread;
+  std::vector<RigidModel> body;      // 0, 1: tools; 2: needle
+  NeedleArc needle_arc;
+  float h = 1.0f / 480;              // [s] substep
+  Vec3 gravity{0, -9.81f, 0};        // [m/s^2]
+  int shape_sweeps = 1, self_sweeps = 1, contact_sweeps = 1, volume_sweeps = 1;
+  float shape_stiffness = 0.65f;     // s of solve_shape_particles at this h
+  float shape_relaxation = 1;
+  bool use_volume = false;
+  float volume_compliance = 0;
+  float damping = 0, thread_damping = 0, body_damping = 20;  // [1/s]
+  Friction friction;
+  float ground = -1e9f;              // [m] height of the drape
+};
+
+constexpr uint32_t kNeedle = 2;
+
+struct SolverState {
+  Column<Vec4> x, v;                     // position [m], velocity [m/s]
+  ClusterRotations rotation;             // warm start of the polar decompositions
+  std::vector<RigidBody> body;
+  Thread thread;
+  std::vector<Weld> weld;                // tool to hand, needle to tool
+  std::vector<Attachment> attach;        // tissue to needle tip, tissue to its closing target
+  std::vector<ChannelPoint> channel;     // needle in its channel
+  std::vector<uint8_t> thread_collides;  // per thread slot (relative)
+  std::vector<uint8_t> body_collides;    // per body
+};
+
+// Working memory and caches: never saved, never hashed; results do not depend on what is left in it.
+struct SolverScratch {
+  Column<Vec4> prev;
+  ShapeScratch shape;
+  std::vector<float> volume_lambda;
+  ThreadScratch thread;
+  Candidates candidates;
+  std::vector<BodyContact> on_body;     // contact impulses on bodies in the last substep
+  std::vector<int32_t> node_of_slot;
+  std::vector<uint8_t> locked;
+  uint32_t contacts = 0;                // touching in the last substep
+};
+
+SolverState make_solver_state(const SolverModel& model, std::span<const Vec3> position);
+void prepare_scratch(const SolverModel& model, SolverScratch& scratch);
+// Once a tick, before its substeps: who may touch whom. margin [m]: the furthest anything may move against another in a tick.
+void find_candidates(const SolverModel& model, const SolverState& state, SolverScratch& scratch, float margin,
+                     StageTimes* times);
+void substep(const SolverModel& model, SolverState& state, SolverScratch& scratch, Jobs& jobs, StageTimes* times);
+
+// [m/N] compliance per particle that a stiffness s in (0, 1] stands for at substep h, and back (XPBD: s = w / (w + alpha/h^2)).
+float stiffness_at(float stiffness, float h_reference, float h);
+
+}  // namespace catgut

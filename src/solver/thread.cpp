@@ -1,0 +1,252 @@
+// solver/thread: reads the order, anchors and holds; moves particles, tissue and bodies; writes tensions and slides.
+// The direct solve is a Newton step on all stretch constraints at once; their matrix J M^-1 J^T is tridiagonal in the order of
+// the thread. Bare Newton is singular where a slack thread folds, so it is regularised and its step limited; the sweeps
+// after it clean up. Rest-length slide at an anchor is one more coordinate s with inverse mass w of a thread particle:
+// rest[needle side] += s, rest[free side] -= s, which only adds to the two pairs beside the anchor and their coupling.
+#include "solver/thread.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace catgut {
+namespace {
+
+constexpr int kNewtonSteps = 2;
+constexpr double kRegularisation = 1e-2;  // of the diagonal; the fixed point does not depend on it
+constexpr float kLargestStep = 0.6f;      // of the spacing, per Newton step
+
+// n1^T W n2 of the node seen by two pair directions.
+float node_inverse_mass(const ThreadScratch& s, const Thread& t, size_t i, Vec3 n1, Vec3 n2,
+                        const std::vector<RigidModel>& model, const std::vector<RigidBody>& body) {
+  if (s.hold_at[i] < 0) return s.w[i] * dot(n1, n2);
+  const ThreadHold& hold = t.hold[static_cast<size_t>(s.hold_at[i])];
+  const RigidBody& b = body[static_cast<size_t>(hold.body)];
+  const RigidModel& m = model[static_cast<size_t>(hold.body)];
+  const Vec3 r = rotate(b.q, hold.local);
+  return m.inv_mass * dot(n1, n2) + dot(cross(r, n1), inverse_inertia(m, b, cross(r, n2)));
+}
+
+// Applies the positional impulse `p` to whatever node i is, and refreshes its position.
+void push_node(ThreadScratch& s, const Thread& t, size_t i, Vec3 p, Vec4* x, const float* inv_mass,
+               const std::vector<RigidModel>& model, std::vector<RigidBody>& body) {
+  if (s.anchor_at[i] >= 0) {
+    const TissuePoint& point = t.anchor[static_cast<size_t>(s.anchor_at[i])].point;
+    push(point, x, inv_mass, p);
+    s.p[i] = position_of(point, x);
+  } else if (s.hold_at[i] >= 0) {
+    const ThreadHold& hold = t.hold[static_cast<size_t>(s.hold_at[i])];
+    RigidBody& b = body[static_cast<size_t>(hold.body)];
+    push(model[static_cast<size_t>(hold.body)], b, p, rotate(b.q, hold.local));
+    s.p[i] = transform(b.pose(), hold.local);
+  } else {
+    s.p[i] += p * s.w[i];
+  }
+}
+
+}  // namespace
+
+void ThreadScratch::resize(uint32_t count) {
+  p.assign(count, {});
+  w.assign(count, 0);
+  anchor_at.assign(count, -1);
+  hold_at.assign(count, -1);
+  n.assign(count, {});
+  diag.assign(count, 0);
+  off.assign(count, 0);
+  rhs.assign(count, 0);
+  lambda.assign(count, 0);
+  bend_lambda.assign(count, 0);
+}
+
+Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vector<RigidBody>& body) {
+  const uint32_t slot = t.order[node];
+  for (const ThreadAnchor& a : t.anchor)
+    if (a.slot == slot) return position_of(a.point, x);
+  for (const ThreadHold& hold : t.hold)
+    if (hold.slot == slot) return transform(body[static_cast<size_t>(hold.body)].pose(), hold.local);
+  return xyz(x[slot]);
+}
+
+float thread_length(const Thread& t, const Vec4* x, const std::vector<RigidBody>& body) {
+  float sum = 0;
+  for (size_t i = 0; i + 1 < t.order.size(); ++i) sum += distance(thread_position(t, i, x, body), thread_position(t, i + 1, x, body));
+  return sum;
+}
+
+void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float compliance, float h, float& lambda) {
+  const Vec3 da = a - b, dc = c - b;
+  const float la = length(da), lc = length(dc);
+  if (la < 1e-9f || lc < 1e-9f) return;
+  const Vec3 u = da / la, v = dc / lc;
+  const float cosine = std::clamp(dot(u, v), -1.0f, 1.0f);
+  const float violation = cosine + 1.0f;
+  const Vec3 ga = (v - u * cosine) / la, gc = (u - v * cosine) / lc, gb = -(ga + gc);
+  const float w = wa * length2(ga) + wb * length2(gb) + wc * length2(gc);
+  const float alpha = compliance / (h * h);
+  // Near straight the violation falls with the square of the angle and w with it, so the step stays bounded; at exactly 0 or 180
+  // degrees the direction is undefined and there is nothing to apply.
+  if (w < 1e-12f * (wa + wb + wc) / (la * lc)) return;
+  float d = -(violation + alpha * lambda) / (w + alpha);
+  // A rigid bend (compliance 0) linearised far from straight would overshoot: no more than a tenth of a segment at a time.
+  const float reach = std::abs(d) * std::max({wa * length(ga), wb * length(gb), wc * length(gc)});
+  const float limit = 0.1f * std::min(la, lc);
+  if (reach > limit) d *= limit / reach;
+  lambda += d;
+  a += ga * (wa * d);
+  b += gb * (wb * d);
+  c += gc * (wc * d);
+}
+
+void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Vec4* x, const float* inv_mass,
+                  const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body, float h) {
+  const size_t nodes = thread.order.size();
+  if (nodes < 2) return;
+  const size_t pairs = nodes - 1;
+  const float inv_h2 = 1.0f / (h * h);
+  const float alpha_per_metre = model.stretch_compliance / model.spacing * inv_h2;
+
+  for (size_t i = 0; i < nodes; ++i) {
+    s.p[i] = xyz(x[thread.order[i]]);
+    s.w[i] = model.inv_mass;
+    s.anchor_at[i] = s.hold_at[i] = -1;
+  }
+  auto node_of = [&](uint32_t slot) {
+    return static_cast<size_t>(std::find(thread.order.begin(), thread.order.end(), slot) - thread.order.begin());
+  };
+  for (size_t k = 0; k < thread.anchor.size(); ++k) {
+    const size_t i = node_of(thread.anchor[k].slot);
+    s.anchor_at[i] = static_cast<int32_t>(k);
+    s.p[i] = position_of(thread.anchor[k].point, x);
+    s.w[i] = inverse_mass_of(thread.anchor[k].point, inv_mass);
+  }
+  for (size_t k = 0; k < thread.hold.size(); ++k) {
+    const size_t i = node_of(thread.hold[k].slot);
+    if (s.anchor_at[i] >= 0) continue;  // tissue keeps it: the tool's hold on it is felt through the neighbours
+    s.hold_at[i] = static_cast<int32_t>(k);
+    s.p[i] = transform(body[static_cast<size_t>(thread.hold[k].body)].pose(), thread.hold[k].local);
+    s.w[i] = 0;
+  }
+  for (int sweep = 0; sweep < model.bend_sweeps; ++sweep)
+    for (size_t i = 1; i + 1 < nodes; ++i) {
+      // Locked nodes do not give way to bending: tissue and tools are far heavier than the thread.
+      auto free_mass = [&](size_t k) { return s.anchor_at[k] < 0 && s.hold_at[k] < 0 ? s.w[k] : 0.0f; };
+      const float wa = free_mass(i - 1), wb = free_mass(i), wc = free_mass(i + 1);
+      if (wa + wb + wc > 0)
+        solve_bend(s.p[i - 1], s.p[i], s.p[i + 1], wa, wb, wc, model.bend_compliance, h, s.bend_lambda[i]);
+    }
+
+  s.rest_before.resize(thread.anchor.size());
+  for (size_t i = 1; i < pairs; ++i)
+    if (s.anchor_at[i] >= 0) s.rest_before[static_cast<size_t>(s.anchor_at[i])] = thread.rest[i];
+  if (model.direct) {
+    const float ws = model.inv_mass;  // the sliding coordinate is as heavy as a thread particle
+    // Friction of a slipping anchor is a known force on its slide, spent in the first step.
+    std::vector<ThreadAnchor>& anchors = thread.anchor;
+    float left = 1;  // part of the friction still to be spent (a limited step spends a part)
+    for (int step = 0; step < kNewtonSteps; ++step) {
+      for (size_t i = 0; i < pairs; ++i) s.n[i] = normalized(s.p[i + 1] - s.p[i], {0, 1, 0});
+      for (size_t i = 0; i < pairs; ++i) {
+        const float alpha = alpha_per_metre * thread.rest[i];
+        const double d = node_inverse_mass(s, thread, i, s.n[i], s.n[i], body_model, body) +
+                         node_inverse_mass(s, thread, i + 1, s.n[i], s.n[i], body_model, body);
+        s.diag[i] = d * (1 + kRegularisation) + alpha;
+        s.rhs[i] = -(distance(s.p[i], s.p[i + 1]) - thread.rest[i]) - alpha * s.lambda[i];
+        s.off[i] = i + 1 < pairs ? -node_inverse_mass(s, thread, i + 1, s.n[i], s.n[i + 1], body_model, body) : 0.0;
+      }
+      for (size_t i = 1; i < pairs; ++i)
+        if (s.anchor_at[i] >= 0) {
+          const ThreadAnchor& a = anchors[static_cast<size_t>(s.anchor_at[i])];
+          if (a.slipping == 0) continue;
+          const double slide = -a.slipping * double{a.friction} * h * h * ws * left;
+          s.diag[i] += ws, s.diag[i - 1] += ws;
+          s.off[i - 1] -= ws;
+          s.rhs[i] += slide;      // C of the needle side falls by the slide
+          s.rhs[i - 1] -= slide;
+        }
+      // Thomas algorithm. The matrix is symmetric positive definite.
+      for (size_t i = 1; i < pairs; ++i) {
+        const double f = s.off[i - 1] / s.diag[i - 1];
+        s.diag[i] -= f * s.off[i - 1];
+        s.rhs[i] -= f * s.rhs[i - 1];
+      }
+      for (size_t i = pairs; i-- > 0;) {
+        if (i + 1 < pairs) s.rhs[i] -= s.off[i] * s.rhs[i + 1];
+        s.rhs[i] /= s.diag[i];
+      }
+      float largest = 0;
+      for (size_t i = 0; i < nodes; ++i) {
+        if (s.hold_at[i] >= 0 || s.anchor_at[i] >= 0) continue;
+        Vec3 p{};
+        if (i > 0) p += s.n[i - 1] * static_cast<float>(s.rhs[i - 1]);
+        if (i < pairs) p -= s.n[i] * static_cast<float>(s.rhs[i]);
+        largest = std::max(largest, length2(p) * s.w[i] * s.w[i]);
+      }
+      largest = std::sqrt(largest);
+      const float limit = kLargestStep * model.spacing;
+      const float part = largest > limit ? limit / largest : 1.0f;
+      for (size_t i = 0; i < nodes; ++i) {
+        Vec3 p{};
+        if (i > 0) p += s.n[i - 1] * (part * static_cast<float>(s.rhs[i - 1]));
+        if (i < pairs) p -= s.n[i] * (part * static_cast<float>(s.rhs[i]));
+        push_node(s, thread, i, p, x, inv_mass, body_model, body);
+      }
+      for (size_t i = 0; i < pairs; ++i) s.lambda[i] += part * static_cast<float>(s.rhs[i]);
+      for (size_t i = 1; i < pairs; ++i)
+        if (s.anchor_at[i] >= 0) {
+          ThreadAnchor& a = anchors[static_cast<size_t>(s.anchor_at[i])];
+          if (a.slipping == 0) continue;
+          const float drag = -static_cast<float>(a.slipping) * a.friction * h * h * left;
+          float slide = part * ws * (drag + static_cast<float>(s.rhs[i - 1] - s.rhs[i]));
+          // Neither side can give more than it has.
+          const float least = 0.02f * model.spacing;
+          slide = std::clamp(slide, std::min(0.0f, least - thread.rest[i]), std::max(0.0f, thread.rest[i - 1] - least));
+          thread.rest[i] += slide;
+          thread.rest[i - 1] -= slide;
+        }
+      left *= 1 - part;
+    }
+  }
+
+  for (int sweep = 0; sweep < model.distance_sweeps; ++sweep)
+    for (size_t i = 0; i < pairs; ++i) {
+      const Vec3 d = s.p[i + 1] - s.p[i];
+      const float l = length(d);
+      if (l < 1e-9f) continue;
+      const Vec3 n = d / l;
+      const float alpha = alpha_per_metre * thread.rest[i];
+      const float w = node_inverse_mass(s, thread, i, n, n, body_model, body) +
+                      node_inverse_mass(s, thread, i + 1, n, n, body_model, body);
+      if (w + alpha <= 0) continue;
+      const float dl = (-(l - thread.rest[i]) - alpha * s.lambda[i]) / (w + alpha);
+      s.lambda[i] += dl;
+      push_node(s, thread, i, n * -dl, x, inv_mass, body_model, body);
+      push_node(s, thread, i + 1, n * dl, x, inv_mass, body_model, body);
+    }
+
+  for (size_t i = 0; i < nodes; ++i) set(x[thread.order[i]], s.p[i]);
+  for (size_t i = 0; i < pairs; ++i) thread.tension[i] = -s.lambda[i] * inv_h2;
+
+  // Stick or slip for the next substep, from this one's tensions.
+  for (size_t i = 1; i < pairs; ++i)
+    if (s.anchor_at[i] >= 0) {
+      ThreadAnchor& a = thread.anchor[static_cast<size_t>(s.anchor_at[i])];
+      // Friction stops a slide; it never drives one backward.
+      const float slid = thread.rest[i] - s.rest_before[static_cast<size_t>(s.anchor_at[i])];
+      if (slid * static_cast<float>(a.slipping) < 0) {
+        thread.rest[i] -= slid;
+        thread.rest[i - 1] += slid;
+        a.slipping = 0;
+      }
+      a.tension_needle = thread.tension[i];
+      a.tension_free = thread.tension[i - 1];
+      const float difference = a.tension_needle - a.tension_free;
+      const int wants = difference > a.friction ? 1 : difference < -a.friction ? -1 : 0;
+      const bool may = (wants > 0 && !a.blocked_needle) || (wants < 0 && !a.blocked_free);
+      if (a.slipping == 0) a.slipping = may ? wants : 0;
+      // While it slips the difference sits at the friction; it sticks again when the pull falls clearly below that.
+      else if (static_cast<float>(a.slipping) * difference < 0.5f * a.friction) a.slipping = 0;
+      else if ((a.slipping > 0 && a.blocked_needle) || (a.slipping < 0 && a.blocked_free)) a.slipping = 0;
+    }
+}
+
+}  // namespace catgut

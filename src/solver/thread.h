@@ -1,0 +1,85 @@
+// solver/thread: the suture thread as an XPBD chain (paper 2.1, 2.3): distance constraints between neighbours, cosine bending on
+// triplets, and a direct tridiagonal solve along the whole thread, because a Gauss-Seidel chain of 175 particles at the
+// paper's three sweeps stretches by 18 %.
+//
+// Particles keep their slot for life; `order` lists slots from the free end to the needle. A slot can be
+//   free      a particle of its own,
+//   anchored  locked to a point of the tissue: a suture point (its position and inverse mass are the tissue's), or
+//   held      locked to a place on a rigid body: the needle's swage, a tool's jaw.
+// At an anchor the thread can slide: rest length moves from the pair on one side to the pair on the other, and slides
+// until the tensions differ by no more than the friction. Sliding is solved inside the tridiagonal system, so the total rest
+// length never changes and nothing jumps.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "solver/attach.h"
+
+namespace catgut {
+
+struct ThreadModel {
+  uint32_t first_slot = 0;  // of the thread's particles in the columns
+  uint32_t count = 0;
+  float spacing = 0;              // [m] rest distance of neighbours at the start
+  float radius = 0;               // [m]
+  float inv_mass = 0;             // [1/kg] of a free particle
+  float stretch_compliance = 0;   // [m/N] per segment of length `spacing`
+  float bend_compliance = 0;      // [1/J]
+  int bend_sweeps = 1, distance_sweeps = 1;
+  bool direct = true;
+};
+
+// A suture point's hold on the thread.
+struct ThreadAnchor {
+  uint32_t slot = 0;
+  TissuePoint point;
+  float friction = 0;              // [N] tension difference beyond which thread slides
+  int slipping = 0;                // +1: toward the needle, -1: toward the free end, 0: stuck
+  bool blocked_needle = false;     // no particle left to pass toward the needle / toward the free end
+  bool blocked_free = false;
+  float tension_needle = 0, tension_free = 0;  // [N] of the pairs on its two sides, written by solve_thread
+};
+
+struct ThreadHold {
+  uint32_t slot = 0;
+  int body = 0;
+  Vec3 local;    // [m] body frame
+};
+
+struct Thread {
+  std::vector<uint32_t> order;        // slots, free end first
+  std::vector<float> rest;            // [m] per pair (order[i], order[i + 1])
+  std::vector<ThreadAnchor> anchor;   // in the order in which they were made
+  std::vector<ThreadHold> hold;
+  std::vector<float> tension;         // [N] per pair, of the last substep; negative: compressed
+};
+
+struct ThreadScratch {
+  std::vector<Vec3> p;              // per node of order
+  std::vector<float> w;             // inverse mass of the node; < 0: held by a rigid body
+  std::vector<int32_t> anchor_at;   // per node: index of its anchor, or -1
+  std::vector<int32_t> hold_at;     // per node: index of its hold, or -1
+  std::vector<Vec3> n;              // per pair: unit direction toward the needle
+  std::vector<double> diag, off, rhs;
+  std::vector<float> lambda;        // per pair, cleared at the start of a substep
+  std::vector<float> bend_lambda;   // per node
+  std::vector<float> rest_before;   // per anchor: rest length of its needle side at the start of the substep
+  void resize(uint32_t count);
+};
+
+// Position of node i of the order, whatever it is locked to.
+Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vector<RigidBody>& body);
+
+// One substep's solve: bending sweeps, direct solve, distance sweeps. Expects cleared multipliers in scratch. Moves thread particles, the tissue under anchors and the
+// bodies that hold it; writes tensions and the slide of every anchor. Substep h [s].
+void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& scratch, Vec4* x, const float* inv_mass,
+                  const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body, float h);
+
+// One cosine bending constraint (paper 2.1): C = u.v - cos(theta0) with theta0 = pi (straight). Moves the three points by XPBD.
+// Straight (u.v = -1) has no gradient and needs none; fully folded (u.v = +1) has none either: it is left to others.
+void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float compliance, float h, float& lambda);
+
+float thread_length(const Thread& t, const Vec4* x, const std::vector<RigidBody>& body);
+
+}  // namespace catgut
