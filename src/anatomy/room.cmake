@@ -1,0 +1,2 @@
+# The words of its messages.
+target_link_libraries(catgut_anatomy ${kind} fmt::fmt)

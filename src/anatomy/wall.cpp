@@ -1,0 +1,143 @@
+#include "anatomy/wall.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/check.h"
+#include "geometry/topology.h"
+
+namespace catgut {
+
+namespace {
+
+constexpr size_t kClusterMembers = 16;
+uint32_t outer(uint32_t v) { return 2 * v; }
+uint32_t inner(uint32_t v) { return 2 * v + 1; }
+
+// Members by distance from the centre: the farthest are the ones to do without.
+void keep_nearest(std::vector<uint32_t>& member, std::span<const Vec3> position) {
+  if (member.size() <= kClusterMembers) return;
+  const Vec3 c = position[member[0]];
+  std::stable_sort(member.begin() + 1, member.end(), [&](uint32_t a, uint32_t b) {
+    const float da = length2(position[a] - c), db = length2(position[b] - c);
+    return da != db ? da < db : a < b;
+  });
+  member.resize(kClusterMembers);
+  std::sort(member.begin() + 1, member.end());
+}
+
+void add_clusters(BodyRest& body, const TriangleMesh& sheet) {
+  const uint32_t n = static_cast<uint32_t>(sheet.position.size());
+  const auto next = vertex_neighbours(sheet.triangle, n);
+  body.cluster.resize(2 * n);
+  for (uint32_t v = 0; v < n; ++v) {
+    for (const uint32_t side : {0u, 1u}) {
+      auto& member = body.cluster[2 * v + side];
+      for (uint32_t u : next[v]) member.insert(member.end(), {outer(u), inner(u)});
+      member.push_back(2 * v + 1 - side);
+      std::sort(member.begin(), member.end());
+      member.insert(member.begin(), 2 * v + side);
+      keep_nearest(member, body.position);
+    }
+  }
+}
+
+// A prism between the two sides falls into three tetrahedra. Each of its square faces is cut from the inner particle of the
+// lower sheet vertex to the outer particle of the higher one: the neighbour, which sees the same two vertices, cuts it alike.
+void add_prism(std::vector<Tet>& tet, Triangle t) {
+  // Rotating the smallest to the front keeps the orientation; then at most the last two are out of order.
+  std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+  const bool flipped = t[1] > t[2];
+  if (flipped) std::swap(t[1], t[2]);
+  Tet three[3] = {{inner(t[0]), inner(t[1]), inner(t[2]), outer(t[2])},
+                  {inner(t[0]), inner(t[1]), outer(t[2]), outer(t[1])},
+                  {inner(t[0]), outer(t[1]), outer(t[2]), outer(t[0])}};
+  for (Tet& x : three) {
+    if (flipped) std::swap(x[0], x[1]);
+    tet.push_back(x);
+  }
+}
+
+void add_surface(BodyRest& body, const TriangleMesh& sheet) {
+  for (const Triangle& t : sheet.triangle) body.surface.push_back({outer(t[0]), outer(t[1]), outer(t[2])});
+  for (const Triangle& t : sheet.triangle) body.surface.push_back({inner(t[0]), inner(t[2]), inner(t[1])});
+  for (const auto& loop : boundary_loops(sheet.triangle)) {
+    Rim rim;
+    for (size_t i = 0; i < loop.size(); ++i) {
+      // boundary_loops runs against the sheet's own half-edges, which is just the way the strip must run along the outer side.
+      const uint32_t a = loop[i], b = loop[(i + 1) % loop.size()];
+      body.surface.push_back({outer(a), outer(b), inner(b)});
+      body.surface.push_back({outer(a), inner(b), inner(a)});
+      rim.outer.push_back(outer(a));
+      rim.inner.push_back(inner(a));
+    }
+    body.rim.push_back(std::move(rim));
+  }
+}
+
+// The odd particle floats in the middle of one prism, tied to its six corners and the rest of the ring round it.
+void add_extra(BodyRest& body, const Triangle& host) {
+  const uint32_t extra = static_cast<uint32_t>(body.position.size());
+  std::vector<uint32_t> member{extra};
+  Vec3 sum;
+  for (uint32_t v : host) {
+    member.push_back(outer(v));
+    member.push_back(inner(v));
+    sum += body.position[outer(v)] + body.position[inner(v)];
+  }
+  body.position.push_back(sum / 6.0f);
+  body.layer.push_back(TissueLayer::mucosa);
+  body.cluster.push_back(std::move(member));
+  // Its mean share comes out of everybody's, so that the organ weighs what it should.
+  double total = 0;
+  for (float m : body.mass) total += m;
+  for (float& m : body.mass) m *= static_cast<float>(extra) / static_cast<float>(extra + 1);
+  body.mass.push_back(static_cast<float>(total / (extra + 1)));
+}
+
+}  // namespace
+
+double tet_volume(std::span<const Vec3> position, const Tet& tet) {
+  const Vec3 o = position[tet[0]];
+  const Vec3 a = position[tet[1]] - o, b = position[tet[2]] - o, c = position[tet[3]] - o;
+  const double cx = static_cast<double>(a.y) * b.z - static_cast<double>(a.z) * b.y;
+  const double cy = static_cast<double>(a.z) * b.x - static_cast<double>(a.x) * b.z;
+  const double cz = static_cast<double>(a.x) * b.y - static_cast<double>(a.y) * b.x;
+  return (cx * c.x + cy * c.y + cz * c.z) / 6.0;
+}
+
+BodyRest thicken(const TriangleMesh& sheet, std::span<const Vec3> normal, const WallSpec& wall) {
+  CATGUT_CHECK(normal.size() == sheet.position.size() && !sheet.triangle.empty());
+  CATGUT_CHECK(wall.thickness > 0 && wall.density > 0);
+  BodyRest body;
+  const size_t n = sheet.position.size();
+  for (size_t v = 0; v < n; ++v) {
+    body.position.push_back(sheet.position[v]);
+    body.position.push_back(sheet.position[v] - normal[v] * wall.thickness);
+    body.layer.insert(body.layer.end(), {TissueLayer::serosa, TissueLayer::mucosa});
+  }
+  body.radius = 0.5f * wall.thickness;
+  for (const Triangle& t : sheet.triangle) add_prism(body.tet, t);
+  std::vector<double> mass(2 * n, 0.0);
+  size_t inverted = 0;
+  for (const Tet& t : body.tet) {
+    const double v = tet_volume(body.position, t);
+    inverted += !(v > 0);
+    for (uint32_t p : t) mass[p] += 0.25 * wall.density * v;
+  }
+  if (inverted > 0) {
+    throw InputError(wall.name,
+                     fmt::format("a wall of {:.2f} mm is too thick for this surface: it folds over itself in {} places",
+                                 1e3 * wall.thickness, inverted),
+                     "give a thinner wall, fewer particles, or smooth the surface where it bends sharply");
+  }
+  for (double m : mass) body.mass.push_back(static_cast<float>(m));
+  add_clusters(body, sheet);
+  add_surface(body, sheet);
+  if (wall.extra_particle) add_extra(body, sheet.triangle[wall.extra_triangle]);
+  body.pinned.assign(body.position.size(), 0);
+  return body;
+}
+
+}  // namespace catgut

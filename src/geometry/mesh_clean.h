@@ -1,0 +1,21 @@
+// geometry/mesh_clean: makes a manifold, evenly oriented surface of a triangle soup, or says why it cannot.
+#pragma once
+#include <string>
+
+#include "geometry/mesh.h"
+
+namespace catgut {
+
+// Length of the bounding box's diagonal; 0 for an empty mesh.
+float diagonal(const TriangleMesh& mesh);
+
+// Joins vertices nearer than `tolerance`, drops triangles that lost a corner or occur twice, and unused vertices.
+TriangleMesh weld(const TriangleMesh& mesh, float tolerance);
+
+// weld (tolerance 5e-6 of the size: 1e-6 m for an organ of 0.2 m), then: every edge in at most two triangles, all triangles
+// turned the same way and outward (openings thought closed), vertices that join two fans split, specks (below 1 % of the
+// area) dropped. where: the file, for messages. Throws InputError: no triangles, no area, edges shared by more than two
+// triangles, a surface with one side only, several pieces of which none is a speck.
+TriangleMesh clean_mesh(const TriangleMesh& mesh, const std::string& where);
+
+}  // namespace catgut

@@ -1,0 +1,177 @@
+#include "anatomy/bowel.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+
+#include "body_checks.h"
+#include "core/check.h"
+#include "geometry/polygon.h"
+
+namespace catgut {
+namespace {
+
+BowelShape shape_with(int particles) {
+  BowelShape shape;
+  shape.particles = particles;
+  return shape;
+}
+
+TEST(Bowel, HasExactlyTheParticlesAsked) {
+  for (const int n : {200, 401, 1185, 1228, 4054}) {
+    SCOPED_TRACE(n);
+    const BodyRest body = make_bowel(shape_with(n));
+    expect_sound(body, static_cast<size_t>(n));
+    EXPECT_EQ(euler_characteristic(body.surface), 0);  // a tube with a wall is a torus
+    EXPECT_EQ(body.rim.size(), 2u);
+    const double mass = std::accumulate(body.mass.begin(), body.mass.end(), 0.0);
+    EXPECT_NEAR(mass, 1050 * total_tet_volume(body), 1e-4 * mass);
+  }
+}
+
+TEST(Bowel, WallHasTheVolumeOfTheTube) {
+  for (const int n : {401, 1185, 1228, 4054}) {
+    BowelShape shape = shape_with(n);
+    shape.haustra = 0;
+    const BodyRest body = make_bowel(shape);
+    const double smooth = 3.14159265 * (0.02 * 0.02 - 0.0175 * 0.0175) * 0.07;
+    // A ring of 16 is a coarse polygon, 2.6 % smaller than its circle.
+    EXPECT_NEAR(total_tet_volume(body), smooth, (n > 1000 ? 0.02 : 0.03) * smooth);
+  }
+}
+
+TEST(Bowel, RimIsTheCircleOfTheSpecification) {
+  BowelShape shape;
+  shape.position = {0.01f, 0.3f, -0.2f};
+  shape.axis = {1, 2, 0.5f};
+  const BodyRest body = make_bowel(shape);
+  expect_sound(body, 1228);
+  const auto loop = points(body, body.rim[0].outer);
+  EXPECT_NEAR(loop_length(loop), 0.126, 0.001);
+  EXPECT_NEAR(distance(loop_centre(loop), shape.position), 0, 1e-5);
+  EXPECT_NEAR(dot(loop_normal(loop), normalized(shape.axis)), 1, 1e-5);
+  EXPECT_NEAR(dot(loop_normal(points(body, body.rim[1].outer)), normalized(shape.axis)), -1, 1e-5);
+  for (size_t i = 0; i < loop.size(); ++i) {
+    EXPECT_NEAR(distance(loop[i], loop[(i + 1) % loop.size()]), distance(loop[0], loop[1]), 1e-5);
+    EXPECT_NEAR(distance(body.position[body.rim[0].inner[i]], loop[i]), 0.0025, 1e-5);
+  }
+}
+
+TEST(Bowel, ParticlesAreEvenlySpaced) {
+  for (const int n : {401, 1185, 1228, 4054}) {
+    const BodyRest body = make_bowel(shape_with(n));
+    double sum = 0, low = 1, high = 0;
+    size_t count = 0;
+    int worst_valence = 6;
+    for (uint32_t v = 0; v + 1 < body.position.size(); v += 2) {  // outer side
+      int valence = 0;
+      for (const uint32_t m : body.cluster[v]) {
+        if (m == v || m % 2 == 1) continue;
+        const double d = distance(body.position[v], body.position[m]);
+        sum += d, ++count, low = std::min(low, d), high = std::max(high, d), ++valence;
+      }
+      worst_valence = std::max(worst_valence, valence);
+    }
+    const double mean = sum / static_cast<double>(count);
+    std::printf("%d particles: spacing mean %.2f mm, %.2f..%.2f, largest valence %d, rim %zu\n", n, 1e3 * mean, 1e3 * low,
+                1e3 * high, worst_valence, body.rim[0].outer.size());
+    EXPECT_GT(low, 0.75 * mean);
+    EXPECT_LT(high, 1.35 * mean);
+    EXPECT_LE(worst_valence, 7);
+  }
+}
+
+TEST(Bowel, ClusterLinksGoBothWays) {
+  const BodyRest body = make_bowel(shape_with(1228));
+  size_t one_way = 0;
+  for (uint32_t c = 0; c < body.cluster.size(); ++c) {
+    for (const uint32_t m : body.cluster[c]) {
+      const auto& back = body.cluster[m];
+      one_way += std::find(back.begin(), back.end(), c) == back.end();
+    }
+  }
+  EXPECT_EQ(one_way, 0u);
+}
+
+TEST(Bowel, ClosedEndsClose) {
+  for (const bool near : {false, true}) {
+    for (const bool far : {false, true}) {
+      SCOPED_TRACE(2 * near + far);
+      BowelShape shape = shape_with(1185);
+      shape.closed_end = near;
+      shape.closed_start = far;
+      const BodyRest body = make_bowel(shape);
+      expect_sound(body, 1185);
+      EXPECT_EQ(body.rim.size(), static_cast<size_t>(!near) + static_cast<size_t>(!far));
+      EXPECT_EQ(euler_characteristic(body.surface), near && far ? 4 : near || far ? 2 : 0);  // two spheres, one, a torus
+      float low = 1;
+      for (const Vec3 p : body.position) low = std::min(low, p.y);
+      EXPECT_NEAR(low, -0.07, 1e-4);
+      if (!near) { EXPECT_NEAR(loop_length(points(body, body.rim[0].outer)), 0.126, 0.0015); }
+    }
+  }
+}
+
+TEST(Bowel, OnlyTheFarEndIsHeld) {
+  BowelShape shape = shape_with(1185);
+  const BodyRest body = make_bowel(shape);
+  size_t held = 0;
+  for (size_t i = 0; i < body.position.size(); ++i) {
+    held += body.pinned[i];
+    EXPECT_EQ(body.pinned[i] != 0, body.position[i].y < -0.062f) << i;
+  }
+  EXPECT_GT(held, 100u);
+  shape.pinned_length = 0;
+  const BodyRest free = make_bowel(shape);
+  EXPECT_EQ(std::accumulate(free.pinned.begin(), free.pinned.end(), 0), 0);
+}
+
+TEST(Bowel, PicturePassesThroughTheParticles) {
+  const BodyRest body = make_bowel(BowelShape{});
+  for (size_t i = 0; i < body.position.size(); ++i) {
+    const TissueLayer layer = body.layer[i];
+    float nearest = 1;
+    for (size_t v = 0; v < body.visible.position.size(); ++v) {
+      if (body.visible.layer[v] != layer) continue;
+      const Vec3 d = body.position[i] - body.visible.position[v];
+      if (length2(d) < 1.5e-6f) nearest = std::min(nearest, std::abs(dot(d, body.visible.normal[v])));
+    }
+    ASSERT_LT(nearest, 5e-5f) << i;
+  }
+}
+
+TEST(Bowel, SameShapeSameBits) {
+  const BodyRest a = make_bowel(shape_with(1185)), b = make_bowel(shape_with(1185));
+  EXPECT_TRUE(std::equal(a.position.begin(), a.position.end(), b.position.begin()));
+  EXPECT_EQ(a.cluster, b.cluster);
+  EXPECT_EQ(a.visible.skin_weight, b.visible.skin_weight);
+}
+
+TEST(Bowel, RefusesWhatCannotBeBuilt) {
+  const auto message = [](BowelShape shape) {
+    try {
+      make_bowel(shape);
+    } catch (const InputError& e) { return std::string(e.what()); }
+    return std::string("accepted");
+  };
+  BowelShape shape;
+  shape.wall = 0.015f;
+  EXPECT_NE(message(shape).find("wall"), std::string::npos);
+  shape = {};
+  shape.particles = 10;
+  EXPECT_NE(message(shape).find("particles"), std::string::npos);
+  shape = {};
+  shape.axis = {0, 0, 0};
+  EXPECT_NE(message(shape).find("axis"), std::string::npos);
+  shape = {};
+  shape.radius = 20;
+  EXPECT_NE(message(shape).find("metres"), std::string::npos);
+  shape = {};
+  shape.pinned_length = NAN;
+  EXPECT_NE(message(shape).find("pinned_length"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace catgut
