@@ -40,6 +40,7 @@ struct PictureModel {
   std::array<ToolKind, 2> tool{ToolKind::needle_driver, ToolKind::forceps};
   Vec3 focus;                           // [m] centre of the operating field
   float field = 0.1f;                   // [m] its radius
+  float drape = -0.035f;                // [m] height of the sterile drape (horizontal), which the organ stands up through
   std::vector<std::vector<uint32_t>> rim;  // tissue particles round each opening, in order (outer layer)
 };
 

@@ -1,0 +1,255 @@
+// sim/build: turns a scene's description into a Model and its first State. Reads SceneSpec; calls the anatomy; throws InputError for
+// what a scene may get wrong. Nothing here runs during a tick.
+#include <cmath>
+#include <numeric>
+
+#include "anatomy/bowel.h"
+#include "core/check.h"
+#include "sim/model.h"
+#include "sim/state.h"
+#include "suture/needle.h"
+
+namespace catgut {
+namespace {
+
+constexpr float kPaperSubstep = 1.0f / 480;  // [s] at which the paper's deformation resistance is meant
+constexpr float kDrapeBelowRim = 0.035f;     // [m]
+
+BodyRest make_body(const BodySpec& spec) {
+  BowelShape s;
+  s.name = spec.name;
+  s.particles = spec.particles;
+  s.radius = spec.radius;
+  s.length = spec.length;
+  s.wall = spec.wall;
+  s.closed_start = spec.closed_start;
+  s.closed_end = spec.closed_end;
+  s.haustra = spec.haustra;
+  s.taeniae = spec.taeniae;
+  s.position = spec.position;
+  s.axis = spec.axis;
+  s.density = spec.density;
+  s.pinned_length = spec.pinned_length;
+  return make_bowel(s);
+}
+
+// The thread lies on the drape in even turns, beginning at `start` and leading away along +x: what a nurse would hand over.
+std::vector<Vec3> lay_thread(const ThreadSpec& spec, Vec3 start) {
+  constexpr float kRow = 0.07f, kTurn = 0.005f;  // [m] length of a row, radius of its turns
+  const float turn = kPi * kTurn;
+  std::vector<Vec3> p;
+  for (int i = 0; i < spec.particles; ++i) {
+    const float along = static_cast<float>(i) * spec.spacing;
+    const float period = kRow + turn;
+    const int row = static_cast<int>(along / period);
+    const float in_row = along - static_cast<float>(row) * period, way = row % 2 == 0 ? 1.0f : -1.0f;
+    const float x0 = 2 * kTurn * static_cast<float>(row), z0 = row % 2 == 0 ? 0.0f : kRow;
+    Vec3 q;
+    if (in_row < kRow) {
+      q = {x0, 0, z0 + way * in_row};
+    } else {
+      const float a = (in_row - kRow) / kTurn;
+      q = {x0 + kTurn * (1 - std::cos(a)), 0, z0 + way * (kRow + kTurn * std::sin(a))};
+    }
+    p.push_back(start + q);
+  }
+  return p;
+}
+
+RigidModel tool_body() {
+  RigidModel m;
+  m.inv_mass = 1 / 0.05f;
+  m.inv_inertia = {2e4f, 2e4f, 4e4f};
+  m.capsule.push_back({{0, 0, 0.0015f}, {0, 0, 0.016f}, 0.0012f});  // jaws
+  m.capsule.push_back({{0, 0, 0.018f}, {0, 0, 0.12f}, 0.0025f});    // shaft
+  return m;
+}
+
+}  // namespace
+
+bool apply_preset(SolverSpec& s, const std::string& preset) {
+  const SolverSpec standard;
+  if (preset == "default") {
+    s = standard;
+    return true;
+  }
+  if (preset != "paper") return false;
+  s = standard;
+  s.preset = "paper";
+  s.substeps = 8;
+  s.shape_sweeps = 2;
+  s.shape_stiffness = 0.65f;
+  s.shape_relaxation = 1;
+  s.distance_sweeps = 3;
+  s.bend_sweeps = 3;
+  s.bend_compliance = 0.02f;
+  s.self_contact_sweeps = 10;
+  s.contact_sweeps = 5;
+  return true;
+}
+
+std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
+  auto model = std::make_shared<Model>();
+  Model& m = *model;
+  m.scene = scene;
+  const std::string where = scene.name.empty() ? "scene" : scene.name;
+  if (scene.body.empty()) throw InputError(where, "it has no [[body]]", "add at least one soft body");
+  if (scene.thread.particles < 8) throw InputError(where, "thread.particles is below 8", "a thread needs at least 8 particles");
+  m.dt = 1.0f / scene.solver.tick_rate;
+  m.substeps = scene.solver.substeps;
+
+  // Soft bodies one after the other in the columns; the thread after them.
+  SolverModel& s = m.solver;
+  std::vector<Vec3> rest;
+  std::vector<float> mass, radius, apart;
+  std::vector<uint32_t> body;
+  std::vector<std::vector<uint32_t>> cluster;
+  std::vector<Tet> tet;
+  std::vector<Triangle> surface;
+  float wall = 0.0025f;
+  for (size_t b = 0; b < scene.body.size(); ++b) {
+    BodyRest r = make_body(scene.body[b]);
+    const uint32_t first = static_cast<uint32_t>(rest.size());
+    if (b == 0) wall = scene.body[b].wall;
+    double spacing = 0;
+    size_t edges = 0;
+    for (const Triangle& t : r.surface)
+      for (size_t k = 0; k < 3; ++k) spacing += distance(r.position[t[k]], r.position[t[(k + 1) % 3]]), ++edges;
+    spacing /= static_cast<double>(edges);
+    for (size_t i = 0; i < r.position.size(); ++i) {
+      rest.push_back(r.position[i]);
+      mass.push_back(r.mass[i]);
+      s.inv_mass.push_back(r.pinned[i] ? 0.0f : 1.0f / r.mass[i]);
+      radius.push_back(r.radius);
+      apart.push_back(static_cast<float>(2.2 * spacing));
+      body.push_back(static_cast<uint32_t>(b));
+    }
+    for (auto& c : r.cluster) {
+      for (uint32_t& i : c) i += first;
+      cluster.push_back(std::move(c));
+    }
+    for (Tet t : r.tet) tet.push_back({t[0] + first, t[1] + first, t[2] + first, t[3] + first});
+    for (Triangle t : r.surface) surface.push_back({t[0] + first, t[1] + first, t[2] + first});
+    for (const Rim& rim : r.rim) {
+      std::vector<uint32_t> outer = rim.outer, inner = rim.inner;
+      for (uint32_t& i : outer) i += first;
+      for (uint32_t& i : inner) i += first;
+      if (m.purse_string.rim_outer.empty()) m.purse_string.rim_outer = outer, m.purse_string.rim_inner = inner;
+      m.picture.rim.push_back(outer);
+    }
+    for (auto& k : r.visible.skin_particle)
+      for (uint32_t& i : k) i += first;
+    m.picture.body.push_back(std::move(r.visible));
+  }
+  s.tissue = static_cast<uint32_t>(rest.size());
+  s.count = s.tissue + static_cast<uint32_t>(scene.thread.particles);
+  s.inv_mass.resize(s.count, 1.0f / scene.thread.mass);
+  s.shape = make_shape_model(rest, mass, cluster);
+  s.use_volume = scene.solver.volume;
+  s.volume_compliance = scene.solver.volume_compliance;
+  if (s.use_volume) s.volume = make_volume_model(rest, tet);
+  s.collision = make_tissue_collision(s.shape.rest, radius, body, apart, surface);
+
+  s.h = m.dt / static_cast<float>(m.substeps);
+  s.gravity = scene.solver.gravity;
+  s.shape_sweeps = scene.solver.shape_sweeps;
+  s.shape_stiffness = stiffness_at(scene.solver.shape_stiffness, kPaperSubstep, s.h);
+  s.shape_relaxation = scene.solver.shape_relaxation;
+  s.self_sweeps = scene.solver.self_contact_sweeps;
+  s.contact_sweeps = scene.solver.contact_sweeps;
+  s.damping = scene.solver.damping;
+  s.thread_damping = scene.solver.thread_damping;
+  s.friction = {scene.solver.friction_tissue, scene.solver.friction_tool, scene.solver.friction_thread};
+  ThreadModel& t = s.thread;
+  t.first_slot = s.tissue;
+  t.count = static_cast<uint32_t>(scene.thread.particles);
+  t.spacing = scene.thread.spacing;
+  t.radius = scene.thread.radius;
+  t.inv_mass = 1.0f / scene.thread.mass;
+  t.stretch_compliance = scene.thread.stretch_compliance;
+  t.bend_compliance = scene.solver.bend_compliance;
+  t.bend_sweeps = scene.solver.bend_sweeps;
+  t.distance_sweeps = scene.solver.distance_sweeps;
+  t.direct = scene.solver.thread_direct;
+
+  const NeedleShape needle{scene.needle.radius, scene.needle.arc, scene.needle.wire_radius, scene.needle.mass};
+  s.needle_arc = needle_arc(needle);
+  s.body = {tool_body(), tool_body(), needle_body(needle)};
+  s.ground = scene.body[0].position.y - kDrapeBelowRim;
+
+  SutureModel& u = m.suture;
+  u.attach_threshold = scene.suture.attach_threshold;
+  u.release_distance = scene.suture.release_distance;
+  u.attach_compliance = scene.suture.attach_compliance;
+  u.channel_compliance = scene.suture.channel_compliance;
+  u.pass_tension = scene.suture.pass_tension;
+  u.collision_off = scene.suture.collision_off;
+  u.grasp_reach = scene.suture.grasp_reach;
+
+  m.has_technique = scene.technique.name == "purse_string";
+  if (!m.has_technique && scene.technique.name != "none")
+    throw InputError(where, "technique.name \"" + scene.technique.name + "\" is not known", "use \"purse_string\" or \"none\"");
+  if (m.has_technique && m.purse_string.rim_inner.empty())
+    throw InputError(where, "a purse-string needs an opening and no body has one", "leave one end of the body open");
+  m.purse_string.anvil = scene.technique.anvil;
+  m.purse_string.anvil_radius = scene.technique.anvil_radius;
+  m.purse_string.compliance = scene.technique.closure_compliance;
+  m.purse_string.min_bites = scene.technique.min_bites;
+  m.purse_string.wall = wall;
+
+  // The needle lies on the drape to the right of the organ, its circle flat, the thread leading away from its swage.
+  m.start = rest;
+  const Vec3 rim = scene.body[0].position;
+  const Pose flat{{}, axis_angle({1, 0, 0}, -0.5f * kPi)};  // body z up: the circle lies in the drape's plane
+  const float wire = s.ground + scene.needle.wire_radius + 0.0002f;
+  m.needle_start = {Vec3{rim.x + scene.body[0].radius + 0.03f, wire, rim.z + 0.01f}, flat.q};
+  const Vec3 swage = transform(m.needle_start, s.needle_arc.point(0));
+  std::vector<Vec3> thread = lay_thread(scene.thread, swage);
+  for (size_t i = thread.size(); i-- > 0;) m.start.push_back(thread[i]);  // free end first
+  m.tool_start = {Pose{rim + Vec3{0.12f, 0.10f, 0.05f}, {}}, Pose{rim + Vec3{-0.12f, 0.10f, 0.05f}, {}}};
+
+  PictureModel& p = m.picture;
+  p.title = scene.title;
+  p.particle_rest = rest;
+  p.thread_first = s.tissue;
+  p.thread_count = t.count;
+  p.thread_radius = t.radius;
+  p.needle_radius = scene.needle.radius;
+  p.needle_arc = scene.needle.arc;
+  p.needle_wire_radius = scene.needle.wire_radius;
+  p.focus = rim;
+  p.field = 3 * scene.body[0].radius;
+  p.drape = s.ground;
+  return model;
+}
+
+const SceneSpec& scene_of(const Model& model) { return model.scene; }
+size_t particle_count(const Model& model) { return model.solver.count; }
+void StateDeleter::operator()(State* s) const { delete s; }
+
+StatePtr initial_state(const Model& model) {
+  StatePtr state(new State);
+  State& s = *state;
+  s.solver = make_solver_state(model.solver, model.start);
+  prepare_scratch(model.solver, s.scratch);
+  for (size_t k = 0; k < 2; ++k) {
+    RigidBody& tool = s.solver.body[k];
+    tool.x = tool.prev_x = model.tool_start[k].p;
+    tool.q = tool.prev_q = model.tool_start[k].q;
+    s.hand[k] = model.tool_start[k];
+    Weld hand;
+    hand.a = static_cast<int>(k);
+    hand.target = model.tool_start[k];
+    s.solver.weld.push_back(hand);
+    s.solver.body_collides[k] = 0;
+  }
+  RigidBody& needle = s.solver.body[kNeedle];
+  needle.x = needle.prev_x = model.needle_start.p;
+  needle.q = needle.prev_q = model.needle_start.q;
+  // The thread's last particle is the needle's: swaged on.
+  s.solver.thread.hold.push_back({s.solver.thread.order.back(), static_cast<int>(kNeedle), model.solver.needle_arc.point(0)});
+  update_thread_collisions(model.solver, s.solver, model.suture);
+  return state;
+}
+
+}  // namespace catgut

@@ -1,0 +1,31 @@
+// sim/model: everything about a scene that never changes. Written by sim/build, read by every stage.
+#pragma once
+#include <vector>
+
+#include "anatomy/body.h"
+#include "sim/scene.h"
+#include "sim/simulation.h"
+#include "solver/substep.h"
+#include "suture/suture.h"
+#include "technique/purse_string.h"
+
+namespace catgut {
+
+struct Model {
+  SceneSpec scene;
+  SolverModel solver;
+  SutureModel suture;
+  PurseStringModel purse_string;
+  bool has_technique = false;
+  float dt = 1.0f / 60;  // [s] tick
+  int substeps = 8;
+  std::vector<Vec3> start;           // [m] of every particle
+  std::vector<Pose> tool_start;      // of the two tools
+  Pose needle_start;                 // body frame
+  float hand_compliance = 1.0f / 3000, hand_angular_compliance = 0.05f;  // [m/N], [rad/(N m)] tool on its hand
+  PictureModel picture;
+};
+
+// How the suture thread and the needle lie at the start is part of building the model.
+
+}  // namespace catgut

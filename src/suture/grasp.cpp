@@ -1,0 +1,75 @@
+// suture/grasp: jaws that hold needle or thread. Reads jaws and poses; adds and removes welds and thread holds.
+#include <algorithm>
+
+#include "suture/suture.h"
+
+namespace catgut {
+namespace {
+
+constexpr float kClosed = 0.35f, kOpen = 0.5f;  // jaw thresholds, apart so that a trembling finger does not drop the needle
+
+void let_go(SolverState& solver, HandState& hand, uint8_t who, std::vector<Event>& events) {
+  const int body = who;
+  if (hand.held == Held::needle) {
+    std::erase_if(solver.weld, [&](const Weld& w) { return w.a == static_cast<int>(kNeedle) && w.b == body; });
+    events.push_back({0, EventKind::needle_released, who, 0, hand.at, solver.body[static_cast<size_t>(body)].x});
+  } else if (hand.held == Held::thread) {
+    std::erase_if(solver.thread.hold, [&](const ThreadHold& h) { return h.body == body; });
+    events.push_back({0, EventKind::thread_released, who, hand.slot, 0, solver.body[static_cast<size_t>(body)].x});
+  }
+  hand.held = Held::nothing;
+}
+
+}  // namespace
+
+void grasp(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+           const std::array<ToolInput, 2>& input, std::vector<Event>& events) {
+  for (uint8_t who = 0; who < 2; ++who) {
+    HandState& hand = state.hand[who];
+    const float jaw = input[who].connected ? input[who].jaw : hand.jaw;
+    const bool closing = hand.jaw > kClosed && jaw <= kClosed;
+    hand.jaw = jaw;
+    if (hand.held != Held::nothing) {
+      if (jaw >= kOpen) {
+        let_go(solver, hand, who, events);
+        update_thread_collisions(model, solver, suture);
+      }
+      continue;
+    }
+    if (!closing) continue;
+    const RigidBody& tool = solver.body[who];
+    const RigidBody& needle = solver.body[kNeedle];
+    const float phi = model.needle_arc.nearest(to_local(needle.pose(), tool.x));
+    if (distance(needle_point(model.needle_arc, needle, phi), tool.x) <= suture.grasp_reach) {
+      Weld w;
+      w.a = static_cast<int>(kNeedle);
+      w.b = who;
+      // Held where and as it was caught: the same world frame seen from both bodies.
+      w.local_a = inverse(needle.pose()) * tool.pose();
+      w.compliance = suture.grasp_compliance;
+      w.angular_compliance = suture.grasp_angular_compliance;
+      solver.weld.push_back(w);
+      hand.held = Held::needle;
+      hand.at = phi / model.needle_arc.arc;
+      events.push_back({0, EventKind::needle_grasped, who, 0, hand.at, tool.x});
+      continue;
+    }
+    float best = suture.grasp_reach;
+    int32_t found = -1;
+    for (uint32_t slot : solver.thread.order) {
+      const bool taken = std::any_of(solver.thread.anchor.begin(), solver.thread.anchor.end(), [&](auto& a) { return a.slot == slot; }) ||
+                         std::any_of(solver.thread.hold.begin(), solver.thread.hold.end(), [&](auto& h) { return h.slot == slot; });
+      const float d = distance(xyz(solver.x[slot]), tool.x);
+      if (!taken && d < best) best = d, found = static_cast<int32_t>(slot);
+    }
+    if (found >= 0) {
+      hand.held = Held::thread;
+      hand.slot = static_cast<uint32_t>(found);
+      solver.thread.hold.push_back({hand.slot, who, to_local(tool.pose(), xyz(solver.x[hand.slot]))});
+      update_thread_collisions(model, solver, suture);
+      events.push_back({0, EventKind::thread_grasped, who, hand.slot, 0, tool.x});
+    }
+  }
+}
+
+}  // namespace catgut

@@ -1,0 +1,134 @@
+// suture/pull: thread through suture points (paper 2.3, figures 7 to 9). Reads tensions and rest lengths; edits the order list, never
+// a slot. Thread slides at an anchor inside the solver (see solver/thread); here, when the pair on one side of an anchor is used up, its
+// particle passes: it takes its new place in the order and stands at the midpoint of the pair it splits (figure 7c).
+// Slack is resolved in the paper's order (figure 9) because tension is: a span with slack has none, so the anchor next to the pull slides
+// first, and the one behind it only when the span between them is taut.
+#include <algorithm>
+
+#include "suture/suture.h"
+
+namespace catgut {
+namespace {
+
+constexpr float kUsedUp = 0.1f;  // of the spacing: the pair beside an anchor is so short that its particle's turn has come
+
+bool is_locked(const Thread& t, uint32_t slot) {
+  return std::any_of(t.anchor.begin(), t.anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot; }) ||
+         std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) { return h.slot == slot; });
+}
+
+size_t node_of(const Thread& t, uint32_t slot) {
+  return static_cast<size_t>(std::find(t.order.begin(), t.order.end(), slot) - t.order.begin());
+}
+
+}  // namespace
+
+void move_particle(Thread& t, size_t from, size_t after) {
+  // Figure 8: the two pairs at the old place become one, the pair at the new place becomes two.
+  const uint32_t slot = t.order[from];
+  const float joined = t.rest[from - 1] + t.rest[from];
+  const float half = 0.5f * t.rest[after];
+  if (from < after) {
+    // rest: [.. from-1, from, from+1 .. after ..] -> [.. joined, from+1 .. after-1, half, half ..]
+    t.rest[from - 1] = joined;
+    std::move(t.rest.begin() + static_cast<long>(from) + 1, t.rest.begin() + static_cast<long>(after), t.rest.begin() + static_cast<long>(from));
+    t.rest[after - 1] = t.rest[after] = half;
+    std::move(t.order.begin() + static_cast<long>(from) + 1, t.order.begin() + static_cast<long>(after) + 1, t.order.begin() + static_cast<long>(from));
+    t.order[after] = slot;
+  } else {
+    // rest: [.. after, after+1 .. from-2, from-1, from ..] -> [.. half, half, after+1 .. from-2, joined ..]
+    t.rest[from] = joined;
+    std::move_backward(t.rest.begin() + static_cast<long>(after) + 1, t.rest.begin() + static_cast<long>(from) - 1, t.rest.begin() + static_cast<long>(from));
+    t.rest[after] = t.rest[after + 1] = half;
+    std::move_backward(t.order.begin() + static_cast<long>(after) + 1, t.order.begin() + static_cast<long>(from), t.order.begin() + static_cast<long>(from) + 1);
+    t.order[after + 1] = slot;
+  }
+}
+
+void update_thread_collisions(const SolverModel& model, SolverState& solver, const SutureModel& suture) {
+  std::fill(solver.thread_collides.begin(), solver.thread_collides.end(), uint8_t{1});
+  const int nodes = static_cast<int>(solver.thread.order.size());
+  auto off = [&](uint32_t slot) {
+    const int at = static_cast<int>(node_of(solver.thread, slot));
+    for (int i = std::max(0, at - suture.collision_off); i <= std::min(nodes - 1, at + suture.collision_off); ++i)
+      solver.thread_collides[solver.thread.order[static_cast<size_t>(i)] - model.thread.first_slot] = 0;
+  };
+  for (const ThreadAnchor& a : solver.thread.anchor) off(a.slot);
+  for (const ThreadHold& h : solver.thread.hold) off(h.slot);
+}
+
+float length_between_ends(const SolverState& solver) {
+  const Thread& t = solver.thread;
+  if (t.anchor.size() < 2) return 0;
+  size_t lo = t.order.size(), hi = 0;
+  for (const ThreadAnchor& a : t.anchor) {
+    const size_t i = node_of(t, a.slot);
+    lo = std::min(lo, i);
+    hi = std::max(hi, i);
+  }
+  float sum = 0;
+  for (size_t i = lo; i < hi; ++i) sum += t.rest[i];
+  return sum;
+}
+
+bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                        uint32_t bite, bool exit, std::vector<Event>& events) {
+  Thread& t = solver.thread;
+  if (t.order.size() < 3) return false;
+  const size_t node = t.order.size() - 2;  // the last is the needle's own
+  const uint32_t slot = t.order[node];
+  if (is_locked(t, slot)) return false;
+  const BiteEnd& end = exit ? state.bite[bite].exit : state.bite[bite].entry;
+  ThreadAnchor a;
+  a.slot = slot;
+  a.point = end.point;
+  a.friction = suture.pass_tension;
+  // The particle steps forward to the hole. Rest length goes with it, so neither side is stretched or squeezed by that.
+  const Vec3 at = position_of(end.point, solver.x.data());
+  const float sum = t.rest[node - 1] + t.rest[node];
+  const float to_needle = std::clamp(distance(at, xyz(solver.x[t.order[node + 1]])), 0.15f * model.thread.spacing, 0.9f * sum);
+  t.rest[node] = to_needle;
+  t.rest[node - 1] = sum - to_needle;
+  set(solver.x[slot], at);
+  solver.v[slot] = {};
+  t.anchor.push_back(a);
+  state.point.push_back({bite, exit, static_cast<uint32_t>(t.anchor.size() - 1)});
+  update_thread_collisions(model, solver, suture);
+  events.push_back({0, EventKind::suture_point, 0, static_cast<uint32_t>(state.point.size() - 1), static_cast<float>(bite), at});
+  return true;
+}
+
+void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, std::vector<Event>& events) {
+  Thread& t = solver.thread;
+  const float used_up = kUsedUp * model.thread.spacing;
+  bool changed = false;
+  for (size_t k = state.point.size(); k-- > 0;) {
+    ThreadAnchor& a = t.anchor[state.point[k].anchor];
+    const size_t i = node_of(t, a.slot);
+    const bool was_blocked = a.blocked_needle;
+    const bool can_give_free = i >= 2 && !is_locked(t, t.order[i - 1]);
+    const bool can_give_needle = i + 2 < t.order.size() && !is_locked(t, t.order[i + 1]);
+    a.blocked_needle = !can_give_free && t.rest[i - 1] <= used_up;
+    a.blocked_free = !can_give_needle && t.rest[i] <= used_up;
+    if (a.blocked_needle && !was_blocked && i == 1)
+      events.push_back({0, EventKind::thread_ran_out, 0, static_cast<uint32_t>(k), 0, position_of(a.point, solver.x.data())});
+
+    // Toward the needle: the particle on the free side splits the pair on the needle side; the other way round for a pull on the tail.
+    const bool forward = can_give_free && t.rest[i - 1] <= used_up;
+    const bool backward = !forward && can_give_needle && t.rest[i] <= used_up;
+    if (!forward && !backward) continue;
+    const uint32_t slot = t.order[forward ? i - 1 : i + 1];
+    const uint32_t beyond = t.order[forward ? i + 1 : i - 1];
+    if (forward) move_particle(t, i - 1, i);
+    else move_particle(t, i + 1, i - 1);
+    const Vec3 here = position_of(a.point, solver.x.data()), there = xyz(solver.x[beyond]);
+    set(solver.x[slot], lerp(here, there, 0.5f));
+    const Vec3 velocity = 0.5f * (xyz(solver.v[beyond]) + xyz(solver.v[a.slot]));
+    set(solver.v[slot], velocity);
+    changed = true;
+    events.push_back({0, EventKind::particle_passed, 0, static_cast<uint32_t>(k), forward ? 1.0f : -1.0f, here});
+  }
+  if (changed) update_thread_collisions(model, solver, suture);
+}
+
+}  // namespace catgut

@@ -1,0 +1,180 @@
+// suture/puncture: the needle's two triggers (paper 2.2, figures 4 and 5). Reads the needle and the tissue's surface; writes bites, the
+// attachment of the nearest particle, the channel in which the shaft runs, and asks for suture points.
+// The tip is tracked against the surface itself, so a bite keeps where it went in and out to a fraction of a millimetre; the nearest
+// particle is what drags the tissue along, as in the paper.
+#include <algorithm>
+#include <cmath>
+
+#include "suture/suture.h"
+
+namespace catgut {
+namespace {
+
+constexpr float kReach = 0.008f;         // [m] the tip looks this far for the surface
+constexpr float kEndReached = 0.0008f;   // [m] along the shaft: an end of the needle is at the hole
+constexpr float kHysteresis = 0.00002f;  // [m] so that a tip resting on the surface does not chatter
+
+ChannelPoint channel_at(const SutureModel& suture, const BiteEnd& end) {
+  ChannelPoint c;
+  c.point = end.point;
+  c.compliance = suture.channel_compliance;
+  c.drag = suture.channel_drag;
+  return c;
+}
+
+void drop_attachment(SolverState& solver, SutureState& state) {
+  if (!state.attached) return;
+  std::erase_if(solver.attach, [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
+  state.attached = false;
+}
+
+}  // namespace
+
+bool nearest_surface(const SolverModel& model, const Candidates& candidates, const Vec4* x, Vec3 p, float reach, SurfaceHit& hit) {
+  const TissueCollision& tissue = model.collision;
+  const int near = nearest_particle(tissue, candidates, x, p, reach);
+  if (near < 0) return false;
+  // Triangles round the nearest particle and round its neighbours: the nearest triangle need not touch the nearest particle.
+  float best = 1e30f;
+  Vec3 normal{};
+  auto look = [&](uint32_t f) {
+    const Triangle& t = tissue.surface[f];
+    const Vec3 a = xyz(x[t[0]]), b = xyz(x[t[1]]), c = xyz(x[t[2]]);
+    const ClosestOnTriangle on = closest_on_triangle(p, a, b, c);
+    const float d = length2(on.point - p);
+    const Vec3 n = normalized(cross(b - a, c - a));
+    if (d < best * 0.9999f - 1e-14f) {
+      best = d;
+      normal = n;
+      hit.point = on.point;
+      hit.end.triangle = f;
+      hit.end.weight = on.weight;
+      hit.end.point.particle = {t[0], t[1], t[2]};
+      hit.end.point.weight = on.weight;
+    } else if (d <= best * 1.0001f + 1e-14f) {
+      normal += n;  // on a shared edge or corner: the mean of the faces decides inside or outside
+    }
+  };
+  std::array<uint32_t, 96> seen;
+  size_t count = 0;
+  auto look_once = [&](uint32_t f) {
+    if (std::find(seen.begin(), seen.begin() + static_cast<long>(count), f) != seen.begin() + static_cast<long>(count)) return;
+    if (count < seen.size()) seen[count++] = f;
+    look(f);
+  };
+  const size_t centre = static_cast<size_t>(near);
+  for (uint32_t r = tissue.ring_first[centre]; r < tissue.ring_first[centre + 1]; ++r)
+    for (uint32_t k : tissue.surface[tissue.ring[r]])
+      for (uint32_t q = tissue.ring_first[k]; q < tissue.ring_first[k + 1]; ++q) look_once(tissue.ring[q]);
+  if (count == 0) return false;
+  hit.normal = normalized(normal, {0, 1, 0});
+  hit.distance = std::sqrt(best) * (dot(p - hit.point, hit.normal) < 0 ? -1.0f : 1.0f);
+  return true;
+}
+
+void puncture(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
+              SutureState& state, std::vector<Event>& events) {
+  const Vec4* x = solver.x.data();
+  const NeedleArc& arc = model.needle_arc;
+  const RigidBody& needle = solver.body[kNeedle];
+  const Vec3 tip = needle_tip(arc, needle);
+  SurfaceHit hit;
+  const bool near = nearest_surface(model, scratch.candidates, x, tip, kReach, hit);
+  const bool was_inside = state.tip_inside;
+  const bool inside = near && hit.distance < (was_inside ? kHysteresis : -kHysteresis);
+  state.tip_inside = inside;
+  auto along = [&](const BiteEnd& end) { return arc.radius * arc.nearest(to_local(needle.pose(), position_of(end.point, x))); };
+  const float tip_at = arc.radius * arc.arc;
+
+  switch (state.phase) {
+    case NeedlePhase::outside: {
+      if (!inside || was_inside) return;
+      const Vec3 heading = rotate(needle.q, arc.tangent(arc.arc));
+      state.current = static_cast<uint32_t>(state.bite.size());
+      Bite bite;
+      bite.entry = hit.end;
+      const int nearest = nearest_particle(model.collision, scratch.candidates, x, tip, suture.attach_threshold);
+      if (nearest >= 0) bite.nearest = static_cast<uint32_t>(nearest);
+      state.bite.push_back(bite);
+      state.phase = NeedlePhase::tip_in;
+      const float angle = std::acos(std::clamp(-dot(heading, hit.normal), -1.0f, 1.0f));
+      events.push_back({0, EventKind::tip_entered, 0, state.current, angle, hit.point});
+      if (nearest >= 0) {
+        // Figure 4: the nearest particle within X of the tip moves with the tip, by the paper's spring.
+        Attachment a;
+        a.point.particle = {bite.nearest, bite.nearest, bite.nearest};
+        a.point.weight = {1, 0, 0};
+        a.body = static_cast<int>(kNeedle);
+        state.attached_from = xyz(x[bite.nearest]);
+        a.target = to_local(needle.pose(), state.attached_from);
+        a.compliance = suture.attach_compliance;
+        solver.attach.push_back(a);
+        state.attached = true;
+        events.push_back({0, EventKind::particle_attached, 0, bite.nearest, distance(state.attached_from, tip), state.attached_from});
+      }
+      solver.channel.push_back(channel_at(suture, bite.entry));
+      solver.body_collides[kNeedle] = 0;  // the shaft is in the tissue now: its channel holds it, not its surface
+      return;
+    }
+    case NeedlePhase::tip_in: {
+      Bite& bite = state.bite[state.current];
+      if (inside) bite.depth = std::max(bite.depth, -hit.distance);
+      if (state.attached) {
+        // Figure 5: dragged beyond the threshold, it is let go and the tissue relaxes.
+        const float dragged = distance(xyz(x[bite.nearest]), state.attached_from);
+        const auto row = std::find_if(solver.attach.begin(), solver.attach.end(), [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
+        const float torn = distance(transform(needle.pose(), row->target), state.attached_from);
+        if (std::max(dragged, torn) > suture.release_distance) {
+          drop_attachment(solver, state);
+          events.push_back({0, EventKind::particle_released, 0, bite.nearest, dragged, xyz(x[bite.nearest])});
+        }
+      }
+      if (inside) return;
+      drop_attachment(solver, state);
+      if (!near || tip_at - along(bite.entry) < kEndReached) {
+        // Out the way it came.
+        bite.cancelled = true;
+        solver.channel.clear();
+        solver.body_collides[kNeedle] = 1;
+        state.phase = NeedlePhase::outside;
+        events.push_back({0, EventKind::bite_cancelled, 0, state.current, bite.depth, tip});
+        return;
+      }
+      bite.exit = hit.end;
+      bite.has_exit = true;
+      solver.channel.push_back(channel_at(suture, bite.exit));
+      state.phase = NeedlePhase::through;
+      events.push_back({0, EventKind::tip_exited, 0, state.current, bite.depth, hit.point});
+      return;
+    }
+    case NeedlePhase::through: {
+      Bite& bite = state.bite[state.current];
+      if (inside && tip_at - along(bite.exit) < kEndReached) {
+        bite.has_exit = false;  // drawn back into the wall
+        solver.channel.pop_back();
+        state.phase = NeedlePhase::tip_in;
+        return;
+      }
+      if (along(bite.entry) > kEndReached) return;
+      // The back-end trigger: the swage has reached the entry, the thread follows through it.
+      if (!place_suture_point(model, solver, suture, state, state.current, false, events)) return;
+      solver.channel.erase(solver.channel.begin());
+      state.phase = NeedlePhase::back_in;
+      return;
+    }
+    case NeedlePhase::back_in: {
+      Bite& bite = state.bite[state.current];
+      if (along(bite.exit) > kEndReached) return;
+      if (!place_suture_point(model, solver, suture, state, state.current, true, events)) return;
+      solver.channel.clear();
+      solver.body_collides[kNeedle] = 1;
+      bite.complete = true;
+      state.phase = NeedlePhase::outside;
+      const Vec3 out = position_of(bite.exit.point, x);
+      events.push_back({0, EventKind::bite_completed, 0, state.current, distance(position_of(bite.entry.point, x), out), out});
+      return;
+    }
+  }
+}
+
+}  // namespace catgut

@@ -1,0 +1,116 @@
+// technique/purse_string: reads suture points and thread length, answers with a ClosurePlan. Paper 2.5.1, figure 11.
+#include "technique/purse_string.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace catgut {
+namespace {
+
+Vec3 centre_of(std::span<const uint32_t> rim, const Vec4* x) {
+  Vec3 c{};
+  for (uint32_t i : rim) c += xyz(x[i]);
+  return rim.empty() ? c : c / static_cast<float>(rim.size());
+}
+// Newell's vector: normal of the loop's best plane, its length twice the projected area.
+Vec3 newell(std::span<const uint32_t> rim, const Vec4* x) {
+  Vec3 n{};
+  const Vec3 c = centre_of(rim, x);
+  for (size_t i = 0; i < rim.size(); ++i) n += cross(xyz(x[rim[i]]) - c, xyz(x[rim[(i + 1) % rim.size()]]) - c);
+  return n;
+}
+
+// How far round the opening the suture points go, as a signed angle [rad] about the axis.
+float turned(std::span<const Vec3> sp, Vec3 centre, Vec3 axis) {
+  float sum = 0;
+  for (size_t i = 0; i + 1 < sp.size(); ++i) {
+    Vec3 a = sp[i] - centre, b = sp[i + 1] - centre;
+    a -= axis * dot(a, axis);
+    b -= axis * dot(b, axis);
+    sum += std::atan2(dot(cross(a, b), axis), dot(a, b));
+  }
+  return sum;
+}
+
+}  // namespace
+
+float opening_area(std::span<const uint32_t> rim, const Vec4* x) { return 0.5f * length(newell(rim, x)); }
+
+int first_out_of_order(std::span<const Vec3> sp, size_t from) {
+  const size_t n = sp.size();
+  if (n < 4) return -1;  // fewer than three others to choose from: nothing to tell
+  for (size_t i = from; i < n; ++i) {
+    std::array<size_t, 3> next{};
+    for (size_t k = 0; k < 3; ++k) next[k] = i + 3 < n ? i + 1 + k : (i + 1 + k) % n;
+    const float d = distance(sp[i], sp[next[0]]);
+    if (distance(sp[i], sp[next[1]]) < d || distance(sp[i], sp[next[2]]) < d) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+void purse_string(const PurseStringModel& model, PurseStringState& state, std::span<const Vec3> sp,
+                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, ClosurePlan& plan, std::vector<Event>& events) {
+  if (model.rim_inner.size() < 3) return;
+  if (state.area_start == 0) state.area_start = opening_area(model.rim_inner, x);
+  if (state.finished) return;
+
+  if (!state.ring_complete) {
+    // While the ring grows, a point can be checked once three more follow it.
+    for (; state.checked + 3 < sp.size(); ++state.checked)
+      if (first_out_of_order(sp.subspan(state.checked, 4)) == 0)
+        events.push_back({0, EventKind::order_broken, 0, state.checked + 1, 0, sp[state.checked + 1]});
+    const Vec3 centre = centre_of(model.rim_outer, x), axis = normalized(newell(model.rim_outer, x));
+    if (sp.size() < 2 * static_cast<size_t>(model.min_bites) || sp.size() % 2 != 0) return;  // even: no bite half done
+    const float angle = std::abs(turned(sp, centre, axis));
+    // The way back from the last to the first is at most one and a half of the largest steps so far.
+    float step = 0;
+    for (size_t i = 0; i + 1 < sp.size(); ++i) step = std::max(step, distance(sp[i], sp[i + 1]));
+    if (angle < kPi || distance(sp.back(), sp.front()) > 1.5f * step) return;
+    state.ring_complete = true;
+    state.path_start = 0;
+    for (size_t i = 0; i + 1 < sp.size(); ++i) state.path_start += distance(sp[i], sp[i + 1]);
+    for (; state.checked < sp.size(); ++state.checked)
+      if (first_out_of_order(sp, state.checked) == static_cast<int>(state.checked))
+        events.push_back({0, EventKind::order_broken, 0, state.checked + 1, 0, sp[(state.checked + 1) % sp.size()]});
+    events.push_back({0, EventKind::ring_complete, 0, static_cast<uint32_t>(sp.size()), angle, centre});
+    return;
+  }
+
+  if (!state.closing) {
+    // Closing begins when the thread in the ring is as short as the way round it: the slack is out.
+    if (loop > 0.995f * state.path_start) return;
+    state.closing = true;
+    const Vec3 centre = centre_of(model.rim_outer, x), axis = normalized(newell(model.rim_outer, x));
+    const Vec3 anvil = centre + model.anvil;
+    auto toward = [&](Vec3 from, float radius) {
+      Vec3 out = from - anvil;
+      const float height = dot(out, axis);
+      out -= axis * height;
+      // Gathered tissue keeps a little of its height, so that the edge does not fold into a single plane.
+      return anvil + normalized(out) * radius + axis * (0.5f * height);
+    };
+    auto add_pull = [&](const TissuePoint& p, float radius) {
+      const Vec3 from = position_of(p, x);
+      plan.pull.push_back({p, from, toward(from, radius)});
+    };
+    auto particle = [](uint32_t i) { return TissuePoint{{i, i, i}, {1, 0, 0}}; };
+    for (uint32_t i : model.rim_inner) add_pull(particle(i), model.anvil_radius);
+    for (uint32_t i : model.rim_outer) add_pull(particle(i), model.anvil_radius + model.wall);
+    const float thread_radius = model.anvil_radius + 2 * model.wall;
+    for (const TissuePoint& p : sp_point) add_pull(p, thread_radius);
+    plan.compliance = model.compliance;
+    state.path_end = 0;
+    const size_t first = plan.pull.size() - sp_point.size();
+    for (size_t i = first; i + 1 < plan.pull.size(); ++i) state.path_end += distance(plan.pull[i].to, plan.pull[i + 1].to);
+    events.push_back({0, EventKind::closure_started, 0, 0, opening_area(model.rim_inner, x), anvil});
+  }
+
+  plan.progress = std::clamp((state.path_start - loop) / (state.path_start - state.path_end), 0.0f, 1.0f);
+  if (plan.progress >= 0.99f) {
+    state.finished = true;
+    plan.progress = 1;
+    events.push_back({0, EventKind::closure_finished, 0, 0, opening_area(model.rim_inner, x), centre_of(model.rim_inner, x)});
+  }
+}
+
+}  // namespace catgut

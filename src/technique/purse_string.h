@@ -1,0 +1,40 @@
+// technique/purse_string: paper 2.5.1. Bites in and out round an opening; nothing is closed until the ring is complete; then, as the
+// thread is drawn tight, every edge particle travels to the anvil, all arriving together.
+// Talks to the mechanics through events (in) and a ClosurePlan (out) alone.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "suture/suture.h"
+
+namespace catgut {
+
+struct PurseStringModel {
+  std::vector<uint32_t> rim_outer, rim_inner;  // particles round the opening, in order; partners share an index
+  Vec3 anvil;                  // [m] relative to the rim's centre at the start of the closure
+  float anvil_radius = 0.004f; // [m]
+  float wall = 0.0025f;        // [m]
+  float compliance = 5e-4f;    // [m/N]
+  int min_bites = 10;
+};
+
+struct PurseStringState {
+  bool ring_complete = false, closing = false, finished = false;
+  float path_start = 0, path_end = 0;  // [m] way from the first to the last suture point, open and closed
+  uint32_t checked = 0;                // suture points already checked for order
+  float area_start = 0;                // [m^2]
+};
+
+// The adjacency rule of 2.5.1: sp[i + 1] is the nearest to sp[i] among the three that follow it; past the end, sp[0..2] follow.
+// Returns the first i (from `from` on) whose successor is not, or -1.
+int first_out_of_order(std::span<const Vec3> sp, size_t from = 0);
+
+// Once a tick. `sp`: where the suture points are; x: particle positions; loop: rest length of thread from the first suture point to the last
+// [m]. Fills `plan` when there is something to close, and reports through `events`.
+void purse_string(const PurseStringModel& model, PurseStringState& state, std::span<const Vec3> sp,
+                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, ClosurePlan& plan, std::vector<Event>& events);
+
+// Area of the opening [m^2]: the inner edge projected on its own best plane.
+float opening_area(std::span<const uint32_t> rim, const Vec4* x);
+
+}  // namespace catgut
