@@ -68,7 +68,7 @@ void expect_good(const TriangleMesh& from, const TriangleMesh& to, size_t vertic
               q.least_angle, q.mean_least_angle, 1e3 * q.shortest, 1e3 * q.mean, 1e3 * q.longest);
   EXPECT_GT(q.least_angle, least_angle);
   EXPECT_GT(q.mean_least_angle, 45);
-  EXPECT_NEAR(surface_area(to), surface_area(from), 0.03 * surface_area(from));
+  EXPECT_NEAR(surface_area(to), surface_area(from), 0.05 * surface_area(from));
   const auto a = boundary_loops(from.triangle), b = boundary_loops(to.triangle);
   ASSERT_EQ(a.size(), b.size());
   float total_from = 0, total_to = 0;
@@ -128,19 +128,23 @@ TEST(Closest, AgreesWithTryingEverything) {
 TEST(Remesh, RealOrgan) {
   const std::string path = std::string(CATGUT_SOURCE_DIR) + "/../shared/organs/large_intestine_female.glb";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no organ file at " << path;
+  // The file draws outside and lumen as two shells; the outer one is taken. The rectum is a blind pouch, the sigmoid a tube.
+  const auto rims = [](const TriangleMesh& mesh) {
+    std::vector<float> mm;
+    for (const auto& loop : boundary_loops(mesh.triangle)) mm.push_back(1e3f * loop_length(points(mesh, loop)));
+    std::sort(mm.begin(), mm.end());
+    return mm;
+  };
   const TriangleMesh rectum = read_mesh(path, "VH_F_rectum");
-  EXPECT_EQ(rectum.position.size(), 965u);
-  EXPECT_EQ(rectum.triangle.size(), 1880u);
-  std::vector<float> length;
-  for (const auto& loop : boundary_loops(rectum.triangle)) length.push_back(1e3f * loop_length(points(rectum, loop)));
-  std::sort(length.begin(), length.end());
-  ASSERT_EQ(length.size(), 2u);
-  EXPECT_NEAR(length[0], 126.2, 0.1);
-  EXPECT_NEAR(length[1], 128.2, 0.1);
-  for (const size_t n : {592u, 614u, 2027u}) {
-    const TriangleMesh out = remesh(rectum, n, "rectum");
-    expect_good(rectum, out, n, 10);
-  }
+  EXPECT_EQ(rectum.position.size(), 507u);
+  ASSERT_EQ(rims(rectum).size(), 1u);
+  EXPECT_NEAR(rims(rectum)[0], 128.2, 0.1);
+  const TriangleMesh sigmoid = read_mesh(path, "VH_F_sigmoid_colon");
+  ASSERT_EQ(rims(sigmoid).size(), 2u);
+  EXPECT_NEAR(rims(sigmoid)[0], 128.2, 0.1);
+  EXPECT_NEAR(rims(sigmoid)[1], 138.2, 0.1);
+  for (const size_t n : {592u, 614u, 2027u}) expect_good(rectum, remesh(rectum, n, "rectum"), n, 10);
+  expect_good(sigmoid, remesh(sigmoid, 614, "sigmoid"), 614, 10);
 }
 
 }  // namespace
