@@ -25,10 +25,10 @@ struct BodyRest {
   std::vector<TissueLayer> layer;  // serosa: outer side of the wall, mucosa: inner side
   float radius = 0;                // [m] contact radius of a particle
   std::vector<std::vector<uint32_t>> cluster;  // cluster c is centred on particle c; first member is c; at most 16 members
-  std::vector<Tet> tet;            // the wall's volume
-  std::vector<Triangle> surface;   // watertight, particle indices, counter-clockwise seen from outside the tissue
-  std::vector<Rim> rim;            // openings; rim[0] is the one the procedure works on
-  VisibleMesh visible;             // skin_particle indexes this body's particles
+  std::vector<Tet> tet;                        // the wall's volume
+  std::vector<Triangle> surface;               // watertight, particle indices, counter-clockwise seen from outside the tissue
+  std::vector<Rim> rim;                        // openings; rim[0] is the one the procedure works on
+  VisibleMesh visible;                         // skin_particle indexes this body's particles
 };
 
 }  // namespace catgut

@@ -107,6 +107,40 @@ double tet_volume(std::span<const Vec3> position, const Tet& tet) {
   return (cx * c.x + cy * c.y + cz * c.z) / 6.0;
 }
 
+std::vector<Vec3> wall_directions(const TriangleMesh& sheet, float thickness) {
+  std::vector<Vec3> direction = vertex_normals(sheet);
+  const auto next = vertex_neighbours(sheet.triangle, sheet.position.size());
+  std::vector<Tet> tet;
+  for (const Triangle& t : sheet.triangle) add_prism(tet, t);
+  std::vector<Vec3> position(2 * sheet.position.size());
+  constexpr int rounds = 40;
+  for (int round = 0; round < rounds; ++round) {
+    for (size_t v = 0; v < sheet.position.size(); ++v) {
+      position[2 * v] = sheet.position[v];
+      position[2 * v + 1] = sheet.position[v] - direction[v] * thickness;
+    }
+    std::vector<uint8_t> folded(sheet.position.size(), 0);
+    bool any = false;
+    for (const Tet& t : tet) {
+      // A margin over merely positive: slivers make a poor solid.
+      const Vec3 o = position[t[0]];
+      const float flat = length(cross(position[t[1]] - o, position[t[2]] - o)) * thickness / 6;
+      if (tet_volume(position, t) > 0.1 * flat) continue;
+      any = true;
+      for (uint32_t p : t) folded[p / 2] = 1;
+    }
+    if (!any) break;
+    std::vector<Vec3> smoother = direction;
+    for (size_t v = 0; v < folded.size(); ++v) {
+      if (!folded[v]) continue;
+      for (uint32_t u : next[v]) smoother[v] += direction[u];
+      smoother[v] = normalized(smoother[v], direction[v]);
+    }
+    direction = std::move(smoother);
+  }
+  return direction;
+}
+
 BodyRest thicken(const TriangleMesh& sheet, std::span<const Vec3> normal, const WallSpec& wall) {
   CATGUT_CHECK(normal.size() == sheet.position.size() && !sheet.triangle.empty());
   CATGUT_CHECK(wall.thickness > 0 && wall.density > 0);

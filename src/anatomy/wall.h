@@ -24,6 +24,9 @@ struct WallSpec {
 // Throws InputError when the wall is too thick for the bend of the sheet (a tetrahedron would be inside out).
 BodyRest thicken(const TriangleMesh& sheet, std::span<const Vec3> normal, const WallSpec& wall);
 
+// The normals of the sheet, turned toward their neighbours' where a wall of that thickness would otherwise fold over itself.
+std::vector<Vec3> wall_directions(const TriangleMesh& sheet, float thickness);
+
 // [m^3] positive for a Tet in the right order.
 double tet_volume(std::span<const Vec3> position, const Tet& tet);
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "core/check.h"
@@ -92,24 +93,66 @@ std::vector<uint32_t> orient_pieces(TriangleMesh& mesh, const std::vector<HalfEd
   return piece;
 }
 
-void keep_largest_piece(TriangleMesh& mesh, const std::vector<uint32_t>& piece, uint32_t pieces, const std::string& where) {
+// The surface with each opening closed, as one closes it in thought, by a fan about its middle.
+TriangleMesh capped(const TriangleMesh& mesh) {
+  TriangleMesh closed = mesh;
+  for (const auto& loop : boundary_loops(mesh.triangle)) {
+    Vec3 middle;
+    for (uint32_t v : loop) middle += mesh.position[v] / static_cast<float>(loop.size());
+    const uint32_t m = static_cast<uint32_t>(closed.position.size());
+    closed.position.push_back(middle);
+    for (size_t i = 0; i < loop.size(); ++i) closed.triangle.push_back({m, loop[i], loop[(i + 1) % loop.size()]});
+  }
+  return closed;
+}
+
+// How often the closed surface winds round p: about 1 (or -1) inside, 0 outside (Van Oosterom and Strackee 1983).
+double winding(const TriangleMesh& closed, Vec3 p) {
+  double sum = 0;
+  for (const Triangle& t : closed.triangle) {
+    const Vec3 a = closed.position[t[0]] - p, b = closed.position[t[1]] - p, c = closed.position[t[2]] - p;
+    const double la = length(a), lb = length(b), lc = length(c);
+    sum += 2 * std::atan2(static_cast<double>(dot(a, cross(b, c))),
+                          la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+  }
+  return sum / (4 * 3.14159265358979);
+}
+
+bool lies_inside(const TriangleMesh& inner, const TriangleMesh& outer_closed) {
+  const size_t step = inner.triangle.size() / 200 + 1;  // some 200 places tell as much as all
+  size_t inside = 0, asked = 0;
+  for (size_t t = 0; t < inner.triangle.size(); t += step, ++asked) {
+    inside += std::abs(winding(outer_closed, inner.position[inner.triangle[t][0]])) > 0.5;
+  }
+  return 10 * inside >= 8 * asked;  // near its opening it may stand out a little
+}
+
+// Organ files often draw the wall twice, outside and lumen: the outer surface is taken, the wall is ours to build. Specks go.
+void keep_outer_piece(TriangleMesh& mesh, const std::vector<uint32_t>& piece, uint32_t pieces, const std::string& where) {
   if (pieces == 1) return;
-  std::vector<double> area(pieces, 0);
-  for (size_t t = 0; t < piece.size(); ++t) area[piece[t]] += surface_area({mesh.position, {mesh.triangle[t]}});
-  const uint32_t largest = static_cast<uint32_t>(std::max_element(area.begin(), area.end()) - area.begin());
-  std::vector<double> other = area;
-  std::sort(other.rbegin(), other.rend());
-  if (other[1] > 0.01 * other[0]) {
-    throw InputError(where,
-                     fmt::format("{} separate surfaces, the largest of {:.2f} cm^2 and {:.2f} cm^2; an organ must be one",
-                                 pieces, 1e4 * other[0], 1e4 * other[1]),
-                     "export one of them, or name a single node with path#node");
+  std::vector<TriangleMesh> part(pieces, TriangleMesh{mesh.position, {}});
+  for (size_t t = 0; t < piece.size(); ++t) part[piece[t]].triangle.push_back(mesh.triangle[t]);
+  std::vector<double> area(pieces);
+  for (size_t i = 0; i < pieces; ++i) area[i] = surface_area(part[i]);
+  const double largest = *std::max_element(area.begin(), area.end());
+  size_t best = pieces, left = 0;
+  double best_volume = -1;
+  for (size_t i = 0; i < pieces; ++i) {
+    if (area[i] < 0.01 * largest) continue;
+    ++left;
+    const double volume = std::abs(enclosed_volume(capped(part[i])));
+    if (volume > best_volume) best_volume = volume, best = i;
   }
-  std::vector<Triangle> kept;
-  for (size_t t = 0; t < piece.size(); ++t) {
-    if (piece[t] == largest) kept.push_back(mesh.triangle[t]);
+  const TriangleMesh closed = capped(part[best]);
+  for (size_t i = 0; i < pieces; ++i) {
+    if (i == best || area[i] < 0.01 * largest || lies_inside(part[i], closed)) continue;
+    throw InputError(
+        where,
+        fmt::format("{} separate surfaces side by side, of {:.2f} cm^2 and {:.2f} cm^2 among others; an organ must be one",
+                    left, 1e4 * area[best], 1e4 * area[i]),
+        "export one of them, or name a single node with path#node");
   }
-  mesh.triangle = std::move(kept);
+  mesh.triangle = std::move(part[best].triangle);
 }
 
 // Where two fans of triangles touch only in a vertex each fan gets its own: otherwise the vertex has no ring round it.
@@ -159,16 +202,7 @@ TriangleMesh without_unused(const TriangleMesh& mesh) {
 }
 
 void turn_outward(TriangleMesh& mesh) {
-  // Each opening is closed in thought by a fan about its middle; then the sign of the enclosed volume tells.
-  TriangleMesh closed = mesh;
-  for (const auto& loop : boundary_loops(mesh.triangle)) {
-    Vec3 middle;
-    for (uint32_t v : loop) middle += mesh.position[v] / static_cast<float>(loop.size());
-    const uint32_t m = static_cast<uint32_t>(closed.position.size());
-    closed.position.push_back(middle);
-    for (size_t i = 0; i < loop.size(); ++i) closed.triangle.push_back({m, loop[i], loop[(i + 1) % loop.size()]});
-  }
-  if (enclosed_volume(closed) >= 0) return;
+  if (enclosed_volume(capped(mesh)) >= 0) return;
   for (Triangle& t : mesh.triangle) std::swap(t[1], t[2]);
 }
 
@@ -236,7 +270,7 @@ TriangleMesh clean_mesh(const TriangleMesh& mesh, const std::string& where) {
   check_edges(out, edge, where);
   uint32_t pieces = 0;
   const auto piece = orient_pieces(out, edge, pieces, where);
-  keep_largest_piece(out, piece, pieces, where);
+  keep_outer_piece(out, piece, pieces, where);
   split_touching_fans(out);
   out = without_unused(out);
   turn_outward(out);

@@ -14,8 +14,9 @@ TriangleMesh weld(const TriangleMesh& mesh, float tolerance);
 
 // weld (tolerance 5e-6 of the size: 1e-6 m for an organ of 0.2 m), then: every edge in at most two triangles, all triangles
 // turned the same way and outward (openings thought closed), vertices that join two fans split, specks (below 1 % of the
-// area) dropped. where: the file, for messages. Throws InputError: no triangles, no area, edges shared by more than two
-// triangles, a surface with one side only, several pieces of which none is a speck.
+// area) dropped. Where the file draws both sides of a wall, the outer surface is kept and those inside it are dropped.
+// where: the file, for messages. Throws InputError: no triangles, no area, edges shared by more than two triangles, a surface
+// with one side only, several surfaces side by side.
 TriangleMesh clean_mesh(const TriangleMesh& mesh, const std::string& where);
 
 }  // namespace catgut

@@ -100,7 +100,18 @@ TEST(MeshIo, SaysWhatItCannotUse) {
   EXPECT_SAYS(refusal(file("points.obj", "v 0 0 0\nv 0.1 0 0\nv 0.2 0 0\np 1 2 3\n")), "triangles");
   EXPECT_SAYS(refusal(file("fins.obj", "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nv 0 -0.1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n")),
               "manifold");
-  EXPECT_SAYS(refusal(file("pieces.obj", tube(0.1, "both") + tube(0.1, "both", 73, 1).substr(7))), "2 separate surfaces");
+  EXPECT_SAYS(refusal(file("pieces.obj", tube(0.1, "both") + tube(0.1, "both", 73, 1).substr(7))),
+              "2 separate surfaces side by side");
+}
+
+TEST(MeshIo, KeepsTheOutsideOfADoubleWall) {
+  std::string text = tube(0.1, "wall");
+  std::string inner = tube(0.09, "wall", 73).substr(7);  // a second, smaller tube inside the first
+  const TriangleMesh mesh = read_mesh(file("double.obj", text + inner), "");
+  EXPECT_EQ(mesh.position.size(), 72u);
+  float widest = 0;
+  for (const Vec3 p : mesh.position) widest = std::max(widest, p.x);
+  EXPECT_NEAR(widest, 0.02f, 1e-6f);
 }
 
 TEST(MeshIo, DropsSpecks) {

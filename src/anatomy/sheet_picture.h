@@ -1,0 +1,15 @@
+// anatomy/sheet_picture: the visible mesh of a body that was thickened from a triangle sheet.
+#pragma once
+#include <span>
+
+#include "anatomy/body.h"
+#include "geometry/mesh.h"
+
+namespace catgut {
+
+// Outside, inside and rounded rim edges, smooth and through the particles (sheet vertex v is particles 2 v and 2 v + 1), about
+// 20,000 vertices where the sheet allows. along: [m] of each sheet vertex from where the organ begins; the texture runs along
+// it and round the organ's middle line. Bound to body.position.
+VisibleMesh sheet_picture(const TriangleMesh& sheet, const BodyRest& body, std::span<const float> along);
+
+}  // namespace catgut
