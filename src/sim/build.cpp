@@ -119,7 +119,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
     for (size_t i = 0; i < r.position.size(); ++i) {
       rest.push_back(r.position[i]);
       mass.push_back(r.mass[i]);
-      s.inv_mass.push_back(r.pinned[i] ? 0.0f : 1.0f / r.mass[i]);
+      s.inv_mass.push_back(r.pinned[i] ? 0.0f : 1.0f / (r.mass[i] * scene.solver.mass_scale));
       radius.push_back(r.radius);
       apart.push_back(static_cast<float>(2.2 * spacing));
       body.push_back(static_cast<uint32_t>(b));
@@ -152,6 +152,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
 
   s.h = m.dt / static_cast<float>(m.substeps);
   s.gravity = scene.solver.gravity;
+  s.tissue_gravity = scene.solver.gravity / scene.solver.mass_scale;
   s.shape_sweeps = scene.solver.shape_sweeps;
   s.shape_stiffness = stiffness_at(scene.solver.shape_stiffness, kPaperSubstep, s.h);
   s.shape_relaxation = scene.solver.shape_relaxation;

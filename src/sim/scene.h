@@ -26,7 +26,7 @@ struct BodySpec {
   Vec3 position;                 // [m] centre of the near end
   Vec3 axis{0, 1, 0};            // the way the near end faces
   float density = 1050;          // [kg/m^3]
-  float pinned_length = 0.008f;  // [m] of the far end that the surroundings hold
+  float pinned_length = 0.035f;  // [m] of the far end that the surroundings hold
 };
 
 struct ThreadSpec {
@@ -41,7 +41,7 @@ struct NeedleSpec {
   float radius = 0.00828f;       // [m] of the circle: half circle of 26 mm arc
   float arc = 3.14159265f;       // [rad]
   float wire_radius = 0.00033f;  // [m]
-  float mass = 3e-4f;            // [kg]
+  float mass = 0.005f;           // [kg] inertia; more than the steel's 0.07 g, to match the scaled inertia of the tissue it moves
 };
 
 // The solver's knobs. preset = "paper" sets all of them as in section 2.1 of the paper; "default" is what works best.
@@ -50,7 +50,7 @@ struct SolverSpec {
   float tick_rate = 60;            // [1/s] ticks
   int substeps = 16;               // per tick
   int shape_sweeps = 1;
-  float shape_stiffness = 0.65f;   // 0..1, the paper's deformation resistance, per sweep
+  float shape_stiffness = 0.9f;    // 0..1, the paper's deformation resistance, per sweep of a substep of 1/480 s
   float shape_relaxation = 1.3f;   // over-relaxation of the averaged goals; stiffness * relaxation < 2
   int distance_sweeps = 1;
   int bend_sweeps = 1;
@@ -63,6 +63,7 @@ struct SolverSpec {
   float damping = 4;               // [1/s] of tissue velocities
   float thread_damping = 12;       // [1/s] of thread velocities
   Vec3 gravity{0, -9.81f, 0};      // [m/s^2]
+  float mass_scale = 80;           // tissue inertia times this at unchanged weight: sets the force with which tissue answers
   float friction_tissue = 0.3f;    // coefficients of Coulomb friction
   float friction_tool = 0.1f;
   float friction_thread = 0.15f;

@@ -24,11 +24,11 @@ void clear_multipliers(SolverState& state, SolverScratch& scratch) {
 }
 
 void predict_particles(const SolverModel& m, SolverState& s, SolverScratch& k, size_t first, size_t last) {
-  const Vec3 gh = m.gravity * m.h;
+  const Vec3 tissue_gh = m.tissue_gravity * m.h, thread_gh = m.gravity * m.h;
   for (size_t i = first; i < last; ++i) {
     k.prev[i] = s.x[i];
     if (m.inv_mass[i] == 0) continue;
-    Vec3 v = xyz(s.v[i]) + gh;
+    Vec3 v = xyz(s.v[i]) + (i < m.tissue ? tissue_gh : thread_gh);
     const float speed2 = length2(v);
     if (speed2 > kTopSpeed * kTopSpeed) v *= kTopSpeed / std::sqrt(speed2);
     add(s.x[i], v * m.h);
@@ -146,15 +146,15 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     for (Attachment& a : s.attach) solve_attachment(a, x, w, m.body, s.body, h);
   }
   {
+    // Few but stiff and pulling against each other (hand, grasp, channel): they get sweeps of their own.
     StageTimer timer(times, Stage::rigid);
-    for (Weld& weld : s.weld) solve_weld(m.body, s.body, weld, h);
-    if (!s.channel.empty()) {
-      RigidBody& needle = s.body[kNeedle];
-      for (ChannelPoint& c : s.channel) {
-        c.at = m.needle_arc.nearest(rotate(conjugate(needle.prev_q),
-                                           Vec3{} + position_of(c.point, k.prev.data()) - needle.prev_x));
-        solve_channel(c, m.needle_arc, x, w, m.body[kNeedle], needle, h);
-      }
+    RigidBody& needle = s.body[kNeedle];
+    for (ChannelPoint& c : s.channel)
+      c.at = m.needle_arc.nearest(rotate(conjugate(needle.prev_q), position_of(c.point, k.prev.data()) - needle.prev_x));
+    const int sweeps = s.channel.empty() ? 1 : m.rigid_sweeps;
+    for (int sweep = 0; sweep < sweeps; ++sweep) {
+      for (ChannelPoint& c : s.channel) solve_channel(c, m.needle_arc, x, w, m.body[kNeedle], needle, h);
+      for (Weld& weld : s.weld) solve_weld(m.body, s.body, weld, h);
     }
   }
   {

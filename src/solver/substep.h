@@ -27,8 +27,9 @@ struct SolverModel {
   std::vector<RigidModel> body;      // 0, 1: tools; 2: needle
   NeedleArc needle_arc;
   float h = 1.0f / 480;              // [s] substep
-  Vec3 gravity{0, -9.81f, 0};        // [m/s^2]
-  int shape_sweeps = 1, self_sweeps = 1, contact_sweeps = 1, volume_sweeps = 1;
+  Vec3 gravity{0, -9.81f, 0};        // [m/s^2] on thread and needle
+  Vec3 tissue_gravity{0, -9.81f, 0}; // [m/s^2] on tissue: divided by the mass scaling, so that its weight is true
+  int shape_sweeps = 1, self_sweeps = 1, contact_sweeps = 1, volume_sweeps = 1, rigid_sweeps = 4;
   float shape_stiffness = 0.65f;     // s of solve_shape_particles at this h
   float shape_relaxation = 1;
   bool use_volume = false;

@@ -12,7 +12,9 @@ namespace catgut {
 namespace {
 
 constexpr int kNewtonSteps = 2;
-constexpr double kRegularisation = 1e-2;  // of the diagonal; the fixed point does not depend on it
+// Of the diagonal. A light thread drawn straight between heavy ends has one soft mode, a hundred thousand times softer than the
+// diagonal, and it is the one that matters: more than this would hide it.
+constexpr double kRegularisation = 1e-6;
 constexpr float kLargestStep = 0.6f;      // of the spacing, per Newton step
 
 // n1^T W n2 of the node seen by two pair directions.
@@ -142,7 +144,6 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
     const float ws = model.inv_mass;  // the sliding coordinate is as heavy as a thread particle
     // Friction of a slipping anchor is a known force on its slide, spent in the first step.
     std::vector<ThreadAnchor>& anchors = thread.anchor;
-    float left = 1;  // part of the friction still to be spent (a limited step spends a part)
     for (int step = 0; step < kNewtonSteps; ++step) {
       for (size_t i = 0; i < pairs; ++i) s.n[i] = normalized(s.p[i + 1] - s.p[i], {0, 1, 0});
       for (size_t i = 0; i < pairs; ++i) {
@@ -157,7 +158,7 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
         if (s.anchor_at[i] >= 0) {
           const ThreadAnchor& a = anchors[static_cast<size_t>(s.anchor_at[i])];
           if (a.slipping == 0) continue;
-          const double slide = -a.slipping * double{a.friction} * h * h * ws * left;
+          const double slide = step == 0 ? -a.slipping * double{a.friction} * h * h * ws : 0.0;
           s.diag[i] += ws, s.diag[i - 1] += ws;
           s.off[i - 1] -= ws;
           s.rhs[i] += slide;      // C of the needle side falls by the slide
@@ -173,37 +174,33 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
         if (i + 1 < pairs) s.rhs[i] -= s.off[i] * s.rhs[i + 1];
         s.rhs[i] /= s.diag[i];
       }
-      float largest = 0;
+      // A bent stretch of light thread between heavy ends: the impulse that moves the ends would throw the light nodes far sideways, because
+      // the linearisation does not know that they come to rest on the straight line. So a light node takes a bounded step, heavy
+      // ones their full one; the next step sees the new directions.
+      const float limit = kLargestStep * model.spacing;
       for (size_t i = 0; i < nodes; ++i) {
-        if (s.hold_at[i] >= 0 || s.anchor_at[i] >= 0) continue;
         Vec3 p{};
         if (i > 0) p += s.n[i - 1] * static_cast<float>(s.rhs[i - 1]);
         if (i < pairs) p -= s.n[i] * static_cast<float>(s.rhs[i]);
-        largest = std::max(largest, length2(p) * s.w[i] * s.w[i]);
-      }
-      largest = std::sqrt(largest);
-      const float limit = kLargestStep * model.spacing;
-      const float part = largest > limit ? limit / largest : 1.0f;
-      for (size_t i = 0; i < nodes; ++i) {
-        Vec3 p{};
-        if (i > 0) p += s.n[i - 1] * (part * static_cast<float>(s.rhs[i - 1]));
-        if (i < pairs) p -= s.n[i] * (part * static_cast<float>(s.rhs[i]));
+        if (s.hold_at[i] < 0 && s.anchor_at[i] < 0) {
+          const float reach = length(p) * s.w[i];
+          if (reach > limit) p *= limit / reach;
+        }
         push_node(s, thread, i, p, x, inv_mass, body_model, body);
       }
-      for (size_t i = 0; i < pairs; ++i) s.lambda[i] += part * static_cast<float>(s.rhs[i]);
+      for (size_t i = 0; i < pairs; ++i) s.lambda[i] += static_cast<float>(s.rhs[i]);
       for (size_t i = 1; i < pairs; ++i)
         if (s.anchor_at[i] >= 0) {
           ThreadAnchor& a = anchors[static_cast<size_t>(s.anchor_at[i])];
           if (a.slipping == 0) continue;
-          const float drag = -static_cast<float>(a.slipping) * a.friction * h * h * left;
-          float slide = part * ws * (drag + static_cast<float>(s.rhs[i - 1] - s.rhs[i]));
+          const float drag = -static_cast<float>(a.slipping) * a.friction * h * h * (step == 0 ? 1.0f : 0.0f);
+          float slide = ws * (drag + static_cast<float>(s.rhs[i - 1] - s.rhs[i]));
           // Neither side can give more than it has.
           const float least = 0.02f * model.spacing;
           slide = std::clamp(slide, std::min(0.0f, least - thread.rest[i]), std::max(0.0f, thread.rest[i - 1] - least));
           thread.rest[i] += slide;
           thread.rest[i - 1] -= slide;
         }
-      left *= 1 - part;
     }
   }
 

@@ -9,7 +9,7 @@ struct NeedleShape {
   float radius = 0.00828f;       // [m] of the circle
   float arc = kPi;               // [rad]
   float wire_radius = 0.00033f;  // [m]
-  float mass = 3e-4f;            // [kg]
+  float mass = 0.005f;           // [kg]
 };
 
 NeedleArc needle_arc(const NeedleShape& shape);
