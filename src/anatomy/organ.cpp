@@ -143,6 +143,29 @@ std::vector<float> way_from(const TriangleMesh& sheet, const Loop& start) {
   return way;
 }
 
+// The way along the organ for the picture: with several openings the distance is eased until each is reached all round at
+// once (a harmonic function), so that cross sections follow the organ and end flush at its rims.
+std::vector<float> ease_along(const TriangleMesh& sheet, std::vector<float> along, const std::vector<Loop>& rims) {
+  if (rims.size() < 2) return along;
+  std::vector<uint8_t> fixed(along.size(), 0);
+  for (const Loop& rim : rims) {
+    float mean = 0;
+    for (uint32_t v : rim) mean += along[v] / static_cast<float>(rim.size());
+    for (uint32_t v : rim) along[v] = mean, fixed[v] = 1;
+  }
+  const auto next = vertex_neighbours(sheet.triangle, along.size());
+  constexpr int sweeps = 400;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    for (size_t v = 0; v < along.size(); ++v) {
+      if (fixed[v]) continue;
+      float sum = 0;
+      for (uint32_t u : next[v]) sum += along[u];
+      along[v] += 1.6f * (sum / static_cast<float>(next[v].size()) - along[v]);  // over-relaxed
+    }
+  }
+  return along;
+}
+
 // For each sheet vertex, how far it is from what the surroundings hold [m].
 std::vector<float> from_hold(const TriangleMesh& sheet, const std::vector<float>& along, const std::vector<Loop>& rims) {
   std::vector<float> far(sheet.position.size(), 3e38f);
@@ -195,7 +218,7 @@ BodyRest import_organ(const OrganImport& import) {
   body.name = import.name;
   for (size_t v = 0; v < hold.size(); ++v) body.pinned[2 * v] = body.pinned[2 * v + 1] = hold[v] < import.pinned_length;
   if (wall.extra_particle) body.pinned.back() = nearest < import.pinned_length;
-  body.visible = sheet_picture(sheet, body, along);
+  body.visible = sheet_picture(sheet, body, ease_along(sheet, along, rims));
   return body;
 }
 

@@ -173,7 +173,7 @@ class Remesher {
   bool collapse_shortest(float below) {
     bool done = false;
     // The few that refuse are passed over; their turn may come when their surroundings have changed.
-    for (auto it = queue_.begin(); it != queue_.end() && it->first < below && !done;) {
+    for (auto it = queue_.begin(); !done && it != queue_.end() && it->first < below;) {
       const auto entry = *it;
       done = collapse(entry.second);
       if (!done) it = std::next(queue_.find(entry));

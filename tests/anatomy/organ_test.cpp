@@ -83,6 +83,17 @@ TEST(Organ, TubeKeepsBothRims) {
   }
 }
 
+TEST(Organ, TextureHasNoTornTriangles) {
+  const BodyRest body = import_organ(organ(write_obj("bent.obj", true, true), 1228));
+  for (const Triangle& t : body.visible.triangle) {
+    for (int k = 0; k < 3; ++k) {
+      const auto &a = body.visible.uv[t[k]], &b = body.visible.uv[t[(k + 1) % 3]];
+      ASSERT_LT(std::abs(a[0] - b[0]), 0.3f);
+      ASSERT_LT(std::abs(a[1] - b[1]), 0.6f);
+    }
+  }
+}
+
 TEST(Organ, RimIsChosenByIndex) {
   OrganImport o = organ(write_obj("bent.obj", true, true), 600);
   o.rim = 1;
