@@ -17,15 +17,32 @@ constexpr int kNewtonSteps = 2;
 constexpr double kRegularisation = 1e-6;
 constexpr float kLargestStep = 0.6f;      // of the spacing, per Newton step
 
-// n1^T W n2 of the node seen by two pair directions.
+// n1^T W n2 of the node seen by two pair directions. A free node on a taut thread is hard to move sideways (see stiffen).
 float node_inverse_mass(const ThreadScratch& s, const Thread& t, size_t i, Vec3 n1, Vec3 n2,
                         const std::vector<RigidModel>& model, const std::vector<RigidBody>& body) {
-  if (s.hold_at[i] < 0) return s.w[i] * dot(n1, n2);
+  if (s.hold_at[i] < 0) return s.w[i] * (s.sideways[i] * dot(n1, n2) + (1 - s.sideways[i]) * dot(n1, s.t[i]) * dot(n2, s.t[i]));
   const ThreadHold& hold = t.hold[static_cast<size_t>(s.hold_at[i])];
   const RigidBody& b = body[static_cast<size_t>(hold.body)];
   const RigidModel& m = model[static_cast<size_t>(hold.body)];
   const Vec3 r = rotate(b.q, hold.local);
   return m.inv_mass * dot(n1, n2) + dot(cross(r, n1), inverse_inertia(m, b, cross(r, n2)));
+}
+
+// Geometric stiffness. A taut thread resists being moved sideways with tension / length, which the bare linearisation does not know: it
+// would shorten a taut zigzag by throwing its light nodes sideways, and never converge. So sideways a node is given the inertia
+// m + h^2 T (1/l0 + 1/l1) (Tournier et al. 2015, Stable constrained dynamics); sideways[i] is the ratio of the inverse masses.
+void stiffen(ThreadScratch& s, const Thread& t, size_t nodes, float h) {
+  for (size_t i = 0; i < nodes; ++i) {
+    s.sideways[i] = 1;
+    if (i == 0 || i + 1 == nodes || s.anchor_at[i] >= 0 || s.hold_at[i] >= 0) continue;
+    const float inv_h2 = 1 / (h * h);
+    const float before = std::max(t.tension[i - 1], -s.lambda[i - 1] * inv_h2), after = std::max(t.tension[i], -s.lambda[i] * inv_h2);
+    const float tension = std::max(0.0f, std::min(before, after));
+    if (tension == 0) continue;
+    const float l0 = std::max(distance(s.p[i - 1], s.p[i]), 1e-5f), l1 = std::max(distance(s.p[i], s.p[i + 1]), 1e-5f);
+    s.t[i] = normalized(s.n[i - 1] + s.n[i], s.n[i]);
+    s.sideways[i] = 1 / (1 + s.w[i] * h * h * tension * (1 / l0 + 1 / l1));
+  }
 }
 
 // Applies the positional impulse `p` to whatever node i is, and refreshes its position.
@@ -53,6 +70,8 @@ void ThreadScratch::resize(uint32_t count) {
   anchor_at.assign(count, -1);
   hold_at.assign(count, -1);
   n.assign(count, {});
+  t.assign(count, {});
+  sideways.assign(count, 1);
   diag.assign(count, 0);
   off.assign(count, 0);
   rhs.assign(count, 0);
@@ -128,6 +147,7 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
     s.p[i] = transform(body[static_cast<size_t>(thread.hold[k].body)].pose(), thread.hold[k].local);
     s.w[i] = 0;
   }
+  std::fill(s.sideways.begin(), s.sideways.end(), 1.0f);
   for (int sweep = 0; sweep < model.bend_sweeps; ++sweep)
     for (size_t i = 1; i + 1 < nodes; ++i) {
       // Locked nodes do not give way to bending: tissue and tools are far heavier than the thread.
@@ -146,6 +166,7 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
     std::vector<ThreadAnchor>& anchors = thread.anchor;
     for (int step = 0; step < kNewtonSteps; ++step) {
       for (size_t i = 0; i < pairs; ++i) s.n[i] = normalized(s.p[i + 1] - s.p[i], {0, 1, 0});
+      stiffen(s, thread, nodes, h);
       for (size_t i = 0; i < pairs; ++i) {
         const float alpha = alpha_per_metre * thread.rest[i];
         const double d = node_inverse_mass(s, thread, i, s.n[i], s.n[i], body_model, body) +
@@ -183,6 +204,7 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
         if (i > 0) p += s.n[i - 1] * static_cast<float>(s.rhs[i - 1]);
         if (i < pairs) p -= s.n[i] * static_cast<float>(s.rhs[i]);
         if (s.hold_at[i] < 0 && s.anchor_at[i] < 0) {
+          p = p * s.sideways[i] + s.t[i] * ((1 - s.sideways[i]) * dot(p, s.t[i]));
           const float reach = length(p) * s.w[i];
           if (reach > limit) p *= limit / reach;
         }
@@ -204,6 +226,7 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
     }
   }
 
+  std::fill(s.sideways.begin(), s.sideways.end(), 1.0f);
   for (int sweep = 0; sweep < model.distance_sweeps; ++sweep)
     for (size_t i = 0; i < pairs; ++i) {
       const Vec3 d = s.p[i + 1] - s.p[i];

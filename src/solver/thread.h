@@ -61,6 +61,8 @@ struct ThreadScratch {
   std::vector<int32_t> anchor_at;   // per node: index of its anchor, or -1
   std::vector<int32_t> hold_at;     // per node: index of its hold, or -1
   std::vector<Vec3> n;              // per pair: unit direction toward the needle
+  std::vector<Vec3> t;              // per node: unit tangent
+  std::vector<float> sideways;      // per node: inverse mass across the tangent over that along it
   std::vector<double> diag, off, rhs;
   std::vector<float> lambda;        // per pair, cleared at the start of a substep
   std::vector<float> bend_lambda;   // per node
