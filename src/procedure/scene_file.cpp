@@ -263,7 +263,7 @@ SceneSpec read_scene(const std::string& name_or_path) {
     const std::vector<std::string> names = scene_names();
     const std::string nearest = bare ? nearest_word(name_or_path, names) : "";
     std::string next = "give the path of a .toml file";
-    if (!names.empty()) next = fmt::format("there is {}, or give the path of a .toml file", fmt::join(names, ", "));
+    if (!names.empty()) next = fmt::format("the scenes are: {} (or give the path of a .toml file)", fmt::join(names, ", "));
     if (!nearest.empty()) next = fmt::format("did you mean \"{}\"? {}", nearest, next);
     throw InputError(name_or_path, "there is no such scene", next);
   }
