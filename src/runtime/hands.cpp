@@ -59,6 +59,8 @@ SurgeonSkill skill_of(const SceneSpec& scene) {
 Hands make_hands(const std::string& who, const SceneSpec& scene, const PictureModel& picture) {
   if (who == "none") return {};
   if (who == "scripted") {
+    if (scene.technique.name == "none")
+      throw InputError("--surgeon scripted", "the scene has no technique to carry out", "use --surgeon none, or a recording");
     try {
       return {make_surgeon(scene.technique.name, picture, skill_of(scene)), true};
     } catch (const std::invalid_argument&) {
