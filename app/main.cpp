@@ -39,8 +39,6 @@ int main(int argc, char** argv) {
     return app.exit(wanted);
   } catch (const CLI::ParseError& error) {
     return report(std::string("command line: ") + error.what() + "; catgut --help explains");
-  } catch (const std::exception& error) {
-    return report(error.what());
-  }
+  } catch (const std::exception& error) { return report(error.what()); }
   return exit_code;
 }

@@ -35,7 +35,8 @@ int bench(const BenchOptions& o) {
     RunResult r = run_session(scene, session, hooks);
     if (i > 0 && r.state_hash != best.state_hash && !r.interrupted) {
       end_progress_line();
-      std::fprintf(stderr, "catgut: bench stages: two runs of %s gave different states; this is a fault in Catgut, please report it\n",
+      std::fprintf(stderr,
+                   "catgut: bench stages: two runs of %s gave different states; this is a fault in Catgut, please report it\n",
                    o.scene.c_str());
       return 1;
     }

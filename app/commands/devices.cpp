@@ -13,9 +13,11 @@ void add_devices(CLI::App& app, int& exit_code) {
   command->add_flag("--test", *test, "a safe force test of every device");
   command->callback([test, &exit_code] {
     if (*test)
-      throw InputError("devices --test", "this version supports no haptic device", "use the scripted surgeon: catgut run SCENE");
-    write_output("-", "No haptic devices are supported in this version yet; mouse and keyboard come with the window.\n"
-                      "The scripted surgeon needs none: catgut run purse_string --surgeon scripted --headless\n");
+      throw InputError("devices --test", "this version supports no haptic device",
+                       "use the scripted surgeon: catgut run SCENE");
+    write_output("-",
+                 "No haptic devices are supported in this version yet; mouse and keyboard come with the window.\n"
+                 "The scripted surgeon needs none: catgut run purse_string --surgeon scripted --headless\n");
     exit_code = 0;
   });
 }

@@ -33,18 +33,19 @@ int replay(const ReplayOptions& o) {
   if (!o.json.empty()) write_output(o.json, replay_json(result, recording));
 
   if (result.differs_at) {
-    std::fprintf(stderr, "catgut: %s: the state after tick %llu differs from the recorded one; recorded by version %s, this is %s\n",
+    std::fprintf(stderr,
+                 "catgut: %s: the state after tick %llu differs from the recorded one; recorded by version %s, this is %s\n",
                  o.file.c_str(), static_cast<unsigned long long>(*result.differs_at), recording.header.catgut_version.c_str(),
                  catgut_version());
     return 1;
   }
   if (o.json != "-")
-    std::printf("%s: %llu ticks replayed%s, state %016llx\n", o.file.c_str(),
-                static_cast<unsigned long long>(result.run.ticks),
+    std::printf("%s: %llu ticks replayed%s, state %016llx\n", o.file.c_str(), static_cast<unsigned long long>(result.run.ticks),
                 o.check ? ", every hash as recorded" : "", static_cast<unsigned long long>(result.run.state_hash));
   if (result.run.interrupted) return 130;
   // What could be replayed has been; that it is not the whole run is still the file's fault.
-  if (recording.truncated) throw InputError(o.file, "the recording is not whole: " + recording.fault, "the ticks before were replayed");
+  if (recording.truncated)
+    throw InputError(o.file, "the recording is not whole: " + recording.fault, "the ticks before were replayed");
   return 0;
 }
 

@@ -66,7 +66,8 @@ void add_run(CLI::App& app, int& exit_code) {
   command->add_option("--seconds", o->session.seconds, "simulated time, settling included; else the scene's duration")
       ->check(CLI::Range(0.001, 1e6))
       ->type_name("S");
-  CLI::Option* seed = command->add_option("--seed", o->seed, "of the surgeon's tremor and aim; else the scene's")->type_name("N");
+  CLI::Option* seed =
+      command->add_option("--seed", o->seed, "of the surgeon's tremor and aim; else the scene's")->type_name("N");
   add_threads_option(*command, o->session.threads);
   command->add_option("--preset", o->preset, "of the solver: paper or default")->type_name("paper|default");
   command->add_option("--set", o->set, "change a key of the scene: key=value, as often as needed")

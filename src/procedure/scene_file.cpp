@@ -37,21 +37,35 @@ std::vector<std::string> keys_of(std::string_view section) {
     if (nearest.empty() && key == f.key) nearest = full_key(f);
   const std::string what = fmt::format("{} has no key \"{}\"", section.empty() ? "a scene" : section, key);
   if (!nearest.empty()) throw InputError(where, what, fmt::format("did you mean \"{}\"?", nearest));
-  throw InputError(where, what,
-                   section.empty() ? "`catgut describe` lists the keys"
-                                   : fmt::format("`catgut describe {}` lists its keys", section));
+  throw InputError(
+      where, what,
+      section.empty() ? "`catgut describe` lists the keys" : fmt::format("`catgut describe {}` lists its keys", section));
 }
 
 std::string found_text(const toml::node& node) {
   std::ostringstream out;
   switch (node.type()) {
-    case toml::node_type::string: out << "the text \"" << *node.value<std::string>() << "\""; break;
-    case toml::node_type::integer: out << *node.value<int64_t>(); break;
-    case toml::node_type::floating_point: out << number_text(*node.value<double>()); break;
-    case toml::node_type::boolean: out << (*node.value<bool>() ? "true" : "false"); break;
-    case toml::node_type::array: out << "a list of " << node.as_array()->size(); break;
-    case toml::node_type::table: out << "a table"; break;
-    default: out << "a date or time"; break;
+    case toml::node_type::string:
+      out << "the text \"" << *node.value<std::string>() << "\"";
+      break;
+    case toml::node_type::integer:
+      out << *node.value<int64_t>();
+      break;
+    case toml::node_type::floating_point:
+      out << number_text(*node.value<double>());
+      break;
+    case toml::node_type::boolean:
+      out << (*node.value<bool>() ? "true" : "false");
+      break;
+    case toml::node_type::array:
+      out << "a list of " << node.as_array()->size();
+      break;
+    case toml::node_type::table:
+      out << "a table";
+      break;
+    default:
+      out << "a date or time";
+      break;
   }
   return out.str();
 }
@@ -275,9 +289,7 @@ SceneSpec read_scene(const std::string& name_or_path) {
 SceneSpec parse_scene(const std::string& text, const std::string& filename) {
   try {
     return scene_of_table(toml::parse(text, filename), filename);
-  } catch (const toml::parse_error& error) {
-    rethrow(error, filename);
-  }
+  } catch (const toml::parse_error& error) { rethrow(error, filename); }
 }
 
 std::string write_scene(const SceneSpec& scene) {
@@ -346,9 +358,9 @@ void set_value(SceneSpec& scene, const std::string& key_equals_value, const std:
   const auto& sections = scene_sections();
   if (!section.empty() && std::find(sections.begin(), sections.end(), section) == sections.end()) {
     const std::string nearest = nearest_word(section, sections);
-    throw InputError(here, fmt::format("a scene has no section \"{}\"", section),
-                     nearest.empty() ? fmt::format("there is {}", fmt::join(sections, ", "))
-                                     : fmt::format("did you mean \"{}\"?", nearest));
+    throw InputError(
+        here, fmt::format("a scene has no section \"{}\"", section),
+        nearest.empty() ? fmt::format("there is {}", fmt::join(sections, ", ")) : fmt::format("did you mean \"{}\"?", nearest));
   }
   const Field* field = section == "expect" ? nullptr : find_field(section, key);
   if (!field && section != "expect") unknown_key(here, section, key);

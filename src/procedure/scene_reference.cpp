@@ -62,7 +62,8 @@ std::string describe(const std::string& key) {
     return out;
   }
   std::string plain = key;  // "body[].radius" and "body[0].radius" mean the same key here
-  if (const size_t open = plain.find('['), close = plain.find(']'); open != std::string::npos && close != std::string::npos && close > open)
+  if (const size_t open = plain.find('['), close = plain.find(']');
+      open != std::string::npos && close != std::string::npos && close > open)
     plain.erase(open, close - open + 1);
   std::vector<std::string> known = scene_sections();
   for (const std::string& section : scene_sections())
@@ -77,7 +78,8 @@ std::string describe(const std::string& key) {
   }
   if (!found.empty()) return found;
   for (const ResultName& r : result_names()) {
-    if (plain == fmt::format("expect.{}", r.name) || plain == r.name) return fmt::format("expect.{}\n  {}\n", r.name, r.meaning);
+    if (plain == fmt::format("expect.{}", r.name) || plain == r.name)
+      return fmt::format("expect.{}\n  {}\n", r.name, r.meaning);
     known.push_back(fmt::format("expect.{}", r.name));
   }
   const std::string nearest = nearest_word(plain, known);
@@ -88,10 +90,12 @@ std::string describe(const std::string& key) {
 std::string reference_markdown() {
   std::string out =
       "# Scene files: every key\n\n"
-      "This page is written by `catgut describe --markdown`; a test keeps it so. A scene is a TOML file; a key left out keeps its\n"
+      "This page is written by `catgut describe --markdown`; a test keeps it so. A scene is a TOML file; a key left out keeps "
+      "its\n"
       "default. Units are SI. `catgut describe KEY` prints one entry, `--set key=value` on the command line changes one.\n";
   const auto table = [&](const std::string& section) {
-    out += fmt::format("\n## {}{}\n\n", section.empty() ? "" : fmt::format("`{}` ", heading(section)), section_meaning(section));
+    out +=
+        fmt::format("\n## {}{}\n\n", section.empty() ? "" : fmt::format("`{}` ", heading(section)), section_meaning(section));
     out += "| key | type | unit | default | range | meaning |\n|---|---|---|---|---|---|\n";
     for (const Field& f : scene_fields())
       if (section == f.section)
@@ -102,8 +106,9 @@ std::string reference_markdown() {
   for (const std::string& section : scene_sections())
     if (section != "expect") table(section);
   out += fmt::format("\n## `[expect]` {}\n\n", section_meaning("expect"));
-  out += "`name = 12` asks for equality, `name = {min = 10, max = 14}` for bounds (either may be left out). A run whose\n"
-         "expectations do not all hold ends with exit code 1.\n\n| result | unit | meaning |\n|---|---|---|\n";
+  out +=
+      "`name = 12` asks for equality, `name = {min = 10, max = 14}` for bounds (either may be left out). A run whose\n"
+      "expectations do not all hold ends with exit code 1.\n\n| result | unit | meaning |\n|---|---|---|\n";
   for (const ResultName& r : result_names()) out += fmt::format("| `{}` | {} | {} |\n", r.name, r.unit, r.meaning);
   return out;
 }

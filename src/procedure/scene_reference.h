@@ -4,8 +4,8 @@
 
 namespace catgut {
 
-// key: "" for everything; a section ("solver", "expect"); a key ("solver.substeps", "body.radius", "title", or just "substeps").
-// Throws InputError naming the nearest key.
+// key: "" for everything; a section ("solver", "expect"); a key ("solver.substeps", "body.radius", "title", or just
+// "substeps"). Throws InputError naming the nearest key.
 std::string describe(const std::string& key);
 
 std::string reference_markdown();  // the whole of docs/scene_reference.md

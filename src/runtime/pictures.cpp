@@ -31,9 +31,7 @@ template <typename Work>
 auto guarded(const std::string& where, Work&& work) {
   try {
     return work();
-  } catch (const InputError&) {
-    throw;
-  } catch (const std::runtime_error& error) {
+  } catch (const InputError&) { throw; } catch (const std::runtime_error& error) {
     throw InputError(where, error.what(), "leave out --video, --frames and --contact-sheet to run without pictures");
   }
 }

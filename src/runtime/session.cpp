@@ -24,8 +24,13 @@ double ms_since(Clock::time_point start) { return std::chrono::duration<double, 
 class Run {
  public:
   Run(const SceneSpec& scene, int threads, const SessionHooks& hooks)
-      : model_(build_model(scene)), picture_(picture_model(*model_)), state_(initial_state(*model_)), jobs_(threads),
-        tally_(scene_of(*model_), picture_), hooks_(hooks), dt_(1 / scene.solver.tick_rate) {
+      : model_(build_model(scene)),
+        picture_(picture_model(*model_)),
+        state_(initial_state(*model_)),
+        jobs_(threads),
+        tally_(scene_of(*model_), picture_),
+        hooks_(hooks),
+        dt_(1 / scene.solver.tick_rate) {
     publish(*model_, *state_, seen_);
     if (hooks_.on_start) hooks_.on_start(picture_);
     told_ = Clock::now();
@@ -110,8 +115,7 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
   Hands hands = make_hands(options.surgeon, scene, run.picture_);
   std::unique_ptr<Recorder> recorder;
   if (!options.record.empty())
-    recorder = std::make_unique<Recorder>(options.record,
-                                          RecordingHeader{catgut_version(), kStateVersion, write_scene(scene)},
+    recorder = std::make_unique<Recorder>(options.record, RecordingHeader{catgut_version(), kStateVersion, write_scene(scene)},
                                           save_state(*run.model_, *run.state_));
 
   const double until_s = options.seconds > 0 ? options.seconds : static_cast<double>(scene.duration);
@@ -136,8 +140,7 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
     const float dt = static_cast<float>(run.dt_);
     if (hands.surgeon)
       go_on = one_tick([&](const Snapshot& seen) { return hands.surgeon->operate(seen, dt); }, hands.surgeon->doing());
-    else
-      go_on = one_tick([](const Snapshot&) { return no_hands(); }, "no hands");
+    else go_on = one_tick([](const Snapshot&) { return no_hands(); }, "no hands");
   }
   if (hands.surgeon && hands.surgeon->done()) {
     result.value["surgeon_done"] = 1;

@@ -46,7 +46,8 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
 
 struct ReplayResult {
   RunResult run;
-  std::optional<uint64_t> differs_at;  // number of the first tick, from 1, after which the state's hash was not the recorded one
+  std::optional<uint64_t>
+      differs_at;  // number of the first tick, from 1, after which the state's hash was not the recorded one
 };
 // Plays a recording. check: compare the hash after every tick and stop at the first that differs. Throws InputError when the
 // recording comes from a program whose state had another layout.

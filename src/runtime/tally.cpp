@@ -21,7 +21,10 @@ bool RunResult::expectations_hold() const {
 }
 
 Tally::Tally(const SceneSpec& scene, const PictureModel& picture)
-    : scene_(scene), thread_first_(picture.thread_first), thread_count_(picture.thread_count), seen_slot_(picture.thread_count) {}
+    : scene_(scene),
+      thread_first_(picture.thread_first),
+      thread_count_(picture.thread_count),
+      seen_slot_(picture.thread_count) {}
 
 void Tally::open() { opening_wanted_ = true; }
 
@@ -78,8 +81,8 @@ void Tally::finish(const Snapshot& last, RunResult& result) const {
   }
   result.value.erase(event_name(EventKind::suture_point));  // the result suture_points says it
   std::map<std::string, double>& v = result.value;
-  v["bites"] = static_cast<double>(
-      std::count_if(last.bite.begin(), last.bite.end(), [](const BiteView& b) { return b.complete; }));
+  v["bites"] =
+      static_cast<double>(std::count_if(last.bite.begin(), last.bite.end(), [](const BiteView& b) { return b.complete; }));
   v["suture_points"] = static_cast<double>(last.suture_point.size());
   v["knots"] = 0;
   v["particles"] = static_cast<double>(result.particles);

@@ -33,10 +33,10 @@ struct RunResult {
   size_t particles = 0;
   uint64_t ticks = 0;
   double simulated_s = 0;
-  double real_time_factor = 0;  // simulated time over the time spent in step, publish and the surgeon's plan
-  Spread solver_ms, tick_ms;    // per tick
-  std::array<Spread, kStages> stage_ms;  // per tick
-  uint32_t contacts = 0;        // the most in a substep
+  double real_time_factor = 0;             // simulated time over the time spent in step, publish and the surgeon's plan
+  Spread solver_ms, tick_ms;               // per tick
+  std::array<Spread, kStages> stage_ms;    // per tick
+  uint32_t contacts = 0;                   // the most in a substep
   std::map<std::string, uint64_t> events;  // by kind, only those that happened
   std::map<std::string, double> value;     // every name of result_names
   std::vector<ExpectationResult> expect;
@@ -51,8 +51,8 @@ class Tally {
  public:
   Tally(const SceneSpec& scene, const PictureModel& picture);
 
-  void open();                        // the hands are let in now: the next snapshot's opening is the whole opening
-  void tick(const Snapshot& seen);    // after every tick
+  void open();                      // the hands are let in now: the next snapshot's opening is the whole opening
+  void tick(const Snapshot& seen);  // after every tick
   void time(const StageTimes& times, double tick_ms);
   void not_sane() { sane_ = false; }
   bool sane() const { return sane_; }

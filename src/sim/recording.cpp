@@ -85,9 +85,7 @@ ToolInput tool(Reader& in) {
   return t;
 }
 
-uint64_t chunk_hash(uint32_t kind, const char* payload, uint64_t size) {
-  return hash_bytes(payload, size, size * 8 + kind);
-}
+uint64_t chunk_hash(uint32_t kind, const char* payload, uint64_t size) { return hash_bytes(payload, size, size * 8 + kind); }
 
 struct Chunk {
   uint32_t kind = 0;

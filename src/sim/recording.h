@@ -19,9 +19,9 @@ namespace catgut {
 constexpr uint32_t kRecordingFormat = 1;
 
 struct RecordingHeader {
-  std::string catgut_version;   // of the program that recorded
-  uint32_t state_version = 0;   // kStateVersion of its state
-  std::string scene;            // the whole scene, as write_scene gives it
+  std::string catgut_version;  // of the program that recorded
+  uint32_t state_version = 0;  // kStateVersion of its state
+  std::string scene;           // the whole scene, as write_scene gives it
 };
 
 struct RecordedTick {

@@ -162,7 +162,8 @@ TEST_F(CommandLine, a_recording_replays_and_a_changed_one_does_not) {
   const catgut::Recording recording = catgut::read_recording(folder_ / "a.cgrec");
   {
     catgut::Recorder changed(folder_ / "b.cgrec", recording.header, recording.start);
-    for (size_t i = 0; i < recording.tick.size(); ++i) changed.tick(recording.tick[i].input, recording.tick[i].hash ^ (i >= 11));
+    for (size_t i = 0; i < recording.tick.size(); ++i)
+      changed.tick(recording.tick[i].input, recording.tick[i].hash ^ (i >= 11));
     changed.finish(false);
   }
   const Outcome differs = run_catgut("replay b.cgrec --check");
@@ -194,8 +195,8 @@ TEST_F(CommandLine, an_interrupted_run_closes_its_files) {
   if (child == 0) {
     if (!std::freopen("/dev/null", "w", stdout)) _exit(98);
     if (!std::freopen("/dev/null", "w", stderr)) _exit(98);
-    execl(CATGUT_APP, CATGUT_APP, "run", scene.c_str(), "--surgeon", "none", "--seconds", "100000", "--record", record_path.c_str(),
-          "--json", json_path.c_str(), nullptr);
+    execl(CATGUT_APP, CATGUT_APP, "run", scene.c_str(), "--surgeon", "none", "--seconds", "100000", "--record",
+          record_path.c_str(), "--json", json_path.c_str(), nullptr);
     _exit(99);
   }
   // The recording is created when the run starts: then it can be interrupted.

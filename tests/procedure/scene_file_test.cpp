@@ -29,9 +29,7 @@ std::string set_fault(const std::string& setting) {
   scene.body.resize(2);
   try {
     set_value(scene, setting);
-  } catch (const InputError& error) {
-    return error.what();
-  }
+  } catch (const InputError& error) { return error.what(); }
   return "no fault";
 }
 
@@ -39,7 +37,9 @@ std::string set_fault(const std::string& setting) {
 void randomise(const Field& f, FieldRef ref, Random& random) {
   const double low = f.min, high = std::min(f.max, 1e6);
   const auto number = [&] { return static_cast<float>(low + (high - low) * (0.001 + 0.998 * random.uniform())); };
-  if (auto* v = std::get_if<std::string*>(&ref)) **v = f.choices ? std::string(f.choices).substr(0, std::string(f.choices).find('|')) : "a \"b\" \\ \n\t\x01 é " + std::to_string(random.next());
+  if (auto* v = std::get_if<std::string*>(&ref))
+    **v = f.choices ? std::string(f.choices).substr(0, std::string(f.choices).find('|'))
+                    : "a \"b\" \\ \n\t\x01 é " + std::to_string(random.next());
   if (auto* v = std::get_if<int*>(&ref)) **v = static_cast<int>(std::ceil(number()));
   if (auto* v = std::get_if<uint64_t*>(&ref)) **v = static_cast<uint64_t>(random.next()) << 30;
   if (auto* v = std::get_if<float*>(&ref)) **v = number();
@@ -113,8 +113,7 @@ TEST(SceneFile, faults_name_file_line_and_the_nearest_key) {
   EXPECT_EQ(fault("[solver]\nvolume = 1"), "lembert.toml:2: solver.volume cannot be 1; it is a flag, true or false");
   EXPECT_EQ(fault("[solver]\ngravity = [0, 1]"),
             "lembert.toml:2: solver.gravity cannot be a list of 2; it is a vector, -1000..1000 [m/s^2]");
-  EXPECT_EQ(fault("[solver]\npreset = 'papr'"),
-            "lembert.toml:2: solver.preset \"papr\" is not known; did you mean \"paper\"?");
+  EXPECT_EQ(fault("[solver]\npreset = 'papr'"), "lembert.toml:2: solver.preset \"papr\" is not known; did you mean \"paper\"?");
   EXPECT_EQ(fault("seed = -1"), "lembert.toml:1: seed = -1 is out of range; it is a whole number, 0 or more");
   EXPECT_EQ(fault("solver = 3"), "lembert.toml:1: solver cannot be 3; it is a table: write [solver]");
   EXPECT_EQ(fault("[body]\nradius = 1"),

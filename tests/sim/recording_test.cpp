@@ -111,8 +111,7 @@ TEST(Recording, a_flipped_bit_never_gives_wrong_ticks) {
       const Recording r = parse_recording(bent, "r");
       EXPECT_TRUE(r.truncated) << byte;
       expect_prefix(r);
-    } catch (const InputError&) {
-    }
+    } catch (const InputError&) {}
   }
 }
 
