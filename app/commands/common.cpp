@@ -67,8 +67,10 @@ void prepare_output(const std::string& path) {
   std::error_code error;
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   if (!folder.empty()) std::filesystem::create_directories(folder, error);
+  const bool was_there = std::filesystem::exists(path, error);
   if (std::filesystem::is_directory(path, error) || !std::ofstream(path, std::ios::app))
     throw InputError(path, "cannot be written", "choose another place");
+  if (!was_there) std::filesystem::remove(path, error);  // a run that fails early leaves no empty file behind
 }
 
 void write_output(const std::string& path, const std::string& text) {
