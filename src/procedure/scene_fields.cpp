@@ -63,7 +63,7 @@ const Field kField[] = {
     {"solver", "contact_sweeps", "", 0, 100, nullptr, "tools, thread and needle, per substep", TOP(solver.contact_sweeps)},
     {"solver", "thread_direct", "", 0, 0, nullptr, "direct solve along the thread before the distance sweeps", TOP(solver.thread_direct)},
     {"solver", "volume", "", 0, 0, nullptr, "tetrahedral volume constraints in the wall", TOP(solver.volume)},
-    {"solver", "volume_compliance", "m^5/N", 0, 1e12, nullptr, "of the volume constraints; 0: incompressible", TOP(solver.volume_compliance)},
+    {"solver", "volume_compliance", "m^6/J", 0, 1e12, nullptr, "of the volume constraints; 0: incompressible", TOP(solver.volume_compliance)},
     {"solver", "damping", "1/s", 0, 10000, nullptr, "of tissue velocities", TOP(solver.damping)},
     {"solver", "thread_damping", "1/s", 0, 10000, nullptr, "of thread velocities", TOP(solver.thread_damping)},
     {"solver", "gravity", "m/s^2", -1000, 1000, nullptr, "y is up", TOP(solver.gravity)},
