@@ -1,0 +1,76 @@
+// app: `catgut bench`: where the time of a tick goes. The paper's tables come in a later version.
+#include <cstdio>
+#include <memory>
+
+#include "commands/commands.h"
+#include "core/check.h"
+#include "procedure/scene_file.h"
+#include "runtime/report.h"
+
+namespace catgut {
+namespace {
+
+struct BenchOptions {
+  std::string what, json, scene = "purse_string";
+  std::vector<std::string> set;
+  int repeat = 1, threads = 1;
+  double seconds = 0;
+};
+
+int bench(const BenchOptions& o) {
+  if (o.what != "stages") throw InputError("bench " + o.what, "not available yet in this version", "use `catgut bench stages`");
+  SceneSpec scene = read_scene(o.scene);
+  for (const std::string& setting : o.set) set_value(scene, setting);
+  prepare_output(o.json);
+  SessionHooks hooks;
+  hooks.stop = &stop_on_interrupt();
+  hooks.on_progress = progress_line();
+  SessionOptions session;
+  session.threads = o.threads;
+  session.seconds = o.seconds;
+  session.surgeon = scene.technique.name == "none" ? "none" : "scripted";
+  // Every repetition computes the same bits; the one least disturbed by other programs tells what the code costs.
+  RunResult best;
+  for (int i = 0; i < o.repeat; ++i) {
+    RunResult r = run_session(scene, session, hooks);
+    if (i > 0 && r.state_hash != best.state_hash && !r.interrupted) {
+      end_progress_line();
+      std::fprintf(stderr,
+                   "catgut: bench stages: two runs of %s gave different states; this is a fault in Catgut, please report it\n",
+                   o.scene.c_str());
+      return 1;
+    }
+    if (i == 0 || (r.solver_ms.median < best.solver_ms.median && !r.interrupted)) best = std::move(r);
+    if (hooks.stop->load()) break;
+  }
+  end_progress_line();
+  if (!o.json.empty()) write_output(o.json, run_json(best));
+  if (o.json != "-") {
+    std::printf("%s, preset %s: %zu particles, %llu ticks, %d threads, best of %d\n", best.scene.c_str(), best.preset.c_str(),
+                best.particles, static_cast<unsigned long long>(best.ticks), best.threads, o.repeat);
+    std::fputs(stage_table(best).c_str(), stdout);
+  }
+  return best.interrupted ? 130 : 0;
+}
+
+}  // namespace
+
+void add_bench(CLI::App& app, int& exit_code) {
+  auto o = std::make_shared<BenchOptions>();
+  CLI::App* command = app.add_subcommand("bench", "measure where the time goes");
+  command->add_option("what", o->what, "stages (paper, limits and scale come later)")
+      ->required()
+      ->check(CLI::IsMember({"paper", "limits", "scale", "stages"}))
+      ->type_name("paper|limits|scale|stages");
+  command->add_option("--json", o->json, "results as JSON; - for standard output")->type_name("FILE|-");
+  command->add_option("--repeat", o->repeat, "runs; the one with the fastest median is reported")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  add_threads_option(*command, o->threads);
+  command->add_option("--scene", o->scene, "scene to run")->capture_default_str();
+  command->add_option("--seconds", o->seconds, "simulated time; else until the surgeon is done")->check(CLI::Range(0.001, 1e6));
+  command->add_option("--set", o->set, "change a key of the scene: key=value")->take_all()->allow_extra_args(false);
+  command->callback([o, &exit_code] { exit_code = bench(*o); });
+}
+
+}  // namespace catgut

@@ -1,0 +1,39 @@
+// app: the commands of the program, one file each. A command adds itself to the command line and, when it was chosen, sets the
+// exit code: 0 done, 1 the expectation or check failed, 2 bad input, 130 interrupted.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include "runtime/pictures.h"
+#include "runtime/session.h"
+
+namespace catgut {
+
+void add_run(CLI::App& app, int& exit_code);
+void add_replay(CLI::App& app, int& exit_code);
+void add_bench(CLI::App& app, int& exit_code);
+void add_validate(CLI::App& app, int& exit_code);
+void add_devices(CLI::App& app, int& exit_code);
+void add_describe(CLI::App& app, int& exit_code);
+
+// What several commands share (app/commands/common.cpp).
+
+// --video, --frames, --contact-sheet, --video-speed.
+void add_picture_options(CLI::App& command, PictureOptions& options);
+void add_threads_option(CLI::App& command, int& threads);
+
+// Set by the first Ctrl-C (the tick in hand is finished, files are closed); a second one kills at once.
+const std::atomic<bool>& stop_on_interrupt();
+
+// A line a second on a terminal, else one every five seconds, on standard error.
+std::function<void(const Progress&)> progress_line();
+void end_progress_line();
+
+// Makes the folder of an output file and checks that the file can be written; before the work, not after it. "" and "-" pass.
+void prepare_output(const std::string& path);
+// path "-": standard output.
+void write_output(const std::string& path, const std::string& text);
+
+}  // namespace catgut

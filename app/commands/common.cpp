@@ -1,0 +1,88 @@
+// app: what the commands share; see commands.h.
+#include <signal.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "commands/commands.h"
+#include "core/check.h"
+
+namespace catgut {
+namespace {
+
+std::atomic<bool> stop_wanted{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "set in a signal handler");
+
+void on_interrupt(int) { stop_wanted = true; }
+
+bool line_open = false;  // a progress line stands on the terminal
+
+}  // namespace
+
+void add_picture_options(CLI::App& command, PictureOptions& options) {
+  command.add_option("--video", options.video, "time-lapse film, FILE.mp4")->type_name("FILE.mp4");
+  command.add_option("--video-speed", options.speed, "simulated seconds per second of film")
+      ->check(CLI::Range(0.01, 1000.0))
+      ->capture_default_str();
+  command.add_option("--frames", options.frames, "folder for the film's pictures as PNG")->type_name("DIR");
+  command.add_option("--contact-sheet", options.contact_sheet, "up to twelve moments on one PNG")->type_name("FILE.png");
+}
+
+void add_threads_option(CLI::App& command, int& threads) {
+  threads = default_threads();
+  command.add_option("--threads", threads, "workers of the solver; the result is the same for any number")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+}
+
+const std::atomic<bool>& stop_on_interrupt() {
+  struct sigaction action = {};
+  action.sa_handler = on_interrupt;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  return stop_wanted;
+}
+
+std::function<void(const Progress&)> progress_line() {
+  const bool terminal = isatty(STDERR_FILENO);
+  return [terminal, calls = 0](const Progress& p) mutable {
+    if (!terminal && ++calls % 5 != 0) return;
+    std::fprintf(stderr, "%s%7.1f of %.0f s  %5.1f x real time  %s%s", terminal ? "\r\033[K" : "", p.simulated_s, p.until_s,
+                 p.real_time_factor, p.doing.c_str(), terminal ? "" : "\n");
+    std::fflush(stderr);
+    line_open = terminal;
+  };
+}
+
+void end_progress_line() {
+  if (line_open) std::fputs("\r\033[K", stderr);
+  line_open = false;
+}
+
+void prepare_output(const std::string& path) {
+  if (path.empty() || path == "-") return;
+  std::error_code error;
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (!folder.empty()) std::filesystem::create_directories(folder, error);
+  const bool was_there = std::filesystem::exists(path, error);
+  if (std::filesystem::is_directory(path, error) || !std::ofstream(path, std::ios::app))
+    throw InputError(path, "cannot be written", "choose another place");
+  if (!was_there) std::filesystem::remove(path, error);  // a run that fails early leaves no empty file behind
+}
+
+void write_output(const std::string& path, const std::string& text) {
+  if (path == "-") {
+    std::fputs(text.c_str(), stdout);
+    if (std::fflush(stdout) != 0) throw InputError("standard output", "cannot be written", "is the disk full?");
+    return;
+  }
+  std::ofstream out(path, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) throw InputError(path, "cannot be written", "is the disk full?");
+}
+
+}  // namespace catgut

@@ -1,0 +1,65 @@
+// app: `catgut replay FILE`: plays a recording; with --check, proves that today's program gives the recorded bits.
+#include <cstdio>
+#include <memory>
+
+#include "commands/commands.h"
+#include "core/check.h"
+#include "runtime/report.h"
+
+namespace catgut {
+namespace {
+
+struct ReplayOptions {
+  std::string file, json;
+  bool check = false;
+  int threads = 1;
+  PictureOptions pictures;
+};
+
+int replay(const ReplayOptions& o) {
+  const Recording recording = read_recording(o.file);
+  for (const std::string& path : {o.json, o.pictures.video, o.pictures.contact_sheet}) prepare_output(path);
+  std::unique_ptr<Pictures> pictures;
+  SessionHooks hooks;
+  hooks.stop = &stop_on_interrupt();
+  hooks.on_progress = progress_line();
+  if (o.pictures.any()) {
+    hooks.on_start = [&](const PictureModel& model) { pictures = std::make_unique<Pictures>(o.pictures, model); };
+    hooks.on_tick = [&](const Snapshot& seen, const std::string& doing) { pictures->tick(seen, doing); };
+  }
+  const ReplayResult result = replay_session(recording, o.file, o.check, o.threads, hooks);
+  end_progress_line();
+  if (pictures) pictures->finish();
+  if (!o.json.empty()) write_output(o.json, replay_json(result, recording));
+
+  if (result.differs_at) {
+    std::fprintf(stderr,
+                 "catgut: %s: the state after tick %llu differs from the recorded one; recorded by version %s, this is %s\n",
+                 o.file.c_str(), static_cast<unsigned long long>(*result.differs_at), recording.header.catgut_version.c_str(),
+                 catgut_version());
+    return 1;
+  }
+  if (o.json != "-")
+    std::printf("%s: %llu ticks replayed%s, state %016llx\n", o.file.c_str(), static_cast<unsigned long long>(result.run.ticks),
+                o.check ? ", every hash as recorded" : "", static_cast<unsigned long long>(result.run.state_hash));
+  if (result.run.interrupted) return 130;
+  // What could be replayed has been; that it is not the whole run is still the file's fault.
+  if (recording.truncated)
+    throw InputError(o.file, "the recording is not whole: " + recording.fault, "the ticks before were replayed");
+  return 0;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+  auto o = std::make_shared<ReplayOptions>();
+  CLI::App* command = app.add_subcommand("replay", "play a recording");
+  command->add_option("file", o->file, "the recording")->required()->type_name("FILE.cgrec");
+  command->add_flag("--check", o->check, "compare the state with the recorded hash after every tick");
+  add_threads_option(*command, o->threads);
+  command->add_option("--json", o->json, "results as JSON; - for standard output")->type_name("FILE|-");
+  add_picture_options(*command, o->pictures);
+  command->callback([o, &exit_code] { exit_code = replay(*o); });
+}
+
+}  // namespace catgut

@@ -1,0 +1,88 @@
+// app: `catgut run SCENE`: simulates a scene and judges it by its expectations.
+#include <cstdio>
+#include <memory>
+
+#include "commands/commands.h"
+#include "core/check.h"
+#include "procedure/scene_file.h"
+#include "runtime/report.h"
+
+namespace catgut {
+namespace {
+
+struct RunOptions {
+  std::string scene, preset, mesh, json;
+  std::vector<std::string> set;
+  uint64_t seed = 0;
+  bool seed_given = false, headless = false, no_expect = false;
+  SessionOptions session;
+  PictureOptions pictures;
+};
+
+SceneSpec scene_for(const RunOptions& o) {
+  SceneSpec scene = read_scene(o.scene);
+  if (!o.preset.empty()) use_preset(scene, o.preset);
+  if (o.seed_given) set_value(scene, "seed=" + std::to_string(o.seed), "--seed");
+  if (!o.mesh.empty()) {
+    if (scene.body.empty()) throw InputError("--mesh", "the scene has no body to replace", "add a [[body]] to it");
+    scene.body[0].mesh = o.mesh;
+  }
+  for (const std::string& setting : o.set) set_value(scene, setting);
+  return scene;
+}
+
+int run(const RunOptions& o) {
+  const SceneSpec scene = scene_for(o);
+  for (const std::string& path : {o.json, o.session.record, o.pictures.video, o.pictures.contact_sheet}) prepare_output(path);
+
+  std::unique_ptr<Pictures> pictures;
+  SessionHooks hooks;
+  hooks.stop = &stop_on_interrupt();
+  hooks.on_progress = progress_line();
+  if (o.pictures.any()) {
+    hooks.on_start = [&](const PictureModel& model) { pictures = std::make_unique<Pictures>(o.pictures, model); };
+    hooks.on_tick = [&](const Snapshot& seen, const std::string& doing) { pictures->tick(seen, doing); };
+  }
+  const RunResult result = run_session(scene, o.session, hooks);
+  end_progress_line();
+  if (pictures) pictures->finish();
+
+  if (!o.json.empty()) write_output(o.json, run_json(result));
+  if (o.json != "-") std::fputs(run_summary(result).c_str(), stdout);
+  if (result.interrupted) return 130;
+  return o.no_expect || result.expectations_hold() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, int& exit_code) {
+  auto o = std::make_shared<RunOptions>();
+  CLI::App* command = app.add_subcommand("run", "simulate a scene");
+  command->add_option("scene", o->scene, "a name from scenes/ or the path of a .toml file")->required()->type_name("SCENE");
+  command->add_option("--surgeon", o->session.surgeon, "scripted, none, or a recording whose hands are played")
+      ->type_name("scripted|none|FILE")
+      ->capture_default_str();
+  command->add_flag("--headless", o->headless, "without a window (so far every run is)");
+  command->add_option("--seconds", o->session.seconds, "simulated time, settling included; else the scene's duration")
+      ->check(CLI::Range(0.001, 1e6))
+      ->type_name("S");
+  CLI::Option* seed =
+      command->add_option("--seed", o->seed, "of the surgeon's tremor and aim; else the scene's")->type_name("N");
+  add_threads_option(*command, o->session.threads);
+  command->add_option("--preset", o->preset, "of the solver: paper or default")->type_name("paper|default");
+  command->add_option("--set", o->set, "change a key of the scene: key=value, as often as needed")
+      ->type_name("key=value")
+      ->take_all()
+      ->allow_extra_args(false);
+  command->add_option("--record", o->session.record, "recording to write")->type_name("FILE.cgrec");
+  command->add_option("--json", o->json, "results as JSON; - for standard output")->type_name("FILE|-");
+  command->add_option("--mesh", o->mesh, "organ surface for the first body, file or file#node")->type_name("FILE");
+  command->add_flag("--no-expect", o->no_expect, "report the scene's expectations without judging the run by them");
+  add_picture_options(*command, o->pictures);
+  command->callback([o, seed, &exit_code] {
+    o->seed_given = seed->count() > 0;
+    exit_code = run(*o);
+  });
+}
+
+}  // namespace catgut

@@ -1,0 +1,53 @@
+// procedure: the one table of everything a scene file can say. The reader, the writer, --set, `catgut describe`,
+// docs/scene_reference.md and the tests all walk it, so a key added here is complete everywhere at once.
+// Default values are not repeated in the table: they are read from a default-constructed SceneSpec.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "sim/scene.h"
+
+namespace catgut {
+
+// Where a value lives; its alternative is also the key's type.
+using FieldRef = std::variant<std::string*, int*, uint64_t*, float*, bool*, Vec3*>;
+
+struct Field {
+  const char* section;  // "" for keys at the top of the file; "body" is a list of tables, [[body]]
+  const char* key;
+  const char* unit;     // SI; "" when the value has none
+  double min, max;      // inclusive, per component of a vector; ignored for text and flags
+  const char* choices;  // text: the allowed words separated by '|'; nullptr: any text
+  const char* meaning;
+  FieldRef (*at)(SceneSpec& scene, size_t body);  // body: index into scene.body, used by section "body" only
+};
+
+std::span<const Field> scene_fields();
+const std::vector<std::string>& scene_sections();       // "body", "thread", ... in file order, "" left out
+const char* section_meaning(std::string_view section);  // one line for the reference
+
+const Field* find_field(std::string_view section, std::string_view key);  // nullptr if there is none
+std::string full_key(const Field& field);                                 // "solver.substeps", "body[].radius", "title"
+
+std::string type_name(const Field& field);     // "text", "whole number", "number", "flag", "vector"
+std::string range_text(const Field& field);    // "1..64", "purse_string or none", "" when anything goes
+std::string default_text(const Field& field);  // as it would be written in a scene file
+
+// A value as TOML, in the fewest digits that read back to the same bits.
+std::string value_text(FieldRef value);
+std::string number_text(double value);
+
+// The results a run reports and [expect] may bound: runtime/session fills them all.
+struct ResultName {
+  std::string name, unit, meaning;
+};
+const std::vector<ResultName>& result_names();
+
+// The candidate that differs least from a misspelt word; "" when none is near enough to be a likely meaning.
+std::string nearest_word(std::string_view word, const std::vector<std::string>& candidates);
+
+}  // namespace catgut

@@ -1,0 +1,79 @@
+// runtime: makes the hands of a run; see hands.h.
+#include "runtime/hands.h"
+
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+
+#include "core/check.h"
+#include "procedure/scene_file.h"
+#include "sim/recording.h"
+
+namespace catgut {
+namespace {
+
+// Plays what some hands once did, by time, so that a recording also serves a scene with another tick rate. It does not look:
+// in a scene that differs it will do the wrong thing, as a film of hands would.
+class RecordedHands : public Surgeon {
+ public:
+  RecordedHands(Recording recording, float tick_rate) : recording_(std::move(recording)), tick_rate_(tick_rate) {}
+
+  std::array<ToolInput, 2> operate(const Snapshot& seen, float dt) override {
+    next_ = static_cast<size_t>(std::llround(static_cast<double>(seen.tick) * dt * tick_rate_));
+    if (recording_.tick.empty()) return nobody();
+    return recording_.tick[std::min(next_, recording_.tick.size() - 1)].input.hand;
+  }
+  bool done() const override { return next_ + 1 >= recording_.tick.size(); }
+  std::string doing() const override {
+    return "recorded hands, tick " + std::to_string(next_) + " of " + std::to_string(recording_.tick.size());
+  }
+
+ private:
+  static std::array<ToolInput, 2> nobody() {
+    std::array<ToolInput, 2> hands;
+    hands[0].connected = hands[1].connected = 0;
+    return hands;
+  }
+  Recording recording_;
+  double tick_rate_;
+  size_t next_ = 0;
+};
+
+SurgeonSkill skill_of(const SceneSpec& scene) {
+  const SurgeonSpec& s = scene.surgeon;
+  SurgeonSkill k;
+  k.bites = s.bites;
+  k.edge_distance = s.edge_distance;
+  k.bite_length = s.bite_length;
+  k.tail = s.tail;
+  k.speed = s.speed;
+  k.drive_speed = s.drive_speed;
+  k.tremor = s.tremor;
+  k.aim_error = s.aim_error;
+  k.seed = scene.seed;
+  return k;
+}
+
+}  // namespace
+
+Hands make_hands(const std::string& who, const SceneSpec& scene, const PictureModel& picture) {
+  if (who == "none") return {};
+  if (who == "scripted") {
+    if (scene.technique.name == "none")
+      throw InputError("--surgeon scripted", "the scene has no technique to carry out", "use --surgeon none, or a recording");
+    try {
+      return {make_surgeon(scene.technique.name, picture, skill_of(scene)), true};
+    } catch (const std::invalid_argument&) {
+      throw InputError("--surgeon scripted", "there is no script for the technique \"" + scene.technique.name + "\"",
+                       "use --surgeon none, or a recording");
+    }
+  }
+  if (!std::filesystem::exists(who))
+    throw InputError("--surgeon " + who, "there is no such surgeon and no such file",
+                     "write scripted, none or the path of a .cgrec recording");
+  Recording recording = read_recording(who);
+  const float tick_rate = parse_scene(recording.header.scene, who).solver.tick_rate;
+  return {std::make_unique<RecordedHands>(std::move(recording), tick_rate), false};
+}
+
+}  // namespace catgut

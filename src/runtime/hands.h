@@ -1,0 +1,20 @@
+// runtime: who holds the tools in a run: the scripted surgeon, nobody, or the hands of a recording.
+#pragma once
+#include <memory>
+#include <string>
+
+#include "exchange/picture.h"
+#include "sim/scene.h"
+#include "surgeon/surgeon.h"
+
+namespace catgut {
+
+struct Hands {
+  std::unique_ptr<Surgeon> surgeon;  // null: no hands
+  bool settles = true;               // false: a recording brings its own settling time along
+};
+
+// who: "scripted", "none" or the path of a .cgrec file. Throws InputError.
+Hands make_hands(const std::string& who, const SceneSpec& scene, const PictureModel& picture);
+
+}  // namespace catgut

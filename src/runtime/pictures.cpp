@@ -1,0 +1,123 @@
+// runtime: takes the pictures of a run; see pictures.h.
+#include "runtime/pictures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+#include <vector>
+
+#include "core/check.h"
+#include "render/camera.h"
+#include "render/image.h"
+#include "render/renderer.h"
+#include "render/video.h"
+
+namespace catgut {
+namespace {
+
+constexpr size_t kSheetCells = 12, kSheetColumns = 4;
+constexpr size_t kMostMoments = 48;  // pictures kept in memory; beyond it every other one is let go
+
+bool is_moment(const Snapshot& seen) {
+  return std::any_of(seen.event.begin(), seen.event.end(), [](const Event& e) {
+    return e.kind == EventKind::bite_completed || e.kind == EventKind::closure_started || e.kind == EventKind::closure_finished;
+  });
+}
+
+// The render room speaks in std::runtime_error; the user hears one line like any other fault.
+template <typename Work>
+auto guarded(const std::string& where, Work&& work) {
+  try {
+    return work();
+  } catch (const InputError&) { throw; } catch (const std::runtime_error& error) {
+    throw InputError(where, error.what(), "leave out --video, --frames and --contact-sheet to run without pictures");
+  }
+}
+
+}  // namespace
+
+struct Pictures::Studio {
+  PictureOptions options;
+  std::unique_ptr<Renderer> renderer;
+  std::unique_ptr<VideoWriter> film;
+  FollowCamera follow;
+  Camera camera;
+  double next_s = 0, last_s = -1;  // [s] simulated
+  size_t frame = 0;
+  std::vector<SheetCell> moment;
+  Snapshot last;  // of the run so far, for the sheet's last cell
+  std::string last_caption;
+
+  Studio(const PictureOptions& o, const PictureModel& model) : options(o), follow(model), camera(overview(model)) {
+    renderer = make_renderer(model, o.width, o.height, Quality::draft);
+    if (!o.video.empty()) film = std::make_unique<VideoWriter>(o.video, o.width, o.height, o.rate);
+    if (!o.frames.empty()) std::filesystem::create_directories(o.frames);
+  }
+
+  static std::string caption_of(const Snapshot& seen, const std::string& caption) {
+    return fmt::format("{:6.1f} s   {}", seen.time_s, caption);
+  }
+
+  Image take(const Snapshot& seen, const std::string& caption) {
+    // The camera eases in the film's time: what the viewer sees should glide at any time-lapse factor.
+    const double dt = last_s < 0 ? 0 : (seen.time_s - last_s) / options.speed;
+    last_s = seen.time_s;
+    camera = follow.update(seen, static_cast<float>(dt));
+    Overlay overlay;
+    overlay.caption = caption;
+    return renderer->render(seen, camera, overlay);
+  }
+
+  void keep(Image picture, const std::string& caption) {
+    moment.push_back({std::move(picture), caption});
+    if (moment.size() < kMostMoments) return;
+    for (size_t i = 1; 2 * i < moment.size(); ++i) moment[i] = std::move(moment[2 * i]);
+    moment.resize((moment.size() + 1) / 2);
+  }
+
+  void tick(const Snapshot& seen, const std::string& doing) {
+    const bool sheet = !options.contact_sheet.empty() && (moment.empty() || is_moment(seen));
+    const bool frame_due = (film || !options.frames.empty()) && seen.time_s >= next_s;
+    if (sheet || frame_due) {
+      const std::string caption = caption_of(seen, doing);
+      Image picture = take(seen, frame_due ? caption : std::string());
+      if (frame_due) {
+        next_s += options.speed / options.rate;
+        next_s = std::max(next_s, seen.time_s);  // slower than the film's rate: no frames to catch up with
+        if (film) film->add(picture);
+        if (!options.frames.empty()) write_png(picture, fmt::format("{}/frame_{:05}.png", options.frames, frame++));
+      }
+      if (sheet) keep(std::move(picture), caption);
+    }
+    if (!options.contact_sheet.empty()) {
+      last = seen;
+      last_caption = caption_of(seen, doing);
+    }
+  }
+
+  void finish() {
+    if (film) film->finish();
+    if (options.contact_sheet.empty() || moment.empty()) return;
+    moment.push_back({take(last, {}), last_caption});
+    std::vector<SheetCell> cell;
+    const size_t n = std::min(kSheetCells, moment.size());
+    for (size_t i = 0; i < n; ++i) cell.push_back(moment[n == 1 ? 0 : i * (moment.size() - 1) / (n - 1)]);
+    write_png(contact_sheet(cell, static_cast<int>(kSheetColumns)), options.contact_sheet);
+  }
+};
+
+Pictures::Pictures(const PictureOptions& options, const PictureModel& model)
+    : studio_(guarded("pictures", [&] { return std::make_unique<Studio>(options, model); })) {}
+Pictures::~Pictures() = default;
+
+void Pictures::tick(const Snapshot& seen, const std::string& caption) {
+  guarded("pictures", [&] { studio_->tick(seen, caption); });
+}
+
+void Pictures::finish() {
+  guarded("pictures", [&] { studio_->finish(); });
+}
+
+}  // namespace catgut

@@ -1,0 +1,38 @@
+// runtime: the pictures of a run: single frames, a time-lapse film, a contact sheet of its moments. Reads snapshots as the run
+// goes; writes files. The only file above the render room that knows the renderer.
+#pragma once
+#include <memory>
+#include <string>
+
+#include "exchange/picture.h"
+#include "exchange/snapshot.h"
+
+namespace catgut {
+
+struct PictureOptions {
+  std::string frames;         // folder for one PNG per picture; empty: none
+  std::string video;          // MP4; empty: none
+  std::string contact_sheet;  // PNG of up to twelve moments; empty: none
+  double speed = 4;           // simulated seconds per second of film
+  double rate = 30;           // pictures per second of film
+  int width = 640, height = 360;
+  bool any() const { return !frames.empty() || !video.empty() || !contact_sheet.empty(); }
+};
+
+class Pictures {
+ public:
+  // Throws InputError when this machine cannot draw, encode or write there: before the run, not after it.
+  Pictures(const PictureOptions& options, const PictureModel& model);
+  ~Pictures();
+  Pictures(const Pictures&) = delete;
+  Pictures& operator=(const Pictures&) = delete;
+
+  void tick(const Snapshot& seen, const std::string& caption);
+  void finish();  // writes the film's end and the contact sheet; throws InputError
+
+ private:
+  struct Studio;
+  std::unique_ptr<Studio> studio_;
+};
+
+}  // namespace catgut

@@ -1,0 +1,114 @@
+// runtime: writes results; see report.h. Numbers that are not finite become null, as JSON wants.
+#include "runtime/report.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace catgut {
+namespace {
+using Json = nlohmann::ordered_json;
+
+Json spread_json(const Spread& s) { return {{"median", s.median}, {"p99", s.p99}, {"max", s.max}}; }
+
+// Counts are written without a fraction: 12, not 12.0.
+Json number_json(double v) {
+  if (std::isfinite(v) && v == std::floor(v) && std::abs(v) < 1e15) return static_cast<int64_t>(v);
+  return v;
+}
+
+Json want_json(const Expectation& e) {
+  if (e.min == e.max) return number_json(e.min);
+  Json want = Json::object();
+  const Expectation open;
+  if (e.min != open.min) want["min"] = number_json(e.min);
+  if (e.max != open.max) want["max"] = number_json(e.max);
+  return want;
+}
+
+std::string want_text(const Expectation& e) {
+  const Expectation open;
+  if (e.min == e.max) return fmt::format("{}", e.min);
+  if (e.min != open.min && e.max != open.max) return fmt::format("{} to {}", e.min, e.max);
+  return e.min != open.min ? fmt::format("at least {}", e.min) : fmt::format("at most {}", e.max);
+}
+
+double value(const RunResult& r, const char* name) {
+  const auto found = r.value.find(name);
+  return found == r.value.end() ? 0 : found->second;
+}
+
+Json json_of(const RunResult& r) {
+  Json j;
+  j["catgut"] = catgut_version();
+  j["scene"] = r.scene;
+  j["title"] = r.title;
+  j["preset"] = r.preset;
+  j["surgeon"] = r.surgeon;
+  j["threads"] = r.threads;
+  j["particles"] = r.particles;
+  j["ticks"] = r.ticks;
+  j["simulated_s"] = r.simulated_s;
+  j["real_time_factor"] = r.real_time_factor;
+  j["solver_ms"] = spread_json(r.solver_ms);
+  j["tick_ms"] = spread_json(r.tick_ms);
+  j["stages"] = Json::object();
+  for (size_t s = 0; s < kStages; ++s) j["stages"][stage_name(static_cast<Stage>(s))] = spread_json(r.stage_ms[s]);
+  j["contacts"] = r.contacts;
+  j["sutures"] = number_json(value(r, "bites"));
+  j["knots"] = number_json(value(r, "knots"));
+  for (const char* name : {"suture_points", "opening_ratio", "closure", "thread_length_error", "thread_length_error_passing",
+                           "lost", "sane", "surgeon_done"})
+    j[name] = number_json(value(r, name));
+  j["events"] = r.events.empty() ? Json::object() : Json(r.events);
+  j["expect"] = Json::object();
+  for (const ExpectationResult& e : r.expect)
+    j["expect"][e.want.name] = {{"want", want_json(e.want)}, {"got", number_json(e.got)}, {"ok", e.ok}};
+  j["interrupted"] = r.interrupted;
+  j["ended"] = r.ended;
+  j["state_hash"] = fmt::format("{:016x}", r.state_hash);
+  return j;
+}
+
+// Names come from files and may hold anything: what is not UTF-8 is replaced, not thrown at the user.
+std::string text(const Json& j) { return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
+}  // namespace
+
+std::string run_json(const RunResult& result) { return text(json_of(result)); }
+
+std::string replay_json(const ReplayResult& result, const Recording& recording) {
+  Json j = json_of(result.run);
+  j["recorded_by"] = recording.header.catgut_version;
+  j["recorded_ticks"] = recording.tick.size();
+  j["truncated"] = recording.truncated;
+  j["differs_at"] = result.differs_at ? Json(*result.differs_at) : Json();
+  return text(j);
+}
+
+std::string run_summary(const RunResult& r) {
+  std::string out = fmt::format("{}: {:.1f} s simulated in {} ticks, {:.1f} x real time, {} particles, {} thread{}\n", r.scene,
+                                r.simulated_s, r.ticks, r.real_time_factor, r.particles, r.threads, r.threads == 1 ? "" : "s");
+  out += fmt::format("  solver {:.3f} ms a tick (median), {:.3f} (99th percentile), {:.3f} (worst)\n", r.solver_ms.median,
+                     r.solver_ms.p99, r.solver_ms.max);
+  out += fmt::format("  {} bites, {} suture points, opening at {:.1f} % of what it was\n", value(r, "bites"),
+                     value(r, "suture_points"), 100 * value(r, "opening_ratio"));
+  out += fmt::format("  ended: {}; state {:016x}\n", r.ended, r.state_hash);
+  for (const ExpectationResult& e : r.expect)
+    out += fmt::format("  {} {} = {:.6g}, expected {}\n", e.ok ? "ok    " : "FAILED", e.want.name, e.got, want_text(e.want));
+  return out;
+}
+
+std::string stage_table(const RunResult& r) {
+  std::string out = fmt::format("{:<16}{:>12}{:>12}{:>12}\n", "stage", "median ms", "p99 ms", "max ms");
+  const auto row = [&](const char* name, const Spread& s) {
+    out += fmt::format("{:<16}{:>12.4f}{:>12.4f}{:>12.4f}\n", name, s.median, s.p99, s.max);
+  };
+  for (size_t s = 0; s < kStages; ++s) row(stage_name(static_cast<Stage>(s)), r.stage_ms[s]);
+  row("solver", r.solver_ms);
+  row("whole tick", r.tick_ms);
+  return out;
+}
+
+}  // namespace catgut

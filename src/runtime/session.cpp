@@ -1,0 +1,185 @@
+// runtime: the run loop. Per tick: the hands see the last snapshot, step, publish, measure, tell. See session.h.
+#include "runtime/session.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include "core/check.h"
+#include "procedure/scene_file.h"
+#include "runtime/hands.h"
+#include "sim/simulation.h"
+
+namespace catgut {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr double kAfterDone = 0.5;     // [s] simulated: what was let go comes to rest
+constexpr uint64_t kSanityTicks = 16;  // a state that has gone wrong is noticed within a moment, at no measurable cost
+
+double ms_since(Clock::time_point start) { return std::chrono::duration<double, std::milli>(Clock::now() - start).count(); }
+
+// The state of one run and what is done around each of its ticks, whether the hands live or are replayed.
+class Run {
+ public:
+  Run(const SceneSpec& scene, int threads, const SessionHooks& hooks)
+      : model_(build_model(scene)),
+        picture_(picture_model(*model_)),
+        state_(initial_state(*model_)),
+        jobs_(threads),
+        tally_(scene_of(*model_), picture_),
+        hooks_(hooks),
+        dt_(1 / scene.solver.tick_rate) {
+    publish(*model_, *state_, seen_);
+    if (hooks_.on_start) hooks_.on_start(picture_);
+    told_ = Clock::now();
+  }
+
+  // hands: asked for the input of the tick. False when the run has to end: stopped, or no longer sane.
+  template <typename HandsOf>
+  bool tick(HandsOf&& hands, const std::string& doing, double until_s) {
+    const Clock::time_point start = Clock::now();
+    input_.tick = ticks_;
+    input_.hand = hands(seen_);
+    StageTimes times;
+    step(*model_, *state_, input_, jobs_, &times);
+    {
+      StageTimer timer(&times, Stage::publish);
+      publish(*model_, *state_, seen_);
+    }
+    tally_.time(times, ms_since(start));
+    ++ticks_;
+    tally_.tick(seen_);
+    if (ticks_ % kSanityTicks == 0 && !state_is_sane(*model_, *state_)) tally_.not_sane();
+    if (hooks_.on_tick) hooks_.on_tick(seen_, doing);
+    if (hooks_.on_progress && ms_since(told_) > 1000) {
+      told_ = Clock::now();
+      hooks_.on_progress({simulated_s(), until_s, simulated_s() * 1000 / tally_.spent_ms(), doing});
+    }
+    return !stopped() && tally_.sane();
+  }
+
+  bool stopped() const { return hooks_.stop && hooks_.stop->load(std::memory_order_relaxed); }
+  double simulated_s() const { return static_cast<double>(ticks_) * dt_; }
+
+  void finish(RunResult& result) {
+    if (!state_is_sane(*model_, *state_)) tally_.not_sane();
+    const SceneSpec& scene = scene_of(*model_);
+    result.scene = scene.name;
+    result.title = scene.title;
+    result.preset = scene.solver.preset;
+    result.threads = jobs_.threads();
+    result.particles = particle_count(*model_);
+    result.ticks = ticks_;
+    result.simulated_s = simulated_s();
+    result.state_hash = hash_state(*model_, *state_);
+    result.interrupted = stopped();
+    if (result.interrupted) result.ended = "interrupted";
+    if (!tally_.sane()) result.ended = "the state was no longer sane";
+    tally_.finish(seen_, result);
+  }
+
+  std::shared_ptr<const Model> model_;
+  PictureModel picture_;
+  StatePtr state_;
+  Jobs jobs_;
+  Tally tally_;
+  const SessionHooks& hooks_;
+  Snapshot seen_;
+  TickInput input_;
+  uint64_t ticks_ = 0;
+  const double dt_;
+
+ private:
+  Clock::time_point told_;
+};
+
+std::array<ToolInput, 2> no_hands() {
+  std::array<ToolInput, 2> hands;
+  hands[0].connected = hands[1].connected = 0;
+  return hands;
+}
+
+uint64_t ticks_in(double seconds, double dt) { return static_cast<uint64_t>(std::llround(seconds / dt)); }
+
+}  // namespace
+
+const char* catgut_version() { return CATGUT_VERSION; }
+
+// More than four workers wait for each other longer than they help: the stages are tens of microseconds long.
+int default_threads() { return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 4); }
+
+RunResult run_session(const SceneSpec& scene, const SessionOptions& options, const SessionHooks& hooks) {
+  Run run(scene, options.threads, hooks);
+  Hands hands = make_hands(options.surgeon, scene, run.picture_);
+  std::unique_ptr<Recorder> recorder;
+  if (!options.record.empty())
+    recorder = std::make_unique<Recorder>(options.record, RecordingHeader{catgut_version(), kStateVersion, write_scene(scene)},
+                                          save_state(*run.model_, *run.state_));
+
+  const double until_s = options.seconds > 0 ? options.seconds : static_cast<double>(scene.duration);
+  const uint64_t last = std::max<uint64_t>(1, ticks_in(until_s, run.dt_));
+  const uint64_t settle = hands.settles ? std::min(last, ticks_in(scene.settle, run.dt_)) : 0;
+  const uint64_t after_done = hands.settles ? ticks_in(kAfterDone, run.dt_) : 0;  // a recording holds that time too
+  const auto one_tick = [&](auto&& of, const std::string& doing) {
+    const bool go_on = run.tick(of, doing, until_s);
+    if (recorder) recorder->tick(run.input_, hash_state(*run.model_, *run.state_));
+    return go_on;
+  };
+
+  RunResult result;
+  result.surgeon = options.surgeon;
+  result.ended = "the time was over";
+  bool go_on = true;
+  while (go_on && run.ticks_ < settle) go_on = one_tick([](const Snapshot&) { return no_hands(); }, "settling");
+  run.tally_.open();
+  uint64_t done_for = 0;
+  while (go_on && run.ticks_ < last) {
+    if (hands.surgeon && hands.surgeon->done() && done_for++ >= after_done) break;
+    const float dt = static_cast<float>(run.dt_);
+    if (hands.surgeon)
+      go_on = one_tick([&](const Snapshot& seen) { return hands.surgeon->operate(seen, dt); }, hands.surgeon->doing());
+    else go_on = one_tick([](const Snapshot&) { return no_hands(); }, "no hands");
+  }
+  if (hands.surgeon && hands.surgeon->done()) {
+    result.value["surgeon_done"] = 1;
+    result.ended = "the surgeon was done: " + hands.surgeon->doing();
+  }
+  run.finish(result);
+  if (recorder) recorder->finish(result.interrupted);
+  return result;
+}
+
+ReplayResult replay_session(const Recording& recording, const std::string& name, bool check, int threads,
+                            const SessionHooks& hooks) {
+  if (recording.header.state_version != kStateVersion)
+    throw InputError(name,
+                     "it was recorded by version " + recording.header.catgut_version + " with state layout " +
+                         std::to_string(recording.header.state_version) + ", this version has " + std::to_string(kStateVersion),
+                     "replay it with that version, or play its hands with `catgut run SCENE --surgeon " + name + "`");
+  const SceneSpec scene = parse_scene(recording.header.scene, name);
+  Run run(scene, threads, hooks);
+  load_state(*run.model_, *run.state_, recording.start);
+  publish(*run.model_, *run.state_, run.seen_);
+  const uint64_t settle = ticks_in(scene.settle, run.dt_);
+  const double until_s = static_cast<double>(recording.tick.size()) * run.dt_;
+
+  ReplayResult result;
+  result.run.surgeon = name;
+  result.run.ended = "the recording was over";
+  for (const RecordedTick& t : recording.tick) {
+    if (run.ticks_ == settle) run.tally_.open();
+    const bool go_on = run.tick([&](const Snapshot&) { return t.input.hand; }, "replay", until_s);
+    if (check && hash_state(*run.model_, *run.state_) != t.hash) {
+      result.differs_at = run.ticks_;
+      result.run.ended = "the state differed from the recorded one";
+      break;
+    }
+    if (!go_on) break;
+  }
+  run.finish(result.run);
+  return result;
+}
+
+}  // namespace catgut

@@ -1,0 +1,60 @@
+// runtime: runs a scene from its first tick to its last, in lock step: as fast as it goes, on the caller's thread. The only
+// room that reads a clock; times go into reports, never into the physics, so a run's bits depend on its inputs alone.
+#pragma once
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/jobs.h"
+#include "exchange/picture.h"
+#include "exchange/snapshot.h"
+#include "runtime/tally.h"
+#include "sim/recording.h"
+#include "sim/scene.h"
+#include "surgeon/surgeon.h"
+
+namespace catgut {
+
+const char* catgut_version();
+
+struct Progress {
+  double simulated_s = 0, until_s = 0;  // until_s: at most
+  double real_time_factor = 0;
+  std::string doing;
+};
+
+// What a run tells while it goes. Each may be empty.
+struct SessionHooks {
+  std::function<void(const PictureModel&)> on_start;
+  std::function<void(const Snapshot&, const std::string& doing)> on_tick;
+  std::function<void(const Progress&)> on_progress;  // about once a second of wall time
+  const std::atomic<bool>* stop = nullptr;           // set: the run ends after the tick in hand
+};
+
+struct SessionOptions {
+  std::string surgeon = "scripted";  // "scripted", "none", or the path of a recording whose hands are played
+  double seconds = 0;                // [s] simulated, settling included; 0: the scene's duration
+  int threads = 1;                   // workers of the solver, 1..64
+  std::string record;                // path of the recording to write; empty: none
+};
+
+// Settles the scene with no hands, then lets the surgeon work until half a second after he is done, or until the time is over.
+// Throws InputError (scene, surgeon, recording).
+RunResult run_session(const SceneSpec& scene, const SessionOptions& options, const SessionHooks& hooks = {});
+
+struct ReplayResult {
+  RunResult run;
+  std::optional<uint64_t>
+      differs_at;  // number of the first tick, from 1, after which the state's hash was not the recorded one
+};
+// Plays a recording. check: compare the hash after every tick and stop at the first that differs. Throws InputError when the
+// recording comes from a program whose state had another layout.
+ReplayResult replay_session(const Recording& recording, const std::string& name, bool check, int threads,
+                            const SessionHooks& hooks = {});
+
+// As many workers as help on this machine.
+int default_threads();
+
+}  // namespace catgut

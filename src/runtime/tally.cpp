@@ -1,0 +1,111 @@
+// runtime: gathers a run's results; see tally.h for what each means.
+#include "runtime/tally.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace catgut {
+
+Spread spread_of(std::vector<float> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double part) {
+    const size_t rank = static_cast<size_t>(std::ceil(part * static_cast<double>(values.size())));
+    return static_cast<double>(values[std::clamp<size_t>(rank, 1, values.size()) - 1]);
+  };
+  return {at(0.5), at(0.99), static_cast<double>(values.back())};
+}
+
+bool RunResult::expectations_hold() const {
+  return std::all_of(expect.begin(), expect.end(), [](const ExpectationResult& e) { return e.ok; });
+}
+
+Tally::Tally(const SceneSpec& scene, const PictureModel& picture)
+    : scene_(scene),
+      thread_first_(picture.thread_first),
+      thread_count_(picture.thread_count),
+      seen_slot_(picture.thread_count) {}
+
+void Tally::open() { opening_wanted_ = true; }
+
+void Tally::tick(const Snapshot& seen) {
+  if (opening_wanted_) opening_at_start_ = seen.opening_area;
+  opening_wanted_ = false;
+  bool passing = false;
+  for (const Event& e : seen.event) {
+    if (e.kind < EventKind::count_) ++events_[static_cast<size_t>(e.kind)];
+    passing = passing || e.kind == EventKind::particle_passed;
+  }
+  const float error = thread_length_error(seen);
+  if (!std::isfinite(error)) sane_ = false;
+  length_error_ = std::max(length_error_, error);
+  if (passing) length_error_passing_ = std::max(length_error_passing_, error);
+  lost_ = std::max(lost_, lost_slots(seen));
+}
+
+void Tally::time(const StageTimes& times, double tick_ms) {
+  solver_ms_.push_back(static_cast<float>(times.solver_ms()));
+  tick_ms_.push_back(static_cast<float>(tick_ms));
+  for (size_t s = 0; s < kStages; ++s) stage_ms_[s].push_back(static_cast<float>(times.ms[s]));
+  contacts_ = std::max(contacts_, times.contacts);
+  spent_ms_ += tick_ms;
+}
+
+float Tally::thread_length_error(const Snapshot& seen) const {
+  if (seen.thread_order.size() < 2) return 0;
+  double length = 0;
+  for (size_t i = 1; i < seen.thread_order.size(); ++i) {
+    const uint32_t a = seen.thread_order[i - 1], b = seen.thread_order[i];
+    if (a < seen.particle.size() && b < seen.particle.size()) length += distance(seen.particle[a], seen.particle[b]);
+  }
+  const double rest = static_cast<double>(seen.thread_order.size() - 1) * scene_.thread.spacing;
+  return static_cast<float>(std::abs(length - rest) / rest);
+}
+
+uint32_t Tally::lost_slots(const Snapshot& seen) {
+  std::fill(seen_slot_.begin(), seen_slot_.end(), uint8_t{0});
+  uint32_t wrong = 0;
+  for (const uint32_t slot : seen.thread_order) {
+    const uint32_t i = slot - thread_first_;  // wraps to a large number below the first
+    if (i >= thread_count_ || seen_slot_[i]) ++wrong;
+    else seen_slot_[i] = 1;
+  }
+  return wrong + static_cast<uint32_t>(std::count(seen_slot_.begin(), seen_slot_.end(), uint8_t{0}));
+}
+
+void Tally::finish(const Snapshot& last, RunResult& result) const {
+  for (size_t k = 0; k < events_.size(); ++k) {
+    const char* name = event_name(static_cast<EventKind>(k));
+    if (events_[k]) result.events[name] = events_[k];
+    result.value[name] = static_cast<double>(events_[k]);
+  }
+  result.value.erase(event_name(EventKind::suture_point));  // the result suture_points says it
+  std::map<std::string, double>& v = result.value;
+  v["bites"] =
+      static_cast<double>(std::count_if(last.bite.begin(), last.bite.end(), [](const BiteView& b) { return b.complete; }));
+  v["suture_points"] = static_cast<double>(last.suture_point.size());
+  v["knots"] = 0;
+  v["particles"] = static_cast<double>(result.particles);
+  v["opening_ratio"] = opening_at_start_ > 0 ? static_cast<double>(last.opening_area) / opening_at_start_ : 1;
+  v["closure"] = last.closure;
+  v["thread_length_error"] = length_error_;
+  v["thread_length_error_passing"] = length_error_passing_;
+  v["lost"] = lost_;
+  v["sane"] = sane_ ? 1 : 0;
+  v["simulated_s"] = result.simulated_s;
+  v["ticks"] = static_cast<double>(result.ticks);
+  v.try_emplace("surgeon_done", 0);
+
+  result.solver_ms = spread_of(solver_ms_);
+  result.tick_ms = spread_of(tick_ms_);
+  for (size_t s = 0; s < kStages; ++s) result.stage_ms[s] = spread_of(stage_ms_[s]);
+  result.contacts = contacts_;
+  result.real_time_factor = spent_ms_ > 0 ? result.simulated_s * 1000 / spent_ms_ : 0;
+  for (const Expectation& want : scene_.expect) {
+    const auto found = v.find(want.name);
+    const double got = found == v.end() ? std::nan("") : found->second;
+    result.expect.push_back({want, got, got >= want.min && got <= want.max});
+  }
+}
+
+}  // namespace catgut

@@ -1,0 +1,80 @@
+// runtime: what a run is judged by, gathered from the published snapshots tick by tick. Reads Snapshot and StageTimes; writes
+// RunResult. It sees only what a picture or a host would see, so it cannot flatter the engine.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/profile.h"
+#include "exchange/picture.h"
+#include "exchange/snapshot.h"
+#include "sim/scene.h"
+
+namespace catgut {
+
+constexpr size_t kStages = static_cast<size_t>(Stage::count_);
+
+struct Spread {
+  double median = 0, p99 = 0, max = 0;
+};
+Spread spread_of(std::vector<float> values);  // all zero for none
+
+struct ExpectationResult {
+  Expectation want;
+  double got = 0;
+  bool ok = false;
+};
+
+struct RunResult {
+  std::string scene, title, preset, surgeon;
+  int threads = 1;
+  size_t particles = 0;
+  uint64_t ticks = 0;
+  double simulated_s = 0;
+  double real_time_factor = 0;             // simulated time over the time spent in step, publish and the surgeon's plan
+  Spread solver_ms, tick_ms;               // per tick
+  std::array<Spread, kStages> stage_ms;    // per tick
+  uint32_t contacts = 0;                   // the most in a substep
+  std::map<std::string, uint64_t> events;  // by kind, only those that happened
+  std::map<std::string, double> value;     // every name of result_names
+  std::vector<ExpectationResult> expect;
+  uint64_t state_hash = 0;
+  bool interrupted = false;
+  std::string ended;  // why, in words
+
+  bool expectations_hold() const;
+};
+
+class Tally {
+ public:
+  Tally(const SceneSpec& scene, const PictureModel& picture);
+
+  void open();                      // the hands are let in now: the next snapshot's opening is the whole opening
+  void tick(const Snapshot& seen);  // after every tick
+  void time(const StageTimes& times, double tick_ms);
+  void not_sane() { sane_ = false; }
+  bool sane() const { return sane_; }
+  double spent_ms() const { return spent_ms_; }
+
+  // Fills values, events, spreads and expectations; the rest of `result` must be there already.
+  void finish(const Snapshot& last, RunResult& result) const;
+
+ private:
+  float thread_length_error(const Snapshot& seen) const;
+  uint32_t lost_slots(const Snapshot& seen);
+
+  const SceneSpec& scene_;
+  uint32_t thread_first_, thread_count_;
+  std::vector<uint8_t> seen_slot_;
+  bool opening_wanted_ = true, sane_ = true;
+  float opening_at_start_ = 0, length_error_ = 0, length_error_passing_ = 0;
+  uint32_t lost_ = 0, contacts_ = 0;
+  std::array<uint64_t, static_cast<size_t>(EventKind::count_)> events_{};
+  std::vector<float> solver_ms_, tick_ms_;
+  std::array<std::vector<float>, kStages> stage_ms_;
+  double spent_ms_ = 0;
+};
+
+}  // namespace catgut

@@ -1,0 +1,69 @@
+// sim: recordings (.cgrec). Start state + the hands of every tick + a hash per tick: enough to replay a run bit for bit, to
+// check that a change did not alter the physics, and to hand a bug to somebody else.
+//
+// The file: 8 bytes of magic, format version (u32), then chunks {kind u32, size u64, hash u64, payload}. Little endian, packed
+// field by field, so that neither padding nor the compiler leaks into it. The hash covers kind, size and payload. Chunks are
+// written whole and flushed: a program killed at any byte leaves a file that reads up to its last whole chunk.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "exchange/tool_input.h"
+
+namespace catgut {
+
+constexpr uint32_t kRecordingFormat = 1;
+
+struct RecordingHeader {
+  std::string catgut_version;  // of the program that recorded
+  uint32_t state_version = 0;  // kStateVersion of its state
+  std::string scene;           // the whole scene, as write_scene gives it
+};
+
+struct RecordedTick {
+  TickInput input;
+  uint64_t hash = 0;  // hash_state after the tick
+};
+
+struct Recording {
+  RecordingHeader header;
+  std::vector<std::byte> start;  // save_state before the first tick
+  std::vector<RecordedTick> tick;
+  bool truncated = false;    // it ends without its end chunk: the ticks up to there are whole
+  bool interrupted = false;  // the user stopped the run
+  std::string fault;         // truncated: where and how it ends, in words
+};
+
+// Writes as it goes. Throws InputError when the file cannot be created or written (disk full, ...).
+class Recorder {
+ public:
+  Recorder(const std::string& path, const RecordingHeader& header, const std::vector<std::byte>& start);
+  ~Recorder();  // writes the ticks at hand but no end chunk: only finish() says that the run is whole
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  void tick(const TickInput& input, uint64_t hash);
+  void finish(bool interrupted);
+
+ private:
+  void chunk(uint32_t kind, const std::string& payload);
+  void flush_ticks();
+
+  std::string path_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  std::string ticks_;
+  uint64_t count_ = 0;
+};
+
+// Throws InputError for a file that is missing, is not a recording, has another format version, or whose header or start state
+// is damaged. A file damaged or cut further on gives the ticks before the damage, `truncated` and `fault`.
+Recording read_recording(const std::string& path);
+
+// The same on bytes in memory; name: for messages.
+Recording parse_recording(const std::string& bytes, const std::string& name);
+
+}  // namespace catgut

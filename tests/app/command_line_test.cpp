@@ -1,0 +1,215 @@
+// tests/app: the command line is a contract that scripts depend on: exit codes, one line per fault, JSON on request.
+// Runs the built program as a user would.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <thread>
+
+#include "sim/recording.h"
+
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+struct Outcome {
+  int code = -1;
+  std::string out, err;
+};
+
+std::string read_file(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+class CommandLine : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!fs::exists(CATGUT_APP)) GTEST_SKIP() << "the program is not built here";
+    folder_ = fs::path(testing::TempDir()) / ("catgut_app_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+    // Half a second and no surgeon: what is tested here is the command line.
+    std::ofstream(folder_ / "small.toml") << R"(title = "small"
+duration = 0.5
+settle = 0.05
+[[body]]
+[technique]
+name = "none"
+[expect]
+sane = 1
+particles = 1403
+)";
+  }
+  void TearDown() override {
+    if (!folder_.empty()) fs::remove_all(folder_);
+  }
+  Outcome run_catgut(const std::string& arguments) {
+    const fs::path out = folder_ / "stdout", err = folder_ / "stderr";
+    const std::string line = "cd '" + folder_.string() + "' && '" CATGUT_APP "' " + arguments + " >'" + out.string() + "' 2>'" +
+                             err.string() + "' </dev/null";
+    const int status = std::system(line.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out), read_file(err)};
+  }
+  // Bad input: code 2, nothing on standard output, one line on standard error that holds `part`.
+  void expect_refused(const std::string& arguments, const std::string& part) {
+    const Outcome o = run_catgut(arguments);
+    EXPECT_EQ(o.code, 2) << arguments << "\n" << o.err;
+    EXPECT_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1) << arguments << "\n" << o.err;
+    EXPECT_EQ(o.err.rfind("catgut: ", 0), 0u) << o.err;
+    EXPECT_NE(o.err.find(part), std::string::npos) << arguments << "\n" << o.err;
+  }
+  bool record(const std::string& name) {
+    return run_catgut("run small.toml --surgeon none --headless --record " + name + " --json -").code == 0;
+  }
+  fs::path folder_;
+};
+
+TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
+  expect_refused("", "run without it");
+  expect_refused("run purse_sting --headless", "did you mean \"purse_string\"?");
+  expect_refused("run /no/such/file.toml", "there is no such scene");
+  expect_refused("run small.toml --set solver.substep=8", "did you mean \"substeps\"?");
+  expect_refused("run small.toml --set body.particles=-5", "out of range");
+  expect_refused("run small.toml --preset papr", "there is no preset");
+  expect_refused("run small.toml --surgeon nobody", "no such surgeon");
+  expect_refused("run small.toml --surgeon scripted", "--surgeon none");
+  expect_refused("run small.toml --bogus", "--bogus");
+  expect_refused("run small.toml --threads 0", "--threads");
+  expect_refused("run small.toml --seconds -3", "--seconds");
+  expect_refused("run small.toml --surgeon none --json /proc/nowhere/x.json", "cannot be written");
+  expect_refused("run", "scene");
+  expect_refused("fly", "fly");
+  expect_refused("replay nothing.cgrec", "there is no such recording");
+  expect_refused("replay small.toml", "not a Catgut recording");
+  expect_refused("bench paper", "not available yet in this version");
+  expect_refused("describe substep", "substeps");
+  expect_refused("devices --test", "no haptic device");
+}
+
+TEST_F(CommandLine, faults_in_a_scene_name_its_line) {
+  std::ofstream(folder_ / "wrong.toml") << "[solver]\nsubstep = 8\n";
+  expect_refused("run wrong.toml", "wrong.toml:2: solver has no key \"substep\"; did you mean \"substeps\"?");
+  std::ofstream(folder_ / "minus.toml") << "[[body]]\n\nparticles = -1\n";
+  expect_refused("run minus.toml", "minus.toml:3: body[].particles = -1 is out of range");
+  std::ofstream(folder_ / "torn.toml") << "title = \"no end\n";
+  expect_refused("run torn.toml", "torn.toml:1:");
+}
+
+TEST_F(CommandLine, help_and_descriptions_are_code_0) {
+  EXPECT_EQ(run_catgut("--help").code, 0);
+  EXPECT_EQ(run_catgut("run --help").code, 0);
+  EXPECT_EQ(run_catgut("--version").code, 0);
+  EXPECT_EQ(run_catgut("devices").code, 0);
+  const Outcome all = run_catgut("describe"), one = run_catgut("describe solver.substeps");
+  EXPECT_EQ(all.code, 0);
+  EXPECT_NE(all.out.find("[solver]"), std::string::npos);
+  EXPECT_EQ(one.code, 0);
+  EXPECT_NE(one.out.find("per tick"), std::string::npos);
+}
+
+TEST_F(CommandLine, the_reference_page_is_what_the_program_says) {
+  const Outcome o = run_catgut("describe --markdown");
+  EXPECT_EQ(o.code, 0);
+  EXPECT_TRUE(o.out == read_file(fs::path(CATGUT_SOURCE_DIR) / "docs/scene_reference.md"))
+      << "write it anew: ./catgut describe --markdown > docs/scene_reference.md";
+}
+
+TEST_F(CommandLine, a_run_reports_all_that_the_contract_names) {
+  const Outcome o = run_catgut("run small.toml --surgeon none --headless --threads 1 --json -");
+  ASSERT_EQ(o.code, 0) << o.err;
+  const json j = json::parse(o.out);
+  for (const char* key : {"scene", "preset", "particles", "ticks", "simulated_s", "real_time_factor", "solver_ms", "sutures",
+                          "knots", "events", "expect", "state_hash", "stages", "catgut"})
+    EXPECT_TRUE(j.contains(key)) << key;
+  for (const char* key : {"median", "p99", "max"}) EXPECT_TRUE(j["solver_ms"].contains(key)) << key;
+  EXPECT_EQ(j["scene"], "small");
+  EXPECT_EQ(j["particles"], 1403);
+  EXPECT_EQ(j["ticks"], 30);
+  EXPECT_EQ(j["expect"]["particles"]["want"], 1403);
+  EXPECT_EQ(j["expect"]["particles"]["got"], 1403);
+  EXPECT_EQ(j["expect"]["particles"]["ok"], true);
+  EXPECT_EQ(j["state_hash"].get<std::string>().size(), 16u);
+}
+
+TEST_F(CommandLine, a_failed_expectation_is_code_1) {
+  EXPECT_EQ(run_catgut("run small.toml --surgeon none --set expect.bites=3").code, 1);
+  EXPECT_EQ(run_catgut("run small.toml --surgeon none --set expect.bites=3 --no-expect").code, 0);
+}
+
+TEST_F(CommandLine, the_bits_do_not_depend_on_threads) {
+  const Outcome one = run_catgut("run small.toml --surgeon none --threads 1 --json -");
+  const Outcome three = run_catgut("run small.toml --surgeon none --threads 3 --json -");
+  ASSERT_EQ(one.code, 0);
+  ASSERT_EQ(three.code, 0);
+  EXPECT_EQ(json::parse(one.out)["state_hash"], json::parse(three.out)["state_hash"]);
+}
+
+TEST_F(CommandLine, a_recording_replays_and_a_changed_one_does_not) {
+  ASSERT_TRUE(record("a.cgrec"));
+  EXPECT_EQ(run_catgut("replay a.cgrec --check").code, 0);
+  EXPECT_EQ(run_catgut("replay a.cgrec --check --threads 2").code, 0);
+  const catgut::Recording recording = catgut::read_recording(folder_ / "a.cgrec");
+  {
+    catgut::Recorder changed(folder_ / "b.cgrec", recording.header, recording.start);
+    for (size_t i = 0; i < recording.tick.size(); ++i)
+      changed.tick(recording.tick[i].input, recording.tick[i].hash ^ (i >= 11));
+    changed.finish(false);
+  }
+  const Outcome differs = run_catgut("replay b.cgrec --check");
+  EXPECT_EQ(differs.code, 1);
+  EXPECT_NE(differs.err.find("after tick 12 differs"), std::string::npos) << differs.err;
+  EXPECT_EQ(run_catgut("replay b.cgrec").code, 0) << "without --check nothing is compared";
+  const Outcome played = run_catgut("run small.toml --surgeon a.cgrec --json -");
+  const Outcome live = run_catgut("run small.toml --surgeon none --json -");
+  EXPECT_EQ(json::parse(played.out)["state_hash"], json::parse(live.out)["state_hash"]);
+}
+
+TEST_F(CommandLine, a_cut_recording_is_named_as_such) {
+  ASSERT_TRUE(record("a.cgrec"));
+  const std::string whole = read_file(folder_ / "a.cgrec");
+  std::ofstream(folder_ / "cut.cgrec", std::ios::binary) << whole.substr(0, whole.size() - 10);
+  expect_refused("replay cut.cgrec --check --json cut.json", "the recording is not whole");
+  EXPECT_EQ(json::parse(read_file(folder_ / "cut.json"))["ticks"], 30) << "the ticks it holds are replayed all the same";
+  std::ofstream(folder_ / "stump.cgrec", std::ios::binary) << whole.substr(0, 40);
+  expect_refused("replay stump.cgrec", "cut or damaged");
+  std::string other = whole;
+  other[8] = 99;
+  std::ofstream(folder_ / "other.cgrec", std::ios::binary) << other;
+  expect_refused("replay other.cgrec", "the recording has format 99");
+}
+
+TEST_F(CommandLine, an_interrupted_run_closes_its_files) {
+  const std::string json_path = folder_ / "i.json", record_path = folder_ / "i.cgrec", scene = folder_ / "small.toml";
+  const pid_t child = fork();
+  if (child == 0) {
+    if (!std::freopen("/dev/null", "w", stdout)) _exit(98);
+    if (!std::freopen("/dev/null", "w", stderr)) _exit(98);
+    execl(CATGUT_APP, CATGUT_APP, "run", scene.c_str(), "--surgeon", "none", "--seconds", "100000", "--record",
+          record_path.c_str(), "--json", json_path.c_str(), nullptr);
+    _exit(99);
+  }
+  // The recording is created when the run starts: then it can be interrupted.
+  for (int i = 0; i < 2000 && !(fs::exists(record_path) && fs::file_size(record_path) > 40000); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  kill(child, SIGINT);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  const json j = json::parse(read_file(json_path));
+  EXPECT_EQ(j["interrupted"], true);
+  EXPECT_EQ(run_catgut("replay i.cgrec --check").code, 0) << "an interrupted recording is whole";
+}
+
+}  // namespace
