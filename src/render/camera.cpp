@@ -31,7 +31,23 @@ Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
 
   // Near the axis the needle's direction means nothing; the camera keeps to where it is.
   const float from_axis = std::hypot(offset.x, offset.z);
-  const float side = from_axis > 0.06f * field_ ? std::atan2(offset.x, offset.z) + beside : azimuth_;
+  float side = azimuth_;
+  if (from_axis > 0.06f * field_) {
+    const float middle = std::atan2(offset.x, offset.z);
+    // How far the nearest tool's shaft stands from a camera on that side, seen from above.
+    const auto clear = [&](float hand) {
+      float least = kPi;
+      for (const ToolView& tool : snapshot.tool) {
+        const Vec3 shaft = rotate(tool.pose.q, {0, 0, 1});
+        if (distance(tool.pose.p, focus_) < 2 * field_ && std::hypot(shaft.x, shaft.z) > 0.2f)
+          least = std::min(least, std::abs(wrap_angle(middle + hand * beside - std::atan2(shaft.x, shaft.z))));
+      }
+      return least;
+    };
+    // It changes sides only for a good reason, or it would sway between two equal ones.
+    if (clear(-hand_) > clear(hand_) + (started_ ? 0.35f : 0)) hand_ = -hand_;
+    side = middle + hand_ * beside;
+  }
 
   if (!started_) {
     started_ = true;

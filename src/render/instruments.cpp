@@ -109,7 +109,7 @@ Shape needle_shape(const PictureModel& model) {
 ToolShape tool_shape(ToolKind kind) { return kind == ToolKind::needle_driver ? needle_driver() : forceps(); }
 
 Shape drape_shape(Vec3 centre, float hole, float size) {
-  constexpr int rings = 70, around = 128;
+  constexpr int rings = 44, around = 80;
   Shape shape;
   const auto height = [&](float x, float z, float r) {
     const float out = std::clamp((r - hole) / 0.03f, 0.0f, 1.0f);

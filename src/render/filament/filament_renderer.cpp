@@ -14,7 +14,6 @@
 #include <filament/TextureSampler.h>
 #include <filament/View.h>
 #include <filament/Viewport.h>
-#include <math/vec3.h>
 #include <utils/EntityManager.h>
 
 #include "render/filament/egl_platform.h"
@@ -28,7 +27,8 @@
 namespace catgut {
 namespace {
 
-using filament::math::float3;
+// From the main lamp, over the surgeon's right shoulder.
+constexpr Vec3 kLampDirection{-0.32f, -1.0f, -0.38f};
 
 struct ToolView3d {
   ToolShape shape;
@@ -132,9 +132,12 @@ class FilamentRenderer final : public Renderer {
     ao.quality = filament::View::QualityLevel::MEDIUM;
     view_->setAmbientOcclusionOptions(ao);
     filament::View::BloomOptions bloom;
-    bloom.enabled = good;
-    bloom.strength = 0.06f;
-    bloom.levels = 4;
+    // Never off: without it Filament grades the colours inside the main pass by framebuffer fetch, which Mesa's software
+    // rasteriser gets wrong (the picture turns into coloured tiles). A tiny one costs nothing.
+    bloom.enabled = true;
+    bloom.strength = good ? 0.06f : 0.02f;
+    bloom.resolution = good ? 360 : 16;
+    bloom.levels = good ? 4 : 3;
     view_->setBloomOptions(bloom);
     grading_ = filament::ColorGrading::Builder()
                    .toneMapping(filament::ColorGrading::ToneMapping::ACES)
@@ -159,7 +162,7 @@ class FilamentRenderer final : public Renderer {
     filament::LightManager::Builder(filament::LightManager::Type::DIRECTIONAL)
         .color({1.0f, 0.965f, 0.91f})
         .intensity(85000)
-        .direction({-0.32f, -1.0f, -0.38f})
+        .direction({kLampDirection.x, kLampDirection.y, kLampDirection.z})
         .castShadows(true)
         .shadowOptions(shadow)
         .build(*engine_, lamp_);
@@ -200,7 +203,19 @@ class FilamentRenderer final : public Renderer {
     for (const Vec3 p : all)
       if (p.y < box.low.y + 0.01f) reach = std::max(reach, std::hypot(p.x - ground.x, p.z - ground.z));
     const float hole = reach + 0.01f;
-    drape_ = make_mesh(*engine_, *scene_, drape_shape(ground, hole, 0.7f), drape_material_, true);
+    const Shape cloth = drape_shape(ground, hole, 0.7f);
+    drape_ = make_mesh(*engine_, *scene_, cloth, drape_material_, false);
+    // The cloth's share of lamp and room light, once (see drape.mat): the room is darker low down beside the organ.
+    std::vector<VertexLook> look(cloth.position.size());
+    for (size_t i = 0; i < look.size(); ++i) {
+      const Vec3 c = cloth.colour[i], p = cloth.position[i], n = cloth.normal[i];
+      const float away = std::hypot(p.x - ground.x, p.z - ground.z) - hole;
+      const float open = 1 - 0.55f * std::exp(-std::max(0.0f, away + 0.008f) / 0.03f);
+      look[i] = {{c.x, c.y, c.z, 1},
+                 {cloth.uv[i][0], cloth.uv[i][1]},
+                 {0.95f * std::max(0.0f, dot(n, normalized(-kLampDirection))), 0.34f * open * (0.5f + 0.5f * n.y)}};
+    }
+    set_look(*engine_, drape_, look);
     bed_ = make_mesh(*engine_, *scene_, wound_bed_shape(ground - Vec3{0, 0.004f, 0}, hole + 0.01f), tissue_material_, false);
     needle_ = make_mesh(*engine_, *scene_, needle_shape(model_), needle_material_, true);
     for (size_t i = 0; i < tool_.size(); ++i) {

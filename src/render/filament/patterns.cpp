@@ -66,7 +66,7 @@ void draw_vessel(std::vector<float>& map, Dice& dice, float x, float y, float he
         const float dx = std::floor(x) + float(i) - x, dy = std::floor(y) + float(j) - y;
         const float d2 = (dx * dx + dy * dy) / (w * w);
         float& m = map[at(int(std::floor(x)) + i, int(std::floor(y)) + j)];
-        m = std::max(m, std::min(1.0f, 0.35f + 0.3f * w) * std::exp(-d2));
+        m = std::max(m, std::min(1.0f, 0.30f + 0.42f * w) * std::exp(-d2));
       }
     x += std::cos(heading);
     y += std::sin(heading);
@@ -109,7 +109,7 @@ TissueTextures make_tissue_textures(filament::Engine& engine) {
   // Trunks run round the organ (texture v) from both sides, as they come from the mesentery; fine ones everywhere.
   for (int i = 0; i < 5; ++i)
     draw_vessel(vessel, dice, (float(i) + 0.6f * dice()) * kSize / 5, kSize * dice(), dice() < 0.5f ? 1.57f : -1.57f,
-                1.5f + 1.3f * dice(), kSize * (0.6f + 0.4f * dice()), 3);
+                2.0f + 1.4f * dice(), kSize * (0.6f + 0.4f * dice()), 3);
   for (int i = 0; i < 26; ++i)
     draw_vessel(vessel, dice, kSize * dice(), kSize * dice(), 2 * kPi * dice(), 0.7f + 0.5f * dice(), 90 + 80 * dice(), 1);
 
@@ -121,7 +121,7 @@ TissueTextures make_tissue_textures(filament::Engine& engine) {
   }
 
   // Serosa: fine grain, its vessels a little raised. Mucosa: the folds and pits of a velvety lining.
-  std::vector<float> serosa = octaves(10, 5, 0.6f, 37), mucosa = octaves(14, 4, 0.6f, 53);
+  std::vector<float> serosa = octaves(7, 4, 0.5f, 37), mucosa = octaves(12, 4, 0.5f, 53);
   for (size_t i = 0; i < serosa.size(); ++i) {
     serosa[i] = 3.2f * serosa[i] + 0.25f * vessel[i];
     const float ridge = 1 - std::abs(2 * mucosa[i] - 1);

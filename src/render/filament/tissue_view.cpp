@@ -116,9 +116,9 @@ VertexLook look_of(const VisibleMesh& mesh, uint32_t v, Uv uv, float sky) {
   Vec3 c;
   float vessels = 0, mucosa = 0;
   switch (layer) {
-    case TissueLayer::serosa: c = srgb(222, 158, 140), vessels = 0.85f; break;
-    case TissueLayer::mucosa: c = srgb(196, 84, 78), vessels = 0.25f, mucosa = 1; break;
-    case TissueLayer::cut_edge: c = srgb(238, 200, 184), mucosa = 0.35f; break;
+    case TissueLayer::serosa: c = srgb(228, 160, 146), vessels = 0.9f; break;
+    case TissueLayer::mucosa: c = srgb(208, 92, 86), vessels = 0.3f, mucosa = 1; break;
+    case TissueLayer::cut_edge: c = srgb(240, 204, 190); break;
   }
   return {{c.x, c.y, c.z, vessels}, {uv[0], uv[1]}, {sky, mucosa}};
 }
