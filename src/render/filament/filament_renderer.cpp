@@ -28,7 +28,7 @@ namespace catgut {
 namespace {
 
 // From the main lamp, over the surgeon's right shoulder.
-constexpr Vec3 kLampDirection{-0.32f, -1.0f, -0.38f};
+constexpr Vec3 kLampDirection{-0.17f, -1.0f, -0.22f};
 
 struct ToolView3d {
   ToolShape shape;
@@ -61,13 +61,14 @@ class FilamentRenderer final : public Renderer {
     for (TissueView& t : tissue_) destroy_mesh(*engine_, *scene_, t.gpu);
     for (ToolView3d& t : tool_)
       for (GpuMesh& m : t.part) destroy_mesh(*engine_, *scene_, m);
-    for (GpuMesh* m : {&needle_, &drape_, &bed_, &thread_.gpu}) destroy_mesh(*engine_, *scene_, *m);
+    for (GpuMesh* m : {&needle_, &drape_, &drape_shadow_, &bed_, &thread_.gpu}) destroy_mesh(*engine_, *scene_, *m);
     for (GpuMesh& m : marker_) destroy_mesh(*engine_, *scene_, m);
     engine_->destroy(tissue_material_);
     engine_->destroy(thread_material_);
     engine_->destroy(needle_material_);
     engine_->destroy(tool_material_);
     engine_->destroy(drape_material_);
+    engine_->destroy(shadow_material_);
     engine_->destroy(marker_material_);
     for (filament::Material* m : material_) engine_->destroy(m);
     engine_->destroy(textures_.pattern);
@@ -147,15 +148,15 @@ class FilamentRenderer final : public Renderer {
   }
 
   void set_light(Quality quality) {
-    environment_ = make_environment(*engine_, 26000);
+    environment_ = make_environment(*engine_, 30000);
     scene_->setIndirectLight(environment_.light);
     skybox_ = filament::Skybox::Builder().color({0.012f, 0.03f, 0.028f, 1}).build(*engine_);
     scene_->setSkybox(skybox_);
     // Shadows at the scale of a thread: the library's own bias of a millimetre would swallow the thread's and needle's.
     filament::LightManager::ShadowOptions shadow;
     shadow.mapSize = quality == Quality::good ? 2048 : 1024;
-    shadow.constantBias = 0.0001f;
-    shadow.normalBias = 0.6f;
+    shadow.constantBias = 0.00025f;
+    shadow.normalBias = 1.0f;
     shadow.shadowNearHint = 0.05f;
     shadow.shadowFarHint = 0.6f;
     lamp_ = utils::EntityManager::get().create();
@@ -187,6 +188,7 @@ class FilamentRenderer final : public Renderer {
     tool_material_ = material_.back()->createInstance();
     tool_material_->setParameter("roughness", 0.34f);
     drape_material_ = instance_of(drape_material());
+    shadow_material_ = instance_of(shadow_material());
     marker_material_ = instance_of(marker_material());
   }
 
@@ -211,11 +213,14 @@ class FilamentRenderer final : public Renderer {
       const Vec3 c = cloth.colour[i], p = cloth.position[i], n = cloth.normal[i];
       const float away = std::hypot(p.x - ground.x, p.z - ground.z) - hole;
       const float open = 1 - 0.55f * std::exp(-std::max(0.0f, away + 0.008f) / 0.03f);
-      look[i] = {{c.x, c.y, c.z, 1},
-                 {cloth.uv[i][0], cloth.uv[i][1]},
-                 {0.95f * std::max(0.0f, dot(n, normalized(-kLampDirection))), 0.34f * open * (0.5f + 0.5f * n.y)}};
+      const float lamp = 0.95f * std::max(0.0f, dot(n, normalized(-kLampDirection))), room = 0.30f * open * (0.5f + 0.5f * n.y);
+      look[i] = {{c.x, c.y, c.z, 1}, {cloth.uv[i][0], cloth.uv[i][1]}, {lamp + room, lamp / (lamp + room)}};
     }
     set_look(*engine_, drape_, look);
+    Shape over = cloth;
+    for (Vec3& p : over.position) p.y += 0.0001f;  // never level with the cloth, or the two would fight for pixels
+    drape_shadow_ = make_mesh(*engine_, *scene_, over, shadow_material_, false);
+    set_look(*engine_, drape_shadow_, look);
     bed_ = make_mesh(*engine_, *scene_, wound_bed_shape(ground - Vec3{0, 0.004f, 0}, hole + 0.01f), tissue_material_, false);
     needle_ = make_mesh(*engine_, *scene_, needle_shape(model_), needle_material_, true);
     for (size_t i = 0; i < tool_.size(); ++i) {
@@ -269,11 +274,11 @@ class FilamentRenderer final : public Renderer {
   TissueTextures textures_;
   std::vector<filament::Material*> material_;
   filament::MaterialInstance *tissue_material_ = nullptr, *thread_material_ = nullptr, *needle_material_ = nullptr,
-                             *tool_material_ = nullptr, *drape_material_ = nullptr, *marker_material_ = nullptr;
+                             *tool_material_ = nullptr, *drape_material_ = nullptr, *shadow_material_ = nullptr, *marker_material_ = nullptr;
   std::vector<TissueView> tissue_;
   ThreadView thread_;
   std::array<ToolView3d, 2> tool_;
-  GpuMesh needle_, drape_, bed_;
+  GpuMesh needle_, drape_, drape_shadow_, bed_;
   std::vector<GpuMesh> marker_;
 };
 

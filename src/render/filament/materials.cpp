@@ -15,6 +15,9 @@ constexpr uint8_t kMetal[] = {
 constexpr uint8_t kDrape[] = {
 #include "drape.inc"
 };
+constexpr uint8_t kShadow[] = {
+#include "shadow.inc"
+};
 constexpr uint8_t kMarker[] = {
 #include "marker.inc"
 };
@@ -24,6 +27,7 @@ std::span<const uint8_t> tissue_material() { return kTissue; }
 std::span<const uint8_t> thread_material() { return kThread; }
 std::span<const uint8_t> metal_material() { return kMetal; }
 std::span<const uint8_t> drape_material() { return kDrape; }
+std::span<const uint8_t> shadow_material() { return kShadow; }
 std::span<const uint8_t> marker_material() { return kMarker; }
 
 }  // namespace catgut

@@ -9,6 +9,7 @@ std::span<const uint8_t> tissue_material();
 std::span<const uint8_t> thread_material();
 std::span<const uint8_t> metal_material();
 std::span<const uint8_t> drape_material();
+std::span<const uint8_t> shadow_material();
 std::span<const uint8_t> marker_material();
 
 }  // namespace catgut
