@@ -115,7 +115,7 @@ Shape drape_shape(Vec3 centre, float hole, float size) {
     const float out = std::clamp((r - hole) / 0.03f, 0.0f, 1.0f);
     // The cloth's edge lies as a soft roll round the hole and falls away from it a little.
     const float roll = 0.0022f * std::exp(-(r - hole) * (r - hole) / (0.0035f * 0.0035f));
-    return centre.y + roll + 0.0035f * out * cloth_height(x, z) - 0.05f * std::max(0.0f, r - hole - 0.06f);
+    return centre.y + roll + 0.0050f * out * cloth_height(x, z) - 0.05f * std::max(0.0f, r - hole - 0.06f);
   };
   for (int i = 0; i <= rings; ++i) {
     const float s = float(i) / rings, r = hole + (size - hole) * s * s;
@@ -128,7 +128,7 @@ Shape drape_shape(Vec3 centre, float hole, float size) {
       shape.tangent.push_back(normalized(Vec3{1, 0, 0} - n * n.x));
       shape.uv.push_back({x / 0.01f, z / 0.01f});
       // Worn and damp near the wound.
-      shape.colour.push_back(lerp(srgb(24, 84, 74), srgb(38, 122, 104), std::clamp((r - hole) / 0.05f, 0.0f, 1.0f)));
+      shape.colour.push_back(lerp(srgb(22, 78, 76), srgb(44, 116, 110), std::clamp((r - hole) / 0.05f, 0.0f, 1.0f)));
     }
   }
   for (uint32_t i = 0; i < rings; ++i)

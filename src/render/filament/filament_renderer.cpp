@@ -28,7 +28,7 @@ namespace catgut {
 namespace {
 
 // From the main lamp, over the surgeon's right shoulder.
-constexpr Vec3 kLampDirection{-0.17f, -1.0f, -0.22f};
+constexpr Vec3 kLampDirection{-0.24f, -1.0f, -0.32f};
 
 struct ToolView3d {
   ToolShape shape;
@@ -155,8 +155,8 @@ class FilamentRenderer final : public Renderer {
     // Shadows at the scale of a thread: the library's own bias of a millimetre would swallow the thread's and needle's.
     filament::LightManager::ShadowOptions shadow;
     shadow.mapSize = quality == Quality::good ? 2048 : 1024;
-    shadow.constantBias = 0.00025f;
-    shadow.normalBias = 1.0f;
+    shadow.constantBias = 0.0002f;
+    shadow.normalBias = 0.8f;
     shadow.shadowNearHint = 0.05f;
     shadow.shadowFarHint = 0.6f;
     lamp_ = utils::EntityManager::get().create();

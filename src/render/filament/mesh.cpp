@@ -40,13 +40,15 @@ filament::Box to_box(Box3 b) {
 }  // namespace
 
 Box3 bounds(std::span<const Vec3> points) {
-  if (points.empty()) return {};
-  Box3 b{points[0], points[0]};
+  Box3 b{{1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}};
+  bool any = false;
   for (const Vec3 p : points) {
+    if (!is_finite(p)) continue;  // one particle gone astray must not take the whole mesh out of the picture
+    any = true;
     b.low = {std::min(b.low.x, p.x), std::min(b.low.y, p.y), std::min(b.low.z, p.z)};
     b.high = {std::max(b.high.x, p.x), std::max(b.high.y, p.y), std::max(b.high.z, p.z)};
   }
-  return b;
+  return any ? b : Box3{};
 }
 
 GpuMesh make_mesh(filament::Engine& engine, filament::Scene& scene, std::span<const VertexLook> look,

@@ -106,7 +106,7 @@ std::vector<float> baked_sky(const VisibleMesh& mesh) {
       seen += open ? weight : 0;
     }
     // What faces the ground entirely still gets what the drape throws back.
-    sky[v] = all > 0 ? 0.16f + 0.84f * seen / all : 0.3f;
+    sky[v] = all > 0 ? 0.15f + 0.85f * seen / all : 0.3f;
   }
   return sky;
 }
@@ -117,7 +117,7 @@ VertexLook look_of(const VisibleMesh& mesh, uint32_t v, Uv uv, float sky) {
   float vessels = 0, mucosa = 0;
   switch (layer) {
     case TissueLayer::serosa: c = srgb(228, 160, 146), vessels = 0.9f; break;
-    case TissueLayer::mucosa: c = srgb(208, 92, 86), vessels = 0.3f, mucosa = 1; break;
+    case TissueLayer::mucosa: c = srgb(206, 92, 88), vessels = 0.35f, mucosa = 1; break;
     case TissueLayer::cut_edge: c = srgb(240, 204, 190); break;
   }
   return {{c.x, c.y, c.z, vessels}, {uv[0], uv[1]}, {sky, mucosa}};
