@@ -1,0 +1,66 @@
+// render/camera: see camera.h.
+#include "render/camera.h"
+
+namespace catgut {
+namespace {
+
+Camera look_at_from(Vec3 target, float azimuth, float elevation, float half_height, float fov_deg) {
+  const float d = half_height / std::tan(0.5f * fov_deg * kPi / 180);
+  const Vec3 away{std::cos(elevation) * std::sin(azimuth), std::sin(elevation), std::cos(elevation) * std::cos(azimuth)};
+  return {target + d * away, target, {0, 1, 0}, fov_deg};
+}
+
+float wrap_angle(float a) { return a - 2 * kPi * std::round(a / (2 * kPi)); }
+
+}  // namespace
+
+Camera overview(const PictureModel& model) {
+  return look_at_from(model.focus - Vec3{0, 0.1f * model.field, 0}, 0.5f, 0.75f, 0.42f * model.field, 30);
+}
+
+FollowCamera::FollowCamera(const PictureModel& model)
+    : half_height(0.3f * model.field), focus_(model.focus), field_(model.field), target_(model.focus) {}
+
+Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
+  // Part of the way from the organ's middle to the needle: the work stays in view together with what it is done to.
+  Vec3 offset = snapshot.needle.pose.p - focus_;
+  if (!is_finite(offset)) offset = {};
+  const float reach = 0.35f * field_;
+  if (const float l = length(offset); l > reach) offset *= reach / l;
+  const Vec3 wanted = focus_ + 0.45f * offset;
+
+  // Near the axis the needle's direction means nothing; the camera keeps to where it is.
+  const float from_axis = std::hypot(offset.x, offset.z);
+  float side = azimuth_;
+  if (from_axis > 0.06f * field_) {
+    const float middle = std::atan2(offset.x, offset.z);
+    // How far the nearest tool's shaft stands from a camera on that side, seen from above.
+    const auto clear = [&](float hand) {
+      float least = kPi;
+      for (const ToolView& tool : snapshot.tool) {
+        const Vec3 shaft = rotate(tool.pose.q, {0, 0, 1});
+        if (distance(tool.pose.p, focus_) < 2 * field_ && std::hypot(shaft.x, shaft.z) > 0.2f)
+          least = std::min(least, std::abs(wrap_angle(middle + hand * beside - std::atan2(shaft.x, shaft.z))));
+      }
+      return least;
+    };
+    // It changes sides only for a good reason, or it would sway between two equal ones.
+    if (clear(-hand_) > clear(hand_) + (started_ ? 0.35f : 0)) hand_ = -hand_;
+    side = middle + hand_ * beside;
+  }
+
+  if (!started_) {
+    started_ = true;
+    target_ = wanted;
+    azimuth_ = side;
+  } else if (dt > 0) {
+    target_ = lerp(target_, wanted, 1 - std::exp(-3 * dt / settle_time));
+    const float want_speed = std::clamp(wrap_angle(side - azimuth_) / settle_time, -turn_speed, turn_speed);
+    // The speed itself eases, or the camera would start and stop with a jerk.
+    speed_ += (want_speed - speed_) * (1 - std::exp(-4 * dt / settle_time));
+    azimuth_ = wrap_angle(azimuth_ + std::clamp(speed_ * dt, -0.5f, 0.5f));
+  }
+  return look_at_from(target_, azimuth_, elevation, half_height, fov_deg);
+}
+
+}  // namespace catgut

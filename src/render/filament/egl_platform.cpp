@@ -1,0 +1,168 @@
+// render/filament/egl_platform: see egl_platform.h.
+//
+// The one file that leans on a private interface. Filament 1.9.25's own platform on Linux needs an X server; its base class
+// for others, backend::OpenGLPlatform, is exported by the library but its header is not installed, so it is declared again
+// here. The order of the virtual functions is that of the library's own vtable and must not change; room.cmake accepts no other
+// version. Newer Filament has a public header and a headless EGL platform of its own.
+#include "render/filament/egl_platform.h"
+
+#include <epoxy/egl.h>
+
+#include <cstdint>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace filament::backend {
+
+struct AcquiredImage;
+
+class OpenGLPlatform : public DefaultPlatform {
+ public:
+  ~OpenGLPlatform() noexcept override;
+  static Driver* createDefaultDriver(OpenGLPlatform* platform, void* sharedContext);
+  virtual void terminate() noexcept = 0;
+  virtual SwapChain* createSwapChain(void* nativeWindow, uint64_t& flags) noexcept = 0;
+  virtual SwapChain* createSwapChain(uint32_t width, uint32_t height, uint64_t& flags) noexcept = 0;
+  virtual void destroySwapChain(SwapChain* swapChain) noexcept = 0;
+  virtual void createDefaultRenderTarget(uint32_t& framebuffer, uint32_t& colorbuffer, uint32_t& depthbuffer) noexcept;
+  virtual void makeCurrent(SwapChain* drawSwapChain, SwapChain* readSwapChain) noexcept = 0;
+  virtual void commit(SwapChain* swapChain) noexcept = 0;
+  virtual void setPresentationTime(int64_t nanoseconds) noexcept = 0;
+  virtual bool canCreateFence() noexcept;
+  virtual Fence* createFence() noexcept = 0;
+  virtual void destroyFence(Fence* fence) noexcept = 0;
+  virtual FenceStatus waitFence(Fence* fence, uint64_t timeout) noexcept = 0;
+  virtual Stream* createStream(void* nativeStream) noexcept = 0;
+  virtual void destroyStream(Stream* stream) noexcept = 0;
+  virtual void attach(Stream* stream, intptr_t tname) noexcept = 0;
+  virtual void detach(Stream* stream) noexcept = 0;
+  virtual void updateTexImage(Stream* stream, int64_t* timestamp) noexcept = 0;
+  virtual ExternalTexture* createExternalTextureStorage() noexcept = 0;
+  virtual void reallocateExternalStorage(ExternalTexture* ets, uint32_t w, uint32_t h, TextureFormat format) noexcept = 0;
+  virtual void destroyExternalTextureStorage(ExternalTexture* ets) noexcept = 0;
+  virtual AcquiredImage transformAcquiredImage(AcquiredImage source) noexcept;
+  virtual bool setExternalImage(void* externalImage, void* texture) noexcept;
+  virtual void retainExternalImage(void* externalImage) noexcept;
+  virtual void releaseExternalImage(void* externalImage) noexcept;
+  virtual void* createExternalImageTexture(void* externalImage) noexcept;
+  virtual void destroyExternalImage(void* texture) noexcept;
+};
+
+}  // namespace filament::backend
+
+namespace catgut {
+namespace {
+
+using filament::backend::Driver;
+using filament::backend::FenceStatus;
+using filament::backend::OpenGLPlatform;
+using filament::backend::TextureFormat;
+
+bool has(const char* extensions, std::string_view name) {
+  std::istringstream words(extensions ? extensions : "");
+  for (std::string word; words >> word;)
+    if (word == name) return true;
+  return false;
+}
+
+bool usable(EGLDisplay display) {
+  return display != EGL_NO_DISPLAY && eglInitialize(display, nullptr, nullptr) && eglBindAPI(EGL_OPENGL_API);
+}
+
+// Mesa's surfaceless platform first (it works without a card), then the first card that answers.
+EGLDisplay open_display() {
+  const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
+  // eglGetPlatformDisplayEXT and not the core function: libepoxy aborts on that one while no display is current.
+  if (!has(client, "EGL_EXT_platform_base")) throw std::runtime_error("no pictures: EGL on this machine has no platform displays");
+  if (has(client, "EGL_MESA_platform_surfaceless")) {
+    const EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
+    if (usable(display)) return display;
+  }
+  if (has(client, "EGL_EXT_platform_device") && has(client, "EGL_EXT_device_enumeration")) {
+    EGLDeviceEXT devices[16];
+    EGLint count = 0;
+    if (eglQueryDevicesEXT(16, devices, &count))
+      for (EGLint i = 0; i < count; ++i) {
+        const EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, devices[i], nullptr);
+        if (usable(display)) return display;
+      }
+  }
+  throw std::runtime_error("no pictures: no EGL driver answers on this machine (Debian: apt install libgl1-mesa-dri libegl1)");
+}
+
+class EglPlatform final : public OpenGLPlatform {
+ public:
+  // Everything that can fail happens here, on the caller's thread, where it can be reported.
+  EglPlatform() : display_(open_display()) {
+    const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_RED_SIZE, 8,
+                             EGL_GREEN_SIZE, 8, EGL_BLUE_SIZE, 8, EGL_ALPHA_SIZE, 8, EGL_DEPTH_SIZE, 24, EGL_NONE};
+    EGLint count = 0;
+    if (!eglChooseConfig(display_, wanted, &config_, 1, &count) || count < 1)
+      throw std::runtime_error("no pictures: the EGL driver offers no 8-bit colour with depth");
+    const EGLint context[] = {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 1, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                              EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+    context_ = eglCreateContext(display_, config_, EGL_NO_CONTEXT, context);
+    if (context_ == EGL_NO_CONTEXT) throw std::runtime_error("no pictures: the EGL driver has no OpenGL 4.1 core");
+    idle_ = pbuffer(1, 1);
+  }
+  // The display is one for the whole process and stays open: another renderer may be using it.
+  ~EglPlatform() noexcept override {
+    if (idle_ != EGL_NO_SURFACE) eglDestroySurface(display_, idle_);
+    eglDestroyContext(display_, context_);
+  }
+
+  int getOSVersion() const noexcept override { return 0; }
+
+  Driver* createDriver(void* shared) noexcept override {
+    eglBindAPI(EGL_OPENGL_API);  // per thread, and this is Filament's
+    if (!eglMakeCurrent(display_, idle_, idle_, context_)) return nullptr;
+    return createDefaultDriver(this, shared);
+  }
+  void terminate() noexcept override {
+    eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    eglReleaseThread();
+  }
+  SwapChain* createSwapChain(void*, uint64_t&) noexcept override { return nullptr; }  // no windows here
+  SwapChain* createSwapChain(uint32_t width, uint32_t height, uint64_t&) noexcept override {
+    return reinterpret_cast<SwapChain*>(pbuffer(EGLint(width), EGLint(height)));
+  }
+  void destroySwapChain(SwapChain* chain) noexcept override {
+    if (!chain) return;
+    eglMakeCurrent(display_, idle_, idle_, context_);
+    eglDestroySurface(display_, reinterpret_cast<EGLSurface>(chain));
+  }
+  void makeCurrent(SwapChain* draw, SwapChain* read) noexcept override {
+    eglMakeCurrent(display_, reinterpret_cast<EGLSurface>(draw), reinterpret_cast<EGLSurface>(read), context_);
+  }
+  void commit(SwapChain*) noexcept override {}  // nothing is shown; the pixels are read back before
+  void setPresentationTime(int64_t) noexcept override {}
+  Fence* createFence() noexcept override { return nullptr; }
+  void destroyFence(Fence*) noexcept override {}
+  FenceStatus waitFence(Fence*, uint64_t) noexcept override { return FenceStatus::ERROR; }
+  Stream* createStream(void*) noexcept override { return nullptr; }
+  void destroyStream(Stream*) noexcept override {}
+  void attach(Stream*, intptr_t) noexcept override {}
+  void detach(Stream*) noexcept override {}
+  void updateTexImage(Stream*, int64_t*) noexcept override {}
+  ExternalTexture* createExternalTextureStorage() noexcept override { return nullptr; }
+  void reallocateExternalStorage(ExternalTexture*, uint32_t, uint32_t, TextureFormat) noexcept override {}
+  void destroyExternalTextureStorage(ExternalTexture*) noexcept override {}
+
+ private:
+  EGLSurface pbuffer(EGLint width, EGLint height) const {
+    const EGLint size[] = {EGL_WIDTH, width, EGL_HEIGHT, height, EGL_NONE};
+    return eglCreatePbufferSurface(display_, config_, size);
+  }
+  EGLDisplay display_;
+  EGLConfig config_ = nullptr;
+  EGLContext context_ = EGL_NO_CONTEXT;
+  EGLSurface idle_ = EGL_NO_SURFACE;
+};
+
+}  // namespace
+
+std::unique_ptr<filament::backend::Platform> make_egl_platform() { return std::make_unique<EglPlatform>(); }
+
+}  // namespace catgut

@@ -1,0 +1,138 @@
+// render/filament/environment: a theatre lamp, a ring of dimmer lamps, pale walls and a green floor. What wet tissue and steel
+// mirror decides whether they look wet and like steel.
+#include "render/filament/environment.h"
+
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include <math/vec3.h>
+
+#include "core/math.h"
+
+namespace catgut {
+namespace {
+
+using filament::Texture;
+
+float smooth_step(float a, float b, float x) {
+  const float t = std::clamp((x - a) / (b - a), 0.0f, 1.0f);
+  return t * t * (3 - 2 * t);
+}
+
+// Radiance from direction d, in units of the environment's intensity.
+Vec3 radiance(Vec3 d) {
+  // Walls: pale above the horizon, the drape's green from below.
+  const Vec3 ceiling{0.70f, 0.74f, 0.78f}, wall{0.52f, 0.56f, 0.58f}, floor{0.11f, 0.24f, 0.20f};
+  Vec3 c = d.y > 0 ? lerp(wall, ceiling, d.y) : lerp(wall * 0.6f, floor, smooth_step(0, 0.35f, -d.y));
+  // The main lamp's cluster of round heads, and a satellite.
+  const auto head = [&](Vec3 middle, float radius, float glow, Vec3 tint) {
+    const float away = std::acos(std::clamp(dot(d, normalized(middle)), -1.0f, 1.0f));
+    c += tint * (glow * (1 - smooth_step(radius * 0.8f, radius * 1.1f, away)));
+  };
+  const Vec3 warm{1.0f, 0.96f, 0.90f}, cool{0.92f, 0.97f, 1.0f};
+  for (int i = 0; i < 6; ++i) {
+    const float a = 2 * kPi * float(i) / 6;
+    head({0.25f + 0.24f * std::cos(a), 1, 0.30f + 0.24f * std::sin(a)}, 0.105f, 13, warm);
+  }
+  head({0.25f, 1, 0.30f}, 0.105f, 13, warm);
+  head({-0.95f, 0.8f, -0.5f}, 0.20f, 6, cool);
+  // A light panel along the wall behind the surgeon: the long highlight on instruments.
+  if (d.z > 0.3f && std::abs(d.y / d.z - 0.55f) < 0.10f && std::abs(d.x / d.z) < 0.9f) c += cool * 2.2f;
+  return c;
+}
+
+Vec3 cube_direction(int face, float s, float t) {  // s, t in -1..1, rows from the top, OpenGL's convention
+  switch (face) {
+    case 0: return normalized(Vec3{1, -t, -s});
+    case 1: return normalized(Vec3{-1, -t, s});
+    case 2: return normalized(Vec3{s, 1, t});
+    case 3: return normalized(Vec3{s, -1, -t});
+    case 4: return normalized(Vec3{s, -t, 1});
+    default: return normalized(Vec3{-s, -t, -1});
+  }
+}
+
+float radical_inverse(uint32_t i) {
+  i = (i << 16) | (i >> 16);
+  i = ((i & 0x55555555u) << 1) | ((i & 0xAAAAAAAAu) >> 1);
+  i = ((i & 0x33333333u) << 2) | ((i & 0xCCCCCCCCu) >> 2);
+  i = ((i & 0x0F0F0F0Fu) << 4) | ((i & 0xF0F0F0F0u) >> 4);
+  i = ((i & 0x00FF00FFu) << 8) | ((i & 0xFF00FF00u) >> 8);
+  return float(i) * 2.3283064e-10f;
+}
+
+// What a surface of that roughness mirrors toward n: the environment weighed by GGX (the usual split-sum prefilter).
+Vec3 blurred(Vec3 n, float roughness, uint32_t samples) {
+  const Vec3 side = any_perpendicular(n), up = cross(n, side);
+  const float a2 = roughness * roughness;
+  Vec3 sum;
+  float weight = 0;
+  for (uint32_t i = 0; i < samples; ++i) {
+    const float u = (float(i) + 0.5f) / float(samples), phi = 2 * kPi * radical_inverse(i);
+    const float cos_h = std::sqrt((1 - u) / (1 + (a2 - 1) * u)), sin_h = std::sqrt(std::max(0.0f, 1 - cos_h * cos_h));
+    const Vec3 h = side * (sin_h * std::cos(phi)) + up * (sin_h * std::sin(phi)) + n * cos_h;
+    const Vec3 l = h * (2 * cos_h) - n;
+    const float w = dot(l, n);
+    if (w > 0) sum += radiance(normalized(l)) * w, weight += w;
+  }
+  return sum / std::max(weight, 1e-6f);
+}
+
+Texture::PixelBufferDescriptor floats(const std::vector<float>& data) {
+  const size_t bytes = data.size() * sizeof(float);
+  void* copy = std::malloc(bytes);
+  std::memcpy(copy, data.data(), bytes);
+  return {copy, bytes, Texture::Format::RGB, Texture::Type::FLOAT, [](void* p, size_t, void*) { std::free(p); }};
+}
+
+}  // namespace
+
+Environment make_environment(filament::Engine& engine, float intensity) {
+  constexpr int levels = 5, base = 128;
+  Environment environment;
+  environment.reflections = Texture::Builder()
+                                .width(base)
+                                .height(base)
+                                .levels(levels)
+                                .sampler(Texture::Sampler::SAMPLER_CUBEMAP)
+                                .format(Texture::InternalFormat::R11F_G11F_B10F)
+                                .build(engine);
+  // Filament looks up level (levels - 1) * q (2 - q) for perceptual roughness q: solved for q at each level.
+  for (int level = 0; level < levels; ++level) {
+    const int size = base >> level;
+    const float lod = float(level) / float(levels - 1), q = 1 - std::sqrt(1 - lod), roughness = std::max(q * q, 1e-4f);
+    std::vector<float> pixels;
+    pixels.reserve(size_t(6 * size * size * 3));
+    for (int face = 0; face < 6; ++face)
+      for (int y = 0; y < size; ++y)
+        for (int x = 0; x < size; ++x) {
+          const Vec3 d = cube_direction(face, 2 * (float(x) + 0.5f) / float(size) - 1, 2 * (float(y) + 0.5f) / float(size) - 1);
+          const Vec3 c = level == 0 ? radiance(d) : blurred(d, roughness, level == 1 ? 48 : 128);
+          pixels.insert(pixels.end(), {c.x, c.y, c.z});
+        }
+    environment.reflections->setImage(engine, size_t(level), floats(pixels), Texture::FaceOffsets(size_t(size * size * 12)));
+  }
+
+  // Diffuse light: the first nine spherical harmonics of the radiance. The lamps are left to the lamp that casts shadows, by
+  // cutting what is brighter than the walls.
+  filament::math::float3 sh[9] = {};
+  constexpr int n = 64;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < 2 * n; ++j) {
+      const float y = 1 - 2 * (float(i) + 0.5f) / n, a = kPi * (float(j) + 0.5f) / n, r = std::sqrt(1 - y * y);
+      const Vec3 d{r * std::cos(a), y, r * std::sin(a)};
+      Vec3 c = radiance(d);
+      c = {std::min(c.x, 1.6f), std::min(c.y, 1.6f), std::min(c.z, 1.6f)};
+      const float w = 4 * kPi / float(2 * n * n);
+      const float basis[9] = {0.282095f, 0.488603f * d.y, 0.488603f * d.z, 0.488603f * d.x, 1.092548f * d.x * d.y,
+                              1.092548f * d.y * d.z, 0.315392f * (3 * d.z * d.z - 1), 1.092548f * d.x * d.z,
+                              0.546274f * (d.x * d.x - d.y * d.y)};
+      for (int k = 0; k < 9; ++k) sh[k] += filament::math::float3{c.x, c.y, c.z} * (basis[k] * w);
+    }
+  environment.light =
+      filament::IndirectLight::Builder().reflections(environment.reflections).radiance(3, sh).intensity(intensity).build(engine);
+  return environment;
+}
+
+}  // namespace catgut

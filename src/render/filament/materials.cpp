@@ -1,0 +1,33 @@
+// render/filament/materials: see materials.h. The .inc files are written by matc at build time from materials/*.mat.
+#include "render/filament/materials.h"
+
+namespace catgut {
+namespace {
+constexpr uint8_t kTissue[] = {
+#include "tissue.inc"
+};
+constexpr uint8_t kThread[] = {
+#include "thread.inc"
+};
+constexpr uint8_t kMetal[] = {
+#include "metal.inc"
+};
+constexpr uint8_t kDrape[] = {
+#include "drape.inc"
+};
+constexpr uint8_t kShadow[] = {
+#include "shadow.inc"
+};
+constexpr uint8_t kMarker[] = {
+#include "marker.inc"
+};
+}  // namespace
+
+std::span<const uint8_t> tissue_material() { return kTissue; }
+std::span<const uint8_t> thread_material() { return kThread; }
+std::span<const uint8_t> metal_material() { return kMetal; }
+std::span<const uint8_t> drape_material() { return kDrape; }
+std::span<const uint8_t> shadow_material() { return kShadow; }
+std::span<const uint8_t> marker_material() { return kMarker; }
+
+}  // namespace catgut

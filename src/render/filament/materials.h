@@ -1,0 +1,15 @@
+// render/filament/materials: the compiled materials, embedded so that a build has no files to find at run time.
+#pragma once
+#include <cstdint>
+#include <span>
+
+namespace catgut {
+
+std::span<const uint8_t> tissue_material();
+std::span<const uint8_t> thread_material();
+std::span<const uint8_t> metal_material();
+std::span<const uint8_t> drape_material();
+std::span<const uint8_t> shadow_material();
+std::span<const uint8_t> marker_material();
+
+}  // namespace catgut

@@ -1,0 +1,26 @@
+// render/filament/thread_view: the suture thread as a smooth tube through its particles, and the needle on its end.
+#pragma once
+#include <vector>
+
+#include "exchange/picture.h"
+#include "exchange/snapshot.h"
+#include "render/camera.h"
+#include "render/filament/mesh.h"
+
+namespace catgut {
+
+struct ThreadView {
+  uint32_t capacity = 0;  // points of the drawn curve at most
+  std::vector<Vec3> through, curve;
+  std::vector<float> radius;
+  Shape tube;
+  GpuMesh gpu;
+};
+
+ThreadView make_thread_view(filament::Engine& engine, filament::Scene& scene, const PictureModel& model,
+                            filament::MaterialInstance* material);
+// pixel: [m] that one pixel covers at 1 m from the camera; the thread is drawn wide enough to be seen.
+void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel& model, const Snapshot& snapshot,
+                 const Camera& camera, float pixel);
+
+}  // namespace catgut

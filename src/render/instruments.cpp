@@ -1,0 +1,165 @@
+// render/shapes: needle, needle driver, forceps and drape; see shapes.h. Sizes follow the instruments on a surgeon's table:
+// a 180 mm needle holder with gold rings, 150 mm tissue forceps.
+#include <vector>
+
+#include "render/shapes.h"
+
+namespace catgut {
+namespace {
+
+constexpr float mm = 0.001f;
+
+void add_line_tube(Shape& shape, std::span<const Vec3> through, float r0, float r1, Vec3 colour) {
+  std::vector<Vec3> centre;
+  smooth_curve(through, 8, centre);
+  std::vector<float> radius(centre.size());
+  for (size_t i = 0; i < centre.size(); ++i) radius[i] = r0 + (r1 - r0) * float(i) / float(centre.size() - 1);
+  add_tube(shape, centre, radius, 14, colour);
+}
+
+void add_ring(Shape& shape, Vec3 centre, float rx, float rz, float wire, Vec3 colour) {
+  std::vector<Vec3> points;
+  for (int i = 0; i <= 40; ++i) {
+    const float a = 2 * kPi * float(i) / 40;
+    points.push_back(centre + Vec3{rx * std::cos(a), 0, rz * std::sin(a)});
+  }
+  const std::vector<float> radius(points.size(), wire);
+  add_tube(shape, points, radius, 12, colour);
+}
+
+ToolShape needle_driver() {
+  const Vec3 steel = srgb(196, 198, 202), carbide = srgb(96, 98, 102), gold = srgb(212, 172, 92);
+  ToolShape tool;
+  tool.pivot = 26 * mm;
+  tool.opening = 0.16f;
+  // One jaw: flat inside at x = 0, the grasp point a little behind the tip.
+  const Section jaw[] = {{{1.0f * mm, 0, -2.5f * mm}, 0.62f * mm, 0.9f * mm}, {{1.1f * mm, 0, -1.8f * mm}, 0.78f * mm, 1.15f * mm},
+                         {{1.25f * mm, 0, 4 * mm}, 0.95f * mm, 1.4f * mm},    {{1.75f * mm, 0, 14 * mm}, 1.45f * mm, 2.0f * mm},
+                         {{2.3f * mm, 0, 21 * mm}, 2.0f * mm, 2.5f * mm},     {{2.2f * mm, 0, 27 * mm}, 2.1f * mm, 2.7f * mm}};
+  add_loft(tool.half, jaw, steel);
+  const Section insert[] = {{{0.28f * mm, 0, -2.3f * mm}, 0.26f * mm, 0.82f * mm}, {{0.28f * mm, 0, 13 * mm}, 0.26f * mm, 1.5f * mm}};
+  add_loft(tool.half, insert, carbide, 8);
+  // The shank of the other side belongs to this jaw in life; drawn on its own side, the crossing hides in the box joint.
+  const Vec3 shank[] = {{1.9f * mm, 0, 30 * mm}, {3.4f * mm, 0, 50 * mm}, {5.2f * mm, 0, 90 * mm},
+                        {8.5f * mm, 0, 130 * mm}, {13 * mm, 0, 152 * mm}};
+  add_line_tube(tool.half, shank, 2.3f * mm, 1.9f * mm, steel);
+  add_ring(tool.half, {16 * mm, 0, 165 * mm}, 10.5f * mm, 14 * mm, 2.0f * mm, gold);
+  const Section joint[] = {{{0, 0, 19.5f * mm}, 3.1f * mm, 2.5f * mm}, {{0, 0, 21 * mm}, 4.2f * mm, 3.0f * mm},
+                           {{0, 0, 31 * mm}, 4.4f * mm, 3.1f * mm},    {{0, 0, 35 * mm}, 3.6f * mm, 2.7f * mm},
+                           {{0, 0, 37 * mm}, 2.9f * mm, 2.2f * mm}};
+  add_loft(tool.body, joint, steel, 5);
+  for (const float s : {-1.0f, 1.0f}) {
+    const Vec3 pin[] = {{0, s * 2.8f * mm, 26 * mm}, {0, s * 3.2f * mm, 26 * mm}, {0, s * 3.35f * mm, 26 * mm}};
+    const float r[] = {1.9f * mm, 1.9f * mm, 1.5f * mm};
+    add_tube(tool.body, pin, r, 16, srgb(160, 162, 168));
+  }
+  return tool;
+}
+
+ToolShape forceps() {
+  const Vec3 steel = srgb(190, 193, 198), grip = srgb(150, 153, 158);
+  ToolShape tool;
+  tool.pivot = 140 * mm;
+  tool.opening = 0.03f;
+  const Section arm[] = {{{0.6f * mm, 0, -1.5f * mm}, 0.5f * mm, 0.7f * mm},  {{0.75f * mm, 0, 0}, 0.7f * mm, 0.95f * mm},
+                         {{1.1f * mm, 0, 8 * mm}, 0.8f * mm, 1.2f * mm},      {{2.3f * mm, 0, 22 * mm}, 0.9f * mm, 1.9f * mm},
+                         {{4.6f * mm, 0, 42 * mm}, 0.85f * mm, 3.6f * mm},    {{6.0f * mm, 0, 65 * mm}, 0.8f * mm, 4.9f * mm},
+                         {{5.6f * mm, 0, 95 * mm}, 0.8f * mm, 5.1f * mm},     {{3.2f * mm, 0, 125 * mm}, 0.8f * mm, 4.7f * mm},
+                         {{1.0f * mm, 0, 142 * mm}, 0.9f * mm, 4.0f * mm},    {{0.9f * mm, 0, 150 * mm}, 0.9f * mm, 3.4f * mm}};
+  add_loft(tool.half, arm, steel);
+  // Ridges for the fingers.
+  for (int i = 0; i < 9; ++i) {
+    const float z = (56 + 3.2f * float(i)) * mm;
+    const Section ridge[] = {{{6.5f * mm, 0, z}, 0.45f * mm, 3.4f * mm}, {{6.5f * mm, 0, z + 1.4f * mm}, 0.45f * mm, 3.4f * mm}};
+    add_loft(tool.half, ridge, grip);
+  }
+  const Section end[] = {{{0, 0, 140 * mm}, 1.6f * mm, 4.1f * mm}, {{0, 0, 151 * mm}, 1.6f * mm, 3.2f * mm}};
+  add_loft(tool.body, end, steel);
+  return tool;
+}
+
+// Smooth noise without a table: a few waves of unrelated lengths and directions.
+float cloth_height(float x, float z) {
+  float h = 0;
+  h += 0.9f * std::sin(31 * x + 17 * z + 0.4f) * std::sin(23 * z - 9 * x + 1.1f);
+  h += 0.5f * std::sin(57 * x - 43 * z + 2.0f) * std::sin(19 * x + 61 * z);
+  h += 0.25f * std::sin(131 * x + 37 * z) * std::sin(113 * z - 71 * x + 0.7f);
+  return h;
+}
+
+}  // namespace
+
+Shape needle_shape(const PictureModel& model) {
+  constexpr int n = 64;
+  std::vector<Vec3> centre;
+  std::vector<float> radius;
+  const float wire = model.needle_wire_radius, r = model.needle_radius;
+  for (int i = 0; i <= n; ++i) {
+    const float s = float(i) / n, phi = s * model.needle_arc;
+    centre.push_back({r * std::cos(phi), r * std::sin(phi), 0});
+    // The swage is drilled and a little thicker than the thread it holds; the last fifth tapers to the point.
+    const float to_tip = (1 - s) / 0.2f;
+    radius.push_back(wire * (to_tip < 1 ? 0.04f + 0.96f * std::sqrt(to_tip) * (1.5f - 0.5f * to_tip) : s < 0.06f ? 1.08f : 1.0f));
+  }
+  Shape shape;
+  add_tube(shape, centre, radius, 12, srgb(205, 208, 212));
+  return shape;
+}
+
+ToolShape tool_shape(ToolKind kind) { return kind == ToolKind::needle_driver ? needle_driver() : forceps(); }
+
+Shape drape_shape(Vec3 centre, float hole, float size) {
+  constexpr int rings = 44, around = 80;
+  Shape shape;
+  const auto height = [&](float x, float z, float r) {
+    const float out = std::clamp((r - hole) / 0.03f, 0.0f, 1.0f);
+    // The cloth's edge lies as a soft roll round the hole and falls away from it a little.
+    const float roll = 0.0022f * std::exp(-(r - hole) * (r - hole) / (0.0035f * 0.0035f));
+    return centre.y + roll + 0.0050f * out * cloth_height(x, z) - 0.05f * std::max(0.0f, r - hole - 0.06f);
+  };
+  for (int i = 0; i <= rings; ++i) {
+    const float s = float(i) / rings, r = hole + (size - hole) * s * s;
+    for (int k = 0; k <= around; ++k) {
+      const float a = 2 * kPi * float(k) / around, x = r * std::cos(a), z = -r * std::sin(a), e = 0.0005f;
+      const Vec3 n = normalized(Vec3{height(x - e, z, std::hypot(x - e, z)) - height(x + e, z, std::hypot(x + e, z)), 2 * e,
+                                     height(x, z - e, std::hypot(x, z - e)) - height(x, z + e, std::hypot(x, z + e))});
+      shape.position.push_back({centre.x + x, height(x, z, r), centre.z + z});
+      shape.normal.push_back(n);
+      shape.tangent.push_back(normalized(Vec3{1, 0, 0} - n * n.x));
+      shape.uv.push_back({x / 0.01f, z / 0.01f});
+      // Worn and damp near the wound.
+      shape.colour.push_back(lerp(srgb(22, 78, 76), srgb(44, 116, 110), std::clamp((r - hole) / 0.05f, 0.0f, 1.0f)));
+    }
+  }
+  for (uint32_t i = 0; i < rings; ++i)
+    for (uint32_t k = 0; k < around; ++k) {
+      const uint32_t a = i * (around + 1) + k, b = a + around + 1;
+      shape.triangle.push_back({a, b, a + 1});
+      shape.triangle.push_back({a + 1, b, b + 1});
+    }
+  return shape;
+}
+
+Shape wound_bed_shape(Vec3 centre, float radius) {
+  constexpr int rings = 12, around = 48;
+  Shape shape;
+  for (int i = 0; i <= rings; ++i)
+    for (int k = 0; k <= around; ++k) {
+      const float s = float(i) / rings, r = radius * s, a = 2 * kPi * float(k) / around;
+      const float x = r * std::cos(a), z = -r * std::sin(a), y = 0.0015f * cloth_height(3 * x + 0.3f, 3 * z);
+      shape.position.push_back({centre.x + x, centre.y + y, centre.z + z});
+      shape.normal.push_back({0, 1, 0});
+      shape.tangent.push_back({1, 0, 0});
+      shape.uv.push_back({x / 0.01f, z / 0.01f});
+      shape.colour.push_back(srgb(120, 36, 34));
+    }
+  for (uint32_t i = 0; i < rings; ++i)
+    for (uint32_t k = 0; k < around; ++k) {
+      const uint32_t a = i * (around + 1) + k, b = a + around + 1;
+      shape.triangle.push_back({a, b, a + 1});
+      shape.triangle.push_back({a + 1, b, b + 1});
+    }
+  return shape;
+}
+
+}  // namespace catgut

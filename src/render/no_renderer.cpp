@@ -1,0 +1,18 @@
+// render: what a build without pictures (CATGUT_RENDER=OFF) answers. Physics, recordings and tests of them need no graphics.
+#include <stdexcept>
+
+#include "render/renderer.h"
+
+#ifndef CATGUT_WITH_FILAMENT
+namespace catgut {
+
+std::unique_ptr<Renderer> make_renderer(const PictureModel&, int, int, Quality) {
+  throw std::runtime_error(
+      "this build makes no pictures; install libfilament-dev libfilament-tools libegl-dev libepoxy-dev and configure with "
+      "-DCATGUT_RENDER=ON");
+}
+
+bool renderer_available() { return false; }
+
+}  // namespace catgut
+#endif

@@ -1,0 +1,36 @@
+// render: pictures of the operating field. Reads the PictureModel once and a Snapshot per picture; writes pixels and nothing
+// else. Nothing outside this room includes a header of the graphics library.
+#pragma once
+#include <memory>
+#include <string>
+
+#include "exchange/picture.h"
+#include "exchange/snapshot.h"
+#include "render/camera.h"
+#include "render/image.h"
+
+namespace catgut {
+
+enum class Quality {
+  draft,  // one sample a pixel, 1024 shadow map: for previews and for machines without a graphics card
+  good    // four samples, ambient occlusion, 2048 shadow map
+};
+
+struct Overlay {
+  std::string caption;         // along the bottom, none when empty
+  bool suture_points = false;  // small balls at the entries (yellow) and exits (cyan)
+};
+
+// Belongs to the thread that made it; two renderers may live side by side.
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+  virtual Image render(const Snapshot& snapshot, const Camera& camera, const Overlay& overlay = {}) = 0;
+};
+
+// Throws std::runtime_error with one line to act on: no EGL driver on this machine, or a build without pictures.
+std::unique_ptr<Renderer> make_renderer(const PictureModel& model, int width, int height, Quality quality);
+
+bool renderer_available();  // whether make_renderer can work here: built in, and a driver answers
+
+}  // namespace catgut

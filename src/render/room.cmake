@@ -1,0 +1,35 @@
+# render: PNG through libstb; pictures through Filament when CATGUT_RENDER is on. Video needs only the ffmpeg program at run time.
+find_library(STB_LIBRARY stb REQUIRED)
+target_link_libraries(catgut_render PRIVATE ${STB_LIBRARY})
+
+if(CATGUT_RENDER)
+  # EXACT: filament/egl_platform.cpp declares a class of the library whose header is not installed.
+  find_package(filament 1.9.25 EXACT QUIET)
+  find_program(MATC matc)
+  find_library(EPOXY_LIBRARY epoxy)
+  if(NOT filament_FOUND OR NOT MATC OR NOT EPOXY_LIBRARY)
+    message(FATAL_ERROR "Pictures need Filament 1.9.25: apt install libfilament-dev libfilament-tools libegl-dev libepoxy-dev, "
+                        "or configure with -DCATGUT_RENDER=OFF to build without pictures.")
+  endif()
+  file(GLOB filament_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/render/filament/*.cpp)
+  file(GLOB materials CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/render/filament/materials/*.mat)
+  set(material_folder ${CMAKE_BINARY_DIR}/render_materials)
+  file(MAKE_DIRECTORY ${material_folder})
+  foreach(material ${materials})
+    get_filename_component(stem ${material} NAME_WE)
+    add_custom_command(
+      OUTPUT ${material_folder}/${stem}.inc
+      COMMAND ${MATC} -p desktop -a opengl -V skinning,dynamicLighting,fog -f header -o ${material_folder}/${stem}.inc ${material}
+      DEPENDS ${material}
+      COMMENT "Compiling material ${stem}")
+    list(APPEND material_incs ${material_folder}/${stem}.inc)
+  endforeach()
+  target_sources(catgut_render PRIVATE ${filament_sources} ${material_incs})
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/render/filament/materials.cpp PROPERTIES OBJECT_DEPENDS "${material_incs}")
+  target_compile_definitions(catgut_render PRIVATE CATGUT_WITH_FILAMENT)
+  # SYSTEM: Filament's headers warn about what C++17 deprecated.
+  get_target_property(filament_include filament::filament INTERFACE_INCLUDE_DIRECTORIES)
+  target_include_directories(catgut_render SYSTEM PRIVATE ${filament_include})
+  target_include_directories(catgut_render PRIVATE ${material_folder})
+  target_link_libraries(catgut_render PRIVATE filament::filament filament::backend filament::utils ${EPOXY_LIBRARY})
+endif()

@@ -1,0 +1,57 @@
+// render/shapes: triangle meshes made from a few numbers: tubes, lofts, tools, needle, drape. Plain geometry, no graphics
+// library; [m] throughout, counter-clockwise seen from outside.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "exchange/picture.h"
+
+namespace catgut {
+
+struct Shape {
+  std::vector<Vec3> position, normal, tangent;  // tangent: along the u of uv
+  std::vector<std::array<float, 2>> uv;
+  std::vector<Vec3> colour;                     // linear
+  std::vector<std::array<uint32_t, 3>> triangle;
+};
+
+Vec3 srgb(int r, int g, int b);  // linear colour of 8-bit sRGB values
+
+// A round tube along `centre` with a radius per point, `sides` corners and closed ends. u runs along it [m], v round it 0..1.
+// The frame is carried along the curve without turning about it, so a pattern on the tube does not twist.
+void add_tube(Shape& shape, std::span<const Vec3> centre, std::span<const float> radius, int sides, Vec3 colour);
+
+// Cross-sections in the xy plane with rounded corners, joined along their order.
+struct Section {
+  Vec3 centre;
+  float half_x = 0, half_y = 0;
+};
+void add_loft(Shape& shape, std::span<const Section> sections, Vec3 colour, float squareness = 4);
+
+void add_ball(Shape& shape, Vec3 centre, float radius, Vec3 colour);
+void add_shape(Shape& to, const Shape& from);
+Shape moved(Shape shape, const Pose& pose);
+Shape mirrored_x(Shape shape);
+
+// Points of a Catmull-Rom curve through `through`, `per_span` pieces a span, last point included. Written to `out`.
+void smooth_curve(std::span<const Vec3> through, int per_span, std::vector<Vec3>& out);
+
+Shape needle_shape(const PictureModel& model);  // in the needle's frame
+
+// A tool in its frame (origin between the jaw tips, shaft along +z): what stands still, and the half that opens toward +x.
+// The other half is the mirror image. The halves turn about the y axis at z = pivot by up to `opening` radians each.
+struct ToolShape {
+  Shape body, half;
+  float pivot = 0;    // [m]
+  float opening = 0;  // [rad]
+};
+ToolShape tool_shape(ToolKind kind);
+
+// The sterile drape: a cloth with folds round a hole of radius `hole` about (centre.x, centre.z), at height centre.y.
+Shape drape_shape(Vec3 centre, float hole, float size);
+// What lies in the drape's hole round the organ.
+Shape wound_bed_shape(Vec3 centre, float radius);
+
+}  // namespace catgut

@@ -1,0 +1,209 @@
+// tests/render: pictures show what the snapshot says; files of them can be written and read. Needs an EGL driver, else skips.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "render/renderer.h"
+#include "render/video.h"
+#include "scene.h"
+
+namespace catgut {
+namespace {
+
+constexpr int kWidth = 320, kHeight = 180;
+
+// One renderer and one picture for all tests: starting it takes longer than the pictures.
+struct Stage {
+  TestField field = make_test_field();
+  std::unique_ptr<Renderer> renderer = make_renderer(field.model, kWidth, kHeight, Quality::draft);
+  Camera camera = overview(field.model);
+  Image picture = renderer->render(field.snapshot, camera);
+};
+Stage& stage() {
+  static Stage the_stage;
+  return the_stage;
+}
+
+#define NEEDS_RENDERER() \
+  if (!renderer_available()) GTEST_SKIP() << "no EGL driver here, or a build without pictures (CATGUT_RENDER=OFF)"
+
+std::string temporary(const std::string& name) {
+  const auto folder = std::filesystem::temp_directory_path() / ("catgut_render_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  return (folder / name).string();
+}
+
+// Where a point of the scene lands in the picture.
+std::array<int, 2> project(const Camera& camera, Vec3 point) {
+  const Vec3 ahead = normalized(camera.target - camera.eye), right = normalized(cross(ahead, camera.up));
+  const Vec3 up = cross(right, ahead), d = point - camera.eye;
+  const float scale = 0.5f * kHeight / std::tan(0.5f * camera.fov_deg * kPi / 180) / dot(d, ahead);
+  return {int(0.5f * kWidth + scale * dot(d, right)), int(0.5f * kHeight - scale * dot(d, up))};
+}
+
+int difference(const Image& a, const Image& b) {
+  int changed = 0;
+  for (size_t i = 0; i < a.rgba.size(); i += 4)
+    changed += std::abs(a.rgba[i] - b.rgba[i]) + std::abs(a.rgba[i + 1] - b.rgba[i + 1]) > 24;
+  return changed;
+}
+
+bool reddish(Colour c) { return c[0] > c[1] + 8 && c[0] > c[2]; }
+bool greenish(Colour c) { return c[1] > c[0] + 8; }
+bool bluish(Colour c) { return c[2] > c[0] + 12 && c[2] > c[1] + 12; }
+
+TEST(Pictures, TissueIsWhereTheMeshIsAndTheDrapeRoundIt) {
+  NEEDS_RENDERER();
+  const Stage& s = stage();
+  ASSERT_EQ(s.picture.rgba.size(), size_t(kWidth * kHeight * 4));
+  int red = 0, looked = 0;
+  for (int i = 0; i < 40; ++i) {
+    // The outside of the near wall: half a turn facing the camera, some way below the rim.
+    const float side = std::atan2(s.camera.eye.x, s.camera.eye.z) + 0.9f * (float(i % 8) / 7 - 0.5f);
+    const auto [x, y] = project(s.camera, {0.02f * std::sin(side), -0.006f - 0.003f * float(i / 8), 0.02f * std::cos(side)});
+    if (x < 0 || y < 0 || x >= kWidth || y >= kHeight) continue;
+    ++looked;
+    red += reddish(pixel(s.picture, x, y));
+  }
+  ASSERT_GT(looked, 20);
+  EXPECT_GT(red, looked * 6 / 10);  // tools and their shadows may hide some
+  EXPECT_TRUE(greenish(pixel(s.picture, kWidth / 10, kHeight - 12)));
+  EXPECT_TRUE(greenish(pixel(s.picture, kWidth / 2, 3)));
+}
+
+TEST(Pictures, TheThreadShowsInItsColour) {
+  NEEDS_RENDERER();
+  Stage& s = stage();
+  int blue = 0;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) blue += bluish(pixel(s.picture, x, y));
+  EXPECT_GT(blue, 30);
+  Snapshot without = s.field.snapshot;
+  without.thread_order.clear();
+  const Image bare = s.renderer->render(without, s.camera);
+  int left = 0;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) left += bluish(pixel(bare, x, y));
+  EXPECT_LT(left, blue / 4);
+}
+
+TEST(Pictures, MovingAParticleMovesThePicture) {
+  NEEDS_RENDERER();
+  Stage& s = stage();
+  EXPECT_EQ(difference(s.picture, s.renderer->render(s.field.snapshot, s.camera)), 0);  // and nothing else does
+  Snapshot pushed = s.field.snapshot;
+  for (uint32_t i = 0; i < 16; ++i) pushed.particle[i].y += 0.004f;
+  EXPECT_GT(difference(s.picture, s.renderer->render(pushed, s.camera)), 200);
+  Snapshot moved = s.field.snapshot;
+  moved.tool[0].jaw = 1;
+  EXPECT_GT(difference(s.picture, s.renderer->render(moved, s.camera)), 40);
+}
+
+TEST(Pictures, MarkersAndCaptionsComeAndGo) {
+  NEEDS_RENDERER();
+  Stage& s = stage();
+  EXPECT_GT(difference(s.picture, s.renderer->render(s.field.snapshot, s.camera, {"", true})), 5);
+  EXPECT_GT(difference(s.picture, s.renderer->render(s.field.snapshot, s.camera, {"bite 3 of 12 - 14.2 s", false})), 100);
+  EXPECT_EQ(difference(s.picture, s.renderer->render(s.field.snapshot, s.camera)), 0);
+}
+
+TEST(Pictures, WildSnapshotsDoNotBringItDown) {
+  NEEDS_RENDERER();
+  Stage& s = stage();
+  Snapshot wild = s.field.snapshot;
+  wild.particle[3] = {NAN, 1e30f, 0};
+  wild.particle[wild.thread_order[5]] = {NAN, NAN, NAN};
+  wild.thread_order.resize(1);
+  wild.needle.pose.p = {NAN, 0, 0};
+  EXPECT_NO_THROW(s.renderer->render(wild, s.camera));
+  Snapshot long_thread = s.field.snapshot;
+  const auto once = long_thread.thread_order;
+  long_thread.thread_order.insert(long_thread.thread_order.end(), once.begin(), once.end());
+  EXPECT_NO_THROW(s.renderer->render(long_thread, s.camera));
+  EXPECT_EQ(difference(s.picture, s.renderer->render(s.field.snapshot, s.camera)), 0);
+}
+
+TEST(Pictures, SizesThatCannotBeAreRefused) {
+  const TestField field = make_test_field(8, 2);
+  EXPECT_THROW(make_renderer(field.model, 0, 100, Quality::draft), std::runtime_error);
+}
+
+TEST(Pngs, RoundTrip) {
+  Image image = make_image(40, 20, {10, 20, 30, 255});
+  draw_text(image, 2, 2, "q\x01", {255, 255, 255, 255});
+  const std::string path = temporary("round.png");
+  write_png(image, path);
+  const Image back = read_png(path);
+  EXPECT_EQ(back.width, 40);
+  EXPECT_EQ(back.rgba, image.rgba);
+  EXPECT_THROW(read_png(temporary("missing.png")), std::runtime_error);
+  EXPECT_THROW(write_png(image, "/nonexistent/folder/x.png"), std::runtime_error);
+  EXPECT_THROW(write_png(Image{}, path), std::runtime_error);
+}
+
+TEST(Pngs, ContactSheetShowsEveryCellWithItsCaption) {
+  std::vector<SheetCell> cells;
+  for (int i = 0; i < 5; ++i)
+    cells.push_back({make_image(60, 30, {uint8_t(40 * i + 50), 0, 0, 255}), "bite " + std::to_string(i) + " with a long caption"});
+  const std::string path = temporary("sheet.png");
+  write_png(contact_sheet(cells, 3), path);
+  const Image sheet = read_png(path);
+  EXPECT_EQ(sheet.width, 6 + 3 * 66);
+  EXPECT_EQ(sheet.height, 6 + 2 * 52);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(pixel(sheet, 30 + i % 3 * 66, 20 + i / 3 * 52)[0], 40 * i + 50);
+  int lit = 0;
+  for (int x = 0; x < 66; ++x)
+    for (int y = 37; y < 52; ++y) lit += pixel(sheet, x, y)[0] > 200;
+  EXPECT_GT(lit, 30);
+  EXPECT_GT(contact_sheet({}, 4).width, 0);
+}
+
+TEST(Videos, AFileComesOut) {
+  if (!video_available()) GTEST_SKIP() << "the program ffmpeg is not installed";
+  const std::string path = temporary("video.mp4");
+  VideoWriter video(path, 64, 48, 30);
+  for (int i = 0; i < 10; ++i) video.add(make_image(64, 48, {uint8_t(20 * i), 90, 60, 255}));
+  EXPECT_THROW(video.add(make_image(32, 48, {})), std::runtime_error);
+  video.finish();
+  EXPECT_GT(std::filesystem::file_size(path), 500u);
+  EXPECT_THROW(video.add(make_image(64, 48, {})), std::runtime_error);
+}
+
+TEST(Videos, ABrokenPipeIsAnErrorAndNotTheEnd) {
+  if (!video_available()) GTEST_SKIP() << "the program ffmpeg is not installed";
+  EXPECT_THROW(VideoWriter(temporary("odd.mp4"), 63, 48, 30), std::runtime_error);
+  VideoWriter video("/nonexistent/folder/video.mp4", 640, 480, 30);
+  const Image frame = make_image(640, 480, {1, 2, 3, 255});
+  EXPECT_THROW(
+      {
+        for (int i = 0; i < 200; ++i) video.add(frame);
+        video.finish();
+      },
+      std::runtime_error);
+}
+
+TEST(FollowCameras, NeverJump) {
+  TestField field = make_test_field(8, 2);
+  FollowCamera follow(field.model);
+  Snapshot s = field.snapshot;
+  const float dt = 1.0f / 30;
+  Camera last = follow.update(s, dt);
+  for (int i = 0; i < 600; ++i) {
+    // The needle goes round, and every two seconds is somewhere else altogether.
+    const float a = 0.01f * float(i) + 2.3f * float(i / 60);
+    s.needle.pose.p = Vec3{0.02f * std::cos(a), 0.01f, 0.02f * std::sin(a)};
+    if (i % 97 == 0) s.needle.pose.p = {NAN, 0, 0};
+    const Camera now = follow.update(s, dt);
+    ASSERT_TRUE(is_finite(now.eye));
+    EXPECT_LT(distance(now.eye, last.eye), 0.004f) << "frame " << i;
+    EXPECT_GT(now.eye.y, now.target.y);
+    last = now;
+  }
+}
+
+}  // namespace
+}  // namespace catgut
