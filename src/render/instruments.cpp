@@ -28,7 +28,7 @@ void add_ring(Shape& shape, Vec3 centre, float rx, float rz, float wire, Vec3 co
 }
 
 ToolShape needle_driver() {
-  const Vec3 steel = srgb(196, 198, 202), carbide = srgb(96, 98, 102), gold = srgb(212, 172, 92);
+  const Vec3 steel = srgb(222, 224, 228), carbide = srgb(96, 98, 102), gold = srgb(212, 172, 92);
   ToolShape tool;
   tool.pivot = 26 * mm;
   tool.opening = 0.16f;
@@ -57,7 +57,7 @@ ToolShape needle_driver() {
 }
 
 ToolShape forceps() {
-  const Vec3 steel = srgb(190, 193, 198), grip = srgb(150, 153, 158);
+  const Vec3 steel = srgb(218, 220, 225), grip = srgb(150, 153, 158);
   ToolShape tool;
   tool.pivot = 140 * mm;
   tool.opening = 0.03f;
@@ -102,7 +102,7 @@ Shape needle_shape(const PictureModel& model) {
     radius.push_back(wire * (to_tip < 1 ? 0.04f + 0.96f * std::sqrt(to_tip) * (1.5f - 0.5f * to_tip) : s < 0.06f ? 1.08f : 1.0f));
   }
   Shape shape;
-  add_tube(shape, centre, radius, 12, srgb(205, 208, 212));
+  add_tube(shape, centre, radius, 12, srgb(228, 230, 234));
   return shape;
 }
 

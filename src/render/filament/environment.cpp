@@ -23,7 +23,7 @@ float smooth_step(float a, float b, float x) {
 // Radiance from direction d, in units of the environment's intensity.
 Vec3 radiance(Vec3 d) {
   // Walls: pale above the horizon, the drape's green from below.
-  const Vec3 ceiling{0.70f, 0.74f, 0.78f}, wall{0.52f, 0.56f, 0.58f}, floor{0.11f, 0.24f, 0.20f};
+  const Vec3 ceiling{0.70f, 0.74f, 0.78f}, wall{0.62f, 0.66f, 0.68f}, floor{0.11f, 0.24f, 0.20f};
   Vec3 c = d.y > 0 ? lerp(wall, ceiling, d.y) : lerp(wall * 0.6f, floor, smooth_step(0, 0.35f, -d.y));
   // The main lamp's cluster of round heads, and a satellite.
   const auto head = [&](Vec3 middle, float radius, float glow, Vec3 tint) {
@@ -38,7 +38,7 @@ Vec3 radiance(Vec3 d) {
   head({0.25f, 1, 0.30f}, 0.105f, 13, warm);
   head({-0.95f, 0.8f, -0.5f}, 0.20f, 6, cool);
   // A light panel along the wall behind the surgeon: the long highlight on instruments.
-  if (d.z > 0.3f && std::abs(d.y / d.z - 0.55f) < 0.10f && std::abs(d.x / d.z) < 0.9f) c += cool * 2.2f;
+  if (d.z > 0.3f && std::abs(d.y / d.z - 0.55f) < 0.10f && std::abs(d.x / d.z) < 0.9f) c += cool * 3.0f;
   return c;
 }
 
