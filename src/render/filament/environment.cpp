@@ -44,12 +44,18 @@ Vec3 radiance(Vec3 d) {
 
 Vec3 cube_direction(int face, float s, float t) {  // s, t in -1..1, rows from the top, OpenGL's convention
   switch (face) {
-    case 0: return normalized(Vec3{1, -t, -s});
-    case 1: return normalized(Vec3{-1, -t, s});
-    case 2: return normalized(Vec3{s, 1, t});
-    case 3: return normalized(Vec3{s, -1, -t});
-    case 4: return normalized(Vec3{s, -t, 1});
-    default: return normalized(Vec3{-s, -t, -1});
+    case 0:
+      return normalized(Vec3{1, -t, -s});
+    case 1:
+      return normalized(Vec3{-1, -t, s});
+    case 2:
+      return normalized(Vec3{s, 1, t});
+    case 3:
+      return normalized(Vec3{s, -1, -t});
+    case 4:
+      return normalized(Vec3{s, -t, 1});
+    default:
+      return normalized(Vec3{-s, -t, -1});
   }
 }
 
@@ -125,13 +131,22 @@ Environment make_environment(filament::Engine& engine, float intensity) {
       Vec3 c = radiance(d);
       c = {std::min(c.x, 1.6f), std::min(c.y, 1.6f), std::min(c.z, 1.6f)};
       const float w = 4 * kPi / float(2 * n * n);
-      const float basis[9] = {0.282095f, 0.488603f * d.y, 0.488603f * d.z, 0.488603f * d.x, 1.092548f * d.x * d.y,
-                              1.092548f * d.y * d.z, 0.315392f * (3 * d.z * d.z - 1), 1.092548f * d.x * d.z,
+      const float basis[9] = {0.282095f,
+                              0.488603f * d.y,
+                              0.488603f * d.z,
+                              0.488603f * d.x,
+                              1.092548f * d.x * d.y,
+                              1.092548f * d.y * d.z,
+                              0.315392f * (3 * d.z * d.z - 1),
+                              1.092548f * d.x * d.z,
                               0.546274f * (d.x * d.x - d.y * d.y)};
       for (int k = 0; k < 9; ++k) sh[k] += filament::math::float3{c.x, c.y, c.z} * (basis[k] * w);
     }
-  environment.light =
-      filament::IndirectLight::Builder().reflections(environment.reflections).radiance(3, sh).intensity(intensity).build(engine);
+  environment.light = filament::IndirectLight::Builder()
+                          .reflections(environment.reflections)
+                          .radiance(3, sh)
+                          .intensity(intensity)
+                          .build(engine);
   return environment;
 }
 
