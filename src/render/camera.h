@@ -22,11 +22,11 @@ struct FollowCamera {
   // The camera dt [s] after the previous call; the first call starts at the work without easing in.
   Camera update(const Snapshot& snapshot, float dt);
 
-  float elevation = 0.78f;        // [rad] above the horizon
-  float beside = 0.7f;            // [rad] from the needle's side of the organ, toward where the tools' shafts hide less
-  float turn_speed = 0.35f;       // [rad/s] at most
-  float settle_time = 1.2f;       // [s] in which most of a change of target is made up
-  float half_height = 0.028f;     // [m] of the picture, at the target
+  float elevation = 0.78f;     // [rad] above the horizon
+  float beside = 0.7f;         // [rad] from the needle's side of the organ, toward where the tools' shafts hide less
+  float turn_speed = 0.35f;    // [rad/s] at most
+  float settle_time = 1.2f;    // [s] in which most of a change of target is made up
+  float half_height = 0.028f;  // [m] of the picture, at the target
   float fov_deg = 30;
 
  private:
@@ -34,7 +34,7 @@ struct FollowCamera {
   float field_;
   Vec3 target_;
   float azimuth_ = 0.6f, speed_ = 0;  // [rad], [rad/s]
-  float hand_ = 1;                // +1 or -1: on which side of the needle the camera stands
+  float hand_ = 1;                    // +1 or -1: on which side of the needle the camera stands
   bool started_ = false;
 };
 

@@ -28,24 +28,31 @@ void add_ring(Shape& shape, Vec3 centre, float rx, float rz, float wire, Vec3 co
 }
 
 ToolShape needle_driver() {
-  const Vec3 steel = srgb(196, 198, 202), carbide = srgb(96, 98, 102), gold = srgb(212, 172, 92);
+  const Vec3 steel = srgb(222, 224, 228), carbide = srgb(96, 98, 102), gold = srgb(212, 172, 92);
   ToolShape tool;
   tool.pivot = 26 * mm;
   tool.opening = 0.16f;
   // One jaw: flat inside at x = 0, the grasp point a little behind the tip.
-  const Section jaw[] = {{{1.0f * mm, 0, -2.5f * mm}, 0.62f * mm, 0.9f * mm}, {{1.1f * mm, 0, -1.8f * mm}, 0.78f * mm, 1.15f * mm},
-                         {{1.25f * mm, 0, 4 * mm}, 0.95f * mm, 1.4f * mm},    {{1.75f * mm, 0, 14 * mm}, 1.45f * mm, 2.0f * mm},
-                         {{2.3f * mm, 0, 21 * mm}, 2.0f * mm, 2.5f * mm},     {{2.2f * mm, 0, 27 * mm}, 2.1f * mm, 2.7f * mm}};
+  const Section jaw[] = {
+      {{1.0f * mm, 0, -2.5f * mm}, 0.62f * mm, 0.9f * mm}, {{1.1f * mm, 0, -1.8f * mm}, 0.78f * mm, 1.15f * mm},
+      {{1.25f * mm, 0, 4 * mm}, 0.95f * mm, 1.4f * mm},    {{1.75f * mm, 0, 14 * mm}, 1.45f * mm, 2.0f * mm},
+      {{2.3f * mm, 0, 21 * mm}, 2.0f * mm, 2.5f * mm},     {{2.2f * mm, 0, 27 * mm}, 2.1f * mm, 2.7f * mm}};
   add_loft(tool.half, jaw, steel);
-  const Section insert[] = {{{0.28f * mm, 0, -2.3f * mm}, 0.26f * mm, 0.82f * mm}, {{0.28f * mm, 0, 13 * mm}, 0.26f * mm, 1.5f * mm}};
+  const Section insert[] = {{{0.28f * mm, 0, -2.3f * mm}, 0.26f * mm, 0.82f * mm},
+                            {{0.28f * mm, 0, 13 * mm}, 0.26f * mm, 1.5f * mm}};
   add_loft(tool.half, insert, carbide, 8);
   // The shank of the other side belongs to this jaw in life; drawn on its own side, the crossing hides in the box joint.
-  const Vec3 shank[] = {{1.9f * mm, 0, 30 * mm}, {3.4f * mm, 0, 50 * mm}, {5.2f * mm, 0, 90 * mm},
-                        {8.5f * mm, 0, 130 * mm}, {13 * mm, 0, 152 * mm}};
+  const Vec3 shank[] = {{1.9f * mm, 0, 30 * mm},
+                        {3.4f * mm, 0, 50 * mm},
+                        {5.2f * mm, 0, 90 * mm},
+                        {8.5f * mm, 0, 130 * mm},
+                        {13 * mm, 0, 152 * mm}};
   add_line_tube(tool.half, shank, 2.3f * mm, 1.9f * mm, steel);
   add_ring(tool.half, {16 * mm, 0, 165 * mm}, 10.5f * mm, 14 * mm, 2.0f * mm, gold);
-  const Section joint[] = {{{0, 0, 19.5f * mm}, 3.1f * mm, 2.5f * mm}, {{0, 0, 21 * mm}, 4.2f * mm, 3.0f * mm},
-                           {{0, 0, 31 * mm}, 4.4f * mm, 3.1f * mm},    {{0, 0, 35 * mm}, 3.6f * mm, 2.7f * mm},
+  const Section joint[] = {{{0, 0, 19.5f * mm}, 3.1f * mm, 2.5f * mm},
+                           {{0, 0, 21 * mm}, 4.2f * mm, 3.0f * mm},
+                           {{0, 0, 31 * mm}, 4.4f * mm, 3.1f * mm},
+                           {{0, 0, 35 * mm}, 3.6f * mm, 2.7f * mm},
                            {{0, 0, 37 * mm}, 2.9f * mm, 2.2f * mm}};
   add_loft(tool.body, joint, steel, 5);
   for (const float s : {-1.0f, 1.0f}) {
@@ -57,20 +64,21 @@ ToolShape needle_driver() {
 }
 
 ToolShape forceps() {
-  const Vec3 steel = srgb(190, 193, 198), grip = srgb(150, 153, 158);
+  const Vec3 steel = srgb(218, 220, 225), grip = srgb(150, 153, 158);
   ToolShape tool;
   tool.pivot = 140 * mm;
   tool.opening = 0.03f;
-  const Section arm[] = {{{0.6f * mm, 0, -1.5f * mm}, 0.5f * mm, 0.7f * mm},  {{0.75f * mm, 0, 0}, 0.7f * mm, 0.95f * mm},
-                         {{1.1f * mm, 0, 8 * mm}, 0.8f * mm, 1.2f * mm},      {{2.3f * mm, 0, 22 * mm}, 0.9f * mm, 1.9f * mm},
-                         {{4.6f * mm, 0, 42 * mm}, 0.85f * mm, 3.6f * mm},    {{6.0f * mm, 0, 65 * mm}, 0.8f * mm, 4.9f * mm},
-                         {{5.6f * mm, 0, 95 * mm}, 0.8f * mm, 5.1f * mm},     {{3.2f * mm, 0, 125 * mm}, 0.8f * mm, 4.7f * mm},
-                         {{1.0f * mm, 0, 142 * mm}, 0.9f * mm, 4.0f * mm},    {{0.9f * mm, 0, 150 * mm}, 0.9f * mm, 3.4f * mm}};
+  const Section arm[] = {{{0.6f * mm, 0, -1.5f * mm}, 0.5f * mm, 0.7f * mm}, {{0.75f * mm, 0, 0}, 0.7f * mm, 0.95f * mm},
+                         {{1.1f * mm, 0, 8 * mm}, 0.8f * mm, 1.2f * mm},     {{2.3f * mm, 0, 22 * mm}, 0.9f * mm, 1.9f * mm},
+                         {{4.6f * mm, 0, 42 * mm}, 0.85f * mm, 3.6f * mm},   {{6.0f * mm, 0, 65 * mm}, 0.8f * mm, 4.9f * mm},
+                         {{5.6f * mm, 0, 95 * mm}, 0.8f * mm, 5.1f * mm},    {{3.2f * mm, 0, 125 * mm}, 0.8f * mm, 4.7f * mm},
+                         {{1.0f * mm, 0, 142 * mm}, 0.9f * mm, 4.0f * mm},   {{0.9f * mm, 0, 150 * mm}, 0.9f * mm, 3.4f * mm}};
   add_loft(tool.half, arm, steel);
   // Ridges for the fingers.
   for (int i = 0; i < 9; ++i) {
     const float z = (56 + 3.2f * float(i)) * mm;
-    const Section ridge[] = {{{6.5f * mm, 0, z}, 0.45f * mm, 3.4f * mm}, {{6.5f * mm, 0, z + 1.4f * mm}, 0.45f * mm, 3.4f * mm}};
+    const Section ridge[] = {{{6.5f * mm, 0, z}, 0.45f * mm, 3.4f * mm},
+                             {{6.5f * mm, 0, z + 1.4f * mm}, 0.45f * mm, 3.4f * mm}};
     add_loft(tool.half, ridge, grip);
   }
   const Section end[] = {{{0, 0, 140 * mm}, 1.6f * mm, 4.1f * mm}, {{0, 0, 151 * mm}, 1.6f * mm, 3.2f * mm}};
@@ -99,10 +107,12 @@ Shape needle_shape(const PictureModel& model) {
     centre.push_back({r * std::cos(phi), r * std::sin(phi), 0});
     // The swage is drilled and a little thicker than the thread it holds; the last fifth tapers to the point.
     const float to_tip = (1 - s) / 0.2f;
-    radius.push_back(wire * (to_tip < 1 ? 0.04f + 0.96f * std::sqrt(to_tip) * (1.5f - 0.5f * to_tip) : s < 0.06f ? 1.08f : 1.0f));
+    radius.push_back(wire * (to_tip < 1  ? 0.04f + 0.96f * std::sqrt(to_tip) * (1.5f - 0.5f * to_tip)
+                             : s < 0.06f ? 1.08f
+                                         : 1.0f));
   }
   Shape shape;
-  add_tube(shape, centre, radius, 12, srgb(205, 208, 212));
+  add_tube(shape, centre, radius, 12, srgb(228, 230, 234));
   return shape;
 }
 
@@ -150,7 +160,7 @@ Shape wound_bed_shape(Vec3 centre, float radius) {
       shape.position.push_back({centre.x + x, centre.y + y, centre.z + z});
       shape.normal.push_back({0, 1, 0});
       shape.tangent.push_back({1, 0, 0});
-      shape.uv.push_back({x / 0.01f, z / 0.01f});
+      shape.uv.push_back({x / 0.04f, z / 0.04f});  // in repeats of the tissue pattern
       shape.colour.push_back(srgb(120, 36, 34));
     }
   for (uint32_t i = 0; i < rings; ++i)

@@ -123,7 +123,8 @@ void add_ball(Shape& shape, Vec3 centre, float radius, Vec3 colour) {
       const Vec3 n{std::sin(p) * std::cos(a), -std::cos(p), -std::sin(p) * std::sin(a)};
       add_vertex(shape, centre + radius * n, n, {-std::sin(a), 0, -std::cos(a)}, float(k) / around, float(i) / up, colour);
     }
-  for (uint32_t i = 0; i < up; ++i) join_rings(shape, first + i * (around + 1), first + (i + 1) * (around + 1), around, around + 1);
+  for (uint32_t i = 0; i < up; ++i)
+    join_rings(shape, first + i * (around + 1), first + (i + 1) * (around + 1), around, around + 1);
 }
 
 void add_shape(Shape& to, const Shape& from) {
@@ -160,8 +161,8 @@ void smooth_curve(std::span<const Vec3> through, int per_span, std::vector<Vec3>
     const Vec3 a = i > 0 ? through[i - 1] : 2.0f * b - c, d = i + 2 < n ? through[i + 2] : 2.0f * c - b;
     for (int k = 0; k < per_span; ++k) {
       const float t = float(k) / float(per_span), t2 = t * t, t3 = t2 * t;
-      out.push_back(0.5f * (2.0f * b + (c - a) * t + (2.0f * a - 5.0f * b + 4.0f * c - d) * t2 +
-                            (3.0f * b - a - 3.0f * c + d) * t3));
+      out.push_back(0.5f *
+                    (2.0f * b + (c - a) * t + (2.0f * a - 5.0f * b + 4.0f * c - d) * t2 + (3.0f * b - a - 3.0f * c + d) * t3));
     }
   }
   if (n > 0) out.push_back(through[n - 1]);

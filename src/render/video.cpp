@@ -38,8 +38,7 @@ bool write_all(int fd, const uint8_t* data, size_t size) {
   }
   if (broken && !was_pending) {
     const timespec now{0, 0};
-    while (sigtimedwait(&pipe_signal, nullptr, &now) == -1 && errno == EINTR) {
-    }
+    while (sigtimedwait(&pipe_signal, nullptr, &now) == -1 && errno == EINTR) {}
   }
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
   return ok;
@@ -68,8 +67,7 @@ struct VideoWriter::Pipe {
     fd = -1;
     if (child < 0) return 0;
     int status = 0;
-    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-    }
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {}
     child = -1;
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128;
   }
@@ -92,9 +90,10 @@ VideoWriter::VideoWriter(const std::string& path, int width, int height, double 
   const std::string rate = std::to_string(frames_per_second);
   // A path that starts with '-' would be read as an option.
   const std::string target = path.starts_with('-') ? "./" + path : path;
-  std::vector<std::string> words{"ffmpeg", "-hide_banner", "-loglevel", "error", "-nostdin", "-y", "-f", "rawvideo", "-pix_fmt",
-                                 "rgba", "-s", size, "-r", rate, "-i", "pipe:0", "-an", "-c:v", "libx264", "-preset",
-                                 "veryfast", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", target};
+  std::vector<std::string> words{"ffmpeg",   "-hide_banner", "-loglevel", "error",   "-nostdin",  "-y",         "-f",
+                                 "rawvideo", "-pix_fmt",     "rgba",      "-s",      size,        "-r",         rate,
+                                 "-i",       "pipe:0",       "-an",       "-c:v",    "libx264",   "-preset",    "veryfast",
+                                 "-crf",     "20",           "-pix_fmt",  "yuv420p", "-movflags", "+faststart", target};
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -120,7 +119,8 @@ void VideoWriter::add(const Image& frame) {
     throw std::runtime_error(pipe_->path + ": a frame of another size than the video's");
   if (!write_all(pipe_->fd, frame.rgba.data(), frame.rgba.size())) {
     pipe_->close_and_wait();
-    throw std::runtime_error(pipe_->path + ": ffmpeg stopped before the video was done; does the folder exist, and is there room?");
+    throw std::runtime_error(pipe_->path +
+                             ": ffmpeg stopped before the video was done; does the folder exist, and is there room?");
   }
 }
 

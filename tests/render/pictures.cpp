@@ -148,7 +148,8 @@ TEST(Pngs, RoundTrip) {
 TEST(Pngs, ContactSheetShowsEveryCellWithItsCaption) {
   std::vector<SheetCell> cells;
   for (int i = 0; i < 5; ++i)
-    cells.push_back({make_image(60, 30, {uint8_t(40 * i + 50), 0, 0, 255}), "bite " + std::to_string(i) + " with a long caption"});
+    cells.push_back(
+        {make_image(60, 30, {uint8_t(40 * i + 50), 0, 0, 255}), "bite " + std::to_string(i) + " with a long caption"});
   const std::string path = temporary("sheet.png");
   write_png(contact_sheet(cells, 3), path);
   const Image sheet = read_png(path);

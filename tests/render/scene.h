@@ -39,8 +39,11 @@ inline TestField make_test_field(int around = 96, int rows = 40) {
   }
   for (int i = 1; i < edge; ++i) {
     const float a = kPi * float(i) / edge;
-    profile.push_back({outer - 0.5f * wall + 0.5f * wall * std::cos(a), -0.0015f + 0.5f * wall * std::sin(a),
-                       {std::cos(a), std::sin(a), 0}, TissueLayer::cut_edge, length + 0.0015f * a});
+    profile.push_back({outer - 0.5f * wall + 0.5f * wall * std::cos(a),
+                       -0.0015f + 0.5f * wall * std::sin(a),
+                       {std::cos(a), std::sin(a), 0},
+                       TissueLayer::cut_edge,
+                       length + 0.0015f * a});
   }
   for (int i = 0; i <= rows; ++i) {
     const float y = -0.0015f - (length - 0.0015f) * float(i) / float(rows);
@@ -84,7 +87,8 @@ inline TestField make_test_field(int around = 96, int rows = 40) {
   const Vec3 last = thread.back(), swage{0.016f, 0.017f, 0.030f};
   for (int i = 1; i <= 40; ++i) {
     const float t = float(i) / 40;
-    thread.push_back(lerp(last, swage, t) + Vec3{0.004f * std::sin(5 * t), 0.012f * std::sin(kPi * t), 0.006f * std::sin(kPi * t)});
+    thread.push_back(lerp(last, swage, t) +
+                     Vec3{0.004f * std::sin(5 * t), 0.012f * std::sin(kPi * t), 0.006f * std::sin(kPi * t)});
   }
   model.thread_count = uint32_t(thread.size());
   for (const Vec3 p : thread) {

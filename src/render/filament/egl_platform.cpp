@@ -75,7 +75,8 @@ bool usable(EGLDisplay display) {
 EGLDisplay open_display() {
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
   // eglGetPlatformDisplayEXT and not the core function: libepoxy aborts on that one while no display is current.
-  if (!has(client, "EGL_EXT_platform_base")) throw std::runtime_error("no pictures: EGL on this machine has no platform displays");
+  if (!has(client, "EGL_EXT_platform_base"))
+    throw std::runtime_error("no pictures: EGL on this machine has no platform displays");
   if (has(client, "EGL_MESA_platform_surfaceless")) {
     const EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
     if (usable(display)) return display;
@@ -96,13 +97,27 @@ class EglPlatform final : public OpenGLPlatform {
  public:
   // Everything that can fail happens here, on the caller's thread, where it can be reported.
   EglPlatform() : display_(open_display()) {
-    const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_RED_SIZE, 8,
-                             EGL_GREEN_SIZE, 8, EGL_BLUE_SIZE, 8, EGL_ALPHA_SIZE, 8, EGL_DEPTH_SIZE, 24, EGL_NONE};
+    const EGLint wanted[] = {EGL_SURFACE_TYPE,
+                             EGL_PBUFFER_BIT,
+                             EGL_RENDERABLE_TYPE,
+                             EGL_OPENGL_BIT,
+                             EGL_RED_SIZE,
+                             8,
+                             EGL_GREEN_SIZE,
+                             8,
+                             EGL_BLUE_SIZE,
+                             8,
+                             EGL_ALPHA_SIZE,
+                             8,
+                             EGL_DEPTH_SIZE,
+                             24,
+                             EGL_NONE};
     EGLint count = 0;
     if (!eglChooseConfig(display_, wanted, &config_, 1, &count) || count < 1)
       throw std::runtime_error("no pictures: the EGL driver offers no 8-bit colour with depth");
-    const EGLint context[] = {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 1, EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                              EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+    const EGLint context[] = {
+        EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 1, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+        EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
     context_ = eglCreateContext(display_, config_, EGL_NO_CONTEXT, context);
     if (context_ == EGL_NO_CONTEXT) throw std::runtime_error("no pictures: the EGL driver has no OpenGL 4.1 core");
     idle_ = pbuffer(1, 1);

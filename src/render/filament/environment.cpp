@@ -23,7 +23,7 @@ float smooth_step(float a, float b, float x) {
 // Radiance from direction d, in units of the environment's intensity.
 Vec3 radiance(Vec3 d) {
   // Walls: pale above the horizon, the drape's green from below.
-  const Vec3 ceiling{0.70f, 0.74f, 0.78f}, wall{0.52f, 0.56f, 0.58f}, floor{0.11f, 0.24f, 0.20f};
+  const Vec3 ceiling{0.70f, 0.74f, 0.78f}, wall{0.62f, 0.66f, 0.68f}, floor{0.11f, 0.24f, 0.20f};
   Vec3 c = d.y > 0 ? lerp(wall, ceiling, d.y) : lerp(wall * 0.6f, floor, smooth_step(0, 0.35f, -d.y));
   // The main lamp's cluster of round heads, and a satellite.
   const auto head = [&](Vec3 middle, float radius, float glow, Vec3 tint) {
@@ -38,18 +38,24 @@ Vec3 radiance(Vec3 d) {
   head({0.25f, 1, 0.30f}, 0.105f, 13, warm);
   head({-0.95f, 0.8f, -0.5f}, 0.20f, 6, cool);
   // A light panel along the wall behind the surgeon: the long highlight on instruments.
-  if (d.z > 0.3f && std::abs(d.y / d.z - 0.55f) < 0.10f && std::abs(d.x / d.z) < 0.9f) c += cool * 2.2f;
+  if (d.z > 0.3f && std::abs(d.y / d.z - 0.55f) < 0.10f && std::abs(d.x / d.z) < 0.9f) c += cool * 3.0f;
   return c;
 }
 
 Vec3 cube_direction(int face, float s, float t) {  // s, t in -1..1, rows from the top, OpenGL's convention
   switch (face) {
-    case 0: return normalized(Vec3{1, -t, -s});
-    case 1: return normalized(Vec3{-1, -t, s});
-    case 2: return normalized(Vec3{s, 1, t});
-    case 3: return normalized(Vec3{s, -1, -t});
-    case 4: return normalized(Vec3{s, -t, 1});
-    default: return normalized(Vec3{-s, -t, -1});
+    case 0:
+      return normalized(Vec3{1, -t, -s});
+    case 1:
+      return normalized(Vec3{-1, -t, s});
+    case 2:
+      return normalized(Vec3{s, 1, t});
+    case 3:
+      return normalized(Vec3{s, -1, -t});
+    case 4:
+      return normalized(Vec3{s, -t, 1});
+    default:
+      return normalized(Vec3{-s, -t, -1});
   }
 }
 
@@ -125,13 +131,22 @@ Environment make_environment(filament::Engine& engine, float intensity) {
       Vec3 c = radiance(d);
       c = {std::min(c.x, 1.6f), std::min(c.y, 1.6f), std::min(c.z, 1.6f)};
       const float w = 4 * kPi / float(2 * n * n);
-      const float basis[9] = {0.282095f, 0.488603f * d.y, 0.488603f * d.z, 0.488603f * d.x, 1.092548f * d.x * d.y,
-                              1.092548f * d.y * d.z, 0.315392f * (3 * d.z * d.z - 1), 1.092548f * d.x * d.z,
+      const float basis[9] = {0.282095f,
+                              0.488603f * d.y,
+                              0.488603f * d.z,
+                              0.488603f * d.x,
+                              1.092548f * d.x * d.y,
+                              1.092548f * d.y * d.z,
+                              0.315392f * (3 * d.z * d.z - 1),
+                              1.092548f * d.x * d.z,
                               0.546274f * (d.x * d.x - d.y * d.y)};
       for (int k = 0; k < 9; ++k) sh[k] += filament::math::float3{c.x, c.y, c.z} * (basis[k] * w);
     }
-  environment.light =
-      filament::IndirectLight::Builder().reflections(environment.reflections).radiance(3, sh).intensity(intensity).build(engine);
+  environment.light = filament::IndirectLight::Builder()
+                          .reflections(environment.reflections)
+                          .radiance(3, sh)
+                          .intensity(intensity)
+                          .build(engine);
   return environment;
 }
 

@@ -1,5 +1,8 @@
 // render: the Filament renderer: theatre light, tissue, thread, needle, tools and drape. See renderer.h.
+#include <unistd.h>
+
 #include <algorithm>
+#include <cstdio>
 #include <stdexcept>
 
 #include <filament/Camera.h>
@@ -7,8 +10,8 @@
 #include <filament/Engine.h>
 #include <filament/LightManager.h>
 #include <filament/Material.h>
-#include <filament/Renderer.h>
 #include <filament/RenderableManager.h>
+#include <filament/Renderer.h>
 #include <filament/Scene.h>
 #include <filament/Skybox.h>
 #include <filament/TextureSampler.h>
@@ -35,11 +38,36 @@ struct ToolView3d {
   std::array<GpuMesh, 3> part;  // body, the half toward +x, the half toward -x
 };
 
+// Filament greets on standard output while it starts, where a program's own results go. Its lines go to standard error instead;
+// so would another thread's in that moment.
+class QuietStart {
+ public:
+  QuietStart() {
+    std::fflush(stdout);
+    saved_ = ::dup(STDOUT_FILENO);
+    if (saved_ >= 0) ::dup2(STDERR_FILENO, STDOUT_FILENO);
+  }
+  ~QuietStart() {
+    if (saved_ < 0) return;
+    std::fflush(stdout);
+    ::dup2(saved_, STDOUT_FILENO);
+    ::close(saved_);
+  }
+  QuietStart(const QuietStart&) = delete;
+  QuietStart& operator=(const QuietStart&) = delete;
+
+ private:
+  int saved_ = -1;
+};
+
 class FilamentRenderer final : public Renderer {
  public:
   FilamentRenderer(const PictureModel& model, int width, int height, Quality quality)
       : model_(model), width_(width), height_(height), platform_(make_egl_platform()) {
-    engine_ = filament::Engine::create(filament::Engine::Backend::OPENGL, platform_.get());
+    {
+      const QuietStart quiet;
+      engine_ = filament::Engine::create(filament::Engine::Backend::OPENGL, platform_.get());
+    }
     if (!engine_) throw std::runtime_error("no pictures: the graphics driver refused to start");
     chain_ = engine_->createSwapChain(uint32_t(width), uint32_t(height));
     renderer_ = engine_->createRenderer();
@@ -109,8 +137,9 @@ class FilamentRenderer final : public Renderer {
       if (!(begun = renderer_->beginFrame(chain_))) engine_->flushAndWait();
     if (!begun) throw std::runtime_error("no picture: the graphics driver does not accept a frame");
     renderer_->render(view_);
-    renderer_->readPixels(0, 0, uint32_t(width_), uint32_t(height_),
-                          {image.rgba.data(), image.rgba.size(), filament::Texture::Format::RGBA, filament::Texture::Type::UBYTE});
+    renderer_->readPixels(
+        0, 0, uint32_t(width_), uint32_t(height_),
+        {image.rgba.data(), image.rgba.size(), filament::Texture::Format::RGBA, filament::Texture::Type::UBYTE});
     renderer_->endFrame();
     engine_->flushAndWait();
     for (size_t i = 3; i < image.rgba.size(); i += 4) image.rgba[i] = 255;
@@ -274,7 +303,8 @@ class FilamentRenderer final : public Renderer {
   TissueTextures textures_;
   std::vector<filament::Material*> material_;
   filament::MaterialInstance *tissue_material_ = nullptr, *thread_material_ = nullptr, *needle_material_ = nullptr,
-                             *tool_material_ = nullptr, *drape_material_ = nullptr, *shadow_material_ = nullptr, *marker_material_ = nullptr;
+                             *tool_material_ = nullptr, *drape_material_ = nullptr, *shadow_material_ = nullptr,
+                             *marker_material_ = nullptr;
   std::vector<TissueView> tissue_;
   ThreadView thread_;
   std::array<ToolView3d, 2> tool_;
@@ -295,9 +325,7 @@ bool renderer_available() {
   try {
     make_egl_platform();
     return true;
-  } catch (const std::runtime_error&) {
-    return false;
-  }
+  } catch (const std::runtime_error&) { return false; }
 }
 
 }  // namespace catgut

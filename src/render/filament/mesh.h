@@ -48,7 +48,8 @@ void destroy_mesh(filament::Engine& engine, filament::Scene& scene, GpuMesh& mes
 // texture runs clockwise there; may be empty.
 void set_surface(filament::Engine& engine, const GpuMesh& mesh, std::span<const Vec3> position, std::span<const Vec3> normal,
                  std::span<const Vec3> tangent, std::span<const uint8_t> mirrored = {});
-// Replaces everything of a mesh that was made with at least as many vertices; draws `triangles` of its triangles from the first.
+// Replaces everything of a mesh that was made with at least as many vertices; draws `triangles` of its triangles from the
+// first.
 void set_look(filament::Engine& engine, const GpuMesh& mesh, std::span<const VertexLook> look);
 void set_drawn(filament::Engine& engine, const GpuMesh& mesh, uint32_t triangles);
 void set_pose(filament::Engine& engine, const GpuMesh& mesh, const Pose& pose);

@@ -73,7 +73,8 @@ void draw_vessel(std::vector<float>& map, Dice& dice, float x, float y, float he
     heading += 0.28f * (dice() - 0.5f) + 0.04f * (first - heading);
     if (depth > 0 && dice() < 0.022f) {
       const float side = dice() < 0.5f ? -1.0f : 1.0f;
-      draw_vessel(map, dice, x, y, heading + side * (0.5f + 0.6f * dice()), 0.68f * w, (0.25f + 0.4f * dice()) * reach, depth - 1);
+      draw_vessel(map, dice, x, y, heading + side * (0.5f + 0.6f * dice()), 0.68f * w, (0.25f + 0.4f * dice()) * reach,
+                  depth - 1);
     }
   }
 }
@@ -90,7 +91,8 @@ void slopes(const std::vector<float>& height, float scale, int channel, std::vec
 }
 
 Texture* upload(filament::Engine& engine, const std::vector<uint8_t>& pixels) {
-  Texture* texture = Texture::Builder().width(kSize).height(kSize).levels(0xff).format(Texture::InternalFormat::RGBA8).build(engine);
+  Texture* texture =
+      Texture::Builder().width(kSize).height(kSize).levels(0xff).format(Texture::InternalFormat::RGBA8).build(engine);
   void* copy = std::malloc(pixels.size());
   std::memcpy(copy, pixels.data(), pixels.size());
   texture->setImage(engine, 0,

@@ -5,9 +5,8 @@ namespace catgut {
 namespace {
 
 constexpr int kSides = 8, kPerSpan = 4;
-const Vec3 kViolet = srgb(70, 42, 150);
+const Vec3 kViolet = srgb(88, 58, 190);
 
-// The triangles of a tube are laid out span after span, its two end caps last; a shorter thread collapses what it does not use.
 }  // namespace
 
 ThreadView make_thread_view(filament::Engine& engine, filament::Scene& scene, const PictureModel& model,
@@ -50,6 +49,7 @@ void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel&
   for (size_t i = 0; i < look.size(); ++i)
     look[i] = {{kViolet.x, kViolet.y, kViolet.z, 1}, {view.tube.uv[i][0], view.tube.uv[i][1]}, {1, 0}};
   set_look(engine, view.gpu, look);
+  // The triangles lie span after span, the caps last: a shorter thread is drawn without its far cap, which nobody sees.
   set_drawn(engine, view.gpu, uint32_t(used - 1) * kSides * 2);
 }
 

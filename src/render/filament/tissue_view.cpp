@@ -39,7 +39,8 @@ Unwrapped unwrap(const VisibleMesh& mesh) {
         const uint32_t a = t[k], b = t[(k + 1) % 3];
         const float jump = std::abs(out.uv[a][axis] - out.uv[b][axis]);
         if (jump < 0.6f * extent || extent <= 0) continue;
-        period_sum += double(jump + std::min(0.3f * extent, distance(mesh.position[out.source[a]], mesh.position[out.source[b]]) / 0.01f));
+        period_sum += double(
+            jump + std::min(0.3f * extent, distance(mesh.position[out.source[a]], mesh.position[out.source[b]]) / 0.01f));
         ++jumps;
       }
     float stretch = 1 / kTile;
@@ -116,9 +117,15 @@ VertexLook look_of(const VisibleMesh& mesh, uint32_t v, Uv uv, float sky) {
   Vec3 c;
   float vessels = 0, mucosa = 0;
   switch (layer) {
-    case TissueLayer::serosa: c = srgb(228, 160, 146), vessels = 0.9f; break;
-    case TissueLayer::mucosa: c = srgb(206, 92, 88), vessels = 0.35f, mucosa = 1; break;
-    case TissueLayer::cut_edge: c = srgb(240, 204, 190); break;
+    case TissueLayer::serosa:
+      c = srgb(228, 160, 146), vessels = 0.9f;
+      break;
+    case TissueLayer::mucosa:
+      c = srgb(206, 92, 88), vessels = 0.35f, mucosa = 1;
+      break;
+    case TissueLayer::cut_edge:
+      c = srgb(240, 204, 190);
+      break;
   }
   return {{c.x, c.y, c.z, vessels}, {uv[0], uv[1]}, {sky, mucosa}};
 }

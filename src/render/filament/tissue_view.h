@@ -11,12 +11,12 @@
 namespace catgut {
 
 struct TissueView {
-  const VisibleMesh* mesh = nullptr;     // the model's
-  std::vector<uint32_t> source;          // drawn vertex -> mesh vertex; vertices on a texture seam are drawn twice
-  std::vector<uint32_t> along;           // drawn vertex -> mesh vertex next to it in the texture's u direction
-  std::vector<uint8_t> against;          // whether `along` lies toward smaller u
-  std::vector<uint8_t> mirrored;         // whether the texture runs clockwise there
-  std::vector<Vec3> position, normal;    // of the mesh, from skin
+  const VisibleMesh* mesh = nullptr;   // the model's
+  std::vector<uint32_t> source;        // drawn vertex -> mesh vertex; vertices on a texture seam are drawn twice
+  std::vector<uint32_t> along;         // drawn vertex -> mesh vertex next to it in the texture's u direction
+  std::vector<uint8_t> against;        // whether `along` lies toward smaller u
+  std::vector<uint8_t> mirrored;       // whether the texture runs clockwise there
+  std::vector<Vec3> position, normal;  // of the mesh, from skin
   std::vector<Vec3> drawn_position, drawn_normal, drawn_tangent;
   GpuMesh gpu;
 };
