@@ -1,3 +1,4 @@
+// geometry/topology: who is whose neighbour in a triangle mesh; boundary loops, normals, area and volume.
 #include "geometry/topology.h"
 
 #include <algorithm>

@@ -67,6 +67,7 @@ const Field kField[] = {
     {"solver", "damping", "1/s", 0, 10000, nullptr, "of tissue velocities", TOP(solver.damping)},
     {"solver", "thread_damping", "1/s", 0, 10000, nullptr, "of thread velocities", TOP(solver.thread_damping)},
     {"solver", "gravity", "m/s^2", -1000, 1000, nullptr, "y is up", TOP(solver.gravity)},
+    {"solver", "mass_scale", "", 1, 10000, nullptr, "tissue inertia times this at unchanged weight: sets the force with which tissue answers", TOP(solver.mass_scale)},
     {"solver", "friction_tissue", "", 0, 10, nullptr, "coefficient of Coulomb friction, tissue on tissue", TOP(solver.friction_tissue)},
     {"solver", "friction_tool", "", 0, 10, nullptr, "coefficient of Coulomb friction, tool on tissue", TOP(solver.friction_tool)},
     {"solver", "friction_thread", "", 0, 10, nullptr, "coefficient of Coulomb friction, thread on tissue and thread", TOP(solver.friction_thread)},
@@ -76,6 +77,7 @@ const Field kField[] = {
     {"suture", "attach_compliance", "m/N", 0, 1000, nullptr, "of that attachment", TOP(suture.attach_compliance)},
     {"suture", "channel_compliance", "m/N", 0, 1000, nullptr, "how softly the bitten tissue holds the needle's shaft sideways", TOP(suture.channel_compliance)},
     {"suture", "pass_tension", "N", 0, 1000, nullptr, "tension difference beyond which thread slides through a suture point", TOP(suture.pass_tension)},
+    {"suture", "capstan", "", 0, 10, nullptr, "and so much more per newton of tension: friction coefficient times the angle by which the suture point bends the thread", TOP(suture.capstan)},
     {"suture", "collision_off", "", 0, 100, nullptr, "thread particles on each side of a locked one that do not collide", TOP(suture.collision_off)},
     {"suture", "grasp_reach", "m", 0, 0.1, nullptr, "how near a closing jaw must be to hold needle or thread", TOP(suture.grasp_reach)},
 

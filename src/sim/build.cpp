@@ -184,6 +184,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   u.attach_compliance = scene.suture.attach_compliance;
   u.channel_compliance = scene.suture.channel_compliance;
   u.pass_tension = scene.suture.pass_tension;
+  u.capstan = scene.suture.capstan;
   u.collision_off = scene.suture.collision_off;
   u.grasp_reach = scene.suture.grasp_reach;
 

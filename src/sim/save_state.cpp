@@ -19,14 +19,16 @@ constexpr bool kPlain = std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_
                         std::is_same_v<T, ChannelPoint> || std::is_same_v<T, RigidBody> || std::is_same_v<T, ThreadHold> ||
                         std::is_same_v<T, ClosurePlan::Pull>;
 static_assert(sizeof(Weld) % 4 == 0 && sizeof(Weld) == 4 * (2 + 3 * 7 + 2 + 6));
-static_assert(sizeof(Attachment) == 4 * (6 + 1 + 3 + 1 + 3));
-static_assert(sizeof(ChannelPoint) == 4 * (6 + 3 + 3 + 1));
+static_assert(sizeof(TissuePoint) == 4 * (1 + 16 + 16));
+static_assert(sizeof(Attachment) == sizeof(TissuePoint) + 4 * (1 + 3 + 1 + 3));
+static_assert(sizeof(ChannelPoint) == sizeof(TissuePoint) + 4 * (3 + 3 + 1));
 static_assert(sizeof(RigidBody) == 4 * (3 + 4 + 3 + 3 + 3 + 4));
-static_assert(sizeof(ThreadHold) == 4 * 5 && sizeof(BiteEnd) == 4 * 10 && sizeof(ClosurePlan::Pull) == 4 * 12);
+static_assert(sizeof(ThreadHold) == 4 * 5 && sizeof(BiteEnd) == sizeof(TissuePoint) + 4 * 4 &&
+              sizeof(ClosurePlan::Pull) == sizeof(TissuePoint) + 4 * 6);
 
 template <typename A>
 void fields(A& a, ThreadAnchor& t) {
-  a(t.slot), a(t.point), a(t.friction), a(t.slipping), a(t.blocked_needle), a(t.blocked_free), a(t.tension_needle), a(t.tension_free);
+  a(t.slot), a(t.point), a(t.friction), a(t.capstan), a(t.slipping), a(t.blocked_needle), a(t.blocked_free), a(t.tension_needle), a(t.tension_free);
 }
 template <typename A>
 void fields(A& a, Bite& b) {

@@ -76,6 +76,7 @@ struct SutureSpec {
   float attach_compliance = 0.00091f;  // [m/N] of that attachment: 1 / 1100 N/m, the paper's spring
   float channel_compliance = 0.002f; // [m/N] the bitten tissue holds the needle's shaft sideways
   float pass_tension = 0.03f;        // [N] tension difference beyond which thread slides through a suture point
+  float capstan = 0.08f;             // and so much more per newton of tension (friction coefficient times the angle of the bend)
   int collision_off = 3;             // thread particles on each side of a locked one that do not collide
   float grasp_reach = 0.003f;        // [m] how near a closing jaw must be to hold needle or thread
 };
@@ -85,7 +86,7 @@ struct TechniqueSpec {
   std::string name = "purse_string";   // or "none"
   Vec3 anvil;                          // [m] focal point of the closure, relative to the rim's centre
   float anvil_radius = 0.004f;         // [m] the rim ends on a ring of this radius
-  float closure_compliance = 0.0005f;  // [m/N] of the pull of the edge particles toward it
+  float closure_compliance = 0.0001f;  // [m/N] of the pull of the edge particles toward it
   int min_bites = 10;
 };
 

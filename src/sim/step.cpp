@@ -60,7 +60,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
       where.push_back(position_of(point.back(), state.solver.x.data()));
     }
     purse_string(model.purse_string, state.purse_string, where, point, state.solver.x.data(), length_between_ends(state.solver),
-                 state.plan, state.event);
+                 model.dt, state.plan, state.event);
     close(state.solver, state.plan);
   }
   for (size_t k = 0; k < 2; ++k)

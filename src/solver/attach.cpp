@@ -1,7 +1,27 @@
 // solver/attach: reads attachments, moves tissue particles and rigid bodies alike. XPBD (Macklin et al. 2016) per attachment.
 #include "solver/attach.h"
 
+#include <Eigen/Dense>
+
 namespace catgut {
+
+TissuePoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at) {
+  TissuePoint t;
+  t.count = static_cast<uint32_t>(std::min<size_t>(particle.size(), TissuePoint::kMost));
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  auto rest_of = [&](uint32_t k) { return Eigen::Vector3d(rest[particle[k]].x, rest[particle[k]].y, rest[particle[k]].z); };
+  for (uint32_t k = 0; k < t.count; ++k) mean += rest_of(k) / t.count;
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (uint32_t k = 0; k < t.count; ++k) spread += (rest_of(k) - mean) * (rest_of(k) - mean).transpose();
+  // b_k = 1/n + (q_k - mean)^T S^-1 (at - mean); the pseudo-inverse leaves directions alone in which the particles do not spread.
+  const Eigen::Vector3d slope =
+      spread.completeOrthogonalDecomposition().solve(Eigen::Vector3d(at.x, at.y, at.z) - mean);
+  for (uint32_t k = 0; k < t.count; ++k) {
+    t.particle[k] = particle[k];
+    t.weight[k] = static_cast<float>(1.0 / t.count + (rest_of(k) - mean).dot(slope));
+  }
+  return t;
+}
 
 float NeedleArc::nearest(Vec3 p) const {
   float phi = std::atan2(p.y - centre.y, p.x - centre.x);

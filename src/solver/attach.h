@@ -1,8 +1,9 @@
-// solver/attach: compliant attachments of tissue. Points of tissue are weighted sums of up to three particles, so that a bite
-// sits where the needle went in and not on the nearest particle; the paper's nearest particle is the case of one weight 1.
+// solver/attach: compliant attachments of tissue. Points of tissue are weighted sums of a few particles, so that a bite sits
+// where the needle went in and not on the nearest particle; the paper's nearest particle is the case of one weight 1.
 #pragma once
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "solver/particles.h"
@@ -10,21 +11,38 @@
 
 namespace catgut {
 
+// A material point: sum of weight * particle. Spread over a neighbourhood it also has the inertia of one: a thread that pulls on three
+// particles alone would drag them millimetres in a substep before their neighbours could answer.
 struct TissuePoint {
-  std::array<uint32_t, 3> particle{};
-  std::array<float, 3> weight{};  // sum 1; unused: 0
+  static constexpr uint32_t kMost = 16;
+  uint32_t count = 0;
+  std::array<uint32_t, kMost> particle{};
+  std::array<float, kMost> weight{};  // sum 1
 };
+inline TissuePoint particle_point(uint32_t i) {
+  TissuePoint t;
+  t.count = 1;
+  t.particle[0] = i;
+  t.weight[0] = 1;
+  return t;
+}
+// The smoothest weights over `particle` (at rest positions `rest`) whose weighted sum is `at`: least squares with linear precision, so
+// that the point follows every affine motion of its neighbourhood exactly. At most kMost particles are used.
+TissuePoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at);
+
 inline Vec3 position_of(const TissuePoint& t, const Vec4* x) {
-  return xyz(x[t.particle[0]]) * t.weight[0] + xyz(x[t.particle[1]]) * t.weight[1] + xyz(x[t.particle[2]]) * t.weight[2];
+  Vec3 p{};
+  for (uint32_t k = 0; k < t.count; ++k) p += xyz(x[t.particle[k]]) * t.weight[k];
+  return p;
 }
 inline float inverse_mass_of(const TissuePoint& t, const float* w) {
   float s = 0;
-  for (int k = 0; k < 3; ++k) s += t.weight[k] * t.weight[k] * w[t.particle[k]];
+  for (uint32_t k = 0; k < t.count; ++k) s += t.weight[k] * t.weight[k] * w[t.particle[k]];
   return s;
 }
 // Applies the positional impulse p [kg m] at the point.
 inline void push(const TissuePoint& t, Vec4* x, const float* w, Vec3 p) {
-  for (int k = 0; k < 3; ++k) add(x[t.particle[k]], p * (w[t.particle[k]] * t.weight[k]));
+  for (uint32_t k = 0; k < t.count; ++k) add(x[t.particle[k]], p * (w[t.particle[k]] * t.weight[k]));
 }
 
 // Particle (or weighted point) to a fixed place in the world, or to a place in a body's frame.

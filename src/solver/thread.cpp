@@ -15,6 +15,10 @@ constexpr int kNewtonSteps = 2;
 // Of the diagonal. A light thread drawn straight between heavy ends has one soft mode, a hundred thousand times softer than the
 // diagonal, and it is the one that matters: more than this would hide it.
 constexpr double kRegularisation = 1e-6;
+// Inverse mass of a sliding coordinate over that of a thread particle. It has no velocity of its own, so this acts as a small viscous drag:
+// 7 mN at 0.15 m/s and 1 ms. Lighter would let friction overshoot the length of a segment within a substep.
+constexpr double kSlideMass = 0.04;
+constexpr int kSlideRounds = 4;
 constexpr float kLargestStep = 0.6f;      // of the spacing, per Newton step
 
 // n1^T W n2 of the node seen by two pair directions. A free node on a taut thread is hard to move sideways (see stiffen).
@@ -45,6 +49,59 @@ void stiffen(ThreadScratch& s, const Thread& t, size_t nodes, float h) {
   }
 }
 
+// Solves the tridiagonal system for the change of the multipliers (into s.rhs), together with the slides at slipping anchors: one more
+// unknown each, coupled to the two pairs beside it. A slide that would run backward (friction stops, it never drives) or beyond what the
+// pair on its side still has is fixed at that bound and the system solved again: an active set, which shrinks every round.
+void solve_with_slides(const ThreadModel& model, const Thread& thread, ThreadScratch& s, size_t pairs, float h) {
+  const double ws = kSlideMass * model.inv_mass;
+  const float least = 0.02f * model.spacing;
+  for (SlideState& k : s.slide) k.fixed = false;
+  for (int round = 0; round < kSlideRounds; ++round) {
+    std::copy_n(s.base_diag.begin(), pairs, s.diag.begin());
+    std::copy_n(s.base_off.begin(), pairs, s.off.begin());
+    std::copy_n(s.base_rhs.begin(), pairs, s.rhs.begin());
+    auto drag_of = [&](const ThreadAnchor& a, const SlideState& k) {
+      return k.dragged ? 0.0 : -a.slipping * double{a.threshold()} * h * h;  // a known force on the slide, spent once a substep
+    };
+    for (size_t i = 1; i < pairs; ++i) {
+      if (s.anchor_at[i] < 0) continue;
+      const ThreadAnchor& a = thread.anchor[static_cast<size_t>(s.anchor_at[i])];
+      const SlideState& k = s.slide[static_cast<size_t>(s.anchor_at[i])];
+      if (a.slipping == 0) continue;
+      const double known = k.fixed ? k.step : ws * drag_of(a, k);
+      s.rhs[i] += known;  // C of the needle side falls by the slide
+      s.rhs[i - 1] -= known;
+      if (k.fixed) continue;
+      s.diag[i] += ws, s.diag[i - 1] += ws;
+      s.off[i - 1] -= ws;
+    }
+    // Thomas algorithm. The matrix is symmetric positive definite.
+    for (size_t i = 1; i < pairs; ++i) {
+      const double f = s.off[i - 1] / s.diag[i - 1];
+      s.diag[i] -= f * s.off[i - 1];
+      s.rhs[i] -= f * s.rhs[i - 1];
+    }
+    for (size_t i = pairs; i-- > 0;) {
+      if (i + 1 < pairs) s.rhs[i] -= s.off[i] * s.rhs[i + 1];
+      s.rhs[i] /= s.diag[i];
+    }
+    bool again = false;
+    for (size_t i = 1; i < pairs; ++i) {
+      if (s.anchor_at[i] < 0) continue;
+      const ThreadAnchor& a = thread.anchor[static_cast<size_t>(s.anchor_at[i])];
+      SlideState& k = s.slide[static_cast<size_t>(s.anchor_at[i])];
+      if (a.slipping == 0 || k.fixed) continue;
+      k.step = static_cast<float>(ws * (drag_of(a, k) + s.rhs[i - 1] - s.rhs[i]));
+      const float most_forward = std::max(0.0f, thread.rest[i - 1] - least), most_back = -std::max(0.0f, thread.rest[i] - least);
+      float bounded = std::clamp(k.step, most_back, most_forward);
+      if ((k.total + bounded) * static_cast<float>(a.slipping) < 0) bounded = -k.total, k.stopped = true;
+      if (bounded != k.step) k.step = bounded, k.fixed = again = true;
+    }
+    if (!again) break;
+  }
+  for (SlideState& k : s.slide) k.dragged = true;
+}
+
 // Applies the positional impulse `p` to whatever node i is, and refreshes its position.
 void push_node(ThreadScratch& s, const Thread& t, size_t i, Vec3 p, Vec4* x, const float* inv_mass,
                const std::vector<RigidModel>& model, std::vector<RigidBody>& body) {
@@ -72,6 +129,9 @@ void ThreadScratch::resize(uint32_t count) {
   n.assign(count, {});
   t.assign(count, {});
   sideways.assign(count, 1);
+  base_diag.assign(count, 0);
+  base_off.assign(count, 0);
+  base_rhs.assign(count, 0);
   diag.assign(count, 0);
   off.assign(count, 0);
   rhs.assign(count, 0);
@@ -157,13 +217,8 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
         solve_bend(s.p[i - 1], s.p[i], s.p[i + 1], wa, wb, wc, model.bend_compliance, h, s.bend_lambda[i]);
     }
 
-  s.rest_before.resize(thread.anchor.size());
-  for (size_t i = 1; i < pairs; ++i)
-    if (s.anchor_at[i] >= 0) s.rest_before[static_cast<size_t>(s.anchor_at[i])] = thread.rest[i];
   if (model.direct) {
-    const float ws = model.inv_mass;  // the sliding coordinate is as heavy as a thread particle
-    // Friction of a slipping anchor is a known force on its slide, spent in the first step.
-    std::vector<ThreadAnchor>& anchors = thread.anchor;
+    s.slide.assign(thread.anchor.size(), {});  // within its capacity: no allocation once as many anchors were seen
     for (int step = 0; step < kNewtonSteps; ++step) {
       for (size_t i = 0; i < pairs; ++i) s.n[i] = normalized(s.p[i + 1] - s.p[i], {0, 1, 0});
       stiffen(s, thread, nodes, h);
@@ -171,30 +226,12 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
         const float alpha = alpha_per_metre * thread.rest[i];
         const double d = node_inverse_mass(s, thread, i, s.n[i], s.n[i], body_model, body) +
                          node_inverse_mass(s, thread, i + 1, s.n[i], s.n[i], body_model, body);
-        s.diag[i] = d * (1 + kRegularisation) + alpha;
-        s.rhs[i] = -(distance(s.p[i], s.p[i + 1]) - thread.rest[i]) - alpha * s.lambda[i];
-        s.off[i] = i + 1 < pairs ? -node_inverse_mass(s, thread, i + 1, s.n[i], s.n[i + 1], body_model, body) : 0.0;
+        s.base_diag[i] = d * (1 + kRegularisation) + alpha;
+        s.base_rhs[i] = -(distance(s.p[i], s.p[i + 1]) - thread.rest[i]) - alpha * s.lambda[i];
+        s.base_off[i] = i + 1 < pairs ? -node_inverse_mass(s, thread, i + 1, s.n[i], s.n[i + 1], body_model, body) : 0.0;
       }
-      for (size_t i = 1; i < pairs; ++i)
-        if (s.anchor_at[i] >= 0) {
-          const ThreadAnchor& a = anchors[static_cast<size_t>(s.anchor_at[i])];
-          if (a.slipping == 0) continue;
-          const double slide = step == 0 ? -a.slipping * double{a.friction} * h * h * ws : 0.0;
-          s.diag[i] += ws, s.diag[i - 1] += ws;
-          s.off[i - 1] -= ws;
-          s.rhs[i] += slide;      // C of the needle side falls by the slide
-          s.rhs[i - 1] -= slide;
-        }
-      // Thomas algorithm. The matrix is symmetric positive definite.
-      for (size_t i = 1; i < pairs; ++i) {
-        const double f = s.off[i - 1] / s.diag[i - 1];
-        s.diag[i] -= f * s.off[i - 1];
-        s.rhs[i] -= f * s.rhs[i - 1];
-      }
-      for (size_t i = pairs; i-- > 0;) {
-        if (i + 1 < pairs) s.rhs[i] -= s.off[i] * s.rhs[i + 1];
-        s.rhs[i] /= s.diag[i];
-      }
+      solve_with_slides(model, thread, s, pairs, h);
+
       // A bent stretch of light thread between heavy ends: the impulse that moves the ends would throw the light nodes far sideways, because
       // the linearisation does not know that they come to rest on the straight line. So a light node takes a bounded step, heavy
       // ones their full one; the next step sees the new directions.
@@ -213,15 +250,10 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
       for (size_t i = 0; i < pairs; ++i) s.lambda[i] += static_cast<float>(s.rhs[i]);
       for (size_t i = 1; i < pairs; ++i)
         if (s.anchor_at[i] >= 0) {
-          ThreadAnchor& a = anchors[static_cast<size_t>(s.anchor_at[i])];
-          if (a.slipping == 0) continue;
-          const float drag = -static_cast<float>(a.slipping) * a.friction * h * h * (step == 0 ? 1.0f : 0.0f);
-          float slide = ws * (drag + static_cast<float>(s.rhs[i - 1] - s.rhs[i]));
-          // Neither side can give more than it has.
-          const float least = 0.02f * model.spacing;
-          slide = std::clamp(slide, std::min(0.0f, least - thread.rest[i]), std::max(0.0f, thread.rest[i - 1] - least));
-          thread.rest[i] += slide;
-          thread.rest[i - 1] -= slide;
+          SlideState& k = s.slide[static_cast<size_t>(s.anchor_at[i])];
+          thread.rest[i] += k.step;
+          thread.rest[i - 1] -= k.step;
+          k.total += k.step;
         }
     }
   }
@@ -250,21 +282,16 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
   for (size_t i = 1; i < pairs; ++i)
     if (s.anchor_at[i] >= 0) {
       ThreadAnchor& a = thread.anchor[static_cast<size_t>(s.anchor_at[i])];
-      // Friction stops a slide; it never drives one backward.
-      const float slid = thread.rest[i] - s.rest_before[static_cast<size_t>(s.anchor_at[i])];
-      if (slid * static_cast<float>(a.slipping) < 0) {
-        thread.rest[i] -= slid;
-        thread.rest[i - 1] += slid;
-        a.slipping = 0;
-      }
+      if (model.direct && s.slide[static_cast<size_t>(s.anchor_at[i])].stopped) a.slipping = 0;
       a.tension_needle = thread.tension[i];
       a.tension_free = thread.tension[i - 1];
       const float difference = a.tension_needle - a.tension_free;
-      const int wants = difference > a.friction ? 1 : difference < -a.friction ? -1 : 0;
+      const float threshold = a.threshold();
+      const int wants = difference > threshold ? 1 : difference < -threshold ? -1 : 0;
       const bool may = (wants > 0 && !a.blocked_needle) || (wants < 0 && !a.blocked_free);
       if (a.slipping == 0) a.slipping = may ? wants : 0;
       // While it slips the difference sits at the friction; it sticks again when the pull falls clearly below that.
-      else if (static_cast<float>(a.slipping) * difference < 0.5f * a.friction) a.slipping = 0;
+      else if (static_cast<float>(a.slipping) * difference < 0.5f * threshold) a.slipping = 0;
       else if ((a.slipping > 0 && a.blocked_needle) || (a.slipping < 0 && a.blocked_free)) a.slipping = 0;
     }
 }

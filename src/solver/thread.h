@@ -10,6 +10,7 @@
 // until the tensions differ by no more than the friction. Sliding is solved inside the tridiagonal system, so the total rest
 // length never changes and nothing jumps.
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -34,11 +35,13 @@ struct ThreadModel {
 struct ThreadAnchor {
   uint32_t slot = 0;
   TissuePoint point;
-  float friction = 0;              // [N] tension difference beyond which thread slides
+  float friction = 0;              // [N] tension difference beyond which thread slides, at no tension
+  float capstan = 0;               // and so much more per newton of tension: coefficient of friction times the angle it bends by
   int slipping = 0;                // +1: toward the needle, -1: toward the free end, 0: stuck
   bool blocked_needle = false;     // no particle left to pass toward the needle / toward the free end
   bool blocked_free = false;
   float tension_needle = 0, tension_free = 0;  // [N] of the pairs on its two sides, written by solve_thread
+  float threshold() const { return friction + capstan * std::max(0.0f, std::min(tension_needle, tension_free)); }
 };
 
 struct ThreadHold {
@@ -55,6 +58,14 @@ struct Thread {
   std::vector<float> tension;         // [N] per pair, of the last substep; negative: compressed
 };
 
+// The slide at one anchor within a substep.
+struct SlideState {
+  float step = 0, total = 0;   // [m] of this Newton step, of the substep
+  bool fixed = false;          // at a bound in this step
+  bool stopped = false;        // friction stopped it: the anchor sticks
+  bool dragged = false;        // the friction of this substep has been spent
+};
+
 struct ThreadScratch {
   std::vector<Vec3> p;              // per node of order
   std::vector<float> w;             // inverse mass of the node; < 0: held by a rigid body
@@ -63,10 +74,10 @@ struct ThreadScratch {
   std::vector<Vec3> n;              // per pair: unit direction toward the needle
   std::vector<Vec3> t;              // per node: unit tangent
   std::vector<float> sideways;      // per node: inverse mass across the tangent over that along it
-  std::vector<double> diag, off, rhs;
+  std::vector<double> base_diag, base_off, base_rhs, diag, off, rhs;
   std::vector<float> lambda;        // per pair, cleared at the start of a substep
   std::vector<float> bend_lambda;   // per node
-  std::vector<float> rest_before;   // per anchor: rest length of its needle side at the start of the substep
+  std::vector<SlideState> slide;    // per anchor
   void resize(uint32_t count);
 };
 

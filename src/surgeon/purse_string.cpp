@@ -395,10 +395,12 @@ class PurseStringSurgeon final : public Surgeon {
         const Vec3 left = normalized(f.out * 0.5f - f.along * 0.8f + axis_ * 0.35f), right = normalized(f.out * 0.5f + f.along * 0.8f + axis_ * 0.35f);
         // The needle's end leaves the last bite, which lies before the first one along the rim; the tail leaves the first.
         const float reach = 0.35f;
+        // A surgeon feels the thread: the harder it pulls back, the slower the hand.
+        auto gently = [&](size_t hand) { return 0.25f * speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.02f, 1.0f); };
         if (seen.closure < 0.985f) {
-          move_toward(forceps, {picture_.focus + left * reach, forceps.pose.q}, 0.5f * speed, dt);
+          move_toward(forceps, {picture_.focus + left * reach, forceps.pose.q}, gently(kForceps), dt);
           // The tail hand gives a counter-hold: it moves out only as far as keeps its own side tight.
-          move_toward(driver, {picture_.focus + right * 0.11f, driver.pose.q}, 0.4f * speed, dt);
+          move_toward(driver, {picture_.focus + right * 0.11f, driver.pose.q}, gently(kDriver), dt);
         } else {
           go(Step::hold);
         }

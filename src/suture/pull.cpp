@@ -83,6 +83,7 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
   a.slot = slot;
   a.point = end.point;
   a.friction = suture.pass_tension;
+  a.capstan = suture.capstan;
   // The particle steps forward to the hole. Rest length goes with it, so neither side is stretched or squeezed by that.
   const Vec3 at = position_of(end.point, solver.x.data());
   const float sum = t.rest[node - 1] + t.rest[node];

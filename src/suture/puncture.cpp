@@ -22,6 +22,22 @@ ChannelPoint channel_at(const SutureModel& suture, const BiteEnd& end) {
   return c;
 }
 
+// The place as a material point, spread over the cluster of the triangle's nearest corner.
+void spread(const SolverModel& model, BiteEnd& end) {
+  const Triangle& t = model.collision.surface[end.triangle];
+  const Vec4* rest = model.shape.rest.data();
+  Vec3 at{};
+  size_t nearest = 0;
+  for (size_t k = 0; k < 3; ++k) {
+    at += xyz(rest[t[k]]) * end.weight[k];
+    if (end.weight[k] > end.weight[nearest]) nearest = k;
+  }
+  const uint32_t* member = model.shape.member.data() + size_t{t[nearest]} * model.shape.cluster_stride;
+  uint32_t count = 0;
+  while (count < model.shape.cluster_stride && member[count] < model.tissue) ++count;  // the pad names no particle
+  end.point = spread_point({member, count}, rest, at);
+}
+
 void drop_attachment(SolverState& solver, SutureState& state) {
   if (!state.attached) return;
   std::erase_if(solver.attach, [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
@@ -49,8 +65,6 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
       hit.point = on.point;
       hit.end.triangle = f;
       hit.end.weight = on.weight;
-      hit.end.point.particle = {t[0], t[1], t[2]};
-      hit.end.point.weight = on.weight;
     } else if (d <= best * 1.0001f + 1e-14f) {
       normal += n;  // on a shared edge or corner: the mean of the faces decides inside or outside
     }
@@ -93,6 +107,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
       state.current = static_cast<uint32_t>(state.bite.size());
       Bite bite;
       bite.entry = hit.end;
+      spread(model, bite.entry);
       const int nearest = nearest_particle(model.collision, scratch.candidates, x, tip, suture.attach_threshold);
       if (nearest >= 0) bite.nearest = static_cast<uint32_t>(nearest);
       state.bite.push_back(bite);
@@ -102,8 +117,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
       if (nearest >= 0) {
         // Figure 4: the nearest particle within X of the tip moves with the tip, by the paper's spring.
         Attachment a;
-        a.point.particle = {bite.nearest, bite.nearest, bite.nearest};
-        a.point.weight = {1, 0, 0};
+        a.point = particle_point(bite.nearest);
         a.body = static_cast<int>(kNeedle);
         state.attached_from = xyz(x[bite.nearest]);
         a.target = to_local(needle.pose(), state.attached_from);
@@ -141,6 +155,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
         return;
       }
       bite.exit = hit.end;
+      spread(model, bite.exit);
       bite.has_exit = true;
       solver.channel.push_back(channel_at(suture, bite.exit));
       state.phase = NeedlePhase::through;

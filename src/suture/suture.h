@@ -56,6 +56,7 @@ struct SutureModel {
   float attach_compliance = 1.0f / 1100, channel_compliance = 0.002f;  // [m/N]
   float channel_drag = 0.12f;    // [N] per end of the channel
   float pass_tension = 0.03f;    // [N]
+  float capstan = 0.08f;         // thread-tissue friction times the angle by which a suture point bends the thread
   int collision_off = 3;         // thread particles on each side
   float grasp_reach = 0.003f;    // [m]
   float grasp_compliance = 2e-5f, grasp_angular_compliance = 0.02f;  // [m/N], [rad/(N m)]

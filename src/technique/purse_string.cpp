@@ -7,6 +7,8 @@
 namespace catgut {
 namespace {
 
+constexpr float kRoom = 1.3f;  // length of thread round the closed edge, over the bare way round it
+
 Vec3 centre_of(std::span<const uint32_t> rim, const Vec4* x) {
   Vec3 c{};
   for (uint32_t i : rim) c += xyz(x[i]);
@@ -49,7 +51,7 @@ int first_out_of_order(std::span<const Vec3> sp, size_t from) {
 }
 
 void purse_string(const PurseStringModel& model, PurseStringState& state, std::span<const Vec3> sp,
-                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, ClosurePlan& plan, std::vector<Event>& events) {
+                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, float dt, ClosurePlan& plan, std::vector<Event>& events) {
   if (model.rim_inner.size() < 3) return;
   if (state.area_start == 0) state.area_start = opening_area(model.rim_inner, x);
   if (state.finished) return;
@@ -93,19 +95,22 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, std::s
       const Vec3 from = position_of(p, x);
       plan.pull.push_back({p, from, toward(from, radius)});
     };
-    auto particle = [](uint32_t i) { return TissuePoint{{i, i, i}, {1, 0, 0}}; };
-    for (uint32_t i : model.rim_inner) add_pull(particle(i), model.anvil_radius);
-    for (uint32_t i : model.rim_outer) add_pull(particle(i), model.anvil_radius + model.wall);
+    for (uint32_t i : model.rim_inner) add_pull(particle_point(i), model.anvil_radius);
+    for (uint32_t i : model.rim_outer) add_pull(particle_point(i), model.anvil_radius + model.wall);
     const float thread_radius = model.anvil_radius + 2 * model.wall;
     for (const TissuePoint& p : sp_point) add_pull(p, thread_radius);
     plan.compliance = model.compliance;
     state.path_end = 0;
     const size_t first = plan.pull.size() - sp_point.size();
     for (size_t i = first; i + 1 < plan.pull.size(); ++i) state.path_end += distance(plan.pull[i].to, plan.pull[i + 1].to);
+    // Gathered tissue takes up room on the thread: closing is led by the thread, but the edge arrives before the loop is as short as the bare
+    // way round. What is left then is drawn up against the tissue itself.
+    state.path_end *= kRoom;
     events.push_back({0, EventKind::closure_started, 0, 0, opening_area(model.rim_inner, x), anvil});
   }
 
-  plan.progress = std::clamp((state.path_start - loop) / (state.path_start - state.path_end), 0.0f, 1.0f);
+  const float wanted = std::clamp((state.path_start - loop) / (state.path_start - state.path_end), 0.0f, 1.0f);
+  plan.progress += std::clamp(wanted - plan.progress, -model.fastest * dt, model.fastest * dt);
   if (plan.progress >= 0.99f) {
     state.finished = true;
     plan.progress = 1;

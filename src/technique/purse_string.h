@@ -16,6 +16,7 @@ struct PurseStringModel {
   float wall = 0.0025f;        // [m]
   float compliance = 5e-4f;    // [m/N]
   int min_bites = 10;
+  float fastest = 0.7f;        // [1/s] of progress: tissue needs its time to gather
 };
 
 struct PurseStringState {
@@ -30,9 +31,9 @@ struct PurseStringState {
 int first_out_of_order(std::span<const Vec3> sp, size_t from = 0);
 
 // Once a tick. `sp`: where the suture points are; x: particle positions; loop: rest length of thread from the first suture point to the last
-// [m]. Fills `plan` when there is something to close, and reports through `events`.
+// [m]; dt: length of a tick [s]. Fills `plan` when there is something to close, and reports through `events`.
 void purse_string(const PurseStringModel& model, PurseStringState& state, std::span<const Vec3> sp,
-                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, ClosurePlan& plan, std::vector<Event>& events);
+                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, float dt, ClosurePlan& plan, std::vector<Event>& events);
 
 // Area of the opening [m^2]: the inner edge projected on its own best plane.
 float opening_area(std::span<const uint32_t> rim, const Vec4* x);
