@@ -7,25 +7,35 @@
 
 namespace catgut {
 
-Vec3 closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
+ClosestOnTriangle closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
+  // Ericson, Real-Time Collision Detection, 5.1.5: by Voronoi region.
   const Vec3 ab = b - a, ac = c - a, ap = p - a;
   const float d1 = dot(ab, ap), d2 = dot(ac, ap);
-  if (d1 <= 0 && d2 <= 0) return a;
+  if (d1 <= 0 && d2 <= 0) return {a, {1, 0, 0}};
   const Vec3 bp = p - b;
   const float d3 = dot(ab, bp), d4 = dot(ac, bp);
-  if (d3 >= 0 && d4 <= d3) return b;
+  if (d3 >= 0 && d4 <= d3) return {b, {0, 1, 0}};
   const float vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + ab * (d1 / (d1 - d3));
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
+    const float t = d1 / (d1 - d3);
+    return {a + ab * t, {1 - t, t, 0}};
+  }
   const Vec3 cp = p - c;
   const float d5 = dot(ab, cp), d6 = dot(ac, cp);
-  if (d6 >= 0 && d5 <= d6) return c;
+  if (d6 >= 0 && d5 <= d6) return {c, {0, 0, 1}};
   const float vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + ac * (d2 / (d2 - d6));
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
+    const float t = d2 / (d2 - d6);
+    return {a + ac * t, {1 - t, 0, t}};
+  }
   const float va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
-  const float sum = va + vb + vc;
-  if (!(sum > 0)) return a;  // a triangle without area that got past the edges
-  return a + ab * (vb / sum) + ac * (vc / sum);
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    const float t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    return {b + (c - b) * t, {0, 1 - t, t}};
+  }
+  const float inv = 1.0f / (va + vb + vc);
+  const float v = vb * inv, w = vc * inv;
+  return {a + ab * v + ac * w, {1 - v - w, v, w}};
 }
 
 SurfaceTree::SurfaceTree(const TriangleMesh& mesh) : mesh_(mesh), order_(mesh.triangle.size()) {
@@ -86,7 +96,7 @@ SurfaceTree::Hit SurfaceTree::nearest(Vec3 p) const {
     }
     for (uint32_t i = n.first; i < n.first + n.count; ++i) {
       const Triangle& t = mesh_.triangle[order_[i]];
-      const Vec3 q = closest_on_triangle(p, mesh_.position[t[0]], mesh_.position[t[1]], mesh_.position[t[2]]);
+      const Vec3 q = closest_on_triangle(p, mesh_.position[t[0]], mesh_.position[t[1]], mesh_.position[t[2]]).point;
       const float d2 = length2(q - p);
       if (d2 < best.distance2 || (d2 == best.distance2 && order_[i] < best.triangle)) best = {q, order_[i], d2};
     }

@@ -1,5 +1,6 @@
 // geometry/closest: the point of a triangle mesh nearest to a given one.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -7,8 +8,12 @@
 
 namespace catgut {
 
-// The point of triangle a b c nearest to p (Ericson 2005, section 5.1.5).
-Vec3 closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c);
+// The point of triangle a b c nearest to p (Ericson 2005, section 5.1.5), and its barycentric weights.
+struct ClosestOnTriangle {
+  Vec3 point;
+  std::array<float, 3> weight;
+};
+ClosestOnTriangle closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c);
 
 // A tree of boxes over a mesh that must outlive it unchanged.
 class SurfaceTree {

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "anatomy/bowel.h"
+#include "anatomy/organ.h"
 #include "core/check.h"
 #include "sim/model.h"
 #include "sim/state.h"
@@ -16,6 +17,18 @@ constexpr float kPaperSubstep = 1.0f / 480;  // [s] at which the paper's deforma
 constexpr float kDrapeBelowRim = 0.035f;     // [m]
 
 BodyRest make_body(const BodySpec& spec) {
+  if (!spec.mesh.empty()) {
+    OrganImport o;
+    o.name = spec.name;
+    o.mesh = spec.mesh;
+    o.particles = spec.particles;
+    o.wall = spec.wall;
+    o.position = spec.position;
+    o.axis = spec.axis;
+    o.density = spec.density;
+    o.pinned_length = spec.pinned_length;
+    return import_organ(o);
+  }
   BowelShape s;
   s.name = spec.name;
   s.particles = spec.particles;

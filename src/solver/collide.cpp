@@ -111,37 +111,6 @@ int nearest_particle(const TissueCollision& tissue, const Candidates& c, const V
   return found;
 }
 
-ClosestOnTriangle closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
-  // Ericson, Real-Time Collision Detection, 5.1.5: by Voronoi region.
-  const Vec3 ab = b - a, ac = c - a, ap = p - a;
-  const float d1 = dot(ab, ap), d2 = dot(ac, ap);
-  if (d1 <= 0 && d2 <= 0) return {a, {1, 0, 0}};
-  const Vec3 bp = p - b;
-  const float d3 = dot(ab, bp), d4 = dot(ac, bp);
-  if (d3 >= 0 && d4 <= d3) return {b, {0, 1, 0}};
-  const float vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
-    const float t = d1 / (d1 - d3);
-    return {a + ab * t, {1 - t, t, 0}};
-  }
-  const Vec3 cp = p - c;
-  const float d5 = dot(ab, cp), d6 = dot(ac, cp);
-  if (d6 >= 0 && d5 <= d6) return {c, {0, 0, 1}};
-  const float vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
-    const float t = d2 / (d2 - d6);
-    return {a + ac * t, {1 - t, 0, t}};
-  }
-  const float va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const float t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {b + (c - b) * t, {0, 1 - t, t}};
-  }
-  const float inv = 1.0f / (va + vb + vc);
-  const float v = vb * inv, w = vc * inv;
-  return {a + ab * v + ac * w, {1 - v - w, v, w}};
-}
-
 std::pair<float, float> closest_on_segments(Vec3 a0, Vec3 a1, Vec3 b0, Vec3 b1) {
   // Ericson 5.1.9, with degenerate segments treated as points.
   const Vec3 d1 = a1 - a0, d2 = b1 - b0, r = a0 - b0;

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "geometry/closest.h"
 #include "geometry/mesh.h"
 #include "solver/rigid.h"
 #include "solver/thread.h"
@@ -56,11 +57,6 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
                                      const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,
                                      std::span<const uint8_t> body_collides, float margin, Candidates& c);
 
-struct ClosestOnTriangle {
-  Vec3 point;
-  std::array<float, 3> weight;
-};
-ClosestOnTriangle closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c);
 // Nearest tissue particle to p within `reach`, or -1.
 int nearest_particle(const TissueCollision& tissue, const Candidates& c, const Vec4* x, Vec3 p, float reach);
 // Parameters (0..1) of the nearest points of segments a0-a1 and b0-b1.
