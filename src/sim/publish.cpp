@@ -17,7 +17,10 @@ void publish(const Model& model, const State& state, Snapshot& out) {
   out.particle.resize(m.count);
   for (uint32_t i = 0; i < m.count; ++i) out.particle[i] = xyz(s.x[i]);
   out.rotation.resize(m.tissue);
-  for (uint32_t i = 0; i < m.tissue; ++i) out.rotation[i] = {s.rotation.x[i], s.rotation.y[i], s.rotation.z[i], s.rotation.w[i]};
+  for (uint32_t i = 0; i < m.tissue; ++i) {
+    const uint32_t c = m.shape.cluster_of[i];
+    out.rotation[i] = {s.rotation.x[c], s.rotation.y[c], s.rotation.z[c], s.rotation.w[c]};
+  }
   out.thread_order = s.thread.order;
   out.thread_tension = s.thread.tension;
   for (size_t k = 0; k < 2; ++k) {

@@ -189,6 +189,9 @@ void ShapeParticles(const ShapeModel& model, Vec4* x, const float* inv_mass, flo
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
+#include <algorithm>
+#include <map>
+
 #include "core/check.h"
 
 namespace catgut {
@@ -224,7 +227,17 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
                             std::span<const std::vector<uint32_t>> cluster) {
   ShapeModel m;
   const uint32_t particles = static_cast<uint32_t>(rest.size());
-  m.clusters = static_cast<uint32_t>(cluster.size());
+  // The members as a set, in ascending order, are the key: partners across the wall list the same neighbourhood.
+  std::map<std::vector<uint32_t>, uint32_t> known;
+  std::vector<const std::vector<uint32_t>*> unique;
+  for (const std::vector<uint32_t>& c : cluster) {
+    std::vector<uint32_t> key = c;
+    std::sort(key.begin(), key.end());
+    const auto [at, fresh] = known.try_emplace(std::move(key), static_cast<uint32_t>(unique.size()));
+    if (fresh) unique.push_back(&c);
+    m.cluster_of.push_back(at->second);
+  }
+  m.clusters = static_cast<uint32_t>(unique.size());
   double total = 0;
   for (float k : mass) total += k;
   for (uint32_t i = 0; i < particles; ++i) {
@@ -234,16 +247,16 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
   std::vector<std::vector<uint32_t>> holders(particles);
   size_t widest = 4;
   for (uint32_t c = 0; c < m.clusters; ++c) {
-    widest = std::max(widest, cluster[c].size());
-    for (uint32_t k : cluster[c]) holders[k].push_back(c);
+    widest = std::max(widest, unique[c]->size());
+    for (uint32_t k : *unique[c]) holders[k].push_back(c);
   }
   m.cluster_stride = static_cast<uint32_t>((widest + 3) / 4 * 4);
   m.member.assign(size_t{m.clusters} * m.cluster_stride, particles);
   m.rest_centre.assign((m.clusters + 15) / 16 * 16, Vec4{});
   for (uint32_t c = 0; c < m.clusters; ++c) {
     double sum = 0, sx = 0, sy = 0, sz = 0;
-    for (size_t k = 0; k < cluster[c].size(); ++k) {
-      const uint32_t id = cluster[c][k];
+    for (size_t k = 0; k < unique[c]->size(); ++k) {
+      const uint32_t id = (*unique[c])[k];
       m.member[size_t{c} * m.cluster_stride + k] = id;
       const double w = m.relative_mass[id];
       sum += w, sx += w * rest[id].x, sy += w * rest[id].y, sz += w * rest[id].z;

@@ -32,7 +32,7 @@ void spread(const SolverModel& model, BiteEnd& end) {
     at += xyz(rest[t[k]]) * end.weight[k];
     if (end.weight[k] > end.weight[nearest]) nearest = k;
   }
-  const uint32_t* member = model.shape.member.data() + size_t{t[nearest]} * model.shape.cluster_stride;
+  const uint32_t* member = model.shape.member.data() + size_t{model.shape.cluster_of[t[nearest]]} * model.shape.cluster_stride;
   uint32_t count = 0;
   while (count < model.shape.cluster_stride && member[count] < model.tissue) ++count;  // the pad names no particle
   end.point = spread_point({member, count}, rest, at);
