@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 namespace catgut {
 namespace {
 
 constexpr uint32_t kBlock = 16;
+using Four = float __attribute__((vector_size(16)));  // lanes of a position
 
 bool boxes_meet(Vec3 l0, Vec3 u0, Vec3 l1, Vec3 u1) {
   return l0.x <= u1.x && l1.x <= u0.x && l0.y <= u1.y && l1.y <= u0.y && l0.z <= u1.z && l1.z <= u0.z;
@@ -61,12 +63,17 @@ void update_boxes(const TissueCollision& tissue, const Vec4* x, Candidates& c) {
 void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Vec4* x, Candidates& c) {
   const uint32_t n = tissue.particles;
   if (c.built_at.size() == n) {
-    float worst = 0;
+    // By components, which is cheap and on the safe side: none above half the margin over the root of three.
+    Four worst{};
     for (uint32_t i = 0; i < n; ++i) {
-      const float dx = x[i].x - c.built_at[i].x, dy = x[i].y - c.built_at[i].y, dz = x[i].z - c.built_at[i].z;
-      worst = std::max(worst, dx * dx + dy * dy + dz * dz);
+      Four now, then;
+      std::memcpy(&now, &x[i], sizeof now);
+      std::memcpy(&then, &c.built_at[i], sizeof then);
+      const Four d = now - then, d2 = d * d;
+      worst = d2 > worst ? d2 : worst;
     }
-    if (worst < 0.25f * kPairMargin * kPairMargin) return;
+    const float limit = kPairMargin * kPairMargin / 12;
+    if (worst[0] < limit && worst[1] < limit && worst[2] < limit) return;
   }
   c.built_at.assign(x, x + n);
   c.pair.clear();
@@ -169,34 +176,52 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
     }
   }
 
-  // Thread on tissue: one triangle each, the nearest of those around the nearest particle; the substeps use its plane.
-  const float reach = 0.004f + margin;
-  for (uint32_t slot : thread.order) {
-    if (!collides(slot)) continue;
-    const Vec3 p = xyz(x[slot]);
-    const int near = nearest_particle(tissue, c, x, p, reach);
-    if (near < 0) continue;
-    float best = 1e30f;
-    uint32_t found = 0;
-    for (uint32_t r = tissue.ring_first[static_cast<size_t>(near)]; r < tissue.ring_first[static_cast<size_t>(near) + 1]; ++r) {
-      const Triangle& t = tissue.surface[tissue.ring[r]];
-      const float d = length2(closest_on_triangle(p, xyz(x[t[0]]), xyz(x[t[1]]), xyz(x[t[2]])).point - p);
-      if (d < best) best = d, found = tissue.ring[r];
-    }
-    if (best < margin * margin) c.thread_tissue.push_back({slot, found});
-  }
-
-  // Thread on itself: boxes of eight segments, so that a straight thread costs next to nothing.
-  constexpr size_t kRun = 8;
-  const size_t runs = (segments + kRun - 1) / kRun;
-  std::array<Vec3, 512> lo, hi;
-  if (runs > lo.size()) return;
-  const float grow = 2 * thread_model.radius + 0.002f;
+  // Runs of eight segments in boxes: most of a thread is far from everything.
+  constexpr size_t kRun = 8, kMostRuns = 1024;
+  const size_t runs = std::min(kMostRuns, (segments + kRun - 1) / kRun);
+  std::array<Vec3, kMostRuns> lo, hi;
   for (size_t r = 0; r < runs; ++r) {
     lo[r] = hi[r] = xyz(x[thread.order[r * kRun]]);
     for (size_t i = r * kRun; i <= std::min(segments, (r + 1) * kRun); ++i)
       lo[r] = least(lo[r], xyz(x[thread.order[i]])), hi[r] = most(hi[r], xyz(x[thread.order[i]]));
   }
+
+  // Thread on tissue: one triangle each, the nearest of those around the nearest particle; the substeps use its plane.
+  const float reach = 0.004f + margin;
+  for (size_t r = 0; r < runs; ++r) {
+    c.near_block.clear();
+    for (uint32_t b = 0; b < blocks; ++b)
+      if (boxes_meet(lo[r] - all(reach), hi[r] + all(reach), c.lower[b], c.upper[b])) c.near_block.push_back(b);
+    if (c.near_block.empty()) continue;
+    for (size_t k = r * kRun; k < std::min(segments, (r + 1) * kRun); ++k) {
+      const uint32_t slot = thread.order[k];
+      if (!collides(slot)) continue;
+      const Vec3 p = xyz(x[slot]);
+      float closest = reach * reach;
+      uint32_t near = tissue.particles;
+      for (uint32_t b : c.near_block) {
+        if (distance_to_box2(p, c.lower[b], c.upper[b]) > closest) continue;
+        const uint32_t end = std::min(tissue.particles, (b + 1) * kBlock);
+        for (uint32_t i = b * kBlock; i < end; ++i) {
+          const float d = length2(xyz(x[i]) - p);
+          if (d < closest) closest = d, near = i;
+        }
+      }
+      if (near == tissue.particles) continue;
+      float best = 1e30f;
+      uint32_t found = 0;
+      for (uint32_t f = tissue.ring_first[near]; f < tissue.ring_first[near + 1]; ++f) {
+        const Triangle& t = tissue.surface[tissue.ring[f]];
+        const float d = length2(closest_on_triangle(p, xyz(x[t[0]]), xyz(x[t[1]]), xyz(x[t[2]])).point - p);
+        if (d < best) best = d, found = tissue.ring[f];
+      }
+      if (best < margin * margin) c.thread_tissue.push_back({slot, found});
+    }
+  }
+
+  const float grow = 2 * thread_model.radius + 0.002f;
+  // Two segments cannot be nearer than their middles less half of both; a segment may be stretched to twice its spacing.
+  const float far = grow + 2 * thread_model.spacing;
   for (size_t ra = 0; ra < runs; ++ra)
     for (size_t rb = ra; rb < runs; ++rb) {
       if (!boxes_meet(lo[ra] - all(grow), hi[ra] + all(grow), lo[rb], hi[rb])) continue;
@@ -204,6 +229,8 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
         for (size_t j = std::max(rb * kRun, i + 4); j < std::min(segments, (rb + 1) * kRun); ++j) {
           const uint32_t i0 = thread.order[i], i1 = thread.order[i + 1], j0 = thread.order[j], j1 = thread.order[j + 1];
           if (!collides(i0) || !collides(i1) || !collides(j0) || !collides(j1)) continue;
+          const Vec3 middles = xyz(x[i0]) + xyz(x[i1]) - xyz(x[j0]) - xyz(x[j1]);
+          if (length2(middles) > 4 * far * far) continue;
           const auto [s, t] = closest_on_segments(xyz(x[i0]), xyz(x[i1]), xyz(x[j0]), xyz(x[j1]));
           if (length2(lerp(xyz(x[i0]), xyz(x[i1]), s) - lerp(xyz(x[j0]), xyz(x[j1]), t)) < grow * grow)
             c.thread_pair.push_back({i0, j0});

@@ -44,6 +44,7 @@ struct Candidates {
   std::vector<ThreadPairCandidate> thread_pair;
   std::vector<Vec4> built_at;       // tissue positions when `pair` was built; empty: build now
   std::vector<Vec3> lower, upper;   // block boxes
+  std::vector<uint32_t> near_block; // working memory
 };
 
 constexpr float kPairMargin = 0.0012f;  // [m]

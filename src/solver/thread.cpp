@@ -12,6 +12,7 @@ namespace catgut {
 namespace {
 
 constexpr int kNewtonSteps = 2;
+constexpr float kGoodEnough = 5e-7f;  // [m] a second step is spared when no pair is off by more
 // Of the diagonal. A light thread drawn straight between heavy ends has one soft mode, a hundred thousand times softer than the
 // diagonal, and it is the one that matters: more than this would hide it.
 constexpr double kRegularisation = 1e-6;
@@ -21,32 +22,71 @@ constexpr double kSlideMass = 0.04;
 constexpr int kSlideRounds = 4;
 constexpr float kLargestStep = 0.6f;      // of the spacing, per Newton step
 
-// n1^T W n2 of the node seen by two pair directions. A free node on a taut thread is hard to move sideways (see stiffen).
-float node_inverse_mass(const ThreadScratch& s, const Thread& t, size_t i, Vec3 n1, Vec3 n2,
-                        const std::vector<RigidModel>& model, const std::vector<RigidBody>& body) {
-  if (s.hold_at[i] < 0) return s.w[i] * (s.sideways[i] * dot(n1, n2) + (1 - s.sideways[i]) * dot(n1, s.t[i]) * dot(n2, s.t[i]));
-  const ThreadHold& hold = t.hold[static_cast<size_t>(s.hold_at[i])];
+// A held node seen by two pair directions: n1^T W n2 of the rigid body at that place.
+float held_inverse_mass(const ThreadHold& hold, Vec3 n1, Vec3 n2, const std::vector<RigidModel>& model,
+                        const std::vector<RigidBody>& body) {
   const RigidBody& b = body[static_cast<size_t>(hold.body)];
   const RigidModel& m = model[static_cast<size_t>(hold.body)];
   const Vec3 r = rotate(b.q, hold.local);
   return m.inv_mass * dot(n1, n2) + dot(cross(r, n1), inverse_inertia(m, b, cross(r, n2)));
 }
+float node_inverse_mass(const ThreadScratch& s, const Thread& t, size_t i, Vec3 n, const std::vector<RigidModel>& model,
+                        const std::vector<RigidBody>& body) {
+  return s.hold_at[i] < 0 ? s.w[i] : held_inverse_mass(t.hold[static_cast<size_t>(s.hold_at[i])], n, n, model, body);
+}
 
+// The tridiagonal matrix J M^-1 J^T of all stretch constraints and its right-hand side, for the positions as they are.
+//
 // Geometric stiffness. A taut thread resists being moved sideways with tension / length, which the bare linearisation does not know: it
-// would shorten a taut zigzag by throwing its light nodes sideways, and never converge. So sideways a node is given the inertia
-// m + h^2 T (1/l0 + 1/l1) (Tournier et al. 2015, Stable constrained dynamics); sideways[i] is the ratio of the inverse masses.
-void stiffen(ThreadScratch& s, const Thread& t, size_t nodes, float h) {
+// would shorten a taut zigzag by throwing its light nodes sideways, and never converge. So sideways a free node is given the
+// inertia m + h^2 T (1/l0 + 1/l1) (Tournier et al. 2015, Stable constrained dynamics); sideways[i] is the ratio of the inverse masses.
+// With the tangent t = n0 + n1 of unit pair directions, t.t = 2 (1 + c) and n0.t = n1.t = 1 + c, c = n0.n1: no root is needed.
+// Returns the largest residual [m].
+float assemble(const Thread& t, ThreadScratch& s, size_t nodes, float alpha_per_metre, float h,
+              const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body) {
+  const size_t pairs = nodes - 1;
+  const float inv_h2 = 1 / (h * h), h2 = h * h, shortest = 1e-5f;
+  float worst = 0;
+  for (size_t i = 0; i < pairs; ++i) {
+    const Vec3 d = s.p[i + 1] - s.p[i];
+    const float l = length(d);
+    s.length[i] = std::max(l, shortest);
+    s.n[i] = l > 1e-12f ? d / l : Vec3{0, 1, 0};
+    const float alpha = alpha_per_metre * t.rest[i];
+    const float residual = -(l - t.rest[i]) - alpha * s.lambda[i];
+    worst = std::max(worst, std::abs(residual));
+    s.base_rhs[i] = residual;
+    s.base_diag[i] = alpha;
+    s.base_off[i] = 0;
+  }
   for (size_t i = 0; i < nodes; ++i) {
     s.sideways[i] = 1;
-    if (i == 0 || i + 1 == nodes || s.anchor_at[i] >= 0 || s.hold_at[i] >= 0) continue;
-    const float inv_h2 = 1 / (h * h);
-    const float before = std::max(t.tension[i - 1], -s.lambda[i - 1] * inv_h2), after = std::max(t.tension[i], -s.lambda[i] * inv_h2);
-    const float tension = std::max(0.0f, std::min(before, after));
-    if (tension == 0) continue;
-    const float l0 = std::max(distance(s.p[i - 1], s.p[i]), 1e-5f), l1 = std::max(distance(s.p[i], s.p[i + 1]), 1e-5f);
-    s.t[i] = normalized(s.n[i - 1] + s.n[i], s.n[i]);
-    s.sideways[i] = 1 / (1 + s.w[i] * h * h * tension * (1 / l0 + 1 / l1));
+    float before, after, across = 0;  // n0^T W n0, n1^T W n1, n0^T W n1
+    if (s.hold_at[i] >= 0) {
+      const ThreadHold& hold = t.hold[static_cast<size_t>(s.hold_at[i])];
+      before = i > 0 ? held_inverse_mass(hold, s.n[i - 1], s.n[i - 1], body_model, body) : 0;
+      after = i < pairs ? held_inverse_mass(hold, s.n[i], s.n[i], body_model, body) : 0;
+      if (i > 0 && i < pairs) across = held_inverse_mass(hold, s.n[i - 1], s.n[i], body_model, body);
+    } else {
+      before = after = s.w[i];
+      if (i > 0 && i < pairs) {
+        const float c = dot(s.n[i - 1], s.n[i]);
+        across = s.w[i] * c;
+        const float pull = std::min(std::max(t.tension[i - 1], -s.lambda[i - 1] * inv_h2), std::max(t.tension[i], -s.lambda[i] * inv_h2));
+        if (s.anchor_at[i] < 0 && pull > 0 && c > -0.999f) {
+          const float rho = 1 / (1 + s.w[i] * h2 * pull * (1 / s.length[i - 1] + 1 / s.length[i]));
+          s.sideways[i] = rho;
+          const float along = (1 - rho) * 0.5f * (1 + c);
+          before = after = s.w[i] * (rho + along);
+          across = s.w[i] * (rho * c + along);
+        }
+      }
+    }
+    if (i > 0) s.base_diag[i - 1] += double{before} * (1 + kRegularisation);
+    if (i < pairs) s.base_diag[i] += double{after} * (1 + kRegularisation);
+    if (i > 0 && i < pairs) s.base_off[i - 1] = -across;
   }
+  return worst;
 }
 
 // Solves the tridiagonal system for the change of the multipliers (into s.rhs), together with the slides at slipping anchors: one more
@@ -76,15 +116,16 @@ void solve_with_slides(const ThreadModel& model, const Thread& thread, ThreadScr
       s.off[i - 1] -= ws;
     }
     // Thomas algorithm. The matrix is symmetric positive definite.
+    double inverse = 1 / s.diag[0];
+    s.diag[0] = inverse;  // from here on the inverse pivots
     for (size_t i = 1; i < pairs; ++i) {
-      const double f = s.off[i - 1] / s.diag[i - 1];
-      s.diag[i] -= f * s.off[i - 1];
+      const double f = s.off[i - 1] * inverse;
+      inverse = 1 / (s.diag[i] - f * s.off[i - 1]);
+      s.diag[i] = inverse;
       s.rhs[i] -= f * s.rhs[i - 1];
     }
-    for (size_t i = pairs; i-- > 0;) {
-      if (i + 1 < pairs) s.rhs[i] -= s.off[i] * s.rhs[i + 1];
-      s.rhs[i] /= s.diag[i];
-    }
+    s.rhs[pairs - 1] *= s.diag[pairs - 1];
+    for (size_t i = pairs - 1; i-- > 0;) s.rhs[i] = (s.rhs[i] - s.off[i] * s.rhs[i + 1]) * s.diag[i];
     bool again = false;
     for (size_t i = 1; i < pairs; ++i) {
       if (s.anchor_at[i] < 0) continue;
@@ -127,8 +168,10 @@ void ThreadScratch::resize(uint32_t count) {
   anchor_at.assign(count, -1);
   hold_at.assign(count, -1);
   n.assign(count, {});
-  t.assign(count, {});
+  length.assign(count, 0);
   sideways.assign(count, 1);
+  bend_w.assign(count, 0);
+  node_of_slot.assign(count, -1);
   base_diag.assign(count, 0);
   base_off.assign(count, 0);
   base_rhs.assign(count, 0);
@@ -156,22 +199,24 @@ float thread_length(const Thread& t, const Vec4* x, const std::vector<RigidBody>
 
 void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float compliance, float h, float& lambda) {
   const Vec3 da = a - b, dc = c - b;
-  const float la = length(da), lc = length(dc);
-  if (la < 1e-9f || lc < 1e-9f) return;
-  const Vec3 u = da / la, v = dc / lc;
+  const float la2 = length2(da), lc2 = length2(dc);
+  if (la2 < 1e-18f || lc2 < 1e-18f) return;
+  const float inv_la = 1 / std::sqrt(la2), inv_lc = 1 / std::sqrt(lc2);
+  const Vec3 u = da * inv_la, v = dc * inv_lc;
   const float cosine = std::clamp(dot(u, v), -1.0f, 1.0f);
   const float violation = cosine + 1.0f;
-  const Vec3 ga = (v - u * cosine) / la, gc = (u - v * cosine) / lc, gb = -(ga + gc);
+  if (violation < 1e-6f && lambda == 0) return;  // straight to a tenth of a degree
+  const Vec3 ga = (v - u * cosine) * inv_la, gc = (u - v * cosine) * inv_lc, gb = -(ga + gc);
   const float w = wa * length2(ga) + wb * length2(gb) + wc * length2(gc);
   const float alpha = compliance / (h * h);
   // Near straight the violation falls with the square of the angle and w with it, so the step stays bounded; at exactly 0 or 180
   // degrees the direction is undefined and there is nothing to apply.
-  if (w < 1e-12f * (wa + wb + wc) / (la * lc)) return;
+  if (w < 1e-12f * (wa + wb + wc) * inv_la * inv_lc) return;
   float d = -(violation + alpha * lambda) / (w + alpha);
   // A rigid bend (compliance 0) linearised far from straight would overshoot: no more than a tenth of a segment at a time.
-  const float reach = std::abs(d) * std::max({wa * length(ga), wb * length(gb), wc * length(gc)});
-  const float limit = 0.1f * std::min(la, lc);
-  if (reach > limit) d *= limit / reach;
+  const float most = std::max({wa * wa * length2(ga), wb * wb * length2(gb), wc * wc * length2(gc)}) * d * d;
+  const float limit2 = 0.01f * std::min(la2, lc2);
+  if (most > limit2) d *= std::sqrt(limit2 / most);
   lambda += d;
   a += ga * (wa * d);
   b += gb * (wb * d);
@@ -188,48 +233,40 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
 
   for (size_t i = 0; i < nodes; ++i) {
     s.p[i] = xyz(x[thread.order[i]]);
-    s.w[i] = model.inv_mass;
+    s.w[i] = s.bend_w[i] = model.inv_mass;
     s.anchor_at[i] = s.hold_at[i] = -1;
+    s.node_of_slot[thread.order[i] - model.first_slot] = static_cast<int32_t>(i);
   }
-  auto node_of = [&](uint32_t slot) {
-    return static_cast<size_t>(std::find(thread.order.begin(), thread.order.end(), slot) - thread.order.begin());
-  };
+  auto node_of = [&](uint32_t slot) { return static_cast<size_t>(s.node_of_slot[slot - model.first_slot]); };
   for (size_t k = 0; k < thread.anchor.size(); ++k) {
     const size_t i = node_of(thread.anchor[k].slot);
     s.anchor_at[i] = static_cast<int32_t>(k);
     s.p[i] = position_of(thread.anchor[k].point, x);
     s.w[i] = inverse_mass_of(thread.anchor[k].point, inv_mass);
+    s.bend_w[i] = 0;  // locked nodes do not give way to bending: tissue and tools are far heavier than the thread
   }
   for (size_t k = 0; k < thread.hold.size(); ++k) {
     const size_t i = node_of(thread.hold[k].slot);
     if (s.anchor_at[i] >= 0) continue;  // tissue keeps it: the tool's hold on it is felt through the neighbours
     s.hold_at[i] = static_cast<int32_t>(k);
     s.p[i] = transform(body[static_cast<size_t>(thread.hold[k].body)].pose(), thread.hold[k].local);
-    s.w[i] = 0;
+    s.w[i] = s.bend_w[i] = 0;
   }
-  std::fill(s.sideways.begin(), s.sideways.end(), 1.0f);
+
+  // Every third triplet shares no particle with the next, so the three colours are swept one after the other: independent work keeps
+  // the processor busy where a chain of neighbours would wait for each root in turn.
   for (int sweep = 0; sweep < model.bend_sweeps; ++sweep)
-    for (size_t i = 1; i + 1 < nodes; ++i) {
-      // Locked nodes do not give way to bending: tissue and tools are far heavier than the thread.
-      auto free_mass = [&](size_t k) { return s.anchor_at[k] < 0 && s.hold_at[k] < 0 ? s.w[k] : 0.0f; };
-      const float wa = free_mass(i - 1), wb = free_mass(i), wc = free_mass(i + 1);
-      if (wa + wb + wc > 0)
-        solve_bend(s.p[i - 1], s.p[i], s.p[i + 1], wa, wb, wc, model.bend_compliance, h, s.bend_lambda[i]);
-    }
+    for (size_t colour = 1; colour <= 3; ++colour)
+      for (size_t i = colour; i + 1 < nodes; i += 3)
+        if (s.bend_w[i - 1] + s.bend_w[i] + s.bend_w[i + 1] > 0)
+          solve_bend(s.p[i - 1], s.p[i], s.p[i + 1], s.bend_w[i - 1], s.bend_w[i], s.bend_w[i + 1], model.bend_compliance, h,
+                     s.bend_lambda[i]);
 
   if (model.direct) {
     s.slide.assign(thread.anchor.size(), {});  // within its capacity: no allocation once as many anchors were seen
     for (int step = 0; step < kNewtonSteps; ++step) {
-      for (size_t i = 0; i < pairs; ++i) s.n[i] = normalized(s.p[i + 1] - s.p[i], {0, 1, 0});
-      stiffen(s, thread, nodes, h);
-      for (size_t i = 0; i < pairs; ++i) {
-        const float alpha = alpha_per_metre * thread.rest[i];
-        const double d = node_inverse_mass(s, thread, i, s.n[i], s.n[i], body_model, body) +
-                         node_inverse_mass(s, thread, i + 1, s.n[i], s.n[i], body_model, body);
-        s.base_diag[i] = d * (1 + kRegularisation) + alpha;
-        s.base_rhs[i] = -(distance(s.p[i], s.p[i + 1]) - thread.rest[i]) - alpha * s.lambda[i];
-        s.base_off[i] = i + 1 < pairs ? -node_inverse_mass(s, thread, i + 1, s.n[i], s.n[i + 1], body_model, body) : 0.0;
-      }
+      const float residual = assemble(thread, s, nodes, alpha_per_metre, h, body_model, body);
+      if (step > 0 && residual < kGoodEnough) break;
       solve_with_slides(model, thread, s, pairs, h);
 
       // A bent stretch of light thread between heavy ends: the impulse that moves the ends would throw the light nodes far sideways, because
@@ -241,11 +278,16 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
         if (i > 0) p += s.n[i - 1] * static_cast<float>(s.rhs[i - 1]);
         if (i < pairs) p -= s.n[i] * static_cast<float>(s.rhs[i]);
         if (s.hold_at[i] < 0 && s.anchor_at[i] < 0) {
-          p = p * s.sideways[i] + s.t[i] * ((1 - s.sideways[i]) * dot(p, s.t[i]));
-          const float reach = length(p) * s.w[i];
-          if (reach > limit) p *= limit / reach;
+          if (s.sideways[i] < 1) {
+            const Vec3 t = s.n[i - 1] + s.n[i];
+            p = p * s.sideways[i] + t * ((1 - s.sideways[i]) * dot(p, t) / length2(t));
+          }
+          const float reach2 = length2(p) * s.w[i] * s.w[i];
+          if (reach2 > limit * limit) p *= limit / std::sqrt(reach2);
+          s.p[i] += p * s.w[i];
+        } else {
+          push_node(s, thread, i, p, x, inv_mass, body_model, body);
         }
-        push_node(s, thread, i, p, x, inv_mass, body_model, body);
       }
       for (size_t i = 0; i < pairs; ++i) s.lambda[i] += static_cast<float>(s.rhs[i]);
       for (size_t i = 1; i < pairs; ++i)
@@ -258,18 +300,18 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
     }
   }
 
-  std::fill(s.sideways.begin(), s.sideways.end(), 1.0f);
   for (int sweep = 0; sweep < model.distance_sweeps; ++sweep)
     for (size_t i = 0; i < pairs; ++i) {
       const Vec3 d = s.p[i + 1] - s.p[i];
-      const float l = length(d);
-      if (l < 1e-9f) continue;
+      const float l2 = length2(d), rest = thread.rest[i], alpha = alpha_per_metre * rest, compliant = alpha * s.lambda[i];
+      // Right to a tenth of a micrometre, as the direct solve leaves most pairs: spare the root and the division.
+      if (std::abs(l2 - rest * rest) < 2e-7f * rest && std::abs(compliant) < 1e-7f) continue;
+      if (l2 < 1e-18f) continue;
+      const float l = std::sqrt(l2);
       const Vec3 n = d / l;
-      const float alpha = alpha_per_metre * thread.rest[i];
-      const float w = node_inverse_mass(s, thread, i, n, n, body_model, body) +
-                      node_inverse_mass(s, thread, i + 1, n, n, body_model, body);
+      const float w = node_inverse_mass(s, thread, i, n, body_model, body) + node_inverse_mass(s, thread, i + 1, n, body_model, body);
       if (w + alpha <= 0) continue;
-      const float dl = (-(l - thread.rest[i]) - alpha * s.lambda[i]) / (w + alpha);
+      const float dl = (-(l - rest) - compliant) / (w + alpha);
       s.lambda[i] += dl;
       push_node(s, thread, i, n * -dl, x, inv_mass, body_model, body);
       push_node(s, thread, i + 1, n * dl, x, inv_mass, body_model, body);

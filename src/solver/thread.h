@@ -72,12 +72,14 @@ struct ThreadScratch {
   std::vector<int32_t> anchor_at;   // per node: index of its anchor, or -1
   std::vector<int32_t> hold_at;     // per node: index of its hold, or -1
   std::vector<Vec3> n;              // per pair: unit direction toward the needle
-  std::vector<Vec3> t;              // per node: unit tangent
+  std::vector<float> length;        // per pair [m]
   std::vector<float> sideways;      // per node: inverse mass across the tangent over that along it
   std::vector<double> base_diag, base_off, base_rhs, diag, off, rhs;
   std::vector<float> lambda;        // per pair, cleared at the start of a substep
   std::vector<float> bend_lambda;   // per node
+  std::vector<float> bend_w;        // per node: inverse mass against bending, 0 where locked
   std::vector<SlideState> slide;    // per anchor
+  std::vector<int32_t> node_of_slot;  // index in the order of each slot (relative to first_slot)
   void resize(uint32_t count);
 };
 
