@@ -20,7 +20,6 @@ void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   std::fill(scratch.shape.moved.begin(), scratch.shape.moved.end(), Vec4{});
   std::fill(scratch.on_body.begin(), scratch.on_body.end(), BodyContact{});
   std::fill(scratch.thread.lambda.begin(), scratch.thread.lambda.end(), 0.0f);
-  std::fill(scratch.thread.bend_lambda.begin(), scratch.thread.bend_lambda.end(), 0.0f);
 }
 
 void predict_particles(const SolverModel& m, SolverState& s, SolverScratch& k, size_t first, size_t last) {

@@ -12,7 +12,7 @@ namespace catgut {
 namespace {
 
 constexpr int kNewtonSteps = 2;
-constexpr float kGoodEnough = 5e-7f;  // [m] a second step is spared when no pair is off by more
+constexpr float kGoodEnough = 2e-6f;  // [m] a second step is spared when no pair is off by more
 // Of the diagonal. A light thread drawn straight between heavy ends has one soft mode, a hundred thousand times softer than the
 // diagonal, and it is the one that matters: more than this would hide it.
 constexpr double kRegularisation = 1e-6;
@@ -179,7 +179,7 @@ void ThreadScratch::resize(uint32_t count) {
   off.assign(count, 0);
   rhs.assign(count, 0);
   lambda.assign(count, 0);
-  bend_lambda.assign(count, 0);
+  bend.resize(count);
 }
 
 Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vector<RigidBody>& body) {
@@ -253,14 +253,7 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
     s.w[i] = s.bend_w[i] = 0;
   }
 
-  // Every third triplet shares no particle with the next, so the three colours are swept one after the other: independent work keeps
-  // the processor busy where a chain of neighbours would wait for each root in turn.
-  for (int sweep = 0; sweep < model.bend_sweeps; ++sweep)
-    for (size_t colour = 1; colour <= 3; ++colour)
-      for (size_t i = colour; i + 1 < nodes; i += 3)
-        if (s.bend_w[i - 1] + s.bend_w[i] + s.bend_w[i + 1] > 0)
-          solve_bend(s.p[i - 1], s.p[i], s.p[i + 1], s.bend_w[i - 1], s.bend_w[i], s.bend_w[i + 1], model.bend_compliance, h,
-                     s.bend_lambda[i]);
+  solve_bends({s.p.data(), nodes}, {s.bend_w.data(), nodes}, model.bend_compliance, h, model.bend_sweeps, s.bend);
 
   if (model.direct) {
     s.slide.assign(thread.anchor.size(), {});  // within its capacity: no allocation once as many anchors were seen

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "solver/attach.h"
+#include "solver/bend.h"
 
 namespace catgut {
 
@@ -76,7 +77,7 @@ struct ThreadScratch {
   std::vector<float> sideways;      // per node: inverse mass across the tangent over that along it
   std::vector<double> base_diag, base_off, base_rhs, diag, off, rhs;
   std::vector<float> lambda;        // per pair, cleared at the start of a substep
-  std::vector<float> bend_lambda;   // per node
+  BendScratch bend;
   std::vector<float> bend_w;        // per node: inverse mass against bending, 0 where locked
   std::vector<SlideState> slide;    // per anchor
   std::vector<int32_t> node_of_slot;  // index in the order of each slot (relative to first_slot)
