@@ -222,6 +222,14 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
     for (int step = 0; step < kNewtonSteps; ++step) {
       for (size_t i = 0; i < pairs; ++i) s.n[i] = normalized(s.p[i + 1] - s.p[i], {0, 1, 0});
       stiffen(s, thread, nodes, h);
+      // Weight meets the same sideways inertia as tension does. If it did not, it would carry a taut thread down faster than tension may
+      // lift it back, and the thread would come to rest stretched, at any tension.
+      if (step == 0)
+        for (size_t i = 0; i < nodes; ++i)
+          if (s.sideways[i] < 1) {
+            const Vec3 fall = model.gravity * (h * h);
+            s.p[i] -= (fall - s.t[i] * dot(fall, s.t[i])) * (1 - s.sideways[i]);
+          }
       for (size_t i = 0; i < pairs; ++i) {
         const float alpha = alpha_per_metre * thread.rest[i];
         const double d = node_inverse_mass(s, thread, i, s.n[i], s.n[i], body_model, body) +

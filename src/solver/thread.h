@@ -29,6 +29,7 @@ struct ThreadModel {
   float bend_compliance = 0;      // [1/J]
   int bend_sweeps = 1, distance_sweeps = 1;
   bool direct = true;
+  Vec3 gravity;                   // [m/s^2] that the predicted positions contain
 };
 
 // A suture point's hold on the thread.
