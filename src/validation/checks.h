@@ -27,7 +27,6 @@ struct ThreadRig {
   std::vector<float> inv_mass;
   std::vector<RigidModel> body_model;
   std::vector<RigidBody> body;
-  Vec3 gravity;
   float damping = 0;  // [1/s]
 
   ThreadRig(std::span<const Vec3> position, float spacing, float mass, bool hold_last);

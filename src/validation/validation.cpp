@@ -46,7 +46,7 @@ void ThreadRig::step(float h) {
   std::fill(scratch.lambda.begin(), scratch.lambda.end(), 0.0f);
   std::fill(scratch.bend_lambda.begin(), scratch.bend_lambda.end(), 0.0f);
   prev = x;
-  for (size_t i = 0; i < x.size(); ++i) add(x[i], (xyz(v[i]) + gravity * h) * h);
+  for (size_t i = 0; i < x.size(); ++i) add(x[i], (xyz(v[i]) + model.gravity * h) * h);
   for (const ThreadHold& hold : thread.hold) x[hold.slot] = prev[hold.slot];
   solve_thread(model, thread, scratch, x.data(), inv_mass.data(), body_model, body, h);
   const float keep = 1 / (h * (1 + damping * h));
