@@ -187,6 +187,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   t.bend_sweeps = scene.solver.bend_sweeps;
   t.distance_sweeps = scene.solver.distance_sweeps;
   t.direct = scene.solver.thread_direct;
+  t.gravity = s.gravity;
 
   const NeedleShape needle{scene.needle.radius, scene.needle.arc, scene.needle.wire_radius, scene.needle.mass};
   s.needle_arc = needle_arc(needle);

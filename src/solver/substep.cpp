@@ -182,7 +182,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   }
   {
     StageTimer timer(times, Stage::thread);
-    solve_thread(m.thread, s.thread, k.thread, x, w, m.body, s.body, h);
+    solve_thread(m.thread, s.thread, k.thread, x, k.prev.data(), w, m.body, s.body, h);
   }
   {
     StageTimer timer(times, Stage::velocity);

@@ -89,6 +89,63 @@ float assemble(const Thread& t, ThreadScratch& s, size_t nodes, float alpha_per_
   return worst;
 }
 
+// The inertia and the weight that carried the nodes to where they are now must meet the same geometric stiffness as the constraints will:
+// implicit Euler is (M + h^2 K) dx = h M v + h^2 f, with K the tension's Laplacian. Without it a taut thread swings sideways as freely as a
+// slack one while its tension may hardly pull it back: it would gain energy, or come to rest stretched.
+//   The part from velocities, d = p - before - h^2 g, is smoothed by (1 + K) d' = d along the thread with locked nodes fixed: a thread
+//   that moves as a whole keeps its motion, a taut one loses its flutter, a slack one (no tension) is left alone.
+//   The weight's part across the thread is scaled by the node's own ratio, as its constraint impulses are: at rest the two then balance,
+//   and the thread hangs as a catenary (catgut validate).
+void stiffen_prediction(const ThreadModel& model, const Thread& t, ThreadScratch& s, size_t nodes, const Vec4* before, float h) {
+  const size_t pairs = nodes - 1;
+  const float h2 = h * h;
+  const Vec3 fall = model.gravity * h2;
+  bool taut = false;
+  for (size_t i = 0; i < pairs; ++i) {
+    s.stiff[i] = std::max(0.0f, t.tension[i]) * h2 * model.inv_mass / std::max(t.rest[i], 0.1f * model.spacing);
+    taut = taut || s.stiff[i] > 1e-3f;
+  }
+  if (!taut) return;
+  auto locked = [&](size_t i) { return s.anchor_at[i] >= 0 || s.hold_at[i] >= 0; };
+  // Thomas algorithm on the three components at once.
+  Vec3 last{};
+  float carry = 0;
+  for (size_t i = 0; i < nodes; ++i) {
+    const Vec3 was = xyz(before[t.order[i]]);
+    float diagonal = 1, left = 0, right = 0;
+    Vec3 d = s.p[i] - was;
+    if (!locked(i)) {
+      d -= fall;
+      left = i > 0 ? s.stiff[i - 1] : 0;
+      right = i < pairs ? s.stiff[i] : 0;
+      diagonal = 1 + left + right;
+    }
+    const float inverse = 1 / (diagonal - left * carry);
+    carry = right * inverse;
+    last = (d + last * left) * inverse;
+    s.smooth[i] = last;
+    s.carry[i] = carry;
+  }
+  for (size_t i = nodes; i-- > 0;) {
+    if (i < pairs) s.smooth[i] += s.smooth[i + 1] * s.carry[i];
+    if (locked(i)) continue;
+    Vec3 weight = fall;
+    if (i > 0 && i < pairs) {
+      const float pull = std::min(t.tension[i - 1], t.tension[i]);
+      const Vec3 d0 = s.p[i] - s.p[i - 1], d1 = s.p[i + 1] - s.p[i];
+      const float l0 = length(d0), l1 = length(d1);
+      if (pull > 0 && l0 > 1e-9f && l1 > 1e-9f) {
+        const float rho = 1 / (1 + model.inv_mass * h2 * pull * (1 / std::max(l0, 1e-5f) + 1 / std::max(l1, 1e-5f)));
+        const Vec3 tangent = normalized(d0 / l0 + d1 / l1);
+        weight = tangent * dot(fall, tangent) + (fall - tangent * dot(fall, tangent)) * rho;
+      }
+    }
+    s.moved[i] = s.smooth[i] + weight;
+  }
+  for (size_t i = 0; i < nodes; ++i)
+    if (!locked(i)) s.p[i] = xyz(before[t.order[i]]) + s.moved[i];
+}
+
 // Solves the tridiagonal system for the change of the multipliers (into s.rhs), together with the slides at slipping anchors: one more
 // unknown each, coupled to the two pairs beside it. A slide that would run backward (friction stops, it never drives) or beyond what the
 // pair on its side still has is fixed at that bound and the system solved again: an active set, which shrinks every round.
@@ -180,6 +237,10 @@ void ThreadScratch::resize(uint32_t count) {
   rhs.assign(count, 0);
   lambda.assign(count, 0);
   bend.resize(count);
+  stiff.assign(count, 0);
+  carry.assign(count, 0);
+  smooth.assign(count, {});
+  moved.assign(count, {});
 }
 
 Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vector<RigidBody>& body) {
@@ -223,7 +284,7 @@ void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float c
   c += gc * (wc * d);
 }
 
-void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Vec4* x, const float* inv_mass,
+void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Vec4* x, const Vec4* before, const float* inv_mass,
                   const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body, float h) {
   const size_t nodes = thread.order.size();
   if (nodes < 2) return;
@@ -253,6 +314,7 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
     s.w[i] = s.bend_w[i] = 0;
   }
 
+  if (model.direct) stiffen_prediction(model, thread, s, nodes, before, h);
   solve_bends({s.p.data(), nodes}, {s.bend_w.data(), nodes}, model.bend_compliance, h, model.bend_sweeps, s.bend);
 
   if (model.direct) {

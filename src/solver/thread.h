@@ -30,6 +30,7 @@ struct ThreadModel {
   float bend_compliance = 0;      // [1/J]
   int bend_sweeps = 1, distance_sweeps = 1;
   bool direct = true;
+  Vec3 gravity;                   // [m/s^2] that the predicted positions contain
 };
 
 // A suture point's hold on the thread.
@@ -78,6 +79,8 @@ struct ThreadScratch {
   std::vector<double> base_diag, base_off, base_rhs, diag, off, rhs;
   std::vector<float> lambda;        // per pair, cleared at the start of a substep
   BendScratch bend;
+  std::vector<float> stiff, carry;  // of stiffen_prediction
+  std::vector<Vec3> smooth, moved;
   std::vector<float> bend_w;        // per node: inverse mass against bending, 0 where locked
   std::vector<SlideState> slide;    // per anchor
   std::vector<int32_t> node_of_slot;  // index in the order of each slot (relative to first_slot)
@@ -88,8 +91,9 @@ struct ThreadScratch {
 Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vector<RigidBody>& body);
 
 // One substep's solve: bending sweeps, direct solve, distance sweeps. Expects cleared multipliers in scratch. Moves thread particles, the tissue under anchors and the
-// bodies that hold it; writes tensions and the slide of every anchor. Substep h [s].
-void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& scratch, Vec4* x, const float* inv_mass,
+// bodies that hold it; writes tensions and the slide of every anchor. x: predicted positions; before: those at the start of the substep;
+// h [s].
+void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& scratch, Vec4* x, const Vec4* before, const float* inv_mass,
                   const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body, float h);
 
 // One cosine bending constraint (paper 2.1): C = u.v - cos(theta0) with theta0 = pi (straight). Moves the three points by XPBD.

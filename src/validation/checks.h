@@ -1,0 +1,65 @@
+// validation: what the checks share: where lines go, and small worlds to run the kernels in.
+#pragma once
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/jobs.h"
+#include "solver/substep.h"
+#include "validation/validation.h"
+
+namespace catgut::validation {
+
+struct Lines {
+  std::vector<ValidationLine> line;
+  std::function<void(const ValidationLine&)> on_line;
+  void add(const std::string& name, double expected, double got, double tolerance, const std::string& unit, const std::string& source);
+};
+
+// A thread whose first node, and last if wanted, is held by the world: only the thread's kernels and the time step around them.
+// Without the substep's limit on speed, so that published cases of metres and kilograms can run as they are.
+struct ThreadRig {
+  ThreadModel model;
+  Thread thread;
+  ThreadScratch scratch;
+  Column<Vec4> x, v, prev;
+  std::vector<float> inv_mass;
+  std::vector<RigidModel> body_model;
+  std::vector<RigidBody> body;
+  float damping = 0;  // [1/s]
+
+  ThreadRig(std::span<const Vec3> position, float spacing, float mass, bool hold_last);
+  void step(float h);
+};
+
+// A whole solver world: tissue from `rest` in the given clusters, no thread, no gravity, no damping, no contact, no ground.
+struct TissueWorld {
+  SolverModel model;
+  SolverState state;
+  SolverScratch scratch;
+  TissueWorld(std::span<const Vec3> rest, std::span<const float> mass, std::span<const std::vector<uint32_t>> cluster);
+  void start(std::span<const Vec3> position);  // after the model is complete
+  void run(double seconds, Jobs& jobs);
+};
+
+struct Block {
+  std::vector<Vec3> position;
+  std::vector<Tet> tet;
+  std::vector<std::vector<uint32_t>> cluster;  // one, of everything
+  int n = 0;
+  uint32_t at(int i, int j, int k) const { return static_cast<uint32_t>((k * n + j) * n + i); }
+};
+// n x n x n particles, `spacing` apart, centred on the origin; five tetrahedra a cell, mirrored from cell to cell.
+Block make_block(int n, float spacing);
+
+void check_oscillator(Lines& out);
+void check_hanging_chain(Lines& out);
+void check_catenary(Lines& out);
+void check_bending(Lines& out);
+void check_stiffness(Lines& out);
+void check_momentum(Lines& out);
+void check_rotation(Lines& out);
+void check_volume(Lines& out);
+
+}  // namespace catgut::validation

@@ -1,0 +1,23 @@
+// validation: what the solver computes beside what mechanics says: closed forms, published numbers and invariances. Every line runs the
+// kernels of the simulation itself and can fail; `catgut validate` prints them, tests/validation asserts them.
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace catgut {
+
+struct ValidationLine {
+  std::string name;
+  double expected = 0, got = 0;
+  double error = 0;      // relative where something other than 0 is expected, else absolute
+  double tolerance = 0;  // of the error
+  std::string unit;      // of expected and got
+  std::string source;    // where the expected value comes from
+  bool ok = false;
+};
+
+// Runs every check, a few seconds in all. on_line is called with each line as it is known.
+std::vector<ValidationLine> run_validation(const std::function<void(const ValidationLine&)>& on_line = {});
+
+}  // namespace catgut
