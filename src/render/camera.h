@@ -26,7 +26,7 @@ struct FollowCamera {
   float beside = 0.7f;         // [rad] from the needle's side of the organ, toward where the tools' shafts hide less
   float turn_speed = 0.35f;    // [rad/s] at most
   float settle_time = 1.2f;    // [s] in which most of a change of target is made up
-  float half_height = 0.028f;  // [m] of the picture, at the target
+  float half_height = 0.034f;  // [m] of the picture, at the target
   float fov_deg = 30;
 
  private:

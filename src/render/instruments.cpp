@@ -125,7 +125,8 @@ Shape drape_shape(Vec3 centre, float hole, float size) {
     const float out = std::clamp((r - hole) / 0.03f, 0.0f, 1.0f);
     // The cloth's edge lies as a soft roll round the hole and falls away from it a little.
     const float roll = 0.0022f * std::exp(-(r - hole) * (r - hole) / (0.0035f * 0.0035f));
-    return centre.y + roll + 0.0050f * out * cloth_height(x, z) - 0.05f * std::max(0.0f, r - hole - 0.06f);
+    // Folds only go down: what lies on the drape in the physics lies on its highest level.
+    return centre.y + roll + 0.0020f * out * (cloth_height(x, z) - 1) - 0.05f * std::max(0.0f, r - hole - 0.06f);
   };
   for (int i = 0; i <= rings; ++i) {
     const float s = float(i) / rings, r = hole + (size - hole) * s * s;

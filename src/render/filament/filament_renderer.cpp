@@ -227,12 +227,18 @@ class FilamentRenderer final : public Renderer {
       tissue_.push_back(make_tissue_view(*engine_, *scene_, mesh, tissue_material_));
       all.insert(all.end(), mesh.position.begin(), mesh.position.end());
     }
-    // The drape lies at the lowest tissue; its hole clears the organ there by a centimetre.
-    const Box3 box = all.empty() ? Box3{model_.focus, model_.focus} : bounds(all);
-    const Vec3 middle = 0.5f * (box.low + box.high), ground{middle.x, box.low.y, middle.z};
-    float reach = 0;
+    // The drape lies where the model says; its hole clears by a centimetre the tissue that stands up through it there.
+    Vec3 ground{model_.focus.x, model_.drape, model_.focus.z};
+    std::vector<Vec3> through;
     for (const Vec3 p : all)
-      if (p.y < box.low.y + 0.01f) reach = std::max(reach, std::hypot(p.x - ground.x, p.z - ground.z));
+      if (std::abs(p.y - ground.y) < 0.005f) through.push_back(p);
+    if (!through.empty()) {
+      const Box3 box = bounds(through);
+      ground.x = 0.5f * (box.low.x + box.high.x);
+      ground.z = 0.5f * (box.low.z + box.high.z);
+    }
+    float reach = 0;
+    for (const Vec3 p : through) reach = std::max(reach, std::hypot(p.x - ground.x, p.z - ground.z));
     const float hole = reach + 0.01f;
     const Shape cloth = drape_shape(ground, hole, 0.7f);
     drape_ = make_mesh(*engine_, *scene_, cloth, drape_material_, false);
