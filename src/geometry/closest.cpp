@@ -7,7 +7,7 @@
 
 namespace catgut {
 
-Vec3 closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
+Vec3 closest_point_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
   const Vec3 ab = b - a, ac = c - a, ap = p - a;
   const float d1 = dot(ab, ap), d2 = dot(ac, ap);
   if (d1 <= 0 && d2 <= 0) return a;
@@ -86,7 +86,7 @@ SurfaceTree::Hit SurfaceTree::nearest(Vec3 p) const {
     }
     for (uint32_t i = n.first; i < n.first + n.count; ++i) {
       const Triangle& t = mesh_.triangle[order_[i]];
-      const Vec3 q = closest_on_triangle(p, mesh_.position[t[0]], mesh_.position[t[1]], mesh_.position[t[2]]);
+      const Vec3 q = closest_point_on_triangle(p, mesh_.position[t[0]], mesh_.position[t[1]], mesh_.position[t[2]]);
       const float d2 = length2(q - p);
       if (d2 < best.distance2 || (d2 == best.distance2 && order_[i] < best.triangle)) best = {q, order_[i], d2};
     }

@@ -8,7 +8,7 @@
 namespace catgut {
 
 // The point of triangle a b c nearest to p (Ericson 2005, section 5.1.5).
-Vec3 closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c);
+Vec3 closest_point_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c);
 
 // A tree of boxes over a mesh that must outlive it unchanged.
 class SurfaceTree {

@@ -119,7 +119,7 @@ TEST(Closest, AgreesWithTryingEverything) {
     const Vec3 p = Vec3{random.uniform() - 0.5f, random.uniform() - 0.5f, random.uniform() - 0.5f} * 0.1f;
     float best = 1;
     for (const Triangle& t : m.triangle) {
-      best = std::min(best, length2(p - closest_on_triangle(p, m.position[t[0]], m.position[t[1]], m.position[t[2]])));
+      best = std::min(best, length2(p - closest_point_on_triangle(p, m.position[t[0]], m.position[t[1]], m.position[t[2]])));
     }
     EXPECT_EQ(tree.nearest(p).distance2, best);
   }
