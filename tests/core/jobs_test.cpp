@@ -26,7 +26,8 @@ TEST(Jobs, every_index_exactly_once_for_any_number_of_workers) {
           for (size_t i = first; i < last; ++i) touched[i].fetch_add(1);
         });
         EXPECT_TRUE(in_order.load());
-        for (size_t i = 0; i < count; ++i) ASSERT_EQ(touched[i].load(), 1) << threads << " threads, index " << i << " of " << count;
+        for (size_t i = 0; i < count; ++i)
+          ASSERT_EQ(touched[i].load(), 1) << threads << " threads, index " << i << " of " << count;
       }
   }
 }

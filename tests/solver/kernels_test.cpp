@@ -13,7 +13,9 @@
 namespace catgut {
 namespace {
 
-Vec3 random_point(Random& r, float size = 1) { return Vec3{r.uniform() - 0.5f, r.uniform() - 0.5f, r.uniform() - 0.5f} * (2 * size); }
+Vec3 random_point(Random& r, float size = 1) {
+  return Vec3{r.uniform() - 0.5f, r.uniform() - 0.5f, r.uniform() - 0.5f} * (2 * size);
+}
 
 TEST(Volume, gradients_agree_with_central_differences) {
   Random r(1);
@@ -46,7 +48,8 @@ TEST(Volume, gradients_agree_with_central_differences) {
         };
         slope[c] = (volume(1e-4) - volume(-1e-4)) / 2e-4;
       }
-      EXPECT_LT((slope - Eigen::Vector3d(got.x, got.y, got.z)).norm(), 1e-4 * (1 + slope.norm())) << "trial " << trial << " corner " << k;
+      EXPECT_LT((slope - Eigen::Vector3d(got.x, got.y, got.z)).norm(), 1e-4 * (1 + slope.norm()))
+          << "trial " << trial << " corner " << k;
     }
   }
 }
@@ -156,7 +159,9 @@ TEST(Attachment, a_spread_point_follows_every_affine_motion) {
   const Vec3 at{0.001f, -0.0005f, 0.0007f};
   const TissuePoint t = spread_point(id, rest.data(), at);
   EXPECT_LT(distance(position_of(t, rest.data()), at), 1e-7f);
-  auto affine = [](Vec3 p) { return Vec3{1.2f * p.x + 0.1f * p.y - 0.3f * p.z + 0.05f, 0.9f * p.y - 0.2f * p.x, 0.4f * p.y + 1.1f * p.z - 0.02f}; };
+  auto affine = [](Vec3 p) {
+    return Vec3{1.2f * p.x + 0.1f * p.y - 0.3f * p.z + 0.05f, 0.9f * p.y - 0.2f * p.x, 0.4f * p.y + 1.1f * p.z - 0.02f};
+  };
   Column<Vec4> moved;
   for (const Vec4& p : rest) moved.push_back(point(affine(xyz(p))));
   EXPECT_LT(distance(position_of(t, moved.data()), affine(at)), 1e-6f);

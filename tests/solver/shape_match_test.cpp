@@ -47,7 +47,8 @@ struct Cluster {
   Eigen::Matrix3d wanted(const std::vector<Vec3>& at, double* gap = nullptr) const {
     Eigen::Vector3d c = Eigen::Vector3d::Zero(), q0 = c;
     double total = 0;
-    for (size_t i = 0; i < at.size(); ++i) c += mass[i] * eigen(at[i]), q0 += mass[i] * eigen(rest[i]), total += double{mass[i]};
+    for (size_t i = 0; i < at.size(); ++i)
+      c += mass[i] * eigen(at[i]), q0 += mass[i] * eigen(rest[i]), total += double{mass[i]};
     c /= total, q0 /= total;
     Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
     for (size_t i = 0; i < at.size(); ++i) a += mass[i] * (eigen(at[i]) - c) * (eigen(rest[i]) - q0).transpose();
@@ -61,12 +62,11 @@ struct Cluster {
 
 double angle(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) { return Eigen::AngleAxisd(a.transpose() * b).angle(); }
 
-Quat random_rotation(Random& r) {
-  return normalized(Quat{r.normal(), r.normal(), r.normal(), r.normal()});
-}
+Quat random_rotation(Random& r) { return normalized(Quat{r.normal(), r.normal(), r.normal(), r.normal()}); }
 std::vector<Vec3> cloud(Random& r, int n, Vec3 size) {
   std::vector<Vec3> p;
-  for (int i = 0; i < n; ++i) p.push_back({(r.uniform() - 0.5f) * size.x, (r.uniform() - 0.5f) * size.y, (r.uniform() - 0.5f) * size.z});
+  for (int i = 0; i < n; ++i)
+    p.push_back({(r.uniform() - 0.5f) * size.x, (r.uniform() - 0.5f) * size.y, (r.uniform() - 0.5f) * size.z});
   return p;
 }
 
@@ -184,7 +184,9 @@ TEST(ShapeRows, kernels_equal_a_plain_scalar_reference) {
   for (uint32_t i = 0; i < n; ++i) {
     const Eigen::Vector3d at = eigen(xyz(before[i])), moved(1e-4, -2e-4, 3e-4);
     const Eigen::Vector3d want =
-        inv_mass[i] == 0 ? at : Eigen::Vector3d(at + double{relaxation} * (double{s} * (goal[i] / holders[i] - at) - (1 - double{s}) * moved));
+        inv_mass[i] == 0
+            ? at
+            : Eigen::Vector3d(at + double{relaxation} * (double{s} * (goal[i] / holders[i] - at) - (1 - double{s}) * moved));
     EXPECT_LT((eigen(xyz(x[i])) - want).norm(), 1e-6) << "particle " << i;
     EXPECT_EQ(x[i].w, 1.0f);
   }
@@ -214,7 +216,8 @@ TEST(ShapeRows, the_number_of_workers_does_not_change_a_bit) {
         solve_shape_clusters(model, rotation, scratch, static_cast<uint32_t>(a), static_cast<uint32_t>(b));
       });
       jobs.each(n, 256, [&](size_t a, size_t b) {
-        solve_shape_particles(model, x.data(), inv_mass.data(), 0.6f, 1.3f, scratch, static_cast<uint32_t>(a), static_cast<uint32_t>(b));
+        solve_shape_particles(model, x.data(), inv_mass.data(), 0.6f, 1.3f, scratch, static_cast<uint32_t>(a),
+                              static_cast<uint32_t>(b));
       });
     }
     return x;

@@ -161,8 +161,8 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
     state.body[2].x.x += 0.15f * model.h;
     substep(model, state, scratch, jobs, nullptr);
     pull(model, state, suture, stitches, events);
-    // Stretch between the anchor and the hand. A stuck anchor lets go at the end of the substep in which the pull exceeds its friction;
-    // this hand starts at full speed, so the first substeps are not a steady pull.
+    // Stretch between the anchor and the hand. A stuck anchor lets go at the end of the substep in which the pull exceeds its
+    // friction; this hand starts at full speed, so the first substeps are not a steady pull.
     if (i < 10) continue;
     const auto& order = state.thread.order;
     const size_t node = static_cast<size_t>(std::find(order.begin(), order.end(), a.slot) - order.begin());
@@ -176,7 +176,8 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
   }
   EXPECT_LT(most, 1e-3);
   EXPECT_NEAR(std::accumulate(state.thread.rest.begin(), state.thread.rest.end(), 0.0) / before, 1, 1e-6);
-  EXPECT_GE(std::count_if(events.begin(), events.end(), [](const Event& e) { return e.kind == EventKind::particle_passed; }), 35);
+  EXPECT_GE(std::count_if(events.begin(), events.end(), [](const Event& e) { return e.kind == EventKind::particle_passed; }),
+            35);
 }
 
 // Weight against geometric stiffness: a taut, light thread between two hands hangs as a catenary and no tighter.
