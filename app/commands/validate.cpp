@@ -1,5 +1,4 @@
 // app: `catgut validate`: what the solver computes beside closed forms and published numbers.
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
