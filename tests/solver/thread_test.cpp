@@ -51,11 +51,10 @@ struct Line {
   ThreadAnchor& anchor() { return thread.anchor[0]; }
   void step() {
     std::fill(scratch.lambda.begin(), scratch.lambda.end(), 0.0f);
-    std::fill(scratch.bend_lambda.begin(), scratch.bend_lambda.end(), 0.0f);
     prev = x;
     for (size_t i = 0; i < x.size(); ++i)
       if (inv_mass[i] > 0) add(x[i], xyz(v[i]) * h);
-    solve_thread(model, thread, scratch, x.data(), inv_mass.data(), body_model, body, h);
+    solve_thread(model, thread, scratch, x.data(), prev.data(), inv_mass.data(), body_model, body, h);
     for (size_t i = 0; i < x.size(); ++i) set(v[i], (xyz(x[i]) - xyz(prev[i])) / (h * (1 + damping * h)));
   }
   // The needle end goes by `by` [m] in `seconds`, and waits as long again.
