@@ -102,6 +102,61 @@ struct Reader {
   }
 };
 
+// Every index that a stage follows without asking lies within this scene: bytes of another scene or a damaged file must never become
+// a crash later.
+bool fits(const Model& model, const State& s) {
+  const SolverModel& m = model.solver;
+  const SolverState& v = s.solver;
+  const Thread& t = v.thread;
+  const size_t bodies = m.body.size();
+  if (v.x.size() != m.count || v.v.size() != m.count || v.body.size() != bodies || v.body_collides.size() != bodies) return false;
+  ClusterRotations rotation;
+  rotation.reset(m.shape.clusters);
+  for (const auto* r : {&v.rotation.x, &v.rotation.y, &v.rotation.z, &v.rotation.w})
+    if (r->size() != rotation.x.size()) return false;
+  if (t.order.size() != m.thread.count || v.thread_collides.size() != m.thread.count) return false;
+  const size_t pairs = m.thread.count > 0 ? m.thread.count - 1 : 0;
+  if (t.rest.size() != pairs || t.tension.size() != pairs) return false;
+  std::vector<uint8_t> found(m.thread.count);
+  auto is_slot = [&](uint32_t slot) { return slot >= m.thread.first_slot && slot - m.thread.first_slot < m.thread.count; };
+  for (uint32_t slot : t.order)
+    if (!is_slot(slot) || found[slot - m.thread.first_slot]++) return false;
+  auto is_point = [&](const TissuePoint& p) {
+    if (p.count > TissuePoint::kMost) return false;
+    for (uint32_t k = 0; k < p.count; ++k)
+      if (p.particle[k] >= m.tissue) return false;
+    return true;
+  };
+  auto is_body = [&](int b) { return b >= 0 && static_cast<size_t>(b) < bodies; };
+  for (const ThreadAnchor& a : t.anchor)
+    if (!is_slot(a.slot) || !is_point(a.point)) return false;
+  for (const ThreadHold& h : t.hold)
+    if (!is_slot(h.slot) || !is_body(h.body)) return false;
+  if (v.weld.size() < 2) return false;  // each tool on its hand
+  for (const Weld& w : v.weld)
+    if (!is_body(w.a) || (w.b >= 0 && !is_body(w.b))) return false;
+  bool tip = false;
+  for (const Attachment& a : v.attach) {
+    if (!is_point(a.point) || (a.body >= 0 && !is_body(a.body))) return false;
+    tip = tip || a.body == static_cast<int>(kNeedle);
+  }
+  for (const ChannelPoint& c : v.channel)
+    if (!is_point(c.point)) return false;
+  for (const Bite& b : s.suture.bite)
+    if (!is_point(b.entry.point) || !is_point(b.exit.point) || b.nearest >= m.tissue) return false;
+  for (const SuturePoint& p : s.suture.point)
+    if (p.anchor >= t.anchor.size() || p.bite >= s.suture.bite.size()) return false;
+  if (s.suture.phase > NeedlePhase::back_in || (s.suture.attached && !tip)) return false;
+  if (s.suture.phase != NeedlePhase::outside && s.suture.current >= s.suture.bite.size()) return false;
+  if (s.suture.phase == NeedlePhase::through && v.channel.size() != 2) return false;
+  if (s.suture.phase == NeedlePhase::back_in && s.suture.point.empty()) return false;
+  for (const HandState& h : s.suture.hand)
+    if (h.held > Held::thread) return false;
+  for (const ClosurePlan::Pull& p : s.plan.pull)
+    if (!is_point(p.point)) return false;
+  return true;
+}
+
 }  // namespace
 
 std::vector<std::byte> save_state(const Model&, const State& state) {
@@ -116,8 +171,7 @@ void load_state(const Model& model, State& state, const std::vector<std::byte>& 
   StatePtr fresh = initial_state(model);
   Reader r{bytes};
   fields(r, *fresh);
-  if (r.at != bytes.size() || fresh->solver.x.size() != model.solver.count || fresh->solver.v.size() != model.solver.count ||
-      fresh->solver.body.size() != model.solver.body.size() || fresh->solver.thread.order.size() != model.solver.thread.count)
+  if (r.at != bytes.size() || !fits(model, *fresh))
     throw InputError("saved state", "it does not fit this scene", "use the scene and the version it was saved with");
   state = std::move(*fresh);
 }

@@ -5,6 +5,7 @@
 // first, and the one behind it only when the span between them is taut.
 #include <algorithm>
 
+#include "core/check.h"
 #include "suture/suture.h"
 
 namespace catgut {
@@ -25,6 +26,7 @@ size_t node_of(const Thread& t, uint32_t slot) {
 
 void move_particle(Thread& t, size_t from, size_t after) {
   // Figure 8: the two pairs at the old place become one, the pair at the new place becomes two.
+  if (from == after + 1) return;
   const uint32_t slot = t.order[from];
   const float joined = t.rest[from - 1] + t.rest[from];
   const float half = 0.5f * t.rest[after];
@@ -97,6 +99,13 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
   update_thread_collisions(model, solver, suture);
   events.push_back({0, EventKind::suture_point, 0, static_cast<uint32_t>(state.point.size() - 1), static_cast<float>(bite), at});
   return true;
+}
+
+void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state) {
+  CATGUT_CHECK(!state.point.empty() && state.point.back().anchor + 1 == solver.thread.anchor.size());
+  solver.thread.anchor.pop_back();
+  state.point.pop_back();
+  update_thread_collisions(model, solver, suture);
 }
 
 void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, std::vector<Event>& events) {

@@ -13,6 +13,8 @@ namespace {
 constexpr float kReach = 0.008f;         // [m] the tip looks this far for the surface
 constexpr float kEndReached = 0.0008f;   // [m] along the shaft: an end of the needle is at the hole
 constexpr float kHysteresis = 0.00002f;  // [m] so that a tip resting on the surface does not chatter
+constexpr float kBackOut = 0.002f;       // [m] of shaft outside the entry again: the thread is no longer in the hole
+constexpr float kOnShaft = 0.0015f;      // [m] a hole this near to the shaft has the shaft in it
 
 ChannelPoint channel_at(const SutureModel& suture, const BiteEnd& end) {
   ChannelPoint c;
@@ -42,6 +44,18 @@ void drop_attachment(SolverState& solver, SutureState& state) {
   if (!state.attached) return;
   std::erase_if(solver.attach, [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
   state.attached = false;
+}
+
+// The needle is out again the way it came. The bite's record stays, marked; everything that held needle, tissue or thread goes.
+void cancel_bite(SolverState& solver, SutureState& state, Vec3 tip, std::vector<Event>& events) {
+  Bite& bite = state.bite[state.current];
+  drop_attachment(solver, state);
+  solver.channel.clear();
+  solver.body_collides[kNeedle] = 1;
+  bite.cancelled = true;
+  bite.has_exit = false;
+  state.phase = NeedlePhase::outside;
+  events.push_back({0, EventKind::bite_cancelled, 0, state.current, bite.depth, tip});
 }
 
 }  // namespace
@@ -146,12 +160,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
       if (inside) return;
       drop_attachment(solver, state);
       if (!near || tip_at - along(bite.entry) < kEndReached) {
-        // Out the way it came.
-        bite.cancelled = true;
-        solver.channel.clear();
-        solver.body_collides[kNeedle] = 1;
-        state.phase = NeedlePhase::outside;
-        events.push_back({0, EventKind::bite_cancelled, 0, state.current, bite.depth, tip});
+        cancel_bite(solver, state, tip, events);
         return;
       }
       bite.exit = hit.end;
@@ -170,6 +179,11 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
         state.phase = NeedlePhase::tip_in;
         return;
       }
+      if (!inside && tip_at - along(bite.exit) < kEndReached && tip_at - along(bite.entry) < kEndReached) {
+        // Torn back through both holes between two substeps: the tip was never seen in the wall.
+        cancel_bite(solver, state, tip, events);
+        return;
+      }
       if (along(bite.entry) > kEndReached) return;
       // The back-end trigger: the swage has reached the entry, the thread follows through it.
       if (!place_suture_point(model, solver, suture, state, state.current, false, events)) return;
@@ -179,6 +193,15 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
     }
     case NeedlePhase::back_in: {
       Bite& bite = state.bite[state.current];
+      const float entry_at = along(bite.entry);
+      if (entry_at > kBackOut && entry_at < 0.5f * tip_at &&
+          distance(position_of(bite.entry.point, x), needle_point(arc, needle, entry_at / arc.radius)) < kOnShaft) {
+        // The back end came out of the entry again: the thread has left the hole, the shaft is in it.
+        remove_last_suture_point(model, solver, suture, state);
+        solver.channel.insert(solver.channel.begin(), channel_at(suture, bite.entry));
+        state.phase = NeedlePhase::through;
+        return;
+      }
       if (along(bite.exit) > kEndReached) return;
       if (!place_suture_point(model, solver, suture, state, state.current, true, events)) return;
       solver.channel.clear();

@@ -93,13 +93,16 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
 
 // --- pull.cpp ----------------------------------------------------------------------------------------------------------
 // Moves the particle at index `from` of the order to stand right after the particle now at index `after` (figure 8), and gives
-// every pair a rest length so that the sum is what it was. from and after differ; ends of the thread stay ends.
+// every pair a rest length so that the sum is what it was. from and after differ; ends of the thread stay ends. A particle that stands
+// right after `after` already stays, and so do the lengths beside it.
 void move_particle(Thread& thread, size_t from, size_t after);
 // After every substep: particles whose turn it is pass their suture point (figures 7 to 9), from the needle end to the free end.
 void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, std::vector<Event>& events);
 // Locks the next free particle behind the needle to `end` and makes it a suture point (figure 7a). False: no free particle there yet.
 bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                         uint32_t bite, bool exit, std::vector<Event>& events);
+// Unlocks the newest suture point again: its thread was drawn back out of the hole. The particle stays where it is, as free thread.
+void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state);
 // Collisions are off for locked and held particles and `collision_off` neighbours on each side, on for all others (paper 2.3).
 void update_thread_collisions(const SolverModel& model, SolverState& solver, const SutureModel& suture);
 // Rest length [m] of the thread between its first and its last suture point along the order; 0 with fewer than two.

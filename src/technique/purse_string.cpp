@@ -73,7 +73,7 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, std::s
     for (size_t i = 0; i + 1 < sp.size(); ++i) state.path_start += distance(sp[i], sp[i + 1]);
     for (; state.checked < sp.size(); ++state.checked)
       if (first_out_of_order(sp, state.checked) == static_cast<int>(state.checked))
-        events.push_back({0, EventKind::order_broken, 0, state.checked + 1, 0, sp[(state.checked + 1) % sp.size()]});
+        events.push_back({0, EventKind::order_broken, 0, (state.checked + 1) % static_cast<uint32_t>(sp.size()), 0, sp[(state.checked + 1) % sp.size()]});
     events.push_back({0, EventKind::ring_complete, 0, static_cast<uint32_t>(sp.size()), angle, centre});
     return;
   }
