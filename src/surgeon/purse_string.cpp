@@ -1,7 +1,8 @@
 // surgeon/purse_string: the script of paper 2.5.1 as a surgeon does it. Needle driver (right) drives a seromuscular bite along the rim by
 // turning the needle about its own circle; the forceps (left) takes the tip, brings it through and pulls the thread; the driver
 // takes the needle back for the next bite. At the end one hand holds the needle's end, the other the tail, and both pull.
-// Reads Snapshots only; each step looks at what really happened before the next begins.
+// Reads Snapshots only; each step looks at what really happened before the next begins. What goes wrong is tried again: a bite whose tip
+// did not come out is drawn back and driven a little shallower or deeper, a missed grasp is approached anew.
 #include <array>
 #include <cmath>
 #include <limits>
@@ -16,8 +17,9 @@ namespace {
 
 constexpr size_t kDriver = 0, kForceps = 1;
 constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f;  // places on the needle's arc: two thirds from the tip, behind the tip
+constexpr int kAttempts = 8;                             // at one bite, at one grasp
 
-enum class Step { pick_over, pick_down, pick_close, hover, approach, drive, take_over, take_down, take_close, release, retreat, drive_through,
+enum class Step { pick_over, pick_down, pick_close, hover, approach, drive, withdraw, take_over, take_down, take_close, release, retreat, drive_through,
                   pull, present, back_over, back_down, back_close, give, tail_over, tail_down, tail_close, tighten, hold, done };
 
 // Where a bite is made, in the world as it is now: a place on the serosa, its outward normal, the way along the rim, the way to the rim.
@@ -42,6 +44,7 @@ class PurseStringSurgeon final : public Surgeon {
       case Step::pick_over: case Step::pick_down: case Step::pick_close: return "pick up the needle";
       case Step::hover: case Step::approach: return bite + "approach";
       case Step::drive: return bite + "drive the needle";
+      case Step::withdraw: return bite + "draw back and try again";
       case Step::take_over: case Step::take_down: case Step::take_close: case Step::release: case Step::retreat: return bite + "take the tip";
       case Step::drive_through: return bite + "bring the needle through";
       case Step::pull: return bite + "pull the thread";
@@ -162,7 +165,7 @@ class PurseStringSurgeon final : public Surgeon {
 
   // The needle with its tip `psi` past the deepest place of a bite at frame f: its circle cuts the wall over bite_length.
   Pose needle_at(const BiteFrame& f, float psi) const {
-    const Vec3 centre = f.at + f.out * (picture_.needle_radius - bite_depth() + depth_error_);
+    const Vec3 centre = f.at + f.out * (picture_.needle_radius - bite_depth() + depth_error_ + depth_fix_);
     const Vec3 x = f.out * std::cos(psi) - f.along * std::sin(psi);
     // The tip is at the end of the arc: for other arcs than a half circle turn back by what is missing.
     const Pose half{centre, from_axes(x, cross(f.up, x), f.up)};
@@ -239,7 +242,7 @@ class PurseStringSurgeon final : public Surgeon {
       case Step::pick_close:
         if (!move_jaw(driver, 0, dt) || waited_ < 0.35f) return;
         if (!holds_needle(seen, kDriver)) {
-          if (++misses_ > 3) return give_up();
+          if (++misses_ > kAttempts) return give_up();
           return go(Step::pick_over);
         }
         driver.grip = inverse(needle) * seen.tool[kDriver].pose;
@@ -274,7 +277,25 @@ class PurseStringSurgeon final : public Surgeon {
         move_toward(driver, holding(kDriver, needle_at(frame_, psi_)), 2 * speed, dt);
         const bool out = seen.bite.size() > first_bite_seen_ && seen.bite.back().has_exit;
         if (out && psi_ > psi_bite + 0.72f) return go(Step::take_over);
-        if (psi_ > psi_bite + 1.1f) return give_up();  // the tip did not come out where it should
+        if (psi_ > psi_bite + 1.1f) {
+          // The tip is not where it should be: it never went in, or it went too deep to come out.
+          depth_fix_ += seen.needle.in_tissue ? 0.0003f : -0.0003f;
+          return go(Step::withdraw);
+        }
+        return;
+      }
+      case Step::withdraw: {  // back the way it came, then the same bite again
+        rest_aside(kForceps);
+        psi_ = std::max(psi_ - 2 * skill_.drive_speed / picture_.needle_radius * dt, -psi_bite - 0.7f);
+        BiteFrame f = frame_;
+        if (!patience(1.5f)) f.at += f.out * std::min(0.01f, 0.01f * (waited_ - 1.5f));  // it sticks: away from the wall
+        move_toward(driver, holding(kDriver, needle_at(f, psi_)), 2 * speed, dt);
+        if (psi_ <= -psi_bite - 0.7f && !seen.needle.in_tissue) {
+          if (++attempts_ > kAttempts) return give_up();
+          aim();
+          return go(Step::hover);
+        }
+        if (!patience(8)) give_up();
         return;
       }
       case Step::take_over:
@@ -287,7 +308,7 @@ class PurseStringSurgeon final : public Surgeon {
       case Step::take_close:
         if (!move_jaw(forceps, 0, dt) || waited_ < 0.3f) return;
         if (!holds_needle(seen, kForceps)) {
-          if (++misses_ > 3) return give_up();
+          if (++misses_ > kAttempts) return give_up();
           return go(Step::take_over);
         }
         misses_ = 0;
@@ -303,11 +324,13 @@ class PurseStringSurgeon final : public Surgeon {
         rest_aside(kDriver);
         psi_ += 2 * skill_.drive_speed / picture_.needle_radius * dt;
         psi_ = std::min(psi_, psi_bite + kPi + 0.5f);
-        move_toward(forceps, holding(kForceps, needle_at(frame_, psi_)), 2 * speed, dt);
+        BiteFrame f = frame_;
+        if (!patience(3)) f.at += (f.out + 0.4f * f.up) * std::min(0.02f, 0.01f * (waited_ - 3));  // it sticks: a pull outward frees the back end
+        move_toward(forceps, holding(kForceps, needle_at(f, psi_)), 2 * speed, dt);
         if (seen.bite.size() > first_bite_seen_ && seen.bite.back().complete) {
           pull_from_ = forceps.pose;
           go(Step::pull);
-        } else if (!patience(6)) {
+        } else if (!patience(8)) {
           give_up();
         }
         return;
@@ -326,15 +349,17 @@ class PurseStringSurgeon final : public Surgeon {
           const float there = length_from(seen, node_of(seen, a.anchored), node_of(seen, b.anchored));
           slack = there - 1.1f * distance(a.position, b.position) - 0.001f;
         }
-        if (slack <= 0 || distance(forceps.pose.p, pull_from_.p) > 0.29f) {
+        // Thread that cannot be drawn further is left: the last pull takes up the slack.
+        if (slack <= 0 || distance(forceps.pose.p, pull_from_.p) > 0.29f || !patience(12)) {
           ++bite_;
+          attempts_ = 0;
+          depth_fix_ = 0;
           aim();
           return go(bite_ < skill_.bites ? Step::present : Step::tail_over);
         }
         const Pose goal{pull_from_.p + way * 0.3f, forceps.pose.q};
         // Slow down before the thread runs tight: a jerk would tear.
         move_toward(forceps, goal, std::min(speed, 0.015f + 5 * slack), dt);
-        if (!patience(12)) give_up();
         return;
       }
       case Step::present: {  // bring the needle beside the next bite, where the driver can take it
@@ -355,7 +380,7 @@ class PurseStringSurgeon final : public Surgeon {
       case Step::back_close:
         if (!move_jaw(driver, 0, dt) || waited_ < 0.3f) return;
         if (!holds_needle(seen, kDriver)) {
-          if (++misses_ > 3) return give_up();
+          if (++misses_ > kAttempts) return give_up();
           return go(Step::back_over);
         }
         misses_ = 0;
@@ -369,7 +394,9 @@ class PurseStringSurgeon final : public Surgeon {
       case Step::tail_over: case Step::tail_down: case Step::tail_close: {
         // A place on the tail a little way from the first bite, seen from outside.
         const size_t first = node_of(seen, seen.suture_point.front().anchored);
-        const size_t at = first > 14 ? first - 12 : first / 2;
+        // After a miss another place: that one may lie against the tissue.
+        const size_t away = 12 + 3 * static_cast<size_t>(misses_ % 4);
+        const size_t at = first > away + 2 ? first - away : first / 2;
         const Vec3 thread = seen.particle[seen.thread_order[at]];
         const BiteFrame f = frame(seen, 0);
         const Vec3 z = normalized(f.out * 0.6f + axis_), x = normalized(f.along - z * dot(f.along, z));
@@ -383,7 +410,7 @@ class PurseStringSurgeon final : public Surgeon {
           else if (!patience(4)) give_up();
         } else if (move_jaw(driver, 0, dt) && waited_ > 0.3f) {
           if (seen.tool[kDriver].held != Held::thread) {
-            if (++misses_ > 4) return give_up();
+            if (++misses_ > kAttempts) return give_up();
             return go(Step::tail_over);
           }
           go(Step::tighten);
@@ -431,10 +458,11 @@ class PurseStringSurgeon final : public Surgeon {
   float ring_radius_ = 0.02f;
   Step step_ = Step::pick_over;
   float waited_ = 0;
-  int bite_ = 0, misses_ = 0;
+  int bite_ = 0, misses_ = 0, attempts_ = 0;
   bool gave_up_ = false;
   BiteFrame frame_;
   float psi_ = 0, aim_along_ = 0, aim_up_ = 0, depth_error_ = 0;
+  float depth_fix_ = 0;  // [m] what the failed attempts at this bite taught; positive: shallower
   size_t first_bite_seen_ = 0;
   Pose pull_from_;
   uint32_t sequence_ = 0;
