@@ -1,8 +1,8 @@
-// surgeon/purse_string: the script of paper 2.5.1 as a surgeon does it. Needle driver (right) drives a seromuscular bite along the rim by
-// turning the needle about its own circle; the forceps (left) takes the tip, brings it through and pulls the thread; the driver
-// takes the needle back for the next bite. At the end one hand holds the needle's end, the other the tail, and both pull.
-// Reads Snapshots only; each step looks at what really happened before the next begins. What goes wrong is tried again: a bite whose tip
-// did not come out is drawn back and driven a little shallower or deeper, a missed grasp is approached anew.
+// surgeon/purse_string: the script of paper 2.5.1 as a surgeon does it. Needle driver (right) drives a seromuscular bite along
+// the rim by turning the needle about its own circle; the forceps (left) takes the tip, brings it through and pulls the thread;
+// the driver takes the needle back for the next bite. At the end one hand holds the needle's end, the other the tail, and both
+// pull. Reads Snapshots only; each step looks at what really happened before the next begins. What goes wrong is tried again: a
+// bite whose tip did not come out is drawn back and driven a little shallower or deeper, a missed grasp is approached anew.
 #include <array>
 #include <cmath>
 #include <limits>
@@ -17,19 +17,46 @@ namespace {
 
 constexpr size_t kDriver = 0, kForceps = 1;
 constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f;  // places on the needle's arc: two thirds from the tip, behind the tip
-constexpr int kAttempts = 8;                             // at one bite, at one grasp
+constexpr int kAttempts = 8;                            // at one bite, at one grasp
 
-enum class Step { pick_over, pick_down, pick_close, hover, approach, drive, withdraw, take_over, take_down, take_close, release, retreat, drive_through,
-                  pull, present, back_over, back_down, back_close, give, tail_over, tail_down, tail_close, tighten, hold, done };
+enum class Step {
+  pick_over,
+  pick_down,
+  pick_close,
+  hover,
+  approach,
+  drive,
+  withdraw,
+  take_over,
+  take_down,
+  take_close,
+  release,
+  retreat,
+  drive_through,
+  pull,
+  present,
+  back_over,
+  back_down,
+  back_close,
+  give,
+  tail_over,
+  tail_down,
+  tail_close,
+  tighten,
+  hold,
+  done
+};
 
-// Where a bite is made, in the world as it is now: a place on the serosa, its outward normal, the way along the rim, the way to the rim.
+// Where a bite is made, in the world as it is now: a place on the serosa, its outward normal, the way along the rim, the way to
+// the rim.
 struct BiteFrame {
   Vec3 at, out, along, up;
 };
 
 class PurseStringSurgeon final : public Surgeon {
  public:
-  PurseStringSurgeon(const PictureModel& picture, const SurgeonSkill& skill) : picture_(picture), skill_(skill), random_(skill.seed) {
+  PurseStringSurgeon(const PictureModel& picture, const SurgeonSkill& skill)
+      : picture_(picture), skill_(skill), random_(skill.seed) {
     if (picture.rim.empty() || picture.body.empty()) throw std::invalid_argument("the scene has no opening for a purse-string");
     find_places();
     hand_[kDriver].pose = {picture.focus + Vec3{0.06f, 0.08f, 0.05f}, {}};
@@ -39,20 +66,46 @@ class PurseStringSurgeon final : public Surgeon {
   bool done() const override { return step_ == Step::done; }
 
   std::string doing() const override {
-    const std::string bite = "bite " + std::to_string(std::min(bite_ + 1, skill_.bites)) + " of " + std::to_string(skill_.bites) + ": ";
+    const std::string bite =
+        "bite " + std::to_string(std::min(bite_ + 1, skill_.bites)) + " of " + std::to_string(skill_.bites) + ": ";
     switch (step_) {
-      case Step::pick_over: case Step::pick_down: case Step::pick_close: return "pick up the needle";
-      case Step::hover: case Step::approach: return bite + "approach";
-      case Step::drive: return bite + "drive the needle";
-      case Step::withdraw: return bite + "draw back and try again";
-      case Step::take_over: case Step::take_down: case Step::take_close: case Step::release: case Step::retreat: return bite + "take the tip";
-      case Step::drive_through: return bite + "bring the needle through";
-      case Step::pull: return bite + "pull the thread";
-      case Step::present: case Step::back_over: case Step::back_down: case Step::back_close: case Step::give: return bite + "take the needle back";
-      case Step::tail_over: case Step::tail_down: case Step::tail_close: return "take the tail";
-      case Step::tighten: return "draw the purse-string tight";
-      case Step::hold: return "hold";
-      case Step::done: return gave_up_ ? "gave up" : "done";
+      case Step::pick_over:
+      case Step::pick_down:
+      case Step::pick_close:
+        return "pick up the needle";
+      case Step::hover:
+      case Step::approach:
+        return bite + "approach";
+      case Step::drive:
+        return bite + "drive the needle";
+      case Step::withdraw:
+        return bite + "draw back and try again";
+      case Step::take_over:
+      case Step::take_down:
+      case Step::take_close:
+      case Step::release:
+      case Step::retreat:
+        return bite + "take the tip";
+      case Step::drive_through:
+        return bite + "bring the needle through";
+      case Step::pull:
+        return bite + "pull the thread";
+      case Step::present:
+      case Step::back_over:
+      case Step::back_down:
+      case Step::back_close:
+      case Step::give:
+        return bite + "take the needle back";
+      case Step::tail_over:
+      case Step::tail_down:
+      case Step::tail_close:
+        return "take the tail";
+      case Step::tighten:
+        return "draw the purse-string tight";
+      case Step::hold:
+        return "hold";
+      case Step::done:
+        return gave_up_ ? "gave up" : "done";
     }
     return "";
   }
@@ -83,7 +136,8 @@ class PurseStringSurgeon final : public Surgeon {
     if (dot(axis_, centre - mean_rest()) < 0) axis_ = -axis_;  // out of the opening
     const Vec3 u = normalized(Vec3{1, 0, 0} - axis_ * axis_.x, any_perpendicular(axis_)), v = cross(axis_, u);
     float round = 0;
-    for (size_t i = 0; i < rim.size(); ++i) round += distance(picture_.particle_rest[rim[i]], picture_.particle_rest[rim[(i + 1) % rim.size()]]);
+    for (size_t i = 0; i < rim.size(); ++i)
+      round += distance(picture_.particle_rest[rim[i]], picture_.particle_rest[rim[(i + 1) % rim.size()]]);
     ring_radius_ = round / (2 * kPi);
     const VisibleMesh& mesh = picture_.body[0];
     // Bites are even in length round the rim, not in angle: an organ's rim is no circle.
@@ -93,7 +147,8 @@ class PurseStringSurgeon final : public Surgeon {
     auto angle_of = [&](Vec3 p) { return std::atan2(dot(p - centre, v), dot(p - centre, u)); };
     size_t start = 0;
     for (size_t i = 0; i < n; ++i)
-      if (std::abs(angle_of(picture_.particle_rest[rim[i]])) < std::abs(angle_of(picture_.particle_rest[rim[start]]))) start = i;
+      if (std::abs(angle_of(picture_.particle_rest[rim[i]])) < std::abs(angle_of(picture_.particle_rest[rim[start]])))
+        start = i;
     const bool counter = dot(normal, axis_) > 0;  // go clockwise seen from above: the way a right hand's needle turns
     auto rim_at = [&](size_t i) { return picture_.particle_rest[rim[(start + (counter ? n - i % n : i % n)) % n]]; };
     for (size_t i = 0; i < n; ++i) run.push_back(run.back() + distance(rim_at(i), rim_at(i + 1)));
@@ -160,7 +215,9 @@ class PurseStringSurgeon final : public Surgeon {
     return f;
   }
 
-  float bite_depth() const { return skill_.bite_length * skill_.bite_length / 8 * (1 / picture_.needle_radius + 1 / ring_radius_); }
+  float bite_depth() const {
+    return skill_.bite_length * skill_.bite_length / 8 * (1 / picture_.needle_radius + 1 / ring_radius_);
+  }
   float half_bite_angle() const { return std::asin(std::min(0.9f, 0.5f * skill_.bite_length / picture_.needle_radius)); }
 
   // The needle with its tip `psi` past the deepest place of a bite at frame f: its circle cuts the wall over bite_length.
@@ -172,8 +229,8 @@ class PurseStringSurgeon final : public Surgeon {
     return half * Pose{{}, axis_angle({0, 0, 1}, kPi - picture_.needle_arc)};
   }
 
-  // A tool frame that grips the needle (at `needle`) at place s of its arc: shaft out of the needle's plane on its upper side, leaning
-  // over the circle's centre by `lean`.
+  // A tool frame that grips the needle (at `needle`) at place s of its arc: shaft out of the needle's plane on its upper side,
+  // leaning over the circle's centre by `lean`.
   Pose grip_at(const Pose& needle, float s, float lean) const {
     const float phi = s * picture_.needle_arc;
     const Vec3 radial = rotate(needle.q, {std::cos(phi), std::sin(phi), 0});
@@ -325,7 +382,9 @@ class PurseStringSurgeon final : public Surgeon {
         psi_ += 2 * skill_.drive_speed / picture_.needle_radius * dt;
         psi_ = std::min(psi_, psi_bite + kPi + 0.5f);
         BiteFrame f = frame_;
-        if (!patience(3)) f.at += (f.out + 0.4f * f.up) * std::min(0.02f, 0.01f * (waited_ - 3));  // it sticks: a pull outward frees the back end
+        if (!patience(3))
+          f.at +=
+              (f.out + 0.4f * f.up) * std::min(0.02f, 0.01f * (waited_ - 3));  // it sticks: a pull outward frees the back end
         move_toward(forceps, holding(kForceps, needle_at(f, psi_)), 2 * speed, dt);
         if (seen.bite.size() > first_bite_seen_ && seen.bite.back().complete) {
           pull_from_ = forceps.pose;
@@ -391,7 +450,9 @@ class PurseStringSurgeon final : public Surgeon {
         return;
 
       // --- closing: the driver takes the tail, both hands pull ---
-      case Step::tail_over: case Step::tail_down: case Step::tail_close: {
+      case Step::tail_over:
+      case Step::tail_down:
+      case Step::tail_close: {
         // A place on the tail a little way from the first bite, seen from outside.
         const size_t first = node_of(seen, seen.suture_point.front().anchored);
         // After a miss another place: that one may lie against the tissue.
@@ -419,11 +480,14 @@ class PurseStringSurgeon final : public Surgeon {
       }
       case Step::tighten: {
         const BiteFrame f = frame(seen, 0);
-        const Vec3 left = normalized(f.out * 0.5f - f.along * 0.8f + axis_ * 0.35f), right = normalized(f.out * 0.5f + f.along * 0.8f + axis_ * 0.35f);
+        const Vec3 left = normalized(f.out * 0.5f - f.along * 0.8f + axis_ * 0.35f),
+                   right = normalized(f.out * 0.5f + f.along * 0.8f + axis_ * 0.35f);
         // The needle's end leaves the last bite, which lies before the first one along the rim; the tail leaves the first.
         const float reach = 0.35f;
         // A surgeon feels the thread: the harder it pulls back, the slower the hand.
-        auto gently = [&](size_t hand) { return 0.25f * speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.02f, 1.0f); };
+        auto gently = [&](size_t hand) {
+          return 0.25f * speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.02f, 1.0f);
+        };
         if (seen.closure < 0.985f) {
           move_toward(forceps, {picture_.focus + left * reach, forceps.pose.q}, gently(kForceps), dt);
           // The tail hand gives a counter-hold: it moves out only as far as keeps its own side tight.

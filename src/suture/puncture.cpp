@@ -1,6 +1,6 @@
-// suture/puncture: the needle's two triggers (paper 2.2, figures 4 and 5). Reads the needle and the tissue's surface; writes bites, the
-// attachment of the nearest particle, the channel in which the shaft runs, and asks for suture points.
-// The tip is tracked against the surface itself, so a bite keeps where it went in and out to a fraction of a millimetre; the nearest
+// suture/puncture: the needle's two triggers (paper 2.2, figures 4 and 5). Reads the needle and the tissue's surface; writes
+// bites, the attachment of the nearest particle, the channel in which the shaft runs, and asks for suture points. The tip is
+// tracked against the surface itself, so a bite keeps where it went in and out to a fraction of a millimetre; the nearest
 // particle is what drags the tissue along, as in the paper.
 #include <algorithm>
 #include <cmath>
@@ -60,7 +60,8 @@ void cancel_bite(SolverState& solver, SutureState& state, Vec3 tip, std::vector<
 
 }  // namespace
 
-bool nearest_surface(const SolverModel& model, const Candidates& candidates, const Vec4* x, Vec3 p, float reach, SurfaceHit& hit) {
+bool nearest_surface(const SolverModel& model, const Candidates& candidates, const Vec4* x, Vec3 p, float reach,
+                     SurfaceHit& hit) {
   const TissueCollision& tissue = model.collision;
   const int near = nearest_particle(tissue, candidates, x, p, reach);
   if (near < 0) return false;
@@ -138,7 +139,8 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
         a.compliance = suture.attach_compliance;
         solver.attach.push_back(a);
         state.attached = true;
-        events.push_back({0, EventKind::particle_attached, 0, bite.nearest, distance(state.attached_from, tip), state.attached_from});
+        events.push_back(
+            {0, EventKind::particle_attached, 0, bite.nearest, distance(state.attached_from, tip), state.attached_from});
       }
       solver.channel.push_back(channel_at(suture, bite.entry));
       solver.body_collides[kNeedle] = 0;  // the shaft is in the tissue now: its channel holds it, not its surface
@@ -150,7 +152,8 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
       if (state.attached) {
         // Figure 5: dragged beyond the threshold, it is let go and the tissue relaxes.
         const float dragged = distance(xyz(x[bite.nearest]), state.attached_from);
-        const auto row = std::find_if(solver.attach.begin(), solver.attach.end(), [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
+        const auto row = std::find_if(solver.attach.begin(), solver.attach.end(),
+                                      [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
         const float torn = distance(transform(needle.pose(), row->target), state.attached_from);
         if (std::max(dragged, torn) > suture.release_distance) {
           drop_attachment(solver, state);

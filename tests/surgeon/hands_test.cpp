@@ -80,7 +80,9 @@ struct Scene {
 
 bool same(const std::array<ToolInput, 2>& a, const std::array<ToolInput, 2>& b) {
   for (size_t k = 0; k < 2; ++k)
-    if (!(a[k].pose == b[k].pose) || !(a[k].velocity == b[k].velocity) || a[k].jaw != b[k].jaw || a[k].sequence != b[k].sequence) return false;
+    if (!(a[k].pose == b[k].pose) || !(a[k].velocity == b[k].velocity) || a[k].jaw != b[k].jaw ||
+        a[k].sequence != b[k].sequence)
+      return false;
   return true;
 }
 
@@ -137,7 +139,8 @@ TEST(Surgeon, sees_the_snapshot_alone) {
     std::string line;
     while (std::getline(in, line))
       if (line.rfind("#include \"", 0) == 0) {
-        EXPECT_TRUE(line.find("\"core/") != line.npos || line.find("\"exchange/") != line.npos || line.find("\"surgeon/") != line.npos)
+        EXPECT_TRUE(line.find("\"core/") != line.npos || line.find("\"exchange/") != line.npos ||
+                    line.find("\"surgeon/") != line.npos)
             << line;
       }
   }

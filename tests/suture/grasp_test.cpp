@@ -125,7 +125,8 @@ TEST(Grasp, holds_and_releases_the_nearest_thread) {
   ASSERT_EQ(r.count(EventKind::thread_grasped), 1u);
   EXPECT_EQ(r.suture().hand[1].held, Held::thread);
   const uint32_t held = r.suture().hand[1].slot;
-  EXPECT_LE(distance(xyz(r.solver().x[held]), r.solver().body[1].x), distance(xyz(r.solver().x[slot]), r.solver().body[1].x) + 1e-4f);
+  EXPECT_LE(distance(xyz(r.solver().x[held]), r.solver().body[1].x),
+            distance(xyz(r.solver().x[slot]), r.solver().body[1].x) + 1e-4f);
   // Paper 2.3: particles in a jaw, and three neighbours a side, do not collide.
   const size_t n = r.node_of(held);
   for (size_t i = n - 3; i <= n + 3; ++i)

@@ -13,17 +13,19 @@ struct Pair {
   uint32_t first, second;
 };
 
-// Figure 8 and its text, to the letter: pp_m is the pair whose first particle is to move, pp_t the one after whose first particle it goes.
+// Figure 8 and its text, to the letter: pp_m is the pair whose first particle is to move, pp_t the one after whose first
+// particle it goes.
 std::vector<Pair> recalculate(std::vector<Pair> pp, uint32_t moved, uint32_t after) {
   auto at = [&](uint32_t first) {
-    return static_cast<size_t>(std::find_if(pp.begin(), pp.end(), [&](const Pair& p) { return p.first == first; }) - pp.begin());
+    return static_cast<size_t>(std::find_if(pp.begin(), pp.end(), [&](const Pair& p) { return p.first == first; }) -
+                               pp.begin());
   };
   size_t m = at(moved), t = at(after);
-  // "If pp_m is not the first pair in the rope, the second particle in the next available pair (pp_m-1) is set to the second particle
-  // of pp_m."
+  // "If pp_m is not the first pair in the rope, the second particle in the next available pair (pp_m-1) is set to the second
+  // particle of pp_m."
   if (m != 0) pp[m - 1].second = pp[m].second;
-  // "A new pair is created where the first particle in the pair is the first particle in pp_t, and the second particle in the pair is the
-  // particle that moved. This pair's location is set to be before pp_t in the order of the rope." (figure 8c)
+  // "A new pair is created where the first particle in the pair is the first particle in pp_t, and the second particle in the
+  // pair is the particle that moved. This pair's location is set to be before pp_t in the order of the rope." (figure 8c)
   const Pair made{pp[t].first, moved};
   // "The first particle in pp_t is set to the particle that was moved." (figure 8d)
   pp[t].first = moved;
@@ -60,7 +62,8 @@ TEST(Figure8, order_is_the_papers_for_every_move) {
       std::vector<Pair> pp;
       for (uint32_t i = 0; i + 1 < kNodes; ++i) pp.push_back({t.order[i], t.order[i + 1]});
       const std::vector<Pair> want = recalculate(pp, t.order[from], t.order[after]);
-      const uint32_t moved = t.order[from], behind = t.order[after], free_side = t.order[from - 1], needle_side = t.order[from + 1];
+      const uint32_t moved = t.order[from], behind = t.order[after], free_side = t.order[from - 1],
+                     needle_side = t.order[from + 1];
       move_particle(t, from, after);
       ASSERT_EQ(t.order.size(), size_t{kNodes});
       ASSERT_EQ(t.rest.size(), size_t{kNodes} - 1);

@@ -1,4 +1,5 @@
-// tests/suture: thread through suture points (paper 2.3, figures 7 and 9). Weightless and laid by hand, so that every length is known.
+// tests/suture: thread through suture points (paper 2.3, figures 7 and 9). Weightless and laid by hand, so that every length is
+// known.
 #include <gtest/gtest.h>
 
 #include "rig.h"
@@ -27,7 +28,8 @@ void lock(Rig& rig, size_t node, Vec3 at) {
   a.friction = rig.model->suture.pass_tension;
   a.capstan = rig.model->suture.capstan;
   set(rig.solver().x[a.slot], position_of(a.point, rig.x()));
-  rig.suture().point.push_back({static_cast<uint32_t>(rig.suture().bite.size()), false, static_cast<uint32_t>(rig.thread().anchor.size())});
+  rig.suture().point.push_back(
+      {static_cast<uint32_t>(rig.suture().bite.size()), false, static_cast<uint32_t>(rig.thread().anchor.size())});
   rig.suture().bite.push_back(bite);
   rig.thread().anchor.push_back(a);
 }
@@ -71,8 +73,8 @@ void draw_out(Rig& rig, const Place& p, float metres, float speed) {
   rig.needle_to(to, metres / speed);
 }
 
-// "The simulator temporarily anchors the next free particle at the needle's end to the suture point. This locks the thread at that
-// location." (figure 7a)
+// "The simulator temporarily anchors the next free particle at the needle's end to the suture point. This locks the thread at
+// that location." (figure 7a)
 TEST(Figure7, a_suture_point_locks_the_next_free_particle_behind_the_needle) {
   Rig rig(weightless(40));
   rig.wait(0.1f);
@@ -98,8 +100,9 @@ TEST(Figure7, a_suture_point_locks_the_next_free_particle_behind_the_needle) {
   EXPECT_EQ(rig.thread().anchor.size(), 1u);
 }
 
-// "... allowing tension T to build between the anchored particle and the particle still attached to the needle as it moves away. Once T
-// exceeds a predefined threshold, the simulator advances the thread" (figure 7b): below the threshold nothing passes.
+// "... allowing tension T to build between the anchored particle and the particle still attached to the needle as it moves
+// away. Once T exceeds a predefined threshold, the simulator advances the thread" (figure 7b): below the threshold nothing
+// passes.
 TEST(Figure7, tension_below_the_threshold_passes_nothing_above_it_thread_passes) {
   SceneSpec scene = weightless(40);
   scene.suture.pass_tension = 0.013f;  // one particle of tissue gives way by a millimetre for each 1.4 mN
@@ -127,8 +130,8 @@ TEST(Figure7, tension_below_the_threshold_passes_nothing_above_it_thread_passes)
   EXPECT_GE(rig.count(EventKind::particle_passed), 1u);
 }
 
-// Figure 7c: "The particle on the free end of the suture point moves to the midpoint of the needle end particle and the suture point."
-// The stage by itself, on a state whose turn it is: exactly one particle, exactly the midpoint, nothing else moves.
+// Figure 7c: "The particle on the free end of the suture point moves to the midpoint of the needle end particle and the suture
+// point." The stage by itself, on a state whose turn it is: exactly one particle, exactly the midpoint, nothing else moves.
 TEST(Figure7, exactly_one_particle_passes_to_the_midpoint) {
   Rig rig(weightless(40));
   Place p;
@@ -159,8 +162,8 @@ TEST(Figure7, exactly_one_particle_passes_to_the_midpoint) {
   EXPECT_TRUE(events.empty());
 }
 
-// Ours beyond the paper: passing a particle is bookkeeping. Thread that lies straight is straight afterwards and nothing jumps, because
-// the midpoint lies on it.
+// Ours beyond the paper: passing a particle is bookkeeping. Thread that lies straight is straight afterwards and nothing jumps,
+// because the midpoint lies on it.
 TEST(Figure7, passing_makes_no_jump) {
   Rig rig(weightless(40));
   Place p;
@@ -184,7 +187,8 @@ TEST(Figure7, passing_makes_no_jump) {
   EXPECT_LT(longest_passing, longest + 0.0002f);
 }
 
-// Figure 7d: "Tension is resolved after particle movement." Once the needle stops, the difference is no more than the friction holds.
+// Figure 7d: "Tension is resolved after particle movement." Once the needle stops, the difference is no more than the friction
+// holds.
 TEST(Figure7, tension_resolves_after_passing) {
   Rig rig(weightless(40));
   Place p;
@@ -198,13 +202,14 @@ TEST(Figure7, tension_resolves_after_passing) {
   const size_t passed = rig.count(EventKind::particle_passed);
   rig.wait(0.5f);
   EXPECT_EQ(rig.count(EventKind::particle_passed), passed) << "a resting thread passes nothing";
-  // As much thread came through as the needle took, less what the tissue, held by friction, still leans after it: to one particle.
+  // As much thread came through as the needle took, less what the tissue, held by friction, still leans after it: to one
+  // particle.
   const float leans = dot(rig.point_at(0) - at_rest, p.out), spacing = rig.model->solver.thread.spacing;
   EXPECT_NEAR(static_cast<float>(passed) * spacing + leans, 0.012f, 1.1f * spacing);
 }
 
-// "If p10 is locked to a suture point, p11 through p13 and p7 through p9 will have collision disabled along with p10. ... A particle's ability
-// to collide is restored as the thread is pulled through the suture point."
+// "If p10 is locked to a suture point, p11 through p13 and p7 through p9 will have collision disabled along with p10. ... A
+// particle's ability to collide is restored as the thread is pulled through the suture point."
 TEST(Collisions, are_off_for_the_locked_particle_and_three_neighbours_a_side_and_come_back) {
   Rig rig(weightless(40));
   Place p;
@@ -247,14 +252,16 @@ void two_points(Rig& rig, size_t older, size_t newer, Place& p) {
   const float height = std::sqrt(std::max(0.0f, length * length - chord * chord)) * 0.5f;
   for (size_t i = older + 1; i < newer; ++i) {
     const float s = static_cast<float>(i - older) / static_cast<float>(newer - older);
-    set(rig.solver().x[rig.thread().order[i]], lerp(a, b, s) + normalized(first.out + p.out) * (height * (1 - std::abs(2 * s - 1))));
+    set(rig.solver().x[rig.thread().order[i]],
+        lerp(a, b, s) + normalized(first.out + p.out) * (height * (1 - std::abs(2 * s - 1))));
   }
   put_needle(rig, xyz(rig.solver().x[rig.thread().order.back()]));
   update_thread_collisions(rig.model->solver, rig.solver(), rig.model->suture);
 }
 
-// Figure 9: (a), (b) while the thread between two suture points is longer than the way between them, "the particle on the free end of the
-// thread adjacent to sp2 is moved"; (c) "there is no slack left between the two suture points, and pulling will happen" behind the older.
+// Figure 9: (a), (b) while the thread between two suture points is longer than the way between them, "the particle on the free
+// end of the thread adjacent to sp2 is moved"; (c) "there is no slack left between the two suture points, and pulling will
+// happen" behind the older.
 TEST(Figure9, slack_is_resolved_first_then_the_pull_comes_from_behind_the_older_point) {
   Rig rig(weightless(50));
   Place p;

@@ -8,8 +8,8 @@
 namespace catgut {
 namespace {
 
-// "As soon as the needle's tip penetrates the soft tissue, the closest soft-body particle within a specified threshold distance X of
-// the tip is identified and attached to the needle as illustrated in Fig. 4."
+// "As soon as the needle's tip penetrates the soft tissue, the closest soft-body particle within a specified threshold distance
+// X of the tip is identified and attached to the needle as illustrated in Fig. 4."
 TEST(Figure4, nearest_particle_within_x_is_attached_when_the_tip_enters) {
   Rig rig;
   rig.wait(0.2f);
@@ -23,13 +23,16 @@ TEST(Figure4, nearest_particle_within_x_is_attached_when_the_tip_enters) {
   const Event& e = *rig.last(EventKind::particle_attached);
   EXPECT_LE(e.value, rig.model->suture.attach_threshold);
   EXPECT_EQ(rig.suture().bite[0].nearest, e.which);
-  // No particle was nearer to the tip. A few substeps have passed since: tip and tissue have moved by less than half a millimetre.
+  // No particle was nearer to the tip. A few substeps have passed since: tip and tissue have moved by less than half a
+  // millimetre.
   float nearest = std::numeric_limits<float>::max();
-  for (uint32_t i = 0; i < rig.model->solver.tissue; ++i) nearest = std::min(nearest, distance(xyz(rig.x()[i]), rig.last(EventKind::tip_entered)->where));
+  for (uint32_t i = 0; i < rig.model->solver.tissue; ++i)
+    nearest = std::min(nearest, distance(xyz(rig.x()[i]), rig.last(EventKind::tip_entered)->where));
   EXPECT_NEAR(e.value, nearest, 0.0005f);
 }
 
-// The same figure, exactly: one call of the stage on a tip placed by hand, so that nothing has moved between the trigger and the search.
+// The same figure, exactly: one call of the stage on a tip placed by hand, so that nothing has moved between the trigger and
+// the search.
 TEST(Figure4, the_nearest_is_the_nearest_of_all) {
   Rig rig;
   rig.wait(0.1f);
@@ -72,9 +75,9 @@ TEST(Figure4, no_particle_within_x_attaches_none) {
   EXPECT_TRUE(rig.solver().attach.empty());
 }
 
-// Figure 5: "When the needle has dragged the attached particle a certain distance beyond its original position, exceeding a preset
-// distance threshold, the particle's attachment to the needle is automatically released, allowing the previously stretched region
-// of tissue to relax back toward its original shape."
+// Figure 5: "When the needle has dragged the attached particle a certain distance beyond its original position, exceeding a
+// preset distance threshold, the particle's attachment to the needle is automatically released, allowing the previously
+// stretched region of tissue to relax back toward its original shape."
 TEST(Figure5, dragged_beyond_the_threshold_it_is_released_and_the_tissue_relaxes) {
   Rig rig;
   rig.wait(1.0f);
@@ -106,8 +109,9 @@ TEST(Figure5, dragged_beyond_the_threshold_it_is_released_and_the_tissue_relaxes
   EXPECT_LT(worst, 0.0003f);
 }
 
-// "Once the needle's back-end trigger also passes through the tissue, the system marks the completion of that bite of the suture. When a
-// bite is completed, the needle creates a suture point." A bite has two holes, so it makes two: entry first, then exit.
+// "Once the needle's back-end trigger also passes through the tissue, the system marks the completion of that bite of the
+// suture. When a bite is completed, the needle creates a suture point." A bite has two holes, so it makes two: entry first,
+// then exit.
 TEST(Bite, back_end_trigger_completes_it_and_makes_its_suture_points) {
   Rig rig;
   rig.wait(0.2f);
@@ -289,7 +293,8 @@ TEST(Spread, reproduces_the_place_at_rest_and_under_affine_motion) {
     EXPECT_NEAR(sum, 1.0, 1e-6);
     EXPECT_LT(distance(position_of(t, shape.rest.data()), at), 1e-6f);
     auto affine = [](Vec3 p) {
-      return Vec3{1.2f * p.x + 0.3f * p.y - 0.1f * p.z + 0.01f, -0.2f * p.x + 0.8f * p.y + 0.25f * p.z - 0.02f, 0.15f * p.x + 1.1f * p.z};
+      return Vec3{1.2f * p.x + 0.3f * p.y - 0.1f * p.z + 0.01f, -0.2f * p.x + 0.8f * p.y + 0.25f * p.z - 0.02f,
+                  0.15f * p.x + 1.1f * p.z};
     };
     std::vector<Vec4> moved(shape.rest.begin(), shape.rest.end());
     for (Vec4& p : moved) set(p, affine(xyz(p)));

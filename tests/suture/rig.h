@@ -1,5 +1,5 @@
-// tests/suture: a whole scene in which a ghost drives the needle. The ghost is one more weld of the needle to a place in the world, so
-// that a test says exactly where the needle goes; jaws, hands and mechanics are the real ones.
+// tests/suture: a whole scene in which a ghost drives the needle. The ghost is one more weld of the needle to a place in the
+// world, so that a test says exactly where the needle goes; jaws, hands and mechanics are the real ones.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ struct Rig {
   Jobs jobs{1};
   std::vector<Event> seen;  // all events so far
   TickInput input;
-  int ghost = -1;           // index of its weld
+  int ghost = -1;  // index of its weld
 
   explicit Rig(const SceneSpec& scene = plain_scene()) : model(build_model(scene)), state(initial_state(*model)) {
     for (ToolInput& h : input.hand) h.connected = 0;
@@ -101,7 +101,8 @@ struct Rig {
     const Vec3 out = normalized(Vec3{hit.normal.x, 0, hit.normal.z}), up{0, 1, 0};
     return {hit.point, out, cross(out, up), up};
   }
-  // The needle's circle with the tip `psi` past the deepest place of a bite at `p`; the circle reaches `deep` below the surface.
+  // The needle's circle with the tip `psi` past the deepest place of a bite at `p`; the circle reaches `deep` below the
+  // surface.
   Pose circle_at(const Place& p, float psi, float deep = 0.0011f) const {
     const Vec3 axis_x = p.out * std::cos(psi) - p.along * std::sin(psi);
     return {p.at + p.out * (model->scene.needle.radius - deep), from_axes(axis_x, cross(p.up, axis_x), p.up)};

@@ -17,7 +17,8 @@ std::vector<Vec3> ring(int bites, float radius = 0.02f, float inside = 0.5f) {
   return sp;
 }
 
-// "The thread does not cross the opening when sp_i+1 is the closest suture point to sp_i in 3D space from sp_i+1, sp_i+2, and sp_i+3."
+// "The thread does not cross the opening when sp_i+1 is the closest suture point to sp_i in 3D space from sp_i+1, sp_i+2, and
+// sp_i+3."
 TEST(Adjacency, holds_for_a_ring_of_twenty_four) {
   EXPECT_EQ(first_out_of_order(ring(12)), -1);
   EXPECT_EQ(first_out_of_order(ring(12, 0.02f, 0.65f)), -1) << "bites longer than the bridges between them";
@@ -71,7 +72,8 @@ struct Ring {
     constexpr int kRim = 48;
     for (int i = 0; i < kRim; ++i) add(0.020f, 2 * kPi * static_cast<float>(i) / kRim, 0, &model.rim_outer);
     for (int i = 0; i < kRim; ++i) add(0.0175f, 2 * kPi * static_cast<float>(i) / kRim, 0, &model.rim_inner);
-    for (const Vec3& p : ring(bites, 0.0195f)) sp.push_back(static_cast<uint32_t>(x.size())), x.push_back(point(p - Vec3{0, 0.004f, 0}));
+    for (const Vec3& p : ring(bites, 0.0195f))
+      sp.push_back(static_cast<uint32_t>(x.size())), x.push_back(point(p - Vec3{0, 0.004f, 0}));
     for (const Vec4& p : x) start.push_back(xyz(p));
   }
   void add(float r, float a, float y, std::vector<uint32_t>* rim) {
@@ -81,7 +83,8 @@ struct Ring {
   void tick(float loop, float dt = 1.0f / 60, size_t points = 1000) {
     std::vector<Vec3> where;
     std::vector<TissuePoint> at;
-    for (size_t k = 0; k < std::min(points, sp.size()); ++k) where.push_back(xyz(x[sp[k]])), at.push_back(particle_point(sp[k]));
+    for (size_t k = 0; k < std::min(points, sp.size()); ++k)
+      where.push_back(xyz(x[sp[k]])), at.push_back(particle_point(sp[k]));
     purse_string(model, state, where, at, x.data(), loop, dt, plan, events);
   }
   float way() const {
