@@ -1,4 +1,5 @@
-// sim/save_state: the whole state as bytes, and its hash. One list of fields serves saving, loading and hashing, so that none can forget one.
+// sim/save_state: the whole state as bytes, and its hash. One list of fields serves saving, loading and hashing, so that none
+// can forget one.
 #include <cmath>
 #include <cstring>
 #include <type_traits>
@@ -13,11 +14,11 @@ namespace {
 
 // Structs made of four-byte members only: no padding, so their bytes are their value.
 template <typename T>
-constexpr bool kPlain = std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> ||
-                        std::is_same_v<T, Quat> || std::is_same_v<T, Pose> || std::is_same_v<T, TissuePoint> ||
-                        std::is_same_v<T, BiteEnd> || std::is_same_v<T, Weld> || std::is_same_v<T, Attachment> ||
-                        std::is_same_v<T, ChannelPoint> || std::is_same_v<T, RigidBody> || std::is_same_v<T, ThreadHold> ||
-                        std::is_same_v<T, ClosurePlan::Pull>;
+constexpr bool kPlain =
+    std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> ||
+    std::is_same_v<T, Quat> || std::is_same_v<T, Pose> || std::is_same_v<T, TissuePoint> || std::is_same_v<T, BiteEnd> ||
+    std::is_same_v<T, Weld> || std::is_same_v<T, Attachment> || std::is_same_v<T, ChannelPoint> ||
+    std::is_same_v<T, RigidBody> || std::is_same_v<T, ThreadHold> || std::is_same_v<T, ClosurePlan::Pull>;
 static_assert(sizeof(Weld) % 4 == 0 && sizeof(Weld) == 4 * (2 + 3 * 7 + 2 + 6));
 static_assert(sizeof(TissuePoint) == 4 * (1 + 16 + 16));
 static_assert(sizeof(Attachment) == sizeof(TissuePoint) + 4 * (1 + 3 + 1 + 3));
@@ -28,7 +29,8 @@ static_assert(sizeof(ThreadHold) == 4 * 5 && sizeof(BiteEnd) == sizeof(TissuePoi
 
 template <typename A>
 void fields(A& a, ThreadAnchor& t) {
-  a(t.slot), a(t.point), a(t.friction), a(t.capstan), a(t.slipping), a(t.blocked_needle), a(t.blocked_free), a(t.tension_needle), a(t.tension_free);
+  a(t.slot), a(t.point), a(t.friction), a(t.capstan), a(t.slipping), a(t.blocked_needle), a(t.blocked_free),
+      a(t.tension_needle), a(t.tension_free);
 }
 template <typename A>
 void fields(A& a, Bite& b) {
@@ -48,7 +50,8 @@ void fields(A& a, State& s) {
   a(s.solver.x), a(s.solver.v);
   a(s.solver.rotation.x), a(s.solver.rotation.y), a(s.solver.rotation.z), a(s.solver.rotation.w);
   a(s.solver.body);
-  a(s.solver.thread.order), a(s.solver.thread.rest), a(s.solver.thread.anchor), a(s.solver.thread.hold), a(s.solver.thread.tension);
+  a(s.solver.thread.order), a(s.solver.thread.rest), a(s.solver.thread.anchor), a(s.solver.thread.hold),
+      a(s.solver.thread.tension);
   a(s.solver.weld), a(s.solver.attach), a(s.solver.channel), a(s.solver.thread_collides), a(s.solver.body_collides);
   a(s.suture.bite), a(s.suture.point), a(s.suture.phase), a(s.suture.current), a(s.suture.tip_inside), a(s.suture.attached);
   a(s.suture.attached_from), a(s.suture.hand[0]), a(s.suture.hand[1]);
@@ -74,7 +77,8 @@ struct Writer {
     const uint64_t n = v.size();
     bytes(&n, sizeof n);
     if constexpr (kPlain<T>) bytes(v.data(), n * sizeof(T));
-    else for (T& e : v) (*this)(e);
+    else
+      for (T& e : v) (*this)(e);
   }
 };
 
@@ -82,7 +86,8 @@ struct Reader {
   const std::vector<std::byte>& in;
   size_t at = 0;
   void bytes(void* p, size_t n) {
-    if (n > in.size() - at) throw InputError("saved state", "it ends too early", "the file was cut or belongs to another scene");
+    if (n > in.size() - at)
+      throw InputError("saved state", "it ends too early", "the file was cut or belongs to another scene");
     std::memcpy(p, in.data() + at, n);
     at += n;
   }
@@ -98,9 +103,66 @@ struct Reader {
     if (n > in.size()) throw InputError("saved state", "an array has an impossible length", "the file is damaged");
     v.resize(n);
     if constexpr (kPlain<T>) bytes(v.data(), n * sizeof(T));
-    else for (T& e : v) (*this)(e);
+    else
+      for (T& e : v) (*this)(e);
   }
 };
+
+// Every index that a stage follows without asking lies within this scene: bytes of another scene or a damaged file must never
+// become a crash later.
+bool fits(const Model& model, const State& s) {
+  const SolverModel& m = model.solver;
+  const SolverState& v = s.solver;
+  const Thread& t = v.thread;
+  const size_t bodies = m.body.size();
+  if (v.x.size() != m.count || v.v.size() != m.count || v.body.size() != bodies || v.body_collides.size() != bodies)
+    return false;
+  ClusterRotations rotation;
+  rotation.reset(m.shape.clusters);
+  for (const auto* r : {&v.rotation.x, &v.rotation.y, &v.rotation.z, &v.rotation.w})
+    if (r->size() != rotation.x.size()) return false;
+  if (t.order.size() != m.thread.count || v.thread_collides.size() != m.thread.count) return false;
+  const size_t pairs = m.thread.count > 0 ? m.thread.count - 1 : 0;
+  if (t.rest.size() != pairs || t.tension.size() != pairs) return false;
+  std::vector<uint8_t> found(m.thread.count);
+  auto is_slot = [&](uint32_t slot) { return slot >= m.thread.first_slot && slot - m.thread.first_slot < m.thread.count; };
+  for (uint32_t slot : t.order)
+    if (!is_slot(slot) || found[slot - m.thread.first_slot]++) return false;
+  auto is_point = [&](const TissuePoint& p) {
+    if (p.count > TissuePoint::kMost) return false;
+    for (uint32_t k = 0; k < p.count; ++k)
+      if (p.particle[k] >= m.tissue) return false;
+    return true;
+  };
+  auto is_body = [&](int b) { return b >= 0 && static_cast<size_t>(b) < bodies; };
+  for (const ThreadAnchor& a : t.anchor)
+    if (!is_slot(a.slot) || !is_point(a.point)) return false;
+  for (const ThreadHold& h : t.hold)
+    if (!is_slot(h.slot) || !is_body(h.body)) return false;
+  if (v.weld.size() < 2) return false;  // each tool on its hand
+  for (const Weld& w : v.weld)
+    if (!is_body(w.a) || (w.b >= 0 && !is_body(w.b))) return false;
+  bool tip = false;
+  for (const Attachment& a : v.attach) {
+    if (!is_point(a.point) || (a.body >= 0 && !is_body(a.body))) return false;
+    tip = tip || a.body == static_cast<int>(kNeedle);
+  }
+  for (const ChannelPoint& c : v.channel)
+    if (!is_point(c.point)) return false;
+  for (const Bite& b : s.suture.bite)
+    if (!is_point(b.entry.point) || !is_point(b.exit.point) || b.nearest >= m.tissue) return false;
+  for (const SuturePoint& p : s.suture.point)
+    if (p.anchor >= t.anchor.size() || p.bite >= s.suture.bite.size()) return false;
+  if (s.suture.phase > NeedlePhase::back_in || (s.suture.attached && !tip)) return false;
+  if (s.suture.phase != NeedlePhase::outside && s.suture.current >= s.suture.bite.size()) return false;
+  if (s.suture.phase == NeedlePhase::through && v.channel.size() != 2) return false;
+  if (s.suture.phase == NeedlePhase::back_in && s.suture.point.empty()) return false;
+  for (const HandState& h : s.suture.hand)
+    if (h.held > Held::thread) return false;
+  for (const ClosurePlan::Pull& p : s.plan.pull)
+    if (!is_point(p.point)) return false;
+  return true;
+}
 
 }  // namespace
 
@@ -116,8 +178,7 @@ void load_state(const Model& model, State& state, const std::vector<std::byte>& 
   StatePtr fresh = initial_state(model);
   Reader r{bytes};
   fields(r, *fresh);
-  if (r.at != bytes.size() || fresh->solver.x.size() != model.solver.count || fresh->solver.v.size() != model.solver.count ||
-      fresh->solver.body.size() != model.solver.body.size() || fresh->solver.thread.order.size() != model.solver.thread.count)
+  if (r.at != bytes.size() || !fits(model, *fresh))
     throw InputError("saved state", "it does not fit this scene", "use the scene and the version it was saved with");
   state = std::move(*fresh);
 }
