@@ -328,13 +328,9 @@ void fling_all(int seeds, float seconds) {
   }
 }
 
-// DISABLED: solve_thread feeds energy into a thread that is flung about faster than it converges (a needle on nine segments of
-// thread, jerked at 2 m/s, reaches 36 m/s and 300 N within a tick, and the free thread then keeps itself going). A mistake of
-// the solver, not of the mechanics tested here; run them with --gtest_also_run_disabled_tests, and drop the prefix with the
-// fix.
-TEST(Fling, DISABLED_six_seconds_three_seeds) { fling_all(3, 6); }
+TEST(Fling, six_seconds_three_seeds) { fling_all(3, 6); }
 
-TEST(Fling, DISABLED_sixty_seconds_ten_seeds) {
+TEST(Fling, sixty_seconds_ten_seeds) {
   if (!long_run()) GTEST_SKIP() << "set CATGUT_LONG=1";
   fling_all(10, 60);
 }
