@@ -1,4 +1,5 @@
 // sim/save_state: the whole state as bytes, and its hash. One list of fields serves saving, loading and hashing, so that none can forget one.
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <type_traits>
@@ -88,19 +89,91 @@ struct Reader {
   }
   template <typename T>
   void operator()(T& v) {
-    if constexpr (kPlain<T>) bytes(&v, sizeof v);
-    else fields(*this, v);
+    if constexpr (std::is_same_v<T, bool>) {  // a byte that is neither 0 nor 1 is no bool
+      uint8_t byte = 0;
+      bytes(&byte, 1);
+      if (byte > 1) throw InputError("saved state", "a flag is neither on nor off", "the file is damaged");
+      v = byte != 0;
+    } else if constexpr (kPlain<T>) {
+      bytes(&v, sizeof v);
+    } else {
+      fields(*this, v);
+    }
   }
   template <typename T, typename Alloc>
   void operator()(std::vector<T, Alloc>& v) {
     uint64_t n = 0;
     bytes(&n, sizeof n);
-    if (n > in.size()) throw InputError("saved state", "an array has an impossible length", "the file is damaged");
+    // Memory is asked for only when the file is long enough to fill it: no row takes more than twice its bytes there.
+    if (n > (in.size() - at) / std::max<size_t>(1, sizeof(T) / 2))
+      throw InputError("saved state", "an array has an impossible length", "the file is damaged");
     v.resize(n);
     if constexpr (kPlain<T>) bytes(v.data(), n * sizeof(T));
     else for (T& e : v) (*this)(e);
   }
 };
+
+// Whether every index in a state that was read leads somewhere: the stages trust them. `fresh`: a state of the same model.
+bool fits(const Model& model, const State& s, const State& fresh) {
+  const SolverModel& m = model.solver;
+  const SolverState &a = s.solver, &b = fresh.solver;
+  if (a.x.size() != b.x.size() || a.v.size() != b.v.size() || a.body.size() != b.body.size() ||
+      a.rotation.x.size() != b.rotation.x.size() || a.rotation.y.size() != b.rotation.y.size() ||
+      a.rotation.z.size() != b.rotation.z.size() || a.rotation.w.size() != b.rotation.w.size() ||
+      a.thread.order.size() != b.thread.order.size() || a.thread.rest.size() != b.thread.rest.size() ||
+      a.thread.tension.size() != b.thread.tension.size() || a.thread_collides.size() != b.thread_collides.size() ||
+      a.body_collides.size() != b.body_collides.size())
+    return false;
+  // Every thread particle once.
+  const uint32_t first = m.thread.first_slot, count = m.thread.count;
+  constexpr uint32_t kNone = ~0u;
+  std::vector<uint32_t> node(count, kNone);
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint32_t slot = a.thread.order[i] - first;  // wraps to a large number below the first
+    if (slot >= count || node[slot] != kNone) return false;
+    node[slot] = i;
+  }
+  const int bodies = static_cast<int>(a.body.size());
+  const auto point_ok = [&](const TissuePoint& p) {
+    if (p.count > TissuePoint::kMost) return false;
+    for (uint32_t k = 0; k < p.count; ++k)
+      if (p.particle[k] >= m.tissue) return false;
+    return true;
+  };
+  const auto end_ok = [&](const BiteEnd& e) { return e.triangle < m.collision.surface.size() && point_ok(e.point); };
+  for (const ThreadAnchor& t : a.thread.anchor) {  // the thread goes on to both sides of a suture point
+    if (t.slot - first >= count || !point_ok(t.point)) return false;
+    const uint32_t i = node[t.slot - first];
+    if (i == 0 || i + 1 == count) return false;
+  }
+  for (const ThreadHold& h : a.thread.hold)
+    if (h.slot - first >= count || h.body < 0 || h.body >= bodies) return false;
+  if (a.weld.size() < 2) return false;
+  for (size_t k = 0; k < a.weld.size(); ++k) {  // the first two hold the tools to their hands
+    const Weld& w = a.weld[k];
+    if (w.a < 0 || w.a >= bodies || w.b < -1 || w.b >= bodies || (k < 2 && (w.a != static_cast<int>(k) || w.b != -1))) return false;
+  }
+  bool tip_attached = false;
+  for (const Attachment& t : a.attach) {
+    if (t.body < -1 || t.body >= bodies || !point_ok(t.point)) return false;
+    tip_attached = tip_attached || t.body == static_cast<int>(kNeedle);
+  }
+  for (const ChannelPoint& c : a.channel)
+    if (!point_ok(c.point)) return false;
+  const SutureState& u = s.suture;
+  for (const Bite& bite : u.bite)
+    if (bite.nearest >= m.tissue || !end_ok(bite.entry) || !end_ok(bite.exit)) return false;
+  for (const SuturePoint& p : u.point)
+    if (p.bite >= u.bite.size() || p.anchor >= a.thread.anchor.size()) return false;
+  if (u.phase > NeedlePhase::back_in || (u.phase != NeedlePhase::outside && u.current >= u.bite.size())) return false;
+  if ((u.phase == NeedlePhase::through && a.channel.empty()) || (u.attached && !tip_attached)) return false;
+  if (u.attached && u.phase != NeedlePhase::tip_in) return false;
+  for (const HandState& h : u.hand)
+    if (h.held > Held::thread || (h.held == Held::thread && h.slot - first >= count)) return false;
+  for (const ClosurePlan::Pull& p : s.plan.pull)
+    if (!point_ok(p.point)) return false;
+  return s.purse_string.checked <= u.point.size();
+}
 
 }  // namespace
 
@@ -116,8 +189,7 @@ void load_state(const Model& model, State& state, const std::vector<std::byte>& 
   StatePtr fresh = initial_state(model);
   Reader r{bytes};
   fields(r, *fresh);
-  if (r.at != bytes.size() || fresh->solver.x.size() != model.solver.count || fresh->solver.v.size() != model.solver.count ||
-      fresh->solver.body.size() != model.solver.body.size() || fresh->solver.thread.order.size() != model.solver.thread.count)
+  if (r.at != bytes.size() || !fits(model, *fresh, *initial_state(model)))
     throw InputError("saved state", "it does not fit this scene", "use the scene and the version it was saved with");
   state = std::move(*fresh);
 }
