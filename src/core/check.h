@@ -12,7 +12,15 @@ namespace catgut {
 struct InputError : std::runtime_error {
   // where: "scene.toml:14" or a file or an option; what: the fault; next: what the user can do about it.
   InputError(const std::string& where, const std::string& what, const std::string& next)
-      : std::runtime_error(where + ": " + what + "; " + next) {}
+      : std::runtime_error(one_line(where + ": " + what + "; " + next)) {}
+
+ private:
+  // Messages quote what the input says: whatever that is, it stays one line and sends no control codes to a terminal.
+  static std::string one_line(std::string text) {
+    for (char& c : text)
+      if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+    return text;
+  }
 };
 
 [[noreturn]] inline void check_failed(const char* file, int line, const char* condition) {

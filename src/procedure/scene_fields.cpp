@@ -143,7 +143,7 @@ std::string quoted(const std::string& text) {
 std::string float_text(float value) {
   std::string text = fmt::format("{}", value);
   if (static_cast<float>(std::strtod(text.c_str(), nullptr)) != value) text = fmt::format("{:.9g}", value);
-  return text;
+  return text == "-0" ? "-0.0" : text;  // TOML's -0 is a whole number, and those have no sign of zero
 }
 
 }  // namespace

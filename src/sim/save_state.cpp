@@ -1,5 +1,5 @@
-// sim/save_state: the whole state as bytes, and its hash. One list of fields serves saving, loading and hashing, so that none
-// can forget one.
+// sim/save_state: the whole state as bytes, and its hash. One list of fields serves saving, loading and hashing, so that none can forget one.
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <type_traits>
@@ -14,11 +14,11 @@ namespace {
 
 // Structs made of four-byte members only: no padding, so their bytes are their value.
 template <typename T>
-constexpr bool kPlain =
-    std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> ||
-    std::is_same_v<T, Quat> || std::is_same_v<T, Pose> || std::is_same_v<T, TissuePoint> || std::is_same_v<T, BiteEnd> ||
-    std::is_same_v<T, Weld> || std::is_same_v<T, Attachment> || std::is_same_v<T, ChannelPoint> ||
-    std::is_same_v<T, RigidBody> || std::is_same_v<T, ThreadHold> || std::is_same_v<T, ClosurePlan::Pull>;
+constexpr bool kPlain = std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> ||
+                        std::is_same_v<T, Quat> || std::is_same_v<T, Pose> || std::is_same_v<T, TissuePoint> ||
+                        std::is_same_v<T, BiteEnd> || std::is_same_v<T, Weld> || std::is_same_v<T, Attachment> ||
+                        std::is_same_v<T, ChannelPoint> || std::is_same_v<T, RigidBody> || std::is_same_v<T, ThreadHold> ||
+                        std::is_same_v<T, ClosurePlan::Pull>;
 static_assert(sizeof(Weld) % 4 == 0 && sizeof(Weld) == 4 * (2 + 3 * 7 + 2 + 6));
 static_assert(sizeof(TissuePoint) == 4 * (1 + 16 + 16));
 static_assert(sizeof(Attachment) == sizeof(TissuePoint) + 4 * (1 + 3 + 1 + 3));
@@ -29,8 +29,7 @@ static_assert(sizeof(ThreadHold) == 4 * 5 && sizeof(BiteEnd) == sizeof(TissuePoi
 
 template <typename A>
 void fields(A& a, ThreadAnchor& t) {
-  a(t.slot), a(t.point), a(t.friction), a(t.capstan), a(t.slipping), a(t.blocked_needle), a(t.blocked_free),
-      a(t.tension_needle), a(t.tension_free);
+  a(t.slot), a(t.point), a(t.friction), a(t.capstan), a(t.slipping), a(t.blocked_needle), a(t.blocked_free), a(t.tension_needle), a(t.tension_free);
 }
 template <typename A>
 void fields(A& a, Bite& b) {
@@ -50,8 +49,7 @@ void fields(A& a, State& s) {
   a(s.solver.x), a(s.solver.v);
   a(s.solver.rotation.x), a(s.solver.rotation.y), a(s.solver.rotation.z), a(s.solver.rotation.w);
   a(s.solver.body);
-  a(s.solver.thread.order), a(s.solver.thread.rest), a(s.solver.thread.anchor), a(s.solver.thread.hold),
-      a(s.solver.thread.tension);
+  a(s.solver.thread.order), a(s.solver.thread.rest), a(s.solver.thread.anchor), a(s.solver.thread.hold), a(s.solver.thread.tension);
   a(s.solver.weld), a(s.solver.attach), a(s.solver.channel), a(s.solver.thread_collides), a(s.solver.body_collides);
   a(s.suture.bite), a(s.suture.point), a(s.suture.phase), a(s.suture.current), a(s.suture.tip_inside), a(s.suture.attached);
   a(s.suture.attached_from), a(s.suture.hand[0]), a(s.suture.hand[1]);
@@ -77,8 +75,7 @@ struct Writer {
     const uint64_t n = v.size();
     bytes(&n, sizeof n);
     if constexpr (kPlain<T>) bytes(v.data(), n * sizeof(T));
-    else
-      for (T& e : v) (*this)(e);
+    else for (T& e : v) (*this)(e);
   }
 };
 
@@ -86,82 +83,96 @@ struct Reader {
   const std::vector<std::byte>& in;
   size_t at = 0;
   void bytes(void* p, size_t n) {
-    if (n > in.size() - at)
-      throw InputError("saved state", "it ends too early", "the file was cut or belongs to another scene");
+    if (n > in.size() - at) throw InputError("saved state", "it ends too early", "the file was cut or belongs to another scene");
     std::memcpy(p, in.data() + at, n);
     at += n;
   }
   template <typename T>
   void operator()(T& v) {
-    if constexpr (kPlain<T>) bytes(&v, sizeof v);
-    else fields(*this, v);
+    if constexpr (std::is_same_v<T, bool>) {  // a byte that is neither 0 nor 1 is no bool
+      uint8_t byte = 0;
+      bytes(&byte, 1);
+      if (byte > 1) throw InputError("saved state", "a flag is neither on nor off", "the file is damaged");
+      v = byte != 0;
+    } else if constexpr (kPlain<T>) {
+      bytes(&v, sizeof v);
+    } else {
+      fields(*this, v);
+    }
   }
   template <typename T, typename Alloc>
   void operator()(std::vector<T, Alloc>& v) {
     uint64_t n = 0;
     bytes(&n, sizeof n);
-    if (n > in.size()) throw InputError("saved state", "an array has an impossible length", "the file is damaged");
+    // Memory is asked for only when the file is long enough to fill it: no row takes more than twice its bytes there.
+    if (n > (in.size() - at) / std::max<size_t>(1, sizeof(T) / 2))
+      throw InputError("saved state", "an array has an impossible length", "the file is damaged");
     v.resize(n);
     if constexpr (kPlain<T>) bytes(v.data(), n * sizeof(T));
-    else
-      for (T& e : v) (*this)(e);
+    else for (T& e : v) (*this)(e);
   }
 };
 
-// Every index that a stage follows without asking lies within this scene: bytes of another scene or a damaged file must never
-// become a crash later.
-bool fits(const Model& model, const State& s) {
+// Whether every index in a state that was read leads somewhere: the stages trust them. `fresh`: a state of the same model.
+bool fits(const Model& model, const State& s, const State& fresh) {
   const SolverModel& m = model.solver;
-  const SolverState& v = s.solver;
-  const Thread& t = v.thread;
-  const size_t bodies = m.body.size();
-  if (v.x.size() != m.count || v.v.size() != m.count || v.body.size() != bodies || v.body_collides.size() != bodies)
+  const SolverState &a = s.solver, &b = fresh.solver;
+  if (a.x.size() != b.x.size() || a.v.size() != b.v.size() || a.body.size() != b.body.size() ||
+      a.rotation.x.size() != b.rotation.x.size() || a.rotation.y.size() != b.rotation.y.size() ||
+      a.rotation.z.size() != b.rotation.z.size() || a.rotation.w.size() != b.rotation.w.size() ||
+      a.thread.order.size() != b.thread.order.size() || a.thread.rest.size() != b.thread.rest.size() ||
+      a.thread.tension.size() != b.thread.tension.size() || a.thread_collides.size() != b.thread_collides.size() ||
+      a.body_collides.size() != b.body_collides.size())
     return false;
-  ClusterRotations rotation;
-  rotation.reset(m.shape.clusters);
-  for (const auto* r : {&v.rotation.x, &v.rotation.y, &v.rotation.z, &v.rotation.w})
-    if (r->size() != rotation.x.size()) return false;
-  if (t.order.size() != m.thread.count || v.thread_collides.size() != m.thread.count) return false;
-  const size_t pairs = m.thread.count > 0 ? m.thread.count - 1 : 0;
-  if (t.rest.size() != pairs || t.tension.size() != pairs) return false;
-  std::vector<uint8_t> found(m.thread.count);
-  auto is_slot = [&](uint32_t slot) { return slot >= m.thread.first_slot && slot - m.thread.first_slot < m.thread.count; };
-  for (uint32_t slot : t.order)
-    if (!is_slot(slot) || found[slot - m.thread.first_slot]++) return false;
-  auto is_point = [&](const TissuePoint& p) {
+  // Every thread particle once.
+  const uint32_t first = m.thread.first_slot, count = m.thread.count;
+  constexpr uint32_t kNone = ~0u;
+  std::vector<uint32_t> node(count, kNone);
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint32_t slot = a.thread.order[i] - first;  // wraps to a large number below the first
+    if (slot >= count || node[slot] != kNone) return false;
+    node[slot] = i;
+  }
+  const int bodies = static_cast<int>(a.body.size());
+  const auto point_ok = [&](const TissuePoint& p) {
     if (p.count > TissuePoint::kMost) return false;
     for (uint32_t k = 0; k < p.count; ++k)
       if (p.particle[k] >= m.tissue) return false;
     return true;
   };
-  auto is_body = [&](int b) { return b >= 0 && static_cast<size_t>(b) < bodies; };
-  for (const ThreadAnchor& a : t.anchor)
-    if (!is_slot(a.slot) || !is_point(a.point)) return false;
-  for (const ThreadHold& h : t.hold)
-    if (!is_slot(h.slot) || !is_body(h.body)) return false;
-  if (v.weld.size() < 2) return false;  // each tool on its hand
-  for (const Weld& w : v.weld)
-    if (!is_body(w.a) || (w.b >= 0 && !is_body(w.b))) return false;
-  bool tip = false;
-  for (const Attachment& a : v.attach) {
-    if (!is_point(a.point) || (a.body >= 0 && !is_body(a.body))) return false;
-    tip = tip || a.body == static_cast<int>(kNeedle);
+  const auto end_ok = [&](const BiteEnd& e) { return e.triangle < m.collision.surface.size() && point_ok(e.point); };
+  for (const ThreadAnchor& t : a.thread.anchor) {  // the thread goes on to both sides of a suture point
+    if (t.slot - first >= count || !point_ok(t.point)) return false;
+    const uint32_t i = node[t.slot - first];
+    if (i == 0 || i + 1 == count) return false;
   }
-  for (const ChannelPoint& c : v.channel)
-    if (!is_point(c.point)) return false;
-  for (const Bite& b : s.suture.bite)
-    if (!is_point(b.entry.point) || !is_point(b.exit.point) || b.nearest >= m.tissue) return false;
-  for (const SuturePoint& p : s.suture.point)
-    if (p.anchor >= t.anchor.size() || p.bite >= s.suture.bite.size()) return false;
-  if (s.suture.phase > NeedlePhase::back_in || (s.suture.attached && !tip)) return false;
-  if (s.suture.phase != NeedlePhase::outside && s.suture.current >= s.suture.bite.size()) return false;
-  if (s.suture.phase == NeedlePhase::through && v.channel.size() != 2) return false;
-  if (s.suture.phase == NeedlePhase::back_in && s.suture.point.empty()) return false;
-  for (const HandState& h : s.suture.hand)
-    if (h.held > Held::thread) return false;
+  for (const ThreadHold& h : a.thread.hold)
+    if (h.slot - first >= count || h.body < 0 || h.body >= bodies) return false;
+  if (a.weld.size() < 2) return false;
+  for (size_t k = 0; k < a.weld.size(); ++k) {  // the first two hold the tools to their hands
+    const Weld& w = a.weld[k];
+    if (w.a < 0 || w.a >= bodies || w.b < -1 || w.b >= bodies || (k < 2 && (w.a != static_cast<int>(k) || w.b != -1))) return false;
+  }
+  bool tip_attached = false;
+  for (const Attachment& t : a.attach) {
+    if (t.body < -1 || t.body >= bodies || !point_ok(t.point)) return false;
+    tip_attached = tip_attached || t.body == static_cast<int>(kNeedle);
+  }
+  for (const ChannelPoint& c : a.channel)
+    if (!point_ok(c.point)) return false;
+  const SutureState& u = s.suture;
+  for (const Bite& bite : u.bite)
+    if (bite.nearest >= m.tissue || !end_ok(bite.entry) || !end_ok(bite.exit)) return false;
+  for (const SuturePoint& p : u.point)
+    if (p.bite >= u.bite.size() || p.anchor >= a.thread.anchor.size()) return false;
+  if (u.phase > NeedlePhase::back_in || (u.phase != NeedlePhase::outside && u.current >= u.bite.size())) return false;
+  if ((u.phase == NeedlePhase::through && a.channel.empty()) || (u.attached && !tip_attached)) return false;
+  if (u.attached && u.phase != NeedlePhase::tip_in) return false;
+  for (const HandState& h : u.hand)
+    if (h.held > Held::thread || (h.held == Held::thread && h.slot - first >= count)) return false;
   for (const ClosurePlan::Pull& p : s.plan.pull)
-    if (!is_point(p.point)) return false;
-  return true;
+    if (!point_ok(p.point)) return false;
+  return s.purse_string.checked <= u.point.size();
 }
 
 }  // namespace
@@ -178,7 +189,7 @@ void load_state(const Model& model, State& state, const std::vector<std::byte>& 
   StatePtr fresh = initial_state(model);
   Reader r{bytes};
   fields(r, *fresh);
-  if (r.at != bytes.size() || !fits(model, *fresh))
+  if (r.at != bytes.size() || !fits(model, *fresh, *initial_state(model)))
     throw InputError("saved state", "it does not fit this scene", "use the scene and the version it was saved with");
   state = std::move(*fresh);
 }

@@ -329,7 +329,9 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
       // and feed energy in. So the whole step is shortened.
       float most = 0;
       for (size_t i = 0; i < nodes; ++i) {
-        if (s.hold_at[i] < 0 && s.anchor_at[i] < 0) continue;
+        const bool moves = s.hold_at[i] >= 0 ? body_model[static_cast<size_t>(thread.hold[static_cast<size_t>(s.hold_at[i])].body)].inv_mass > 0
+                                             : s.anchor_at[i] >= 0 && s.w[i] > 0;
+        if (!moves) continue;
         Vec3 p{};
         if (i > 0) p += s.n[i - 1] * static_cast<float>(s.rhs[i - 1]);
         if (i < pairs) p -= s.n[i] * static_cast<float>(s.rhs[i]);

@@ -106,6 +106,36 @@ TEST_F(CommandLine, faults_in_a_scene_name_its_line) {
   expect_refused("run torn.toml", "torn.toml:1:");
 }
 
+TEST_F(CommandLine, a_wrong_scene_is_refused_before_it_costs_anything) {
+  expect_refused("run no_such_scene.toml", "there is no such scene");
+  std::ofstream(folder_ / "key.toml") << "title = 'x'\n[thread]\nparticels = 100\n";
+  expect_refused("run key.toml", "key.toml:3: thread has no key \"particels\"; did you mean \"particles\"?");
+  std::ofstream(folder_ / "negative.toml") << "[thread]\nparticles = -175\n";
+  expect_refused("run negative.toml", "negative.toml:2: thread.particles = -175 is out of range");
+  std::ofstream(folder_ / "billion.toml") << "[thread]\nparticles = 1_000_000_000\n";
+  expect_refused("run billion.toml", "billion.toml:2: thread.particles = 1e+09 is out of range");
+  std::ofstream(folder_ / "lines.toml") << "[solver]\npreset = \"a\\nb\\u001b[31m\"\n";
+  expect_refused("run lines.toml", "lines.toml:2: solver.preset");
+}
+
+TEST_F(CommandLine, a_mesh_that_cannot_be_used_says_why) {
+  const auto mesh = [&](const std::string& name, const std::string& text) { std::ofstream(folder_ / name) << text; };
+  const auto refused = [&](const std::string& name, const std::string& part) {
+    expect_refused("run small.toml --surgeon none --mesh " + name, part);
+  };
+  refused("nowhere.obj", "nowhere.obj: no such mesh file");
+  mesh("flat.obj", "v 0 0 0\nv 0.1 0 0\nv 0.2 0 0\nf 1 2 3\n");
+  refused("flat.obj", "no area");
+  mesh("point.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n");
+  refused("point.obj", "no area");
+  mesh("km.obj", "v 0 0 0\nv 0.0001 0 0\nv 0 0.0001 0\nf 1 2 3\n");  // a decimetre, written in kilometres
+  refused("km.obj", "looks like kilometres: scale by 1000");
+  mesh("garbage.glb", "glTF but not really");
+  refused("garbage.glb", "cannot be read as a mesh");
+  mesh("organ.txt", "v 0 0 0\n");
+  refused("organ.txt", "are not read");
+}
+
 TEST_F(CommandLine, help_and_descriptions_are_code_0) {
   EXPECT_EQ(run_catgut("--help").code, 0);
   EXPECT_EQ(run_catgut("run --help").code, 0);
@@ -210,6 +240,33 @@ TEST_F(CommandLine, an_interrupted_run_closes_its_files) {
   const json j = json::parse(read_file(json_path));
   EXPECT_EQ(j["interrupted"], true);
   EXPECT_EQ(run_catgut("replay i.cgrec --check").code, 0) << "an interrupted recording is whole";
+}
+
+// kill -9, a power cut: what was on the disk is what there is, and it replays.
+TEST_F(CommandLine, a_killed_run_leaves_what_it_had_recorded) {
+  const std::string record_path = folder_ / "k.cgrec", scene = folder_ / "small.toml";
+  const pid_t child = fork();
+  if (child == 0) {
+    if (!std::freopen("/dev/null", "w", stdout)) _exit(98);
+    if (!std::freopen("/dev/null", "w", stderr)) _exit(98);
+    execl(CATGUT_APP, CATGUT_APP, "run", scene.c_str(), "--surgeon", "none", "--seconds", "100000", "--record",
+          record_path.c_str(), nullptr);
+    _exit(99);
+  }
+  const auto ticks = [&]() -> size_t {
+    try {
+      return catgut::read_recording(record_path).tick.size();
+    } catch (const std::exception&) { return 0; }
+  };
+  for (int i = 0; i < 3000 && ticks() == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  kill(child, SIGKILL);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  const size_t saved = ticks();
+  ASSERT_GE(saved, 60u) << "a second of it, at least";
+  expect_refused("replay k.cgrec --check --json k.json", "the recording is not whole");
+  EXPECT_EQ(json::parse(read_file(folder_ / "k.json"))["ticks"], saved);
 }
 
 }  // namespace

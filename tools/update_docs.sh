@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# Writes anew what the pages copy from the program: docs/scene_reference.md, and the numbers in docs/one_tick.md (each block that
+# opens with ```text NAME takes the lines after [NAME] of the sample one_tick). Run it after a change of keys or of physics.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+./catgut describe --markdown >build/reference.md
+mv build/reference.md docs/scene_reference.md
+ninja -C build sample_one_tick >/dev/null
+build/samples/sample_one_tick >build/one_tick.txt
+awk 'NR == FNR { if ($0 ~ /^\[[a-z]+\]$/) name = substr($0, 2, length($0) - 2); else block[name] = block[name] $0 "\n"; next }
+     /^```text [a-z]+$/ { print; printf "%s", block[$2]; skip = 1; next }
+     /^```$/ { skip = 0 }
+     !skip { print }' build/one_tick.txt docs/one_tick.md >build/one_tick.md
+mv build/one_tick.md docs/one_tick.md
+git diff --stat -- docs
