@@ -1,3 +1,4 @@
+// anatomy/organ: reads an organ's surface from a file and makes a soft body of it. See the header for the steps.
 #include "anatomy/organ.h"
 
 #include <fmt/format.h>

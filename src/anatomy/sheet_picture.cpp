@@ -1,3 +1,4 @@
+// anatomy/sheet_picture: the visible mesh of a body made from a triangulated sheet.
 #include "anatomy/sheet_picture.h"
 
 #include <algorithm>

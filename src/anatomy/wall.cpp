@@ -1,3 +1,4 @@
+// anatomy/wall: thickens a sheet into a wall of particles, clusters, tetrahedra and a watertight surface.
 #include "anatomy/wall.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// geometry/closest: nearest points on triangles, one by one or through a tree of boxes. Reads meshes, writes nothing.
 #include "geometry/closest.h"
 
 #include <algorithm>

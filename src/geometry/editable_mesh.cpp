@@ -1,3 +1,4 @@
+// geometry/editable_mesh: the collapse, split and flip of edges that remeshing is made of.
 #include "geometry/editable_mesh.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// geometry/mesh_clean: welds, orients and checks what a file gave. Says plainly what cannot be used.
 #include "geometry/mesh_clean.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// geometry/mesh_io: reads surfaces through assimp. Reads files; throws InputError.
 #include "geometry/mesh_io.h"
 
 #include <assimp/postprocess.h>

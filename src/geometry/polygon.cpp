@@ -1,3 +1,4 @@
+// geometry/polygon: measures of closed loops in space (Newell).
 #include "geometry/polygon.h"
 
 namespace catgut {

@@ -1,3 +1,4 @@
+// geometry/remesh: brings a surface to an exact number of evenly spread vertices.
 #include "geometry/remesh.h"
 
 #include <fmt/format.h>
