@@ -26,9 +26,7 @@ int main(int argc, char** argv) {
   catgut::add_run(app, exit_code);
   catgut::add_replay(app, exit_code);
   catgut::add_bench(app, exit_code);
-#ifdef CATGUT_HAS_VALIDATE
   catgut::add_validate(app, exit_code);
-#endif
   catgut::add_devices(app, exit_code);
   catgut::add_describe(app, exit_code);
   if (argc == 1)
