@@ -84,6 +84,7 @@ struct Reader {
   size_t at = 0;
   void bytes(void* p, size_t n) {
     if (n > in.size() - at) throw InputError("saved state", "it ends too early", "the file was cut or belongs to another scene");
+    if (n == 0) return;  // an empty array has no place to copy to
     std::memcpy(p, in.data() + at, n);
     at += n;
   }
