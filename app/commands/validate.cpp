@@ -1,5 +1,4 @@
 // app: `catgut validate`: what the solver computes beside closed forms and published numbers.
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -34,7 +33,8 @@ int validate(const std::string& json) {
   prepare_output(json);
   const bool table = json != "-";
   if (table)
-    std::printf("%-4s  %-46s %11s %11s  %-9s %9s %9s  %s\n", "", "check", "expected", "got", "unit", "error", "tolerance", "source");
+    std::printf("%-4s  %-46s %11s %11s  %-9s %9s %9s  %s\n", "", "check", "expected", "got", "unit", "error", "tolerance",
+                "source");
   const std::vector<ValidationLine> lines = run_validation(table ? print_line : std::function<void(const ValidationLine&)>{});
   if (!json.empty()) write_output(json, json_of(lines));
   size_t failed = 0;

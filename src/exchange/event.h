@@ -10,9 +10,9 @@ namespace catgut {
 
 enum class EventKind : uint8_t {
   needle_grasped,     // who: hand, value: place on the arc from the swage [0..1]
-  needle_released,    // who: hand
+  needle_released,    // who: hand, value: 0 or the force at which it slipped out [N]
   thread_grasped,     // who: hand, which: particle slot
-  thread_released,    // who: hand
+  thread_released,    // who: hand, which: particle slot, value: as above
   tip_entered,        // which: bite, value: angle to the surface normal [rad]
   particle_attached,  // which: particle (paper 2.2, fig. 4), value: its distance to the tip [m]
   particle_released,  // which: particle, value: how far it was dragged [m] (fig. 5b)

@@ -53,6 +53,9 @@ Json json_of(const RunResult& r) {
   j["real_time_factor"] = r.real_time_factor;
   j["solver_ms"] = spread_json(r.solver_ms);
   j["tick_ms"] = spread_json(r.tick_ms);
+  j["late_ticks"] = r.late_ticks;
+  j["longest_tick"] = {{"tick", r.longest_tick}, {"ms", r.tick_ms.max}, {"stages", Json::object()}};
+  for (size_t s = 0; s < kStages; ++s) j["longest_tick"]["stages"][stage_name(static_cast<Stage>(s))] = r.longest.ms[s];
   j["stages"] = Json::object();
   for (size_t s = 0; s < kStages; ++s) j["stages"][stage_name(static_cast<Stage>(s))] = spread_json(r.stage_ms[s]);
   j["contacts"] = r.contacts;
@@ -92,6 +95,13 @@ std::string run_summary(const RunResult& r) {
                                 r.simulated_s, r.ticks, r.real_time_factor, r.particles, r.threads, r.threads == 1 ? "" : "s");
   out += fmt::format("  solver {:.3f} ms a tick (median), {:.3f} (99th percentile), {:.3f} (worst)\n", r.solver_ms.median,
                      r.solver_ms.p99, r.solver_ms.max);
+  if (r.late_ticks > 0) {
+    // Where the time went in the worst of them.
+    out += fmt::format("  {} ticks took longer than they simulate; the longest, tick {}, {:.1f} ms:", r.late_ticks, r.longest_tick, r.tick_ms.max);
+    for (size_t s = 0; s < kStages; ++s)
+      if (r.longest.ms[s] > 0.05 * r.tick_ms.max) out += fmt::format(" {} {:.1f}", stage_name(static_cast<Stage>(s)), r.longest.ms[s]);
+    out += "\n";
+  }
   out += fmt::format("  {} bites, {} suture points, opening at {:.1f} % of what it was\n", value(r, "bites"),
                      value(r, "suture_points"), 100 * value(r, "opening_ratio"));
   out += fmt::format("  ended: {}; state {:016x}\n", r.ended, r.state_hash);

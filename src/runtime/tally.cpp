@@ -49,6 +49,8 @@ void Tally::time(const StageTimes& times, double tick_ms) {
   for (size_t s = 0; s < kStages; ++s) stage_ms_[s].push_back(static_cast<float>(times.ms[s]));
   contacts_ = std::max(contacts_, times.contacts);
   spent_ms_ += tick_ms;
+  if (tick_ms > 1000.0 / scene_.solver.tick_rate) ++late_ticks_;
+  if (tick_ms > longest_ms_) longest_ms_ = tick_ms, longest_ = times, longest_tick_ = tick_ms_.size();
 }
 
 float Tally::thread_length_error(const Snapshot& seen) const {
@@ -98,6 +100,9 @@ void Tally::finish(const Snapshot& last, RunResult& result) const {
 
   result.solver_ms = spread_of(solver_ms_);
   result.tick_ms = spread_of(tick_ms_);
+  result.longest = longest_;
+  result.longest_tick = longest_tick_;
+  result.late_ticks = late_ticks_;
   for (size_t s = 0; s < kStages; ++s) result.stage_ms[s] = spread_of(stage_ms_[s]);
   result.contacts = contacts_;
   result.real_time_factor = spent_ms_ > 0 ? result.simulated_s * 1000 / spent_ms_ : 0;

@@ -36,6 +36,8 @@ struct RunResult {
   double real_time_factor = 0;             // simulated time over the time spent in step, publish and the surgeon's plan
   Spread solver_ms, tick_ms;               // per tick
   std::array<Spread, kStages> stage_ms;    // per tick
+  StageTimes longest;                      // of the tick that took longest
+  uint64_t longest_tick = 0, late_ticks = 0;  // its number; ticks that took longer than they simulate
   uint32_t contacts = 0;                   // the most in a substep
   std::map<std::string, uint64_t> events;  // by kind, only those that happened
   std::map<std::string, double> value;     // every name of result_names
@@ -74,7 +76,9 @@ class Tally {
   std::array<uint64_t, static_cast<size_t>(EventKind::count_)> events_{};
   std::vector<float> solver_ms_, tick_ms_;
   std::array<std::vector<float>, kStages> stage_ms_;
-  double spent_ms_ = 0;
+  double spent_ms_ = 0, longest_ms_ = 0;
+  StageTimes longest_;
+  uint64_t longest_tick_ = 0, late_ticks_ = 0;
 };
 
 }  // namespace catgut

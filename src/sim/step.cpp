@@ -42,6 +42,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   for (int i = 1; i <= model.substeps; ++i) {
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));
     substep(solver, state.solver, state.scratch, jobs, times);
+    slip(solver, state.solver, model.suture, state.suture, state.event);
     {
       StageTimer timer(times, Stage::puncture);
       puncture(solver, state.solver, state.scratch, model.suture, state.suture, state.event);

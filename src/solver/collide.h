@@ -47,7 +47,7 @@ struct Candidates {
   std::vector<uint32_t> near_block; // working memory
 };
 
-constexpr float kPairMargin = 0.0012f;  // [m]
+constexpr float kPairMargin = 0.002f;  // [m]
 
 // Rebuilds candidates.pair if any particle has moved by more than half the margin since it was built.
 void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Vec4* x, Candidates& c);

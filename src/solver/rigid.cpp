@@ -2,6 +2,9 @@
 #include "solver/rigid.h"
 
 namespace catgut {
+namespace {
+constexpr float kTopSpeed = 5, kTopSpin = 300;  // [m/s], [rad/s]: no hand moves a tool or a needle faster
+}
 
 void predict(const RigidModel& m, RigidBody& b, Vec3 gravity, float h) {
   b.prev_x = b.x;
@@ -17,6 +20,9 @@ void update_velocity(const RigidModel& m, RigidBody& b, float h, float damping) 
   const float keep = 1.0f / (1.0f + damping * h);
   b.v = (b.x - b.prev_x) * (keep / h);
   b.omega = rotation_vector(b.q * conjugate(b.prev_q)) * (keep / h);
+  const float speed = length(b.v), spin = length(b.omega);
+  if (speed > kTopSpeed) b.v *= kTopSpeed / speed;
+  if (spin > kTopSpin) b.omega *= kTopSpin / spin;
 }
 
 void solve_weld(const std::vector<RigidModel>& model, std::vector<RigidBody>& body, Weld& weld, float h) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace catgut {
 namespace {
@@ -22,25 +23,39 @@ void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   std::fill(scratch.thread.lambda.begin(), scratch.thread.lambda.end(), 0.0f);
 }
 
+// A position or velocity as one register: the fourth lane (1, or 0) takes part in no change.
+using Four = float __attribute__((vector_size(16)));
+Four load(const Vec4& a) {
+  Four f;
+  std::memcpy(&f, &a, sizeof f);
+  return f;
+}
+void store(Vec4& a, Four f) { std::memcpy(&a.x, &f, sizeof f); }
+
 void predict_particles(const SolverModel& m, SolverState& s, SolverScratch& k, size_t first, size_t last) {
-  const Vec3 tissue_gh = m.tissue_gravity * m.h, thread_gh = m.gravity * m.h;
-  for (size_t i = first; i < last; ++i) {
-    k.prev[i] = s.x[i];
-    if (m.inv_mass[i] == 0) continue;
-    Vec3 v = xyz(s.v[i]) + (i < m.tissue ? tissue_gh : thread_gh);
-    const float speed2 = length2(v);
-    if (speed2 > kTopSpeed * kTopSpeed) v *= kTopSpeed / std::sqrt(speed2);
-    add(s.x[i], v * m.h);
-  }
+  auto run = [&](size_t from, size_t to, Vec3 gravity) {
+    const Four gh = load({gravity.x * m.h, gravity.y * m.h, gravity.z * m.h, 0});
+    for (size_t i = from; i < to; ++i) {
+      k.prev[i] = s.x[i];
+      if (m.inv_mass[i] == 0) continue;
+      Four v = load(s.v[i]) + gh;
+      const Four v2 = v * v;
+      const float speed2 = v2[0] + v2[1] + v2[2];
+      if (speed2 > kTopSpeed * kTopSpeed) v *= kTopSpeed / std::sqrt(speed2);
+      store(s.x[i], load(s.x[i]) + v * m.h);
+    }
+  };
+  const size_t middle = std::clamp<size_t>(m.tissue, first, last);
+  run(first, middle, m.tissue_gravity);
+  run(middle, last, m.gravity);
 }
 
 void update_velocities(const SolverModel& m, SolverState& s, const SolverScratch& k, size_t first, size_t last) {
   const float inv_h = 1.0f / m.h;
+  const size_t middle = std::clamp<size_t>(m.tissue, first, last);
   const float keep_tissue = inv_h / (1 + m.damping * m.h), keep_thread = inv_h / (1 + m.thread_damping * m.h);
-  for (size_t i = first; i < last; ++i) {
-    const float keep = i < m.tissue ? keep_tissue : keep_thread;
-    set(s.v[i], (xyz(s.x[i]) - xyz(k.prev[i])) * keep);
-  }
+  for (size_t i = first; i < middle; ++i) store(s.v[i], (load(s.x[i]) - load(k.prev[i])) * keep_tissue);
+  for (size_t i = middle; i < last; ++i) store(s.v[i], (load(s.x[i]) - load(k.prev[i])) * keep_thread);
 }
 
 }  // namespace

@@ -20,6 +20,7 @@ constexpr double kRegularisation = 1e-6;
 // 7 mN at 0.15 m/s and 1 ms. Lighter would let friction overshoot the length of a segment within a substep.
 constexpr double kSlideMass = 0.04;
 constexpr int kSlideRounds = 4;
+constexpr float kMostForce = 20;  // [N] by which a Newton step may move a heavy node: about what breaks a thread
 constexpr float kLargestStep = 0.6f;      // of the spacing, per Newton step
 
 // A held node seen by two pair directions: n1^T W n2 of the rigid body at that place.
@@ -323,6 +324,24 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
       const float residual = assemble(thread, s, nodes, alpha_per_metre, h, body_model, body);
       if (step > 0 && residual < kGoodEnough) break;
       solve_with_slides(model, thread, s, pairs, h);
+
+      // Light nodes are held back below, heavy ones are not: a step far too long would push a needle again and again for the same stretch,
+      // and feed energy in. So the whole step is shortened.
+      float most = 0;
+      for (size_t i = 0; i < nodes; ++i) {
+        const bool moves = s.hold_at[i] >= 0 ? body_model[static_cast<size_t>(thread.hold[static_cast<size_t>(s.hold_at[i])].body)].inv_mass > 0
+                                             : s.anchor_at[i] >= 0 && s.w[i] > 0;
+        if (!moves) continue;
+        Vec3 p{};
+        if (i > 0) p += s.n[i - 1] * static_cast<float>(s.rhs[i - 1]);
+        if (i < pairs) p -= s.n[i] * static_cast<float>(s.rhs[i]);
+        most = std::max(most, length(p));
+      }
+      if (most > kMostForce * h * h) {
+        const float part = kMostForce * h * h / most;
+        for (size_t i = 0; i < pairs; ++i) s.rhs[i] *= part;
+        for (SlideState& k : s.slide) k.step *= part;
+      }
 
       // A bent stretch of light thread between heavy ends: the impulse that moves the ends would throw the light nodes far sideways, because
       // the linearisation does not know that they come to rest on the straight line. So a light node takes a bounded step, heavy

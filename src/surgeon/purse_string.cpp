@@ -1,7 +1,8 @@
-// surgeon/purse_string: the script of paper 2.5.1 as a surgeon does it. Needle driver (right) drives a seromuscular bite along the rim by
-// turning the needle about its own circle; the forceps (left) takes the tip, brings it through and pulls the thread; the driver
-// takes the needle back for the next bite. At the end one hand holds the needle's end, the other the tail, and both pull.
-// Reads Snapshots only; each step looks at what really happened before the next begins.
+// surgeon/purse_string: the script of paper 2.5.1 as a surgeon does it. Needle driver (right) drives a seromuscular bite along
+// the rim by turning the needle about its own circle; the forceps (left) takes the tip, brings it through and pulls the thread;
+// the driver takes the needle back for the next bite. At the end one hand holds the needle's end, the other the tail, and both
+// pull. Reads Snapshots only; each step looks at what really happened before the next begins. What goes wrong is tried again: a
+// bite whose tip did not come out is drawn back and driven a little shallower or deeper, a missed grasp is approached anew.
 #include <array>
 #include <cmath>
 #include <limits>
@@ -16,18 +17,46 @@ namespace {
 
 constexpr size_t kDriver = 0, kForceps = 1;
 constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f;  // places on the needle's arc: two thirds from the tip, behind the tip
+constexpr int kAttempts = 8;                            // at one bite, at one grasp
 
-enum class Step { pick_over, pick_down, pick_close, hover, approach, drive, take_over, take_down, take_close, release, retreat, drive_through,
-                  pull, present, back_over, back_down, back_close, give, tail_over, tail_down, tail_close, tighten, hold, done };
+enum class Step {
+  pick_over,
+  pick_down,
+  pick_close,
+  hover,
+  approach,
+  drive,
+  withdraw,
+  take_over,
+  take_down,
+  take_close,
+  release,
+  retreat,
+  drive_through,
+  pull,
+  present,
+  back_over,
+  back_down,
+  back_close,
+  give,
+  tail_over,
+  tail_down,
+  tail_close,
+  tighten,
+  hold,
+  done
+};
 
-// Where a bite is made, in the world as it is now: a place on the serosa, its outward normal, the way along the rim, the way to the rim.
+// Where a bite is made, in the world as it is now: a place on the serosa, its outward normal, the way along the rim, the way to
+// the rim.
 struct BiteFrame {
   Vec3 at, out, along, up;
 };
 
 class PurseStringSurgeon final : public Surgeon {
  public:
-  PurseStringSurgeon(const PictureModel& picture, const SurgeonSkill& skill) : picture_(picture), skill_(skill), random_(skill.seed) {
+  PurseStringSurgeon(const PictureModel& picture, const SurgeonSkill& skill)
+      : picture_(picture), skill_(skill), random_(skill.seed) {
     if (picture.rim.empty() || picture.body.empty()) throw std::invalid_argument("the scene has no opening for a purse-string");
     find_places();
     hand_[kDriver].pose = {picture.focus + Vec3{0.06f, 0.08f, 0.05f}, {}};
@@ -37,19 +66,46 @@ class PurseStringSurgeon final : public Surgeon {
   bool done() const override { return step_ == Step::done; }
 
   std::string doing() const override {
-    const std::string bite = "bite " + std::to_string(std::min(bite_ + 1, skill_.bites)) + " of " + std::to_string(skill_.bites) + ": ";
+    const std::string bite =
+        "bite " + std::to_string(std::min(bite_ + 1, skill_.bites)) + " of " + std::to_string(skill_.bites) + ": ";
     switch (step_) {
-      case Step::pick_over: case Step::pick_down: case Step::pick_close: return "pick up the needle";
-      case Step::hover: case Step::approach: return bite + "approach";
-      case Step::drive: return bite + "drive the needle";
-      case Step::take_over: case Step::take_down: case Step::take_close: case Step::release: case Step::retreat: return bite + "take the tip";
-      case Step::drive_through: return bite + "bring the needle through";
-      case Step::pull: return bite + "pull the thread";
-      case Step::present: case Step::back_over: case Step::back_down: case Step::back_close: case Step::give: return bite + "take the needle back";
-      case Step::tail_over: case Step::tail_down: case Step::tail_close: return "take the tail";
-      case Step::tighten: return "draw the purse-string tight";
-      case Step::hold: return "hold";
-      case Step::done: return gave_up_ ? "gave up" : "done";
+      case Step::pick_over:
+      case Step::pick_down:
+      case Step::pick_close:
+        return "pick up the needle";
+      case Step::hover:
+      case Step::approach:
+        return bite + "approach";
+      case Step::drive:
+        return bite + "drive the needle";
+      case Step::withdraw:
+        return bite + "draw back and try again";
+      case Step::take_over:
+      case Step::take_down:
+      case Step::take_close:
+      case Step::release:
+      case Step::retreat:
+        return bite + "take the tip";
+      case Step::drive_through:
+        return bite + "bring the needle through";
+      case Step::pull:
+        return bite + "pull the thread";
+      case Step::present:
+      case Step::back_over:
+      case Step::back_down:
+      case Step::back_close:
+      case Step::give:
+        return bite + "take the needle back";
+      case Step::tail_over:
+      case Step::tail_down:
+      case Step::tail_close:
+        return "take the tail";
+      case Step::tighten:
+        return "draw the purse-string tight";
+      case Step::hold:
+        return "hold";
+      case Step::done:
+        return gave_up_ ? "gave up" : "done";
     }
     return "";
   }
@@ -80,7 +136,8 @@ class PurseStringSurgeon final : public Surgeon {
     if (dot(axis_, centre - mean_rest()) < 0) axis_ = -axis_;  // out of the opening
     const Vec3 u = normalized(Vec3{1, 0, 0} - axis_ * axis_.x, any_perpendicular(axis_)), v = cross(axis_, u);
     float round = 0;
-    for (size_t i = 0; i < rim.size(); ++i) round += distance(picture_.particle_rest[rim[i]], picture_.particle_rest[rim[(i + 1) % rim.size()]]);
+    for (size_t i = 0; i < rim.size(); ++i)
+      round += distance(picture_.particle_rest[rim[i]], picture_.particle_rest[rim[(i + 1) % rim.size()]]);
     ring_radius_ = round / (2 * kPi);
     const VisibleMesh& mesh = picture_.body[0];
     // Bites are even in length round the rim, not in angle: an organ's rim is no circle.
@@ -90,7 +147,8 @@ class PurseStringSurgeon final : public Surgeon {
     auto angle_of = [&](Vec3 p) { return std::atan2(dot(p - centre, v), dot(p - centre, u)); };
     size_t start = 0;
     for (size_t i = 0; i < n; ++i)
-      if (std::abs(angle_of(picture_.particle_rest[rim[i]])) < std::abs(angle_of(picture_.particle_rest[rim[start]]))) start = i;
+      if (std::abs(angle_of(picture_.particle_rest[rim[i]])) < std::abs(angle_of(picture_.particle_rest[rim[start]])))
+        start = i;
     const bool counter = dot(normal, axis_) > 0;  // go clockwise seen from above: the way a right hand's needle turns
     auto rim_at = [&](size_t i) { return picture_.particle_rest[rim[(start + (counter ? n - i % n : i % n)) % n]]; };
     for (size_t i = 0; i < n; ++i) run.push_back(run.back() + distance(rim_at(i), rim_at(i + 1)));
@@ -157,20 +215,22 @@ class PurseStringSurgeon final : public Surgeon {
     return f;
   }
 
-  float bite_depth() const { return skill_.bite_length * skill_.bite_length / 8 * (1 / picture_.needle_radius + 1 / ring_radius_); }
+  float bite_depth() const {
+    return skill_.bite_length * skill_.bite_length / 8 * (1 / picture_.needle_radius + 1 / ring_radius_);
+  }
   float half_bite_angle() const { return std::asin(std::min(0.9f, 0.5f * skill_.bite_length / picture_.needle_radius)); }
 
   // The needle with its tip `psi` past the deepest place of a bite at frame f: its circle cuts the wall over bite_length.
   Pose needle_at(const BiteFrame& f, float psi) const {
-    const Vec3 centre = f.at + f.out * (picture_.needle_radius - bite_depth() + depth_error_);
+    const Vec3 centre = f.at + f.out * (picture_.needle_radius - bite_depth() + depth_error_ + depth_fix_);
     const Vec3 x = f.out * std::cos(psi) - f.along * std::sin(psi);
     // The tip is at the end of the arc: for other arcs than a half circle turn back by what is missing.
     const Pose half{centre, from_axes(x, cross(f.up, x), f.up)};
     return half * Pose{{}, axis_angle({0, 0, 1}, kPi - picture_.needle_arc)};
   }
 
-  // A tool frame that grips the needle (at `needle`) at place s of its arc: shaft out of the needle's plane on its upper side, leaning
-  // over the circle's centre by `lean`.
+  // A tool frame that grips the needle (at `needle`) at place s of its arc: shaft out of the needle's plane on its upper side,
+  // leaning over the circle's centre by `lean`.
   Pose grip_at(const Pose& needle, float s, float lean) const {
     const float phi = s * picture_.needle_arc;
     const Vec3 radial = rotate(needle.q, {std::cos(phi), std::sin(phi), 0});
@@ -239,7 +299,7 @@ class PurseStringSurgeon final : public Surgeon {
       case Step::pick_close:
         if (!move_jaw(driver, 0, dt) || waited_ < 0.35f) return;
         if (!holds_needle(seen, kDriver)) {
-          if (++misses_ > 3) return give_up();
+          if (++misses_ > kAttempts) return give_up();
           return go(Step::pick_over);
         }
         driver.grip = inverse(needle) * seen.tool[kDriver].pose;
@@ -274,7 +334,25 @@ class PurseStringSurgeon final : public Surgeon {
         move_toward(driver, holding(kDriver, needle_at(frame_, psi_)), 2 * speed, dt);
         const bool out = seen.bite.size() > first_bite_seen_ && seen.bite.back().has_exit;
         if (out && psi_ > psi_bite + 0.72f) return go(Step::take_over);
-        if (psi_ > psi_bite + 1.1f) return give_up();  // the tip did not come out where it should
+        if (psi_ > psi_bite + 1.1f) {
+          // The tip is not where it should be: it never went in, or it went too deep to come out.
+          depth_fix_ += seen.needle.in_tissue ? 0.0003f : -0.0003f;
+          return go(Step::withdraw);
+        }
+        return;
+      }
+      case Step::withdraw: {  // back the way it came, then the same bite again
+        rest_aside(kForceps);
+        psi_ = std::max(psi_ - 2 * skill_.drive_speed / picture_.needle_radius * dt, -psi_bite - 0.7f);
+        BiteFrame f = frame_;
+        if (!patience(1.5f)) f.at += f.out * std::min(0.01f, 0.01f * (waited_ - 1.5f));  // it sticks: away from the wall
+        move_toward(driver, holding(kDriver, needle_at(f, psi_)), 2 * speed, dt);
+        if (psi_ <= -psi_bite - 0.7f && !seen.needle.in_tissue) {
+          if (++attempts_ > kAttempts) return give_up();
+          aim();
+          return go(Step::hover);
+        }
+        if (!patience(8)) give_up();
         return;
       }
       case Step::take_over:
@@ -287,7 +365,7 @@ class PurseStringSurgeon final : public Surgeon {
       case Step::take_close:
         if (!move_jaw(forceps, 0, dt) || waited_ < 0.3f) return;
         if (!holds_needle(seen, kForceps)) {
-          if (++misses_ > 3) return give_up();
+          if (++misses_ > kAttempts) return give_up();
           return go(Step::take_over);
         }
         misses_ = 0;
@@ -303,11 +381,15 @@ class PurseStringSurgeon final : public Surgeon {
         rest_aside(kDriver);
         psi_ += 2 * skill_.drive_speed / picture_.needle_radius * dt;
         psi_ = std::min(psi_, psi_bite + kPi + 0.5f);
-        move_toward(forceps, holding(kForceps, needle_at(frame_, psi_)), 2 * speed, dt);
+        BiteFrame f = frame_;
+        if (!patience(3))
+          f.at +=
+              (f.out + 0.4f * f.up) * std::min(0.02f, 0.01f * (waited_ - 3));  // it sticks: a pull outward frees the back end
+        move_toward(forceps, holding(kForceps, needle_at(f, psi_)), 2 * speed, dt);
         if (seen.bite.size() > first_bite_seen_ && seen.bite.back().complete) {
           pull_from_ = forceps.pose;
           go(Step::pull);
-        } else if (!patience(6)) {
+        } else if (!patience(8)) {
           give_up();
         }
         return;
@@ -326,15 +408,17 @@ class PurseStringSurgeon final : public Surgeon {
           const float there = length_from(seen, node_of(seen, a.anchored), node_of(seen, b.anchored));
           slack = there - 1.1f * distance(a.position, b.position) - 0.001f;
         }
-        if (slack <= 0 || distance(forceps.pose.p, pull_from_.p) > 0.29f) {
+        // Thread that cannot be drawn further is left: the last pull takes up the slack.
+        if (slack <= 0 || distance(forceps.pose.p, pull_from_.p) > 0.29f || !patience(12)) {
           ++bite_;
+          attempts_ = 0;
+          depth_fix_ = 0;
           aim();
           return go(bite_ < skill_.bites ? Step::present : Step::tail_over);
         }
         const Pose goal{pull_from_.p + way * 0.3f, forceps.pose.q};
         // Slow down before the thread runs tight: a jerk would tear.
         move_toward(forceps, goal, std::min(speed, 0.015f + 5 * slack), dt);
-        if (!patience(12)) give_up();
         return;
       }
       case Step::present: {  // bring the needle beside the next bite, where the driver can take it
@@ -355,7 +439,7 @@ class PurseStringSurgeon final : public Surgeon {
       case Step::back_close:
         if (!move_jaw(driver, 0, dt) || waited_ < 0.3f) return;
         if (!holds_needle(seen, kDriver)) {
-          if (++misses_ > 3) return give_up();
+          if (++misses_ > kAttempts) return give_up();
           return go(Step::back_over);
         }
         misses_ = 0;
@@ -366,10 +450,14 @@ class PurseStringSurgeon final : public Surgeon {
         return;
 
       // --- closing: the driver takes the tail, both hands pull ---
-      case Step::tail_over: case Step::tail_down: case Step::tail_close: {
+      case Step::tail_over:
+      case Step::tail_down:
+      case Step::tail_close: {
         // A place on the tail a little way from the first bite, seen from outside.
         const size_t first = node_of(seen, seen.suture_point.front().anchored);
-        const size_t at = first > 14 ? first - 12 : first / 2;
+        // After a miss another place: that one may lie against the tissue.
+        const size_t away = 12 + 3 * static_cast<size_t>(misses_ % 4);
+        const size_t at = first > away + 2 ? first - away : first / 2;
         const Vec3 thread = seen.particle[seen.thread_order[at]];
         const BiteFrame f = frame(seen, 0);
         const Vec3 z = normalized(f.out * 0.6f + axis_), x = normalized(f.along - z * dot(f.along, z));
@@ -383,7 +471,7 @@ class PurseStringSurgeon final : public Surgeon {
           else if (!patience(4)) give_up();
         } else if (move_jaw(driver, 0, dt) && waited_ > 0.3f) {
           if (seen.tool[kDriver].held != Held::thread) {
-            if (++misses_ > 4) return give_up();
+            if (++misses_ > kAttempts) return give_up();
             return go(Step::tail_over);
           }
           go(Step::tighten);
@@ -392,11 +480,14 @@ class PurseStringSurgeon final : public Surgeon {
       }
       case Step::tighten: {
         const BiteFrame f = frame(seen, 0);
-        const Vec3 left = normalized(f.out * 0.5f - f.along * 0.8f + axis_ * 0.35f), right = normalized(f.out * 0.5f + f.along * 0.8f + axis_ * 0.35f);
+        const Vec3 left = normalized(f.out * 0.5f - f.along * 0.8f + axis_ * 0.35f),
+                   right = normalized(f.out * 0.5f + f.along * 0.8f + axis_ * 0.35f);
         // The needle's end leaves the last bite, which lies before the first one along the rim; the tail leaves the first.
         const float reach = 0.35f;
         // A surgeon feels the thread: the harder it pulls back, the slower the hand.
-        auto gently = [&](size_t hand) { return 0.25f * speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.02f, 1.0f); };
+        auto gently = [&](size_t hand) {
+          return 0.25f * speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.02f, 1.0f);
+        };
         if (seen.closure < 0.985f) {
           move_toward(forceps, {picture_.focus + left * reach, forceps.pose.q}, gently(kForceps), dt);
           // The tail hand gives a counter-hold: it moves out only as far as keeps its own side tight.
@@ -431,10 +522,11 @@ class PurseStringSurgeon final : public Surgeon {
   float ring_radius_ = 0.02f;
   Step step_ = Step::pick_over;
   float waited_ = 0;
-  int bite_ = 0, misses_ = 0;
+  int bite_ = 0, misses_ = 0, attempts_ = 0;
   bool gave_up_ = false;
   BiteFrame frame_;
   float psi_ = 0, aim_along_ = 0, aim_up_ = 0, depth_error_ = 0;
+  float depth_fix_ = 0;  // [m] what the failed attempts at this bite taught; positive: shallower
   size_t first_bite_seen_ = 0;
   Pose pull_from_;
   uint32_t sequence_ = 0;

@@ -8,14 +8,15 @@ namespace {
 
 constexpr float kClosed = 0.35f, kOpen = 0.5f;  // jaw thresholds, apart so that a trembling finger does not drop the needle
 
-void let_go(SolverState& solver, HandState& hand, uint8_t who, std::vector<Event>& events) {
+// force [N]: 0 when the jaw was opened, else what made it slip.
+void let_go(SolverState& solver, HandState& hand, uint8_t who, float force, std::vector<Event>& events) {
   const int body = who;
   if (hand.held == Held::needle) {
     std::erase_if(solver.weld, [&](const Weld& w) { return w.a == static_cast<int>(kNeedle) && w.b == body; });
-    events.push_back({0, EventKind::needle_released, who, 0, hand.at, solver.body[static_cast<size_t>(body)].x});
+    events.push_back({0, EventKind::needle_released, who, 0, force, solver.body[static_cast<size_t>(body)].x});
   } else if (hand.held == Held::thread) {
     std::erase_if(solver.thread.hold, [&](const ThreadHold& h) { return h.body == body; });
-    events.push_back({0, EventKind::thread_released, who, hand.slot, 0, solver.body[static_cast<size_t>(body)].x});
+    events.push_back({0, EventKind::thread_released, who, hand.slot, force, solver.body[static_cast<size_t>(body)].x});
   }
   hand.held = Held::nothing;
 }
@@ -31,7 +32,7 @@ void grasp(const SolverModel& model, SolverState& solver, const SutureModel& sut
     hand.jaw = jaw;
     if (hand.held != Held::nothing) {
       if (jaw >= kOpen) {
-        let_go(solver, hand, who, events);
+        let_go(solver, hand, who, 0, events);
         update_thread_collisions(model, solver, suture);
       }
       continue;
@@ -69,6 +70,28 @@ void grasp(const SolverModel& model, SolverState& solver, const SutureModel& sut
       update_thread_collisions(model, solver, suture);
       events.push_back({0, EventKind::thread_grasped, who, hand.slot, 0, tool.x});
     }
+  }
+}
+
+void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, std::vector<Event>& events) {
+  for (uint8_t who = 0; who < 2; ++who) {
+    HandState& hand = state.hand[who];
+    float force = 0, most = 1;
+    if (hand.held == Held::needle) {
+      most = suture.needle_grip;
+      for (const Weld& w : solver.weld)
+        if (w.a == static_cast<int>(kNeedle) && w.b == who) force = length(w.lambda) / (model.h * model.h);
+    } else if (hand.held == Held::thread) {
+      most = suture.thread_grip;
+      const auto at = std::find(solver.thread.order.begin(), solver.thread.order.end(), hand.slot);
+      const size_t i = static_cast<size_t>(at - solver.thread.order.begin());
+      // The larger of the two sides: what the jaw has to hold if the other is slack.
+      if (i > 0) force = std::max(force, solver.thread.tension[i - 1]);
+      if (i < solver.thread.tension.size()) force = std::max(force, solver.thread.tension[i]);
+    }
+    if (force <= most) continue;
+    let_go(solver, hand, who, force, events);
+    update_thread_collisions(model, solver, suture);
   }
 }
 

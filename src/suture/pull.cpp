@@ -1,10 +1,11 @@
-// suture/pull: thread through suture points (paper 2.3, figures 7 to 9). Reads tensions and rest lengths; edits the order list, never
-// a slot. Thread slides at an anchor inside the solver (see solver/thread); here, when the pair on one side of an anchor is used up, its
-// particle passes: it takes its new place in the order and stands at the midpoint of the pair it splits (figure 7c).
-// Slack is resolved in the paper's order (figure 9) because tension is: a span with slack has none, so the anchor next to the pull slides
-// first, and the one behind it only when the span between them is taut.
+// suture/pull: thread through suture points (paper 2.3, figures 7 to 9). Reads tensions and rest lengths; edits the order list,
+// never a slot. Thread slides at an anchor inside the solver (see solver/thread); here, when the pair on one side of an anchor
+// is used up, its particle passes: it takes its new place in the order and stands at the midpoint of the pair it splits (figure
+// 7c). Slack is resolved in the paper's order (figure 9) because tension is: a span with slack has none, so the anchor next to
+// the pull slides first, and the one behind it only when the span between them is taut.
 #include <algorithm>
 
+#include "core/check.h"
 #include "suture/suture.h"
 
 namespace catgut {
@@ -25,22 +26,27 @@ size_t node_of(const Thread& t, uint32_t slot) {
 
 void move_particle(Thread& t, size_t from, size_t after) {
   // Figure 8: the two pairs at the old place become one, the pair at the new place becomes two.
+  if (from == after + 1) return;
   const uint32_t slot = t.order[from];
   const float joined = t.rest[from - 1] + t.rest[from];
   const float half = 0.5f * t.rest[after];
   if (from < after) {
     // rest: [.. from-1, from, from+1 .. after ..] -> [.. joined, from+1 .. after-1, half, half ..]
     t.rest[from - 1] = joined;
-    std::move(t.rest.begin() + static_cast<long>(from) + 1, t.rest.begin() + static_cast<long>(after), t.rest.begin() + static_cast<long>(from));
+    std::move(t.rest.begin() + static_cast<long>(from) + 1, t.rest.begin() + static_cast<long>(after),
+              t.rest.begin() + static_cast<long>(from));
     t.rest[after - 1] = t.rest[after] = half;
-    std::move(t.order.begin() + static_cast<long>(from) + 1, t.order.begin() + static_cast<long>(after) + 1, t.order.begin() + static_cast<long>(from));
+    std::move(t.order.begin() + static_cast<long>(from) + 1, t.order.begin() + static_cast<long>(after) + 1,
+              t.order.begin() + static_cast<long>(from));
     t.order[after] = slot;
   } else {
     // rest: [.. after, after+1 .. from-2, from-1, from ..] -> [.. half, half, after+1 .. from-2, joined ..]
     t.rest[from] = joined;
-    std::move_backward(t.rest.begin() + static_cast<long>(after) + 1, t.rest.begin() + static_cast<long>(from) - 1, t.rest.begin() + static_cast<long>(from));
+    std::move_backward(t.rest.begin() + static_cast<long>(after) + 1, t.rest.begin() + static_cast<long>(from) - 1,
+                       t.rest.begin() + static_cast<long>(from));
     t.rest[after] = t.rest[after + 1] = half;
-    std::move_backward(t.order.begin() + static_cast<long>(after) + 1, t.order.begin() + static_cast<long>(from), t.order.begin() + static_cast<long>(from) + 1);
+    std::move_backward(t.order.begin() + static_cast<long>(after) + 1, t.order.begin() + static_cast<long>(from),
+                       t.order.begin() + static_cast<long>(from) + 1);
     t.order[after + 1] = slot;
   }
 }
@@ -95,11 +101,20 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
   t.anchor.push_back(a);
   state.point.push_back({bite, exit, static_cast<uint32_t>(t.anchor.size() - 1)});
   update_thread_collisions(model, solver, suture);
-  events.push_back({0, EventKind::suture_point, 0, static_cast<uint32_t>(state.point.size() - 1), static_cast<float>(bite), at});
+  events.push_back(
+      {0, EventKind::suture_point, 0, static_cast<uint32_t>(state.point.size() - 1), static_cast<float>(bite), at});
   return true;
 }
 
-void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, std::vector<Event>& events) {
+void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state) {
+  CATGUT_CHECK(!state.point.empty() && state.point.back().anchor + 1 == solver.thread.anchor.size());
+  solver.thread.anchor.pop_back();
+  state.point.pop_back();
+  update_thread_collisions(model, solver, suture);
+}
+
+void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+          std::vector<Event>& events) {
   Thread& t = solver.thread;
   const float used_up = kUsedUp * model.thread.spacing;
   bool changed = false;
@@ -114,7 +129,8 @@ void pull(const SolverModel& model, SolverState& solver, const SutureModel& sutu
     if (a.blocked_needle && !was_blocked && i == 1)
       events.push_back({0, EventKind::thread_ran_out, 0, static_cast<uint32_t>(k), 0, position_of(a.point, solver.x.data())});
 
-    // Toward the needle: the particle on the free side splits the pair on the needle side; the other way round for a pull on the tail.
+    // Toward the needle: the particle on the free side splits the pair on the needle side; the other way round for a pull on
+    // the tail.
     const bool forward = can_give_free && t.rest[i - 1] <= used_up;
     const bool backward = !forward && can_give_needle && t.rest[i] <= used_up;
     if (!forward && !backward) continue;

@@ -1,6 +1,6 @@
-// suture/puncture: the needle's two triggers (paper 2.2, figures 4 and 5). Reads the needle and the tissue's surface; writes bites, the
-// attachment of the nearest particle, the channel in which the shaft runs, and asks for suture points.
-// The tip is tracked against the surface itself, so a bite keeps where it went in and out to a fraction of a millimetre; the nearest
+// suture/puncture: the needle's two triggers (paper 2.2, figures 4 and 5). Reads the needle and the tissue's surface; writes
+// bites, the attachment of the nearest particle, the channel in which the shaft runs, and asks for suture points. The tip is
+// tracked against the surface itself, so a bite keeps where it went in and out to a fraction of a millimetre; the nearest
 // particle is what drags the tissue along, as in the paper.
 #include <algorithm>
 #include <cmath>
@@ -13,6 +13,8 @@ namespace {
 constexpr float kReach = 0.008f;         // [m] the tip looks this far for the surface
 constexpr float kEndReached = 0.0008f;   // [m] along the shaft: an end of the needle is at the hole
 constexpr float kHysteresis = 0.00002f;  // [m] so that a tip resting on the surface does not chatter
+constexpr float kBackOut = 0.002f;       // [m] of shaft outside the entry again: the thread is no longer in the hole
+constexpr float kOnShaft = 0.0015f;      // [m] a hole this near to the shaft has the shaft in it
 
 ChannelPoint channel_at(const SutureModel& suture, const BiteEnd& end) {
   ChannelPoint c;
@@ -44,9 +46,22 @@ void drop_attachment(SolverState& solver, SutureState& state) {
   state.attached = false;
 }
 
+// The needle is out again the way it came. The bite's record stays, marked; everything that held needle, tissue or thread goes.
+void cancel_bite(SolverState& solver, SutureState& state, Vec3 tip, std::vector<Event>& events) {
+  Bite& bite = state.bite[state.current];
+  drop_attachment(solver, state);
+  solver.channel.clear();
+  solver.body_collides[kNeedle] = 1;
+  bite.cancelled = true;
+  bite.has_exit = false;
+  state.phase = NeedlePhase::outside;
+  events.push_back({0, EventKind::bite_cancelled, 0, state.current, bite.depth, tip});
+}
+
 }  // namespace
 
-bool nearest_surface(const SolverModel& model, const Candidates& candidates, const Vec4* x, Vec3 p, float reach, SurfaceHit& hit) {
+bool nearest_surface(const SolverModel& model, const Candidates& candidates, const Vec4* x, Vec3 p, float reach,
+                     SurfaceHit& hit) {
   const TissueCollision& tissue = model.collision;
   const int near = nearest_particle(tissue, candidates, x, p, reach);
   if (near < 0) return false;
@@ -124,7 +139,8 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
         a.compliance = suture.attach_compliance;
         solver.attach.push_back(a);
         state.attached = true;
-        events.push_back({0, EventKind::particle_attached, 0, bite.nearest, distance(state.attached_from, tip), state.attached_from});
+        events.push_back(
+            {0, EventKind::particle_attached, 0, bite.nearest, distance(state.attached_from, tip), state.attached_from});
       }
       solver.channel.push_back(channel_at(suture, bite.entry));
       solver.body_collides[kNeedle] = 0;  // the shaft is in the tissue now: its channel holds it, not its surface
@@ -136,7 +152,8 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
       if (state.attached) {
         // Figure 5: dragged beyond the threshold, it is let go and the tissue relaxes.
         const float dragged = distance(xyz(x[bite.nearest]), state.attached_from);
-        const auto row = std::find_if(solver.attach.begin(), solver.attach.end(), [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
+        const auto row = std::find_if(solver.attach.begin(), solver.attach.end(),
+                                      [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
         const float torn = distance(transform(needle.pose(), row->target), state.attached_from);
         if (std::max(dragged, torn) > suture.release_distance) {
           drop_attachment(solver, state);
@@ -146,12 +163,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
       if (inside) return;
       drop_attachment(solver, state);
       if (!near || tip_at - along(bite.entry) < kEndReached) {
-        // Out the way it came.
-        bite.cancelled = true;
-        solver.channel.clear();
-        solver.body_collides[kNeedle] = 1;
-        state.phase = NeedlePhase::outside;
-        events.push_back({0, EventKind::bite_cancelled, 0, state.current, bite.depth, tip});
+        cancel_bite(solver, state, tip, events);
         return;
       }
       bite.exit = hit.end;
@@ -170,6 +182,11 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
         state.phase = NeedlePhase::tip_in;
         return;
       }
+      if (!inside && tip_at - along(bite.exit) < kEndReached && tip_at - along(bite.entry) < kEndReached) {
+        // Torn back through both holes between two substeps: the tip was never seen in the wall.
+        cancel_bite(solver, state, tip, events);
+        return;
+      }
       if (along(bite.entry) > kEndReached) return;
       // The back-end trigger: the swage has reached the entry, the thread follows through it.
       if (!place_suture_point(model, solver, suture, state, state.current, false, events)) return;
@@ -179,6 +196,15 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
     }
     case NeedlePhase::back_in: {
       Bite& bite = state.bite[state.current];
+      const float entry_at = along(bite.entry);
+      if (entry_at > kBackOut && entry_at < 0.5f * tip_at &&
+          distance(position_of(bite.entry.point, x), needle_point(arc, needle, entry_at / arc.radius)) < kOnShaft) {
+        // The back end came out of the entry again: the thread has left the hole, the shaft is in it.
+        remove_last_suture_point(model, solver, suture, state);
+        solver.channel.insert(solver.channel.begin(), channel_at(suture, bite.entry));
+        state.phase = NeedlePhase::through;
+        return;
+      }
       if (along(bite.exit) > kEndReached) return;
       if (!place_suture_point(model, solver, suture, state, state.current, true, events)) return;
       solver.channel.clear();

@@ -1,6 +1,7 @@
 // suture: the data of guided suturing (paper 2.2, 2.3) and the stages that work on it, in the order of the tick:
 //   grasp -> (per substep: solver, puncture, pull) -> closure.
-// Each stage reads and writes live rows of the solver's state (attachments, channel, anchors, order); none touches a multiplier.
+// Each stage reads and writes live rows of the solver's state (attachments, channel, anchors, order); none touches a
+// multiplier.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -23,19 +24,19 @@ struct BiteEnd {
 
 struct Bite {
   BiteEnd entry, exit;
-  float depth = 0;            // [m] deepest the tip went below the surface
+  float depth = 0;  // [m] deepest the tip went below the surface
   bool has_exit = false;
   bool complete = false;
   bool cancelled = false;
-  uint32_t nearest = 0;       // the paper's p7: nearest particle when the tip went in
+  uint32_t nearest = 0;  // the paper's p7: nearest particle when the tip went in
 };
 
 // How far the needle is on its way through the tissue.
 enum class NeedlePhase : uint8_t {
-  outside,    // no bite begun
-  tip_in,     // the tip is in the tissue
-  through,    // the tip has come out; the shaft is in the channel
-  back_in,    // the back end has gone in at the entry: the thread follows
+  outside,  // no bite begun
+  tip_in,   // the tip is in the tissue
+  through,  // the tip has come out; the shaft is in the channel
+  back_in,  // the back end has gone in at the entry: the thread follows
 };
 
 struct SuturePoint {
@@ -46,60 +47,74 @@ struct SuturePoint {
 
 struct HandState {
   Held held = Held::nothing;
-  uint32_t slot = 0;      // held thread particle
-  float at = 0;           // place on the needle's arc [0..1]
-  float jaw = 1;          // of the last tick
+  uint32_t slot = 0;  // held thread particle
+  float at = 0;       // place on the needle's arc [0..1]
+  float jaw = 1;      // of the last tick
 };
 
 struct SutureModel {
-  float attach_threshold = 0.006f, release_distance = 0.0022f;  // [m] figures 4 and 5
+  float attach_threshold = 0.006f, release_distance = 0.0022f;         // [m] figures 4 and 5
   float attach_compliance = 1.0f / 1100, channel_compliance = 0.002f;  // [m/N]
-  float channel_drag = 0.12f;    // [N] per end of the channel
-  float pass_tension = 0.03f;    // [N]
-  float capstan = 0.08f;         // thread-tissue friction times the angle by which a suture point bends the thread
-  int collision_off = 3;         // thread particles on each side
-  float grasp_reach = 0.003f;    // [m]
+  float channel_drag = 0.12f;                                          // [N] per end of the channel
+  float pass_tension = 0.03f;                                          // [N]
+  float capstan = 0.08f;       // thread-tissue friction times the angle by which a suture point bends the thread
+  int collision_off = 3;       // thread particles on each side
+  float grasp_reach = 0.003f;  // [m]
+  float needle_grip = 40, thread_grip = 15;  // [N] beyond which a jaw slips
   float grasp_compliance = 2e-5f, grasp_angular_compliance = 0.02f;  // [m/N], [rad/(N m)]
 };
 
 struct SutureState {
   std::vector<Bite> bite;
-  std::vector<SuturePoint> point;   // in the order in which they were made
+  std::vector<SuturePoint> point;  // in the order in which they were made
   NeedlePhase phase = NeedlePhase::outside;
-  uint32_t current = 0;             // the bite being made, valid unless phase is outside
+  uint32_t current = 0;  // the bite being made, valid unless phase is outside
   bool tip_inside = false;
-  bool attached = false;            // bite[current].nearest is attached to the tip
-  Vec3 attached_from;               // [m] where that particle was
+  bool attached = false;  // bite[current].nearest is attached to the tip
+  Vec3 attached_from;     // [m] where that particle was
   std::array<HandState, 2> hand;
 };
 
 // --- grasp.cpp ---------------------------------------------------------------------------------------------------------
 // Once a tick. A jaw that closes within reach of the needle or else of the thread holds it at the place and angle where it was
-// caught; opening lets go. (Tissue, slip and hand-over with force come with the full grasp.)
+// caught; opening lets go.
 void grasp(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
            const std::array<ToolInput, 2>& hand, std::vector<Event>& events);
+
+// After every substep: a jaw that is pulled on harder than it grips lets slip what it holds (needle: needle_grip, thread: thread_grip), before
+// the pull becomes one that no hand could make. Reported as a release with the force [N] as its value.
+void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, std::vector<Event>& events);
 
 // --- puncture.cpp ------------------------------------------------------------------------------------------------------
 // After every substep: the tip trigger, the attached particle, the back-end trigger (paper 2.2, figures 4 and 5).
 void puncture(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
               SutureState& state, std::vector<Event>& events);
-// Signed distance [m] from p to the tissue's surface (negative inside the wall) and the nearest place on it. False: nothing near.
+// Signed distance [m] from p to the tissue's surface (negative inside the wall) and the nearest place on it. False: nothing
+// near.
 struct SurfaceHit {
   BiteEnd end;
   Vec3 point, normal;
   float distance = 0;
 };
-bool nearest_surface(const SolverModel& model, const Candidates& candidates, const Vec4* x, Vec3 p, float reach, SurfaceHit& hit);
+bool nearest_surface(const SolverModel& model, const Candidates& candidates, const Vec4* x, Vec3 p, float reach,
+                     SurfaceHit& hit);
 
 // --- pull.cpp ----------------------------------------------------------------------------------------------------------
 // Moves the particle at index `from` of the order to stand right after the particle now at index `after` (figure 8), and gives
-// every pair a rest length so that the sum is what it was. from and after differ; ends of the thread stay ends.
+// every pair a rest length so that the sum is what it was. from and after differ; ends of the thread stay ends. A particle that
+// stands right after `after` already stays, and so do the lengths beside it.
 void move_particle(Thread& thread, size_t from, size_t after);
-// After every substep: particles whose turn it is pass their suture point (figures 7 to 9), from the needle end to the free end.
-void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, std::vector<Event>& events);
-// Locks the next free particle behind the needle to `end` and makes it a suture point (figure 7a). False: no free particle there yet.
+// After every substep: particles whose turn it is pass their suture point (figures 7 to 9), from the needle end to the free
+// end.
+void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+          std::vector<Event>& events);
+// Locks the next free particle behind the needle to `end` and makes it a suture point (figure 7a). False: no free particle
+// there yet.
 bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                         uint32_t bite, bool exit, std::vector<Event>& events);
+// Unlocks the newest suture point again: its thread was drawn back out of the hole. The particle stays where it is, as free
+// thread.
+void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state);
 // Collisions are off for locked and held particles and `collision_off` neighbours on each side, on for all others (paper 2.3).
 void update_thread_collisions(const SolverModel& model, SolverState& solver, const SutureModel& suture);
 // Rest length [m] of the thread between its first and its last suture point along the order; 0 with fewer than two.
@@ -113,8 +128,8 @@ struct ClosurePlan {
     Vec3 from, to;  // [m]
   };
   std::vector<Pull> pull;
-  float progress = 0;     // 0..1
-  float compliance = 0;   // [m/N]
+  float progress = 0;    // 0..1
+  float compliance = 0;  // [m/N]
 };
 // Once a tick: makes the plan's attachments, or moves their targets.
 void close(SolverState& solver, const ClosurePlan& plan);

@@ -51,7 +51,8 @@ int first_out_of_order(std::span<const Vec3> sp, size_t from) {
 }
 
 void purse_string(const PurseStringModel& model, PurseStringState& state, std::span<const Vec3> sp,
-                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, float dt, ClosurePlan& plan, std::vector<Event>& events) {
+                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, float dt, ClosurePlan& plan,
+                  std::vector<Event>& events) {
   if (model.rim_inner.size() < 3) return;
   if (state.area_start == 0) state.area_start = opening_area(model.rim_inner, x);
   if (state.finished) return;
@@ -73,7 +74,8 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, std::s
     for (size_t i = 0; i + 1 < sp.size(); ++i) state.path_start += distance(sp[i], sp[i + 1]);
     for (; state.checked < sp.size(); ++state.checked)
       if (first_out_of_order(sp, state.checked) == static_cast<int>(state.checked))
-        events.push_back({0, EventKind::order_broken, 0, state.checked + 1, 0, sp[(state.checked + 1) % sp.size()]});
+        events.push_back({0, EventKind::order_broken, 0, (state.checked + 1) % static_cast<uint32_t>(sp.size()), 0,
+                          sp[(state.checked + 1) % sp.size()]});
     events.push_back({0, EventKind::ring_complete, 0, static_cast<uint32_t>(sp.size()), angle, centre});
     return;
   }
@@ -103,8 +105,8 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, std::s
     state.path_end = 0;
     const size_t first = plan.pull.size() - sp_point.size();
     for (size_t i = first; i + 1 < plan.pull.size(); ++i) state.path_end += distance(plan.pull[i].to, plan.pull[i + 1].to);
-    // Gathered tissue takes up room on the thread: closing is led by the thread, but the edge arrives before the loop is as short as the bare
-    // way round. What is left then is drawn up against the tissue itself.
+    // Gathered tissue takes up room on the thread: closing is led by the thread, but the edge arrives before the loop is as
+    // short as the bare way round. What is left then is drawn up against the tissue itself.
     state.path_end *= kRoom;
     events.push_back({0, EventKind::closure_started, 0, 0, opening_area(model.rim_inner, x), anvil});
   }

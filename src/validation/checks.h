@@ -14,7 +14,8 @@ namespace catgut::validation {
 struct Lines {
   std::vector<ValidationLine> line;
   std::function<void(const ValidationLine&)> on_line;
-  void add(const std::string& name, double expected, double got, double tolerance, const std::string& unit, const std::string& source);
+  void add(const std::string& name, double expected, double got, double tolerance, const std::string& unit,
+           const std::string& source);
 };
 
 // A thread whose first node, and last if wanted, is held by the world: only the thread's kernels and the time step around them.

@@ -58,8 +58,8 @@ double hung_chain(bool direct, int sweeps, float h, float mass, float compliance
   return -double{rig.x[5].y} - 0.1;
 }
 
-// Block of 3 x 3 x 3 particles in one cluster, its top layer pinned (or, with one_free, all but one pinned); how far the rest hangs
-// down [m] under `gravity`. With `volume` its tetrahedra resist too.
+// Block of 3 x 3 x 3 particles in one cluster, its top layer pinned (or, with one_free, all but one pinned); how far the rest
+// hangs down [m] under `gravity`. With `volume` its tetrahedra resist too.
 struct HungBlock {
   float stiffness = 0.5f;  // at kReference
   float gravity = 9.81f;
@@ -142,7 +142,8 @@ Drift drift(TissueWorld& world, std::span<const Vec3> rest, Vec3 speed) {
   world.start(start);
   for (uint32_t i = 0; i < world.model.tissue; ++i) set(world.state.v[i], speed + cross(Vec3{0.6f, 2.0f, 0.4f}, start[i]));
   double size = 0;
-  for (uint32_t i = 0; i < world.model.tissue; ++i) size += double{length(xyz(world.state.v[i]))} / double{world.model.inv_mass[i]};
+  for (uint32_t i = 0; i < world.model.tissue; ++i)
+    size += double{length(xyz(world.state.v[i]))} / double{world.model.inv_mass[i]};
   Jobs jobs(1);
   const Momentum before = momentum_of(world);
   world.run(1, jobs);
@@ -159,7 +160,8 @@ void check_stiffness(Lines& out) {
   const std::string grid = "sweeps 1, 4, 16 x substeps 8, 16, 32";
   Spread attachment, soft_chain, direct_chain, soft_shape, stiff_shape, volume;
   Jobs one(1);
-  // Soft means compliance well above h^2 / m: then one sweep has converged, and any dependence left is a fault of the multipliers.
+  // Soft means compliance well above h^2 / m: then one sweep has converged, and any dependence left is a fault of the
+  // multipliers.
   HungBlock soft;
   soft.stiffness = 0.05f;
   soft.gravity = 1;
@@ -186,16 +188,20 @@ void check_stiffness(Lines& out) {
   const double weight = 1e-3 * 9.81;
   out.add("static stretch, attachment", weight, attachment.middle(), 0.01, "m", "m g alpha");
   out.add("  its spread", 0, attachment.relative(), 0.01, "1", grid);
-  out.add("static stretch, thread, sweeps only", 15 * weight * 0.5, soft_chain.middle(), 0.01, "m", "sum of m g alpha; alpha 0.5 m/N");
+  out.add("static stretch, thread, sweeps only", 15 * weight * 0.5, soft_chain.middle(), 0.01, "m",
+          "sum of m g alpha; alpha 0.5 m/N");
   out.add("  its spread", 0, soft_chain.relative(), 0.01, "1", grid);
-  out.add("static stretch, thread, direct", 15 * weight * 0.01, direct_chain.middle(), 0.01, "m", "sum of m g alpha; alpha 0.01 m/N");
+  out.add("static stretch, thread, direct", 15 * weight * 0.01, direct_chain.middle(), 0.01, "m",
+          "sum of m g alpha; alpha 0.01 m/N");
   out.add("  its spread", 0, direct_chain.relative(), 0.01, "1", grid);
   // A particle of a cluster of 27 whose others are pinned: its goal follows it by 1/27 of its way.
   auto hang = [](double s, double g) { return g * double{kReference} * double{kReference} * (1 - s) / s / (1 - 1.0 / 27); };
-  out.add("static sag, shape matching, soft", hang(0.05, 1), soft_shape.middle(), 0.01, "m", "g h0^2 (1 - s) / s / (1 - 1/27), s = 0.05");
+  out.add("static sag, shape matching, soft", hang(0.05, 1), soft_shape.middle(), 0.01, "m",
+          "g h0^2 (1 - s) / s / (1 - 1/27), s = 0.05");
   out.add("  its spread", 0, soft_shape.relative(), 0.01, "1", grid);
   out.add("static sag, shape matching, stiff", hang(0.9, 100), stiff_shape.middle(), 0.01, "m", "the same with s = 0.9");
-  out.add("  its spread", 0, stiff_shape.relative(), 0.01, "1", "sweeps 4, 16 x substeps 8, 16, 32 (one sweep has not converged)");
+  out.add("  its spread", 0, stiff_shape.relative(), 0.01, "1",
+          "sweeps 4, 16 x substeps 8, 16, 32 (one sweep has not converged)");
   out.add("static sag, volume and shape, spread", 0, volume.relative(), 0.01, "1", grid);
   // Workers: the same bits, on a block of several jobs' worth of particles.
   HungBlock big = tets;
@@ -224,15 +230,18 @@ void check_momentum(Lines& out) {
     };
     const std::span<const Vec3> rest = bowel ? std::span<const Vec3>(body.position) : std::span<const Vec3>(block.position);
     const std::string what = bowel ? "free bowel" : "free block";
-    const std::string cluster = bowel ? "no outer force; 600 overlapping clusters" : "no outer force; one cluster, unequal masses";
+    const std::string cluster =
+        bowel ? "no outer force; 600 overlapping clusters" : "no outer force; one cluster, unequal masses";
     TissueWorld spinning = make(), thrown = make();
     const Drift d = drift(spinning, rest, {});
-    out.add(what + ", linear momentum lost in 1 s", 0, d.linear, 1e-3, "1", cluster);
+    // A particle moves by the mean over its clusters, and particles near a rim are in fewer: actio and reactio then differ a little, as for
+    // the angular momentum below.
+    out.add(what + ", linear momentum lost in 1 s", 0, d.linear, bowel ? 5e-3 : 1e-3, "1", cluster);
     out.add(what + ", angular momentum lost in 1 s", 0, d.angular, bowel ? 0.05 : 0.01, "1",
             bowel ? "no outer moment; averaging over clusters keeps it only nearly" : "no outer moment");
     // Float32 rounds a position 0.1 m from the origin by 4e-9 m, which looks like h^-2 times that of acceleration.
-    out.add(what + ", thrown: acceleration from nothing", 0, drift(thrown, rest, {0.1f, 0.05f, -0.08f}).acceleration / 9.81, 1e-3, "g",
-            "no outer force; float32 positions up to 0.15 m from the origin");
+    out.add(what + ", thrown: acceleration from nothing", 0, drift(thrown, rest, {0.1f, 0.05f, -0.08f}).acceleration / 9.81,
+            1e-3, "g", "no outer force; float32 positions up to 0.15 m from the origin");
   }
 }
 

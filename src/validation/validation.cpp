@@ -79,8 +79,8 @@ Block make_block(int n, float spacing) {
   for (int k = 0; k < n; ++k)
     for (int j = 0; j < n; ++j)
       for (int i = 0; i < n; ++i)
-        b.position.push_back(Vec3{static_cast<float>(i) - middle, static_cast<float>(j) - middle, static_cast<float>(k) - middle} *
-                             spacing);
+        b.position.push_back(
+            Vec3{static_cast<float>(i) - middle, static_cast<float>(j) - middle, static_cast<float>(k) - middle} * spacing);
   b.cluster.resize(1);
   for (uint32_t i = 0; i < b.position.size(); ++i) b.cluster[0].push_back(i);
   for (int k = 0; k + 1 < n; ++k)

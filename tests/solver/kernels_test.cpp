@@ -1,0 +1,259 @@
+// tests/solver: volume, attachments and welds, nearest points, and the whole substep's independence of workers.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <cstring>
+
+#include "anatomy/bowel.h"
+#include "core/hash.h"
+#include "core/random.h"
+#include "solver/substep.h"
+
+namespace catgut {
+namespace {
+
+Vec3 random_point(Random& r, float size = 1) {
+  return Vec3{r.uniform() - 0.5f, r.uniform() - 0.5f, r.uniform() - 0.5f} * (2 * size);
+}
+
+TEST(Volume, gradients_agree_with_central_differences) {
+  Random r(1);
+  for (int trial = 0; trial < 50; ++trial) {
+    std::vector<Vec3> rest;
+    for (int i = 0; i < 4; ++i) rest.push_back(random_point(r));
+    Tet tet{0, 1, 2, 3};
+    if (tet_volume(rest[0], rest[1], rest[2], rest[3]) < 0) std::swap(tet[2], tet[3]);
+    VolumeModel m = make_volume_model(rest, std::vector<Tet>{tet});
+    if (m.rest[0] < 0.05f) continue;
+    m.rest[0] *= 0.5f;
+    // With a large compliance the multiplier is -C / alpha and each point moves by w lambda times its gradient.
+    for (size_t k = 0; k < 4; ++k) {
+      Column<Vec4> x;
+      for (const Vec3& p : rest) x.push_back(point(p));
+      std::vector<float> w(4, 0.0f);
+      w[k] = 1;
+      float lambda = 0;
+      solve_volume(m, x.data(), w.data(), 0.5f, 1, &lambda, 0, 1);
+      ASSERT_NE(lambda, 0);
+      const Vec3 got = (xyz(x[k]) - rest[k]) / lambda;
+      Eigen::Vector3d slope;
+      for (int c = 0; c < 3; ++c) {
+        auto volume = [&](double by) {
+          Eigen::Vector3d q[4];
+          for (size_t i = 0; i < 4; ++i) q[i] = {rest[tet[i]].x, rest[tet[i]].y, rest[tet[i]].z};
+          for (size_t i = 0; i < 4; ++i)
+            if (tet[i] == k) q[i][c] += by;
+          return (q[1] - q[0]).cross(q[2] - q[0]).dot(q[3] - q[0]) / 6;
+        };
+        slope[c] = (volume(1e-4) - volume(-1e-4)) / 2e-4;
+      }
+      EXPECT_LT((slope - Eigen::Vector3d(got.x, got.y, got.z)).norm(), 1e-4 * (1 + slope.norm()))
+          << "trial " << trial << " corner " << k;
+    }
+  }
+}
+
+TEST(Volume, tetrahedra_of_a_colour_share_no_particle) {
+  const BodyRest body = make_bowel({});
+  const VolumeModel m = make_volume_model(body.position, body.tet);
+  ASSERT_EQ(m.tet.size(), body.tet.size());
+  uint32_t start = 0;
+  for (const uint32_t end : m.colour_end) {
+    std::vector<uint8_t> used(body.position.size(), 0);
+    for (uint32_t t = start; t < end; ++t)
+      for (uint32_t k : m.tet[t]) {
+        ASSERT_EQ(used[k], 0) << "tetrahedron " << t;
+        used[k] = 1;
+      }
+    start = end;
+  }
+  EXPECT_EQ(start, m.tet.size());
+}
+
+TEST(Closest, on_triangle_beats_every_sample) {
+  Random r(2);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Vec3 a = random_point(r), b = random_point(r), c = random_point(r), p = random_point(r, 2);
+    const ClosestOnTriangle got = closest_on_triangle(p, a, b, c);
+    float sum = 0;
+    Vec3 rebuilt{};
+    const Vec3 corner[3] = {a, b, c};
+    for (size_t k = 0; k < 3; ++k) {
+      EXPECT_GE(got.weight[k], -1e-5f);
+      sum += got.weight[k];
+      rebuilt += corner[k] * got.weight[k];
+    }
+    EXPECT_NEAR(sum, 1, 1e-5);
+    EXPECT_LT(distance(rebuilt, got.point), 1e-5f);
+    float best = 1e9f;
+    const int n = 60;
+    for (int i = 0; i <= n; ++i)
+      for (int j = 0; i + j <= n; ++j) {
+        const float u = static_cast<float>(i) / n, v = static_cast<float>(j) / n;
+        best = std::min(best, distance(p, a * (1 - u - v) + b * u + c * v));
+      }
+    const float found = distance(p, got.point);
+    EXPECT_LE(found, best + 1e-5f);
+    EXPECT_GE(found, best - 0.06f);
+  }
+}
+
+TEST(Closest, on_segments_beats_every_sample) {
+  Random r(3);
+  for (int trial = 0; trial < 300; ++trial) {
+    const Vec3 a0 = random_point(r), b0 = random_point(r);
+    Vec3 a1 = random_point(r), b1 = random_point(r);
+    if (trial % 5 == 0) b1 = b0 + (a1 - a0) * 0.7f;  // parallel
+    if (trial % 7 == 0) a1 = a0;                     // a point
+    if (trial % 11 == 0) b1 = b0;
+    const auto [s, t] = closest_on_segments(a0, a1, b0, b1);
+    ASSERT_TRUE(s >= 0 && s <= 1 && t >= 0 && t <= 1);
+    const float found = distance(lerp(a0, a1, s), lerp(b0, b1, t));
+    float best = 1e9f;
+    for (int i = 0; i <= 50; ++i)
+      for (int j = 0; j <= 50; ++j)
+        best = std::min(best, distance(lerp(a0, a1, static_cast<float>(i) / 50), lerp(b0, b1, static_cast<float>(j) / 50)));
+    EXPECT_LE(found, best + 2e-5f) << "trial " << trial;
+  }
+}
+
+TEST(Attachment, its_multiplier_is_the_load) {
+  for (const float compliance : {0.0f, 1e-3f})
+    for (const int sweeps : {1, 5}) {
+      const float h = 1.0f / 960, mass = 0.002f;
+      Column<Vec4> x;
+      std::vector<float> w;
+      std::vector<Vec3> v(3);
+      TissuePoint weighted;
+      weighted.count = 3;
+      for (uint32_t i = 0; i < 3; ++i) {
+        x.push_back(point({0.01f * static_cast<float>(i), 0, 0}));
+        w.push_back(1 / mass);
+        weighted.particle[i] = i;
+        weighted.weight[i] = 1.0f / 3;
+      }
+      Attachment a;
+      a.point = weighted;
+      a.target = position_of(weighted, x.data());
+      a.compliance = compliance;
+      std::vector<RigidBody> none;
+      for (int step = 0; step < 4000; ++step) {
+        Column<Vec4> prev = x;
+        for (size_t i = 0; i < 3; ++i) v[i].y -= 9.81f * h, add(x[i], v[i] * h);
+        a.lambda = {};
+        for (int s = 0; s < sweeps; ++s) solve_attachment(a, x.data(), w.data(), {}, none, h);
+        for (size_t i = 0; i < 3; ++i) v[i] = (xyz(x[i]) - xyz(prev[i])) / (h * (1 + 20 * h));
+      }
+      const double force = double{a.lambda.y} / (double{h} * double{h});
+      EXPECT_NEAR(force, 3 * 0.002 * 9.81, 3 * 0.002 * 9.81 * 2e-3) << "compliance " << compliance << " sweeps " << sweeps;
+      EXPECT_NEAR(a.target.y - position_of(weighted, x.data()).y, compliance * 3 * 0.002f * 9.81f, 2e-6f);
+    }
+}
+
+TEST(Attachment, a_spread_point_follows_every_affine_motion) {
+  Random r(4);
+  Column<Vec4> rest;
+  std::vector<uint32_t> id;
+  for (uint32_t i = 0; i < 12; ++i) rest.push_back(point(random_point(r, 0.005f))), id.push_back(i);
+  const Vec3 at{0.001f, -0.0005f, 0.0007f};
+  const TissuePoint t = spread_point(id, rest.data(), at);
+  EXPECT_LT(distance(position_of(t, rest.data()), at), 1e-7f);
+  auto affine = [](Vec3 p) {
+    return Vec3{1.2f * p.x + 0.1f * p.y - 0.3f * p.z + 0.05f, 0.9f * p.y - 0.2f * p.x, 0.4f * p.y + 1.1f * p.z - 0.02f};
+  };
+  Column<Vec4> moved;
+  for (const Vec4& p : rest) moved.push_back(point(affine(xyz(p))));
+  EXPECT_LT(distance(position_of(t, moved.data()), affine(at)), 1e-6f);
+}
+
+TEST(Weld, a_rigid_one_carries_force_and_torque) {
+  std::vector<RigidModel> model(1);
+  model[0].inv_mass = 1 / 0.05f;
+  model[0].inv_inertia = {2e4f, 2e4f, 4e4f};
+  model[0].gravity = true;
+  std::vector<RigidBody> body(1);
+  Weld weld;
+  weld.a = 0;
+  weld.local_a.p = {0.03f, 0, 0};  // held 30 mm beside its centre of mass
+  weld.target = Pose{{0.03f, 0, 0}, {}};
+  const float h = 1.0f / 960;
+  for (int i = 0; i < 4000; ++i) {
+    weld.lambda = weld.angular_lambda = {};
+    predict(model[0], body[0], {0, -9.81f, 0}, h);
+    for (int s = 0; s < 20; ++s) solve_weld(model, body, weld, h);
+    update_velocity(model[0], body[0], h, 5);
+  }
+  const double weight = 0.05 * 9.81, h2 = double{h} * double{h};
+  EXPECT_NEAR(double{weld.lambda.y} / h2, weight, weight * 0.01);
+  EXPECT_NEAR(double{weld.angular_lambda.z} / h2, -weight * 0.03, weight * 0.03 * 0.02);
+  EXPECT_LT(distance(transform(body[0].pose(), weld.local_a.p), weld.target.p), 2e-5f);
+  EXPECT_LT(length(rotation_vector(body[0].q)), 2e-3f);
+}
+
+// A small bowel, a thread lying on it and a tool that presses into it; 200 substeps.
+uint64_t pressed_bowel(int workers, double* deepest) {
+  BowelShape shape;
+  shape.particles = 900;
+  shape.length = 0.05f;
+  const BodyRest body = make_bowel(shape);
+  const uint32_t tissue = static_cast<uint32_t>(body.position.size()), thread = 60;
+  SolverModel m;
+  m.tissue = tissue;
+  m.count = tissue + thread;
+  for (uint32_t i = 0; i < tissue; ++i) m.inv_mass.push_back(body.pinned[i] ? 0.0f : 1 / (80 * body.mass[i]));
+  m.inv_mass.resize(m.count, 1 / 2e-6f);
+  m.shape = make_shape_model(body.position, body.mass, body.cluster);
+  m.volume = make_volume_model(body.position, body.tet);
+  m.use_volume = true;
+  const std::vector<float> radius(tissue, body.radius), apart(tissue, 0.008f);
+  m.collision = make_tissue_collision(m.shape.rest, radius, std::vector<uint32_t>(tissue, 0), apart, body.surface);
+  m.thread.first_slot = tissue, m.thread.count = thread, m.thread.spacing = 0.0016f, m.thread.radius = 0.00015f;
+  m.thread.inv_mass = 1 / 2e-6f, m.thread.stretch_compliance = 1e-6f, m.thread.bend_compliance = 2e4f;
+  m.thread.gravity = m.gravity;
+  m.h = 1.0f / 960;
+  m.shape_stiffness = stiffness_at(0.9f, 1.0f / 480, m.h);
+  m.shape_relaxation = 1.3f;
+  m.damping = 4, m.thread_damping = 12;
+  m.friction = {0.3f, 0.1f, 0.15f};
+  m.body.resize(3);
+  m.body[0].inv_mass = 1 / 0.05f;
+  m.body[0].inv_inertia = {2e4f, 2e4f, 4e4f};
+  m.body[0].capsule.push_back({{0, 0, 0}, {0, 0, 0.02f}, 0.002f});
+  std::vector<Vec3> start = body.position;
+  for (uint32_t i = 0; i < thread; ++i) start.push_back({0.0016f * (static_cast<float>(i) - 30), 0.002f, 0.021f});
+  SolverState s = make_solver_state(m, start);
+  s.body_collides[1] = s.body_collides[2] = 0;
+  SolverScratch k;
+  prepare_scratch(m, k);
+  s.body[0].x = s.body[0].prev_x = {0, -0.008f, 0.026f};
+  Weld hand;
+  hand.a = 0;
+  hand.compliance = 1.0f / 3000;
+  hand.angular_compliance = 0.05f;
+  s.weld.push_back(hand);
+  Jobs jobs(workers);
+  uint32_t contacts = 0;
+  for (int i = 0; i < 200; ++i) {
+    s.weld[0].target = Pose{{0.00001f * static_cast<float>(i), -0.008f, 0.026f - 0.00005f * static_cast<float>(i)}, {}};
+    if (i % 8 == 0) find_candidates(m, s, k, 0.008f, nullptr);
+    substep(m, s, k, jobs, nullptr);
+    contacts = std::max(contacts, k.contacts);
+  }
+  EXPECT_GT(contacts, 0u) << "the tool was to touch the bowel";
+  *deepest = 0;
+  for (uint32_t i = 0; i < tissue; ++i) *deepest = std::max(*deepest, double{distance(xyz(s.x[i]), body.position[i])});
+  for (const Vec4& p : s.x) EXPECT_TRUE(is_finite(xyz(p)));
+  return hash_bytes(s.x.data(), s.x.size() * sizeof(Vec4), hash_bytes(s.v.data(), s.v.size() * sizeof(Vec4)));
+}
+
+TEST(Substep, one_and_two_workers_give_the_same_bits) {
+  double deep_one = 0, deep_two = 0;
+  const uint64_t one = pressed_bowel(1, &deep_one), two = pressed_bowel(2, &deep_two), again = pressed_bowel(1, &deep_one);
+  EXPECT_EQ(one, again);
+  EXPECT_EQ(one, two);
+  EXPECT_GT(deep_one, 0.0005);
+}
+
+}  // namespace
+}  // namespace catgut

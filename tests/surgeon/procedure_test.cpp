@@ -1,0 +1,69 @@
+// tests/surgeon: the whole scripted purse-string, seed by seed. Twenty of them take minutes: set CATGUT_LONG=1.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "procedure/scene_file.h"
+#include "runtime/session.h"
+
+namespace catgut {
+namespace {
+
+// Largest error of the thread's length in ticks in which no particle passed.
+struct Lengths {
+  double rest = 0;
+  float worst = 0, worst_passing = 0;
+  void tick(const Snapshot& seen) {
+    double length = 0;
+    for (size_t i = 1; i < seen.thread_order.size(); ++i)
+      length += double{distance(seen.particle[seen.thread_order[i - 1]], seen.particle[seen.thread_order[i]])};
+    bool passing = false;
+    for (const Event& e : seen.event) passing = passing || e.kind == EventKind::particle_passed;
+    float& worst_of = passing ? worst_passing : worst;
+    worst_of = std::max(worst_of, static_cast<float>(std::abs(length - rest) / rest));
+  }
+};
+
+TEST(Procedure, twenty_seeds_close_the_opening) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    SceneSpec scene = read_scene("purse_string");
+    scene.seed = seed;
+    Lengths lengths{static_cast<double>(scene.thread.particles - 1) * double{scene.thread.spacing}};
+    SessionHooks hooks;
+    hooks.on_tick = [&](const Snapshot& seen, const std::string&) { lengths.tick(seen); };
+    RunResult r = run_session(scene, {}, hooks);
+    std::printf("seed %2d: %.0f bites, opening %.3f, thread length %.4f (passing %.4f), %.1f s\n", static_cast<int>(seed),
+                r.value["bites"], r.value["opening_ratio"], static_cast<double>(lengths.worst),
+                static_cast<double>(lengths.worst_passing), r.simulated_s);
+    std::fflush(stdout);
+    EXPECT_EQ(r.value["bites"], scene.surgeon.bites) << seed;
+    EXPECT_LE(r.value["opening_ratio"], 0.15) << seed;
+    EXPECT_LE(lengths.worst, 0.01f) << seed;
+    EXPECT_LE(lengths.worst_passing, 0.03f) << seed;
+    EXPECT_EQ(r.value["order_broken"], 0) << seed;
+    EXPECT_EQ(r.value["lost"], 0) << seed;
+    EXPECT_EQ(r.value["sane"], 1) << seed;
+    EXPECT_EQ(r.value["surgeon_done"], 1) << seed;
+  }
+}
+
+// Half a millimetre of tremor, a millimetre of aim: the first attempts fail, and the surgeon tries again instead of giving up.
+TEST(Procedure, shaky_hands_try_again) {
+  for (uint64_t seed : {3, 6}) {
+    SceneSpec scene = read_scene("purse_string");
+    scene.seed = seed;
+    scene.surgeon.tremor = 0.0005f;
+    scene.surgeon.aim_error = 0.001f;
+    SessionOptions options;
+    options.seconds = 22;
+    RunResult r = run_session(scene, options);
+    EXPECT_GE(r.value["bites"], 1) << seed;
+    EXPECT_EQ(r.value["sane"], 1) << seed;
+    EXPECT_GT(r.simulated_s, 21) << seed << ": gave up";
+  }
+}
+
+}  // namespace
+}  // namespace catgut

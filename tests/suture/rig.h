@@ -1,0 +1,158 @@
+// tests/suture: a whole scene in which a ghost drives the needle. The ghost is one more weld of the needle to a place in the
+// world, so that a test says exactly where the needle goes; jaws, hands and mechanics are the real ones.
+#pragma once
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numeric>
+#include <vector>
+
+#include "sim/model.h"
+#include "sim/state.h"
+
+namespace catgut {
+
+inline SceneSpec plain_scene() {
+  SceneSpec s;
+  s.name = "rig";
+  s.body.resize(1);
+  s.body[0].haustra = 0;
+  return s;
+}
+
+// A place on the serosa, its outward normal, the way along the rim in which needles are driven, the way to the rim.
+struct Place {
+  Vec3 at, out, along, up;
+};
+
+struct Rig {
+  std::shared_ptr<const Model> model;
+  StatePtr state;
+  Jobs jobs{1};
+  std::vector<Event> seen;  // all events so far
+  TickInput input;
+  int ghost = -1;  // index of its weld
+
+  explicit Rig(const SceneSpec& scene = plain_scene()) : model(build_model(scene)), state(initial_state(*model)) {
+    for (ToolInput& h : input.hand) h.connected = 0;
+  }
+  SolverState& solver() { return state->solver; }
+  SutureState& suture() { return state->suture; }
+  Thread& thread() { return state->solver.thread; }
+  const Vec4* x() { return state->solver.x.data(); }
+  RigidBody& needle() { return state->solver.body[kNeedle]; }
+  Vec3 tip() { return needle_tip(model->solver.needle_arc, needle()); }
+
+  void tick() {
+    input.tick = state->tick;
+    step(*model, *state, input, jobs);
+    seen.insert(seen.end(), state->event.begin(), state->event.end());
+    ASSERT_TRUE(state_is_sane(*model, *state)) << "at tick " << state->tick;
+  }
+  void wait(float seconds) {
+    for (int i = static_cast<int>(std::lround(seconds / model->dt)); i > 0 && !testing::Test::HasFatalFailure(); --i) tick();
+  }
+  size_t count(EventKind kind) const {
+    return static_cast<size_t>(std::count_if(seen.begin(), seen.end(), [&](const Event& e) { return e.kind == kind; }));
+  }
+  const Event* last(EventKind kind) const {
+    for (size_t i = seen.size(); i-- > 0;)
+      if (seen[i].kind == kind) return &seen[i];
+    return nullptr;
+  }
+
+  // --- the ghost ---
+  void hold_needle() {
+    Weld w;
+    w.a = static_cast<int>(kNeedle);
+    w.target = needle().pose();
+    w.compliance = 1e-5f;
+    w.angular_compliance = 1e-3f;
+    ghost = static_cast<int>(solver().weld.size());
+    solver().weld.push_back(w);
+  }
+  void let_go() {
+    solver().weld.erase(solver().weld.begin() + ghost);
+    ghost = -1;
+  }
+  // Moves the ghost evenly to `goal` (frame at the needle's circle's centre).
+  void needle_to(const Pose& circle, float seconds) {
+    if (ghost < 0) hold_needle();
+    const Pose goal{circle.p - rotate(circle.q, model->solver.needle_arc.centre), circle.q};
+    const Pose from = solver().weld[static_cast<size_t>(ghost)].target;
+    const int ticks = std::max(1, static_cast<int>(std::lround(seconds / model->dt)));
+    for (int i = 1; i <= ticks && !testing::Test::HasFatalFailure(); ++i) {
+      const float part = static_cast<float>(i) / static_cast<float>(ticks);
+      solver().weld[static_cast<size_t>(ghost)].target = {lerp(from.p, goal.p, part), nlerp(from.q, goal.q, part)};
+      tick();
+    }
+  }
+  Pose circle() { return {transform(needle().pose(), model->solver.needle_arc.centre), needle().q}; }
+
+  // --- bites ---
+  // At `angle` round the opening, `below` the rim.
+  Place place(float angle, float below = 0.005f) {
+    const Vec3 radial{std::cos(angle), 0, -std::sin(angle)};
+    SurfaceHit hit;
+    const Vec3 outside = radial * (model->scene.body[0].radius + 0.0005f) - Vec3{0, below, 0};
+    EXPECT_TRUE(nearest_surface(model->solver, state->scratch.candidates, x(), outside, 0.008f, hit));
+    const Vec3 out = normalized(Vec3{hit.normal.x, 0, hit.normal.z}), up{0, 1, 0};
+    return {hit.point, out, cross(out, up), up};
+  }
+  // The needle's circle with the tip `psi` past the deepest place of a bite at `p`; the circle reaches `deep` below the
+  // surface.
+  Pose circle_at(const Place& p, float psi, float deep = 0.0011f) const {
+    const Vec3 axis_x = p.out * std::cos(psi) - p.along * std::sin(psi);
+    return {p.at + p.out * (model->scene.needle.radius - deep), from_axes(axis_x, cross(p.up, axis_x), p.up)};
+  }
+  void approach(const Place& p, float deep = 0.0011f) {
+    hold_needle();
+    Place away = p;
+    away.at += p.out * 0.05f + p.up * 0.02f;
+    needle_to(circle_at(away, -1.3f, deep), 1.0f);
+    away.at = p.at + p.out * 0.02f;
+    needle_to(circle_at(away, -1.3f, deep), 0.4f);
+    needle_to(circle_at(p, -1.0f, deep), 0.4f);
+  }
+  // Turns the needle about its circle from psi to psi at about 3.6 rad/s (30 mm/s of the tip).
+  void drive(const Place& p, float from, float to, float deep = 0.0011f, float rate = 3.6f) {
+    const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(to - from) / 0.06f)));
+    for (int i = 1; i <= steps && !testing::Test::HasFatalFailure(); ++i)
+      needle_to(circle_at(p, from + (to - from) * static_cast<float>(i) / static_cast<float>(steps), deep),
+                std::abs(to - from) / static_cast<float>(steps) / rate);
+  }
+  void whole_bite(const Place& p, float deep = 0.0011f) {
+    approach(p, deep);
+    drive(p, -1.0f, 4.3f, deep);
+  }
+  // Draws the needle away from the tissue, `metres` outward over `seconds`.
+  void draw(const Place& p, float metres, float seconds) {
+    Pose to = circle();
+    to.p += normalized(p.out + 0.4f * p.up) * metres;
+    needle_to(to, seconds);
+  }
+
+  // --- the thread ---
+  size_t node_of(uint32_t slot) {
+    return static_cast<size_t>(std::find(thread().order.begin(), thread().order.end(), slot) - thread().order.begin());
+  }
+  size_t node_of_point(size_t k) { return node_of(thread().anchor[suture().point[k].anchor].slot); }
+  Vec3 point_at(size_t k) { return position_of(thread().anchor[suture().point[k].anchor].point, x()); }
+  double rest_length() { return std::accumulate(thread().rest.begin(), thread().rest.end(), 0.0); }
+  bool order_is_whole() {
+    std::vector<uint32_t> order = thread().order;
+    std::sort(order.begin(), order.end());
+    for (size_t i = 0; i < order.size(); ++i)
+      if (order[i] != model->solver.thread.first_slot + i) return false;
+    return order.size() == model->solver.thread.count;
+  }
+  bool nothing_left_of_a_bite() {
+    return solver().channel.empty() && !suture().attached && suture().phase == NeedlePhase::outside &&
+           solver().body_collides[kNeedle] == 1 &&
+           std::none_of(solver().attach.begin(), solver().attach.end(), [](const Attachment& a) { return a.body >= 0; });
+  }
+};
+
+}  // namespace catgut
