@@ -30,7 +30,7 @@ struct InputError : std::runtime_error {
 
 }  // namespace catgut
 
-#define CATGUT_CHECK(condition) \
-  do { \
+#define CATGUT_CHECK(condition)                                               \
+  do {                                                                        \
     if (!(condition)) ::catgut::check_failed(__FILE__, __LINE__, #condition); \
   } while (0)

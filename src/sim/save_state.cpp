@@ -1,4 +1,5 @@
-// sim/save_state: the whole state as bytes, and its hash. One list of fields serves saving, loading and hashing, so that none can forget one.
+// sim/save_state: the whole state as bytes, and its hash. One list of fields serves saving, loading and hashing, so that none
+// can forget one.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -14,11 +15,11 @@ namespace {
 
 // Structs made of four-byte members only: no padding, so their bytes are their value.
 template <typename T>
-constexpr bool kPlain = std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> ||
-                        std::is_same_v<T, Quat> || std::is_same_v<T, Pose> || std::is_same_v<T, TissuePoint> ||
-                        std::is_same_v<T, BiteEnd> || std::is_same_v<T, Weld> || std::is_same_v<T, Attachment> ||
-                        std::is_same_v<T, ChannelPoint> || std::is_same_v<T, RigidBody> || std::is_same_v<T, ThreadHold> ||
-                        std::is_same_v<T, ClosurePlan::Pull>;
+constexpr bool kPlain =
+    std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> ||
+    std::is_same_v<T, Quat> || std::is_same_v<T, Pose> || std::is_same_v<T, TissuePoint> || std::is_same_v<T, BiteEnd> ||
+    std::is_same_v<T, Weld> || std::is_same_v<T, Attachment> || std::is_same_v<T, ChannelPoint> ||
+    std::is_same_v<T, RigidBody> || std::is_same_v<T, ThreadHold> || std::is_same_v<T, ClosurePlan::Pull>;
 static_assert(sizeof(Weld) % 4 == 0 && sizeof(Weld) == 4 * (2 + 3 * 7 + 2 + 6));
 static_assert(sizeof(TissuePoint) == 4 * (1 + 16 + 16));
 static_assert(sizeof(Attachment) == sizeof(TissuePoint) + 4 * (1 + 3 + 1 + 3));
@@ -29,7 +30,8 @@ static_assert(sizeof(ThreadHold) == 4 * 5 && sizeof(BiteEnd) == sizeof(TissuePoi
 
 template <typename A>
 void fields(A& a, ThreadAnchor& t) {
-  a(t.slot), a(t.point), a(t.friction), a(t.capstan), a(t.slipping), a(t.blocked_needle), a(t.blocked_free), a(t.tension_needle), a(t.tension_free);
+  a(t.slot), a(t.point), a(t.friction), a(t.capstan), a(t.slipping), a(t.blocked_needle), a(t.blocked_free),
+      a(t.tension_needle), a(t.tension_free);
 }
 template <typename A>
 void fields(A& a, Bite& b) {
@@ -49,7 +51,8 @@ void fields(A& a, State& s) {
   a(s.solver.x), a(s.solver.v);
   a(s.solver.rotation.x), a(s.solver.rotation.y), a(s.solver.rotation.z), a(s.solver.rotation.w);
   a(s.solver.body);
-  a(s.solver.thread.order), a(s.solver.thread.rest), a(s.solver.thread.anchor), a(s.solver.thread.hold), a(s.solver.thread.tension);
+  a(s.solver.thread.order), a(s.solver.thread.rest), a(s.solver.thread.anchor), a(s.solver.thread.hold),
+      a(s.solver.thread.tension);
   a(s.solver.weld), a(s.solver.attach), a(s.solver.channel), a(s.solver.thread_collides), a(s.solver.body_collides);
   a(s.suture.bite), a(s.suture.point), a(s.suture.phase), a(s.suture.current), a(s.suture.tip_inside), a(s.suture.attached);
   a(s.suture.attached_from), a(s.suture.hand[0]), a(s.suture.hand[1]);
@@ -75,7 +78,8 @@ struct Writer {
     const uint64_t n = v.size();
     bytes(&n, sizeof n);
     if constexpr (kPlain<T>) bytes(v.data(), n * sizeof(T));
-    else for (T& e : v) (*this)(e);
+    else
+      for (T& e : v) (*this)(e);
   }
 };
 
@@ -83,7 +87,9 @@ struct Reader {
   const std::vector<std::byte>& in;
   size_t at = 0;
   void bytes(void* p, size_t n) {
-    if (n > in.size() - at) throw InputError("saved state", "it ends too early", "the file was cut or belongs to another scene");
+    if (n > in.size() - at)
+      throw InputError("saved state", "it ends too early", "the file was cut or belongs to another scene");
+    if (n == 0) return;  // an empty array has no place to copy to
     std::memcpy(p, in.data() + at, n);
     at += n;
   }
@@ -109,7 +115,8 @@ struct Reader {
       throw InputError("saved state", "an array has an impossible length", "the file is damaged");
     v.resize(n);
     if constexpr (kPlain<T>) bytes(v.data(), n * sizeof(T));
-    else for (T& e : v) (*this)(e);
+    else
+      for (T& e : v) (*this)(e);
   }
 };
 
@@ -151,7 +158,8 @@ bool fits(const Model& model, const State& s, const State& fresh) {
   if (a.weld.size() < 2) return false;
   for (size_t k = 0; k < a.weld.size(); ++k) {  // the first two hold the tools to their hands
     const Weld& w = a.weld[k];
-    if (w.a < 0 || w.a >= bodies || w.b < -1 || w.b >= bodies || (k < 2 && (w.a != static_cast<int>(k) || w.b != -1))) return false;
+    if (w.a < 0 || w.a >= bodies || w.b < -1 || w.b >= bodies || (k < 2 && (w.a != static_cast<int>(k) || w.b != -1)))
+      return false;
   }
   bool tip_attached = false;
   for (const Attachment& t : a.attach) {

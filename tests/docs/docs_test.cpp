@@ -53,7 +53,8 @@ TEST(Docs, files_that_are_named_exist) {
   for (const fs::path& page : pages()) {
     const std::string text = read_file(page);
     for (std::sregex_iterator m(text.begin(), text.end(), kPath), none; m != none; ++m) {
-      std::string path = (*m)[1];
+      const std::string path = (*m)[1];
+      if (path.find("NAME") != std::string::npos) continue;  // to be filled in by the reader
       const bool there = fs::exists(kRoot / path) || fs::exists(kRoot / (path + ".h")) || fs::exists(kRoot / (path + ".cpp"));
       EXPECT_TRUE(there) << fs::relative(page, kRoot).string() << ": " << path;
     }
