@@ -8,6 +8,8 @@
 
 namespace catgut {
 
-inline uint64_t hash_bytes(const void* data, size_t bytes, uint64_t seed = 0) { return XXH3_64bits_withSeed(data, bytes, seed); }
+inline uint64_t hash_bytes(const void* data, size_t bytes, uint64_t seed = 0) {
+  return XXH3_64bits_withSeed(data, bytes, seed);
+}
 
 }  // namespace catgut

@@ -22,8 +22,8 @@ inline void relax() {
 #endif
 }
 
-constexpr int kSpins = 2000;     // about 30 us: longer than the gaps between the stages of a substep
-constexpr int kYields = 64;      // then give the core to others, then sleep until the next tick
+constexpr int kSpins = 2000;  // about 30 us: longer than the gaps between the stages of a substep
+constexpr int kYields = 64;   // then give the core to others, then sleep until the next tick
 
 }  // namespace
 

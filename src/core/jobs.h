@@ -21,10 +21,12 @@ class Jobs {
   // Calls work(first, last) for consecutive blocks of at most `block` items that cover [0, count); returns when all are done.
   template <typename Work>
   void each(size_t count, size_t block, Work&& work) {
-    run((count + block - 1) / block, [](void* w, size_t b, size_t n, size_t bl) {
-      const size_t first = b * bl;
-      (*static_cast<std::remove_reference_t<Work>*>(w))(first, first + bl < n ? first + bl : n);
-    }, &work, count, block);
+    run((count + block - 1) / block,
+        [](void* w, size_t b, size_t n, size_t bl) {
+          const size_t first = b * bl;
+          (*static_cast<std::remove_reference_t<Work>*>(w))(first, first + bl < n ? first + bl : n);
+        },
+        &work, count, block);
   }
 
  private:

@@ -8,15 +8,29 @@
 namespace catgut {
 
 enum class Stage : uint8_t {
-  predict, shape, volume, thread, attach, rigid, broadphase, self_contact, tool_contact, thread_contact, velocity,  // solver
-  puncture, pull, closure, publish, count_
+  predict,
+  shape,
+  volume,
+  thread,
+  attach,
+  rigid,
+  broadphase,
+  self_contact,
+  tool_contact,
+  thread_contact,
+  velocity,  // solver
+  puncture,
+  pull,
+  closure,
+  publish,
+  count_
 };
 const char* stage_name(Stage stage);
 constexpr Stage kLastSolverStage = Stage::velocity;
 
 struct StageTimes {
   std::array<double, static_cast<size_t>(Stage::count_)> ms{};  // accumulated wall time
-  uint32_t contacts = 0;   // largest number of active contacts in a substep
+  uint32_t contacts = 0;                                        // largest number of active contacts in a substep
   double solver_ms() const {
     double s = 0;
     for (size_t i = 0; i <= static_cast<size_t>(kLastSolverStage); ++i) s += ms[i];

@@ -16,13 +16,13 @@ enum class TissueLayer : uint8_t { serosa = 0, mucosa = 1, cut_edge = 2 };
 // position[v] follows up to four particles with weights that sum to 1. The moved vertex is
 //   sum_k weight_k * (particle_k + R_k (position[v] - rest_k)),  R_k = rotation of the particle's cluster.
 struct VisibleMesh {
-  std::vector<Vec3> position;                        // [m] at rest
-  std::vector<Vec3> normal;                          // unit, at rest, outward
-  std::vector<std::array<float, 2>> uv;              // metres along and around the organ / 0.01, for textures
-  std::vector<TissueLayer> layer;                    // per vertex
-  std::vector<std::array<uint32_t, 3>> triangle;     // counter-clockwise seen from outside
+  std::vector<Vec3> position;                          // [m] at rest
+  std::vector<Vec3> normal;                            // unit, at rest, outward
+  std::vector<std::array<float, 2>> uv;                // metres along and around the organ / 0.01, for textures
+  std::vector<TissueLayer> layer;                      // per vertex
+  std::vector<std::array<uint32_t, 3>> triangle;       // counter-clockwise seen from outside
   std::vector<std::array<uint32_t, 4>> skin_particle;  // indices into Snapshot::particle
-  std::vector<std::array<float, 4>> skin_weight;     // sum 1
+  std::vector<std::array<float, 4>> skin_weight;       // sum 1
 };
 
 enum class ToolKind : uint8_t { needle_driver, forceps };
@@ -30,17 +30,17 @@ enum class ToolKind : uint8_t { needle_driver, forceps };
 struct PictureModel {
   std::string title;
   std::vector<VisibleMesh> body;
-  std::vector<Vec3> particle_rest;      // [m] rest position of every tissue particle
-  uint32_t thread_first = 0;            // slot of the first thread particle in Snapshot::particle
+  std::vector<Vec3> particle_rest;  // [m] rest position of every tissue particle
+  uint32_t thread_first = 0;        // slot of the first thread particle in Snapshot::particle
   uint32_t thread_count = 0;
   float thread_radius = 0.00015f;       // [m]
   float needle_radius = 0.00828f;       // [m] of the needle's circle
   float needle_arc = kPi;               // [rad]
   float needle_wire_radius = 0.00033f;  // [m]
   std::array<ToolKind, 2> tool{ToolKind::needle_driver, ToolKind::forceps};
-  Vec3 focus;                           // [m] centre of the operating field
-  float field = 0.1f;                   // [m] its radius
-  float drape = -0.035f;                // [m] height of the sterile drape (horizontal), which the organ stands up through
+  Vec3 focus;                              // [m] centre of the operating field
+  float field = 0.1f;                      // [m] its radius
+  float drape = -0.035f;                   // [m] height of the sterile drape (horizontal), which the organ stands up through
   std::vector<std::vector<uint32_t>> rim;  // tissue particles round each opening, in order (outer layer)
 };
 

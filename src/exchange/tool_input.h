@@ -11,14 +11,14 @@ namespace catgut {
 // Tool frame: origin at the grasp point between the jaw tips, -z the way the tool points (the shaft runs along +z toward the
 // hand), x the direction in which the jaws open.
 struct ToolInput {
-  Pose pose;                  // of the hand's tool frame, in world [m]
-  Vec3 velocity;              // [m/s]
-  Vec3 angular_velocity;      // [rad/s]
-  float jaw = 1;              // 0 closed .. 1 open
-  uint32_t buttons = 0;       // bit per button
-  uint64_t time_ns = 0;       // device clock, for latency tables only: never read by the physics
+  Pose pose;              // of the hand's tool frame, in world [m]
+  Vec3 velocity;          // [m/s]
+  Vec3 angular_velocity;  // [rad/s]
+  float jaw = 1;          // 0 closed .. 1 open
+  uint32_t buttons = 0;   // bit per button
+  uint64_t time_ns = 0;   // device clock, for latency tables only: never read by the physics
   uint32_t sequence = 0;
-  uint32_t connected = 1;     // 0: no device; the tool stays where it is and touches nothing
+  uint32_t connected = 1;  // 0: no device; the tool stays where it is and touches nothing
 };
 
 struct TickInput {

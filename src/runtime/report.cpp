@@ -97,9 +97,11 @@ std::string run_summary(const RunResult& r) {
                      r.solver_ms.p99, r.solver_ms.max);
   if (r.late_ticks > 0) {
     // Where the time went in the worst of them.
-    out += fmt::format("  {} ticks took longer than they simulate; the longest, tick {}, {:.1f} ms:", r.late_ticks, r.longest_tick, r.tick_ms.max);
+    out += fmt::format("  {} ticks took longer than they simulate; the longest, tick {}, {:.1f} ms:", r.late_ticks,
+                       r.longest_tick, r.tick_ms.max);
     for (size_t s = 0; s < kStages; ++s)
-      if (r.longest.ms[s] > 0.05 * r.tick_ms.max) out += fmt::format(" {} {:.1f}", stage_name(static_cast<Stage>(s)), r.longest.ms[s]);
+      if (r.longest.ms[s] > 0.05 * r.tick_ms.max)
+        out += fmt::format(" {} {:.1f}", stage_name(static_cast<Stage>(s)), r.longest.ms[s]);
     out += "\n";
   }
   out += fmt::format("  {} bites, {} suture points, opening at {:.1f} % of what it was\n", value(r, "bites"),

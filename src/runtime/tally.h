@@ -33,14 +33,14 @@ struct RunResult {
   size_t particles = 0;
   uint64_t ticks = 0;
   double simulated_s = 0;
-  double real_time_factor = 0;             // simulated time over the time spent in step, publish and the surgeon's plan
-  Spread solver_ms, tick_ms;               // per tick
-  std::array<Spread, kStages> stage_ms;    // per tick
-  StageTimes longest;                      // of the tick that took longest
+  double real_time_factor = 0;                // simulated time over the time spent in step, publish and the surgeon's plan
+  Spread solver_ms, tick_ms;                  // per tick
+  std::array<Spread, kStages> stage_ms;       // per tick
+  StageTimes longest;                         // of the tick that took longest
   uint64_t longest_tick = 0, late_ticks = 0;  // its number; ticks that took longer than they simulate
-  uint32_t contacts = 0;                   // the most in a substep
-  std::map<std::string, uint64_t> events;  // by kind, only those that happened
-  std::map<std::string, double> value;     // every name of result_names
+  uint32_t contacts = 0;                      // the most in a substep
+  std::map<std::string, uint64_t> events;     // by kind, only those that happened
+  std::map<std::string, double> value;        // every name of result_names
   std::vector<ExpectationResult> expect;
   uint64_t state_hash = 0;
   bool interrupted = false;

@@ -1,5 +1,5 @@
-// sim/build: turns a scene's description into a Model and its first State. Reads SceneSpec; calls the anatomy; throws InputError for
-// what a scene may get wrong. Nothing here runs during a tick.
+// sim/build: turns a scene's description into a Model and its first State. Reads SceneSpec; calls the anatomy; throws
+// InputError for what a scene may get wrong. Nothing here runs during a tick.
 #include <cmath>
 #include <numeric>
 
@@ -95,8 +95,8 @@ bool apply_preset(SolverSpec& s, const std::string& preset) {
   s.shape_relaxation = 1;
   s.distance_sweeps = 3;
   s.bend_sweeps = 3;
-  // The paper gives 0.02 without a unit, for particles of unit mass as such solvers have them. What matters is compliance against
-  // inverse mass: for our thread's 2 mg that is 0.02 / 2e-6 = 1e4 per joule.
+  // The paper gives 0.02 without a unit, for particles of unit mass as such solvers have them. What matters is compliance
+  // against inverse mass: for our thread's 2 mg that is 0.02 / 2e-6 = 1e4 per joule.
   s.bend_compliance = 1e4f;
   s.self_contact_sweeps = 10;
   s.contact_sweeps = 5;

@@ -19,9 +19,9 @@ struct Model {
   bool has_technique = false;
   float dt = 1.0f / 60;  // [s] tick
   int substeps = 8;
-  std::vector<Vec3> start;           // [m] of every particle
-  std::vector<Pose> tool_start;      // of the two tools
-  Pose needle_start;                 // body frame
+  std::vector<Vec3> start;                                               // [m] of every particle
+  std::vector<Pose> tool_start;                                          // of the two tools
+  Pose needle_start;                                                     // body frame
   float hand_compliance = 1.0f / 3000, hand_angular_compliance = 0.05f;  // [m/N], [rad/(N m)] tool on its hand
   PictureModel picture;
 };

@@ -47,7 +47,8 @@ void publish(const Model& model, const State& state, Snapshot& out) {
   }
   out.bite.clear();
   for (const Bite& b : state.suture.bite)
-    out.bite.push_back({position_of(b.entry.point, s.x.data()), position_of(b.exit.point, s.x.data()), b.depth, b.has_exit, b.complete});
+    out.bite.push_back(
+        {position_of(b.entry.point, s.x.data()), position_of(b.exit.point, s.x.data()), b.depth, b.has_exit, b.complete});
   out.opening_area = model.purse_string.rim_inner.empty() ? 0 : opening_area(model.purse_string.rim_inner, s.x.data());
   out.closure = state.plan.progress;
   out.event = state.event;

@@ -31,9 +31,9 @@ struct BodySpec {
 
 struct ThreadSpec {
   int particles = 175;
-  float spacing = 0.0016f;         // [m] rest distance of neighbours
-  float radius = 0.00015f;         // [m]
-  float mass = 2e-6f;              // [kg] per particle
+  float spacing = 0.0016f;           // [m] rest distance of neighbours
+  float radius = 0.00015f;           // [m]
+  float mass = 2e-6f;                // [kg] per particle
   float stretch_compliance = 1e-6f;  // [m/N] per segment
 };
 
@@ -41,44 +41,44 @@ struct NeedleSpec {
   float radius = 0.00828f;       // [m] of the circle: half circle of 26 mm arc
   float arc = 3.14159265f;       // [rad]
   float wire_radius = 0.00033f;  // [m]
-  float mass = 0.005f;           // [kg] inertia; more than the steel's 0.07 g, to match the scaled inertia of the tissue it moves
+  float mass = 0.005f;  // [kg] inertia; more than the steel's 0.07 g, to match the scaled inertia of the tissue it moves
 };
 
 // The solver's knobs. preset = "paper" sets all of them as in section 2.1 of the paper; "default" is what works best.
 struct SolverSpec {
   std::string preset = "default";
-  float tick_rate = 60;            // [1/s] ticks
-  int substeps = 16;               // per tick
+  float tick_rate = 60;  // [1/s] ticks
+  int substeps = 16;     // per tick
   int shape_sweeps = 1;
-  float shape_stiffness = 0.9f;    // 0..1, the paper's deformation resistance, per sweep of a substep of 1/480 s
-  float shape_relaxation = 1.3f;   // over-relaxation of the averaged goals; stiffness * relaxation < 2
+  float shape_stiffness = 0.9f;   // 0..1, the paper's deformation resistance, per sweep of a substep of 1/480 s
+  float shape_relaxation = 1.3f;  // over-relaxation of the averaged goals; stiffness * relaxation < 2
   int distance_sweeps = 1;
   int bend_sweeps = 1;
-  float bend_compliance = 2e4f;    // [1/J] of the cosine form
-  int self_contact_sweeps = 1;     // tissue against tissue
-  int contact_sweeps = 1;          // tools, thread and needle
-  bool thread_direct = true;       // direct solve along the thread before the distance sweeps
-  bool volume = false;             // tetrahedral volume constraints
-  float volume_compliance = 0;     // [m^6/J] energy = (V - V0)^2 / (2 compliance); 0: incompressible
-  float damping = 4;               // [1/s] of tissue velocities
-  float thread_damping = 12;       // [1/s] of thread velocities
-  Vec3 gravity{0, -9.81f, 0};      // [m/s^2]
-  float mass_scale = 80;           // tissue inertia times this at unchanged weight: sets the force with which tissue answers
-  float friction_tissue = 0.3f;    // coefficients of Coulomb friction
+  float bend_compliance = 2e4f;  // [1/J] of the cosine form
+  int self_contact_sweeps = 1;   // tissue against tissue
+  int contact_sweeps = 1;        // tools, thread and needle
+  bool thread_direct = true;     // direct solve along the thread before the distance sweeps
+  bool volume = false;           // tetrahedral volume constraints
+  float volume_compliance = 0;   // [m^6/J] energy = (V - V0)^2 / (2 compliance); 0: incompressible
+  float damping = 4;             // [1/s] of tissue velocities
+  float thread_damping = 12;     // [1/s] of thread velocities
+  Vec3 gravity{0, -9.81f, 0};    // [m/s^2]
+  float mass_scale = 80;         // tissue inertia times this at unchanged weight: sets the force with which tissue answers
+  float friction_tissue = 0.3f;  // coefficients of Coulomb friction
   float friction_tool = 0.1f;
   float friction_thread = 0.15f;
 };
 
 // Guided mechanics (paper 2.2, 2.3).
 struct SutureSpec {
-  float attach_threshold = 0.006f;   // [m] X of figure 4: the nearest particle must be this near to the tip
-  float release_distance = 0.0022f;  // [m] drag beyond which the attached particle is let go (figure 5)
+  float attach_threshold = 0.006f;     // [m] X of figure 4: the nearest particle must be this near to the tip
+  float release_distance = 0.0022f;    // [m] drag beyond which the attached particle is let go (figure 5)
   float attach_compliance = 0.00091f;  // [m/N] of that attachment: 1 / 1100 N/m, the paper's spring
-  float channel_compliance = 0.002f; // [m/N] the bitten tissue holds the needle's shaft sideways
-  float pass_tension = 0.03f;        // [N] tension difference beyond which thread slides through a suture point
-  float capstan = 0.08f;             // and so much more per newton of tension (friction coefficient times the angle of the bend)
-  int collision_off = 3;             // thread particles on each side of a locked one that do not collide
-  float grasp_reach = 0.003f;        // [m] how near a closing jaw must be to hold needle or thread
+  float channel_compliance = 0.002f;   // [m/N] the bitten tissue holds the needle's shaft sideways
+  float pass_tension = 0.03f;          // [N] tension difference beyond which thread slides through a suture point
+  float capstan = 0.08f;       // and so much more per newton of tension (friction coefficient times the angle of the bend)
+  int collision_off = 3;       // thread particles on each side of a locked one that do not collide
+  float grasp_reach = 0.003f;  // [m] how near a closing jaw must be to hold needle or thread
 };
 
 // The technique's plan.
@@ -93,13 +93,13 @@ struct TechniqueSpec {
 // The scripted surgeon.
 struct SurgeonSpec {
   int bites = 12;
-  float edge_distance = 0.004f;   // [m] of the bites from the rim
-  float bite_length = 0.007f;     // [m] along the rim
-  float tail = 0.045f;            // [m] of thread left at the free end
-  float speed = 0.15f;            // [m/s] of free hand motion
-  float drive_speed = 0.03f;      // [m/s] of the needle in tissue
-  float tremor = 0.0001f;         // [m] standard deviation
-  float aim_error = 0.0003f;      // [m] standard deviation
+  float edge_distance = 0.004f;  // [m] of the bites from the rim
+  float bite_length = 0.007f;    // [m] along the rim
+  float tail = 0.045f;           // [m] of thread left at the free end
+  float speed = 0.15f;           // [m/s] of free hand motion
+  float drive_speed = 0.03f;     // [m/s] of the needle in tissue
+  float tremor = 0.0001f;        // [m] standard deviation
+  float aim_error = 0.0003f;     // [m] standard deviation
 };
 
 // What must hold at the end: every scene is a test. min/max of a named result (see docs/scene_reference).
@@ -109,11 +109,11 @@ struct Expectation {
 };
 
 struct SceneSpec {
-  std::string name;              // of the file, without .toml
+  std::string name;  // of the file, without .toml
   std::string title;
   uint64_t seed = 1;
-  float duration = 240;          // [s] simulated, at most; a run ends earlier when the surgeon is done
-  float settle = 0.5f;           // [s] simulated before the hands are let in
+  float duration = 240;  // [s] simulated, at most; a run ends earlier when the surgeon is done
+  float settle = 0.5f;   // [s] simulated before the hands are let in
   std::vector<BodySpec> body;
   ThreadSpec thread;
   NeedleSpec needle;

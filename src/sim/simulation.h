@@ -1,5 +1,6 @@
-// sim: the engine's face. `Model` never changes, `State` is all that does, `step` is the tick, and the same inputs give the same
-// bits for any number of workers. Everything above (command line, window, recording, embedding) is built on these few calls.
+// sim: the engine's face. `Model` never changes, `State` is all that does, `step` is the tick, and the same inputs give the
+// same bits for any number of workers. Everything above (command line, window, recording, embedding) is built on these few
+// calls.
 #pragma once
 #include <cstddef>
 #include <memory>
@@ -23,7 +24,9 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene);
 const SceneSpec& scene_of(const Model& model);
 size_t particle_count(const Model& model);  // tissue + thread
 
-struct StateDeleter { void operator()(State*) const; };
+struct StateDeleter {
+  void operator()(State*) const;
+};
 using StatePtr = std::unique_ptr<State, StateDeleter>;
 StatePtr initial_state(const Model& model);
 
@@ -34,7 +37,8 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
 void publish(const Model& model, const State& state, Snapshot& snapshot);
 PictureModel picture_model(const Model& model);
 
-// The whole state as bytes (versioned by kStateVersion) and back. load_state throws InputError if the bytes do not fit the model.
+// The whole state as bytes (versioned by kStateVersion) and back. load_state throws InputError if the bytes do not fit the
+// model.
 constexpr uint32_t kStateVersion = 1;
 std::vector<std::byte> save_state(const Model& model, const State& state);
 void load_state(const Model& model, State& state, const std::vector<std::byte>& bytes);

@@ -13,9 +13,9 @@ TissuePoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, V
   for (uint32_t k = 0; k < t.count; ++k) mean += rest_of(k) / t.count;
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (uint32_t k = 0; k < t.count; ++k) spread += (rest_of(k) - mean) * (rest_of(k) - mean).transpose();
-  // b_k = 1/n + (q_k - mean)^T S^-1 (at - mean); the pseudo-inverse leaves directions alone in which the particles do not spread.
-  const Eigen::Vector3d slope =
-      spread.completeOrthogonalDecomposition().solve(Eigen::Vector3d(at.x, at.y, at.z) - mean);
+  // b_k = 1/n + (q_k - mean)^T S^-1 (at - mean); the pseudo-inverse leaves directions alone in which the particles do not
+  // spread.
+  const Eigen::Vector3d slope = spread.completeOrthogonalDecomposition().solve(Eigen::Vector3d(at.x, at.y, at.z) - mean);
   for (uint32_t k = 0; k < t.count; ++k) {
     t.particle[k] = particle[k];
     t.weight[k] = static_cast<float>(1.0 / t.count + (rest_of(k) - mean).dot(slope));

@@ -11,8 +11,8 @@
 
 namespace catgut {
 
-// A material point: sum of weight * particle. Spread over a neighbourhood it also has the inertia of one: a thread that pulls on three
-// particles alone would drag them millimetres in a substep before their neighbours could answer.
+// A material point: sum of weight * particle. Spread over a neighbourhood it also has the inertia of one: a thread that pulls
+// on three particles alone would drag them millimetres in a substep before their neighbours could answer.
 struct TissuePoint {
   static constexpr uint32_t kMost = 16;
   uint32_t count = 0;
@@ -26,8 +26,8 @@ inline TissuePoint particle_point(uint32_t i) {
   t.weight[0] = 1;
   return t;
 }
-// The smoothest weights over `particle` (at rest positions `rest`) whose weighted sum is `at`: least squares with linear precision, so
-// that the point follows every affine motion of its neighbourhood exactly. At most kMost particles are used.
+// The smoothest weights over `particle` (at rest positions `rest`) whose weighted sum is `at`: least squares with linear
+// precision, so that the point follows every affine motion of its neighbourhood exactly. At most kMost particles are used.
 TissuePoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at);
 
 inline Vec3 position_of(const TissuePoint& t, const Vec4* x) {
@@ -48,10 +48,10 @@ inline void push(const TissuePoint& t, Vec4* x, const float* w, Vec3 p) {
 // Particle (or weighted point) to a fixed place in the world, or to a place in a body's frame.
 struct Attachment {
   TissuePoint point;
-  int body = -1;          // -1: the world
-  Vec3 target;            // [m] world, or body frame
-  float compliance = 0;   // [m/N]
-  Vec3 lambda;            // [N s^2] cleared at the start of a substep; acts on the tissue
+  int body = -1;         // -1: the world
+  Vec3 target;           // [m] world, or body frame
+  float compliance = 0;  // [m/N]
+  Vec3 lambda;           // [N s^2] cleared at the start of a substep; acts on the tissue
 };
 
 // The shaft of the needle in its channel: the tissue point lies on the arc of the needle (particle-line attachment). It slides

@@ -80,9 +80,9 @@ void AllBends(BendScratch& s, size_t nodes, float alpha, int sweeps) {
       // Offsets of the first triplet of the colour within each column.
       const size_t oa = (middle - 1) / 3, ob = middle / 3, oc = (middle + 1) / 3;
       const size_t count = (nodes - 2 - middle) / 3 + 1;
-      Sweep({s.x[a].data() + oa, s.y[a].data() + oa, s.z[a].data() + oa, s.w[a].data() + oa, s.x[b].data() + ob, s.y[b].data() + ob,
-             s.z[b].data() + ob, s.w[b].data() + ob, s.x[c].data() + oc, s.y[c].data() + oc, s.z[c].data() + oc, s.w[c].data() + oc,
-             s.lambda[b].data() + ob, count},
+      Sweep({s.x[a].data() + oa, s.y[a].data() + oa, s.z[a].data() + oa, s.w[a].data() + oa, s.x[b].data() + ob,
+             s.y[b].data() + ob, s.z[b].data() + ob, s.w[b].data() + ob, s.x[c].data() + oc, s.y[c].data() + oc,
+             s.z[c].data() + oc, s.w[c].data() + oc, s.lambda[b].data() + ob, count},
             alpha);
     }
 }

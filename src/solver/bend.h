@@ -1,6 +1,7 @@
-// solver/bend: cosine bending along a thread (paper 2.1) in SIMD. Every third triplet shares no particle with the next, so the triplets
-// fall into three colours; nodes are kept by their index modulo three, which makes the three points of all triplets of a colour
-// contiguous columns. The same update as solve_bend (solver/thread.h), lane by lane, the same bits for any width of SIMD.
+// solver/bend: cosine bending along a thread (paper 2.1) in SIMD. Every third triplet shares no particle with the next, so the
+// triplets fall into three colours; nodes are kept by their index modulo three, which makes the three points of all triplets of
+// a colour contiguous columns. The same update as solve_bend (solver/thread.h), lane by lane, the same bits for any width of
+// SIMD.
 #pragma once
 #include <span>
 
@@ -16,8 +17,8 @@ struct BendScratch {
   void resize(size_t nodes);
 };
 
-// `sweeps` Gauss-Seidel sweeps over the three colours. p: positions of the nodes [m]; w: inverse masses, 0 where locked; compliance [1/J];
-// multipliers start at zero.
+// `sweeps` Gauss-Seidel sweeps over the three colours. p: positions of the nodes [m]; w: inverse masses, 0 where locked;
+// compliance [1/J]; multipliers start at zero.
 void solve_bends(std::span<Vec3> p, std::span<const float> w, float compliance, float h, int sweeps, BendScratch& scratch);
 
 }  // namespace catgut

@@ -26,9 +26,8 @@ float distance_to_box2(Vec3 p, Vec3 l, Vec3 u) {
 
 }  // namespace
 
-TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius,
-                                      std::span<const uint32_t> body, std::span<const float> rest_reach,
-                                      std::vector<Triangle> surface) {
+TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius, std::span<const uint32_t> body,
+                                      std::span<const float> rest_reach, std::vector<Triangle> surface) {
   TissueCollision t;
   t.particles = static_cast<uint32_t>(rest.size());
   t.radius.assign(radius.begin(), radius.end());

@@ -17,24 +17,33 @@ namespace catgut {
 // neighbours in space, which bodies promise.
 struct TissueCollision {
   uint32_t particles = 0;
-  std::vector<float> radius;           // [m] per particle, against other tissue
-  std::vector<uint32_t> body;          // per particle
-  std::vector<float> rest_reach;       // [m] per particle: same-body particles nearer than this at rest never collide
+  std::vector<float> radius;      // [m] per particle, against other tissue
+  std::vector<uint32_t> body;     // per particle
+  std::vector<float> rest_reach;  // [m] per particle: same-body particles nearer than this at rest never collide
   std::vector<Triangle> surface;
-  std::vector<uint32_t> ring_first;    // per particle: first of its triangles in ring, size particles + 1
-  std::vector<uint32_t> ring;          // triangles around each particle
-  float tool_radius = 0.0006f;         // [m] of a particle against tools
+  std::vector<uint32_t> ring_first;  // per particle: first of its triangles in ring, size particles + 1
+  std::vector<uint32_t> ring;        // triangles around each particle
+  float tool_radius = 0.0006f;       // [m] of a particle against tools
   float largest_radius = 0;
 };
-TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius,
-                                      std::span<const uint32_t> body, std::span<const float> rest_reach,
-                                      std::vector<Triangle> surface);
+TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius, std::span<const uint32_t> body,
+                                      std::span<const float> rest_reach, std::vector<Triangle> surface);
 
-struct PairCandidate { uint32_t a, b; };                       // tissue particles, a < b
-struct ToolCandidate { uint32_t body, capsule, particle; };    // tissue particle near a capsule
-struct ThreadToolCandidate { uint32_t body, capsule, slot; };  // the segment after `slot` (toward the needle) near a capsule
-struct ThreadTissueCandidate { uint32_t slot, triangle; };     // thread particle near the tissue's surface
-struct ThreadPairCandidate { uint32_t a, b; };                 // segments after slots a and b
+struct PairCandidate {
+  uint32_t a, b;
+};  // tissue particles, a < b
+struct ToolCandidate {
+  uint32_t body, capsule, particle;
+};  // tissue particle near a capsule
+struct ThreadToolCandidate {
+  uint32_t body, capsule, slot;
+};  // the segment after `slot` (toward the needle) near a capsule
+struct ThreadTissueCandidate {
+  uint32_t slot, triangle;
+};  // thread particle near the tissue's surface
+struct ThreadPairCandidate {
+  uint32_t a, b;
+};  // segments after slots a and b
 
 struct Candidates {
   std::vector<PairCandidate> pair;
@@ -42,9 +51,9 @@ struct Candidates {
   std::vector<ThreadToolCandidate> thread_tool;
   std::vector<ThreadTissueCandidate> thread_tissue;
   std::vector<ThreadPairCandidate> thread_pair;
-  std::vector<Vec4> built_at;       // tissue positions when `pair` was built; empty: build now
-  std::vector<Vec3> lower, upper;   // block boxes
-  std::vector<uint32_t> near_block; // working memory
+  std::vector<Vec4> built_at;        // tissue positions when `pair` was built; empty: build now
+  std::vector<Vec3> lower, upper;    // block boxes
+  std::vector<uint32_t> near_block;  // working memory
 };
 
 constexpr float kPairMargin = 0.002f;  // [m]

@@ -130,7 +130,8 @@ uint32_t solve_thread_on_tissue(const ContactView& v, const TissueCollision& tis
     if (length2(p - n * (gap + v.thread_model->radius) - near.point) > 1e-6f) continue;  // slid off the triangle by over 1 mm
     const float wt = v.thread_model->inv_mass;
     float w = wt;
-    for (int k = 0; k < 3; ++k) w += near.weight[static_cast<size_t>(k)] * near.weight[static_cast<size_t>(k)] * v.inv_mass[t[static_cast<size_t>(k)]];
+    for (int k = 0; k < 3; ++k)
+      w += near.weight[static_cast<size_t>(k)] * near.weight[static_cast<size_t>(k)] * v.inv_mass[t[static_cast<size_t>(k)]];
     ++touching;
     Vec3 slip = moved(v, c.slot);
     for (size_t k = 0; k < 3; ++k) slip -= moved(v, t[k]) * near.weight[k];

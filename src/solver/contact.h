@@ -1,7 +1,7 @@
-// solver/contact: unilateral contact with Coulomb friction in positions: tissue on tissue, tools on tissue, thread (as capsules)
-// on tools, on itself and on the tissue's surface, and the drape under everything.
-// Normal part: C = gap >= 0, undone at once (contacts are hard). Friction undoes the slip since the start of the substep, at
-// most friction times the normal correction.
+// solver/contact: unilateral contact with Coulomb friction in positions: tissue on tissue, tools on tissue, thread (as
+// capsules) on tools, on itself and on the tissue's surface, and the drape under everything. Normal part: C = gap >= 0, undone
+// at once (contacts are hard). Friction undoes the slip since the start of the substep, at most friction times the normal
+// correction.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -28,7 +28,7 @@ struct ContactView {  // what a contact kernel needs, gathered once per substep
   const int32_t* node_of_slot;  // relative to first_slot; -1: not in the thread
   const Thread* thread;
   const ThreadModel* thread_model;
-  const uint8_t* locked;        // per thread slot (relative): position is somebody else's (anchor or hold)
+  const uint8_t* locked;  // per thread slot (relative): position is somebody else's (anchor or hold)
 };
 
 // One sweep each; returns the number of touching candidates.

@@ -13,17 +13,17 @@ struct Capsule {
 };
 
 struct RigidModel {
-  float inv_mass = 0;             // [1/kg]
-  Vec3 inv_inertia;               // [1/(kg m^2)] principal, body frame
-  std::vector<Capsule> capsule;   // what it collides with
-  bool gravity = false;           // a tool's weight is carried by the hand
+  float inv_mass = 0;            // [1/kg]
+  Vec3 inv_inertia;              // [1/(kg m^2)] principal, body frame
+  std::vector<Capsule> capsule;  // what it collides with
+  bool gravity = false;          // a tool's weight is carried by the hand
 };
 
 struct RigidBody {
-  Vec3 x;           // [m] centre of mass
+  Vec3 x;  // [m] centre of mass
   Quat q;
-  Vec3 v, omega;    // [m/s], [rad/s]
-  Vec3 prev_x;      // at the start of the substep
+  Vec3 v, omega;  // [m/s], [rad/s]
+  Vec3 prev_x;    // at the start of the substep
   Quat prev_q;
   Pose pose() const { return {x, q}; }
 };

@@ -26,8 +26,7 @@ HWY_INLINE void sum_rows(const Row* row, const uint32_t* index, uint32_t n, floa
     for (size_t p = 0; p < kParts; ++p) acc[k][p] = hn::Load(d, row[index[k]].f + p * kLanes);
   for (uint32_t i = 4; i < n; i += 4)
     for (size_t k = 0; k < 4; ++k)
-      for (size_t p = 0; p < kParts; ++p)
-        acc[k][p] = hn::Add(acc[k][p], hn::Load(d, row[index[i + k]].f + p * kLanes));
+      for (size_t p = 0; p < kParts; ++p) acc[k][p] = hn::Add(acc[k][p], hn::Load(d, row[index[i + k]].f + p * kLanes));
   for (size_t p = 0; p < kParts; ++p)
     hn::Store(hn::Add(hn::Add(acc[0][p], acc[1][p]), hn::Add(acc[2][p], acc[3][p])), d, out + p * kLanes);
 }
@@ -118,10 +117,9 @@ void Clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch&
       const V det = hn::Add(hn::Add(hn::Mul(h00, k00), hn::Mul(h01, k01)), hn::Mul(h02, k02));
       const V size = hn::Max(hn::Abs(trace), tiny);
       const V inv_det = hn::Div(one, hn::Max(det, tiny));
-      Lanes3<V> newton{
-          hn::Mul(inv_det, hn::Add(hn::Add(hn::Mul(k00, g.x), hn::Mul(k01, g.y)), hn::Mul(k02, g.z))),
-          hn::Mul(inv_det, hn::Add(hn::Add(hn::Mul(k01, g.x), hn::Mul(k11, g.y)), hn::Mul(k12, g.z))),
-          hn::Mul(inv_det, hn::Add(hn::Add(hn::Mul(k02, g.x), hn::Mul(k12, g.y)), hn::Mul(k22, g.z)))};
+      Lanes3<V> newton{hn::Mul(inv_det, hn::Add(hn::Add(hn::Mul(k00, g.x), hn::Mul(k01, g.y)), hn::Mul(k02, g.z))),
+                       hn::Mul(inv_det, hn::Add(hn::Add(hn::Mul(k01, g.x), hn::Mul(k11, g.y)), hn::Mul(k12, g.z))),
+                       hn::Mul(inv_det, hn::Add(hn::Add(hn::Mul(k02, g.x), hn::Mul(k12, g.y)), hn::Mul(k22, g.z)))};
       // Positive definite with some reserve and a step below half a radian, else the always-safe damped step g / tr.
       const V relative = hn::Div(det, hn::Mul(size, hn::Mul(size, size)));
       const auto safe = hn::And(hn::And(hn::Gt(trace, tiny), hn::Gt(relative, hn::Set(d, 1e-3f))),
@@ -135,8 +133,8 @@ void Clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch&
       const V ny = hn::Add(qy, hn::Add(hn::Mul(qw, wy), hn::Sub(hn::Mul(qz, wx), hn::Mul(qx, wz))));
       const V nz = hn::Add(qz, hn::Add(hn::Mul(qw, wz), hn::Sub(hn::Mul(qx, wy), hn::Mul(qy, wx))));
       const V nw = hn::Sub(qw, hn::Add(hn::Add(hn::Mul(qx, wx), hn::Mul(qy, wy)), hn::Mul(qz, wz)));
-      const V norm = hn::Div(one, hn::Sqrt(hn::Add(hn::Add(hn::Mul(nx, nx), hn::Mul(ny, ny)),
-                                                   hn::Add(hn::Mul(nz, nz), hn::Mul(nw, nw)))));
+      const V norm =
+          hn::Div(one, hn::Sqrt(hn::Add(hn::Add(hn::Mul(nx, nx), hn::Mul(ny, ny)), hn::Add(hn::Mul(nz, nz), hn::Mul(nw, nw)))));
       qx = hn::Mul(nx, norm), qy = hn::Mul(ny, norm), qz = hn::Mul(nz, norm), qw = hn::Mul(nw, norm);
       hn::Store(qx, d, rotation.x.data() + at);
       hn::Store(qy, d, rotation.y.data() + at);

@@ -16,15 +16,15 @@ struct alignas(64) Row {
 
 // Constant part. Lists are padded to a fixed stride with the index of a zero row, so that the sums are straight-line code.
 struct ShapeModel {
-  uint32_t clusters = 0;          // different ones: particles on the two sides of a wall often share theirs
-  uint32_t cluster_stride = 16;   // members per cluster, padded; the pad is index `particles` (a zero row)
-  uint32_t particle_stride = 16;  // clusters per particle, padded with index `clusters`
-  Column<uint32_t> member;        // clusters x cluster_stride: particles
-  Column<uint32_t> holder;        // particles x particle_stride: clusters
-  Column<float> inv_holders;      // per particle: 1 / number of clusters that hold it
-  Column<Vec4> rest;              // per particle, (x, y, z, 1)
-  Column<float> relative_mass;    // per particle: m_k / mean m, the weights of the moments
-  Column<Vec4> rest_centre;       // per cluster: mass-weighted, w unused
+  uint32_t clusters = 0;             // different ones: particles on the two sides of a wall often share theirs
+  uint32_t cluster_stride = 16;      // members per cluster, padded; the pad is index `particles` (a zero row)
+  uint32_t particle_stride = 16;     // clusters per particle, padded with index `clusters`
+  Column<uint32_t> member;           // clusters x cluster_stride: particles
+  Column<uint32_t> holder;           // particles x particle_stride: clusters
+  Column<float> inv_holders;         // per particle: 1 / number of clusters that hold it
+  Column<Vec4> rest;                 // per particle, (x, y, z, 1)
+  Column<float> relative_mass;       // per particle: m_k / mean m, the weights of the moments
+  Column<Vec4> rest_centre;          // per cluster: mass-weighted, w unused
   std::vector<uint32_t> cluster_of;  // per particle: the cluster centred on it
 };
 // cluster[i] is centred on particle i. Clusters of the same members are one: it would only be solved twice to the same end.

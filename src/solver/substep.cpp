@@ -1,6 +1,6 @@
 // solver/substep: reads the model; moves every particle and body of the state. Section 2.1 of the paper, with its order:
-// predict, shape (and volume), tissue contact, attachments and bodies, contacts of tools and thread, the thread itself, velocities.
-// The thread comes last so that what is drawn and felt is a thread of the right length.
+// predict, shape (and volume), tissue contact, attachments and bodies, contacts of tools and thread, the thread itself,
+// velocities. The thread comes last so that what is drawn and felt is a thread of the right length.
 #include "solver/substep.h"
 
 #include <algorithm>
@@ -141,7 +141,8 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
       }
     }
   }
-  ContactView view{x, k.prev.data(), w, &m.body, &s.body, &k.on_body, k.node_of_slot.data(), &s.thread, &m.thread, k.locked.data()};
+  ContactView view{x,          k.prev.data(),         w,         &m.body,   &s.body,
+                   &k.on_body, k.node_of_slot.data(), &s.thread, &m.thread, k.locked.data()};
   uint32_t touching = 0;
   {
     StageTimer timer(times, Stage::broadphase);
@@ -175,7 +176,8 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     StageTimer timer(times, Stage::thread_contact);
     std::fill(k.node_of_slot.begin(), k.node_of_slot.end(), -1);
     std::fill(k.locked.begin(), k.locked.end(), uint8_t{0});
-    for (size_t i = 0; i < s.thread.order.size(); ++i) k.node_of_slot[s.thread.order[i] - m.thread.first_slot] = static_cast<int32_t>(i);
+    for (size_t i = 0; i < s.thread.order.size(); ++i)
+      k.node_of_slot[s.thread.order[i] - m.thread.first_slot] = static_cast<int32_t>(i);
     for (const ThreadAnchor& a : s.thread.anchor) k.locked[a.slot - m.thread.first_slot] = 1;
     for (const ThreadHold& a : s.thread.hold) k.locked[a.slot - m.thread.first_slot] = 1;
   }

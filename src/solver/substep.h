@@ -17,33 +17,33 @@ namespace catgut {
 
 // Never changes during a run.
 struct SolverModel {
-  uint32_t tissue = 0;               // particles of soft bodies; thread particles follow
-  uint32_t count = 0;                // all particles
-  Column<float> inv_mass;            // [1/kg] per particle, 0: pinned
+  uint32_t tissue = 0;     // particles of soft bodies; thread particles follow
+  uint32_t count = 0;      // all particles
+  Column<float> inv_mass;  // [1/kg] per particle, 0: pinned
   ShapeModel shape;
   VolumeModel volume;
   TissueCollision collision;
   ThreadModel thread;
-  std::vector<RigidModel> body;      // 0, 1: tools; 2: needle
+  std::vector<RigidModel> body;  // 0, 1: tools; 2: needle
   NeedleArc needle_arc;
-  float h = 1.0f / 480;              // [s] substep
-  Vec3 gravity{0, -9.81f, 0};        // [m/s^2] on thread and needle
-  Vec3 tissue_gravity{0, -9.81f, 0}; // [m/s^2] on tissue: divided by the mass scaling, so that its weight is true
+  float h = 1.0f / 480;               // [s] substep
+  Vec3 gravity{0, -9.81f, 0};         // [m/s^2] on thread and needle
+  Vec3 tissue_gravity{0, -9.81f, 0};  // [m/s^2] on tissue: divided by the mass scaling, so that its weight is true
   int shape_sweeps = 1, self_sweeps = 1, contact_sweeps = 1, volume_sweeps = 1, rigid_sweeps = 4;
-  float shape_stiffness = 0.65f;     // s of solve_shape_particles at this h
+  float shape_stiffness = 0.65f;  // s of solve_shape_particles at this h
   float shape_relaxation = 1;
   bool use_volume = false;
   float volume_compliance = 0;
   float damping = 0, thread_damping = 0, body_damping = 20;  // [1/s]
   Friction friction;
-  float ground = -1e9f;              // [m] height of the drape
+  float ground = -1e9f;  // [m] height of the drape
 };
 
 constexpr uint32_t kNeedle = 2;
 
 struct SolverState {
-  Column<Vec4> x, v;                     // position [m], velocity [m/s]
-  ClusterRotations rotation;             // warm start of the polar decompositions
+  Column<Vec4> x, v;          // position [m], velocity [m/s]
+  ClusterRotations rotation;  // warm start of the polar decompositions
   std::vector<RigidBody> body;
   Thread thread;
   std::vector<Weld> weld;                // tool to hand, needle to tool
@@ -60,10 +60,10 @@ struct SolverScratch {
   std::vector<float> volume_lambda;
   ThreadScratch thread;
   Candidates candidates;
-  std::vector<BodyContact> on_body;     // contact impulses on bodies in the last substep
+  std::vector<BodyContact> on_body;  // contact impulses on bodies in the last substep
   std::vector<int32_t> node_of_slot;
   std::vector<uint8_t> locked;
-  uint32_t contacts = 0;                // touching in the last substep
+  uint32_t contacts = 0;  // touching in the last substep
 };
 
 SolverState make_solver_state(const SolverModel& model, std::span<const Vec3> position);

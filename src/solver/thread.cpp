@@ -16,12 +16,12 @@ constexpr float kGoodEnough = 2e-6f;  // [m] a second step is spared when no pai
 // Of the diagonal. A light thread drawn straight between heavy ends has one soft mode, a hundred thousand times softer than the
 // diagonal, and it is the one that matters: more than this would hide it.
 constexpr double kRegularisation = 1e-6;
-// Inverse mass of a sliding coordinate over that of a thread particle. It has no velocity of its own, so this acts as a small viscous drag:
-// 7 mN at 0.15 m/s and 1 ms. Lighter would let friction overshoot the length of a segment within a substep.
+// Inverse mass of a sliding coordinate over that of a thread particle. It has no velocity of its own, so this acts as a small
+// viscous drag: 7 mN at 0.15 m/s and 1 ms. Lighter would let friction overshoot the length of a segment within a substep.
 constexpr double kSlideMass = 0.04;
 constexpr int kSlideRounds = 4;
-constexpr float kMostForce = 20;  // [N] by which a Newton step may move a heavy node: about what breaks a thread
-constexpr float kLargestStep = 0.6f;      // of the spacing, per Newton step
+constexpr float kMostForce = 20;      // [N] by which a Newton step may move a heavy node: about what breaks a thread
+constexpr float kLargestStep = 0.6f;  // of the spacing, per Newton step
 
 // A held node seen by two pair directions: n1^T W n2 of the rigid body at that place.
 float held_inverse_mass(const ThreadHold& hold, Vec3 n1, Vec3 n2, const std::vector<RigidModel>& model,
@@ -38,13 +38,13 @@ float node_inverse_mass(const ThreadScratch& s, const Thread& t, size_t i, Vec3 
 
 // The tridiagonal matrix J M^-1 J^T of all stretch constraints and its right-hand side, for the positions as they are.
 //
-// Geometric stiffness. A taut thread resists being moved sideways with tension / length, which the bare linearisation does not know: it
-// would shorten a taut zigzag by throwing its light nodes sideways, and never converge. So sideways a free node is given the
-// inertia m + h^2 T (1/l0 + 1/l1) (Tournier et al. 2015, Stable constrained dynamics); sideways[i] is the ratio of the inverse masses.
-// With the tangent t = n0 + n1 of unit pair directions, t.t = 2 (1 + c) and n0.t = n1.t = 1 + c, c = n0.n1: no root is needed.
-// Returns the largest residual [m].
+// Geometric stiffness. A taut thread resists being moved sideways with tension / length, which the bare linearisation does not
+// know: it would shorten a taut zigzag by throwing its light nodes sideways, and never converge. So sideways a free node is
+// given the inertia m + h^2 T (1/l0 + 1/l1) (Tournier et al. 2015, Stable constrained dynamics); sideways[i] is the ratio of
+// the inverse masses. With the tangent t = n0 + n1 of unit pair directions, t.t = 2 (1 + c) and n0.t = n1.t = 1 + c, c = n0.n1:
+// no root is needed. Returns the largest residual [m].
 float assemble(const Thread& t, ThreadScratch& s, size_t nodes, float alpha_per_metre, float h,
-              const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body) {
+               const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body) {
   const size_t pairs = nodes - 1;
   const float inv_h2 = 1 / (h * h), h2 = h * h, shortest = 1e-5f;
   float worst = 0;
@@ -73,7 +73,8 @@ float assemble(const Thread& t, ThreadScratch& s, size_t nodes, float alpha_per_
       if (i > 0 && i < pairs) {
         const float c = dot(s.n[i - 1], s.n[i]);
         across = s.w[i] * c;
-        const float pull = std::min(std::max(t.tension[i - 1], -s.lambda[i - 1] * inv_h2), std::max(t.tension[i], -s.lambda[i] * inv_h2));
+        const float pull =
+            std::min(std::max(t.tension[i - 1], -s.lambda[i - 1] * inv_h2), std::max(t.tension[i], -s.lambda[i] * inv_h2));
         if (s.anchor_at[i] < 0 && pull > 0 && c > -0.999f) {
           const float rho = 1 / (1 + s.w[i] * h2 * pull * (1 / s.length[i - 1] + 1 / s.length[i]));
           s.sideways[i] = rho;
@@ -90,14 +91,16 @@ float assemble(const Thread& t, ThreadScratch& s, size_t nodes, float alpha_per_
   return worst;
 }
 
-// The inertia and the weight that carried the nodes to where they are now must meet the same geometric stiffness as the constraints will:
-// implicit Euler is (M + h^2 K) dx = h M v + h^2 f, with K the tension's Laplacian. Without it a taut thread swings sideways as freely as a
-// slack one while its tension may hardly pull it back: it would gain energy, or come to rest stretched.
-//   The part from velocities, d = p - before - h^2 g, is smoothed by (1 + K) d' = d along the thread with locked nodes fixed: a thread
-//   that moves as a whole keeps its motion, a taut one loses its flutter, a slack one (no tension) is left alone.
-//   The weight's part across the thread is scaled by the node's own ratio, as its constraint impulses are: at rest the two then balance,
-//   and the thread hangs as a catenary (catgut validate).
-void stiffen_prediction(const ThreadModel& model, const Thread& t, ThreadScratch& s, size_t nodes, const Vec4* before, float h) {
+// The inertia and the weight that carried the nodes to where they are now must meet the same geometric stiffness as the
+// constraints will: implicit Euler is (M + h^2 K) dx = h M v + h^2 f, with K the tension's Laplacian. Without it a taut thread
+// swings sideways as freely as a slack one while its tension may hardly pull it back: it would gain energy, or come to rest
+// stretched.
+//   The part from velocities, d = p - before - h^2 g, is smoothed by (1 + K) d' = d along the thread with locked nodes fixed: a
+//   thread that moves as a whole keeps its motion, a taut one loses its flutter, a slack one (no tension) is left alone. The
+//   weight's part across the thread is scaled by the node's own ratio, as its constraint impulses are: at rest the two then
+//   balance, and the thread hangs as a catenary (catgut validate).
+void stiffen_prediction(const ThreadModel& model, const Thread& t, ThreadScratch& s, size_t nodes, const Vec4* before,
+                        float h) {
   const size_t pairs = nodes - 1;
   const float h2 = h * h;
   const Vec3 fall = model.gravity * h2;
@@ -147,9 +150,10 @@ void stiffen_prediction(const ThreadModel& model, const Thread& t, ThreadScratch
     if (!locked(i)) s.p[i] = xyz(before[t.order[i]]) + s.moved[i];
 }
 
-// Solves the tridiagonal system for the change of the multipliers (into s.rhs), together with the slides at slipping anchors: one more
-// unknown each, coupled to the two pairs beside it. A slide that would run backward (friction stops, it never drives) or beyond what the
-// pair on its side still has is fixed at that bound and the system solved again: an active set, which shrinks every round.
+// Solves the tridiagonal system for the change of the multipliers (into s.rhs), together with the slides at slipping anchors:
+// one more unknown each, coupled to the two pairs beside it. A slide that would run backward (friction stops, it never drives)
+// or beyond what the pair on its side still has is fixed at that bound and the system solved again: an active set, which
+// shrinks every round.
 void solve_with_slides(const ThreadModel& model, const Thread& thread, ThreadScratch& s, size_t pairs, float h) {
   const double ws = kSlideMass * model.inv_mass;
   const float least = 0.02f * model.spacing;
@@ -191,7 +195,8 @@ void solve_with_slides(const ThreadModel& model, const Thread& thread, ThreadScr
       SlideState& k = s.slide[static_cast<size_t>(s.anchor_at[i])];
       if (a.slipping == 0 || k.fixed) continue;
       k.step = static_cast<float>(ws * (drag_of(a, k) + s.rhs[i - 1] - s.rhs[i]));
-      const float most_forward = std::max(0.0f, thread.rest[i - 1] - least), most_back = -std::max(0.0f, thread.rest[i] - least);
+      const float most_forward = std::max(0.0f, thread.rest[i - 1] - least),
+                  most_back = -std::max(0.0f, thread.rest[i] - least);
       float bounded = std::clamp(k.step, most_back, most_forward);
       if ((k.total + bounded) * static_cast<float>(a.slipping) < 0) bounded = -k.total, k.stopped = true;
       if (bounded != k.step) k.step = bounded, k.fixed = again = true;
@@ -255,7 +260,8 @@ Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vec
 
 float thread_length(const Thread& t, const Vec4* x, const std::vector<RigidBody>& body) {
   float sum = 0;
-  for (size_t i = 0; i + 1 < t.order.size(); ++i) sum += distance(thread_position(t, i, x, body), thread_position(t, i + 1, x, body));
+  for (size_t i = 0; i + 1 < t.order.size(); ++i)
+    sum += distance(thread_position(t, i, x, body), thread_position(t, i + 1, x, body));
   return sum;
 }
 
@@ -271,8 +277,8 @@ void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float c
   const Vec3 ga = (v - u * cosine) * inv_la, gc = (u - v * cosine) * inv_lc, gb = -(ga + gc);
   const float w = wa * length2(ga) + wb * length2(gb) + wc * length2(gc);
   const float alpha = compliance / (h * h);
-  // Near straight the violation falls with the square of the angle and w with it, so the step stays bounded; at exactly 0 or 180
-  // degrees the direction is undefined and there is nothing to apply.
+  // Near straight the violation falls with the square of the angle and w with it, so the step stays bounded; at exactly 0 or
+  // 180 degrees the direction is undefined and there is nothing to apply.
   if (w < 1e-12f * (wa + wb + wc) * inv_la * inv_lc) return;
   float d = -(violation + alpha * lambda) / (w + alpha);
   // A rigid bend (compliance 0) linearised far from straight would overshoot: no more than a tenth of a segment at a time.
@@ -285,8 +291,8 @@ void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float c
   c += gc * (wc * d);
 }
 
-void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Vec4* x, const Vec4* before, const float* inv_mass,
-                  const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body, float h) {
+void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Vec4* x, const Vec4* before,
+                  const float* inv_mass, const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body, float h) {
   const size_t nodes = thread.order.size();
   if (nodes < 2) return;
   const size_t pairs = nodes - 1;
@@ -325,12 +331,14 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
       if (step > 0 && residual < kGoodEnough) break;
       solve_with_slides(model, thread, s, pairs, h);
 
-      // Light nodes are held back below, heavy ones are not: a step far too long would push a needle again and again for the same stretch,
-      // and feed energy in. So the whole step is shortened.
+      // Light nodes are held back below, heavy ones are not: a step far too long would push a needle again and again for the
+      // same stretch, and feed energy in. So the whole step is shortened.
       float most = 0;
       for (size_t i = 0; i < nodes; ++i) {
-        const bool moves = s.hold_at[i] >= 0 ? body_model[static_cast<size_t>(thread.hold[static_cast<size_t>(s.hold_at[i])].body)].inv_mass > 0
-                                             : s.anchor_at[i] >= 0 && s.w[i] > 0;
+        const bool moves =
+            s.hold_at[i] >= 0
+                ? body_model[static_cast<size_t>(thread.hold[static_cast<size_t>(s.hold_at[i])].body)].inv_mass > 0
+                : s.anchor_at[i] >= 0 && s.w[i] > 0;
         if (!moves) continue;
         Vec3 p{};
         if (i > 0) p += s.n[i - 1] * static_cast<float>(s.rhs[i - 1]);
@@ -343,9 +351,9 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
         for (SlideState& k : s.slide) k.step *= part;
       }
 
-      // A bent stretch of light thread between heavy ends: the impulse that moves the ends would throw the light nodes far sideways, because
-      // the linearisation does not know that they come to rest on the straight line. So a light node takes a bounded step, heavy
-      // ones their full one; the next step sees the new directions.
+      // A bent stretch of light thread between heavy ends: the impulse that moves the ends would throw the light nodes far
+      // sideways, because the linearisation does not know that they come to rest on the straight line. So a light node takes a
+      // bounded step, heavy ones their full one; the next step sees the new directions.
       const float limit = kLargestStep * model.spacing;
       for (size_t i = 0; i < nodes; ++i) {
         Vec3 p{};
@@ -383,7 +391,8 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
       if (l2 < 1e-18f) continue;
       const float l = std::sqrt(l2);
       const Vec3 n = d / l;
-      const float w = node_inverse_mass(s, thread, i, n, body_model, body) + node_inverse_mass(s, thread, i + 1, n, body_model, body);
+      const float w =
+          node_inverse_mass(s, thread, i, n, body_model, body) + node_inverse_mass(s, thread, i + 1, n, body_model, body);
       if (w + alpha <= 0) continue;
       const float dl = (-(l - rest) - compliant) / (w + alpha);
       s.lambda[i] += dl;

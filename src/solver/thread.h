@@ -1,5 +1,5 @@
-// solver/thread: the suture thread as an XPBD chain (paper 2.1, 2.3): distance constraints between neighbours, cosine bending on
-// triplets, and a direct tridiagonal solve along the whole thread, because a Gauss-Seidel chain of 175 particles at the
+// solver/thread: the suture thread as an XPBD chain (paper 2.1, 2.3): distance constraints between neighbours, cosine bending
+// on triplets, and a direct tridiagonal solve along the whole thread, because a Gauss-Seidel chain of 175 particles at the
 // paper's three sweeps stretches by 18 %.
 //
 // Particles keep their slot for life; `order` lists slots from the free end to the needle. A slot can be
@@ -23,24 +23,24 @@ namespace catgut {
 struct ThreadModel {
   uint32_t first_slot = 0;  // of the thread's particles in the columns
   uint32_t count = 0;
-  float spacing = 0;              // [m] rest distance of neighbours at the start
-  float radius = 0;               // [m]
-  float inv_mass = 0;             // [1/kg] of a free particle
-  float stretch_compliance = 0;   // [m/N] per segment of length `spacing`
-  float bend_compliance = 0;      // [1/J]
+  float spacing = 0;             // [m] rest distance of neighbours at the start
+  float radius = 0;              // [m]
+  float inv_mass = 0;            // [1/kg] of a free particle
+  float stretch_compliance = 0;  // [m/N] per segment of length `spacing`
+  float bend_compliance = 0;     // [1/J]
   int bend_sweeps = 1, distance_sweeps = 1;
   bool direct = true;
-  Vec3 gravity;                   // [m/s^2] that the predicted positions contain
+  Vec3 gravity;  // [m/s^2] that the predicted positions contain
 };
 
 // A suture point's hold on the thread.
 struct ThreadAnchor {
   uint32_t slot = 0;
   TissuePoint point;
-  float friction = 0;              // [N] tension difference beyond which thread slides, at no tension
-  float capstan = 0;               // and so much more per newton of tension: coefficient of friction times the angle it bends by
-  int slipping = 0;                // +1: toward the needle, -1: toward the free end, 0: stuck
-  bool blocked_needle = false;     // no particle left to pass toward the needle / toward the free end
+  float friction = 0;           // [N] tension difference beyond which thread slides, at no tension
+  float capstan = 0;            // and so much more per newton of tension: coefficient of friction times the angle it bends by
+  int slipping = 0;             // +1: toward the needle, -1: toward the free end, 0: stuck
+  bool blocked_needle = false;  // no particle left to pass toward the needle / toward the free end
   bool blocked_free = false;
   float tension_needle = 0, tension_free = 0;  // [N] of the pairs on its two sides, written by solve_thread
   float threshold() const { return friction + capstan * std::max(0.0f, std::min(tension_needle, tension_free)); }
@@ -49,40 +49,40 @@ struct ThreadAnchor {
 struct ThreadHold {
   uint32_t slot = 0;
   int body = 0;
-  Vec3 local;    // [m] body frame
+  Vec3 local;  // [m] body frame
 };
 
 struct Thread {
-  std::vector<uint32_t> order;        // slots, free end first
-  std::vector<float> rest;            // [m] per pair (order[i], order[i + 1])
-  std::vector<ThreadAnchor> anchor;   // in the order in which they were made
+  std::vector<uint32_t> order;       // slots, free end first
+  std::vector<float> rest;           // [m] per pair (order[i], order[i + 1])
+  std::vector<ThreadAnchor> anchor;  // in the order in which they were made
   std::vector<ThreadHold> hold;
-  std::vector<float> tension;         // [N] per pair, of the last substep; negative: compressed
+  std::vector<float> tension;  // [N] per pair, of the last substep; negative: compressed
 };
 
 // The slide at one anchor within a substep.
 struct SlideState {
-  float step = 0, total = 0;   // [m] of this Newton step, of the substep
-  bool fixed = false;          // at a bound in this step
-  bool stopped = false;        // friction stopped it: the anchor sticks
-  bool dragged = false;        // the friction of this substep has been spent
+  float step = 0, total = 0;  // [m] of this Newton step, of the substep
+  bool fixed = false;         // at a bound in this step
+  bool stopped = false;       // friction stopped it: the anchor sticks
+  bool dragged = false;       // the friction of this substep has been spent
 };
 
 struct ThreadScratch {
-  std::vector<Vec3> p;              // per node of order
-  std::vector<float> w;             // inverse mass of the node; < 0: held by a rigid body
-  std::vector<int32_t> anchor_at;   // per node: index of its anchor, or -1
-  std::vector<int32_t> hold_at;     // per node: index of its hold, or -1
-  std::vector<Vec3> n;              // per pair: unit direction toward the needle
-  std::vector<float> length;        // per pair [m]
-  std::vector<float> sideways;      // per node: inverse mass across the tangent over that along it
+  std::vector<Vec3> p;             // per node of order
+  std::vector<float> w;            // inverse mass of the node; < 0: held by a rigid body
+  std::vector<int32_t> anchor_at;  // per node: index of its anchor, or -1
+  std::vector<int32_t> hold_at;    // per node: index of its hold, or -1
+  std::vector<Vec3> n;             // per pair: unit direction toward the needle
+  std::vector<float> length;       // per pair [m]
+  std::vector<float> sideways;     // per node: inverse mass across the tangent over that along it
   std::vector<double> base_diag, base_off, base_rhs, diag, off, rhs;
-  std::vector<float> lambda;        // per pair, cleared at the start of a substep
+  std::vector<float> lambda;  // per pair, cleared at the start of a substep
   BendScratch bend;
   std::vector<float> stiff, carry;  // of stiffen_prediction
   std::vector<Vec3> smooth, moved;
-  std::vector<float> bend_w;        // per node: inverse mass against bending, 0 where locked
-  std::vector<SlideState> slide;    // per anchor
+  std::vector<float> bend_w;          // per node: inverse mass against bending, 0 where locked
+  std::vector<SlideState> slide;      // per anchor
   std::vector<int32_t> node_of_slot;  // index in the order of each slot (relative to first_slot)
   void resize(uint32_t count);
 };
@@ -90,11 +90,11 @@ struct ThreadScratch {
 // Position of node i of the order, whatever it is locked to.
 Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vector<RigidBody>& body);
 
-// One substep's solve: bending sweeps, direct solve, distance sweeps. Expects cleared multipliers in scratch. Moves thread particles, the tissue under anchors and the
-// bodies that hold it; writes tensions and the slide of every anchor. x: predicted positions; before: those at the start of the substep;
-// h [s].
-void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& scratch, Vec4* x, const Vec4* before, const float* inv_mass,
-                  const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body, float h);
+// One substep's solve: bending sweeps, direct solve, distance sweeps. Expects cleared multipliers in scratch. Moves thread
+// particles, the tissue under anchors and the bodies that hold it; writes tensions and the slide of every anchor. x: predicted
+// positions; before: those at the start of the substep; h [s].
+void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& scratch, Vec4* x, const Vec4* before,
+                  const float* inv_mass, const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body, float h);
 
 // One cosine bending constraint (paper 2.1): C = u.v - cos(theta0) with theta0 = pi (straight). Moves the three points by XPBD.
 // Straight (u.v = -1) has no gradient and needs none; fully folded (u.v = +1) has none either: it is left to others.

@@ -12,7 +12,8 @@ bool move_toward(ScriptedHand& hand, const Pose& goal, float speed, float dt) {
   const float far = length(way), angle = length(turn);
   // Speed up and slow down like a hand: by at most 1.5 m/s^2, and never faster than can be stopped in time.
   constexpr float kAcceleration = 1.5f;
-  const float allowed = std::min({speed, std::sqrt(2 * kAcceleration * far) + 0.002f, length(hand.velocity) + kAcceleration * dt});
+  const float allowed =
+      std::min({speed, std::sqrt(2 * kAcceleration * far) + 0.002f, length(hand.velocity) + kAcceleration * dt});
   const float step = std::min(far, allowed * dt);
   const Vec3 moved = far > 0 ? way * (step / far) : Vec3{};
   hand.velocity = moved / dt;

@@ -1,5 +1,5 @@
-// surgeon/hands: how a scripted hand moves. Plain kinematics: toward a goal at a bounded speed, with a tremor on top. Knows nothing of
-// the simulation.
+// surgeon/hands: how a scripted hand moves. Plain kinematics: toward a goal at a bounded speed, with a tremor on top. Knows
+// nothing of the simulation.
 #pragma once
 #include "core/random.h"
 #include "exchange/snapshot.h"
@@ -8,11 +8,11 @@
 namespace catgut {
 
 struct ScriptedHand {
-  Pose pose;         // commanded, without tremor
-  Vec3 velocity;     // [m/s] of the last tick
+  Pose pose;      // commanded, without tremor
+  Vec3 velocity;  // [m/s] of the last tick
   float jaw = 1;
-  Vec3 tremor;       // [m]
-  Pose grip;         // needle frame -> tool frame, measured when the needle was grasped
+  Vec3 tremor;  // [m]
+  Pose grip;    // needle frame -> tool frame, measured when the needle was grasped
 };
 
 // Moves toward `goal` at no more than speed [m/s] and a turn rate to match; true when it is there (0.3 mm, 0.02 rad).

@@ -26,8 +26,8 @@ class Surgeon {
   virtual ~Surgeon() = default;
   // The hands for the next tick, seeing the state after the last one. dt: length of a tick [s].
   virtual std::array<ToolInput, 2> operate(const Snapshot& seen, float dt) = 0;
-  virtual bool done() const = 0;            // the plan is finished (or given up)
-  virtual std::string doing() const = 0;    // "bite 3 of 12: drive the needle", for progress lines
+  virtual bool done() const = 0;          // the plan is finished (or given up)
+  virtual std::string doing() const = 0;  // "bite 3 of 12: drive the needle", for progress lines
 };
 
 // The purse-string of paper 2.5.1. Throws std::invalid_argument for a technique without a script.

@@ -1,5 +1,5 @@
-// suture/closure: carries out a technique's ClosurePlan (paper 2.5.1: edge particles are pulled together over time, all arriving at once).
-// Reads the plan; keeps one world attachment per pulled point.
+// suture/closure: carries out a technique's ClosurePlan (paper 2.5.1: edge particles are pulled together over time, all
+// arriving at once). Reads the plan; keeps one world attachment per pulled point.
 #include "suture/suture.h"
 
 namespace catgut {

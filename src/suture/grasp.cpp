@@ -58,8 +58,9 @@ void grasp(const SolverModel& model, SolverState& solver, const SutureModel& sut
     float best = suture.grasp_reach;
     int32_t found = -1;
     for (uint32_t slot : solver.thread.order) {
-      const bool taken = std::any_of(solver.thread.anchor.begin(), solver.thread.anchor.end(), [&](auto& a) { return a.slot == slot; }) ||
-                         std::any_of(solver.thread.hold.begin(), solver.thread.hold.end(), [&](auto& h) { return h.slot == slot; });
+      const bool taken =
+          std::any_of(solver.thread.anchor.begin(), solver.thread.anchor.end(), [&](auto& a) { return a.slot == slot; }) ||
+          std::any_of(solver.thread.hold.begin(), solver.thread.hold.end(), [&](auto& h) { return h.slot == slot; });
       const float d = distance(xyz(solver.x[slot]), tool.x);
       if (!taken && d < best) best = d, found = static_cast<int32_t>(slot);
     }
@@ -73,7 +74,8 @@ void grasp(const SolverModel& model, SolverState& solver, const SutureModel& sut
   }
 }
 
-void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, std::vector<Event>& events) {
+void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+          std::vector<Event>& events) {
   for (uint8_t who = 0; who < 2; ++who) {
     HandState& hand = state.hand[who];
     float force = 0, most = 1;

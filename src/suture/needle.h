@@ -15,7 +15,9 @@ struct NeedleShape {
 NeedleArc needle_arc(const NeedleShape& shape);
 // Inertia of a thin arc of wire; capsules along the shaft but for the last fifth before the tip, which must be free to enter.
 RigidModel needle_body(const NeedleShape& shape);
-inline Vec3 needle_point(const NeedleArc& arc, const RigidBody& needle, float phi) { return transform(needle.pose(), arc.point(phi)); }
+inline Vec3 needle_point(const NeedleArc& arc, const RigidBody& needle, float phi) {
+  return transform(needle.pose(), arc.point(phi));
+}
 inline Vec3 needle_tip(const NeedleArc& arc, const RigidBody& needle) { return needle_point(arc, needle, arc.arc); }
 inline Vec3 needle_swage(const NeedleArc& arc, const RigidBody& needle) { return needle_point(arc, needle, 0); }
 

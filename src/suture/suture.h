@@ -57,9 +57,9 @@ struct SutureModel {
   float attach_compliance = 1.0f / 1100, channel_compliance = 0.002f;  // [m/N]
   float channel_drag = 0.12f;                                          // [N] per end of the channel
   float pass_tension = 0.03f;                                          // [N]
-  float capstan = 0.08f;       // thread-tissue friction times the angle by which a suture point bends the thread
-  int collision_off = 3;       // thread particles on each side
-  float grasp_reach = 0.003f;  // [m]
+  float capstan = 0.08f;                     // thread-tissue friction times the angle by which a suture point bends the thread
+  int collision_off = 3;                     // thread particles on each side
+  float grasp_reach = 0.003f;                // [m]
   float needle_grip = 40, thread_grip = 15;  // [N] beyond which a jaw slips
   float grasp_compliance = 2e-5f, grasp_angular_compliance = 0.02f;  // [m/N], [rad/(N m)]
 };
@@ -81,9 +81,10 @@ struct SutureState {
 void grasp(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
            const std::array<ToolInput, 2>& hand, std::vector<Event>& events);
 
-// After every substep: a jaw that is pulled on harder than it grips lets slip what it holds (needle: needle_grip, thread: thread_grip), before
-// the pull becomes one that no hand could make. Reported as a release with the force [N] as its value.
-void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, std::vector<Event>& events);
+// After every substep: a jaw that is pulled on harder than it grips lets slip what it holds (needle: needle_grip, thread:
+// thread_grip), before the pull becomes one that no hand could make. Reported as a release with the force [N] as its value.
+void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+          std::vector<Event>& events);
 
 // --- puncture.cpp ------------------------------------------------------------------------------------------------------
 // After every substep: the tip trigger, the attached particle, the back-end trigger (paper 2.2, figures 4 and 5).

@@ -1,6 +1,6 @@
-// technique/purse_string: paper 2.5.1. Bites in and out round an opening; nothing is closed until the ring is complete; then, as the
-// thread is drawn tight, every edge particle travels to the anvil, all arriving together.
-// Talks to the mechanics through events (in) and a ClosurePlan (out) alone.
+// technique/purse_string: paper 2.5.1. Bites in and out round an opening; nothing is closed until the ring is complete; then,
+// as the thread is drawn tight, every edge particle travels to the anvil, all arriving together. Talks to the mechanics through
+// events (in) and a ClosurePlan (out) alone.
 #pragma once
 #include <span>
 #include <vector>
@@ -11,12 +11,12 @@ namespace catgut {
 
 struct PurseStringModel {
   std::vector<uint32_t> rim_outer, rim_inner;  // particles round the opening, in order; partners share an index
-  Vec3 anvil;                  // [m] relative to the rim's centre at the start of the closure
-  float anvil_radius = 0.004f; // [m]
-  float wall = 0.0025f;        // [m]
-  float compliance = 5e-4f;    // [m/N]
+  Vec3 anvil;                                  // [m] relative to the rim's centre at the start of the closure
+  float anvil_radius = 0.004f;                 // [m]
+  float wall = 0.0025f;                        // [m]
+  float compliance = 5e-4f;                    // [m/N]
   int min_bites = 10;
-  float fastest = 0.7f;        // [1/s] of progress: tissue needs its time to gather
+  float fastest = 0.7f;  // [1/s] of progress: tissue needs its time to gather
 };
 
 struct PurseStringState {
@@ -30,10 +30,11 @@ struct PurseStringState {
 // Returns the first i (from `from` on) whose successor is not, or -1.
 int first_out_of_order(std::span<const Vec3> sp, size_t from = 0);
 
-// Once a tick. `sp`: where the suture points are; x: particle positions; loop: rest length of thread from the first suture point to the last
-// [m]; dt: length of a tick [s]. Fills `plan` when there is something to close, and reports through `events`.
+// Once a tick. `sp`: where the suture points are; x: particle positions; loop: rest length of thread from the first suture
+// point to the last [m]; dt: length of a tick [s]. Fills `plan` when there is something to close, and reports through `events`.
 void purse_string(const PurseStringModel& model, PurseStringState& state, std::span<const Vec3> sp,
-                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, float dt, ClosurePlan& plan, std::vector<Event>& events);
+                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, float dt, ClosurePlan& plan,
+                  std::vector<Event>& events);
 
 // Area of the opening [m^2]: the inner edge projected on its own best plane.
 float opening_area(std::span<const uint32_t> rim, const Vec4* x);

@@ -186,8 +186,8 @@ void check_hanging_chain(Lines& out) {
     out.add("chain force error, " + std::to_string(p.sweeps) + " sweeps", p.error,
             chain_error(level, kFrame, false, p.sweeps, fallen, want), p.tolerance, "1",
             source + (p.sweeps == 1000 ? "; float32 limits it" : ""));
-  // Falling, at the scenes' own substep. (At 1/60 s the whip of the chain turns its segments by a third of a radian a step, and the geometric
-  // stiffness, which is what keeps fast taut thread calm, damps it: 5 % there.)
+  // Falling, at the scenes' own substep. (At 1/60 s the whip of the chain turns its segments by a third of a radian a step, and
+  // the geometric stiffness, which is what keeps fast taut thread calm, damps it: 5 % there.)
   const double substep = kFrame / 8;
   out.add("chain force error, direct, falling", 0,
           chain_error(level, substep, true, 1, 8 * fallen, newton_chain(level, substep, 8 * frames)), 0.05, "1",

@@ -234,8 +234,8 @@ void check_momentum(Lines& out) {
         bowel ? "no outer force; 600 overlapping clusters" : "no outer force; one cluster, unequal masses";
     TissueWorld spinning = make(), thrown = make();
     const Drift d = drift(spinning, rest, {});
-    // A particle moves by the mean over its clusters, and particles near a rim are in fewer: actio and reactio then differ a little, as for
-    // the angular momentum below.
+    // A particle moves by the mean over its clusters, and particles near a rim are in fewer: actio and reactio then differ a
+    // little, as for the angular momentum below.
     out.add(what + ", linear momentum lost in 1 s", 0, d.linear, bowel ? 5e-3 : 1e-3, "1", cluster);
     out.add(what + ", angular momentum lost in 1 s", 0, d.angular, bowel ? 0.05 : 0.01, "1",
             bowel ? "no outer moment; averaging over clusters keeps it only nearly" : "no outer moment");
