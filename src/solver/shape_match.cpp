@@ -33,14 +33,22 @@ HWY_INLINE void sum_rows(const Row* row, const uint32_t* index, uint32_t n, floa
 
 void MakeRows(const ShapeModel& model, const Vec4* x, ShapeScratch& scratch, uint32_t first, uint32_t last) {
   const D4 d;
-  for (uint32_t i = first; i < last; ++i) {
-    const auto p = hn::Mul(hn::Load(d, &x[i].x), hn::Set(d, model.relative_mass[i]));
-    const Vec4 q = model.rest[i];
-    float* row = scratch.row[i].f;  // column j holds m x q_j: the moment matrix by columns
-    hn::Store(hn::Mul(p, hn::Set(d, q.x)), d, row);
-    hn::Store(hn::Mul(p, hn::Set(d, q.y)), d, row + 4);
-    hn::Store(hn::Mul(p, hn::Set(d, q.z)), d, row + 8);
-    hn::Store(p, d, row + 12);
+  for (uint32_t g = first; g < last; ++g) {
+    // Column j holds the sum of m x q_j: the moment matrix by columns.
+    auto c0 = hn::Zero(d), c1 = c0, c2 = c0, c3 = c0;
+    for (uint32_t i = model.group_first[g]; i < model.group_first[g + 1]; ++i) {
+      const auto p = hn::Mul(hn::Load(d, &x[i].x), hn::Set(d, model.relative_mass[i]));
+      const Vec4 q = model.rest[i];
+      c0 = hn::Add(c0, hn::Mul(p, hn::Set(d, q.x)));
+      c1 = hn::Add(c1, hn::Mul(p, hn::Set(d, q.y)));
+      c2 = hn::Add(c2, hn::Mul(p, hn::Set(d, q.z)));
+      c3 = hn::Add(c3, p);
+    }
+    float* row = scratch.row[g].f;
+    hn::Store(c0, d, row);
+    hn::Store(c1, d, row + 4);
+    hn::Store(c2, d, row + 8);
+    hn::Store(c3, d, row + 12);
   }
 }
 
@@ -82,7 +90,7 @@ void Clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch&
     for (uint32_t c = 0; c < 16; ++c) {
       // The last group may reach past the clusters: it repeats the last one and its results are dropped below.
       const uint32_t id = HWY_MIN(base + c, model.clusters - 1);
-      sum_rows(scratch.row.data(), model.member.data() + size_t{id} * model.cluster_stride, model.cluster_stride, moment);
+      sum_rows(scratch.row.data(), model.group_member.data() + size_t{id} * model.member_stride, model.member_stride, moment);
       for (size_t j = 0; j < 4; ++j) hn::Store(hn::Load(d4, moment + 4 * j), d4, column[j] + 4 * c);
     }
     for (uint32_t c = 0; c < 16; c += kLanes) {
@@ -124,7 +132,8 @@ void Clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch&
       const V relative = hn::Div(det, hn::Mul(size, hn::Mul(size, size)));
       const auto safe = hn::And(hn::And(hn::Gt(trace, tiny), hn::Gt(relative, hn::Set(d, 1e-3f))),
                                 hn::Lt(LDot<D>(newton, newton), hn::Set(d, 0.25f)));
-      const V damp = hn::Div(one, size);
+      // Bounded by one even where there is nothing to turn by (a cluster shrunk to a point has only rounding for moments).
+      const V damp = hn::Div(one, hn::Add(size, hn::Add(hn::Add(hn::Abs(g.x), hn::Abs(g.y)), hn::Abs(g.z))));
       const V wx = hn::Mul(half, hn::IfThenElse(safe, newton.x, hn::Mul(damp, g.x)));
       const V wy = hn::Mul(half, hn::IfThenElse(safe, newton.y, hn::Mul(damp, g.y)));
       const V wz = hn::Mul(half, hn::IfThenElse(safe, newton.z, hn::Mul(damp, g.z)));
@@ -163,13 +172,15 @@ void ShapeParticles(const ShapeModel& model, Vec4* x, const float* inv_mass, flo
                     ShapeScratch& scratch, uint32_t first, uint32_t last) {
   const D4 d;
   alignas(64) float sum[16];
-  for (uint32_t i = first; i < last; ++i) {
-    if (inv_mass[i] > 0) {
-      sum_rows(scratch.transform.data(), model.holder.data() + size_t{i} * model.particle_stride, model.particle_stride, sum);
+  for (uint32_t g = first; g < last; ++g) {
+    sum_rows(scratch.transform.data(), model.holder.data() + size_t{g} * model.holder_stride, model.holder_stride, sum);
+    const auto share = hn::Set(d, model.inv_holders[g]);
+    for (uint32_t i = model.group_first[g]; i < model.group_first[g + 1]; ++i) {
+      if (inv_mass[i] == 0) continue;
       const Vec4 q = model.rest[i];
       auto goal = hn::Add(hn::Add(hn::Mul(hn::Load(d, sum), hn::Set(d, q.x)), hn::Mul(hn::Load(d, sum + 4), hn::Set(d, q.y))),
                           hn::Add(hn::Mul(hn::Load(d, sum + 8), hn::Set(d, q.z)), hn::Load(d, sum + 12)));
-      goal = hn::Mul(goal, hn::Set(d, model.inv_holders[i]));
+      goal = hn::Mul(goal, share);
       const auto at = hn::Load(d, &x[i].x), moved = hn::Load(d, &scratch.moved[i].x);
       // Lane 3 (the constant 1 of a position) must not move: the mask keeps it.
       auto dx = hn::Mul(hn::Set(d, relaxation), hn::Sub(hn::Mul(hn::Set(d, stiffness), hn::Sub(goal, at)),
@@ -216,7 +227,7 @@ void ClusterRotations::reset(uint32_t clusters) {
 }
 
 void ShapeScratch::resize(const ShapeModel& model) {
-  row.assign(model.rest.size() + 1, Row{});
+  row.assign(model.groups + 1, Row{});
   transform.assign(model.clusters + 1, Row{});
   moved.assign(model.rest.size(), Vec4{});
 }
@@ -261,15 +272,33 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
     }
     m.rest_centre[c] = {static_cast<float>(sx / sum), static_cast<float>(sy / sum), static_cast<float>(sz / sum), 0};
   }
-  widest = 4;
-  for (const auto& h : holders) widest = std::max(widest, h.size());
-  m.particle_stride = static_cast<uint32_t>((widest + 3) / 4 * 4);
-  m.holder.assign(size_t{particles} * m.particle_stride, m.clusters);
+  // Groups: runs of particles with the same list of clusters.
   for (uint32_t i = 0; i < particles; ++i) {
     CATGUT_CHECK(!holders[i].empty());
-    for (size_t k = 0; k < holders[i].size(); ++k) m.holder[size_t{i} * m.particle_stride + k] = holders[i][k];
-    m.inv_holders.push_back(1.0f / static_cast<float>(holders[i].size()));
+    if (i == 0 || holders[i] != holders[i - 1]) m.group_first.push_back(i);
   }
+  m.groups = static_cast<uint32_t>(m.group_first.size());
+  m.group_first.push_back(particles);
+  const auto padded = [](size_t n) { return static_cast<uint32_t>((std::max<size_t>(n, 4) + 3) / 4 * 4); };
+  widest = 0;
+  for (uint32_t g = 0; g < m.groups; ++g) widest = std::max(widest, holders[m.group_first[g]].size());
+  m.holder_stride = padded(widest);
+  m.holder.assign(size_t{m.groups} * m.holder_stride, m.clusters);
+  std::vector<std::vector<uint32_t>> held(m.clusters);
+  for (uint32_t g = 0; g < m.groups; ++g) {
+    const std::vector<uint32_t>& h = holders[m.group_first[g]];
+    for (size_t k = 0; k < h.size(); ++k) {
+      m.holder[size_t{g} * m.holder_stride + k] = h[k];
+      held[h[k]].push_back(g);
+    }
+    m.inv_holders.push_back(1.0f / static_cast<float>(h.size()));
+  }
+  widest = 0;
+  for (const auto& g : held) widest = std::max(widest, g.size());
+  m.member_stride = padded(widest);
+  m.group_member.assign(size_t{m.clusters} * m.member_stride, m.groups);
+  for (uint32_t c = 0; c < m.clusters; ++c)
+    for (size_t k = 0; k < held[c].size(); ++k) m.group_member[size_t{c} * m.member_stride + k] = held[c][k];
   return m;
 }
 

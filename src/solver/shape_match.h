@@ -14,18 +14,25 @@ struct alignas(64) Row {
   float f[16] = {};
 };
 
+// Particles next to each other in memory that belong to the very same clusters (as the two sides of a wall do) form a group:
+// they share one row, the sum of theirs, and one sum of transforms. That is the same arithmetic at half the loads.
+//
 // Constant part. Lists are padded to a fixed stride with the index of a zero row, so that the sums are straight-line code.
 struct ShapeModel {
-  uint32_t clusters = 0;             // different ones: particles on the two sides of a wall often share theirs
-  uint32_t cluster_stride = 16;      // members per cluster, padded; the pad is index `particles` (a zero row)
-  uint32_t particle_stride = 16;     // clusters per particle, padded with index `clusters`
-  Column<uint32_t> member;           // clusters x cluster_stride: particles
-  Column<uint32_t> holder;           // particles x particle_stride: clusters
-  Column<float> inv_holders;         // per particle: 1 / number of clusters that hold it
-  Column<Vec4> rest;                 // per particle, (x, y, z, 1)
-  Column<float> relative_mass;       // per particle: m_k / mean m, the weights of the moments
-  Column<Vec4> rest_centre;          // per cluster: mass-weighted, w unused
-  std::vector<uint32_t> cluster_of;  // per particle: the cluster centred on it
+  uint32_t clusters = 0;  // different ones: particles on the two sides of a wall often share theirs
+  uint32_t groups = 0;
+  std::vector<uint32_t> group_first;  // groups + 1: particles group_first[g] .. group_first[g + 1] - 1
+  uint32_t cluster_stride = 16;       // particles per cluster, padded; the pad is index `particles`
+  uint32_t member_stride = 16;        // groups per cluster, padded; the pad is index `groups` (a zero row)
+  uint32_t holder_stride = 16;        // clusters per group, padded with index `clusters` (a zero transform)
+  Column<uint32_t> member;            // clusters x cluster_stride: particles; not for the kernels
+  Column<uint32_t> group_member;      // clusters x member_stride: groups
+  Column<uint32_t> holder;            // groups x holder_stride: clusters
+  Column<float> inv_holders;          // per group: 1 / number of clusters that hold it
+  Column<Vec4> rest;                  // per particle, (x, y, z, 1)
+  Column<float> relative_mass;        // per particle: m_k / mean m, the weights of the moments
+  Column<Vec4> rest_centre;           // per cluster: mass-weighted, w unused
+  std::vector<uint32_t> cluster_of;   // per particle: the cluster centred on it
 };
 // cluster[i] is centred on particle i. Clusters of the same members are one: it would only be solved twice to the same end.
 ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> mass,
@@ -37,9 +44,9 @@ struct ClusterRotations {
   void reset(uint32_t clusters);
 };
 
-// Working memory of one sweep. Row `particles` and transform `clusters` stay zero.
+// Working memory of one sweep. Row `groups` and transform `clusters` stay zero.
 struct ShapeScratch {
-  Column<Row> row;        // per particle: m_k (x,1)(q,1)^T
+  Column<Row> row;        // per group: sum of m_k (x,1)(q,1)^T
   Column<Row> transform;  // per cluster: columns of the 3x4 affine [R | t], 4 floats each
   Column<Vec4> moved;     // per particle: what shape matching moved it this substep [m] (lambda = moved * mass)
   void resize(const ShapeModel& model);
@@ -50,11 +57,11 @@ struct ShapeScratch {
 // first must be a multiple of 16.
 void solve_shape_clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch& scratch, uint32_t first,
                           uint32_t last);
-// Rows of particles [first, last) from their positions.
+// Rows of groups [first, last) from the positions of their particles.
 void make_shape_rows(const ShapeModel& model, const Vec4* x, ShapeScratch& scratch, uint32_t first, uint32_t last);
-// Sweep, pass 2 over particles [first, last): dx = relaxation * (s (g - x) - (1 - s) moved), with s = w / (w + alpha / h^2)
-// per particle: the XPBD update of a constraint with compliance alpha and multiplier moved / w. Makes the next sweep's rows
-// too. Particles with inv_mass 0 stay.
+// Sweep, pass 2 over groups [first, last), each particle of them: dx = relaxation * (s (g - x) - (1 - s) moved), with s = w /
+// (w + alpha / h^2) per particle: the XPBD update of a constraint with compliance alpha and multiplier moved / w. Makes the
+// next sweep's rows too. Particles with inv_mass 0 stay.
 void solve_shape_particles(const ShapeModel& model, Vec4* x, const float* inv_mass, float stiffness, float relaxation,
                            ShapeScratch& scratch, uint32_t first, uint32_t last);
 

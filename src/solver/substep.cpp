@@ -10,8 +10,11 @@
 namespace catgut {
 namespace {
 
-constexpr size_t kParticleBlock = 256, kClusterBlock = 160;  // fixed: never a function of the number of workers
-constexpr float kTopSpeed = 5.0f;                            // [m/s] of a particle; a hand cannot throw tissue faster
+// Items per block of a stage: fixed, never a function of the number of workers. Fork and join cost some microseconds, so a
+// light stage is cut only where it is worth that; shape matching into several blocks a worker, so that an uneven start evens
+// out.
+constexpr size_t kLightBlock = 2048, kParticleBlock = 256, kGroupBlock = 80, kClusterBlock = 80;
+constexpr float kTopSpeed = 5.0f;  // [m/s] of a particle; a hand cannot throw tissue faster
 
 void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   for (Weld& w : state.weld) w.lambda = w.angular_lambda = {};
@@ -107,12 +110,9 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   clear_multipliers(s, k);
   {
     StageTimer timer(times, Stage::predict);
-    jobs.each(m.count, kParticleBlock, [&](size_t first, size_t last) {
-      predict_particles(m, s, k, first, last);
-      if (first < m.tissue) {
-        const uint32_t end = static_cast<uint32_t>(std::min<size_t>(last, m.tissue));
-        make_shape_rows(m.shape, x, k.shape, static_cast<uint32_t>(first), end);
-      }
+    jobs.each(m.count, kLightBlock, [&](size_t first, size_t last) { predict_particles(m, s, k, first, last); });
+    jobs.each(m.shape.groups, kLightBlock, [&](size_t first, size_t last) {
+      make_shape_rows(m.shape, x, k.shape, static_cast<uint32_t>(first), static_cast<uint32_t>(last));
     });
     for (size_t b = 0; b < s.body.size(); ++b) predict(m.body[b], s.body[b], m.gravity, h);
   }
@@ -122,7 +122,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
       jobs.each(m.shape.clusters, kClusterBlock, [&](size_t first, size_t last) {
         solve_shape_clusters(m.shape, s.rotation, k.shape, static_cast<uint32_t>(first), static_cast<uint32_t>(last));
       });
-      jobs.each(m.tissue, kParticleBlock, [&](size_t first, size_t last) {
+      jobs.each(m.shape.groups, kGroupBlock, [&](size_t first, size_t last) {
         solve_shape_particles(m.shape, x, w, m.shape_stiffness, m.shape_relaxation, k.shape, static_cast<uint32_t>(first),
                               static_cast<uint32_t>(last));
       });
@@ -203,7 +203,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   }
   {
     StageTimer timer(times, Stage::velocity);
-    jobs.each(m.count, kParticleBlock, [&](size_t first, size_t last) { update_velocities(m, s, k, first, last); });
+    jobs.each(m.count, kLightBlock, [&](size_t first, size_t last) { update_velocities(m, s, k, first, last); });
     for (size_t b = 0; b < s.body.size(); ++b) update_velocity(m.body[b], s.body[b], h, m.body_damping);
   }
   k.contacts = touching;

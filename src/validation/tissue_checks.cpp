@@ -252,7 +252,7 @@ void check_rotation(Lines& out) {
   const std::vector<float> mass(block.position.size(), 0.001f);
   const Vec3 axis = normalized(Vec3{0.3f, 0.8f, -0.5f}), away{0.05f, -0.02f, 0.1f};
   auto settle = [&](TissueWorld& w, int sweeps) {
-    make_shape_rows(w.model.shape, w.state.x.data(), w.scratch.shape, 0, w.model.tissue);
+    make_shape_rows(w.model.shape, w.state.x.data(), w.scratch.shape, 0, w.model.shape.groups);
     for (int i = 0; i < sweeps; ++i) solve_shape_clusters(w.model.shape, w.state.rotation, w.scratch.shape, 0, 1);
   };
   auto found = [](const TissueWorld& w) {

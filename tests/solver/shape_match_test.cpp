@@ -33,7 +33,7 @@ struct Cluster {
   void settle(const std::vector<Vec3>& at, int steps) {
     Column<Vec4> x;
     for (const Vec3& p : at) x.push_back(point(p));
-    make_shape_rows(model, x.data(), scratch, 0, static_cast<uint32_t>(rest.size()));
+    make_shape_rows(model, x.data(), scratch, 0, model.groups);
     for (int i = 0; i < steps; ++i) solve_shape_clusters(model, rotation, scratch, 0, 1);
   }
   Eigen::Matrix3d found() const {
@@ -164,11 +164,11 @@ TEST(ShapeRows, kernels_equal_a_plain_scalar_reference) {
   Column<Vec4> x;
   for (const Vec3& p : rest) x.push_back(point(p + Vec3{r.normal(), r.normal(), r.normal()} * 0.0005f));
   const Column<Vec4> before = x;
-  make_shape_rows(model, x.data(), scratch, 0, n);
+  make_shape_rows(model, x.data(), scratch, 0, model.groups);
   for (int i = 0; i < 30; ++i) solve_shape_clusters(model, rotation, scratch, 0, model.clusters);
   const float s = 0.7f, relaxation = 1.3f;
   for (uint32_t i = 0; i < n; ++i) scratch.moved[i] = {1e-4f, -2e-4f, 3e-4f, 0};
-  solve_shape_particles(model, x.data(), inv_mass.data(), s, relaxation, scratch, 0, n);
+  solve_shape_particles(model, x.data(), inv_mass.data(), s, relaxation, scratch, 0, model.groups);
 
   std::vector<Eigen::Vector3d> goal(n, Eigen::Vector3d::Zero());
   std::vector<int> holders(n, 0);
@@ -210,12 +210,12 @@ TEST(ShapeRows, the_number_of_workers_does_not_change_a_bit) {
     scratch.resize(model);
     ClusterRotations rotation;
     rotation.reset(model.clusters);
-    make_shape_rows(model, x.data(), scratch, 0, n);
+    make_shape_rows(model, x.data(), scratch, 0, model.groups);
     for (int sweep = 0; sweep < 20; ++sweep) {
-      jobs.each(n, 160, [&](size_t a, size_t b) {
+      jobs.each(model.clusters, 160, [&](size_t a, size_t b) {
         solve_shape_clusters(model, rotation, scratch, static_cast<uint32_t>(a), static_cast<uint32_t>(b));
       });
-      jobs.each(n, 256, [&](size_t a, size_t b) {
+      jobs.each(model.groups, 256, [&](size_t a, size_t b) {
         solve_shape_particles(model, x.data(), inv_mass.data(), 0.6f, 1.3f, scratch, static_cast<uint32_t>(a),
                               static_cast<uint32_t>(b));
       });
