@@ -38,8 +38,8 @@ void Tally::tick(const Snapshot& seen) {
   }
   const float error = thread_length_error(seen);
   if (!std::isfinite(error)) sane_ = false;
-  length_error_ = std::max(length_error_, error);
-  if (passing) length_error_passing_ = std::max(length_error_passing_, error);
+  float& worst = passing ? length_error_passing_ : length_error_;
+  worst = std::max(worst, error);
   lost_ = std::max(lost_, lost_slots(seen));
 }
 
