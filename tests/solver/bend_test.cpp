@@ -1,0 +1,44 @@
+// tests of solver/bend: the SIMD sweep that threads run against solve_bend, the scalar form that `catgut validate` checks.
+#include "solver/bend.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "core/random.h"
+#include "solver/thread.h"
+
+namespace catgut {
+namespace {
+
+TEST(Bend, the_simd_sweep_is_the_scalar_update_by_colours) {
+  for (const size_t nodes : {3u, 4u, 5u, 17u, 50u, 175u}) {
+    Random r(nodes);
+    std::vector<Vec3> p;
+    std::vector<float> w;
+    for (size_t i = 0; i < nodes; ++i) {
+      p.push_back(Vec3{static_cast<float>(i) * 0.0016f, 0, 0} + Vec3{r.normal(), r.normal(), r.normal()} * 0.0006f);
+      w.push_back(i % 7 == 3 ? 0 : 5e5f);
+    }
+    std::vector<Vec3> want = p;
+    const std::vector<Vec3> start = p;
+    const float compliance = 1e4f, h = 1.0f / 480;
+    std::vector<float> lambda(nodes, 0);
+    for (int sweep = 0; sweep < 3; ++sweep)
+      for (size_t colour = 1; colour <= 3; ++colour)
+        for (size_t i = colour; i + 1 < nodes; i += 3)
+          solve_bend(want[i - 1], want[i], want[i + 1], w[i - 1], w[i], w[i + 1], compliance, h, lambda[i]);
+    BendScratch scratch;
+    scratch.resize(nodes);
+    solve_bends(p, w, compliance, h, 3, scratch);
+    float moved = 0;
+    for (size_t i = 0; i < nodes; ++i) {
+      EXPECT_LT(distance(p[i], want[i]), 1e-8f) << nodes << " nodes, node " << i;
+      moved = std::max(moved, distance(p[i], start[i]));
+    }
+    EXPECT_GT(moved, 1e-6f) << "nothing was bent back: the comparison would be empty";
+  }
+}
+
+}  // namespace
+}  // namespace catgut
