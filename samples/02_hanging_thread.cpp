@@ -28,6 +28,7 @@ int main() {
   }
   thread.rest.assign(kCount - 1, kSpacing);
   thread.tension.assign(kCount - 1, 0);
+  thread.cut.assign(kCount - 1, 0);
   thread.hold.push_back({0, 0, {}});  // node 0 on body 0, the hook, which nothing can move
   const std::vector<RigidModel> hook_model(1);
   std::vector<RigidBody> hook(1);

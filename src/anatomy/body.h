@@ -27,7 +27,9 @@ struct BodyRest {
   std::vector<std::vector<uint32_t>> cluster;  // cluster c is centred on particle c; first member is c; at most 16 members
   std::vector<Tet> tet;                        // the wall's volume
   std::vector<Triangle> surface;               // watertight, particle indices, counter-clockwise seen from outside the tissue
-  std::vector<Rim> rim;                        // openings; rim[0] is the one the procedure works on
+  std::vector<Rim> rim;                        // openings; rim[w] with w < walls is where the procedure works on wall w
+  int walls = 1;                               // 2: a bowel folded into itself; wall 0 is the outer tube, 1 the inner one
+  std::vector<uint8_t> wall;                   // per particle: which wall it belongs to; empty: all 0
   VisibleMesh visible;                         // skin_particle indexes this body's particles
 };
 

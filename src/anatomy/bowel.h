@@ -21,6 +21,7 @@ struct BowelShape {
   Vec3 axis{0, 1, 0};            // the way the near end faces; need not be of unit length
   float density = 1050;          // [kg/m^3]
   float pinned_length = 0.008f;  // [m] of the far end that the surroundings hold; 0 holds nothing
+  float inner_radius = 0;        // [m] outer radius of a second tube inside the first; 0: none
 };
 
 // Particles run ring by ring from the near end; a place on the sheet is two neighbouring particles, outer (even index) then

@@ -7,9 +7,25 @@ const char* event_name(EventKind kind) {
   static constexpr const char* kName[] = {
       "needle_grasped",    "needle_released", "thread_grasped",  "thread_released",  "tip_entered",    "particle_attached",
       "particle_released", "tip_exited",      "bite_cancelled",  "suture_point",     "bite_completed", "particle_passed",
-      "order_broken",      "ring_complete",   "closure_started", "closure_finished", "thread_ran_out"};
+      "order_broken",      "ring_complete",   "closure_started", "closure_finished", "thread_ran_out", "tissue_grasped",
+      "tissue_released",   "loop_formed",     "loop_rejected",   "loop_released",    "knot_begun",     "knot_locked",
+      "knot_cancelled",    "thread_cut",      "suture_taken",    "stitch_settled",   "seam_closed",    "technique_fault"};
   static_assert(sizeof(kName) / sizeof(kName[0]) == static_cast<size_t>(EventKind::count_));
   return kind < EventKind::count_ ? kName[static_cast<int>(kind)] : "unknown";
+}
+
+const char* fault_name(Fault fault) {
+  static constexpr const char* kName[] = {"none",          "wrong_body",        "wrong_layer",
+                                          "one_wall_only", "knot_without_bite", "needle_in_tissue",
+                                          "cut_in_stitch", "cut_before_knot",   "too_few_throws"};
+  static_assert(sizeof(kName) / sizeof(kName[0]) == static_cast<size_t>(Fault::count_));
+  return fault < Fault::count_ ? kName[static_cast<int>(fault)] : "unknown";
+}
+
+const char* loop_reason_name(LoopReason reason) {
+  static constexpr const char* kName[] = {"none", "no_crossing", "tip_outside", "too_deep"};
+  static_assert(sizeof(kName) / sizeof(kName[0]) == static_cast<size_t>(LoopReason::count_));
+  return reason < LoopReason::count_ ? kName[static_cast<int>(reason)] : "unknown";
 }
 
 }  // namespace catgut

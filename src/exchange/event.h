@@ -26,8 +26,46 @@ enum class EventKind : uint8_t {
   closure_started,    // value: opening area [m^2]
   closure_finished,   // value: opening area [m^2]
   thread_ran_out,     // which: suture point; the free end reached it and holds
+  tissue_grasped,     // who: hand, which: particle
+  tissue_released,    // who: hand, which: particle, value: 0 or the force at which it slipped out [N]
+  loop_formed,        // who: hand with the tool that it lies round, which: wraps, value: +1 or -1, its handedness
+  loop_rejected,      // who: hand, which: LoopReason; told once until the reason changes (2.4)
+  loop_released,      // who: hand; the loop came off without a knot
+  knot_begun,         // who: hand that pulls, which: knot, value: wraps
+  knot_locked,        // which: knot, value: tension when it was set [N]
+  knot_cancelled,     // which: knot; the free end was let go before it reached the tissue
+  thread_cut,         // who: hand, which: slot toward the free end, value: thread to the nearest suture point or knot [m]
+  suture_taken,       // which: how many were taken before; a fresh needle and thread lie ready
+  stitch_settled,     // which: settled stitch; its thread is no longer simulated (3.4)
+  seam_closed,        // which: row of Snapshot::seam, value: what is left of its gap [m]
+  technique_fault,    // which: bite, knot or suture (see Fault), value: Fault; nothing is repaired
   count_
 };
+
+// What was wrong, of a technique_fault event.
+enum class Fault : uint8_t {
+  none,
+  wrong_body,         // which: bite; the technique wanted the other side, or the other layer
+  wrong_layer,        // which: bite; it goes from outside in where it should go from inside out, or the other way round
+  one_wall_only,      // which: bite; a stitch that should join two walls was tied through one
+  knot_without_bite,  // which: knot; it was begun before there was a suture point, or with the bites incomplete
+  needle_in_tissue,   // which: bite; thread was pulled tight or a knot begun with the needle still in the tissue
+  cut_in_stitch,      // which: slot; the thread was cut between suture points or knots: the stitch is open
+  cut_before_knot,    // which: slot; the thread was cut before anything was tied
+  too_few_throws,     // which: knot; it was cut or left with fewer throws than hold
+  count_
+};
+const char* fault_name(Fault fault);
+
+// Why a loop round a tool is none (2.4, figure 10), of a loop_rejected event.
+enum class LoopReason : uint8_t {
+  none,         // it is one
+  no_crossing,  // the thread touches the tool but does not cross itself in the plane across it
+  tip_outside,  // it crosses itself beside the tool: the tip is not inside
+  too_deep,     // a helix: its ends are further apart along the tool than one pair of particles
+  count_
+};
+const char* loop_reason_name(LoopReason reason);
 const char* event_name(EventKind kind);
 
 struct Event {

@@ -38,10 +38,13 @@ struct PictureModel {
   float needle_arc = kPi;               // [rad]
   float needle_wire_radius = 0.00033f;  // [m]
   std::array<ToolKind, 2> tool{ToolKind::needle_driver, ToolKind::forceps};
-  Vec3 focus;                              // [m] centre of the operating field
-  float field = 0.1f;                      // [m] its radius
-  float drape = -0.035f;                   // [m] height of the sterile drape (horizontal), which the organ stands up through
-  std::vector<std::vector<uint32_t>> rim;  // tissue particles round each opening, in order (outer layer)
+  Vec3 focus;             // [m] centre of the operating field
+  float field = 0.1f;     // [m] its radius
+  float drape = -0.035f;  // [m] height of the sterile drape (horizontal), which the organ stands up through
+  // One per wall that the procedure works on: tissue particles round its near opening, in order, on its outer side. Walls are
+  // numbered: one per bowel end, and two (outer, inner) for a bowel folded into itself.
+  std::vector<std::vector<uint32_t>> rim;
+  std::vector<uint8_t> wall;  // per tissue particle
 };
 
 }  // namespace catgut

@@ -10,17 +10,20 @@
 
 namespace catgut {
 
-enum class Held : uint8_t { nothing, needle, thread };
+enum class Held : uint8_t { nothing, needle, thread, tissue };
 
 struct ToolView {
   Pose pose;      // where the simulated tool is (tissue and thread may hold it back from the hand)
   Pose hand;      // where the hand is
   float jaw = 1;  // 0 closed .. 1 open
   Held held = Held::nothing;
-  float held_at = 0;       // needle: place on the arc, 0 swage .. 1 tip
-  uint32_t held_slot = 0;  // thread: particle slot
-  Vec3 force;              // [N] on the hand
-  Vec3 torque;             // [N m] on the hand, about the tool's origin
+  float held_at = 0;                       // needle: place on the arc, 0 swage .. 1 tip
+  uint32_t held_slot = 0;                  // thread: particle slot; tissue: particle
+  uint32_t loop_wraps = 0;                 // turns of thread frozen round it, 0: none
+  int loop_handed = 0;                     // +1: right-handed as seen from its hand, -1: left-handed
+  uint32_t loop_first = 0, loop_last = 0;  // slots of the loop's ends, free-end side first; valid with a loop
+  Vec3 force;                              // [N] on the hand
+  Vec3 torque;                             // [N m] on the hand, about the tool's origin
 };
 
 struct NeedleView {
@@ -35,12 +38,49 @@ struct SuturePointView {
   bool exit = false;                           // the exit end of its bite, else the entry
   uint32_t anchored = 0;                       // slot of the thread particle locked to it
   float tension_needle = 0, tension_free = 0;  // [N] on its two sides
+  uint32_t wall = 0;                           // of PictureModel::rim: the bowel end, or the layer, that it is in
+};
+
+// One throw of a knot, for the picture and for who judges it (square, granny, 2-1-1, air knot).
+struct KnotThrow {
+  uint32_t wraps = 1;
+  int32_t handed = 1;      // of the loop, +1 or -1
+  int32_t needle_end = 1;  // 1: the end with the needle was wrapped, 0: the free end
+  float tension = 0;       // [N] of the pulled strand when it was set
+  float gap = 0;           // [m] to the tissue, or to the throw before it, when it was set
+};
+
+enum class KnotPhase : uint32_t { tightening, locked };
+
+struct KnotView {
+  static constexpr size_t kMostThrows = 8;
+  KnotPhase phase = KnotPhase::tightening;
+  Vec3 position;  // [m]
+  Vec3 way;       // unit: along the stitch it ties, from its free-end side to its needle side
+  uint32_t throws = 0;
+  std::array<KnotThrow, kMostThrows> thrown;
+};
+
+// A tied stitch that is no longer simulated: its thread as a curve that the tissue carries, tails included.
+struct SettledView {
+  std::vector<Vec3> node;
+  std::vector<Vec3> knot;
+};
+
+// Two edges that a technique draws together, at one place of the line: a midpoint of 2.5.2, a pair of figure 13 or 15.
+struct SeamView {
+  Vec3 a, b;              // [m] the two points of tissue
+  float start = 0;        // [m] their distance when the pair was made
+  float progress = 0;     // 0..1
+  bool midpoint = false;  // between suture points; else one of the pairs in between
 };
 
 struct BiteView {
   Vec3 entry, exit;  // [m] where they are now, carried by the tissue
   float depth = 0;   // [m] deepest the tip went below the surface
   bool has_exit = false, complete = false;
+  uint32_t wall = 0;                               // as in SuturePointView
+  bool entry_inside = false, exit_inside = false;  // that end lies on the mucosa
 };
 
 struct Snapshot {
@@ -53,6 +93,11 @@ struct Snapshot {
   std::array<ToolView, 2> tool;
   NeedleView needle;
   std::vector<SuturePointView> suture_point;
+  std::vector<uint8_t> thread_cut;  // per pair of thread_order: 1 where it was cut through
+  bool needle_on_thread = true;     // false once the thread was cut off the needle
+  std::vector<KnotView> knot;
+  std::vector<SettledView> settled;
+  std::vector<SeamView> seam;
   std::vector<BiteView> bite;
   float opening_area = 0;    // [m^2] of the rim that is being closed
   float closure = 0;         // 0 open .. 1 at the anvil

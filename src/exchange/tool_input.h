@@ -8,6 +8,11 @@
 
 namespace catgut {
 
+// Bits of ToolInput::buttons. Each acts once, when it goes down.
+constexpr uint32_t kButtonCut = 1u << 0;  // scissors cut the thread where this tool's jaws are
+constexpr uint32_t kButtonNewSuture =
+    1u << 1;  // a fresh needle and thread, please: what is tied settles, the rest is taken away
+
 // Tool frame: origin at the grasp point between the jaw tips, -z the way the tool points (the shaft runs along +z toward the
 // hand), x the direction in which the jaws open.
 struct ToolInput {

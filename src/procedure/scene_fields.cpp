@@ -38,6 +38,7 @@ const Field kField[] = {
     {"body", "axis", "", -1, 1, nullptr, "direction in which the near end faces", BODY(axis)},
     {"body", "density", "kg/m^3", 1, 20000, nullptr, "of the tissue", BODY(density)},
     {"body", "pinned_length", "m", 0, 2, nullptr, "length of the far end that the surroundings hold", BODY(pinned_length)},
+    {"body", "inner_radius", "m", 0, 1, nullptr, "outer radius of a second tube inside the first, as in a bowel folded into itself; 0: none", BODY(inner_radius)},
 
     {"thread", "particles", "", 2, 10000, nullptr, "thread particles from the free end to the needle", TOP(thread.particles)},
     {"thread", "spacing", "m", 0.0001, 0.1, nullptr, "rest distance of neighbours", TOP(thread.spacing)},
@@ -81,11 +82,14 @@ const Field kField[] = {
     {"suture", "collision_off", "", 0, 100, nullptr, "thread particles on each side of a locked one that do not collide", TOP(suture.collision_off)},
     {"suture", "grasp_reach", "m", 0, 0.1, nullptr, "how near a closing jaw must be to hold needle or thread", TOP(suture.grasp_reach)},
 
-    {"technique", "name", "", 0, 0, "purse_string|none", "which points close with which, and when", TOP(technique.name)},
+    {"technique", "name", "", 0, 0, "purse_string|connell|stay|lembert|none", "which points close with which, and when", TOP(technique.name)},
     {"technique", "anvil", "m", -1, 1, nullptr, "focal point of the closure, relative to the rim's centre", TOP(technique.anvil)},
     {"technique", "anvil_radius", "m", 0, 0.1, nullptr, "the rim ends on a ring of this radius", TOP(technique.anvil_radius)},
     {"technique", "closure_compliance", "m/N", 0, 1000, nullptr, "of the pull of the edge particles toward the anvil", TOP(technique.closure_compliance)},
     {"technique", "min_bites", "", 0, 1000, nullptr, "bites needed before the closure may start", TOP(technique.min_bites)},
+    {"technique", "closed_gap", "m", 0, 0.1, nullptr, "what is left between two points that a seam or a knot draws together", TOP(technique.closed_gap)},
+    {"technique", "step", "m", 0.0001, 0.1, nullptr, "between the pairs that a seam draws together in between (dist_threshold of section 2.5.2)", TOP(technique.step)},
+    {"technique", "throws", "", 1, 8, nullptr, "with fewer a knot does not hold", TOP(technique.throws)},
 
     {"surgeon", "bites", "", 0, 1000, nullptr, "bites the scripted surgeon makes", TOP(surgeon.bites)},
     {"surgeon", "edge_distance", "m", 0, 0.1, nullptr, "of the bites from the rim", TOP(surgeon.edge_distance)},

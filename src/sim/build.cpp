@@ -43,6 +43,7 @@ BodyRest make_body(const BodySpec& spec) {
   s.axis = spec.axis;
   s.density = spec.density;
   s.pinned_length = spec.pinned_length;
+  s.inner_radius = spec.inner_radius;
   return make_bowel(s);
 }
 
@@ -67,6 +68,47 @@ std::vector<Vec3> lay_thread(const ThreadSpec& spec, Vec3 start) {
     p.push_back(start + q);
   }
   return p;
+}
+
+// The rims are those of the walls, in their order.
+TechniqueModel make_technique(const SceneSpec& scene, const std::vector<Rim>& rim, float wall, const std::string& where) {
+  TechniqueModel t;
+  const TechniqueSpec& spec = scene.technique;
+  auto need = [&](size_t walls, const char* why, const char* what_next) {
+    for (size_t w = 0; w < walls; ++w)
+      if (w >= rim.size() || rim[w].outer.empty()) throw InputError(where, why, what_next);
+  };
+  if (spec.name == "purse_string") {
+    t.kind = TechniqueKind::purse_string;
+    need(1, "a purse-string needs an opening and no body has one", "leave one end of the body open");
+    t.purse_string.rim_outer = rim[0].outer;
+    t.purse_string.rim_inner = rim[0].inner;
+    t.purse_string.anvil = spec.anvil;
+    t.purse_string.anvil_radius = spec.anvil_radius;
+    t.purse_string.compliance = spec.closure_compliance;
+    t.purse_string.min_bites = spec.min_bites;
+    t.purse_string.wall = wall;
+  } else if (spec.name == "connell" || spec.name == "stay") {
+    t.kind = spec.name == "connell" ? TechniqueKind::connell : TechniqueKind::stay;
+    need(2, "it joins two open bowel ends and the scene does not have two", "add a second [[body]] with an open end");
+    t.seam.connell = t.kind == TechniqueKind::connell;
+    t.seam.rim = {rim[0].outer, rim[1].outer};
+    t.seam.step = spec.step;
+    t.seam.gap = spec.closed_gap;
+    t.seam.compliance = spec.closure_compliance;
+  } else if (spec.name == "lembert") {
+    t.kind = TechniqueKind::lembert;
+    need(2, "it joins two layers and the scene's body has one", "give the body an inner_radius");
+    t.lembert.outer = rim[0].outer;
+    t.lembert.inner = rim[1].outer;
+    t.lembert.gap = spec.closed_gap;
+    t.lembert.compliance = spec.closure_compliance;
+    t.lembert.throws = spec.throws;
+  } else if (spec.name != "none") {
+    throw InputError(where, "technique.name \"" + spec.name + "\" is not known",
+                     "use purse_string, connell, stay, lembert or none");
+  }
+  return t;
 }
 
 RigidModel tool_body() {
@@ -118,6 +160,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   std::vector<Vec3> rest;
   std::vector<float> mass, radius, apart;
   std::vector<uint32_t> body;
+  std::vector<Rim> working_rim;  // per wall
   std::vector<std::vector<uint32_t>> cluster;
   std::vector<Tet> tet;
   std::vector<Triangle> surface;
@@ -137,7 +180,10 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
       s.inv_mass.push_back(r.pinned[i] ? 0.0f : 1.0f / (r.mass[i] * scene.solver.mass_scale));
       radius.push_back(r.radius);
       apart.push_back(static_cast<float>(2.2 * spacing));
-      body.push_back(static_cast<uint32_t>(b));
+      const size_t wall_here = working_rim.size() + (r.wall.empty() ? 0 : r.wall[i]);
+      body.push_back(static_cast<uint32_t>(wall_here));  // two layers of one body meet as two bodies do
+      m.wall.push_back(static_cast<uint8_t>(wall_here));
+      m.layer.push_back(static_cast<uint8_t>(r.layer[i]));
     }
     for (auto& c : r.cluster) {
       for (uint32_t& i : c) i += first;
@@ -145,12 +191,12 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
     }
     for (Tet t : r.tet) tet.push_back({t[0] + first, t[1] + first, t[2] + first, t[3] + first});
     for (Triangle t : r.surface) surface.push_back({t[0] + first, t[1] + first, t[2] + first});
-    for (const Rim& rim : r.rim) {
-      std::vector<uint32_t> outer = rim.outer, inner = rim.inner;
-      for (uint32_t& i : outer) i += first;
-      for (uint32_t& i : inner) i += first;
-      if (m.purse_string.rim_outer.empty()) m.purse_string.rim_outer = outer, m.purse_string.rim_inner = inner;
-      m.picture.rim.push_back(outer);
+    for (size_t w = 0; w < static_cast<size_t>(r.walls); ++w) {
+      Rim rim = w < r.rim.size() ? r.rim[w] : Rim{};
+      for (uint32_t& i : rim.outer) i += first;
+      for (uint32_t& i : rim.inner) i += first;
+      m.picture.rim.push_back(rim.outer);
+      working_rim.push_back(std::move(rim));
     }
     for (auto& k : r.visible.skin_particle)
       for (uint32_t& i : k) i += first;
@@ -204,16 +250,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   u.collision_off = scene.suture.collision_off;
   u.grasp_reach = scene.suture.grasp_reach;
 
-  m.has_technique = scene.technique.name == "purse_string";
-  if (!m.has_technique && scene.technique.name != "none")
-    throw InputError(where, "technique.name \"" + scene.technique.name + "\" is not known", "use \"purse_string\" or \"none\"");
-  if (m.has_technique && m.purse_string.rim_inner.empty())
-    throw InputError(where, "a purse-string needs an opening and no body has one", "leave one end of the body open");
-  m.purse_string.anvil = scene.technique.anvil;
-  m.purse_string.anvil_radius = scene.technique.anvil_radius;
-  m.purse_string.compliance = scene.technique.closure_compliance;
-  m.purse_string.min_bites = scene.technique.min_bites;
-  m.purse_string.wall = wall;
+  m.technique = make_technique(scene, working_rim, wall, where);
 
   // The needle lies on the drape to the right of the organ, its circle flat, the thread leading away from its swage.
   m.start = rest;
@@ -229,6 +266,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   PictureModel& p = m.picture;
   p.title = scene.title;
   p.particle_rest = rest;
+  p.wall = m.wall;
   p.thread_first = s.tissue;
   p.thread_count = t.count;
   p.thread_radius = t.radius;
@@ -265,7 +303,8 @@ StatePtr initial_state(const Model& model) {
   needle.x = needle.prev_x = model.needle_start.p;
   needle.q = needle.prev_q = model.needle_start.q;
   // The thread's last particle is the needle's: swaged on.
-  s.solver.thread.hold.push_back({s.solver.thread.order.back(), static_cast<int>(kNeedle), model.solver.needle_arc.point(0)});
+  s.solver.thread.hold.push_back(
+      {s.solver.thread.order.back(), static_cast<int>(kNeedle), model.solver.needle_arc.point(0), HoldKind::swage});
   update_thread_collisions(model.solver, s.solver, model.suture);
   return state;
 }

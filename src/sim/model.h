@@ -7,7 +7,7 @@
 #include "sim/simulation.h"
 #include "solver/substep.h"
 #include "suture/suture.h"
-#include "technique/purse_string.h"
+#include "technique/technique.h"
 
 namespace catgut {
 
@@ -15,9 +15,10 @@ struct Model {
   SceneSpec scene;
   SolverModel solver;
   SutureModel suture;
-  PurseStringModel purse_string;
-  bool has_technique = false;
-  float dt = 1.0f / 60;  // [s] tick
+  TechniqueModel technique;
+  std::vector<uint8_t> wall;   // per tissue particle: which bowel end, or which layer, it belongs to
+  std::vector<uint8_t> layer;  // per tissue particle: TissueLayer, serosa outside, mucosa inside
+  float dt = 1.0f / 60;        // [s] tick
   int substeps = 8;
   std::vector<Vec3> start;                                               // [m] of every particle
   std::vector<Pose> tool_start;                                          // of the two tools

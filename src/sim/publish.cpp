@@ -6,6 +6,42 @@
 
 namespace catgut {
 
+namespace {
+
+void publish_knots(const Model& model, const State& state, Snapshot& out) {
+  const SolverState& s = state.solver;
+  const Vec4* x = s.x.data();
+  out.knot.clear();
+  for (const Knot& k : state.suture.knot) {
+    KnotView v;
+    v.phase = k.phase;
+    v.position = position_of(k.target, x);
+    for (const ThreadAnchor& a : s.thread.anchor)
+      if (a.knotted && a.slot == k.slot[0]) v.position = position_of(a, x);
+    v.throws = k.throws;
+    v.thrown = k.thrown;
+    if (state.suture.point.size() > 1)
+      v.way = normalized(position_of(s.thread.anchor[state.suture.point.back().anchor], x) -
+                             position_of(s.thread.anchor[state.suture.point.front().anchor], x),
+                         {1, 0, 0});
+    out.knot.push_back(v);
+  }
+  out.settled.clear();
+  const auto place = [&](const SettledNode& n) {
+    const uint32_t c = model.solver.shape.cluster_of[n.particle];
+    const Quat q{s.rotation.x[c], s.rotation.y[c], s.rotation.z[c], s.rotation.w[c]};
+    return xyz(x[n.particle]) + rotate(q, n.offset);
+  };
+  for (const SettledStitch& stitch : state.suture.settled) {
+    SettledView v;
+    for (const SettledNode& n : stitch.node) v.node.push_back(place(n));
+    for (const SettledNode& n : stitch.knot) v.knot.push_back(place(n));
+    out.settled.push_back(std::move(v));
+  }
+}
+
+}  // namespace
+
 PictureModel picture_model(const Model& model) { return model.picture; }
 
 void publish(const Model& model, const State& state, Snapshot& out) {
@@ -32,6 +68,11 @@ void publish(const Model& model, const State& state, Snapshot& out) {
     t.held = hand.held;
     t.held_at = hand.at;
     t.held_slot = hand.slot;
+    const ToolLoop& loop = state.suture.loop[k];
+    t.loop_wraps = loop.wraps;
+    t.loop_handed = loop.handed;
+    t.loop_first = loop.first;
+    t.loop_last = loop.last;
     // The weld's multiplier acts on the tool; the hand feels its opposite.
     t.force = s.weld[k].lambda * -inv_h2;
     t.torque = s.weld[k].angular_lambda * -inv_h2;
@@ -43,13 +84,26 @@ void publish(const Model& model, const State& state, Snapshot& out) {
   out.suture_point.clear();
   for (const SuturePoint& p : state.suture.point) {
     const ThreadAnchor& a = s.thread.anchor[p.anchor];
-    out.suture_point.push_back({position_of(a.point, s.x.data()), p.bite, p.exit, a.slot, a.tension_needle, a.tension_free});
+    const Bite& bite = state.suture.bite[p.bite];
+    out.suture_point.push_back({position_of(a.point, s.x.data()), p.bite, p.exit, a.slot, a.tension_needle, a.tension_free,
+                                model.wall[m.collision.surface[(p.exit ? bite.exit : bite.entry).triangle][0]]});
   }
+  out.thread_cut = s.thread.cut;
+  out.needle_on_thread =
+      std::any_of(s.thread.hold.begin(), s.thread.hold.end(), [](const ThreadHold& h) { return h.kind == HoldKind::swage; });
+  publish_knots(model, state, out);
+  out.seam.clear();
+  for (const ClosurePlan::Pair& p : state.plan.pair)
+    out.seam.push_back({position_of(p.a, s.x.data()), position_of(p.b, s.x.data()), p.start, p.progress, p.midpoint != 0});
   out.bite.clear();
-  for (const Bite& b : state.suture.bite)
-    out.bite.push_back(
-        {position_of(b.entry.point, s.x.data()), position_of(b.exit.point, s.x.data()), b.depth, b.has_exit, b.complete});
-  out.opening_area = model.purse_string.rim_inner.empty() ? 0 : opening_area(model.purse_string.rim_inner, s.x.data());
+  for (const Bite& b : state.suture.bite) {
+    const uint32_t in = m.collision.surface[b.entry.triangle][0], through = m.collision.surface[b.exit.triangle][0];
+    const auto inside = [&](uint32_t i) { return model.layer[i] == static_cast<uint8_t>(TissueLayer::mucosa); };
+    out.bite.push_back({position_of(b.entry.point, s.x.data()), position_of(b.exit.point, s.x.data()), b.depth, b.has_exit,
+                        b.complete, model.wall[in], inside(in), inside(through)});
+  }
+  const std::vector<uint32_t>& rim = model.technique.purse_string.rim_inner;
+  out.opening_area = rim.empty() ? 0 : opening_area(rim, s.x.data());
   out.closure = state.plan.progress;
   out.event = state.event;
 }

@@ -15,23 +15,26 @@ namespace {
 
 // Structs made of four-byte members only: no padding, so their bytes are their value.
 template <typename T>
-constexpr bool kPlain =
-    std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> ||
-    std::is_same_v<T, Quat> || std::is_same_v<T, Pose> || std::is_same_v<T, TissuePoint> || std::is_same_v<T, BiteEnd> ||
-    std::is_same_v<T, Weld> || std::is_same_v<T, Attachment> || std::is_same_v<T, ChannelPoint> ||
-    std::is_same_v<T, RigidBody> || std::is_same_v<T, ThreadHold> || std::is_same_v<T, ClosurePlan::Pull>;
+constexpr bool kPlain = std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4> ||
+                        std::is_same_v<T, Quat> || std::is_same_v<T, Pose> || std::is_same_v<T, TissuePoint> ||
+                        std::is_same_v<T, BiteEnd> || std::is_same_v<T, Weld> || std::is_same_v<T, Attachment> ||
+                        std::is_same_v<T, ChannelPoint> || std::is_same_v<T, RigidBody> || std::is_same_v<T, ThreadHold> ||
+                        std::is_same_v<T, ClosurePlan::Pull> || std::is_same_v<T, ClosurePlan::Pair> ||
+                        std::is_same_v<T, TissuePin> || std::is_same_v<T, SettledNode> || std::is_same_v<T, KnotThrow>;
 static_assert(sizeof(Weld) % 4 == 0 && sizeof(Weld) == 4 * (2 + 3 * 7 + 2 + 6));
 static_assert(sizeof(TissuePoint) == 4 * (1 + 16 + 16));
 static_assert(sizeof(Attachment) == sizeof(TissuePoint) + 4 * (1 + 3 + 1 + 3));
 static_assert(sizeof(ChannelPoint) == sizeof(TissuePoint) + 4 * (3 + 3 + 1));
 static_assert(sizeof(RigidBody) == 4 * (3 + 4 + 3 + 3 + 3 + 4));
-static_assert(sizeof(ThreadHold) == 4 * 5 && sizeof(BiteEnd) == sizeof(TissuePoint) + 4 * 4 &&
+static_assert(sizeof(TissuePin) == 2 * sizeof(TissuePoint) + 4 * 4 && sizeof(SettledNode) == 4 * 4 &&
+              sizeof(KnotThrow) == 4 * 5 && sizeof(ClosurePlan::Pair) == 2 * sizeof(TissuePoint) + 4 * 4);
+static_assert(sizeof(ThreadHold) == 4 * 6 && sizeof(BiteEnd) == sizeof(TissuePoint) + 4 * 4 &&
               sizeof(ClosurePlan::Pull) == sizeof(TissuePoint) + 4 * 6);
 
 template <typename A>
 void fields(A& a, ThreadAnchor& t) {
-  a(t.slot), a(t.point), a(t.friction), a(t.capstan), a(t.slipping), a(t.blocked_needle), a(t.blocked_free),
-      a(t.tension_needle), a(t.tension_free);
+  a(t.slot), a(t.point), a(t.offset), a(t.knotted), a(t.friction), a(t.capstan), a(t.slipping), a(t.blocked_needle),
+      a(t.blocked_free), a(t.tension_needle), a(t.tension_free);
 }
 template <typename A>
 void fields(A& a, Bite& b) {
@@ -46,19 +49,37 @@ void fields(A& a, HandState& h) {
   a(h.held), a(h.slot), a(h.at), a(h.jaw);
 }
 template <typename A>
+void fields(A& a, ToolLoop& l) {
+  a(l.wraps), a(l.handed), a(l.first), a(l.last), a(l.told);
+}
+template <typename A>
+void fields(A& a, Knot& k) {
+  a(k.phase), a(k.hand), a(k.begun), a(k.target), a(k.from), a(k.hand_from), a(k.strand), a(k.slot[0]), a(k.slot[1]),
+      a(k.slots), a(k.throws);
+  for (KnotThrow& t : k.thrown) a(t);
+}
+template <typename A>
+void fields(A& a, SettledStitch& s) {
+  a(s.node), a(s.knot);
+}
+template <typename A>
 void fields(A& a, State& s) {
   a(s.tick);
   a(s.solver.x), a(s.solver.v);
   a(s.solver.rotation.x), a(s.solver.rotation.y), a(s.solver.rotation.z), a(s.solver.rotation.w);
   a(s.solver.body);
   a(s.solver.thread.order), a(s.solver.thread.rest), a(s.solver.thread.anchor), a(s.solver.thread.hold),
-      a(s.solver.thread.tension);
-  a(s.solver.weld), a(s.solver.attach), a(s.solver.channel), a(s.solver.thread_collides), a(s.solver.body_collides);
+      a(s.solver.thread.tension), a(s.solver.thread.cut);
+  a(s.solver.weld), a(s.solver.attach), a(s.solver.pin), a(s.solver.channel), a(s.solver.thread_collides),
+      a(s.solver.body_collides);
   a(s.suture.bite), a(s.suture.point), a(s.suture.phase), a(s.suture.current), a(s.suture.tip_inside), a(s.suture.attached);
   a(s.suture.attached_from), a(s.suture.hand[0]), a(s.suture.hand[1]);
-  a(s.purse_string.ring_complete), a(s.purse_string.closing), a(s.purse_string.finished), a(s.purse_string.path_start);
-  a(s.purse_string.path_end), a(s.purse_string.checked), a(s.purse_string.area_start);
-  a(s.plan.pull), a(s.plan.progress), a(s.plan.compliance);
+  for (ToolLoop& l : s.suture.loop) a(l);
+  a(s.suture.knot), a(s.suture.settled), a(s.suture.buttons[0]), a(s.suture.buttons[1]), a(s.suture.taken);
+  PurseStringState& p = s.technique.purse_string;
+  a(p.ring_complete), a(p.closing), a(p.finished), a(p.path_start), a(p.path_end), a(p.checked), a(p.area_start);
+  a(s.technique.seam.checked), a(s.technique.lembert.angle), a(s.technique.lembert.checked);
+  a(s.plan.pull), a(s.plan.progress), a(s.plan.compliance), a(s.plan.pair);
   a(s.hand[0]), a(s.hand[1]), a(s.hand_known[0]), a(s.hand_known[1]);
 }
 
@@ -128,8 +149,8 @@ bool fits(const Model& model, const State& s, const State& fresh) {
       a.rotation.x.size() != b.rotation.x.size() || a.rotation.y.size() != b.rotation.y.size() ||
       a.rotation.z.size() != b.rotation.z.size() || a.rotation.w.size() != b.rotation.w.size() ||
       a.thread.order.size() != b.thread.order.size() || a.thread.rest.size() != b.thread.rest.size() ||
-      a.thread.tension.size() != b.thread.tension.size() || a.thread_collides.size() != b.thread_collides.size() ||
-      a.body_collides.size() != b.body_collides.size())
+      a.thread.tension.size() != b.thread.tension.size() || a.thread.cut.size() != b.thread.cut.size() ||
+      a.thread_collides.size() != b.thread_collides.size() || a.body_collides.size() != b.body_collides.size())
     return false;
   // Every thread particle once.
   const uint32_t first = m.thread.first_slot, count = m.thread.count;
@@ -154,7 +175,9 @@ bool fits(const Model& model, const State& s, const State& fresh) {
     if (i == 0 || i + 1 == count) return false;
   }
   for (const ThreadHold& h : a.thread.hold)
-    if (h.slot - first >= count || h.body < 0 || h.body >= bodies) return false;
+    if (h.slot - first >= count || h.body < 0 || h.body >= bodies || h.kind > HoldKind::loop) return false;
+  for (const TissuePin& p : a.pin)
+    if (!point_ok(p.a) || !point_ok(p.b) || p.owner > PinOwner::stitch) return false;
   if (a.weld.size() < 2) return false;
   for (size_t k = 0; k < a.weld.size(); ++k) {  // the first two hold the tools to their hands
     const Weld& w = a.weld[k];
@@ -177,10 +200,29 @@ bool fits(const Model& model, const State& s, const State& fresh) {
   if ((u.phase == NeedlePhase::through && a.channel.empty()) || (u.attached && !tip_attached)) return false;
   if (u.attached && u.phase != NeedlePhase::tip_in) return false;
   for (const HandState& h : u.hand)
-    if (h.held > Held::thread || (h.held == Held::thread && h.slot - first >= count)) return false;
+    if (h.held > Held::tissue || (h.held == Held::thread && h.slot - first >= count) ||
+        (h.held == Held::tissue && h.slot >= m.tissue))
+      return false;
+  for (const ToolLoop& l : u.loop)
+    if (l.told >= LoopReason::count_ || (l.wraps > 0 && (l.first - first >= count || l.last - first >= count))) return false;
+  for (const Knot& k : u.knot) {
+    if (k.phase > KnotPhase::locked || k.hand > 1 || !point_ok(k.target) || k.throws > k.thrown.size() || k.slots > 2)
+      return false;
+    for (uint32_t i = 0; i < k.slots; ++i)
+      if (k.slot[i] - first >= count) return false;
+    if (k.strand - first >= count) return false;
+  }
+  for (const SettledStitch& stitch : u.settled) {
+    for (const SettledNode& n : stitch.node)
+      if (n.particle >= m.tissue) return false;
+    for (const SettledNode& n : stitch.knot)
+      if (n.particle >= m.tissue) return false;
+  }
+  for (const ClosurePlan::Pair& p : s.plan.pair)
+    if (!point_ok(p.a) || !point_ok(p.b)) return false;
   for (const ClosurePlan::Pull& p : s.plan.pull)
     if (!point_ok(p.point)) return false;
-  return s.purse_string.checked <= u.point.size();
+  return s.technique.purse_string.checked <= u.point.size();
 }
 
 }  // namespace

@@ -27,6 +27,7 @@ struct BodySpec {
   Vec3 axis{0, 1, 0};            // the way the near end faces
   float density = 1050;          // [kg/m^3]
   float pinned_length = 0.035f;  // [m] of the far end that the surroundings hold
+  float inner_radius = 0;        // [m] outer radius of a second tube inside the first (a bowel folded into itself); 0: none
 };
 
 struct ThreadSpec {
@@ -83,11 +84,14 @@ struct SutureSpec {
 
 // The technique's plan.
 struct TechniqueSpec {
-  std::string name = "purse_string";   // or "none"
+  std::string name = "purse_string";   // or connell, stay, lembert, none
   Vec3 anvil;                          // [m] focal point of the closure, relative to the rim's centre
   float anvil_radius = 0.004f;         // [m] the rim ends on a ring of this radius
   float closure_compliance = 0.0001f;  // [m/N] of the pull of the edge particles toward it
   int min_bites = 10;
+  float closed_gap = 0.0005f;  // [m] left between two points that a seam or a knot draws together
+  float step = 0.003f;         // [m] between the pairs that a seam draws together in between (dist_threshold of 2.5.2)
+  int throws = 2;              // with fewer a knot does not hold
 };
 
 // The scripted surgeon.

@@ -7,7 +7,7 @@
 #include "exchange/tool_input.h"
 #include "solver/substep.h"
 #include "suture/suture.h"
-#include "technique/purse_string.h"
+#include "technique/technique.h"
 
 namespace catgut {
 
@@ -15,12 +15,14 @@ struct State {
   uint64_t tick = 0;
   SolverState solver;                   // written by solver/substep, suture/*
   SutureState suture;                   // written by suture/{grasp, puncture, pull}
-  PurseStringState purse_string;        // written by technique/purse_string
-  ClosurePlan plan;                     // written by technique/purse_string, read by suture/closure
+  TechniqueState technique;             // written by technique
+  ClosurePlan plan;                     // written by technique, read by suture/closure
   std::array<Pose, 2> hand;             // where the hands were at the end of the last tick; written by sim/step
   std::array<uint8_t, 2> hand_known{};  // 0 until a hand has first been connected
   // Not saved: events of this tick, working memory.
   std::vector<Event> event;
+  std::vector<StitchPoint> stitch;
+  std::vector<float> stitch_span;
   SolverScratch scratch;
 };
 

@@ -31,6 +31,36 @@ void meet_hands(State& state, const TickInput& input) {
   }
 }
 
+// What the technique may see of the tick.
+TechniqueView look(const Model& model, State& state) {
+  const Thread& thread = state.solver.thread;
+  state.stitch.clear();
+  for (const SuturePoint& p : state.suture.point) {
+    StitchPoint s;
+    const BiteEnd& end = p.exit ? state.suture.bite[p.bite].exit : state.suture.bite[p.bite].entry;
+    s.point = thread.anchor[p.anchor].point;
+    s.at = position_of(s.point, state.solver.x.data());
+    s.bite = p.bite;
+    s.exit = p.exit;
+    const uint32_t corner = model.solver.collision.surface[end.triangle][0];
+    s.wall = model.wall[corner];
+    s.inside = model.layer[corner] == static_cast<uint8_t>(TissueLayer::mucosa);
+    state.stitch.push_back(s);
+  }
+  spans(state.solver, state.suture, state.stitch_span);
+  for (size_t k = 0; k < state.stitch.size(); ++k) state.stitch[k].span = state.stitch_span[k];
+  TechniqueView view;
+  view.point = state.stitch;
+  view.bite = state.suture.bite;
+  view.knot = state.suture.knot;
+  view.x = state.solver.x.data();
+  view.loop = length_between_ends(state.solver, state.suture);
+  view.needle_in_tissue = state.suture.phase != NeedlePhase::outside;
+  view.taken = state.suture.taken;
+  view.dt = model.dt;
+  return view;
+}
+
 }  // namespace
 
 void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times) {
@@ -52,16 +82,9 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
       pull(solver, state.solver, model.suture, state.suture, state.event);
     }
   }
-  if (model.has_technique) {
+  {
     StageTimer timer(times, Stage::closure);
-    std::vector<Vec3> where;
-    std::vector<TissuePoint> point;
-    for (const SuturePoint& p : state.suture.point) {
-      point.push_back(state.solver.thread.anchor[p.anchor].point);
-      where.push_back(position_of(point.back(), state.solver.x.data()));
-    }
-    purse_string(model.purse_string, state.purse_string, where, point, state.solver.x.data(), length_between_ends(state.solver),
-                 model.dt, state.plan, state.event);
+    technique(model.technique, state.technique, look(model, state), state.plan, state.event);
     close(state.solver, state.plan);
   }
   for (size_t k = 0; k < 2; ++k)

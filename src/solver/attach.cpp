@@ -55,6 +55,19 @@ void solve_attachment(Attachment& a, Vec4* x, const float* w, const std::vector<
   push(m, b, -d, r);
 }
 
+void solve_pin(TissuePin& pin, Vec4* x, const float* w, float h) {
+  const Vec3 d = position_of(pin.a, x) - position_of(pin.b, x);
+  const float l = length(d);
+  if (l <= pin.length && pin.lambda >= 0) return;
+  const Vec3 n = l > 1e-9f ? d / l : Vec3{0, 1, 0};
+  const float alpha = pin.compliance / (h * h), wsum = inverse_mass_of(pin.a, w) + inverse_mass_of(pin.b, w);
+  if (wsum + alpha <= 0) return;
+  const float step = std::min(-(l - pin.length + alpha * pin.lambda) / (wsum + alpha), -pin.lambda);
+  pin.lambda += step;
+  push(pin.a, x, w, n * step);
+  push(pin.b, x, w, n * -step);
+}
+
 void solve_channel(ChannelPoint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model, RigidBody& needle,
                    float h) {
   const Vec3 p = position_of(c.point, x);

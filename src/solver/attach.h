@@ -54,6 +54,17 @@ struct Attachment {
   Vec3 lambda;           // [N s^2] cleared at the start of a substep; acts on the tissue
 };
 
+enum class PinOwner : uint32_t { plan, stitch };  // who made it: a technique's closure plan, or a settled stitch
+
+// Two points of tissue that thread holds together: never further apart than `length`. A rope: it does not push.
+struct TissuePin {
+  TissuePoint a, b;
+  float length = 0;      // [m]
+  float compliance = 0;  // [m/N]
+  float lambda = 0;      // [N s^2] cleared at the start of a substep; negative: it pulls
+  PinOwner owner = PinOwner::plan;
+};
+
 // The shaft of the needle in its channel: the tissue point lies on the arc of the needle (particle-line attachment). It slides
 // along the arc against a Coulomb-like drag and is held sideways by `compliance`.
 struct ChannelPoint {
@@ -77,6 +88,7 @@ struct NeedleArc {
 
 void solve_attachment(Attachment& a, Vec4* x, const float* w, const std::vector<RigidModel>& model,
                       std::vector<RigidBody>& body, float h);
+void solve_pin(TissuePin& pin, Vec4* x, const float* w, float h);
 void solve_channel(ChannelPoint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model, RigidBody& needle,
                    float h);
 

@@ -19,6 +19,7 @@ constexpr float kTopSpeed = 5.0f;  // [m/s] of a particle; a hand cannot throw t
 void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   for (Weld& w : state.weld) w.lambda = w.angular_lambda = {};
   for (Attachment& a : state.attach) a.lambda = {};
+  for (TissuePin& p : state.pin) p.lambda = 0;
   for (ChannelPoint& c : state.channel) c.lambda = {}, c.drag_lambda = 0;
   std::fill(scratch.volume_lambda.begin(), scratch.volume_lambda.end(), 0.0f);
   std::fill(scratch.shape.moved.begin(), scratch.shape.moved.end(), Vec4{});
@@ -82,6 +83,7 @@ SolverState make_solver_state(const SolverModel& model, std::span<const Vec3> po
   for (uint32_t i = 0; i < model.thread.count; ++i) s.thread.order.push_back(model.thread.first_slot + i);
   s.thread.rest.assign(model.thread.count > 0 ? model.thread.count - 1 : 0, model.thread.spacing);
   s.thread.tension.assign(s.thread.rest.size(), 0.0f);
+  s.thread.cut.assign(s.thread.rest.size(), 0);
   return s;
 }
 
@@ -159,6 +161,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   {
     StageTimer timer(times, Stage::attach);
     for (Attachment& a : s.attach) solve_attachment(a, x, w, m.body, s.body, h);
+    for (TissuePin& p : s.pin) solve_pin(p, x, w, h);
   }
   {
     // Few but stiff and pulling against each other (hand, grasp, channel): they get sweeps of their own.

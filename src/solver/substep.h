@@ -47,7 +47,8 @@ struct SolverState {
   std::vector<RigidBody> body;
   Thread thread;
   std::vector<Weld> weld;                // tool to hand, needle to tool
-  std::vector<Attachment> attach;        // tissue to needle tip, tissue to its closing target
+  std::vector<Attachment> attach;        // tissue to needle tip, to a jaw, to its closing target
+  std::vector<TissuePin> pin;            // tissue to tissue: seams, settled stitches
   std::vector<ChannelPoint> channel;     // needle in its channel
   std::vector<uint8_t> thread_collides;  // per thread slot (relative)
   std::vector<uint8_t> body_collides;    // per body

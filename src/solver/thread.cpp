@@ -55,10 +55,11 @@ float assemble(const Thread& t, ThreadScratch& s, size_t nodes, float alpha_per_
     s.n[i] = l > 1e-12f ? d / l : Vec3{0, 1, 0};
     const float alpha = alpha_per_metre * t.rest[i];
     const float residual = -(l - t.rest[i]) - alpha * s.lambda[i];
-    worst = std::max(worst, std::abs(residual));
+    if (!t.cut[i]) worst = std::max(worst, std::abs(residual));
     s.base_rhs[i] = residual;
     s.base_diag[i] = alpha;
     s.base_off[i] = 0;
+    if (t.cut[i]) s.base_rhs[i] = 0;
   }
   for (size_t i = 0; i < nodes; ++i) {
     s.sideways[i] = 1;
@@ -86,7 +87,7 @@ float assemble(const Thread& t, ThreadScratch& s, size_t nodes, float alpha_per_
     }
     if (i > 0) s.base_diag[i - 1] += double{before} * (1 + kRegularisation);
     if (i < pairs) s.base_diag[i] += double{after} * (1 + kRegularisation);
-    if (i > 0 && i < pairs) s.base_off[i - 1] = -across;
+    if (i > 0 && i < pairs) s.base_off[i - 1] = t.cut[i - 1] || t.cut[i] ? 0.0 : -across;
   }
   return worst;
 }
@@ -106,7 +107,7 @@ void stiffen_prediction(const ThreadModel& model, const Thread& t, ThreadScratch
   const Vec3 fall = model.gravity * h2;
   bool taut = false;
   for (size_t i = 0; i < pairs; ++i) {
-    s.stiff[i] = std::max(0.0f, t.tension[i]) * h2 * model.inv_mass / std::max(t.rest[i], 0.1f * model.spacing);
+    s.stiff[i] = t.cut[i] ? 0 : std::max(0.0f, t.tension[i]) * h2 * model.inv_mass / std::max(t.rest[i], 0.1f * model.spacing);
     taut = taut || s.stiff[i] > 1e-3f;
   }
   if (!taut) return;
@@ -210,9 +211,9 @@ void solve_with_slides(const ThreadModel& model, const Thread& thread, ThreadScr
 void push_node(ThreadScratch& s, const Thread& t, size_t i, Vec3 p, Vec4* x, const float* inv_mass,
                const std::vector<RigidModel>& model, std::vector<RigidBody>& body) {
   if (s.anchor_at[i] >= 0) {
-    const TissuePoint& point = t.anchor[static_cast<size_t>(s.anchor_at[i])].point;
-    push(point, x, inv_mass, p);
-    s.p[i] = position_of(point, x);
+    const ThreadAnchor& anchor = t.anchor[static_cast<size_t>(s.anchor_at[i])];
+    push(anchor.point, x, inv_mass, p);
+    s.p[i] = position_of(anchor, x);
   } else if (s.hold_at[i] >= 0) {
     const ThreadHold& hold = t.hold[static_cast<size_t>(s.hold_at[i])];
     RigidBody& b = body[static_cast<size_t>(hold.body)];
@@ -252,7 +253,7 @@ void ThreadScratch::resize(uint32_t count) {
 Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vector<RigidBody>& body) {
   const uint32_t slot = t.order[node];
   for (const ThreadAnchor& a : t.anchor)
-    if (a.slot == slot) return position_of(a.point, x);
+    if (a.slot == slot) return position_of(a, x);
   for (const ThreadHold& hold : t.hold)
     if (hold.slot == slot) return transform(body[static_cast<size_t>(hold.body)].pose(), hold.local);
   return xyz(x[slot]);
@@ -261,7 +262,7 @@ Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vec
 float thread_length(const Thread& t, const Vec4* x, const std::vector<RigidBody>& body) {
   float sum = 0;
   for (size_t i = 0; i + 1 < t.order.size(); ++i)
-    sum += distance(thread_position(t, i, x, body), thread_position(t, i + 1, x, body));
+    if (!t.cut[i]) sum += distance(thread_position(t, i, x, body), thread_position(t, i + 1, x, body));
   return sum;
 }
 
@@ -309,7 +310,7 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
   for (size_t k = 0; k < thread.anchor.size(); ++k) {
     const size_t i = node_of(thread.anchor[k].slot);
     s.anchor_at[i] = static_cast<int32_t>(k);
-    s.p[i] = position_of(thread.anchor[k].point, x);
+    s.p[i] = position_of(thread.anchor[k], x);
     s.w[i] = inverse_mass_of(thread.anchor[k].point, inv_mass);
     s.bend_w[i] = 0;  // locked nodes do not give way to bending: tissue and tools are far heavier than the thread
   }
@@ -384,6 +385,7 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
 
   for (int sweep = 0; sweep < model.distance_sweeps; ++sweep)
     for (size_t i = 0; i < pairs; ++i) {
+      if (thread.cut[i]) continue;
       const Vec3 d = s.p[i + 1] - s.p[i];
       const float l2 = length2(d), rest = thread.rest[i], alpha = alpha_per_metre * rest, compliant = alpha * s.lambda[i];
       // Right to a tenth of a micrometre, as the direct solve leaves most pairs: spare the root and the division.
@@ -413,7 +415,7 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
       const float difference = a.tension_needle - a.tension_free;
       const float threshold = a.threshold();
       const int wants = difference > threshold ? 1 : difference < -threshold ? -1 : 0;
-      const bool may = (wants > 0 && !a.blocked_needle) || (wants < 0 && !a.blocked_free);
+      const bool may = !a.knotted && ((wants > 0 && !a.blocked_needle) || (wants < 0 && !a.blocked_free));
       if (a.slipping == 0) a.slipping = may ? wants : 0;
       // While it slips the difference sits at the friction; it sticks again when the pull falls clearly below that.
       else if (static_cast<float>(a.slipping) * difference < 0.5f * threshold) a.slipping = 0;

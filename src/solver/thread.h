@@ -37,6 +37,8 @@ struct ThreadModel {
 struct ThreadAnchor {
   uint32_t slot = 0;
   TissuePoint point;
+  Vec3 offset;                  // [m] world, from that point: a knot on its way to the tissue, else zero
+  bool knotted = false;         // a knot's: the thread never slides here
   float friction = 0;           // [N] tension difference beyond which thread slides, at no tension
   float capstan = 0;            // and so much more per newton of tension: coefficient of friction times the angle it bends by
   int slipping = 0;             // +1: toward the needle, -1: toward the free end, 0: stuck
@@ -46,15 +48,21 @@ struct ThreadAnchor {
   float threshold() const { return friction + capstan * std::max(0.0f, std::min(tension_needle, tension_free)); }
 };
 
+enum class HoldKind : uint32_t { swage, jaw, loop };  // the needle's own end, a closed jaw, a loop frozen round a tool
+
 struct ThreadHold {
   uint32_t slot = 0;
   int body = 0;
   Vec3 local;  // [m] body frame
+  HoldKind kind = HoldKind::jaw;
 };
+
+inline Vec3 position_of(const ThreadAnchor& a, const Vec4* x) { return position_of(a.point, x) + a.offset; }
 
 struct Thread {
   std::vector<uint32_t> order;       // slots, free end first
   std::vector<float> rest;           // [m] per pair (order[i], order[i + 1])
+  std::vector<uint8_t> cut;          // per pair: 1 where the thread was cut through; nothing acts across
   std::vector<ThreadAnchor> anchor;  // in the order in which they were made
   std::vector<ThreadHold> hold;
   std::vector<float> tension;  // [N] per pair, of the last substep; negative: compressed

@@ -15,7 +15,7 @@ void let_go(SolverState& solver, HandState& hand, uint8_t who, float force, std:
     std::erase_if(solver.weld, [&](const Weld& w) { return w.a == static_cast<int>(kNeedle) && w.b == body; });
     events.push_back({0, EventKind::needle_released, who, 0, force, solver.body[static_cast<size_t>(body)].x});
   } else if (hand.held == Held::thread) {
-    std::erase_if(solver.thread.hold, [&](const ThreadHold& h) { return h.body == body; });
+    std::erase_if(solver.thread.hold, [&](const ThreadHold& h) { return h.body == body && h.kind == HoldKind::jaw; });
     events.push_back({0, EventKind::thread_released, who, hand.slot, force, solver.body[static_cast<size_t>(body)].x});
   }
   hand.held = Held::nothing;
@@ -67,7 +67,7 @@ void grasp(const SolverModel& model, SolverState& solver, const SutureModel& sut
     if (found >= 0) {
       hand.held = Held::thread;
       hand.slot = static_cast<uint32_t>(found);
-      solver.thread.hold.push_back({hand.slot, who, to_local(tool.pose(), xyz(solver.x[hand.slot]))});
+      solver.thread.hold.push_back({hand.slot, who, to_local(tool.pose(), xyz(solver.x[hand.slot])), HoldKind::jaw});
       update_thread_collisions(model, solver, suture);
       events.push_back({0, EventKind::thread_grasped, who, hand.slot, 0, tool.x});
     }

@@ -27,6 +27,7 @@ size_t node_of(const Thread& t, uint32_t slot) {
 void move_particle(Thread& t, size_t from, size_t after) {
   // Figure 8: the two pairs at the old place become one, the pair at the new place becomes two.
   if (from == after + 1) return;
+  CATGUT_CHECK(!t.cut[from - 1] && !t.cut[from] && !t.cut[after]);
   const uint32_t slot = t.order[from];
   const float joined = t.rest[from - 1] + t.rest[from];
   const float half = 0.5f * t.rest[after];
@@ -36,6 +37,9 @@ void move_particle(Thread& t, size_t from, size_t after) {
     std::move(t.rest.begin() + static_cast<long>(from) + 1, t.rest.begin() + static_cast<long>(after),
               t.rest.begin() + static_cast<long>(from));
     t.rest[after - 1] = t.rest[after] = half;
+    std::move(t.cut.begin() + static_cast<long>(from) + 1, t.cut.begin() + static_cast<long>(after),
+              t.cut.begin() + static_cast<long>(from));
+    t.cut[after - 1] = 0;
     std::move(t.order.begin() + static_cast<long>(from) + 1, t.order.begin() + static_cast<long>(after) + 1,
               t.order.begin() + static_cast<long>(from));
     t.order[after] = slot;
@@ -45,6 +49,9 @@ void move_particle(Thread& t, size_t from, size_t after) {
     std::move_backward(t.rest.begin() + static_cast<long>(after) + 1, t.rest.begin() + static_cast<long>(from) - 1,
                        t.rest.begin() + static_cast<long>(from));
     t.rest[after] = t.rest[after + 1] = half;
+    std::move_backward(t.cut.begin() + static_cast<long>(after) + 1, t.cut.begin() + static_cast<long>(from) - 1,
+                       t.cut.begin() + static_cast<long>(from));
+    t.cut[after + 1] = 0;
     std::move_backward(t.order.begin() + static_cast<long>(after) + 1, t.order.begin() + static_cast<long>(from),
                        t.order.begin() + static_cast<long>(from) + 1);
     t.order[after + 1] = slot;
@@ -63,18 +70,33 @@ void update_thread_collisions(const SolverModel& model, SolverState& solver, con
   for (const ThreadHold& h : solver.thread.hold) off(h.slot);
 }
 
-float length_between_ends(const SolverState& solver) {
+float length_between_ends(const SolverState& solver, const SutureState& state) {
   const Thread& t = solver.thread;
-  if (t.anchor.size() < 2) return 0;
+  if (state.point.size() < 2) return 0;
   size_t lo = t.order.size(), hi = 0;
-  for (const ThreadAnchor& a : t.anchor) {
-    const size_t i = node_of(t, a.slot);
+  for (const SuturePoint& p : state.point) {
+    const size_t i = node_of(t, t.anchor[p.anchor].slot);
     lo = std::min(lo, i);
     hi = std::max(hi, i);
   }
   float sum = 0;
   for (size_t i = lo; i < hi; ++i) sum += t.rest[i];
   return sum;
+}
+
+void spans(const SolverState& solver, const SutureState& state, std::vector<float>& span) {
+  const Thread& t = solver.thread;
+  span.assign(state.point.size(), 0);
+  for (size_t k = 0; k + 1 < state.point.size(); ++k) {
+    const size_t a = node_of(t, t.anchor[state.point[k].anchor].slot), b = node_of(t, t.anchor[state.point[k + 1].anchor].slot);
+    for (size_t i = std::min(a, b); i < std::max(a, b); ++i) span[k] += t.rest[i];
+  }
+}
+
+void erase_anchor(SolverState& solver, SutureState& state, uint32_t anchor) {
+  solver.thread.anchor.erase(solver.thread.anchor.begin() + anchor);
+  for (SuturePoint& p : state.point)
+    if (p.anchor > anchor) --p.anchor;
 }
 
 bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
@@ -107,9 +129,10 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
 }
 
 void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state) {
-  CATGUT_CHECK(!state.point.empty() && state.point.back().anchor + 1 == solver.thread.anchor.size());
-  solver.thread.anchor.pop_back();
+  CATGUT_CHECK(!state.point.empty());
+  const uint32_t anchor = state.point.back().anchor;
   state.point.pop_back();
+  erase_anchor(solver, state, anchor);
   update_thread_collisions(model, solver, suture);
 }
 
@@ -122,11 +145,11 @@ void pull(const SolverModel& model, SolverState& solver, const SutureModel& sutu
     ThreadAnchor& a = t.anchor[state.point[k].anchor];
     const size_t i = node_of(t, a.slot);
     const bool was_blocked = a.blocked_needle;
-    const bool can_give_free = i >= 2 && !is_locked(t, t.order[i - 1]);
-    const bool can_give_needle = i + 2 < t.order.size() && !is_locked(t, t.order[i + 1]);
+    const bool can_give_free = i >= 2 && !is_locked(t, t.order[i - 1]) && !t.cut[i - 1] && !t.cut[i - 2];
+    const bool can_give_needle = i + 2 < t.order.size() && !is_locked(t, t.order[i + 1]) && !t.cut[i] && !t.cut[i + 1];
     a.blocked_needle = !can_give_free && t.rest[i - 1] <= used_up;
     a.blocked_free = !can_give_needle && t.rest[i] <= used_up;
-    if (a.blocked_needle && !was_blocked && i == 1)
+    if (a.blocked_needle && !was_blocked && (i == 1 || t.cut[i - 2]))
       events.push_back({0, EventKind::thread_ran_out, 0, static_cast<uint32_t>(k), 0, position_of(a.point, solver.x.data())});
 
     // Toward the needle: the particle on the free side splits the pair on the needle side; the other way round for a pull on

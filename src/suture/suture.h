@@ -1,5 +1,5 @@
 // suture: the data of guided suturing (paper 2.2, 2.3) and the stages that work on it, in the order of the tick:
-//   grasp -> (per substep: solver, puncture, pull) -> closure.
+//   grasp -> loop -> knot -> cut -> (per substep: solver, slip, puncture, pull) -> [technique] -> closure.
 // Each stage reads and writes live rows of the solver's state (attachments, channel, anchors, order); none touches a
 // multiplier.
 #pragma once
@@ -52,6 +52,40 @@ struct HandState {
   float jaw = 1;      // of the last tick
 };
 
+// Turns of thread frozen round a tool (2.4, figure 10). Its particles from `first` to `last` along the order are held by the
+// tool (HoldKind::loop).
+struct ToolLoop {
+  uint32_t wraps = 0;  // whole turns; 0: there is no loop
+  int32_t handed = 0;  // +1: right-handed helix about the way the tool points, -1: left-handed
+  uint32_t first = 0, last = 0;
+  LoopReason told = LoopReason::none;  // the rejection that was last reported
+};
+
+// A knot. While it tightens, the ends of its loop are anchored to it (ThreadAnchor::knotted with an offset) and it travels from
+// the tool to the tissue; once locked it holds a particle of both strands at one point of the tissue, and nothing slides there.
+struct Knot {
+  KnotPhase phase = KnotPhase::tightening;
+  uint32_t hand = 0;               // the tool that pulls it tight
+  uint32_t begun = 0;              // throws that were locked when the throw in hand was begun
+  TissuePoint target;              // where it goes: the suture point, or the middle between the two ends of its stitch
+  Vec3 from;                       // [m] its offset from the target when the throw in hand was begun
+  Vec3 hand_from;                  // [m] where the pulling tool was then
+  uint32_t strand = 0;             // slot that the hand took: on the free end, on the needle side, or on a bight
+  std::array<uint32_t, 2> slot{};  // the two particles that it holds once locked: free-end side, needle side
+  uint32_t slots = 0;              // how many of them are valid: 1 when it was tied on one strand alone
+  uint32_t throws = 0;             // the throw in hand included
+  std::array<KnotThrow, KnotView::kMostThrows> thrown;
+};
+
+// A tied stitch whose thread is no longer simulated: every node follows the cluster of one tissue particle.
+struct SettledNode {
+  uint32_t particle = 0;
+  Vec3 offset;  // [m] in the rest frame of that particle's cluster
+};
+struct SettledStitch {
+  std::vector<SettledNode> node, knot;
+};
+
 struct SutureModel {
   float attach_threshold = 0.006f, release_distance = 0.0022f;         // [m] figures 4 and 5
   float attach_compliance = 1.0f / 1100, channel_compliance = 0.002f;  // [m/N]
@@ -73,6 +107,11 @@ struct SutureState {
   bool attached = false;  // bite[current].nearest is attached to the tip
   Vec3 attached_from;     // [m] where that particle was
   std::array<HandState, 2> hand;
+  std::array<ToolLoop, 2> loop;        // round each tool
+  std::vector<Knot> knot;              // in the order in which they were begun
+  std::vector<SettledStitch> settled;  // in the order in which they settled
+  std::array<uint32_t, 2> buttons{};   // of the last tick
+  uint32_t taken = 0;                  // fresh needles and threads so far
 };
 
 // --- grasp.cpp ---------------------------------------------------------------------------------------------------------
@@ -118,8 +157,12 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
 void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state);
 // Collisions are off for locked and held particles and `collision_off` neighbours on each side, on for all others (paper 2.3).
 void update_thread_collisions(const SolverModel& model, SolverState& solver, const SutureModel& suture);
-// Rest length [m] of the thread between its first and its last suture point along the order; 0 with fewer than two.
-float length_between_ends(const SolverState& solver);
+// Rest length [m] of the thread between the first and the last suture point along the order; 0 with fewer than two.
+float length_between_ends(const SolverState& solver, const SutureState& state);
+// Rest length [m] of the thread from each suture point to the next one made after it; 0 for the last.
+void spans(const SolverState& solver, const SutureState& state, std::vector<float>& span);
+// Takes the row out of Thread::anchor and puts the indices right that point behind it.
+void erase_anchor(SolverState& solver, SutureState& state, uint32_t anchor);
 
 // --- closure.cpp -------------------------------------------------------------------------------------------------------
 // What a technique wants closed: points of tissue and where they go. At progress s each is pulled toward from + s (to - from).
@@ -129,8 +172,16 @@ struct ClosurePlan {
     Vec3 from, to;  // [m]
   };
   std::vector<Pull> pull;
-  float progress = 0;    // 0..1
-  float compliance = 0;  // [m/N]
+  float progress = 0;    // 0..1, of the pulls
+  float compliance = 0;  // [m/N], of both
+  // Two points of tissue that are drawn together, from `start` apart to `end` apart.
+  struct Pair {
+    TissuePoint a, b;
+    float start = 0, end = 0;  // [m]
+    float progress = 0;        // 0..1
+    uint32_t midpoint = 0;     // 1: between suture points, 0: one of the pairs in between (figures 13 and 15)
+  };
+  std::vector<Pair> pair;  // rows are added, never removed
 };
 // Once a tick: makes the plan's attachments, or moves their targets.
 void close(SolverState& solver, const ClosurePlan& plan);

@@ -50,17 +50,21 @@ int first_out_of_order(std::span<const Vec3> sp, size_t from) {
   return -1;
 }
 
-void purse_string(const PurseStringModel& model, PurseStringState& state, std::span<const Vec3> sp,
-                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, float dt, ClosurePlan& plan,
+void purse_string(const PurseStringModel& model, PurseStringState& state, const TechniqueView& view, ClosurePlan& plan,
                   std::vector<Event>& events) {
   if (model.rim_inner.size() < 3) return;
+  const Vec4* x = view.x;
+  const float loop = view.loop, dt = view.dt;
+  std::vector<Vec3>& sp = state.where;
+  sp.clear();
+  for (const StitchPoint& p : view.point) sp.push_back(p.at);
   if (state.area_start == 0) state.area_start = opening_area(model.rim_inner, x);
   if (state.finished) return;
 
   if (!state.ring_complete) {
     // While the ring grows, a point can be checked once three more follow it.
     for (; state.checked + 3 < sp.size(); ++state.checked)
-      if (first_out_of_order(sp.subspan(state.checked, 4)) == 0)
+      if (first_out_of_order(std::span(sp).subspan(state.checked, 4)) == 0)
         events.push_back({0, EventKind::order_broken, 0, state.checked + 1, 0, sp[state.checked + 1]});
     const Vec3 centre = centre_of(model.rim_outer, x), axis = normalized(newell(model.rim_outer, x));
     if (sp.size() < 2 * static_cast<size_t>(model.min_bites) || sp.size() % 2 != 0) return;  // even: no bite half done
@@ -100,10 +104,10 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, std::s
     for (uint32_t i : model.rim_inner) add_pull(particle_point(i), model.anvil_radius);
     for (uint32_t i : model.rim_outer) add_pull(particle_point(i), model.anvil_radius + model.wall);
     const float thread_radius = model.anvil_radius + 2 * model.wall;
-    for (const TissuePoint& p : sp_point) add_pull(p, thread_radius);
+    for (const StitchPoint& p : view.point) add_pull(p.point, thread_radius);
     plan.compliance = model.compliance;
     state.path_end = 0;
-    const size_t first = plan.pull.size() - sp_point.size();
+    const size_t first = plan.pull.size() - view.point.size();
     for (size_t i = first; i + 1 < plan.pull.size(); ++i) state.path_end += distance(plan.pull[i].to, plan.pull[i + 1].to);
     // Gathered tissue takes up room on the thread: closing is led by the thread, but the edge arrives before the loop is as
     // short as the bare way round. What is left then is drawn up against the tissue itself.

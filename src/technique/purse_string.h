@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "suture/suture.h"
+#include "technique/view.h"
 
 namespace catgut {
 
@@ -24,16 +24,15 @@ struct PurseStringState {
   float path_start = 0, path_end = 0;  // [m] way from the first to the last suture point, open and closed
   uint32_t checked = 0;                // suture points already checked for order
   float area_start = 0;                // [m^2]
+  std::vector<Vec3> where;             // working memory, not saved
 };
 
 // The adjacency rule of 2.5.1: sp[i + 1] is the nearest to sp[i] among the three that follow it; past the end, sp[0..2] follow.
 // Returns the first i (from `from` on) whose successor is not, or -1.
 int first_out_of_order(std::span<const Vec3> sp, size_t from = 0);
 
-// Once a tick. `sp`: where the suture points are; x: particle positions; loop: rest length of thread from the first suture
-// point to the last [m]; dt: length of a tick [s]. Fills `plan` when there is something to close, and reports through `events`.
-void purse_string(const PurseStringModel& model, PurseStringState& state, std::span<const Vec3> sp,
-                  std::span<const TissuePoint> sp_point, const Vec4* x, float loop, float dt, ClosurePlan& plan,
+// Once a tick. Fills `plan` when there is something to close, and reports through `events`.
+void purse_string(const PurseStringModel& model, PurseStringState& state, const TechniqueView& view, ClosurePlan& plan,
                   std::vector<Event>& events);
 
 // Area of the opening [m^2]: the inner edge projected on its own best plane.

@@ -35,6 +35,7 @@ ThreadRig::ThreadRig(std::span<const Vec3> position, float spacing, float mass, 
   prev = x;
   thread.rest.assign(n - 1, spacing);
   thread.tension.assign(n - 1, 0);
+  thread.cut.assign(n - 1, 0);
   thread.hold.push_back({0, 0, {}});
   body[0].x = position[0];
   if (hold_last) thread.hold.push_back({n - 1, 1, {}});

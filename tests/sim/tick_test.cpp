@@ -138,14 +138,14 @@ TEST(WholeRun, saved_in_the_middle_of_the_closure_and_loaded_it_goes_on_bit_for_
   for (ToolInput& h : idle.hand) h.connected = 0;
   for (int i = 0; i < 10; ++i) step(*model, *state, idle, jobs);
   // A closure under way: the plan of a ring, half done.
-  for (uint32_t i : model->purse_string.rim_inner) {
+  for (uint32_t i : model->technique.purse_string.rim_inner) {
     const Vec3 from = xyz(state->solver.x[i]);
     state->plan.pull.push_back({particle_point(i), from, Vec3{0.3f * from.x, from.y, 0.3f * from.z}});
   }
-  state->plan.compliance = model->purse_string.compliance;
+  state->plan.compliance = model->technique.purse_string.compliance;
   state->plan.progress = 0.4f;
-  state->purse_string.ring_complete = state->purse_string.closing = true;
-  state->purse_string.path_start = 0.12f, state->purse_string.path_end = 0.05f;
+  state->technique.purse_string.ring_complete = state->technique.purse_string.closing = true;
+  state->technique.purse_string.path_start = 0.12f, state->technique.purse_string.path_end = 0.05f;
   for (int i = 0; i < 20; ++i) step(*model, *state, idle, jobs);
   ASSERT_FALSE(state->solver.attach.empty());
   const std::vector<std::byte> bytes = save_state(*model, *state);

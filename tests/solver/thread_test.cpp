@@ -39,6 +39,7 @@ struct Line {
     v.assign(x.size(), {});
     thread.rest.assign(nodes - 1, spacing);
     thread.tension.assign(nodes - 1, 0);
+    thread.cut.assign(nodes - 1, 0);
     thread.hold = {{0, 0, {}}, {nodes - 1, 1, {}}};
     body[0].x = xyz(x[0]);
     body[1].x = xyz(x[nodes - 1]);

@@ -41,6 +41,7 @@ Thread chain(uint32_t nodes, uint32_t first_slot, uint64_t seed) {
   Thread t;
   for (uint32_t i = 0; i < nodes; ++i) t.order.push_back(first_slot + i);
   for (uint32_t i = 0; i + 1 < nodes; ++i) t.rest.push_back(0.0016f * (0.1f + 1.8f * random.uniform()));
+  t.cut.assign(t.rest.size(), 0);
   return t;
 }
 

@@ -81,11 +81,14 @@ struct Ring {
     x.push_back(point({r * std::cos(a), y, r * std::sin(a)}));
   }
   void tick(float loop, float dt = 1.0f / 60, size_t points = 1000) {
-    std::vector<Vec3> where;
-    std::vector<TissuePoint> at;
-    for (size_t k = 0; k < std::min(points, sp.size()); ++k)
-      where.push_back(xyz(x[sp[k]])), at.push_back(particle_point(sp[k]));
-    purse_string(model, state, where, at, x.data(), loop, dt, plan, events);
+    std::vector<StitchPoint> point(std::min(points, sp.size()));
+    for (size_t k = 0; k < point.size(); ++k) point[k].at = xyz(x[sp[k]]), point[k].point = particle_point(sp[k]);
+    TechniqueView view;
+    view.point = point;
+    view.x = x.data();
+    view.loop = loop;
+    view.dt = dt;
+    purse_string(model, state, view, plan, events);
   }
   float way() const {
     float s = 0;
@@ -212,7 +215,7 @@ TEST(Closure, needs_an_opening) {
   PurseStringState state;
   ClosurePlan plan;
   std::vector<Event> events;
-  purse_string(model, state, {}, {}, nullptr, 0, 0.01f, plan, events);
+  purse_string(model, state, {}, plan, events);
   EXPECT_TRUE(events.empty());
   EXPECT_TRUE(plan.pull.empty());
 }
