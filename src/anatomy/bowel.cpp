@@ -17,6 +17,8 @@ namespace {
 
 constexpr double kTwoPi = 6.283185307179586;
 constexpr int kFewest = 120, kMost = 200000;
+constexpr float kLeastGap = 0.001f;  // [m] between the two walls of a folded bowel: they must not touch at rest
+constexpr int kPictureVertices = 18000;
 
 void check(const BowelShape& b) {
   const auto refuse = [&](const std::string& what, const std::string& next) { throw InputError(b.name, what, next); };
@@ -43,6 +45,24 @@ void check(const BowelShape& b) {
     refuse(fmt::format("a density of {} kg/m^3", b.density), "give a positive number, e.g. 1050");
   if (!finite(b.pinned_length) || b.pinned_length < 0 || b.pinned_length > b.length) {
     refuse(fmt::format("pinned_length {} m", b.pinned_length), "give 0 to the bowel's length");
+  }
+  if (b.inner_radius == 0) return;
+  if (!finite(b.inner_radius) || b.inner_radius < 2 * b.wall) {
+    refuse(fmt::format("an inner_radius of {} m leaves no tube with a wall of {} m", b.inner_radius, b.wall),
+           "give at least twice the wall, or 0 for no inner tube");
+  }
+  // The folds of the outer tube reach inward.
+  const float most = b.radius - b.haustra - b.wall - kLeastGap;
+  if (b.inner_radius > most) {
+    refuse(fmt::format("an inner_radius of {} m does not fit inside: the two walls need {} mm between them", b.inner_radius,
+                       1e3f * kLeastGap),
+           fmt::format("give at most {:.4f} m (radius less haustra, wall and gap)", most));
+  }
+  if (b.closed_start || b.closed_end) {
+    refuse("a bowel with an inner tube cannot have closed ends", "leave out closed_start and closed_end, or inner_radius");
+  }
+  if (b.particles < 2 * kFewest) {
+    refuse(fmt::format("{} particles cannot make two tubes", b.particles), fmt::format("give {} to {}", 2 * kFewest, kMost));
   }
 }
 
@@ -126,10 +146,8 @@ void zip(const Ring& a, const Ring& b, std::vector<Triangle>& triangle) {
   }
 }
 
-}  // namespace
-
-BodyRest make_bowel(const BowelShape& shape) {
-  check(shape);
+// One tube. vertices: of its picture, rim edges on top; everted: turned inside out, mucosa on its outer side.
+BodyRest make_tube(const BowelShape& shape, int vertices, bool everted) {
   const BowelSurface surface(shape);
   const std::vector<Ring> rings = lay_rings(shape, surface, shape.particles / 2);
 
@@ -157,10 +175,67 @@ BodyRest make_bowel(const BowelShape& shape) {
   }
   if (wall.extra_particle) body.pinned.back() = shape.pinned_length > 0;
 
-  body.visible = bowel_picture(shape, surface);
+  if (everted) {
+    for (TissueLayer& layer : body.layer) layer = layer == TissueLayer::serosa ? TissueLayer::mucosa : TissueLayer::serosa;
+  }
+
+  body.visible = bowel_picture(shape, surface, vertices, everted);
   const double spacing =
       std::sqrt(surface.profile_length() * kTwoPi * shape.radius / static_cast<double>(depth.size()) / 0.8660254);
   bind_skin(body.visible, body.position, static_cast<float>(2.0 * spacing), 2);
+  return body;
+}
+
+// Adds `more` as the next wall: its particles follow, nothing of it is tied to what is there already.
+void join(BodyRest& body, BodyRest&& more) {
+  const uint32_t first = static_cast<uint32_t>(body.position.size()),
+                 vertex = static_cast<uint32_t>(body.visible.position.size());
+  const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  const auto shifted = [](auto list, uint32_t by) {
+    for (auto& row : list)
+      for (uint32_t& i : row) i += by;
+    return list;
+  };
+  body.wall.resize(first, 0);
+  body.wall.resize(first + more.position.size(), static_cast<uint8_t>(body.walls));
+  ++body.walls;
+  append(body.position, more.position), append(body.mass, more.mass);
+  append(body.pinned, more.pinned), append(body.layer, more.layer);
+  append(body.cluster, shifted(more.cluster, first));
+  append(body.tet, shifted(more.tet, first));
+  append(body.surface, shifted(more.surface, first));
+  // Near rims first, wall by wall; then the far ones.
+  for (Rim& r : more.rim) {
+    for (uint32_t& i : r.outer) i += first;
+    for (uint32_t& i : r.inner) i += first;
+  }
+  std::vector<Rim> rim;
+  for (size_t end = 0; end < body.rim.size(); ++end) rim.insert(rim.end(), {body.rim[end], more.rim[end]});
+  body.rim = std::move(rim);
+  VisibleMesh& mesh = body.visible;
+  append(mesh.position, more.visible.position), append(mesh.normal, more.visible.normal);
+  append(mesh.uv, more.visible.uv), append(mesh.layer, more.visible.layer);
+  append(mesh.triangle, shifted(more.visible.triangle, vertex));
+  append(mesh.skin_particle, shifted(more.visible.skin_particle, first));
+  append(mesh.skin_weight, more.visible.skin_weight);
+}
+
+}  // namespace
+
+BodyRest make_bowel(const BowelShape& shape) {
+  check(shape);
+  if (shape.inner_radius == 0) return make_tube(shape, kPictureVertices, false);
+  BowelShape outer = shape, inner = shape;
+  outer.inner_radius = inner.inner_radius = 0;
+  inner.radius = shape.inner_radius;
+  outer.taeniae = 0;  // a rectum has none; the folds that remain are the rings that a prolapse shows
+  const float part = shape.radius / (shape.radius + shape.inner_radius);
+  // An even number, so that the odd particle, if there is one, is the inner tube's and outer sides keep even indices.
+  outer.particles = 2 * static_cast<int>(std::lround(0.5f * part * static_cast<float>(shape.particles)));
+  inner.particles = shape.particles - outer.particles;
+  const int vertices = static_cast<int>(part * kPictureVertices);
+  BodyRest body = make_tube(outer, vertices, true);
+  join(body, make_tube(inner, kPictureVertices - vertices, false));
   return body;
 }
 

@@ -27,6 +27,14 @@ struct BowelShape {
 // Particles run ring by ring from the near end; a place on the sheet is two neighbouring particles, outer (even index) then
 // inner (odd index). rim[0] is the near end, rim[1] the far end, as far as they are open; a rim runs counter-clockwise seen
 // from outside its opening. visible: about 20,000 vertices whose outer side passes through the outer particles.
+//
+// inner_radius > 0: what is left when a prolapsed rectum was cut off (paper 2.5.4). A prolapse is bowel that has slid out
+// through itself: the outer tube is rectum turned inside out, so its mucosa is seen from outside; the inner tube is the colon
+// that followed, the right way out; between the two, serosa faces serosa. The cut leaves both ends open, their rims level. The
+// outer tube is wall 0, with exactly as many particles more as it has more surface, then comes wall 1; far ends are held as
+// above. Rims: near end of wall 0, of wall 1, far end of wall 0, of wall 1. A rim's `outer` is always the side away from the
+// axis.
+//
 // The same shape gives the same bits. Throws InputError for a shape that cannot be built.
 BodyRest make_bowel(const BowelShape& shape);
 

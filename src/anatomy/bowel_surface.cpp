@@ -153,9 +153,9 @@ struct Grid {
 
 }  // namespace
 
-VisibleMesh bowel_picture(const BowelShape& shape, const BowelSurface& surface) {
+VisibleMesh bowel_picture(const BowelShape& shape, const BowelSurface& surface, int vertices, bool everted) {
   const double along = surface.profile_length(), round = kTwoPi * shape.radius;
-  const double step = std::sqrt(2 * along * round / 18000);  // two sides share 18,000 vertices; rim edges come on top
+  const double step = std::sqrt(2 * along * round / vertices);  // two sides share them
   const int columns = std::max(12, static_cast<int>(std::lround(round / step)));
   const int rows = std::max(4, static_cast<int>(std::lround(along / step)) + 1);
   const auto s_of = [&](int i) { return along * i / (rows - 1); };
@@ -173,7 +173,7 @@ VisibleMesh bowel_picture(const BowelShape& shape, const BowelSurface& surface) 
         const Vec3 n = surface.normal(s_of(i), angle_of(j));
         const Vec3 p = surface.point(s_of(i), angle_of(j)) - n * (inside ? shape.wall : 0.0f);
         grid.vertex(p, inside ? -n : n, static_cast<float>(s_of(i) / 0.01), v_of(j),
-                    inside ? TissueLayer::mucosa : TissueLayer::serosa);
+                    inside == everted ? TissueLayer::serosa : TissueLayer::mucosa);
       }
     }
     grid.quads(first, rows, inside);

@@ -33,7 +33,8 @@ class BowelSurface {
   std::vector<double> dome_arc_;  // arc length of a dome's quarter ellipse from its top, over equal steps of its angle
 };
 
-// The picture of it: outside, inside and rounded rim edges, about 20,000 vertices, not yet bound to particles.
-VisibleMesh bowel_picture(const BowelShape& shape, const BowelSurface& surface);
+// The picture of it: outside and inside with about `vertices` vertices, rounded rim edges on top, not yet bound to particles.
+// everted: the mucosa is outside.
+VisibleMesh bowel_picture(const BowelShape& shape, const BowelSurface& surface, int vertices, bool everted);
 
 }  // namespace catgut

@@ -63,7 +63,9 @@ inline void expect_sound(const BodyRest& body, size_t particles) {
   for (const Rim& rim : body.rim) {
     ASSERT_EQ(rim.outer.size(), rim.inner.size());
     for (size_t i = 0; i < rim.outer.size(); ++i) {
-      EXPECT_EQ(body.layer[rim.outer[i]], TissueLayer::serosa);
+      const bool everted = body.walls > 1 && body.wall[rim.outer[i]] == 0;  // the outer tube of a cut prolapse
+      EXPECT_EQ(body.layer[rim.outer[i]], everted ? TissueLayer::mucosa : TissueLayer::serosa);
+      EXPECT_EQ(body.layer[rim.inner[i]], everted ? TissueLayer::serosa : TissueLayer::mucosa);
       EXPECT_EQ(rim.inner[i], rim.outer[i] + 1);
     }
   }

@@ -149,6 +149,127 @@ TEST(Bowel, SameShapeSameBits) {
   EXPECT_EQ(a.visible.skin_weight, b.visible.skin_weight);
 }
 
+// --- what is left after a prolapse was cut off (paper 2.5.4): one tube inside another --------------------------------------
+
+BowelShape folded(int particles) {
+  BowelShape shape = shape_with(particles);
+  shape.wall = 0.0022f;
+  shape.inner_radius = 0.0125f;
+  return shape;
+}
+
+// The surface's triangles that lie on one wall.
+std::vector<Triangle> of_wall(const BodyRest& body, int wall) {
+  std::vector<Triangle> out;
+  for (const Triangle& t : body.surface)
+    if (body.wall[t[0]] == wall) out.push_back(t);
+  return out;
+}
+
+TEST(FoldedBowel, HasExactlyTheParticlesAskedSharedByArea) {
+  for (const int n : {401, 1185, 2000, 4053, 4054, 4055}) {
+    SCOPED_TRACE(n);
+    const BodyRest body = make_bowel(folded(n));
+    expect_sound(body, static_cast<size_t>(n));
+    EXPECT_EQ(body.walls, 2);
+    ASSERT_EQ(body.wall.size(), static_cast<size_t>(n));
+    const auto outer = std::count(body.wall.begin(), body.wall.end(), 0);
+    EXPECT_EQ(outer % 2, 0);
+    EXPECT_NEAR(static_cast<double>(outer) / n, 20 / 32.5, 1.0 / n);
+    EXPECT_TRUE(std::is_sorted(body.wall.begin(), body.wall.end()));
+    const double mass = std::accumulate(body.mass.begin(), body.mass.end(), 0.0);
+    EXPECT_NEAR(mass, 1050 * total_tet_volume(body), 1e-4 * mass);
+  }
+}
+
+TEST(FoldedBowel, EachWallIsWatertightAndFacesOutward) {
+  const BodyRest body = make_bowel(folded(4054));
+  size_t triangles = 0;
+  for (const int wall : {0, 1}) {
+    const std::vector<Triangle> surface = of_wall(body, wall);
+    triangles += surface.size();
+    EXPECT_TRUE(watertight(surface));
+    EXPECT_EQ(euler_characteristic(surface), 0);
+    const double r = wall == 0 ? 0.020 : 0.0125, in = r - 0.0022, tube = 3.14159265 * (r * r - in * in) * 0.07;
+    EXPECT_NEAR(enclosed_volume({body.position, surface}), tube, 0.08 * tube) << "haustra and polygons take a little";
+  }
+  EXPECT_EQ(triangles, body.surface.size());
+  for (const Triangle& t : body.surface)
+    for (uint32_t i : t) ASSERT_EQ(body.wall[i], body.wall[t[0]]);
+}
+
+TEST(FoldedBowel, NothingTiesOneWallToTheOther) {
+  const BodyRest body = make_bowel(folded(4055));
+  for (const auto& cluster : body.cluster)
+    for (uint32_t i : cluster) ASSERT_EQ(body.wall[i], body.wall[cluster[0]]);
+  for (const Tet& t : body.tet)
+    for (uint32_t i : t) ASSERT_EQ(body.wall[i], body.wall[t[0]]);
+  // The picture's two tubes are known by their distance from the axis; each follows its own particles.
+  for (size_t v = 0; v < body.visible.position.size(); ++v) {
+    const Vec3 p = body.visible.position[v];
+    const int wall = std::hypot(p.x, p.z) > 0.015f ? 0 : 1;
+    for (int k = 0; k < 4; ++k) ASSERT_EQ(body.wall[body.visible.skin_particle[v][k]], wall) << v;
+  }
+}
+
+TEST(FoldedBowel, RimsAreLevelAndNearOnesComeFirst) {
+  const BodyRest body = make_bowel(folded(4054));
+  ASSERT_EQ(body.rim.size(), 4u);
+  for (size_t r = 0; r < 4; ++r) {
+    SCOPED_TRACE(r);
+    const int wall = r % 2;
+    const auto outer = points(body, body.rim[r].outer);
+    for (uint32_t i : body.rim[r].outer) EXPECT_EQ(body.wall[i], wall);
+    EXPECT_NEAR(loop_length(outer), 6.2832 * (wall == 0 ? 0.020 : 0.0125), 0.001);
+    for (size_t i = 0; i < outer.size(); ++i) {
+      EXPECT_NEAR(outer[i].y, r < 2 ? 0 : -0.07, 1e-5);
+      EXPECT_LT(std::hypot(body.position[body.rim[r].inner[i]].x, body.position[body.rim[r].inner[i]].z),
+                std::hypot(outer[i].x, outer[i].z));
+    }
+    EXPECT_NEAR(dot(loop_normal(outer), Vec3{0, r < 2 ? 1.0f : -1.0f, 0}), 1, 1e-5);
+  }
+  for (size_t i = 0; i < body.position.size(); ++i) EXPECT_EQ(body.pinned[i] != 0, body.position[i].y < -0.062f) << i;
+}
+
+// A prolapse is bowel turned inside out over itself: mucosa outside and in the lumen, serosa on the two sides that meet.
+TEST(FoldedBowel, SerosaFacesSerosa) {
+  const BodyRest body = make_bowel(folded(4054));
+  for (size_t i = 0; i < body.position.size(); ++i) {
+    const float r = std::hypot(body.position[i].x, body.position[i].z);
+    const bool between = body.wall[i] == 0 ? r < 0.0189f - 0.0008f : r > 0.0125f - 0.0011f;
+    ASSERT_EQ(body.layer[i] == TissueLayer::serosa, between) << i << " at " << r;
+  }
+  for (size_t v = 0; v < body.visible.position.size(); ++v) {
+    if (body.visible.layer[v] == TissueLayer::cut_edge) continue;
+    const Vec3 p = body.visible.position[v], n = body.visible.normal[v];
+    const bool outward = n.x * p.x + n.z * p.z > 0, outer_tube = std::hypot(p.x, p.z) > 0.015f;
+    ASSERT_EQ(body.visible.layer[v] == TissueLayer::serosa, outward != outer_tube) << v;
+  }
+}
+
+TEST(FoldedBowel, RefusesAnInnerTubeThatDoesNotFit) {
+  const auto message = [](BowelShape shape) {
+    try {
+      make_bowel(shape);
+    } catch (const InputError& e) { return std::string(e.what()); }
+    return std::string("accepted");
+  };
+  BowelShape shape = folded(4054);
+  shape.inner_radius = 0.0161f;  // 20 less 0.8 of folds, 2.2 of wall and 1 of gap leave 16.0 mm
+  EXPECT_NE(message(shape).find("give at most 0.0160 m"), std::string::npos) << message(shape);
+  shape.inner_radius = 0.0159f;
+  EXPECT_EQ(message(shape), "accepted");
+  for (const float r : {-0.01f, 0.003f, NAN}) {
+    shape.inner_radius = r;
+    EXPECT_NE(message(shape).find("inner_radius"), std::string::npos) << r;
+  }
+  shape = folded(4054);
+  shape.closed_start = true;
+  EXPECT_NE(message(shape).find("closed"), std::string::npos);
+  shape = folded(200);
+  EXPECT_NE(message(shape).find("two tubes"), std::string::npos);
+}
+
 TEST(Bowel, RefusesWhatCannotBeBuilt) {
   const auto message = [](BowelShape shape) {
     try {
