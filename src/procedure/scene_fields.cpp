@@ -224,7 +224,18 @@ const std::vector<ResultName>& result_names() {
     std::vector<ResultName> out = {
         {"bites", "", "completed bites"},
         {"suture_points", "", "suture points at the end"},
-        {"knots", "", "locked knots"},
+        {"knots", "", "locked knots, those of settled sutures included"},
+        {"throws", "", "locked throws of all knots"},
+        {"last_knot_throws", "", "locked throws of the last knot"},
+        {"sutures", "", "tied sutures, settled or not"},
+        {"pairs", "", "pairs of places that are drawn together: midpoints and those in between"},
+        {"seam_gap", "m", "largest distance between the two places of a midpoint pair at the end"},
+        {"seam_gap_all", "m", "the same over all pairs"},
+        {"seam_gap_start", "m", "smallest distance that a midpoint pair had when it was made; 0 without one"},
+        {"needle_off", "", "1 when the needle was cut off the thread at the end, else 0"},
+        {"held_ends", "", "ends of thread that one tool holds at the end, the most of the two tools"},
+        {"ends_uneven", "",
+         "difference over sum of the thread before the first and after the last suture point when the first knot was begun"},
         {"particles", "", "tissue and thread particles"},
         {"opening_ratio", "", "area of the opening at the end over its area when the hands were let in"},
         {"closure", "", "0 open .. 1 at the anvil"},
@@ -241,6 +252,10 @@ const std::vector<ResultName>& result_names() {
       const std::string name = event_name(static_cast<EventKind>(k));
       if (name != "suture_point")  // so close to suture_points that it would only confuse
         out.push_back({name, "", "number of `" + name + "` events"});
+    }
+    for (int k = 1; k < static_cast<int>(Fault::count_); ++k) {
+      const std::string name = fault_name(static_cast<Fault>(k));
+      out.push_back({"fault_" + name, "", "number of `technique_fault` events that say " + name});
     }
     return out;
   }();

@@ -1,6 +1,7 @@
 // sim/build: turns a scene's description into a Model and its first State. Reads SceneSpec; calls the anatomy; throws
 // InputError for what a scene may get wrong. Nothing here runs during a tick.
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "anatomy/bowel.h"
@@ -14,7 +15,8 @@ namespace catgut {
 namespace {
 
 constexpr float kPaperSubstep = 1.0f / 480;  // [s] at which the paper's deformation resistance is meant
-constexpr float kDrapeBelowRim = 0.035f;     // [m]
+constexpr float kDrapeBelowRim = 0.035f;     // [m] where a body stands up through the drape
+constexpr float kDrapeBelowBody = 0.010f;    // [m] where a body lies over it
 
 BodyRest make_body(const BodySpec& spec) {
   if (!spec.mesh.empty()) {
@@ -46,6 +48,9 @@ BodyRest make_body(const BodySpec& spec) {
   s.inner_radius = spec.inner_radius;
   return make_bowel(s);
 }
+
+// A bowel end that points sideways rather than up.
+bool lies(const BodySpec& body) { return std::abs(body.axis.y) < 0.7f * length(body.axis); }
 
 // The thread lies on the drape in even turns, beginning at `start` and leading away along +x: what a nurse would hand over.
 std::vector<Vec3> lay_thread(const ThreadSpec& spec, Vec3 start) {
@@ -99,7 +104,8 @@ TechniqueModel make_technique(const SceneSpec& scene, const std::vector<Rim>& ri
   } else if (spec.name == "lembert") {
     t.kind = TechniqueKind::lembert;
     need(2, "it joins two layers and the scene's body has one", "give the body an inner_radius");
-    t.lembert.outer = rim[0].outer;
+    // The sides that face each other: what is drawn together meets there, with no wall in between.
+    t.lembert.outer = rim[0].inner;
     t.lembert.inner = rim[1].outer;
     t.lembert.gap = spec.closed_gap;
     t.lembert.compliance = spec.closure_compliance;
@@ -164,11 +170,16 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   std::vector<std::vector<uint32_t>> cluster;
   std::vector<Tet> tet;
   std::vector<Triangle> surface;
-  float wall = 0.0025f;
+  float wall = 0.0025f, drape = std::numeric_limits<float>::max();
   for (size_t b = 0; b < scene.body.size(); ++b) {
     BodyRest r = make_body(scene.body[b]);
     const uint32_t first = static_cast<uint32_t>(rest.size());
     if (b == 0) wall = scene.body[b].wall;
+    float bottom = scene.body[b].position.y - kDrapeBelowRim;
+    if (lies(scene.body[b])) {
+      for (const Vec3& p : r.position) bottom = std::min(bottom, p.y - kDrapeBelowBody);
+    }
+    drape = std::min(drape, bottom);
     double spacing = 0;
     size_t edges = 0;
     for (const Triangle& t : r.surface)
@@ -238,7 +249,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   const NeedleShape needle{scene.needle.radius, scene.needle.arc, scene.needle.wire_radius, scene.needle.mass};
   s.needle_arc = needle_arc(needle);
   s.body = {tool_body(), tool_body(), needle_body(needle)};
-  s.ground = scene.body[0].position.y - kDrapeBelowRim;
+  s.ground = drape;
 
   SutureModel& u = m.suture;
   u.attach_threshold = scene.suture.attach_threshold;
@@ -252,12 +263,16 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
 
   m.technique = make_technique(scene, working_rim, wall, where);
 
-  // The needle lies on the drape to the right of the organ, its circle flat, the thread leading away from its swage.
+  // The needle lies on the drape to the right of the organ, its circle flat, the thread leading away from its swage. Two bowel
+  // ends lie along x, and the needle in front of them.
   m.start = rest;
-  const Vec3 rim = scene.body[0].position;
+  const bool two = scene.body.size() > 1 && lies(scene.body[0]);
+  const float tube = scene.body[0].radius;
+  const Vec3 rim = two ? 0.5f * (scene.body[0].position + scene.body[1].position) : scene.body[0].position;
   const Pose flat{{}, axis_angle({1, 0, 0}, -0.5f * kPi)};  // body z up: the circle lies in the drape's plane
   const float wire = s.ground + scene.needle.wire_radius + 0.0002f;
-  m.needle_start = {Vec3{rim.x + scene.body[0].radius + 0.03f, wire, rim.z + 0.01f}, flat.q};
+  const Vec3 beside = two ? Vec3{0.02f, 0, tube + 0.03f} : Vec3{tube + 0.03f, 0, 0.01f};
+  m.needle_start = {Vec3{rim.x + beside.x, wire, rim.z + beside.z}, flat.q};
   const Vec3 swage = transform(m.needle_start, s.needle_arc.point(0));
   std::vector<Vec3> thread = lay_thread(scene.thread, swage);
   for (size_t i = thread.size(); i-- > 0;) m.start.push_back(thread[i]);  // free end first
@@ -273,8 +288,8 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   p.needle_radius = scene.needle.radius;
   p.needle_arc = scene.needle.arc;
   p.needle_wire_radius = scene.needle.wire_radius;
-  p.focus = rim;
-  p.field = 3 * scene.body[0].radius;
+  p.focus = two ? rim + Vec3{0, tube, 0} : rim;  // two ends are joined on top, where their rims face each other
+  p.field = 3 * tube;
   p.drape = s.ground;
   return model;
 }
