@@ -79,8 +79,8 @@ void publish(const Model& model, const State& state, Snapshot& out) {
   }
   // Published at the circle's centre, which is what pictures and plans turn about.
   out.needle.pose = {transform(s.body[kNeedle].pose(), m.needle_arc.centre), s.body[kNeedle].q};
-  out.needle.in_tissue = state.suture.phase != NeedlePhase::outside;
-  out.needle.bite = state.suture.current;
+  out.needle.in_tissue = !state.suture.open.empty();
+  out.needle.bite = state.suture.open.empty() ? 0 : state.suture.open.back().bite;
   out.suture_point.clear();
   for (const SuturePoint& p : state.suture.point) {
     const ThreadAnchor& a = s.thread.anchor[p.anchor];

@@ -1,5 +1,5 @@
-// technique/lembert: interrupted stitches through both layers of a cut bowel; a locked knot draws inner and outer layer together
-// there and, by the angle rule, between it and its neighbours (paper 2.5.4, figure 15).
+// technique/lembert: interrupted stitches through both layers of a cut bowel; a locked knot draws inner and outer layer
+// together there and, by the angle rule, between it and its neighbours (paper 2.5.4, figure 15).
 #pragma once
 #include <span>
 #include <vector>

@@ -10,24 +10,24 @@ namespace catgut {
 
 // One end of a bite as the techniques see it.
 struct StitchPoint {
-  Vec3 at;             // [m] now
-  TissuePoint point;   // the same, carried by the tissue
-  uint32_t bite = 0;   // index in `bite`
-  uint32_t wall = 0;   // bowel end (connell, stay) or layer (lembert: 0 outer, 1 inner)
-  bool exit = false;   // the exit end of its bite, else the entry
+  Vec3 at;              // [m] now
+  TissuePoint point;    // the same, carried by the tissue
+  uint32_t bite = 0;    // index in `bite`
+  uint32_t wall = 0;    // bowel end (connell, stay) or layer (lembert: 0 outer, 1 inner)
+  bool exit = false;    // the exit end of its bite, else the entry
   bool inside = false;  // on the mucosa, else on the serosa
-  float span = 0;      // [m] rest length of thread from this point to the next toward the needle; 0 for the last
+  float span = 0;       // [m] rest length of thread from this point to the next toward the needle; 0 for the last
 };
 
 struct TechniqueView {
   std::span<const StitchPoint> point;  // the suture points in the order in which they were made
   std::span<const Bite> bite;
   std::span<const Knot> knot;
-  const Vec4* x = nullptr;             // particle positions [m]
-  float loop = 0;                      // [m] rest length of thread from the first suture point to the last
+  const Vec4* x = nullptr;  // particle positions [m]
+  float loop = 0;           // [m] rest length of thread from the first suture point to the last
   bool needle_in_tissue = false;
-  uint32_t taken = 0;                  // fresh sutures so far: points and knots before that are settled and no longer listed
-  float dt = 0;                        // [s] length of a tick
+  uint32_t taken = 0;  // fresh sutures so far: points and knots before that are settled and no longer listed
+  float dt = 0;        // [s] length of a tick
 };
 
 }  // namespace catgut
