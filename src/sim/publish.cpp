@@ -68,6 +68,9 @@ void publish(const Model& model, const State& state, Snapshot& out) {
     t.held = hand.held;
     t.held_at = hand.at;
     t.held_slot = hand.slot;
+    t.held_strands = static_cast<uint32_t>(std::count_if(s.thread.hold.begin(), s.thread.hold.end(), [&](const ThreadHold& h) {
+      return h.body == static_cast<int>(k) && h.kind == HoldKind::jaw;
+    }));
     const ToolLoop& loop = state.suture.loop[k];
     t.loop_wraps = loop.wraps;
     t.loop_handed = loop.handed;
