@@ -110,7 +110,7 @@ int main() {
   // bits.
   const uint64_t hash = hash_state(m, s);
   const bool first_event = !seen.event.empty() && seen.event[0].kind == EventKind::tip_entered;
-  const bool inside = bite.depth >= 0 && s.suture.phase == NeedlePhase::tip_in && s.solver.channel.size() == 1;
+  const bool inside = bite.depth >= 0 && phase_of(s.suture) == NeedlePhase::tip_in && s.solver.channel.size() == 1;
   const uint64_t tick = input.tick;
   load_state(m, s, before);
   input.tick = tick - 1;

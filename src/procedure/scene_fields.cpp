@@ -246,7 +246,7 @@ const std::vector<ResultName>& result_names() {
         {"sane", "", "1 when nothing was NaN, infinite or more than 1 m away, else 0"},
         {"simulated_s", "s", "simulated time, settling included"},
         {"ticks", "", "ticks, settling included"},
-        {"surgeon_done", "", "1 when the surgeon finished (or gave up) before the time was over"},
+        {"surgeon_done", "", "1 when the surgeon finished before the time was over and did not give up"},
     };
     for (int k = 0; k < static_cast<int>(EventKind::count_); ++k) {
       const std::string name = event_name(static_cast<EventKind>(k));

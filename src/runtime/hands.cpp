@@ -50,6 +50,7 @@ SurgeonSkill skill_of(const SceneSpec& scene) {
   k.drive_speed = s.drive_speed;
   k.tremor = s.tremor;
   k.aim_error = s.aim_error;
+  k.wall = scene.body[0].wall;
   k.seed = scene.seed;
   return k;
 }

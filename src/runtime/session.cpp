@@ -143,7 +143,7 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
     else go_on = one_tick([](const Snapshot&) { return no_hands(); }, "no hands");
   }
   if (hands.surgeon && hands.surgeon->done()) {
-    result.value["surgeon_done"] = 1;
+    result.value["surgeon_done"] = hands.surgeon->gave_up() ? 0 : 1;
     result.ended = "the surgeon was done: " + hands.surgeon->doing();
   }
   run.finish(result);

@@ -68,6 +68,9 @@ void publish(const Model& model, const State& state, Snapshot& out) {
     t.held = hand.held;
     t.held_at = hand.at;
     t.held_slot = hand.slot;
+    t.held_strands = static_cast<uint32_t>(std::count_if(s.thread.hold.begin(), s.thread.hold.end(), [&](const ThreadHold& h) {
+      return h.body == static_cast<int>(k) && h.kind == HoldKind::jaw;
+    }));
     const ToolLoop& loop = state.suture.loop[k];
     t.loop_wraps = loop.wraps;
     t.loop_handed = loop.handed;
@@ -79,8 +82,8 @@ void publish(const Model& model, const State& state, Snapshot& out) {
   }
   // Published at the circle's centre, which is what pictures and plans turn about.
   out.needle.pose = {transform(s.body[kNeedle].pose(), m.needle_arc.centre), s.body[kNeedle].q};
-  out.needle.in_tissue = state.suture.phase != NeedlePhase::outside;
-  out.needle.bite = state.suture.current;
+  out.needle.in_tissue = !state.suture.open.empty();
+  out.needle.bite = state.suture.open.empty() ? 0 : state.suture.open.back().bite;
   out.suture_point.clear();
   for (const SuturePoint& p : state.suture.point) {
     const ThreadAnchor& a = s.thread.anchor[p.anchor];

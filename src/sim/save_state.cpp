@@ -24,7 +24,7 @@ constexpr bool kPlain = std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_
 static_assert(sizeof(Weld) % 4 == 0 && sizeof(Weld) == 4 * (2 + 3 * 7 + 2 + 6));
 static_assert(sizeof(TissuePoint) == 4 * (1 + 16 + 16));
 static_assert(sizeof(Attachment) == sizeof(TissuePoint) + 4 * (1 + 3 + 1 + 3));
-static_assert(sizeof(ChannelPoint) == sizeof(TissuePoint) + 4 * (3 + 3 + 1));
+static_assert(sizeof(ChannelPoint) == sizeof(TissuePoint) + 4 * (4 + 3 + 1));
 static_assert(sizeof(RigidBody) == 4 * (3 + 4 + 3 + 3 + 3 + 4));
 static_assert(sizeof(TissuePin) == 2 * sizeof(TissuePoint) + 4 * 4 && sizeof(SettledNode) == 4 * 4 &&
               sizeof(KnotThrow) == 4 * 5 && sizeof(ClosurePlan::Pair) == 2 * sizeof(TissuePoint) + 4 * 4);
@@ -39,6 +39,10 @@ void fields(A& a, ThreadAnchor& t) {
 template <typename A>
 void fields(A& a, Bite& b) {
   a(b.entry), a(b.exit), a(b.depth), a(b.has_exit), a(b.complete), a(b.cancelled), a(b.nearest);
+}
+template <typename A>
+void fields(A& a, OpenBite& o) {
+  a(o.bite), a(o.phase);
 }
 template <typename A>
 void fields(A& a, SuturePoint& p) {
@@ -72,7 +76,7 @@ void fields(A& a, State& s) {
       a(s.solver.thread.tension), a(s.solver.thread.cut);
   a(s.solver.weld), a(s.solver.attach), a(s.solver.pin), a(s.solver.channel), a(s.solver.thread_collides),
       a(s.solver.body_collides);
-  a(s.suture.bite), a(s.suture.point), a(s.suture.phase), a(s.suture.current), a(s.suture.tip_inside), a(s.suture.attached);
+  a(s.suture.bite), a(s.suture.point), a(s.suture.open), a(s.suture.tip_inside), a(s.suture.attached);
   a(s.suture.attached_from), a(s.suture.hand[0]), a(s.suture.hand[1]);
   for (ToolLoop& l : s.suture.loop) a(l);
   a(s.suture.knot), a(s.suture.settled), a(s.suture.buttons[0]), a(s.suture.buttons[1]), a(s.suture.taken);
@@ -196,9 +200,11 @@ bool fits(const Model& model, const State& s, const State& fresh) {
     if (bite.nearest >= m.tissue || !end_ok(bite.entry) || !end_ok(bite.exit)) return false;
   for (const SuturePoint& p : u.point)
     if (p.bite >= u.bite.size() || p.anchor >= a.thread.anchor.size()) return false;
-  if (u.phase > NeedlePhase::back_in || (u.phase != NeedlePhase::outside && u.current >= u.bite.size())) return false;
-  if ((u.phase == NeedlePhase::through && a.channel.empty()) || (u.attached && !tip_attached)) return false;
-  if (u.attached && u.phase != NeedlePhase::tip_in) return false;
+  for (const OpenBite& o : u.open)
+    if (o.phase == NeedlePhase::outside || o.phase > NeedlePhase::back_in || o.bite >= u.bite.size()) return false;
+  if (u.attached && (!tip_attached || phase_of(u) != NeedlePhase::tip_in)) return false;
+  const bool back_in = std::any_of(u.open.begin(), u.open.end(), [](auto& o) { return o.phase == NeedlePhase::back_in; });
+  if (back_in && u.point.empty()) return false;
   for (const HandState& h : u.hand)
     if (h.held > Held::tissue || (h.held == Held::thread && h.slot - first >= count) ||
         (h.held == Held::tissue && h.slot >= m.tissue))

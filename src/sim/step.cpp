@@ -55,7 +55,7 @@ TechniqueView look(const Model& model, State& state) {
   view.knot = state.suture.knot;
   view.x = state.solver.x.data();
   view.loop = length_between_ends(state.solver, state.suture);
-  view.needle_in_tissue = state.suture.phase != NeedlePhase::outside;
+  view.needle_in_tissue = !state.suture.open.empty();
   view.taken = state.suture.taken;
   view.dt = model.dt;
   return view;
@@ -67,7 +67,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   const SolverModel& solver = model.solver;
   state.event.clear();
   meet_hands(state, input);
-  grasp(solver, state.solver, model.suture, state.suture, input.hand, state.event);
+  grasp(solver, state.solver, state.scratch, model.suture, state.suture, input.hand, state.event);
   find_candidates(solver, state.solver, state.scratch, 0.008f, times);
   for (int i = 1; i <= model.substeps; ++i) {
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));

@@ -72,6 +72,7 @@ struct ChannelPoint {
   float compliance = 0;   // [m/N] sideways
   float drag = 0;         // [N] largest force along the shaft
   float at = 0;           // [rad] where on the arc it was at the start of the substep
+  uint32_t hole = 0;      // which hole it is, for whoever made the row
   Vec3 lambda;            // sideways, cleared at the start of a substep
   float drag_lambda = 0;  // along the shaft
 };

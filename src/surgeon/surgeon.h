@@ -18,6 +18,7 @@ struct SurgeonSkill {
   float tail = 0.045f;                                 // [m] free end left
   float speed = 0.15f, drive_speed = 0.03f;            // [m/s]
   float tremor = 0.0001f, aim_error = 0.0003f;         // [m] standard deviations
+  float wall = 0.0025f;                                // [m] thickness of the wall, which shows at a cut edge
   uint64_t seed = 1;
 };
 
@@ -26,11 +27,13 @@ class Surgeon {
   virtual ~Surgeon() = default;
   // The hands for the next tick, seeing the state after the last one. dt: length of a tick [s].
   virtual std::array<ToolInput, 2> operate(const Snapshot& seen, float dt) = 0;
-  virtual bool done() const = 0;          // the plan is finished (or given up)
+  virtual bool done() const = 0;  // the plan is finished (or given up)
+  virtual bool gave_up() const { return false; }
   virtual std::string doing() const = 0;  // "bite 3 of 12: drive the needle", for progress lines
 };
 
-// The purse-string of paper 2.5.1. Throws std::invalid_argument for a technique without a script.
+// The techniques of paper 2.5: purse_string, connell, stay, lembert. Throws std::invalid_argument for a technique without a
+// script.
 std::unique_ptr<Surgeon> make_surgeon(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
 
 }  // namespace catgut

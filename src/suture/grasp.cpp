@@ -1,4 +1,5 @@
-// suture/grasp: jaws that hold needle or thread. Reads jaws and poses; adds and removes welds and thread holds.
+// suture/grasp: jaws that hold needle, thread or tissue. Reads jaws and poses; adds and removes welds, thread holds and
+// attachments of tissue.
 #include <algorithm>
 
 #include "suture/suture.h"
@@ -18,13 +19,39 @@ void let_go(SolverState& solver, HandState& hand, uint8_t who, float force, std:
     std::erase_if(solver.thread.hold, [&](const ThreadHold& h) { return h.body == body && h.kind == HoldKind::jaw; });
     events.push_back({0, EventKind::thread_released, who, hand.slot, force, solver.body[static_cast<size_t>(body)].x});
   }
+  if (hand.held == Held::tissue) {
+    std::erase_if(solver.attach, [&](const Attachment& a) { return a.body == body; });
+    events.push_back({0, EventKind::tissue_released, who, hand.slot, force, solver.body[static_cast<size_t>(body)].x});
+  }
   hand.held = Held::nothing;
+}
+
+// The jaws close on the wall: its place nearest to them, with the neighbourhood that moves with it, is held where it is.
+void take_tissue(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
+                 HandState& hand, uint8_t who, std::vector<Event>& events) {
+  const RigidBody& tool = solver.body[who];
+  SurfaceHit hit;
+  if (!nearest_surface(model, scratch.candidates, solver.x.data(), tool.x, suture.grasp_reach, hit)) return;
+  if (std::abs(hit.distance) > suture.tissue_reach) return;
+  spread(model, hit.end);
+  const Triangle& corner = model.collision.surface[hit.end.triangle];
+  const size_t nearest =
+      static_cast<size_t>(std::max_element(hit.end.weight.begin(), hit.end.weight.end()) - hit.end.weight.begin());
+  Attachment a;
+  a.point = hit.end.point;
+  a.body = who;
+  a.target = to_local(tool.pose(), hit.point);
+  a.compliance = suture.tissue_compliance;
+  solver.attach.push_back(a);
+  hand.held = Held::tissue;
+  hand.slot = corner[nearest];
+  events.push_back({0, EventKind::tissue_grasped, who, hand.slot, 0, hit.point});
 }
 
 }  // namespace
 
-void grasp(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-           const std::array<ToolInput, 2>& input, std::vector<Event>& events) {
+void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
+           SutureState& state, const std::array<ToolInput, 2>& input, std::vector<Event>& events) {
   for (uint8_t who = 0; who < 2; ++who) {
     HandState& hand = state.hand[who];
     const float jaw = input[who].connected ? input[who].jaw : hand.jaw;
@@ -70,6 +97,8 @@ void grasp(const SolverModel& model, SolverState& solver, const SutureModel& sut
       solver.thread.hold.push_back({hand.slot, who, to_local(tool.pose(), xyz(solver.x[hand.slot])), HoldKind::jaw});
       update_thread_collisions(model, solver, suture);
       events.push_back({0, EventKind::thread_grasped, who, hand.slot, 0, tool.x});
+    } else {
+      take_tissue(model, solver, scratch, suture, hand, who, events);
     }
   }
 }
@@ -90,6 +119,11 @@ void slip(const SolverModel& model, SolverState& solver, const SutureModel& sutu
       // The larger of the two sides: what the jaw has to hold if the other is slack.
       if (i > 0) force = std::max(force, solver.thread.tension[i - 1]);
       if (i < solver.thread.tension.size()) force = std::max(force, solver.thread.tension[i]);
+    }
+    if (hand.held == Held::tissue) {
+      most = suture.tissue_grip;
+      for (const Attachment& a : solver.attach)
+        if (a.body == who) force = length(a.lambda) / (model.h * model.h);
     }
     if (force <= most) continue;
     let_go(solver, hand, who, force, events);

@@ -99,13 +99,30 @@ void erase_anchor(SolverState& solver, SutureState& state, uint32_t anchor) {
     if (p.anchor > anchor) --p.anchor;
 }
 
+// Two holes may lie closer together than two particles of the thread, and the one before has just taken the last of them: the
+// next free particle behind passes the suture points up to the needle before its turn (figure 7c). False: there is none.
+bool bring_particle(Thread& t, SolverState& solver) {
+  size_t from = t.order.size() - 2;
+  while (from > 0 && is_locked(t, t.order[from]) && !t.cut[from]) --from;
+  if (from == 0 || t.cut[from] || t.cut[from - 1]) return false;
+  for (; from + 2 < t.order.size(); ++from) {
+    const uint32_t slot = t.order[from];
+    move_particle(t, from, from + 1);
+    const size_t at = from + 1;
+    set(solver.x[slot], lerp(xyz(solver.x[t.order[at - 1]]), xyz(solver.x[t.order[at + 1]]), 0.5f));
+    solver.v[slot] = {};
+  }
+  return true;
+}
+
 bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                         uint32_t bite, bool exit, std::vector<Event>& events) {
   Thread& t = solver.thread;
   if (t.order.size() < 3) return false;
-  const size_t node = t.order.size() - 2;  // the last is the needle's own
+  const size_t node = t.order.size() - 2;  // the last is the needle's
+  if (t.cut[node] || t.cut[node - 1]) return false;
+  if (is_locked(t, t.order[node]) && !bring_particle(t, solver)) return false;
   const uint32_t slot = t.order[node];
-  if (is_locked(t, slot)) return false;
   const BiteEnd& end = exit ? state.bite[bite].exit : state.bite[bite].entry;
   ThreadAnchor a;
   a.slot = slot;

@@ -12,19 +12,48 @@ namespace {
 
 constexpr float kReach = 0.008f;         // [m] the tip looks this far for the surface
 constexpr float kEndReached = 0.0008f;   // [m] along the shaft: an end of the needle is at the hole
+constexpr float kNewWall = 0.0015f;      // [m] of shaft beyond the last exit: the tip goes in again, it was not drawn back
 constexpr float kHysteresis = 0.00002f;  // [m] so that a tip resting on the surface does not chatter
 constexpr float kBackOut = 0.002f;       // [m] of shaft outside the entry again: the thread is no longer in the hole
 constexpr float kOnShaft = 0.0015f;      // [m] a hole this near to the shaft has the shaft in it
 
-ChannelPoint channel_at(const SutureModel& suture, const BiteEnd& end) {
+uint32_t hole_of(uint32_t bite, bool exit) { return 2 * bite + exit; }
+
+ChannelPoint channel_at(const SutureModel& suture, const Bite& bite, uint32_t which, bool exit) {
+  const BiteEnd& end = exit ? bite.exit : bite.entry;
   ChannelPoint c;
+  c.hole = hole_of(which, exit);
   c.point = end.point;
   c.compliance = suture.channel_compliance;
   c.drag = suture.channel_drag;
   return c;
 }
 
-// The place as a material point, spread over the cluster of the triangle's nearest corner.
+void drop_attachment(SolverState& solver, SutureState& state) {
+  if (!state.attached) return;
+  std::erase_if(solver.attach, [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
+  state.attached = false;
+}
+
+void close_hole(SolverState& solver, uint32_t hole) {
+  std::erase_if(solver.channel, [&](const ChannelPoint& c) { return c.hole == hole; });
+}
+
+// The newest bite is out again the way it came. Its record stays, marked; everything that held needle or tissue there goes.
+void cancel_bite(SolverState& solver, SutureState& state, Vec3 tip, std::vector<Event>& events) {
+  const uint32_t which = state.open.back().bite;
+  Bite& bite = state.bite[which];
+  drop_attachment(solver, state);
+  close_hole(solver, hole_of(which, false));
+  close_hole(solver, hole_of(which, true));
+  bite.cancelled = true;
+  bite.has_exit = false;
+  state.open.pop_back();
+  events.push_back({0, EventKind::bite_cancelled, 0, which, bite.depth, tip});
+}
+
+}  // namespace
+
 void spread(const SolverModel& model, BiteEnd& end) {
   const Triangle& t = model.collision.surface[end.triangle];
   const Vec4* rest = model.shape.rest.data();
@@ -39,26 +68,6 @@ void spread(const SolverModel& model, BiteEnd& end) {
   while (count < model.shape.cluster_stride && member[count] < model.tissue) ++count;  // the pad names no particle
   end.point = spread_point({member, count}, rest, at);
 }
-
-void drop_attachment(SolverState& solver, SutureState& state) {
-  if (!state.attached) return;
-  std::erase_if(solver.attach, [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
-  state.attached = false;
-}
-
-// The needle is out again the way it came. The bite's record stays, marked; everything that held needle, tissue or thread goes.
-void cancel_bite(SolverState& solver, SutureState& state, Vec3 tip, std::vector<Event>& events) {
-  Bite& bite = state.bite[state.current];
-  drop_attachment(solver, state);
-  solver.channel.clear();
-  solver.body_collides[kNeedle] = 1;
-  bite.cancelled = true;
-  bite.has_exit = false;
-  state.phase = NeedlePhase::outside;
-  events.push_back({0, EventKind::bite_cancelled, 0, state.current, bite.depth, tip});
-}
-
-}  // namespace
 
 bool nearest_surface(const SolverModel& model, const Candidates& candidates, const Vec4* x, Vec3 p, float reach,
                      SurfaceHit& hit) {
@@ -112,110 +121,109 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
   const bool was_inside = state.tip_inside;
   const bool inside = near && hit.distance < (was_inside ? kHysteresis : -kHysteresis);
   state.tip_inside = inside;
+  // [m] along the shaft from the swage to an end of a bite.
   auto along = [&](const BiteEnd& end) { return arc.radius * arc.nearest(to_local(needle.pose(), position_of(end.point, x))); };
   const float tip_at = arc.radius * arc.arc;
 
-  switch (state.phase) {
-    case NeedlePhase::outside: {
-      if (!inside || was_inside) return;
-      const Vec3 heading = rotate(needle.q, arc.tangent(arc.arc));
-      state.current = static_cast<uint32_t>(state.bite.size());
-      Bite bite;
-      bite.entry = hit.end;
-      spread(model, bite.entry);
-      const int nearest = nearest_particle(model.collision, scratch.candidates, x, tip, suture.attach_threshold);
-      if (nearest >= 0) bite.nearest = static_cast<uint32_t>(nearest);
-      state.bite.push_back(bite);
-      state.phase = NeedlePhase::tip_in;
-      const float angle = std::acos(std::clamp(-dot(heading, hit.normal), -1.0f, 1.0f));
-      events.push_back({0, EventKind::tip_entered, 0, state.current, angle, hit.point});
-      if (nearest >= 0) {
-        // Figure 4: the nearest particle within X of the tip moves with the tip, by the paper's spring.
-        Attachment a;
-        a.point = particle_point(bite.nearest);
-        a.body = static_cast<int>(kNeedle);
-        state.attached_from = xyz(x[bite.nearest]);
-        a.target = to_local(needle.pose(), state.attached_from);
-        a.compliance = suture.attach_compliance;
-        solver.attach.push_back(a);
-        state.attached = true;
-        events.push_back(
-            {0, EventKind::particle_attached, 0, bite.nearest, distance(state.attached_from, tip), state.attached_from});
+  // --- the tip, in the newest wall ---
+  const NeedlePhase newest = phase_of(state);
+  if (newest == NeedlePhase::tip_in) {
+    const uint32_t which = state.open.back().bite;
+    Bite& bite = state.bite[which];
+    if (inside) bite.depth = std::max(bite.depth, -hit.distance);
+    if (state.attached) {
+      // Figure 5: dragged beyond the threshold, it is let go and the tissue relaxes.
+      const float dragged = distance(xyz(x[bite.nearest]), state.attached_from);
+      const auto row = std::find_if(solver.attach.begin(), solver.attach.end(),
+                                    [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
+      const float torn = distance(transform(needle.pose(), row->target), state.attached_from);
+      if (std::max(dragged, torn) > suture.release_distance) {
+        drop_attachment(solver, state);
+        events.push_back({0, EventKind::particle_released, 0, bite.nearest, dragged, xyz(x[bite.nearest])});
       }
-      solver.channel.push_back(channel_at(suture, bite.entry));
-      solver.body_collides[kNeedle] = 0;  // the shaft is in the tissue now: its channel holds it, not its surface
-      return;
     }
-    case NeedlePhase::tip_in: {
-      Bite& bite = state.bite[state.current];
-      if (inside) bite.depth = std::max(bite.depth, -hit.distance);
-      if (state.attached) {
-        // Figure 5: dragged beyond the threshold, it is let go and the tissue relaxes.
-        const float dragged = distance(xyz(x[bite.nearest]), state.attached_from);
-        const auto row = std::find_if(solver.attach.begin(), solver.attach.end(),
-                                      [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
-        const float torn = distance(transform(needle.pose(), row->target), state.attached_from);
-        if (std::max(dragged, torn) > suture.release_distance) {
-          drop_attachment(solver, state);
-          events.push_back({0, EventKind::particle_released, 0, bite.nearest, dragged, xyz(x[bite.nearest])});
-        }
-      }
-      if (inside) return;
+    if (!inside) {
       drop_attachment(solver, state);
       if (!near || tip_at - along(bite.entry) < kEndReached) {
         cancel_bite(solver, state, tip, events);
-        return;
+      } else {
+        bite.exit = hit.end;
+        spread(model, bite.exit);
+        bite.has_exit = true;
+        solver.channel.push_back(channel_at(suture, bite, which, true));
+        state.open.back().phase = NeedlePhase::through;
+        events.push_back({0, EventKind::tip_exited, 0, which, bite.depth, hit.point});
       }
-      bite.exit = hit.end;
-      spread(model, bite.exit);
-      bite.has_exit = true;
-      solver.channel.push_back(channel_at(suture, bite.exit));
-      state.phase = NeedlePhase::through;
-      events.push_back({0, EventKind::tip_exited, 0, state.current, bite.depth, hit.point});
-      return;
     }
-    case NeedlePhase::through: {
-      Bite& bite = state.bite[state.current];
-      if (inside && tip_at - along(bite.exit) < kEndReached) {
-        bite.has_exit = false;  // drawn back into the wall
-        solver.channel.pop_back();
-        state.phase = NeedlePhase::tip_in;
-        return;
-      }
-      if (!inside && tip_at - along(bite.exit) < kEndReached && tip_at - along(bite.entry) < kEndReached) {
-        // Torn back through both holes between two substeps: the tip was never seen in the wall.
-        cancel_bite(solver, state, tip, events);
-        return;
-      }
-      if (along(bite.entry) > kEndReached) return;
+  } else if (newest == NeedlePhase::through && tip_at - along(state.bite[state.open.back().bite].exit) < kEndReached &&
+             (inside || tip_at - along(state.bite[state.open.back().bite].entry) < kEndReached)) {
+    const uint32_t which = state.open.back().bite;
+    if (inside) {  // drawn back into the wall
+      state.bite[which].has_exit = false;
+      close_hole(solver, hole_of(which, true));
+      state.open.back().phase = NeedlePhase::tip_in;
+    } else {  // torn back through both holes between two substeps: the tip was never seen in the wall
+      cancel_bite(solver, state, tip, events);
+    }
+  } else if (inside && !was_inside &&
+             (newest == NeedlePhase::outside || tip_at - along(state.bite[state.open.back().bite].exit) > kNewWall)) {
+    const uint32_t which = static_cast<uint32_t>(state.bite.size());
+    Bite bite;
+    bite.entry = hit.end;
+    spread(model, bite.entry);
+    const int nearest = nearest_particle(model.collision, scratch.candidates, x, tip, suture.attach_threshold);
+    if (nearest >= 0) bite.nearest = static_cast<uint32_t>(nearest);
+    state.bite.push_back(bite);
+    state.open.push_back({which, NeedlePhase::tip_in});
+    const Vec3 heading = rotate(needle.q, arc.tangent(arc.arc));
+    const float angle = std::acos(std::clamp(-dot(heading, hit.normal), -1.0f, 1.0f));
+    events.push_back({0, EventKind::tip_entered, 0, which, angle, hit.point});
+    if (nearest >= 0) {
+      // Figure 4: the nearest particle within X of the tip moves with the tip, by the paper's spring.
+      Attachment a;
+      a.point = particle_point(bite.nearest);
+      a.body = static_cast<int>(kNeedle);
+      state.attached_from = xyz(x[bite.nearest]);
+      a.target = to_local(needle.pose(), state.attached_from);
+      a.compliance = suture.attach_compliance;
+      solver.attach.push_back(a);
+      state.attached = true;
+      events.push_back(
+          {0, EventKind::particle_attached, 0, bite.nearest, distance(state.attached_from, tip), state.attached_from});
+    }
+    solver.channel.push_back(channel_at(suture, bite, which, false));
+  }
+
+  // --- the back end, in the oldest wall that it has not left ---
+  if (!state.open.empty() && state.open.front().phase >= NeedlePhase::through) {
+    OpenBite& oldest = state.open.front();
+    Bite& bite = state.bite[oldest.bite];
+    if (oldest.phase == NeedlePhase::through) {
       // The back-end trigger: the swage has reached the entry, the thread follows through it.
-      if (!place_suture_point(model, solver, suture, state, state.current, false, events)) return;
-      solver.channel.erase(solver.channel.begin());
-      state.phase = NeedlePhase::back_in;
-      return;
-    }
-    case NeedlePhase::back_in: {
-      Bite& bite = state.bite[state.current];
+      if (along(bite.entry) <= kEndReached && place_suture_point(model, solver, suture, state, oldest.bite, false, events)) {
+        close_hole(solver, hole_of(oldest.bite, false));
+        oldest.phase = NeedlePhase::back_in;
+      }
+    } else {
       const float entry_at = along(bite.entry);
       if (entry_at > kBackOut && entry_at < 0.5f * tip_at &&
           distance(position_of(bite.entry.point, x), needle_point(arc, needle, entry_at / arc.radius)) < kOnShaft) {
         // The back end came out of the entry again: the thread has left the hole, the shaft is in it.
         remove_last_suture_point(model, solver, suture, state);
-        solver.channel.insert(solver.channel.begin(), channel_at(suture, bite.entry));
-        state.phase = NeedlePhase::through;
-        return;
+        solver.channel.push_back(channel_at(suture, bite, oldest.bite, false));
+        oldest.phase = NeedlePhase::through;
+      } else if (along(bite.exit) <= kEndReached &&
+                 place_suture_point(model, solver, suture, state, oldest.bite, true, events)) {
+        close_hole(solver, hole_of(oldest.bite, true));
+        bite.complete = true;
+        const Vec3 out = position_of(bite.exit.point, x);
+        events.push_back({0, EventKind::bite_completed, 0, oldest.bite, distance(position_of(bite.entry.point, x), out), out});
+        state.open.erase(state.open.begin());
       }
-      if (along(bite.exit) > kEndReached) return;
-      if (!place_suture_point(model, solver, suture, state, state.current, true, events)) return;
-      solver.channel.clear();
-      solver.body_collides[kNeedle] = 1;
-      bite.complete = true;
-      state.phase = NeedlePhase::outside;
-      const Vec3 out = position_of(bite.exit.point, x);
-      events.push_back({0, EventKind::bite_completed, 0, state.current, distance(position_of(bite.entry.point, x), out), out});
-      return;
     }
   }
+  // In the tissue the shaft is held by its channel, not by the surface.
+  solver.body_collides[kNeedle] = state.open.empty();
 }
 
 }  // namespace catgut

@@ -31,12 +31,19 @@ struct Bite {
   uint32_t nearest = 0;  // the paper's p7: nearest particle when the tip went in
 };
 
-// How far the needle is on its way through the tissue.
+// How far the needle is on its way through a wall.
 enum class NeedlePhase : uint8_t {
-  outside,  // no bite begun
+  outside,  // in no wall
   tip_in,   // the tip is in the tissue
   through,  // the tip has come out; the shaft is in the channel
   back_in,  // the back end has gone in at the entry: the thread follows
+};
+
+// A wall that the needle is in. Its arc is longer than a wall is thick: it can be in several at once, as when one sweep goes in
+// and out again (Connell) or takes two layers (Lembert).
+struct OpenBite {
+  uint32_t bite = 0;
+  NeedlePhase phase = NeedlePhase::tip_in;
 };
 
 struct SuturePoint {
@@ -91,20 +98,21 @@ struct SutureModel {
   float attach_compliance = 1.0f / 1100, channel_compliance = 0.002f;  // [m/N]
   float channel_drag = 0.12f;                                          // [N] per end of the channel
   float pass_tension = 0.03f;                                          // [N]
-  float capstan = 0.08f;                     // thread-tissue friction times the angle by which a suture point bends the thread
-  int collision_off = 3;                     // thread particles on each side
-  float grasp_reach = 0.003f;                // [m]
-  float needle_grip = 40, thread_grip = 15;  // [N] beyond which a jaw slips
+  float capstan = 0.08f;       // thread-tissue friction times the angle by which a suture point bends the thread
+  int collision_off = 3;       // thread particles on each side
+  float grasp_reach = 0.003f;  // [m]
+  float needle_grip = 40, thread_grip = 15, tissue_grip = 6;         // [N] beyond which a jaw slips
+  float tissue_compliance = 5e-4f;                                   // [m/N] of tissue held by a jaw
+  float tissue_reach = 0.0015f;                                      // [m] how near the surface must be to a closing jaw
   float grasp_compliance = 2e-5f, grasp_angular_compliance = 0.02f;  // [m/N], [rad/(N m)]
 };
 
 struct SutureState {
   std::vector<Bite> bite;
   std::vector<SuturePoint> point;  // in the order in which they were made
-  NeedlePhase phase = NeedlePhase::outside;
-  uint32_t current = 0;  // the bite being made, valid unless phase is outside
+  std::vector<OpenBite> open;      // the walls that the needle is in, the one nearest to its back end first
   bool tip_inside = false;
-  bool attached = false;  // bite[current].nearest is attached to the tip
+  bool attached = false;  // the newest bite's nearest particle is attached to the tip
   Vec3 attached_from;     // [m] where that particle was
   std::array<HandState, 2> hand;
   std::array<ToolLoop, 2> loop;        // round each tool
@@ -114,14 +122,18 @@ struct SutureState {
   uint32_t taken = 0;                  // fresh needles and threads so far
 };
 
+// Of the newest bite; outside when the needle is in no wall.
+inline NeedlePhase phase_of(const SutureState& s) { return s.open.empty() ? NeedlePhase::outside : s.open.back().phase; }
+
 // --- grasp.cpp ---------------------------------------------------------------------------------------------------------
-// Once a tick. A jaw that closes within reach of the needle or else of the thread holds it at the place and angle where it was
-// caught; opening lets go.
-void grasp(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-           const std::array<ToolInput, 2>& hand, std::vector<Event>& events);
+// Once a tick. A jaw that closes within reach of the needle, else of the thread, else of the tissue's surface holds it at the
+// place and angle where it was caught; opening lets go. scratch: where the last substep left the broad phase.
+void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
+           SutureState& state, const std::array<ToolInput, 2>& hand, std::vector<Event>& events);
 
 // After every substep: a jaw that is pulled on harder than it grips lets slip what it holds (needle: needle_grip, thread:
-// thread_grip), before the pull becomes one that no hand could make. Reported as a release with the force [N] as its value.
+// thread_grip, tissue: tissue_grip), before the pull becomes one that no hand could make. Reported as a release with the force
+// [N] as its value.
 void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
           std::vector<Event>& events);
 
@@ -136,6 +148,8 @@ struct SurfaceHit {
   Vec3 point, normal;
   float distance = 0;
 };
+// Makes end.point: the place as a weighted point over the cluster of its triangle's nearest corner.
+void spread(const SolverModel& model, BiteEnd& end);
 bool nearest_surface(const SolverModel& model, const Candidates& candidates, const Vec4* x, Vec3 p, float reach,
                      SurfaceHit& hit);
 

@@ -57,7 +57,7 @@ Played scripted_run(const Model& model, size_t ticks) {
     publish(model, *state, seen);
     run.input.push_back(in);
     run.hash.push_back(hash_state(model, *state));
-    if (!run.mid_bite && state->suture.phase == NeedlePhase::through) run.mid_bite = i + 5;
+    if (!run.mid_bite && phase_of(state->suture) == NeedlePhase::through) run.mid_bite = i + 5;
   }
   return run;
 }
@@ -98,7 +98,7 @@ TEST_F(Scripted, saved_in_the_middle_of_a_bite_and_loaded_it_goes_on_bit_for_bit
   StatePtr state = initial_state(*model_);
   play(*state, 0, run_->mid_bite, 1);
   const std::vector<std::byte> bytes = save_state(*model_, *state);
-  EXPECT_NE(state->suture.phase, NeedlePhase::outside);
+  EXPECT_NE(phase_of(state->suture), NeedlePhase::outside);
   StatePtr other = initial_state(*model_);
   load_state(*model_, *other, bytes);
   EXPECT_EQ(hash_state(*model_, *other), run_->hash[run_->mid_bite - 1]);
@@ -302,7 +302,9 @@ void fling(uint64_t seed, float seconds, Fling& out) {
     ASSERT_NEAR(rest, double{model->solver.thread.spacing} * static_cast<double>(order.size() - 1), 1e-4)
         << "seed " << seed << ", tick " << i;
     // Nothing dangles: rows of a bite exist only during one.
-    if (state->suture.phase == NeedlePhase::outside) { ASSERT_TRUE(state->solver.channel.empty() && !state->suture.attached); }
+    if (phase_of(state->suture) == NeedlePhase::outside) {
+      ASSERT_TRUE(state->solver.channel.empty() && !state->suture.attached);
+    }
     ASSERT_LE(state->solver.weld.size(), 4u);
   }
   // The hands leave: everything comes to rest.

@@ -177,5 +177,48 @@ TEST(Grasp, pulling_the_tail_passes_thread_toward_the_free_end) {
   EXPECT_TRUE(r.order_is_whole());
 }
 
+// A tool at the rim, its jaws on the wall, pointing down at it.
+Pose at_rim(Hands& r, float angle) {
+  const Place p = r.place(angle, 0.003f);
+  return {p.at, from_axes(p.along, cross(p.out, p.along), p.out)};
+}
+
+TEST(Grasp, a_jaw_that_closes_on_the_wall_holds_the_tissue_and_draws_it_along) {
+  Hands r;
+  r.wait(0.3f);
+  r.show(1, at_rim(r, 1.1f), 1);
+  r.close(1);
+  ASSERT_EQ(r.count(EventKind::tissue_grasped), 1u);
+  ASSERT_EQ(r.suture().hand[1].held, Held::tissue);
+  const uint32_t particle = r.suture().hand[1].slot;
+  const Vec3 before = xyz(r.x()[particle]);
+  const Pose start = r.input.hand[1].pose;
+  const Vec3 out = normalized(Vec3{start.p.x, 0, start.p.z});
+  for (int i = 1; i <= 60; ++i) r.input.hand[1].pose.p = start.p + out * (0.0001f * static_cast<float>(i)), r.tick();
+  r.wait(0.3f);
+  EXPECT_GT(dot(xyz(r.x()[particle]) - before, out), 0.003f) << "the wall follows a pull of 6 mm";
+  // Two-way: the hand is held back by the tissue, on the line of the pull.
+  EXPECT_LT(dot(r.solver().body[1].x - r.input.hand[1].pose.p, out), -1e-5f);
+  r.open(1);
+  EXPECT_EQ(r.count(EventKind::tissue_released), 1u);
+  EXPECT_FLOAT_EQ(r.last(EventKind::tissue_released)->value, 0.0f);
+  r.input.hand[1].connected = 0;
+  r.wait(1.5f);
+  EXPECT_LT(distance(xyz(r.x()[particle]), before), 0.001f) << "let go, the wall returns";
+}
+
+TEST(Grasp, tissue_slips_out_of_a_jaw_that_is_torn_away) {
+  Hands r;
+  r.wait(0.3f);
+  r.show(1, at_rim(r, 1.1f), 1);
+  r.close(1);
+  ASSERT_EQ(r.suture().hand[1].held, Held::tissue);
+  const Pose start = r.input.hand[1].pose;
+  const Vec3 out = normalized(Vec3{start.p.x, 0, start.p.z});
+  for (int i = 1; i <= 90; ++i) r.input.hand[1].pose.p = start.p + out * (0.001f * static_cast<float>(i)), r.tick();
+  ASSERT_EQ(r.count(EventKind::tissue_released), 1u);
+  EXPECT_GT(r.last(EventKind::tissue_released)->value, r.model->suture.tissue_grip);
+}
+
 }  // namespace
 }  // namespace catgut

@@ -95,9 +95,17 @@ TEST(Figure7, a_suture_point_locks_the_next_free_particle_behind_the_needle) {
   EXPECT_LT(distance(xyz(rig.x()[next_free]), position_of(bite.entry.point, rig.x())), 1e-7f);
   EXPECT_NEAR(rig.rest_length(), length, 1e-7);
   EXPECT_TRUE(rig.order_is_whole());
-  // Until a particle has passed there is none for the next suture point.
-  EXPECT_FALSE(place_suture_point(rig.model->solver, rig.solver(), rig.model->suture, rig.suture(), 0, true, events));
-  EXPECT_EQ(rig.thread().anchor.size(), 1u);
+  // A second hole right behind the first: the particle behind passes the first suture point before its turn (figure 7c).
+  const uint32_t behind = rig.thread().order[n - 3];
+  bite.exit.point = bite.entry.point;
+  rig.suture().bite[0] = bite;
+  ASSERT_TRUE(place_suture_point(rig.model->solver, rig.solver(), rig.model->suture, rig.suture(), 0, true, events));
+  ASSERT_EQ(rig.thread().anchor.size(), 2u);
+  EXPECT_EQ(rig.thread().anchor[1].slot, behind);
+  EXPECT_EQ(rig.node_of(next_free), n - 3) << "the first suture point keeps its particle";
+  EXPECT_EQ(rig.node_of(behind), n - 2);
+  EXPECT_NEAR(rig.rest_length(), length, 1e-7);
+  EXPECT_TRUE(rig.order_is_whole());
 }
 
 // "... allowing tension T to build between the anchored particle and the particle still attached to the needle as it moves

@@ -156,7 +156,7 @@ TEST(Bite, drawn_back_before_the_tip_came_out_leaves_nothing_behind) {
   const Place p = rig.place(0.4f);
   rig.approach(p);
   rig.drive(p, -1.0f, 0.0f);
-  ASSERT_EQ(rig.suture().phase, NeedlePhase::tip_in);
+  ASSERT_EQ(phase_of(rig.suture()), NeedlePhase::tip_in);
   EXPECT_EQ(rig.solver().channel.size(), 1u);
   EXPECT_EQ(rig.solver().body_collides[kNeedle], 0);
   rig.drive(p, 0.0f, -1.2f);
@@ -169,7 +169,7 @@ TEST(Bite, drawn_back_after_the_tip_came_out_leaves_nothing_behind) {
   const Place p = rig.place(0.4f);
   rig.approach(p);
   rig.drive(p, -1.0f, 1.2f);
-  ASSERT_EQ(rig.suture().phase, NeedlePhase::through);
+  ASSERT_EQ(phase_of(rig.suture()), NeedlePhase::through);
   EXPECT_EQ(rig.solver().channel.size(), 2u);
   rig.drive(p, 1.2f, -1.2f);
   expect_like_never_begun(rig);
@@ -182,7 +182,7 @@ TEST(Bite, torn_back_in_one_tick_leaves_nothing_behind) {
   const Place p = rig.place(0.4f);
   rig.approach(p);
   rig.drive(p, -1.0f, 1.2f);
-  ASSERT_EQ(rig.suture().phase, NeedlePhase::through);
+  ASSERT_EQ(phase_of(rig.suture()), NeedlePhase::through);
   rig.drive(p, 1.2f, -1.3f, 0.0011f, 200.0f);
   rig.draw(p, 0.03f, 0.1f);
   rig.wait(0.3f);
@@ -197,8 +197,8 @@ TEST(Bite, drawn_back_after_the_back_end_went_in_frees_the_thread) {
   rig.approach(p);
   float psi = 1.2f;
   rig.drive(p, -1.0f, psi);
-  while (rig.suture().phase == NeedlePhase::through && psi < 4.2f) rig.drive(p, psi, psi + 0.06f), psi += 0.06f;
-  ASSERT_EQ(rig.suture().phase, NeedlePhase::back_in);
+  while (phase_of(rig.suture()) == NeedlePhase::through && psi < 4.2f) rig.drive(p, psi, psi + 0.06f), psi += 0.06f;
+  ASSERT_EQ(phase_of(rig.suture()), NeedlePhase::back_in);
   ASSERT_EQ(rig.thread().anchor.size(), 1u);
   const double length = rig.rest_length();
   rig.drive(p, psi, -1.2f);
@@ -300,6 +300,55 @@ TEST(Spread, reproduces_the_place_at_rest_and_under_affine_motion) {
     for (Vec4& p : moved) set(p, affine(xyz(p)));
     EXPECT_LT(distance(position_of(t, moved.data()), affine(at)), 1e-6f);
   }
+}
+
+// 2.5.2: "The needle is passed through one soft body (creating a suture point), then through the same soft body again for a
+// second bite." A sweep deeper than the wall does both: outside in, then inside out.
+TEST(TwoWalls, one_sweep_through_the_lumen_makes_two_bites) {
+  SceneSpec scene = plain_scene();
+  scene.body[0].wall = 0.0016f;
+  Rig rig(scene);
+  rig.wait(0.2f);
+  const Place p = rig.place(0.4f, 0.006f);
+  rig.approach(p, 0.0027f);
+  size_t most_open = 0;
+  for (float psi = -1.0f; psi < 4.3f; psi += 0.06f) {
+    rig.drive(p, psi, psi + 0.06f, 0.0027f);
+    most_open = std::max(most_open, rig.suture().open.size());
+  }
+  ASSERT_EQ(most_open, 2u) << "the needle was in both walls at once";
+  ASSERT_EQ(rig.suture().bite.size(), 2u);
+  EXPECT_TRUE(rig.suture().bite[0].complete && rig.suture().bite[1].complete);
+  EXPECT_EQ(rig.count(EventKind::bite_completed), 2u);
+  ASSERT_EQ(rig.suture().point.size(), 4u);
+  const auto inside = [&](const BiteEnd& end) {
+    return rig.model->layer[rig.model->solver.collision.surface[end.triangle][0]] == static_cast<uint8_t>(TissueLayer::mucosa);
+  };
+  EXPECT_FALSE(inside(rig.suture().bite[0].entry));
+  EXPECT_TRUE(inside(rig.suture().bite[0].exit));
+  EXPECT_TRUE(inside(rig.suture().bite[1].entry));
+  EXPECT_FALSE(inside(rig.suture().bite[1].exit));
+  // The suture points follow each other along the thread, from the free end to the needle.
+  for (size_t k = 0; k + 1 < 4; ++k) EXPECT_LT(rig.node_of_point(k), rig.node_of_point(k + 1)) << k;
+  EXPECT_TRUE(rig.order_is_whole());
+  EXPECT_TRUE(rig.nothing_left_of_a_bite());
+  EXPECT_NEAR(rig.rest_length(), 174 * 0.0016, 1e-6);
+}
+
+TEST(TwoWalls, drawn_back_the_same_way_both_bites_are_cancelled) {
+  SceneSpec scene = plain_scene();
+  scene.body[0].wall = 0.0016f;
+  Rig rig(scene);
+  rig.wait(0.2f);
+  const Place p = rig.place(0.4f, 0.006f);
+  rig.approach(p, 0.0027f);
+  float psi = -1.0f;
+  while (rig.suture().open.size() < 2 && psi < 1.5f) rig.drive(p, psi, psi + 0.06f, 0.0027f), psi += 0.06f;
+  ASSERT_EQ(rig.suture().open.size(), 2u);
+  rig.drive(p, psi, -1.2f, 0.0027f);
+  EXPECT_EQ(rig.count(EventKind::bite_cancelled), 2u);
+  EXPECT_TRUE(rig.suture().point.empty());
+  EXPECT_TRUE(rig.nothing_left_of_a_bite());
 }
 
 }  // namespace

@@ -149,7 +149,7 @@ struct Rig {
     return order.size() == model->solver.thread.count;
   }
   bool nothing_left_of_a_bite() {
-    return solver().channel.empty() && !suture().attached && suture().phase == NeedlePhase::outside &&
+    return solver().channel.empty() && !suture().attached && phase_of(suture()) == NeedlePhase::outside &&
            solver().body_collides[kNeedle] == 1 &&
            std::none_of(solver().attach.begin(), solver().attach.end(), [](const Attachment& a) { return a.body >= 0; });
   }

@@ -1,0 +1,206 @@
+// surgeon/plan: the four techniques of paper 2.5 as a surgeon does them. Reads the picture at rest; see plan.h.
+#include "surgeon/plan.h"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "surgeon/sight.h"
+
+namespace catgut {
+namespace {
+
+constexpr float kFreeDepth = 0.0045f;  // [m] below the rims that a sweep through two layers reaches
+
+// Depth of the needle's circle below a surface of radius `curved` [m] whose chord is `length`.
+float depth_of(float length, float needle, float curved) { return length * length / 8 * (1 / needle + 1 / curved); }
+
+// The serosa vertex nearest to a place `edge` below the rim point `on_rim`.
+void settle_on_serosa(const VisibleMesh& mesh, Vec3 on_rim, Vec3 axis, Vec3 sideways, float edge, BitePlace& place) {
+  float best = std::numeric_limits<float>::max();
+  uint32_t found = 0;
+  for (uint32_t k = 0; k < mesh.position.size(); ++k) {
+    if (mesh.layer[k] != TissueLayer::serosa) continue;
+    const Vec3 d = mesh.position[k] - on_rim;
+    const float below = length(d - sideways * dot(d, sideways)) - edge, side = dot(d, sideways);
+    const float wrong_way = std::max(0.0f, dot(d, axis)), score = below * below + side * side + 4 * wrong_way * wrong_way;
+    if (length2(d) < 4 * edge * edge + 1e-5f && score < best) best = score, found = k;
+  }
+  place.at = mesh.position[found];
+  place.out = mesh.normal[found];
+}
+
+// Bites round an opening, even in length along the rim, not in angle: an organ's rim is no circle.
+void places_round(const PictureModel& picture, const SurgeonSkill& skill, Plan& plan) {
+  const OpeningShape o = opening_shape(picture, 0);
+  const std::vector<uint32_t>& rim = picture.rim[0];
+  const std::vector<Vec3>& rest = picture.particle_rest;
+  const Vec3 u = normalized(Vec3{1, 0, 0} - o.axis * o.axis.x, any_perpendicular(o.axis)), v = cross(o.axis, u);
+  const size_t n = rim.size();
+  auto angle_of = [&](Vec3 p) { return std::atan2(dot(p - o.centre, v), dot(p - o.centre, u)); };
+  size_t start = 0;
+  float turn = 0;
+  for (size_t i = 0; i < n; ++i) {
+    if (std::abs(angle_of(rest[rim[i]])) < std::abs(angle_of(rest[rim[start]]))) start = i;
+    turn += dot(cross(rest[rim[i]] - o.centre, rest[rim[(i + 1) % n]] - o.centre), o.axis);
+  }
+  const bool counter = turn > 0;  // go clockwise seen from above: the way a right hand's needle turns
+  auto rim_at = [&](size_t i) { return rest[rim[(start + (counter ? n - i % n : i % n)) % n]]; };
+  std::vector<float> run{0};
+  for (size_t i = 0; i < n; ++i) run.push_back(run.back() + distance(rim_at(i), rim_at(i + 1)));
+  for (int b = 0; b < skill.bites; ++b) {
+    const float want = run.back() * static_cast<float>(b) / static_cast<float>(skill.bites);
+    size_t i = 0;
+    while (i + 1 < n && run[i + 1] <= want) ++i;
+    const Vec3 on_rim = lerp(rim_at(i), rim_at(i + 1), (want - run[i]) / std::max(run[i + 1] - run[i], 1e-6f));
+    const Vec3 radial = normalized(on_rim - o.centre - o.axis * dot(on_rim - o.centre, o.axis));
+    BitePlace p;
+    settle_on_serosa(picture.body[0], on_rim, o.axis, cross(o.axis, radial), skill.edge_distance, p);
+    p.up = o.axis;
+    p.length = skill.bite_length;
+    p.depth = depth_of(p.length, picture.needle_radius, run.back() / (2 * kPi));
+    p.level = true;
+    plan.place.push_back(p);
+  }
+}
+
+// A place on the upper side of bowel end `wall`, `angle` round from the top and `edge` from the rim.
+BitePlace on_top(const PictureModel& picture, uint32_t wall, float angle, float edge) {
+  const OpeningShape o = opening_shape(picture, wall);
+  const Vec3 top = normalized(Vec3{0, 1, 0} - o.axis * o.axis.y, any_perpendicular(o.axis)), side = cross(top, Vec3{1, 0, 0});
+  BitePlace p;
+  p.out = top * std::cos(angle) - side * std::sin(angle);
+  p.at = o.centre + p.out * o.radius - o.axis * edge;
+  p.wall = wall;
+  return p;
+}
+
+void add(Plan& plan, TaskKind kind, int which = 0, int way = 1) { plan.task.push_back({kind, which, way}); }
+
+Plan purse_string_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan;
+  plan.lift = 0.012f;
+  places_round(picture, skill, plan);
+  add(plan, TaskKind::pick_up);
+  for (int b = 0; b < skill.bites; ++b) {
+    add(plan, TaskKind::bite, b);
+    add(plan, b == 0 ? TaskKind::pull_tail : TaskKind::pull_slack);
+    if (b + 1 < skill.bites) add(plan, TaskKind::hand_back);
+  }
+  add(plan, TaskKind::draw);
+  add(plan, TaskKind::rest);
+  return plan;
+}
+
+// 2.5.2: sweeps along the edge, each outside in and inside out again on one bowel, then straight across to the other. The first
+// crossing is tied like a stay suture, so that the thread has something to pull against; the last throw locks the running
+// thread.
+Plan connell_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan;
+  plan.forceps_side = -1;
+  const int sweeps = (skill.bites + 1) / 2;
+  const float radius = opening_shape(picture, 0).radius;
+  const float turn = 2 * std::asin(0.5f * skill.bite_length / radius);
+  for (int s = 0; s < sweeps; ++s) {
+    const float angle = turn * (0.5f * static_cast<float>(sweeps - 1) - static_cast<float>(s));
+    BitePlace p = on_top(picture, static_cast<uint32_t>(s % 2), angle, skill.edge_distance);
+    p.up = {1, 0, 0};
+    p.length = skill.bite_length;
+    p.depth = depth_of(p.length, picture.needle_radius, radius);
+    p.walls = 2;
+    plan.place.push_back(p);
+  }
+  add(plan, TaskKind::pick_up);
+  for (int s = 0; s < sweeps; ++s) {
+    add(plan, TaskKind::bite, s);
+    if (s == 0) add(plan, TaskKind::pull_tail);
+    else if (s > 1) add(plan, TaskKind::pull_together);
+    if (s == 1) {
+      add(plan, TaskKind::draw);
+      add(plan, TaskKind::regrip);
+      add(plan, TaskKind::throw_, 2, 1);
+      add(plan, TaskKind::throw_, 1, -1);
+    }
+    if (s + 1 < sweeps) add(plan, TaskKind::hand_back);
+  }
+  add(plan, TaskKind::regrip);
+  add(plan, TaskKind::lock_strand, 1, 1);
+  add(plan, TaskKind::rest);
+  return plan;
+}
+
+// 2.5.3: one bite through each bowel end, across the gap; pulled even, tied, the needle taken off, both ends held.
+Plan stay_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan;
+  plan.forceps_side = -1;
+  for (uint32_t wall = 0; wall < 2; ++wall) {
+    BitePlace p = on_top(picture, wall, 0, skill.edge_distance + 0.5f * skill.bite_length);
+    p.up = {0, 0, 1};
+    p.length = skill.bite_length;
+    p.depth = depth_of(p.length, picture.needle_radius, 1e9f);
+    plan.place.push_back(p);
+  }
+  add(plan, TaskKind::pick_up);
+  add(plan, TaskKind::bite, 0);
+  add(plan, TaskKind::hand_back);
+  add(plan, TaskKind::bite, 1);
+  add(plan, TaskKind::pull_tail);
+  add(plan, TaskKind::draw);
+  add(plan, TaskKind::regrip);
+  add(plan, TaskKind::throw_, 2, 1);
+  add(plan, TaskKind::throw_, 1, -1);
+  add(plan, TaskKind::take_both);
+  add(plan, TaskKind::cut_needle);
+  add(plan, TaskKind::rest);
+  return plan;
+}
+
+// 2.5.4: single stitches through outer and inner layer round the ring, each tied and cut, with a fresh needle for the next.
+Plan lembert_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan;
+  plan.forceps_side = -1;
+  const OpeningShape outer = opening_shape(picture, 0), inner = opening_shape(picture, 1);
+  const Vec3 u = normalized(Vec3{0, 0, 1} - outer.axis * outer.axis.z, any_perpendicular(outer.axis)), v = cross(outer.axis, u);
+  // The wall's thickness shows at the cut edge: from the outer rim inward by as much as the mucosa lies inside it.
+  const float wall = skill.wall;
+  for (int b = 0; b < skill.bites; ++b) {
+    const float angle = 2 * kPi * static_cast<float>(b) / static_cast<float>(skill.bites);
+    const Vec3 radial = u * std::cos(angle) + v * std::sin(angle);
+    BitePlace p;
+    const float middle = 0.5f * (outer.radius + inner.radius - wall);
+    p.at = outer.centre + radial * middle;
+    p.out = outer.axis;
+    p.up = cross(-radial, outer.axis);  // so that cross(out, up) leads inward
+    p.length = outer.radius - inner.radius + wall;
+    p.depth = kFreeDepth;
+    p.walls = 2;
+    plan.place.push_back(p);
+    add(plan, TaskKind::pick_up);
+    add(plan, TaskKind::bite, b);
+    add(plan, TaskKind::pull_tail);
+    add(plan, TaskKind::regrip);
+    add(plan, TaskKind::throw_, 2, 1);
+    add(plan, TaskKind::throw_, 1, -1);
+    add(plan, TaskKind::cut_long);
+    add(plan, TaskKind::cut_tail);
+    if (b + 1 < skill.bites) add(plan, TaskKind::fresh);
+  }
+  add(plan, TaskKind::rest);
+  return plan;
+}
+
+}  // namespace
+
+Plan make_plan(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill) {
+  const size_t walls = technique == "purse_string" ? 1 : 2;
+  for (size_t w = 0; w < walls; ++w)
+    if (picture.body.empty() || w >= picture.rim.size() || picture.rim[w].empty())
+      throw std::invalid_argument("the scene does not have the openings that the technique \"" + technique + "\" works on");
+  if (technique == "purse_string") return purse_string_plan(picture, skill);
+  if (technique == "connell") return connell_plan(picture, skill);
+  if (technique == "stay") return stay_plan(picture, skill);
+  if (technique == "lembert") return lembert_plan(picture, skill);
+  throw std::invalid_argument("there is no scripted surgeon for technique \"" + technique + "\"");
+}
+
+}  // namespace catgut
