@@ -19,14 +19,20 @@ Camera overview(const PictureModel& model) {
 }
 
 FollowCamera::FollowCamera(const PictureModel& model)
-    : half_height(0.3f * model.field), focus_(model.focus), field_(model.field), target_(model.focus) {}
+    : half_height(0.3f * model.field),
+      focus_(model.focus),
+      field_(model.field),
+      target_(model.focus),
+      front_(model.body.size() > 1) {}
 
 Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
   // Part of the way from the organ's middle to the needle: the work stays in view together with what it is done to.
   Vec3 offset = snapshot.needle.pose.p - focus_;
   if (!is_finite(offset)) offset = {};
-  const float reach = 0.35f * field_;
-  if (const float l = length(offset); l > reach) offset *= reach / l;
+  // Hands that tie or draw thread are farther away: the picture opens up for them.
+  const float away = length(offset), reach = 0.35f * field_;
+  const float half_wanted = std::clamp(0.55f * away, half_height, 0.62f * field_);
+  if (away > reach) offset *= std::min(away, 1.1f * field_) / away;
   const Vec3 wanted = focus_ + 0.45f * offset;
 
   // Near the axis the needle's direction means nothing; the camera keeps to where it is.
@@ -48,19 +54,23 @@ Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
     if (clear(-hand_) > clear(hand_) + (started_ ? 0.35f : 0)) hand_ = -hand_;
     side = middle + hand_ * beside;
   }
+  if (front_) side = std::clamp(wrap_angle(side), -0.75f, 0.75f);
 
   if (!started_) {
     started_ = true;
     target_ = wanted;
     azimuth_ = side;
+    half_ = half_wanted;
   } else if (dt > 0) {
-    target_ = lerp(target_, wanted, 1 - std::exp(-3 * dt / settle_time));
+    const float part = 1 - std::exp(-3 * dt / settle_time);
+    target_ = lerp(target_, wanted, part);
+    half_ += (half_wanted - half_) * part;
     const float want_speed = std::clamp(wrap_angle(side - azimuth_) / settle_time, -turn_speed, turn_speed);
     // The speed itself eases, or the camera would start and stop with a jerk.
     speed_ += (want_speed - speed_) * (1 - std::exp(-4 * dt / settle_time));
     azimuth_ = wrap_angle(azimuth_ + std::clamp(speed_ * dt, -0.5f, 0.5f));
   }
-  return look_at_from(target_, azimuth_, elevation, half_height, fov_deg);
+  return look_at_from(target_, azimuth_, elevation, half_, fov_deg);
 }
 
 }  // namespace catgut

@@ -26,7 +26,7 @@ struct FollowCamera {
   float beside = 0.7f;         // [rad] from the needle's side of the organ, toward where the tools' shafts hide less
   float turn_speed = 0.35f;    // [rad/s] at most
   float settle_time = 1.2f;    // [s] in which most of a change of target is made up
-  float half_height = 0.034f;  // [m] of the picture, at the target
+  float half_height = 0.034f;  // [m] of the picture, at the target, with the needle at the tissue; more when it is drawn away
   float fov_deg = 30;
 
  private:
@@ -35,6 +35,8 @@ struct FollowCamera {
   Vec3 target_;
   float azimuth_ = 0.6f, speed_ = 0;  // [rad], [rad/s]
   float hand_ = 1;                    // +1 or -1: on which side of the needle the camera stands
+  float half_ = 0;                    // [m] half the picture's height now
+  bool front_ = false;                // it stays on the surgeon's side: two bowel ends lie across the field
   bool started_ = false;
 };
 

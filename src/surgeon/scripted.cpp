@@ -18,12 +18,12 @@ namespace {
 constexpr size_t kDriver = 0, kForceps = 1;
 // Places on the needle's arc: two thirds from the tip, behind the tip, behind the swage.
 constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f, kTyingAt = 0.12f;
-constexpr int kAttempts = 8;          // at one bite, at one grasp, at one throw
-constexpr float kHalfOpen = 0.7f;     // a jaw that lets go without shaking off a loop
-constexpr float kStump = 0.007f;      // [m] of thread left on a knot
-constexpr float kWindAt = 0.008f;     // [m] behind the driver's tip, where thread is wound round it
+constexpr int kAttempts = 8;            // at one bite, at one grasp, at one throw
+constexpr float kHalfOpen = 0.7f;       // a jaw that lets go without shaking off a loop
+constexpr float kStump = 0.007f;        // [m] of thread left on a knot
+constexpr float kWindAt = 0.009f;       // [m] behind the driver's tip, where thread is wound round it
 constexpr float kWindRadius = 0.0019f;  // [m] of a wrap's middle line
-constexpr float kSecure = 0.985f;     // of a closure that counts as closed
+constexpr float kSecure = 0.985f;       // of a closure that counts as closed
 
 // Where a bite is made, in the world as it is now: a place, outward, the way of the needle, the axis about which it turns.
 struct BiteFrame {
@@ -395,7 +395,7 @@ class Scripted final : public Surgeon {
   // --- tying ------------------------------------------------------------------------------------------------------------
   // How the hands stand to tie: the driver lies across the wound from the right, the forceps comes from the left.
   static Pose tying_pose(size_t hand, Vec3 at) {
-    const Vec3 z = normalized(Vec3{hand == kDriver ? 1.0f : -1.0f, 0.45f, 0.15f}), x = normalized(Vec3{0, 1, 0} - z * z.y);
+    const Vec3 z = normalized(Vec3{hand == kDriver ? 1.0f : -1.0f, 0.3f, 0.15f}), x = normalized(Vec3{0, 1, 0} - z * z.y);
     return {at, from_axes(x, cross(z, x), z)};
   }
 
@@ -439,9 +439,7 @@ class Scripted final : public Surgeon {
     if (seen.suture_point.empty()) return picture_.focus;
     return 0.5f * (seen.suture_point.front().position + seen.suture_point.back().position);
   }
-  Vec3 swage(const Snapshot& seen) const {
-    return transform(seen.needle.pose, Vec3{picture_.needle_radius, 0, 0});
-  }
+  Vec3 swage(const Snapshot& seen) const { return transform(seen.needle.pose, Vec3{picture_.needle_radius, 0, 0}); }
   // Moves the forceps so that the needle's swage, which it holds, comes to `goal`.
   bool carry_swage(const Snapshot& seen, Vec3 goal, float speed) {
     return move(kForceps, {goal + (seen.tool[kForceps].pose.p - swage(seen)), tying_pose(kForceps, {}).q}, speed);
@@ -458,25 +456,31 @@ class Scripted final : public Surgeon {
     const float side = static_cast<float>(task.way);
     const size_t last = seen.thread_order.size() - 1;
     if (stage_ == lift && waited_ <= dt_) {
-      start_ = stitch(seen);
+      // The strand rises from the last suture point, or from the knot that is already there.
+      start_ = seen.knot.empty() && !seen.suture_point.empty() ? seen.suture_point.back().position : stitch(seen);
       reach_ = std::max(0.03f, length_between(seen, last_point_node(seen), last));
-      const float wound = static_cast<float>(task.which) * 2 * kPi * kWindRadius;
-      height_ = std::clamp(0.55f * (reach_ - wound), 0.025f, 0.06f);
+      taut_ = 0.97f;
+      // So high that the hand, going round below, keeps clear of the tissue.
+      height_ = std::clamp(0.5f * reach_ + 0.004f, 0.025f, 0.09f);
       throws_before_ = seen.knot.empty() ? 0 : seen.knot.back().throws;
       knots_before_ = seen.knot.size();
     }
     // Across the driver: e1 away from the tissue, e2 to its side.
     const Vec3 z = rotate(tying_pose(kDriver, {}).q, {0, 0, 1}), e1 = normalized(Vec3{0, 1, 0} - z * z.y), e2 = cross(z, e1);
-    const Vec3 axis_at = start_ + Vec3{0, height_, 0} - e2 * (side * kWindRadius);
+    const Vec3 axis_at = start_ + e1 * height_ - e2 * (side * kWindRadius);
     const Pose lying = tying_pose(kDriver, axis_at - z * kWindAt);
     // The strand, just not taut, leaving the driver after turning by w about it.
     auto swage_at = [&](float w) {
       const float way = side * w;
       const Vec3 leave = axis_at + kWindRadius * (e2 * (side * std::cos(w)) + e1 * std::sin(w)) + z * (0.00012f * std::abs(w));
       const Vec3 to = e1 * std::cos(way) - e2 * std::sin(way);
-      const float free = std::max(0.008f, 0.96f * (reach_ - height_ - kWindRadius * std::max(0.0f, w)));
+      const float free = std::max(0.008f, taut_ * (reach_ - height_ - kWindRadius * std::max(0.0f, w)));
       return leave + to * free;
     };
+    // The strand is kept just taut by feel: four per cent of slack would let it sag by a seventh of its length.
+    const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
+    if (stage_ <= wind)
+      taut_ = std::clamp(taut_ + dt_ * (tension < 0.02f ? 0.12f : tension > 0.08f ? -0.5f : 0.0f), 0.9f, 1.03f);
     switch (stage_) {
       case lift:
         jaw(kDriver, kHalfOpen);
@@ -744,8 +748,8 @@ class Scripted final : public Surgeon {
   std::array<ScriptedHand, 2> hand_;
   std::array<uint32_t, 2> buttons_{};
   size_t task_ = 0;
-  int stage_ = 0;      // within the task
-  float waited_ = 0;   // [s] in this stage
+  int stage_ = 0;     // within the task
+  float waited_ = 0;  // [s] in this stage
   float dt_ = 1.0f / 60;
   int misses_ = 0, attempts_ = 0;
   bool gave_up_ = false;
@@ -759,6 +763,7 @@ class Scripted final : public Surgeon {
   // A throw.
   Vec3 start_;
   float reach_ = 0, height_ = 0, wound_ = 0;
+  float taut_ = 1;  // the strand's straight length over what it was reckoned to be
   size_t knots_before_ = 0, cuts_before_ = 0, settled_before_ = 0;
   uint32_t throws_before_ = 0;
   uint32_t sequence_ = 0;

@@ -1,4 +1,5 @@
-// render/filament/thread_view: the suture thread as a smooth tube through its particles, and the needle on its end.
+// render/filament/thread_view: the suture thread as a smooth tube through its particles, in as many pieces as it was cut into;
+// knots as the turns of their throws; settled stitches. All of it is one mesh.
 #pragma once
 #include <vector>
 
@@ -11,7 +12,7 @@ namespace catgut {
 
 struct ThreadView {
   uint32_t capacity = 0;  // points of the drawn curve at most
-  std::vector<Vec3> through, curve;
+  std::vector<Vec3> through, piece, curve;
   std::vector<float> radius;
   Shape tube;
   GpuMesh gpu;
