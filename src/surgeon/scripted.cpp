@@ -18,12 +18,12 @@ namespace {
 constexpr size_t kDriver = 0, kForceps = 1;
 // Places on the needle's arc: two thirds from the tip, behind the tip, behind the swage.
 constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f, kTyingAt = 0.12f;
-constexpr int kAttempts = 8;          // at one bite, at one grasp, at one throw
-constexpr float kHalfOpen = 0.7f;     // a jaw that lets go without shaking off a loop
-constexpr float kStump = 0.007f;      // [m] of thread left on a knot
-constexpr float kWindAt = 0.008f;     // [m] behind the driver's tip, where thread is wound round it
+constexpr int kAttempts = 8;            // at one bite, at one grasp, at one throw
+constexpr float kHalfOpen = 0.7f;       // a jaw that lets go without shaking off a loop
+constexpr float kStump = 0.007f;        // [m] of thread left on a knot
+constexpr float kWindAt = 0.008f;       // [m] behind the driver's tip, where thread is wound round it
 constexpr float kWindRadius = 0.0019f;  // [m] of a wrap's middle line
-constexpr float kSecure = 0.985f;     // of a closure that counts as closed
+constexpr float kSecure = 0.985f;       // of a closure that counts as closed
 
 // Where a bite is made, in the world as it is now: a place, outward, the way of the needle, the axis about which it turns.
 struct BiteFrame {
@@ -439,9 +439,7 @@ class Scripted final : public Surgeon {
     if (seen.suture_point.empty()) return picture_.focus;
     return 0.5f * (seen.suture_point.front().position + seen.suture_point.back().position);
   }
-  Vec3 swage(const Snapshot& seen) const {
-    return transform(seen.needle.pose, Vec3{picture_.needle_radius, 0, 0});
-  }
+  Vec3 swage(const Snapshot& seen) const { return transform(seen.needle.pose, Vec3{picture_.needle_radius, 0, 0}); }
   // Moves the forceps so that the needle's swage, which it holds, comes to `goal`.
   bool carry_swage(const Snapshot& seen, Vec3 goal, float speed) {
     return move(kForceps, {goal + (seen.tool[kForceps].pose.p - swage(seen)), tying_pose(kForceps, {}).q}, speed);
@@ -744,8 +742,8 @@ class Scripted final : public Surgeon {
   std::array<ScriptedHand, 2> hand_;
   std::array<uint32_t, 2> buttons_{};
   size_t task_ = 0;
-  int stage_ = 0;      // within the task
-  float waited_ = 0;   // [s] in this stage
+  int stage_ = 0;     // within the task
+  float waited_ = 0;  // [s] in this stage
   float dt_ = 1.0f / 60;
   int misses_ = 0, attempts_ = 0;
   bool gave_up_ = false;
