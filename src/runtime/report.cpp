@@ -59,12 +59,29 @@ Json json_of(const RunResult& r) {
   j["stages"] = Json::object();
   for (size_t s = 0; s < kStages; ++s) j["stages"][stage_name(static_cast<Stage>(s))] = spread_json(r.stage_ms[s]);
   j["contacts"] = r.contacts;
-  j["sutures"] = number_json(value(r, "bites"));
-  j["knots"] = number_json(value(r, "knots"));
-  for (const char* name : {"suture_points", "opening_ratio", "closure", "thread_length_error", "thread_length_error_passing",
-                           "lost", "sane", "surgeon_done"})
+  for (const char* name : {"bites",
+                           "sutures",
+                           "knots",
+                           "throws",
+                           "last_knot_throws",
+                           "suture_points",
+                           "opening_ratio",
+                           "closure",
+                           "pairs",
+                           "seam_gap",
+                           "seam_gap_all",
+                           "seam_gap_start",
+                           "needle_off",
+                           "held_ends",
+                           "ends_uneven",
+                           "thread_length_error",
+                           "thread_length_error_passing",
+                           "lost",
+                           "sane",
+                           "surgeon_done"})
     j[name] = number_json(value(r, name));
   j["events"] = r.events.empty() ? Json::object() : Json(r.events);
+  j["faults"] = r.faults.empty() ? Json::object() : Json(r.faults);
   j["expect"] = Json::object();
   for (const ExpectationResult& e : r.expect)
     j["expect"][e.want.name] = {{"want", want_json(e.want)}, {"got", number_json(e.got)}, {"ok", e.ok}};
@@ -104,8 +121,13 @@ std::string run_summary(const RunResult& r) {
         out += fmt::format(" {} {:.1f}", stage_name(static_cast<Stage>(s)), r.longest.ms[s]);
     out += "\n";
   }
-  out += fmt::format("  {} bites, {} suture points, opening at {:.1f} % of what it was\n", value(r, "bites"),
-                     value(r, "suture_points"), 100 * value(r, "opening_ratio"));
+  out += fmt::format("  {} bites, {} suture points", value(r, "bites"), value(r, "suture_points"));
+  if (value(r, "throws") > 0) out += fmt::format(", {} knots of {} throws", value(r, "knots"), value(r, "throws"));
+  if (value(r, "pairs") > 0)
+    out += fmt::format(", {} pairs, {:.1f} mm apart at most", value(r, "pairs"), 1e3 * value(r, "seam_gap_all"));
+  else out += fmt::format(", opening at {:.1f} % of what it was", 100 * value(r, "opening_ratio"));
+  out += "\n";
+  for (const auto& [name, count] : r.faults) out += fmt::format("  fault: {} ({} x)\n", name, count);
   out += fmt::format("  ended: {}; state {:016x}\n", r.ended, r.state_hash);
   for (const ExpectationResult& e : r.expect)
     out += fmt::format("  {} {} = {:.6g}, expected {}\n", e.ok ? "ok    " : "FAILED", e.want.name, e.got, want_text(e.want));

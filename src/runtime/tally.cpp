@@ -20,6 +20,29 @@ bool RunResult::expectations_hold() const {
   return std::all_of(expect.begin(), expect.end(), [](const ExpectationResult& e) { return e.ok; });
 }
 
+namespace {
+
+// |free end - needle end| / sum of the thread outside the first and the last suture point, as it lies. 0 without both.
+double uneven_ends(const Snapshot& seen) {
+  if (seen.suture_point.empty() || seen.thread_order.size() < 2) return 0;
+  const auto begin = seen.thread_order.begin(), end = seen.thread_order.end();
+  std::ptrdiff_t first = end - begin, last = 0;
+  for (const SuturePointView& p : seen.suture_point) {
+    const auto at = std::find(begin, end, p.anchored) - begin;
+    first = std::min(first, at), last = std::max(last, at);
+  }
+  const auto length = [&](std::ptrdiff_t from, std::ptrdiff_t to) {
+    double sum = 0;
+    for (; from < to && from + 1 < end - begin; ++from)
+      sum += distance(seen.particle[begin[from]], seen.particle[begin[from + 1]]);
+    return sum;
+  };
+  const double tail = length(0, first), needle_side = length(last, end - begin - 1);
+  return tail + needle_side > 0 ? std::abs(tail - needle_side) / (tail + needle_side) : 0;
+}
+
+}  // namespace
+
 Tally::Tally(const SceneSpec& scene, const PictureModel& picture)
     : scene_(scene),
       thread_first_(picture.thread_first),
@@ -35,12 +58,47 @@ void Tally::tick(const Snapshot& seen) {
   for (const Event& e : seen.event) {
     if (e.kind < EventKind::count_) ++events_[static_cast<size_t>(e.kind)];
     passing = passing || e.kind == EventKind::particle_passed;
+    if (e.kind == EventKind::technique_fault) {
+      const size_t fault = e.value >= 0 ? static_cast<size_t>(e.value) : faults_.size();
+      if (fault < faults_.size()) ++faults_[fault];
+    }
+    if (e.kind == EventKind::knot_begun && ends_uneven_ < 0) ends_uneven_ = uneven_ends(seen);
+    count_knots(e);
   }
   const float error = thread_length_error(seen);
   if (!std::isfinite(error)) sane_ = false;
   float& worst = passing ? length_error_passing_ : length_error_;
   worst = std::max(worst, error);
   lost_ = std::max(lost_, lost_slots(seen));
+}
+
+// A knot_locked event is a throw. Knots are numbered from 0 in every suture.
+void Tally::count_knots(const Event& e) {
+  if (e.kind == EventKind::suture_taken || e.kind == EventKind::stitch_settled) {
+    for (uint32_t throws : knot_throws_) knots_before_ += throws > 0;
+    knot_throws_.clear();
+  }
+  if (e.kind != EventKind::knot_locked) return;
+  if (e.which >= knot_throws_.size()) knot_throws_.resize(std::min<size_t>(e.which, 1000) + 1, 0);
+  last_knot_throws_ = ++knot_throws_[std::min<size_t>(e.which, 1000)];
+  ++throws_;
+}
+
+void Tally::judge_seam(const Snapshot& last, std::map<std::string, double>& v) const {
+  double gap = 0, all = 0, start = 0;
+  bool any = false;
+  for (const SeamView& s : last.seam) {
+    const double d = distance(s.a, s.b);
+    all = std::max(all, d);
+    if (!s.midpoint) continue;
+    gap = std::max(gap, d);
+    start = any ? std::min(start, static_cast<double>(s.start)) : static_cast<double>(s.start);
+    any = true;
+  }
+  v["pairs"] = static_cast<double>(last.seam.size());
+  v["seam_gap"] = gap;
+  v["seam_gap_all"] = all;
+  v["seam_gap_start"] = start;
 }
 
 void Tally::time(const StageTimes& times, double tick_ms) {
@@ -86,7 +144,21 @@ void Tally::finish(const Snapshot& last, RunResult& result) const {
   v["bites"] =
       static_cast<double>(std::count_if(last.bite.begin(), last.bite.end(), [](const BiteView& b) { return b.complete; }));
   v["suture_points"] = static_cast<double>(last.suture_point.size());
-  v["knots"] = 0;
+  v["knots"] = static_cast<double>(knots_before_ + static_cast<uint64_t>(std::count_if(knot_throws_.begin(), knot_throws_.end(),
+                                                                                       [](auto n) { return n > 0; })));
+  v["throws"] = static_cast<double>(throws_);
+  v["last_knot_throws"] = static_cast<double>(last_knot_throws_);
+  const bool tied = std::any_of(last.knot.begin(), last.knot.end(), [](auto& k) { return k.phase == KnotPhase::locked; });
+  v["sutures"] = static_cast<double>(last.settled.size() + tied);
+  judge_seam(last, v);
+  v["needle_off"] = last.needle_on_thread ? 0 : 1;
+  v["held_ends"] = std::max(last.tool[0].held_strands, last.tool[1].held_strands);
+  v["ends_uneven"] = std::max(0.0, ends_uneven_);
+  for (size_t k = 1; k < faults_.size(); ++k) {
+    const std::string name = fault_name(static_cast<Fault>(k));
+    if (faults_[k]) result.faults[name] = faults_[k];
+    v["fault_" + name] = static_cast<double>(faults_[k]);
+  }
   v["particles"] = static_cast<double>(result.particles);
   v["opening_ratio"] = opening_at_start_ > 0 ? static_cast<double>(last.opening_area) / opening_at_start_ : 1;
   v["closure"] = last.closure;

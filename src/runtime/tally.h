@@ -40,6 +40,7 @@ struct RunResult {
   uint64_t longest_tick = 0, late_ticks = 0;  // its number; ticks that took longer than they simulate
   uint32_t contacts = 0;                      // the most in a substep
   std::map<std::string, uint64_t> events;     // by kind, only those that happened
+  std::map<std::string, uint64_t> faults;     // technique_fault events by name, only those that happened
   std::map<std::string, double> value;        // every name of result_names
   std::vector<ExpectationResult> expect;
   uint64_t state_hash = 0;
@@ -66,6 +67,8 @@ class Tally {
  private:
   float thread_length_error(const Snapshot& seen) const;
   uint32_t lost_slots(const Snapshot& seen);
+  void count_knots(const Event& e);
+  void judge_seam(const Snapshot& last, std::map<std::string, double>& value) const;
 
   const SceneSpec& scene_;
   uint32_t thread_first_, thread_count_;
@@ -74,6 +77,10 @@ class Tally {
   float opening_at_start_ = 0, length_error_ = 0, length_error_passing_ = 0;
   uint32_t lost_ = 0, contacts_ = 0;
   std::array<uint64_t, static_cast<size_t>(EventKind::count_)> events_{};
+  std::array<uint64_t, static_cast<size_t>(Fault::count_)> faults_{};
+  std::vector<uint32_t> knot_throws_;  // locked throws of each knot of the suture in hand; a Snapshot lists no settled ones
+  uint64_t knots_before_ = 0, throws_ = 0, last_knot_throws_ = 0;
+  double ends_uneven_ = -1;  // -1: no knot was begun yet
   std::vector<float> solver_ms_, tick_ms_;
   std::array<std::vector<float>, kStages> stage_ms_;
   double spent_ms_ = 0, longest_ms_ = 0;

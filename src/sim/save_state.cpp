@@ -20,7 +20,8 @@ constexpr bool kPlain = std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_
                         std::is_same_v<T, BiteEnd> || std::is_same_v<T, Weld> || std::is_same_v<T, Attachment> ||
                         std::is_same_v<T, ChannelPoint> || std::is_same_v<T, RigidBody> || std::is_same_v<T, ThreadHold> ||
                         std::is_same_v<T, ClosurePlan::Pull> || std::is_same_v<T, ClosurePlan::Pair> ||
-                        std::is_same_v<T, TissuePin> || std::is_same_v<T, SettledNode> || std::is_same_v<T, KnotThrow>;
+                        std::is_same_v<T, TissuePin> || std::is_same_v<T, SettledNode> || std::is_same_v<T, KnotThrow> ||
+                        std::is_same_v<T, SeamRow> || std::is_same_v<T, LembertStitch> || std::is_same_v<T, LembertRow>;
 static_assert(sizeof(Weld) % 4 == 0 && sizeof(Weld) == 4 * (2 + 3 * 7 + 2 + 6));
 static_assert(sizeof(TissuePoint) == 4 * (1 + 16 + 16));
 static_assert(sizeof(Attachment) == sizeof(TissuePoint) + 4 * (1 + 3 + 1 + 3));
@@ -28,6 +29,7 @@ static_assert(sizeof(ChannelPoint) == sizeof(TissuePoint) + 4 * (4 + 3 + 1));
 static_assert(sizeof(RigidBody) == 4 * (3 + 4 + 3 + 3 + 3 + 4));
 static_assert(sizeof(TissuePin) == 2 * sizeof(TissuePoint) + 4 * 4 && sizeof(SettledNode) == 4 * 4 &&
               sizeof(KnotThrow) == 4 * 5 && sizeof(ClosurePlan::Pair) == 2 * sizeof(TissuePoint) + 4 * 4);
+static_assert(sizeof(SeamRow) == 4 * 5 && sizeof(LembertStitch) == 4 * 3 && sizeof(LembertRow) == 4 * 3);
 static_assert(sizeof(ThreadHold) == 4 * 6 && sizeof(BiteEnd) == sizeof(TissuePoint) + 4 * 4 &&
               sizeof(ClosurePlan::Pull) == sizeof(TissuePoint) + 4 * 6);
 
@@ -82,7 +84,10 @@ void fields(A& a, State& s) {
   a(s.suture.knot), a(s.suture.settled), a(s.suture.buttons[0]), a(s.suture.buttons[1]), a(s.suture.taken);
   PurseStringState& p = s.technique.purse_string;
   a(p.ring_complete), a(p.closing), a(p.finished), a(p.path_start), a(p.path_end), a(p.checked), a(p.area_start);
-  a(s.technique.seam.checked), a(s.technique.lembert.angle), a(s.technique.lembert.checked);
+  SeamState& m = s.technique.seam;
+  a(m.row), a(m.first_row), a(m.taken), a(m.points), a(m.passes), a(m.throws), a(m.told);
+  LembertState& l = s.technique.lembert;
+  a(l.stitch), a(l.row), a(l.taken), a(l.throws), a(l.knot), a(l.tied), a(l.told);
   a(s.plan.pull), a(s.plan.progress), a(s.plan.compliance), a(s.plan.pair);
   a(s.hand[0]), a(s.hand[1]), a(s.hand_known[0]), a(s.hand_known[1]);
 }
@@ -228,6 +233,20 @@ bool fits(const Model& model, const State& s, const State& fresh) {
     if (!point_ok(p.a) || !point_ok(p.b)) return false;
   for (const ClosurePlan::Pull& p : s.plan.pull)
     if (!point_ok(p.point)) return false;
+  const size_t pairs = s.plan.pair.size();
+  const SeamState& seam = s.technique.seam;
+  const bool seams = model.technique.kind == TechniqueKind::connell || model.technique.kind == TechniqueKind::stay;
+  if (seams ? seam.row.size() != pairs : !seam.row.empty()) return false;
+  if (seam.first_row > seam.row.size()) return false;
+  for (uint32_t r = 0; r < seam.row.size(); ++r)
+    if (seam.row[r].leader > r || seam.row[r].hold > SeamHold::nothing) return false;
+  const LembertState& l = s.technique.lembert;
+  if (model.technique.kind == TechniqueKind::lembert ? l.row.size() != pairs : !l.row.empty()) return false;
+  if (l.tied > 1 || (l.tied && l.stitch.empty())) return false;
+  for (const LembertStitch& stitch : l.stitch)
+    if (stitch.row >= pairs) return false;
+  for (const LembertRow& row : l.row)
+    if (row.one >= l.stitch.size() || row.other >= l.stitch.size()) return false;
   return s.technique.purse_string.checked <= u.point.size();
 }
 

@@ -1,8 +1,143 @@
 // technique/lembert: see lembert.h.
 #include "technique/lembert.h"
 
-namespace catgut {
+#include <algorithm>
+#include <cmath>
 
-void lembert(const LembertModel&, LembertState&, const TechniqueView&, ClosurePlan&, std::vector<Event>&) {}
+#include "technique/common.h"
+
+namespace catgut {
+namespace {
+
+constexpr float kSameAngle = 0.005f;  // [rad] a tenth of a millimetre on the rim
+
+// From u to v about the unit vector axis, -pi..pi.
+float signed_angle(Vec3 u, Vec3 v, Vec3 axis) {
+  u -= axis * dot(u, axis);
+  v -= axis * dot(v, axis);
+  return std::atan2(dot(cross(u, v), axis), dot(u, v));
+}
+
+struct Ring {
+  Vec3 centre, axis;
+};
+
+// cp of 2.5.4, and the way that the ring faces.
+Ring ring_of(const LembertModel& model, const Vec4* x) {
+  Ring ring;
+  for (const auto* group : {&model.outer, &model.inner})
+    for (uint32_t i : *group) ring.centre += xyz(x[i]);
+  ring.centre = ring.centre / static_cast<float>(model.outer.size() + model.inner.size());
+  Vec3 newell{};
+  for (size_t i = 0; i < model.outer.size(); ++i)
+    newell += cross(xyz(x[model.outer[i]]) - ring.centre, xyz(x[model.outer[(i + 1) % model.outer.size()]]) - ring.centre);
+  ring.axis = normalized(newell, {0, 1, 0});
+  return ring;
+}
+
+void add_pair(const LembertModel& model, LembertState& state, const Vec4* x, uint32_t a, uint32_t b, LembertRow row,
+              uint32_t midpoint, ClosurePlan& plan) {
+  const float apart = distance(xyz(x[a]), xyz(x[b]));
+  plan.compliance = model.compliance;
+  plan.pair.push_back({particle_point(a), particle_point(b), apart, std::min(apart, model.gap), 0, midpoint});
+  state.row.push_back(row);
+}
+
+// Figure 15: particles of both groups between two stitches, each with the closest of the opposite group.
+void pair_between(const LembertModel& model, LembertState& state, const TechniqueView& view, const Ring& ring, uint32_t one,
+                  uint32_t other, ClosurePlan& plan) {
+  const Vec4* x = view.x;
+  const auto from_centre = [&](uint32_t stitch) {
+    const ClosurePlan::Pair& p = plan.pair[state.stitch[stitch].row];
+    return 0.5f * (position_of(p.a, x) + position_of(p.b, x)) - ring.centre;
+  };
+  const Vec3 v1 = from_centre(one), v2 = from_centre(other);
+  const auto taken = [&](uint32_t i) {
+    return std::any_of(plan.pair.begin(), plan.pair.end(),
+                       [&](const ClosurePlan::Pair& p) { return p.a.particle[0] == i || p.b.particle[0] == i; });
+  };
+  for (uint32_t i : model.outer)
+    if (is_between(v1, v2, xyz(x[i]) - ring.centre, ring.axis) && !taken(i))
+      add_pair(model, state, x, i, nearest_of(model.inner, x, xyz(x[i])), {one, other, 0}, 0, plan);
+  for (uint32_t i : model.inner)
+    if (is_between(v1, v2, xyz(x[i]) - ring.centre, ring.axis) && !taken(i))
+      add_pair(model, state, x, nearest_of(model.outer, x, xyz(x[i])), i, {one, other, 0}, 0, plan);
+}
+
+// "The closest particle in pg_i and pg_o is found and they are pulled to their midpoint when a knot is tied. When a subsequent
+// suture point is placed, particles in pg_i and pg_o between the two suture points are pulled together."
+void tie(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan) {
+  Vec3 at{};
+  for (const StitchPoint& p : view.point) at += p.at;
+  at = at / static_cast<float>(view.point.size());
+  const Ring ring = ring_of(model, view.x);
+  const uint32_t stitch = static_cast<uint32_t>(state.stitch.size());
+  state.stitch.push_back({static_cast<uint32_t>(plan.pair.size()), view.taken, 1});
+  add_pair(model, state, view.x, nearest_of(model.outer, view.x, at), nearest_of(model.inner, view.x, at), {stitch, stitch, 0},
+           1, plan);
+  // The nearest stitch each way round.
+  for (const float way : {1.0f, -1.0f}) {
+    float least = model.widest;
+    int neighbour = -1;
+    for (uint32_t s = 0; s < stitch; ++s) {
+      if (!state.stitch[s].holds) continue;
+      const ClosurePlan::Pair& p = plan.pair[state.stitch[s].row];
+      const Vec3 there = 0.5f * (position_of(p.a, view.x) + position_of(p.b, view.x));
+      const float angle = way * signed_angle(at - ring.centre, there - ring.centre, ring.axis);
+      if (angle > 0 && angle < least) least = angle, neighbour = static_cast<int>(s);
+    }
+    if (neighbour >= 0) pair_between(model, state, view, ring, stitch, static_cast<uint32_t>(neighbour), plan);
+  }
+}
+
+}  // namespace
+
+bool is_between(Vec3 v1, Vec3 v2, Vec3 vp, Vec3 axis) {
+  const float a = std::abs(signed_angle(v1, v2, axis));
+  const float b = std::abs(signed_angle(v1, vp, axis)), c = std::abs(signed_angle(v2, vp, axis));
+  return b + c <= a + kSameAngle;  // never less than a
+}
+
+void lembert(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan,
+             std::vector<Event>& events) {
+  if (model.outer.size() < 3 || model.inner.size() < 3) return;
+  // Whatever ends a suture: too few throws hold nothing.
+  const auto end_suture = [&] {
+    if (state.throws == 0 || state.throws >= static_cast<uint32_t>(model.throws)) return;
+    const Vec3 where = view.point.empty() ? Vec3{} : view.point.back().at;
+    tell(Fault::too_few_throws, state.knot, where, state.told, events);
+    if (state.tied) state.stitch.back().holds = 0;
+  };
+  if (view.taken != state.taken) {
+    end_suture();
+    state.taken = view.taken;
+    state.throws = state.knot = state.tied = state.told = 0;
+  }
+  judge_begun_knots(view, false, state.told, events);
+
+  const bool first = state.throws == 0;
+  state.throws = locked_throws(view.knot);
+  if (!view.knot.empty()) state.knot = static_cast<uint32_t>(view.knot.size()) - 1;
+  if (first && state.throws > 0 && !view.point.empty()) {
+    if (one_wall(walls_taken(view.point))) {
+      // Tied to itself: it draws no layer to the other.
+      tell(Fault::one_wall_only, view.point.back().bite, view.point.back().at, state.told, events);
+    } else {
+      tie(model, state, view, plan);
+      state.tied = 1;
+    }
+  }
+  const size_t before = events.size();
+  for (size_t i = 0; i < before; ++i)
+    if (events[i].kind == EventKind::thread_cut) end_suture();
+  if (state.tied && cut_in_stitch(events)) state.stitch.back().holds = 0;
+
+  for (uint32_t r = 0; r < state.row.size(); ++r) {
+    LembertRow& row = state.row[r];
+    const bool holds = state.stitch[row.one].holds && state.stitch[row.other].holds;
+    advance(plan.pair[r].progress, holds ? 1.0f : 0.0f, model.fastest, view.dt);
+    tell_closed(r, plan.pair[r], view.x, row.told, events);
+  }
+}
 
 }  // namespace catgut

@@ -1,5 +1,6 @@
 // technique/lembert: interrupted stitches through both layers of a cut bowel; a locked knot draws inner and outer layer
-// together there and, by the angle rule, between it and its neighbours (paper 2.5.4, figure 15).
+// together there and, by the angle rule, between it and its neighbours (paper 2.5.4, figure 15). Reads suture points and knots;
+// answers with pairs of a ClosurePlan, and with events for what was wrong.
 #pragma once
 #include <span>
 #include <vector>
@@ -9,20 +10,42 @@
 namespace catgut {
 
 struct LembertModel {
-  std::vector<uint32_t> outer, inner;  // pg_o and pg_i: particles round the two rims, in order
-  float gap = 0.0005f;                 // [m]
-  float compliance = 1e-5f;            // [m/N]
-  float fastest = 1.0f;                // [1/s] of progress
-  float widest = 2.2f;                 // [rad] neighbouring stitches further apart than this are not neighbours
-  int throws = 2;                      // fewer than this hold nothing
+  std::vector<uint32_t> outer,
+      inner;                 // pg_o and pg_i: particles round the two rims, in order, on the sides that face each other
+  float gap = 0.0005f;       // [m]
+  float compliance = 1e-5f;  // [m/N]
+  float fastest = 1.0f;      // [1/s] of progress
+  float widest = 2.2f;       // [rad] neighbouring stitches further apart than this are not neighbours
+  int throws = 2;            // fewer than this hold nothing
+};
+
+// A tied stitch.
+struct LembertStitch {
+  uint32_t row = 0;     // of the plan: its own pair
+  uint32_t suture = 0;  // sutures settled before it
+  uint32_t holds = 1;   // 0: it had too few throws, or was cut through
+};
+// What the technique remembers of a row of ClosurePlan::pair.
+struct LembertRow {
+  uint32_t one = 0, other = 0;  // the stitches that it hangs on: it is closed while both hold
+  uint32_t told = 0;            // 1: seam_closed was said
 };
 
 struct LembertState {
-  std::vector<float> angle;  // [rad] round the centre, of every tied stitch in the order in which they were tied
-  uint32_t checked = 0;
+  std::vector<LembertStitch> stitch;  // in the order in which they were tied
+  std::vector<LembertRow> row;        // one per row of the plan
+  uint32_t taken = 0;                 // sutures settled before the one in hand
+  uint32_t throws = 0, knot = 0;      // its locked throws; its newest knot
+  uint32_t tied = 0;                  // 1: its stitch is in the list
+  uint32_t told = 0;                  // a bit per Fault
 };
 
+// Once a tick.
 void lembert(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan,
              std::vector<Event>& events);
+
+// "If the angle between v1 and vp and the angle between v2 and vp equals the angle between v1 and v2, then the particle is
+// between sp1 and sp2." All three as seen along `axis`.
+bool is_between(Vec3 v1, Vec3 v2, Vec3 vp, Vec3 axis);
 
 }  // namespace catgut

@@ -1,0 +1,67 @@
+// technique/common: see common.h.
+#include "technique/common.h"
+
+#include <limits>
+
+namespace catgut {
+
+uint32_t locked_throws(const Knot& knot) { return knot.phase == KnotPhase::locked ? knot.throws : knot.begun; }
+
+uint32_t locked_throws(std::span<const Knot> knot) {
+  uint32_t sum = 0;
+  for (const Knot& k : knot) sum += locked_throws(k);
+  return sum;
+}
+
+uint32_t walls_taken(std::span<const StitchPoint> point) {
+  uint32_t walls = 0;
+  for (const StitchPoint& p : point) walls |= 1u << std::min(p.wall, 31u);
+  return walls;
+}
+
+uint32_t nearest_of(std::span<const uint32_t> group, const Vec4* x, Vec3 p) {
+  uint32_t found = group.front();
+  float best = std::numeric_limits<float>::max();
+  for (uint32_t i : group) {
+    const float d = length2(xyz(x[i]) - p);
+    if (d < best) best = d, found = i;
+  }
+  return found;
+}
+
+void tell(Fault fault, uint32_t which, Vec3 where, uint32_t& told, std::vector<Event>& events) {
+  const uint32_t bit = 1u << static_cast<uint32_t>(fault);
+  if (told & bit) return;
+  told |= bit;
+  events.push_back({0, EventKind::technique_fault, 0, which, static_cast<float>(fault), where});
+}
+
+void judge_begun_knots(const TechniqueView& view, bool join_two, uint32_t& told, std::vector<Event>& events) {
+  const size_t before = events.size();
+  for (size_t i = 0; i < before; ++i) {
+    const Event e = events[i];
+    if (e.kind != EventKind::knot_begun) continue;
+    const uint32_t newest = view.bite.empty() ? 0 : static_cast<uint32_t>(view.bite.size() - 1);
+    if (view.point.empty()) tell(Fault::knot_without_bite, e.which, e.where, told, events);
+    else if (view.needle_in_tissue) tell(Fault::needle_in_tissue, newest, e.where, told, events);
+    else if (join_two && one_wall(walls_taken(view.point)))
+      tell(Fault::one_wall_only, view.point.back().bite, e.where, told, events);
+  }
+}
+
+bool cut_in_stitch(std::span<const Event> events) {
+  return std::any_of(events.begin(), events.end(), [](const Event& e) {
+    return e.kind == EventKind::technique_fault && e.value == static_cast<float>(Fault::cut_in_stitch);
+  });
+}
+
+void tell_closed(uint32_t row, const ClosurePlan::Pair& pair, const Vec4* x, uint32_t& told, std::vector<Event>& events) {
+  if (told) return;
+  const Vec3 a = position_of(pair.a, x), b = position_of(pair.b, x);
+  const float gap = distance(a, b);
+  if (gap >= kSeamClosed) return;
+  told = 1;
+  events.push_back({0, EventKind::seam_closed, 0, row, gap, 0.5f * (a + b)});
+}
+
+}  // namespace catgut
