@@ -155,8 +155,8 @@ bool BeginSmoothing(ThreadScratch& s, size_t nodes, float inv_mass, float shorte
   const V one = hn::Set(d, 1.0f), zero = hn::Zero(d), per_newton = hn::Set(d, h * h * inv_mass);
   V most = zero;
   for (ptrdiff_t i = 0; i < static_cast<ptrdiff_t>(nodes); i += kStep) {
-    const V stiff =
-        hn::Div(hn::Mul(hn::Max(zero, Get(s.tension, i)), per_newton), hn::Max(Get(s.rest, i), hn::Set(d, shortest)));
+    const V stiff = hn::IfThenElseZero(In(i, nodes), hn::Div(hn::Mul(hn::Max(zero, Get(s.tension, i)), per_newton),
+                                                             hn::Max(Get(s.rest, i), hn::Set(d, shortest))));
     Put(stiff, s.stiff, i);  // the last node's is of no pair: its tension is 0
     most = hn::Max(most, stiff);
   }
