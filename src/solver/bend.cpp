@@ -106,16 +106,16 @@ void BendScratch::resize(size_t nodes) {
   }
 }
 
-void solve_bends(std::span<Vec3> p, std::span<const float> w, float compliance, float h, int sweeps, BendScratch& s) {
-  const size_t nodes = p.size();
+void solve_bends(BendScratch& s, size_t nodes, float compliance, float h, int sweeps) {
   if (nodes < 3 || sweeps < 1) return;
   for (int k = 0; k < 3; ++k) std::fill(s.lambda[k].begin(), s.lambda[k].end(), 0.0f);
-  for (size_t i = 0; i < nodes; ++i) {
-    const size_t k = i % 3, j = i / 3;
-    s.x[k][j] = p[i].x, s.y[k][j] = p[i].y, s.z[k][j] = p[i].z, s.w[k][j] = w[i];
-  }
   HWY_DYNAMIC_DISPATCH(AllBends)(s, nodes, compliance / (h * h), sweeps);
-  for (size_t i = 0; i < nodes; ++i) p[i] = {s.x[i % 3][i / 3], s.y[i % 3][i / 3], s.z[i % 3][i / 3]};
+}
+
+void solve_bends(std::span<Vec3> p, std::span<const float> w, float compliance, float h, int sweeps, BendScratch& s) {
+  for (size_t i = 0; i < p.size(); ++i) s.set(i % 3, i / 3, p[i], w[i]);
+  solve_bends(s, p.size(), compliance, h, sweeps);
+  for (size_t i = 0; i < p.size(); ++i) p[i] = s.at(i % 3, i / 3);
 }
 
 }  // namespace catgut

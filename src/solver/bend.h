@@ -15,10 +15,16 @@ struct BendScratch {
   Column<float> x[3], y[3], z[3], w[3];
   Column<float> lambda[3];  // per triplet, by the colour of its middle node (i % 3)
   void resize(size_t nodes);
+  // Node 3 k + colour.
+  void set(size_t colour, size_t k, Vec3 p, float mass) {
+    x[colour][k] = p.x, y[colour][k] = p.y, z[colour][k] = p.z, w[colour][k] = mass;
+  }
+  Vec3 at(size_t colour, size_t k) const { return {x[colour][k], y[colour][k], z[colour][k]}; }
 };
 
 // `sweeps` Gauss-Seidel sweeps over the three colours. p: positions of the nodes [m]; w: inverse masses, 0 where locked;
 // compliance [1/J]; multipliers start at zero.
+void solve_bends(BendScratch& scratch, size_t nodes, float compliance, float h, int sweeps);  // of the nodes set in scratch
 void solve_bends(std::span<Vec3> p, std::span<const float> w, float compliance, float h, int sweeps, BendScratch& scratch);
 
 }  // namespace catgut

@@ -17,38 +17,53 @@ using D4 = hn::FixedTag<float, 4>;
 constexpr size_t kLanes = HWY_MIN(16, HWY_MAX_BYTES / sizeof(float));
 constexpr size_t kParts = 16 / kLanes;
 
-// Sum of `n` rows named by `index`; out is one row. n is a multiple of 4.
-HWY_INLINE void sum_rows(const Row* row, const uint32_t* index, uint32_t n, float* HWY_RESTRICT out) {
+// Rows (or transforms) as registers.
+struct Parts {
+  hn::Vec<D> part[kParts];
+};
+
+// Sum of `n` rows named by `index`. n is a multiple of 4. Four independent partial sums hide the latency of the additions.
+HWY_INLINE Parts SumRows(const float* HWY_RESTRICT row, const uint32_t* HWY_RESTRICT index, uint32_t n) {
   const D d;
-  // Four independent partial sums hide the latency of the additions.
-  hn::Vec<D> acc[4][kParts];
+  Parts acc[4];
   for (size_t k = 0; k < 4; ++k)
-    for (size_t p = 0; p < kParts; ++p) acc[k][p] = hn::Load(d, row[index[k]].f + p * kLanes);
-  for (uint32_t i = 4; i < n; i += 4)
+    for (size_t p = 0; p < kParts; ++p) acc[k].part[p] = hn::Load(d, row + index[k] + p * kLanes);
+  auto more = [&](uint32_t i) HWY_ATTR {
     for (size_t k = 0; k < 4; ++k)
-      for (size_t p = 0; p < kParts; ++p) acc[k][p] = hn::Add(acc[k][p], hn::Load(d, row[index[i + k]].f + p * kLanes));
+      for (size_t p = 0; p < kParts; ++p)
+        acc[k].part[p] = hn::Add(acc[k].part[p], hn::Load(d, row + index[i + k] + p * kLanes));
+  };
+  if (n == 8) more(4);  // a shell of two layers: straight-line code
+  else
+    for (uint32_t i = 4; i < n; i += 4) more(i);
+  Parts sum;
   for (size_t p = 0; p < kParts; ++p)
-    hn::Store(hn::Add(hn::Add(acc[0][p], acc[1][p]), hn::Add(acc[2][p], acc[3][p])), d, out + p * kLanes);
+    sum.part[p] = hn::Add(hn::Add(acc[0].part[p], acc[1].part[p]), hn::Add(acc[2].part[p], acc[3].part[p]));
+  return sum;
 }
 
+// Which component of (q, 1) each lane of a row is multiplied by: column j of the moments is m x q_j.
+alignas(64) constexpr int32_t kColumn[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+
 void MakeRows(const ShapeModel& model, const Vec4* x, ShapeScratch& scratch, uint32_t first, uint32_t last) {
-  const D4 d;
+  const D d;
+  Row* row = scratch.row.data();
+  const Vec4* rest = model.weighted_rest.data();
+  const uint32_t* group = model.group_first.data();
+  // Each part takes its own columns out of a (q, 1) that is repeated in every block of four lanes.
+  hn::Vec<hn::RebindToSigned<D>> lanes[kParts];
+  for (size_t p = 0; p < kParts; ++p) lanes[p] = hn::Load(hn::RebindToSigned<D>(), kColumn + p * kLanes);
   for (uint32_t g = first; g < last; ++g) {
-    // Column j holds the sum of m x q_j: the moment matrix by columns.
-    auto c0 = hn::Zero(d), c1 = c0, c2 = c0, c3 = c0;
-    for (uint32_t i = model.group_first[g]; i < model.group_first[g + 1]; ++i) {
-      const auto p = hn::Mul(hn::Load(d, &x[i].x), hn::Set(d, model.relative_mass[i]));
-      const Vec4 q = model.rest[i];
-      c0 = hn::Add(c0, hn::Mul(p, hn::Set(d, q.x)));
-      c1 = hn::Add(c1, hn::Mul(p, hn::Set(d, q.y)));
-      c2 = hn::Add(c2, hn::Mul(p, hn::Set(d, q.z)));
-      c3 = hn::Add(c3, p);
+    Parts sum;
+    for (size_t p = 0; p < kParts; ++p) sum.part[p] = hn::Zero(d);
+    for (uint32_t i = group[g]; i < group[g + 1]; ++i) {
+      const auto at = hn::LoadDup128(d, &x[i].x), q = hn::LoadDup128(d, &rest[i].x);
+      for (size_t p = 0; p < kParts; ++p) {
+        const auto column = hn::TableLookupLanes(q, hn::IndicesFromVec(d, lanes[p]));
+        sum.part[p] = hn::Add(sum.part[p], hn::Mul(at, column));
+      }
     }
-    float* row = scratch.row[g].f;
-    hn::Store(c0, d, row);
-    hn::Store(c1, d, row + 4);
-    hn::Store(c2, d, row + 8);
-    hn::Store(c3, d, row + 12);
+    for (size_t p = 0; p < kParts; ++p) hn::Store(sum.part[p], d, row[g].f + p * kLanes);
   }
 }
 
@@ -84,13 +99,18 @@ void Clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch&
   const D d;
   const D4 d4;
   using V = hn::Vec<D>;
+  const float* row = scratch.row.data()->f;
+  float* transform = scratch.transform.data()->f;
+  const uint32_t* member = model.group_member.data();
+  const uint32_t stride = model.member_stride;
   alignas(64) float moment[16];
   alignas(64) float column[4][16 * 4];  // column j of the moments of 16 clusters, four floats each
   for (uint32_t base = first; base < last; base += 16) {
     for (uint32_t c = 0; c < 16; ++c) {
       // The last group may reach past the clusters: it repeats the last one and its results are dropped below.
       const uint32_t id = HWY_MIN(base + c, model.clusters - 1);
-      sum_rows(scratch.row.data(), model.group_member.data() + size_t{id} * model.member_stride, model.member_stride, moment);
+      const Parts sum = SumRows(row, member + size_t{id} * stride, stride);
+      for (size_t p = 0; p < kParts; ++p) hn::Store(sum.part[p], d, moment + p * kLanes);
       for (size_t j = 0; j < 4; ++j) hn::Store(hn::Load(d4, moment + 4 * j), d4, column[j] + 4 * c);
     }
     for (uint32_t c = 0; c < 16; c += kLanes) {
@@ -164,33 +184,40 @@ void Clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch&
     }
     const uint32_t n = HWY_MIN(16u, last - base);
     for (uint32_t c = 0; c < n; ++c)
-      for (size_t j = 0; j < 4; ++j) hn::Store(hn::Load(d4, column[j] + 4 * c), d4, scratch.transform[base + c].f + 4 * j);
+      for (size_t j = 0; j < 4; ++j) hn::Store(hn::Load(d4, column[j] + 4 * c), d4, transform + 16 * size_t{base + c} + 4 * j);
   }
 }
 
 void ShapeParticles(const ShapeModel& model, Vec4* x, const float* inv_mass, float stiffness, float relaxation,
-                    ShapeScratch& scratch, uint32_t first, uint32_t last) {
-  const D4 d;
+                    ShapeScratch& scratch, uint32_t first, uint32_t last, bool more) {
+  const D d;
+  const D4 d4;
+  const float* transform = scratch.transform.data()->f;
+  Vec4* move = scratch.moved.data();
+  const Vec4* rest = model.rest.data();
+  const uint32_t *holder = model.holder.data(), *group = model.group_first.data();
+  const uint32_t stride = model.holder_stride;
+  // Lane 3 (the constant 1 of a position) must not move.
+  const auto relax = hn::IfThenElseZero(hn::FirstN(d4, 3), hn::Set(d4, relaxation));
+  const auto stiff = hn::Set(d4, stiffness), soft = hn::Set(d4, 1.0f - stiffness);
   alignas(64) float sum[16];
   for (uint32_t g = first; g < last; ++g) {
-    sum_rows(scratch.transform.data(), model.holder.data() + size_t{g} * model.holder_stride, model.holder_stride, sum);
+    const Parts total = SumRows(transform, holder + size_t{g} * stride, stride);
     const auto share = hn::Set(d, model.inv_holders[g]);
-    for (uint32_t i = model.group_first[g]; i < model.group_first[g + 1]; ++i) {
+    for (size_t p = 0; p < kParts; ++p) hn::Store(hn::Mul(total.part[p], share), d, sum + p * kLanes);
+    const auto c0 = hn::Load(d4, sum), c1 = hn::Load(d4, sum + 4), c2 = hn::Load(d4, sum + 8), c3 = hn::Load(d4, sum + 12);
+    for (uint32_t i = group[g]; i < group[g + 1]; ++i) {
       if (inv_mass[i] == 0) continue;
-      const Vec4 q = model.rest[i];
-      auto goal = hn::Add(hn::Add(hn::Mul(hn::Load(d, sum), hn::Set(d, q.x)), hn::Mul(hn::Load(d, sum + 4), hn::Set(d, q.y))),
-                          hn::Add(hn::Mul(hn::Load(d, sum + 8), hn::Set(d, q.z)), hn::Load(d, sum + 12)));
-      goal = hn::Mul(goal, share);
-      const auto at = hn::Load(d, &x[i].x), moved = hn::Load(d, &scratch.moved[i].x);
-      // Lane 3 (the constant 1 of a position) must not move: the mask keeps it.
-      auto dx = hn::Mul(hn::Set(d, relaxation), hn::Sub(hn::Mul(hn::Set(d, stiffness), hn::Sub(goal, at)),
-                                                        hn::Mul(hn::Set(d, 1.0f - stiffness), moved)));
-      dx = hn::IfThenElseZero(hn::FirstN(d, 3), dx);
-      hn::Store(hn::Add(at, dx), d, &x[i].x);
-      hn::Store(hn::Add(moved, dx), d, &scratch.moved[i].x);
+      const Vec4& q = rest[i];
+      const auto goal = hn::Add(hn::Add(hn::Mul(c0, hn::Set(d4, q.x)), hn::Mul(c1, hn::Set(d4, q.y))),
+                                hn::Add(hn::Mul(c2, hn::Set(d4, q.z)), c3));
+      const auto at = hn::Load(d4, &x[i].x), moved = hn::Load(d4, &move[i].x);
+      const auto dx = hn::Mul(relax, hn::Sub(hn::Mul(stiff, hn::Sub(goal, at)), hn::Mul(soft, moved)));
+      hn::Store(hn::Add(at, dx), d4, &x[i].x);
+      hn::Store(hn::Add(moved, dx), d4, &move[i].x);
     }
   }
-  MakeRows(model, x, scratch, first, last);
+  if (more) MakeRows(model, x, scratch, first, last);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -217,8 +244,8 @@ void solve_shape_clusters(const ShapeModel& model, ClusterRotations& rotation, S
   HWY_DYNAMIC_DISPATCH(Clusters)(model, rotation, scratch, first, last);
 }
 void solve_shape_particles(const ShapeModel& model, Vec4* x, const float* inv_mass, float stiffness, float relaxation,
-                           ShapeScratch& scratch, uint32_t first, uint32_t last) {
-  HWY_DYNAMIC_DISPATCH(ShapeParticles)(model, x, inv_mass, stiffness, relaxation, scratch, first, last);
+                           ShapeScratch& scratch, uint32_t first, uint32_t last, bool more) {
+  HWY_DYNAMIC_DISPATCH(ShapeParticles)(model, x, inv_mass, stiffness, relaxation, scratch, first, last, more);
 }
 
 void ClusterRotations::reset(uint32_t clusters) {
@@ -234,6 +261,7 @@ void ShapeScratch::resize(const ShapeModel& model) {
 
 ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> mass,
                             std::span<const std::vector<uint32_t>> cluster) {
+  constexpr uint32_t kRow = sizeof(Row) / sizeof(float);
   ShapeModel m;
   const uint32_t particles = static_cast<uint32_t>(rest.size());
   // The members as a set, in ascending order, are the key: partners across the wall list the same neighbourhood.
@@ -252,6 +280,8 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
   for (uint32_t i = 0; i < particles; ++i) {
     m.rest.push_back(point(rest[i]));
     m.relative_mass.push_back(static_cast<float>(mass[i] * particles / total));
+    const Vec3 weighted = rest[i] * m.relative_mass[i];
+    m.weighted_rest.push_back({weighted.x, weighted.y, weighted.z, m.relative_mass[i]});
   }
   std::vector<std::vector<uint32_t>> holders(particles);
   size_t widest = 4;
@@ -283,12 +313,12 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
   widest = 0;
   for (uint32_t g = 0; g < m.groups; ++g) widest = std::max(widest, holders[m.group_first[g]].size());
   m.holder_stride = padded(widest);
-  m.holder.assign(size_t{m.groups} * m.holder_stride, m.clusters);
+  m.holder.assign(size_t{m.groups} * m.holder_stride, kRow * m.clusters);
   std::vector<std::vector<uint32_t>> held(m.clusters);
   for (uint32_t g = 0; g < m.groups; ++g) {
     const std::vector<uint32_t>& h = holders[m.group_first[g]];
     for (size_t k = 0; k < h.size(); ++k) {
-      m.holder[size_t{g} * m.holder_stride + k] = h[k];
+      m.holder[size_t{g} * m.holder_stride + k] = kRow * h[k];
       held[h[k]].push_back(g);
     }
     m.inv_holders.push_back(1.0f / static_cast<float>(h.size()));
@@ -296,9 +326,9 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
   widest = 0;
   for (const auto& g : held) widest = std::max(widest, g.size());
   m.member_stride = padded(widest);
-  m.group_member.assign(size_t{m.clusters} * m.member_stride, m.groups);
+  m.group_member.assign(size_t{m.clusters} * m.member_stride, kRow * m.groups);
   for (uint32_t c = 0; c < m.clusters; ++c)
-    for (size_t k = 0; k < held[c].size(); ++k) m.group_member[size_t{c} * m.member_stride + k] = held[c][k];
+    for (size_t k = 0; k < held[c].size(); ++k) m.group_member[size_t{c} * m.member_stride + k] = kRow * held[c][k];
   return m;
 }
 

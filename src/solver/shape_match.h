@@ -26,11 +26,12 @@ struct ShapeModel {
   uint32_t member_stride = 16;        // groups per cluster, padded; the pad is index `groups` (a zero row)
   uint32_t holder_stride = 16;        // clusters per group, padded with index `clusters` (a zero transform)
   Column<uint32_t> member;            // clusters x cluster_stride: particles; not for the kernels
-  Column<uint32_t> group_member;      // clusters x member_stride: groups
-  Column<uint32_t> holder;            // groups x holder_stride: clusters
+  Column<uint32_t> group_member;      // clusters x member_stride: groups, as the place of their row (16 floats each)
+  Column<uint32_t> holder;            // groups x holder_stride: clusters, likewise
   Column<float> inv_holders;          // per group: 1 / number of clusters that hold it
   Column<Vec4> rest;                  // per particle, (x, y, z, 1)
   Column<float> relative_mass;        // per particle: m_k / mean m, the weights of the moments
+  Column<Vec4> weighted_rest;         // per particle: relative mass times rest
   Column<Vec4> rest_centre;           // per cluster: mass-weighted, w unused
   std::vector<uint32_t> cluster_of;   // per particle: the cluster centred on it
 };
@@ -61,8 +62,8 @@ void solve_shape_clusters(const ShapeModel& model, ClusterRotations& rotation, S
 void make_shape_rows(const ShapeModel& model, const Vec4* x, ShapeScratch& scratch, uint32_t first, uint32_t last);
 // Sweep, pass 2 over groups [first, last), each particle of them: dx = relaxation * (s (g - x) - (1 - s) moved), with s = w /
 // (w + alpha / h^2) per particle: the XPBD update of a constraint with compliance alpha and multiplier moved / w. Makes the
-// next sweep's rows too. Particles with inv_mass 0 stay.
+// next sweep's rows too, if there is to be one more. Particles with inv_mass 0 stay.
 void solve_shape_particles(const ShapeModel& model, Vec4* x, const float* inv_mass, float stiffness, float relaxation,
-                           ShapeScratch& scratch, uint32_t first, uint32_t last);
+                           ShapeScratch& scratch, uint32_t first, uint32_t last, bool more = true);
 
 }  // namespace catgut

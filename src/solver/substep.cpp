@@ -126,7 +126,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
       });
       jobs.each(m.shape.groups, kGroupBlock, [&](size_t first, size_t last) {
         solve_shape_particles(m.shape, x, w, m.shape_stiffness, m.shape_relaxation, k.shape, static_cast<uint32_t>(first),
-                              static_cast<uint32_t>(last));
+                              static_cast<uint32_t>(last), sweep + 1 < m.shape_sweeps);
       });
     }
   }

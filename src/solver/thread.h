@@ -17,6 +17,7 @@
 
 #include "solver/attach.h"
 #include "solver/bend.h"
+#include "solver/thread_columns.h"
 
 namespace catgut {
 
@@ -77,21 +78,33 @@ struct SlideState {
 };
 
 struct ThreadScratch {
-  std::vector<Vec3> p;             // per node of order
-  std::vector<float> w;            // inverse mass of the node; < 0: held by a rigid body
-  std::vector<int32_t> anchor_at;  // per node: index of its anchor, or -1
-  std::vector<int32_t> hold_at;    // per node: index of its hold, or -1
-  std::vector<Vec3> n;             // per pair: unit direction toward the needle
-  std::vector<float> length;       // per pair [m]
-  std::vector<float> sideways;     // per node: inverse mass across the tangent over that along it
-  std::vector<double> base_diag, base_off, base_rhs, diag, off, rhs;
-  std::vector<float> lambda;  // per pair, cleared at the start of a substep
+  // Per node of the order.
+  PaddedColumn<float> x, y, z;              // [m]
+  PaddedColumn<float> w;                    // [1/kg] inverse mass; of the tissue where anchored, 0 where held
+  PaddedColumn<float> loose;                // 1 where the node is a particle of its own, 0 where anchored or held
+  std::vector<int32_t> anchor_at, hold_at;  // index of its anchor, of its hold, or -1
+  // W of the node as its two pairs see it: n0 W n0, n1 W n1, n0 W n1 with n0, n1 the pairs' directions.
+  PaddedColumn<float> mass_before, mass_after, across;
+  // An impulse p moves a loose node by w (side p + tilt (p.t) t), with t the sum of the pairs' directions (see find_masses).
+  PaddedColumn<float> side, tilt;
+  std::vector<uint32_t> heavy;  // nodes that are anchored or held: few
+  // Per pair.
+  PaddedColumn<float> rest, tension, keep;  // copies of the thread's; keep: 0 where it is cut
+  PaddedColumn<float> nx, ny, nz;           // unit direction toward the needle; 0 where cut
+  PaddedColumn<float> inv_length;           // [1/m]
+  PaddedColumn<float> alpha, residual;      // [m/N / s^2], [m]
+  PaddedColumn<float> lambda;               // cleared at the start of a substep
+  PaddedColumn<float> step;                 // its change in this Newton step
+  std::vector<uint64_t> unfit;              // a bit per pair
+  Strands<double, 1> stretch;
+  Strands<float, 3> motion;
   BendScratch bend;
-  std::vector<float> stiff, carry;  // of stiffen_prediction
-  std::vector<Vec3> smooth, moved;
-  std::vector<float> bend_w;          // per node: inverse mass against bending, 0 where locked
   std::vector<SlideState> slide;      // per anchor
+  std::vector<uint32_t> anchor_node;  // per anchor
   std::vector<int32_t> node_of_slot;  // index in the order of each slot (relative to first_slot)
+  // Of smooth_motion, per node: where it was, how far it was carried from there without its weight, how far it goes.
+  PaddedColumn<float> from_x, from_y, from_z, gone_x, gone_y, gone_z, moved_x, moved_y, moved_z;
+  PaddedColumn<float> stiff;  // per pair
   void resize(uint32_t count);
 };
 

@@ -1,5 +1,6 @@
 // tests/solver: volume, attachments and welds, nearest points, and the whole substep's independence of workers.
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
 
 #include <Eigen/Dense>
 #include <cmath>
@@ -232,9 +233,21 @@ uint64_t pressed_bowel(int workers, double* deepest) {
   hand.compliance = 1.0f / 3000;
   hand.angular_compliance = 0.05f;
   s.weld.push_back(hand);
+  // One end of the thread is drawn up by the other hand, through a point of the tissue.
+  s.body[1].x = start.back();
+  s.thread.hold.push_back({tissue + thread - 1, 1, {}});
+  ThreadAnchor bite;
+  bite.slot = tissue + 30;
+  uint32_t nearest = 0;
+  for (uint32_t i = 1; i < tissue; ++i)
+    if (distance(start[i], start[bite.slot]) < distance(start[nearest], start[bite.slot])) nearest = i;
+  bite.point = particle_point(nearest);
+  bite.friction = 0.03f, bite.capstan = 0.08f;
+  s.thread.anchor.push_back(bite);
   Jobs jobs(workers);
   uint32_t contacts = 0;
   for (int i = 0; i < 200; ++i) {
+    s.body[1].x += Vec3{0.00002f, 0, 0.00003f};
     s.weld[0].target = Pose{{0.00001f * static_cast<float>(i), -0.008f, 0.026f - 0.00005f * static_cast<float>(i)}, {}};
     if (i % 8 == 0) find_candidates(m, s, k, 0.008f, nullptr);
     substep(m, s, k, jobs, nullptr);
@@ -253,6 +266,20 @@ TEST(Substep, one_and_two_workers_give_the_same_bits) {
   EXPECT_EQ(one, again);
   EXPECT_EQ(one, two);
   EXPECT_GT(deep_one, 0.0005);
+}
+
+TEST(Substep, every_instruction_set_gives_the_same_bits) {
+  double deep = 0;
+  const uint64_t best = pressed_bowel(1, &deep);
+  const int64_t have = hwy::SupportedTargets();
+  for (int64_t target = 1; target > 0 && target <= HWY_STATIC_TARGET; target <<= 1) {
+    if ((have & target) == 0) continue;
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(target);
+    EXPECT_EQ(best, pressed_bowel(1, &deep)) << hwy::TargetName(target);
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(have);
 }
 
 }  // namespace

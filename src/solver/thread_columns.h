@@ -1,0 +1,76 @@
+// solver/thread_columns: the parts of a thread's solve that do the same to every node, in SIMD; thread.cpp puts right the few
+// nodes that are something else than a particle. Reads and writes ThreadScratch only. The same bits for any width of SIMD.
+#pragma once
+#include <algorithm>
+#include <cstddef>
+
+#include "core/math.h"
+#include "solver/particles.h"
+
+namespace catgut {
+
+// A column with zeros before its first and behind its last element: kernels may look at neighbours and work in whole vectors.
+template <typename T>
+class PaddedColumn {
+ public:
+  static constexpr size_t kPad = 32;
+  void assign(size_t count, T value) {
+    all_.assign(count + 2 * kPad, T{});
+    std::fill(begin(), end(), value);
+  }
+  T* data() { return all_.data() + kPad; }
+  const T* data() const { return all_.data() + kPad; }
+  T& operator[](size_t i) { return data()[i]; }
+  const T& operator[](size_t i) const { return data()[i]; }
+  T* begin() { return data(); }
+  T* end() { return data() + (all_.size() - 2 * kPad); }
+
+ private:
+  Column<T> all_ = Column<T>(2 * kPad);
+};
+
+// A symmetric positive definite tridiagonal system cut into eight strands of equal length, one to a lane: eliminating a row
+// waits for the row before it (some 35 cycles, mostly its division), so eight short chains side by side are several times
+// faster than one long one. The last row of every strand is a separator: the inside of a strand is eliminated with its two
+// separators as unknowns, the eight separators are solved by themselves (their matrix, a Schur complement, is positive
+// definite again), and the inside follows in parallel (Wang 1981, A parallel method for tridiagonal equations).
+// Row i of the system is row i % rows of strand i / rows. Rows behind the last are identity.
+constexpr size_t kStrands = 8;
+template <typename T, size_t kRight>
+struct Strands {
+  // The system in its own order: off[i] between rows i and i + 1; right-hand sides, then solutions.
+  PaddedColumn<T> diag, off, right[kRight];
+  // Row by row of all strands: off, inverse pivots, influence of the separator before and of the one behind, values.
+  Column<T> link, inverse, before, after, value[kRight];
+  void resize(size_t count) {
+    for (PaddedColumn<T>* c : {&diag, &off}) c->assign(count, T{});
+    for (PaddedColumn<T>& c : right) c.assign(count, T{});
+    const size_t most = std::max<size_t>(2, count / kStrands + 1) * kStrands;
+    for (Column<T>* c : {&link, &inverse, &before, &after}) c->assign(most, T{});
+    for (Column<T>& c : value) c.assign(most, T{});
+  }
+};
+// Solves the first `count` rows. Overwrites up to 15 rows behind them.
+void solve_strands(Strands<double, 1>& system, size_t count);
+void solve_strands(Strands<float, 3>& system, size_t count);
+
+struct ThreadScratch;
+// Directions, inverse lengths, compliances and residuals of all pairs. Returns the largest residual [m].
+float find_directions(ThreadScratch& s, size_t pairs, float alpha_per_metre);
+// What the pairs see of their nodes, as if none were held by a body.
+void find_masses(ThreadScratch& s, size_t nodes, float h);
+// The matrix and right-hand side of the stretch constraints in s.stretch. A pair that is cut has no row of its own.
+void find_matrix(ThreadScratch& s, size_t pairs, double regularisation);
+// Moves the loose nodes by the impulses in s.step, none further than `limit` [m], and adds them to the multipliers.
+void move_loose_nodes(ThreadScratch& s, size_t nodes, float limit);
+// Marks in s.unfit the pairs that a distance sweep would change.
+void find_unfit_pairs(ThreadScratch& s, size_t pairs, float alpha_per_metre);
+// Lets the inertia and the weight that carried the nodes here meet the thread's tension. `fall` [m] is what weight does in a
+// substep. Returns false, with nothing done, where nothing is taut.
+bool smooth_motion(ThreadScratch& s, size_t nodes, float inv_mass, float shortest, Vec3 fall, float h);
+
+// A distance constraint is right to a tenth of a micrometre, as the direct solve leaves most pairs: that spares its root and
+// its division. `compliant`: compliance times multiplier [m].
+constexpr float kFitLength = 2e-7f, kFitCompliant = 1e-7f;
+
+}  // namespace catgut
