@@ -91,6 +91,7 @@ const Field kField[] = {
     {"technique", "step", "m", 0.0001, 0.1, nullptr, "between the pairs that a seam draws together in between (dist_threshold of section 2.5.2)", TOP(technique.step)},
     {"technique", "throws", "", 1, 8, nullptr, "with fewer a knot does not hold", TOP(technique.throws)},
 
+    {"surgeon", "plan", "", 0, 0, "|purse_string|connell|stay|lembert|running", "what the scripted surgeon does; empty: the technique. running: bites in one bowel, row under row", TOP(surgeon.plan)},
     {"surgeon", "bites", "", 0, 1000, nullptr, "bites the scripted surgeon makes", TOP(surgeon.bites)},
     {"surgeon", "edge_distance", "m", 0, 0.1, nullptr, "of the bites from the rim", TOP(surgeon.edge_distance)},
     {"surgeon", "bite_length", "m", 0, 0.1, nullptr, "along the rim", TOP(surgeon.bite_length)},

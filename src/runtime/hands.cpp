@@ -60,12 +60,13 @@ SurgeonSkill skill_of(const SceneSpec& scene) {
 Hands make_hands(const std::string& who, const SceneSpec& scene, const PictureModel& picture) {
   if (who == "none") return {};
   if (who == "scripted") {
-    if (scene.technique.name == "none")
+    const std::string plan = scene.surgeon.plan.empty() ? scene.technique.name : scene.surgeon.plan;
+    if (plan == "none")
       throw InputError("--surgeon scripted", "the scene has no technique to carry out", "use --surgeon none, or a recording");
     try {
-      return {make_surgeon(scene.technique.name, picture, skill_of(scene)), true};
+      return {make_surgeon(plan, picture, skill_of(scene)), true};
     } catch (const std::invalid_argument&) {
-      throw InputError("--surgeon scripted", "there is no script for the technique \"" + scene.technique.name + "\"",
+      throw InputError("--surgeon scripted", "there is no script for \"" + plan + "\" in this scene",
                        "use --surgeon none, or a recording");
     }
   }

@@ -96,6 +96,7 @@ struct TechniqueSpec {
 
 // The scripted surgeon.
 struct SurgeonSpec {
+  std::string plan;  // what he does; empty: the technique
   int bites = 12;
   float edge_distance = 0.004f;  // [m] of the bites from the rim
   float bite_length = 0.007f;    // [m] along the rim

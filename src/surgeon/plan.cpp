@@ -10,6 +10,8 @@
 namespace catgut {
 namespace {
 
+constexpr int kBitesPerThread = 10;
+constexpr float kRow = 0.004f;         // [m] between one row of bites and the next
 constexpr float kFreeDepth = 0.0045f;  // [m] below the rims that a sweep through two layers reaches
 
 // Depth of the needle's circle below a surface of radius `curved` [m] whose chord is `length`.
@@ -30,8 +32,8 @@ void settle_on_serosa(const VisibleMesh& mesh, Vec3 on_rim, Vec3 axis, Vec3 side
   place.out = mesh.normal[found];
 }
 
-// Bites round an opening, even in length along the rim, not in angle: an organ's rim is no circle.
-void places_round(const PictureModel& picture, const SurgeonSkill& skill, Plan& plan) {
+// `bites` bites round an opening, `edge` from the rim, even in length along it, not in angle: an organ's rim is no circle.
+void places_round(const PictureModel& picture, const SurgeonSkill& skill, int bites, float edge, Plan& plan) {
   const OpeningShape o = opening_shape(picture, 0);
   const std::vector<uint32_t>& rim = picture.rim[0];
   const std::vector<Vec3>& rest = picture.particle_rest;
@@ -48,14 +50,14 @@ void places_round(const PictureModel& picture, const SurgeonSkill& skill, Plan& 
   auto rim_at = [&](size_t i) { return rest[rim[(start + (counter ? n - i % n : i % n)) % n]]; };
   std::vector<float> run{0};
   for (size_t i = 0; i < n; ++i) run.push_back(run.back() + distance(rim_at(i), rim_at(i + 1)));
-  for (int b = 0; b < skill.bites; ++b) {
-    const float want = run.back() * static_cast<float>(b) / static_cast<float>(skill.bites);
+  for (int b = 0; b < bites; ++b) {
+    const float want = run.back() * static_cast<float>(b) / static_cast<float>(bites);
     size_t i = 0;
     while (i + 1 < n && run[i + 1] <= want) ++i;
     const Vec3 on_rim = lerp(rim_at(i), rim_at(i + 1), (want - run[i]) / std::max(run[i + 1] - run[i], 1e-6f));
     const Vec3 radial = normalized(on_rim - o.centre - o.axis * dot(on_rim - o.centre, o.axis));
     BitePlace p;
-    settle_on_serosa(picture.body[0], on_rim, o.axis, cross(o.axis, radial), skill.edge_distance, p);
+    settle_on_serosa(picture.body[0], on_rim, o.axis, cross(o.axis, radial), edge, p);
     p.up = o.axis;
     p.length = skill.bite_length;
     p.depth = depth_of(p.length, picture.needle_radius, run.back() / (2 * kPi));
@@ -80,7 +82,7 @@ void add(Plan& plan, TaskKind kind, int which = 0, int way = 1) { plan.task.push
 Plan purse_string_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.lift = 0.012f;
-  places_round(picture, skill, plan);
+  places_round(picture, skill, skill.bites, skill.edge_distance, plan);
   add(plan, TaskKind::pick_up);
   for (int b = 0; b < skill.bites; ++b) {
     add(plan, TaskKind::bite, b);
@@ -92,39 +94,68 @@ Plan purse_string_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
+// Running bites in one bowel end, row under row, a fresh thread for every row: how much one body bears (paper 3.5).
+Plan running_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan;
+  plan.lift = 0.012f;
+  for (int done = 0, row = 0; done < skill.bites; ++row) {
+    const int here = std::min(kBitesPerThread, skill.bites - done);
+    places_round(picture, skill, here, skill.edge_distance + kRow * static_cast<float>(row), plan);
+    if (row > 0) add(plan, TaskKind::fresh);
+    add(plan, TaskKind::pick_up);
+    for (int b = 0; b < here; ++b) {
+      add(plan, TaskKind::bite, done + b);
+      add(plan, b == 0 ? TaskKind::pull_tail : TaskKind::pull_slack);
+      if (b + 1 < here) add(plan, TaskKind::hand_back);
+    }
+    add(plan, TaskKind::regrip);
+    add(plan, TaskKind::lock_strand, 1, 1);
+    add(plan, TaskKind::cut_long);
+    done += here;
+  }
+  add(plan, TaskKind::rest);
+  return plan;
+}
+
 // 2.5.2: sweeps along the edge, each outside in and inside out again on one bowel, then straight across to the other. The first
 // crossing is tied like a stay suture, so that the thread has something to pull against; the last throw locks the running
-// thread.
+// thread. More bites than one thread holds go on in a second row, with a fresh thread.
 Plan connell_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;
-  const int sweeps = (skill.bites + 1) / 2;
   const float radius = opening_shape(picture, 0).radius;
   const float turn = 2 * std::asin(0.5f * skill.bite_length / radius);
-  for (int s = 0; s < sweeps; ++s) {
-    const float angle = turn * (0.5f * static_cast<float>(sweeps - 1) - static_cast<float>(s));
-    BitePlace p = on_top(picture, static_cast<uint32_t>(s % 2), angle, skill.edge_distance);
-    p.up = {1, 0, 0};
-    p.length = skill.bite_length;
-    p.depth = depth_of(p.length, picture.needle_radius, radius);
-    p.walls = 2;
-    plan.place.push_back(p);
-  }
-  add(plan, TaskKind::pick_up);
-  for (int s = 0; s < sweeps; ++s) {
-    add(plan, TaskKind::bite, s);
-    if (s == 0) add(plan, TaskKind::pull_tail);
-    else if (s > 1) add(plan, TaskKind::pull_together);
-    if (s == 1) {
-      add(plan, TaskKind::draw);
-      add(plan, TaskKind::regrip);
-      add(plan, TaskKind::throw_, 2, 1);
-      add(plan, TaskKind::throw_, 1, -1);
+  const int all = (skill.bites + 1) / 2;
+  for (int done = 0, row = 0; done < all; ++row) {
+    const int sweeps = std::min(kBitesPerThread / 2, all - done);
+    for (int s = 0; s < sweeps; ++s) {
+      const float angle = turn * (0.5f * static_cast<float>(sweeps - 1) - static_cast<float>(s));
+      BitePlace p = on_top(picture, static_cast<uint32_t>(s % 2), angle, skill.edge_distance + kRow * static_cast<float>(row));
+      p.up = {1, 0, 0};
+      p.length = skill.bite_length;
+      p.depth = depth_of(p.length, picture.needle_radius, radius);
+      p.walls = 2;
+      plan.place.push_back(p);
     }
-    if (s + 1 < sweeps) add(plan, TaskKind::hand_back);
+    if (row > 0) add(plan, TaskKind::fresh);
+    add(plan, TaskKind::pick_up);
+    for (int s = 0; s < sweeps; ++s) {
+      add(plan, TaskKind::bite, done + s);
+      if (s == 0) add(plan, TaskKind::pull_tail);
+      else if (s > 1) add(plan, TaskKind::pull_together);
+      if (s == 1) {
+        add(plan, TaskKind::draw);
+        add(plan, TaskKind::regrip);
+        add(plan, TaskKind::throw_, 2, 1);
+        add(plan, TaskKind::throw_, 1, -1);
+      }
+      if (s + 1 < sweeps) add(plan, TaskKind::hand_back);
+    }
+    add(plan, TaskKind::regrip);
+    add(plan, TaskKind::lock_strand, 1, 1);
+    done += sweeps;
+    if (done < all) add(plan, TaskKind::cut_long);
   }
-  add(plan, TaskKind::regrip);
-  add(plan, TaskKind::lock_strand, 1, 1);
   add(plan, TaskKind::rest);
   return plan;
 }
@@ -192,11 +223,12 @@ Plan lembert_plan(const PictureModel& picture, const SurgeonSkill& skill) {
 }  // namespace
 
 Plan make_plan(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill) {
-  const size_t walls = technique == "purse_string" ? 1 : 2;
+  const size_t walls = technique == "purse_string" || technique == "running" ? 1 : 2;
   for (size_t w = 0; w < walls; ++w)
     if (picture.body.empty() || w >= picture.rim.size() || picture.rim[w].empty())
       throw std::invalid_argument("the scene does not have the openings that the technique \"" + technique + "\" works on");
   if (technique == "purse_string") return purse_string_plan(picture, skill);
+  if (technique == "running") return running_plan(picture, skill);
   if (technique == "connell") return connell_plan(picture, skill);
   if (technique == "stay") return stay_plan(picture, skill);
   if (technique == "lembert") return lembert_plan(picture, skill);

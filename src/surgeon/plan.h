@@ -54,6 +54,7 @@ struct Plan {
   float lift = 0;  // [m] along `up`, when the needle is brought to a bite
 };
 
+// technique: purse_string, connell, stay, lembert, or running (bites in one bowel end, row under row).
 // Throws std::invalid_argument for a technique without a plan, or a picture that does not fit it.
 Plan make_plan(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
 
