@@ -95,6 +95,7 @@ struct Snapshot {
   NeedleView needle;
   std::vector<SuturePointView> suture_point;
   std::vector<uint8_t> thread_cut;  // per pair of thread_order: 1 where it was cut through
+  float thread_rest = 0;            // [m] rest length of all pairs that are not cut
   bool needle_on_thread = true;     // false once the thread was cut off the needle
   std::vector<KnotView> knot;
   std::vector<SettledView> settled;

@@ -114,11 +114,18 @@ void Tally::time(const StageTimes& times, double tick_ms) {
 float Tally::thread_length_error(const Snapshot& seen) const {
   if (seen.thread_order.size() < 2) return 0;
   double length = 0;
+  bool whole = true;
   for (size_t i = 1; i < seen.thread_order.size(); ++i) {
     const uint32_t a = seen.thread_order[i - 1], b = seen.thread_order[i];
+    if (i - 1 < seen.thread_cut.size() && seen.thread_cut[i - 1]) {
+      whole = false;
+      continue;
+    }
     if (a < seen.particle.size() && b < seen.particle.size()) length += distance(seen.particle[a], seen.particle[b]);
   }
-  const double rest = static_cast<double>(seen.thread_order.size() - 1) * scene_.thread.spacing;
+  // As long as it is whole, the thread is measured against the scene; its pieces against what they say they are.
+  const double rest = whole ? static_cast<double>(seen.thread_order.size() - 1) * scene_.thread.spacing : seen.thread_rest;
+  if (rest <= 0) return 0;
   return static_cast<float>(std::abs(length - rest) / rest);
 }
 

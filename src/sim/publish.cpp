@@ -92,6 +92,9 @@ void publish(const Model& model, const State& state, Snapshot& out) {
                                 model.wall[m.collision.surface[(p.exit ? bite.exit : bite.entry).triangle][0]]});
   }
   out.thread_cut = s.thread.cut;
+  out.thread_rest = 0;
+  for (size_t i = 0; i < s.thread.rest.size(); ++i)
+    if (!s.thread.cut[i]) out.thread_rest += s.thread.rest[i];
   out.needle_on_thread =
       std::any_of(s.thread.hold.begin(), s.thread.hold.end(), [](const ThreadHold& h) { return h.kind == HoldKind::swage; });
   publish_knots(model, state, out);

@@ -9,8 +9,10 @@ namespace {
 
 constexpr float kClosed = 0.35f, kOpen = 0.5f;  // jaw thresholds, apart so that a trembling finger does not drop the needle
 
-// force [N]: 0 when the jaw was opened, else what made it slip.
-void let_go(SolverState& solver, HandState& hand, uint8_t who, float force, std::vector<Event>& events) {
+}  // namespace
+
+void release(SolverState& solver, SutureState& state, uint8_t who, float force, std::vector<Event>& events) {
+  HandState& hand = state.hand[who];
   const int body = who;
   if (hand.held == Held::needle) {
     std::erase_if(solver.weld, [&](const Weld& w) { return w.a == static_cast<int>(kNeedle) && w.b == body; });
@@ -25,6 +27,8 @@ void let_go(SolverState& solver, HandState& hand, uint8_t who, float force, std:
   }
   hand.held = Held::nothing;
 }
+
+namespace {
 
 // The jaws close on the wall: its place nearest to them, with the neighbourhood that moves with it, is held where it is.
 void take_tissue(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
@@ -48,6 +52,26 @@ void take_tissue(const SolverModel& model, SolverState& solver, const SolverScra
   events.push_back({0, EventKind::tissue_grasped, who, hand.slot, 0, hit.point});
 }
 
+// Jaws hold every strand that lies between them: of each further stretch of thread within reach, its nearest particle.
+void take_other_strands(SolverState& solver, const SutureModel& suture, uint8_t who) {
+  Thread& t = solver.thread;
+  const RigidBody& tool = solver.body[who];
+  constexpr size_t kApart = 6;  // particles along the thread: another strand, not the neighbours of the first
+  const size_t first = static_cast<size_t>(std::find(t.order.begin(), t.order.end(), t.hold.back().slot) - t.order.begin());
+  float best = suture.strand_reach;
+  size_t found = t.order.size();
+  for (size_t i = 0; i < t.order.size(); ++i) {
+    if ((i > first ? i - first : first - i) < kApart) continue;
+    const uint32_t slot = t.order[i];
+    const float d = distance(xyz(solver.x[slot]), tool.x);
+    const bool taken = std::any_of(t.anchor.begin(), t.anchor.end(), [&](auto& a) { return a.slot == slot; }) ||
+                       std::any_of(t.hold.begin(), t.hold.end(), [&](auto& h) { return h.slot == slot; });
+    if (!taken && d < best) best = d, found = i;
+  }
+  if (found < t.order.size())
+    t.hold.push_back({t.order[found], who, to_local(tool.pose(), xyz(solver.x[t.order[found]])), HoldKind::jaw});
+}
+
 }  // namespace
 
 void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
@@ -59,7 +83,7 @@ void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& s
     hand.jaw = jaw;
     if (hand.held != Held::nothing) {
       if (jaw >= kOpen) {
-        let_go(solver, hand, who, 0, events);
+        release(solver, state, who, 0, events);
         update_thread_collisions(model, solver, suture);
       }
       continue;
@@ -95,6 +119,7 @@ void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& s
       hand.held = Held::thread;
       hand.slot = static_cast<uint32_t>(found);
       solver.thread.hold.push_back({hand.slot, who, to_local(tool.pose(), xyz(solver.x[hand.slot])), HoldKind::jaw});
+      take_other_strands(solver, suture, who);
       update_thread_collisions(model, solver, suture);
       events.push_back({0, EventKind::thread_grasped, who, hand.slot, 0, tool.x});
     } else {
@@ -126,7 +151,7 @@ void slip(const SolverModel& model, SolverState& solver, const SutureModel& sutu
         if (a.body == who) force = length(a.lambda) / (model.h * model.h);
     }
     if (force <= most) continue;
-    let_go(solver, hand, who, force, events);
+    release(solver, state, who, force, events);
     update_thread_collisions(model, solver, suture);
   }
 }

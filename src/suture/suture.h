@@ -98,9 +98,10 @@ struct SutureModel {
   float attach_compliance = 1.0f / 1100, channel_compliance = 0.002f;  // [m/N]
   float channel_drag = 0.12f;                                          // [N] per end of the channel
   float pass_tension = 0.03f;                                          // [N]
-  float capstan = 0.08f;       // thread-tissue friction times the angle by which a suture point bends the thread
-  int collision_off = 3;       // thread particles on each side
-  float grasp_reach = 0.003f;  // [m]
+  float capstan = 0.08f;         // thread-tissue friction times the angle by which a suture point bends the thread
+  int collision_off = 3;         // thread particles on each side
+  float grasp_reach = 0.003f;    // [m]
+  float strand_reach = 0.0022f;  // [m] of a second strand, to be between the jaws with the first
   float needle_grip = 40, thread_grip = 15, tissue_grip = 6;         // [N] beyond which a jaw slips
   float tissue_compliance = 5e-4f;                                   // [m/N] of tissue held by a jaw
   float tissue_reach = 0.0015f;                                      // [m] how near the surface must be to a closing jaw
@@ -136,6 +137,26 @@ void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& s
 // [N] as its value.
 void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
           std::vector<Event>& events);
+
+// A hand lets go of what it holds. force [N]: 0 when the jaw was opened, else what made it slip.
+void release(SolverState& solver, SutureState& state, uint8_t who, float force, std::vector<Event>& events);
+
+// --- cut.cpp -----------------------------------------------------------------------------------------------------------
+// Once a tick. pressed: the buttons that went down in this tick, per hand. kButtonCut cuts the thread nearest to that tool's
+// jaws, at most 4 mm away: between two particles, or the needle off at its swage. A cut within a stitch, or before anything was
+// tied, is a technique_fault besides.
+void cut(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+         const std::array<uint32_t, 2>& pressed, std::vector<Event>& events);
+
+// --- settle.cpp --------------------------------------------------------------------------------------------------------
+struct FreshSuture {
+  std::span<const Vec3> start;  // [m] of every particle, as at the beginning; the thread's are used
+  Pose needle;                  // of the needle's body
+};
+// Once a tick. kButtonNewSuture: what is tied becomes a settled stitch with its pins; whatever else there is of the thread is
+// taken away, and thread and needle lie as at the beginning. Refused, with a fault, while the needle is in the tissue.
+void take_fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                       const FreshSuture& fresh, const std::array<uint32_t, 2>& pressed, std::vector<Event>& events);
 
 // --- puncture.cpp ------------------------------------------------------------------------------------------------------
 // After every substep: the tip trigger, the attached particle, the back-end trigger (paper 2.2, figures 4 and 5).
