@@ -55,7 +55,8 @@ void Sweep(const Colour& t, float alpha) {
                                                         hn::Mul(hn::Mul(wc, wc), gc2)));
     const V limit = hn::Mul(hn::Set(d, 0.01f), hn::Min(la2, lc2));
     const auto over = hn::Gt(most, limit);
-    step = hn::IfThenElse(over, hn::Mul(step, hn::Sqrt(hn::Div(limit, hn::IfThenElse(over, most, one)))), step);
+    if (!hn::AllFalse(d, over))  // rare, and the root and the division are dear
+      step = hn::IfThenElse(over, hn::Mul(step, hn::Sqrt(hn::Div(limit, hn::IfThenElse(over, most, one)))), step);
     step = hn::IfThenElseZero(live, step);
     hn::StoreU(hn::Add(lambda, step), d, t.lambda + k);
     const V sa = hn::Mul(wa, step), sb = hn::Mul(wb, step), sc = hn::Mul(wc, step);

@@ -63,20 +63,30 @@ void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Ve
   const uint32_t n = tissue.particles;
   if (c.built_at.size() == n) {
     // By components, which is cheap and on the safe side: none above half the margin over the root of three.
-    Four worst{};
-    for (uint32_t i = 0; i < n; ++i) {
+    // Four maxima, so that none waits for the one before.
+    Four most_of[4] = {};
+    auto look = [&](uint32_t i, Four& worst) {
       Four now, then;
       std::memcpy(&now, &x[i], sizeof now);
       std::memcpy(&then, &c.built_at[i], sizeof then);
       const Four d = now - then, d2 = d * d;
       worst = d2 > worst ? d2 : worst;
-    }
+    };
+    uint32_t i = 0;
+    for (; i + 4 <= n; i += 4)
+      for (uint32_t k = 0; k < 4; ++k) look(i + k, most_of[k]);
+    for (; i < n; ++i) look(i, most_of[0]);
+    Four worst = most_of[0];
+    for (const Four& w : most_of) worst = w > worst ? w : worst;
     const float limit = kPairMargin * kPairMargin / 12;
     if (worst[0] < limit && worst[1] < limit && worst[2] < limit) return;
   }
   c.built_at.assign(x, x + n);
   c.pair.clear();
   update_boxes(tissue, x, c);
+  // By components, padded to whole groups of four.
+  for (std::vector<float>* column : {&c.x, &c.y, &c.z, &c.radius}) column->resize((n + 3) / 4 * 4);
+  for (uint32_t k = 0; k < n; ++k) c.x[k] = x[k].x, c.y[k] = x[k].y, c.z[k] = x[k].z, c.radius[k] = tissue.radius[k];
   const uint32_t blocks = static_cast<uint32_t>(c.lower.size());
   const Vec3 grow = all(2 * tissue.largest_radius + kPairMargin);
   for (uint32_t ba = 0; ba < blocks; ++ba)
@@ -87,14 +97,24 @@ void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Ve
         // Half the particles of a neighbouring block are out of reach: one test on the box saves sixteen.
         const Vec3 p = xyz(x[i]);
         if (ba != bb && distance_to_box2(p, c.lower[bb], c.upper[bb]) > grow.x * grow.x) continue;
-        for (uint32_t j = ba == bb ? i + 1 : bb * kBlock; j < eb; ++j) {
-          const float reach = tissue.radius[i] + tissue.radius[j] + kPairMargin;
-          if (length2(xyz(x[j]) - p) > reach * reach) continue;
-          if (tissue.body[i] == tissue.body[j]) {
-            const float apart = std::max(tissue.rest_reach[i], tissue.rest_reach[j]);
-            if (length2(xyz(rest[j]) - xyz(rest[i])) < apart * apart) continue;
+        // Four at a time: which are near at all? Most are not.
+        const float reach_i = tissue.radius[i] + kPairMargin;
+        for (uint32_t j0 = bb * kBlock; j0 < eb; j0 += 4) {
+          Four at_x, at_y, at_z, radius;
+          std::memcpy(&at_x, &c.x[j0], sizeof at_x), std::memcpy(&at_y, &c.y[j0], sizeof at_y);
+          std::memcpy(&at_z, &c.z[j0], sizeof at_z), std::memcpy(&radius, &c.radius[j0], sizeof radius);
+          const Four dx = at_x - p.x, dy = at_y - p.y, dz = at_z - p.z, reach = radius + reach_i;
+          const auto far = dx * dx + dy * dy + dz * dz > reach * reach;
+          if ((far[0] & far[1] & far[2] & far[3]) != 0) continue;
+          for (uint32_t k = 0; k < 4; ++k) {
+            const uint32_t j = j0 + k;
+            if (far[k] || j >= eb || (ba == bb && j <= i)) continue;
+            if (tissue.body[i] == tissue.body[j]) {
+              const float apart = std::max(tissue.rest_reach[i], tissue.rest_reach[j]);
+              if (length2(xyz(rest[j]) - xyz(rest[i])) < apart * apart) continue;
+            }
+            c.pair.push_back({i, j});
           }
-          c.pair.push_back({i, j});
         }
       }
     }
@@ -146,35 +166,6 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
   const size_t segments = thread.order.size() < 2 ? 0 : thread.order.size() - 1;
   auto collides = [&](uint32_t slot) { return thread_collides[slot - thread_model.first_slot] != 0; };
 
-  for (uint32_t b = 0; b < body.size(); ++b) {
-    if (!body_collides[b]) continue;
-    for (uint32_t k = 0; k < model[b].capsule.size(); ++k) {
-      const Capsule& capsule = model[b].capsule[k];
-      const Vec3 p = transform(body[b].pose(), capsule.a), q = transform(body[b].pose(), capsule.b);
-      const float reach = capsule.radius + tissue.tool_radius + margin;
-      const Vec3 lo = least(p, q) - all(reach), hi = most(p, q) + all(reach);
-      for (uint32_t blk = 0; blk < blocks; ++blk) {
-        if (!boxes_meet(lo, hi, c.lower[blk], c.upper[blk])) continue;
-        const uint32_t end = std::min(tissue.particles, (blk + 1) * kBlock);
-        for (uint32_t i = blk * kBlock; i < end; ++i) {
-          const Vec3 at = xyz(x[i]), d = q - p;
-          const float t = std::clamp(dot(at - p, d) / std::max(length2(d), 1e-16f), 0.0f, 1.0f);
-          if (length2(at - (p + d * t)) < reach * reach) c.tool.push_back({b, k, i});
-        }
-      }
-      const float thread_reach = capsule.radius + thread_model.radius + margin;
-      for (size_t i = 0; i < segments; ++i) {
-        const uint32_t s0 = thread.order[i], s1 = thread.order[i + 1];
-        if (!collides(s0) || !collides(s1)) continue;
-        const Vec3 a0 = xyz(x[s0]), a1 = xyz(x[s1]);
-        const Vec3 l = least(a0, a1), u = most(a0, a1);
-        if (!boxes_meet(l, u, lo, hi)) continue;
-        const auto [s, t] = closest_on_segments(a0, a1, p, q);
-        if (length2(lerp(a0, a1, s) - lerp(p, q, t)) < thread_reach * thread_reach) c.thread_tool.push_back({b, k, s0});
-      }
-    }
-  }
-
   // Runs of eight segments in boxes: most of a thread is far from everything.
   constexpr size_t kRun = 8, kMostRuns = 1024;
   const size_t runs = std::min(kMostRuns, (segments + kRun - 1) / kRun);
@@ -185,8 +176,40 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
       lo[r] = least(lo[r], xyz(x[thread.order[i]])), hi[r] = most(hi[r], xyz(x[thread.order[i]]));
   }
 
+  for (uint32_t b = 0; b < body.size(); ++b) {
+    if (!body_collides[b]) continue;
+    for (uint32_t k = 0; k < model[b].capsule.size(); ++k) {
+      const Capsule& capsule = model[b].capsule[k];
+      const Vec3 p = transform(body[b].pose(), capsule.a), q = transform(body[b].pose(), capsule.b);
+      const float reach = capsule.radius + tissue.tool_radius + margin;
+      const Vec3 from = least(p, q) - all(reach), to = most(p, q) + all(reach);
+      for (uint32_t blk = 0; blk < blocks; ++blk) {
+        if (!boxes_meet(from, to, c.lower[blk], c.upper[blk])) continue;
+        const uint32_t end = std::min(tissue.particles, (blk + 1) * kBlock);
+        for (uint32_t i = blk * kBlock; i < end; ++i) {
+          const Vec3 at = xyz(x[i]), d = q - p;
+          const float t = std::clamp(dot(at - p, d) / std::max(length2(d), 1e-16f), 0.0f, 1.0f);
+          if (length2(at - (p + d * t)) < reach * reach) c.tool.push_back({b, k, i});
+        }
+      }
+      const float thread_reach = capsule.radius + thread_model.radius + margin;
+      for (size_t r = 0; r < runs; ++r) {
+        if (!boxes_meet(lo[r], hi[r], from, to)) continue;
+        for (size_t i = r * kRun; i < std::min(segments, (r + 1) * kRun); ++i) {
+          const uint32_t s0 = thread.order[i], s1 = thread.order[i + 1];
+          if (thread.cut[i] || !collides(s0) || !collides(s1)) continue;
+          const Vec3 a0 = xyz(x[s0]), a1 = xyz(x[s1]);
+          if (!boxes_meet(least(a0, a1), most(a0, a1), from, to)) continue;
+          const auto [s, t] = closest_on_segments(a0, a1, p, q);
+          if (length2(lerp(a0, a1, s) - lerp(p, q, t)) < thread_reach * thread_reach) c.thread_tool.push_back({b, k, s0});
+        }
+      }
+    }
+  }
+
   // Thread on tissue: one triangle each, the nearest of those around the nearest particle; the substeps use its plane.
   const float reach = 0.004f + margin;
+  uint32_t guess = tissue.particles;  // the nearest of the node before: with it most boxes are too far at once
   for (size_t r = 0; r < runs; ++r) {
     c.near_block.clear();
     for (uint32_t b = 0; b < blocks; ++b)
@@ -198,6 +221,7 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
       const Vec3 p = xyz(x[slot]);
       float closest = reach * reach;
       uint32_t near = tissue.particles;
+      if (guess < tissue.particles && length2(xyz(x[guess]) - p) < closest) closest = length2(xyz(x[guess]) - p), near = guess;
       for (uint32_t b : c.near_block) {
         if (distance_to_box2(p, c.lower[b], c.upper[b]) > closest) continue;
         const uint32_t end = std::min(tissue.particles, (b + 1) * kBlock);
@@ -206,6 +230,7 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
           if (d < closest) closest = d, near = i;
         }
       }
+      guess = near;
       if (near == tissue.particles) continue;
       float best = 1e30f;
       uint32_t found = 0;
@@ -221,15 +246,16 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
   const float grow = 2 * thread_model.radius + 0.002f;
   // Two segments cannot be nearer than their middles less half of both; a segment may be stretched to twice its spacing.
   const float far = grow + 2 * thread_model.spacing;
+  c.middle.resize(segments);
+  for (size_t i = 0; i < segments; ++i) c.middle[i] = xyz(x[thread.order[i]]) + xyz(x[thread.order[i + 1]]);  // twice
   for (size_t ra = 0; ra < runs; ++ra)
     for (size_t rb = ra; rb < runs; ++rb) {
       if (!boxes_meet(lo[ra] - all(grow), hi[ra] + all(grow), lo[rb], hi[rb])) continue;
       for (size_t i = ra * kRun; i < std::min(segments, (ra + 1) * kRun); ++i)
         for (size_t j = std::max(rb * kRun, i + 4); j < std::min(segments, (rb + 1) * kRun); ++j) {
+          if (length2(c.middle[i] - c.middle[j]) > 4 * far * far) continue;
           const uint32_t i0 = thread.order[i], i1 = thread.order[i + 1], j0 = thread.order[j], j1 = thread.order[j + 1];
-          if (!collides(i0) || !collides(i1) || !collides(j0) || !collides(j1)) continue;
-          const Vec3 middles = xyz(x[i0]) + xyz(x[i1]) - xyz(x[j0]) - xyz(x[j1]);
-          if (length2(middles) > 4 * far * far) continue;
+          if (thread.cut[i] || thread.cut[j] || !collides(i0) || !collides(i1) || !collides(j0) || !collides(j1)) continue;
           const auto [s, t] = closest_on_segments(xyz(x[i0]), xyz(x[i1]), xyz(x[j0]), xyz(x[j1]));
           if (length2(lerp(xyz(x[i0]), xyz(x[i1]), s) - lerp(xyz(x[j0]), xyz(x[j1]), t)) < grow * grow)
             c.thread_pair.push_back({i0, j0});

@@ -54,6 +54,8 @@ struct Candidates {
   std::vector<Vec4> built_at;        // tissue positions when `pair` was built; empty: build now
   std::vector<Vec3> lower, upper;    // block boxes
   std::vector<uint32_t> near_block;  // working memory
+  std::vector<Vec3> middle;
+  std::vector<float> x, y, z, radius;
 };
 
 constexpr float kPairMargin = 0.002f;  // [m]

@@ -197,24 +197,37 @@ void ShapeParticles(const ShapeModel& model, Vec4* x, const float* inv_mass, flo
   const Vec4* rest = model.rest.data();
   const uint32_t *holder = model.holder.data(), *group = model.group_first.data();
   const uint32_t stride = model.holder_stride;
+  const hn::CappedTag<float, 8> dw;
+  constexpr uint32_t kPer = HWY_MIN(8, kLanes) / 4;
   // Lane 3 (the constant 1 of a position) must not move.
-  const auto relax = hn::IfThenElseZero(hn::FirstN(d4, 3), hn::Set(d4, relaxation));
-  const auto stiff = hn::Set(d4, stiffness), soft = hn::Set(d4, 1.0f - stiffness);
+  alignas(16) const float relax[4] = {relaxation, relaxation, relaxation, 0};
   alignas(64) float sum[16];
   for (uint32_t g = first; g < last; ++g) {
     const Parts total = SumRows(transform, holder + size_t{g} * stride, stride);
     const auto share = hn::Set(d, model.inv_holders[g]);
     for (size_t p = 0; p < kParts; ++p) hn::Store(hn::Mul(total.part[p], share), d, sum + p * kLanes);
-    const auto c0 = hn::Load(d4, sum), c1 = hn::Load(d4, sum + 4), c2 = hn::Load(d4, sum + 8), c3 = hn::Load(d4, sum + 12);
-    for (uint32_t i = group[g]; i < group[g + 1]; ++i) {
-      if (inv_mass[i] == 0) continue;
-      const Vec4& q = rest[i];
-      const auto goal = hn::Add(hn::Add(hn::Mul(c0, hn::Set(d4, q.x)), hn::Mul(c1, hn::Set(d4, q.y))),
-                                hn::Add(hn::Mul(c2, hn::Set(d4, q.z)), c3));
-      const auto at = hn::Load(d4, &x[i].x), moved = hn::Load(d4, &move[i].x);
-      const auto dx = hn::Mul(relax, hn::Sub(hn::Mul(stiff, hn::Sub(goal, at)), hn::Mul(soft, moved)));
-      hn::Store(hn::Add(at, dx), d4, &x[i].x);
-      hn::Store(hn::Add(moved, dx), d4, &move[i].x);
+    // Two particles at a time where registers are wide enough, and the few left over, or beside a pinned one, singly.
+    auto move_at = [&](auto dp, uint32_t i) HWY_ATTR {
+      const auto q = hn::LoadU(dp, &rest[i].x), at = hn::LoadU(dp, &x[i].x), moved = hn::LoadU(dp, &move[i].x);
+      const auto goal =
+          hn::Add(hn::Add(hn::Mul(hn::LoadDup128(dp, sum), hn::Broadcast<0>(q)),
+                          hn::Mul(hn::LoadDup128(dp, sum + 4), hn::Broadcast<1>(q))),
+                  hn::Add(hn::Mul(hn::LoadDup128(dp, sum + 8), hn::Broadcast<2>(q)), hn::LoadDup128(dp, sum + 12)));
+      const auto dx = hn::Mul(hn::LoadDup128(dp, relax), hn::Sub(hn::Mul(hn::Set(dp, stiffness), hn::Sub(goal, at)),
+                                                                 hn::Mul(hn::Set(dp, 1.0f - stiffness), moved)));
+      hn::StoreU(hn::Add(at, dx), dp, &x[i].x);
+      hn::StoreU(hn::Add(moved, dx), dp, &move[i].x);
+    };
+    uint32_t i = group[g];
+    const uint32_t end = group[g + 1];
+    while (i < end) {
+      if (i + kPer <= end && inv_mass[i] != 0 && inv_mass[i + kPer - 1] != 0) {
+        move_at(dw, i);
+        i += kPer;
+      } else {
+        if (inv_mass[i] != 0) move_at(d4, i);
+        ++i;
+      }
     }
   }
   if (more) MakeRows(model, x, scratch, first, last);

@@ -157,7 +157,8 @@ bool BeginSmoothing(ThreadScratch& s, size_t nodes, float inv_mass, float shorte
   for (ptrdiff_t i = 0; i < static_cast<ptrdiff_t>(nodes); i += kStep) {
     const V stiff = hn::IfThenElseZero(In(i, nodes), hn::Div(hn::Mul(hn::Max(zero, Get(s.tension, i)), per_newton),
                                                              hn::Max(Get(s.rest, i), hn::Set(d, shortest))));
-    Put(stiff, s.stiff, i);  // the last node's is of no pair: its tension is 0
+    // Next to nothing is nothing (no denormal numbers). The last node's is of no pair: its tension is 0.
+    Put(hn::IfThenElseZero(hn::Gt(stiff, hn::Set(d, 1e-9f)), stiff), s.stiff, i);
     most = hn::Max(most, stiff);
   }
   if (hn::GetLane(hn::MaxOfLanes(d, most)) <= 1e-3f) return false;
@@ -236,7 +237,9 @@ HWY_INLINE void Solve(Strands<T, kRight>& s, size_t count) {
   const size_t last = rows - 1, separator = last * kStrands, end = separator - kStrands;  // first elements of the last two rows
   const W one = hn::Set(d, T{1});
   // Influences die away along a strand. Denormal numbers, which they would end as, cost a hundred cycles each.
-  auto felt = [&](W v) { return hn::IfThenElseZero(hn::Gt(hn::Abs(v), hn::Set(d, T{1e-25f})), v); };
+  auto felt = [&](W v) HWY_ATTR { return hn::IfThenElseZero(hn::Gt(hn::Abs(v), hn::Set(d, T{1e-18f})), v); };
+  // Neither must a float32 value die away: 1e-18 m is no motion. In double precision there is room.
+  auto value_of = [&](W v) HWY_ATTR { return sizeof(T) == sizeof(float) ? felt(v) : v; };
   T *link = s.link.data(), *inv = s.inverse.data(), *before = s.before.data(), *after = s.after.data();
 
   // Forward: each row without the one before it. Inside a strand the separator before is carried along as one more column.
@@ -266,7 +269,7 @@ HWY_INLINE void Solve(Strands<T, kRight>& s, size_t count) {
       hn::Store(inverse[p], d, inv + k);
       hn::Store(carry[p], d, before + k);
       for (size_t j = 0; j < kRight; ++j) {
-        y[j][p] = hn::Sub(hn::GatherIndex(d, s.right[j].data() + row, lane[p]), hn::Mul(f, y[j][p]));
+        y[j][p] = value_of(hn::Sub(hn::GatherIndex(d, s.right[j].data() + row, lane[p]), hn::Mul(f, y[j][p])));
         hn::Store(y[j][p], d, s.value[j].data() + k);
       }
     }
@@ -293,7 +296,7 @@ HWY_INLINE void Solve(Strands<T, kRight>& s, size_t count) {
       hn::Store(carry[p], d, before + k);
       hn::Store(behind[p], d, after + k);
       for (size_t j = 0; j < kRight; ++j) {
-        y[j][p] = hn::Mul(hn::Sub(hn::Load(d, s.value[j].data() + k), hn::Mul(out, y[j][p])), i);
+        y[j][p] = value_of(hn::Mul(hn::Sub(hn::Load(d, s.value[j].data() + k), hn::Mul(out, y[j][p])), i));
         hn::Store(y[j][p], d, s.value[j].data() + k);
       }
     }
