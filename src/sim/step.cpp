@@ -68,6 +68,10 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   state.event.clear();
   meet_hands(state, input);
   grasp(solver, state.solver, model.suture, state.suture, input.hand, state.event);
+  {
+    StageTimer timer(times, Stage::loop);
+    find_loops(solver, state.solver, model.suture, state.suture, state.event);
+  }
   find_candidates(solver, state.solver, state.scratch, 0.008f, times);
   for (int i = 1; i <= model.substeps; ++i) {
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));

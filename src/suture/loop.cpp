@@ -15,7 +15,12 @@ namespace {
 
 constexpr size_t kMostCorners = 512;  // of the thread on one tool: a longer run is a heap, and only its beginning is looked at
 constexpr size_t kFewest = 3;         // particles of a loop: thread between two of them is straight
-constexpr double kParallel = 1e-12;   // [m^2] thread that runs along the tool is a point in the picture and crosses nothing
+constexpr float kWide = 0.95f;        // a jaw opened this far drops the loop round it
+constexpr float kShut = 0.35f;        // a jaw closed this far has taken what there is, or nothing
+constexpr size_t kSeveral = 6;        // particles that must touch, and
+constexpr float kMostOfATurn =
+    1.5f * kPi;                      // [rad] how far thread must go round a tool, before a loop that is none is spoken of
+constexpr double kParallel = 1e-12;  // [m^2] thread that runs along the tool is a point in the picture and crosses nothing
 
 // A corner of the thread's picture on the plane across the tool.
 struct Corner {
@@ -163,6 +168,138 @@ LoopVerdict find_loop(const Vec4* x, std::span<const uint32_t> order, const Loop
     i = end + 1;
   }
   return best;
+}
+
+namespace {
+
+bool is_held_elsewhere(const Thread& t, uint32_t slot, int body) {
+  return std::any_of(t.anchor.begin(), t.anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot; }) ||
+         std::any_of(t.hold.begin(), t.hold.end(),
+                     [&](const ThreadHold& h) { return h.slot == slot && !(h.body == body && h.kind == HoldKind::loop); });
+}
+
+// Figure 10 on every stretch of free thread. A suture point, a jaw and a cut end a stretch: thread beyond them is not drawn
+// through a loop.
+LoopVerdict look(const SolverModel& model, const SolverState& solver, const SutureModel& suture, int body) {
+  const Thread& t = solver.thread;
+  const LoopTool tool{solver.body[static_cast<size_t>(body)].pose(), model.body[static_cast<size_t>(body)].capsule};
+  LoopVerdict best;
+  for (size_t begin = 0, end = 0; begin + 1 < t.order.size(); begin = end) {
+    end = begin + 1;
+    while (end + 1 < t.order.size() && !t.cut[end - 1] && !is_held_elsewhere(t, t.order[end], body)) ++end;
+    // Both ends of the stretch belong to it, unless the thread is cut there.
+    const size_t last = t.cut[end - 1] ? end - 1 : end;
+    LoopVerdict v = find_loop(solver.x.data(), {t.order.data() + begin, last - begin + 1}, tool,
+                              suture.loop_depth * model.thread.spacing, suture.loop_reach);
+    v.first += begin, v.last += begin;
+    v.touching = std::max(v.touching, best.touching), v.round = std::max(v.round, best.round);
+    if (better(v, best)) best = v;
+    best.touching = v.touching, best.round = v.round;
+  }
+  return best;
+}
+
+// Handedness. What counts is the half knot that the loop becomes. Its two strands come out of the tissue, and the one that the
+// tool takes is drawn through the loop along the tool, from tip to hand; so the sign of the half knot is the way in which the
+// other, walked outward too, turns about that direction. It does not matter which end was wrapped or which way the tool points:
+// two throws with the same sign are a granny, with opposite signs a reef knot. The list runs from the free end to the needle:
+// outward on the needle's side of the stitch, inward on the free end's.
+int32_t handedness(const Thread& t, const LoopVerdict& v) {
+  for (size_t i = 0; i < v.first; ++i)
+    for (const ThreadAnchor& a : t.anchor)
+      if (a.slot == t.order[i]) return v.turn;
+  return t.anchor.empty() ? v.turn : -v.turn;
+}
+
+Vec3 middle(const SolverState& solver, const LoopVerdict& v) {
+  Vec3 sum{};
+  for (size_t i = v.first; i <= v.last; ++i) sum += xyz(solver.x[solver.thread.order[i]]);
+  return sum / static_cast<float>(v.last - v.first + 1);
+}
+
+size_t node_of(const Thread& t, uint32_t slot) {
+  return static_cast<size_t>(std::find(t.order.begin(), t.order.end(), slot) - t.order.begin());
+}
+
+// [N] with which the thread on either side of the loop pulls on it.
+float pull_on(const Thread& t, const ToolLoop& loop) {
+  const size_t first = node_of(t, loop.first), last = node_of(t, loop.last);
+  float most = 0;
+  if (first > 0) most = std::max(most, t.tension[first - 1]);
+  if (last < t.tension.size()) most = std::max(most, t.tension[last]);
+  return most;
+}
+
+}  // namespace
+
+void take_off_loop(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t who) {
+  std::erase_if(solver.thread.hold,
+                [&](const ThreadHold& h) { return h.body == static_cast<int>(who) && h.kind == HoldKind::loop; });
+  ToolLoop& loop = state.loop[who];
+  const float jaw = loop.jaw;
+  loop = {};
+  loop.jaw = jaw;
+  loop.spent = 1;
+  update_thread_collisions(model, solver, suture);
+}
+
+void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                std::vector<Event>& events) {
+  Thread& t = solver.thread;
+  for (uint8_t who = 0; who < 2; ++who) {
+    ToolLoop& loop = state.loop[who];
+    const HandState& hand = state.hand[who];
+    const RigidBody& tool = solver.body[who];
+    const bool opened = loop.jaw < kWide && hand.jaw >= kWide && hand.held == Held::nothing;
+    const bool closes = loop.jaw > kShut && hand.jaw <= kShut;
+    loop.jaw = hand.jaw;
+    if (loop.wraps > 0) {
+      const float pull = pull_on(t, loop);
+      if (opened || pull > suture.thread_grip) {
+        take_off_loop(model, solver, suture, state, who);
+        events.push_back({0, EventKind::loop_released, who, 0, opened ? 0 : pull, tool.x});
+        continue;
+      }
+    }
+    // A tool that holds something is at work with it. Thread that happens to lie round a needle driver while it drives the
+    // needle is no loop, and round jaws that hold the very thread there is nothing to draw through.
+    const bool free = hand.held == Held::nothing;
+    if (!solver.body_collides[who] || !(free || (closes && hand.held == Held::thread))) continue;
+    const LoopVerdict v = look(model, solver, suture, who);
+    if (v.touching == 0) loop.told = LoopReason::none;
+    if (v.wraps == 0) {
+      loop.spent = 0;
+      // Thread that is still being laid has not crossed itself yet: nothing is missing before the jaws close on the other end.
+      if (loop.wraps == 0 && v.touching >= kSeveral && v.reason != loop.told &&
+          (v.reason != LoopReason::no_crossing || (closes && v.round > kMostOfATurn))) {
+        loop.told = v.reason;
+        events.push_back({0, EventKind::loop_rejected, who, static_cast<uint32_t>(v.reason), 0, tool.x});
+      }
+      continue;
+    }
+    const int32_t handed = handedness(t, v);
+    if (!free || loop.spent) continue;
+    if (loop.wraps > 0) {
+      // The frozen turns are seen again, with those that have been laid since.
+      const bool same = handed == loop.handed && v.first <= node_of(t, loop.last) && node_of(t, loop.first) <= v.last;
+      if (!same || v.wraps <= loop.wraps) continue;
+    }
+    // "All the particles in the loop are attached to the tool using particle attachments. This prevents the user from undoing
+    // the loop."
+    for (size_t i = v.first; i <= v.last; ++i) {
+      const uint32_t slot = t.order[i];
+      if (std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) { return h.slot == slot; })) continue;
+      t.hold.push_back({slot, who, to_local(tool.pose(), xyz(solver.x[slot])), HoldKind::loop});
+    }
+    const size_t first = loop.wraps > 0 ? std::min(v.first, node_of(t, loop.first)) : v.first;
+    const size_t last = loop.wraps > 0 ? std::max(v.last, node_of(t, loop.last)) : v.last;
+    loop.first = t.order[first], loop.last = t.order[last];
+    loop.wraps = v.wraps;
+    loop.handed = handed;
+    loop.told = LoopReason::none;
+    update_thread_collisions(model, solver, suture);
+    events.push_back({0, EventKind::loop_formed, who, loop.wraps, static_cast<float>(handed), middle(solver, v)});
+  }
 }
 
 }  // namespace catgut

@@ -7,7 +7,7 @@
 #include <functional>
 #include <string>
 
-#include "rig.h"
+#include "tie.h"
 
 namespace catgut {
 namespace {
@@ -248,6 +248,200 @@ TEST(LoopZoo, every_shape_is_what_its_name_says_at_every_angle_of_the_tool_and_f
           for (size_t i = v.first; i <= v.last; ++i)
             EXPECT_LT(std::hypot(thread[i].x, thread[i].y), 0.0025f + kReach) << "its particles lie on the tool";
         }
+}
+
+// --- the stage ---
+
+// "When both checks are identified as true, all the particles in the loop are attached to the tool using particle attachments."
+TEST(Loop, its_particles_are_frozen_on_the_tool_and_go_where_it_goes) {
+  for (const int way : {1, -1}) {
+    TieSetup setup;
+    setup.way = way;
+    Tie r(setup);
+    ASSERT_EQ(r.count(EventKind::loop_formed), 1u);
+    EXPECT_EQ(r.last(EventKind::loop_formed)->which, 1u);
+    EXPECT_EQ(r.last(EventKind::loop_formed)->value, static_cast<float>(way));
+    EXPECT_EQ(r.loop().wraps, 1u);
+    EXPECT_EQ(r.loop().handed, way);
+    const size_t first = r.node_of(r.loop().first), last = r.node_of(r.loop().last);
+    EXPECT_EQ(r.holds(HoldKind::loop), last - first + 1);
+    std::vector<Vec3> where;
+    for (size_t i = first; i <= last; ++i)
+      where.push_back(to_local(r.solver().body[0].pose(), xyz(r.x()[r.thread().order[i]])));
+    r.move(0, Vec3{0, 0.004f, 0} + r.first.out * 0.004f, 0.4f);
+    for (size_t i = first; i <= last; ++i)
+      EXPECT_LT(distance(to_local(r.solver().body[0].pose(), xyz(r.x()[r.thread().order[i]])), where[i - first]), 1e-6f);
+    EXPECT_EQ(r.count(EventKind::loop_formed), 1u) << "a loop is told once";
+    EXPECT_EQ(r.count(EventKind::loop_rejected), 0u);
+  }
+}
+
+// A reef knot's throws are wrapped in opposite ways with the same end, or the same way with the other end.
+TEST(Loop, handedness_is_that_of_the_half_knot_whichever_end_was_wrapped) {
+  for (const bool tail : {false, true})
+    for (const int way : {1, -1}) {
+      TieSetup setup;
+      setup.way = way, setup.wrap_tail = tail;
+      setup.older = 45, setup.newer = 50;
+      Tie r(setup);
+      ASSERT_EQ(r.loop().wraps, 1u) << (tail ? "tail" : "needle end");
+      EXPECT_EQ(r.loop().handed, way) << (tail ? "tail" : "needle end");
+    }
+}
+
+TEST(Loop, turns_that_follow_are_added) {
+  TieSetup setup;
+  Tie r(setup);
+  ASSERT_EQ(r.loop().wraps, 1u);
+  const uint32_t first = r.loop().first, last = r.loop().last;
+  // The strand beyond the frozen turn is wound round once more.
+  const Pose tool = r.solver().body[0].pose();
+  const size_t from = r.node_of(last) + 1;
+  std::vector<Vec3> c;
+  const Vec3 start = to_local(tool, xyz(r.x()[last]));
+  const float phi0 = std::atan2(start.y, start.x);
+  for (int i = 0; i <= 250; ++i) {
+    const float phi = 1.2f * kTurn * static_cast<float>(i) / 250;
+    c.push_back(transform(tool, {0.0021f * std::cos(phi0 + phi), 0.0021f * std::sin(phi0 + phi), start.z + 0.0001f * phi}));
+  }
+  const Vec3 out = normalized(c.back() - c[c.size() - 2]);
+  Tie::line(c, c.back(), c.back() + out * 0.3f);
+  c[0] = xyz(r.x()[last]);
+  r.lay_along(from, 1, c, r.thread().order.size() - 1);
+  r.let_go();
+  put_needle(r, xyz(r.x()[r.thread().order.back()]));
+  r.tick();
+  EXPECT_EQ(r.loop().wraps, 2u);
+  EXPECT_EQ(r.loop().first, first);
+  EXPECT_GT(r.node_of(r.loop().last), r.node_of(last));
+  EXPECT_EQ(r.holds(HoldKind::loop), r.node_of(r.loop().last) - r.node_of(r.loop().first) + 1);
+  EXPECT_EQ(r.count(EventKind::loop_formed), 2u);
+}
+
+TEST(Loop, opening_wide_lets_it_go_once_and_it_does_not_come_back_by_itself) {
+  Tie r;
+  ASSERT_EQ(r.loop().wraps, 1u);
+  for (float jaw : {0.6f, 0.9f, 0.93f}) r.input.hand[0].jaw = jaw, r.tick();
+  EXPECT_EQ(r.loop().wraps, 1u) << "jaws open to take the other end";
+  r.input.hand[0].jaw = 1, r.tick();
+  EXPECT_EQ(r.loop().wraps, 0u);
+  EXPECT_EQ(r.holds(HoldKind::loop), 0u);
+  EXPECT_EQ(r.count(EventKind::loop_released), 1u);
+  r.wait(0.2f);
+  EXPECT_EQ(r.count(EventKind::loop_formed), 1u) << "what was let go is no loop until it has been taken off";
+}
+
+TEST(Loop, a_pull_harder_than_a_grip_strips_it_off) {
+  SceneSpec scene = weightless(90);
+  Tie r({}, scene);
+  ASSERT_EQ(r.loop().wraps, 1u);
+  Pose to = r.circle();
+  to.p += normalized(xyz(r.x()[r.thread().order.back()]) - r.solver().body[0].x) * 0.03f;
+  r.needle_to(to, 0.5f);
+  ASSERT_EQ(r.count(EventKind::loop_released), 1u);
+  EXPECT_GT(r.last(EventKind::loop_released)->value, r.model->suture.thread_grip);
+  EXPECT_EQ(r.holds(HoldKind::loop), 0u);
+}
+
+TEST(Loop, a_tool_that_holds_something_forms_none) {
+  TieSetup setup;
+  setup.turns = 0;
+  Tie r(setup);
+  r.take();
+  ASSERT_EQ(r.suture().hand[0].held, Held::thread);
+  r.lay_along(r.node_of_point(1) + 1, 1, r.round_the_tool(r.point_at(1), 1.25f, 1), r.thread().order.size() - 1);
+  r.wait(0.05f);
+  EXPECT_EQ(r.count(EventKind::loop_formed), 0u);
+}
+
+TEST(Loop, a_rejection_is_told_once_and_brushing_thread_is_not_spoken_of) {
+  // A helix: five turns along the jaws, 5 mm apart.
+  TieSetup setup;
+  setup.turns = 0;
+  Tie r(setup);
+  EXPECT_EQ(r.count(EventKind::loop_rejected), 0u);
+  r.wait(0.2f);
+  EXPECT_EQ(r.count(EventKind::loop_rejected), 0u) << "thread past the tip";
+  std::vector<Vec3> c{r.point_at(1)};
+  const float z = to_local(r.frame, r.point_at(1)).z;
+  for (int i = 0; i <= 300; ++i) {
+    const float phi = 1.25f * kTurn * static_cast<float>(i) / 300;
+    c.push_back(transform(r.frame, {Tie::kRound * std::cos(phi), Tie::kRound * std::sin(phi), z + 0.0008f * phi}));
+  }
+  Tie::line(c, c.back(), c.back() + rotate(r.frame.q, Vec3{-0.3f, 0, 0.1f}));
+  r.lay_along(r.node_of_point(1) + 1, 1, c, r.thread().order.size() - 1);
+  r.let_go();
+  put_needle(r, xyz(r.x()[r.thread().order.back()]));
+  r.wait(0.2f);
+  EXPECT_EQ(r.count(EventKind::loop_formed), 0u);
+  ASSERT_EQ(r.count(EventKind::loop_rejected), 1u);
+  EXPECT_EQ(r.last(EventKind::loop_rejected)->which, static_cast<uint32_t>(LoopReason::too_deep));
+}
+
+// Nothing placed by hand: the forceps carry the thread round the needle driver, and the physics lays it.
+TEST(Loop, a_hand_that_carries_the_thread_round_the_tool_lays_loops) {
+  for (const int way : {1, -1})
+    for (const float turns : {1.3f, 2.3f}) {
+      TieSetup setup;
+      setup.turns = 0;
+      setup.particles = 130;
+      setup.above = 0.06f;  // room for a hand between tool and tissue
+      Tie r(setup);
+      const float side = static_cast<float>(way);
+      // The needle's strand stands straight out beside the tool; the forceps take it 24 mm beyond.
+      const Vec3 beside = transform(r.frame, Vec3{side * 0.0016f, 0, 0.006f});
+      std::vector<Vec3> c{r.point_at(1)};
+      Tie::line(c, r.point_at(1), beside);
+      Tie::line(c, beside, beside + rotate(r.frame.q, Vec3{0, 0.3f, 0}));
+      r.lay_along(r.node_of_point(1) + 1, 1, c, r.thread().order.size() - 1);
+      r.let_go();
+      put_needle(r, xyz(r.x()[r.thread().order.back()]));
+      r.let_go();  // the needle floats along
+      size_t held = r.node_of_point(1) + 1;
+      while (to_local(r.frame, xyz(r.x()[r.thread().order[held]])).y < 0.018f + 0.016f * turns) ++held;
+      const Vec3 at = xyz(r.x()[r.thread().order[held]]);
+      const Quat turned = r.frame.q * axis_angle({1, 0, 0}, kPi);  // the hand comes from the other side
+      r.show(1, {at, turned}, 0.3f);
+      ASSERT_EQ(r.suture().hand[1].held, Held::thread);
+      // Nearly taut, as a surgeon keeps it: what is wound up is no longer between hand and tool. And past the strand that comes
+      // from the tissue, not through it.
+      const float wound = 0.0015f, loose = 0.0018f, free = to_local(r.frame, at).y;
+      const int ticks = static_cast<int>(turns * 60);
+      for (int i = 1; i <= ticks; ++i) {
+        const float phi = turns * kTurn * static_cast<float>(i) / static_cast<float>(ticks), left = free - loose * phi;
+        r.input.hand[1].pose.p =
+            transform(r.frame, {side * (wound * std::cos(phi) - left * std::sin(phi)),
+                                wound * std::sin(phi) + left * std::cos(phi), 0.006f - 0.003f * std::min(1.0f, phi)});
+        r.tick();
+        if (HasFatalFailure()) return;
+      }
+      r.wait(0.2f);
+      EXPECT_EQ(r.loop().wraps, turns < 2 ? 1u : 2u) << "way " << way;
+      EXPECT_EQ(r.loop().handed, way);
+      EXPECT_EQ(r.count(EventKind::loop_rejected), 0u) << "half a turn on the way to a whole one is no mistake";
+    }
+}
+
+TEST(Loop, a_near_miss_is_spoken_of_when_the_jaws_close) {
+  TieSetup setup;
+  setup.turns = 0;
+  Tie r(setup);
+  std::vector<Vec3> c;
+  const float z = to_local(r.frame, r.point_at(1)).z;
+  Tie::line(c, r.point_at(1), transform(r.frame, {0, -0.0017f, z}));
+  for (int i = 0; i <= 200; ++i) {
+    const float phi = (-90.0f + 320.0f * static_cast<float>(i) / 200) * kPi / 180;
+    c.push_back(transform(r.frame, {0.0017f * std::cos(phi), 0.0017f * std::sin(phi), z}));
+  }
+  Tie::line(c, c.back(), c.back() + rotate(r.frame.q, Vec3{-0.2f, -0.2f, 0}));
+  r.lay_along(r.node_of_point(1) + 1, 1, c, r.thread().order.size() - 1);
+  r.let_go();
+  put_needle(r, xyz(r.x()[r.thread().order.back()]));
+  r.take();
+  EXPECT_EQ(r.suture().hand[0].held, Held::thread);
+  EXPECT_EQ(r.count(EventKind::loop_formed), 0u);
+  ASSERT_EQ(r.count(EventKind::loop_rejected), 1u);
+  EXPECT_EQ(r.last(EventKind::loop_rejected)->which, static_cast<uint32_t>(LoopReason::no_crossing));
 }
 
 }  // namespace
