@@ -19,6 +19,7 @@ enum class Stage : uint8_t {
   tool_contact,
   thread_contact,
   velocity,  // solver
+  loop,
   puncture,
   pull,
   closure,

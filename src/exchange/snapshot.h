@@ -21,7 +21,8 @@ struct ToolView {
   uint32_t held_slot = 0;                  // thread: particle slot; tissue: particle
   uint32_t held_strands = 0;               // strands of thread between the jaws
   uint32_t loop_wraps = 0;                 // turns of thread frozen round it, 0: none
-  int loop_handed = 0;                     // +1: right-handed as seen from its hand, -1: left-handed
+  // Walked away from the tissue, the thread turns round the tool +1: counter-clockwise, -1: clockwise as seen from its hand.
+  int loop_handed = 0;
   uint32_t loop_first = 0, loop_last = 0;  // slots of the loop's ends, free-end side first; valid with a loop
   Vec3 force;                              // [N] on the hand
   Vec3 torque;                             // [N m] on the hand, about the tool's origin
@@ -45,7 +46,7 @@ struct SuturePointView {
 // One throw of a knot, for the picture and for who judges it (square, granny, 2-1-1, air knot).
 struct KnotThrow {
   uint32_t wraps = 1;
-  int32_t handed = 1;      // of the loop, +1 or -1
+  int32_t handed = 1;      // of the loop, +1 or -1 (ToolView::loop_handed): a reef knot's two differ, a granny's do not
   int32_t needle_end = 1;  // 1: the end with the needle was wrapped, 0: the free end
   float tension = 0;       // [N] of the pulled strand when it was set
   float gap = 0;           // [m] to the tissue, or to the throw before it, when it was set

@@ -56,7 +56,7 @@ void fields(A& a, HandState& h) {
 }
 template <typename A>
 void fields(A& a, ToolLoop& l) {
-  a(l.wraps), a(l.handed), a(l.first), a(l.last), a(l.told);
+  a(l.wraps), a(l.handed), a(l.first), a(l.last), a(l.told), a(l.spent), a(l.jaw);
 }
 template <typename A>
 void fields(A& a, Knot& k) {

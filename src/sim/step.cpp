@@ -79,6 +79,11 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   state.event.clear();
   meet_hands(state, input);
   grasp(solver, state.solver, state.scratch, model.suture, state.suture, input.hand, state.event);
+  {
+    StageTimer timer(times, Stage::loop);
+    find_loops(solver, state.solver, model.suture, state.suture, state.event);
+    tie_knots(solver, state.solver, state.scratch, model.suture, state.suture, model.dt, state.event);
+  }
   const std::array<uint32_t, 2> pressed = newly_pressed(state.suture, input);
   cut(solver, state.solver, model.suture, state.suture, pressed, state.event);
   take_fresh_suture(solver, state.solver, model.suture, state.suture, {model.start, model.needle_start}, pressed, state.event);

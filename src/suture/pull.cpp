@@ -67,7 +67,9 @@ void update_thread_collisions(const SolverModel& model, SolverState& solver, con
       solver.thread_collides[solver.thread.order[static_cast<size_t>(i)] - model.thread.first_slot] = 0;
   };
   for (const ThreadAnchor& a : solver.thread.anchor) off(a.slot);
-  for (const ThreadHold& h : solver.thread.hold) off(h.slot);
+  // A loop round a tool goes on colliding: the turns that follow lie on the same tool.
+  for (const ThreadHold& h : solver.thread.hold)
+    if (h.kind != HoldKind::loop) off(h.slot);
 }
 
 float length_between_ends(const SolverState& solver, const SutureState& state) {

@@ -1,5 +1,5 @@
 // suture: the data of guided suturing (paper 2.2, 2.3) and the stages that work on it, in the order of the tick:
-//   grasp -> loop -> knot -> cut -> (per substep: solver, slip, puncture, pull) -> [technique] -> closure.
+//   grasp -> loop -> (per substep: solver, slip, puncture, pull) -> [technique] -> closure.
 // Each stage reads and writes live rows of the solver's state (attachments, channel, anchors, order); none touches a
 // multiplier.
 #pragma once
@@ -63,9 +63,12 @@ struct HandState {
 // tool (HoldKind::loop).
 struct ToolLoop {
   uint32_t wraps = 0;  // whole turns; 0: there is no loop
-  int32_t handed = 0;  // +1: right-handed helix about the way the tool points, -1: left-handed
-  uint32_t first = 0, last = 0;
+  // +1: walked away from the tissue, the thread turns round the tool counter-clockwise as seen from the hand; -1: clockwise.
+  int32_t handed = 0;
+  uint32_t first = 0, last = 0;        // slots, free-end side first
   LoopReason told = LoopReason::none;  // the rejection that was last reported
+  uint32_t spent = 0;                  // 1: what lies round the tool was let go; it counts again once it has been taken off
+  float jaw = 1;                       // of the last tick
 };
 
 // A knot. While it tightens, the ends of its loop are anchored to it (ThreadAnchor::knotted with an offset) and it travels from
@@ -105,6 +108,10 @@ struct SutureModel {
   float needle_grip = 40, thread_grip = 15, tissue_grip = 6;         // [N] beyond which a jaw slips
   float tissue_compliance = 5e-4f;                                   // [m/N] of tissue held by a jaw
   float tissue_reach = 0.0015f;                                      // [m] how near the surface must be to a closing jaw
+  float loop_reach = 0.0025f;                // [m] how far off a tool thread still lies round it
+  // Rest distances of neighbours: how far apart along the tool a loop's ends may be. The paper says one, of its coarser thread;
+  // a hand that carries thread past the strand it crosses lays ours 2 to 3 mm deep.
+  float loop_depth = 2;
   float grasp_compliance = 2e-5f, grasp_angular_compliance = 0.02f;  // [m/N], [rad/(N m)]
 };
 
@@ -137,6 +144,20 @@ void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& s
 // [N] as its value.
 void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
           std::vector<Event>& events);
+
+// --- loop.cpp ----------------------------------------------------------------------------------------------------------
+// Once a tick. Thread that is laid round a tool whose jaw holds nothing is frozen there; more turns that follow are added to
+// it. Opening the jaws wide, or a pull harder than thread_grip, lets it go.
+void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                std::vector<Event>& events);
+// The loop leaves its tool, to become a knot or to fall off.
+void take_off_loop(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t who);
+
+// --- knot.cpp ----------------------------------------------------------------------------------------------------------
+// Once a tick, after the loops. A tool with a loop that has taken the thread begins a knot (or a throw on the one that is
+// there); knots travel to the tissue as their tool moves away, lock there, or are undone when the strand is let go. dt [s].
+void tie_knots(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
+               SutureState& state, float dt, std::vector<Event>& events);
 
 // A hand lets go of what it holds. force [N]: 0 when the jaw was opened, else what made it slip.
 void release(SolverState& solver, SutureState& state, uint8_t who, float force, std::vector<Event>& events);

@@ -155,4 +155,52 @@ struct Rig {
   }
 };
 
+// --- laid by hand, weightless: every length is known ---
+inline SceneSpec weightless(int particles) {
+  SceneSpec s = plain_scene();
+  s.solver.gravity = {};
+  s.thread.particles = particles;
+  s.technique.name = "none";
+  return s;
+}
+
+// Locks node `node` of the order to the tissue particle nearest to `at`: the paper's suture point, the case of one weight 1.
+inline void lock(Rig& rig, size_t node, Vec3 at) {
+  const int near = nearest_particle(rig.model->solver.collision, rig.state->scratch.candidates, rig.x(), at, 0.01f);
+  ASSERT_GE(near, 0);
+  Bite bite;
+  bite.entry.point = bite.exit.point = particle_point(static_cast<uint32_t>(near));
+  bite.complete = bite.has_exit = true;
+  ThreadAnchor a;
+  a.slot = rig.thread().order[node];
+  a.point = bite.entry.point;
+  a.friction = rig.model->suture.pass_tension;
+  a.capstan = rig.model->suture.capstan;
+  set(rig.solver().x[a.slot], position_of(a.point, rig.x()));
+  rig.suture().point.push_back(
+      {static_cast<uint32_t>(rig.suture().bite.size()), false, static_cast<uint32_t>(rig.thread().anchor.size())});
+  rig.suture().bite.push_back(bite);
+  rig.thread().anchor.push_back(a);
+}
+
+// Lays nodes first..last (inclusive) evenly along `way` from `from`, one spacing apart, starting `skip` spacings away.
+inline void lay(Rig& rig, size_t first, size_t last, Vec3 from, Vec3 way, int direction) {
+  const float spacing = rig.model->solver.thread.spacing;
+  for (size_t i = first; i <= last; ++i) {
+    const size_t steps = direction > 0 ? i - first + 1 : last - i + 1;
+    set(rig.solver().x[rig.thread().order[i]], from + way * (spacing * static_cast<float>(steps)));
+    rig.solver().v[rig.thread().order[i]] = {};
+  }
+}
+// Puts the needle's swage at the thread's last node and has the ghost hold it there.
+inline void put_needle(Rig& rig, Vec3 swage) {
+  RigidBody& needle = rig.needle();
+  needle.q = {};
+  needle.x = swage - rig.model->solver.needle_arc.point(0);
+  needle.prev_x = needle.x, needle.prev_q = needle.q;
+  needle.v = needle.omega = {};
+  rig.hold_needle();
+  set(rig.solver().x[rig.thread().order.back()], swage);
+}
+
 }  // namespace catgut

@@ -1,0 +1,305 @@
+// suture/loop: reads thread and tools; freezes loops on them (paper 2.4, figure 10).
+//
+// A surgeon lays the thread round the needle driver before it takes the other end. Whether it lies round it is asked of the
+// picture that the thread makes on the plane across the tool, where the tool is a single point, the place of its tip: does the
+// thread cross itself there, and is the tip inside what it encloses? Two more questions keep out what looks like a loop in
+// that picture and is none: does it lie on the tool at all, and are its ends beside each other or is it a stretched spiral?
+#include "suture/loop.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace catgut {
+namespace {
+
+constexpr size_t kMostCorners = 512;  // of the thread on one tool: a longer run is a heap, and only its beginning is looked at
+constexpr size_t kFewest = 3;         // particles of a loop: thread between two of them is straight
+constexpr float kWide = 0.95f;        // a jaw opened this far drops the loop round it
+constexpr float kShut = 0.35f;        // a jaw closed this far has taken what there is, or nothing
+constexpr size_t kSeveral = 6;        // particles that must touch, and
+constexpr float kMostOfATurn =
+    1.5f * kPi;                      // [rad] how far thread must go round a tool, before a loop that is none is spoken of
+constexpr double kParallel = 1e-12;  // [m^2] thread that runs along the tool is a point in the picture and crosses nothing
+
+// A corner of the thread's picture on the plane across the tool.
+struct Corner {
+  double x = 0, y = 0;                 // [m] the tool is at 0, 0
+  double depth_in = 0, depth_out = 0;  // [m] along the tool, of the thread that comes to this corner and that leaves it
+  size_t node = 0;                     // of the thread at this corner, or the last one before it
+  int closed = 0;                      // turns that were closed before it
+};
+
+// Touching. A loop is a polygon with corners a spacing apart, and thread is stiff: even a tight one stands off the tool by
+// half a millimetre at its corners, a slack one by two. So touching means within `reach` of the surface. Beyond the tip there
+// is no tool: what lies there slips off, however near it is.
+bool touches(const LoopTool& tool, Vec3 p, float reach) {
+  if (p.z < 0) return false;
+  for (const Capsule& c : tool.capsule) {
+    const Vec3 axis = c.b - c.a;
+    const float t = std::clamp(dot(p - c.a, axis) / std::max(length2(axis), 1e-16f), 0.0f, 1.0f), far = c.radius + reach;
+    if (length2(p - (c.a + axis * t)) <= far * far) return true;
+  }
+  return false;
+}
+
+// Where the segment p-q crosses the segment a-b: at s of a-b and t of p-q, each of which owns its beginning and not its end, so
+// that a crossing at a corner counts once.
+bool cross(const Corner& a, const Corner& b, const Corner& p, const Corner& q, double& s, double& t) {
+  const double ux = b.x - a.x, uy = b.y - a.y, vx = q.x - p.x, vy = q.y - p.y, wx = p.x - a.x, wy = p.y - a.y;
+  const double area = ux * vy - uy * vx;
+  if (std::abs(area) < kParallel) return false;
+  s = (wx * vy - wy * vx) / area;
+  t = (wx * uy - wy * ux) / area;
+  return s >= 0 && s < 1 && t >= 0 && t < 1;
+}
+
+// Even-odd rule (Shimrat 1962): a ray from the tip crosses the polygon's sides an odd number of times if the tip is inside.
+// twice_area: positive for a polygon that runs counter-clockwise as seen from the hand.
+bool tip_inside(std::span<const Corner> polygon, double& twice_area) {
+  bool inside = false;
+  twice_area = 0;
+  for (size_t i = 0, j = polygon.size() - 1; i < polygon.size(); j = i++) {
+    const Corner &a = polygon[j], &b = polygon[i];
+    twice_area += a.x * b.y - a.y * b.x;
+    if ((a.y > 0) == (b.y > 0)) continue;
+    if (a.x + (b.x - a.x) * (-a.y) / (b.y - a.y) > 0) inside = !inside;
+  }
+  return inside;
+}
+
+// Of two answers about the same thread the one that came further: no loop because of its depth is nearer to one than no
+// crossing.
+bool better(const LoopVerdict& a, const LoopVerdict& b) {
+  if (a.wraps != b.wraps) return a.wraps > b.wraps;
+  return a.wraps == 0 && a.reason > b.reason;
+}
+
+// One run of consecutive particles that touch the tool, walked pair by pair in order. Every pair is tested against all pairs
+// before it. Where it crosses one, the thread between the crossing pairs is a closed polygon in the picture. The loop is
+// judged, then cut out, and the walk goes on from the crossing: so every polygon is simple, for which the even-odd rule is
+// exact (a double turn judged as one polygon would count as outside), turns add up to the winding number, and a loop that comes
+// later is found like the first.
+void judge_run(const LoopTool& tool, const Vec4* x, std::span<const uint32_t> order, size_t begin, size_t end, float pair,
+               LoopVerdict& best) {
+  // One particle more on each side: the crossing itself may lie in a pair that is just leaving the tool.
+  const size_t from = begin > 0 ? begin - 1 : begin, to = std::min(order.size(), end + 1);
+  std::array<Corner, kMostCorners> path;
+  size_t corners = 0;
+  LoopVerdict turns;  // turns the same way, one after the other, are one loop
+  int closed = 0;
+  double angle = 0;
+  for (size_t i = from; i < to && corners + 2 < kMostCorners; ++i) {
+    const Vec3 p = to_local(tool.pose, xyz(x[order[i]]));
+    const Corner next{double{p.x}, double{p.y}, double{p.z}, double{p.z}, i, closed};
+    if (i > from) {
+      const Corner& was = path[corners - 1];
+      angle += std::atan2(was.x * next.y - was.y * next.x, was.x * next.x + was.y * next.y);
+    }
+    best.round = std::max(best.round, static_cast<float>(std::abs(angle)));
+    // The pair may cross several: the nearest crossing first.
+    while (corners >= 3) {
+      double at = 2, along = 0;
+      size_t crossed = 0;
+      for (size_t k = 0; k + 2 < corners; ++k) {
+        double s = 0, t = 0;
+        if (cross(path[k], path[k + 1], path[corners - 1], next, s, t) && t < at) at = t, along = s, crossed = k;
+      }
+      if (at > 1) break;
+      const Corner &a = path[crossed], &b = path[crossed + 1], &p0 = path[corners - 1];
+      Corner crossing;
+      crossing.x = p0.x + (next.x - p0.x) * at;
+      crossing.y = p0.y + (next.y - p0.y) * at;
+      crossing.depth_in = a.depth_out + (b.depth_in - a.depth_out) * along;
+      crossing.depth_out = p0.depth_out + (next.depth_in - p0.depth_out) * at;
+      crossing.node = i - 1;
+      const size_t first = a.node + 1, last = i - 1;
+      const int between = 1 + closed - a.closed;  // turns of thread between its two strands
+      path[corners] = crossing;
+      double twice_area = 0;
+      const bool inside = tip_inside({path.data() + crossed + 1, corners - crossed}, twice_area);
+      // First check: the loop encircles the tool, seen from the tip. Second check: its ends, one above the other where they
+      // cross, are no further apart along the tool than one pair of particles for each turn between them. Further apart it is
+      // a spiral, which no knot is tied with: pulled on, it runs along the tool and closes on nothing. Measured at the
+      // crossing and not at the particles next to it, the answer does not depend on where along the thread its particles
+      // happen to be.
+      const double depth = std::abs(crossing.depth_out - crossing.depth_in);
+      if (!inside || last < first + kFewest - 1) {
+        LoopVerdict v;
+        v.reason = LoopReason::tip_outside;
+        if (better(v, best)) best.reason = v.reason;
+      } else if (depth > double{pair} * between) {
+        LoopVerdict v;
+        v.reason = LoopReason::too_deep;
+        if (better(v, best)) best.reason = v.reason;
+      } else {
+        const int32_t way = twice_area > 0 ? 1 : -1;
+        if (turns.wraps == 0 || turns.turn != way) {
+          turns = {};
+          turns.first = first;
+          turns.turn = way;
+        }
+        turns.reason = LoopReason::none;
+        turns.first = std::min(turns.first, first);
+        turns.last = last;
+        ++turns.wraps;
+        crossing.closed = ++closed;
+        if (better(turns, best)) {
+          turns.touching = best.touching, turns.round = best.round;
+          best = turns;
+        }
+      }
+      path[crossed + 1] = crossing;
+      corners = crossed + 2;
+    }
+    path[corners++] = next;
+  }
+}
+
+}  // namespace
+
+LoopVerdict find_loop(const Vec4* x, std::span<const uint32_t> order, const LoopTool& tool, float pair, float reach) {
+  LoopVerdict best;
+  for (size_t i = 0; i < order.size();) {
+    size_t end = i;
+    while (end < order.size() && touches(tool, to_local(tool.pose, xyz(x[order[end]])), reach)) ++end;
+    best.touching = std::max(best.touching, end - i);
+    if (end - i >= kFewest) judge_run(tool, x, order, i, end, pair, best);
+    i = end + 1;
+  }
+  return best;
+}
+
+namespace {
+
+bool is_held_elsewhere(const Thread& t, uint32_t slot, int body) {
+  return std::any_of(t.anchor.begin(), t.anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot; }) ||
+         std::any_of(t.hold.begin(), t.hold.end(),
+                     [&](const ThreadHold& h) { return h.slot == slot && !(h.body == body && h.kind == HoldKind::loop); });
+}
+
+// Figure 10 on every stretch of free thread. A suture point, a jaw and a cut end a stretch: thread beyond them is not drawn
+// through a loop.
+LoopVerdict look(const SolverModel& model, const SolverState& solver, const SutureModel& suture, int body) {
+  const Thread& t = solver.thread;
+  const LoopTool tool{solver.body[static_cast<size_t>(body)].pose(), model.body[static_cast<size_t>(body)].capsule};
+  LoopVerdict best;
+  for (size_t begin = 0, end = 0; begin + 1 < t.order.size(); begin = end) {
+    end = begin + 1;
+    while (end + 1 < t.order.size() && !t.cut[end - 1] && !is_held_elsewhere(t, t.order[end], body)) ++end;
+    // Both ends of the stretch belong to it, unless the thread is cut there.
+    const size_t last = t.cut[end - 1] ? end - 1 : end;
+    LoopVerdict v = find_loop(solver.x.data(), {t.order.data() + begin, last - begin + 1}, tool,
+                              suture.loop_depth * model.thread.spacing, suture.loop_reach);
+    v.first += begin, v.last += begin;
+    v.touching = std::max(v.touching, best.touching), v.round = std::max(v.round, best.round);
+    if (better(v, best)) best = v;
+    best.touching = v.touching, best.round = v.round;
+  }
+  return best;
+}
+
+// Handedness. What counts is the half knot that the loop becomes. Its two strands come out of the tissue, and the one that the
+// tool takes is drawn through the loop along the tool, from tip to hand; so the sign of the half knot is the way in which the
+// other, walked outward too, turns about that direction. It does not matter which end was wrapped or which way the tool points:
+// two throws with the same sign are a granny, with opposite signs a reef knot. The list runs from the free end to the needle:
+// outward on the needle's side of the stitch, inward on the free end's.
+int32_t handedness(const Thread& t, const LoopVerdict& v) {
+  for (size_t i = 0; i < v.first; ++i)
+    for (const ThreadAnchor& a : t.anchor)
+      if (a.slot == t.order[i]) return v.turn;
+  return t.anchor.empty() ? v.turn : -v.turn;
+}
+
+Vec3 middle(const SolverState& solver, const LoopVerdict& v) {
+  Vec3 sum{};
+  for (size_t i = v.first; i <= v.last; ++i) sum += xyz(solver.x[solver.thread.order[i]]);
+  return sum / static_cast<float>(v.last - v.first + 1);
+}
+
+size_t node_of(const Thread& t, uint32_t slot) {
+  return static_cast<size_t>(std::find(t.order.begin(), t.order.end(), slot) - t.order.begin());
+}
+
+// [N] with which the thread on either side of the loop pulls on it.
+float pull_on(const Thread& t, const ToolLoop& loop) {
+  const size_t first = node_of(t, loop.first), last = node_of(t, loop.last);
+  float most = 0;
+  if (first > 0) most = std::max(most, t.tension[first - 1]);
+  if (last < t.tension.size()) most = std::max(most, t.tension[last]);
+  return most;
+}
+
+}  // namespace
+
+void take_off_loop(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t who) {
+  std::erase_if(solver.thread.hold,
+                [&](const ThreadHold& h) { return h.body == static_cast<int>(who) && h.kind == HoldKind::loop; });
+  ToolLoop& loop = state.loop[who];
+  const float jaw = loop.jaw;
+  loop = {};
+  loop.jaw = jaw;
+  loop.spent = 1;
+  update_thread_collisions(model, solver, suture);
+}
+
+void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                std::vector<Event>& events) {
+  Thread& t = solver.thread;
+  for (uint8_t who = 0; who < 2; ++who) {
+    ToolLoop& loop = state.loop[who];
+    const HandState& hand = state.hand[who];
+    const RigidBody& tool = solver.body[who];
+    const bool opened = loop.jaw < kWide && hand.jaw >= kWide && hand.held == Held::nothing;
+    const bool closes = loop.jaw > kShut && hand.jaw <= kShut;
+    loop.jaw = hand.jaw;
+    if (loop.wraps > 0) {
+      const float pull = pull_on(t, loop);
+      if (opened || pull > suture.thread_grip) {
+        take_off_loop(model, solver, suture, state, who);
+        events.push_back({0, EventKind::loop_released, who, 0, opened ? 0 : pull, tool.x});
+        continue;
+      }
+    }
+    // A tool that holds something is at work with it. Thread that happens to lie round a needle driver while it drives the
+    // needle is no loop, and round jaws that hold the very thread there is nothing to draw through.
+    const bool free = hand.held == Held::nothing;
+    if (!solver.body_collides[who] || !(free || (closes && hand.held == Held::thread))) continue;
+    const LoopVerdict v = look(model, solver, suture, who);
+    if (v.touching == 0) loop.told = LoopReason::none;
+    if (v.wraps == 0) {
+      loop.spent = 0;
+      // Thread that is still being laid has not crossed itself yet: nothing is missing before the jaws close on the other end.
+      if (loop.wraps == 0 && v.touching >= kSeveral && v.reason != loop.told &&
+          (v.reason != LoopReason::no_crossing || (closes && v.round > kMostOfATurn))) {
+        loop.told = v.reason;
+        events.push_back({0, EventKind::loop_rejected, who, static_cast<uint32_t>(v.reason), 0, tool.x});
+      }
+      continue;
+    }
+    const int32_t handed = handedness(t, v);
+    if (!free || loop.spent) continue;
+    if (loop.wraps > 0) {
+      // The frozen turns are seen again, with those that have been laid since.
+      const bool same = handed == loop.handed && v.first <= node_of(t, loop.last) && node_of(t, loop.first) <= v.last;
+      if (!same || v.wraps <= loop.wraps) continue;
+    }
+    // "All the particles in the loop are attached to the tool using particle attachments. This prevents the user from undoing
+    // the loop."
+    for (size_t i = v.first; i <= v.last; ++i) {
+      const uint32_t slot = t.order[i];
+      if (std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) { return h.slot == slot; })) continue;
+      t.hold.push_back({slot, who, to_local(tool.pose(), xyz(solver.x[slot])), HoldKind::loop});
+    }
+    const size_t first = loop.wraps > 0 ? std::min(v.first, node_of(t, loop.first)) : v.first;
+    const size_t last = loop.wraps > 0 ? std::max(v.last, node_of(t, loop.last)) : v.last;
+    loop.first = t.order[first], loop.last = t.order[last];
+    loop.wraps = v.wraps;
+    loop.handed = handed;
+    loop.told = LoopReason::none;
+    update_thread_collisions(model, solver, suture);
+    events.push_back({0, EventKind::loop_formed, who, loop.wraps, static_cast<float>(handed), middle(solver, v)});
+  }
+}
+
+}  // namespace catgut

@@ -1,0 +1,158 @@
+// tests/suture: a stitch of two suture points, and a tool above it with one of the two strands laid round it. Everything is
+// placed by hand, so that every length is known; from there on hands and mechanics are the real ones.
+#pragma once
+#include "rig.h"
+
+namespace catgut {
+
+struct TieSetup {
+  float turns = 1.25f;            // of thread round the tool; 0: none
+  int way = 1;                    // +1: walked away from the tissue it turns counter-clockwise as seen from the hand
+  bool wrap_tail = false;         // the free end is laid round the tool, and the needle's strand led to its tip
+  float above = 0.015f;           // [m] the tool above the tissue
+  size_t older = 25, newer = 30;  // nodes of the two suture points
+  size_t particles = 90;
+  size_t tool = 0;
+};
+
+struct Tie : Rig {
+  static constexpr float kRound = 0.0019f;  // [m] radius of the turns
+  Place first, second;
+  Pose frame;  // of the tool: x along the stitch, y away from the tissue, z along the rim's axis toward the hand
+  TieSetup setup;
+
+  explicit Tie(const TieSetup& s = {}, const SceneSpec& scene = weightless(90)) : Rig(fitting(scene, s)), setup(s) {
+    wait(0.1f);
+    first = place(0.2f, 0.004f);
+    second = place(0.55f, 0.004f);
+    lock(*this, s.older, first.at);
+    lock(*this, s.newer, second.at);
+    stand(s.above);
+    lay_stitch();
+    lay_strands(s.turns, s.way, s.wrap_tail);
+    update_thread_collisions(model->solver, solver(), model->suture);
+    show(s.tool, frame, 0.7f);
+  }
+  static SceneSpec fitting(SceneSpec scene, const TieSetup& s) {
+    scene.thread.particles = static_cast<int>(s.particles);
+    return scene;
+  }
+  Vec3 middle() { return 0.5f * (point_at(0) + point_at(1)); }
+  // The tool's frame, `above` the middle of the stitch.
+  void stand(float above) {
+    const Vec3 up{0, 1, 0}, out = normalized(first.out + second.out), along = cross(out, up);
+    frame = {middle() + out * above - up * 0.006f, from_axes(along, out, up)};
+  }
+  void show(size_t hand, const Pose& pose, float jaw) {
+    input.hand[hand].connected = 1;
+    input.hand[hand].pose = pose;
+    input.hand[hand].jaw = jaw;
+    tick();
+  }
+  void open(size_t hand, float wide = 0.7f) {
+    for (float jaw : {0.3f, 0.6f, wide}) input.hand[hand].jaw = jaw, tick();
+  }
+  void move(size_t hand, Vec3 by, float seconds) {
+    const Vec3 from = input.hand[hand].pose.p;
+    const int ticks = std::max(1, static_cast<int>(std::lround(seconds / model->dt)));
+    for (int i = 1; i <= ticks && !testing::Test::HasFatalFailure(); ++i) {
+      input.hand[hand].pose.p = from + by * (static_cast<float>(i) / static_cast<float>(ticks));
+      tick();
+    }
+  }
+
+  // Places the nodes from `node` on, one after the other in direction `step`, along the curve, each pair as long as it rests.
+  void lay_along(size_t node, int step, const std::vector<Vec3>& curve, size_t last) {
+    size_t at = 0;
+    Vec3 here = curve[0];
+    float s = 0;
+    for (size_t i = node;; i = step > 0 ? i + 1 : i - 1) {
+      const size_t slot = thread().order[i];
+      const float rest = thread().rest[step > 0 ? i - 1 : i];
+      // The first place on the curve that is `rest` away.
+      const Vec3 from = here;
+      while (at + 1 < curve.size()) {
+        const Vec3 p = lerp(curve[at], curve[at + 1], s);
+        if (distance(p, from) >= rest) break;
+        s += 0.02f;
+        if (s >= 1) s = 0, ++at;
+      }
+      const Vec3 p = at + 1 < curve.size() ? lerp(curve[at], curve[at + 1], s) : curve.back();
+      here = from + normalized(p - from, {0, 1, 0}) * rest;
+      set(solver().x[slot], here);
+      solver().v[slot] = {};
+      if (i == last) break;
+    }
+  }
+  static void line(std::vector<Vec3>& c, Vec3 a, Vec3 b) {
+    const int n = std::max(1, static_cast<int>(distance(a, b) / 0.0005f));
+    for (int i = 0; i <= n; ++i) c.push_back(lerp(a, b, static_cast<float>(i) / static_cast<float>(n)));
+  }
+  // The thread between the two suture points: a flat arch outside.
+  void lay_stitch() {
+    const Vec3 a = point_at(0), b = point_at(1), out = normalized(first.out + second.out);
+    const size_t from = setup.older, to = setup.newer;
+    float length = 0;
+    for (size_t i = from; i < to; ++i) length += thread().rest[i];
+    const float chord = distance(a, b), height = 0.5f * std::sqrt(std::max(0.0f, length * length - chord * chord));
+    for (size_t i = from + 1; i < to; ++i) {
+      const float s = static_cast<float>(i - from) / static_cast<float>(to - from);
+      set(solver().x[thread().order[i]], lerp(a, b, s) + out * (height * (1 - std::abs(2 * s - 1))));
+    }
+  }
+  // From a suture point to the tool, round it, and away to one side.
+  std::vector<Vec3> round_the_tool(Vec3 from, float turns, int way) {
+    std::vector<Vec3> c;
+    const float side = static_cast<float>(way);
+    const float z = to_local(frame, from).z;
+    const auto at = [&](float phi, float r, float depth) {
+      return transform(frame, Vec3{side * r * std::cos(phi), r * std::sin(phi), depth});
+    };
+    line(c, from, at(0, kRound, z));
+    for (int i = 1; i <= 200; ++i) {
+      const float phi = turns * 2 * kPi * static_cast<float>(i) / 200;
+      c.push_back(at(phi, kRound + 0.00005f * phi, z + 0.00007f * phi));
+    }
+    const Vec3 out = normalized(c.back() - c[c.size() - 2]);
+    line(c, c.back(), c.back() + out * 0.3f);
+    return c;
+  }
+  // From a suture point to the tool's tip, past it within reach of the jaws, and on.
+  std::vector<Vec3> past_the_tip(Vec3 from) {
+    std::vector<Vec3> c;
+    const Vec3 tip = transform(frame, Vec3{0, 0, -0.0018f});
+    line(c, from, from + normalized(tip - from) * 0.3f);
+    return c;
+  }
+  void lay_strands(float turns, int way, bool wrap_tail) {
+    const size_t n = thread().order.size(), a = node_of_point(0), b = node_of_point(1);
+    const Vec3 pa = point_at(0), pb = point_at(1);
+    const auto strand = [&](Vec3 from, bool wrapped) {
+      return wrapped && turns > 0 ? round_the_tool(from, turns, way) : past_the_tip(from);
+    };
+    lay_along(a - 1, -1, strand(pa, wrap_tail), 0);
+    lay_along(b + 1, 1, strand(pb, !wrap_tail), n - 1);
+    put_needle(*this, xyz(solver().x[thread().order.back()]));
+  }
+  // Lays the strand that is not wrapped past the tip of the tool and has the jaws close on it before it can move. Thread is
+  // light and stiff: left alone it springs away within a tick.
+  void take(size_t hand = 0) {
+    frame = solver().body[setup.tool].pose();
+    if (setup.wrap_tail) {
+      lay_along(node_of_point(1) + 1, 1, past_the_tip(point_at(1)), thread().order.size() - 1);
+      if (ghost >= 0) let_go();
+      put_needle(*this, xyz(solver().x[thread().order.back()]));
+    } else {
+      lay_along(node_of_point(0) - 1, -1, past_the_tip(point_at(0)), 0);
+    }
+    input.hand[hand].jaw = 0.3f;
+    tick();
+  }
+  const ToolLoop& loop(size_t hand = 0) { return suture().loop[hand]; }
+  size_t holds(HoldKind kind) {
+    return static_cast<size_t>(
+        std::count_if(thread().hold.begin(), thread().hold.end(), [&](const ThreadHold& h) { return h.kind == kind; }));
+  }
+};
+
+}  // namespace catgut
