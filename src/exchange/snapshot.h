@@ -17,10 +17,10 @@ struct ToolView {
   Pose hand;      // where the hand is
   float jaw = 1;  // 0 closed .. 1 open
   Held held = Held::nothing;
-  float held_at = 0;                       // needle: place on the arc, 0 swage .. 1 tip
-  uint32_t held_slot = 0;                  // thread: particle slot; tissue: particle
-  uint32_t held_strands = 0;               // strands of thread between the jaws
-  uint32_t loop_wraps = 0;                 // turns of thread frozen round it, 0: none
+  float held_at = 0;          // needle: place on the arc, 0 swage .. 1 tip
+  uint32_t held_slot = 0;     // thread: particle slot; tissue: particle
+  uint32_t held_strands = 0;  // strands of thread between the jaws
+  uint32_t loop_wraps = 0;    // turns of thread frozen round it, 0: none
   // Walked away from the tissue, the thread turns round the tool +1: counter-clockwise, -1: clockwise as seen from its hand.
   int loop_handed = 0;
   uint32_t loop_first = 0, loop_last = 0;  // slots of the loop's ends, free-end side first; valid with a loop

@@ -15,9 +15,7 @@ void publish_knots(const Model& model, const State& state, Snapshot& out) {
   for (const Knot& k : state.suture.knot) {
     KnotView v;
     v.phase = k.phase;
-    v.position = position_of(k.target, x);
-    for (const ThreadAnchor& a : s.thread.anchor)
-      if (a.knotted && a.slot == k.slot[0]) v.position = position_of(a, x);
+    v.position = position_of(k.target, x) + k.offset;
     v.throws = k.throws;
     v.thrown = k.thrown;
     if (state.suture.point.size() > 1)

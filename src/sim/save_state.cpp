@@ -60,8 +60,8 @@ void fields(A& a, ToolLoop& l) {
 }
 template <typename A>
 void fields(A& a, Knot& k) {
-  a(k.phase), a(k.hand), a(k.begun), a(k.target), a(k.from), a(k.hand_from), a(k.strand), a(k.slot[0]), a(k.slot[1]),
-      a(k.slots), a(k.throws);
+  a(k.phase), a(k.hand), a(k.begun), a(k.target), a(k.from), a(k.offset), a(k.loop[0]), a(k.loop[1]), a(k.hand_from),
+      a(k.strand), a(k.slot[0]), a(k.slot[1]), a(k.slots), a(k.throws);
   for (KnotThrow& t : k.thrown) a(t);
 }
 template <typename A>
@@ -221,7 +221,7 @@ bool fits(const Model& model, const State& s, const State& fresh) {
       return false;
     for (uint32_t i = 0; i < k.slots; ++i)
       if (k.slot[i] - first >= count) return false;
-    if (k.strand - first >= count) return false;
+    if (k.strand - first >= count || k.loop[0] - first >= count || k.loop[1] - first >= count) return false;
   }
   for (const SettledStitch& stitch : u.settled) {
     for (const SettledNode& n : stitch.node)

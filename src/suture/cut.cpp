@@ -10,7 +10,8 @@ namespace {
 
 constexpr float kReach = 0.004f;  // [m] how near the thread must be to the jaws
 
-// [m] of thread from pair `pair` to the nearest anchored particle on either side, up to a cut; the whole way when there is none.
+// [m] of thread from pair `pair` to the nearest anchored particle on either side, up to a cut; the whole way when there is
+// none.
 float to_nearest_anchor(const Thread& t, size_t pair, const std::vector<uint8_t>& anchored) {
   float best = 0;
   bool found = false;

@@ -10,8 +10,8 @@
 namespace catgut {
 namespace {
 
-constexpr float kTail = 0.012f;             // [m] of thread left on a stitch that was not cut
-constexpr float kPinCompliance = 1e-5f;     // [m/N]
+constexpr float kTail = 0.012f;          // [m] of thread left on a stitch that was not cut
+constexpr float kPinCompliance = 1e-5f;  // [m/N]
 
 size_t node_of(const Thread& t, uint32_t slot) {
   return static_cast<size_t>(std::find(t.order.begin(), t.order.end(), slot) - t.order.begin());
@@ -51,8 +51,7 @@ void settle(const SolverModel& model, SolverState& solver, SutureState& state) {
   for (float gone = 0; last + 1 < t.order.size() && !t.cut[last] && gone < kTail; ++last) gone += t.rest[last];
   for (size_t i = first; i <= last; ++i) stitch.node.push_back(bind(model, solver, xyz(solver.x[t.order[i]])));
   for (const Knot& k : state.knot)
-    if (k.phase == KnotPhase::locked)
-      stitch.knot.push_back(bind(model, solver, position_of(k.target, solver.x.data())));
+    if (k.phase == KnotPhase::locked) stitch.knot.push_back(bind(model, solver, position_of(k.target, solver.x.data())));
   state.settled.push_back(std::move(stitch));
   // From anchor to anchor the thread goes on holding the tissue together, as a rope. Within a bite it runs through tissue.
   for (size_t k = 0; k + 1 < held.size(); ++k) {

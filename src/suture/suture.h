@@ -79,6 +79,8 @@ struct Knot {
   uint32_t begun = 0;              // throws that were locked when the throw in hand was begun
   TissuePoint target;              // where it goes: the suture point, or the middle between the two ends of its stitch
   Vec3 from;                       // [m] its offset from the target when the throw in hand was begun
+  Vec3 offset;                     // [m] now; zero once locked
+  std::array<uint32_t, 2> loop{};  // slots of the loop's ends, valid while it tightens
   Vec3 hand_from;                  // [m] where the pulling tool was then
   uint32_t strand = 0;             // slot that the hand took: on the free end, on the needle side, or on a bight
   std::array<uint32_t, 2> slot{};  // the two particles that it holds once locked: free-end side, needle side
@@ -105,10 +107,10 @@ struct SutureModel {
   int collision_off = 3;         // thread particles on each side
   float grasp_reach = 0.003f;    // [m]
   float strand_reach = 0.0022f;  // [m] of a second strand, to be between the jaws with the first
-  float needle_grip = 40, thread_grip = 15, tissue_grip = 6;         // [N] beyond which a jaw slips
-  float tissue_compliance = 5e-4f;                                   // [m/N] of tissue held by a jaw
-  float tissue_reach = 0.0015f;                                      // [m] how near the surface must be to a closing jaw
-  float loop_reach = 0.0025f;                // [m] how far off a tool thread still lies round it
+  float needle_grip = 40, thread_grip = 15, tissue_grip = 6;  // [N] beyond which a jaw slips
+  float tissue_compliance = 5e-4f;                            // [m/N] of tissue held by a jaw
+  float tissue_reach = 0.0015f;                               // [m] how near the surface must be to a closing jaw
+  float loop_reach = 0.0025f;                                 // [m] how far off a tool thread still lies round it
   // Rest distances of neighbours: how far apart along the tool a loop's ends may be. The paper says one, of its coarser thread;
   // a hand that carries thread past the strand it crosses lays ours 2 to 3 mm deep.
   float loop_depth = 2;
