@@ -155,7 +155,7 @@ void Tally::finish(const Snapshot& last, RunResult& result) const {
                                                                                        [](auto n) { return n > 0; })));
   v["throws"] = static_cast<double>(throws_);
   v["last_knot_throws"] = static_cast<double>(last_knot_throws_);
-  const bool tied = std::any_of(last.knot.begin(), last.knot.end(), [](auto& k) { return k.phase == KnotPhase::locked; });
+  const bool tied = std::any_of(knot_throws_.begin(), knot_throws_.end(), [](auto n) { return n > 0; });
   v["sutures"] = static_cast<double>(last.settled.size() + tied);
   judge_seam(last, v);
   v["needle_off"] = last.needle_on_thread ? 0 : 1;

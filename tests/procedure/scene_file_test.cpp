@@ -6,10 +6,12 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "core/check.h"
 #include "core/random.h"
 #include "procedure/scene_fields.h"
+#include "sim/simulation.h"
 
 namespace catgut {
 namespace {
@@ -170,6 +172,29 @@ TEST(SceneFile, every_scene_in_the_folder_reads_and_ends_in_expectations) {
     EXPECT_FALSE(scene.expect.empty()) << name;
     EXPECT_FALSE(scene.title.empty()) << name;
   }
+}
+
+// Design: "Particle counts are exact." What a scene expects is what is built.
+TEST(SceneFile, every_scene_is_built_with_exactly_the_particles_it_expects) {
+  const std::map<std::string, size_t> paper{{"purse_string", 1403}, {"connell", 2471}, {"stay", 2471}, {"lembert", 4155}};
+  size_t found = 0;
+  for (const std::string& name : scene_names()) {
+    SCOPED_TRACE(name);
+    const SceneSpec scene = read_scene(name);
+    const size_t built = particle_count(*build_model(scene));
+    size_t asked = static_cast<size_t>(scene.thread.particles);
+    for (const BodySpec& b : scene.body) asked += static_cast<size_t>(b.particles);
+    EXPECT_EQ(built, asked);
+    const auto want = std::find_if(scene.expect.begin(), scene.expect.end(), [](auto& e) { return e.name == "particles"; });
+    ASSERT_NE(want, scene.expect.end());
+    EXPECT_EQ(want->min, static_cast<double>(built));
+    EXPECT_EQ(want->max, static_cast<double>(built));
+    if (const auto in_paper = paper.find(name); in_paper != paper.end()) {
+      EXPECT_EQ(built, in_paper->second);
+      ++found;
+    }
+  }
+  EXPECT_EQ(found, paper.size());
 }
 
 TEST(SceneFile, set_reaches_every_kind_of_key) {

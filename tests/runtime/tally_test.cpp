@@ -1,0 +1,107 @@
+// tests/runtime: what a run is judged by, from snapshots made by hand.
+#include "runtime/tally.h"
+
+#include <gtest/gtest.h>
+
+#include "procedure/scene_fields.h"
+
+namespace catgut {
+namespace {
+
+struct Judged {
+  SceneSpec scene;
+  PictureModel picture;
+  Snapshot seen;
+  std::unique_ptr<Tally> tally;
+
+  Judged() {
+    scene.thread.particles = 11;
+    scene.thread.spacing = 0.01f;
+    picture.thread_count = 11;
+    for (uint32_t i = 0; i < 11; ++i) {
+      seen.particle.push_back({0.01f * static_cast<float>(i), 0, 0});
+      seen.thread_order.push_back(i);
+    }
+    tally = std::make_unique<Tally>(scene, picture);
+  }
+  void tell(EventKind kind, uint32_t which = 0, float value = 0) { seen.event.push_back({0, kind, 0, which, value, {}}); }
+  void tick() {
+    tally->tick(seen);
+    seen.event.clear();
+  }
+  RunResult result() const {
+    RunResult r;
+    tally->finish(seen, r);
+    return r;
+  }
+};
+
+TEST(Tally, every_result_has_a_value) {
+  const RunResult r = Judged().result();
+  for (const ResultName& name : result_names()) EXPECT_TRUE(r.value.count(name.name)) << name.name;
+}
+
+TEST(Tally, knots_and_throws_are_counted_through_settling) {
+  Judged j;
+  for (uint32_t suture = 0; suture < 5; ++suture) {
+    j.tell(EventKind::knot_locked, 0), j.tick();
+    j.tell(EventKind::knot_locked, 0);
+    if (suture == 2) j.tell(EventKind::knot_locked, 1);  // a second knot on the same thread
+    j.tick();
+    if (suture == 4) break;
+    j.seen.settled.emplace_back();
+    j.tell(EventKind::stitch_settled, suture), j.tell(EventKind::suture_taken, suture), j.tick();
+  }
+  RunResult r = j.result();
+  EXPECT_EQ(r.value["knots"], 6);
+  EXPECT_EQ(r.value["throws"], 11);
+  EXPECT_EQ(r.value["last_knot_throws"], 2);
+  EXPECT_EQ(r.value["sutures"], 5) << "four settled, one in hand";
+}
+
+TEST(Tally, gaps_are_the_widest_at_the_end_and_the_narrowest_at_the_start) {
+  Judged j;
+  EXPECT_EQ(j.result().value["seam_gap_start"], 0);
+  const auto row = [&](float gap, float start, bool midpoint) { j.seen.seam.push_back({{}, {gap, 0, 0}, start, 1, midpoint}); };
+  row(0.0005f, 0.010f, true), row(0.0007f, 0.009f, true), row(0.002f, 0.004f, false);
+  RunResult r = j.result();
+  EXPECT_EQ(r.value["pairs"], 3);
+  EXPECT_FLOAT_EQ(static_cast<float>(r.value["seam_gap"]), 0.0007f);
+  EXPECT_FLOAT_EQ(static_cast<float>(r.value["seam_gap_all"]), 0.002f);
+  EXPECT_FLOAT_EQ(static_cast<float>(r.value["seam_gap_start"]), 0.009f);
+}
+
+TEST(Tally, uneven_ends_are_those_of_the_first_knot) {
+  Judged j;
+  j.seen.suture_point.resize(2);
+  j.seen.suture_point[0].anchored = 3;  // 30 mm of free end
+  j.seen.suture_point[1].anchored = 4;  // 60 mm on the needle's side
+  j.tell(EventKind::knot_begun), j.tick();
+  j.seen.suture_point[1].anchored = 9;
+  j.tell(EventKind::knot_begun), j.tick();
+  EXPECT_NEAR(j.result().value["ends_uneven"], 1.0 / 3, 1e-6);
+  EXPECT_EQ(Judged().result().value["ends_uneven"], 0) << "no knot";
+}
+
+TEST(Tally, faults_by_name_ends_in_hand_and_the_needle) {
+  Judged j;
+  j.tell(EventKind::technique_fault, 2, static_cast<float>(Fault::wrong_body));
+  j.tell(EventKind::technique_fault, 3, static_cast<float>(Fault::wrong_body));
+  j.tell(EventKind::technique_fault, 0, static_cast<float>(Fault::too_few_throws));
+  j.tell(EventKind::technique_fault, 0, 77);  // none that we know
+  j.tell(EventKind::technique_fault, 0, -1);
+  j.tick();
+  j.seen.tool[1].held_strands = 2;
+  j.seen.needle_on_thread = false;
+  RunResult r = j.result();
+  EXPECT_EQ(r.value["fault_wrong_body"], 2);
+  EXPECT_EQ(r.value["fault_too_few_throws"], 1);
+  EXPECT_EQ(r.value["fault_wrong_layer"], 0);
+  EXPECT_EQ(r.value["technique_fault"], 5);
+  EXPECT_EQ(r.faults, (std::map<std::string, uint64_t>{{"too_few_throws", 1}, {"wrong_body", 2}}));
+  EXPECT_EQ(r.value["held_ends"], 2);
+  EXPECT_EQ(r.value["needle_off"], 1);
+}
+
+}  // namespace
+}  // namespace catgut
