@@ -146,7 +146,7 @@ Plan connell_plan(const PictureModel& picture, const SurgeonSkill& skill) {
       if (s == 1) {
         add(plan, TaskKind::draw);
         add(plan, TaskKind::regrip);
-        add(plan, TaskKind::throw_, 2, 1);
+        add(plan, TaskKind::throw_, 1, 1);
         add(plan, TaskKind::throw_, 1, -1);
       }
       if (s + 1 < sweeps) add(plan, TaskKind::hand_back);
@@ -178,7 +178,7 @@ Plan stay_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   add(plan, TaskKind::pull_tail);
   add(plan, TaskKind::draw);
   add(plan, TaskKind::regrip);
-  add(plan, TaskKind::throw_, 2, 1);
+  add(plan, TaskKind::throw_, 1, 1);
   add(plan, TaskKind::throw_, 1, -1);
   add(plan, TaskKind::take_both);
   add(plan, TaskKind::cut_needle);
@@ -210,7 +210,7 @@ Plan lembert_plan(const PictureModel& picture, const SurgeonSkill& skill) {
     add(plan, TaskKind::bite, b);
     add(plan, TaskKind::pull_tail);
     add(plan, TaskKind::regrip);
-    add(plan, TaskKind::throw_, 2, 1);
+    add(plan, TaskKind::throw_, 1, 1);
     add(plan, TaskKind::throw_, 1, -1);
     add(plan, TaskKind::cut_long);
     add(plan, TaskKind::cut_tail);

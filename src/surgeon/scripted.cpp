@@ -23,6 +23,7 @@ constexpr float kHalfOpen = 0.7f;       // a jaw that lets go without shaking of
 constexpr float kStump = 0.007f;        // [m] of thread left on a knot
 constexpr float kWindAt = 0.009f;       // [m] behind the driver's tip, where thread is wound round it
 constexpr float kWindRadius = 0.0019f;  // [m] of a wrap's middle line
+constexpr float kWound = 0.0026f;       // [m] of thread that a radian takes, coarse as its segments are
 constexpr float kSecure = 0.985f;       // of a closure that counts as closed
 
 // Where a bite is made, in the world as it is now: a place, outward, the way of the needle, the axis about which it turns.
@@ -460,6 +461,8 @@ class Scripted final : public Surgeon {
       start_ = seen.knot.empty() && !seen.suture_point.empty() ? seen.suture_point.back().position : stitch(seen);
       reach_ = std::max(0.03f, length_between(seen, last_point_node(seen), last));
       taut_ = 0.97f;
+      frozen_at_ = 0;
+      wraps_seen_ = 0;
       // So high that the hand, going round below, keeps clear of the tissue.
       height_ = std::clamp(0.5f * reach_ + 0.004f, 0.025f, 0.09f);
       throws_before_ = seen.knot.empty() ? 0 : seen.knot.back().throws;
@@ -474,13 +477,18 @@ class Scripted final : public Surgeon {
       const float way = side * w;
       const Vec3 leave = axis_at + kWindRadius * (e2 * (side * std::cos(w)) + e1 * std::sin(w)) + z * (0.00012f * std::abs(w));
       const Vec3 to = e1 * std::cos(way) - e2 * std::sin(way);
-      const float free = std::max(0.008f, taut_ * (reach_ - height_ - kWindRadius * std::max(0.0f, w)));
-      return leave + to * free;
+      // What lies frozen round the driver is spent; what was wound since takes its part.
+      const float left = driver.loop_wraps > 0 ? length_between(seen, node_of(seen, driver.loop_last), last) -
+                                                     kWound * std::max(0.0f, w - frozen_at_)
+                                               : reach_ - height_ - kWound * std::max(0.0f, w);
+      const float free = std::max(0.008f, taut_ * left);
+      // It leaves slanting toward the hand, so that it crosses above the strand that comes up and not against it.
+      return leave + to * free + z * std::min(0.35f * free, 0.007f);
     };
     // The strand is kept just taut by feel: four per cent of slack would let it sag by a seventh of its length.
     const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
     if (stage_ <= wind)
-      taut_ = std::clamp(taut_ + dt_ * (tension < 0.02f ? 0.12f : tension > 0.08f ? -0.5f : 0.0f), 0.9f, 1.03f);
+      taut_ = std::clamp(taut_ + dt_ * (tension < 0.02f ? 0.12f : tension > 0.15f ? -2.0f : tension > 0.06f ? -0.4f : 0.0f), 0.85f, 1.02f);
     switch (stage_) {
       case lift:
         jaw(kDriver, kHalfOpen);
@@ -502,8 +510,9 @@ class Scripted final : public Surgeon {
         return false;
       case wind: {
         const float want = static_cast<float>(task.which) * 2 * kPi + 0.6f;
-        wound_ = std::min(wound_ + 2.5f * dt_, want + 0.9f);
-        carry_swage(seen, swage_at(wound_), 1.5f * skill_.speed);
+        if (driver.loop_wraps != wraps_seen_) wraps_seen_ = driver.loop_wraps, frozen_at_ = wound_;
+        wound_ = std::min(wound_ + 2.2f * dt_, want + 0.9f);
+        carry_swage(seen, swage_at(wound_), 1.2f * skill_.speed);
         move(kDriver, lying, careful());
         if (driver.loop_wraps >= static_cast<uint32_t>(task.which)) go(over);
         else if (wound_ >= want + 0.9f && waited_ > 7) go(unwind);
@@ -765,7 +774,8 @@ class Scripted final : public Surgeon {
   float reach_ = 0, height_ = 0, wound_ = 0;
   float taut_ = 1;  // the strand's straight length over what it was reckoned to be
   size_t knots_before_ = 0, cuts_before_ = 0, settled_before_ = 0;
-  uint32_t throws_before_ = 0;
+  float frozen_at_ = 0;  // [rad] wound when the loop was last seen to grow
+  uint32_t throws_before_ = 0, wraps_seen_ = 0;
   uint32_t sequence_ = 0;
 };
 

@@ -11,6 +11,7 @@ namespace {
 
 constexpr float kFastest = 0.25f;   // [m/s] of the travelling knot
 constexpr float kArrived = 1e-4f;   // [m]
+constexpr float kTaut = 0.3f;       // [N]
 constexpr float kShortest = 5e-4f;  // [m] of thread between a hole and its knot
 
 size_t node_of(const Thread& t, uint32_t slot) {
@@ -19,6 +20,15 @@ size_t node_of(const Thread& t, uint32_t slot) {
 bool is_locked(const Thread& t, uint32_t slot) {
   return std::any_of(t.anchor.begin(), t.anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot; }) ||
          std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) { return h.slot == slot; });
+}
+
+// [N] of the tighter of the two pairs at a particle.
+float tension_at(const Thread& t, uint32_t slot) {
+  const size_t node = node_of(t, slot);
+  float most = 0;
+  if (node > 0) most = std::max(most, t.tension[node - 1]);
+  if (node < t.tension.size()) most = std::max(most, t.tension[node]);
+  return most;
 }
 
 // The middle between two points of tissue, as one point: eight particles of each, so that it still follows both exactly in
@@ -191,9 +201,7 @@ void lock(const SolverModel& model, SolverState& solver, const SutureModel& sutu
     if (strand > hi || wound > hi) tie_strand(solver, k, hi, 1, at);
   }
   KnotThrow& thrown = k.thrown[k.throws - 1];
-  const size_t node = node_of(t, k.strand);
-  if (node > 0) thrown.tension = std::max(thrown.tension, t.tension[node - 1]);
-  if (node < t.tension.size()) thrown.tension = std::max(thrown.tension, t.tension[node]);
+  thrown.tension = tension_at(t, k.strand);
   SurfaceHit hit;
   thrown.gap = nearest_surface(model, scratch.candidates, solver.x.data(), at, 0.008f, hit) ? std::max(0.0f, hit.distance) : 0.008f;
   k.phase = KnotPhase::locked;
@@ -215,7 +223,9 @@ void tie_knots(const SolverModel& model, SolverState& solver, const SolverScratc
       continue;
     }
     // "As the tool moves away from its original position, the knot object moves towards the suture point."
-    const float whole = length(k.from), gone = distance(solver.body[k.hand].x, k.hand_from);
+    // A strand that is drawn taut brings it along however short the way of the hand.
+    const float whole = length(k.from);
+    const float gone = tension_at(solver.thread, k.strand) > kTaut ? whole : distance(solver.body[k.hand].x, k.hand_from);
     const float left = std::max(whole - gone, length(k.offset) - kFastest * dt);
     k.offset = whole > 0 && left > 0 ? k.from * (std::min(left, length(k.offset)) / whole) : Vec3{};
     for (ThreadAnchor& a : solver.thread.anchor)
