@@ -1,0 +1,153 @@
+// surgeon/scripted: carries out a plan's tasks with two hands. The needle driver (right) drives a bite by turning the needle
+// about its own circle; the forceps (left) takes the tip, brings it through and pulls the thread; knots are tied with the
+// instrument. Reads Snapshots only; each step looks at what really happened before the next begins. What goes wrong is tried
+// again: a bite whose tip did not come out is drawn back and driven a little shallower or deeper, a missed grasp is approached
+// anew, a throw whose loop did not hold is wound again. Bites are in scripted.cpp, knots and scissors in tying.cpp.
+#pragma once
+#include <array>
+#include <string>
+
+#include "surgeon/hands.h"
+#include "surgeon/plan.h"
+#include "surgeon/sight.h"
+#include "surgeon/surgeon.h"
+
+namespace catgut {
+
+constexpr size_t kDriver = 0, kForceps = 1;
+constexpr int kAttempts = 8;  // at one bite, at one grasp, at one throw
+
+// Where a bite is made, in the world as it is now: a place, outward, the way of the needle, the axis about which it turns.
+struct BiteFrame {
+  Vec3 at, out, along, up;
+};
+
+class Scripted final : public Surgeon {
+ public:
+  Scripted(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
+
+  bool done() const override { return gave_up_ || task_ >= plan_.task.size(); }
+  bool gave_up() const override { return gave_up_; }
+
+  std::string doing() const override;
+
+  std::array<ToolInput, 2> operate(const Snapshot& seen, float dt) override;
+
+ private:
+  // --- the state of a task ----------------------------------------------------------------------------------------------
+  void begin();
+  void go(int stage);
+  bool patience(float seconds) const { return waited_ < seconds; }
+  // Counts a miss; gives up after too many.
+  void miss(int back_to);
+
+  // --- hands ------------------------------------------------------------------------------------------------------------
+  bool move(size_t hand, const Pose& goal, float speed) { return move_toward(hand_[hand], goal, speed, dt_); }
+  bool jaw(size_t hand, float goal) { return move_jaw(hand_[hand], goal, dt_); }
+  float careful() const { return 0.35f * skill_.speed; }
+  bool holds_needle(const Snapshot& seen, size_t hand) const { return seen.tool[hand].held == Held::needle; }
+  // Tool pose that puts the held needle at `needle`.
+  Pose holding(size_t hand, const Pose& needle) const { return needle * hand_[hand].grip; }
+  void remember_grip(const Snapshot& seen, size_t hand) { hand_[hand].grip = inverse(seen.needle.pose) * seen.tool[hand].pose; }
+  static Pose raised(const Pose& tool, float by) { return {tool.p + rotate(tool.q, {0, 0, by}), tool.q}; }
+
+  // The hand that is not needed waits out of the way, on its own side of the field.
+  void rest_aside(const Snapshot& seen, size_t hand);
+
+  // --- bites ------------------------------------------------------------------------------------------------------------
+  BiteFrame frame(const Snapshot& seen, size_t place) const;
+  const BitePlace& bite() const { return plan_.place[place_]; }
+  float half_bite_angle() const { return std::asin(std::min(0.9f, 0.5f * bite().length / picture_.needle_radius)); }
+
+  // The needle with its tip `psi` past the deepest place of a bite at frame f.
+  Pose needle_at(const BiteFrame& f, float psi) const;
+
+  // A tool frame that grips the needle (at `needle`) at place s of its arc: the shaft leaves the needle's plane on `side` and
+  // leans by `lean` toward what is outward of the tissue when the tip is `psi` past the deepest place.
+  Pose grip_at(const Pose& needle, float s, float side, float lean, float psi) const;
+  Pose driver_grip(const Pose& needle) const;
+  Pose forceps_grip(const Pose& needle) const;
+
+  // Draws the errors of the next bite.
+  void aim();
+
+  // --- tasks ------------------------------------------------------------------------------------------------------------
+  // Each returns true when it is finished.
+  bool act(const Task& task, const Snapshot& seen);
+
+  std::string name_of_bite() const;
+
+  bool pick_up(const Snapshot& seen);
+
+  bool make_bite(const Snapshot& seen);
+
+  bool pull(TaskKind kind, const Snapshot& seen);
+
+  // [m] by which the midpoints are still apart, the slowest of them; 0 once all count as closed.
+  static float open_seam(const Snapshot& seen);
+
+  // The driver takes the needle from the forceps; with `present` the forceps first brings it beside the next bite.
+  bool take_back(const Snapshot& seen, bool present);
+
+  // --- tying ------------------------------------------------------------------------------------------------------------
+  // How the hands stand to tie: the driver lies across the wound from the right, the forceps comes from the left.
+  static Pose tying_pose(size_t hand, Vec3 at);
+
+  bool regrip(const Snapshot& seen);
+
+  // Where the stitch is tied: at its knot, else in the middle between the ends of its thread in the tissue.
+  Vec3 stitch(const Snapshot& seen) const;
+  Vec3 swage(const Snapshot& seen) const { return transform(seen.needle.pose, Vec3{picture_.needle_radius, 0, 0}); }
+  // Moves the forceps so that the needle's swage, which it holds, comes to `goal`.
+  bool carry_swage(const Snapshot& seen, Vec3 goal, float speed);
+
+  // An instrument tie. The needle's strand is held up, the driver is laid beside it, the forceps carries the strand round the
+  // driver; then the driver, the loop on it, takes the tail and the hands pull apart.
+  bool tie(const Task& task, const Snapshot& seen);
+
+  // The needle's own strand is laid between the driver's jaws, past the loop.
+  bool take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again);
+
+  // --- both hands on the thread -----------------------------------------------------------------------------------------
+  // The driver takes the tail, then both pull until everything is closed.
+  bool draw(const Snapshot& seen);
+
+  // --- scissors ---------------------------------------------------------------------------------------------------------
+  bool cut(TaskKind kind, const Snapshot& seen);
+  static size_t count_cuts(const Snapshot& seen);
+
+  bool fresh(const Snapshot& seen);
+
+  // The needle's strand is laid along the tail; the driver closes on both.
+  bool take_both(const Snapshot& seen);
+
+  PictureModel picture_;
+  SurgeonSkill skill_;
+  Plan plan_;
+  Random random_;
+  std::array<ScriptedHand, 2> hand_;
+  std::array<uint32_t, 2> buttons_{};
+  size_t task_ = 0;
+  int stage_ = 0;     // within the task
+  float waited_ = 0;  // [s] in this stage
+  float dt_ = 1.0f / 60;
+  int misses_ = 0, attempts_ = 0;
+  bool gave_up_ = false;
+  std::string doing_ = "pick up the needle";
+  // A bite.
+  size_t place_ = 0, bites_before_ = 0;
+  BiteFrame frame_;
+  float psi_ = 0, aim_along_ = 0, aim_up_ = 0, depth_error_ = 0;
+  float depth_fix_ = 0;  // [m] what the failed attempts at this bite taught; positive: shallower
+  Pose pull_from_;
+  // A throw.
+  Vec3 start_;
+  float reach_ = 0, height_ = 0, wound_ = 0;
+  float taut_ = 1;  // the strand's straight length over what it was reckoned to be
+  size_t knots_before_ = 0, cuts_before_ = 0, settled_before_ = 0;
+  float frozen_at_ = 0;  // [rad] wound when the loop was last seen to grow
+  uint32_t throws_before_ = 0, wraps_seen_ = 0;
+  uint32_t sequence_ = 0;
+};
+
+}  // namespace catgut

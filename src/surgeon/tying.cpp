@@ -1,0 +1,308 @@
+// surgeon/tying: instrument ties, scissors, a fresh needle; see scripted.h.
+#include <cmath>
+
+#include "surgeon/scripted.h"
+
+namespace catgut {
+namespace {
+
+constexpr float kHalfOpen = 0.7f;       // a jaw that lets go without shaking off a loop
+constexpr float kStump = 0.007f;        // [m] of thread left on a knot
+constexpr float kWindAt = 0.009f;       // [m] behind the driver's tip, where thread is wound round it
+constexpr float kWindRadius = 0.0019f;  // [m] of a wrap's middle line
+constexpr float kWound = 0.0026f;       // [m] of thread that a radian takes, coarse as its segments are
+constexpr float kTyingAt = 0.12f;       // place on the needle's arc: behind the swage
+
+}  // namespace
+
+Pose Scripted::tying_pose(size_t hand, Vec3 at) {
+  const Vec3 z = normalized(Vec3{hand == kDriver ? 1.0f : -1.0f, 0.3f, 0.15f}), x = normalized(Vec3{0, 1, 0} - z * z.y);
+  return {at, from_axes(x, cross(z, x), z)};
+}
+
+bool Scripted::regrip(const Snapshot& seen) {
+  enum { first = 0, over = 10, down, close, give };
+  if (stage_ < over) {
+    if (!holds_needle(seen, kDriver) || stage_ > first) {
+      if (!take_back(seen, false)) return false;
+    }
+    go(over);
+    return false;
+  }
+  const float phi = kTyingAt * picture_.needle_arc;
+  const Vec3 place = transform(seen.needle.pose, picture_.needle_radius * Vec3{std::cos(phi), std::sin(phi), 0});
+  const Pose grip = tying_pose(kForceps, place);
+  switch (stage_) {
+    case over:
+      jaw(kForceps, 1);
+      if (move(kForceps, raised(grip, 0.025f), skill_.speed)) go(down);
+      else if (!patience(6)) gave_up_ = true;
+      return false;
+    case down:
+      if (move(kForceps, grip, careful())) go(close);
+      else if (!patience(4)) gave_up_ = true;
+      return false;
+    case close:
+      if (!jaw(kForceps, 0) || waited_ < 0.3f) return false;
+      if (!holds_needle(seen, kForceps)) return miss(over), false;
+      remember_grip(seen, kForceps);
+      go(give);
+      return false;
+    default:
+      jaw(kDriver, 1);
+      return move(kDriver, raised(hand_[kDriver].pose, 0.02f), skill_.speed) || waited_ > 0.6f;
+  }
+}
+
+Vec3 Scripted::stitch(const Snapshot& seen) const {
+  if (!seen.knot.empty()) return seen.knot.back().position;
+  if (seen.suture_point.empty()) return picture_.focus;
+  return 0.5f * (seen.suture_point.front().position + seen.suture_point.back().position);
+}
+
+bool Scripted::carry_swage(const Snapshot& seen, Vec3 goal, float speed) {
+  return move(kForceps, {goal + (seen.tool[kForceps].pose.p - swage(seen)), tying_pose(kForceps, {}).q}, speed);
+}
+
+bool Scripted::tie(const Task& task, const Snapshot& seen) {
+  enum { lift, lay, beside, wind, over, down, close, tighten, open, unwind };
+  const bool own_strand = task.kind == TaskKind::lock_strand;
+  doing_ = std::string(own_strand ? "lock the thread: " : "throw: ") + std::to_string(task.which) + " wrap" +
+           (task.which > 1 ? "s" : "");
+  const ToolView& driver = seen.tool[kDriver];
+  const float side = static_cast<float>(task.way);
+  const size_t last = seen.thread_order.size() - 1;
+  if (stage_ == lift && waited_ <= dt_) {
+    // The strand rises from the last suture point, or from the knot that is already there.
+    start_ = seen.knot.empty() && !seen.suture_point.empty() ? seen.suture_point.back().position : stitch(seen);
+    reach_ = std::max(0.03f, length_between(seen, last_point_node(seen), last));
+    taut_ = 0.97f;
+    frozen_at_ = 0;
+    wraps_seen_ = 0;
+    // So high that the hand, going round below, keeps clear of the tissue.
+    height_ = std::clamp(0.5f * reach_ + 0.004f, 0.025f, 0.09f);
+    throws_before_ = seen.knot.empty() ? 0 : seen.knot.back().throws;
+    knots_before_ = seen.knot.size();
+  }
+  // Across the driver: e1 away from the tissue, e2 to its side.
+  const Vec3 z = rotate(tying_pose(kDriver, {}).q, {0, 0, 1}), e1 = normalized(Vec3{0, 1, 0} - z * z.y), e2 = cross(z, e1);
+  const Vec3 axis_at = start_ + e1 * height_ - e2 * (side * kWindRadius);
+  const Pose lying = tying_pose(kDriver, axis_at - z * kWindAt);
+  // The strand, just not taut, leaving the driver after turning by w about it.
+  auto swage_at = [&](float w) {
+    const float way = side * w;
+    const Vec3 leave = axis_at + kWindRadius * (e2 * (side * std::cos(w)) + e1 * std::sin(w)) + z * (0.00012f * std::abs(w));
+    const Vec3 to = e1 * std::cos(way) - e2 * std::sin(way);
+    // What lies frozen round the driver is spent; what was wound since takes its part.
+    const float left = driver.loop_wraps > 0 ? length_between(seen, node_of(seen, driver.loop_last), last) -
+                                                   kWound * std::max(0.0f, w - frozen_at_)
+                                             : reach_ - height_ - kWound * std::max(0.0f, w);
+    const float free = std::max(0.008f, taut_ * left);
+    // It leaves slanting toward the hand, so that it crosses above the strand that comes up and not against it.
+    return leave + to * free + z * std::min(0.35f * free, 0.007f);
+  };
+  // The strand is kept just taut by feel: four per cent of slack would let it sag by a seventh of its length.
+  const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
+  if (stage_ <= wind)
+    taut_ = std::clamp(taut_ + dt_ * (tension < 0.02f ? 0.12f : tension > 0.15f ? -2.0f : tension > 0.06f ? -0.4f : 0.0f), 0.85f, 1.02f);
+  switch (stage_) {
+    case lift:
+      jaw(kDriver, kHalfOpen);
+      move(kDriver, {lying.p - e2 * (side * 0.03f) + Vec3{0, 0.01f, 0}, lying.q}, skill_.speed);
+      if (carry_swage(seen, swage_at(-0.25f), skill_.speed)) go(lay);
+      else if (!patience(8)) go(lay);
+      return false;
+    case lay:
+      carry_swage(seen, swage_at(-0.25f), skill_.speed);
+      if (move(kDriver, {lying.p - e2 * (side * 0.012f), lying.q}, skill_.speed)) go(beside);
+      else if (!patience(6)) gave_up_ = true;
+      return false;
+    case beside:
+      carry_swage(seen, swage_at(-0.25f), careful());
+      if (move(kDriver, lying, careful()) || !patience(4)) {
+        wound_ = -0.25f;
+        go(wind);
+      }
+      return false;
+    case wind: {
+      const float want = static_cast<float>(task.which) * 2 * kPi + 0.6f;
+      if (driver.loop_wraps != wraps_seen_) wraps_seen_ = driver.loop_wraps, frozen_at_ = wound_;
+      wound_ = std::min(wound_ + 2.2f * dt_, want + 0.9f);
+      carry_swage(seen, swage_at(wound_), 1.2f * skill_.speed);
+      move(kDriver, lying, careful());
+      if (driver.loop_wraps >= static_cast<uint32_t>(task.which)) go(over);
+      else if (wound_ >= want + 0.9f && waited_ > 7) go(unwind);
+      return false;
+    }
+    case over:
+    case down:
+    case close: {
+      if (driver.loop_wraps == 0 && stage_ != close) return miss(lift), false;
+      if (own_strand) return take_strand(seen, lying, close, tighten, lift);
+      // A place on the tail a little way from the stitch; after a miss another, since that one may lie against the tissue.
+      const size_t first = first_point_node(seen);
+      const float away = 0.012f + 0.004f * static_cast<float>(misses_ % 4);
+      const Vec3 thread = node_at(seen, node_along(seen, first, away, -1));
+      const Pose goal{thread, lying.q};
+      carry_swage(seen, hand_[kDriver].pose.p + z * kWindAt + (swage_at(wound_) - axis_at), 2 * skill_.speed);
+      if (stage_ == over) {
+        jaw(kDriver, kHalfOpen);
+        if (move(kDriver, raised(goal, 0.012f), 0.6f * skill_.speed)) go(down);
+        else if (!patience(6)) miss(unwind);
+      } else if (stage_ == down) {
+        if (move(kDriver, goal, careful())) go(close);
+        else if (!patience(4)) miss(over);
+      } else if (jaw(kDriver, 0) && waited_ > 0.35f) {
+        if (driver.held == Held::thread && node_of(seen, driver.held_slot) < first) {
+          pull_from_ = hand_[kDriver].pose;
+          go(tighten);
+        } else {
+          miss(over);
+        }
+      }
+      return false;
+    }
+    case tighten: {
+      const bool locked = seen.knot.size() > 0 && seen.knot.back().phase == KnotPhase::locked &&
+                          (seen.knot.size() > knots_before_ || seen.knot.back().throws > throws_before_);
+      // The strands are drawn apart, low and even.
+      auto gently = [&](size_t hand) {
+        return 0.6f * skill_.speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.03f, 1.0f);
+      };
+      const Vec3 right = normalized(Vec3{side, 0.35f, 0.1f}), left = normalized(Vec3{-side, 0.35f, 0.1f});
+      move(kDriver, {pull_from_.p + right * 0.08f, hand_[kDriver].pose.q}, gently(kDriver));
+      carry_swage(seen, start_ + (own_strand ? Vec3{0, 1, 0} : left) * (0.9f * reach_), gently(kForceps));
+      if (locked && waited_ > 0.5f) go(open);
+      else if (driver.held != Held::thread) miss(lift);
+      else if (!patience(8)) miss(unwind);
+      return false;
+    }
+    case open:
+      jaw(kDriver, kHalfOpen);
+      return move(kDriver, raised(hand_[kDriver].pose, 0.02f), skill_.speed) || waited_ > 0.8f;
+    default:  // unwind: shake the loop off and begin again
+      jaw(kDriver, 1);
+      wound_ = std::max(-0.25f, wound_ - 4 * dt_);
+      carry_swage(seen, swage_at(wound_), skill_.speed);
+      if (move(kDriver, raised(lying, 0.03f), skill_.speed) && waited_ > 1) miss(lift);
+      else if (!patience(5)) miss(lift);
+      return false;
+  }
+}
+
+bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again) {
+  const Vec3 z = rotate(lying.q, {0, 0, 1});
+  const ToolView& driver = seen.tool[kDriver];
+  const Vec3 ahead = driver.pose.p - z * 0.02f;
+  if (stage_ != close) {
+    jaw(kDriver, kHalfOpen);
+    move(kDriver, lying, careful());
+    if (carry_swage(seen, ahead, skill_.speed) && waited_ > 0.5f) go(close);
+    else if (!patience(5)) go(close);
+    return false;
+  }
+  if (jaw(kDriver, 0) && waited_ > 0.35f) {
+    if (driver.held == Held::thread && node_of(seen, driver.held_slot) > last_point_node(seen)) {
+      pull_from_ = hand_[kDriver].pose;
+      go(tighten);
+    } else {
+      miss(again);
+    }
+  }
+  return false;
+}
+
+bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
+  enum { over, down, snip, away };
+  const size_t last = seen.thread_order.size() - 1;
+  if (kind == TaskKind::cut_needle) {  // the forceps holds the needle by its end: cut right there
+    if (stage_ == over) {
+      buttons_[kForceps] = kButtonCut;
+      go(away);
+    } else if (!seen.needle_on_thread || !patience(0.5f)) {
+      if (seen.needle_on_thread) return miss(over), false;
+      return move(kForceps, {hand_[kForceps].pose.p + Vec3{-0.03f, 0.02f, 0}, hand_[kForceps].pose.q}, skill_.speed) ||
+             waited_ > 1.5f;
+    }
+    return false;
+  }
+  const bool tail = kind == TaskKind::cut_tail;
+  const size_t at = node_along(seen, tail ? first_point_node(seen) : last_point_node(seen), kStump, tail ? -1 : 1);
+  const Pose goal = tying_pose(kDriver, node_at(seen, std::clamp<size_t>(at, 1, last - 1)));
+  switch (stage_) {
+    case over:
+      cuts_before_ = count_cuts(seen);
+      jaw(kDriver, kHalfOpen);
+      if (move(kDriver, raised(goal, 0.015f), skill_.speed) || !patience(5)) go(down);
+      return false;
+    case down:
+      if (move(kDriver, goal, careful()) || !patience(3)) go(snip);
+      return false;
+    case snip:
+      buttons_[kDriver] = kButtonCut;
+      go(away);
+      return false;
+    default:
+      move(kDriver, raised(hand_[kDriver].pose, 0.015f), skill_.speed);
+      if (waited_ < 0.3f) return false;
+      if (count_cuts(seen) == cuts_before_) return miss(over), false;
+      return true;
+  }
+}
+
+size_t Scripted::count_cuts(const Snapshot& seen) {
+  size_t n = 0;
+  for (const uint8_t c : seen.thread_cut) n += c;
+  return n;
+}
+
+bool Scripted::fresh(const Snapshot& seen) {
+  enum { let_go, ask, wait };
+  rest_aside(seen, kDriver);
+  rest_aside(seen, kForceps);
+  switch (stage_) {
+    case let_go:
+      if (waited_ > 0.6f) go(ask);
+      return false;
+    case ask:
+      buttons_[kDriver] = kButtonNewSuture;
+      settled_before_ = seen.settled.size();
+      go(wait);
+      return false;
+    default:
+      if (waited_ < 0.3f) return false;
+      if (seen.settled.size() == settled_before_) return miss(let_go), false;
+      return true;
+  }
+}
+
+bool Scripted::take_both(const Snapshot& seen) {
+  enum { lay, over, down, close };
+  const size_t first = first_point_node(seen);
+  const size_t at = node_along(seen, first, 0.014f + 0.003f * static_cast<float>(misses_ % 3), -1);
+  const Vec3 thread = node_at(seen, at), knot = stitch(seen);
+  const Vec3 way = normalized(thread - knot, {1, 0, 0});
+  const float free = length_between(seen, last_point_node(seen), seen.thread_order.size() - 1);
+  const Pose goal = tying_pose(kDriver, thread);
+  carry_swage(seen, knot + normalized(way + Vec3{0, 0.12f, 0}) * (0.97f * free), skill_.speed);
+  switch (stage_) {
+    case lay:
+      jaw(kDriver, kHalfOpen);
+      move(kDriver, raised(goal, 0.03f), skill_.speed);
+      if (waited_ > 2.0f) go(over);
+      return false;
+    case over:
+      jaw(kDriver, kHalfOpen);
+      if (move(kDriver, raised(goal, 0.02f), skill_.speed) || !patience(4)) go(down);
+      return false;
+    case down:
+      if (move(kDriver, goal, careful()) || !patience(4)) go(close);
+      return false;
+    default:
+      if (!jaw(kDriver, 0) || waited_ < 0.35f) return false;
+      if (seen.tool[kDriver].held != Held::thread || seen.tool[kDriver].held_strands < 2) return miss(over), false;
+      return true;
+  }
+}
+
+}  // namespace catgut
