@@ -144,6 +144,7 @@ Plan connell_plan(const PictureModel& picture, const SurgeonSkill& skill) {
       if (s == 0) add(plan, TaskKind::pull_tail);
       else if (s > 1) add(plan, TaskKind::pull_together);
       if (s == 1) {
+        add(plan, TaskKind::pull_slack);
         add(plan, TaskKind::draw);
         add(plan, TaskKind::regrip);
         add(plan, TaskKind::throw_, 1, 1);

@@ -24,7 +24,7 @@ enum class TaskKind {
   pick_up,        // the driver takes the needle from the drape
   bite,           // one sweep of the needle at place[which]; the forceps brings it out
   pull_tail,      // the forceps pulls thread through until the tail is as long as wanted
-  pull_slack,     // until the span before the last bite has no slack
+  pull_slack,     // until the way before the last bite has no slack
   pull_together,  // until the last midpoint has come together
   hand_back,      // the driver takes the needle from the forceps
   regrip,         // the forceps takes the needle near its back end, to tie

@@ -293,11 +293,15 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   float slack = 0;
   if (kind == TaskKind::pull_tail) {
     slack = length_between(seen, 0, first_point_node(seen)) - skill_.tail;
-  } else if (kind == TaskKind::pull_slack && n > 2) {
-    // Between the bite before and this one: thread there against the straight way.
-    const SuturePointView &a = seen.suture_point[n - 3], &b = seen.suture_point[n - 2];
-    slack = length_between(seen, node_of(seen, a.anchored), node_of(seen, b.anchored)) -
-            1.1f * distance(a.position, b.position) - 0.001f;
+  } else if (kind == TaskKind::pull_slack) {
+    // In the last way from one bite to the next, or from one bowel end to the other: thread there against the straight way.
+    for (size_t k = n - 1; k-- > 0;) {
+      const SuturePointView &a = seen.suture_point[k], &b = seen.suture_point[k + 1];
+      if (a.bite == b.bite || (plan_.lift == 0 && a.wall == b.wall)) continue;
+      slack = length_between(seen, node_of(seen, a.anchored), node_of(seen, b.anchored)) -
+              1.1f * distance(a.position, b.position) - 0.001f;
+      break;
+    }
   } else if (kind == TaskKind::pull_together) {
     slack = open_seam(seen);
   }
@@ -322,9 +326,11 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
     case bring: {
       rest_aside(seen, kDriver);
       const size_t next = std::min(place_ + 1, plan_.place.size() - 1);
-      BiteFrame f = frame(seen, present ? next : place_);
-      f.at += f.out * (present ? 0.03f : 0.045f) + f.up * (1.7f * plan_.lift);
-      if (move(kForceps, holding(kForceps, needle_at(f, -half_bite_angle() - 0.7f)), skill_.speed)) go(over);
+      // Before a bite the needle is brought beside its place; before a knot high above the stitch, its tip up and out of the
+      // way.
+      BiteFrame f = present ? frame(seen, next) : BiteFrame{stitch(seen), {0, 1, 0}, {0, 0, -1}, {1, 0, 0}};
+      f.at += f.out * (present ? 0.03f : 0.045f) + f.up * (present ? 1.7f * plan_.lift : 0.0f);
+      if (move(kForceps, holding(kForceps, needle_at(f, present ? -half_bite_angle() - 0.7f : -2.2f)), skill_.speed)) go(over);
       else if (!patience(6)) gave_up_ = true;
       return false;
     }

@@ -8,9 +8,10 @@ namespace {
 
 constexpr float kHalfOpen = 0.7f;       // a jaw that lets go without shaking off a loop
 constexpr float kStump = 0.007f;        // [m] of thread left on a knot
-constexpr float kWindAt = 0.009f;       // [m] behind the driver's tip, where thread is wound round it
-constexpr float kWindRadius = 0.0019f;  // [m] of a wrap's middle line
-constexpr float kWound = 0.0026f;       // [m] of thread that a radian takes, coarse as its segments are
+constexpr float kWindAt = 0.024f;       // [m] behind the driver's tip, where thread is wound round it
+constexpr float kWindRadius = 0.0028f;  // [m] of a wrap's middle line
+constexpr float kWound = 0.0031f;       // [m] of thread that a radian takes, coarse as its segments are
+constexpr float kApart = 0.010f;        // [m] along the driver, by which the strand's two ends stand apart
 constexpr float kTyingAt = 0.12f;       // place on the needle's arc: behind the swage
 
 }  // namespace
@@ -75,7 +76,9 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   if (stage_ == lift && waited_ <= dt_) {
     // The strand rises from the last suture point, or from the knot that is already there.
     start_ = seen.knot.empty() && !seen.suture_point.empty() ? seen.suture_point.back().position : stitch(seen);
-    reach_ = std::max(0.03f, length_between(seen, last_point_node(seen), last));
+    // What the knot holds already is no longer in the hand.
+    const float spent = seen.suture_point.empty() ? 0 : distance(seen.suture_point.back().position, start_);
+    reach_ = std::max(0.03f, length_between(seen, last_point_node(seen), last) - spent);
     taut_ = 0.97f;
     frozen_at_ = 0;
     wraps_seen_ = 0;
@@ -86,25 +89,30 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   }
   // Across the driver: e1 away from the tissue, e2 to its side.
   const Vec3 z = rotate(tying_pose(kDriver, {}).q, {0, 0, 1}), e1 = normalized(Vec3{0, 1, 0} - z * z.y), e2 = cross(z, e1);
-  const Vec3 axis_at = start_ + e1 * height_ - e2 * (side * kWindRadius);
+  // The strand comes up on the hand's side of the turn and leaves on the tip's: the two never meet.
+  const Vec3 axis_at = start_ + e1 * height_ - e2 * (side * kWindRadius) - z * kApart;
   const Pose lying = tying_pose(kDriver, axis_at - z * kWindAt);
   // The strand, just not taut, leaving the driver after turning by w about it.
   auto swage_at = [&](float w) {
     const float way = side * w;
-    const Vec3 leave = axis_at + kWindRadius * (e2 * (side * std::cos(w)) + e1 * std::sin(w)) + z * (0.00012f * std::abs(w));
+    const Vec3 leave = axis_at + kWindRadius * (e2 * (side * std::cos(w)) + e1 * std::sin(w));
     const Vec3 to = e1 * std::cos(way) - e2 * std::sin(way);
     // What lies frozen round the driver is spent; what was wound since takes its part.
     const float left = driver.loop_wraps > 0 ? length_between(seen, node_of(seen, driver.loop_last), last) -
                                                    kWound * std::max(0.0f, w - frozen_at_)
                                              : reach_ - height_ - kWound * std::max(0.0f, w);
     const float free = std::max(0.008f, taut_ * left);
-    // It leaves slanting toward the hand, so that it crosses above the strand that comes up and not against it.
-    return leave + to * free + z * std::min(0.35f * free, 0.007f);
+    // The forceps' shaft lies on that side too.
+    return leave + to * free - z * std::min(0.4f * free, kApart);
   };
   // The strand is kept just taut by feel: four per cent of slack would let it sag by a seventh of its length.
   const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
   if (stage_ <= wind)
-    taut_ = std::clamp(taut_ + dt_ * (tension < 0.02f ? 0.12f : tension > 0.15f ? -2.0f : tension > 0.06f ? -0.4f : 0.0f), 0.85f, 1.02f);
+    taut_ = std::clamp(taut_ + dt_ * (tension < 0.02f   ? 0.12f
+                                      : tension > 0.2f  ? -0.5f
+                                      : tension > 0.08f ? -0.2f
+                                                        : 0.0f),
+                       0.88f, 1.02f);
   switch (stage_) {
     case lift:
       jaw(kDriver, kHalfOpen);
@@ -144,7 +152,10 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       const float away = 0.012f + 0.004f * static_cast<float>(misses_ % 4);
       const Vec3 thread = node_at(seen, node_along(seen, first, away, -1));
       const Pose goal{thread, lying.q};
-      carry_swage(seen, hand_[kDriver].pose.p + z * kWindAt + (swage_at(wound_) - axis_at), 2 * skill_.speed);
+      // The forceps goes along above, its strand loose.
+      const float loose = 0.85f * length_between(seen, node_of(seen, driver.loop_last), last);
+      carry_swage(seen, hand_[kDriver].pose.p + z * kWindAt + normalized(e1 - 0.4f * z) * std::max(0.012f, loose),
+                  2 * skill_.speed);
       if (stage_ == over) {
         jaw(kDriver, kHalfOpen);
         if (move(kDriver, raised(goal, 0.012f), 0.6f * skill_.speed)) go(down);
@@ -172,7 +183,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       const Vec3 right = normalized(Vec3{side, 0.35f, 0.1f}), left = normalized(Vec3{-side, 0.35f, 0.1f});
       move(kDriver, {pull_from_.p + right * 0.08f, hand_[kDriver].pose.q}, gently(kDriver));
       carry_swage(seen, start_ + (own_strand ? Vec3{0, 1, 0} : left) * (0.9f * reach_), gently(kForceps));
-      if (locked && waited_ > 0.5f) go(open);
+      if (locked && (waited_ > 0.5f || driver.held != Held::thread)) go(open);
       else if (driver.held != Held::thread) miss(lift);
       else if (!patience(8)) miss(unwind);
       return false;
@@ -284,7 +295,7 @@ bool Scripted::take_both(const Snapshot& seen) {
   const Vec3 way = normalized(thread - knot, {1, 0, 0});
   const float free = length_between(seen, last_point_node(seen), seen.thread_order.size() - 1);
   const Pose goal = tying_pose(kDriver, thread);
-  carry_swage(seen, knot + normalized(way + Vec3{0, 0.12f, 0}) * (0.97f * free), skill_.speed);
+  carry_swage(seen, knot + normalized(way + Vec3{0, 0.04f, 0}) * (0.99f * free), skill_.speed);
   switch (stage_) {
     case lay:
       jaw(kDriver, kHalfOpen);

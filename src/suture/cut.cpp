@@ -45,6 +45,9 @@ void cut_at(const SolverModel& model, SolverState& solver, const SutureModel& su
     const float l2 = length2(b - a), part = l2 > 0 ? std::clamp(dot(at - a, b - a) / l2, 0.0f, 1.0f) : 0;
     if (const float d = distance(at, lerp(a, b, part)); d < best) best = d, found = i;
   }
+  const bool swaged = std::any_of(t.hold.begin(), t.hold.end(), [](const ThreadHold& h) { return h.kind == HoldKind::swage; });
+  // A hand that holds the needle has the thread cut off it.
+  if (state.hand[who].held == Held::needle && swaged) found = t.rest.size() - 1;
   if (found == t.rest.size()) return;
   std::vector<uint8_t> anchored(t.order.size());
   size_t first = t.order.size(), last = 0;
@@ -55,7 +58,6 @@ void cut_at(const SolverModel& model, SolverState& solver, const SutureModel& su
     last = std::max(last, node);
   }
   const uint32_t slot = t.order[found];
-  const bool swaged = std::any_of(t.hold.begin(), t.hold.end(), [](const ThreadHold& h) { return h.kind == HoldKind::swage; });
   if (found + 1 == t.rest.size() && swaged) {
     // At the swage: the whole thread stays, the needle comes off.
     std::erase_if(t.hold, [](const ThreadHold& h) { return h.kind == HoldKind::swage; });

@@ -1,7 +1,7 @@
-// suture/knot: knots (paper 2.4). A tool with a loop of thread round it takes the other strand: the loop leaves the tool and its
-// two ends are held by the knot. As the tool moves away the knot travels to the tissue; there it locks, lets go of the loop's
-// ends and holds a particle of both strands instead, at one point of the tissue, where nothing slides any more. Letting go of
-// the strand before that undoes the throw. Further throws travel to the knot that is there.
+// suture/knot: knots (paper 2.4). A tool with a loop of thread round it takes the other strand: the loop leaves the tool and
+// its two ends are held by the knot. As the tool moves away the knot travels to the tissue; there it locks, lets go of the
+// loop's ends and holds a particle of both strands instead, at one point of the tissue, where nothing slides any more. Letting
+// go of the strand before that undoes the throw. Further throws travel to the knot that is there.
 #include <algorithm>
 
 #include "suture/suture.h"
@@ -102,7 +102,8 @@ void begin(const SolverModel& model, SolverState& solver, const SutureModel& sut
     const SuturePoint& by_strand = nearest_point(solver, state, held);
     // "If more than one suture point has been created, the knot object will move toward the midpoint of the last two": of the
     // two ends of its stitch. With the paper's one point a bite these are the last two; a bite of ours makes two.
-    const SuturePoint& other = held > hole && first > hole && state.point.size() > 1 ? state.point[state.point.size() - 2] : by_strand;
+    const SuturePoint& other =
+        held > hole && first > hole && state.point.size() > 1 ? state.point[state.point.size() - 2] : by_strand;
     const TissuePoint &a = t.anchor[by_loop.anchor].point, &b = t.anchor[other.anchor].point;
     fresh.target = &by_loop == &other ? a : middle(model, a, b);
     state.knot.push_back(fresh);
@@ -131,8 +132,8 @@ void begin(const SolverModel& model, SolverState& solver, const SutureModel& sut
     solver.thread.anchor.push_back(a);
   }
   update_thread_collisions(model, solver, suture);
-  events.push_back({0, EventKind::knot_begun, who, static_cast<uint32_t>(knot - state.knot.data()),
-                    static_cast<float>(loop.wraps), at});
+  events.push_back(
+      {0, EventKind::knot_begun, who, static_cast<uint32_t>(knot - state.knot.data()), static_cast<float>(loop.wraps), at});
 }
 
 void cancel(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, size_t which,
@@ -151,9 +152,9 @@ void cancel(const SolverModel& model, SolverState& solver, const SutureModel& su
                     position_of(k.target, solver.x.data()) + k.offset});
 }
 
-// Ties the strand that leaves the tissue at node `hole` in direction `way` (+1 toward the needle) to the knot at `at`: the first
-// free particle that reaches it comes to stand there, and what thread there is too much between hole and knot is drawn out.
-// False: the strand ends before it could.
+// Ties the strand that leaves the tissue at node `hole` in direction `way` (+1 toward the needle) to the knot at `at`: the
+// first free particle that reaches it comes to stand there, and what thread there is too much between hole and knot is drawn
+// out. False: the strand ends before it could.
 bool tie_strand(SolverState& solver, Knot& k, size_t hole, int way, Vec3 at) {
   Thread& t = solver.thread;
   const Vec3 from = xyz(solver.x[t.order[hole]]);
@@ -203,7 +204,8 @@ void lock(const SolverModel& model, SolverState& solver, const SutureModel& sutu
   KnotThrow& thrown = k.thrown[k.throws - 1];
   thrown.tension = tension_at(t, k.strand);
   SurfaceHit hit;
-  thrown.gap = nearest_surface(model, scratch.candidates, solver.x.data(), at, 0.008f, hit) ? std::max(0.0f, hit.distance) : 0.008f;
+  thrown.gap =
+      nearest_surface(model, scratch.candidates, solver.x.data(), at, 0.008f, hit) ? std::max(0.0f, hit.distance) : 0.008f;
   k.phase = KnotPhase::locked;
   k.offset = {};
   update_thread_collisions(model, solver, suture);

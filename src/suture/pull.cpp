@@ -88,10 +88,19 @@ float length_between_ends(const SolverState& solver, const SutureState& state) {
 
 void spans(const SolverState& solver, const SutureState& state, std::vector<float>& span) {
   const Thread& t = solver.thread;
+  const Vec4* x = solver.x.data();
   span.assign(state.point.size(), 0);
   for (size_t k = 0; k + 1 < state.point.size(); ++k) {
-    const size_t a = node_of(t, t.anchor[state.point[k].anchor].slot), b = node_of(t, t.anchor[state.point[k + 1].anchor].slot);
+    const ThreadAnchor &here = t.anchor[state.point[k].anchor], &next = t.anchor[state.point[k + 1].anchor];
+    const size_t a = node_of(t, here.slot), b = node_of(t, next.slot);
     for (size_t i = std::min(a, b); i < std::max(a, b); ++i) span[k] += t.rest[i];
+    for (const ThreadAnchor& knot : t.anchor) {
+      const size_t node = knot.knotted ? node_of(t, knot.slot) : 0;
+      if (node <= std::min(a, b) || node >= std::max(a, b)) continue;
+      float beyond = 0;  // from the knot on; what lies before it cannot be drawn
+      for (size_t i = std::min(node, b); i < std::max(node, b); ++i) beyond += t.rest[i];
+      span[k] = std::min(span[k], std::max(0.0f, beyond - distance(position_of(knot, x), position_of(here, x))));
+    }
   }
 }
 
@@ -155,6 +164,36 @@ void remove_last_suture_point(const SolverModel& model, SolverState& solver, con
   update_thread_collisions(model, solver, suture);
 }
 
+// Two holes may follow each other with no particle between them. When the short pair between them is used up, the nearer hole
+// would hold the thread fast however hard it is pulled; so a little thread is drawn through the further one (or several of
+// them) as soon as the pull is more than the friction of all.
+static void feed(Thread& t, const ThreadAnchor& a, size_t i, float used_up, float step) {
+  if (a.knotted) return;
+  auto hole = [&](size_t node) {
+    return std::find_if(t.anchor.begin(), t.anchor.end(),
+                        [&](const ThreadAnchor& b) { return b.slot == t.order[node] && !b.knotted; });
+  };
+  for (const int way : {1, -1}) {
+    float resist = a.threshold();
+    const size_t nearest = way > 0 ? i - 1 : i;  // the pair on the side from which thread comes
+    size_t pair = nearest;
+    while (t.rest[pair] <= 2 * used_up) {
+      const size_t node = way > 0 ? pair : pair + 1;  // its far end
+      if (node == 0 || node + 1 == t.order.size()) break;
+      const auto next = hole(node);
+      const size_t beyond = way > 0 ? pair - 1 : pair + 1;
+      if (next == t.anchor.end() || t.cut[beyond]) break;
+      resist += next->threshold();
+      pair = beyond;
+    }
+    const float force = way > 0 ? a.tension_needle : a.tension_free;
+    if (pair == nearest || t.rest[nearest] > used_up || t.rest[pair] <= 2 * used_up || force <= resist) continue;
+    const float drawn = std::min(step, t.rest[pair] - used_up);
+    t.rest[pair] -= drawn;
+    t.rest[nearest] += drawn;
+  }
+}
+
 void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
           std::vector<Event>& events) {
   Thread& t = solver.thread;
@@ -164,6 +203,7 @@ void pull(const SolverModel& model, SolverState& solver, const SutureModel& sutu
     ThreadAnchor& a = t.anchor[state.point[k].anchor];
     const size_t i = node_of(t, a.slot);
     const bool was_blocked = a.blocked_needle;
+    feed(t, a, i, used_up, 0.25f * model.thread.spacing);
     const bool can_give_free = i >= 2 && !is_locked(t, t.order[i - 1]) && !t.cut[i - 1] && !t.cut[i - 2];
     const bool can_give_needle = i + 2 < t.order.size() && !is_locked(t, t.order[i + 1]) && !t.cut[i] && !t.cut[i + 1];
     a.blocked_needle = !can_give_free && t.rest[i - 1] <= used_up;

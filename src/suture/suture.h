@@ -103,10 +103,10 @@ struct SutureModel {
   float attach_compliance = 1.0f / 1100, channel_compliance = 0.002f;  // [m/N]
   float channel_drag = 0.12f;                                          // [N] per end of the channel
   float pass_tension = 0.03f;                                          // [N]
-  float capstan = 0.08f;         // thread-tissue friction times the angle by which a suture point bends the thread
-  int collision_off = 3;         // thread particles on each side
-  float grasp_reach = 0.003f;    // [m]
-  float strand_reach = 0.0022f;  // [m] of a second strand, to be between the jaws with the first
+  float capstan = 0.08f;        // thread-tissue friction times the angle by which a suture point bends the thread
+  int collision_off = 3;        // thread particles on each side
+  float grasp_reach = 0.003f;   // [m]
+  float strand_reach = 0.003f;  // [m] of a second strand, to be between the jaws with the first
   float needle_grip = 40, thread_grip = 15, tissue_grip = 6;  // [N] beyond which a jaw slips
   float tissue_compliance = 5e-4f;                            // [m/N] of tissue held by a jaw
   float tissue_reach = 0.0015f;                               // [m] how near the surface must be to a closing jaw
@@ -166,8 +166,8 @@ void release(SolverState& solver, SutureState& state, uint8_t who, float force, 
 
 // --- cut.cpp -----------------------------------------------------------------------------------------------------------
 // Once a tick. pressed: the buttons that went down in this tick, per hand. kButtonCut cuts the thread nearest to that tool's
-// jaws, at most 4 mm away: between two particles, or the needle off at its swage. A cut within a stitch, or before anything was
-// tied, is a technique_fault besides.
+// jaws, at most 4 mm away: between two particles, or the needle off at its swage, as also where that tool holds the needle. A
+// cut within a stitch, or before anything was tied, is a technique_fault besides.
 void cut(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
          const std::array<uint32_t, 2>& pressed, std::vector<Event>& events);
 
@@ -217,7 +217,8 @@ void remove_last_suture_point(const SolverModel& model, SolverState& solver, con
 void update_thread_collisions(const SolverModel& model, SolverState& solver, const SutureModel& suture);
 // Rest length [m] of the thread between the first and the last suture point along the order; 0 with fewer than two.
 float length_between_ends(const SolverState& solver, const SutureState& state);
-// Rest length [m] of the thread from each suture point to the next one made after it; 0 for the last.
+// Rest length [m] of the thread from each suture point to the next one made after it; 0 for the last. With a knot between
+// them: by how much what lies beyond the knot is longer than the way from the knot to the first of the two.
 void spans(const SolverState& solver, const SutureState& state, std::vector<float>& span);
 // Takes the row out of Thread::anchor and puts the indices right that point behind it.
 void erase_anchor(SolverState& solver, SutureState& state, uint32_t anchor);

@@ -133,7 +133,8 @@ TEST(Surgeon, keeps_to_the_speed_of_its_skill) {
 
 // The surgeon touches nothing but the Snapshot: no file of its room names a room below or beside.
 TEST(Surgeon, sees_the_snapshot_alone) {
-  for (const char* name : {"surgeon.h", "hands.h", "hands.cpp", "plan.h", "plan.cpp", "sight.h", "sight.cpp", "scripted.h", "scripted.cpp", "tying.cpp"}) {
+  for (const char* name : {"surgeon.h", "hands.h", "hands.cpp", "plan.h", "plan.cpp", "sight.h", "sight.cpp", "scripted.h",
+                           "scripted.cpp", "tying.cpp"}) {
     std::ifstream in(std::string(CATGUT_SOURCE_DIR) + "/src/surgeon/" + name);
     ASSERT_TRUE(in) << name;
     std::string line;
