@@ -16,8 +16,7 @@ void publish_knots(const Model& model, const State& state, Snapshot& out) {
     KnotView v;
     v.phase = k.phase;
     v.position = position_of(k.target, x);
-    for (const ThreadAnchor& a : s.thread.anchor)
-      if (a.knotted && a.slot == k.slot[0]) v.position = position_of(a, x);
+    if (k.phase == KnotPhase::tightening && k.begun == 0) v.position += normalized(k.from) * k.left;
     v.throws = k.throws;
     v.thrown = k.thrown;
     if (state.suture.point.size() > 1)

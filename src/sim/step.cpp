@@ -71,6 +71,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   {
     StageTimer timer(times, Stage::loop);
     find_loops(solver, state.solver, model.suture, state.suture, state.event);
+    tie(solver, state.solver, model.suture, state.suture, state.event);
   }
   find_candidates(solver, state.solver, state.scratch, 0.008f, times);
   for (int i = 1; i <= model.substeps; ++i) {
@@ -84,6 +85,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
     {
       StageTimer timer(times, Stage::pull);
       pull(solver, state.solver, model.suture, state.suture, state.event);
+      tighten(solver, state.solver, state.scratch, model.suture, state.suture, state.event);
     }
   }
   {

@@ -1,5 +1,5 @@
 // suture: the data of guided suturing (paper 2.2, 2.3) and the stages that work on it, in the order of the tick:
-//   grasp -> loop -> (per substep: solver, slip, puncture, pull) -> [technique] -> closure.
+//   grasp -> loop -> knot -> (per substep: solver, slip, puncture, pull, tighten) -> [technique] -> closure.
 // Each stage reads and writes live rows of the solver's state (attachments, channel, anchors, order); none touches a
 // multiplier.
 #pragma once
@@ -64,19 +64,23 @@ struct ToolLoop {
   float jaw = 1;                       // of the last tick
 };
 
-// A knot. While it tightens, the ends of its loop are anchored to it (ThreadAnchor::knotted with an offset) and it travels from
-// the tool to the tissue; once locked it holds a particle of both strands at one point of the tissue, and nothing slides there.
+// A knot: throws that lie on each other, made of loops. While a throw tightens, the ends of its loop are anchored to it with an
+// offset from the tissue that shrinks, and thread may run through it as through a suture point. Locked, the knot holds a
+// particle of each of the two strands at one point of the tissue, and nothing runs there again (ThreadAnchor::knotted).
 struct Knot {
-  KnotPhase phase = KnotPhase::tightening;
-  uint32_t hand = 0;               // the tool that pulls it tight
-  uint32_t begun = 0;              // throws that were locked when the throw in hand was begun
-  TissuePoint target;              // where it goes: the suture point, or the middle between the two ends of its stitch
-  Vec3 from;                       // [m] its offset from the target when the throw in hand was begun
-  Vec3 hand_from;                  // [m] where the pulling tool was then
-  uint32_t strand = 0;             // slot that the hand took: on the free end, on the needle side, or on a bight
-  std::array<uint32_t, 2> slot{};  // the two particles that it holds once locked: free-end side, needle side
-  uint32_t slots = 0;              // how many of them are valid: 1 when it was tied on one strand alone
-  uint32_t throws = 0;             // the throw in hand included
+  KnotPhase phase = KnotPhase::tightening;  // of the throw in hand
+  uint32_t hand = 0;                        // the tool that pulls it tight
+  uint32_t begun = 0;                       // throws that were locked when the throw in hand was begun
+  TissuePoint target;                       // where it goes: the suture point, or the middle between the two ends of its stitch
+  Vec3 from;                                // [m] offset of the throw in hand from the target when it was begun
+  float left = 0;                           // [m] of that offset
+  Vec3 hand_from;                           // [m] where the pulling tool was then
+  uint32_t strand = 0;                      // slot that the hand took: on the free end, on the needle side, or on a bight
+  std::array<uint32_t, 2> end{};            // slots of the loop's two ends, free-end side first; anchored while it tightens
+  std::array<uint32_t, 2> slot{};           // the particles that it holds once locked: free-end side, needle side
+  uint32_t slots = 0;                       // how many of them are valid: 1 when it was tied on one strand alone; 0: none yet
+  uint32_t snug = 0;                        // 1: what was slack between it and the stitch has been drawn through
+  uint32_t throws = 0;                      // the throw in hand included
   std::array<KnotThrow, KnotView::kMostThrows> thrown;
 };
 
@@ -140,6 +144,18 @@ void find_loops(const SolverModel& model, SolverState& solver, const SutureModel
 // The loop leaves its tool, to become a knot or to fall off.
 void take_off_loop(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t who);
 
+// --- knot.cpp ----------------------------------------------------------------------------------------------------------
+// Once a tick. A tool with a loop round it whose jaws have closed on thread beyond the loop begins a throw; one that lets go of
+// it before the throw is locked takes it back.
+void tie(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+         std::vector<Event>& events);
+// After every substep: throws go down to the tissue as far as the pulling tool goes away, and lock there; a knot that was just
+// locked draws through what is still slack under it.
+void tighten(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
+             SutureState& state, std::vector<Event>& events);
+// Midway between two points of tissue, wherever the tissue carries them.
+TissuePoint midway(const SolverModel& model, const TissuePoint& a, const TissuePoint& b);
+
 // --- puncture.cpp ------------------------------------------------------------------------------------------------------
 // After every substep: the tip trigger, the attached particle, the back-end trigger (paper 2.2, figures 4 and 5).
 void puncture(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
@@ -163,6 +179,9 @@ void move_particle(Thread& thread, size_t from, size_t after);
 // end.
 void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
           std::vector<Event>& events);
+// Moves up to `length` [m] of thread past the locked particle `slot`, toward the needle (way +1) or the free end (-1); the sum
+// of rest lengths stays. Returns how much went: particles that are locked or at an end of the thread do not pass.
+float draw_through(const SolverModel& model, SolverState& solver, uint32_t slot, int way, float length);
 // Locks the next free particle behind the needle to `end` and makes it a suture point (figure 7a). False: no free particle
 // there yet.
 bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
