@@ -249,6 +249,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   u.capstan = scene.suture.capstan;
   u.collision_off = scene.suture.collision_off;
   u.grasp_reach = scene.suture.grasp_reach;
+  u.least_throws = scene.technique.throws;
 
   m.technique = make_technique(scene, working_rim, wall, where);
 

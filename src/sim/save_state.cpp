@@ -55,7 +55,7 @@ void fields(A& a, ToolLoop& l) {
 template <typename A>
 void fields(A& a, Knot& k) {
   a(k.phase), a(k.hand), a(k.begun), a(k.target), a(k.from), a(k.left), a(k.hand_from), a(k.strand), a(k.end[0]), a(k.end[1]),
-      a(k.slot[0]), a(k.slot[1]), a(k.slots), a(k.snug), a(k.throws);
+      a(k.slot[0]), a(k.slot[1]), a(k.slots), a(k.snug), a(k.throws), a(k.told);
   for (KnotThrow& t : k.thrown) a(t);
 }
 template <typename A>

@@ -67,11 +67,13 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   const SolverModel& solver = model.solver;
   state.event.clear();
   meet_hands(state, input);
+  const std::array<uint32_t, 2> pressed = pressed_buttons(state.suture, input.hand);
   grasp(solver, state.solver, model.suture, state.suture, input.hand, state.event);
   {
     StageTimer timer(times, Stage::loop);
     find_loops(solver, state.solver, model.suture, state.suture, state.event);
     tie(solver, state.solver, model.suture, state.suture, state.event);
+    cut(solver, state.solver, model.suture, state.suture, pressed, state.event);
   }
   find_candidates(solver, state.solver, state.scratch, 0.008f, times);
   for (int i = 1; i <= model.substeps; ++i) {

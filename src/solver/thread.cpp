@@ -323,7 +323,14 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
   }
 
   if (model.direct) stiffen_prediction(model, thread, s, nodes, before, h);
-  solve_bends({s.p.data(), nodes}, {s.bend_w.data(), nodes}, model.bend_compliance, h, model.bend_sweeps, s.bend);
+  // Nothing bends across a cut: piece by piece.
+  for (size_t begin = 0, i = 0; i < nodes; ++i) {
+    if (i < pairs && !thread.cut[i]) continue;
+    const size_t count = i + 1 - begin;
+    solve_bends({s.p.data() + begin, count}, {s.bend_w.data() + begin, count}, model.bend_compliance, h, model.bend_sweeps,
+                s.bend);
+    begin = i + 1;
+  }
 
   if (model.direct) {
     s.slide.assign(thread.anchor.size(), {});  // within its capacity: no allocation once as many anchors were seen

@@ -68,6 +68,7 @@ void grasp(const SolverModel& model, SolverState& solver, const SutureModel& sut
       hand.held = Held::thread;
       hand.slot = static_cast<uint32_t>(found);
       solver.thread.hold.push_back({hand.slot, who, to_local(tool.pose(), xyz(solver.x[hand.slot])), HoldKind::jaw});
+      hold_other_strands(solver, suture, state, who);
       update_thread_collisions(model, solver, suture);
       events.push_back({0, EventKind::thread_grasped, who, hand.slot, 0, tool.x});
     }

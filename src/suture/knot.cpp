@@ -80,6 +80,14 @@ bool pulls(const SutureState& state, const Knot& knot) {
   const HandState& hand = state.hand[knot.hand];
   return hand.held == Held::thread && hand.slot == knot.strand;
 }
+// Whether the throw in hand still hangs on one thread: its loop, and the strand that was taken, with the stitch.
+bool is_whole(const Thread& t, const SutureState& state, const Knot& knot) {
+  const size_t first = node_of(t, knot.end[0]), last = node_of(t, knot.end[1]), held = node_of(t, knot.strand);
+  return first < last &&
+         std::none_of(t.cut.begin() + static_cast<long>(first), t.cut.begin() + static_cast<long>(last),
+                      [](uint8_t cut) { return cut != 0; }) &&
+         ends_of(t, state, first, last).strand != Strand::loose && ends_of(t, state, held, held).strand != Strand::loose;
+}
 
 void release_end(SolverState& solver, SutureState& state, uint32_t slot) {
   const int k = anchor_of(solver.thread, slot);
@@ -152,14 +160,13 @@ void begin(const SolverModel& model, SolverState& solver, const SutureModel& sut
   const size_t first = node_of(t, loop.first), last = node_of(t, loop.last), held = node_of(t, strand);
   const Ends wrapped = ends_of(t, state, first, last), taken = ends_of(t, state, held, held);
   // Two strands are tied to each other if one leads to the free end and the other to the needle.
-  const bool one_strand = wrapped.strand == taken.strand || wrapped.strand == Strand::bight || taken.strand == Strand::bight ||
-                          taken.strand == Strand::loose;
+  const bool one_strand = wrapped.strand == taken.strand || wrapped.strand == Strand::bight || taken.strand == Strand::bight;
   const int under = knot_under(t, state, wrapped, taken, one_strand);
   const auto fault = [&](uint32_t which, Fault f) {
     events.push_back({0, EventKind::technique_fault, who, which, static_cast<float>(f), tool.x});
   };
   const bool full = under != kNone && state.knot[static_cast<size_t>(under)].throws == KnotView::kMostThrows;
-  if (state.point.empty() || wrapped.strand == Strand::loose || full) {
+  if (state.point.empty() || wrapped.strand == Strand::loose || taken.strand == Strand::loose || full) {
     if (!full) fault(static_cast<uint32_t>(state.knot.size()), Fault::knot_without_bite);
     take_off_loop(model, solver, suture, state, who);
     events.push_back({0, EventKind::loop_released, who, 0, 0, tool.x});
@@ -339,7 +346,8 @@ TissuePoint midway(const SolverModel& model, const TissuePoint& a, const TissueP
 void tie(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
          std::vector<Event>& events) {
   for (size_t i = state.knot.size(); i-- > 0;)
-    if (state.knot[i].phase == KnotPhase::tightening && !pulls(state, state.knot[i]))
+    if (state.knot[i].phase == KnotPhase::tightening &&
+        (!pulls(state, state.knot[i]) || !is_whole(solver.thread, state, state.knot[i])))
       cancel(model, solver, suture, state, static_cast<uint32_t>(i), events);
   for (uint8_t who = 0; who < 2; ++who)
     if (state.loop[who].wraps > 0 && state.hand[who].held == Held::thread) begin(model, solver, suture, state, who, events);

@@ -127,6 +127,16 @@ void update_thread_collisions(const SolverModel& model, SolverState& solver, con
   }
 }
 
+// A cut thread holds nothing together: as long as all of it, whatever is drawn.
+static float length_between(const Thread& t, size_t a, size_t b) {
+  float sum = 0, all = 0;
+  bool whole = true;
+  for (size_t i = std::min(a, b); i < std::max(a, b); ++i) sum += t.rest[i], whole = whole && !t.cut[i];
+  if (whole) return sum;
+  for (float rest : t.rest) all += rest;
+  return all;
+}
+
 float length_between_ends(const SolverState& solver, const SutureState& state) {
   const Thread& t = solver.thread;
   if (state.point.size() < 2) return 0;
@@ -136,18 +146,15 @@ float length_between_ends(const SolverState& solver, const SutureState& state) {
     lo = std::min(lo, i);
     hi = std::max(hi, i);
   }
-  float sum = 0;
-  for (size_t i = lo; i < hi; ++i) sum += t.rest[i];
-  return sum;
+  return length_between(t, lo, hi);
 }
 
 void spans(const SolverState& solver, const SutureState& state, std::vector<float>& span) {
   const Thread& t = solver.thread;
   span.assign(state.point.size(), 0);
-  for (size_t k = 0; k + 1 < state.point.size(); ++k) {
-    const size_t a = node_of(t, t.anchor[state.point[k].anchor].slot), b = node_of(t, t.anchor[state.point[k + 1].anchor].slot);
-    for (size_t i = std::min(a, b); i < std::max(a, b); ++i) span[k] += t.rest[i];
-  }
+  for (size_t k = 0; k + 1 < state.point.size(); ++k)
+    span[k] = length_between(t, node_of(t, t.anchor[state.point[k].anchor].slot),
+                             node_of(t, t.anchor[state.point[k + 1].anchor].slot));
 }
 
 void erase_anchor(SolverState& solver, SutureState& state, uint32_t anchor) {
@@ -162,6 +169,9 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
   if (t.order.size() < 3) return false;
   const size_t node = t.order.size() - 2;  // the last is the needle's own
   const uint32_t slot = t.order[node];
+  // A needle off which the thread was cut, or with a stump too short to follow it, leaves none in the hole.
+  const bool swaged = std::any_of(t.hold.begin(), t.hold.end(), [](const ThreadHold& h) { return h.kind == HoldKind::swage; });
+  if (!swaged || t.cut[node] || t.cut[node - 1]) return true;
   if (is_locked(t, slot)) return false;
   const BiteEnd& end = exit ? state.bite[bite].exit : state.bite[bite].entry;
   ThreadAnchor a;
@@ -186,7 +196,7 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
 }
 
 void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state) {
-  CATGUT_CHECK(!state.point.empty());
+  if (state.point.empty() || state.point.back().bite != state.current) return;  // the needle was drawn through without thread
   const uint32_t anchor = state.point.back().anchor;
   state.point.pop_back();
   erase_anchor(solver, state, anchor);

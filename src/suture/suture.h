@@ -1,5 +1,5 @@
 // suture: the data of guided suturing (paper 2.2, 2.3) and the stages that work on it, in the order of the tick:
-//   grasp -> loop -> knot -> (per substep: solver, slip, puncture, pull, tighten) -> [technique] -> closure.
+//   grasp -> loop -> knot -> cut -> (per substep: solver, slip, puncture, pull, tighten) -> [technique] -> closure.
 // Each stage reads and writes live rows of the solver's state (attachments, channel, anchors, order); none touches a
 // multiplier.
 #pragma once
@@ -81,6 +81,7 @@ struct Knot {
   uint32_t slots = 0;                       // how many of them are valid: 1 when it was tied on one strand alone; 0: none yet
   uint32_t snug = 0;                        // 1: what was slack between it and the stitch has been drawn through
   uint32_t throws = 0;                      // the throw in hand included
+  uint32_t told = 0;                        // 1: it has been said that it has too few throws
   std::array<KnotThrow, KnotView::kMostThrows> thrown;
 };
 
@@ -102,6 +103,8 @@ struct SutureModel {
   int collision_off = 3;                     // thread particles on each side
   float grasp_reach = 0.003f;                // [m]
   float needle_grip = 40, thread_grip = 15;  // [N] beyond which a jaw slips
+  float cut_reach = 0.004f;                  // [m] how near the scissors must be to the thread
+  int least_throws = 2;                      // a knot with fewer does not hold
   float loop_reach = 0.0025f;                // [m] how far off a tool thread still lies round it
   // Rest distances of neighbours: how far apart along the tool a loop's ends may be. The paper says one, of its coarser thread;
   // a hand that carries thread past the strand it crosses lays ours 2 to 3 mm deep.
@@ -156,6 +159,16 @@ void tighten(const SolverModel& model, SolverState& solver, const SolverScratch&
 // Midway between two points of tissue, wherever the tissue carries them.
 TissuePoint midway(const SolverModel& model, const TissuePoint& a, const TissuePoint& b);
 
+// --- cut.cpp -----------------------------------------------------------------------------------------------------------
+// Buttons that went down since the last tick, by hand; remembers them.
+std::array<uint32_t, 2> pressed_buttons(SutureState& state, const std::array<ToolInput, 2>& hand);
+// Once a tick. kButtonCut cuts the thread nearest to the tool's jaws; the last pair is the needle's own: there the needle comes
+// off. A cut in a wrong place is reported and stays.
+void cut(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+         const std::array<uint32_t, 2>& pressed, std::vector<Event>& events);
+// A jaw that has just closed on thread also holds the other strands that lie between its tips: the two ends of a stay suture.
+void hold_other_strands(SolverState& solver, const SutureModel& suture, const SutureState& state, uint8_t who);
+
 // --- puncture.cpp ------------------------------------------------------------------------------------------------------
 // After every substep: the tip trigger, the attached particle, the back-end trigger (paper 2.2, figures 4 and 5).
 void puncture(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
@@ -183,7 +196,7 @@ void pull(const SolverModel& model, SolverState& solver, const SutureModel& sutu
 // of rest lengths stays. Returns how much went: particles that are locked or at an end of the thread do not pass.
 float draw_through(const SolverModel& model, SolverState& solver, uint32_t slot, int way, float length);
 // Locks the next free particle behind the needle to `end` and makes it a suture point (figure 7a). False: no free particle
-// there yet.
+// there yet. A needle without thread passes (true) and makes none.
 bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                         uint32_t bite, bool exit, std::vector<Event>& events);
 // Unlocks the newest suture point again: its thread was drawn back out of the hole. The particle stays where it is, as free
@@ -191,7 +204,8 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
 void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state);
 // Collisions are off for locked and held particles and `collision_off` neighbours on each side, on for all others (paper 2.3).
 void update_thread_collisions(const SolverModel& model, SolverState& solver, const SutureModel& suture);
-// Rest length [m] of the thread between the first and the last suture point along the order; 0 with fewer than two.
+// Rest length [m] of the thread between the first and the last suture point along the order; 0 with fewer than two. Across a
+// cut thread, here and in spans: the whole length of the thread, which draws nothing together.
 float length_between_ends(const SolverState& solver, const SutureState& state);
 // Rest length [m] of the thread from each suture point to the next one made after it; 0 for the last.
 void spans(const SolverState& solver, const SutureState& state, std::vector<float>& span);
