@@ -300,13 +300,7 @@ StatePtr initial_state(const Model& model) {
     s.solver.weld.push_back(hand);
     s.solver.body_collides[k] = 0;
   }
-  RigidBody& needle = s.solver.body[kNeedle];
-  needle.x = needle.prev_x = model.needle_start.p;
-  needle.q = needle.prev_q = model.needle_start.q;
-  // The thread's last particle is the needle's: swaged on.
-  s.solver.thread.hold.push_back(
-      {s.solver.thread.order.back(), static_cast<int>(kNeedle), model.solver.needle_arc.point(0), HoldKind::swage});
-  update_thread_collisions(model.solver, s.solver, model.suture);
+  fresh_suture(model.solver, s.solver, model.suture, model.start, model.needle_start);
   return state;
 }
 

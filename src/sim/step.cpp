@@ -74,6 +74,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
     find_loops(solver, state.solver, model.suture, state.suture, state.event);
     tie(solver, state.solver, model.suture, state.suture, state.event);
     cut(solver, state.solver, model.suture, state.suture, pressed, state.event);
+    new_suture(solver, state.solver, model.suture, state.suture, model.start, model.needle_start, pressed, state.event);
   }
   find_candidates(solver, state.solver, state.scratch, 0.008f, times);
   for (int i = 1; i <= model.substeps; ++i) {

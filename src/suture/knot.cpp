@@ -343,6 +343,12 @@ TissuePoint midway(const SolverModel& model, const TissuePoint& a, const TissueP
   return m;
 }
 
+void take_back_throws(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                      std::vector<Event>& events) {
+  for (size_t i = state.knot.size(); i-- > 0;)
+    if (state.knot[i].phase == KnotPhase::tightening) cancel(model, solver, suture, state, static_cast<uint32_t>(i), events);
+}
+
 void tie(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
          std::vector<Event>& events) {
   for (size_t i = state.knot.size(); i-- > 0;)

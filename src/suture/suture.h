@@ -1,10 +1,11 @@
 // suture: the data of guided suturing (paper 2.2, 2.3) and the stages that work on it, in the order of the tick:
-//   grasp -> loop -> knot -> cut -> (per substep: solver, slip, puncture, pull, tighten) -> [technique] -> closure.
+//   grasp -> loop -> knot -> cut -> settle -> (per substep: solver, slip, puncture, pull, tighten) -> [technique] -> closure.
 // Each stage reads and writes live rows of the solver's state (attachments, channel, anchors, order); none touches a
 // multiplier.
 #pragma once
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "exchange/event.h"
@@ -156,6 +157,9 @@ void tie(const SolverModel& model, SolverState& solver, const SutureModel& sutur
 // locked draws through what is still slack under it.
 void tighten(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
              SutureState& state, std::vector<Event>& events);
+// Takes every throw that is not locked back, whoever pulls on it.
+void take_back_throws(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                      std::vector<Event>& events);
 // Midway between two points of tissue, wherever the tissue carries them.
 TissuePoint midway(const SolverModel& model, const TissuePoint& a, const TissuePoint& b);
 
@@ -168,6 +172,17 @@ void cut(const SolverModel& model, SolverState& solver, const SutureModel& sutur
          const std::array<uint32_t, 2>& pressed, std::vector<Event>& events);
 // A jaw that has just closed on thread also holds the other strands that lie between its tips: the two ends of a stay suture.
 void hold_other_strands(SolverState& solver, const SutureModel& suture, const SutureState& state, uint8_t who);
+
+// --- settle.cpp --------------------------------------------------------------------------------------------------------
+// Once a tick. kButtonNewSuture of either hand: what is tied settles, tails included, its thread's pull goes over to pins; the
+// rest is taken away, and a fresh needle and thread lie on the drape. Bites stay listed. Not while the needle is in the tissue.
+// True: it was done. start: positions of all particles at the start [m].
+bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                std::span<const Vec3> start, const Pose& needle_start, const std::array<uint32_t, 2>& pressed,
+                std::vector<Event>& events);
+// Needle and thread as they lie at the start, and nothing that holds them but the swage.
+void fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, std::span<const Vec3> start,
+                  const Pose& needle_start);
 
 // --- puncture.cpp ------------------------------------------------------------------------------------------------------
 // After every substep: the tip trigger, the attached particle, the back-end trigger (paper 2.2, figures 4 and 5).

@@ -23,15 +23,28 @@ struct Tie : Rig {
 
   explicit Tie(const TieSetup& s = {}, const SceneSpec& scene = weightless(90)) : Rig(fitting(scene, s)), setup(s) {
     wait(0.1f);
-    first = place(0.2f, 0.004f);
-    second = place(0.55f, 0.004f);
-    lock(*this, s.older, first.at);
-    lock(*this, s.newer, second.at);
-    stand(s.above);
-    lay_stitch();
-    lay_strands(s.turns, s.way, s.wrap_tail);
-    update_thread_collisions(model->solver, solver(), model->suture);
+    sew(0.2f);
     show(s.tool, frame, 0.7f);
+  }
+  // Two suture points, from `angle` round the rim on, and both strands led to the tool.
+  void sew(float angle) {
+    first = place(angle, 0.004f);
+    second = place(angle + 0.35f, 0.004f);
+    lock(*this, setup.older, first.at);
+    lock(*this, setup.newer, second.at);
+    stand(setup.above);
+    lay_stitch();
+    lay_strands(setup.turns, setup.way, setup.wrap_tail);
+    update_thread_collisions(model->solver, solver(), model->suture);
+  }
+  // Puts the tool where a new stitch wants it, jaws open: no way is flown.
+  void put_tool() {
+    RigidBody& b = solver().body[setup.tool];
+    b = {};
+    b.x = b.prev_x = frame.p, b.q = b.prev_q = frame.q;
+    state->hand[setup.tool] = frame;
+    suture().loop[setup.tool].spent = 0;
+    input.hand[setup.tool].pose = frame;
   }
   static SceneSpec fitting(SceneSpec scene, const TieSetup& s) {
     scene.thread.particles = static_cast<int>(s.particles);
@@ -147,12 +160,7 @@ struct Tie : Rig {
   void wrap(int way, float turns = 1.25f) {
     open(setup.tool);
     stand(setup.above);
-    RigidBody& b = solver().body[setup.tool];
-    b = {};
-    b.x = b.prev_x = frame.p, b.q = b.prev_q = frame.q;
-    state->hand[setup.tool] = frame;
-    suture().loop[setup.tool].spent = 0;
-    input.hand[setup.tool].pose = frame;
+    put_tool();
     setup.way = way;
     lay_strands(turns, way, setup.wrap_tail);
     tick();
