@@ -34,11 +34,11 @@ enum class EventKind : uint8_t {
   knot_begun,         // who: hand that pulls, which: knot, value: wraps
   knot_locked,        // which: knot, value: tension when it was set [N]
   knot_cancelled,     // which: knot; the free end was let go before it reached the tissue
-  thread_cut,         // who: hand, which: slot toward the free end, value: thread to the nearest suture point or knot [m]
-  suture_taken,       // which: how many were taken before; a fresh needle and thread lie ready
-  stitch_settled,     // which: settled stitch; its thread is no longer simulated (3.4)
-  seam_closed,        // which: row of Snapshot::seam, value: what is left of its gap [m]
-  technique_fault,    // which: bite, knot or suture (see Fault), value: Fault; nothing is repaired
+  thread_cut,    // who: hand, which: slot toward the free end, value: thread to the nearest suture point or knot [m], -1: none
+  suture_taken,  // which: how many were taken before; a fresh needle and thread lie ready
+  stitch_settled,   // which: settled stitch; its thread is no longer simulated (3.4)
+  seam_closed,      // which: row of Snapshot::seam, value: what is left of its gap [m]
+  technique_fault,  // which: bite, knot or suture (see Fault), value: Fault; nothing is repaired
   count_
 };
 

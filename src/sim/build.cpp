@@ -260,6 +260,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   u.capstan = scene.suture.capstan;
   u.collision_off = scene.suture.collision_off;
   u.grasp_reach = scene.suture.grasp_reach;
+  u.least_throws = scene.technique.throws;
 
   m.technique = make_technique(scene, working_rim, wall, where);
 
@@ -314,13 +315,7 @@ StatePtr initial_state(const Model& model) {
     s.solver.weld.push_back(hand);
     s.solver.body_collides[k] = 0;
   }
-  RigidBody& needle = s.solver.body[kNeedle];
-  needle.x = needle.prev_x = model.needle_start.p;
-  needle.q = needle.prev_q = model.needle_start.q;
-  // The thread's last particle is the needle's: swaged on.
-  s.solver.thread.hold.push_back(
-      {s.solver.thread.order.back(), static_cast<int>(kNeedle), model.solver.needle_arc.point(0), HoldKind::swage});
-  update_thread_collisions(model.solver, s.solver, model.suture);
+  fresh_suture(model.solver, s.solver, model.suture, model.start, model.needle_start);
   return state;
 }
 

@@ -15,7 +15,8 @@ void publish_knots(const Model& model, const State& state, Snapshot& out) {
   for (const Knot& k : state.suture.knot) {
     KnotView v;
     v.phase = k.phase;
-    v.position = position_of(k.target, x) + k.offset;
+    v.position = position_of(k.target, x);
+    if (k.phase == KnotPhase::tightening && k.begun == 0) v.position += normalized(k.from) * k.left;
     v.throws = k.throws;
     v.thrown = k.thrown;
     if (state.suture.point.size() > 1)

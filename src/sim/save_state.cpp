@@ -60,8 +60,8 @@ void fields(A& a, ToolLoop& l) {
 }
 template <typename A>
 void fields(A& a, Knot& k) {
-  a(k.phase), a(k.hand), a(k.begun), a(k.target), a(k.from), a(k.offset), a(k.loop[0]), a(k.loop[1]), a(k.hand_from),
-      a(k.strand), a(k.slot[0]), a(k.slot[1]), a(k.slots), a(k.throws);
+  a(k.phase), a(k.hand), a(k.begun), a(k.target), a(k.from), a(k.left), a(k.hand_from), a(k.strand), a(k.end[0]), a(k.end[1]),
+      a(k.slot[0]), a(k.slot[1]), a(k.slots), a(k.snug), a(k.throws), a(k.told);
   for (KnotThrow& t : k.thrown) a(t);
 }
 template <typename A>
@@ -217,11 +217,17 @@ bool fits(const Model& model, const State& s, const State& fresh) {
   for (const ToolLoop& l : u.loop)
     if (l.told >= LoopReason::count_ || (l.wraps > 0 && (l.first - first >= count || l.last - first >= count))) return false;
   for (const Knot& k : u.knot) {
-    if (k.phase > KnotPhase::locked || k.hand > 1 || !point_ok(k.target) || k.throws > k.thrown.size() || k.slots > 2)
+    const bool tightening = k.phase == KnotPhase::tightening;
+    if (k.phase > KnotPhase::locked || k.hand > 1 || !point_ok(k.target) || k.throws > k.thrown.size() || k.throws == 0 ||
+        k.begun + (tightening ? 1 : 0) > k.throws || k.slots > 2 || (k.slots == 0 && (k.begun > 0 || !tightening)))
       return false;
+    const auto anchored = [&](uint32_t slot) {
+      return std::any_of(a.thread.anchor.begin(), a.thread.anchor.end(), [&](const ThreadAnchor& t) { return t.slot == slot; });
+    };
     for (uint32_t i = 0; i < k.slots; ++i)
-      if (k.slot[i] - first >= count) return false;
-    if (k.strand - first >= count || k.loop[0] - first >= count || k.loop[1] - first >= count) return false;
+      if (!anchored(k.slot[i])) return false;
+    if (tightening && (!anchored(k.end[0]) || !anchored(k.end[1]))) return false;
+    if (k.strand - first >= count) return false;
   }
   for (const SettledStitch& stitch : u.settled) {
     for (const SettledNode& n : stitch.node)

@@ -31,17 +31,6 @@ void meet_hands(State& state, const TickInput& input) {
   }
 }
 
-// A button acts when it goes down.
-std::array<uint32_t, 2> newly_pressed(SutureState& state, const TickInput& input) {
-  std::array<uint32_t, 2> pressed;
-  for (size_t k = 0; k < 2; ++k) {
-    const uint32_t now = input.hand[k].connected ? input.hand[k].buttons : 0;
-    pressed[k] = now & ~state.buttons[k];
-    state.buttons[k] = now;
-  }
-  return pressed;
-}
-
 // What the technique may see of the tick.
 TechniqueView look(const Model& model, State& state) {
   const Thread& thread = state.solver.thread;
@@ -78,15 +67,15 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   const SolverModel& solver = model.solver;
   state.event.clear();
   meet_hands(state, input);
+  const std::array<uint32_t, 2> pressed = pressed_buttons(state.suture, input.hand);
   grasp(solver, state.solver, state.scratch, model.suture, state.suture, input.hand, state.event);
   {
     StageTimer timer(times, Stage::loop);
     find_loops(solver, state.solver, model.suture, state.suture, state.event);
-    tie_knots(solver, state.solver, state.scratch, model.suture, state.suture, model.dt, state.event);
+    tie(solver, state.solver, model.suture, state.suture, state.event);
+    cut(solver, state.solver, model.suture, state.suture, pressed, state.event);
+    new_suture(solver, state.solver, model.suture, state.suture, model.start, model.needle_start, pressed, state.event);
   }
-  const std::array<uint32_t, 2> pressed = newly_pressed(state.suture, input);
-  cut(solver, state.solver, model.suture, state.suture, pressed, state.event);
-  take_fresh_suture(solver, state.solver, model.suture, state.suture, {model.start, model.needle_start}, pressed, state.event);
   find_candidates(solver, state.solver, state.scratch, 0.008f, times);
   for (int i = 1; i <= model.substeps; ++i) {
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));
@@ -99,6 +88,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
     {
       StageTimer timer(times, Stage::pull);
       pull(solver, state.solver, model.suture, state.suture, state.event);
+      tighten(solver, state.solver, state.scratch, model.suture, state.suture, state.event);
     }
   }
   {

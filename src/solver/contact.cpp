@@ -27,7 +27,8 @@ struct Segment {
 bool segment_after(const ContactView& v, uint32_t slot, Segment& out) {
   const uint32_t first = v.thread_model->first_slot;
   const int32_t node = v.node_of_slot[slot - first];
-  if (node < 0 || static_cast<size_t>(node) + 1 >= v.thread->order.size()) return false;
+  if (node < 0 || static_cast<size_t>(node) + 1 >= v.thread->order.size() || v.thread->cut[static_cast<size_t>(node)])
+    return false;
   out.s0 = slot;
   out.s1 = v.thread->order[static_cast<size_t>(node) + 1];
   out.w0 = v.locked[out.s0 - first] ? 0 : v.thread_model->inv_mass;

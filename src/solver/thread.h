@@ -39,7 +39,7 @@ struct ThreadAnchor {
   uint32_t slot = 0;
   TissuePoint point;
   Vec3 offset;                  // [m] world, from that point: a knot on its way to the tissue, else zero
-  bool knotted = false;         // a knot's: the thread never slides here
+  bool knotted = false;         // a locked knot's: the thread never slides here
   float friction = 0;           // [N] tension difference beyond which thread slides, at no tension
   float capstan = 0;            // and so much more per newton of tension: coefficient of friction times the angle it bends by
   int slipping = 0;             // +1: toward the needle, -1: toward the free end, 0: stuck

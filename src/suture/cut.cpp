@@ -1,6 +1,5 @@
-// suture/cut: scissors (paper 2.5.3: "Once the knot is tied, the thread is disconnected from the needle"). Reads buttons and
-// where the tools are; marks a pair of the thread as cut, or takes the needle off. A cut at the wrong place is carried out like
-// any other, and told.
+// suture/cut: scissors. Reads buttons and tools; marks the pair that was cut (Thread::cut), or takes the thread off its needle.
+// To loops, knots, pulls and the solver a cut is an end of the thread. What a wrong cut opens stays open.
 #include <algorithm>
 
 #include "suture/suture.h"
@@ -8,80 +7,145 @@
 namespace catgut {
 namespace {
 
-constexpr float kReach = 0.004f;  // [m] how near the thread must be to the jaws
+constexpr float kOtherStrand = 0.015f;  // [m] along the thread: nearer than this it is the same strand
 
-// [m] of thread from pair `pair` to the nearest anchored particle on either side, up to a cut; the whole way when there is
-// none.
-float to_nearest_anchor(const Thread& t, size_t pair, const std::vector<uint8_t>& anchored) {
-  float best = 0;
-  bool found = false;
-  for (const int way : {-1, 1}) {
-    float sum = 0.5f * t.rest[pair];
-    size_t node = way < 0 ? pair : pair + 1;
-    for (;; node = static_cast<size_t>(static_cast<std::ptrdiff_t>(node) + way)) {
-      if (anchored[node]) {
-        if (!found || sum < best) best = sum;
-        found = true;
-        break;
-      }
-      if ((way < 0 && node == 0) || (way > 0 && node + 1 == t.order.size())) break;
-      const size_t next = way < 0 ? node - 1 : node;
-      if (t.cut[next]) break;
-      sum += t.rest[next];
-    }
-  }
-  return best;
+bool is_anchored(const Thread& t, uint32_t slot) {
+  return std::any_of(t.anchor.begin(), t.anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot; });
 }
 
-void cut_at(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint8_t who,
-            std::vector<Event>& events) {
-  Thread& t = solver.thread;
-  const Vec3 at = solver.body[who].x;
-  float best = kReach;
-  size_t found = t.rest.size();
-  for (size_t i = 0; i < t.rest.size(); ++i) {
-    if (t.cut[i]) continue;
-    const Vec3 a = xyz(solver.x[t.order[i]]), b = xyz(solver.x[t.order[i + 1]]);
-    const float l2 = length2(b - a), part = l2 > 0 ? std::clamp(dot(at - a, b - a) / l2, 0.0f, 1.0f) : 0;
-    if (const float d = distance(at, lerp(a, b, part)); d < best) best = d, found = i;
+// Thread [m] from node i to the nearest suture point or knot that way, and its slot; negative: there is none before the end.
+struct Way {
+  float length = -1;
+  uint32_t slot = 0;
+};
+Way to_stitch(const Thread& t, size_t i, int way) {
+  for (float sum = 0;;) {
+    if (is_anchored(t, t.order[i])) return {sum, t.order[i]};
+    if (way > 0 ? i + 1 >= t.order.size() || t.cut[i] : i == 0 || t.cut[i - 1]) return {};
+    sum += t.rest[way > 0 ? i : i - 1];
+    i = way > 0 ? i + 1 : i - 1;
   }
-  const bool swaged = std::any_of(t.hold.begin(), t.hold.end(), [](const ThreadHold& h) { return h.kind == HoldKind::swage; });
-  // A hand that holds the needle has the thread cut off it.
-  if (state.hand[who].held == Held::needle && swaged) found = t.rest.size() - 1;
-  if (found == t.rest.size()) return;
-  std::vector<uint8_t> anchored(t.order.size());
-  size_t first = t.order.size(), last = 0;
-  for (const ThreadAnchor& a : t.anchor) {
-    const size_t node = static_cast<size_t>(std::find(t.order.begin(), t.order.end(), a.slot) - t.order.begin());
-    anchored[node] = 1;
-    first = std::min(first, node);
-    last = std::max(last, node);
-  }
-  const uint32_t slot = t.order[found];
-  if (found + 1 == t.rest.size() && swaged) {
-    // At the swage: the whole thread stays, the needle comes off.
-    std::erase_if(t.hold, [](const ThreadHold& h) { return h.kind == HoldKind::swage; });
-  } else {
-    t.cut[found] = 1;
-    t.tension[found] = 0;
-  }
-  update_thread_collisions(model, solver, suture);
-  events.push_back({0, EventKind::thread_cut, who, slot, to_nearest_anchor(t, found, anchored), at});
-  const auto fault = [&](Fault what) {
-    events.push_back({0, EventKind::technique_fault, who, slot, static_cast<float>(what), at});
-  };
-  const bool tied =
-      std::any_of(state.knot.begin(), state.knot.end(), [](const Knot& k) { return k.phase == KnotPhase::locked; });
-  if (first < last && found >= first && found < last) fault(Fault::cut_in_stitch);
-  else if (!t.anchor.empty() && !tied) fault(Fault::cut_before_knot);
 }
 
 }  // namespace
 
+std::array<uint32_t, 2> pressed_buttons(SutureState& state, const std::array<ToolInput, 2>& hand) {
+  std::array<uint32_t, 2> pressed{};
+  for (size_t who = 0; who < 2; ++who) {
+    const uint32_t now = hand[who].connected ? hand[who].buttons : 0;
+    pressed[who] = now & ~state.buttons[who];
+    state.buttons[who] = now;
+  }
+  return pressed;
+}
+
 void cut(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
          const std::array<uint32_t, 2>& pressed, std::vector<Event>& events) {
-  for (uint8_t who = 0; who < 2; ++who)
-    if (pressed[who] & kButtonCut) cut_at(model, solver, suture, state, who, events);
+  Thread& t = solver.thread;
+  for (uint8_t who = 0; who < 2; ++who) {
+    if (!(pressed[who] & kButtonCut)) continue;
+    const Vec3 at = solver.body[who].x;
+    float best = suture.cut_reach, along = 0;
+    size_t i = t.order.size();
+    for (size_t k = 0; k + 1 < t.order.size(); ++k) {
+      if (t.cut[k]) continue;
+      const Vec3 a = xyz(solver.x[t.order[k]]), b = xyz(solver.x[t.order[k + 1]]), d = b - a;
+      const float s = std::clamp(dot(at - a, d) / std::max(length2(d), 1e-16f), 0.0f, 1.0f), far = distance(a + d * s, at);
+      if (far < best) best = far, along = s, i = k;
+    }
+    // A hand that holds the needle has the thread cut off it, wherever on the arc it holds.
+    if (state.hand[who].held == Held::needle && !t.cut.back()) i = t.order.size() - 2, along = 1;
+    if (i == t.order.size()) continue;
+
+    const Way free = to_stitch(t, i, -1), needle = to_stitch(t, i + 1, 1);
+    const float to_free = free.length + along * t.rest[i], to_needle = needle.length + (1 - along) * t.rest[i];
+    const bool stitch_free = free.length >= 0, stitch_needle = needle.length >= 0;
+    const bool nearer_free = stitch_free && (!stitch_needle || to_free <= to_needle);
+    const uint32_t slot = t.order[i];
+    const float left = nearer_free ? to_free : stitch_needle ? to_needle : -1;
+    const Vec3 where = lerp(xyz(solver.x[slot]), xyz(solver.x[t.order[i + 1]]), along);
+
+    const auto swage =
+        std::find_if(t.hold.begin(), t.hold.end(), [](const ThreadHold& h) { return h.kind == HoldKind::swage; });
+    if (swage != t.hold.end() && i + 2 == t.order.size()) {
+      t.hold.erase(swage);
+    } else {
+      t.cut[i] = 1;
+      t.tension[i] = 0;
+      // Turns that are cut through hold nothing.
+      for (uint8_t tool = 0; tool < 2; ++tool) {
+        const auto turns = [&](uint32_t s) {
+          return std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) {
+            return h.slot == s && h.body == static_cast<int>(tool) && h.kind == HoldKind::loop;
+          });
+        };
+        if (!turns(slot) || !turns(t.order[i + 1])) continue;
+        take_off_loop(model, solver, suture, state, tool);
+        events.push_back({0, EventKind::loop_released, tool, 0, 0, where});
+      }
+    }
+    update_thread_collisions(model, solver, suture);
+    events.push_back({0, EventKind::thread_cut, who, slot, left, where});
+
+    const auto fault = [&](uint32_t which, Fault f) {
+      events.push_back({0, EventKind::technique_fault, who, which, static_cast<float>(f), where});
+    };
+    if (stitch_free && stitch_needle) {
+      fault(slot, Fault::cut_in_stitch);
+      continue;
+    }
+    const bool tied = std::any_of(state.knot.begin(), state.knot.end(), [](const Knot& k) { return k.slots > 0; });
+    if (!tied) {
+      fault(slot, Fault::cut_before_knot);
+      continue;
+    }
+    // The end of a knot is cut: it will get no more throws.
+    const uint32_t root = nearer_free ? free.slot : needle.slot;
+    for (uint32_t k = 0; k < state.knot.size(); ++k) {
+      Knot& knot = state.knot[k];
+      const bool its_own = std::find(knot.slot.begin(), knot.slot.begin() + knot.slots, root) != knot.slot.begin() + knot.slots;
+      if (left < 0 || !its_own || knot.told || knot.throws >= static_cast<uint32_t>(suture.least_throws)) continue;
+      knot.told = 1;
+      fault(k, Fault::too_few_throws);
+    }
+  }
+}
+
+void hold_other_strands(SolverState& solver, const SutureModel& suture, const SutureState& state, uint8_t who) {
+  // Jaws with a loop round them draw one end through it; the loop's own strands lie near and are not meant.
+  if (state.loop[who].wraps > 0) return;
+  Thread& t = solver.thread;
+  const RigidBody& tool = solver.body[who];
+  // Thread from a particle of the order to the nearest one that these jaws hold, or more than kOtherStrand.
+  const auto is_other = [&](size_t i) {
+    for (const int way : {1, -1}) {
+      float sum = 0;
+      for (size_t k = i; sum < kOtherStrand;) {
+        if (std::any_of(t.hold.begin(), t.hold.end(),
+                        [&](const ThreadHold& h) { return h.body == static_cast<int>(who) && h.slot == t.order[k]; }))
+          return false;
+        if (way > 0 ? k + 1 >= t.order.size() || t.cut[k] : k == 0 || t.cut[k - 1]) break;
+        sum += t.rest[way > 0 ? k : k - 1];
+        k = way > 0 ? k + 1 : k - 1;
+      }
+    }
+    return true;
+  };
+  for (;;) {
+    float best = suture.grasp_reach;
+    size_t found = t.order.size();
+    for (size_t i = 0; i < t.order.size(); ++i) {
+      const uint32_t slot = t.order[i];
+      const float d = distance(xyz(solver.x[slot]), tool.x);
+      if (d >= best || is_anchored(t, slot) ||
+          std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) { return h.slot == slot; }) || !is_other(i))
+        continue;
+      best = d, found = i;
+    }
+    if (found == t.order.size()) return;
+    const uint32_t slot = t.order[found];
+    t.hold.push_back({slot, who, to_local(tool.pose(), xyz(solver.x[slot])), HoldKind::jaw});
+  }
 }
 
 }  // namespace catgut

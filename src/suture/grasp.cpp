@@ -52,26 +52,6 @@ void take_tissue(const SolverModel& model, SolverState& solver, const SolverScra
   events.push_back({0, EventKind::tissue_grasped, who, hand.slot, 0, hit.point});
 }
 
-// Jaws hold every strand that lies between them: of each further stretch of thread within reach, its nearest particle.
-void take_other_strands(SolverState& solver, const SutureModel& suture, uint8_t who) {
-  Thread& t = solver.thread;
-  const RigidBody& tool = solver.body[who];
-  constexpr size_t kApart = 6;  // particles along the thread: another strand, not the neighbours of the first
-  const size_t first = static_cast<size_t>(std::find(t.order.begin(), t.order.end(), t.hold.back().slot) - t.order.begin());
-  float best = suture.strand_reach;
-  size_t found = t.order.size();
-  for (size_t i = 0; i < t.order.size(); ++i) {
-    if ((i > first ? i - first : first - i) < kApart) continue;
-    const uint32_t slot = t.order[i];
-    const float d = distance(xyz(solver.x[slot]), tool.x);
-    const bool taken = std::any_of(t.anchor.begin(), t.anchor.end(), [&](auto& a) { return a.slot == slot; }) ||
-                       std::any_of(t.hold.begin(), t.hold.end(), [&](auto& h) { return h.slot == slot; });
-    if (!taken && d < best) best = d, found = i;
-  }
-  if (found < t.order.size())
-    t.hold.push_back({t.order[found], who, to_local(tool.pose(), xyz(solver.x[t.order[found]])), HoldKind::jaw});
-}
-
 }  // namespace
 
 void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
@@ -119,7 +99,7 @@ void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& s
       hand.held = Held::thread;
       hand.slot = static_cast<uint32_t>(found);
       solver.thread.hold.push_back({hand.slot, who, to_local(tool.pose(), xyz(solver.x[hand.slot])), HoldKind::jaw});
-      take_other_strands(solver, suture, who);
+      hold_other_strands(solver, suture, state, who);
       update_thread_collisions(model, solver, suture);
       events.push_back({0, EventKind::thread_grasped, who, hand.slot, 0, tool.x});
     } else {

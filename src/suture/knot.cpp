@@ -1,241 +1,385 @@
-// suture/knot: knots (paper 2.4). A tool with a loop of thread round it takes the other strand: the loop leaves the tool and
-// its two ends are held by the knot. As the tool moves away the knot travels to the tissue; there it locks, lets go of the
-// loop's ends and holds a particle of both strands instead, at one point of the tissue, where nothing slides any more. Letting
-// go of the strand before that undoes the throw. Further throws travel to the knot that is there.
+// suture/knot: a loop becomes a throw, the throw goes down to the tissue and locks there (paper 2.4). Reads loops, hands and
+// the thread's order; writes knots, their anchors and, once a knot is locked, what was slack under it.
+//
+// A tool with a loop round it takes thread beyond the loop: the other end of the stitch, as a rule, which is thereby drawn
+// through the loop. From then on the loop is a throw: it leaves the tool and hangs on the two ends of its own thread between
+// tool and tissue. The further the tool goes away, the nearer it comes. Until it is there it can be taken back by letting go.
 #include <algorithm>
+#include <cmath>
 
 #include "suture/suture.h"
 
 namespace catgut {
 namespace {
 
-constexpr float kFastest = 0.25f;   // [m/s] of the travelling knot
-constexpr float kArrived = 1e-4f;   // [m]
-constexpr float kTaut = 0.3f;       // [N]
-constexpr float kShortest = 5e-4f;  // [m] of thread between a hole and its knot
+constexpr float kDrawSpeed = 0.25f;  // [m/s] thread drawn through a locked knot, and particles drawn into it
+constexpr float kSnug = 0.00005f;    // [m] of slack that a snug stitch keeps
+constexpr int kNone = -1;
 
 size_t node_of(const Thread& t, uint32_t slot) {
   return static_cast<size_t>(std::find(t.order.begin(), t.order.end(), slot) - t.order.begin());
 }
-bool is_locked(const Thread& t, uint32_t slot) {
-  return std::any_of(t.anchor.begin(), t.anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot; }) ||
-         std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) { return h.slot == slot; });
+int anchor_of(const Thread& t, uint32_t slot) {
+  for (size_t k = 0; k < t.anchor.size(); ++k)
+    if (t.anchor[k].slot == slot) return static_cast<int>(k);
+  return kNone;
+}
+bool is_suture_point(const SutureState& state, int anchor) {
+  return std::any_of(state.point.begin(), state.point.end(),
+                     [&](const SuturePoint& p) { return p.anchor == static_cast<uint32_t>(anchor); });
 }
 
-// [N] of the tighter of the two pairs at a particle.
-float tension_at(const Thread& t, uint32_t slot) {
-  const size_t node = node_of(t, slot);
+// The next anchor from node i along the thread: toward the needle (way +1) or the free end. An end of the thread, cut or not,
+// is the end. Loops on their way are none: they are thread. `points`: suture points only, not the particles of knots.
+int next_anchor(const Thread& t, const SutureState& state, size_t i, int way, bool points) {
+  while (way > 0 ? i + 1 < t.order.size() && !t.cut[i] : i > 0 && !t.cut[i - 1]) {
+    i = way > 0 ? i + 1 : i - 1;
+    const int k = anchor_of(t, t.order[i]);
+    if (k != kNone && (is_suture_point(state, k) || (!points && t.anchor[static_cast<size_t>(k)].knotted))) return k;
+  }
+  return kNone;
+}
+
+// Where on its thread a place is: on the strand that leads to the free end, on the one that leads to the needle, on a bight
+// between two points of tissue, or on a piece that is tied to nothing.
+enum class Strand { free_end, needle, bight, loose };
+struct Ends {
+  Strand strand = Strand::loose;
+  int inward = kNone;  // anchor of the stitch or the knot that it comes out of
+};
+Ends ends_of(const Thread& t, const SutureState& state, size_t first, size_t last) {
+  const int down = next_anchor(t, state, first, -1, false), up = next_anchor(t, state, last, 1, false);
+  if (down != kNone && up != kNone) return {Strand::bight, down};
+  if (down != kNone) return {Strand::needle, down};
+  if (up != kNone) return {Strand::free_end, up};
+  return {};
+}
+
+// The suture point nearest along the thread to a strand that comes out of anchor k, that anchor included.
+int nearest_point(const Thread& t, const SutureState& state, int k, Strand strand) {
+  if (k == kNone || is_suture_point(state, k)) return k;
+  return next_anchor(t, state, node_of(t, t.anchor[static_cast<size_t>(k)].slot), strand == Strand::free_end ? 1 : -1, true);
+}
+
+// Rest length [m] between nodes a and b.
+float thread_between(const Thread& t, size_t a, size_t b) {
+  float sum = 0;
+  for (size_t i = std::min(a, b); i < std::max(a, b); ++i) sum += t.rest[i];
+  return sum;
+}
+
+float strand_tension(const Thread& t, uint32_t slot) {
+  const size_t i = node_of(t, slot);
   float most = 0;
-  if (node > 0) most = std::max(most, t.tension[node - 1]);
-  if (node < t.tension.size()) most = std::max(most, t.tension[node]);
+  if (i > 0) most = std::max(most, t.tension[i - 1]);
+  if (i < t.tension.size()) most = std::max(most, t.tension[i]);
   return most;
 }
 
-// The middle between two points of tissue, as one point: eight particles of each, so that it still follows both exactly in
-// every affine motion.
-TissuePoint middle(const SolverModel& model, const TissuePoint& a, const TissuePoint& b) {
+bool pulls(const SutureState& state, const Knot& knot) {
+  const HandState& hand = state.hand[knot.hand];
+  return hand.held == Held::thread && hand.slot == knot.strand;
+}
+// Whether the throw in hand still hangs on one thread: its loop, and the strand that was taken, with the stitch.
+bool is_whole(const Thread& t, const SutureState& state, const Knot& knot) {
+  const size_t first = node_of(t, knot.end[0]), last = node_of(t, knot.end[1]), held = node_of(t, knot.strand);
+  return first < last &&
+         std::none_of(t.cut.begin() + static_cast<long>(first), t.cut.begin() + static_cast<long>(last),
+                      [](uint8_t cut) { return cut != 0; }) &&
+         ends_of(t, state, first, last).strand != Strand::loose && ends_of(t, state, held, held).strand != Strand::loose;
+}
+
+void release_end(SolverState& solver, SutureState& state, uint32_t slot) {
+  const int k = anchor_of(solver.thread, slot);
+  if (k != kNone) erase_anchor(solver, state, static_cast<uint32_t>(k));
+}
+
+// "If the user decides they do not want to proceed ... they can release the free end of the thread. After letting go, the loop
+// will be released, and the knot object will be destroyed." Nothing but positions tells that there was a throw.
+void cancel(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t which,
+            std::vector<Event>& events) {
+  Knot& knot = state.knot[which];
+  const Vec3 where = position_of(knot.target, solver.x.data()) + normalized(knot.from) * knot.left;
+  events.push_back({0, EventKind::knot_cancelled, static_cast<uint8_t>(knot.hand), which, 0, where});
+  for (uint32_t slot : knot.end) release_end(solver, state, slot);
+  if (knot.begun == 0) {
+    state.knot.erase(state.knot.begin() + which);
+  } else {
+    knot.thrown[knot.throws - 1] = {};
+    knot.throws = knot.begun;
+    knot.phase = KnotPhase::locked;
+  }
+  update_thread_collisions(model, solver, suture);
+}
+
+// The locked knot that a further throw belongs to: the one out of which both strands come, or out of which the wrapped one
+// comes when it is thrown round a bight or round itself.
+int knot_under(const Thread& t, const SutureState& state, const Ends& loop, const Ends& taken, bool one_strand) {
+  const auto holds = [&](const Knot& k, int anchor) {
+    if (anchor == kNone) return false;
+    const uint32_t slot = t.anchor[static_cast<size_t>(anchor)].slot;
+    return std::find(k.slot.begin(), k.slot.begin() + k.slots, slot) != k.slot.begin() + k.slots;
+  };
+  for (size_t i = state.knot.size(); i-- > 0;) {
+    const Knot& k = state.knot[i];
+    if (k.phase == KnotPhase::locked && holds(k, loop.inward) && (one_strand || holds(k, taken.inward)))
+      return static_cast<int>(i);
+  }
+  return kNone;
+}
+
+// Where a first throw goes. "The knot object moves towards the suture point. ... If more than one suture point has been
+// created, the knot object will move toward the midpoint of the last two created suture points." The paper's stitch is one such
+// pair; ours may have many points before it is tied (a purse-string), and what is tied together then is its two ends: the
+// suture point nearest to the strand that was taken and the one nearest to the loop. For a stitch of two points both are the
+// same. Where a running suture is tied to itself (the end of a Connell: the taken strand is a bight, or the needle's own) there
+// is no other end, and the paper's rule holds as it stands.
+TissuePoint where_to(const SolverModel& model, const Thread& t, const SutureState& state, const Ends& loop, const Ends& taken,
+                     bool one_strand) {
+  const auto point = [&](int anchor) -> const TissuePoint& { return t.anchor[static_cast<size_t>(anchor)].point; };
+  const size_t points = state.point.size();
+  if (one_strand) {
+    const int last = static_cast<int>(state.point[points - 1].anchor);
+    return points == 1 ? point(last) : midway(model, point(static_cast<int>(state.point[points - 2].anchor)), point(last));
+  }
+  const int a = nearest_point(t, state, taken.inward, taken.strand), b = nearest_point(t, state, loop.inward, loop.strand);
+  if (a == kNone || b == kNone) return point(a == kNone ? (b == kNone ? loop.inward : b) : a);
+  return a == b ? point(a) : midway(model, point(a), point(b));
+}
+
+// "Knots can be created when at least one valid loop and suture point are detected. If the tool that has the loop around it
+// grabs the free end of the rope passed the loop, a 3D object that represents the knot is created. The loop's ends are attached
+// to the object, and the whole loop detaches from the tool."
+void begin(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint8_t who,
+           std::vector<Event>& events) {
+  Thread& t = solver.thread;
+  const Vec4* x = solver.x.data();
+  const ToolLoop loop = state.loop[who];
+  const uint32_t strand = state.hand[who].slot;
+  const RigidBody& tool = solver.body[who];
+  const size_t first = node_of(t, loop.first), last = node_of(t, loop.last), held = node_of(t, strand);
+  const Ends wrapped = ends_of(t, state, first, last), taken = ends_of(t, state, held, held);
+  // Two strands are tied to each other if one leads to the free end and the other to the needle.
+  const bool one_strand = wrapped.strand == taken.strand || wrapped.strand == Strand::bight || taken.strand == Strand::bight;
+  const int under = knot_under(t, state, wrapped, taken, one_strand);
+  const auto fault = [&](uint32_t which, Fault f) {
+    events.push_back({0, EventKind::technique_fault, who, which, static_cast<float>(f), tool.x});
+  };
+  const bool full = under != kNone && state.knot[static_cast<size_t>(under)].throws == KnotView::kMostThrows;
+  if (state.point.empty() || wrapped.strand == Strand::loose || taken.strand == Strand::loose || full) {
+    if (!full) fault(static_cast<uint32_t>(state.knot.size()), Fault::knot_without_bite);
+    take_off_loop(model, solver, suture, state, who);
+    events.push_back({0, EventKind::loop_released, who, 0, 0, tool.x});
+    return;
+  }
+  if (!state.open.empty()) fault(state.open.back().bite, Fault::needle_in_tissue);
+
+  uint32_t which = static_cast<uint32_t>(under);
+  if (under == kNone) {
+    which = static_cast<uint32_t>(state.knot.size());
+    state.knot.emplace_back();
+    state.knot[which].target = where_to(model, t, state, wrapped, taken, one_strand);
+  }
+  Knot& knot = state.knot[which];
+  Vec3 place{};
+  for (size_t i = first; i <= last; ++i) place += xyz(x[t.order[i]]) / static_cast<float>(last - first + 1);
+  const Vec3 target = position_of(knot.target, x);
+  knot.phase = KnotPhase::tightening;
+  knot.hand = who;
+  knot.begun = knot.throws++;
+  knot.from = place - target;
+  knot.left = length(knot.from);
+  knot.hand_from = tool.x;
+  knot.strand = strand;
+  knot.end = {loop.first, loop.last};
+  KnotThrow& made = knot.thrown[knot.throws - 1];
+  made = {};
+  made.wraps = loop.wraps;
+  made.handed = loop.handed;
+  made.needle_end = wrapped.strand == Strand::free_end ? 0 : 1;
+  take_off_loop(model, solver, suture, state, who);
+  for (uint32_t slot : knot.end) {
+    ThreadAnchor a;
+    a.slot = slot;
+    a.point = knot.target;
+    a.offset = xyz(x[slot]) - target;
+    a.friction = suture.pass_tension;
+    a.capstan = suture.capstan;
+    t.anchor.push_back(a);
+  }
+  update_thread_collisions(model, solver, suture);
+  events.push_back({0, EventKind::knot_begun, who, which, static_cast<float>(made.wraps), place});
+}
+
+// The particle of the taken strand that the knot will hold: of those between the stitch and the jaw, the one nearest to it.
+// -1: there is none.
+int64_t particle_for(const SolverState& solver, const SutureState& state, const Knot& knot) {
+  const Thread& t = solver.thread;
+  const size_t held = node_of(t, knot.strand);
+  const Ends taken = ends_of(t, state, held, held);
+  if (taken.strand == Strand::bight || taken.strand == Strand::loose) return -1;
+  const size_t from = node_of(t, t.anchor[static_cast<size_t>(taken.inward)].slot);
+  const Vec3 target = position_of(knot.target, solver.x.data());
+  int64_t found = -1;
+  float best = 1e30f;
+  for (size_t i = std::min(from, held) + 1; i < std::max(from, held); ++i) {
+    const uint32_t slot = t.order[i];
+    if (anchor_of(t, slot) != kNone ||
+        std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) { return h.slot == slot; }))
+      continue;
+    const float d = distance(xyz(solver.x[slot]), target);
+    if (d < best) best = d, found = slot;
+  }
+  return found;
+}
+
+// "When the knot object reaches the suture point or midpoint between the two previous suture points, it is locked in place, and
+// the attached particles are released." From here on the knot holds the stitch: a particle of the wrapped strand, which is the
+// loop's inner end, and one of the taken strand.
+void lock(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
+          SutureState& state, uint32_t which, std::vector<Event>& events) {
+  Thread& t = solver.thread;
+  Knot& knot = state.knot[which];
+  KnotThrow& made = knot.thrown[knot.throws - 1];
+  const Vec3 where = position_of(knot.target, solver.x.data());
+  made.tension = strand_tension(t, knot.strand);
+  if (knot.slots == 0) {
+    const size_t first = node_of(t, knot.end[0]), last = node_of(t, knot.end[1]), held = node_of(t, knot.strand);
+    const Ends wrapped = ends_of(t, state, first, last), taken = ends_of(t, state, held, held);
+    const bool free_end_wrapped = wrapped.strand == Strand::free_end;
+    const bool two = (free_end_wrapped && taken.strand == Strand::needle) ||
+                     (wrapped.strand == Strand::needle && taken.strand == Strand::free_end);
+    const int64_t other = two ? particle_for(solver, state, knot) : -1;
+    const uint32_t inner = knot.end[free_end_wrapped ? 1 : 0];
+    release_end(solver, state, knot.end[free_end_wrapped ? 0 : 1]);
+    const int k = anchor_of(t, inner);
+    if (k != kNone) {
+      t.anchor[static_cast<size_t>(k)].offset = {};
+      t.anchor[static_cast<size_t>(k)].knotted = true;
+    }
+    knot.slot[0] = inner;
+    knot.slots = 1;
+    if (other >= 0) {
+      ThreadAnchor a;
+      a.slot = static_cast<uint32_t>(other);
+      a.point = knot.target;
+      a.offset = xyz(solver.x[a.slot]) - where;
+      a.knotted = true;
+      t.anchor.push_back(a);
+      knot.slot = free_end_wrapped ? std::array{inner, a.slot} : std::array{a.slot, inner};
+      knot.slots = 2;
+    }
+    knot.snug = 0;
+    SurfaceHit hit;
+    constexpr float kFar = 0.008f;
+    made.gap =
+        nearest_surface(model, scratch.candidates, solver.x.data(), where, kFar, hit) ? std::max(0.0f, hit.distance) : kFar;
+  } else {
+    for (uint32_t slot : knot.end) release_end(solver, state, slot);
+    made.gap = knot.left;
+  }
+  knot.phase = KnotPhase::locked;
+  update_thread_collisions(model, solver, suture);
+  events.push_back({0, EventKind::knot_locked, static_cast<uint8_t>(knot.hand), which, made.tension, where});
+}
+
+// A knot that has just been locked draws its two strands in: what is slack between the stitch and it goes to the outer side, as
+// if the hands drew on both ends, and no faster than they could.
+void draw_snug(const SolverModel& model, SolverState& solver, const SutureModel& suture, const SutureState& state, Knot& knot) {
+  Thread& t = solver.thread;
+  const Vec4* x = solver.x.data();
+  const float step = kDrawSpeed * model.h;
+  bool busy = false, passed = false;
+  for (uint32_t i = 0; i < knot.slots; ++i) {
+    const int k = anchor_of(t, knot.slot[i]);
+    if (k == kNone) continue;
+    ThreadAnchor& a = t.anchor[static_cast<size_t>(k)];
+    const float off = length(a.offset);
+    a.offset = off > step ? a.offset * (1 - step / off) : Vec3{};
+    busy = busy || off > step;
+    // Inward is where the stitch is: for the needle's particle toward the free end, for the free end's toward the needle.
+    const size_t node = node_of(t, a.slot);
+    int way = knot.slots == 2 && i == 0 ? 1 : -1;
+    if (knot.slots == 1 && next_anchor(t, state, node, -1, true) == kNone) way = 1;
+    const int stitch = next_anchor(t, state, node, way, false);
+    if (stitch == kNone) continue;
+    const ThreadAnchor& s = t.anchor[static_cast<size_t>(stitch)];
+    const float slack = thread_between(t, node, node_of(t, s.slot)) - distance(position_of(a, x), position_of(s, x));
+    if (std::abs(slack) <= kSnug) continue;
+    const std::vector<uint32_t>& order = t.order;
+    const uint32_t beside = order[node - 1];
+    if (draw_through(model, solver, a.slot, slack > 0 ? -way : way, std::min(std::abs(slack), step)) > 0) busy = true;
+    passed = passed || order[node - 1] != beside;
+  }
+  if (!busy) knot.snug = 1;
+  if (passed || !busy) update_thread_collisions(model, solver, suture);
+}
+
+}  // namespace
+
+TissuePoint midway(const SolverModel& model, const TissuePoint& a, const TissuePoint& b) {
+  // A point of tissue has room for so many particles; each of the two keeps the half of them that are nearest to it, with
+  // weights that put it where it was.
+  constexpr uint32_t kHalf = TissuePoint::kMost / 2;
   const Vec4* rest = model.shape.rest.data();
   TissuePoint m;
   for (const TissuePoint* p : {&a, &b}) {
-    const Vec3 at = position_of(*p, rest);
-    std::array<uint32_t, TissuePoint::kMost> near = p->particle;
-    const auto last = near.begin() + static_cast<long>(p->count);
-    std::sort(near.begin(), last, [&](uint32_t i, uint32_t k) {
-      const float di = length2(xyz(rest[i]) - at), dk = length2(xyz(rest[k]) - at);
-      return di != dk ? di < dk : i < k;
-    });
-    const TissuePoint half = spread_point({near.data(), std::min(p->count, TissuePoint::kMost / 2)}, rest, at);
-    for (uint32_t k = 0; k < half.count; ++k) {
-      m.particle[m.count] = half.particle[k];
-      m.weight[m.count++] = 0.5f * half.weight[k];
+    TissuePoint part = *p;
+    if (part.count > kHalf) {
+      const Vec3 at = position_of(*p, rest);
+      std::sort(part.particle.begin(), part.particle.begin() + part.count, [&](uint32_t i, uint32_t j) {
+        const float di = length2(xyz(rest[i]) - at), dj = length2(xyz(rest[j]) - at);
+        return di != dj ? di < dj : i < j;
+      });
+      part = spread_point({part.particle.data(), kHalf}, rest, at);
+    }
+    for (uint32_t k = 0; k < part.count; ++k) {
+      uint32_t row = 0;
+      while (row < m.count && m.particle[row] != part.particle[k]) ++row;
+      if (row == m.count) m.particle[m.count++] = part.particle[k];
+      m.weight[row] += 0.5f * part.weight[k];
     }
   }
   return m;
 }
 
-// Takes away the anchors by which the throw in hand travels: those of the knot's loop ends.
-void drop_loop_ends(SolverState& solver, SutureState& state, const Knot& k) {
-  for (const uint32_t slot : k.loop)
-    for (size_t i = solver.thread.anchor.size(); i-- > 0;)
-      if (solver.thread.anchor[i].knotted && solver.thread.anchor[i].slot == slot)
-        erase_anchor(solver, state, static_cast<uint32_t>(i));
+void take_back_throws(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                      std::vector<Event>& events) {
+  for (size_t i = state.knot.size(); i-- > 0;)
+    if (state.knot[i].phase == KnotPhase::tightening) cancel(model, solver, suture, state, static_cast<uint32_t>(i), events);
 }
 
-// The suture point's node nearest along the order to `node`; state.point is not empty.
-const SuturePoint& nearest_point(const SolverState& solver, const SutureState& state, size_t node) {
-  const SuturePoint* best = nullptr;
-  size_t least = ~size_t{0};
-  for (const SuturePoint& p : state.point) {
-    const size_t at = node_of(solver.thread, solver.thread.anchor[p.anchor].slot), away = at > node ? at - node : node - at;
-    if (away < least) least = away, best = &p;
-  }
-  return *best;
-}
-
-void begin(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint8_t who,
-           std::vector<Event>& events) {
-  const Thread& t = solver.thread;
-  const ToolLoop loop = state.loop[who];
-  const uint32_t strand = state.hand[who].slot;
-  const size_t first = node_of(t, loop.first), last = node_of(t, loop.last), held = node_of(t, strand);
-  if (held >= first && held <= last) return;  // a jaw on the loop itself ties nothing
-  const Vec3 tool = solver.body[who].x;
-  Vec3 at{};
-  for (size_t i = first; i <= last; ++i) at += xyz(solver.x[t.order[i]]) / static_cast<float>(last - first + 1);
-  take_off_loop(model, solver, suture, state, who);
-  if (state.point.empty()) {
-    events.push_back({0, EventKind::technique_fault, who, static_cast<uint32_t>(state.knot.size()),
-                      static_cast<float>(Fault::knot_without_bite), at});
-    return;
-  }
-  // A throw adds to the knot that is there when no suture point lies between them along the thread.
-  const SuturePoint& by_loop = nearest_point(solver, state, first);
-  const size_t hole = node_of(t, t.anchor[by_loop.anchor].slot);
-  Knot* knot = nullptr;
-  for (Knot& k : state.knot)
-    for (uint32_t i = 0; i < k.slots; ++i) {
-      const size_t node = node_of(t, k.slot[i]);
-      if ((node > hole) == (first > hole) && node != hole) knot = &k;
-    }
-  if (!knot) {
-    Knot fresh;
-    const SuturePoint& by_strand = nearest_point(solver, state, held);
-    // "If more than one suture point has been created, the knot object will move toward the midpoint of the last two": of the
-    // two ends of its stitch. With the paper's one point a bite these are the last two; a bite of ours makes two.
-    const SuturePoint& other =
-        held > hole && first > hole && state.point.size() > 1 ? state.point[state.point.size() - 2] : by_strand;
-    const TissuePoint &a = t.anchor[by_loop.anchor].point, &b = t.anchor[other.anchor].point;
-    fresh.target = &by_loop == &other ? a : middle(model, a, b);
-    state.knot.push_back(fresh);
-    knot = &state.knot.back();
-  }
-  knot->phase = KnotPhase::tightening;
-  knot->begun = knot->throws;
-  knot->hand = who;
-  knot->strand = strand;
-  knot->loop = {loop.first, loop.last};
-  knot->from = at - position_of(knot->target, solver.x.data());
-  knot->offset = knot->from;
-  knot->hand_from = tool;
-  knot->throws = std::min<uint32_t>(knot->throws + 1, KnotView::kMostThrows);
-  KnotThrow& thrown = knot->thrown[knot->throws - 1];
-  thrown = {};
-  thrown.wraps = loop.wraps;
-  thrown.handed = loop.handed;
-  thrown.needle_end = first > hole;
-  for (const uint32_t slot : knot->loop) {
-    ThreadAnchor a;
-    a.slot = slot;
-    a.point = knot->target;
-    a.offset = knot->offset;
-    a.knotted = true;
-    solver.thread.anchor.push_back(a);
-  }
-  update_thread_collisions(model, solver, suture);
-  events.push_back(
-      {0, EventKind::knot_begun, who, static_cast<uint32_t>(knot - state.knot.data()), static_cast<float>(loop.wraps), at});
-}
-
-void cancel(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, size_t which,
-            std::vector<Event>& events) {
-  const Knot k = state.knot[which];
-  drop_loop_ends(solver, state, k);
-  if (k.begun == 0) {
-    state.knot.erase(state.knot.begin() + static_cast<long>(which));
-  } else {
-    state.knot[which].phase = KnotPhase::locked;
-    state.knot[which].thrown[k.begun] = {};
-    state.knot[which].throws = k.begun;
-  }
-  update_thread_collisions(model, solver, suture);
-  events.push_back({0, EventKind::knot_cancelled, static_cast<uint8_t>(k.hand), static_cast<uint32_t>(which), 0,
-                    position_of(k.target, solver.x.data()) + k.offset});
-}
-
-// Ties the strand that leaves the tissue at node `hole` in direction `way` (+1 toward the needle) to the knot at `at`: the
-// first free particle that reaches it comes to stand there, and what thread there is too much between hole and knot is drawn
-// out. False: the strand ends before it could.
-bool tie_strand(SolverState& solver, Knot& k, size_t hole, int way, Vec3 at) {
-  Thread& t = solver.thread;
-  const Vec3 from = xyz(solver.x[t.order[hole]]);
-  const float wanted = std::max(kShortest, distance(from, at));
-  auto pair_of = [&](size_t node) { return way > 0 ? node : node - 1; };  // the pair from `node` outward
-  size_t node = hole;
-  float length = 0;
-  while (true) {
-    if ((way > 0 && node + 2 >= t.order.size()) || (way < 0 && node < 2) || t.cut[pair_of(node)]) return false;
-    length += t.rest[pair_of(node)];
-    node = way > 0 ? node + 1 : node - 1;
-    if (is_locked(t, t.order[node])) return false;
-    if (length >= wanted) break;
-  }
-  const size_t inner = pair_of(way > 0 ? node - 1 : node + 1), outer = pair_of(node);
-  const float excess = std::min(length - wanted, t.rest[inner] - 0.1f * kShortest);
-  t.rest[inner] -= excess;
-  t.rest[outer] += excess;
-  ThreadAnchor a;
-  a.slot = t.order[node];
-  a.point = k.target;
-  a.knotted = true;
-  set(solver.x[a.slot], at);
-  solver.v[a.slot] = {};
-  t.anchor.push_back(a);
-  k.slot[k.slots++] = a.slot;
-  return true;
-}
-
-void lock(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-          const SolverScratch& scratch, size_t which, std::vector<Event>& events) {
-  Knot& k = state.knot[which];
-  Thread& t = solver.thread;
-  const size_t strand = node_of(t, k.strand), wound = node_of(t, k.loop[0]);
-  drop_loop_ends(solver, state, k);
-  const Vec3 at = position_of(k.target, solver.x.data());
-  if (k.begun == 0) {
-    size_t lo = t.order.size(), hi = 0;
-    for (const SuturePoint& p : state.point) {
-      const size_t node = node_of(t, t.anchor[p.anchor].slot);
-      lo = std::min(lo, node);
-      hi = std::max(hi, node);
-    }
-    if (strand < lo || wound < lo) tie_strand(solver, k, lo, -1, at);
-    if (strand > hi || wound > hi) tie_strand(solver, k, hi, 1, at);
-  }
-  KnotThrow& thrown = k.thrown[k.throws - 1];
-  thrown.tension = tension_at(t, k.strand);
-  SurfaceHit hit;
-  thrown.gap =
-      nearest_surface(model, scratch.candidates, solver.x.data(), at, 0.008f, hit) ? std::max(0.0f, hit.distance) : 0.008f;
-  k.phase = KnotPhase::locked;
-  k.offset = {};
-  update_thread_collisions(model, solver, suture);
-  events.push_back({0, EventKind::knot_locked, static_cast<uint8_t>(k.hand), static_cast<uint32_t>(which), thrown.tension, at});
-}
-
-}  // namespace
-
-void tie_knots(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-               SutureState& state, float dt, std::vector<Event>& events) {
-  for (size_t which = state.knot.size(); which-- > 0;) {
-    Knot& k = state.knot[which];
-    if (k.phase != KnotPhase::tightening) continue;
-    const HandState& hand = state.hand[k.hand];
-    if (hand.held != Held::thread || hand.slot != k.strand) {
-      cancel(model, solver, suture, state, which, events);
-      continue;
-    }
-    // "As the tool moves away from its original position, the knot object moves towards the suture point."
-    // A strand that is drawn taut brings it along however short the way of the hand.
-    const float whole = length(k.from);
-    const float gone = tension_at(solver.thread, k.strand) > kTaut ? whole : distance(solver.body[k.hand].x, k.hand_from);
-    const float left = std::max(whole - gone, length(k.offset) - kFastest * dt);
-    k.offset = whole > 0 && left > 0 ? k.from * (std::min(left, length(k.offset)) / whole) : Vec3{};
-    for (ThreadAnchor& a : solver.thread.anchor)
-      if (a.knotted && (a.slot == k.loop[0] || a.slot == k.loop[1])) a.offset = k.offset;
-    if (length(k.offset) < kArrived) lock(model, solver, suture, state, scratch, which, events);
-  }
+void tie(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+         std::vector<Event>& events) {
+  for (size_t i = state.knot.size(); i-- > 0;)
+    if (state.knot[i].phase == KnotPhase::tightening &&
+        (!pulls(state, state.knot[i]) || !is_whole(solver.thread, state, state.knot[i])))
+      cancel(model, solver, suture, state, static_cast<uint32_t>(i), events);
   for (uint8_t who = 0; who < 2; ++who)
     if (state.loop[who].wraps > 0 && state.hand[who].held == Held::thread) begin(model, solver, suture, state, who, events);
+}
+
+void tighten(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
+             SutureState& state, std::vector<Event>& events) {
+  for (uint32_t i = 0; i < state.knot.size(); ++i) {
+    Knot& knot = state.knot[i];
+    if (knot.phase == KnotPhase::locked) {
+      if (!knot.snug) draw_snug(model, solver, suture, state, knot);
+      continue;
+    }
+    if (!pulls(state, knot)) continue;  // taken back at the next tick
+    // "As the tool moves away from its original position, the knot object moves towards the suture point." It never goes back
+    // up again when the tool does.
+    const float gone = distance(solver.body[knot.hand].x, knot.hand_from);
+    const float left = std::max(0.0f, length(knot.from) - gone);
+    if (left < knot.left) {
+      const float part = left / knot.left;
+      for (ThreadAnchor& a : solver.thread.anchor)
+        if (a.slot == knot.end[0] || a.slot == knot.end[1]) a.offset = a.offset * part;
+      knot.left = left;
+    }
+    if (knot.left <= 0) lock(model, solver, scratch, suture, state, i, events);
+  }
 }
 
 }  // namespace catgut

@@ -4,6 +4,7 @@
 // 7c). Slack is resolved in the paper's order (figure 9) because tension is: a span with slack has none, so the anchor next to
 // the pull slides first, and the one behind it only when the span between them is taut.
 #include <algorithm>
+#include <array>
 
 #include "core/check.h"
 #include "suture/suture.h"
@@ -20,6 +21,50 @@ bool is_locked(const Thread& t, uint32_t slot) {
 
 size_t node_of(const Thread& t, uint32_t slot) {
   return static_cast<size_t>(std::find(t.order.begin(), t.order.end(), slot) - t.order.begin());
+}
+
+// Whether the particle beside the locked node i may pass it: there is one, it is free, and thread goes on behind it.
+bool can_give_free(const Thread& t, size_t i) {
+  return i >= 2 && i + 1 < t.order.size() && !is_locked(t, t.order[i - 1]) && !t.cut[i - 1] && !t.cut[i - 2] && !t.cut[i];
+}
+bool can_give_needle(const Thread& t, size_t i) {
+  return i >= 1 && i + 2 < t.order.size() && !is_locked(t, t.order[i + 1]) && !t.cut[i] && !t.cut[i + 1] && !t.cut[i - 1];
+}
+
+// Figure 7c: the particle beside the locked node i takes its place on the other side, at the midpoint of the pair it splits.
+void pass(SolverState& solver, size_t i, bool toward_needle) {
+  Thread& t = solver.thread;
+  const uint32_t locked = t.order[i], slot = t.order[toward_needle ? i - 1 : i + 1],
+                 beyond = t.order[toward_needle ? i + 1 : i - 1];
+  if (toward_needle) move_particle(t, i - 1, i);
+  else move_particle(t, i + 1, i - 1);
+  set(solver.x[slot], lerp(xyz(solver.x[locked]), xyz(solver.x[beyond]), 0.5f));
+  set(solver.v[slot], 0.5f * (xyz(solver.v[beyond]) + xyz(solver.v[locked])));
+}
+
+// "With a knot created, the suture pulling will perform the same slack check from the needle end but will stop checking when
+// the knot is found." Between the two particles of a knot the stitch is closed: no pull from outside gets there.
+struct TiedNodes {
+  static constexpr size_t kMost = 64;
+  std::array<size_t, kMost> node;  // of locked knots' particles
+  size_t count = 0;
+};
+TiedNodes tied_nodes(const Thread& t) {
+  TiedNodes k;
+  for (const ThreadAnchor& a : t.anchor)
+    if (a.knotted && k.count < TiedNodes::kMost) k.node[k.count++] = node_of(t, a.slot);
+  return k;
+}
+bool is_tied(const Thread& t, const TiedNodes& knots, size_t i) {
+  size_t below = i, above = i;
+  for (size_t k = 0; k < knots.count; ++k) {
+    const size_t n = knots.node[k];
+    if (n < i && (below == i || n > below)) below = n;
+    if (n > i && (above == i || n < above)) above = n;
+  }
+  return below < i && above > i &&
+         std::none_of(t.cut.begin() + static_cast<long>(below), t.cut.begin() + static_cast<long>(above),
+                      [](uint8_t cut) { return cut != 0; });
 }
 
 }  // namespace
@@ -70,6 +115,26 @@ void update_thread_collisions(const SolverModel& model, SolverState& solver, con
   // A loop round a tool goes on colliding: the turns that follow lie on the same tool.
   for (const ThreadHold& h : solver.thread.hold)
     if (h.kind != HoldKind::loop) off(h.slot);
+  // The loop of a throw on its way to the tissue has left the tool that it lay round, and must not catch on it: off from one of
+  // its ends to the other.
+  const std::vector<ThreadAnchor>& anchor = solver.thread.anchor;
+  const auto travels = [](const ThreadAnchor& a) { return !a.knotted && length2(a.offset) > 0; };
+  for (size_t k = 0; k + 1 < anchor.size(); ++k) {
+    if (!travels(anchor[k]) || !travels(anchor[k + 1])) continue;
+    for (size_t i = node_of(solver.thread, anchor[k].slot); i <= node_of(solver.thread, anchor[k + 1].slot); ++i)
+      solver.thread_collides[solver.thread.order[i] - model.thread.first_slot] = 0;
+    ++k;
+  }
+}
+
+// A cut thread holds nothing together: as long as all of it, whatever is drawn.
+static float length_between(const Thread& t, size_t a, size_t b) {
+  float sum = 0, all = 0;
+  bool whole = true;
+  for (size_t i = std::min(a, b); i < std::max(a, b); ++i) sum += t.rest[i], whole = whole && !t.cut[i];
+  if (whole) return sum;
+  for (float rest : t.rest) all += rest;
+  return all;
 }
 
 float length_between_ends(const SolverState& solver, const SutureState& state) {
@@ -81,9 +146,7 @@ float length_between_ends(const SolverState& solver, const SutureState& state) {
     lo = std::min(lo, i);
     hi = std::max(hi, i);
   }
-  float sum = 0;
-  for (size_t i = lo; i < hi; ++i) sum += t.rest[i];
-  return sum;
+  return length_between(t, lo, hi);
 }
 
 void spans(const SolverState& solver, const SutureState& state, std::vector<float>& span) {
@@ -114,8 +177,11 @@ void erase_anchor(SolverState& solver, SutureState& state, uint32_t anchor) {
 // next free particle behind passes the suture points up to the needle before its turn (figure 7c). False: there is none.
 bool bring_particle(Thread& t, SolverState& solver) {
   size_t from = t.order.size() - 2;
-  while (from > 0 && is_locked(t, t.order[from]) && !t.cut[from]) --from;
-  if (from == 0 || t.cut[from] || t.cut[from - 1]) return false;
+  const auto in_hole = [&](uint32_t slot) {
+    return std::any_of(t.anchor.begin(), t.anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot && !a.knotted; });
+  };
+  while (from > 0 && in_hole(t.order[from]) && !t.cut[from]) --from;
+  if (from == 0 || is_locked(t, t.order[from]) || t.cut[from] || t.cut[from - 1]) return false;
   for (; from + 2 < t.order.size(); ++from) {
     const uint32_t slot = t.order[from];
     move_particle(t, from, from + 1);
@@ -131,7 +197,9 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
   Thread& t = solver.thread;
   if (t.order.size() < 3) return false;
   const size_t node = t.order.size() - 2;  // the last is the needle's
-  if (t.cut[node] || t.cut[node - 1]) return false;
+  // A needle off which the thread was cut, or with a stump too short to follow it, leaves none in the hole.
+  const bool swaged = std::any_of(t.hold.begin(), t.hold.end(), [](const ThreadHold& h) { return h.kind == HoldKind::swage; });
+  if (!swaged || t.cut[node] || t.cut[node - 1]) return true;
   if (is_locked(t, t.order[node]) && !bring_particle(t, solver)) return false;
   const uint32_t slot = t.order[node];
   const BiteEnd& end = exit ? state.bite[bite].exit : state.bite[bite].entry;
@@ -157,7 +225,8 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
 }
 
 void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state) {
-  CATGUT_CHECK(!state.point.empty());
+  if (state.point.empty() || state.open.empty() || state.point.back().bite != state.open.front().bite)
+    return;  // the needle was drawn through without thread
   const uint32_t anchor = state.point.back().anchor;
   state.point.pop_back();
   erase_anchor(solver, state, anchor);
@@ -199,35 +268,58 @@ void pull(const SolverModel& model, SolverState& solver, const SutureModel& sutu
   Thread& t = solver.thread;
   const float used_up = kUsedUp * model.thread.spacing;
   bool changed = false;
-  for (size_t k = state.point.size(); k-- > 0;) {
-    ThreadAnchor& a = t.anchor[state.point[k].anchor];
+  const TiedNodes knots = tied_nodes(t);  // no particle passes a knot, so they stay true while others pass
+  // `point`: the suture point that the anchor is, or -1 for the end of a loop on its way to the tissue.
+  const auto pass_at = [&](ThreadAnchor& a, int64_t point) {
     const size_t i = node_of(t, a.slot);
+    if (i == 0 || i + 1 >= t.order.size()) return;
     const bool was_blocked = a.blocked_needle;
     feed(t, a, i, used_up, 0.25f * model.thread.spacing);
-    const bool can_give_free = i >= 2 && !is_locked(t, t.order[i - 1]) && !t.cut[i - 1] && !t.cut[i - 2];
-    const bool can_give_needle = i + 2 < t.order.size() && !is_locked(t, t.order[i + 1]) && !t.cut[i] && !t.cut[i + 1];
-    a.blocked_needle = !can_give_free && t.rest[i - 1] <= used_up;
-    a.blocked_free = !can_give_needle && t.rest[i] <= used_up;
-    if (a.blocked_needle && !was_blocked && (i == 1 || t.cut[i - 2]))
-      events.push_back({0, EventKind::thread_ran_out, 0, static_cast<uint32_t>(k), 0, position_of(a.point, solver.x.data())});
+    const bool tied = is_tied(t, knots, i);
+    const bool from_free = !tied && can_give_free(t, i), from_needle = !tied && can_give_needle(t, i);
+    // A cut end has no length to give, however much of the cut pair is written in the list.
+    a.blocked_needle = tied || t.cut[i - 1] || t.cut[i] || (!from_free && t.rest[i - 1] <= used_up);
+    a.blocked_free = tied || t.cut[i - 1] || t.cut[i] || (!from_needle && t.rest[i] <= used_up);
+    if (point >= 0 && a.blocked_needle && !was_blocked && !tied && (i == 1 || t.cut[i - 1] || t.cut[i - 2]))
+      events.push_back(
+          {0, EventKind::thread_ran_out, 0, static_cast<uint32_t>(point), 0, position_of(a.point, solver.x.data())});
 
     // Toward the needle: the particle on the free side splits the pair on the needle side; the other way round for a pull on
     // the tail.
-    const bool forward = can_give_free && t.rest[i - 1] <= used_up;
-    const bool backward = !forward && can_give_needle && t.rest[i] <= used_up;
-    if (!forward && !backward) continue;
-    const uint32_t slot = t.order[forward ? i - 1 : i + 1];
-    const uint32_t beyond = t.order[forward ? i + 1 : i - 1];
-    if (forward) move_particle(t, i - 1, i);
-    else move_particle(t, i + 1, i - 1);
-    const Vec3 here = position_of(a.point, solver.x.data()), there = xyz(solver.x[beyond]);
-    set(solver.x[slot], lerp(here, there, 0.5f));
-    const Vec3 velocity = 0.5f * (xyz(solver.v[beyond]) + xyz(solver.v[a.slot]));
-    set(solver.v[slot], velocity);
+    const bool forward = from_free && t.rest[i - 1] <= used_up;
+    const bool backward = !forward && from_needle && t.rest[i] <= used_up;
+    if (!forward && !backward) return;
+    pass(solver, i, forward);
     changed = true;
-    events.push_back({0, EventKind::particle_passed, 0, static_cast<uint32_t>(k), forward ? 1.0f : -1.0f, here});
-  }
+    if (point >= 0)
+      events.push_back({0, EventKind::particle_passed, 0, static_cast<uint32_t>(point), forward ? 1.0f : -1.0f,
+                        position_of(a, solver.x.data())});
+  };
+  for (size_t k = state.point.size(); k-- > 0;) pass_at(t.anchor[state.point[k].anchor], static_cast<int64_t>(k));
+  for (const Knot& knot : state.knot)
+    if (knot.phase == KnotPhase::tightening)
+      for (ThreadAnchor& a : t.anchor)
+        if (a.slot == knot.end[0] || a.slot == knot.end[1]) pass_at(a, -1);
   if (changed) update_thread_collisions(model, solver, suture);
+}
+
+float draw_through(const SolverModel& model, SolverState& solver, uint32_t slot, int way, float length) {
+  Thread& t = solver.thread;
+  const float used_up = kUsedUp * model.thread.spacing, least = 0.02f * model.thread.spacing;
+  float gone = 0;
+  for (;;) {
+    const size_t i = node_of(t, slot);
+    if (i == 0 || i + 1 >= t.order.size() || t.cut[i - 1] || t.cut[i]) return gone;
+    const size_t from = way > 0 ? i - 1 : i, to = way > 0 ? i : i - 1;
+    const float step = std::min(length - gone, t.rest[from] - least);
+    if (step > 0) {
+      t.rest[from] -= step;
+      t.rest[to] += step;
+      gone += step;
+    }
+    if (t.rest[from] > used_up || !(way > 0 ? can_give_free(t, i) : can_give_needle(t, i))) return gone;
+    pass(solver, i, way > 0);
+  }
 }
 
 }  // namespace catgut

@@ -1,119 +1,168 @@
-// suture/settle: a fresh needle and thread; what is tied settles (paper 3.4: "This process replaces the thread with a 3D mesh
-// when a knot is created ... so that physics is no longer performed on previous sutures"). Reads knots and anchors; writes
-// settled stitches and their pins, and lays the thread out again as at the start. There is one thread however many sutures are
-// made, so a tick costs the same for the fiftieth as for the first.
+// suture/settle: a fresh needle and thread (kButtonNewSuture). Reads the thread and its knots; what is tied becomes a settled
+// stitch, everything else of the old suture goes. Cost stays flat however many stitches a procedure has (paper 3.4): a settled
+// stitch is a curve that the tissue carries and a few pins between the points that its thread held together.
 #include <algorithm>
-#include <limits>
 
 #include "suture/suture.h"
 
 namespace catgut {
 namespace {
 
-constexpr float kTail = 0.012f;          // [m] of thread left on a stitch that was not cut
-constexpr float kPinCompliance = 1e-5f;  // [m/N]
+constexpr float kLongestTail = 0.03f;  // [m] of a strand that was left uncut: an assistant trims it here
 
-size_t node_of(const Thread& t, uint32_t slot) {
-  return static_cast<size_t>(std::find(t.order.begin(), t.order.end(), slot) - t.order.begin());
+int anchor_at(const Thread& t, uint32_t slot) {
+  for (size_t k = 0; k < t.anchor.size(); ++k)
+    if (t.anchor[k].slot == slot) return static_cast<int>(k);
+  return -1;
 }
 
-// Bound to the nearest particle's cluster, in whose rest frame the offset is kept.
+// A place bound to the nearest tissue particle, in the frame of that particle's cluster.
 SettledNode bind(const SolverModel& model, const SolverState& solver, Vec3 at) {
   SettledNode n;
-  float best = std::numeric_limits<float>::max();
-  for (uint32_t i = 0; i < model.tissue; ++i)
-    if (const float d = length2(xyz(solver.x[i]) - at); d < best) best = d, n.particle = i;
+  float best = 1e30f;
+  for (uint32_t i = 0; i < model.tissue; ++i) {
+    const float d = length2(xyz(solver.x[i]) - at);
+    if (d < best) best = d, n.particle = i;
+  }
   const uint32_t c = model.shape.cluster_of[n.particle];
-  const ClusterRotations& r = solver.rotation;
-  n.offset = rotate(conjugate(Quat{r.x[c], r.y[c], r.z[c], r.w[c]}), at - xyz(solver.x[n.particle]));
+  const Quat q{solver.rotation.x[c], solver.rotation.y[c], solver.rotation.z[c], solver.rotation.w[c]};
+  n.offset = rotate(conjugate(q), at - xyz(solver.x[n.particle]));
   return n;
 }
 
-// The stitch that the thread's anchors and knots make, from one end of its piece of thread to the other.
-void settle(const SolverModel& model, SolverState& solver, SutureState& state) {
+// The piece of thread from node `first` to node `last`, tied by `knots`, as a settled stitch and the pins that do what it did.
+void settle_piece(const SolverModel& model, SolverState& solver, SutureState& state, size_t first, size_t last,
+                  const std::vector<uint32_t>& knots, std::vector<Event>& events) {
   const Thread& t = solver.thread;
-  struct Held {
-    size_t node;
-    const ThreadAnchor* anchor;
-    uint32_t bite;
-  };
-  std::vector<Held> held;
-  for (size_t k = 0; k < t.anchor.size(); ++k) {
-    uint32_t bite = ~0u - static_cast<uint32_t>(k);
-    for (const SuturePoint& p : state.point)
-      if (p.anchor == k) bite = p.bite;
-    held.push_back({node_of(t, t.anchor[k].slot), &t.anchor[k], bite});
-  }
-  std::sort(held.begin(), held.end(), [](const Held& a, const Held& b) { return a.node < b.node; });
   SettledStitch stitch;
-  size_t first = held.front().node, last = held.back().node;
-  for (float gone = 0; first > 0 && !t.cut[first - 1] && gone < kTail; --first) gone += t.rest[first - 1];
-  for (float gone = 0; last + 1 < t.order.size() && !t.cut[last] && gone < kTail; ++last) gone += t.rest[last];
-  for (size_t i = first; i <= last; ++i) stitch.node.push_back(bind(model, solver, xyz(solver.x[t.order[i]])));
-  for (const Knot& k : state.knot)
-    if (k.phase == KnotPhase::locked) stitch.knot.push_back(bind(model, solver, position_of(k.target, solver.x.data())));
+  size_t lowest = last, highest = first;
+  for (size_t i = first; i <= last; ++i)
+    if (anchor_at(t, t.order[i]) >= 0) lowest = std::min(lowest, i), highest = std::max(highest, i);
+  float tail = 0;
+  while (lowest > first && tail + t.rest[lowest - 1] <= kLongestTail) tail += t.rest[--lowest];
+  tail = 0;
+  while (highest < last && tail + t.rest[highest] <= kLongestTail) tail += t.rest[highest++];
+  int before = -1;
+  float length = 0;
+  for (size_t i = lowest; i <= highest; ++i) {
+    stitch.node.push_back(bind(model, solver, thread_position(t, i, solver.x.data(), solver.body)));
+    if (const int here = anchor_at(t, t.order[i]); here >= 0) {
+      if (before >= 0) {
+        TissuePin pin;
+        pin.a = t.anchor[static_cast<size_t>(before)].point;
+        pin.b = t.anchor[static_cast<size_t>(here)].point;
+        pin.length = length;
+        pin.compliance = model.thread.stretch_compliance * length / model.thread.spacing;
+        pin.owner = PinOwner::stitch;
+        solver.pin.push_back(pin);
+      }
+      before = here;
+      length = 0;
+    }
+    if (i < highest) length += t.rest[i];
+  }
+  Vec3 where{};
+  for (uint32_t k : knots) {
+    where = position_of(state.knot[k].target, solver.x.data());
+    stitch.knot.push_back(bind(model, solver, where));
+  }
+  events.push_back({0, EventKind::stitch_settled, 0, static_cast<uint32_t>(state.settled.size()), 0, where});
   state.settled.push_back(std::move(stitch));
-  // From anchor to anchor the thread goes on holding the tissue together, as a rope. Within a bite it runs through tissue.
-  for (size_t k = 0; k + 1 < held.size(); ++k) {
-    if (held[k].bite == held[k + 1].bite) continue;
-    TissuePin pin;
-    pin.a = held[k].anchor->point;
-    pin.b = held[k + 1].anchor->point;
-    for (size_t i = held[k].node; i < held[k + 1].node; ++i) pin.length += t.rest[i];
-    pin.compliance = kPinCompliance;
-    pin.owner = PinOwner::stitch;
-    solver.pin.push_back(pin);
-  }
-}
-
-void lay_out(const SolverModel& model, SolverState& solver, const FreshSuture& fresh) {
-  Thread& t = solver.thread;
-  t.anchor.clear();
-  t.hold.clear();
-  for (uint32_t i = 0; i < model.thread.count; ++i) {
-    const uint32_t slot = model.thread.first_slot + i;
-    t.order[i] = slot;
-    solver.x[slot] = point(fresh.start[slot]);
-    solver.v[slot] = {};
-  }
-  std::fill(t.rest.begin(), t.rest.end(), model.thread.spacing);
-  std::fill(t.cut.begin(), t.cut.end(), uint8_t{0});
-  std::fill(t.tension.begin(), t.tension.end(), 0.0f);
-  t.hold.push_back({t.order.back(), static_cast<int>(kNeedle), model.needle_arc.point(0), HoldKind::swage});
-  RigidBody& needle = solver.body[kNeedle];
-  needle = {};
-  needle.x = needle.prev_x = fresh.needle.p;
-  needle.q = needle.prev_q = fresh.needle.q;
 }
 
 }  // namespace
 
-void take_fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                       const FreshSuture& fresh, const std::array<uint32_t, 2>& pressed, std::vector<Event>& events) {
-  if (!((pressed[0] | pressed[1]) & kButtonNewSuture)) return;
-  const uint8_t who = pressed[0] & kButtonNewSuture ? 0 : 1;
-  const Vec3 at = solver.body[who].x;
-  const auto fault = [&](Fault what, uint32_t which) {
-    events.push_back({0, EventKind::technique_fault, who, which, static_cast<float>(what), at});
-  };
-  if (!state.open.empty()) return fault(Fault::needle_in_tissue, state.open.back().bite);
-  const bool tied =
-      std::any_of(state.knot.begin(), state.knot.end(), [](const Knot& k) { return k.phase == KnotPhase::locked; });
-  if (tied && !solver.thread.anchor.empty()) {
-    settle(model, solver, state);
-    events.push_back({0, EventKind::stitch_settled, who, static_cast<uint32_t>(state.settled.size() - 1), 0, at});
-  } else if (!state.point.empty()) {
-    fault(Fault::cut_before_knot, solver.thread.order.front());  // its thread is drawn out of the tissue again
+void fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, std::span<const Vec3> start,
+                  const Pose& needle_start) {
+  Thread& t = solver.thread;
+  const uint32_t first = model.thread.first_slot;
+  for (uint32_t i = 0; i < model.thread.count; ++i) {
+    t.order[i] = first + i;
+    solver.x[first + i] = point(start[first + i]);
+    solver.v[first + i] = {};
   }
-  for (uint8_t hand = 0; hand < 2; ++hand)
-    if (state.hand[hand].held == Held::needle || state.hand[hand].held == Held::thread) release(solver, state, hand, 0, events);
-  state.loop = {};
-  state.knot.clear();
-  state.point.clear();
-  lay_out(model, solver, fresh);
+  std::fill(t.rest.begin(), t.rest.end(), model.thread.spacing);
+  std::fill(t.tension.begin(), t.tension.end(), 0.0f);
+  std::fill(t.cut.begin(), t.cut.end(), uint8_t{0});
+  t.anchor.clear();
+  t.hold.clear();
+  RigidBody& needle = solver.body[kNeedle];
+  needle = {};
+  needle.x = needle.prev_x = needle_start.p;
+  needle.q = needle.prev_q = needle_start.q;
+  // The thread's last particle is the needle's: swaged on.
+  t.hold.push_back({t.order.back(), static_cast<int>(kNeedle), model.needle_arc.point(0), HoldKind::swage});
   update_thread_collisions(model, solver, suture);
-  events.push_back({0, EventKind::suture_taken, who, state.taken, 0, fresh.needle.p});
-  ++state.taken;
+}
+
+bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                std::span<const Vec3> start, const Pose& needle_start, const std::array<uint32_t, 2>& pressed,
+                std::vector<Event>& events) {
+  const auto who = static_cast<uint8_t>(pressed[0] & kButtonNewSuture ? 0 : 1);
+  if (!(pressed[who] & kButtonNewSuture)) return false;
+  const Vec3 here = solver.body[kNeedle].x;
+  const auto fault = [&](uint32_t which, Fault f, Vec3 where) {
+    events.push_back({0, EventKind::technique_fault, who, which, static_cast<float>(f), where});
+  };
+  if (!state.open.empty()) {
+    fault(state.open.back().bite, Fault::needle_in_tissue, here);
+    return false;
+  }
+  const Thread& t = solver.thread;
+  take_back_throws(model, solver, suture, state, events);
+
+  // Piece by piece between the cuts.
+  std::vector<uint32_t> knots;
+  for (size_t first = 0; first < t.order.size();) {
+    size_t last = first;
+    while (last + 1 < t.order.size() && !t.cut[last]) ++last;
+    const auto on_piece = [&](uint32_t slot) {
+      const auto begin = t.order.begin() + static_cast<long>(first), end = t.order.begin() + static_cast<long>(last) + 1;
+      return std::find(begin, end, slot) != end;
+    };
+    knots.clear();
+    for (uint32_t k = 0; k < state.knot.size(); ++k) {
+      const Knot& knot = state.knot[k];
+      if (knot.slots == 0 || !on_piece(knot.slot[0])) continue;
+      knots.push_back(k);
+      if (knot.throws < static_cast<uint32_t>(suture.least_throws) && !knot.told)
+        fault(k, Fault::too_few_throws, position_of(knot.target, solver.x.data()));
+    }
+    if (!knots.empty()) {
+      settle_piece(model, solver, state, first, last, knots, events);
+    } else {
+      // Thread that was sewn in and never tied is pulled out.
+      for (const SuturePoint& p : state.point) {
+        const ThreadAnchor& a = t.anchor[p.anchor];
+        if (!on_piece(a.slot)) continue;
+        fault(a.slot, Fault::cut_before_knot, position_of(a.point, solver.x.data()));
+        break;
+      }
+    }
+    first = last + 1;
+  }
+
+  for (uint8_t k = 0; k < 2; ++k) {
+    HandState& hand = state.hand[k];
+    const Vec3 at = solver.body[k].x;
+    if (hand.held == Held::needle) events.push_back({0, EventKind::needle_released, k, 0, 0, at});
+    if (hand.held == Held::thread) events.push_back({0, EventKind::thread_released, k, hand.slot, 0, at});
+    if (hand.held != Held::tissue) hand.held = Held::nothing;
+    if (state.loop[k].wraps > 0) events.push_back({0, EventKind::loop_released, k, 0, 0, at});
+    const float jaw = state.loop[k].jaw;
+    state.loop[k] = {};
+    state.loop[k].jaw = jaw;
+  }
+  std::erase_if(solver.weld, [](const Weld& w) { return w.a == static_cast<int>(kNeedle); });
+  std::erase_if(solver.attach, [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
+  solver.channel.clear();
+  solver.body_collides[kNeedle] = 1;
+  state.attached = state.tip_inside = false;
+  state.point.clear();
+  state.knot.clear();
+  fresh_suture(model, solver, suture, start, needle_start);
+  events.push_back({0, EventKind::suture_taken, who, state.taken++, 0, solver.body[kNeedle].x});
+  return true;
 }
 
 }  // namespace catgut

@@ -1,10 +1,11 @@
 // suture: the data of guided suturing (paper 2.2, 2.3) and the stages that work on it, in the order of the tick:
-//   grasp -> loop -> (per substep: solver, slip, puncture, pull) -> [technique] -> closure.
+//   grasp -> loop -> knot -> cut -> settle -> (per substep: solver, slip, puncture, pull, tighten) -> [technique] -> closure.
 // Each stage reads and writes live rows of the solver's state (attachments, channel, anchors, order); none touches a
 // multiplier.
 #pragma once
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "exchange/event.h"
@@ -71,21 +72,24 @@ struct ToolLoop {
   float jaw = 1;                       // of the last tick
 };
 
-// A knot. While it tightens, the ends of its loop are anchored to it (ThreadAnchor::knotted with an offset) and it travels from
-// the tool to the tissue; once locked it holds a particle of both strands at one point of the tissue, and nothing slides there.
+// A knot: throws that lie on each other, made of loops. While a throw tightens, the ends of its loop are anchored to it with an
+// offset from the tissue that shrinks, and thread may run through it as through a suture point. Locked, the knot holds a
+// particle of each of the two strands at one point of the tissue, and nothing runs there again (ThreadAnchor::knotted).
 struct Knot {
-  KnotPhase phase = KnotPhase::tightening;
-  uint32_t hand = 0;               // the tool that pulls it tight
-  uint32_t begun = 0;              // throws that were locked when the throw in hand was begun
-  TissuePoint target;              // where it goes: the suture point, or the middle between the two ends of its stitch
-  Vec3 from;                       // [m] its offset from the target when the throw in hand was begun
-  Vec3 offset;                     // [m] now; zero once locked
-  std::array<uint32_t, 2> loop{};  // slots of the loop's ends, valid while it tightens
-  Vec3 hand_from;                  // [m] where the pulling tool was then
-  uint32_t strand = 0;             // slot that the hand took: on the free end, on the needle side, or on a bight
-  std::array<uint32_t, 2> slot{};  // the two particles that it holds once locked: free-end side, needle side
-  uint32_t slots = 0;              // how many of them are valid: 1 when it was tied on one strand alone
-  uint32_t throws = 0;             // the throw in hand included
+  KnotPhase phase = KnotPhase::tightening;  // of the throw in hand
+  uint32_t hand = 0;                        // the tool that pulls it tight
+  uint32_t begun = 0;                       // throws that were locked when the throw in hand was begun
+  TissuePoint target;                       // where it goes: the suture point, or the middle between the two ends of its stitch
+  Vec3 from;                                // [m] offset of the throw in hand from the target when it was begun
+  float left = 0;                           // [m] of that offset
+  Vec3 hand_from;                           // [m] where the pulling tool was then
+  uint32_t strand = 0;                      // slot that the hand took: on the free end, on the needle side, or on a bight
+  std::array<uint32_t, 2> end{};            // slots of the loop's two ends, free-end side first; anchored while it tightens
+  std::array<uint32_t, 2> slot{};           // the particles that it holds once locked: free-end side, needle side
+  uint32_t slots = 0;                       // how many of them are valid: 1 when it was tied on one strand alone; 0: none yet
+  uint32_t snug = 0;                        // 1: what was slack between it and the stitch has been drawn through
+  uint32_t throws = 0;                      // the throw in hand included
+  uint32_t told = 0;                        // 1: it has been said that it has too few throws
   std::array<KnotThrow, KnotView::kMostThrows> thrown;
 };
 
@@ -103,14 +107,15 @@ struct SutureModel {
   float attach_compliance = 1.0f / 1100, channel_compliance = 0.002f;  // [m/N]
   float channel_drag = 0.12f;                                          // [N] per end of the channel
   float pass_tension = 0.03f;                                          // [N]
-  float capstan = 0.08f;        // thread-tissue friction times the angle by which a suture point bends the thread
-  int collision_off = 3;        // thread particles on each side
-  float grasp_reach = 0.003f;   // [m]
-  float strand_reach = 0.003f;  // [m] of a second strand, to be between the jaws with the first
+  float capstan = 0.08f;                     // thread-tissue friction times the angle by which a suture point bends the thread
+  int collision_off = 3;                     // thread particles on each side
+  float grasp_reach = 0.003f;                // [m]
   float needle_grip = 40, thread_grip = 15, tissue_grip = 6;  // [N] beyond which a jaw slips
   float tissue_compliance = 5e-4f;                            // [m/N] of tissue held by a jaw
   float tissue_reach = 0.0015f;                               // [m] how near the surface must be to a closing jaw
-  float loop_reach = 0.0025f;                                 // [m] how far off a tool thread still lies round it
+  float cut_reach = 0.004f;                  // [m] how near the scissors must be to the thread
+  int least_throws = 2;                      // a knot with fewer does not hold
+  float loop_reach = 0.0025f;                // [m] how far off a tool thread still lies round it
   // Rest distances of neighbours: how far apart along the tool a loop's ends may be. The paper says one, of its coarser thread;
   // a hand that carries thread past the strand it crosses lays ours 2 to 3 mm deep.
   float loop_depth = 2;
@@ -156,30 +161,43 @@ void find_loops(const SolverModel& model, SolverState& solver, const SutureModel
 void take_off_loop(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t who);
 
 // --- knot.cpp ----------------------------------------------------------------------------------------------------------
-// Once a tick, after the loops. A tool with a loop that has taken the thread begins a knot (or a throw on the one that is
-// there); knots travel to the tissue as their tool moves away, lock there, or are undone when the strand is let go. dt [s].
-void tie_knots(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-               SutureState& state, float dt, std::vector<Event>& events);
-
 // A hand lets go of what it holds. force [N]: 0 when the jaw was opened, else what made it slip.
 void release(SolverState& solver, SutureState& state, uint8_t who, float force, std::vector<Event>& events);
 
+// Once a tick. A tool with a loop round it whose jaws have closed on thread beyond the loop begins a throw; one that lets go of
+// it before the throw is locked takes it back.
+void tie(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+         std::vector<Event>& events);
+// After every substep: throws go down to the tissue as far as the pulling tool goes away, and lock there; a knot that was just
+// locked draws through what is still slack under it.
+void tighten(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
+             SutureState& state, std::vector<Event>& events);
+// Takes every throw that is not locked back, whoever pulls on it.
+void take_back_throws(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                      std::vector<Event>& events);
+// Midway between two points of tissue, wherever the tissue carries them.
+TissuePoint midway(const SolverModel& model, const TissuePoint& a, const TissuePoint& b);
+
 // --- cut.cpp -----------------------------------------------------------------------------------------------------------
-// Once a tick. pressed: the buttons that went down in this tick, per hand. kButtonCut cuts the thread nearest to that tool's
-// jaws, at most 4 mm away: between two particles, or the needle off at its swage, as also where that tool holds the needle. A
-// cut within a stitch, or before anything was tied, is a technique_fault besides.
+// Buttons that went down since the last tick, by hand; remembers them.
+std::array<uint32_t, 2> pressed_buttons(SutureState& state, const std::array<ToolInput, 2>& hand);
+// Once a tick. kButtonCut cuts the thread nearest to the tool's jaws; the last pair is the needle's own: there the needle comes
+// off. A cut in a wrong place is reported and stays.
 void cut(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
          const std::array<uint32_t, 2>& pressed, std::vector<Event>& events);
+// A jaw that has just closed on thread also holds the other strands that lie between its tips: the two ends of a stay suture.
+void hold_other_strands(SolverState& solver, const SutureModel& suture, const SutureState& state, uint8_t who);
 
 // --- settle.cpp --------------------------------------------------------------------------------------------------------
-struct FreshSuture {
-  std::span<const Vec3> start;  // [m] of every particle, as at the beginning; the thread's are used
-  Pose needle;                  // of the needle's body
-};
-// Once a tick. kButtonNewSuture: what is tied becomes a settled stitch with its pins; whatever else there is of the thread is
-// taken away, and thread and needle lie as at the beginning. Refused, with a fault, while the needle is in the tissue.
-void take_fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                       const FreshSuture& fresh, const std::array<uint32_t, 2>& pressed, std::vector<Event>& events);
+// Once a tick. kButtonNewSuture of either hand: what is tied settles, tails included, its thread's pull goes over to pins; the
+// rest is taken away, and a fresh needle and thread lie on the drape. Bites stay listed. Not while the needle is in the tissue.
+// True: it was done. start: positions of all particles at the start [m].
+bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
+                std::span<const Vec3> start, const Pose& needle_start, const std::array<uint32_t, 2>& pressed,
+                std::vector<Event>& events);
+// Needle and thread as they lie at the start, and nothing that holds them but the swage.
+void fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, std::span<const Vec3> start,
+                  const Pose& needle_start);
 
 // --- puncture.cpp ------------------------------------------------------------------------------------------------------
 // After every substep: the tip trigger, the attached particle, the back-end trigger (paper 2.2, figures 4 and 5).
@@ -206,8 +224,11 @@ void move_particle(Thread& thread, size_t from, size_t after);
 // end.
 void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
           std::vector<Event>& events);
+// Moves up to `length` [m] of thread past the locked particle `slot`, toward the needle (way +1) or the free end (-1); the sum
+// of rest lengths stays. Returns how much went: particles that are locked or at an end of the thread do not pass.
+float draw_through(const SolverModel& model, SolverState& solver, uint32_t slot, int way, float length);
 // Locks the next free particle behind the needle to `end` and makes it a suture point (figure 7a). False: no free particle
-// there yet.
+// there yet. A needle without thread passes (true) and makes none.
 bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                         uint32_t bite, bool exit, std::vector<Event>& events);
 // Unlocks the newest suture point again: its thread was drawn back out of the hole. The particle stays where it is, as free
@@ -215,7 +236,8 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
 void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state);
 // Collisions are off for locked and held particles and `collision_off` neighbours on each side, on for all others (paper 2.3).
 void update_thread_collisions(const SolverModel& model, SolverState& solver, const SutureModel& suture);
-// Rest length [m] of the thread between the first and the last suture point along the order; 0 with fewer than two.
+// Rest length [m] of the thread between the first and the last suture point along the order; 0 with fewer than two. Across a
+// cut thread, here and in spans: the whole length of the thread, which draws nothing together.
 float length_between_ends(const SolverState& solver, const SutureState& state);
 // Rest length [m] of the thread from each suture point to the next one made after it; 0 for the last. With a knot between
 // them: by how much what lies beyond the knot is longer than the way from the knot to the first of the two.

@@ -59,7 +59,12 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
   sp.clear();
   for (const StitchPoint& p : view.point) sp.push_back(p.at);
   if (state.area_start == 0) state.area_start = opening_area(model.rim_inner, x);
+  state.checked = std::min(state.checked, static_cast<uint32_t>(sp.size()));
   if (state.finished) return;
+  if (sp.empty()) {  // settled as far as it was drawn, or taken away: no thread leads it
+    state.ring_complete = state.ring_complete && state.closing;
+    return;
+  }
 
   if (!state.ring_complete) {
     // While the ring grows, a point can be checked once three more follow it.

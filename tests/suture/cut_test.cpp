@@ -1,186 +1,201 @@
-// tests/suture: scissors, and a fresh needle and thread (paper 2.5.3, 3.4).
+// tests/suture: scissors: a cut is an end of the thread to everything, and a wrong one is said and stays.
 #include <gtest/gtest.h>
 
-#include "rig.h"
+#include "tie.h"
 
 namespace catgut {
 namespace {
 
-struct Tied : Rig {
-  explicit Tied(const SceneSpec& scene = plain_scene()) : Rig(scene) {
-    wait(0.2f);
-    const Place p = place(0.4f);
-    whole_bite(p);
-    draw(p, 0.05f, 0.6f);
-  }
-  // A locked knot, made by hand: one more anchor on each strand, at the stitch.
-  void tie() {
-    Knot k;
-    k.phase = KnotPhase::locked;
-    k.target = thread().anchor[0].point;
-    k.slots = 2;
-    k.throws = 1;
-    for (size_t side = 0; side < 2; ++side) {
-      const size_t node = side == 0 ? node_of_point(0) - 2 : node_of_point(1) + 2;
-      ThreadAnchor a;
-      a.slot = thread().order[node];
-      a.point = k.target;
-      a.knotted = true;
-      thread().anchor.push_back(a);
-      k.slot[side] = a.slot;
-    }
-    k.strand = k.slot[0];
-    suture().knot.push_back(k);
-  }
-  // The tool appears at `at` with the button down.
-  void press(size_t hand, uint32_t button, Vec3 at) {
-    input.hand[hand].connected = 1;
-    input.hand[hand].pose = {at, {}};
-    input.hand[hand].buttons = button;
-    tick();
-  }
-  Vec3 node(size_t i) { return xyz(x()[thread().order[i]]); }
-};
+size_t cuts(Rig& r) { return static_cast<size_t>(std::count(r.thread().cut.begin(), r.thread().cut.end(), 1)); }
 
-TEST(Cut, nothing_acts_across_a_cut_and_the_button_acts_once) {
-  Tied r;
-  ASSERT_EQ(r.suture().point.size(), 2u);
-  r.tie();
-  const size_t at = r.node_of_point(1) + 12;
-  r.press(0, kButtonCut, r.node(at));
+TEST(Cut, the_nearest_pair_within_reach_once_a_press) {
+  Rig r(weightless(40));
+  r.wait(0.1f);
+  snip(r, between(r, 12) + Vec3{0, 0.006f, 0});
+  EXPECT_EQ(r.count(EventKind::thread_cut), 0u) << "out of reach";
+  snip(r, between(r, 12, 0.4f) + Vec3{0, 0.003f, 0});
   ASSERT_EQ(r.count(EventKind::thread_cut), 1u);
-  size_t cuts = 0, where = 0;
-  for (size_t i = 0; i < r.thread().cut.size(); ++i)
-    if (r.thread().cut[i]) ++cuts, where = i;
-  ASSERT_EQ(cuts, 1u);
-  EXPECT_NEAR(static_cast<double>(where), static_cast<double>(at), 2);
-  r.wait(0.3f);  // the button is still down
-  EXPECT_EQ(r.count(EventKind::thread_cut), 1u);
-  EXPECT_EQ(r.count(EventKind::technique_fault), 0u) << "beyond the knot is where one cuts";
-  // The two ends part: the needle's piece is drawn away, the stitch's stays.
-  const Vec3 left = r.node(where);
-  r.draw(r.place(0.4f), 0.05f, 0.5f);
-  EXPECT_LT(distance(r.node(where), left), 0.03f);
-  EXPECT_GT(distance(r.node(where), r.node(where + 1)), 0.01f);
+  EXPECT_EQ(cuts(r), 1u);
+  EXPECT_EQ(r.thread().cut[12], 1);
+  EXPECT_EQ(r.last(EventKind::thread_cut)->which, r.thread().order[12]);
+  EXPECT_EQ(r.last(EventKind::thread_cut)->value, -1.0f) << "no stitch to measure to";
+  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::cut_before_knot));
+  // Held down the button cuts no more, whatever comes between the blades.
+  r.input.hand[1].buttons = kButtonCut;
+  r.tick();
+  for (int i = 0; i < 10; ++i) {
+    r.input.hand[1].pose.p = between(r, 20), r.solver().body[1].x = between(r, 20);
+    r.tick();
+  }
+  EXPECT_EQ(cuts(r), 1u);
 }
 
-TEST(Cut, within_the_stitch_it_is_done_and_told) {
-  Tied r;
-  r.tie();
-  r.press(0, kButtonCut, 0.5f * (r.node(r.node_of_point(1)) + r.node(r.node_of_point(1) + 1)));
-  ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
-  EXPECT_EQ(static_cast<Fault>(static_cast<int>(r.last(EventKind::technique_fault)->value)), Fault::cut_in_stitch);
+TEST(Cut, nothing_acts_across_it) {
+  Rig r(weightless(40));
+  r.wait(0.1f);
+  snip(r, between(r, 20));
+  ASSERT_EQ(r.thread().cut[20], 1);
+  r.wait(0.3f);
+  const auto x = r.solver().x;
+  // The needle goes away with its piece; the other one does not stir.
+  r.hold_needle();
+  Pose to = r.circle();
+  to.p += Vec3{0.05f, 0.03f, 0.02f};
+  r.needle_to(to, 0.8f);
+  EXPECT_GT(distance(xyz(r.x()[r.thread().order[21]]), xyz(x[r.thread().order[21]])), 0.01f);
+  for (size_t i = 0; i <= 20; ++i)
+    EXPECT_LT(distance(xyz(r.x()[r.thread().order[i]]), xyz(x[r.thread().order[i]])), 0.0005f) << i;
+  EXPECT_EQ(r.thread().tension[20], 0);
 }
 
-TEST(Cut, before_anything_is_tied_it_is_done_and_told) {
-  Tied r;
-  r.press(0, kButtonCut, r.node(r.node_of_point(1) + 8));
+TEST(Cut, at_the_swage_takes_the_thread_off_the_needle) {
+  Rig r(weightless(40));
+  r.wait(0.1f);
+  snip(r, between(r, 38, 0.8f));
   ASSERT_EQ(r.count(EventKind::thread_cut), 1u);
-  ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
-  EXPECT_EQ(static_cast<Fault>(static_cast<int>(r.last(EventKind::technique_fault)->value)), Fault::cut_before_knot);
-}
-
-TEST(Cut, at_the_swage_the_needle_comes_off_and_the_thread_stays_whole) {
-  Tied r;
-  r.tie();
-  r.press(0, kButtonCut, needle_swage(r.model->solver.needle_arc, r.needle()));
-  EXPECT_EQ(r.count(EventKind::thread_cut), 1u);
-  EXPECT_EQ(std::count(r.thread().cut.begin(), r.thread().cut.end(), 1), 0);
+  EXPECT_EQ(cuts(r), 0u);
   EXPECT_TRUE(r.thread().hold.empty());
-  r.draw(r.place(0.4f), 0.05f, 0.5f);
-  EXPECT_GT(distance(r.node(r.thread().order.size() - 1), needle_swage(r.model->solver.needle_arc, r.needle())), 0.02f);
-}
-
-TEST(Cut, in_the_air_it_cuts_nothing) {
-  Tied r;
-  r.press(0, kButtonCut, {0.1f, 0.1f, 0.1f});
-  EXPECT_EQ(r.count(EventKind::thread_cut), 0u);
-}
-
-TEST(Settle, what_is_tied_becomes_a_stitch_with_pins_and_thread_and_needle_are_as_at_the_start) {
-  Tied r;
-  r.tie();
-  r.let_go();
-  r.press(1, kButtonNewSuture, {0.1f, 0.1f, 0});
-  ASSERT_EQ(r.count(EventKind::stitch_settled), 1u);
-  ASSERT_EQ(r.count(EventKind::suture_taken), 1u);
-  ASSERT_EQ(r.suture().settled.size(), 1u);
-  EXPECT_GT(r.suture().settled[0].node.size(), 6u);
-  ASSERT_EQ(r.suture().settled[0].knot.size(), 1u);
-  EXPECT_TRUE(r.suture().point.empty() && r.suture().knot.empty() && r.thread().anchor.empty());
-  EXPECT_TRUE(r.order_is_whole());
-  EXPECT_NEAR(r.rest_length(), 174 * 0.0016, 1e-6);
-  EXPECT_LT(distance(r.needle().x, r.model->needle_start.p), 0.002f);
-  // Knot to entry, exit to knot: the bite itself runs in the tissue.
-  ASSERT_EQ(r.solver().pin.size(), 2u);
-  for (const TissuePin& p : r.solver().pin) EXPECT_EQ(p.owner, PinOwner::stitch);
-  // The picture's stitch lies where the thread lay.
   Snapshot seen;
   publish(*r.model, *r.state, seen);
-  ASSERT_EQ(seen.settled.size(), 1u);
-  const Bite& bite = r.suture().bite[0];  // the tissue has sprung back since: where its holes are now
-  for (const Vec3& end : {position_of(bite.entry.point, r.x()), position_of(bite.exit.point, r.x())}) {
-    float nearest = 1;
-    for (const Vec3& p : seen.settled[0].node) nearest = std::min(nearest, distance(p, end));
-    EXPECT_LT(nearest, 0.0015f);
-  }
-  // And it can be sewn with again.
-  r.wait(0.3f);
-  r.whole_bite(r.place(2.0f));
-  EXPECT_EQ(r.suture().point.size(), 2u);
+  EXPECT_FALSE(seen.needle_on_thread);
+  r.hold_needle();
+  Pose to = r.circle();
+  to.p += Vec3{0.1f, 0.06f, 0};
+  r.needle_to(to, 0.8f);
+  EXPECT_GT(distance(xyz(r.x()[r.thread().order.back()]), needle_swage(r.model->solver.needle_arc, r.needle())), 0.03f);
 }
 
-TEST(Settle, with_the_needle_in_the_tissue_it_is_refused_and_told) {
+TEST(Cut, a_needle_without_thread_leaves_none_in_the_tissue) {
   Rig r;
   r.wait(0.2f);
+  snip(r, between(r, r.thread().order.size() - 2, 0.8f));
+  ASSERT_TRUE(r.thread().hold.empty());
   const Place p = r.place(0.4f);
-  r.approach(p);
-  r.drive(p, -1.0f, 0.0f);
-  ASSERT_FALSE(r.suture().open.empty());
-  r.input.hand[1].connected = 1;
-  r.input.hand[1].pose = {{0.1f, 0.1f, 0}, {}};
-  r.input.hand[1].buttons = kButtonNewSuture;
-  r.tick();
-  EXPECT_EQ(r.count(EventKind::suture_taken), 0u);
+  r.whole_bite(p);
+  EXPECT_EQ(r.count(EventKind::bite_completed), 1u);
+  EXPECT_EQ(r.count(EventKind::suture_point), 0u);
+  EXPECT_TRUE(r.thread().anchor.empty());
+  EXPECT_TRUE(r.nothing_left_of_a_bite());
+}
+
+TEST(Cut, tells_how_long_the_tail_is_and_that_the_throws_are_too_few) {
+  SceneSpec scene = weightless(90);
+  scene.technique.throws = 2;
+  Tie r({}, scene);
+  r.take();
+  r.pull_tight();
+  ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+  r.open(0);
+  const Knot k = r.suture().knot[0];
+  const size_t at = r.node_of(k.slot[1]) + 4;
+  float length = 0;
+  for (size_t i = r.node_of(k.slot[1]); i < at; ++i) length += r.thread().rest[i];
+  const float rest = r.thread().rest[at];
+  snip(r, between(r, at));
+  ASSERT_EQ(r.count(EventKind::thread_cut), 1u);
+  ASSERT_EQ(r.thread().cut[at], 1);
+  EXPECT_NEAR(r.last(EventKind::thread_cut)->value, length + 0.5f * rest, 0.0003f);
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
-  EXPECT_EQ(static_cast<Fault>(static_cast<int>(r.last(EventKind::technique_fault)->value)), Fault::needle_in_tissue);
+  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::too_few_throws));
+  EXPECT_EQ(r.last(EventKind::technique_fault)->which, 0u);
+  snip(r, between(r, r.node_of(k.slot[0]) - 5));
+  EXPECT_EQ(r.count(EventKind::thread_cut), 2u);
+  EXPECT_EQ(r.count(EventKind::technique_fault), 1u) << "of one knot it is said once";
+  // The knot holds what it held.
+  EXPECT_EQ(r.suture().knot[0].slots, 2u);
+  EXPECT_EQ(r.thread().anchor.size(), 4u);
 }
 
-TEST(Settle, an_untied_stitch_is_lost_and_told) {
-  Tied r;
-  r.let_go();
-  r.press(1, kButtonNewSuture, {0.1f, 0.1f, 0});
-  EXPECT_EQ(r.count(EventKind::stitch_settled), 0u);
-  EXPECT_EQ(r.count(EventKind::suture_taken), 1u);
-  EXPECT_EQ(static_cast<Fault>(static_cast<int>(r.last(EventKind::technique_fault)->value)), Fault::cut_before_knot);
-  EXPECT_TRUE(r.suture().settled.empty() && r.solver().pin.empty());
+TEST(Cut, in_the_stitch_is_a_fault_and_opens_it) {
+  Rig r(weightless(60));
+  r.wait(0.1f);
+  lock(r, 20, r.place(0.0f, 0.004f).at);
+  lock(r, 30, r.place(0.5f, 0.004f).at);
+  const float before = length_between_ends(r.solver(), r.suture());
+  const Vec3 a = r.point_at(0), b = r.point_at(1);
+  for (size_t i = 21; i < 30; ++i)
+    set(r.solver().x[r.thread().order[i]], lerp(a, b, static_cast<float>(i - 20) / 10) + r.place(0.25f).out * 0.004f);
+  const Vec3 at = between(r, 25);
+  snip(r, at);
+  ASSERT_EQ(r.count(EventKind::thread_cut), 1u);
+  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::cut_in_stitch));
+  EXPECT_GT(length_between_ends(r.solver(), r.suture()), before + 0.01f) << "nothing is drawn together any more";
+  r.wait(0.3f);
+  EXPECT_EQ(cuts(r), 1u) << "nothing is repaired";
 }
 
-// "so that physics is no longer performed on previous sutures": what a tick works on stays the same over ten of them, and such
-// a state can be saved and loaded.
-TEST(Settle, ten_stitches_leave_one_thread) {
-  Tied r;
-  for (int i = 0; i < 10; ++i) {
-    if (i > 0) {
-      const Place p = r.place(0.4f + 0.5f * static_cast<float>(i));
-      r.whole_bite(p);
-      r.draw(p, 0.05f, 0.6f);
-      ASSERT_EQ(r.suture().point.size(), 2u) << i;
-    }
-    r.tie();
-    r.let_go();
-    r.press(1, kButtonNewSuture, {0.1f, 0.1f, 0});
-    r.input.hand[1].buttons = 0;
-    r.wait(0.1f);
-    ASSERT_EQ(r.suture().settled.size(), static_cast<size_t>(i) + 1);
-    EXPECT_EQ(r.thread().order.size(), 175u);
-    EXPECT_TRUE(r.thread().anchor.empty());
-    EXPECT_EQ(r.solver().pin.size(), 2 * (static_cast<size_t>(i) + 1));
+TEST(Cut, to_a_pull_is_the_end_of_the_thread) {
+  Rig r(weightless(40));
+  r.wait(0.1f);
+  const Place p = r.place(0.4f, 0.004f);
+  lock(r, 30, p.at);
+  lay(r, 0, 29, r.point_at(0), p.up, -1);
+  lay(r, 31, 39, r.point_at(0), p.out, 1);
+  put_needle(r, xyz(r.x()[r.thread().order.back()]));
+  r.thread().cut[24] = 1;
+  const std::vector<uint32_t> order(r.thread().order.begin(), r.thread().order.begin() + 26);
+  for (int i = 0; i < 100; ++i) {
+    Pose to = r.circle();
+    to.p += p.out * 0.0002f;
+    r.needle_to(to, 1.0f / 60);
   }
-  const auto bytes = save_state(*r.model, *r.state);
-  StatePtr again = initial_state(*r.model);
-  load_state(*r.model, *again, bytes);
-  EXPECT_EQ(hash_state(*r.model, *r.state), hash_state(*r.model, *again));
+  EXPECT_GE(r.count(EventKind::particle_passed), 3u);
+  EXPECT_GE(r.count(EventKind::thread_ran_out), 1u);
+  EXPECT_TRUE(std::equal(order.begin(), order.end(), r.thread().order.begin())) << "what is beyond the cut stays";
+  EXPECT_EQ(r.thread().cut[24], 1);
+  EXPECT_EQ(cuts(r), 1u);
+  EXPECT_EQ(r.node_of_point(0), 26u);
+}
+
+TEST(Cut, through_a_loop_takes_it_off) {
+  Tie r;
+  ASSERT_EQ(r.loop().wraps, 1u);
+  snip(r, between(r, r.node_of(r.loop().first) + 1));
+  EXPECT_EQ(r.count(EventKind::loop_released), 1u);
+  EXPECT_EQ(r.loop().wraps, 0u);
+  EXPECT_EQ(r.holds(HoldKind::loop), 0u);
+}
+
+TEST(Cut, off_the_stitch_takes_a_throw_back) {
+  TieSetup setup;
+  setup.older = 45, setup.newer = 50;
+  Tie r(setup);
+  r.take();
+  ASSERT_EQ(r.suture().knot.size(), 1u);
+  r.thread().cut[r.node_of_point(0) - 3] = 1;  // the taken end, between jaw and stitch
+  r.tick();
+  EXPECT_EQ(r.count(EventKind::knot_cancelled), 1u);
+  EXPECT_TRUE(r.suture().knot.empty());
+  EXPECT_EQ(r.thread().anchor.size(), 2u);
+}
+
+// A stay suture: "A tool can grab the two ends of the thread and hold it."
+TEST(Cut, both_ends_are_held_by_one_tool) {
+  Rig r(weightless(80));
+  r.wait(0.1f);
+  snip(r, between(r, 70));
+  const Vec3 at{0.05f, 0.05f, 0.05f};
+  for (size_t i = 0; i <= 35; ++i) {  // a hairpin whose ends meet
+    set(r.solver().x[r.thread().order[i]], at + Vec3{0.001f, 0, -0.0016f * static_cast<float>(i)});
+    set(r.solver().x[r.thread().order[70 - i]], at + Vec3{-0.001f, 0, -0.0016f * static_cast<float>(i)});
+  }
+  ToolInput& hand = r.input.hand[0];
+  hand.connected = 1, hand.pose = {at, {}}, hand.jaw = 0.3f;
+  r.tick();
+  ASSERT_EQ(r.suture().hand[0].held, Held::thread);
+  std::vector<uint32_t> held;
+  for (const ThreadHold& h : r.thread().hold)
+    if (h.kind == HoldKind::jaw) held.push_back(h.slot);
+  ASSERT_EQ(held.size(), 2u);
+  EXPECT_LE(std::min(r.node_of(held[0]), r.node_of(held[1])), 2u);
+  EXPECT_GE(std::max(r.node_of(held[0]), r.node_of(held[1])), 68u);
+  for (int i = 0; i < 30; ++i) {
+    hand.pose.p.y += 0.0005f;
+    r.tick();
+    for (uint32_t slot : held) EXPECT_LT(distance(xyz(r.x()[slot]), r.solver().body[0].x), 0.004f);
+  }
+  for (float jaw : {0.4f, 0.7f}) hand.jaw = jaw, r.tick();
+  for (const ThreadHold& h : r.thread().hold) EXPECT_NE(h.kind, HoldKind::jaw) << "opening drops both";
 }
 
 }  // namespace

@@ -203,4 +203,26 @@ inline void put_needle(Rig& rig, Vec3 swage) {
   set(rig.solver().x[rig.thread().order.back()], swage);
 }
 
+// --- scissors ---
+// Hand 1, free of everything, cuts at `at`.
+inline void snip(Rig& r, Vec3 at, size_t hand = 1) {
+  r.input.hand[hand].connected = 1;
+  r.input.hand[hand].pose = {at, axis_angle({1, 0, 0}, 1.2f)};
+  RigidBody& b = r.solver().body[hand];
+  b = {};
+  b.x = b.prev_x = at, b.q = b.prev_q = r.input.hand[hand].pose.q;
+  r.state->hand[hand] = r.input.hand[hand].pose;
+  r.state->hand_known[hand] = 1;
+  r.input.hand[hand].buttons = kButtonCut;
+  r.tick();
+  r.input.hand[hand].buttons = 0;
+  r.input.hand[hand].pose.p += Vec3{0, 0.1f, 0};
+  b.x = b.prev_x = r.input.hand[hand].pose.p;
+  r.state->hand[hand] = r.input.hand[hand].pose;
+  r.tick();
+}
+inline Vec3 between(Rig& r, size_t node, float s = 0.5f) {
+  return lerp(xyz(r.x()[r.thread().order[node]]), xyz(r.x()[r.thread().order[node + 1]]), s);
+}
+
 }  // namespace catgut

@@ -23,15 +23,28 @@ struct Tie : Rig {
 
   explicit Tie(const TieSetup& s = {}, const SceneSpec& scene = weightless(90)) : Rig(fitting(scene, s)), setup(s) {
     wait(0.1f);
-    first = place(0.2f, 0.004f);
-    second = place(0.55f, 0.004f);
-    lock(*this, s.older, first.at);
-    lock(*this, s.newer, second.at);
-    stand(s.above);
-    lay_stitch();
-    lay_strands(s.turns, s.way, s.wrap_tail);
-    update_thread_collisions(model->solver, solver(), model->suture);
+    sew(0.2f);
     show(s.tool, frame, 0.7f);
+  }
+  // Two suture points, from `angle` round the rim on, and both strands led to the tool.
+  void sew(float angle) {
+    first = place(angle, 0.004f);
+    second = place(angle + 0.35f, 0.004f);
+    lock(*this, setup.older, first.at);
+    lock(*this, setup.newer, second.at);
+    stand(setup.above);
+    lay_stitch();
+    lay_strands(setup.turns, setup.way, setup.wrap_tail);
+    update_thread_collisions(model->solver, solver(), model->suture);
+  }
+  // Puts the tool where a new stitch wants it, jaws open: no way is flown.
+  void put_tool() {
+    RigidBody& b = solver().body[setup.tool];
+    b = {};
+    b.x = b.prev_x = frame.p, b.q = b.prev_q = frame.q;
+    state->hand[setup.tool] = frame;
+    suture().loop[setup.tool].spent = 0;
+    input.hand[setup.tool].pose = frame;
   }
   static SceneSpec fitting(SceneSpec scene, const TieSetup& s) {
     scene.thread.particles = static_cast<int>(s.particles);
@@ -124,26 +137,49 @@ struct Tie : Rig {
     line(c, from, from + normalized(tip - from) * 0.3f);
     return c;
   }
+  // The nodes out of which the two strands come: those of the last locked knot, or of the outermost suture points.
+  std::array<size_t, 2> roots() {
+    if (!suture().knot.empty() && suture().knot.back().slots == 2)
+      return {node_of(suture().knot.back().slot[0]), node_of(suture().knot.back().slot[1])};
+    size_t a = thread().order.size(), b = 0;
+    for (size_t k = 0; k < suture().point.size(); ++k) a = std::min(a, node_of_point(k)), b = std::max(b, node_of_point(k));
+    return {a, b};
+  }
+  Vec3 at_node(size_t i) { return thread_position(thread(), i, x(), solver().body); }
   void lay_strands(float turns, int way, bool wrap_tail) {
-    const size_t n = thread().order.size(), a = node_of_point(0), b = node_of_point(1);
-    const Vec3 pa = point_at(0), pb = point_at(1);
+    const auto [a, b] = roots();
     const auto strand = [&](Vec3 from, bool wrapped) {
       return wrapped && turns > 0 ? round_the_tool(from, turns, way) : past_the_tip(from);
     };
-    lay_along(a - 1, -1, strand(pa, wrap_tail), 0);
-    lay_along(b + 1, 1, strand(pb, !wrap_tail), n - 1);
+    lay_along(a - 1, -1, strand(at_node(a), wrap_tail), 0);
+    lay_along(b + 1, 1, strand(at_node(b), !wrap_tail), thread().order.size() - 1);
+    if (ghost >= 0) let_go();
     put_needle(*this, xyz(solver().x[thread().order.back()]));
+  }
+  // The tool lets go, comes back over the stitch, and has thread laid round it anew.
+  void wrap(int way, float turns = 1.25f) {
+    open(setup.tool);
+    stand(setup.above);
+    put_tool();
+    setup.way = way;
+    lay_strands(turns, way, setup.wrap_tail);
+    tick();
+  }
+  // Moves the tool away until the throw in hand has been set, and waits until the stitch is snug.
+  void pull_tight(float metres = 0.018f) {
+    move(setup.tool, rotate(frame.q, Vec3{0, 0.7f, 0.7f}) * metres, metres / 0.06f);
+    wait(0.4f);
   }
   // Lays the strand that is not wrapped past the tip of the tool and has the jaws close on it before it can move. Thread is
   // light and stiff: left alone it springs away within a tick.
   void take(size_t hand = 0) {
     frame = solver().body[setup.tool].pose();
     if (setup.wrap_tail) {
-      lay_along(node_of_point(1) + 1, 1, past_the_tip(point_at(1)), thread().order.size() - 1);
+      lay_along(roots()[1] + 1, 1, past_the_tip(at_node(roots()[1])), thread().order.size() - 1);
       if (ghost >= 0) let_go();
       put_needle(*this, xyz(solver().x[thread().order.back()]));
     } else {
-      lay_along(node_of_point(0) - 1, -1, past_the_tip(point_at(0)), 0);
+      lay_along(roots()[0] - 1, -1, past_the_tip(at_node(roots()[0])), 0);
     }
     input.hand[hand].jaw = 0.3f;
     tick();

@@ -1,0 +1,239 @@
+// tests/suture: a fresh needle and thread: what is tied settles, the rest goes, and nothing grows but what it leaves behind.
+#include <gtest/gtest.h>
+
+#include "tie.h"
+
+namespace catgut {
+namespace {
+
+void press(Rig& r, size_t hand = 0) {
+  r.input.hand[hand].buttons = kButtonNewSuture;
+  r.tick();
+  r.input.hand[hand].buttons = 0;
+}
+
+// Ties two throws, or one, and cuts both ends.
+void tie_and_cut(Tie& r, int throws = 2) {
+  const size_t before = r.count(EventKind::knot_locked);
+  for (int k = 0; k < throws; ++k) {
+    if (k > 0) r.wrap(k % 2 ? -1 : 1);
+    r.take();
+    r.pull_tight();
+  }
+  ASSERT_EQ(r.count(EventKind::knot_locked), before + static_cast<size_t>(throws));
+  r.open(0);
+  const Knot k = r.suture().knot.back();
+  snip(r, between(r, r.node_of(k.slot[0]) - 5));
+  snip(r, between(r, r.node_of(k.slot[1]) + 4));
+}
+
+void expect_fresh(Rig& r) {
+  const StatePtr fresh = initial_state(*r.model);
+  const SolverState &a = r.solver(), &b = fresh->solver;
+  EXPECT_EQ(a.thread.order, b.thread.order);
+  EXPECT_EQ(a.thread.rest, b.thread.rest);
+  EXPECT_EQ(a.thread.cut, b.thread.cut);
+  EXPECT_EQ(a.thread.anchor.size(), 0u);
+  ASSERT_EQ(a.thread.hold.size(), 1u);
+  EXPECT_EQ(a.thread.hold[0].kind, HoldKind::swage);
+  EXPECT_EQ(a.thread_collides, b.thread_collides);
+  EXPECT_EQ(a.weld.size(), 2u);
+  EXPECT_TRUE(a.channel.empty());
+  EXPECT_TRUE(r.suture().point.empty());
+  EXPECT_TRUE(r.suture().knot.empty());
+  for (const ToolLoop& l : r.suture().loop) EXPECT_EQ(l.wraps, 0u);
+  for (const HandState& h : r.suture().hand) EXPECT_EQ(h.held, Held::nothing);
+}
+
+TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
+  TieSetup setup;
+  setup.particles = 110;
+  Tie r(setup);
+  tie_and_cut(r);
+  if (HasFatalFailure()) return;
+  const Knot k = r.suture().knot[0];
+  const size_t first = r.node_of(k.slot[0]), last = r.node_of(k.slot[1]);
+  std::vector<Vec3> where;
+  const std::vector<uint32_t> order = r.thread().order;
+  size_t cut0 = 0, cut1 = 0;
+  for (size_t i = 0; i < r.thread().cut.size(); ++i)
+    if (r.thread().cut[i]) (i < first ? cut0 : cut1) = i;
+  const std::array<size_t, 4> at = {first, r.node_of_point(0), r.node_of_point(1), last};
+  std::array<float, 3> length{};
+  for (size_t p = 0; p < 3; ++p)
+    for (size_t i = at[p]; i < at[p + 1]; ++i) length[p] += r.thread().rest[i];
+  const Vec3 knot = position_of(k.target, r.x());
+  for (size_t i = cut0 + 1; i <= cut1; ++i) where.push_back(xyz(r.x()[order[i]]));
+  std::vector<Event> events;
+  ASSERT_TRUE(new_suture(r.model->solver, r.solver(), r.model->suture, r.suture(), r.model->start, r.model->needle_start,
+                         {kButtonNewSuture, 0}, events));
+  // The curve: every particle of the piece, where it was; tails included, what was cut off gone.
+  ASSERT_EQ(r.suture().settled.size(), 1u);
+  Snapshot seen;
+  publish(*r.model, *r.state, seen);
+  ASSERT_EQ(seen.settled.size(), 1u);
+  ASSERT_EQ(seen.settled[0].node.size(), where.size());
+  for (size_t i = 0; i < where.size(); ++i) EXPECT_LT(distance(seen.settled[0].node[i], where[i]), 1e-4f) << i;
+  ASSERT_EQ(seen.settled[0].knot.size(), 1u);
+  EXPECT_LT(distance(seen.settled[0].knot[0], knot), 1e-5f);
+  // The pins: knot, point, point, knot, as long as the thread between them.
+  ASSERT_EQ(r.solver().pin.size(), 3u);
+  for (size_t p = 0; p < 3; ++p) {
+    EXPECT_EQ(r.solver().pin[p].owner, PinOwner::stitch);
+    EXPECT_NEAR(r.solver().pin[p].length, length[p], 1e-7f);
+  }
+  expect_fresh(r);
+  EXPECT_EQ(r.suture().bite.size(), 2u) << "bites stay listed";
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[0].kind, EventKind::stitch_settled);
+  EXPECT_EQ(events[1].kind, EventKind::suture_taken);
+  EXPECT_EQ(events[1].which, 0u);
+  EXPECT_EQ(r.suture().taken, 1u);
+  const uint32_t slots = r.model->solver.thread.first_slot;
+  for (uint32_t i = slots; i < r.model->solver.count; ++i) EXPECT_EQ(xyz(r.x()[i]), r.model->start[i]);
+  EXPECT_EQ(r.needle().x, r.model->needle_start.p);
+}
+
+// What the thread held together stays together when the tissue is pulled at.
+TEST(Settle, the_pins_hold_what_the_thread_held) {
+  float apart[2];
+  for (const bool held : {true, false}) {
+    TieSetup setup;
+    setup.particles = 110;
+    Tie r(setup);
+    tie_and_cut(r);
+    if (HasFatalFailure()) return;
+    const TissuePoint a = r.thread().anchor[r.suture().point[0].anchor].point,
+                      b = r.thread().anchor[r.suture().point[1].anchor].point;
+    press(r);
+    if (!held) r.solver().pin.clear();
+    const Vec3 pa = position_of(a, r.x()), pb = position_of(b, r.x()), way = normalized(pb - pa);
+    for (const auto& [point, from, sign] : {std::tuple{a, pa, -1.0f}, std::tuple{b, pb, 1.0f}}) {
+      Attachment pull;
+      pull.point = point;
+      pull.target = from + way * (0.004f * sign);
+      pull.compliance = 0.02f;
+      r.solver().attach.push_back(pull);
+    }
+    r.wait(1.0f);
+    apart[held ? 0 : 1] = distance(position_of(a, r.x()), position_of(b, r.x()));
+  }
+  EXPECT_LT(apart[0], apart[1] - 0.0005f);
+}
+
+TEST(Settle, not_with_the_needle_in_the_tissue) {
+  Rig r;
+  r.wait(0.2f);
+  const Place p = r.place(0.4f);
+  r.approach(p);
+  r.drive(p, -1.0f, 0.4f);
+  ASSERT_NE(phase_of(r.suture()), NeedlePhase::outside);
+  const uint32_t bite = r.suture().open.back().bite;
+  const Vec3 needle = r.needle().x;
+  press(r, 1);
+  r.input.hand[1].connected = 1;
+  r.input.hand[1].pose = {{0.1f, 0.1f, 0}, {}};
+  r.tick();
+  press(r, 1);
+  ASSERT_EQ(r.count(EventKind::technique_fault), 1u) << "a hand that is not there presses nothing";
+  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::needle_in_tissue));
+  EXPECT_EQ(r.last(EventKind::technique_fault)->which, bite);
+  EXPECT_EQ(r.count(EventKind::suture_taken), 0u);
+  EXPECT_LT(distance(r.needle().x, needle), 0.002f);
+}
+
+TEST(Settle, what_was_not_tied_is_taken_away_and_said) {
+  Tie r;
+  r.take();
+  ASSERT_EQ(r.suture().knot.size(), 1u);
+  press(r);
+  EXPECT_EQ(r.count(EventKind::knot_cancelled), 1u);
+  ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
+  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::cut_before_knot));
+  EXPECT_EQ(r.count(EventKind::stitch_settled), 0u);
+  EXPECT_EQ(r.count(EventKind::suture_taken), 1u);
+  EXPECT_EQ(r.count(EventKind::thread_released), 1u);
+  EXPECT_TRUE(r.suture().settled.empty());
+  EXPECT_TRUE(r.solver().pin.empty());
+}
+
+TEST(Settle, a_knot_that_does_not_hold_is_said_and_long_ends_are_trimmed) {
+  TieSetup setup;
+  setup.particles = 110;
+  Tie r(setup);
+  r.take();
+  r.pull_tight();
+  ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+  r.let_go();  // the ghost's weld is the test's own
+  press(r);
+  ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
+  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::too_few_throws));
+  ASSERT_EQ(r.suture().settled.size(), 1u);
+  // Two tails of 30 mm at most, and what is between.
+  EXPECT_LT(r.suture().settled[0].node.size(), 2 * 19 + 15u);
+  EXPECT_GT(r.suture().settled[0].node.size(), 2 * 10u);
+}
+
+// "Cost and counts": nothing that a tick works on grows.
+TEST(Settle, ten_stitches_leave_nothing_but_themselves) {
+  TieSetup setup;
+  setup.particles = 100;
+  Tie r(setup);
+  r.setup.turns = 1.25f;
+  std::vector<size_t> bytes;
+  for (int k = 0; k < 10; ++k) {
+    if (k > 0) {
+      r.sew(0.2f + 0.5f * static_cast<float>(k));
+      r.put_tool();
+      r.tick();
+    }
+    tie_and_cut(r, 1);
+    if (HasFatalFailure()) return;
+    if (r.ghost >= 0) r.let_go();
+    press(r);
+    r.input.hand[0].jaw = 0.7f;
+    ASSERT_EQ(r.suture().settled.size(), static_cast<size_t>(k) + 1);
+    EXPECT_EQ(r.solver().pin.size(), 3u * (static_cast<size_t>(k) + 1));
+    EXPECT_EQ(r.solver().weld.size(), 2u);
+    EXPECT_TRUE(r.solver().attach.empty());
+    EXPECT_TRUE(r.thread().anchor.empty());
+    EXPECT_EQ(r.thread().hold.size(), 1u);
+    EXPECT_TRUE(r.suture().knot.empty());
+    EXPECT_TRUE(r.suture().point.empty());
+    bytes.push_back(save_state(*r.model, *r.state).size());
+    const std::vector<std::byte> saved = save_state(*r.model, *r.state);
+    StatePtr again = initial_state(*r.model);
+    load_state(*r.model, *again, saved);
+    EXPECT_EQ(save_state(*r.model, *again), saved);
+    Jobs jobs(2);
+    step(*r.model, *again, r.input, jobs);
+    r.tick();
+    EXPECT_EQ(hash_state(*r.model, *again), hash_state(*r.model, *r.state));
+  }
+  EXPECT_EQ(r.suture().taken, 10u);
+  // Each leaves its curve, its pins and its bites: the same for every stitch, but for how long its tails are.
+  for (size_t k = 1; k < bytes.size(); ++k) EXPECT_LT(bytes[k] - bytes[k - 1], 3000u);
+}
+
+// The same buttons, the same bits: by inputs alone.
+TEST(Settle, replays_the_same) {
+  std::vector<uint64_t> hash[2];
+  for (int run = 0; run < 2; ++run) {
+    Rig r;
+    Jobs jobs(run + 1);
+    for (int i = 0; i < 90; ++i) {
+      ToolInput& hand = r.input.hand[1];
+      hand.connected = i > 5;
+      hand.pose = {{0.06f - 0.0002f * static_cast<float>(i), -0.034f, 0.01f}, {}};
+      hand.buttons = (i == 30 || i == 60 ? kButtonNewSuture : 0u) | (i == 40 || i == 50 ? kButtonCut : 0u);
+      r.input.tick = r.state->tick;
+      step(*r.model, *r.state, r.input, jobs);
+      hash[run].push_back(hash_state(*r.model, *r.state));
+    }
+    EXPECT_EQ(r.suture().taken, 2u);
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+}
+
+}  // namespace
+}  // namespace catgut
