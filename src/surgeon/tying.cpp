@@ -290,7 +290,7 @@ bool Scripted::fresh(const Snapshot& seen) {
 bool Scripted::take_both(const Snapshot& seen) {
   enum { lay, over, down, close };
   const size_t first = first_point_node(seen);
-  const size_t at = node_along(seen, first, 0.014f + 0.003f * static_cast<float>(misses_ % 3), -1);
+  const size_t at = node_along(seen, first, 0.008f + 0.003f * static_cast<float>(misses_ % 3), -1);
   const Vec3 thread = node_at(seen, at), knot = stitch(seen);
   const Vec3 way = normalized(thread - knot, {1, 0, 0});
   const float free = length_between(seen, last_point_node(seen), seen.thread_order.size() - 1);

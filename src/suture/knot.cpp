@@ -12,6 +12,18 @@
 namespace catgut {
 namespace {
 
+constexpr float kTaut = 0.3f;      // [N] of a strand that draws its throw down
+constexpr float kFastest = 0.25f;  // [m/s] at which it does
+
+// [N] of the tighter of the two pairs at a particle.
+float tension_at(const Thread& t, uint32_t slot) {
+  const size_t node = static_cast<size_t>(std::find(t.order.begin(), t.order.end(), slot) - t.order.begin());
+  float most = 0;
+  if (node > 0) most = std::max(most, t.tension[node - 1]);
+  if (node < t.tension.size()) most = std::max(most, t.tension[node]);
+  return most;
+}
+
 constexpr float kDrawSpeed = 0.25f;  // [m/s] thread drawn through a locked knot, and particles drawn into it
 constexpr float kSnug = 0.00005f;    // [m] of slack that a snug stitch keeps
 constexpr int kNone = -1;
@@ -371,7 +383,9 @@ void tighten(const SolverModel& model, SolverState& solver, const SolverScratch&
     // "As the tool moves away from its original position, the knot object moves towards the suture point." It never goes back
     // up again when the tool does.
     const float gone = distance(solver.body[knot.hand].x, knot.hand_from);
-    const float left = std::max(0.0f, length(knot.from) - gone);
+    float left = std::max(0.0f, length(knot.from) - gone);
+    // A strand that is drawn taut brings the throw down however short the way of the hand.
+    if (tension_at(solver.thread, knot.strand) > kTaut) left = std::max(0.0f, std::min(left, knot.left - kFastest * model.h));
     if (left < knot.left) {
       const float part = left / knot.left;
       for (ThreadAnchor& a : solver.thread.anchor)

@@ -107,15 +107,15 @@ struct SutureModel {
   float attach_compliance = 1.0f / 1100, channel_compliance = 0.002f;  // [m/N]
   float channel_drag = 0.12f;                                          // [N] per end of the channel
   float pass_tension = 0.03f;                                          // [N]
-  float capstan = 0.08f;                     // thread-tissue friction times the angle by which a suture point bends the thread
-  int collision_off = 3;                     // thread particles on each side
-  float grasp_reach = 0.003f;                // [m]
+  float capstan = 0.08f;       // thread-tissue friction times the angle by which a suture point bends the thread
+  int collision_off = 3;       // thread particles on each side
+  float grasp_reach = 0.003f;  // [m]
   float needle_grip = 40, thread_grip = 15, tissue_grip = 6;  // [N] beyond which a jaw slips
   float tissue_compliance = 5e-4f;                            // [m/N] of tissue held by a jaw
   float tissue_reach = 0.0015f;                               // [m] how near the surface must be to a closing jaw
-  float cut_reach = 0.004f;                  // [m] how near the scissors must be to the thread
-  int least_throws = 2;                      // a knot with fewer does not hold
-  float loop_reach = 0.0025f;                // [m] how far off a tool thread still lies round it
+  float cut_reach = 0.004f;                                   // [m] how near the scissors must be to the thread
+  int least_throws = 2;                                       // a knot with fewer does not hold
+  float loop_reach = 0.0025f;                                 // [m] how far off a tool thread still lies round it
   // Rest distances of neighbours: how far apart along the tool a loop's ends may be. The paper says one, of its coarser thread;
   // a hand that carries thread past the strand it crosses lays ours 2 to 3 mm deep.
   float loop_depth = 2;

@@ -207,7 +207,7 @@ inline void put_needle(Rig& rig, Vec3 swage) {
 // Hand 1, free of everything, cuts at `at`.
 inline void snip(Rig& r, Vec3 at, size_t hand = 1) {
   r.input.hand[hand].connected = 1;
-  r.input.hand[hand].pose = {at, axis_angle({1, 0, 0}, 1.2f)};
+  r.input.hand[hand].pose = {at, axis_angle({1, 0, 0}, -0.5f * kPi)};
   RigidBody& b = r.solver().body[hand];
   b = {};
   b.x = b.prev_x = at, b.q = b.prev_q = r.input.hand[hand].pose.q;
