@@ -7,6 +7,7 @@
 namespace catgut {
 namespace {
 
+constexpr float kNear = 0.001f;               // [m] as far as the thread's solve may move a node at once
 constexpr float kLargestCorrection = 0.001f;  // [m] per contact and sweep: deep overlap is undone over some substeps
 
 // The part of the relative slip `slip` that friction undoes, given the normal correction.
@@ -28,6 +29,7 @@ bool segment_after(const ContactView& v, uint32_t slot, Segment& out) {
   const uint32_t first = v.thread_model->first_slot;
   const int32_t node = v.node_of_slot[slot - first];
   if (node < 0 || static_cast<size_t>(node) + 1 >= v.thread->order.size()) return false;
+  if (v.thread->cut[static_cast<size_t>(node)]) return false;  // cut through since the candidates were found: no segment
   out.s0 = slot;
   out.s1 = v.thread->order[static_cast<size_t>(node) + 1];
   out.w0 = v.locked[out.s0 - first] ? 0 : v.thread_model->inv_mass;
@@ -83,7 +85,8 @@ uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tiss
   return touching;
 }
 
-uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float friction) {
+uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float friction,
+                               float height) {
   uint32_t touching = 0;
   for (const ThreadToolCandidate& c : list) {
     Segment s;
@@ -93,6 +96,7 @@ uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToo
     const Capsule& capsule = m.capsule[c.capsule];
     const Vec3 p = transform(b.pose(), capsule.a), q = transform(b.pose(), capsule.b);
     const Vec3 x0 = xyz(v.x[s.s0]), x1 = xyz(v.x[s.s1]);
+    if (std::min(x0.y, x1.y) > height) continue;
     const auto [ts, tt] = closest_on_segments(x0, x1, p, q);
     const Vec3 on = lerp(p, q, tt), d = lerp(x0, x1, ts) - on;
     const float reach = capsule.radius + v.thread_model->radius, l2 = length2(d);
@@ -112,6 +116,24 @@ uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToo
     (*v.on_body)[c.body].angular -= cross(r, impulse);
   }
   return touching;
+}
+
+void find_thread_touch(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float height,
+                       std::vector<ThreadTouch>& touch) {
+  touch.clear();
+  for (const ThreadToolCandidate& c : list) {
+    Segment s;
+    if (!segment_after(v, c.slot, s) || s.w0 + s.w1 == 0) continue;
+    const Vec3 x0 = xyz(v.x[s.s0]), x1 = xyz(v.x[s.s1]);
+    if (std::min(x0.y, x1.y) <= height) continue;
+    const Capsule& capsule = (*v.model)[c.body].capsule[c.capsule];
+    const Pose pose = (*v.body)[c.body].pose();
+    const Vec3 p = transform(pose, capsule.a), q = transform(pose, capsule.b);
+    const auto [ts, tt] = closest_on_segments(x0, x1, p, q);
+    const float reach = capsule.radius + v.thread_model->radius + kNear;
+    if (length2(lerp(x0, x1, ts) - lerp(p, q, tt)) > reach * reach) continue;
+    touch.push_back({static_cast<uint32_t>(v.node_of_slot[c.slot - v.thread_model->first_slot]), c.body, c.capsule});
+  }
 }
 
 uint32_t solve_thread_on_tissue(const ContactView& v, const TissueCollision& tissue,

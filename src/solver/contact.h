@@ -36,7 +36,13 @@ uint32_t solve_tissue_pairs(const ContactView& v, const TissueCollision& tissue,
                             float friction);
 uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tissue, const std::vector<ToolCandidate>& list,
                                float friction);
-uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float friction);
+// Only segments below `height` [m], if the thread's own solve sees to the others.
+uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float friction,
+                               float height);
+// Which are those: segments near a tool, above `height`. Below it thread lies on the drape. Pressed between that and a tool it
+// has nowhere to go (nothing stops such a tool but the hand), and a solve that insisted would shoot it out sideways.
+void find_thread_touch(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float height,
+                       std::vector<ThreadTouch>& touch);
 uint32_t solve_thread_on_tissue(const ContactView& v, const TissueCollision& tissue,
                                 const std::vector<ThreadTissueCandidate>& list, float friction);
 uint32_t solve_thread_on_thread(const ContactView& v, const std::vector<ThreadPairCandidate>& list, float friction);

@@ -184,6 +184,8 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     for (const ThreadAnchor& a : s.thread.anchor) k.locked[a.slot - m.thread.first_slot] = 1;
     for (const ThreadHold& a : s.thread.hold) k.locked[a.slot - m.thread.first_slot] = 1;
   }
+  // With a direct solve, thread that is off the drape meets tools inside that.
+  const float height = m.thread.direct ? m.ground + 3 * m.thread.radius : 1e9f;
   for (int sweep = 0; sweep < m.contact_sweeps; ++sweep) {
     uint32_t n = 0;
     {
@@ -192,7 +194,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     }
     {
       StageTimer timer(times, Stage::thread_contact);
-      n += solve_thread_on_tools(view, k.candidates.thread_tool, m.friction.thread);
+      n += solve_thread_on_tools(view, k.candidates.thread_tool, m.friction.thread, height);
       n += solve_thread_on_tissue(view, m.collision, k.candidates.thread_tissue, m.friction.thread);
       n += solve_thread_on_thread(view, k.candidates.thread_pair, m.friction.thread);
       n += solve_ground(view, m.ground, m.friction.tissue);
@@ -201,8 +203,19 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     if (n == 0) break;
   }
   {
+    StageTimer timer(times, Stage::thread_contact);
+    k.thread.touch.clear();
+    if (m.thread.direct) find_thread_touch(view, k.candidates.thread_tool, height, k.thread.touch);
+    k.thread.touch_friction = m.friction.thread;
+  }
+  {
     StageTimer timer(times, Stage::thread);
     solve_thread(m.thread, s.thread, k.thread, x, k.prev.data(), w, m.body, s.body, h);
+    for (const NodeContact& c : k.thread.contact) touching += c.active;
+    for (size_t b = 0; b < k.thread.on_tool.size(); ++b) {
+      k.on_body[b].linear += k.thread.on_tool[b].linear;
+      k.on_body[b].angular += k.thread.on_tool[b].angular;
+    }
   }
   {
     StageTimer timer(times, Stage::velocity);

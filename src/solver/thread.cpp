@@ -13,6 +13,7 @@ namespace catgut {
 namespace {
 
 constexpr int kNewtonSteps = 2;
+constexpr int kContactSteps = 5;      // as long as nodes come to touch a tool or leave it
 constexpr float kGoodEnough = 2e-6f;  // [m] a second step is spared when no pair is off by more
 // Of the diagonal. A light thread drawn straight between heavy ends has one soft mode, a hundred thousand times softer than the
 // diagonal, and it is the one that matters: more than this would hide it.
@@ -36,11 +37,6 @@ float node_inverse_mass(const ThreadScratch& s, const Thread& t, size_t i, Vec3 
                         const std::vector<RigidBody>& body) {
   return s.hold_at[i] < 0 ? s.w[i] : held_inverse_mass(t.hold[static_cast<size_t>(s.hold_at[i])], n, n, model, body);
 }
-Vec3 node(const ThreadScratch& s, size_t i) { return {s.x[i], s.y[i], s.z[i]}; }
-void put_node(ThreadScratch& s, size_t i, Vec3 p) { s.x[i] = p.x, s.y[i] = p.y, s.z[i] = p.z; }
-// Directions of the pairs before and after a node; zero where there is none.
-Vec3 way_after(const ThreadScratch& s, size_t i) { return {s.nx[i], s.ny[i], s.nz[i]}; }
-Vec3 way_before(const ThreadScratch& s, size_t i) { return i > 0 ? way_after(s, i - 1) : Vec3{}; }
 
 // What every node of the order is, and where.
 void gather_nodes(const ThreadModel& model, const Thread& thread, ThreadScratch& s, const Vec4* x, const Vec4* before,
@@ -81,6 +77,17 @@ void gather_nodes(const ThreadModel& model, const Thread& thread, ThreadScratch&
     put_node(s, i, transform(body[static_cast<size_t>(thread.hold[k].body)].pose(), thread.hold[k].local));
     s.w[i] = s.loose[i] = 0;
   }
+  for (const NodeContact& c : s.contact) s.contact_at[c.node] = -1;  // of the substep before
+  s.contact.clear();
+  s.on_tool.assign(body.size(), {});
+  for (const ThreadTouch& t : s.touch)
+    for (uint32_t i = t.pair; i <= t.pair + 1; ++i) {
+      if (s.loose[i] == 0 || s.contact_at[i] >= 0) continue;
+      s.contact_at[i] = static_cast<int32_t>(s.contact.size());
+      s.contact.push_back({});
+      s.contact.back().node = i;
+      s.contact.back().start = node(s, i);
+    }
 }
 
 // The tridiagonal matrix J M^-1 J^T of all stretch constraints, as what every pair sees of its two nodes, and its right-hand
@@ -104,6 +111,7 @@ float assemble(const Thread& t, ThreadScratch& s, size_t nodes, float alpha_per_
     s.mass_after[i] = held_inverse_mass(hold, n1, n1, body_model, body);
     s.across[i] = held_inverse_mass(hold, n0, n1, body_model, body);
   }
+  weigh_contacts(s, body_model, body);
   return worst;
 }
 
@@ -159,10 +167,6 @@ void solve_with_slides(const ThreadModel& model, const Thread& thread, ThreadScr
   for (size_t i = 0; i < pairs; ++i) s.step[i] = static_cast<float>(rhs[i]);
 }
 
-Vec3 impulse_on(const ThreadScratch& s, size_t i) {
-  return way_before(s, i) * (i > 0 ? s.step[i - 1] : 0) - way_after(s, i) * s.step[i];
-}
-
 // Applies the positional impulse `p` to whatever node i is, and refreshes its position.
 void push_node(ThreadScratch& s, const Thread& t, size_t i, Vec3 p, Vec4* x, const float* inv_mass,
                const std::vector<RigidModel>& model, std::vector<RigidBody>& body) {
@@ -176,6 +180,14 @@ void push_node(ThreadScratch& s, const Thread& t, size_t i, Vec3 p, Vec4* x, con
     push(model[static_cast<size_t>(hold.body)], b, p, rotate(b.q, hold.local));
     put_node(s, i, transform(b.pose(), hold.local));
   } else {
+    // Into a tool that it touches it does not go: the tool takes that part.
+    if (s.contact_at[i] >= 0) {
+      const NodeContact& c = s.contact[static_cast<size_t>(s.contact_at[i])];
+      if (const float into = dot(p, c.n); c.active && into < 0) {
+        push_tool(s, c, c.n * into, model, body);
+        p -= c.n * into;
+      }
+    }
     put_node(s, i, node(s, i) + p * s.w[i]);
   }
 }
@@ -229,6 +241,9 @@ void ThreadScratch::resize(uint32_t count) {
     c->assign(count, 0);
   anchor_at.assign(count, -1);
   hold_at.assign(count, -1);
+  contact_at.assign(count, -1);
+  contact.clear();
+  touch.clear();
   node_of_slot.assign(count, -1);
   heavy.clear();
   unfit.assign(count / 64 + 1, 0);
@@ -299,10 +314,12 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
   }
 
   if (model.direct) {
+    bool changed = false;
     s.slide.assign(thread.anchor.size(), {});  // within its capacity: no allocation once as many anchors were seen
-    for (int step = 0; step < kNewtonSteps; ++step) {
+    for (int step = 0; step < kNewtonSteps || (changed && step < kContactSteps); ++step) {
+      if (meet_tools(model, s, body_model, body, h)) changed = true;
       const float residual = assemble(thread, s, nodes, alpha_per_metre, h, body_model, body);
-      if (step > 0 && residual < kGoodEnough) break;
+      if (step > 0 && !changed && residual < kGoodEnough) break;
       solve_with_slides(model, thread, s, pairs, h);
 
       // Light nodes are held back below, heavy ones are not: a step far too long would push a needle again and again for the
@@ -325,7 +342,9 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
       // sideways, because the linearisation does not know that they come to rest on the straight line. So a light node takes a
       // bounded step, heavy ones their full one; the next step sees the new directions.
       for (const uint32_t i : s.heavy) push_node(s, thread, i, impulse_on(s, i), x, inv_mass, body_model, body);
+      hold_contacts(s);
       move_loose_nodes(s, nodes, kLargestStep * model.spacing);
+      changed = move_contacts(s, kLargestStep * model.spacing, body_model, body);
       for (size_t j = 0; j < s.slide.size(); ++j) {
         SlideState& k = s.slide[j];
         const size_t i = s.anchor_node[j];
@@ -338,6 +357,7 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
   }
 
   sweep_distances(model, thread, s, pairs, alpha_per_metre, x, inv_mass, body_model, body);
+  meet_tools(model, s, body_model, body, h);
 
   for (size_t i = 0; i < nodes; ++i) set(x[thread.order[i]], node(s, i));
   for (size_t i = 0; i < pairs; ++i) thread.tension[i] = -s.lambda[i] * inv_h2;

@@ -18,6 +18,7 @@
 #include "solver/attach.h"
 #include "solver/bend.h"
 #include "solver/thread_columns.h"
+#include "solver/thread_touch.h"
 
 namespace catgut {
 
@@ -105,8 +106,25 @@ struct ThreadScratch {
   // Of smooth_motion, per node: where it was, how far it was carried from there without its weight, how far it goes.
   PaddedColumn<float> from_x, from_y, from_z, gone_x, gone_y, gone_z, moved_x, moved_y, moved_z;
   PaddedColumn<float> stiff;  // per pair
+  // Written by the contact stage of the substep, read by solve_thread.
+  std::vector<ThreadTouch> touch;
+  float touch_friction = 0;          // coefficient of Coulomb friction
+  std::vector<ToolPush> on_tool;     // per body
+  std::vector<Vec3> load;            // per body: what the tensions press on it [N]
+  std::vector<NodeContact> contact;  // nodes of these segments
+  std::vector<int32_t> contact_at;   // per node: index of its contact, or -1
   void resize(uint32_t count);
 };
+
+// A node's position, and the directions of the pairs before and after it; zero where there is none.
+inline Vec3 node(const ThreadScratch& s, size_t i) { return {s.x[i], s.y[i], s.z[i]}; }
+inline void put_node(ThreadScratch& s, size_t i, Vec3 p) { s.x[i] = p.x, s.y[i] = p.y, s.z[i] = p.z; }
+inline Vec3 way_after(const ThreadScratch& s, size_t i) { return {s.nx[i], s.ny[i], s.nz[i]}; }
+inline Vec3 way_before(const ThreadScratch& s, size_t i) { return i > 0 ? way_after(s, i - 1) : Vec3{}; }
+// The positional impulse that the pairs' steps give a node [kg m].
+inline Vec3 impulse_on(const ThreadScratch& s, size_t i) {
+  return way_before(s, i) * (i > 0 ? s.step[i - 1] : 0) - way_after(s, i) * s.step[i];
+}
 
 // Position of node i of the order, whatever it is locked to.
 Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vector<RigidBody>& body);
