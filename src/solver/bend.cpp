@@ -22,7 +22,7 @@ HWY_INLINE V Dot3(V3 a, V3 b) { return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mu
 
 // Triplets of one colour: end columns a and c, middle column b, each starting at its own offset; `count` of them.
 struct Colour {
-  float *ax, *ay, *az, *aw, *bx, *by, *bz, *bw, *cx, *cy, *cz, *cw, *lambda;
+  float *ax, *ay, *az, *aw, *bx, *by, *bz, *bw, *cx, *cy, *cz, *cw, *lambda, *whole;
   size_t count;
 };
 
@@ -49,6 +49,7 @@ void Sweep(const Colour& t, float alpha) {
     const V w = hn::Add(hn::Add(hn::Mul(wa, ga2), hn::Mul(wb, gb2)), hn::Mul(wc, gc2));
     const V floor = hn::Mul(hn::Mul(hn::Set(d, 1e-12f), hn::Add(hn::Add(wa, wb), wc)), hn::Mul(ia, ic));
     auto live = hn::And(hn::And(hn::Ge(la2, tiny), hn::Ge(lc2, tiny)), hn::And(hn::Ge(w, floor), hn::Gt(w, zero)));
+    live = hn::And(live, hn::Gt(hn::LoadU(d, t.whole + k), zero));
     live = hn::And(live, hn::Or(hn::Ge(violation, hn::Set(d, 1e-6f)), hn::Ne(lambda, zero)));
     V step = hn::Neg(hn::Div(hn::Add(violation, hn::Mul(va, lambda)), hn::IfThenElse(live, hn::Add(w, va), one)));
     const V most = hn::Mul(hn::Mul(step, step), hn::Max(hn::Max(hn::Mul(hn::Mul(wa, wa), ga2), hn::Mul(hn::Mul(wb, wb), gb2)),
@@ -83,7 +84,7 @@ void AllBends(BendScratch& s, size_t nodes, float alpha, int sweeps) {
       const size_t count = (nodes - 2 - middle) / 3 + 1;
       Sweep({s.x[a].data() + oa, s.y[a].data() + oa, s.z[a].data() + oa, s.w[a].data() + oa, s.x[b].data() + ob,
              s.y[b].data() + ob, s.z[b].data() + ob, s.w[b].data() + ob, s.x[c].data() + oc, s.y[c].data() + oc,
-             s.z[c].data() + oc, s.w[c].data() + oc, s.lambda[b].data() + ob, count},
+             s.z[c].data() + oc, s.w[c].data() + oc, s.lambda[b].data() + ob, s.whole[b].data() + ob, count},
             alpha);
     }
 }
@@ -103,7 +104,7 @@ void BendScratch::resize(size_t nodes) {
   const size_t padded = nodes / 3 + 1 + 16;
   for (int k = 0; k < 3; ++k) {
     x[k].assign(padded, 0), y[k].assign(padded, 0), z[k].assign(padded, 0);
-    w[k].assign(padded, 0), lambda[k].assign(padded, 0);
+    w[k].assign(padded, 0), lambda[k].assign(padded, 0), whole[k].assign(padded, 1);
   }
 }
 

@@ -14,6 +14,7 @@ namespace catgut {
 struct BendScratch {
   Column<float> x[3], y[3], z[3], w[3];
   Column<float> lambda[3];  // per triplet, by the colour of its middle node (i % 3)
+  Column<float> whole[3];   // likewise: 0 where one of its pairs is cut through, 1 otherwise
   void resize(size_t nodes);
   // Node 3 k + colour.
   void set(size_t colour, size_t k, Vec3 p, float mass) {

@@ -307,7 +307,10 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
   if (model.bend_sweeps > 0) {
     // Locked nodes do not give way to bending: tissue and tools are far heavier than the thread.
     for (size_t colour = 0; colour < 3; ++colour)
-      for (size_t i = colour, k = 0; i < nodes; i += 3, ++k) s.bend.set(colour, k, node(s, i), s.loose[i] * model.inv_mass);
+      for (size_t i = colour, k = 0; i < nodes; i += 3, ++k) {
+        s.bend.set(colour, k, node(s, i), s.loose[i] * model.inv_mass);
+        s.bend.whole[colour][k] = i > 0 ? s.keep[i - 1] * s.keep[i] : 0;
+      }
     solve_bends(s.bend, nodes, model.bend_compliance, h, model.bend_sweeps);
     for (size_t colour = 0; colour < 3; ++colour)
       for (size_t i = colour, k = 0; i < nodes; i += 3, ++k) put_node(s, i, s.bend.at(colour, k));
@@ -332,6 +335,8 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
                 : s.w[i] > 0;
         if (moves) most = std::max(most, length(impulse_on(s, i)));
       }
+      for (const NodeContact& c : s.contact)
+        if (c.active && body_model[c.body].inv_mass > 0) most = std::max(most, length(impulse_on(s, c.node)));
       if (most > kMostForce * h * h) {
         const float part = kMostForce * h * h / most;
         for (size_t i = 0; i < pairs; ++i) s.step[i] *= part;

@@ -40,5 +40,24 @@ TEST(Bend, the_simd_sweep_is_the_scalar_update_by_colours) {
   }
 }
 
+TEST(Bend, a_triplet_that_spans_a_cut_does_not_bend) {
+  BendScratch scratch;
+  scratch.resize(9);
+  std::vector<Vec3> start;
+  for (size_t i = 0; i < 9; ++i) {
+    start.push_back({static_cast<float>(i) * 0.0016f, i % 2 == 0 ? 0.0004f : 0, 0});
+    scratch.set(i % 3, i / 3, start[i], 5e5f);
+  }
+  for (size_t i : {3u, 4u}) scratch.whole[i % 3][i / 3] = 0;  // pair 3 is cut
+  solve_bends(scratch, 9, 1e4f, 1.0f / 480, 3);
+  // What is done to one side does not depend on the other.
+  BendScratch half;
+  half.resize(4);
+  for (size_t i = 0; i < 4; ++i) half.set(i % 3, i / 3, start[i], 5e5f);
+  solve_bends(half, 4, 1e4f, 1.0f / 480, 3);
+  for (size_t i = 0; i < 4; ++i) EXPECT_EQ(distance(scratch.at(i % 3, i / 3), half.at(i % 3, i / 3)), 0) << i;
+  EXPECT_GT(distance(scratch.at(1, 0), start[1]), 1e-6f);
+}
+
 }  // namespace
 }  // namespace catgut

@@ -192,6 +192,68 @@ TEST(Weld, a_rigid_one_carries_force_and_torque) {
   EXPECT_LT(length(rotation_vector(body[0].q)), 2e-3f);
 }
 
+// Two particles of 20 and 50 g, each a point of tissue.
+struct Pinned {
+  Column<Vec4> x{point({0, 0, 0}), point({0.02f, 0, 0})}, v{2}, prev{2};
+  std::vector<float> w{50, 20};
+  TissuePin pin;
+  float h = 1.0f / 960;
+  Pinned(float length, float compliance) {
+    pin.a = particle_point(0), pin.b = particle_point(1);
+    pin.length = length, pin.compliance = compliance;
+  }
+  // pull: [N] on the second particle, its opposite on the first.
+  void step(Vec3 pull, float damping) {
+    prev = x;
+    pin.lambda = 0;
+    for (size_t i = 0; i < 2; ++i) {
+      add(v[i], pull * ((i == 0 ? -1.0f : 1.0f) * w[i] * h));
+      add(x[i], xyz(v[i]) * h);
+    }
+    solve_pin(pin, x.data(), w.data(), h);
+    for (size_t i = 0; i < 2; ++i) set(v[i], (xyz(x[i]) - xyz(prev[i])) / (h * (1 + damping * h)));
+  }
+  float apart() const { return distance(xyz(x[0]), xyz(x[1])); }
+};
+
+TEST(Pin, draws_together_what_is_too_far_apart_and_carries_the_pull) {
+  for (const float compliance : {0.0f, 1e-3f}) {
+    Pinned p(0.01f, compliance);
+    for (int i = 0; i < 3000; ++i) p.step({}, 30);
+    EXPECT_LT(p.apart(), 0.01 + 1e-5) << "nearer is no fault: a rope does not push them apart";
+    EXPECT_NEAR(p.x[0].x / 50 + p.x[1].x / 20, 0.02 / 20, 1e-5) << "the centre of mass stays";
+    for (int i = 0; i < 6000; ++i) p.step({0.5f, 0, 0}, 30);
+    EXPECT_NEAR(p.pin.lambda / (p.h * p.h), -0.5, 0.005);
+    EXPECT_NEAR(p.apart(), 0.01f + 0.5f * compliance, 1e-5);
+  }
+}
+
+TEST(Pin, never_pushes) {
+  Pinned p(0.03f, 0);
+  const Column<Vec4> start = p.x;
+  solve_pin(p.pin, p.x.data(), p.w.data(), p.h);
+  EXPECT_EQ(p.apart(), 0.02f);
+  EXPECT_EQ(p.pin.lambda, 0);
+  // Pushed together from outside, they come as near as they are pushed: the free fall of both.
+  for (int i = 0; i < 96; ++i) {
+    p.step({-0.01f, 0, 0}, 0);
+    EXPECT_EQ(p.pin.lambda, 0);
+  }
+  EXPECT_NEAR(p.apart(), 0.02 - 0.5 * 0.01 * 70 * 0.01, 5e-5);
+  // And drawn apart again the rope gets taut at its length, with not one sweep of push in between.
+  for (int i = 0; i < 2000; ++i) {
+    p.step({0.05f, 0, 0}, 5);
+    EXPECT_LE(p.pin.lambda, 0);
+  }
+  EXPECT_NEAR(p.apart(), 0.03, 1e-5);
+  // Sweeps too many and too far: what pulled may be given back, never more.
+  p.pin.lambda = -1e-9f;
+  set(p.x[1], xyz(p.x[0]) + Vec3{0.01f, 0, 0});
+  solve_pin(p.pin, p.x.data(), p.w.data(), p.h);
+  EXPECT_EQ(p.pin.lambda, 0);
+  EXPECT_NEAR(p.apart(), 0.01, 1e-6);
+}
+
 // A small bowel, a thread lying on it and a tool that presses into it; 200 substeps.
 uint64_t pressed_bowel(int workers, double* deepest) {
   BowelShape shape;

@@ -199,6 +199,62 @@ TEST(ThreadWeight, a_taut_light_thread_does_not_pull_by_itself) {
   }
 }
 
+// A hanging thread is cut through in its middle: what is below falls freely, what is above hangs on.
+TEST(ThreadCut, the_lower_half_falls_the_upper_half_stays) {
+  constexpr uint32_t kNodes = 61, kCut = 30;  // nodes 0 .. 30 stay
+  Line line(kNodes, 0.0016f, 2e-6f, 1e-6f, 45);
+  line.thread.hold.pop_back();
+  line.model.bend_sweeps = 3, line.model.distance_sweeps = 3, line.model.bend_compliance = 2e4f;
+  line.model.gravity = {0, -9.81f, 0};
+  for (uint32_t i = 0; i < kNodes; ++i) line.x[i] = point({0, -0.0016f * static_cast<float>(i), 0});
+  line.thread.anchor.clear();
+  auto steps = [&](int n) {
+    for (int k = 0; k < n; ++k) {
+      for (size_t i = 1; i < kNodes; ++i) line.v[i].y -= 9.81f * line.h;
+      line.step();
+    }
+  };
+  steps(960);
+  auto middle = [&](uint32_t from, uint32_t to) {
+    double sum = 0;
+    for (uint32_t i = from; i < to; ++i) sum += double{line.x[i].y} / (to - from);
+    return sum;
+  };
+  auto length_of = [&](uint32_t from, uint32_t to) {
+    double sum = 0;
+    for (uint32_t i = from; i + 1 < to; ++i) sum += double{distance(xyz(line.x[i]), xyz(line.x[i + 1]))};
+    return sum;
+  };
+  const double upper = middle(0, kCut + 1), lower = middle(kCut + 1, kNodes);
+  EXPECT_NEAR(line.thread.tension[0], 60 * 2e-6 * 9.81, 1e-5);
+  line.thread.cut[kCut] = 1;
+  line.damping = 0;
+  steps(192);
+  const double t = 0.2, fall = 0.5 * 9.81 * t * t;
+  EXPECT_NEAR(lower - middle(kCut + 1, kNodes), fall, 0.01 * fall);
+  EXPECT_NEAR(middle(0, kCut + 1), upper, 1e-4);
+  EXPECT_NEAR(length_of(0, kCut + 1), kCut * 0.0016, 1e-4 * kCut * 0.0016);
+  EXPECT_NEAR(length_of(kCut + 1, kNodes), (kNodes - kCut - 2) * 0.0016, 1e-4 * 0.048);
+  EXPECT_EQ(line.thread.tension[kCut], 0);
+  EXPECT_NEAR(line.thread.tension[0], 30 * 2e-6 * 9.81, 0.1 * 30 * 2e-6 * 9.81);
+}
+
+// Beside an anchor: no thread can pass to or from what is cut off, whatever pulls.
+TEST(ThreadCut, nothing_slides_through_an_anchor_beside_a_cut) {
+  Line line = soft_line();
+  line.pull(0.014f, 0.5f);  // it slides
+  line.pull(0.002f, 0.1f);
+  const auto rest = line.thread.rest;
+  line.thread.cut[line.at] = 1;
+  line.anchor().slipping = 1;
+  line.pull(0.01f, 0.5f);
+  EXPECT_EQ(line.thread.rest, rest);
+  EXPECT_EQ(line.anchor().slipping, 0);
+  for (const Vec4& p : line.x) EXPECT_TRUE(is_finite(xyz(p)));
+  EXPECT_NEAR(line.thread.tension.back(), 0, 1e-4) << "the needle side is loose";
+  EXPECT_GT(line.thread.tension.front(), 0.01f) << "the other is held as it was";
+}
+
 TEST(ThreadNumbers, one_segment_carries_its_load) {
   // A body of 10 g hangs on a thread of one segment: lambda / h^2 is its weight.
   Line line(2, 0.1f, 1e-4f, 1e-4f, 0);
