@@ -31,9 +31,9 @@ inline TissuePoint particle_point(uint32_t i) {
 TissuePoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at);
 
 inline Vec3 position_of(const TissuePoint& t, const Vec4* x) {
-  Vec3 p{};
-  for (uint32_t k = 0; k < t.count; ++k) p += xyz(x[t.particle[k]]) * t.weight[k];
-  return p;
+  Four p{};
+  for (uint32_t k = 0; k < t.count; ++k) p += load(x[t.particle[k]]) * t.weight[k];
+  return {p[0], p[1], p[2]};
 }
 inline float inverse_mass_of(const TissuePoint& t, const float* w) {
   float s = 0;
@@ -42,7 +42,11 @@ inline float inverse_mass_of(const TissuePoint& t, const float* w) {
 }
 // Applies the positional impulse p [kg m] at the point.
 inline void push(const TissuePoint& t, Vec4* x, const float* w, Vec3 p) {
-  for (uint32_t k = 0; k < t.count; ++k) add(x[t.particle[k]], p * (w[t.particle[k]] * t.weight[k]));
+  const Four four{p.x, p.y, p.z, 0};
+  for (uint32_t k = 0; k < t.count; ++k) {
+    Vec4& at = x[t.particle[k]];
+    store(at, load(at) + four * (w[t.particle[k]] * t.weight[k]));
+  }
 }
 
 // Particle (or weighted point) to a fixed place in the world, or to a place in a body's frame.

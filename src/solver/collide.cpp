@@ -10,7 +10,6 @@ namespace catgut {
 namespace {
 
 constexpr uint32_t kBlock = 16;
-using Four = float __attribute__((vector_size(16)));  // lanes of a position
 
 bool boxes_meet(Vec3 l0, Vec3 u0, Vec3 l1, Vec3 u1) {
   return l0.x <= u1.x && l1.x <= u0.x && l0.y <= u1.y && l1.y <= u0.y && l0.z <= u1.z && l1.z <= u0.z;
@@ -66,10 +65,7 @@ void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Ve
     // Four maxima, so that none waits for the one before.
     Four most_of[4] = {};
     auto look = [&](uint32_t i, Four& worst) {
-      Four now, then;
-      std::memcpy(&now, &x[i], sizeof now);
-      std::memcpy(&then, &c.built_at[i], sizeof then);
-      const Four d = now - then, d2 = d * d;
+      const Four d = load(x[i]) - load(c.built_at[i]), d2 = d * d;
       worst = d2 > worst ? d2 : worst;
     };
     uint32_t i = 0;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 namespace catgut {
 namespace {
@@ -26,15 +25,6 @@ void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   std::fill(scratch.on_body.begin(), scratch.on_body.end(), BodyContact{});
   std::fill(scratch.thread.lambda.begin(), scratch.thread.lambda.end(), 0.0f);
 }
-
-// A position or velocity as one register: the fourth lane (1, or 0) takes part in no change.
-using Four = float __attribute__((vector_size(16)));
-Four load(const Vec4& a) {
-  Four f;
-  std::memcpy(&f, &a, sizeof f);
-  return f;
-}
-void store(Vec4& a, Four f) { std::memcpy(&a.x, &f, sizeof f); }
 
 void predict_particles(const SolverModel& m, SolverState& s, SolverScratch& k, size_t first, size_t last) {
   auto run = [&](size_t from, size_t to, Vec3 gravity) {

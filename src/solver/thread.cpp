@@ -61,6 +61,7 @@ void gather_nodes(const ThreadModel& model, const Thread& thread, ThreadScratch&
   auto node_of = [&](uint32_t slot) { return static_cast<uint32_t>(s.node_of_slot[slot - model.first_slot]); };
   s.heavy.clear();
   s.anchor_node.resize(thread.anchor.size());
+  s.waiting.assign(thread.anchor.size(), {});
   for (size_t k = 0; k < thread.anchor.size(); ++k) {
     const uint32_t i = s.anchor_node[k] = node_of(thread.anchor[k].slot);
     if (s.anchor_at[i] < 0) s.heavy.push_back(i);
@@ -167,13 +168,14 @@ void solve_with_slides(const ThreadModel& model, const Thread& thread, ThreadScr
   for (size_t i = 0; i < pairs; ++i) s.step[i] = static_cast<float>(rhs[i]);
 }
 
-// Applies the positional impulse `p` to whatever node i is, and refreshes its position.
-void push_node(ThreadScratch& s, const Thread& t, size_t i, Vec3 p, Vec4* x, const float* inv_mass,
-               const std::vector<RigidModel>& model, std::vector<RigidBody>& body) {
+// Applies the positional impulse `p` to whatever node i is, and refreshes its position. Tissue under an anchor waits for
+// push_anchors: its sixteen particles are dear, and the node goes just where they will put it, but for what the pushes of
+// other anchors on the same particles do.
+void push_node(ThreadScratch& s, const Thread& t, size_t i, Vec3 p, const std::vector<RigidModel>& model,
+               std::vector<RigidBody>& body) {
   if (s.anchor_at[i] >= 0) {
-    const ThreadAnchor& anchor = t.anchor[static_cast<size_t>(s.anchor_at[i])];
-    push(anchor.point, x, inv_mass, p);
-    put_node(s, i, position_of(anchor, x));
+    s.waiting[static_cast<size_t>(s.anchor_at[i])] += p;
+    put_node(s, i, node(s, i) + p * s.w[i]);
   } else if (s.hold_at[i] >= 0) {
     const ThreadHold& hold = t.hold[static_cast<size_t>(s.hold_at[i])];
     RigidBody& b = body[static_cast<size_t>(hold.body)];
@@ -192,6 +194,14 @@ void push_node(ThreadScratch& s, const Thread& t, size_t i, Vec3 p, Vec4* x, con
   }
 }
 
+// Gives the tissue what its anchors were pushed by.
+void push_anchors(ThreadScratch& s, const Thread& t, Vec4* x, const float* inv_mass) {
+  for (size_t k = 0; k < t.anchor.size(); ++k) {
+    if (length2(s.waiting[k]) > 0) push(t.anchor[k].point, x, inv_mass, s.waiting[k]);
+    s.waiting[k] = {};
+  }
+}
+
 // The next pair from i on that is marked, or `pairs`.
 size_t next_unfit(const ThreadScratch& s, size_t i, size_t pairs) {
   for (; i < pairs; i = (i / 64 + 1) * 64) {
@@ -205,7 +215,7 @@ void mark_unfit(ThreadScratch& s, size_t i) { s.unfit[i / 64] |= uint64_t{1} << 
 // Gauss-Seidel sweeps over the pairs in their order. After the direct solve nine in ten are right already: those are found at
 // once and passed by; a pair that was moved marks its neighbours, which leaves the order of the work as it would be.
 void sweep_distances(const ThreadModel& model, const Thread& thread, ThreadScratch& s, size_t pairs, float alpha_per_metre,
-                     Vec4* x, const float* inv_mass, const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body) {
+                     const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body) {
   std::copy(thread.rest.begin(), thread.rest.end(), s.rest.begin());
   find_unfit_pairs(s, pairs, alpha_per_metre);
   for (int sweep = 0; sweep < model.distance_sweeps; ++sweep)
@@ -224,8 +234,8 @@ void sweep_distances(const ThreadModel& model, const Thread& thread, ThreadScrat
       if (w + alpha <= 0) continue;
       const float dl = (-(l - rest) - compliant) / (w + alpha);
       s.lambda[i] += dl;
-      push_node(s, thread, i, n * -dl, x, inv_mass, body_model, body);
-      push_node(s, thread, i + 1, n * dl, x, inv_mass, body_model, body);
+      push_node(s, thread, i, n * -dl, body_model, body);
+      push_node(s, thread, i + 1, n * dl, body_model, body);
       if (i > 0) mark_unfit(s, i - 1);
       if (i + 1 < pairs) mark_unfit(s, i + 1);
     }
@@ -346,7 +356,10 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
       // A bent stretch of light thread between heavy ends: the impulse that moves the ends would throw the light nodes far
       // sideways, because the linearisation does not know that they come to rest on the straight line. So a light node takes a
       // bounded step, heavy ones their full one; the next step sees the new directions.
-      for (const uint32_t i : s.heavy) push_node(s, thread, i, impulse_on(s, i), x, inv_mass, body_model, body);
+      for (const uint32_t i : s.heavy) push_node(s, thread, i, impulse_on(s, i), body_model, body);
+      push_anchors(s, thread, x, inv_mass);
+      for (const uint32_t i : s.heavy)  // where the pushes of all have put them
+        if (s.anchor_at[i] >= 0) put_node(s, i, position_of(thread.anchor[static_cast<size_t>(s.anchor_at[i])], x));
       hold_contacts(s);
       move_loose_nodes(s, nodes, kLargestStep * model.spacing);
       changed = move_contacts(s, kLargestStep * model.spacing, body_model, body);
@@ -361,7 +374,8 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Ve
     }
   }
 
-  sweep_distances(model, thread, s, pairs, alpha_per_metre, x, inv_mass, body_model, body);
+  sweep_distances(model, thread, s, pairs, alpha_per_metre, body_model, body);
+  push_anchors(s, thread, x, inv_mass);
   meet_tools(model, s, body_model, body, h);
 
   for (size_t i = 0; i < nodes; ++i) set(x[thread.order[i]], node(s, i));

@@ -101,6 +101,7 @@ struct ThreadScratch {
   Strands<float, 3> motion;
   BendScratch bend;
   std::vector<SlideState> slide;      // per anchor
+  std::vector<Vec3> waiting;          // per anchor: impulse that its tissue has yet to get [kg m]
   std::vector<uint32_t> anchor_node;  // per anchor
   std::vector<int32_t> node_of_slot;  // index in the order of each slot (relative to first_slot)
   // Of smooth_motion, per node: where it was, how far it was carried from there without its weight, how far it goes.

@@ -39,8 +39,7 @@ struct ToolPush {
 // Brings every segment of s.touch out of its tool and finds the nodes that touch. Returns whether that set has changed.
 bool meet_tools(const ThreadModel& model, ThreadScratch& s, const std::vector<RigidModel>& body_model,
                 const std::vector<RigidBody>& body, float h);
-// Puts right what the pairs see of the nodes that touch: along the normal they move with the
-// tool or not at all.
+// Puts right what the pairs see of the nodes that touch: along the normal they move with the tool or not at all.
 void weigh_contacts(ThreadScratch& s, const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body);
 // Gives the tool of a contact the positional impulse p [kg m].
 void push_tool(ThreadScratch& s, const NodeContact& c, Vec3 p, const std::vector<RigidModel>& body_model,

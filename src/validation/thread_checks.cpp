@@ -175,17 +175,17 @@ void check_hanging_chain(Lines& out) {
   const std::vector<double> want = newton_chain(level, kFrame, frames);
   // The paper gives 20 particles of 1 kg, compliance 1e-8 m/N and 100 frames; it was not at hand to say how the chain starts.
   // Assumed: 1 m spacing, released level, frames of 1/60 s without substeps, g 9.8; the first ten frames, in which the force
-  // rises from nothing and a relative error means little, are left out. The same sweeps in double precision give 6.2, 1.3 and
-  // 0.38 %: at a thousand sweeps on 20 m of chain, float32 rounding is what is left.
+  // rises from nothing and a relative error means little, are left out. The paper's third number, 0.5 % after 1000 sweeps, is
+  // not checked: the same sweeps in double precision give 0.38 %, but these kernels are float32, which is 2 % there whatever
+  // the chain's size (docs/solver.md).
   const std::string source = "XPBD 2016 sec. 6.2; assumed: released level, 1 m spacing, frames 10 to 100";
   struct Published {
     int sweeps;
     double error, tolerance;
   };
-  for (const Published& p : {Published{50, 0.06, 0.2}, Published{100, 0.02, 0.4}, Published{1000, 0.005, 4.0}})
+  for (const Published& p : {Published{50, 0.06, 0.2}, Published{100, 0.02, 0.4}})
     out.add("chain force error, " + std::to_string(p.sweeps) + " sweeps", p.error,
-            chain_error(level, kFrame, false, p.sweeps, fallen, want), p.tolerance, "1",
-            source + (p.sweeps == 1000 ? "; float32 limits it" : ""));
+            chain_error(level, kFrame, false, p.sweeps, fallen, want), p.tolerance, "1", source);
   // Falling, at the scenes' own substep. (At 1/60 s the whip of the chain turns its segments by a third of a radian a step, and
   // the geometric stiffness, which is what keeps fast taut thread calm, damps it: 5 % there.)
   const double substep = kFrame / 8;
