@@ -232,7 +232,7 @@ void sweep_distances(const ThreadModel& model, const Thread& thread, ThreadScrat
       const float w =
           node_inverse_mass(s, thread, i, n, body_model, body) + node_inverse_mass(s, thread, i + 1, n, body_model, body);
       if (w + alpha <= 0) continue;
-      const float dl = (-(l - rest) - compliant) / (w + alpha);
+      const float dl = distance_step(l, rest, w, alpha, s.lambda[i]);
       s.lambda[i] += dl;
       push_node(s, thread, i, n * -dl, body_model, body);
       push_node(s, thread, i + 1, n * dl, body_model, body);

@@ -140,6 +140,14 @@ void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& scrat
 // Straight (u.v = -1) has no gradient and needs none; fully folded (u.v = +1) has none either: it is left to others.
 void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float compliance, float h, float& lambda);
 
+// XPBD's multiplier step of one distance constraint (Macklin et al. 2016, eq. 18): length l, rest length, generalised inverse
+// mass w [1/kg], alpha = compliance / h^2, multiplier so far lambda. Any real type: the sweeps run it in float, `catgut
+// validate` in double too.
+template <typename Real>
+constexpr Real distance_step(Real l, Real rest, Real w, Real alpha, Real lambda) {
+  return (-(l - rest) - alpha * lambda) / (w + alpha);
+}
+
 float thread_length(const Thread& t, const Vec4* x, const std::vector<RigidBody>& body);
 
 }  // namespace catgut

@@ -91,7 +91,8 @@ void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& s
     for (uint32_t slot : solver.thread.order) {
       const bool taken =
           std::any_of(solver.thread.anchor.begin(), solver.thread.anchor.end(), [&](auto& a) { return a.slot == slot; }) ||
-          std::any_of(solver.thread.hold.begin(), solver.thread.hold.end(), [&](auto& h) { return h.slot == slot; });
+          std::any_of(solver.thread.hold.begin(), solver.thread.hold.end(), [&](auto& h) { return h.slot == slot; }) ||
+          beside_loop(solver.thread, state.loop[who], slot);
       const float d = distance(xyz(solver.x[slot]), tool.x);
       if (!taken && d < best) best = d, found = static_cast<int32_t>(slot);
     }

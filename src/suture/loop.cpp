@@ -13,11 +13,12 @@
 namespace catgut {
 namespace {
 
-constexpr size_t kMostCorners = 512;  // of the thread on one tool: a longer run is a heap, and only its beginning is looked at
-constexpr size_t kFewest = 3;         // particles of a loop: thread between two of them is straight
-constexpr float kWide = 0.95f;        // a jaw opened this far drops the loop round it
-constexpr float kShut = 0.35f;        // a jaw closed this far has taken what there is, or nothing
-constexpr size_t kSeveral = 6;        // particles that must touch, and
+constexpr size_t kMostCorners = 512;   // of the thread on one tool: a longer run is a heap, and only its beginning is looked at
+constexpr size_t kFewest = 3;          // particles of a loop: thread between two of them is straight
+constexpr float kOwnStrands = 0.012f;  // [m] of thread on either side that belong to a loop: jaws do not take them by mistake
+constexpr float kWide = 0.95f;         // a jaw opened this far drops the loop round it
+constexpr float kShut = 0.35f;         // a jaw closed this far has taken what there is, or nothing
+constexpr size_t kSeveral = 6;         // particles that must touch, and
 constexpr float kMostOfATurn =
     1.5f * kPi;                      // [rad] how far thread must go round a tool, before a loop that is none is spoken of
 constexpr double kParallel = 1e-12;  // [m^2] thread that runs along the tool is a point in the picture and crosses nothing
@@ -231,6 +232,16 @@ float pull_on(const Thread& t, const ToolLoop& loop) {
 }
 
 }  // namespace
+
+bool beside_loop(const Thread& t, const ToolLoop& loop, uint32_t slot) {
+  if (loop.wraps == 0) return false;
+  const size_t i = node_of(t, slot), first = node_of(t, loop.first), last = node_of(t, loop.last);
+  if (i >= first && i <= last) return true;
+  float apart = 0;
+  for (size_t k = std::min(i, last); k < std::max(i, first); ++k)
+    if (k < first || k >= last) apart += t.rest[k];
+  return apart < kOwnStrands;
+}
 
 void take_off_loop(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t who) {
   std::erase_if(solver.thread.hold,

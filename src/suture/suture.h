@@ -157,6 +157,8 @@ void slip(const SolverModel& model, SolverState& solver, const SutureModel& sutu
 // it. Opening the jaws wide, or a pull harder than thread_grip, lets it go.
 void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                 std::vector<Event>& events);
+// Whether a particle lies so near to the loop round a tool, along the thread, that jaws which close at the loop do not mean it.
+bool beside_loop(const Thread& thread, const ToolLoop& loop, uint32_t slot);
 // The loop leaves its tool, to become a knot or to fall off.
 void take_off_loop(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t who);
 

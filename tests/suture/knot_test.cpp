@@ -1,6 +1,9 @@
 // tests/suture: throws and knots (paper 2.4, its last two paragraphs), sentence by sentence.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
+#include "core/random.h"
 #include "tie.h"
 
 namespace catgut {
@@ -167,7 +170,7 @@ TEST(Knot, of_a_running_suture_tied_to_itself_goes_to_the_midpoint_of_the_last_t
   ASSERT_EQ(r.suture().hand[0].held, Held::thread);
   ASSERT_EQ(r.suture().knot.size(), 1u);
   EXPECT_LT(distance(target_of(r), 0.5f * (r.point_at(1) + r.point_at(2))), 1e-6f);
-  r.pull_tight(0.02f);
+  r.pull_tight();
   ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
   EXPECT_EQ(r.suture().knot[0].slots, 1u);
   EXPECT_GT(r.node_of(r.suture().knot[0].slot[0]), r.node_of_point(1)) << "a particle of the needle's strand";
@@ -197,6 +200,22 @@ TEST(Knot, begun_with_the_needle_still_in_the_tissue_is_said_and_goes_on) {
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
   EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::needle_in_tissue));
   EXPECT_EQ(r.last(EventKind::technique_fault)->which, 1u);
+  EXPECT_EQ(r.count(EventKind::knot_begun), 1u);
+}
+
+// Jaws that close right at the loop mean the other end, however near the loop's own strands are.
+TEST(Knot, the_jaws_take_the_other_end_and_not_the_loops_own_strand) {
+  TieSetup setup;
+  setup.depth = 0.0016f;
+  Tie r(setup);
+  ASSERT_EQ(r.loop().wraps, 1u);
+  float nearest = 1;
+  for (size_t i = r.node_of(r.loop().last) + 1; i < r.thread().order.size(); ++i)
+    nearest = std::min(nearest, distance(xyz(r.x()[r.thread().order[i]]), r.solver().body[0].x));
+  ASSERT_LT(nearest, r.model->suture.grasp_reach);
+  r.take();
+  ASSERT_EQ(r.suture().hand[0].held, Held::thread);
+  EXPECT_LT(r.node_of(r.suture().hand[0].slot), r.node_of_point(0));
   EXPECT_EQ(r.count(EventKind::knot_begun), 1u);
 }
 
@@ -528,6 +547,65 @@ TEST(KnotState, is_saved_whole) {
     for (size_t i = at[s]; i < hash.size(); ++i) {
       step(*r.model, *again, input[i], jobs);
       ASSERT_EQ(hash_state(*r.model, *again), hash[i]) << "saved at " << at[s] << ", tick " << i;
+    }
+  }
+}
+
+// Hands that do anything at any time: wind, take, let go, cut, ask for a fresh suture, save and load. Nothing breaks, and every
+// index leads somewhere (load_state checks).
+TEST(KnotState, survives_hands_that_do_anything) {
+  const bool long_run = std::getenv("CATGUT_LONG") != nullptr;
+  Random random(7);
+  for (int run = 0; run < (long_run ? 40 : 2); ++run) {
+    TieSetup setup;
+    setup.particles = 100;
+    setup.older = 30 + random.next() % 20, setup.newer = setup.older + 5;
+    setup.way = random.next() % 2 ? 1 : -1;
+    setup.wrap_tail = random.next() % 3 == 0;
+    SceneSpec scene = weightless(100);
+    if (random.next() % 2) scene.solver.gravity = {0, -9.81f, 0};
+    Tie r(setup, scene);
+    const double length = r.rest_length();
+    for (int i = 0; i < 60; ++i) {
+      switch (random.next() % 9) {
+        case 0:
+          if (r.suture().point.size() >= 2) r.take(random.next() % 2);
+          break;
+        case 1:
+          r.open(random.next() % 2, random.next() % 2 ? 1.0f : 0.7f);
+          break;
+        case 2:
+          r.pull_tight(0.01f + 0.01f * random.uniform());
+          break;
+        case 3:
+          r.move(0, rotate(r.frame.q, Vec3{random.uniform() - 0.5f, random.uniform(), random.uniform() - 0.5f}) * 0.02f, 0.2f);
+          break;
+        case 4:
+          if (r.suture().point.size() >= 2) r.wrap(random.next() % 2 ? 1 : -1, random.next() % 2 ? 1.25f : 2.25f);
+          break;
+        case 5:
+          snip(r, between(r, random.next() % (r.thread().order.size() - 1), random.uniform()));
+          break;
+        case 6:
+          if (random.next() % 3) break;
+          r.input.hand[0].buttons = kButtonNewSuture;
+          if (r.ghost >= 0) r.let_go();
+          r.tick();
+          r.input.hand[0].buttons = 0;
+          break;
+        case 7:
+          r.input.hand[1] = r.input.hand[0], r.input.hand[1].pose.p += Vec3{0.002f, 0, 0}, r.tick();
+          break;
+        case 8:
+          if (r.suture().point.size() < 2 && r.thread().anchor.empty()) r.sew(6 * random.uniform()), r.put_tool(), r.tick();
+          break;
+      }
+      if (HasFatalFailure()) return;
+      ASSERT_TRUE(r.order_is_whole());
+      ASSERT_NEAR(r.rest_length(), length, 1e-4);
+      const std::vector<std::byte> saved = save_state(*r.model, *r.state);
+      StatePtr again = initial_state(*r.model);
+      ASSERT_NO_THROW(load_state(*r.model, *again, saved)) << "run " << run << ", deed " << i;
     }
   }
 }

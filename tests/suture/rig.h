@@ -74,7 +74,7 @@ struct Rig {
     solver().weld.push_back(w);
   }
   void let_go() {
-    solver().weld.erase(solver().weld.begin() + ghost);
+    std::erase_if(solver().weld, [](const Weld& w) { return w.a == static_cast<int>(kNeedle) && w.b < 0; });
     ghost = -1;
   }
   // Moves the ghost evenly to `goal` (frame at the needle's circle's centre).

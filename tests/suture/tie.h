@@ -10,6 +10,7 @@ struct TieSetup {
   int way = 1;                    // +1: walked away from the tissue it turns counter-clockwise as seen from the hand
   bool wrap_tail = false;         // the free end is laid round the tool, and the needle's strand led to its tip
   float above = 0.015f;           // [m] the tool above the tissue
+  float depth = 0.006f;           // [m] from the tool's tip to the thread round it
   size_t older = 25, newer = 30;  // nodes of the two suture points
   size_t particles = 90;
   size_t tool = 0;
@@ -54,7 +55,7 @@ struct Tie : Rig {
   // The tool's frame, `above` the middle of the stitch.
   void stand(float above) {
     const Vec3 up{0, 1, 0}, out = normalized(first.out + second.out), along = cross(out, up);
-    frame = {middle() + out * above - up * 0.006f, from_axes(along, out, up)};
+    frame = {middle() + out * above - up * setup.depth, from_axes(along, out, up)};
   }
   void show(size_t hand, const Pose& pose, float jaw) {
     input.hand[hand].connected = 1;
@@ -166,8 +167,14 @@ struct Tie : Rig {
     tick();
   }
   // Moves the tool away until the throw in hand has been set, and waits until the stitch is snug.
-  void pull_tight(float metres = 0.018f) {
-    move(setup.tool, rotate(frame.q, Vec3{0, 0.7f, 0.7f}) * metres, metres / 0.06f);
+  void pull_tight(float most = 0.024f) {
+    constexpr float kStep = 0.001f;
+    const auto set = [&] {
+      return std::all_of(suture().knot.begin(), suture().knot.end(),
+                         [](const Knot& k) { return k.phase == KnotPhase::locked; });
+    };
+    for (float gone = 0; gone < most && !set(); gone += kStep)
+      move(setup.tool, rotate(frame.q, Vec3{0, 0.7f, 0.7f}) * kStep, kStep / 0.06f);
     wait(0.4f);
   }
   // Lays the strand that is not wrapped past the tip of the tool and has the jaws close on it before it can move. Thread is
