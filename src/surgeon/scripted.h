@@ -143,10 +143,9 @@ class Scripted final : public Surgeon {
   // A throw.
   Vec3 start_;
   float reach_ = 0, height_ = 0, wound_ = 0;
-  float taut_ = 1;  // the strand's straight length over what it was reckoned to be
+  float free_ = 0;  // [m] of strand between driver and needle, as it is felt
   size_t knots_before_ = 0, cuts_before_ = 0, settled_before_ = 0;
-  float frozen_at_ = 0;  // [rad] wound when the loop was last seen to grow
-  uint32_t throws_before_ = 0, wraps_seen_ = 0;
+  uint32_t throws_before_ = 0;
   uint32_t sequence_ = 0;
 };
 

@@ -10,8 +10,11 @@ constexpr float kHalfOpen = 0.7f;       // a jaw that lets go without shaking of
 constexpr float kStump = 0.007f;        // [m] of thread left on a knot
 constexpr float kWindAt = 0.024f;       // [m] behind the driver's tip, where thread is wound round it
 constexpr float kWindRadius = 0.0028f;  // [m] of a wrap's middle line
-constexpr float kWound = 0.0031f;       // [m] of thread that a radian takes, coarse as its segments are
+constexpr float kBefore = -0.25f;       // [rad] where the strand stands before it is wound
+constexpr float kWound = 0.0022f;       // [m] of thread that a radian takes
 constexpr float kApart = 0.010f;        // [m] along the driver, by which the strand's two ends stand apart
+constexpr float kLean = 0.3f;           // of the strand that leaves, along the driver
+constexpr float kTaut = 0.975f;         // of the strand's length, between driver and needle: just not taut
 constexpr float kTyingAt = 0.12f;       // place on the needle's arc: behind the swage
 
 }  // namespace
@@ -79,11 +82,9 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     // What the knot holds already is no longer in the hand.
     const float spent = seen.suture_point.empty() ? 0 : distance(seen.suture_point.back().position, start_);
     reach_ = std::max(0.03f, length_between(seen, last_point_node(seen), last) - spent);
-    taut_ = 0.97f;
-    frozen_at_ = 0;
-    wraps_seen_ = 0;
     // So high that the hand, going round below, keeps clear of the tissue.
     height_ = std::clamp(0.5f * reach_ + 0.004f, 0.025f, 0.09f);
+    wound_ = kBefore;
     throws_before_ = seen.knot.empty() ? 0 : seen.knot.back().throws;
     knots_before_ = seen.knot.size();
   }
@@ -92,54 +93,48 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   // The strand comes up on the hand's side of the turn and leaves on the tip's: the two never meet.
   const Vec3 axis_at = start_ + e1 * height_ - e2 * (side * kWindRadius) - z * kApart;
   const Pose lying = tying_pose(kDriver, axis_at - z * kWindAt);
-  // The strand, just not taut, leaving the driver after turning by w about it.
+  // The needle when the strand leaves the driver after turning by w about it.
   auto swage_at = [&](float w) {
     const float way = side * w;
     const Vec3 leave = axis_at + kWindRadius * (e2 * (side * std::cos(w)) + e1 * std::sin(w));
     const Vec3 to = e1 * std::cos(way) - e2 * std::sin(way);
-    // What lies frozen round the driver is spent; what was wound since takes its part.
-    const float left = driver.loop_wraps > 0 ? length_between(seen, node_of(seen, driver.loop_last), last) -
-                                                   kWound * std::max(0.0f, w - frozen_at_)
-                                             : reach_ - height_ - kWound * std::max(0.0f, w);
-    const float free = std::max(0.008f, taut_ * left);
     // The forceps' shaft lies on that side too.
-    return leave + to * free - z * std::min(0.4f * free, kApart);
+    return leave + to * free_ - z * std::min(kLean * free_, kApart);
   };
-  // The strand is kept just taut by feel: four per cent of slack would let it sag by a seventh of its length.
+  // How much strand is left between driver and needle is felt: a little is given while it is taut and taken while it is slack.
+  // By eye it cannot be known: four per cent of slack would let it sag by a seventh of its length.
   const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
-  if (stage_ <= wind)
-    taut_ = std::clamp(taut_ + dt_ * (tension < 0.02f   ? 0.12f
-                                      : tension > 0.2f  ? -0.5f
-                                      : tension > 0.08f ? -0.2f
-                                                        : 0.0f),
-                       0.88f, 1.02f);
+  if (stage_ == lift && waited_ <= dt_) free_ = kTaut * (reach_ - distance(start_, axis_at));
+  const float behind = stage_ <= wind ? distance(swage(seen), swage_at(wound_)) : 0;
+  if (stage_ <= wind && behind < 0.005f) {
+    free_ += dt_ * (tension < 0.02f ? 0.012f : tension > 0.1f ? -std::min(0.06f, 0.1f * tension) : 0.0f);
+    free_ = std::clamp(free_, 0.006f, reach_);
+  }
   switch (stage_) {
     case lift:
       jaw(kDriver, kHalfOpen);
       move(kDriver, {lying.p - e2 * (side * 0.03f) + Vec3{0, 0.01f, 0}, lying.q}, skill_.speed);
-      if (carry_swage(seen, swage_at(-0.25f), skill_.speed)) go(lay);
+      if (carry_swage(seen, swage_at(wound_), skill_.speed)) go(lay);
       else if (!patience(8)) go(lay);
       return false;
     case lay:
-      carry_swage(seen, swage_at(-0.25f), skill_.speed);
+      carry_swage(seen, swage_at(wound_), skill_.speed);
       if (move(kDriver, {lying.p - e2 * (side * 0.012f), lying.q}, skill_.speed)) go(beside);
       else if (!patience(6)) gave_up_ = true;
       return false;
     case beside:
-      carry_swage(seen, swage_at(-0.25f), careful());
-      if (move(kDriver, lying, careful()) || !patience(4)) {
-        wound_ = -0.25f;
-        go(wind);
-      }
+      carry_swage(seen, swage_at(wound_), careful());
+      if (move(kDriver, lying, careful()) || !patience(4)) go(wind);
       return false;
     case wind: {
       const float want = static_cast<float>(task.which) * 2 * kPi + 0.6f;
-      if (driver.loop_wraps != wraps_seen_) wraps_seen_ = driver.loop_wraps, frozen_at_ = wound_;
-      wound_ = std::min(wound_ + 2.2f * dt_, want + 0.9f);
+      // The needle is not hurried on while it lags behind: the strand would go slack, or cut the corner.
+      const float turn = 2.2f * dt_ * std::clamp(1.5f - behind / 0.006f, 0.0f, 1.0f);
+      if (wound_ + turn < want + 0.9f) wound_ += turn, free_ = std::max(0.006f, free_ - kWound * turn);
       carry_swage(seen, swage_at(wound_), 1.2f * skill_.speed);
       move(kDriver, lying, careful());
       if (driver.loop_wraps >= static_cast<uint32_t>(task.which)) go(over);
-      else if (wound_ >= want + 0.9f && waited_ > 7) go(unwind);
+      else if (!patience(9)) go(unwind);
       return false;
     }
     case over:
@@ -193,7 +188,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       return move(kDriver, raised(hand_[kDriver].pose, 0.02f), skill_.speed) || waited_ > 0.8f;
     default:  // unwind: shake the loop off and begin again
       jaw(kDriver, 1);
-      wound_ = std::max(-0.25f, wound_ - 4 * dt_);
+      wound_ = std::max(kBefore, wound_ - 4 * dt_);
       carry_swage(seen, swage_at(wound_), skill_.speed);
       if (move(kDriver, raised(lying, 0.03f), skill_.speed) && waited_ > 1) miss(lift);
       else if (!patience(5)) miss(lift);
@@ -293,9 +288,14 @@ bool Scripted::take_both(const Snapshot& seen) {
   const size_t at = node_along(seen, first, 0.008f + 0.003f * static_cast<float>(misses_ % 3), -1);
   const Vec3 thread = node_at(seen, at), knot = stitch(seen);
   const Vec3 way = normalized(thread - knot, {1, 0, 0});
-  const float free = length_between(seen, last_point_node(seen), seen.thread_order.size() - 1);
+  const float free = length_between(seen, last_point_node(seen), seen.thread_order.size() - 1) -
+                     (seen.suture_point.empty() ? 0 : distance(seen.suture_point.back().position, knot));
   const Pose goal = tying_pose(kDriver, thread);
-  carry_swage(seen, knot + normalized(way + Vec3{0, 0.04f, 0}) * (0.99f * free), skill_.speed);
+  const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
+  // Over the tissue first, then down beside the tail.
+  const float up = stage_ == lay && waited_ < 0.8f ? 1.5f : 0.25f;
+  carry_swage(seen, knot + normalized(way + Vec3{0, up, 0}) * (kTaut * free),
+              skill_.speed * std::clamp(1.2f - tension, 0.0f, 1.0f));
   switch (stage_) {
     case lay:
       jaw(kDriver, kHalfOpen);
