@@ -101,6 +101,10 @@ class Scripted final : public Surgeon {
   // Moves the forceps so that the needle's swage, which it holds, comes to `goal`.
   bool carry_swage(const Snapshot& seen, Vec3 goal, float speed);
 
+  // The node of the tail where the driver, which lies along z, is best to take it: clear of the other strand. After a miss
+  // another one, since that one may lie against the tissue.
+  size_t place_on_tail(const Snapshot& seen, Vec3 z) const;
+
   // An instrument tie. The needle's strand is held up, the driver is laid beside it, the forceps carries the strand round the
   // driver; then the driver, the loop on it, takes the tail and the hands pull apart.
   bool tie(const Task& task, const Snapshot& seen);

@@ -15,6 +15,7 @@ constexpr float kWound = 0.0022f;       // [m] of thread that a radian takes
 constexpr float kApart = 0.010f;        // [m] along the driver, by which the strand's two ends stand apart
 constexpr float kLean = 0.3f;           // of the strand that leaves, along the driver
 constexpr float kTaut = 0.975f;         // of the strand's length, between driver and needle: just not taut
+constexpr float kClear = 0.006f;        // [m] between jaws that take the tail and the other strand
 constexpr float kTyingAt = 0.12f;       // place on the needle's arc: behind the swage
 
 }  // namespace
@@ -68,8 +69,26 @@ bool Scripted::carry_swage(const Snapshot& seen, Vec3 goal, float speed) {
   return move(kForceps, {goal + (seen.tool[kForceps].pose.p - swage(seen)), tying_pose(kForceps, {}).q}, speed);
 }
 
+size_t Scripted::place_on_tail(const Snapshot& seen, Vec3 z) const {
+  const size_t first = first_point_node(seen);
+  const float from = 0.010f + 0.004f * static_cast<float>(misses_ % 4), tail = length_between(seen, 0, first);
+  const Vec3 knot = stitch(seen);
+  size_t found = node_along(seen, first, std::min(from, 0.6f * tail), -1);
+  float best = -1;
+  for (size_t i = found; i > 0 && length_between(seen, 0, i) > 0.25f * tail; --i) {
+    if (i - 1 < seen.thread_cut.size() && seen.thread_cut[i - 1]) break;
+    // The needle's strand as it will run when the jaws are there: from the knot to the turns behind them.
+    const Vec3 tip = node_at(seen, i), way = tip + z * kWindAt - knot;
+    const float s = std::clamp(dot(tip - knot, way) / std::max(length2(way), 1e-12f), 0.0f, 1.0f);
+    const float clear = std::min(distance(tip, knot + way * s), kClear);
+    if (clear > best) best = clear, found = i;
+    if (clear >= kClear) break;
+  }
+  return found;
+}
+
 bool Scripted::tie(const Task& task, const Snapshot& seen) {
-  enum { lift, lay, beside, wind, over, down, close, tighten, open, unwind };
+  enum { lift, lay, beside, wind, over, down, close, tighten, lay_down, open, unwind };
   const bool own_strand = task.kind == TaskKind::lock_strand;
   doing_ = std::string(own_strand ? "lock the thread: " : "throw: ") + std::to_string(task.which) + " wrap" +
            (task.which > 1 ? "s" : "");
@@ -142,11 +161,8 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     case close: {
       if (driver.loop_wraps == 0 && stage_ != close) return miss(lift), false;
       if (own_strand) return take_strand(seen, lying, close, tighten, lift);
-      // A place on the tail a little way from the stitch; after a miss another, since that one may lie against the tissue.
       const size_t first = first_point_node(seen);
-      const float away = 0.012f + 0.004f * static_cast<float>(misses_ % 4);
-      const Vec3 thread = node_at(seen, node_along(seen, first, away, -1));
-      const Pose goal{thread, lying.q};
+      const Pose goal{node_at(seen, place_on_tail(seen, z)), lying.q};
       // The forceps goes along above, its strand loose.
       const float loose = 0.85f * length_between(seen, node_of(seen, driver.loop_last), last);
       carry_swage(seen, hand_[kDriver].pose.p + z * kWindAt + normalized(e1 - 0.4f * z) * std::max(0.012f, loose),
@@ -178,9 +194,15 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       const Vec3 right = normalized(Vec3{side, 0.35f, 0.1f}), left = normalized(Vec3{-side, 0.35f, 0.1f});
       move(kDriver, {pull_from_.p + right * 0.08f, hand_[kDriver].pose.q}, gently(kDriver));
       carry_swage(seen, start_ + (own_strand ? Vec3{0, 1, 0} : left) * (0.9f * reach_), gently(kForceps));
-      if (locked && (waited_ > 0.5f || driver.held != Held::thread)) go(open);
+      if (locked && (waited_ > 0.5f || driver.held != Held::thread)) go(driver.held == Held::thread ? lay_down : open);
       else if (driver.held != Held::thread) miss(lift);
       else if (!patience(8)) miss(unwind);
+      return false;
+    }
+    case lay_down: {  // where the next throw finds it, and clear of the needle's strand
+      const float tail = std::abs(length_between(seen, first_point_node(seen), node_of(seen, driver.held_slot)));
+      const Vec3 place = stitch(seen) + std::min(0.03f, 0.8f * tail) * normalized(Vec3{-0.2f, 0.2f, 1.0f});
+      if (own_strand || move(kDriver, {place, hand_[kDriver].pose.q}, skill_.speed) || !patience(2)) go(open);
       return false;
     }
     case open:
@@ -287,7 +309,8 @@ bool Scripted::take_both(const Snapshot& seen) {
   const size_t first = first_point_node(seen);
   const size_t at = node_along(seen, first, 0.008f + 0.003f * static_cast<float>(misses_ % 3), -1);
   const Vec3 thread = node_at(seen, at), knot = stitch(seen);
-  const Vec3 way = normalized(thread - knot, {1, 0, 0});
+  Vec3 way = normalized(thread - knot, {1, 0, 0});
+  way = normalized(Vec3{way.x, std::max(way.y, 0.0f), way.z}, {1, 0, 0});
   const float free = length_between(seen, last_point_node(seen), seen.thread_order.size() - 1) -
                      (seen.suture_point.empty() ? 0 : distance(seen.suture_point.back().position, knot));
   const Pose goal = tying_pose(kDriver, thread);
