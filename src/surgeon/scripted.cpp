@@ -353,7 +353,7 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
 }
 
 bool Scripted::draw(const Snapshot& seen) {
-  enum { over, down, close, pull, open };
+  enum { over, down, close, pull, lay, open };
   const size_t first = first_point_node(seen);
   const BiteFrame f = frame(seen, 0);
   switch (stage_) {
@@ -385,7 +385,7 @@ bool Scripted::draw(const Snapshot& seen) {
         return 0.25f * skill_.speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.02f, 1.0f);
       };
       const bool closed = plan_.lift > 0 ? seen.closure >= kSecure : open_seam(seen) <= 0;
-      if (closed) return go(open), false;
+      if (closed) return go(plan_.lift > 0 ? open : lay), false;
       Vec3 left, right;
       if (plan_.lift > 0) {
         // The needle's end leaves the last bite, which lies before the first one along the rim; the tail leaves the first.
@@ -402,6 +402,9 @@ bool Scripted::draw(const Snapshot& seen) {
       if (!patience(20)) gave_up_ = true;
       return false;
     }
+    case lay:
+      if (lay_tail(seen) || !patience(2.5f)) go(open);
+      return false;
     default:
       if (plan_.lift > 0) return true;  // a purse-string stays in the hands
       jaw(kDriver, 1);

@@ -101,9 +101,18 @@ class Scripted final : public Surgeon {
   // Moves the forceps so that the needle's swage, which it holds, comes to `goal`.
   bool carry_swage(const Snapshot& seen, Vec3 goal, float speed);
 
+  // [m] height of the highest tissue within `radius` of a place, seen from above; that far below it where there is none.
+  float highest_near(const Snapshot& seen, Vec3 p, float radius) const;
+  // The driver, which holds the tail, brings it to where the next throw finds it: on tissue, clear of the needle's strand.
+  bool lay_tail(const Snapshot& seen);
+
   // The node of the tail where the driver, which lies along z, is best to take it: clear of the other strand. After a miss
   // another one, since that one may lie against the tissue.
   size_t place_on_tail(const Snapshot& seen, Vec3 z) const;
+
+  // How much strand [m] is left between two hands is felt: a little is given while it is taut and taken while it is slack. By
+  // eye it cannot be known: four per cent of slack let it sag by a seventh of its length.
+  float feel(float strand, float tension) const;
 
   // An instrument tie. The needle's strand is held up, the driver is laid beside it, the forceps carries the strand round the
   // driver; then the driver, the loop on it, takes the tail and the hands pull apart.

@@ -16,6 +16,12 @@ constexpr float kApart = 0.010f;        // [m] along the driver, by which the st
 constexpr float kLean = 0.3f;           // of the strand that leaves, along the driver
 constexpr float kTaut = 0.975f;         // of the strand's length, between driver and needle: just not taut
 constexpr float kClear = 0.006f;        // [m] between jaws that take the tail and the other strand
+constexpr float kNeedleBelow = 0.007f;  // [m] that the needle hangs below its swage
+constexpr float kLeastFree = 0.026f;    // [m] of strand that must be left to go round the driver
+constexpr float kLeastFreeForOwn = 0.038f;  // the same where the strand is then led along the driver to its jaws
+constexpr float kWindOwnAt = 0.016f;        // [m] behind the tip, where such a strand is wound
+constexpr float kTailAside = 0.026f;        // [m] from the stitch, where the tail is laid down
+constexpr float kNear = 0.035f;         // [m] round a stitch: tissue that hands go over
 constexpr float kTyingAt = 0.12f;       // place on the needle's arc: behind the swage
 
 }  // namespace
@@ -69,6 +75,32 @@ bool Scripted::carry_swage(const Snapshot& seen, Vec3 goal, float speed) {
   return move(kForceps, {goal + (seen.tool[kForceps].pose.p - swage(seen)), tying_pose(kForceps, {}).q}, speed);
 }
 
+float Scripted::highest_near(const Snapshot& seen, Vec3 p, float radius) const {
+  float y = p.y - radius;
+  for (size_t i = 0; i < picture_.particle_rest.size(); ++i) {
+    const Vec3 d = seen.particle[i] - p;
+    if (d.x * d.x + d.z * d.z < radius * radius) y = std::max(y, seen.particle[i].y);
+  }
+  return y;
+}
+
+bool Scripted::lay_tail(const Snapshot& seen) {
+  const Vec3 at = stitch(seen);
+  const float tail = length_between(seen, first_point_node(seen), node_of(seen, seen.tool[kDriver].held_slot));
+  const float far = std::min(kTailAside, 0.7f * tail);
+  // Not to the right, where the driver's shaft will lie; where there is tissue to lie on; rather to the left.
+  Vec3 place = at;
+  float best = -1e9f;
+  for (int k = 0; k < 8; ++k) {
+    const float turn = kPi * (0.5f + static_cast<float>(k) / 7);
+    Vec3 p = at + far * Vec3{std::cos(turn), 0, std::sin(turn)};
+    p.y = std::min(highest_near(seen, p, 0.008f) + 0.003f, at.y + 0.7f * far);
+    const float good = p.y - 0.2f * (p.x - at.x);
+    if (good > best) best = good, place = p;
+  }
+  return move(kDriver, {place, hand_[kDriver].pose.q}, skill_.speed);
+}
+
 size_t Scripted::place_on_tail(const Snapshot& seen, Vec3 z) const {
   const size_t first = first_point_node(seen);
   const float from = 0.010f + 0.004f * static_cast<float>(misses_ % 4), tail = length_between(seen, 0, first);
@@ -87,6 +119,10 @@ size_t Scripted::place_on_tail(const Snapshot& seen, Vec3 z) const {
   return found;
 }
 
+float Scripted::feel(float strand, float tension) const {
+  return strand + dt_ * (tension < 0.02f ? 0.012f : tension > 0.1f ? -std::min(0.06f, 0.1f * tension) : 0.0f);
+}
+
 bool Scripted::tie(const Task& task, const Snapshot& seen) {
   enum { lift, lay, beside, wind, over, down, close, tighten, lay_down, open, unwind };
   const bool own_strand = task.kind == TaskKind::lock_strand;
@@ -96,13 +132,15 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   const float side = static_cast<float>(task.way);
   const size_t last = seen.thread_order.size() - 1;
   if (stage_ == lift && waited_ <= dt_) {
-    // The strand rises from the last suture point, or from the knot that is already there.
-    start_ = seen.knot.empty() && !seen.suture_point.empty() ? seen.suture_point.back().position : stitch(seen);
+    // The strand rises from the last suture point, or from the knot that is already on it.
+    const bool from_point = !seen.suture_point.empty() && (own_strand || seen.knot.empty());
+    start_ = from_point ? seen.suture_point.back().position : stitch(seen);
     // What the knot holds already is no longer in the hand.
     const float spent = seen.suture_point.empty() ? 0 : distance(seen.suture_point.back().position, start_);
     reach_ = std::max(0.03f, length_between(seen, last_point_node(seen), last) - spent);
-    // So high that the hand, going round below, keeps clear of the tissue.
-    height_ = std::clamp(0.5f * reach_ + 0.004f, 0.025f, 0.09f);
+    // So high that the needle, going round below, keeps clear of the tissue, as far as the strand allows.
+    height_ = std::clamp(0.5f * (reach_ + highest_near(seen, start_, kNear) - start_.y + kNeedleBelow), 0.025f,
+                         std::max(0.025f, reach_ - (own_strand ? kLeastFreeForOwn : kLeastFree)));
     wound_ = kBefore;
     throws_before_ = seen.knot.empty() ? 0 : seen.knot.back().throws;
     knots_before_ = seen.knot.size();
@@ -111,7 +149,8 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   const Vec3 z = rotate(tying_pose(kDriver, {}).q, {0, 0, 1}), e1 = normalized(Vec3{0, 1, 0} - z * z.y), e2 = cross(z, e1);
   // The strand comes up on the hand's side of the turn and leaves on the tip's: the two never meet.
   const Vec3 axis_at = start_ + e1 * height_ - e2 * (side * kWindRadius) - z * kApart;
-  const Pose lying = tying_pose(kDriver, axis_at - z * kWindAt);
+  const float wind_at = own_strand ? kWindOwnAt : kWindAt;
+  const Pose lying = tying_pose(kDriver, axis_at - z * wind_at);
   // The needle when the strand leaves the driver after turning by w about it.
   auto swage_at = [&](float w) {
     const float way = side * w;
@@ -120,14 +159,11 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     // The forceps' shaft lies on that side too.
     return leave + to * free_ - z * std::min(kLean * free_, kApart);
   };
-  // How much strand is left between driver and needle is felt: a little is given while it is taut and taken while it is slack.
-  // By eye it cannot be known: four per cent of slack would let it sag by a seventh of its length.
   const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
   if (stage_ == lift && waited_ <= dt_) free_ = kTaut * (reach_ - distance(start_, axis_at));
   const float behind = stage_ <= wind ? distance(swage(seen), swage_at(wound_)) : 0;
   if (stage_ <= wind && behind < 0.005f) {
-    free_ += dt_ * (tension < 0.02f ? 0.012f : tension > 0.1f ? -std::min(0.06f, 0.1f * tension) : 0.0f);
-    free_ = std::clamp(free_, 0.006f, reach_);
+    free_ = std::clamp(feel(free_, tension), 0.006f, reach_);
   }
   switch (stage_) {
     case lift:
@@ -199,12 +235,9 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       else if (!patience(8)) miss(unwind);
       return false;
     }
-    case lay_down: {  // where the next throw finds it, and clear of the needle's strand
-      const float tail = std::abs(length_between(seen, first_point_node(seen), node_of(seen, driver.held_slot)));
-      const Vec3 place = stitch(seen) + std::min(0.03f, 0.8f * tail) * normalized(Vec3{-0.2f, 0.2f, 1.0f});
-      if (own_strand || move(kDriver, {place, hand_[kDriver].pose.q}, skill_.speed) || !patience(2)) go(open);
+    case lay_down:
+      if (own_strand || lay_tail(seen) || !patience(2.5f)) go(open);
       return false;
-    }
     case open:
       jaw(kDriver, kHalfOpen);
       return move(kDriver, raised(hand_[kDriver].pose, 0.02f), skill_.speed) || waited_ > 0.8f;
@@ -221,12 +254,18 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
 bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again) {
   const Vec3 z = rotate(lying.q, {0, 0, 1});
   const ToolView& driver = seen.tool[kDriver];
-  const Vec3 ahead = driver.pose.p - z * 0.02f;
+  // Straight on from the turns, along the driver and between its jaws; drawn out until it is felt to be taut.
+  const float left = length_between(seen, node_of(seen, driver.loop_last), seen.thread_order.size() - 1);
+  if (stage_ != close && waited_ <= dt_) free_ = 0.9f * left;
+  const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
+  const Vec3 ahead = lying.p - z * std::max(0.004f, free_ - kWindOwnAt);
+  const bool there = distance(swage(seen), ahead) < 0.002f;
+  if (there) free_ = feel(free_, tension);
   if (stage_ != close) {
     jaw(kDriver, kHalfOpen);
     move(kDriver, lying, careful());
-    if (carry_swage(seen, ahead, skill_.speed) && waited_ > 0.5f) go(close);
-    else if (!patience(5)) go(close);
+    carry_swage(seen, ahead, 0.5f * skill_.speed);
+    if ((there && tension > 0.03f && waited_ > 0.5f) || !patience(5)) go(close);
     return false;
   }
   if (jaw(kDriver, 0) && waited_ > 0.35f) {
