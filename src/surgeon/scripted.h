@@ -103,12 +103,11 @@ class Scripted final : public Surgeon {
 
   // [m] height of the highest tissue within `radius` of a place, seen from above; that far below it where there is none.
   float highest_near(const Snapshot& seen, Vec3 p, float radius) const;
-  // The driver, which holds the tail, brings it to where the next throw finds it: on tissue, clear of the needle's strand.
+  // The driver, which holds the tail, brings it to where the next throw finds it: in front, clear of the needle's strand.
   bool lay_tail(const Snapshot& seen);
 
-  // The node of the tail where the driver, which lies along z, is best to take it: clear of the other strand. After a miss
-  // another one, since that one may lie against the tissue.
-  size_t place_on_tail(const Snapshot& seen, Vec3 z) const;
+  // Where on the tail, and from which side, the driver is best to take it: clear of the other strand, no tissue in the way.
+  void choose_grasp(const Snapshot& seen);
 
   // How much strand [m] is left between two hands is felt: a little is given while it is taut and taken while it is slack. By
   // eye it cannot be known: four per cent of slack let it sag by a seventh of its length.
@@ -156,9 +155,12 @@ class Scripted final : public Surgeon {
   // A throw.
   Vec3 start_;
   float reach_ = 0, height_ = 0, wound_ = 0;
-  float free_ = 0;  // [m] of strand between driver and needle, as it is felt
+  float floor_ = 0;  // [m] height below which the needle would meet tissue
+  float free_ = 0;   // [m] of strand between driver and needle, as it is felt
   size_t knots_before_ = 0, cuts_before_ = 0, settled_before_ = 0;
-  uint32_t throws_before_ = 0;
+  uint32_t throws_before_ = 0, take_slot_ = 0;
+  Quat take_turn_;
+  Vec3 tried_;
   uint32_t sequence_ = 0;
 };
 

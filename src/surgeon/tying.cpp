@@ -15,20 +15,28 @@ constexpr float kWound = 0.0022f;       // [m] of thread that a radian takes
 constexpr float kApart = 0.010f;        // [m] along the driver, by which the strand's two ends stand apart
 constexpr float kLean = 0.3f;           // of the strand that leaves, along the driver
 constexpr float kTaut = 0.975f;         // of the strand's length, between driver and needle: just not taut
+constexpr float kShaft = 0.0035f;       // [m] a shaft's radius and the tissue's
 constexpr float kClear = 0.006f;        // [m] between jaws that take the tail and the other strand
 constexpr float kNeedleBelow = 0.007f;  // [m] that the needle hangs below its swage
-constexpr float kLeastFree = 0.026f;    // [m] of strand that must be left to go round the driver
+constexpr float kHighest = 0.042f;      // [m] above the tissue, for the driver that thread is wound round
+constexpr float kTooTaut = 0.3f;        // [N]
+constexpr float kLeastFree = 0.032f;    // [m] of strand that must be left to go round the driver
 constexpr float kLeastFreeForOwn = 0.038f;  // the same where the strand is then led along the driver to its jaws
 constexpr float kWindOwnAt = 0.016f;        // [m] behind the tip, where such a strand is wound
-constexpr float kTailAside = 0.026f;        // [m] from the stitch, where the tail is laid down
+constexpr float kTailAside = 0.030f;        // [m] from the stitch, where the tail is laid down
 constexpr float kNear = 0.035f;         // [m] round a stitch: tissue that hands go over
 constexpr float kTyingAt = 0.12f;       // place on the needle's arc: behind the swage
+
+// A tool along z, the open side of its jaws up.
+Quat from_tool_axis(Vec3 z) {
+  const Vec3 x = normalized(Vec3{0, 1, 0} - z * z.y);
+  return from_axes(x, cross(z, x), z);
+}
 
 }  // namespace
 
 Pose Scripted::tying_pose(size_t hand, Vec3 at) {
-  const Vec3 z = normalized(Vec3{hand == kDriver ? 1.0f : -1.0f, 0.3f, 0.15f}), x = normalized(Vec3{0, 1, 0} - z * z.y);
-  return {at, from_axes(x, cross(z, x), z)};
+  return {at, from_tool_axis(normalized(Vec3{hand == kDriver ? 1.0f : -1.0f, 0.3f, 0.15f}))};
 }
 
 bool Scripted::regrip(const Snapshot& seen) {
@@ -85,38 +93,38 @@ float Scripted::highest_near(const Snapshot& seen, Vec3 p, float radius) const {
 }
 
 bool Scripted::lay_tail(const Snapshot& seen) {
-  const Vec3 at = stitch(seen);
   const float tail = length_between(seen, first_point_node(seen), node_of(seen, seen.tool[kDriver].held_slot));
-  const float far = std::min(kTailAside, 0.7f * tail);
-  // Not to the right, where the driver's shaft will lie; where there is tissue to lie on; rather to the left.
-  Vec3 place = at;
-  float best = -1e9f;
-  for (int k = 0; k < 8; ++k) {
-    const float turn = kPi * (0.5f + static_cast<float>(k) / 7);
-    Vec3 p = at + far * Vec3{std::cos(turn), 0, std::sin(turn)};
-    p.y = std::min(highest_near(seen, p, 0.008f) + 0.003f, at.y + 0.7f * far);
-    const float good = p.y - 0.2f * (p.x - at.x);
-    if (good > best) best = good, place = p;
-  }
+  const Vec3 place = stitch(seen) + std::min(kTailAside, 0.8f * tail) * normalized(Vec3{-0.2f, 0.2f, 1.0f});
   return move(kDriver, {place, hand_[kDriver].pose.q}, skill_.speed);
 }
 
-size_t Scripted::place_on_tail(const Snapshot& seen, Vec3 z) const {
-  const size_t first = first_point_node(seen);
-  const float from = 0.010f + 0.004f * static_cast<float>(misses_ % 4), tail = length_between(seen, 0, first);
+void Scripted::choose_grasp(const Snapshot& seen) {
   const Vec3 knot = stitch(seen);
-  size_t found = node_along(seen, first, std::min(from, 0.6f * tail), -1);
-  float best = -1;
-  for (size_t i = found; i > 0 && length_between(seen, 0, i) > 0.25f * tail; --i) {
-    if (i - 1 < seen.thread_cut.size() && seen.thread_cut[i - 1]) break;
-    // The needle's strand as it will run when the jaws are there: from the knot to the turns behind them.
-    const Vec3 tip = node_at(seen, i), way = tip + z * kWindAt - knot;
-    const float s = std::clamp(dot(tip - knot, way) / std::max(length2(way), 1e-12f), 0.0f, 1.0f);
-    const float clear = std::min(distance(tip, knot + way * s), kClear);
-    if (clear > best) best = clear, found = i;
-    if (clear >= kClear) break;
+  const size_t point = first_point_node(seen), root = node_along(seen, point, distance(node_at(seen, point), knot), -1);
+  const float tail = length_between(seen, 0, root);
+  const Vec3 ways[] = {{1, 0.3f, 0.15f}, {0.8f, 0.5f, 0.6f}, {0.5f, 0.4f, 1}, {0.7f, 1, 0.1f}};
+  float best = -1e9f;
+  for (size_t i = node_along(seen, root, std::min(0.010f, 0.5f * tail), -1); i-- > 1;) {
+    if (length_between(seen, 0, i) < 0.2f * tail || (i < seen.thread_cut.size() && seen.thread_cut[i])) break;
+    const Vec3 tip = node_at(seen, i);
+    for (const Vec3& way : ways) {
+      const Vec3 z = normalized(way);
+      // The needle's strand as it will run when the jaws are there: from the knot to the turns behind them.
+      const Vec3 run = tip + z * kWindAt - knot;
+      const float s = std::clamp(dot(tip - knot, run) / std::max(length2(run), 1e-12f), 0.0f, 1.0f);
+      float good = std::min(distance(tip, knot + run * s), kClear) / kClear;
+      // Tissue in the way of the shaft.
+      for (size_t k = 0; k < picture_.particle_rest.size(); ++k) {
+        const Vec3 d = seen.particle[k] - tip;
+        const float along = dot(d, z);
+        if (along > 0.003f && along < 0.06f && length2(d - z * along) < kShaft * kShaft) good -= 0.1f;
+      }
+      // Near the knot little else lies about. Where it was tried in vain it is not tried again.
+      good -= 5 * distance(tip, knot) + (misses_ > 0 && distance(tip, tried_) < 0.004f ? 0.5f : 0.0f);
+      if (good > best) best = good, take_slot_ = seen.thread_order[i], take_turn_ = from_tool_axis(z);
+    }
   }
-  return found;
+  tried_ = node_at(seen, node_of(seen, take_slot_));
 }
 
 float Scripted::feel(float strand, float tension) const {
@@ -138,9 +146,12 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     // What the knot holds already is no longer in the hand.
     const float spent = seen.suture_point.empty() ? 0 : distance(seen.suture_point.back().position, start_);
     reach_ = std::max(0.03f, length_between(seen, last_point_node(seen), last) - spent);
-    // So high that the needle, going round below, keeps clear of the tissue, as far as the strand allows.
-    height_ = std::clamp(0.5f * (reach_ + highest_near(seen, start_, kNear) - start_.y + kNeedleBelow), 0.025f,
-                         std::max(0.025f, reach_ - (own_strand ? kLeastFreeForOwn : kLeastFree)));
+    // So high that the needle, going round below on a taut strand, keeps clear of the tissue, as far as a short strand allows;
+    // but no higher than need be, since what lies between the tissue and the turns is slack when the jaws go to the tail.
+    const float crest = highest_near(seen, start_, kNear), rise = crest - start_.y;
+    floor_ = crest + kNeedleBelow;
+    height_ = std::min(0.5f * (reach_ + rise + kNeedleBelow), own_strand ? 1.0f : rise + kHighest);
+    height_ = std::clamp(height_, 0.025f, std::max(0.025f, reach_ - (own_strand ? kLeastFreeForOwn : kLeastFree)));
     wound_ = kBefore;
     throws_before_ = seen.knot.empty() ? 0 : seen.knot.back().throws;
     knots_before_ = seen.knot.size();
@@ -151,20 +162,22 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   const Vec3 axis_at = start_ + e1 * height_ - e2 * (side * kWindRadius) - z * kApart;
   const float wind_at = own_strand ? kWindOwnAt : kWindAt;
   const Pose lying = tying_pose(kDriver, axis_at - z * wind_at);
-  // The needle when the strand leaves the driver after turning by w about it.
+  // The needle when the strand leaves the driver after turning by w about it. A long strand goes slack below, where there is no
+  // room for it, and is drawn taut again behind.
+  float room = 1;
   auto swage_at = [&](float w) {
     const float way = side * w;
     const Vec3 leave = axis_at + kWindRadius * (e2 * (side * std::cos(w)) + e1 * std::sin(w));
     const Vec3 to = e1 * std::cos(way) - e2 * std::sin(way);
+    room = to.y < 0 ? std::max(0.012f, (leave.y - floor_) / -to.y) : 1;
     // The forceps' shaft lies on that side too.
-    return leave + to * free_ - z * std::min(kLean * free_, kApart);
+    return leave + to * std::min(free_, room) - z * std::min(kLean * free_, kApart);
   };
   const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
   if (stage_ == lift && waited_ <= dt_) free_ = kTaut * (reach_ - distance(start_, axis_at));
   const float behind = stage_ <= wind ? distance(swage(seen), swage_at(wound_)) : 0;
-  if (stage_ <= wind && behind < 0.005f) {
+  if (stage_ <= wind && ((behind < 0.005f && room > free_) || tension > kTooTaut))
     free_ = std::clamp(feel(free_, tension), 0.006f, reach_);
-  }
   switch (stage_) {
     case lift:
       jaw(kDriver, kHalfOpen);
@@ -198,17 +211,19 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       if (driver.loop_wraps == 0 && stage_ != close) return miss(lift), false;
       if (own_strand) return take_strand(seen, lying, close, tighten, lift);
       const size_t first = first_point_node(seen);
-      const Pose goal{node_at(seen, place_on_tail(seen, z)), lying.q};
-      // The forceps goes along above, its strand loose.
-      const float loose = 0.85f * length_between(seen, node_of(seen, driver.loop_last), last);
-      carry_swage(seen, hand_[kDriver].pose.p + z * kWindAt + normalized(e1 - 0.4f * z) * std::max(0.012f, loose),
-                  2 * skill_.speed);
+      if (stage_ == over && waited_ <= dt_) choose_grasp(seen);
+      const Pose goal{node_at(seen, node_of(seen, take_slot_)), take_turn_};
+      // The forceps goes along above, its strand loose; neither hand hurries when that runs taut.
+      const float loose = 0.8f * length_between(seen, node_of(seen, driver.loop_last), last);
+      const Vec3 turns = hand_[kDriver].pose.p + rotate(hand_[kDriver].pose.q, {0, 0, kWindAt});
+      carry_swage(seen, turns + normalized(e1 - 0.4f * z) * loose, 2 * skill_.speed);
+      const float calm = std::clamp(1.5f - tension, 0.05f, 1.0f);
       if (stage_ == over) {
         jaw(kDriver, kHalfOpen);
-        if (move(kDriver, raised(goal, 0.012f), 0.6f * skill_.speed)) go(down);
+        if (move(kDriver, raised(goal, 0.012f), 0.6f * skill_.speed * calm)) go(down);
         else if (!patience(6)) miss(unwind);
       } else if (stage_ == down) {
-        if (move(kDriver, goal, careful())) go(close);
+        if (move(kDriver, goal, careful() * calm)) go(close);
         else if (!patience(4)) miss(over);
       } else if (jaw(kDriver, 0) && waited_ > 0.35f) {
         if (driver.held == Held::thread && node_of(seen, driver.held_slot) < first) {
@@ -260,7 +275,7 @@ bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, i
   const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
   const Vec3 ahead = lying.p - z * std::max(0.004f, free_ - kWindOwnAt);
   const bool there = distance(swage(seen), ahead) < 0.002f;
-  if (there) free_ = feel(free_, tension);
+  if (there || tension > kTooTaut) free_ = feel(free_, tension);
   if (stage_ != close) {
     jaw(kDriver, kHalfOpen);
     move(kDriver, lying, careful());
