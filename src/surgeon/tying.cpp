@@ -102,6 +102,9 @@ void Scripted::choose_grasp(const Snapshot& seen) {
   const Vec3 knot = stitch(seen);
   const size_t point = first_point_node(seen), root = node_along(seen, point, distance(node_at(seen, point), knot), -1);
   const float tail = length_between(seen, 0, root);
+  // What lies between tissue and turns is all there is: the jaws come no further.
+  const float leash = 0.9f * (length_between(seen, last_point_node(seen), node_of(seen, seen.tool[kDriver].loop_first)) -
+                              distance(node_at(seen, last_point_node(seen)), knot));
   const Vec3 ways[] = {{1, 0.3f, 0.15f}, {0.8f, 0.5f, 0.6f}, {0.5f, 0.4f, 1}, {0.7f, 1, 0.1f}};
   float best = -1e9f;
   for (size_t i = node_along(seen, root, std::min(0.010f, 0.5f * tail), -1); i-- > 1;) {
@@ -113,6 +116,7 @@ void Scripted::choose_grasp(const Snapshot& seen) {
       const Vec3 run = tip + z * kWindAt - knot;
       const float s = std::clamp(dot(tip - knot, run) / std::max(length2(run), 1e-12f), 0.0f, 1.0f);
       float good = std::min(distance(tip, knot + run * s), kClear) / kClear;
+      if (length(run) > leash) good -= 1 + 100 * (length(run) - leash);
       // Tissue in the way of the shaft.
       for (size_t k = 0; k < picture_.particle_rest.size(); ++k) {
         const Vec3 d = seen.particle[k] - tip;
