@@ -13,12 +13,13 @@ constexpr float kWindRadius = 0.0028f;  // [m] of a wrap's middle line
 constexpr float kBefore = -0.25f;       // [rad] where the strand stands before it is wound
 constexpr float kWound = 0.0022f;       // [m] of thread that a radian takes
 constexpr float kApart = 0.010f;        // [m] along the driver, by which the strand's two ends stand apart
+constexpr float kLeadBack = 0.004f;     // [m] toward the hand
 constexpr float kLean = 0.3f;           // of the strand that leaves, along the driver
 constexpr float kTaut = 0.975f;         // of the strand's length, between driver and needle: just not taut
 constexpr float kShaft = 0.0035f;       // [m] a shaft's radius and the tissue's
 constexpr float kClear = 0.006f;        // [m] between jaws that take the tail and the other strand
 constexpr float kNeedleBelow = 0.007f;  // [m] that the needle hangs below its swage
-constexpr float kHighest = 0.042f;      // [m] above the tissue, for the driver that thread is wound round
+constexpr float kHighest = 1.0f;      // [m] above the tissue, for the driver that thread is wound round
 constexpr float kTooTaut = 0.3f;        // [N]
 constexpr float kLeastFree = 0.032f;    // [m] of strand that must be left to go round the driver
 constexpr float kLeastFreeForOwn = 0.038f;  // the same where the strand is then led along the driver to its jaws
@@ -174,13 +175,13 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     const Vec3 leave = axis_at + kWindRadius * (e2 * (side * std::cos(w)) + e1 * std::sin(w));
     const Vec3 to = e1 * std::cos(way) - e2 * std::sin(way);
     room = to.y < 0 ? std::max(0.012f, (leave.y - floor_) / -to.y) : 1;
-    // The forceps' shaft lies on that side too.
-    return leave + to * std::min(free_, room) - z * std::min(kLean * free_, kApart);
+    // The forceps' shaft lies on the tip's side. A slack strand would slide off there: it is led back.
+    return leave + to * std::min(free_, room) - z * (room < free_ ? -kLeadBack : std::min(kLean * free_, kApart));
   };
   const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
   if (stage_ == lift && waited_ <= dt_) free_ = kTaut * (reach_ - distance(start_, axis_at));
   const float behind = stage_ <= wind ? distance(swage(seen), swage_at(wound_)) : 0;
-  if (stage_ <= wind && ((behind < 0.005f && room > free_) || tension > kTooTaut))
+  if ((stage_ == beside || stage_ == wind) && ((behind < 0.005f && room > free_) || tension > kTooTaut))
     free_ = std::clamp(feel(free_, tension), 0.006f, reach_);
   switch (stage_) {
     case lift:
@@ -196,7 +197,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       return false;
     case beside:
       carry_swage(seen, swage_at(wound_), careful());
-      if (move(kDriver, lying, careful()) || !patience(4)) go(wind);
+      if ((move(kDriver, lying, careful()) && tension > 0.02f) || !patience(4)) go(wind);
       return false;
     case wind: {
       const float want = static_cast<float>(task.which) * 2 * kPi + 0.6f;
