@@ -26,6 +26,7 @@ constexpr float kLeastFreeForOwn = 0.038f;  // the same where the strand is then
 constexpr float kWindOwnAt = 0.016f;        // [m] behind the tip, where such a strand is wound
 constexpr float kTailAside = 0.030f;        // [m] from the stitch, where the tail is laid down
 constexpr float kNear = 0.035f;         // [m] round a stitch: tissue that hands go over
+constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the middle of the field, where a used needle is let go
 constexpr float kTyingAt = 0.12f;       // place on the needle's arc: behind the swage
 
 // A tool along z, the open side of its jaws up.
@@ -344,10 +345,13 @@ size_t Scripted::count_cuts(const Snapshot& seen) {
 }
 
 bool Scripted::fresh(const Snapshot& seen) {
-  enum { let_go, ask, wait };
+  enum { aside, let_go, ask, wait };
   rest_aside(seen, kDriver);
-  rest_aside(seen, kForceps);
+  if (stage_ != aside) rest_aside(seen, kForceps);
   switch (stage_) {
+    case aside:  // the old needle is not dropped into the wound
+      if (move(kForceps, {picture_.focus + kAside, hand_[kForceps].pose.q}, skill_.speed) || !patience(2)) go(let_go);
+      return false;
     case let_go:
       if (waited_ > 0.6f) go(ask);
       return false;

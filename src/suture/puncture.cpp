@@ -120,7 +120,9 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
   const bool near = nearest_surface(model, scratch.candidates, x, tip, kReach, hit);
   const bool was_inside = state.tip_inside;
   const bool inside = near && hit.distance < (was_inside ? kHysteresis : -kHysteresis);
-  state.tip_inside = inside;
+  // A needle that lies about pierces nothing: it weighs a few millinewtons.
+  const bool held = std::any_of(solver.weld.begin(), solver.weld.end(), [](const Weld& w) { return w.a == static_cast<int>(kNeedle); });
+  state.tip_inside = inside && (held || !state.open.empty());
   // [m] along the shaft from the swage to an end of a bite.
   auto along = [&](const BiteEnd& end) { return arc.radius * arc.nearest(to_local(needle.pose(), position_of(end.point, x))); };
   const float tip_at = arc.radius * arc.arc;
@@ -165,7 +167,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
     } else {  // torn back through both holes between two substeps: the tip was never seen in the wall
       cancel_bite(solver, state, tip, events);
     }
-  } else if (inside && !was_inside &&
+  } else if (held && inside && !was_inside &&
              (newest == NeedlePhase::outside || tip_at - along(state.bite[state.open.back().bite].exit) > kNewWall)) {
     const uint32_t which = static_cast<uint32_t>(state.bite.size());
     Bite bite;
