@@ -263,11 +263,13 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       jaw(kDriver, kHalfOpen);
       return move(kDriver, raised(hand_[kDriver].pose, 0.02f), skill_.speed) || waited_ > 0.8f;
     default:  // unwind: shake the loop off and begin again
-      jaw(kDriver, 1);
+      // Not before the jaws are open, and not against a taut strand: it would draw the tail out of the tissue.
+      if (!jaw(kDriver, 1)) return false;
       wound_ = std::max(kBefore, wound_ - 4 * dt_);
       carry_swage(seen, swage_at(wound_), skill_.speed);
-      if (move(kDriver, raised(lying, 0.03f), skill_.speed) && waited_ > 1) miss(lift);
-      else if (!patience(5)) miss(lift);
+      if ((move(kDriver, raised(lying, 0.03f), skill_.speed * std::clamp(1 - 2 * tension, 0.0f, 1.0f)) && waited_ > 1) ||
+          !patience(5))
+        miss(lift);
       return false;
   }
 }
