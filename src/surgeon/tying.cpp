@@ -20,6 +20,7 @@ constexpr float kShaft = 0.0035f;       // [m] a shaft's radius and the tissue's
 constexpr float kClear = 0.006f;        // [m] between jaws that take the tail and the other strand
 constexpr float kNeedleBelow = 0.007f;  // [m] that the needle hangs below its swage
 constexpr float kHighest = 1.0f;      // [m] above the tissue, for the driver that thread is wound round
+constexpr float kLoose = 0.7f;          // of the strand between the turns and the needle, on the way to the tail
 constexpr float kTooTaut = 0.3f;        // [N]
 constexpr float kLeastFree = 0.032f;    // [m] of strand that must be left to go round the driver
 constexpr float kLeastFreeForOwn = 0.038f;  // the same where the strand is then led along the driver to its jaws
@@ -220,9 +221,10 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       if (stage_ == over && waited_ <= dt_) choose_grasp(seen);
       const Pose goal{node_at(seen, node_of(seen, take_slot_)), take_turn_};
       // The forceps goes along above, its strand loose; neither hand hurries when that runs taut.
-      const float loose = 0.8f * length_between(seen, node_of(seen, driver.loop_last), last);
+      if (stage_ == over && waited_ <= dt_) free_ = kLoose * length_between(seen, node_of(seen, driver.loop_last), last);
+      if (tension > kTooTaut) free_ = std::max(0.002f, feel(free_, tension));
       const Vec3 turns = hand_[kDriver].pose.p + rotate(hand_[kDriver].pose.q, {0, 0, kWindAt});
-      carry_swage(seen, turns + normalized(e1 - 0.4f * z) * loose, 2 * skill_.speed);
+      carry_swage(seen, turns + normalized(e1 - 0.4f * z) * free_, 2 * skill_.speed);
       const float calm = std::clamp(1.5f - tension, 0.05f, 1.0f);
       if (stage_ == over) {
         jaw(kDriver, kHalfOpen);
@@ -317,7 +319,16 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
     return false;
   }
   const bool tail = kind == TaskKind::cut_tail;
-  const size_t at = node_along(seen, tail ? first_point_node(seen) : last_point_node(seen), kStump, tail ? -1 : 1);
+  // Not too near to the knot, and where the scissors cannot meet the stitch itself.
+  const size_t first = first_point_node(seen), end = last_point_node(seen);
+  size_t at = last;
+  float clearest = 0;
+  for (float far = kStump; far < 4 * kStump && clearest < kClear; far += 0.002f) {
+    const size_t i = std::clamp<size_t>(node_along(seen, tail ? first : end, far, tail ? -1 : 1), 1, last - 1);
+    float clear = kClear;
+    for (size_t k = first; k <= end; ++k) clear = std::min(clear, distance(node_at(seen, i), node_at(seen, k)));
+    if (clear > clearest) clearest = clear, at = i;
+  }
   const Pose goal = tying_pose(kDriver, node_at(seen, std::clamp<size_t>(at, 1, last - 1)));
   switch (stage_) {
     case over:
