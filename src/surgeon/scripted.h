@@ -155,6 +155,7 @@ class Scripted final : public Surgeon {
   // A throw.
   Vec3 start_;
   float reach_ = 0, height_ = 0, wound_ = 0;
+  float lean_ = 0;   // of the strand that leaves the driver, toward its tip
   float floor_ = 0;  // [m] height below which the needle would meet tissue
   float free_ = 0;   // [m] of strand between driver and needle, as it is felt
   size_t knots_before_ = 0, cuts_before_ = 0, settled_before_ = 0;

@@ -24,7 +24,7 @@ constexpr float kLoose = 0.7f;          // of the strand between the turns and t
 constexpr float kTooTaut = 0.3f;        // [N]
 constexpr float kLeastFree = 0.032f;    // [m] of strand that must be left to go round the driver
 constexpr float kLeastFreeForOwn = 0.038f;  // the same where the strand is then led along the driver to its jaws
-constexpr float kWindOwnAt = 0.016f;        // [m] behind the tip, where such a strand is wound
+constexpr float kWindOwnAt = 0.022f;        // [m] behind the tip, where such a strand is wound
 constexpr float kTailAside = 0.030f;        // [m] from the stitch, where the tail is laid down
 constexpr float kNear = 0.035f;         // [m] round a stitch: tissue that hands go over
 constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the middle of the field, where a used needle is let go
@@ -160,6 +160,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     height_ = std::min(0.5f * (reach_ + rise + kNeedleBelow), own_strand ? 1.0f : rise + kHighest);
     height_ = std::clamp(height_, 0.025f, std::max(0.025f, reach_ - (own_strand ? kLeastFreeForOwn : kLeastFree)));
     wound_ = kBefore;
+    lean_ = kLean;
     throws_before_ = seen.knot.empty() ? 0 : seen.knot.back().throws;
     knots_before_ = seen.knot.size();
   }
@@ -178,7 +179,8 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     const Vec3 to = e1 * std::cos(way) - e2 * std::sin(way);
     room = to.y < 0 ? std::max(0.012f, (leave.y - floor_) / -to.y) : 1;
     // The forceps' shaft lies on the tip's side. A slack strand would slide off there: it is led back.
-    return leave + to * std::min(free_, room) - z * (room < free_ ? -kLeadBack : std::min(kLean * free_, kApart));
+    return leave + to * std::min(free_, room) -
+           z * (room < free_ ? -kLeadBack : std::clamp(lean_ * free_, -kApart, kApart));
   };
   const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
   if (stage_ == lift && waited_ <= dt_) free_ = kTaut * (reach_ - distance(start_, axis_at));
@@ -205,7 +207,9 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       const float want = static_cast<float>(task.which) * 2 * kPi + 0.6f;
       // The needle is not hurried on while it lags behind: the strand would go slack, or cut the corner.
       const float turn = 2.2f * dt_ * std::clamp(1.5f - behind / 0.006f, 0.0f, 1.0f);
+      // Wound and no loop yet: its ends lie too far apart along the driver, and are led together.
       if (wound_ + turn < want + 0.9f) wound_ += turn, free_ = std::max(0.006f, free_ - kWound * turn);
+      else lean_ = std::max(-2 * kLean, lean_ - kLean * dt_);
       carry_swage(seen, swage_at(wound_), 1.2f * skill_.speed);
       move(kDriver, lying, careful());
       if (driver.loop_wraps >= static_cast<uint32_t>(task.which)) go(over);
