@@ -6,6 +6,7 @@
 namespace catgut {
 namespace {
 
+constexpr float kCounterHold = 0.8f;                    // [N]
 constexpr float kSecure = 0.985f;                       // of a closure that counts as closed
 constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f;  // places on the needle's arc: two thirds from the tip, behind the tip
 
@@ -157,6 +158,9 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
       return fresh(seen);
     case TaskKind::rest:
       doing_ = "hold";
+      // Without pulling: a suture is judged as it lies.
+      if (!seen.thread_tension.empty() && seen.thread_tension.back() > 0.05f)
+        move(kForceps, {stitch(seen), hand_[kForceps].pose.q}, 0.3f * skill_.speed);
       return waited_ > 1.5f;
   }
   return true;
@@ -397,8 +401,12 @@ bool Scripted::draw(const Snapshot& seen) {
         right = normalized(across * -0.8f + f.out * 0.6f);
       }
       move(kForceps, {picture_.focus + left * 0.35f, hand_[kForceps].pose.q}, gently(kForceps));
-      // The tail hand gives a counter-hold: it moves out only as far as keeps its own side tight.
-      move(kDriver, {picture_.focus + right * 0.11f, hand_[kDriver].pose.q}, gently(kDriver));
+      // The tail hand gives a counter-hold: it moves out only as far as keeps its own side tight. Where both sides are drawn
+      // hard the thread sticks in its holes and the tissue follows the hands instead, so it gives way first.
+      const size_t held = node_of(seen, seen.tool[kDriver].held_slot);
+      const float tail = held < seen.thread_tension.size() ? seen.thread_tension[held] : 0;
+      if (plan_.lift == 0 && tail > kCounterHold) move(kDriver, {stitch(seen), hand_[kDriver].pose.q}, 0.3f * skill_.speed);
+      else move(kDriver, {picture_.focus + right * 0.11f, hand_[kDriver].pose.q}, gently(kDriver));
       if (!patience(20)) gave_up_ = true;
       return false;
     }

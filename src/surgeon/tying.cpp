@@ -6,29 +6,29 @@
 namespace catgut {
 namespace {
 
-constexpr float kHalfOpen = 0.7f;       // a jaw that lets go without shaking off a loop
-constexpr float kStump = 0.007f;        // [m] of thread left on a knot
-constexpr float kWindAt = 0.024f;       // [m] behind the driver's tip, where thread is wound round it
-constexpr float kWindRadius = 0.0028f;  // [m] of a wrap's middle line
-constexpr float kBefore = -0.25f;       // [rad] where the strand stands before it is wound
-constexpr float kWound = 0.0022f;       // [m] of thread that a radian takes
-constexpr float kApart = 0.010f;        // [m] along the driver, by which the strand's two ends stand apart
-constexpr float kLeadBack = 0.004f;     // [m] toward the hand
-constexpr float kLean = 0.3f;           // of the strand that leaves, along the driver
-constexpr float kTaut = 0.975f;         // of the strand's length, between driver and needle: just not taut
-constexpr float kShaft = 0.0035f;       // [m] a shaft's radius and the tissue's
-constexpr float kClear = 0.006f;        // [m] between jaws that take the tail and the other strand
-constexpr float kNeedleBelow = 0.007f;  // [m] that the needle hangs below its swage
-constexpr float kHighest = 1.0f;      // [m] above the tissue, for the driver that thread is wound round
-constexpr float kLoose = 0.7f;          // of the strand between the turns and the needle, on the way to the tail
-constexpr float kTooTaut = 0.3f;        // [N]
-constexpr float kLeastFree = 0.032f;    // [m] of strand that must be left to go round the driver
-constexpr float kLeastFreeForOwn = 0.038f;  // the same where the strand is then led along the driver to its jaws
-constexpr float kWindOwnAt = 0.022f;        // [m] behind the tip, where such a strand is wound
-constexpr float kTailAside = 0.030f;        // [m] from the stitch, where the tail is laid down
-constexpr float kNear = 0.035f;         // [m] round a stitch: tissue that hands go over
+constexpr float kHalfOpen = 0.7f;             // a jaw that lets go without shaking off a loop
+constexpr float kStump = 0.007f;              // [m] of thread left on a knot
+constexpr float kWindAt = 0.024f;             // [m] behind the driver's tip, where thread is wound round it
+constexpr float kWindRadius = 0.0028f;        // [m] of a wrap's middle line
+constexpr float kBefore = -0.25f;             // [rad] where the strand stands before it is wound
+constexpr float kWound = 0.0022f;             // [m] of thread that a radian takes
+constexpr float kApart = 0.010f;              // [m] along the driver, by which the strand's two ends stand apart
+constexpr float kLeadBack = 0.004f;           // [m] toward the hand
+constexpr float kLean = 0.3f;                 // of the strand that leaves, along the driver
+constexpr float kTaut = 0.975f;               // of the strand's length, between driver and needle: just not taut
+constexpr float kShaft = 0.0035f;             // [m] a shaft's radius and the tissue's
+constexpr float kClear = 0.006f;              // [m] between jaws that take the tail and the other strand
+constexpr float kNeedleBelow = 0.007f;        // [m] that the needle hangs below its swage
+constexpr float kHighest = 1.0f;              // [m] above the tissue, for the driver that thread is wound round
+constexpr float kLoose = 0.7f;                // of the strand between the turns and the needle, on the way to the tail
+constexpr float kTooTaut = 0.3f;              // [N]
+constexpr float kLeastFree = 0.032f;          // [m] of strand that must be left to go round the driver
+constexpr float kLeastFreeForOwn = 0.038f;    // the same where the strand is then led along the driver to its jaws
+constexpr float kWindOwnAt = 0.022f;          // [m] behind the tip, where such a strand is wound
+constexpr float kTailAside = 0.030f;          // [m] from the stitch, where the tail is laid down
+constexpr float kNear = 0.035f;               // [m] round a stitch: tissue that hands go over
 constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the middle of the field, where a used needle is let go
-constexpr float kTyingAt = 0.12f;       // place on the needle's arc: behind the swage
+constexpr float kTyingAt = 0.12f;             // place on the needle's arc: behind the swage
 
 // A tool along z, the open side of its jaws up.
 Quat from_tool_axis(Vec3 z) {
@@ -179,8 +179,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     const Vec3 to = e1 * std::cos(way) - e2 * std::sin(way);
     room = to.y < 0 ? std::max(0.012f, (leave.y - floor_) / -to.y) : 1;
     // The forceps' shaft lies on the tip's side. A slack strand would slide off there: it is led back.
-    return leave + to * std::min(free_, room) -
-           z * (room < free_ ? -kLeadBack : std::clamp(lean_ * free_, -kApart, kApart));
+    return leave + to * std::min(free_, room) - z * (room < free_ ? -kLeadBack : std::clamp(lean_ * free_, -kApart, kApart));
   };
   const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
   if (stage_ == lift && waited_ <= dt_) free_ = kTaut * (reach_ - distance(start_, axis_at));

@@ -121,7 +121,8 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
   const bool was_inside = state.tip_inside;
   const bool inside = near && hit.distance < (was_inside ? kHysteresis : -kHysteresis);
   // A needle that lies about pierces nothing: it weighs a few millinewtons.
-  const bool held = std::any_of(solver.weld.begin(), solver.weld.end(), [](const Weld& w) { return w.a == static_cast<int>(kNeedle); });
+  const bool held =
+      std::any_of(solver.weld.begin(), solver.weld.end(), [](const Weld& w) { return w.a == static_cast<int>(kNeedle); });
   state.tip_inside = inside && (held || !state.open.empty());
   // [m] along the shaft from the swage to an end of a bite.
   auto along = [&](const BiteEnd& end) { return arc.radius * arc.nearest(to_local(needle.pose(), position_of(end.point, x))); };
