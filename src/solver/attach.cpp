@@ -2,6 +2,7 @@
 #include "solver/attach.h"
 
 #include <Eigen/Dense>
+#include <cmath>
 
 namespace catgut {
 
@@ -55,17 +56,61 @@ void solve_attachment(Attachment& a, Vec4* x, const float* w, const std::vector<
   push(m, b, -d, r);
 }
 
-void solve_pin(TissuePin& pin, Vec4* x, const float* w, float h) {
+// Returns how far it may have moved a particle [m].
+static float solve_pin(TissuePin& pin, Vec4* x, const float* w, float h, double moved, PinMemory& memory) {
   const Vec3 d = position_of(pin.a, x) - position_of(pin.b, x);
   const float l = length(d);
-  if (l <= pin.length && pin.lambda >= 0) return;
+  if (l <= pin.length && pin.lambda >= 0) {
+    memory.slack = pin.length - l;
+    memory.moved = moved;
+    return 0;
+  }
+  memory.slack = -1;
+  if (memory.w < 0) {
+    memory.w = inverse_mass_of(pin.a, w) + inverse_mass_of(pin.b, w);
+    memory.stir = 0;
+    for (const TissuePoint* p : {&pin.a, &pin.b}) {
+      float most = 0;
+      for (uint32_t k = 0; k < p->count; ++k) most = std::max(most, w[p->particle[k]] * std::abs(p->weight[k]));
+      memory.stir += most;  // a particle may belong to both points
+    }
+  }
   const Vec3 n = l > 1e-9f ? d / l : Vec3{0, 1, 0};
-  const float alpha = pin.compliance / (h * h), wsum = inverse_mass_of(pin.a, w) + inverse_mass_of(pin.b, w);
-  if (wsum + alpha <= 0) return;
-  const float step = std::min(-(l - pin.length + alpha * pin.lambda) / (wsum + alpha), -pin.lambda);
+  const float alpha = pin.compliance / (h * h);
+  if (memory.w + alpha <= 0) return 0;
+  const float step = std::min(-(l - pin.length + alpha * pin.lambda) / (memory.w + alpha), -pin.lambda);
   pin.lambda += step;
   push(pin.a, x, w, n * step);
   push(pin.b, x, w, n * -step);
+  return std::abs(step) * memory.stir;
+}
+
+void solve_pin(TissuePin& pin, Vec4* x, const float* w, float h) {
+  PinMemory memory;
+  solve_pin(pin, x, w, h, 0, memory);
+}
+
+void solve_pins(std::span<TissuePin> pin, Vec4* x, const float* w, float h, int sweeps, std::vector<PinMemory>& memory) {
+  // Beyond what the arithmetic rounds off, over all pushes of a substep: then a skipped pin is one that would have done
+  // nothing.
+  constexpr double kRounding = 5e-6, kMore = 1.01;
+  memory.assign(pin.size(), {});
+  double moved = 0;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    for (size_t i = 0; i < pin.size(); ++i) {
+      PinMemory& m = memory[i];
+      if (m.slack >= 0) {
+        if (moved == m.moved) continue;  // nothing has moved at all
+        if (m.reach < 0) {
+          m.reach = 0;
+          for (const TissuePoint* p : {&pin[i].a, &pin[i].b})
+            for (uint32_t k = 0; k < p->count; ++k) m.reach += std::abs(p->weight[k]);
+        }
+        if (kMore * (moved - m.moved) * m.reach + kRounding < m.slack) continue;
+      }
+      moved += solve_pin(pin[i], x, w, h, moved, m);
+    }
+  }
 }
 
 void solve_channel(ChannelPoint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model, RigidBody& needle,

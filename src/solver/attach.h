@@ -94,6 +94,17 @@ struct NeedleArc {
 void solve_attachment(Attachment& a, Vec4* x, const float* w, const std::vector<RigidModel>& model,
                       std::vector<RigidBody>& body, float h);
 void solve_pin(TissuePin& pin, Vec4* x, const float* w, float h);
+// What the sweeps of a substep remember of a pin.
+struct PinMemory {
+  float slack = -1;  // [m] of its rope when it was last looked at; negative: it pulls, or nobody has looked yet
+  double moved = 0;  // [m] how far all pins together might have moved a particle by then
+  float reach = -1;  // by how much its points' distance can change for each metre that particles move; negative: not known yet
+  float w = -1;      // [1/kg] of its two points together; negative: not known yet
+  float stir = 0;    // [1/kg] by how much a unit of its pull moves the particle that it moves most
+};
+// `sweeps` times solve_pin of each pin in turn, to the last bit; but a rope with more slack than the others have moved tissue
+// since is not looked at again. Settled stitches are slack nearly always, and a long procedure has hundreds of them.
+void solve_pins(std::span<TissuePin> pin, Vec4* x, const float* w, float h, int sweeps, std::vector<PinMemory>& memory);
 void solve_channel(ChannelPoint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model, RigidBody& needle,
                    float h);
 

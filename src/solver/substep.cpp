@@ -151,8 +151,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   {
     StageTimer timer(times, Stage::attach);
     for (Attachment& a : s.attach) solve_attachment(a, x, w, m.body, s.body, h);
-    for (int sweep = 0; sweep < m.pin_sweeps; ++sweep)
-      for (TissuePin& p : s.pin) solve_pin(p, x, w, h);
+    solve_pins(s.pin, x, w, h, m.pin_sweeps, k.pin);
   }
   {
     // Few but stiff and pulling against each other (hand, grasp, channel): they get sweeps of their own.

@@ -61,6 +61,7 @@ struct SolverScratch {
   ShapeScratch shape;
   std::vector<float> volume_lambda;
   ThreadScratch thread;
+  std::vector<PinMemory> pin;
   Candidates candidates;
   std::vector<BodyContact> on_body;  // contact impulses on bodies in the last substep
   std::vector<int32_t> node_of_slot;
