@@ -1,4 +1,5 @@
-// app: `catgut bench`: where the time of a tick goes. The paper's tables come in a later version.
+// app: `catgut bench`: where the time of a tick goes, and (limits.cpp) what it costs as sutures are added. The paper's tables
+// come in a later version.
 #include <cstdio>
 #include <memory>
 
@@ -11,15 +12,16 @@ namespace catgut {
 namespace {
 
 struct BenchOptions {
-  std::string what, json, scene = "purse_string";
-  std::vector<std::string> set;
-  int repeat = 1, threads = 1;
+  std::string what, json, out = "out/limits";
+  std::vector<std::string> scene, set;
+  int repeat = 1, threads = 1, sutures = 50;
   double seconds = 0;
 };
 
-int bench(const BenchOptions& o) {
-  if (o.what != "stages") throw InputError("bench " + o.what, "not available yet in this version", "use `catgut bench stages`");
-  SceneSpec scene = read_scene(o.scene);
+int bench_stages(const BenchOptions& o) {
+  if (o.scene.size() > 1) throw InputError("bench stages --scene", "one scene at a time", "name one");
+  const std::string name = o.scene.empty() ? "purse_string" : o.scene[0];
+  SceneSpec scene = read_scene(name);
   for (const std::string& setting : o.set) set_value(scene, setting);
   prepare_output(o.json);
   SessionHooks hooks;
@@ -37,7 +39,7 @@ int bench(const BenchOptions& o) {
       end_progress_line();
       std::fprintf(stderr,
                    "catgut: bench stages: two runs of %s gave different states; this is a fault in Catgut, please report it\n",
-                   o.scene.c_str());
+                   name.c_str());
       return 1;
     }
     if (i == 0 || (r.solver_ms.median < best.solver_ms.median && !r.interrupted)) best = std::move(r);
@@ -53,22 +55,41 @@ int bench(const BenchOptions& o) {
   return best.interrupted ? 130 : 0;
 }
 
+int bench(const BenchOptions& o) {
+  if (o.what == "stages") return bench_stages(o);
+  if (o.what != "limits")
+    throw InputError("bench " + o.what, "not available yet in this version",
+                     "use `catgut bench stages` or `catgut bench limits`");
+  const std::vector<std::string> both{"stress_one_body", "stress_two_bodies"};
+  return bench_limits({o.scene.empty() ? both : o.scene, o.set, o.out, o.sutures, o.threads});
+}
+
 }  // namespace
 
 void add_bench(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<BenchOptions>();
   CLI::App* command = app.add_subcommand("bench", "measure where the time goes");
-  command->add_option("what", o->what, "stages (paper, limits and scale come later)")
+  command
+      ->add_option("what", o->what,
+                   "stages: where a tick's time goes; limits: what each further suture costs (paper and scale come later)")
       ->required()
       ->check(CLI::IsMember({"paper", "limits", "scale", "stages"}))
       ->type_name("paper|limits|scale|stages");
-  command->add_option("--json", o->json, "results as JSON; - for standard output")->type_name("FILE|-");
-  command->add_option("--repeat", o->repeat, "runs; the one with the fastest median is reported")
+  command->add_option("--json", o->json, "stages: results as JSON; - for standard output")->type_name("FILE|-");
+  command->add_option("--repeat", o->repeat, "stages: runs; the one with the fastest median is reported")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   add_threads_option(*command, o->threads);
-  command->add_option("--scene", o->scene, "scene to run")->capture_default_str();
-  command->add_option("--seconds", o->seconds, "simulated time; else until the surgeon is done")->check(CLI::Range(0.001, 1e6));
+  command->add_option("--scene", o->scene, "scene to run (stages: purse_string; limits: the two stress scenes)")
+      ->type_name("NAME");
+  command->add_option("--seconds", o->seconds, "stages: simulated time; else until the surgeon is done")
+      ->check(CLI::Range(0.001, 1e6));
+  command->add_option("--sutures", o->sutures, "limits: bites in each scene")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--out", o->out, "limits: folder for a table (CSV) and a plot (PNG) of each scene")
+      ->type_name("DIR")
+      ->capture_default_str();
   command->add_option("--set", o->set, "change a key of the scene: key=value")->take_all()->allow_extra_args(false);
   command->callback([o, &exit_code] { exit_code = bench(*o); });
 }

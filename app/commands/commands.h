@@ -18,6 +18,14 @@ void add_validate(CLI::App& app, int& exit_code);
 void add_devices(CLI::App& app, int& exit_code);
 void add_describe(CLI::App& app, int& exit_code);
 
+// `catgut bench limits` (app/commands/limits.cpp). Code 1 when not all sutures that were asked for could be made.
+struct LimitsOptions {
+  std::vector<std::string> scene, set;
+  std::string out;  // folder
+  int sutures = 50, threads = 1;
+};
+int bench_limits(const LimitsOptions& options);
+
 // What several commands share (app/commands/common.cpp).
 
 // --video, --frames, --contact-sheet, --video-speed.

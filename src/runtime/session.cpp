@@ -48,16 +48,18 @@ class Run {
       StageTimer timer(&times, Stage::publish);
       publish(*model_, *state_, seen_);
     }
-    tally_.time(times, ms_since(start));
+    const double tick_ms = ms_since(start);
+    tally_.time(times, tick_ms);
     ++ticks_;
     tally_.tick(seen_);
     if (ticks_ % kSanityTicks == 0 && !state_is_sane(*model_, *state_)) tally_.not_sane();
     if (hooks_.on_tick) hooks_.on_tick(seen_, doing);
+    if (hooks_.on_cost && !hooks_.on_cost(seen_, times, tick_ms)) enough_ = true;
     if (hooks_.on_progress && ms_since(told_) > 1000) {
       told_ = Clock::now();
       hooks_.on_progress({simulated_s(), until_s, simulated_s() * 1000 / tally_.spent_ms(), doing});
     }
-    return !stopped() && tally_.sane();
+    return !stopped() && !enough_ && tally_.sane();
   }
 
   bool stopped() const { return hooks_.stop && hooks_.stop->load(std::memory_order_relaxed); }
@@ -75,6 +77,7 @@ class Run {
     result.simulated_s = simulated_s();
     result.state_hash = hash_state(*model_, *state_);
     result.interrupted = stopped();
+    if (enough_) result.ended = "enough was seen";
     if (result.interrupted) result.ended = "interrupted";
     if (!tally_.sane()) result.ended = "the state was no longer sane";
     tally_.finish(seen_, result);
@@ -89,6 +92,7 @@ class Run {
   Snapshot seen_;
   TickInput input_;
   uint64_t ticks_ = 0;
+  bool enough_ = false;
   const double dt_;
 
  private:

@@ -29,6 +29,8 @@ struct Progress {
 struct SessionHooks {
   std::function<void(const PictureModel&)> on_start;
   std::function<void(const Snapshot&, const std::string& doing)> on_tick;
+  // What the tick cost, stage by stage and as a whole [ms]; false: enough was seen, the run ends.
+  std::function<bool(const Snapshot&, const StageTimes&, double tick_ms)> on_cost;
   std::function<void(const Progress&)> on_progress;  // about once a second of wall time
   const std::atomic<bool>* stop = nullptr;           // set: the run ends after the tick in hand
 };

@@ -44,7 +44,7 @@ void fields(A& a, Bite& b) {
 }
 template <typename A>
 void fields(A& a, OpenBite& o) {
-  a(o.bite), a(o.phase);
+  a(o.bite), a(o.phase), a(o.drawn), a(o.told);
 }
 template <typename A>
 void fields(A& a, SuturePoint& p) {

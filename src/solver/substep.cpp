@@ -89,6 +89,10 @@ void prepare_scratch(const SolverModel& model, SolverScratch& k) {
 }
 
 void find_candidates(const SolverModel& m, const SolverState& s, SolverScratch& k, float margin, StageTimes* times) {
+  {
+    StageTimer timer(times, Stage::attach);
+    weave(s.pin, m.inv_mass.data(), m.tissue, k.web);
+  }
   StageTimer timer(times, Stage::broadphase);
   find_tool_and_thread_candidates(m.collision, s.x.data(), m.thread, s.thread, s.thread_collides, m.body, s.body,
                                   s.body_collides, margin, k.candidates);
@@ -151,8 +155,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   {
     StageTimer timer(times, Stage::attach);
     for (Attachment& a : s.attach) solve_attachment(a, x, w, m.body, s.body, h);
-    for (int sweep = 0; sweep < m.pin_sweeps; ++sweep)
-      for (TissuePin& p : s.pin) solve_pin(p, x, w, h);
+    solve_pins(s.pin, k.web, x, w, h, m.pin_sweeps, k.room);
   }
   {
     // Few but stiff and pulling against each other (hand, grasp, channel): they get sweeps of their own.

@@ -61,6 +61,8 @@ struct SolverScratch {
   ShapeScratch shape;
   std::vector<float> volume_lambda;
   ThreadScratch thread;
+  PinWeb web;
+  std::vector<float> room;
   Candidates candidates;
   std::vector<BodyContact> on_body;  // contact impulses on bodies in the last substep
   std::vector<int32_t> node_of_slot;
@@ -70,7 +72,8 @@ struct SolverScratch {
 
 SolverState make_solver_state(const SolverModel& model, std::span<const Vec3> position);
 void prepare_scratch(const SolverModel& model, SolverScratch& scratch);
-// Once a tick, before its substeps: who may touch whom. margin [m]: the furthest anything may move against another in a tick.
+// Once a tick, before its substeps, in which no pin is made or taken away: who may touch whom, and which pins share tissue.
+// margin [m]: the furthest anything may move against another in a tick.
 void find_candidates(const SolverModel& model, const SolverState& state, SolverScratch& scratch, float margin,
                      StageTimes* times);
 void substep(const SolverModel& model, SolverState& state, SolverScratch& scratch, Jobs& jobs, StageTimes* times);

@@ -184,7 +184,10 @@ void begin(const SolverModel& model, SolverState& solver, const SutureModel& sut
     events.push_back({0, EventKind::loop_released, who, 0, 0, tool.x});
     return;
   }
-  if (!state.open.empty()) fault(state.open.back().bite, Fault::needle_in_tissue);
+  if (!state.open.empty() && !state.open.back().told) {
+    fault(state.open.back().bite, Fault::needle_in_tissue);
+    state.open.back().told = 1;
+  }
 
   uint32_t which = static_cast<uint32_t>(under);
   if (under == kNone) {

@@ -127,6 +127,31 @@ void update_thread_collisions(const SolverModel& model, SolverState& solver, con
   }
 }
 
+// Whether jaws draw thread that passes at node i that way: they hold it there, with no other suture point in between.
+static int drawing_hand(const Thread& t, size_t i, int way) {
+  for (size_t k = i; way > 0 ? k + 1 < t.order.size() && !t.cut[k] : k > 0 && !t.cut[k - 1];) {
+    k = way > 0 ? k + 1 : k - 1;
+    const uint32_t slot = t.order[k];
+    for (const ThreadHold& h : t.hold)
+      if (h.slot == slot) return h.kind == HoldKind::jaw ? h.body : -1;
+    if (std::any_of(t.anchor.begin(), t.anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot; })) return -1;
+  }
+  return -1;
+}
+
+// "Pulling" before the bite is done. The needle draws thread through holes too, and should; jaws on the thread should not. One
+// particle may have been about to pass when they took hold; with the second, thread as long as the way between two has come.
+static void judge_drawing(const SolverState& solver, SutureState& state, const ThreadAnchor& a, bool toward_needle,
+                          std::vector<Event>& events) {
+  if (state.open.empty()) return;
+  OpenBite& open = state.open.back();
+  const int hand = open.told ? -1 : drawing_hand(solver.thread, node_of(solver.thread, a.slot), toward_needle ? 1 : -1);
+  if (hand < 0 || ++open.drawn < 2) return;
+  open.told = 1;
+  events.push_back({0, EventKind::technique_fault, static_cast<uint8_t>(hand), open.bite,
+                    static_cast<float>(Fault::needle_in_tissue), position_of(a, solver.x.data())});
+}
+
 // A cut thread holds nothing together: as long as all of it, whatever is drawn.
 static float length_between(const Thread& t, size_t a, size_t b) {
   float sum = 0, all = 0;
@@ -291,9 +316,10 @@ void pull(const SolverModel& model, SolverState& solver, const SutureModel& sutu
     if (!forward && !backward) return;
     pass(solver, i, forward);
     changed = true;
-    if (point >= 0)
-      events.push_back({0, EventKind::particle_passed, 0, static_cast<uint32_t>(point), forward ? 1.0f : -1.0f,
-                        position_of(a, solver.x.data())});
+    if (point < 0) return;
+    events.push_back({0, EventKind::particle_passed, 0, static_cast<uint32_t>(point), forward ? 1.0f : -1.0f,
+                      position_of(a, solver.x.data())});
+    judge_drawing(solver, state, a, forward, events);
   };
   for (size_t k = state.point.size(); k-- > 0;) pass_at(t.anchor[state.point[k].anchor], static_cast<int64_t>(k));
   for (const Knot& knot : state.knot)

@@ -45,6 +45,8 @@ enum class NeedlePhase : uint8_t {
 struct OpenBite {
   uint32_t bite = 0;
   NeedlePhase phase = NeedlePhase::tip_in;
+  uint32_t drawn = 0;  // particles that a hand on the thread has drawn through the tissue since the tip went in
+  uint32_t told = 0;   // 1: needle_in_tissue was said of it
 };
 
 struct SuturePoint {
@@ -223,7 +225,7 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
 // stands right after `after` already stays, and so do the lengths beside it.
 void move_particle(Thread& thread, size_t from, size_t after);
 // After every substep: particles whose turn it is pass their suture point (figures 7 to 9), from the needle end to the free
-// end.
+// end. A hand that draws thread through the tissue while the needle is still in it is told so, once a bite; the thread comes.
 void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
           std::vector<Event>& events);
 // Moves up to `length` [m] of thread past the locked particle `slot`, toward the needle (way +1) or the free end (-1); the sum

@@ -36,6 +36,11 @@ void tell(Fault fault, uint32_t which, Vec3 where, uint32_t& told, std::vector<E
   events.push_back({0, EventKind::technique_fault, 0, which, static_cast<float>(fault), where});
 }
 
+void hear(std::span<const Event> events, uint32_t& told) {
+  for (const Event& e : events)
+    if (e.kind == EventKind::technique_fault) told |= 1u << static_cast<uint32_t>(e.value);
+}
+
 void judge_begun_knots(const TechniqueView& view, bool join_two, uint32_t& told, std::vector<Event>& events) {
   const size_t before = events.size();
   for (size_t i = 0; i < before; ++i) {

@@ -101,6 +101,7 @@ bool is_between(Vec3 v1, Vec3 v2, Vec3 vp, Vec3 axis) {
 void lembert(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan,
              std::vector<Event>& events) {
   if (model.outer.size() < 3 || model.inner.size() < 3) return;
+  hear(events, state.told);
   // Whatever ends a suture: too few throws hold nothing.
   const auto end_suture = [&] {
     if (state.throws == 0 || state.throws >= static_cast<uint32_t>(model.throws)) return;

@@ -99,6 +99,7 @@ Fault judge_stay(std::span<const Pass> pass) {
 }
 
 void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, ClosurePlan& plan, std::vector<Event>& events) {
+  hear(events, state.told);
   if (view.taken != state.taken) {
     // A fresh suture: what no knot holds has lost its thread.
     for (size_t r = state.first_row; r < state.row.size(); ++r)

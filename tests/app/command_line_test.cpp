@@ -14,6 +14,7 @@
 #include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "sim/recording.h"
 
@@ -217,6 +218,77 @@ TEST_F(CommandLine, a_cut_recording_is_named_as_such) {
   other[8] = 99;
   std::ofstream(folder_ / "other.cgrec", std::ios::binary) << other;
   expect_refused("replay other.cgrec", "the recording has format 99");
+}
+
+std::vector<std::vector<std::string>> read_table(const fs::path& path) {
+  std::vector<std::vector<std::string>> row;
+  std::ifstream in(path);
+  for (std::string line; std::getline(in, line);) {
+    row.emplace_back();
+    std::istringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');) row.back().push_back(cell);
+  }
+  return row;
+}
+const std::vector<std::string> kLimitsColumns{"suture",         "bites",       "suture_points",    "settled",
+                                              "simulated_s",    "ticks",       "solver_ms_median", "solver_ms_p99",
+                                              "tick_ms_median", "tick_ms_p99", "contacts",         "fps"};
+
+TEST_F(CommandLine, bench_limits_writes_a_row_for_each_suture) {
+  const Outcome o = run_catgut("bench limits --scene stress_one_body --sutures 3 --threads 1 --out limits");
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.out.find("3 of 3 sutures"), std::string::npos) << o.out;
+  const auto row = read_table(folder_ / "limits/stress_one_body.csv");
+  ASSERT_EQ(row.size(), 4u);
+  ASSERT_EQ(row[0], kLimitsColumns);
+  double before = 0.5;  // [s] the scene settles
+  for (size_t i = 1; i <= 3; ++i) {
+    ASSERT_EQ(row[i].size(), kLimitsColumns.size());
+    std::vector<double> v;
+    for (const std::string& cell : row[i]) v.push_back(std::stod(cell));
+    EXPECT_EQ(v[0], i);
+    EXPECT_EQ(v[1], i) << "as many bites as the picture shows";
+    EXPECT_EQ(v[2], 2 * i) << "two suture points each";
+    EXPECT_NEAR(v[4] - before, v[5] / 60, 0.002) << "every tick belongs to one suture";
+    EXPECT_GT(v[6], 0);
+    EXPECT_GE(v[7], v[6]);
+    EXPECT_GT(v[8], v[6]) << "the whole tick takes longer than the solver";
+    EXPECT_NEAR(v[11], 1000 / v[8], 0.001 * v[11] + 0.1);
+    before = v[4];
+  }
+  EXPECT_EQ(read_file(folder_ / "limits/stress_one_body.png").substr(1, 3), "PNG");
+}
+
+TEST_F(CommandLine, bench_limits_says_how_far_it_came) {
+  const Outcome o = run_catgut("bench limits --scene stress_one_body --sutures 3 --set duration=1 --out limits");
+  EXPECT_EQ(o.code, 1);
+  EXPECT_NE(o.out.find("0 of 3 sutures in 1 s simulated (the time was over)"), std::string::npos) << o.out;
+  EXPECT_EQ(read_table(folder_ / "limits/stress_one_body.csv").size(), 1u);
+  expect_refused("bench limits --scene small.toml", "--surgeon none");
+  expect_refused("bench limits --out /proc/nowhere", "cannot be written");
+}
+
+TEST_F(CommandLine, an_interrupted_bench_limits_keeps_what_was_measured) {
+  const std::string out = folder_ / "limits";
+  const pid_t child = fork();
+  if (child == 0) {
+    if (!std::freopen("/dev/null", "w", stdout)) _exit(98);
+    if (!std::freopen("/dev/null", "w", stderr)) _exit(98);
+    execl(CATGUT_APP, CATGUT_APP, "bench", "limits", "--scene", "stress_one_body", "--out", out.c_str(), nullptr);
+    _exit(99);
+  }
+  for (int i = 0; i < 6000 && read_table(out + "/stress_one_body.csv").size() < 2; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  kill(child, SIGINT);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  const auto row = read_table(out + "/stress_one_body.csv");
+  ASSERT_GE(row.size(), 2u);
+  ASSERT_LT(row.size(), 51u);
+  for (const auto& r : row) EXPECT_EQ(r.size(), kLimitsColumns.size());
+  EXPECT_TRUE(fs::exists(out + "/stress_one_body.png"));
 }
 
 TEST_F(CommandLine, an_interrupted_run_closes_its_files) {

@@ -330,6 +330,18 @@ TEST(BegunKnot, wants_bites_in_two_walls_and_the_needle_out) {
   EXPECT_EQ(t.faults(Fault::knot_without_bite).size(), 2u) << "a new suture, a new mistake";
 }
 
+// The suture room tells it to whoever sews without a technique too.
+TEST(Stay, what_was_told_in_the_tick_is_not_told_again) {
+  TwoEdges t(false);
+  t.pass(0, t.p[5], kOut, t.p[2], kOut);
+  t.pass(1, t.p[10], kOut, t.p[14], kOut);
+  t.needle_in_tissue = true;
+  t.now.push_back({0, EventKind::technique_fault, 0, 1, static_cast<float>(Fault::needle_in_tissue), {}});
+  t.begin_knot();
+  t.tick(2);
+  EXPECT_EQ(t.faults(Fault::needle_in_tissue), Bites{1});
+}
+
 // Figure 14: one bite through each, drawn together, tied.
 TEST(Stay, a_good_one_has_no_fault) {
   TwoEdges t(false);

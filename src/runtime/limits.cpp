@@ -1,0 +1,145 @@
+// runtime/limits: see limits.h.
+#include "runtime/limits.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace catgut {
+namespace {
+
+constexpr size_t kEdge = 5;             // sutures at either end that the growth compares
+constexpr double kRealTimeFps = 24;     // the paper's limit of real time
+constexpr uint32_t kPaperLost = 26;     // suture of two bodies at which the paper's simulation fell below it
+constexpr double kPaperOneBody = 76.2;  // [1/s] with 50 sutures in one body, drawing included
+
+class SutureWatch {
+ public:
+  SutureWatch(LimitsResult& result, double settle, const std::function<void(const SutureCost&)>& on_row)
+      : result_(result), settle_(settle), on_row_(on_row) {}
+
+  bool operator()(const Snapshot& seen, const StageTimes& times, double tick_ms) {
+    if (seen.time_s <= settle_) return true;
+    solver_ms_.push_back(static_cast<float>(times.solver_ms()));
+    tick_ms_.push_back(static_cast<float>(tick_ms));
+    contacts_ = std::max(contacts_, times.contacts);
+    const auto completed =
+        std::count_if(seen.event.begin(), seen.event.end(), [](const Event& e) { return e.kind == EventKind::bite_completed; });
+    if (completed == 0) return true;
+    SutureCost cost;
+    cost.bites =
+        static_cast<uint32_t>(std::count_if(seen.bite.begin(), seen.bite.end(), [](const BiteView& b) { return b.complete; }));
+    cost.suture_points = static_cast<uint32_t>(seen.suture_point.size());
+    cost.settled = static_cast<uint32_t>(seen.settled.size());
+    cost.simulated_s = seen.time_s;
+    cost.ticks = tick_ms_.size();
+    cost.solver_ms = spread_of(std::move(solver_ms_));
+    cost.tick_ms = spread_of(std::move(tick_ms_));
+    cost.contacts = contacts_;
+    cost.fps = cost.tick_ms.median > 0 ? 1000 / cost.tick_ms.median : 0;
+    for (auto k = completed; k > 0 && !result_.reached(); --k) {
+      cost.suture = static_cast<uint32_t>(result_.row.size()) + 1;
+      result_.row.push_back(cost);
+      if (on_row_) on_row_(cost);
+    }
+    solver_ms_.clear(), tick_ms_.clear();
+    contacts_ = 0;
+    return !result_.reached();
+  }
+
+ private:
+  LimitsResult& result_;
+  const double settle_;  // [s]
+  const std::function<void(const SutureCost&)>& on_row_;
+  std::vector<float> solver_ms_, tick_ms_;
+  uint32_t contacts_ = 0;
+};
+
+double median_solver_ms(std::span<const SutureCost> row) {
+  std::vector<float> ms;
+  for (const SutureCost& r : row) ms.push_back(static_cast<float>(r.solver_ms.median));
+  return spread_of(std::move(ms)).median;
+}
+
+}  // namespace
+
+LimitsResult measure_limits(SceneSpec scene, int sutures, int threads, const std::function<void(const SutureCost&)>& on_row,
+                            const SessionHooks& hooks) {
+  LimitsResult result;
+  result.wanted = static_cast<uint32_t>(sutures);
+  scene.surgeon.bites = sutures;
+  SessionOptions options;
+  options.threads = threads;
+  SessionHooks own = hooks;
+  own.on_cost = SutureWatch(result, scene.settle, on_row);
+  result.run = run_session(scene, options, own);
+  return result;
+}
+
+double limits_growth(std::span<const SutureCost> row) {
+  if (row.size() < 2 * kEdge) return 0;
+  const double first = median_solver_ms(row.first(kEdge));
+  return first > 0 ? median_solver_ms(row.last(kEdge)) / first : 0;
+}
+
+std::string limits_csv_header() {
+  return "suture,bites,suture_points,settled,simulated_s,ticks,solver_ms_median,solver_ms_p99,tick_ms_median,tick_ms_p99,"
+         "contacts,fps\n";
+}
+
+std::string limits_csv_row(const SutureCost& r) {
+  return fmt::format("{},{},{},{},{:.3f},{},{:.4f},{:.4f},{:.4f},{:.4f},{},{:.1f}\n", r.suture, r.bites, r.suture_points,
+                     r.settled, r.simulated_s, r.ticks, r.solver_ms.median, r.solver_ms.p99, r.tick_ms.median, r.tick_ms.p99,
+                     r.contacts, r.fps);
+}
+
+std::string limits_table(const LimitsResult& result, size_t bodies) {
+  std::string text = fmt::format("{}: {} particles, {} thread{}; {} of {} sutures in {:.0f} s simulated", result.run.scene,
+                                 result.run.particles, result.run.threads, result.run.threads == 1 ? "" : "s",
+                                 result.row.size(), result.wanted, result.run.simulated_s);
+  if (!result.reached()) text += fmt::format(" ({})", result.run.ended);
+  text += "\n";
+  if (result.row.empty()) return text;
+  text += "suture  points  settled  contacts  solver ms: median    p99  tick ms: median    p99     FPS\n";
+  for (size_t i = 0; i < result.row.size(); ++i) {
+    const SutureCost& r = result.row[i];
+    if (i > 0 && r.suture % 5 != 0 && i + 1 < result.row.size()) continue;
+    text += fmt::format("{:6}  {:6}  {:7}  {:8}  {:17.2f}  {:5.2f}  {:15.2f}  {:5.2f}  {:6.0f}\n", r.suture, r.suture_points,
+                        r.settled, r.contacts, r.solver_ms.median, r.solver_ms.p99, r.tick_ms.median, r.tick_ms.p99, r.fps);
+  }
+  const double growth = limits_growth(result.row);
+  if (growth > 0) text += fmt::format("solver time of the last five sutures over the first five: {:.2f}\n", growth);
+  else text += fmt::format("growth: needs {} sutures to compare the last five with the first five\n", 2 * kEdge);
+  const auto slow =
+      std::find_if(result.row.begin(), result.row.end(), [](const SutureCost& r) { return r.fps < kRealTimeFps; });
+  const std::string ours = slow != result.row.end() ? fmt::format("here below it from suture {}", slow->suture)
+                                                    : fmt::format("here never below it up to suture {}", result.row.size());
+  text += bodies > 1
+              ? fmt::format("paper, two bodies, drawing included: below {} FPS at suture {}, solver 20 ms there; {}\n",
+                            kRealTimeFps, kPaperLost, ours)
+              : fmt::format("paper, one body, drawing included: {} FPS at suture 50; here {:.0f} at suture {}, nothing drawn\n",
+                            kPaperOneBody, result.row.back().fps, result.row.size());
+  return text;
+}
+
+Image limits_plot(const LimitsResult& result, size_t bodies, double tick_rate) {
+  Plot plot;
+  plot.title = fmt::format("{}: solver time as sutures are added ({} particles, {} thread{})", result.run.scene,
+                           result.run.particles, result.run.threads, result.run.threads == 1 ? "" : "s");
+  plot.x_name = "suture";
+  plot.y_name = "ms per tick";
+  PlotCurve median{"median", {30, 90, 160, 255}, {}}, p99{"99th percentile", {120, 170, 210, 255}, {}};
+  for (const SutureCost& r : result.row) {
+    const double x = r.suture;
+    median.point.push_back({x, r.solver_ms.median});
+    p99.point.push_back({x, r.solver_ms.p99});
+  }
+  plot.curve = {p99, median};
+  // The text of 3.5 gives two numbers of figure 21.
+  if (bodies > 1) plot.curve.push_back({"paper, two bodies", {200, 120, 30, 255}, {{13, 10}, {kPaperLost, 20}}, false});
+  plot.level = {{"24 FPS", 1000 / kRealTimeFps},
+                {fmt::format("real time at {:g} ticks a second", tick_rate), 1000 / tick_rate}};
+  return draw_plot(plot);
+}
+
+}  // namespace catgut

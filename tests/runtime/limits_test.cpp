@@ -1,0 +1,64 @@
+// tests/runtime: what `catgut bench limits` makes of its measurements; that it measures is tested in tests/app.
+#include <gtest/gtest.h>
+
+#include "runtime/limits.h"
+
+namespace catgut {
+namespace {
+
+std::vector<SutureCost> rows(size_t n, double first_ms, double last_ms) {
+  std::vector<SutureCost> row(n);
+  for (size_t i = 0; i < n; ++i) {
+    row[i].suture = static_cast<uint32_t>(i) + 1;
+    row[i].solver_ms.median = first_ms + (last_ms - first_ms) * static_cast<double>(i) / static_cast<double>(n - 1);
+    row[i].solver_ms.p99 = 2 * row[i].solver_ms.median;
+    row[i].fps = 1000 / row[i].solver_ms.median;
+  }
+  return row;
+}
+
+TEST(Limits, growth_compares_the_last_five_with_the_first_five) {
+  std::vector<SutureCost> row = rows(21, 1, 3);  // 1.0, 1.1 .. 3.0: medians 1.2 and 2.8
+  EXPECT_NEAR(limits_growth(row), 2.8 / 1.2, 1e-6);
+  row[1].solver_ms.median = 100;  // one suture disturbed by another program does not count for much
+  EXPECT_NEAR(limits_growth(row), 2.8 / 1.3, 1e-6);
+  EXPECT_EQ(limits_growth(rows(9, 1, 3)), 0) << "too few to compare";
+  EXPECT_EQ(limits_growth({}), 0);
+}
+
+TEST(Limits, the_table_says_where_it_fell_below_the_limit_and_where_it_did_not) {
+  LimitsResult result;
+  result.wanted = 20;
+  result.row = rows(20, 20, 58);  // 2 ms more each: over 1000 / 24 from the twelfth on
+  const std::string text = limits_table(result, 2);
+  EXPECT_NE(text.find("20 of 20"), std::string::npos) << text;
+  EXPECT_NE(text.find("here below it from suture 12"), std::string::npos) << text;
+  result.row = rows(20, 1, 1.1);
+  EXPECT_NE(limits_table(result, 2).find("here never below it up to suture 20"), std::string::npos);
+  result.row.clear();
+  result.run.ended = "the surgeon was done: gave up";
+  EXPECT_NE(limits_table(result, 2).find("0 of 20 sutures in 0 s simulated (the surgeon was done: gave up)"),
+            std::string::npos);
+}
+
+// The curve stands where its numbers say: twice the value is the same way up everywhere on a logarithmic axis.
+TEST(Limits, the_plot_shows_the_numbers) {
+  LimitsResult result;
+  const auto height_of = [&](double ms) {
+    result.row = rows(10, ms, ms);
+    const Image image = limits_plot(result, 1, 60);
+    int first = -1, last = -1;
+    for (int y = 40; y < image.height - 60; ++y)  // the median's colour in the middle of the plot
+      if (pixel(image, image.width / 2, y) == Colour{30, 90, 160, 255}) last = y, first = first < 0 ? y : first;
+    EXPECT_GE(first, 0) << ms;
+    return 0.5 * (first + last);
+  };
+  const double one = height_of(1.5), two = height_of(3), four = height_of(6);
+  EXPECT_GT(one, two);
+  EXPECT_NEAR(one - two, two - four, 1.5);
+  result.row.clear();
+  EXPECT_GT(limits_plot(result, 2, 60).width, 0) << "nothing measured: an empty plot, no fault";
+}
+
+}  // namespace
+}  // namespace catgut
