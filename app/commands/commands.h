@@ -11,12 +11,15 @@
 
 namespace catgut {
 
+void add_play(CLI::App& app, int& exit_code);
 void add_run(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
 void add_validate(CLI::App& app, int& exit_code);
 void add_devices(CLI::App& app, int& exit_code);
 void add_describe(CLI::App& app, int& exit_code);
+
+int play_without_arguments();  // the window's start screen
 
 // What several commands share (app/commands/common.cpp).
 

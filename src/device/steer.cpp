@@ -10,7 +10,7 @@ constexpr float kDriveAt = 0.35f, kTipAt = 0.93f;  // places on the needle's arc
 constexpr float kBeside = 0.3f;                    // of the arc: two jaws nearer than this would meet
 constexpr float kCatch = 0.009f;     // [m] across the view: nearer than this to the good place, the help takes the tool
 constexpr float kLetGo = 0.014f;     // and farther than this it lets go
-constexpr float kCatchDeep = 0.06f;  // [m] along the view, where nobody can judge distances on a flat screen
+constexpr float kCatchDeep = 0.12f;  // [m] along the view, where nobody can judge distances on a flat screen
 constexpr float kThere = 0.0015f;    // [m] the tool is at the needle
 constexpr float kPatience = 0.6f;    // [s] a closing jaw waits for that
 constexpr float kReach = 0.35f;      // [m] from the field's centre: no hand gets lost
@@ -28,7 +28,9 @@ void drive_needle(SteeredHand& hand, float angle) {
 }
 
 void move(SteeredHand& hand, const HandMotion& m, const ViewFrame& view, const PictureModel& picture) {
-  hand.pose.p += view.right * m.right + view.up * m.up + view.ahead * m.ahead;
+  hand.pose.p += view.right * m.right + view.up * m.up;
+  // Into the picture is along the line of sight: the tool stays under the pointer.
+  hand.pose.p += normalized(hand.pose.p - view.eye, view.ahead) * m.ahead;
   turn_about(hand.pose, view.up, m.yaw);
   turn_about(hand.pose, view.right, m.pitch);
   turn_about(hand.pose, view.ahead, m.roll);
@@ -49,14 +51,16 @@ void help(Steering& steering, size_t who, const ViewFrame& view, const PictureMo
     return;
   }
   const Pose grip = good_grip(picture, seen, who, shaft_of(hand.pose), hand.pose.p);
-  const Vec3 d = grip.p - hand.pose.p;
-  const float deep = dot(d, view.ahead), across = length(d - view.ahead * deep);
+  const Vec3 a = hand.pose.p - view.eye, b = grip.p - view.eye;
+  const float deep_a = std::max(dot(a, view.ahead), 0.01f), deep_b = dot(b, view.ahead);
+  // Both seen at the needle's depth.
+  const Vec3 there = a * (deep_b / deep_a);
   const bool was = hand.snapped;
-  hand.snapped = across < (was ? kLetGo : kCatch) && std::abs(deep) < kCatchDeep;
+  hand.snapped = distance(there, b) < (was ? kLetGo : kCatch) && std::abs(deep_b - deep_a) < kCatchDeep;
   if (!hand.snapped) return;
   hand.help = grip;
   // The depth that the help found is the hand's from now on, or the tool would jump back when it is let go.
-  hand.pose.p += view.ahead * deep;
+  hand.pose.p = view.eye + there;
 }
 
 }  // namespace

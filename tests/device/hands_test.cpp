@@ -66,8 +66,9 @@ TEST(Mouse, wheel_and_shift_go_into_the_picture) {
   MouseInput in;
   in.wheel = 3;
   d.turn(in);
-  EXPECT_NEAR(dot(d.out[0].pose.p - start, d.view.ahead), 0.006f, 1e-6f);
   EXPECT_NEAR(distance(d.out[0].pose.p, start), 0.006f, 1e-6f);
+  EXPECT_NEAR(distance(d.out[0].pose.p, d.view.eye), distance(start, d.view.eye) + 0.006f, 1e-5f);
+  EXPECT_NEAR(on_screen(d.view, d.out[0].pose.p)[0], on_screen(d.view, start)[0], 0.05f) << "it stays under the pointer";
   in = moved(0, -50);  // the mouse away from the user
   in.depth = true;
   d.turn(in);

@@ -79,7 +79,7 @@ void Theatre::show(const Snapshot& snapshot, const Camera& camera, int width, in
 
 void Theatre::set_quality(Quality quality) {
   const bool good = quality == Quality::good;
-  view_->setSampleCount(good ? 4 : 1);
+  view_->setSampleCount(quality == Quality::draft ? 1 : 4);
   view_->setAntiAliasing(filament::View::AntiAliasing::FXAA);
   view_->setDithering(filament::View::Dithering::NONE);
   filament::View::AmbientOcclusionOptions ao;
@@ -112,7 +112,7 @@ void Theatre::set_light(Quality quality) {
   scene_->setSkybox(skybox_);
   // Shadows at the scale of a thread: the library's own bias of a millimetre would swallow the thread's and needle's.
   filament::LightManager::ShadowOptions shadow;
-  shadow.mapSize = quality == Quality::good ? 2048 : 1024;
+  shadow.mapSize = quality == Quality::draft ? 1024 : 2048;
   shadow.constantBias = 0.0002f;
   shadow.normalBias = 0.8f;
   shadow.shadowNearHint = 0.05f;

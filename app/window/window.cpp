@@ -1,0 +1,425 @@
+// app/window: the loop of the window: events, hands, one picture; and which screen comes after which. Physics has its own
+// thread (runtime/live) and never waits for this one.
+#include "window/window.h"
+
+#include <SDL.h>
+#include <SDL_syswm.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <optional>
+
+#include "commands/commands.h"
+#include "core/check.h"
+#include "device/steer.h"
+#include "procedure/scene_file.h"
+#include "render/orbit.h"
+#include "render/window.h"
+#include "window/input.h"
+#include "window/panels.h"
+
+namespace catgut {
+namespace {
+
+constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSansMono.ttf";
+constexpr size_t kLogLines = 8;
+constexpr const char* kHeadless = "run without it: catgut run purse_string --surgeon scripted --headless";
+
+enum class Screen { start, practise, pause, results };
+constexpr const char* kScreenNames[] = {"start", "practise", "pause", "results"};
+
+// SDL and its window, gone when this is.
+struct SdlWindow {
+  SDL_Window* window = nullptr;
+  uint64_t number = 0;  // of the X server
+
+  SdlWindow(int width, int height) {
+    // Pictures go through EGL on X11; on a Wayland desktop its X server serves.
+    SDL_SetHintWithPriority(SDL_HINT_VIDEODRIVER, "x11", SDL_HINT_DEFAULT);
+    SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
+    if (SDL_Init(SDL_INIT_VIDEO | SDL_INIT_GAMECONTROLLER) != 0)
+      throw InputError("window", fmt::format("there is no display here ({})", SDL_GetError()), kHeadless);
+    window = SDL_CreateWindow("Catgut", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
+                              SDL_WINDOW_RESIZABLE | SDL_WINDOW_SHOWN);
+    SDL_SysWMinfo info;
+    SDL_VERSION(&info.version);
+    if (!window || !SDL_GetWindowWMInfo(window, &info) || info.subsystem != SDL_SYSWM_X11) {
+      const std::string why = window ? "it is not an X11 window" : SDL_GetError();
+      close();
+      throw InputError("window", "it cannot be opened (" + why + ")", kHeadless);
+    }
+    number = info.info.x11.window;
+  }
+  ~SdlWindow() { close(); }
+  SdlWindow(const SdlWindow&) = delete;
+  SdlWindow& operator=(const SdlWindow&) = delete;
+
+ private:
+  void close() {
+    if (window) SDL_DestroyWindow(window);
+    window = nullptr;
+    SDL_Quit();
+  }
+};
+
+class Window {
+ public:
+  explicit Window(const PlayOptions& options)
+      : options_(options), sdl_(options.width, options.height), width_(options.width), height_(options.height) {
+    try {
+      renderer_ = make_window_renderer(sdl_.number, width_, height_, kFont);
+    } catch (const std::runtime_error& error) { throw InputError("window", error.what(), kHeadless); }
+    settings_.quality = options.quality;
+    settings_.left_handed = options.left_handed;
+    settings_.hints = options.height >= 480;
+    // What people practise first, from the simplest; then what is there besides.
+    std::vector<std::string> names = scene_names();
+    const auto rank = [](const std::string& name) {
+      const std::vector<std::string> kFirst{"purse_string", "stay", "connell", "lembert"};
+      return std::find(kFirst.begin(), kFirst.end(), name) - kFirst.begin();
+    };
+    std::stable_sort(names.begin(), names.end(), [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
+    for (const std::string& name : names) scenes_.push_back({name, read_scene(name).title});
+    if (!options.events.empty()) {
+      events_ = options.events == "-" ? stdout : std::fopen(options.events.c_str(), "w");
+      if (!events_) throw InputError(options.events, "cannot be written", "choose another place");
+    }
+    resized();
+  }
+  ~Window() {
+    if (events_ && events_ != stdout) std::fclose(events_);
+  }
+  Window(const Window&) = delete;
+  Window& operator=(const Window&) = delete;
+
+  int loop() {
+    if (!options_.scene.empty()) open(options_.scene);
+    const double start = wall_seconds();
+    double last = start, drawn_at = start;
+    const std::atomic<bool>& stop = stop_on_interrupt();
+    while (!quit_ && !stop) {
+      const double now = wall_seconds();
+      const float dt = static_cast<float>(std::clamp(now - last, 1e-3, 0.25));
+      last = now;
+      if (options_.seconds > 0 && now - start > options_.seconds) break;
+      if (frame(dt)) {
+        ++pictures_;
+        const double drawn = wall_seconds(), keep = std::exp(-(drawn - drawn_at));
+        picture_s_ = picture_s_ * keep + (drawn - drawn_at);
+        picture_count_ = picture_count_ * keep + 1;
+        drawn_at = drawn;
+      } else {
+        SDL_Delay(1);  // the driver is behind: hands go on, and the processor is left to it
+      }
+      if (!options_.screenshot.empty() && pictures_ >= options_.after) break;
+    }
+    LiveResult result;
+    if (live_) result = finish();
+    report(wall_seconds() - start);
+    if (!result.fault.empty()) throw InputError("simulation", result.fault, "the recording holds what went before");
+    return stop ? 130 : 0;
+  }
+
+ private:
+  // --- scenes
+  // -----------------------------------------------------------------------------------------------------------------
+  void open(const std::string& name) {
+    scene_ = read_scene(name);
+    LiveOptions live = options_.live;
+    if (!live.record.empty() && opened_++ > 0) {  // every visit has its own file
+      const size_t dot = live.record.rfind(".cgrec");
+      live.record = live.record.substr(0, dot) + fmt::format("_visit{}.cgrec", opened_);
+    }
+    live_ = std::make_unique<Live>(scene_, live);
+    steering_ = start_steering(live_->picture(), settings_.left_handed);
+    mouse_ = {};
+    pad_ = {};
+    orbit_ = start_orbit(live_->picture());
+    log_.clear();
+    epoch_ = 0;
+    renderer_->stage(&live_->picture(), settings_.quality);
+    go(Screen::practise);
+  }
+
+  LiveResult finish() {
+    if (live_) live_->look(seen_);
+    LiveResult result = live_ ? live_->finish() : LiveResult{};
+    take_events();
+    live_.reset();
+    return result;
+  }
+
+  void go(Screen screen) {
+    // While somebody works the mouse is a hand and not a pointer; what it did before the change is nobody's.
+    if (screen == Screen::practise && options_.live.surgeon.empty()) SDL_SetRelativeMouseMode(SDL_TRUE);
+    else SDL_SetRelativeMouseMode(SDL_FALSE);
+    if (live_ && screen == Screen::pause) live_->command(LiveCommand::pause);
+    if (live_ && screen == Screen::practise) live_->command(LiveCommand::resume);
+    SDL_PumpEvents();
+    SDL_FlushEvent(SDL_MOUSEMOTION);
+    screen_ = screen;
+    tell_screen_ = true;
+  }
+
+  void carry_out(const Choice& choice) {
+    switch (choice.what) {
+      case Chosen::nothing:
+        break;
+      case Chosen::scene:
+        try {
+          open(scenes_[choice.scene].name);
+          message_.clear();
+        } catch (const InputError& error) { message_ = error.what(); }
+        break;
+      case Chosen::resume:
+        go(Screen::practise);
+        break;
+      case Chosen::single_step:
+        live_->command(LiveCommand::single_step);
+        break;
+      case Chosen::take_back:
+        live_->command(LiveCommand::take_back);
+        break;
+      case Chosen::restart:
+        if (live_) {
+          live_->command(LiveCommand::restart);
+          go(Screen::practise);
+        } else {
+          open(options_.scene.empty() || scene_.name != options_.scene ? scene_.name : options_.scene);
+        }
+        break;
+      case Chosen::finish:
+        result_ = finish();
+        renderer_->stage(nullptr, settings_.quality);
+        go(Screen::results);
+        break;
+      case Chosen::start_screen:
+        finish();
+        renderer_->stage(nullptr, settings_.quality);
+        go(Screen::start);
+        break;
+      case Chosen::quit:
+        quit_ = true;
+        break;
+    }
+  }
+
+  // --- a picture
+  // ----------------------------------------------------------------------------------------------------------------
+  bool frame(float dt) {
+    const bool working = screen_ == Screen::practise;
+    WindowInput in = events_in_.read(working, dt);
+    quit_ = quit_ || in.quit;
+    if (in.resized) resized();
+    keys(in);
+    if (live_) field(in, dt);
+    tell_screen();
+    turn_orbit(orbit_, in.orbit_right, in.orbit_up, in.closer);
+    if (in.camera_home && live_) orbit_ = start_orbit(live_->picture());
+
+    Choice choice;
+    Image copy;
+    WindowRenderer::Frame frame;
+    const bool seen = live_ && have_picture_;
+    frame.snapshot = seen ? &seen_ : nullptr;
+    frame.camera = camera_of(orbit_);
+    frame.suture_points = settings_.suture_points;
+    frame.dt = dt;
+    frame.panels = [&] { choice = panels(); };
+    const bool last = !options_.screenshot.empty() && pictures_ + 1 >= options_.after;
+    if (last) frame.copy = &copy;
+    const bool drawn = renderer_->draw(frame);
+    if (drawn && last) write_png(copy, options_.screenshot);
+    if (drawn && seen) note_latency();
+    carry_out(choice);
+    return drawn;
+  }
+
+  // Hands in, the field out.
+  void field(const WindowInput& in, float dt) {
+    have_picture_ = live_->look(seen_);
+    take_events();
+    const LiveStatus& status = live_->status();
+    if (status.epoch != epoch_) {
+      epoch_ = status.epoch;
+      if (status.practice.time_s > 0) resume_steering(steering_, seen_);
+      else steering_ = start_steering(live_->picture(), settings_.left_handed);
+      mouse_.was_down = false;
+    }
+    if (!status.fault.empty() && screen_ == Screen::practise) go(Screen::pause);
+    if (screen_ != Screen::practise || status.settling || !have_picture_ || !options_.live.surgeon.empty()) return;
+    steering_.assist = settings_.assist;
+    mouse_.hold_to_close = settings_.hold_to_close;
+    if (in.speed >= 0) mouse_.speed = kMouseSpeeds[static_cast<size_t>(in.speed)];
+    const Camera camera = camera_of(orbit_);
+    const ViewFrame view = view_frame(camera.eye, camera.target, camera.up, camera.fov_deg, static_cast<float>(height_));
+    std::array<HandMotion, 2> motion = mouse_motion(mouse_, steering_, in.mouse, view, dt);
+    if (in.has_pad) {
+      pad_.left_handed = settings_.left_handed;
+      const std::array<HandMotion, 2> more = gamepad_motion(pad_, steering_, in.pad, dt);
+      for (size_t k = 0; k < 2; ++k) {
+        HandMotion &m = motion[k], n = more[k];
+        m = {m.right + n.right, m.up + n.up,       m.ahead + n.ahead, m.drive + n.drive,
+             m.yaw + n.yaw,     m.pitch + n.pitch, m.roll + n.roll};
+      }
+    }
+    if (in.moved_ns) moved_ns_ = in.moved_ns;
+    const auto hands = steer(steering_, motion, view, live_->picture(), seen_, dt, moved_ns_);
+    for (size_t k = 0; k < 2; ++k) live_->hand(k, hands[k]);
+  }
+
+  void take_events() {
+    if (!live_) return;
+    for (Event e; live_->event(e);) {
+      if (events_) std::fprintf(events_, "%s\n", event_json(e).c_str());
+      LogLine line;
+      line.text = words_for(e, line.bad);
+      line.time_s = static_cast<double>(e.tick) / static_cast<double>(scene_.solver.tick_rate);
+      if (line.text.empty()) continue;
+      log_.push_back(line);
+      if (log_.size() > kLogLines) log_.pop_front();
+    }
+    if (events_) std::fflush(events_);
+  }
+
+  // Whoever follows the events also wants to know when hands are let in.
+  void tell_screen() {
+    if (!events_ || !tell_screen_ || (screen_ == Screen::practise && (!have_picture_ || live_->status().settling))) return;
+    tell_screen_ = false;
+    std::fprintf(events_, "{\"screen\":\"%s\"}\n", kScreenNames[static_cast<size_t>(screen_)]);
+    std::fflush(events_);
+  }
+
+  void keys(const WindowInput& in) {
+    const bool field = screen_ == Screen::practise || screen_ == Screen::pause;
+    switch (in.key) {
+      case Key::escape:
+        if (screen_ == Screen::start) quit_ = true;
+        else if (screen_ == Screen::practise) go(Screen::pause);
+        else if (screen_ == Screen::pause) carry_out({live_->status().fault.empty() ? Chosen::resume : Chosen::nothing, 0});
+        else carry_out({Chosen::start_screen, 0});
+        break;
+      case Key::pause:
+        if (screen_ == Screen::practise) go(Screen::pause);
+        else if (screen_ == Screen::pause && live_->status().fault.empty()) go(Screen::practise);
+        break;
+      case Key::enter:
+        if (screen_ == Screen::results) carry_out({Chosen::restart, 0});
+        else if (screen_ == Screen::start && !scenes_.empty()) carry_out({Chosen::scene, 0});
+        break;
+      case Key::digit:
+        if (screen_ == Screen::start && in.digit <= static_cast<int>(scenes_.size()))
+          carry_out({Chosen::scene, static_cast<size_t>(in.digit) - 1});
+        break;
+      case Key::single_step:
+        if (screen_ == Screen::pause) carry_out({Chosen::single_step, 0});
+        break;
+      case Key::take_back:
+        if (field) carry_out({Chosen::take_back, 0});
+        break;
+      case Key::restart:
+        if (field) carry_out({Chosen::restart, 0});
+        break;
+      case Key::finish:
+        if (field) carry_out({Chosen::finish, 0});
+        break;
+      case Key::slower:
+        if (field) live_->command(LiveCommand::slower);
+        break;
+      case Key::faster:
+        if (field) live_->command(LiveCommand::faster);
+        break;
+      case Key::points:
+        settings_.suture_points = !settings_.suture_points;
+        break;
+      case Key::hints:
+        settings_.hints = !settings_.hints;
+        break;
+      case Key::help_at_needle:
+        settings_.assist = !settings_.assist;
+        break;
+      case Key::none:
+        break;
+    }
+  }
+
+  Choice panels() {
+    WorkView view{&scene_,
+                  live_ ? &live_->status() : nullptr,
+                  &seen_,
+                  &steering_,
+                  &mouse_,
+                  &log_,
+                  events_in_.pad_name(),
+                  picture_count_ / std::max(picture_s_, 1e-3)};
+    if (screen_ == Screen::start) return start_panel(scenes_, settings_, message_);
+    if (screen_ == Screen::results) return result_panel(scene_, result_.practice, result_.recorded, result_.fault);
+    if (have_picture_) work_panel(view, settings_);
+    if (screen_ == Screen::pause) return pause_panel(view, settings_);
+    return {};
+  }
+
+  void resized() {
+    SDL_GetWindowSize(sdl_.window, &width_, &height_);
+    renderer_->resize(width_, height_);
+    style_panels(std::clamp(static_cast<float>(height_) / 720, 0.7f, 2.0f));
+  }
+
+  void note_latency() {
+    const LiveStatus& s = live_->status();
+    const uint64_t newest = std::max(s.input_time_ns[0], s.input_time_ns[1]);
+    if (newest == 0 || newest == shown_ns_) return;
+    shown_ns_ = newest;
+    latency_ms_.push_back(static_cast<float>(wall_ns() - newest) * 1e-6f);
+  }
+
+  void report(double seconds) {
+    if (options_.seconds <= 0 && options_.screenshot.empty()) return;
+    std::sort(latency_ms_.begin(), latency_ms_.end());
+    const auto part = [&](double p) {
+      return latency_ms_.empty() ? 0.0f : latency_ms_[static_cast<size_t>(p * static_cast<double>(latency_ms_.size() - 1))];
+    };
+    std::fprintf(stderr, "catgut: %d pictures in %.1f s", pictures_, seconds);
+    if (!latency_ms_.empty())
+      std::fprintf(stderr, "; from a hand's motion to the picture that shows it: median %.1f ms, 95 %% %.1f ms (%zu motions)",
+                   static_cast<double>(part(0.5)), static_cast<double>(part(0.95)), latency_ms_.size());
+    std::fprintf(stderr, "\n");
+  }
+
+  const PlayOptions& options_;
+  SdlWindow sdl_;
+  int width_, height_;
+  std::unique_ptr<WindowRenderer> renderer_;
+  WindowEvents events_in_;
+  Settings settings_;
+  std::vector<SceneChoice> scenes_;
+  std::string message_;
+  Screen screen_ = Screen::start;
+  bool tell_screen_ = true, quit_ = false, have_picture_ = false;
+  SceneSpec scene_;
+  std::unique_ptr<Live> live_;
+  int opened_ = 0;
+  LiveResult result_;
+  Snapshot seen_;
+  Steering steering_;
+  MouseHand mouse_;
+  GamepadHand pad_;
+  Orbit orbit_;
+  std::deque<LogLine> log_;
+  uint32_t epoch_ = 0;
+  uint64_t moved_ns_ = 0, shown_ns_ = 0;
+  std::vector<float> latency_ms_;
+  double picture_s_ = 0, picture_count_ = 0;  // lately
+  int pictures_ = 0;
+  std::FILE* events_ = nullptr;
+};
+
+}  // namespace
+
+int play(const PlayOptions& options) { return Window(options).loop(); }
+
+}  // namespace catgut
