@@ -73,7 +73,7 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
       {SDLK_ESCAPE, Key::escape},       {SDLK_RETURN, Key::enter}, {SDLK_p, Key::pause},      {SDLK_PERIOD, Key::single_step},
       {SDLK_BACKSPACE, Key::take_back}, {SDLK_F5, Key::restart},   {SDLK_MINUS, Key::slower}, {SDLK_PLUS, Key::faster},
       {SDLK_EQUALS, Key::faster},       {SDLK_m, Key::points},     {SDLK_F1, Key::hints},     {SDLK_h, Key::help_at_needle},
-      {SDLK_F10, Key::finish}};
+      {SDLK_F10, Key::finish},          {SDLK_F12, Key::picture}};
   for (const auto& k : kKeys)
     if (k.code == code) in.key = k.key;
 }
@@ -97,7 +97,6 @@ WindowInput WindowEvents::read(bool working, float dt) {
   WindowInput in;
   in.mouse.cut = cut_, in.mouse.fresh = fresh_;
   ImGuiIO& io = ImGui::GetIO();
-  bool clicked = false;
   for (SDL_Event e; SDL_PollEvent(&e);) {
     switch (e.type) {
       case SDL_QUIT:
@@ -129,7 +128,7 @@ WindowInput WindowEvents::read(bool working, float dt) {
         if (e.button.button == SDL_BUTTON_LEFT) left_ = down, in.mouse.jaw_presses += down && working;
         if (e.button.button == SDL_BUTTON_RIGHT) right_ = down;
         if (e.button.button == SDL_BUTTON_MIDDLE) middle_ = down;
-        clicked = clicked || (down && e.button.button == SDL_BUTTON_LEFT);
+        clicked_ = clicked_ || (down && e.button.button == SDL_BUTTON_LEFT);
         break;
       }
       case SDL_MOUSEWHEEL:
@@ -179,7 +178,7 @@ WindowInput WindowEvents::read(bool working, float dt) {
   SDL_GetMouseState(&x, &y);
   io.MousePos = working ? ImVec2(-1, -1) : ImVec2(static_cast<float>(x), static_cast<float>(y));
   // A click that came and went between two pictures is still one for the panels.
-  io.MouseDown[0] = !working && (left_ || clicked);
+  io.MouseDown[0] = !working && (left_ || clicked_);
   return in;
 }
 

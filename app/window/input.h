@@ -26,7 +26,8 @@ enum class Key {
   hints,
   help_at_needle,
   finish,
-  digit
+  digit,
+  picture
 };
 
 struct WindowInput {
@@ -51,6 +52,7 @@ class WindowEvents {
 
   // Everything since the last call. working: the mouse belongs to the hands, else to the panels (ImGui's context is fed).
   WindowInput read(bool working, float dt);
+  void panels_drawn() { clicked_ = false; }  // they have seen the clicks
   const std::string& pad_name() const { return pad_name_; }
 
  private:
@@ -59,6 +61,7 @@ class WindowEvents {
 
   SDL_GameController* pad_ = nullptr;
   std::string pad_name_;
+  bool clicked_ = false;  // the left button went down since the panels were last drawn
   bool left_ = false, right_ = false, middle_ = false, space_ = false, cut_ = false, fresh_ = false;
   bool roll_left_ = false, roll_right_ = false;
   int arrow_x_ = 0, arrow_y_ = 0, zoom_ = 0;

@@ -61,6 +61,7 @@ const char* kHints =
     "middle, arrows   look round; Ctrl+wheel: closer\n"
     "- +              slow motion\n"
     "Backspace        take back the last bite\n"
+    "F12              save a picture\n"
     "Esc              pause     F1 hide this";
 
 }  // namespace
@@ -127,7 +128,7 @@ void work_panel(const WorkView& v, const Settings& settings) {
   if (s.doing.empty() && !s.settling) {
     const size_t k = v.mouse->active;
     const bool help = v.steering->hand[k].snapped;
-    begin_at("hand", 0.5f, 1, 0.55f, kOverlay);
+    begin_at("hand", 1, 1, 0.55f, kOverlay);
     text(
         fmt::format("{} ({} hand)", k == 0 ? "needle driver" : "forceps", (k == 0) != settings.left_handed ? "right" : "left"));
     if (v.mouse->speed != 1) ImGui::SameLine(), text(kQuiet, v.mouse->speed < 1 ? "fine" : "fast");

@@ -9,9 +9,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
+#include <filesystem>
 #include <memory>
-#include <optional>
+#include <utility>
 
 #include "commands/commands.h"
 #include "core/check.h"
@@ -27,6 +27,8 @@ namespace {
 
 constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSansMono.ttf";
 constexpr size_t kLogLines = 8;
+constexpr double kMostPictures = 150;  // [1/s]
+constexpr double kSlowPicture = 0.07;  // [s] a picture that takes longer is drawn coarser
 constexpr const char* kHeadless = "run without it: catgut run purse_string --surgeon scripted --headless";
 
 enum class Screen { start, practise, pause, results };
@@ -112,6 +114,10 @@ class Window {
         picture_s_ = picture_s_ * keep + (drawn - drawn_at);
         picture_count_ = picture_count_ * keep + 1;
         drawn_at = drawn;
+        coarser_if_slow();
+        // Where the display does not set the pace something must, or the picture would take the processor from the physics.
+        const double left = 1.0 / kMostPictures - (drawn - now);
+        if (left > 0) SDL_Delay(static_cast<uint32_t>(1000 * left));
       } else {
         SDL_Delay(1);  // the driver is behind: hands go on, and the processor is left to it
       }
@@ -142,6 +148,7 @@ class Window {
     log_.clear();
     epoch_ = 0;
     renderer_->stage(&live_->picture(), settings_.quality);
+    if (coarse_ < 1) renderer_->draw_coarser(coarse_);
     go(Screen::practise);
   }
 
@@ -193,8 +200,7 @@ class Window {
         }
         break;
       case Chosen::finish:
-        result_ = finish();
-        renderer_->stage(nullptr, settings_.quality);
+        result_ = finish();  // the field stays in the picture, as it was left
         go(Screen::results);
         break;
       case Chosen::start_screen:
@@ -224,19 +230,31 @@ class Window {
     Choice choice;
     Image copy;
     WindowRenderer::Frame frame;
-    const bool seen = live_ && have_picture_;
+    const bool seen = have_picture_ && (live_ || screen_ == Screen::results);
     frame.snapshot = seen ? &seen_ : nullptr;
     frame.camera = camera_of(orbit_);
     frame.suture_points = settings_.suture_points;
     frame.dt = dt;
     frame.panels = [&] { choice = panels(); };
     const bool last = !options_.screenshot.empty() && pictures_ + 1 >= options_.after;
-    if (last) frame.copy = &copy;
+    if (last || picture_wanted_) frame.copy = &copy;
     const bool drawn = renderer_->draw(frame);
+    if (drawn) events_in_.panels_drawn();
     if (drawn && last) write_png(copy, options_.screenshot);
-    if (drawn && seen) note_latency();
+    if (drawn && std::exchange(picture_wanted_, false)) save_picture(copy);
+    if (drawn && seen && live_) note_latency();
     carry_out(choice);
     return drawn;
+  }
+
+  void save_picture(const Image& image) {
+    std::string name;
+    for (int i = 1; name.empty() || std::filesystem::exists(name); ++i) name = fmt::format("catgut_{}.png", i);
+    LogLine line{seen_.time_s, "picture: " + name, false};
+    try {
+      write_png(image, name);
+    } catch (const std::runtime_error& error) { line.text = error.what(), line.bad = true; }
+    log_.push_back(line);
   }
 
   // Hands in, the field out.
@@ -342,6 +360,9 @@ class Window {
       case Key::help_at_needle:
         settings_.assist = !settings_.assist;
         break;
+      case Key::picture:
+        picture_wanted_ = true;
+        break;
       case Key::none:
         break;
     }
@@ -369,25 +390,36 @@ class Window {
     style_panels(std::clamp(static_cast<float>(height_) / 720, 0.7f, 2.0f));
   }
 
+  // A machine without a graphics card: fewer points rather than fewer pictures, as long as the low quality was asked for.
+  void coarser_if_slow() {
+    const float least = std::clamp(180.0f / static_cast<float>(height_), 0.25f, 1.0f);
+    if (!live_ || settings_.quality != Quality::draft || coarse_ <= least) return;
+    if (++pictures_so_ < 12 || picture_s_ < picture_count_ * kSlowPicture) return;
+    coarse_ = std::max(least, 0.7f * coarse_);
+    renderer_->draw_coarser(coarse_);
+    pictures_so_ = 0;
+    picture_s_ = picture_count_ = 0;
+  }
+
   void note_latency() {
     const LiveStatus& s = live_->status();
     const uint64_t newest = std::max(s.input_time_ns[0], s.input_time_ns[1]);
     if (newest == 0 || newest == shown_ns_) return;
     shown_ns_ = newest;
-    latency_ms_.push_back(static_cast<float>(wall_ns() - newest) * 1e-6f);
+    to_tick_ms_.push_back(s.hand_to_tick_ms);
+    to_picture_ms_.push_back(static_cast<float>(wall_ns() - newest) * 1e-6f);
   }
 
   void report(double seconds) {
     if (options_.seconds <= 0 && options_.screenshot.empty()) return;
-    std::sort(latency_ms_.begin(), latency_ms_.end());
-    const auto part = [&](double p) {
-      return latency_ms_.empty() ? 0.0f : latency_ms_[static_cast<size_t>(p * static_cast<double>(latency_ms_.size() - 1))];
-    };
-    std::fprintf(stderr, "catgut: %d pictures in %.1f s", pictures_, seconds);
-    if (!latency_ms_.empty())
-      std::fprintf(stderr, "; from a hand's motion to the picture that shows it: median %.1f ms, 95 %% %.1f ms (%zu motions)",
-                   static_cast<double>(part(0.5)), static_cast<double>(part(0.95)), latency_ms_.size());
-    std::fprintf(stderr, "\n");
+    std::fprintf(stderr, "catgut: %d pictures in %.1f s\n", pictures_, seconds);
+    if (to_picture_ms_.empty()) return;
+    const Spread tick = spread_of(to_tick_ms_), picture = spread_of(to_picture_ms_);
+    std::fprintf(
+        stderr,
+        "catgut: from reading a motion to the end of its tick %.1f ms, to its picture being drawn %.1f ms (medians of %zu; "
+        "99 %%: %.1f, %.1f)\n",
+        tick.median, picture.median, to_picture_ms_.size(), tick.p99, picture.p99);
   }
 
   const PlayOptions& options_;
@@ -399,7 +431,7 @@ class Window {
   std::vector<SceneChoice> scenes_;
   std::string message_;
   Screen screen_ = Screen::start;
-  bool tell_screen_ = true, quit_ = false, have_picture_ = false;
+  bool tell_screen_ = true, picture_wanted_ = false, quit_ = false, have_picture_ = false;
   SceneSpec scene_;
   std::unique_ptr<Live> live_;
   int opened_ = 0;
@@ -412,8 +444,10 @@ class Window {
   std::deque<LogLine> log_;
   uint32_t epoch_ = 0;
   uint64_t moved_ns_ = 0, shown_ns_ = 0;
-  std::vector<float> latency_ms_;
+  std::vector<float> to_tick_ms_, to_picture_ms_;
   double picture_s_ = 0, picture_count_ = 0;  // lately
+  float coarse_ = 1;                          // of the window's pixels each way
+  int pictures_so_ = 0;                       // since that was last changed
   int pictures_ = 0;
   std::FILE* events_ = nullptr;
 };

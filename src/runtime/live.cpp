@@ -150,6 +150,7 @@ void Live::Work::record_from_here() {
 
 void Live::Work::tick(bool let_in) {
   const Clock::time_point start = Clock::now();
+  uint64_t fresh = 0;  // time_ns of the newest motion that this tick is the first to have
   if (let_in && told.tick % checkpoint_every == 0) {
     std::swap(checkpoint[0], checkpoint[1]);
     checkpoint[0] = moment();
@@ -169,6 +170,7 @@ void Live::Work::tick(bool let_in) {
       if (mail.epoch != told.epoch) continue;
       hand = hand_toward(hand, mail.input, options.hand_speed, options.hand_turn, static_cast<float>(dt));
       hand.buttons |= down;
+      fresh = std::max(fresh, mail.input.time_ns > told.input_time_ns[k] ? mail.input.time_ns : 0);
       told.input_time_ns[k] = mail.input.time_ns;
     }
   }
@@ -193,6 +195,7 @@ void Live::Work::tick(bool let_in) {
   if (now.tick % kSanityTicks == 0 && !state_is_sane(*model, *state))
     throw InputError(scene.name, "the simulation went wrong",
                      "take back the last bite, or restart; a recording helps to find out why");
+  if (fresh > 0) told.hand_to_tick_ms = static_cast<float>(wall_ns() - fresh) * 1e-6f;
   const double spent = seconds_of(Clock::now() - start), keep = std::exp(-dt / kFactorTime);
   spent_s = spent_s * keep + spent;
   ticks_weight = ticks_weight * keep + 1;

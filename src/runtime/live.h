@@ -52,6 +52,7 @@ struct LiveStatus {
   uint32_t to_take_back = 0;                // bites that take_back can undo
   uint32_t events_lost = 0;                 // nobody fetched them in time
   std::array<uint64_t, 2> input_time_ns{};  // ToolInput::time_ns of the hands in the newest tick, for latencies
+  float hand_to_tick_ms = 0;                // from the newest of these, where a device uses wall_ns(), to the end of its tick
   Practice practice;
   std::string doing;  // of the surgeon, when one works
   std::string fault;  // not empty: the run has stopped, and why

@@ -174,6 +174,26 @@ TEST(Steer, no_motion_takes_a_hand_out_of_reach) {
   EXPECT_TRUE(is_finite(d.out[0].pose.p));
 }
 
+TEST(Steer, after_a_jump_in_time_hands_go_on_from_the_tools) {
+  Desk d;
+  d.turn(moved(80, 30));
+  const Pose grip{{0.004f, 0.007f, 0}, axis_angle({1, 0, 0}, 0.4f)};
+  d.seen.needle.pose = {{0.01f, 0.02f, 0.03f}, axis_angle(normalized(Vec3{1, 2, 3}), 0.7f)};
+  d.seen.tool[0].held = Held::needle;
+  d.seen.tool[0].jaw = 0;
+  d.seen.tool[0].pose = d.seen.tool[0].hand = d.seen.needle.pose * grip;
+  d.seen.tool[1].hand = {{-0.05f, 0.01f, 0}, {}};
+  resume_steering(d.steering, d.seen);
+  d.turn({});
+  EXPECT_LT(distance(d.out[0].pose.p, d.seen.tool[0].hand.p), 1e-6f);
+  EXPECT_EQ(d.out[0].jaw, 0) << "it still holds the needle";
+  EXPECT_LT(distance(d.out[1].pose.p, d.seen.tool[1].hand.p), 1e-6f);
+  MouseInput in = moved(50, 0);
+  in.turn = true;
+  d.turn(in);
+  EXPECT_LT(distance((d.out[0].pose * inverse(grip)).p, d.seen.needle.pose.p), 1e-6f) << "and turns it about its own centre";
+}
+
 TEST(Help, takes_an_open_jaw_to_the_good_place_and_lets_go_of_a_moving_hand) {
   Desk d;
   d.seen.needle.pose = {d.out[0].pose.p + d.view.ahead * 0.04f, axis_angle({1, 0, 0}, -0.5f * kPi)};

@@ -68,13 +68,23 @@ void Theatre::show(const Snapshot& snapshot, const Camera& camera, int width, in
                          filament::Camera::Fov::VERTICAL);
   camera_->lookAt({camera.eye.x, camera.eye.y, camera.eye.z}, {camera.target.x, camera.target.y, camera.target.z},
                   {camera.up.x, camera.up.y, camera.up.z});
-  const float pixel = 2 * std::tan(0.5f * camera.fov_deg * kPi / 180) / float(height);
+  const float pixel = 2 * std::tan(0.5f * camera.fov_deg * kPi / 180) / (coarse_ * float(height));
 
   for (TissueView& t : tissue_) move_tissue(engine_, t, model_, snapshot);
   move_thread(engine_, thread_, model_, snapshot, camera, pixel);
   catgut::set_pose(engine_, needle_, snapshot.needle.pose);
   for (size_t i = 0; i < tool_.size(); ++i) move_tool(tool_[i], snapshot.tool[i]);
   show_markers(snapshot, suture_points);
+}
+
+void Theatre::draw_coarser(float part) {
+  coarse_ = part;
+  filament::View::DynamicResolutionOptions coarse;
+  coarse.enabled = part < 1;
+  coarse.homogeneousScaling = true;
+  coarse.minScale = coarse.maxScale = {part, part};
+  coarse.quality = filament::View::QualityLevel::LOW;
+  view_->setDynamicResolutionOptions(coarse);
 }
 
 void Theatre::set_quality(Quality quality) {

@@ -35,6 +35,9 @@ class Theatre {
 
   // Moves everything to where the snapshot has it; the next frame that renders view() shows it.
   void show(const Snapshot& snapshot, const Camera& camera, int width, int height, bool suture_points);
+  // Draws the field with `part` of the picture's points each way and stretches it: for windows on machines without a graphics
+  // card.
+  void draw_coarser(float part);
   filament::View* view() const { return view_; }
 
  private:
@@ -46,6 +49,7 @@ class Theatre {
   void move_tool(const ToolView3d& view, const ToolView& tool);
   void show_markers(const Snapshot& snapshot, bool wanted);
 
+  float coarse_ = 1;
   const PictureModel model_;  // a copy: the theatre outlives whatever built it
   filament::Engine& engine_;
   filament::Scene* scene_ = nullptr;

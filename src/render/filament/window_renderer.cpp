@@ -45,7 +45,12 @@ class FilamentWindow final : public WindowRenderer {
 
   void stage(const PictureModel* model, Quality quality) override {
     theatre_.reset();
-    if (model) theatre_ = std::make_unique<Theatre>(*engine_, *model, quality);
+    if (!model) return;
+    theatre_ = std::make_unique<Theatre>(*engine_, *model, quality);
+  }
+
+  void draw_coarser(float part) override {
+    if (theatre_) theatre_->draw_coarser(part);
   }
 
   void resize(int width, int height) override {
@@ -55,17 +60,18 @@ class FilamentWindow final : public WindowRenderer {
   }
 
   bool draw(const Frame& frame) override {
-    const bool field = theatre_ && frame.snapshot;
-    if (field) theatre_->show(*frame.snapshot, frame.camera, width_, height_, frame.suture_points);
-    panels_->render(frame.dt, [&](filament::Engine*, filament::View*) {
-      if (frame.panels) frame.panels();
-    });
+    // First of all whether there will be a frame: what is uploaded for none would pile up before a driver that is behind.
     bool begun = renderer_->beginFrame(chain_);
     for (int i = 0; frame.copy && !begun && i < 20; ++i) {
       engine_->flushAndWait();
       begun = renderer_->beginFrame(chain_);
     }
     if (!begun) return false;
+    const bool field = theatre_ && frame.snapshot;
+    if (field) theatre_->show(*frame.snapshot, frame.camera, width_, height_, frame.suture_points);
+    panels_->render(frame.dt, [&](filament::Engine*, filament::View*) {
+      if (frame.panels) frame.panels();
+    });
     if (field) renderer_->render(theatre_->view());
     renderer_->render(panel_view_);
     if (frame.copy) {
