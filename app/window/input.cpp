@@ -106,6 +106,7 @@ WindowInput WindowEvents::read(bool working, float dt) {
         in.resized = in.resized || e.window.event == SDL_WINDOWEVENT_SIZE_CHANGED;
         // Keys that were down when the window lost the keyboard never come up here.
         if (e.window.event == SDL_WINDOWEVENT_FOCUS_LOST) {
+          in.left = true;
           left_ = right_ = middle_ = space_ = cut_ = fresh_ = roll_left_ = roll_right_ = false;
           arrow_x_ = arrow_y_ = zoom_ = 0;
         }

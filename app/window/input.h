@@ -40,6 +40,7 @@ struct WindowInput {
   Key key = Key::none;
   int digit = 0;
   bool quit = false, resized = false;
+  bool left = false;      // the keyboard went to another window
   uint64_t moved_ns = 0;  // on the clock of runtime/live: when the newest motion was read
 };
 

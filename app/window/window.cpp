@@ -222,6 +222,7 @@ class Window {
     quit_ = quit_ || in.quit;
     if (in.resized) resized();
     keys(in);
+    if (in.left && screen_ == Screen::practise && options_.live.surgeon.empty()) go(Screen::pause);
     if (live_) field(in, dt);
     tell_screen();
     turn_orbit(orbit_, in.orbit_right, in.orbit_up, in.closer);

@@ -7,6 +7,7 @@
 #include "device/gamepad.h"
 #include "device/mouse.h"
 #include "procedure/scene_file.h"
+#include "runtime/live.h"
 #include "sim/simulation.h"
 #include "surgeon/plan.h"
 #include "surgeon/sight.h"
@@ -285,8 +286,13 @@ TEST(Gamepad, triggers_close_the_jaws_and_leave_a_mouses_alone) {
 // Somebody who looks at the picture and has nothing but a mouse: every step below is pixels, notches and buttons.
 class MousePerson {
  public:
-  explicit MousePerson(const std::string& scene)
-      : model_(build_model(read_scene(scene))), state_(initial_state(*model_)), picture_(picture_model(*model_)) {
+  // ticks: of the simulation between two pictures; hands get there as they do in runtime/live.
+  explicit MousePerson(const std::string& scene, int ticks = 1)
+      : ticks_(ticks),
+        dt_(kDt * static_cast<float>(ticks)),
+        model_(build_model(read_scene(scene))),
+        state_(initial_state(*model_)),
+        picture_(picture_model(*model_)) {
     steering_ = start_steering(picture_, false);
     const Vec3 target = picture_.focus + Vec3{0.02f, 0, 0};
     view_ = view_frame(target + Vec3{0.03f, 0.16f, 0.17f}, target, {0, 1, 0}, 30, 360);
@@ -294,11 +300,14 @@ class MousePerson {
   }
 
   void tick(const MouseInput& input) {
-    TickInput in;
-    in.hand = steer(steering_, mouse_motion(mouse_, steering_, input, view_, dt_), view_, picture_, seen_, dt_, 0);
-    step(*model_, *state_, in, jobs_);
-    publish(*model_, *state_, seen_);
-    for (const Event& e : seen_.event) events_.push_back(e);
+    const auto hand = steer(steering_, mouse_motion(mouse_, steering_, input, view_, dt_), view_, picture_, seen_, dt_, 0);
+    for (int i = 0; i < ticks_; ++i) {
+      for (size_t k = 0; k < 2; ++k) in_.hand[k] = started_ ? hand_toward(in_.hand[k], hand[k], 0.6f, 12, kDt) : hand[k];
+      started_ = true;
+      step(*model_, *state_, in_, jobs_);
+      publish(*model_, *state_, seen_);
+      for (const Event& e : seen_.event) events_.push_back(e);
+    }
   }
   void wait(int ticks) {
     for (int i = 0; i < ticks; ++i) tick({});
@@ -366,20 +375,27 @@ class MousePerson {
     return transform(seen_.needle.pose, Vec3{std::cos(phi), std::sin(phi), 0} * picture_.needle_radius);
   }
 
+  const int ticks_;
+  const float dt_;  // [s] between two pictures
   std::shared_ptr<const Model> model_;
   StatePtr state_;
   PictureModel picture_;
   Snapshot seen_;
+  TickInput in_;
+  bool started_ = false;
   Steering steering_;
   MouseHand mouse_;
   ViewFrame view_;
   Jobs jobs_{1};
   std::vector<Event> events_;
-  float dt_ = kDt;
 };
 
-TEST(Mouse, alone_makes_a_whole_bite) {
-  MousePerson me("purse_string");
+// ticks 1: a picture every tick; 6: ten pictures a second, what a machine without a graphics card gives.
+class WholeBite : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Pictures, WholeBite, testing::Values(1, 6));
+
+TEST_P(WholeBite, by_mouse_alone) {
+  MousePerson me("purse_string", GetParam());
   me.wait(30);
   // The pointer over the needle; the help sees to the rest.
   ASSERT_TRUE(me.point_at([&] { return me.on_needle(0.35f); }, false, 400));
