@@ -144,7 +144,7 @@ class Window {
     steering_ = start_steering(live_->picture(), settings_.left_handed);
     mouse_ = {};
     pad_ = {};
-    orbit_ = start_orbit(live_->picture());
+    orbit_set_ = false;
     log_.clear();
     epoch_ = 0;
     renderer_->stage(&live_->picture(), settings_.quality);
@@ -226,7 +226,7 @@ class Window {
     if (live_) field(in, dt);
     tell_screen();
     turn_orbit(orbit_, in.orbit_right, in.orbit_up, in.closer);
-    if (in.camera_home && live_) orbit_ = start_orbit(live_->picture());
+    if (in.camera_home && live_) orbit_set_ = false;
 
     Choice choice;
     Image copy;
@@ -261,6 +261,7 @@ class Window {
   // Hands in, the field out.
   void field(const WindowInput& in, float dt) {
     have_picture_ = live_->look(seen_);
+    if (have_picture_ && !std::exchange(orbit_set_, true)) orbit_ = start_orbit(live_->picture(), seen_.needle.pose.p);
     take_events();
     const LiveStatus& status = live_->status();
     if (status.epoch != epoch_) {
@@ -442,6 +443,7 @@ class Window {
   MouseHand mouse_;
   GamepadHand pad_;
   Orbit orbit_;
+  bool orbit_set_ = false;  // false: chosen anew with the next snapshot
   std::deque<LogLine> log_;
   uint32_t epoch_ = 0;
   uint64_t moved_ns_ = 0, shown_ns_ = 0;

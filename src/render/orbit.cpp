@@ -5,11 +5,20 @@
 
 namespace catgut {
 
-Orbit start_orbit(const PictureModel& picture) {
+Orbit start_orbit(const PictureModel& picture, Vec3 needle) {
   Orbit o;
-  // Organ and needle are in the picture: the needle lies beside the organ, lower down, on the right or in front.
-  o.target = picture.focus + Vec3{0.2f, -0.15f, 0.1f} * picture.field;
-  o.half_height = 0.75f * picture.field;
+  // Between the two, nearer to the organ: that is where the work will be.
+  const Vec3 off = is_finite(needle) ? needle - picture.focus : Vec3{};
+  o.target = picture.focus + off * (0.35f * std::min(1.0f, 1.2f * picture.field / std::max(length(off), 1e-6f)));
+  o.half_height = 0.7f * picture.field;
+  // Back until the needle's whole circle is in the picture, not at its very edge.
+  for (int i = 0; i < 12; ++i) {
+    const Camera c = camera_of(o);
+    const Vec3 ahead = normalized(c.target - c.eye), right = normalized(cross(ahead, c.up)), d = needle - c.eye;
+    const float half = std::tan(0.5f * c.fov_deg * kPi / 180) * dot(d, ahead);
+    if (std::abs(dot(d, cross(right, ahead))) + picture.needle_radius < 0.9f * half) break;
+    o.half_height *= 1.08f;
+  }
   return o;
 }
 

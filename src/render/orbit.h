@@ -11,7 +11,8 @@ struct Orbit {
   Vec3 target;                              // [m]
 };
 
-Orbit start_orbit(const PictureModel& picture);
+// Organ and needle are in the picture. needle: [m] where it lies.
+Orbit start_orbit(const PictureModel& picture, Vec3 needle);
 void turn_orbit(Orbit& orbit, float right, float up, float closer);  // [rad], [rad], factor's logarithm
 Camera camera_of(const Orbit& orbit);
 

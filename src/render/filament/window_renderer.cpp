@@ -24,10 +24,9 @@ class FilamentWindow final : public WindowRenderer {
       : platform_(make_egl_platform(window)), engine_(start_engine(*platform_)) {
     chain_ = engine_->createSwapChain(reinterpret_cast<void*>(static_cast<uintptr_t>(window)));
     renderer_ = engine_->createRenderer();
-    renderer_->setClearOptions({{0.012f, 0.03f, 0.028f, 1}, true, false});
+    renderer_->setClearOptions({{0.02f, 0.10f, 0.09f, 1}, true, false});
     panel_view_ = engine_->createView();
     panel_view_->setPostProcessingEnabled(false);
-    panel_view_->setBlendMode(filament::View::BlendMode::TRANSLUCENT);
     panel_view_->setShadowingEnabled(false);
     const bool there = !font.empty() && std::filesystem::exists(font);
     panels_ = std::make_unique<filagui::ImGuiHelper>(engine_, panel_view_, utils::Path(there ? font.c_str() : ""));
@@ -69,6 +68,8 @@ class FilamentWindow final : public WindowRenderer {
     if (!begun) return false;
     const bool field = theatre_ && frame.snapshot;
     if (field) theatre_->show(*frame.snapshot, frame.camera, width_, height_, frame.suture_points);
+    // Alone, the panels' view clears what was there before.
+    panel_view_->setBlendMode(field ? filament::View::BlendMode::TRANSLUCENT : filament::View::BlendMode::OPAQUE);
     panels_->render(frame.dt, [&](filament::Engine*, filament::View*) {
       if (frame.panels) frame.panels();
     });
