@@ -3,7 +3,6 @@
 #include "window/window.h"
 
 #include <SDL.h>
-#include <SDL_syswm.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,7 +19,9 @@
 #include "render/orbit.h"
 #include "render/window.h"
 #include "window/input.h"
+#include "window/latency.h"
 #include "window/panels.h"
+#include "window/sdl_window.h"
 
 namespace catgut {
 namespace {
@@ -29,44 +30,9 @@ constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSansMono.t
 constexpr size_t kLogLines = 8;
 constexpr double kMostPictures = 150;  // [1/s]
 constexpr double kSlowPicture = 0.07;  // [s] a picture that takes longer is drawn coarser
-constexpr const char* kHeadless = "run without it: catgut run purse_string --surgeon scripted --headless";
 
 enum class Screen { start, practise, pause, results };
 constexpr const char* kScreenNames[] = {"start", "practise", "pause", "results"};
-
-// SDL and its window, gone when this is.
-struct SdlWindow {
-  SDL_Window* window = nullptr;
-  uint64_t number = 0;  // of the X server
-
-  SdlWindow(int width, int height) {
-    // Pictures go through EGL on X11; on a Wayland desktop its X server serves.
-    SDL_SetHintWithPriority(SDL_HINT_VIDEODRIVER, "x11", SDL_HINT_DEFAULT);
-    SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
-    if (SDL_Init(SDL_INIT_VIDEO | SDL_INIT_GAMECONTROLLER) != 0)
-      throw InputError("window", fmt::format("there is no display here ({})", SDL_GetError()), kHeadless);
-    window = SDL_CreateWindow("Catgut", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
-                              SDL_WINDOW_RESIZABLE | SDL_WINDOW_SHOWN);
-    SDL_SysWMinfo info;
-    SDL_VERSION(&info.version);
-    if (!window || !SDL_GetWindowWMInfo(window, &info) || info.subsystem != SDL_SYSWM_X11) {
-      const std::string why = window ? "it is not an X11 window" : SDL_GetError();
-      close();
-      throw InputError("window", "it cannot be opened (" + why + ")", kHeadless);
-    }
-    number = info.info.x11.window;
-  }
-  ~SdlWindow() { close(); }
-  SdlWindow(const SdlWindow&) = delete;
-  SdlWindow& operator=(const SdlWindow&) = delete;
-
- private:
-  void close() {
-    if (window) SDL_DestroyWindow(window);
-    window = nullptr;
-    SDL_Quit();
-  }
-};
 
 class Window {
  public:
@@ -125,7 +91,7 @@ class Window {
     }
     LiveResult result;
     if (live_) result = finish();
-    report(wall_seconds() - start);
+    if (options_.seconds > 0 || !options_.screenshot.empty()) latency_.report(pictures_, wall_seconds() - start);
     if (!result.fault.empty()) throw InputError("simulation", result.fault, "the recording holds what went before");
     return stop ? 130 : 0;
   }
@@ -243,7 +209,7 @@ class Window {
     if (drawn) events_in_.panels_drawn();
     if (drawn && last) write_png(copy, options_.screenshot);
     if (drawn && std::exchange(picture_wanted_, false)) save_picture(copy);
-    if (drawn && seen && live_) note_latency();
+    if (drawn && seen && live_) latency_.picture(live_->status());
     carry_out(choice);
     return drawn;
   }
@@ -403,27 +369,6 @@ class Window {
     picture_s_ = picture_count_ = 0;
   }
 
-  void note_latency() {
-    const LiveStatus& s = live_->status();
-    const uint64_t newest = std::max(s.input_time_ns[0], s.input_time_ns[1]);
-    if (newest == 0 || newest == shown_ns_) return;
-    shown_ns_ = newest;
-    to_tick_ms_.push_back(s.hand_to_tick_ms);
-    to_picture_ms_.push_back(static_cast<float>(wall_ns() - newest) * 1e-6f);
-  }
-
-  void report(double seconds) {
-    if (options_.seconds <= 0 && options_.screenshot.empty()) return;
-    std::fprintf(stderr, "catgut: %d pictures in %.1f s\n", pictures_, seconds);
-    if (to_picture_ms_.empty()) return;
-    const Spread tick = spread_of(to_tick_ms_), picture = spread_of(to_picture_ms_);
-    std::fprintf(
-        stderr,
-        "catgut: from reading a motion to the end of its tick %.1f ms, to its picture being drawn %.1f ms (medians of %zu; "
-        "99 %%: %.1f, %.1f)\n",
-        tick.median, picture.median, to_picture_ms_.size(), tick.p99, picture.p99);
-  }
-
   const PlayOptions& options_;
   SdlWindow sdl_;
   int width_, height_;
@@ -446,8 +391,8 @@ class Window {
   bool orbit_set_ = false;  // false: chosen anew with the next snapshot
   std::deque<LogLine> log_;
   uint32_t epoch_ = 0;
-  uint64_t moved_ns_ = 0, shown_ns_ = 0;
-  std::vector<float> to_tick_ms_, to_picture_ms_;
+  uint64_t moved_ns_ = 0;
+  Latency latency_;
   double picture_s_ = 0, picture_count_ = 0;  // lately
   float coarse_ = 1;                          // of the window's pixels each way
   int pictures_so_ = 0;                       // since that was last changed
