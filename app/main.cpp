@@ -23,15 +23,15 @@ int main(int argc, char** argv) {
   app.require_subcommand(0, 1);
   app.footer("Exit codes: 0 done, 1 the expectation or check failed, 2 bad input, 130 interrupted.");
   int exit_code = 0;
+  catgut::add_play(app, exit_code);
   catgut::add_run(app, exit_code);
   catgut::add_replay(app, exit_code);
   catgut::add_bench(app, exit_code);
   catgut::add_validate(app, exit_code);
   catgut::add_devices(app, exit_code);
   catgut::add_describe(app, exit_code);
-  if (argc == 1)
-    return report("the window comes in a later version; run without it: catgut run purse_string --surgeon scripted --headless");
   try {
+    if (argc == 1) return catgut::play_without_arguments();
     app.parse(argc, argv);
   } catch (const CLI::Success& wanted) {  // --help, --version
     return app.exit(wanted);

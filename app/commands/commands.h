@@ -11,6 +11,7 @@
 
 namespace catgut {
 
+void add_play(CLI::App& app, int& exit_code);
 void add_run(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
@@ -25,6 +26,8 @@ struct LimitsOptions {
   int sutures = 50, threads = 1;
 };
 int bench_limits(const LimitsOptions& options);
+
+int play_without_arguments();  // the window's start screen
 
 // What several commands share (app/commands/common.cpp).
 

@@ -16,7 +16,8 @@ void add_devices(CLI::App& app, int& exit_code) {
       throw InputError("devices --test", "this version supports no haptic device",
                        "use the scripted surgeon: catgut run SCENE");
     write_output("-",
-                 "No haptic devices are supported in this version yet; mouse and keyboard come with the window.\n"
+                 "No haptic devices are supported in this version yet. Mouse, keyboard and gamepad are hands in the window: "
+                 "catgut play\n"
                  "The scripted surgeon needs none: catgut run purse_string --surgeon scripted --headless\n");
     exit_code = 0;
   });

@@ -62,7 +62,7 @@ void add_run(CLI::App& app, int& exit_code) {
   command->add_option("--surgeon", o->session.surgeon, "scripted, none, or a recording whose hands are played")
       ->type_name("scripted|none|FILE")
       ->capture_default_str();
-  command->add_flag("--headless", o->headless, "without a window (so far every run is)");
+  command->add_flag("--headless", o->headless, "without a window (every run is; the window is catgut play)");
   command->add_option("--seconds", o->session.seconds, "simulated time, settling included; else the scene's duration")
       ->check(CLI::Range(0.001, 1e6))
       ->type_name("S");

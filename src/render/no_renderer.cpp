@@ -2,6 +2,7 @@
 #include <stdexcept>
 
 #include "render/renderer.h"
+#include "render/window.h"
 
 #ifndef CATGUT_WITH_FILAMENT
 namespace catgut {
@@ -13,6 +14,10 @@ std::unique_ptr<Renderer> make_renderer(const PictureModel&, int, int, Quality) 
 }
 
 bool renderer_available() { return false; }
+
+std::unique_ptr<WindowRenderer> make_window_renderer(uint64_t, int, int, const std::string&) {
+  throw std::runtime_error("this build has no window; configure it with -DCATGUT_RENDER=ON");
+}
 
 }  // namespace catgut
 #endif

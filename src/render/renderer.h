@@ -12,8 +12,9 @@
 namespace catgut {
 
 enum class Quality {
-  draft,  // one sample a pixel, 1024 shadow map: for previews and for machines without a graphics card
-  good    // four samples, ambient occlusion, 2048 shadow map
+  draft,   // one sample a pixel, 1024 shadow map: for previews and for machines without a graphics card
+  medium,  // four samples, 2048 shadow map
+  good     // and ambient occlusion
 };
 
 struct Overlay {

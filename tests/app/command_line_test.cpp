@@ -57,8 +57,8 @@ particles = 1403
   }
   Outcome run_catgut(const std::string& arguments) {
     const fs::path out = folder_ / "stdout", err = folder_ / "stderr";
-    const std::string line = "cd '" + folder_.string() + "' && '" CATGUT_APP "' " + arguments + " >'" + out.string() + "' 2>'" +
-                             err.string() + "' </dev/null";
+    const std::string line = "cd '" + folder_.string() + "' && env -u DISPLAY -u WAYLAND_DISPLAY '" CATGUT_APP "' " +
+                             arguments + " >'" + out.string() + "' 2>'" + err.string() + "' </dev/null";
     const int status = std::system(line.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out), read_file(err)};
   }

@@ -6,13 +6,21 @@
 // version. Newer Filament has a public header and a headless EGL platform of its own.
 #include "render/filament/egl_platform.h"
 
+#include <X11/Xlib.h>
 #include <epoxy/egl.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
+
+// Xlib's names for small numbers are words of ours and of Filament's.
+#undef None
+#undef Status
+#undef Success
 
 namespace filament::backend {
 
@@ -93,39 +101,58 @@ EGLDisplay open_display() {
   throw std::runtime_error("no pictures: no EGL driver answers on this machine (Debian: apt install libgl1-mesa-dri libegl1)");
 }
 
+EGLDisplay open_x11(Display* connection) {
+  if (has(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), "EGL_EXT_platform_x11") ||
+      has(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), "EGL_KHR_platform_x11")) {
+    const EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_X11_EXT, connection, nullptr);
+    if (usable(display)) return display;
+  }
+  throw std::runtime_error("no window: no EGL driver for this X server (Debian: apt install libgl1-mesa-dri libegl1)");
+}
+
+// 8-bit colour with depth; for a window of the visual that it was made with, or drawing on it fails on some drivers.
+EGLConfig choose_config(EGLDisplay display, EGLint surface, EGLint visual) {
+  const EGLint wanted[] = {
+      EGL_SURFACE_TYPE, surface, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_RED_SIZE,   8,  EGL_GREEN_SIZE, 8,
+      EGL_BLUE_SIZE,    8,       EGL_ALPHA_SIZE,      visual ? 0 : 8, EGL_DEPTH_SIZE, 24, EGL_NONE};
+  EGLint count = 0;
+  eglChooseConfig(display, wanted, nullptr, 0, &count);
+  std::vector<EGLConfig> configs(static_cast<size_t>(std::max(count, 0)));
+  if (!eglChooseConfig(display, wanted, configs.data(), count, &count) || count < 1)
+    throw std::runtime_error("no pictures: the EGL driver offers no 8-bit colour with depth");
+  for (const EGLConfig config : configs) {
+    EGLint has_visual = 0;
+    if (visual && eglGetConfigAttrib(display, config, EGL_NATIVE_VISUAL_ID, &has_visual) && has_visual == visual) return config;
+  }
+  return configs[0];
+}
+
 class EglPlatform final : public OpenGLPlatform {
  public:
   // Everything that can fail happens here, on the caller's thread, where it can be reported.
-  EglPlatform() : display_(open_display()) {
-    const EGLint wanted[] = {EGL_SURFACE_TYPE,
-                             EGL_PBUFFER_BIT,
-                             EGL_RENDERABLE_TYPE,
-                             EGL_OPENGL_BIT,
-                             EGL_RED_SIZE,
-                             8,
-                             EGL_GREEN_SIZE,
-                             8,
-                             EGL_BLUE_SIZE,
-                             8,
-                             EGL_ALPHA_SIZE,
-                             8,
-                             EGL_DEPTH_SIZE,
-                             24,
-                             EGL_NONE};
-    EGLint count = 0;
-    if (!eglChooseConfig(display_, wanted, &config_, 1, &count) || count < 1)
-      throw std::runtime_error("no pictures: the EGL driver offers no 8-bit colour with depth");
-    const EGLint context[] = {
-        EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 1, EGL_CONTEXT_OPENGL_PROFILE_MASK,
-        EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
-    context_ = eglCreateContext(display_, config_, EGL_NO_CONTEXT, context);
-    if (context_ == EGL_NO_CONTEXT) throw std::runtime_error("no pictures: the EGL driver has no OpenGL 4.1 core");
-    idle_ = pbuffer(1, 1);
+  EglPlatform() : display_(open_display()), config_(choose_config(display_, EGL_PBUFFER_BIT, 0)) { make_context(); }
+  explicit EglPlatform(Window window) : connection_(XOpenDisplay(nullptr)) {
+    XWindowAttributes attributes;
+    if (!connection_ || !XGetWindowAttributes(connection_, window, &attributes)) {
+      close_connection();
+      throw std::runtime_error("no window: the X server does not answer");
+    }
+    try {
+      display_ = open_x11(connection_);
+      const auto visual = static_cast<EGLint>(XVisualIDFromVisual(attributes.visual));
+      config_ = choose_config(display_, EGL_WINDOW_BIT | EGL_PBUFFER_BIT, visual);
+      make_context();
+    } catch (...) {
+      close_connection();
+      throw;
+    }
   }
-  // The display is one for the whole process and stays open: another renderer may be using it.
+  // Without a window the display is one for the whole process and stays open: another renderer may be using it.
   ~EglPlatform() noexcept override {
     if (idle_ != EGL_NO_SURFACE) eglDestroySurface(display_, idle_);
     eglDestroyContext(display_, context_);
+    if (connection_) eglTerminate(display_);
+    close_connection();
   }
 
   int getOSVersion() const noexcept override { return 0; }
@@ -139,7 +166,11 @@ class EglPlatform final : public OpenGLPlatform {
     eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     eglReleaseThread();
   }
-  SwapChain* createSwapChain(void*, uint64_t&) noexcept override { return nullptr; }  // no windows here
+  SwapChain* createSwapChain(void* window, uint64_t&) noexcept override {
+    if (!connection_) return nullptr;  // no windows here
+    return reinterpret_cast<SwapChain*>(
+        eglCreateWindowSurface(display_, config_, reinterpret_cast<EGLNativeWindowType>(window), nullptr));
+  }
   SwapChain* createSwapChain(uint32_t width, uint32_t height, uint64_t&) noexcept override {
     return reinterpret_cast<SwapChain*>(pbuffer(EGLint(width), EGLint(height)));
   }
@@ -150,8 +181,12 @@ class EglPlatform final : public OpenGLPlatform {
   }
   void makeCurrent(SwapChain* draw, SwapChain* read) noexcept override {
     eglMakeCurrent(display_, reinterpret_cast<EGLSurface>(draw), reinterpret_cast<EGLSurface>(read), context_);
+    if (connection_) eglSwapInterval(display_, 1);
   }
-  void commit(SwapChain*) noexcept override {}  // nothing is shown; the pixels are read back before
+  // Without a window nothing is shown; the pixels are read back before.
+  void commit(SwapChain* chain) noexcept override {
+    if (connection_) eglSwapBuffers(display_, reinterpret_cast<EGLSurface>(chain));
+  }
   void setPresentationTime(int64_t) noexcept override {}
   Fence* createFence() noexcept override { return nullptr; }
   void destroyFence(Fence*) noexcept override {}
@@ -166,11 +201,24 @@ class EglPlatform final : public OpenGLPlatform {
   void destroyExternalTextureStorage(ExternalTexture*) noexcept override {}
 
  private:
+  void make_context() {
+    const EGLint context[] = {
+        EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 1, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+        EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+    context_ = eglCreateContext(display_, config_, EGL_NO_CONTEXT, context);
+    if (context_ == EGL_NO_CONTEXT) throw std::runtime_error("no pictures: the EGL driver has no OpenGL 4.1 core");
+    idle_ = pbuffer(1, 1);
+  }
+  void close_connection() noexcept {
+    if (connection_) XCloseDisplay(connection_);
+    connection_ = nullptr;
+  }
   EGLSurface pbuffer(EGLint width, EGLint height) const {
     const EGLint size[] = {EGL_WIDTH, width, EGL_HEIGHT, height, EGL_NONE};
     return eglCreatePbufferSurface(display_, config_, size);
   }
-  EGLDisplay display_;
+  Display* connection_ = nullptr;  // of a window
+  EGLDisplay display_ = EGL_NO_DISPLAY;
   EGLConfig config_ = nullptr;
   EGLContext context_ = EGL_NO_CONTEXT;
   EGLSurface idle_ = EGL_NO_SURFACE;
@@ -179,5 +227,8 @@ class EglPlatform final : public OpenGLPlatform {
 }  // namespace
 
 std::unique_ptr<filament::backend::Platform> make_egl_platform() { return std::make_unique<EglPlatform>(); }
+std::unique_ptr<filament::backend::Platform> make_egl_platform(uint64_t window) {
+  return std::make_unique<EglPlatform>(static_cast<Window>(window));
+}
 
 }  // namespace catgut

@@ -1,0 +1,71 @@
+// app/window: what the window's events say, as plain data: for the hands, for the camera, for the panels, for the screens. The
+// only file beside window.cpp that knows SDL.
+#pragma once
+#include <SDL.h>
+
+#include <cstdint>
+#include <string>
+
+#include "device/gamepad.h"
+#include "device/mouse.h"
+
+namespace catgut {
+
+// Keys that are told once when they go down.
+enum class Key {
+  none,
+  escape,
+  enter,
+  pause,
+  single_step,
+  take_back,
+  restart,
+  slower,
+  faster,
+  points,
+  hints,
+  help_at_needle,
+  finish,
+  digit,
+  picture
+};
+
+struct WindowInput {
+  MouseInput mouse;
+  GamepadInput pad;
+  bool has_pad = false;
+  float orbit_right = 0, orbit_up = 0, closer = 0;  // of the camera, see turn_orbit
+  bool camera_home = false;
+  int speed = -1;  // of kMouseSpeeds, when a speed key was pressed
+  Key key = Key::none;
+  int digit = 0;
+  bool quit = false, resized = false;
+  bool left = false;      // the keyboard went to another window
+  uint64_t moved_ns = 0;  // on the clock of runtime/live: when the newest motion was read
+};
+
+class WindowEvents {
+ public:
+  WindowEvents() = default;
+  ~WindowEvents();
+  WindowEvents(const WindowEvents&) = delete;
+  WindowEvents& operator=(const WindowEvents&) = delete;
+
+  // Everything since the last call. working: the mouse belongs to the hands, else to the panels (ImGui's context is fed).
+  WindowInput read(bool working, float dt);
+  void panels_drawn() { clicked_ = false; }  // they have seen the clicks
+  const std::string& pad_name() const { return pad_name_; }
+
+ private:
+  void key(const SDL_KeyboardEvent& e, WindowInput& in);
+  void read_pad(GamepadInput& pad) const;
+
+  SDL_GameController* pad_ = nullptr;
+  std::string pad_name_;
+  bool clicked_ = false;  // the left button went down since the panels were last drawn
+  bool left_ = false, right_ = false, middle_ = false, space_ = false, cut_ = false, fresh_ = false;
+  bool roll_left_ = false, roll_right_ = false;
+  int arrow_x_ = 0, arrow_y_ = 0, zoom_ = 0;
+};
+
+}  // namespace catgut

@@ -1,0 +1,41 @@
+// app/window: see sdl_window.h.
+#include "window/sdl_window.h"
+
+#include <SDL_syswm.h>
+#include <fmt/format.h>
+
+#include <string>
+
+#include "core/check.h"
+
+namespace catgut {
+namespace {
+
+void close(SDL_Window* window) {
+  if (window) SDL_DestroyWindow(window);
+  SDL_Quit();
+}
+
+}  // namespace
+
+SdlWindow::SdlWindow(int width, int height) {
+  // Pictures go through EGL on X11; on a Wayland desktop its X server serves.
+  SDL_SetHintWithPriority(SDL_HINT_VIDEODRIVER, "x11", SDL_HINT_DEFAULT);
+  SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
+  if (SDL_Init(SDL_INIT_VIDEO | SDL_INIT_GAMECONTROLLER) != 0)
+    throw InputError("window", fmt::format("there is no display here ({})", SDL_GetError()), kHeadless);
+  window = SDL_CreateWindow("Catgut", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
+                            SDL_WINDOW_RESIZABLE | SDL_WINDOW_SHOWN);
+  SDL_SysWMinfo info;
+  SDL_VERSION(&info.version);
+  if (!window || !SDL_GetWindowWMInfo(window, &info) || info.subsystem != SDL_SYSWM_X11) {
+    const std::string why = window ? "it is not an X11 window" : SDL_GetError();
+    close(window);
+    throw InputError("window", "it cannot be opened (" + why + ")", kHeadless);
+  }
+  number = info.info.x11.window;
+}
+
+SdlWindow::~SdlWindow() { close(window); }
+
+}  // namespace catgut

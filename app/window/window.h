@@ -1,0 +1,27 @@
+// app/window: the simulator that people sit down at: a window, screens to choose, practise, pause and look back, and hands by
+// mouse, keyboard and gamepad.
+#pragma once
+#include <string>
+
+#include "render/renderer.h"
+#include "runtime/live.h"
+
+namespace catgut {
+
+struct PlayOptions {
+  std::string scene;  // opens straight into it; empty: the start screen
+  LiveOptions live;
+  Quality quality = Quality::draft;
+  bool quality_given = false;
+  int width = 1280, height = 720;
+  bool left_handed = false;
+  std::string events;      // file to which everything that happens is written as it happens, a JSON object a line; "-"
+  std::string screenshot;  // PNG of the window, then quit
+  int after = 60;          // pictures before it
+  double seconds = 0;      // [s] of wall time, then quit; 0: until somebody quits
+};
+
+// Runs until the window is closed. Throws InputError, also when there is no display here.
+int play(const PlayOptions& options);
+
+}  // namespace catgut

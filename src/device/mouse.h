@@ -1,0 +1,36 @@
+// device: hands by mouse and keyboard. The mouse moves the active tool where it moves on the screen; wheel, or Shift and the
+// mouse, into the picture; the right button turns, the left one closes. Pure: what was pressed since the last picture in,
+// motions out; whoever owns the window fills a MouseInput.
+#pragma once
+#include <array>
+
+#include "device/steer.h"
+
+namespace catgut {
+
+struct MouseInput {
+  float right = 0, down = 0;        // [pixels] since the last call
+  float wheel = 0;                  // [notches] away from the user: into the picture
+  bool turn = false;                // right button: drive the needle, or turn the tool about its shaft
+  bool free_turn = false;           // Control with it: turn the tool as a ball
+  bool depth = false;               // Shift: the mouse moves into the picture
+  float roll = 0;                   // -1 .. 1, Q and E: about the line of sight
+  int jaw_presses = 0;              // left button or space went down so often
+  bool jaw_down = false;            // and is down now
+  bool cut = false, fresh = false;  // C, N are down
+  int hand_changes = 0;             // Tab
+};
+
+struct MouseHand {
+  size_t active = 0;           // hand that the mouse moves
+  bool hold_to_close = false;  // the jaw is closed while the button is down; else each press closes or opens it, like a ratchet
+  float speed = 1;             // of tool to mouse, 1: the tool stays under the pointer
+  bool was_down = false;
+};
+constexpr std::array<float, 3> kMouseSpeeds{0.3f, 1.0f, 2.0f};
+
+// Also sets jaws and buttons of `steering`. dt: [s] since the last call, for what is held down.
+std::array<HandMotion, 2> mouse_motion(MouseHand& mouse, Steering& steering, const MouseInput& input, const ViewFrame& view,
+                                       float dt);
+
+}  // namespace catgut

@@ -1,0 +1,40 @@
+// exchange: a queue of fixed size between one writer and one reader that never wait for each other. Nothing is lost on the way:
+// when it is full push() says so and the writer decides. For commands and events; poses go through exchange/latest.
+#pragma once
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+namespace catgut {
+
+template <typename T, size_t kSize>
+class Ring {
+  static_assert(kSize > 0 && (kSize & (kSize - 1)) == 0, "a power of two");
+
+ public:
+  // Writer only. False: it is full, and the value is not in it.
+  bool push(const T& value) {
+    const uint64_t put = put_.load(std::memory_order_relaxed);
+    if (put - taken_.load(std::memory_order_acquire) == kSize) return false;
+    slot_[put % kSize] = value;
+    put_.store(put + 1, std::memory_order_release);
+    return true;
+  }
+
+  // Reader only. False: it is empty.
+  bool pop(T& value) {
+    const uint64_t taken = taken_.load(std::memory_order_relaxed);
+    if (taken == put_.load(std::memory_order_acquire)) return false;
+    value = slot_[taken % kSize];
+    taken_.store(taken + 1, std::memory_order_release);
+    return true;
+  }
+
+ private:
+  std::array<T, kSize> slot_{};
+  alignas(64) std::atomic<uint64_t> put_{0};    // written by the writer alone
+  alignas(64) std::atomic<uint64_t> taken_{0};  // written by the reader alone
+};
+
+}  // namespace catgut

@@ -1,0 +1,235 @@
+// render/filament: what is in a picture, however it is shown. See theatre.h.
+#include "render/filament/theatre.h"
+
+#include <algorithm>
+
+#include <filament/LightManager.h>
+#include <filament/RenderableManager.h>
+#include <filament/TextureSampler.h>
+#include <filament/Viewport.h>
+#include <utils/EntityManager.h>
+
+#include "render/filament/materials.h"
+
+namespace catgut {
+namespace {
+
+// From the main lamp, over the surgeon's right shoulder.
+constexpr Vec3 kLampDirection{-0.24f, -1.0f, -0.32f};
+
+}  // namespace
+
+Theatre::Theatre(filament::Engine& engine, const PictureModel& model, Quality quality) : model_(model), engine_(engine) {
+  scene_ = engine_.createScene();
+  view_ = engine_.createView();
+  camera_entity_ = utils::EntityManager::get().create();
+  camera_ = engine_.createCamera(camera_entity_);
+  view_->setScene(scene_);
+  view_->setCamera(camera_);
+  set_quality(quality);
+  set_light(quality);
+  make_materials();
+  make_stage();
+  thread_ = make_thread_view(engine_, *scene_, model_, thread_material_);
+}
+
+Theatre::~Theatre() {
+  for (TissueView& t : tissue_) destroy_mesh(engine_, *scene_, t.gpu);
+  for (ToolView3d& t : tool_)
+    for (GpuMesh& m : t.part) destroy_mesh(engine_, *scene_, m);
+  for (GpuMesh* m : {&needle_, &drape_, &drape_shadow_, &bed_, &thread_.gpu}) destroy_mesh(engine_, *scene_, *m);
+  for (GpuMesh& m : marker_) destroy_mesh(engine_, *scene_, m);
+  engine_.destroy(tissue_material_);
+  engine_.destroy(thread_material_);
+  engine_.destroy(needle_material_);
+  engine_.destroy(tool_material_);
+  engine_.destroy(drape_material_);
+  engine_.destroy(shadow_material_);
+  engine_.destroy(marker_material_);
+  for (filament::Material* m : material_) engine_.destroy(m);
+  engine_.destroy(textures_.pattern);
+  engine_.destroy(textures_.bumps);
+  engine_.destroy(environment_.light);
+  engine_.destroy(environment_.reflections);
+  engine_.destroy(skybox_);
+  engine_.destroy(grading_);
+  engine_.destroy(lamp_);
+  utils::EntityManager::get().destroy(lamp_);
+  engine_.destroyCameraComponent(camera_entity_);
+  utils::EntityManager::get().destroy(camera_entity_);
+  engine_.destroy(view_);
+  engine_.destroy(scene_);
+}
+
+void Theatre::show(const Snapshot& snapshot, const Camera& camera, int width, int height, bool suture_points) {
+  view_->setViewport({0, 0, uint32_t(width), uint32_t(height)});
+  const float distance_to_work = std::max(0.01f, distance(camera.eye, camera.target));
+  camera_->setProjection(double(camera.fov_deg), double(width) / height, double(0.1f * distance_to_work), 3.0,
+                         filament::Camera::Fov::VERTICAL);
+  camera_->lookAt({camera.eye.x, camera.eye.y, camera.eye.z}, {camera.target.x, camera.target.y, camera.target.z},
+                  {camera.up.x, camera.up.y, camera.up.z});
+  const float pixel = 2 * std::tan(0.5f * camera.fov_deg * kPi / 180) / (coarse_ * float(height));
+
+  for (TissueView& t : tissue_) move_tissue(engine_, t, model_, snapshot);
+  move_thread(engine_, thread_, model_, snapshot, camera, pixel);
+  catgut::set_pose(engine_, needle_, snapshot.needle.pose);
+  for (size_t i = 0; i < tool_.size(); ++i) move_tool(tool_[i], snapshot.tool[i]);
+  show_markers(snapshot, suture_points);
+}
+
+void Theatre::draw_coarser(float part) {
+  coarse_ = part;
+  filament::View::DynamicResolutionOptions coarse;
+  coarse.enabled = part < 1;
+  coarse.homogeneousScaling = true;
+  coarse.minScale = coarse.maxScale = {part, part};
+  coarse.quality = filament::View::QualityLevel::LOW;
+  view_->setDynamicResolutionOptions(coarse);
+}
+
+void Theatre::set_quality(Quality quality) {
+  const bool good = quality == Quality::good;
+  view_->setSampleCount(quality == Quality::draft ? 1 : 4);
+  view_->setAntiAliasing(filament::View::AntiAliasing::FXAA);
+  view_->setDithering(filament::View::Dithering::NONE);
+  filament::View::AmbientOcclusionOptions ao;
+  ao.enabled = good;
+  ao.radius = 0.006f;
+  ao.bias = 0.0002f;
+  ao.intensity = 1.2f;
+  ao.power = 1.2f;
+  ao.quality = filament::View::QualityLevel::MEDIUM;
+  view_->setAmbientOcclusionOptions(ao);
+  filament::View::BloomOptions bloom;
+  // Never off: without it Filament grades the colours inside the main pass by framebuffer fetch, which Mesa's software
+  // rasteriser gets wrong (the picture turns into coloured tiles). A tiny one costs nothing.
+  bloom.enabled = true;
+  bloom.strength = good ? 0.06f : 0.02f;
+  bloom.resolution = good ? 360 : 16;
+  bloom.levels = good ? 4 : 3;
+  view_->setBloomOptions(bloom);
+  grading_ = filament::ColorGrading::Builder()
+                 .toneMapping(filament::ColorGrading::ToneMapping::ACES)
+                 .quality(filament::ColorGrading::QualityLevel::MEDIUM)
+                 .build(engine_);
+  view_->setColorGrading(grading_);
+}
+
+void Theatre::set_light(Quality quality) {
+  environment_ = make_environment(engine_, 30000);
+  scene_->setIndirectLight(environment_.light);
+  skybox_ = filament::Skybox::Builder().color({0.012f, 0.03f, 0.028f, 1}).build(engine_);
+  scene_->setSkybox(skybox_);
+  // Shadows at the scale of a thread: the library's own bias of a millimetre would swallow the thread's and needle's.
+  filament::LightManager::ShadowOptions shadow;
+  shadow.mapSize = quality == Quality::draft ? 1024 : 2048;
+  shadow.constantBias = 0.0002f;
+  shadow.normalBias = 0.8f;
+  shadow.shadowNearHint = 0.05f;
+  shadow.shadowFarHint = 0.6f;
+  lamp_ = utils::EntityManager::get().create();
+  filament::LightManager::Builder(filament::LightManager::Type::DIRECTIONAL)
+      .color({1.0f, 0.965f, 0.91f})
+      .intensity(85000)
+      .direction({kLampDirection.x, kLampDirection.y, kLampDirection.z})
+      .castShadows(true)
+      .shadowOptions(shadow)
+      .build(engine_, lamp_);
+  scene_->addEntity(lamp_);
+}
+
+filament::MaterialInstance* Theatre::instance_of(std::span<const uint8_t> package) {
+  material_.push_back(filament::Material::Builder().package(package.data(), package.size()).build(engine_));
+  return material_.back()->createInstance();
+}
+
+void Theatre::make_materials() {
+  textures_ = make_tissue_textures(engine_);
+  filament::TextureSampler repeat(filament::TextureSampler::MinFilter::LINEAR_MIPMAP_LINEAR,
+                                  filament::TextureSampler::MagFilter::LINEAR, filament::TextureSampler::WrapMode::REPEAT);
+  tissue_material_ = instance_of(tissue_material());
+  tissue_material_->setParameter("pattern", textures_.pattern, repeat);
+  tissue_material_->setParameter("bumps", textures_.bumps, repeat);
+  thread_material_ = instance_of(thread_material());
+  needle_material_ = instance_of(metal_material());
+  needle_material_->setParameter("roughness", 0.22f);
+  tool_material_ = material_.back()->createInstance();
+  tool_material_->setParameter("roughness", 0.34f);
+  drape_material_ = instance_of(drape_material());
+  shadow_material_ = instance_of(shadow_material());
+  marker_material_ = instance_of(marker_material());
+}
+
+void Theatre::make_stage() {
+  std::vector<Vec3> all;
+  for (const VisibleMesh& mesh : model_.body) {
+    tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_));
+    all.insert(all.end(), mesh.position.begin(), mesh.position.end());
+  }
+  // The drape lies where the model says; its hole clears by a centimetre the tissue that stands up through it there.
+  Vec3 ground{model_.focus.x, model_.drape, model_.focus.z};
+  std::vector<Vec3> through;
+  for (const Vec3 p : all)
+    if (std::abs(p.y - ground.y) < 0.005f) through.push_back(p);
+  if (!through.empty()) {
+    const Box3 box = bounds(through);
+    ground.x = 0.5f * (box.low.x + box.high.x);
+    ground.z = 0.5f * (box.low.z + box.high.z);
+  }
+  float reach = 0;
+  for (const Vec3 p : through) reach = std::max(reach, std::hypot(p.x - ground.x, p.z - ground.z));
+  const float hole = reach + 0.01f;
+  const Shape cloth = drape_shape(ground, hole, 0.7f);
+  drape_ = make_mesh(engine_, *scene_, cloth, drape_material_, false);
+  // The cloth's share of lamp and room light, once (see drape.mat): the room is darker low down beside the organ.
+  std::vector<VertexLook> look(cloth.position.size());
+  for (size_t i = 0; i < look.size(); ++i) {
+    const Vec3 c = cloth.colour[i], p = cloth.position[i], n = cloth.normal[i];
+    const float away = std::hypot(p.x - ground.x, p.z - ground.z) - hole;
+    const float open = 1 - 0.55f * std::exp(-std::max(0.0f, away + 0.008f) / 0.03f);
+    const float lamp = 0.95f * std::max(0.0f, dot(n, normalized(-kLampDirection))), room = 0.30f * open * (0.5f + 0.5f * n.y);
+    look[i] = {{c.x, c.y, c.z, 1}, {cloth.uv[i][0], cloth.uv[i][1]}, {lamp + room, lamp / (lamp + room)}};
+  }
+  set_look(engine_, drape_, look);
+  Shape over = cloth;
+  for (Vec3& p : over.position) p.y += 0.0001f;  // never level with the cloth, or the two would fight for pixels
+  drape_shadow_ = make_mesh(engine_, *scene_, over, shadow_material_, false);
+  set_look(engine_, drape_shadow_, look);
+  bed_ = make_mesh(engine_, *scene_, wound_bed_shape(ground - Vec3{0, 0.004f, 0}, hole + 0.01f), tissue_material_, false);
+  needle_ = make_mesh(engine_, *scene_, needle_shape(model_), needle_material_, true);
+  for (size_t i = 0; i < tool_.size(); ++i) {
+    tool_[i].shape = tool_shape(model_.tool[i]);
+    tool_[i].part = {make_mesh(engine_, *scene_, tool_[i].shape.body, tool_material_, true),
+                     make_mesh(engine_, *scene_, tool_[i].shape.half, tool_material_, true),
+                     make_mesh(engine_, *scene_, mirrored_x(tool_[i].shape.half), tool_material_, true)};
+  }
+}
+
+void Theatre::move_tool(const ToolView3d& view, const ToolView& tool) {
+  catgut::set_pose(engine_, view.part[0], tool.pose);
+  for (const float side : {1.0f, -1.0f}) {
+    // The jaws lie on the -z side of the hinge: turning about +y moves what is at -z toward -x.
+    const Quat turn = axis_angle({0, 1, 0}, -side * view.shape.opening * std::clamp(tool.jaw, 0.0f, 1.0f));
+    const Pose hinge{Vec3{0, 0, view.shape.pivot} - rotate(turn, {0, 0, view.shape.pivot}), turn};
+    catgut::set_pose(engine_, view.part[side > 0 ? 1 : 2], tool.pose * hinge);
+  }
+}
+
+// Markers come and go with the suture points; they are few, so each is a drawable of its own that is parked when unused.
+void Theatre::show_markers(const Snapshot& snapshot, bool wanted) {
+  const size_t count = wanted ? snapshot.suture_point.size() : 0;
+  while (marker_.size() < 2 * count) {
+    Shape ball;
+    add_ball(ball, {}, 0.00045f, marker_.size() % 2 ? srgb(60, 220, 235) : srgb(250, 215, 60));
+    marker_.push_back(make_mesh(engine_, *scene_, ball, marker_material_, false));
+  }
+  for (size_t i = 0; i < marker_.size(); ++i) {
+    const bool shown = i / 2 < count && snapshot.suture_point[i / 2].exit == (i % 2 == 1);
+    scene_->remove(marker_[i].entity);
+    if (!shown) continue;
+    catgut::set_pose(engine_, marker_[i], {snapshot.suture_point[i / 2].position, {}});
+    scene_->addEntity(marker_[i].entity);
+  }
+}
+
+}  // namespace catgut

@@ -1,0 +1,110 @@
+// render: the Filament renderer in a window; see render/window.h. The panels are a view of their own, drawn last.
+#include "render/window.h"
+
+#include <filesystem>
+#include <stdexcept>
+
+#include <filagui/ImGuiHelper.h>
+#include <filament/Engine.h>
+#include <filament/Renderer.h>
+#include <filament/SwapChain.h>
+#include <filament/View.h>
+#include <filament/Viewport.h>
+
+#include "render/filament/egl_platform.h"
+#include "render/filament/start_engine.h"
+#include "render/filament/theatre.h"
+
+namespace catgut {
+namespace {
+
+class FilamentWindow final : public WindowRenderer {
+ public:
+  FilamentWindow(uint64_t window, int width, int height, const std::string& font)
+      : platform_(make_egl_platform(window)), engine_(start_engine(*platform_)) {
+    chain_ = engine_->createSwapChain(reinterpret_cast<void*>(static_cast<uintptr_t>(window)));
+    renderer_ = engine_->createRenderer();
+    renderer_->setClearOptions({{0.02f, 0.10f, 0.09f, 1}, true, false});
+    panel_view_ = engine_->createView();
+    panel_view_->setPostProcessingEnabled(false);
+    panel_view_->setShadowingEnabled(false);
+    const bool there = !font.empty() && std::filesystem::exists(font);
+    panels_ = std::make_unique<filagui::ImGuiHelper>(engine_, panel_view_, utils::Path(there ? font.c_str() : ""));
+    resize(width, height);
+  }
+
+  ~FilamentWindow() override {
+    panels_.reset();
+    theatre_.reset();
+    engine_->destroy(panel_view_);
+    engine_->destroy(renderer_);
+    engine_->destroy(chain_);
+    filament::Engine::destroy(&engine_);
+  }
+
+  void stage(const PictureModel* model, Quality quality) override {
+    theatre_.reset();
+    if (!model) return;
+    theatre_ = std::make_unique<Theatre>(*engine_, *model, quality);
+  }
+
+  void draw_coarser(float part) override {
+    if (theatre_) theatre_->draw_coarser(part);
+  }
+
+  void resize(int width, int height) override {
+    width_ = std::max(width, 16), height_ = std::max(height, 16);
+    panel_view_->setViewport({0, 0, uint32_t(width_), uint32_t(height_)});
+    panels_->setDisplaySize(width_, height_);
+  }
+
+  bool draw(const Frame& frame) override {
+    // First of all whether there will be a frame: what is uploaded for none would pile up before a driver that is behind.
+    bool begun = renderer_->beginFrame(chain_);
+    for (int i = 0; frame.copy && !begun && i < 20; ++i) {
+      engine_->flushAndWait();
+      begun = renderer_->beginFrame(chain_);
+    }
+    if (!begun) return false;
+    const bool field = theatre_ && frame.snapshot;
+    if (field) theatre_->show(*frame.snapshot, frame.camera, width_, height_, frame.suture_points);
+    // Alone, the panels' view clears what was there before.
+    panel_view_->setBlendMode(field ? filament::View::BlendMode::TRANSLUCENT : filament::View::BlendMode::OPAQUE);
+    panels_->render(frame.dt, [&](filament::Engine*, filament::View*) {
+      if (frame.panels) frame.panels();
+    });
+    if (field) renderer_->render(theatre_->view());
+    renderer_->render(panel_view_);
+    if (frame.copy) {
+      Image& image = *frame.copy;
+      image = make_image(width_, height_, {0, 0, 0, 255});
+      renderer_->readPixels(
+          0, 0, uint32_t(width_), uint32_t(height_),
+          {image.rgba.data(), image.rgba.size(), filament::Texture::Format::RGBA, filament::Texture::Type::UBYTE});
+    }
+    renderer_->endFrame();
+    if (frame.copy) {
+      engine_->flushAndWait();
+      for (size_t i = 3; i < frame.copy->rgba.size(); i += 4) frame.copy->rgba[i] = 255;
+    }
+    return true;
+  }
+
+ private:
+  std::unique_ptr<filament::backend::Platform> platform_;
+  filament::Engine* engine_ = nullptr;
+  filament::SwapChain* chain_ = nullptr;
+  filament::Renderer* renderer_ = nullptr;
+  filament::View* panel_view_ = nullptr;
+  std::unique_ptr<filagui::ImGuiHelper> panels_;
+  std::unique_ptr<Theatre> theatre_;
+  int width_ = 640, height_ = 360;
+};
+
+}  // namespace
+
+std::unique_ptr<WindowRenderer> make_window_renderer(uint64_t window, int width, int height, const std::string& font) {
+  return std::make_unique<FilamentWindow>(window, width, height, font);
+}
+
+}  // namespace catgut

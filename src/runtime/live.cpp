@@ -1,0 +1,401 @@
+// runtime: physics on a thread of its own; see live.h. Below, Work's members say which of the two threads may touch them.
+#include "runtime/live.h"
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <optional>
+#include <thread>
+
+#include "core/check.h"
+#include "exchange/latest.h"
+#include "exchange/ring.h"
+#include "procedure/scene_file.h"
+#include "runtime/blend.h"
+#include "runtime/hands.h"
+#include "runtime/session.h"
+#include "sim/recording.h"
+#include "sim/simulation.h"
+
+namespace catgut {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr int kCatchUp = 4;            // late ticks made up for at once; what is later than that is given up
+constexpr size_t kMostTakenBack = 32;  // bites kept, some 200 kB each
+constexpr double kBeforeBite = 0.25;   // [s] at least between the moment that is gone back to and the tip going in
+constexpr uint64_t kSanityTicks = 16;  // as in runtime/session
+constexpr double kFactorTime = 0.5;    // [s] over which `lately` looks back
+constexpr auto kNap = std::chrono::milliseconds(2);  // how soon a command is heard while nothing is due
+
+double seconds_of(Clock::duration d) { return std::chrono::duration<double>(d).count(); }
+
+// Everything needed to go on from a moment as if nothing had happened since.
+struct Moment {
+  std::vector<std::byte> state;
+  std::array<ToolInput, 2> hand;
+  Practice practice;
+};
+
+struct BiteMoment {
+  uint32_t bite = 0;
+  Moment before;
+};
+
+ToolInput nobody() {
+  ToolInput input;
+  input.connected = 0;
+  return input;
+}
+
+struct HandMail {
+  ToolInput input = nobody();
+  uint32_t epoch = 0;  // that whoever sent it had seen
+};
+
+struct LiveView {
+  Snapshot before, now;
+  Clock::time_point at;    // when `now` was ready
+  double tick_wall_s = 1;  // from one tick to the next, at this speed
+  LiveStatus status;
+  bool any = false;
+};
+
+// NAME.cgrec, NAME.2.cgrec, ...
+std::string part_name(const std::string& path, size_t part) {
+  if (part == 1) return path;
+  const size_t dot = path.rfind('.'), slash = path.rfind('/');
+  const bool has = dot != std::string::npos && (slash == std::string::npos || dot > slash + 1);
+  return path.substr(0, has ? dot : path.size()) + "." + std::to_string(part) + (has ? path.substr(dot) : "");
+}
+
+}  // namespace
+
+struct Live::Work {
+  // --- set up before the thread starts, constant after -------------------------------------------------------------------
+  SceneSpec scene;
+  LiveOptions options;
+  std::shared_ptr<const Model> model;
+  PictureModel picture;
+  double dt = 0;
+
+  // --- between the threads -----------------------------------------------------------------------------------------------
+  std::array<Latest<HandMail>, 2> hand_box;        // window -> physics
+  std::array<std::atomic<uint32_t>, 2> pressed{};  // both: buttons that went down since the last tick
+  Ring<LiveCommand, 64> commands;                  // window -> physics
+  std::atomic<bool> quit{false};                   // window -> physics
+  Latest<LiveView> view_box;                       // physics -> window
+  Ring<Event, 1024> events;                        // physics -> window
+  std::thread thread;
+
+  // --- the window's ------------------------------------------------------------------------------------------------------
+  LiveStatus status;
+  std::array<uint32_t, 2> buttons{};
+
+  // --- the physics thread's ----------------------------------------------------------------------------------------------
+  StatePtr state;
+  std::unique_ptr<Jobs> jobs;
+  Hands surgeon;
+  std::unique_ptr<Recorder> recorder;
+  LiveResult result;
+  TickInput input;
+  Snapshot before, now;
+  LiveStatus told;
+  Moment settled;
+  std::deque<BiteMoment> bites;
+  std::array<std::optional<Moment>, 2> checkpoint;                    // the newest and the one before it
+  uint64_t checkpoint_every = 1;                                      // [ticks]
+  size_t speed = 0;                                                   // of kLiveSpeeds
+  int steps = 0;                                                      // single steps asked for
+  double wall_s = 0, simulated_s = 0, spent_s = 0, ticks_weight = 0;  // lately, each weighed down by age
+
+  void begin();
+  void run();
+  void main_loop();
+  void obey();
+  void tick(bool let_in);
+  void show();
+  void go_back(const Moment& to);
+  void record_from_here();
+  void forget_pace() { wall_s = simulated_s = 0; }
+  Moment moment() const { return {save_state(*model, *state), input.hand, told.practice}; }
+};
+
+void Live::Work::begin() {
+  model = build_model(scene);
+  picture = picture_model(*model);
+  dt = 1.0 / static_cast<double>(scene.solver.tick_rate);
+  checkpoint_every = std::max<uint64_t>(1, static_cast<uint64_t>(std::llround(kBeforeBite / dt)));
+  state = initial_state(*model);
+  jobs = std::make_unique<Jobs>(options.threads);
+  if (!options.surgeon.empty()) surgeon = make_hands(options.surgeon, scene, picture);
+  for (ToolInput& hand : input.hand) hand.connected = 0;
+  record_from_here();
+  publish(*model, *state, now);
+  before = now;
+  told.paused = options.start_paused;
+  thread = std::thread([this] { run(); });
+}
+
+void Live::Work::record_from_here() {
+  if (options.record.empty()) return;
+  if (recorder) recorder->finish(true);
+  recorder.reset();
+  const std::string path = part_name(options.record, result.recorded.size() + 1);
+  recorder = std::make_unique<Recorder>(path, RecordingHeader{catgut_version(), kStateVersion, write_scene(scene)},
+                                        save_state(*model, *state));
+  result.recorded.push_back(path);
+}
+
+void Live::Work::tick(bool let_in) {
+  const Clock::time_point start = Clock::now();
+  uint64_t fresh = 0;  // time_ns of the newest motion that this tick is the first to have
+  if (let_in && told.tick % checkpoint_every == 0) {
+    std::swap(checkpoint[0], checkpoint[1]);
+    checkpoint[0] = moment();
+  }
+  input.tick = result.ticks;
+  if (let_in && surgeon.surgeon) {
+    input.hand = surgeon.surgeon->operate(now, static_cast<float>(dt));
+    told.doing = surgeon.surgeon->doing();
+  } else if (let_in) {
+    for (size_t k = 0; k < 2; ++k) {
+      hand_box[k].update();
+      const HandMail& mail = hand_box[k].seen();
+      const uint32_t down = pressed[k].exchange(0, std::memory_order_relaxed);
+      ToolInput& hand = input.hand[k];
+      hand.buttons = 0;
+      // Mail from before a jump in time is about tools that were elsewhere: until newer comes the hand stays.
+      if (mail.epoch != told.epoch) continue;
+      hand = hand_toward(hand, mail.input, options.hand_speed, options.hand_turn, static_cast<float>(dt));
+      hand.buttons |= down;
+      fresh = std::max(fresh, mail.input.time_ns > told.input_time_ns[k] ? mail.input.time_ns : 0);
+      told.input_time_ns[k] = mail.input.time_ns;
+    }
+  }
+  step(*model, *state, input, *jobs);
+  std::swap(before, now);
+  publish(*model, *state, now);
+  ++result.ticks;
+  if (recorder) recorder->tick(input, hash_state(*model, *state));
+  if (let_in) note(told.practice, now, static_cast<float>(dt));
+  for (const Event& e : now.event) {
+    told.events_lost += !events.push(e);
+    if (e.kind == EventKind::tip_entered && checkpoint[0]) {
+      bites.push_back({e.which, checkpoint[1] ? *checkpoint[1] : *checkpoint[0]});
+      if (bites.size() > kMostTakenBack) bites.pop_front();
+    } else if (e.kind == EventKind::bite_cancelled) {
+      if (!bites.empty() && bites.back().bite == e.which) bites.pop_back();
+    }
+  }
+  told.tick = now.tick;
+  told.time_s = now.time_s;
+  told.to_take_back = static_cast<uint32_t>(bites.size());
+  if (now.tick % kSanityTicks == 0 && !state_is_sane(*model, *state))
+    throw InputError(scene.name, "the simulation went wrong",
+                     "take back the last bite, or restart; a recording helps to find out why");
+  if (fresh > 0) told.hand_to_tick_ms = static_cast<float>(wall_ns() - fresh) * 1e-6f;
+  const double spent = seconds_of(Clock::now() - start), keep = std::exp(-dt / kFactorTime);
+  spent_s = spent_s * keep + spent;
+  ticks_weight = ticks_weight * keep + 1;
+  told.tick_ms = static_cast<float>(1000 * spent_s / ticks_weight);
+}
+
+void Live::Work::show() {
+  LiveView& view = view_box.draft();
+  view.before = before;
+  view.now = now;
+  view.at = Clock::now();
+  view.tick_wall_s = dt / static_cast<double>(kLiveSpeeds[speed]);
+  told.speed = kLiveSpeeds[speed];
+  view.status = told;
+  view.any = true;
+  view_box.publish();
+}
+
+void Live::Work::go_back(const Moment& to) {
+  load_state(*model, *state, to.state);
+  publish(*model, *state, now);
+  before = now;
+  input.hand = to.hand;
+  const uint32_t taken_back = told.practice.taken_back;
+  told.practice = to.practice;
+  told.practice.taken_back = taken_back;
+  told.fault.clear();
+  ++told.epoch;
+  told.tick = now.tick;
+  told.time_s = now.time_s;
+  checkpoint = {};
+  checkpoint[0] = to;
+  told.to_take_back = static_cast<uint32_t>(bites.size());
+  record_from_here();
+  forget_pace();
+}
+
+void Live::Work::obey() {
+  bool any = false;
+  for (LiveCommand c; commands.pop(c); any = true) {
+    switch (c) {
+      case LiveCommand::pause:
+        told.paused = true;
+        break;
+      case LiveCommand::resume:
+        told.paused = !told.fault.empty();
+        break;
+      case LiveCommand::single_step:
+        told.paused = true;
+        steps += told.fault.empty();
+        break;
+      case LiveCommand::restart:
+        bites.clear();
+        told.practice.taken_back = 0;
+        go_back(settled);
+        if (!options.surgeon.empty()) surgeon = make_hands(options.surgeon, scene, picture);
+        break;
+      case LiveCommand::take_back: {
+        if (bites.empty() || surgeon.surgeon) break;
+        const Moment to = std::move(bites.back().before);
+        bites.pop_back();
+        ++told.practice.taken_back;
+        go_back(to);
+        break;
+      }
+      case LiveCommand::slower:
+        speed = std::min(speed + 1, kLiveSpeeds.size() - 1);
+        forget_pace();
+        break;
+      case LiveCommand::faster:
+        speed -= speed > 0;
+        forget_pace();
+        break;
+    }
+  }
+  if (any) show();
+}
+
+void Live::Work::main_loop() {
+  Clock::time_point due = Clock::now(), last = due;
+  while (!quit.load(std::memory_order_relaxed)) {
+    obey();
+    const Clock::time_point at = Clock::now();
+    const bool stepping = steps > 0;
+    if (told.paused && !stepping) {
+      std::this_thread::sleep_for(kNap);
+      due = last = Clock::now();
+      continue;
+    }
+    if (!stepping && at < due) {
+      std::this_thread::sleep_until(std::min(due, at + kNap));
+      continue;
+    }
+    steps -= stepping;
+    tick(true);
+    const Clock::time_point done = Clock::now();
+    const double passed = seconds_of(done - last), keep = std::exp(-passed / kFactorTime);
+    last = done;
+    wall_s = wall_s * keep + passed;
+    simulated_s = simulated_s * keep + dt;
+    told.time_factor = static_cast<float>(simulated_s / std::max(wall_s, 1e-6));
+    const double period = dt / static_cast<double>(kLiveSpeeds[speed]);
+    due += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(period));
+    const double behind = seconds_of(done - due);
+    if (stepping) {
+      due = done;
+    } else if (behind > kCatchUp * period) {
+      told.late += static_cast<uint64_t>(behind / period);
+      due = done;
+    }
+    show();
+  }
+}
+
+void Live::Work::run() {
+  bool was_settled = false;
+  while (!quit.load(std::memory_order_relaxed)) try {
+      if (!was_settled) {  // as fast as it goes: nobody is let in yet
+        show();
+        const auto ticks = static_cast<uint64_t>(std::llround(static_cast<double>(scene.settle) / dt));
+        while (result.ticks < ticks && !quit.load(std::memory_order_relaxed)) tick(false);
+        settled = moment();
+        told.settling = false;
+        was_settled = true;
+        show();
+      }
+      main_loop();
+    } catch (const std::exception& error) {  // shown in the window; the user restarts, takes back, or leaves
+      told.fault = error.what();
+      told.paused = true;
+      steps = 0;
+      if (!was_settled) settled = moment(), was_settled = true, told.settling = false;
+      if (recorder) recorder.reset();
+      show();
+    }
+  told.fault.swap(result.fault);
+  result.practice = told.practice;
+  result.state_hash = hash_state(*model, *state);
+  try {
+    if (recorder) recorder->finish(true);
+  } catch (const std::exception& error) { result.fault = error.what(); }
+  recorder.reset();
+}
+
+Live::Live(const SceneSpec& scene, const LiveOptions& options) : work_(std::make_unique<Work>()) {
+  work_->scene = scene;
+  work_->options = options;
+  work_->begin();
+}
+
+Live::~Live() { finish(); }
+
+const PictureModel& Live::picture() const { return work_->picture; }
+
+void Live::hand(size_t who, const ToolInput& input) {
+  HandMail& mail = work_->hand_box[who].draft();
+  mail.input = input;
+  mail.epoch = work_->status.epoch;
+  work_->pressed[who].fetch_or(input.buttons & ~work_->buttons[who], std::memory_order_relaxed);
+  work_->buttons[who] = input.buttons;
+  work_->hand_box[who].publish();
+}
+
+bool Live::command(LiveCommand command) { return work_->commands.push(command); }
+
+bool Live::look(Snapshot& out) {
+  work_->view_box.update();
+  const LiveView& view = work_->view_box.seen();
+  if (!view.any) return false;
+  work_->status = view.status;
+  const double passed = seconds_of(Clock::now() - view.at);
+  blend(view.before, view.now, view.status.paused ? 1.0f : static_cast<float>(passed / view.tick_wall_s), out);
+  return true;
+}
+
+const LiveStatus& Live::status() const { return work_->status; }
+bool Live::event(Event& out) { return work_->events.pop(out); }
+
+LiveResult Live::finish() {
+  work_->quit = true;
+  if (work_->thread.joinable()) work_->thread.join();
+  return work_->result;
+}
+
+ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt) {
+  if (!from.connected || !to.connected) return to;
+  ToolInput out = to;
+  const Vec3 way = to.pose.p - from.pose.p, about = rotation_vector(to.pose.q * conjugate(from.pose.q));
+  const float far = length(way), angle = length(about);
+  if (far > speed * dt) out.pose.p = from.pose.p + way * (speed * dt / far);
+  if (angle > turn * dt) out.pose.q = nlerp(from.pose.q, to.pose.q, turn * dt / angle);
+  out.jaw = from.jaw + std::clamp(to.jaw - from.jaw, -10 * dt, 10 * dt);
+  out.velocity = (out.pose.p - from.pose.p) / dt;
+  out.angular_velocity = rotation_vector(out.pose.q * conjugate(from.pose.q)) / dt;
+  return out;
+}
+
+double wall_seconds() { return seconds_of(Clock::now().time_since_epoch()); }
+uint64_t wall_ns() {
+  return static_cast<uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count());
+}
+
+}  // namespace catgut

@@ -1,0 +1,105 @@
+// runtime: a scene that people work in. Physics runs on a thread of its own at the scene's fixed tick; whoever holds the window
+// publishes hands and commands and looks at pictures, and neither waits for the other. Ticks that come late are caught up, a
+// few at a time; a machine that cannot keep up makes time itself go slower, and says by how much. What is simulated depends on
+// the hands and the tick alone, as in runtime/session: with `record` every tick can be replayed bit for bit.
+//
+// One thread at a time calls a Live's functions (the window's); they never block, except finish() and the destructor.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "exchange/picture.h"
+#include "exchange/snapshot.h"
+#include "exchange/tool_input.h"
+#include "runtime/practice.h"
+#include "sim/scene.h"
+
+namespace catgut {
+
+enum class LiveCommand : uint8_t {
+  pause,
+  resume,
+  single_step,  // one tick, then pause
+  restart,      // back to the settled scene
+  take_back,    // back to a moment before the last bite began; nothing when there is none
+  slower,       // the next of kLiveSpeeds
+  faster,
+};
+constexpr std::array<float, 4> kLiveSpeeds{1.0f, 0.5f, 0.25f, 0.1f};  // of real time
+
+struct LiveOptions {
+  int threads = 1;          // of the solver
+  std::string record;       // recording to write; empty: none. See LiveStatus::recorded
+  std::string surgeon;      // as `catgut run --surgeon`; empty: the hands of hand()
+  float hand_speed = 0.6f;  // [m/s] and
+  float hand_turn = 12.0f;  // [rad/s] at most for a tool: a device that jumps (a mouse under a slow picture) tears nothing
+  bool start_paused = false;
+};
+
+struct LiveStatus {
+  uint64_t tick = 0;
+  double time_s = 0;      // [s] simulated
+  float speed = 1;        // of real time, as asked for
+  float time_factor = 0;  // simulated over wall time, lately; less than `speed`: this machine is too slow for the scene
+  float tick_ms = 0;      // that a tick takes to compute, lately
+  uint64_t late = 0;      // ticks' worth of time that was given up because it could not be caught up
+  bool paused = false;
+  bool settling = true;                     // the scene comes to rest; hands are not let in yet
+  uint32_t epoch = 0;                       // counts restarts and bites taken back: hands go on from where the tools are then
+  uint32_t to_take_back = 0;                // bites that take_back can undo
+  uint32_t events_lost = 0;                 // nobody fetched them in time
+  std::array<uint64_t, 2> input_time_ns{};  // ToolInput::time_ns of the hands in the newest tick, for latencies
+  float hand_to_tick_ms = 0;                // from the newest of these, where a device uses wall_ns(), to the end of its tick
+  Practice practice;
+  std::string doing;  // of the surgeon, when one works
+  std::string fault;  // not empty: the run has stopped, and why
+};
+
+struct LiveResult {
+  Practice practice;
+  uint64_t ticks = 0;  // all that were computed, those taken back included
+  uint64_t state_hash = 0;
+  std::vector<std::string> recorded;  // files written: a restart or a bite taken back begins the next one (NAME.2.cgrec ...)
+  std::string fault;
+};
+
+class Live {
+ public:
+  // Builds the scene and starts. Throws InputError (scene, recording, surgeon).
+  Live(const SceneSpec& scene, const LiveOptions& options);
+  ~Live();  // stops; the recording is kept
+  Live(const Live&) = delete;
+  Live& operator=(const Live&) = delete;
+
+  const PictureModel& picture() const;
+
+  // The newest pose of hand `who` (0 or 1). A button that goes down is not lost when it comes up again before the next tick.
+  void hand(size_t who, const ToolInput& input);
+  // False: too many are waiting; try again.
+  bool command(LiveCommand command);
+
+  // The field as it is now: the last two ticks blended by the time that has passed, so that it shows one tick late and moves
+  // evenly whatever the rate of pictures. False before there is any.
+  bool look(Snapshot& out);
+  const LiveStatus& status() const;  // as of the last look()
+  bool event(Event& out);            // the next thing that happened; false: none for now
+
+  LiveResult finish();  // stops and closes the recording
+
+ private:
+  struct Work;
+  std::unique_ptr<Work> work_;
+};
+
+// Toward `to` as far as a hand gets in dt [s] at no more than `speed` [m/s] and `turn` [rad/s]; the jaw at ten strokes a
+// second.
+ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt);
+
+// [s] on a clock that never goes back, for whatever is paced outside the physics: pictures, key repeats, latencies.
+double wall_seconds();
+uint64_t wall_ns();
+
+}  // namespace catgut

@@ -1,0 +1,35 @@
+// runtime: what somebody at the instruments has done so far, gathered from the published snapshots tick by tick. Plain values,
+// so that taking back a bite takes back what it counted too.
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "exchange/snapshot.h"
+
+namespace catgut {
+
+struct Practice {
+  double time_s = 0;             // [s] simulated, since the hands were let in
+  uint32_t bites = 0;            // completed
+  uint32_t bites_cancelled = 0;  // the needle was drawn back
+  uint32_t knots = 0;            // with at least one locked throw
+  uint32_t throws = 0;
+  uint32_t cuts = 0;
+  uint32_t stitches_settled = 0;
+  uint32_t needle_slips = 0;  // the needle was torn out of a jaw
+  std::array<uint32_t, static_cast<size_t>(Fault::count_)> faults{};
+  uint32_t faults_in_all = 0;
+  float path[2] = {0, 0};        // [m] of each tool's tip
+  float most_force[2] = {0, 0};  // [N] on each hand
+  float opening_start = 0;       // [m^2] when the hands were let in; 0: nothing to close
+  float opening = 0;             // [m^2] now
+  float closure = 0;             // 0 open .. 1
+  uint32_t taken_back = 0;       // bites that were taken back; survives the taking back
+  std::array<Vec3, 2> tip{};     // [m] where the tools were, for the path
+  bool begun = false;
+};
+
+// After every tick. dt: length of a tick [s].
+void note(Practice& practice, const Snapshot& seen, float dt);
+
+}  // namespace catgut

@@ -1,0 +1,242 @@
+// tests/app: somebody sits down at the window. A real X server (Xvfb), real mouse and keyboard events (xdotool); what is
+// checked is what happened in the simulation and what was recorded, not pixels. Skips where one of the two is missing.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <thread>
+
+#include "device/mouse.h"
+#include "procedure/scene_file.h"
+#include "render/orbit.h"
+#include "render/renderer.h"
+#include "sim/recording.h"
+#include "sim/simulation.h"
+
+namespace catgut {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr int kWidth = 640, kHeight = 360;
+
+bool on_path(const std::string& program) { return std::system(("command -v " + program + " >/dev/null 2>&1").c_str()) == 0; }
+
+// An X server of our own: on a machine with a desktop the test must not take the mouse away.
+struct XServer {
+  pid_t pid = -1;
+  std::string display;
+  XServer() {
+    int out[2];
+    if (pipe(out) != 0) return;
+    pid = fork();
+    if (pid == 0) {
+      dup2(out[1], 3);
+      if (!std::freopen("/dev/null", "w", stderr)) _exit(98);
+      execlp("Xvfb", "Xvfb", "-displayfd", "3", "-screen", "0", "800x600x24", "-nolisten", "tcp", nullptr);
+      _exit(99);
+    }
+    close(out[1]);
+    std::string number;
+    for (char c; read(out[0], &c, 1) == 1 && c != '\n';) number += c;  // Xvfb says which display it has, or ends
+    close(out[0]);
+    if (!number.empty()) display = ":" + number;
+  }
+  ~XServer() {
+    if (pid <= 0) return;
+    kill(pid, SIGTERM);
+    waitpid(pid, nullptr, 0);
+  }
+};
+
+std::string read_file(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+class Window : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!fs::exists(CATGUT_APP)) GTEST_SKIP() << "the program is not built here";
+    if (!renderer_available()) GTEST_SKIP() << "no EGL driver here, or a build without pictures (CATGUT_RENDER=OFF)";
+    for (const char* program : {"Xvfb", "xdotool"})
+      if (!on_path(program)) GTEST_SKIP() << program << " is missing (Debian: apt install xvfb xdotool)";
+    x_ = std::make_unique<XServer>();
+    if (x_->display.empty()) GTEST_SKIP() << "Xvfb does not start here";
+    folder_ = fs::path(testing::TempDir()) / ("catgut_window_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override {
+    if (app_ > 0) {
+      kill(app_, SIGKILL);
+      waitpid(app_, nullptr, 0);
+    }
+    if (!folder_.empty()) fs::remove_all(folder_);
+  }
+
+  void start(const std::vector<std::string>& arguments) {
+    app_ = fork();
+    if (app_ != 0) return;
+    setenv("DISPLAY", x_->display.c_str(), 1);
+    setenv("SDL_VIDEODRIVER", "x11", 1);
+    setenv("XDG_RUNTIME_DIR", folder_.c_str(), 1);
+    if (!std::freopen((folder_ / "stderr").c_str(), "w", stderr)) _exit(98);
+    std::vector<char*> argv{const_cast<char*>("catgut")};
+    for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
+    argv.push_back(nullptr);
+    execv(CATGUT_APP, argv.data());
+    _exit(99);
+  }
+  void xdo(const std::string& what) {
+    EXPECT_EQ(std::system(("DISPLAY=" + x_->display + " xdotool " + what + " >/dev/null 2>&1").c_str()), 0) << what;
+  }
+  // Small steps with pauses, as a hand moves; the server must not take them for one jump.
+  void drag(float right, float down, int steps = 10) {
+    float x = 0, y = 0;
+    for (int i = 1; i <= steps; ++i) {
+      const float part = static_cast<float>(i) / static_cast<float>(steps);
+      const int dx = static_cast<int>(std::lround(right * part - x)), dy = static_cast<int>(std::lround(down * part - y));
+      x += static_cast<float>(dx), y += static_cast<float>(dy);
+      xdo("mousemove_relative -- " + std::to_string(dx) + " " + std::to_string(dy));
+      pause(20);
+    }
+  }
+  static void pause(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
+  size_t count(const std::string& what) const {
+    const std::string text = read_file(folder_ / "events");
+    size_t n = 0;
+    for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++n;
+    return n;
+  }
+  // Until it stands in the events, for the n-th time.
+  bool happens(const std::string& what, size_t n = 1, int seconds = 40) const {
+    for (int i = 0; i < seconds * 20; ++i) {
+      if (count("\"" + what + "\"") >= n) return true;
+      pause(50);
+    }
+    return false;
+  }
+  int exit_code(int seconds = 40) {
+    int status = 0;
+    for (int i = 0; i < seconds * 20; ++i) {
+      if (waitpid(app_, &status, WNOHANG) == app_) {
+        app_ = -1;
+        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+      }
+      pause(50);
+    }
+    return -2;
+  }
+  std::string said() const { return read_file(folder_ / "stderr") + read_file(folder_ / "events"); }
+
+  std::unique_ptr<XServer> x_;
+  fs::path folder_;
+  pid_t app_ = -1;
+};
+
+// Where the pointer has to go, reckoned from what the program is known to begin with.
+std::array<float, 2> from_tool_to_needle() {
+  const auto model = build_model(read_scene("purse_string"));
+  const auto state = initial_state(*model);
+  Snapshot seen;
+  publish(*model, *state, seen);
+  const PictureModel picture = picture_model(*model);
+  const Camera c = camera_of(start_orbit(picture, seen.needle.pose.p));
+  const ViewFrame view = view_frame(c.eye, c.target, c.up, c.fov_deg, kHeight);
+  const auto on_screen = [&](Vec3 p) {
+    const Vec3 d = p - view.eye;
+    const float scale = 1 / (view.pixel * dot(d, view.ahead));
+    return std::array<float, 2>{dot(d, view.right) * scale, -dot(d, view.up) * scale};
+  };
+  const auto tool = on_screen(start_steering(picture, false).hand[0].pose.p);
+  const auto needle = on_screen(good_grip(picture, seen, 0, {0, 1, 0}, {}).p);
+  EXPECT_LT(std::abs(needle[0]), kWidth / 2) << "the needle is in the picture from the start";
+  EXPECT_LT(std::abs(needle[1]), kHeight / 2);
+  return {needle[0] - tool[0], needle[1] - tool[1]};
+}
+
+TEST_F(Window, somebody_takes_the_needle_and_everything_is_recorded) {
+  const fs::path events = folder_ / "events", recording = folder_ / "r.cgrec";
+  start({"play", "purse_string", "--size", "640x360", "--quality", "low", "--events", events.string(), "--record",
+         recording.string(), "--seconds", "180"});
+  ASSERT_TRUE(happens("practise", 1, 60)) << said();
+  pause(500);
+  const auto way = from_tool_to_needle();
+  drag(way[0], way[1], 20);
+  pause(1500);  // a slow picture later the help has the tool at the needle
+  xdo("click 1");
+  ASSERT_TRUE(happens("needle_grasped")) << said();
+  xdo("mousedown 3");
+  drag(120, 0);
+  pause(800);
+  xdo("mouseup 3");
+  for (int i = 0; i < 5; ++i) xdo("click 4");  // the wheel
+  xdo("key space");
+  EXPECT_TRUE(happens("needle_released")) << said();
+  xdo("key Tab");
+  pause(500);
+  drag(60, 20);
+  xdo("key n");
+  EXPECT_TRUE(happens("suture_taken")) << said();
+  pause(500);
+
+  // The screens, by keys.
+  xdo("key Escape");
+  EXPECT_TRUE(happens("pause")) << said();
+  xdo("key period");
+  xdo("key Escape");
+  EXPECT_TRUE(happens("practise", 2)) << said();
+  xdo("key F10");
+  EXPECT_TRUE(happens("results")) << said();
+  xdo("key Escape");
+  EXPECT_TRUE(happens("start")) << said();
+  xdo("key Escape");
+  EXPECT_EQ(exit_code(), 0) << said();
+
+  // What was recorded is what was done, and it replays.
+  const Recording r = read_recording(recording.string());
+  EXPECT_FALSE(r.truncated) << r.fault;
+  ASSERT_GT(r.tick.size(), 60u);
+  const Pose first = start_steering(picture_model(*build_model(read_scene("purse_string"))), false).hand[1].pose;
+  float farthest = 0;
+  bool pressed = false, closed = false;
+  for (const RecordedTick& t : r.tick) {
+    if (t.input.hand[1].connected) farthest = std::max(farthest, distance(t.input.hand[1].pose.p, first.p));
+    pressed = pressed || (t.input.hand[1].buttons & kButtonNewSuture);
+    closed = closed || t.input.hand[0].jaw == 0;
+  }
+  EXPECT_GT(farthest, 0.005f) << "Tab gave the mouse to the other hand";
+  EXPECT_TRUE(pressed);
+  EXPECT_TRUE(closed);
+  EXPECT_EQ(std::system(("'" CATGUT_APP "' replay '" + recording.string() + "' --check >/dev/null").c_str()), 0);
+}
+
+TEST_F(Window, a_screenshot_shows_the_field) {
+  const fs::path picture = folder_ / "s.png";
+  start({"play", "purse_string", "--size", "640x360", "--screenshot", picture.string(), "--after", "3"});
+  ASSERT_EQ(exit_code(60), 0) << said();
+  const Image image = read_png(picture.string());
+  ASSERT_EQ(image.width, kWidth);
+  int red = 0, green = 0;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      const Colour c = pixel(image, x, y);
+      red += c[0] > c[1] + 20 && c[0] > c[2] + 20;
+      green += c[1] > c[0] + 20;
+    }
+  EXPECT_GT(red, kWidth * kHeight / 40) << "tissue";
+  EXPECT_GT(green, kWidth * kHeight / 4) << "drape";
+}
+
+}  // namespace
+}  // namespace catgut
