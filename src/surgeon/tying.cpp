@@ -127,7 +127,7 @@ void Scripted::choose_grasp(const Snapshot& seen) {
         if (along > 0.003f && along < 0.06f && length2(d - z * along) < kShaft * kShaft) good -= 0.1f;
       }
       // Near the knot little else lies about. Where it was tried in vain it is not tried again.
-      good -= 5 * distance(tip, knot) + (misses_ > 0 && distance(tip, tried_) < 0.004f ? 0.5f : 0.0f);
+      good -= 12 * distance(tip, knot) + (misses_ > 0 && distance(tip, tried_) < 0.004f ? 0.5f : 0.0f);
       if (good > best) best = good, take_slot_ = seen.thread_order[i], take_turn_ = from_tool_axis(z);
     }
   }
@@ -184,8 +184,11 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
   if (stage_ == lift && waited_ <= dt_) free_ = kTaut * (reach_ - distance(start_, axis_at));
   const float behind = stage_ <= wind ? distance(swage(seen), swage_at(wound_)) : 0;
+  // Before the first throw nothing but friction holds the thread in its holes: no more is asked for than there is.
+  const float there_is = reach_ - distance(start_, axis_at) - kWound * std::max(0.0f, wound_) + 0.002f;
+  const float most = seen.knot.empty() ? std::max(0.006f, there_is) : reach_;
   if ((stage_ == beside || stage_ == wind) && ((behind < 0.005f && room > free_) || tension > kTooTaut))
-    free_ = std::clamp(feel(free_, tension), 0.006f, reach_);
+    free_ = std::clamp(feel(free_, tension), 0.006f, most);
   switch (stage_) {
     case lift:
       jaw(kDriver, kHalfOpen);
@@ -227,7 +230,9 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       if (stage_ == over && waited_ <= dt_) free_ = kLoose * length_between(seen, node_of(seen, driver.loop_last), last);
       if (tension > kTooTaut) free_ = std::max(0.002f, feel(free_, tension));
       const Vec3 turns = hand_[kDriver].pose.p + rotate(hand_[kDriver].pose.q, {0, 0, kWindAt});
-      carry_swage(seen, turns + normalized(e1 - 0.4f * z) * free_, 2 * skill_.speed);
+      Vec3 above = turns + normalized(e1 - 0.4f * z) * free_;
+      above.y = std::max(above.y, std::min(floor_, turns.y + free_));
+      carry_swage(seen, above, 2 * skill_.speed);
       const float calm = std::clamp(1.5f - tension, 0.05f, 1.0f);
       if (stage_ == over) {
         jaw(kDriver, kHalfOpen);
