@@ -405,7 +405,8 @@ bool Scripted::draw(const Snapshot& seen) {
       // hard the thread sticks in its holes and the tissue follows the hands instead, so it gives way first.
       const size_t held = node_of(seen, seen.tool[kDriver].held_slot);
       const float tail = held < seen.thread_tension.size() ? seen.thread_tension[held] : 0;
-      if (plan_.lift == 0 && !patience(5) && tail > kCounterHold) move(kDriver, {stitch(seen), hand_[kDriver].pose.q}, 0.3f * skill_.speed);
+      if (plan_.lift == 0 && !patience(5) && tail > kCounterHold)
+        move(kDriver, {stitch(seen), hand_[kDriver].pose.q}, 0.3f * skill_.speed);
       else move(kDriver, {picture_.focus + right * 0.11f, hand_[kDriver].pose.q}, gently(kDriver));
       if (!patience(20)) gave_up_ = true;
       return false;

@@ -19,7 +19,6 @@ constexpr float kTaut = 0.975f;               // of the strand's length, between
 constexpr float kShaft = 0.0035f;             // [m] a shaft's radius and the tissue's
 constexpr float kClear = 0.006f;              // [m] between jaws that take the tail and the other strand
 constexpr float kNeedleBelow = 0.007f;        // [m] that the needle hangs below its swage
-constexpr float kHighest = 1.0f;              // [m] above the tissue, for the driver that thread is wound round
 constexpr float kLoose = 0.7f;                // of the strand between the turns and the needle, on the way to the tail
 constexpr float kTooTaut = 0.3f;              // [N]
 constexpr float kLeastFree = 0.032f;          // [m] of strand that must be left to go round the driver
@@ -153,12 +152,11 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     // What the knot holds already is no longer in the hand.
     const float spent = seen.suture_point.empty() ? 0 : distance(seen.suture_point.back().position, start_);
     reach_ = std::max(0.03f, length_between(seen, last_point_node(seen), last) - spent);
-    // So high that the needle, going round below on a taut strand, keeps clear of the tissue, as far as a short strand allows;
-    // but no higher than need be, since what lies between the tissue and the turns is slack when the jaws go to the tail.
+    // So high that the needle, going round below on a taut strand, keeps clear of the tissue, as far as a short strand allows.
     const float crest = highest_near(seen, start_, kNear), rise = crest - start_.y;
     floor_ = crest + kNeedleBelow;
-    height_ = std::min(0.5f * (reach_ + rise + kNeedleBelow), own_strand ? 1.0f : rise + kHighest);
-    height_ = std::clamp(height_, 0.025f, std::max(0.025f, reach_ - (own_strand ? kLeastFreeForOwn : kLeastFree)));
+    height_ = std::clamp(0.5f * (reach_ + rise + kNeedleBelow), 0.025f,
+                         std::max(0.025f, reach_ - (own_strand ? kLeastFreeForOwn : kLeastFree)));
     wound_ = kBefore;
     lean_ = kLean;
     throws_before_ = seen.knot.empty() ? 0 : seen.knot.back().throws;
@@ -170,8 +168,8 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   const Vec3 axis_at = start_ + e1 * height_ - e2 * (side * kWindRadius) - z * kApart;
   const float wind_at = own_strand ? kWindOwnAt : kWindAt;
   const Pose lying = tying_pose(kDriver, axis_at - z * wind_at);
-  // The needle when the strand leaves the driver after turning by w about it. A long strand goes slack below, where there is no
-  // room for it, and is drawn taut again behind.
+  // The needle when the strand leaves the driver after turning by w about it. A strand that is short for the height goes slack
+  // below, where there is no room for it, and is drawn taut again behind.
   float room = 1;
   auto swage_at = [&](float w) {
     const float way = side * w;

@@ -65,5 +65,34 @@ TEST(Procedure, shaky_hands_try_again) {
   }
 }
 
+// Every scene says what it expects of its suture; all of it must hold, whatever the hands' tremor.
+void sew(const std::string& name, uint64_t seeds) {
+  for (uint64_t seed = 1; seed <= seeds; ++seed) {
+    SceneSpec scene = read_scene(name);
+    scene.seed = seed;
+    const RunResult r = run_session(scene, {});
+    std::printf("%s, seed %2d: %.1f s, %s\n", name.c_str(), static_cast<int>(seed), r.simulated_s, r.ended.c_str());
+    std::fflush(stdout);
+    ASSERT_FALSE(r.expect.empty());
+    for (const ExpectationResult& e : r.expect)
+      EXPECT_TRUE(e.ok) << name << ", seed " << seed << ": " << e.want.name << " is " << e.got;
+  }
+}
+
+TEST(Procedure, a_stay_suture_is_tied_and_held) { sew("stay", 1); }
+
+TEST(Procedure, twenty_seeds_of_stay) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  sew("stay", 20);
+}
+TEST(Procedure, twenty_seeds_of_connell) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  sew("connell", 20);
+}
+TEST(Procedure, twenty_seeds_of_lembert) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  sew("lembert", 20);
+}
+
 }  // namespace
 }  // namespace catgut
