@@ -325,11 +325,12 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
     return false;
   }
   const bool tail = kind == TaskKind::cut_tail;
-  // Not too near to the knot, and where the scissors cannot meet the stitch itself.
+  // Not too near to the knot, where the scissors cannot meet the stitch itself; after a miss further out, where they have room.
   const size_t first = first_point_node(seen), end = last_point_node(seen);
   size_t at = last;
   float clearest = 0;
-  for (float far = kStump; far < 4 * kStump && clearest < kClear; far += 0.002f) {
+  const float near = kStump + 0.004f * static_cast<float>(misses_);
+  for (float far = near; far < near + 3 * kStump && clearest < kClear; far += 0.002f) {
     const size_t i = std::clamp<size_t>(node_along(seen, tail ? first : end, far, tail ? -1 : 1), 1, last - 1);
     float clear = kClear;
     for (size_t k = first; k <= end; ++k) clear = std::min(clear, distance(node_at(seen, i), node_at(seen, k)));
