@@ -36,6 +36,7 @@ TEST(Figure4, nearest_particle_within_x_is_attached_when_the_tip_enters) {
 TEST(Figure4, the_nearest_is_the_nearest_of_all) {
   Rig rig;
   rig.wait(0.1f);
+  rig.hold_needle();
   for (int k = 0; k < 24; ++k) {
     const Place p = rig.place(0.27f * static_cast<float>(k), 0.003f + 0.0007f * static_cast<float>(k % 7));
     const Pose circle = rig.circle_at({p.at - p.out * 0.0004f, p.out, p.along, p.up}, 0, 0);
@@ -57,6 +58,23 @@ TEST(Figure4, the_nearest_is_the_nearest_of_all) {
     EXPECT_EQ(a.point.particle[0], best);
     EXPECT_LT(distance(transform(solver.body[kNeedle].pose(), a.target), xyz(solver.x[best])), 1e-6f);
     EXPECT_FLOAT_EQ(a.compliance, rig.model->suture.attach_compliance);
+  }
+}
+
+// It weighs a few millinewtons. Once a hand takes it where it lies, with its tip in the wall, it is in.
+TEST(Figure4, a_needle_that_nobody_holds_pierces_nothing) {
+  Rig rig;
+  rig.wait(0.1f);
+  const Place p = rig.place(0.5f, 0.004f);
+  const Pose circle = rig.circle_at({p.at - p.out * 0.0004f, p.out, p.along, p.up}, 0, 0);
+  rig.needle().x = circle.p - rotate(circle.q, rig.model->solver.needle_arc.centre);
+  rig.needle().q = circle.q;
+  std::vector<Event> events;
+  for (const bool held : {false, false, true}) {
+    if (held) rig.hold_needle();
+    puncture(rig.model->solver, rig.solver(), rig.state->scratch, rig.model->suture, rig.suture(), events);
+    EXPECT_EQ(rig.suture().bite.size(), held ? 1u : 0u);
+    EXPECT_EQ(rig.suture().attached, held);
   }
 }
 
