@@ -18,11 +18,13 @@ namespace catgut {
 namespace {
 
 constexpr size_t kSheetCells = 12, kSheetColumns = 4;
+constexpr double kMomentsApart = 0.6;  // [s] simulated: what happens together is one picture
 constexpr size_t kMostMoments = 48;  // pictures kept in memory; beyond it every other one is let go
 
 bool is_moment(const Snapshot& seen) {
   return std::any_of(seen.event.begin(), seen.event.end(), [](const Event& e) {
-    return e.kind == EventKind::bite_completed || e.kind == EventKind::closure_started || e.kind == EventKind::closure_finished;
+    return e.kind == EventKind::bite_completed || e.kind == EventKind::closure_started || e.kind == EventKind::closure_finished ||
+           e.kind == EventKind::loop_formed || e.kind == EventKind::knot_locked;
   });
 }
 
@@ -44,7 +46,7 @@ struct Pictures::Studio {
   std::unique_ptr<VideoWriter> film;
   FollowCamera follow;
   Camera camera;
-  double next_s = 0, last_s = -1;  // [s] simulated
+  double next_s = 0, last_s = -1, last_moment_s = 0;  // [s] simulated
   size_t frame = 0;
   std::vector<SheetCell> moment;
   Snapshot last;  // of the run so far, for the sheet's last cell
@@ -78,7 +80,7 @@ struct Pictures::Studio {
   }
 
   void tick(const Snapshot& seen, const std::string& doing) {
-    const bool sheet = !options.contact_sheet.empty() && (moment.empty() || is_moment(seen));
+    const bool sheet = !options.contact_sheet.empty() && (moment.empty() || (seen.time_s >= last_moment_s + kMomentsApart && is_moment(seen)));
     const bool frame_due = (film || !options.frames.empty()) && seen.time_s >= next_s;
     if (sheet || frame_due) {
       const std::string caption = caption_of(seen, doing);
@@ -89,7 +91,7 @@ struct Pictures::Studio {
         if (film) film->add(picture);
         if (!options.frames.empty()) write_png(picture, fmt::format("{}/frame_{:05}.png", options.frames, frame++));
       }
-      if (sheet) keep(std::move(picture), caption);
+      if (sheet) keep(std::move(picture), caption), last_moment_s = seen.time_s;
     }
     if (!options.contact_sheet.empty()) {
       last = seen;
