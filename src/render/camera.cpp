@@ -4,6 +4,9 @@
 namespace catgut {
 namespace {
 
+// Of the field: how far off a hand still counts, and the largest half height of the picture.
+constexpr float kFarthest = 1.8f, kWidest = 1.0f;
+
 Camera look_at_from(Vec3 target, float azimuth, float elevation, float half_height, float fov_deg) {
   const float d = half_height / std::tan(0.5f * fov_deg * kPi / 180);
   const Vec3 away{std::cos(elevation) * std::sin(azimuth), std::sin(elevation), std::cos(elevation) * std::cos(azimuth)};
@@ -29,11 +32,24 @@ Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
   // Part of the way from the organ's middle to the needle: the work stays in view together with what it is done to.
   Vec3 offset = snapshot.needle.pose.p - focus_;
   if (!is_finite(offset)) offset = {};
-  // Hands that tie or draw thread are farther away: the picture opens up for them.
+  // Hands that tie or draw thread are farther away: the picture opens up for them, from the tissue to the needle and the tools'
+  // tips.
   const float away = length(offset), reach = 0.35f * field_;
-  const float half_wanted = std::clamp(0.55f * away, half_height, 0.62f * field_);
-  if (away > reach) offset *= std::min(away, 1.1f * field_) / away;
-  const Vec3 wanted = focus_ + 0.45f * offset;
+  float half_wanted = std::clamp(0.55f * away, half_height, 0.62f * field_);
+  Vec3 wanted = focus_ + 0.45f * offset;
+  if (away > reach) {
+    offset *= std::min(away, kFarthest * field_) / away;
+    Vec3 low = focus_, high = focus_;
+    const auto show = [&](Vec3 p) {
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    };
+    show(focus_ + offset);
+    for (const ToolView& tool : snapshot.tool)
+      if (distance(tool.pose.p, focus_) < kFarthest * field_) show(tool.pose.p);
+    wanted = 0.5f * (low + high);
+    half_wanted = std::clamp(0.55f * length(high - low), half_height, kWidest * field_);
+  }
 
   // Near the axis the needle's direction means nothing; the camera keeps to where it is.
   const float from_axis = std::hypot(offset.x, offset.z);

@@ -19,12 +19,12 @@ namespace {
 
 constexpr size_t kSheetCells = 12, kSheetColumns = 4;
 constexpr double kMomentsApart = 0.6;  // [s] simulated: what happens together is one picture
-constexpr size_t kMostMoments = 48;  // pictures kept in memory; beyond it every other one is let go
+constexpr size_t kMostMoments = 48;    // pictures kept in memory; beyond it every other one is let go
 
 bool is_moment(const Snapshot& seen) {
   return std::any_of(seen.event.begin(), seen.event.end(), [](const Event& e) {
-    return e.kind == EventKind::bite_completed || e.kind == EventKind::closure_started || e.kind == EventKind::closure_finished ||
-           e.kind == EventKind::loop_formed || e.kind == EventKind::knot_locked;
+    return e.kind == EventKind::bite_completed || e.kind == EventKind::closure_started ||
+           e.kind == EventKind::closure_finished || e.kind == EventKind::loop_formed || e.kind == EventKind::knot_locked;
   });
 }
 
@@ -80,7 +80,8 @@ struct Pictures::Studio {
   }
 
   void tick(const Snapshot& seen, const std::string& doing) {
-    const bool sheet = !options.contact_sheet.empty() && (moment.empty() || (seen.time_s >= last_moment_s + kMomentsApart && is_moment(seen)));
+    const bool sheet =
+        !options.contact_sheet.empty() && (moment.empty() || (seen.time_s >= last_moment_s + kMomentsApart && is_moment(seen)));
     const bool frame_due = (film || !options.frames.empty()) && seen.time_s >= next_s;
     if (sheet || frame_due) {
       const std::string caption = caption_of(seen, doing);
