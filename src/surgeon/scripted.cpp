@@ -159,8 +159,7 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
     case TaskKind::rest:
       doing_ = "hold";
       // Without pulling: a suture is judged as it lies.
-      if (!seen.thread_tension.empty() && seen.thread_tension.back() > 0.05f)
-        move(kForceps, {stitch(seen), hand_[kForceps].pose.q}, 0.3f * skill_.speed);
+      if (needle_tension(seen) > 0.05f) move(kForceps, {stitch(seen), hand_[kForceps].pose.q}, 0.3f * skill_.speed);
       return waited_ > 1.5f;
   }
   return true;

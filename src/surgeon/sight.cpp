@@ -81,6 +81,8 @@ size_t node_along(const Snapshot& seen, size_t from, float far, int way) {
   return at;
 }
 
+float needle_tension(const Snapshot& seen) { return seen.thread_tension.empty() ? 0 : seen.thread_tension.back(); }
+
 size_t first_point_node(const Snapshot& seen) {
   size_t node = seen.thread_order.size();
   for (const SuturePointView& p : seen.suture_point) node = std::min(node, node_of(seen, p.anchored));

@@ -27,6 +27,8 @@ float length_between(const Snapshot& seen, size_t a, size_t b);
 // The node `far` [m] along the thread from node `from`, toward the needle (way = 1) or the free end (way = -1); stops at an end
 // or where the thread was cut.
 size_t node_along(const Snapshot& seen, size_t from, float far, int way);
+// [N] in the thread's last pair, at the needle: what a hand that holds the needle feels of its strand.
+float needle_tension(const Snapshot& seen);
 // The first and the last suture point's nodes; both 0 when there is none.
 size_t first_point_node(const Snapshot& seen);
 size_t last_point_node(const Snapshot& seen);

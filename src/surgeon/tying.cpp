@@ -179,7 +179,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     // The forceps' shaft lies on the tip's side. A slack strand would slide off there: it is led back.
     return leave + to * std::min(free_, room) - z * (room < free_ ? -kLeadBack : std::clamp(lean_ * free_, -kApart, kApart));
   };
-  const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
+  const float tension = needle_tension(seen);
   if (stage_ == lift && waited_ <= dt_) free_ = kTaut * (reach_ - distance(start_, axis_at));
   const float behind = stage_ <= wind ? distance(swage(seen), swage_at(wound_)) : 0;
   // Before the first throw nothing but friction holds the thread in its holes: no more is asked for than there is.
@@ -288,7 +288,7 @@ bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, i
   // Straight on from the turns, along the driver and between its jaws; drawn out until it is felt to be taut.
   const float left = length_between(seen, node_of(seen, driver.loop_last), seen.thread_order.size() - 1);
   if (stage_ != close && waited_ <= dt_) free_ = 0.9f * left;
-  const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
+  const float tension = needle_tension(seen);
   const Vec3 ahead = lying.p - z * std::max(0.004f, free_ - kWindOwnAt);
   const bool there = distance(swage(seen), ahead) < 0.002f;
   if (there || tension > kTooTaut) free_ = feel(free_, tension);
@@ -397,7 +397,7 @@ bool Scripted::take_both(const Snapshot& seen) {
   const float free = length_between(seen, last_point_node(seen), seen.thread_order.size() - 1) -
                      (seen.suture_point.empty() ? 0 : distance(seen.suture_point.back().position, knot));
   const Pose goal = tying_pose(kDriver, thread);
-  const float tension = seen.thread_tension.empty() ? 0 : seen.thread_tension.back();
+  const float tension = needle_tension(seen);
   // Over the tissue first, then down beside the tail.
   const float up = stage_ == lay && waited_ < 0.8f ? 1.5f : 0.25f;
   carry_swage(seen, knot + normalized(way + Vec3{0, up, 0}) * (kTaut * free),

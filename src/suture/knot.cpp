@@ -15,15 +15,6 @@ namespace {
 constexpr float kTaut = 0.3f;      // [N] of a strand that draws its throw down
 constexpr float kFastest = 0.25f;  // [m/s] at which it does
 
-// [N] of the tighter of the two pairs at a particle.
-float tension_at(const Thread& t, uint32_t slot) {
-  const size_t node = static_cast<size_t>(std::find(t.order.begin(), t.order.end(), slot) - t.order.begin());
-  float most = 0;
-  if (node > 0) most = std::max(most, t.tension[node - 1]);
-  if (node < t.tension.size()) most = std::max(most, t.tension[node]);
-  return most;
-}
-
 constexpr float kDrawSpeed = 0.25f;  // [m/s] thread drawn through a locked knot, and particles drawn into it
 constexpr float kSnug = 0.00005f;    // [m] of slack that a snug stitch keeps
 constexpr int kNone = -1;
@@ -80,6 +71,7 @@ float thread_between(const Thread& t, size_t a, size_t b) {
   return sum;
 }
 
+// [N] of the tighter of the two pairs at a particle.
 float strand_tension(const Thread& t, uint32_t slot) {
   const size_t i = node_of(t, slot);
   float most = 0;
@@ -388,7 +380,8 @@ void tighten(const SolverModel& model, SolverState& solver, const SolverScratch&
     const float gone = distance(solver.body[knot.hand].x, knot.hand_from);
     float left = std::max(0.0f, length(knot.from) - gone);
     // A strand that is drawn taut brings the throw down however short the way of the hand.
-    if (tension_at(solver.thread, knot.strand) > kTaut) left = std::max(0.0f, std::min(left, knot.left - kFastest * model.h));
+    if (strand_tension(solver.thread, knot.strand) > kTaut)
+      left = std::max(0.0f, std::min(left, knot.left - kFastest * model.h));
     if (left < knot.left) {
       const float part = left / knot.left;
       for (ThreadAnchor& a : solver.thread.anchor)
