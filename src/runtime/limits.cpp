@@ -15,16 +15,15 @@ constexpr double kPaperOneBody = 76.2;  // [1/s] with 50 sutures in one body, dr
 
 class SutureWatch {
  public:
-  SutureWatch(LimitsResult& result, double settle, const std::function<void(const SutureCost&)>& on_row)
-      : result_(result), settle_(settle), on_row_(on_row) {}
+  SutureWatch(LimitsResult& result, const SceneSpec& scene, const std::function<void(const SutureCost&)>& on_row)
+      : result_(result), scene_(scene), on_row_(on_row) {}
 
   bool operator()(const Snapshot& seen, const StageTimes& times, double tick_ms) {
-    if (seen.time_s <= settle_) return true;
+    if (seen.time_s <= scene_.settle) return true;
     solver_ms_.push_back(static_cast<float>(times.solver_ms()));
     tick_ms_.push_back(static_cast<float>(tick_ms));
     contacts_ = std::max(contacts_, times.contacts);
-    const auto completed =
-        std::count_if(seen.event.begin(), seen.event.end(), [](const Event& e) { return e.kind == EventKind::bite_completed; });
+    const size_t completed = completed_in(seen);
     if (completed == 0) return true;
     SutureCost cost;
     cost.bites =
@@ -37,7 +36,7 @@ class SutureWatch {
     cost.tick_ms = spread_of(std::move(tick_ms_));
     cost.contacts = contacts_;
     cost.fps = cost.tick_ms.median > 0 ? 1000 / cost.tick_ms.median : 0;
-    for (auto k = completed; k > 0 && !result_.reached(); --k) {
+    for (size_t k = completed; k > 0 && !result_.reached(); --k) {
       cost.suture = static_cast<uint32_t>(result_.row.size()) + 1;
       result_.row.push_back(cost);
       if (on_row_) on_row_(cost);
@@ -48,9 +47,22 @@ class SutureWatch {
   }
 
  private:
+  // Single sutures are done with the last throw of their knot, a running one with every bite.
+  size_t completed_in(const Snapshot& seen) {
+    const bool single = scene_.technique.name == "lembert" || scene_.technique.name == "stay";
+    size_t completed = 0;
+    for (const Event& e : seen.event) {
+      if (e.kind == EventKind::suture_taken) throws_ = 0;
+      if (single && e.kind == EventKind::knot_locked) completed += ++throws_ == scene_.technique.throws;
+      if (!single && e.kind == EventKind::bite_completed) ++completed;
+    }
+    return completed;
+  }
+
   LimitsResult& result_;
-  const double settle_;  // [s]
+  const SceneSpec& scene_;
   const std::function<void(const SutureCost&)>& on_row_;
+  int throws_ = 0;  // of the suture in hand
   std::vector<float> solver_ms_, tick_ms_;
   uint32_t contacts_ = 0;
 };
@@ -71,7 +83,7 @@ LimitsResult measure_limits(SceneSpec scene, int sutures, int threads, const std
   SessionOptions options;
   options.threads = threads;
   SessionHooks own = hooks;
-  own.on_cost = SutureWatch(result, scene.settle, on_row);
+  own.on_cost = SutureWatch(result, scene, on_row);
   result.run = run_session(scene, options, own);
   return result;
 }

@@ -1,5 +1,6 @@
 // runtime: how many sutures a scene bears (paper 3.5, figures 20 to 23): what a tick costs while each further one is sewn. Runs
-// the scene with the scripted surgeon in lock step; one row per completed bite, which is a pair of suture points.
+// the scene with the scripted surgeon in lock step; one row per suture: a bite of a running thread, which is a pair of suture
+// points, or a single suture (techniques stay and lembert) with its knot.
 #pragma once
 #include <functional>
 #include <span>
