@@ -55,35 +55,72 @@ void solve_attachment(Attachment& a, Vec4* x, const float* w, const std::vector<
   push(m, b, -d, r);
 }
 
-static float inverse_mass_of(const TissuePin& pin, const float* w) {
-  return inverse_mass_of(pin.a, w) + inverse_mass_of(pin.b, w);
+namespace {
+
+// A pin as one sum over all the particles of its two points: their difference is sum(share * x), and a pull of 1 along it moves
+// particle k by move[k]. An even number, so that two sums run side by side.
+struct PinRow {
+  uint32_t count = 0;
+  float inv_mass = 0;  // [1/kg]
+  std::array<uint32_t, 2 * TissuePoint::kMost> particle{};
+  std::array<float, 2 * TissuePoint::kMost> share{}, move{};
+};
+
+PinRow row_of(const TissuePin& pin, const float* w) {
+  PinRow row;
+  const auto take = [&](const TissuePoint& t, float sign) {
+    for (uint32_t k = 0; k < t.count; ++k) {
+      uint32_t at = 0;
+      while (at < row.count && row.particle[at] != t.particle[k]) ++at;
+      if (at == row.count) row.particle[row.count++] = t.particle[k];
+      row.share[at] += sign * t.weight[k];
+    }
+  };
+  take(pin.a, 1);
+  take(pin.b, -1);
+  if (row.count % 2) row.particle[row.count] = row.particle[row.count - 1], ++row.count;  // with no share in it
+  for (uint32_t k = 0; k < row.count; ++k) {
+    row.move[k] = row.share[k] * w[row.particle[k]];
+    row.inv_mass += row.share[k] * row.move[k];
+  }
+  return row;
 }
 
-// wsum: of its points [1/kg]. room [m]: how much slack its rope has for certain, negative when it pulls. Returns the size of
-// its step [N s^2].
-static float solve_pin(TissuePin& pin, Vec4* x, const float* w, float wsum, float h, float& room) {
-  // More than the arithmetic rounds off in all the steps of a substep.
-  constexpr float kRounding = 5e-6f;
-  const Vec3 d = position_of(pin.a, x) - position_of(pin.b, x);
+// slack [m]: how much the rope has when this is done; 0 when it pulls. Returns the size of its step [N s^2].
+float solve_row(TissuePin& pin, Vec4* x, const uint32_t* particle, const float* share, const float* move, uint32_t count,
+                float inv_mass, float h, float& slack) {
+  Four even{}, odd{};
+  for (uint32_t k = 0; k < count; k += 2) {
+    even += load(x[particle[k]]) * share[k];
+    odd += load(x[particle[k + 1]]) * share[k + 1];
+  }
+  const Four sum = even + odd;
+  const Vec3 d{sum[0], sum[1], sum[2]};
   const float l = length(d);
   if (l <= pin.length && pin.lambda >= 0) {
-    room = pin.length - l - kRounding;
+    slack = pin.length - l;
     return 0;
   }
-  room = -1;
+  slack = 0;
   const Vec3 n = l > 1e-9f ? d / l : Vec3{0, 1, 0};
   const float alpha = pin.compliance / (h * h);
-  if (wsum + alpha <= 0) return 0;
-  const float step = std::min(-(l - pin.length + alpha * pin.lambda) / (wsum + alpha), -pin.lambda);
+  if (inv_mass + alpha <= 0) return 0;
+  const float step = std::min(-(l - pin.length + alpha * pin.lambda) / (inv_mass + alpha), -pin.lambda);
   pin.lambda += step;
-  push(pin.a, x, w, n * step);
-  push(pin.b, x, w, n * -step);
+  const Four push{n.x * step, n.y * step, n.z * step, 0};
+  for (uint32_t k = 0; k < count; ++k) {
+    Vec4& at = x[particle[k]];
+    store(at, load(at) + push * move[k]);
+  }
   return std::abs(step);
 }
 
+}  // namespace
+
 void solve_pin(TissuePin& pin, Vec4* x, const float* w, float h) {
-  float room = 0;
-  solve_pin(pin, x, w, inverse_mass_of(pin, w), h, room);
+  const PinRow row = row_of(pin, w);
+  float slack = 0;
+  solve_row(pin, x, row.particle.data(), row.share.data(), row.move.data(), row.count, row.inv_mass, h, slack);
 }
 
 static bool same(const TissuePoint& a, const TissuePoint& b) {
@@ -98,42 +135,45 @@ void weave(std::span<const TissuePin> pin, const float* w, uint32_t particles, P
   if (still) return;
   web.point.clear();
   web.inv_mass.clear();
+  web.particle.clear();
+  web.share.clear();
+  web.move.clear();
+  web.row.assign(1, 0);
   for (const TissuePin& p : pin) {
     web.point.push_back(p.a);
     web.point.push_back(p.b);
-    web.inv_mass.push_back(inverse_mass_of(p, w));
+    const PinRow row = row_of(p, w);
+    web.particle.insert(web.particle.end(), row.particle.begin(), row.particle.begin() + row.count);
+    web.share.insert(web.share.end(), row.share.begin(), row.share.begin() + row.count);
+    web.move.insert(web.move.end(), row.move.begin(), row.move.begin() + row.count);
+    web.row.push_back(static_cast<uint32_t>(web.particle.size()));
+    web.inv_mass.push_back(row.inv_mass);
   }
 
-  // Every particle's row: the pins that it is part of, and its weight there.
-  const auto each = [&](auto&& of) {
-    for (uint32_t k = 0; k < web.point.size(); ++k)
-      for (uint32_t m = 0; m < web.point[k].count; ++m) of(k / 2, web.point[k].particle[m], std::abs(web.point[k].weight[m]));
-  };
+  // By particle: the pins that it is part of, and its share there.
   web.start.assign(particles + 2, 0);
-  each([&](uint32_t, uint32_t particle, float) { ++web.start[particle + 2]; });
+  for (const uint32_t k : web.particle) ++web.start[k + 2];
   for (size_t i = 1; i < web.start.size(); ++i) web.start[i] += web.start[i - 1];
-  web.pin.resize(web.start.back());
-  web.weight.resize(web.start.back());
-  each([&](uint32_t i, uint32_t particle, float weight) {  // start[particle + 1] runs through its row to where the next begins
-    const uint32_t at = web.start[particle + 1]++;
-    web.pin[at] = i;
-    web.weight[at] = weight;
-  });
+  web.pin.resize(web.particle.size());
+  web.weight.resize(web.particle.size());
+  for (uint32_t i = 0; i < pin.size(); ++i)
+    for (uint32_t k = web.row[i]; k < web.row[i + 1]; ++k) {
+      const uint32_t at = web.start[web.particle[k] + 1]++;  // runs through its part to where the next begins
+      web.pin[at] = i;
+      web.weight[at] = std::abs(web.share[k]);
+    }
 
   web.first.assign(1, 0);
   web.other.clear();
   web.by_pin.assign(pin.size(), 0);
   for (uint32_t i = 0; i < pin.size(); ++i) {
-    for (const TissuePoint* p : {&pin[i].a, &pin[i].b})
-      for (uint32_t m = 0; m < p->count; ++m) {
-        const uint32_t particle = p->particle[m];
-        for (uint32_t r = web.start[particle]; r < web.start[particle + 1]; ++r) {
-          const uint32_t j = web.pin[r];
-          if (j == i) continue;
-          if (web.by_pin[j] == 0) web.other.push_back({j, 0});
-          // A pinned particle couples nothing, but a row is listed once.
-          web.by_pin[j] += std::max(1e-20f, w[particle] * std::abs(p->weight[m]) * web.weight[r]);
-        }
+    for (uint32_t k = web.row[i]; k < web.row[i + 1]; ++k)
+      for (uint32_t r = web.start[web.particle[k]]; r < web.start[web.particle[k] + 1]; ++r) {
+        const uint32_t j = web.pin[r];
+        if (j == i) continue;
+        if (web.by_pin[j] == 0) web.other.push_back({j, 0});
+        // A pinned particle couples nothing, but a pin is listed once.
+        web.by_pin[j] += std::max(1e-20f, std::abs(web.move[k]) * web.weight[r]);
       }
     for (size_t r = web.first.back(); r < web.other.size(); ++r) {
       constexpr float kMore = 1.01f;  // than the sum, which is rounded
@@ -144,8 +184,10 @@ void weave(std::span<const TissuePin> pin, const float* w, uint32_t particles, P
   }
 }
 
-void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, const float* w, float h, int sweeps,
+void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, const float* w, float h, int sweeps, float tolerance,
                 std::vector<float>& room) {
+  // More than the arithmetic rounds off in all the steps of a substep.
+  constexpr float kRounding = 5e-6f;
   if (web.first.size() != pin.size() + 1) {
     for (int sweep = 0; sweep < sweeps; ++sweep)
       for (TissuePin& p : pin) solve_pin(p, x, w, h);
@@ -155,7 +197,11 @@ void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, const floa
   for (int sweep = 0; sweep < sweeps; ++sweep)
     for (size_t i = 0; i < pin.size(); ++i) {
       if (room[i] >= 0) continue;
-      const float step = solve_pin(pin[i], x, w, web.inv_mass[i], h, room[i]);
+      const uint32_t at = web.row[i];
+      float slack = 0;
+      const float step = solve_row(pin[i], x, &web.particle[at], &web.share[at], &web.move[at], web.row[i + 1] - at,
+                                   web.inv_mass[i], h, slack);
+      room[i] = slack + tolerance - kRounding;
       if (step == 0) continue;
       for (uint32_t r = web.first[i]; r < web.first[i + 1]; ++r) room[web.other[r].pin] -= step * web.other[r].coupling;
     }

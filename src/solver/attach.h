@@ -103,18 +103,22 @@ struct PinWeb {
   };
   std::vector<uint32_t> first;  // pin i shares particles with other[first[i]] .. other[first[i + 1]], itself left out
   std::vector<Strand> other;
-  std::vector<float> inv_mass;     // [1/kg] of a pin's two points together
   std::vector<TissuePoint> point;  // of all pins, as they were when the web was made
+  // Pin i as one sum over the particles of both its points, row[i] .. row[i + 1]: see PinRow in attach.cpp.
+  std::vector<uint32_t> row, particle;
+  std::vector<float> share, move;
+  std::vector<float> inv_mass;  // [1/kg] of a pin
   // Working memory of weave: pins by particle and their weights there, couplings by pin.
   std::vector<uint32_t> start, pin;
   std::vector<float> weight, by_pin;
 };
 // Makes the web anew if the pins' points have changed. w: inverse mass [1/kg] of the particles, which never changes.
 void weave(std::span<const TissuePin> pin, const float* w, uint32_t particles, PinWeb& web);
-// `sweeps` times solve_pin of each pin in turn, to the last bit, but without looking at those of which it is known that they do
-// nothing. Settled stitches are slack nearly always, and a long procedure has hundreds of them. web: of these pins; one of
-// another number of pins is taken for none, and every pin is looked at. room: working memory.
-void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, const float* w, float h, int sweeps,
+// `sweeps` times solve_pin of each pin in turn, but without looking at those that their neighbours have moved by no more than
+// `tolerance` [m] since they were last as they should be; with 0 that is the same to the last bit. Settled stitches are slack
+// nearly always, and a long procedure has hundreds of them. web: of these pins; one of another number of pins is taken for
+// none, and every pin is looked at. room: working memory.
+void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, const float* w, float h, int sweeps, float tolerance,
                 std::vector<float>& room);
 void solve_channel(ChannelPoint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model, RigidBody& needle,
                    float h);

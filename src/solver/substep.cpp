@@ -155,7 +155,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   {
     StageTimer timer(times, Stage::attach);
     for (Attachment& a : s.attach) solve_attachment(a, x, w, m.body, s.body, h);
-    solve_pins(s.pin, k.web, x, w, h, m.pin_sweeps, k.room);
+    solve_pins(s.pin, k.web, x, w, h, m.pin_sweeps, m.pin_tolerance, k.room);
   }
   {
     // Few but stiff and pulling against each other (hand, grasp, channel): they get sweeps of their own.

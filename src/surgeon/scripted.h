@@ -158,7 +158,7 @@ class Scripted final : public Surgeon {
   float lean_ = 0;   // of the strand that leaves the driver, toward its tip
   float floor_ = 0;  // [m] height below which the needle would meet tissue
   float free_ = 0;   // [m] of strand between driver and needle, as it is felt
-  size_t knots_before_ = 0, cuts_before_ = 0, settled_before_ = 0;
+  size_t cuts_before_ = 0, settled_before_ = 0;
   uint32_t throws_before_ = 0, take_slot_ = 0;
   Quat take_turn_;
   Vec3 tried_;

@@ -81,6 +81,12 @@ size_t node_along(const Snapshot& seen, size_t from, float far, int way) {
   return at;
 }
 
+uint32_t locked_throws(const Snapshot& seen) {
+  uint32_t sum = 0;
+  for (const KnotView& k : seen.knot) sum += k.throws - (k.phase != KnotPhase::locked && k.throws > 0);
+  return sum;
+}
+
 float needle_tension(const Snapshot& seen) { return seen.thread_tension.empty() ? 0 : seen.thread_tension.back(); }
 
 size_t first_point_node(const Snapshot& seen) {

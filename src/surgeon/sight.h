@@ -29,6 +29,7 @@ float length_between(const Snapshot& seen, size_t a, size_t b);
 size_t node_along(const Snapshot& seen, size_t from, float far, int way);
 // [N] in the thread's last pair, at the needle: what a hand that holds the needle feels of its strand.
 float needle_tension(const Snapshot& seen);
+uint32_t locked_throws(const Snapshot& seen);  // of all knots of the suture in hand; not those that are not yet set
 // The first and the last suture point's nodes; both 0 when there is none.
 size_t first_point_node(const Snapshot& seen);
 size_t last_point_node(const Snapshot& seen);

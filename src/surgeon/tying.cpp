@@ -159,8 +159,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
                          std::max(0.025f, reach_ - (own_strand ? kLeastFreeForOwn : kLeastFree)));
     wound_ = kBefore;
     lean_ = kLean;
-    throws_before_ = seen.knot.empty() ? 0 : seen.knot.back().throws;
-    knots_before_ = seen.knot.size();
+    throws_before_ = locked_throws(seen);
   }
   // Across the driver: e1 away from the tissue, e2 to its side.
   const Vec3 z = rotate(tying_pose(kDriver, {}).q, {0, 0, 1}), e1 = normalized(Vec3{0, 1, 0} - z * z.y), e2 = cross(z, e1);
@@ -250,8 +249,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       return false;
     }
     case tighten: {
-      const bool locked = seen.knot.size() > 0 && seen.knot.back().phase == KnotPhase::locked &&
-                          (seen.knot.size() > knots_before_ || seen.knot.back().throws > throws_before_);
+      const bool locked = locked_throws(seen) > throws_before_;
       // The strands are drawn apart, low and even.
       auto gently = [&](size_t hand) {
         return 0.6f * skill_.speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.03f, 1.0f);

@@ -9,11 +9,22 @@ namespace catgut {
 namespace {
 
 constexpr float kLongestTail = 0.03f;  // [m] of a strand that was left uncut: an assistant trims it here
+constexpr float kCarries = 0.1f;       // [N] less than this in the thread inside a wall, and the wall holds itself
 
 int anchor_at(const Thread& t, uint32_t slot) {
   for (size_t k = 0; k < t.anchor.size(); ++k)
     if (t.anchor[k].slot == slot) return static_cast<int>(k);
   return -1;
+}
+
+// Whether anchors a and b are where the thread goes into and comes out of one bite.
+bool same_bite(const SutureState& state, int a, int b) {
+  const auto point_at = [&](int anchor) {
+    return std::find_if(state.point.begin(), state.point.end(),
+                        [&](const SuturePoint& p) { return static_cast<int>(p.anchor) == anchor; });
+  };
+  const auto in = point_at(a), out = point_at(b);
+  return in != state.point.end() && out != state.point.end() && in->bite == out->bite;
 }
 
 // A place bound to the nearest tissue particle, in the frame of that particle's cluster.
@@ -43,11 +54,12 @@ void settle_piece(const SolverModel& model, SolverState& solver, SutureState& st
   tail = 0;
   while (highest < last && tail + t.rest[highest] <= kLongestTail) tail += t.rest[highest++];
   int before = -1;
-  float length = 0;
+  float length = 0, tension = 0;
   for (size_t i = lowest; i <= highest; ++i) {
     stitch.node.push_back(bind(model, solver, thread_position(t, i, solver.x.data(), solver.body)));
     if (const int here = anchor_at(t, t.order[i]); here >= 0) {
-      if (before >= 0) {
+      // The passage through a wall holds nothing together but the wall: as long as it carries nothing, no pin is needed.
+      if (before >= 0 && !(same_bite(state, before, here) && tension < kCarries)) {
         TissuePin pin;
         pin.a = t.anchor[static_cast<size_t>(before)].point;
         pin.b = t.anchor[static_cast<size_t>(here)].point;
@@ -57,9 +69,9 @@ void settle_piece(const SolverModel& model, SolverState& solver, SutureState& st
         solver.pin.push_back(pin);
       }
       before = here;
-      length = 0;
+      length = tension = 0;
     }
-    if (i < highest) length += t.rest[i];
+    if (i < highest) length += t.rest[i], tension = std::max(tension, t.tension[i]);
   }
   Vec3 where{};
   for (uint32_t k : knots) {
