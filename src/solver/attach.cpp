@@ -202,7 +202,7 @@ void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, const floa
       const float step = solve_row(pin[i], x, &web.particle[at], &web.share[at], &web.move[at], web.row[i + 1] - at,
                                    web.inv_mass[i], h, slack);
       room[i] = slack + tolerance - kRounding;
-      if (step == 0) continue;
+      if (step == 0 || sweep + 1 == sweeps) continue;
       for (uint32_t r = web.first[i]; r < web.first[i + 1]; ++r) room[web.other[r].pin] -= step * web.other[r].coupling;
     }
 }

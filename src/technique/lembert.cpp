@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "technique/common.h"
 
@@ -35,11 +36,33 @@ Ring ring_of(const LembertModel& model, const Vec4* x) {
   return ring;
 }
 
-void add_pair(const LembertModel& model, LembertState& state, const Vec4* x, uint32_t a, uint32_t b, LembertRow row,
-              uint32_t midpoint, ClosurePlan& plan) {
-  const float apart = distance(xyz(x[a]), xyz(x[b]));
+// The place nearest to p on the line through a group's particles, the nearer of its two particles first.
+TissuePoint on_ring(std::span<const uint32_t> group, const Vec4* x, Vec3 p) {
+  const size_t n = group.size();
+  float best = std::numeric_limits<float>::max(), at = 0;
+  size_t found = 0;
+  for (size_t k = 0; k < n; ++k) {
+    const Vec3 from = xyz(x[group[k]]), way = xyz(x[group[(k + 1) % n]]) - from;
+    const float t = std::clamp(dot(p - from, way) / std::max(length2(way), 1e-12f), 0.0f, 1.0f),
+                d = length2(from + way * t - p);
+    if (d < best) best = d, found = k, at = t;
+  }
+  const uint32_t one = group[found], next = group[(found + 1) % n];
+  TissuePoint point = particle_point(at > 0.5f ? next : one);
+  const float rest = std::min(at, 1 - at);
+  if (rest < 0.01f) return point;
+  point.count = 2;
+  point.particle[1] = at > 0.5f ? one : next;
+  point.weight[0] = 1 - rest;
+  point.weight[1] = rest;
+  return point;
+}
+
+void add_pair(const LembertModel& model, LembertState& state, const Vec4* x, const TissuePoint& a, const TissuePoint& b,
+              LembertRow row, uint32_t midpoint, ClosurePlan& plan) {
+  const float apart = distance(position_of(a, x), position_of(b, x));
   plan.compliance = model.compliance;
-  plan.pair.push_back({particle_point(a), particle_point(b), apart, std::min(apart, model.gap), 0, midpoint});
+  plan.pair.push_back({a, b, apart, std::min(apart, model.gap), 0, midpoint});
   state.row.push_back(row);
 }
 
@@ -58,23 +81,29 @@ void pair_between(const LembertModel& model, LembertState& state, const Techniqu
   };
   for (uint32_t i : model.outer)
     if (is_between(v1, v2, xyz(x[i]) - ring.centre, ring.axis) && !taken(i))
-      add_pair(model, state, x, i, nearest_of(model.inner, x, xyz(x[i])), {one, other, 0}, 0, plan);
+      add_pair(model, state, x, particle_point(i), particle_point(nearest_of(model.inner, x, xyz(x[i]))), {one, other, 0}, 0,
+               plan);
   for (uint32_t i : model.inner)
     if (is_between(v1, v2, xyz(x[i]) - ring.centre, ring.axis) && !taken(i))
-      add_pair(model, state, x, nearest_of(model.outer, x, xyz(x[i])), i, {one, other, 0}, 0, plan);
+      add_pair(model, state, x, particle_point(nearest_of(model.outer, x, xyz(x[i]))), particle_point(i), {one, other, 0}, 0,
+               plan);
 }
 
 // "The closest particle in pg_i and pg_o is found and they are pulled to their midpoint when a knot is tied. When a subsequent
-// suture point is placed, particles in pg_i and pg_o between the two suture points are pulled together."
+// suture point is placed, particles in pg_i and pg_o between the two suture points are pulled together." On the inner side we
+// take the place between two particles, and where the outer particle is drawn already, the stitch holds that pair: stitches
+// closer to each other than particles would draw one particle to several places.
 void tie(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan) {
   Vec3 at{};
   for (const StitchPoint& p : view.point) at += p.at;
   at = at / static_cast<float>(view.point.size());
   const Ring ring = ring_of(model, view.x);
-  const uint32_t stitch = static_cast<uint32_t>(state.stitch.size());
-  state.stitch.push_back({static_cast<uint32_t>(plan.pair.size()), view.taken, 1});
-  add_pair(model, state, view.x, nearest_of(model.outer, view.x, at), nearest_of(model.inner, view.x, at), {stitch, stitch, 0},
-           1, plan);
+  const uint32_t stitch = static_cast<uint32_t>(state.stitch.size()), nearest = nearest_of(model.outer, view.x, at);
+  const auto drawn =
+      std::find_if(plan.pair.begin(), plan.pair.end(), [&](const ClosurePlan::Pair& p) { return p.a.particle[0] == nearest; });
+  state.stitch.push_back({static_cast<uint32_t>(drawn - plan.pair.begin()), view.taken, 1});
+  if (drawn != plan.pair.end()) drawn->midpoint = 1;
+  else add_pair(model, state, view.x, particle_point(nearest), on_ring(model.inner, view.x, at), {stitch, stitch, 0}, 1, plan);
   // The nearest stitch each way round.
   for (const float way : {1.0f, -1.0f}) {
     float least = model.widest;
@@ -135,7 +164,9 @@ void lembert(const LembertModel& model, LembertState& state, const TechniqueView
 
   for (uint32_t r = 0; r < state.row.size(); ++r) {
     LembertRow& row = state.row[r];
-    const bool holds = state.stitch[row.one].holds && state.stitch[row.other].holds;
+    const bool holds =
+        (state.stitch[row.one].holds && state.stitch[row.other].holds) ||
+        std::any_of(state.stitch.begin(), state.stitch.end(), [&](const LembertStitch& s) { return s.row == r && s.holds; });
     advance(plan.pair[r].progress, holds ? 1.0f : 0.0f, model.fastest, view.dt);
     tell_closed(r, plan.pair[r], view.x, row.told, events);
   }

@@ -21,13 +21,13 @@ struct LembertModel {
 
 // A tied stitch.
 struct LembertStitch {
-  uint32_t row = 0;     // of the plan: its own pair
+  uint32_t row = 0;     // of the plan: its pair, which a neighbour nearer than the next particle shares
   uint32_t suture = 0;  // sutures settled before it
   uint32_t holds = 1;   // 0: it had too few throws, or was cut through
 };
 // What the technique remembers of a row of ClosurePlan::pair.
 struct LembertRow {
-  uint32_t one = 0, other = 0;  // the stitches that it hangs on: it is closed while both hold
+  uint32_t one = 0, other = 0;  // the stitches between which it lies: it is closed while both hold, or one whose pair it is
   uint32_t told = 0;            // 1: seam_closed was said
 };
 

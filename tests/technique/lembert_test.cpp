@@ -42,6 +42,10 @@ struct TwoRings : StitchRig {
     tick();
   }
   float degrees_of(uint32_t i) const { return std::atan2(-x[i].z, x[i].x) / kDegree; }
+  float degrees_of(const TissuePoint& p) const {
+    const Vec3 at = position_of(p, x.data());
+    return std::atan2(-at.z, at.x) / kDegree;
+  }
   std::vector<uint32_t> in_pairs(const std::vector<uint32_t>& group) const {
     std::vector<uint32_t> found;
     for (uint32_t i : group)
@@ -124,8 +128,8 @@ TEST(Lembert, nothing_closes_before_the_knot_locks) {
   t.lock();
   t.tick();
   ASSERT_EQ(t.plan.pair.size(), 1u);
-  EXPECT_NEAR(t.degrees_of(t.plan.pair[0].a.particle[0]), 40, 4);
-  EXPECT_NEAR(t.degrees_of(t.plan.pair[0].b.particle[0]), 40, 6);
+  EXPECT_NEAR(t.degrees_of(t.plan.pair[0].a), 40, 4);
+  EXPECT_NEAR(t.degrees_of(t.plan.pair[0].b), 40, 1) << "between particles too, which are 10 degrees apart";
   float before = t.plan.pair[0].progress;
   for (int i = 0; i < 120; ++i) {
     t.tick();
@@ -136,6 +140,31 @@ TEST(Lembert, nothing_closes_before_the_knot_locks) {
   EXPECT_FLOAT_EQ(before, 1);
   EXPECT_NEAR(t.gap(0), t.model.gap, 1e-6f);
   EXPECT_EQ(t.count(EventKind::seam_closed), 1u);
+}
+
+// Stitches closer together than particles: none draws a particle to a second place, and each is held where it is.
+TEST(Lembert, stitches_closer_than_particles_share_their_pairs) {
+  TwoRings t;
+  for (int k = 0; k < 8; ++k) t.suture(40 + 2.5f * static_cast<float>(k));
+  std::set<uint32_t> outer;
+  for (const ClosurePlan::Pair& p : t.plan.pair) EXPECT_TRUE(outer.insert(p.a.particle[0]).second);
+  EXPECT_LT(t.plan.pair.size(), 6u) << "four particles of the outer ring, 6.4 degrees apart";
+  for (uint32_t k = 0; k < 8; ++k) {
+    const float at = 40 + 2.5f * static_cast<float>(k);
+    EXPECT_NEAR(t.degrees_of(t.plan.pair[t.state.stitch[k].row].a), at, 3.3f);
+    EXPECT_NEAR(t.degrees_of(t.plan.pair[t.state.stitch[k].row].b), at, 6.5f);
+  }
+  // A shared pair opens when the last of its stitches lets go, not before.
+  const uint32_t row = t.state.stitch[1].row;
+  ASSERT_EQ(t.state.stitch[2].row, row);
+  t.tick(100);
+  t.state.stitch[1].holds = 0;
+  t.tick(200);
+  EXPECT_FLOAT_EQ(t.plan.pair[row].progress, 1);
+  for (LembertStitch& s : t.state.stitch)
+    if (s.row == row) s.holds = 0;
+  t.tick(200);
+  EXPECT_FLOAT_EQ(t.plan.pair[row].progress, 0);
 }
 
 // "If multiple Lembert sutures are made close together, the bowel's flesh between the two sutures should also be pulled

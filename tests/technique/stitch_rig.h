@@ -64,12 +64,12 @@ struct StitchRig {
   // Tissue that follows the plan at once: each pair moves toward its own middle.
   void follow() {
     for (const ClosurePlan::Pair& p : plan.pair) {
-      Vec4 &a = x[p.a.particle[0]], &b = x[p.b.particle[0]];
-      const Vec3 middle = 0.5f * (xyz(a) + xyz(b)), apart = xyz(b) - xyz(a);
+      const Vec3 apart = position_of(p.b, x.data()) - position_of(p.a, x.data());
       const float want = p.start + p.progress * (p.end - p.start), l = length(apart);
       if (l <= want || l == 0) continue;
-      set(a, middle - apart * (0.5f * want / l));
-      set(b, middle + apart * (0.5f * want / l));
+      const Vec3 way = apart * (0.5f * (l - want) / l);
+      for (uint32_t k = 0; k < p.a.count; ++k) add(x[p.a.particle[k]], way);
+      for (uint32_t k = 0; k < p.b.count; ++k) add(x[p.b.particle[k]], -way);
     }
   }
   size_t count(EventKind kind) const {
