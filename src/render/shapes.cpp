@@ -1,4 +1,4 @@
-// render/shapes: the building blocks; see shapes.h. Tools, needle and cloth are in instruments.cpp.
+// render/shapes: the building blocks; see shapes.h. Tools and needle are in instruments.cpp, what lies about them in cloth.cpp.
 #include "render/shapes.h"
 
 namespace catgut {

@@ -23,8 +23,12 @@ float smooth_step(float a, float b, float x) {
 // Radiance from direction d, in units of the environment's intensity.
 Vec3 radiance(Vec3 d) {
   // Walls: pale above the horizon, the drape's green from below.
-  const Vec3 ceiling{0.70f, 0.74f, 0.78f}, wall{0.62f, 0.66f, 0.68f}, floor{0.11f, 0.24f, 0.20f};
-  Vec3 c = d.y > 0 ? lerp(wall, ceiling, d.y) : lerp(wall * 0.6f, floor, smooth_step(0, 0.35f, -d.y));
+  const Vec3 ceiling{0.70f, 0.74f, 0.78f}, wall{0.62f, 0.66f, 0.68f}, floor{0.30f, 0.36f, 0.35f};
+  // Gowned people stand about the table: a dim band with gaps, at the height that instruments mirror.
+  const float people = smooth_step(-0.15f, 0.05f, d.y) * (1 - smooth_step(0.25f, 0.45f, d.y)) *
+                       smooth_step(-0.2f, 0.5f, std::sin(5 * std::atan2(d.x, d.z) + 0.6f));
+  Vec3 c = d.y > 0 ? lerp(wall, ceiling, d.y) : lerp(wall * 0.75f, floor, smooth_step(0, 0.45f, -d.y));
+  c = lerp(c, {0.26f, 0.36f, 0.38f}, 0.6f * people);
   // The main lamp's cluster of round heads, and a satellite.
   const auto head = [&](Vec3 middle, float radius, float glow, Vec3 tint) {
     const float away = std::acos(std::clamp(dot(d, normalized(middle)), -1.0f, 1.0f));
@@ -33,9 +37,9 @@ Vec3 radiance(Vec3 d) {
   const Vec3 warm{1.0f, 0.96f, 0.90f}, cool{0.92f, 0.97f, 1.0f};
   for (int i = 0; i < 6; ++i) {
     const float a = 2 * kPi * float(i) / 6;
-    head({0.25f + 0.24f * std::cos(a), 1, 0.30f + 0.24f * std::sin(a)}, 0.105f, 13, warm);
+    head({0.30f + 0.27f * std::cos(a), 1, 0.50f + 0.27f * std::sin(a)}, 0.075f, 13, warm);
   }
-  head({0.25f, 1, 0.30f}, 0.105f, 13, warm);
+  head({0.30f, 1, 0.50f}, 0.075f, 13, warm);
   head({-0.95f, 0.8f, -0.5f}, 0.20f, 6, cool);
   // A light panel along the wall behind the surgeon: the long highlight on instruments.
   if (d.z > 0.3f && std::abs(d.y / d.z - 0.55f) < 0.10f && std::abs(d.x / d.z) < 0.9f) c += cool * 3.0f;
