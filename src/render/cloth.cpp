@@ -80,22 +80,26 @@ void add_grid(Shape& shape, int rows, int columns, float repeat, const std::func
 
 }  // namespace
 
-float hole_radius(float hole, float angle) { return hole * (1.10f + 0.10f * std::cos(2 * angle - 0.5f) + 0.015f * std::sin(5 * angle)); }
+float hole_radius(float hole, float angle) {
+  return hole * (1.10f + 0.10f * std::cos(2 * angle - 0.5f) + 0.015f * std::sin(5 * angle));
+}
 
 Shape drape_shape(Vec3 centre, float hole, float size) {
   const auto place = [&](float s, float t) {
     const float a = 2 * kPi * t, edge = hole > 0 ? hole_radius(hole, a) : 0, r = edge + (size - edge) * s * (0.04f + 0.96f * s);
     const float x = r * std::cos(a), z = -r * std::sin(a), in = r - edge;
-    // Folds only go down: what lies on the drape in the physics lies on its highest level. The edge is a soft roll round the hole.
+    // Folds only go down: what lies on the drape in the physics lies on its highest level. The edge is a soft roll round the
+    // hole.
     const float roll = hole > 0 ? 2.6f * mm * std::exp(-in * in / (0.004f * 0.004f)) : 0;
     const float out = hole > 0 ? std::clamp((in - 0.004f) / 0.03f, 0.0f, 1.0f) : 1;
-    const float y = roll + out * (1.6f * mm * (cloth_height(x, z) - 1.4f) + 5.5f * mm * folds(x, z)) -
-                    0.05f * std::max(0.0f, in - 0.06f);
+    const float y =
+        roll + out * (1.6f * mm * (cloth_height(x, z) - 1.4f) + 5.5f * mm * folds(x, z)) - 0.05f * std::max(0.0f, in - 0.06f);
     return centre + Vec3{x, y, z};
   };
   Shape shape;
-  add_grid(shape, 72, 128, 0.01f, place, [&](Vec3 p) {
-    const float x = p.x - centre.x, z = p.z - centre.z, r = std::hypot(x, z), edge = hole > 0 ? hole_radius(hole, std::atan2(-z, x)) : -1;
+  add_grid(shape, 48, 96, 0.01f, place, [&](Vec3 p) {
+    const float x = p.x - centre.x, z = p.z - centre.z, r = std::hypot(x, z),
+                edge = hole > 0 ? hole_radius(hole, std::atan2(-z, x)) : -1;
     // Worn and damp near the wound, never quite even elsewhere.
     const float dry = std::clamp((r - edge) / 0.02f, 0.0f, 1.0f), wear = 0.04f * cloth_height(0.6f * x + 0.2f, 0.7f * z);
     return lerp(srgb(48, 116, 114), srgb(66, 138, 134), dry) * (1 + wear);
@@ -109,13 +113,14 @@ Shape wound_bed_shape(Vec3 centre, float radius) {
     return 2.6f * mm * std::sqrt(big) + 0.7f * mm * std::sqrt(small);
   };
   const auto place = [&](float s, float t) {
-    const float a = 2 * kPi * t, r = hole_radius(radius, a) * s, x = r * std::cos(a), z = -r * std::sin(a);
+    const float a = 2 * kPi * t, r = hole_radius(radius, a) * (0.45f + 0.55f * s), x = r * std::cos(a), z = -r * std::sin(a);
     return centre + Vec3{x, height(x, z) - 2.5f * mm, z};
   };
   Shape shape;
-  add_grid(shape, 64, 160, 0.04f, place, [&](Vec3 p) {
+  add_grid(shape, 30, 110, 0.04f, place, [&](Vec3 p) {
     const float x = p.x - centre.x, z = p.z - centre.z;
-    const float top = std::sqrt(lobules(x, z, 7.5f * mm)), blush = std::clamp(0.45f + 0.4f * cloth_height(1.7f * x, 1.9f * z + 0.1f), 0.0f, 1.0f);
+    const float top = std::sqrt(lobules(x, z, 7.5f * mm)),
+                blush = std::clamp(0.45f + 0.4f * cloth_height(1.7f * x, 1.9f * z + 0.1f), 0.0f, 1.0f);
     const Vec3 fat = lerp(srgb(248, 218, 146), srgb(238, 182, 128), blush);
     return lerp(srgb(186, 84, 62), fat, 0.3f + 0.7f * top);
   });
@@ -148,7 +153,7 @@ Shape swab_shape(std::span<const Vec3> body, Vec3 away, float ground) {
     return h;
   };
   const auto place = [&](float s, float t) {
-    const float across = 0.044f * (2 * t - 1), lap = 0.0025f * std::sin(160 * across) + 0.0006f * std::sin(410 * across + 1);
+    const float across = 0.044f * (2 * t - 1), lap = 0.0016f * std::sin(120 * across);
     const float from = end - 0.022f + lap, to = end + 0.030f, along = from + (to - from) * s;
     const float past = std::max(0.0f, along - (end + 0.002f));
     float h = lie(across) - 2.6f * past;
@@ -161,8 +166,9 @@ Shape swab_shape(std::span<const Vec3> body, Vec3 away, float ground) {
     return away * along + side * (middle + across) + Vec3{0, h, 0};
   };
   Shape shape;
-  add_grid(shape, 64, 96, 0.01f, place, [&](Vec3 p) {
-    const float in = dot(p, away) - (end - 0.022f), blood = std::clamp(cloth_height(2.2f * p.x, 2.5f * p.z) - 0.25f, 0.0f, 1.0f);
+  add_grid(shape, 40, 72, 0.01f, place, [&](Vec3 p) {
+    const float in = dot(p, away) - (end - 0.022f),
+                blood = std::clamp(cloth_height(2.2f * p.x, 2.5f * p.z) - 0.25f, 0.0f, 1.0f);
     return lerp(srgb(226, 226, 214), srgb(196, 96, 84), 0.75f * blood * std::exp(-std::max(0.0f, in) / 0.014f));
   });
   return shape;
@@ -174,11 +180,12 @@ Shape cushion_shape(Vec3 middle, Vec3 away, float from, float to, float top, flo
     const float across = 0.022f * (2 * t - 1), along = from + (to - from) * s;
     const float a = across / 0.021f, end = std::clamp(std::min(s, 1 - s) * (to - from) / 0.006f, 0.0f, 1.0f);
     const float round = std::sqrt(std::max(0.0f, 1 - a * a)) * std::sqrt(end * (2 - end));
-    const float h = ground + (top - ground) * std::pow(round, 0.5f) + 0.5f * mm * std::sin(430 * along + 3 * std::sin(200 * across)) * round;
+    const float h = ground + (top - ground) * std::pow(round, 0.5f) +
+                    0.5f * mm * std::sin(430 * along + 3 * std::sin(200 * across)) * round;
     return Vec3{middle.x, 0, middle.z} + away * along + side * across + Vec3{0, h, 0};
   };
   Shape shape;
-  add_grid(shape, 48, 40, 0.01f, place, [&](Vec3 p) {
+  add_grid(shape, 24, 28, 0.01f, place, [&](Vec3 p) {
     const float blood = std::clamp(cloth_height(1.9f * p.x + 0.2f, 2.1f * p.z) - 0.45f, 0.0f, 1.0f);
     return lerp(srgb(220, 220, 206), srgb(190, 90, 78), 0.6f * blood);
   });

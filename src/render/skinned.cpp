@@ -3,14 +3,31 @@
 
 namespace catgut {
 
+namespace {
+
+constexpr float kStill = 3e-6f;        // [m] a twentieth of a pixel from near by
+constexpr float kStillTurn = 0.0005f;  // of a quaternion: 1 mrad, which moves a vertex by as much
+
+bool still(Quat a, Quat b) {
+  return std::abs(a.x - b.x) + std::abs(a.y - b.y) + std::abs(a.z - b.z) + std::abs(a.w - b.w) < kStillTurn;
+}
+
+}  // namespace
+
 void find_motion(std::span<const Vec3> particle_rest, std::span<const Vec3> particle, std::span<const Quat> rotation,
-                 std::vector<Motion>& motion) {
-  motion.resize(particle_rest.size());
+                 Motions& motion) {
+  const bool first = motion.of.size() != particle_rest.size();
+  motion.of.resize(particle_rest.size());
+  motion.moved.resize(particle_rest.size());
+  motion.seen.resize(particle_rest.size());
   for (size_t i = 0; i < particle_rest.size(); ++i) {
     const Quat q = rotation[i];
+    motion.moved[i] = first || !(length2(particle[i] - motion.seen[i]) < kStill * kStill && still(q, motion.of[i].q));
+    if (!motion.moved[i]) continue;
+    motion.seen[i] = particle[i];
     const Vec3 x = rotate(q, {1, 0, 0}), y = rotate(q, {0, 1, 0}), z = rotate(q, {0, 0, 1});
     const Vec3 p = particle_rest[i], shift = particle[i] - (x * p.x + y * p.y + z * p.z);
-    motion[i] = {{x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z, shift.x, shift.y, shift.z}, q};
+    motion.of[i] = {{x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z, shift.x, shift.y, shift.z}, q};
   }
 }
 

@@ -16,8 +16,13 @@ struct alignas(64) Motion {
   float m[12];
   Quat q;
 };
+struct Motions {
+  std::vector<Motion> of;
+  std::vector<uint8_t> moved;  // since the picture before; by less than can be seen counts as not at all
+  std::vector<Vec3> seen;      // [m] where each was when it last moved
+};
 void find_motion(std::span<const Vec3> particle_rest, std::span<const Vec3> particle, std::span<const Quat> rotation,
-                 std::vector<Motion>& motion);
+                 Motions& motion);
 
 struct SkinnedVertex {
   std::array<uint32_t, 4> slot;
@@ -32,5 +37,8 @@ struct Skinned {
 };
 // A vertex whose particles have gone astray keeps its frame of rest.
 Skinned follow(const SkinnedVertex& vertex, std::span<const Motion> motion);
+inline bool has_moved(const SkinnedVertex& v, const Motions& motion) {
+  return motion.moved[v.slot[0]] | motion.moved[v.slot[1]] | motion.moved[v.slot[2]] | motion.moved[v.slot[3]];
+}
 
 }  // namespace catgut

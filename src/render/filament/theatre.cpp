@@ -83,6 +83,10 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
     eye_[i].camera->lookAt({camera.eye.x, camera.eye.y, camera.eye.z}, {camera.target.x, camera.target.y, camera.target.z},
                            {camera.up.x, camera.up.y, camera.up.z});
   }
+  // Shadows no farther than a little behind the work: the map's points are where they are looked at.
+  filament::LightManager& lights = engine_.getLightManager();
+  shadow_.shadowFar = 2.2f * std::max(0.05f, distance(cameras[0].eye, cameras[0].target));
+  lights.setShadowOptions(lights.getInstance(lamp_), shadow_);
   const float pixel = 2 * std::tan(0.5f * cameras[0].fov_deg * kPi / 180) / (coarse_ * float(height));
 
   find_motion(model_.particle_rest, snapshot.particle, snapshot.rotation, motion_);
@@ -113,7 +117,7 @@ void Theatre::set_quality(filament::View& view, Quality quality) {
   ao.enabled = good;
   ao.radius = 0.006f;
   ao.bias = 0.0002f;
-  ao.intensity = 1.2f;
+  ao.intensity = 0.8f;
   ao.power = 1.2f;
   ao.quality = filament::View::QualityLevel::MEDIUM;
   view.setAmbientOcclusionOptions(ao);
@@ -129,21 +133,19 @@ void Theatre::set_quality(filament::View& view, Quality quality) {
 }
 
 void Theatre::set_light(Quality quality) {
-  environment_ = make_environment(engine_, 38000);
+  environment_ = make_environment(engine_, 44000);
   scene_->setIndirectLight(environment_.light);
   skybox_ = filament::Skybox::Builder().color({0.012f, 0.03f, 0.028f, 1}).build(engine_);
   scene_->setSkybox(skybox_);
   // Shadows at the scale of a thread: the library's own bias of a millimetre would swallow the thread's and needle's.
-  filament::LightManager::ShadowOptions shadow;
-  shadow.mapSize = quality == Quality::draft ? 1024 : 2048;
+  filament::LightManager::ShadowOptions& shadow = shadow_;
+  shadow.mapSize = quality == Quality::draft ? 1024 : quality == Quality::medium ? 2048 : 4096;
   shadow.constantBias = 0.0002f;
   shadow.normalBias = 0.8f;
-  shadow.shadowNearHint = 0.05f;
-  shadow.shadowFarHint = 0.6f;
   lamp_ = utils::EntityManager::get().create();
   filament::LightManager::Builder(filament::LightManager::Type::DIRECTIONAL)
       .color({1.0f, 0.965f, 0.91f})
-      .intensity(72000)
+      .intensity(64000)
       .direction({kLampDirection.x, kLampDirection.y, kLampDirection.z})
       .castShadows(true)
       .shadowOptions(shadow)

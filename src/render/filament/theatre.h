@@ -8,6 +8,7 @@
 #include <filament/Camera.h>
 #include <filament/ColorGrading.h>
 #include <filament/Engine.h>
+#include <filament/LightManager.h>
 #include <filament/Material.h>
 #include <filament/Scene.h>
 #include <filament/Skybox.h>
@@ -66,6 +67,7 @@ class Theatre {
   filament::Scene* scene_ = nullptr;
   std::vector<Eye> eye_;
   utils::Entity lamp_;
+  filament::LightManager::ShadowOptions shadow_;
   filament::ColorGrading* grading_ = nullptr;
   filament::Skybox* skybox_ = nullptr;
   Environment environment_;
@@ -74,7 +76,7 @@ class Theatre {
   filament::MaterialInstance *tissue_material_ = nullptr, *thread_material_ = nullptr, *needle_material_ = nullptr,
                              *tool_material_ = nullptr, *drape_material_ = nullptr, *shadow_material_ = nullptr,
                              *marker_material_ = nullptr, *mark_material_ = nullptr;
-  std::vector<Motion> motion_;  // of every particle, in the picture that is being made
+  Motions motion_;  // of every particle, in the picture that is being made
   std::vector<TissueView> tissue_;
   ThreadView thread_;
   MarkView mark_;

@@ -31,9 +31,9 @@ void add_strand(ThreadView& view, float width, bool guide = false) {
   view.through.clear();
 }
 
-Vec3 normal_at(Nearest at, std::span<const TissueView> tissue, std::span<const Motion> motion) {
+Vec3 normal_at(Nearest at, std::span<const TissueView> tissue, const Motions& motion) {
   if (at.body < 0) return {0, 1, 0};
-  return rotate(follow(tissue[size_t(at.body)].vertex[at.vertex], motion).frame, {0, 0, 1});
+  return rotate(follow(tissue[size_t(at.body)].vertex[at.vertex], motion.of).frame, {0, 0, 1});
 }
 
 // Looks for the nearest tissue only when what was found last time is no longer near: it is a walk over every vertex.
@@ -121,7 +121,7 @@ ThreadView make_thread_view(filament::Engine& engine, filament::Scene& scene, co
 }
 
 void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel& model, const Snapshot& snapshot,
-                 std::span<const TissueView> tissue, std::span<const Motion> motion, const Camera& camera, float pixel) {
+                 std::span<const TissueView> tissue, const Motions& motion, const Camera& camera, float pixel) {
   if (view.capacity == 0) return;
   view.curve.clear(), view.radius.clear(), view.guide.clear(), view.through.clear();
   const Vec3 ahead = normalized(camera.target - camera.eye);
@@ -201,7 +201,7 @@ MarkView make_mark_view(filament::Engine& engine, filament::Scene& scene, filame
 }
 
 void move_marks(filament::Engine& engine, MarkView& view, const Snapshot& snapshot, std::span<const TissueView> tissue,
-                std::span<const Motion> motion) {
+                const Motions& motion) {
   const uint32_t count = uint32_t(std::min<size_t>(snapshot.suture_point.size(), kMostMarks));
   set_drawn(engine, view.gpu, count * kMarkSides * 3);
   if (count == 0) return;

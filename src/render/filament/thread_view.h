@@ -26,7 +26,7 @@ ThreadView make_thread_view(filament::Engine& engine, filament::Scene& scene, co
                             filament::MaterialInstance* material);
 // pixel: [m] that one pixel covers at 1 m from the camera; the thread is drawn wide enough to be seen.
 void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel& model, const Snapshot& snapshot,
-                 std::span<const TissueView> tissue, std::span<const Motion> motion, const Camera& camera, float pixel);
+                 std::span<const TissueView> tissue, const Motions& motion, const Camera& camera, float pixel);
 
 // The punctures: where the thread goes into the wall and comes out of it.
 struct MarkView {
@@ -35,6 +35,6 @@ struct MarkView {
 };
 MarkView make_mark_view(filament::Engine& engine, filament::Scene& scene, filament::MaterialInstance* material);
 void move_marks(filament::Engine& engine, MarkView& view, const Snapshot& snapshot, std::span<const TissueView> tissue,
-                std::span<const Motion> motion);
+                const Motions& motion);
 
 }  // namespace catgut

@@ -202,6 +202,8 @@ void reach_from(TissueView& view, Vec3 point, std::vector<Reached>& out) {
 void blanch(filament::Engine& engine, TissueView& view, const Snapshot& snapshot) {
   const size_t count = snapshot.suture_point.size();
   bool changed = false;
+  const bool first = !view.shown;
+  view.shown = true;
   if (view.reached.size() > count) {  // a bite was taken back, or a fresh suture begun
     for (VertexLive& live : view.live) live.bloody = 0;
     view.reached.clear();
@@ -227,7 +229,7 @@ void blanch(filament::Engine& engine, TissueView& view, const Snapshot& snapshot
   for (const uint32_t v : view.pressed) {
     const int want = int(255 * view.press[v]), have = view.live[v].blanched;
     if (want == have) continue;
-    const int step = std::clamp((want - have) / 6, -40, 40);
+    const int step = first ? want - have : std::clamp((want - have) / 6, -40, 40);
     view.live[v].blanched = uint8_t(have + (step != 0 ? step : want > have ? 1 : -1));
     changed = true;
   }
@@ -273,6 +275,7 @@ TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, co
     look[i] = look_of(mesh, v, flat.uv[i], sky[v], depth[v]);
     view.vertex[i] = {mesh.skin_particle[v], mesh.skin_weight[v], mesh.position[v], frame_of(mesh.normal[v], tangent[i])};
     view.position.push_back(mesh.position[v]);
+    view.frame.push_back(pack_frame(view.vertex[i].frame, view.mirrored[i]));
   }
   view.live.resize(n);
   view.press.assign(n, 0);
@@ -280,15 +283,20 @@ TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, co
   return view;
 }
 
-void move_tissue(filament::Engine& engine, TissueView& view, std::span<const Motion> motion, const Snapshot& snapshot) {
-  const Surface surface = new_surface(uint32_t(view.vertex.size()));
+void move_tissue(filament::Engine& engine, TissueView& view, const Motions& motion, const Snapshot& snapshot) {
   for (size_t i = 0; i < view.vertex.size(); ++i) {
-    const Skinned at = follow(view.vertex[i], motion);
-    surface.position[i] = at.position;
-    surface.frame[i] = pack_frame(at.frame, view.mirrored[i]);
+    if (!has_moved(view.vertex[i], motion)) continue;
+    const Skinned at = follow(view.vertex[i], motion.of);
     view.position[i] = at.position;
+    view.frame[i] = pack_frame(at.frame, view.mirrored[i]);
   }
-  upload_surface(engine, view.gpu, surface, bounds(view.position));
+  const Surface surface = new_surface(uint32_t(view.vertex.size()));
+  std::copy(view.position.begin(), view.position.end(), surface.position.begin());
+  std::copy(view.frame.begin(), view.frame.end(), surface.frame.begin());
+  // Of the particles, which are fewer: no vertex is farther from them than this.
+  constexpr Vec3 margin{0.006f, 0.006f, 0.006f};
+  const Box3 box = bounds(motion.seen);
+  upload_surface(engine, view.gpu, surface, {box.low - margin, box.high + margin});
   blanch(engine, view, snapshot);
 }
 

@@ -22,17 +22,19 @@ struct TissueView {
   std::vector<SkinnedVertex> vertex;  // as drawn; vertices on a texture seam are drawn twice
   std::vector<uint8_t> mirrored;      // whether the texture runs clockwise there
   std::vector<Vec3> position;         // as drawn, of the last picture
+  std::vector<PackedFrame> frame;
   std::vector<VertexLive> live;
   std::vector<float> press;  // per vertex, of this picture
   // Where thread goes through the wall, found when it is first seen: by number of the suture point.
   std::vector<std::vector<Reached>> reached;
   std::vector<uint32_t> pressed;  // vertices with anything in `press`
+  bool shown = false;             // in a picture before
   GpuMesh gpu;
 };
 
 TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, const VisibleMesh& mesh,
                             filament::MaterialInstance* material);
-void move_tissue(filament::Engine& engine, TissueView& view, std::span<const Motion> motion, const Snapshot& snapshot);
+void move_tissue(filament::Engine& engine, TissueView& view, const Motions& motion, const Snapshot& snapshot);
 
 // The drawn vertex nearest to a point, among all bodies; -1: none within `reach` [m].
 struct Nearest {
