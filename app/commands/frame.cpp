@@ -14,12 +14,13 @@
 namespace catgut {
 namespace {
 
-constexpr double kFrameEvery = 1.0 / 30;             // [s] simulated: of a run's frames, enough to know them
-constexpr int kEyeWidth = 1440, kEyeHeight = 1584;   // [pixels] a usual headset's
+constexpr double kFrameEvery = 1.0 / 30;            // [s] simulated: of a run's frames, enough to know them
+constexpr int kEyeWidth = 1440, kEyeHeight = 1584;  // [pixels] a usual headset's
 
 double at_part(std::vector<double>& values, double part) {
   std::sort(values.begin(), values.end());
-  return values.empty() ? 0 : values[std::min(values.size() - 1, static_cast<size_t>(part * static_cast<double>(values.size())))];
+  return values.empty() ? 0
+                        : values[std::min(values.size() - 1, static_cast<size_t>(part * static_cast<double>(values.size())))];
 }
 
 }  // namespace
@@ -63,17 +64,21 @@ int bench_frame(const FrameOptions& o) {
     caller.erase(caller.begin(), caller.begin() + 30);
     all.erase(all.begin(), all.begin() + 30);
   }
-  const double median = at_part(caller, 0.5), p99 = at_part(caller, 0.99), all_median = at_part(all, 0.5), all_p99 = at_part(all, 0.99);
+  const double median = at_part(caller, 0.5), p99 = at_part(caller, 0.99), all_median = at_part(all, 0.5),
+               all_p99 = at_part(all, 0.99);
   if (!o.json.empty())
-    write_output(o.json, fmt::format("{{\"scene\": \"{}\", \"eyes\": 2, \"frames\": {}, \"frame_ms\": {{\"median\": {:.3f}, \"p99\": {:.3f}}}, "
-                                     "\"all_threads_ms\": {{\"median\": {:.3f}, \"p99\": {:.3f}}}}}\n",
-                                     scene.name, caller.size(), median, p99, all_median, all_p99));
+    write_output(
+        o.json,
+        fmt::format("{{\"scene\": \"{}\", \"eyes\": 2, \"frames\": {}, \"frame_ms\": {{\"median\": {:.3f}, \"p99\": {:.3f}}}, "
+                    "\"all_threads_ms\": {{\"median\": {:.3f}, \"p99\": {:.3f}}}}}\n",
+                    scene.name, caller.size(), median, p99, all_median, all_p99));
   if (o.json != "-")
-    std::printf("%s: %zu stereo frames, nothing rasterised; processor time of one [ms]\n"
-                "                     median    p99\n"
-                "picture's thread   %8.2f %6.2f\n"
-                "all threads        %8.2f %6.2f\n",
-                scene.name.c_str(), caller.size(), median, p99, all_median, all_p99);
+    std::printf(
+        "%s: %zu stereo frames, nothing rasterised; processor time of one [ms]\n"
+        "                     median    p99\n"
+        "picture's thread   %8.2f %6.2f\n"
+        "all threads        %8.2f %6.2f\n",
+        scene.name.c_str(), caller.size(), median, p99, all_median, all_p99);
   return run.interrupted ? 130 : 0;
 }
 

@@ -121,8 +121,8 @@ Shape wound_bed_shape(Vec3 centre, float radius) {
     const float x = p.x - centre.x, z = p.z - centre.z;
     const float top = std::sqrt(lobules(x, z, 7.5f * mm)),
                 blush = std::clamp(0.45f + 0.4f * cloth_height(1.7f * x, 1.9f * z + 0.1f), 0.0f, 1.0f);
-    const Vec3 fat = lerp(srgb(248, 218, 146), srgb(238, 182, 128), blush);
-    return lerp(srgb(186, 84, 62), fat, 0.3f + 0.7f * top);
+    const Vec3 fat = lerp(srgb(252, 228, 168), srgb(244, 198, 150), blush);
+    return lerp(srgb(206, 112, 84), fat, 0.35f + 0.65f * top);
   });
   return shape;
 }

@@ -25,9 +25,9 @@ struct QualityChoice {
   std::vector<QualityTrial> trials;  // from draft up; what comes after one that is too slow is not tried
 };
 
-// Draws some frames of the scene, unseen, at the window's size. Takes a second or so with a graphics card and a few without one.
-// Call it before the window's own renderer is made, on the thread that will make it. Never throws: without a driver it answers
-// draft, and no trials.
+// Draws some frames of the scene, unseen, at the window's size. Takes a second or so with a graphics card and a few without
+// one. Call it before the window's own renderer is made, on the thread that will make it. Never throws: without a driver it
+// answers draft, and no trials.
 QualityChoice choose_quality(const PictureModel& model, const Snapshot& snapshot, int width, int height,
                              double budget_ms = kFrameBudget);
 

@@ -41,7 +41,7 @@ const std::vector<Head>& heads() {
       head({0.30f + 0.27f * std::cos(a), 1, 0.50f + 0.27f * std::sin(a)}, 0.075f, 13, warm);
     }
     head({0.30f, 1, 0.50f}, 0.075f, 13, warm);
-    head({-0.95f, 0.8f, -0.5f}, 0.20f, 6, kCool);
+    head({-0.95f, 0.8f, -0.5f}, 0.16f, 6, kCool);
     return made;
   }();
   return all;
@@ -61,7 +61,10 @@ Vec3 radiance(Vec3 d) {
     if (near > h.fade) c += h.light * smooth_step(h.fade, h.full, near);
   }
   // A light panel along the wall behind the surgeon: the long highlight on instruments.
-  if (d.z > 0.3f && std::abs(d.y / d.z - 0.55f) < 0.10f && std::abs(d.x / d.z) < 0.9f) c += kCool * 3.0f;
+  if (d.z > 0.3f) {
+    const float up = std::abs(d.y / d.z - 0.55f), across = std::abs(d.x / d.z);
+    c += kCool * (2.4f * (1 - smooth_step(0.03f, 0.14f, up)) * (1 - smooth_step(0.5f, 1.0f, across)));
+  }
   return c;
 }
 

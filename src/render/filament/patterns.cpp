@@ -78,7 +78,7 @@ void draw_vessel(Vessels& map, Dice& dice, float x, float y, float heading, floa
     const float w = std::max(0.55f, width * (1 - 0.8f * done / reach));
     const int r = int(1.8f * w) + 2;
     // What is thinner than a texel is fainter instead.
-    const float strength = std::min(1.0f, 0.22f + 0.36f * w) * std::min(1.0f, 4 * (1 - done / reach));
+    const float strength = std::min(1.0f, 0.10f + 0.40f * w) * std::min(1.0f, 4 * (1 - done / reach));
     for (int j = -r; j <= r; ++j)
       for (int i = -r; i <= r; ++i) {
         const float dx = std::floor(x) + float(i) - x, dy = std::floor(y) + float(j) - y;
@@ -139,8 +139,8 @@ Patterns make_patterns() {
     draw_vessel(vessel, dice, x, y, way, 1.25f * width, reach, 1, 2);
     draw_vessel(vessel, dice, x + 3.2f * width, y + 10, way, 0.8f * width, reach, 0, 3);
   }
-  for (int i = 0; i < 90; ++i)
-    draw_vessel(vessel, dice, kSize * dice(), kSize * dice(), 2 * kPi * dice(), 0.6f + 0.5f * dice(), 50 + 110 * dice(), 0, 2);
+  for (int i = 0; i < 60; ++i)
+    draw_vessel(vessel, dice, kSize * dice(), kSize * dice(), 2 * kPi * dice(), 0.6f + 0.6f * dice(), 60 + 110 * dice(), 0, 2);
 
   Patterns made{std::vector<uint8_t>(size_t(kSize) * kSize * 4), std::vector<uint8_t>(size_t(kSize) * kSize * 4)};
   std::vector<uint8_t>& pattern = made.pattern;

@@ -85,7 +85,7 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
   }
   // Shadows no farther than a little behind the work: the map's points are where they are looked at.
   filament::LightManager& lights = engine_.getLightManager();
-  shadow_.shadowFar = 2.2f * std::max(0.05f, distance(cameras[0].eye, cameras[0].target));
+  shadow_.shadowFar = 3.2f * std::max(0.05f, distance(cameras[0].eye, cameras[0].target));
   lights.setShadowOptions(lights.getInstance(lamp_), shadow_);
   const float pixel = 2 * std::tan(0.5f * cameras[0].fov_deg * kPi / 180) / (coarse_ * float(height));
 

@@ -186,7 +186,7 @@ MarkView make_mark_view(filament::Engine& engine, filament::Scene& scene, filame
     const uint32_t first = m * kMarkCorners;
     for (uint32_t i = 0; i < kMarkCorners; ++i) {
       const Vec3 c = i <= kMarkSides ? hole : bruise;
-      look.push_back({{c.x, c.y, c.z, i <= kMarkSides ? 0.9f : 0.0f}, {0, 0}, {1, 0}});
+      look.push_back({{c.x, c.y, c.z, i <= kMarkSides ? 0.82f : 0.0f}, {0, 0}, {1, 0}});
     }
     for (uint32_t k = 0; k < kMarkSides; ++k) {
       const uint32_t a = first + 1 + k, b = first + 1 + (k + 1) % kMarkSides;
@@ -217,10 +217,10 @@ void move_marks(filament::Engine& engine, MarkView& view, const Snapshot& snapsh
     const Vec3 x = any_perpendicular(out), y = cross(out, x);
     // A pulled thread draws its puncture open.
     const float pulled = std::max(point.tension_needle, point.tension_free),
-                inner = 0.00020f + 0.00012f * std::min(2.0f, pulled);
+                inner = 0.00017f + 0.00010f * std::min(2.0f, pulled);
     for (uint32_t i = 0; i < kMarkCorners; ++i) {
       const float a = 2 * kPi * float((i + kMarkSides - 1) % kMarkSides) / kMarkSides;
-      const float r = i == 0 ? 0 : i <= kMarkSides ? inner : 0.00085f;
+      const float r = i == 0 ? 0 : i <= kMarkSides ? inner : 0.00062f;
       surface.position[m * kMarkCorners + i] = centre + r * (x * std::cos(a) + y * std::sin(a));
       surface.frame[m * kMarkCorners + i] = pack_frame(Quat{});
     }

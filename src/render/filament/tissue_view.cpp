@@ -162,12 +162,12 @@ VertexLook look_of(const VisibleMesh& mesh, uint32_t v, Uv uv, float sky, float 
   switch (layer) {
     case TissueLayer::serosa: {
       const float toward = dot(mesh.normal[v], kMesentery);
-      c = lerp(srgb(240, 190, 176), srgb(232, 158, 148), red);
+      c = lerp(srgb(244, 194, 182), srgb(236, 154, 148), red);
       // In drops and streaks along the organ, closing up toward the mesentery itself.
       const float lobule = std::sin(1150 * p.x + 420 * p.y) * std::sin(930 * p.y - 610 * p.z + 380 * p.x) +
                            0.6f * std::sin(2300 * p.z + 700 * p.y) * std::sin(1900 * p.x - 1700 * p.y);
       const float fat = std::clamp((toward - 0.86f + 0.09f * lobule + 0.2f * (red - 0.5f)) / 0.10f, 0.0f, 1.0f);
-      c = lerp(c, srgb(244, 214, 150), 0.7f * fat);
+      c = lerp(c, srgb(250, 226, 176), 0.6f * fat);
       vessels = (0.55f + 0.45f * std::clamp(0.5f + 0.9f * toward, 0.0f, 1.0f)) * (1 - 0.6f * fat);
       break;
     }
