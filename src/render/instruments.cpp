@@ -28,7 +28,7 @@ void add_ring(Shape& shape, Vec3 centre, float rx, float rz, float wire, Vec3 co
 }
 
 ToolShape needle_driver() {
-  const Vec3 steel = srgb(222, 224, 228), carbide = srgb(96, 98, 102), gold = srgb(212, 172, 92);
+  const Vec3 steel = srgb(222, 224, 228), carbide = srgb(120, 122, 126), gold = srgb(212, 172, 92);
   ToolShape tool;
   tool.pivot = 26 * mm;
   tool.opening = 0.16f;
@@ -40,7 +40,9 @@ ToolShape needle_driver() {
   add_loft(tool.half, jaw, steel);
   const Section insert[] = {{{0.28f * mm, 0, -2.3f * mm}, 0.26f * mm, 0.82f * mm},
                             {{0.28f * mm, 0, 13 * mm}, 0.26f * mm, 1.5f * mm}};
+  tool.half.hatched.resize(tool.half.position.size(), 0);
   add_loft(tool.half, insert, carbide, 8);
+  tool.half.hatched.resize(tool.half.position.size(), 1);
   // The shank of the other side belongs to this jaw in life; drawn on its own side, the crossing hides in the box joint.
   const Vec3 shank[] = {{1.9f * mm, 0, 30 * mm},
                         {3.4f * mm, 0, 50 * mm},
@@ -74,6 +76,8 @@ ToolShape forceps() {
                          {{5.6f * mm, 0, 95 * mm}, 0.8f * mm, 5.1f * mm},    {{3.2f * mm, 0, 125 * mm}, 0.8f * mm, 4.7f * mm},
                          {{1.0f * mm, 0, 142 * mm}, 0.9f * mm, 4.0f * mm},   {{0.9f * mm, 0, 150 * mm}, 0.9f * mm, 3.4f * mm}};
   add_loft(tool.half, arm, steel);
+  for (size_t i = 0; i < tool.half.position.size(); ++i)  // the tips grip with their inner faces
+    tool.half.hatched.push_back(tool.half.position[i].z < 9 * mm && tool.half.normal[i].x < -0.4f ? 1.0f : 0.0f);
   // Ridges for the fingers.
   for (int i = 0; i < 9; ++i) {
     const float z = (56 + 3.2f * float(i)) * mm;

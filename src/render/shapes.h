@@ -13,7 +13,8 @@ namespace catgut {
 struct Shape {
   std::vector<Vec3> position, normal, tangent;  // tangent: along the u of uv
   std::vector<std::array<float, 2>> uv;
-  std::vector<Vec3> colour;  // linear
+  std::vector<Vec3> colour;    // linear
+  std::vector<float> hatched;  // 1 on gripping faces of tools; may be shorter than the rest, which is then smooth
   std::vector<std::array<uint32_t, 3>> triangle;
 };
 

@@ -25,9 +25,9 @@ TEST(Skinned, MovesVerticesAsSkinDoesAndTheirFramesAlong) {
   Motions motion;
   find_motion(field.model.particle_rest, particle, rotation, motion);
   for (size_t v = 0; v < position.size(); ++v) {
-    const SkinnedVertex vertex{mesh.skin_particle[v], mesh.skin_weight[v], mesh.position[v],
-                               from_axes(any_perpendicular(mesh.normal[v]), cross(mesh.normal[v], any_perpendicular(mesh.normal[v])),
-                                         mesh.normal[v])};
+    const SkinnedVertex vertex{
+        mesh.skin_particle[v], mesh.skin_weight[v], mesh.position[v],
+        from_axes(any_perpendicular(mesh.normal[v]), cross(mesh.normal[v], any_perpendicular(mesh.normal[v])), mesh.normal[v])};
     ASSERT_TRUE(has_moved(vertex, motion));
     const Skinned at = follow(vertex, motion.of);
     EXPECT_LT(distance(at.position, position[v]), 1e-6f);

@@ -126,7 +126,8 @@ GpuMesh make_mesh(filament::Engine& engine, filament::Scene& scene, const Shape&
   std::vector<VertexLook> look(shape.position.size());
   for (size_t i = 0; i < look.size(); ++i) {
     const Vec3 c = shape.colour[i];
-    look[i] = {{c.x, c.y, c.z, 1}, {shape.uv[i][0], shape.uv[i][1]}, {1, 0}};
+    const float hatched = i < shape.hatched.size() ? shape.hatched[i] : 0;
+    look[i] = {{c.x, c.y, c.z, 1 - hatched}, {shape.uv[i][0], shape.uv[i][1]}, {1, 0}};
   }
   const GpuMesh mesh = make_mesh(engine, scene, look, shape.triangle, material, casts_shadow, live);
   set_surface(engine, mesh, shape.position, shape.normal, shape.tangent);
