@@ -11,7 +11,8 @@ namespace catgut {
 
 struct QualityTrial {
   Quality quality = Quality::draft;
-  double frame_ms = 0;  // [ms] the median of some frames, until the last pixel was there
+  double frame_ms = 0;  // [ms] the median of some frames, until the last pixel was there; of frames a quarter of the size each
+                        // way where even those were too slow
 };
 
 // The best level whose frames took at most `budget_ms`; draft when none did.
