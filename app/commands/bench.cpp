@@ -1,5 +1,5 @@
-// app: `catgut bench`: where the time of a tick goes, and (limits.cpp) what it costs as sutures are added. The paper's tables
-// come in a later version.
+// app: `catgut bench`: where the time of a tick goes, and (limits.cpp) what it costs as sutures are added, and (frame.cpp) what
+// a picture costs. The paper's tables come in a later version.
 #include <cstdio>
 #include <memory>
 
@@ -57,9 +57,11 @@ int bench_stages(const BenchOptions& o) {
 
 int bench(const BenchOptions& o) {
   if (o.what == "stages") return bench_stages(o);
+  if (o.what == "frame")
+    return bench_frame({o.scene.empty() ? "lembert" : o.scene[0], o.json, o.set, o.seconds > 0 ? o.seconds : 30});
   if (o.what != "limits")
     throw InputError("bench " + o.what, "not available yet in this version",
-                     "use `catgut bench stages` or `catgut bench limits`");
+                     "use `catgut bench stages`, `catgut bench limits` or `catgut bench frame`");
   const std::vector<std::string> both{"stress_one_body", "stress_two_bodies"};
   return bench_limits({o.scene.empty() ? both : o.scene, o.set, o.out, o.sutures, o.threads});
 }
@@ -71,18 +73,20 @@ void add_bench(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("bench", "measure where the time goes");
   command
       ->add_option("what", o->what,
-                   "stages: where a tick's time goes; limits: what each further suture costs (paper and scale come later)")
+                   "stages: where a tick's time goes; limits: what each further suture costs; frame: a stereo frame without a "
+                   "rasteriser "
+                   "(paper and scale come later)")
       ->required()
-      ->check(CLI::IsMember({"paper", "limits", "scale", "stages"}))
-      ->type_name("paper|limits|scale|stages");
-  command->add_option("--json", o->json, "stages: results as JSON; - for standard output")->type_name("FILE|-");
+      ->check(CLI::IsMember({"paper", "limits", "scale", "stages", "frame"}))
+      ->type_name("paper|limits|scale|stages|frame");
+  command->add_option("--json", o->json, "stages, frame: results as JSON; - for standard output")->type_name("FILE|-");
   command->add_option("--repeat", o->repeat, "stages: runs; the one with the fastest median is reported")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   add_threads_option(*command, o->threads);
-  command->add_option("--scene", o->scene, "scene to run (stages: purse_string; limits: the two stress scenes)")
+  command->add_option("--scene", o->scene, "scene to run (stages: purse_string; frame: lembert; limits: the two stress scenes)")
       ->type_name("NAME");
-  command->add_option("--seconds", o->seconds, "stages: simulated time; else until the surgeon is done")
+  command->add_option("--seconds", o->seconds, "simulated time; else until the surgeon is done (stages), 30 s (frame)")
       ->check(CLI::Range(0.001, 1e6));
   command->add_option("--sutures", o->sutures, "limits: bites in each scene")
       ->check(CLI::Range(1, 1000))

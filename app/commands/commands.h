@@ -27,6 +27,14 @@ struct LimitsOptions {
 };
 int bench_limits(const LimitsOptions& options);
 
+// `catgut bench frame` (app/commands/frame.cpp).
+struct FrameOptions {
+  std::string scene, json;
+  std::vector<std::string> set;
+  double seconds = 0;  // [s] simulated
+};
+int bench_frame(const FrameOptions& options);
+
 int play_without_arguments();  // the window's start screen
 
 // What several commands share (app/commands/common.cpp).

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -28,6 +29,23 @@ void add_picture_options(CLI::App& command, PictureOptions& options) {
       ->capture_default_str();
   command.add_option("--frames", options.frames, "folder for the film's pictures as PNG")->type_name("DIR");
   command.add_option("--contact-sheet", options.contact_sheet, "up to twelve moments on one PNG")->type_name("FILE.png");
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--still",
+          [&options](const std::vector<std::string>& all) {
+            for (const std::string& one : all) {
+              const size_t colon = one.find(':');
+              char* end = nullptr;
+              const double at_s = std::strtod(one.c_str(), &end);
+              if (colon == std::string::npos || end != one.c_str() + colon || !(at_s >= 0) || colon + 1 == one.size())
+                throw CLI::ValidationError("--still", one + ": expected SECONDS:FILE.png");
+              options.still.emplace_back(at_s, one.substr(colon + 1));
+            }
+          },
+          "one moment, large and in the best quality: simulated seconds and a PNG; as often as needed")
+      ->type_name("S:FILE.png")
+      ->take_all()
+      ->allow_extra_args(false);
 }
 
 void add_threads_option(CLI::App& command, int& threads) {

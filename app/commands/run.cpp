@@ -34,6 +34,7 @@ SceneSpec scene_for(const RunOptions& o) {
 int run(const RunOptions& o) {
   const SceneSpec scene = scene_for(o);
   for (const std::string& path : {o.json, o.session.record, o.pictures.video, o.pictures.contact_sheet}) prepare_output(path);
+  for (const auto& [at_s, path] : o.pictures.still) prepare_output(path);
 
   std::unique_ptr<Pictures> pictures;
   SessionHooks hooks;

@@ -1,6 +1,8 @@
 // render/camera: see camera.h.
 #include "render/camera.h"
 
+#include <iterator>
+
 namespace catgut {
 namespace {
 
@@ -14,6 +16,29 @@ Camera look_at_from(Vec3 target, float azimuth, float elevation, float half_heig
 }
 
 float wrap_angle(float a) { return a - 2 * kPi * std::round(a / (2 * kPi)); }
+
+// Places to look from: round from the needle's side, in units of `beside`, and up from `elevation` [rad].
+constexpr float kRound[] = {0.4f, -0.4f, 1, -1, 1.7f, -1.7f, 0}, kUp[] = {0, 0.22f, -0.16f};
+constexpr size_t kRounds = std::size(kRound), kUps = std::size(kUp);
+
+// How much the tools' shafts hide of the needle and of the picture's middle, seen from the unit direction `away`.
+float hidden(const Snapshot& snapshot, Vec3 away, Vec3 target, float half) {
+  constexpr int points = 10;
+  float sum = 0;
+  for (const ToolView& tool : snapshot.tool) {
+    const Vec3 along = rotate(tool.pose.q, {0, 0, 1});
+    for (int i = 1; i <= points; ++i) {
+      const Vec3 p = tool.pose.p + along * (0.012f * static_cast<float>(i));
+      const auto before = [&](Vec3 key, float size) {
+        const Vec3 d = p - key;
+        const float toward = dot(d, away), off2 = length2(d - away * toward);
+        return toward > 0 && std::isfinite(off2) ? std::exp(-off2 / (size * size)) : 0.0f;
+      };
+      sum += 0.5f * before(snapshot.needle.pose.p, 0.010f) + 0.35f * before(target, 0.6f * half);
+    }
+  }
+  return sum;
+}
 
 }  // namespace
 
@@ -51,32 +76,37 @@ Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
     half_wanted = std::clamp(0.55f * length(high - low), half_height, kWidest * field_);
   }
 
-  // Near the axis the needle's direction means nothing; the camera keeps to where it is.
+  // Round from the needle's side of the organ, and up: to where the tools' shafts hide least of the needle and of the work.
   const float from_axis = std::hypot(offset.x, offset.z);
   float side = azimuth_;
+  // Near the axis the needle's direction means nothing; the camera keeps to where it is.
   if (from_axis > 0.06f * field_) {
     const float middle = std::atan2(offset.x, offset.z);
-    // How far the nearest tool's shaft stands from a camera on that side, seen from above.
-    const auto clear = [&](float hand) {
-      float least = kPi;
-      for (const ToolView& tool : snapshot.tool) {
-        const Vec3 shaft = rotate(tool.pose.q, {0, 0, 1});
-        if (distance(tool.pose.p, focus_) < 2 * field_ && std::hypot(shaft.x, shaft.z) > 0.2f)
-          least = std::min(least, std::abs(wrap_angle(middle + hand * beside - std::atan2(shaft.x, shaft.z))));
-      }
-      return least;
+    const auto azimuth_of = [&](size_t i) {
+      const float a = wrap_angle(middle + kRound[i % kRounds] * beside);
+      return front_ ? std::clamp(a, -0.75f, 0.75f) : a;
     };
-    // It changes sides only for a good reason, or it would sway between two equal ones.
-    if (clear(-hand_) > clear(hand_) + (started_ ? 0.35f : 0)) hand_ = -hand_;
-    side = middle + hand_ * beside;
+    const auto cost = [&](size_t i) {
+      const float raised = kUp[i / kRounds], a = azimuth_of(i), e = elevation + raised;
+      const Vec3 seen_from{std::cos(e) * std::sin(a), std::sin(e), std::cos(e) * std::cos(a)};
+      return hidden(snapshot, seen_from, wanted, half_wanted) + 0.35f * kRound[i % kRounds] * kRound[i % kRounds] +
+             3 * raised * raised;
+    };
+    size_t best = choice_;
+    float least = cost(choice_) - (started_ ? 0.5f : 0);  // it goes elsewhere only for a good reason, or it would sway
+    for (size_t i = 0; i < kRounds * kUps; ++i)
+      if (const float c = cost(i); c < least) least = c, best = i;
+    choice_ = best;
+    side = azimuth_of(choice_);
   }
-  if (front_) side = std::clamp(wrap_angle(side), -0.75f, 0.75f);
+  const float lift_wanted = kUp[choice_ / kRounds];
 
   if (!started_) {
     started_ = true;
     target_ = wanted;
     azimuth_ = side;
     half_ = half_wanted;
+    lift_ = lift_wanted;
   } else if (dt > 0) {
     const float part = 1 - std::exp(-3 * dt / settle_time);
     target_ = lerp(target_, wanted, part);
@@ -85,8 +115,9 @@ Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
     // The speed itself eases, or the camera would start and stop with a jerk.
     speed_ += (want_speed - speed_) * (1 - std::exp(-4 * dt / settle_time));
     azimuth_ = wrap_angle(azimuth_ + std::clamp(speed_ * dt, -0.5f, 0.5f));
+    lift_ += (lift_wanted - lift_) * (1 - std::exp(-1.5f * dt / settle_time));
   }
-  return look_at_from(target_, azimuth_, elevation, half_, fov_deg);
+  return look_at_from(target_, azimuth_, elevation + lift_, half_, fov_deg);
 }
 
 }  // namespace catgut

@@ -22,8 +22,8 @@ struct FollowCamera {
   // The camera dt [s] after the previous call; the first call starts at the work without easing in.
   Camera update(const Snapshot& snapshot, float dt);
 
-  float elevation = 0.78f;     // [rad] above the horizon
-  float beside = 0.7f;         // [rad] from the needle's side of the organ, toward where the tools' shafts hide less
+  float elevation = 0.80f;     // [rad] above the horizon; a little more or less where the tools' shafts hide less then
+  float beside = 0.7f;         // [rad] round from the needle's side of the organ, toward where the shafts hide less
   float turn_speed = 0.35f;    // [rad/s] at most
   float settle_time = 1.2f;    // [s] in which most of a change of target is made up
   float half_height = 0.034f;  // [m] of the picture, at the target, with the needle at the tissue; more when it is drawn away
@@ -34,7 +34,8 @@ struct FollowCamera {
   float field_;
   Vec3 target_;
   float azimuth_ = 0.6f, speed_ = 0;  // [rad], [rad/s]
-  float hand_ = 1;                    // +1 or -1: on which side of the needle the camera stands
+  size_t choice_ = 0;                 // of the places to look from
+  float lift_ = 0;                    // [rad] above `elevation` now
   float half_ = 0;                    // [m] half the picture's height now
   bool front_ = false;                // it stays on the surgeon's side: two bowel ends lie across the field
   bool started_ = false;

@@ -1,4 +1,4 @@
-// render/shapes: needle, needle driver, forceps and drape; see shapes.h. Sizes follow the instruments on a surgeon's table:
+// render/shapes: needle, needle driver and forceps; see shapes.h. Sizes follow the instruments on a surgeon's table:
 // a 180 mm needle holder with gold rings, 150 mm tissue forceps.
 #include <vector>
 
@@ -28,7 +28,7 @@ void add_ring(Shape& shape, Vec3 centre, float rx, float rz, float wire, Vec3 co
 }
 
 ToolShape needle_driver() {
-  const Vec3 steel = srgb(222, 224, 228), carbide = srgb(96, 98, 102), gold = srgb(212, 172, 92);
+  const Vec3 steel = srgb(222, 224, 228), carbide = srgb(120, 122, 126), gold = srgb(212, 172, 92);
   ToolShape tool;
   tool.pivot = 26 * mm;
   tool.opening = 0.16f;
@@ -40,7 +40,9 @@ ToolShape needle_driver() {
   add_loft(tool.half, jaw, steel);
   const Section insert[] = {{{0.28f * mm, 0, -2.3f * mm}, 0.26f * mm, 0.82f * mm},
                             {{0.28f * mm, 0, 13 * mm}, 0.26f * mm, 1.5f * mm}};
+  tool.half.hatched.resize(tool.half.position.size(), 0);
   add_loft(tool.half, insert, carbide, 8);
+  tool.half.hatched.resize(tool.half.position.size(), 1);
   // The shank of the other side belongs to this jaw in life; drawn on its own side, the crossing hides in the box joint.
   const Vec3 shank[] = {{1.9f * mm, 0, 30 * mm},
                         {3.4f * mm, 0, 50 * mm},
@@ -74,6 +76,8 @@ ToolShape forceps() {
                          {{5.6f * mm, 0, 95 * mm}, 0.8f * mm, 5.1f * mm},    {{3.2f * mm, 0, 125 * mm}, 0.8f * mm, 4.7f * mm},
                          {{1.0f * mm, 0, 142 * mm}, 0.9f * mm, 4.0f * mm},   {{0.9f * mm, 0, 150 * mm}, 0.9f * mm, 3.4f * mm}};
   add_loft(tool.half, arm, steel);
+  for (size_t i = 0; i < tool.half.position.size(); ++i)  // the tips grip with their inner faces
+    tool.half.hatched.push_back(tool.half.position[i].z < 9 * mm && tool.half.normal[i].x < -0.4f ? 1.0f : 0.0f);
   // Ridges for the fingers.
   for (int i = 0; i < 9; ++i) {
     const float z = (56 + 3.2f * float(i)) * mm;
@@ -84,15 +88,6 @@ ToolShape forceps() {
   const Section end[] = {{{0, 0, 140 * mm}, 1.6f * mm, 4.1f * mm}, {{0, 0, 151 * mm}, 1.6f * mm, 3.2f * mm}};
   add_loft(tool.body, end, steel);
   return tool;
-}
-
-// Smooth noise without a table: a few waves of unrelated lengths and directions.
-float cloth_height(float x, float z) {
-  float h = 0;
-  h += 0.9f * std::sin(31 * x + 17 * z + 0.4f) * std::sin(23 * z - 9 * x + 1.1f);
-  h += 0.5f * std::sin(57 * x - 43 * z + 2.0f) * std::sin(19 * x + 61 * z);
-  h += 0.25f * std::sin(131 * x + 37 * z) * std::sin(113 * z - 71 * x + 0.7f);
-  return h;
 }
 
 }  // namespace
@@ -117,60 +112,5 @@ Shape needle_shape(const PictureModel& model) {
 }
 
 ToolShape tool_shape(ToolKind kind) { return kind == ToolKind::needle_driver ? needle_driver() : forceps(); }
-
-Shape drape_shape(Vec3 centre, float hole, float size) {
-  constexpr int rings = 44, around = 80;
-  Shape shape;
-  const auto height = [&](float x, float z, float r) {
-    const float out = std::clamp((r - hole) / 0.03f, 0.0f, 1.0f);
-    // The cloth's edge lies as a soft roll round the hole and falls away from it a little.
-    const float roll = 0.0022f * std::exp(-(r - hole) * (r - hole) / (0.0035f * 0.0035f));
-    // Folds only go down: what lies on the drape in the physics lies on its highest level.
-    return centre.y + roll + 0.0020f * out * (cloth_height(x, z) - 1) - 0.05f * std::max(0.0f, r - hole - 0.06f);
-  };
-  for (int i = 0; i <= rings; ++i) {
-    const float s = float(i) / rings, r = hole + (size - hole) * s * s;
-    for (int k = 0; k <= around; ++k) {
-      const float a = 2 * kPi * float(k) / around, x = r * std::cos(a), z = -r * std::sin(a), e = 0.0005f;
-      const Vec3 n = normalized(Vec3{height(x - e, z, std::hypot(x - e, z)) - height(x + e, z, std::hypot(x + e, z)), 2 * e,
-                                     height(x, z - e, std::hypot(x, z - e)) - height(x, z + e, std::hypot(x, z + e))});
-      shape.position.push_back({centre.x + x, height(x, z, r), centre.z + z});
-      shape.normal.push_back(n);
-      shape.tangent.push_back(normalized(Vec3{1, 0, 0} - n * n.x));
-      shape.uv.push_back({x / 0.01f, z / 0.01f});
-      // Worn and damp near the wound.
-      shape.colour.push_back(lerp(srgb(22, 78, 76), srgb(44, 116, 110), std::clamp((r - hole) / 0.05f, 0.0f, 1.0f)));
-    }
-  }
-  for (uint32_t i = 0; i < rings; ++i)
-    for (uint32_t k = 0; k < around; ++k) {
-      const uint32_t a = i * (around + 1) + k, b = a + around + 1;
-      shape.triangle.push_back({a, b, a + 1});
-      shape.triangle.push_back({a + 1, b, b + 1});
-    }
-  return shape;
-}
-
-Shape wound_bed_shape(Vec3 centre, float radius) {
-  constexpr int rings = 12, around = 48;
-  Shape shape;
-  for (int i = 0; i <= rings; ++i)
-    for (int k = 0; k <= around; ++k) {
-      const float s = float(i) / rings, r = radius * s, a = 2 * kPi * float(k) / around;
-      const float x = r * std::cos(a), z = -r * std::sin(a), y = 0.0015f * cloth_height(3 * x + 0.3f, 3 * z);
-      shape.position.push_back({centre.x + x, centre.y + y, centre.z + z});
-      shape.normal.push_back({0, 1, 0});
-      shape.tangent.push_back({1, 0, 0});
-      shape.uv.push_back({x / 0.04f, z / 0.04f});  // in repeats of the tissue pattern
-      shape.colour.push_back(srgb(120, 36, 34));
-    }
-  for (uint32_t i = 0; i < rings; ++i)
-    for (uint32_t k = 0; k < around; ++k) {
-      const uint32_t a = i * (around + 1) + k, b = a + around + 1;
-      shape.triangle.push_back({a, b, a + 1});
-      shape.triangle.push_back({a + 1, b, b + 1});
-    }
-  return shape;
-}
 
 }  // namespace catgut

@@ -1,6 +1,7 @@
 // render: what a build without pictures (CATGUT_RENDER=OFF) answers. Physics, recordings and tests of them need no graphics.
 #include <stdexcept>
 
+#include "render/frame_cost.h"
 #include "render/renderer.h"
 #include "render/window.h"
 
@@ -17,6 +18,10 @@ bool renderer_available() { return false; }
 
 std::unique_ptr<WindowRenderer> make_window_renderer(uint64_t, int, int, const std::string&) {
   throw std::runtime_error("this build has no window; configure it with -DCATGUT_RENDER=ON");
+}
+
+std::unique_ptr<FrameCost> make_frame_cost(const PictureModel&, int, int, Quality, int) {
+  throw std::runtime_error("this build makes no pictures");
 }
 
 }  // namespace catgut

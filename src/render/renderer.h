@@ -11,10 +11,11 @@
 
 namespace catgut {
 
+// Which one a machine bears: render/quality.h.
 enum class Quality {
   draft,   // one sample a pixel, 1024 shadow map: for previews and for machines without a graphics card
   medium,  // four samples, 2048 shadow map
-  good     // and ambient occlusion
+  good     // and a 4096 shadow map, ambient occlusion, a glow about highlights
 };
 
 struct Overlay {
@@ -27,6 +28,8 @@ class Renderer {
  public:
   virtual ~Renderer() = default;
   virtual Image render(const Snapshot& snapshot, const Camera& camera, const Overlay& overlay = {}) = 0;
+  // The same without the picture; comes back when it has been drawn. For measuring.
+  virtual void draw(const Snapshot& snapshot, const Camera& camera) = 0;
 };
 
 // Throws std::runtime_error with one line to act on: no EGL driver on this machine, or a build without pictures.

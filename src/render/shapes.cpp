@@ -1,4 +1,4 @@
-// render/shapes: the building blocks; see shapes.h. Tools, needle and cloth are in instruments.cpp.
+// render/shapes: the building blocks; see shapes.h. Tools and needle are in instruments.cpp, what lies about them in cloth.cpp.
 #include "render/shapes.h"
 
 namespace catgut {
@@ -134,6 +134,8 @@ void add_shape(Shape& to, const Shape& from) {
   to.tangent.insert(to.tangent.end(), from.tangent.begin(), from.tangent.end());
   to.uv.insert(to.uv.end(), from.uv.begin(), from.uv.end());
   to.colour.insert(to.colour.end(), from.colour.begin(), from.colour.end());
+  to.hatched.resize(first, 0);
+  to.hatched.insert(to.hatched.end(), from.hatched.begin(), from.hatched.end());
   for (const auto [a, b, c] : from.triangle) to.triangle.push_back({a + first, b + first, c + first});
 }
 

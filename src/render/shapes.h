@@ -13,7 +13,8 @@ namespace catgut {
 struct Shape {
   std::vector<Vec3> position, normal, tangent;  // tangent: along the u of uv
   std::vector<std::array<float, 2>> uv;
-  std::vector<Vec3> colour;  // linear
+  std::vector<Vec3> colour;    // linear
+  std::vector<float> hatched;  // 1 on gripping faces of tools; may be shorter than the rest, which is then smooth
   std::vector<std::array<uint32_t, 3>> triangle;
 };
 
@@ -49,9 +50,17 @@ struct ToolShape {
 };
 ToolShape tool_shape(ToolKind kind);
 
-// The sterile drape: a cloth with folds round a hole of radius `hole` about (centre.x, centre.z), at height centre.y.
+// The sterile drape: a cloth with folds at height centre.y, with a hole along an ellipse about (centre.x, centre.z) that is
+// `hole` wide at least; 0: without a hole.
 Shape drape_shape(Vec3 centre, float hole, float size);
-// What lies in the drape's hole round the organ.
+// What lies in the drape's hole round the organ: the fat of the wound's edges.
 Shape wound_bed_shape(Vec3 centre, float radius);
+float hole_radius(float hole, float angle);  // [m] of the ellipse
+
+// A damp gauze swab laid over the end of an organ that lies on the drape. `body`: its surface; `away`: unit, level, from the
+// work to that end. It hangs down to height `ground` on all sides but the one toward the work.
+Shape swab_shape(std::span<const Vec3> body, Vec3 away, float ground);
+// A roll of gauze under it, from `from` to `to` [m] along `away` from `middle`.
+Shape cushion_shape(Vec3 middle, Vec3 away, float from, float to, float top, float ground);
 
 }  // namespace catgut

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <stdexcept>
 #include <vector>
 
@@ -34,7 +35,7 @@ auto guarded(const std::string& where, Work&& work) {
   try {
     return work();
   } catch (const InputError&) { throw; } catch (const std::runtime_error& error) {
-    throw InputError(where, error.what(), "leave out --video, --frames and --contact-sheet to run without pictures");
+    throw InputError(where, error.what(), "leave out --video, --frames, --still and --contact-sheet to run without pictures");
   }
 }
 
@@ -51,8 +52,11 @@ struct Pictures::Studio {
   std::vector<SheetCell> moment;
   Snapshot last;  // of the run so far, for the sheet's last cell
   std::string last_caption;
+  const PictureModel model;
+  std::unique_ptr<Renderer> still_renderer;
 
-  Studio(const PictureOptions& o, const PictureModel& model) : options(o), follow(model), camera(overview(model)) {
+  Studio(const PictureOptions& o, const PictureModel& m) : options(o), follow(m), camera(overview(m)), model(m) {
+    std::sort(options.still.begin(), options.still.end(), std::greater<>());  // the next one last
     renderer = make_renderer(model, o.width, o.height, Quality::draft);
     if (!o.video.empty()) film = std::make_unique<VideoWriter>(o.video, o.width, o.height, o.rate);
     if (!o.frames.empty()) std::filesystem::create_directories(o.frames);
@@ -79,7 +83,15 @@ struct Pictures::Studio {
     moment.resize((moment.size() + 1) / 2);
   }
 
+  // From where the work is seen best at that moment, whatever the film's camera does.
+  void take_still(const Snapshot& seen) {
+    if (!still_renderer) still_renderer = make_renderer(model, options.still_width, options.still_height, Quality::good);
+    write_png(still_renderer->render(seen, FollowCamera(model).update(seen, 0)), options.still.back().second);
+    options.still.pop_back();
+  }
+
   void tick(const Snapshot& seen, const std::string& doing) {
+    while (!options.still.empty() && seen.time_s >= options.still.back().first) take_still(seen);
     const bool sheet =
         !options.contact_sheet.empty() && (moment.empty() || (seen.time_s >= last_moment_s + kMomentsApart && is_moment(seen)));
     const bool frame_due = (film || !options.frames.empty()) && seen.time_s >= next_s;
@@ -102,6 +114,9 @@ struct Pictures::Studio {
 
   void finish() {
     if (film) film->finish();
+    if (!options.still.empty())
+      throw std::runtime_error(
+          fmt::format("the run ended before {} s, the moment of {}", options.still.back().first, options.still.back().second));
     if (options.contact_sheet.empty() || moment.empty()) return;
     moment.push_back({take(last, {}), last_caption});
     std::vector<SheetCell> cell;

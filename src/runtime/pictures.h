@@ -3,6 +3,8 @@
 #pragma once
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
@@ -13,10 +15,13 @@ struct PictureOptions {
   std::string frames;         // folder for one PNG per picture; empty: none
   std::string video;          // MP4; empty: none
   std::string contact_sheet;  // PNG of up to twelve moments; empty: none
-  double speed = 4;           // simulated seconds per second of film
-  double rate = 30;           // pictures per second of film
+  // Single moments, large and in the best quality: simulated time [s] and PNG. In any order.
+  std::vector<std::pair<double, std::string>> still;
+  double speed = 4;  // simulated seconds per second of film
+  double rate = 30;  // pictures per second of film
   int width = 640, height = 360;
-  bool any() const { return !frames.empty() || !video.empty() || !contact_sheet.empty(); }
+  int still_width = 1280, still_height = 800;
+  bool any() const { return !frames.empty() || !video.empty() || !contact_sheet.empty() || !still.empty(); }
 };
 
 class Pictures {

@@ -2,6 +2,7 @@
 // mirror decides whether they look wet and like steel.
 #include "render/filament/environment.h"
 
+#include <array>
 #include <cstdlib>
 #include <cstring>
 #include <vector>
@@ -15,30 +16,55 @@ namespace {
 
 using filament::Texture;
 
+constexpr Vec3 kCool{0.92f, 0.97f, 1.0f};
+
 float smooth_step(float a, float b, float x) {
   const float t = std::clamp((x - a) / (b - a), 0.0f, 1.0f);
   return t * t * (3 - 2 * t);
 }
 
+// The main lamp's cluster of round heads, and a satellite. full, fade: cosines of the angles to where a head is bright and
+// where it ends.
+struct Head {
+  Vec3 middle, light;
+  float full, fade;
+};
+const std::vector<Head>& heads() {
+  static const std::vector<Head> all = [] {
+    std::vector<Head> made;
+    const auto head = [&](Vec3 middle, float radius, float glow, Vec3 tint) {
+      made.push_back({normalized(middle), tint * glow, std::cos(0.8f * radius), std::cos(1.1f * radius)});
+    };
+    const Vec3 warm{1.0f, 0.96f, 0.90f};
+    for (int i = 0; i < 6; ++i) {
+      const float a = 2 * kPi * float(i) / 6;
+      head({0.30f + 0.27f * std::cos(a), 1, 0.50f + 0.27f * std::sin(a)}, 0.075f, 13, warm);
+    }
+    head({0.30f, 1, 0.50f}, 0.075f, 13, warm);
+    head({-0.95f, 0.8f, -0.5f}, 0.16f, 6, kCool);
+    return made;
+  }();
+  return all;
+}
+
 // Radiance from direction d, in units of the environment's intensity.
 Vec3 radiance(Vec3 d) {
   // Walls: pale above the horizon, the drape's green from below.
-  const Vec3 ceiling{0.70f, 0.74f, 0.78f}, wall{0.62f, 0.66f, 0.68f}, floor{0.11f, 0.24f, 0.20f};
-  Vec3 c = d.y > 0 ? lerp(wall, ceiling, d.y) : lerp(wall * 0.6f, floor, smooth_step(0, 0.35f, -d.y));
-  // The main lamp's cluster of round heads, and a satellite.
-  const auto head = [&](Vec3 middle, float radius, float glow, Vec3 tint) {
-    const float away = std::acos(std::clamp(dot(d, normalized(middle)), -1.0f, 1.0f));
-    c += tint * (glow * (1 - smooth_step(radius * 0.8f, radius * 1.1f, away)));
-  };
-  const Vec3 warm{1.0f, 0.96f, 0.90f}, cool{0.92f, 0.97f, 1.0f};
-  for (int i = 0; i < 6; ++i) {
-    const float a = 2 * kPi * float(i) / 6;
-    head({0.25f + 0.24f * std::cos(a), 1, 0.30f + 0.24f * std::sin(a)}, 0.105f, 13, warm);
+  const Vec3 ceiling{0.70f, 0.74f, 0.78f}, wall{0.62f, 0.66f, 0.68f}, floor{0.30f, 0.36f, 0.35f};
+  // Gowned people stand about the table: a dim band with gaps, at the height that instruments mirror.
+  const float people = smooth_step(-0.15f, 0.05f, d.y) * (1 - smooth_step(0.25f, 0.45f, d.y)) *
+                       smooth_step(-0.2f, 0.5f, std::sin(5 * std::atan2(d.x, d.z) + 0.6f));
+  Vec3 c = d.y > 0 ? lerp(wall, ceiling, d.y) : lerp(wall * 0.75f, floor, smooth_step(0, 0.45f, -d.y));
+  c = lerp(c, {0.26f, 0.36f, 0.38f}, 0.6f * people);
+  for (const Head& h : heads()) {
+    const float near = dot(d, h.middle);
+    if (near > h.fade) c += h.light * smooth_step(h.fade, h.full, near);
   }
-  head({0.25f, 1, 0.30f}, 0.105f, 13, warm);
-  head({-0.95f, 0.8f, -0.5f}, 0.20f, 6, cool);
   // A light panel along the wall behind the surgeon: the long highlight on instruments.
-  if (d.z > 0.3f && std::abs(d.y / d.z - 0.55f) < 0.10f && std::abs(d.x / d.z) < 0.9f) c += cool * 3.0f;
+  if (d.z > 0.3f) {
+    const float up = std::abs(d.y / d.z - 0.55f), across = std::abs(d.x / d.z);
+    c += kCool * (2.4f * (1 - smooth_step(0.03f, 0.14f, up)) * (1 - smooth_step(0.5f, 1.0f, across)));
+  }
   return c;
 }
 
@@ -85,6 +111,28 @@ Vec3 blurred(Vec3 n, float roughness, uint32_t samples) {
   return sum / std::max(weight, 1e-6f);
 }
 
+constexpr int levels = 5, base = 128;
+using Mirrored = std::array<std::vector<float>, levels>;
+
+// Filament looks up level (levels - 1) * q (2 - q) for perceptual roughness q: solved for q at each level.
+Mirrored mirror_environment() {
+  Mirrored all;
+  for (int level = 0; level < levels; ++level) {
+    const int size = base >> level;
+    const float lod = float(level) / float(levels - 1), q = 1 - std::sqrt(1 - lod), roughness = std::max(q * q, 1e-4f);
+    std::vector<float>& pixels = all[size_t(level)];
+    pixels.reserve(size_t(6 * size * size * 3));
+    for (int face = 0; face < 6; ++face)
+      for (int y = 0; y < size; ++y)
+        for (int x = 0; x < size; ++x) {
+          const Vec3 d = cube_direction(face, 2 * (float(x) + 0.5f) / float(size) - 1, 2 * (float(y) + 0.5f) / float(size) - 1);
+          const Vec3 c = level == 0 ? radiance(d) : blurred(d, roughness, level == 1 ? 48 : 128);
+          pixels.insert(pixels.end(), {c.x, c.y, c.z});
+        }
+  }
+  return all;
+}
+
 Texture::PixelBufferDescriptor floats(const std::vector<float>& data) {
   const size_t bytes = data.size() * sizeof(float);
   void* copy = std::malloc(bytes);
@@ -95,7 +143,6 @@ Texture::PixelBufferDescriptor floats(const std::vector<float>& data) {
 }  // namespace
 
 Environment make_environment(filament::Engine& engine, float intensity) {
-  constexpr int levels = 5, base = 128;
   Environment environment;
   environment.reflections = Texture::Builder()
                                 .width(base)
@@ -104,21 +151,10 @@ Environment make_environment(filament::Engine& engine, float intensity) {
                                 .sampler(Texture::Sampler::SAMPLER_CUBEMAP)
                                 .format(Texture::InternalFormat::R11F_G11F_B10F)
                                 .build(engine);
-  // Filament looks up level (levels - 1) * q (2 - q) for perceptual roughness q: solved for q at each level.
-  for (int level = 0; level < levels; ++level) {
-    const int size = base >> level;
-    const float lod = float(level) / float(levels - 1), q = 1 - std::sqrt(1 - lod), roughness = std::max(q * q, 1e-4f);
-    std::vector<float> pixels;
-    pixels.reserve(size_t(6 * size * size * 3));
-    for (int face = 0; face < 6; ++face)
-      for (int y = 0; y < size; ++y)
-        for (int x = 0; x < size; ++x) {
-          const Vec3 d = cube_direction(face, 2 * (float(x) + 0.5f) / float(size) - 1, 2 * (float(y) + 0.5f) / float(size) - 1);
-          const Vec3 c = level == 0 ? radiance(d) : blurred(d, roughness, level == 1 ? 48 : 128);
-          pixels.insert(pixels.end(), {c.x, c.y, c.z});
-        }
-    environment.reflections->setImage(engine, size_t(level), floats(pixels), Texture::FaceOffsets(size_t(size * size * 12)));
-  }
+  static const Mirrored mirrored = mirror_environment();  // the same for every renderer of the program
+  for (int level = 0; level < levels; ++level)
+    environment.reflections->setImage(engine, size_t(level), floats(mirrored[size_t(level)]),
+                                      Texture::FaceOffsets(size_t((base >> level) * (base >> level) * 12)));
 
   // Diffuse light: the first nine spherical harmonics of the radiance. The lamps are left to the lamp that casts shadows, by
   // cutting what is brighter than the walls.

@@ -12,7 +12,8 @@ struct Environment {
 };
 Environment make_environment(filament::Engine& engine, float intensity);
 
-// Tileable patterns for tissue. pattern: r mottling, g vessels, b blood in the wall. bumps: rg serosa's slope, ba mucosa's.
+// Tileable patterns for tissue. pattern: r mottling, g vessels, b blood in the wall, a which
+// vessels are veins. bumps: rg serosa's slope, ba mucosa's.
 struct TissueTextures {
   filament::Texture* pattern = nullptr;
   filament::Texture* bumps = nullptr;

@@ -30,8 +30,22 @@ class FilamentRenderer final : public Renderer {
   }
 
   Image render(const Snapshot& snapshot, const Camera& camera, const Overlay& overlay) override {
-    theatre_->show(snapshot, camera, width_, height_, overlay.suture_points);
     Image image = make_image(width_, height_, {0, 0, 0, 255});
+    draw_into(snapshot, camera, overlay.suture_points, width_, height_, image);
+    for (size_t i = 3; i < image.rgba.size(); i += 4) image.rgba[i] = 255;
+    draw_caption(image, overlay.caption);
+    return image;
+  }
+
+  void draw(const Snapshot& snapshot, const Camera& camera) override {
+    Image one = make_image(1, 1, {0, 0, 0, 255});  // reading any pixel waits for all of them
+    draw_into(snapshot, camera, false, 1, 1, one);
+  }
+
+ private:
+  void draw_into(const Snapshot& snapshot, const Camera& camera, bool suture_points, int read_width, int read_height,
+                 Image& image) {
+    theatre_->show(snapshot, camera, width_, height_, suture_points);
     // Filament may ask to skip a frame when it thinks the driver is behind; a picture that was asked for is always made.
     bool begun = false;
     for (int i = 0; i < 20 && !begun; ++i)
@@ -39,16 +53,12 @@ class FilamentRenderer final : public Renderer {
     if (!begun) throw std::runtime_error("no picture: the graphics driver does not accept a frame");
     renderer_->render(theatre_->view());
     renderer_->readPixels(
-        0, 0, uint32_t(width_), uint32_t(height_),
+        0, 0, uint32_t(read_width), uint32_t(read_height),
         {image.rgba.data(), image.rgba.size(), filament::Texture::Format::RGBA, filament::Texture::Type::UBYTE});
     renderer_->endFrame();
     engine_->flushAndWait();
-    for (size_t i = 3; i < image.rgba.size(); i += 4) image.rgba[i] = 255;
-    draw_caption(image, overlay.caption);
-    return image;
   }
 
- private:
   int width_, height_;
   std::unique_ptr<filament::backend::Platform> platform_;
   filament::Engine* engine_ = nullptr;

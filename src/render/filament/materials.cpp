@@ -21,6 +21,9 @@ constexpr uint8_t kShadow[] = {
 constexpr uint8_t kMarker[] = {
 #include "marker.inc"
 };
+constexpr uint8_t kMark[] = {
+#include "mark.inc"
+};
 }  // namespace
 
 std::span<const uint8_t> tissue_material() { return kTissue; }
@@ -29,5 +32,6 @@ std::span<const uint8_t> metal_material() { return kMetal; }
 std::span<const uint8_t> drape_material() { return kDrape; }
 std::span<const uint8_t> shadow_material() { return kShadow; }
 std::span<const uint8_t> marker_material() { return kMarker; }
+std::span<const uint8_t> mark_material() { return kMark; }
 
 }  // namespace catgut

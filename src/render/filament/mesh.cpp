@@ -3,6 +3,8 @@
 
 #include <cstdlib>
 #include <cstring>
+#include <map>
+#include <mutex>
 
 #include <filament/RenderableManager.h>
 #include <filament/TransformManager.h>
@@ -19,16 +21,48 @@ using filament::VertexBuffer;
 using filament::math::float3;
 using filament::math::mat3f;
 using filament::math::mat4f;
-using filament::math::short4;
 
 float3 f3(Vec3 v) { return {v.x, v.y, v.z}; }
 
-// Buffers are read on Filament's own thread some time later, so each upload is a copy that frees itself.
+// Buffers are read on Filament's own thread some time later, so each upload is a copy of its own. Copies of a size that was
+// used before are used again.
+class Copies {
+ public:
+  void* take(size_t bytes) {
+    const std::lock_guard lock(mutex_);
+    std::vector<void*>& free = free_[bytes];
+    if (free.empty()) return std::malloc(std::max<size_t>(1, bytes));
+    void* p = free.back();
+    free.pop_back();
+    return p;
+  }
+  void give_back(void* p, size_t bytes) {
+    const std::lock_guard lock(mutex_);
+    std::vector<void*>& free = free_[bytes];
+    // More than this are in flight only while something loads.
+    if (free.size() < 8) free.push_back(p);
+    else std::free(p);
+  }
+  ~Copies() {
+    for (auto& [bytes, free] : free_)
+      for (void* p : free) std::free(p);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<size_t, std::vector<void*>> free_;
+};
+Copies copies;
+
+VertexBuffer::BufferDescriptor hand_over(void* data, size_t bytes) {
+  return {data, bytes, [](void* p, size_t size, void*) { copies.give_back(p, size); }};
+}
+
 template <class T>
 VertexBuffer::BufferDescriptor copy_of(std::span<const T> data) {
-  void* copy = std::malloc(std::max<size_t>(1, data.size_bytes()));
+  void* copy = copies.take(data.size_bytes());
   if (!data.empty()) std::memcpy(copy, data.data(), data.size_bytes());
-  return {copy, data.size_bytes(), [](void* p, size_t, void*) { std::free(p); }};
+  return hand_over(copy, data.size_bytes());
 }
 
 filament::Box to_box(Box3 b) {
@@ -52,20 +86,24 @@ Box3 bounds(std::span<const Vec3> points) {
 }
 
 GpuMesh make_mesh(filament::Engine& engine, filament::Scene& scene, std::span<const VertexLook> look,
-                  std::span<const std::array<uint32_t, 3>> triangle, filament::MaterialInstance* material, bool casts_shadow) {
+                  std::span<const std::array<uint32_t, 3>> triangle, filament::MaterialInstance* material, bool casts_shadow,
+                  bool live) {
   GpuMesh mesh;
   mesh.vertex_count = uint32_t(look.size());
-  mesh.vertices = VertexBuffer::Builder()
-                      .vertexCount(std::max(1u, mesh.vertex_count))
-                      .bufferCount(3)
-                      .attribute(VertexAttribute::POSITION, 0, VertexBuffer::AttributeType::FLOAT3)
-                      .attribute(VertexAttribute::TANGENTS, 1, VertexBuffer::AttributeType::SHORT4)
-                      .normalized(VertexAttribute::TANGENTS)
-                      .attribute(VertexAttribute::COLOR, 2, VertexBuffer::AttributeType::FLOAT4, 0, sizeof(VertexLook))
-                      .attribute(VertexAttribute::UV0, 2, VertexBuffer::AttributeType::FLOAT2, 16, sizeof(VertexLook))
-                      .attribute(VertexAttribute::UV1, 2, VertexBuffer::AttributeType::FLOAT2, 24, sizeof(VertexLook))
-                      .build(engine);
+  VertexBuffer::Builder builder;
+  builder.vertexCount(std::max(1u, mesh.vertex_count))
+      .bufferCount(live ? 4 : 3)
+      .attribute(VertexAttribute::POSITION, 0, VertexBuffer::AttributeType::FLOAT3)
+      .attribute(VertexAttribute::TANGENTS, 1, VertexBuffer::AttributeType::SHORT4)
+      .normalized(VertexAttribute::TANGENTS)
+      .attribute(VertexAttribute::COLOR, 2, VertexBuffer::AttributeType::FLOAT4, 0, sizeof(VertexLook))
+      .attribute(VertexAttribute::UV0, 2, VertexBuffer::AttributeType::FLOAT2, 16, sizeof(VertexLook))
+      .attribute(VertexAttribute::UV1, 2, VertexBuffer::AttributeType::FLOAT2, 24, sizeof(VertexLook));
+  if (live)
+    builder.attribute(VertexAttribute::CUSTOM0, 3, VertexBuffer::AttributeType::UBYTE4).normalized(VertexAttribute::CUSTOM0);
+  mesh.vertices = builder.build(engine);
   mesh.vertices->setBufferAt(engine, 2, copy_of(look));
+  if (live) set_live(engine, mesh, std::vector<VertexLive>(std::max<size_t>(1, look.size())));
   mesh.indices = filament::IndexBuffer::Builder()
                      .indexCount(uint32_t(std::max<size_t>(1, triangle.size()) * 3))
                      .bufferType(filament::IndexBuffer::IndexType::UINT)
@@ -84,13 +122,14 @@ GpuMesh make_mesh(filament::Engine& engine, filament::Scene& scene, std::span<co
 }
 
 GpuMesh make_mesh(filament::Engine& engine, filament::Scene& scene, const Shape& shape, filament::MaterialInstance* material,
-                  bool casts_shadow) {
+                  bool casts_shadow, bool live) {
   std::vector<VertexLook> look(shape.position.size());
   for (size_t i = 0; i < look.size(); ++i) {
     const Vec3 c = shape.colour[i];
-    look[i] = {{c.x, c.y, c.z, 1}, {shape.uv[i][0], shape.uv[i][1]}, {1, 0}};
+    const float hatched = i < shape.hatched.size() ? shape.hatched[i] : 0;
+    look[i] = {{c.x, c.y, c.z, 1 - hatched}, {shape.uv[i][0], shape.uv[i][1]}, {1, 0}};
   }
-  const GpuMesh mesh = make_mesh(engine, scene, look, shape.triangle, material, casts_shadow);
+  const GpuMesh mesh = make_mesh(engine, scene, look, shape.triangle, material, casts_shadow, live);
   set_surface(engine, mesh, shape.position, shape.normal, shape.tangent);
   return mesh;
 }
@@ -105,25 +144,54 @@ void destroy_mesh(filament::Engine& engine, filament::Scene& scene, GpuMesh& mes
   mesh = {};
 }
 
-void set_surface(filament::Engine& engine, const GpuMesh& mesh, std::span<const Vec3> position, std::span<const Vec3> normal,
-                 std::span<const Vec3> tangent, std::span<const uint8_t> mirrored) {
-  std::vector<short4> frame(position.size());
-  for (size_t i = 0; i < position.size(); ++i) {
-    const Vec3 n = normal[i];
-    const Vec3 t = normalized(tangent[i] - n * dot(tangent[i], n), any_perpendicular(n));
-    const Vec3 b = !mirrored.empty() && mirrored[i] ? cross(t, n) : cross(n, t);
-    const auto q = mat3f::packTangentFrame(mat3f{f3(t), f3(b), f3(n)});
-    const auto pack = [](float x) { return int16_t(std::lround(std::clamp(x, -1.0f, 1.0f) * 32767.0f)); };
-    frame[i] = {pack(q.x), pack(q.y), pack(q.z), pack(q.w)};
+PackedFrame pack_frame(Quat q, bool mirrored) {
+  // The sign of w says which way the texture runs, so w must never round to 0.
+  constexpr float least = 1.0f / 32767;
+  float s = q.w < 0 ? -1.0f : 1.0f;
+  float w = s * q.w;
+  if (w < least) {
+    w = least;
+    s *= std::sqrt(1 - least * least);
   }
-  mesh.vertices->setBufferAt(engine, 0, copy_of(position));
-  mesh.vertices->setBufferAt(engine, 1, copy_of(std::span<const short4>(frame)));
+  if (mirrored) s = -s, w = -w;
+  // Rounded by hand: lround is a call.
+  const auto pack = [](float x) { return static_cast<int16_t>(static_cast<int>(x * 32767.0f + 32768.5f) - 32768); };
+  return {pack(s * q.x), pack(s * q.y), pack(s * q.z), pack(w)};
+}
+
+Quat frame_of(Vec3 n, Vec3 tangent) {
+  const Vec3 t = normalized(tangent - n * dot(tangent, n), any_perpendicular(n));
+  return from_axes(t, cross(n, t), n);
+}
+
+Surface new_surface(uint32_t vertices) {
+  return {{static_cast<Vec3*>(copies.take(vertices * sizeof(Vec3))), vertices},
+          {static_cast<PackedFrame*>(copies.take(vertices * sizeof(PackedFrame))), vertices}};
+}
+
+void upload_surface(filament::Engine& engine, const GpuMesh& mesh, const Surface& surface, Box3 box) {
+  mesh.vertices->setBufferAt(engine, 0, hand_over(surface.position.data(), surface.position.size_bytes()));
+  mesh.vertices->setBufferAt(engine, 1, hand_over(surface.frame.data(), surface.frame.size_bytes()));
   RenderableManager& manager = engine.getRenderableManager();
-  manager.setAxisAlignedBoundingBox(manager.getInstance(mesh.entity), to_box(bounds(position)));
+  manager.setAxisAlignedBoundingBox(manager.getInstance(mesh.entity), to_box(box));
+}
+
+void set_surface(filament::Engine& engine, const GpuMesh& mesh, std::span<const Vec3> position, std::span<const Vec3> normal,
+                 std::span<const Vec3> tangent) {
+  const Surface surface = new_surface(uint32_t(position.size()));
+  for (size_t i = 0; i < position.size(); ++i) {
+    surface.position[i] = position[i];
+    surface.frame[i] = pack_frame(frame_of(normal[i], tangent[i]));
+  }
+  upload_surface(engine, mesh, surface, bounds(position));
 }
 
 void set_look(filament::Engine& engine, const GpuMesh& mesh, std::span<const VertexLook> look) {
   mesh.vertices->setBufferAt(engine, 2, copy_of(look));
+}
+
+void set_live(filament::Engine& engine, const GpuMesh& mesh, std::span<const VertexLive> live) {
+  mesh.vertices->setBufferAt(engine, 3, copy_of(live));
 }
 
 void set_drawn(filament::Engine& engine, const GpuMesh& mesh, uint32_t triangles) {

@@ -24,6 +24,12 @@ struct VertexLook {
   float uv1[2];
 };
 
+// What of a vertex changes slowly while people work, each 0..255: how far tension has pressed the blood out of it, how much
+// blood lies on it. Meshes that have it are made with `live`.
+struct VertexLive {
+  uint8_t blanched = 0, bloody = 0, spare[2] = {};
+};
+
 struct GpuMesh {
   filament::VertexBuffer* vertices = nullptr;
   filament::IndexBuffer* indices = nullptr;
@@ -36,21 +42,37 @@ struct Box3 {
 };
 Box3 bounds(std::span<const Vec3> points);
 
-// Room for vertex_count vertices; the triangles are fixed, positions come with set_surface.
+// Room for look.size() vertices; the triangles are fixed, positions come with upload_surface.
 GpuMesh make_mesh(filament::Engine& engine, filament::Scene& scene, std::span<const VertexLook> look,
-                  std::span<const std::array<uint32_t, 3>> triangle, filament::MaterialInstance* material, bool casts_shadow);
+                  std::span<const std::array<uint32_t, 3>> triangle, filament::MaterialInstance* material, bool casts_shadow,
+                  bool live = false);
 // A mesh whose surface is that of `shape`.
 GpuMesh make_mesh(filament::Engine& engine, filament::Scene& scene, const Shape& shape, filament::MaterialInstance* material,
-                  bool casts_shadow);
+                  bool casts_shadow, bool live = false);
 void destroy_mesh(filament::Engine& engine, filament::Scene& scene, GpuMesh& mesh);
 
-// Uploads the surface for the next picture. tangent need not be at right angles to normal. mirrored: per vertex, whether the
-// texture runs clockwise there; may be empty.
+// The rotation that takes x to the tangent and z to the normal, in the form the graphics side wants it.
+using PackedFrame = std::array<int16_t, 4>;
+// mirrored: the texture runs clockwise there.
+PackedFrame pack_frame(Quat frame, bool mirrored = false);
+Quat frame_of(Vec3 normal, Vec3 tangent);  // tangent need not be at right angles to normal
+
+// A part of a mesh's next surface, to be written in place: what is uploaded every frame comes from memory that is used again,
+// so that a running picture allocates nothing. Each one must be handed to upload_surface, once.
+struct Surface {
+  std::span<Vec3> position;
+  std::span<PackedFrame> frame;
+};
+Surface new_surface(uint32_t vertices);
+void upload_surface(filament::Engine& engine, const GpuMesh& mesh, const Surface& surface, Box3 box);
+
+// Uploads the surface of shapes that seldom change.
 void set_surface(filament::Engine& engine, const GpuMesh& mesh, std::span<const Vec3> position, std::span<const Vec3> normal,
-                 std::span<const Vec3> tangent, std::span<const uint8_t> mirrored = {});
-// Replaces everything of a mesh that was made with at least as many vertices; draws `triangles` of its triangles from the
-// first.
+                 std::span<const Vec3> tangent);
+// The first vertices of a mesh that was made with at least as many.
 void set_look(filament::Engine& engine, const GpuMesh& mesh, std::span<const VertexLook> look);
+void set_live(filament::Engine& engine, const GpuMesh& mesh, std::span<const VertexLive> live);
+// Draws `triangles` of its triangles from the first.
 void set_drawn(filament::Engine& engine, const GpuMesh& mesh, uint32_t triangles);
 void set_pose(filament::Engine& engine, const GpuMesh& mesh, const Pose& pose);
 

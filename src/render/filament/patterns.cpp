@@ -11,7 +11,7 @@ namespace {
 
 using filament::Texture;
 
-constexpr int kSize = 512;
+constexpr int kSize = 1024;
 
 size_t at(int x, int y) { return size_t(y & (kSize - 1)) * kSize + size_t(x & (kSize - 1)); }
 
@@ -30,16 +30,28 @@ std::vector<float> noise(int cells, uint32_t seed) {
   std::vector<float> corner(size_t(cells * cells));
   for (float& c : corner) c = dice();
   std::vector<float> out(size_t(kSize) * kSize);
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x) {
-      const float fx = float(x) * float(cells) / kSize, fy = float(y) * float(cells) / kSize;
-      const int ix = int(fx), iy = int(fy);
-      float tx = fx - float(ix), ty = fy - float(iy);
-      tx = tx * tx * (3 - 2 * tx);
-      ty = ty * ty * (3 - 2 * ty);
-      const auto c = [&](int i, int j) { return corner[size_t((iy + j) % cells * cells + (ix + i) % cells)]; };
-      out[at(x, y)] = (c(0, 0) * (1 - tx) + c(1, 0) * tx) * (1 - ty) + (c(0, 1) * (1 - tx) + c(1, 1) * tx) * ty;
+  // Across first, for one row of cells at a time: everything else is two multiplications a point.
+  const auto smooth = [cells](int at, int& cell) {
+    const float f = float(at) * float(cells) / kSize, t = f - std::floor(f);
+    cell = int(f);
+    return t * t * (3 - 2 * t);
+  };
+  std::vector<float> part(kSize), row(size_t(cells) + 1);
+  std::vector<int> cell(kSize);
+  for (int x = 0; x < kSize; ++x) part[size_t(x)] = smooth(x, cell[size_t(x)]);
+  for (int y = 0; y < kSize; ++y) {
+    int iy;
+    const float ty = smooth(y, iy);
+    for (int i = 0; i <= cells; ++i) {
+      const float a = corner[size_t(iy % cells * cells + i % cells)], b = corner[size_t((iy + 1) % cells * cells + i % cells)];
+      row[size_t(i)] = a + (b - a) * ty;
     }
+    float* to = &out[at(0, y)];
+    for (size_t x = 0; x < size_t(kSize); ++x) {
+      const float a = row[size_t(cell[x])], b = row[size_t(cell[x]) + 1];
+      to[x] = a + (b - a) * part[x];
+    }
+  }
   return out;
 }
 
@@ -55,26 +67,36 @@ std::vector<float> octaves(int cells, int count, float falloff, uint32_t seed) {
   return sum;
 }
 
-// One vessel: a wandering stroke that thins and throws off branches.
-void draw_vessel(std::vector<float>& map, Dice& dice, float x, float y, float heading, float width, float reach, int depth) {
+// One vessel: a wandering stroke that thins and throws off branches. `vein`: darker and bluer, drawn into its own channel.
+struct Vessels {
+  std::vector<float> there = std::vector<float>(size_t(kSize) * kSize), vein = std::vector<float>(size_t(kSize) * kSize);
+};
+void draw_vessel(Vessels& map, Dice& dice, float x, float y, float heading, float width, float reach, float vein, int depth) {
   const float first = heading;
+  float turning = 0;
   for (float done = 0; done < reach; done += 1) {
-    const float w = width * (1 - 0.75f * done / reach);
-    const int r = int(w) + 2;
+    const float w = std::max(0.55f, width * (1 - 0.8f * done / reach));
+    const int r = int(1.8f * w) + 2;
+    // What is thinner than a texel is fainter instead.
+    const float strength = std::min(1.0f, 0.10f + 0.40f * w) * std::min(1.0f, 4 * (1 - done / reach));
     for (int j = -r; j <= r; ++j)
       for (int i = -r; i <= r; ++i) {
         const float dx = std::floor(x) + float(i) - x, dy = std::floor(y) + float(j) - y;
         const float d2 = (dx * dx + dy * dy) / (w * w);
-        float& m = map[at(int(std::floor(x)) + i, int(std::floor(y)) + j)];
-        m = std::max(m, std::min(1.0f, 0.30f + 0.42f * w) * std::exp(-d2));
+        if (d2 > 2.2f) continue;
+        const float ink = strength * std::exp(-d2 * d2);
+        const size_t k = at(int(std::floor(x)) + i, int(std::floor(y)) + j);
+        if (ink > map.there[k]) map.there[k] = ink, map.vein[k] = vein;
       }
     x += std::cos(heading);
     y += std::sin(heading);
-    heading += 0.28f * (dice() - 0.5f) + 0.04f * (first - heading);
-    if (depth > 0 && dice() < 0.022f) {
+    turning = 0.90f * turning + 0.045f * (dice() - 0.5f);
+    heading += turning + 0.025f * (first - heading);
+    if (depth > 0 && done > 0.08f * reach && dice() < 0.020f) {
       const float side = dice() < 0.5f ? -1.0f : 1.0f;
-      draw_vessel(map, dice, x, y, heading + side * (0.5f + 0.6f * dice()), 0.68f * w, (0.25f + 0.4f * dice()) * reach,
+      draw_vessel(map, dice, x, y, heading + side * (0.45f + 0.5f * dice()), 0.62f * w, (0.30f + 0.45f * dice()) * reach, vein,
                   depth - 1);
+      heading -= side * 0.15f;
     }
   }
 }
@@ -102,37 +124,52 @@ Texture* upload(filament::Engine& engine, const std::vector<uint8_t>& pixels) {
   return texture;
 }
 
-}  // namespace
-
-TissueTextures make_tissue_textures(filament::Engine& engine) {
-  const std::vector<float> mottle = octaves(4, 6, 0.62f, 11), blood = octaves(3, 4, 0.55f, 23);
-  std::vector<float> vessel(size_t(kSize) * kSize);
+struct Patterns {
+  std::vector<uint8_t> pattern, bumps;
+};
+Patterns make_patterns() {
+  const std::vector<float> mottle = octaves(6, 5, 0.66f, 11), blood = octaves(5, 4, 0.55f, 23);
+  Vessels vessel;
   Dice dice{5};
-  // Trunks run round the organ (texture v) from both sides, as they come from the mesentery; fine ones everywhere.
-  for (int i = 0; i < 5; ++i)
-    draw_vessel(vessel, dice, (float(i) + 0.6f * dice()) * kSize / 5, kSize * dice(), dice() < 0.5f ? 1.57f : -1.57f,
-                2.0f + 1.4f * dice(), kSize * (0.6f + 0.4f * dice()), 3);
-  for (int i = 0; i < 26; ++i)
-    draw_vessel(vessel, dice, kSize * dice(), kSize * dice(), 2 * kPi * dice(), 0.7f + 0.5f * dice(), 90 + 80 * dice(), 1);
+  // Straight vessels run round the organ (texture v) from both sides, an artery and its vein together, as they come from the
+  // mesentery; fine ones everywhere between them.
+  for (int i = 0; i < 7; ++i) {
+    const float x = (float(i) + 0.7f * dice()) * kSize / 7, y = kSize * dice(), way = i % 2 ? 1.57f : -1.57f;
+    const float width = 1.9f + 1.6f * dice(), reach = kSize * (0.45f + 0.35f * dice());
+    draw_vessel(vessel, dice, x, y, way, 1.25f * width, reach, 1, 2);
+    draw_vessel(vessel, dice, x + 3.2f * width, y + 10, way, 0.8f * width, reach, 0, 3);
+  }
+  for (int i = 0; i < 60; ++i)
+    draw_vessel(vessel, dice, kSize * dice(), kSize * dice(), 2 * kPi * dice(), 0.6f + 0.6f * dice(), 60 + 110 * dice(), 0, 2);
 
-  std::vector<uint8_t> pattern(size_t(kSize) * kSize * 4, 255);
+  Patterns made{std::vector<uint8_t>(size_t(kSize) * kSize * 4), std::vector<uint8_t>(size_t(kSize) * kSize * 4)};
+  std::vector<uint8_t>& pattern = made.pattern;
   for (size_t i = 0; i < mottle.size(); ++i) {
-    pattern[i * 4] = uint8_t(255 * std::clamp(1.6f * (mottle[i] - 0.5f) + 0.5f, 0.0f, 1.0f));
-    pattern[i * 4 + 1] = uint8_t(255 * std::clamp(vessel[i], 0.0f, 1.0f));
-    pattern[i * 4 + 2] = uint8_t(255 * std::clamp(2.4f * (blood[i] - 0.5f) + 0.4f, 0.0f, 1.0f));
+    pattern[i * 4] = uint8_t(255 * std::clamp(1.7f * (mottle[i] - 0.5f) + 0.5f, 0.0f, 1.0f));
+    pattern[i * 4 + 1] = uint8_t(255 * std::clamp(vessel.there[i], 0.0f, 1.0f));
+    pattern[i * 4 + 2] = uint8_t(255 * std::clamp(2.6f * (blood[i] - 0.5f) + 0.45f, 0.0f, 1.0f));
+    pattern[i * 4 + 3] = uint8_t(255 * vessel.vein[i]);
   }
 
-  // Serosa: fine grain, its vessels a little raised. Mucosa: the folds and pits of a velvety lining.
-  std::vector<float> serosa = octaves(7, 4, 0.5f, 37), mucosa = octaves(12, 4, 0.5f, 53);
+  // Serosa: long soft swellings with a fine grain on them, its vessels a little raised. Mucosa: the folds and pits of a velvety
+  // lining.
+  const std::vector<float> swelling = octaves(14, 2, 0.5f, 37), grain = octaves(96, 2, 0.6f, 41);
+  std::vector<float> serosa(size_t(kSize) * kSize), mucosa = octaves(22, 4, 0.55f, 53);
   for (size_t i = 0; i < serosa.size(); ++i) {
-    serosa[i] = 3.2f * serosa[i] + 0.25f * vessel[i];
+    serosa[i] = 5.0f * swelling[i] + 0.55f * grain[i] + 0.35f * vessel.there[i];
     const float ridge = 1 - std::abs(2 * mucosa[i] - 1);
     mucosa[i] = 4.0f * ridge * ridge;
   }
-  std::vector<uint8_t> bumps(size_t(kSize) * kSize * 4);
-  slopes(serosa, 2.2f, 0, bumps);
-  slopes(mucosa, 1.6f, 2, bumps);
-  return {upload(engine, pattern), upload(engine, bumps)};
+  slopes(serosa, 2.6f, 0, made.bumps);
+  slopes(mucosa, 1.8f, 2, made.bumps);
+  return made;
+}
+
+}  // namespace
+
+TissueTextures make_tissue_textures(filament::Engine& engine) {
+  static const Patterns made = make_patterns();  // the same for every renderer of the program
+  return {upload(engine, made.pattern), upload(engine, made.bumps)};
 }
 
 }  // namespace catgut

@@ -15,29 +15,38 @@ namespace catgut {
 namespace {
 
 // From the main lamp, over the surgeon's right shoulder.
-constexpr Vec3 kLampDirection{-0.24f, -1.0f, -0.32f};
+constexpr Vec3 kLampDirection{-0.30f, -1.0f, -0.50f};
 
 }  // namespace
 
-Theatre::Theatre(filament::Engine& engine, const PictureModel& model, Quality quality) : model_(model), engine_(engine) {
+Theatre::Theatre(filament::Engine& engine, const PictureModel& model, Quality quality, int eyes)
+    : model_(model), engine_(engine) {
   scene_ = engine_.createScene();
-  view_ = engine_.createView();
-  camera_entity_ = utils::EntityManager::get().create();
-  camera_ = engine_.createCamera(camera_entity_);
-  view_->setScene(scene_);
-  view_->setCamera(camera_);
-  set_quality(quality);
+  grading_ = filament::ColorGrading::Builder()
+                 .toneMapping(filament::ColorGrading::ToneMapping::ACES)
+                 .quality(filament::ColorGrading::QualityLevel::MEDIUM)
+                 .build(engine_);
+  for (int i = 0; i < eyes; ++i) {
+    Eye eye{engine_.createView(), nullptr, utils::EntityManager::get().create()};
+    eye.camera = engine_.createCamera(eye.entity);
+    eye.view->setScene(scene_);
+    eye.view->setCamera(eye.camera);
+    set_quality(*eye.view, quality);
+    eye_.push_back(eye);
+  }
   set_light(quality);
   make_materials();
   make_stage();
   thread_ = make_thread_view(engine_, *scene_, model_, thread_material_);
+  mark_ = make_mark_view(engine_, *scene_, mark_material_);
 }
 
 Theatre::~Theatre() {
   for (TissueView& t : tissue_) destroy_mesh(engine_, *scene_, t.gpu);
   for (ToolView3d& t : tool_)
     for (GpuMesh& m : t.part) destroy_mesh(engine_, *scene_, m);
-  for (GpuMesh* m : {&needle_, &drape_, &drape_shadow_, &bed_, &thread_.gpu}) destroy_mesh(engine_, *scene_, *m);
+  for (GpuMesh* m : {&needle_, &bed_, &thread_.gpu, &mark_.gpu}) destroy_mesh(engine_, *scene_, *m);
+  for (GpuMesh& m : cloth_) destroy_mesh(engine_, *scene_, m);
   for (GpuMesh& m : marker_) destroy_mesh(engine_, *scene_, m);
   engine_.destroy(tissue_material_);
   engine_.destroy(thread_material_);
@@ -46,6 +55,7 @@ Theatre::~Theatre() {
   engine_.destroy(drape_material_);
   engine_.destroy(shadow_material_);
   engine_.destroy(marker_material_);
+  engine_.destroy(mark_material_);
   for (filament::Material* m : material_) engine_.destroy(m);
   engine_.destroy(textures_.pattern);
   engine_.destroy(textures_.bumps);
@@ -55,23 +65,34 @@ Theatre::~Theatre() {
   engine_.destroy(grading_);
   engine_.destroy(lamp_);
   utils::EntityManager::get().destroy(lamp_);
-  engine_.destroyCameraComponent(camera_entity_);
-  utils::EntityManager::get().destroy(camera_entity_);
-  engine_.destroy(view_);
+  for (const Eye& eye : eye_) {
+    engine_.destroyCameraComponent(eye.entity);
+    utils::EntityManager::get().destroy(eye.entity);
+    engine_.destroy(eye.view);
+  }
   engine_.destroy(scene_);
 }
 
-void Theatre::show(const Snapshot& snapshot, const Camera& camera, int width, int height, bool suture_points) {
-  view_->setViewport({0, 0, uint32_t(width), uint32_t(height)});
-  const float distance_to_work = std::max(0.01f, distance(camera.eye, camera.target));
-  camera_->setProjection(double(camera.fov_deg), double(width) / height, double(0.1f * distance_to_work), 3.0,
-                         filament::Camera::Fov::VERTICAL);
-  camera_->lookAt({camera.eye.x, camera.eye.y, camera.eye.z}, {camera.target.x, camera.target.y, camera.target.z},
-                  {camera.up.x, camera.up.y, camera.up.z});
-  const float pixel = 2 * std::tan(0.5f * camera.fov_deg * kPi / 180) / (coarse_ * float(height));
+void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, int width, int height, bool suture_points) {
+  for (size_t i = 0; i < eye_.size(); ++i) {
+    const Camera& camera = cameras[std::min(i, cameras.size() - 1)];
+    eye_[i].view->setViewport({0, 0, uint32_t(width), uint32_t(height)});
+    const float distance_to_work = std::max(0.01f, distance(camera.eye, camera.target));
+    eye_[i].camera->setProjection(double(camera.fov_deg), double(width) / height, double(0.1f * distance_to_work), 3.0,
+                                  filament::Camera::Fov::VERTICAL);
+    eye_[i].camera->lookAt({camera.eye.x, camera.eye.y, camera.eye.z}, {camera.target.x, camera.target.y, camera.target.z},
+                           {camera.up.x, camera.up.y, camera.up.z});
+  }
+  // Shadows no farther than a little behind the work: the map's points are where they are looked at.
+  filament::LightManager& lights = engine_.getLightManager();
+  shadow_.shadowFar = 3.2f * std::max(0.05f, distance(cameras[0].eye, cameras[0].target));
+  lights.setShadowOptions(lights.getInstance(lamp_), shadow_);
+  const float pixel = 2 * std::tan(0.5f * cameras[0].fov_deg * kPi / 180) / (coarse_ * float(height));
 
-  for (TissueView& t : tissue_) move_tissue(engine_, t, model_, snapshot);
-  move_thread(engine_, thread_, model_, snapshot, camera, pixel);
+  find_motion(model_.particle_rest, snapshot.particle, snapshot.rotation, motion_);
+  for (TissueView& t : tissue_) move_tissue(engine_, t, motion_, snapshot);
+  move_thread(engine_, thread_, model_, snapshot, tissue_, motion_, cameras[0], pixel);
+  move_marks(engine_, mark_, snapshot, tissue_, motion_);
   catgut::set_pose(engine_, needle_, snapshot.needle.pose);
   for (size_t i = 0; i < tool_.size(); ++i) move_tool(tool_[i], snapshot.tool[i]);
   show_markers(snapshot, suture_points);
@@ -84,22 +105,22 @@ void Theatre::draw_coarser(float part) {
   coarse.homogeneousScaling = true;
   coarse.minScale = coarse.maxScale = {part, part};
   coarse.quality = filament::View::QualityLevel::LOW;
-  view_->setDynamicResolutionOptions(coarse);
+  for (const Eye& eye : eye_) eye.view->setDynamicResolutionOptions(coarse);
 }
 
-void Theatre::set_quality(Quality quality) {
+void Theatre::set_quality(filament::View& view, Quality quality) {
   const bool good = quality == Quality::good;
-  view_->setSampleCount(quality == Quality::draft ? 1 : 4);
-  view_->setAntiAliasing(filament::View::AntiAliasing::FXAA);
-  view_->setDithering(filament::View::Dithering::NONE);
+  view.setSampleCount(quality == Quality::draft ? 1 : 4);
+  view.setAntiAliasing(filament::View::AntiAliasing::FXAA);
+  view.setDithering(filament::View::Dithering::NONE);
   filament::View::AmbientOcclusionOptions ao;
   ao.enabled = good;
   ao.radius = 0.006f;
   ao.bias = 0.0002f;
-  ao.intensity = 1.2f;
+  ao.intensity = 0.8f;
   ao.power = 1.2f;
   ao.quality = filament::View::QualityLevel::MEDIUM;
-  view_->setAmbientOcclusionOptions(ao);
+  view.setAmbientOcclusionOptions(ao);
   filament::View::BloomOptions bloom;
   // Never off: without it Filament grades the colours inside the main pass by framebuffer fetch, which Mesa's software
   // rasteriser gets wrong (the picture turns into coloured tiles). A tiny one costs nothing.
@@ -107,30 +128,24 @@ void Theatre::set_quality(Quality quality) {
   bloom.strength = good ? 0.06f : 0.02f;
   bloom.resolution = good ? 360 : 16;
   bloom.levels = good ? 4 : 3;
-  view_->setBloomOptions(bloom);
-  grading_ = filament::ColorGrading::Builder()
-                 .toneMapping(filament::ColorGrading::ToneMapping::ACES)
-                 .quality(filament::ColorGrading::QualityLevel::MEDIUM)
-                 .build(engine_);
-  view_->setColorGrading(grading_);
+  view.setBloomOptions(bloom);
+  view.setColorGrading(grading_);
 }
 
 void Theatre::set_light(Quality quality) {
-  environment_ = make_environment(engine_, 30000);
+  environment_ = make_environment(engine_, 44000);
   scene_->setIndirectLight(environment_.light);
   skybox_ = filament::Skybox::Builder().color({0.012f, 0.03f, 0.028f, 1}).build(engine_);
   scene_->setSkybox(skybox_);
   // Shadows at the scale of a thread: the library's own bias of a millimetre would swallow the thread's and needle's.
-  filament::LightManager::ShadowOptions shadow;
-  shadow.mapSize = quality == Quality::draft ? 1024 : 2048;
+  filament::LightManager::ShadowOptions& shadow = shadow_;
+  shadow.mapSize = quality == Quality::draft ? 1024 : quality == Quality::medium ? 2048 : 4096;
   shadow.constantBias = 0.0002f;
   shadow.normalBias = 0.8f;
-  shadow.shadowNearHint = 0.05f;
-  shadow.shadowFarHint = 0.6f;
   lamp_ = utils::EntityManager::get().create();
   filament::LightManager::Builder(filament::LightManager::Type::DIRECTIONAL)
       .color({1.0f, 0.965f, 0.91f})
-      .intensity(85000)
+      .intensity(64000)
       .direction({kLampDirection.x, kLampDirection.y, kLampDirection.z})
       .castShadows(true)
       .shadowOptions(shadow)
@@ -150,6 +165,8 @@ void Theatre::make_materials() {
   tissue_material_ = instance_of(tissue_material());
   tissue_material_->setParameter("pattern", textures_.pattern, repeat);
   tissue_material_->setParameter("bumps", textures_.bumps, repeat);
+  const Vec3 lamp = normalized(-kLampDirection);
+  tissue_material_->setParameter("lamp", filament::math::float3{lamp.x, lamp.y, lamp.z});
   thread_material_ = instance_of(thread_material());
   needle_material_ = instance_of(metal_material());
   needle_material_->setParameter("roughness", 0.22f);
@@ -158,6 +175,7 @@ void Theatre::make_materials() {
   drape_material_ = instance_of(drape_material());
   shadow_material_ = instance_of(shadow_material());
   marker_material_ = instance_of(marker_material());
+  mark_material_ = instance_of(mark_material());
 }
 
 void Theatre::make_stage() {
@@ -166,36 +184,33 @@ void Theatre::make_stage() {
     tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_));
     all.insert(all.end(), mesh.position.begin(), mesh.position.end());
   }
-  // The drape lies where the model says; its hole clears by a centimetre the tissue that stands up through it there.
+  // The drape lies where the model says. What stands up through it has a hole there, which it clears by a centimetre; what lies
+  // on it is held by gauze at its far end, as a surgeon's assistant would.
   Vec3 ground{model_.focus.x, model_.drape, model_.focus.z};
-  std::vector<Vec3> through;
+  std::vector<Vec3> through, sample;
   for (const Vec3 p : all)
     if (std::abs(p.y - ground.y) < 0.005f) through.push_back(p);
+  for (size_t i = 0; i < all.size(); i += 12) sample.push_back(all[i]);
+  float hole = 0;
   if (!through.empty()) {
     const Box3 box = bounds(through);
     ground.x = 0.5f * (box.low.x + box.high.x);
     ground.z = 0.5f * (box.low.z + box.high.z);
+    for (const Vec3 p : through) hole = std::max(hole, std::hypot(p.x - ground.x, p.z - ground.z));
+    hole += 0.01f;
+    bed_ = make_mesh(engine_, *scene_, wound_bed_shape(ground - Vec3{0, 0.0035f, 0}, hole + 0.004f), tissue_material_, false,
+                     true);
   }
-  float reach = 0;
-  for (const Vec3 p : through) reach = std::max(reach, std::hypot(p.x - ground.x, p.z - ground.z));
-  const float hole = reach + 0.01f;
-  const Shape cloth = drape_shape(ground, hole, 0.7f);
-  drape_ = make_mesh(engine_, *scene_, cloth, drape_material_, false);
-  // The cloth's share of lamp and room light, once (see drape.mat): the room is darker low down beside the organ.
-  std::vector<VertexLook> look(cloth.position.size());
-  for (size_t i = 0; i < look.size(); ++i) {
-    const Vec3 c = cloth.colour[i], p = cloth.position[i], n = cloth.normal[i];
-    const float away = std::hypot(p.x - ground.x, p.z - ground.z) - hole;
-    const float open = 1 - 0.55f * std::exp(-std::max(0.0f, away + 0.008f) / 0.03f);
-    const float lamp = 0.95f * std::max(0.0f, dot(n, normalized(-kLampDirection))), room = 0.30f * open * (0.5f + 0.5f * n.y);
-    look[i] = {{c.x, c.y, c.z, 1}, {cloth.uv[i][0], cloth.uv[i][1]}, {lamp + room, lamp / (lamp + room)}};
+  add_cloth(drape_shape(ground, hole, 0.7f), 22, sample, false);
+  for (const VisibleMesh& mesh : model_.body) {
+    if (!through.empty() || mesh.position.empty()) continue;
+    const Box3 box = bounds(mesh.position);
+    const Vec3 middle = 0.5f * (box.low + box.high), way = middle - model_.focus;
+    const Vec3 away =
+        std::abs(way.x) > std::abs(way.z) ? Vec3{std::copysign(1.0f, way.x), 0, 0} : Vec3{0, 0, std::copysign(1.0f, way.z)};
+    add_cloth(swab_shape(mesh.position, away, ground.y), 14, sample, true);
+    add_cloth(cushion_shape(middle, away, -0.022f, 0.03f, box.low.y + 0.001f, ground.y), 14, sample, true);
   }
-  set_look(engine_, drape_, look);
-  Shape over = cloth;
-  for (Vec3& p : over.position) p.y += 0.0001f;  // never level with the cloth, or the two would fight for pixels
-  drape_shadow_ = make_mesh(engine_, *scene_, over, shadow_material_, false);
-  set_look(engine_, drape_shadow_, look);
-  bed_ = make_mesh(engine_, *scene_, wound_bed_shape(ground - Vec3{0, 0.004f, 0}, hole + 0.01f), tissue_material_, false);
   needle_ = make_mesh(engine_, *scene_, needle_shape(model_), needle_material_, true);
   for (size_t i = 0; i < tool_.size(); ++i) {
     tool_[i].shape = tool_shape(model_.tool[i]);
@@ -203,6 +218,26 @@ void Theatre::make_stage() {
                      make_mesh(engine_, *scene_, tool_[i].shape.half, tool_material_, true),
                      make_mesh(engine_, *scene_, mirrored_x(tool_[i].shape.half), tool_material_, true)};
   }
+}
+
+// A cloth's share of lamp and room light, once (see drape.mat): the room is darker low down beside tissue.
+void Theatre::add_cloth(const Shape& cloth, float threads_per_cm, std::span<const Vec3> tissue, bool casts_shadow) {
+  std::vector<VertexLook> look(cloth.position.size());
+  for (size_t i = 0; i < look.size(); ++i) {
+    const Vec3 c = cloth.colour[i], p = cloth.position[i], n = cloth.normal[i];
+    float near = 1;
+    for (const Vec3 t : tissue) near = std::min(near, length2(t - p));
+    const float open = 1 - 0.5f * std::exp(-std::sqrt(near) / 0.012f);
+    const float lamp = 0.86f * std::max(0.0f, dot(n, normalized(-kLampDirection))), room = 0.42f * open * (0.5f + 0.5f * n.y);
+    look[i] = {{c.x, c.y, c.z, threads_per_cm}, {cloth.uv[i][0], cloth.uv[i][1]}, {lamp + room, lamp / (lamp + room)}};
+  }
+  cloth_.push_back(make_mesh(engine_, *scene_, cloth, drape_material_, casts_shadow));
+  set_look(engine_, cloth_.back(), look);
+  Shape over = cloth;
+  for (size_t i = 0; i < look.size(); ++i)
+    over.position[i] += cloth.normal[i] * 0.0001f;  // never level with the cloth, or the two would fight for pixels
+  cloth_.push_back(make_mesh(engine_, *scene_, over, shadow_material_, false));
+  set_look(engine_, cloth_.back(), look);
 }
 
 void Theatre::move_tool(const ToolView3d& view, const ToolView& tool) {

@@ -8,6 +8,7 @@
 #include <filament/Camera.h>
 #include <filament/ColorGrading.h>
 #include <filament/Engine.h>
+#include <filament/LightManager.h>
 #include <filament/Material.h>
 #include <filament/Scene.h>
 #include <filament/Skybox.h>
@@ -28,24 +29,35 @@ struct ToolView3d {
 
 class Theatre {
  public:
-  Theatre(filament::Engine& engine, const PictureModel& model, Quality quality);
+  // eyes: how many views of the same field there are, two for a headset.
+  Theatre(filament::Engine& engine, const PictureModel& model, Quality quality, int eyes = 1);
   ~Theatre();
   Theatre(const Theatre&) = delete;
   Theatre& operator=(const Theatre&) = delete;
 
-  // Moves everything to where the snapshot has it; the next frame that renders view() shows it.
-  void show(const Snapshot& snapshot, const Camera& camera, int width, int height, bool suture_points);
+  // Moves everything to where the snapshot has it, once for all eyes; the next frame that renders view() shows it. One camera
+  // per eye.
+  void show(const Snapshot& snapshot, std::span<const Camera> camera, int width, int height, bool suture_points);
+  void show(const Snapshot& snapshot, const Camera& camera, int width, int height, bool suture_points) {
+    show(snapshot, std::span(&camera, 1), width, height, suture_points);
+  }
   // Draws the field with `part` of the picture's points each way and stretches it: for windows on machines without a graphics
   // card.
   void draw_coarser(float part);
-  filament::View* view() const { return view_; }
+  filament::View* view(int eye = 0) const { return eye_[size_t(eye)].view; }
 
  private:
-  void set_quality(Quality quality);
+  struct Eye {
+    filament::View* view = nullptr;
+    filament::Camera* camera = nullptr;
+    utils::Entity entity;
+  };
+  void set_quality(filament::View& view, Quality quality);
   void set_light(Quality quality);
   filament::MaterialInstance* instance_of(std::span<const uint8_t> package);
   void make_materials();
   void make_stage();
+  void add_cloth(const Shape& cloth, float threads_per_cm, std::span<const Vec3> tissue, bool casts_shadow);
   void move_tool(const ToolView3d& view, const ToolView& tool);
   void show_markers(const Snapshot& snapshot, bool wanted);
 
@@ -53,9 +65,9 @@ class Theatre {
   const PictureModel model_;  // a copy: the theatre outlives whatever built it
   filament::Engine& engine_;
   filament::Scene* scene_ = nullptr;
-  filament::View* view_ = nullptr;
-  filament::Camera* camera_ = nullptr;
-  utils::Entity camera_entity_, lamp_;
+  std::vector<Eye> eye_;
+  utils::Entity lamp_;
+  filament::LightManager::ShadowOptions shadow_;
   filament::ColorGrading* grading_ = nullptr;
   filament::Skybox* skybox_ = nullptr;
   Environment environment_;
@@ -63,11 +75,14 @@ class Theatre {
   std::vector<filament::Material*> material_;
   filament::MaterialInstance *tissue_material_ = nullptr, *thread_material_ = nullptr, *needle_material_ = nullptr,
                              *tool_material_ = nullptr, *drape_material_ = nullptr, *shadow_material_ = nullptr,
-                             *marker_material_ = nullptr;
+                             *marker_material_ = nullptr, *mark_material_ = nullptr;
+  Motions motion_;  // of every particle, in the picture that is being made
   std::vector<TissueView> tissue_;
   ThreadView thread_;
+  MarkView mark_;
   std::array<ToolView3d, 2> tool_;
-  GpuMesh needle_, drape_, drape_shadow_, bed_;
+  GpuMesh needle_, bed_;
+  std::vector<GpuMesh> cloth_;  // each with the shadows on it
   std::vector<GpuMesh> marker_;
 };
 

@@ -6,40 +6,95 @@
 namespace catgut {
 namespace {
 
-constexpr int kSides = 8, kPerSpan = 4, kPerTurn = 12;
+constexpr int kSides = 8, kPerSpan = 4, kPerTurn = 14;
+constexpr uint32_t kRing = kSides + 1;
 constexpr uint32_t kRoomForTied = 4000;  // points of the curve for knots and settled stitches; what is beyond is not drawn
-const Vec3 kViolet = srgb(88, 58, 190);
+const Vec3 kViolet = srgb(98, 62, 178), kGuide = srgb(176, 150, 238);
 
-// Adds one more piece to the curve. Pieces are joined by points of no width, which cannot be seen.
-void add_piece(ThreadView& view, std::span<const Vec3> points, float width) {
+// Adds one more piece to the curve. It begins and ends with a point of no width, which closes its ends and hides the way to the
+// next piece.
+void add_piece(ThreadView& view, std::span<const Vec3> points, float width, bool guide = false) {
   if (points.size() < 2 || view.curve.size() + points.size() + 2 > view.capacity) return;
-  if (!view.curve.empty()) {
-    view.curve.push_back(view.curve.back());
-    view.radius.push_back(0);
-    view.curve.push_back(points.front());
-    view.radius.push_back(0);
-  }
-  for (const Vec3& p : points) view.curve.push_back(p), view.radius.push_back(width);
+  const auto add = [&](Vec3 p, float r) {
+    view.curve.push_back(p);
+    view.radius.push_back(r);
+    view.guide.push_back(guide);
+  };
+  add(points.front(), 0);
+  for (const Vec3& p : points) add(p, width);
+  add(points.back(), 0);
 }
 
-void add_strand(ThreadView& view, float width) {
+void add_strand(ThreadView& view, float width, bool guide = false) {
   smooth_curve(view.through, kPerSpan, view.piece);
-  add_piece(view, view.piece, width);
+  add_piece(view, view.piece, width, guide);
   view.through.clear();
 }
 
-// One throw: its turns lie round the stitch's two strands, which run along `way`.
-void add_throw(ThreadView& view, Vec3 at, Vec3 way, uint32_t wraps, int handed, float width) {
-  const Vec3 side = any_perpendicular(way), up = cross(way, side);
-  const float turns = static_cast<float>(wraps) + 0.5f, across = 2.6f * width, along = 2.1f * width * turns;
+Vec3 normal_at(Nearest at, std::span<const TissueView> tissue, const Motions& motion) {
+  if (at.body < 0) return {0, 1, 0};
+  return rotate(follow(tissue[size_t(at.body)].vertex[at.vertex], motion.of).frame, {0, 0, 1});
+}
+
+// Looks for the nearest tissue only when what was found last time is no longer near: it is a walk over every vertex.
+Nearest tissue_at(std::vector<Nearest>& known, size_t i, Vec3 point, float reach, std::span<const TissueView> tissue) {
+  if (known.size() <= i) known.resize(i + 1);
+  Nearest& n = known[i];
+  if (n.body < 0 || distance(tissue[size_t(n.body)].position[n.vertex], point) > reach)
+    n = nearest_vertex(tissue, point, reach);
+  return n;
+}
+
+// One throw: its two strands lie turned about each other along the stitch, one wrap more than they cross, and dip toward the
+// tissue at both ends. `above`: how far the throw lies from the knot's place along `out`.
+void add_throw(ThreadView& view, Vec3 at, Vec3 way, Vec3 out, float above, uint32_t wraps, int handed, float width) {
+  way = normalized(way - out * dot(way, out), any_perpendicular(out));
+  const Vec3 side = cross(way, out);
+  const float turns = 0.5f * (static_cast<float>(std::min(wraps, 6u)) + 1), along = 4.2f * width * turns;
   const int points = static_cast<int>(turns * kPerTurn);
-  view.piece.clear();
-  for (int i = 0; i <= points; ++i) {
-    const float part = static_cast<float>(i) / static_cast<float>(points),
-                a = static_cast<float>(handed) * 2 * kPi * turns * part;
-    view.piece.push_back(at + side * (across * std::cos(a)) + up * (across * std::sin(a)) + way * (along * (part - 0.5f)));
+  for (const float start : {0.0f, kPi}) {
+    view.piece.clear();
+    for (int i = -2; i <= points + 2; ++i) {
+      const float part = static_cast<float>(i) / static_cast<float>(points),
+                  a = start + static_cast<float>(handed) * 2 * kPi * turns * part;
+      const float bow = 2 * part - 1, sag = width * (0.9f * bow * bow);
+      view.piece.push_back(at + out * (above - sag + 1.02f * width * std::cos(a)) + side * (1.02f * width * std::sin(a)) +
+                           way * (along * (part - 0.5f)));
+    }
+    add_piece(view, view.piece, width);
   }
-  add_piece(view, view.piece, 1.15f * width);
+}
+
+// The ring of vertices round each point of the curve. The ring's frame is carried along the curve without turning about it, so
+// that the braid does not twist; each corner's own frame is that one turned about the curve.
+void write_tube(ThreadView& view, const Surface& surface) {
+  struct Corner {
+    float c, s;
+    Quat turn;
+  };
+  std::array<Corner, kRing> corner;
+  for (uint32_t k = 0; k < kRing; ++k) {
+    const float a = 2 * kPi * float(k) / kSides;
+    corner[k] = {std::cos(a), std::sin(a), axis_angle({1, 0, 0}, a)};
+  }
+  const size_t n = view.curve.size();
+  Vec3 along{0, 0, 1}, side{1, 0, 0};
+  float u = 0;
+  for (size_t i = 0; i < n; ++i) {
+    const Vec3 p = view.curve[i];
+    along = normalized(view.curve[i + 1 < n ? i + 1 : i] - view.curve[i > 0 ? i - 1 : i], along);
+    side = normalized(side - along * dot(side, along), any_perpendicular(along));
+    const Vec3 up = cross(along, side);
+    const Quat frame = from_axes(along, -up, side);
+    if (i > 0) u += distance(p, view.curve[i - 1]);
+    const Vec3 c = view.guide[i] ? kGuide : kViolet;
+    for (uint32_t k = 0; k < kRing; ++k) {
+      const size_t v = i * kRing + k;
+      surface.position[v] = p + view.radius[i] * (side * corner[k].c + up * corner[k].s);
+      surface.frame[v] = pack_frame(frame * corner[k].turn);
+      view.look[v] = {{c.x, c.y, c.z, view.guide[i] ? 1.0f : 0.0f}, {u, float(k) / kSides}, {1, 0}};
+    }
+  }
 }
 
 }  // namespace
@@ -49,17 +104,26 @@ ThreadView make_thread_view(filament::Engine& engine, filament::Scene& scene, co
   ThreadView view;
   if (model.thread_count < 2) return view;
   view.capacity = (model.thread_count - 1) * kPerSpan + 1 + kRoomForTied;
-  view.curve.assign(view.capacity, {});
-  view.radius.assign(view.capacity, 0);
-  add_tube(view.tube, view.curve, view.radius, kSides, kViolet);
-  view.gpu = make_mesh(engine, scene, view.tube, material, true);
+  view.look.resize(size_t(view.capacity) * kRing);
+  std::vector<std::array<uint32_t, 3>> triangle;
+  for (uint32_t i = 0; i + 1 < view.capacity; ++i)
+    for (uint32_t k = 0; k < uint32_t(kSides); ++k) {
+      const uint32_t a = i * kRing + k, b = a + kRing;
+      triangle.push_back({a, a + 1, b});
+      triangle.push_back({a + 1, b + 1, b});
+    }
+  for (auto* v : {&view.through, &view.piece, &view.curve}) v->reserve(view.capacity);
+  view.radius.reserve(view.capacity);
+  view.guide.reserve(view.capacity);
+  view.gpu = make_mesh(engine, scene, view.look, triangle, material, true);
+  set_drawn(engine, view.gpu, 0);
   return view;
 }
 
 void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel& model, const Snapshot& snapshot,
-                 const Camera& camera, float pixel) {
+                 std::span<const TissueView> tissue, const Motions& motion, const Camera& camera, float pixel) {
   if (view.capacity == 0) return;
-  view.curve.clear(), view.radius.clear(), view.through.clear();
+  view.curve.clear(), view.radius.clear(), view.guide.clear(), view.through.clear();
   const Vec3 ahead = normalized(camera.target - camera.eye);
   const float width = std::max(model.thread_radius, 0.75f * pixel * std::max(0.0f, dot(camera.target - camera.eye, ahead)));
   for (size_t i = 0; i < snapshot.thread_order.size(); ++i) {
@@ -68,38 +132,100 @@ void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel&
     if (i < snapshot.thread_cut.size() && snapshot.thread_cut[i]) add_strand(view, width);
   }
   add_strand(view, width);
-  for (const KnotView& knot : snapshot.knot)
-    for (uint32_t k = 0; k < knot.throws; ++k) {
-      const Vec3 at = knot.position + Vec3{0, (0.5f + 3.2f * static_cast<float>(k)) * width, 0};
-      add_throw(view, at, knot.way, knot.thrown[k].wraps, knot.thrown[k].handed, width);
-    }
+  const Pose& needle = snapshot.needle.pose;
+  if (snapshot.needle.in_tissue && snapshot.needle.bite < snapshot.bite.size() && is_finite(needle.p)) {
+    // It follows the needle's own arc as far as the needle goes, so that it shows the way the thread will take.
+    const Vec3 entry = snapshot.bite[snapshot.needle.bite].entry, swage = transform(needle, {model.needle_radius, 0, 0});
+    const Vec3 middle = 0.5f * (entry + swage), bow = normalized(middle - needle.p, {0, 1, 0});
+    view.through = {entry, middle + bow * (0.12f * distance(entry, swage)), swage};
+    if (is_finite(entry)) add_strand(view, 0.8f * width, true);
+    view.through.clear();
+  }
+  const float reach = 0.006f;
+  size_t tied = 0;
+  for (const KnotView& knot : snapshot.knot) {
+    const Vec3 out = normal_at(tissue_at(view.on_tissue, tied++, knot.position, reach, tissue), tissue, motion);
+    for (uint32_t k = 0; k < std::min<uint32_t>(knot.throws, KnotView::kMostThrows); ++k)
+      add_throw(view, knot.position, knot.way, out, (0.8f + 2.7f * static_cast<float>(k)) * width, knot.thrown[k].wraps,
+                knot.thrown[k].handed, width);
+  }
   for (const SettledView& stitch : snapshot.settled) {
-    view.through = stitch.node;
+    view.through.assign(stitch.node.begin(), stitch.node.end());
     const Vec3 way = stitch.node.size() > 1 ? normalized(stitch.node.back() - stitch.node.front(), {1, 0, 0}) : Vec3{1, 0, 0};
     add_strand(view, width);
     for (const Vec3& at : stitch.knot) {
-      add_throw(view, at + Vec3{0, 0.5f * width, 0}, way, 2, 1, width);
-      add_throw(view, at + Vec3{0, 3.7f * width, 0}, way, 1, -1, width);
+      const Vec3 out = normal_at(tissue_at(view.on_tissue, tied++, at, reach, tissue), tissue, motion);
+      add_throw(view, at, way, out, 0.8f * width, 2, 1, width);
+      add_throw(view, at, way, out, 3.5f * width, 1, -1, width);
     }
   }
-  if (view.curve.size() < 2) {
+  const uint32_t used = uint32_t(view.curve.size());
+  if (used < 2) {
     set_drawn(engine, view.gpu, 0);
     return;
   }
-  // Unused points stand at the end with no width, so that the mesh keeps its size.
-  const size_t used = view.curve.size();
-  view.curve.resize(view.capacity, view.curve.back());
-  view.radius.resize(view.capacity, 0);
-  view.tube.position.clear(), view.tube.normal.clear(), view.tube.tangent.clear(), view.tube.uv.clear();
-  view.tube.colour.clear(), view.tube.triangle.clear();
-  add_tube(view.tube, view.curve, view.radius, kSides, kViolet);
-  set_surface(engine, view.gpu, view.tube.position, view.tube.normal, view.tube.tangent);
-  std::vector<VertexLook> look(view.tube.position.size());
-  for (size_t i = 0; i < look.size(); ++i)
-    look[i] = {{kViolet.x, kViolet.y, kViolet.z, 1}, {view.tube.uv[i][0], view.tube.uv[i][1]}, {1, 0}};
-  set_look(engine, view.gpu, look);
-  // The triangles lie span after span, the caps last: a shorter thread is drawn without its far cap, which nobody sees.
-  set_drawn(engine, view.gpu, uint32_t(used - 1) * kSides * 2);
+  const Surface surface = new_surface(used * kRing);
+  write_tube(view, surface);
+  upload_surface(engine, view.gpu, surface, bounds(surface.position));
+  set_look(engine, view.gpu, std::span(view.look).first(size_t(used) * kRing));
+  set_drawn(engine, view.gpu, (used - 1) * kSides * 2);
+}
+
+namespace {
+
+constexpr uint32_t kMostMarks = 96, kMarkSides = 10, kMarkCorners = 1 + 2 * kMarkSides;
+
+}  // namespace
+
+MarkView make_mark_view(filament::Engine& engine, filament::Scene& scene, filament::MaterialInstance* material) {
+  MarkView view;
+  std::vector<VertexLook> look;
+  std::vector<std::array<uint32_t, 3>> triangle;
+  const Vec3 hole = srgb(52, 6, 8), bruise = srgb(120, 14, 20);
+  for (uint32_t m = 0; m < kMostMarks; ++m) {
+    const uint32_t first = m * kMarkCorners;
+    for (uint32_t i = 0; i < kMarkCorners; ++i) {
+      const Vec3 c = i <= kMarkSides ? hole : bruise;
+      look.push_back({{c.x, c.y, c.z, i <= kMarkSides ? 0.82f : 0.0f}, {0, 0}, {1, 0}});
+    }
+    for (uint32_t k = 0; k < kMarkSides; ++k) {
+      const uint32_t a = first + 1 + k, b = first + 1 + (k + 1) % kMarkSides;
+      triangle.push_back({first, a, b});
+      triangle.push_back({a, a + kMarkSides, b});
+      triangle.push_back({b, a + kMarkSides, b + kMarkSides});
+    }
+  }
+  view.gpu = make_mesh(engine, scene, look, triangle, material, false);
+  set_drawn(engine, view.gpu, 0);
+  return view;
+}
+
+void move_marks(filament::Engine& engine, MarkView& view, const Snapshot& snapshot, std::span<const TissueView> tissue,
+                const Motions& motion) {
+  const uint32_t count = uint32_t(std::min<size_t>(snapshot.suture_point.size(), kMostMarks));
+  set_drawn(engine, view.gpu, count * kMarkSides * 3);
+  if (count == 0) return;
+  const Surface surface = new_surface(count * kMarkCorners);
+  for (uint32_t m = 0; m < count; ++m) {
+    const SuturePointView& point = snapshot.suture_point[m];
+    const Nearest at = tissue_at(view.on_tissue, m, point.position, 0.003f, tissue);
+    const Vec3 out = normal_at(at, tissue, motion);
+    Vec3 centre = point.position;
+    // On the drawn surface, which may lie a little off the particles'.
+    if (at.body >= 0) centre -= out * dot(centre - tissue[size_t(at.body)].position[at.vertex], out);
+    centre += out * 0.00012f;
+    const Vec3 x = any_perpendicular(out), y = cross(out, x);
+    // A pulled thread draws its puncture open.
+    const float pulled = std::max(point.tension_needle, point.tension_free),
+                inner = 0.00017f + 0.00010f * std::min(2.0f, pulled);
+    for (uint32_t i = 0; i < kMarkCorners; ++i) {
+      const float a = 2 * kPi * float((i + kMarkSides - 1) % kMarkSides) / kMarkSides;
+      const float r = i == 0 ? 0 : i <= kMarkSides ? inner : 0.00062f;
+      surface.position[m * kMarkCorners + i] = centre + r * (x * std::cos(a) + y * std::sin(a));
+      surface.frame[m * kMarkCorners + i] = pack_frame(Quat{});
+    }
+  }
+  upload_surface(engine, view.gpu, surface, bounds(surface.position));
 }
 
 }  // namespace catgut

@@ -1,5 +1,6 @@
 // render/filament/thread_view: the suture thread as a smooth tube through its particles, in as many pieces as it was cut into;
-// knots as the turns of their throws; settled stitches. All of it is one mesh.
+// knots as the two strands of every throw turned about each other; settled stitches; the visual guide from a bite's entry to
+// the needle (paper 2.2). All of it is one mesh.
 #pragma once
 #include <vector>
 
@@ -7,6 +8,7 @@
 #include "exchange/snapshot.h"
 #include "render/camera.h"
 #include "render/filament/mesh.h"
+#include "render/filament/tissue_view.h"
 
 namespace catgut {
 
@@ -14,7 +16,9 @@ struct ThreadView {
   uint32_t capacity = 0;  // points of the drawn curve at most
   std::vector<Vec3> through, piece, curve;
   std::vector<float> radius;
-  Shape tube;
+  std::vector<uint8_t> guide;      // per point of the curve: 1 where it belongs to the visual guide
+  std::vector<Nearest> on_tissue;  // per knot, then per knot of settled stitches: the tissue that it lies on
+  std::vector<VertexLook> look;
   GpuMesh gpu;
 };
 
@@ -22,6 +26,15 @@ ThreadView make_thread_view(filament::Engine& engine, filament::Scene& scene, co
                             filament::MaterialInstance* material);
 // pixel: [m] that one pixel covers at 1 m from the camera; the thread is drawn wide enough to be seen.
 void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel& model, const Snapshot& snapshot,
-                 const Camera& camera, float pixel);
+                 std::span<const TissueView> tissue, const Motions& motion, const Camera& camera, float pixel);
+
+// The punctures: where the thread goes into the wall and comes out of it.
+struct MarkView {
+  std::vector<Nearest> on_tissue;  // per suture point
+  GpuMesh gpu;
+};
+MarkView make_mark_view(filament::Engine& engine, filament::Scene& scene, filament::MaterialInstance* material);
+void move_marks(filament::Engine& engine, MarkView& view, const Snapshot& snapshot, std::span<const TissueView> tissue,
+                const Motions& motion);
 
 }  // namespace catgut

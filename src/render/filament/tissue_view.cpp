@@ -1,14 +1,13 @@
 // render/filament/tissue_view: see tissue_view.h.
 #include "render/filament/tissue_view.h"
 
+#include <algorithm>
 #include <unordered_map>
-
-#include "geometry/skin.h"
 
 namespace catgut {
 namespace {
 
-constexpr float kTile = 4;  // [cm] one repeat of the tissue patterns
+constexpr float kTile = 6.3f;  // [cm] one repeat of the tissue patterns
 
 using Uv = std::array<float, 2>;
 
@@ -112,22 +111,134 @@ std::vector<float> baked_sky(const VisibleMesh& mesh) {
   return sky;
 }
 
-VertexLook look_of(const VisibleMesh& mesh, uint32_t v, Uv uv, float sky) {
+// Where a vertex of the cut lies between the organ's outside (0) and its inside (1): what decides which layer of the wall
+// shows.
+std::vector<float> baked_depth(const VisibleMesh& mesh) {
+  std::vector<float> depth(mesh.position.size(), 0);
+  std::vector<Vec3> outside, inside;
+  std::vector<size_t> cut;
+  for (size_t v = 0; v < depth.size() && v < mesh.layer.size(); ++v) {
+    if (mesh.layer[v] == TissueLayer::mucosa) depth[v] = 1;
+    if (mesh.layer[v] == TissueLayer::cut_edge) cut.push_back(v);
+  }
+  // Only what lies about a cut can be nearest to it.
+  constexpr float far = 0.006f;
+  std::vector<Vec3> sample;
+  for (size_t i = 0; i < cut.size(); i += 16) sample.push_back(mesh.position[cut[i]]);
+  for (size_t v = 0; v < depth.size() && v < mesh.layer.size(); ++v) {
+    if (mesh.layer[v] == TissueLayer::cut_edge) continue;
+    const bool near =
+        std::any_of(sample.begin(), sample.end(), [&](Vec3 p) { return length2(p - mesh.position[v]) < far * far; });
+    if (near) (mesh.layer[v] == TissueLayer::mucosa ? inside : outside).push_back(mesh.position[v]);
+  }
+  const auto away = [](const std::vector<Vec3>& points, Vec3 p) {
+    float least = 1;
+    for (const Vec3 q : points) least = std::min(least, length2(p - q));
+    return std::sqrt(least);
+  };
+  for (const size_t v : cut) {
+    const float a = away(outside, mesh.position[v]), b = away(inside, mesh.position[v]);
+    depth[v] = std::clamp(a / std::max(a + b, 1e-6f), 0.001f, 0.999f);
+  }
+  return depth;
+}
+
+// Broad patches with more or less blood, that no repeat of the texture can show. 0..1
+float flush(Vec3 p) {
+  return 0.5f + 0.25f * std::sin(173 * p.x + 67 * p.y + 1.3f) * std::sin(91 * p.z - 139 * p.y + 0.4f) +
+         0.25f * std::sin(59 * p.x - 83 * p.z + 2.1f) * std::sin(71 * p.y + 113 * p.x);
+}
+
+// Fat lies in lobules along the mesentery's side, from where the vessels come: behind an organ that stands, below one that
+// lies.
+constexpr Vec3 kMesentery{0, -0.55f, -0.835f};
+
+VertexLook look_of(const VisibleMesh& mesh, uint32_t v, Uv uv, float sky, float depth) {
   const TissueLayer layer = v < mesh.layer.size() ? mesh.layer[v] : TissueLayer::serosa;
+  const Vec3 p = mesh.position[v];
+  const float red = flush(p);
   Vec3 c;
-  float vessels = 0, mucosa = 0;
+  float vessels = 0;
   switch (layer) {
-    case TissueLayer::serosa:
-      c = srgb(228, 160, 146), vessels = 0.9f;
+    case TissueLayer::serosa: {
+      const float toward = dot(mesh.normal[v], kMesentery);
+      c = lerp(srgb(244, 194, 182), srgb(236, 154, 148), red);
+      // In drops and streaks along the organ, closing up toward the mesentery itself.
+      const float lobule = std::sin(1150 * p.x + 420 * p.y) * std::sin(930 * p.y - 610 * p.z + 380 * p.x) +
+                           0.6f * std::sin(2300 * p.z + 700 * p.y) * std::sin(1900 * p.x - 1700 * p.y);
+      const float fat = std::clamp((toward - 0.86f + 0.09f * lobule + 0.2f * (red - 0.5f)) / 0.10f, 0.0f, 1.0f);
+      c = lerp(c, srgb(250, 226, 176), 0.6f * fat);
+      vessels = (0.55f + 0.45f * std::clamp(0.5f + 0.9f * toward, 0.0f, 1.0f)) * (1 - 0.6f * fat);
       break;
+    }
     case TissueLayer::mucosa:
-      c = srgb(206, 92, 88), vessels = 0.35f, mucosa = 1;
+      c = lerp(srgb(226, 136, 124), srgb(212, 108, 100), red), vessels = 0.2f;
       break;
     case TissueLayer::cut_edge:
-      c = srgb(240, 204, 190);
+      c = srgb(226, 150, 138);
       break;
   }
-  return {{c.x, c.y, c.z, vessels}, {uv[0], uv[1]}, {sky, mucosa}};
+  return {{c.x, c.y, c.z, vessels}, {uv[0], uv[1]}, {sky, depth}};
+}
+
+constexpr float kReach = 0.0055f;  // [m] round a suture point that its tension whitens
+
+// How white tissue is pressed: a gentle pull shows a little, a newton a lot.
+float whiteness(float tension) { return 1 - std::exp(-1.6f * std::max(0.0f, tension - 0.05f)); }
+
+void reach_from(TissueView& view, Vec3 point, std::vector<Reached>& out) {
+  for (uint32_t v = 0; v < uint32_t(view.position.size()); ++v) {
+    const float d2 = length2(view.position[v] - point);
+    if (d2 > kReach * kReach) continue;
+    const float near = 1 - std::sqrt(d2) / kReach;
+    out.push_back({v, near * near * (3 - 2 * near)});
+    // A puncture bleeds a little and stains what is about it.
+    const float stain = near * near * near;
+    view.live[v].bloody = std::max(view.live[v].bloody, uint8_t(120 * stain * stain));
+  }
+}
+
+// Tension whitens the tissue round every suture point; it comes and goes over some pictures, as blood does.
+void blanch(filament::Engine& engine, TissueView& view, const Snapshot& snapshot) {
+  const size_t count = snapshot.suture_point.size();
+  bool changed = false;
+  const bool first = !view.shown;
+  view.shown = true;
+  if (view.reached.size() > count) {  // a bite was taken back, or a fresh suture begun
+    for (VertexLive& live : view.live) live.bloody = 0;
+    view.reached.clear();
+  }
+  while (view.reached.size() < count) {
+    changed = true;
+    view.reached.emplace_back();
+    reach_from(view, snapshot.suture_point[view.reached.size() - 1].position, view.reached.back());
+  }
+  for (const uint32_t v : view.pressed) view.press[v] = 0;
+  const auto add = [&](const std::vector<Reached>& reached, float white) {
+    for (const Reached& r : reached) {
+      if (!view.live[r.vertex].spare[0]) view.pressed.push_back(r.vertex);
+      view.live[r.vertex].spare[0] = 1;  // it is in the list
+      view.press[r.vertex] = std::max(view.press[r.vertex], r.weight * white);
+    }
+  };
+  for (size_t i = 0; i < count; ++i) {
+    const SuturePointView& point = snapshot.suture_point[i];
+    const float white = whiteness(std::max(point.tension_needle, point.tension_free));
+    if (white > 0.02f) add(view.reached[i], white);
+  }
+  for (const uint32_t v : view.pressed) {
+    const int want = int(255 * view.press[v]), have = view.live[v].blanched;
+    if (want == have) continue;
+    const int step = first ? want - have : std::clamp((want - have) / 6, -40, 40);
+    view.live[v].blanched = uint8_t(have + (step != 0 ? step : want > have ? 1 : -1));
+    changed = true;
+  }
+  std::erase_if(view.pressed, [&](uint32_t v) {
+    if (view.press[v] > 0 || view.live[v].blanched > 0) return false;
+    view.live[v].spare[0] = 0;
+    return true;
+  });
+  if (changed) set_live(engine, view.gpu, view.live);
 }
 
 }  // namespace
@@ -138,11 +249,10 @@ TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, co
   view.mesh = &mesh;
   const Unwrapped flat = unwrap(mesh);
   const size_t n = flat.source.size();
-  view.source = flat.source;
-  view.along.resize(n);
-  view.against.assign(n, 0);
   view.mirrored.assign(n, 0);
+  // The texture's direction at a vertex: of the edge there that runs most nearly along it.
   std::vector<float> best(n, -1);
+  std::vector<Vec3> tangent(n, Vec3{1, 0, 0});
   for (const auto& t : flat.triangle) {
     for (size_t k = 0; k < 3; ++k)
       for (const size_t other : {(k + 1) % 3, (k + 2) % 3}) {
@@ -150,36 +260,55 @@ TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, co
         const float straight = std::abs(du) / (std::hypot(du, dv) + 1e-12f);
         if (straight <= best[t[k]]) continue;
         best[t[k]] = straight;
-        view.along[t[k]] = flat.source[t[other]];
-        view.against[t[k]] = du < 0;
+        const Vec3 step = mesh.position[flat.source[t[other]]] - mesh.position[flat.source[t[k]]];
+        tangent[t[k]] = normalized(du < 0 ? -step : step, {1, 0, 0});
       }
     const Uv a = flat.uv[t[0]], b = flat.uv[t[1]], c = flat.uv[t[2]];
     if ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) < 0)
       for (const uint32_t v : t) view.mirrored[v] = 1;
   }
-  const std::vector<float> sky = baked_sky(mesh);
+  const std::vector<float> sky = baked_sky(mesh), depth = baked_depth(mesh);
   std::vector<VertexLook> look(n);
-  for (size_t i = 0; i < n; ++i) look[i] = look_of(mesh, flat.source[i], flat.uv[i], sky[flat.source[i]]);
-  view.position.resize(mesh.position.size());
-  view.normal.resize(mesh.position.size());
-  view.drawn_position.resize(n);
-  view.drawn_normal.resize(n);
-  view.drawn_tangent.resize(n);
-  view.gpu = make_mesh(engine, scene, look, flat.triangle, material, true);
+  view.vertex.resize(n);
+  for (size_t i = 0; i < n; ++i) {
+    const uint32_t v = flat.source[i];
+    look[i] = look_of(mesh, v, flat.uv[i], sky[v], depth[v]);
+    view.vertex[i] = {mesh.skin_particle[v], mesh.skin_weight[v], mesh.position[v], frame_of(mesh.normal[v], tangent[i])};
+    view.position.push_back(mesh.position[v]);
+    view.frame.push_back(pack_frame(view.vertex[i].frame, view.mirrored[i]));
+  }
+  view.live.resize(n);
+  view.press.assign(n, 0);
+  view.gpu = make_mesh(engine, scene, look, flat.triangle, material, true, true);
   return view;
 }
 
-void move_tissue(filament::Engine& engine, TissueView& view, const PictureModel& model, const Snapshot& snapshot) {
-  skin(*view.mesh, model.particle_rest, snapshot.particle, snapshot.rotation, view.position, view.normal);
-  for (size_t i = 0; i < view.source.size(); ++i) {
-    const Vec3 p = view.position[view.source[i]], step = view.position[view.along[i]] - p;
-    view.drawn_position[i] = p;
-    view.drawn_normal[i] = view.normal[view.source[i]];
-    view.drawn_tangent[i] = view.against[i] ? -step : step;
+void move_tissue(filament::Engine& engine, TissueView& view, const Motions& motion, const Snapshot& snapshot) {
+  for (size_t i = 0; i < view.vertex.size(); ++i) {
+    if (!has_moved(view.vertex[i], motion)) continue;
+    const Skinned at = follow(view.vertex[i], motion.of);
+    view.position[i] = at.position;
+    view.frame[i] = pack_frame(at.frame, view.mirrored[i]);
   }
-  // Tangents are steps of about a millimetre; unit length is what the frame expects.
-  for (Vec3& t : view.drawn_tangent) t = normalized(t, {1, 0, 0});
-  set_surface(engine, view.gpu, view.drawn_position, view.drawn_normal, view.drawn_tangent, view.mirrored);
+  const Surface surface = new_surface(uint32_t(view.vertex.size()));
+  std::copy(view.position.begin(), view.position.end(), surface.position.begin());
+  std::copy(view.frame.begin(), view.frame.end(), surface.frame.begin());
+  // Of the particles, which are fewer: no vertex is farther from them than this.
+  constexpr Vec3 margin{0.006f, 0.006f, 0.006f};
+  const Box3 box = bounds(motion.seen);
+  upload_surface(engine, view.gpu, surface, {box.low - margin, box.high + margin});
+  blanch(engine, view, snapshot);
+}
+
+Nearest nearest_vertex(std::span<const TissueView> tissue, Vec3 point, float reach) {
+  Nearest found;
+  float least = reach * reach;
+  for (size_t b = 0; b < tissue.size(); ++b)
+    for (uint32_t v = 0; v < uint32_t(tissue[b].position.size()); ++v) {
+      const float d2 = length2(tissue[b].position[v] - point);
+      if (d2 < least) least = d2, found = {int(b), v};
+    }
+  return found;
 }
 
 }  // namespace catgut

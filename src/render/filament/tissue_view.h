@@ -7,22 +7,40 @@
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "render/filament/mesh.h"
+#include "render/skinned.h"
 
 namespace catgut {
 
+// A vertex that tension presses the blood out of, and how much.
+struct Reached {
+  uint32_t vertex;
+  float weight;
+};
+
 struct TissueView {
-  const VisibleMesh* mesh = nullptr;   // the model's
-  std::vector<uint32_t> source;        // drawn vertex -> mesh vertex; vertices on a texture seam are drawn twice
-  std::vector<uint32_t> along;         // drawn vertex -> mesh vertex next to it in the texture's u direction
-  std::vector<uint8_t> against;        // whether `along` lies toward smaller u
-  std::vector<uint8_t> mirrored;       // whether the texture runs clockwise there
-  std::vector<Vec3> position, normal;  // of the mesh, from skin
-  std::vector<Vec3> drawn_position, drawn_normal, drawn_tangent;
+  const VisibleMesh* mesh = nullptr;  // the model's
+  std::vector<SkinnedVertex> vertex;  // as drawn; vertices on a texture seam are drawn twice
+  std::vector<uint8_t> mirrored;      // whether the texture runs clockwise there
+  std::vector<Vec3> position;         // as drawn, of the last picture
+  std::vector<PackedFrame> frame;
+  std::vector<VertexLive> live;
+  std::vector<float> press;  // per vertex, of this picture
+  // Where thread goes through the wall, found when it is first seen: by number of the suture point.
+  std::vector<std::vector<Reached>> reached;
+  std::vector<uint32_t> pressed;  // vertices with anything in `press`
+  bool shown = false;             // in a picture before
   GpuMesh gpu;
 };
 
 TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, const VisibleMesh& mesh,
                             filament::MaterialInstance* material);
-void move_tissue(filament::Engine& engine, TissueView& view, const PictureModel& model, const Snapshot& snapshot);
+void move_tissue(filament::Engine& engine, TissueView& view, const Motions& motion, const Snapshot& snapshot);
+
+// The drawn vertex nearest to a point, among all bodies; -1: none within `reach` [m].
+struct Nearest {
+  int body = -1;
+  uint32_t vertex = 0;
+};
+Nearest nearest_vertex(std::span<const TissueView> tissue, Vec3 point, float reach);
 
 }  // namespace catgut
