@@ -56,7 +56,7 @@ void add_play(CLI::App& app, int& exit_code) {
     read_size(o->size, o->play);
     o->play.quality = o->quality == "high" ? Quality::good : o->quality == "medium" ? Quality::medium : Quality::draft;
     if (!o->play.scene.empty()) read_scene(o->play.scene);  // its faults are told before a window opens
-    for (const std::string& path : {o->play.live.record, o->play.events, o->play.screenshot}) prepare_output(path);
+    for (const std::string& path : {o->play.live.record, o->play.events, o->play.screenshot}) check_output(path);
     exit_code = play(o->play);
   });
 }
