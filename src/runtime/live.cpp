@@ -102,6 +102,7 @@ struct Live::Work {
   TickInput input;
   Snapshot before, now;
   LiveStatus told;
+  StitchMap map;
   Moment settled;
   std::deque<BiteMoment> bites;
   std::array<std::optional<Moment>, 2> checkpoint;                    // the newest and the one before it
@@ -132,6 +133,7 @@ void Live::Work::begin() {
   if (!options.surgeon.empty()) surgeon = make_hands(options.surgeon, scene, picture);
   for (ToolInput& hand : input.hand) hand.connected = 0;
   record_from_here();
+  map = start_map(picture, dt);
   publish(*model, *state, now);
   before = now;
   told.paused = options.start_paused;
@@ -179,7 +181,10 @@ void Live::Work::tick(bool let_in) {
   publish(*model, *state, now);
   ++result.ticks;
   if (recorder) recorder->tick(input, hash_state(*model, *state));
-  if (let_in) note(told.practice, now, static_cast<float>(dt));
+  if (let_in) {
+    note(told.practice, now, static_cast<float>(dt));
+    note(map, picture, now);
+  }
   for (const Event& e : now.event) {
     told.events_lost += !events.push(e);
     if (e.kind == EventKind::tip_entered && checkpoint[0]) {
@@ -218,6 +223,7 @@ void Live::Work::go_back(const Moment& to) {
   load_state(*model, *state, to.state);
   publish(*model, *state, now);
   before = now;
+  rewind(map, now.tick);
   input.hand = to.hand;
   const uint32_t taken_back = told.practice.taken_back;
   told.practice = to.practice;
@@ -333,6 +339,7 @@ void Live::Work::run() {
     }
   told.fault.swap(result.fault);
   result.practice = told.practice;
+  result.map = std::move(map);
   result.state_hash = hash_state(*model, *state);
   try {
     if (recorder) recorder->finish(true);

@@ -15,6 +15,7 @@
 #include "exchange/snapshot.h"
 #include "exchange/tool_input.h"
 #include "runtime/practice.h"
+#include "runtime/stitch_map.h"
 #include "sim/scene.h"
 
 namespace catgut {
@@ -60,6 +61,7 @@ struct LiveStatus {
 
 struct LiveResult {
   Practice practice;
+  StitchMap map;
   uint64_t ticks = 0;  // all that were computed, those taken back included
   uint64_t state_hash = 0;
   std::vector<std::string> recorded;  // files written: a restart or a bite taken back begins the next one (NAME.2.cgrec ...)
