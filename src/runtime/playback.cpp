@@ -19,10 +19,10 @@ namespace catgut {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr double kKeepEvery = 1.0;      // [s] between kept states; a step back costs at most so much simulation
-constexpr size_t kMostKept = 600;       // some 200 kB each; with more every other one is dropped
-constexpr int kTogether = 8;            // ticks looked through before wishes are heard again
-constexpr int kGatherEvery = 30;        // ticks between two tellings of what was gathered
+constexpr double kKeepEvery = 1.0;  // [s] between kept states; a step back costs at most so much simulation
+constexpr size_t kMostKept = 600;   // some 200 kB each; with more every other one is dropped
+constexpr int kTogether = 8;        // ticks looked through before wishes are heard again
+constexpr int kGatherEvery = 30;    // ticks between two tellings of what was gathered
 constexpr auto kNap = std::chrono::milliseconds(2);
 
 double seconds_of(Clock::duration d) { return std::chrono::duration<double>(d).count(); }

@@ -18,10 +18,10 @@
 namespace catgut {
 
 struct PlaybackStatus {
-  uint64_t ticks = 0;      // recorded
-  uint64_t known = 0;      // ticks looked through so far; nothing later can be shown yet
-  uint64_t at = 0;         // ticks played until what is shown
-  uint64_t first = 0;      // tick of the start state: a recording may begin in the middle of the work
+  uint64_t ticks = 0;  // recorded
+  uint64_t known = 0;  // ticks looked through so far; nothing later can be shown yet
+  uint64_t at = 0;     // ticks played until what is shown
+  uint64_t first = 0;  // tick of the start state: a recording may begin in the middle of the work
   double tick_s = 1.0 / 60;
   bool playing = false;
   float speed = 1;
@@ -42,9 +42,9 @@ class Playback {
   const PictureModel& picture() const;
 
   void play(bool on);
-  void speed(float of_real_time);  // 0.05 .. 16
-  void go_to(uint64_t tick);       // 0 .. ticks, also while playing
-  bool look(Snapshot& out);        // as Live::look
+  void speed(float of_real_time);        // 0.05 .. 16
+  void go_to(uint64_t tick);             // 0 .. ticks, also while playing
+  bool look(Snapshot& out);              // as Live::look
   const PlaybackStatus& status() const;  // as of the last look()
   LiveResult result() const;             // of what is known so far; its `recorded` is the recording's name
 

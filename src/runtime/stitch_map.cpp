@@ -7,7 +7,7 @@
 namespace catgut {
 namespace {
 
-constexpr double kSampleTime = 0.1;       // [s]
+constexpr double kSampleTime = 0.1;      // [s]
 constexpr size_t kMostEvents = 20000;    // some hours of work
 constexpr size_t kMostSamples = 216000;  // six hours
 

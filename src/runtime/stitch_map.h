@@ -15,21 +15,21 @@ namespace catgut {
 
 // The edge that is sewn, at rest: the row of tissue particles round the opening of one wall, closed.
 struct StitchEdge {
-  std::vector<Vec3> point;       // [m]
-  std::vector<float> along;      // [m] from point[0], one more than points: the last is the edge's length
+  std::vector<Vec3> point;   // [m]
+  std::vector<float> along;  // [m] from point[0], one more than points: the last is the edge's length
   float length() const { return along.empty() ? 0 : along.back(); }
 };
 
 struct StitchBite {
-  uint64_t tick = 0;  // when it was complete
-  uint32_t bite = 0;  // its number, as events tell it
-  uint32_t suture = 0;  // how many needles were taken before
-  uint32_t wall = 0;    // of PictureModel::rim
-  Vec3 entry, exit;     // [m] at rest
+  uint64_t tick = 0;                      // when it was complete
+  uint32_t bite = 0;                      // its number, as events tell it
+  uint32_t suture = 0;                    // how many needles were taken before
+  uint32_t wall = 0;                      // of PictureModel::rim
+  Vec3 entry, exit;                       // [m] at rest
   float entry_along = 0, exit_along = 0;  // [m] along the edge, to the place nearest to it
   float entry_edge = -1, exit_edge = -1;  // [m] from there, the distance from the edge; -1: this wall has none
   float length = 0;                       // [m] from entry to exit
-  float depth = 0;  // [m] deepest the tip went below the surface (BiteView)
+  float depth = 0;                        // [m] deepest the tip went below the surface (BiteView)
   float entry_angle = -1;                 // [rad] off upright when the tip went in; -1: not seen
   // [m] of edge between this bite and the nearest end of the one before it on the same wall: the stretch that nothing holds.
   // -1: it is the first there.
@@ -44,7 +44,7 @@ struct TensionSample {
 };
 
 struct StitchMap {
-  double tick_s = 1.0 / 60;  // [s] of a tick
+  double tick_s = 1.0 / 60;      // [s] of a tick
   std::vector<StitchEdge> edge;  // of each wall; the second runs beside the first, from the place opposite to its start
   std::vector<StitchBite> bite;
   std::vector<TensionSample> tension;  // ten a second

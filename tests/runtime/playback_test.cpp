@@ -104,7 +104,8 @@ TEST(Playback, it_plays_at_the_speed_that_was_asked_for_and_stops_at_the_end) {
   p.speed(0.1f);
   p.go_to(30);
   ASSERT_TRUE(wait_for(p, seen, [](auto& s) { return s.at >= 30 && s.at < 60; }));
-  wait_for(p, seen, [](auto&) { return false; }, 0.4);
+  wait_for(
+      p, seen, [](auto&) { return false; }, 0.4);
   EXPECT_LT(p.status().at, 36u) << "a tenth of 24";
 }
 
@@ -141,7 +142,8 @@ TEST(Playback, what_cannot_be_replayed_is_refused) {
   EXPECT_TRUE(wait_for(p, seen, [](auto& s) { return s.ticks == 0; }));
   p.go_to(5);
   p.play(true);
-  wait_for(p, seen, [](auto&) { return false; }, 0.1);
+  wait_for(
+      p, seen, [](auto&) { return false; }, 0.1);
   EXPECT_EQ(p.status().at, 0u);
 }
 
