@@ -12,6 +12,7 @@
 namespace catgut {
 
 void add_play(CLI::App& app, int& exit_code);
+void add_view(CLI::App& app, int& exit_code);
 void add_run(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);

@@ -27,7 +27,12 @@ enum class Key {
   help_at_needle,
   finish,
   digit,
-  picture
+  picture,
+  settings,
+  developer,
+  save,
+  space,
+  step_back
 };
 
 struct WindowInput {
@@ -39,8 +44,10 @@ struct WindowInput {
   int speed = -1;  // of kMouseSpeeds, when a speed key was pressed
   Key key = Key::none;
   int digit = 0;
+  int arrow_presses = 0;  // right minus left, repeats included
   bool quit = false, resized = false;
-  bool left = false;      // the keyboard went to another window
+  bool left = false;      // the keyboard went to another window, or this one is hidden
+  bool pad_gone = false;  // the gamepad that was used was unplugged
   uint64_t moved_ns = 0;  // on the clock of runtime/live: when the newest motion was read
 };
 
@@ -51,8 +58,9 @@ class WindowEvents {
   WindowEvents(const WindowEvents&) = delete;
   WindowEvents& operator=(const WindowEvents&) = delete;
 
-  // Everything since the last call. working: the mouse belongs to the hands, else to the panels (ImGui's context is fed).
-  WindowInput read(bool working, float dt);
+  // Everything since the last call. working: the mouse belongs to the hands, else to the panels (ImGui's context is fed), and
+  // with look_round where no panel wants it to the camera.
+  WindowInput read(bool working, float dt, bool look_round = false);
   void panels_drawn() { clicked_ = false; }  // they have seen the clicks
   const std::string& pad_name() const { return pad_name_; }
 

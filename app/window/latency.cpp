@@ -9,7 +9,7 @@
 namespace catgut {
 
 void Latency::picture(const LiveStatus& s) {
-  if (s.moved_ns == 0 || s.moved_ns == shown_ns_ || s.moved_ns < stalled_ns_) return;
+  if (s.moved_ns == 0 || s.moved_ns == shown_ns_) return;
   shown_ns_ = s.moved_ns;
   const auto ms = [](uint64_t from, uint64_t to) { return to > from ? static_cast<float>(to - from) * 1e-6f : 0.0f; };
   const uint64_t now = wall_ns();

@@ -10,12 +10,11 @@ namespace catgut {
 struct Latency {
   // After a picture of `status` has been handed to the driver.
   void picture(const LiveStatus& status);
-  void stalled_until(uint64_t ns) { stalled_ns_ = ns; }  // motions before that waited for the loop, not for the program
   // A table on standard error: motion read -> tick that has it begins -> its snapshot is ready -> its picture is handed over.
   void report(int pictures, double seconds) const;
 
  private:
-  uint64_t shown_ns_ = 0, stalled_ns_ = 0;
+  uint64_t shown_ns_ = 0;
   std::vector<float> to_tick_ms_, in_tick_ms_, to_picture_ms_, all_ms_;
 };
 
