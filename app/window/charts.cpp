@@ -14,17 +14,25 @@ namespace catgut {
 namespace {
 
 // Where the scales end [mm]; what is beyond has the last colour, and its number says so.
-constexpr float kMostSpacing = 10, kMostDepth = 2, kMostEdge = 10;
+constexpr float kMostSpacing = 8, kMostDepth = 2, kMostEdge = 8;
+constexpr size_t kMostNumbered = 26;  // bites; with more the numbers would lie over each other
 // What surgeons' books ask of bites in bowel [mm]: 3 to 5 apart and from the edge.
 constexpr float kGoodFrom = 3, kGoodTo = 5;
 
 ImU32 colour(const ImVec4& c, float alpha = 1) { return ImGui::GetColorU32({c.x, c.y, c.z, c.w * alpha}); }
 
-float most(BiteColour by) { return by == BiteColour::spacing ? kMostSpacing : by == BiteColour::depth ? kMostDepth : kMostEdge; }
+float most(BiteColour by) {
+  return by == BiteColour::spacing ? kMostSpacing : by == BiteColour::depth ? kMostDepth : kMostEdge;
+}
 
 void label(ImDrawList& list, ImVec2 at, ImU32 c, const std::string& s, float x_part, float y_part, float scale = 1) {
   const ImVec2 size = ImGui::CalcTextSize(s.c_str());
   list.AddText(ImGui::GetFont(), em() * scale, {at.x - x_part * size.x * scale, at.y - y_part * size.y * scale}, c, s.c_str());
+}
+
+float bite_value_mm(const StitchBite& b, BiteColour by) {
+  const float far = std::max(b.entry_edge, b.exit_edge);
+  return 1000 * (by == BiteColour::spacing ? b.spacing : by == BiteColour::depth ? b.depth : far);
 }
 
 // A distance between grid lines that gives some four to eight of them.
@@ -57,13 +65,9 @@ ImU32 scale_colour(float part, float alpha) {
 }
 
 float bite_part(const StitchBite& b, BiteColour by, bool& known) {
-  const float value = by == BiteColour::spacing ? b.spacing : by == BiteColour::depth ? b.depth : std::max(b.entry_edge, b.exit_edge);
+  const float value = bite_value_mm(b, by);
   known = value >= 0;
-  return std::clamp(1000 * value / most(by), 0.0f, 1.0f);
-}
-
-const char* bite_colour_unit(BiteColour by) {
-  return by == BiteColour::spacing ? "spacing [mm]" : by == BiteColour::depth ? "depth [mm]" : "from the edge [mm]";
+  return std::clamp(value / most(by), 0.0f, 1.0f);
 }
 
 void scale_legend(BiteColour by, float width) {
@@ -94,7 +98,7 @@ void stitch_map_chart(const StitchMap& map, BiteColour by, ImVec2 size) {
   float deepest = 0.006f, spread = 0;  // [m] of tissue that is shown
   for (const StitchEdge& e : map.edge) walls += e.length() > 0;
   for (const StitchBite& b : map.bite) {
-    deepest = std::max({deepest, 1.25f * b.entry_edge, 1.25f * b.exit_edge});
+    deepest = std::max({deepest, 1.45f * b.entry_edge, 1.45f * b.exit_edge});
     if (b.wall < map.edge.size()) spread = std::max(spread, map.edge[b.wall].length());
   }
   if (walls == 0) {
@@ -117,7 +121,8 @@ void stitch_map_chart(const StitchMap& map, BiteColour by, ImVec2 size) {
     for (float d = 0.0025f; d < deepest; d += 0.0025f) {
       list.AddLine({left, line + way * d * pixels}, {right, line + way * d * pixels}, colour(kQuiet, 0.13f), thin);
       if (std::fmod(d + 1e-6f, 0.005f) < 1e-4f)
-        label(list, {left - 0.4f * em(), line + way * d * pixels}, colour(kQuiet), fmt::format("{:.0f}", 1000 * d), 1, 0.5f, 0.85f);
+        label(list, {left - 0.4f * em(), line + way * d * pixels}, colour(kQuiet), fmt::format("{:.0f}", 1000 * d), 1, 0.5f,
+              0.85f);
     }
     list.AddRectFilled({left, line + way * kGoodFrom * 1e-3f * pixels}, {right, line + way * kGoodTo * 1e-3f * pixels},
                        colour(kAccent, 0.10f));
@@ -161,6 +166,9 @@ void stitch_map_chart(const StitchMap& map, BiteColour by, ImVec2 size) {
     const float x = across ? in.x : (in.x + out.x) / 2;
     const float away = way * std::max(way * in.y, way * out.y) + way * (dot + 0.15f * em());
     label(list, {x, away}, colour(kText), fmt::format("{}", k + 1), 0.5f, way > 0 ? 0.0f : 1.0f, 0.85f);
+    if (known && map.bite.size() <= kMostNumbered)
+      label(list, {x, away + way * 0.85f * em()}, c, fmt::format("{:.1f}", bite_value_mm(b, by)), 0.5f, way > 0 ? 0.0f : 1.0f,
+            0.85f);
   }
   if (map.bite.empty())
     label(list, {(left + right) / 2, (middle + bottom) / 2}, colour(kQuiet), "no bite was completed", 0.5f, 0.5f);
@@ -176,7 +184,9 @@ void tension_chart(const StitchMap& map, uint64_t from, uint64_t to, double now,
   const float left = at.x + (labels ? 3.2f * em() : 0), right = at.x + size.x - (labels ? 1.2f * em() : 0),
               top = at.y + (labels ? 0.9f * em() : 0.2f * em()), bottom = at.y + size.y - (labels ? 1.5f * em() : 0);
   const double span = std::max<double>(1, static_cast<double>(to - from));
-  const auto x_of = [&](double tick) { return left + (right - left) * static_cast<float>((tick - static_cast<double>(from)) / span); };
+  const auto x_of = [&](double tick) {
+    return left + (right - left) * static_cast<float>((tick - static_cast<double>(from)) / span);
+  };
   const auto y_of = [&](float n) { return bottom - (bottom - top) * n / (1.08f * most_n); };
   const float thin = std::max(1.0f, 0.06f * em());
   if (labels) {
@@ -189,7 +199,8 @@ void tension_chart(const StitchMap& map, uint64_t from, uint64_t to, double now,
     for (double s = std::ceil(begin / step_s) * step_s; s <= begin + seconds + 1e-9; s += step_s) {
       const float x = x_of(s / map.tick_s);
       list.AddLine({x, bottom}, {x, bottom + 0.2f * em()}, colour(kQuiet), thin);
-      label(list, {x, bottom + 0.2f * em()}, colour(kQuiet), fmt::format("{:.0f} s", s), x > right - 2 * em() ? 1.0f : 0.5f, 0, 0.85f);
+      label(list, {x, bottom + 0.2f * em()}, colour(kQuiet), fmt::format("{:.0f} s", s), x > right - 2 * em() ? 1.0f : 0.5f, 0,
+            0.85f);
     }
   }
   // As many points as there are pixels: of what falls on one the most.
@@ -261,8 +272,11 @@ void draw_mark(ImDrawList& list, ImVec2 p, Mark mark, float s) {
 }
 
 void mark_legend() {
-  constexpr std::pair<Mark, const char*> kMarks[] = {
-      {Mark::bite, "bite"}, {Mark::knot, "throw set"}, {Mark::cut, "cut"}, {Mark::suture, "fresh needle"}, {Mark::fault, "went wrong"}};
+  constexpr std::pair<Mark, const char*> kMarks[] = {{Mark::bite, "bite"},
+                                                     {Mark::knot, "throw set"},
+                                                     {Mark::cut, "cut"},
+                                                     {Mark::suture, "fresh needle"},
+                                                     {Mark::fault, "went wrong"}};
   for (const auto& [mark, word] : kMarks) {
     const ImVec2 at = ImGui::GetCursorScreenPos();
     draw_mark(*ImGui::GetWindowDrawList(), {at.x + 0.5f * em(), at.y + 0.5f * em()}, mark, 0.36f * em());

@@ -15,7 +15,6 @@ enum class BiteColour { spacing, depth, edge };
 ImU32 scale_colour(float part, float alpha = 1);
 // What a bite is coloured by, 0..1, and whether it is known.
 float bite_part(const StitchBite& bite, BiteColour by, bool& known);
-const char* bite_colour_unit(BiteColour by);  // "spacing [mm]", ...
 
 // The edges of all walls side by side, cut open at their start: along the edge to the right, away from it up or down.
 void stitch_map_chart(const StitchMap& map, BiteColour by, ImVec2 size);

@@ -15,8 +15,8 @@ Choice developer_panel(const WorkView& v, bool can_touch) {
   begin_at("inside", 1, 1, 0.86f);
   text(kAccent, "Inside (F3)");
   ImGui::SameLine();
-  text(kQuiet, fmt::format("{} particles ({} thread), {} clusters, {} contacts, late {}", m.particles, m.thread_particles, m.clusters,
-                           m.contacts, v.status->late));
+  text(kQuiet, fmt::format("{} particles ({} thread), {} clusters, {} contacts, late {}", m.particles, m.thread_particles,
+                           m.clusters, m.contacts, v.status->late));
   float most = 0.05f, all = 0;
   for (float ms : m.stage_ms) most = std::max(most, ms), all += ms;
   if (ImGui::BeginTable("inside", 2, ImGuiTableFlags_SizingFixedFit)) {

@@ -57,7 +57,7 @@ void event_list(const StitchMap& map) {
     bool bad = false;
     const std::string words = words_for(e, bad);
     if (words.empty()) continue;
-    text(bad ? kBad : kQuiet, fmt::format("{:7.1f} {} {}", static_cast<double>(e.tick) * map.tick_s, bad ? '!' : ' ', words));
+    text(bad ? kBad : kQuiet, fmt::format("{:5.1f} {} {}", static_cast<double>(e.tick) * map.tick_s, bad ? '!' : ' ', words));
   }
 }
 
@@ -77,7 +77,7 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   ImGui::Separator();
 
   const float foot = 2.8f * em();
-  ImGui::BeginChild("numbers", {0.34f * size.x, -foot});
+  ImGui::BeginChild("numbers", {0.35f * size.x, -foot});
   if (ImGui::BeginTable("rows", 2)) {
     ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 10 * em());
     ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch);
@@ -112,7 +112,8 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   scale_legend(by, std::max(4 * em(), ImGui::GetContentRegionAvail().x - 3.2f * em()));
   ImGui::SameLine(0, 0.6f * em());
   text(kQuiet, "mm");
-  stitch_map_chart(r.map, by, {space.x, 0.36f * space.y});
+  text(kQuiet, "filled: where the needle went in; ring: where it came out; number, and below it what it is coloured by");
+  stitch_map_chart(r.map, by, {space.x, 0.35f * space.y});
   gap(0.1f);
   text(kAccent, "Thread tension");
   ImGui::SameLine();

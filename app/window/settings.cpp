@@ -146,7 +146,8 @@ Settings parse_settings(const std::string& text, const std::string& name) {
       throw InputError(at(node.source()), fmt::format("there is no setting \"{}\"", wanted),
                        nearest.empty() ? "take it out" : fmt::format("did you mean \"{}\"?", nearest));
     }
-    if (!found->read(node, out)) throw InputError(at(node.source()), fmt::format("{} cannot be this", found->name), found->wants);
+    if (!found->read(node, out))
+      throw InputError(at(node.source()), fmt::format("{} cannot be this", found->name), found->wants);
   }
   return out;
 }

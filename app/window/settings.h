@@ -20,9 +20,9 @@ struct Settings {
   bool hold_to_close = false;  // the jaw closes only while the button is down
   bool assist = true;          // an open jaw finds the needle
   bool suture_points = false;
-  bool hints = true;       // the list of keys
-  float mouse_speed = 1;   // 0.2 .. 4, of tool to mouse
-  float text_size = 1;     // 0.7 .. 2, of what fits the window
+  bool hints = true;      // the list of keys
+  float mouse_speed = 1;  // 0.2 .. 4, of tool to mouse
+  float text_size = 1;    // 0.7 .. 2, of what fits the window
   bool operator==(const Settings&) const = default;
 };
 const char* quality_name(Quality quality);     // "low", "medium", "high"

@@ -22,7 +22,9 @@ const char* kViewKeys =
     "F5  Enter        to the start, what was sewn\n"
     "F1  Esc          hide this, leave";
 
-std::string clock(double s) { return fmt::format("{}:{:04.1f}", static_cast<int>(s) / 60, s - 60 * (static_cast<int>(s) / 60)); }
+std::string clock(double s) {
+  return fmt::format("{}:{:04.1f}", static_cast<int>(s) / 60, s - 60 * (static_cast<int>(s) / 60));
+}
 
 }  // namespace
 
@@ -77,7 +79,8 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
   tension_chart(v.result->map, s.first, s.first + s.ticks, static_cast<double>(s.first + s.at), size, false);
   if (s.known < s.ticks) {
     const float x = at.x + size.x * static_cast<float>(static_cast<double>(s.known) / all);
-    ImGui::GetWindowDrawList()->AddRectFilled({x, at.y}, {at.x + size.x, at.y + size.y}, ImGui::GetColorU32(ImVec4{0, 0, 0, 0.55f}));
+    ImGui::GetWindowDrawList()->AddRectFilled({x, at.y}, {at.x + size.x, at.y + size.y},
+                                              ImGui::GetColorU32(ImVec4{0, 0, 0, 0.55f}));
   }
   mark_legend();
   ImGui::SameLine(0, 1.2f * em());

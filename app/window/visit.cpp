@@ -44,7 +44,10 @@ LiveResult Visit::finish() {
 Viewing::Viewing(const std::string& path) : Viewing(path, read_recording(path)) {}
 
 Viewing::Viewing(const std::string& path, const Recording& recording)
-    : file(path), version(recording.header.catgut_version), cut(recording.truncated ? recording.fault : ""), playback(recording, path) {
+    : file(path),
+      version(recording.header.catgut_version),
+      cut(recording.truncated ? recording.fault : ""),
+      playback(recording, path) {
   result = playback.result();
 }
 
@@ -79,7 +82,8 @@ std::vector<std::string> recordings_in(const std::string& folder, const std::vec
   for (const std::string& path : also) add(path);
   // A folder of photographs must not make the start screen wait.
   int looked_at = 0;
-  for (fs::directory_iterator i(folder, fs::directory_options::skip_permission_denied, error), end; !error && i != end; i.increment(error)) {
+  for (fs::directory_iterator i(folder, fs::directory_options::skip_permission_denied, error), end; !error && i != end;
+       i.increment(error)) {
     if (i->path().extension() == ".cgrec") add(folder == "." ? i->path().filename() : i->path());
     if (++looked_at > 5000) break;
   }

@@ -1,4 +1,5 @@
-// app/window: a scene from its opening to its end, and a recording that is looked at: what runs, and what of it the screens show.
+// app/window: a scene from its opening to its end, and a recording that is looked at: what runs, and what of it the screens
+// show.
 #pragma once
 #include <cstdio>
 #include <deque>

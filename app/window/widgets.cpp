@@ -95,8 +95,8 @@ void lines_at(const char* name, float x, float y, float alpha, const std::vector
   size.x += 2 * style.WindowPadding.x, size.y += 2 * style.WindowPadding.y;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   const float margin = 0.6f * em();
-  begin_box(name, {margin + x * (screen.x - 2 * margin - size.x), margin + y * (screen.y - 2 * margin - size.y) - above_bottom}, size,
-            alpha, kOverlay | ImGuiWindowFlags_NoScrollbar);
+  begin_box(name, {margin + x * (screen.x - 2 * margin - size.x), margin + y * (screen.y - 2 * margin - size.y) - above_bottom},
+            size, alpha, kOverlay | ImGuiWindowFlags_NoScrollbar);
   for (const auto& [colour, line] : lines) text(colour, line);
   ImGui::End();
 }

@@ -27,8 +27,8 @@ bool begin_at(const char* name, float x, float y, float alpha, ImGuiWindowFlags 
 bool begin_box(const char* name, ImVec2 place, ImVec2 size, float alpha, ImGuiWindowFlags more = 0);
 constexpr ImGuiWindowFlags kOverlay = ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
 
-// Lines over the picture, at a place as above. Its size is reckoned from the lines, because a panel that ImGui fits by itself is one
-// picture late, which is long where pictures are slow.
+// Lines over the picture, at a place as above. Its size is reckoned from the lines, because a panel that ImGui fits by itself
+// is one picture late, which is long where pictures are slow.
 using Line = std::pair<ImVec4, std::string>;
 void lines_at(const char* name, float x, float y, float alpha, const std::vector<Line>& lines, float above_bottom = 0);
 

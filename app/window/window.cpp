@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <utility>
@@ -64,6 +65,13 @@ std::string free_name(const char* pattern) {
   std::string name;
   for (int i = 1; name.empty() || std::filesystem::exists(name); ++i) name = fmt::format(fmt::runtime(pattern), i);
   return name;
+}
+
+// A path as people write it.
+std::string short_name(const std::string& path) {
+  const char* home = std::getenv("HOME");
+  const std::string start = home && home[0] ? std::string(home) + "/" : "";
+  return !start.empty() && path.rfind(start, 0) == 0 ? "~/" + path.substr(start.size()) : path;
 }
 
 class Window {
@@ -368,10 +376,10 @@ class Window {
     frame.suture_points = settings_.suture_points || (visit_ && settings_.guidance == Guidance::learn);
     frame.dt = dt;
     frame.panels = [&] { choice = panels(); };
-    const bool last = !options_.screenshot.empty() && posed_ && ++posed_for_ >= options_.after;
+    const bool last = !options_.screenshot.empty() && posed_ && posed_for_ + 1 >= options_.after;
     if (last || picture_wanted_) frame.copy = &copy;
     const bool drawn = renderer_->draw(frame);
-    if (drawn) events_in_.panels_drawn();
+    if (drawn) events_in_.panels_drawn(), posed_for_ += posed_;
     if (drawn && last) write_png(copy, options_.screenshot), photographed_ = true;
     if (drawn && std::exchange(picture_wanted_, false)) save_picture(copy);
     if (drawn && seen && visit_) latency_.picture(visit_->live.status());
@@ -450,7 +458,7 @@ class Window {
     if (screen_ == Screen::start)
       return start_panel({&scenes_, &recordings_, message_, events_in_.pad_name(), !options_.live.surgeon.empty()}, settings_,
                          watch_);
-    if (screen_ == Screen::settings) return settings_panel(settings_, settings_path(), message_, visit_ != nullptr);
+    if (screen_ == Screen::settings) return settings_panel(settings_, short_name(settings_path()), message_, visit_ != nullptr);
     if (screen_ == Screen::results) {
       results_.scene = &scene_;
       results_.result = &result_;

@@ -97,6 +97,9 @@ TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
   expect_refused("fly", "fly");
   expect_refused("replay nothing.cgrec", "there is no such recording");
   expect_refused("replay small.toml", "not a Catgut recording");
+  expect_refused("view nothing.cgrec", "there is no such recording");
+  expect_refused("view small.toml", "not a Catgut recording");
+  expect_refused("play small.toml --json nowhere/x.json", "there is no folder nowhere");
   expect_refused("bench paper", "not available yet in this version");
   expect_refused("describe substep", "substeps");
   expect_refused("devices --test", "no haptic device");
