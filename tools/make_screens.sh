@@ -23,7 +23,7 @@ shoot() {  # shoot NAME WxH ARGUMENT ...
   shift 2
   [ ${#wanted[@]} -eq 0 ] || [[ " ${wanted[*]} " == *" ${name#screen_} "* ]] || return 0
   echo "$name"
-  xvfb-run -a -s "-screen 0 ${size}x24" "$root/build/app/catgut" "$@" --quality medium --size "$size" --after 4 \
+  xvfb-run -a -s "-screen 0 ${size}x24" "$root/build/app/catgut" "$@" --quality "${quality:-medium}" --size "$size" --after 4 \
     --screenshot "$name.png" 2>"$name.log" || { cat "$name.log" >&2; return 1; }
   ffmpeg -v error -y -i "$name.png" -q:v 4 "$root/docs/media/$name.jpg"
 }
@@ -35,7 +35,7 @@ shoot screen_practise 1280x720 play purse_string --screen practise --at 1
 shoot screen_pause 1280x720 play stay --surgeon scripted --screen pause --at 7
 shoot screen_developer 1280x720 play stay --surgeon scripted --screen developer --at 5
 shoot screen_results 1280x720 view "$recording" --screen results
-shoot screen_results_4k 3840x2160 view "$recording" --screen results
+quality=low shoot screen_results_4k 3840x2160 view "$recording" --screen results
 shoot screen_view 1280x720 view "$recording" --screen view --at 38
 shoot window 1280x720 play purse_string --surgeon scripted --screen practise --at 9
 ls -l "$root"/docs/media/screen_*.jpg "$root/docs/media/window.jpg"

@@ -72,7 +72,8 @@ float bite_part(const StitchBite& b, BiteColour by, bool& known) {
 
 void scale_legend(BiteColour by, float width) {
   ImDrawList& list = *ImGui::GetWindowDrawList();
-  const ImVec2 at = ImGui::GetCursorScreenPos();
+  ImVec2 at = ImGui::GetCursorScreenPos();
+  at.y += 0.25f * em();  // room for the bracket
   const float high = 0.6f * em();
   constexpr int kSteps = 40;
   for (int i = 0; i < kSteps; ++i) {
@@ -86,7 +87,7 @@ void scale_legend(BiteColour by, float width) {
   for (const float part : {0.0f, 0.25f, 0.5f, 0.75f, 1.0f})
     label(list, {at.x + part * width, at.y + high + 3}, colour(kQuiet),
           fmt::format("{:.3g}{}", part * most(by), part == 1 ? "+" : ""), part, 0, 0.85f);
-  ImGui::Dummy({width, high + 1.1f * em()});
+  ImGui::Dummy({width, high + 1.3f * em()});
 }
 
 void stitch_map_chart(const StitchMap& map, BiteColour by, ImVec2 size) {

@@ -24,12 +24,12 @@ Choice developer_panel(const WorkView& v, bool can_touch) {
     text(kQuiet, fmt::format("stages, {:.2f} ms a tick", all));
     for (size_t k = 0; k < m.stage_ms.size(); ++k) {
       const ImVec2 at = ImGui::GetCursorScreenPos();
-      const float wide = 19 * em();
+      const float wide = 13 * em();
       ImGui::GetWindowDrawList()->AddRectFilled({at.x, at.y + 1}, {at.x + wide * m.stage_ms[k] / most, at.y + em()},
                                                 ImGui::GetColorU32(ImVec4{kAccent.x, kAccent.y, kAccent.z, 0.28f}), 2);
       text(fmt::format("{:<15}{:7.3f} ms", stage_name(static_cast<Stage>(k)), m.stage_ms[k]));
       ImGui::SameLine(0, 0);
-      ImGui::Dummy({0, em()});
+      ImGui::Dummy({1.2f * em(), em()});
     }
     ImGui::TableNextColumn();
     text(kQuiet, "largest multiplier of each kind, as force");

@@ -90,7 +90,10 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
     if (radio("watch the scripted surgeon", watch)) watch = true;
   }
   hand_choice(settings);
-  text(kQuiet, v.pad.empty() ? "mouse and keyboard; a gamepad may be plugged in" : "mouse, keyboard, " + v.pad);
+  ImGui::PushStyleColor(ImGuiCol_Text, kQuiet);
+  ImGui::TextWrapped("%s",
+                     v.pad.empty() ? "mouse and keyboard; a gamepad may be plugged in" : ("mouse, keyboard, " + v.pad).c_str());
+  ImGui::PopStyleColor();
   gap();
   heading("Picture");
   quality_choice(settings);

@@ -77,7 +77,7 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   ImGui::Separator();
 
   const float foot = 2.8f * em();
-  ImGui::BeginChild("numbers", {0.35f * size.x, -foot});
+  ImGui::BeginChild("numbers", {0.36f * size.x, -foot});
   if (ImGui::BeginTable("rows", 2)) {
     ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 10 * em());
     ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch);
@@ -112,7 +112,7 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   scale_legend(by, std::max(4 * em(), ImGui::GetContentRegionAvail().x - 3.2f * em()));
   ImGui::SameLine(0, 0.6f * em());
   text(kQuiet, "mm");
-  text(kQuiet, "filled: where the needle went in; ring: where it came out; number, and below it what it is coloured by");
+  text(kQuiet, "filled: the needle goes in, ring: it comes out; below the number the value [mm]");
   stitch_map_chart(r.map, by, {space.x, 0.35f * space.y});
   gap(0.1f);
   text(kAccent, "Thread tension");

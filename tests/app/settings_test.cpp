@@ -185,9 +185,7 @@ TEST(Screens, keys_of_the_field_do_nothing_elsewhere) {
     f.screen = screen;
     for (const Key key : {Key::take_back, Key::finish, Key::help_at_needle, Key::developer})
       EXPECT_EQ(pressed(key, f), Chosen::nothing) << screen_name(screen) << " " << static_cast<int>(key);
-    if (screen != Screen::start) {
-      EXPECT_EQ(pressed(Key::digit, f, 1), Chosen::nothing) << screen_name(screen);
-    }
+    if (screen != Screen::start) { EXPECT_EQ(pressed(Key::digit, f, 1), Chosen::nothing) << screen_name(screen); }
   }
   ScreenFacts start;
   start.scenes = 2;
