@@ -168,8 +168,8 @@ void stitch_map_chart(const StitchMap& map, BiteColour by, ImVec2 size) {
     const float away = way * std::max(way * in.y, way * out.y) + way * (dot + 0.15f * em());
     label(list, {x, away}, colour(kText), fmt::format("{}", k + 1), 0.5f, way > 0 ? 0.0f : 1.0f, 0.85f);
     if (known && map.bite.size() <= kMostNumbered)
-      label(list, {x, away + way * 0.85f * em()}, c, fmt::format("{:.1f}", bite_value_mm(b, by)), 0.5f, way > 0 ? 0.0f : 1.0f,
-            0.85f);
+      label(list, {x, away + way * 0.85f * em()}, colour(kQuiet), fmt::format("{:.1f}", bite_value_mm(b, by)), 0.5f,
+            way > 0 ? 0.0f : 1.0f, 0.85f);
   }
   if (map.bite.empty())
     label(list, {(left + right) / 2, (middle + bottom) / 2}, colour(kQuiet), "no bite was completed", 0.5f, 0.5f);

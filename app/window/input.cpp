@@ -64,9 +64,9 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
   if (code == SDLK_TAB) ++in.mouse.hand_changes;
   if (code == SDLK_HOME) in.camera_home = true;
   if (code >= SDLK_1 && code <= SDLK_9) {
-    in.key = Key::digit;
-    in.digit = static_cast<int>(code - SDLK_0);
-    if (in.digit <= static_cast<int>(kMouseSpeeds.size())) in.speed = in.digit - 1;
+    const int digit = static_cast<int>(code - SDLK_0);
+    keys_.push_back({Key::digit, digit});
+    if (digit <= static_cast<int>(kMouseSpeeds.size())) in.speed = digit - 1;
   }
   constexpr struct {
     SDL_Keycode code;
@@ -91,7 +91,7 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
                {SDLK_SPACE, Key::space},
                {SDLK_COMMA, Key::step_back}};
   for (const auto& k : kKeys)
-    if (k.code == code) in.key = k.key;
+    if (k.code == code) keys_.push_back({k.key, 0});
 }
 
 void WindowEvents::read_pad(GamepadInput& pad) const {
@@ -178,12 +178,16 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
         }
         break;
       case SDL_CONTROLLERBUTTONDOWN:
-        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_START) in.key = Key::escape;
-        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_BACK) in.key = Key::take_back;
+        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_START) keys_.push_back({Key::escape, 0});
+        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_BACK) keys_.push_back({Key::take_back, 0});
         break;
       default:
         break;
     }
+  }
+  if (!keys_.empty()) {
+    in.key = keys_.front().first, in.digit = keys_.front().second;
+    keys_.pop_front();
   }
   const SDL_Keymod mod = SDL_GetModState();
   in.mouse.turn = right_;

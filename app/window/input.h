@@ -4,7 +4,9 @@
 #include <SDL.h>
 
 #include <cstdint>
+#include <deque>
 #include <string>
+#include <utility>
 
 #include "device/gamepad.h"
 #include "device/mouse.h"
@@ -41,8 +43,8 @@ struct WindowInput {
   bool has_pad = false;
   float orbit_right = 0, orbit_up = 0, closer = 0;  // of the camera, see turn_orbit
   bool camera_home = false;
-  int speed = -1;  // of kMouseSpeeds, when a speed key was pressed
-  Key key = Key::none;
+  int speed = -1;       // of kMouseSpeeds, when a speed key was pressed
+  Key key = Key::none;  // one at a time: two that went down between two pictures come one after the other
   int digit = 0;
   int arrow_presses = 0;  // right minus left, repeats included
   bool quit = false, resized = false;
@@ -68,6 +70,7 @@ class WindowEvents {
   void key(const SDL_KeyboardEvent& e, WindowInput& in);
   void read_pad(GamepadInput& pad) const;
 
+  std::deque<std::pair<Key, int>> keys_;  // with the digit, not told yet
   SDL_GameController* pad_ = nullptr;
   std::string pad_name_;
   bool clicked_ = false;  // the left button went down since the panels were last drawn

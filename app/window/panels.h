@@ -51,9 +51,12 @@ struct WorkView {
 struct ResultView {
   const SceneSpec* scene = nullptr;
   const LiveResult* result = nullptr;
+  std::vector<LogLine> told;    // all that happened, in words
   std::string saved;            // name of the JSON file, or why there is none
   bool from_recording = false;  // it was looked at, not sewn just now
 };
+
+std::vector<LogLine> told_in_words(const StitchMap& map);
 
 struct PlayedView {
   const SceneSpec* scene = nullptr;

@@ -52,16 +52,29 @@ void bite_table(const StitchMap& map) {
   ImGui::EndTable();
 }
 
-void event_list(const StitchMap& map) {
-  for (const Event& e : map.event) {
-    bool bad = false;
-    const std::string words = words_for(e, bad);
-    if (words.empty()) continue;
-    text(bad ? kBad : kQuiet, fmt::format("{:5.1f} {} {}", static_cast<double>(e.tick) * map.tick_s, bad ? '!' : ' ', words));
-  }
+// Only what is in sight: hours of work have thousands of lines.
+void event_list(const std::vector<LogLine>& told) {
+  ImGuiListClipper clipper;
+  clipper.Begin(static_cast<int>(told.size()));
+  while (clipper.Step())
+    for (int i = clipper.DisplayStart; i < clipper.DisplayEnd; ++i) {
+      const LogLine& line = told[static_cast<size_t>(i)];
+      text(line.bad ? kBad : kQuiet, fmt::format("{:5.1f} {} {}", line.time_s, line.bad ? '!' : ' ', line.text));
+    }
 }
 
 }  // namespace
+
+std::vector<LogLine> told_in_words(const StitchMap& map) {
+  std::vector<LogLine> out;
+  for (const Event& e : map.event) {
+    LogLine line;
+    line.time_s = static_cast<double>(e.tick) * map.tick_s;
+    line.text = words_for(e, line.bad);
+    if (!line.text.empty()) out.push_back(line);
+  }
+  return out;
+}
 
 Choice result_panel(const ResultView& v, BiteColour& by) {
   Choice choice;
@@ -93,7 +106,7 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   gap();
   heading("Events [s]");
   ImGui::BeginChild("events", {0, 0});
-  event_list(r.map);
+  event_list(v.told);
   ImGui::EndChild();
   ImGui::EndChild();
   ImGui::SameLine(0, em());

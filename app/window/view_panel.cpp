@@ -10,7 +10,7 @@ namespace catgut {
 namespace {
 
 constexpr float kSpeeds[] = {0.1f, 0.25f, 0.5f, 1, 2, 4, 8};
-constexpr std::ptrdiff_t kWordsShown = 7;
+constexpr size_t kWordsShown = 7;
 
 const char* kViewKeys =
     "space            play, hold\n"
@@ -50,15 +50,18 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
 
   // What has just happened, up to the moment that is shown.
   std::vector<Line> happened;
-  for (const Event& e : v.result->map.event) {
-    if (e.tick > s.first + s.at) break;
+  const std::vector<Event>& events = v.result->map.event;
+  auto e =
+      std::upper_bound(events.begin(), events.end(), s.first + s.at, [](uint64_t at, const Event& o) { return at < o.tick; });
+  while (e != events.begin() && happened.size() < kWordsShown) {
+    --e;
     bool bad = false;
-    const std::string words = words_for(e, bad);
+    const std::string words = words_for(*e, bad);
     if (words.empty()) continue;
-    happened.push_back(
-        {bad ? kBad : kQuiet, fmt::format("{:6.1f} {} {}", static_cast<double>(e.tick) * s.tick_s, bad ? '!' : ' ', words)});
+    happened.insert(
+        happened.begin(),
+        {bad ? kBad : kQuiet, fmt::format("{:6.1f} {} {}", static_cast<double>(e->tick) * s.tick_s, bad ? '!' : ' ', words)});
   }
-  if (std::ssize(happened) > kWordsShown) happened.erase(happened.begin(), happened.end() - kWordsShown);
   if (happened.empty()) happened.push_back({kQuiet, "nothing has happened yet"});
   lines_at("happened", 1, 0, 0.55f, happened);
 

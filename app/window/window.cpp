@@ -176,6 +176,7 @@ class Window {
   // Whatever is open is brought to its end.
   void leave() {
     if (visit_) finish();
+    if (results_.from_recording) results_ = {};
     viewing_.reset();
   }
 
@@ -186,9 +187,9 @@ class Window {
     if (!options_.json.empty()) try {
         write_output(of_visit(options_.json, opened_), practice_json(visit_->scene, result));
       } catch (const InputError& error) { message_ = json_fault_ = error.what(); }
-    results_ = {};
     scene_ = visit_->scene;
     result_ = result;
+    results_ = {&scene_, &result_, told_in_words(result.map), "", false};
     std::swap(last_, visit_->seen);
     have_last_ = have;
     visit_.reset();
@@ -227,20 +228,26 @@ class Window {
   }
 
   void carry_out(const Choice& choice) {
+    try {
+      do_it(choice);
+    } catch (const InputError& error) {  // told where the next thing can be chosen
+      message_ = error.what();
+      if (!visit_ && !viewing_) show_start();
+    }
+  }
+
+  void do_it(const Choice& choice) {
     Live* live = visit_ ? &visit_->live : nullptr;
     switch (choice.what) {
       case Chosen::nothing:
         break;
       case Chosen::scene:
+        open(scenes_[choice.which].name);
+        message_.clear();
+        break;
       case Chosen::recording:
-        try {
-          if (choice.what == Chosen::scene) open(scenes_[choice.which].name);
-          else view(choice.text);
-          message_.clear();
-        } catch (const InputError& error) {
-          message_ = error.what();
-          if (screen_ == Screen::results) show_start();
-        }
+        view(choice.text);
+        message_.clear();
         break;
       case Chosen::settings:
         settings_from_ = screen_ == Screen::practise ? Screen::pause : screen_;
@@ -284,15 +291,14 @@ class Window {
       case Chosen::save_json:
         try {
           const std::string name = free_name("catgut_result_{}.json");
-          write_output(name, practice_json(scene_, result_));
+          write_output(name, practice_json(scene_, *results_.result));
           results_.saved = "saved: " + name;
         } catch (const InputError& error) { results_.saved = error.what(); }
         break;
       case Chosen::change:
-        if (live) try {
-            set_value(visit_->scene, choice.text, "change");
-            live->change(choice.text);
-          } catch (const InputError& error) { message_ = error.what(); }
+        if (!live) break;
+        set_value(visit_->scene, choice.text, "change");
+        live->change(choice.text);
         break;
       case Chosen::play_or_hold:
         if (!viewing_) break;
@@ -311,9 +317,8 @@ class Window {
       case Chosen::sewn:
         if (!viewing_) break;
         viewing_->playback.play(false);
-        results_ = {};
-        results_.from_recording = true;
         scene_ = viewing_->playback.scene();
+        results_ = {&scene_, &viewing_->result, told_in_words(viewing_->result.map), "", true};
         go(Screen::results);
         break;
       case Chosen::leave_results:
@@ -358,8 +363,9 @@ class Window {
     if ((in.left || in.pad_gone) && screen_ == Screen::practise && visit_ && !visit_->watching) go(Screen::pause);
     if (visit_) field(in, dt);
     if (viewing_) {
+      const uint64_t known = viewing_->gathered;
       viewing_->look();
-      if (results_.from_recording) result_ = viewing_->result;
+      if (results_.from_recording && known != viewing_->gathered) results_.told = told_in_words(viewing_->result.map);
     }
     const Snapshot* seen = shown();
     if (seen && !std::exchange(orbit_set_, true)) orbit_ = start_orbit(picture(), seen->needle.pose.p);
@@ -459,11 +465,7 @@ class Window {
       return start_panel({&scenes_, &recordings_, message_, events_in_.pad_name(), !options_.live.surgeon.empty()}, settings_,
                          watch_);
     if (screen_ == Screen::settings) return settings_panel(settings_, short_name(settings_path()), message_, visit_ != nullptr);
-    if (screen_ == Screen::results) {
-      results_.scene = &scene_;
-      results_.result = &result_;
-      return result_panel(results_, coloured_by_);
-    }
+    if (screen_ == Screen::results) { return result_panel(results_, coloured_by_); }
     Settings shown = settings_;
     if (height_ < 480) shown.hints = false, shown.guidance = std::max(shown.guidance, Guidance::practise);
     if (viewing_ && viewing_->have) {

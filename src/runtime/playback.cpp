@@ -233,7 +233,7 @@ void Playback::Work::run() {
       }
     } catch (const std::exception& error) {
       told.fault = error.what();
-      whole = false;
+      whole = going = false;
       tell();
       show();
       continue;

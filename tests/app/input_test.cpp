@@ -103,6 +103,13 @@ TEST_F(WindowEventsTest, keys) {
   EXPECT_EQ(read().key, Key::take_back);
 }
 
+TEST_F(WindowEventsTest, two_keys_between_two_slow_pictures_are_both_told) {
+  key(SDLK_h, SDL_SCANCODE_H, true), key(SDLK_h, SDL_SCANCODE_H, false), key(SDLK_F2, SDL_SCANCODE_F2, true);
+  EXPECT_EQ(read().key, Key::help_at_needle);
+  EXPECT_EQ(read().key, Key::settings);
+  EXPECT_EQ(read().key, Key::none);
+}
+
 TEST_F(WindowEventsTest, a_window_that_is_hidden_or_minimised_is_left) {
   for (const uint8_t what : {SDL_WINDOWEVENT_MINIMIZED, SDL_WINDOWEVENT_HIDDEN}) {
     button(SDL_BUTTON_LEFT, true);

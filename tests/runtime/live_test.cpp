@@ -364,6 +364,7 @@ TEST(Live, a_bite_can_be_taken_back) {
   live.look(seen);
   EXPECT_LT(distance(seen.tool[0].hand.p, hand), 1e-6f);
   EXPECT_EQ(seen.tool[0].held, Held::needle);
+  EXPECT_TRUE(live.finish().map.bite.empty()) << "nor is it in what was sewn";
 }
 
 TEST(Blend, is_between_the_two_and_ends_at_the_newer) {
