@@ -54,6 +54,7 @@ struct ResultView {
   std::vector<LogLine> told;    // all that happened, in words
   std::string saved;            // name of the JSON file, or why there is none
   bool from_recording = false;  // it was looked at, not sewn just now
+  float known = 1;              // part of the recording that was looked through: what is shown is of that part
 };
 
 std::vector<LogLine> told_in_words(const StitchMap& map);

@@ -86,6 +86,10 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   text(kAccent, v.scene->title);
   ImGui::SameLine();
   text(kQuiet, v.from_recording ? "what the recording's hands have sewn" : "what was sewn");
+  if (v.known < 1) {
+    ImGui::SameLine();
+    text(kBad, fmt::format("! so far: {:.0f} % of it is looked through", 100 * v.known));
+  }
   if (!r.fault.empty()) bad_text(r.fault);
   ImGui::Separator();
 

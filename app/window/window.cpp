@@ -189,7 +189,7 @@ class Window {
       } catch (const InputError& error) { message_ = json_fault_ = error.what(); }
     scene_ = visit_->scene;
     result_ = result;
-    results_ = {&scene_, &result_, told_in_words(result.map), "", false};
+    results_ = {&scene_, &result_, told_in_words(result.map), "", false, 1};
     std::swap(last_, visit_->seen);
     have_last_ = have;
     visit_.reset();
@@ -289,6 +289,10 @@ class Window {
         show_start();
         break;
       case Chosen::save_json:
+        if (results_.known < 1) {  // half of it in a file would look like all of it
+          results_.saved = "not saved: wait until all of it is looked through";
+          break;
+        }
         try {
           const std::string name = free_name("catgut_result_{}.json");
           write_output(name, practice_json(scene_, *results_.result));
@@ -318,7 +322,7 @@ class Window {
         if (!viewing_) break;
         viewing_->playback.play(false);
         scene_ = viewing_->playback.scene();
-        results_ = {&scene_, &viewing_->result, told_in_words(viewing_->result.map), "", true};
+        results_ = {&scene_, &viewing_->result, told_in_words(viewing_->result.map), "", true, 0};
         go(Screen::results);
         break;
       case Chosen::leave_results:
@@ -366,6 +370,9 @@ class Window {
       const uint64_t known = viewing_->gathered;
       viewing_->look();
       if (results_.from_recording && known != viewing_->gathered) results_.told = told_in_words(viewing_->result.map);
+      const PlaybackStatus& s = viewing_->playback.status();
+      const bool whole = s.known >= s.ticks || !s.fault.empty();
+      results_.known = whole ? 1 : static_cast<float>(s.known) / static_cast<float>(s.ticks);
     }
     const Snapshot* seen = shown();
     if (seen && !std::exchange(orbit_set_, true)) orbit_ = start_orbit(picture(), seen->needle.pose.p);
