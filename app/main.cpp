@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   app.footer("Exit codes: 0 done, 1 the expectation or check failed, 2 bad input, 130 interrupted.");
   int exit_code = 0;
   catgut::add_play(app, exit_code);
+  catgut::add_view(app, exit_code);
   catgut::add_run(app, exit_code);
   catgut::add_replay(app, exit_code);
   catgut::add_bench(app, exit_code);

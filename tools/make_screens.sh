@@ -1,19 +1,41 @@
 #!/usr/bin/env bash
-# Makes docs/media/NAME.jpg anew: one moment of each technique in progress, in the best quality. Runs the scenes up to that
-# moment, which takes a minute or two.
-#   tools/make_screens.sh [FOLDER]     where the PNGs are, or go: NAME_still.png; made when they are missing
+# Makes the pictures of the window anew: docs/media/screen_NAME.jpg for every screen at 1280x720, screen_results_4k.jpg at
+# 3840x2160, and window.jpg, which the README shows. Needs Xvfb; draws with whatever driver is there, which takes some minutes
+# without a graphics card.
+#   tools/make_screens.sh [NAME ...]     only these: start settings practise pause developer results results_4k view window
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-folder="${1:-out/screens}"
+root="$PWD"
+./catgut --version
+folder="$root/out/screens"
 mkdir -p "$folder" docs/media
+cd "$folder"
+# Nobody's own settings, and a home whose path is nobody's.
+export HOME="$folder/home" SDL_VIDEODRIVER=x11
+unset XDG_CONFIG_HOME
+rm -rf "$HOME" && mkdir -p "$HOME"
 
-# Scene and moment [simulated s] of the scripted surgeon with seed 1.
-for shot in purse_string:80.5 connell:63 stay:12 lembert:64; do
-  name="${shot%%:*}" moment="${shot##*:}" png="$folder/${shot%%:*}_still.png"
-  [ -f "$png" ] || ./catgut run "$name" --seed 1 --headless --no-expect --seconds "$(awk -v m="$moment" 'BEGIN { print m + 0.1 }')" --still "$moment:$png"
-  for quality in 3 4 5 6 8 10; do  # as good as fits into 250 kB
-    ffmpeg -v error -y -i "$png" -frames:v 1 -q:v "$quality" "docs/media/$name.jpg"
-    [ "$(stat -c %s "docs/media/$name.jpg")" -gt 250000 ] || break
-  done
-done
-ls -l docs/media/*.jpg
+recording=purse_string.cgrec
+[ -f "$recording" ] || "$root/build/app/catgut" run purse_string --seed 1 --headless --no-expect --record "$recording"
+
+shoot() {  # shoot NAME WxH ARGUMENT ...
+  local name="$1" size="$2"
+  shift 2
+  [ ${#wanted[@]} -eq 0 ] || [[ " ${wanted[*]} " == *" ${name#screen_} "* ]] || return 0
+  echo "$name"
+  xvfb-run -a -s "-screen 0 ${size}x24" "$root/build/app/catgut" "$@" --quality "${quality:-medium}" --size "$size" --after 4 \
+    --screenshot "$name.png" 2>"$name.log" || { cat "$name.log" >&2; return 1; }
+  ffmpeg -v error -y -i "$name.png" -q:v 4 "$root/docs/media/$name.jpg"
+}
+wanted=("$@")
+
+shoot screen_start 1280x720 play --screen start
+shoot screen_settings 1280x720 play --screen settings
+shoot screen_practise 1280x720 play purse_string --screen practise --at 1
+shoot screen_pause 1280x720 play stay --surgeon scripted --screen pause --at 7
+shoot screen_developer 1280x720 play stay --surgeon scripted --screen developer --at 5
+shoot screen_results 1280x720 view "$recording" --screen results
+quality=low shoot screen_results_4k 3840x2160 view "$recording" --screen results
+shoot screen_view 1280x720 view "$recording" --screen view --at 38
+shoot window 1280x720 play purse_string --surgeon scripted --screen practise --at 9
+ls -l "$root"/docs/media/screen_*.jpg "$root/docs/media/window.jpg"

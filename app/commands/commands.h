@@ -12,6 +12,7 @@
 namespace catgut {
 
 void add_play(CLI::App& app, int& exit_code);
+void add_view(CLI::App& app, int& exit_code);
 void add_run(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
@@ -52,6 +53,9 @@ void end_progress_line();
 
 // Makes the folder of an output file and checks that the file can be written; before the work, not after it. "" and "-" pass.
 void prepare_output(const std::string& path);
+// The same where no folder may be made: whoever sits down at a window has not asked for one, and a slip of the pen would send
+// the recording of an hour's work to a place where nobody looks for it.
+void check_output(const std::string& path);
 // path "-": standard output.
 void write_output(const std::string& path, const std::string& text);
 

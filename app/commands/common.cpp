@@ -91,6 +91,15 @@ void prepare_output(const std::string& path) {
   if (!was_there) std::filesystem::remove(path, error);  // a run that fails early leaves no empty file behind
 }
 
+void check_output(const std::string& path) {
+  if (path.empty() || path == "-") return;
+  std::error_code error;
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder, error))
+    throw InputError(path, "there is no folder " + folder.string(), "make it, or choose another place");
+  prepare_output(path);
+}
+
 void write_output(const std::string& path, const std::string& text) {
   if (path == "-") {
     std::fputs(text.c_str(), stdout);

@@ -31,9 +31,11 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
       roll_right_ = down;
       return;
     case SDL_SCANCODE_LEFT:
+      in.arrow_presses -= down;
       arrow_x_ = down ? -1 : 0;
       return;
     case SDL_SCANCODE_RIGHT:
+      in.arrow_presses += down;
       arrow_x_ = down ? 1 : 0;
       return;
     case SDL_SCANCODE_UP:
@@ -62,20 +64,34 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
   if (code == SDLK_TAB) ++in.mouse.hand_changes;
   if (code == SDLK_HOME) in.camera_home = true;
   if (code >= SDLK_1 && code <= SDLK_9) {
-    in.key = Key::digit;
-    in.digit = static_cast<int>(code - SDLK_0);
-    if (in.digit <= static_cast<int>(kMouseSpeeds.size())) in.speed = in.digit - 1;
+    const int digit = static_cast<int>(code - SDLK_0);
+    keys_.push_back({Key::digit, digit});
+    if (digit <= static_cast<int>(kMouseSpeeds.size())) in.speed = digit - 1;
   }
   constexpr struct {
     SDL_Keycode code;
     Key key;
-  } kKeys[] = {
-      {SDLK_ESCAPE, Key::escape},       {SDLK_RETURN, Key::enter}, {SDLK_p, Key::pause},      {SDLK_PERIOD, Key::single_step},
-      {SDLK_BACKSPACE, Key::take_back}, {SDLK_F5, Key::restart},   {SDLK_MINUS, Key::slower}, {SDLK_PLUS, Key::faster},
-      {SDLK_EQUALS, Key::faster},       {SDLK_m, Key::points},     {SDLK_F1, Key::hints},     {SDLK_h, Key::help_at_needle},
-      {SDLK_F10, Key::finish},          {SDLK_F12, Key::picture}};
+  } kKeys[] = {{SDLK_ESCAPE, Key::escape},
+               {SDLK_RETURN, Key::enter},
+               {SDLK_p, Key::pause},
+               {SDLK_PERIOD, Key::single_step},
+               {SDLK_BACKSPACE, Key::take_back},
+               {SDLK_F5, Key::restart},
+               {SDLK_MINUS, Key::slower},
+               {SDLK_PLUS, Key::faster},
+               {SDLK_EQUALS, Key::faster},
+               {SDLK_m, Key::points},
+               {SDLK_F1, Key::hints},
+               {SDLK_h, Key::help_at_needle},
+               {SDLK_F10, Key::finish},
+               {SDLK_F12, Key::picture},
+               {SDLK_F2, Key::settings},
+               {SDLK_F3, Key::developer},
+               {SDLK_j, Key::save},
+               {SDLK_SPACE, Key::space},
+               {SDLK_COMMA, Key::step_back}};
   for (const auto& k : kKeys)
-    if (k.code == code) in.key = k.key;
+    if (k.code == code) keys_.push_back({k.key, 0});
 }
 
 void WindowEvents::read_pad(GamepadInput& pad) const {
@@ -93,10 +109,11 @@ void WindowEvents::read_pad(GamepadInput& pad) const {
   pad.slow = SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_X);
 }
 
-WindowInput WindowEvents::read(bool working, float dt) {
+WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
   WindowInput in;
   in.mouse.cut = cut_, in.mouse.fresh = fresh_;
   ImGuiIO& io = ImGui::GetIO();
+  look_round = look_round && !working && !io.WantCaptureMouse;
   for (SDL_Event e; SDL_PollEvent(&e);) {
     switch (e.type) {
       case SDL_QUIT:
@@ -105,7 +122,8 @@ WindowInput WindowEvents::read(bool working, float dt) {
       case SDL_WINDOWEVENT:
         in.resized = in.resized || e.window.event == SDL_WINDOWEVENT_SIZE_CHANGED;
         // Keys that were down when the window lost the keyboard never come up here.
-        if (e.window.event == SDL_WINDOWEVENT_FOCUS_LOST) {
+        if (e.window.event == SDL_WINDOWEVENT_FOCUS_LOST || e.window.event == SDL_WINDOWEVENT_MINIMIZED ||
+            e.window.event == SDL_WINDOWEVENT_HIDDEN) {
           in.left = true;
           left_ = right_ = middle_ = space_ = cut_ = fresh_ = roll_left_ = roll_right_ = false;
           arrow_x_ = arrow_y_ = zoom_ = 0;
@@ -113,8 +131,9 @@ WindowInput WindowEvents::read(bool working, float dt) {
         break;
       case SDL_MOUSEMOTION:
         in.moved_ns = wall_ns();
-        if (!working) break;
-        if (middle_) {
+        if (!working && !look_round) break;
+        if (middle_ || look_round) {
+          if (!middle_ && !left_) break;
           in.orbit_right -= static_cast<float>(e.motion.xrel) * kOrbitPerPixel;
           in.orbit_up += static_cast<float>(e.motion.yrel) * kOrbitPerPixel;
         } else {
@@ -134,7 +153,8 @@ WindowInput WindowEvents::read(bool working, float dt) {
       }
       case SDL_MOUSEWHEEL:
         in.moved_ns = wall_ns();
-        if (!working) io.MouseWheel += e.wheel.preciseY;
+        if (look_round) in.closer += 0.1f * e.wheel.preciseY;
+        else if (!working) io.MouseWheel += e.wheel.preciseY;
         else if (SDL_GetModState() & KMOD_CTRL) in.closer += 0.1f * e.wheel.preciseY;
         else in.mouse.wheel += e.wheel.preciseY;
         break;
@@ -154,15 +174,20 @@ WindowInput WindowEvents::read(bool working, float dt) {
           SDL_GameControllerClose(pad_);
           pad_ = nullptr;
           pad_name_.clear();
+          in.pad_gone = true;
         }
         break;
       case SDL_CONTROLLERBUTTONDOWN:
-        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_START) in.key = Key::escape;
-        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_BACK) in.key = Key::take_back;
+        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_START) keys_.push_back({Key::escape, 0});
+        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_BACK) keys_.push_back({Key::take_back, 0});
         break;
       default:
         break;
     }
+  }
+  if (!keys_.empty()) {
+    in.key = keys_.front().first, in.digit = keys_.front().second;
+    keys_.pop_front();
   }
   const SDL_Keymod mod = SDL_GetModState();
   in.mouse.turn = right_;

@@ -4,7 +4,9 @@
 #include <SDL.h>
 
 #include <cstdint>
+#include <deque>
 #include <string>
+#include <utility>
 
 #include "device/gamepad.h"
 #include "device/mouse.h"
@@ -27,7 +29,12 @@ enum class Key {
   help_at_needle,
   finish,
   digit,
-  picture
+  picture,
+  settings,
+  developer,
+  save,
+  space,
+  step_back
 };
 
 struct WindowInput {
@@ -36,11 +43,13 @@ struct WindowInput {
   bool has_pad = false;
   float orbit_right = 0, orbit_up = 0, closer = 0;  // of the camera, see turn_orbit
   bool camera_home = false;
-  int speed = -1;  // of kMouseSpeeds, when a speed key was pressed
-  Key key = Key::none;
+  int speed = -1;       // of kMouseSpeeds, when a speed key was pressed
+  Key key = Key::none;  // one at a time: two that went down between two pictures come one after the other
   int digit = 0;
+  int arrow_presses = 0;  // right minus left, repeats included
   bool quit = false, resized = false;
-  bool left = false;      // the keyboard went to another window
+  bool left = false;      // the keyboard went to another window, or this one is hidden
+  bool pad_gone = false;  // the gamepad that was used was unplugged
   uint64_t moved_ns = 0;  // on the clock of runtime/live: when the newest motion was read
 };
 
@@ -51,8 +60,9 @@ class WindowEvents {
   WindowEvents(const WindowEvents&) = delete;
   WindowEvents& operator=(const WindowEvents&) = delete;
 
-  // Everything since the last call. working: the mouse belongs to the hands, else to the panels (ImGui's context is fed).
-  WindowInput read(bool working, float dt);
+  // Everything since the last call. working: the mouse belongs to the hands, else to the panels (ImGui's context is fed), and
+  // with look_round where no panel wants it to the camera.
+  WindowInput read(bool working, float dt, bool look_round = false);
   void panels_drawn() { clicked_ = false; }  // they have seen the clicks
   const std::string& pad_name() const { return pad_name_; }
 
@@ -60,6 +70,7 @@ class WindowEvents {
   void key(const SDL_KeyboardEvent& e, WindowInput& in);
   void read_pad(GamepadInput& pad) const;
 
+  std::deque<std::pair<Key, int>> keys_;  // with the digit, not told yet
   SDL_GameController* pad_ = nullptr;
   std::string pad_name_;
   bool clicked_ = false;  // the left button went down since the panels were last drawn

@@ -10,11 +10,12 @@ namespace catgut {
 struct Latency {
   // After a picture of `status` has been handed to the driver.
   void picture(const LiveStatus& status);
-  void report(int pictures, double seconds) const;  // a line or two on standard error
+  // A table on standard error: motion read -> tick that has it begins -> its snapshot is ready -> its picture is handed over.
+  void report(int pictures, double seconds) const;
 
  private:
   uint64_t shown_ns_ = 0;
-  std::vector<float> to_tick_ms_, to_picture_ms_;
+  std::vector<float> to_tick_ms_, in_tick_ms_, to_picture_ms_, all_ms_;
 };
 
 }  // namespace catgut

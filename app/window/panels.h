@@ -6,24 +6,25 @@
 #include <vector>
 
 #include "device/mouse.h"
-#include "render/renderer.h"
 #include "runtime/live.h"
+#include "runtime/playback.h"
+#include "window/charts.h"
+#include "window/screens.h"
+#include "window/settings.h"
 #include "window/words.h"
 
 namespace catgut {
 
 struct SceneChoice {
-  std::string name, title;
+  std::string name, title, technique, body;
 };
 
-// What a person has set; the start and pause screens change it.
-struct Settings {
-  Quality quality = Quality::draft;
-  bool left_handed = false;
-  bool hold_to_close = false;
-  bool assist = true;
-  bool suture_points = false;
-  bool hints = true;
+struct StartView {
+  const std::vector<SceneChoice>* scenes = nullptr;
+  const std::vector<std::string>* recordings = nullptr;  // paths, newest first
+  std::string message;                                   // what went wrong, one line
+  std::string pad;                                       // name of the gamepad; empty: none
+  bool watch_only = false;                               // the command line has chosen who works
 };
 
 struct LogLine {
@@ -40,21 +41,40 @@ struct WorkView {
   const Steering* steering = nullptr;
   const MouseHand* mouse = nullptr;
   const std::deque<LogLine>* log = nullptr;
-  std::string pad;  // name of the gamepad; empty: none
+  size_t speed = 1;       // of kMouseSpeeds
+  std::string pad;        // name of the gamepad; empty: none
+  bool watching = false;  // a surgeon works
+  bool inside = false;    // the developers' panel takes the lower part of the window
   double pictures_per_s = 0;
 };
 
-enum class Chosen { nothing, scene, resume, single_step, take_back, restart, finish, start_screen, quit };
-struct Choice {
-  Chosen what = Chosen::nothing;
-  size_t scene = 0;  // of the list
+struct ResultView {
+  const SceneSpec* scene = nullptr;
+  const LiveResult* result = nullptr;
+  std::vector<LogLine> told;    // all that happened, in words
+  std::string saved;            // name of the JSON file, or why there is none
+  bool from_recording = false;  // it was looked at, not sewn just now
+  float known = 1;              // part of the recording that was looked through: what is shown is of that part
 };
 
-Choice start_panel(const std::vector<SceneChoice>& scenes, Settings& settings, const std::string& message);
+std::vector<LogLine> told_in_words(const StitchMap& map);
+
+struct PlayedView {
+  const SceneSpec* scene = nullptr;
+  const PlaybackStatus* status = nullptr;
+  const LiveResult* result = nullptr;  // of what is known
+  const Snapshot* seen = nullptr;
+  std::string file, version, cut;  // cut: where and how the recording ends when it is not whole
+};
+
+// Each may change the settings; `watch`: the scripted surgeon is to work.
+Choice start_panel(const StartView& view, Settings& settings, bool& watch);
+Choice settings_panel(Settings& settings, const std::string& file, const std::string& message, bool working);
 void work_panel(const WorkView& view, const Settings& settings);
-Choice pause_panel(const WorkView& view, Settings& settings);
-Choice result_panel(const SceneSpec& scene, const Practice& practice, const std::vector<std::string>& recorded,
-                    const std::string& fault);
-void style_panels(float scale);  // once, and when the window has changed
+Choice pause_panel(const WorkView& view);
+// can_touch: the mouse is a pointer now and sliders can be moved.
+Choice developer_panel(const WorkView& view, bool can_touch);
+Choice result_panel(const ResultView& view, BiteColour& by);
+Choice view_panel(const PlayedView& view, const Settings& settings);
 
 }  // namespace catgut

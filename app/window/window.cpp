@@ -1,5 +1,5 @@
-// app/window: the loop of the window: events, hands, one picture; and which screen comes after which. Physics has its own
-// thread (runtime/live) and never waits for this one.
+// app/window: the loop of the window: events, hands, one picture; and the carrying out of what was chosen. Physics has its own
+// thread (runtime/live, runtime/playback) and never waits for this one.
 #include "window/window.h"
 
 #include <SDL.h>
@@ -8,31 +8,71 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <utility>
 
 #include "commands/commands.h"
 #include "core/check.h"
-#include "device/steer.h"
 #include "procedure/scene_file.h"
 #include "render/orbit.h"
 #include "render/window.h"
+#include "runtime/report.h"
+#include "window/hands.h"
 #include "window/input.h"
 #include "window/latency.h"
 #include "window/panels.h"
 #include "window/sdl_window.h"
+#include "window/visit.h"
+#include "window/widgets.h"
 
 namespace catgut {
 namespace {
 
 constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSansMono.ttf";
-constexpr size_t kLogLines = 8;
 constexpr double kMostPictures = 150;  // [1/s]
 constexpr double kSlowPicture = 0.07;  // [s] a picture that takes longer is drawn coarser
+constexpr double kStallEvery = 2;      // [s] of --stall-ms
 
-enum class Screen { start, practise, pause, results };
-constexpr const char* kScreenNames[] = {"start", "practise", "pause", "results"};
+std::vector<SceneChoice> scene_choices() {
+  // What people practise first, from the simplest; then what is there besides.
+  std::vector<std::string> names = scene_names();
+  const auto rank = [](const std::string& name) {
+    const std::vector<std::string> kFirst{"purse_string", "stay", "connell", "lembert"};
+    return std::find(kFirst.begin(), kFirst.end(), name) - kFirst.begin();
+  };
+  std::stable_sort(names.begin(), names.end(), [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
+  std::vector<SceneChoice> out;
+  for (const std::string& name : names) {
+    const SceneSpec scene = read_scene(name);
+    std::string technique = scene.technique.name, body;
+    std::replace(technique.begin(), technique.end(), '_', '-');
+    for (const BodySpec& b : scene.body) body += (body.empty() ? "" : " and ") + b.name;
+    out.push_back({name, scene.title, technique, body});
+  }
+  return out;
+}
+
+// NAME.EXT, NAME_visit2.EXT, ...: every visit has its own files.
+std::string of_visit(const std::string& path, int visit) {
+  if (path.empty() || visit < 2) return path;
+  const std::filesystem::path p(path);
+  return (p.parent_path() / (p.stem().string() + fmt::format("_visit{}", visit) + p.extension().string())).string();
+}
+
+std::string free_name(const char* pattern) {
+  std::string name;
+  for (int i = 1; name.empty() || std::filesystem::exists(name); ++i) name = fmt::format(fmt::runtime(pattern), i);
+  return name;
+}
+
+// A path as people write it.
+std::string short_name(const std::string& path) {
+  const char* home = std::getenv("HOME");
+  const std::string start = home && home[0] ? std::string(home) + "/" : "";
+  return !start.empty() && path.rfind(start, 0) == 0 ? "~/" + path.substr(start.size()) : path;
+}
 
 class Window {
  public:
@@ -41,17 +81,15 @@ class Window {
     try {
       renderer_ = make_window_renderer(sdl_.number, width_, height_, kFont);
     } catch (const std::runtime_error& error) { throw InputError("window", error.what(), kHeadless); }
-    settings_.quality = options.quality;
-    settings_.left_handed = options.left_handed;
-    settings_.hints = options.height >= 480;
-    // What people practise first, from the simplest; then what is there besides.
-    std::vector<std::string> names = scene_names();
-    const auto rank = [](const std::string& name) {
-      const std::vector<std::string> kFirst{"purse_string", "stay", "connell", "lembert"};
-      return std::find(kFirst.begin(), kFirst.end(), name) - kFirst.begin();
-    };
-    std::stable_sort(names.begin(), names.end(), [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
-    for (const std::string& name : names) scenes_.push_back({name, read_scene(name).title});
+    LoadedSettings loaded = load_settings(settings_path());
+    if (!loaded.fault.empty()) std::fprintf(stderr, "catgut: %s\n", loaded.fault.c_str());
+    message_ = loaded.fault;
+    kept_ = settings_ = loaded.settings;
+    if (options.quality_given) settings_.quality = options.quality;
+    if (options.left_handed) settings_.left_handed = true;
+    at_start_ = settings_;
+    scenes_ = scene_choices();
+    recordings_ = recordings_in(".", {});
     if (!options.events.empty()) {
       events_ = options.events == "-" ? stdout : std::fopen(options.events.c_str(), "w");
       if (!events_) throw InputError(options.events, "cannot be written", "choose another place");
@@ -66,14 +104,19 @@ class Window {
 
   int loop() {
     if (!options_.scene.empty()) open(options_.scene);
+    if (!options_.view.empty()) view(options_.view);
     const double start = wall_seconds();
-    double last = start, drawn_at = start;
+    double last = start, drawn_at = start, stalled = start;
     const std::atomic<bool>& stop = stop_on_interrupt();
     while (!quit_ && !stop) {
       const double now = wall_seconds();
       const float dt = static_cast<float>(std::clamp(now - last, 1e-3, 0.25));
       last = now;
       if (options_.seconds > 0 && now - start > options_.seconds) break;
+      if (options_.stall_ms > 0 && now - stalled > kStallEvery) {
+        SDL_Delay(static_cast<uint32_t>(options_.stall_ms));
+        stalled = wall_seconds();
+      }
       if (frame(dt)) {
         ++pictures_;
         const double drawn = wall_seconds(), keep = std::exp(-(drawn - drawn_at));
@@ -87,92 +130,219 @@ class Window {
       } else {
         SDL_Delay(1);  // the driver is behind: hands go on, and the processor is left to it
       }
-      if (!options_.screenshot.empty() && pictures_ >= options_.after) break;
+      if (photographed_) break;
     }
     LiveResult result;
-    if (live_) result = finish();
+    if (visit_) result = finish();
+    keep_settings();
     if (options_.seconds > 0 || !options_.screenshot.empty()) latency_.report(pictures_, wall_seconds() - start);
+    if (!json_fault_.empty()) throw InputError(options_.json, json_fault_, "choose another place");
     if (!result.fault.empty()) throw InputError("simulation", result.fault, "the recording holds what went before");
     return stop ? 130 : 0;
   }
 
  private:
-  // --- scenes
+  // --- scenes and recordings
   // -----------------------------------------------------------------------------------------------------------------
   void open(const std::string& name) {
-    scene_ = read_scene(name);
+    const SceneSpec scene = read_scene(name);
     LiveOptions live = options_.live;
-    if (!live.record.empty() && opened_++ > 0) {  // every visit has its own file
-      const size_t dot = live.record.rfind(".cgrec");
-      live.record = live.record.substr(0, dot) + fmt::format("_visit{}.cgrec", opened_);
-    }
-    live_ = std::make_unique<Live>(scene_, live);
-    steering_ = start_steering(live_->picture(), settings_.left_handed);
-    mouse_ = {};
-    pad_ = {};
-    orbit_set_ = false;
-    log_.clear();
-    epoch_ = 0;
-    renderer_->stage(&live_->picture(), settings_.quality);
-    if (coarse_ < 1) renderer_->draw_coarser(coarse_);
+    live.record = of_visit(live.record, ++opened_);
+    if (live.surgeon.empty() && watch_) live.surgeon = "scripted";
+    leave();
+    visit_ = std::make_unique<Visit>(scene, live, events_);
+    source_ = name;
+    hands_.begin(visit_->live.picture(), settings_);
+    stage(visit_->live.picture());
     go(Screen::practise);
   }
 
+  void view(const std::string& path) {
+    auto next = std::make_unique<Viewing>(path);
+    leave();
+    viewing_ = std::move(next);
+    viewing_->playback.play(options_.screen.empty());
+    stage(viewing_->playback.picture());
+    go(Screen::view);
+  }
+
+  void stage(const PictureModel& picture) {
+    renderer_->stage(&picture, settings_.quality);
+    if (coarse_ < 1) renderer_->draw_coarser(coarse_);
+    orbit_set_ = false;
+    have_last_ = false;
+  }
+
+  // Whatever is open is brought to its end.
+  void leave() {
+    if (visit_) finish();
+    if (results_.from_recording) results_ = {};
+    viewing_.reset();
+  }
+
   LiveResult finish() {
-    if (live_) live_->look(seen_);
-    LiveResult result = live_ ? live_->finish() : LiveResult{};
-    take_events();
-    live_.reset();
+    const bool have = visit_->have;
+    LiveResult result = visit_->finish();
+    made_.insert(made_.end(), result.recorded.begin(), result.recorded.end());
+    if (!options_.json.empty()) try {
+        write_output(of_visit(options_.json, opened_), practice_json(visit_->scene, result));
+      } catch (const InputError& error) { message_ = json_fault_ = error.what(); }
+    scene_ = visit_->scene;
+    result_ = result;
+    results_ = {&scene_, &result_, told_in_words(result.map), "", false, 1};
+    std::swap(last_, visit_->seen);
+    have_last_ = have;
+    visit_.reset();
     return result;
   }
 
   void go(Screen screen) {
     // While somebody works the mouse is a hand and not a pointer; what it did before the change is nobody's.
-    if (screen == Screen::practise && options_.live.surgeon.empty()) SDL_SetRelativeMouseMode(SDL_TRUE);
-    else SDL_SetRelativeMouseMode(SDL_FALSE);
-    if (live_ && screen == Screen::pause) live_->command(LiveCommand::pause);
-    if (live_ && screen == Screen::practise) live_->command(LiveCommand::resume);
+    SDL_SetRelativeMouseMode(screen == Screen::practise && visit_ && !visit_->watching ? SDL_TRUE : SDL_FALSE);
+    if (visit_) visit_->live.command(screen == Screen::practise ? LiveCommand::resume : LiveCommand::pause);
     SDL_PumpEvents();
     SDL_FlushEvent(SDL_MOUSEMOTION);
+    if (screen == Screen::start) recordings_ = recordings_in(".", made_);
+    keep_settings();
     screen_ = screen;
     tell_screen_ = true;
   }
 
+  void show_start() {
+    leave();
+    renderer_->stage(nullptr, settings_.quality);
+    have_last_ = false;
+    go(Screen::start);
+  }
+
+  void keep_settings() {
+    if (settings_ == at_start_) return;
+    at_start_ = settings_;
+    Settings s = settings_;  // what the command line asked for was meant for this time
+    if (options_.quality_given && s.quality == options_.quality) s.quality = kept_.quality;
+    if (options_.left_handed && s.left_handed) s.left_handed = kept_.left_handed;
+    try {
+      save_settings(s, settings_path());
+      message_.clear();
+    } catch (const InputError& error) { message_ = error.what(); }
+  }
+
   void carry_out(const Choice& choice) {
+    try {
+      do_it(choice);
+    } catch (const InputError& error) {  // told where the next thing can be chosen
+      message_ = error.what();
+      if (!visit_ && !viewing_) show_start();
+    }
+  }
+
+  void do_it(const Choice& choice) {
+    Live* live = visit_ ? &visit_->live : nullptr;
     switch (choice.what) {
       case Chosen::nothing:
         break;
       case Chosen::scene:
-        try {
-          open(scenes_[choice.scene].name);
-          message_.clear();
-        } catch (const InputError& error) { message_ = error.what(); }
+        open(scenes_[choice.which].name);
+        message_.clear();
+        break;
+      case Chosen::recording:
+        view(choice.text);
+        message_.clear();
+        break;
+      case Chosen::settings:
+        settings_from_ = screen_ == Screen::practise ? Screen::pause : screen_;
+        go(Screen::settings);
+        break;
+      case Chosen::leave_settings:
+        go(settings_from_);
         break;
       case Chosen::resume:
         go(Screen::practise);
         break;
+      case Chosen::pause:
+        go(Screen::pause);
+        break;
       case Chosen::single_step:
-        live_->command(LiveCommand::single_step);
+        if (live) live->command(LiveCommand::single_step);
         break;
       case Chosen::take_back:
-        live_->command(LiveCommand::take_back);
+        if (live) live->command(LiveCommand::take_back);
         break;
       case Chosen::restart:
-        if (live_) {
-          live_->command(LiveCommand::restart);
+        if (live) {
+          live->command(LiveCommand::restart);
           go(Screen::practise);
         } else {
-          open(options_.scene.empty() || scene_.name != options_.scene ? scene_.name : options_.scene);
+          open(source_);
         }
         break;
       case Chosen::finish:
-        result_ = finish();  // the field stays in the picture, as it was left
+        finish();  // the field stays in the picture, as it was left
         go(Screen::results);
         break;
+      case Chosen::slower:
+      case Chosen::faster:
+        if (live) live->command(choice.what == Chosen::slower ? LiveCommand::slower : LiveCommand::faster);
+        else if (viewing_) viewing_->change_speed(choice.what == Chosen::faster);
+        break;
       case Chosen::start_screen:
-        finish();
-        renderer_->stage(nullptr, settings_.quality);
-        go(Screen::start);
+        show_start();
+        break;
+      case Chosen::save_json:
+        if (results_.known < 1) {  // half of it in a file would look like all of it
+          results_.saved = "not saved: wait until all of it is looked through";
+          break;
+        }
+        try {
+          const std::string name = free_name("catgut_result_{}.json");
+          write_output(name, practice_json(scene_, *results_.result));
+          results_.saved = "saved: " + name;
+        } catch (const InputError& error) { results_.saved = error.what(); }
+        break;
+      case Chosen::change:
+        if (!live) break;
+        set_value(visit_->scene, choice.text, "change");
+        live->change(choice.text);
+        break;
+      case Chosen::play_or_hold:
+        if (!viewing_) break;
+        if (viewing_->playback.status().at == viewing_->playback.status().ticks) viewing_->playback.go_to(0);
+        viewing_->playback.play(!viewing_->playback.status().playing);
+        break;
+      case Chosen::go_to:
+        if (viewing_) viewing_->playback.go_to(choice.which);
+        break;
+      case Chosen::go_by:
+        if (viewing_) viewing_->go_by(choice.by);
+        break;
+      case Chosen::speed:
+        if (viewing_) viewing_->playback.speed(choice.of);
+        break;
+      case Chosen::sewn:
+        if (!viewing_) break;
+        viewing_->playback.play(false);
+        scene_ = viewing_->playback.scene();
+        results_ = {&scene_, &viewing_->result, told_in_words(viewing_->result.map), "", true, 0};
+        go(Screen::results);
+        break;
+      case Chosen::leave_results:
+        if (results_.from_recording) go(Screen::view);
+        else show_start();
+        break;
+      case Chosen::points:
+        settings_.suture_points = !settings_.suture_points;
+        break;
+      case Chosen::hints:
+        settings_.hints = !settings_.hints;
+        break;
+      case Chosen::help_at_needle:
+        settings_.assist = !settings_.assist;
+        break;
+      case Chosen::developer:
+        developer_ = !developer_;
+        break;
+      case Chosen::picture:
+        picture_wanted_ = true;
         break;
       case Chosen::quit:
         quit_ = true;
@@ -184,184 +354,166 @@ class Window {
   // ----------------------------------------------------------------------------------------------------------------
   bool frame(float dt) {
     const bool working = screen_ == Screen::practise;
-    WindowInput in = events_in_.read(working, dt);
+    const WindowInput in = events_in_.read(working, dt, screen_ == Screen::view || (working && visit_ && visit_->watching));
     quit_ = quit_ || in.quit;
     if (in.resized) resized();
-    keys(in);
-    if (in.left && screen_ == Screen::practise && options_.live.surgeon.empty()) go(Screen::pause);
-    if (live_) field(in, dt);
+    ScreenFacts facts;
+    facts.screen = screen_;
+    facts.fault = visit_ && !visit_->live.status().fault.empty();
+    facts.scenes = scenes_.size();
+    facts.from_recording = results_.from_recording;
+    if (viewing_) facts.second = std::max<int64_t>(1, std::llround(1 / viewing_->playback.status().tick_s));
+    carry_out(choice_of_key(in, facts));
+    if ((in.left || in.pad_gone) && screen_ == Screen::practise && visit_ && !visit_->watching) go(Screen::pause);
+    if (visit_) field(in, dt);
+    if (viewing_) {
+      const uint64_t known = viewing_->gathered;
+      viewing_->look();
+      if (results_.from_recording && known != viewing_->gathered) results_.told = told_in_words(viewing_->result.map);
+      const PlaybackStatus& s = viewing_->playback.status();
+      const bool whole = s.known >= s.ticks || !s.fault.empty();
+      results_.known = whole ? 1 : static_cast<float>(s.known) / static_cast<float>(s.ticks);
+    }
+    const Snapshot* seen = shown();
+    if (seen && !std::exchange(orbit_set_, true)) orbit_ = start_orbit(picture(), seen->needle.pose.p);
+    pose_for_picture();
     tell_screen();
-    turn_orbit(orbit_, in.orbit_right, in.orbit_up, in.closer);
-    if (in.camera_home && live_) orbit_set_ = false;
+    turn_orbit(orbit_, screen_ == Screen::view && in.arrow_presses ? 0 : in.orbit_right, in.orbit_up, in.closer);
+    if (in.camera_home && (visit_ || viewing_)) orbit_set_ = false;
 
     Choice choice;
     Image copy;
     WindowRenderer::Frame frame;
-    const bool seen = have_picture_ && (live_ || screen_ == Screen::results);
-    frame.snapshot = seen ? &seen_ : nullptr;
+    frame.snapshot = seen;
     frame.camera = camera_of(orbit_);
-    frame.suture_points = settings_.suture_points;
+    frame.suture_points = settings_.suture_points || (visit_ && settings_.guidance == Guidance::learn);
     frame.dt = dt;
     frame.panels = [&] { choice = panels(); };
-    const bool last = !options_.screenshot.empty() && pictures_ + 1 >= options_.after;
+    const bool last = !options_.screenshot.empty() && posed_ && posed_for_ + 1 >= options_.after;
     if (last || picture_wanted_) frame.copy = &copy;
     const bool drawn = renderer_->draw(frame);
-    if (drawn) events_in_.panels_drawn();
-    if (drawn && last) write_png(copy, options_.screenshot);
+    if (drawn) events_in_.panels_drawn(), posed_for_ += posed_;
+    if (drawn && last) write_png(copy, options_.screenshot), photographed_ = true;
     if (drawn && std::exchange(picture_wanted_, false)) save_picture(copy);
-    if (drawn && seen && live_) latency_.picture(live_->status());
+    if (drawn && seen && visit_) latency_.picture(visit_->live.status());
+    const float text_size = settings_.text_size;
     carry_out(choice);
+    if (text_size != style_text_) resized();
     return drawn;
   }
 
+  const Snapshot* shown() const {
+    if (visit_) return visit_->have ? &visit_->seen : nullptr;
+    if (viewing_) return viewing_->have ? &viewing_->seen : nullptr;
+    return have_last_ && screen_ == Screen::results ? &last_ : nullptr;
+  }
+  const PictureModel& picture() const { return visit_ ? visit_->live.picture() : viewing_->playback.picture(); }
+
   void save_picture(const Image& image) {
-    std::string name;
-    for (int i = 1; name.empty() || std::filesystem::exists(name); ++i) name = fmt::format("catgut_{}.png", i);
-    LogLine line{seen_.time_s, "picture: " + name, false};
+    const std::string name = free_name("catgut_{}.png");
+    LogLine line{visit_ ? visit_->seen.time_s : 0, "picture: " + name, false};
     try {
       write_png(image, name);
     } catch (const std::runtime_error& error) { line.text = error.what(), line.bad = true; }
-    log_.push_back(line);
+    if (visit_) visit_->log.push_back(line);
+    else std::fprintf(stderr, "catgut: %s\n", line.text.c_str());
   }
 
   // Hands in, the field out.
   void field(const WindowInput& in, float dt) {
-    have_picture_ = live_->look(seen_);
-    if (have_picture_ && !std::exchange(orbit_set_, true)) orbit_ = start_orbit(live_->picture(), seen_.needle.pose.p);
-    take_events();
-    const LiveStatus& status = live_->status();
-    if (status.epoch != epoch_) {
-      epoch_ = status.epoch;
-      if (status.practice.time_s > 0) resume_steering(steering_, seen_);
-      else steering_ = start_steering(live_->picture(), settings_.left_handed);
-      mouse_.was_down = false;
+    Visit& v = *visit_;
+    v.live.watch(developer_);
+    v.look();
+    const LiveStatus& status = v.live.status();
+    if (status.epoch != v.epoch) {
+      v.epoch = status.epoch;
+      hands_.jumped(v.live.picture(), v.seen, settings_, status.practice.time_s == 0);
     }
     if (!status.fault.empty() && screen_ == Screen::practise) go(Screen::pause);
-    if (screen_ != Screen::practise || status.settling || !have_picture_ || !options_.live.surgeon.empty()) return;
-    steering_.assist = settings_.assist;
-    mouse_.hold_to_close = settings_.hold_to_close;
-    if (in.speed >= 0) mouse_.speed = kMouseSpeeds[static_cast<size_t>(in.speed)];
+    if (screen_ != Screen::practise || status.settling || !v.have || v.watching) return;
     const Camera camera = camera_of(orbit_);
     const ViewFrame view = view_frame(camera.eye, camera.target, camera.up, camera.fov_deg, static_cast<float>(height_));
-    std::array<HandMotion, 2> motion = mouse_motion(mouse_, steering_, in.mouse, view, dt);
-    if (in.has_pad) {
-      pad_.left_handed = settings_.left_handed;
-      const std::array<HandMotion, 2> more = gamepad_motion(pad_, steering_, in.pad, dt);
-      for (size_t k = 0; k < 2; ++k) {
-        HandMotion &m = motion[k], n = more[k];
-        m = {m.right + n.right, m.up + n.up,       m.ahead + n.ahead, m.drive + n.drive,
-             m.yaw + n.yaw,     m.pitch + n.pitch, m.roll + n.roll};
-      }
-    }
-    if (in.moved_ns) moved_ns_ = in.moved_ns;
-    const auto hands = steer(steering_, motion, view, live_->picture(), seen_, dt, moved_ns_);
-    for (size_t k = 0; k < 2; ++k) live_->hand(k, hands[k]);
-  }
-
-  void take_events() {
-    if (!live_) return;
-    for (Event e; live_->event(e);) {
-      if (events_) std::fprintf(events_, "%s\n", event_json(e).c_str());
-      LogLine line;
-      line.text = words_for(e, line.bad);
-      line.time_s = static_cast<double>(e.tick) / static_cast<double>(scene_.solver.tick_rate);
-      if (line.text.empty()) continue;
-      log_.push_back(line);
-      if (log_.size() > kLogLines) log_.pop_front();
-    }
-    if (events_) std::fflush(events_);
+    const auto hands = hands_.move(in, settings_, view, v.live.picture(), v.seen, dt);
+    for (size_t k = 0; k < 2; ++k) v.live.hand(k, hands[k]);
   }
 
   // Whoever follows the events also wants to know when hands are let in.
   void tell_screen() {
-    if (!events_ || !tell_screen_ || (screen_ == Screen::practise && (!have_picture_ || live_->status().settling))) return;
+    if (!events_ || !tell_screen_) return;
+    if (screen_ == Screen::practise && (!visit_->have || visit_->live.status().settling)) return;
     tell_screen_ = false;
-    std::fprintf(events_, "{\"screen\":\"%s\"}\n", kScreenNames[static_cast<size_t>(screen_)]);
+    std::fprintf(events_, "{\"screen\":\"%s\"}\n", screen_name(screen_));
     std::fflush(events_);
   }
 
-  void keys(const WindowInput& in) {
-    const bool field = screen_ == Screen::practise || screen_ == Screen::pause;
-    switch (in.key) {
-      case Key::escape:
-        if (screen_ == Screen::start) quit_ = true;
-        else if (screen_ == Screen::practise) go(Screen::pause);
-        else if (screen_ == Screen::pause) carry_out({live_->status().fault.empty() ? Chosen::resume : Chosen::nothing, 0});
-        else carry_out({Chosen::start_screen, 0});
-        break;
-      case Key::pause:
-        if (screen_ == Screen::practise) go(Screen::pause);
-        else if (screen_ == Screen::pause && live_->status().fault.empty()) go(Screen::practise);
-        break;
-      case Key::enter:
-        if (screen_ == Screen::results) carry_out({Chosen::restart, 0});
-        else if (screen_ == Screen::start && !scenes_.empty()) carry_out({Chosen::scene, 0});
-        break;
-      case Key::digit:
-        if (screen_ == Screen::start && in.digit <= static_cast<int>(scenes_.size()))
-          carry_out({Chosen::scene, static_cast<size_t>(in.digit) - 1});
-        break;
-      case Key::single_step:
-        if (screen_ == Screen::pause) carry_out({Chosen::single_step, 0});
-        break;
-      case Key::take_back:
-        if (field) carry_out({Chosen::take_back, 0});
-        break;
-      case Key::restart:
-        if (field) carry_out({Chosen::restart, 0});
-        break;
-      case Key::finish:
-        if (field) carry_out({Chosen::finish, 0});
-        break;
-      case Key::slower:
-        if (field) live_->command(LiveCommand::slower);
-        break;
-      case Key::faster:
-        if (field) live_->command(LiveCommand::faster);
-        break;
-      case Key::points:
-        settings_.suture_points = !settings_.suture_points;
-        break;
-      case Key::hints:
-        settings_.hints = !settings_.hints;
-        break;
-      case Key::help_at_needle:
-        settings_.assist = !settings_.assist;
-        break;
-      case Key::picture:
-        picture_wanted_ = true;
-        break;
-      case Key::none:
-        break;
+  // For --screenshot: to the screen and the moment that were asked for. Pictures are counted from there.
+  void pose_for_picture() {
+    if (options_.screenshot.empty() || posed_) return;
+    const std::string& wanted = options_.screen;
+    if (visit_) {
+      const LiveStatus& s = visit_->live.status();
+      if (!visit_->have || s.settling || s.practice.time_s < options_.at) return;
+      if (wanted == "pause") go(Screen::pause);
+      if (wanted == "results") carry_out({Chosen::finish});
+      developer_ = wanted == "developer";
+    } else if (viewing_) {
+      const PlaybackStatus& s = viewing_->playback.status();
+      const auto to = static_cast<uint64_t>(std::llround(options_.at / s.tick_s));
+      if (s.known < s.ticks) return;
+      if (s.at != std::min(to, s.ticks)) return viewing_->playback.go_to(to);
+      if (wanted == "results") carry_out({Chosen::sewn});
     }
+    if (wanted == "settings") carry_out({Chosen::settings});
+    posed_ = true;
   }
 
   Choice panels() {
-    WorkView view{&scene_,
-                  live_ ? &live_->status() : nullptr,
-                  &seen_,
-                  &steering_,
-                  &mouse_,
-                  &log_,
-                  events_in_.pad_name(),
-                  picture_count_ / std::max(picture_s_, 1e-3)};
-    if (screen_ == Screen::start) return start_panel(scenes_, settings_, message_);
-    if (screen_ == Screen::results) return result_panel(scene_, result_.practice, result_.recorded, result_.fault);
-    if (have_picture_) work_panel(view, settings_);
-    if (screen_ == Screen::pause) return pause_panel(view, settings_);
-    return {};
+    if (screen_ == Screen::start)
+      return start_panel({&scenes_, &recordings_, message_, events_in_.pad_name(), !options_.live.surgeon.empty()}, settings_,
+                         watch_);
+    if (screen_ == Screen::settings) return settings_panel(settings_, short_name(settings_path()), message_, visit_ != nullptr);
+    if (screen_ == Screen::results) { return result_panel(results_, coloured_by_); }
+    Settings shown = settings_;
+    if (height_ < 480) shown.hints = false, shown.guidance = std::max(shown.guidance, Guidance::practise);
+    if (viewing_ && viewing_->have) {
+      const Viewing& v = *viewing_;
+      return view_panel({&v.playback.scene(), &v.playback.status(), &v.result, &v.seen, v.file, v.version, v.cut}, shown);
+    }
+    if (!visit_ || !visit_->have) return {};
+    WorkView view;
+    view.scene = &visit_->scene;
+    view.status = &visit_->live.status();
+    view.seen = &visit_->seen;
+    view.steering = &hands_.steering;
+    view.mouse = &hands_.mouse;
+    view.log = &visit_->log;
+    view.speed = hands_.speed;
+    view.pad = events_in_.pad_name();
+    view.watching = visit_->watching;
+    view.inside = developer_;
+    view.pictures_per_s = picture_count_ / std::max(picture_s_, 1e-3);
+    work_panel(view, shown);
+    Choice choice;
+    if (developer_) choice = developer_panel(view, screen_ == Screen::pause);
+    if (screen_ == Screen::pause)
+      if (const Choice more = pause_panel(view); more.what != Chosen::nothing) choice = more;
+    return choice;
   }
 
   void resized() {
     SDL_GetWindowSize(sdl_.window, &width_, &height_);
     renderer_->resize(width_, height_);
-    style_panels(std::clamp(static_cast<float>(height_) / 720, 0.7f, 2.0f));
+    const float fits = std::min(static_cast<float>(height_) / 720, static_cast<float>(width_) / 1280);
+    style_text_ = settings_.text_size;
+    style_panels(std::clamp(fits, 0.7f, 4.0f) * style_text_);
   }
 
-  // A machine without a graphics card: fewer points rather than fewer pictures, as long as the low quality was asked for.
+  // A machine without a graphics card: fewer points rather than fewer pictures, as long as the low quality was asked for. A
+  // picture that is kept may take its time.
   void coarser_if_slow() {
     const float least = std::clamp(180.0f / static_cast<float>(height_), 0.25f, 1.0f);
-    if (!live_ || settings_.quality != Quality::draft || coarse_ <= least) return;
+    if (!(visit_ || viewing_) || settings_.quality != Quality::draft || coarse_ <= least || !options_.screenshot.empty())
+      return;
     if (++pictures_so_ < 12 || picture_s_ < picture_count_ * kSlowPicture) return;
     coarse_ = std::max(least, 0.7f * coarse_);
     renderer_->draw_coarser(coarse_);
@@ -374,24 +526,28 @@ class Window {
   int width_, height_;
   std::unique_ptr<WindowRenderer> renderer_;
   WindowEvents events_in_;
-  Settings settings_;
+  Settings settings_, kept_, at_start_;  // as they are; as the file has them; when they were last looked at
+  float style_text_ = 1;
   std::vector<SceneChoice> scenes_;
-  std::string message_;
-  Screen screen_ = Screen::start;
-  bool tell_screen_ = true, picture_wanted_ = false, quit_ = false, have_picture_ = false;
-  SceneSpec scene_;
-  std::unique_ptr<Live> live_;
+  std::vector<std::string> recordings_, made_;  // listed; made since the program began
+  std::string message_, json_fault_;
+  Screen screen_ = Screen::start, settings_from_ = Screen::start;
+  bool tell_screen_ = true, picture_wanted_ = false, quit_ = false, developer_ = false, watch_ = false;
+  bool posed_ = false, photographed_ = false;
+  int posed_for_ = 0;  // pictures
+  std::unique_ptr<Visit> visit_;
+  std::unique_ptr<Viewing> viewing_;
+  std::string source_;  // of the visit: a scene's name or path
   int opened_ = 0;
+  SceneSpec scene_;  // of the results
   LiveResult result_;
-  Snapshot seen_;
-  Steering steering_;
-  MouseHand mouse_;
-  GamepadHand pad_;
+  ResultView results_;
+  BiteColour coloured_by_ = BiteColour::spacing;
+  Snapshot last_;  // behind the results
+  bool have_last_ = false;
+  WindowHands hands_;
   Orbit orbit_;
   bool orbit_set_ = false;  // false: chosen anew with the next snapshot
-  std::deque<LogLine> log_;
-  uint32_t epoch_ = 0;
-  uint64_t moved_ns_ = 0;
   Latency latency_;
   double picture_s_ = 0, picture_count_ = 0;  // lately
   float coarse_ = 1;                          // of the window's pixels each way

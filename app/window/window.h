@@ -10,6 +10,7 @@ namespace catgut {
 
 struct PlayOptions {
   std::string scene;  // opens straight into it; empty: the start screen
+  std::string view;   // or a recording, to look at
   LiveOptions live;
   Quality quality = Quality::draft;
   bool quality_given = false;
@@ -18,7 +19,11 @@ struct PlayOptions {
   std::string events;      // file to which everything that happens is written as it happens, a JSON object a line; "-"
   std::string screenshot;  // PNG of the window, then quit
   int after = 60;          // pictures before it
-  double seconds = 0;      // [s] of wall time, then quit; 0: until somebody quits
+  std::string screen;  // that is in it: start, settings, practise, pause, developer, results, view; empty: whatever is there
+  double at = 0;       // [s] of the work, or of the recording, that it shows
+  std::string json;    // what was sewn, written when a scene is left; "-"
+  double seconds = 0;  // [s] of wall time, then quit; 0: until somebody quits
+  int stall_ms = 0;    // for tests: the loop stands still so long, every two seconds
 };
 
 // Runs until the window is closed. Throws InputError, also when there is no display here.

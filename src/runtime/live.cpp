@@ -74,9 +74,7 @@ std::string part_name(const std::string& path, size_t part) {
 
 struct Live::Work {
   // --- set up before the thread starts, constant after -------------------------------------------------------------------
-  SceneSpec scene;
   LiveOptions options;
-  std::shared_ptr<const Model> model;
   PictureModel picture;
   double dt = 0;
 
@@ -84,7 +82,9 @@ struct Live::Work {
   std::array<Latest<HandMail>, 2> hand_box;        // window -> physics
   std::array<std::atomic<uint32_t>, 2> pressed{};  // both: buttons that went down since the last tick
   Ring<LiveCommand, 64> commands;                  // window -> physics
+  Ring<std::string, 16> changes;                   // window -> physics
   std::atomic<bool> quit{false};                   // window -> physics
+  std::atomic<bool> watched{false};                // window -> physics
   Latest<LiveView> view_box;                       // physics -> window
   Ring<Event, 1024> events;                        // physics -> window
   std::thread thread;
@@ -94,6 +94,8 @@ struct Live::Work {
   std::array<uint32_t, 2> buttons{};
 
   // --- the physics thread's ----------------------------------------------------------------------------------------------
+  SceneSpec scene;
+  std::shared_ptr<const Model> model;
   StatePtr state;
   std::unique_ptr<Jobs> jobs;
   Hands surgeon;
@@ -102,6 +104,7 @@ struct Live::Work {
   TickInput input;
   Snapshot before, now;
   LiveStatus told;
+  StitchMap map;
   Moment settled;
   std::deque<BiteMoment> bites;
   std::array<std::optional<Moment>, 2> checkpoint;                    // the newest and the one before it
@@ -117,6 +120,7 @@ struct Live::Work {
   void tick(bool let_in);
   void show();
   void go_back(const Moment& to);
+  void change_scene(const std::string& key_equals_value);
   void record_from_here();
   void forget_pace() { wall_s = simulated_s = 0; }
   Moment moment() const { return {save_state(*model, *state), input.hand, told.practice}; }
@@ -132,6 +136,7 @@ void Live::Work::begin() {
   if (!options.surgeon.empty()) surgeon = make_hands(options.surgeon, scene, picture);
   for (ToolInput& hand : input.hand) hand.connected = 0;
   record_from_here();
+  map = start_map(picture, dt);
   publish(*model, *state, now);
   before = now;
   told.paused = options.start_paused;
@@ -150,6 +155,7 @@ void Live::Work::record_from_here() {
 
 void Live::Work::tick(bool let_in) {
   const Clock::time_point start = Clock::now();
+  const uint64_t began_ns = wall_ns();
   uint64_t fresh = 0;  // time_ns of the newest motion that this tick is the first to have
   if (let_in && told.tick % checkpoint_every == 0) {
     std::swap(checkpoint[0], checkpoint[1]);
@@ -174,12 +180,20 @@ void Live::Work::tick(bool let_in) {
       told.input_time_ns[k] = mail.input.time_ns;
     }
   }
-  step(*model, *state, input, *jobs);
+  const bool watch = watched.load(std::memory_order_relaxed);
+  StageTimes times;
+  step(*model, *state, input, *jobs, watch ? &times : nullptr);
   std::swap(before, now);
-  publish(*model, *state, now);
+  {
+    StageTimer timer(watch ? &times : nullptr, Stage::publish);
+    publish(*model, *state, now);
+  }
   ++result.ticks;
   if (recorder) recorder->tick(input, hash_state(*model, *state));
-  if (let_in) note(told.practice, now, static_cast<float>(dt));
+  if (let_in) {
+    note(told.practice, now, static_cast<float>(dt));
+    note(map, picture, now);
+  }
   for (const Event& e : now.event) {
     told.events_lost += !events.push(e);
     if (e.kind == EventKind::tip_entered && checkpoint[0]) {
@@ -195,7 +209,15 @@ void Live::Work::tick(bool let_in) {
   if (now.tick % kSanityTicks == 0 && !state_is_sane(*model, *state))
     throw InputError(scene.name, "the simulation went wrong",
                      "take back the last bite, or restart; a recording helps to find out why");
-  if (fresh > 0) told.hand_to_tick_ms = static_cast<float>(wall_ns() - fresh) * 1e-6f;
+  if (fresh > 0) told.moved_ns = fresh, told.began_ns = began_ns, told.ready_ns = 0;
+  if (watch) {
+    measure(*model, *state, told.measures);
+    told.measures.contacts = times.contacts;
+    for (size_t k = 0; k < times.ms.size(); ++k) {  // smoothed: a number that flickers cannot be read
+      float& ms = told.measures.stage_ms[k];
+      ms += 0.05f * (static_cast<float>(times.ms[k]) - ms);
+    }
+  }
   const double spent = seconds_of(Clock::now() - start), keep = std::exp(-dt / kFactorTime);
   spent_s = spent_s * keep + spent;
   ticks_weight = ticks_weight * keep + 1;
@@ -209,6 +231,7 @@ void Live::Work::show() {
   view.at = Clock::now();
   view.tick_wall_s = dt / static_cast<double>(kLiveSpeeds[speed]);
   told.speed = kLiveSpeeds[speed];
+  if (told.ready_ns == 0 && told.moved_ns > 0) told.ready_ns = wall_ns();
   view.status = told;
   view.any = true;
   view_box.publish();
@@ -218,6 +241,7 @@ void Live::Work::go_back(const Moment& to) {
   load_state(*model, *state, to.state);
   publish(*model, *state, now);
   before = now;
+  rewind(map, now.tick);
   input.hand = to.hand;
   const uint32_t taken_back = told.practice.taken_back;
   told.practice = to.practice;
@@ -233,8 +257,27 @@ void Live::Work::go_back(const Moment& to) {
   forget_pace();
 }
 
+// What was simulated so far stays; a tick's bits depend on the scene, the state and the hands, and the recording's next file
+// has all three.
+void Live::Work::change_scene(const std::string& key_equals_value) {
+  try {
+    SceneSpec changed = scene;
+    set_value(changed, key_equals_value, "change");
+    const auto next = build_model(changed);
+    StatePtr same = initial_state(*next);
+    load_state(*next, *same, save_state(*model, *state));
+    scene = changed;
+    model = next;
+    state = std::move(same);
+    told.refused.clear();
+    record_from_here();
+  } catch (const InputError& error) { told.refused = error.what(); }
+  forget_pace();
+}
+
 void Live::Work::obey() {
   bool any = false;
+  for (std::string c; changes.pop(c); any = true) change_scene(c);
   for (LiveCommand c; commands.pop(c); any = true) {
     switch (c) {
       case LiveCommand::pause:
@@ -333,6 +376,7 @@ void Live::Work::run() {
     }
   told.fault.swap(result.fault);
   result.practice = told.practice;
+  result.map = std::move(map);
   result.state_hash = hash_state(*model, *state);
   try {
     if (recorder) recorder->finish(true);
@@ -358,6 +402,9 @@ void Live::hand(size_t who, const ToolInput& input) {
   work_->buttons[who] = input.buttons;
   work_->hand_box[who].publish();
 }
+
+bool Live::change(const std::string& key_equals_value) { return work_->changes.push(key_equals_value); }
+void Live::watch(bool on) { work_->watched = on; }
 
 bool Live::command(LiveCommand command) { return work_->commands.push(command); }
 

@@ -14,7 +14,9 @@
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "exchange/tool_input.h"
+#include "runtime/measures.h"
 #include "runtime/practice.h"
+#include "runtime/stitch_map.h"
 #include "sim/scene.h"
 
 namespace catgut {
@@ -52,14 +54,19 @@ struct LiveStatus {
   uint32_t to_take_back = 0;                // bites that take_back can undo
   uint32_t events_lost = 0;                 // nobody fetched them in time
   std::array<uint64_t, 2> input_time_ns{};  // ToolInput::time_ns of the hands in the newest tick, for latencies
-  float hand_to_tick_ms = 0;                // from the newest of these, where a device uses wall_ns(), to the end of its tick
+  // Of the newest tick that was the first to have a motion, on wall_ns(), for latencies: when the motion was read (where the
+  // device uses that clock), when the tick began, and when its snapshot was ready to be looked at.
+  uint64_t moved_ns = 0, began_ns = 0, ready_ns = 0;
   Practice practice;
-  std::string doing;  // of the surgeon, when one works
-  std::string fault;  // not empty: the run has stopped, and why
+  Measures measures;    // filled while watched, see watch()
+  std::string doing;    // of the surgeon, when one works
+  std::string refused;  // the last change() that could not be made, and why
+  std::string fault;    // not empty: the run has stopped, and why
 };
 
 struct LiveResult {
   Practice practice;
+  StitchMap map;
   uint64_t ticks = 0;  // all that were computed, those taken back included
   uint64_t state_hash = 0;
   std::vector<std::string> recorded;  // files written: a restart or a bite taken back begins the next one (NAME.2.cgrec ...)
@@ -80,6 +87,12 @@ class Live {
   void hand(size_t who, const ToolInput& input);
   // False: too many are waiting; try again.
   bool command(LiveCommand command);
+
+  // For developers: "solver.damping=6" from the next tick on, as in --set; sizes and numbers of things cannot change. The model
+  // is built anew, which may cost some ticks' time. The recording goes on in another file, whose scene says so. False: as
+  // above.
+  bool change(const std::string& key_equals_value);
+  void watch(bool on);  // measures are wanted; they cost some microseconds a tick
 
   // The field as it is now: the last two ticks blended by the time that has passed, so that it shows one tick late and moves
   // evenly whatever the rate of pictures. False before there is any.

@@ -1,7 +1,49 @@
 // runtime: see practice.h.
 #include "runtime/practice.h"
 
+#include <algorithm>
+
 namespace catgut {
+
+void count(Counts& c, const Event& e) {
+  if (e.kind < EventKind::count_) ++c.events[static_cast<size_t>(e.kind)];
+  switch (e.kind) {
+    case EventKind::bite_completed:
+      ++c.bites;
+      break;
+    case EventKind::bite_cancelled:
+      ++c.bites_cancelled;
+      break;
+    case EventKind::knot_locked: {  // one more throw
+      uint8_t& throws = c.throws_of_knot[std::min<size_t>(e.which, c.throws_of_knot.size() - 1)];
+      c.knots += throws == 0;
+      throws = static_cast<uint8_t>(std::min(throws + 1, 255));
+      c.last_knot_throws = throws;
+      ++c.throws;
+      break;
+    }
+    case EventKind::suture_taken:
+      c.throws_of_knot.fill(0);
+      break;
+    case EventKind::stitch_settled:
+      ++c.stitches_settled;
+      c.throws_of_knot.fill(0);
+      break;
+    case EventKind::thread_cut:
+      ++c.cuts;
+      break;
+    case EventKind::needle_released:
+      c.needle_slips += e.value > 0;
+      break;
+    case EventKind::technique_fault: {
+      const size_t fault = e.value >= 0 ? static_cast<size_t>(e.value) : c.faults.size();
+      if (fault < c.faults.size()) ++c.faults[fault], ++c.faults_in_all;
+      break;
+    }
+    default:
+      break;
+  }
+}
 
 void note(Practice& p, const Snapshot& seen, float dt) {
   if (!p.begun) p.opening_start = seen.opening_area;
@@ -15,36 +57,7 @@ void note(Practice& p, const Snapshot& seen, float dt) {
   p.time_s += static_cast<double>(dt);
   p.opening = seen.opening_area;
   p.closure = seen.closure;
-  for (const Event& e : seen.event) {
-    switch (e.kind) {
-      case EventKind::bite_completed:
-        ++p.bites;
-        break;
-      case EventKind::bite_cancelled:
-        ++p.bites_cancelled;
-        break;
-      case EventKind::knot_locked:
-        ++p.throws;
-        p.knots += e.which < seen.knot.size() && seen.knot[e.which].throws == 1;
-        break;
-      case EventKind::thread_cut:
-        ++p.cuts;
-        break;
-      case EventKind::stitch_settled:
-        ++p.stitches_settled;
-        break;
-      case EventKind::needle_released:
-        p.needle_slips += e.value > 0;
-        break;
-      case EventKind::technique_fault: {
-        const size_t fault = static_cast<size_t>(e.value);
-        if (fault < p.faults.size()) ++p.faults[fault], ++p.faults_in_all;
-        break;
-      }
-      default:
-        break;
-    }
-  }
+  for (const Event& e : seen.event) count(p, e);
 }
 
 }  // namespace catgut

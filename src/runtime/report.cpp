@@ -107,6 +107,82 @@ std::string replay_json(const ReplayResult& result, const Recording& recording) 
   return text(j);
 }
 
+namespace {
+
+double mm(float metres) { return std::round(1e6 * static_cast<double>(metres)) / 1e3; }
+double newtons(float force) { return std::round(1e4 * static_cast<double>(force)) / 1e4; }
+Json mm_or_null(float metres) { return metres < 0 ? Json() : Json(mm(metres)); }
+Json point_mm(Vec3 p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
+
+Json bite_json(const StitchBite& b, double tick_s) {
+  return {{"time_s", static_cast<double>(b.tick) * tick_s},
+          {"suture", b.suture},
+          {"bite", b.bite},
+          {"wall", b.wall},
+          {"entry_mm", point_mm(b.entry)},
+          {"exit_mm", point_mm(b.exit)},
+          {"along_mm", {mm(b.entry_along), mm(b.exit_along)}},
+          {"edge_mm", {mm_or_null(b.entry_edge), mm_or_null(b.exit_edge)}},
+          {"spacing_mm", mm_or_null(b.spacing)},
+          {"length_mm", mm(b.length)},
+          {"depth_mm", mm(b.depth)},
+          {"entry_angle_deg", b.entry_angle < 0 ? Json() : Json(std::round(10 * b.entry_angle * 180 / kPi) / 10)},
+          {"inside", {b.entry_inside, b.exit_inside}}};
+}
+
+}  // namespace
+
+std::string practice_json(const SceneSpec& scene, const LiveResult& r) {
+  const Practice& p = r.practice;
+  Json j;
+  j["catgut"] = catgut_version();
+  j["scene"] = scene.name;
+  j["title"] = scene.title;
+  j["technique"] = scene.technique.name;
+  j["time_s"] = p.time_s;
+  j["bites"] = p.bites;
+  j["bites_cancelled"] = p.bites_cancelled;
+  j["taken_back"] = p.taken_back;
+  j["knots"] = p.knots;
+  j["throws"] = p.throws;
+  j["cuts"] = p.cuts;
+  j["stitches_settled"] = p.stitches_settled;
+  j["needle_slips"] = p.needle_slips;
+  j["path_m"] = {p.path[0], p.path[1]};
+  j["most_force_n"] = {newtons(p.most_force[0]), newtons(p.most_force[1])};
+  j["opening_ratio"] = p.opening_start > 0 ? Json(p.opening / p.opening_start) : Json();
+  j["faults"] = Json::object();
+  for (size_t f = 1; f < p.faults.size(); ++f)
+    if (p.faults[f]) j["faults"][fault_name(static_cast<Fault>(f))] = p.faults[f];
+  j["edges"] = Json::array();
+  for (const StitchEdge& e : r.map.edge) {
+    Json points = Json::array();
+    for (Vec3 q : e.point) points.push_back(point_mm(q));
+    j["edges"].push_back({{"length_mm", mm(e.length())}, {"at_rest_mm", points}});
+  }
+  j["stitches"] = Json::array();
+  for (const StitchBite& b : r.map.bite) j["stitches"].push_back(bite_json(b, r.map.tick_s));
+  j["tension"] = {{"time_s", Json::array()}, {"most_n", Json::array()}, {"needle_n", Json::array()}};
+  for (const TensionSample& t : r.map.tension) {
+    j["tension"]["time_s"].push_back(std::round(1e3 * static_cast<double>(t.tick) * r.map.tick_s) / 1e3);
+    j["tension"]["most_n"].push_back(newtons(t.most));
+    j["tension"]["needle_n"].push_back(newtons(t.needle));
+  }
+  j["events"] = Json::array();
+  for (const Event& e : r.map.event)
+    j["events"].push_back({{"tick", e.tick},
+                           {"time_s", std::round(1e3 * static_cast<double>(e.tick) * r.map.tick_s) / 1e3},
+                           {"event", event_name(e.kind)},
+                           {"who", e.who},
+                           {"which", e.which},
+                           {"value", e.value},
+                           {"where_mm", point_mm(e.where)}});
+  j["recorded"] = r.recorded;
+  j["fault"] = r.fault;
+  j["state_hash"] = fmt::format("{:016x}", r.state_hash);
+  return text(j);
+}
+
 std::string run_summary(const RunResult& r) {
   std::string out = fmt::format("{}: {:.1f} s simulated in {} ticks, {:.1f} x real time, {} particles, {} thread{}\n", r.scene,
                                 r.simulated_s, r.ticks, r.real_time_factor, r.particles, r.threads, r.threads == 1 ? "" : "s");

@@ -155,13 +155,17 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
   return result;
 }
 
+void check_replayable(const Recording& recording, const std::string& name) {
+  if (recording.header.state_version == kStateVersion) return;
+  throw InputError(name,
+                   "it was recorded by version " + recording.header.catgut_version + " with state layout " +
+                       std::to_string(recording.header.state_version) + ", this version has " + std::to_string(kStateVersion),
+                   "replay it with that version, or play its hands with `catgut run SCENE --surgeon " + name + "`");
+}
+
 ReplayResult replay_session(const Recording& recording, const std::string& name, bool check, int threads,
                             const SessionHooks& hooks) {
-  if (recording.header.state_version != kStateVersion)
-    throw InputError(name,
-                     "it was recorded by version " + recording.header.catgut_version + " with state layout " +
-                         std::to_string(recording.header.state_version) + ", this version has " + std::to_string(kStateVersion),
-                     "replay it with that version, or play its hands with `catgut run SCENE --surgeon " + name + "`");
+  check_replayable(recording, name);
   const SceneSpec scene = parse_scene(recording.header.scene, name);
   Run run(scene, threads, hooks);
   load_state(*run.model_, *run.state_, recording.start);

@@ -46,6 +46,9 @@ struct SessionOptions {
 // Throws InputError (scene, surgeon, recording).
 RunResult run_session(const SceneSpec& scene, const SessionOptions& options, const SessionHooks& hooks = {});
 
+// Throws InputError when the recording comes from a program whose state had another layout.
+void check_replayable(const Recording& recording, const std::string& name);
+
 struct ReplayResult {
   RunResult run;
   std::optional<uint64_t>

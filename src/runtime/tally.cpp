@@ -56,32 +56,15 @@ void Tally::tick(const Snapshot& seen) {
   opening_wanted_ = false;
   bool passing = false;
   for (const Event& e : seen.event) {
-    if (e.kind < EventKind::count_) ++events_[static_cast<size_t>(e.kind)];
+    count(counts_, e);
     passing = passing || e.kind == EventKind::particle_passed;
-    if (e.kind == EventKind::technique_fault) {
-      const size_t fault = e.value >= 0 ? static_cast<size_t>(e.value) : faults_.size();
-      if (fault < faults_.size()) ++faults_[fault];
-    }
     if (e.kind == EventKind::knot_begun && ends_uneven_ < 0) ends_uneven_ = uneven_ends(seen);
-    count_knots(e);
   }
   const float error = thread_length_error(seen);
   if (!std::isfinite(error)) sane_ = false;
   float& worst = passing ? length_error_passing_ : length_error_;
   worst = std::max(worst, error);
   lost_ = std::max(lost_, lost_slots(seen));
-}
-
-// A knot_locked event is a throw. Knots are numbered from 0 in every suture.
-void Tally::count_knots(const Event& e) {
-  if (e.kind == EventKind::suture_taken || e.kind == EventKind::stitch_settled) {
-    for (uint32_t throws : knot_throws_) knots_before_ += throws > 0;
-    knot_throws_.clear();
-  }
-  if (e.kind != EventKind::knot_locked) return;
-  if (e.which >= knot_throws_.size()) knot_throws_.resize(std::min<size_t>(e.which, 1000) + 1, 0);
-  last_knot_throws_ = ++knot_throws_[std::min<size_t>(e.which, 1000)];
-  ++throws_;
 }
 
 void Tally::judge_seam(const Snapshot& last, std::map<std::string, double>& v) const {
@@ -141,30 +124,28 @@ uint32_t Tally::lost_slots(const Snapshot& seen) {
 }
 
 void Tally::finish(const Snapshot& last, RunResult& result) const {
-  for (size_t k = 0; k < events_.size(); ++k) {
+  for (size_t k = 0; k < counts_.events.size(); ++k) {
     const char* name = event_name(static_cast<EventKind>(k));
-    if (events_[k]) result.events[name] = events_[k];
-    result.value[name] = static_cast<double>(events_[k]);
+    if (counts_.events[k]) result.events[name] = counts_.events[k];
+    result.value[name] = static_cast<double>(counts_.events[k]);
   }
   result.value.erase(event_name(EventKind::suture_point));  // the result suture_points says it
   std::map<std::string, double>& v = result.value;
   v["bites"] =
       static_cast<double>(std::count_if(last.bite.begin(), last.bite.end(), [](const BiteView& b) { return b.complete; }));
   v["suture_points"] = static_cast<double>(last.suture_point.size());
-  v["knots"] = static_cast<double>(knots_before_ + static_cast<uint64_t>(std::count_if(knot_throws_.begin(), knot_throws_.end(),
-                                                                                       [](auto n) { return n > 0; })));
-  v["throws"] = static_cast<double>(throws_);
-  v["last_knot_throws"] = static_cast<double>(last_knot_throws_);
-  const bool tied = std::any_of(knot_throws_.begin(), knot_throws_.end(), [](auto n) { return n > 0; });
-  v["sutures"] = static_cast<double>(last.settled.size() + tied);
+  v["knots"] = counts_.knots;
+  v["throws"] = counts_.throws;
+  v["last_knot_throws"] = counts_.last_knot_throws;
+  v["sutures"] = static_cast<double>(last.settled.size() + counts_.tied());
   judge_seam(last, v);
   v["needle_off"] = last.needle_on_thread ? 0 : 1;
   v["held_ends"] = std::max(last.tool[0].held_strands, last.tool[1].held_strands);
   v["ends_uneven"] = std::max(0.0, ends_uneven_);
-  for (size_t k = 1; k < faults_.size(); ++k) {
+  for (size_t k = 1; k < counts_.faults.size(); ++k) {
     const std::string name = fault_name(static_cast<Fault>(k));
-    if (faults_[k]) result.faults[name] = faults_[k];
-    v["fault_" + name] = static_cast<double>(faults_[k]);
+    if (counts_.faults[k]) result.faults[name] = counts_.faults[k];
+    v["fault_" + name] = static_cast<double>(counts_.faults[k]);
   }
   v["particles"] = static_cast<double>(result.particles);
   v["opening_ratio"] = opening_at_start_ > 0 ? static_cast<double>(last.opening_area) / opening_at_start_ : 1;

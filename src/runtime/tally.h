@@ -10,6 +10,7 @@
 #include "core/profile.h"
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
+#include "runtime/practice.h"
 #include "sim/scene.h"
 
 namespace catgut {
@@ -67,7 +68,6 @@ class Tally {
  private:
   float thread_length_error(const Snapshot& seen) const;
   uint32_t lost_slots(const Snapshot& seen);
-  void count_knots(const Event& e);
   void judge_seam(const Snapshot& last, std::map<std::string, double>& value) const;
 
   const SceneSpec& scene_;
@@ -76,10 +76,7 @@ class Tally {
   bool opening_wanted_ = true, sane_ = true;
   float opening_at_start_ = 0, length_error_ = 0, length_error_passing_ = 0;
   uint32_t lost_ = 0, contacts_ = 0;
-  std::array<uint64_t, static_cast<size_t>(EventKind::count_)> events_{};
-  std::array<uint64_t, static_cast<size_t>(Fault::count_)> faults_{};
-  std::vector<uint32_t> knot_throws_;  // locked throws of each knot of the suture in hand; a Snapshot lists no settled ones
-  uint64_t knots_before_ = 0, throws_ = 0, last_knot_throws_ = 0;
+  Counts counts_;            // a Snapshot lists no settled knots
   double ends_uneven_ = -1;  // -1: no knot was begun yet
   std::vector<float> solver_ms_, tick_ms_;
   std::array<std::vector<float>, kStages> stage_ms_;

@@ -89,10 +89,17 @@ TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
   expect_refused("run small.toml --threads 0", "--threads");
   expect_refused("run small.toml --seconds -3", "--seconds");
   expect_refused("run small.toml --surgeon none --json /proc/nowhere/x.json", "cannot be written");
+  expect_refused("play small.toml --record nowhere/x.cgrec", "nowhere/x.cgrec: there is no folder nowhere; make it");
+  expect_refused("play small.toml --screenshot nowhere/a.png", "there is no folder nowhere");
+  expect_refused("play small.toml --events /proc/x.json", "cannot be written");
+  EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
   expect_refused("run", "scene");
   expect_refused("fly", "fly");
   expect_refused("replay nothing.cgrec", "there is no such recording");
   expect_refused("replay small.toml", "not a Catgut recording");
+  expect_refused("view nothing.cgrec", "there is no such recording");
+  expect_refused("view small.toml", "not a Catgut recording");
+  expect_refused("play small.toml --json nowhere/x.json", "there is no folder nowhere");
   expect_refused("bench paper", "not available yet in this version");
   expect_refused("describe substep", "substeps");
   expect_refused("devices --test", "no haptic device");

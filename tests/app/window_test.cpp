@@ -90,6 +90,8 @@ class Window : public testing::Test {
     setenv("DISPLAY", x_->display.c_str(), 1);
     setenv("SDL_VIDEODRIVER", "x11", 1);
     setenv("XDG_RUNTIME_DIR", folder_.c_str(), 1);
+    setenv("XDG_CONFIG_HOME", folder_.c_str(), 1);  // whoever runs the tests keeps their own settings
+    if (chdir(folder_.c_str()) != 0) _exit(97);     // what the program writes beside it goes with the folder
     if (!std::freopen((folder_ / "stderr").c_str(), "w", stderr)) _exit(98);
     std::vector<char*> argv{const_cast<char*>("catgut")};
     for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
@@ -219,6 +221,107 @@ TEST_F(Window, somebody_takes_the_needle_and_everything_is_recorded) {
   EXPECT_TRUE(pressed);
   EXPECT_TRUE(closed);
   EXPECT_EQ(std::system(("'" CATGUT_APP "' replay '" + recording.string() + "' --check >/dev/null").c_str()), 0);
+}
+
+// Another size, out of sight, back again, and ended by the system in the middle of it.
+TEST_F(Window, whatever_happens_to_the_window_nothing_is_lost) {
+  const fs::path events = folder_ / "events", recording = folder_ / "r.cgrec", json = folder_ / "r.json";
+  start({"play", "stay", "--size", "640x360", "--quality", "low", "--events", events.string(), "--record", recording.string(),
+         "--json", json.string(), "--seconds", "180"});
+  ASSERT_TRUE(happens("practise", 1, 60)) << said();
+  xdo("search --name Catgut windowsize 500 400");
+  pause(700);
+  xdo("search --name Catgut windowsize 780 560");
+  pause(700);
+  xdo("search --name Catgut windowunmap");
+  EXPECT_TRUE(happens("pause")) << "hands that are not seen do nothing: " << said();
+  xdo("search --name Catgut windowmap");
+  pause(500);
+  xdo("search --name Catgut windowfocus");
+  xdo("key Escape");
+  EXPECT_TRUE(happens("practise", 2)) << said();
+  drag(40, 10, 5);
+  kill(app_, SIGTERM);
+  EXPECT_EQ(exit_code(), 130) << said();
+
+  const Recording r = read_recording(recording.string());
+  EXPECT_FALSE(r.truncated) << r.fault;
+  EXPECT_TRUE(r.interrupted);
+  EXPECT_GT(r.tick.size(), 40u);
+  EXPECT_EQ(std::system(("'" CATGUT_APP "' replay '" + recording.string() + "' --check >/dev/null").c_str()), 0);
+  EXPECT_NE(read_file(json).find("\"technique\": \"stay\""), std::string::npos) << "what was sewn is kept too";
+}
+
+TEST_F(Window, a_killed_program_leaves_what_it_had_recorded) {
+  const fs::path events = folder_ / "events", recording = folder_ / "r.cgrec";
+  start({"play", "stay", "--size", "320x180", "--events", events.string(), "--record", recording.string(), "--seconds", "180"});
+  ASSERT_TRUE(happens("practise", 1, 60)) << said();
+  pause(4000);
+  kill(app_, SIGKILL);
+  exit_code();
+  const Recording r = read_recording(recording.string());
+  EXPECT_TRUE(r.truncated);
+  EXPECT_GT(r.tick.size(), 40u);
+}
+
+// The picture stands still for half a second every two; the physics is the headless run's, bit for bit.
+TEST_F(Window, a_stalled_picture_changes_no_hash) {
+  const fs::path alone = folder_ / "alone.cgrec", stalled = folder_ / "stalled.cgrec";
+  ASSERT_EQ(std::system(("'" CATGUT_APP "' run stay --surgeon scripted --headless --no-expect --seconds 5 --record '" +
+                         alone.string() + "' >/dev/null 2>&1")
+                            .c_str()),
+            0);
+  start({"play", "stay", "--surgeon", "scripted", "--size", "320x180", "--stall-ms", "500", "--seconds", "7", "--record",
+         stalled.string()});
+  ASSERT_EQ(exit_code(90), 0) << said();
+  const Recording a = read_recording(alone.string()), b = read_recording(stalled.string());
+  EXPECT_FALSE(b.truncated) << b.fault;
+  const size_t both = std::min(a.tick.size(), b.tick.size());
+  ASSERT_GT(both, 60u);
+  for (size_t k = 0; k < both; ++k) ASSERT_EQ(a.tick[k].hash, b.tick[k].hash) << "tick " << k;
+}
+
+TEST_F(Window, a_recording_is_looked_at_and_what_was_sewn_is_shown) {
+  const fs::path recording = folder_ / "r.cgrec", picture = folder_ / "v.png", results = folder_ / "w.png";
+  ASSERT_EQ(std::system(("'" CATGUT_APP "' run stay --surgeon scripted --headless --no-expect --seconds 3 --record '" +
+                         recording.string() + "' >/dev/null 2>&1")
+                            .c_str()),
+            0);
+  start({"view", recording.string(), "--size", "640x360", "--screen", "view", "--at", "2", "--after", "2", "--screenshot",
+         picture.string()});
+  ASSERT_EQ(exit_code(90), 0) << said();
+  start({"view", recording.string(), "--size", "640x360", "--screen", "results", "--after", "3", "--screenshot",
+         results.string()});
+  ASSERT_EQ(exit_code(90), 0) << said();
+  const auto red = [](const Image& image) {
+    int n = 0;
+    for (int y = 0; y < image.height; ++y)
+      for (int x = 0; x < image.width; ++x) n += pixel(image, x, y)[0] > pixel(image, x, y)[1] + 20;
+    return n;
+  };
+  const Image field = read_png(picture.string()), sewn = read_png(results.string());
+  EXPECT_GT(red(field), kWidth * kHeight / 40) << "tissue";
+  EXPECT_LT(red(sewn), red(field) / 2) << "the panel covers it";
+}
+
+// A setting that is changed in the window is there the next time, and a file that is not understood stops nobody.
+TEST_F(Window, settings_are_kept) {
+  const fs::path file = folder_ / "catgut" / "settings.toml", events = folder_ / "events";
+  fs::create_directories(file.parent_path());
+  std::ofstream(file) << "hints = maybe\n";
+  start({"play", "stay", "--size", "640x360", "--events", events.string(), "--seconds", "120"});
+  ASSERT_TRUE(happens("practise", 1, 60)) << said();
+  EXPECT_NE(said().find("settings.toml:1"), std::string::npos) << said();
+  xdo("key h");  // help at the needle: off
+  pause(500);
+  xdo("key F2");
+  EXPECT_TRUE(happens("settings")) << said();
+  xdo("key Escape");
+  EXPECT_TRUE(happens("pause")) << said();
+  kill(app_, SIGTERM);
+  EXPECT_EQ(exit_code(), 130);
+  EXPECT_NE(read_file(file).find("assist = false"), std::string::npos) << read_file(file);
+  EXPECT_EQ(read_file(file.string() + ".bad"), "hints = maybe\n");
 }
 
 TEST_F(Window, a_screenshot_shows_the_field) {

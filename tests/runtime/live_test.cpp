@@ -14,6 +14,7 @@
 #include "procedure/scene_file.h"
 #include "runtime/blend.h"
 #include "runtime/session.h"
+#include "sim/simulation.h"
 #include "surgeon/surgeon.h"
 
 namespace catgut {
@@ -200,6 +201,112 @@ TEST(Live, the_recording_replays) {
   EXPECT_EQ(hash, result.state_hash);
 }
 
+// A picture that takes half a second, again and again: the hashes of the recording, which is all of the physics, stay what they
+// are with a smooth picture, tick for tick, and no time is lost. The hands are a recording's: they depend on nothing but time.
+TEST(Live, a_picture_that_stalls_changes_no_bit_and_loses_no_tick) {
+  const std::string folder = testing::TempDir(), id = std::to_string(::getpid());
+  const std::string hands = folder + "catgut_hands_" + id + ".cgrec";
+  {
+    const auto model = build_model(small_scene());
+    Recorder recorder(hands, {catgut_version(), kStateVersion, write_scene(small_scene())},
+                      save_state(*model, *initial_state(*model)));
+    TickInput input;
+    for (input.tick = 0; input.tick < 600; ++input.tick) {
+      const float a = 0.03f * static_cast<float>(input.tick);
+      input.hand[0] = hand_at({0.02f * std::cos(a), 0.012f * std::cos(2 * a), 0.02f * std::sin(a)});
+      recorder.tick(input, 0);
+    }
+    recorder.finish(false);
+  }
+  std::vector<RecordedTick> ticks[2];
+  for (const bool stalls : {false, true}) {
+    LiveOptions options;
+    options.surgeon = hands;
+    options.record = folder + "catgut_stall_" + id + ".cgrec";
+    {
+      Live live(small_scene(), options);
+      ASSERT_TRUE(wait_for(live, 20, is_working));
+      Snapshot seen;
+      const double start = wall_seconds();
+      const uint64_t first = live.status().tick;
+      for (int picture = 0; picture < 3; ++picture) {
+        live.look(seen);
+        const uint64_t before = live.status().tick, late = live.status().late;
+        if (stalls) std::this_thread::sleep_for(std::chrono::milliseconds(500));
+        else wait_for(live, 0.5, [](auto&) { return false; });
+        live.look(seen);
+        EXPECT_NEAR(static_cast<double>(live.status().tick - before + live.status().late - late), 30, 8) << "time goes on";
+      }
+      const double passed = wall_seconds() - start;
+      EXPECT_NEAR(static_cast<double>(live.status().tick - first + live.status().late), passed * 60, 8);
+      EXPECT_EQ(live.status().events_lost, 0u);
+      live.finish();
+    }
+    const Recording r = read_recording(options.record);
+    EXPECT_FALSE(r.truncated) << r.fault;
+    EXPECT_FALSE(replay_session(r, "stall", true, 1).differs_at.has_value());
+    ticks[stalls] = r.tick;
+    std::filesystem::remove(options.record);
+  }
+  std::filesystem::remove(hands);
+  const size_t both = std::min(ticks[0].size(), ticks[1].size());
+  ASSERT_GT(both, 40u);
+  for (size_t k = 0; k < both; ++k) ASSERT_EQ(ticks[0][k].hash, ticks[1][k].hash) << "tick " << k;
+}
+
+TEST(Live, a_parameter_changed_in_between_is_in_the_recording) {
+  LiveOptions options;
+  options.record = testing::TempDir() + "catgut_change_" + std::to_string(::getpid()) + ".cgrec";
+  LiveResult result;
+  {
+    Live live(small_scene(), options);
+    live.watch(true);
+    ASSERT_TRUE(wait_for(live, 20, is_working));
+    live.hand(0, hand_at({0, 0.01f, 0.02f}));
+    uint64_t at = live.status().tick;
+    ASSERT_TRUE(wait_for(live, 10, [&](auto& s) { return s.tick > at + 10; }));
+    EXPECT_TRUE(live.change("solver.damping=17"));
+    EXPECT_TRUE(live.change("solver.dampin=17"));
+    ASSERT_TRUE(wait_for(live, 20, [&](auto& s) { return !s.refused.empty(); }));
+    EXPECT_NE(live.status().refused.find("did you mean"), std::string::npos);
+    EXPECT_EQ(live.status().epoch, 0u) << "nobody jumps";
+    EXPECT_GT(live.status().practice.time_s, 0.1);
+    at = live.status().tick;
+    ASSERT_TRUE(wait_for(live, 10, [&](auto& s) { return s.tick > at + 10; }));
+    const Measures& m = live.status().measures;
+    EXPECT_EQ(m.particles, 330u);
+    EXPECT_EQ(m.thread_particles, 30u);
+    EXPECT_GT(m.clusters, 100u);
+    EXPECT_GT(m.stage_ms[static_cast<size_t>(Stage::shape)], 0);
+    live.change("body.particles=200");
+    ASSERT_TRUE(wait_for(live, 20, [&](auto& s) { return s.refused.find("did you mean") == std::string::npos; }));
+    EXPECT_FALSE(live.status().refused.empty()) << "a state that does not fit is refused";
+    at = live.status().tick;
+    EXPECT_TRUE(wait_for(live, 10, [&](auto& s) { return s.tick > at + 3; })) << "and the work goes on";
+    result = live.finish();
+  }
+  ASSERT_EQ(result.recorded.size(), 2u);
+  for (const std::string& file : result.recorded) {
+    const Recording r = read_recording(file);
+    EXPECT_FALSE(replay_session(r, file, true, 1).differs_at.has_value()) << file;
+    EXPECT_EQ(parse_scene(r.header.scene, file).solver.damping == 17, file != options.record);
+    std::filesystem::remove(file);
+  }
+}
+
+TEST(Live, every_live_parameter_is_one) {
+  const SceneSpec scene = read_scene("purse_string");
+  for (const LiveParameter& p : live_parameters()) {
+    for (const float v : {p.low, p.high}) {
+      SceneSpec changed = scene;
+      EXPECT_NO_THROW(set_value(changed, std::string(p.key) + "=" + std::to_string(v))) << p.key;
+      EXPECT_NEAR(p.value(changed), v, 1e-6f) << p.key;
+    }
+    EXPECT_GE(p.value(scene), p.low) << p.key;
+    EXPECT_LE(p.value(scene), p.high) << p.key;
+  }
+}
+
 TEST(Live, what_cannot_be_recorded_is_refused_before_it_starts) {
   LiveOptions options;
   options.record = "/proc/nowhere/x.cgrec";
@@ -257,6 +364,7 @@ TEST(Live, a_bite_can_be_taken_back) {
   live.look(seen);
   EXPECT_LT(distance(seen.tool[0].hand.p, hand), 1e-6f);
   EXPECT_EQ(seen.tool[0].held, Held::needle);
+  EXPECT_TRUE(live.finish().map.bite.empty()) << "nor is it in what was sewn";
 }
 
 TEST(Blend, is_between_the_two_and_ends_at_the_newer) {

@@ -1,0 +1,32 @@
+// app/window: what was sewn as pictures made of lines: the edge unrolled with every bite on it, and the thread's tension over
+// time. Drawn with ImGui's lists into the space that is left in the panel.
+#pragma once
+#include <imgui.h>
+
+#include <vector>
+
+#include "runtime/stitch_map.h"
+
+namespace catgut {
+
+enum class BiteColour { spacing, depth, edge };
+
+// Dark blue over grey to yellow (cividis): the same order of lightness for every kind of eye. part: 0..1.
+ImU32 scale_colour(float part, float alpha = 1);
+// What a bite is coloured by, 0..1, and whether it is known.
+float bite_part(const StitchBite& bite, BiteColour by, bool& known);
+
+// The edges of all walls side by side, cut open at their start: along the edge to the right, away from it up or down.
+void stitch_map_chart(const StitchMap& map, BiteColour by, ImVec2 size);
+void scale_legend(BiteColour by, float width);
+
+// from, to: ticks at the left and right end. now: a line there; negative: none.
+void tension_chart(const StitchMap& map, uint64_t from, uint64_t to, double now, ImVec2 size, bool labels);
+
+// What is worth a mark on a line of time, and which.
+enum class Mark { none, bite, knot, cut, suture, fault };
+Mark mark_of(const Event& event);
+void draw_mark(ImDrawList& list, ImVec2 at, Mark mark, float size);
+void mark_legend();
+
+}  // namespace catgut

@@ -1,0 +1,68 @@
+// app/window: the inside of a tick, for developers.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "window/panels.h"
+#include "window/widgets.h"
+
+namespace catgut {
+
+Choice developer_panel(const WorkView& v, bool can_touch) {
+  Choice choice;
+  const Measures& m = v.status->measures;
+  begin_at("inside", 1, 1, 0.86f);
+  text(kAccent, "Inside (F3)");
+  ImGui::SameLine();
+  text(kQuiet, fmt::format("{} particles ({} thread), {} clusters, {} contacts, late {}", m.particles, m.thread_particles,
+                           m.clusters, m.contacts, v.status->late));
+  float most = 0.05f, all = 0;
+  for (float ms : m.stage_ms) most = std::max(most, ms), all += ms;
+  if (ImGui::BeginTable("inside", 2, ImGuiTableFlags_SizingFixedFit)) {
+    ImGui::TableNextColumn();
+    text(kQuiet, fmt::format("stages, {:.2f} ms a tick", all));
+    for (size_t k = 0; k < m.stage_ms.size(); ++k) {
+      const ImVec2 at = ImGui::GetCursorScreenPos();
+      const float wide = 13 * em();
+      ImGui::GetWindowDrawList()->AddRectFilled({at.x, at.y + 1}, {at.x + wide * m.stage_ms[k] / most, at.y + em()},
+                                                ImGui::GetColorU32(ImVec4{kAccent.x, kAccent.y, kAccent.z, 0.28f}), 2);
+      text(fmt::format("{:<15}{:7.3f} ms", stage_name(static_cast<Stage>(k)), m.stage_ms[k]));
+      ImGui::SameLine(0, 0);
+      ImGui::Dummy({1.2f * em(), em()});
+    }
+    ImGui::TableNextColumn();
+    text(kQuiet, "largest multiplier of each kind, as force");
+    for (size_t k = 0; k < m.most_n.size(); ++k)
+      text(fmt::format("{:<16}{:8.3f} N  of {}", force_name(static_cast<ForceKind>(k)), m.most_n[k], m.constraints[k]));
+    gap(0.3f);
+    text(kQuiet, can_touch ? "parameters, from the next tick on" : "parameters (Esc to change them)");
+    // A slider that is being moved keeps its own value until it is let go: every change builds the model anew.
+    static std::array<float, kLiveParameters> moved{};
+    static int active = -1;
+    for (size_t k = 0; k < kLiveParameters; ++k) {
+      const LiveParameter& p = live_parameters()[k];
+      if (active != static_cast<int>(k)) moved[k] = p.value(*v.scene);
+      if (!can_touch) {
+        text(fmt::format("{:<29}{:9.4g}", p.key, moved[k]));
+        continue;
+      }
+      ImGui::SetNextItemWidth(8 * em());
+      ImGui::SliderFloat(p.key, &moved[k], p.low, p.high, "%.4g",
+                         ImGuiSliderFlags_AlwaysClamp | (p.low > 0 ? ImGuiSliderFlags_Logarithmic : 0));
+      if (ImGui::IsItemActive()) active = static_cast<int>(k);
+      else if (active == static_cast<int>(k)) active = -1;
+      if (ImGui::IsItemDeactivatedAfterEdit()) choice = {Chosen::change, 0, fmt::format("{}={:.6g}", p.key, moved[k])};
+    }
+    ImGui::EndTable();
+  }
+  if (!v.status->refused.empty()) {
+    ImGui::PushTextWrapPos(45 * em());
+    bad_text(v.status->refused);
+    ImGui::PopTextWrapPos();
+  }
+  ImGui::End();
+  return choice;
+}
+
+}  // namespace catgut

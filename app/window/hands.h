@@ -1,0 +1,27 @@
+// app/window: from what was read since the last picture to the hands that are published: mouse and gamepad together.
+#pragma once
+#include <array>
+
+#include "device/gamepad.h"
+#include "device/mouse.h"
+#include "device/steer.h"
+#include "window/input.h"
+#include "window/settings.h"
+
+namespace catgut {
+
+struct WindowHands {
+  Steering steering;
+  MouseHand mouse;
+  GamepadHand pad;
+  size_t speed = 1;       // of kMouseSpeeds
+  uint64_t moved_ns = 0;  // when the newest motion was read
+
+  void begin(const PictureModel& picture, const Settings& settings);
+  // After a restart or a bite taken back the hands go on from where the tools are.
+  void jumped(const PictureModel& picture, const Snapshot& seen, const Settings& settings, bool at_start);
+  std::array<ToolInput, 2> move(const WindowInput& in, const Settings& settings, const ViewFrame& view,
+                                const PictureModel& picture, const Snapshot& seen, float dt);
+};
+
+}  // namespace catgut

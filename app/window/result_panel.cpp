@@ -1,0 +1,169 @@
+// app/window: what was sewn, to look back at: the stitch map, the thread's tension, the events, the numbers.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "window/panels.h"
+#include "window/widgets.h"
+
+namespace catgut {
+namespace {
+
+std::string millimetres(float metres) { return metres < 0 ? "-" : fmt::format("{:.1f}", 1000 * metres); }
+
+// A number with the colour that its bite has in the map.
+void swatch(const StitchBite& b, BiteColour by, const std::string& number) {
+  bool known = false;
+  const float part = bite_part(b, by, known);
+  const ImVec2 at = ImGui::GetCursorScreenPos();
+  const float s = 0.6f * em();
+  if (known)
+    ImGui::GetWindowDrawList()->AddRectFilled({at.x, at.y + 0.2f * em()}, {at.x + s, at.y + 0.2f * em() + s},
+                                              scale_colour(part), 2);
+  ImGui::Dummy({s, s});
+  ImGui::SameLine(0, 0.4f * em());
+  text(number);
+}
+
+void bite_table(const StitchMap& map) {
+  constexpr ImGuiTableFlags kFlags = ImGuiTableFlags_ScrollY | ImGuiTableFlags_RowBg | ImGuiTableFlags_SizingStretchProp;
+  if (!ImGui::BeginTable("bites", 7, kFlags)) return;
+  ImGui::TableSetupScrollFreeze(0, 1);
+  for (const char* name : {"", "time", "wall", "spacing", "depth", "from edge", "length"}) ImGui::TableSetupColumn(name);
+  ImGui::TableHeadersRow();
+  for (size_t k = 0; k < map.bite.size(); ++k) {
+    const StitchBite& b = map.bite[k];
+    ImGui::TableNextRow();
+    ImGui::TableNextColumn();
+    text(fmt::format("{}", k + 1));
+    ImGui::TableNextColumn();
+    text(kQuiet, fmt::format("{:.1f} s", static_cast<double>(b.tick) * map.tick_s));
+    ImGui::TableNextColumn();
+    text(kQuiet, fmt::format("{}", b.wall + 1));
+    ImGui::TableNextColumn();
+    swatch(b, BiteColour::spacing, millimetres(b.spacing));
+    ImGui::TableNextColumn();
+    swatch(b, BiteColour::depth, millimetres(b.depth));
+    ImGui::TableNextColumn();
+    text(millimetres(b.entry_edge) + " / " + millimetres(b.exit_edge));
+    ImGui::TableNextColumn();
+    text(millimetres(b.length));
+  }
+  ImGui::EndTable();
+}
+
+// Only what is in sight: hours of work have thousands of lines.
+void event_list(const std::vector<LogLine>& told) {
+  ImGuiListClipper clipper;
+  clipper.Begin(static_cast<int>(told.size()));
+  while (clipper.Step())
+    for (int i = clipper.DisplayStart; i < clipper.DisplayEnd; ++i) {
+      const LogLine& line = told[static_cast<size_t>(i)];
+      text(line.bad ? kBad : kQuiet, fmt::format("{:5.1f} {} {}", line.time_s, line.bad ? '!' : ' ', line.text));
+    }
+}
+
+}  // namespace
+
+std::vector<LogLine> told_in_words(const StitchMap& map) {
+  std::vector<LogLine> out;
+  for (const Event& e : map.event) {
+    LogLine line;
+    line.time_s = static_cast<double>(e.tick) * map.tick_s;
+    line.text = words_for(e, line.bad);
+    if (!line.text.empty()) out.push_back(line);
+  }
+  return out;
+}
+
+Choice result_panel(const ResultView& v, BiteColour& by) {
+  Choice choice;
+  const LiveResult& r = *v.result;
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  const float margin = 0.6f * em();
+  const ImVec2 size{screen.x - 2 * margin, screen.y - 2 * margin};
+  begin_box("results", {margin, margin}, size, 0.93f);
+  text(kAccent, v.scene->title);
+  ImGui::SameLine();
+  text(kQuiet, v.from_recording ? "what the recording's hands have sewn" : "what was sewn");
+  if (v.known < 1) {
+    ImGui::SameLine();
+    text(kBad, fmt::format("! so far: {:.0f} % of it is looked through", 100 * v.known));
+  }
+  if (!r.fault.empty()) bad_text(r.fault);
+  ImGui::Separator();
+
+  const float foot = 2.8f * em();
+  ImGui::BeginChild("numbers", {0.36f * size.x, -foot});
+  if (ImGui::BeginTable("rows", 2)) {
+    ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 10 * em());
+    ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch);
+    for (const ResultRow& row : result_rows(*v.scene, r.practice)) {
+      ImGui::TableNextRow();
+      ImGui::TableNextColumn();
+      text(row.name == "fault" ? kBad : kQuiet, (row.name == "fault" ? "! " : "") + row.name);
+      ImGui::TableNextColumn();
+      ImGui::TextWrapped("%s", row.value.c_str());
+    }
+    ImGui::EndTable();
+  }
+  gap();
+  heading("Events [s]");
+  ImGui::BeginChild("events", {0, 0});
+  event_list(v.told);
+  ImGui::EndChild();
+  ImGui::EndChild();
+  ImGui::SameLine(0, em());
+
+  ImGui::BeginChild("charts", {0, -foot});
+  const ImVec2 space = ImGui::GetContentRegionAvail();
+  const std::pair<BiteColour, const char*> kBy[] = {
+      {BiteColour::spacing, "spacing"}, {BiteColour::depth, "depth"}, {BiteColour::edge, "from the edge"}};
+  ImGui::AlignTextToFramePadding();
+  text(kAccent, "Stitches, coloured by");
+  for (const auto& [what, name] : kBy) {
+    ImGui::SameLine();
+    if (radio(name, by == what)) by = what;
+  }
+  ImGui::SameLine(0, 1.2f * em());
+  scale_legend(by, std::max(4 * em(), ImGui::GetContentRegionAvail().x - 3.2f * em()));
+  ImGui::SameLine(0, 0.6f * em());
+  text(kQuiet, "mm");
+  text(kQuiet, "filled: the needle goes in, ring: it comes out; below the number the value [mm]");
+  stitch_map_chart(r.map, by, {space.x, 0.35f * space.y});
+  gap(0.1f);
+  text(kAccent, "Thread tension");
+  ImGui::SameLine();
+  text(kQuiet, "blue: the most anywhere in the thread; grey: at the needle");
+  const uint64_t first = r.map.tension.empty() ? 0 : r.map.tension.front().tick,
+                 last = r.map.tension.empty() ? 1 : r.map.tension.back().tick;
+  tension_chart(r.map, first, last, -1, {space.x, 0.23f * space.y}, true);
+  mark_legend();
+  gap(0.1f);
+  bite_table(r.map);
+  ImGui::EndChild();
+
+  ImGui::Separator();
+  if (v.from_recording) {
+    if (wide_button("Back (Esc)", 11)) choice.what = Chosen::leave_results;
+  } else {
+    if (wide_button("Once more (Enter)", 11)) choice.what = Chosen::restart;
+    ImGui::SameLine();
+    if (wide_button("Another scene (Esc)", 13)) choice.what = Chosen::leave_results;
+    for (const std::string& file : r.recorded) {
+      ImGui::SameLine();
+      if (&file == &r.recorded.back() && wide_button("Look at it again", 12)) choice = {Chosen::recording, 0, file};
+    }
+  }
+  ImGui::SameLine();
+  if (wide_button("Save as JSON (J)", 11)) choice.what = Chosen::save_json;
+  ImGui::SameLine();
+  if (wide_button("Quit", 6)) choice.what = Chosen::quit;
+  ImGui::SameLine();
+  if (!v.saved.empty()) text(kQuiet, v.saved);
+  else if (!r.recorded.empty() && !v.from_recording) text(kQuiet, "recorded: " + r.recorded.back());
+  ImGui::End();
+  return choice;
+}
+
+}  // namespace catgut

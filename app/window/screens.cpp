@@ -1,0 +1,72 @@
+// app/window: see screens.h.
+#include "window/screens.h"
+
+namespace catgut {
+
+const char* screen_name(Screen screen) {
+  static constexpr const char* kName[] = {"start", "settings", "practise", "pause", "results", "view"};
+  return kName[static_cast<size_t>(screen)];
+}
+
+Choice choice_of_key(const WindowInput& in, const ScreenFacts& f) {
+  const bool practise = f.screen == Screen::practise, pause = f.screen == Screen::pause, field = practise || pause;
+  const bool start = f.screen == Screen::start, view = f.screen == Screen::view, results = f.screen == Screen::results;
+  if (view && in.arrow_presses != 0) return {Chosen::go_by, 0, "", in.arrow_presses * f.second};
+  const auto when = [](bool holds, Chosen what) { return Choice{holds ? what : Chosen::nothing}; };
+  switch (in.key) {
+    case Key::escape:
+      if (start) return {Chosen::quit};
+      if (practise) return {Chosen::pause};
+      if (pause) return when(!f.fault, Chosen::resume);
+      if (f.screen == Screen::settings) return {Chosen::leave_settings};
+      if (results) return {Chosen::leave_results};
+      return {Chosen::start_screen};
+    case Key::pause:
+      if (view) return {Chosen::play_or_hold};
+      return practise ? Choice{Chosen::pause} : when(pause && !f.fault, Chosen::resume);
+    case Key::enter:
+      if (results) return {f.from_recording ? Chosen::leave_results : Chosen::restart};
+      if (view) return {Chosen::sewn};
+      return when(start && f.scenes > 0, Chosen::scene);
+    case Key::digit:
+      if (start && in.digit >= 1 && static_cast<size_t>(in.digit) <= f.scenes)
+        return {Chosen::scene, static_cast<size_t>(in.digit) - 1};
+      return {};
+    case Key::space:
+      return when(view, Chosen::play_or_hold);
+    case Key::single_step:
+      return view ? Choice{Chosen::go_by, 0, "", 1} : when(pause && !f.fault, Chosen::single_step);
+    case Key::step_back:
+      return view ? Choice{Chosen::go_by, 0, "", -1} : Choice{};
+    case Key::take_back:
+      return when(field, Chosen::take_back);
+    case Key::restart:
+      return view ? Choice{Chosen::go_to, 0} : when(field, Chosen::restart);
+    case Key::finish:
+      return when(field, Chosen::finish);
+    case Key::slower:
+      return when(field || view, Chosen::slower);
+    case Key::faster:
+      return when(field || view, Chosen::faster);
+    case Key::points:
+      return {Chosen::points};
+    case Key::hints:
+      return {Chosen::hints};
+    case Key::help_at_needle:
+      return when(field, Chosen::help_at_needle);
+    case Key::settings:
+      if (f.screen == Screen::settings) return {Chosen::leave_settings};
+      return when(start || field, Chosen::settings);
+    case Key::developer:
+      return when(field, Chosen::developer);
+    case Key::save:
+      return when(results, Chosen::save_json);
+    case Key::picture:
+      return {Chosen::picture};
+    case Key::none:
+      return {};
+  }
+  return {};
+}
+
+}  // namespace catgut

@@ -1,0 +1,115 @@
+// app/window: the replay viewer's panels: what is shown, and a line of time to go along.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "window/panels.h"
+#include "window/widgets.h"
+
+namespace catgut {
+namespace {
+
+constexpr float kSpeeds[] = {0.1f, 0.25f, 0.5f, 1, 2, 4, 8};
+constexpr size_t kWordsShown = 7;
+
+const char* kViewKeys =
+    "space            play, hold\n"
+    "left right       a second back, on\n"
+    ",  .             a tick back, on\n"
+    "- +              slower, faster\n"
+    "drag, wheel      look round, closer\n"
+    "Home  M          camera as at first, points\n"
+    "F5  Enter        to the start, what was sewn\n"
+    "F1  Esc          hide this, leave";
+
+std::string clock(double s) {
+  return fmt::format("{}:{:04.1f}", static_cast<int>(s) / 60, s - 60 * (static_cast<int>(s) / 60));
+}
+
+}  // namespace
+
+Choice view_panel(const PlayedView& v, const Settings& settings) {
+  Choice choice;
+  const PlaybackStatus& s = *v.status;
+  std::vector<Line> about{{kText, v.scene->title}, {kQuiet, v.file}};
+  about.push_back({kQuiet, fmt::format("recorded by {}, {} ticks", v.version, s.ticks)});
+  if (!v.cut.empty()) about.push_back({kBad, "! not whole: " + v.cut});
+  if (!s.fault.empty()) about.push_back({kBad, "! " + s.fault});
+  if (s.differs_at) {
+    about.push_back({kBad, fmt::format("! from tick {} on this is not what was recorded", *s.differs_at)});
+    about.push_back({kBad, "  (another version of the program, or a damaged file)"});
+  } else if (s.known < s.ticks) {
+    const double part = static_cast<double>(s.known) / std::max<double>(1, static_cast<double>(s.ticks));
+    about.push_back({kQuiet, fmt::format("looked through {:.0f} %, every hash as recorded", 100 * part)});
+  } else {
+    about.push_back({kAccent, "every hash is as recorded"});
+  }
+  for (const std::string& line : technique_lines(*v.scene, *v.seen, v.result->practice))
+    if (line.find(" N") != std::string::npos || line.find("needle is in") != std::string::npos) about.push_back({kText, line});
+  lines_at("recording", 0, 0, 0.66f, about);
+
+  // What has just happened, up to the moment that is shown.
+  std::vector<Line> happened;
+  const std::vector<Event>& events = v.result->map.event;
+  auto e =
+      std::upper_bound(events.begin(), events.end(), s.first + s.at, [](uint64_t at, const Event& o) { return at < o.tick; });
+  while (e != events.begin() && happened.size() < kWordsShown) {
+    --e;
+    bool bad = false;
+    const std::string words = words_for(*e, bad);
+    if (words.empty()) continue;
+    happened.insert(
+        happened.begin(),
+        {bad ? kBad : kQuiet, fmt::format("{:6.1f} {} {}", static_cast<double>(e->tick) * s.tick_s, bad ? '!' : ' ', words)});
+  }
+  if (happened.empty()) happened.push_back({kQuiet, "nothing has happened yet"});
+  lines_at("happened", 1, 0, 0.55f, happened);
+
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  const float margin = 0.6f * em(), high = 7.4f * em();
+  if (settings.hints) lines_at("keys", 0, 1, 0.5f, {{kQuiet, kViewKeys}}, high + margin);
+
+  begin_box("time", {margin, screen.y - high - margin}, {screen.x - 2 * margin, high}, 0.85f, ImGuiWindowFlags_NoScrollbar);
+  // The line: tension behind, marks on it, what is not known yet darker. Press or drag to go there.
+  const ImVec2 at = ImGui::GetCursorScreenPos(), size{ImGui::GetContentRegionAvail().x, 2.6f * em()};
+  const double all = std::max<double>(1, static_cast<double>(s.ticks));
+  ImGui::InvisibleButton("line", size);
+  if (ImGui::IsItemActive()) {
+    const double part = std::clamp(static_cast<double>((ImGui::GetIO().MousePos.x - at.x) / size.x), 0.0, 1.0);
+    choice = {Chosen::go_to, static_cast<size_t>(part * all + 0.5)};
+  }
+  ImGui::SetCursorScreenPos(at);
+  tension_chart(v.result->map, s.first, s.first + s.ticks, static_cast<double>(s.first + s.at), size, false);
+  if (s.known < s.ticks) {
+    const float x = at.x + size.x * static_cast<float>(static_cast<double>(s.known) / all);
+    ImGui::GetWindowDrawList()->AddRectFilled({x, at.y}, {at.x + size.x, at.y + size.y},
+                                              ImGui::GetColorU32(ImVec4{0, 0, 0, 0.55f}));
+  }
+  mark_legend();
+  ImGui::SameLine(0, 1.2f * em());
+  text(kQuiet, "blue: thread tension");
+  gap(0.05f);
+  if (ImGui::Button(s.playing ? "Hold (space)" : "Play (space)", {9 * em(), 0})) choice.what = Chosen::play_or_hold;
+  ImGui::SameLine();
+  if (ImGui::Button("<< 5 s", {4.5f * em(), 0})) choice = {Chosen::go_by, 0, "", -static_cast<int64_t>(5 / s.tick_s)};
+  ImGui::SameLine();
+  if (ImGui::Button("5 s >>", {4.5f * em(), 0})) choice = {Chosen::go_by, 0, "", static_cast<int64_t>(5 / s.tick_s)};
+  ImGui::SameLine(0, em());
+  text(fmt::format("{} / {}", clock(static_cast<double>(s.at) * s.tick_s), clock(static_cast<double>(s.ticks) * s.tick_s)));
+  ImGui::SameLine(0, em());
+  for (const float speed : kSpeeds) {
+    const bool on = std::abs(s.speed - speed) < 0.01f;
+    if (on) ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyle().Colors[ImGuiCol_ButtonActive]);
+    if (ImGui::Button(fmt::format("{:g}x", speed).c_str())) choice = {Chosen::speed, 0, "", 0, speed};
+    if (on) ImGui::PopStyleColor();
+    ImGui::SameLine(0, 0.3f * em());
+  }
+  ImGui::SameLine(0, em());
+  if (ImGui::Button("What was sewn (Enter)")) choice.what = Chosen::sewn;
+  ImGui::SameLine();
+  if (ImGui::Button("Leave (Esc)")) choice.what = Chosen::start_screen;
+  ImGui::End();
+  return choice;
+}
+
+}  // namespace catgut

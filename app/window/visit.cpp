@@ -1,0 +1,97 @@
+// app/window: see visit.h.
+#include "window/visit.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+namespace catgut {
+namespace {
+
+constexpr size_t kLogLines = 8;
+constexpr size_t kMostListed = 40;
+
+}  // namespace
+
+Visit::Visit(const SceneSpec& s, const LiveOptions& options, std::FILE* events)
+    : scene(s), live(s, options), watching(!options.surgeon.empty()), events_(events) {}
+
+void Visit::look() {
+  have = live.look(seen);
+  take_events();
+}
+
+void Visit::take_events() {
+  for (Event e; live.event(e);) {
+    if (events_) std::fprintf(events_, "%s\n", event_json(e).c_str());
+    LogLine line;
+    line.text = words_for(e, line.bad);
+    line.time_s = static_cast<double>(e.tick) / static_cast<double>(scene.solver.tick_rate);
+    if (line.text.empty()) continue;
+    log.push_back(line);
+    if (log.size() > kLogLines) log.pop_front();
+  }
+  if (events_) std::fflush(events_);
+}
+
+LiveResult Visit::finish() {
+  live.look(seen);
+  LiveResult result = live.finish();
+  take_events();
+  return result;
+}
+
+Viewing::Viewing(const std::string& path) : Viewing(path, read_recording(path)) {}
+
+Viewing::Viewing(const std::string& path, const Recording& recording)
+    : file(path),
+      version(recording.header.catgut_version),
+      cut(recording.truncated ? recording.fault : ""),
+      playback(recording, path) {
+  result = playback.result();
+}
+
+void Viewing::look() {
+  have = playback.look(seen);
+  if (gathered == playback.status().gathered) return;
+  gathered = playback.status().gathered;
+  result = playback.result();
+}
+
+void Viewing::go_by(int64_t ticks) {
+  const PlaybackStatus& s = playback.status();
+  const int64_t to = static_cast<int64_t>(s.at) + ticks;
+  playback.go_to(static_cast<uint64_t>(std::clamp<int64_t>(to, 0, static_cast<int64_t>(s.ticks))));
+}
+
+void Viewing::change_speed(bool faster) {
+  const float speed = playback.status().speed;
+  playback.speed(std::clamp(faster ? 2 * speed : 0.5f * speed, 0.125f, 8.0f));
+}
+
+std::vector<std::string> recordings_in(const std::string& folder, const std::vector<std::string>& also) {
+  namespace fs = std::filesystem;
+  std::vector<std::pair<fs::file_time_type, std::string>> found;
+  std::set<fs::path> known;
+  std::error_code error;
+  const auto add = [&](const fs::path& path) {
+    const fs::path whole = fs::weakly_canonical(path, error);
+    if (error || !fs::is_regular_file(path, error) || !known.insert(whole).second) return;
+    found.push_back({fs::last_write_time(path, error), path.string()});
+  };
+  for (const std::string& path : also) add(path);
+  // A folder of photographs must not make the start screen wait.
+  int looked_at = 0;
+  for (fs::directory_iterator i(folder, fs::directory_options::skip_permission_denied, error), end; !error && i != end;
+       i.increment(error)) {
+    if (i->path().extension() == ".cgrec") add(folder == "." ? i->path().filename() : i->path());
+    if (++looked_at > 5000) break;
+  }
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  if (found.size() > kMostListed) found.resize(kMostListed);
+  std::vector<std::string> out;
+  for (const auto& f : found) out.push_back(f.second);
+  return out;
+}
+
+}  // namespace catgut
