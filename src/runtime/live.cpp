@@ -100,6 +100,8 @@ struct Live::Work {
   std::unique_ptr<Recorder> recorder;
   LiveResult result;
   TickInput input;
+  std::array<int, 2> unheard{};                  // [ticks] since hands were last heard of, and
+  std::array<float, 2> heard_every{1.0f, 1.0f};  // [ticks] how often they are, lately
   Snapshot before, now;
   LiveStatus told;
   Moment settled;
@@ -161,14 +163,19 @@ void Live::Work::tick(bool let_in) {
     told.doing = surgeon.surgeon->doing();
   } else if (let_in) {
     for (size_t k = 0; k < 2; ++k) {
-      hand_box[k].update();
+      ++unheard[k];
+      if (hand_box[k].update()) {
+        heard_every[k] += 0.2f * (static_cast<float>(unheard[k]) - heard_every[k]);
+        unheard[k] = 0;
+      }
       const HandMail& mail = hand_box[k].seen();
       const uint32_t down = pressed[k].exchange(0, std::memory_order_relaxed);
       ToolInput& hand = input.hand[k];
       hand.buttons = 0;
       // Mail from before a jump in time is about tools that were elsewhere: until newer comes the hand stays.
       if (mail.epoch != told.epoch) continue;
-      hand = hand_toward(hand, mail.input, options.hand_speed, options.hand_turn, static_cast<float>(dt));
+      hand = hand_toward(hand, mail.input, options.hand_speed, options.hand_turn, static_cast<float>(dt),
+                         hand_share(heard_every[k]));
       hand.buttons |= down;
       fresh = std::max(fresh, mail.input.time_ns > told.input_time_ns[k] ? mail.input.time_ns : 0);
       told.input_time_ns[k] = mail.input.time_ns;
@@ -380,13 +387,18 @@ LiveResult Live::finish() {
   return work_->result;
 }
 
-ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt) {
+float hand_share(float every) { return 1 - std::exp(-2 / std::clamp(every, 0.3f, 8.0f)); }
+
+ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt, float share) {
   if (!from.connected || !to.connected) return to;
   ToolInput out = to;
   const Vec3 way = to.pose.p - from.pose.p, about = rotation_vector(to.pose.q * conjugate(from.pose.q));
   const float far = length(way), angle = length(about);
-  if (far > speed * dt) out.pose.p = from.pose.p + way * (speed * dt / far);
-  if (angle > turn * dt) out.pose.q = nlerp(from.pose.q, to.pose.q, turn * dt / angle);
+  if (far * share > speed * dt) share = std::min(share, speed * dt / far);
+  float turned = share;
+  if (angle * turned > turn * dt) turned = turn * dt / angle;
+  if (share < 1) out.pose.p = from.pose.p + way * share;
+  if (turned < 1) out.pose.q = nlerp(from.pose.q, to.pose.q, turned);
   out.jaw = from.jaw + std::clamp(to.jaw - from.jaw, -10 * dt, 10 * dt);
   out.velocity = (out.pose.p - from.pose.p) / dt;
   out.angular_velocity = rotation_vector(out.pose.q * conjugate(from.pose.q)) / dt;

@@ -95,8 +95,10 @@ class Live {
 };
 
 // Toward `to` as far as a hand gets in dt [s] at no more than `speed` [m/s] and `turn` [rad/s]; the jaw at ten strokes a
-// second.
-ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt);
+// second. share: of the way, per call: below 1 where hands are heard of less often than this is called, so that a tool moves
+// evenly and does not stop between two pictures (a needle that stops springs back out of the tissue).
+ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt, float share = 1);
+float hand_share(float every);  // for hands that are heard of every so many calls
 
 // [s] on a clock that never goes back, for whatever is paced outside the physics: pictures, key repeats, latencies.
 double wall_seconds();

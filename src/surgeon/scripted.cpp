@@ -72,21 +72,7 @@ void Scripted::rest_aside(const Snapshot& seen, size_t hand) {
 }
 
 BiteFrame Scripted::frame(const Snapshot& seen, size_t place) const {
-  const BitePlace& b = plan_.place[std::min(place, plan_.place.size() - 1)];
-  BiteFrame f;
-  Quat turned;
-  f.at = live_place(picture_, seen, b.at, b.wall, &turned);
-  if (b.walls > 1 && picture_.rim.size() > 1 && picture_.body.size() == 1) {
-    // Between two layers: the middle of where the place would be on either.
-    f.at = 0.5f * (f.at + live_place(picture_, seen, b.at, 1, nullptr));
-    f.out = b.out;
-  } else {
-    f.out = rotate(turned, b.out);
-  }
-  if (b.level) f.out = normalized(f.out - b.up * (0.5f * dot(f.out, b.up)));
-  f.up = normalized(b.up - f.out * dot(b.up, f.out));
-  f.along = cross(f.out, f.up);
-  return f;
+  return bite_frame(picture_, seen, plan_.place[std::min(place, plan_.place.size() - 1)]);
 }
 
 Pose Scripted::needle_at(const BiteFrame& f, float psi) const {

@@ -17,11 +17,6 @@ namespace catgut {
 constexpr size_t kDriver = 0, kForceps = 1;
 constexpr int kAttempts = 8;  // at one bite, at one grasp, at one throw
 
-// Where a bite is made, in the world as it is now: a place, outward, the way of the needle, the axis about which it turns.
-struct BiteFrame {
-  Vec3 at, out, along, up;
-};
-
 class Scripted final : public Surgeon {
  public:
   Scripted(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
