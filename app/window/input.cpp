@@ -30,6 +30,9 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
     case SDL_SCANCODE_E:
       roll_right_ = down;
       return;
+    case SDL_SCANCODE_W:
+      both_ = down;
+      return;
     case SDL_SCANCODE_LEFT:
       arrow_x_ = down ? -1 : 0;
       return;
@@ -90,6 +93,7 @@ void WindowEvents::read_pad(GamepadInput& pad) const {
   }
   pad.cut = SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_A);
   pad.fresh = SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_Y);
+  pad.both = SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_B);
   pad.slow = SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_X);
 }
 
@@ -107,7 +111,7 @@ WindowInput WindowEvents::read(bool working, float dt) {
         // Keys that were down when the window lost the keyboard never come up here.
         if (e.window.event == SDL_WINDOWEVENT_FOCUS_LOST) {
           in.left = true;
-          left_ = right_ = middle_ = space_ = cut_ = fresh_ = roll_left_ = roll_right_ = false;
+          left_ = right_ = middle_ = space_ = cut_ = fresh_ = roll_left_ = roll_right_ = both_ = false;
           arrow_x_ = arrow_y_ = zoom_ = 0;
         }
         break;
@@ -166,6 +170,7 @@ WindowInput WindowEvents::read(bool working, float dt) {
   }
   const SDL_Keymod mod = SDL_GetModState();
   in.mouse.turn = right_;
+  in.mouse.both = both_;
   in.mouse.free_turn = mod & KMOD_CTRL;
   in.mouse.depth = mod & KMOD_SHIFT;
   in.mouse.jaw_down = left_ || space_;

@@ -55,6 +55,7 @@ const char* kHints =
     "left, space      close or open the jaw\n"
     "right            drive the needle, turn the tool\n"
     "Ctrl+right, Q E  turn the tool as a ball\n"
+    "W                both hands: wind, draw apart\n"
     "Tab              the other hand\n"
     "C  N             cut, fresh needle\n"
     "1 2 3            fine, normal, fast\n"
@@ -132,7 +133,11 @@ void work_panel(const WorkView& v, const Settings& settings) {
     text(
         fmt::format("{} ({} hand)", k == 0 ? "needle driver" : "forceps", (k == 0) != settings.left_handed ? "right" : "left"));
     if (v.mouse->speed != 1) ImGui::SameLine(), text(kQuiet, v.mouse->speed < 1 ? "fine" : "fast");
-    if (help) text(kGood, "at the needle: close the jaw");
+    const HelpAt at = v.steering->hand[k].at;
+    if (help)
+      text(kGood, at == HelpAt::needle ? "at the needle: close the jaw"
+                  : at == HelpAt::tail ? "at the tail: close the jaw"
+                                       : "at the bite: drive the needle");
     if (!v.pad.empty()) text(kQuiet, v.pad);
     ImGui::End();
   }

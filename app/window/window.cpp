@@ -18,6 +18,7 @@
 #include "procedure/scene_file.h"
 #include "render/orbit.h"
 #include "render/window.h"
+#include "runtime/guide.h"
 #include "window/input.h"
 #include "window/latency.h"
 #include "window/panels.h"
@@ -107,6 +108,7 @@ class Window {
       live.record = live.record.substr(0, dot) + fmt::format("_visit{}.cgrec", opened_);
     }
     live_ = std::make_unique<Live>(scene_, live);
+    places_ = bite_places(scene_, live_->picture());
     steering_ = start_steering(live_->picture(), settings_.left_handed);
     mouse_ = {};
     pad_ = {};
@@ -239,6 +241,7 @@ class Window {
     if (!status.fault.empty() && screen_ == Screen::practise) go(Screen::pause);
     if (screen_ != Screen::practise || status.settling || !have_picture_ || !options_.live.surgeon.empty()) return;
     steering_.assist = settings_.assist;
+    steering_.guide = next_bite(places_, live_->picture(), seen_);
     mouse_.hold_to_close = settings_.hold_to_close;
     if (in.speed >= 0) mouse_.speed = kMouseSpeeds[static_cast<size_t>(in.speed)];
     const Camera camera = camera_of(orbit_);
@@ -249,19 +252,23 @@ class Window {
       const std::array<HandMotion, 2> more = gamepad_motion(pad_, steering_, in.pad, dt);
       for (size_t k = 0; k < 2; ++k) {
         HandMotion &m = motion[k], n = more[k];
-        m = {m.right + n.right, m.up + n.up,       m.ahead + n.ahead, m.drive + n.drive,
-             m.yaw + n.yaw,     m.pitch + n.pitch, m.roll + n.roll};
+        m = {m.right + n.right, m.up + n.up,     m.ahead + n.ahead,        m.drive + n.drive, m.yaw + n.yaw,
+             m.pitch + n.pitch, m.roll + n.roll, m.together || n.together, m.both + n.both};
       }
     }
+    // One that comes back has nothing to say until its triggers move: what was held is held.
+    if (!in.has_pad) pad_.trigger = {};
     if (in.moved_ns) moved_ns_ = in.moved_ns;
     const auto hands = steer(steering_, motion, view, live_->picture(), seen_, dt, moved_ns_);
     for (size_t k = 0; k < 2; ++k) live_->hand(k, hands[k]);
+    if (options_.watch && !options_.watch({seen_, view, steering_, mouse_, status})) quit_ = true;
   }
 
   void take_events() {
     if (!live_) return;
     for (Event e; live_->event(e);) {
       if (events_) std::fprintf(events_, "%s\n", event_json(e).c_str());
+      if (options_.told) options_.told(e);
       LogLine line;
       line.text = words_for(e, line.bad);
       line.time_s = static_cast<double>(e.tick) / static_cast<double>(scene_.solver.tick_rate);
@@ -384,6 +391,7 @@ class Window {
   int opened_ = 0;
   LiveResult result_;
   Snapshot seen_;
+  BitePlaces places_;
   Steering steering_;
   MouseHand mouse_;
   GamepadHand pad_;

@@ -1,12 +1,23 @@
 // app/window: the simulator that people sit down at: a window, screens to choose, practise, pause and look back, and hands by
 // mouse, keyboard and gamepad.
 #pragma once
+#include <functional>
 #include <string>
 
+#include "device/mouse.h"
 #include "render/renderer.h"
 #include "runtime/live.h"
 
 namespace catgut {
+
+// What somebody at the window sees and has in hand, after a picture in which hands were let in.
+struct WindowLook {
+  const Snapshot& seen;
+  const ViewFrame& view;
+  const Steering& steering;
+  const MouseHand& mouse;
+  const LiveStatus& status;
+};
 
 struct PlayOptions {
   std::string scene;  // opens straight into it; empty: the start screen
@@ -15,7 +26,11 @@ struct PlayOptions {
   bool quality_given = false;
   int width = 1280, height = 720;
   bool left_handed = false;
-  std::string events;      // file to which everything that happens is written as it happens, a JSON object a line; "-"
+  std::string events;  // file to which everything that happens is written as it happens, a JSON object a line; "-"
+  // For whoever looks on from within the program (a test that sits at the window): every such picture, false closes the window;
+  // and every event.
+  std::function<bool(const WindowLook&)> watch;
+  std::function<void(const Event&)> told;
   std::string screenshot;  // PNG of the window, then quit
   int after = 60;          // pictures before it
   double seconds = 0;      // [s] of wall time, then quit; 0: until somebody quits
