@@ -76,7 +76,7 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
       {SDLK_ESCAPE, Key::escape},       {SDLK_RETURN, Key::enter}, {SDLK_p, Key::pause},      {SDLK_PERIOD, Key::single_step},
       {SDLK_BACKSPACE, Key::take_back}, {SDLK_F5, Key::restart},   {SDLK_MINUS, Key::slower}, {SDLK_PLUS, Key::faster},
       {SDLK_EQUALS, Key::faster},       {SDLK_m, Key::points},     {SDLK_F1, Key::hints},     {SDLK_h, Key::help_at_needle},
-      {SDLK_F10, Key::finish},          {SDLK_F12, Key::picture}};
+      {SDLK_F10, Key::finish},          {SDLK_F12, Key::picture},  {SDLK_s, Key::show_me},    {SDLK_t, Key::teach}};
   for (const auto& k : kKeys)
     if (k.code == code) in.key = k.key;
 }

@@ -27,7 +27,9 @@ enum class Key {
   help_at_needle,
   finish,
   digit,
-  picture
+  picture,
+  show_me,
+  teach
 };
 
 struct WindowInput {

@@ -38,6 +38,13 @@ void show_settings(Settings& s, bool at_start) {
   ImGui::Checkbox("jaw closes only while the button is down", &s.hold_to_close);
   ImGui::Checkbox("help at the needle (H)", &s.assist);
   ImGui::Checkbox("show suture points (M)", &s.suture_points);
+  text("guidance");
+  const std::pair<const char*, Guidance> kLevels[] = {
+      {"full", Guidance::full}, {"hints only", Guidance::hints}, {"none", Guidance::none}};
+  for (const auto& [name, level] : kLevels) {
+    ImGui::SameLine();
+    if (ImGui::RadioButton(name, s.guidance == level)) s.guidance = level;
+  }
   if (!at_start) return;
   ImGui::Checkbox("left-handed", &s.left_handed);
   text("picture");
@@ -92,6 +99,7 @@ Choice start_panel(const std::vector<SceneChoice>& scenes, Settings& settings, c
   ImGui::SameLine();
   text(kQuiet, "open surgery, stitch by stitch");
   ImGui::Separator();
+  if (ImGui::Button("T  Teach me: a first stitch", {24 * ImGui::GetFontSize(), 0})) choice.what = Chosen::teach;
   for (size_t i = 0; i < scenes.size(); ++i)
     if (ImGui::Button(fmt::format("{}  {}##{}", i + 1, scenes[i].title, scenes[i].name).c_str(),
                       {24 * ImGui::GetFontSize(), 0}))

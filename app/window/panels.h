@@ -16,6 +16,8 @@ struct SceneChoice {
   std::string name, title;
 };
 
+enum class Guidance { full, hints, none };
+
 // What a person has set; the start and pause screens change it.
 struct Settings {
   Quality quality = Quality::draft;
@@ -24,6 +26,9 @@ struct Settings {
   bool assist = true;
   bool suture_points = false;
   bool hints = true;
+  // What is shown of how it should be: the ghost of the needle's way and what is said of the bite; how things are done; or
+  // nothing.
+  Guidance guidance = Guidance::full;
 };
 
 struct LogLine {
@@ -44,7 +49,7 @@ struct WorkView {
   double pictures_per_s = 0;
 };
 
-enum class Chosen { nothing, scene, resume, single_step, take_back, restart, finish, start_screen, quit };
+enum class Chosen { nothing, scene, teach, resume, single_step, take_back, restart, finish, start_screen, quit };
 struct Choice {
   Chosen what = Chosen::nothing;
   size_t scene = 0;  // of the list

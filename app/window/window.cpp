@@ -66,7 +66,7 @@ class Window {
   Window& operator=(const Window&) = delete;
 
   int loop() {
-    if (!options_.scene.empty()) open(options_.scene);
+    if (!options_.scene.empty()) open(options_.scene, options_.teach);
     const double start = wall_seconds();
     double last = start, drawn_at = start;
     const std::atomic<bool>& stop = stop_on_interrupt();
@@ -100,7 +100,7 @@ class Window {
  private:
   // --- scenes
   // -----------------------------------------------------------------------------------------------------------------
-  void open(const std::string& name) {
+  void open(const std::string& name, bool teach = false) {
     scene_ = read_scene(name);
     LiveOptions live = options_.live;
     if (!live.record.empty() && opened_++ > 0) {  // every visit has its own file
@@ -109,6 +109,8 @@ class Window {
     }
     live_ = std::make_unique<Live>(scene_, live);
     places_ = bite_places(scene_, live_->picture());
+    if (teach) lesson_.begin(first_stitch());
+    else lesson_.end();
     steering_ = start_steering(live_->picture(), settings_.left_handed);
     mouse_ = {};
     pad_ = {};
@@ -150,6 +152,9 @@ class Window {
           message_.clear();
         } catch (const InputError& error) { message_ = error.what(); }
         break;
+      case Chosen::teach:
+        open(first_stitch().scene, true);
+        break;
       case Chosen::resume:
         go(Screen::practise);
         break;
@@ -164,7 +169,7 @@ class Window {
           live_->command(LiveCommand::restart);
           go(Screen::practise);
         } else {
-          open(options_.scene.empty() || scene_.name != options_.scene ? scene_.name : options_.scene);
+          open(options_.scene.empty() || scene_.name != options_.scene ? scene_.name : options_.scene, lesson_.on());
         }
         break;
       case Chosen::finish:
@@ -239,6 +244,9 @@ class Window {
       mouse_.was_down = false;
     }
     if (!status.fault.empty() && screen_ == Screen::practise) go(Screen::pause);
+    if (lesson_.on() && lesson_.look(*live_, seen_, wall_seconds()) && events_)
+      std::fprintf(events_, "{\"lesson\":\"%s\"}\n",
+                   lesson_.all_done() ? "done" : lesson_.lesson().step[lesson_.step()].name.c_str());
     if (screen_ != Screen::practise || status.settling || !have_picture_ || !options_.live.surgeon.empty()) return;
     steering_.assist = settings_.assist;
     steering_.guide = next_bite(places_, live_->picture(), seen_);
@@ -261,7 +269,7 @@ class Window {
     if (in.moved_ns) moved_ns_ = in.moved_ns;
     const auto hands = steer(steering_, motion, view, live_->picture(), seen_, dt, moved_ns_);
     for (size_t k = 0; k < 2; ++k) live_->hand(k, hands[k]);
-    if (options_.watch && !options_.watch({seen_, view, steering_, mouse_, status})) quit_ = true;
+    if (options_.watch && !options_.watch({seen_, view, steering_, mouse_, status, lesson_})) quit_ = true;
   }
 
   void take_events() {
@@ -269,6 +277,7 @@ class Window {
     for (Event e; live_->event(e);) {
       if (events_) std::fprintf(events_, "%s\n", event_json(e).c_str());
       if (options_.told) options_.told(e);
+      if (lesson_.on()) lesson_.told(e);
       LogLine line;
       line.text = words_for(e, line.bad);
       line.time_s = static_cast<double>(e.tick) / static_cast<double>(scene_.solver.tick_rate);
@@ -338,6 +347,12 @@ class Window {
       case Key::picture:
         picture_wanted_ = true;
         break;
+      case Key::show_me:
+        if (screen_ == Screen::practise && live_) show_me();
+        break;
+      case Key::teach:
+        if (screen_ == Screen::start) carry_out({Chosen::teach, 0});
+        break;
       case Key::none:
         break;
     }
@@ -355,8 +370,28 @@ class Window {
     if (screen_ == Screen::start) return start_panel(scenes_, settings_, message_);
     if (screen_ == Screen::results) return result_panel(scene_, result_.practice, result_.recorded, result_.fault);
     if (have_picture_) work_panel(view, settings_);
+    if (have_picture_ && live_ && !live_->status().settling) guidance();
     if (screen_ == Screen::pause) return pause_panel(view, settings_);
     return {};
+  }
+
+  void show_me() {
+    const bool was = lesson_.showing();
+    lesson_.show(*live_);
+    if (events_ && !was && lesson_.showing())
+      std::fprintf(events_, "{\"shows\":\"%s\"}\n", lesson_.lesson().step[lesson_.step()].name.c_str());
+  }
+
+  // What is shown of how it should be done, as far as somebody wants it.
+  void guidance() {
+    const Guidance level = settings_.guidance;
+    if (lesson_.on()) lesson_panel(lesson_, level != Guidance::none);
+    if (level != Guidance::full || !options_.live.surgeon.empty()) return;
+    if (const auto guide = next_bite(places_, live_->picture(), seen_)) {
+      const Camera c = camera_of(orbit_);
+      const float w = static_cast<float>(width_), h = static_cast<float>(height_);
+      guide_overlay(*guide, view_frame(c.eye, c.target, c.up, c.fov_deg, h), live_->picture(), seen_, w, h);
+    }
   }
 
   void resized() {
@@ -392,6 +427,7 @@ class Window {
   LiveResult result_;
   Snapshot seen_;
   BitePlaces places_;
+  LessonRun lesson_;
   Steering steering_;
   MouseHand mouse_;
   GamepadHand pad_;

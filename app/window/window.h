@@ -7,6 +7,7 @@
 #include "device/mouse.h"
 #include "render/renderer.h"
 #include "runtime/live.h"
+#include "window/lesson_panel.h"
 
 namespace catgut {
 
@@ -17,6 +18,7 @@ struct WindowLook {
   const Steering& steering;
   const MouseHand& mouse;
   const LiveStatus& status;
+  const LessonRun& lesson;
 };
 
 struct PlayOptions {
@@ -26,6 +28,7 @@ struct PlayOptions {
   bool quality_given = false;
   int width = 1280, height = 720;
   bool left_handed = false;
+  bool teach = false;  // the lesson of the first stitch, in its scene
   std::string events;  // file to which everything that happens is written as it happens, a JSON object a line; "-"
   // For whoever looks on from within the program (a test that sits at the window): every such picture, false closes the window;
   // and every event.

@@ -49,6 +49,19 @@ ToolInput nobody() {
   return input;
 }
 
+// Tasks of the surgeon's plan, in a box that commands fit into.
+struct Demonstration {
+  std::array<uint8_t, 6> task{};
+  uint8_t tasks = 0;
+  bool from_mark = false;
+};
+
+struct Command {
+  LiveCommand what{};
+  bool demonstrate = false;
+  Demonstration of;
+};
+
 struct HandMail {
   ToolInput input = nobody();
   uint32_t epoch = 0;  // that whoever sent it had seen
@@ -83,7 +96,7 @@ struct Live::Work {
   // --- between the threads -----------------------------------------------------------------------------------------------
   std::array<Latest<HandMail>, 2> hand_box;        // window -> physics
   std::array<std::atomic<uint32_t>, 2> pressed{};  // both: buttons that went down since the last tick
-  Ring<LiveCommand, 64> commands;                  // window -> physics
+  Ring<Command, 64> commands;                      // window -> physics
   std::atomic<bool> quit{false};                   // window -> physics
   Latest<LiveView> view_box;                       // physics -> window
   Ring<Event, 1024> events;                        // physics -> window
@@ -104,7 +117,9 @@ struct Live::Work {
   std::array<float, 2> heard_every{1.0f, 1.0f};  // [ticks] how often they are, lately
   Snapshot before, now;
   LiveStatus told;
-  Moment settled;
+  Moment settled, mark, learner;
+  Hands demonstrator;
+  bool marked = false;
   std::deque<BiteMoment> bites;
   std::array<std::optional<Moment>, 2> checkpoint;                    // the newest and the one before it
   uint64_t checkpoint_every = 1;                                      // [ticks]
@@ -119,6 +134,8 @@ struct Live::Work {
   void tick(bool let_in);
   void show();
   void go_back(const Moment& to);
+  void demonstrate(const Demonstration& what);
+  void end_demonstration();
   void record_from_here();
   void forget_pace() { wall_s = simulated_s = 0; }
   Moment moment() const { return {save_state(*model, *state), input.hand, told.practice}; }
@@ -158,9 +175,11 @@ void Live::Work::tick(bool let_in) {
     checkpoint[0] = moment();
   }
   input.tick = result.ticks;
-  if (let_in && surgeon.surgeon) {
-    input.hand = surgeon.surgeon->operate(now, static_cast<float>(dt));
-    told.doing = surgeon.surgeon->doing();
+  if (let_in && (surgeon.surgeon || told.demonstrating)) {
+    Surgeon& hands = told.demonstrating ? *demonstrator.surgeon : *surgeon.surgeon;
+    input.hand = hands.operate(now, static_cast<float>(dt));
+    told.doing = hands.doing();
+    told.shown = told.demonstrating && hands.done();
   } else if (let_in) {
     for (size_t k = 0; k < 2; ++k) {
       ++unheard[k];
@@ -189,6 +208,7 @@ void Live::Work::tick(bool let_in) {
   if (let_in) note(told.practice, now, static_cast<float>(dt));
   for (const Event& e : now.event) {
     told.events_lost += !events.push(e);
+    if (told.demonstrating) continue;  // nobody takes back what was only shown
     if (e.kind == EventKind::tip_entered && checkpoint[0]) {
       bites.push_back({e.which, checkpoint[1] ? *checkpoint[1] : *checkpoint[0]});
       if (bites.size() > kMostTakenBack) bites.pop_front();
@@ -240,10 +260,34 @@ void Live::Work::go_back(const Moment& to) {
   forget_pace();
 }
 
+void Live::Work::demonstrate(const Demonstration& what) {
+  if (surgeon.surgeon || told.demonstrating || told.settling || !told.fault.empty()) return;
+  const std::string plan = scene.surgeon.plan.empty() ? scene.technique.name : scene.surgeon.plan;
+  try {
+    demonstrator.surgeon =
+        make_demonstrator(plan, picture, skill_of(scene), {what.task.begin(), what.task.begin() + what.tasks});
+  } catch (const std::invalid_argument&) { return; }  // a scene that nobody can show
+  learner = moment();
+  if (what.from_mark && marked) go_back(mark);
+  told.demonstrating = true;
+  told.shown = false;
+}
+
+void Live::Work::end_demonstration() {
+  if (!told.demonstrating) return;
+  told.demonstrating = told.shown = false;
+  told.doing.clear();
+  go_back(learner);
+}
+
 void Live::Work::obey() {
   bool any = false;
-  for (LiveCommand c; commands.pop(c); any = true) {
-    switch (c) {
+  for (Command c; commands.pop(c); any = true) {
+    if (c.demonstrate) {
+      demonstrate(c.of);
+      continue;
+    }
+    switch (c.what) {
       case LiveCommand::pause:
         told.paused = true;
         break;
@@ -254,13 +298,23 @@ void Live::Work::obey() {
         told.paused = true;
         steps += told.fault.empty();
         break;
+      case LiveCommand::mark:
+        if (told.demonstrating) break;
+        mark = moment();
+        marked = true;
+        break;
+      case LiveCommand::end_demonstration:
+        end_demonstration();
+        break;
       case LiveCommand::restart:
+        end_demonstration();
         bites.clear();
         told.practice.taken_back = 0;
         go_back(settled);
         if (!options.surgeon.empty()) surgeon = make_hands(options.surgeon, scene, picture);
         break;
       case LiveCommand::take_back: {
+        end_demonstration();
         if (bites.empty() || surgeon.surgeon) break;
         const Moment to = std::move(bites.back().before);
         bites.pop_back();
@@ -366,7 +420,16 @@ void Live::hand(size_t who, const ToolInput& input) {
   work_->hand_box[who].publish();
 }
 
-bool Live::command(LiveCommand command) { return work_->commands.push(command); }
+bool Live::command(LiveCommand command) { return work_->commands.push({command, false, {}}); }
+
+bool Live::demonstrate(const std::vector<size_t>& tasks, bool from_mark) {
+  Command c;
+  c.demonstrate = true;
+  c.of.from_mark = from_mark;
+  for (const size_t t : tasks)
+    if (c.of.tasks < c.of.task.size()) c.of.task[c.of.tasks++] = static_cast<uint8_t>(t);
+  return work_->commands.push(c);
+}
 
 bool Live::look(Snapshot& out) {
   work_->view_box.update();

@@ -27,6 +27,8 @@ enum class LiveCommand : uint8_t {
   take_back,    // back to a moment before the last bite began; nothing when there is none
   slower,       // the next of kLiveSpeeds
   faster,
+  mark,               // this moment is where a demonstration may begin: Live::demonstrate(..., true)
+  end_demonstration,  // back to where the learner was
 };
 constexpr std::array<float, 4> kLiveSpeeds{1.0f, 0.5f, 0.25f, 0.1f};  // of real time
 
@@ -54,8 +56,10 @@ struct LiveStatus {
   std::array<uint64_t, 2> input_time_ns{};  // ToolInput::time_ns of the hands in the newest tick, for latencies
   float hand_to_tick_ms = 0;                // from the newest of these, where a device uses wall_ns(), to the end of its tick
   Practice practice;
-  std::string doing;  // of the surgeon, when one works
-  std::string fault;  // not empty: the run has stopped, and why
+  std::string doing;           // of the surgeon, when one works
+  bool demonstrating = false;  // the surgeon shows something; what was before comes back
+  bool shown = false;          // and is through with it, or gave up
+  std::string fault;           // not empty: the run has stopped, and why
 };
 
 struct LiveResult {
@@ -80,6 +84,10 @@ class Live {
   void hand(size_t who, const ToolInput& input);
   // False: too many are waiting; try again.
   bool command(LiveCommand command);
+
+  // The scripted surgeon takes the tools and shows tasks of its plan (make_demonstrator): from here, or from the moment that
+  // was last marked. Until end_demonstration, which brings everything back as it is now.
+  bool demonstrate(const std::vector<size_t>& tasks, bool from_mark);
 
   // The field as it is now: the last two ticks blended by the time that has passed, so that it shows one tick late and moves
   // evenly whatever the rate of pictures. False before there is any.

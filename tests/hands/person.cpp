@@ -226,26 +226,31 @@ bool Person::draw_together() {
   return lay_tail();
 }
 
-bool Person::tie(int way) {
-  const auto wound = [&] { return seen().tool[0].loop_wraps > 0; };
+bool Person::wind(int way) {
+  doing_ = "wind the strand";
+  if (both(
+          4.0f * static_cast<float>(way), [&] { return seen().tool[0].loop_wraps > 0; }, 12))
+    return true;
+  both(
+      -4.0f * static_cast<float>(way), [&] { return desk_.look().steering.both.wound < 0; }, 8);
+  return false;
+}
+
+bool Person::set_throw() {
+  doing_ = "draw the throw down";
   const size_t locked = desk_.count(EventKind::knot_locked);
   const auto set = [&] { return desk_.count(EventKind::knot_locked) > locked; };
+  if (!both(4, [&] { return set() || seen().tool[0].held == Held::nothing; }) || !set()) return false;
+  doing_ = "lay the tail down";
+  return lay_tail();
+}
+
+bool Person::tie(int way) {
   // What goes wrong is done again, as one does.
   for (int attempt = 0; attempt < 4; ++attempt) {
-    doing_ = "wind the strand";
-    if (!both(4.0f * static_cast<float>(way), wound, 12)) {
-      both(
-          -4.0f * static_cast<float>(way), [&] { return desk_.look().steering.both.wound < 0; }, 8);
-      continue;
-    }
+    if (!wind(way)) continue;
     doing_ = "take the tail through the loop";
-    if (take_tail()) {
-      doing_ = "draw the throw down";
-      if (both(4, [&] { return set() || seen().tool[0].held == Held::nothing; }) && set()) {
-        doing_ = "lay the tail down";
-        return lay_tail();
-      }
-    }
+    if (take_tail() && set_throw()) return true;
     if (hand(0).closed) let_go(0);
     aside(0);
   }

@@ -44,7 +44,10 @@ class Person {
   bool hand_back();  // the driver takes it from the forceps
   bool pull_tail(float tail);
   bool draw_together();  // tail and needle end, until the tissue has come together
-  bool tie(int way);     // one throw
+  bool tie(int way);     // one throw: the three below, done again when they fail, and the tail laid down
+  bool wind(int way);
+  bool take_tail();
+  bool set_throw();
   std::string doing() const { return doing_; }
 
  private:
@@ -58,7 +61,6 @@ class Person {
   void aside(size_t k);
   bool drive(size_t k, const std::function<bool()>& done);
   bool both(float amount, const std::function<bool()>& done, float patience = 25);
-  bool take_tail();
   bool lay_tail();
 
   Desk& desk_;

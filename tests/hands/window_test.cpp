@@ -69,6 +69,13 @@ class AtTheWindow : public Desk {
     do_it(act);
     return see(2);
   }
+  size_t lesson_step() const { return lesson_step_; }
+  // Until the surgeon has begun to show something, or has stopped.
+  bool until_showing(bool wanted) {
+    for (int i = 0; i < 2000 && showing_ != wanted; ++i)
+      if (!see(1)) return false;
+    return showing_ == wanted && see(3);
+  }
   // Somebody who has made a mess of it begins again.
   virtual void begin_again() = 0;
   bool restarted() {
@@ -80,13 +87,14 @@ class AtTheWindow : public Desk {
   }
 
   // Opens the window and lets `work` be done at it; true when it was done before the time was up.
-  bool sit(const std::function<void()>& work) {
+  bool sit(const std::function<void()>& work, bool teach = false) {
     std::thread person([&] {
       if (see(3)) work();
       gone_ = true;
     });
     PlayOptions options;
     options.scene = "stay";
+    options.teach = teach;
     options.width = 320, options.height = 200;
     options.watch = [&](const WindowLook& now) {
       const std::lock_guard lock(mutex_);
@@ -95,6 +103,8 @@ class AtTheWindow : public Desk {
       newest_.steering = now.steering;
       active_ = now.mouse.active;
       epoch_ = now.status.epoch;
+      lesson_step_ = now.lesson.step();
+      showing_ = now.lesson.showing();
       ++pictures_;
       changed_.notify_all();
       return !gone_ && Clock::now() < until_;
@@ -130,6 +140,8 @@ class AtTheWindow : public Desk {
   std::atomic<size_t> active_{0};
   std::atomic<uint32_t> epoch_{0};
   uint32_t begun_ = 0;
+  std::atomic<size_t> lesson_step_{0};
+  std::atomic<bool> showing_{false};
 
  private:
   Clock::time_point until_, seen_at_ = Clock::now();
@@ -146,10 +158,11 @@ class XMouse : public AtTheWindow {
  public:
   XMouse(const std::string& display, int seconds) : AtTheWindow(seconds), x_(display) {}
   bool ready() const { return x_.ready(); }
+  void press(const std::string& key) { x_.key(key, true), x_.key(key, false); }
   void begin_again() override {
     if (turn_) x_.button(3, turn_ = false);
     if (both_) x_.key("w", both_ = false);
-    x_.key("F5", true), x_.key("F5", false);
+    press("F5");
   }
 
  private:
@@ -282,6 +295,35 @@ TEST_F(StitchAtTheWindow, by_mouse_and_keyboard) {
   std::string stopped_at = "nothing was done";
   desk.sit([&] { sew_and_tie(desk, stopped_at); });
   expect_a_stitch(desk, stopped_at);
+}
+
+// "Show me", then the learner's turn: nothing of what was shown is left, and what the learner does is recognised.
+TEST_F(StitchAtTheWindow, a_lesson_shows_a_step_and_sees_it_done) {
+  XMouse desk(x_->display, 180);
+  if (!desk.ready()) GTEST_SKIP() << "no XTest here";
+  Person me(desk);
+  bool shown = false, undone = false, taken = false;
+  size_t before = 99, after = 0, grasped = 0;
+  desk.sit(
+      [&] {
+        const Vec3 lay = desk.look().seen.needle.pose.p;
+        before = desk.lesson_step();
+        desk.press("s");
+        shown = desk.until_showing(true) && desk.until_showing(false);
+        grasped = desk.count(EventKind::needle_grasped);
+        undone = desk.look().seen.tool[0].held == Held::nothing && distance(desk.look().seen.needle.pose.p, lay) < 0.001f &&
+                 desk.lesson_step() == 0;
+        taken = me.take_needle();
+        for (int i = 0; i < 5; ++i) desk.act({});
+        after = desk.lesson_step();
+      },
+      true);
+  EXPECT_EQ(before, 0u);
+  EXPECT_TRUE(shown);
+  EXPECT_EQ(grasped, 1u) << "the surgeon took it";
+  EXPECT_TRUE(undone);
+  EXPECT_TRUE(taken) << me.doing();
+  EXPECT_EQ(after, 1u);
 }
 
 TEST_F(StitchAtTheWindow, by_gamepad) {
