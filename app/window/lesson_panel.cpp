@@ -74,7 +74,7 @@ void LessonRun::show(Live& live) {
 
 void lesson_panel(const LessonRun& run, bool hints) {
   const ImVec2 size = ImGui::GetIO().DisplaySize;
-  const float font = ImGui::GetFontSize(), wide = std::min(44 * font, 0.62f * size.x);
+  const float font = ImGui::GetFontSize(), wide = std::min(44 * font, 0.5f * size.x);  // between the panels of the corners
   ImGui::SetNextWindowPos({0.5f * size.x, 8}, ImGuiCond_Always, {0.5f, 0});
   ImGui::SetNextWindowSizeConstraints({wide, 0}, {wide, size.y});
   ImGui::SetNextWindowBgAlpha(0.8f);
