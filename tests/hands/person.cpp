@@ -214,16 +214,24 @@ bool Person::lay_tail() {
 }
 
 bool Person::draw_together() {
-  doing_ = "take the tail";
-  if (!take_tail()) return false;
-  doing_ = "draw the ends apart";
   const auto closed = [&] {
     for (const SeamView& s : seen().seam)
       if (s.midpoint && s.progress < 0.985f) return false;
     return !seen().seam.empty();
   };
-  if (!both(4, closed)) return false;
-  return lay_tail();
+  // Where it sticks, or the tail slips: let go and take it anew.
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    doing_ = "take the tail";
+    if (!take_tail()) return false;
+    doing_ = "draw the ends apart";
+    if (both(
+            4, [&] { return closed() || seen().tool[0].held != Held::thread; }, 8) &&
+        closed())
+      return lay_tail();
+    if (hand(0).closed) let_go(0);
+    aside(0);
+  }
+  return false;
 }
 
 bool Person::wind(int way) {
