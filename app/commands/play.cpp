@@ -3,6 +3,7 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "procedure/lesson.h"
 #include "procedure/scene_file.h"
 #include "window/window.h"
 
@@ -67,6 +68,7 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_flag("--left-handed", o->play.left_handed, "the needle driver is the left hand's");
   command->add_option("--surgeon", o->play.live.surgeon, "watch: scripted, or a recording whose hands are played")
       ->type_name("scripted|FILE");
+  command->add_flag("--teach", o->play.teach, "the lesson: a first stitch, step by step");
   // One by default: a tick is short, and workers that wait for the next one take time from the picture.
   command->add_option("--threads", o->play.live.threads, "workers of the solver")
       ->check(CLI::Range(1, 64))
@@ -76,6 +78,10 @@ void add_play(CLI::App& app, int& exit_code) {
   add_window_options(*command, *o);
   command->callback([o, &exit_code] {
     read_window_options(*o);
+    if (o->play.teach && o->play.scene.empty()) o->play.scene = first_stitch().scene;
+    if (o->play.teach && (o->play.scene != first_stitch().scene || !o->play.live.surgeon.empty()))
+      throw InputError("--teach", "the lesson is given in the scene \"" + first_stitch().scene + "\", to you",
+                       "write catgut play " + first_stitch().scene + " --teach");
     if (!o->play.scene.empty()) read_scene(o->play.scene);  // its faults are told before a window opens
     for (const std::string& path : {o->play.live.record, o->play.json, o->play.events, o->play.screenshot}) check_output(path);
     exit_code = play(o->play);

@@ -27,9 +27,11 @@ std::array<ToolInput, 2> WindowHands::move(const WindowInput& in, const Settings
     const std::array<HandMotion, 2> more = gamepad_motion(pad, steering, in.pad, dt);
     for (size_t k = 0; k < 2; ++k) {
       HandMotion &m = motion[k], n = more[k];
-      m = {m.right + n.right, m.up + n.up,       m.ahead + n.ahead, m.drive + n.drive,
-           m.yaw + n.yaw,     m.pitch + n.pitch, m.roll + n.roll};
+      m = {m.right + n.right, m.up + n.up,     m.ahead + n.ahead,        m.drive + n.drive, m.yaw + n.yaw,
+           m.pitch + n.pitch, m.roll + n.roll, m.together || n.together, m.both + n.both};
     }
+  } else {
+    pad.trigger = {};  // one that comes back has nothing to say until its triggers move: what was held is held
   }
   if (in.moved_ns) moved_ns = in.moved_ns;
   return steer(steering, motion, view, picture, seen, dt, moved_ns);

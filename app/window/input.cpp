@@ -30,6 +30,9 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
     case SDL_SCANCODE_E:
       roll_right_ = down;
       return;
+    case SDL_SCANCODE_W:
+      both_ = down;
+      return;
     case SDL_SCANCODE_LEFT:
       in.arrow_presses -= down;
       arrow_x_ = down ? -1 : 0;
@@ -89,7 +92,9 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
                {SDLK_F3, Key::developer},
                {SDLK_j, Key::save},
                {SDLK_SPACE, Key::space},
-               {SDLK_COMMA, Key::step_back}};
+               {SDLK_COMMA, Key::step_back},
+               {SDLK_s, Key::show_me},
+               {SDLK_t, Key::teach}};
   for (const auto& k : kKeys)
     if (k.code == code) keys_.push_back({k.key, 0});
 }
@@ -106,6 +111,7 @@ void WindowEvents::read_pad(GamepadInput& pad) const {
   }
   pad.cut = SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_A);
   pad.fresh = SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_Y);
+  pad.both = SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_B);
   pad.slow = SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_X);
 }
 
@@ -125,7 +131,7 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
         if (e.window.event == SDL_WINDOWEVENT_FOCUS_LOST || e.window.event == SDL_WINDOWEVENT_MINIMIZED ||
             e.window.event == SDL_WINDOWEVENT_HIDDEN) {
           in.left = true;
-          left_ = right_ = middle_ = space_ = cut_ = fresh_ = roll_left_ = roll_right_ = false;
+          left_ = right_ = middle_ = space_ = cut_ = fresh_ = roll_left_ = roll_right_ = both_ = false;
           arrow_x_ = arrow_y_ = zoom_ = 0;
         }
         break;
@@ -191,6 +197,7 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
   }
   const SDL_Keymod mod = SDL_GetModState();
   in.mouse.turn = right_;
+  in.mouse.both = both_;
   in.mouse.free_turn = mod & KMOD_CTRL;
   in.mouse.depth = mod & KMOD_SHIFT;
   in.mouse.jaw_down = left_ || space_;

@@ -34,7 +34,9 @@ enum class Key {
   developer,
   save,
   space,
-  step_back
+  step_back,
+  show_me,
+  teach
 };
 
 struct WindowInput {
@@ -75,7 +77,7 @@ class WindowEvents {
   std::string pad_name_;
   bool clicked_ = false;  // the left button went down since the panels were last drawn
   bool left_ = false, right_ = false, middle_ = false, space_ = false, cut_ = false, fresh_ = false;
-  bool roll_left_ = false, roll_right_ = false;
+  bool roll_left_ = false, roll_right_ = false, both_ = false;
   int arrow_x_ = 0, arrow_y_ = 0, zoom_ = 0;
 };
 

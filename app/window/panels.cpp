@@ -18,6 +18,7 @@ const char* kHints =
     "left, space      close or open the jaw\n"
     "right            drive the needle, turn the tool\n"
     "Ctrl+right, Q E  turn the tool as a ball\n"
+    "W                both hands: wind, draw apart\n"
     "Tab              the other hand\n"
     "C  N             cut, fresh needle\n"
     "1 2 3            fine, normal, fast\n"
@@ -35,7 +36,7 @@ void quality_choice(Settings& s) {
 }
 
 void guidance_choice(Settings& s) {
-  const std::pair<Guidance, const char*> kLevels[] = {{Guidance::learn, "learn: suture points and keys are shown"},
+  const std::pair<Guidance, const char*> kLevels[] = {{Guidance::learn, "learn: where the needle should go is shown"},
                                                       {Guidance::practise, "practise: what happens is told in words"},
                                                       {Guidance::exam, "exam: no help and no word until the end"}};
   for (const auto& [level, words] : kLevels)
@@ -62,6 +63,8 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   if (!v.message.empty()) bad_text(v.message);
   const float foot = 3.0f * em();
   ImGui::BeginChild("procedures", {0.53f * wide, -foot});
+  if (ImGui::Button("T  Teach me: a first stitch", {-1.0f, 1.75f * em()})) choice.what = Chosen::teach;
+  gap(0.3f);
   heading("Procedure and technique");
   for (size_t i = 0; i < v.scenes->size(); ++i) {
     const SceneChoice& s = (*v.scenes)[i];
@@ -203,7 +206,12 @@ void work_panel(const WorkView& v, const Settings& settings) {
     const char* speed = v.speed < 1 ? "  fine" : v.speed > 1 ? "  fast" : "";
     std::vector<Line> hand{{kText, fmt::format("{} ({} hand){}", k == 0 ? "needle driver" : "forceps",
                                                (k == 0) != settings.left_handed ? "right" : "left", speed)}};
-    if (v.steering->hand[k].snapped) hand.push_back({kAccent, "at the needle: close the jaw"});
+    if (v.steering->hand[k].snapped) {
+      const HelpAt at = v.steering->hand[k].at;
+      hand.push_back({kAccent, at == HelpAt::needle ? "at the needle: close the jaw"
+                               : at == HelpAt::tail ? "at the tail: close the jaw"
+                                                    : "at the bite: drive the needle"});
+    }
     if (!v.pad.empty()) hand.push_back({kQuiet, v.pad});
     lines_at("hand", 1, 1, 0.62f, hand);
   }

@@ -61,6 +61,10 @@ Choice choice_of_key(const WindowInput& in, const ScreenFacts& f) {
       return when(field, Chosen::developer);
     case Key::save:
       return when(results, Chosen::save_json);
+    case Key::show_me:
+      return when(practise, Chosen::show_me);
+    case Key::teach:
+      return when(start, Chosen::teach);
     case Key::picture:
       return {Chosen::picture};
     case Key::none:

@@ -14,7 +14,9 @@ const char* screen_name(Screen screen);
 
 enum class Chosen {
   nothing,
-  scene,      // which: of the list
+  scene,  // which: of the list
+  teach,
+  show_me,    // the surgeon shows the step of the lesson
   recording,  // text: its path
   settings,
   leave_settings,

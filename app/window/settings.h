@@ -8,7 +8,7 @@ namespace catgut {
 
 // How much the program says while somebody sews.
 enum class Guidance {
-  learn,     // suture points and keys are shown
+  learn,     // the way that the needle should go, suture points and keys are shown
   practise,  // what happens is told in words
   exam,      // nothing is told or helped until the end
 };

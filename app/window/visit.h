@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdio>
 #include <deque>
+#include <functional>
 #include <string>
 
 #include "runtime/live.h"
@@ -13,8 +14,9 @@ namespace catgut {
 
 // Somebody works, or a surgeon is watched.
 struct Visit {
-  // events: everything that happens is written there, a JSON object a line; null: nowhere. Throws InputError.
-  Visit(const SceneSpec& scene, const LiveOptions& options, std::FILE* events);
+  // events: everything that happens is written there, a JSON object a line; null: nowhere. told: hears it too, or is empty.
+  // Throws InputError.
+  Visit(const SceneSpec& scene, const LiveOptions& options, std::FILE* events, std::function<void(const Event&)> told);
 
   void look();  // at the newest picture and what has happened
   LiveResult finish();
@@ -30,6 +32,7 @@ struct Visit {
  private:
   void take_events();
   std::FILE* events_;
+  std::function<void(const Event&)> told_;
 };
 
 // A recording. Throws InputError.

@@ -18,6 +18,7 @@
 #include "procedure/scene_file.h"
 #include "render/orbit.h"
 #include "render/window.h"
+#include "runtime/guide.h"
 #include "runtime/report.h"
 #include "window/hands.h"
 #include "window/input.h"
@@ -103,7 +104,7 @@ class Window {
   Window& operator=(const Window&) = delete;
 
   int loop() {
-    if (!options_.scene.empty()) open(options_.scene);
+    if (!options_.scene.empty()) open(options_.scene, options_.teach);
     if (!options_.view.empty()) view(options_.view);
     const double start = wall_seconds();
     double last = start, drawn_at = start, stalled = start;
@@ -144,14 +145,20 @@ class Window {
  private:
   // --- scenes and recordings
   // -----------------------------------------------------------------------------------------------------------------
-  void open(const std::string& name) {
+  void open(const std::string& name, bool teach = false) {
     const SceneSpec scene = read_scene(name);
     LiveOptions live = options_.live;
     live.record = of_visit(live.record, ++opened_);
-    if (live.surgeon.empty() && watch_) live.surgeon = "scripted";
+    if (live.surgeon.empty() && watch_ && !teach) live.surgeon = "scripted";
     leave();
-    visit_ = std::make_unique<Visit>(scene, live, events_);
+    visit_ = std::make_unique<Visit>(scene, live, events_, [this](const Event& e) {
+      if (options_.told) options_.told(e);
+      if (lesson_.on()) lesson_.told(e);
+    });
     source_ = name;
+    places_ = bite_places(scene, visit_->live.picture());
+    if (teach) lesson_.begin(first_stitch());
+    else lesson_.end();
     hands_.begin(visit_->live.picture(), settings_);
     stage(visit_->live.picture());
     go(Screen::practise);
@@ -245,6 +252,13 @@ class Window {
         open(scenes_[choice.which].name);
         message_.clear();
         break;
+      case Chosen::teach:
+        open(first_stitch().scene, true);
+        message_.clear();
+        break;
+      case Chosen::show_me:
+        if (live && lesson_.on()) show_me();
+        break;
       case Chosen::recording:
         view(choice.text);
         message_.clear();
@@ -273,7 +287,7 @@ class Window {
           live->command(LiveCommand::restart);
           go(Screen::practise);
         } else {
-          open(source_);
+          open(source_, lesson_.on());
         }
         break;
       case Chosen::finish:
@@ -430,11 +444,35 @@ class Window {
       hands_.jumped(v.live.picture(), v.seen, settings_, status.practice.time_s == 0);
     }
     if (!status.fault.empty() && screen_ == Screen::practise) go(Screen::pause);
+    if (lesson_.on() && lesson_.look(v.live, v.seen, wall_seconds()) && events_)
+      std::fprintf(events_, "{\"lesson\":\"%s\"}\n",
+                   lesson_.all_done() ? "done" : lesson_.lesson().step[lesson_.step()].name.c_str());
     if (screen_ != Screen::practise || status.settling || !v.have || v.watching) return;
+    hands_.steering.guide = next_bite(places_, v.live.picture(), v.seen);
     const Camera camera = camera_of(orbit_);
     const ViewFrame view = view_frame(camera.eye, camera.target, camera.up, camera.fov_deg, static_cast<float>(height_));
     const auto hands = hands_.move(in, settings_, view, v.live.picture(), v.seen, dt);
     for (size_t k = 0; k < 2; ++k) v.live.hand(k, hands[k]);
+    if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, lesson_})) quit_ = true;
+  }
+
+  void show_me() {
+    const bool was = lesson_.showing();
+    lesson_.show(visit_->live);
+    if (events_ && !was && lesson_.showing())
+      std::fprintf(events_, "{\"shows\":\"%s\"}\n", lesson_.lesson().step[lesson_.step()].name.c_str());
+  }
+
+  // What is shown of how it should be done, as far as somebody wants it.
+  void guidance() {
+    const Guidance level = settings_.guidance;
+    if (lesson_.on()) lesson_panel(lesson_, level != Guidance::exam);
+    if ((level != Guidance::learn && !lesson_.on()) || level == Guidance::exam || visit_->watching) return;
+    if (const auto guide = next_bite(places_, visit_->live.picture(), visit_->seen)) {
+      const Camera c = camera_of(orbit_);
+      const float w = static_cast<float>(width_), h = static_cast<float>(height_);
+      guide_overlay(*guide, view_frame(c.eye, c.target, c.up, c.fov_deg, h), visit_->live.picture(), visit_->seen, w, h);
+    }
   }
 
   // Whoever follows the events also wants to know when hands are let in.
@@ -493,6 +531,7 @@ class Window {
     view.inside = developer_;
     view.pictures_per_s = picture_count_ / std::max(picture_s_, 1e-3);
     work_panel(view, shown);
+    if (!visit_->live.status().settling) guidance();
     Choice choice;
     if (developer_) choice = developer_panel(view, screen_ == Screen::pause);
     if (screen_ == Screen::pause)
@@ -546,6 +585,8 @@ class Window {
   Snapshot last_;  // behind the results
   bool have_last_ = false;
   WindowHands hands_;
+  BitePlaces places_;
+  LessonRun lesson_;
   Orbit orbit_;
   bool orbit_set_ = false;  // false: chosen anew with the next snapshot
   Latency latency_;

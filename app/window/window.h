@@ -1,12 +1,25 @@
 // app/window: the simulator that people sit down at: a window, screens to choose, practise, pause and look back, and hands by
 // mouse, keyboard and gamepad.
 #pragma once
+#include <functional>
 #include <string>
 
+#include "device/mouse.h"
 #include "render/renderer.h"
 #include "runtime/live.h"
+#include "window/lesson_panel.h"
 
 namespace catgut {
+
+// What somebody at the window sees and has in hand, after a picture in which hands were let in.
+struct WindowLook {
+  const Snapshot& seen;
+  const ViewFrame& view;
+  const Steering& steering;
+  const MouseHand& mouse;
+  const LiveStatus& status;
+  const LessonRun& lesson;
+};
 
 struct PlayOptions {
   std::string scene;  // opens straight into it; empty: the start screen
@@ -16,6 +29,7 @@ struct PlayOptions {
   bool quality_given = false;
   int width = 1280, height = 720;
   bool left_handed = false;
+  bool teach = false;      // the lesson of the first stitch, in its scene
   std::string events;      // file to which everything that happens is written as it happens, a JSON object a line; "-"
   std::string screenshot;  // PNG of the window, then quit
   int after = 60;          // pictures before it
@@ -23,7 +37,11 @@ struct PlayOptions {
   double at = 0;       // [s] of the work, or of the recording, that it shows
   std::string json;    // what was sewn, written when a scene is left; "-"
   double seconds = 0;  // [s] of wall time, then quit; 0: until somebody quits
-  int stall_ms = 0;    // for tests: the loop stands still so long, every two seconds
+  // For whoever looks on from within the program (a test that sits at the window): every such picture, false closes the window;
+  // and every event.
+  std::function<bool(const WindowLook&)> watch;
+  std::function<void(const Event&)> told;
+  int stall_ms = 0;  // for tests: the loop stands still so long, every two seconds
 };
 
 // Runs until the window is closed. Throws InputError, also when there is no display here.

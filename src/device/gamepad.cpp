@@ -9,6 +9,7 @@ namespace {
 constexpr float kDead = 0.15f;      // of a stick's way: worn sticks do not come to rest at zero
 constexpr float kSpeed = 0.08f;     // [m/s] with the stick all the way
 constexpr float kTurnSpeed = 2.0f;  // [rad/s]
+constexpr float kBothSpeed = 4.0f;  // [rad/s]
 
 // Nothing inside the dead zone, then from zero up; squared, so that small motions are fine ones.
 float eased(float x) {
@@ -25,7 +26,10 @@ std::array<HandMotion, 2> gamepad_motion(GamepadHand& pad, Steering& steering, c
     const GamepadSide& side = (k == 0) != pad.left_handed ? input.right : input.left;
     const float x = eased(side.x), y = eased(side.y);
     HandMotion& m = motion[k];
-    if (side.shoulder) {
+    if (input.both) {
+      m.together = true;
+      if (k == 0) m.both = x * kBothSpeed * slow * dt;
+    } else if (side.shoulder) {
       m.drive = x * turn;
       m.ahead = -y * far;
     } else if (side.press) {

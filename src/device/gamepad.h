@@ -19,6 +19,7 @@ struct GamepadInput {
   GamepadSide left, right;
   bool cut = false, fresh = false;  // A, Y
   bool slow = false;                // X: a third of the speed
+  bool both = false;                // B: the driver's stick, sideways, is both hands' (device/both_hands)
 };
 
 struct GamepadHand {

@@ -9,6 +9,8 @@ namespace {
 constexpr float kTurnPerPixel = 0.006f;  // [rad] half a turn is the width of a small window
 constexpr float kNotch = 0.002f;         // [m] into the picture
 constexpr float kRollRate = 1.5f;        // [rad/s]
+constexpr float kRollNotch = 0.08f;      // [rad]
+constexpr float kBothPerPixel = 0.015f;  // [rad] once round is two thirds of a small window
 
 }  // namespace
 
@@ -19,7 +21,10 @@ std::array<HandMotion, 2> mouse_motion(MouseHand& mouse, Steering& steering, con
   SteeredHand& hand = steering.hand[mouse.active];
   HandMotion& m = motion[mouse.active];
   const float per_pixel = std::max(0.02f, dot(hand.pose.p - view.eye, view.ahead)) * view.pixel * mouse.speed;
-  if (input.turn && input.free_turn) {
+  if (input.both) {
+    m.together = true;
+    m.both = input.right * kBothPerPixel * mouse.speed;
+  } else if (input.turn && input.free_turn) {
     m.yaw = input.right * kTurnPerPixel * mouse.speed;
     m.pitch = input.down * kTurnPerPixel * mouse.speed;
   } else if (input.turn) {
@@ -31,8 +36,9 @@ std::array<HandMotion, 2> mouse_motion(MouseHand& mouse, Steering& steering, con
     m.right = input.right * per_pixel;
     m.up = -input.down * per_pixel;
   }
-  m.ahead += input.wheel * kNotch * mouse.speed;
-  m.roll = input.roll * kRollRate * mouse.speed * dt;
+  const bool ball = input.turn && input.free_turn;
+  m.ahead += ball ? 0 : input.wheel * kNotch * mouse.speed;
+  m.roll = (input.roll * kRollRate * dt + (ball ? input.wheel * kRollNotch : 0)) * mouse.speed;
 
   if (mouse.hold_to_close) {
     if (input.jaw_down != mouse.was_down) hand.closed = input.jaw_down;

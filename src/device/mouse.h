@@ -12,9 +12,10 @@ struct MouseInput {
   float right = 0, down = 0;        // [pixels] since the last call
   float wheel = 0;                  // [notches] away from the user: into the picture
   bool turn = false;                // right button: drive the needle, or turn the tool about its shaft
-  bool free_turn = false;           // Control with it: turn the tool as a ball
+  bool free_turn = false;           // Control with it: turn the tool as a ball; the wheel rolls
   bool depth = false;               // Shift: the mouse moves into the picture
   float roll = 0;                   // -1 .. 1, Q and E: about the line of sight
+  bool both = false;                // W: both hands wind the strand, or draw the ends apart, as the mouse goes right or left
   int jaw_presses = 0;              // left button or space went down so often
   bool jaw_down = false;            // and is down now
   bool cut = false, fresh = false;  // C, N are down

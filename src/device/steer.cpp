@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "exchange/strand.h"
+
 namespace catgut {
 namespace {
 
@@ -13,7 +15,14 @@ constexpr float kLetGo = 0.014f;     // and farther than this it lets go
 constexpr float kCatchDeep = 0.12f;  // [m] along the view, where nobody can judge distances on a flat screen
 constexpr float kThere = 0.0015f;    // [m] the tool is at the needle
 constexpr float kPatience = 0.6f;    // [s] a closing jaw waits for that
-constexpr float kReach = 0.35f;      // [m] from the field's centre: no hand gets lost
+constexpr float kBiteCatch = 0.012f, kBiteLetGo = 0.02f;  // [m] across the view, of the needle from the place of a bite
+constexpr float kBefore = 0.45f;                          // [rad] of the needle's tip before the tissue
+constexpr float kBesideTissue = 0.022f;                   // [m] where it comes to first
+constexpr float kHelpSpeed = 0.2f, kHelpTurn = 5.0f;      // [m/s], [rad/s] of a tool that carries a needle there
+constexpr float kAboveTail = 0.012f;                      // [m]
+constexpr float kLoopSpeed = 0.1f;                        // [m/s] of a tool that carries a loop
+constexpr float kKeepsLoop = 0.7f;                        // opening of a jaw that lets go without shaking off a loop
+constexpr float kReach = 0.35f;                           // [m] from the field's centre: no hand gets lost
 
 Vec3 shaft_of(const Pose& tool) { return rotate(tool.q, {0, 0, 1}); }
 
@@ -27,40 +36,126 @@ void drive_needle(SteeredHand& hand, float angle) {
   hand.pose = needle * Pose{{}, axis_angle({0, 0, 1}, angle)} * hand.grip;
 }
 
-void move(SteeredHand& hand, const HandMotion& m, const ViewFrame& view, const PictureModel& picture) {
-  hand.pose.p += view.right * m.right + view.up * m.up;
+// force: [N] on the hand, zero where nobody is to feel it.
+void move(SteeredHand& hand, const HandMotion& m, const ViewFrame& view, const PictureModel& picture, Vec3 force) {
   // Into the picture is along the line of sight: the tool stays under the pointer.
-  hand.pose.p += normalized(hand.pose.p - view.eye, view.ahead) * m.ahead;
+  Vec3 way = view.right * m.right + view.up * m.up + normalized(hand.pose.p - view.eye, view.ahead) * m.ahead;
+  // Hands that feel nothing would tear what they pull at: against a force they go slower.
+  if (dot(way, force) < 0) way = way * std::clamp(1.5f - length(force), 0.05f, 1.0f);
+  hand.pose.p += way;
   turn_about(hand.pose, view.up, m.yaw);
   turn_about(hand.pose, view.right, m.pitch);
   turn_about(hand.pose, view.ahead, m.roll);
   if (m.drive != 0) {
-    if (hand.holds) drive_needle(hand, m.drive);
+    const bool at_bite = hand.snapped && hand.at == HelpAt::bite;
+    if (at_bite) hand.driven = hand.hovered ? std::max(0.0f, hand.driven + m.drive) : 0;
+    else if (hand.holds) drive_needle(hand, m.drive);
     else turn_about(hand.pose, shaft_of(hand.pose), m.drive);
   }
   const Vec3 away = hand.pose.p - picture.focus;
   if (length(away) > kReach) hand.pose.p = picture.focus + normalized(away) * kReach;
 }
 
-// Whether the help has the tool now; on a flat screen nearness counts across the view far more than along it.
+// On a flat screen nearness counts across the view far more than along it. there: the hand, as it is seen, at the place's
+// depth.
+bool near_on_screen(const ViewFrame& view, Vec3 hand, Vec3 place, float reach, Vec3& there) {
+  const Vec3 a = hand - view.eye, b = place - view.eye;
+  const float deep_a = std::max(dot(a, view.ahead), 0.01f), deep_b = dot(b, view.ahead);
+  there = view.eye + a * (deep_b / deep_a);
+  return distance(there, place) < reach && std::abs(deep_b - deep_a) < kCatchDeep;
+}
+
+// A held needle near the place of the next bite stands up there, its tip before the tissue: first beside it, then at it.
+void help_to_bite(Steering& steering, size_t who, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen) {
+  SteeredHand& hand = steering.hand[who];
+  const bool was = hand.snapped && hand.at == HelpAt::bite;
+  const bool drives = picture.tool[who] == ToolKind::needle_driver && seen.tool[1 - who].held != Held::needle;
+  if (!steering.guide || !drives || (seen.needle.in_tissue && !was)) {
+    hand.snapped = false;
+    return;
+  }
+  if (seen.needle.in_tissue) {  // from here on the hand drives it
+    hand.snapped = false;
+    hand.pose = hand.sent.pose;
+    return;
+  }
+  if (!was) hand.driven = 0;
+  if (hand.driven <= 0) hand.bite = *steering.guide;
+  const BiteGuide& g = hand.bite;
+  const Pose needle = hand.pose * inverse(hand.grip);
+  const Vec3 tip = on_needle(picture, needle, 1), middle = on_needle(picture, needle, 0.5f);
+  Vec3 there, other;
+  const float reach = was ? kBiteLetGo : kBiteCatch;
+  // Whichever somebody takes for the pointer: the needle's tip, or the tool.
+  hand.snapped = hand.driven > 0 || near_on_screen(view, tip, entry_of(g), reach, there) ||
+                 near_on_screen(view, hand.pose.p, entry_of(g), reach, other) ||
+                 near_on_screen(view, middle, g.at, reach, other);
+  if (!hand.snapped) return;
+  if (!was) hand.hovered = false;
+  hand.at = HelpAt::bite;
+  const float psi = -half_bite(picture, g) - kBefore;
+  const Pose beside = needle_on(picture, g, psi - 0.25f, kBesideTissue) * hand.grip;
+  if (!hand.hovered) {
+    const Pose& at = hand.sent.pose;
+    hand.hovered = distance(at.p, beside.p) < 0.003f && length(rotation_vector(at.q * conjugate(beside.q))) < 0.1f;
+  }
+  hand.help = hand.hovered ? needle_on(picture, g, psi + hand.driven) * hand.grip : beside;
+}
+
+// Whether the help has the tool now.
 void help(Steering& steering, size_t who, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen) {
   SteeredHand& hand = steering.hand[who];
+  if (steering.assist && seen.tool[who].held == Held::needle) return help_to_bite(steering, who, view, picture, seen);
   const bool open = !hand.closed && hand.opening > 0.5f;
   if (!steering.assist || seen.tool[who].held != Held::nothing || (!open && !hand.snapped)) {
     hand.snapped = false;
     return;
   }
-  const Pose grip = good_grip(picture, seen, who, shaft_of(hand.pose), hand.pose.p);
-  const Vec3 a = hand.pose.p - view.eye, b = grip.p - view.eye;
-  const float deep_a = std::max(dot(a, view.ahead), 0.01f), deep_b = dot(b, view.ahead);
-  // Both seen at the needle's depth.
-  const Vec3 there = a * (deep_b / deep_a);
+  if (hand.snapped && hand.at == HelpAt::bite) hand.snapped = false;
   const bool was = hand.snapped;
-  hand.snapped = distance(there, b) < (was ? kLetGo : kCatch) && std::abs(deep_b - deep_a) < kCatchDeep;
-  if (!hand.snapped) return;
-  hand.help = grip;
+  const auto reach = [&](HelpAt at) { return was && hand.at == at ? kLetGo : kCatch; };
+  // The tail is what is wanted while the other hand has the needle; a tool with thread round it wants nothing else.
+  const bool loop = seen.tool[who].loop_wraps > 0, other_has = seen.tool[1 - who].held == Held::needle;
+  Vec3 there, best;
+  float nearest = 1;
+  hand.snapped = false;
+  TailGrip tail;
+  if (other_has && !seen.needle.in_tissue && tail_grip(picture, seen, who, tail)) {
+    // Once found it stays with its particle, though another place may be better by a hair.
+    if (was && hand.at == HelpAt::tail) tail.slot = hand.tail_slot, tail.pose.p = seen.particle[tail.slot];
+    if (near_on_screen(view, hand.pose.p, tail.pose.p, reach(HelpAt::tail), there)) {
+      // Along the shaft, from above: what lies beside the tail is not pushed aside.
+      const Pose above{tail.pose.p + rotate(tail.pose.q, {0, 0, kAboveTail}), tail.pose.q};
+      if (!was || hand.at != HelpAt::tail) hand.hovered = false;
+      hand.hovered = hand.hovered || distance(hand.sent.pose.p, above.p) < 0.003f;
+      hand.snapped = true, hand.at = HelpAt::tail, hand.tail_slot = tail.slot;
+      hand.help = hand.hovered ? tail.pose : above;
+      best = there, nearest = distance(there, tail.pose.p);
+    }
+  }
+  const Pose grip = good_grip(picture, seen, who, shaft_of(hand.pose), hand.pose.p);
+  if (!loop && near_on_screen(view, hand.pose.p, grip.p, reach(HelpAt::needle), there) && distance(there, grip.p) < nearest)
+    hand.snapped = true, hand.at = HelpAt::needle, hand.help = grip, best = there;
   // The depth that the help found is the hand's from now on, or the tool would jump back when it is let go.
-  hand.pose.p = view.eye + there;
+  if (hand.snapped) hand.pose.p = best;
+}
+
+// What both hands do at once, and the hand that goes along with the other.
+void both(Steering& steering, const std::array<HandMotion, 2>& motion, const PictureModel& picture, const Snapshot& seen,
+          float dt) {
+  if (!steering.assist) return;
+  std::array<Pose, 2> pose{steering.hand[0].pose, steering.hand[1].pose};
+  const size_t needle = seen.tool[0].held == Held::needle ? 0 : 1;
+  const Pose& grip = steering.hand[needle].grip;
+  if (motion[0].together || motion[1].together) {
+    const BothDo done = both_hands(steering.both, motion[0].both + motion[1].both, pose, grip, picture, seen, dt);
+    if (done != BothDo::nothing) steering.hand[0].snapped = steering.hand[1].snapped = false;
+  } else if (seen.tool[needle].held == Held::needle && seen.tool[1 - needle].loop_wraps > 0) {
+    go_along(steering.both, 1 - needle, pose, grip, picture, seen, dt);
+  } else {
+    steering.both.follows = false;
+  }
+  for (size_t k = 0; k < 2; ++k) steering.hand[k].pose = pose[k];
 }
 
 }  // namespace
@@ -87,6 +182,7 @@ Steering start_steering(const PictureModel& picture, bool left_handed) {
 }
 
 void resume_steering(Steering& steering, const Snapshot& seen) {
+  steering.both = {};
   for (size_t k = 0; k < 2; ++k) {
     SteeredHand& hand = steering.hand[k];
     hand.pose = seen.tool[k].hand;
@@ -129,18 +225,49 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
     if (holds && !hand.holds) {
       if (hand.snapped) hand.pose = hand.help;  // it was grasped where the help had it
       hand.grip = inverse(seen.needle.pose) * seen.tool[k].pose;
+      hand.snapped = false;
     }
     hand.holds = holds;
-    move(hand, motion[k], view, picture);
-    help(steering, k, view, picture, seen);
+    // While two tools held it they bent each other's hold a little: what counts is how it lies in this one alone.
+    if (holds && !seen.needle.in_tissue && seen.tool[1 - k].held != Held::needle)
+      hand.grip = inverse(seen.needle.pose) * seen.tool[k].pose;
+  }
+  both(steering, motion, picture, seen, dt);
+  for (size_t k = 0; k < 2; ++k) {
+    SteeredHand& hand = steering.hand[k];
+    const bool together = motion[k].together && steering.assist && steering.both.doing != BothDo::nothing;
+    if (!together) {
+      const bool pulls = steering.assist && seen.tool[k].held != Held::nothing;
+      move(hand, motion[k], view, picture, pulls ? seen.tool[k].force : Vec3{});
+      if (pulls) hand.pose.p = on_leash(picture, seen, k, hand.pose.p);
+      help(steering, k, view, picture, seen);
+    }
 
     ToolInput in;
     in.pose = hand.snapped ? hand.help : hand.pose;
+    const bool loop = steering.assist && seen.tool[k].loop_wraps > 0;
+    if (hand.sent.connected && steering.sequence > 0) {
+      // Neither a needle on its way to a bite nor a tool with a loop on it is hurried.
+      Pose from = hand.sent.pose;
+      if (hand.snapped && hand.at == HelpAt::bite) {
+        glide(from, in.pose, kHelpSpeed, kHelpTurn, dt);
+        in.pose = from;
+      } else if (loop && !together) {
+        const float calm = std::clamp(1.5f - needle_tension(seen), 0.05f, 1.0f);
+        glide(from, in.pose, kLoopSpeed * calm, kHelpTurn, dt);
+        in.pose = from;
+      }
+    }
     in.jaw = hand.closed ? 0.0f : hand.opening;
     // A jaw that is told to close on the way to the needle closes when it is there.
-    const bool coming = hand.snapped && hand.closed && distance(seen.tool[k].pose.p, hand.help.p) > kThere;
-    hand.waited = coming ? hand.waited + dt : 0;
+    const bool at_jaw = hand.snapped && hand.at != HelpAt::bite;
+    const bool coming = at_jaw && hand.closed &&
+                        (distance(seen.tool[k].pose.p, hand.help.p) > kThere || (hand.at == HelpAt::tail && !hand.hovered));
+    const bool sent_there = distance(in.pose.p, hand.help.p) < kThere;
+    hand.waited = coming ? hand.waited + (sent_there ? dt : 0) : 0;
     if (coming && hand.waited < kPatience) in.jaw = 1;
+    const bool winds = together && steering.both.doing == BothDo::wind && !hand.holds;
+    if (loop || winds) in.jaw = std::min(in.jaw, kKeepsLoop);
     in.buttons = hand.buttons;
     hand.buttons = 0;
     in.time_ns = time_ns;

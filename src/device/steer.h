@@ -3,10 +3,17 @@
 //
 // A motion is meant as it is seen: right, up and into the picture. What a hand does with the needle is not: driving turns the
 // held needle about its own circle, which is how a needle goes through tissue without tearing it.
+//
+// Where a flat screen and one hand at a time are not enough there is help, and it can be switched off (Steering::assist): an
+// open jaw goes to where needle or tail are best held, a held needle to where the next bite begins, and what takes both hands
+// at once is one gesture (device/both_hands).
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 
+#include "device/bite_guide.h"
+#include "device/both_hands.h"
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "exchange/tool_input.h"
@@ -25,7 +32,11 @@ struct HandMotion {
   float right = 0, up = 0, ahead = 0;  // [m]
   float drive = 0;                     // [rad] about the held needle's circle, tip first; else about the tool's shaft
   float yaw = 0, pitch = 0, roll = 0;  // [rad] about the view's up, right and ahead, through the jaws
+  bool together = false;               // both hands are meant, and
+  float both = 0;                      // [rad] how far: see device/both_hands
 };
+
+enum class HelpAt : uint8_t { needle, tail, bite };  // what the help has found
 
 struct SteeredHand {
   Pose pose;             // where the hand is, before any help
@@ -34,15 +45,22 @@ struct SteeredHand {
   uint32_t buttons = 0;  // kButtonCut, ...; whoever reads keys sets them anew before every steer()
   bool holds = false;    // the needle
   Pose grip;             // tool in the needle's frame, from the moment it was grasped
-  bool snapped = false;  // the help has the tool at the needle
-  Pose help;             // valid while snapped: where it holds it
-  float waited = 0;      // [s] that the jaw was kept open until the tool was there
-  ToolInput sent;        // last
+  bool snapped = false;  // the help has the tool, at
+  HelpAt at = HelpAt::needle;
+  Pose help;               // valid while snapped: where it holds it
+  uint32_t tail_slot = 0;  // the tail's particle
+  BiteGuide bite;          // the one that it is at: tissue that gives way does not move it
+  bool hovered = false;    // the needle has come to the bite from outside the tissue, the jaws from above the tail
+  float driven = 0;        // [rad] of the needle since then
+  float waited = 0;        // [s] that the jaw was kept open until the tool was there
+  ToolInput sent;          // last
 };
 
 struct Steering {
   std::array<SteeredHand, 2> hand;  // 0 needle driver, 1 forceps
-  bool assist = true;               // an open jaw near the needle goes to where it is best held
+  bool assist = true;               // help, all of it
+  std::optional<BiteGuide> guide;   // where the next bite should go; whoever knows sets it before every steer()
+  BothHands both;
   uint32_t sequence = 0;
 };
 

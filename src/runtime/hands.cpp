@@ -39,6 +39,8 @@ class RecordedHands : public Surgeon {
   size_t next_ = 0;
 };
 
+}  // namespace
+
 SurgeonSkill skill_of(const SceneSpec& scene) {
   const SurgeonSpec& s = scene.surgeon;
   SurgeonSkill k;
@@ -54,8 +56,6 @@ SurgeonSkill skill_of(const SceneSpec& scene) {
   k.seed = scene.seed;
   return k;
 }
-
-}  // namespace
 
 Hands make_hands(const std::string& who, const SceneSpec& scene, const PictureModel& picture) {
   if (who == "none") return {};

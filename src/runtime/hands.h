@@ -14,6 +14,8 @@ struct Hands {
   bool settles = true;               // false: a recording brings its own settling time along
 };
 
+SurgeonSkill skill_of(const SceneSpec& scene);
+
 // who: "scripted", "none" or the path of a .cgrec file. Throws InputError.
 Hands make_hands(const std::string& who, const SceneSpec& scene, const PictureModel& picture);
 

@@ -49,6 +49,19 @@ ToolInput nobody() {
   return input;
 }
 
+// Tasks of the surgeon's plan, in a box that commands fit into.
+struct Demonstration {
+  std::array<uint8_t, 6> task{};
+  uint8_t tasks = 0;
+  bool from_mark = false;
+};
+
+struct Command {
+  LiveCommand what{};
+  bool demonstrate = false;
+  Demonstration of;
+};
+
 struct HandMail {
   ToolInput input = nobody();
   uint32_t epoch = 0;  // that whoever sent it had seen
@@ -81,7 +94,7 @@ struct Live::Work {
   // --- between the threads -----------------------------------------------------------------------------------------------
   std::array<Latest<HandMail>, 2> hand_box;        // window -> physics
   std::array<std::atomic<uint32_t>, 2> pressed{};  // both: buttons that went down since the last tick
-  Ring<LiveCommand, 64> commands;                  // window -> physics
+  Ring<Command, 64> commands;                      // window -> physics
   Ring<std::string, 16> changes;                   // window -> physics
   std::atomic<bool> quit{false};                   // window -> physics
   std::atomic<bool> watched{false};                // window -> physics
@@ -102,10 +115,14 @@ struct Live::Work {
   std::unique_ptr<Recorder> recorder;
   LiveResult result;
   TickInput input;
+  std::array<int, 2> unheard{};                  // [ticks] since hands were last heard of, and
+  std::array<float, 2> heard_every{1.0f, 1.0f};  // [ticks] how often they are, lately
   Snapshot before, now;
   LiveStatus told;
-  StitchMap map;
-  Moment settled;
+  StitchMap map, learner_map;
+  Moment settled, mark, learner;
+  Hands demonstrator;
+  bool marked = false;
   std::deque<BiteMoment> bites;
   std::array<std::optional<Moment>, 2> checkpoint;                    // the newest and the one before it
   uint64_t checkpoint_every = 1;                                      // [ticks]
@@ -121,6 +138,8 @@ struct Live::Work {
   void show();
   void go_back(const Moment& to);
   void change_scene(const std::string& key_equals_value);
+  void demonstrate(const Demonstration& what);
+  void end_demonstration();
   void record_from_here();
   void forget_pace() { wall_s = simulated_s = 0; }
   Moment moment() const { return {save_state(*model, *state), input.hand, told.practice}; }
@@ -162,19 +181,26 @@ void Live::Work::tick(bool let_in) {
     checkpoint[0] = moment();
   }
   input.tick = result.ticks;
-  if (let_in && surgeon.surgeon) {
-    input.hand = surgeon.surgeon->operate(now, static_cast<float>(dt));
-    told.doing = surgeon.surgeon->doing();
+  if (let_in && (surgeon.surgeon || told.demonstrating)) {
+    Surgeon& hands = told.demonstrating ? *demonstrator.surgeon : *surgeon.surgeon;
+    input.hand = hands.operate(now, static_cast<float>(dt));
+    told.doing = hands.doing();
+    told.shown = told.demonstrating && hands.done();
   } else if (let_in) {
     for (size_t k = 0; k < 2; ++k) {
-      hand_box[k].update();
+      ++unheard[k];
+      if (hand_box[k].update()) {
+        heard_every[k] += 0.2f * (static_cast<float>(unheard[k]) - heard_every[k]);
+        unheard[k] = 0;
+      }
       const HandMail& mail = hand_box[k].seen();
       const uint32_t down = pressed[k].exchange(0, std::memory_order_relaxed);
       ToolInput& hand = input.hand[k];
       hand.buttons = 0;
       // Mail from before a jump in time is about tools that were elsewhere: until newer comes the hand stays.
       if (mail.epoch != told.epoch) continue;
-      hand = hand_toward(hand, mail.input, options.hand_speed, options.hand_turn, static_cast<float>(dt));
+      hand = hand_toward(hand, mail.input, options.hand_speed, options.hand_turn, static_cast<float>(dt),
+                         hand_share(heard_every[k]));
       hand.buttons |= down;
       fresh = std::max(fresh, mail.input.time_ns > told.input_time_ns[k] ? mail.input.time_ns : 0);
       told.input_time_ns[k] = mail.input.time_ns;
@@ -196,6 +222,7 @@ void Live::Work::tick(bool let_in) {
   }
   for (const Event& e : now.event) {
     told.events_lost += !events.push(e);
+    if (told.demonstrating) continue;  // nobody takes back what was only shown
     if (e.kind == EventKind::tip_entered && checkpoint[0]) {
       bites.push_back({e.which, checkpoint[1] ? *checkpoint[1] : *checkpoint[0]});
       if (bites.size() > kMostTakenBack) bites.pop_front();
@@ -275,11 +302,37 @@ void Live::Work::change_scene(const std::string& key_equals_value) {
   forget_pace();
 }
 
+void Live::Work::demonstrate(const Demonstration& what) {
+  if (surgeon.surgeon || told.demonstrating || told.settling || !told.fault.empty()) return;
+  const std::string plan = scene.surgeon.plan.empty() ? scene.technique.name : scene.surgeon.plan;
+  try {
+    demonstrator.surgeon =
+        make_demonstrator(plan, picture, skill_of(scene), {what.task.begin(), what.task.begin() + what.tasks});
+  } catch (const std::invalid_argument&) { return; }  // a scene that nobody can show
+  learner = moment();
+  learner_map = map;
+  if (what.from_mark && marked) go_back(mark);
+  told.demonstrating = true;
+  told.shown = false;
+}
+
+void Live::Work::end_demonstration() {
+  if (!told.demonstrating) return;
+  told.demonstrating = told.shown = false;
+  told.doing.clear();
+  go_back(learner);
+  map = learner_map;
+}
+
 void Live::Work::obey() {
   bool any = false;
   for (std::string c; changes.pop(c); any = true) change_scene(c);
-  for (LiveCommand c; commands.pop(c); any = true) {
-    switch (c) {
+  for (Command c; commands.pop(c); any = true) {
+    if (c.demonstrate) {
+      demonstrate(c.of);
+      continue;
+    }
+    switch (c.what) {
       case LiveCommand::pause:
         told.paused = true;
         break;
@@ -290,13 +343,23 @@ void Live::Work::obey() {
         told.paused = true;
         steps += told.fault.empty();
         break;
+      case LiveCommand::mark:
+        if (told.demonstrating) break;
+        mark = moment();
+        marked = true;
+        break;
+      case LiveCommand::end_demonstration:
+        end_demonstration();
+        break;
       case LiveCommand::restart:
+        end_demonstration();
         bites.clear();
         told.practice.taken_back = 0;
         go_back(settled);
         if (!options.surgeon.empty()) surgeon = make_hands(options.surgeon, scene, picture);
         break;
       case LiveCommand::take_back: {
+        end_demonstration();
         if (bites.empty() || surgeon.surgeon) break;
         const Moment to = std::move(bites.back().before);
         bites.pop_back();
@@ -406,7 +469,16 @@ void Live::hand(size_t who, const ToolInput& input) {
 bool Live::change(const std::string& key_equals_value) { return work_->changes.push(key_equals_value); }
 void Live::watch(bool on) { work_->watched = on; }
 
-bool Live::command(LiveCommand command) { return work_->commands.push(command); }
+bool Live::command(LiveCommand command) { return work_->commands.push({command, false, {}}); }
+
+bool Live::demonstrate(const std::vector<size_t>& tasks, bool from_mark) {
+  Command c;
+  c.demonstrate = true;
+  c.of.from_mark = from_mark;
+  for (const size_t t : tasks)
+    if (c.of.tasks < c.of.task.size()) c.of.task[c.of.tasks++] = static_cast<uint8_t>(t);
+  return work_->commands.push(c);
+}
 
 bool Live::look(Snapshot& out) {
   work_->view_box.update();
@@ -427,13 +499,18 @@ LiveResult Live::finish() {
   return work_->result;
 }
 
-ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt) {
+float hand_share(float every) { return 1 - std::exp(-2 / std::clamp(every, 0.3f, 8.0f)); }
+
+ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt, float share) {
   if (!from.connected || !to.connected) return to;
   ToolInput out = to;
   const Vec3 way = to.pose.p - from.pose.p, about = rotation_vector(to.pose.q * conjugate(from.pose.q));
   const float far = length(way), angle = length(about);
-  if (far > speed * dt) out.pose.p = from.pose.p + way * (speed * dt / far);
-  if (angle > turn * dt) out.pose.q = nlerp(from.pose.q, to.pose.q, turn * dt / angle);
+  if (far * share > speed * dt) share = std::min(share, speed * dt / far);
+  float turned = share;
+  if (angle * turned > turn * dt) turned = turn * dt / angle;
+  if (share < 1) out.pose.p = from.pose.p + way * share;
+  if (turned < 1) out.pose.q = nlerp(from.pose.q, to.pose.q, turned);
   out.jaw = from.jaw + std::clamp(to.jaw - from.jaw, -10 * dt, 10 * dt);
   out.velocity = (out.pose.p - from.pose.p) / dt;
   out.angular_velocity = rotation_vector(out.pose.q * conjugate(from.pose.q)) / dt;

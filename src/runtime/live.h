@@ -29,6 +29,8 @@ enum class LiveCommand : uint8_t {
   take_back,    // back to a moment before the last bite began; nothing when there is none
   slower,       // the next of kLiveSpeeds
   faster,
+  mark,               // this moment is where a demonstration may begin: Live::demonstrate(..., true)
+  end_demonstration,  // back to where the learner was
 };
 constexpr std::array<float, 4> kLiveSpeeds{1.0f, 0.5f, 0.25f, 0.1f};  // of real time
 
@@ -58,10 +60,12 @@ struct LiveStatus {
   // device uses that clock), when the tick began, and when its snapshot was ready to be looked at.
   uint64_t moved_ns = 0, began_ns = 0, ready_ns = 0;
   Practice practice;
-  Measures measures;    // filled while watched, see watch()
-  std::string doing;    // of the surgeon, when one works
-  std::string refused;  // the last change() that could not be made, and why
-  std::string fault;    // not empty: the run has stopped, and why
+  Measures measures;           // filled while watched, see watch()
+  std::string doing;           // of the surgeon, when one works
+  bool demonstrating = false;  // the surgeon shows something; what was before comes back
+  bool shown = false;          // and is through with it, or gave up
+  std::string refused;         // the last change() that could not be made, and why
+  std::string fault;           // not empty: the run has stopped, and why
 };
 
 struct LiveResult {
@@ -93,6 +97,9 @@ class Live {
   // above.
   bool change(const std::string& key_equals_value);
   void watch(bool on);  // measures are wanted; they cost some microseconds a tick
+  // The scripted surgeon takes the tools and shows tasks of its plan (make_demonstrator): from here, or from the moment that
+  // was last marked. Until end_demonstration, which brings everything back as it is now.
+  bool demonstrate(const std::vector<size_t>& tasks, bool from_mark);
 
   // The field as it is now: the last two ticks blended by the time that has passed, so that it shows one tick late and moves
   // evenly whatever the rate of pictures. False before there is any.
@@ -108,8 +115,10 @@ class Live {
 };
 
 // Toward `to` as far as a hand gets in dt [s] at no more than `speed` [m/s] and `turn` [rad/s]; the jaw at ten strokes a
-// second.
-ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt);
+// second. share: of the way, per call: below 1 where hands are heard of less often than this is called, so that a tool moves
+// evenly and does not stop between two pictures (a needle that stops springs back out of the tissue).
+ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt, float share = 1);
+float hand_share(float every);  // for hands that are heard of every so many calls
 
 // [s] on a clock that never goes back, for whatever is paced outside the physics: pictures, key repeats, latencies.
 double wall_seconds();

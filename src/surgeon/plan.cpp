@@ -223,6 +223,23 @@ Plan lembert_plan(const PictureModel& picture, const SurgeonSkill& skill) {
 
 }  // namespace
 
+BiteFrame bite_frame(const PictureModel& picture, const Snapshot& seen, const BitePlace& b) {
+  BiteFrame f;
+  Quat turned;
+  f.at = live_place(picture, seen, b.at, b.wall, &turned);
+  if (b.walls > 1 && picture.rim.size() > 1 && picture.body.size() == 1) {
+    // Between two layers: the middle of where the place would be on either.
+    f.at = 0.5f * (f.at + live_place(picture, seen, b.at, 1, nullptr));
+    f.out = b.out;
+  } else {
+    f.out = rotate(turned, b.out);
+  }
+  if (b.level) f.out = normalized(f.out - b.up * (0.5f * dot(f.out, b.up)));
+  f.up = normalized(b.up - f.out * dot(b.up, f.out));
+  f.along = cross(f.out, f.up);
+  return f;
+}
+
 Plan make_plan(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill) {
   const size_t walls = technique == "purse_string" || technique == "running" ? 1 : 2;
   for (size_t w = 0; w < walls; ++w)

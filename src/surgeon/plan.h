@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "exchange/picture.h"
+#include "exchange/snapshot.h"
 #include "surgeon/surgeon.h"
 
 namespace catgut {
@@ -19,6 +20,12 @@ struct BitePlace {
   bool level = false;  // hands keep the circle nearly square to `up` where the tissue leans
   int walls = 1;       // passages through a wall that the sweep makes
 };
+
+// Where a bite is made, in the world as it is now: a place, outward, the way of the needle, the axis about which it turns.
+struct BiteFrame {
+  Vec3 at, out, along, up;
+};
+BiteFrame bite_frame(const PictureModel& picture, const Snapshot& seen, const BitePlace& place);
 
 enum class TaskKind {
   pick_up,        // the driver takes the needle from the drape

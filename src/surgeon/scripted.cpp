@@ -2,6 +2,7 @@
 #include "surgeon/scripted.h"
 
 #include <cmath>
+#include <stdexcept>
 
 namespace catgut {
 namespace {
@@ -23,7 +24,33 @@ std::string Scripted::doing() const {
   return task_ >= plan_.task.size() ? "done" : doing_;
 }
 
+void Scripted::take_over_for(const std::vector<size_t>& tasks) {
+  std::vector<Task> kept;
+  for (const size_t t : tasks) {
+    if (t >= plan_.task.size()) throw std::invalid_argument("the plan has no such task");
+    kept.push_back(plan_.task[t]);
+  }
+  // The bite that was made last before.
+  for (size_t t = 0; !tasks.empty() && t < tasks.front(); ++t)
+    if (plan_.task[t].kind == TaskKind::bite) place_ = static_cast<size_t>(plan_.task[t].which);
+  plan_.task = kept;
+  takes_over_ = true;
+}
+
+void Scripted::take_over(const Snapshot& seen) {
+  takes_over_ = false;
+  for (size_t k = 0; k < 2; ++k) {
+    hand_[k].pose = seen.tool[k].pose;
+    hand_[k].jaw = seen.tool[k].jaw;
+    if (holds_needle(seen, k)) remember_grip(seen, k);
+  }
+  frame_ = frame(seen, place_);
+  bites_before_ = seen.bite.size();
+  pull_from_ = hand_[kForceps].pose;
+}
+
 std::array<ToolInput, 2> Scripted::operate(const Snapshot& seen, float dt) {
+  if (takes_over_) take_over(seen);
   const std::array<Pose, 2> before{hand_[0].pose, hand_[1].pose};
   buttons_ = {};
   if (!done()) {
@@ -72,21 +99,7 @@ void Scripted::rest_aside(const Snapshot& seen, size_t hand) {
 }
 
 BiteFrame Scripted::frame(const Snapshot& seen, size_t place) const {
-  const BitePlace& b = plan_.place[std::min(place, plan_.place.size() - 1)];
-  BiteFrame f;
-  Quat turned;
-  f.at = live_place(picture_, seen, b.at, b.wall, &turned);
-  if (b.walls > 1 && picture_.rim.size() > 1 && picture_.body.size() == 1) {
-    // Between two layers: the middle of where the place would be on either.
-    f.at = 0.5f * (f.at + live_place(picture_, seen, b.at, 1, nullptr));
-    f.out = b.out;
-  } else {
-    f.out = rotate(turned, b.out);
-  }
-  if (b.level) f.out = normalized(f.out - b.up * (0.5f * dot(f.out, b.up)));
-  f.up = normalized(b.up - f.out * dot(b.up, f.out));
-  f.along = cross(f.out, f.up);
-  return f;
+  return bite_frame(picture_, seen, plan_.place[std::min(place, plan_.place.size() - 1)]);
 }
 
 Pose Scripted::needle_at(const BiteFrame& f, float psi) const {
@@ -418,6 +431,13 @@ bool Scripted::draw(const Snapshot& seen) {
       jaw(kDriver, 1);
       return move(kDriver, raised(hand_[kDriver].pose, 0.02f), skill_.speed) || waited_ > 0.8f;
   }
+}
+
+std::unique_ptr<Surgeon> make_demonstrator(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill,
+                                           const std::vector<size_t>& tasks) {
+  auto surgeon = std::make_unique<Scripted>(technique, picture, skill);
+  surgeon->take_over_for(tasks);
+  return surgeon;
 }
 
 std::unique_ptr<Surgeon> make_surgeon(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill) {

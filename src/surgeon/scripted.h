@@ -17,14 +17,12 @@ namespace catgut {
 constexpr size_t kDriver = 0, kForceps = 1;
 constexpr int kAttempts = 8;  // at one bite, at one grasp, at one throw
 
-// Where a bite is made, in the world as it is now: a place, outward, the way of the needle, the axis about which it turns.
-struct BiteFrame {
-  Vec3 at, out, along, up;
-};
-
 class Scripted final : public Surgeon {
  public:
   Scripted(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
+
+  // Only these tasks of the plan, with the tools as somebody else left them.
+  void take_over_for(const std::vector<size_t>& tasks);
 
   bool done() const override { return gave_up_ || task_ >= plan_.task.size(); }
   bool gave_up() const override { return gave_up_; }
@@ -50,6 +48,8 @@ class Scripted final : public Surgeon {
   Pose holding(size_t hand, const Pose& needle) const { return needle * hand_[hand].grip; }
   void remember_grip(const Snapshot& seen, size_t hand) { hand_[hand].grip = inverse(seen.needle.pose) * seen.tool[hand].pose; }
   static Pose raised(const Pose& tool, float by) { return {tool.p + rotate(tool.q, {0, 0, by}), tool.q}; }
+
+  void take_over(const Snapshot& seen);
 
   // The hand that is not needed waits out of the way, on its own side of the field.
   void rest_aside(const Snapshot& seen, size_t hand);
@@ -144,7 +144,7 @@ class Scripted final : public Surgeon {
   float waited_ = 0;  // [s] in this stage
   float dt_ = 1.0f / 60;
   int misses_ = 0, attempts_ = 0;
-  bool gave_up_ = false;
+  bool gave_up_ = false, takes_over_ = false;
   std::string doing_ = "pick up the needle";
   // A bite.
   size_t place_ = 0, bites_before_ = 0;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
@@ -31,6 +32,11 @@ class Surgeon {
   virtual bool gave_up() const { return false; }
   virtual std::string doing() const = 0;  // "bite 3 of 12: drive the needle", for progress lines
 };
+
+// Shows a part of the work: tasks of the plan, by number and in this order, taking over from whoever had the tools. It begins
+// where they are and with what they hold. Throws as make_surgeon, or where the plan has no such task.
+std::unique_ptr<Surgeon> make_demonstrator(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill,
+                                           const std::vector<size_t>& tasks);
 
 // The techniques of paper 2.5: purse_string, connell, stay, lembert. Throws std::invalid_argument for a technique without a
 // script.

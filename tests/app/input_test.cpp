@@ -92,12 +92,17 @@ TEST_F(WindowEventsTest, keys) {
   EXPECT_EQ(in.speed, 2);
   EXPECT_EQ(in.digit, 3);
   EXPECT_EQ(in.mouse.roll, 1);
+  EXPECT_FALSE(in.mouse.both);
+  key(SDLK_w, SDL_SCANCODE_W, true);
+  EXPECT_TRUE(read().mouse.both);
+  EXPECT_TRUE(read().mouse.both) << "until it comes up";
   SDL_Event e{};
   e.type = SDL_WINDOWEVENT;
   e.window.event = SDL_WINDOWEVENT_FOCUS_LOST;
   SDL_PushEvent(&e);
   in = read();
   EXPECT_TRUE(in.left);
+  EXPECT_FALSE(in.mouse.both);
   EXPECT_EQ(in.mouse.roll, 0) << "a key that comes up elsewhere is not held here for ever";
   key(SDLK_BACKSPACE, SDL_SCANCODE_BACKSPACE, true);
   EXPECT_EQ(read().key, Key::take_back);
@@ -153,11 +158,13 @@ TEST_F(WindowEventsTest, a_gamepad_comes_works_and_goes) {
   SDL_JoystickSetVirtualAxis(stick, SDL_CONTROLLER_AXIS_RIGHTY, -32767);
   SDL_JoystickSetVirtualButton(stick, SDL_CONTROLLER_BUTTON_RIGHTSHOULDER, SDL_PRESSED);
   SDL_JoystickSetVirtualButton(stick, SDL_CONTROLLER_BUTTON_START, SDL_PRESSED);
+  SDL_JoystickSetVirtualButton(stick, SDL_CONTROLLER_BUTTON_B, SDL_PRESSED);
   read();  // SDL hears of a virtual stick when it is asked for events
   in = read();
   EXPECT_NEAR(in.pad.left.x, 1, 1e-3f);
   EXPECT_NEAR(in.pad.right.y, -1, 1e-3f);
   EXPECT_TRUE(in.pad.right.shoulder);
+  EXPECT_TRUE(in.pad.both);
   EXPECT_FALSE(in.pad.left.shoulder);
   SDL_JoystickClose(stick);
   SDL_JoystickDetachVirtual(index);

@@ -228,6 +228,94 @@ TEST(Help, takes_an_open_jaw_to_the_good_place_and_lets_go_of_a_moving_hand) {
   EXPECT_FALSE(d.steering.hand[0].snapped) << "switched off";
 }
 
+// Thread from a stitch in the middle of the field to the needle, which the forceps holds; the tail lies in front.
+void with_a_stitch(Desk& d) {
+  for (uint32_t i = 0; i < 41; ++i) {
+    const float s = 0.002f * static_cast<float>(i);
+    d.seen.thread_order.push_back(i);
+    d.seen.particle.push_back(i <= 15 ? Vec3{0, 0, 0.03f - s} : Vec3{0.03f - s, 0.002f, 0});
+  }
+  d.seen.thread_tension.resize(40);
+  d.seen.thread_cut.resize(40);
+  d.seen.thread_rest = 0.08f;
+  d.seen.suture_point.resize(1);
+  d.seen.suture_point[0].anchored = 15;
+  d.seen.needle.pose.p = d.seen.particle[40] - Vec3{d.picture.needle_radius, 0, 0};
+  d.seen.tool[1].held = Held::needle;
+  d.seen.tool[1].pose = d.steering.hand[1].pose = {d.seen.needle.pose.p, axis_angle({0, 1, 0}, -0.5f * kPi)};
+}
+
+TEST(Help, one_gesture_moves_both_hands_unless_it_is_switched_off) {
+  MouseInput in = moved(60, 0);
+  in.both = true;
+  for (const bool assist : {true, false}) {
+    Desk d;
+    with_a_stitch(d);
+    d.steering.assist = assist;
+    const Vec3 driver = d.steering.hand[0].pose.p, forceps = d.steering.hand[1].pose.p;
+    d.turn(in);
+    EXPECT_EQ(distance(d.out[0].pose.p, driver) > 0.001f, assist);
+    EXPECT_EQ(distance(d.out[1].pose.p, forceps) > 0.001f, assist);
+    EXPECT_EQ(d.steering.both.way, assist ? 1.0f : 0.0f);
+    EXPECT_LT(d.out[0].jaw, assist ? 0.71f : 1.1f) << "a jaw wide open would shake the loop off";
+  }
+}
+
+TEST(Help, an_end_is_not_drawn_farther_than_it_is_long) {
+  Desk d;
+  with_a_stitch(d);
+  const float strand = 0.05f;  // from the stitch to the needle
+  const Vec3 stitch = d.seen.particle[15];
+  const auto swage_with = [&](Vec3 hand) { return d.seen.particle[40] + (hand - d.seen.tool[1].pose.p); };
+  const Vec3 here = d.seen.tool[1].pose.p, far = here + Vec3{-0.2f, 0.1f, 0};
+  EXPECT_TRUE(on_leash(d.picture, d.seen, 1, here) == here);
+  EXPECT_NEAR(distance(swage_with(on_leash(d.picture, d.seen, 1, far)), stitch), strand + 0.01f, 1e-4f);
+  d.seen.knot.resize(1);
+  d.seen.knot[0].position = stitch;
+  EXPECT_NEAR(distance(swage_with(on_leash(d.picture, d.seen, 1, far)), stitch), strand + 0.002f, 1e-4f) << "nothing slides";
+  EXPECT_TRUE(on_leash(d.picture, d.seen, 0, far) == far) << "an empty hand goes where it likes";
+}
+
+TEST(Help, the_jaws_find_the_tail_while_the_other_hand_has_the_needle) {
+  Desk d;
+  with_a_stitch(d);
+  TailGrip grip;
+  ASSERT_TRUE(tail_grip(d.picture, d.seen, 0, grip));
+  EXPECT_LT(grip.slot, 15u);
+  const auto to = on_screen(d.view, grip.pose.p), from = on_screen(d.view, d.steering.hand[0].pose.p);
+  d.turn(moved(to[0] - from[0], to[1] - from[1]));
+  EXPECT_TRUE(d.steering.hand[0].snapped);
+  EXPECT_EQ(d.steering.hand[0].at, HelpAt::tail);
+}
+
+TEST(Help, a_held_needle_comes_to_the_bite_and_is_driven_from_there) {
+  Desk d;
+  d.seen.needle.pose = {{0.03f, 0.03f, 0}, axis_angle({1, 0, 0}, 0.3f)};
+  d.seen.tool[0].held = Held::needle;
+  d.seen.tool[0].pose = d.steering.hand[0].pose = d.seen.needle.pose * Pose{{0.004f, 0.007f, 0}, axis_angle({1, 0, 0}, 0.4f)};
+  d.steering.guide = BiteGuide{{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, 0.008f, 0.001f};
+  d.turn({});
+  EXPECT_FALSE(d.steering.hand[0].snapped) << "too far";
+  const auto to = on_screen(d.view, entry_of(*d.steering.guide)), from = on_screen(d.view, d.steering.hand[0].pose.p);
+  d.turn(moved(to[0] - from[0], to[1] - from[1]));
+  ASSERT_TRUE(d.steering.hand[0].snapped);
+  for (int i = 0; i < 240; ++i) {  // the tool and the needle in it go where they are sent
+    d.seen.needle.pose = d.out[0].pose * inverse(d.steering.hand[0].grip);
+    d.seen.tool[0].pose = d.out[0].pose;
+    d.turn({});
+  }
+  const Vec3 before = on_needle(d.picture, d.seen.needle.pose, 1);
+  EXPECT_LT(distance(before, entry_of(*d.steering.guide)), 0.006f);
+  EXPECT_GT(before.y, 0) << "the tip is before the tissue";
+  MouseInput in = moved(80, 0);
+  in.turn = true;
+  d.turn(in);
+  for (int i = 0; i < 30; ++i) d.turn({});
+  const Vec3 after = on_needle(d.picture, d.out[0].pose * inverse(d.steering.hand[0].grip), 1);
+  EXPECT_LT(after.y, before.y);
+  EXPECT_GT(after.x, before.x);
+}
+
 TEST(Help, the_second_hand_takes_the_other_place) {
   Desk d;
   d.seen.needle.pose = {};

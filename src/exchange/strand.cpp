@@ -1,0 +1,55 @@
+// exchange: see strand.h.
+#include "exchange/strand.h"
+
+#include <algorithm>
+
+namespace catgut {
+
+size_t node_of(const Snapshot& seen, uint32_t slot) {
+  const auto at = std::find(seen.thread_order.begin(), seen.thread_order.end(), slot);
+  return at == seen.thread_order.end() ? 0 : static_cast<size_t>(at - seen.thread_order.begin());
+}
+
+Vec3 node_at(const Snapshot& seen, size_t node) { return seen.particle[seen.thread_order[node]]; }
+
+float length_between(const Snapshot& seen, size_t a, size_t b) {
+  float sum = 0;
+  for (size_t i = std::min(a, b); i < std::max(a, b) && i + 1 < seen.thread_order.size(); ++i)
+    sum += distance(node_at(seen, i), node_at(seen, i + 1));
+  return sum;
+}
+
+size_t node_along(const Snapshot& seen, size_t from, float far, int way) {
+  const size_t last = seen.thread_order.size() - 1;
+  size_t at = from;
+  for (float gone = 0; gone < far;) {
+    if ((way > 0 && at == last) || (way < 0 && at == 0)) break;
+    const size_t next = way > 0 ? at + 1 : at - 1, pair = std::min(at, next);
+    if (pair < seen.thread_cut.size() && seen.thread_cut[pair]) break;
+    gone += distance(node_at(seen, at), node_at(seen, next));
+    at = next;
+  }
+  return at;
+}
+
+uint32_t locked_throws(const Snapshot& seen) {
+  uint32_t sum = 0;
+  for (const KnotView& k : seen.knot) sum += k.throws - (k.phase != KnotPhase::locked && k.throws > 0);
+  return sum;
+}
+
+float needle_tension(const Snapshot& seen) { return seen.thread_tension.empty() ? 0 : seen.thread_tension.back(); }
+
+size_t first_point_node(const Snapshot& seen) {
+  size_t node = seen.thread_order.size();
+  for (const SuturePointView& p : seen.suture_point) node = std::min(node, node_of(seen, p.anchored));
+  return seen.suture_point.empty() ? 0 : node;
+}
+
+size_t last_point_node(const Snapshot& seen) {
+  size_t node = 0;
+  for (const SuturePointView& p : seen.suture_point) node = std::max(node, node_of(seen, p.anchored));
+  return node;
+}
+
+}  // namespace catgut

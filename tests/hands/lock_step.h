@@ -1,0 +1,117 @@
+// tests/hands: a desk without a window: device rooms and the simulation alone, in lock step.
+#pragma once
+#include "device/gamepad.h"
+#include "person.h"
+#include "procedure/scene_file.h"
+#include "runtime/guide.h"
+#include "runtime/hands.h"
+#include "runtime/live.h"
+#include "sim/simulation.h"
+
+namespace catgut {
+
+constexpr float kTick = 1.0f / 60;
+
+// ticks: of the simulation between two pictures; hands get there as they do in runtime/live.
+class LockStep : public Desk {
+ public:
+  explicit LockStep(int ticks)
+      : ticks_(ticks),
+        scene_(read_scene("stay")),
+        model_(build_model(scene_)),
+        state_(initial_state(*model_)),
+        picture_(picture_model(*model_)) {
+    places_ = bite_places(scene_, picture_);
+    look_.steering = start_steering(picture_, false);
+    look_.dt = kTick * static_cast<float>(ticks);
+    const Vec3 target = picture_.focus + Vec3{0.01f, 0, 0};
+    look_.view = view_frame(target + Vec3{0.06f, 0.16f, 0.16f}, target, {0, 1, 0}, 30, 360);
+    for (int i = 0; i < 30; ++i) step(*model_, *state_, nobody(), jobs_);
+    publish(*model_, *state_, look_.seen);
+  }
+  const PictureModel& picture() const override { return picture_; }
+  const Look& look() const override { return look_; }
+  size_t count(EventKind kind) const override { return happened_[static_cast<size_t>(kind)]; }
+  bool act(const Act& act) override {
+    look_.steering.guide = next_bite(places_, picture_, look_.seen);
+    const auto hand = steer(look_.steering, moved(act), look_.view, picture_, look_.seen, look_.dt, 0);
+    for (int i = 0; i < ticks_; ++i) {
+      for (size_t k = 0; k < 2; ++k)
+        in_.hand[k] =
+            started_ ? hand_toward(in_.hand[k], hand[k], 0.6f, 12, kTick, hand_share(static_cast<float>(ticks_))) : hand[k];
+      started_ = true;
+      step(*model_, *state_, in_, jobs_);
+      publish(*model_, *state_, look_.seen);
+      for (const Event& e : look_.seen.event) ++happened_[static_cast<size_t>(e.kind)];
+      if (after_tick) after_tick(look_.seen);
+    }
+    return look_.seen.time_s < 400;
+  }
+
+  std::function<void(const Snapshot&)> after_tick;
+  std::vector<std::byte> save() const { return save_state(*model_, *state_); }
+  void load(const std::vector<std::byte>& bytes) {
+    load_state(*model_, *state_, bytes);
+    publish(*model_, *state_, look_.seen);
+    for (size_t k = 0; k < 2; ++k) in_.hand[k].pose = look_.seen.tool[k].hand, in_.hand[k].jaw = look_.seen.tool[k].jaw;
+  }
+  // The scripted surgeon has the tools until `done`; false: it gave up, or was through without.
+  bool show(const std::vector<size_t>& tasks, const std::function<bool(const Snapshot&)>& done) {
+    const auto surgeon = make_demonstrator(scene_.technique.name, picture_, skill_of(scene_), tasks);
+    Snapshot seen = look_.seen;
+    for (int i = 0; i < 3600 && !surgeon->done(); ++i) {
+      TickInput in;
+      in.hand = surgeon->operate(seen, kTick);
+      step(*model_, *state_, in, jobs_);
+      publish(*model_, *state_, seen);
+      if (done(seen)) return true;
+    }
+    return false;
+  }
+
+ protected:
+  virtual std::array<HandMotion, 2> moved(const Act& act) = 0;
+  static TickInput nobody() {
+    TickInput in;
+    in.hand[0].connected = in.hand[1].connected = 0;
+    return in;
+  }
+  int ticks_;
+  SceneSpec scene_;
+  std::shared_ptr<const Model> model_;
+  StatePtr state_;
+  PictureModel picture_;
+  BitePlaces places_;
+  Look look_;
+  TickInput in_;
+  bool started_ = false;
+  Jobs jobs_{1};
+  std::array<size_t, static_cast<size_t>(EventKind::count_)> happened_{};
+};
+
+class AtTheMouse : public LockStep {
+ public:
+  using LockStep::LockStep;
+
+ private:
+  std::array<HandMotion, 2> moved(const Act& act) override {
+    MouseInput in = by_mouse(act, look_, mouse_.speed);
+    in.hand_changes = act.hand != mouse_.active;
+    return mouse_motion(mouse_, look_.steering, in, look_.view, look_.dt);
+  }
+  MouseHand mouse_;
+};
+
+class AtThePad : public LockStep {
+ public:
+  using LockStep::LockStep;
+
+ private:
+  std::array<HandMotion, 2> moved(const Act& act) override {
+    return gamepad_motion(pad_, look_.steering, by_pad(act, look_, input_), look_.dt);
+  }
+  GamepadHand pad_;
+  GamepadInput input_;
+};
+
+}  // namespace catgut

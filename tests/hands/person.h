@@ -1,0 +1,76 @@
+// tests/hands: somebody who sees the picture and has one device, and what they do to make a stitch. A Desk is where they sit:
+// it turns what a hand is meant to do into the device's own events and gives the next picture. What is asked of a hand is what
+// is seen: point there, click, drag; the person never says where a tool is in space.
+#pragma once
+#include <array>
+#include <functional>
+#include <string>
+
+#include "device/gamepad.h"
+#include "device/mouse.h"
+#include "exchange/strand.h"
+
+namespace catgut {
+
+struct Look {
+  Snapshot seen;
+  ViewFrame view;
+  Steering steering;
+  float dt = 1.0f / 60;  // [s] between two pictures
+};
+
+struct Act {
+  size_t hand = 0;
+  HandMotion motion;
+  bool click = false;  // close the jaw, or open it
+};
+
+class Desk {
+ public:
+  virtual ~Desk() = default;
+  virtual const PictureModel& picture() const = 0;
+  virtual const Look& look() const = 0;
+  // Does it, and waits for a picture that shows it. False: the simulation has ended.
+  virtual bool act(const Act& act) = 0;
+  virtual size_t count(EventKind kind) const = 0;  // that happened so far
+};
+
+class Person {
+ public:
+  explicit Person(Desk& desk) : desk_(desk) {}
+
+  bool take_needle();
+  bool bite();       // the driver holds the needle; afterwards the forceps has brought it through
+  bool hand_back();  // the driver takes it from the forceps
+  bool pull_tail(float tail);
+  bool draw_together();  // tail and needle end, until the tissue has come together
+  bool tie(int way);     // one throw: the three below, done again when they fail, and the tail laid down
+  bool wind(int way);
+  bool take_tail();
+  bool set_throw();
+  std::string doing() const { return doing_; }
+
+ private:
+  const Snapshot& seen() const { return desk_.look().seen; }
+  const SteeredHand& hand(size_t k) const { return desk_.look().steering.hand[k]; }
+  bool wait(float seconds, const std::function<bool()>& done, Act act = {});
+  bool point(size_t k, const std::function<Vec3()>& place, const std::function<bool()>& done, bool deep = false,
+             float patience = 25);
+  bool take(size_t k, Held what, HelpAt at, const std::function<Vec3()>& place);
+  bool let_go(size_t k);
+  void aside(size_t k);
+  bool drive(size_t k, const std::function<bool()>& done);
+  bool both(float amount, const std::function<bool()>& done, float patience = 25);
+  bool lay_tail();
+
+  Desk& desk_;
+  std::string doing_;
+};
+
+// The events of the mouse that make this motion, in whole pixels and notches.
+MouseInput by_mouse(const Act& act, const Look& look, float speed);
+
+// The sticks and buttons that make it; `pad` holds what is pressed meanwhile (a closed jaw is a trigger held down).
+GamepadInput by_pad(const Act& act, const Look& look, GamepadInput& pad);
+
+}  // namespace catgut

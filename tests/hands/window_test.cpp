@@ -1,0 +1,365 @@
+// tests/hands: the same stitch at the window itself. The program's own loop, physics on its thread, pictures drawn; an X server
+// of our own, and the mouse and keyboard events that the server makes for us (XTest), or a gamepad that SDL finds. What is
+// checked is what happened, never a pixel. Everything waits for what it sees, so a slow machine only takes longer.
+#ifdef CATGUT_TESTS_WINDOW
+#include <SDL.h>
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdlib>
+#include <mutex>
+#include <thread>
+
+#include "person.h"
+#include "procedure/scene_file.h"
+#include "render/renderer.h"
+#include "sim/simulation.h"
+#include "window/window.h"
+#include "x_events.h"
+
+namespace catgut {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// On a machine with a desktop the test must not take the mouse away.
+struct XServer {
+  pid_t pid = -1;
+  std::string display;
+  XServer() {
+    int out[2];
+    if (pipe(out) != 0) return;
+    pid = fork();
+    if (pid == 0) {
+      dup2(out[1], 3);
+      if (!std::freopen("/dev/null", "w", stderr)) _exit(98);
+      execlp("Xvfb", "Xvfb", "-displayfd", "3", "-screen", "0", "800x600x24", "-nolisten", "tcp", nullptr);
+      _exit(99);
+    }
+    close(out[1]);
+    std::string number;
+    for (char c; read(out[0], &c, 1) == 1 && c != '\n';) number += c;
+    close(out[0]);
+    if (!number.empty()) display = ":" + number;
+  }
+  ~XServer() {
+    if (pid <= 0) return;
+    kill(pid, SIGTERM);
+    waitpid(pid, nullptr, 0);
+  }
+};
+
+// Somebody's eyes and, in what derives from it, their device. The window runs on the thread that called sit(); the person on
+// one of their own.
+class AtTheWindow : public Desk {
+ public:
+  explicit AtTheWindow(int seconds) : until_(Clock::now() + std::chrono::seconds(seconds)) {
+    picture_ = picture_model(*build_model(read_scene("stay")));
+  }
+  const PictureModel& picture() const override { return picture_; }
+  const Look& look() const override { return look_; }
+  size_t count(EventKind kind) const override { return happened_[static_cast<size_t>(kind)]; }
+  bool act(const Act& act) override {
+    do_it(act);
+    return see(2);
+  }
+  size_t lesson_step() const { return lesson_step_; }
+  // Until the surgeon has begun to show something, or has stopped.
+  bool until_showing(bool wanted) {
+    for (int i = 0; i < 2000 && showing_ != wanted; ++i)
+      if (!see(1)) return false;
+    return showing_ == wanted && see(3);
+  }
+  // Somebody who has made a mess of it begins again.
+  virtual void begin_again() = 0;
+  bool restarted() {
+    for (int i = 0; i < 200 && (epoch_ == begun_ || !see(1)); ++i)
+      if (!see(1)) return false;
+    begun_ = epoch_;
+    for (auto& n : happened_) n = 0;
+    return see(3);
+  }
+
+  // Opens the window and lets `work` be done at it; true when it was done before the time was up.
+  bool sit(const std::function<void()>& work, bool teach = false) {
+    std::thread person([&] {
+      if (see(3)) work();
+      gone_ = true;
+    });
+    PlayOptions options;
+    options.scene = "stay";
+    options.teach = teach;
+    options.width = 320, options.height = 200;
+    options.watch = [&](const WindowLook& now) {
+      const std::lock_guard lock(mutex_);
+      newest_.seen = now.seen;
+      newest_.view = now.view;
+      newest_.steering = now.steering;
+      active_ = now.mouse.active;
+      epoch_ = now.status.epoch;
+      lesson_step_ = now.lesson.step();
+      showing_ = now.lesson.showing();
+      ++pictures_;
+      changed_.notify_all();
+      return !gone_ && Clock::now() < until_;
+    };
+    options.told = [&](const Event& e) { ++happened_[static_cast<size_t>(e.kind)]; };
+    const int code = play(options);
+    {
+      const std::lock_guard lock(mutex_);
+      closed_ = true;
+      changed_.notify_all();
+    }
+    person.join();
+    return code == 0;
+  }
+
+ protected:
+  virtual void do_it(const Act& act) = 0;
+  // Until so many pictures have been drawn since: what was done before the call is in the last of them.
+  bool see(size_t pictures) {
+    std::unique_lock lock(mutex_);
+    const size_t from = pictures_;
+    changed_.wait(lock, [&] { return closed_ || pictures_ >= from + pictures; });
+    const auto now = Clock::now();
+    const float passed = std::chrono::duration<float>(now - seen_at_).count();
+    seen_at_ = now;
+    look_ = newest_;
+    look_.dt = std::clamp(passed, 0.02f, 0.25f);
+    return !closed_;
+  }
+
+  PictureModel picture_;
+  Look look_;
+  std::atomic<size_t> active_{0};
+  std::atomic<uint32_t> epoch_{0};
+  uint32_t begun_ = 0;
+  std::atomic<size_t> lesson_step_{0};
+  std::atomic<bool> showing_{false};
+
+ private:
+  Clock::time_point until_, seen_at_ = Clock::now();
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  Look newest_;
+  size_t pictures_ = 0;
+  bool closed_ = false;
+  std::atomic<bool> gone_{false};
+  std::array<std::atomic<size_t>, static_cast<size_t>(EventKind::count_)> happened_{};
+};
+
+class XMouse : public AtTheWindow {
+ public:
+  XMouse(const std::string& display, int seconds) : AtTheWindow(seconds), x_(display) {}
+  bool ready() const { return x_.ready(); }
+  void press(const std::string& key) { x_.key(key, true), x_.key(key, false); }
+  void begin_again() override {
+    if (turn_) x_.button(3, turn_ = false);
+    if (both_) x_.key("w", both_ = false);
+    press("F5");
+  }
+
+ private:
+  void do_it(const Act& act) override {
+    for (int i = 0; act.hand != active_ && i < 40; ++i) {
+      if (i % 8 == 0) x_.key("Tab", true), x_.key("Tab", false);
+      if (!see(1)) return;
+    }
+    const MouseInput in = by_mouse(act, look_, 1);
+    if (turn_ != in.turn) x_.button(3, turn_ = in.turn), see(2);  // before the mouse moves: it means another thing now
+    if (both_ != in.both) x_.key("w", both_ = in.both), see(2);
+    for (float right = in.right, down = in.down; right != 0 || down != 0;) {
+      // The pointer is held in the middle: no step may be so long that it meets the edge of the screen.
+      const float x = std::clamp(right, -50.0f, 50.0f), y = std::clamp(down, -50.0f, 50.0f);
+      x_.motion(static_cast<int>(x), static_cast<int>(y));
+      right -= x, down -= y;
+    }
+    const int notches = std::clamp(static_cast<int>(in.wheel), -12, 12);
+    for (int i = 0; i < std::abs(notches); ++i) click(notches > 0 ? 4 : 5);
+    if (in.jaw_presses) click(1);
+  }
+  void click(unsigned which) { x_.button(which, true), x_.button(which, false); }
+
+  XEvents x_;
+  bool turn_ = false, both_ = false;
+};
+
+// A gamepad of SDL's own making: it comes, is opened and read like one of plastic.
+class SdlPad : public AtTheWindow {
+ public:
+  using AtTheWindow::AtTheWindow;
+  bool plug_in() {
+    SDL_LockJoysticks();
+    index_ = SDL_JoystickAttachVirtual(SDL_JOYSTICK_TYPE_GAMECONTROLLER, SDL_CONTROLLER_AXIS_MAX, SDL_CONTROLLER_BUTTON_MAX, 1);
+    stick_ = index_ < 0 ? nullptr : SDL_JoystickOpen(index_);
+    pad_ = {};
+    if (stick_) send(pad_);
+    SDL_UnlockJoysticks();
+    return stick_ && see(3);
+  }
+  void pull_out() {
+    SDL_LockJoysticks();
+    SDL_JoystickClose(stick_);
+    SDL_JoystickDetachVirtual(index_);
+    SDL_UnlockJoysticks();
+    stick_ = nullptr;
+    see(3);
+  }
+  void begin_again() override {
+    pad_ = {};
+    send(pad_);
+    see(3);
+    // There is no button for it: the keyboard has one.
+    SDL_Event e{};
+    e.type = SDL_KEYDOWN;
+    e.key.keysym.sym = SDLK_F5;
+    SDL_PushEvent(&e);
+  }
+
+ private:
+  void do_it(const Act& act) override {
+    if (stick_) send(by_pad(act, look_, pad_));
+  }
+  void send(const GamepadInput& pad) {
+    const auto axis = [&](int which, float value) {
+      SDL_JoystickSetVirtualAxis(stick_, which, static_cast<Sint16>(std::clamp(value, -1.0f, 1.0f) * 32767));
+    };
+    const auto button = [&](int which, bool down) { SDL_JoystickSetVirtualButton(stick_, which, down); };
+    axis(SDL_CONTROLLER_AXIS_LEFTX, pad.left.x), axis(SDL_CONTROLLER_AXIS_LEFTY, pad.left.y);
+    axis(SDL_CONTROLLER_AXIS_RIGHTX, pad.right.x), axis(SDL_CONTROLLER_AXIS_RIGHTY, pad.right.y);
+    // A trigger rests at the low end of its axis.
+    axis(SDL_CONTROLLER_AXIS_TRIGGERLEFT, 2 * pad.left.trigger - 1);
+    axis(SDL_CONTROLLER_AXIS_TRIGGERRIGHT, 2 * pad.right.trigger - 1);
+    button(SDL_CONTROLLER_BUTTON_LEFTSHOULDER, pad.left.shoulder);
+    button(SDL_CONTROLLER_BUTTON_RIGHTSHOULDER, pad.right.shoulder);
+    button(SDL_CONTROLLER_BUTTON_B, pad.both);
+  }
+  GamepadInput pad_;
+  int index_ = -1;
+  SDL_Joystick* stick_ = nullptr;
+};
+
+bool on_path(const std::string& program) { return std::system(("command -v " + program + " >/dev/null 2>&1").c_str()) == 0; }
+
+class StitchAtTheWindow : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!renderer_available()) GTEST_SKIP() << "no EGL driver here";
+    for (const char* program : {"Xvfb", "xdotool"})
+      if (!on_path(program)) GTEST_SKIP() << program << " is missing (Debian: apt install xvfb xdotool)";
+    x_ = std::make_unique<XServer>();
+    if (x_->display.empty()) GTEST_SKIP() << "Xvfb does not start here";
+    setenv("DISPLAY", x_->display.c_str(), 1);
+    setenv("SDL_VIDEODRIVER", "x11", 1);
+    signal(SIGPIPE, SIG_IGN);
+  }
+  std::unique_ptr<XServer> x_;
+};
+
+// Takes the needle, sews both bowel ends, pulls the thread through, draws them together, ties a throw. Three tries: hands that
+// depend on when pictures come do not do the same thing twice.
+void sew_and_tie(AtTheWindow& desk, std::string& stopped_at) {
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    Person me(desk);
+    const auto sewn = [&] { return desk.count(EventKind::bite_completed) >= 2; };
+    if (me.take_needle() && me.bite() && (sewn() || (me.hand_back() && me.bite())) && me.pull_tail(0.1f) &&
+        me.draw_together() && me.tie(1))
+      return stopped_at.clear();
+    stopped_at = me.doing();
+    std::fprintf(stderr, "again: %s\n", me.doing().c_str());
+    desk.begin_again();
+    if (!desk.restarted()) return;
+  }
+}
+
+void expect_a_stitch(AtTheWindow& desk, const std::string& stopped_at) {
+  EXPECT_TRUE(stopped_at.empty()) << stopped_at;
+  EXPECT_GE(desk.count(EventKind::needle_grasped), 3u);
+  EXPECT_GE(desk.count(EventKind::bite_completed), 2u);
+  EXPECT_GE(desk.count(EventKind::particle_passed), 10u) << "thread was pulled through";
+  EXPECT_GE(desk.count(EventKind::seam_closed), 1u);
+  EXPECT_GE(desk.count(EventKind::loop_formed), 1u);
+  EXPECT_GE(desk.count(EventKind::knot_begun), 1u);
+  EXPECT_GE(desk.count(EventKind::knot_locked), 1u);
+}
+
+TEST_F(StitchAtTheWindow, by_mouse_and_keyboard) {
+  XMouse desk(x_->display, 240);
+  if (!desk.ready()) GTEST_SKIP() << "no XTest here";
+  std::string stopped_at = "nothing was done";
+  desk.sit([&] { sew_and_tie(desk, stopped_at); });
+  expect_a_stitch(desk, stopped_at);
+}
+
+// "Show me", then the learner's turn: nothing of what was shown is left, and what the learner does is recognised.
+TEST_F(StitchAtTheWindow, a_lesson_shows_a_step_and_sees_it_done) {
+  XMouse desk(x_->display, 180);
+  if (!desk.ready()) GTEST_SKIP() << "no XTest here";
+  Person me(desk);
+  bool shown = false, undone = false, taken = false;
+  size_t before = 99, after = 0, grasped = 0;
+  desk.sit(
+      [&] {
+        const Vec3 lay = desk.look().seen.needle.pose.p;
+        before = desk.lesson_step();
+        desk.press("s");
+        shown = desk.until_showing(true) && desk.until_showing(false);
+        grasped = desk.count(EventKind::needle_grasped);
+        undone = desk.look().seen.tool[0].held == Held::nothing && distance(desk.look().seen.needle.pose.p, lay) < 0.001f &&
+                 desk.lesson_step() == 0;
+        taken = me.take_needle();
+        for (int i = 0; i < 5; ++i) desk.act({});
+        after = desk.lesson_step();
+      },
+      true);
+  EXPECT_EQ(before, 0u);
+  EXPECT_TRUE(shown);
+  EXPECT_EQ(grasped, 1u) << "the surgeon took it";
+  EXPECT_TRUE(undone);
+  EXPECT_TRUE(taken) << me.doing();
+  EXPECT_EQ(after, 1u);
+}
+
+TEST_F(StitchAtTheWindow, by_gamepad) {
+  SdlPad desk(240);
+  std::string stopped_at = "no virtual joysticks in this SDL";
+  desk.sit([&] {
+    if (desk.plug_in()) sew_and_tie(desk, stopped_at);
+  });
+  expect_a_stitch(desk, stopped_at);
+}
+
+// The plug comes out while the needle is held: the hands stay, the needle is not dropped, and plugged in again the
+// bite is finished.
+TEST_F(StitchAtTheWindow, a_gamepad_that_is_unplugged_loses_nothing) {
+  SdlPad desk(180);
+  Person me(desk);
+  bool held = false, kept = false, finished = false;
+  desk.sit([&] {
+    held = desk.plug_in() && me.take_needle();
+    if (!held) return;
+    const size_t released = desk.count(EventKind::needle_released);
+    const Vec3 at = desk.look().seen.tool[0].pose.p;
+    desk.pull_out();
+    for (int i = 0; i < 10; ++i) desk.act({});
+    kept = desk.look().seen.tool[0].held == Held::needle && desk.count(EventKind::needle_released) == released &&
+           distance(desk.look().seen.tool[0].pose.p, at) < 0.01f;
+    if (!desk.plug_in()) return;
+    for (int i = 0; i < 5; ++i) desk.act({});
+    kept = kept && desk.count(EventKind::needle_released) == released;
+    finished = me.bite();
+  });
+  EXPECT_TRUE(held) << me.doing();
+  EXPECT_TRUE(kept);
+  EXPECT_TRUE(finished) << me.doing();
+}
+
+}  // namespace
+}  // namespace catgut
+#endif

@@ -1,0 +1,23 @@
+// tests/hands: mouse and keyboard events made by the X server (XTest), on a connection of our own: to the program they come
+// from outside, like anybody's.
+#pragma once
+#include <memory>
+#include <string>
+
+namespace catgut {
+
+class XEvents {
+ public:
+  explicit XEvents(const std::string& display);
+  ~XEvents();
+  bool ready() const;
+  void key(const std::string& name, bool down);  // as X calls it: "Tab", "w"
+  void button(unsigned which, bool down);        // 1 left, 3 right, 4 and 5 the wheel
+  void motion(int right, int down);              // [pixels]
+
+ private:
+  struct Connection;
+  std::unique_ptr<Connection> to_;
+};
+
+}  // namespace catgut
