@@ -324,22 +324,24 @@ void draw_snug(const SolverModel& model, SolverState& solver, const SutureModel&
 
 }  // namespace
 
+TissuePoint carried_by(const SolverModel& model, const TissuePoint& point, uint32_t count) {
+  if (point.count <= count) return point;
+  const Vec4* rest = model.shape.rest.data();
+  const Vec3 at = position_of(point, rest);
+  std::array<uint32_t, TissuePoint::kMost> near = point.particle;
+  std::sort(near.begin(), near.begin() + point.count, [&](uint32_t i, uint32_t j) {
+    const float di = length2(xyz(rest[i]) - at), dj = length2(xyz(rest[j]) - at);
+    return di != dj ? di < dj : i < j;
+  });
+  return spread_point({near.data(), count}, rest, at);
+}
+
 TissuePoint midway(const SolverModel& model, const TissuePoint& a, const TissuePoint& b) {
   // A point of tissue has room for so many particles; each of the two keeps the half of them that are nearest to it, with
   // weights that put it where it was.
-  constexpr uint32_t kHalf = TissuePoint::kMost / 2;
-  const Vec4* rest = model.shape.rest.data();
   TissuePoint m;
   for (const TissuePoint* p : {&a, &b}) {
-    TissuePoint part = *p;
-    if (part.count > kHalf) {
-      const Vec3 at = position_of(*p, rest);
-      std::sort(part.particle.begin(), part.particle.begin() + part.count, [&](uint32_t i, uint32_t j) {
-        const float di = length2(xyz(rest[i]) - at), dj = length2(xyz(rest[j]) - at);
-        return di != dj ? di < dj : i < j;
-      });
-      part = spread_point({part.particle.data(), kHalf}, rest, at);
-    }
+    const TissuePoint part = carried_by(model, *p, TissuePoint::kMost / 2);
     for (uint32_t k = 0; k < part.count; ++k) {
       uint32_t row = 0;
       while (row < m.count && m.particle[row] != part.particle[k]) ++row;

@@ -9,6 +9,7 @@ namespace catgut {
 namespace {
 
 constexpr float kLongestTail = 0.03f;  // [m] of a strand that was left uncut: an assistant trims it here
+constexpr uint32_t kCarriers = 6;      // particles that a pin's end hangs on
 constexpr float kCarries = 0.1f;       // [N] less than this in the thread inside a wall, and the wall holds itself
 
 int anchor_at(const Thread& t, uint32_t slot) {
@@ -61,9 +62,15 @@ void settle_piece(const SolverModel& model, SolverState& solver, SutureState& st
       // The passage through a wall holds nothing together but the wall: as long as it carries nothing, no pin is needed.
       if (before >= 0 && !(same_bite(state, before, here) && tension < kCarries)) {
         TissuePin pin;
-        pin.a = t.anchor[static_cast<size_t>(before)].point;
-        pin.b = t.anchor[static_cast<size_t>(here)].point;
-        pin.length = length;
+        const TissuePoint &a = t.anchor[static_cast<size_t>(before)].point, &b = t.anchor[static_cast<size_t>(here)].point;
+        // What a tied stitch pulls is little, and its pins are looked at in every substep from now on. In deformed tissue fewer
+        // particles say a little else: nothing may move because of that.
+        pin.a = carried_by(model, a, kCarriers);
+        pin.b = carried_by(model, b, kCarriers);
+        const Vec4* x = solver.x.data();
+        const float other =
+            distance(position_of(pin.a, x), position_of(pin.b, x)) - distance(position_of(a, x), position_of(b, x));
+        pin.length = std::max(0.0f, length + other);
         pin.compliance = model.thread.stretch_compliance * length / model.thread.spacing;
         pin.owner = PinOwner::stitch;
         solver.pin.push_back(pin);

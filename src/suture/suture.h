@@ -179,6 +179,8 @@ void tighten(const SolverModel& model, SolverState& solver, const SolverScratch&
 // Takes every throw that is not locked back, whoever pulls on it.
 void take_back_throws(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                       std::vector<Event>& events);
+// The same place at rest, carried by no more than `count` particles, the nearest of those it has.
+TissuePoint carried_by(const SolverModel& model, const TissuePoint& point, uint32_t count);
 // Midway between two points of tissue, wherever the tissue carries them.
 TissuePoint midway(const SolverModel& model, const TissuePoint& a, const TissuePoint& b);
 
