@@ -5,6 +5,7 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "haptic/study.h"
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
 
@@ -55,11 +56,36 @@ int bench_stages(const BenchOptions& o) {
   return best.interrupted ? 130 : 0;
 }
 
+// Research notes 2.5 again, with the code that drives the arms; beside each figure what is written there.
+int bench_haptics() {
+  std::printf(
+      "a hand presses, holds and lets go of a wall of tissue; in brackets the research notes' figure for their gesture\n");
+  std::printf("%-10s %5s  %-26s %19s %19s %19s %19s\n", "tissue/", "rate", "rendering", "force error [N]", "swing, held [mm]",
+              "step [N/ms]", "energy [mJ]");
+  for (const StudyPublished& p : published_study()) {
+    const StudyRow r = run_study(p.c);
+    std::printf("%4.0f/%-3.0f N/m %4.0f Hz  %-26s", double{p.c.tissue}, double{p.c.coupling}, double{p.c.rate},
+                rendering_name(p.c.rendering));
+    const auto cell = [](double ours, double notes) {
+      char text[32] = "";
+      if (notes >= 0) std::snprintf(text, sizeof text, "(%.3g)", notes);
+      std::printf(" %9.3f %9s", ours, text);
+    };
+    cell(double{r.force_error}, double{p.notes.force_error});
+    cell(double{r.hold_swing} * 1e3, double{p.notes.hold_swing} * 1e3);
+    cell(double{r.largest_step}, double{p.notes.largest_step});
+    cell(double{r.energy} * 1e3, double{p.notes.energy} * 1e3);
+    std::printf("\n");
+  }
+  return 0;
+}
+
 int bench(const BenchOptions& o) {
+  if (o.what == "haptics") return bench_haptics();
   if (o.what == "stages") return bench_stages(o);
   if (o.what != "limits")
     throw InputError("bench " + o.what, "not available yet in this version",
-                     "use `catgut bench stages` or `catgut bench limits`");
+                     "use `catgut bench stages`, `catgut bench limits` or `catgut bench haptics`");
   const std::vector<std::string> both{"stress_one_body", "stress_two_bodies"};
   return bench_limits({o.scene.empty() ? both : o.scene, o.set, o.out, o.sutures, o.threads});
 }
@@ -70,11 +96,13 @@ void add_bench(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<BenchOptions>();
   CLI::App* command = app.add_subcommand("bench", "measure where the time goes");
   command
-      ->add_option("what", o->what,
-                   "stages: where a tick's time goes; limits: what each further suture costs (paper and scale come later)")
+      ->add_option(
+          "what", o->what,
+          "stages: where a tick's time goes; limits: what each further suture costs; haptics: what a hand feels of a slow "
+          "simulation (paper and scale come later)")
       ->required()
-      ->check(CLI::IsMember({"paper", "limits", "scale", "stages"}))
-      ->type_name("paper|limits|scale|stages");
+      ->check(CLI::IsMember({"paper", "limits", "scale", "stages", "haptics"}))
+      ->type_name("paper|limits|scale|stages|haptics");
   command->add_option("--json", o->json, "stages: results as JSON; - for standard output")->type_name("FILE|-");
   command->add_option("--repeat", o->repeat, "stages: runs; the one with the fastest median is reported")
       ->check(CLI::Range(1, 1000))
