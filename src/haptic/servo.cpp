@@ -73,7 +73,9 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
   in.warmth = sample.warmth;
   in.ready = ready && !sample.forced_off && o.force;
   const Vec3 allowed = limit(h.limiter, in, dt, o.limiter);
-  out.force = keep_passive(h.passivity, h.at, h.velocity, allowed, o.limiter.force, dt, o.passivity);
+  PassivityOptions net = o.passivity;
+  if (h.limiter.engaged == Engaged::no || h.limiter.engaged == Engaged::waiting) net.damping = 0;  // off is off
+  out.force = keep_passive(h.passivity, h.at, h.velocity, allowed, o.limiter.force, dt, net);
   if (h.passivity.braking) h.limiter.faults |= kGenerated;
 
   const uint32_t down = sample.buttons & ~h.buttons;
