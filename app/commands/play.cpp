@@ -45,6 +45,9 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_option("--threads", o->play.live.threads, "workers of the solver")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
+  command->add_option("--haptics", o->play.live.haptics, "haptic arms as hands; a hand without one stays the mouse's")
+      ->check(CLI::IsMember({"touch", "off"}))
+      ->type_name("touch|off");
   command->add_option("--events", o->play.events, "what happens, as it happens, one JSON object a line; - for standard output")
       ->type_name("FILE|-");
   command->add_option("--seconds", o->play.seconds, "close after so much time")->check(CLI::Range(0.1, 1e6))->type_name("S");
@@ -56,6 +59,7 @@ void add_play(CLI::App& app, int& exit_code) {
     read_size(o->size, o->play);
     o->play.quality = o->quality == "high" ? Quality::good : o->quality == "medium" ? Quality::medium : Quality::draft;
     if (!o->play.scene.empty()) read_scene(o->play.scene);  // its faults are told before a window opens
+    o->play.live.say = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
     for (const std::string& path : {o->play.live.record, o->play.events, o->play.screenshot}) prepare_output(path);
     exit_code = play(o->play);
   });

@@ -7,6 +7,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -37,6 +38,10 @@ struct LiveOptions {
   float hand_speed = 0.6f;  // [m/s] and
   float hand_turn = 12.0f;  // [rad/s] at most for a tool: a device that jumps (a mouse under a slow picture) tears nothing
   bool start_paused = false;
+  // Haptic arms: "touch"; empty or "off": none. What is missing is told and the scene opens without. A hand without an arm
+  // stays the window's.
+  std::string haptics;
+  std::function<void(const std::string&)> say;  // a line about the arms, from any thread; empty: nobody is told
 };
 
 struct LiveStatus {
@@ -53,6 +58,7 @@ struct LiveStatus {
   uint32_t events_lost = 0;                 // nobody fetched them in time
   std::array<uint64_t, 2> input_time_ns{};  // ToolInput::time_ns of the hands in the newest tick, for latencies
   float hand_to_tick_ms = 0;                // from the newest of these, where a device uses wall_ns(), to the end of its tick
+  std::array<bool, 2> arm{};                // a haptic arm moves that hand
   Practice practice;
   std::string doing;  // of the surgeon, when one works
   std::string fault;  // not empty: the run has stopped, and why
