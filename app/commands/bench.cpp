@@ -5,7 +5,6 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
-#include "haptic/study.h"
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
 
@@ -13,7 +12,7 @@ namespace catgut {
 namespace {
 
 struct BenchOptions {
-  std::string what, json, out = "out/limits";
+  std::string what, json, out;
   std::vector<std::string> scene, set;
   int repeat = 1, threads = 1, sutures = 50;
   double seconds = 0;
@@ -56,38 +55,14 @@ int bench_stages(const BenchOptions& o) {
   return best.interrupted ? 130 : 0;
 }
 
-// Research notes 2.5 again, with the code that drives the arms; beside each figure what is written there.
-int bench_haptics() {
-  std::printf(
-      "a hand presses, holds and lets go of a wall of tissue; in brackets the research notes' figure for their gesture\n");
-  std::printf("%-10s %5s  %-26s %19s %19s %19s %19s\n", "tissue/", "rate", "rendering", "force error [N]", "swing, held [mm]",
-              "step [N/ms]", "energy [mJ]");
-  for (const StudyPublished& p : published_study()) {
-    const StudyRow r = run_study(p.c);
-    std::printf("%4.0f/%-3.0f N/m %4.0f Hz  %-26s", double{p.c.tissue}, double{p.c.coupling}, double{p.c.rate},
-                rendering_name(p.c.rendering));
-    const auto cell = [](double ours, double notes) {
-      char text[32] = "";
-      if (notes >= 0) std::snprintf(text, sizeof text, "(%.3g)", notes);
-      std::printf(" %9.3f %9s", ours, text);
-    };
-    cell(double{r.force_error}, double{p.notes.force_error});
-    cell(double{r.hold_swing} * 1e3, double{p.notes.hold_swing} * 1e3);
-    cell(double{r.largest_step}, double{p.notes.largest_step});
-    cell(double{r.energy} * 1e3, double{p.notes.energy} * 1e3);
-    std::printf("\n");
-  }
-  return 0;
-}
-
 int bench(const BenchOptions& o) {
-  if (o.what == "haptics") return bench_haptics();
+  if (o.what == "haptics") return bench_haptics(o.out, o.scene.empty() ? "purse_string" : o.scene[0]);
   if (o.what == "stages") return bench_stages(o);
   if (o.what != "limits")
     throw InputError("bench " + o.what, "not available yet in this version",
                      "use `catgut bench stages`, `catgut bench limits` or `catgut bench haptics`");
   const std::vector<std::string> both{"stress_one_body", "stress_two_bodies"};
-  return bench_limits({o.scene.empty() ? both : o.scene, o.set, o.out, o.sutures, o.threads});
+  return bench_limits({o.scene.empty() ? both : o.scene, o.set, o.out.empty() ? "out/limits" : o.out, o.sutures, o.threads});
 }
 
 }  // namespace
@@ -115,9 +90,11 @@ void add_bench(CLI::App& app, int& exit_code) {
   command->add_option("--sutures", o->sutures, "limits: bites in each scene")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command->add_option("--out", o->out, "limits: folder for a table (CSV) and a plot (PNG) of each scene")
-      ->type_name("DIR")
-      ->capture_default_str();
+  command
+      ->add_option("--out", o->out,
+                   "limits: folder for a table (CSV) and a plot (PNG) of each scene (out/limits); haptics: for forces.png, "
+                   "what a bite and a knot feel like")
+      ->type_name("DIR");
   command->add_option("--set", o->set, "change a key of the scene: key=value")->take_all()->allow_extra_args(false);
   command->callback([o, &exit_code] { exit_code = bench(*o); });
 }

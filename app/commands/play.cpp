@@ -45,9 +45,11 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_option("--threads", o->play.live.threads, "workers of the solver")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  command->add_option("--haptics", o->play.live.haptics, "haptic arms as hands; a hand without one stays the mouse's")
-      ->check(CLI::IsMember({"touch", "off"}))
-      ->type_name("touch|off");
+  command
+      ->add_option("--haptics", o->play.live.haptics,
+                   "haptic arms as hands (a hand without one stays the mouse's); paper: with the paper's spring")
+      ->check(CLI::IsMember({"touch", "paper", "off"}))
+      ->type_name("touch|paper|off");
   command->add_option("--events", o->play.events, "what happens, as it happens, one JSON object a line; - for standard output")
       ->type_name("FILE|-");
   command->add_option("--seconds", o->play.seconds, "close after so much time")->check(CLI::Range(0.1, 1e6))->type_name("S");

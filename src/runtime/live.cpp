@@ -13,6 +13,7 @@
 #include "exchange/ring.h"
 #include "procedure/scene_file.h"
 #include "runtime/blend.h"
+#include "runtime/felt.h"
 #include "runtime/hands.h"
 #include "runtime/haptics.h"
 #include "runtime/session.h"
@@ -102,6 +103,7 @@ struct Live::Work {
   Hands surgeon;
   std::unique_ptr<Recorder> recorder;
   std::unique_ptr<Haptics> haptics;  // null: no arms
+  PaperSpring paper;
   LiveResult result;
   TickInput input;
   Snapshot before, now;
@@ -226,7 +228,10 @@ void Live::Work::tick(bool let_in) {
 }
 
 void Live::Work::feel() {
-  for (size_t k = 0; k < 2; ++k) haptics->publish(k, now.patch[k], told.epoch, kLiveSpeeds[speed]);
+  const bool as_paper = options.haptics == "paper";
+  if (as_paper) follow(paper, now, picture);
+  for (size_t k = 0; k < 2; ++k)
+    haptics->publish(k, as_paper ? paper_patch(paper, now, picture, k) : now.patch[k], told.epoch, kLiveSpeeds[speed]);
   if (now.tick % kNewsTicks != 0 || !options.say) return;
   for (const std::string& line : haptics->news()) options.say(line);
 }

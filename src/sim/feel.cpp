@@ -6,6 +6,7 @@
 
 #include "sim/model.h"
 #include "sim/state.h"
+#include "suture/forces.h"
 
 namespace catgut {
 namespace {
@@ -34,6 +35,39 @@ Vec3 thread_on_tool(const SolverState& s, const ThreadHold& hold, const SolverMo
 
 Sym3 across(Vec3 n, float k) { return identity(k) + outer(n, -k); }
 constexpr float series(float a, float b) { return a * b / (a + b); }
+
+// What the wall does to a needle that goes through it (suture/forces), at its tip now.
+NeedleResistance resistance_now(const Model& model, const State& state, float tension) {
+  const SolverModel& m = model.solver;
+  const SolverState& s = state.solver;
+  const RigidBody& needle = s.body[kNeedle];
+  const SutureState& suture = state.suture;
+  const NeedleArc& arc = m.needle_arc;
+  const auto along = [&](const BiteEnd& end) {
+    return arc.radius * arc.nearest(to_local(needle.pose(), position_of(end.point, s.x.data())));
+  };
+  const float tip_at = arc.radius * arc.arc;
+  float embedded = 0, indented = -1, to_exit = -1;
+  for (const OpenBite& open : suture.open) {
+    const Bite& bite = suture.bite[open.bite];
+    const float from = open.phase == NeedlePhase::back_in ? 0 : along(bite.entry),
+                to = bite.has_exit ? along(bite.exit) : tip_at;
+    embedded += std::max(0.0f, to - from);
+  }
+  const bool tip_in = phase_of(suture) == NeedlePhase::tip_in;
+  if (tip_in && suture.attached) {
+    for (const Attachment& a : s.attach)
+      if (a.body == static_cast<int>(kNeedle)) indented = distance(transform(needle.pose(), a.target), suture.attached_from);
+  } else if (tip_in) {
+    SurfaceHit hit;
+    const Vec3 heading = rotate(needle.q, arc.tangent(arc.arc));
+    // Only on its way out: close to the surface that it went in by, the tip points the other way.
+    if (nearest_surface(m, state.scratch.candidates, s.x.data(), needle_tip(arc, needle), kLook, hit) &&
+        dot(heading, hit.normal) > 0.2f)
+      to_exit = std::max(0.0f, -hit.distance);
+  }
+  return needle_resistance(indented, model.suture.release_distance, to_exit, embedded, tip_in, tension);
+}
 
 }  // namespace
 
@@ -174,8 +208,6 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     if (state.suture.attached) stiff += identity(series(kTissue, 1 / std::max(1e-6f, model.suture.attach_compliance)));
     if (s.channel.empty()) stiff += outer(normalized(needle), kTissue);  // its shaft lies against something
     both_ways = true;
-    // Cutting and shaft friction belong to the servo; see haptic/force_model.
-    for (const ChannelPoint& c : s.channel) p.drag += c.drag;
     p.along = rotate(body.q, m.needle_arc.tangent(hand.at * m.needle_arc.arc));
   }
   if (length(thread) > 4 * kNothing) {
@@ -194,6 +226,22 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     // The directions are those of what holds the tool; how stiff they are is what the hand has found.
     const float guess = (p.stiffness.xx + p.stiffness.yy + p.stiffness.zz) / 3;
     if (guess > 1) p.stiffness = clamp_eigenvalues(p.stiffness * (learned(felt, guess, coupling) / guess), 0, coupling);
+    if (hand.held == Held::needle && !state.suture.open.empty()) {
+      // Across the shaft and in turning it is the solver's reaction; along it what a wall really does, never less than the
+      // solver says.
+      const ToolReaction& other = state.feel.tool[1 - k];
+      const NeedleResistance r = resistance_now(model, state, other.substeps > 0 ? length(other.held) / other.substeps : 0);
+      const float solver = -dot(needle, p.along);
+      if (r.spring > solver) p.force -= p.along * (r.spring - solver);
+      p.stiffness =
+          clamp_eigenvalues(p.stiffness + outer(p.along, series(std::max(1e-3f, r.stiffness), coupling)), 0, coupling);
+      p.drag = r.drag;
+      p.viscous = kShaftViscous;
+      p.presliding = kPresliding;
+      p.pierce = p.along;
+      p.pierce_force = std::max(r.pierce, r.pierce > 0 ? solver : 0);
+      p.pierce_keep = kPunctureKeep;
+    }
     return p;
   }
   const float push = length(pressing);

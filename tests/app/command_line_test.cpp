@@ -95,7 +95,26 @@ TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
   expect_refused("replay small.toml", "not a Catgut recording");
   expect_refused("bench paper", "not available yet in this version");
   expect_refused("describe substep", "substeps");
-  expect_refused("devices --test", "no haptic device");
+  expect_refused("devices --test", "no haptic arm");
+  expect_refused("play --haptics spoon", "--haptics");
+}
+
+// Arms come and go with a library that is loaded at run time; here it is the simulated one.
+TEST_F(CommandLine, devices_are_listed_and_pushed) {
+  const Outcome none = run_catgut("devices");
+  EXPECT_EQ(none.code, 0);
+  EXPECT_NE(none.out.find("touch: "), std::string::npos) << "one line says what is missing";
+  setenv("CATGUT_LIBHD", CATGUT_FAKE_LIBHD, 1);
+  const Outcome both = run_catgut("devices");
+  EXPECT_NE(both.out.find("right-0001"), std::string::npos) << both.out;
+  EXPECT_NE(both.out.find("left-0002"), std::string::npos) << both.out;
+  setenv("FAKE_HD_FAULT", "flip_x:right:0", 1);
+  const Outcome flipped = run_catgut("devices --test");
+  EXPECT_EQ(flipped.code, 1);
+  EXPECT_NE(flipped.out.find("WRONG WAY when pushed right"), std::string::npos) << flipped.out;
+  EXPECT_NE(flipped.out.find("left arm: "), std::string::npos) << flipped.out;
+  unsetenv("FAKE_HD_FAULT");
+  unsetenv("CATGUT_LIBHD");
 }
 
 TEST_F(CommandLine, faults_in_a_scene_name_its_line) {
