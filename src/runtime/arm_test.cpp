@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "core/check.h"
+#include "exchange/latest.h"
 #include "haptic/servo.h"
 #include "runtime/live.h"
 
@@ -130,6 +131,39 @@ ArmTestResult test_arms(ArmPort port, const ArmTestOptions& options, const std::
     result.ok &= ok;
   }
   return result;
+}
+
+std::array<Vec3, 2> held_places(ArmPort port, float countdown, const std::function<void(const std::string&)>& say,
+                                const std::atomic<bool>& stop, std::array<bool, 2>& known) {
+  struct Watch {
+    std::array<Latest<ArmSample>, 2> box;
+    static Vec3 step(void* user, size_t arm, const ArmSample& s) {
+      Latest<ArmSample>& box = static_cast<Watch*>(user)->box[arm];
+      box.draft() = s;
+      box.publish();
+      return {};
+    }
+  };
+  Watch watch;
+  std::string why;
+  if (!port.start(port.self, {Watch::step, &watch}, why))
+    throw InputError(port.kind, why, "close other programs that use the arms");
+  for (double until = wall_seconds() + double{countdown}, told = 1e9; wall_seconds() < until && !stop;) {
+    const double left = std::ceil(until - wall_seconds());
+    if (left < told)
+      say("hold each stylus where the middle of its side of the field shall be: " + std::to_string(static_cast<int>(left)));
+    told = left;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  port.stop(port.self);
+  std::array<Vec3, 2> at;
+  for (size_t k = 0; k < 2; ++k) {
+    watch.box[k].update();
+    const ArmSample& s = watch.box[k].seen();
+    known[k] = port.arm[k].present && s.state == ArmState::ready && is_finite(s.pose.p) && !stop;
+    at[k] = s.pose.p;
+  }
+  return at;
 }
 
 }  // namespace catgut

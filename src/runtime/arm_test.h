@@ -1,5 +1,5 @@
-// runtime: `catgut devices --test`: a slow, small push of each arm along each axis, through the same limits as in a scene, and
-// what the stylus does under it.
+// runtime: `catgut devices --calibrate`, and `--test`: a slow, small push of each arm along each axis, through the same limits
+// as in a scene, and what the stylus does under it.
 #pragma once
 #include <array>
 #include <atomic>
@@ -24,5 +24,9 @@ struct ArmTestResult {
 // say: the countdown and what comes next. stop: ends it; force goes down by the slew. Blocks for some ten seconds.
 ArmTestResult test_arms(ArmPort port, const ArmTestOptions& options, const std::function<void(const std::string&)>& say,
                         const std::atomic<bool>& stop);
+
+// Where each stylus is held once `countdown` [s] is over, arm frame [m]; for arms that are there and gave a sample. No force.
+std::array<Vec3, 2> held_places(ArmPort port, float countdown, const std::function<void(const std::string&)>& say,
+                                const std::atomic<bool>& stop, std::array<bool, 2>& known);
 
 }  // namespace catgut

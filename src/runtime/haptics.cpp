@@ -97,6 +97,18 @@ double quantile_us(const std::array<uint64_t, 512>& counts, double part) {
   return 0;
 }
 
+Workspace workspace_of(const ArmInfo& arm, size_t k, Vec3 focus, const std::map<std::string, ArmPlace>& places) {
+  ArmPlace place;
+  place.middle = 0.5f * (arm.least + arm.most);
+  if (const auto found = places.find(arm.serial); found != places.end()) place = found->second;
+  Workspace w;
+  w.scale = place.scale;
+  w.turn = axis_angle({0, 1, 0}, place.turn * kPi / 180);
+  // The hands side by side, a little above the field.
+  w.offset = focus + Vec3{k == 0 ? 0.015f : -0.015f, 0.02f, 0.01f} - rotate(w.turn, place.middle) * w.scale;
+  return w;
+}
+
 Haptics::Haptics(ArmPort port, const PictureModel& picture, const HapticsOptions& options) : work_(std::make_unique<Work>()) {
   work_->port = std::move(port);
   if (options.clock) work_->clock = options.clock;
@@ -106,9 +118,7 @@ Haptics::Haptics(ArmPort port, const PictureModel& picture, const HapticsOptions
     fit_to_arm(o, arm.limits);
     o.ratchet = options.ratchet;
     o.force = options.force;
-    // The middle of each workspace a little above the field, the hands side by side.
-    const Vec3 middle = 0.5f * (arm.least + arm.most);
-    o.place.offset = picture.focus + Vec3{k == 0 ? 0.015f : -0.015f, 0.02f, 0.01f} - middle;
+    o.place = workspace_of(arm, k, picture.focus, options.place);
     ToolInput& nobody = work_->side[k].hand.draft();
     nobody.connected = 0;
     work_->side[k].hand.publish();

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "exchange/picture.h"
 #include "exchange/tool_input.h"
 #include "haptic/servo.h"
+#include "procedure/arm_places.h"
 #include "sim/scene.h"
 
 namespace catgut {
@@ -28,7 +30,10 @@ struct HapticsOptions {
   uint64_t (*clock)() = nullptr;  // null: wall_ns(); tests hand in their own
   bool ratchet = true;            // the stylus' first button closes the jaw and, pressed again, opens it; else it is held
   bool force = true;              // false: arms move tools and feel nothing
+  std::map<std::string, ArmPlace> place;  // by serial number; an arm that is not in it: the middle of its workspace, 1:1
 };
+// Where the workspace of arm k lies in a scene whose field has its middle at `focus` [m].
+Workspace workspace_of(const ArmInfo& arm, size_t k, Vec3 focus, const std::map<std::string, ArmPlace>& places);
 
 // How regularly the servo of one arm ran, in [us]: counts per 10 us, the last one for all that is longer.
 struct ServoTimes {

@@ -141,7 +141,9 @@ void Live::Work::begin() {
   model = build_model(scene);
   picture = picture_model(*model);
   if (arms.any()) {
-    haptics = std::make_unique<Haptics>(std::move(arms), picture, HapticsOptions{});
+    HapticsOptions how;
+    how.place = read_arm_places(arm_places_file());
+    haptics = std::make_unique<Haptics>(std::move(arms), picture, how);
     for (size_t k = 0; k < 2; ++k) told.arm[k] = haptics->present(k);
   }
   dt = 1.0 / static_cast<double>(scene.solver.tick_rate);
