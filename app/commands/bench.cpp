@@ -12,7 +12,7 @@ namespace catgut {
 namespace {
 
 struct BenchOptions {
-  std::string what, json, out = "out/limits";
+  std::string what, json, out;
   std::vector<std::string> scene, set;
   int repeat = 1, threads = 1, sutures = 50;
   double seconds = 0;
@@ -56,14 +56,15 @@ int bench_stages(const BenchOptions& o) {
 }
 
 int bench(const BenchOptions& o) {
+  if (o.what == "haptics") return bench_haptics(o.out, o.scene.empty() ? "purse_string" : o.scene[0]);
   if (o.what == "stages") return bench_stages(o);
   if (o.what == "frame")
     return bench_frame({o.scene.empty() ? "lembert" : o.scene[0], o.json, o.set, o.seconds > 0 ? o.seconds : 30});
   if (o.what != "limits")
     throw InputError("bench " + o.what, "not available yet in this version",
-                     "use `catgut bench stages`, `catgut bench limits` or `catgut bench frame`");
+                     "use `catgut bench stages`, `catgut bench limits`, `catgut bench frame` or `catgut bench haptics`");
   const std::vector<std::string> both{"stress_one_body", "stress_two_bodies"};
-  return bench_limits({o.scene.empty() ? both : o.scene, o.set, o.out, o.sutures, o.threads});
+  return bench_limits({o.scene.empty() ? both : o.scene, o.set, o.out.empty() ? "out/limits" : o.out, o.sutures, o.threads});
 }
 
 }  // namespace
@@ -74,11 +75,10 @@ void add_bench(CLI::App& app, int& exit_code) {
   command
       ->add_option("what", o->what,
                    "stages: where a tick's time goes; limits: what each further suture costs; frame: a stereo frame without a "
-                   "rasteriser "
-                   "(paper and scale come later)")
+                   "rasteriser; haptics: what a hand feels of a slow simulation (paper and scale come later)")
       ->required()
-      ->check(CLI::IsMember({"paper", "limits", "scale", "stages", "frame"}))
-      ->type_name("paper|limits|scale|stages|frame");
+      ->check(CLI::IsMember({"paper", "limits", "scale", "stages", "frame", "haptics"}))
+      ->type_name("paper|limits|scale|stages|frame|haptics");
   command->add_option("--json", o->json, "stages, frame: results as JSON; - for standard output")->type_name("FILE|-");
   command->add_option("--repeat", o->repeat, "stages: runs; the one with the fastest median is reported")
       ->check(CLI::Range(1, 1000))
@@ -91,9 +91,11 @@ void add_bench(CLI::App& app, int& exit_code) {
   command->add_option("--sutures", o->sutures, "limits: bites in each scene")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command->add_option("--out", o->out, "limits: folder for a table (CSV) and a plot (PNG) of each scene")
-      ->type_name("DIR")
-      ->capture_default_str();
+  command
+      ->add_option("--out", o->out,
+                   "limits: folder for a table (CSV) and a plot (PNG) of each scene (out/limits); haptics: for forces.png, "
+                   "what a bite and a knot feel like")
+      ->type_name("DIR");
   command->add_option("--set", o->set, "change a key of the scene: key=value")->take_all()->allow_extra_args(false);
   command->callback([o, &exit_code] { exit_code = bench(*o); });
 }

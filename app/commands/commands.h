@@ -36,6 +36,9 @@ struct FrameOptions {
 };
 int bench_frame(const FrameOptions& options);
 
+// `catgut bench haptics` (app/commands/haptics.cpp). folder: empty: the table alone.
+int bench_haptics(const std::string& folder, const std::string& scene);
+
 int play_without_arguments();  // the window's start screen
 
 // What several commands share (app/commands/common.cpp).

@@ -1,26 +1,97 @@
-// app: `catgut devices`: what is connected.
+// app: `catgut devices`: which haptic arms are connected and what they can do; with --test, a slow small push of each.
 #include <cstdio>
 #include <memory>
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "runtime/arm_test.h"
+#include "runtime/haptics.h"
 
 namespace catgut {
+namespace {
+
+struct Options {
+  bool test = false, calibrate = false;
+  double scale = 1, turn = 0;
+};
+
+int calibrate(ArmPort port, const Options& o) {
+  const std::string file = arm_places_file();
+  std::map<std::string, ArmPlace> places = read_arm_places(file);
+  const std::array<ArmInfo, 2> arm = port.arm;
+  std::array<bool, 2> known{};
+  const auto say = [](const std::string& line) { std::printf("%s\n", line.c_str()), std::fflush(stdout); };
+  const std::array<Vec3, 2> at = held_places(std::move(port), 5, say, stop_on_interrupt(), known);
+  for (size_t k = 0; k < 2; ++k) {
+    if (!known[k]) continue;
+    places[arm[k].serial] = {static_cast<float>(o.scale), static_cast<float>(o.turn), at[k]};
+    std::printf("%s arm: middle at %.0f, %.0f, %.0f mm, scale %g, turned by %g degrees\n", k == 0 ? "right" : "left",
+                1e3 * double{at[k].x}, 1e3 * double{at[k].y}, 1e3 * double{at[k].z}, o.scale, o.turn);
+  }
+  if (!known[0] && !known[1]) return 1;
+  write_arm_places(file, places);
+  std::printf("%s\n", file.c_str());
+  return 0;
+}
+
+int devices(const Options& o) {
+  const bool test = o.test;
+  std::vector<std::string> told;
+  ArmPort port = open_arms("touch", told);
+  for (const std::string& line : told) std::printf("%s\n", line.c_str());
+  for (size_t k = 0; k < 2; ++k) {
+    const ArmInfo& a = port.arm[k];
+    if (!a.present) continue;
+    std::printf("%s arm: \"%s\", %s, serial %s, driver %s\n", k == 0 ? "right" : "left", a.name.c_str(), a.model.c_str(),
+                a.serial.c_str(), a.driver.c_str());
+    ServoOptions servo;
+    fit_to_arm(servo, a.limits);
+    std::printf("  force %.2g N, %.2g N for long; %.0f N/m, %.1f N s/m at most; workspace %.0f x %.0f x %.0f mm\n",
+                double{servo.limits.force}, double{servo.limits.continuous}, double{servo.limits.stiffness},
+                double{servo.limits.damping}, 1e3 * double{a.most.x - a.least.x}, 1e3 * double{a.most.y - a.least.y},
+                1e3 * double{a.most.z - a.least.z});
+  }
+  if (!port.any()) {
+    if (test || o.calibrate)
+      throw InputError(test ? "devices --test" : "devices --calibrate", "there is no haptic arm",
+                       "see above for what is missing");
+    std::printf(
+        "Mouse, keyboard and gamepad are hands in the window: catgut play\n"
+        "The scripted surgeon needs none: catgut run purse_string --surgeon scripted --headless\n");
+    return 0;
+  }
+  if (o.calibrate) return calibrate(std::move(port), o);
+  if (!test) {
+    std::printf("catgut devices --test pushes each gently; catgut play --haptics touch uses them\n");
+    return 0;
+  }
+  const ArmTestResult result = test_arms(
+      std::move(port), {},
+      [](const std::string& line) {
+        std::printf("%s\n", line.c_str());
+        std::fflush(stdout);
+      },
+      stop_on_interrupt());
+  for (const std::string& line : result.line) std::printf("%s\n", line.c_str());
+  return result.ok ? 0 : 1;
+}
+
+}  // namespace
 
 void add_devices(CLI::App& app, int& exit_code) {
-  auto test = std::make_shared<bool>(false);
-  CLI::App* command = app.add_subcommand("devices", "list connected hands");
-  command->add_flag("--test", *test, "a safe force test of every device");
-  command->callback([test, &exit_code] {
-    if (*test)
-      throw InputError("devices --test", "this version supports no haptic device",
-                       "use the scripted surgeon: catgut run SCENE");
-    write_output("-",
-                 "No haptic devices are supported in this version yet. Mouse, keyboard and gamepad are hands in the window: "
-                 "catgut play\n"
-                 "The scripted surgeon needs none: catgut run purse_string --surgeon scripted --headless\n");
-    exit_code = 0;
-  });
+  auto o = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("devices", "list haptic arms");
+  CLI::Option* test =
+      command->add_flag("--test", o->test, "push each arm slowly along each axis, after a countdown, and see what it does");
+  command->add_flag("--calibrate", o->calibrate, "lay the arms' workspaces into the field; kept per user and arm")
+      ->excludes(test);
+  command->add_option("--scale", o->scale, "calibrate: metres in the field per metre of the stylus")
+      ->check(CLI::Range(0.1, 3.0))
+      ->capture_default_str();
+  command->add_option("--turn", o->turn, "calibrate: how far the arms are turned about the vertical [degrees]")
+      ->check(CLI::Range(-180.0, 180.0))
+      ->capture_default_str();
+  command->callback([o, &exit_code] { exit_code = devices(*o); });
 }
 
 }  // namespace catgut

@@ -73,6 +73,11 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_option("--threads", o->play.live.threads, "workers of the solver")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
+  command
+      ->add_option("--haptics", o->play.live.haptics,
+                   "haptic arms as hands (a hand without one stays the mouse's); paper: with the paper's spring")
+      ->check(CLI::IsMember({"touch", "paper", "off"}))
+      ->type_name("touch|paper|off");
   command->add_option("--events", o->play.events, "what happens, as it happens, one JSON object a line; - for standard output")
       ->type_name("FILE|-");
   add_window_options(*command, *o);
@@ -83,6 +88,7 @@ void add_play(CLI::App& app, int& exit_code) {
       throw InputError("--teach", "the lesson is given in the scene \"" + first_stitch().scene + "\", to you",
                        "write catgut play " + first_stitch().scene + " --teach");
     if (!o->play.scene.empty()) read_scene(o->play.scene);  // its faults are told before a window opens
+    o->play.live.say = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
     for (const std::string& path : {o->play.live.record, o->play.json, o->play.events, o->play.screenshot}) check_output(path);
     exit_code = play(o->play);
   });

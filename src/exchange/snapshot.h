@@ -7,6 +7,7 @@
 
 #include "core/math.h"
 #include "exchange/event.h"
+#include "exchange/force_patch.h"
 
 namespace catgut {
 
@@ -102,9 +103,10 @@ struct Snapshot {
   std::vector<SettledView> settled;
   std::vector<SeamView> seam;
   std::vector<BiteView> bite;
-  float opening_area = 0;    // [m^2] of the rim that is being closed
-  float closure = 0;         // 0 open .. 1 at the anvil
-  std::vector<Event> event;  // of this tick
+  float opening_area = 0;           // [m^2] of the rim that is being closed
+  float closure = 0;                // 0 open .. 1 at the anvil
+  std::vector<Event> event;         // of this tick
+  std::array<ForcePatch, 2> patch;  // what each hand may feel until the next tick
 };
 
 }  // namespace catgut

@@ -72,6 +72,7 @@ const Field kField[] = {
     {"solver", "friction_tissue", "", 0, 10, nullptr, "coefficient of Coulomb friction, tissue on tissue", TOP(solver.friction_tissue)},
     {"solver", "friction_tool", "", 0, 10, nullptr, "coefficient of Coulomb friction, tool on tissue", TOP(solver.friction_tool)},
     {"solver", "friction_thread", "", 0, 10, nullptr, "coefficient of Coulomb friction, thread on tissue and thread", TOP(solver.friction_thread)},
+    {"solver", "hand_stiffness", "N/m", 1, 100000, nullptr, "of the coupling between a hand and its tool; a haptic arm renders no more than some 300", TOP(solver.hand_stiffness)},
 
     {"suture", "attach_threshold", "m", 0, 0.1, nullptr, "how near a particle must be to the needle's tip to be attached (X of the paper's figure 4)", TOP(suture.attach_threshold)},
     {"suture", "release_distance", "m", 0, 0.1, nullptr, "drag beyond which the attached particle is let go (figure 5)", TOP(suture.release_distance)},

@@ -1,4 +1,5 @@
-// procedure: toml++ as it can be trusted with text that anybody may write. Include this instead of the library's own header.
+// procedure: toml++ with one fault mended. Whoever reads TOML includes this and never toml++ itself: two versions of its tables
+// in one program would be one too many.
 #pragma once
 // clang-format off
 // toml++ 3.3 tells blanks and letters by tables that call most of what they do not hold unreachable, which is undefined behaviour

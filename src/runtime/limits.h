@@ -22,6 +22,7 @@ struct SutureCost {
   double simulated_s = 0;
   uint64_t ticks = 0;
   Spread solver_ms, tick_ms;  // per tick; tick_ms: surgeon, step and publish
+  double shape_ms = 0;        // median of shape matching, which does the same work in every tick: how fast the machine was
   uint32_t contacts = 0;      // the most in a substep
   double fps = 0;             // that the median tick would allow, with nothing drawn
 };
@@ -38,8 +39,9 @@ struct LimitsResult {
 LimitsResult measure_limits(SceneSpec scene, int sutures, int threads, const std::function<void(const SutureCost&)>& on_row,
                             const SessionHooks& hooks = {});
 
-// Median solver time of the last five sutures over that of the first five; 0 with fewer than ten.
-double limits_growth(std::span<const SutureCost> row);
+// Median solver time of the last five sutures over that of the first five; 0 with fewer than ten. steady: each divided by the
+// shape matching of its ticks, so that a processor which changes its clock on the way does not count as growth, nor hides it.
+double limits_growth(std::span<const SutureCost> row, bool steady);
 
 std::string limits_csv_header();  // with a final newline, as each row
 std::string limits_csv_row(const SutureCost& row);

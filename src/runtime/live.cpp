@@ -13,7 +13,9 @@
 #include "exchange/ring.h"
 #include "procedure/scene_file.h"
 #include "runtime/blend.h"
+#include "runtime/felt.h"
 #include "runtime/hands.h"
+#include "runtime/haptics.h"
 #include "runtime/session.h"
 #include "sim/recording.h"
 #include "sim/simulation.h"
@@ -26,7 +28,9 @@ constexpr int kCatchUp = 4;            // late ticks made up for at once; what i
 constexpr size_t kMostTakenBack = 32;  // bites kept, some 200 kB each
 constexpr double kBeforeBite = 0.25;   // [s] at least between the moment that is gone back to and the tip going in
 constexpr uint64_t kSanityTicks = 16;  // as in runtime/session
+constexpr uint64_t kNewsTicks = 64;    // how often arms are asked what went wrong
 constexpr double kFactorTime = 0.5;    // [s] over which `lately` looks back
+constexpr float kArmSpeed = 1.0f;      // [m/s] at which a tool comes to an arm that was found elsewhere than it was lost
 constexpr auto kNap = std::chrono::milliseconds(2);  // how soon a command is heard while nothing is due
 
 double seconds_of(Clock::duration d) { return std::chrono::duration<double>(d).count(); }
@@ -113,6 +117,8 @@ struct Live::Work {
   std::unique_ptr<Jobs> jobs;
   Hands surgeon;
   std::unique_ptr<Recorder> recorder;
+  std::unique_ptr<Haptics> haptics;  // null: no arms
+  PaperSpring paper;
   LiveResult result;
   TickInput input;
   std::array<int, 2> unheard{};                  // [ticks] since hands were last heard of, and
@@ -135,6 +141,7 @@ struct Live::Work {
   void main_loop();
   void obey();
   void tick(bool let_in);
+  void feel();
   void show();
   void go_back(const Moment& to);
   void change_scene(const std::string& key_equals_value);
@@ -146,8 +153,22 @@ struct Live::Work {
 };
 
 void Live::Work::begin() {
+  ArmPort arms;
+  if (!options.haptics.empty() && options.haptics != "off") {
+    std::vector<std::string> lines;
+    arms = open_arms(options.haptics, lines);
+    for (const std::string& line : lines)
+      if (options.say) options.say(line);
+    if (arms.any()) prepare_for_arms(scene);
+  }
   model = build_model(scene);
   picture = picture_model(*model);
+  if (arms.any()) {
+    HapticsOptions how;
+    how.place = read_arm_places(arm_places_file());
+    haptics = std::make_unique<Haptics>(std::move(arms), picture, how);
+    for (size_t k = 0; k < 2; ++k) told.arm[k] = haptics->present(k);
+  }
   dt = 1.0 / static_cast<double>(scene.solver.tick_rate);
   checkpoint_every = std::max<uint64_t>(1, static_cast<uint64_t>(std::llround(kBeforeBite / dt)));
   state = initial_state(*model);
@@ -197,6 +218,11 @@ void Live::Work::tick(bool let_in) {
       const uint32_t down = pressed[k].exchange(0, std::memory_order_relaxed);
       ToolInput& hand = input.hand[k];
       hand.buttons = 0;
+      if (told.arm[k]) {
+        hand = hand_toward(hand, haptics->hand(k), kArmSpeed, 10 * options.hand_turn, static_cast<float>(dt));
+        hand.buttons |= down;
+        continue;
+      }
       // Mail from before a jump in time is about tools that were elsewhere: until newer comes the hand stays.
       if (mail.epoch != told.epoch) continue;
       hand = hand_toward(hand, mail.input, options.hand_speed, options.hand_turn, static_cast<float>(dt),
@@ -214,6 +240,7 @@ void Live::Work::tick(bool let_in) {
     StageTimer timer(watch ? &times : nullptr, Stage::publish);
     publish(*model, *state, now);
   }
+  if (haptics && let_in) feel();
   ++result.ticks;
   if (recorder) recorder->tick(input, hash_state(*model, *state));
   if (let_in) {
@@ -249,6 +276,15 @@ void Live::Work::tick(bool let_in) {
   spent_s = spent_s * keep + spent;
   ticks_weight = ticks_weight * keep + 1;
   told.tick_ms = static_cast<float>(1000 * spent_s / ticks_weight);
+}
+
+void Live::Work::feel() {
+  const bool as_paper = options.haptics == "paper";
+  if (as_paper) follow(paper, now, picture);
+  for (size_t k = 0; k < 2; ++k)
+    haptics->publish(k, as_paper ? paper_patch(paper, now, picture, k) : now.patch[k], told.epoch, kLiveSpeeds[speed]);
+  if (now.tick % kNewsTicks != 0 || !options.say) return;
+  for (const std::string& line : haptics->news()) options.say(line);
 }
 
 void Live::Work::show() {
@@ -437,6 +473,7 @@ void Live::Work::run() {
       if (recorder) recorder.reset();
       show();
     }
+  if (haptics) haptics->stop();
   told.fault.swap(result.fault);
   result.practice = told.practice;
   result.map = std::move(map);

@@ -7,6 +7,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -41,6 +42,10 @@ struct LiveOptions {
   float hand_speed = 0.6f;  // [m/s] and
   float hand_turn = 12.0f;  // [rad/s] at most for a tool: a device that jumps (a mouse under a slow picture) tears nothing
   bool start_paused = false;
+  // Haptic arms: "touch", "paper" (the same arms, rendered as in the paper); empty or "off": none. What is missing is told and
+  // the scene opens without. A hand without an arm stays the window's.
+  std::string haptics;
+  std::function<void(const std::string&)> say;  // a line about the arms, from any thread; empty: nobody is told
 };
 
 struct LiveStatus {
@@ -59,6 +64,7 @@ struct LiveStatus {
   // Of the newest tick that was the first to have a motion, on wall_ns(), for latencies: when the motion was read (where the
   // device uses that clock), when the tick began, and when its snapshot was ready to be looked at.
   uint64_t moved_ns = 0, began_ns = 0, ready_ns = 0;
+  std::array<bool, 2> arm{};  // a haptic arm moves that hand
   Practice practice;
   Measures measures;           // filled while watched, see watch()
   std::string doing;           // of the surgeon, when one works

@@ -232,6 +232,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   s.contact_sweeps = scene.solver.contact_sweeps;
   s.damping = scene.solver.damping;
   s.thread_damping = scene.solver.thread_damping;
+  m.hand_compliance = 1 / scene.solver.hand_stiffness;
   s.friction = {scene.solver.friction_tissue, scene.solver.friction_tool, scene.solver.friction_thread};
   ThreadModel& t = s.thread;
   t.first_slot = s.tissue;

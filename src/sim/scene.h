@@ -68,6 +68,7 @@ struct SolverSpec {
   float friction_tissue = 0.3f;  // coefficients of Coulomb friction
   float friction_tool = 0.1f;
   float friction_thread = 0.15f;
+  float hand_stiffness = 3000;  // [N/m] of the coupling between a hand and its tool
 };
 
 // Guided mechanics (paper 2.2, 2.3).

@@ -5,6 +5,7 @@
 
 #include "exchange/event.h"
 #include "exchange/tool_input.h"
+#include "sim/feel.h"
 #include "solver/substep.h"
 #include "suture/suture.h"
 #include "technique/technique.h"
@@ -24,6 +25,7 @@ struct State {
   std::vector<StitchPoint> stitch;
   std::vector<float> stitch_span;
   SolverScratch scratch;
+  Feel feel;  // written by sim/feel, read by publish
 };
 
 }  // namespace catgut

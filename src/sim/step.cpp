@@ -77,9 +77,11 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
     new_suture(solver, state.solver, model.suture, state.suture, model.start, model.needle_start, pressed, state.event);
   }
   find_candidates(solver, state.solver, state.scratch, 0.008f, times);
+  begin_feeling(state);
   for (int i = 1; i <= model.substeps; ++i) {
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));
     substep(solver, state.solver, state.scratch, jobs, times);
+    feel_substep(model, state, i);
     slip(solver, state.solver, model.suture, state.suture, state.event);
     {
       StageTimer timer(times, Stage::puncture);
@@ -99,6 +101,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   for (size_t k = 0; k < 2; ++k)
     if (input.hand[k].connected) state.hand[k] = input.hand[k].pose;
   for (Event& e : state.event) e.tick = state.tick;
+  end_feeling(model, state);
   ++state.tick;
 }
 

@@ -76,11 +76,16 @@ uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tiss
     const float wp = v.inv_mass[c.particle], w = wp + inverse_mass_at(m, b, r, n);
     if (w <= 0) continue;
     const Vec3 slip = moved(v, c.particle) - (on - previous_point(b, r));
-    const Vec3 impulse = (n * depth - friction_step(slip, n, depth, friction)) / w;
+    const Vec3 rub = friction_step(slip, n, depth, friction);
+    const Vec3 impulse = (n * depth - rub) / w;
     add(v.x[c.particle], impulse * wp);
     push(m, b, -impulse, r);
-    (*v.on_body)[c.body].linear -= impulse;
-    (*v.on_body)[c.body].angular -= cross(r, impulse);
+    BodyContact& felt = (*v.on_body)[c.body];
+    felt.linear -= impulse;
+    felt.angular -= cross(r, impulse);
+    felt.pressing -= n * (depth / w);
+    felt.rubbing += rub / w;
+    felt.pressed += depth / w;
   }
   return touching;
 }

@@ -16,6 +16,10 @@ struct Friction {
 // The force of contacts on each body in this substep: positional impulse sums [kg m]; divide by h^2 for newtons.
 struct BodyContact {
   Vec3 linear, angular;
+  // Of `linear`, what tissue does: pressing along the contacts' normals, rubbing across them; and all pressing regardless of
+  // its direction. For who renders friction by himself.
+  Vec3 pressing, rubbing;
+  float pressed = 0;
 };
 
 struct ContactView {  // what a contact kernel needs, gathered once per substep

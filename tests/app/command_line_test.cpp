@@ -16,6 +16,7 @@
 #include <thread>
 #include <vector>
 
+#include "runtime/haptics.h"
 #include "sim/recording.h"
 
 namespace {
@@ -102,7 +103,43 @@ TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
   expect_refused("play small.toml --json nowhere/x.json", "there is no folder nowhere");
   expect_refused("bench paper", "not available yet in this version");
   expect_refused("describe substep", "substeps");
-  expect_refused("devices --test", "no haptic device");
+  expect_refused("devices --test", "no haptic arm");
+  expect_refused("play --haptics spoon", "--haptics");
+}
+
+// Arms come and go with a library that is loaded at run time; here it is the simulated one.
+TEST_F(CommandLine, devices_are_listed_and_pushed) {
+  const Outcome none = run_catgut("devices");
+  EXPECT_EQ(none.code, 0);
+  EXPECT_NE(none.out.find("touch: "), std::string::npos) << "one line says what is missing";
+  setenv("CATGUT_LIBHD", CATGUT_FAKE_LIBHD, 1);
+  const Outcome both = run_catgut("devices");
+  EXPECT_NE(both.out.find("right-0001"), std::string::npos) << both.out;
+  EXPECT_NE(both.out.find("left-0002"), std::string::npos) << both.out;
+  const std::string places = (folder_ / "arms.toml").string();
+  setenv("CATGUT_ARMS", places.c_str(), 1);
+  const Outcome laid = run_catgut("devices --calibrate --scale 0.5 --turn 90");
+  EXPECT_EQ(laid.code, 0) << laid.err;
+  const auto kept = catgut::read_arm_places(places);
+  ASSERT_EQ(kept.size(), 2u);
+  EXPECT_EQ(kept.at("right-0001").scale, 0.5f);
+  // What was held becomes the middle; the arm's x points into the picture once it is turned by 90 degrees.
+  using catgut::Vec3;
+  catgut::ArmInfo arm;
+  arm.serial = "right-0001";
+  const catgut::Workspace w = catgut::workspace_of(arm, 0, {0, 0.1f, 0}, kept);
+  EXPECT_LT(catgut::distance(catgut::to_world(w, {kept.at("right-0001").middle, {}}).p, {0.015f, 0.12f, 0.01f}), 1e-6f);
+  EXPECT_LT(catgut::distance(catgut::rotate(w.turn, Vec3{1, 0, 0}), {0, 0, -1}), 1e-6f);
+  std::ofstream(places) << "[right-0001]\nscale = 50\n";
+  expect_refused("devices --calibrate", "arms.toml:2: scale is no number between");
+  unsetenv("CATGUT_ARMS");
+  setenv("FAKE_HD_FAULT", "flip_x:right:0", 1);
+  const Outcome flipped = run_catgut("devices --test");
+  EXPECT_EQ(flipped.code, 1);
+  EXPECT_NE(flipped.out.find("WRONG WAY when pushed right"), std::string::npos) << flipped.out;
+  EXPECT_NE(flipped.out.find("left arm: "), std::string::npos) << flipped.out;
+  unsetenv("FAKE_HD_FAULT");
+  unsetenv("CATGUT_LIBHD");
 }
 
 TEST_F(CommandLine, faults_in_a_scene_name_its_line) {

@@ -96,6 +96,7 @@ class AtTheWindow : public Desk {
     options.scene = "stay";
     options.teach = teach;
     options.width = 320, options.height = 200;
+    options.seconds = std::max(1.0, std::chrono::duration<double>(until_ - Clock::now()).count());
     options.watch = [&](const WindowLook& now) {
       const std::lock_guard lock(mutex_);
       newest_.seen = now.seen;
@@ -133,6 +134,16 @@ class AtTheWindow : public Desk {
     look_ = newest_;
     look_.dt = std::clamp(passed, 0.02f, 0.25f);
     return !closed_;
+  }
+
+  // No work is seen any more: the window shows another screen.
+  bool stands_still() {
+    std::unique_lock lock(mutex_);
+    for (int i = 0; i < 20 && !closed_; ++i) {
+      const size_t from = pictures_;
+      if (!changed_.wait_for(lock, std::chrono::seconds(3), [&] { return closed_ || pictures_ > from; })) return true;
+    }
+    return false;
   }
 
   PictureModel picture_;
@@ -203,26 +214,31 @@ class SdlPad : public AtTheWindow {
     SDL_UnlockJoysticks();
     return stick_ && see(3);
   }
-  void pull_out() {
+  // The window pauses; true when it did.
+  bool pull_out() {
     SDL_LockJoysticks();
     SDL_JoystickClose(stick_);
     SDL_JoystickDetachVirtual(index_);
     SDL_UnlockJoysticks();
     stick_ = nullptr;
-    see(3);
+    const bool paused = stands_still();
+    press(SDLK_ESCAPE);
+    return see(3) && paused;
   }
   void begin_again() override {
     pad_ = {};
     send(pad_);
     see(3);
-    // There is no button for it: the keyboard has one.
-    SDL_Event e{};
-    e.type = SDL_KEYDOWN;
-    e.key.keysym.sym = SDLK_F5;
-    SDL_PushEvent(&e);
+    press(SDLK_F5);  // there is no button for it
   }
 
  private:
+  static void press(SDL_Keycode key) {
+    SDL_Event e{};
+    e.type = SDL_KEYDOWN;
+    e.key.keysym.sym = key;
+    SDL_PushEvent(&e);
+  }
   void do_it(const Act& act) override {
     if (stick_) send(by_pad(act, look_, pad_));
   }
@@ -346,9 +362,9 @@ TEST_F(StitchAtTheWindow, a_gamepad_that_is_unplugged_loses_nothing) {
     if (!held) return;
     const size_t released = desk.count(EventKind::needle_released);
     const Vec3 at = desk.look().seen.tool[0].pose.p;
-    desk.pull_out();
+    const bool paused = desk.pull_out();
     for (int i = 0; i < 10; ++i) desk.act({});
-    kept = desk.look().seen.tool[0].held == Held::needle && desk.count(EventKind::needle_released) == released &&
+    kept = paused && desk.look().seen.tool[0].held == Held::needle && desk.count(EventKind::needle_released) == released &&
            distance(desk.look().seen.tool[0].pose.p, at) < 0.01f;
     if (!desk.plug_in()) return;
     for (int i = 0; i < 5; ++i) desk.act({});

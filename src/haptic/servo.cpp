@@ -1,0 +1,95 @@
+// haptic/servo: see the header.
+#include "haptic/servo.h"
+
+namespace catgut {
+
+Pose to_world(const Workspace& w, const Pose& arm) {
+  return {w.offset + rotate(w.turn, arm.p) * w.scale, normalized(w.turn * arm.q * w.stylus)};
+}
+Pose to_arm(const Workspace& w, const Pose& world) {
+  return {rotate(conjugate(w.turn), world.p - w.offset) / w.scale,
+          normalized(conjugate(w.turn) * world.q * conjugate(w.stylus))};
+}
+
+void fit_to_arm(ServoOptions& o, const ArmLimits& limits) {
+  const auto known = [](float says, float careful) {
+    return says > 0 && std::isfinite(says) ? std::min(says, careful) : careful;
+  };
+  o.limits.force = known(limits.force, o.limits.force);
+  o.limits.continuous = known(limits.continuous, o.limits.continuous);
+  o.limits.stiffness = known(limits.stiffness, o.limits.stiffness);
+  o.limits.damping = known(limits.damping, o.limits.damping);
+  o.limiter.force = std::min(o.limiter.force, o.limits.force);
+  o.limiter.continuous = std::min(o.limiter.continuous, o.limits.continuous);
+  o.passivity.damping = std::min(o.passivity.damping, o.limits.damping);
+}
+
+ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample, const ForcePatch* fresh, uint64_t now_ns) {
+  ServoOut out;
+  const float gain = o.gain > 0 ? o.gain : o.place.scale;
+  const bool ready = sample.state == ArmState::ready && is_finite(sample.pose.p);
+  if (sample.state == ArmState::ready && !ready) h.limiter.faults |= kNotFinite;
+  float dt = 0.001f;
+  if (h.steps++ > 0) dt = safe_dt(h.limiter, now_ns >= h.last_ns ? 1e-9f * static_cast<float>(now_ns - h.last_ns) : -1.0f);
+  h.last_ns = now_ns;
+
+  // Where the hand is. A lost arm leaves the hand where it was; a found one starts from rest.
+  if (ready) {
+    if (!h.any) h.at = sample.pose.p, h.velocity = {};
+    const float keep = std::exp(-2 * kPi * o.velocity_filter * dt);
+    h.velocity = h.velocity * keep + (sample.pose.p - h.at) * ((1 - keep) / dt);
+    h.at = sample.pose.p;
+  } else {
+    h.velocity = {};
+  }
+  h.any = ready;
+
+  const Pose world = to_world(o.place, {h.at, sample.pose.q});
+  const Vec3 velocity = rotate(o.place.turn, h.velocity) * o.place.scale;
+  if (fresh) {
+    ForcePatch patch = *fresh;
+    // What the motors render is gain * scale times what is stiff in the field.
+    const float most = 1 / std::max(1e-6f, gain * o.place.scale);
+    if (!make_safe(patch, o.limits.force / std::max(1e-6f, gain), o.limits.stiffness * most, o.limits.damping * most))
+      h.limiter.faults |= kBadModel;
+    if (h.has_patch && patch.epoch != h.epoch) disengage(h.limiter);
+    h.epoch = patch.epoch;
+    h.has_patch = true;
+    receive(h.model, patch, o.model);
+  }
+  LimiterInput in;
+  if (h.has_patch) {
+    const Vec3 f = evaluate(h.model, world.p, velocity, dt, o.model);
+    in.wanted = rotate(conjugate(o.place.turn), f) * gain;
+    in.cap = h.model.now.cap * gain;
+    in.expiry = h.model.now.expiry;
+    const uint64_t made = h.model.now.time_ns;
+    if (made > now_ns + 5000000) h.limiter.faults |= kTimeBack;
+    in.age = made < now_ns ? 1e-9f * static_cast<float>(now_ns - made) : 0;
+  } else {
+    in.age = -1;
+  }
+  in.speed = length(h.velocity);
+  in.warmth = sample.warmth;
+  in.ready = ready && !sample.forced_off && o.force;
+  const Vec3 allowed = limit(h.limiter, in, dt, o.limiter);
+  PassivityOptions net = o.passivity;
+  if (h.limiter.engaged == Engaged::no || h.limiter.engaged == Engaged::waiting) net.damping = 0;  // off is off
+  out.force = keep_passive(h.passivity, h.at, h.velocity, allowed, o.limiter.force, dt, net);
+  if (h.passivity.braking) h.limiter.faults |= kGenerated;
+
+  const uint32_t down = sample.buttons & ~h.buttons;
+  h.buttons = ready ? sample.buttons : 0;
+  if (o.ratchet) h.closed ^= (down & 1) != 0;
+  else if (ready) h.closed = (sample.buttons & 1) != 0;
+  out.hand.pose = world;
+  out.hand.velocity = velocity;
+  out.hand.jaw = h.closed ? 0.0f : 1.0f;
+  out.hand.buttons = sample.buttons & 2 ? kButtonCut : 0;
+  out.hand.time_ns = now_ns;
+  out.hand.sequence = ++h.sequence;
+  out.hand.connected = ready;
+  return out;
+}
+
+}  // namespace catgut

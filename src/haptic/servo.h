@@ -1,0 +1,65 @@
+// haptic: one millisecond of one hand. Reads an ArmSample and, when there is one, a newer ForcePatch; writes the force for the
+// motors and the whole pose for the simulation. Nothing here waits, allocates, logs or reads a clock: it runs in the callback
+// of the arm's driver. Research notes 2.4 to 2.7.
+#pragma once
+#include <cstdint>
+
+#include "exchange/arm.h"
+#include "exchange/force_patch.h"
+#include "exchange/tool_input.h"
+#include "haptic/force_model.h"
+#include "haptic/limiter.h"
+#include "haptic/passivity.h"
+
+namespace catgut {
+
+// Where an arm's workspace lies in the field: world = offset + scale * turn(arm). What `catgut devices --calibrate` finds.
+struct Workspace {
+  float scale = 1;
+  Quat turn;    // of the arm's axes
+  Vec3 offset;  // [m] world: where the arm's origin lies
+  Quat stylus;  // of the tool in the stylus: identity, -z of both is the way they point
+};
+Pose to_world(const Workspace& w, const Pose& arm);
+Pose to_arm(const Workspace& w, const Pose& world);
+
+struct ServoOptions {
+  ArmLimits limits;
+  Workspace place;
+  LimiterOptions limiter;
+  PassivityOptions passivity;
+  ForceModelOptions model;
+  // Newtons at the motors per newton in the field; 0: the workspace's scale, which neither makes nor loses energy.
+  float gain = 0;
+  float velocity_filter = 50;  // [Hz] first-order, for damping (notes 2.2: 30 to 80)
+  bool ratchet = true;         // the button nearest to the tip closes the jaw and, pressed again, opens it; else it is held
+  bool force = true;           // false: the arm moves the tool and feels nothing
+};
+// Limits of the chain from those of the arm, the smaller of what is known and what is asked for.
+void fit_to_arm(ServoOptions& options, const ArmLimits& limits);
+
+struct ServoHand {
+  ForceModel model;
+  Limiter limiter;
+  Passivity passivity;
+  Vec3 at, velocity;     // [m], [m/s] arm frame, filtered
+  uint64_t last_ns = 0;  // of the last step
+  uint32_t epoch = 0;
+  bool any = false;  // there was a sample
+  bool has_patch = false;
+  uint32_t buttons = 0;
+  bool closed = false;
+  uint32_t sequence = 0;
+  uint64_t steps = 0;
+};
+
+struct ServoOut {
+  Vec3 force;      // [N] arm frame
+  ToolInput hand;  // world; connected 0 while the arm is lost
+};
+
+// fresh: null when the physics has published nothing since. now_ns: the clock that stamps ForcePatch::time_ns.
+ServoOut servo_step(ServoHand& hand, const ServoOptions& options, const ArmSample& sample, const ForcePatch* fresh,
+                    uint64_t now_ns);
+
+}  // namespace catgut

@@ -1,0 +1,45 @@
+// haptic: the comparison of research notes 2.5, with the code that drives the arms. One dimension: a hand presses a wall of
+// tissue, holds, and lets go, on an arm, while a slow simulation computes the tissue. Who renders what in between decides
+// whether the hand feels tissue or a machine gun. `catgut bench haptics` prints it, tests/haptic holds it to its claims.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "haptic/servo.h"
+
+namespace catgut {
+
+enum class Rendering : uint8_t {
+  reference,       // tissue and coupling worked out at 1 kHz, no delay
+  held_force,      // the force of the last frame, held (what the paper's system does)
+  held_and_net,    // the same with the energy controller
+  coupling,        // a spring at 1 kHz to the tool's place in the last frame
+  coupling_blend,  // to its place blended between the last two frames
+  local_model,     // ForcePatch
+};
+const char* rendering_name(Rendering r);
+
+struct StudyCase {
+  Rendering rendering{};
+  float tissue = 1100, coupling = 400;  // [N/m]
+  float rate = 60;                      // [1/s] of the physics
+  float hardening = 0;                  // [N/m^2] a2 of f = a1 z + a2 z^2; 0: linear tissue
+  float mass = 0.1f, viscous = 0.5f;    // [kg], [N s/m] arm and finger
+  float grip = 150, grip_damping = 2;   // [N/m], [N s/m] hand
+};
+struct StudyRow {
+  float force_error = 0;   // [N] RMS against the reference moving the same way
+  float hold_swing = 0;    // [m] peak to peak while the hand means to hold still
+  float largest_step = 0;  // [N] from one millisecond to the next
+  float energy = 0;        // [J] the largest energy given to the hand
+};
+StudyRow run_study(const StudyCase& c);
+
+// The rows of notes 2.5 with what is written there, for comparison. hold_swing [m], energy [J].
+struct StudyPublished {
+  StudyCase c;
+  StudyRow notes;
+};
+std::vector<StudyPublished> published_study();
+
+}  // namespace catgut

@@ -1,0 +1,81 @@
+// procedure/arm_places: see the header.
+#include "procedure/arm_places.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "core/check.h"
+#include "procedure/toml.h"
+
+namespace catgut {
+namespace {
+
+float number(const toml::table& t, const char* key, float otherwise, float least, float most, const std::string& where) {
+  const toml::node* node = t.get(key);
+  if (!node) return otherwise;
+  const std::optional<double> value = node->value<double>();
+  const std::string line = where + ":" + std::to_string(node->source().begin.line);
+  if (!value || !(*value >= double{least} && *value <= double{most}))
+    throw InputError(line, std::string(key) + " is no number between " + fmt::format("{} and {}", least, most),
+                     "put it right, or calibrate anew: catgut devices --calibrate");
+  return static_cast<float>(*value);
+}
+
+}  // namespace
+
+std::string arm_places_file() {
+  const auto get = [](const char* name) {
+    const char* s = std::getenv(name);
+    return std::string(s ? s : "");
+  };
+  if (const std::string set = get("CATGUT_ARMS"); !set.empty()) return set;
+  const std::string config = get("XDG_CONFIG_HOME");
+  return (config.empty() ? get("HOME") + "/.config" : config) + "/catgut/arms.toml";
+}
+
+std::map<std::string, ArmPlace> read_arm_places(const std::string& path) {
+  std::map<std::string, ArmPlace> places;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return places;
+  toml::table file;
+  try {
+    file = toml::parse_file(path);
+  } catch (const toml::parse_error& e) {
+    throw InputError(path + ":" + std::to_string(e.source().begin.line), std::string(e.description()),
+                     "put it right, or remove the file and calibrate anew: catgut devices --calibrate");
+  }
+  for (const auto& [serial, node] : file) {
+    const toml::table* t = node.as_table();
+    if (!t) continue;
+    ArmPlace p;
+    p.scale = number(*t, "scale", p.scale, 0.1f, 3, path);
+    p.turn = number(*t, "turn", p.turn, -180, 180, path);
+    p.middle.x = number(*t, "x", 0, -0.5f, 0.5f, path);
+    p.middle.y = number(*t, "y", 0, -0.5f, 0.5f, path);
+    p.middle.z = number(*t, "z", 0, -0.5f, 0.5f, path);
+    places[std::string(serial.str())] = p;
+  }
+  return places;
+}
+
+void write_arm_places(const std::string& path, const std::map<std::string, ArmPlace>& places) {
+  std::error_code error;
+  std::filesystem::create_directories(std::filesystem::path(path).parent_path(), error);
+  toml::table file;
+  for (const auto& [serial, p] : places)
+    file.insert_or_assign(
+        serial, toml::table{{"scale", p.scale}, {"turn", p.turn}, {"x", p.middle.x}, {"y", p.middle.y}, {"z", p.middle.z}});
+  std::ofstream out(path);
+  out << "# Where each haptic arm lies in the field, by serial number; catgut devices --calibrate writes this.\n"
+         "# scale: metres in the field per metre of the stylus; turn [degrees]; x, y, z [m]: what of the arm is the middle of "
+         "the field.\n"
+      << file << "\n";
+  out.close();
+  if (!out) throw InputError(path, "cannot be written", "set CATGUT_ARMS to another place");
+}
+
+}  // namespace catgut

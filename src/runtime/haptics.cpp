@@ -1,0 +1,190 @@
+// runtime/haptics: see the header. Below, Side's members say which of the threads may touch them.
+#include "runtime/haptics.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <thread>
+
+#include "core/check.h"
+#include "device/touch.h"
+#include "exchange/latest.h"
+#include "runtime/live.h"
+
+namespace catgut {
+namespace {
+
+constexpr uint64_t kLost = 20000000;  // [ns] without a sample: the arm is lost (research notes 2.7)
+
+const char* word_of(uint32_t fault) {
+  switch (fault) {
+    case kNotFinite:
+      return "a force or position was no number";
+    case kTooMuch:
+      return "a force far beyond the arm's was asked for; it was not given";
+    case kBadModel:
+      return "a patch of the simulation was unusable";
+    case kTimeBack:
+      return "its clock stood still, ran backwards or leapt";
+    case kTooFast:
+      return "it was moved faster than 1 m/s; force is off until it is quiet";
+    case kExpired:
+      return "the simulation did not answer in time; force is off until the hand lets go";
+    case kGenerated:
+      return "the energy net had to brake";
+    case kTooWarm:
+      return "its motors need rest; force is turned down";
+    default:
+      return "";
+  }
+}
+
+struct Side {
+  Latest<ForcePatch> patch;         // physics -> servo
+  Latest<ToolInput> hand;           // servo -> physics
+  std::atomic<uint32_t> faults{0};  // servo -> physics
+  // The servo's.
+  ServoHand servo;
+  ServoOptions options;  // constant once it runs
+  ServoTimes times;
+  uint64_t last_ns = 0;
+  // The physics'.
+  uint32_t told = 0, told_errors = 0;
+  bool was_ready = true;
+};
+
+void count(std::array<uint64_t, 512>& counts, uint64_t ns) { ++counts[std::min<uint64_t>(511, ns / 10000)]; }
+
+}  // namespace
+
+struct Haptics::Work {
+  ArmPort port;
+  std::array<Side, 2> side;
+  uint64_t (*clock)() = wall_ns;
+
+  static Vec3 step(void* user, size_t arm, const ArmSample& sample) {
+    Work& w = *static_cast<Work*>(user);
+    Side& s = w.side[arm];
+    const uint64_t now = w.clock();
+    const bool fresh = s.patch.update();
+    const ServoOut out = servo_step(s.servo, s.options, sample, fresh ? &s.patch.seen() : nullptr, now);
+    s.hand.draft() = out.hand;
+    s.hand.publish();
+    s.faults.fetch_or(s.servo.limiter.faults, std::memory_order_relaxed);
+    s.servo.limiter.faults = 0;
+    if (s.last_ns > 0) count(s.times.period, now - s.last_ns);
+    s.last_ns = now;
+    count(s.times.work, w.clock() - now);
+    ++s.times.steps;
+    return out.force;
+  }
+};
+
+void prepare_for_arms(SceneSpec& scene) {
+  scene.solver.hand_stiffness = std::min(scene.solver.hand_stiffness, kHapticStiffness);
+  if (scene.solver.substeps % kHapticParts != 0) return;
+  scene.solver.tick_rate *= kHapticParts;
+  scene.solver.substeps /= kHapticParts;
+}
+
+double quantile_us(const std::array<uint64_t, 512>& counts, double part) {
+  uint64_t all = 0, below = 0;
+  for (const uint64_t c : counts) all += c;
+  for (size_t k = 0; k < counts.size(); ++k) {
+    below += counts[k];
+    if (static_cast<double>(below) >= part * static_cast<double>(all)) return 10.0 * static_cast<double>(k + 1);
+  }
+  return 0;
+}
+
+Workspace workspace_of(const ArmInfo& arm, size_t k, Vec3 focus, const std::map<std::string, ArmPlace>& places) {
+  ArmPlace place;
+  place.middle = 0.5f * (arm.least + arm.most);
+  if (const auto found = places.find(arm.serial); found != places.end()) place = found->second;
+  Workspace w;
+  w.scale = place.scale;
+  w.turn = axis_angle({0, 1, 0}, place.turn * kPi / 180);
+  // The hands side by side, a little above the field.
+  w.offset = focus + Vec3{k == 0 ? 0.015f : -0.015f, 0.02f, 0.01f} - rotate(w.turn, place.middle) * w.scale;
+  return w;
+}
+
+Haptics::Haptics(ArmPort port, const PictureModel& picture, const HapticsOptions& options) : work_(std::make_unique<Work>()) {
+  work_->port = std::move(port);
+  if (options.clock) work_->clock = options.clock;
+  for (size_t k = 0; k < 2; ++k) {
+    ServoOptions& o = work_->side[k].options;
+    const ArmInfo& arm = work_->port.arm[k];
+    fit_to_arm(o, arm.limits);
+    o.ratchet = options.ratchet;
+    o.force = options.force;
+    o.place = workspace_of(arm, k, picture.focus, options.place);
+    ToolInput& nobody = work_->side[k].hand.draft();
+    nobody.connected = 0;
+    work_->side[k].hand.publish();
+  }
+  std::string why;
+  if (work_->port.any() && !work_->port.start(work_->port.self, {Work::step, work_.get()}, why))
+    throw InputError(work_->port.kind, why, "close other programs that use the arms, or go on without: --haptics off");
+}
+
+Haptics::~Haptics() { stop(); }
+
+bool Haptics::present(size_t k) const { return work_->port.arm[k].present; }
+const ServoOptions& Haptics::servo(size_t k) const { return work_->side[k].options; }
+
+void Haptics::publish(size_t k, const ForcePatch& patch, uint32_t epoch, float speed) {
+  ForcePatch& p = work_->side[k].patch.draft();
+  p = patch;
+  p.time_ns = work_->clock();
+  p.epoch = epoch;
+  p.period = patch.period / speed;
+  p.expiry = std::max(patch.expiry, 2 * p.period);
+  work_->side[k].patch.publish();
+}
+
+ToolInput Haptics::hand(size_t k) {
+  Side& s = work_->side[k];
+  s.hand.update();
+  ToolInput hand = s.hand.seen();
+  const uint64_t now = work_->clock();
+  if (!present(k) || hand.time_ns + kLost < now) hand.connected = 0;
+  return hand;
+}
+
+std::vector<std::string> Haptics::news() {
+  std::vector<std::string> lines;
+  for (size_t k = 0; k < 2; ++k) {
+    if (!present(k)) continue;
+    Side& s = work_->side[k];
+    const std::string who = std::string(k == 0 ? "right arm: " : "left arm: ");
+    const uint32_t fresh = s.faults.exchange(0, std::memory_order_relaxed) & ~s.told;
+    s.told |= fresh;
+    for (uint32_t bit = 1; bit != 0 && bit <= fresh; bit <<= 1)
+      if (fresh & bit) lines.push_back(who + word_of(bit));
+    const ArmStatus status = work_->port.status(work_->port.self, k);
+    if (status.steps > 0 && status.ready != s.was_ready) {
+      lines.push_back(who + (status.ready ? "it is back"
+                                          : "lost: " + work_->port.error_text(work_->port.self, status.error) +
+                                                "; its tool stays where it is, the other hand goes on"));
+      s.was_ready = status.ready;
+    } else if (status.ready && status.errors > 0 && s.told_errors == 0) {
+      s.told_errors = status.errors;
+      lines.push_back(who + work_->port.error_text(work_->port.self, status.error));
+    }
+  }
+  return lines;
+}
+
+ServoTimes Haptics::times(size_t k) const { return work_->side[k].times; }
+
+void Haptics::stop() {
+  if (work_->port.self) work_->port.stop(work_->port.self);
+}
+
+ArmPort open_arms(const std::string& kind, std::vector<std::string>& told) {
+  if (kind == "touch" || kind == "paper") return open_touch({}, told);
+  throw InputError("--haptics " + kind, "there is no such device", "use touch, paper or off");
+}
+
+}  // namespace catgut

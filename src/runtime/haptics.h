@@ -1,0 +1,74 @@
+// runtime: two haptic arms in a run. Ties the driver (device/arm), the servo (haptic/servo) and the physics together: the
+// servo's millisecond runs in the driver's thread, the physics publishes a patch a tick and takes the newest poses, and they
+// meet at exchange/latest alone: no lock, no allocation and no logging on the servo's side. What went wrong there is a bit or a
+// number, and becomes a line here, told once.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "device/arm.h"
+#include "exchange/force_patch.h"
+#include "exchange/picture.h"
+#include "exchange/tool_input.h"
+#include "haptic/servo.h"
+#include "procedure/arm_places.h"
+#include "sim/scene.h"
+
+namespace catgut {
+
+// Physics under arms: more ticks with fewer substeps each (of the same length), and the coupling that an arm can render.
+constexpr int kHapticParts = 4;          // ticks in the time of one of the scene's, where its substeps can be shared out
+constexpr float kHapticStiffness = 300;  // [N/m] between hand and tool (notes 5: 300, at most 400 on a Touch)
+void prepare_for_arms(SceneSpec& scene);
+
+struct HapticsOptions {
+  uint64_t (*clock)() = nullptr;  // null: wall_ns(); tests hand in their own
+  bool ratchet = true;            // the stylus' first button closes the jaw and, pressed again, opens it; else it is held
+  bool force = true;              // false: arms move tools and feel nothing
+  std::map<std::string, ArmPlace> place;  // by serial number; an arm that is not in it: the middle of its workspace, 1:1
+};
+// Where the workspace of arm k lies in a scene whose field has its middle at `focus` [m].
+Workspace workspace_of(const ArmInfo& arm, size_t k, Vec3 focus, const std::map<std::string, ArmPlace>& places);
+
+// How regularly the servo of one arm ran, in [us]: counts per 10 us, the last one for all that is longer.
+struct ServoTimes {
+  std::array<uint64_t, 512> period{}, work{};
+  uint64_t steps = 0;
+};
+// [us] below which `part` (0..1) of the counts lie.
+double quantile_us(const std::array<uint64_t, 512>& counts, double part);
+
+class Haptics {
+ public:
+  // Takes the port over and starts its servo. `focus` [m] is where the workspaces' middle goes.
+  Haptics(ArmPort port, const PictureModel& picture, const HapticsOptions& options);
+  ~Haptics();
+  Haptics(const Haptics&) = delete;
+  Haptics& operator=(const Haptics&) = delete;
+
+  bool present(size_t k) const;
+  const ServoOptions& servo(size_t k) const;
+
+  // Of the thread that runs the physics.
+  void publish(size_t k, const ForcePatch& patch, uint32_t epoch, float speed);  // speed: of real time
+  ToolInput hand(size_t k);  // the newest; not connected when no sample came for 20 ms
+  // What happened to arms and servo since the last call, a line each.
+  std::vector<std::string> news();
+
+  ServoTimes times(size_t k) const;  // valid after stop()
+  void stop();                       // force off, no more callbacks
+
+ private:
+  struct Work;
+  std::unique_ptr<Work> work_;
+};
+
+// "touch" -> its driver. Throws InputError for a word that is none.
+ArmPort open_arms(const std::string& kind, std::vector<std::string>& told);
+
+}  // namespace catgut

@@ -1,0 +1,282 @@
+// sim/feel: see the header. Research notes 2.4; numbers of the tissue and the needle from 3.1 and 3.4.
+#include "sim/feel.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/model.h"
+#include "sim/state.h"
+#include "suture/forces.h"
+
+namespace catgut {
+namespace {
+
+// The last quarter of a tick's substeps: enough for contacts that come and go between two of them, and young.
+constexpr int kLastPart = 4;
+// [N/m] before anything has been learned: what the generated bowel answers a blunt tool with (60 to 120, tests/sim/feel_test),
+// and tissue that is held in its plane (closed form of notes 3.4: 800 to 1400; half of that near a free edge).
+constexpr float kBlunt = 100, kTissue = 600;
+constexpr float kForget = 0.06f;    // [s] after which what was learned counts for a third
+constexpr float kTrust = 0.0001f;   // [m] of motion that weighs as much as the value above
+constexpr float kNothing = 0.005f;  // [N] less than this is not felt
+constexpr float kLook = 0.008f;     // [m] how far ahead the next contact is looked for; the broad phase's margin
+
+Vec3 thread_on_tool(const SolverState& s, const ThreadHold& hold, const SolverModel& m) {
+  const auto node = std::find(s.thread.order.begin(), s.thread.order.end(), hold.slot);
+  if (node == s.thread.order.end()) return {};
+  const size_t i = static_cast<size_t>(node - s.thread.order.begin());
+  const auto place = [&](size_t at) { return thread_position(s.thread, at, s.x.data(), s.body); };
+  Vec3 force;
+  (void)m;
+  if (i > 0) force += normalized(place(i - 1) - place(i)) * s.thread.tension[i - 1];
+  if (i < s.thread.tension.size()) force += normalized(place(i + 1) - place(i)) * s.thread.tension[i];
+  return force;
+}
+
+Sym3 across(Vec3 n, float k) { return identity(k) + outer(n, -k); }
+constexpr float series(float a, float b) { return a * b / (a + b); }
+
+// What the wall does to a needle that goes through it (suture/forces), at its tip now.
+NeedleResistance resistance_now(const Model& model, const State& state, float tension) {
+  const SolverModel& m = model.solver;
+  const SolverState& s = state.solver;
+  const RigidBody& needle = s.body[kNeedle];
+  const SutureState& suture = state.suture;
+  const NeedleArc& arc = m.needle_arc;
+  const auto along = [&](const BiteEnd& end) {
+    return arc.radius * arc.nearest(to_local(needle.pose(), position_of(end.point, s.x.data())));
+  };
+  const float tip_at = arc.radius * arc.arc;
+  float embedded = 0, indented = -1, to_exit = -1;
+  for (const OpenBite& open : suture.open) {
+    const Bite& bite = suture.bite[open.bite];
+    const float from = open.phase == NeedlePhase::back_in ? 0 : along(bite.entry),
+                to = bite.has_exit ? along(bite.exit) : tip_at;
+    embedded += std::max(0.0f, to - from);
+  }
+  const bool tip_in = phase_of(suture) == NeedlePhase::tip_in;
+  if (tip_in && suture.attached) {
+    for (const Attachment& a : s.attach)
+      if (a.body == static_cast<int>(kNeedle)) indented = distance(transform(needle.pose(), a.target), suture.attached_from);
+  } else if (tip_in) {
+    SurfaceHit hit;
+    const Vec3 heading = rotate(needle.q, arc.tangent(arc.arc));
+    // Only on its way out: close to the surface that it went in by, the tip points the other way.
+    if (nearest_surface(m, state.scratch.candidates, s.x.data(), needle_tip(arc, needle), kLook, hit) &&
+        dot(heading, hit.normal) > 0.2f)
+      to_exit = std::max(0.0f, -hit.distance);
+  }
+  return needle_resistance(indented, model.suture.release_distance, to_exit, embedded, tip_in, tension);
+}
+
+}  // namespace
+
+void begin_feeling(State& state) {
+  for (ToolReaction& t : state.feel.tool) t = {};
+}
+
+void feel_substep(const Model& model, State& state, int i) {
+  const int first = model.substeps - std::max(1, model.substeps / kLastPart) + 1;
+  if (i < first) return;
+  const SolverModel& m = model.solver;
+  const SolverState& s = state.solver;
+  const float inv_h2 = 1 / (m.h * m.h);
+  for (size_t k = 0; k < 2; ++k) {
+    ToolReaction& t = state.feel.tool[k];
+    const int body = static_cast<int>(k);
+    const BodyContact& on = state.scratch.on_body[k];
+    t.pressing += on.pressing * inv_h2;
+    t.rubbing += on.rubbing * inv_h2;
+    t.pressed += on.pressed * inv_h2;
+    t.thread += (on.linear - on.pressing - on.rubbing) * inv_h2;
+    for (const ThreadHold& h : s.thread.hold)
+      if (h.body == body) t.thread += thread_on_tool(s, h, m);
+    for (const Attachment& a : s.attach)
+      if (a.body == body) t.held += a.lambda * -inv_h2;
+    bool has_needle = false;
+    for (const Weld& w : s.weld)
+      if (w.a == static_cast<int>(kNeedle) && w.b == body) t.needle += w.lambda * -inv_h2, has_needle = true;
+    if (has_needle) {
+      const RigidBody& needle = s.body[kNeedle];
+      for (const ChannelPoint& c : s.channel) {
+        const Vec3 way = rotate(
+            needle.q, m.needle_arc.tangent(m.needle_arc.nearest(to_local(needle.pose(), position_of(c.point, s.x.data())))));
+        t.drag += way * (-c.drag_lambda * inv_h2);  // the channel's push on the tissue, turned round: on the needle
+      }
+    }
+    t.hand += s.weld[k].lambda * -inv_h2;
+    t.at += s.weld[k].target.p;
+    t.substeps += 1;
+  }
+}
+
+namespace {
+
+Vec3 load_of(const ToolReaction& t) {
+  return t.substeps > 0 ? (t.pressing + t.thread + t.held + t.needle - t.drag) / t.substeps : Vec3{};
+}
+
+void learn(FeltStiffness& f, const ToolReaction& t, uint32_t topology, float dt) {
+  const float keep = std::exp(-dt / kForget);
+  const Vec3 force = load_of(t), point = t.substeps > 0 ? t.at / t.substeps : f.point;
+  const bool loaded = length(force) > kNothing;
+  if (topology != f.topology || !loaded) {
+    f.work = f.travel = 0;
+  } else if (f.loaded) {
+    Vec3 dx = point - f.point, df = force - f.force;
+    if (length2(t.pressing) > 0 && length2(t.held) + length2(t.needle) + length2(t.thread) == 0) {
+      const Vec3 n = normalized(force);  // a surface is stiff along its normal alone
+      dx = n * dot(dx, n), df = n * dot(df, n);
+    }
+    f.work = keep * f.work - dot(df, dx);
+    f.travel = keep * f.travel + length2(dx);
+  }
+  f.point = point, f.force = force, f.topology = topology, f.loaded = loaded;
+}
+
+// [N/m] as the hand feels it, `before` it has been felt.
+float learned(const FeltStiffness& f, float before, float coupling) {
+  return std::clamp((f.work + before * kTrust * kTrust) / (f.travel + kTrust * kTrust), 0.0f, coupling);
+}
+
+}  // namespace
+
+void end_feeling(const Model& model, State& state) {
+  for (const Event& e : state.event) {
+    std::array<bool, 2> felt{};
+    switch (e.kind) {
+      case EventKind::needle_grasped:
+      case EventKind::needle_released:
+      case EventKind::thread_grasped:
+      case EventKind::thread_released:
+      case EventKind::tissue_grasped:
+      case EventKind::tissue_released:
+      case EventKind::loop_formed:
+      case EventKind::loop_released:
+        felt[e.who & 1] = true;
+        break;
+      case EventKind::tip_entered:
+      case EventKind::particle_released:
+      case EventKind::tip_exited:
+      case EventKind::bite_cancelled:
+        for (size_t k = 0; k < 2; ++k) felt[k] = state.suture.hand[k].held == Held::needle;
+        break;
+      case EventKind::thread_cut:
+      case EventKind::suture_taken:
+        felt = {true, true};
+        break;
+      default:
+        break;
+    }
+    for (size_t k = 0; k < 2; ++k) state.feel.topology[k] += felt[k];
+  }
+  for (size_t k = 0; k < 2; ++k) learn(state.feel.stiffness[k], state.feel.tool[k], state.feel.topology[k], model.dt);
+}
+
+ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
+  const SolverModel& m = model.solver;
+  const SolverState& s = state.solver;
+  const HandState& hand = state.suture.hand[k];
+  const ToolReaction& sum = state.feel.tool[k];
+  const float part = sum.substeps > 0 ? 1 / sum.substeps : 0, coupling = 1 / model.hand_compliance;
+  ForcePatch p;
+  p.tick = state.tick;
+  p.topology = state.feel.topology[k];
+  p.period = model.dt;
+  p.expiry = std::max(p.expiry, 2 * model.dt);  // notes 2.7: two periods are normal
+  p.point = sum.substeps > 0 ? sum.at * part : state.hand[k].p;
+  if (!s.body_collides[k]) return p;  // no hand there
+
+  const Vec3 pressing = sum.pressing * part, thread = sum.thread * part, held = sum.held * part,
+             needle = (sum.needle - sum.drag) * part;
+  if (length(thread) > kNothing) p.thread_direction = normalized(thread), p.thread_tension = length(thread);
+
+  // How stiff the tool stands: what each load path would answer a millimetre with.
+  Sym3 stiff;
+  bool both_ways = false;
+  if (hand.held == Held::tissue) {
+    stiff += identity(series(kTissue, 1 / model.suture.tissue_compliance));
+    both_ways = true;
+  }
+  if (hand.held == Held::needle && (!s.channel.empty() || length(needle) > 20 * kNothing)) {
+    const RigidBody& body = s.body[kNeedle];
+    for (const ChannelPoint& c : s.channel) {
+      const Vec3 way =
+          rotate(body.q, m.needle_arc.tangent(m.needle_arc.nearest(to_local(body.pose(), position_of(c.point, s.x.data())))));
+      stiff += across(way, series(kTissue, 1 / std::max(1e-6f, c.compliance)));
+    }
+    if (state.suture.attached) stiff += identity(series(kTissue, 1 / std::max(1e-6f, model.suture.attach_compliance)));
+    if (s.channel.empty()) stiff += outer(normalized(needle), kTissue);  // its shaft lies against something
+    both_ways = true;
+    p.along = rotate(body.q, m.needle_arc.tangent(hand.at * m.needle_arc.arc));
+  }
+  if (length(thread) > 4 * kNothing) {
+    // Taut thread is as stiff as the tissue it hangs on, along itself, unless it slides there.
+    const bool slides =
+        std::any_of(s.thread.anchor.begin(), s.thread.anchor.end(), [](const ThreadAnchor& a) { return a.slipping != 0; });
+    if (!slides) stiff += outer(normalized(thread), kTissue);
+    both_ways = true;
+  }
+
+  p.force = pressing + thread + held + needle;
+  const FeltStiffness& felt = state.feel.stiffness[k];
+  if (both_ways) {
+    if (length(pressing) > kNothing) stiff += outer(normalized(pressing), kBlunt);
+    p.stiffness = in_series(stiff, coupling);
+    // The directions are those of what holds the tool; how stiff they are is what the hand has found.
+    const float guess = (p.stiffness.xx + p.stiffness.yy + p.stiffness.zz) / 3;
+    if (guess > 1) p.stiffness = clamp_eigenvalues(p.stiffness * (learned(felt, guess, coupling) / guess), 0, coupling);
+    if (hand.held == Held::needle && !state.suture.open.empty()) {
+      // Across the shaft and in turning it is the solver's reaction; along it what a wall really does, never less than the
+      // solver says.
+      const ToolReaction& other = state.feel.tool[1 - k];
+      const NeedleResistance r = resistance_now(model, state, other.substeps > 0 ? length(other.held) / other.substeps : 0);
+      const float solver = -dot(needle, p.along);
+      if (r.spring > solver) p.force -= p.along * (r.spring - solver);
+      p.stiffness =
+          clamp_eigenvalues(p.stiffness + outer(p.along, series(std::max(1e-3f, r.stiffness), coupling)), 0, coupling);
+      p.drag = r.drag;
+      p.viscous = kShaftViscous;
+      p.presliding = kPresliding;
+      p.pierce = p.along;
+      p.pierce_force = std::max(r.pierce, r.pierce > 0 ? solver : 0);
+      p.pierce_keep = kPunctureKeep;
+    }
+    return p;
+  }
+  const float push = length(pressing);
+  if (push > kNothing) {
+    const Vec3 n = pressing / push;
+    p.normal = n;
+    // Squeezed from several sides the tool is held both ways, and what lifts it off one side presses it on another.
+    if (push < 0.5f * sum.pressed * part) p.normal = {};
+    const float slope = std::max(1.0f, learned(felt, series(kBlunt, coupling), coupling));
+    p.stiffness = length2(p.normal) > 0 ? outer(n, slope) : identity(slope);
+    p.gap = push / slope;
+    p.coefficient = m.friction.tool;
+    p.force = pressing;
+    return p;
+  }
+
+  // Nothing yet: where it would begin. The tool is where the hand is.
+  p.force = {};
+  float nearest = kLook;
+  for (const ToolCandidate& c : state.scratch.candidates.tool) {
+    if (c.body != k) continue;
+    const Capsule& capsule = m.body[c.body].capsule[c.capsule];
+    const Pose pose = s.body[c.body].pose();
+    const Vec3 a = transform(pose, capsule.a), axis = transform(pose, capsule.b) - a, at = xyz(s.x[c.particle]);
+    const float t = std::clamp(dot(at - a, axis) / std::max(length2(axis), 1e-16f), 0.0f, 1.0f);
+    const Vec3 away = a + axis * t - at;
+    const float gap = length(away) - capsule.radius - m.collision.tool_radius;
+    if (gap < nearest) nearest = gap, p.normal = normalized(away);
+  }
+  if (nearest < kLook) {
+    p.point = state.hand[k].p - p.normal * std::max(0.0f, nearest);
+    p.stiffness = outer(p.normal, series(kBlunt, coupling));
+    p.coefficient = m.friction.tool;
+  }
+  return p;
+}
+
+}  // namespace catgut

@@ -1,0 +1,56 @@
+// sim/feel: what each hand feels of a tick, from the solver's own multipliers. Reads State and scratch, writes nothing that is
+// simulated: a run has the same bits whether anybody feels it or not.
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "core/sym3.h"
+#include "exchange/force_patch.h"
+#include "solver/substep.h"
+#include "suture/suture.h"
+
+namespace catgut {
+
+struct Model;
+struct State;
+
+// Forces on one tool, summed over the last substeps of a tick [N]. Not saved: it is gone with the tick.
+struct ToolReaction {
+  Vec3 pressing, rubbing;  // tissue on the tool, along the contacts' normals and across
+  float pressed = 0;       // all pressing, whatever its direction
+  Vec3 thread;             // thread that lies round the tool, is frozen there or is held in the jaws
+  Vec3 held;               // tissue in the jaws
+  Vec3 needle;             // the needle in the jaws, less what rubs along its shaft
+  Vec3 drag;               // that
+  Vec3 hand;               // the weld that couples tool and hand: what all of these balance when nothing speeds up
+  float substeps = 0;      // how many there are in the sum
+  Vec3 at;                 // [m] where the hand was, summed too
+};
+
+// How stiff the tissue is to a hand, learned from what it does: least squares over the last ticks, which forgets. A wall that
+// bends answers ten times softer than one that is pulled in its plane, and no table knows which it is.
+struct FeltStiffness {
+  Vec3 point, force;  // [m], [N] of the tick before
+  uint32_t topology = 0;
+  bool loaded = false;  // there was a force in the tick before
+  float work = 0;       // [N m] sum of -dF . dx
+  float travel = 0;     // [m^2] sum of dx . dx
+};
+
+struct Feel {
+  std::array<ToolReaction, 2> tool;
+  std::array<FeltStiffness, 2> stiffness;
+  // Counts what changes at once for a hand: taken, let go, pierced (ForcePatch::topology).
+  std::array<uint32_t, 2> topology{};
+};
+
+// Once a tick, before its substeps.
+void begin_feeling(State& state);
+// After substep i of the tick's, 1 to model.substeps.
+void feel_substep(const Model& model, State& state, int i);
+// After the tick's last stage: counts what changed at once, learns how stiff things are.
+void end_feeling(const Model& model, State& state);
+// The patch of hand k.
+ForcePatch feel_patch(const Model& model, const State& state, size_t k);
+
+}  // namespace catgut

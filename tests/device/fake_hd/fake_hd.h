@@ -1,0 +1,42 @@
+// tests/device/fake_hd: what a test may ask of the simulated libHD beside its real functions. Loaded by name, like those.
+#pragma once
+
+extern "C" {
+
+enum FakeHdFault {
+  kFakeCommError = 1,   // the arm is off the line: errors, no new pose
+  kFakeWarmMotors = 2,  // the driver cuts the force
+  kFakeStall = 3,       // the whole scheduler stops calling back
+  kFakeNan = 4,         // positions that are no numbers
+  kFakeFlipX = 5,       // the x motor is wired the wrong way round
+  kFakeTooFast = 6,     // HD_EXCEEDED_MAX_VELOCITY
+};
+
+struct FakeHdArm {
+  double position[3], velocity[3];  // [mm], [mm/s]
+  double force[3];                  // [N] that the motors hold now
+  double energy, energy_most;       // [J] into the hand since fakeHdReset or fakeHdZero; its largest value
+  double step_most, force_most;     // [N] from one millisecond to the next; longest force
+  unsigned long ticks;
+  int force_output;  // HD_FORCE_OUTPUT is enabled
+};
+
+// Everything as after loading; the environment is read again:
+//   FAKE_HD_MANUAL=1        no thread: fakeHdStep runs the scheduler
+//   FAKE_HD_MISSING=left    that arm cannot be opened (right, left, or all)
+//   FAKE_HD_UNCALIBRATED=1  arms want their inkwell
+//   FAKE_HD_BUSY=N          N times HD_DEVICE_ALREADY_INITIATED
+//   FAKE_HD_FAULT=kind:arm:from[:to],...   kind: comm_error, warm_motors, stall, nan, flip_x, too_fast; arm: right, left; times
+//   in
+//                           [ms] of scheduler time
+void fakeHdReset(void);
+void fakeHdStep(unsigned milliseconds);
+void fakeHdFault(int arm, int fault, int on);
+// Where the hand means to be [mm], how it holds the stylus (x, y, z, w), which buttons it presses.
+void fakeHdHand(int arm, const double* position, const double* quaternion, int buttons);
+// [N/mm], [N s/mm], [kg] arm and finger together, [N] dry friction.
+void fakeHdGrip(int arm, double stiffness, double damping, double mass, double coulomb);
+void fakeHdPlace(int arm, const double* position);  // at once, at rest
+void fakeHdRead(int arm, FakeHdArm* out);
+void fakeHdZero(int arm);  // its energy and its largest values
+}

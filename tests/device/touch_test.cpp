@@ -1,0 +1,347 @@
+// tests/device: the driver of the Touch against a simulated libHD, through the same dlopen and the same symbols as the real
+// one. H1, H7 and H9 of research notes 2.8; the servo in between is the real one.
+#include "device/touch.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "device/hd_api.h"
+#include "fake_hd/load.h"
+#include "haptic/servo.h"
+
+namespace catgut {
+namespace {
+
+// Both arms on servos of their own, fed with a patch each.
+struct Two {
+  FakeHd fake{true};
+  std::vector<std::string> told;
+  ArmPort port;
+  std::array<ServoHand, 2> hand;
+  std::array<ServoOptions, 2> options;
+  std::array<ForcePatch, 2> patch;
+  std::array<ToolInput, 2> input;
+  std::array<ArmSample, 2> sample;
+  std::array<bool, 2> feed{true, true};
+  std::array<uint64_t, 2> calls{};
+  uint64_t now_ns = 1000000000;
+  int sent = 0;
+
+  static Vec3 step(void* user, size_t arm, const ArmSample& s) {
+    Two& t = *static_cast<Two*>(user);
+    t.sample[arm] = s;
+    ++t.calls[arm];
+    t.patch[arm].time_ns = t.now_ns;
+    const bool fresh = t.feed[arm] && t.sent % 16 == 0;
+    const ServoOut out = servo_step(t.hand[arm], t.options[arm], s, fresh ? &t.patch[arm] : nullptr, t.now_ns);
+    t.input[arm] = out.hand;
+    return out.force;
+  }
+  void open() {
+    port = open_touch({}, told);
+    std::string why;
+    if (port.any()) { ASSERT_TRUE(port.start(port.self, {step, this}, why)) << why; }
+    for (size_t k = 0; k < 2; ++k) fit_to_arm(options[k], port.arm[k].limits);
+  }
+  // [ms]; `each` sees every one of them.
+  template <typename F>
+  void run(int ms, F&& each) {
+    for (int k = 0; k < ms; ++k) {
+      fake.step(1);
+      ++sent;
+      now_ns += 1000000;
+      each(k);
+    }
+  }
+  void run(int ms) {
+    run(ms, [](int) {});
+  }
+  ~Two() { port.reset(); }
+};
+
+ForcePatch constant(Vec3 force) {
+  ForcePatch p;
+  p.period = 0.016f;
+  p.force = force;
+  return p;
+}
+
+// Arms that have engaged without force, then feel a spring that holds them with `force` newtons.
+void engage(Two& t, Vec3 right, Vec3 left) {
+  t.patch = {constant({}), constant({})};
+  t.run(2200);
+  t.patch = {constant(right), constant(left)};
+  t.run(1200);
+}
+
+// H1: every symbol is there, numbers keep their width, the error record comes back whole.
+TEST(Haptics, H1_abi) {
+  FakeHd fake(true);
+  hd::Library hd;
+  size_t found = 0;
+#define CATGUT_FIND(name, result, arguments)                                 \
+  hd.name = reinterpret_cast<decltype(hd.name)>(dlsym(fake.library, #name)); \
+  found += hd.name != nullptr;
+  CATGUT_HD_FUNCTIONS(CATGUT_FIND)
+#undef CATGUT_FIND
+  EXPECT_EQ(found, hd::kFunctions);
+  EXPECT_GE(hd::kFunctions, 30u);
+
+  const hd::Handle right = hd.hdInitDevice("Right Device");
+  ASSERT_NE(right, hd::kNoDevice);
+  hd.hdMakeCurrentDevice(77);  // no such handle
+  const hd::ErrorInfo e = hd.hdGetError();
+  EXPECT_EQ(e.code, 0x0104u);
+  EXPECT_EQ(e.internal, 0x0104 + 1000);
+  EXPECT_EQ(e.device, right);
+  EXPECT_EQ(hd.hdGetError().code, hd::kSuccess);
+  hd.hdMakeCurrentDevice(right);
+  hd::Long encoder[6] = {};
+  hd.hdGetLongv(0x2010, encoder);
+  if (sizeof(hd::Long) == 8) { EXPECT_EQ(encoder[5], (1L << 40) + 5); }
+  hd::Boolean inkwell[4] = {9, 9, 9, 9};
+  hd.hdGetBooleanv(0x2002, inkwell);
+  EXPECT_EQ(inkwell[0], 0);
+  EXPECT_EQ(inkwell[1], 9) << "a boolean is one byte";
+  hd::Int wrong = 0;
+  hd.hdGetIntegerv(0x2002, &wrong);
+  EXPECT_EQ(hd.hdGetError().code, 0x0103u) << "the inkwell is no integer";
+}
+
+TEST(Touch, tells_what_it_found) {
+  Two t;
+  t.open();
+  ASSERT_TRUE(t.port.arm[0].present && t.port.arm[1].present);
+  EXPECT_TRUE(t.told.empty());
+  EXPECT_EQ(t.port.arm[0].serial, "right-0001");
+  EXPECT_EQ(t.port.arm[1].serial, "left-0002");
+  EXPECT_FLOAT_EQ(t.port.arm[1].limits.force, 3.3f);
+  EXPECT_FLOAT_EQ(t.port.arm[1].limits.continuous, 0.88f);
+  EXPECT_FLOAT_EQ(t.port.arm[1].limits.stiffness, 400);
+  EXPECT_FLOAT_EQ(t.port.arm[1].limits.damping, 4);
+  EXPECT_FLOAT_EQ(t.port.arm[0].most.x, 0.08f);
+}
+
+// Positions in metres, the matrix by columns, buttons as bits.
+TEST(Touch, poses_come_whole) {
+  Two t;
+  t.open();
+  const Quat turn = axis_angle(normalized(Vec3{1, 2, -1}), 0.8f);
+  t.fake.put(0, {0.01f, 0.02f, -0.03f});
+  t.fake.wish(0, {0.01f, 0.02f, -0.03f}, turn, 3);
+  t.run(5);
+  EXPECT_LT(distance(t.sample[0].pose.p, {0.01f, 0.02f, -0.03f}), 1e-6f);
+  EXPECT_LT(length(rotation_vector(t.sample[0].pose.q * conjugate(turn))), 1e-5f);
+  EXPECT_EQ(t.sample[0].buttons, 3u);
+  EXPECT_EQ(t.sample[1].buttons, 0u);
+  EXPECT_EQ(t.input[0].jaw, 0.0f);
+  EXPECT_EQ(t.input[0].buttons, kButtonCut);
+}
+
+// H9: two arms, two forces, never the other's.
+TEST(Haptics, H9_forces_are_never_swapped) {
+  Two t;
+  t.open();
+  const Vec3 right{0.3f, 0.1f, 0}, left{0, -0.2f, 0.6f};
+  engage(t, right, left);
+  int bad = 0;
+  t.run(500, [&](int) { bad += distance(t.fake.force(0), right) > 1e-4f || distance(t.fake.force(1), left) > 1e-4f; });
+  EXPECT_EQ(bad, 0);
+}
+
+// H7: an arm is lost at any moment and comes back. Its force is gone and returns through the ramp; the other hand's goes on as
+// if nothing had happened, to the bit.
+TEST(Haptics, H7_an_arm_is_lost_and_comes_back) {
+  for (const int lost : {0, 1}) {
+    SCOPED_TRACE(lost);
+    const int other = 1 - lost;
+    const Vec3 right{0.9f, 0, 0}, left{0, 0.7f, 0};
+    std::vector<Vec3> quiet;
+    for (const bool faulty : {false, true}) {
+      Two t;
+      t.open();
+      engage(t, right, left);
+      t.fake.zero(0), t.fake.zero(1);
+      size_t n = 0;
+      int bad = 0;
+      const auto see = [&](int) {
+        if (!faulty) quiet.push_back(t.fake.force(other));
+        else bad += !(t.fake.force(other) == quiet[n]);
+        ++n;
+      };
+      t.run(50, see);
+      t.fake.fault(lost, kFakeCommError, faulty);
+      t.run(30, see);
+      if (faulty) {
+        EXPECT_EQ(t.input[static_cast<size_t>(lost)].connected, 0u);
+        EXPECT_EQ(length(t.fake.force(lost)), 0);
+        EXPECT_FALSE(t.port.status(t.port.self, static_cast<size_t>(lost)).ready);
+        EXPECT_EQ(t.port.status(t.port.self, static_cast<size_t>(lost)).error, 0x0302u);
+      }
+      t.run(1000, see);
+      t.fake.fault(lost, kFakeCommError, 0);
+      t.run(300, see);
+      if (faulty) {
+        EXPECT_EQ(t.input[static_cast<size_t>(lost)].connected, 1u);
+        EXPECT_LT(length(t.fake.force(lost)), 1e-4f) << "what is wanted is not small: it must not engage";
+        // The hand lets go for a moment; then force comes in over two seconds.
+        t.patch[static_cast<size_t>(lost)] = constant({});
+        t.run(100, see);
+        t.patch[static_cast<size_t>(lost)] = constant(lost == 0 ? right : left);
+        t.run(300, see);
+        const float soon = length(t.fake.force(lost));
+        EXPECT_LT(soon, 0.25f * length(lost == 0 ? right : left));
+        t.run(2500, see);
+        EXPECT_NEAR(length(t.fake.force(lost)), length(lost == 0 ? right : left), 0.08f);
+        EXPECT_LE(t.fake.at(lost).step_most, lost == 0 ? 0.91 : 0.71) << "only the driver's own cut is a step";
+      } else {
+        t.run(2900, see);
+      }
+      EXPECT_EQ(bad, 0) << "the other hand felt it";
+      EXPECT_LE(t.fake.at(other).step_most, 0.5);
+    }
+  }
+}
+
+// Warm motors and a hand that is too fast are no disconnection: the tool still moves, force is off and comes back.
+TEST(Touch, warm_motors) {
+  Two t;
+  t.open();
+  engage(t, {0.9f, 0, 0}, {});
+  t.fake.fault(0, kFakeWarmMotors, 1);
+  t.run(60);
+  EXPECT_EQ(t.input[0].connected, 1u);
+  EXPECT_LT(length(t.fake.force(0)), 1e-4f);
+  EXPECT_EQ(t.port.status(t.port.self, 0).error, 0x0200u);
+  EXPECT_TRUE(t.port.status(t.port.self, 0).ready);
+}
+
+TEST(Touch, positions_that_are_no_numbers) {
+  Two t;
+  t.open();
+  engage(t, {0.9f, 0, 0}, {0, 0.5f, 0});
+  t.fake.fault(0, kFakeNan, 1);
+  t.run(200, [&](int) { ASSERT_TRUE(is_finite(t.fake.force(0))); });
+  EXPECT_EQ(length(t.fake.force(0)), 0);
+  EXPECT_TRUE(is_finite(t.input[0].pose.p));
+  EXPECT_TRUE(t.hand[0].limiter.faults & kNotFinite);
+  EXPECT_NEAR(length(t.fake.force(1)), 0.5f, 1e-3f);
+}
+
+// A motor wired the wrong way round makes a spring into its opposite: the net notices that energy comes out and the force stays
+// within its cap.
+TEST(Touch, a_flipped_axis) {
+  Two t;
+  t.open();
+  ForcePatch spring = constant({});
+  spring.stiffness = identity(300);
+  t.patch = {spring, constant({})};
+  t.run(2500);
+  t.fake.fault(0, kFakeFlipX, 1);
+  t.fake.wish(0, {0.003f, 0, 0});
+  t.run(2000, [&](int) { ASSERT_LE(length(t.fake.force(0)), 3.3f + 1e-4f); });
+  EXPECT_LE(t.fake.at(0).step_most, 0.5 + 1e-4);
+}
+
+// The scheduler itself stops: nothing can be written any more. What the arm does then is its maker's watchdog's; ours is that
+// the steps stop, which whoever feeds the simulation sees.
+TEST(Touch, the_scheduler_stalls) {
+  Two t;
+  t.open();
+  t.run(100);
+  const uint64_t before = t.port.status(t.port.self, 0).steps;
+  t.fake.fault(0, kFakeStall, 1);
+  t.run(50);
+  EXPECT_EQ(t.port.status(t.port.self, 0).steps, before);
+  t.fake.fault(0, kFakeStall, 0);
+  t.run(50);
+  EXPECT_EQ(t.port.status(t.port.self, 0).steps, before + 50);
+}
+
+// Faults by environment, as a person would try them by hand.
+TEST(Touch, faults_by_environment) {
+  Two t;
+  setenv("FAKE_HD_FAULT", "comm_error:left:100:200,warm_motors:right:300:400", 1);
+  t.fake.reset();
+  t.open();
+  t.run(150);
+  EXPECT_EQ(t.input[1].connected, 0u);
+  EXPECT_EQ(t.input[0].connected, 1u);
+  t.run(1000);
+  EXPECT_EQ(t.input[1].connected, 1u);
+  EXPECT_EQ(t.port.status(t.port.self, 0).error, 0x0200u);
+  unsetenv("FAKE_HD_FAULT");
+}
+
+TEST(Touch, one_arm_is_missing) {
+  Two t;
+  setenv("FAKE_HD_MISSING", "left", 1);
+  t.fake.reset();
+  t.open();
+  ASSERT_EQ(t.told.size(), 1u);
+  EXPECT_NE(t.told[0].find("no left arm"), std::string::npos) << t.told[0];
+  EXPECT_TRUE(t.port.arm[0].present);
+  t.run(100);
+  EXPECT_EQ(t.calls[0], 100u);
+  EXPECT_EQ(t.calls[1], 0u);
+}
+
+TEST(Touch, nothing_to_work_with_is_one_line) {
+  FakeHd fake(true);
+  const auto line = [](const char* needle, const TouchOptions& options = {}) {
+    std::vector<std::string> told;
+    const ArmPort port = open_touch(options, told);
+    EXPECT_FALSE(port.any());
+    ASSERT_FALSE(told.empty());
+    EXPECT_NE(told.back().find(needle), std::string::npos) << told.back();
+    EXPECT_EQ(told.back().find('\n'), std::string::npos);
+  };
+  setenv("FAKE_HD_MISSING", "all", 1);
+  fake.reset();
+  line("arm");
+  unsetenv("FAKE_HD_MISSING");
+  setenv("FAKE_HD_UNCALIBRATED", "1", 1);
+  fake.reset();
+  line("inkwell");
+  unsetenv("FAKE_HD_UNCALIBRATED");
+  TouchOptions o;
+  o.library = "/nowhere/libHD.so";
+  line("install OpenHaptics", o);
+  o.library = "libc.so.6";
+  line("has no function hdInitDevice", o);
+}
+
+TEST(Touch, an_arm_left_open_by_a_crash_is_taken_over) {
+  Two t;
+  setenv("FAKE_HD_BUSY", "3", 1);
+  t.fake.reset();
+  t.open();
+  EXPECT_TRUE(t.port.arm[0].present && t.port.arm[1].present);
+}
+
+// Leaving takes the force off by the slew, then switches the motors off.
+TEST(Touch, leaving) {
+  FakeHd fake(false);  // with its own thread, as stop() waits for it
+  std::vector<std::string> told;
+  ArmPort port = open_touch({}, told);
+  ASSERT_TRUE(port.any());
+  std::string why;
+  struct Hold {
+    static Vec3 step(void*, size_t, const ArmSample&) { return {0, 2, 0}; }
+  };
+  ASSERT_TRUE(port.start(port.self, {Hold::step, nullptr}, why)) << why;
+  for (int k = 0; k < 2000 && length(fake.force(1)) < 1; ++k) {
+    timespec nap{0, 1000000};
+    nanosleep(&nap, nullptr);
+  }
+  ASSERT_GT(length(fake.force(0)), 1);
+  fake.zero(0);
+  port.stop(port.self);
+  EXPECT_LE(fake.at(0).step_most, 0.5 + 1e-6);
+  EXPECT_EQ(fake.at(0).force_output, 0);
+  EXPECT_EQ(fake.at(1).force_output, 0);
+}
+
+}  // namespace
+}  // namespace catgut

@@ -1,0 +1,356 @@
+// tests/haptic: the criteria of research notes 2.8 that need no driver, by name, in lock step: H3 passivity, H5 stall, H6
+// garbage, H8 heat, H10 determinism; and the comparison of 2.5.
+#include "haptic/servo.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <limits>
+
+#include "bench_hand.h"
+#include "core/hash.h"
+#include "core/random.h"
+#include "haptic/study.h"
+
+namespace catgut {
+namespace {
+
+constexpr float kPitch = 2 * kPi;
+
+struct Gesture {
+  const char* name;
+  float seconds;
+  BenchTissue tissue;
+  Vec3 (*path)(float);
+  float still_from = 0, still_to = 0;  // [s] the hand means to hold still
+};
+
+std::vector<Gesture> gestures() {
+  BenchTissue wall, needle, held;
+  needle.pierce_force = 0.9f;
+  held.held = true;
+  return {
+      // A heavy hand that hardly grips rings down by itself, at full rate too: what swings a second later is the rendering's.
+      {"press", 3.2f, wall,
+       [](float t) {
+         return Vec3{0, 0.005f - 0.012f * (smooth((t - 0.1f) / 0.4f) - smooth((t - 2.6f) / 0.4f)), 0};
+       },
+       1.6f, 2.6f},
+      {"drag", 2.2f, wall,
+       [](float t) {
+         return Vec3{0.03f * smooth((t - 0.6f) / 0.6f),
+                     0.005f - 0.01f * (smooth((t - 0.1f) / 0.4f) - smooth((t - 1.7f) / 0.4f)), 0};
+       },
+       1.45f, 1.7f},
+      {"tap 5 Hz", 2, wall,
+       [](float t) {
+         return Vec3{0, 0.002f + 0.005f * std::cos(kPitch * 5 * t), 0};
+       }},
+      {"tremor 8 Hz", 2, wall,
+       [](float t) {
+         return Vec3{0, -0.004f * smooth(4 * t) + 0.0005f * std::sin(kPitch * 8 * t), 0};
+       }},
+      {"tremor 12 Hz", 2, wall,
+       [](float t) {
+         return Vec3{0, -0.004f * smooth(4 * t) + 0.0005f * std::sin(kPitch * 12 * t), 0};
+       }},
+      {"puncture", 2.2f, needle,
+       [](float t) {
+         return Vec3{0, 0.005f - 0.02f * (smooth((t - 0.1f) / 0.8f) - smooth((t - 1.4f) / 0.6f)), 0};
+       }},
+      {"pull-through", 1.6f, held,
+       [](float t) {
+         return Vec3{0.008f * smooth((t - 0.1f) / 0.8f), 0, 0};
+       },
+       1.2f, 1.6f},
+  };
+}
+
+struct Felt {
+  double energy;
+  float swing, step;
+};
+Felt feel(const Gesture& g, float rate, bool late, float mass, float grip, bool held_force = false) {
+  Bench b;
+  b.coulomb = 0;  // nothing but the rendering keeps the hand still
+  if (held_force) b.options.passivity.damping = 0;
+  if (held_force) b.spoil = [](ForcePatch& p) { p.stiffness = {}, p.normal = {}, p.coefficient = 0; };
+  b.tissue = g.tissue;
+  b.rate = rate, b.late = late, b.mass = mass, b.grip = grip;
+  b.path = g.path;
+  b.warm_up(g.path(0));
+  float low = 1e9f, high = -1e9f;
+  const int steps = static_cast<int>(g.seconds / 0.001f);
+  for (int i = 0; i < steps; ++i) {
+    b.run(0.001f);
+    if (b.time > g.still_from && b.time < g.still_to) low = std::min(low, b.x.y), high = std::max(high, b.x.y);
+  }
+  return {b.energy_most, high > low ? high - low : 0, b.step_most};
+}
+
+// H3: E_max <= 0.5 mJ + 2 x the full-rate reference's, no swing beyond 0.2 mm while the hand means to hold still; grips of 50
+// to 800 N/m, hands of 0.05 to 0.3 kg; and without any of it the same gesture does give energy, so the test can fail.
+TEST(Haptics, H3_passive_under_every_hand) {
+  double worst_energy = 0;
+  float worst_swing = 0, worst_step = 0;
+  for (const Gesture& g : gestures())
+    for (const float mass : {0.05f, 0.1f, 0.3f})
+      for (const float grip : {50.0f, 150.0f, 400.0f, 800.0f}) {
+        const Felt ours = feel(g, 60, true, mass, grip), reference = feel(g, 1000, false, mass, grip);
+        SCOPED_TRACE(testing::Message() << g.name << " mass " << mass << " kg grip " << grip << " N/m");
+        EXPECT_LE(ours.energy, 0.5e-3 + 2 * reference.energy);
+        EXPECT_LE(ours.swing, 0.2e-3f);
+        EXPECT_LE(ours.step, 0.5f + 1e-4f);
+        worst_energy = std::max(worst_energy, ours.energy - 2 * reference.energy);
+        worst_swing = std::max(worst_swing, ours.swing);
+        worst_step = std::max(worst_step, ours.step);
+      }
+  // The same chain fed with bare forces and without its net: it shakes.
+  const Felt bare = feel(gestures()[0], 60, true, 0.1f, 150, true);
+  EXPECT_GT(bare.swing, 0.2e-3f);
+  EXPECT_GT(bare.energy, 0.5e-3);
+  std::printf("H3: a held force: E %.3f mJ, swing %.3f mm\n", bare.energy * 1e3, static_cast<double>(bare.swing) * 1e3);
+  std::printf("H3: worst E - 2 E_ref %.3f mJ (0.5), swing %.3f mm (0.2), step %.3f N/ms (0.5)\n", worst_energy * 1e3,
+              static_cast<double>(worst_swing) * 1e3, static_cast<double>(worst_step));
+}
+
+// A linear tissue looks to the local model as it does at full rate; a held force swings by centimetres. Notes 2.5.
+TEST(Haptics, the_comparison_of_the_notes) {
+  for (const StudyPublished& p : published_study()) {
+    const StudyRow r = run_study(p.c);
+    std::printf(
+        "%4.0f/%3.0f N/m %4.0f Hz %-27s error %.3f N (notes %.2f)  swing %.3f mm (%.3f)  step %.3f N (%.3f)  energy %.3f mJ "
+        "(%.2f)\n",
+        double{p.c.tissue}, double{p.c.coupling}, double{p.c.rate}, rendering_name(p.c.rendering), double{r.force_error},
+        double{p.notes.force_error}, double{r.hold_swing} * 1e3, double{p.notes.hold_swing} * 1e3, double{r.largest_step},
+        double{p.notes.largest_step}, double{r.energy} * 1e3, double{p.notes.energy} * 1e3);
+    if (p.c.rendering == Rendering::local_model) {
+      EXPECT_LT(r.force_error, 0.005f);
+      EXPECT_LT(r.energy, 0.2e-3f);
+      EXPECT_LT(r.hold_swing, 0.2e-3f);
+    }
+    if (p.c.rendering == Rendering::held_force && p.c.rate < 200) {
+      EXPECT_GT(r.hold_swing, 5e-3f);
+      EXPECT_GT(r.energy, 50e-3f);
+    }
+  }
+}
+
+// H5: physics stalls while the hand is pressed upon with 2 N. The force goes down and never up, is below 0.05 N within 100 ms
+// of expiry, never steps, and comes back through the ramp.
+TEST(Haptics, H5_physics_stalls) {
+  for (const float stall : {0.05f, 0.2f, 2.0f}) {
+    SCOPED_TRACE(testing::Message() << "stalled for " << stall << " s");
+    Bench b;
+    b.tissue.held = true;
+    b.options.limiter.continuous = 3.3f;  // two newtons for seconds would rightly be turned down: not what is asked here
+    b.path = [](float t) { return Vec3{0, 0.018f * smooth(t / 0.8f), 0}; };
+    b.warm_up({});
+    b.grip = 400;
+    b.run(1.2f);
+    const float before = length(b.force);
+    ASSERT_GT(before, 1.6f);
+    const float start = b.time;
+    b.physics_works = [start, stall](float t) { return t < start || t > start + stall; };
+    b.step_most = 0;
+    float last = before, below_at = -1, expired_at = -1, highest_after = 0;
+    for (int i = 0; i < 6000; ++i) {
+      b.run(0.001f);
+      const float f = length(b.force), since = b.time - start;
+      const float age = 1e-9f * static_cast<float>(b.now_ns - b.servo.model.now.time_ns);
+      if (expired_at < 0 && age > b.servo.model.now.expiry) expired_at = since;
+      // While it is off there is no way up but by the ramp; the force in it is never more than its part.
+      if (expired_at >= 0 && since < stall) { EXPECT_LE(f, last + 1e-4f) << "at " << since; }
+      if (expired_at >= 0 && below_at < 0 && f < 0.05f) below_at = since - expired_at;
+      if (since > stall + 0.04f) highest_after = std::max(highest_after, f);
+      last = f;
+    }
+    EXPECT_LE(b.step_most, 0.5f + 1e-4f);
+    if (stall > 0.15f) {
+      EXPECT_GE(below_at, 0);
+      EXPECT_LE(below_at, 0.1f);
+      // The hand still pulls: nothing engages until it has let go, however long the physics has been back.
+      EXPECT_LT(highest_after, 0.05f);
+      std::printf("H5: stall %.2f s: below 0.05 N %.0f ms after expiry, largest step %.3f N/ms\n", double{stall},
+                  double{below_at} * 1e3, double{b.step_most});
+      // Let go, then pull again: the ramp takes two seconds.
+      b.path = [](float) { return Vec3{}; };
+      b.run(0.5f);
+      EXPECT_TRUE(b.servo.limiter.engaged == Engaged::rising);
+      const float pull_from = b.time;
+      b.path = [pull_from](float t) { return Vec3{0, 0.018f * smooth((t - pull_from) / 0.3f), 0}; };
+      b.run(0.4f);
+      EXPECT_LT(length(b.force), 0.5f * before);
+      b.run(2.0f);
+      EXPECT_NEAR(length(b.force), before, 0.1f * before);
+    } else {
+      EXPECT_NEAR(last, before, 0.1f * before) << "a short stall ends by itself";
+    }
+  }
+}
+
+// H6: whatever the simulation, the arm or the clock say, what goes out is finite and within the cap, and says so once.
+TEST(Haptics, H6_garbage) {
+  const float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity();
+  const std::vector<std::pair<uint32_t, std::function<void(ForcePatch&)>>> bad{
+      {kBadModel, [nan](ForcePatch& p) { p.force.x = nan; }},
+      {kBadModel, [infinite](ForcePatch& p) { p.stiffness.xy = infinite; }},
+      {kBadModel, [](ForcePatch& p) { p.stiffness = identity(-5000); }},
+      {kBadModel,
+       [](ForcePatch& p) {
+         p.normal = {3, 4, 0};
+       }},
+      {kBadModel, [nan](ForcePatch& p) { p.cap = nan; }},
+      {kTooMuch,
+       [](ForcePatch& p) {
+         p.force = {1e9f, 0, 0}, p.normal = {};
+       }},
+      {kTooMuch,
+       [](ForcePatch& p) {
+         p.point = {1e6f, 0, 0}, p.normal = {}, p.stiffness = identity(300);
+       }},
+      {kTimeBack, [](ForcePatch& p) { p.time_ns += 1000000000; }},
+      {0, [](ForcePatch& p) { p.cap = 1e9f; }},
+  };
+  for (size_t k = 0; k < bad.size(); ++k) {
+    SCOPED_TRACE(k);
+    Bench b;
+    b.path = [](float t) { return Vec3{0, 0.005f - 0.012f * smooth(t / 0.4f), 0}; };
+    b.warm_up({0, 0.005f, 0});
+    b.run(0.6f);
+    b.servo.limiter.faults = 0;
+    b.step_most = b.force_most = 0;
+    int n = 0;
+    b.spoil = [&](ForcePatch& p) {
+      if (++n % 3 == 0) bad[k].second(p);
+    };
+    for (int i = 0; i < 1000; ++i) {
+      b.run(0.001f);
+      ASSERT_TRUE(is_finite(b.force));
+      ASSERT_LE(length(b.force), 3.3f + 1e-4f);
+    }
+    EXPECT_LE(b.step_most, 0.5f + 1e-4f);
+    EXPECT_EQ(b.servo.limiter.faults & bad[k].first, bad[k].first);
+  }
+  // The arm: positions that are none, clocks that run backwards, hands that fly.
+  ServoHand hand;
+  ServoOptions options;
+  Random random(3);
+  uint64_t now = 5000000000;
+  Vec3 last;
+  for (int i = 0; i < 20000; ++i) {
+    ArmSample s;
+    s.state = ArmState::ready;
+    const float way = random.uniform();
+    s.pose.p = way < 0.01f ? Vec3{nan, 0, 0} : way < 0.02f ? Vec3{1e30f, 0, 0} : Vec3{0, -0.004f, 0};
+    if (random.uniform() < 0.01f) s.warmth = nan;
+    ForcePatch p;
+    p.time_ns = now;
+    p.force = {0, random.uniform() < 0.01f ? -infinite : 1, 0};
+    p.stiffness = identity(300);
+    now += random.uniform() < 0.01f ? -5000000ull : 1000000ull;
+    const Vec3 f = servo_step(hand, options, s, i % 16 == 0 ? &p : nullptr, now).force;
+    ASSERT_TRUE(is_finite(f));
+    ASSERT_LE(length(f), 3.3f + 1e-4f);
+    ASSERT_LE(length(f - last), 0.5f + 1e-4f);
+    last = f;
+  }
+  EXPECT_TRUE(hand.limiter.faults & kNotFinite);
+  EXPECT_TRUE(hand.limiter.faults & kTimeBack);
+}
+
+// H8: three newtons asked for during ten minutes: the mean that goes out is one the motors can bear for ever.
+TEST(Haptics, H8_heat) {
+  Limiter limiter;
+  double square = 0;
+  constexpr int kSteps = 600000;
+  float most = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    LimiterInput in;
+    in.wanted = i < 10 ? Vec3{} : Vec3{0, 3, 0};
+    const float f = length(limit(limiter, in, 0.001f));
+    square += double{f} * double{f};
+    most = std::max(most, f);
+  }
+  const double rms = std::sqrt(square / kSteps);
+  std::printf("H8: peak %.2f N, RMS over ten minutes %.3f N (0.88)\n", double{most}, rms);
+  EXPECT_GT(most, 2.0f);
+  EXPECT_LE(rms, 0.88);
+  EXPECT_GT(rms, 0.7);
+  // Hot motors: nothing at all is left.
+  LimiterInput hot;
+  hot.wanted = {0, 1, 0};
+  hot.warmth = 1;
+  for (int i = 0; i < 1000; ++i) limit(limiter, hot, 0.001f);
+  EXPECT_LT(length(limiter.out), 1e-4f);
+}
+
+// H10: the same samples and the same patches give the same forces, to the bit.
+TEST(Haptics, H10_determinism) {
+  const auto play = [](float offset) {
+    Bench b;
+    b.tissue.pierce_force = 0.9f;
+    b.path = [offset](float t) {
+      return Vec3{0.01f * std::sin(7 * t), 0.004f - 0.012f * std::sin(3 * t), offset + 0.004f * std::cos(11 * t)};
+    };
+    b.warm_up({});
+    uint64_t hash = 0;
+    for (int i = 0; i < 4000; ++i) {
+      b.run(0.001f);
+      const std::array<float, 3> f{b.force.x, b.force.y, b.force.z};
+      hash = hash_bytes(f.data(), sizeof f, hash);
+    }
+    return hash;
+  };
+  EXPECT_EQ(play(0), play(0));
+  EXPECT_NE(play(0), play(0.001f));
+}
+
+// A force that a patch holds beyond the arm's stiffness is cut down to it, along every direction.
+TEST(Haptics, stiffness_is_what_the_arm_can_render) {
+  ForcePatch p;
+  p.stiffness = {900, 300, 250, 300, -20, 10};
+  EXPECT_TRUE(make_safe(p, 3.3f, 400, 4));
+  const Eigen3 e = eigen(p.stiffness);
+  for (const float value : e.value) {
+    EXPECT_LE(value, 400.1f);
+    EXPECT_GE(value, -1e-3f);
+  }
+  // Two springs in series, as closed form has it.
+  const Sym3 s = in_series(outer({0, 1, 0}, 1100), 400);
+  EXPECT_NEAR(s.yy, 1100.0f * 400 / 1500, 0.01f);
+  EXPECT_NEAR(s.xx, 0, 1e-4f);
+}
+
+// The arm's place in the field: there and back, and force and motion keep their product.
+TEST(Haptics, workspace_makes_no_energy) {
+  Workspace w;
+  w.scale = 0.5f;
+  w.turn = axis_angle(normalized(Vec3{1, 2, 3}), 0.7f);
+  w.offset = {0.02f, 0.1f, -0.03f};
+  const Pose arm{{0.03f, -0.02f, 0.05f}, axis_angle({0, 1, 0}, 0.4f)};
+  const Pose back = to_arm(w, to_world(w, arm));
+  EXPECT_LT(distance(back.p, arm.p), 1e-6f);
+  ServoHand hand;
+  ServoOptions o;
+  o.place = w;
+  ForcePatch p;
+  p.force = {0, 0, 0};
+  uint64_t now = 1000000;
+  ArmSample s;
+  s.state = ArmState::ready;
+  s.pose = arm;
+  p.point = to_world(w, arm).p;
+  Vec3 out;
+  for (int i = 0; i < 3000; ++i, now += 1000000) {
+    if (i > 2500) p.force = {0.3f, -0.2f, 0.1f};
+    p.time_ns = now;
+    out = servo_step(hand, o, s, &p, now).force;
+  }
+  const Vec3 dx{0.001f, 0.002f, -0.0005f};  // of the arm
+  const Vec3 world = rotate(w.turn, dx) * w.scale;
+  EXPECT_NEAR(dot(out, dx), dot(p.force, world), 1e-7f);
+}
+
+}  // namespace
+}  // namespace catgut
