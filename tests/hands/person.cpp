@@ -87,7 +87,7 @@ bool Person::point(size_t k, const std::function<Vec3()>& place, const std::func
 }
 
 bool Person::take(size_t k, Held what, HelpAt at, const std::function<Vec3()>& place) {
-  for (int attempt = 0; attempt < 4; ++attempt) {
+  for (int attempt = 0; attempt < 8; ++attempt) {
     if (!point(k, place, [&] { return hand(k).snapped && hand(k).at == at; })) return false;
     // The tool comes to where the help wants it, then the jaw closes.
     const bool tail = at == HelpAt::tail;
@@ -255,7 +255,7 @@ bool Person::set_throw() {
 
 bool Person::tie(int way) {
   // What goes wrong is done again, as one does.
-  for (int attempt = 0; attempt < 4; ++attempt) {
+  for (int attempt = 0; attempt < 8; ++attempt) {
     if (!wind(way)) continue;
     doing_ = "take the tail through the loop";
     if (take_tail() && set_throw()) return true;
