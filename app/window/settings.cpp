@@ -161,7 +161,8 @@ std::string settings_text(const Settings& settings) {
 LoadedSettings load_settings(const std::string& path) {
   LoadedSettings out;
   std::error_code error;
-  if (path.empty() || !fs::exists(path, error)) return out;
+  out.first = path.empty() || !fs::exists(path, error);
+  if (out.first) return out;
   try {
     out.settings = parse_settings(read_small_file(path), path);
   } catch (const InputError& fault) { out.fault = fault.what(); }

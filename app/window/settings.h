@@ -33,8 +33,9 @@ Settings parse_settings(const std::string& text, const std::string& name);
 std::string settings_text(const Settings& settings);  // parse_settings gives the same back
 
 struct LoadedSettings {
-  Settings settings;  // defaults where the file could not be read
-  std::string fault;  // one line, naming the file; empty: none, also where there is no file yet
+  Settings settings;   // defaults where the file could not be read
+  std::string fault;   // one line, naming the file; empty: none, also where there is no file yet
+  bool first = false;  // there is no file yet
 };
 LoadedSettings load_settings(const std::string& path);
 

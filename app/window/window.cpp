@@ -17,9 +17,11 @@
 #include "core/check.h"
 #include "procedure/scene_file.h"
 #include "render/orbit.h"
+#include "render/quality.h"
 #include "render/window.h"
 #include "runtime/guide.h"
 #include "runtime/report.h"
+#include "sim/simulation.h"
 #include "window/hands.h"
 #include "window/input.h"
 #include "window/latency.h"
@@ -75,14 +77,29 @@ std::string short_name(const std::string& path) {
   return !start.empty() && path.rfind(start, 0) == 0 ? "~/" + path.substr(start.size()) : path;
 }
 
+// How well this machine draws, on a scene as people see it first.
+Quality measured_quality(int width, int height) {
+  std::fprintf(stderr, "catgut: first start: how well this machine draws is measured, some seconds\n");
+  const auto model = build_model(read_scene("purse_string"));
+  Snapshot seen;
+  publish(*model, *initial_state(*model), seen);
+  return choose_quality(picture_model(*model), seen, width, height).quality;
+}
+
 class Window {
  public:
   explicit Window(const PlayOptions& options)
       : options_(options), sdl_(options.width, options.height), width_(options.width), height_(options.height) {
+    LoadedSettings loaded = load_settings(settings_path());
+    if (loaded.first && !options.quality_given && options.scene.empty() && options.view.empty() && options.screenshot.empty()) {
+      loaded.settings.quality = measured_quality(width_, height_);
+      try {
+        if (!settings_path().empty()) save_settings(loaded.settings, settings_path());
+      } catch (const InputError& error) { loaded.fault = error.what(); }
+    }
     try {
       renderer_ = make_window_renderer(sdl_.number, width_, height_, kFont);
     } catch (const std::runtime_error& error) { throw InputError("window", error.what(), kHeadless); }
-    LoadedSettings loaded = load_settings(settings_path());
     if (!loaded.fault.empty()) std::fprintf(stderr, "catgut: %s\n", loaded.fault.c_str());
     message_ = loaded.fault;
     kept_ = settings_ = loaded.settings;

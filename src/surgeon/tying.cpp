@@ -25,6 +25,7 @@ constexpr float kLeastFree = 0.032f;          // [m] of strand that must be left
 constexpr float kLeastFreeForOwn = 0.038f;    // the same where the strand is then led along the driver to its jaws
 constexpr float kWindOwnAt = 0.022f;          // [m] behind the tip, where such a strand is wound
 constexpr float kTailAside = 0.030f;          // [m] from the stitch, where the tail is laid down
+constexpr float kDeep = 0.010f;               // [m] below the knot, where a tail is still easy to reach
 constexpr float kNear = 0.035f;               // [m] round a stitch: tissue that hands go over
 constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the middle of the field, where a used needle is let go
 constexpr float kTyingAt = 0.12f;             // place on the needle's arc: behind the swage
@@ -125,6 +126,8 @@ void Scripted::choose_grasp(const Snapshot& seen) {
         const float along = dot(d, z);
         if (along > 0.003f && along < 0.06f && length2(d - z * along) < kShaft * kShaft) good -= 0.1f;
       }
+      // Where the tail has slipped down between the edges it is taken up there: below, hands and needle would meet tissue.
+      good -= 50 * std::max(0.0f, knot.y - kDeep - tip.y);
       // Near the knot little else lies about. Where it was tried in vain it is not tried again.
       good -= 12 * distance(tip, knot) + (misses_ > 0 && distance(tip, tried_) < 0.004f ? 0.5f : 0.0f);
       if (good > best) best = good, take_slot_ = seen.thread_order[i], take_turn_ = from_tool_axis(z);
