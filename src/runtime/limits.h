@@ -40,7 +40,8 @@ LimitsResult measure_limits(SceneSpec scene, int sutures, int threads, const std
                             const SessionHooks& hooks = {});
 
 // Median solver time of the last five sutures over that of the first five; 0 with fewer than ten. steady: each divided by the
-// shape matching of its ticks, so that a processor which changes its clock on the way does not count as growth, nor hides it.
+// shape matching of its ticks, for a processor that changes its clock on the way. A rough help: on a shared machine the stages
+// do not follow the clock alike, and the figure moves by a fifth.
 double limits_growth(std::span<const SutureCost> row, bool steady);
 
 std::string limits_csv_header();  // with a final newline, as each row
