@@ -125,8 +125,9 @@ std::string limits_table(const LimitsResult& result, size_t bodies) {
   const double growth = limits_growth(result.row, false);
   if (growth > 0)
     text += fmt::format(
-        "solver time of the last five sutures over the first five: {:.2f}; measured by shape matching, which is "
-        "the same in every tick: {:.2f}\n",
+        "solver time of the last five sutures over the first five: {:.2f}; each against its own shape matching (where the "
+        "clock "
+        "wanders; rough): {:.2f}\n",
         growth, limits_growth(result.row, true));
   else text += fmt::format("growth: needs {} sutures to compare the last five with the first five\n", 2 * kEdge);
   const auto slow =
