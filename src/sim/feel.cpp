@@ -21,13 +21,12 @@ constexpr float kTrust = 0.0001f;   // [m] of motion that weighs as much as the 
 constexpr float kNothing = 0.005f;  // [N] less than this is not felt
 constexpr float kLook = 0.008f;     // [m] how far ahead the next contact is looked for; the broad phase's margin
 
-Vec3 thread_on_tool(const SolverState& s, const ThreadHold& hold, const SolverModel& m) {
+Vec3 thread_on_tool(const SolverState& s, const ThreadHold& hold) {
   const auto node = std::find(s.thread.order.begin(), s.thread.order.end(), hold.slot);
   if (node == s.thread.order.end()) return {};
   const size_t i = static_cast<size_t>(node - s.thread.order.begin());
   const auto place = [&](size_t at) { return thread_position(s.thread, at, s.x.data(), s.body); };
   Vec3 force;
-  (void)m;
   if (i > 0) force += normalized(place(i - 1) - place(i)) * s.thread.tension[i - 1];
   if (i < s.thread.tension.size()) force += normalized(place(i + 1) - place(i)) * s.thread.tension[i];
   return force;
@@ -90,7 +89,7 @@ void feel_substep(const Model& model, State& state, int i) {
     t.pressed += on.pressed * inv_h2;
     t.thread += (on.linear - on.pressing - on.rubbing) * inv_h2;
     for (const ThreadHold& h : s.thread.hold)
-      if (h.body == body) t.thread += thread_on_tool(s, h, m);
+      if (h.body == body) t.thread += thread_on_tool(s, h);
     for (const Attachment& a : s.attach)
       if (a.body == body) t.held += a.lambda * -inv_h2;
     bool has_needle = false;
