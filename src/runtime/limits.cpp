@@ -21,7 +21,6 @@ class SutureWatch {
   bool operator()(const Snapshot& seen, const StageTimes& times, double tick_ms) {
     if (seen.time_s <= scene_.settle) return true;
     solver_ms_.push_back(static_cast<float>(times.solver_ms()));
-    shape_ms_.push_back(static_cast<float>(times.ms[static_cast<size_t>(Stage::shape)]));
     tick_ms_.push_back(static_cast<float>(tick_ms));
     contacts_ = std::max(contacts_, times.contacts);
     const size_t completed = completed_in(seen);
@@ -35,7 +34,6 @@ class SutureWatch {
     cost.ticks = tick_ms_.size();
     cost.solver_ms = spread_of(std::move(solver_ms_));
     cost.tick_ms = spread_of(std::move(tick_ms_));
-    cost.shape_ms = spread_of(std::move(shape_ms_)).median;
     cost.contacts = contacts_;
     cost.fps = cost.tick_ms.median > 0 ? 1000 / cost.tick_ms.median : 0;
     for (size_t k = completed; k > 0 && !result_.reached(); --k) {
@@ -43,7 +41,7 @@ class SutureWatch {
       result_.row.push_back(cost);
       if (on_row_) on_row_(cost);
     }
-    solver_ms_.clear(), tick_ms_.clear(), shape_ms_.clear();
+    solver_ms_.clear(), tick_ms_.clear();
     contacts_ = 0;
     return !result_.reached();
   }
@@ -65,14 +63,13 @@ class SutureWatch {
   const SceneSpec& scene_;
   const std::function<void(const SutureCost&)>& on_row_;
   int throws_ = 0;  // of the suture in hand
-  std::vector<float> solver_ms_, tick_ms_, shape_ms_;
+  std::vector<float> solver_ms_, tick_ms_;
   uint32_t contacts_ = 0;
 };
 
-double median_solver(std::span<const SutureCost> row, bool steady) {
+double median_solver_ms(std::span<const SutureCost> row) {
   std::vector<float> ms;
-  for (const SutureCost& r : row)
-    ms.push_back(static_cast<float>(r.solver_ms.median / (steady && r.shape_ms > 0 ? r.shape_ms : 1)));
+  for (const SutureCost& r : row) ms.push_back(static_cast<float>(r.solver_ms.median));
   return spread_of(std::move(ms)).median;
 }
 
@@ -91,21 +88,21 @@ LimitsResult measure_limits(SceneSpec scene, int sutures, int threads, const std
   return result;
 }
 
-double limits_growth(std::span<const SutureCost> row, bool steady) {
+double limits_growth(std::span<const SutureCost> row) {
   if (row.size() < 2 * kEdge) return 0;
-  const double first = median_solver(row.first(kEdge), steady);
-  return first > 0 ? median_solver(row.last(kEdge), steady) / first : 0;
+  const double first = median_solver_ms(row.first(kEdge));
+  return first > 0 ? median_solver_ms(row.last(kEdge)) / first : 0;
 }
 
 std::string limits_csv_header() {
   return "suture,bites,suture_points,settled,simulated_s,ticks,solver_ms_median,solver_ms_p99,tick_ms_median,tick_ms_p99,"
-         "contacts,fps,shape_ms_median\n";
+         "contacts,fps\n";
 }
 
 std::string limits_csv_row(const SutureCost& r) {
-  return fmt::format("{},{},{},{},{:.3f},{},{:.4f},{:.4f},{:.4f},{:.4f},{},{:.1f},{:.4f}\n", r.suture, r.bites, r.suture_points,
+  return fmt::format("{},{},{},{},{:.3f},{},{:.4f},{:.4f},{:.4f},{:.4f},{},{:.1f}\n", r.suture, r.bites, r.suture_points,
                      r.settled, r.simulated_s, r.ticks, r.solver_ms.median, r.solver_ms.p99, r.tick_ms.median, r.tick_ms.p99,
-                     r.contacts, r.fps, r.shape_ms);
+                     r.contacts, r.fps);
 }
 
 std::string limits_table(const LimitsResult& result, size_t bodies) {
@@ -122,13 +119,8 @@ std::string limits_table(const LimitsResult& result, size_t bodies) {
     text += fmt::format("{:6}  {:6}  {:7}  {:8}  {:17.2f}  {:5.2f}  {:15.2f}  {:5.2f}  {:6.0f}\n", r.suture, r.suture_points,
                         r.settled, r.contacts, r.solver_ms.median, r.solver_ms.p99, r.tick_ms.median, r.tick_ms.p99, r.fps);
   }
-  const double growth = limits_growth(result.row, false);
-  if (growth > 0)
-    text += fmt::format(
-        "solver time of the last five sutures over the first five: {:.2f}; each against its own shape matching (where the "
-        "clock "
-        "wanders; rough): {:.2f}\n",
-        growth, limits_growth(result.row, true));
+  const double growth = limits_growth(result.row);
+  if (growth > 0) text += fmt::format("solver time of the last five sutures over the first five: {:.2f}\n", growth);
   else text += fmt::format("growth: needs {} sutures to compare the last five with the first five\n", 2 * kEdge);
   const auto slow =
       std::find_if(result.row.begin(), result.row.end(), [](const SutureCost& r) { return r.fps < kRealTimeFps; });

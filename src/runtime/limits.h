@@ -22,7 +22,6 @@ struct SutureCost {
   double simulated_s = 0;
   uint64_t ticks = 0;
   Spread solver_ms, tick_ms;  // per tick; tick_ms: surgeon, step and publish
-  double shape_ms = 0;        // median of shape matching, which does the same work in every tick: how fast the machine was
   uint32_t contacts = 0;      // the most in a substep
   double fps = 0;             // that the median tick would allow, with nothing drawn
 };
@@ -39,10 +38,9 @@ struct LimitsResult {
 LimitsResult measure_limits(SceneSpec scene, int sutures, int threads, const std::function<void(const SutureCost&)>& on_row,
                             const SessionHooks& hooks = {});
 
-// Median solver time of the last five sutures over that of the first five; 0 with fewer than ten. steady: each divided by the
-// shape matching of its ticks, for a processor that changes its clock on the way. A rough help: on a shared machine the stages
-// do not follow the clock alike, and the figure moves by a fifth.
-double limits_growth(std::span<const SutureCost> row, bool steady);
+// Median solver time of the last five sutures over that of the first five; 0 with fewer than ten. Says nothing where the
+// processor changed its clock on the way.
+double limits_growth(std::span<const SutureCost> row);
 
 std::string limits_csv_header();  // with a final newline, as each row
 std::string limits_csv_row(const SutureCost& row);
