@@ -127,6 +127,8 @@ void write_felt(const std::string& folder, const std::string& scene) {
 }  // namespace
 
 int bench_haptics(const std::string& folder, const std::string& scene) {
+  if (!folder.empty())
+    for (const char* name : {"/forces.csv", "/forces.png"}) prepare_output(folder + name);
   std::printf(
       "a hand presses, holds and lets go of a wall of tissue; in brackets the research notes' figure for their gesture\n");
   std::printf("%-10s %5s  %-26s %19s %19s %19s %19s\n", "tissue/", "rate", "rendering", "force error [N]", "swing, held [mm]",

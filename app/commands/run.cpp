@@ -1,4 +1,6 @@
 // app: `catgut run SCENE`: simulates a scene and judges it by its expectations.
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <memory>
 
@@ -34,7 +36,13 @@ SceneSpec scene_for(const RunOptions& o) {
 int run(const RunOptions& o) {
   const SceneSpec scene = scene_for(o);
   for (const std::string& path : {o.json, o.session.record, o.pictures.video, o.pictures.contact_sheet}) prepare_output(path);
-  for (const auto& [at_s, path] : o.pictures.still) prepare_output(path);
+  const double until_s = o.session.seconds > 0 ? o.session.seconds : static_cast<double>(scene.duration);
+  for (const auto& [at_s, path] : o.pictures.still) {
+    if (at_s > until_s)
+      throw InputError("--still", fmt::format("the run is over after {} s at the latest, before {} s", until_s, at_s),
+                       "choose an earlier moment, or a later --seconds");
+    prepare_output(path);
+  }
 
   std::unique_ptr<Pictures> pictures;
   SessionHooks hooks;
@@ -46,10 +54,9 @@ int run(const RunOptions& o) {
   }
   const RunResult result = run_session(scene, o.session, hooks);
   end_progress_line();
-  if (pictures) pictures->finish();
-
   if (!o.json.empty()) write_output(o.json, run_json(result));
   if (o.json != "-") std::fputs(run_summary(result).c_str(), stdout);
+  if (pictures) pictures->finish();  // last: a picture that fails takes no results with it
   if (result.interrupted) return 130;
   return o.no_expect || result.expectations_hold() ? 0 : 1;
 }

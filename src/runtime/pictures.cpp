@@ -114,10 +114,15 @@ struct Pictures::Studio {
 
   void finish() {
     if (film) film->finish();
+    if (!options.contact_sheet.empty() && !moment.empty()) write_sheet();
     if (!options.still.empty())
-      throw std::runtime_error(
-          fmt::format("the run ended before {} s, the moment of {}", options.still.back().first, options.still.back().second));
-    if (options.contact_sheet.empty() || moment.empty()) return;
+      throw InputError(
+          "--still",
+          fmt::format("the run ended before {} s, so there is no {}", options.still.back().first, options.still.back().second),
+          "choose an earlier moment; everything else was written");
+  }
+
+  void write_sheet() {
     moment.push_back({take(last, {}), last_caption});
     std::vector<SheetCell> cell;
     const size_t n = std::min(kSheetCells, moment.size());

@@ -264,6 +264,22 @@ TEST_F(CommandLine, a_cut_recording_is_named_as_such) {
   expect_refused("replay other.cgrec", "the recording has format 99");
 }
 
+// A picture of a moment the run never has: refused before the work where that is known, and else after everything is written.
+TEST_F(CommandLine, a_picture_of_a_moment_that_never_comes_takes_no_results_with_it) {
+  expect_refused("run small.toml --surgeon none --headless --seconds 1 --still 2:late.png", "the run is over after 1 s");
+  expect_refused("bench haptics --out /proc/nowhere", "cannot be written");
+
+  const Outcome o = run_catgut(
+      "run stay --surgeon scripted --headless --threads 1 --set duration=3000 --still 2990:late.png --json end.json "
+      "--no-expect "
+      "--contact-sheet sheet.png");
+  EXPECT_EQ(o.code, 2);
+  EXPECT_NE(o.err.find("everything else was written"), std::string::npos) << o.err;
+  EXPECT_GT(json::parse(read_file(folder_ / "end.json"))["ticks"], 100);
+  EXPECT_EQ(read_file(folder_ / "sheet.png").substr(1, 3), "PNG");
+  EXPECT_FALSE(fs::exists(folder_ / "late.png"));
+}
+
 std::vector<std::vector<std::string>> read_table(const fs::path& path) {
   std::vector<std::vector<std::string>> row;
   std::ifstream in(path);
