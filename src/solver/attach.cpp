@@ -86,9 +86,11 @@ PinRow row_of(const TissuePin& pin, const float* w) {
   return row;
 }
 
-// slack [m]: how much the rope has when this is done; 0 when it pulls. Returns the size of its step [N s^2].
+// A rope that pulls already and is as it should be to within `tolerance` [m] is left alone; one that does not yet is solved
+// however little it is too long, or it would be left until it is and then twitch. room [m]: how much nearer or further its
+// points may come before it has to be looked at again. Returns the size of its step [N s^2].
 float solve_row(TissuePin& pin, Vec4* x, const uint32_t* particle, const float* share, const float* move, uint32_t count,
-                float inv_mass, float h, float& slack) {
+                float inv_mass, float h, float tolerance, float& room) {
   Four even{}, odd{};
   for (uint32_t k = 0; k < count; k += 2) {
     even += load(x[particle[k]]) * share[k];
@@ -98,14 +100,17 @@ float solve_row(TissuePin& pin, Vec4* x, const uint32_t* particle, const float* 
   const Vec3 d{sum[0], sum[1], sum[2]};
   const float l = length(d);
   if (l <= pin.length && pin.lambda >= 0) {
-    slack = pin.length - l;
+    room = pin.length - l + tolerance;
     return 0;
   }
-  slack = 0;
-  const Vec3 n = l > 1e-9f ? d / l : Vec3{0, 1, 0};
   const float alpha = pin.compliance / (h * h);
+  const float off = l - pin.length + alpha * pin.lambda;
+  room = tolerance - std::abs(off);
+  if (room > 0 && pin.lambda < 0) return 0;
+  room = tolerance;
   if (inv_mass + alpha <= 0) return 0;
-  const float step = std::min(-(l - pin.length + alpha * pin.lambda) / (inv_mass + alpha), -pin.lambda);
+  const Vec3 n = l > 1e-9f ? d / l : Vec3{0, 1, 0};
+  const float step = std::min(-off / (inv_mass + alpha), -pin.lambda);
   pin.lambda += step;
   const Four push{n.x * step, n.y * step, n.z * step, 0};
   for (uint32_t k = 0; k < count; ++k) {
@@ -119,8 +124,8 @@ float solve_row(TissuePin& pin, Vec4* x, const uint32_t* particle, const float* 
 
 void solve_pin(TissuePin& pin, Vec4* x, const float* w, float h) {
   const PinRow row = row_of(pin, w);
-  float slack = 0;
-  solve_row(pin, x, row.particle.data(), row.share.data(), row.move.data(), row.count, row.inv_mass, h, slack);
+  float room = 0;
+  solve_row(pin, x, row.particle.data(), row.share.data(), row.move.data(), row.count, row.inv_mass, h, 0, room);
 }
 
 static bool same(const TissuePoint& a, const TissuePoint& b) {
@@ -198,10 +203,8 @@ void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, const floa
     for (size_t i = 0; i < pin.size(); ++i) {
       if (room[i] >= 0) continue;
       const uint32_t at = web.row[i];
-      float slack = 0;
       const float step = solve_row(pin[i], x, &web.particle[at], &web.share[at], &web.move[at], web.row[i + 1] - at,
-                                   web.inv_mass[i], h, slack);
-      room[i] = slack + tolerance - kRounding;
+                                   web.inv_mass[i], h, tolerance - kRounding, room[i]);
       if (step == 0 || sweep + 1 == sweeps) continue;
       for (uint32_t r = web.first[i]; r < web.first[i + 1]; ++r) room[web.other[r].pin] -= step * web.other[r].coupling;
     }

@@ -114,10 +114,10 @@ struct PinWeb {
 };
 // Makes the web anew if the pins' points have changed. w: inverse mass [1/kg] of the particles, which never changes.
 void weave(std::span<const TissuePin> pin, const float* w, uint32_t particles, PinWeb& web);
-// `sweeps` times solve_pin of each pin in turn, but without looking at those that their neighbours have moved by no more than
-// `tolerance` [m] since they were last as they should be; with 0 that is the same to the last bit. Settled stitches are slack
-// nearly always, and a long procedure has hundreds of them. web: of these pins; one of another number of pins is taken for
-// none, and every pin is looked at. room: working memory.
+// `sweeps` times solve_pin of each pin in turn, but pins that are as they should be to within `tolerance` [m] are left alone,
+// and not looked at again before their neighbours may have moved them out of it; with 0 that is the same to the last bit.
+// Settled stitches are slack or at rest nearly always, and a long procedure has hundreds of them. web: of these pins; one of
+// another number of pins is taken for none, and every pin is looked at. room: working memory.
 void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, const float* w, float h, int sweeps, float tolerance,
                 std::vector<float>& room);
 void solve_channel(ChannelPoint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model, RigidBody& needle,

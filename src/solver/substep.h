@@ -30,7 +30,7 @@ struct SolverModel {
   Vec3 gravity{0, -9.81f, 0};         // [m/s^2] on thread and needle
   Vec3 tissue_gravity{0, -9.81f, 0};  // [m/s^2] on tissue: divided by the mass scaling, so that its weight is true
   int shape_sweeps = 1, self_sweeps = 1, contact_sweeps = 1, volume_sweeps = 1, rigid_sweeps = 4;
-  float pin_tolerance = 1e-5f;  // [m] a fraction of the thread's diameter
+  float pin_tolerance = 3e-5f;  // [m] a tenth of the thread's diameter
   int pin_sweeps = 4;  // the pins of a seam share tissue with their neighbours: after one sweep they would stay 1 mm apart
   float shape_stiffness = 0.65f;  // s of solve_shape_particles at this h
   float shape_relaxation = 1;
