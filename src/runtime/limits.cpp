@@ -4,11 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
+
+#include "core/jobs.h"
+#include "sim/simulation.h"
 
 namespace catgut {
 namespace {
 
-constexpr size_t kEdge = 5;             // sutures at either end that the growth compares
 constexpr double kRealTimeFps = 24;     // the paper's limit of real time
 constexpr uint32_t kPaperLost = 26;     // suture of two bodies at which the paper's simulation fell below it
 constexpr double kPaperOneBody = 76.2;  // [1/s] with 50 sutures in one body, drawing included
@@ -67,10 +70,33 @@ class SutureWatch {
   uint32_t contacts_ = 0;
 };
 
-double median_solver_ms(std::span<const SutureCost> row) {
-  std::vector<float> ms;
-  for (const SutureCost& r : row) ms.push_back(static_cast<float>(r.solver_ms.median));
-  return spread_of(std::move(ms)).median;
+// One suture as it was sewn: the state before it and the hands of its ticks.
+struct Stretch {
+  std::vector<std::byte> start;
+  std::vector<TickInput> input;
+};
+
+SutureGrowth sew_in_turns(const SceneSpec& scene, int threads, const Stretch& first, const Stretch& last,
+                          const std::atomic<bool>* stop) {
+  const std::shared_ptr<const Model> model = build_model(scene);
+  const StatePtr a = initial_state(*model), b = initial_state(*model);
+  load_state(*model, *a, first.start);
+  load_state(*model, *b, last.start);
+  Jobs jobs(threads);
+  const auto solver_ms = [&](State& state, const TickInput& input) {
+    StageTimes times;
+    step(*model, state, input, jobs, &times);
+    return static_cast<float>(times.solver_ms());
+  };
+  SutureGrowth growth;
+  std::vector<float> first_ms, last_ms;
+  for (; growth.ticks < std::min(first.input.size(), last.input.size()) && !(stop && *stop); ++growth.ticks) {
+    first_ms.push_back(solver_ms(*a, first.input[growth.ticks]));
+    last_ms.push_back(solver_ms(*b, last.input[growth.ticks]));
+  }
+  growth.first_ms = spread_of(std::move(first_ms)).median;
+  growth.last_ms = spread_of(std::move(last_ms)).median;
+  return growth;
 }
 
 }  // namespace
@@ -83,15 +109,25 @@ LimitsResult measure_limits(SceneSpec scene, int sutures, int threads, const std
   SessionOptions options;
   options.threads = threads;
   SessionHooks own = hooks;
-  own.on_cost = SutureWatch(result, scene, on_row);
+  SutureWatch watch(result, scene, on_row);
+  Stretch first, last, now;
+  own.on_cost = [&](const Snapshot& seen, const StageTimes& times, double tick_ms) {
+    const size_t before = result.row.size();
+    if (seen.time_s <= scene.settle) now = {};
+    const bool go_on = watch(seen, times, tick_ms);
+    if (result.row.size() > before) {
+      last = std::exchange(now, {});
+      if (before == 0) first = last;
+    }
+    return go_on;
+  };
+  own.on_step = [&](const Model& model, const State& state, const TickInput& input) {
+    if (now.start.empty()) now.start = save_state(model, state);
+    else now.input.push_back(input);
+  };
   result.run = run_session(scene, options, own);
+  if (result.row.size() > 1) result.growth = sew_in_turns(scene, threads, first, last, hooks.stop);
   return result;
-}
-
-double limits_growth(std::span<const SutureCost> row) {
-  if (row.size() < 2 * kEdge) return 0;
-  const double first = median_solver_ms(row.first(kEdge));
-  return first > 0 ? median_solver_ms(row.last(kEdge)) / first : 0;
 }
 
 std::string limits_csv_header() {
@@ -119,9 +155,10 @@ std::string limits_table(const LimitsResult& result, size_t bodies) {
     text += fmt::format("{:6}  {:6}  {:7}  {:8}  {:17.2f}  {:5.2f}  {:15.2f}  {:5.2f}  {:6.0f}\n", r.suture, r.suture_points,
                         r.settled, r.contacts, r.solver_ms.median, r.solver_ms.p99, r.tick_ms.median, r.tick_ms.p99, r.fps);
   }
-  const double growth = limits_growth(result.row);
-  if (growth > 0) text += fmt::format("solver time of the last five sutures over the first five: {:.2f}\n", growth);
-  else text += fmt::format("growth: needs {} sutures to compare the last five with the first five\n", 2 * kEdge);
+  if (const SutureGrowth& g = result.growth; g.ticks > 0)
+    text += fmt::format(
+        "suture 1 and suture {} sewn again in turns, {} ticks each: solver {:.2f} and {:.2f} ms (median), x {:.2f}\n",
+        result.row.back().suture, g.ticks, g.first_ms, g.last_ms, g.ratio());
   const auto slow =
       std::find_if(result.row.begin(), result.row.end(), [](const SutureCost& r) { return r.fps < kRealTimeFps; });
   const std::string ours = slow != result.row.end() ? fmt::format("here below it from suture {}", slow->suture)

@@ -26,10 +26,20 @@ struct SutureCost {
   double fps = 0;             // that the median tick would allow, with nothing drawn
 };
 
+// The first and the last suture sewn once more, by the same hands from the same states, in turns: a tick of the one, a tick of
+// the other. A processor that changes its clock or is shared does it to both alike, so that their ratio can be trusted where
+// the rows' times cannot.
+struct SutureGrowth {
+  uint64_t ticks = 0;                // of each; 0: fewer than two sutures
+  double first_ms = 0, last_ms = 0;  // solver, median tick
+  double ratio() const { return first_ms > 0 ? last_ms / first_ms : 0; }
+};
+
 struct LimitsResult {
   RunResult run;
   uint32_t wanted = 0;  // sutures
   std::vector<SutureCost> row;
+  SutureGrowth growth;
   bool reached() const { return row.size() >= wanted; }
 };
 
@@ -37,10 +47,6 @@ struct LimitsResult {
 // what was measured by then. on_row: each as it is completed. Throws InputError.
 LimitsResult measure_limits(SceneSpec scene, int sutures, int threads, const std::function<void(const SutureCost&)>& on_row,
                             const SessionHooks& hooks = {});
-
-// Median solver time of the last five sutures over that of the first five; 0 with fewer than ten. Says nothing where the
-// processor changed its clock on the way.
-double limits_growth(std::span<const SutureCost> row);
 
 std::string limits_csv_header();  // with a final newline, as each row
 std::string limits_csv_row(const SutureCost& row);

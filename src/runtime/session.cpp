@@ -54,6 +54,7 @@ class Run {
     tally_.tick(seen_);
     if (ticks_ % kSanityTicks == 0 && !state_is_sane(*model_, *state_)) tally_.not_sane();
     if (hooks_.on_tick) hooks_.on_tick(seen_, doing);
+    if (hooks_.on_step) hooks_.on_step(*model_, *state_, input_);
     if (hooks_.on_cost && !hooks_.on_cost(seen_, times, tick_ms)) enough_ = true;
     if (hooks_.on_progress && ms_since(told_) > 1000) {
       told_ = Clock::now();

@@ -17,6 +17,9 @@
 
 namespace catgut {
 
+struct Model;
+struct State;
+
 const char* catgut_version();
 
 struct Progress {
@@ -29,6 +32,8 @@ struct Progress {
 struct SessionHooks {
   std::function<void(const PictureModel&)> on_start;
   std::function<void(const Snapshot&, const std::string& doing)> on_tick;
+  // What the tick made of the hands' input; before on_cost.
+  std::function<void(const Model&, const State&, const TickInput&)> on_step;
   // What the tick cost, stage by stage and as a whole [ms]; false: enough was seen, the run ends.
   std::function<bool(const Snapshot&, const StageTimes&, double tick_ms)> on_cost;
   std::function<void(const Progress&)> on_progress;  // about once a second of wall time

@@ -1,6 +1,7 @@
 // tests/runtime: what `catgut bench limits` makes of its measurements; that it measures is tested in tests/app.
 #include <gtest/gtest.h>
 
+#include "procedure/scene_file.h"
 #include "runtime/limits.h"
 
 namespace catgut {
@@ -17,13 +18,15 @@ std::vector<SutureCost> rows(size_t n, double first_ms, double last_ms) {
   return row;
 }
 
-TEST(Limits, growth_compares_the_last_five_with_the_first_five) {
-  std::vector<SutureCost> row = rows(21, 1, 3);  // 1.0, 1.1 .. 3.0: medians 1.2 and 2.8
-  EXPECT_NEAR(limits_growth(row), 2.8 / 1.2, 1e-6);
-  row[1].solver_ms.median = 100;  // one suture disturbed by another program does not count for much
-  EXPECT_NEAR(limits_growth(row), 2.8 / 1.3, 1e-6);
-  EXPECT_EQ(limits_growth(rows(9, 1, 3)), 0) << "too few to compare";
-  EXPECT_EQ(limits_growth({}), 0);
+// The sutures that are sewn again in turns are the first and the last, tick by tick as they were.
+TEST(Limits, growth_is_measured_on_the_first_and_the_last_suture_sewn_again) {
+  const LimitsResult result = measure_limits(read_scene("stress_one_body"), 3, 1, {});
+  ASSERT_EQ(result.row.size(), 3u);
+  EXPECT_EQ(result.growth.ticks, std::min(result.row[0].ticks, result.row[2].ticks) - 1);
+  EXPECT_GT(result.growth.ratio(), 0.5);
+  EXPECT_LT(result.growth.ratio(), 2);
+  EXPECT_NE(limits_table(result, 1).find("suture 1 and suture 3 sewn again in turns"), std::string::npos);
+  EXPECT_EQ(measure_limits(read_scene("stress_one_body"), 1, 1, {}).growth.ticks, 0u) << "nothing to compare with";
 }
 
 TEST(Limits, the_table_says_where_it_fell_below_the_limit_and_where_it_did_not) {
