@@ -41,7 +41,6 @@ void style_panels(float scale) {
   style.Colors[ImGuiCol_Separator] = {0.35f, 0.45f, 0.50f, 0.5f};
   style.Colors[ImGuiCol_TableRowBgAlt] = {1, 1, 1, 0.03f};
   style.ScaleAllSizes(scale);
-  ImGui::GetIO().FontGlobalScale = scale;
   ImGui::GetIO().IniFilename = nullptr;
 }
 

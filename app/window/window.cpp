@@ -561,7 +561,9 @@ class Window {
     renderer_->resize(width_, height_);
     const float fits = std::min(static_cast<float>(height_) / 720, static_cast<float>(width_) / 1280);
     style_text_ = settings_.text_size;
-    style_panels(std::clamp(fits, 0.7f, 4.0f) * style_text_);
+    const float scale = std::clamp(fits, 0.7f, 4.0f) * style_text_;
+    renderer_->text_height(16 * scale);
+    style_panels(scale);
   }
 
   // A machine without a graphics card: fewer points rather than fewer pictures, as long as the low quality was asked for. A

@@ -24,6 +24,8 @@ class WindowRenderer {
   // sharp. Half the pixels take about a third of the time on a processor.
   virtual void draw_coarser(float part) = 0;
   virtual void resize(int width, int height) = 0;  // [pixels], when the window has changed
+  // [pixels] of a line of the panels' text. Between frames; 16 at first.
+  virtual void text_height(float pixels) = 0;
 
   struct Frame {
     const Snapshot* snapshot = nullptr;  // null: the field is not drawn

@@ -1,6 +1,9 @@
 // render: the Filament renderer in a window; see render/window.h. The panels are a view of their own, drawn last.
 #include "render/window.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
 #include <stdexcept>
 
@@ -10,6 +13,7 @@
 #include <filament/SwapChain.h>
 #include <filament/View.h>
 #include <filament/Viewport.h>
+#include <imgui.h>
 
 #include "render/filament/egl_platform.h"
 #include "render/filament/start_engine.h"
@@ -17,6 +21,9 @@
 
 namespace catgut {
 namespace {
+
+// [pixels] for which letters are drawn; others are made of the nearest. 720 lines have 16, 1080: 24, 1440: 32, 2160: 48.
+constexpr std::array<float, 11> kTextHeights{11, 13, 16, 19, 22, 24, 28, 32, 40, 48, 64};
 
 class FilamentWindow final : public WindowRenderer {
  public:
@@ -28,8 +35,19 @@ class FilamentWindow final : public WindowRenderer {
     panel_view_ = engine_->createView();
     panel_view_->setPostProcessingEnabled(false);
     panel_view_->setShadowingEnabled(false);
+    panels_ = std::make_unique<filagui::ImGuiHelper>(engine_, panel_view_, utils::Path());
+    // All heights at once: the panels' materials keep the first letters they are given.
+    ImFontAtlas& letters = *ImGui::GetIO().Fonts;
+    letters.Clear();
     const bool there = !font.empty() && std::filesystem::exists(font);
-    panels_ = std::make_unique<filagui::ImGuiHelper>(engine_, panel_view_, utils::Path(there ? font.c_str() : ""));
+    for (const float pixels : kTextHeights) {
+      ImFontConfig built_in;
+      built_in.SizePixels = pixels;
+      if (there) letters.AddFontFromFileTTF(font.c_str(), pixels);
+      else letters.AddFontDefault(&built_in);
+    }
+    panels_->createAtlasTexture(engine_);
+    text_height(16);
     resize(width, height);
   }
 
@@ -56,6 +74,14 @@ class FilamentWindow final : public WindowRenderer {
     width_ = std::max(width, 16), height_ = std::max(height, 16);
     panel_view_->setViewport({0, 0, uint32_t(width_), uint32_t(height_)});
     panels_->setDisplaySize(width_, height_);
+  }
+
+  void text_height(float pixels) override {
+    const auto nearest = std::min_element(kTextHeights.begin(), kTextHeights.end(),
+                                          [&](float a, float b) { return std::abs(a - pixels) < std::abs(b - pixels); });
+    ImGuiIO& io = ImGui::GetIO();
+    io.FontDefault = io.Fonts->Fonts[static_cast<int>(nearest - kTextHeights.begin())];
+    io.FontGlobalScale = pixels / *nearest;
   }
 
   bool draw(const Frame& frame) override {
