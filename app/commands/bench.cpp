@@ -1,5 +1,5 @@
-// app: `catgut bench`: where the time of a tick goes, and (limits.cpp) what it costs as sutures are added, and (frame.cpp) what
-// a picture costs. The paper's tables come in a later version.
+// app: `catgut bench`: where the time of a tick goes; what it costs as sutures are added (limits.cpp), in the paper's tables
+// (paper.cpp); what a picture costs (frame.cpp); what a hand feels (haptics.cpp).
 #include <cstdio>
 #include <memory>
 
@@ -14,7 +14,7 @@ namespace {
 struct BenchOptions {
   std::string what, json, out;
   std::vector<std::string> scene, set;
-  int repeat = 1, threads = 1, sutures = 50;
+  int repeat = 1, threads = 1, sutures = 50, executions = 10;
   double seconds = 0;
 };
 
@@ -60,9 +60,13 @@ int bench(const BenchOptions& o) {
   if (o.what == "stages") return bench_stages(o);
   if (o.what == "frame")
     return bench_frame({o.scene.empty() ? "lembert" : o.scene[0], o.json, o.set, o.seconds > 0 ? o.seconds : 30});
+  if (o.what == "paper") {
+    const std::vector<std::string> four{"purse_string", "connell", "stay", "lembert"};
+    return bench_paper({o.scene.empty() ? four : o.scene, o.set, o.out, o.executions, o.threads});
+  }
   if (o.what != "limits")
     throw InputError("bench " + o.what, "not available yet in this version",
-                     "use `catgut bench stages`, `catgut bench limits`, `catgut bench frame` or `catgut bench haptics`");
+                     "use `catgut bench paper`, `stages`, `limits`, `frame` or `haptics`");
   const std::vector<std::string> both{"stress_one_body", "stress_two_bodies"};
   return bench_limits({o.scene.empty() ? both : o.scene, o.set, o.out.empty() ? "out/limits" : o.out, o.sutures, o.threads});
 }
@@ -73,9 +77,11 @@ void add_bench(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<BenchOptions>();
   CLI::App* command = app.add_subcommand("bench", "measure where the time goes");
   command
-      ->add_option("what", o->what,
-                   "stages: where a tick's time goes; limits: what each further suture costs; frame: a stereo frame without a "
-                   "rasteriser; haptics: what a hand feels of a slow simulation (paper and scale come later)")
+      ->add_option(
+          "what", o->what,
+          "paper: its tables 1 to 4 with ours beside them; stages: where a tick's time goes; limits: what each further "
+          "suture costs; frame: a stereo frame without a rasteriser; haptics: what a hand feels of a slow simulation "
+          "(scale comes later)")
       ->required()
       ->check(CLI::IsMember({"paper", "limits", "scale", "stages", "frame", "haptics"}))
       ->type_name("paper|limits|scale|stages|frame|haptics");
@@ -84,17 +90,23 @@ void add_bench(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   add_threads_option(*command, o->threads);
-  command->add_option("--scene", o->scene, "scene to run (stages: purse_string; frame: lembert; limits: the two stress scenes)")
+  command
+      ->add_option(
+          "--scene", o->scene,
+          "scene to run (paper: all four techniques; stages: purse_string; frame: lembert; limits: the two stress scenes)")
       ->type_name("NAME");
   command->add_option("--seconds", o->seconds, "simulated time; else until the surgeon is done (stages), 30 s (frame)")
       ->check(CLI::Range(0.001, 1e6));
   command->add_option("--sutures", o->sutures, "limits: bites in each scene")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+  command->add_option("--executions", o->executions, "paper: of each technique, each with another seed")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   command
       ->add_option("--out", o->out,
-                   "limits: folder for a table (CSV) and a plot (PNG) of each scene (out/limits); haptics: for forces.png, "
-                   "what a bite and a knot feel like")
+                   "folder. limits: for a table (CSV) and a plot (PNG) of each scene (out/limits); paper: for the tables "
+                   "(tables.md, tables.csv); haptics: for forces.png, what a bite and a knot feel like")
       ->type_name("DIR");
   command->add_option("--set", o->set, "change a key of the scene: key=value")->take_all()->allow_extra_args(false);
   command->callback([o, &exit_code] { exit_code = bench(*o); });

@@ -28,6 +28,14 @@ struct LimitsOptions {
 };
 int bench_limits(const LimitsOptions& options);
 
+// `catgut bench paper` (app/commands/paper.cpp). Code 1 when an execution did not sew what its scene expects.
+struct PaperOptions {
+  std::vector<std::string> scene, set;
+  std::string out;  // folder; empty: none
+  int executions = 10, threads = 1;
+};
+int bench_paper(const PaperOptions& options);
+
 // `catgut bench frame` (app/commands/frame.cpp).
 struct FrameOptions {
   std::string scene, json;

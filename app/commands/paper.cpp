@@ -1,0 +1,93 @@
+// app: `catgut bench paper`: tables 1 to 4 of the paper, our figures beside its own.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <fstream>
+#include <stdexcept>
+#include <thread>
+
+#include "commands/commands.h"
+#include "core/check.h"
+#include "procedure/scene_file.h"
+#include "render/frame_cost.h"
+#include "runtime/paper_tables.h"
+
+namespace catgut {
+namespace {
+
+constexpr int kEyeWidth = 1440, kEyeHeight = 1584;  // [pixels] a usual headset's
+
+std::string this_machine() {
+  std::ifstream info("/proc/cpuinfo");
+  std::string name = "an unknown processor";
+  for (std::string line; std::getline(info, line);)
+    if (line.rfind("model name", 0) == 0) {
+      name = line.substr(line.find(':') + 2);
+      break;
+    }
+  return fmt::format("{}, {} hardware threads", name, std::thread::hardware_concurrency());
+}
+
+// Empty in a build without pictures.
+std::function<PictureCost(const PictureModel&)> stereo_picture() {
+  try {
+    make_frame_cost({}, kEyeWidth, kEyeHeight, Quality::medium, 2);
+  } catch (const std::runtime_error&) { return {}; }
+  return [](const PictureModel& model) -> PictureCost {
+    const std::shared_ptr<FrameCost> picture = make_frame_cost(model, kEyeWidth, kEyeHeight, Quality::medium, 2);
+    const auto follow = std::make_shared<FollowCamera>(model);
+    return [picture, follow](const Snapshot& seen) {
+      const Camera middle = follow->update(seen, 1.0f / 15);
+      Camera eyes[2] = {middle, middle};
+      const Vec3 apart = normalized(cross(middle.target - middle.eye, middle.up)) * 0.032f;
+      eyes[0].eye -= apart, eyes[1].eye += apart;
+      return picture->frame(seen, eyes).caller_ms;
+    };
+  };
+}
+
+}  // namespace
+
+int bench_paper(const PaperOptions& o) {
+  std::vector<SceneSpec> scenes;
+  for (const std::string& name : o.scene) {
+    scenes.push_back(read_scene(name));
+    for (const std::string& setting : o.set) set_value(scenes.back(), setting);
+    if (scenes.back().technique.name == "none")
+      throw InputError(name, "it has no technique that the scripted surgeon could sew",
+                       "name purse_string, connell, stay or lembert");
+  }
+  if (!o.out.empty())
+    for (const char* name : {"/tables.md", "/tables.csv"}) prepare_output(o.out + name);
+  const auto picture = stereo_picture();
+  SessionHooks hooks;
+  hooks.stop = &stop_on_interrupt();
+  const std::string about = fmt::format(
+      "On {}. Mean ± standard deviation over {} executions of their median ticks; the paper's figures beside them (i7-13700KF, "
+      "RTX 4070 Ti, drawn in a headset). frame: the surgeon's plan, the tick{} one after another.\n\n",
+      this_machine(), o.executions,
+      picture ? " and a stereo picture handed to a driver that rasterises nothing," : " (no pictures in this build)");
+  std::fputs(about.c_str(), stdout);
+  std::string markdown = about, csv = paper_csv_header();
+  bool all_sewn = true, interrupted = false;
+  for (const SceneSpec& scene : scenes) {
+    hooks.on_progress = progress_line();
+    const PaperTable table = measure_paper(scene, o.executions, o.threads, picture, hooks);
+    end_progress_line();
+    const std::string text = paper_markdown(table);
+    std::fputs(text.c_str(), stdout);
+    std::fflush(stdout);
+    markdown += text, csv += paper_csv(table);
+    all_sewn = all_sewn && table.sewn == o.executions;
+    interrupted = table.interrupted;
+    if (interrupted) break;
+  }
+  if (!o.out.empty()) {
+    write_output(o.out + "/tables.md", markdown);
+    write_output(o.out + "/tables.csv", csv);
+    std::printf("%s/tables.md  %s/tables.csv\n", o.out.c_str(), o.out.c_str());
+  }
+  return interrupted ? 130 : all_sewn ? 0 : 1;
+}
+
+}  // namespace catgut

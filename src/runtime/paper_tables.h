@@ -1,0 +1,57 @@
+// runtime: the paper's tables 1 to 4 with our figures beside its own: what a technique costs at rest, while it is sewn, while
+// its knots are made, and when it is done (sections 3.1 to 3.4). The scripted surgeon sews it a few times, each with hands of
+// his own (another seed).
+#pragma once
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "runtime/session.h"
+
+namespace catgut {
+
+// Which of the paper's phases a tick belongs to, in the paper's words: "Start" until the hands are let in, "During suturing",
+// "During looping" from the first loop round a tool to the end of its knot (the next bite or needle, or the end of the work),
+// "After completion" when the surgeon is done. With `numbered` (Lembert) every suture is its own: "Suture #2", "Loop #2".
+class PaperPhase {
+ public:
+  explicit PaperPhase(bool numbered) : numbered_(numbered) {}
+  // events: of the tick. settled: the hands are in. done: the surgeon has finished.
+  std::string operator()(std::span<const Event> events, bool settled, bool done);
+
+ private:
+  bool numbered_, looping_ = false;
+  int suture_ = 1;
+};
+
+struct PhaseCost {
+  std::string phase;
+  // One for each execution: medians over the ticks of the phase [ms]. frame: surgeon, tick and picture, one after another.
+  std::vector<double> solver_ms, frame_ms;
+};
+
+struct PaperTable {
+  std::string technique, preset;
+  size_t particles = 0;
+  int threads = 1, substeps = 0;
+  double tick_rate = 0;  // [1/s]
+  int executions = 0;    // that were run to their end
+  int sewn = 0;          // of these, with everything the scene expects
+  bool pictures = false;
+  bool interrupted = false;
+  std::vector<PhaseCost> phase;  // in the order in which they came
+};
+
+// picture_ms: makes, at the start of an execution, what measures the picture of a snapshot [ms], asked in every fourth tick; it
+// may be empty, and frames are then without. Throws InputError (a scene that the scripted surgeon cannot sew).
+using PictureCost = std::function<double(const Snapshot&)>;
+PaperTable measure_paper(SceneSpec scene, int executions, int threads,
+                         const std::function<PictureCost(const PictureModel&)>& picture_ms, const SessionHooks& hooks = {});
+
+// As Markdown: a row for each phase; mean and standard deviation over the executions, the paper's figure beside them.
+std::string paper_markdown(const PaperTable& table);
+std::string paper_csv_header();  // with a final newline
+std::string paper_csv(const PaperTable& table);
+
+}  // namespace catgut
