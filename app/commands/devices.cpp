@@ -62,6 +62,7 @@ int devices(const Options& o) {
   }
   if (o.calibrate) return calibrate(std::move(port), o);
   if (!test) {
+    read_arm_places(arm_places_file());  // says here what a scene would stumble over
     std::printf("catgut devices --test pushes each gently; catgut play --haptics touch uses them\n");
     return 0;
   }

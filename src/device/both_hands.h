@@ -7,6 +7,7 @@
 
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
+#include "exchange/tying.h"
 
 namespace catgut {
 
@@ -15,15 +16,12 @@ enum class BothDo : uint8_t { nothing, wind, draw };
 // What the two hands are about, kept from one call to the next.
 struct BothHands {
   BothDo doing = BothDo::nothing;
-  int stage = 0;                            // of winding: see both_hands.cpp
-  float way = 0;                            // +1, -1: of the last winding; 0: nothing was wound yet
-  Vec3 start;                               // [m] where the strand leaves the stitch
-  float reach = 0, height = 0, ground = 0;  // [m] of strand; of the tool over the stitch; below it the needle would meet tissue
-  float wound = 0, wish = 0;                // [rad] so far; still asked for
-  float lean = 0, free = 0;                 // of the strand that leaves; [m] of strand between tool and needle, as it is felt
-  float held_for = 0;                       // [s] in this stage
-  Vec3 lain;                                // [m] where winding last left the tool that is wound round
-  bool follows = false;                     // the needle's hand goes along with the tool that carries the loop
+  int stage = 0;         // of winding: see both_hands.cpp
+  float wish = 0;        // [rad] still asked for
+  Winding winding;       // way 0: nothing was wound yet
+  float held_for = 0;    // [s] in this stage
+  Vec3 lain;             // [m] where winding last left the tool that is wound round
+  bool follows = false;  // the needle's hand goes along with the tool that carries the loop
 };
 
 // hand: tool poses as the hands have them, moved here by what dt allows. grip: of the hand that holds the needle, tool in the
@@ -38,10 +36,6 @@ void go_along(BothHands& b, size_t who, std::array<Pose, 2>& hand, const Pose& g
 
 // Where hand `who` best takes the tail of the thread: clear of the other strand, no tissue in the way of its shaft, near the
 // knot, within what the loop on it leaves. False: there is no tail.
-struct TailGrip {
-  uint32_t slot = 0;  // of the thread
-  Pose pose;
-};
 bool tail_grip(const PictureModel& picture, const Snapshot& seen, size_t who, TailGrip& out);
 
 // A hand that feels nothing would tear a stitch with one jerk: what holds an end of the thread comes no more than a little

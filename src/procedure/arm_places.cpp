@@ -3,10 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <string_view>
 
 #include "core/check.h"
 #include "procedure/toml.h"
@@ -14,14 +17,16 @@
 namespace catgut {
 namespace {
 
+constexpr std::string_view kKeys[] = {"scale", "turn", "x", "y", "z"};
+constexpr const char* kNext = "put it right, or remove the file and calibrate anew: catgut devices --calibrate";
+
 float number(const toml::table& t, const char* key, float otherwise, float least, float most, const std::string& where) {
   const toml::node* node = t.get(key);
   if (!node) return otherwise;
   const std::optional<double> value = node->value<double>();
   const std::string line = where + ":" + std::to_string(node->source().begin.line);
   if (!value || !(*value >= double{least} && *value <= double{most}))
-    throw InputError(line, std::string(key) + " is no number between " + fmt::format("{} and {}", least, most),
-                     "put it right, or calibrate anew: catgut devices --calibrate");
+    throw InputError(line, std::string(key) + " is no number between " + fmt::format("{} and {}", least, most), kNext);
   return static_cast<float>(*value);
 }
 
@@ -40,17 +45,29 @@ std::string arm_places_file() {
 std::map<std::string, ArmPlace> read_arm_places(const std::string& path) {
   std::map<std::string, ArmPlace> places;
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return places;
+  using std::filesystem::file_type;
+  const file_type type = std::filesystem::status(path, error).type();
+  if (type == file_type::directory) throw InputError(path, "is a folder", "set CATGUT_ARMS to a file");
+  if (type != file_type::regular && type != file_type::none) return places;
+  std::ifstream in(path, std::ios::binary);
+  std::string text;
+  for (char part[4096]; in.read(part, sizeof part) || in.gcount() > 0;) text.append(part, static_cast<size_t>(in.gcount()));
+  if (!in.is_open() || in.bad()) throw InputError(path, "cannot be read", "allow it, or set CATGUT_ARMS to another file");
   toml::table file;
   try {
-    file = toml::parse_file(path);
+    file = toml::parse(text, path);
   } catch (const toml::parse_error& e) {
-    throw InputError(path + ":" + std::to_string(e.source().begin.line), std::string(e.description()),
-                     "put it right, or remove the file and calibrate anew: catgut devices --calibrate");
+    throw InputError(path + ":" + std::to_string(e.source().begin.line), std::string(e.description()), kNext);
   }
   for (const auto& [serial, node] : file) {
+    const auto refuse = [&](const toml::node& at, const std::string& what) {
+      throw InputError(path + ":" + std::to_string(at.source().begin.line), what, kNext);
+    };
     const toml::table* t = node.as_table();
-    if (!t) continue;
+    if (!t) refuse(node, std::string(serial.str()) + " is no table [SERIAL NUMBER]");
+    for (const auto& [key, value] : *t)
+      if (std::find(std::begin(kKeys), std::end(kKeys), key.str()) == std::end(kKeys))
+        refuse(value, std::string(key.str()) + " is not known; an arm has scale, turn, x, y and z");
     ArmPlace p;
     p.scale = number(*t, "scale", p.scale, 0.1f, 3, path);
     p.turn = number(*t, "turn", p.turn, -180, 180, path);

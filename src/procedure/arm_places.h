@@ -16,7 +16,8 @@ struct ArmPlace {
 
 // CATGUT_ARMS, else catgut/arms.toml in XDG_CONFIG_HOME or ~/.config.
 std::string arm_places_file();
-// By serial number. Empty when there is no file. Throws InputError with file and line.
+// By serial number. Empty when there is no file. What cannot be read or understood is never passed over, because calibrating
+// would write over it: InputError with file and line.
 std::map<std::string, ArmPlace> read_arm_places(const std::string& path);
 void write_arm_places(const std::string& path, const std::map<std::string, ArmPlace>& places);
 

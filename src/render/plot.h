@@ -1,5 +1,5 @@
-// render: a small plot: curves over a common x axis, a logarithmic y axis, level lines with a name. For reports of the program
-// itself; needs neither a graphics card nor a font file.
+// render: a small plot: curves over a common x axis, a logarithmic or linear y axis, shaded bands and level lines with a name.
+// For reports of the program itself; needs neither a graphics card nor a font file.
 #pragma once
 #include <array>
 #include <string>
@@ -12,20 +12,33 @@ namespace catgut {
 struct PlotCurve {
   std::string name;
   Colour colour{};
-  std::vector<std::array<double, 2>> point;  // x ascending; y above 0, others are left out
+  std::vector<std::array<double, 2>> point;  // on a logarithmic axis y above 0, others are left out
   bool joined = true;                        // false: points alone, as crosses
+  bool dots = true;                          // on a joined curve: where its points are
 };
 struct PlotLevel {
   std::string name;
   double y = 0;
 };
+// What is expected between `from` and `to`, behind the curves: from `low` to `high` at either end. Its name stands in the key.
+struct PlotBand {
+  std::string name;
+  Colour colour{};
+  double from = 0, to = 0;
+  std::array<double, 2> low{}, high{};
+};
+enum class PlotAxis { logarithmic, linear };
 struct Plot {
   std::string title, x_name, y_name;
   std::vector<PlotCurve> curve;
   std::vector<PlotLevel> level;
+  std::vector<PlotBand> band;
+  PlotAxis y_axis = PlotAxis::logarithmic;
+  // Where the axes end; 0: where everything fits. Beyond x_most nothing is drawn, beyond y_most along the edge.
+  double x_most = 0, y_most = 0;
 };
 
-// The axes hold every point and every level; y in whole decades.
+// The x axis begins at 0, and so does a linear y axis; a logarithmic one has whole decades, whatever y_most is.
 Image draw_plot(const Plot& plot, int width = 720, int height = 420);
 
 }  // namespace catgut

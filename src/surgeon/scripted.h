@@ -7,6 +7,7 @@
 #include <array>
 #include <string>
 
+#include "exchange/tying.h"
 #include "surgeon/hands.h"
 #include "surgeon/plan.h"
 #include "surgeon/sight.h"
@@ -96,22 +97,16 @@ class Scripted final : public Surgeon {
   bool regrip(const Snapshot& seen);
 
   // Where the stitch is tied: at its knot, else in the middle between the ends of its thread in the tissue.
-  Vec3 stitch(const Snapshot& seen) const;
-  Vec3 swage(const Snapshot& seen) const { return transform(seen.needle.pose, Vec3{picture_.needle_radius, 0, 0}); }
+  Vec3 stitch(const Snapshot& seen) const { return stitch_place(picture_, seen); }
+  Vec3 swage(const Snapshot& seen) const { return needle_swage(picture_, seen); }
   // Moves the forceps so that the needle's swage, which it holds, comes to `goal`.
   bool carry_swage(const Snapshot& seen, Vec3 goal, float speed);
 
-  // [m] height of the highest tissue within `radius` of a place, seen from above; that far below it where there is none.
-  float highest_near(const Snapshot& seen, Vec3 p, float radius) const;
   // The driver, which holds the tail, brings it to where the next throw finds it: in front, clear of the needle's strand.
   bool lay_tail(const Snapshot& seen);
 
-  // Where on the tail, and from which side, the driver is best to take it: clear of the other strand, no tissue in the way.
+  // Where on the tail, and from which side, the driver is best to take it; not where it just missed.
   void choose_grasp(const Snapshot& seen);
-
-  // How much strand [m] is left between two hands is felt: a little is given while it is taut and taken while it is slack. By
-  // eye it cannot be known: four per cent of slack let it sag by a seventh of its length.
-  float feel(float strand, float tension) const;
 
   // An instrument tie. The needle's strand is held up, the driver is laid beside it, the forceps carries the strand round the
   // driver; then the driver, the loop on it, takes the tail and the hands pull apart.
@@ -153,11 +148,7 @@ class Scripted final : public Surgeon {
   float depth_fix_ = 0;  // [m] what the failed attempts at this bite taught; positive: shallower
   Pose pull_from_;
   // A throw.
-  Vec3 start_;
-  float reach_ = 0, height_ = 0, wound_ = 0;
-  float lean_ = 0;   // of the strand that leaves the driver, toward its tip
-  float floor_ = 0;  // [m] height below which the needle would meet tissue
-  float free_ = 0;   // [m] of strand between driver and needle, as it is felt
+  Winding winding_;  // reckoned by exchange/tying, as the help for hands without hardware does it
   size_t cuts_before_ = 0, settled_before_ = 0;
   uint32_t throws_before_ = 0, take_slot_ = 0;
   Quat take_turn_;

@@ -8,39 +8,15 @@ namespace {
 
 constexpr float kHalfOpen = 0.7f;             // a jaw that lets go without shaking off a loop
 constexpr float kStump = 0.007f;              // [m] of thread left on a knot
-constexpr float kWindAt = 0.024f;             // [m] behind the driver's tip, where thread is wound round it
-constexpr float kWindRadius = 0.0028f;        // [m] of a wrap's middle line
-constexpr float kBefore = -0.25f;             // [rad] where the strand stands before it is wound
-constexpr float kWound = 0.0022f;             // [m] of thread that a radian takes
-constexpr float kApart = 0.010f;              // [m] along the driver, by which the strand's two ends stand apart
-constexpr float kLeadBack = 0.004f;           // [m] toward the hand
-constexpr float kLean = 0.3f;                 // of the strand that leaves, along the driver
-constexpr float kTaut = 0.975f;               // of the strand's length, between driver and needle: just not taut
-constexpr float kShaft = 0.0035f;             // [m] a shaft's radius and the tissue's
-constexpr float kClear = 0.006f;              // [m] between jaws that take the tail and the other strand
-constexpr float kNeedleBelow = 0.007f;        // [m] that the needle hangs below its swage
-constexpr float kLoose = 0.7f;                // of the strand between the turns and the needle, on the way to the tail
-constexpr float kTooTaut = 0.3f;              // [N]
-constexpr float kLeastFree = 0.032f;          // [m] of strand that must be left to go round the driver
 constexpr float kLeastFreeForOwn = 0.038f;    // the same where the strand is then led along the driver to its jaws
 constexpr float kWindOwnAt = 0.022f;          // [m] behind the tip, where such a strand is wound
 constexpr float kTailAside = 0.030f;          // [m] from the stitch, where the tail is laid down
-constexpr float kDeep = 0.010f;               // [m] below the knot, where a tail is still easy to reach
-constexpr float kNear = 0.035f;               // [m] round a stitch: tissue that hands go over
 constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the middle of the field, where a used needle is let go
 constexpr float kTyingAt = 0.12f;             // place on the needle's arc: behind the swage
 
-// A tool along z, the open side of its jaws up.
-Quat from_tool_axis(Vec3 z) {
-  const Vec3 x = normalized(Vec3{0, 1, 0} - z * z.y);
-  return from_axes(x, cross(z, x), z);
-}
-
 }  // namespace
 
-Pose Scripted::tying_pose(size_t hand, Vec3 at) {
-  return {at, from_tool_axis(normalized(Vec3{hand == kDriver ? 1.0f : -1.0f, 0.3f, 0.15f}))};
-}
+Pose Scripted::tying_pose(size_t hand, Vec3 at) { return {at, from_tool_axis(tying_axis(hand == kDriver ? 1.0f : -1.0f))}; }
 
 bool Scripted::regrip(const Snapshot& seen) {
   enum { first = 0, over = 10, down, close, give };
@@ -76,23 +52,8 @@ bool Scripted::regrip(const Snapshot& seen) {
   }
 }
 
-Vec3 Scripted::stitch(const Snapshot& seen) const {
-  if (!seen.knot.empty()) return seen.knot.back().position;
-  if (seen.suture_point.empty()) return picture_.focus;
-  return 0.5f * (seen.suture_point.front().position + seen.suture_point.back().position);
-}
-
 bool Scripted::carry_swage(const Snapshot& seen, Vec3 goal, float speed) {
   return move(kForceps, {goal + (seen.tool[kForceps].pose.p - swage(seen)), tying_pose(kForceps, {}).q}, speed);
-}
-
-float Scripted::highest_near(const Snapshot& seen, Vec3 p, float radius) const {
-  float y = p.y - radius;
-  for (size_t i = 0; i < picture_.particle_rest.size(); ++i) {
-    const Vec3 d = seen.particle[i] - p;
-    if (d.x * d.x + d.z * d.z < radius * radius) y = std::max(y, seen.particle[i].y);
-  }
-  return y;
 }
 
 bool Scripted::lay_tail(const Snapshot& seen) {
@@ -102,42 +63,10 @@ bool Scripted::lay_tail(const Snapshot& seen) {
 }
 
 void Scripted::choose_grasp(const Snapshot& seen) {
-  const Vec3 knot = stitch(seen);
-  const size_t point = first_point_node(seen), root = node_along(seen, point, distance(node_at(seen, point), knot), -1);
-  const float tail = length_between(seen, 0, root);
-  // What lies between tissue and turns is all there is: the jaws come no further.
-  const float leash = 0.9f * (length_between(seen, last_point_node(seen), node_of(seen, seen.tool[kDriver].loop_first)) -
-                              distance(node_at(seen, last_point_node(seen)), knot));
-  const Vec3 ways[] = {{1, 0.3f, 0.15f}, {0.8f, 0.5f, 0.6f}, {0.5f, 0.4f, 1}, {0.7f, 1, 0.1f}};
-  float best = -1e9f;
-  for (size_t i = node_along(seen, root, std::min(0.010f, 0.5f * tail), -1); i-- > 1;) {
-    if (length_between(seen, 0, i) < 0.2f * tail || (i < seen.thread_cut.size() && seen.thread_cut[i])) break;
-    const Vec3 tip = node_at(seen, i);
-    for (const Vec3& way : ways) {
-      const Vec3 z = normalized(way);
-      // The needle's strand as it will run when the jaws are there: from the knot to the turns behind them.
-      const Vec3 run = tip + z * kWindAt - knot;
-      const float s = std::clamp(dot(tip - knot, run) / std::max(length2(run), 1e-12f), 0.0f, 1.0f);
-      float good = std::min(distance(tip, knot + run * s), kClear) / kClear;
-      if (length(run) > leash) good -= 1 + 100 * (length(run) - leash);
-      // Tissue in the way of the shaft.
-      for (size_t k = 0; k < picture_.particle_rest.size(); ++k) {
-        const Vec3 d = seen.particle[k] - tip;
-        const float along = dot(d, z);
-        if (along > 0.003f && along < 0.06f && length2(d - z * along) < kShaft * kShaft) good -= 0.1f;
-      }
-      // Where the tail has slipped down between the edges it is taken up there: below, hands and needle would meet tissue.
-      good -= 50 * std::max(0.0f, knot.y - kDeep - tip.y);
-      // Near the knot little else lies about. Where it was tried in vain it is not tried again.
-      good -= 12 * distance(tip, knot) + (misses_ > 0 && distance(tip, tried_) < 0.004f ? 0.5f : 0.0f);
-      if (good > best) best = good, take_slot_ = seen.thread_order[i], take_turn_ = from_tool_axis(z);
-    }
-  }
+  TailGrip grip;
+  if (best_tail_grip(picture_, seen, kDriver, 1, kTailByScript, misses_ > 0 ? &tried_ : nullptr, grip))
+    take_slot_ = grip.slot, take_turn_ = grip.pose.q;
   tried_ = node_at(seen, node_of(seen, take_slot_));
-}
-
-float Scripted::feel(float strand, float tension) const {
-  return strand + dt_ * (tension < 0.02f ? 0.012f : tension > 0.1f ? -std::min(0.06f, 0.1f * tension) : 0.0f);
 }
 
 bool Scripted::tie(const Task& task, const Snapshot& seen) {
@@ -149,60 +78,34 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   const float side = static_cast<float>(task.way);
   const size_t last = seen.thread_order.size() - 1;
   if (stage_ == lift && waited_ <= dt_) {
-    // The strand rises from the last suture point, or from the knot that is already on it.
-    const bool from_point = !seen.suture_point.empty() && (own_strand || seen.knot.empty());
-    start_ = from_point ? seen.suture_point.back().position : stitch(seen);
-    // What the knot holds already is no longer in the hand.
-    const float spent = seen.suture_point.empty() ? 0 : distance(seen.suture_point.back().position, start_);
-    reach_ = std::max(0.03f, length_between(seen, last_point_node(seen), last) - spent);
-    // So high that the needle, going round below on a taut strand, keeps clear of the tissue, as far as a short strand allows.
-    const float crest = highest_near(seen, start_, kNear), rise = crest - start_.y;
-    floor_ = crest + kNeedleBelow;
-    height_ = std::clamp(0.5f * (reach_ + rise + kNeedleBelow), 0.025f,
-                         std::max(0.025f, reach_ - (own_strand ? kLeastFreeForOwn : kLeastFree)));
-    wound_ = kBefore;
-    lean_ = kLean;
+    begin_winding(winding_, picture_, seen, own_strand ? kLeastFreeForOwn : kTieLeastFree, own_strand);
     throws_before_ = locked_throws(seen);
   }
-  // Across the driver: e1 away from the tissue, e2 to its side.
-  const Vec3 z = rotate(tying_pose(kDriver, {}).q, {0, 0, 1}), e1 = normalized(Vec3{0, 1, 0} - z * z.y), e2 = cross(z, e1);
-  // The strand comes up on the hand's side of the turn and leaves on the tip's: the two never meet.
-  const Vec3 axis_at = start_ + e1 * height_ - e2 * (side * kWindRadius) - z * kApart;
-  const float wind_at = own_strand ? kWindOwnAt : kWindAt;
-  const Pose lying = tying_pose(kDriver, axis_at - z * wind_at);
-  // The needle when the strand leaves the driver after turning by w about it. A strand that is short for the height goes slack
-  // below, where there is no room for it, and is drawn taut again behind.
+  winding_.way = side;
+  const AcrossTool across(rotate(tying_pose(kDriver, {}).q, {0, 0, 1}));
+  const Vec3 axis_at = winding_axis(winding_, across);
+  const float wind_at = own_strand ? kWindOwnAt : kTieWindAt;
+  const Pose lying = tying_pose(kDriver, axis_at - across.z * wind_at);
   float room = 1;
-  auto swage_at = [&](float w) {
-    const float way = side * w;
-    const Vec3 leave = axis_at + kWindRadius * (e2 * (side * std::cos(w)) + e1 * std::sin(w));
-    const Vec3 to = e1 * std::cos(way) - e2 * std::sin(way);
-    room = to.y < 0 ? std::max(0.012f, (leave.y - floor_) / -to.y) : 1;
-    // The forceps' shaft lies on the tip's side. A slack strand would slide off there: it is led back.
-    return leave + to * std::min(free_, room) - z * (room < free_ ? -kLeadBack : std::clamp(lean_ * free_, -kApart, kApart));
-  };
+  auto swage_at = [&](float w) { return winding_swage(winding_, across, w, room); };
   const float tension = needle_tension(seen);
-  if (stage_ == lift && waited_ <= dt_) free_ = kTaut * (reach_ - distance(start_, axis_at));
-  const float behind = stage_ <= wind ? distance(swage(seen), swage_at(wound_)) : 0;
-  // Before the first throw nothing but friction holds the thread in its holes: no more is asked for than there is.
-  const float there_is = reach_ - distance(start_, axis_at) - kWound * std::max(0.0f, wound_) + 0.002f;
-  const float most = seen.knot.empty() ? std::max(0.006f, there_is) : reach_;
-  if ((stage_ == beside || stage_ == wind) && ((behind < 0.005f && room > free_) || tension > kTooTaut))
-    free_ = std::clamp(feel(free_, tension), 0.006f, most);
+  if (stage_ == lift && waited_ <= dt_) winding_.free = kTieTaut * (winding_.reach - distance(winding_.start, axis_at));
+  const float behind = stage_ <= wind ? distance(swage(seen), swage_at(winding_.wound)) : 0;
+  if (stage_ == beside || stage_ == wind) feel_winding(winding_, seen, across, behind, room, dt_);
   switch (stage_) {
     case lift:
       jaw(kDriver, kHalfOpen);
-      move(kDriver, {lying.p - e2 * (side * 0.03f) + Vec3{0, 0.01f, 0}, lying.q}, skill_.speed);
-      if (carry_swage(seen, swage_at(wound_), skill_.speed)) go(lay);
+      move(kDriver, {lying.p - across.e2 * (side * 0.03f) + Vec3{0, 0.01f, 0}, lying.q}, skill_.speed);
+      if (carry_swage(seen, swage_at(winding_.wound), skill_.speed)) go(lay);
       else if (!patience(8)) go(lay);
       return false;
     case lay:
-      carry_swage(seen, swage_at(wound_), skill_.speed);
-      if (move(kDriver, {lying.p - e2 * (side * 0.012f), lying.q}, skill_.speed)) go(beside);
+      carry_swage(seen, swage_at(winding_.wound), skill_.speed);
+      if (move(kDriver, {lying.p - across.e2 * (side * 0.012f), lying.q}, skill_.speed)) go(beside);
       else if (!patience(6)) gave_up_ = true;
       return false;
     case beside:
-      carry_swage(seen, swage_at(wound_), careful());
+      carry_swage(seen, swage_at(winding_.wound), careful());
       if ((move(kDriver, lying, careful()) && tension > 0.02f) || !patience(4)) go(wind);
       return false;
     case wind: {
@@ -210,9 +113,10 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       // The needle is not hurried on while it lags behind: the strand would go slack, or cut the corner.
       const float turn = 2.2f * dt_ * std::clamp(1.5f - behind / 0.006f, 0.0f, 1.0f);
       // Wound and no loop yet: its ends lie too far apart along the driver, and are led together.
-      if (wound_ + turn < want + 0.9f) wound_ += turn, free_ = std::max(0.006f, free_ - kWound * turn);
-      else lean_ = std::max(-2 * kLean, lean_ - kLean * dt_);
-      carry_swage(seen, swage_at(wound_), 1.2f * skill_.speed);
+      if (winding_.wound + turn < want + 0.9f)
+        winding_.wound += turn, winding_.free = std::max(0.006f, winding_.free - kTieWound * turn);
+      else winding_.lean = std::max(-2 * kTieLean, winding_.lean - kTieLean * dt_);
+      carry_swage(seen, swage_at(winding_.wound), 1.2f * skill_.speed);
       move(kDriver, lying, careful());
       if (driver.loop_wraps >= static_cast<uint32_t>(task.which)) go(over);
       else if (!patience(9)) go(unwind);
@@ -227,12 +131,11 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       if (stage_ == over && waited_ <= dt_) choose_grasp(seen);
       const Pose goal{node_at(seen, node_of(seen, take_slot_)), take_turn_};
       // The forceps goes along above, its strand loose; neither hand hurries when that runs taut.
-      if (stage_ == over && waited_ <= dt_) free_ = kLoose * length_between(seen, node_of(seen, driver.loop_last), last);
-      if (tension > kTooTaut) free_ = std::max(0.002f, feel(free_, tension));
-      const Vec3 turns = hand_[kDriver].pose.p + rotate(hand_[kDriver].pose.q, {0, 0, kWindAt});
-      Vec3 above = turns + normalized(e1 - 0.4f * z) * free_;
-      above.y = std::max(above.y, std::min(floor_, turns.y + free_));
-      carry_swage(seen, above, 2 * skill_.speed);
+      if (stage_ == over && waited_ <= dt_)
+        winding_.free = kTieLoose * length_between(seen, node_of(seen, driver.loop_last), last);
+      if (tension > kTieTooTaut) winding_.free = std::max(0.002f, feel_strand(winding_.free, tension, dt_));
+      const Vec3 turns = hand_[kDriver].pose.p + rotate(hand_[kDriver].pose.q, {0, 0, kTieWindAt});
+      carry_swage(seen, strand_above(winding_, across, turns), 2 * skill_.speed);
       const float calm = std::clamp(1.5f - tension, 0.05f, 1.0f);
       if (stage_ == over) {
         jaw(kDriver, kHalfOpen);
@@ -259,7 +162,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       };
       const Vec3 right = normalized(Vec3{side, 0.35f, 0.1f}), left = normalized(Vec3{-side, 0.35f, 0.1f});
       move(kDriver, {pull_from_.p + right * 0.08f, hand_[kDriver].pose.q}, gently(kDriver));
-      carry_swage(seen, start_ + (own_strand ? Vec3{0, 1, 0} : left) * (0.9f * reach_), gently(kForceps));
+      carry_swage(seen, winding_.start + (own_strand ? Vec3{0, 1, 0} : left) * (0.9f * winding_.reach), gently(kForceps));
       if (locked && (waited_ > 0.5f || driver.held != Held::thread)) go(driver.held == Held::thread ? lay_down : open);
       else if (driver.held != Held::thread) miss(lift);
       else if (!patience(8)) miss(unwind);
@@ -274,8 +177,8 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     default:  // unwind: shake the loop off and begin again
       // Not before the jaws are open, and not against a taut strand: it would draw the tail out of the tissue.
       if (!jaw(kDriver, 1)) return false;
-      wound_ = std::max(kBefore, wound_ - 4 * dt_);
-      carry_swage(seen, swage_at(wound_), skill_.speed);
+      winding_.wound = std::max(kTieBefore, winding_.wound - 4 * dt_);
+      carry_swage(seen, swage_at(winding_.wound), skill_.speed);
       if ((move(kDriver, raised(lying, 0.03f), skill_.speed * std::clamp(1 - 2 * tension, 0.0f, 1.0f)) && waited_ > 1) ||
           !patience(5))
         miss(lift);
@@ -288,11 +191,11 @@ bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, i
   const ToolView& driver = seen.tool[kDriver];
   // Straight on from the turns, along the driver and between its jaws; drawn out until it is felt to be taut.
   const float left = length_between(seen, node_of(seen, driver.loop_last), seen.thread_order.size() - 1);
-  if (stage_ != close && waited_ <= dt_) free_ = 0.9f * left;
+  if (stage_ != close && waited_ <= dt_) winding_.free = 0.9f * left;
   const float tension = needle_tension(seen);
-  const Vec3 ahead = lying.p - z * std::max(0.004f, free_ - kWindOwnAt);
+  const Vec3 ahead = lying.p - z * std::max(0.004f, winding_.free - kWindOwnAt);
   const bool there = distance(swage(seen), ahead) < 0.002f;
-  if (there || tension > kTooTaut) free_ = feel(free_, tension);
+  if (there || tension > kTieTooTaut) winding_.free = feel_strand(winding_.free, tension, dt_);
   if (stage_ != close) {
     jaw(kDriver, kHalfOpen);
     move(kDriver, lying, careful());
@@ -331,9 +234,9 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
   size_t at = last;
   float clearest = 0;
   const float near = kStump + 0.004f * static_cast<float>(misses_);
-  for (float far = near; far < near + 3 * kStump && clearest < kClear; far += 0.002f) {
+  for (float far = near; far < near + 3 * kStump && clearest < kTieClear; far += 0.002f) {
     const size_t i = std::clamp<size_t>(node_along(seen, tail ? first : end, far, tail ? -1 : 1), 1, last - 1);
-    float clear = kClear;
+    float clear = kTieClear;
     for (size_t k = first; k <= end; ++k) clear = std::min(clear, distance(node_at(seen, i), node_at(seen, k)));
     if (clear > clearest) clearest = clear, at = i;
   }
@@ -401,7 +304,7 @@ bool Scripted::take_both(const Snapshot& seen) {
   const float tension = needle_tension(seen);
   // Over the tissue first, then down beside the tail.
   const float up = stage_ == lay && waited_ < 0.8f ? 1.5f : 0.25f;
-  carry_swage(seen, knot + normalized(way + Vec3{0, up, 0}) * (kTaut * free),
+  carry_swage(seen, knot + normalized(way + Vec3{0, up, 0}) * (kTieTaut * free),
               skill_.speed * std::clamp(1.2f - tension, 0.0f, 1.0f));
   switch (stage_) {
     case lay:

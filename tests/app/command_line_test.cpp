@@ -10,6 +10,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -133,6 +135,23 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   EXPECT_LT(catgut::distance(catgut::rotate(w.turn, Vec3{1, 0, 0}), {0, 0, -1}), 1e-6f);
   std::ofstream(places) << "[right-0001]\nscale = 50\n";
   expect_refused("devices --calibrate", "arms.toml:2: scale is no number between");
+  // What is wrong with the file is said by whoever reads it, and nobody writes over it.
+  for (const auto& [text, wrong] : std::map<std::string, std::string>{{"[right-0001\nscale = 1\n", "arms.toml:1: "},
+                                                                      {"[right-0001]\nturn = nan\n", "arms.toml:2: turn is no"},
+                                                                      {"[right-0001]\nx = \"far\"\n", "arms.toml:2: x is no"},
+                                                                      {"[left-0002]\nscael = 2\n", "arms.toml:2: scael is not"},
+                                                                      {"\nright-0001 = 3\n", "arms.toml:2: right-0001 is no"},
+                                                                      {std::string("\0\xff[", 3), "arms.toml:1: "}}) {
+    std::ofstream(places, std::ios::binary) << text;
+    expect_refused("devices --calibrate", wrong);
+    std::ifstream in(places, std::ios::binary);
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), text);
+  }
+  setenv("CATGUT_ARMS", folder_.c_str(), 1);
+  expect_refused("devices --calibrate", "is a folder; set CATGUT_ARMS to");
+  // Unreadable even for root.
+  setenv("CATGUT_ARMS", "/proc/self/mem", 1);
+  for (const char* command : {"devices", "devices --calibrate"}) expect_refused(command, "/proc/self/mem: cannot be read; ");
   unsetenv("CATGUT_ARMS");
   setenv("FAKE_HD_FAULT", "flip_x:right:0", 1);
   const Outcome flipped = run_catgut("devices --test");

@@ -1,6 +1,5 @@
 // tests/app: somebody sits down at the window. A real X server (Xvfb), real mouse and keyboard events (xdotool); what is
 // checked is what happened in the simulation and what was recorded, not pixels. Skips where one of the two is missing.
-#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -15,6 +14,7 @@
 #include <string>
 #include <thread>
 
+#include "../hands/x_server.h"
 #include "device/mouse.h"
 #include "procedure/scene_file.h"
 #include "render/orbit.h"
@@ -27,35 +27,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kWidth = 640, kHeight = 360;
-
-bool on_path(const std::string& program) { return std::system(("command -v " + program + " >/dev/null 2>&1").c_str()) == 0; }
-
-// An X server of our own: on a machine with a desktop the test must not take the mouse away.
-struct XServer {
-  pid_t pid = -1;
-  std::string display;
-  XServer() {
-    int out[2];
-    if (pipe(out) != 0) return;
-    pid = fork();
-    if (pid == 0) {
-      dup2(out[1], 3);
-      if (!std::freopen("/dev/null", "w", stderr)) _exit(98);
-      execlp("Xvfb", "Xvfb", "-displayfd", "3", "-screen", "0", "800x600x24", "-nolisten", "tcp", nullptr);
-      _exit(99);
-    }
-    close(out[1]);
-    std::string number;
-    for (char c; read(out[0], &c, 1) == 1 && c != '\n';) number += c;  // Xvfb says which display it has, or ends
-    close(out[0]);
-    if (!number.empty()) display = ":" + number;
-  }
-  ~XServer() {
-    if (pid <= 0) return;
-    kill(pid, SIGTERM);
-    waitpid(pid, nullptr, 0);
-  }
-};
 
 std::string read_file(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);

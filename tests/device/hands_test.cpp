@@ -256,7 +256,7 @@ TEST(Help, one_gesture_moves_both_hands_unless_it_is_switched_off) {
     d.turn(in);
     EXPECT_EQ(distance(d.out[0].pose.p, driver) > 0.001f, assist);
     EXPECT_EQ(distance(d.out[1].pose.p, forceps) > 0.001f, assist);
-    EXPECT_EQ(d.steering.both.way, assist ? 1.0f : 0.0f);
+    EXPECT_EQ(d.steering.both.winding.way, assist ? 1.0f : 0.0f);
     EXPECT_LT(d.out[0].jaw, assist ? 0.71f : 1.1f) << "a jaw wide open would shake the loop off";
   }
 }

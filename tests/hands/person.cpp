@@ -240,7 +240,7 @@ bool Person::wind(int way) {
           4.0f * static_cast<float>(way), [&] { return seen().tool[0].loop_wraps > 0; }, 12))
     return true;
   both(
-      -4.0f * static_cast<float>(way), [&] { return desk_.look().steering.both.wound < 0; }, 8);
+      -4.0f * static_cast<float>(way), [&] { return desk_.look().steering.both.winding.wound < 0; }, 8);
   return false;
 }
 

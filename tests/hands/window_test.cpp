@@ -3,11 +3,8 @@
 // checked is what happened, never a pixel. Everything waits for what it sees, so a slow machine only takes longer.
 #ifdef CATGUT_TESTS_WINDOW
 #include <SDL.h>
-#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
@@ -23,38 +20,12 @@
 #include "sim/simulation.h"
 #include "window/window.h"
 #include "x_events.h"
+#include "x_server.h"
 
 namespace catgut {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-// On a machine with a desktop the test must not take the mouse away.
-struct XServer {
-  pid_t pid = -1;
-  std::string display;
-  XServer() {
-    int out[2];
-    if (pipe(out) != 0) return;
-    pid = fork();
-    if (pid == 0) {
-      dup2(out[1], 3);
-      if (!std::freopen("/dev/null", "w", stderr)) _exit(98);
-      execlp("Xvfb", "Xvfb", "-displayfd", "3", "-screen", "0", "800x600x24", "-nolisten", "tcp", nullptr);
-      _exit(99);
-    }
-    close(out[1]);
-    std::string number;
-    for (char c; read(out[0], &c, 1) == 1 && c != '\n';) number += c;
-    close(out[0]);
-    if (!number.empty()) display = ":" + number;
-  }
-  ~XServer() {
-    if (pid <= 0) return;
-    kill(pid, SIGTERM);
-    waitpid(pid, nullptr, 0);
-  }
-};
 
 // Somebody's eyes and, in what derives from it, their device. The window runs on the thread that called sit(); the person on
 // one of their own.
@@ -265,8 +236,6 @@ class SdlPad : public AtTheWindow {
   int index_ = -1;
   SDL_Joystick* stick_ = nullptr;
 };
-
-bool on_path(const std::string& program) { return std::system(("command -v " + program + " >/dev/null 2>&1").c_str()) == 0; }
 
 class StitchAtTheWindow : public testing::Test {
  protected:

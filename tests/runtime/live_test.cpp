@@ -15,25 +15,11 @@
 #include "runtime/blend.h"
 #include "runtime/session.h"
 #include "sim/simulation.h"
+#include "small.h"
 #include "surgeon/surgeon.h"
 
 namespace catgut {
 namespace {
-
-SceneSpec small_scene() {
-  return parse_scene(R"(title = "small"
-settle = 0.05
-[[body]]
-particles = 300
-[thread]
-particles = 30
-[solver]
-substeps = 2
-[technique]
-name = "none"
-)",
-                     "small");
-}
 
 // Looks until `done`, at most `seconds`.
 bool wait_for(Live& live, double seconds, const std::function<bool(const LiveStatus&)>& done) {

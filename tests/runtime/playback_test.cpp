@@ -12,6 +12,7 @@
 #include "procedure/scene_file.h"
 #include "runtime/session.h"
 #include "sim/simulation.h"
+#include "small.h"
 
 namespace catgut {
 namespace {
@@ -19,18 +20,7 @@ namespace {
 // Three seconds of a hand that pokes the tissue.
 const Recording& poked() {
   static const Recording made = [] {
-    const SceneSpec scene = parse_scene(R"(title = "small"
-settle = 0.05
-[[body]]
-particles = 300
-[thread]
-particles = 30
-[solver]
-substeps = 2
-[technique]
-name = "none"
-)",
-                                        "small");
+    const SceneSpec scene = small_scene();
     const auto model = build_model(scene);
     const auto state = initial_state(*model);
     Jobs jobs(1);

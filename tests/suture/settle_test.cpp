@@ -94,6 +94,89 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   EXPECT_EQ(r.needle().x, r.model->needle_start.p);
 }
 
+std::vector<Event> settle(Tie& r) {
+  std::vector<Event> events;
+  EXPECT_TRUE(new_suture(r.model->solver, r.solver(), r.model->suture, r.suture(), r.model->start, r.model->needle_start,
+                         {kButtonNewSuture, 0}, events));
+  return events;
+}
+
+// Two suture points of one bite are a way through a wall, which holds itself: a pin there would be looked at in every substep
+// from now on, for nothing.
+TEST(Settle, a_wall_that_carries_nothing_gets_no_pin) {
+  struct Case {
+    const char* what;
+    bool one_bite;
+    float tension;  // [N] at one place inside
+    size_t pins;
+  };
+  for (const Case& c : {Case{"two walls, slack", false, 0, 3}, Case{"one wall, slack", true, 0.09f, 2},
+                        Case{"one wall, drawn in", true, 0.11f, 3}}) {
+    SCOPED_TRACE(c.what);
+    TieSetup setup;
+    setup.particles = 110;
+    Tie r(setup);
+    tie_and_cut(r);
+    if (HasFatalFailure()) return;
+    if (c.one_bite) r.suture().point[1].bite = r.suture().point[0].bite;
+    const size_t from = r.node_of_point(0), to = r.node_of_point(1);
+    ASSERT_LT(from + 1, to);
+    for (size_t i = from; i < to; ++i) r.thread().tension[i] = 0;
+    r.thread().tension[from + 1] = c.tension;
+    const Knot k = r.suture().knot[0];
+    const Vec3 ends[2] = {r.point_at(0), r.point_at(1)};
+    const Vec3 roots[2] = {r.at_node(r.node_of(k.slot[0])), r.at_node(r.node_of(k.slot[1]))};
+    settle(r);
+    ASSERT_EQ(r.solver().pin.size(), c.pins);
+    // What is left are those between the knot and the two points.
+    for (const size_t side : {size_t{0}, size_t{1}}) {
+      const TissuePin& pin = side == 0 ? r.solver().pin.front() : r.solver().pin.back();
+      EXPECT_LT(distance(position_of(side == 0 ? pin.b : pin.a, r.x()), ends[side]), 1e-4f);
+      EXPECT_LT(distance(position_of(side == 0 ? pin.a : pin.b, r.x()), roots[side]), 1e-3f);
+    }
+  }
+}
+
+// Few particles carry it on, and nothing moves because of that, not even in tissue that is out of shape.
+TEST(Settle, a_pin_hangs_on_six_particles_at_most) {
+  TieSetup setup;
+  setup.particles = 110;
+  Tie r(setup);
+  tie_and_cut(r);
+  if (HasFatalFailure()) return;
+  // The first point hangs on as many particles as there can be.
+  TissuePoint& point = r.thread().anchor[r.suture().point[0].anchor].point;
+  const Vec3 at = r.point_at(0);
+  std::vector<uint32_t> near(r.model->solver.tissue);
+  for (uint32_t i = 0; i < near.size(); ++i) near[i] = i;
+  std::sort(near.begin(), near.end(),
+            [&](uint32_t a, uint32_t b) { return distance(xyz(r.x()[a]), at) < distance(xyz(r.x()[b]), at); });
+  point.count = TissuePoint::kMost;
+  for (uint32_t i = 0; i < point.count; ++i)
+    point.particle[i] = near[i], point.weight[i] = 1.0f / static_cast<float>(TissuePoint::kMost);
+  // The outermost of them, which the pin will do without, have been moved.
+  for (uint32_t i = TissuePoint::kMost - 4; i < TissuePoint::kMost; ++i)
+    set(r.solver().x[near[i]], xyz(r.x()[near[i]]) + Vec3{0, 0.003f, 0});
+  const TissuePoint a = point, b = r.thread().anchor[r.suture().point[1].anchor].point;
+  float length = 0;
+  for (size_t i = r.node_of_point(0); i < r.node_of_point(1); ++i) length += r.thread().rest[i];
+  settle(r);
+  ASSERT_EQ(r.solver().pin.size(), 3u);
+  for (const TissuePin& pin : r.solver().pin)
+    for (const TissuePoint* end : {&pin.a, &pin.b}) {
+      EXPECT_GE(end->count, 1u);
+      EXPECT_LE(end->count, 6u);
+      float weight = 0;
+      for (uint32_t i = 0; i < end->count; ++i) weight += end->weight[i];
+      EXPECT_NEAR(weight, 1, 1e-5f);
+    }
+  const TissuePin& pin = r.solver().pin[1];
+  const float before = distance(position_of(a, r.x()), position_of(b, r.x())) - length,
+              now = distance(position_of(pin.a, r.x()), position_of(pin.b, r.x())) - pin.length;
+  EXPECT_GT(distance(position_of(a, r.x()), position_of(pin.a, r.x())), 1e-4f) << "the end lies elsewhere";
+  EXPECT_NEAR(now, before, 1e-6f) << "and draws as the thread drew";
+}
+
 // What the thread held together stays together when the tissue is pulled at.
 TEST(Settle, the_pins_hold_what_the_thread_held) {
   float apart[2];
