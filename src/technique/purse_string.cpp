@@ -66,6 +66,15 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
     return;
   }
 
+  // The way round from point to point, and whether those that were not looked at yet lie in order, now that all are known.
+  const auto measure_ring = [&] {
+    state.path_start = 0;
+    for (size_t i = 0; i + 1 < sp.size(); ++i) state.path_start += distance(sp[i], sp[i + 1]);
+    for (; state.checked < sp.size(); ++state.checked)
+      if (first_out_of_order(sp, state.checked) == static_cast<int>(state.checked))
+        events.push_back({0, EventKind::order_broken, 0, (state.checked + 1) % static_cast<uint32_t>(sp.size()), 0,
+                          sp[(state.checked + 1) % sp.size()]});
+  };
   if (!state.ring_complete) {
     // While the ring grows, a point can be checked once three more follow it.
     for (; state.checked + 3 < sp.size(); ++state.checked)
@@ -79,17 +88,14 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
     for (size_t i = 0; i + 1 < sp.size(); ++i) step = std::max(step, distance(sp[i], sp[i + 1]));
     if (angle < kPi || distance(sp.back(), sp.front()) > 1.5f * step) return;
     state.ring_complete = true;
-    state.path_start = 0;
-    for (size_t i = 0; i + 1 < sp.size(); ++i) state.path_start += distance(sp[i], sp[i + 1]);
-    for (; state.checked < sp.size(); ++state.checked)
-      if (first_out_of_order(sp, state.checked) == static_cast<int>(state.checked))
-        events.push_back({0, EventKind::order_broken, 0, (state.checked + 1) % static_cast<uint32_t>(sp.size()), 0,
-                          sp[(state.checked + 1) % sp.size()]});
+    measure_ring();
     events.push_back({0, EventKind::ring_complete, 0, static_cast<uint32_t>(sp.size()), angle, centre});
     return;
   }
 
   if (!state.closing) {
+    // One more bite than the ring needs: its thread is part of the way round.
+    if (state.checked < sp.size() && sp.size() % 2 == 0) measure_ring();
     // Closing begins when the thread in the ring is as short as the way round it: the slack is out.
     if (loop > 0.995f * state.path_start) return;
     state.closing = true;

@@ -152,6 +152,25 @@ TEST(Closure, begins_when_the_slack_is_out) {
   EXPECT_EQ(r.plan.pull.size(), 48u + 48u + 24u);
 }
 
+// A ring may be complete before the last bite of a plan: that bite's thread is then part of the way round, and the ring closes.
+TEST(Closure, begins_after_one_bite_more_than_the_ring_needed) {
+  Ring r(12);
+  for (const float part : {1.0f / 3, 2.0f / 3}) {  // the thirteenth, between the last and the first
+    const Vec3 at = lerp(xyz(r.x[r.sp[23]]), xyz(r.x[r.sp[0]]), part);
+    r.sp.push_back(static_cast<uint32_t>(r.x.size())), r.x.push_back(point(at));
+  }
+  r.tick(1, 1.0f / 60, 24);
+  ASSERT_TRUE(r.state.ring_complete);
+  r.tick(1, 1.0f / 60, 25);
+  r.tick(1.05f * r.way());
+  EXPECT_FALSE(r.state.closing);
+  r.tick(0.99f * r.way());
+  EXPECT_TRUE(r.state.closing);
+  EXPECT_EQ(r.plan.pull.size(), 48u + 48u + 26u);
+  EXPECT_EQ(r.count(EventKind::ring_complete), 1u);
+  EXPECT_EQ(r.count(EventKind::order_broken), 0u);
+}
+
 // Figure 11: "Each particle is pulled over time, ensuring all particles arrive at the location simultaneously."
 TEST(Closure, all_points_arrive_together) {
   Ring r(12);
