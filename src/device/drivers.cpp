@@ -2,6 +2,7 @@
 #include "device/drivers.h"
 
 #include "device/bridge.h"
+#include "device/force_dimension.h"
 #include "device/touch.h"
 
 namespace catgut {
@@ -13,6 +14,12 @@ constexpr ArmDriver kDrivers[] = {
        TouchOptions o;
        o.library = where;
        return open_touch(o, told);
+     }},
+    {"force-dimension", "Force Dimension omega, delta, lambda, sigma; Novint Falcon", "path of libdhd.so",
+     [](const std::string& where, std::vector<std::string>& told) {
+       ForceDimensionOptions o;
+       o.library = where;
+       return open_force_dimension(o, told);
      }},
     {"bridge", "arms of another machine or program", "HOST[:PORT]",
      [](const std::string& where, std::vector<std::string>& told) {
