@@ -3,6 +3,7 @@
 
 #include "device/bridge.h"
 #include "device/force_dimension.h"
+#include "device/haply.h"
 #include "device/touch.h"
 
 namespace catgut {
@@ -20,6 +21,12 @@ constexpr ArmDriver kDrivers[] = {
        ForceDimensionOptions o;
        o.library = where;
        return open_force_dimension(o, told);
+     }},
+    {"haply", "Haply Inverse3 and Minverse", "HOST[:PORT]",
+     [](const std::string& where, std::vector<std::string>& told) {
+       HaplyOptions o;
+       o.where = where;
+       return open_haply(o, told);
      }},
     {"bridge", "arms of another machine or program", "HOST[:PORT]",
      [](const std::string& where, std::vector<std::string>& told) {
