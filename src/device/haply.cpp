@@ -88,7 +88,9 @@ struct Haply {
   std::string out;
   uint64_t turn = 0;
   bool got = false, reading = false, writing = false, up = false, done = false;
-  bool vectors = true, introduced = false;  // the form of commands; this line's first message was sent
+  bool vectors = true;  // the form of commands
+  // Of this line: the service has said what it has, which is no answer to anything; our first message was sent.
+  bool greeted = false, introduced = false;
   error_code failure;
   Quat no_grip = axis_angle({1, 0, 0}, -0.25f * kPi);
 };
@@ -101,7 +103,7 @@ void drop(Haply& h) {
   }
   h.line.reset();
   h.in.clear();
-  h.got = h.reading = h.writing = h.up = h.introduced = false;
+  h.got = h.reading = h.writing = h.up = h.greeted = h.introduced = false;
 }
 
 // Runs the line until `done`, or the time. What calls this never waits for the service longer than it wants to.
@@ -277,7 +279,7 @@ void run(Haply& h) {
   int stops = 0;
   bool waits = false;  // for an answer: the next message is sent when it has come, or is not believed in any more
   while (!h.stopping || ((length2(h.arm[0].force) > 0 || length2(h.arm[1].force) > 0) && ++stops < kMostStops)) {
-    if (h.up && !waits) send(h), waits = true;
+    if (h.up && h.greeted && !waits) send(h), waits = true;
     const bool was_up = h.up;
     until(h, Clock::now() + (h.options.paced || !was_up ? 1ms : 20ms), [&h, was_up] { return h.got || h.up != was_up; });
     const auto now = Clock::now();
@@ -285,7 +287,7 @@ void run(Haply& h) {
     if (h.got) {
       const json message = take_message(h);
       read_next(h);
-      waits = false;
+      waits = false, h.greeted = true;
       if (read_states(message, h)) heard = now;
       else error = kNonsense;
     } else if (now < heard + patience) {
@@ -376,6 +378,7 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
   json inventory;
   if (h->got) {
     inventory = take_message(*h);
+    h->greeted = true;
     read_next(*h);
   }
   const json& all = member(inventory, "inverse3");

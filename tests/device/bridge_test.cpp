@@ -424,9 +424,9 @@ struct Both : Lent {
     o.patience = 5;
     port = open_bridge(o, told);
     for (const std::string& line : told) ADD_FAILURE() << line;
+    for (size_t k = 0; k < 2; ++k) fit_to_arm(options[k], port.arm[k].limits);
     std::string why;
     EXPECT_TRUE(port.any() && port.start(port.self, {step, this}, why));
-    for (size_t k = 0; k < 2; ++k) fit_to_arm(options[k], port.arm[k].limits);
     // The thread says hello; samples come from then on.
     EXPECT_TRUE(wait_for([&] { return server->counts().accepted >= 2; }));
   }
