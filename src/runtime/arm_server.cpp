@@ -189,19 +189,19 @@ void ArmServer::Work::take(const uint8_t* data, size_t size, const Peer& from) {
       drop(stranger);
       return refuse(from, h.session, kArmsTaken);
     }
-    if (!known) say("lent to the simulator at " + name_of(from));
     if (!known || peer.session != h.session) {
       Peer next = from;
       next.session = h.session;
       lend(next);
     }
+    if (!known) say("lent to the simulator at " + name_of(from));
     heard_ns = now;
     answer(from, h.session);
   } else if (!known || h.session != peer.session) {
     return drop(stranger);
   } else if (h.kind == BridgeKind::bye) {
-    say("given back by the simulator at " + name_of(from));
     lend({});
+    say("given back by the simulator at " + name_of(from));
   } else if (h.kind == BridgeKind::command) {
     Side& s = side[h.arm];
     if (h.sequence <= s.sequence) return drop(old);
