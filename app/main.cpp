@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
   catgut::add_bench(app, exit_code);
   catgut::add_validate(app, exit_code);
   catgut::add_devices(app, exit_code);
+  catgut::add_bridge(app, exit_code);
   catgut::add_describe(app, exit_code);
   try {
     if (argc == 1) return catgut::play_without_arguments();

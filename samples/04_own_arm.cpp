@@ -37,6 +37,7 @@ bool start(void* self, const ArmCallback& callback, std::string&) {
   });
   return true;
 }
+// A real one first lets the motors' force down, by at most 0.5 N a millisecond, and then switches them off.
 void stop(void* self) {
   MyArm& arm = *static_cast<MyArm*>(self);
   arm.quit = true;

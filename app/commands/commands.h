@@ -18,6 +18,7 @@ void add_replay(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
 void add_validate(CLI::App& app, int& exit_code);
 void add_devices(CLI::App& app, int& exit_code);
+void add_bridge(CLI::App& app, int& exit_code);
 void add_describe(CLI::App& app, int& exit_code);
 
 // `catgut bench limits` (app/commands/limits.cpp). Code 1 when not all sutures that were asked for could be made.

@@ -1,9 +1,12 @@
-// app: `catgut devices`: which haptic arms are connected and what they can do; with --test, a slow small push of each.
+// app: `catgut devices`: which haptic arms are connected and what they can do, driver by driver; with --test, a slow small push
+// of each.
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "device/drivers.h"
 #include "runtime/arm_test.h"
 #include "runtime/haptics.h"
 
@@ -11,6 +14,7 @@ namespace catgut {
 namespace {
 
 struct Options {
+  std::string which;
   bool test = false, calibrate = false;
   double scale = 1, turn = 0;
 };
@@ -34,16 +38,19 @@ int calibrate(ArmPort port, const Options& o) {
   return 0;
 }
 
-int devices(const Options& o) {
-  const bool test = o.test;
-  std::vector<std::string> told;
-  ArmPort port = open_arms("touch", told);
-  for (const std::string& line : told) std::printf("%s\n", line.c_str());
+int test(ArmPort port) {
+  const auto say = [](const std::string& line) { std::printf("%s\n", line.c_str()), std::fflush(stdout); };
+  const ArmTestResult result = test_arms(std::move(port), {}, say, stop_on_interrupt());
+  for (const std::string& line : result.line) say(line);
+  return result.ok ? 0 : 1;
+}
+
+void print(const ArmPort& port) {
   for (size_t k = 0; k < 2; ++k) {
     const ArmInfo& a = port.arm[k];
     if (!a.present) continue;
-    std::printf("%s arm: \"%s\", %s, serial %s, driver %s\n", k == 0 ? "right" : "left", a.name.c_str(), a.model.c_str(),
-                a.serial.c_str(), a.driver.c_str());
+    std::printf("%s: %s arm \"%s\", %s, serial %s, driver %s\n", port.kind, k == 0 ? "right" : "left", a.name.c_str(),
+                a.model.c_str(), a.serial.c_str(), a.driver.c_str());
     ServoOptions servo;
     fit_to_arm(servo, a.limits);
     std::printf("  force %.2g N, %.2g N for long; %.0f N/m, %.1f N s/m at most; workspace %.0f x %.0f x %.0f mm\n",
@@ -51,30 +58,34 @@ int devices(const Options& o) {
                 double{servo.limits.damping}, 1e3 * double{a.most.x - a.least.x}, 1e3 * double{a.most.y - a.least.y},
                 1e3 * double{a.most.z - a.least.z});
   }
-  if (!port.any()) {
-    if (test || o.calibrate)
-      throw InputError(test ? "devices --test" : "devices --calibrate", "there is no haptic arm",
-                       "see above for what is missing");
-    std::printf(
-        "Mouse, keyboard and gamepad are hands in the window: catgut play\n"
-        "The scripted surgeon needs none: catgut run purse_string --surgeon scripted --headless\n");
-    return 0;
+}
+
+// One driver after the other, so that no two of them hold the same arm.
+int devices(const Options& o) {
+  int code = 0;
+  bool any = false;
+  const ArmChoice wanted = read_arm_choice(o.which);
+  for (const ArmDriver& d : arm_drivers()) {
+    if (!wanted.driver.empty() && wanted.driver != d.word) continue;
+    std::vector<std::string> told;
+    ArmPort port = open_arms({d.word, wanted.where, false}, told);
+    for (const std::string& line : told) std::printf("%s\n", line.c_str());
+    print(port);
+    if (!port.any()) continue;
+    any = true;
+    if (o.calibrate) code = std::max(code, calibrate(std::move(port), o));
+    else if (o.test) code = std::max(code, test(std::move(port)));
+    else std::printf("  catgut devices %s --test pushes gently; catgut play --haptics %s uses them\n", d.word, d.word);
   }
-  if (o.calibrate) return calibrate(std::move(port), o);
-  if (!test) {
-    read_arm_places(arm_places_file());  // says here what a scene would stumble over
-    std::printf("catgut devices --test pushes each gently; catgut play --haptics touch uses them\n");
-    return 0;
-  }
-  const ArmTestResult result = test_arms(
-      std::move(port), {},
-      [](const std::string& line) {
-        std::printf("%s\n", line.c_str());
-        std::fflush(stdout);
-      },
-      stop_on_interrupt());
-  for (const std::string& line : result.line) std::printf("%s\n", line.c_str());
-  return result.ok ? 0 : 1;
+  if (any && !o.test && !o.calibrate) read_arm_places(arm_places_file());  // says here what a scene would stumble over
+  if (any) return code;
+  if (o.test || o.calibrate)
+    throw InputError(o.test ? "devices --test" : "devices --calibrate", "there is no haptic arm",
+                     "see above for what is missing");
+  std::printf(
+      "Mouse, keyboard and gamepad are hands in the window: catgut play\n"
+      "The scripted surgeon needs none: catgut run purse_string --surgeon scripted --headless\n");
+  return 0;
 }
 
 }  // namespace
@@ -82,6 +93,10 @@ int devices(const Options& o) {
 void add_devices(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("devices", "list haptic arms");
+  std::string drivers = "of this driver alone:";
+  for (const ArmDriver& d : arm_drivers())
+    drivers += std::string("\n") + d.word + (*d.where ? std::string("[:") + d.where + "]" : "") + "  " + d.arms;
+  command->add_option("driver", o->which, drivers)->type_name("DRIVER[:WHERE]");
   CLI::Option* test =
       command->add_flag("--test", o->test, "push each arm slowly along each axis, after a countdown, and see what it does");
   command->add_flag("--calibrate", o->calibrate, "lay the arms' workspaces into the field; kept per user and arm")

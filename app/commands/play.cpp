@@ -3,8 +3,10 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "device/drivers.h"
 #include "procedure/lesson.h"
 #include "procedure/scene_file.h"
+#include "runtime/haptics.h"
 #include "window/window.h"
 
 namespace catgut {
@@ -73,16 +75,20 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_option("--threads", o->play.live.threads, "workers of the solver")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
+  std::string drivers;
+  for (const ArmDriver& d : arm_drivers()) drivers += std::string(d.word) + "[:WHERE]|";
   command
-      ->add_option("--haptics", o->play.live.haptics,
-                   "haptic arms as hands (a hand without one stays the mouse's); paper: with the paper's spring")
-      ->check(CLI::IsMember({"touch", "paper", "off"}))
-      ->type_name("touch|paper|off");
+      ->add_option(
+          "--haptics", o->play.live.haptics,
+          "haptic arms as hands (a hand without one stays the mouse's), see catgut devices --help; paper[:DRIVER]: with "
+          "the paper's spring")
+      ->type_name(drivers + "paper[:DRIVER]|off");
   command->add_option("--events", o->play.events, "what happens, as it happens, one JSON object a line; - for standard output")
       ->type_name("FILE|-");
   add_window_options(*command, *o);
   command->callback([o, &exit_code] {
     read_window_options(*o);
+    read_arm_choice(o->play.live.haptics);  // its faults are told before a window opens
     if (o->play.teach && o->play.scene.empty()) o->play.scene = first_stitch().scene;
     if (o->play.teach && (o->play.scene != first_stitch().scene || !o->play.live.surgeon.empty()))
       throw InputError("--teach", "the lesson is given in the scene \"" + first_stitch().scene + "\", to you",

@@ -17,7 +17,7 @@ struct LimiterOptions {
   float slew = 500;           // [N/s] 0.5 N/ms: a puncture's drop of 1 to 1.8 N in 3 to 5 ms passes
   float slew_recovery = 20;   // [N/s] 0.02 N/ms while force comes back
   float decay = 0.02f;        // [s] time constant once the model has expired
-  float off_after = 0.07f;    // [s] after expiry: off, and engage anew
+  float off_after = 0.06f;    // [s] after expiry: off, and engage anew; with an expiry of 30 ms, within 100 ms
   float heat_time = 10;       // [s] of the leaky mean (an assumption; no motor model was found)
   float margin = 0.95f;       // of the continuous force: a mean over minutes contains what the leaky one let through at first
   float warm = 0.8f;          // of ArmSample::warmth from which force backs off to nothing at 1

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "core/check.h"
-#include "device/touch.h"
+#include "device/drivers.h"
 #include "exchange/latest.h"
 #include "runtime/live.h"
 
@@ -158,10 +158,8 @@ std::vector<std::string> Haptics::news() {
     if (!present(k)) continue;
     Side& s = work_->side[k];
     const std::string who = std::string(k == 0 ? "right arm: " : "left arm: ");
-    const uint32_t fresh = s.faults.exchange(0, std::memory_order_relaxed) & ~s.told;
-    s.told |= fresh;
-    for (uint32_t bit = 1; bit != 0 && bit <= fresh; bit <<= 1)
-      if (fresh & bit) lines.push_back(who + word_of(bit));
+    for (const std::string& line : new_faults(s.faults.exchange(0, std::memory_order_relaxed), s.told))
+      lines.push_back(who + line);
     const ArmStatus status = work_->port.status(work_->port.self, k);
     if (status.steps > 0 && status.ready != s.was_ready) {
       lines.push_back(who + (status.ready ? "it is back"
@@ -182,9 +180,43 @@ void Haptics::stop() {
   if (work_->port.self) work_->port.stop(work_->port.self);
 }
 
-ArmPort open_arms(const std::string& kind, std::vector<std::string>& told) {
-  if (kind == "touch" || kind == "paper") return open_touch({}, told);
-  throw InputError("--haptics " + kind, "there is no such device", "use touch, paper or off");
+std::vector<std::string> new_faults(uint32_t faults, uint32_t& told) {
+  std::vector<std::string> lines;
+  const uint32_t fresh = faults & ~told;
+  told |= fresh;
+  for (uint32_t bit = 1; bit != 0 && bit <= fresh; bit <<= 1)
+    if (fresh & bit) lines.push_back(word_of(bit));
+  return lines;
+}
+
+ArmChoice read_arm_choice(const std::string& text) {
+  ArmChoice c;
+  if (text.empty() || text == "off") return c;
+  std::string rest = text;
+  const auto next = [&rest] {
+    const size_t colon = rest.find(':');
+    const std::string word = rest.substr(0, colon);
+    rest = colon == std::string::npos ? "" : rest.substr(colon + 1);
+    return word;
+  };
+  c.driver = next();
+  if (c.driver == "paper") {
+    c.as_paper = true;
+    c.driver = rest.empty() ? "touch" : next();
+  }
+  c.where = rest;
+  std::string all;
+  for (const ArmDriver& d : arm_drivers()) {
+    if (c.driver == d.word) return c;
+    all += std::string(d.word) + ", ";
+  }
+  throw InputError("--haptics " + text, "there is no such device", "use " + all + "paper or off");
+}
+
+ArmPort open_arms(const ArmChoice& choice, std::vector<std::string>& told) {
+  for (const ArmDriver& d : arm_drivers())
+    if (choice.driver == d.word) return d.open(choice.where, told);
+  return {};
 }
 
 }  // namespace catgut

@@ -68,7 +68,17 @@ class Haptics {
   std::unique_ptr<Work> work_;
 };
 
-// "touch" -> its driver. Throws InputError for a word that is none.
-ArmPort open_arms(const std::string& kind, std::vector<std::string>& told);
+// What the LimiterFault bits in `faults` that are not in `told` mean, a line each; they are in `told` afterwards.
+std::vector<std::string> new_faults(uint32_t faults, uint32_t& told);
+
+// Which arms, as people write it: DRIVER[:WHERE] of device/drivers ("touch", "bridge:10.0.0.2"); "paper" or
+// "paper:DRIVER[:WHERE]": the same arms with the paper's spring, the Touch's when none is named; "off" or nothing: none.
+struct ArmChoice {
+  std::string driver, where;
+  bool as_paper = false;
+};
+ArmChoice read_arm_choice(const std::string& text);  // throws InputError for a word that is no driver
+// `told` gets a line for what is missing. No driver: no arms.
+ArmPort open_arms(const ArmChoice& choice, std::vector<std::string>& told);
 
 }  // namespace catgut

@@ -118,6 +118,7 @@ struct Live::Work {
   Hands surgeon;
   std::unique_ptr<Recorder> recorder;
   std::unique_ptr<Haptics> haptics;  // null: no arms
+  bool as_paper = false;             // they feel the paper's spring
   PaperSpring paper;
   LiveResult result;
   TickInput input;
@@ -154,13 +155,13 @@ struct Live::Work {
 
 void Live::Work::begin() {
   ArmPort arms;
-  if (!options.haptics.empty() && options.haptics != "off") {
-    std::vector<std::string> lines;
-    arms = open_arms(options.haptics, lines);
-    for (const std::string& line : lines)
-      if (options.say) options.say(line);
-    if (arms.any()) prepare_for_arms(scene);
-  }
+  const ArmChoice choice = read_arm_choice(options.haptics);
+  as_paper = choice.as_paper;
+  std::vector<std::string> lines;
+  arms = open_arms(choice, lines);
+  for (const std::string& line : lines)
+    if (options.say) options.say(line);
+  if (arms.any()) prepare_for_arms(scene);
   model = build_model(scene);
   picture = picture_model(*model);
   if (arms.any()) {
@@ -279,7 +280,6 @@ void Live::Work::tick(bool let_in) {
 }
 
 void Live::Work::feel() {
-  const bool as_paper = options.haptics == "paper";
   if (as_paper) follow(paper, now, picture);
   for (size_t k = 0; k < 2; ++k)
     haptics->publish(k, as_paper ? paper_patch(paper, now, picture, k) : now.patch[k], told.epoch, kLiveSpeeds[speed]);

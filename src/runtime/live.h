@@ -42,8 +42,8 @@ struct LiveOptions {
   float hand_speed = 0.6f;  // [m/s] and
   float hand_turn = 12.0f;  // [rad/s] at most for a tool: a device that jumps (a mouse under a slow picture) tears nothing
   bool start_paused = false;
-  // Haptic arms: "touch", "paper" (the same arms, rendered as in the paper); empty or "off": none. What is missing is told and
-  // the scene opens without. A hand without an arm stays the window's.
+  // Haptic arms, as read_arm_choice (runtime/haptics) reads them; empty or "off": none. What is missing is told and the scene
+  // opens without. A hand without an arm stays the window's.
   std::string haptics;
   std::function<void(const std::string&)> say;  // a line about the arms, from any thread; empty: nobody is told
 };

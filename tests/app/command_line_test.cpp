@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -160,6 +161,35 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   EXPECT_NE(flipped.out.find("left arm: "), std::string::npos) << flipped.out;
   unsetenv("FAKE_HD_FAULT");
   unsetenv("CATGUT_LIBHD");
+}
+
+// One process lends its arms, another finds them; nobody there, or no arm to lend, is a line.
+TEST_F(CommandLine, arms_are_lent_over_the_bridge) {
+  expect_refused("bridge --arms spoon", "there is no such device");
+  expect_refused("play --haptics paper:spoon", "there is no such device");
+  const Outcome nothing = run_catgut("bridge --arms touch:/nowhere/libHD.so");
+  EXPECT_EQ(nothing.code, 2);
+  EXPECT_NE(nothing.err.find("no haptic arm to lend"), std::string::npos) << nothing.err;
+  setenv("CATGUT_LIBHD", CATGUT_FAKE_LIBHD, 1);
+  expect_refused("bridge --listen 203.0.113.7:0", "name an address of this machine");
+  FILE* lender = popen("echo $$; exec '" CATGUT_APP "' bridge --listen 127.0.0.1:0 --seconds 60", "r");
+  unsetenv("CATGUT_LIBHD");
+  ASSERT_NE(lender, nullptr);
+  char line[256];
+  ASSERT_NE(fgets(line, sizeof line, lender), nullptr);
+  const pid_t pid = std::atoi(line);
+  std::string port;
+  while (port.empty() && fgets(line, sizeof line, lender))
+    if (const char* at = std::strstr(line, ", port ")) port = std::to_string(std::atoi(at + 7));
+  const Outcome lent = run_catgut("devices bridge:127.0.0.1:" + port);
+  EXPECT_NE(lent.out.find("bridge: left arm"), std::string::npos) << lent.out;
+  EXPECT_NE(lent.out.find("right-0001"), std::string::npos) << lent.out;
+  EXPECT_EQ(lent.out.find("touch"), std::string::npos) << "of the driver that was asked for alone";
+  kill(pid, SIGTERM);
+  while (fgets(line, sizeof line, lender)) {}
+  EXPECT_EQ(pclose(lender), 0) << "a clean end";
+  const Outcome gone = run_catgut("devices bridge:127.0.0.1:" + port);
+  EXPECT_NE(gone.out.find("bridge: nobody answers"), std::string::npos) << gone.out;
 }
 
 TEST_F(CommandLine, faults_in_a_scene_name_its_line) {

@@ -1,0 +1,62 @@
+// app: `catgut bridge`: lends the haptic arms of this machine to a simulator on another one (or in another process here).
+#include <cstdio>
+#include <memory>
+#include <thread>
+
+#include "commands/commands.h"
+#include "core/check.h"
+#include "device/drivers.h"
+#include "runtime/arm_server.h"
+#include "runtime/haptics.h"
+#include "runtime/live.h"
+
+namespace catgut {
+namespace {
+
+struct Options {
+  std::string arms = "touch", listen = "127.0.0.1";
+  double seconds = 0;
+};
+
+int bridge(const Options& o) {
+  const ArmChoice choice = read_arm_choice(o.arms);
+  if (choice.as_paper || choice.driver.empty())
+    throw InputError("--arms " + o.arms, "that is no driver of arms", "see catgut devices --help");
+  std::vector<std::string> told;
+  ArmPort port = open_arms(choice, told);
+  for (const std::string& line : told) std::printf("%s\n", line.c_str());
+  if (!port.any()) throw InputError("bridge", "there is no haptic arm to lend", "see above for what is missing");
+  for (size_t k = 0; k < 2; ++k)
+    if (port.arm[k].present) std::printf("%s arm: %s\n", k == 0 ? "right" : "left", port.arm[k].name.c_str());
+  ArmServerOptions options;
+  options.listen = o.listen;
+  const std::atomic<bool>& stop = stop_on_interrupt();
+  ArmServer server(std::move(port), options);
+  std::printf("listening on %s, port %u; there: catgut play SCENE --haptics bridge:HOST:%u; Ctrl-C ends\n", o.listen.c_str(),
+              server.port(), server.port());
+  std::fflush(stdout);
+  for (const double until = wall_seconds() + o.seconds; !stop && (o.seconds <= 0 || wall_seconds() < until);) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    for (const std::string& line : server.news()) std::printf("%s\n", line.c_str());
+    std::fflush(stdout);
+  }
+  server.stop();
+  return 0;
+}
+
+}  // namespace
+
+void add_bridge(CLI::App& app, int& exit_code) {
+  auto o = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("bridge", "lend this machine's haptic arms to a simulator elsewhere");
+  command->add_option("--arms", o->arms, "which, as for play --haptics")->type_name("DRIVER[:WHERE]")->capture_default_str();
+  command
+      ->add_option("--listen", o->listen,
+                   "address and port; nothing is encrypted, so let only a network of your own reach it (0.0.0.0: any address)")
+      ->type_name("HOST[:PORT]")
+      ->capture_default_str();
+  command->add_option("--seconds", o->seconds, "end after so much time")->check(CLI::Range(0.1, 1e9))->type_name("S");
+  command->callback([o, &exit_code] { exit_code = bridge(*o); });
+}
+
+}  // namespace catgut

@@ -1,0 +1,28 @@
+// device: the millisecond of drivers whose maker's library has no scheduler of its own.
+#pragma once
+#include <pthread.h>
+
+#include <chrono>
+#include <thread>
+
+namespace catgut {
+
+// Of the calling thread: ahead of ordinary work, where the system lets it. No fault where not.
+inline void go_first() {
+  sched_param first{};
+  first.sched_priority = 50;
+  pthread_setschedparam(pthread_self(), SCHED_FIFO, &first);
+}
+
+struct Beat {
+  std::chrono::steady_clock::time_point next = std::chrono::steady_clock::now();
+  // Until the next millisecond. One that was missed is not made up for: a hand has no use for ten samples at once.
+  void wait() {
+    next += std::chrono::milliseconds(1);
+    const auto now = std::chrono::steady_clock::now();
+    if (next < now) next = now;
+    else std::this_thread::sleep_until(next);
+  }
+};
+
+}  // namespace catgut

@@ -1,0 +1,43 @@
+// device/drivers: see the header. A new driver is a line here.
+#include "device/drivers.h"
+
+#include "device/bridge.h"
+#include "device/force_dimension.h"
+#include "device/haply.h"
+#include "device/touch.h"
+
+namespace catgut {
+namespace {
+
+constexpr ArmDriver kDrivers[] = {
+    {"touch", "3D Systems Touch", "path of libHD.so",
+     [](const std::string& where, std::vector<std::string>& told) {
+       TouchOptions o;
+       o.library = where;
+       return open_touch(o, told);
+     }},
+    {"force-dimension", "Force Dimension omega, delta, lambda, sigma; Novint Falcon", "path of libdhd.so",
+     [](const std::string& where, std::vector<std::string>& told) {
+       ForceDimensionOptions o;
+       o.library = where;
+       return open_force_dimension(o, told);
+     }},
+    {"haply", "Haply Inverse3 and Minverse", "HOST[:PORT]",
+     [](const std::string& where, std::vector<std::string>& told) {
+       HaplyOptions o;
+       o.where = where;
+       return open_haply(o, told);
+     }},
+    {"bridge", "arms of another machine or program", "HOST[:PORT]",
+     [](const std::string& where, std::vector<std::string>& told) {
+       BridgeOptions o;
+       o.where = where;
+       return open_bridge(o, told);
+     }},
+};
+
+}  // namespace
+
+std::span<const ArmDriver> arm_drivers() { return kDrivers; }
+
+}  // namespace catgut

@@ -1,0 +1,316 @@
+// device/force_dimension: see the header. Below, Arm's members say which thread may use them.
+#include "device/force_dimension.h"
+
+#include <dlfcn.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <thread>
+
+#include "device/beat.h"
+#include "device/dhd_api.h"
+
+namespace catgut {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr float kStopStep = 0.5f;                   // [N] per millisecond on the way down (research notes 2.7)
+constexpr uint32_t kStatusEvery = 20;               // [ms] between looks at whether the firmware has cut the force
+constexpr uint32_t kEnableEvery = 250;              // [ms] between tries to switch it on again
+constexpr auto kReopenEvery = 500ms;                // of a lost arm
+constexpr auto kHangsAfter = 300ms;                 // a thread that does not end by then is left behind
+constexpr double kClosed = 0.007, kOpened = 0.011;  // [m] gap of a gripper that counts as pressed, and as let go again
+
+// Their axes (x toward the user, y right, z up) in ours (x right, y up, z toward the user), and back.
+Vec3 ours(double x, double y, double z) { return {static_cast<float>(y), static_cast<float>(z), static_cast<float>(x)}; }
+
+struct Arm {
+  dhd::Library dhd;  // constant
+  int index = 0;     // among the library's devices; constant
+  size_t hand = 0;
+  bool paced = true, gripper = false;
+  // The thread's, and before it runs the opener's.
+  dhd::Id id = -1;
+  ArmCallback callback;
+  uint32_t sequence = 0, cut_for = 0;
+  bool forced_off = false, closed = false;
+  Vec3 force;  // [N] last written, our frame
+  std::chrono::steady_clock::time_point reopen_at;
+  // For any thread.
+  std::atomic<bool> ready{false}, stopping{false}, stopped{true};
+  std::atomic<bool> calling{false}, left{false};  // left: the port is gone, the callback with it
+  std::atomic<uint32_t> error{0}, errors{0};
+  std::atomic<uint64_t> steps{0};
+};
+
+// The thread holds its arm, too: one that hangs in the library outlives the port.
+struct ForceDimension {
+  dhd::Library dhd;
+  std::array<std::shared_ptr<Arm>, 2> arm;
+  std::array<std::thread, 2> thread;
+};
+
+std::string text(const char* s) { return s ? s : ""; }
+
+// Ready for use, or why not. Called again when an arm comes back.
+bool prepare(Arm& a, std::string& why) {
+  int status[dhd::kStatusRoom] = {};
+  if (a.dhd.dhdGetStatus(status, a.id) == dhd::kError) {
+    why = text(a.dhd.dhdErrorGetStr(a.dhd.dhdErrorGetLast()));
+    return false;
+  }
+  if (!status[dhd::kStatusReset]) {
+    why = "it is not calibrated: run the maker's HapticInit, or move it as its manual says, and try again";
+    return false;
+  }
+  // Expert mode is needed for the watchdog alone and is left at once: it would also let wrong calls through.
+  const bool watched =
+      a.dhd.dhdEnableExpertMode() != dhd::kError && a.dhd.dhdSetWatchdog(dhd::kWatchdogMost, a.id) != dhd::kError;
+  a.dhd.dhdDisableExpertMode();
+  if (!watched) {
+    why = "its watchdog cannot be set, and without one a program that dies would leave a force behind";
+    return false;
+  }
+  a.dhd.dhdSetGravityCompensation(dhd::kOn, a.id);
+  if (a.dhd.dhdEnableForce(dhd::kOn, a.id) == dhd::kError) {
+    why = "its force cannot be switched on";
+    return false;
+  }
+  a.gripper = a.dhd.dhdHasGripper(a.id);
+  return true;
+}
+
+bool read(Arm& a, ArmSample& s) {
+  double p[3] = {}, v[3] = {}, m[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  if (a.dhd.dhdGetPosition(&p[0], &p[1], &p[2], a.id) == dhd::kError) return false;
+  if (a.dhd.dhdGetOrientationFrame(m, a.id) == dhd::kError) return false;
+  // Right after opening the velocity has no history and is an error: none, then.
+  if (a.dhd.dhdGetLinearVelocity(&v[0], &v[1], &v[2], a.id) == dhd::kError) v[0] = v[1] = v[2] = 0;
+  s.pose.p = ours(p[0], p[1], p[2]);
+  s.velocity = ours(v[0], v[1], v[2]);
+  // The columns are the tool's axes in the base frame. The tool's own axes are named as the base's are: its y is our tool's x.
+  const auto column = [&m](int k) { return ours(m[0][k], m[1][k], m[2][k]); };
+  s.pose.q = from_axes(normalized(column(1), {1, 0, 0}), normalized(column(2), {0, 1, 0}), normalized(column(0), {0, 0, 1}));
+  for (int k = 0; k < 2; ++k)
+    if (a.dhd.dhdGetButton(k, a.id) == dhd::kOn) s.buttons |= 1u << k;
+  double gap = 0;
+  if (a.gripper && a.dhd.dhdGetGripperGap(&gap, a.id) != dhd::kError) {
+    a.closed = gap < (a.closed ? kOpened : kClosed);
+    if (a.closed) s.buttons |= 1;
+  }
+  if (a.sequence % kStatusEvery == 1) {
+    int status[dhd::kStatusRoom] = {};
+    if (a.dhd.dhdGetStatus(status, a.id) == dhd::kError) return false;
+    const int cause = status[dhd::kStatusForceOffCause];
+    a.forced_off = !status[dhd::kStatusForce];
+    a.cut_for = a.forced_off ? a.cut_for + kStatusEvery : 0;
+    // What the firmware cut because we were late or the hand was fast comes back (and then through the servo's ramp); what
+    // somebody switched off at the arm stays off until he switches it on.
+    if (a.cut_for >= kEnableEvery && (cause == dhd::kCauseWatchdog || cause == dhd::kCauseVelocity))
+      a.dhd.dhdEnableForce(dhd::kOn, a.id), a.cut_for = 0;
+  }
+  s.forced_off = a.forced_off;
+  s.state = ArmState::ready;
+  return true;
+}
+
+bool write(Arm& a, Vec3 f) {
+  return a.dhd.dhdSetForceAndTorqueAndGripperForce(double{f.z}, double{f.x}, double{f.y}, 0, 0, 0, 0, a.id) != dhd::kError;
+}
+
+void lose(Arm& a) {
+  a.error.store(static_cast<uint32_t>(a.dhd.dhdErrorGetLast()), std::memory_order_relaxed);
+  a.errors.fetch_add(1, std::memory_order_relaxed);
+  a.ready.store(false, std::memory_order_relaxed);
+  a.force = {};
+  a.dhd.dhdClose(a.id);
+  a.id = -1;
+  a.reopen_at = std::chrono::steady_clock::now() + kReopenEvery;
+}
+
+// A lost arm may have been unplugged: its number is void, and it has to be opened again.
+void find_again(Arm& a) {
+  if (std::chrono::steady_clock::now() < a.reopen_at) return;
+  a.reopen_at = std::chrono::steady_clock::now() + kReopenEvery;
+  const int id = a.dhd.dhdOpenID(static_cast<dhd::Id>(a.index));
+  if (id < 0) return;
+  a.id = static_cast<dhd::Id>(id);
+  std::string why;
+  if (prepare(a, why)) return;
+  a.dhd.dhdClose(a.id);
+  a.id = -1;
+}
+
+// One millisecond of one arm.
+void serve(Arm& a) {
+  ArmSample s;
+  s.sequence = ++a.sequence;
+  if (a.id < 0 && !a.stopping) find_again(a);
+  const bool here = a.id >= 0;
+  bool fine = here && read(a, s);
+  if (!fine) s = {}, s.sequence = a.sequence;
+  // Between these two marks the callback's owner is not destroyed (see stop).
+  a.calling = true;
+  Vec3 force;
+  if (!a.left) force = a.callback.step(a.callback.user, a.hand, s);
+  a.calling = false;
+  if (a.stopping) {
+    const float l = length(a.force);
+    force = l > kStopStep ? a.force * ((l - kStopStep) / l) : Vec3{};
+  }
+  if (!is_finite(force)) force = {};
+  fine = fine && write(a, force);
+  if (fine) a.force = force, a.ready.store(true, std::memory_order_relaxed);
+  else if (here) lose(a);
+  a.steps.fetch_add(1, std::memory_order_relaxed);
+}
+
+void run(const std::shared_ptr<Arm>& arm) {
+  Arm& a = *arm;
+  go_first();
+  Beat beat;
+  while (!a.left && (!a.stopping || length2(a.force) > 0)) {
+    serve(a);
+    if (a.paced || a.id < 0) beat.wait();
+  }
+  if (a.id >= 0 && !a.left) a.dhd.dhdEnableForce(dhd::kOff, a.id);
+  a.stopped = true;
+}
+
+bool start(void* self, const ArmCallback& callback, std::string&) {
+  ForceDimension& f = *static_cast<ForceDimension*>(self);
+  for (size_t k = 0; k < 2; ++k) {
+    if (!f.arm[k]) continue;
+    f.arm[k]->callback = callback;
+    f.arm[k]->stopping = false, f.arm[k]->stopped = false;
+    f.thread[k] = std::thread(run, f.arm[k]);
+  }
+  return true;
+}
+
+void stop(void* self) {
+  ForceDimension& f = *static_cast<ForceDimension*>(self);
+  for (const auto& a : f.arm)
+    if (a) a->stopping = true;
+  const auto until = std::chrono::steady_clock::now() + kHangsAfter;
+  for (size_t k = 0; k < 2; ++k) {
+    if (!f.thread[k].joinable()) continue;
+    Arm& a = *f.arm[k];
+    while (!a.stopped && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(1ms);
+    if (a.stopped) {
+      f.thread[k].join();
+      continue;
+    }
+    // It hangs in the library; the arm's watchdog has taken the force off long ago. It will find nobody to call.
+    a.left = true;
+    while (a.calling) std::this_thread::yield();
+    f.thread[k].detach();
+  }
+}
+
+ArmStatus status(void* self, size_t k) {
+  const auto& a = static_cast<ForceDimension*>(self)->arm[k];
+  if (!a) return {};
+  return {a->ready, a->error, a->errors, a->steps};
+}
+
+std::string error_text(void* self, uint32_t error) {
+  return text(static_cast<ForceDimension*>(self)->dhd.dhdErrorGetStr(static_cast<int>(error)));
+}
+
+void close(void* self) {
+  ForceDimension* f = static_cast<ForceDimension*>(self);
+  stop(self);
+  for (const auto& a : f->arm)
+    if (a && !a->left && a->id >= 0) f->dhd.dhdClose(a->id);
+  delete f;
+}
+
+bool load(const ForceDimensionOptions& options, dhd::Library& dhd, std::vector<std::string>& told) {
+  std::vector<std::string> names{"libdhd.so", "libdhd.so.3", "libdrd.so", "libdrd.so.3"};  // the latter contains the former
+  const char* set = std::getenv("CATGUT_LIBDHD");
+  if (set && *set) names = {set};
+  if (!options.library.empty()) names = {options.library};
+  void* library = nullptr;
+  std::string why;
+  for (const std::string& name : names) {
+    library = dlopen(name.c_str(), RTLD_NOW | RTLD_LOCAL);  // never closed: a thread may still be in it
+    if (library) break;
+    if (why.empty()) why = dlerror();
+  }
+  if (!library) {
+    told.push_back("force-dimension: the library of Force Dimension's SDK is not there (" + why +
+                   "); install the SDK, or set CATGUT_LIBDHD to the path of libdhd.so");
+    return false;
+  }
+  std::string missing;
+#define CATGUT_DHD_LOAD(name, result, arguments)                          \
+  dhd.name = reinterpret_cast<decltype(dhd.name)>(dlsym(library, #name)); \
+  if (!dhd.name && missing.empty()) missing = #name;
+  CATGUT_DHD_FUNCTIONS(CATGUT_DHD_LOAD)
+#undef CATGUT_DHD_LOAD
+  if (missing.empty()) return true;
+  told.push_back("force-dimension: the library has no function " + missing +
+                 "; its version is not one that is known here (3.14 to 3.17)");
+  return false;
+}
+
+}  // namespace
+
+ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<std::string>& told) {
+  ArmPort port;
+  port.kind = "force-dimension";
+  dhd::Library dhd;
+  if (!load(options, dhd, told)) return port;
+  const int count = dhd.dhdGetDeviceCount();
+  if (count <= 0) {
+    told.push_back(
+        "force-dimension: no arm is connected and switched on, or its USB device may not be opened by you (udev rules)");
+    return port;
+  }
+  int version[4] = {};
+  dhd.dhdGetSDKVersion(&version[0], &version[1], &version[2], &version[3]);
+  auto f = std::make_unique<ForceDimension>();
+  f->dhd = dhd;
+  for (int index = 0; index < count && !(f->arm[0] && f->arm[1]); ++index) {
+    const std::string who = "force-dimension: arm " + std::to_string(index + 1) + " of " + std::to_string(count);
+    const int id = dhd.dhdOpenID(static_cast<dhd::Id>(index));
+    if (id < 0) {
+      told.push_back(who + " cannot be opened: " + text(dhd.dhdErrorGetStr(dhd.dhdErrorGetLast())) +
+                     "; does another program use it, or may you not open USB devices (udev rules)?");
+      continue;
+    }
+    auto a = std::make_shared<Arm>();
+    a->dhd = dhd, a->index = index, a->id = static_cast<dhd::Id>(id), a->paced = options.paced;
+    std::string why;
+    if (!prepare(*a, why)) {
+      told.push_back(who + " cannot be used: " + why);
+      dhd.dhdClose(a->id);
+      continue;
+    }
+    a->hand = dhd.dhdIsLeftHanded(a->id) ? 1 : 0;
+    if (f->arm[a->hand]) a->hand = 1 - a->hand;
+    ArmInfo& info = port.arm[a->hand];
+    info.present = true;
+    info.model = text(dhd.dhdGetSystemName(a->id));
+    info.name = info.model;
+    unsigned short serial = 0;
+    if (dhd.dhdGetSerialNumber(&serial, a->id) != dhd::kError) info.serial = "fd-" + std::to_string(serial);
+    info.driver = std::to_string(version[0]) + "." + std::to_string(version[1]) + "." + std::to_string(version[2]);
+    // The library does not tell its arms' limits; these are the data sheets' (research notes 1.1), the rest is not said.
+    const int type = dhd.dhdGetSystemType(a->id);
+    const bool falcon = type == dhd::kTypeFalcon, delta = type == dhd::kTypeDelta3 || type == dhd::kTypeOldDelta3;
+    info.limits = {falcon ? 8.0f : delta ? 20.0f : 12.0f, 0, 0, 0};
+    const float reach = falcon ? 0.04f : delta ? 0.15f : 0.075f;
+    info.least = Vec3{-reach, -reach, -reach}, info.most = Vec3{reach, reach, reach};
+    f->arm[a->hand] = std::move(a);
+  }
+  if (!f->arm[0] && !f->arm[1]) return port;
+  port.self = f.release();
+  port.start = start, port.stop = stop, port.status = status, port.error_text = error_text, port.close = close;
+  return port;
+}
+
+}  // namespace catgut

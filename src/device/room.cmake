@@ -1,0 +1,7 @@
+# The Haply service speaks JSON over WebSocket: Boost.Beast and nlohmann-json, headers only, in one file.
+find_package(Boost 1.74 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+target_link_libraries(catgut_device PRIVATE Boost::headers nlohmann_json::nlohmann_json)
+# Quick to build matters more than quick to run. Asio has fences that GCC's thread sanitizer warns of; one thread runs it here.
+set_source_files_properties(${PROJECT_SOURCE_DIR}/src/device/haply.cpp PROPERTIES
+  COMPILE_OPTIONS "-O1;$<$<CXX_COMPILER_ID:GNU>:-Wno-tsan>")

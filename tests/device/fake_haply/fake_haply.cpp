@@ -1,0 +1,207 @@
+// tests/device/fake_haply: see the header. Written from the maker's published description of the service.
+#include "fake_haply.h"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/websocket.hpp>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+namespace catgut {
+namespace {
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+using nlohmann::json;
+}  // namespace
+
+struct FakeHaply::Work {
+  HaplyForm form;
+  size_t arms;
+  asio::io_context io;
+  asio::ip::tcp::acceptor acceptor{io, {asio::ip::make_address("127.0.0.1"), 0}};
+  int fd = -1;  // of the line that is served
+  mutable std::mutex lock;
+  std::condition_variable change;
+  std::array<Arm, 2> arm;
+  bool held = false, quit = false, stepped = false;
+  std::string next, first, last;
+  unsigned long answered = 0, allowed = 0;
+  std::thread thread;
+
+  json xyz(const std::array<double, 3>& v) const { return {{"x", v[0]}, {"y", v[1]}, {"z", v[2]}}; }
+  json state(bool whole) const {
+    json m;
+    if (form == HaplyForm::v35 && whole) m["session_id"] = 7;
+    m["inverse3"] = json::array();
+    m["wireless_verse_grip"] = json::array();
+    m["verse_grip"] = json::array();
+    for (size_t k = 0; k < arms; ++k) {
+      if (!arm[k].there) continue;
+      json d{{"device_id", k == 0 ? "04BA" : "049D"}};
+      if (whole) d["config"] = {{"type", "inverse3"}, {"handedness", k == 0 ? "left" : "right"}};
+      d["state"] = {{"cursor_position", xyz(arm[k].position)}, {"cursor_velocity", xyz({0, 0, 0})}};
+      d["state"][form == HaplyForm::v35 ? "control_mode" : "mode"] = "idle";
+      d["status"] = {{"calibrated", true}, {"ready", true}, {"power_supply", true}};
+      m["inverse3"].push_back(d);
+    }
+    // The first arm's grip has no wire: turned by 90 degrees about the vertical, a pressed. The second's has one.
+    m["wireless_verse_grip"].push_back({{"device_id", "61576"},
+                                        {"state",
+                                         {{"orientation", {{"x", 0}, {"y", 0}, {"z", std::sqrt(0.5)}, {"w", std::sqrt(0.5)}}},
+                                          {"buttons", {{"a", true}, {"b", false}, {"c", false}}}}}});
+    m["verse_grip"].push_back(
+        {{"device_id", "61548"}, {"state", {{"orientation", {{"x", 0}, {"y", 0}, {"z", 0}, {"w", 1}}}, {"button", false}}}});
+    return m;
+  }
+  void obey(const json& message) {
+    for (const json& d : message.value("inverse3", json::array())) {
+      const size_t k = d.value("device_id", "") == "04BA" ? 0 : 1;
+      const json command = d.value("commands", json::object()).value("set_cursor_force", json::object());
+      // The other form is not an error here as it is none there: there is simply no force in it.
+      const json f = command.value(form == HaplyForm::v35 ? "vector" : "values", json::object());
+      const std::array<double, 3> to{f.value("x", 0.0), f.value("y", 0.0), f.value("z", 0.0)};
+      double step = 0;
+      for (size_t i = 0; i < 3; ++i) step += (to[i] - arm[k].force[i]) * (to[i] - arm[k].force[i]);
+      arm[k].step_most = std::max(arm[k].step_most, std::sqrt(step));
+      arm[k].force = to;
+      ++arm[k].messages;
+    }
+  }
+  void idle() {
+    for (Arm& a : arm) a.force = {0, 0, 0};
+  }
+  void serve(asio::ip::tcp::socket socket) {
+    {
+      const std::lock_guard<std::mutex> hold(lock);
+      fd = socket.native_handle();
+    }
+    beast::websocket::stream<asio::ip::tcp::socket> ws(std::move(socket));
+    beast::error_code e;
+    ws.next_layer().set_option(asio::ip::tcp::no_delay(true), e);
+    ws.accept(e);
+    ws.text(true);
+    std::string text;
+    if (!e) {
+      {
+        const std::lock_guard<std::mutex> hold(lock);
+        text = first.empty() ? state(true).dump() : first;
+        first.clear();
+      }
+      ws.write(asio::buffer(text), e);
+    }
+    while (!e) {
+      beast::flat_buffer in;
+      ws.read(in, e);
+      if (e) break;
+      const json message = json::parse(beast::buffers_to_string(in.data()), nullptr, false);
+      if (message.is_discarded()) break;
+      {
+        std::unique_lock<std::mutex> hold(lock);
+        if (held) change.wait_for(hold, std::chrono::milliseconds(30), [&] { return quit || !held || allowed > 0; });
+        if (held && allowed == 0 && !stepped) idle();  // the service's own watchdog, where time passes by itself
+        change.wait(hold, [&] { return quit || !held || allowed > 0; });
+        if (quit) break;
+        if (allowed > 0) --allowed;
+        last = message.dump();
+        obey(message);
+        text = next.empty() ? state(false).dump() : next;
+        next.clear();
+        ++answered;
+        change.notify_all();
+      }
+      ws.write(asio::buffer(text), e);
+    }
+    const std::lock_guard<std::mutex> hold(lock);
+    idle();
+    fd = -1;
+  }
+  void run() {
+    for (;;) {
+      beast::error_code e;
+      asio::ip::tcp::socket socket(io);
+      acceptor.accept(socket, e);
+      {
+        const std::lock_guard<std::mutex> hold(lock);
+        if (quit) return;
+      }
+      if (!e) serve(std::move(socket));
+    }
+  }
+};
+
+FakeHaply::FakeHaply(HaplyForm form, int arms) : work(std::make_unique<Work>()) {
+  work->form = form;
+  work->arms = static_cast<size_t>(arms);
+  work->thread = std::thread([w = work.get()] { w->run(); });
+}
+FakeHaply::~FakeHaply() {
+  const auto port = work->acceptor.local_endpoint();
+  {
+    const std::lock_guard<std::mutex> hold(work->lock);
+    work->quit = true;
+    if (work->fd >= 0) ::shutdown(work->fd, SHUT_RDWR);
+    work->change.notify_all();
+  }
+  asio::io_context io;
+  asio::ip::tcp::socket last(io);
+  beast::error_code e;
+  last.connect(port, e);  // wakes the one who waits for a line
+  work->thread.join();
+}
+std::string FakeHaply::where() const { return "127.0.0.1:" + std::to_string(work->acceptor.local_endpoint().port()); }
+
+#define HOLD const std::lock_guard<std::mutex> hold_lock(work->lock)
+FakeHaply::Arm FakeHaply::at(size_t k) const {
+  HOLD;
+  return work->arm[k];
+}
+void FakeHaply::zero(size_t k) {
+  HOLD;
+  work->arm[k].step_most = 0;
+}
+void FakeHaply::there(size_t k, bool is) {
+  HOLD;
+  work->arm[k].there = is;
+}
+void FakeHaply::hold(bool on) {
+  HOLD;
+  work->held = on;
+  work->change.notify_all();
+}
+void FakeHaply::say(const std::string& text) {
+  HOLD;
+  work->next = text;
+}
+void FakeHaply::inventory(const std::string& text) {
+  HOLD;
+  work->first = text;
+}
+void FakeHaply::hang_up() {
+  HOLD;
+  if (work->fd >= 0) ::shutdown(work->fd, SHUT_RDWR);
+}
+unsigned long FakeHaply::answered() const {
+  HOLD;
+  return work->answered;
+}
+std::string FakeHaply::last() const {
+  HOLD;
+  return work->last;
+}
+void FakeHaply::step(unsigned long messages) {
+  std::unique_lock<std::mutex> hold(work->lock);
+  const unsigned long want = work->answered + messages;
+  work->allowed += messages;
+  work->stepped = true;
+  work->change.notify_all();
+  if (!work->change.wait_for(hold, std::chrono::seconds(5), [&] { return work->answered >= want; }))
+    ADD_FAILURE() << "the driver sends nothing";
+}
+
+}  // namespace catgut

@@ -1,0 +1,38 @@
+// tests/device/fake_haply: a service of the shape of Haply's: a WebSocket on a port that the system gives, one state for each
+// message, forces that last as long as messages come. Its own axes: x right, y forward, z up; metres and newtons.
+#pragma once
+#include <array>
+#include <atomic>
+#include <memory>
+#include <string>
+
+namespace catgut {
+
+enum class HaplyForm { v31, v35 };
+
+struct FakeHaply {
+  struct Arm {
+    std::array<double, 3> position{0, -0.12, 0.15}, force{0, 0, 0};
+    double step_most = 0;  // [N] from one message to the next
+    unsigned long messages = 0;
+    bool there = true;
+  };
+  explicit FakeHaply(HaplyForm form = HaplyForm::v35, int arms = 2);
+  ~FakeHaply();
+  std::string where() const;  // "127.0.0.1:PORT"
+  Arm at(size_t device) const;
+  void zero(size_t device);
+  void there(size_t device, bool is);       // false: it is no longer in what the service says
+  void hold(bool on);                       // true: messages are kept without an answer until false, or step
+  void say(const std::string& text);        // the answer to the next message, whatever it is; "": as it should be
+  void inventory(const std::string& text);  // what is said first, to the next who connects
+  void hang_up();                           // cuts the line; who connects again is served
+  unsigned long answered() const;
+  void step(unsigned long messages);  // lets so many be answered while held; waits for them
+  std::string last() const;           // message that came
+
+  struct Work;
+  std::unique_ptr<Work> work;
+};
+
+}  // namespace catgut

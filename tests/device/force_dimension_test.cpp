@@ -1,0 +1,314 @@
+// tests/device: the driver of Force Dimension's arms against a simulated libdhd, through the same dlopen and the same symbols
+// as the real one; the servo in between is the real one. In the double the first device is the left hand's.
+#include "device/force_dimension.h"
+
+#include <dlfcn.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <thread>
+
+#include "device/dhd_api.h"
+#include "fake_dhd/fake_dhd.h"
+#include "haptic/servo.h"
+
+namespace catgut {
+namespace {
+
+struct FakeDhd {
+  void* library = nullptr;
+  decltype(&fakeDhdReset) reset = nullptr;
+  decltype(&fakeDhdStep) step = nullptr;
+  decltype(&fakeDhdRun) run = nullptr;
+  decltype(&fakeDhdFault) fault = nullptr;
+  decltype(&fakeDhdHand) hand = nullptr;
+  decltype(&fakeDhdFast) fast = nullptr;
+  decltype(&fakeDhdRead) read = nullptr;
+  decltype(&fakeDhdZero) zero = nullptr;
+  explicit FakeDhd(bool manual) {
+    for (const char* name : {"FAKE_DHD_COUNT", "FAKE_DHD_UNCALIBRATED", "FAKE_DHD_LOCKED"}) unsetenv(name);
+    setenv("FAKE_DHD_MANUAL", manual ? "1" : "0", 1);
+    setenv("CATGUT_LIBDHD", CATGUT_FAKE_LIBDHD, 1);
+    library = dlopen(CATGUT_FAKE_LIBDHD, RTLD_NOW | RTLD_LOCAL);
+    if (!library) ADD_FAILURE() << dlerror();
+    find(reset, "fakeDhdReset"), find(step, "fakeDhdStep"), find(fault, "fakeDhdFault"), find(hand, "fakeDhdHand");
+    find(fast, "fakeDhdFast"), find(read, "fakeDhdRead"), find(zero, "fakeDhdZero");
+    find(run, "fakeDhdRun");
+    reset();
+  }
+  template <typename F>
+  void find(F& f, const char* name) {
+    f = reinterpret_cast<F>(dlsym(library, name));
+    if (!f) ADD_FAILURE() << name;
+  }
+  // hand: 0 right, 1 left.
+  static int device(size_t h) { return h == 0 ? 1 : 0; }
+  FakeDhdArm at(size_t h) const {
+    FakeDhdArm a{};
+    read(device(h), &a);
+    return a;
+  }
+  Vec3 force(size_t h) const {  // in our axes
+    const FakeDhdArm a = at(h);
+    return {static_cast<float>(a.force[1]), static_cast<float>(a.force[2]), static_cast<float>(a.force[0])};
+  }
+};
+
+// Both arms on servos, a millisecond at a time.
+struct Two {
+  FakeDhd fake{true};
+  std::vector<std::string> told;
+  ArmPort port;
+  std::array<ServoHand, 2> hand;
+  std::array<ServoOptions, 2> options;
+  std::array<Vec3, 2> pull{};
+  std::array<ToolInput, 2> input;
+  std::array<ArmSample, 2> sample;
+  std::array<uint64_t, 2> now_ns{1000000000, 1000000000};  // each thread its own
+  std::array<uint64_t, 2> physics_ns{};                    // 0: the physics lives
+
+  static Vec3 step(void* user, size_t k, const ArmSample& s) {
+    Two& t = *static_cast<Two*>(user);
+    t.now_ns[k] += 1000000;
+    t.sample[k] = s;
+    ForcePatch p;
+    p.period = 0.016f, p.force = t.pull[k], p.time_ns = t.physics_ns[k] ? t.physics_ns[k] : t.now_ns[k];
+    const ServoOut out = servo_step(t.hand[k], t.options[k], s, &p, t.now_ns[k]);
+    t.input[k] = out.hand;
+    return out.force;
+  }
+  void open() {
+    ForceDimensionOptions o;
+    o.paced = false;
+    port = open_force_dimension(o, told);
+    for (size_t k = 0; k < 2; ++k) fit_to_arm(options[k], port.arm[k].limits);
+    std::string why;
+    if (port.any()) { ASSERT_TRUE(port.start(port.self, {step, this}, why)) << why; }
+  }
+  template <typename F>
+  void run(int ms, const F& each) {
+    for (int k = 0; k < ms; ++k) {
+      ASSERT_TRUE(fake.step(1));
+      each(k);
+    }
+  }
+  void run(int ms) {
+    run(ms, [](int) {});
+  }
+  void engage(Vec3 right, Vec3 left) {
+    run(2100);
+    pull = {right, left};
+    run(800);
+    fake.zero(0), fake.zero(1);
+  }
+  void put(size_t h, Vec3 p, const double* rows, int button = 0, double gap = 0.02) {
+    const double at[3] = {double{p.z}, double{p.x}, double{p.y}};
+    fake.hand(FakeDhd::device(h), at, rows, button, gap);
+  }
+  ~Two() {
+    fake.run();  // the driver gets the milliseconds it needs to take its force off
+    port.reset();
+  }
+};
+
+constexpr double kStraight[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+TEST(ForceDimension, tells_what_it_found) {
+  Two t;
+  t.open();
+  EXPECT_TRUE(t.told.empty());
+  ASSERT_TRUE(t.port.arm[0].present && t.port.arm[1].present);
+  EXPECT_EQ(t.port.arm[0].serial, "fd-1001");
+  EXPECT_EQ(t.port.arm[1].serial, "fd-1000") << "the left-handed one is the left hand's";
+  EXPECT_EQ(t.port.arm[0].driver, "3.17.5");
+  EXPECT_EQ(t.port.arm[0].limits.force, 12);
+  EXPECT_EQ(t.options[0].limiter.force, 3.3f) << "and still no more than a Touch gives";
+  EXPECT_EQ(t.fake.at(0).watchdog, 255);
+}
+
+TEST(ForceDimension, poses_come_whole) {
+  Two t;
+  t.open();
+  // Turned by 90 degrees about the vertical, their z: their x axis points where their y was.
+  const double turned[9] = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+  t.put(0, {0.01f, 0.02f, 0.03f}, turned, 0, 0.003);
+  t.put(1, {-0.01f, 0, 0}, kStraight, 1);
+  t.run(300);
+  EXPECT_LT(distance(t.sample[0].pose.p, {0.01f, 0.02f, 0.03f}), 1e-5f);
+  EXPECT_LT(length(rotation_vector(t.sample[0].pose.q * conjugate(axis_angle({0, 1, 0}, 0.5f * kPi)))), 1e-5f);
+  EXPECT_LT(length(rotation_vector(t.sample[1].pose.q)), 1e-5f);
+  EXPECT_EQ(t.sample[0].buttons, 1u) << "the gripper is pressed";
+  EXPECT_EQ(t.sample[1].buttons, 1u);
+  t.put(0, {}, turned, 0, 0.009);
+  t.run(5);
+  EXPECT_EQ(t.sample[0].buttons, 1u) << "not quite let go";
+  t.put(0, {}, turned, 0, 0.02);
+  t.run(5);
+  EXPECT_EQ(t.sample[0].buttons, 0u);
+}
+
+TEST(ForceDimension, H9_forces_are_never_swapped) {
+  Two t;
+  t.open();
+  const Vec3 right{0.3f, 0.1f, 0}, left{0, -0.2f, 0.6f};
+  t.engage(right, left);
+  EXPECT_LT(distance(t.fake.force(0), right), 1e-3f);
+  EXPECT_LT(distance(t.fake.force(1), left), 1e-3f);
+  EXPECT_GT(t.fake.at(0).position[1], 0.001) << "pushed to the right, it went to the right";
+}
+
+// The physics dies: force is zero within 100 ms, without a step.
+TEST(ForceDimension, the_physics_dies) {
+  Two t;
+  t.open();
+  t.engage({0.9f, 0, 0}, {0, 0.6f, 0});
+  const Vec3 left = t.fake.force(1);
+  t.physics_ns[0] = t.now_ns[0];
+  int zero = 0;
+  t.run(150, [&](int k) {
+    if (length(t.fake.force(0)) == 0 && zero == 0) zero = k + 1;
+    ASSERT_TRUE(t.fake.force(1) == left);
+  });
+  EXPECT_GT(zero, 30);
+  EXPECT_LE(zero, 100);
+  EXPECT_LE(t.fake.at(0).step_most, 0.5 + 1e-4);
+}
+
+// An arm is unplugged and plugged in again: its force is gone, the other hand's goes on to the bit, and it comes back through
+// the ramp.
+TEST(ForceDimension, H7_an_arm_is_unplugged) {
+  Two t;
+  t.open();
+  t.engage({0.9f, 0, 0}, {0, 0.6f, 0});
+  const Vec3 left = t.fake.force(1);
+  t.fake.fault(FakeDhd::device(0), kDhdUnplugged, 1);
+  t.run(200, [&](int) {
+    ASSERT_TRUE(t.fake.force(1) == left);
+    ASSERT_EQ(length(t.fake.force(0)), 0);
+  });
+  for (int k = 0; k < 2000 && t.port.status(t.port.self, 0).ready; ++k)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_FALSE(t.port.status(t.port.self, 0).ready);
+  EXPECT_TRUE(t.port.status(t.port.self, 1).ready);
+  EXPECT_EQ(t.port.error_text(t.port.self, t.port.status(t.port.self, 0).error), "communication error");
+  t.fake.fault(FakeDhd::device(0), kDhdUnplugged, 0);
+  for (int k = 0; k < 5000 && !t.port.status(t.port.self, 0).ready; ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    ASSERT_TRUE(t.fake.step(1));
+  }
+  EXPECT_TRUE(t.port.status(t.port.self, 0).ready);
+  EXPECT_EQ(t.fake.at(0).watchdog, 255);
+  t.run(100);
+  EXPECT_EQ(length(t.fake.force(0)), 0) << "what is wanted is not small: it must not engage";
+  EXPECT_TRUE(t.fake.force(1) == left);
+}
+
+// A call that never comes back: the arm's own watchdog takes the force off, the other hand does not notice, and leaving does
+// not wait for it.
+TEST(ForceDimension, an_arm_hangs) {
+  Two t;
+  t.open();
+  t.engage({0.9f, 0, 0}, {0, 0.6f, 0});
+  const Vec3 left = t.fake.force(1);
+  t.fake.fault(FakeDhd::device(0), kDhdHang, 1);
+  int zero = 0;
+  t.run(100, [&](int k) {
+    if (length(t.fake.force(0)) == 0 && zero == 0) zero = k + 1;
+    ASSERT_TRUE(t.fake.force(1) == left);
+  });
+  EXPECT_GT(zero, 0);
+  EXPECT_LE(zero, 33);
+  EXPECT_EQ(t.fake.at(0).cause, 3);
+  t.fake.run();
+  const auto before = std::chrono::steady_clock::now();
+  t.port.reset();
+  EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(5));
+  EXPECT_EQ(t.fake.at(1).output, 0) << "the other one was left as it should be";
+  t.fake.fault(FakeDhd::device(0), kDhdHang, 0);  // the thread that was left behind finds nobody, and ends
+  t.fake.fault(FakeDhd::device(0), kDhdUnplugged, 1);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+}
+
+// The firmware cut the force because the hand was fast: the tool still moves, force comes back through the ramp.
+TEST(ForceDimension, the_firmware_cuts_the_force) {
+  Two t;
+  t.open();
+  t.engage({0.9f, 0, 0}, {});
+  t.fake.fast(FakeDhd::device(0));
+  t.run(60);
+  EXPECT_EQ(t.input[0].connected, 1u);
+  EXPECT_TRUE(t.sample[0].forced_off);
+  EXPECT_EQ(length(t.fake.force(0)), 0);
+  t.run(400);
+  EXPECT_FALSE(t.sample[0].forced_off) << "switched on again";
+  EXPECT_EQ(length(t.fake.force(0)), 0) << "but what is wanted is not small";
+}
+
+TEST(ForceDimension, positions_that_are_no_numbers) {
+  Two t;
+  t.open();
+  t.engage({0.9f, 0, 0}, {0, 0.6f, 0});
+  t.fake.fault(FakeDhd::device(0), kDhdNan, 1);
+  t.run(100, [&](int) { ASSERT_TRUE(is_finite(t.fake.force(0))); });
+  EXPECT_EQ(length(t.fake.force(0)), 0);
+  EXPECT_NEAR(length(t.fake.force(1)), 0.6f, 0.01f);
+}
+
+TEST(ForceDimension, nothing_to_work_with_is_one_line) {
+  FakeDhd fake(true);
+  const auto line = [&fake](const char* name, const char* value, const char* needle, const std::string& library = "") {
+    if (*name) setenv(name, value, 1);
+    fake.reset();
+    std::vector<std::string> told;
+    ForceDimensionOptions o;
+    o.library = library;
+    EXPECT_FALSE(open_force_dimension(o, told).any()) << needle;
+    ASSERT_FALSE(told.empty());
+    EXPECT_NE(told.back().find(needle), std::string::npos) << told.back();
+    EXPECT_EQ(told.back().find('\n'), std::string::npos);
+    if (*name) unsetenv(name);
+  };
+  line("FAKE_DHD_COUNT", "0", "no arm is connected");
+  line("FAKE_DHD_UNCALIBRATED", "1", "HapticInit");
+  line("FAKE_DHD_LOCKED", "1", "udev rules");
+  line("", "", "install the SDK", "/nowhere/libdhd.so");
+  line("", "", "has no function dhdGetDeviceCount", "libc.so.6");
+}
+
+TEST(ForceDimension, one_arm_is_enough) {
+  Two t;
+  setenv("FAKE_DHD_COUNT", "1", 1);
+  t.fake.reset();
+  t.open();
+  EXPECT_TRUE(t.told.empty());
+  EXPECT_TRUE(!t.port.arm[0].present && t.port.arm[1].present);
+  t.run(20);
+  EXPECT_EQ(t.port.status(t.port.self, 0).steps, 0u);
+  EXPECT_GE(t.port.status(t.port.self, 1).steps, 19u);
+  unsetenv("FAKE_DHD_COUNT");
+}
+
+// Leaving takes the force off by the slew, then switches the motors off. In real time, as the arm keeps it.
+TEST(ForceDimension, leaving) {
+  FakeDhd fake(false);
+  std::vector<std::string> told;
+  ArmPort port = open_force_dimension({}, told);
+  ASSERT_TRUE(port.any());
+  const auto hold = [](void*, size_t, const ArmSample&) { return Vec3{0, 2, 0}; };
+  std::string why;
+  ASSERT_TRUE(port.start(port.self, {hold, nullptr}, why)) << why;
+  for (int k = 0; k < 5000 && (length(fake.force(0)) < 1 || length(fake.force(1)) < 1); ++k)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  ASSERT_GT(length(fake.force(0)), 1);
+  fake.zero(0), fake.zero(1);
+  port.stop(port.self);
+  for (const size_t k : {size_t{0}, size_t{1}}) {
+    EXPECT_LE(fake.at(k).step_most, 0.5 + 1e-6);
+    EXPECT_EQ(fake.at(k).output, 0);
+  }
+}
+
+}  // namespace
+}  // namespace catgut

@@ -1,0 +1,238 @@
+// tests/device: the driver of Haply's arms against a service of the same shape, over a WebSocket as with the real one; the
+// servo in between is the real one. Messages are counted: one is a millisecond of the arms. The first device is the left
+// hand's.
+#include "device/haply.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <functional>
+#include <thread>
+
+#include "fake_haply/fake_haply.h"
+#include "haptic/servo.h"
+
+namespace catgut {
+namespace {
+
+bool wait_for(const std::function<bool()>& done) {
+  for (int k = 0; k < 20000; ++k) {
+    if (done()) return true;
+    std::this_thread::sleep_for(std::chrono::microseconds(500));
+  }
+  return false;
+}
+
+// In our axes.
+Vec3 force_of(const FakeHaply::Arm& a) {
+  return {static_cast<float>(a.force[0]), static_cast<float>(a.force[2]), static_cast<float>(-a.force[1])};
+}
+
+struct Two {
+  FakeHaply fake;
+  std::vector<std::string> told;
+  ArmPort port;
+  std::array<ServoHand, 2> hand;
+  std::array<ServoOptions, 2> options;
+  std::array<std::atomic<float>, 2> pull{};  // [N] along x right, y up
+  std::array<std::atomic<uint64_t>, 2> physics_ns{};
+  std::array<ArmSample, 2> sample;  // of a driver that stands still
+  std::array<std::atomic<bool>, 2> there{};
+  std::array<std::atomic<uint64_t>, 2> now_ns{};
+
+  static Vec3 step(void* user, size_t k, const ArmSample& s) {
+    Two& t = *static_cast<Two*>(user);
+    const uint64_t now = t.now_ns[k] += 1000000;
+    t.sample[k] = s;
+    ForcePatch p;
+    p.period = 0.016f, p.time_ns = t.physics_ns[k] ? t.physics_ns[k].load() : now;
+    (k == 0 ? p.force.x : p.force.y) = t.pull[k];
+    const ServoOut out = servo_step(t.hand[k], t.options[k], s, &p, now);
+    t.there[k] = out.hand.connected;
+    return out.force;
+  }
+  explicit Two(HaplyForm form = HaplyForm::v35, int arms = 2) : fake(form, arms) {
+    for (auto& n : now_ns) n = 1000000000;
+    fake.hold(true);
+    HaplyOptions o;
+    o.where = fake.where();
+    o.patience = 5, o.forget = 5, o.paced = false;  // this machine may be busy
+    port = open_haply(o, told);
+    for (const std::string& line : told) ADD_FAILURE() << line;
+    for (size_t k = 0; k < 2; ++k) fit_to_arm(options[k], port.arm[k].limits), options[k].limiter.ramp = 0.2f;
+    std::string why;
+    if (port.any()) { EXPECT_TRUE(port.start(port.self, {step, this}, why)) << why; }
+  }
+  ~Two() {
+    fake.hold(false);
+    port.reset();
+  }
+  Vec3 force(size_t h) const { return force_of(fake.at(h == 0 ? 1 : 0)); }
+  template <typename F>
+  void run(int messages, const F& each) {
+    for (int k = 0; k < messages; ++k) fake.step(1), each(k);
+  }
+  void engage(float right, float left) {
+    fake.step(300);
+    pull[0] = right, pull[1] = left;
+    fake.step(300);
+    fake.zero(0), fake.zero(1);
+  }
+};
+
+TEST(Haply, both_forms_of_the_service) {
+  for (const HaplyForm form : {HaplyForm::v31, HaplyForm::v35}) {
+    Two t(form);
+    ASSERT_TRUE(t.port.arm[0].present && t.port.arm[1].present);
+    EXPECT_EQ(t.port.arm[0].serial, "haply-049D");
+    EXPECT_EQ(t.port.arm[1].serial, "haply-04BA") << "as the service says which hand's it is";
+    EXPECT_EQ(t.options[0].limiter.force, 3.3f) << "what is not said is careful";
+    t.engage(0.5f, 0.4f);
+    // H9: two arms, two forces, and both arrive in the form the service reads.
+    EXPECT_LT(distance(t.force(0), {0.5f, 0, 0}), 1e-3f);
+    EXPECT_LT(distance(t.force(1), {0, 0.4f, 0}), 1e-3f);
+    EXPECT_EQ(t.fake.last().find("session") != std::string::npos, false) << "said once";
+    EXPECT_EQ(t.fake.last().find("vector") != std::string::npos, form == HaplyForm::v35);
+  }
+}
+
+TEST(Haply, poses_come_whole) {
+  Two t;
+  t.fake.step(10);
+  t.fake.hold(false);
+  t.port.stop(t.port.self);  // from here on the samples stand still
+  EXPECT_LT(distance(t.sample[1].pose.p, {0, 0.15f, 0.12f}), 1e-6f);
+  // Their z is our y. A grip that is not turned points along their y: our -z, as a tool that is not turned does.
+  EXPECT_LT(length(rotation_vector(t.sample[1].pose.q * conjugate(axis_angle({0, 1, 0}, 0.5f * kPi)))), 1e-5f);
+  EXPECT_LT(length(rotation_vector(t.sample[0].pose.q)), 1e-5f);
+  EXPECT_EQ(t.sample[1].buttons, 1u);
+  EXPECT_EQ(t.sample[0].buttons, 0u);
+}
+
+TEST(Haply, the_physics_dies) {
+  Two t;
+  t.engage(0.9f, 0.6f);
+  const Vec3 left = t.force(1);
+  t.physics_ns[0] = t.now_ns[0].load();
+  int zero = 0;
+  t.run(150, [&](int k) {
+    if (length(t.force(0)) == 0 && zero == 0) zero = k + 1;
+    ASSERT_TRUE(t.force(1) == left);
+  });
+  EXPECT_GT(zero, 30);
+  EXPECT_LE(zero, 100);
+  EXPECT_LE(t.fake.at(1).step_most, 0.5 + 1e-4);
+}
+
+// One arm is lost and comes back; the other's force goes on to the bit.
+TEST(Haply, H7_an_arm_is_lost) {
+  Two t;
+  t.engage(0.9f, 0.6f);
+  const Vec3 left = t.force(1);
+  t.fake.there(1, false);
+  t.run(100, [&](int k) {
+    ASSERT_TRUE(t.force(1) == left);
+    if (k > 1) { ASSERT_EQ(length(t.force(0)), 0); }
+  });
+  EXPECT_FALSE(t.there[0]);
+  EXPECT_TRUE(t.there[1]);
+  EXPECT_NE(t.port.error_text(t.port.self, t.port.status(t.port.self, 0).error).find("has lost it"), std::string::npos);
+  t.fake.there(1, true);
+  t.run(200, [&](int) { ASSERT_EQ(length(t.force(0)), 0) << "what is wanted is not small: it must not engage"; });
+  EXPECT_TRUE(t.there[0]);
+  EXPECT_TRUE(t.force(1) == left);
+}
+
+// Whatever the service says, nothing falls over and no force leaps.
+TEST(Haply, answers_that_are_none) {
+  Two t;
+  t.engage(0.9f, 0.6f);
+  for (const char* text :
+       {"{", "[]", "null", "7", "\"x\"", "{\"inverse3\":7}", "{\"inverse3\":[7,null,[]]}", "{\"inverse3\":[{\"device_id\":4}]}",
+        "{\"inverse3\":[{\"device_id\":\"049D\",\"state\":{\"cursor_position\":{\"x\":1e99,\"y\":0,\"z\":0}}}]}",
+        "{\"inverse3\":[{\"device_id\":\"049D\",\"state\":{\"cursor_position\":{\"x\":\"a\"}}}]}",
+        "{\"inverse3\":[{\"device_id\":\"049D\",\"state\":null}],\"wireless_verse_grip\":[[]]}"}) {
+    SCOPED_TRACE(text);
+    t.fake.say(text);
+    t.run(3, [&](int) { ASSERT_LE(length(t.force(0)), 0.91f); });
+  }
+  t.pull[0] = t.pull[1] = 0;
+  t.fake.step(300);
+  EXPECT_TRUE(t.there[0] && t.there[1]);
+}
+
+// In real time: the service stops answering, then its line is cut, then it is back. Both arms are lost, and come back.
+TEST(Haply, the_service_stands_still) {
+  FakeHaply fake;
+  HaplyOptions o;
+  o.where = fake.where();
+  o.patience = 5;
+  std::vector<std::string> told;
+  ArmPort port = open_haply(o, told);
+  ASSERT_TRUE(port.any());
+  static std::atomic<uint64_t> lost{0};
+  lost = 0;
+  const auto step = [](void*, size_t, const ArmSample& s) {
+    lost += s.state == ArmState::absent;
+    return Vec3{0, 0.3f, 0};
+  };
+  std::string why;
+  ASSERT_TRUE(port.start(port.self, {step, nullptr}, why));
+  const auto ready = [&](bool is) {
+    return wait_for([&] { return port.status(port.self, 0).ready == is && port.status(port.self, 1).ready == is; });
+  };
+  ASSERT_TRUE(ready(true));
+  fake.hold(true);
+  EXPECT_TRUE(ready(false));
+  EXPECT_TRUE(wait_for([] { return lost > 10; })) << "the servo still has its millisecond";
+  EXPECT_TRUE(wait_for([&] { return length(force_of(fake.at(0))) == 0; }));
+  fake.hold(false);
+  EXPECT_TRUE(ready(true));
+  fake.say("\xff\xfe");  // no text at all: the line is given up
+  EXPECT_TRUE(ready(false));
+  EXPECT_TRUE(ready(true)) << "a new line";
+  fake.hang_up();
+  EXPECT_TRUE(ready(false));
+  EXPECT_TRUE(ready(true)) << "a new line";
+  EXPECT_TRUE(wait_for([&] { return length(force_of(fake.at(0))) > 0.2f; }));
+  fake.zero(0);
+  port.stop(port.self);
+  EXPECT_TRUE(wait_for([&] { return length(force_of(fake.at(0))) == 0; }));
+  EXPECT_LE(fake.at(0).step_most, 0.5 + 1e-4);
+}
+
+TEST(Haply, nothing_to_work_with_is_one_line) {
+  const auto line = [](const std::string& where, const char* needle) {
+    std::vector<std::string> told;
+    HaplyOptions o;
+    o.where = where;
+    o.patience = 0.2f;
+    EXPECT_FALSE(open_haply(o, told).any()) << needle;
+    ASSERT_EQ(told.size(), 1u);
+    EXPECT_NE(told[0].find(needle), std::string::npos) << told[0];
+    EXPECT_EQ(told[0].find('\n'), std::string::npos);
+  };
+  std::string gone;
+  {
+    FakeHaply fake;
+    gone = fake.where();
+  }
+  line(gone, "no Inverse service answers");
+  line("127.0.0.1:nothing", "is no Inverse service");
+  FakeHaply none(HaplyForm::v35, 0);
+  line(none.where(), "has no arm");
+  FakeHaply other;
+  other.inventory("{\"device\":[]}");
+  line(other.where(), "as versions 3.1 to 3.5 do");
+  FakeHaply raw;
+  raw.inventory(R"({"inverse3":[{"device_id":"04BA","status":{"calibrated":false}}]})");
+  line(raw.where(), "not calibrated");
+  FakeHaply quotes;
+  quotes.inventory(R"({"inverse3":[{"device_id":"04\"BA"}]})");
+  line(quotes.where(), "has no arm");
+}
+
+}  // namespace
+}  // namespace catgut
