@@ -285,6 +285,34 @@ TEST(Haptics, H8_heat) {
   EXPECT_LT(length(limiter.out), 1e-4f);
 }
 
+// H4, the puncture: what is left of the force when the tip goes through is felt at most 8 ms after the physics lets it through,
+// although the physics is heard a frame late. The servo knows the force at which a wall gives way, and does not wait.
+TEST(Haptics, H4_puncture_drop) {
+  for (const float rate : {60.0f, 240.0f, 480.0f}) {
+    SCOPED_TRACE(rate);
+    Bench b;
+    b.rate = rate;
+    b.tissue.pierce_force = 0.9f;
+    b.path = [](float t) { return Vec3{0, 0.004f - 0.03f * t, 0}; };
+    b.warm_up({0, 0.004f, 0});
+    float peak = 0;
+    int through = -1, dropped = -1;  // [ms]
+    for (int ms = 0; ms < 600 && (dropped < 0 || through < 0); ++ms) {
+      b.run(0.001f);
+      peak = std::max(peak, length(b.force));
+      if (through < 0 && b.pierced) through = ms;
+      if (dropped < 0 && peak > 0.7f && length(b.force) < 0.5f * peak) dropped = ms;
+    }
+    std::printf("H4: %3.0f Hz: peak %.2f N, half of it %+d ms after the physics let the tip in\n", double{rate}, double{peak},
+                dropped - through);
+    ASSERT_GE(through, 0);
+    ASSERT_GE(dropped, 0);
+    EXPECT_LE(dropped - through, 8);
+    EXPECT_GT(dropped - through, -20) << "no sooner than the wall would give way";
+    EXPECT_GT(peak, 0.75f);
+  }
+}
+
 // H10: the same samples and the same patches give the same forces, to the bit.
 TEST(Haptics, H10_determinism) {
   const auto play = [](float offset) {
