@@ -320,8 +320,7 @@ TEST_F(CommandLine, a_picture_of_a_moment_that_never_comes_takes_no_results_with
   expect_refused("bench haptics --out /proc/nowhere", "cannot be written");
 
   const Outcome o = run_catgut(
-      "run stay --surgeon scripted --headless --threads 1 --set duration=3000 --still 2990:late.png --json end.json "
-      "--no-expect "
+      "run stay --surgeon scripted --headless --set duration=3000 --still 2990:late.png --json end.json --no-expect "
       "--contact-sheet sheet.png");
   EXPECT_EQ(o.code, 2);
   EXPECT_NE(o.err.find("everything else was written"), std::string::npos) << o.err;
