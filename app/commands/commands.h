@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "render/frame_cost.h"
 #include "runtime/pictures.h"
 #include "runtime/session.h"
 
@@ -44,6 +45,10 @@ struct FrameOptions {
   double seconds = 0;  // [s] simulated
 };
 int bench_frame(const FrameOptions& options);
+// What a headset's picture of each snapshot costs, `every_s` [s] simulated apart, nothing rasterised. Throws std::runtime_error
+// in a build without pictures.
+using StereoPictures = std::function<FrameCost::Times(const Snapshot&)>;
+StereoPictures stereo_pictures(const PictureModel& model, float every_s);
 
 // `catgut bench haptics` (app/commands/haptics.cpp). folder: empty: the table alone.
 int bench_haptics(const std::string& folder, const std::string& scene);

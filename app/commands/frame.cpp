@@ -9,7 +9,6 @@
 #include "commands/commands.h"
 #include "core/check.h"
 #include "procedure/scene_file.h"
-#include "render/frame_cost.h"
 
 namespace catgut {
 namespace {
@@ -25,29 +24,33 @@ double at_part(std::vector<double>& values, double part) {
 
 }  // namespace
 
+StereoPictures stereo_pictures(const PictureModel& model, float every_s) {
+  const std::shared_ptr<FrameCost> picture = make_frame_cost(model, kEyeWidth, kEyeHeight, Quality::medium, 2);
+  const auto follow = std::make_shared<FollowCamera>(model);
+  return [picture, follow, every_s](const Snapshot& seen) {
+    const Camera middle = follow->update(seen, every_s);
+    Camera eyes[2] = {middle, middle};
+    const Vec3 apart = normalized(cross(middle.target - middle.eye, middle.up)) * 0.032f;
+    eyes[0].eye -= apart, eyes[1].eye += apart;
+    return picture->frame(seen, eyes);
+  };
+}
+
 int bench_frame(const FrameOptions& o) {
   SceneSpec scene = read_scene(o.scene);
   for (const std::string& setting : o.set) set_value(scene, setting);
   prepare_output(o.json);
-  std::unique_ptr<FrameCost> picture;
-  std::unique_ptr<FollowCamera> follow;
+  StereoPictures picture;
   std::vector<double> caller, all;
   double next_s = 0;
   SessionHooks hooks;
   hooks.stop = &stop_on_interrupt();
   hooks.on_progress = progress_line();
-  hooks.on_start = [&](const PictureModel& model) {
-    picture = make_frame_cost(model, kEyeWidth, kEyeHeight, Quality::medium, 2);
-    follow = std::make_unique<FollowCamera>(model);
-  };
+  hooks.on_start = [&](const PictureModel& model) { picture = stereo_pictures(model, static_cast<float>(kFrameEvery)); };
   hooks.on_tick = [&](const Snapshot& seen, const std::string&) {
     if (seen.time_s < next_s) return;
     next_s = seen.time_s + kFrameEvery;
-    const Camera middle = follow->update(seen, static_cast<float>(kFrameEvery));
-    Camera eyes[2] = {middle, middle};
-    const Vec3 apart = normalized(cross(middle.target - middle.eye, middle.up)) * 0.032f;
-    eyes[0].eye -= apart, eyes[1].eye += apart;
-    const FrameCost::Times t = picture->frame(seen, eyes);
+    const FrameCost::Times t = picture(seen);
     caller.push_back(t.caller_ms), all.push_back(t.all_ms);
   };
   SessionOptions session;

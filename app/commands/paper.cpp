@@ -9,13 +9,10 @@
 #include "commands/commands.h"
 #include "core/check.h"
 #include "procedure/scene_file.h"
-#include "render/frame_cost.h"
 #include "runtime/paper_tables.h"
 
 namespace catgut {
 namespace {
-
-constexpr int kEyeWidth = 1440, kEyeHeight = 1584;  // [pixels] a usual headset's
 
 std::string this_machine() {
   std::ifstream info("/proc/cpuinfo");
@@ -29,20 +26,12 @@ std::string this_machine() {
 }
 
 // Empty in a build without pictures.
-std::function<PictureCost(const PictureModel&)> stereo_picture() {
+std::function<PictureCost(const PictureModel&)> picture_cost() {
   try {
-    make_frame_cost({}, kEyeWidth, kEyeHeight, Quality::medium, 2);
+    stereo_pictures({}, 0.1f);
   } catch (const std::runtime_error&) { return {}; }
   return [](const PictureModel& model) -> PictureCost {
-    const std::shared_ptr<FrameCost> picture = make_frame_cost(model, kEyeWidth, kEyeHeight, Quality::medium, 2);
-    const auto follow = std::make_shared<FollowCamera>(model);
-    return [picture, follow](const Snapshot& seen) {
-      const Camera middle = follow->update(seen, 1.0f / 15);
-      Camera eyes[2] = {middle, middle};
-      const Vec3 apart = normalized(cross(middle.target - middle.eye, middle.up)) * 0.032f;
-      eyes[0].eye -= apart, eyes[1].eye += apart;
-      return picture->frame(seen, eyes).caller_ms;
-    };
+    return [picture = stereo_pictures(model, 1.0f / 15)](const Snapshot& seen) { return picture(seen).caller_ms; };
   };
 }
 
@@ -59,7 +48,7 @@ int bench_paper(const PaperOptions& o) {
   }
   if (!o.out.empty())
     for (const char* name : {"/tables.md", "/tables.csv"}) prepare_output(o.out + name);
-  const auto picture = stereo_picture();
+  const auto picture = picture_cost();
   SessionHooks hooks;
   hooks.stop = &stop_on_interrupt();
   const std::string about = fmt::format(

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <string_view>
 #include <thread>
 
 #include "core/check.h"
@@ -189,6 +190,16 @@ std::vector<std::string> new_faults(uint32_t faults, uint32_t& told) {
   return lines;
 }
 
+// Whether "HOST:PORT" has a port that is none. Numbers of IPv6 have colons of their own: "[::1]:PORT".
+static bool bad_port(const std::string& where) {
+  const size_t colon = where.rfind(':'), bracket = where.rfind(']');
+  if (colon == std::string::npos) return false;
+  if (bracket == std::string::npos ? where.find(':') != colon : colon < bracket) return false;
+  const std::string port = where.substr(colon + 1);
+  return port.empty() || port.size() > 5 || port.find_first_not_of("0123456789") != std::string::npos ||
+         std::stoul(port) > 65535;
+}
+
 ArmChoice read_arm_choice(const std::string& text) {
   ArmChoice c;
   if (text.empty() || text == "off") return c;
@@ -207,7 +218,11 @@ ArmChoice read_arm_choice(const std::string& text) {
   c.where = rest;
   std::string all;
   for (const ArmDriver& d : arm_drivers()) {
-    if (c.driver == d.word) return c;
+    if (c.driver == d.word) {
+      if (std::string_view(d.where).substr(0, 4) == "HOST" && bad_port(c.where))
+        throw InputError("--haptics " + text, "\"" + c.where + "\" is no " + d.where, "give a port from 0 to 65535, or none");
+      return c;
+    }
     all += std::string(d.word) + ", ";
   }
   throw InputError("--haptics " + text, "there is no such device", "use " + all + "paper or off");

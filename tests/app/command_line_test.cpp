@@ -109,6 +109,8 @@ TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
   expect_refused("describe substep", "substeps");
   expect_refused("devices --test", "no haptic arm");
   expect_refused("play --haptics spoon", "--haptics");
+  expect_refused("devices bridge:host:abc", "\"host:abc\" is no HOST[:PORT]");
+  expect_refused("play stay --haptics haply:host:70000", "is no HOST[:PORT]");
 }
 
 // Arms come and go with a library that is loaded at run time; here it is the simulated one.
