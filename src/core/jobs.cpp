@@ -1,9 +1,12 @@
 // core/jobs: the workers behind Jobs::each. Reads the published job; writes nothing but what the job's own blocks write.
-// One 64-bit ticket holds (generation, blocks left). A worker claims a block by decrementing it, so a worker that wakes late
-// finds nothing to claim and never touches a job that is over; the caller works too and waits only for claimed blocks.
+// Every worker has a desk: one cache line with the job and a ticket (generation, first, last): blocks of its own share that
+// nobody has begun. It takes them from the front, and whoever has waited for it too long takes them from the back. A claim
+// names the generation, so a worker that wakes late finds nothing to claim and never touches a job that is over.
 #include "core/jobs.h"
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
@@ -22,41 +25,67 @@ inline void relax() {
 #endif
 }
 
-constexpr int kSpins = 2000;  // about 30 us: longer than the gaps between the stages of a substep
-constexpr int kYields = 64;   // then give the core to others, then sleep until the next tick
+constexpr int kSpins = 2000;   // 20 to 100 us: longer than the gaps between the stages of a substep
+constexpr int kYields = 64;    // then give the core to others, then sleep until the next tick
+constexpr int kPatience = 40;  // 1 to 2 us: the others are nearly done; their blocks are in their caches, so leave them
+// A worker whose core is taken by another program holds everybody up for a scheduler's slice. After one such wait the caller
+// does without workers for a while.
+constexpr auto kLate = std::chrono::milliseconds(1);
+constexpr auto kAlone = std::chrono::milliseconds(50);
+
+// A ticket: generation (32 bits), first and last block not yet begun (16 bits each).
+constexpr uint64_t make_ticket(uint64_t generation, uint64_t first, uint64_t last) {
+  return generation << 32 | first << 16 | last;
+}
+constexpr uint64_t first_of(uint64_t ticket) { return ticket >> 16 & 0xffff; }
+constexpr uint64_t last_of(uint64_t ticket) { return ticket & 0xffff; }
+constexpr bool is_empty(uint64_t ticket) { return first_of(ticket) >= last_of(ticket); }
+constexpr size_t kMostBlocks = 0xffff;
 
 }  // namespace
 
 struct Jobs::Pool {
-  alignas(64) std::atomic<uint64_t> ticket{0};  // generation << 32 | blocks left to claim
-  alignas(64) std::atomic<uint32_t> done{0};    // blocks finished in this generation
-  // The job: written before the ticket is published, stable until every claimed block is done.
-  Call call = nullptr;
-  void* work = nullptr;
-  size_t count = 0, block = 0;
+  struct alignas(64) Desk {
+    std::atomic<uint64_t> ticket{0};
+    // The job: written before the ticket is published, stable until every claimed block is done.
+    Call call = nullptr;
+    void* work = nullptr;
+    size_t count = 0, block = 0;
+  };
+  std::vector<Desk> desk;  // the caller's first
+  uint64_t generation = 0;
+  alignas(64) std::atomic<size_t> done{0};  // blocks finished in this generation
 
   alignas(64) std::atomic<int> asleep{0};
   std::atomic<bool> stop{false};
   std::mutex mutex;
   std::condition_variable wake;
   std::vector<std::thread> threads;
+  std::chrono::steady_clock::time_point alone_until{};
 
-  bool claim_and_run() {
-    uint64_t t = ticket.load(std::memory_order_acquire);
-    while ((t & 0xffffffffu) != 0) {
-      if (ticket.compare_exchange_weak(t, t - 1, std::memory_order_acq_rel, std::memory_order_acquire)) {
-        call(work, (t & 0xffffffffu) - 1, count, block);
-        done.fetch_add(1, std::memory_order_release);
-        return true;
-      }
+  explicit Pool(int workers) : desk(static_cast<size_t>(workers)) {}
+
+  // Runs what is left at a desk, from the front if it is one's own; returns how many blocks that were.
+  static size_t clear(Desk& d, bool own) {
+    size_t n = 0;
+    uint64_t t = d.ticket.load(std::memory_order_acquire);
+    while (!is_empty(t)) {
+      const uint64_t next = own ? t + (uint64_t{1} << 16) : t - 1;
+      if (!d.ticket.compare_exchange_weak(t, next, std::memory_order_acq_rel, std::memory_order_acquire)) continue;
+      d.call(d.work, own ? first_of(t) : last_of(next), d.count, d.block);
+      ++n;
+      t = next;
+      if (!own) break;  // one at a time: its owner may be back
     }
-    return false;
+    return n;
   }
 
-  void work_loop() {
+  void work_loop(size_t me) {
     int idle = 0;
     while (!stop.load(std::memory_order_relaxed)) {
-      if (claim_and_run()) {
+      const size_t n = clear(desk[me], true);
+      if (n > 0) {
+        done.fetch_add(n, std::memory_order_release);
         idle = 0;
       } else if (++idle < kSpins) {
         relax();
@@ -65,18 +94,43 @@ struct Jobs::Pool {
       } else {
         std::unique_lock<std::mutex> lock(mutex);
         asleep.fetch_add(1);
-        wake.wait(lock, [&] { return stop.load() || (ticket.load() & 0xffffffffu) != 0; });
+        wake.wait(lock, [&] { return stop.load() || !is_empty(desk[me].ticket.load()); });
         asleep.fetch_sub(1);
         idle = 0;
       }
+    }
+  }
+
+  // The caller, done with its own share: waits for the others, and does for them what they are too late for.
+  void finish(size_t blocks, size_t finished) {
+    int spins = 0;
+    std::chrono::steady_clock::time_point waiting{};
+    while (finished + done.load(std::memory_order_acquire) != blocks) {
+      if (++spins < kPatience) {
+        relax();
+        continue;
+      }
+      size_t n = 0;
+      for (size_t k = 1; k < desk.size() && n == 0; ++k) n = clear(desk[k], false);
+      finished += n;
+      if (n > 0) continue;
+      if (spins < kSpins) {
+        relax();
+        continue;
+      }
+      const auto now = std::chrono::steady_clock::now();
+      if (waiting == std::chrono::steady_clock::time_point{}) waiting = now;
+      if (now - waiting > kLate) alone_until = now + kAlone;
+      std::this_thread::yield();
     }
   }
 };
 
 Jobs::Jobs(int threads) : threads_(threads < 1 ? 1 : threads > 64 ? 64 : threads) {
   if (threads_ == 1) return;
-  pool_ = std::make_unique<Pool>();
-  for (int i = 1; i < threads_; ++i) pool_->threads.emplace_back([pool = pool_.get()] { pool->work_loop(); });
+  pool_ = std::make_unique<Pool>(threads_);
+  for (size_t i = 1; i < static_cast<size_t>(threads_); ++i)
+    pool_->threads.emplace_back([pool = pool_.get(), i] { pool->work_loop(i); });
 }
 
 Jobs::~Jobs() {
@@ -91,28 +145,34 @@ Jobs::~Jobs() {
 
 void Jobs::run(size_t blocks, Call call, void* work, size_t count, size_t block) {
   if (blocks == 0) return;
-  if (!pool_ || blocks == 1) {
+  const bool alone = !pool_ || blocks == 1 || blocks > kMostBlocks ||
+                     (pool_->alone_until != std::chrono::steady_clock::time_point{} && still_alone());
+  if (alone) {
     for (size_t b = 0; b < blocks; ++b) call(work, b, count, block);
     return;
   }
   Pool& p = *pool_;
-  p.call = call;
-  p.work = work;
-  p.count = count;
-  p.block = block;
   p.done.store(0, std::memory_order_relaxed);
-  const uint64_t generation = (p.ticket.load(std::memory_order_relaxed) >> 32) + 1;
-  p.ticket.store(generation << 32 | blocks);
+  ++p.generation;
+  // Block b of any job of as many blocks goes to the same worker: what it wrote in one stage is in its cache in the next.
+  const size_t workers = p.desk.size();
+  for (size_t k = workers; k-- > 0;) {
+    Pool::Desk& d = p.desk[k];
+    d.call = call, d.work = work, d.count = count, d.block = block;
+    d.ticket.store(make_ticket(p.generation, blocks * k / workers, blocks * (k + 1) / workers));
+  }
   if (p.asleep.load() > 0) {
     // Taking the mutex orders this against a worker that is just about to sleep.
     { std::lock_guard<std::mutex> lock(p.mutex); }
     p.wake.notify_all();
   }
-  while (p.claim_and_run()) {}
-  for (int spins = 0; p.done.load(std::memory_order_acquire) != blocks;) {
-    if (++spins < 20 * kSpins) relax();
-    else std::this_thread::yield();
-  }
+  p.finish(blocks, Pool::clear(p.desk[0], true));
+}
+
+bool Jobs::still_alone() {
+  if (std::chrono::steady_clock::now() < pool_->alone_until) return true;
+  pool_->alone_until = {};
+  return false;
 }
 
 }  // namespace catgut

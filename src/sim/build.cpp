@@ -190,7 +190,8 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
       mass.push_back(r.mass[i]);
       s.inv_mass.push_back(r.pinned[i] ? 0.0f : 1.0f / (r.mass[i] * scene.solver.mass_scale));
       radius.push_back(r.radius);
-      apart.push_back(static_cast<float>(2.2 * spacing));
+      // Neighbours in the wall are held apart by its shape, not by contact, however fine the particles.
+      apart.push_back(static_cast<float>(std::max(2.2 * spacing, 2 * r.radius + spacing)));
       const size_t wall_here = working_rim.size() + (r.wall.empty() ? 0 : r.wall[i]);
       body.push_back(static_cast<uint32_t>(wall_here));  // two layers of one body meet as two bodies do
       m.wall.push_back(static_cast<uint8_t>(wall_here));

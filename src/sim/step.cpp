@@ -76,7 +76,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
     cut(solver, state.solver, model.suture, state.suture, pressed, state.event);
     new_suture(solver, state.solver, model.suture, state.suture, model.start, model.needle_start, pressed, state.event);
   }
-  find_candidates(solver, state.solver, state.scratch, 0.008f, times);
+  find_candidates(solver, state.solver, state.scratch, jobs, 0.008f, times);
   begin_feeling(state);
   for (int i = 1; i <= model.substeps; ++i) {
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));

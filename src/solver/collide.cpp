@@ -4,12 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 
 namespace catgut {
 namespace {
-
-constexpr uint32_t kBlock = 16;
 
 bool boxes_meet(Vec3 l0, Vec3 u0, Vec3 l1, Vec3 u1) {
   return l0.x <= u1.x && l1.x <= u0.x && l0.y <= u1.y && l1.y <= u0.y && l0.z <= u1.z && l1.z <= u0.z;
@@ -18,118 +15,19 @@ Vec3 least(Vec3 a, Vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std
 Vec3 most(Vec3 a, Vec3 b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
 Vec3 all(float s) { return {s, s, s}; }
 
-float distance_to_box2(Vec3 p, Vec3 l, Vec3 u) {
-  const Vec3 d = most(most(l - p, p - u), Vec3{});
-  return length2(d);
-}
-
 }  // namespace
 
-TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius, std::span<const uint32_t> body,
-                                      std::span<const float> rest_reach, std::vector<Triangle> surface) {
-  TissueCollision t;
-  t.particles = static_cast<uint32_t>(rest.size());
-  t.radius.assign(radius.begin(), radius.end());
-  t.body.assign(body.begin(), body.end());
-  t.rest_reach.assign(rest_reach.begin(), rest_reach.end());
-  t.surface = std::move(surface);
-  for (float r : radius) t.largest_radius = std::max(t.largest_radius, r);
-  std::vector<uint32_t> count(t.particles + 1, 0);
-  for (const Triangle& k : t.surface)
-    for (uint32_t i : k) ++count[i + 1];
-  for (size_t i = 1; i < count.size(); ++i) count[i] += count[i - 1];
-  t.ring_first = count;
-  t.ring.resize(t.surface.size() * 3);
-  for (uint32_t f = 0; f < t.surface.size(); ++f)
-    for (uint32_t i : t.surface[f]) t.ring[count[i]++] = f;
-  return t;
-}
-
-void update_boxes(const TissueCollision& tissue, const Vec4* x, Candidates& c) {
-  const uint32_t blocks = (tissue.particles + kBlock - 1) / kBlock;
-  c.lower.resize(blocks);
-  c.upper.resize(blocks);
-  for (uint32_t b = 0; b < blocks; ++b) {
-    Vec3 lo = xyz(x[b * kBlock]), hi = lo;
-    const uint32_t end = std::min(tissue.particles, (b + 1) * kBlock);
-    for (uint32_t i = b * kBlock + 1; i < end; ++i) lo = least(lo, xyz(x[i])), hi = most(hi, xyz(x[i]));
-    c.lower[b] = lo;
-    c.upper[b] = hi;
-  }
-}
-
-void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Vec4* x, Candidates& c) {
-  const uint32_t n = tissue.particles;
-  if (c.built_at.size() == n) {
-    // By components, which is cheap and on the safe side: none above half the margin over the root of three.
-    // Four maxima, so that none waits for the one before.
-    Four most_of[4] = {};
-    auto look = [&](uint32_t i, Four& worst) {
-      const Four d = load(x[i]) - load(c.built_at[i]), d2 = d * d;
-      worst = d2 > worst ? d2 : worst;
-    };
-    uint32_t i = 0;
-    for (; i + 4 <= n; i += 4)
-      for (uint32_t k = 0; k < 4; ++k) look(i + k, most_of[k]);
-    for (; i < n; ++i) look(i, most_of[0]);
-    Four worst = most_of[0];
-    for (const Four& w : most_of) worst = w > worst ? w : worst;
-    const float limit = kPairMargin * kPairMargin / 12;
-    if (worst[0] < limit && worst[1] < limit && worst[2] < limit) return;
-  }
-  c.built_at.assign(x, x + n);
-  c.pair.clear();
-  update_boxes(tissue, x, c);
-  // By components, padded to whole groups of four.
-  for (std::vector<float>* column : {&c.x, &c.y, &c.z, &c.radius}) column->resize((n + 3) / 4 * 4);
-  for (uint32_t k = 0; k < n; ++k) c.x[k] = x[k].x, c.y[k] = x[k].y, c.z[k] = x[k].z, c.radius[k] = tissue.radius[k];
-  const uint32_t blocks = static_cast<uint32_t>(c.lower.size());
-  const Vec3 grow = all(2 * tissue.largest_radius + kPairMargin);
-  for (uint32_t ba = 0; ba < blocks; ++ba)
-    for (uint32_t bb = ba; bb < blocks; ++bb) {
-      if (!boxes_meet(c.lower[ba], c.upper[ba], c.lower[bb] - grow, c.upper[bb] + grow)) continue;
-      const uint32_t ea = std::min(n, (ba + 1) * kBlock), eb = std::min(n, (bb + 1) * kBlock);
-      for (uint32_t i = ba * kBlock; i < ea; ++i) {
-        // Half the particles of a neighbouring block are out of reach: one test on the box saves sixteen.
-        const Vec3 p = xyz(x[i]);
-        if (ba != bb && distance_to_box2(p, c.lower[bb], c.upper[bb]) > grow.x * grow.x) continue;
-        // Four at a time: which are near at all? Most are not.
-        const float reach_i = tissue.radius[i] + kPairMargin;
-        for (uint32_t j0 = bb * kBlock; j0 < eb; j0 += 4) {
-          Four at_x, at_y, at_z, radius;
-          std::memcpy(&at_x, &c.x[j0], sizeof at_x), std::memcpy(&at_y, &c.y[j0], sizeof at_y);
-          std::memcpy(&at_z, &c.z[j0], sizeof at_z), std::memcpy(&radius, &c.radius[j0], sizeof radius);
-          const Four dx = at_x - p.x, dy = at_y - p.y, dz = at_z - p.z, reach = radius + reach_i;
-          const auto far = dx * dx + dy * dy + dz * dz > reach * reach;
-          if ((far[0] & far[1] & far[2] & far[3]) != 0) continue;
-          for (uint32_t k = 0; k < 4; ++k) {
-            const uint32_t j = j0 + k;
-            if (far[k] || j >= eb || (ba == bb && j <= i)) continue;
-            if (tissue.body[i] == tissue.body[j]) {
-              const float apart = std::max(tissue.rest_reach[i], tissue.rest_reach[j]);
-              if (length2(xyz(rest[j]) - xyz(rest[i])) < apart * apart) continue;
-            }
-            c.pair.push_back({i, j});
-          }
-        }
-      }
-    }
-  std::sort(c.pair.begin(), c.pair.end(), [](PairCandidate a, PairCandidate b) { return a.a != b.a ? a.a < b.a : a.b < b.b; });
-}
-
 int nearest_particle(const TissueCollision& tissue, const Candidates& c, const Vec4* x, Vec3 p, float reach) {
+  constexpr float kOld = 0.002f;  // [m] boxes may be a tick old: more than tissue moves in one
   float best = reach * reach;
   int found = -1;
-  // Boxes may be a few substeps old: a pair margin covers what can have moved since.
-  const float slack = reach + kPairMargin;
-  for (uint32_t b = 0; b < c.lower.size(); ++b) {
-    if (distance_to_box2(p, c.lower[b], c.upper[b]) > slack * slack) continue;
+  for_blocks_near(c.tissue.boxes, p - all(reach + kOld), p + all(reach + kOld), [&](uint32_t b) {
     const uint32_t end = std::min(tissue.particles, (b + 1) * kBlock);
     for (uint32_t i = b * kBlock; i < end; ++i) {
       const float d = length2(xyz(x[i]) - p);
       if (d < best) best = d, found = static_cast<int>(i);
     }
-  }
+  });
   return found;
 }
 
@@ -157,8 +55,6 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
   c.thread_tool.clear();
   c.thread_tissue.clear();
   c.thread_pair.clear();
-  update_boxes(tissue, x, c);
-  const uint32_t blocks = static_cast<uint32_t>(c.lower.size());
   const size_t segments = thread.order.size() < 2 ? 0 : thread.order.size() - 1;
   auto collides = [&](uint32_t slot) { return thread_collides[slot - thread_model.first_slot] != 0; };
 
@@ -179,15 +75,14 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
       const Vec3 p = transform(body[b].pose(), capsule.a), q = transform(body[b].pose(), capsule.b);
       const float reach = capsule.radius + tissue.tool_radius + margin;
       const Vec3 from = least(p, q) - all(reach), to = most(p, q) + all(reach);
-      for (uint32_t blk = 0; blk < blocks; ++blk) {
-        if (!boxes_meet(from, to, c.lower[blk], c.upper[blk])) continue;
+      for_blocks_near(c.tissue.boxes, from, to, [&](uint32_t blk) {
         const uint32_t end = std::min(tissue.particles, (blk + 1) * kBlock);
         for (uint32_t i = blk * kBlock; i < end; ++i) {
           const Vec3 at = xyz(x[i]), d = q - p;
           const float t = std::clamp(dot(at - p, d) / std::max(length2(d), 1e-16f), 0.0f, 1.0f);
           if (length2(at - (p + d * t)) < reach * reach) c.tool.push_back({b, k, i});
         }
-      }
+      });
       const float thread_reach = capsule.radius + thread_model.radius + margin;
       for (size_t r = 0; r < runs; ++r) {
         if (!boxes_meet(lo[r], hi[r], from, to)) continue;
@@ -208,8 +103,7 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
   uint32_t guess = tissue.particles;  // the nearest of the node before: with it most boxes are too far at once
   for (size_t r = 0; r < runs; ++r) {
     c.near_block.clear();
-    for (uint32_t b = 0; b < blocks; ++b)
-      if (boxes_meet(lo[r] - all(reach), hi[r] + all(reach), c.lower[b], c.upper[b])) c.near_block.push_back(b);
+    for_blocks_near(c.tissue.boxes, lo[r] - all(reach), hi[r] + all(reach), [&](uint32_t b) { c.near_block.push_back(b); });
     if (c.near_block.empty()) continue;
     for (size_t k = r * kRun; k < std::min(segments, (r + 1) * kRun); ++k) {
       const uint32_t slot = thread.order[k];
@@ -219,7 +113,7 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
       uint32_t near = tissue.particles;
       if (guess < tissue.particles && length2(xyz(x[guess]) - p) < closest) closest = length2(xyz(x[guess]) - p), near = guess;
       for (uint32_t b : c.near_block) {
-        if (distance_to_box2(p, c.lower[b], c.upper[b]) > closest) continue;
+        if (distance_to_block2(c.tissue.boxes, b, p) > closest) continue;
         const uint32_t end = std::min(tissue.particles, (b + 1) * kBlock);
         for (uint32_t i = b * kBlock; i < end; ++i) {
           const float d = length2(xyz(x[i]) - p);

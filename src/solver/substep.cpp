@@ -9,10 +9,9 @@
 namespace catgut {
 namespace {
 
-// Items per block of a stage: fixed, never a function of the number of workers. Fork and join cost some microseconds, so a
-// light stage is cut only where it is worth that; shape matching into several blocks a worker, so that an uneven start evens
-// out.
-constexpr size_t kLightBlock = 2048, kParticleBlock = 256, kGroupBlock = 80, kClusterBlock = 80;
+// Items per block of a stage: fixed, never a function of the number of workers. What is done to every particle goes by groups
+// of the shape, so that a worker finds what it left in its cache in the stage before.
+constexpr size_t kParticleBlock = 256, kGroupBlock = 32, kClusterBlock = 32;
 constexpr float kTopSpeed = 5.0f;  // [m/s] of a particle; a hand cannot throw tissue faster
 
 void clear_multipliers(SolverState& state, SolverScratch& scratch) {
@@ -26,30 +25,30 @@ void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   std::fill(scratch.thread.lambda.begin(), scratch.thread.lambda.end(), 0.0f);
 }
 
-void predict_particles(const SolverModel& m, SolverState& s, SolverScratch& k, size_t first, size_t last) {
-  auto run = [&](size_t from, size_t to, Vec3 gravity) {
-    const Four gh = load({gravity.x * m.h, gravity.y * m.h, gravity.z * m.h, 0});
-    for (size_t i = from; i < to; ++i) {
-      k.prev[i] = s.x[i];
-      if (m.inv_mass[i] == 0) continue;
-      Four v = load(s.v[i]) + gh;
-      const Four v2 = v * v;
-      const float speed2 = v2[0] + v2[1] + v2[2];
-      if (speed2 > kTopSpeed * kTopSpeed) v *= kTopSpeed / std::sqrt(speed2);
-      store(s.x[i], load(s.x[i]) + v * m.h);
-    }
-  };
-  const size_t middle = std::clamp<size_t>(m.tissue, first, last);
-  run(first, middle, m.tissue_gravity);
-  run(middle, last, m.gravity);
+void predict_particles(const SolverModel& m, SolverState& s, SolverScratch& k, Vec3 gravity, size_t first, size_t last) {
+  const Four gh = load({gravity.x * m.h, gravity.y * m.h, gravity.z * m.h, 0});
+  for (size_t i = first; i < last; ++i) {
+    k.prev[i] = s.x[i];
+    if (m.inv_mass[i] == 0) continue;
+    Four v = load(s.v[i]) + gh;
+    const Four v2 = v * v;
+    const float speed2 = v2[0] + v2[1] + v2[2];
+    if (speed2 > kTopSpeed * kTopSpeed) v *= kTopSpeed / std::sqrt(speed2);
+    store(s.x[i], load(s.x[i]) + v * m.h);
+  }
 }
 
-void update_velocities(const SolverModel& m, SolverState& s, const SolverScratch& k, size_t first, size_t last) {
-  const float inv_h = 1.0f / m.h;
-  const size_t middle = std::clamp<size_t>(m.tissue, first, last);
-  const float keep_tissue = inv_h / (1 + m.damping * m.h), keep_thread = inv_h / (1 + m.thread_damping * m.h);
-  for (size_t i = first; i < middle; ++i) store(s.v[i], (load(s.x[i]) - load(k.prev[i])) * keep_tissue);
-  for (size_t i = middle; i < last; ++i) store(s.v[i], (load(s.x[i]) - load(k.prev[i])) * keep_thread);
+void update_velocities(const SolverModel& m, SolverState& s, const SolverScratch& k, float damping, size_t first, size_t last) {
+  const float keep = 1.0f / m.h / (1 + damping * m.h);
+  for (size_t i = first; i < last; ++i) store(s.v[i], (load(s.x[i]) - load(k.prev[i])) * keep);
+}
+
+// How far tissue has moved since its pairs were found, for the particles of groups [first, last).
+void note_moves(const SolverModel& m, const SolverState& s, SolverScratch& k, size_t first, size_t last) {
+  PairSearch& search = k.candidates.tissue;
+  const uint32_t from = m.shape.group_first[first], to = m.shape.group_first[last];
+  if (to <= search.built_at.size())
+    search.moved[first / kGroupBlock] = furthest_move(&s.x[from], &search.built_at[from], to - from);
 }
 
 }  // namespace
@@ -83,17 +82,20 @@ void prepare_scratch(const SolverModel& model, SolverScratch& k) {
   k.volume_lambda.assign(model.volume.tet.size(), 0.0f);
   k.thread.resize(model.thread.count);
   k.candidates = {};
+  k.candidates.tissue.moved.assign((model.shape.groups + kGroupBlock - 1) / kGroupBlock, 0.0f);
   k.on_body.assign(model.body.size(), {});
   k.node_of_slot.assign(model.thread.count, -1);
   k.locked.assign(model.thread.count, 0);
 }
 
-void find_candidates(const SolverModel& m, const SolverState& s, SolverScratch& k, float margin, StageTimes* times) {
+void find_candidates(const SolverModel& m, const SolverState& s, SolverScratch& k, Jobs& jobs, float margin,
+                     StageTimes* times) {
   {
     StageTimer timer(times, Stage::attach);
     weave(s.pin, m.inv_mass.data(), m.tissue, k.web);
   }
   StageTimer timer(times, Stage::broadphase);
+  make_boxes(m.collision, s.x.data(), k.candidates.tissue.boxes, jobs);
   find_tool_and_thread_candidates(m.collision, s.x.data(), m.thread, s.thread, s.thread_collides, m.body, s.body,
                                   s.body_collides, margin, k.candidates);
 }
@@ -106,8 +108,9 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   clear_multipliers(s, k);
   {
     StageTimer timer(times, Stage::predict);
-    jobs.each(m.count, kLightBlock, [&](size_t first, size_t last) { predict_particles(m, s, k, first, last); });
-    jobs.each(m.shape.groups, kLightBlock, [&](size_t first, size_t last) {
+    predict_particles(m, s, k, m.gravity, m.tissue, m.count);
+    jobs.each(m.shape.groups, kGroupBlock, [&](size_t first, size_t last) {
+      predict_particles(m, s, k, m.tissue_gravity, m.shape.group_first[first], m.shape.group_first[last]);
       make_shape_rows(m.shape, x, k.shape, static_cast<uint32_t>(first), static_cast<uint32_t>(last));
     });
     for (size_t b = 0; b < s.body.size(); ++b) predict(m.body[b], s.body[b], m.gravity, h);
@@ -121,6 +124,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
       jobs.each(m.shape.groups, kGroupBlock, [&](size_t first, size_t last) {
         solve_shape_particles(m.shape, x, w, m.shape_stiffness, m.shape_relaxation, k.shape, static_cast<uint32_t>(first),
                               static_cast<uint32_t>(last), sweep + 1 < m.shape_sweeps);
+        if (sweep + 1 == m.shape_sweeps && !m.use_volume) note_moves(m, s, k, first, last);
       });
     }
   }
@@ -136,18 +140,20 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
         start = end;
       }
     }
+    jobs.each(m.shape.groups, kGroupBlock, [&](size_t first, size_t last) { note_moves(m, s, k, first, last); });
   }
   ContactView view{x,          k.prev.data(),         w,         &m.body,   &s.body,
                    &k.on_body, k.node_of_slot.data(), &s.thread, &m.thread, k.locked.data()};
   uint32_t touching = 0;
   {
     StageTimer timer(times, Stage::broadphase);
-    find_tissue_pairs(m.collision, m.shape.rest.data(), x, k.candidates);
+    if (pairs_are_stale(m.collision, k.candidates.tissue))
+      find_tissue_pairs(m.collision, m.shape.rest.data(), x, k.candidates.tissue, jobs);
   }
   {
     StageTimer timer(times, Stage::self_contact);
     for (int sweep = 0; sweep < m.self_sweeps; ++sweep) {
-      const uint32_t n = solve_tissue_pairs(view, m.collision, k.candidates.pair, m.friction.tissue);
+      const uint32_t n = solve_tissue_pairs(view, m.collision, k.candidates.tissue.pair, m.friction.tissue);
       if (sweep == 0) touching += n;
       if (n == 0) break;
     }
@@ -213,7 +219,10 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   }
   {
     StageTimer timer(times, Stage::velocity);
-    jobs.each(m.count, kLightBlock, [&](size_t first, size_t last) { update_velocities(m, s, k, first, last); });
+    update_velocities(m, s, k, m.thread_damping, m.tissue, m.count);
+    jobs.each(m.shape.groups, kGroupBlock, [&](size_t first, size_t last) {
+      update_velocities(m, s, k, m.damping, m.shape.group_first[first], m.shape.group_first[last]);
+    });
     for (size_t b = 0; b < s.body.size(); ++b) update_velocity(m.body[b], s.body[b], h, m.body_damping);
   }
   k.contacts = touching;

@@ -75,7 +75,7 @@ SolverState make_solver_state(const SolverModel& model, std::span<const Vec3> po
 void prepare_scratch(const SolverModel& model, SolverScratch& scratch);
 // Once a tick, before its substeps, in which no pin is made or taken away: who may touch whom, and which pins share tissue.
 // margin [m]: the furthest anything may move against another in a tick.
-void find_candidates(const SolverModel& model, const SolverState& state, SolverScratch& scratch, float margin,
+void find_candidates(const SolverModel& model, const SolverState& state, SolverScratch& scratch, Jobs& jobs, float margin,
                      StageTimes* times);
 void substep(const SolverModel& model, SolverState& state, SolverScratch& scratch, Jobs& jobs, StageTimes* times);
 

@@ -1,0 +1,236 @@
+// solver/tissue_pairs: reads positions, writes boxes and pairs. Compiled once per instruction set (Highway) and chosen at run
+// time. Comparisons only decide what is worth a closer look, so every instruction set finds every pair that touches.
+#include "solver/tissue_pairs.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "solver/tissue_pairs.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace catgut {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using D = hn::CappedTag<float, 16>;
+using V = hn::Vec<D>;
+constexpr size_t kLanes = HWY_MIN(16, HWY_MAX_BYTES / sizeof(float));
+
+// Bit k of the result: test(k) of lanes k. Sixteen at a time, whatever the registers hold.
+template <class Test>
+HWY_INLINE uint32_t Sixteen(const Test& test) {
+  const D d;
+  uint32_t bits = 0;
+  for (size_t k = 0; k < 16; k += kLanes) {
+    uint8_t byte[8] = {};
+    hn::StoreMaskBits(d, test(k), byte);
+    bits |= (uint32_t{byte[0]} | uint32_t{byte[1]} << 8) << k;
+  }
+  return bits;
+}
+
+HWY_INLINE uint32_t BoxesThatMeet(const Boxes& box, size_t first, const float* HWY_RESTRICT from, const float* HWY_RESTRICT to) {
+  const D d;
+  return Sixteen([&](size_t k) HWY_ATTR {
+    auto along = [&](size_t axis) HWY_ATTR {
+      return hn::And(hn::Le(hn::Load(d, box.lower[axis].data() + first + k), hn::Set(d, to[axis])),
+                     hn::Ge(hn::Load(d, box.upper[axis].data() + first + k), hn::Set(d, from[axis])));
+    };
+    return hn::And(along(0), hn::And(along(1), along(2)));
+  });
+}
+
+// Boxes of the blocks of a group, and its own.
+void MakeBoxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes, uint32_t g) {
+  const hn::FixedTag<float, 4> d4;
+  alignas(16) float low[4], high[4];
+  auto group_lower = hn::Set(d4, 1e30f), group_upper = hn::Set(d4, -1e30f);
+  const uint32_t end = HWY_MIN(boxes.blocks, (g + 1) * kBlock);
+  for (uint32_t b = g * kBlock; b < end; ++b) {
+    const uint32_t last = HWY_MIN(tissue.particles, (b + 1) * kBlock);
+    auto lower = hn::Load(d4, &x[b * kBlock].x), upper = lower;
+    for (uint32_t i = b * kBlock + 1; i < last; ++i) {
+      const auto at = hn::Load(d4, &x[i].x);
+      lower = hn::Min(lower, at), upper = hn::Max(upper, at);
+    }
+    hn::Store(lower, d4, low), hn::Store(upper, d4, high);
+    for (size_t axis = 0; axis < 3; ++axis) boxes.block.lower[axis][b] = low[axis], boxes.block.upper[axis][b] = high[axis];
+    group_lower = hn::Min(group_lower, lower), group_upper = hn::Max(group_upper, upper);
+  }
+  hn::Store(group_lower, d4, low), hn::Store(group_upper, d4, high);
+  for (size_t axis = 0; axis < 3; ++axis) boxes.group.lower[axis][g] = low[axis], boxes.group.upper[axis][g] = high[axis];
+}
+
+float FurthestMove(const Vec4* x, const Vec4* from, size_t n) {
+  const D d;
+  const float *at = &x->x, *was = &from->x;
+  const size_t count = 4 * n;
+  V most[2] = {hn::Zero(d), hn::Zero(d)};  // two, so that neither waits for the other
+  size_t i = 0;
+  for (; i + 2 * kLanes <= count; i += 2 * kLanes)
+    for (size_t k = 0; k < 2; ++k)
+      most[k] =
+          hn::Max(most[k], hn::Abs(hn::Sub(hn::LoadU(d, at + i + k * kLanes), hn::LoadU(d, was + i + k * kLanes))));
+  float furthest = hn::GetLane(hn::MaxOfLanes(d, hn::Max(most[0], most[1])));
+  for (; i < count; ++i) {
+    const float move = at[i] > was[i] ? at[i] - was[i] : was[i] - at[i];
+    furthest = move > furthest ? move : furthest;
+  }
+  return furthest;
+}
+
+// Positions by components, for the particles of a group of blocks; the places after the last particle are nowhere.
+void SpreadPositions(const TissueCollision& tissue, const Vec4* x, PairSearch& search, uint32_t g) {
+  const uint32_t first = g * kBlock * kBlock, last = HWY_MIN(search.boxes.blocks * kBlock, first + kBlock * kBlock);
+  for (uint32_t i = first; i < last; ++i) {
+    const bool is = i < tissue.particles;
+    search.at[0][i] = is ? x[i].x : 1e18f;
+    search.at[1][i] = is ? x[i].y : 1e18f;
+    search.at[2][i] = is ? x[i].z : 1e18f;
+  }
+}
+
+// Pairs whose first particle is in group g.
+void PairsOfGroup(const TissueCollision& tissue, const Vec4* rest, PairSearch& search, uint32_t g) {
+  const D d;
+  PairSearch::Part& part = search.part[g];
+  part.pair.clear();
+  const BlockBoxes& boxes = search.boxes;
+  const float reach = 2 * tissue.largest_radius + tissue.pair_margin, reach2 = reach * reach;
+  const uint32_t end = HWY_MIN(boxes.blocks, (g + 1) * kBlock);
+  for (uint32_t ba = g * kBlock; ba < end; ++ba) {
+    float from[3], to[3];
+    for (size_t axis = 0; axis < 3; ++axis)
+      from[axis] = boxes.block.lower[axis][ba] - reach, to[axis] = boxes.block.upper[axis][ba] + reach;
+    part.near.clear();
+    for (uint32_t base = g / 16 * 16; base < boxes.groups; base += 16) {
+      uint32_t groups = BoxesThatMeet(boxes.group, base, from, to);
+      for (; groups != 0; groups &= groups - 1) {
+        const uint32_t other = base + static_cast<uint32_t>(__builtin_ctz(groups));
+        if (other < g) continue;
+        uint32_t blocks = BoxesThatMeet(boxes.block, size_t{other} * kBlock, from, to);
+        if (other == g) blocks &= ~0u << (ba - g * kBlock);
+        if (blocks != 0) part.near.push_back({other, blocks});
+      }
+    }
+    const uint32_t last = HWY_MIN(tissue.particles, (ba + 1) * kBlock);
+    for (uint32_t i = ba * kBlock; i < last; ++i) {
+      const V px = hn::Set(d, search.at[0][i]), py = hn::Set(d, search.at[1][i]), pz = hn::Set(d, search.at[2][i]);
+      const V own = hn::Set(d, tissue.radius[i] + tissue.pair_margin);
+      for (const PairSearch::Near& near : part.near) {
+        // Half the particles of a neighbouring block are out of reach: one test on the box saves sixteen.
+        uint32_t blocks = near.blocks & Sixteen([&](size_t k) HWY_ATTR {
+          auto outside = [&](size_t axis, V p) HWY_ATTR {
+            const size_t at = size_t{near.group} * kBlock + k;
+            const V below = hn::Sub(hn::Load(d, boxes.block.lower[axis].data() + at), p);
+            const V above = hn::Sub(p, hn::Load(d, boxes.block.upper[axis].data() + at));
+            return hn::Max(hn::Max(below, above), hn::Zero(d));
+          };
+          const V dx = outside(0, px), dy = outside(1, py), dz = outside(2, pz);
+          return hn::Le(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Set(d, reach2));
+        });
+        for (; blocks != 0; blocks &= blocks - 1) {
+          const uint32_t bb = near.group * kBlock + static_cast<uint32_t>(__builtin_ctz(blocks));
+          uint32_t close = Sixteen([&](size_t k) HWY_ATTR {
+            const size_t at = size_t{bb} * kBlock + k;
+            const V dx = hn::Sub(hn::Load(d, search.at[0].data() + at), px), dy = hn::Sub(hn::Load(d, search.at[1].data() + at), py);
+            const V dz = hn::Sub(hn::Load(d, search.at[2].data() + at), pz);
+            const V touch = hn::Add(own, hn::Load(d, search.radius.data() + at));
+            return hn::Le(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Mul(touch, touch));
+          });
+          if (bb == ba) close &= ~1u << (i - ba * kBlock);
+          for (; close != 0; close &= close - 1) {
+            const uint32_t j = bb * kBlock + static_cast<uint32_t>(__builtin_ctz(close));
+            if (tissue.body[i] == tissue.body[j]) {
+              const float apart = HWY_MAX(tissue.rest_reach[i], tissue.rest_reach[j]);
+              if (length2(xyz(rest[j]) - xyz(rest[i])) < apart * apart) continue;
+            }
+            part.pair.push_back({i, j});
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace catgut
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+#include <algorithm>
+#include <cmath>
+
+namespace catgut {
+
+HWY_EXPORT(MakeBoxes);
+HWY_EXPORT(FurthestMove);
+HWY_EXPORT(SpreadPositions);
+HWY_EXPORT(PairsOfGroup);
+
+TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius, std::span<const uint32_t> body,
+                                      std::span<const float> rest_reach, std::vector<Triangle> surface) {
+  TissueCollision t;
+  t.particles = static_cast<uint32_t>(rest.size());
+  t.radius.assign(radius.begin(), radius.end());
+  t.body.assign(body.begin(), body.end());
+  t.rest_reach.assign(rest_reach.begin(), rest_reach.end());
+  t.surface = std::move(surface);
+  for (float r : radius) t.largest_radius = std::max(t.largest_radius, r);
+  std::vector<uint32_t> count(t.particles + 1, 0);
+  for (const Triangle& k : t.surface)
+    for (uint32_t i : k) ++count[i + 1];
+  for (size_t i = 1; i < count.size(); ++i) count[i] += count[i - 1];
+  t.ring_first = count;
+  t.ring.resize(t.surface.size() * 3);
+  for (uint32_t f = 0; f < t.surface.size(); ++f)
+    for (uint32_t i : t.surface[f]) t.ring[count[i]++] = f;
+  return t;
+}
+
+void Boxes::resize(size_t count) {
+  const size_t padded = (count + kBlock - 1) / kBlock * kBlock;
+  if (!lower[0].empty() && lower[0].size() == padded) return;
+  for (size_t axis = 0; axis < 3; ++axis) lower[axis].assign(padded, 1e30f), upper[axis].assign(padded, -1e30f);
+}
+
+void make_boxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes, Jobs& jobs) {
+  boxes.blocks = (tissue.particles + kBlock - 1) / kBlock;
+  boxes.groups = (boxes.blocks + kBlock - 1) / kBlock;
+  boxes.block.resize(boxes.blocks);
+  boxes.group.resize(boxes.groups);
+  jobs.each(boxes.groups, 1, [&](size_t g, size_t) { HWY_DYNAMIC_DISPATCH(MakeBoxes)(tissue, x, boxes, static_cast<uint32_t>(g)); });
+}
+
+float furthest_move(const Vec4* x, const Vec4* from, size_t n) { return HWY_DYNAMIC_DISPATCH(FurthestMove)(x, from, n); }
+
+bool pairs_are_stale(const TissueCollision& tissue, const PairSearch& search) {
+  if (search.built_at.size() != tissue.particles) return true;
+  float furthest = 0;
+  for (const float move : search.moved) furthest = std::max(furthest, move);
+  // Two particles, each half the margin, along all three axes.
+  return furthest > tissue.pair_margin / (2 * std::sqrt(3.0f));
+}
+
+void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Vec4* x, PairSearch& search, Jobs& jobs) {
+  search.built_at.assign(x, x + tissue.particles);
+  make_boxes(tissue, x, search.boxes, jobs);
+  const size_t padded = size_t{search.boxes.blocks} * kBlock;
+  for (Column<float>& column : search.at) column.resize(padded);
+  if (search.radius.size() != padded) {
+    search.radius.assign(tissue.radius.begin(), tissue.radius.end());
+    search.radius.resize(padded);
+    search.part.resize(search.boxes.groups);
+  }
+  jobs.each(search.boxes.groups, 1, [&](size_t g, size_t) {
+    HWY_DYNAMIC_DISPATCH(SpreadPositions)(tissue, x, search, static_cast<uint32_t>(g));
+  });
+  jobs.each(search.boxes.groups, 1, [&](size_t g, size_t) {
+    HWY_DYNAMIC_DISPATCH(PairsOfGroup)(tissue, rest, search, static_cast<uint32_t>(g));
+  });
+  search.pair.clear();
+  for (const PairSearch::Part& part : search.part) search.pair.insert(search.pair.end(), part.pair.begin(), part.pair.end());
+}
+
+}  // namespace catgut
+#endif  // HWY_ONCE

@@ -1,0 +1,99 @@
+// solver/tissue_pairs: which particles of the tissue may touch each other. Candidates are found with a margin and kept until
+// something has moved by more than half of it, so most substeps pay only for the look whether anything has. They are sorted by
+// particle and so the same for any number of workers, and a pair that touches is always among them: finding them sooner or
+// later changes nothing.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/jobs.h"
+#include "geometry/mesh.h"
+#include "solver/particles.h"
+
+namespace catgut {
+
+constexpr uint32_t kBlock = 16;  // particles in a block, and blocks in a group
+
+// What of the tissue collides. Consecutive particles must be neighbours in space, which bodies promise: the search goes by
+// boxes round 16 of them and round 16 such boxes.
+struct TissueCollision {
+  uint32_t particles = 0;
+  std::vector<float> radius;      // [m] per particle, against other tissue
+  std::vector<uint32_t> body;     // per particle
+  std::vector<float> rest_reach;  // [m] per particle: same-body particles nearer than this at rest never collide
+  std::vector<Triangle> surface;
+  std::vector<uint32_t> ring_first;  // per particle: first of its triangles in ring, size particles + 1
+  std::vector<uint32_t> ring;        // triangles around each particle
+  float tool_radius = 0.0006f;       // [m] of a particle against tools
+  float largest_radius = 0;
+  float pair_margin = 0.001f;  // [m]
+};
+TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius, std::span<const uint32_t> body,
+                                      std::span<const float> rest_reach, std::vector<Triangle> surface);
+
+struct PairCandidate {
+  uint32_t a, b;
+};  // tissue particles, a < b
+
+// Boxes by components; padded to whole groups of 16 with boxes that nothing meets.
+struct Boxes {
+  std::array<Column<float>, 3> lower, upper;  // [m]
+  void resize(size_t count);
+};
+struct BlockBoxes {
+  uint32_t blocks = 0, groups = 0;
+  Boxes block, group;
+};
+
+// Working memory: never saved, and results do not depend on what is left in it.
+struct PairSearch {
+  std::vector<PairCandidate> pair;
+  BlockBoxes boxes;              // as of the last call of make_boxes
+  Column<Vec4> built_at;         // tissue positions when `pair` was found; empty: not yet
+  std::vector<float> moved;      // [m] the furthest move since, along an axis: one for each part of the tissue that is looked at
+  std::array<Column<float>, 3> at;
+  Column<float> radius;
+  struct Near {
+    uint32_t group, blocks;  // bit k: block 16 * group + k
+  };
+  struct Part {  // what is found for a group of blocks
+    std::vector<PairCandidate> pair;
+    std::vector<Near> near;
+  };
+  std::vector<Part> part;
+};
+
+void make_boxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes, Jobs& jobs);
+// [m] the furthest that any of n particles has moved along any axis.
+float furthest_move(const Vec4* x, const Vec4* from, size_t n);
+// Whether search.pair may lack a pair that touches, given search.moved.
+bool pairs_are_stale(const TissueCollision& tissue, const PairSearch& search);
+// Finds search.pair anew. rest, x: [m] per tissue particle.
+void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Vec4* x, PairSearch& search, Jobs& jobs);
+
+// Calls with(block) for every block whose box meets the box from..to, in ascending order.
+template <class With>
+void for_blocks_near(const BlockBoxes& b, Vec3 from, Vec3 to, With&& with) {
+  auto meets = [&](const Boxes& box, size_t k) {
+    return box.lower[0][k] <= to.x && from.x <= box.upper[0][k] && box.lower[1][k] <= to.y && from.y <= box.upper[1][k] &&
+           box.lower[2][k] <= to.z && from.z <= box.upper[2][k];
+  };
+  for (uint32_t g = 0; g < b.groups; ++g) {
+    if (!meets(b.group, g)) continue;
+    const uint32_t end = b.blocks < (g + 1) * kBlock ? b.blocks : (g + 1) * kBlock;
+    for (uint32_t k = g * kBlock; k < end; ++k)
+      if (meets(b.block, k)) with(k);
+  }
+}
+// [m^2] squared distance of a point to the box of a block.
+inline float distance_to_block2(const BlockBoxes& b, uint32_t k, Vec3 p) {
+  auto outside = [&](size_t axis, float at) {
+    const float below = b.block.lower[axis][k] - at, above = at - b.block.upper[axis][k], d = below > above ? below : above;
+    return d > 0 ? d * d : 0.0f;
+  };
+  return outside(0, p.x) + outside(1, p.y) + outside(2, p.z);
+}
+
+}  // namespace catgut
