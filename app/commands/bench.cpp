@@ -1,5 +1,5 @@
 // app: `catgut bench`: where the time of a tick goes; what it costs as sutures are added (limits.cpp), in the paper's tables
-// (paper.cpp); what a picture costs (frame.cpp); what a hand feels (haptics.cpp).
+// (paper.cpp); with more particles (scale.cpp); what a picture costs (frame.cpp); what a hand feels (haptics.cpp).
 #include <cstdio>
 #include <memory>
 
@@ -64,9 +64,9 @@ int bench(const BenchOptions& o) {
     const std::vector<std::string> four{"purse_string", "connell", "stay", "lembert"};
     return bench_paper({o.scene.empty() ? four : o.scene, o.set, o.out, o.executions, o.threads});
   }
-  if (o.what != "limits")
-    throw InputError("bench " + o.what, "not available yet in this version",
-                     "use `catgut bench paper`, `stages`, `limits`, `frame` or `haptics`");
+  if (o.what == "scale")
+    return bench_scale(
+        {o.scene.empty() ? "lembert" : o.scene[0], o.json, o.set, o.repeat, o.threads, o.seconds > 0 ? o.seconds : 4});
   const std::vector<std::string> both{"stress_one_body", "stress_two_bodies"};
   return bench_limits({o.scene.empty() ? both : o.scene, o.set, o.out.empty() ? "out/limits" : o.out, o.sutures, o.threads});
 }
@@ -80,22 +80,24 @@ void add_bench(CLI::App& app, int& exit_code) {
       ->add_option(
           "what", o->what,
           "paper: its tables 1 to 4 with ours beside them; stages: where a tick's time goes; limits: what each further "
-          "suture costs; frame: a stereo frame without a rasteriser; haptics: what a hand feels of a slow simulation "
-          "(scale comes later)")
+          "suture costs; scale: 1, 4 and 16 times the particles, on one thread and on several; frame: a stereo frame without "
+          "a rasteriser; haptics: what a hand feels of a slow simulation")
       ->required()
       ->check(CLI::IsMember({"paper", "limits", "scale", "stages", "frame", "haptics"}))
       ->type_name("paper|limits|scale|stages|frame|haptics");
-  command->add_option("--json", o->json, "stages, frame: results as JSON; - for standard output")->type_name("FILE|-");
-  command->add_option("--repeat", o->repeat, "stages: runs; the one with the fastest median is reported")
+  command->add_option("--json", o->json, "stages, scale, frame: results as JSON; - for standard output")->type_name("FILE|-");
+  command->add_option("--repeat", o->repeat, "stages, scale: runs; the one with the fastest median is reported")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   add_threads_option(*command, o->threads);
   command
-      ->add_option(
-          "--scene", o->scene,
-          "scene to run (paper: all four techniques; stages: purse_string; frame: lembert; limits: the two stress scenes)")
+      ->add_option("--scene", o->scene,
+                   "scene to run (paper: all four techniques; stages: purse_string; frame, scale: lembert; limits: the two "
+                   "stress scenes)")
       ->type_name("NAME");
-  command->add_option("--seconds", o->seconds, "simulated time; else until the surgeon is done (stages), 30 s (frame)")
+  command
+      ->add_option("--seconds", o->seconds,
+                   "simulated time; else until the surgeon is done (stages), 4 s (scale), 30 s (frame)")
       ->check(CLI::Range(0.001, 1e6));
   command->add_option("--sutures", o->sutures, "limits: bites in each scene")
       ->check(CLI::Range(1, 1000))

@@ -38,6 +38,18 @@ struct PaperOptions {
 };
 int bench_paper(const PaperOptions& options);
 
+// `catgut bench scale` (app/commands/scale.cpp): the first scene with 1, 4 and 16 times its particles, on one thread and on
+// `threads`, each for `seconds` of simulated time.
+struct ScaleOptions {
+  std::string scene, json;
+  std::vector<std::string> set;
+  int repeat = 1, threads = 2;
+  double seconds = 0;
+};
+int bench_scale(const ScaleOptions& options);
+// The processor and how many of its cores there are, in words.
+std::string this_machine();
+
 // `catgut bench frame` (app/commands/frame.cpp).
 struct FrameOptions {
   std::string scene, json;

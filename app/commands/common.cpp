@@ -1,4 +1,5 @@
 // app: what the commands share; see commands.h.
+#include <fmt/format.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -6,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "commands/commands.h"
 #include "core/check.h"
@@ -110,6 +112,17 @@ void write_output(const std::string& path, const std::string& text) {
   out << text;
   out.close();
   if (!out) throw InputError(path, "cannot be written", "is the disk full?");
+}
+
+std::string this_machine() {
+  std::ifstream info("/proc/cpuinfo");
+  std::string name = "an unknown processor";
+  for (std::string line; std::getline(info, line);)
+    if (line.rfind("model name", 0) == 0) {
+      name = line.substr(line.find(':') + 2);
+      break;
+    }
+  return fmt::format("{}, {} hardware threads", name, std::thread::hardware_concurrency());
 }
 
 }  // namespace catgut

@@ -2,9 +2,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <fstream>
 #include <stdexcept>
-#include <thread>
 
 #include "commands/commands.h"
 #include "core/check.h"
@@ -13,17 +11,6 @@
 
 namespace catgut {
 namespace {
-
-std::string this_machine() {
-  std::ifstream info("/proc/cpuinfo");
-  std::string name = "an unknown processor";
-  for (std::string line; std::getline(info, line);)
-    if (line.rfind("model name", 0) == 0) {
-      name = line.substr(line.find(':') + 2);
-      break;
-    }
-  return fmt::format("{}, {} hardware threads", name, std::thread::hardware_concurrency());
-}
 
 // Empty in a build without pictures.
 std::function<PictureCost(const PictureModel&)> picture_cost() {

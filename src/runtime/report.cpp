@@ -10,7 +10,7 @@ namespace catgut {
 namespace {
 using Json = nlohmann::ordered_json;
 
-Json spread_json(const Spread& s) { return {{"median", s.median}, {"p99", s.p99}, {"max", s.max}}; }
+Json spread_json(const Spread& s) { return {{"median", s.median}, {"p99", s.p99}, {"p999", s.p999}, {"max", s.max}}; }
 
 // Counts are written without a fraction: 12, not 12.0.
 Json number_json(double v) {
@@ -211,13 +211,17 @@ std::string run_summary(const RunResult& r) {
 }
 
 std::string stage_table(const RunResult& r) {
-  std::string out = fmt::format("{:<16}{:>12}{:>12}{:>12}\n", "stage", "median ms", "p99 ms", "max ms");
+  std::string out = fmt::format("{:<16}{:>12}{:>12}{:>12}{:>12}\n", "stage", "median ms", "p99 ms", "p99.9 ms", "max ms");
   const auto row = [&](const char* name, const Spread& s) {
-    out += fmt::format("{:<16}{:>12.4f}{:>12.4f}{:>12.4f}\n", name, s.median, s.p99, s.max);
+    out += fmt::format("{:<16}{:>12.4f}{:>12.4f}{:>12.4f}{:>12.4f}\n", name, s.median, s.p99, s.p999, s.max);
   };
   for (size_t s = 0; s < kStages; ++s) row(stage_name(static_cast<Stage>(s)), r.stage_ms[s]);
   row("solver", r.solver_ms);
   row("whole tick", r.tick_ms);
+  if (r.ticks > 0)
+    out += fmt::format("{} of {} ticks ({:.3f} %) took longer than the {:.3f} ms that they simulate\n", r.late_ticks, r.ticks,
+                       100.0 * static_cast<double>(r.late_ticks) / static_cast<double>(r.ticks),
+                       1000 * r.simulated_s / static_cast<double>(r.ticks));
   return out;
 }
 

@@ -13,7 +13,7 @@ Spread spread_of(std::vector<float> values) {
     const size_t rank = static_cast<size_t>(std::ceil(part * static_cast<double>(values.size())));
     return static_cast<double>(values[std::clamp<size_t>(rank, 1, values.size()) - 1]);
   };
-  return {at(0.5), at(0.99), static_cast<double>(values.back())};
+  return {at(0.5), at(0.99), at(0.999), static_cast<double>(values.back())};
 }
 
 bool RunResult::expectations_hold() const {

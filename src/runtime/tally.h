@@ -18,7 +18,7 @@ namespace catgut {
 constexpr size_t kStages = static_cast<size_t>(Stage::count_);
 
 struct Spread {
-  double median = 0, p99 = 0, max = 0;
+  double median = 0, p99 = 0, p999 = 0, max = 0;
 };
 Spread spread_of(std::vector<float> values);  // all zero for none
 

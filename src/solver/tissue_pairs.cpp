@@ -29,7 +29,8 @@ HWY_INLINE uint32_t Sixteen(const Test& test) {
   return bits;
 }
 
-HWY_INLINE uint32_t BoxesThatMeet(const Boxes& box, size_t first, const float* HWY_RESTRICT from, const float* HWY_RESTRICT to) {
+HWY_INLINE uint32_t BoxesThatMeet(const Boxes& box, size_t first, const float* HWY_RESTRICT from,
+                                  const float* HWY_RESTRICT to) {
   const D d;
   return Sixteen([&](size_t k) HWY_ATTR {
     auto along = [&](size_t axis) HWY_ATTR {
@@ -69,8 +70,7 @@ float FurthestMove(const Vec4* x, const Vec4* from, size_t n) {
   size_t i = 0;
   for (; i + 2 * kLanes <= count; i += 2 * kLanes)
     for (size_t k = 0; k < 2; ++k)
-      most[k] =
-          hn::Max(most[k], hn::Abs(hn::Sub(hn::LoadU(d, at + i + k * kLanes), hn::LoadU(d, was + i + k * kLanes))));
+      most[k] = hn::Max(most[k], hn::Abs(hn::Sub(hn::LoadU(d, at + i + k * kLanes), hn::LoadU(d, was + i + k * kLanes))));
   float furthest = hn::GetLane(hn::MaxOfLanes(d, hn::Max(most[0], most[1])));
   for (; i < count; ++i) {
     const float move = at[i] > was[i] ? at[i] - was[i] : was[i] - at[i];
@@ -91,7 +91,7 @@ void SpreadPositions(const TissueCollision& tissue, const Vec4* x, PairSearch& s
 }
 
 // Pairs whose first particle is in group g.
-void PairsOfGroup(const TissueCollision& tissue, const Vec4* rest, PairSearch& search, uint32_t g) {
+void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g) {
   const D d;
   PairSearch::Part& part = search.part[g];
   part.pair.clear();
@@ -116,37 +116,46 @@ void PairsOfGroup(const TissueCollision& tissue, const Vec4* rest, PairSearch& s
     const uint32_t last = HWY_MIN(tissue.particles, (ba + 1) * kBlock);
     for (uint32_t i = ba * kBlock; i < last; ++i) {
       const V px = hn::Set(d, search.at[0][i]), py = hn::Set(d, search.at[1][i]), pz = hn::Set(d, search.at[2][i]);
-      const V own = hn::Set(d, tissue.radius[i] + tissue.pair_margin);
+      const V rx = hn::Set(d, search.rest[0][i]), ry = hn::Set(d, search.rest[1][i]), rz = hn::Set(d, search.rest[2][i]);
+      const V own = hn::Set(d, tissue.radius[i] + tissue.pair_margin), rest_reach = hn::Set(d, search.rest_reach[i]);
+      const V body = hn::Set(d, search.body[i]);
       for (const PairSearch::Near& near : part.near) {
         // Half the particles of a neighbouring block are out of reach: one test on the box saves sixteen.
-        uint32_t blocks = near.blocks & Sixteen([&](size_t k) HWY_ATTR {
-          auto outside = [&](size_t axis, V p) HWY_ATTR {
-            const size_t at = size_t{near.group} * kBlock + k;
-            const V below = hn::Sub(hn::Load(d, boxes.block.lower[axis].data() + at), p);
-            const V above = hn::Sub(p, hn::Load(d, boxes.block.upper[axis].data() + at));
-            return hn::Max(hn::Max(below, above), hn::Zero(d));
-          };
-          const V dx = outside(0, px), dy = outside(1, py), dz = outside(2, pz);
-          return hn::Le(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Set(d, reach2));
-        });
+        uint32_t blocks =
+            near.blocks & Sixteen([&](size_t k) HWY_ATTR {
+              auto outside = [&](size_t axis, V p) HWY_ATTR {
+                const size_t at = size_t{near.group} * kBlock + k;
+                const V below = hn::Sub(hn::Load(d, boxes.block.lower[axis].data() + at), p);
+                const V above = hn::Sub(p, hn::Load(d, boxes.block.upper[axis].data() + at));
+                return hn::Max(hn::Max(below, above), hn::Zero(d));
+              };
+              const V dx = outside(0, px), dy = outside(1, py), dz = outside(2, pz);
+              return hn::Le(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Set(d, reach2));
+            });
         for (; blocks != 0; blocks &= blocks - 1) {
           const uint32_t bb = near.group * kBlock + static_cast<uint32_t>(__builtin_ctz(blocks));
           uint32_t close = Sixteen([&](size_t k) HWY_ATTR {
             const size_t at = size_t{bb} * kBlock + k;
-            const V dx = hn::Sub(hn::Load(d, search.at[0].data() + at), px), dy = hn::Sub(hn::Load(d, search.at[1].data() + at), py);
+            const V dx = hn::Sub(hn::Load(d, search.at[0].data() + at), px),
+                    dy = hn::Sub(hn::Load(d, search.at[1].data() + at), py);
             const V dz = hn::Sub(hn::Load(d, search.at[2].data() + at), pz);
             const V touch = hn::Add(own, hn::Load(d, search.radius.data() + at));
             return hn::Le(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Mul(touch, touch));
           });
           if (bb == ba) close &= ~1u << (i - ba * kBlock);
-          for (; close != 0; close &= close - 1) {
-            const uint32_t j = bb * kBlock + static_cast<uint32_t>(__builtin_ctz(close));
-            if (tissue.body[i] == tissue.body[j]) {
-              const float apart = HWY_MAX(tissue.rest_reach[i], tissue.rest_reach[j]);
-              if (length2(xyz(rest[j]) - xyz(rest[i])) < apart * apart) continue;
-            }
-            part.pair.push_back({i, j});
-          }
+          if (close == 0) continue;
+          // Most of those are neighbours in the wall.
+          close &= Sixteen([&](size_t k) HWY_ATTR {
+            const size_t at = size_t{bb} * kBlock + k;
+            const V dx = hn::Sub(hn::Load(d, search.rest[0].data() + at), rx),
+                    dy = hn::Sub(hn::Load(d, search.rest[1].data() + at), ry);
+            const V dz = hn::Sub(hn::Load(d, search.rest[2].data() + at), rz);
+            const V apart = hn::Max(rest_reach, hn::Load(d, search.rest_reach.data() + at));
+            const auto far = hn::Ge(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Mul(apart, apart));
+            return hn::Or(far, hn::Ne(body, hn::Load(d, search.body.data() + at)));
+          });
+          for (; close != 0; close &= close - 1)
+            part.pair.push_back({i, bb * kBlock + static_cast<uint32_t>(__builtin_ctz(close))});
         }
       }
     }
@@ -177,6 +186,9 @@ TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<cons
   t.rest_reach.assign(rest_reach.begin(), rest_reach.end());
   t.surface = std::move(surface);
   for (float r : radius) t.largest_radius = std::max(t.largest_radius, r);
+  // Wide enough to be kept for long, but not so wide that the wall's own particles, a little pressed together, fill the list.
+  const float nearest = rest_reach.empty() ? 1.0f : *std::min_element(rest_reach.begin(), rest_reach.end());
+  t.pair_margin = std::clamp(0.5f * (nearest - 2 * t.largest_radius), 0.0002f, 0.001f);
   std::vector<uint32_t> count(t.particles + 1, 0);
   for (const Triangle& k : t.surface)
     for (uint32_t i : k) ++count[i + 1];
@@ -199,7 +211,9 @@ void make_boxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes,
   boxes.groups = (boxes.blocks + kBlock - 1) / kBlock;
   boxes.block.resize(boxes.blocks);
   boxes.group.resize(boxes.groups);
-  jobs.each(boxes.groups, 1, [&](size_t g, size_t) { HWY_DYNAMIC_DISPATCH(MakeBoxes)(tissue, x, boxes, static_cast<uint32_t>(g)); });
+  jobs.each(boxes.groups, 1, [&](size_t g, size_t) {
+    HWY_DYNAMIC_DISPATCH(MakeBoxes)(tissue, x, boxes, static_cast<uint32_t>(g));
+  });
 }
 
 float furthest_move(const Vec4* x, const Vec4* from, size_t n) { return HWY_DYNAMIC_DISPATCH(FurthestMove)(x, from, n); }
@@ -216,17 +230,24 @@ void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Ve
   search.built_at.assign(x, x + tissue.particles);
   make_boxes(tissue, x, search.boxes, jobs);
   const size_t padded = size_t{search.boxes.blocks} * kBlock;
-  for (Column<float>& column : search.at) column.resize(padded);
   if (search.radius.size() != padded) {
-    search.radius.assign(tissue.radius.begin(), tissue.radius.end());
-    search.radius.resize(padded);
+    auto column = [padded](Column<float>& c, const auto& value) {
+      c.assign(padded, 0.0f);
+      for (size_t i = 0; i < value.size(); ++i) c[i] = static_cast<float>(value[i]);
+    };
+    column(search.radius, tissue.radius);
+    column(search.rest_reach, tissue.rest_reach);
+    column(search.body, tissue.body);
+    for (size_t axis = 0; axis < 3; ++axis) search.at[axis].resize(padded), search.rest[axis].assign(padded, 0.0f);
+    for (uint32_t i = 0; i < tissue.particles; ++i)
+      search.rest[0][i] = rest[i].x, search.rest[1][i] = rest[i].y, search.rest[2][i] = rest[i].z;
     search.part.resize(search.boxes.groups);
   }
   jobs.each(search.boxes.groups, 1, [&](size_t g, size_t) {
     HWY_DYNAMIC_DISPATCH(SpreadPositions)(tissue, x, search, static_cast<uint32_t>(g));
   });
   jobs.each(search.boxes.groups, 1, [&](size_t g, size_t) {
-    HWY_DYNAMIC_DISPATCH(PairsOfGroup)(tissue, rest, search, static_cast<uint32_t>(g));
+    HWY_DYNAMIC_DISPATCH(PairsOfGroup)(tissue, search, static_cast<uint32_t>(g));
   });
   search.pair.clear();
   for (const PairSearch::Part& part : search.part) search.pair.insert(search.pair.end(), part.pair.begin(), part.pair.end());

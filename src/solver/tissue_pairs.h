@@ -28,7 +28,7 @@ struct TissueCollision {
   std::vector<uint32_t> ring;        // triangles around each particle
   float tool_radius = 0.0006f;       // [m] of a particle against tools
   float largest_radius = 0;
-  float pair_margin = 0.001f;  // [m]
+  float pair_margin = 0.001f;  // [m] pairs this much further apart than touching are candidates
 };
 TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius, std::span<const uint32_t> body,
                                       std::span<const float> rest_reach, std::vector<Triangle> surface);
@@ -50,11 +50,12 @@ struct BlockBoxes {
 // Working memory: never saved, and results do not depend on what is left in it.
 struct PairSearch {
   std::vector<PairCandidate> pair;
-  BlockBoxes boxes;              // as of the last call of make_boxes
-  Column<Vec4> built_at;         // tissue positions when `pair` was found; empty: not yet
-  std::vector<float> moved;      // [m] the furthest move since, along an axis: one for each part of the tissue that is looked at
-  std::array<Column<float>, 3> at;
-  Column<float> radius;
+  BlockBoxes boxes;          // as of the last call of make_boxes
+  Column<Vec4> built_at;     // tissue positions when `pair` was found; empty: not yet
+  std::vector<float> moved;  // [m] the furthest move since, along an axis: one for each part of the tissue that is looked at
+  // By components, padded to whole blocks.
+  std::array<Column<float>, 3> at, rest;
+  Column<float> radius, rest_reach, body;
   struct Near {
     uint32_t group, blocks;  // bit k: block 16 * group + k
   };

@@ -65,7 +65,8 @@ TEST(TissuePairs, finds_what_looking_at_every_pair_finds) {
       const auto found = listed(search);
       EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
       // At the very edge of the margin rounding decides; a micrometre inside of it nothing may be missing.
-      const auto wanted = every_pair_within(s, s.tissue.pair_margin - 1e-6f), most = every_pair_within(s, s.tissue.pair_margin + 1e-6f);
+      const auto wanted = every_pair_within(s, s.tissue.pair_margin - 1e-6f),
+                 most = every_pair_within(s, s.tissue.pair_margin + 1e-6f);
       EXPECT_GT(wanted.size(), 1000u);
       EXPECT_TRUE(std::includes(found.begin(), found.end(), wanted.begin(), wanted.end())) << seed << ", " << workers;
       EXPECT_TRUE(std::includes(most.begin(), most.end(), found.begin(), found.end())) << seed << ", " << workers;
