@@ -2,7 +2,6 @@
 // substeps and sweeps unless --set says otherwise; every rule is on, and the scripted surgeon begins to work.
 #include <fmt/format.h>
 
-
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -52,11 +51,11 @@ std::string json_text(const std::string& scene, const std::vector<Measured>& all
 std::string dearest(const RunResult& run) {
   std::vector<size_t> stage(kStages);
   for (size_t s = 0; s < kStages; ++s) stage[s] = s;
-  std::sort(stage.begin(), stage.end(),
-            [&](size_t a, size_t b) { return run.stage_ms[a].median > run.stage_ms[b].median; });
+  std::sort(stage.begin(), stage.end(), [&](size_t a, size_t b) { return run.stage_ms[a].median > run.stage_ms[b].median; });
   std::string out;
   for (size_t k = 0; k < 3; ++k)
-    out += fmt::format("{}{} {:.2f}", k == 0 ? "" : ", ", stage_name(static_cast<Stage>(stage[k])), run.stage_ms[stage[k]].median);
+    out +=
+        fmt::format("{}{} {:.2f}", k == 0 ? "" : ", ", stage_name(static_cast<Stage>(stage[k])), run.stage_ms[stage[k]].median);
   return out;
 }
 
@@ -86,8 +85,10 @@ int bench_scale(const ScaleOptions& o) {
     if (hooks.stop->load()) break;
     if (row.size() > 1 && row[0].run.state_hash != row[1].run.state_hash) {
       end_progress_line();
-      std::fprintf(stderr, "catgut: bench scale: one and %d threads gave different states; this is a fault in Catgut, please report it\n",
-                   o.threads);
+      std::fprintf(
+          stderr,
+          "catgut: bench scale: one and %d threads gave different states; this is a fault in Catgut, please report it\n",
+          o.threads);
       return 1;
     }
     all.insert(all.end(), row.begin(), row.end());
@@ -97,8 +98,10 @@ int bench_scale(const ScaleOptions& o) {
   if (o.json != "-") {
     std::printf("%s, preset %s, %g s simulated, best of %d; %s\n\n", scene.name.c_str(), scene.solver.preset.c_str(), o.seconds,
                 o.repeat, this_machine().c_str());
-    std::printf("| particles | threads | solver ms: median | 99 %% | worst | us a particle | one thread over this | dearest stages [ms] |\n"
-                "|---|---|---|---|---|---|---|---|\n");
+    std::printf(
+        "| particles | threads | solver ms: median | 99 %% | worst | us a particle | one thread over this | dearest stages "
+        "[ms] |\n"
+        "|---|---|---|---|---|---|---|---|\n");
     double one = 0;
     for (const Measured& m : all) {
       const Spread& s = m.run.solver_ms;

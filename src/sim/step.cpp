@@ -1,4 +1,6 @@
 // sim/step: THE stage list. Reads one TickInput, moves the state by one tick, leaves the tick's events in it.
+#include <algorithm>
+
 #include "sim/model.h"
 #include "sim/simulation.h"
 #include "sim/state.h"
@@ -76,7 +78,10 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
     cut(solver, state.solver, model.suture, state.suture, pressed, state.event);
     new_suture(solver, state.solver, model.suture, state.suture, model.start, model.needle_start, pressed, state.event);
   }
-  find_candidates(solver, state.solver, state.scratch, jobs, 0.008f, times);
+  // As far as thread and tools may come nearer to anything in a tick, at half a metre a second; but no less than what a knot's
+  // thread jumps when it slips.
+  const float margin = std::clamp(0.5f * model.dt, 0.002f, 0.008f);
+  find_candidates(solver, state.solver, state.scratch, jobs, margin, times);
   begin_feeling(state);
   for (int i = 1; i <= model.substeps; ++i) {
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));

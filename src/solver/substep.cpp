@@ -147,8 +147,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   uint32_t touching = 0;
   {
     StageTimer timer(times, Stage::broadphase);
-    if (pairs_are_stale(m.collision, k.candidates.tissue))
-      find_tissue_pairs(m.collision, m.shape.rest.data(), x, k.candidates.tissue, jobs);
+    if (pairs_are_stale(m.collision, k.candidates.tissue)) find_tissue_pairs(m.collision, x, k.candidates.tissue, jobs);
   }
   {
     StageTimer timer(times, Stage::self_contact);

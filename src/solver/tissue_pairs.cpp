@@ -96,13 +96,15 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
   PairSearch::Part& part = search.part[g];
   part.pair.clear();
   const BlockBoxes& boxes = search.boxes;
-  const float reach = 2 * tissue.largest_radius + tissue.pair_margin, reach2 = reach * reach;
+  const float reach = 2 * tissue.largest_radius + tissue.pair_margin;
   const uint32_t end = HWY_MIN(boxes.blocks, (g + 1) * kBlock);
   for (uint32_t ba = g * kBlock; ba < end; ++ba) {
     float from[3], to[3];
     for (size_t axis = 0; axis < 3; ++axis)
       from[axis] = boxes.block.lower[axis][ba] - reach, to[axis] = boxes.block.upper[axis][ba] + reach;
     part.near.clear();
+    const TissueCollision::Kin* kin = tissue.kin.data() + tissue.kin_first[ba];
+    const TissueCollision::Kin* const last_kin = tissue.kin.data() + tissue.kin_first[ba + 1];
     for (uint32_t base = g / 16 * 16; base < boxes.groups; base += 16) {
       uint32_t groups = BoxesThatMeet(boxes.group, base, from, to);
       for (; groups != 0; groups &= groups - 1) {
@@ -110,52 +112,52 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
         if (other < g) continue;
         uint32_t blocks = BoxesThatMeet(boxes.block, size_t{other} * kBlock, from, to);
         if (other == g) blocks &= ~0u << (ba - g * kBlock);
-        if (blocks != 0) part.near.push_back({other, blocks});
+        for (; blocks != 0; blocks &= blocks - 1) {
+          const uint32_t bb = other * kBlock + static_cast<uint32_t>(__builtin_ctz(blocks));
+          while (kin != last_kin && kin->block < bb) ++kin;
+          part.near.push_back({bb, kin != last_kin && kin->block == bb ? kin->may.data() : nullptr});
+        }
       }
     }
+    // Their boxes side by side: most of a near block's particles are out of a particle's reach, and one test tells for sixteen.
+    Boxes& near_box = part.near_box;
+    if (near_box.lower[0].size() < part.near.size()) near_box.resize(part.near.size());
+    const size_t padded = (part.near.size() + 15) / 16 * 16;
+    for (size_t axis = 0; axis < 3; ++axis)
+      for (size_t k = 0; k < padded; ++k) {
+        const bool is = k < part.near.size();
+        near_box.lower[axis][k] = is ? boxes.block.lower[axis][part.near[k].block] : 1e18f;
+        near_box.upper[axis][k] = is ? boxes.block.upper[axis][part.near[k].block] : -1e18f;
+      }
     const uint32_t last = HWY_MIN(tissue.particles, (ba + 1) * kBlock);
     for (uint32_t i = ba * kBlock; i < last; ++i) {
       const V px = hn::Set(d, search.at[0][i]), py = hn::Set(d, search.at[1][i]), pz = hn::Set(d, search.at[2][i]);
-      const V rx = hn::Set(d, search.rest[0][i]), ry = hn::Set(d, search.rest[1][i]), rz = hn::Set(d, search.rest[2][i]);
-      const V own = hn::Set(d, tissue.radius[i] + tissue.pair_margin), rest_reach = hn::Set(d, search.rest_reach[i]);
-      const V body = hn::Set(d, search.body[i]);
-      for (const PairSearch::Near& near : part.near) {
-        // Half the particles of a neighbouring block are out of reach: one test on the box saves sixteen.
-        uint32_t blocks =
-            near.blocks & Sixteen([&](size_t k) HWY_ATTR {
-              auto outside = [&](size_t axis, V p) HWY_ATTR {
-                const size_t at = size_t{near.group} * kBlock + k;
-                const V below = hn::Sub(hn::Load(d, boxes.block.lower[axis].data() + at), p);
-                const V above = hn::Sub(p, hn::Load(d, boxes.block.upper[axis].data() + at));
-                return hn::Max(hn::Max(below, above), hn::Zero(d));
-              };
-              const V dx = outside(0, px), dy = outside(1, py), dz = outside(2, pz);
-              return hn::Le(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Set(d, reach2));
-            });
+      const V own = hn::Set(d, tissue.radius[i] + tissue.pair_margin);
+      for (size_t first = 0; first < padded; first += 16) {
+        uint32_t blocks = Sixteen([&](size_t k) HWY_ATTR {
+          auto outside = [&](size_t axis, V p) HWY_ATTR {
+            const V below = hn::Sub(hn::Load(d, near_box.lower[axis].data() + first + k), p);
+            const V above = hn::Sub(p, hn::Load(d, near_box.upper[axis].data() + first + k));
+            return hn::Max(hn::Max(below, above), hn::Zero(d));
+          };
+          const V dx = outside(0, px), dy = outside(1, py), dz = outside(2, pz);
+          return hn::Le(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Set(d, reach * reach));
+        });
         for (; blocks != 0; blocks &= blocks - 1) {
-          const uint32_t bb = near.group * kBlock + static_cast<uint32_t>(__builtin_ctz(blocks));
-          uint32_t close = Sixteen([&](size_t k) HWY_ATTR {
-            const size_t at = size_t{bb} * kBlock + k;
-            const V dx = hn::Sub(hn::Load(d, search.at[0].data() + at), px),
-                    dy = hn::Sub(hn::Load(d, search.at[1].data() + at), py);
-            const V dz = hn::Sub(hn::Load(d, search.at[2].data() + at), pz);
-            const V touch = hn::Add(own, hn::Load(d, search.radius.data() + at));
-            return hn::Le(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Mul(touch, touch));
-          });
-          if (bb == ba) close &= ~1u << (i - ba * kBlock);
-          if (close == 0) continue;
-          // Most of those are neighbours in the wall.
-          close &= Sixteen([&](size_t k) HWY_ATTR {
-            const size_t at = size_t{bb} * kBlock + k;
-            const V dx = hn::Sub(hn::Load(d, search.rest[0].data() + at), rx),
-                    dy = hn::Sub(hn::Load(d, search.rest[1].data() + at), ry);
-            const V dz = hn::Sub(hn::Load(d, search.rest[2].data() + at), rz);
-            const V apart = hn::Max(rest_reach, hn::Load(d, search.rest_reach.data() + at));
-            const auto far = hn::Ge(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Mul(apart, apart));
-            return hn::Or(far, hn::Ne(body, hn::Load(d, search.body.data() + at)));
-          });
+          const PairSearch::Near& near = part.near[first + static_cast<size_t>(__builtin_ctz(blocks))];
+          const uint32_t may = near.may ? near.may[i - ba * kBlock] : 0xffffu;
+          if (may == 0) continue;  // neighbours in the wall
+          uint32_t close =
+              may & Sixteen([&](size_t k) HWY_ATTR {
+                const size_t at = size_t{near.block} * kBlock + k;
+                const V dx = hn::Sub(hn::Load(d, search.at[0].data() + at), px);
+                const V dy = hn::Sub(hn::Load(d, search.at[1].data() + at), py);
+                const V dz = hn::Sub(hn::Load(d, search.at[2].data() + at), pz);
+                const V touch = hn::Add(own, hn::Load(d, search.radius.data() + at));
+                return hn::Le(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Mul(touch, touch));
+              });
           for (; close != 0; close &= close - 1)
-            part.pair.push_back({i, bb * kBlock + static_cast<uint32_t>(__builtin_ctz(close))});
+            part.pair.push_back({i, near.block * kBlock + static_cast<uint32_t>(__builtin_ctz(close))});
         }
       }
     }
@@ -177,6 +179,38 @@ HWY_EXPORT(FurthestMove);
 HWY_EXPORT(SpreadPositions);
 HWY_EXPORT(PairsOfGroup);
 
+namespace {
+
+// Which particles of neighbouring blocks are too near each other at rest ever to collide.
+void find_kin(TissueCollision& t, std::span<const Vec4> rest) {
+  BlockBoxes boxes;
+  Jobs alone;
+  make_boxes(t, rest.data(), boxes, alone);
+  float furthest = 0;
+  for (const float reach : t.rest_reach) furthest = std::max(furthest, reach);
+  for (uint32_t ba = 0; ba < boxes.blocks; ++ba) {
+    t.kin_first.push_back(static_cast<uint32_t>(t.kin.size()));
+    auto corner = [&](const std::array<Column<float>, 3>& of) { return Vec3{of[0][ba], of[1][ba], of[2][ba]}; };
+    const Vec3 grow{furthest, furthest, furthest};
+    for_blocks_near(boxes, corner(boxes.block.lower) - grow, corner(boxes.block.upper) + grow, [&](uint32_t bb) {
+      if (bb < ba) return;
+      TissueCollision::Kin kin{bb, {}};
+      bool all = bb != ba;
+      for (uint32_t i = ba * kBlock; i < std::min(t.particles, (ba + 1) * kBlock); ++i)
+        for (uint32_t j = bb * kBlock; j < std::min(t.particles, (bb + 1) * kBlock); ++j) {
+          const float apart = std::max(t.rest_reach[i], t.rest_reach[j]);
+          const bool may = i < j && (t.body[i] != t.body[j] || length2(xyz(rest[j]) - xyz(rest[i])) >= apart * apart);
+          all = all && may;
+          if (may) kin.may[i % kBlock] = static_cast<uint16_t>(kin.may[i % kBlock] | 1u << (j % kBlock));
+        }
+      if (!all) t.kin.push_back(kin);
+    });
+  }
+  t.kin_first.push_back(static_cast<uint32_t>(t.kin.size()));
+}
+
+}  // namespace
+
 TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius, std::span<const uint32_t> body,
                                       std::span<const float> rest_reach, std::vector<Triangle> surface) {
   TissueCollision t;
@@ -197,6 +231,7 @@ TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<cons
   t.ring.resize(t.surface.size() * 3);
   for (uint32_t f = 0; f < t.surface.size(); ++f)
     for (uint32_t i : t.surface[f]) t.ring[count[i]++] = f;
+  find_kin(t, rest);
   return t;
 }
 
@@ -226,21 +261,14 @@ bool pairs_are_stale(const TissueCollision& tissue, const PairSearch& search) {
   return furthest > tissue.pair_margin / (2 * std::sqrt(3.0f));
 }
 
-void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Vec4* x, PairSearch& search, Jobs& jobs) {
+void find_tissue_pairs(const TissueCollision& tissue, const Vec4* x, PairSearch& search, Jobs& jobs) {
   search.built_at.assign(x, x + tissue.particles);
   make_boxes(tissue, x, search.boxes, jobs);
   const size_t padded = size_t{search.boxes.blocks} * kBlock;
   if (search.radius.size() != padded) {
-    auto column = [padded](Column<float>& c, const auto& value) {
-      c.assign(padded, 0.0f);
-      for (size_t i = 0; i < value.size(); ++i) c[i] = static_cast<float>(value[i]);
-    };
-    column(search.radius, tissue.radius);
-    column(search.rest_reach, tissue.rest_reach);
-    column(search.body, tissue.body);
-    for (size_t axis = 0; axis < 3; ++axis) search.at[axis].resize(padded), search.rest[axis].assign(padded, 0.0f);
-    for (uint32_t i = 0; i < tissue.particles; ++i)
-      search.rest[0][i] = rest[i].x, search.rest[1][i] = rest[i].y, search.rest[2][i] = rest[i].z;
+    for (Column<float>& column : search.at) column.resize(padded);
+    search.radius.assign(tissue.radius.begin(), tissue.radius.end());
+    search.radius.resize(padded);
     search.part.resize(search.boxes.groups);
   }
   jobs.each(search.boxes.groups, 1, [&](size_t g, size_t) {

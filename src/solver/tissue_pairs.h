@@ -26,7 +26,15 @@ struct TissueCollision {
   std::vector<Triangle> surface;
   std::vector<uint32_t> ring_first;  // per particle: first of its triangles in ring, size particles + 1
   std::vector<uint32_t> ring;        // triangles around each particle
-  float tool_radius = 0.0006f;       // [m] of a particle against tools
+  // Blocks with particles that never collide with some of a block's own: neighbours in the wall. First of a block's in kin,
+  // size blocks + 1, ascending, the block itself the first of them.
+  struct Kin {
+    uint32_t block;
+    std::array<uint16_t, kBlock> may;  // bit j of may[i]: particle i of the one and j of the other may touch, i < j
+  };
+  std::vector<uint32_t> kin_first;
+  std::vector<Kin> kin;
+  float tool_radius = 0.0006f;  // [m] of a particle against tools
   float largest_radius = 0;
   float pair_margin = 0.001f;  // [m] pairs this much further apart than touching are candidates
 };
@@ -54,14 +62,16 @@ struct PairSearch {
   Column<Vec4> built_at;     // tissue positions when `pair` was found; empty: not yet
   std::vector<float> moved;  // [m] the furthest move since, along an axis: one for each part of the tissue that is looked at
   // By components, padded to whole blocks.
-  std::array<Column<float>, 3> at, rest;
-  Column<float> radius, rest_reach, body;
+  std::array<Column<float>, 3> at;
+  Column<float> radius;
   struct Near {
-    uint32_t group, blocks;  // bit k: block 16 * group + k
+    uint32_t block;
+    const uint16_t* may;  // as in Kin; null: every pair
   };
   struct Part {  // what is found for a group of blocks
     std::vector<PairCandidate> pair;
-    std::vector<Near> near;
+    std::vector<Near> near;  // blocks near the one that is looked at, and their boxes
+    Boxes near_box;
   };
   std::vector<Part> part;
 };
@@ -71,8 +81,8 @@ void make_boxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes,
 float furthest_move(const Vec4* x, const Vec4* from, size_t n);
 // Whether search.pair may lack a pair that touches, given search.moved.
 bool pairs_are_stale(const TissueCollision& tissue, const PairSearch& search);
-// Finds search.pair anew. rest, x: [m] per tissue particle.
-void find_tissue_pairs(const TissueCollision& tissue, const Vec4* rest, const Vec4* x, PairSearch& search, Jobs& jobs);
+// Finds search.pair anew. x: [m] per tissue particle.
+void find_tissue_pairs(const TissueCollision& tissue, const Vec4* x, PairSearch& search, Jobs& jobs);
 
 // Calls with(block) for every block whose box meets the box from..to, in ascending order.
 template <class With>

@@ -61,7 +61,7 @@ TEST(TissuePairs, finds_what_looking_at_every_pair_finds) {
     for (const int workers : {1, 2, 3}) {
       Jobs jobs(workers);
       PairSearch search;
-      find_tissue_pairs(s.tissue, s.rest.data(), s.x.data(), search, jobs);
+      find_tissue_pairs(s.tissue, s.x.data(), search, jobs);
       const auto found = listed(search);
       EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
       // At the very edge of the margin rounding decides; a micrometre inside of it nothing may be missing.
@@ -80,7 +80,7 @@ TEST(TissuePairs, kept_pairs_hold_all_that_touch_until_they_are_called_stale) {
   PairSearch search;
   search.moved.assign(1, 0.0f);
   EXPECT_TRUE(pairs_are_stale(s.tissue, search)) << "nothing was found yet";
-  find_tissue_pairs(s.tissue, s.rest.data(), s.x.data(), search, jobs);
+  find_tissue_pairs(s.tissue, s.x.data(), search, jobs);
   Random random(9);
   int kept = 0;
   for (int step = 0; step < 100; ++step) {
