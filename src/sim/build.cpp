@@ -117,6 +117,33 @@ TechniqueModel make_technique(const SceneSpec& scene, const std::vector<Rim>& ri
   return t;
 }
 
+// Room for what a procedure adds to the state, so that ticks in which something happens ask for no memory either: four times a
+// long procedure. Only a suture that settles does, for its list of nodes.
+void reserve_room(const Model& model, State& s) {
+  constexpr size_t kMany = 256;
+  s.event.reserve(kMany);
+  s.stitch.reserve(kMany);
+  s.stitch_span.reserve(kMany);
+  s.solver.thread.anchor.reserve(model.solver.thread.count);
+  s.solver.thread.hold.reserve(model.solver.thread.count);
+  s.solver.weld.reserve(kMany);
+  s.solver.attach.reserve(kMany);
+  s.solver.pin.reserve(kMany);
+  s.solver.channel.reserve(kMany);
+  s.suture.bite.reserve(kMany);
+  s.suture.point.reserve(kMany);
+  s.suture.open.reserve(kMany);
+  s.suture.knot.reserve(kMany);
+  s.suture.settled.reserve(kMany);
+  s.technique.purse_string.where.reserve(kMany);
+  s.technique.seam.row.reserve(kMany);
+  s.technique.seam.pass.reserve(kMany);
+  s.technique.lembert.stitch.reserve(kMany);
+  s.technique.lembert.row.reserve(kMany);
+  s.plan.pull.reserve(kMany);
+  s.plan.pair.reserve(kMany);
+}
+
 RigidModel tool_body() {
   RigidModel m;
   m.inv_mass = 1 / 0.05f;
@@ -306,6 +333,7 @@ StatePtr initial_state(const Model& model) {
   State& s = *state;
   s.solver = make_solver_state(model.solver, model.start);
   prepare_scratch(model.solver, s.scratch);
+  reserve_room(model, s);
   for (size_t k = 0; k < 2; ++k) {
     RigidBody& tool = s.solver.body[k];
     tool.x = tool.prev_x = model.tool_start[k].p;

@@ -25,6 +25,54 @@ void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   std::fill(scratch.thread.lambda.begin(), scratch.thread.lambda.end(), 0.0f);
 }
 
+// Room for what a tick may find, so that no tick asks for memory. Bounds where there are any (a capsule cannot be near more
+// than all particles), elsewhere several times the most that was ever seen; what outgrows even that grows as vectors do. Pages
+// that nobody writes to are never made.
+void reserve_room(const SolverModel& m, SolverScratch& k) {
+  constexpr size_t kPairsOfOne = 32, kBlocksNear = 256, kPins = 256, kPinsBeside = 32;
+  const size_t tissue = m.collision.particles, thread = m.thread.count;
+  size_t capsules = 0;
+  for (const RigidModel& b : m.body) capsules += b.capsule.size();
+  Candidates& c = k.candidates;
+  c.tool.reserve(tissue * capsules);
+  c.thread_tool.reserve(thread * capsules);
+  c.thread_tissue.reserve(thread);
+  c.thread_pair.reserve(thread * std::min(thread, 2 * kPairsOfOne));
+  c.near_block.reserve(tissue / kBlock + 1);
+  c.middle.reserve(thread);
+  PairSearch& p = c.tissue;
+  const size_t blocks = (tissue + kBlock - 1) / kBlock, groups = (blocks + kBlock - 1) / kBlock;
+  p.pair.reserve(tissue * kPairsOfOne);
+  p.built_at.reserve(tissue);
+  for (Column<float>* column : {&p.at[0], &p.at[1], &p.at[2], &p.radius}) column->reserve(blocks * kBlock);
+  p.boxes.block.resize(blocks);
+  p.boxes.group.resize(groups);
+  p.part.resize(groups);
+  for (PairSearch::Part& part : p.part) {
+    part.pair.reserve(kBlock * kBlock * kPairsOfOne);
+    part.near.reserve(std::min(blocks, kBlocksNear));
+    part.near_box.resize(std::min(blocks, kBlocksNear));
+  }
+  ThreadScratch& t = k.thread;
+  t.heavy.reserve(thread);
+  t.slide.reserve(thread);  // anchors, of which a thread has no more than particles
+  t.waiting.reserve(thread);
+  t.anchor_node.reserve(thread);
+  t.touch.reserve(thread * capsules);
+  t.contact.reserve(thread);
+  t.on_tool.reserve(m.body.size());
+  t.load.reserve(m.body.size());
+  PinWeb& w = k.web;
+  w.first.reserve(kPins + 1);
+  w.row.reserve(kPins + 1);
+  w.other.reserve(kPins * kPinsBeside);
+  w.point.reserve(2 * kPins);
+  for (std::vector<uint32_t>* part : {&w.particle, &w.pin}) part->reserve(2 * TissuePoint::kMost * kPins);
+  for (std::vector<float>* part : {&w.share, &w.move, &w.weight}) part->reserve(2 * TissuePoint::kMost * kPins);
+  w.start.reserve(m.tissue + 2);
+  for (std::vector<float>* each : {&w.inv_mass, &w.by_pin, &k.room}) each->reserve(kPins);
+}
+
 void predict_particles(const SolverModel& m, SolverState& s, SolverScratch& k, Vec3 gravity, size_t first, size_t last) {
   const Four gh = load({gravity.x * m.h, gravity.y * m.h, gravity.z * m.h, 0});
   for (size_t i = first; i < last; ++i) {
@@ -86,6 +134,7 @@ void prepare_scratch(const SolverModel& model, SolverScratch& k) {
   k.on_body.assign(model.body.size(), {});
   k.node_of_slot.assign(model.thread.count, -1);
   k.locked.assign(model.thread.count, 0);
+  reserve_room(model, k);
 }
 
 void find_candidates(const SolverModel& m, const SolverState& s, SolverScratch& k, Jobs& jobs, float margin,

@@ -13,14 +13,13 @@ namespace {
 constexpr float kRoom = 0.001f;  // [m]
 
 // The bites that are done, in the order in which the thread runs through them.
-std::vector<Pass> passes_of(const TechniqueView& view, size_t points) {
-  std::vector<Pass> pass;
+void find_passes(const TechniqueView& view, size_t points, std::vector<Pass>& pass) {
+  pass.clear();
   for (size_t i = 0; i < points; ++i) {
     const StitchPoint& p = view.point[i];
     if (!p.exit) pass.push_back({p.bite, p.wall, p.inside, p.inside});
     else if (!pass.empty() && pass.back().bite == p.bite) pass.back().out_inside = p.inside;
   }
-  return pass;
 }
 
 // "A line is created connecting the two points and is segmented ... One particle on each SB closest to a segment is identified
@@ -118,7 +117,8 @@ void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, C
   size_t points = 0;
   while (points < view.point.size() && view.bite[view.point[points].bite].complete) ++points;
   if (points > state.points) {
-    const std::vector<Pass> pass = passes_of(view, points);
+    find_passes(view, points, state.pass);
+    const std::vector<Pass>& pass = state.pass;
     for (; state.passes < pass.size(); ++state.passes) {
       const std::span<const Pass> so_far(pass.data(), state.passes + 1);
       const Fault fault = model.connell ? judge_connell(so_far) : judge_stay(so_far);

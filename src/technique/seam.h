@@ -36,6 +36,12 @@ struct SeamRow {
   uint32_t told = 0;  // 1: seam_closed was said
 };
 
+// How the bites of a suture follow each other, as the order rules see them.
+struct Pass {
+  uint32_t bite = 0, wall = 0;
+  bool in_inside = false, out_inside = false;  // its entry, its exit lies on the mucosa
+};
+
 struct SeamState {
   std::vector<SeamRow> row;  // one per row of the plan
   uint32_t first_row = 0;    // of the suture in hand
@@ -44,16 +50,12 @@ struct SeamState {
   uint32_t passes = 0;       // its bites that were judged
   uint32_t throws = 0;       // its locked throws
   uint32_t told = 0;         // a bit per Fault
+  std::vector<Pass> pass;    // working memory, not saved
 };
 
 // Once a tick.
 void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, ClosurePlan& plan, std::vector<Event>& events);
 
-// How the bites of a suture follow each other, as the order rules see them.
-struct Pass {
-  uint32_t bite = 0, wall = 0;
-  bool in_inside = false, out_inside = false;  // its entry, its exit lies on the mucosa
-};
 Fault judge_connell(std::span<const Pass> pass);  // of the last pass; Fault::none when it is in order
 Fault judge_stay(std::span<const Pass> pass);
 

@@ -1,0 +1,170 @@
+// tests/cost: a tick asks for no memory. An allocation is fast nearly always, and now and then takes the milliseconds that a
+// hand feels. Every allocation of this program is counted (malloc itself, on which new stands), but only inside `step`: what
+// the surgeon plans, what is published and what is recorded are not the tick. Scenes are sewn by the scripted surgeon; with
+// CATGUT_LONG to their end.
+#include <execinfo.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "procedure/scene_file.h"
+#include "runtime/hands.h"
+#include "sim/model.h"
+#include "sim/state.h"
+
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define CATGUT_COUNTS_ALLOCATIONS 1
+#endif
+
+namespace {
+
+constexpr size_t kSites = 8, kDepth = 12;
+std::atomic<bool> counting{false};
+std::atomic<uint64_t> allocations{0};
+// Where the first of a tick came from, for addr2line.
+std::array<std::array<void*, kDepth>, kSites> site;
+std::array<int, kSites> depth;
+
+void counted() {
+  if (!counting.load(std::memory_order_relaxed)) return;
+  const uint64_t n = allocations.fetch_add(1);
+  if (n < kSites) depth[n] = backtrace(site[n].data(), kDepth);
+}
+
+}  // namespace
+
+#ifdef CATGUT_COUNTS_ALLOCATIONS
+extern "C" {
+void* __libc_malloc(size_t);
+void* __libc_calloc(size_t, size_t);
+void* __libc_realloc(void*, size_t);
+void* __libc_memalign(size_t, size_t);
+void* malloc(size_t n) noexcept { return counted(), __libc_malloc(n); }
+void* calloc(size_t n, size_t size) noexcept { return counted(), __libc_calloc(n, size); }
+void* realloc(void* p, size_t n) noexcept { return counted(), __libc_realloc(p, n); }
+void* aligned_alloc(size_t align, size_t n) noexcept { return counted(), __libc_memalign(align, n); }
+void* memalign(size_t align, size_t n) noexcept { return counted(), __libc_memalign(align, n); }
+int posix_memalign(void** p, size_t align, size_t n) noexcept { return counted(), (*p = __libc_memalign(align, n)) ? 0 : 12; }
+}
+#endif
+
+namespace catgut {
+namespace {
+
+// The allocations of what `work` does.
+template <typename Work>
+uint64_t allocations_of(Work&& work) {
+  allocations = 0;
+  counting = true;
+  work();
+  counting = false;
+  return allocations;
+}
+
+std::string sites() {
+  std::string text;
+  for (size_t k = 0; k < std::min<size_t>(kSites, allocations); ++k) {
+    char** name = backtrace_symbols(site[k].data(), depth[k]);
+    for (int i = 2; i < depth[k]; ++i) text += std::string("  ") + name[i] + "\n";
+    text += "\n";
+    std::free(name);
+  }
+  return text;
+}
+
+struct Counts {
+  uint64_t ticks = 0, allocating = 0, allocations = 0;
+  void add(uint64_t n) { ++ticks, allocating += n > 0, allocations += n; }
+};
+
+class TickAllocation : public testing::TestWithParam<const char*> {};
+
+TEST_P(TickAllocation, none_from_when_the_hands_are_let_in) {
+#ifndef CATGUT_COUNTS_ALLOCATIONS
+  GTEST_SKIP() << "allocations can be counted with glibc alone, and not under a sanitizer";
+#endif
+  void* room[4];
+  backtrace(room, 4);  // its first call loads a library
+  const SceneSpec scene = read_scene(GetParam());
+  const std::shared_ptr<const Model> model = build_model(scene);
+  const StatePtr state = initial_state(*model);
+  Jobs jobs(1);
+  Snapshot seen;
+  const Hands hands = make_hands("scripted", scene, picture_model(*model));
+  const uint64_t settle = static_cast<uint64_t>(scene.settle / model->dt);
+  const uint64_t last = std::getenv("CATGUT_LONG") ? 100000 : settle + static_cast<uint64_t>(40 / model->dt);
+  // Ticks without an event; ticks with one; ticks in which a suture settles, which is given lists of its own.
+  Counts quiet, eventful, settling;
+  std::string first;
+  publish(*model, *state, seen);
+  for (TickInput input; input.tick < last && !hands.surgeon->done(); ++input.tick) {
+    if (input.tick < settle)
+      for (ToolInput& h : input.hand) h.connected = 0;
+    else input.hand = hands.surgeon->operate(seen, model->dt);
+    const uint64_t n = allocations_of([&] { step(*model, *state, input, jobs); });
+    if (input.tick >= settle) {
+      const bool settles = std::any_of(state->event.begin(), state->event.end(),
+                                       [](const Event& e) { return e.kind == EventKind::suture_taken; });
+      (state->event.empty() ? quiet : settles ? settling : eventful).add(n);
+      if (n > 0 && !settles && first.empty())
+        first = "tick " + std::to_string(input.tick) + ", " + std::to_string(state->event.size()) + " events:\n" + sites();
+      if (n > 0 && std::getenv("CATGUT_SITES"))
+        std::printf("tick %llu, %zu events\n%s", static_cast<unsigned long long>(input.tick), state->event.size(),
+                    sites().c_str());
+    }
+    publish(*model, *state, seen);
+  }
+  const auto say = [](const char* which, const Counts& c) {
+    std::printf("  %-28s %6llu ticks, %llu of them allocate (%llu times)\n", which, static_cast<unsigned long long>(c.ticks),
+                static_cast<unsigned long long>(c.allocating), static_cast<unsigned long long>(c.allocations));
+  };
+  std::printf("%s\n", GetParam());
+  say("without an event", quiet), say("with one", eventful), say("in which a suture settles", settling);
+  EXPECT_GT(quiet.ticks, 1000u);
+  EXPECT_GT(eventful.ticks, 5u) << "nothing was sewn";
+  EXPECT_EQ(quiet.allocations, 0u) << first;
+  EXPECT_EQ(eventful.allocations, 0u) << first;
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, TickAllocation, testing::Values("purse_string", "connell", "stay", "lembert"),
+                         [](const auto& scene) { return std::string(scene.param); });
+
+// Sharing a stage out among workers takes no memory either. Few ticks: on a busy machine workers wait for each other.
+TEST(WorkerAllocation, none) {
+#ifndef CATGUT_COUNTS_ALLOCATIONS
+  GTEST_SKIP() << "allocations can be counted with glibc alone, and not under a sanitizer";
+#endif
+  const std::shared_ptr<const Model> model = build_model(read_scene("lembert"));
+  const StatePtr state = initial_state(*model);
+  Jobs jobs(2);
+  for (TickInput input; input.tick < 20; ++input.tick) {
+    const uint64_t n = allocations_of([&] { step(*model, *state, input, jobs); });
+    EXPECT_EQ(n, 0u) << "tick " << input.tick << "\n" << sites();
+  }
+}
+
+// The counting itself: what allocates is seen, whichever way it asks.
+TEST(AllocationCount, sees_new_aligned_new_and_malloc) {
+#ifndef CATGUT_COUNTS_ALLOCATIONS
+  GTEST_SKIP() << "allocations can be counted with glibc alone, and not under a sanitizer";
+#endif
+  void* room[4];
+  backtrace(room, 4);
+  std::vector<int> plain;
+  Column<float> aligned;
+  void* raw = nullptr;
+  EXPECT_EQ(allocations_of([&] { plain.resize(100); }), 1u);
+  EXPECT_EQ(allocations_of([&] { aligned.resize(100); }), 1u);
+  EXPECT_EQ(allocations_of([&] { raw = std::malloc(100); }), 1u);
+  EXPECT_EQ(allocations_of([&] { plain.resize(50), aligned.clear(); }), 0u);
+  std::free(raw);
+}
+
+}  // namespace
+}  // namespace catgut
