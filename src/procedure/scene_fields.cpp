@@ -70,7 +70,7 @@ const Field kField[] = {
     {"solver", "gravity", "m/s^2", -1000, 1000, nullptr, "y is up", TOP(solver.gravity)},
     {"solver", "mass_scale", "", 1, 10000, nullptr, "tissue inertia times this at unchanged weight: sets the force with which tissue answers", TOP(solver.mass_scale)},
     {"solver", "friction_tissue", "", 0, 10, nullptr, "coefficient of Coulomb friction, tissue on tissue", TOP(solver.friction_tissue)},
-    {"solver", "friction_tool", "", 0, 10, nullptr, "coefficient of Coulomb friction, tool on tissue", TOP(solver.friction_tool)},
+    {"solver", "friction_tool", "", 0, 10, nullptr, "coefficient of Coulomb friction, tool on tissue and on the other tool", TOP(solver.friction_tool)},
     {"solver", "friction_thread", "", 0, 10, nullptr, "coefficient of Coulomb friction, thread on tissue and thread", TOP(solver.friction_thread)},
     {"solver", "hand_stiffness", "N/m", 1, 100000, nullptr, "of the coupling between a hand and its tool; a haptic arm renders no more than some 300", TOP(solver.hand_stiffness)},
 

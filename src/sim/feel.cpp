@@ -87,6 +87,7 @@ void feel_substep(const Model& model, State& state, int i) {
     t.pressing += on.pressing * inv_h2;
     t.rubbing += on.rubbing * inv_h2;
     t.pressed += on.pressed * inv_h2;
+    t.by_tool += on.by_tool * inv_h2;
     t.thread += (on.linear - on.pressing - on.rubbing) * inv_h2;
     for (const ThreadHold& h : s.thread.hold)
       if (h.body == body) t.thread += thread_on_tool(s, h);
@@ -217,10 +218,12 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     both_ways = true;
   }
 
+  // Steel does not give, the hand that holds it does.
+  const float behind = 2 * sum.by_tool > sum.pressed ? coupling : kBlunt;
   p.force = pressing + thread + held + needle;
   const FeltStiffness& felt = state.feel.stiffness[k];
   if (both_ways) {
-    if (length(pressing) > kNothing) stiff += outer(normalized(pressing), kBlunt);
+    if (length(pressing) > kNothing) stiff += outer(normalized(pressing), behind);
     p.stiffness = in_series(stiff, coupling);
     // The directions are those of what holds the tool; how stiff they are is what the hand has found.
     const float guess = (p.stiffness.xx + p.stiffness.yy + p.stiffness.zz) / 3;
@@ -249,7 +252,7 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     p.normal = n;
     // Squeezed from several sides the tool is held both ways, and what lifts it off one side presses it on another.
     if (push < 0.5f * sum.pressed * part) p.normal = {};
-    const float slope = std::max(1.0f, learned(felt, series(kBlunt, coupling), coupling));
+    const float slope = std::max(1.0f, learned(felt, series(behind, coupling), coupling));
     p.stiffness = length2(p.normal) > 0 ? outer(n, slope) : identity(slope);
     p.gap = push / slope;
     p.coefficient = m.friction.tool;
@@ -270,9 +273,24 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     const float gap = length(away) - capsule.radius - m.collision.tool_radius;
     if (gap < nearest) nearest = gap, p.normal = normalized(away);
   }
+  float stands = kBlunt;
+  for (const ToolPair& c : state.scratch.candidates.tool_pair) {
+    if (c.a != k && c.b != k) continue;
+    const bool first = c.a == k;
+    const uint32_t to = first ? c.b : c.a;
+    const Capsule &mine = m.body[k].capsule[first ? c.capsule_a : c.capsule_b],
+                  &other = m.body[to].capsule[first ? c.capsule_b : c.capsule_a];
+    const Pose here = s.body[k].pose(), there = s.body[to].pose();
+    const Vec3 a0 = transform(here, mine.a), a1 = transform(here, mine.b), b0 = transform(there, other.a),
+               b1 = transform(there, other.b);
+    const auto [at, on] = closest_on_segments(a0, a1, b0, b1);
+    const Vec3 away = lerp(a0, a1, at) - lerp(b0, b1, on);
+    const float gap = length(away) - mine.radius - other.radius;
+    if (gap < nearest) nearest = gap, stands = coupling, p.normal = normalized(away);
+  }
   if (nearest < kLook) {
     p.point = state.hand[k].p - p.normal * std::max(0.0f, nearest);
-    p.stiffness = outer(p.normal, series(kBlunt, coupling));
+    p.stiffness = outer(p.normal, series(stands, coupling));
     p.coefficient = m.friction.tool;
   }
   return p;

@@ -16,8 +16,9 @@ struct State;
 
 // Forces on one tool, summed over the last substeps of a tick [N]. Not saved: it is gone with the tick.
 struct ToolReaction {
-  Vec3 pressing, rubbing;  // tissue on the tool, along the contacts' normals and across
+  Vec3 pressing, rubbing;  // tissue and the other tool on this one, along the contacts' normals and across
   float pressed = 0;       // all pressing, whatever its direction
+  float by_tool = 0;       // of that, the other tool's
   Vec3 thread;             // thread that lies round the tool, is frozen there or is held in the jaws
   Vec3 held;               // tissue in the jaws
   Vec3 needle;             // the needle in the jaws, less what rubs along its shaft

@@ -153,4 +153,25 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
     }
 }
 
+void find_tool_pairs(const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,
+                     std::span<const uint8_t> body_collides, std::vector<ToolPair>& pair) {
+  // [m] two hands that rush at each other with 1.5 m/s each, for a tick of 60 Hz. There are four pairs at most: a wide margin
+  // is cheap, and hands are the fastest things there are.
+  constexpr float kMargin = 0.05f;
+  pair.clear();
+  for (uint32_t a = 0; a < body.size(); ++a)
+    for (uint32_t b = a + 1; b < body.size(); ++b) {
+      if (!body_collides[a] || !body_collides[b] || model[a].gravity || model[b].gravity) continue;
+      const Pose pa = body[a].pose(), pb = body[b].pose();
+      for (uint32_t i = 0; i < model[a].capsule.size(); ++i)
+        for (uint32_t k = 0; k < model[b].capsule.size(); ++k) {
+          const Capsule &ca = model[a].capsule[i], &cb = model[b].capsule[k];
+          const Vec3 a0 = transform(pa, ca.a), a1 = transform(pa, ca.b), b0 = transform(pb, cb.a), b1 = transform(pb, cb.b);
+          const auto [s, t] = closest_on_segments(a0, a1, b0, b1);
+          const float reach = ca.radius + cb.radius + kMargin;
+          if (length2(lerp(b0, b1, t) - lerp(a0, a1, s)) < reach * reach) pair.push_back({a, b, i, k, {}});
+        }
+    }
+}
+
 }  // namespace catgut

@@ -1,6 +1,7 @@
 // solver/collide: who may touch whom, where tools or thread are concerned; found once a tick. (Tissue and tissue:
 // tissue_pairs.)
 #pragma once
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -25,12 +26,27 @@ struct ThreadPairCandidate {
   uint32_t a, b;
 };  // segments after slots a and b
 
+// Capsules of two tools that may meet. They can touch where their axes cross and at each of their four ends; side by side they
+// lie on two places, the ends of their overlap, and do not tilt about one.
+struct ToolPair {
+  uint32_t a, b;                  // bodies
+  uint32_t capsule_a, capsule_b;  // theirs
+  // Positional impulses on b so far in this substep, per place: crossing, first and second end of a, of b. Cleared at the start
+  // of a substep.
+  struct Impulse {
+    float normal = 0;  // [kg m]
+    Vec3 rub;          // [kg m]
+  };
+  std::array<Impulse, 5> done{};
+};
+
 struct Candidates {
   PairSearch tissue;  // its boxes are everybody's
   std::vector<ToolCandidate> tool;
   std::vector<ThreadToolCandidate> thread_tool;
   std::vector<ThreadTissueCandidate> thread_tissue;
   std::vector<ThreadPairCandidate> thread_pair;
+  std::vector<ToolPair> tool_pair;
   std::vector<uint32_t> near_block;  // working memory
   std::vector<Vec3> middle;
 };
@@ -42,6 +58,10 @@ void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* 
                                      const Thread& thread, std::span<const uint8_t> thread_collides,
                                      const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,
                                      std::span<const uint8_t> body_collides, float margin, Candidates& c);
+// Once a tick: capsules of different tools that may meet within it. Tools are the bodies whose weight a hand carries; the
+// needle is none, jaws close on it.
+void find_tool_pairs(const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,
+                     std::span<const uint8_t> body_collides, std::vector<ToolPair>& pair);
 
 // Nearest tissue particle to p within `reach`, or -1.
 int nearest_particle(const TissueCollision& tissue, const Candidates& c, const Vec4* x, Vec3 p, float reach);

@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace catgut {
 namespace {
 
 constexpr float kNear = 0.001f;               // [m] as far as the thread's solve may move a node at once
 constexpr float kLargestCorrection = 0.001f;  // [m] per contact and sweep: deep overlap is undone over some substeps
+constexpr float kUndoneTools = 0.0001f;       // [m] of such overlap of tools, per substep
+constexpr float kSameAxis = 0.00001f;         // [m] between axes that have no side any more
 
 // The part of the relative slip `slip` that friction undoes, given the normal correction.
 Vec3 friction_step(Vec3 slip, Vec3 n, float normal, float friction) {
@@ -86,6 +89,88 @@ uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tiss
     felt.pressing -= n * (depth / w);
     felt.rubbing += rub / w;
     felt.pressed += depth / w;
+  }
+  return touching;
+}
+
+namespace {
+
+// Holds the places s and t (0..1) of the axes apart; whether they touch.
+bool hold_apart(const ContactView& v, const ToolPair& pair, float s, float t, float friction, ToolPair::Impulse& done) {
+  RigidBody &a = (*v.body)[pair.a], &b = (*v.body)[pair.b];
+  const RigidModel &ma = (*v.model)[pair.a], &mb = (*v.model)[pair.b];
+  const Capsule &ca = ma.capsule[pair.capsule_a], &cb = mb.capsule[pair.capsule_b];
+  const Vec3 on_a = transform(a.pose(), lerp(ca.a, ca.b, s)), on_b = transform(b.pose(), lerp(cb.a, cb.b, t)), d = on_b - on_a;
+  const float reach = ca.radius + cb.radius, l2 = length2(d);
+  if (l2 >= reach * reach && done.normal == 0) return false;
+  const Vec3 before = previous_point(b, on_b - b.x) - previous_point(a, on_a - a.x);
+  const float l = std::sqrt(l2);
+  Vec3 n = d / std::max(l, 1e-12f);
+  float gap = l - reach;
+  if (l < kSameAxis) {  // any way out will do, if all places of the pair take the same
+    const Vec3 axis = normalized(rotate(a.q, ca.b - ca.a), {0, 0, 1});
+    n = normalized(cross(axis, rotate(b.q, cb.b - cb.a)), any_perpendicular(axis));
+  } else if (dot(d, before) < 0 && length2(before) > 0.25f * reach * reach) {
+    n = -n, gap = -l - reach;  // through each other within the substep: back to where they were
+  }
+  const float goal = std::min(0.0f, length(before) - reach + kUndoneTools);
+  // One place for both, on their surfaces: otherwise friction would turn them out of nothing.
+  const Vec3 at = on_a + n * (ca.radius + 0.5f * gap), ra = at - a.x, rb = at - b.x;
+  const float w = inverse_mass_at(ma, a, ra, n) + inverse_mass_at(mb, b, rb, n);
+  if (w <= 0) return false;
+  const float press = std::max((goal - gap) / w, -done.normal);
+  done.normal += press;
+  const Vec3 slip = previous_point(a, ra) - previous_point(b, rb), across = slip - n * dot(slip, n);
+  Vec3 rub = done.rub - n * dot(done.rub, n);
+  if (const float far = length(across); far > 1e-12f) {
+    const Vec3 way = across / far;
+    rub -= across / (inverse_mass_at(ma, a, ra, way) + inverse_mass_at(mb, b, rb, way));
+  }
+  const float most = friction * done.normal, rubs = length(rub);
+  if (rubs > most) rub *= most / rubs;
+  const Vec3 rub_more = rub - done.rub, impulse = n * press + rub_more;
+  done.rub = rub;
+  push(ma, a, -impulse, ra);
+  push(mb, b, impulse, rb);
+  BodyContact &felt_a = (*v.on_body)[pair.a], &felt_b = (*v.on_body)[pair.b];
+  felt_a.linear -= impulse, felt_b.linear += impulse;
+  felt_a.angular -= cross(ra, impulse), felt_b.angular += cross(rb, impulse);
+  felt_a.pressing -= n * press, felt_b.pressing += n * press;
+  felt_a.rubbing -= rub_more, felt_b.rubbing += rub_more;
+  felt_a.pressed += press, felt_b.pressed += press;
+  felt_a.by_tool += press, felt_b.by_tool += press;
+  return done.normal > 0;
+}
+
+}  // namespace
+
+uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list, float friction) {
+  uint32_t touching = 0;
+  for (ToolPair& pair : list) {
+    const RigidBody &a = (*v.body)[pair.a], &b = (*v.body)[pair.b];
+    const Capsule &ca = (*v.model)[pair.a].capsule[pair.capsule_a], &cb = (*v.model)[pair.b].capsule[pair.capsule_b];
+    const auto ends = [](const RigidBody& body, const Capsule& c) {
+      return std::pair{transform(body.pose(), c.a), transform(body.pose(), c.b)};
+    };
+    auto [a0, a1] = ends(a, ca);
+    auto [b0, b1] = ends(b, cb);
+    const auto [s, t] = closest_on_segments(a0, a1, b0, b1);
+    const float reach = ca.radius + cb.radius;
+    const bool near = length2(lerp(b0, b1, t) - lerp(a0, a1, s)) < reach * reach;
+    if (!near && std::none_of(pair.done.begin(), pair.done.end(), [](const auto& d) { return d.normal > 0; })) continue;
+    uint32_t places = 0;
+    if ((s > 0 && s < 1 && t > 0 && t < 1) || pair.done[0].normal > 0)
+      places += hold_apart(v, pair, s, t, friction, pair.done[0]);
+    for (size_t end = 0; end < 4; ++end) {
+      // Each place sees what the ones before it have moved.
+      std::tie(a0, a1) = ends(a, ca), std::tie(b0, b1) = ends(b, cb);
+      const bool of_a = end < 2;
+      const float here = end % 2 == 0 ? 0.0f : 1.0f;
+      const Vec3 point = of_a ? lerp(a0, a1, here) : lerp(b0, b1, here), from = of_a ? b0 : a0, axis = of_a ? b1 - b0 : a1 - a0;
+      const float there = std::clamp(dot(point - from, axis) / std::max(length2(axis), 1e-16f), 0.0f, 1.0f);
+      places += hold_apart(v, pair, of_a ? here : there, of_a ? there : here, friction, pair.done[1 + end]);
+    }
+    touching += places > 0;
   }
   return touching;
 }

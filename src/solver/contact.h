@@ -1,7 +1,7 @@
-// solver/contact: unilateral contact with Coulomb friction in positions: tissue on tissue, tools on tissue, thread (as
-// capsules) on tools, on itself and on the tissue's surface, and the drape under everything. Normal part: C = gap >= 0, undone
-// at once (contacts are hard). Friction undoes the slip since the start of the substep, at most friction times the normal
-// correction.
+// solver/contact: unilateral contact with Coulomb friction in positions: tissue on tissue, tools on tissue and on each other,
+// thread (as capsules) on tools, on itself and on the tissue's surface, and the drape under everything. Normal part: C = gap >=
+// 0, undone at once (contacts are hard). Friction undoes the slip since the start of the substep, at most friction times the
+// normal correction.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -16,10 +16,10 @@ struct Friction {
 // The force of contacts on each body in this substep: positional impulse sums [kg m]; divide by h^2 for newtons.
 struct BodyContact {
   Vec3 linear, angular;
-  // Of `linear`, what tissue does: pressing along the contacts' normals, rubbing across them; and all pressing regardless of
-  // its direction. For who renders friction by himself.
+  // Of `linear`, what tissue and the other tool do: pressing along the contacts' normals, rubbing across them; and all pressing
+  // regardless of its direction. For who renders friction by himself.
   Vec3 pressing, rubbing;
-  float pressed = 0;
+  float pressed = 0, by_tool = 0;  // and how much of `pressed` the other tool does
 };
 
 struct ContactView {  // what a contact kernel needs, gathered once per substep
@@ -40,6 +40,11 @@ uint32_t solve_tissue_pairs(const ContactView& v, const TissueCollision& tissue,
                             float friction);
 uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tissue, const std::vector<ToolCandidate>& list,
                                float friction);
+// Tools on each other. Steel does not give: what a substep has brought them into each other is undone in it, whichever side the
+// axes are on by now; overlap from before (hands that appear within each other) at 0.1 mm a substep, which is no blow. Impulses
+// accumulate over the sweeps of a substep, and a later sweep takes back what an earlier one did too much of, so that sweeps in
+// turn with the welds of the hands come to the balance of both.
+uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list, float friction);
 // Only segments below `height` [m], if the thread's own solve sees to the others.
 uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float friction,
                                float height);

@@ -22,6 +22,7 @@ void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   std::fill(scratch.volume_lambda.begin(), scratch.volume_lambda.end(), 0.0f);
   std::fill(scratch.shape.moved.begin(), scratch.shape.moved.end(), Vec4{});
   std::fill(scratch.on_body.begin(), scratch.on_body.end(), BodyContact{});
+  for (ToolPair& p : scratch.candidates.tool_pair) p.done = {};
   std::fill(scratch.thread.lambda.begin(), scratch.thread.lambda.end(), 0.0f);
 }
 
@@ -131,6 +132,7 @@ void prepare_scratch(const SolverModel& model, SolverScratch& k) {
   k.thread.resize(model.thread.count);
   k.candidates = {};
   k.candidates.tissue.moved.assign((model.shape.groups + kGroupBlock - 1) / kGroupBlock, 0.0f);
+  k.candidates.tool_pair.reserve(16);  // nothing is allocated when two tools come near each other
   k.on_body.assign(model.body.size(), {});
   k.node_of_slot.assign(model.thread.count, -1);
   k.locked.assign(model.thread.count, 0);
@@ -147,6 +149,7 @@ void find_candidates(const SolverModel& m, const SolverState& s, SolverScratch& 
   make_boxes(m.collision, s.x.data(), k.candidates.tissue.boxes, jobs);
   find_tool_and_thread_candidates(m.collision, s.x.data(), m.thread, s.thread, s.thread_collides, m.body, s.body,
                                   s.body_collides, margin, k.candidates);
+  find_tool_pairs(m.body, s.body, s.body_collides, k.candidates.tool_pair);
 }
 
 void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs, StageTimes* times) {
@@ -212,15 +215,18 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     solve_pins(s.pin, k.web, x, w, h, m.pin_sweeps, m.pin_tolerance, k.room);
   }
   {
-    // Few but stiff and pulling against each other (hand, grasp, channel): they get sweeps of their own.
+    // Few but stiff and pulling against each other (hand, grasp, channel, tool against tool): they get sweeps of their own.
     StageTimer timer(times, Stage::rigid);
     RigidBody& needle = s.body[kNeedle];
     for (ChannelPoint& c : s.channel)
       c.at = m.needle_arc.nearest(rotate(conjugate(needle.prev_q), position_of(c.point, k.prev.data()) - needle.prev_x));
-    const int sweeps = s.channel.empty() ? 1 : m.rigid_sweeps;
+    int sweeps = s.channel.empty() ? 1 : m.rigid_sweeps;
     for (int sweep = 0; sweep < sweeps; ++sweep) {
       for (ChannelPoint& c : s.channel) solve_channel(c, m.needle_arc, x, w, m.body[kNeedle], needle, h);
       for (Weld& weld : s.weld) solve_weld(m.body, s.body, weld, h);
+      const uint32_t n = solve_tools_on_tools(view, k.candidates.tool_pair, m.friction.tool);
+      if (n > 0) sweeps = m.rigid_sweeps;
+      if (sweep == 0) touching += n;
     }
   }
   {

@@ -337,10 +337,12 @@ float Scripted::open_seam(const Snapshot& seen) {
 }
 
 bool Scripted::take_back(const Snapshot& seen, bool present) {
-  enum { bring, over, down, close, give };
+  enum { bring, over, down, close, give, clear };
   switch (stage_) {
     case bring: {
-      rest_aside(seen, kDriver);
+      // It is taken from the driver's side: there he waits, or he would have to go past the forceps.
+      if (present) rest_aside(seen, kDriver);
+      else move(kDriver, {stitch(seen) + Vec3{0.09f * plan_.driver_side, 0.09f, 0}, tying_pose(kDriver, {}).q}, skill_.speed);
       const size_t next = std::min(place_ + 1, plan_.place.size() - 1);
       // Before a bite the needle is brought beside its place; before a knot high above the stitch, its tip up and out of the
       // way.
@@ -363,8 +365,11 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
       remember_grip(seen, kDriver);
       go(give);
       return false;
-    default:
-      return jaw(kForceps, 1);
+    case give:
+      if (jaw(kForceps, 1)) go(clear);
+      return false;
+    default:  // back out along its own shaft first: the tools stand close to each other, and steel is hard
+      return move(kForceps, raised(hand_[kForceps].pose, 0.01f), skill_.speed) || waited_ > 0.2f;
   }
 }
 

@@ -12,6 +12,7 @@ constexpr float kLeastFreeForOwn = 0.038f;    // the same where the strand is th
 constexpr float kWindOwnAt = 0.022f;          // [m] behind the tip, where such a strand is wound
 constexpr float kTailAside = 0.030f;          // [m] from the stitch, where the tail is laid down
 constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the middle of the field, where a used needle is let go
+constexpr float kTieCrossing = 0.3f;          // of the way that crossed hands take, forward and backward
 constexpr float kTyingAt = 0.12f;             // place on the needle's arc: behind the swage
 
 }  // namespace
@@ -160,7 +161,9 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       auto gently = [&](size_t hand) {
         return 0.6f * skill_.speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.03f, 1.0f);
       };
-      const Vec3 right = normalized(Vec3{side, 0.35f, 0.1f}), left = normalized(Vec3{-side, 0.35f, 0.1f});
+      // Where the hands cross, the driver, which has the tail, passes in front.
+      const float front = side < 0 ? kTieCrossing : 0;
+      const Vec3 right = normalized(Vec3{side, 0.35f, 0.1f + front}), left = normalized(Vec3{-side, 0.35f, 0.1f - front});
       move(kDriver, {pull_from_.p + right * 0.08f, hand_[kDriver].pose.q}, gently(kDriver));
       carry_swage(seen, winding_.start + (own_strand ? Vec3{0, 1, 0} : left) * (0.9f * winding_.reach), gently(kForceps));
       if (locked && (waited_ > 0.5f || driver.held != Held::thread)) go(driver.held == Held::thread ? lay_down : open);

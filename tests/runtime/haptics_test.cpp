@@ -161,6 +161,61 @@ TEST(Haptics, H3_on_the_lembert_scene) {
   }
 }
 
+// One tool against the other: what pushes either hand is the other hand, through two springs and a tick of delay. They feel the
+// same force, it stays within H3's bounds for every grip, and it is gone when they part.
+TEST(Haptics, H3_tool_on_tool) {
+  for (const double grip : {0.05, 0.15, 0.8}) {
+    SCOPED_TRACE(grip);
+    LockStep s("lembert");
+    for (int k = 0; k < 2; ++k) s.fake.grip(k, grip, 0.002, k == 0 ? 0.05 : 0.3, 0.0);
+    const Vec3 over = s.scene.body[0].position + Vec3{0, 0.04f, 0};
+    const Quat level = axis_angle({0, 1, 0}, 0.5f * kPi);
+    // The left shaft lies along x, the right one stands beside it; in: how far the hands mean to be in each other.
+    const auto meet = [&](float in) {
+      s.wish(0, {over + Vec3{0, 0, 0.008f - 0.5f * in}, kDown}, 1);
+      s.wish(1, {over + Vec3{-0.03f, 0.03f, 0.5f * in}, level}, 1);
+    };
+    s.put(0, {over + Vec3{0, 0, 0.008f}, kDown});
+    s.put(1, {over + Vec3{-0.03f, 0.03f, 0}, level});
+    meet(0);
+    s.run(2.4f);  // engage
+    for (int k = 0; k < 2; ++k) s.fake.zero(k);
+    EXPECT_LT(length(s.fake.force(0)), 0.01f);
+    const float deep = grip < 0.1 ? 0.03f : 0.013f;
+    for (int i = 0; i <= 20; ++i) meet(deep * static_cast<float>(i) / 20), s.run(0.03f);
+    s.run(1.2f);
+    std::array<Vec3, 2> low, high, force{};
+    low.fill({1e9f, 1e9f, 1e9f}), high.fill({-1e9f, -1e9f, -1e9f});
+    int n = 0;
+    s.run(0.6f, [&] {
+      for (size_t k = 0; k < 2; ++k) {
+        const Vec3 p = s.fake.position(static_cast<int>(k));
+        low[k] = {std::min(low[k].x, p.x), std::min(low[k].y, p.y), std::min(low[k].z, p.z)};
+        high[k] = {std::max(high[k].x, p.x), std::max(high[k].y, p.y), std::max(high[k].z, p.z)};
+        force[k] += s.fake.force(static_cast<int>(k));
+      }
+      ++n;
+    });
+    const float right = length(force[0]) / static_cast<float>(n), left = length(force[1]) / static_cast<float>(n);
+    EXPECT_GT(right, 0.2f);
+    EXPECT_NEAR(left, right, 0.1f * right);
+    EXPECT_GT(s.seen.patch[0].normal.z, 0.9f);
+    EXPECT_LT(s.seen.patch[1].normal.z, -0.9f);
+    for (int i = 20; i >= 0; --i) meet(deep * static_cast<float>(i) / 20), s.run(0.03f);
+    s.run(0.5f);
+    for (size_t k = 0; k < 2; ++k) {
+      const FakeHdArm a = s.fake.at(static_cast<int>(k));
+      std::printf("H3: tool on tool, grip %.0f N/m, %s hand: %.2f N, energy %.3f mJ at most, swing %.3f mm, step %.3f N/ms\n",
+                  1e3 * grip, k == 0 ? "right (50 g)" : "left (300 g)", double{k == 0 ? right : left}, 1e3 * a.energy_most,
+                  1e3 * double{length(high[k] - low[k])}, a.step_most);
+      EXPECT_LE(a.energy_most, 0.5e-3 + 2 * 0.16e-3);
+      EXPECT_LE(length(high[k] - low[k]), 0.2e-3f);
+      EXPECT_LE(a.step_most, 0.5 + 1e-4);
+      EXPECT_LT(length(s.fake.force(static_cast<int>(k))), 0.01f);
+    }
+  }
+}
+
 // H5 and H7 on the Lembert scene: the physics dies under pressing hands; then it lives and one arm dies. Force is gone within
 // 100 ms, without a step, and the other hand never notices.
 TEST(Haptics, killing_physics_or_an_arm) {

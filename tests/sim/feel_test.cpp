@@ -91,6 +91,52 @@ TEST(Feel, a_free_tool_feels_nothing_however_it_moves) {
   }
 }
 
+// Right above the left hand's shaft, which lies along x; `gap` [m] between them, less than nothing: asked of the hands.
+const Quat kLevel = axis_angle({0, 1, 0}, 0.5f * kPi);
+ToolInput left_level(const Field& f) {
+  ToolInput h;
+  h.pose = {f.rim + Vec3{-0.03f, 0.08f, 0}, kLevel};
+  h.jaw = 1;
+  return h;
+}
+Vec3 beside_left(const Field& f, float gap) { return f.rim + Vec3{0, 0.05f, 0.005f + gap}; }
+
+// Each hand feels the other tool: the same force, the other way; where it is before it is met; nothing when it is gone.
+TEST(Feel, the_other_tool) {
+  Field f("purse_string");
+  f.input.hand[1] = left_level(f);
+  for (int i = 0; i < 20; ++i) f.tick(hand(beside_left(f, 0.003f), 1));
+  for (size_t k = 0; k < 2; ++k) {
+    const ForcePatch& p = f.seen.patch[k];
+    const Vec3 out{0, 0, k == 0 ? 1.0f : -1.0f}, here = f.input.hand[k].pose.p;
+    EXPECT_LT(length(p.force), 1e-4f);
+    EXPECT_GT(dot(p.normal, out), 0.99f);
+    EXPECT_EQ(length(linear_force(p, here - out * 0.002f, {})), 0);
+    EXPECT_NEAR(dot(linear_force(p, here - out * 0.005f, {}), out), 0.002f * 0.5f * kArm, 0.03f) << "two arms in series";
+  }
+  for (int i = 0; i < 90; ++i) f.tick(hand(beside_left(f, 0.003f - 0.013f * smooth(f.model->dt * static_cast<float>(i))), 1));
+  const ForcePatch &right = f.seen.patch[0], &left = f.seen.patch[1];
+  // Two springs of the arms, and those of the wrists by their levers of 30 mm.
+  const float want = 0.01f / (2 / kArm + 2 * 0.03f * 0.03f * f.model->hand_angular_compliance);
+  std::printf("tool on tool: %.3f N on the right, %.3f N on the left, %.3f N in closed form\n", double{length(right.force)},
+              double{length(left.force)}, double{want});
+  EXPECT_NEAR(right.force.z, want, 0.04f * want);
+  EXPECT_LT(distance(right.force, -left.force), 0.01f * want);
+  EXPECT_LT(distance(right.force, f.seen.tool[0].force), 0.02f * want);
+  EXPECT_LT(distance(left.force, f.seen.tool[1].force), 0.02f * want);
+  EXPECT_GT(right.normal.z, 0.99f);
+  EXPECT_LT(left.normal.z, -0.99f);
+  EXPECT_NEAR(right.stiffness.zz, 0.5f * kArm, 0.1f * kArm);
+  EXPECT_LT(length(right.thread_direction) + length(left.thread_direction), 1e-6f) << "rubbing steel is no thread";
+  for (int i = 0; i < 30; ++i) f.tick(hand(beside_left(f, 0.02f), 1));
+  for (size_t k = 0; k < 2; ++k) EXPECT_LT(length(f.seen.patch[k].force), 1e-4f);
+  // The left hand leaves: its tool stays in the air and touches nothing.
+  f.input.hand[1].connected = 0;
+  for (int i = 0; i < 30; ++i) f.tick(hand(beside_left(f, -0.005f), 1));
+  EXPECT_LT(length(f.seen.patch[0].force), 1e-4f);
+  EXPECT_EQ(length(f.seen.patch[0].normal), 0);
+}
+
 TEST(Feel, the_next_contact_is_told_before_it_comes) {
   Field f("purse_string");
   const Vec3 near = f.rim + Vec3{f.radius + 0.004f, -0.006f, 0};
@@ -108,8 +154,10 @@ struct Compared {
 };
 
 // The same motion of the hand, felt through patches at 60 Hz times `parts`, a tick late as they are, and at 960 Hz.
-Compared compare(const char* scene, int parts, const std::function<ToolInput(const Field&, float)>& motion, float seconds) {
+Compared compare(const char* scene, int parts, const std::function<ToolInput(const Field&, float)>& motion, float seconds,
+                 bool left) {
   Field slow(scene, parts), full(scene, 16);
+  if (left) slow.input.hand[1] = left_level(slow), full.input.hand[1] = left_level(full);
   ForceModel felt, reference;
   ForcePatch waiting;
   bool any = false;
@@ -155,6 +203,7 @@ TEST(Haptics, H4_as_at_full_rate) {
     const char* scene;
     std::function<ToolInput(const Field&, float)> of;
     float seconds;
+    bool left = false;  // the left hand is there too
   };
   const auto beside = [](const Field& f, float in) { return f.rim + Vec3{f.radius + 0.004f - in, -0.006f, 0}; };
   const std::vector<Motion> motions{
@@ -173,12 +222,18 @@ TEST(Haptics, H4_as_at_full_rate) {
          return hand(rim + Vec3{0.008f, 0.004f, 0} * smooth((t - 0.5f) / 0.6f), t < 0.3f ? 1.0f : 0.0f);
        },
        1.6f},
+      {"press and drag tool on tool", "purse_string",
+       [&](const Field& f, float t) {
+         const float in = smooth(t / 0.3f) - smooth((t - 0.9f) / 0.2f);
+         return hand(beside_left(f, 0.002f - 0.012f * in) + Vec3{0.02f * smooth((t - 0.4f) / 0.4f), 0, 0}, 1);
+       },
+       1.3f, true},
   };
   for (const Motion& m : motions) {
     SCOPED_TRACE(m.name);
     for (const int parts : {1, 8}) {
-      const Compared c = compare(m.scene, parts, m.of, m.seconds);
-      std::printf("H4: %3d Hz %-22s %-12s largest force %.2f N, RMS error %.3f N, peak %.2f N, %d ms beyond 0.5 N\n",
+      const Compared c = compare(m.scene, parts, m.of, m.seconds, m.left);
+      std::printf("H4: %3d Hz %-27s %-12s largest force %.2f N, RMS error %.3f N, peak %.2f N, %d ms beyond 0.5 N\n",
                   60 * parts, m.name, m.scene, double{c.most}, double{c.rms}, double{c.peak}, c.over);
       EXPECT_GT(c.most, 0.15f) << "nothing was felt at all";
       if (parts == 1) continue;
