@@ -79,14 +79,15 @@ float FurthestMove(const Vec4* x, const Vec4* from, size_t n) {
   return furthest;
 }
 
-// Positions by components, for the particles of a group of blocks; the places after the last particle are nowhere.
+// Positions by components, for the particles of a group of blocks; the places after the last particle are no numbers, which are
+// near nothing, however far away a damaged state may have put its particles.
 void SpreadPositions(const TissueCollision& tissue, const Vec4* x, PairSearch& search, uint32_t g) {
   const uint32_t first = g * kBlock * kBlock, last = HWY_MIN(search.boxes.blocks * kBlock, first + kBlock * kBlock);
   for (uint32_t i = first; i < last; ++i) {
     const bool is = i < tissue.particles;
-    search.at[0][i] = is ? x[i].x : 1e18f;
-    search.at[1][i] = is ? x[i].y : 1e18f;
-    search.at[2][i] = is ? x[i].z : 1e18f;
+    search.at[0][i] = is ? x[i].x : kNowhere;
+    search.at[1][i] = is ? x[i].y : kNowhere;
+    search.at[2][i] = is ? x[i].z : kNowhere;
   }
 }
 
@@ -126,8 +127,8 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
     for (size_t axis = 0; axis < 3; ++axis)
       for (size_t k = 0; k < padded; ++k) {
         const bool is = k < part.near.size();
-        near_box.lower[axis][k] = is ? boxes.block.lower[axis][part.near[k].block] : 1e18f;
-        near_box.upper[axis][k] = is ? boxes.block.upper[axis][part.near[k].block] : -1e18f;
+        near_box.lower[axis][k] = is ? boxes.block.lower[axis][part.near[k].block] : 0.0f;
+        near_box.upper[axis][k] = is ? boxes.block.upper[axis][part.near[k].block] : 0.0f;
       }
     const uint32_t last = HWY_MIN(tissue.particles, (ba + 1) * kBlock);
     for (uint32_t i = ba * kBlock; i < last; ++i) {
@@ -143,6 +144,7 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
           const V dx = outside(0, px), dy = outside(1, py), dz = outside(2, pz);
           return hn::Le(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Set(d, reach * reach));
         });
+        if (part.near.size() - first < 16) blocks &= (1u << (part.near.size() - first)) - 1;
         for (; blocks != 0; blocks &= blocks - 1) {
           const PairSearch::Near& near = part.near[first + static_cast<size_t>(__builtin_ctz(blocks))];
           const uint32_t may = near.may ? near.may[i - ba * kBlock] : 0xffffu;
@@ -238,7 +240,7 @@ TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<cons
 void Boxes::resize(size_t count) {
   const size_t padded = (count + kBlock - 1) / kBlock * kBlock;
   if (!lower[0].empty() && lower[0].size() == padded) return;
-  for (size_t axis = 0; axis < 3; ++axis) lower[axis].assign(padded, 1e30f), upper[axis].assign(padded, -1e30f);
+  for (size_t axis = 0; axis < 3; ++axis) lower[axis].assign(padded, kNowhere), upper[axis].assign(padded, kNowhere);
 }
 
 void make_boxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes, Jobs& jobs) {

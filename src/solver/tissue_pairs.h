@@ -5,6 +5,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -15,6 +16,7 @@
 namespace catgut {
 
 constexpr uint32_t kBlock = 16;  // particles in a block, and blocks in a group
+constexpr float kNowhere = std::numeric_limits<float>::quiet_NaN();
 
 // What of the tissue collides. Consecutive particles must be neighbours in space, which bodies promise: the search goes by
 // boxes round 16 of them and round 16 such boxes.
@@ -45,7 +47,7 @@ struct PairCandidate {
   uint32_t a, b;
 };  // tissue particles, a < b
 
-// Boxes by components; padded to whole groups of 16 with boxes that nothing meets.
+// Boxes by components; padded to whole groups of 16 with boxes of no numbers, which nothing meets.
 struct Boxes {
   std::array<Column<float>, 3> lower, upper;  // [m]
   void resize(size_t count);

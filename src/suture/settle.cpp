@@ -10,6 +10,7 @@ namespace {
 
 constexpr float kLongestTail = 0.03f;  // [m] of a strand that was left uncut: an assistant trims it here
 constexpr uint32_t kCarriers = 6;      // particles that a pin's end hangs on
+constexpr float kSamePlace = 0.003f;   // [m] less than stitches are apart: a second pin there would only fight with the first
 constexpr float kCarries = 0.1f;       // [N] less than this in the thread inside a wall, and the wall holds itself
 
 int anchor_at(const Thread& t, uint32_t slot) {
@@ -26,6 +27,18 @@ bool same_bite(const SutureState& state, int a, int b) {
   };
   const auto in = point_at(a), out = point_at(b);
   return in != state.point.end() && out != state.point.end() && in->bite == out->bite;
+}
+
+// Whether one of the first `pins` pins holds the places of `pin` together at least as closely: one of the technique's closure,
+// or of a stitch beside this one.
+bool held_already(const SolverState& solver, size_t pins, const TissuePin& pin) {
+  const Vec4* x = solver.x.data();
+  const Vec3 a = position_of(pin.a, x), b = position_of(pin.b, x);
+  return std::any_of(solver.pin.begin(), solver.pin.begin() + static_cast<long>(pins), [&](const TissuePin& other) {
+    const Vec3 oa = position_of(other.a, x), ob = position_of(other.b, x);
+    const float apart = std::min(std::max(distance(a, oa), distance(b, ob)), std::max(distance(a, ob), distance(b, oa)));
+    return apart < kSamePlace && other.length <= pin.length;
+  });
 }
 
 // A place bound to the nearest tissue particle, in the frame of that particle's cluster.
@@ -47,6 +60,7 @@ void settle_piece(const SolverModel& model, SolverState& solver, SutureState& st
                   const std::vector<uint32_t>& knots, std::vector<Event>& events) {
   const Thread& t = solver.thread;
   SettledStitch stitch;
+  const size_t pins = solver.pin.size();  // without its own
   size_t lowest = last, highest = first;
   for (size_t i = first; i <= last; ++i)
     if (anchor_at(t, t.order[i]) >= 0) lowest = std::min(lowest, i), highest = std::max(highest, i);
@@ -73,7 +87,7 @@ void settle_piece(const SolverModel& model, SolverState& solver, SutureState& st
         pin.length = std::max(0.0f, length + other);
         pin.compliance = model.thread.stretch_compliance * length / model.thread.spacing;
         pin.owner = PinOwner::stitch;
-        solver.pin.push_back(pin);
+        if (!held_already(solver, pins, pin)) solver.pin.push_back(pin);
       }
       before = here;
       length = tension = 0;

@@ -104,7 +104,6 @@ TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
   expect_refused("view nothing.cgrec", "there is no such recording");
   expect_refused("view small.toml", "not a Catgut recording");
   expect_refused("play small.toml --json nowhere/x.json", "there is no folder nowhere");
-  expect_refused("bench scale", "not available yet in this version");
   expect_refused("bench paper --scene small.toml", "no technique that the scripted surgeon could sew");
   expect_refused("describe substep", "substeps");
   expect_refused("devices --test", "no haptic arm");

@@ -288,7 +288,7 @@ TEST(Haptics, H8_heat) {
 // H4, the puncture: what is left of the force when the tip goes through is felt at most 8 ms after the physics lets it through,
 // although the physics is heard a frame late. The servo knows the force at which a wall gives way, and does not wait.
 TEST(Haptics, H4_puncture_drop) {
-  for (const float rate : {60.0f, 240.0f, 480.0f}) {
+  for (const float rate : {60.0f, 240.0f, 480.0f, 960.0f}) {
     SCOPED_TRACE(rate);
     Bench b;
     b.rate = rate;

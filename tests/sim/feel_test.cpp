@@ -194,7 +194,7 @@ Compared compare(const char* scene, int parts, const std::function<ToolInput(con
   return c;
 }
 
-// Arms run the scene at 480 ticks a second, with an eighth of the substeps in each; at its own 60 the figures are for
+// Arms run the scene at 960 ticks a second, one substep in each; here it is half of that. At its own 60 the figures are for
 // comparison. H4: RMS error against the full-rate reference at most the larger of 0.1 N and a tenth of the largest force;
 // beyond 0.5 N for at most 5 ms.
 TEST(Haptics, H4_as_at_full_rate) {

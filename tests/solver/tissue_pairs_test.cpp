@@ -74,6 +74,20 @@ TEST(TissuePairs, finds_what_looking_at_every_pair_finds) {
   }
 }
 
+// A state that was damaged on its way may hold anything; what is not a place is near nothing, and nothing else is read or
+// written.
+TEST(TissuePairs, particles_that_are_nowhere_are_near_nothing) {
+  for (const float far : {1e19f, 1e25f, 3e38f, HUGE_VALF, -HUGE_VALF, std::nanf("")}) {
+    Sheets s = make_sheets(6);
+    for (const size_t i : {0u, 40u, 900u, 1839u}) s.x[i] = {far, i == 40 ? -far : far, far, 1};
+    Jobs jobs(1);
+    PairSearch search;
+    find_tissue_pairs(s.tissue, s.x.data(), search, jobs);
+    EXPECT_GT(search.pair.size(), 1000u);
+    for (const PairCandidate& c : search.pair) ASSERT_TRUE(c.a < c.b && c.b < s.tissue.particles) << far;
+  }
+}
+
 TEST(TissuePairs, kept_pairs_hold_all_that_touch_until_they_are_called_stale) {
   Sheets s = make_sheets(4);
   Jobs jobs(1);

@@ -137,6 +137,42 @@ TEST(Settle, a_wall_that_carries_nothing_gets_no_pin) {
   }
 }
 
+// The technique's closure holds the walls together pair by pair; a stitch that lies on such a pair would only fight with it.
+TEST(Settle, places_that_a_pin_holds_already_get_no_second) {
+  struct Case {
+    const char* what;
+    float aside;   // [m] of the pin that is there
+    float longer;  // [m] than the thread between the points
+    size_t pins;
+  };
+  for (const Case& c : {Case{"none near", 0.02f, 0, 4}, Case{"as tight", 0.001f, 0, 3}, Case{"tighter", 0, -0.001f, 3},
+                        Case{"looser", 0, 0.001f, 4}}) {
+    SCOPED_TRACE(c.what);
+    TieSetup setup;
+    setup.particles = 110;
+    Tie r(setup);
+    tie_and_cut(r);
+    if (HasFatalFailure()) return;
+    float length = 0;
+    for (size_t i = r.node_of_point(0); i < r.node_of_point(1); ++i) length += r.thread().rest[i];
+    TissuePin there;
+    const auto particle_near = [&](Vec3 at) {
+      uint32_t best = 0;
+      for (uint32_t i = 1; i < r.model->solver.tissue; ++i)
+        if (distance(xyz(r.x()[i]), at) < distance(xyz(r.x()[best]), at)) best = i;
+      return particle_point(best);
+    };
+    there.a = particle_near(r.point_at(0) + Vec3{0, 0, c.aside});
+    there.b = particle_near(r.point_at(1) + Vec3{0, 0, c.aside});
+    ASSERT_EQ(distance(position_of(there.a, r.x()), r.point_at(0)) < 0.003f, c.aside < 0.01f);
+    there.length = length + c.longer;
+    there.owner = PinOwner::stitch;  // a plan's pins are made anew every tick
+    r.solver().pin.push_back(there);
+    settle(r);
+    EXPECT_EQ(r.solver().pin.size(), c.pins);
+  }
+}
+
 // Few particles carry it on, and nothing moves because of that, not even in tissue that is out of shape.
 TEST(Settle, a_pin_hangs_on_six_particles_at_most) {
   TieSetup setup;
