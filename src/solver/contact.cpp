@@ -96,7 +96,8 @@ uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tiss
 namespace {
 
 // Holds the places s and t (0..1) of the axes apart; whether they touch.
-bool hold_apart(const ContactView& v, const ToolPair& pair, float s, float t, float friction, ToolPair::Impulse& done) {
+bool hold_apart(const ContactView& v, const ToolPair& pair, float s, float t, float friction, float most_press,
+                ToolPair::Impulse& done) {
   RigidBody &a = (*v.body)[pair.a], &b = (*v.body)[pair.b];
   const RigidModel &ma = (*v.model)[pair.a], &mb = (*v.model)[pair.b];
   const Capsule &ca = ma.capsule[pair.capsule_a], &cb = mb.capsule[pair.capsule_b];
@@ -118,7 +119,9 @@ bool hold_apart(const ContactView& v, const ToolPair& pair, float s, float t, fl
   const Vec3 at = on_a + n * (ca.radius + 0.5f * gap), ra = at - a.x, rb = at - b.x;
   const float w = inverse_mass_at(ma, a, ra, n) + inverse_mass_at(mb, b, rb, n);
   if (w <= 0) return false;
-  const float press = std::max((goal - gap) / w, -done.normal);
+  float room = most_press;  // what the other places have left
+  for (const ToolPair::Impulse& place : pair.done) room -= place.normal;
+  const float press = std::max(std::min((goal - gap) / w, std::max(0.0f, room)), -done.normal);
   done.normal += press;
   const Vec3 slip = previous_point(a, ra) - previous_point(b, rb), across = slip - n * dot(slip, n);
   Vec3 rub = done.rub - n * dot(done.rub, n);
@@ -144,7 +147,7 @@ bool hold_apart(const ContactView& v, const ToolPair& pair, float s, float t, fl
 
 }  // namespace
 
-uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list, float friction) {
+uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list, float friction, float most_press) {
   uint32_t touching = 0;
   for (ToolPair& pair : list) {
     const RigidBody &a = (*v.body)[pair.a], &b = (*v.body)[pair.b];
@@ -160,7 +163,7 @@ uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list,
     if (!near && std::none_of(pair.done.begin(), pair.done.end(), [](const auto& d) { return d.normal > 0; })) continue;
     uint32_t places = 0;
     if ((s > 0 && s < 1 && t > 0 && t < 1) || pair.done[0].normal > 0)
-      places += hold_apart(v, pair, s, t, friction, pair.done[0]);
+      places += hold_apart(v, pair, s, t, friction, most_press, pair.done[0]);
     for (size_t end = 0; end < 4; ++end) {
       // Each place sees what the ones before it have moved.
       std::tie(a0, a1) = ends(a, ca), std::tie(b0, b1) = ends(b, cb);
@@ -168,7 +171,7 @@ uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list,
       const float here = end % 2 == 0 ? 0.0f : 1.0f;
       const Vec3 point = of_a ? lerp(a0, a1, here) : lerp(b0, b1, here), from = of_a ? b0 : a0, axis = of_a ? b1 - b0 : a1 - a0;
       const float there = std::clamp(dot(point - from, axis) / std::max(length2(axis), 1e-16f), 0.0f, 1.0f);
-      places += hold_apart(v, pair, of_a ? here : there, of_a ? there : here, friction, pair.done[1 + end]);
+      places += hold_apart(v, pair, of_a ? here : there, of_a ? there : here, friction, most_press, pair.done[1 + end]);
     }
     touching += places > 0;
   }

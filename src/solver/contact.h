@@ -43,8 +43,9 @@ uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tiss
 // Tools on each other. Steel does not give: what a substep has brought them into each other is undone in it, whichever side the
 // axes are on by now; overlap from before (hands that appear within each other) at 0.1 mm a substep, which is no blow. Impulses
 // accumulate over the sweeps of a substep, and a later sweep takes back what an earlier one did too much of, so that sweeps in
-// turn with the welds of the hands come to the balance of both.
-uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list, float friction);
+// turn with the welds of the hands come to the balance of both. most_press [kg m]: a pair presses no harder and rather slips
+// past each other; nothing stops a hand that feels nothing, and tools locked behind each other would tear what they hold.
+uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list, float friction, float most_press);
 // Only segments below `height` [m], if the thread's own solve sees to the others.
 uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float friction,
                                float height);

@@ -224,7 +224,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     for (int sweep = 0; sweep < sweeps; ++sweep) {
       for (ChannelPoint& c : s.channel) solve_channel(c, m.needle_arc, x, w, m.body[kNeedle], needle, h);
       for (Weld& weld : s.weld) solve_weld(m.body, s.body, weld, h);
-      const uint32_t n = solve_tools_on_tools(view, k.candidates.tool_pair, m.friction.tool);
+      const uint32_t n = solve_tools_on_tools(view, k.candidates.tool_pair, m.friction.tool, m.tool_force * h * h);
       if (n > 0) sweeps = m.rigid_sweeps;
       if (sweep == 0) touching += n;
     }

@@ -38,6 +38,7 @@ struct SolverModel {
   float volume_compliance = 0;
   float damping = 0, thread_damping = 0, body_damping = 20;  // [1/s]
   Friction friction;
+  float tool_force = 8;  // [N] that two tools press each other with at most; more than an arm renders
   float ground = -1e9f;  // [m] height of the drape
 };
 

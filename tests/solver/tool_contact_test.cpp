@@ -136,13 +136,15 @@ TEST(ToolsOnTools, two_hands_balance_in_closed_form) {
   }
 }
 
-// A hand that drives its shaft across the other, as fast as hands go and far beyond it: it stays on its side, whatever meets.
+// A hand that drives its shaft across the other, as fast as hands go and far beyond it: it stays on its side, whatever meets,
+// as long as nothing bounds the force.
 TEST(ToolsOnTools, nothing_passes_through) {
   for (const float speed : {0.05f, 0.2f, 0.5f, 1.5f})
     for (const float along : {0.008f, 0.03f, 0.09f})
       for (const float on_other : {0.008f, 0.05f}) {
         SCOPED_TRACE(testing::Message() << speed << " m/s, " << along << " and " << on_other << " m from the tips");
         Pair p({{-on_other, 0, 0}, kLevel}, {{0, 0.02f, -along}, kAcross}, 0.1f);
+        p.model.tool_force = 1000;
         const float far = 0.03f, travel = 0.02f + far;
         p.run(travel / speed + 0.1f, [&](float t) { p.state.weld[1].target.p.y = 0.02f - std::min(travel, speed * t); });
         // Where both pass: how far apart the axes are at the crossing, with the sign of the side.
@@ -155,6 +157,25 @@ TEST(ToolsOnTools, nothing_passes_through) {
         const bool slid_off = s <= 0 || s >= 1 || t <= 0 || t >= 1;
         if (!slid_off) { EXPECT_GT(dot(lerp(ends[2], ends[3], t) - lerp(ends[0], ends[1], s), Vec3{0, 1, 0}), 0); }
       }
+}
+
+// A hand that feels nothing goes on: it never presses harder than the bound, and the tools slip past each other in the end
+// instead of staying locked behind each other.
+TEST(ToolsOnTools, beyond_the_bound_they_slip_past_each_other) {
+  for (const float speed : {0.05f, 0.2f, 0.5f}) {
+    SCOPED_TRACE(speed);
+    Pair p({{-0.05f, 0, 0}, kLevel}, {{0, 0.02f, -0.03f}, kAcross}, 0.1f);
+    float most = 0;
+    const float travel = 0.05f;
+    p.run(travel / speed + 0.3f, [&](float t) {
+      most = std::max(most, p.on(1).pressed / (p.model.h * p.model.h));
+      p.state.weld[1].target.p.y = 0.02f - std::min(travel, speed * t);
+    });
+    EXPECT_GT(most, 0.9f * p.model.tool_force);
+    EXPECT_LT(most, 1.2f * p.model.tool_force) << "of all it was pushed by, whatever was taken back";
+    EXPECT_GE(p.gap(), -1e-5f);
+    for (size_t k = 0; k < 2; ++k) EXPECT_LT(distance(p.state.body[k].x, p.state.weld[k].target.p), 1e-4f) << k;
+  }
 }
 
 // Nobody holds them, nothing slows them: what one loses the other has, in turning too.
