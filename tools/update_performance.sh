@@ -2,22 +2,23 @@
 # Writes docs/performance.md and its pictures from measurements on this machine, which should have nothing else to do.
 #   tools/update_performance.sh                all of it (half an hour on two cores)
 #   tools/update_performance.sh scale stages   these parts anew; the others as they were measured last
-# Parts: paper limits scale stages kilohertz bullet. What was measured is kept in out/performance.
+#   tools/update_performance.sh --page         only the page, from what was measured last
+# Parts: paper limits limits_200 scale stages kilohertz bullet. What was measured is kept in out/performance.
 set -euo pipefail
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
 out=out/performance
 mkdir -p "$out" docs/media
-all=(paper limits scale stages kilohertz bullet)
+all=(paper limits limits_200 scale stages kilohertz bullet)
 techniques=(purse_string connell stay lembert)
-threads=2
+threads=2 executions=${EXECUTIONS:-10}
 
 measure() {  # measure PART: its text on standard output
   case "$1" in
-    paper) ./catgut bench paper --threads $threads --out "$out/paper" >/dev/null && cat "$out/paper/tables.md" ;;
-    limits)
-      ./catgut bench limits --threads 1 --out "$out/limits"
-      ./catgut bench limits --threads 1 --scene stress_two_bodies --sutures 200 --out "$out/limits_200" | tail -n 25
+    paper) ./catgut bench paper --threads $threads --executions "$executions" --out "$out/paper" >/dev/null && cat "$out/paper/tables.md" ;;
+    limits) ./catgut bench limits --threads 1 --out "$out/limits" ;;
+    limits_200)
+      ./catgut bench limits --threads 1 --scene stress_two_bodies --set duration=9000 --sutures 200 --out "$out/limits_200" | tail -n 25
       ;;
     scale) ./catgut bench scale --threads $threads --repeat 3 ;;
     stages)
@@ -30,14 +31,16 @@ measure() {  # measure PART: its text on standard output
       ./catgut bench stages --scene lembert --set solver.tick_rate=1000 --set solver.substeps=1 --threads 1 --seconds 60
       ;;
     bullet)
-      if [ -x build/bench/against_bullet ]; then build/bench/against_bullet; else echo "Not measured: libbullet-dev was not installed."; fi
+      if [ -x build/bench/against_bullet ]; then build/bench/against_bullet --ticks 50 --upto 4 --threads $threads; else echo "Not measured: libbullet-dev was not installed."; fi
       ;;
     *) echo "update_performance: no part $1; parts: ${all[*]}" >&2; exit 2 ;;
   esac
 }
 
 wanted=("$@")
-if [ ${#wanted[@]} -eq 0 ]; then
+if [ "${1:-}" = --page ]; then
+  wanted=()
+elif [ ${#wanted[@]} -eq 0 ]; then
   wanted=("${all[@]}")
 fi
 ./catgut --version >/dev/null  # builds what has changed before anything is timed
@@ -62,7 +65,7 @@ read ratios within a table rather than milliseconds across tables.
 
 ## The paper's tables, ours beside them
 
-`./catgut bench paper --threads 2`
+`./catgut bench paper --threads 2`, with `--executions` as the table says
 
 END
   text paper
@@ -70,13 +73,15 @@ END
 
 ## What each further suture costs (figures 20 to 23)
 
-`./catgut bench limits --threads 1`, and two bodies to 200 sutures with `--scene stress_two_bodies --sutures 200`
+`./catgut bench limits --threads 1`
 
 ![solver time per suture, one body](media/limits_stress_one_body.png)
 ![solver time per suture, two bodies](media/limits_stress_two_bodies.png)
 
 END
   boxed limits
+  printf '\nTo 200 sutures in two bodies (`--scene stress_two_bodies --set duration=9000 --sutures 200`):\n\n'
+  boxed limits_200
   printf '\n## More particles, and a second thread\n\n`./catgut bench scale --threads 2 --repeat 3`: the paper'"'"'s 8 substeps a tick, every rule on.\n\n'
   text scale
   printf '\n## Where a tick goes\n\n`./catgut bench stages --scene SCENE --set solver.preset=paper --threads 2 --seconds 30 --repeat 3`\n\n'
@@ -89,7 +94,7 @@ END
 
 END
   boxed kilohertz
-  printf '\n## Beside Bullet\n\n`build/bench/against_bullet`\n\n'
+  printf '\n## Beside Bullet\n\n`build/bench/against_bullet --ticks 50 --upto 4 --threads 2`: Catgut on two threads, Bullet on the one it has\n\n'
   text bullet
 } >docs/performance.md
 echo "update_performance: docs/performance.md is written" >&2
