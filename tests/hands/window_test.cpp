@@ -252,10 +252,10 @@ class StitchAtTheWindow : public testing::Test {
   std::unique_ptr<XServer> x_;
 };
 
-// Takes the needle, sews both bowel ends, pulls the thread through, draws them together, ties a throw. Three tries: hands that
+// Takes the needle, sews both bowel ends, pulls the thread through, draws them together, ties a throw. Six tries: hands that
 // depend on when pictures come do not do the same thing twice.
 void sew_and_tie(AtTheWindow& desk, std::string& stopped_at, int throws) {
-  for (int attempt = 0; attempt < 3; ++attempt) {
+  for (int attempt = 0; attempt < 6; ++attempt) {
     Person me(desk);
     const auto sewn = [&] { return desk.count(EventKind::bite_completed) >= 2; };
     if (me.take_needle() && me.bite() && (sewn() || (me.hand_back() && me.bite())) && me.pull_tail(0.1f) &&
@@ -281,7 +281,7 @@ void expect_a_stitch(AtTheWindow& desk, const std::string& stopped_at) {
 
 // With the lesson open, which tells what to do: it follows to its end.
 TEST_F(StitchAtTheWindow, by_mouse_and_keyboard) {
-  XMouse desk(x_->display, 240);
+  XMouse desk(x_->display, 480);
   if (!desk.ready()) GTEST_SKIP() << "no XTest here";
   std::string stopped_at = "nothing was done";
   desk.sit([&] { sew_and_tie(desk, stopped_at, 2); }, true);
