@@ -323,7 +323,7 @@ TEST_F(StitchAtTheWindow, a_lesson_shows_a_step_and_sees_it_done) {
 }
 
 TEST_F(StitchAtTheWindow, by_gamepad) {
-  SdlPad desk(240);
+  SdlPad desk(480);
   std::string stopped_at = "no virtual joysticks in this SDL";
   desk.sit([&] {
     if (desk.plug_in()) sew_and_tie(desk, stopped_at, 1);
