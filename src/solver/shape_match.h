@@ -3,6 +3,7 @@
 // Both passes are sums of listed 64-byte rows in a fixed order: no gathers, no scatter, no atomics, the same bits for any
 // number of workers and any width of SIMD.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -21,19 +22,21 @@ struct alignas(64) Row {
 struct ShapeModel {
   uint32_t clusters = 0;  // different ones: particles on the two sides of a wall often share theirs
   uint32_t groups = 0;
-  std::vector<uint32_t> group_first;  // groups + 1: particles group_first[g] .. group_first[g + 1] - 1
-  uint32_t cluster_stride = 16;       // particles per cluster, padded; the pad is index `particles`
-  uint32_t member_stride = 16;        // groups per cluster, padded; the pad is index `groups` (a zero row)
-  uint32_t holder_stride = 16;        // clusters per group, padded with index `clusters` (a zero transform)
-  Column<uint32_t> member;            // clusters x cluster_stride: particles; not for the kernels
-  Column<uint32_t> group_member;      // clusters x member_stride: groups, as the place of their row (16 floats each)
-  Column<uint32_t> holder;            // groups x holder_stride: clusters, likewise
-  Column<float> inv_holders;          // per group: 1 / number of clusters that hold it
-  Column<Vec4> rest;                  // per particle, (x, y, z, 1)
-  Column<float> relative_mass;        // per particle: m_k / mean m, the weights of the moments
-  Column<Vec4> weighted_rest;         // per particle: relative mass times rest
-  Column<Vec4> rest_centre;           // per cluster: mass-weighted, w unused
-  std::vector<uint32_t> cluster_of;   // per particle: the cluster centred on it
+  std::vector<uint32_t> group_first;         // groups + 1: particles group_first[g] .. group_first[g + 1] - 1
+  uint32_t cluster_stride = 16;              // particles per cluster, padded; the pad is index `particles`
+  uint32_t member_stride = 16;               // groups per cluster, padded; the pad is index `groups` (a zero row)
+  uint32_t holder_stride = 16;               // clusters per group, padded with index `clusters` (a zero transform)
+  Column<uint32_t> member;                   // clusters x cluster_stride: particles; not for the kernels
+  Column<uint32_t> group_member;             // clusters x member_stride: groups, as the place of their row (16 floats each);
+                                             // the last cluster's repeated up to a multiple of 16
+  Column<uint32_t> holder;                   // groups x holder_stride: clusters, likewise
+  Column<float> inv_holders;                 // per group: 1 / number of clusters that hold it
+  Column<Vec4> rest;                         // per particle, (x, y, z, 1)
+  Column<float> relative_mass;               // per particle: m_k / mean m, the weights of the moments
+  Column<Vec4> weighted_rest;                // per particle: relative mass times rest
+  std::array<Column<float>, 3> rest_centre;  // per cluster, by components: mass-weighted
+  Column<float> inv_cluster_mass;            // per cluster: 1 / sum of relative masses; padded as the lists are
+  std::vector<uint32_t> cluster_of;          // per particle: the cluster centred on it
 };
 // cluster[i] is centred on particle i. Clusters of the same members are one: it would only be solved twice to the same end.
 ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> mass,

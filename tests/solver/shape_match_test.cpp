@@ -143,19 +143,12 @@ TEST(Polar, a_cluster_shrunk_to_a_point_or_turned_inside_out_stays_a_rotation) {
 }
 
 // The kernels against a plain reference in double precision: the same rotations, then the same positions.
-TEST(ShapeRows, kernels_equal_a_plain_scalar_reference) {
+void expect_kernels_equal_reference(const std::vector<std::vector<uint32_t>>& cluster) {
   Random r(8);
-  const uint32_t n = 100;
+  const uint32_t n = static_cast<uint32_t>(cluster.size());
   std::vector<Vec3> rest = cloud(r, n, {0.05f, 0.05f, 0.05f});
   std::vector<float> mass, inv_mass;
   for (uint32_t i = 0; i < n; ++i) mass.push_back(0.5f + r.uniform()), inv_mass.push_back(i % 17 == 0 ? 0 : 1 / mass[i]);
-  std::vector<std::vector<uint32_t>> cluster(n);
-  for (uint32_t c = 0; c < n; ++c) {
-    const uint32_t members = 5 + r.next() % 11;
-    for (uint32_t k = 0; k < members; ++k) cluster[c].push_back((c + k * (1 + c % 3)) % n);
-    std::sort(cluster[c].begin(), cluster[c].end());
-    cluster[c].erase(std::unique(cluster[c].begin(), cluster[c].end()), cluster[c].end());
-  }
   const ShapeModel model = make_shape_model(rest, mass, cluster);
   ShapeScratch scratch;
   scratch.resize(model);
@@ -178,7 +171,8 @@ TEST(ShapeRows, kernels_equal_a_plain_scalar_reference) {
     for (uint32_t i : cluster[c])
       mean += mass[i] * eigen(xyz(before[i])), q0 += mass[i] * eigen(rest[i]), total += double{mass[i]};
     mean /= total, q0 /= total;
-    const Eigen::Quaterniond q(rotation.w[c], rotation.x[c], rotation.y[c], rotation.z[c]);
+    const uint32_t k = model.cluster_of[c];
+    const Eigen::Quaterniond q(rotation.w[k], rotation.x[k], rotation.y[k], rotation.z[k]);
     for (uint32_t i : cluster[c]) goal[i] += mean + q * (eigen(rest[i]) - q0), ++holders[i];
   }
   for (uint32_t i = 0; i < n; ++i) {
@@ -189,6 +183,31 @@ TEST(ShapeRows, kernels_equal_a_plain_scalar_reference) {
             : Eigen::Vector3d(at + double{relaxation} * (double{s} * (goal[i] / holders[i] - at) - (1 - double{s}) * moved));
     EXPECT_LT((eigen(xyz(x[i])) - want).norm(), 1e-6) << "particle " << i;
     EXPECT_EQ(x[i].w, 1.0f);
+  }
+}
+
+TEST(ShapeRows, kernels_equal_a_plain_scalar_reference) {
+  Random r(8);
+  const uint32_t n = 100;
+  std::vector<std::vector<uint32_t>> cluster(n);
+  for (uint32_t c = 0; c < n; ++c) {
+    const uint32_t members = 5 + r.next() % 11;
+    for (uint32_t k = 0; k < members; ++k) cluster[c].push_back((c + k * (1 + c % 3)) % n);
+    std::sort(cluster[c].begin(), cluster[c].end());
+    cluster[c].erase(std::unique(cluster[c].begin(), cluster[c].end()), cluster[c].end());
+  }
+  expect_kernels_equal_reference(cluster);
+}
+
+// A wall of two layers: partners share their clusters, of seven pairs each, and are moved several at a time, but not the
+// pinned.
+TEST(ShapeRows, kernels_equal_a_plain_scalar_reference_in_a_wall_of_two_layers) {
+  for (const uint32_t pairs : {40u, 47u}) {
+    std::vector<std::vector<uint32_t>> cluster(2 * pairs);
+    for (uint32_t c = 0; c < 2 * pairs; ++c)
+      for (uint32_t k = 0; k < 7; ++k)
+        for (uint32_t side = 0; side < 2; ++side) cluster[c].push_back(2 * ((c / 2 + k * (1 + c / 2 % 3)) % pairs) + side);
+    expect_kernels_equal_reference(cluster);
   }
 }
 
