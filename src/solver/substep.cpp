@@ -46,11 +46,11 @@ void reserve_room(const SolverModel& m, SolverScratch& k) {
   p.pair.reserve(tissue * kPairsOfOne);
   p.built_at.reserve(tissue);
   for (Column<float>* column : {&p.at[0], &p.at[1], &p.at[2], &p.radius}) column->reserve(blocks * kBlock);
-  p.boxes.block.resize(blocks);
-  p.boxes.group.resize(groups);
+  for (BlockBoxes* boxes : {&p.boxes, &p.built}) boxes->block.resize(blocks), boxes->group.resize(groups);
+  p.of_block.resize(blocks);
+  for (std::vector<PairCandidate>& pair : p.of_block) pair.reserve(kBlock * kPairsOfOne);
   p.part.resize(groups);
   for (PairSearch::Part& part : p.part) {
-    part.pair.reserve(kBlock * kBlock * kPairsOfOne);
     part.near.reserve(std::min(blocks, kBlocksNear));
     part.near_box.resize(std::min(blocks, kBlocksNear));
   }

@@ -2,6 +2,8 @@
 // time. Comparisons only decide what is worth a closer look, so every instruction set finds every pair that touches.
 #include "solver/tissue_pairs.h"
 
+#include <cmath>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "solver/tissue_pairs.cpp"
 #include <hwy/foreach_target.h>
@@ -71,32 +73,43 @@ float FurthestMove(const Vec4* x, const Vec4* from, size_t n) {
   for (; i + 2 * kLanes <= count; i += 2 * kLanes)
     for (size_t k = 0; k < 2; ++k)
       most[k] = hn::Max(most[k], hn::Abs(hn::Sub(hn::LoadU(d, at + i + k * kLanes), hn::LoadU(d, was + i + k * kLanes))));
-  float furthest = hn::GetLane(hn::MaxOfLanes(d, hn::Max(most[0], most[1])));
-  for (; i < count; ++i) {
-    const float move = at[i] > was[i] ? at[i] - was[i] : was[i] - at[i];
-    furthest = move > furthest ? move : furthest;
-  }
-  return furthest;
+  alignas(64) float lane[kLanes];
+  hn::Store(hn::Max(most[0], most[1]), d, lane);
+  float along[4] = {};
+  for (size_t k = 0; k < kLanes; ++k) along[k % 4] = HWY_MAX(along[k % 4], lane[k]);
+  for (; i < count; ++i) along[i % 4] = HWY_MAX(along[i % 4], at[i] > was[i] ? at[i] - was[i] : was[i] - at[i]);
+  return std::sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
 }
 
-// Positions by components, for the particles of a group of blocks; the places after the last particle are no numbers, which are
-// near nothing, however far away a damaged state may have put its particles.
-void SpreadPositions(const TissueCollision& tissue, const Vec4* x, PairSearch& search, uint32_t g) {
-  const uint32_t first = g * kBlock * kBlock, last = HWY_MIN(search.boxes.blocks * kBlock, first + kBlock * kBlock);
-  for (uint32_t i = first; i < last; ++i) {
-    const bool is = i < tissue.particles;
-    search.at[0][i] = is ? x[i].x : kNowhere;
-    search.at[1][i] = is ? x[i].y : kNowhere;
-    search.at[2][i] = is ? x[i].z : kNowhere;
+// Which blocks of group g have moved by more than `limit` along an axis since their pairs were found, or are not numbers; bit
+// k: its block k. They are looked for from where they are now on.
+uint32_t MovedBlocks(const Vec4* x, PairSearch& search, uint32_t g, float limit) {
+  const D d;
+  const uint32_t particles = static_cast<uint32_t>(search.built_at.size());
+  uint32_t moved = 0;
+  for (uint32_t k = 0; k < kBlock && (g * kBlock + k) * kBlock < particles; ++k) {
+    const uint32_t first = (g * kBlock + k) * kBlock, count = HWY_MIN(kBlock, particles - first);
+    const float *at = &x[first].x, *was = &search.built_at[first].x;
+    bool stays = true;
+    size_t i = 0;
+    for (; i + kLanes <= 4 * size_t{count}; i += kLanes)
+      stays = stays && hn::AllTrue(d, hn::Le(hn::Abs(hn::Sub(hn::LoadU(d, at + i), hn::LoadU(d, was + i))), hn::Set(d, limit)));
+    for (; i < 4 * size_t{count}; ++i) stays = stays && (at[i] > was[i] ? at[i] - was[i] : was[i] - at[i]) <= limit;
+    if (stays) continue;
+    moved |= 1u << k;
+    for (i = first; i < first + count; ++i) {
+      search.built_at[i] = x[i];
+      search.at[0][i] = x[i].x, search.at[1][i] = x[i].y, search.at[2][i] = x[i].z;
+    }
   }
+  return moved;
 }
 
-// Pairs whose first particle is in group g.
+// Pairs whose first particle is in a block of group g, if that block or one near it has moved.
 void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g) {
   const D d;
   PairSearch::Part& part = search.part[g];
-  part.pair.clear();
-  const BlockBoxes& boxes = search.boxes;
+  const BlockBoxes& boxes = search.built;
   const float reach = 2 * tissue.largest_radius + tissue.pair_margin;
   const uint32_t end = HWY_MIN(boxes.blocks, (g + 1) * kBlock);
   for (uint32_t ba = g * kBlock; ba < end; ++ba) {
@@ -104,6 +117,7 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
     for (size_t axis = 0; axis < 3; ++axis)
       from[axis] = boxes.block.lower[axis][ba] - reach, to[axis] = boxes.block.upper[axis][ba] + reach;
     part.near.clear();
+    bool anew = false;
     const TissueCollision::Kin* kin = tissue.kin.data() + tissue.kin_first[ba];
     const TissueCollision::Kin* const last_kin = tissue.kin.data() + tissue.kin_first[ba + 1];
     for (uint32_t base = g / 16 * 16; base < boxes.groups; base += 16) {
@@ -113,6 +127,7 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
         if (other < g) continue;
         uint32_t blocks = BoxesThatMeet(boxes.block, size_t{other} * kBlock, from, to);
         if (other == g) blocks &= ~0u << (ba - g * kBlock);
+        anew = anew || (blocks & search.part[other].moved) != 0;
         for (; blocks != 0; blocks &= blocks - 1) {
           const uint32_t bb = other * kBlock + static_cast<uint32_t>(__builtin_ctz(blocks));
           while (kin != last_kin && kin->block < bb) ++kin;
@@ -120,6 +135,9 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
         }
       }
     }
+    if (!anew) continue;  // itself is among them
+    std::vector<PairCandidate>& pair = search.of_block[ba];
+    pair.clear();
     // Their boxes side by side: most of a near block's particles are out of a particle's reach, and one test tells for sixteen.
     Boxes& near_box = part.near_box;
     if (near_box.lower[0].size() < part.near.size()) near_box.resize(part.near.size());
@@ -159,7 +177,7 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
                 return hn::Le(hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz)), hn::Mul(touch, touch));
               });
           for (; close != 0; close &= close - 1)
-            part.pair.push_back({i, near.block * kBlock + static_cast<uint32_t>(__builtin_ctz(close))});
+            pair.push_back({i, near.block * kBlock + static_cast<uint32_t>(__builtin_ctz(close))});
         }
       }
     }
@@ -172,13 +190,12 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 #include <algorithm>
-#include <cmath>
 
 namespace catgut {
 
 HWY_EXPORT(MakeBoxes);
 HWY_EXPORT(FurthestMove);
-HWY_EXPORT(SpreadPositions);
+HWY_EXPORT(MovedBlocks);
 HWY_EXPORT(PairsOfGroup);
 
 namespace {
@@ -224,7 +241,7 @@ TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<cons
   for (float r : radius) t.largest_radius = std::max(t.largest_radius, r);
   // Wide enough to be kept for long, but not so wide that the wall's own particles, a little pressed together, fill the list.
   const float nearest = rest_reach.empty() ? 1.0f : *std::min_element(rest_reach.begin(), rest_reach.end());
-  t.pair_margin = std::clamp(0.5f * (nearest - 2 * t.largest_radius), 0.0002f, 0.001f);
+  t.pair_margin = std::clamp(0.5f * (nearest - 2 * t.largest_radius), 0.0002f, 0.002f);
   std::vector<uint32_t> count(t.particles + 1, 0);
   for (const Triangle& k : t.surface)
     for (uint32_t i : k) ++count[i + 1];
@@ -259,28 +276,37 @@ bool pairs_are_stale(const TissueCollision& tissue, const PairSearch& search) {
   if (search.built_at.size() != tissue.particles) return true;
   float furthest = 0;
   for (const float move : search.moved) furthest = std::max(furthest, move);
-  // Two particles, each half the margin, along all three axes.
-  return furthest > tissue.pair_margin / (2 * std::sqrt(3.0f));
+  return furthest > 0.5f * tissue.pair_margin;  // two particles, each half the margin
 }
 
 void find_tissue_pairs(const TissueCollision& tissue, const Vec4* x, PairSearch& search, Jobs& jobs) {
-  search.built_at.assign(x, x + tissue.particles);
-  make_boxes(tissue, x, search.boxes, jobs);
-  const size_t padded = size_t{search.boxes.blocks} * kBlock;
-  if (search.radius.size() != padded) {
-    for (Column<float>& column : search.at) column.resize(padded);
+  if (search.built_at.size() != tissue.particles) {
+    search.built_at.assign(tissue.particles, {kNowhere, kNowhere, kNowhere, kNowhere});  // from where everything has moved
+    search.built.blocks = (tissue.particles + kBlock - 1) / kBlock;
+    search.built.groups = (search.built.blocks + kBlock - 1) / kBlock;
+    search.built.block.resize(search.built.blocks);
+    search.built.group.resize(search.built.groups);
+    const size_t padded = size_t{search.built.blocks} * kBlock;
+    for (Column<float>& column : search.at) column.assign(padded, kNowhere);
     search.radius.assign(tissue.radius.begin(), tissue.radius.end());
     search.radius.resize(padded);
-    search.part.resize(search.boxes.groups);
+    search.part.resize(search.built.groups);
+    search.of_block.resize(search.built.blocks);
   }
-  jobs.each(search.boxes.groups, 1, [&](size_t g, size_t) {
-    HWY_DYNAMIC_DISPATCH(SpreadPositions)(tissue, x, search, static_cast<uint32_t>(g));
+  // What has moved by less than half of what makes pairs stale may stay where it was looked for: it is often most of the
+  // tissue.
+  const float limit = 0.25f * tissue.pair_margin / std::sqrt(3.0f);
+  jobs.each(search.built.groups, 1, [&](size_t at, size_t) {
+    const uint32_t g = static_cast<uint32_t>(at);
+    search.part[g].moved = HWY_DYNAMIC_DISPATCH(MovedBlocks)(x, search, g, limit);
+    if (search.part[g].moved != 0) HWY_DYNAMIC_DISPATCH(MakeBoxes)(tissue, search.built_at.data(), search.built, g);
   });
-  jobs.each(search.boxes.groups, 1, [&](size_t g, size_t) {
+  jobs.each(search.built.groups, 1, [&](size_t g, size_t) {
     HWY_DYNAMIC_DISPATCH(PairsOfGroup)(tissue, search, static_cast<uint32_t>(g));
   });
   search.pair.clear();
-  for (const PairSearch::Part& part : search.part) search.pair.insert(search.pair.end(), part.pair.begin(), part.pair.end());
+  for (const std::vector<PairCandidate>& pair : search.of_block)
+    search.pair.insert(search.pair.end(), pair.begin(), pair.end());
 }
 
 }  // namespace catgut

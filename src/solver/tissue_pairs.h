@@ -1,5 +1,6 @@
 // solver/tissue_pairs: which particles of the tissue may touch each other. Candidates are found with a margin and kept until
-// something has moved by more than half of it, so most substeps pay only for the look whether anything has. They are sorted by
+// something has moved by more than half of it, so most substeps pay only for the look whether anything has, and then only what
+// has moved is looked for anew. They are sorted by
 // particle and so the same for any number of workers, and a pair that touches is always among them: finding them sooner or
 // later changes nothing.
 #pragma once
@@ -38,7 +39,7 @@ struct TissueCollision {
   std::vector<Kin> kin;
   float tool_radius = 0.0006f;  // [m] of a particle against tools
   float largest_radius = 0;
-  float pair_margin = 0.001f;  // [m] pairs this much further apart than touching are candidates
+  float pair_margin = 0.002f;  // [m] pairs this much further apart than touching are candidates
 };
 TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius, std::span<const uint32_t> body,
                                       std::span<const float> rest_reach, std::vector<Triangle> surface);
@@ -57,21 +58,25 @@ struct BlockBoxes {
   Boxes block, group;
 };
 
-// Working memory: never saved, and results do not depend on what is left in it.
+// Working memory: never saved, and results do not depend on what is left in it. A block that has hardly moved stays where it
+// was looked for when others are looked for anew: whatever is within margin of each other there is listed.
 struct PairSearch {
   std::vector<PairCandidate> pair;
   BlockBoxes boxes;          // as of the last call of make_boxes
-  Column<Vec4> built_at;     // tissue positions when `pair` was found; empty: not yet
-  std::vector<float> moved;  // [m] the furthest move since, along an axis: one for each part of the tissue that is looked at
-  // By components, padded to whole blocks.
+  Column<Vec4> built_at;     // per particle: where it was looked for; empty: not yet
+  std::vector<float> moved;  // [m] how far particles are from there, as furthest_move has it: one for each part of the tissue
+  BlockBoxes built;          // round built_at
+  // built_at by components, padded to whole blocks with places that are no numbers: near nothing, however far away a damaged
+  // state may have put its particles.
   std::array<Column<float>, 3> at;
   Column<float> radius;
+  std::vector<std::vector<PairCandidate>> of_block;  // pairs whose first particle is in it
   struct Near {
     uint32_t block;
     const uint16_t* may;  // as in Kin; null: every pair
   };
-  struct Part {  // what is found for a group of blocks
-    std::vector<PairCandidate> pair;
+  struct Part {              // for a group of blocks
+    uint32_t moved = 0;      // bit k: its block k is looked for anew
     std::vector<Near> near;  // blocks near the one that is looked at, and their boxes
     Boxes near_box;
   };
@@ -79,11 +84,12 @@ struct PairSearch {
 };
 
 void make_boxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes, Jobs& jobs);
-// [m] the furthest that any of n particles has moved along any axis.
+// [m] no less than the furthest that any of n particles has moved, and not much more where neighbours move alike: the length of
+// the furthest moves along each axis.
 float furthest_move(const Vec4* x, const Vec4* from, size_t n);
 // Whether search.pair may lack a pair that touches, given search.moved.
 bool pairs_are_stale(const TissueCollision& tissue, const PairSearch& search);
-// Finds search.pair anew. x: [m] per tissue particle.
+// Brings search.pair up to date. x: [m] per tissue particle.
 void find_tissue_pairs(const TissueCollision& tissue, const Vec4* x, PairSearch& search, Jobs& jobs);
 
 // Calls with(block) for every block whose box meets the box from..to, in ascending order.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/random.h"
@@ -108,6 +109,40 @@ TEST(TissuePairs, kept_pairs_hold_all_that_touch_until_they_are_called_stale) {
   }
   EXPECT_GT(kept, 5);
   EXPECT_LT(kept, 100) << "the sheets went far, and nobody noticed";
+}
+
+// What a hand does: it moves a part of the tissue and then another.
+TEST(TissuePairs, only_what_moved_is_looked_for_anew_and_nothing_that_touches_is_missed) {
+  Sheets s = make_sheets(7);
+  Jobs jobs(2);
+  PairSearch search;
+  search.moved.assign(1, 0.0f);
+  Random random(10);
+  size_t searches = 0, blocks = 0;
+  std::vector<uint32_t> held;
+  Vec3 by;
+  for (int step = 0; step < 160; ++step) {
+    if (step % 8 == 0) {
+      const Vec3 at = xyz(s.x[random.next() % s.x.size()]);
+      held.clear();
+      for (uint32_t i = 0; i < s.x.size(); ++i)
+        if (distance(xyz(s.x[i]), at) < 0.0035f) held.push_back(i);
+      by = {random.normal(), random.normal(), random.normal()};
+      by *= 0.0005f / length(by);
+    }
+    for (const uint32_t i : held) s.x[i].x += by.x, s.x[i].y += by.y, s.x[i].z += by.z;
+    if (!search.built_at.empty()) search.moved[0] = furthest_move(s.x.data(), search.built_at.data(), s.x.size());
+    if (pairs_are_stale(s.tissue, search)) {
+      find_tissue_pairs(s.tissue, s.x.data(), search, jobs);
+      ++searches;
+      for (const PairSearch::Part& part : search.part) blocks += static_cast<size_t>(std::popcount(part.moved));
+    }
+    const auto found = listed(search), touching = every_pair_within(s, 0);
+    ASSERT_TRUE(std::is_sorted(found.begin(), found.end()));
+    ASSERT_TRUE(std::includes(found.begin(), found.end(), touching.begin(), touching.end())) << step;
+  }
+  EXPECT_GT(searches, 10u);
+  EXPECT_LT(blocks, searches * search.built.blocks / 2) << "most of the tissue did not move";
 }
 
 TEST(TissuePairs, the_furthest_move_is_that_of_any_particle_in_any_place) {
