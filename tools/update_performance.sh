@@ -18,7 +18,7 @@ measure() {  # measure PART: its text on standard output
     paper) ./catgut bench paper --threads $threads --executions "$executions" --out "$out/paper" >/dev/null && cat "$out/paper/tables.md" ;;
     limits) ./catgut bench limits --threads 1 --out "$out/limits" ;;
     limits_200)
-      ./catgut bench limits --threads 1 --scene stress_two_bodies --set duration=9000 --sutures 200 --out "$out/limits_200" | tail -n 25
+      ./catgut bench limits --threads 1 --scene stress_two_bodies --set duration=9000 --sutures 200 --out "$out/limits_200"
       ;;
     scale) ./catgut bench scale --threads $threads --repeat 3 ;;
     stages)
@@ -33,16 +33,19 @@ measure() {  # measure PART: its text on standard output
     bullet)
       if [ -x build/bench/against_bullet ]; then build/bench/against_bullet --ticks 50 --upto 4 --threads $threads; else echo "Not measured: libbullet-dev was not installed."; fi
       ;;
-    *) echo "update_performance: no part $1; parts: ${all[*]}" >&2; exit 2 ;;
   esac
 }
 
 wanted=("$@")
 if [ "${1:-}" = --page ]; then
+  [ $# -eq 1 ] || { echo "update_performance: --page stands alone" >&2; exit 2; }
   wanted=()
 elif [ ${#wanted[@]} -eq 0 ]; then
   wanted=("${all[@]}")
 fi
+for part in "${wanted[@]}"; do
+  [[ " ${all[*]} " = *" $part "* ]] || { echo "update_performance: no part $part; parts: ${all[*]}" >&2; exit 2; }
+done
 ./catgut --version >/dev/null  # builds what has changed before anything is timed
 for part in "${wanted[@]}"; do
   echo "update_performance: $part" >&2

@@ -19,7 +19,6 @@ struct BenchOptions {
 };
 
 int bench_stages(const BenchOptions& o) {
-  if (o.scene.size() > 1) throw InputError("bench stages --scene", "one scene at a time", "name one");
   const std::string name = o.scene.empty() ? "purse_string" : o.scene[0];
   SceneSpec scene = read_scene(name);
   for (const std::string& setting : o.set) set_value(scene, setting);
@@ -56,6 +55,8 @@ int bench_stages(const BenchOptions& o) {
 }
 
 int bench(const BenchOptions& o) {
+  if (o.scene.size() > 1 && o.what != "paper" && o.what != "limits")
+    throw InputError("bench " + o.what + " --scene", "one scene at a time", "name one");
   if (o.what == "haptics") return bench_haptics(o.out, o.scene.empty() ? "purse_string" : o.scene[0]);
   if (o.what == "stages") return bench_stages(o);
   if (o.what == "frame")
@@ -98,7 +99,7 @@ void add_bench(CLI::App& app, int& exit_code) {
   command
       ->add_option("--seconds", o->seconds,
                    "simulated time; else until the surgeon is done (stages), 4 s (scale), 30 s (frame)")
-      ->check(CLI::Range(0.001, 1e6));
+      ->check(within(0.001, 1e6));
   command->add_option("--sutures", o->sutures, "limits: bites in each scene")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

@@ -55,7 +55,7 @@ void add_bridge(CLI::App& app, int& exit_code) {
                    "address and port; nothing is encrypted, so let only a network of your own reach it (0.0.0.0: any address)")
       ->type_name("HOST[:PORT]")
       ->capture_default_str();
-  command->add_option("--seconds", o->seconds, "end after so much time")->check(CLI::Range(0.1, 1e9))->type_name("S");
+  command->add_option("--seconds", o->seconds, "end after so much time")->check(within(0.1, 1e9))->type_name("S");
   command->callback([o, &exit_code] { exit_code = bridge(*o); });
 }
 

@@ -69,6 +69,8 @@ int play_without_arguments();  // the window's start screen
 
 // What several commands share (app/commands/common.cpp).
 
+// A number from least to most; unlike CLI::Range it lets no NaN through.
+CLI::Validator within(double least, double most);
 // --video, --frames, --contact-sheet, --video-speed.
 void add_picture_options(CLI::App& command, PictureOptions& options);
 void add_threads_option(CLI::App& command, int& threads);

@@ -24,10 +24,20 @@ bool line_open = false;  // a progress line stands on the terminal
 
 }  // namespace
 
+CLI::Validator within(double least, double most) {
+  return CLI::Validator(
+      [least, most](std::string& text) {
+        double value = 0;
+        if (CLI::detail::lexical_cast(text, value) && value >= least && value <= most) return std::string();
+        return fmt::format("{} is no number from {} to {}", text, least, most);
+      },
+      fmt::format("{} to {}", least, most));
+}
+
 void add_picture_options(CLI::App& command, PictureOptions& options) {
   command.add_option("--video", options.video, "time-lapse film, FILE.mp4")->type_name("FILE.mp4");
   command.add_option("--video-speed", options.speed, "simulated seconds per second of film")
-      ->check(CLI::Range(0.01, 1000.0))
+      ->check(within(0.01, 1000.0))
       ->capture_default_str();
   command.add_option("--frames", options.frames, "folder for the film's pictures as PNG")->type_name("DIR");
   command.add_option("--contact-sheet", options.contact_sheet, "up to twelve moments on one PNG")->type_name("FILE.png");

@@ -102,10 +102,10 @@ void add_devices(CLI::App& app, int& exit_code) {
   command->add_flag("--calibrate", o->calibrate, "lay the arms' workspaces into the field; kept per user and arm")
       ->excludes(test);
   command->add_option("--scale", o->scale, "calibrate: metres in the field per metre of the stylus")
-      ->check(CLI::Range(0.1, 3.0))
+      ->check(within(0.1, 3.0))
       ->capture_default_str();
   command->add_option("--turn", o->turn, "calibrate: how far the arms are turned about the vertical [degrees]")
-      ->check(CLI::Range(-180.0, 180.0))
+      ->check(within(-180.0, 180.0))
       ->capture_default_str();
   command->callback([o, &exit_code] { exit_code = devices(*o); });
 }

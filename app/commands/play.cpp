@@ -34,7 +34,7 @@ void add_window_options(CLI::App& command, WindowCommand& o) {
       ->type_name("low|medium|high");
   command.add_option("--size", o.size, "of the window [pixels]")->type_name("WxH")->capture_default_str();
   command.add_option("--seconds", o.play.seconds, "close after so much time, and tell the latencies")
-      ->check(CLI::Range(0.1, 1e6))
+      ->check(within(0.1, 1e6))
       ->type_name("S");
   command.add_option("--screenshot", o.play.screenshot, "a PNG of the window, then close")->type_name("FILE.png");
   command.add_option("--after", o.play.after, "pictures before the screenshot")->check(CLI::Range(1, 1000000))->type_name("N");
@@ -42,7 +42,7 @@ void add_window_options(CLI::App& command, WindowCommand& o) {
       ->check(CLI::IsMember({"start", "settings", "practise", "pause", "developer", "results", "view"}))
       ->type_name("NAME");
   command.add_option("--at", o.play.at, "the moment in the screenshot, of the work or the recording [s]")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(within(0.0, 1e6))
       ->type_name("S");
   command.add_option("--stall-ms", o.play.stall_ms, "for tests: the picture stands still so long every two seconds")
       ->check(CLI::Range(0, 10000))

@@ -72,7 +72,7 @@ void add_run(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_flag("--headless", o->headless, "without a window (every run is; the window is catgut play)");
   command->add_option("--seconds", o->session.seconds, "simulated time, settling included; else the scene's duration")
-      ->check(CLI::Range(0.001, 1e6))
+      ->check(within(0.001, 1e6))
       ->type_name("S");
   CLI::Option* seed =
       command->add_option("--seed", o->seed, "of the surgeon's tremor and aim; else the scene's")->type_name("N");

@@ -3,6 +3,7 @@
 // docs/benchmarks.md says what each side really simulates.
 #include <time.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "bullet_side.h"
+#include "core/check.h"
 #include "core/jobs.h"
 #include "sim/state.h"
 #include "workload.h"
@@ -119,27 +121,33 @@ nlohmann::ordered_json to_json(const Result& r) {
   return j;
 }
 
-const char* kUsage =
-    "usage: against_bullet [--scene NAME] [--json FILE] [--threads N] [--ticks N] [--upto 1|4|16]\n"
-    "--threads: of Catgut (1); Bullet's soft bodies have one. --ticks: measured, 120 (half as many before them are not; a "
-    "quarter\n"
-    "of that for x4, a tenth for x16). --upto: the largest multiple of the Lembert scene's particles (4)\n";
-
 int run(int argc, char** argv) {
   std::string json;
   int threads = 1, ticks = 120, upto = 4;
   std::vector<std::string> scenes{"purse_string", "connell", "stay", "lembert"};
-  for (int i = 1; i < argc; ++i) {
-    const std::string option = argv[i];
-    const char* value = i + 1 < argc ? argv[++i] : nullptr;
-    if (value && option == "--json") json = value;
-    else if (value && option == "--threads") threads = std::atoi(value);
-    else if (value && option == "--ticks") ticks = std::atoi(value);
-    else if (value && option == "--scene") scenes = {value};
-    else if (value && option == "--upto") upto = std::atoi(value);
-    else return std::fputs(kUsage, stderr), 2;
+  CLI::App app("Catgut and Bullet's soft bodies, tick by tick in turns", "against_bullet");
+  app.add_option("--scene", scenes, "scenes to run")->capture_default_str();
+  app.add_option("--json", json, "results as JSON")->type_name("FILE");
+  app.add_option("--threads", threads, "of Catgut; Bullet's soft bodies have one")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  app.add_option("--ticks", ticks,
+                 "measured; half as many before them are not. A quarter of that for the Lembert scene x 4, a tenth for x 16")
+      ->check(CLI::Range(10, 100000))
+      ->capture_default_str();
+  app.add_option("--upto", upto, "the largest multiple of the Lembert scene's particles")
+      ->check(CLI::IsMember({1, 4, 16}))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& done) { return app.exit(done); } catch (const CLI::ParseError& error) {
+    return std::fprintf(stderr, "against_bullet: %s; --help explains\n", error.what()), 2;
   }
-  if (threads < 1 || ticks < 10) return std::fputs(kUsage, stderr), 2;
+  std::ofstream out;  // opened before the work, not after it
+  if (!json.empty()) {
+    out.open(json);
+    if (!out) throw InputError(json, "cannot be written", "choose another place");
+  }
 
   std::printf(
       "Milliseconds a tick of 1/60 s in 8 substeps, medians (%s), all four in turns tick by tick. Catgut: preset paper, "
@@ -166,11 +174,10 @@ int run(int argc, char** argv) {
   for (const std::string& scene : scenes) one(scene, 1, ticks);
   if (upto >= 4) one("lembert", 4, std::max(10, ticks / 4));
   if (upto >= 16) one("lembert", 16, std::max(10, ticks / 10));
-  if (!json.empty()) {
-    std::ofstream out(json);
-    out << all.dump(2) << "\n";
-    if (!out) return std::fprintf(stderr, "against_bullet: %s cannot be written\n", json.c_str()), 2;
-  }
+  if (json.empty()) return 0;
+  out << all.dump(2) << "\n";
+  out.close();
+  if (!out) throw InputError(json, "cannot be written", "is the disk full?");
   return 0;
 }
 
@@ -179,6 +186,9 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     return run(argc, argv);
+  } catch (const InputError& error) {
+    std::fprintf(stderr, "against_bullet: %s\n", error.what());
+    return 2;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "against_bullet: %s\n", error.what());
     return 1;

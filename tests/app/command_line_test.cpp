@@ -92,6 +92,10 @@ TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
   expect_refused("run small.toml --bogus", "--bogus");
   expect_refused("run small.toml --threads 0", "--threads");
   expect_refused("run small.toml --seconds -3", "--seconds");
+  expect_refused("run small.toml --seconds nan", "nan is no number from 0.001 to 1000000");
+  expect_refused("bench scale --seconds nan", "nan is no number");
+  for (const std::string one : {"stages", "scale", "frame", "haptics"})
+    expect_refused("bench " + one + " --scene small.toml --scene stay", "one scene at a time");
   expect_refused("run small.toml --surgeon none --json /proc/nowhere/x.json", "cannot be written");
   expect_refused("play small.toml --record nowhere/x.cgrec", "nowhere/x.cgrec: there is no folder nowhere; make it");
   expect_refused("play small.toml --screenshot nowhere/a.png", "there is no folder nowhere");
