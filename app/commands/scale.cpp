@@ -31,18 +31,9 @@ std::string json_text(const std::string& scene, const std::vector<Measured>& all
   j["scene"] = scene;
   j["machine"] = this_machine();
   for (const Measured& m : all) {
-    nlohmann::ordered_json row = {{"times", m.times},
-                                  {"particles", m.run.particles},
-                                  {"threads", m.threads},
-                                  {"ticks", m.run.ticks},
-                                  {"solver_ms",
-                                   {{"median", m.run.solver_ms.median},
-                                    {"p99", m.run.solver_ms.p99},
-                                    {"p999", m.run.solver_ms.p999},
-                                    {"max", m.run.solver_ms.max}}},
-                                  {"stages_ms", nlohmann::ordered_json::object()}};
-    for (size_t s = 0; s < kStages; ++s) row["stages_ms"][stage_name(static_cast<Stage>(s))] = m.run.stage_ms[s].median;
-    j["runs"].push_back(row);
+    nlohmann::ordered_json row = {{"times", m.times}};
+    row.update(nlohmann::ordered_json::parse(run_json(m.run)));
+    j["runs"].push_back(std::move(row));
   }
   return j.dump(2) + "\n";
 }

@@ -348,6 +348,21 @@ const std::vector<std::string> kLimitsColumns{"suture",         "bites",       "
                                               "simulated_s",    "ticks",       "solver_ms_median", "solver_ms_p99",
                                               "tick_ms_median", "tick_ms_p99", "contacts",         "fps"};
 
+TEST_F(CommandLine, bench_scale_measures_each_size_on_one_thread_and_on_several) {
+  const Outcome o = run_catgut("bench scale --scene small.toml --seconds 0.05 --threads 2 --json -");
+  ASSERT_EQ(o.code, 0) << o.err;
+  const json all = json::parse(o.out).at("runs");
+  ASSERT_EQ(all.size(), 6u);
+  for (size_t k = 0; k < 6; ++k) {
+    const int times = k < 2 ? 1 : k < 4 ? 4 : 16;
+    EXPECT_EQ(all[k].at("times"), times);
+    EXPECT_EQ(all[k].at("threads"), k % 2 + 1);
+    EXPECT_NEAR(all[k].at("particles").get<int>(), 175 + times * 1228, 2 * times);
+    EXPECT_GT(all[k].at("solver_ms").at("median").get<double>(), 0);
+    EXPECT_EQ(all[k].at("state_hash"), all[k - k % 2].at("state_hash"));
+  }
+}
+
 TEST_F(CommandLine, bench_limits_writes_a_row_for_each_suture) {
   const Outcome o = run_catgut("bench limits --scene stress_one_body --sutures 3 --threads 1 --out limits");
   ASSERT_EQ(o.code, 0) << o.err;
