@@ -240,8 +240,10 @@ bool Scripted::make_bite(const Snapshot& seen) {
         go(over);
       } else if (psi_ > psi_bite + 1.1f) {
         // The tip is not where it should be: it never went in or not deep enough, or it went too deep to come out.
-        const bool shallow = !seen.needle.in_tissue || (seen.bite.size() > bites_before_ && seen.bite.back().has_exit);
-        depth_fix_ += shallow ? -0.0003f : 0.0003f;
+        const bool passed = seen.bite.size() > bites_before_ && seen.bite.back().has_exit;
+        // Through the first wall and not into the second: that gave way, as soft walls do, by millimetres.
+        const bool gave_way = passed && seen.bite.size() < bites_before_ + static_cast<size_t>(bite().walls);
+        depth_fix_ += gave_way ? -0.0008f : passed || !seen.needle.in_tissue ? -0.0003f : 0.0003f;
         go(withdraw);
       }
       return false;
