@@ -27,7 +27,7 @@ measure() {  # measure PART: its text on standard output
       ;;
     stages)
       for scene in "${techniques[@]}"; do
-        ./catgut bench stages --scene "$scene" --set solver.preset=paper --threads $threads --seconds 30 --repeat 3
+        ./catgut bench stages --scene "$scene" --set solver.preset=paper --threads $threads --seconds 30 --repeat 7
         echo
       done
       ;;
@@ -91,7 +91,7 @@ END
   boxed limits_200
   printf '\n## More particles, and a second thread\n\n`./catgut bench scale --threads 2 --repeat 3`, and with `--scene purse_string`: the paper'"'"'s 8 substeps a tick, every rule on.\n\n'
   text scale
-  printf '\n## Where a tick goes\n\n`./catgut bench stages --scene SCENE --set solver.preset=paper --threads 2 --seconds 30 --repeat 3`; in each the surgeon sews.\nWith this preset the wall is so soft that it gives way to the needle: in Lembert he needs several tries for the first bite.\n\n'
+  printf '\n## Where a tick goes\n\n`./catgut bench stages --scene SCENE --set solver.preset=paper --threads 2 --seconds 30 --repeat 7`; in each the surgeon sews.\nWith this preset the wall is so soft that it gives way to the needle: in Lembert he needs several tries for the first bite.\n\n'
   boxed stages
   cat <<'END'
 
