@@ -143,11 +143,8 @@ int run(int argc, char** argv) {
   } catch (const CLI::Success& done) { return app.exit(done); } catch (const CLI::ParseError& error) {
     return std::fprintf(stderr, "against_bullet: %s; --help explains\n", error.what()), 2;
   }
-  std::ofstream out;  // opened before the work, not after it
-  if (!json.empty()) {
-    out.open(json);
-    if (!out) throw InputError(json, "cannot be written", "choose another place");
-  }
+  // Tried before the work, not after it; what it holds from an earlier run stays until there is something to take its place.
+  if (!json.empty() && !std::ofstream(json, std::ios::app)) throw InputError(json, "cannot be written", "choose another place");
 
   std::printf(
       "Milliseconds a tick of 1/60 s in 8 substeps, medians (%s), all four in turns tick by tick. Catgut: preset paper, "
@@ -175,6 +172,7 @@ int run(int argc, char** argv) {
   if (upto >= 4) one("lembert", 4, std::max(10, ticks / 4));
   if (upto >= 16) one("lembert", 16, std::max(10, ticks / 10));
   if (json.empty()) return 0;
+  std::ofstream out(json);
   out << all.dump(2) << "\n";
   out.close();
   if (!out) throw InputError(json, "cannot be written", "is the disk full?");
