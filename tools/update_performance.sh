@@ -68,7 +68,8 @@ boxed() { printf '```\n'; text "$1"; printf '```\n'; }
 
 Written by `tools/update_performance.sh` from what it measured; not by hand. What was tried to get there is in
 [the performance log](performance_log.md), how to measure it yourself in [benchmarks](benchmarks.md). The machine is a shared virtual one:
-read ratios within a table rather than milliseconds across tables.
+read ratios within a table rather than milliseconds across tables. Parts are measured one by one, the slowest (200 sutures) the least often, so it may be
+of an earlier state than the others.
 
 ## The paper's tables, ours beside them
 
