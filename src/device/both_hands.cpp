@@ -40,6 +40,14 @@ Pose carrying(const PictureModel& picture, const Pose& grip, Vec3 swage_at, floa
 
 void go(BothHands& b, int stage) { b.stage = stage, b.held_for = 0; }
 
+// The same way round as before, if there was one.
+void begin(BothHands& b, const PictureModel& picture, const Snapshot& seen) {
+  begin_winding(b.winding, picture, seen);
+  b.winding.free = -1;
+  b.wish = 0;
+  go(b, lift);
+}
+
 void wind_on(BothHands& b, size_t winder, std::array<Pose, 2>& hand, const Pose& grip, const PictureModel& picture,
              const Snapshot& seen, float dt) {
   const size_t lying = 1 - winder;
@@ -86,6 +94,8 @@ void wind_on(BothHands& b, size_t winder, std::array<Pose, 2>& hand, const Pose&
       // Wound and no loop yet: its ends lie too far apart along the tool, and are led together.
       if (w.wound > next + kOver - 0.1f) w.lean = std::max(-2 * kTieLean, w.lean - kTieLean * dt);
       carry(1.2f * kSpeed);
+      // Wound back: what was tried is forgotten, and the tool is laid to the strand anew.
+      if (before >= 0 && w.wound < 0) begin(b, picture, seen);
       return;
     }
   }
@@ -174,10 +184,7 @@ BothDo both_hands(BothHands& b, float amount, std::array<Pose, 2>& hand, const P
   if (!goes_on) {
     b.doing = BothDo::wind;
     b.winding.way = 0;
-    begin_winding(b.winding, picture, seen);
-    b.winding.free = -1;
-    b.wish = 0;
-    go(b, lift);
+    begin(b, picture, seen);
     b.lain = hand[other].p;
   }
   // The first motion chooses the way round; until then the hands stand ready for either.

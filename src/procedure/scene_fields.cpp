@@ -73,6 +73,7 @@ const Field kField[] = {
     {"solver", "friction_tool", "", 0, 10, nullptr, "coefficient of Coulomb friction, tool on tissue and on the other tool", TOP(solver.friction_tool)},
     {"solver", "friction_thread", "", 0, 10, nullptr, "coefficient of Coulomb friction, thread on tissue and thread", TOP(solver.friction_thread)},
     {"solver", "hand_stiffness", "N/m", 1, 100000, nullptr, "of the coupling between a hand and its tool; a haptic arm renders no more than some 300", TOP(solver.hand_stiffness)},
+    {"solver", "tool_force", "N", 0, 1000, nullptr, "with which two tools press each other at most; beyond it they slip past each other (at the mouse: 1.5 at most)", TOP(solver.tool_force)},
 
     {"suture", "attach_threshold", "m", 0, 0.1, nullptr, "how near a particle must be to the needle's tip to be attached (X of the paper's figure 4)", TOP(suture.attach_threshold)},
     {"suture", "release_distance", "m", 0, 0.1, nullptr, "drag beyond which the attached particle is let go (figure 5)", TOP(suture.release_distance)},

@@ -1,6 +1,7 @@
 // runtime: makes the hands of a run; see hands.h.
 #include "runtime/hands.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
@@ -56,6 +57,8 @@ SurgeonSkill skill_of(const SceneSpec& scene) {
   k.seed = scene.seed;
   return k;
 }
+
+void prepare_for_mouse(SceneSpec& scene) { scene.solver.tool_force = std::min(scene.solver.tool_force, kUnfeltToolForce); }
 
 Hands make_hands(const std::string& who, const SceneSpec& scene, const PictureModel& picture) {
   if (who == "none") return {};

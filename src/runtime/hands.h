@@ -16,6 +16,11 @@ struct Hands {
 
 SurgeonSkill skill_of(const SceneSpec& scene);
 
+// Physics under hands at a mouse or gamepad. They do not feel where their tools touch and push on: from this on tools slip past
+// each other, instead of being pushed aside from where their hands want them.
+constexpr float kUnfeltToolForce = 1.5f;  // [N]
+void prepare_for_mouse(SceneSpec& scene);
+
 // who: "scripted", "none" or the path of a .cgrec file. Throws InputError.
 Hands make_hands(const std::string& who, const SceneSpec& scene, const PictureModel& picture);
 

@@ -162,6 +162,7 @@ void Live::Work::begin() {
   for (const std::string& line : lines)
     if (options.say) options.say(line);
   if (arms.any()) prepare_for_arms(scene);
+  else if (options.surgeon.empty()) prepare_for_mouse(scene);
   model = build_model(scene);
   picture = picture_model(*model);
   if (arms.any()) {

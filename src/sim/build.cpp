@@ -261,6 +261,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   s.damping = scene.solver.damping;
   s.thread_damping = scene.solver.thread_damping;
   m.hand_compliance = 1 / scene.solver.hand_stiffness;
+  s.tool_force = scene.solver.tool_force;
   s.friction = {scene.solver.friction_tissue, scene.solver.friction_tool, scene.solver.friction_thread};
   ThreadModel& t = s.thread;
   t.first_slot = s.tissue;

@@ -69,6 +69,7 @@ struct SolverSpec {
   float friction_tool = 0.1f;
   float friction_thread = 0.15f;
   float hand_stiffness = 3000;  // [N/m] of the coupling between a hand and its tool
+  float tool_force = 8;         // [N] with which two tools press each other at most; more than an arm renders
 };
 
 // Guided mechanics (paper 2.2, 2.3).

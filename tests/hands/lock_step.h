@@ -12,12 +12,18 @@ namespace catgut {
 
 constexpr float kTick = 1.0f / 60;
 
+inline SceneSpec at_the_mouse(const std::string& name) {
+  SceneSpec scene = read_scene(name);
+  prepare_for_mouse(scene);
+  return scene;
+}
+
 // ticks: of the simulation between two pictures; hands get there as they do in runtime/live.
 class LockStep : public Desk {
  public:
   explicit LockStep(int ticks)
       : ticks_(ticks),
-        scene_(read_scene("stay")),
+        scene_(at_the_mouse("stay")),
         model_(build_model(scene_)),
         state_(initial_state(*model_)),
         picture_(picture_model(*model_)) {

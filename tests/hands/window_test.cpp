@@ -252,10 +252,10 @@ class StitchAtTheWindow : public testing::Test {
   std::unique_ptr<XServer> x_;
 };
 
-// Takes the needle, sews both bowel ends, pulls the thread through, draws them together, ties a throw. Six tries: hands that
+// Takes the needle, sews both bowel ends, pulls the thread through, draws them together, ties a throw. Three tries: hands that
 // depend on when pictures come do not do the same thing twice.
 void sew_and_tie(AtTheWindow& desk, std::string& stopped_at, int throws) {
-  for (int attempt = 0; attempt < 6; ++attempt) {
+  for (int attempt = 0; attempt < 3; ++attempt) {
     Person me(desk);
     const auto sewn = [&] { return desk.count(EventKind::bite_completed) >= 2; };
     if (me.take_needle() && me.bite() && (sewn() || (me.hand_back() && me.bite())) && me.pull_tail(0.1f) &&
