@@ -223,7 +223,7 @@ void Pins(benchmark::State& bench) {
         state.x = s.predicted, state.pin = pin;
         for (TissuePin& p : state.pin) p.lambda = 0;
       },
-      [&] { solve_pins(state.pin, k.web, state.x.data(), m.inv_mass.data(), m.h, m.pin_sweeps, m.pin_tolerance, k.room); });
+      [&] { solve_pins(state.pin, k.web, state.x.data(), m.h, m.pin_sweeps, m.pin_tolerance, k.pin_span); });
   state.pin = pin;
 }
 void WholeSubstep(benchmark::State& bench) {

@@ -186,7 +186,7 @@ bool fits(const Model& model, const State& s, const State& fresh) {
   for (const ThreadHold& h : a.thread.hold)
     if (h.slot - first >= count || h.body < 0 || h.body >= bodies || h.kind > HoldKind::loop) return false;
   for (const TissuePin& p : a.pin)
-    if (!point_ok(p.a) || !point_ok(p.b) || p.owner > PinOwner::stitch) return false;
+    if (!point_ok(p.a) || !point_ok(p.b) || p.owner > PinOwner::passage) return false;
   if (a.weld.size() < 2) return false;
   for (size_t k = 0; k < a.weld.size(); ++k) {  // the first two hold the tools to their hands
     const Weld& w = a.weld[k];

@@ -58,17 +58,6 @@ struct Attachment {
   Vec3 lambda;           // [N s^2] cleared at the start of a substep; acts on the tissue
 };
 
-enum class PinOwner : uint32_t { plan, stitch };  // who made it: a technique's closure plan, or a settled stitch
-
-// Two points of tissue that thread holds together: never further apart than `length`. A rope: it does not push.
-struct TissuePin {
-  TissuePoint a, b;
-  float length = 0;      // [m]
-  float compliance = 0;  // [m/N]
-  float lambda = 0;      // [N s^2] cleared at the start of a substep; negative: it pulls
-  PinOwner owner = PinOwner::plan;
-};
-
 // The shaft of the needle in its channel: the tissue point lies on the arc of the needle (particle-line attachment). It slides
 // along the arc against a Coulomb-like drag and is held sideways by `compliance`.
 struct ChannelPoint {
@@ -93,33 +82,6 @@ struct NeedleArc {
 
 void solve_attachment(Attachment& a, Vec4* x, const float* w, const std::vector<RigidModel>& model,
                       std::vector<RigidBody>& body, float h);
-void solve_pin(TissuePin& pin, Vec4* x, const float* w, float h);
-// Which pins share tissue with which: what one moves, others may have to look at again.
-struct PinWeb {
-  struct Strand {
-    uint32_t pin = 0;
-    float coupling =
-        0;  // [1/kg] at most so much nearer or further do the points of that pin come for each unit of this one's pull
-  };
-  std::vector<uint32_t> first;  // pin i shares particles with other[first[i]] .. other[first[i + 1]], itself left out
-  std::vector<Strand> other;
-  std::vector<TissuePoint> point;  // of all pins, as they were when the web was made
-  // Pin i as one sum over the particles of both its points, row[i] .. row[i + 1]: see PinRow in attach.cpp.
-  std::vector<uint32_t> row, particle;
-  std::vector<float> share, move;
-  std::vector<float> inv_mass;  // [1/kg] of a pin
-  // Working memory of weave: pins by particle and their weights there, couplings by pin.
-  std::vector<uint32_t> start, pin;
-  std::vector<float> weight, by_pin;
-};
-// Makes the web anew if the pins' points have changed. w: inverse mass [1/kg] of the particles, which never changes.
-void weave(std::span<const TissuePin> pin, const float* w, uint32_t particles, PinWeb& web);
-// `sweeps` times solve_pin of each pin in turn, but pins that are as they should be to within `tolerance` [m] are left alone,
-// and not looked at again before their neighbours may have moved them out of it; with 0 that is the same to the last bit.
-// Settled stitches are slack or at rest nearly always, and a long procedure has hundreds of them. web: of these pins; one of
-// another number of pins is taken for none, and every pin is looked at. room: working memory.
-void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, const float* w, float h, int sweeps, float tolerance,
-                std::vector<float>& room);
 void solve_channel(ChannelPoint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model, RigidBody& needle,
                    float h);
 

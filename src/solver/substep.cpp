@@ -17,7 +17,6 @@ constexpr float kTopSpeed = 5.0f;  // [m/s] of a particle; a hand cannot throw t
 void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   for (Weld& w : state.weld) w.lambda = w.angular_lambda = {};
   for (Attachment& a : state.attach) a.lambda = {};
-  for (TissuePin& p : state.pin) p.lambda = 0;
   for (ChannelPoint& c : state.channel) c.lambda = {}, c.drag_lambda = 0;
   std::fill(scratch.volume_lambda.begin(), scratch.volume_lambda.end(), 0.0f);
   std::fill(scratch.shape.moved.begin(), scratch.shape.moved.end(), Vec4{});
@@ -64,14 +63,16 @@ void reserve_room(const SolverModel& m, SolverScratch& k) {
   t.on_tool.reserve(m.body.size());
   t.load.reserve(m.body.size());
   PinWeb& w = k.web;
-  w.first.reserve(kPins + 1);
   w.row.reserve(kPins + 1);
-  w.other.reserve(kPins * kPinsBeside);
   w.point.reserve(2 * kPins);
+  w.first.reserve(kPins + 1);
+  w.strand.reserve(kPins * kPinsBeside);
   for (std::vector<uint32_t>* part : {&w.particle, &w.pin}) part->reserve(2 * TissuePoint::kMost * kPins);
   for (std::vector<float>* part : {&w.share, &w.move, &w.weight}) part->reserve(2 * TissuePoint::kMost * kPins);
   w.start.reserve(m.tissue + 2);
-  for (std::vector<float>* each : {&w.inv_mass, &w.by_pin, &k.room}) each->reserve(kPins);
+  w.listed.reserve(kPins);
+  for (std::vector<float>* each : {&w.length, &w.compliance, &w.by_pin}) each->reserve(kPins);
+  k.pin_span.reserve(kPins);
 }
 
 void predict_particles(const SolverModel& m, SolverState& s, SolverScratch& k, Vec3 gravity, size_t first, size_t last) {
@@ -212,7 +213,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   {
     StageTimer timer(times, Stage::attach);
     for (Attachment& a : s.attach) solve_attachment(a, x, w, m.body, s.body, h);
-    solve_pins(s.pin, k.web, x, w, h, m.pin_sweeps, m.pin_tolerance, k.room);
+    solve_pins(s.pin, k.web, x, h, m.pin_sweeps, m.pin_tolerance, k.pin_span);
   }
   {
     // Few but stiff and pulling against each other (hand, grasp, channel, tool against tool): they get sweeps of their own.

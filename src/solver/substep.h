@@ -9,6 +9,7 @@
 #include "solver/attach.h"
 #include "solver/collide.h"
 #include "solver/contact.h"
+#include "solver/pins.h"
 #include "solver/shape_match.h"
 #include "solver/thread.h"
 #include "solver/volume.h"
@@ -38,7 +39,7 @@ struct SolverModel {
   float volume_compliance = 0;
   float damping = 0, thread_damping = 0, body_damping = 20;  // [1/s]
   Friction friction;
-  float tool_force = 8;  // [N] that two tools press each other with at most; more than an arm renders
+  float tool_force = 8;  // [N] that two tools press each other with at most
   float ground = -1e9f;  // [m] height of the drape
 };
 
@@ -64,7 +65,7 @@ struct SolverScratch {
   std::vector<float> volume_lambda;
   ThreadScratch thread;
   PinWeb web;
-  std::vector<float> room;
+  std::vector<PinSpan> pin_span;
   Candidates candidates;
   std::vector<BodyContact> on_body;  // contact impulses on bodies in the last substep
   std::vector<int32_t> node_of_slot;

@@ -11,7 +11,7 @@ namespace {
 constexpr float kLongestTail = 0.03f;  // [m] of a strand that was left uncut: an assistant trims it here
 constexpr uint32_t kCarriers = 6;      // particles that a pin's end hangs on
 constexpr float kSamePlace = 0.003f;   // [m] less than stitches are apart: a second pin there would only fight with the first
-constexpr float kCarries = 0.1f;       // [N] less than this in the thread inside a wall, and the wall holds itself
+constexpr float kCarries = 0.1f;       // [N] less than this in a passage through a wall, and the wall holds itself
 
 int anchor_at(const Thread& t, uint32_t slot) {
   for (size_t k = 0; k < t.anchor.size(); ++k)
@@ -55,45 +55,79 @@ SettledNode bind(const SolverModel& model, const SolverState& solver, Vec3 at) {
   return n;
 }
 
-// The piece of thread from node `first` to node `last`, tied by `knots`, as a settled stitch and the pins that do what it did.
-void settle_piece(const SolverModel& model, SolverState& solver, SutureState& state, size_t first, size_t last,
-                  const std::vector<uint32_t>& knots, std::vector<Event>& events) {
-  const Thread& t = solver.thread;
-  SettledStitch stitch;
-  const size_t pins = solver.pin.size();  // without its own
-  size_t lowest = last, highest = first;
-  for (size_t i = first; i <= last; ++i)
-    if (anchor_at(t, t.order[i]) >= 0) lowest = std::min(lowest, i), highest = std::max(highest, i);
-  float tail = 0;
-  while (lowest > first && tail + t.rest[lowest - 1] <= kLongestTail) tail += t.rest[--lowest];
-  tail = 0;
-  while (highest < last && tail + t.rest[highest] <= kLongestTail) tail += t.rest[highest++];
+// Thread between two anchors: what a pin may have to do.
+struct Span {
+  int a, b;
+  float length = 0, tension = 0;  // [m], [N] the most in it
+  bool passage = false;           // from where it goes into a wall to where it comes out of it
+};
+
+// The spans of the anchored part of a piece, from node `lowest` to node `highest`. A knot is no place in the tissue: it lies
+// where its two strands draw it. So where both ends of a stitch meet in one, they are one span, through the knot; and of two
+// spans between the same anchors the shorter is the one that holds.
+std::vector<Span> spans_of(const Thread& t, size_t lowest, size_t highest, const SutureState& state,
+                           const std::vector<uint32_t>& knots) {
+  std::vector<Span> spans;
   int before = -1;
   float length = 0, tension = 0;
   for (size_t i = lowest; i <= highest; ++i) {
-    stitch.node.push_back(bind(model, solver, thread_position(t, i, solver.x.data(), solver.body)));
     if (const int here = anchor_at(t, t.order[i]); here >= 0) {
-      // The passage through a wall holds nothing together but the wall: as long as it carries nothing, no pin is needed.
-      if (before >= 0 && !(same_bite(state, before, here) && tension < kCarries)) {
-        TissuePin pin;
-        const TissuePoint &a = t.anchor[static_cast<size_t>(before)].point, &b = t.anchor[static_cast<size_t>(here)].point;
-        // What a tied stitch pulls is little, and its pins are looked at in every substep from now on. In deformed tissue fewer
-        // particles say a little else: nothing may move because of that.
-        pin.a = carried_by(model, a, kCarriers);
-        pin.b = carried_by(model, b, kCarriers);
-        const Vec4* x = solver.x.data();
-        const float other =
-            distance(position_of(pin.a, x), position_of(pin.b, x)) - distance(position_of(a, x), position_of(b, x));
-        pin.length = std::max(0.0f, length + other);
-        pin.compliance = model.thread.stretch_compliance * length / model.thread.spacing;
-        pin.owner = PinOwner::stitch;
-        if (!held_already(solver, pins, pin)) solver.pin.push_back(pin);
-      }
+      if (before >= 0) spans.push_back({before, here, length, tension, same_bite(state, before, here)});
       before = here;
       length = tension = 0;
     }
     if (i < highest) length += t.rest[i], tension = std::max(tension, t.tension[i]);
   }
+  if (spans.size() < 3) return spans;
+  const auto slot_of = [&](int anchor) { return t.anchor[static_cast<size_t>(anchor)].slot; };
+  const std::array<uint32_t, 2> ends = {slot_of(spans.front().a), slot_of(spans.back().b)};
+  const bool closed = std::any_of(knots.begin(), knots.end(), [&](uint32_t k) {
+    const Knot& knot = state.knot[k];
+    return knot.slots == 2 && std::is_permutation(ends.begin(), ends.end(), knot.slot.begin());
+  });
+  if (!closed) return spans;
+  const Span& last = spans.back();
+  Span round{spans.front().b, last.a, spans.front().length + last.length, std::max(spans.front().tension, last.tension)};
+  if (spans.size() == 3) {
+    round.length = std::min(round.length, spans[1].length);
+    return {round};
+  }
+  spans.front() = round;
+  spans.pop_back();
+  return spans;
+}
+
+// The piece of thread from node `first` to node `last`, tied by `knots`, as a settled stitch and the pins that do what it did.
+void settle_piece(const SolverModel& model, SolverState& solver, SutureState& state, size_t first, size_t last,
+                  const std::vector<uint32_t>& knots, std::vector<Event>& events) {
+  const Thread& t = solver.thread;
+  SettledStitch stitch;
+  size_t lowest = last, highest = first;
+  for (size_t i = first; i <= last; ++i)
+    if (anchor_at(t, t.order[i]) >= 0) lowest = std::min(lowest, i), highest = std::max(highest, i);
+  const size_t pins = solver.pin.size();  // without its own
+  for (const Span& span : spans_of(t, lowest, highest, state, knots)) {
+    // A passage through a wall holds nothing together but the wall: if it carries nothing, no pin is needed.
+    if (span.passage && span.tension < kCarries) continue;
+    TissuePin pin;
+    const TissuePoint &a = t.anchor[static_cast<size_t>(span.a)].point, &b = t.anchor[static_cast<size_t>(span.b)].point;
+    // What a tied stitch pulls is little, and its pins are looked at in every substep from now on. In deformed tissue fewer
+    // particles say a little else: nothing may move because of that.
+    pin.a = carried_by(model, a, kCarriers);
+    pin.b = carried_by(model, b, kCarriers);
+    const Vec4* x = solver.x.data();
+    const float other = distance(position_of(pin.a, x), position_of(pin.b, x)) - distance(position_of(a, x), position_of(b, x));
+    pin.length = std::max(0.0f, span.length + other);
+    pin.compliance = model.thread.stretch_compliance * span.length / model.thread.spacing;
+    pin.owner = span.passage ? PinOwner::passage : PinOwner::stitch;
+    if (!held_already(solver, pins, pin)) solver.pin.push_back(pin);
+  }
+  float tail = 0;
+  while (lowest > first && tail + t.rest[lowest - 1] <= kLongestTail) tail += t.rest[--lowest];
+  tail = 0;
+  while (highest < last && tail + t.rest[highest] <= kLongestTail) tail += t.rest[highest++];
+  for (size_t i = lowest; i <= highest; ++i)
+    stitch.node.push_back(bind(model, solver, thread_position(t, i, solver.x.data(), solver.body)));
   Vec3 where{};
   for (uint32_t k : knots) {
     where = position_of(state.knot[k].target, solver.x.data());
@@ -143,6 +177,10 @@ bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel
   }
   const Thread& t = solver.thread;
   take_back_throws(model, solver, suture, state, events);
+  // Passages that drew their wall in until later stitches took the load off them: a pin that stays is paid for in every
+  // substep.
+  const float least = kCarries * model.h * model.h;
+  std::erase_if(solver.pin, [&](const TissuePin& p) { return p.owner == PinOwner::passage && -p.lambda < least; });
 
   // Piece by piece between the cuts.
   std::vector<uint32_t> knots;
