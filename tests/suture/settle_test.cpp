@@ -162,8 +162,8 @@ struct TwoBites : Tie {
   }
   Vec3 at_point(size_t k) {
     const auto& anchor = thread().anchor;
-    return position_of(std::find_if(anchor.begin(), anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot[k]; })->point,
-                       x());
+    return position_of(
+        std::find_if(anchor.begin(), anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot[k]; })->point, x());
   }
 };
 
