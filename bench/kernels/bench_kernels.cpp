@@ -219,10 +219,7 @@ void Pins(benchmark::State& bench) {
   weave(state.pin, m.inv_mass.data(), m.tissue, k.web);
   measure(
       bench, pin.size() * static_cast<size_t>(m.pin_sweeps), kName[bench.range(0)],
-      [&] {
-        state.x = s.predicted, state.pin = pin;
-        for (TissuePin& p : state.pin) p.lambda = 0;
-      },
+      [&] { state.x = s.predicted, state.pin = pin; },
       [&] { solve_pins(state.pin, k.web, state.x.data(), m.h, m.pin_sweeps, m.pin_tolerance, k.pin_span); });
   state.pin = pin;
 }

@@ -14,7 +14,7 @@ constexpr float kUndoneTools = 0.0001f;       // [m] of such overlap of tools, p
 constexpr float kSameAxis = 0.00001f;         // [m] between axes that have no side any more
 
 // The part of the relative slip `slip` that friction undoes, given the normal correction.
-inline Vec3 friction_step(Vec3 slip, Vec3 n, float normal, float friction) {
+Vec3 friction_step(Vec3 slip, Vec3 n, float normal, float friction) {
   const Vec3 t = slip - n * dot(slip, n);
   const float l = length(t), most = friction * normal;
   if (l < 1e-12f) return {};
@@ -57,8 +57,7 @@ uint32_t solve_tissue_pairs(const ContactView& v, const TissueCollision& tissue,
     ++touching;
     const float l = std::sqrt(l2), depth = std::min(reach - l, kLargestCorrection);
     const Vec3 n = d / l;
-    const Four pa = load(v.prev[c.a]), pb = load(v.prev[c.b]), slide = (load(x[c.b]) - pb) - (load(x[c.a]) - pa);
-    const Vec3 step = (n * depth - friction_step({slide[0], slide[1], slide[2]}, n, depth, friction)) / w;
+    const Vec3 step = (n * depth - friction_step(moved(v, c.b) - moved(v, c.a), n, depth, friction)) / w;
     // In one piece each, as they are loaded again soon: a processor waits where it has to gather what it has just stored.
     store(v.x[c.a], load(x[c.a]) + Four{step.x, step.y, step.z, 0} * -wa);
     store(v.x[c.b], load(x[c.b]) + Four{step.x, step.y, step.z, 0} * wb);

@@ -29,23 +29,27 @@ void solve_pin(TissuePin& pin, Vec4* x, const float* w, float h);
 // What weave finds out about the pins of a tick. The span of a pin is the vector from its b to its a.
 struct PinWeb {
   struct Strand {
-    uint32_t pin = 0;
-    float coupling = 0;  // [1/kg] so much does the span of that pin move along each unit of this one's pull
+    uint32_t rope = 0;
+    float coupling = 0;  // [1/kg] so much does the span of that rope move along each unit of this one's pull
   };
-  std::vector<uint32_t> first;  // pin i moves the spans of strand[first[i]] .. strand[first[i + 1]], its own the first of them
+  // Ropes of the web are the pins that pulled in the substep before. All others hang slack, many of them for good: one that
+  // gets taut pulls by itself until the next tick.
+  std::vector<uint32_t> rope, slack;  // pins
+  std::vector<uint32_t> first;        // rope n moves the spans of strand[first[n]] .. strand[first[n + 1]], its own the first
   std::vector<Strand> strand;
   // Pin i as one sum over the particles of both its points, row[i] .. row[i + 1]: see PinRow in pins.cpp.
   std::vector<uint32_t> row, particle;
   std::vector<float> share, move;
   std::vector<float> length, compliance;  // [m], [m/N], by pin
-  std::vector<TissuePoint> point;         // of all pins, as they were when the strands were found
-  // Working memory of weave: pins by particle and their shares there, couplings by pin and whether they are listed.
-  std::vector<uint32_t> start, pin;
-  std::vector<float> weight, by_pin;
+  std::vector<TissuePoint> point;         // of all pins, as they were when the rows were found
+  // Working memory of weave: the ropes before, ropes by particle and their shares there, couplings by rope and whether they are
+  // listed.
+  std::vector<uint32_t> before, start, on;
+  std::vector<float> weight, by_rope;
   std::vector<uint8_t> listed;
 };
-// Brings the web up to date: to be called whenever pins may have changed. w: inverse mass [1/kg] of the particles, which never
-// changes.
+// Brings the web up to date: to be called whenever pins may have changed, and once a tick, since others of them may pull now.
+// w: inverse mass [1/kg] of the particles, which never changes.
 void weave(std::span<const TissuePin> pin, const float* w, uint32_t particles, PinWeb& web);
 
 // Working memory of solve_pins: all that it reads and writes of a pin while it solves.
@@ -56,11 +60,12 @@ struct PinSpan {
   float give = 0;               // [kg] lambda of a pull that makes it shorter by a metre
   float lambda = 0;             // [N s^2]
 };
-// Solves all pins from no pull at all: `sweeps` times solve_pin of each in turn. From the second sweep on, pins that are as
-// they should be to within `tolerance` [m] are left alone; in the first, ropes would twitch. Pins see each other through the
-// web and give all that they pull to their particles at the end, so a sweep costs what pins that pull have neighbours, however
-// many particles they hang on. (Gauss-Seidel on the multipliers, as Catto, "Iterative Dynamics with Temporal Coherence", 2005,
-// has it for contacts.) web: as weave left it for these pins.
+// Solves all pins from no pull at all: `sweeps` times solve_pin of each of the web's ropes in turn, then once of each other
+// pin. From the second sweep on, ropes that are as they should be to within `tolerance` [m] are left alone; in the first, they
+// would twitch. Ropes see each other through the web and give all that they pull to their particles at the end, so a sweep
+// costs what ropes that pull have neighbours, however many particles they hang on. (Gauss-Seidel on the multipliers, as Catto,
+// "Iterative Dynamics with Temporal Coherence", 2005, has it for contacts.) web: as weave left it for these pins; of another
+// number it stops the program.
 void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, float h, int sweeps, float tolerance,
                 std::vector<PinSpan>& work);
 

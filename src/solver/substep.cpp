@@ -67,11 +67,12 @@ void reserve_room(const SolverModel& m, SolverScratch& k) {
   w.point.reserve(2 * kPins);
   w.first.reserve(kPins + 1);
   w.strand.reserve(kPins * kPinsBeside);
-  for (std::vector<uint32_t>* part : {&w.particle, &w.pin}) part->reserve(2 * TissuePoint::kMost * kPins);
+  for (std::vector<uint32_t>* each : {&w.rope, &w.slack, &w.before}) each->reserve(kPins);
+  for (std::vector<uint32_t>* part : {&w.particle, &w.on}) part->reserve(2 * TissuePoint::kMost * kPins);
   for (std::vector<float>* part : {&w.share, &w.move, &w.weight}) part->reserve(2 * TissuePoint::kMost * kPins);
   w.start.reserve(m.tissue + 2);
   w.listed.reserve(kPins);
-  for (std::vector<float>* each : {&w.length, &w.compliance, &w.by_pin}) each->reserve(kPins);
+  for (std::vector<float>* each : {&w.length, &w.compliance, &w.by_rope}) each->reserve(kPins);
   k.pin_span.reserve(kPins);
 }
 

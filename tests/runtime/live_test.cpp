@@ -13,6 +13,7 @@
 #include "core/check.h"
 #include "procedure/scene_file.h"
 #include "runtime/blend.h"
+#include "runtime/hands.h"
 #include "runtime/session.h"
 #include "sim/simulation.h"
 #include "small.h"
@@ -278,6 +279,28 @@ TEST(Live, a_parameter_changed_in_between_is_in_the_recording) {
     EXPECT_EQ(parse_scene(r.header.scene, file).solver.damping == 17, file != options.record);
     std::filesystem::remove(file);
   }
+}
+
+// What tools press each other with at most depends on who holds them; the recording says what it was.
+TEST(Live, hands_that_feel_nothing_press_their_tools_softly) {
+  const auto recorded = [](float force, const std::string& surgeon) {
+    LiveOptions options;
+    options.record = testing::TempDir() + "catgut_force_" + std::to_string(::getpid()) + ".cgrec";
+    options.surgeon = surgeon;
+    SceneSpec scene = small_scene();
+    scene.solver.tool_force = force;
+    {
+      Live live(scene, options);
+      EXPECT_TRUE(wait_for(live, 20, [](auto& s) { return s.tick > 3; }));
+      live.finish();
+    }
+    const Recording r = read_recording(options.record);
+    std::filesystem::remove(options.record);
+    return parse_scene(r.header.scene, options.record).solver.tool_force;
+  };
+  EXPECT_EQ(recorded(8, ""), kUnfeltToolForce);
+  EXPECT_EQ(recorded(1, ""), 1) << "softer than that was asked for";
+  EXPECT_EQ(recorded(8, "none"), 8) << "nobody's hands push on";
 }
 
 TEST(Live, every_live_parameter_is_one) {

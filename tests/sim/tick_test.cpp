@@ -207,6 +207,13 @@ TEST(Load, damaged_bytes_never_crash) {
   EXPECT_LT(refused, 250);
 }
 
+TEST(Scene, a_bound_on_what_tools_press_reaches_the_solver) {
+  SceneSpec scene = read_scene("stay");
+  EXPECT_EQ(build_model(scene)->solver.tool_force, 8);
+  set_value(scene, "solver.tool_force=3");
+  EXPECT_EQ(build_model(scene)->solver.tool_force, 3);
+}
+
 TEST(Sane, says_when_a_number_is_not_one_or_something_is_gone) {
   const auto model = build_model(short_scene());
   StatePtr state = initial_state(*model);

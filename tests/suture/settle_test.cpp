@@ -144,7 +144,7 @@ struct TwoBites : Tie {
   }
   explicit TwoBites(bool one_wall = true) : Tie(long_enough()) {
     tie_and_cut(*this);
-    if (HasFatalFailure()) return;
+    if (testing::Test::HasFatalFailure()) return;
     const std::array<size_t, 4> node = {node_of_point(0), node_of_point(0) + 2, node_of_point(1) - 2, node_of_point(1)};
     const Vec3 from = point_at(0), to = point_at(1);
     for (const size_t k : {size_t{1}, size_t{2}}) lock(*this, node[k], lerp(from, to, k == 1 ? 0.3f : 0.7f));
@@ -154,7 +154,6 @@ struct TwoBites : Tie {
     point[3].bite = point[1].bite;
     for (size_t i = node[0]; i < node[3]; ++i) thread().tension[i] = 0;
   }
-  static bool HasFatalFailure() { return testing::Test::HasFatalFailure(); }
   float between_points(size_t a, size_t b) {
     float length = 0;
     for (size_t i = node_of(slot[a]); i < node_of(slot[b]); ++i) length += thread().rest[i];
