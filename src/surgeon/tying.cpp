@@ -145,6 +145,9 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       } else if (stage_ == down) {
         if (move(kDriver, goal, careful() * calm)) go(close);
         else if (!patience(4)) miss(over);
+      } else if (driver.held == Held::nothing && !move(kDriver, goal, careful() * calm)) {  // it has moved: after it
+        jaw(kDriver, kHalfOpen);
+        if (!patience(4)) miss(over);
       } else if (jaw(kDriver, 0) && waited_ > 0.35f) {
         if (driver.held == Held::thread && node_of(seen, driver.held_slot) < first) {
           pull_from_ = hand_[kDriver].pose;
