@@ -81,7 +81,8 @@ END
 
 ## What each further suture costs (figures 20 to 23)
 
-`./catgut bench limits --threads 1`
+`./catgut bench limits --threads 1`. Rows are minutes apart, and a shared machine is not as fast in one as in the other: what fifty sutures cost
+is in the line below them, where the first and the last are sewn again in turns.
 
 ![solver time per suture, one body](media/limits_stress_one_body.png)
 ![solver time per suture, two bodies](media/limits_stress_two_bodies.png)
