@@ -213,7 +213,7 @@ void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, float h, i
     if (rope[n].lambda == 0 && xyz(rope[n].pull) == Vec3{}) continue;
     give_pull(load(rope[n].pull), row_at(web, i), x);
   }
-  for (const uint32_t i : web.slack) {
+  for (const uint32_t i : web.slack) {  // nearly all of them still are: that is seen without a root
     pin[i].lambda = 0;
     if (length2_of(span_of(x, row_at(web, i))) > web.length[i] * web.length[i]) solve_row(pin[i], row_at(web, i), x, h);
   }

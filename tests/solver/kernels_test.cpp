@@ -295,7 +295,7 @@ TEST(Pin, many_at_once_are_each_of_them_in_turn) {
   const float h = 1.0f / 960;
   for (int round = 0; round < 200; ++round) {
     const RopeWeb start(random);
-    for (int others_pull = 0; others_pull < 2; ++others_pull) {
+    for (int draw = 0; draw < 2; ++draw) {  // of those that pulled before: the same pins, another web
       RopeWeb one = start, all = start;
       std::vector<TissuePin*> rope, slack_before;
       for (size_t i = 0; i < all.pin.size(); ++i) {
@@ -326,35 +326,44 @@ TEST(Pin, many_at_once_are_each_of_them_in_turn) {
   EXPECT_GT(caught, 500u);
 }
 
-// A slack one that gets taut holds in the same substep, and from the next tick on with the others; slack again, it leaves them.
-TEST(Pin, taut_ones_are_in_the_web) {
-  std::vector<Vec4> x{point({0, 0, 0}), point({0.002f, 0, 0})};
-  const std::vector<float> w{1 / 1e-5f, 1 / 1e-5f};
-  std::vector<TissuePin> pin(1);
-  pin[0].a = particle_point(0), pin[0].b = particle_point(1), pin[0].length = 0.003f;
+// Two free particles of 10 mg on the x axis and a rope between them.
+struct OneRope {
+  std::vector<Vec4> x;
+  std::vector<float> w{1 / 1e-5f, 1 / 1e-5f};
+  std::vector<TissuePin> pin{1};
   PinWeb web;
   std::vector<PinSpan> work;
-  const auto substep = [&](float apart) {
-    x[1].x = x[0].x + apart;
+  OneRope(float apart, float length) : x{point({0, 0, 0}), point({apart, 0, 0})} {
+    pin[0].a = particle_point(0), pin[0].b = particle_point(1), pin[0].length = length;
+  }
+  void weave() { catgut::weave(pin, w.data(), 2, web); }
+  float apart() const { return x[1].x - x[0].x; }
+  float substep(float pulled_to) {
+    x[1].x = x[0].x + pulled_to;
     solve_pins(pin, web, x.data(), 1.0f / 960, 4, 3e-5f, work);
-    return x[1].x - x[0].x;
-  };
-  const auto tick = [&](float apart) {
-    weave(pin, w.data(), 2, web);
-    return substep(apart);
+    return apart();
+  }
+};
+
+// A slack one that gets taut holds in the same substep, and from the next tick on with the others; slack again, it leaves them.
+TEST(Pin, taut_ones_are_in_the_web) {
+  OneRope r(0.002f, 0.003f);
+  const auto tick = [&](float pulled_to) {
+    r.weave();
+    return r.substep(pulled_to);
   };
   EXPECT_NEAR(tick(0.002f), 0.002f, 1e-9f);
-  EXPECT_EQ(web.rope.size(), 0u);
+  EXPECT_EQ(r.web.rope.size(), 0u);
   EXPECT_NEAR(tick(0.0031f), 0.003f, 1e-8f);
-  EXPECT_EQ(web.rope.size(), 0u);
-  EXPECT_NEAR(substep(0.0029f), 0.0029f, 1e-9f) << "what it pulled is not given back";
-  EXPECT_EQ(pin[0].lambda, 0);
-  EXPECT_NEAR(substep(0.0031f), 0.003f, 1e-8f);
+  EXPECT_EQ(r.web.rope.size(), 0u);
+  EXPECT_NEAR(r.substep(0.0029f), 0.0029f, 1e-9f) << "what it pulled is not given back";
+  EXPECT_EQ(r.pin[0].lambda, 0);
+  EXPECT_NEAR(r.substep(0.0031f), 0.003f, 1e-8f);
   EXPECT_NEAR(tick(0.0031f), 0.003f, 1e-8f);
-  EXPECT_EQ(web.rope.size(), 1u);
+  EXPECT_EQ(r.web.rope.size(), 1u);
   EXPECT_NEAR(tick(0.0029f), 0.0029f, 1e-9f);
   EXPECT_NEAR(tick(0.0029f), 0.0029f, 1e-9f);
-  EXPECT_EQ(web.slack.size(), 1u);
+  EXPECT_EQ(r.web.slack.size(), 1u);
 }
 
 // With a tolerance some are left alone, and when all are no rope is further off than that.
@@ -385,19 +394,12 @@ TEST(Pin, a_tolerance_is_what_a_rope_may_be_too_long_by) {
 // A steady pull apart, far less than the tolerance in a substep, is answered in each of them: a rope that waited until it was
 // too long by the tolerance would twitch.
 TEST(Pin, a_tolerance_makes_no_rope_twitch) {
-  std::vector<Vec4> x{point({0, 0, 0}), point({0.002f, 0, 0})};
-  const std::vector<float> w{1 / 1e-5f, 1 / 1e-5f};
-  std::vector<TissuePin> pin(1);
-  pin[0].a = particle_point(0), pin[0].b = particle_point(1), pin[0].length = 0.002f;
-  PinWeb web;
-  pulled_before(pin);
-  weave(pin, w.data(), 2, web);
-  std::vector<PinSpan> work;
+  OneRope r(0.002f, 0.002f);
+  pulled_before(r.pin);
+  r.weave();
   for (int i = 0; i < 50; ++i) {
-    x[1].x += 3e-6f;
-    solve_pins(pin, web, x.data(), 1.0f / 960, 4, 3e-5f, work);
-    EXPECT_NEAR(x[1].x - x[0].x, 0.002f, 1e-8f) << i;
-    EXPECT_LT(pin[0].lambda, 0) << i;
+    EXPECT_NEAR(r.substep(r.apart() + 3e-6f), 0.002f, 1e-8f) << i;
+    EXPECT_LT(r.pin[0].lambda, 0) << i;
   }
 }
 
