@@ -1,4 +1,4 @@
-// app: `catgut bench haptics`: the comparison of renderings (research notes 2.5) and, with --out, what a bite and a knot feel
+// app: `catgut bench haptics`: the comparison of rendering methods and, with --out, what a bite and a knot feel
 // like.
 #include <cmath>
 #include <cstdio>
@@ -50,13 +50,13 @@ void write_felt(const std::string& folder, const std::string& scene) {
   Plot bite = force_plot("A full bite: force on the hand against the way of the tip since it went in", "tip [mm]", c.bite);
   bite.x_most = std::min(25.0, std::max(10.0, c.bite.back().mm));
   bite.y_most = 3.5;
-  bite.band = {{"entry peak 0.9 +- 0.3 N (research notes 3.1; skin with these needles 0.5 to 1.0 N, Maloney)",
+  bite.band = {{"entry peak 0.9 +- 0.3 N (starting value; skin with these needles 0.5 to 1.0 N, Maloney et al. 2025)",
                 kBandEntry,
                 1.5,
                 3.5,
                 {0.6, 0.6},
                 {1.2, 1.2}},
-               {"cutting 0.15 to 0.3 N and shaft 0.03 to 0.06 N/mm while the tip is in (notes 3.1)",
+               {"cutting 0.15 to 0.3 N and shaft 0.03 to 0.06 N/mm while the tip is in (assumption)",
                 kBandShaft,
                 3.5,
                 exit,
@@ -68,12 +68,8 @@ void write_felt(const std::string& folder, const std::string& scene) {
                          "way of the hand since the throw was begun [mm]", c.knot);
   knot.x_most = far;
   knot.y_most = 4;
-  knot.band = {{"tying by hand 1.6 N (superficial) to 3.8 N (deep), means (Laufer 2016, notes 3.6)",
-                kBandEntry,
-                0,
-                far,
-                {1.6, 1.6},
-                {3.8, 3.8}}};
+  knot.band = {
+      {"tying by hand 1.6 N (superficial) to 3.8 N (deep), means (Laufer 2016)", kBandEntry, 0, far, {1.6, 1.6}, {3.8, 3.8}}};
   Image both = make_image(kWide, 2 * kHigh, {});
   paste(both, draw_plot(bite, kWide, kHigh), 0, 0);
   paste(both, draw_plot(knot, kWide, kHigh), 0, kHigh);
@@ -89,23 +85,22 @@ void write_felt(const std::string& folder, const std::string& scene) {
 int bench_haptics(const std::string& folder, const std::string& scene) {
   if (!folder.empty())
     for (const char* name : {"/forces.csv", "/forces.png"}) prepare_output(folder + name);
-  std::printf(
-      "a hand presses, holds and lets go of a wall of tissue; in brackets the research notes' figure for their gesture\n");
+  std::printf("a hand presses, holds and releases a wall of tissue; in brackets the figure of an earlier prototype\n");
   std::printf("%-10s %5s  %-26s %19s %19s %19s %19s\n", "tissue/", "rate", "rendering", "force error [N]", "swing, held [mm]",
               "step [N/ms]", "energy [mJ]");
   for (const StudyPublished& p : published_study()) {
     const StudyRow r = run_study(p.c);
     std::printf("%4.0f/%-3.0f N/m %4.0f Hz  %-26s", double{p.c.tissue}, double{p.c.coupling}, double{p.c.rate},
                 rendering_name(p.c.rendering));
-    const auto cell = [](double ours, double notes) {
+    const auto cell = [](double ours, double prototype) {
       char text[32] = "";
-      if (notes >= 0) std::snprintf(text, sizeof text, "(%.3g)", notes);
+      if (prototype >= 0) std::snprintf(text, sizeof text, "(%.3g)", prototype);
       std::printf(" %9.3f %9s", ours, text);
     };
-    cell(double{r.force_error}, double{p.notes.force_error});
-    cell(double{r.hold_swing} * 1e3, double{p.notes.hold_swing} * 1e3);
-    cell(double{r.largest_step}, double{p.notes.largest_step});
-    cell(double{r.energy} * 1e3, double{p.notes.energy} * 1e3);
+    cell(double{r.force_error}, double{p.prototype.force_error});
+    cell(double{r.hold_swing} * 1e3, double{p.prototype.hold_swing} * 1e3);
+    cell(double{r.largest_step}, double{p.prototype.largest_step});
+    cell(double{r.energy} * 1e3, double{p.prototype.energy} * 1e3);
     std::printf("\n");
   }
   if (!folder.empty()) write_felt(folder, scene);

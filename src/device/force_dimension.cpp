@@ -16,7 +16,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr float kStopStep = 0.5f;                   // [N] per millisecond on the way down (research notes 2.7)
+constexpr float kStopStep = 0.5f;                   // [N] per millisecond on the way down (the limiter's slew rate)
 constexpr uint32_t kStatusEvery = 20;               // [ms] between looks at whether the firmware has cut the force
 constexpr uint32_t kEnableEvery = 250;              // [ms] between tries to switch it on again
 constexpr auto kReopenEvery = 500ms;                // of a lost arm
@@ -299,7 +299,7 @@ ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<s
     unsigned short serial = 0;
     if (dhd.dhdGetSerialNumber(&serial, a->id) != dhd::kError) info.serial = "fd-" + std::to_string(serial);
     info.driver = std::to_string(version[0]) + "." + std::to_string(version[1]) + "." + std::to_string(version[2]);
-    // The library does not tell its arms' limits; these are the data sheets' (research notes 1.1), the rest is not said.
+    // The library does not report its devices' limits; these are those of CHAI3D's CDeltaDevices.cpp (docs/references.md).
     const int type = dhd.dhdGetSystemType(a->id);
     const bool falcon = type == dhd::kTypeFalcon, delta = type == dhd::kTypeDelta3 || type == dhd::kTypeOldDelta3;
     info.limits = {falcon ? 8.0f : delta ? 20.0f : 12.0f, 0, 0, 0};

@@ -25,7 +25,7 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr float kStopStep = 0.5f;  // [N] per millisecond on the way down (research notes 2.7)
+constexpr float kStopStep = 0.5f;  // [N] per millisecond on the way down (the limiter's slew rate)
 constexpr int kMostStops = 100;    // messages after which a stop is not waited for any longer
 constexpr auto kReconnectEvery = 500ms;
 constexpr size_t kMostBytes = 1 << 18;  // of a message; the state of two arms has a few kilobytes

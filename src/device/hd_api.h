@@ -1,5 +1,6 @@
 // device: the part of OpenHaptics' device library (libHD) that we call: our own declarations of its names, types and numbers,
-// so that neither its headers nor its licence are needed to build. Research notes 1.2 say where each comes from.
+// so that neither its headers nor its licence are needed to build. docs/references.md (OpenHaptics headers) says where each
+// comes from.
 //
 // Three traps that other bindings fell into, each held by a static_assert below or by tests/device: the error record has three
 // members and comes back by value (12 bytes); HDlong and the scheduler's handle are C longs; HDboolean is one byte.

@@ -28,7 +28,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr float kStopStep = 0.5f;      // [N] per millisecond on the way down (research notes 2.7)
+constexpr float kStopStep = 0.5f;      // [N] per millisecond on the way down (the limiter's slew rate)
 constexpr uint32_t kProbeEvery = 250;  // [ms] how often a lost arm is asked whether it is back
 constexpr uint32_t kWarmthEvery = 50;  // [ms] motors warm slowly
 constexpr int kMostErrors = 8;         // fetched per arm and millisecond: the stack may be deep, the callback may not

@@ -1,5 +1,5 @@
 // haptic: what a patch means at the place where the hand is now. Reads ForcePatch, writes a force [N] in the world frame.
-// Pure: no clock, no lock, no allocation; the same calls give the same bits. Research notes 2.4 and 3.1.
+// Pure: no clock, no lock, no allocation; the same calls give the same bits. Sources: docs/references.md.
 #pragma once
 #include "exchange/force_patch.h"
 
@@ -30,7 +30,7 @@ struct ForceModelOptions {
   // Part of a physics period over which one patch gives way to the next. Interpolates the models' parameters: both are
   // evaluated where the hand is now, so no frame of delay is added to the feel of moving.
   float blend = 0.5f;
-  float drop_time = 0.004f;  // [s] from the peak to what is left when the tip goes through: 3 to 5 ms (notes 3.1)
+  float drop_time = 0.004f;  // [s] from the peak to what is left when the tip goes through: 3 to 5 ms (assumption)
 };
 
 // A newer patch. A jump in time, or a change of topology, is taken over at once.

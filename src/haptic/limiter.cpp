@@ -1,4 +1,4 @@
-// haptic/limiter: see the header. The order of the steps is that of research notes 2.7.
+// haptic/limiter: see the header. The order of the steps is that of docs/rooms/haptic.md.
 #include "haptic/limiter.h"
 
 namespace catgut {

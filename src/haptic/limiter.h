@@ -1,4 +1,4 @@
-// haptic: everything between the force that was worked out and the motors, in the order of research notes 2.7: finite, age of
+// haptic: everything between the force that was worked out and the motors, in this order: finite, age of
 // the model, soft map, clamp, slew, heat, ramp-in; the energy controller (haptic/passivity) comes after it. Reads a wanted
 // force, writes an allowed one; both in the arm's frame [N]. Pure: time is handed in.
 #pragma once

@@ -1,16 +1,17 @@
 // haptic: a net under everything else. Counts the energy that went into the hand and, when it is more than the rendering could
-// have given rightly, brakes the hand as far as the arm may brake (time-domain passivity, Hannaford & Ryu 2002; research notes
-// 2.6). It keeps things safe, not good: alone under a held force it leaves a limit cycle of a millimetre (notes 2.5).
-// Pure; in the arm's frame, where what the motors do is exact: the force is held between two samples.
+// have given rightly, brakes the hand as far as the arm may brake (time-domain passivity, Hannaford and Ryu
+// 2002). It keeps things safe, not good: alone under a held force it leaves a limit cycle of a millimeter (`catgut bench
+// haptics`). Pure; in the arm's frame, where what the motors do is exact: the force is held between two samples.
 #pragma once
 #include "core/math.h"
 
 namespace catgut {
 
 struct PassivityOptions {
-  double allowance = 2e-4;    // [J] a spring that is sampled at 1 kHz gives 0.12 to 0.16 mJ without any fault (notes 2.5)
-  float damping = 4;          // [N s/m] at most (CHAI3D's cap for a Touch)
-  float slew = 500;           // [N/s] of the whole force
+  double allowance =
+      2e-4;           // [J] a spring that is sampled at 1 kHz gives 0.12 to 0.16 mJ without any fault (`catgut bench haptics`)
+  float damping = 4;  // [N s/m] at most (CHAI3D's cap for a Touch)
+  float slew = 500;   // [N/s] of the whole force
   float small_force = 0.02f;  // [N] below this,
   float quiet_time = 0.05f;   // [s] for so long, the account is closed: old credit would delay the next brake
 };

@@ -1,6 +1,6 @@
 // haptic: one millisecond of one hand. Reads an ArmSample and, when there is one, a newer ForcePatch; writes the force for the
 // motors and the whole pose for the simulation. Nothing here waits, allocates, logs or reads a clock: it runs in the callback
-// of the arm's driver. Research notes 2.4 to 2.7.
+// of the arm's driver. docs/rooms/haptic.md has the chain.
 #pragma once
 #include <cstdint>
 
@@ -31,7 +31,7 @@ struct ServoOptions {
   ForceModelOptions model;
   // Newtons at the motors per newton in the field; 0: the workspace's scale, which neither makes nor loses energy.
   float gain = 0;
-  float velocity_filter = 50;  // [Hz] first-order, for damping (notes 2.2: 30 to 80)
+  float velocity_filter = 50;  // [Hz] first-order, for damping (30 to 80 are usual)
   bool ratchet = true;         // the button nearest to the tip closes the jaw and, pressed again, opens it; else it is held
   bool force = true;           // false: the arm moves the tool and feels nothing
 };

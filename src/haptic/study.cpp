@@ -140,7 +140,7 @@ std::vector<StudyPublished> published_study() {
                       float mj) {
     StudyPublished p;
     p.c.rendering = r, p.c.tissue = tissue, p.c.coupling = coupling, p.c.rate = rate;
-    p.notes = {error, swing_mm * 1e-3f, step, mj * 1e-3f};
+    p.prototype = {error, swing_mm * 1e-3f, step, mj * 1e-3f};
     return p;
   };
   using R = Rendering;

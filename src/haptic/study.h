@@ -1,6 +1,7 @@
-// haptic: the comparison of research notes 2.5, with the code that drives the arms. One dimension: a hand presses a wall of
-// tissue, holds, and lets go, on an arm, while a slow simulation computes the tissue. Who renders what in between decides
-// whether the hand feels tissue or a machine gun. `catgut bench haptics` prints it, tests/haptic holds it to its claims.
+// haptic: the multi-rate comparison of docs/rooms/haptic.md, with the code that drives the arms. One dimension: a hand presses
+// a wall of tissue, holds, and lets go, on an arm, while a slow simulation computes the tissue. Who renders what in between
+// decides whether the hand feels tissue or a machine gun. `catgut bench haptics` prints it, tests/haptic holds it to its
+// claims.
 #pragma once
 #include <string>
 #include <vector>
@@ -35,10 +36,10 @@ struct StudyRow {
 };
 StudyRow run_study(const StudyCase& c);
 
-// The rows of notes 2.5 with what is written there, for comparison. hold_swing [m], energy [J].
+// The cases, each with the figures of an earlier one-dimensional prototype for comparison. hold_swing [m], energy [J].
 struct StudyPublished {
   StudyCase c;
-  StudyRow notes;
+  StudyRow prototype;
 };
 std::vector<StudyPublished> published_study();
 

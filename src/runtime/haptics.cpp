@@ -15,7 +15,7 @@
 namespace catgut {
 namespace {
 
-constexpr uint64_t kLost = 20000000;  // [ns] without a sample: the arm is lost (research notes 2.7)
+constexpr uint64_t kLost = 20000000;  // [ns] without a sample: the device is lost (criterion H7, docs/rooms/haptic.md)
 
 const char* word_of(uint32_t fault) {
   switch (fault) {

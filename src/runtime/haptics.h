@@ -23,7 +23,8 @@ namespace catgut {
 
 // Physics under arms: more ticks with fewer substeps each (of the same length), and the coupling that an arm can render.
 constexpr int kHapticParts = 16;  // ticks in the time of one of the scene's, where its substeps can be shared out: 960 Hz
-constexpr float kHapticStiffness = 300;  // [N/m] between hand and tool (notes 5: 300, at most 400 on a Touch)
+constexpr float kHapticStiffness =
+    300;  // [N/m] between hand and tool (our choice; CHAI3D allows at most 400 on a Touch, docs/references.md)
 void prepare_for_arms(SceneSpec& scene);
 
 struct HapticsOptions {

@@ -1,4 +1,4 @@
-// sim/feel: see the header. Research notes 2.4; numbers of the tissue and the needle from 3.1 and 3.4.
+// sim/feel: see the header. Sources of the numbers: docs/references.md.
 #include "sim/feel.h"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 // The last quarter of a tick's substeps: enough for contacts that come and go between two of them, and young.
 constexpr int kLastPart = 4;
 // [N/m] before anything has been learned: what the generated bowel answers a blunt tool with (60 to 120, tests/sim/feel_test),
-// and tissue that is held in its plane (closed form of notes 3.4: 800 to 1400; half of that near a free edge).
+// and tissue that is held in its plane (point load, docs/references.md: 800 to 1400; half of that near a free edge).
 constexpr float kBlunt = 100, kTissue = 600;
 constexpr float kForget = 0.06f;    // [s] after which what was learned counts for a third
 constexpr float kTrust = 0.0001f;   // [m] of motion that weighs as much as the value above
@@ -183,7 +183,7 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
   p.tick = state.tick;
   p.topology = state.feel.topology[k];
   p.period = model.dt;
-  p.expiry = std::max(p.expiry, 2 * model.dt);  // notes 2.7: two periods are normal
+  p.expiry = std::max(p.expiry, 2 * model.dt);  // two periods are normal
   p.point = sum.substeps > 0 ? sum.at * part : state.hand[k].p;
   if (!s.body_collides[k]) return p;  // no hand there
 

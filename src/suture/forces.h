@@ -1,7 +1,7 @@
 // suture: how hard it is to push a needle through bowel, as named numbers with their sources, and as a function of where the
 // needle is. Felt by the hand, not by the tissue: the simulated tissue answers the tip with the paper's spring (2.2), which
-// knows neither a wall that stiffens before it gives way nor what rubs along a shaft. Numbers: research notes 3.1, which gather
-// published measurements; a starting set for bowel and a 3-0 needle, to be calibrated with surgeons.
+// knows neither a wall that stiffens before it gives way nor what rubs along a shaft. Sources: docs/references.md;
+// a starting set for bowel and a 3-0 needle, to be calibrated with surgeons.
 #pragma once
 #include <algorithm>
 
@@ -9,7 +9,7 @@ namespace catgut {
 
 // Before the tip goes in the wall is a hardening spring, f = a1 z + a2 z^2 (Okamura, Simone & O'Leary 2004), which ends at the
 // entry peak where the paper's rule lets the tissue go (release_distance, 2.2 mm): a1 leaves 0.62 N/mm there, within the 0.5
-// to 1.2 N/mm of a point load in the wall (notes 3.4).
+// to 1.2 N/mm of a point load in the wall (docs/references.md).
 constexpr float kEntryStart = 200;  // [N/m] a1
 constexpr float kEntryPeak = 0.9f;  // [N] 0.9 +- 0.3; skin, same needles: 0.5 to 1.0 (Maloney); colon 1.6 to 1.8 a blunt spike
 constexpr float kExitPeak = 0.54f;  // [N] 0.6 of the entry's; two peaks, in and out (Frick et al. 2001)

@@ -1,5 +1,5 @@
 // tests/device: the driver of the Touch against a simulated libHD, through the same dlopen and the same symbols as the real
-// one. H1, H7 and H9 of research notes 2.8; the servo in between is the real one.
+// one. Criteria H1, H7 and H9 of docs/rooms/haptic.md; the servo in between is the real one.
 #include "device/touch.h"
 
 #include <gtest/gtest.h>

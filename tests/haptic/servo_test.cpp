@@ -1,5 +1,5 @@
-// tests/haptic: the criteria of research notes 2.8 that need no driver, by name, in lock step: H3 passivity, H5 stall, H6
-// garbage, H8 heat, H10 determinism; and the comparison of 2.5.
+// tests/haptic: the criteria of docs/rooms/haptic.md that need no driver, by name, in lock step: H3 passivity, H5 stall, H6
+// garbage, H8 heat, H10 determinism; and the multi-rate comparison.
 #include "haptic/servo.h"
 
 #include <gtest/gtest.h>
@@ -114,16 +114,17 @@ TEST(Haptics, H3_passive_under_every_hand) {
               static_cast<double>(worst_swing) * 1e3, static_cast<double>(worst_step));
 }
 
-// A linear tissue looks to the local model as it does at full rate; a held force swings by centimetres. Notes 2.5.
-TEST(Haptics, the_comparison_of_the_notes) {
+// A linear tissue looks to the local model as it does at full rate; a held force swings by centimeters.
+TEST(Haptics, the_multi_rate_comparison) {
   for (const StudyPublished& p : published_study()) {
     const StudyRow r = run_study(p.c);
     std::printf(
-        "%4.0f/%3.0f N/m %4.0f Hz %-27s error %.3f N (notes %.2f)  swing %.3f mm (%.3f)  step %.3f N (%.3f)  energy %.3f mJ "
+        "%4.0f/%3.0f N/m %4.0f Hz %-27s error %.3f N (prototype %.2f)  swing %.3f mm (%.3f)  step %.3f N (%.3f)  energy %.3f "
+        "mJ "
         "(%.2f)\n",
         double{p.c.tissue}, double{p.c.coupling}, double{p.c.rate}, rendering_name(p.c.rendering), double{r.force_error},
-        double{p.notes.force_error}, double{r.hold_swing} * 1e3, double{p.notes.hold_swing} * 1e3, double{r.largest_step},
-        double{p.notes.largest_step}, double{r.energy} * 1e3, double{p.notes.energy} * 1e3);
+        double{p.prototype.force_error}, double{r.hold_swing} * 1e3, double{p.prototype.hold_swing} * 1e3,
+        double{r.largest_step}, double{p.prototype.largest_step}, double{r.energy} * 1e3, double{p.prototype.energy} * 1e3);
     if (p.c.rendering == Rendering::local_model) {
       EXPECT_LT(r.force_error, 0.005f);
       EXPECT_LT(r.energy, 0.2e-3f);

@@ -1,6 +1,6 @@
 // tests/runtime: two simulated arms, the real driver, the real servo and the real physics together: in lock step, where every
-// millisecond is counted, and as people run it, each in its own thread. Research notes 2.8: H2, H3, H5 and H7 while physics
-// runs the Lembert scene.
+// millisecond is counted, and as people run it, each in its own thread. Criteria of docs/rooms/haptic.md: H2, H3, H5 and H7
+// while physics runs the Lembert scene.
 #include "runtime/haptics.h"
 
 #include <gtest/gtest.h>
@@ -154,7 +154,8 @@ TEST(Haptics, H3_on_the_lembert_scene) {
       std::printf("H3: Lembert, grip %.0f N/m, %s hand: energy %.3f mJ at most, swing %.3f mm, step %.3f N/ms, force %.2f N\n",
                   1e3 * grip, k == 0 ? "right (50 g)" : "left (300 g)", 1e3 * a.energy_most,
                   1e3 * double{high[static_cast<size_t>(k)] - low[static_cast<size_t>(k)]}, a.step_most, a.force_most);
-      EXPECT_LE(a.energy_most, 0.5e-3 + 2 * 0.16e-3);  // the notes' reference, as this scene has none of its own at 1 kHz
+      EXPECT_LE(a.energy_most,
+                0.5e-3 + 2 * 0.16e-3);  // the reference of criterion H3, as this scene has none of its own at 1 kHz
       EXPECT_LE(high[static_cast<size_t>(k)] - low[static_cast<size_t>(k)], 0.2e-3f);
       EXPECT_LE(a.step_most, 0.5 + 1e-4);
     }

@@ -1,5 +1,6 @@
 // tests/sim: what is published for the hands. The patch is made of the solver's own multipliers; it changes nothing; and a hand
-// that feels it between two ticks at 60 Hz feels what a simulation at 960 Hz would have told it (H4 of research notes 2.8).
+// that feels it between two ticks at 60 Hz feels what a simulation at 960 Hz would have told it (criterion H4,
+// docs/rooms/haptic.md).
 #include "sim/feel.h"
 
 #include <gtest/gtest.h>
