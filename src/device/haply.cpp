@@ -64,6 +64,11 @@ bool yes(const json& j, const char* name) {
 
 struct Arm {
   std::string id;  // as the service names it
+  // The grip that was bound to this arm, by its own id; and what it said last: a grip that is missing from a message has
+  // neither turned nor been let go.
+  std::string grip;
+  Quat held;
+  uint32_t pressed = 0;
   uint32_t sequence = 0;
   ArmSample sample;
   Vec3 force;  // [N] to be sent, our frame
@@ -201,29 +206,48 @@ json take_message(Haply& h) {
   return j;
 }
 
-// Where the grip of the service's arm number `place` is in a state: wireless ones first, in the service's order.
-void read_grip(const json& message, size_t place, ArmSample& s) {
-  for (const char* kind : {"wireless_verse_grip", "verse_grip"}) {
+constexpr const char* kGrips[] = {"wireless_verse_grip", "verse_grip", "custom_verse_grip"};
+
+// Grips that no arm has yet, in the service's order (wireless ones first), go to the arms that have none, in the order of the
+// inventory. Once bound, a grip is known by its id: which arms or grips are missing from a later message does not matter.
+void bind_grips(const json& message, Haply& h, const std::vector<size_t>& order) {
+  for (const char* kind : kGrips) {
     const json& all = member(message, kind);
     if (!all.is_array()) continue;
-    if (place >= all.size()) {
-      place -= all.size();
-      continue;
+    for (const json& grip : all) {
+      const std::string id = word(grip, "device_id");
+      if (id.empty() || h.arm[0].grip == id || h.arm[1].grip == id) continue;
+      for (const size_t k : order)
+        if (!h.arm[k].id.empty() && h.arm[k].grip.empty()) {
+          h.arm[k].grip = id;
+          break;
+        }
     }
-    const json& state = member(all[place], "state");
-    const json& q = member(state, "orientation");
-    Vec3 v;
-    float w = 0;
-    // A rotation's axis is a vector, so it changes axes like one; the tool's own axes are renamed the same way.
-    if (vector(q, v) && number(q, "w", w)) {
-      v = ours(v);
-      s.pose.q = normalized(Quat{v.x, v.y, v.z, w});
-    }
-    const json& buttons = member(state, "buttons");
-    if (yes(state, "button") || yes(buttons, "a")) s.buttons |= 1;
-    if (yes(buttons, "b")) s.buttons |= 2;
-    return;
   }
+}
+
+void read_grip(const json& message, Arm& a) {
+  ArmSample& s = a.sample;
+  for (const char* kind : kGrips) {
+    const json& all = member(message, kind);
+    if (a.grip.empty() || !all.is_array()) continue;
+    for (const json& grip : all) {
+      if (word(grip, "device_id") != a.grip) continue;
+      const json& state = member(grip, "state");
+      const json& q = member(state, "orientation");
+      Vec3 v;
+      float w = 0;
+      // A rotation's axis is a vector, so it changes axes like one; the tool's own axes are renamed the same way.
+      if (vector(q, v) && number(q, "w", w)) {
+        v = ours(v);
+        a.held = normalized(Quat{v.x, v.y, v.z, w});
+      }
+      const json& buttons = member(state, "buttons");
+      a.pressed = (yes(state, "button") || yes(buttons, "a") ? 1u : 0u) | (yes(buttons, "b") ? 2u : 0u);
+    }
+  }
+  s.pose.q = a.held;
+  s.buttons = a.pressed;
 }
 
 // The arms' states out of one message; an arm that is not in it is absent.
@@ -231,6 +255,7 @@ bool read_states(const json& message, Haply& h) {
   const json& all = member(message, "inverse3");
   if (!all.is_array()) return false;
   for (Arm& a : h.arm) a.sample = {};
+  bind_grips(message, h, {0, 1});
   for (size_t place = 0; place < all.size(); ++place) {
     const std::string id = word(all[place], "device_id");
     for (Arm& a : h.arm) {
@@ -241,9 +266,9 @@ bool read_states(const json& message, Haply& h) {
       if (!vector(member(state, "cursor_position"), p) || (ready.is_boolean() && !ready.get<bool>())) continue;
       if (!vector(member(state, "cursor_velocity"), v)) v = {};
       a.sample.state = ArmState::ready;
-      a.sample.pose = {ours(p), h.no_grip};
+      a.sample.pose.p = ours(p);
       a.sample.velocity = ours(v);
-      read_grip(message, place, a.sample);
+      read_grip(message, a);
     }
   }
   return true;
@@ -387,6 +412,7 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
                    " does not say which arms it has as versions 3.1 to 3.5 do; update it, or name its port for that form");
     return port;
   }
+  std::vector<size_t> order;
   for (size_t place = 0; place < all.size(); ++place) {
     const json& device = all[place];
     const json& config = member(device, "config");
@@ -406,6 +432,8 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
     if (port.arm[k].present) k = 1 - k;
     if (port.arm[k].present) continue;
     h->arm[k].id = id;
+    h->arm[k].held = h->no_grip;
+    order.push_back(k);
     ArmInfo& info = port.arm[k];
     info.present = true;
     info.model = word(config, "type");
@@ -417,6 +445,7 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
     const Vec3 middle = ours({0, -0.12f, 0.15f}), box{reach, reach, reach};
     info.least = middle - box, info.most = middle + box;
   }
+  bind_grips(inventory, *h, order);
   if (!port.arm[0].present && !port.arm[1].present) {
     if (told.empty()) told.push_back("haply: the service at " + there + " has no arm; is one connected and switched on?");
     drop(*h);

@@ -48,7 +48,10 @@ struct Arm {
   hd::Handle handle = hd::kNoDevice;  // set before the scheduler starts, constant after
   // The callback's.
   uint32_t sequence = 0, lost_for = 0;
-  bool lost = false, forced_off = false;
+  bool lost = false;
+  // Latched until a sample has reported them: the library raises errors at the end of a frame too, after the sample was used,
+  // and those of one arm may be found in the other's frame.
+  bool cut = false, broken = false;
   float warmth = 0;
   Vec3 force;  // [N] last written
   // For any thread.
@@ -66,18 +69,23 @@ struct Touch {
   std::atomic<bool> stopping{false}, stopped{false};
 };
 
-// Fetches what went wrong since the last time; true: the arm is gone.
-bool note_errors(Touch& t, Arm& a) {
-  bool lost = false;
+// Fetches the errors since the last call and latches them at the arm that each names; one that names none is the current
+// arm's. The library hands out the newest first; the worst of them becomes the arm's error, of equals the newest.
+void note_errors(Touch& t, size_t current) {
+  std::array<int, 2> worst{-1, -1};
   for (int k = 0; k < kMostErrors; ++k) {
     const hd::ErrorInfo e = t.hd.hdGetError();
     if (e.code == hd::kSuccess) break;
-    a.error.store(e.code, std::memory_order_relaxed);
+    size_t which = current;
+    for (size_t arm = 0; arm < 2; ++arm)
+      if (e.device != hd::kNoDevice && t.arm[arm].handle == e.device) which = arm;
+    Arm& a = t.arm[which];
     a.errors.fetch_add(1, std::memory_order_relaxed);
-    if (is_lost(e.code)) lost = true;
-    if (cuts_force(e.code)) a.forced_off = true;
+    const int rank = is_lost(e.code) ? 2 : cuts_force(e.code) ? 1 : 0;
+    if (rank > worst[which]) worst[which] = rank, a.error.store(e.code, std::memory_order_relaxed);
+    if (is_lost(e.code)) a.broken = true;
+    if (cuts_force(e.code)) a.cut = true;
   }
-  return lost;
 }
 
 // One arm, one millisecond, to completion: make current, begin, read, work out, write, end.
@@ -86,12 +94,12 @@ void serve(Touch& t, size_t which) {
   if (a.handle == hd::kNoDevice) return;
   ArmSample s;
   s.sequence = ++a.sequence;
+  if (std::exchange(a.broken, false)) a.lost = true, a.lost_for = 0;  // found in the other arm's frame
   if (a.lost && ++a.lost_for % kProbeEvery != 0) {
     t.callback.step(t.callback.user, which, s);
     a.steps.fetch_add(1, std::memory_order_relaxed);
     return;
   }
-  a.forced_off = false;
   t.hd.hdMakeCurrentDevice(a.handle);
   t.hd.hdBeginFrame(a.handle);
   double matrix[16] = {}, velocity[3] = {};
@@ -107,7 +115,8 @@ void serve(Touch& t, size_t which) {
       if (m > most) most = m;
     a.warmth = static_cast<float>(most);
   }
-  const bool lost = note_errors(t, a);
+  note_errors(t, which);
+  const bool lost = std::exchange(a.broken, false);
   if (!lost) {
     s.state = ArmState::ready;
     s.pose.p = Vec3{static_cast<float>(matrix[12]), static_cast<float>(matrix[13]), static_cast<float>(matrix[14])} * 1e-3f;
@@ -116,7 +125,7 @@ void serve(Touch& t, size_t which) {
         Vec3{static_cast<float>(velocity[0]), static_cast<float>(velocity[1]), static_cast<float>(velocity[2])} * 1e-3f;
     s.buttons = static_cast<uint32_t>(buttons);
     s.warmth = a.warmth;
-    s.forced_off = a.forced_off;
+    s.forced_off = std::exchange(a.cut, false);
   }
   Vec3 force = t.callback.step(t.callback.user, which, s);
   if (t.stopping.load(std::memory_order_relaxed)) {
@@ -127,7 +136,8 @@ void serve(Touch& t, size_t which) {
   const double newton[3] = {double{force.x}, double{force.y}, double{force.z}};
   t.hd.hdSetDoublev(hd::kCurrentForce, newton);
   t.hd.hdEndFrame(a.handle);
-  a.lost = note_errors(t, a) || lost;
+  note_errors(t, which);
+  a.lost = std::exchange(a.broken, false) || lost;
   if (!a.lost) a.lost_for = 0;
   a.force = force;
   a.at_rest.store(length2(force) == 0, std::memory_order_relaxed);
@@ -185,14 +195,17 @@ bool load(const TouchOptions& options, hd::Library& hd, std::vector<std::string>
 
 std::string text(const char* s) { return s ? s : ""; }
 
-// Opens the arm `name` (null: the default one). Returns kNoDevice, with the reason in `why`.
-hd::Handle open_arm(const hd::Library& hd, const char* name, int retries, std::string& why) {
+// Opens the arm `name` (null: the default one); `ours`: the arm that is open already. Returns kNoDevice, with the reason in
+// `why`.
+hd::Handle open_arm(const hd::Library& hd, const char* name, hd::Handle ours, int retries, std::string& why) {
   for (int attempt = 0;; ++attempt) {
     drain(hd);
     const hd::Handle handle = hd.hdInitDevice(name);
     const hd::ErrorInfo e = hd.hdGetError();
     if (handle != hd::kNoDevice && e.code == hd::kSuccess) return handle;
     if (e.code == hd::kAlreadyOpen && attempt < retries) {
+      // What a crashed program left open is closed first (SOFA's driver does the same), unless it is an arm of ours.
+      if (handle != hd::kNoDevice && handle != ours) hd.hdDisableDevice(handle);
       std::this_thread::sleep_for(20ms);
       continue;
     }
@@ -251,11 +264,13 @@ bool start(void* self, const ArmCallback& callback, std::string& why) {
   t.stopping = false, t.stopped = false;
   drain(t.hd);
   t.hd.hdSetSchedulerRate(1000);
+  drain(t.hd);  // a rate that is refused is no reason to go without: the servo measures its own periods
   t.scheduled = t.hd.hdScheduleAsynchronous(serve_both, self, hd::kPriority);
   t.hd.hdStartScheduler();
   const hd::ErrorInfo e = t.hd.hdGetError();
   if (e.code != hd::kSuccess) {
     why = "the driver's 1 kHz timer did not start: " + text(t.hd.hdGetErrorString(e.code));
+    t.hd.hdStopScheduler();
     t.hd.hdUnschedule(t.scheduled);
     return false;
   }
@@ -302,12 +317,12 @@ ArmPort open_touch(const TouchOptions& options, std::vector<std::string>& told) 
   touch->hd = hd;
   std::array<std::string, 2> why;
   for (size_t k = 0; k < 2; ++k) {  // all of them before the scheduler starts
-    touch->arm[k].handle = open_arm(hd, options.name[k].c_str(), options.retries, why[k]);
+    touch->arm[k].handle = open_arm(hd, options.name[k].c_str(), touch->arm[0].handle, options.retries, why[k]);
     port.arm[k].name = options.name[k];
   }
   if (touch->arm[0].handle == hd::kNoDevice && touch->arm[1].handle == hd::kNoDevice) {
     std::string none;
-    touch->arm[0].handle = open_arm(hd, nullptr, options.retries, none);
+    touch->arm[0].handle = open_arm(hd, nullptr, hd::kNoDevice, options.retries, none);
     port.arm[0].name = "default device";
   }
   for (size_t k = 0; k < 2; ++k) {

@@ -19,14 +19,15 @@ void disengage(Limiter& s) {
   s.recovering = true;
 }
 
-float safe_dt(Limiter& s, float dt) {
+float safe_dt(Limiter& s, float dt, const LimiterOptions& o) {
+  if (dt > o.late) s.faults |= kLate, s.recovering = true;
   if (dt > 0 && dt <= 0.02f) return dt;
   s.faults |= kTimeBack;
   return 0.001f;
 }
 
 Vec3 limit(Limiter& s, const LimiterInput& in, float raw_dt, const LimiterOptions& o) {
-  const float dt = safe_dt(s, raw_dt);
+  const float dt = safe_dt(s, raw_dt, o), slew_dt = std::min(dt, o.slew_time);
   Vec3 f = in.wanted;
 
   // Finite. What is no number is no force, and whoever made it is not believed until things are quiet again.
@@ -41,7 +42,12 @@ Vec3 limit(Limiter& s, const LimiterInput& in, float raw_dt, const LimiterOption
     disengage(s);
   }
   if (!in.ready) f = {}, disengage(s);
-  if (in.speed > o.top_speed) s.faults |= kTooFast, f = {}, disengage(s);
+  if (in.speed > o.top_speed) {
+    // A hand that moves freely loses nothing: only a force that was being felt has to engage again.
+    f = {};
+    s.recovering = true;
+    if (length2(s.out) > o.free_force * o.free_force) s.faults |= kTooFast, disengage(s);
+  }
 
   // Age. Young: believed. Expired: the last force that was, fading, whatever the hand does; then off. No patch yet: nothing.
   if (in.age < 0) {
@@ -77,7 +83,7 @@ Vec3 limit(Limiter& s, const LimiterInput& in, float raw_dt, const LimiterOption
   // Slew. On the way up after a fault, slowly; on the way down never slower than usual.
   const bool growing = length2(f) > length2(s.soft);
   const float slew = s.recovering && growing ? o.slew_recovery : o.slew;
-  s.soft = toward(s.soft, f, slew * dt);
+  s.soft = toward(s.soft, f, slew * slew_dt);
   if (s.recovering && s.engaged == Engaged::yes && length2(f - s.soft) < 1e-8f) s.recovering = false;
 
   // Heat: the cap closes from the peak to the continuous force as the mean comes near it, and to nothing as the motors get hot.
@@ -90,12 +96,12 @@ Vec3 limit(Limiter& s, const LimiterInput& in, float raw_dt, const LimiterOption
   if (most < o.force && length2(s.soft) > most * most) s.faults |= kTooWarm;
 
   if (s.engaged == Engaged::rising) {
-    s.ramp = std::min(1.0f, s.ramp + dt / o.ramp);
+    s.ramp = std::min(1.0f, s.ramp + slew_dt / o.ramp);
     if (s.ramp >= 1) s.engaged = Engaged::yes;
     out *= s.ramp;
   }
   // Whatever the reason of a change, the motors see no step.
-  s.out = toward(s.out, out, o.slew * dt);
+  s.out = toward(s.out, out, o.slew * slew_dt);
   s.heat += (length2(s.out) - s.heat) * std::min(1.0f, dt / o.heat_time);
   return s.out;
 }

@@ -10,12 +10,15 @@
 namespace catgut {
 
 struct LimiterOptions {
-  float force = 3.3f;         // [N] length of the vector, not per axis (Touch: 3.3)
-  float continuous = 0.88f;   // [N] leaky RMS (Touch's data sheet, from memory: the driver's own number replaces it)
-  float knee = 1.5f;          // [N] up to here 1:1; beyond it
-  float above = 0.5f;         // so much per newton: a bowel that tears at 4.6 N stays stronger than a knot that ties at 3.8
-  float slew = 500;           // [N/s] 0.5 N/ms: a puncture's drop of 1 to 1.8 N in 3 to 5 ms passes
-  float slew_recovery = 20;   // [N/s] 0.02 N/ms while force comes back
+  float force = 3.3f;        // [N] length of the vector, not per axis (Touch: 3.3)
+  float continuous = 0.88f;  // [N] leaky RMS (Touch's data sheet, from memory: the driver's own number replaces it)
+  float knee = 1.5f;         // [N] up to here 1:1; beyond it
+  float above = 0.5f;        // so much per newton: a bowel that tears at 4.6 N stays stronger than a knot that ties at 3.8
+  float slew = 500;          // [N/s] 0.5 N/ms: a puncture's drop of 1 to 1.8 N in 3 to 5 ms passes
+  float slew_recovery = 20;  // [N/s] 0.02 N/ms while force comes back
+  // [s] the slew acts on at most this much of a step: after a gap the motors get the step of one millisecond, not of the gap.
+  float slew_time = 0.001f;
+  float late = 0.005f;        // [s] a longer gap between two steps is a fault, and force recovers slowly
   float decay = 0.02f;        // [s] time constant once the model has expired
   float off_after = 0.06f;    // [s] after expiry: off, and engage anew; with an expiry of 30 ms, within 100 ms
   float heat_time = 10;       // [s] of the leaky mean (an assumption; no motor model was found)
@@ -25,6 +28,7 @@ struct LimiterOptions {
   int engage_steps = 3;       // for more than so many steps
   float ramp = 2;             // [s] from nothing to all of it
   float top_speed = 1.0f;     // [m/s] of the hand; faster: force off (driver's own limit 1.2 m/s)
+  float free_force = 0.05f;   // [N] a fast hand that felt less than this keeps its engagement
 };
 
 enum LimiterFault : uint32_t {
@@ -36,6 +40,8 @@ enum LimiterFault : uint32_t {
   kExpired = 1u << 5,    // no patch for so long that force was taken off
   kGenerated = 1u << 6,  // the energy controller had to brake
   kTooWarm = 1u << 7,    // motors or the mean force
+  kLate = 1u << 8,       // the servo was called later than LimiterOptions::late
+  kElsewhere = 1u << 9,  // the patch was computed for another place than where the hand is
 };
 
 enum class Engaged : uint8_t { no, waiting, rising, yes };
@@ -66,6 +72,7 @@ struct LimiterInput {
 Vec3 limit(Limiter& limiter, const LimiterInput& in, float dt, const LimiterOptions& options = {});
 // The force goes off (through the slew) and has to engage anew.
 void disengage(Limiter& limiter);
-float safe_dt(Limiter& limiter, float dt);
+// dt, or 1 ms where it cannot be right (kTimeBack); a gap longer than `late` is a fault (kLate) and starts a recovery.
+float safe_dt(Limiter& limiter, float dt, const LimiterOptions& options = {});
 
 }  // namespace catgut

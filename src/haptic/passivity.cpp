@@ -22,7 +22,7 @@ Vec3 keep_passive(Passivity& p, Vec3 x, Vec3 v, Vec3 force, float most, float dt
   }
   if (length(out) > most) out *= most / length(out);
   const Vec3 change = out - p.force;
-  const float step = o.slew * dt;
+  const float step = o.slew * std::min(dt, o.slew_time);
   if (length(change) > step) out = p.force + change * (step / length(change));
 
   p.quiet = length(out) < o.small_force ? p.quiet + dt : 0;

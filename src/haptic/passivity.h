@@ -12,6 +12,7 @@ struct PassivityOptions {
       2e-4;           // [J] a spring that is sampled at 1 kHz gives 0.12 to 0.16 mJ without any fault (`catgut bench haptics`)
   float damping = 4;  // [N s/m] at most (CHAI3D's cap for a Touch)
   float slew = 500;   // [N/s] of the whole force
+  float slew_time = 0.001f;   // [s] of a step that the slew may use, as in LimiterOptions
   float small_force = 0.02f;  // [N] below this,
   float quiet_time = 0.05f;   // [s] for so long, the account is closed: old credit would delay the next brake
 };

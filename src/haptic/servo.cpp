@@ -11,6 +11,20 @@ Pose to_arm(const Workspace& w, const Pose& world) {
           normalized(conjugate(w.turn) * world.q * conjugate(w.stylus))};
 }
 
+namespace {
+
+constexpr float kFastTime = 0.05f;  // [s] over which ServoHand::fast fades
+constexpr float kFarthest = 10;     // [m] no arm reaches this far: such a position is garbage
+
+// How far the hand is from where the patch was computed [m]. Outward of a surface nothing is felt and any distance is right.
+float off_patch(const ForcePatch& p, Vec3 x) {
+  Vec3 d = x - p.point;
+  if (length2(p.normal) > 0) d -= p.normal * std::max(0.0f, dot(d, p.normal));
+  return length(d);
+}
+
+}  // namespace
+
 void fit_to_arm(ServoOptions& o, const ArmLimits& limits) {
   const auto known = [](float says, float careful) {
     return says > 0 && std::isfinite(says) ? std::min(says, careful) : careful;
@@ -27,10 +41,12 @@ void fit_to_arm(ServoOptions& o, const ArmLimits& limits) {
 ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample, const ForcePatch* fresh, uint64_t now_ns) {
   ServoOut out;
   const float gain = o.gain > 0 ? o.gain : o.place.scale;
-  const bool ready = sample.state == ArmState::ready && is_finite(sample.pose.p);
+  const bool ready = sample.state == ArmState::ready && length2(sample.pose.p) < kFarthest * kFarthest &&
+                     std::isfinite(sample.pose.q.x + sample.pose.q.y + sample.pose.q.z + sample.pose.q.w);
   if (sample.state == ArmState::ready && !ready) h.limiter.faults |= kNotFinite;
   float dt = 0.001f;
-  if (h.steps++ > 0) dt = safe_dt(h.limiter, now_ns >= h.last_ns ? 1e-9f * static_cast<float>(now_ns - h.last_ns) : -1.0f);
+  if (h.steps++ > 0)
+    dt = safe_dt(h.limiter, now_ns >= h.last_ns ? 1e-9f * static_cast<float>(now_ns - h.last_ns) : -1.0f, o.limiter);
   h.last_ns = now_ns;
 
   // Where the hand is. A lost arm leaves the hand where it was; a found one starts from rest.
@@ -46,6 +62,7 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
 
   const Pose world = to_world(o.place, {h.at, sample.pose.q});
   const Vec3 velocity = rotate(o.place.turn, h.velocity) * o.place.scale;
+  h.fast = std::max(h.fast * std::exp(-dt / kFastTime), length(velocity));
   if (fresh) {
     ForcePatch patch = *fresh;
     // What the motors render is gain * scale times what is stiff in the field.
@@ -66,6 +83,14 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
     const uint64_t made = h.model.now.time_ns;
     if (made > now_ns + 5000000) h.limiter.faults |= kTimeBack;
     in.age = made < now_ns ? 1e-9f * static_cast<float>(now_ns - made) : 0;
+    // Nothing is to be felt (cap 0: somebody else moves the tool), or the patch belongs to another place.
+    if (h.model.now.cap <= 0) disengage(h.limiter);
+    const ForcePatch& p = h.model.now;
+    if (p.cap > 0 && ready && off_patch(p, world.p) > o.reach + h.fast * (in.age + p.period)) {
+      if (h.limiter.engaged == Engaged::rising || h.limiter.engaged == Engaged::yes) h.limiter.faults |= kElsewhere;
+      in.wanted = {};
+      disengage(h.limiter);
+    }
   } else {
     in.age = -1;
   }

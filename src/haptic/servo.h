@@ -32,8 +32,11 @@ struct ServoOptions {
   // Newtons at the motors per newton in the field; 0: the workspace's scale, which neither makes nor loses energy.
   float gain = 0;
   float velocity_filter = 50;  // [Hz] first-order, for damping (30 to 80 are usual)
-  bool ratchet = true;         // the button nearest to the tip closes the jaw and, pressed again, opens it; else it is held
-  bool force = true;           // false: the arm moves the tool and feels nothing
+  // [m] world. A patch is refused while the hand is farther from the patch's point than this plus what the hand can have moved
+  // since: whatever the reason (another hand's patch, a jump in time, a demonstration), it belongs to another place.
+  float reach = 0.004f;
+  bool ratchet = true;  // the button nearest to the tip closes the jaw and, pressed again, opens it; else it is held
+  bool force = true;    // false: the arm moves the tool and feels nothing
 };
 // Limits of the chain from those of the arm, the smaller of what is known and what is asked for.
 void fit_to_arm(ServoOptions& options, const ArmLimits& limits);
@@ -43,6 +46,7 @@ struct ServoHand {
   Limiter limiter;
   Passivity passivity;
   Vec3 at, velocity;     // [m], [m/s] arm frame, filtered
+  float fast = 0;        // [m/s] world: the largest speed of the last tenth of a second, fading
   uint64_t last_ns = 0;  // of the last step
   uint32_t epoch = 0;
   bool any = false;  // there was a sample

@@ -35,6 +35,10 @@ const char* word_of(uint32_t fault) {
       return "the energy net had to brake";
     case kTooWarm:
       return "its motors need rest; force is turned down";
+    case kLate:
+      return "the servo was late by more than 5 ms; close other programs, or run with real-time priority";
+    case kElsewhere:
+      return "the simulation's contact was not where the hand is; force is off until it is";
     default:
       return "";
   }
@@ -51,6 +55,7 @@ struct Side {
   uint64_t last_ns = 0;
   // The physics'.
   uint32_t told = 0, told_errors = 0;
+  uint64_t taken_ns = 0;  // when the pose was sampled that the physics took last
   bool was_ready = true;
 };
 
@@ -137,10 +142,20 @@ const ServoOptions& Haptics::servo(size_t k) const { return work_->side[k].optio
 void Haptics::publish(size_t k, const ForcePatch& patch, uint32_t epoch, float speed) {
   ForcePatch& p = work_->side[k].patch.draft();
   p = patch;
-  p.time_ns = work_->clock();
+  // A patch is as old as the pose it was computed for, not as the moment at which a slow tick was done with it.
+  p.time_ns = work_->side[k].taken_ns > 0 ? work_->side[k].taken_ns : work_->clock();
   p.epoch = epoch;
   p.period = patch.period / speed;
   p.expiry = std::max(patch.expiry, 2 * p.period);
+  work_->side[k].patch.publish();
+}
+
+void Haptics::rest(size_t k, uint32_t epoch) {
+  ForcePatch& p = work_->side[k].patch.draft();
+  p = {};
+  p.cap = 0;
+  p.time_ns = work_->clock();
+  p.epoch = epoch;
   work_->side[k].patch.publish();
 }
 
@@ -149,6 +164,7 @@ ToolInput Haptics::hand(size_t k) {
   s.hand.update();
   ToolInput hand = s.hand.seen();
   const uint64_t now = work_->clock();
+  s.taken_ns = hand.time_ns;
   if (!present(k) || hand.time_ns + kLost < now) hand.connected = 0;
   return hand;
 }

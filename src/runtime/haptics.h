@@ -57,6 +57,8 @@ class Haptics {
 
   // Of the thread that runs the physics.
   void publish(size_t k, const ForcePatch& patch, uint32_t epoch, float speed);  // speed: of real time
+  // Nothing is to be felt, and that is meant: somebody else moves the tool, or time does not run as fast as the hand's.
+  void rest(size_t k, uint32_t epoch);
   ToolInput hand(size_t k);  // the newest; not connected when no sample came for 20 ms
   // What happened to arms and servo since the last call, a line each.
   std::vector<std::string> news();

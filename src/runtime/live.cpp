@@ -119,6 +119,8 @@ struct Live::Work {
   std::unique_ptr<Recorder> recorder;
   std::unique_ptr<Haptics> haptics;  // null: no arms
   bool as_paper = false;             // they feel the paper's spring
+  bool arms_drove = false;           // in the last patch, and
+  uint32_t handovers = 0;            // how often that changed
   PaperSpring paper;
   LiveResult result;
   TickInput input;
@@ -143,6 +145,8 @@ struct Live::Work {
   void obey();
   void tick(bool let_in);
   void feel();
+  bool arms_drive() const;
+  void rest_arms();
   void show();
   void go_back(const Moment& to);
   void change_scene(const std::string& key_equals_value);
@@ -280,10 +284,24 @@ void Live::Work::tick(bool let_in) {
   told.tick_ms = static_cast<float>(1000 * spent_s / ticks_weight);
 }
 
+// Whether the arms move the tools, at the hands' own speed. If not, what acts on the tools is not the arms' to feel.
+bool Live::Work::arms_drive() const { return !told.demonstrating && !surgeon.surgeon && !told.paused && speed == 0; }
+
+void Live::Work::rest_arms() {
+  handovers += arms_drove;
+  arms_drove = false;
+  for (size_t k = 0; k < 2; ++k) haptics->rest(k, told.epoch + handovers);
+}
+
 void Live::Work::feel() {
+  const bool drive = arms_drive();
+  handovers += drive && !arms_drove;
+  if (drive) arms_drove = true;
+  else rest_arms();
   if (as_paper) follow(paper, now, picture);
-  for (size_t k = 0; k < 2; ++k)
-    haptics->publish(k, as_paper ? paper_patch(paper, now, picture, k) : now.patch[k], told.epoch, kLiveSpeeds[speed]);
+  for (size_t k = 0; k < 2 && drive; ++k)
+    haptics->publish(k, as_paper ? paper_patch(paper, now, picture, k) : now.patch[k], told.epoch + handovers,
+                     kLiveSpeeds[speed]);
   if (now.tick % kNewsTicks != 0 || !options.say) return;
   for (const std::string& line : haptics->news()) options.say(line);
 }
@@ -424,6 +442,7 @@ void Live::Work::main_loop() {
     const Clock::time_point at = Clock::now();
     const bool stepping = steps > 0;
     if (told.paused && !stepping) {
+      if (haptics) rest_arms();
       std::this_thread::sleep_for(kNap);
       due = last = Clock::now();
       continue;

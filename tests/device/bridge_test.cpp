@@ -415,6 +415,7 @@ struct Both : Lent {
     while (t.hangs) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     p.period = 0.016f, p.time_ns = t.physics_ns ? t.physics_ns.load() : now;
     p.force = {t.pull[k], 0, 0};
+    p.point = s.pose.p;
     const ServoOut out = servo_step(t.hand[k], t.options[k], s, &p, now);
     t.there[k] = out.hand.connected, t.at[k] = s.pose.p.x;
     return out.force;

@@ -74,6 +74,7 @@ struct Two {
     t.now_ns[k] += 1000000;
     t.sample[k] = s;
     ForcePatch p;
+    p.point = s.pose.p;
     p.period = 0.016f, p.force = t.pull[k], p.time_ns = t.physics_ns[k] ? t.physics_ns[k] : t.now_ns[k];
     const ServoOut out = servo_step(t.hand[k], t.options[k], s, &p, t.now_ns[k]);
     t.input[k] = out.hand;

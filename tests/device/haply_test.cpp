@@ -40,6 +40,8 @@ struct Two {
   std::array<std::atomic<uint64_t>, 2> physics_ns{};
   std::array<ArmSample, 2> sample;  // of a driver that stands still
   std::array<std::atomic<bool>, 2> there{};
+  std::array<std::atomic<float>, 2> turned{};      // [rad] of the grip
+  std::array<std::atomic<uint32_t>, 2> buttons{};  // of the grip
   std::array<std::atomic<uint64_t>, 2> now_ns{};
 
   static Vec3 step(void* user, size_t k, const ArmSample& s) {
@@ -47,10 +49,12 @@ struct Two {
     const uint64_t now = t.now_ns[k] += 1000000;
     t.sample[k] = s;
     ForcePatch p;
+    p.point = s.pose.p;
     p.period = 0.016f, p.time_ns = t.physics_ns[k] ? t.physics_ns[k].load() : now;
     (k == 0 ? p.force.x : p.force.y) = t.pull[k];
     const ServoOut out = servo_step(t.hand[k], t.options[k], s, &p, now);
     t.there[k] = out.hand.connected;
+    if (s.state == ArmState::ready) t.turned[k] = length(rotation_vector(s.pose.q)), t.buttons[k] = s.buttons;
     return out.force;
   }
   explicit Two(HaplyForm form = HaplyForm::v35, int arms = 2) : fake(form, arms) {
@@ -143,6 +147,34 @@ TEST(Haply, H7_an_arm_is_lost) {
   t.run(200, [&](int) { ASSERT_EQ(length(t.force(0)), 0) << "what is wanted is not small: it must not engage"; });
   EXPECT_TRUE(t.there[0]);
   EXPECT_TRUE(t.force(1) == left);
+}
+
+// S7: the right hand's grip stays the right hand's when the left arm, the left grip, or both leave and come back.
+TEST(Haply, grips_belong_to_their_arms) {
+  Two t;
+  t.fake.step(5);
+  const auto right_is_right = [&](const char* when) {
+    EXPECT_LT(t.turned[0], 1e-3f) << when;
+    EXPECT_EQ(t.buttons[0], 0u) << when;
+  };
+  right_is_right("at first");
+  EXPECT_NEAR(t.turned[1], 0.5f * kPi, 1e-3f);
+  EXPECT_EQ(t.buttons[1], 1u);
+  for (const int gone : {1, 2, 3}) {  // arm, grip, both
+    if (gone & 1) t.fake.there(0, false);
+    if (gone & 2) t.fake.grip(0, false);
+    t.fake.step(20);
+    right_is_right("while the left one is gone");
+    EXPECT_EQ(t.there[1], (gone & 1) == 0);
+    if (gone == 2) {
+      EXPECT_NEAR(t.turned[1], 0.5f * kPi, 1e-3f) << "a grip out of range has not turned";
+      EXPECT_EQ(t.buttons[1], 1u) << "nor let go";
+    }
+    t.fake.there(0, true), t.fake.grip(0, true);
+    t.fake.step(20);
+    right_is_right("when it is back");
+    EXPECT_NEAR(t.turned[1], 0.5f * kPi, 1e-3f);
+  }
 }
 
 // Whatever the service says, nothing falls over and no force leaps.

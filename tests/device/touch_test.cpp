@@ -33,6 +33,7 @@ struct Two {
     t.sample[arm] = s;
     ++t.calls[arm];
     t.patch[arm].time_ns = t.now_ns;
+    if (t.patch[arm].stiffness.xx == 0) t.patch[arm].point = s.pose.p;  // a constant force goes with the hand
     const bool fresh = t.feed[arm] && t.sent % 16 == 0;
     const ServoOut out = servo_step(t.hand[arm], t.options[arm], s, fresh ? &t.patch[arm] : nullptr, t.now_ns);
     t.input[arm] = out.hand;
@@ -215,6 +216,52 @@ TEST(Touch, warm_motors) {
   EXPECT_LT(length(t.fake.force(0)), 1e-4f);
   EXPECT_EQ(t.port.status(t.port.self, 0).error, 0x0200u);
   EXPECT_TRUE(t.port.status(t.port.self, 0).ready);
+}
+
+// S2: an error that cuts the force is reported with the next sample wherever the library raises it: at a frame's begin, at its
+// end (where it sends the force), or in between. Without that, the servo pushes on at full force when the cut ends.
+TEST(Touch, force_errors_are_reported_wherever_they_are_raised) {
+  for (const int where : {0, 1, 2})
+    for (const unsigned code : {0x0200u, 0x0201u, 0x0202u, 0x0203u, 0x0204u}) {
+      SCOPED_TRACE(testing::Message() << "place " << where << " code " << code);
+      Two t;
+      t.open();
+      engage(t, {0.9f, 0, 0}, {0, 0.5f, 0});
+      ASSERT_NEAR(length(t.fake.force(0)), 0.9f, 0.01f);
+      t.fake.raise(0, 0, code, where, 300);
+      int told = 0;
+      t.run(300, [&](int) { told += t.sample[0].forced_off; });
+      EXPECT_GE(told, 298);
+      EXPECT_EQ(length(t.fake.force(0)), 0) << "nothing is left to come back at once";
+      EXPECT_NEAR(length(t.fake.force(1)), 0.5f, 0.01f) << "the other hand's";
+      EXPECT_EQ(t.port.status(t.port.self, 0).error, code);
+      t.run(5);
+      EXPECT_FALSE(t.sample[0].forced_off) << "and it ends";
+      EXPECT_TRUE(t.port.status(t.port.self, 0).ready);
+    }
+}
+
+// An error belongs to the arm that its record names, in whoever's frame it is found; the worst of several is the one shown.
+TEST(Touch, errors_go_to_the_arm_they_name) {
+  Two t;
+  t.open();
+  engage(t, {0.9f, 0, 0}, {0, 0.5f, 0});
+  t.fake.raise(0, 1, 0x0200, 1, 50);  // raised in the right arm's frame, about the left
+  t.run(50);
+  EXPECT_NEAR(length(t.fake.force(0)), 0.9f, 0.01f);
+  EXPECT_EQ(length(t.fake.force(1)), 0);
+  EXPECT_EQ(t.port.status(t.port.self, 0).errors, 0u);
+  EXPECT_EQ(t.port.status(t.port.self, 1).error, 0x0200u);
+  t.run(5);
+  // The line of the left arm breaks, found in the right one's frame; something harmless comes after it.
+  t.fake.raise(0, 1, 0x0302, 1, 1);
+  t.fake.raise(0, 1, 0x0100, 1, 1);
+  t.run(2);
+  EXPECT_EQ(t.port.status(t.port.self, 1).error, 0x0302u);
+  EXPECT_EQ(t.input[1].connected, 0u);
+  EXPECT_EQ(t.input[0].connected, 1u);
+  t.run(600);
+  EXPECT_EQ(t.input[1].connected, 1u) << "asked again, and back";
 }
 
 TEST(Touch, positions_that_are_no_numbers) {

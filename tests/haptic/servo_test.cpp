@@ -206,7 +206,7 @@ TEST(Haptics, H6_garbage) {
        [](ForcePatch& p) {
          p.force = {1e9f, 0, 0}, p.normal = {};
        }},
-      {kTooMuch,
+      {kElsewhere,
        [](ForcePatch& p) {
          p.point = {1e6f, 0, 0}, p.normal = {}, p.stiffness = identity(300);
        }},
@@ -258,6 +258,112 @@ TEST(Haptics, H6_garbage) {
   }
   EXPECT_TRUE(hand.limiter.faults & kNotFinite);
   EXPECT_TRUE(hand.limiter.faults & kTimeBack);
+}
+
+// S3: whatever the gap between two calls, the motors see at most the step of one millisecond; a gap over 5 ms is a fault, and
+// force comes back slowly. The hand meets something hard while the servo is late.
+TEST(Haptics, S3_late_servo) {
+  for (const int gap : {2, 3, 7, 15, 19, 60}) {
+    SCOPED_TRACE(gap);
+    ServoHand hand;
+    ServoOptions o;
+    ForcePatch p;
+    uint64_t now = 1000000000;
+    ArmSample s;
+    s.state = ArmState::ready;
+    Vec3 last;
+    float largest = 0, rises = 0;
+    for (int i = 0; i < 3000; ++i) {
+      const bool late = i >= 2500 && i % 20 == 0;
+      now += 1000000ull * static_cast<uint64_t>(late ? gap : 1);
+      p.time_ns = now;
+      p.force = i < 2500 ? Vec3{} : Vec3{i / 20 % 2 ? 0.5f : 3.0f, 0, 0};  // what is felt changes just then
+      const Vec3 f = servo_step(hand, o, s, &p, now).force;
+      largest = std::max(largest, length(f - last));
+      if (late) rises = std::max(rises, length(f) - length(last));
+      last = f;
+    }
+    std::printf("S3: gap %d ms: largest step between two writes %.3f N\n", gap, double{largest});
+    EXPECT_LE(largest, 0.5f + 1e-4f);
+    EXPECT_EQ((hand.limiter.faults & kLate) != 0, gap > 5);
+    if (gap > 5) { EXPECT_LE(rises, 0.02f + 1e-4f) << "recovering"; }
+  }
+}
+
+// S1: a patch that was computed for another place than the hand's is not felt, whatever it says; near, and as far as a hand
+// can have moved since, it is.
+TEST(Haptics, S1_a_patch_of_another_place_is_refused) {
+  const auto felt = [](Vec3 offset, float speed, uint32_t& faults) {
+    ServoHand hand;
+    ServoOptions o;
+    uint64_t now = 1000000000;
+    ArmSample s;
+    s.state = ArmState::ready;
+    float most = 0;
+    for (int i = 0; i < 3000; ++i, now += 1000000) {
+      s.pose.p.x += 0.001f * speed;
+      ForcePatch p;
+      p.point = s.pose.p;
+      p.time_ns = now - 16000000;
+      p.period = 1 / 60.0f;
+      if (i > 2500) p.point += offset, p.force = {0, 0.8f, 0};
+      const Vec3 f = servo_step(hand, o, s, i % 16 == 0 ? &p : nullptr, now).force;
+      most = std::max(most, length(f));
+    }
+    faults = hand.limiter.faults;
+    return most;
+  };
+  uint32_t faults = 0;
+  for (const Vec3 way : {Vec3{1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, 1}}) {
+    EXPECT_EQ(felt(way * 0.010f, 0, faults), 0);
+    EXPECT_TRUE(faults & kElsewhere);
+    EXPECT_NEAR(felt(way * 0.003f, 0, faults), 0.8f, 0.01f);
+    EXPECT_FALSE(faults & kElsewhere);
+  }
+  EXPECT_NEAR(felt({-0.010f, 0, 0}, 0.4f, faults), 0.8f, 0.01f) << "the hand was there a tick ago";
+}
+
+// S12: one sample that lies outside of any arm's reach is garbage, and leaves nothing behind.
+TEST(Haptics, S12_one_absurd_sample) {
+  ServoHand hand;
+  ServoOptions o;
+  uint64_t now = 1000000000;
+  Vec3 f;
+  for (int i = 0; i < 6000; ++i, now += 1000000) {
+    ArmSample s;
+    s.state = ArmState::ready;
+    if (i == 2500) s.pose.p.x = 3e36f;
+    ForcePatch p;
+    p.time_ns = now;
+    if (i > 2700) p.force = {0, 0.8f, 0};
+    if (i == 2600) hand.limiter.faults = 0;
+    f = servo_step(hand, o, s, &p, now).force;
+  }
+  EXPECT_NEAR(f.y, 0.8f, 0.05f);
+  EXPECT_FALSE(hand.limiter.faults & kNotFinite);
+}
+
+// S12: a hand that flies through free air faster than any contact allows feels the next contact at once, gently.
+TEST(Haptics, S12_a_fast_free_hand) {
+  ServoHand hand;
+  ServoOptions o;
+  uint64_t now = 1000000000;
+  Vec3 f, last;
+  float largest = 0;
+  ArmSample s;
+  s.state = ArmState::ready;
+  for (int i = 0; i < 3300; ++i, now += 1000000) {
+    if (i >= 2500 && i < 2600) s.pose.p.x += 0.0015f;
+    ForcePatch p;
+    p.point = s.pose.p;
+    p.time_ns = now;
+    if (i > 2700) p.force = {0, 0.8f, 0};
+    f = servo_step(hand, o, s, &p, now).force;
+    if (i > 2600) largest = std::max(largest, length(f - last));
+    last = f;
+  }
+  EXPECT_NEAR(f.y, 0.8f, 0.01f) << "0.6 s after, not 2 s";
+  EXPECT_LE(largest, 0.5f + 1e-4f);
 }
 
 // H8: three newtons asked for during ten minutes: the mean that goes out is one the motors can bear for ever.

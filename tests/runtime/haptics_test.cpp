@@ -374,6 +374,56 @@ TEST(Haptics, H2_a_live_scene_with_arms) {
   for (const std::string& line : said) std::printf("said: %s\n", line.c_str());
 }
 
+// S1: while the surgeon shows something, while time stands still, and while it runs slower than the hand, the arms' hands are
+// nobody's to push: what acts on the tools then is not theirs. And none of it is told as a fault.
+TEST(Haptics, S1_a_demonstration_leaves_the_learners_hands_alone) {
+  FakeHd fake(false);
+  LiveOptions options;
+  options.haptics = "touch";
+  std::vector<std::string> said;
+  options.say = [&said](const std::string& line) { said.push_back(line); };
+  Snapshot seen;
+  Live live(scene_named("stay"), options);
+  std::array<float, 2> force{}, away{};
+  const auto wait = [&](double seconds, const auto& done) {
+    const double until = wall_seconds() + seconds;
+    do {
+      live.look(seen);
+      for (size_t k = 0; k < 2; ++k) {
+        force[k] = std::max(force[k], length(fake.force(static_cast<int>(k))));
+        away[k] = std::max(away[k], length(fake.position(static_cast<int>(k))));
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    } while (!done() && wall_seconds() < until);
+    return done();
+  };
+  const auto never = [] { return false; };
+  ASSERT_TRUE(wait(120, [&] { return !live.status().settling && live.status().tick > 0; }));
+  wait(3, never);  // in which force would engage
+  const std::array<Vec3, 2> from{seen.tool[0].pose.p, seen.tool[1].pose.p};
+  for (size_t k = 0; k < 2; ++k) force[k] = away[k] = 0;
+  ASSERT_TRUE(live.demonstrate({0, 1}, false));
+  ASSERT_TRUE(wait(120, [&] { return distance(seen.tool[0].pose.p, from[0]) > 0.02f && seen.needle.in_tissue; }))
+      << "the demonstration shows nothing";
+  wait(1, never);
+  for (size_t k = 0; k < 2; ++k) {
+    std::printf("S1: while the surgeon shows: %s arm %.3f N at most, stylus moved %.2f mm\n", k == 0 ? "right" : "left",
+                double{force[k]}, 1e3 * double{away[k]});
+    EXPECT_LT(force[k], 0.01f);
+    EXPECT_LT(away[k], 0.0005f);
+  }
+  live.command(LiveCommand::end_demonstration);
+  ASSERT_TRUE(wait(20, [&] { return !live.status().demonstrating; }));
+  for (size_t k = 0; k < 2; ++k) force[k] = 0;
+  for (const LiveCommand c : {LiveCommand::pause, LiveCommand::single_step, LiveCommand::resume, LiveCommand::slower}) {
+    live.command(c);
+    wait(0.3, never);
+    EXPECT_LT(force[0], 0.01f);
+    EXPECT_LT(force[1], 0.01f);
+  }
+  for (const std::string& line : said) EXPECT_EQ(line.find("did not answer"), std::string::npos) << line;
+}
+
 // The servo's times on this machine, with the Lembert scene's physics beside it.
 TEST(Haptics, H2_times) {
   FakeHd fake(false);

@@ -29,6 +29,7 @@ struct FakeHaply::Work {
   mutable std::mutex lock;
   std::condition_variable change;
   std::array<Arm, 2> arm;
+  std::array<bool, 2> grips{true, true};
   bool held = false, quit = false, stepped = false;
   std::string next, first, last;
   unsigned long answered = 0, allowed = 0;
@@ -51,12 +52,14 @@ struct FakeHaply::Work {
       m["inverse3"].push_back(d);
     }
     // The first arm's grip has no wire: turned by 90 degrees about the vertical, a pressed. The second's has one.
-    m["wireless_verse_grip"].push_back({{"device_id", "61576"},
-                                        {"state",
-                                         {{"orientation", {{"x", 0}, {"y", 0}, {"z", std::sqrt(0.5)}, {"w", std::sqrt(0.5)}}},
-                                          {"buttons", {{"a", true}, {"b", false}, {"c", false}}}}}});
-    m["verse_grip"].push_back(
-        {{"device_id", "61548"}, {"state", {{"orientation", {{"x", 0}, {"y", 0}, {"z", 0}, {"w", 1}}}, {"button", false}}}});
+    if (grips[0])
+      m["wireless_verse_grip"].push_back({{"device_id", "61576"},
+                                          {"state",
+                                           {{"orientation", {{"x", 0}, {"y", 0}, {"z", std::sqrt(0.5)}, {"w", std::sqrt(0.5)}}},
+                                            {"buttons", {{"a", true}, {"b", false}, {"c", false}}}}}});
+    if (grips[1])
+      m["verse_grip"].push_back(
+          {{"device_id", "61548"}, {"state", {{"orientation", {{"x", 0}, {"y", 0}, {"z", 0}, {"w", 1}}}, {"button", false}}}});
     return m;
   }
   void obey(const json& message) {
@@ -168,6 +171,10 @@ void FakeHaply::zero(size_t k) {
 void FakeHaply::there(size_t k, bool is) {
   HOLD;
   work->arm[k].there = is;
+}
+void FakeHaply::grip(size_t k, bool is) {
+  HOLD;
+  work->grips[k] = is;
 }
 void FakeHaply::hold(bool on) {
   HOLD;

@@ -23,6 +23,7 @@ struct FakeHaply {
   Arm at(size_t device) const;
   void zero(size_t device);
   void there(size_t device, bool is);       // false: it is no longer in what the service says
+  void grip(size_t device, bool is);        // false: that device's grip is gone from what the service says
   void hold(bool on);                       // true: messages are kept without an answer until false, or step
   void say(const std::string& text);        // the answer to the next message, whatever it is; "": as it should be
   void inventory(const std::string& text);  // what is said first, to the next who connects

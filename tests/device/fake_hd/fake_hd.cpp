@@ -38,6 +38,12 @@ struct HDErrorInfo {
 
 namespace {
 
+struct Raised {
+  HDErrorInfo error;
+  int frame_of, where;
+  unsigned long times;
+};
+
 struct Planned {
   int arm, fault;
   unsigned long from, to;
@@ -67,6 +73,7 @@ struct Fake {
   int busy = 0;
   std::string missing;
   std::vector<Planned> plan;
+  std::vector<Raised> raised;
   unsigned long ticks = 0;
   std::thread thread;
   std::atomic<bool> quit{false};
@@ -116,6 +123,11 @@ void read_environment(Fake& f) {
 }
 Fake::Fake() { read_environment(*this); }
 
+// What a test has asked to be raised at this place (0 begin, 1 end of a frame, 2 any read) of the current arm.
+void raise_planned(Fake& f, int where) {
+  for (Raised& r : f.raised)
+    if (r.times > 0 && r.where == where && static_cast<HHD>(r.frame_of) == f.current) --r.times, f.error.push_back(r.error);
+}
 void raise(Fake& f, HDerror code) { f.error.push_back({code, static_cast<int>(code) + 1000, f.current}); }
 
 Arm* now(Fake& f) {
@@ -133,7 +145,8 @@ bool has(const Fake& f, int arm, int fault) {
 
 void move(Fake& f, Arm& a, int which) {
   double force[3] = {a.force[0], a.force[1], a.force[2]};
-  if (has(f, which, kFakeWarmMotors) || has(f, which, kFakeCommError) || !a.output) force[0] = force[1] = force[2] = 0;
+  if (has(f, which, kFakeWarmMotors) || has(f, which, kFakeTooFast) || has(f, which, kFakeCommError) || !a.output)
+    force[0] = force[1] = force[2] = 0;
   if (has(f, which, kFakeFlipX)) force[0] = -force[0];
   constexpr int kParts = 10;
   const double h = 1e-3 / kParts;
@@ -237,20 +250,23 @@ void hdBeginFrame(HHD h) {
   if (h >= 2 || f.current != h) return raise(f, 0x0400);
   f.arm[h].in_frame = true;
   if (has(f, static_cast<int>(h), kFakeCommError)) raise(f, 0x0302);
-  if (has(f, static_cast<int>(h), kFakeWarmMotors)) raise(f, 0x0200);
-  if (has(f, static_cast<int>(h), kFakeTooFast)) raise(f, 0x0203);
+  raise_planned(f, 0);
 }
 void hdEndFrame(HHD h) {
   HOLD;
   if (h >= 2 || !f.arm[h].in_frame) return raise(f, 0x0401);
   f.arm[h].in_frame = false;
   if (has(f, static_cast<int>(h), kFakeCommError)) raise(f, 0x0302);
+  // The end of a frame sends the force, and there the library finds that it may not.
+  if (has(f, static_cast<int>(h), kFakeWarmMotors)) raise(f, 0x0200);
+  if (has(f, static_cast<int>(h), kFakeTooFast)) raise(f, 0x0203);
+  raise_planned(f, 1);
 }
 HDErrorInfo hdGetError() {
   HOLD;
   if (f.error.empty()) return {0, 0, f.current};
-  const HDErrorInfo e = f.error.front();
-  f.error.pop_front();
+  const HDErrorInfo e = f.error.back();  // the newest first
+  f.error.pop_back();
   return e;
 }
 HDstring hdGetErrorString(HDerror code) {
@@ -315,6 +331,7 @@ void hdGetDoublev(HDenum what, HDdouble* out) {
   Arm* a = now(f);
   if (!a) return;
   const bool nan = has(f, static_cast<int>(f.current), kFakeNan);
+  if (what == 0x2052) raise_planned(f, 2);
   switch (what) {
     case 0x2050:
       for (int k = 0; k < 3; ++k) out[k] = nan ? std::numeric_limits<double>::quiet_NaN() : a->x[k];
@@ -455,6 +472,7 @@ void fakeHdReset() {
   HOLD;
   for (Arm& a : f.arm) a = {};
   f.error.clear();
+  f.raised.clear();
   f.callback = nullptr;
   f.running = false;
   f.current = 0xFFFFFFFF;
@@ -468,6 +486,10 @@ void fakeHdStep(unsigned milliseconds) {
 void fakeHdFault(int arm, int fault, int on) {
   HOLD;
   f.arm[static_cast<size_t>(arm)].fault[fault] = on != 0;
+}
+void fakeHdRaise(int frame_of, int blamed, unsigned code, int where, unsigned long times) {
+  HOLD;
+  f.raised.push_back({{code, static_cast<int>(code) + 1000, static_cast<HHD>(blamed)}, frame_of, where, times});
 }
 void fakeHdHand(int arm, const double* position, const double* quaternion, int buttons) {
   HOLD;

@@ -9,7 +9,7 @@ enum FakeHdFault {
   kFakeStall = 3,       // the whole scheduler stops calling back
   kFakeNan = 4,         // positions that are no numbers
   kFakeFlipX = 5,       // the x motor is wired the wrong way round
-  kFakeTooFast = 6,     // HD_EXCEEDED_MAX_VELOCITY
+  kFakeTooFast = 6,     // HD_EXCEEDED_MAX_VELOCITY: the driver cuts the force
 };
 
 struct FakeHdArm {
@@ -32,6 +32,9 @@ struct FakeHdArm {
 void fakeHdReset(void);
 void fakeHdStep(unsigned milliseconds);
 void fakeHdFault(int arm, int fault, int on);
+// In the next `times` frames of arm `frame_of`: the error `code`, with arm `blamed` in its record, at the frame's begin (where
+// 0), at its end (1), or when the pose is read (2).
+void fakeHdRaise(int frame_of, int blamed, unsigned code, int where, unsigned long times);
 // Where the hand means to be [mm], how it holds the stylus (x, y, z, w), which buttons it presses.
 void fakeHdHand(int arm, const double* position, const double* quaternion, int buttons);
 // [N/mm], [N s/mm], [kg] arm and finger together, [N] dry friction.

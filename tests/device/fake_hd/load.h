@@ -18,6 +18,7 @@ struct FakeHd {
   decltype(&fakeHdReset) reset = nullptr;
   decltype(&fakeHdStep) step = nullptr;
   decltype(&fakeHdFault) fault = nullptr;
+  decltype(&fakeHdRaise) raise = nullptr;
   decltype(&fakeHdHand) hand = nullptr;
   decltype(&fakeHdGrip) grip = nullptr;
   decltype(&fakeHdPlace) place = nullptr;
@@ -31,7 +32,8 @@ struct FakeHd {
     setenv("CATGUT_LIBHD", CATGUT_FAKE_LIBHD, 1);
     library = dlopen(CATGUT_FAKE_LIBHD, RTLD_NOW | RTLD_LOCAL);
     if (!library) ADD_FAILURE() << dlerror();
-    find(reset, "fakeHdReset"), find(step, "fakeHdStep"), find(fault, "fakeHdFault"), find(hand, "fakeHdHand");
+    find(reset, "fakeHdReset"), find(step, "fakeHdStep"), find(fault, "fakeHdFault"), find(raise, "fakeHdRaise"),
+        find(hand, "fakeHdHand");
     find(grip, "fakeHdGrip"), find(place, "fakeHdPlace"), find(read, "fakeHdRead"), find(zero, "fakeHdZero");
     reset();
   }
