@@ -71,6 +71,8 @@ int play_without_arguments();  // the window's start screen
 
 // A number from least to most; unlike CLI::Range it lets no NaN through.
 CLI::Validator within(double least, double most);
+// Refuses file names whose suffix does not say what they hold.
+void check_picture_files(const PictureOptions& options);
 // --video, --frames, --contact-sheet, --video-speed.
 void add_picture_options(CLI::App& command, PictureOptions& options);
 void add_threads_option(CLI::App& command, int& threads);

@@ -11,6 +11,7 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "core/file.h"
 
 namespace catgut {
 namespace {
@@ -58,6 +59,12 @@ void add_picture_options(CLI::App& command, PictureOptions& options) {
       ->type_name("S:FILE.png")
       ->take_all()
       ->allow_extra_args(false);
+}
+
+void check_picture_files(const PictureOptions& options) {
+  check_suffix(options.video, ".mp4", "--video");
+  check_suffix(options.contact_sheet, ".png", "--contact-sheet");
+  for (const auto& [at_s, path] : options.still) check_suffix(path, ".png", "--still");
 }
 
 void add_threads_option(CLI::App& command, int& threads) {
@@ -118,10 +125,7 @@ void write_output(const std::string& path, const std::string& text) {
     if (std::fflush(stdout) != 0) throw InputError("standard output", "cannot be written", "is the disk full?");
     return;
   }
-  std::ofstream out(path, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) throw InputError(path, "cannot be written", "is the disk full?");
+  write_file(path, text);
 }
 
 std::string this_machine() {

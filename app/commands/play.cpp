@@ -3,6 +3,7 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "core/file.h"
 #include "device/drivers.h"
 #include "procedure/lesson.h"
 #include "procedure/scene_file.h"
@@ -95,6 +96,9 @@ void add_play(CLI::App& app, int& exit_code) {
                        "write catgut play " + first_stitch().scene + " --teach");
     if (!o->play.scene.empty()) read_scene(o->play.scene);  // its faults are told before a window opens
     o->play.live.say = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
+    check_suffix(o->play.live.record, ".cgrec", "--record");
+    check_suffix(o->play.json, ".json", "--json");
+    check_suffix(o->play.screenshot, ".png", "--screenshot");
     for (const std::string& path : {o->play.live.record, o->play.json, o->play.events, o->play.screenshot}) check_output(path);
     exit_code = play(o->play);
   });
@@ -110,6 +114,7 @@ void add_view(CLI::App& app, int& exit_code) {
     const Recording recording = read_recording(o->play.view);  // as above
     check_replayable(recording, o->play.view);
     parse_scene(recording.header.scene, o->play.view);
+    check_suffix(o->play.screenshot, ".png", "--screenshot");
     check_output(o->play.screenshot);
     exit_code = play(o->play);
   });

@@ -4,6 +4,7 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "core/file.h"
 #include "runtime/report.h"
 
 namespace catgut {
@@ -18,6 +19,8 @@ struct ReplayOptions {
 
 int replay(const ReplayOptions& o) {
   const Recording recording = read_recording(o.file);
+  check_picture_files(o.pictures);
+  check_suffix(o.json, ".json", "--json");
   for (const std::string& path : {o.json, o.pictures.video, o.pictures.contact_sheet}) prepare_output(path);
   std::unique_ptr<Pictures> pictures;
   SessionHooks hooks;

@@ -6,6 +6,7 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "core/file.h"
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
 
@@ -35,6 +36,9 @@ SceneSpec scene_for(const RunOptions& o) {
 
 int run(const RunOptions& o) {
   const SceneSpec scene = scene_for(o);
+  check_picture_files(o.pictures);
+  check_suffix(o.session.record, ".cgrec", "--record");
+  check_suffix(o.json, ".json", "--json");
   for (const std::string& path : {o.json, o.session.record, o.pictures.video, o.pictures.contact_sheet}) prepare_output(path);
   const double until_s = o.session.seconds > 0 ? o.session.seconds : static_cast<double>(scene.duration);
   for (const auto& [at_s, path] : o.pictures.still) {

@@ -9,9 +9,11 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <string_view>
 
 #include "core/check.h"
+#include "core/file.h"
 #include "procedure/toml.h"
 
 namespace catgut {
@@ -86,13 +88,12 @@ void write_arm_places(const std::string& path, const std::map<std::string, ArmPl
   for (const auto& [serial, p] : places)
     file.insert_or_assign(
         serial, toml::table{{"scale", p.scale}, {"turn", p.turn}, {"x", p.middle.x}, {"y", p.middle.y}, {"z", p.middle.z}});
-  std::ofstream out(path);
+  std::ostringstream out;
   out << "# Where each haptic arm lies in the field, by serial number; catgut devices --calibrate writes this.\n"
          "# scale: metres in the field per metre of the stylus; turn [degrees]; x, y, z [m]: what of the arm is the middle of "
          "the field.\n"
       << file << "\n";
-  out.close();
-  if (!out) throw InputError(path, "cannot be written", "set CATGUT_ARMS to another place");
+  write_file(path, out.str());
 }
 
 }  // namespace catgut

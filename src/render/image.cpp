@@ -8,6 +8,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "core/file.h"
 #include "render/font.h"
 
 namespace catgut {
@@ -87,8 +88,13 @@ Image contact_sheet(std::span<const SheetCell> cells, int columns) {
 void write_png(const Image& image, const std::string& path) {
   if (image.width <= 0 || image.height <= 0 || image.rgba.size() != size_t(image.width) * size_t(image.height) * 4)
     throw std::runtime_error(path + ": the picture to write is empty");
-  if (!stbi_write_png(path.c_str(), image.width, image.height, 4, image.rgba.data(), image.width * 4))
-    throw std::runtime_error(path + ": cannot write the picture; does the folder exist, and is there room?");
+  std::string bytes;
+  const auto append = [](void* to, void* data, int size) {
+    static_cast<std::string*>(to)->append(static_cast<const char*>(data), static_cast<size_t>(size));
+  };
+  if (!stbi_write_png_to_func(append, &bytes, image.width, image.height, 4, image.rgba.data(), image.width * 4))
+    throw std::runtime_error(path + ": the image cannot be encoded");
+  write_file(path, bytes);
 }
 
 Image read_png(const std::string& path) {

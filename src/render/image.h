@@ -37,6 +37,7 @@ struct SheetCell {
 // A grid of pictures with the caption under each, `columns` wide: one file that tells how a run went.
 Image contact_sheet(std::span<const SheetCell> cells, int columns);
 
+// Replaces the file as a whole (core/file). Throws std::runtime_error, InputError for what the disk or the path refuses.
 void write_png(const Image& image, const std::string& path);
 Image read_png(const std::string& path);
 

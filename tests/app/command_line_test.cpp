@@ -80,6 +80,15 @@ particles = 1403
   fs::path folder_;
 };
 
+TEST_F(CommandLine, a_file_name_says_what_it_holds) {
+  expect_refused("run small.toml --surgeon none --still 0.1:x.jpg", "does not end in .png");
+  expect_refused("run small.toml --surgeon none --video x.png", "does not end in .mp4");
+  expect_refused("run small.toml --surgeon none --contact-sheet x.pdf", "does not end in .png");
+  expect_refused("run small.toml --surgeon none --record x.json", "does not end in .cgrec");
+  expect_refused("run small.toml --surgeon none --json x.cgrec", "does not end in .json");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 3) << "the scene and the two outputs: nothing was written";
+}
+
 TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
   expect_refused("", "run without it");
   expect_refused("run purse_sting --headless", "did you mean \"purse_string\"?");
