@@ -21,13 +21,17 @@ namespace {
 const char* next_step(int error) {
   switch (error) {
     case ENOSPC:
-    case EDQUOT: return "free some space, or choose another disk";
+    case EDQUOT:
+      return "free some space, or choose another disk";
     case ENOENT:
-    case ENOTDIR: return "create its folder, or choose another place";
+    case ENOTDIR:
+      return "create its folder, or choose another place";
     case EACCES:
     case EPERM:
-    case EROFS: return "choose a folder that you may write to";
-    default: return "choose another place";
+    case EROFS:
+      return "choose a folder that you may write to";
+    default:
+      return "choose another place";
   }
 }
 

@@ -54,8 +54,8 @@ TEST_F(File, follows_a_link) {
   EXPECT_EQ(content(path), "new");
 }
 
-// The disk is full after 4096 bytes: the old file survives, nothing else stays behind. In a child process, since the limit cannot
-// be taken back.
+// The disk is full after 4096 bytes: the old file survives, nothing else stays behind. In a child process, since the limit
+// cannot be taken back.
 TEST_F(File, survives_a_full_disk) {
   const fs::path path = folder_ / "a.json";
   write_file(path.string(), "old");
@@ -91,7 +91,8 @@ TEST_F(File, suffix_says_what_it_holds) {
   check_suffix("", ".png", "--still");
   check_suffix("-", ".json", "--json");
   check_suffix("a/b.PNG", ".png", "--still");
-  for (const char* wrong : {"a.jpg", "png", ".png", "a.png.gz"}) EXPECT_THROW(check_suffix(wrong, ".png", "--still"), InputError) << wrong;
+  for (const char* wrong : {"a.jpg", "png", ".png", "a.png.gz"})
+    EXPECT_THROW(check_suffix(wrong, ".png", "--still"), InputError) << wrong;
 }
 
 }  // namespace
