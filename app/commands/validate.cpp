@@ -29,13 +29,14 @@ void print_line(const ValidationLine& l) {
   std::fflush(stdout);
 }
 
-int validate(const std::string& json) {
+int validate(const std::string& json, bool nightly) {
   prepare_output(json);
   const bool table = json != "-";
   if (table)
     std::printf("%-4s  %-46s %11s %11s  %-9s %9s %9s  %s\n", "", "check", "expected", "got", "unit", "error", "tolerance",
                 "source");
-  const std::vector<ValidationLine> lines = run_validation(table ? print_line : std::function<void(const ValidationLine&)>{});
+  const std::vector<ValidationLine> lines =
+      run_validation(table ? print_line : std::function<void(const ValidationLine&)>{}, nightly);
   if (!json.empty()) write_output(json, json_of(lines));
   size_t failed = 0;
   for (const ValidationLine& l : lines) failed += !l.ok;
@@ -49,7 +50,9 @@ void add_validate(CLI::App& app, int& exit_code) {
   auto json = std::make_shared<std::string>();
   CLI::App* command = app.add_subcommand("validate", "check the physics against closed forms and published numbers");
   command->add_option("--json", *json, "the same lines as JSON; - for standard output")->type_name("FILE|-");
-  command->callback([json, &exit_code] { exit_code = validate(*json); });
+  auto nightly = std::make_shared<bool>(false);
+  command->add_flag("--nightly", *nightly, "whole ranges of the checks that are shortened otherwise; many minutes");
+  command->callback([json, nightly, &exit_code] { exit_code = validate(*json, *nightly); });
 }
 
 }  // namespace catgut

@@ -101,7 +101,7 @@ Block make_block(int n, float spacing) {
 
 }  // namespace validation
 
-std::vector<ValidationLine> run_validation(const std::function<void(const ValidationLine&)>& on_line) {
+std::vector<ValidationLine> run_validation(const std::function<void(const ValidationLine&)>& on_line, bool nightly) {
   validation::Lines lines;
   lines.on_line = on_line;
   validation::check_oscillator(lines);
@@ -112,6 +112,10 @@ std::vector<ValidationLine> run_validation(const std::function<void(const Valida
   validation::check_momentum(lines);
   validation::check_rotation(lines);
   validation::check_volume(lines);
+  validation::check_capstan(lines, nightly);
+  validation::check_overhand(lines, nightly);
+  validation::check_holding(lines, nightly);
+  validation::check_ties(lines, nightly);
   return lines.line;
 }
 

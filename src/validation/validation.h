@@ -17,7 +17,9 @@ struct ValidationLine {
   bool ok = false;
 };
 
-// Runs every check, a few seconds in all. on_line is called with each line as it is known.
-std::vector<ValidationLine> run_validation(const std::function<void(const ValidationLine&)>& on_line = {});
+// Runs every check, half a minute in all; nightly: the whole ranges of the long ones, many minutes. on_line is called with each
+// line as it is known.
+std::vector<ValidationLine> run_validation(const std::function<void(const ValidationLine&)>& on_line = {},
+                                           bool nightly = false);
 
 }  // namespace catgut

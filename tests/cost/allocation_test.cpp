@@ -17,6 +17,7 @@
 #include "runtime/hands.h"
 #include "sim/model.h"
 #include "sim/state.h"
+#include "validation/knot_scenes.h"
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define CATGUT_COUNTS_ALLOCATIONS 1
@@ -164,6 +165,26 @@ TEST(AllocationCount, sees_new_aligned_new_and_malloc) {
   EXPECT_EQ(allocations_of([&] { raw = std::malloc(100); }), 1u);
   EXPECT_EQ(allocations_of([&] { plain.resize(50), aligned.clear(); }), 0u);
   std::free(raw);
+}
+
+// The physical thread, while a knot is drawn tight on it and the pair list is refreshed.
+TEST(Allocation, a_thread_that_is_knotted_asks_for_none) {
+#ifndef CATGUT_COUNTS_ALLOCATIONS
+  GTEST_SKIP() << "allocations are not counted here";
+#endif
+  const thread::Settings settings = validation::knot_settings(0.3f);
+  validation::Tightened t(validation::lay_knot(validation::surgeons_211(), settings.material.diameter, 0.5e-3f));
+  thread::State& state = t.knot.state;
+  const thread::Pull pull[2] = {{t.knot.tail_a(), t.knot.tail_direction_a * 2}, {t.knot.tail_b(), t.knot.tail_direction_b * 2}};
+  thread::ToolCapsule tool;
+  tool.a = tool.to_a = {0, -0.02f, -3e-3f}, tool.b = tool.to_b = {0, 0.02f, -3e-3f}, tool.radius = 1e-3f;
+  thread::Surroundings around;
+  around.pulls = pull, around.tools = {&tool, 1};
+  const uint64_t count = allocations_of([&] {
+    for (int i = 0; i < 60; ++i) t.stepper.step(settings, state, around);
+  });
+  EXPECT_GT(state.refreshes, 5u);
+  EXPECT_EQ(count, 0u) << sites();
 }
 
 }  // namespace

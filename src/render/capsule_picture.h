@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// render/capsule_picture: a picture of capsules (threads, tools) without a graphics card: parallel projection, one light from
+// the viewer's upper left, depth and shade per pixel. For close-ups in documents, reports and tests.
+#pragma once
+#include <span>
+
+#include "core/math.h"
+#include "render/image.h"
+
+namespace catgut {
+
+struct DrawnCapsule {
+  Vec3 a, b;         // [m]
+  float radius = 0;  // [m]
+  Colour colour{255, 255, 255, 255};
+};
+struct CapsuleView {
+  Vec3 center;                           // [m] in the middle of the picture
+  Vec3 toward{0, 0.3f, 1}, up{0, 1, 0};  // from the center to the viewer; what is up
+  float width = 0.01f;                   // [m] from the left edge to the right
+};
+
+Image draw_capsules(std::span<const DrawnCapsule> capsules, const CapsuleView& view, int width = 480, int height = 360);
+
+}  // namespace catgut

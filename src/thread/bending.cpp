@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// thread/bending: elastic bending of a stated stiffness B, as a force evaluated at the beginning of the substep. Energy of node
+// i: B / (2 l) |e_i / l_i - e_i-1 / l_i-1|^2 with l the mean length of its two segments (Bergou et al.
+// 2008, 10.1145/1360612.1360662, without twist, small angles between segments). Reads edges; adds to the forces. No constraint:
+// a rod at rest is then a fixed point of the step whatever the solver does, and B is the B that was asked for. The price is a
+// smallest mass (bending_density).
+#include <tuple>
+
+#include "thread/internal.h"
+
+namespace catgut::thread {
+namespace {
+
+CATGUT_CLONES void moments(size_t nodes, float stiffness, const float* __restrict e, const float* __restrict rest,
+                           const float* __restrict inverse, const float* __restrict keep, float* __restrict moment) {
+  for (size_t i = 1; i + 1 < nodes; ++i) {
+    const float bend = e[i] * inverse[i] - e[i - 1] * inverse[i - 1];
+    moment[i] = keep[i] * keep[i - 1] * 2 * stiffness / (rest[i] + rest[i - 1]) * bend;
+  }
+}
+
+CATGUT_CLONES void forces(size_t nodes, const float* __restrict moment, const float* __restrict inverse, float* __restrict f) {
+  for (size_t k = 0; k < nodes; ++k) {
+    const ptrdiff_t i = static_cast<ptrdiff_t>(k);
+    f[i] += (moment[i] - moment[i - 1]) * inverse[i - 1] - (moment[i + 1] - moment[i]) * inverse[i];
+  }
+}
+
+}  // namespace
+
+void add_bending(const Settings& settings, Scratch& s, size_t nodes) {
+  const float b = settings.material.bending_stiffness;
+  const float *rest = s.rest.data(), *inverse = s.inverse_rest.data(), *keep = s.keep.data();
+  for (auto [e, moment, f] : {std::tuple{&s.e.x, &s.moment.x, &s.force.x}, std::tuple{&s.e.y, &s.moment.y, &s.force.y},
+                              std::tuple{&s.e.z, &s.moment.z, &s.force.z}}) {
+    moment->operator[](nodes - 1) = moment->operator[](nodes) = 0;
+    moments(nodes, b, e->data(), rest, inverse, keep, moment->data());
+    forces(nodes, moment->data(), inverse, f->data());
+  }
+}
+
+float bending_density(const Settings& settings, float l) {
+  // The stiffest wave has frequency^2 = 16 B / (l^3 m); a step is stable below 4 / h^2. 1 / h^2 leaves room for contact.
+  const float h = settings.substep;
+  return 16 * settings.material.bending_stiffness * h * h / (l * l * l * l);
+}
+
+}  // namespace catgut::thread

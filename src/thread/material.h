@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// thread/material: suture materials as data. Reads and writes nothing. Every number names its source or says that it is an
+// estimate.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace catgut::thread {
+
+enum class Material : uint8_t { silk, polyglactin_910, polydioxanone, polypropylene };
+enum class Size : uint8_t { usp_4_0, usp_3_0, usp_2_0, usp_0 };
+
+// What the mechanics need to know of a suture. Bending stiffness is a number of its own: a braid bends far more easily than a
+// solid rod of the same tensile stiffness.
+struct Properties {
+  Material material{};
+  Size size{};
+  std::string_view name;        // "silk 3-0"
+  float diameter = 0;           // [m]
+  float line_density = 0;       // [kg/m] real; the simulation uses more (Settings::free_density)
+  float axial_stiffness = 0;    // EA [N]
+  float bending_stiffness = 0;  // B [N.m2]
+  float friction = 0;           // thread on thread, Coulomb
+  float knot_strength = 0;      // knot-pull strength [N]: where a contact bends it, it breaks at this tension
+  float straight_strength = 0;  // [N]
+  bool braided = false;
+};
+
+std::span<const Properties> materials();  // all sixteen, by material, then from 4-0 to 0
+const Properties& properties(Material material, Size size);
+// "silk 3-0" or "silk" (3-0). Null when there is no such suture.
+const Properties* find_material(std::string_view name);
+
+}  // namespace catgut::thread

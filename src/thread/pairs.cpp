@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// thread/pairs: which segments may touch each other or a tool. The list is kept until something has moved half its margin; what
+// a pair remembers is carried over by key, so a refresh changes nothing but who is looked at. Reads positions; writes the
+// crossings.
+#include <algorithm>
+#include <cmath>
+
+#include "thread/internal.h"
+
+namespace catgut::thread {
+namespace {
+
+constexpr size_t kBlock = 8;  // segments that share a bounding sphere
+
+float clamp01(float v) { return v < 0 ? 0 : v > 1 ? 1 : v; }
+
+CATGUT_CLONES void middles(size_t segments, const float* __restrict x, float* __restrict middle) {
+  for (size_t i = 0; i < segments; ++i) middle[i] = 0.5f * (x[i] + x[i + 1]);
+}
+
+// Bit k: segment first + k has its middle within reach of p.
+CATGUT_CLONES void near_middles(const float* __restrict x, const float* __restrict y, const float* __restrict z,
+                                const float* __restrict half, Vec3 p, float reach, int* __restrict near) {
+  for (size_t k = 0; k < kBlock; ++k) {
+    const float dx = x[k] - p.x, dy = y[k] - p.y, dz = z[k] - p.z, r = reach + half[k];
+    near[k] = dx * dx + dy * dy + dz * dz < r * r;
+  }
+}
+
+}  // namespace
+
+void closest_points(Vec3 r, Vec3 a, Vec3 b, float& s, float& t) {
+  const float aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), ar = dot(a, r), br = dot(b, r);
+  const float det = aa * bb - ab * ab;
+  s = det > 1e-7f * aa * bb ? clamp01((ab * br - bb * ar) / det) : 0.5f;
+  t = (ab * s + br) / bb;
+  if (t < 0) t = 0, s = clamp01(-ar / aa);
+  else if (t > 1) t = 1, s = clamp01((ab - ar) / aa);
+}
+
+uint32_t skipped_neighbors(const Settings& settings, const State& state) {
+  // A strand that turns back on itself as tightly as it can (its own radius) needs this much length in between.
+  const float shortest = *std::min_element(state.rest.begin(), state.rest.end());
+  return std::max(2u, static_cast<uint32_t>(std::ceil(1.6f * settings.material.diameter / shortest)));
+}
+
+void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span<const ToolCapsule> tools, float time) {
+  const size_t m = state.segments(), blocks = (m + kBlock - 1) / kBlock;
+  const float reach = settings.material.diameter + settings.list_margin;
+  const uint32_t skip = skipped_neighbors(settings, state);
+  middles(m, state.x.x.data(), s.middle.x.data());
+  middles(m, state.x.y.data(), s.middle.y.data());
+  middles(m, state.x.z.data(), s.middle.z.data());
+  for (size_t i = 0; i < m; ++i) s.half[i] = 0.5f * length(between(state, i + 1, i));
+  for (size_t b = 0; b < blocks; ++b) {
+    const size_t first = b * kBlock, end = std::min(m, first + kBlock);
+    Vec3 center{};
+    for (size_t i = first; i < end; ++i) center += s.middle.at(i);
+    center = center / static_cast<float>(end - first);
+    float radius = 0;
+    for (size_t i = first; i < end; ++i) radius = std::max(radius, distance(center, s.middle.at(i)) + s.half[i]);
+    s.block_middle[b] = center, s.block_radius[b] = radius;
+  }
+  s.new_key.clear(), s.new_budget.clear(), s.new_crossing.clear();
+  size_t old = 0;
+  auto keep = [&](uint32_t key) {
+    if (s.new_key.size() >= s.max_crossings) {
+      ++state.overflow;
+      return;
+    }
+    while (old < state.key.size() && state.key[old] < key) ++old;
+    const bool known = old < state.key.size() && state.key[old] == key;
+    s.new_key.push_back(key);
+    s.new_budget.push_back(known ? state.budget[old] : 0.0f);
+    s.new_crossing.push_back(known ? state.crossing[old] : Crossing{});
+  };
+  int near[kBlock];
+  for (size_t i = 0; i < m; ++i) {
+    if (state.broken[i]) continue;
+    const Vec3 at = s.middle.at(i), a = between(state, i + 1, i);
+    const float half = s.half[i];
+    for (size_t b = (i + skip + 1) / kBlock; b < blocks; ++b) {
+      const float r = reach + half + s.block_radius[b];
+      if (length2(s.block_middle[b] - at) > r * r) continue;
+      const size_t first = b * kBlock;
+      near_middles(&s.middle.x[first], &s.middle.y[first], &s.middle.z[first], &s.half[first], at, reach + half, near);
+      for (size_t k = 0; k < kBlock; ++k) {
+        const size_t j = first + k;
+        if (!near[k] || j <= i + skip || j >= m || state.broken[j]) continue;
+        const Vec3 p = between(state, i, j), c = between(state, j + 1, j);
+        float u, v;
+        closest_points(p, a, c, u, v);
+        if (length2(p + a * u - c * v) < reach * reach) keep(static_cast<uint32_t>(i << 16 | j));
+      }
+    }
+    for (size_t k = 0; k < tools.size(); ++k) {
+      const ToolCapsule& tool = tools[k];
+      const Vec3 ta = lerp(tool.a, tool.to_a, time), tb = lerp(tool.b, tool.to_b, time);
+      const float far = tool.radius + 0.5f * settings.material.diameter + settings.list_margin;
+      const Vec3 p = state.position(i) - ta, c = tb - ta;
+      float u, v;
+      closest_points(p, a, length2(c) > 1e-12f ? c : Vec3{1e-6f, 0, 0}, u, v);
+      if (length2(p + a * u - c * v) < far * far) keep(static_cast<uint32_t>(i << 16 | (kTool + k)));
+    }
+  }
+  state.key.assign(s.new_key.begin(), s.new_key.end());
+  state.budget.assign(s.new_budget.begin(), s.new_budget.end());
+  state.crossing.assign(s.new_crossing.begin(), s.new_crossing.end());
+  state.travel = 0;
+  ++state.refreshes;
+}
+
+}  // namespace catgut::thread

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: Apache-2.0
+// thread/step: one step of a thread, as a list of what happens. Reads Settings and Surroundings; writes State and the forces on
+// holds, tools and plane. Small steps with few iterations: Macklin et al. 2019, 10.1145/3309486.3340247.
+#include <algorithm>
+#include <cmath>
+
+#include "core/check.h"
+#include "core/hash.h"
+#include "thread/internal.h"
+
+namespace catgut::thread {
+namespace {
+
+CATGUT_CLONES void predict(size_t nodes, float h, float gravity, const float* __restrict v, const float* __restrict f,
+                           const float* __restrict w, float* __restrict u) {
+  for (size_t i = 0; i < nodes; ++i) u[i] = w[i] > 0 ? h * (v[i] + h * (gravity + f[i] * w[i])) : 0.0f;
+}
+
+CATGUT_CLONES void move(size_t nodes, float keep, const float* __restrict u, float* __restrict x, float* __restrict fine,
+                        float* __restrict v) {
+  for (size_t i = 0; i < nodes; ++i) {
+    const float low = fine[i] + u[i], sum = x[i] + low;
+    fine[i] = low - (sum - x[i]);
+    x[i] = sum;
+    v[i] = u[i] * keep;
+  }
+}
+
+// Neighbors share a part of their velocity difference: damps what is shorter than the thread's waves, conserves momentum.
+CATGUT_CLONES void calm(size_t nodes, float share, const float* __restrict mass, const float* __restrict w,
+                        const float* __restrict keep, float* __restrict flow, float* __restrict v) {
+  for (size_t i = 0; i + 1 < nodes; ++i)
+    flow[i] = keep[i] * share * (mass[i] < mass[i + 1] ? mass[i] : mass[i + 1]) * (v[i + 1] - v[i]);
+  for (size_t k = 0; k < nodes; ++k) v[k] += w[k] * (flow[k] - flow[static_cast<ptrdiff_t>(k) - 1]);
+}
+
+void limit_motion(Scratch& s, size_t nodes, float limit) {
+  for (size_t i = 0; i < nodes; ++i) {
+    const float size2 = length2(s.u.at(i));
+    if (size2 > limit * limit) s.u.set(i, s.u.at(i) * (limit / std::sqrt(size2)));
+    s.move[i] = std::sqrt(std::min(size2, limit * limit));
+  }
+}
+
+// What stays the same during a step.
+void begin_step(const Settings& settings, const State& state, Scratch& s) {
+  const size_t m = state.segments();
+  const float h = settings.substep;
+  for (size_t i = 0; i < m; ++i) {
+    s.rest[i] = state.rest[i];
+    s.inverse_rest[i] = 1 / state.rest[i];
+    s.keep[i] = state.broken[i] ? 0.0f : 1.0f;
+    s.alpha[i] = state.rest[i] / (settings.material.axial_stiffness * h * h);
+    s.tension_sum[i] = 0;
+  }
+  for (Padded* c : {&s.rest, &s.inverse_rest, &s.keep, &s.alpha}) (*c)[m] = 0;
+  // What bending and tension need of a segment; a node takes the larger need of its two segments.
+  auto need = [&](size_t i) {
+    const float l = state.rest[i], loaded = h * h * std::abs(state.tension[i]) / (l * l * settings.load_limit);
+    return std::max(bending_density(settings, l), loaded);
+  };
+  float before = need(0);
+  for (size_t i = 0; i <= m; ++i) {
+    const float after = i < m ? need(i) : before;
+    s.least_density[i] = std::max(before, after);
+    s.span[i] = 0.5f * ((i > 0 ? state.rest[i - 1] : 0.0f) + (i < m ? state.rest[i] : 0.0f));
+    before = after;
+  }
+}
+
+void find_masses(const Settings& settings, const State& state, Scratch& s, std::span<const Hold> holds) {
+  const size_t n = state.nodes();
+  const float added = settings.touch_density - settings.free_density;
+  for (size_t i = 0; i < n; ++i) {
+    const float density = std::max(s.least_density[i], settings.free_density + added * state.warm[i]);
+    s.mass[i] = density * s.span[i];
+    s.w[i] = 1 / s.mass[i];
+  }
+  for (const Hold& hold : holds)
+    if (hold.stiffness <= 0) s.w[hold.node] = 0;
+}
+
+// Springs are implicit: they add h^2 k to the node's mass, so that no stiffness is too high.
+void move_holds(const Settings& settings, const State& state, Scratch& s, std::span<Hold> holds, int substep) {
+  const float h2 = settings.substep * settings.substep, part = 1.0f / static_cast<float>(settings.substeps);
+  for (const Hold& hold : holds) {
+    const uint32_t i = hold.node;
+    const Vec3 away = (lerp(hold.from, hold.to, static_cast<float>(substep + 1) * part) - state.x.at(i)) - state.fine.at(i);
+    if (hold.stiffness <= 0) {
+      s.u.set(i, away);
+      continue;
+    }
+    const float force = hold.stiffness * length(away - s.u.at(i));
+    if (hold.limit > 0 && force > hold.limit) {
+      s.u.add(i, normalized(away - s.u.at(i)) * (hold.limit * h2 * s.w[i]));
+    } else {
+      const float added = h2 * hold.stiffness, mass = s.mass[i] + added;
+      s.u.set(i, (s.mass[i] * s.u.at(i) + added * away) / mass);
+      s.w[i] = 1 / mass;
+    }
+  }
+}
+
+void record_hold_forces(const Settings& settings, const State& state, const Scratch& s, std::span<Hold> holds, int substep) {
+  const float part = 1.0f / static_cast<float>(settings.substeps), per = part / (settings.substep * settings.substep);
+  for (Hold& hold : holds) {
+    const uint32_t i = hold.node;
+    if (hold.stiffness > 0) {
+      const Vec3 away =
+          (lerp(hold.from, hold.to, static_cast<float>(substep + 1) * part) - state.x.at(i)) - state.fine.at(i) - s.u.at(i);
+      const float force = hold.stiffness * length(away);
+      hold.force += away * (hold.stiffness * part * (hold.limit > 0 && force > hold.limit ? hold.limit / force : 1.0f));
+      continue;
+    }
+    Vec3 on_node = s.force.at(i) * part;
+    if (i > 0) on_node += s.n.at(i - 1) * (s.lambda[i - 1] * per);
+    if (i < state.segments()) on_node -= s.n.at(i) * (s.lambda[i] * per);
+    for (const Active& c : s.active) {
+      const Vec3 impulse = (c.normal * c.ln + c.lt) * per;
+      if (c.i == i) on_node += c.wi0 * impulse;
+      if (c.i + 1 == i) on_node += c.wi1 * impulse;
+      if (c.j == i) on_node += c.wj0 * impulse;
+      if (c.j + 1 == i) on_node += c.wj1 * impulse;
+    }
+    hold.force -= on_node;
+  }
+}
+
+struct Hasher {
+  uint64_t hash = 0;
+  template <typename T>
+  void operator()(const char*, const std::vector<T>& v) {
+    hash = hash_bytes(v.data(), v.size() * sizeof(T), hash);
+  }
+  void operator()(const char*, float v) { hash = hash_bytes(&v, sizeof v, hash); }
+  void operator()(const char*, uint32_t v) { hash = hash_bytes(&v, sizeof v, hash); }
+};
+
+void warm_masses(const Settings& settings, State& state, Scratch& s) {
+  const float fade = std::exp(-settings.substep / settings.mass_decay);
+  const size_t n = state.nodes();
+  for (size_t i = 0; i < n; ++i) {
+    state.warm[i] = s.touched[i] ? 1.0f : state.warm[i] > 1e-3f ? state.warm[i] * fade : 0.0f;
+    s.touched[i] = 0;
+  }
+}
+
+// A mean tension above its strength breaks a segment: the one that bears most of its own. Contact bends it and lowers the
+// strength to that of a knot.
+void break_overloaded(const Settings& settings, State& state) {
+  float worst = 1;
+  size_t where = state.segments();
+  for (size_t i = 0; i < state.segments(); ++i) {
+    const bool knotted = std::max(state.warm[i], state.warm[i + 1]) > 0.5f;
+    const float share = state.tension[i] / (knotted ? settings.material.knot_strength : settings.material.straight_strength);
+    if (share > worst && !state.broken[i]) worst = share, where = i;
+  }
+  if (where == state.segments()) return;
+  state.broken[where] = 1;
+  state.travel = 1e9f;  // its crossings end
+}
+
+}  // namespace
+
+State make_state(std::span<const Vec3> path, size_t crossings) {
+  CATGUT_CHECK(path.size() >= 4 && path.size() < kTool);
+  const size_t n = path.size();
+  State s;
+  for (Columns3* c : {&s.x, &s.fine, &s.v, &s.plane_friction, &s.plane_drift}) c->assign(n, 0);
+  s.warm.assign(n, 0), s.plane_normal.assign(n, 0);
+  for (size_t i = 0; i < n; ++i) s.x.set(i, path[i]);
+  for (size_t i = 0; i + 1 < n; ++i) s.rest.push_back(distance(path[i], path[i + 1]));
+  s.tension.assign(n - 1, 0), s.broken.assign(n - 1, 0);
+  s.key.reserve(crossings), s.budget.reserve(crossings), s.crossing.reserve(crossings);
+  s.travel = 1e9f;  // nothing is listed yet
+  return s;
+}
+
+uint64_t hash_state(const State& state) {
+  Hasher hasher;
+  reflect(hasher, state);
+  return hasher.hash;
+}
+
+Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_unique<Scratch>()) {
+  Scratch& s = *scratch_;
+  s.max_nodes = max_nodes, s.max_crossings = max_crossings;
+  for (Padded3* c : {&s.u, &s.force, &s.e, &s.n, &s.moment, &s.middle}) c->resize(max_nodes);
+  for (Padded* c : {&s.mass,         &s.w,           &s.move,         &s.rest, &s.inverse_rest,  &s.keep, &s.alpha,
+                    &s.lambda,       &s.step,        &s.residual,     &s.diag, &s.off,           &s.down, &s.up,
+                    &s.inverse_diag, &s.tension_sum, &s.segment_move, &s.half, &s.least_density, &s.span})
+    c->resize(max_nodes);
+  s.active.reserve(max_crossings + max_nodes), s.plane_node.reserve(max_nodes), s.touched.assign(max_nodes + 1, 0);
+  s.new_key.reserve(max_crossings), s.new_budget.reserve(max_crossings), s.new_crossing.reserve(max_crossings);
+  s.block_middle.resize(max_nodes / 8 + 2), s.block_radius.resize(max_nodes / 8 + 2);
+  s.tool_move.resize(2 * 64);
+}
+Stepper::~Stepper() = default;
+Stepper::Stepper(Stepper&&) noexcept = default;
+
+void Stepper::step(const Settings& settings, State& state, Surroundings& around) {
+  Scratch& s = *scratch_;
+  const size_t n = state.nodes(), m = state.segments();
+  CATGUT_CHECK(n <= s.max_nodes && around.tools.size() <= s.tool_move.size() / 2);
+  state.key.reserve(s.max_crossings), state.budget.reserve(s.max_crossings), state.crossing.reserve(s.max_crossings);
+  const float h = settings.substep, part = 1.0f / static_cast<float>(settings.substeps);
+  const float keep = std::max(0.0f, 1 - settings.damping * h) / h, limit = settings.max_move * settings.material.diameter;
+  for (Hold& hold : around.holds) hold.force = {};
+  for (ToolCapsule& tool : around.tools) tool.force_a = tool.force_b = {};
+  if (around.plane) around.plane->force = {};
+  begin_step(settings, state, s);
+
+  std::fill_n(s.segment_move.data(), m, 0.0f);
+  for (int sub = 0; sub < settings.substeps; ++sub) {
+    if (state.travel > 0.5f * settings.list_margin)
+      refresh_pairs(settings, state, s, around.tools, static_cast<float>(sub) * part);
+    const float time = static_cast<float>(sub + 1) * part;
+    find_edges(state, s);
+    find_masses(settings, state, s, around.holds);
+    for (Padded* f : {&s.force.x, &s.force.y, &s.force.z}) std::fill_n(f->data(), n, 0.0f);
+    add_bending(settings, s, n);
+    for (const Pull& pull : around.pulls) s.force.add(pull.node, pull.force);
+    predict(n, h, settings.gravity.x, state.v.x.data(), s.force.x.data(), s.w.data(), s.u.x.data());
+    predict(n, h, settings.gravity.y, state.v.y.data(), s.force.y.data(), s.w.data(), s.u.y.data());
+    predict(n, h, settings.gravity.z, state.v.z.data(), s.force.z.data(), s.w.data(), s.u.z.data());
+    move_holds(settings, state, s, around.holds, sub);
+
+    begin_contacts(settings, state, s, around, time);
+    prepare_stretch(settings, state, s);
+    std::fill_n(s.lambda.data(), m, 0.0f);
+    for (int it = 0; it < settings.iterations; ++it) {
+      solve_stretch(s, m);
+      sweep_contacts(s, (static_cast<uint32_t>(it) + state.substeps_done) & 1);
+    }
+    end_contacts(settings, state, s, around);
+
+    limit_motion(s, n, limit);
+    record_hold_forces(settings, state, s, around.holds, sub);
+    for (size_t i = 0; i < m; ++i) {
+      s.tension_sum[i] -= s.lambda[i];
+      s.segment_move[i] = std::max(s.move[i], s.move[i + 1]);
+    }
+    float farthest = 0;
+    for (size_t i = 0; i < n; ++i) farthest = std::max(farthest, s.move[i]);
+    for (size_t k = 0; k < 2 * around.tools.size(); ++k) farthest = std::max(farthest, length(s.tool_move[k]));
+    state.travel += farthest;
+    move(n, keep, s.u.x.data(), state.x.x.data(), state.fine.x.data(), state.v.x.data());
+    move(n, keep, s.u.y.data(), state.x.y.data(), state.fine.y.data(), state.v.y.data());
+    move(n, keep, s.u.z.data(), state.x.z.data(), state.fine.z.data(), state.v.z.data());
+    for (Column* v : {&state.v.x, &state.v.y, &state.v.z})
+      calm(n, settings.inner_damping, s.mass.data(), s.w.data(), s.keep.data(), s.step.data(), v->data());
+    warm_masses(settings, state, s);
+    ++state.substeps_done;
+  }
+  // The budgets of the last substep's motion: nothing of a step is left in the work space.
+  for (size_t k = 0; k < state.key.size(); ++k) {
+    const uint32_t other = partner_of(state.key[k]);
+    state.budget[k] -= s.segment_move[segment_of(state.key[k])] + (other < kTool ? s.segment_move[other] : 0.0f);
+  }
+  for (size_t i = 0; i < m; ++i) state.tension[i] = s.tension_sum[i] * part / (h * h);
+  if (settings.breaks) break_overloaded(settings, state);
+}
+
+}  // namespace catgut::thread

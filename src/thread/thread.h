@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// thread/thread: a suture thread whose knots are nothing but contact, friction, stretch and bending. Reads Settings and what
+// surrounds the thread (holds, tools, a plane); writes State. Section 4 of the paper asks for it; docs/thread.md explains it.
+//
+// Units: SI, float32. Frame: any inertial frame; positions keep 48 bits (a float and the remainder below its resolution), so
+// that a thread may lie a metre from the origin. One thread, one worker: the bits never depend on the number of workers. A step
+// makes no allocation: every list has the capacity that `make_state` gave it. Where a list is full, `overflow` counts.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/math.h"
+#include "thread/material.h"
+
+namespace catgut::thread {
+
+using Column = std::vector<float>;
+struct Columns3 {
+  Column x, y, z;
+  void assign(size_t n, float v) { x.assign(n, v), y.assign(n, v), z.assign(n, v); }
+  void reserve(size_t n) { x.reserve(n), y.reserve(n), z.reserve(n); }
+  Vec3 at(size_t i) const { return {x[i], y[i], z[i]}; }
+  void set(size_t i, Vec3 v) { x[i] = v.x, y[i] = v.y, z[i] = v.z; }
+  void add(size_t i, Vec3 v) { x[i] += v.x, y[i] += v.y, z[i] += v.z; }
+};
+
+// Constants of one thread.
+struct Settings {
+  Properties material;
+  float substep = 50e-6f;  // h [s]
+  int substeps = 20;       // per step(): 1 ms
+  int iterations = 4;      // stretch solve and contact sweep, per substep
+  // Simulated line mass [kg/m]. The real one (1e-4 kg/m) would need shorter substeps: h^2 T / (l^2 rho) must stay below
+  // `load_limit`, and the mass follows the tension where it is not. A part that touches something loaded is heavier, and gets
+  // light again within `mass_decay` [s].
+  float free_density = 0.05f, touch_density = 0.4f, mass_decay = 0.02f, load_limit = 0.2f;
+  float damping = 5;            // drag [1/s]
+  float inner_damping = 0.02f;  // of velocity differences between neighbours, per substep; conserves momentum
+  float anchor = 0.2f;          // share of the remembered tangential drift that a sticking contact takes back per substep
+  float list_margin = 0.6e-3f;  // pairs nearer than d + margin are listed [m]
+  float max_move = 0.125f;      // of the diameter, per substep
+  Vec3 gravity{};               // [m/s2]
+  bool breaks = true;
+};
+
+// Who the second partner of a crossing is: a segment, or kTool + index of a capsule.
+constexpr uint32_t kTool = 0x8000;
+constexpr uint32_t segment_of(uint32_t key) { return key >> 16; }
+constexpr uint32_t partner_of(uint32_t key) { return key & 0xffff; }
+
+enum class Touch : uint8_t { unknown, apart, stick, slip };
+
+// A pair of segments that may touch, or a segment and a tool's capsule. Its memory is the thread's topology: it lives as long
+// as the two are near each other, whatever happens to the list.
+struct Crossing {
+  float s = 0, t = 0;  // closest points, 0..1 along the first and along the second
+  Vec3 normal;         // unit, from the second to the first. Continuous: its side is never derived from positions again
+  float gap = 0;       // [m] along the normal, surface to surface; below -d the pair is on its wrong side and is pushed back
+  float normal_impulse = 0;  // force times h^2 [N.s2], carried over to the next substep
+  Vec3 friction_impulse;     // on the first, likewise
+  Vec3 drift;                // [m] tangential motion that sticking has not undone; 0 after slip; at most 0.2 d
+  Touch touch = Touch::unknown;
+  std::array<uint8_t, 3> pad{};
+};
+
+struct State {
+  // Per node.
+  Columns3 x, fine;  // position [m] = x + fine; written by the substep
+  Columns3 v;        // [m/s]
+  Column warm;       // 0 free .. 1 touches something loaded
+  // Per segment: segment i joins nodes i and i + 1.
+  Column rest;                  // [m]
+  Column tension;               // [N] mean over the last step; negative: pushed
+  std::vector<uint8_t> broken;  // 1: no longer a segment
+  // Crossings, sorted by key. The columns are separate because most pairs only spend their budget.
+  std::vector<uint32_t> key;  // first segment << 16 | partner
+  Column budget;              // [m] of motion left before the pair must be looked at again
+  std::vector<Crossing> crossing;
+  // Contact with the plane, per node.
+  Column plane_normal;  // [N.s2]
+  Columns3 plane_friction, plane_drift;
+  float travel = 0;            // [m] largest motion since the pairs were listed
+  uint32_t substeps_done = 0;  // parity decides the order of a sweep
+  uint32_t overflow = 0;       // pairs that found no room
+  uint32_t refreshes = 0;
+
+  size_t nodes() const { return x.x.size(); }
+  size_t segments() const { return rest.size(); }
+  Vec3 position(size_t i) const { return x.at(i) + fine.at(i); }
+};
+
+// Every field that is state, in order: for whoever saves, loads, hashes or compares.
+template <typename Archive, typename AnyState>
+void reflect(Archive& archive, AnyState& s) {
+  for (auto* c : {&s.x, &s.fine, &s.v, &s.plane_friction, &s.plane_drift}) {
+    archive("x", c->x), archive("y", c->y), archive("z", c->z);
+  }
+  archive("warm", s.warm), archive("rest", s.rest), archive("tension", s.tension), archive("broken", s.broken);
+  archive("key", s.key), archive("budget", s.budget), archive("crossing", s.crossing);
+  archive("plane_normal", s.plane_normal);
+  archive("travel", s.travel), archive("substeps_done", s.substeps_done), archive("overflow", s.overflow);
+  archive("refreshes", s.refreshes);
+}
+uint64_t hash_state(const State& state);
+
+// A node that something else moves or pulls. The target moves evenly from `from` to `to` during a step.
+struct Hold {
+  uint32_t node = 0;
+  Vec3 from, to;        // [m]
+  float stiffness = 0;  // [N/m]; 0: rigid
+  float limit = 0;      // [N] a spring pulls no harder; 0: no limit
+  Vec3 force;           // [N] of the hold on the thread, mean over the last step; written by step
+};
+// A constant force on a node.
+struct Pull {
+  uint32_t node = 0;
+  Vec3 force;  // [N]
+};
+// A tool's part: capsule about the segment a b. The points move evenly during a step.
+struct ToolCapsule {
+  Vec3 a, b;        // [m] at the beginning of the step
+  Vec3 to_a, to_b;  // at its end
+  float radius = 0;
+  float friction = 0.15f;
+  Vec3 force_a, force_b;  // [N] of the thread on the tool, split over its ends; mean over the last step; written by step
+};
+struct Plane {
+  Vec3 normal{0, 1, 0};
+  float offset = 0;  // [m] dot(normal, x) of its points
+  float friction = 0.2f;
+  Vec3 force;  // [N] of the thread on the plane, mean over the last step; written by step
+};
+struct Surroundings {
+  std::span<Hold> holds;
+  std::span<const Pull> pulls;
+  std::span<ToolCapsule> tools;  // the same ones in the same order at every step: contacts remember the index
+  Plane* plane = nullptr;
+};
+
+struct Scratch;  // work space of a step; nothing in it outlives the step
+
+// Straight segments through `path` at the rest lengths that they have there, at rest. capacity: of crossings.
+State make_state(std::span<const Vec3> path, size_t crossings = 4096);
+
+class Stepper {
+ public:
+  explicit Stepper(size_t max_nodes, size_t max_crossings = 4096);
+  ~Stepper();
+  Stepper(Stepper&&) noexcept;
+  // settings.substeps substeps: one millisecond by default. Allocates nothing, unless `state` was copied or loaded since its
+  // last step (its lists get their capacity back).
+  void step(const Settings& settings, State& state, Surroundings& around);
+
+ private:
+  std::unique_ptr<Scratch> scratch_;
+};
+
+// Smallest line mass [kg/m] with which explicit bending is stable between segments of this length [m]; the step uses no less.
+float bending_density(const Settings& settings, float segment_length);
+
+}  // namespace catgut::thread

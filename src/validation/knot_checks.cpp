@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: Apache-2.0
+// validation: the physical thread (src/thread): belt friction on a cylinder, tightening of overhand knots, what knots hold.
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "validation/checks.h"
+#include "validation/knot_scenes.h"
+#include "validation/tool_ties.h"
+
+namespace catgut::validation {
+namespace {
+
+using thread::Hold;
+using thread::Plane;
+using thread::Pull;
+using thread::Settings;
+using thread::State;
+using thread::Stepper;
+using thread::Surroundings;
+using thread::ToolCapsule;
+
+// Thread over a fixed cylinder of radius 4.5 mm (40 segments a turn), drawn at 20 mm/s against a constant force at its other
+// end, or let go at that speed. `load` [N] is the larger of the two tensions. Returns ln(T2 / T1) / (mu angle).
+double capstan_exponent(float degrees, float mu, float load, bool drawn) {
+  Settings settings = knot_settings(mu);
+  settings.material.bending_stiffness = 1e-9f;  // limp: bending carries part of a load without friction
+  settings.damping = 0;
+  const float angle = degrees * kPi / 180, radius = 4.5e-3f, r = radius + 0.5f * settings.material.diameter, l = 0.7e-3f;
+  const float pitch = degrees > 300 ? 0.6e-3f : 0;  // a helix beyond one turn
+  auto at = [&](float a) { return Vec3{r * std::cos(a), r * std::sin(a), pitch * a / (2 * kPi)}; };
+  const Vec3 first{0, -1, 0}, last{-std::sin(angle), std::cos(angle), 0};
+  const int lead = 17, tail = 28, wound = std::max(1, static_cast<int>(std::lround(angle * r / l)));
+  std::vector<Vec3> path;
+  for (int i = lead; i > 0; --i) path.push_back(at(0) + first * (l * static_cast<float>(i)));
+  for (int i = 0; i <= wound; ++i) path.push_back(at(angle * static_cast<float>(i) / static_cast<float>(wound)));
+  for (int i = 1; i <= tail; ++i) path.push_back(at(angle) + last * (l * static_cast<float>(i)));
+  State state = thread::make_state(path);
+  Stepper stepper(path.size());
+  ToolCapsule cylinder;
+  cylinder.a = cylinder.to_a = {0, 0, -0.03f}, cylinder.b = cylinder.to_b = {0, 0, 0.03f};
+  cylinder.radius = radius, cylinder.friction = mu;
+  Hold hold;
+  hold.node = 0, hold.from = hold.to = path[0];
+  const float weight = drawn ? load * std::exp(-mu * angle) : load;
+  const Pull pull{static_cast<uint32_t>(path.size()) - 1, last * weight};
+  Surroundings around;
+  around.holds = {&hold, 1}, around.pulls = {&pull, 1}, around.tools = {&cylinder, 1};
+  double sum = 0;
+  for (int i = 0; i < 400; ++i) {
+    hold.from = hold.to;
+    if (i >= 100) hold.to += first * (drawn ? 2e-5f : -2e-5f);
+    stepper.step(settings, state, around);
+    if (i >= 250) sum += double{length(hold.force)};
+  }
+  return std::log(sum / 150 / double{weight}) / double{mu * angle} * (drawn ? 1 : -1);
+}
+
+std::string number(double v) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", v);
+  return text;
+}
+
+// Arithmetic-geometric mean: complete elliptic integrals of parameter m.
+void elliptic(double m, double& k, double& e) {
+  double a = 1, b = std::sqrt(1 - m), power = 0.5, sum = power * m;
+  for (int i = 0; i < 40; ++i) {
+    const double c = 0.5 * (a - b), next = 0.5 * (a + b);
+    b = std::sqrt(a * b), a = next, power *= 2;
+    sum += power * c * c;
+  }
+  k = double{kPi} / (2 * a), e = k * (1 - sum);
+}
+
+// Force [N] that tightens an overhand knot of n turns, thread radius r, end-to-end shortening e: Jawed et al. 2015, eq. 5.
+double overhand_force(int n, double r, double shortening, double mu, double stiffness) {
+  const double c = std::sqrt(3.0) * double{kPi} * double{kPi}, want = n * n * r / shortening;
+  double low = 1e-9, high = 0.9999, x = 0;
+  for (int i = 0; i < 100; ++i) {
+    const double m = 0.5 * (low + high);
+    double k, e;
+    elliptic(m, k, e);
+    x = 8 * (k - e) / m - 4 * k;
+    (x * x / (x + 4 * k) / (8 * c) < want ? low : high) = m;
+  }
+  return mu * x * x * x / (96 * c) * stiffness / (n * n * r * r);
+}
+
+struct Overhand {
+  double worst = 1;         // ratio of measured to expected force that is farthest from 1
+  double from = 0, to = 0;  // [m] range of the shortening
+};
+
+// An overhand knot of n turns around a loop of 200 mm, tightened at 50 mm/s; ratios every 5 mm of shortening, once it moves
+// evenly.
+Overhand tighten_overhand(int n, float mu, double end) {
+  Settings settings = knot_settings(mu);
+  settings.material.bending_stiffness = 1e-5f;
+  settings.substep = 25e-6f, settings.substeps = 40, settings.iterations = 2;
+  const float d = settings.material.diameter, l = 1e-3f, loop = 0.2f, big = loop / (2 * kPi), r = 0.7f * d;
+  const float turns = static_cast<float>(2 * n + 1) * kPi;
+  const float braid = std::min(3.75f * static_cast<float>(n) * std::sqrt(std::sqrt(12.0f) * d * big), 0.6f * loop),
+              w = 0.5f * braid;
+  std::vector<Vec3> fine;
+  auto line = [&](Vec3 from, Vec3 to) {
+    for (int i = 0; i < 1000; ++i) fine.push_back(lerp(from, to, static_cast<float>(i) / 1000));
+  };
+  auto helix = [&](float phase) {
+    for (int i = 0; i < 1000; ++i) {
+      const float x = braid * (static_cast<float>(i) / 1000 - 0.5f), angle = phase + turns * x / braid;
+      fine.push_back({x, r * std::cos(angle), r * std::sin(angle)});
+    }
+  };
+  const float lead = 0.06f, phase = kPi + 0.5f * turns;
+  line({-w - lead, -r, 0}, {-w, -r, 0});
+  helix(phase);
+  const float circle = std::max(big, 1.05f * w), height = r + std::sqrt(circle * circle - w * w);
+  const float from = std::atan2(r - height, w), to = std::atan2(r - height, -w) + 2 * kPi;
+  for (int i = 0; i < 3000; ++i) {
+    const float a = from + (to - from) * static_cast<float>(i) / 3000;
+    fine.push_back({circle * std::cos(a), height + circle * std::sin(a), 0});
+  }
+  helix(phase + kPi);
+  line({w, -r, 0}, {w + lead, -r, 0});
+  const std::vector<Vec3> path = resample(fine, l);
+  State state = thread::make_state(path);
+  Stepper stepper(path.size());
+  Hold hold[2];
+  hold[0].node = 0, hold[1].node = static_cast<uint32_t>(path.size()) - 1;
+  for (Hold& h : hold) h.from = h.to = state.position(h.node);
+  double total = 0;
+  for (float rest : state.rest) total += double{rest};
+  Overhand result;
+  double sum = 0;
+  for (int i = 1;; ++i) {
+    for (Hold& h : hold) h.from = h.to;
+    if (i > 100) hold[1].to.x += 50e-6f * std::min(1.0f, static_cast<float>(i) / 200);
+    Surroundings around;
+    around.holds = hold;
+    stepper.step(settings, state, around);
+    sum += 0.5 * double{hold[1].force.x - hold[0].force.x};
+    if (i % 100 != 0) continue;
+    const double shortening = total - double{hold[1].to.x - hold[0].to.x};
+    const double ratio = sum / 100 / overhand_force(n, 0.5 * double{d}, shortening, double{mu}, 1e-5);
+    sum = 0;
+    if (i < 800) continue;  // the laid braid first finds its shape
+    if (result.from == 0) result.from = shortening;
+    result.to = shortening;
+    const double off = std::max(ratio, 1 / ratio);
+    if (off > result.worst) result.worst = off;
+    if (shortening < end) return result;
+  }
+}
+
+struct Kind {
+  const char* name;
+  Throws throws;
+};
+
+Holding hold_knot(const Throws& throws, const Settings& settings, float tails, Drawing drawing = Drawing::flat,
+                  float limit = 8) {
+  Tightened t(lay_knot(throws, settings.material.diameter, 1.43f * settings.material.diameter));
+  tighten(settings, t, 2, drawing);
+  return pull_apart(settings, t, tails, 0.02f, limit);
+}
+
+}  // namespace
+
+void check_capstan(Lines& out, bool nightly) {
+  auto line = [&](float degrees, float mu, float load, bool drawn) {
+    out.add("capstan/" + number(double{degrees}) + " deg, mu " + number(double{mu}) + ", " + number(double{load}) +
+                (drawn ? " N, drawn" : " N, let go"),
+            1, capstan_exponent(degrees, mu, load, drawn), 0.03, "exponent", "Euler-Eytelwein: T2 = T1 exp(mu angle)");
+  };
+  if (!nightly) {
+    line(90, 0.1f, 0.5f, true), line(180, 0.4f, 10, false), line(360, 0.2f, 2, true), line(360, 0.3f, 2, false),
+        line(720, 0.3f, 10, true);
+    return;
+  }
+  for (float degrees : {90.0f, 180.0f, 360.0f, 720.0f})
+    for (float mu : {0.1f, 0.2f, 0.3f, 0.4f})
+      for (float load : {0.5f, 2.0f, 10.0f})
+        for (bool drawn : {true, false}) line(degrees, mu, load, drawn);
+}
+
+void check_overhand(Lines& out, bool nightly) {
+  auto line = [&](int n, float mu, double end) {
+    const Overhand knot = tighten_overhand(n, mu, end);
+    out.add("knot/overhand, " + number(n) + " turns, mu " + number(double{mu}) + ", shortening " +
+                number(std::round(1e3 * knot.from)) + " to " + number(std::round(1e3 * knot.to)) + " mm",
+            1, knot.worst, 0.25, "of the force",
+            "Jawed et al. 2015, 10.1103/PhysRevLett.115.118302; worst of the range, ratio or inverse");
+  };
+  if (!nightly) return line(2, 0.3f, 0.16);
+  for (int n : {2, 3})
+    for (float mu : {0.1f, 0.3f}) line(n, mu, 0.1);
+}
+
+void check_holding(Lines& out, bool nightly) {
+  // Below the friction that locks them, with tails that nothing holds: what holds is the knot alone.
+  const float mu = 0.2f;
+  const Settings settings = knot_settings(mu);
+  const float single = hold_knot(single_throw(), settings, 0).peak, two_granny = hold_knot(granny(), settings, 0).peak;
+  const float two = hold_knot(square(), settings, 0).peak, three = hold_knot(three_throws(), settings, 0).peak;
+  const std::string source = "order known to every surgeon; Patil et al. 2020, 10.1126/science.aaz0135";
+  auto below = [&](const std::string& name, float less, float more) {
+    out.add("knot/" + name + ", share of the stronger at mu 0.2", 0, double{less / more}, 0.9, "", source);
+  };
+  below("single throw below granny", single, two_granny);
+  below("granny below square", two_granny, two);
+  below("two square throws below three", two, three);
+
+  // Halving the substep: force while it slides, with 0.2 N on the tails (free tails make it a knife's edge).
+  for (const Kind& kind : {Kind{"granny", granny()}, Kind{"square", square()}}) {
+    if (!nightly && kind.throws[1].hand < 0) continue;
+    for (float m : {0.1f, 0.2f}) {
+      if (!nightly && m > 0.15f) continue;
+      Settings whole = knot_settings(m), half = whole;
+      half.substep *= 0.5f, half.substeps *= 2;
+      const float expected = hold_knot(kind.throws, whole, 0.2f).mean, got = hold_knot(kind.throws, half, 0.2f).mean;
+      out.add(std::string("knot/") + kind.name + ", force while sliding at half the substep, mu " + number(double{m}),
+              double{expected}, double{got}, 0.1, "N", "invariance");
+    }
+  }
+
+  // Drabble et al. 2021: flat 1.2 mm, hands uncrossed 18.5 mm, tied under tension 50.6 mm of slip.
+  const Settings rough = knot_settings(0.4f);
+  const float flat = hold_knot(square(), rough, 0, Drawing::flat, 3).slip;
+  const float uncrossed = hold_knot(square(), rough, 0, Drawing::uncrossed, 3).slip;
+  const float tense = hold_knot(square(), rough, 0, Drawing::under_tension, 3).slip;
+  const std::string drabble = "order of Drabble et al. 2021, 10.1136/bmjsit-2021-000091";
+  out.add("knot/slip to 3 N, square: flat as a share of uncrossed", 0, double{flat / uncrossed}, 0.9, "", drabble);
+  out.add("knot/slip to 3 N, square: uncrossed as a share of tied under tension", 0, double{uncrossed / tense}, 0.9, "",
+          drabble);
+
+  Settings held = knot_settings(0.3f);
+  Tightened t(lay_knot(square(), held.material.diameter, 1.43f * held.material.diameter));
+  tighten(held, t, 2);
+  const double seconds = nightly ? 60 : 4;
+  out.add("knot/creep of a square knot at 3 N for " + number(seconds) + " s", 0, 1e6 * creep(held, t, 3, seconds, seconds / 2),
+          1, "um/s", "a knot that holds does not creep");
+}
+
+void check_ties(Lines& out, bool nightly) {
+  struct Case {
+    const char* name;
+    Tie tie;
+    uint64_t determinant;
+  };
+  const Case cases[] = {{"single throw", {{1}}, 3},        {"double throw", {{2}}, 5},
+                        {"square knot", {{1}, {1}}, 9},    {"granny", {{1}, {1, false}}, 9},
+                        {"surgeon's 2-1", {{2}, {1}}, 15}, {"three throws", {{1}, {1}, {1}}, 27}};
+  const std::string source = "determinant of the knot that the hands' ways make; Burde et al. 2014, 10.1515/9783110270785";
+  const Settings settings = knot_settings(0.25f);
+  double nearest = 1;
+  if (!nightly) {
+    for (const Case& c : {cases[0], cases[2]}) {
+      TieSettings how;
+      how.speed = 0.4f;
+      const TiedKnot knot = tie_with_tools(settings, c.tie, how);
+      nearest = std::min(nearest, double{knot.nearest});
+      out.add(std::string("knot/determinant, ") + c.name + " tied with tools at 0.4 m/s", static_cast<double>(c.determinant),
+              static_cast<double>(knot.determinant), 0, "", source);
+    }
+  } else {
+    int wrong = 0, all = 0;
+    for (uint64_t seed = 0; all < 200; ++seed)
+      for (const Case& c : cases) {
+        if (all == 200) break;
+        TieSettings how;
+        how.seed = seed + 1;
+        how.speed = 0.1f + 0.4f * Random(seed * 7 + 3).uniform();
+        const TiedKnot knot = tie_with_tools(settings, c.tie, how);
+        nearest = std::min(nearest, double{knot.nearest});
+        wrong += knot.determinant != c.determinant;
+        ++all;
+      }
+    out.add("knot/determinant, wrong ones of 200 ties with tools at 0.1 to 0.5 m/s", 0, wrong, 0, "", source);
+  }
+  out.add("knot/smallest distance of strands in all ties, missing from a diameter", 0, 1 - nearest, 0.2, "diameters",
+          "nothing passes: two thicknesses cannot share a place");
+}
+
+}  // namespace catgut::validation

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// validation: see knot_scenes.h.
+#include "validation/knot_scenes.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace catgut::validation {
+namespace {
+
+using thread::Hold;
+using thread::Pull;
+using thread::Settings;
+using thread::Surroundings;
+
+Vec3 turned(Vec3 p) { return {-p.x, -p.y, p.z}; }
+
+}  // namespace
+
+std::vector<Vec3> resample(const std::vector<Vec3>& fine, float spacing) {
+  std::vector<Vec3> out{fine[0]};
+  float left = spacing;
+  for (size_t i = 1; i < fine.size(); ++i) {
+    Vec3 from = fine[i - 1];
+    float piece = distance(from, fine[i]);
+    while (piece >= left) {
+      from = lerp(from, fine[i], left / piece);
+      out.push_back(from);
+      piece -= left;
+      left = spacing;
+    }
+    left -= piece;
+  }
+  return out;
+}
+
+Throws single_throw() { return {{3, 1}}; }
+Throws granny() { return {{3, 1}, {3, 1}}; }
+Throws square() { return {{3, 1}, {3, -1}}; }
+Throws surgeons() { return {{5, 1}, {3, -1}}; }
+Throws three_throws() { return {{3, 1}, {3, -1}, {3, 1}}; }
+Throws surgeons_211() { return {{5, 1}, {3, -1}, {3, 1}}; }
+
+LaidKnot lay_knot(std::span<const Throw> throws, float d, float segment, float load, float tail) {
+  // Strand A from its load end up; B is A turned by half a turn about z, because every throw is symmetric under that turn.
+  std::vector<Vec3> a;
+  const float r = 0.75f * d, bend = 1.5f * d;
+  auto line = [&](Vec3 to) {
+    const Vec3 from = a.back();
+    const int n = std::max(1, static_cast<int>(distance(from, to) / (0.05f * d)));
+    for (int i = 1; i <= n; ++i) a.push_back(lerp(from, to, static_cast<float>(i) / static_cast<float>(n)));
+  };
+  const float first = 0.5f * 2.2f * d * static_cast<float>(throws[0].half_turns);
+  a.push_back({-first - load, 0, -r});
+  float z = 0, side = -1;  // A enters from this side
+  for (size_t k = 0; k < throws.size(); ++k) {
+    const float turns = static_cast<float>(throws[k].half_turns * throws[k].hand) * kPi;
+    const float half = 0.5f * 2.2f * d * static_cast<float>(throws[k].half_turns);
+    // The strand from the left begins below: sin of its first angle is -1.
+    const float phase = std::sin(-0.5f * turns) < 0 ? 0 : kPi;
+    line({side * half, 0, z - r});
+    const int n = throws[k].half_turns * 60;
+    for (int i = 1; i <= n; ++i) {
+      const float x = half * (2 * static_cast<float>(i) / static_cast<float>(n) - 1), angle = phase + 0.5f * turns * x / half;
+      Vec3 p{x, r * std::cos(angle), r * std::sin(angle)};
+      if (side > 0) p = turned(p);
+      a.push_back(p + Vec3{0, 0, z});
+    }
+    side = -side;
+    if (k + 1 == throws.size()) break;
+    const float next = 0.5f * 2.2f * d * static_cast<float>(throws[k + 1].half_turns), out = std::max(half, next);
+    line({side * out, 0, z + r});
+    for (int i = 1; i <= 60; ++i) {
+      const float angle = kPi * static_cast<float>(i) / 60;
+      a.push_back({side * (out + bend * std::sin(angle)), 0, z + r + bend * (1 - std::cos(angle))});
+    }
+    z += 2 * bend + 2 * r;
+  }
+  line(a.back() + Vec3{side * tail, 0, 0.15f * tail});
+  const std::vector<Vec3> strand = resample(a, segment);
+  std::vector<Vec3> path(strand.rbegin(), strand.rend());
+  for (const Vec3& p : strand) path.push_back(turned(p));
+  LaidKnot k;
+  k.state = thread::make_state(path);
+  k.load_a = static_cast<uint32_t>(strand.size()) - 1;
+  k.load_b = k.load_a + 1;
+  k.state.broken[k.load_a] = 1;
+  k.tail_direction_a = {side, 0, 0};
+  k.tail_direction_b = {-side, 0, 0};
+  return k;
+}
+
+Settings knot_settings(float friction) {
+  Settings s;
+  s.material = thread::properties(thread::Material::silk, thread::Size::usp_0);
+  s.material.diameter = 0.35e-3f;
+  s.material.axial_stiffness = 500;
+  s.material.bending_stiffness = 1e-8f;
+  s.material.friction = friction;
+  s.breaks = false;
+  return s;
+}
+
+void tighten(const Settings& settings, Tightened& t, float tails, Drawing drawing, float seconds) {
+  const LaidKnot& k = t.knot;
+  std::vector<Pull> pull{{k.tail_a(), {}}, {k.tail_b(), {}}};
+  std::vector<Hold> hold(2);
+  hold[0].node = k.load_a, hold[1].node = k.load_b;
+  for (Hold& h : hold) h.from = h.to = k.state.position(h.node), h.stiffness = 500;
+  const int ticks = static_cast<int>(std::lround(seconds * 1000)), release = 50;
+  for (int i = 0; i < ticks + release; ++i) {
+    const float on = std::min(1.0f, static_cast<float>(i) / 50),
+                off = std::min(1.0f, static_cast<float>(ticks + release - i) / 50);
+    const float side = drawing == Drawing::uncrossed ? -1.0f : 1.0f, force = side * tails * on * off;
+    // A strand under tension also carries what the other should have shared.
+    const bool tense = drawing == Drawing::under_tension;
+    pull[0].force = k.tail_direction_a * (tense ? 2.5f * force : force);
+    pull[1].force = k.tail_direction_b * (tense ? 0.25f * force : force);
+    Surroundings around;
+    around.pulls = pull, around.holds = hold;
+    t.stepper.step(settings, t.knot.state, around);
+  }
+}
+
+Holding pull_apart(const Settings& settings, Tightened& t, float tails, float speed, float limit, float distance_limit) {
+  const LaidKnot& k = t.knot;
+  std::vector<Hold> hold(2);
+  hold[0].node = k.load_a, hold[1].node = k.load_b;
+  for (Hold& h : hold) h.from = h.to = k.state.position(h.node);
+  const std::vector<Pull> pull{{k.tail_a(), k.tail_direction_a * tails}, {k.tail_b(), k.tail_direction_b * tails}};
+  Holding result;
+  const float step = 0.5f * speed * 1e-3f;
+  const int ticks = static_cast<int>(distance_limit / (2 * step));
+  double sum = 0;
+  float recent = 0;
+  for (int i = 0; i < ticks; ++i) {
+    for (Hold& h : hold) h.from = h.to;
+    hold[0].to.x -= step, hold[1].to.x += step;
+    Surroundings around;
+    around.holds = hold, around.pulls = pull;
+    t.stepper.step(settings, t.knot.state, around);
+    const float force = 0.5f * (hold[1].force.x - hold[0].force.x);
+    recent += (force - recent) / 5;  // mean over about 5 ms
+    result.peak = std::max(result.peak, recent);
+    if (i >= ticks / 4) sum += double{force};
+    result.slip = 2 * step * static_cast<float>(i + 1);
+    if (recent > limit) {
+      result.held = true;
+      result.mean = limit;
+      return result;
+    }
+  }
+  result.mean = static_cast<float>(sum / (ticks - ticks / 4));
+  return result;
+}
+
+double creep(const Settings& settings, Tightened& t, float load, double seconds, double window) {
+  const LaidKnot& k = t.knot;
+  std::vector<Pull> pull{{k.load_a, {}}, {k.load_b, {}}};
+  const int ticks = static_cast<int>(seconds * 1000), last = static_cast<int>(window * 1000);
+  double before = 0;
+  auto apart = [&] {
+    const Vec3 whole = k.state.x.at(k.load_b) - k.state.x.at(k.load_a),
+               rest = k.state.fine.at(k.load_b) - k.state.fine.at(k.load_a);
+    return double{whole.x} + double{rest.x};
+  };
+  for (int i = 0; i < ticks; ++i) {
+    const float now = load * std::min(1.0f, 0.1f + static_cast<float>(i) / 100);
+    pull[0].force = {-now, 0, 0}, pull[1].force = {now, 0, 0};
+    Surroundings around;
+    around.pulls = pull;
+    t.stepper.step(settings, t.knot.state, around);
+    if (i + 1 == ticks - last) before = apart();
+  }
+  return (apart() - before) / window;
+}
+
+}  // namespace catgut::validation

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// validation: scripted hands that tie throws with instruments, as a surgeon does: wind the long strand round the needle holder,
+// take the tail with its jaws, draw it through, pull the ends apart. The tools are capsules that the thread cannot pass.
+#pragma once
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/random.h"
+#include "thread/thread.h"
+
+namespace catgut::validation {
+
+// One throw as it is tied: how often the strand is wound round the needle holder, and whether in the sense that makes a square
+// knot with the throw before it (true) or a granny (false).
+struct TiedThrow {
+  int wraps = 1;
+  bool alternating = true;
+};
+using Tie = std::vector<TiedThrow>;
+
+struct TieSettings {
+  float speed = 0.3f;                         // [m/s] highest of the hands
+  float pull = 2.5f;                          // [N] at which the hands pull a throw tight: their grip gives way beyond
+  float segment = 0.7e-3f;                    // [m]
+  float long_strand = 48e-3f, tail = 42e-3f;  // [m]
+  uint64_t seed = 0;                          // of the tremor of the way points, 1 mm; 0: none
+};
+
+struct TiedKnot {
+  thread::State state;
+  uint32_t bite_a = 0, bite_b = 0;  // nodes that the tissue holds
+  uint64_t determinant = 0;
+  double writhe = 0;
+  float nearest = 1;   // smallest distance between strands that touch, in diameters
+  double seconds = 0;  // simulated
+  float tension = 0;   // [N] of the hands at the end, mean
+};
+
+// `each_tick`, when given, sees every state and the tools (for pictures).
+using TieWatcher =
+    std::function<void(const thread::State&, std::span<const thread::ToolCapsule>, double time, const std::string& phase)>;
+TiedKnot tie_with_tools(const thread::Settings& settings, const Tie& tie, const TieSettings& how,
+                        const TieWatcher& each_tick = {});
+
+}  // namespace catgut::validation

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+// tests/thread: the physical thread from outside: closed forms, conservation, replay. Knots and belt friction:
+// tests/validation.
+#include "thread/thread.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "thread/topology.h"
+#include "validation/knot_scenes.h"
+
+namespace catgut::thread {
+namespace {
+
+std::vector<Vec3> line(size_t nodes, Vec3 from, Vec3 step) {
+  std::vector<Vec3> p;
+  for (size_t i = 0; i < nodes; ++i) p.push_back(from + step * static_cast<float>(i));
+  return p;
+}
+
+Settings plain(float diameter = 0.35e-3f) {
+  Settings s;
+  s.material = properties(Material::silk, Size::usp_0);
+  s.material.diameter = diameter;
+  s.material.axial_stiffness = 500;
+  s.material.bending_stiffness = 1e-8f;
+  s.breaks = false;
+  return s;
+}
+
+TEST(ThreadMaterial, has_sixteen_with_sane_numbers) {
+  EXPECT_EQ(materials().size(), 16u);
+  for (const Properties& p : materials()) {
+    EXPECT_GT(p.diameter, 0.1e-3f) << p.name;
+    EXPECT_LT(p.knot_strength, p.straight_strength) << p.name;
+    EXPECT_GT(p.friction, 0.0f) << p.name;
+    EXPECT_EQ(find_material(p.name), &p);
+  }
+  EXPECT_EQ(find_material("silk"), &properties(Material::silk, Size::usp_3_0));
+  EXPECT_EQ(find_material("wool"), nullptr);
+}
+
+TEST(Thread, a_weight_stretches_it_by_force_over_stiffness) {
+  const Settings settings = plain();
+  State state = make_state(line(101, {0.3f, 0.2f, 0.1f}, {0, -1e-3f, 0}));
+  Stepper stepper(state.nodes());
+  Hold hold;
+  hold.node = 0, hold.from = hold.to = state.position(0);
+  const Pull pull{100, {0, -5, 0}};
+  Surroundings around;
+  around.holds = {&hold, 1}, around.pulls = {&pull, 1};
+  for (int i = 0; i < 1500; ++i) stepper.step(settings, state, around);
+  EXPECT_NEAR(hold.force.y, 5, 0.01);
+  EXPECT_NEAR(0.1f - (state.position(100).y - hold.to.y) - 0.2f, 0.1f * 5 / 500, 2e-5);
+  for (float t : state.tension) EXPECT_NEAR(t, 5, 0.02);
+}
+
+// Tip of a clamped rod under a transverse end load P L^2 / B = 1: Bisshopp and Drucker 1945, 10.1090/qam/13360.
+TEST(Thread, a_clamped_end_bends_as_the_elastica_of_its_stiffness) {
+  for (const float segment : {1e-3f, 0.5e-3f}) {
+    Settings settings = plain();
+    settings.material.bending_stiffness = 1e-7f;
+    settings.damping = 10;
+    const float length = 0.03f;
+    const size_t n = static_cast<size_t>(std::lround(length / segment)) + 2;
+    State state = make_state(line(n, {-segment, 0, 0}, {segment, 0, 0}));
+    Stepper stepper(n);
+    Hold hold[2];
+    for (uint32_t i : {0u, 1u}) hold[i].node = i, hold[i].from = hold[i].to = state.position(i);
+    const Pull pull{static_cast<uint32_t>(n) - 1, {0, -1e-7f / (length * length), 0}};
+    Surroundings around;
+    around.holds = hold, around.pulls = {&pull, 1};
+    for (int i = 0; i < 2500; ++i) stepper.step(settings, state, around);
+    // The discrete rod bends at its nodes, the clamp's node included: it is half a segment longer than it looks.
+    const float tolerance = 0.01f + 1.5f * segment / length;
+    EXPECT_NEAR(-state.position(n - 1).y / length, 0.30172f, tolerance * 0.30172f) << segment;
+    EXPECT_NEAR(1 - state.position(n - 1).x / length, 0.05643f, 2 * tolerance * 0.05643f) << segment;
+  }
+}
+
+TEST(Thread, keeps_its_momentum_when_it_hits_itself) {
+  Settings settings = plain();
+  settings.damping = 0;
+  // A hairpin whose legs move toward each other, one faster.
+  std::vector<Vec3> path = line(40, {-0.02f, 0, 0}, {0.5e-3f, 0, 0});
+  for (int i = 1; i <= 12; ++i)
+    path.push_back({path[39].x + 0.5e-3f * std::sin(i * 0.26f) * 4, 0.5e-3f * 4 * (1 - std::cos(i * 0.26f)), 0});
+  for (const Vec3& p : line(40, path.back() - Vec3{0.5e-3f, 0, 0}, {-0.5e-3f, 0, 0})) path.push_back(p);
+  State state = make_state(path);
+  for (size_t i = 0; i < state.nodes(); ++i) state.v.set(i, i < 45 ? Vec3{0, 0.4f, 0.02f} : Vec3{0, -0.2f, 0});
+  state.warm.assign(state.nodes(), 1);
+  settings.mass_decay = 1e6f;  // constant masses: changing them is not mechanics
+  settings.touch_density = settings.free_density;
+  Stepper stepper(state.nodes());
+  auto momentum = [&] {
+    Vec3 p{};
+    for (size_t i = 0; i < state.nodes(); ++i) {
+      const float span = 0.5f * ((i > 0 ? state.rest[i - 1] : 0) + (i < state.segments() ? state.rest[i] : 0));
+      p += state.v.at(i) * (settings.free_density * span);
+    }
+    return p;
+  };
+  const Vec3 before = momentum();
+  Surroundings around;
+  bool touched = false;
+  for (int i = 0; i < 60; ++i) {
+    stepper.step(settings, state, around);
+    for (const Crossing& c : state.crossing) touched |= c.normal_impulse > 0;
+  }
+  EXPECT_TRUE(touched);
+  EXPECT_LT(length(momentum() - before), 2e-3f * length(before));
+}
+
+TEST(Thread, hangs_over_a_tool_and_weighs_on_it) {
+  const Settings settings = plain();
+  std::vector<Vec3> path = line(40, {-2.2e-3f, -0.02f, 0}, {0, 0.5e-3f, 0});
+  for (int i = 1; i < 14; ++i) path.push_back({-2.2e-3f * std::cos(kPi * i / 14), 2.2e-3f * std::sin(kPi * i / 14), 0});
+  for (const Vec3& p : line(41, {2.2e-3f, 0, 0}, {0, -0.5e-3f, 0})) path.push_back(p);
+  State state = make_state(path);
+  Stepper stepper(state.nodes());
+  ToolCapsule tool;
+  tool.a = tool.to_a = {0, 0, -0.02f}, tool.b = tool.to_b = {0, 0, 0.02f}, tool.radius = 2e-3f;
+  const Pull pull[2] = {{0, {0, -1, 0}}, {static_cast<uint32_t>(path.size()) - 1, {0, -1, 0}}};
+  Surroundings around;
+  around.pulls = pull, around.tools = {&tool, 1};
+  for (int i = 0; i < 500; ++i) stepper.step(settings, state, around);
+  const Vec3 force = tool.force_a + tool.force_b;
+  EXPECT_NEAR(force.y, -2, 0.02);
+  EXPECT_NEAR(force.x, 0, 0.02);
+  EXPECT_NEAR(tool.force_a.y, tool.force_b.y, 0.02);
+}
+
+TEST(Thread, slides_down_a_slope_steeper_than_its_friction_only) {
+  for (const float slope : {0.25f, 0.35f}) {
+    Settings settings = plain();
+    settings.gravity = {-9.81f * std::sin(std::atan(slope)), -9.81f * std::cos(std::atan(slope)), 0};
+    settings.damping = 0;
+    State state = make_state(line(30, {0, 0.5f * settings.material.diameter, 0}, {0, 0, 1e-3f}));
+    Stepper stepper(state.nodes());
+    Plane plane;
+    plane.friction = 0.3f;
+    Surroundings around;
+    around.plane = &plane;
+    for (int i = 0; i < 400; ++i) stepper.step(settings, state, around);
+    // Beyond its friction it accelerates: g (sin - mu cos).
+    const float a = slope - 0.3f, expected = a > 0 ? 0.5f * 9.81f * a * std::cos(std::atan(slope)) * 0.16f : 0;
+    EXPECT_NEAR(-state.position(15).x, expected, 2e-5f + 0.03f * expected) << slope;
+  }
+}
+
+TEST(Thread, breaks_at_its_strength_and_not_below) {
+  for (const float share : {0.95f, 1.05f}) {
+    Settings settings = plain();
+    settings.material = properties(Material::silk, Size::usp_3_0);
+    settings.breaks = true;
+    State state = make_state(line(40, {}, {0.5e-3f, 0, 0}));
+    Stepper stepper(state.nodes());
+    Hold hold;
+    hold.node = 0, hold.from = hold.to = state.position(0);
+    Pull pull{39, {}};
+    Surroundings around;
+    around.holds = {&hold, 1}, around.pulls = {&pull, 1};
+    for (int i = 0; i < 600; ++i) {
+      pull.force.x = share * settings.material.straight_strength * std::min(1.0f, static_cast<float>(i) / 400);
+      stepper.step(settings, state, around);
+    }
+    int broken = 0;
+    for (uint8_t b : state.broken) broken += b;
+    EXPECT_EQ(broken, share > 1 ? 1 : 0);
+  }
+}
+
+// The bits of a run that is saved, loaded into a fresh state and continued are those of the run that was not.
+TEST(Thread, continues_from_a_copy_to_the_bit) {
+  const Settings settings = validation::knot_settings(0.3f);
+  validation::Tightened run(validation::lay_knot(validation::square(), settings.material.diameter, 0.5e-3f));
+  validation::tighten(settings, run, 2, validation::Drawing::flat, 0.03f);
+  State copy = run.knot.state;
+  Stepper other(copy.nodes());
+  Surroundings around;
+  for (int i = 0; i < 20; ++i) {
+    run.stepper.step(settings, run.knot.state, around);
+    other.step(settings, copy, around);
+    ASSERT_EQ(hash_state(run.knot.state), hash_state(copy)) << i;
+  }
+  copy.crossing[0].gap += 1e-9f;
+  EXPECT_NE(hash_state(run.knot.state), hash_state(copy));
+}
+
+// A knot a metre away holds as one at the origin: positions keep more than a float.
+TEST(Thread, holds_a_metre_from_the_origin) {
+  const Settings settings = validation::knot_settings(0.4f);
+  validation::LaidKnot laid = validation::lay_knot(validation::square(), settings.material.diameter, 0.5e-3f);
+  for (size_t i = 0; i < laid.state.nodes(); ++i) laid.state.x.add(i, {1.3f, -0.9f, 1.1f});
+  validation::Tightened t(std::move(laid));
+  validation::tighten(settings, t, 2);
+  EXPECT_LT(std::abs(validation::creep(settings, t, 3, 3, 1)), 1e-6);
+}
+
+// Strands of a laid knot joined into one closed curve: the bite below, the tails far away.
+std::vector<Vec3> closed(const validation::Throws& throws) {
+  const validation::LaidKnot k = validation::lay_knot(throws, 0.35e-3f, 0.5e-3f);
+  std::vector<Vec3> p;
+  for (size_t i = 0; i < k.state.nodes(); ++i) {
+    p.push_back(k.state.position(i));
+    if (i == k.load_a) p.push_back(p.back() + Vec3{0, 0, -0.02f}), p.push_back(k.state.position(k.load_b) + Vec3{0, 0, -0.02f});
+  }
+  return close_curve(p, k.tail_direction_a, k.tail_direction_b);
+}
+
+TEST(Topology, determinants_are_those_of_the_books) {
+  EXPECT_EQ(knot_determinant(closed(validation::single_throw())), 3u);
+  EXPECT_EQ(knot_determinant(closed({{5, 1}})), 5u);
+  EXPECT_EQ(knot_determinant(closed({{7, 1}})), 7u);
+  EXPECT_EQ(knot_determinant(closed({{1, 1}})), 1u);
+  EXPECT_EQ(knot_determinant(closed(validation::granny())), 9u);
+  EXPECT_EQ(knot_determinant(closed(validation::square())), 9u);
+  EXPECT_EQ(knot_determinant(closed(validation::surgeons())), 15u);
+  EXPECT_EQ(knot_determinant(closed(validation::three_throws())), 27u);
+  EXPECT_EQ(knot_determinant(closed(validation::surgeons_211())), 45u);
+}
+
+TEST(Topology, writhe_tells_granny_from_square) {
+  EXPECT_NEAR(mean_writhe(closed(validation::square())), 0, 1.5);
+  EXPECT_GT(std::abs(mean_writhe(closed(validation::granny()))), 4);
+}
+
+}  // namespace
+}  // namespace catgut::thread
