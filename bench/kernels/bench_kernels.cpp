@@ -48,7 +48,8 @@ Sewn sew(const std::string& name, int bite) {
   load_state(*s.model, *s.state, bytes);
   // One substep, so that candidates and everything else that stages leave behind are there.
   Jobs jobs(1);
-  find_candidates(s.model->solver, s.state->solver, s.state->scratch, jobs, 0.008f, nullptr);
+  find_boxes(s.model->solver, s.state->solver, s.state->scratch, jobs, nullptr);
+  find_candidates(s.model->solver, s.state->solver, s.state->scratch, 0.008f, nullptr);
   substep(s.model->solver, s.state->solver, s.state->scratch, jobs, nullptr);
   s.state->scratch.prev = s.predicted = s.state->solver.x;
   for (uint32_t i = 0; i < s.model->solver.count; ++i)
@@ -171,7 +172,10 @@ void TissuePairsFound(benchmark::State& bench) {
   Jobs jobs(1);
   measure(
       bench, m.tissue, kName[bench.range(0)], [] {},
-      [&] { find_tissue_pairs(m.collision, s.state->solver.x.data(), s.state->scratch.candidates.tissue, jobs); });
+      [&] {
+        find_tissue_pairs(m.collision, s.state->solver.x.data(), s.state->solver.pair_origin,
+                          s.state->scratch.candidates.tissue, jobs);
+      });
 }
 // Whether they have to be found anew.
 void TissueMovesLookedAt(benchmark::State& bench) {
@@ -186,7 +190,7 @@ void TissuePairsSolved(benchmark::State& bench) {
   const SolverModel& m = s.model->solver;
   Jobs jobs(1);
   PairSearch& search = s.state->scratch.candidates.tissue;
-  find_tissue_pairs(m.collision, s.predicted.data(), search, jobs);
+  find_tissue_pairs(m.collision, s.predicted.data(), s.state->solver.pair_origin, search, jobs);
   measure(
       bench, search.pair.size(), kName[bench.range(0)], [&] { s.state->solver.x = s.predicted; },
       [&] { solve_tissue_pairs(view_of(s), m.collision, search.pair, m.friction.tissue); });
@@ -196,14 +200,18 @@ void ToolAndThreadCandidates(benchmark::State& bench) {
   Jobs jobs(1);
   measure(
       bench, s.model->solver.count, kName[bench.range(0)], [] {},
-      [&] { find_candidates(s.model->solver, s.state->solver, s.state->scratch, jobs, 0.008f, nullptr); });
+      [&] {
+        find_boxes(s.model->solver, s.state->solver, s.state->scratch, jobs, nullptr);
+        find_candidates(s.model->solver, s.state->solver, s.state->scratch, 0.008f, nullptr);
+      });
 }
 void ToolsOnTissue(benchmark::State& bench) {
   Sewn& s = scene(bench.range(0));
   const SolverModel& m = s.model->solver;
   const std::vector<RigidBody> body = s.state->solver.body;
   Jobs jobs(1);
-  find_candidates(m, s.state->solver, s.state->scratch, jobs, 0.008f, nullptr);
+  find_boxes(m, s.state->solver, s.state->scratch, jobs, nullptr);
+  find_candidates(m, s.state->solver, s.state->scratch, 0.008f, nullptr);
   measure(
       bench, s.state->scratch.candidates.tool.size(), kName[bench.range(0)],
       [&] { s.state->solver.x = s.predicted, s.state->solver.body = body; },

@@ -137,7 +137,8 @@ void Playback::Work::look_ahead() {
       }
     }
     if (told.known % kGatherEvery == 0 || told.known == told.ticks) tell();
-    if (!state_is_sane(*model, *ahead)) throw InputError(name, "the state is no longer sane", "what came before can be seen");
+    if (!state_is_sane(*model, *ahead))
+      throw SimulationUnstable(name + ": the simulation became unstable here; what came before can be seen");
   }
 }
 

@@ -139,9 +139,7 @@ float learned(const FeltStiffness& f, float before, float coupling) {
   return std::clamp((f.work + before * kTrust * kTrust) / (f.travel + kTrust * kTrust), 0.0f, coupling);
 }
 
-}  // namespace
-
-void end_feeling(const Model& model, State& state) {
+void count_changes(State& state) {
   for (const Event& e : state.event) {
     std::array<bool, 2> felt{};
     switch (e.kind) {
@@ -170,9 +168,9 @@ void end_feeling(const Model& model, State& state) {
     }
     for (size_t k = 0; k < 2; ++k) state.feel.topology[k] += felt[k];
   }
-  for (size_t k = 0; k < 2; ++k) learn(state.feel.stiffness[k], state.feel.tool[k], state.feel.topology[k], model.dt);
 }
 
+// The patch of hand k.
 ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
@@ -294,6 +292,14 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     p.coefficient = m.friction.tool;
   }
   return p;
+}
+
+}  // namespace
+
+void end_feeling(const Model& model, State& state) {
+  count_changes(state);
+  for (size_t k = 0; k < 2; ++k) learn(state.feel.stiffness[k], state.feel.tool[k], state.feel.topology[k], model.dt);
+  for (size_t k = 0; k < 2; ++k) state.feel.patch[k] = feel_patch(model, state, k);
 }
 
 }  // namespace catgut

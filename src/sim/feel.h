@@ -1,11 +1,12 @@
-// sim/feel: what each hand feels of a tick, from the solver's own multipliers. Reads State and scratch, writes nothing that is
-// simulated: a run has the same bits whether anybody feels it or not.
+// sim/feel: what each hand feels of a tick, from the solver's own multipliers. Writes State::feel, which nothing that moves
+// reads.
 #pragma once
 #include <array>
 #include <cstdint>
 
 #include "core/sym3.h"
 #include "exchange/force_patch.h"
+#include "exchange/reflect.h"
 #include "solver/substep.h"
 #include "suture/suture.h"
 
@@ -14,7 +15,7 @@ namespace catgut {
 struct Model;
 struct State;
 
-// Forces on one tool, summed over the last substeps of a tick [N]. Not saved: it is gone with the tick.
+// Forces on one tool, summed over the last substeps of a tick [N]. Working memory of the tick.
 struct ToolReaction {
   Vec3 pressing, rubbing;  // tissue and the other tool on this one, along the contacts' normals and across
   float pressed = 0;       // all pressing, whatever its direction
@@ -39,19 +40,23 @@ struct FeltStiffness {
 };
 
 struct Feel {
-  std::array<ToolReaction, 2> tool;
   std::array<FeltStiffness, 2> stiffness;
   // Counts what changes at once for a hand: taken, let go, pierced (ForcePatch::topology).
   std::array<uint32_t, 2> topology{};
+  std::array<ForcePatch, 2> patch;  // what each hand may feel until the next tick
+  std::array<ToolReaction, 2> tool;
 };
+
+constexpr void reflect(auto& a, Like<FeltStiffness> auto& f) {
+  a(f.point), a(f.force), a(f.topology), a(f.loaded), a(f.work), a(f.travel);
+}
+constexpr void reflect(auto& a, Like<Feel> auto& f) { a(f.stiffness), a(f.topology), a(f.patch), a.cache(f.tool); }
 
 // Once a tick, before its substeps.
 void begin_feeling(State& state);
 // After substep i of the tick's, 1 to model.substeps.
 void feel_substep(const Model& model, State& state, int i);
-// After the tick's last stage: counts what changed at once, learns how stiff things are.
+// After the tick's last stage: counts what changed at once, learns how stiff things are, finishes the patches.
 void end_feeling(const Model& model, State& state);
-// The patch of hand k.
-ForcePatch feel_patch(const Model& model, const State& state, size_t k);
 
 }  // namespace catgut

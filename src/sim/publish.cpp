@@ -78,7 +78,7 @@ void publish(const Model& model, const State& state, Snapshot& out) {
     // The weld's multiplier acts on the tool; the hand feels its opposite.
     t.force = s.weld[k].lambda * -inv_h2;
     t.torque = s.weld[k].angular_lambda * -inv_h2;
-    out.patch[k] = feel_patch(model, state, k);
+    out.patch[k] = state.feel.patch[k];
   }
   // Published at the circle's centre, which is what pictures and plans turn about.
   out.needle.pose = {transform(s.body[kNeedle].pose(), m.needle_arc.centre), s.body[kNeedle].q};

@@ -4,6 +4,7 @@
 #pragma once
 #include <cstddef>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -33,16 +34,23 @@ StatePtr initial_state(const Model& model);
 // One tick of 1 / tick_rate seconds. times may be null.
 void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times = nullptr);
 
-// Fills the snapshot (reusing its memory) with the state after the last tick.
+// Copies the state after the last tick into the snapshot (reusing its memory): the same state gives the same snapshot, whether
+// it was reached by ticks or loaded.
 void publish(const Model& model, const State& state, Snapshot& snapshot);
 PictureModel picture_model(const Model& model);
 
 // The whole state as bytes (versioned by kStateVersion) and back. load_state throws InputError if the bytes do not fit the
 // model.
-constexpr uint32_t kStateVersion = 3;
+constexpr uint32_t kStateVersion = 4;
 std::vector<std::byte> save_state(const Model& model, const State& state);
 void load_state(const Model& model, State& state, const std::vector<std::byte>& bytes);
 uint64_t hash_state(const Model& model, const State& state);
+
+// The numbers of a run left what the solver can handle: no fault of the input. Whoever runs ticks checks for it with
+// state_is_sane.
+struct SimulationUnstable : std::runtime_error {
+  explicit SimulationUnstable(const std::string& what) : std::runtime_error(what) {}
+};
 
 // True when nothing in the state is NaN or infinite and no particle is further than `limit` metres from the origin.
 bool state_is_sane(const Model& model, const State& state, float limit = 1.0f);

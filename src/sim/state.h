@@ -1,4 +1,5 @@
-// sim/state: everything that changes, and the scratch that stages reuse. What save_state lists is the state; the rest is cache.
+// sim/state: everything that changes, and the scratch that stages reuse. What reflect names is the state: it is saved, hashed
+// and published. The rest is working memory of a tick.
 #pragma once
 #include <array>
 #include <vector>
@@ -7,8 +8,8 @@
 #include "exchange/tool_input.h"
 #include "sim/feel.h"
 #include "solver/substep.h"
-#include "suture/suture.h"
-#include "technique/technique.h"
+#include "suture/reflect.h"
+#include "technique/reflect.h"
 
 namespace catgut {
 
@@ -20,12 +21,17 @@ struct State {
   ClosurePlan plan;                     // written by technique, read by suture/closure
   std::array<Pose, 2> hand;             // where the hands were at the end of the last tick; written by sim/step
   std::array<uint8_t, 2> hand_known{};  // 0 until a hand has first been connected
-  // Not saved: events of this tick, working memory.
-  std::vector<Event> event;
+  Feel feel;                            // written by sim/feel, read by publish
+  std::vector<Event> event;             // of the last tick
+  // Working memory.
   std::vector<StitchPoint> stitch;
   std::vector<float> stitch_span;
   SolverScratch scratch;
-  Feel feel;  // written by sim/feel, read by publish
 };
+
+constexpr void reflect(auto& a, Like<State> auto& s) {
+  a(s.tick), a(s.solver), a(s.suture), a(s.plan), a(s.technique), a(s.hand), a(s.hand_known), a(s.feel), a(s.event);
+  a.cache(s.stitch), a.cache(s.stitch_span), a.cache(s.scratch);
+}
 
 }  // namespace catgut

@@ -68,6 +68,7 @@ TechniqueView look(const Model& model, State& state) {
 void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times) {
   const SolverModel& solver = model.solver;
   state.event.clear();
+  find_boxes(solver, state.solver, state.scratch, jobs, times);
   meet_hands(state, input);
   const std::array<uint32_t, 2> pressed = pressed_buttons(state.suture, input.hand);
   grasp(solver, state.solver, state.scratch, model.suture, state.suture, input.hand, state.event);
@@ -81,7 +82,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   // As far as thread and tools may come nearer to anything in a tick, at half a metre a second; but no less than what a knot's
   // thread jumps when it slips.
   const float margin = std::clamp(0.5f * model.dt, 0.002f, 0.008f);
-  find_candidates(solver, state.solver, state.scratch, jobs, margin, times);
+  find_candidates(solver, state.solver, state.scratch, margin, times);
   begin_feeling(state);
   for (int i = 1; i <= model.substeps; ++i) {
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));
@@ -106,8 +107,8 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   for (size_t k = 0; k < 2; ++k)
     if (input.hand[k].connected) state.hand[k] = input.hand[k].pose;
   for (Event& e : state.event) e.tick = state.tick;
-  end_feeling(model, state);
   ++state.tick;
+  end_feeling(model, state);
 }
 
 }  // namespace catgut

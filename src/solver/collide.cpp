@@ -18,7 +18,7 @@ Vec3 all(float s) { return {s, s, s}; }
 }  // namespace
 
 int nearest_particle(const TissueCollision& tissue, const Candidates& c, const Vec4* x, Vec3 p, float reach) {
-  constexpr float kOld = 0.002f;  // [m] boxes may be a tick old: more than tissue moves in one
+  constexpr float kOld = 0.002f;  // [m] boxes are of the start of the tick: more than tissue moves in one
   float best = reach * reach;
   int found = -1;
   for_blocks_near(c.tissue.boxes, p - all(reach + kOld), p + all(reach + kOld), [&](uint32_t b) {

@@ -43,9 +43,8 @@ void reserve_room(const SolverModel& m, SolverScratch& k) {
   PairSearch& p = c.tissue;
   const size_t blocks = (tissue + kBlock - 1) / kBlock, groups = (blocks + kBlock - 1) / kBlock;
   p.pair.reserve(tissue * kPairsOfOne);
-  p.built_at.reserve(tissue);
   for (Column<float>* column : {&p.at[0], &p.at[1], &p.at[2], &p.radius}) column->reserve(blocks * kBlock);
-  for (BlockBoxes* boxes : {&p.boxes, &p.built}) boxes->block.resize(blocks), boxes->group.resize(groups);
+  for (BlockBoxes* boxes : {&p.boxes, &p.built, &p.swept}) boxes->block.resize(blocks), boxes->group.resize(groups);
   p.of_block.resize(blocks);
   for (std::vector<PairCandidate>& pair : p.of_block) pair.reserve(kBlock * kPairsOfOne);
   p.part.resize(groups);
@@ -98,8 +97,7 @@ void update_velocities(const SolverModel& m, SolverState& s, const SolverScratch
 void note_moves(const SolverModel& m, const SolverState& s, SolverScratch& k, size_t first, size_t last) {
   PairSearch& search = k.candidates.tissue;
   const uint32_t from = m.shape.group_first[first], to = m.shape.group_first[last];
-  if (to <= search.built_at.size())
-    search.moved[first / kGroupBlock] = furthest_move(&s.x[from], &search.built_at[from], to - from);
+  search.moved[first / kGroupBlock] = furthest_move(&s.x[from], &s.pair_origin[from], to - from);
 }
 
 }  // namespace
@@ -116,6 +114,7 @@ SolverState make_solver_state(const SolverModel& model, std::span<const Vec3> po
   s.x.resize(model.count);
   s.v.resize(model.count);
   for (uint32_t i = 0; i < model.count; ++i) s.x[i] = point(position[i]);
+  s.pair_origin.assign(s.x.begin(), s.x.begin() + model.tissue);
   s.rotation.reset(model.shape.clusters);
   s.body.resize(model.body.size());
   s.thread_collides.assign(model.thread.count, 1);
@@ -141,14 +140,17 @@ void prepare_scratch(const SolverModel& model, SolverScratch& k) {
   reserve_room(model, k);
 }
 
-void find_candidates(const SolverModel& m, const SolverState& s, SolverScratch& k, Jobs& jobs, float margin,
-                     StageTimes* times) {
+void find_boxes(const SolverModel& m, const SolverState& s, SolverScratch& k, Jobs& jobs, StageTimes* times) {
+  StageTimer timer(times, Stage::broadphase);
+  make_boxes(m.collision, s.x.data(), k.candidates.tissue.boxes, jobs);
+}
+
+void find_candidates(const SolverModel& m, const SolverState& s, SolverScratch& k, float margin, StageTimes* times) {
   {
     StageTimer timer(times, Stage::attach);
     weave(s.pin, m.inv_mass.data(), m.tissue, k.web);
   }
   StageTimer timer(times, Stage::broadphase);
-  make_boxes(m.collision, s.x.data(), k.candidates.tissue.boxes, jobs);
   find_tool_and_thread_candidates(m.collision, s.x.data(), m.thread, s.thread, s.thread_collides, m.body, s.body,
                                   s.body_collides, margin, k.candidates);
   find_tool_pairs(m.body, s.body, s.body_collides, k.candidates.tool_pair);
@@ -201,7 +203,9 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   uint32_t touching = 0;
   {
     StageTimer timer(times, Stage::broadphase);
-    if (pairs_are_stale(m.collision, k.candidates.tissue)) find_tissue_pairs(m.collision, x, k.candidates.tissue, jobs);
+    PairSearch& search = k.candidates.tissue;
+    if (!search.filled) list_tissue_pairs(m.collision, s.pair_origin, search, jobs);
+    if (pairs_are_stale(m.collision, search)) find_tissue_pairs(m.collision, x, s.pair_origin, search, jobs);
   }
   {
     StageTimer timer(times, Stage::self_contact);

@@ -56,9 +56,11 @@ struct SolverState {
   std::vector<ChannelPoint> channel;     // needle in its channel
   std::vector<uint8_t> thread_collides;  // per thread slot (relative)
   std::vector<uint8_t> body_collides;    // per body
+  Column<Vec4> pair_origin;              // [m] per tissue particle: where its contact pairs were last searched
 };
 
-// Working memory and caches: never saved, never hashed; results do not depend on what is left in it.
+// Working memory and caches: never saved, never hashed. Whatever a stage reads of it was made in the same tick, or is a
+// function of the state and is made again after a load.
 struct SolverScratch {
   Column<Vec4> prev;
   ShapeScratch shape;
@@ -75,9 +77,11 @@ struct SolverScratch {
 
 SolverState make_solver_state(const SolverModel& model, std::span<const Vec3> position);
 void prepare_scratch(const SolverModel& model, SolverScratch& scratch);
+// Once a tick, before anything else: where the tissue is, for whatever looks for what is near.
+void find_boxes(const SolverModel& model, const SolverState& state, SolverScratch& scratch, Jobs& jobs, StageTimes* times);
 // Once a tick, before its substeps, in which no pin is made or taken away: who may touch whom, and which pins share tissue.
-// margin [m]: the furthest anything may move against another in a tick.
-void find_candidates(const SolverModel& model, const SolverState& state, SolverScratch& scratch, Jobs& jobs, float margin,
+// Reads the boxes. margin [m]: the furthest anything may move against another in a tick.
+void find_candidates(const SolverModel& model, const SolverState& state, SolverScratch& scratch, float margin,
                      StageTimes* times);
 void substep(const SolverModel& model, SolverState& state, SolverScratch& scratch, Jobs& jobs, StageTimes* times);
 

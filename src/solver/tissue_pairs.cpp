@@ -83,13 +83,13 @@ float FurthestMove(const Vec4* x, const Vec4* from, size_t n) {
 
 // Which blocks of group g have moved by more than `limit` along an axis since their pairs were found, or are not numbers; bit
 // k: its block k. They are looked for from where they are now on.
-uint32_t MovedBlocks(const Vec4* x, PairSearch& search, uint32_t g, float limit) {
+uint32_t MovedBlocks(const Vec4* x, Column<Vec4>& origin, PairSearch& search, uint32_t g, float limit) {
   const D d;
-  const uint32_t particles = static_cast<uint32_t>(search.built_at.size());
+  const uint32_t particles = static_cast<uint32_t>(origin.size());
   uint32_t moved = 0;
   for (uint32_t k = 0; k < kBlock && (g * kBlock + k) * kBlock < particles; ++k) {
     const uint32_t first = (g * kBlock + k) * kBlock, count = HWY_MIN(kBlock, particles - first);
-    const float *at = &x[first].x, *was = &search.built_at[first].x;
+    const float *at = &x[first].x, *was = &origin[first].x;
     bool stays = true;
     size_t i = 0;
     for (; i + kLanes <= 4 * size_t{count}; i += kLanes)
@@ -98,24 +98,25 @@ uint32_t MovedBlocks(const Vec4* x, PairSearch& search, uint32_t g, float limit)
     if (stays) continue;
     moved |= 1u << k;
     for (i = first; i < first + count; ++i) {
-      search.built_at[i] = x[i];
+      origin[i] = x[i];
       search.at[0][i] = x[i].x, search.at[1][i] = x[i].y, search.at[2][i] = x[i].z;
     }
   }
   return moved;
 }
 
-// Pairs whose first particle is in a block of group g, if that block or one near it has moved.
+// Pairs whose first particle is in a block of group g, if that block or one near it has moved. Blocks are near that were near
+// before or are now, by a little more than the reach, so that the test of the pairs themselves alone decides what is listed.
 void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g) {
   const D d;
   PairSearch::Part& part = search.part[g];
-  const BlockBoxes& boxes = search.built;
-  const float reach = 2 * tissue.largest_radius + tissue.pair_margin;
+  const BlockBoxes &boxes = search.swept, &built = search.built;
+  const float reach = 1.0001f * (2 * tissue.largest_radius + tissue.pair_margin);
   const uint32_t end = HWY_MIN(boxes.blocks, (g + 1) * kBlock);
   for (uint32_t ba = g * kBlock; ba < end; ++ba) {
     float from[3], to[3];
     for (size_t axis = 0; axis < 3; ++axis)
-      from[axis] = boxes.block.lower[axis][ba] - reach, to[axis] = boxes.block.upper[axis][ba] + reach;
+      from[axis] = built.block.lower[axis][ba] - reach, to[axis] = built.block.upper[axis][ba] + reach;
     part.near.clear();
     bool anew = false;
     const TissueCollision::Kin* kin = tissue.kin.data() + tissue.kin_first[ba];
@@ -145,8 +146,8 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
     for (size_t axis = 0; axis < 3; ++axis)
       for (size_t k = 0; k < padded; ++k) {
         const bool is = k < part.near.size();
-        near_box.lower[axis][k] = is ? boxes.block.lower[axis][part.near[k].block] : 0.0f;
-        near_box.upper[axis][k] = is ? boxes.block.upper[axis][part.near[k].block] : 0.0f;
+        near_box.lower[axis][k] = is ? built.block.lower[axis][part.near[k].block] : 0.0f;
+        near_box.upper[axis][k] = is ? built.block.upper[axis][part.near[k].block] : 0.0f;
       }
     const uint32_t last = HWY_MIN(tissue.particles, (ba + 1) * kBlock);
     for (uint32_t i = ba * kBlock; i < last; ++i) {
@@ -273,40 +274,70 @@ void make_boxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes,
 float furthest_move(const Vec4* x, const Vec4* from, size_t n) { return HWY_DYNAMIC_DISPATCH(FurthestMove)(x, from, n); }
 
 bool pairs_are_stale(const TissueCollision& tissue, const PairSearch& search) {
-  if (search.built_at.size() != tissue.particles) return true;
+  if (!search.filled) return true;
   float furthest = 0;
   for (const float move : search.moved) furthest = std::max(furthest, move);
   return furthest > 0.5f * tissue.pair_margin;  // two particles, each half the margin
 }
 
-void find_tissue_pairs(const TissueCollision& tissue, const Vec4* x, PairSearch& search, Jobs& jobs) {
-  if (search.built_at.size() != tissue.particles) {
-    search.built_at.assign(tissue.particles, {kNowhere, kNowhere, kNowhere, kNowhere});  // from where everything has moved
-    search.built.blocks = (tissue.particles + kBlock - 1) / kBlock;
-    search.built.groups = (search.built.blocks + kBlock - 1) / kBlock;
-    search.built.block.resize(search.built.blocks);
-    search.built.group.resize(search.built.groups);
-    const size_t padded = size_t{search.built.blocks} * kBlock;
-    for (Column<float>& column : search.at) column.assign(padded, kNowhere);
-    search.radius.assign(tissue.radius.begin(), tissue.radius.end());
-    search.radius.resize(padded);
-    search.part.resize(search.built.groups);
-    search.of_block.resize(search.built.blocks);
-  }
-  // What has moved by less than half of what makes pairs stale may stay where it was looked for: it is often most of the
-  // tissue.
-  const float limit = 0.25f * tissue.pair_margin / std::sqrt(3.0f);
-  jobs.each(search.built.groups, 1, [&](size_t at, size_t) {
-    const uint32_t g = static_cast<uint32_t>(at);
-    search.part[g].moved = HWY_DYNAMIC_DISPATCH(MovedBlocks)(x, search, g, limit);
-    if (search.part[g].moved != 0) HWY_DYNAMIC_DISPATCH(MakeBoxes)(tissue, search.built_at.data(), search.built, g);
-  });
+namespace {
+
+// Widens the boxes of group g, and its own, by those of `by`.
+void join_boxes(const BlockBoxes& by, BlockBoxes& boxes, uint32_t g) {
+  auto join = [](const Boxes& other, Boxes& box, size_t k) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      box.lower[axis][k] = std::min(box.lower[axis][k], other.lower[axis][k]);
+      box.upper[axis][k] = std::max(box.upper[axis][k], other.upper[axis][k]);
+    }
+  };
+  join(by.group, boxes.group, g);
+  for (uint32_t b = g * kBlock; b < std::min(boxes.blocks, (g + 1) * kBlock); ++b) join(by.block, boxes.block, b);
+}
+
+void list_pairs(const TissueCollision& tissue, PairSearch& search, Jobs& jobs) {
   jobs.each(search.built.groups, 1, [&](size_t g, size_t) {
     HWY_DYNAMIC_DISPATCH(PairsOfGroup)(tissue, search, static_cast<uint32_t>(g));
   });
   search.pair.clear();
   for (const std::vector<PairCandidate>& pair : search.of_block)
     search.pair.insert(search.pair.end(), pair.begin(), pair.end());
+}
+
+}  // namespace
+
+void list_tissue_pairs(const TissueCollision& tissue, const Column<Vec4>& origin, PairSearch& search, Jobs& jobs) {
+  make_boxes(tissue, origin.data(), search.built, jobs);
+  search.swept = search.built;
+  const size_t padded = size_t{search.built.blocks} * kBlock;
+  for (size_t axis = 0; axis < 3; ++axis) search.at[axis].assign(padded, kNowhere);
+  for (size_t i = 0; i < tissue.particles; ++i)
+    search.at[0][i] = origin[i].x, search.at[1][i] = origin[i].y, search.at[2][i] = origin[i].z;
+  search.radius.assign(tissue.radius.begin(), tissue.radius.end());
+  search.radius.resize(padded);
+  search.of_block.resize(search.built.blocks);
+  search.part.resize(search.built.groups);
+  for (PairSearch::Part& part : search.part) part.moved = (1u << kBlock) - 1;
+  search.filled = true;
+  list_pairs(tissue, search, jobs);
+}
+
+void find_tissue_pairs(const TissueCollision& tissue, const Vec4* x, Column<Vec4>& origin, PairSearch& search, Jobs& jobs) {
+  if (origin.size() != tissue.particles) {
+    origin.assign(x, x + tissue.particles);
+    search.filled = false;
+  }
+  if (!search.filled) return list_tissue_pairs(tissue, origin, search, jobs);
+  // What has moved by less than half of what makes pairs stale may keep its origin: it is often most of the tissue.
+  const float limit = 0.25f * tissue.pair_margin / std::sqrt(3.0f);
+  search.swept = search.built;
+  jobs.each(search.built.groups, 1, [&](size_t at, size_t) {
+    const uint32_t g = static_cast<uint32_t>(at);
+    search.part[g].moved = HWY_DYNAMIC_DISPATCH(MovedBlocks)(x, origin, search, g, limit);
+    if (search.part[g].moved == 0) return;
+    HWY_DYNAMIC_DISPATCH(MakeBoxes)(tissue, origin.data(), search.built, g);
+    join_boxes(search.built, search.swept, g);
+  });
+  list_pairs(tissue, search, jobs);
 }
 
 }  // namespace catgut

@@ -1,8 +1,9 @@
 // solver/tissue_pairs: which particles of the tissue may touch each other. Candidates are found with a margin and kept until
-// something has moved by more than half of it, so most substeps pay only for the look whether anything has, and then only what
-// has moved is looked for anew. They are sorted by
-// particle and so the same for any number of workers, and a pair that touches is always among them: finding them sooner or
-// later changes nothing.
+// something has moved by more than half of it, so most substeps only check the distance moved, and then only blocks that have
+// moved are searched again. A pair that touches when its contacts are solved is always listed; a pair that comes to touch while
+// they are solved may not be. The list is therefore part of the result, and it is a pure function of the positions at which
+// each particle was last searched (`origin`), which are state: all pairs within margin there, sorted. Neither the number of
+// workers nor a save and load in between changes it.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -58,15 +59,16 @@ struct BlockBoxes {
   Boxes block, group;
 };
 
-// Working memory: never saved, and results do not depend on what is left in it. A block that has hardly moved stays where it
-// was looked for when others are looked for anew: whatever is within margin of each other there is listed.
+// Working memory: never saved. All but `boxes` and `moved` is derived from the origins and made from them when `filled` is not
+// set. A block that has hardly moved keeps its origins when others are searched again.
 struct PairSearch {
   std::vector<PairCandidate> pair;
+  bool filled = false;       // what follows is that of the origins
   BlockBoxes boxes;          // as of the last call of make_boxes
-  Column<Vec4> built_at;     // per particle: where it was looked for; empty: not yet
-  std::vector<float> moved;  // [m] how far particles are from there, as furthest_move has it: one for each part of the tissue
-  BlockBoxes built;          // round built_at
-  // built_at by components, padded to whole blocks with places that are no numbers: near nothing, however far away a damaged
+  std::vector<float> moved;  // [m] distance of particles from their origins (furthest_move): one for each part of the tissue
+  BlockBoxes built;          // around the origins
+  BlockBoxes swept;          // around the origins before and after the search that is going on
+  // The origins by components, padded to whole blocks with places that are no numbers: near nothing, however far away a damaged
   // state may have put its particles.
   std::array<Column<float>, 3> at;
   Column<float> radius;
@@ -89,8 +91,10 @@ void make_boxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes,
 float furthest_move(const Vec4* x, const Vec4* from, size_t n);
 // Whether search.pair may lack a pair that touches, given search.moved.
 bool pairs_are_stale(const TissueCollision& tissue, const PairSearch& search);
-// Brings search.pair up to date. x: [m] per tissue particle.
-void find_tissue_pairs(const TissueCollision& tissue, const Vec4* x, PairSearch& search, Jobs& jobs);
+// Lists the pairs of the origins as they are.
+void list_tissue_pairs(const TissueCollision& tissue, const Column<Vec4>& origin, PairSearch& search, Jobs& jobs);
+// Moves the origins of what has moved to x [m], per tissue particle, and lists their pairs.
+void find_tissue_pairs(const TissueCollision& tissue, const Vec4* x, Column<Vec4>& origin, PairSearch& search, Jobs& jobs);
 
 // Calls with(block) for every block whose box meets the box from..to, in ascending order.
 template <class With>

@@ -190,8 +190,8 @@ TEST(Load, damaged_bytes_never_crash) {
   for (ToolInput& h : idle.hand) h.connected = 0;
   step(*model, *state, idle, jobs);
   const std::vector<std::byte> good = save_state(*model, *state);
-  // The columns of positions and velocities are any numbers; what follows them has the structure.
-  const size_t columns = 8 + 2 * (8 + 16 * particle_count(*model));
+  // The columns of positions, velocities and origins are any numbers; what follows them has the structure.
+  const size_t columns = 8 + 2 * (8 + 16 * particle_count(*model)) + 8 + 16 * model->solver.tissue;
   Random random(3);
   int refused = 0;
   for (int k = 0; k < 300; ++k) {

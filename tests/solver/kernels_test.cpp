@@ -460,7 +460,10 @@ uint64_t pressed_bowel(int workers, double* deepest) {
   for (int i = 0; i < 200; ++i) {
     s.body[1].x += Vec3{0.00002f, 0, 0.00003f};
     s.weld[0].target = Pose{{0.00001f * static_cast<float>(i), -0.008f, 0.026f - 0.00005f * static_cast<float>(i)}, {}};
-    if (i % 8 == 0) find_candidates(m, s, k, jobs, 0.008f, nullptr);
+    if (i % 8 == 0) {
+      find_boxes(m, s, k, jobs, nullptr);
+      find_candidates(m, s, k, 0.008f, nullptr);
+    }
     substep(m, s, k, jobs, nullptr);
     contacts = std::max(contacts, k.contacts);
   }

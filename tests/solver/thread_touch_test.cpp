@@ -81,7 +81,10 @@ struct Wrap {
   void run(double seconds) {
     const int steps = static_cast<int>(seconds / double{model.h});
     for (int i = 0; i < steps; ++i) {
-      if (i % 8 == 0) find_candidates(model, state, scratch, jobs, 0.008f, nullptr);
+      if (i % 8 == 0) {
+        find_boxes(model, state, scratch, jobs, nullptr);
+        find_candidates(model, state, scratch, 0.008f, nullptr);
+      }
       substep(model, state, scratch, jobs, nullptr);
       look();
     }

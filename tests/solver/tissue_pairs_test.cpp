@@ -61,8 +61,9 @@ TEST(TissuePairs, finds_what_looking_at_every_pair_finds) {
     const Sheets s = make_sheets(seed);
     for (const int workers : {1, 2, 3}) {
       Jobs jobs(workers);
+      Column<Vec4> origin;
       PairSearch search;
-      find_tissue_pairs(s.tissue, s.x.data(), search, jobs);
+      find_tissue_pairs(s.tissue, s.x.data(), origin, search, jobs);
       const auto found = listed(search);
       EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
       // At the very edge of the margin rounding decides; a micrometre inside of it nothing may be missing.
@@ -82,8 +83,9 @@ TEST(TissuePairs, particles_that_are_nowhere_are_near_nothing) {
     Sheets s = make_sheets(6);
     for (const size_t i : {0u, 40u, 900u, 1839u}) s.x[i] = {far, i == 40 ? -far : far, far, 1};
     Jobs jobs(1);
+    Column<Vec4> origin;
     PairSearch search;
-    find_tissue_pairs(s.tissue, s.x.data(), search, jobs);
+    find_tissue_pairs(s.tissue, s.x.data(), origin, search, jobs);
     EXPECT_GT(search.pair.size(), 1000u);
     for (const PairCandidate& c : search.pair) ASSERT_TRUE(c.a < c.b && c.b < s.tissue.particles) << far;
   }
@@ -92,16 +94,17 @@ TEST(TissuePairs, particles_that_are_nowhere_are_near_nothing) {
 TEST(TissuePairs, kept_pairs_hold_all_that_touch_until_they_are_called_stale) {
   Sheets s = make_sheets(4);
   Jobs jobs(1);
+  Column<Vec4> origin;
   PairSearch search;
   search.moved.assign(1, 0.0f);
   EXPECT_TRUE(pairs_are_stale(s.tissue, search)) << "nothing was found yet";
-  find_tissue_pairs(s.tissue, s.x.data(), search, jobs);
+  find_tissue_pairs(s.tissue, s.x.data(), origin, search, jobs);
   Random random(9);
   int kept = 0;
   for (int step = 0; step < 100; ++step) {
     for (Vec4& p : s.x)
       for (float* at : {&p.x, &p.y, &p.z}) *at += 2e-5f * static_cast<float>(random.uniform() - 0.45);
-    search.moved[0] = furthest_move(s.x.data(), search.built_at.data(), s.x.size());
+    search.moved[0] = furthest_move(s.x.data(), origin.data(), s.x.size());
     if (pairs_are_stale(s.tissue, search)) break;
     ++kept;
     const auto found = listed(search), touching = every_pair_within(s, 0);
@@ -115,6 +118,7 @@ TEST(TissuePairs, kept_pairs_hold_all_that_touch_until_they_are_called_stale) {
 TEST(TissuePairs, only_what_moved_is_looked_for_anew_and_nothing_that_touches_is_missed) {
   Sheets s = make_sheets(7);
   Jobs jobs(2);
+  Column<Vec4> origin;
   PairSearch search;
   search.moved.assign(1, 0.0f);
   Random random(10);
@@ -131,11 +135,15 @@ TEST(TissuePairs, only_what_moved_is_looked_for_anew_and_nothing_that_touches_is
       by *= 0.0005f / length(by);
     }
     for (const uint32_t i : held) s.x[i].x += by.x, s.x[i].y += by.y, s.x[i].z += by.z;
-    if (!search.built_at.empty()) search.moved[0] = furthest_move(s.x.data(), search.built_at.data(), s.x.size());
+    if (!origin.empty()) search.moved[0] = furthest_move(s.x.data(), origin.data(), s.x.size());
     if (pairs_are_stale(s.tissue, search)) {
-      find_tissue_pairs(s.tissue, s.x.data(), search, jobs);
+      find_tissue_pairs(s.tissue, s.x.data(), origin, search, jobs);
       ++searches;
       for (const PairSearch::Part& part : search.part) blocks += static_cast<size_t>(std::popcount(part.moved));
+      // What a save and load in between would list.
+      PairSearch again;
+      list_tissue_pairs(s.tissue, origin, again, jobs);
+      ASSERT_EQ(listed(again), listed(search)) << step;
     }
     const auto found = listed(search), touching = every_pair_within(s, 0);
     ASSERT_TRUE(std::is_sorted(found.begin(), found.end()));

@@ -87,7 +87,10 @@ struct Pair {
     const int steps = static_cast<int>(std::lround(seconds / double{model.h}));
     for (int i = 0; i < steps; ++i) {
       if (hands) hands(static_cast<float>(i + 1) * model.h);
-      if (step++ % 16 == 0) find_candidates(model, state, scratch, jobs, 0.008f, nullptr);
+      if (step++ % 16 == 0) {
+        find_boxes(model, state, scratch, jobs, nullptr);
+        find_candidates(model, state, scratch, 0.008f, nullptr);
+      }
       substep(model, state, scratch, jobs, nullptr);
       deepest = std::max(deepest, -gap());
       for (size_t k = 0; k < 2; ++k) steepest = std::max(steepest, length(state.body[k].v));

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// solver/reflect: the members of the solver's state, for archives (core/reflect.h), and the domains of its indices.
+#pragma once
+#include "core/reflect.h"
+#include "solver/substep.h"
+
+namespace catgut {
+
+// What an index in the state counts.
+enum class IndexOf : uint8_t {
+  particle,  // all columns: tissue, then thread
+  tissue,    // particles of soft bodies
+  slot,      // particles of the thread; the first is not 0
+  pair,      // neighbors along the thread
+  cluster,   // of shape matching, padded as its columns are
+  body,      // rigid
+  triangle,  // of the tissue's surface
+  anchor,    // of the thread
+  bite,
+  plan_row,  // of ClosurePlan::pair
+  count_
+};
+
+constexpr void reflect(auto& a, Like<Vec4> auto& v) { a(v.x), a(v.y), a(v.z), a(v.w); }
+
+constexpr void reflect(auto& a, Like<TissuePoint> auto& t) {
+  a.at_most(t.count, TissuePoint::kMost);
+  // Beyond count the rows are unused, and zero.
+  for (uint32_t k = 0; k < TissuePoint::kMost; ++k) a.index(t.particle[k], IndexOf::tissue);
+  a(t.weight);
+}
+
+constexpr void reflect(auto& a, Like<RigidBody> auto& b) { a(b.x), a(b.q), a(b.v), a(b.omega), a(b.prev_x), a(b.prev_q); }
+
+constexpr void reflect(auto& a, Like<Weld> auto& w) {
+  a.index(w.a, IndexOf::body), a.index_or_none(w.b, IndexOf::body);
+  a(w.local_a), a(w.local_b), a(w.target), a(w.compliance), a(w.angular_compliance), a(w.lambda), a(w.angular_lambda);
+}
+
+constexpr void reflect(auto& a, Like<Attachment> auto& t) {
+  a(t.point), a.index_or_none(t.body, IndexOf::body), a(t.target), a(t.compliance), a(t.lambda);
+}
+
+constexpr void reflect(auto& a, Like<ChannelPoint> auto& c) {
+  a(c.point), a(c.compliance), a(c.drag), a(c.at), a(c.hole), a(c.lambda), a(c.drag_lambda);
+}
+
+constexpr void reflect(auto& a, Like<TissuePin> auto& p) {
+  a(p.a), a(p.b), a(p.length), a(p.compliance), a(p.lambda), a.at_most(p.owner, PinOwner::passage);
+}
+
+constexpr void reflect(auto& a, Like<ThreadAnchor> auto& t) {
+  a.index(t.slot, IndexOf::slot), a(t.point), a(t.offset), a(t.knotted), a(t.friction), a(t.capstan), a(t.slipping);
+  a(t.blocked_needle), a(t.blocked_free), a(t.tension_needle), a(t.tension_free);
+}
+
+constexpr void reflect(auto& a, Like<ThreadHold> auto& h) {
+  a.index(h.slot, IndexOf::slot), a.index(h.body, IndexOf::body), a(h.local), a.at_most(h.kind, HoldKind::loop);
+}
+
+constexpr void reflect(auto& a, Like<Thread> auto& t) {
+  a.permutation(t.order, IndexOf::slot);
+  a.column(t.rest, IndexOf::pair), a.column(t.cut, IndexOf::pair);
+  a(t.anchor), a(t.hold);
+  a.domain(IndexOf::anchor, t.anchor.size());
+  a.column(t.tension, IndexOf::pair);
+}
+
+constexpr void reflect(auto& a, Like<ClusterRotations> auto& r) {
+  for (auto* each : {&r.x, &r.y, &r.z, &r.w}) a.column(*each, IndexOf::cluster);
+}
+
+constexpr void reflect(auto& a, Like<SolverState> auto& s) {
+  a.column(s.x, IndexOf::particle), a.column(s.v, IndexOf::particle);
+  a.column(s.pair_origin, IndexOf::tissue);
+  a(s.rotation);
+  a.column(s.body, IndexOf::body);
+  a(s.thread);
+  a(s.weld), a(s.attach), a(s.pin), a(s.channel);
+  a.column(s.thread_collides, IndexOf::slot), a.column(s.body_collides, IndexOf::body);
+}
+
+}  // namespace catgut

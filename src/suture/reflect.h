@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// suture/reflect: the members of the sutures' state, for archives (core/reflect.h).
+#pragma once
+#include "exchange/reflect.h"
+#include "solver/reflect.h"
+#include "suture/suture.h"
+
+namespace catgut {
+
+constexpr void reflect(auto& a, Like<BiteEnd> auto& e) { a.index(e.triangle, IndexOf::triangle), a(e.weight), a(e.point); }
+
+constexpr void reflect(auto& a, Like<Bite> auto& b) {
+  a(b.entry), a(b.exit), a(b.depth), a(b.has_exit), a(b.complete), a(b.cancelled), a.index(b.nearest, IndexOf::tissue);
+}
+
+constexpr void reflect(auto& a, Like<OpenBite> auto& o) {
+  a.index(o.bite, IndexOf::bite), a.at_most(o.phase, NeedlePhase::back_in), a(o.drawn), a(o.told);
+}
+
+constexpr void reflect(auto& a, Like<SuturePoint> auto& p) {
+  a.index(p.bite, IndexOf::bite), a(p.exit), a.index(p.anchor, IndexOf::anchor);
+}
+
+constexpr void reflect(auto& a, Like<HandState> auto& h) {
+  a.at_most(h.held, Held::tissue);
+  if (h.held == Held::thread) a.index(h.slot, IndexOf::slot);
+  else if (h.held == Held::tissue) a.index(h.slot, IndexOf::tissue);
+  else a(h.slot);
+  a(h.at), a(h.jaw);
+}
+
+constexpr void reflect(auto& a, Like<ToolLoop> auto& l) {
+  a(l.wraps), a(l.handed);
+  if (l.wraps > 0) a.index(l.first, IndexOf::slot), a.index(l.last, IndexOf::slot);
+  else a(l.first), a(l.last);
+  a.at_most(l.told, LoopReason::too_deep), a(l.spent), a(l.jaw);
+}
+
+constexpr void reflect(auto& a, Like<Knot> auto& k) {
+  a.at_most(k.phase, KnotPhase::locked), a.at_most(k.hand, 1u), a(k.begun), a(k.target), a(k.from), a(k.left), a(k.hand_from);
+  a.index(k.strand, IndexOf::slot), a(k.end), a(k.slot), a.at_most(k.slots, 2u), a(k.snug);
+  a.at_most(k.throws, KnotView::kMostThrows), a(k.told), a(k.thrown);
+}
+
+constexpr void reflect(auto& a, Like<SettledNode> auto& n) { a.index(n.particle, IndexOf::tissue), a(n.offset); }
+constexpr void reflect(auto& a, Like<SettledStitch> auto& s) { a(s.node), a(s.knot); }
+
+constexpr void reflect(auto& a, Like<SutureState> auto& s) {
+  a.domain(IndexOf::bite, s.bite.size());
+  a(s.bite), a(s.point), a(s.open), a(s.tip_inside), a(s.attached), a(s.attached_from), a(s.hand), a(s.loop), a(s.knot),
+      a(s.settled), a(s.buttons), a(s.taken);
+}
+
+constexpr void reflect(auto& a, Like<ClosurePlan::Pull> auto& p) { a(p.point), a(p.from), a(p.to); }
+constexpr void reflect(auto& a, Like<ClosurePlan::Pair> auto& p) {
+  a(p.a), a(p.b), a(p.start), a(p.end), a(p.progress), a(p.midpoint);
+}
+constexpr void reflect(auto& a, Like<ClosurePlan> auto& p) {
+  a(p.pull), a(p.progress), a(p.compliance), a(p.pair);
+  a.domain(IndexOf::plan_row, p.pair.size());
+}
+
+}  // namespace catgut
