@@ -14,11 +14,17 @@ namespace catgut {
 namespace {
 
 struct Options {
-  std::string arms = "touch", listen = "127.0.0.1";
+  std::string arms = "touch", listen = "127.0.0.1", key, new_key;
   double seconds = 0;
 };
 
 int bridge(const Options& o) {
+  if (!o.new_key.empty()) {
+    write_bridge_key(o.new_key);
+    std::printf("%s: copy it to the simulator's machine, mode 600; there: CATGUT_BRIDGE_KEY=FILE, here: --key FILE\n",
+                o.new_key.c_str());
+    return 0;
+  }
   const ArmChoice choice = read_arm_choice(o.arms);
   if (choice.as_paper || choice.driver.empty())
     throw InputError("--arms " + o.arms, "that is no driver of arms", "see catgut devices --help");
@@ -30,6 +36,7 @@ int bridge(const Options& o) {
     if (port.arm[k].present) std::printf("%s arm: %s\n", k == 0 ? "right" : "left", port.arm[k].name.c_str());
   ArmServerOptions options;
   options.listen = o.listen;
+  options.key = o.key;
   const std::atomic<bool>& stop = stop_on_interrupt();
   ArmServer server(std::move(port), options);
   std::printf("listening on %s, port %u; there: catgut play SCENE --haptics bridge:HOST:%u; Ctrl-C ends\n", o.listen.c_str(),
@@ -52,9 +59,11 @@ void add_bridge(CLI::App& app, int& exit_code) {
   command->add_option("--arms", o->arms, "which, as for play --haptics")->type_name("DRIVER[:WHERE]")->capture_default_str();
   command
       ->add_option("--listen", o->listen,
-                   "address and port; nothing is encrypted, so let only a network of your own reach it (0.0.0.0: any address)")
+                   "address and port (0.0.0.0: any address); anything but this machine's own 127.0.0.1 needs --key")
       ->type_name("HOST[:PORT]")
       ->capture_default_str();
+  command->add_option("--key", o->key, "file with the key that both ends share (mode 600)")->type_name("FILE");
+  command->add_option("--new-key", o->new_key, "make a key, write it to a new file, and end")->type_name("FILE");
   command->add_option("--seconds", o->seconds, "end after so much time")->check(within(0.1, 1e9))->type_name("S");
   command->callback([o, &exit_code] { exit_code = bridge(*o); });
 }

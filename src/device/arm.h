@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "exchange/arm.h"
+#include "exchange/force_patch.h"
 
 namespace catgut {
 
@@ -33,6 +34,8 @@ struct ArmStatus {
   uint32_t error = 0;   // the driver's last error code, 0: none
   uint32_t errors = 0;  // how many there were
   uint64_t steps = 0;   // callbacks
+  uint32_t faults = 0;  // LimiterFault bits (haptic/limiter) of an arm's end that evaluates patches itself, and
+  float force = 0;      // [N] what it wrote last
 };
 
 // A driver's functions, and what they work on. Make one with open_touch or the like; destroying it takes the force off.
@@ -45,6 +48,9 @@ struct ArmPort {
   ArmStatus (*status)(void* self, size_t arm) = nullptr;
   std::string (*error_text)(void* self, uint32_t error) = nullptr;
   void (*close)(void* self) = nullptr;  // stops too
+  // Set where the arm's end evaluates patches (the bridge): it gets them in the arm's own frame, from the thread of the
+  // physics, and what the callback returns is not used. Null: the callback's force goes to the motors.
+  void (*send_patch)(void* self, size_t arm, const ForcePatch& patch) = nullptr;
 
   ArmPort() = default;
   ArmPort(ArmPort&& other) noexcept { *this = std::move(other); }

@@ -2,188 +2,27 @@
 #include "device/bridge.h"
 
 #include <netdb.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <random>
 #include <thread>
 
+#include "core/check.h"
+#include "device/beat.h"
+#include "exchange/latest.h"
+
 namespace catgut {
-namespace {
 
-constexpr uint32_t kMagic = 0x42474143;
-constexpr size_t kText = 40, kCrcAt = 252;
-
-constexpr std::array<uint32_t, 256> crc_table() {
-  std::array<uint32_t, 256> table{};
-  for (uint32_t n = 0; n < 256; ++n) {
-    uint32_t c = n;
-    for (int k = 0; k < 8; ++k) c = c & 1 ? 0xEDB88320u ^ (c >> 1) : c >> 1;
-    table[n] = c;
-  }
-  return table;
-}
-uint32_t crc32(const uint8_t* data, size_t bytes) {
-  static constexpr std::array<uint32_t, 256> kTable = crc_table();
-  uint32_t c = 0xFFFFFFFFu;
-  for (size_t k = 0; k < bytes; ++k) c = kTable[(c ^ data[k]) & 0xFF] ^ (c >> 8);
-  return c ^ 0xFFFFFFFFu;
-}
-
-// Byte by byte, so that it is little endian wherever this runs.
-template <typename T>
-void put(uint8_t* at, T value) {
-  for (size_t k = 0; k < sizeof(T); ++k) at[k] = static_cast<uint8_t>(value >> (8 * k));
-}
-template <typename T>
-T get(const uint8_t* at) {
-  T value = 0;
-  for (size_t k = 0; k < sizeof(T); ++k) value = static_cast<T>(value | static_cast<T>(static_cast<T>(at[k]) << (8 * k)));
-  return value;
-}
-void put_float(uint8_t* at, float f) { put(at, std::bit_cast<uint32_t>(f)); }
-float get_float(const uint8_t* at) { return std::bit_cast<float>(get<uint32_t>(at)); }
-void put_vec(uint8_t* at, Vec3 v) { put_float(at, v.x), put_float(at + 4, v.y), put_float(at + 8, v.z); }
-Vec3 get_vec(const uint8_t* at) { return {get_float(at), get_float(at + 4), get_float(at + 8)}; }
-void put_text(uint8_t* at, const std::string& s) { std::memcpy(at, s.data(), std::min(s.size(), kText - 1)); }
-// What a stranger calls himself is shown to people: nothing in it may steer a terminal.
-std::string get_text(const uint8_t* at) {
-  std::string s;
-  for (size_t k = 0; k < kText - 1 && at[k]; ++k) s += at[k] >= 0x20 && at[k] < 0x7f ? static_cast<char>(at[k]) : '?';
-  return s;
-}
-
-// Numbers, and none that no arm has: what is squared later must not overflow.
-bool floats_are_sane(const uint8_t* packet, size_t from, size_t count) {
-  for (size_t k = 0; k < count; ++k)
-    if (!(std::abs(get_float(packet + from + 4 * k)) <= 1e6f)) return false;
-  return true;
-}
-
-void begin(BridgeBytes& out, const BridgeHead& h) {
-  out.fill(0);
-  put(&out[0], kMagic), put(&out[4], h.version);
-  out[6] = static_cast<uint8_t>(h.kind), out[7] = h.arm;
-  put(&out[8], h.session), put(&out[16], h.sequence), put(&out[24], h.time_ns);
-}
-void seal(BridgeBytes& out) { put(&out[kCrcAt], crc32(out.data(), kCrcAt)); }
-
-}  // namespace
-
-BridgeFault read_bridge(const uint8_t* data, size_t size, BridgeHead& h) {
-  if (size != kBridgeBytes || get<uint32_t>(data) != kMagic) return BridgeFault::garbage;
-  if (get<uint32_t>(data + kCrcAt) != crc32(data, kCrcAt)) return BridgeFault::garbage;
-  h.version = get<uint16_t>(data + 4);
-  h.kind = static_cast<BridgeKind>(data[6]);
-  h.arm = data[7];
-  h.session = get<uint64_t>(data + 8), h.sequence = get<uint64_t>(data + 16), h.time_ns = get<uint64_t>(data + 24);
-  if (h.version != kBridgeVersion) return BridgeFault::version;
-  bool fine = h.arm < 2;
-  switch (h.kind) {
-    case BridgeKind::hello:
-    case BridgeKind::refused:
-    case BridgeKind::bye:
-      break;
-    case BridgeKind::info:
-      fine = fine && floats_are_sane(data, 36, 10);
-      break;
-    case BridgeKind::sample:
-      fine = fine && floats_are_sane(data, 40, 14);
-      break;
-    case BridgeKind::command:
-      fine = fine && floats_are_sane(data, 32, 4);
-      break;
-    default:
-      fine = false;
-  }
-  return fine ? BridgeFault::none : BridgeFault::nonsense;
-}
-
-void count_fault(BridgeCounts& c, BridgeFault fault) {
-  if (fault == BridgeFault::garbage) ++c.garbage;
-  if (fault == BridgeFault::version) ++c.version;
-  if (fault == BridgeFault::nonsense) ++c.nonsense;
-}
-
-void write_plain(BridgeBytes& out, const BridgeHead& head, uint32_t word) {
-  begin(out, head);
-  put(&out[32], word);
-  seal(out);
-}
-
-void write_info(BridgeBytes& out, const BridgeHead& head, const ArmInfo& a) {
-  begin(out, head);
-  put(&out[32], uint32_t{a.present});
-  put_float(&out[36], a.limits.force), put_float(&out[40], a.limits.continuous);
-  put_float(&out[44], a.limits.stiffness), put_float(&out[48], a.limits.damping);
-  put_vec(&out[52], a.least), put_vec(&out[64], a.most);
-  put_text(&out[76], a.name), put_text(&out[116], a.model), put_text(&out[156], a.serial), put_text(&out[196], a.driver);
-  seal(out);
-}
-
-void write_sample(BridgeBytes& out, const BridgeHead& head, const ArmSample& s, Vec3 force) {
-  begin(out, head);
-  // A sample that is no number goes as what it is worth: an arm that is not there.
-  const bool ready = s.state == ArmState::ready && is_finite(s.pose.p) && is_finite(s.velocity) && std::isfinite(s.warmth) &&
-                     std::isfinite(s.pose.q.x + s.pose.q.y + s.pose.q.z + s.pose.q.w);
-  put(&out[32], uint32_t{ready} | (s.forced_off ? 2u : 0u));
-  if (ready) {
-    put(&out[36], s.buttons);
-    put_vec(&out[40], s.pose.p);
-    put_float(&out[52], s.pose.q.x), put_float(&out[56], s.pose.q.y);
-    put_float(&out[60], s.pose.q.z), put_float(&out[64], s.pose.q.w);
-    put_vec(&out[68], s.velocity);
-    put_float(&out[80], s.warmth);
-  }
-  if (is_finite(force)) put_vec(&out[84], force);
-  seal(out);
-}
-
-void write_command(BridgeBytes& out, const BridgeHead& head, const BridgeCommand& c) {
-  begin(out, head);
-  if (is_finite(c.force)) put_vec(&out[32], c.force);
-  put_float(&out[44], c.expiry);
-  put(&out[48], c.answers_ns);
-  seal(out);
-}
-
-uint32_t read_word(const uint8_t* packet) { return get<uint32_t>(packet + 32); }
-
-ArmInfo read_info(const uint8_t* p) {
-  ArmInfo a;
-  a.present = get<uint32_t>(p + 32) != 0;
-  a.limits = {get_float(p + 36), get_float(p + 40), get_float(p + 44), get_float(p + 48)};
-  a.least = get_vec(p + 52), a.most = get_vec(p + 64);
-  a.name = get_text(p + 76), a.model = get_text(p + 116), a.serial = get_text(p + 156), a.driver = get_text(p + 196);
-  return a;
-}
-
-ArmSample read_sample(const uint8_t* p, Vec3& force) {
-  ArmSample s;
-  const uint32_t flags = get<uint32_t>(p + 32);
-  s.state = flags & 1 ? ArmState::ready : ArmState::absent;
-  s.forced_off = (flags & 2) != 0;
-  s.buttons = get<uint32_t>(p + 36);
-  s.pose.p = get_vec(p + 40);
-  s.pose.q = normalized(Quat{get_float(p + 52), get_float(p + 56), get_float(p + 60), get_float(p + 64)});
-  s.velocity = get_vec(p + 68);
-  s.warmth = get_float(p + 80);
-  force = get_vec(p + 84);
-  return s;
-}
-
-BridgeCommand read_command(const uint8_t* p) { return {get_vec(p + 32), get_float(p + 44), get<uint64_t>(p + 48)}; }
-
-int bridge_socket(const std::string& where, bool bind_it, std::string& why) {
+int bridge_socket(const std::string& where, bool bind_it, std::string& why, bool* local) {
   std::string host = where, port = std::to_string(kBridgePort);
   const size_t colon = where.rfind(':'), bracket = where.rfind(']');
   const bool bare_v6 = bracket == std::string::npos && where.find(':') != colon;
@@ -220,13 +59,21 @@ int bridge_socket(const std::string& where, bool bind_it, std::string& why) {
     }
   }
   freeaddrinfo(found);
+  if (fd >= 0 && local) {  // of the address that is listened on, or sent to
+    sockaddr_storage at{};
+    socklen_t bytes = sizeof at;
+    if (bind_it) getsockname(fd, reinterpret_cast<sockaddr*>(&at), &bytes);
+    else getpeername(fd, reinterpret_cast<sockaddr*>(&at), &bytes);
+    if (at.ss_family == AF_INET) *local = ntohl(reinterpret_cast<sockaddr_in*>(&at)->sin_addr.s_addr) >> 24 == 127;
+    else *local = at.ss_family == AF_INET6 && IN6_IS_ADDR_LOOPBACK(&reinterpret_cast<sockaddr_in6*>(&at)->sin6_addr);
+  }
   return fd;
 }
 
 namespace {
 
-constexpr float kStopStep = 0.5f;  // [N] per millisecond on the way down, as of the other drivers
-constexpr int kMostStops = 50;     // answers after which a stop is not waited for any longer
+constexpr uint64_t kHandshakeTime = 1000000000;  // [ns]
+constexpr uint64_t kAskEvery = 50000000;         // [ns] an ask says that the simulator is there, whatever its physics does
 enum PortError : uint32_t { kSilent = 1, kTheirs = 2, kRefused = 3 };
 
 uint64_t now_ns() {
@@ -235,15 +82,16 @@ uint64_t now_ns() {
 }
 
 struct End {
+  Latest<ForcePatch> patch;  // physics -> thread
   // The thread's.
-  uint64_t heard_ns = 0, stepped_ns = 0, answers_ns = 0, sequence = 0;
+  uint64_t heard_ns = 0, stepped_ns = 0;
   uint32_t count = 0;  // of samples given to the callback
-  bool fresh = false, lost = true;
+  bool fresh = false;
   ArmSample sample;
-  Vec3 force;
   // For any thread.
-  std::atomic<bool> ready{false}, at_rest{true};
-  std::atomic<uint32_t> error{0}, errors{0};
+  std::atomic<bool> ready{false};
+  std::atomic<uint32_t> error{0}, errors{0}, faults{0};
+  std::atomic<float> force{0};  // [N] that the arm's end wrote last
   std::atomic<uint64_t> steps{0};
 };
 
@@ -256,67 +104,116 @@ struct Bridge {
   std::thread thread;
   std::atomic<bool> stopping{false};
   // The thread's, and while opening the opener's.
-  uint64_t session = 0, sent = 0, hello_ns = 0;
-  std::minstd_rand draw;
+  BridgeCaller caller;
+  BridgeKey in{}, out{};
+  bool opened = false, has_cookie = false;
+  std::array<std::array<uint64_t, 2>, kBridgeKinds> last{};  // counters of this session
+  uint64_t sent = 0, called_ns = 0, begun_ns = 0, opened_ns = 0, said_ns = 0;
+  std::array<ArmInfo, 2> info;
+  std::array<bool, 2> known{};
+  uint32_t refused = 0;
+  uint16_t their_version = 0;
   BridgeCounts count;
   // For any thread: the above, copied once per round.
-  std::atomic<uint64_t> accepted{0}, garbage{0}, version{0}, nonsense{0}, stranger{0}, old{0};
+  std::atomic<uint64_t> accepted{0}, garbage{0}, version{0}, forged{0}, nonsense{0}, stranger{0}, old{0};
 };
 
-BridgeHead head_of(Bridge& b, BridgeKind kind, size_t arm = 0) {
-  return {kind, static_cast<uint8_t>(arm), kBridgeVersion, b.session, ++b.sent, now_ns()};
-}
-// Lost packets are the other end's watchdog's business: nothing is waited for, nothing is sent twice.
+// Lost packets are the other end's watchdog's business: nothing is waited for, only the handshake is repeated.
 void post(const Bridge& b, const BridgeBytes& packet) {
-  [[maybe_unused]] const ssize_t n = send(b.fd, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+  [[maybe_unused]] const ssize_t n = ::send(b.fd, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
 }
-void say_hello(Bridge& b) {
-  // A new session: what is still on its way belongs to the old one, and the other end begins with force off.
-  b.session = (uint64_t{b.draw()} << 32) ^ (uint64_t{b.draw()} << 8) ^ b.draw();
-  for (End& e : b.end) e.sequence = 0;
+void send_sealed(Bridge& b, BridgeKind kind, size_t arm, const BridgePayload& payload) {
+  if (!b.opened) return;
   BridgeBytes packet;
-  write_plain(packet, head_of(b, BridgeKind::hello));
+  seal(b.out, {kind, static_cast<uint8_t>(arm), kBridgeVersion, ++b.sent}, payload, packet);
   post(b, packet);
-  b.hello_ns = now_ns();
+  b.said_ns = now_ns();
+}
+// The next step of the handshake, or the first of a new one.
+void call(Bridge& b, bool anew) {
+  if (anew) begin_call(b.caller), b.opened = b.has_cookie = false, b.begun_ns = now_ns();
+  post(b, b.has_cookie ? open_packet(b.caller) : hello_packet(b.caller));
+  b.called_ns = now_ns();
 }
 
-// Takes what has come. info: gets what the other end says of its arms (null: nobody asks). refused: the reason, or 0.
-void take(Bridge& b, std::array<ArmInfo, 2>* info, std::array<bool, 2>& known, uint32_t& refused, uint16_t& their_version) {
-  uint8_t data[kBridgeBytes + 1];
-  for (int k = 0; k < 64; ++k) {  // a flood must not keep the hands from their millisecond
-    const ssize_t n = recv(b.fd, data, sizeof data, MSG_DONTWAIT);
-    if (n < 0 && errno != ECONNREFUSED) return;  // nothing more; a refusal by the system is only silence
-    if (n < 0) continue;
-    BridgeHead h;
-    const BridgeFault fault = read_bridge(data, static_cast<size_t>(n), h);
-    if (fault == BridgeFault::version) their_version = h.version;
-    if (fault != BridgeFault::none) {
-      count_fault(b.count, fault);
-      continue;
+void take_one(Bridge& b, const uint8_t* data, size_t size) {
+  BridgeHead h;
+  const BridgeFault fault = read_head(data, size, h);
+  if (fault == BridgeFault::garbage) {
+    ++b.count.garbage;
+    return;
+  }
+  if (fault == BridgeFault::version) {
+    ++b.count.version, b.their_version = h.version;
+    return;
+  }
+  if (fault == BridgeFault::nonsense) {
+    ++b.count.nonsense;
+    return;
+  }
+  if (is_handshake(h.kind)) {
+    if (!mac_is_right(b.caller.shared, data)) {
+      ++b.count.forged;
+      return;
     }
-    if (h.session != b.session) {
+    if (h.kind == BridgeKind::refused) {
+      b.refused = refused_why(data);
+    } else if (h.kind == BridgeKind::cookie && !b.opened && take_cookie(b.caller, data)) {
+      if (!b.has_cookie) b.has_cookie = true, call(b, false);
+    } else if (h.kind == BridgeKind::opened && !b.opened && b.has_cookie && take_opened(b.caller, data, b.in, b.out)) {
+      b.opened = true, b.refused = 0, b.opened_ns = now_ns();
+      b.last = {};
+      b.sent = 0;
+      send_sealed(b, BridgeKind::ask, 0, {});
+    } else {
       ++b.count.stranger;
-      continue;
-    }
-    if (h.kind == BridgeKind::refused) refused = read_word(data);
-    if (h.kind == BridgeKind::bye) {
-      for (End& e : b.end) e.heard_ns = 0;
-    }
-    if (h.kind == BridgeKind::info && info) (*info)[h.arm] = read_info(data), known[h.arm] = true;
-    if (h.kind == BridgeKind::sample) {
-      End& e = b.end[h.arm];
-      if (h.sequence <= e.sequence) {
-        ++b.count.old;
-        continue;
-      }
-      e.sequence = h.sequence;
-      Vec3 felt;
-      e.sample = read_sample(data, felt);
-      e.answers_ns = h.time_ns;
-      e.heard_ns = now_ns();
-      e.fresh = true;
+      return;
     }
     ++b.count.accepted;
+    return;
+  }
+  BridgePayload payload;
+  if (!b.opened || !unseal(b.in, data, payload)) {
+    ++b.count.forged;
+    return;
+  }
+  uint64_t& last = b.last[static_cast<size_t>(h.kind)][h.arm];
+  if (h.counter <= last) {
+    ++b.count.old;
+    return;
+  }
+  last = h.counter;
+  bool fine = false;
+  if (h.kind == BridgeKind::bye) {
+    for (End& e : b.end) e.heard_ns = 0;
+    b.opened = false;
+    fine = true;
+  } else if (h.kind == BridgeKind::info) {
+    fine = read_info(payload, b.info[h.arm]);
+    b.known[h.arm] |= fine;
+  } else if (h.kind == BridgeKind::sample) {
+    End& e = b.end[h.arm];
+    ArmSample s;
+    Vec3 felt;
+    uint32_t faults = 0;
+    fine = read_sample(payload, s, felt, faults);
+    if (fine) {
+      e.sample = s;
+      e.heard_ns = now_ns();
+      e.fresh = true;
+      e.force.store(length(felt), std::memory_order_relaxed);
+      e.faults.store(faults, std::memory_order_relaxed);
+    }
+  }
+  ++(fine ? b.count.accepted : b.count.nonsense);
+}
+
+void take(Bridge& b) {
+  uint8_t data[kBridgeBytes + 1];  // one more: what is too long is seen to be
+  for (int k = 0; k < 64; ++k) {   // a flood must not keep the hands from their millisecond
+    const ssize_t n = recv(b.fd, data, sizeof data, MSG_DONTWAIT);
+    if (n < 0 && errno != ECONNREFUSED) return;  // nothing more; a refusal by the system is only silence
+    if (n >= 0) take_one(b, data, static_cast<size_t>(n));
   }
 }
 
@@ -325,56 +222,50 @@ void fail(End& e, uint32_t error) {
   e.ready.store(false, std::memory_order_relaxed);
 }
 
+bool silent(const Bridge& b, const End& e, uint64_t now) {
+  return e.heard_ns == 0 || now > e.heard_ns + static_cast<uint64_t>(1e9 * double{b.options.forget});
+}
+
 void serve(Bridge& b, size_t k, uint64_t now) {
   End& e = b.end[k];
-  const bool silent = e.heard_ns == 0 || now > e.heard_ns + static_cast<uint64_t>(1e9 * double{b.options.forget});
-  // While it is silent the servo still gets its millisecond, and learns that there is no arm.
-  if (!e.fresh && (!silent || now < e.stepped_ns + 1000000)) return;
-  if (!e.fresh) e.sample = {};
-  e.sample.sequence = ++e.count;
-  Vec3 force = b.callback.step(b.callback.user, k, e.sample);
-  if (b.stopping.load(std::memory_order_relaxed)) {
-    const float l = length(e.force);
-    force = l > kStopStep ? e.force * ((l - kStopStep) / l) : Vec3{};
+  // While it is silent the servo still gets its millisecond, and sees that there is no arm.
+  if (e.fresh || (silent(b, e, now) && now >= e.stepped_ns + 1000000)) {
+    if (!e.fresh) e.sample = {};
+    e.sample.sequence = ++e.count;
+    b.callback.step(b.callback.user, k, e.sample);  // the force is the arm's end's to compute
+    if (e.fresh && e.sample.state == ArmState::ready) e.ready.store(true, std::memory_order_relaxed);
+    else fail(e, e.fresh ? kTheirs : kSilent);
+    e.fresh = false;
+    e.stepped_ns = now;
+    e.steps.fetch_add(1, std::memory_order_relaxed);
   }
-  const bool ready = e.fresh && e.sample.state == ArmState::ready;
-  if (!is_finite(force) || !ready) force = {};
-  if (e.fresh) {
-    BridgeBytes packet;
-    BridgeCommand c;
-    c.force = force, c.answers_ns = e.answers_ns;
-    write_command(packet, head_of(b, BridgeKind::command, k), c);
-    post(b, packet);
-  }
-  if (ready) e.ready.store(true, std::memory_order_relaxed);
-  else fail(e, e.fresh ? kTheirs : kSilent);
-  e.fresh = false;
-  e.force = force;
-  e.at_rest.store(length2(force) == 0, std::memory_order_relaxed);
-  e.stepped_ns = now;
-  e.steps.fetch_add(1, std::memory_order_relaxed);
+  if (!e.patch.update()) return;
+  BridgePayload payload;
+  write_patch(e.patch.seen(), payload);
+  send_sealed(b, BridgeKind::patch, k, payload);
 }
 
 void run(Bridge& b) {
-  int stops = 0;
-  while (!b.stopping || (!(b.end[0].at_rest && b.end[1].at_rest) && ++stops < kMostStops)) {
+  go_first();
+  while (!b.stopping) {
     pollfd wait{b.fd, POLLIN, 0};
     poll(&wait, 1, 1);
-    std::array<bool, 2> known{};
-    uint32_t refused = 0;
-    uint16_t theirs = 0;
-    take(b, nullptr, known, refused, theirs);
+    take(b);
     const uint64_t now = now_ns();
     bool all_silent = true;
     for (size_t k = 0; k < 2; ++k) {
       if (!b.present[k]) continue;
       serve(b, k, now);
-      if (refused) fail(b.end[k], kRefused);
-      all_silent &= b.end[k].heard_ns == 0 || now > b.end[k].heard_ns + static_cast<uint64_t>(1e9 * double{b.options.forget});
+      if (b.refused) fail(b.end[k], kRefused);
+      all_silent &= silent(b, b.end[k], now);
     }
-    if (all_silent && now > b.hello_ns + static_cast<uint64_t>(1e9 * double{b.options.again_after})) say_hello(b);
-    b.accepted = b.count.accepted, b.garbage = b.count.garbage, b.version = b.count.version;
+    b.accepted = b.count.accepted, b.garbage = b.count.garbage, b.version = b.count.version, b.forged = b.count.forged;
     b.nonsense = b.count.nonsense, b.stranger = b.count.stranger, b.old = b.count.old;
+    if (b.opened && now > b.said_ns + kAskEvery) send_sealed(b, BridgeKind::ask, 0, {});
+    if (!all_silent || now < b.called_ns + static_cast<uint64_t>(1e9 * double{b.options.again_after})) continue;
+    // A handshake takes two round trips: it is begun again only when it has had the time for them.
+    if (b.opened && now < b.opened_ns + kHandshakeTime) send_sealed(b, BridgeKind::ask, 0, {}), b.called_ns = now;
+    else call(b, b.opened || now > b.begun_ns + kHandshakeTime);
   }
 }
 
@@ -382,27 +273,35 @@ bool start_bridge(void* self, const ArmCallback& callback, std::string&) {
   Bridge& b = *static_cast<Bridge*>(self);
   b.callback = callback;
   b.stopping = false;
-  say_hello(b);
+  b.called_ns = now_ns();
   b.thread = std::thread([&b] { run(b); });
   return true;
 }
 
+// The arm's end takes the force off through its own slew when it hears bye, or nothing more.
 void stop_bridge(void* self) {
   Bridge& b = *static_cast<Bridge*>(self);
   if (b.thread.joinable()) {
-    // The force comes down answer by answer. Where no samples come, silence does it at the other end.
     b.stopping = true;
     b.thread.join();
   }
-  BridgeBytes packet;
-  write_plain(packet, head_of(b, BridgeKind::bye));
-  post(b, packet);
+  send_sealed(b, BridgeKind::bye, 0, {});
+  b.opened = false;
+}
+
+void patch_bridge(void* self, size_t arm, const ForcePatch& patch) {
+  End& e = static_cast<Bridge*>(self)->end[arm];
+  e.patch.draft() = patch;
+  e.patch.publish();
 }
 
 ArmStatus status_of_bridge(void* self, size_t k) {
   const End& e = static_cast<Bridge*>(self)->end[k];
-  return {e.ready.load(std::memory_order_relaxed), e.error.load(std::memory_order_relaxed),
-          e.errors.load(std::memory_order_relaxed), e.steps.load(std::memory_order_relaxed)};
+  ArmStatus s{e.ready.load(std::memory_order_relaxed), e.error.load(std::memory_order_relaxed),
+              e.errors.load(std::memory_order_relaxed), e.steps.load(std::memory_order_relaxed)};
+  s.faults = e.faults.load(std::memory_order_relaxed);
+  s.force = e.force.load(std::memory_order_relaxed);
+  return s;
 }
 
 std::string bridge_error(void* self, uint32_t error) {
@@ -433,49 +332,70 @@ ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& told
   port.kind = "bridge";
   auto b = std::make_unique<Bridge>();
   b->options = options;
-  if (const char* set = std::getenv("CATGUT_BRIDGE"); b->options.where.empty() && set) b->options.where = set;
+  const auto or_environment = [](std::string& value, const char* name) {
+    if (const char* set = std::getenv(name); value.empty() && set) value = set;
+  };
+  or_environment(b->options.where, "CATGUT_BRIDGE");
+  or_environment(b->options.key, "CATGUT_BRIDGE_KEY");
   if (b->options.where.empty()) b->options.where = "127.0.0.1";
   const std::string who = "bridge: ";
   std::string why;
-  b->fd = bridge_socket(b->options.where, false, why);
+  bool local = false;
+  b->fd = bridge_socket(b->options.where, false, why, &local);
   if (b->fd < 0) {
     told.push_back(who + why + "; write --haptics bridge:HOST:PORT, or set CATGUT_BRIDGE");
     return port;
   }
-  b->draw.seed(std::random_device{}());
-  std::array<bool, 2> known{};
-  uint32_t refused = 0;
-  uint16_t theirs = 0;
+  try {
+    if (!b->options.key.empty()) b->caller.shared = read_bridge_key(b->options.key);
+    else if (!local)
+      why = b->options.where + " is another machine and needs a key; set CATGUT_BRIDGE_KEY to the file of its key";
+  } catch (const InputError& error) { why = error.what(); }
+  if (!why.empty()) {
+    told.push_back(who + why);
+    ::close(b->fd);
+    return port;
+  }
   const uint64_t until = now_ns() + static_cast<uint64_t>(1e9 * double{options.patience});
-  while (now_ns() < until && !(known[0] && known[1]) && !refused && !theirs) {
-    if (now_ns() > b->hello_ns + static_cast<uint64_t>(0.25e9 * double{options.patience})) say_hello(*b);
+  const uint64_t again = static_cast<uint64_t>(0.25e9 * double{options.patience});
+  call(*b, true);
+  while (now_ns() < until && !(b->known[0] && b->known[1]) && !b->refused && !b->their_version) {
     pollfd wait{b->fd, POLLIN, 0};
     poll(&wait, 1, 10);
-    take(*b, &port.arm, known, refused, theirs);
+    take(*b);
+    if (now_ns() < b->called_ns + again) continue;
+    if (b->opened) send_sealed(*b, BridgeKind::ask, 0, {}), b->called_ns = now_ns();
+    else call(*b, false);
   }
-  if (theirs || refused == kOtherVersion)
-    told.push_back(who + b->options.where + " speaks version " + std::to_string(theirs) +
+  const bool all = b->known[0] && b->known[1];
+  port.arm = b->info;
+  if (b->their_version || b->refused == kOtherVersion)
+    told.push_back(who + b->options.where + " speaks version " + std::to_string(b->their_version) +
                    " of the bridge, this program version " + std::to_string(kBridgeVersion) +
                    "; install the same Catgut on both machines");
-  else if (refused) told.push_back(who + "another simulator has the arms at " + b->options.where + "; close it there");
-  else if (!known[0] || !known[1])
+  else if (b->refused) told.push_back(who + "another simulator has the arms at " + b->options.where + "; close it there");
+  else if (!all && b->count.forged > 0)
+    told.push_back(who + b->options.where + " answers with another key; copy the same key file to both machines");
+  else if (!all)
     told.push_back(who + "nobody answers at " + b->options.where +
-                   "; start `catgut bridge` where the arm is, or write --haptics bridge:HOST:PORT");
+                   (b->options.key.empty() ? "; start `catgut bridge` where the arm is, or write --haptics bridge:HOST:PORT"
+                                           : "; start `catgut bridge` where the arm is, with the same key"));
   else if (!port.arm[0].present && !port.arm[1].present) told.push_back(who + b->options.where + " has no arm");
-  for (size_t k = 0; k < 2; ++k) b->present[k] = port.arm[k].present = port.arm[k].present && known[0] && known[1];
+  for (size_t k = 0; k < 2; ++k) b->present[k] = port.arm[k].present = port.arm[k].present && all;
   if (!b->present[0] && !b->present[1]) {
+    send_sealed(*b, BridgeKind::bye, 0, {});
     ::close(b->fd);
     return port;
   }
   port.self = b.release();
   port.start = start_bridge, port.stop = stop_bridge, port.status = status_of_bridge, port.error_text = bridge_error;
-  port.close = close_bridge;
+  port.close = close_bridge, port.send_patch = patch_bridge;
   return port;
 }
 
 BridgeCounts bridge_counts(const ArmPort& port) {
   const Bridge& b = *static_cast<const Bridge*>(port.self);
-  return {b.accepted, b.garbage, b.version, b.nonsense, b.stranger, b.old};
+  return {b.accepted, b.garbage, b.version, b.forged, b.nonsense, b.stranger, b.old};
 }
 
 }  // namespace catgut

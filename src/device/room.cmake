@@ -2,6 +2,11 @@
 find_package(Boost 1.74 REQUIRED)
 find_package(nlohmann_json REQUIRED)
 target_link_libraries(catgut_device PRIVATE Boost::headers nlohmann_json::nlohmann_json)
+# libsodium: the bridge's handshake and sealed packets.
+find_path(SODIUM_INCLUDE sodium.h REQUIRED)
+find_library(SODIUM_LIBRARY sodium REQUIRED)
+target_include_directories(catgut_device PRIVATE ${SODIUM_INCLUDE})
+target_link_libraries(catgut_device PRIVATE ${SODIUM_LIBRARY})
 # Quick to build matters more than quick to run. Asio has fences that GCC's thread sanitizer warns of; one thread runs it here.
 set_source_files_properties(${PROJECT_SOURCE_DIR}/src/device/haply.cpp PROPERTIES
   COMPILE_OPTIONS "-O1;$<$<CXX_COMPILER_ID:GNU>:-Wno-tsan>")

@@ -21,6 +21,7 @@ ArmPort& ArmPort::operator=(ArmPort&& other) noexcept {
   arm = std::move(other.arm);
   self = std::exchange(other.self, nullptr);
   start = other.start, stop = other.stop, status = other.status, error_text = other.error_text, close = other.close;
+  send_patch = other.send_patch;
   return *this;
 }
 

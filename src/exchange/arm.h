@@ -19,6 +19,8 @@ struct ArmSample {
   uint32_t buttons = 0;     // bit 0: the one nearest to the tip
   float warmth = 0;         // of the warmest motor, 0 cold .. 1 too hot
   bool forced_off = false;  // the driver cut the force by itself (too fast, too warm); it will come back
+  float jaw = -1;           // of a gripper: 0 closed .. 1 open; negative: the arm has none
+  uint64_t time_ns = 0;     // on the clock of the arm's end, where that is not the callback's; 0: it is
   uint32_t sequence = 0;
 };
 

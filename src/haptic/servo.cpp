@@ -11,6 +11,34 @@ Pose to_arm(const Workspace& w, const Pose& world) {
           normalized(conjugate(w.turn) * world.q * conjugate(w.stylus))};
 }
 
+ForcePatch to_arm(const ServoOptions& o, const ForcePatch& world) {
+  const Workspace& w = o.place;
+  const float gain = o.gain > 0 ? o.gain : w.scale;
+  const Quat turn = conjugate(w.turn);
+  const auto way = [&turn](Vec3 v) { return rotate(turn, v); };
+  // S -> R S R^T, a column at a time.
+  const auto tensor = [&](const Sym3& s, float factor) {
+    const Vec3 x = way(s * rotate(w.turn, {1, 0, 0})), y = way(s * rotate(w.turn, {0, 1, 0})),
+               z = way(s * rotate(w.turn, {0, 0, 1}));
+    Sym3 out;
+    out.xx = x.x * factor, out.yy = y.y * factor, out.zz = z.z * factor;
+    out.xy = x.y * factor, out.xz = x.z * factor, out.yz = y.z * factor;
+    return out;
+  };
+  ForcePatch p = world;
+  p.point = way(world.point - w.offset) / w.scale;
+  p.force = way(world.force) * gain;
+  p.stiffness = tensor(world.stiffness, gain * w.scale);
+  p.damping = tensor(world.damping, gain * w.scale);
+  p.normal = way(world.normal), p.along = way(world.along), p.pierce = way(world.pierce);
+  p.thread_direction = way(world.thread_direction);
+  p.gap = world.gap / w.scale, p.presliding = world.presliding / w.scale;
+  p.drag = world.drag * gain, p.viscous = world.viscous * gain * w.scale;
+  p.pierce_force = world.pierce_force * gain, p.thread_tension = world.thread_tension * gain;
+  p.cap = world.cap * gain;
+  return p;
+}
+
 namespace {
 
 constexpr float kFastTime = 0.05f;  // [s] over which ServoHand::fast fades

@@ -38,6 +38,8 @@ struct ServoOptions {
   bool ratchet = true;  // the button nearest to the tip closes the jaw and, pressed again, opens it; else it is held
   bool force = true;    // false: the arm moves the tool and feels nothing
 };
+// The same patch in the arm's own frame and newtons, for an arm's end that evaluates it elsewhere (no workspace, gain 1).
+ForcePatch to_arm(const ServoOptions& options, const ForcePatch& world);
 // Limits of the chain from those of the arm, the smaller of what is known and what is asked for.
 void fit_to_arm(ServoOptions& options, const ArmLimits& limits);
 

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <mutex>
@@ -24,15 +23,18 @@
 namespace catgut {
 namespace {
 
-constexpr float kExpiry = 0.02f;  // [s] a force is never believed for longer, whatever the command says
+constexpr float kExpiry = 0.03f;         // [s] of silence from which a patch is no longer believed, whatever it says
+constexpr uint64_t kOldest = 150000000;  // [ns] of age of the sample that a patch was computed for
+constexpr uint64_t kFaultsFor = 256;     // [steps] for which a fault is told to the simulator: packets get lost
 
 struct Peer {
   sockaddr_storage address{};
-  socklen_t bytes = 0;  // 0: nobody
-  uint64_t session = 0;
+  socklen_t bytes = 0;   // 0: nobody
+  uint64_t session = 0;  // counts them
+  BridgeKey caller{}, in{}, out{};
 };
 struct Order {
-  BridgeCommand command;
+  ForcePatch patch;
   uint64_t session = 0;
 };
 
@@ -41,12 +43,9 @@ struct Side {
   Latest<Peer> peer;    // receiver -> driver
   // The driver's.
   ServoOptions options;  // constant once it runs
-  Limiter limiter;
-  Passivity net;
-  uint64_t last_ns = 0, session = 0;
-  bool ordered = false;
-  // The receiver's.
-  uint64_t sequence = 0;
+  ServoHand servo;
+  uint64_t session = 0;
+  uint32_t recent = 0;  // faults
   // For any thread.
   std::atomic<uint32_t> faults{0};
   // Of whoever asks for news.
@@ -63,7 +62,17 @@ std::string name_of(const Peer& p) {
   return std::string(host) + " port " + port;
 }
 
+uint64_t ns_of(float seconds) { return static_cast<uint64_t>(1e9 * double{seconds}); }
+
 }  // namespace
+
+bool accept_patch(ForcePatch& p, uint64_t now_ns) {
+  if (p.time_ns > now_ns || now_ns - p.time_ns > kOldest) return false;
+  p.period += 1e-9f * static_cast<float>(now_ns - p.time_ns);
+  p.expiry = std::min(p.expiry, kExpiry);
+  p.time_ns = now_ns;
+  return true;
+}
 
 struct ArmServer::Work {
   ArmPort port;
@@ -71,12 +80,19 @@ struct ArmServer::Work {
   int fd = -1;
   uint16_t listens = 0;
   std::array<Side, 2> side;
-  std::atomic<uint64_t> sequence{0};  // of all that is sent
+  std::atomic<uint64_t> counter{0};  // of all that is sealed, whatever the session
   std::thread receiver;
   std::atomic<bool> quit{false};
-  std::atomic<uint64_t> accepted{0}, garbage{0}, version{0}, nonsense{0}, stranger{0}, old{0}, heard_ns{0};
+  std::atomic<uint64_t> accepted{0}, garbage{0}, version{0}, forged{0}, nonsense{0}, stranger{0}, old{0};
+  std::atomic<uint64_t> heard_ns{0}, bytes_out{0};
   // The receiver's.
+  BridgeDoor door;
   Peer peer;
+  uint64_t sessions = 0;
+  std::array<std::array<uint64_t, 2>, kBridgeKinds> last{};  // counters of this session
+  std::array<BridgeKey, 64> used{};  // keys of callers that had a session: what they said once opens nothing again
+  size_t openings = 0;
+  BridgeBytes opened{};  // the answer that began this session
   // Between the receiver, which rarely changes hands, and whoever asks for news; never the driver's.
   std::mutex lock;
   std::vector<std::string> news;
@@ -85,43 +101,32 @@ struct ArmServer::Work {
 
   void say(std::string line) {
     const std::lock_guard<std::mutex> hold(lock);
-    if (news.size() < 100) news.push_back(std::move(line));  // whoever floods us does not fill the memory
+    if (news.size() < 100) news.push_back(std::move(line));  // a flood does not fill the memory
   }
-  BridgeHead head(BridgeKind kind, size_t arm, uint64_t session) {
-    return {kind,
-            static_cast<uint8_t>(arm),
-            kBridgeVersion,
-            session,
-            sequence.fetch_add(1, std::memory_order_relaxed) + 1,
-            options.clock()};
+  void post(const Peer& to, const BridgeBytes& packet) {
+    const ssize_t n = sendto(fd, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+                             reinterpret_cast<const sockaddr*>(&to.address), to.bytes);
+    if (n > 0) bytes_out.fetch_add(static_cast<uint64_t>(n), std::memory_order_relaxed);
   }
-  void post(const Peer& to, const BridgeBytes& packet) const {
-    [[maybe_unused]] const ssize_t n = sendto(fd, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
-                                              reinterpret_cast<const sockaddr*>(&to.address), to.bytes);
-  }
-  void answer(const Peer& to, uint64_t session) {
+  void send_sealed(const Peer& to, BridgeKind kind, size_t arm, const BridgePayload& payload) {
     BridgeBytes packet;
-    for (size_t k = 0; k < 2; ++k) {
-      write_info(packet, head(BridgeKind::info, k, session), port.arm[k]);
-      post(to, packet);
-    }
-  }
-  void refuse(const Peer& to, uint64_t session, BridgeRefusal why) {
-    BridgeBytes packet;
-    write_plain(packet, head(BridgeKind::refused, 0, session), why);
+    const uint64_t n = counter.fetch_add(1, std::memory_order_relaxed) + 1;
+    seal(to.out, {kind, static_cast<uint8_t>(arm), kBridgeVersion, n}, payload, packet);
     post(to, packet);
   }
   void lend(const Peer& to) {
     peer = to;
+    peer.session = ++sessions;
+    last = {};
     for (Side& s : side) {
-      s.sequence = 0;
-      s.peer.draft() = to;
+      s.peer.draft() = peer;
       s.peer.publish();
     }
   }
 
   static Vec3 step(void* user, size_t arm, const ArmSample& sample);
-  void take(const uint8_t* data, size_t size, const Peer& from);
+  std::atomic<uint64_t>* take(const uint8_t* data, size_t size, const Peer& from);
+  std::atomic<uint64_t>* shake_hands(const uint8_t* data, const BridgeHead& head, const Peer& from);
   void receive();
   void stop();
 };
@@ -131,88 +136,107 @@ Vec3 ArmServer::Work::step(void* user, size_t arm, const ArmSample& sample) {
   Work& w = *static_cast<Work*>(user);
   Side& s = w.side[arm];
   const uint64_t now = w.options.clock();
-  const float dt = s.last_ns > 0 && now >= s.last_ns ? 1e-9f * static_cast<float>(now - s.last_ns) : 0.001f;
-  s.last_ns = now;
   s.peer.update();
-  s.order.update();
+  const bool fresh = s.order.update();
   const Peer& peer = s.peer.seen();
   const Order& order = s.order.seen();
-  if (peer.session != s.session) disengage(s.limiter), s.session = peer.session;
+  if (peer.session != s.session) {  // what the last one wanted is void
+    s.session = peer.session;
+    s.servo.has_patch = false;
+    disengage(s.servo.limiter);
+  }
+  const bool ordered = fresh && peer.bytes > 0 && order.session == peer.session;
+  const Vec3 force = servo_step(s.servo, s.options, sample, ordered ? &order.patch : nullptr, now).force;
+  s.faults.fetch_or(s.servo.limiter.faults, std::memory_order_relaxed);
+  if (s.servo.steps % kFaultsFor == 0) s.recent = 0;
+  s.recent |= s.servo.limiter.faults;
+  s.servo.limiter.faults = 0;
 
-  const bool ready = sample.state == ArmState::ready && is_finite(sample.pose.p) && is_finite(sample.velocity);
-  const bool ordered = peer.bytes > 0 && order.session == peer.session && order.command.answers_ns <= now;
-  LimiterInput in;
-  in.wanted = ordered ? order.command.force : Vec3{};
-  in.age = ordered ? 1e-9f * static_cast<float>(now - order.command.answers_ns) : -1.0f;
-  in.expiry = std::clamp(order.command.expiry, 0.001f, kExpiry);
-  in.cap = s.options.limits.force;
-  in.speed = ready ? length(sample.velocity) : 0;
-  in.warmth = sample.warmth;
-  in.ready = ready && !sample.forced_off;
-  const Vec3 allowed = limit(s.limiter, in, dt, s.options.limiter);
-  PassivityOptions net = s.options.passivity;
-  // Off is off, and the simulator that has taken its force off is not braked for: it may have lost its physics.
-  if (length2(allowed) == 0) net.damping = 0;
-  Vec3 force = allowed;
-  if (ready) force = keep_passive(s.net, sample.pose.p, sample.velocity, allowed, s.options.limiter.force, dt, net);
-  else s.net = {};
-  if (s.net.braking) s.limiter.faults |= kGenerated;
-  s.faults.fetch_or(s.limiter.faults, std::memory_order_relaxed);
-  s.limiter.faults = 0;
-
-  if (peer.bytes > 0) {
-    BridgeBytes packet;
-    BridgeHead head = w.head(BridgeKind::sample, arm, peer.session);
-    head.time_ns = now;
-    write_sample(packet, head, sample, force);
-    w.post(peer, packet);
+  if (peer.bytes > 0 && now < w.heard_ns.load(std::memory_order_relaxed) + ns_of(w.options.stream)) {
+    ArmSample out = sample;
+    out.time_ns = now;
+    BridgePayload payload;
+    write_sample(out, force, s.recent, payload);
+    w.send_sealed(peer, BridgeKind::sample, arm, payload);
   }
   return force;
 }
 
-void ArmServer::Work::take(const uint8_t* data, size_t size, const Peer& from) {
-  BridgeHead h;
-  const BridgeFault fault = read_bridge(data, size, h);
-  const auto drop = [](std::atomic<uint64_t>& count) { count.fetch_add(1, std::memory_order_relaxed); };
-  if (fault == BridgeFault::garbage) return drop(garbage);
-  if (fault == BridgeFault::nonsense) return drop(nonsense);
-  if (fault == BridgeFault::version) {
-    drop(version);
-    if (h.kind == BridgeKind::hello) refuse(from, h.session, kOtherVersion);  // the header says which one is spoken here
-    return;
-  }
-  const bool known = peer.bytes == from.bytes && same(peer.address, from.address, from.bytes);
+// Hello and open: nothing is kept of who has not proved that he has the key and hears at the address he writes from.
+std::atomic<uint64_t>* ArmServer::Work::shake_hands(const uint8_t* data, const BridgeHead& h, const Peer& from) {
+  if (h.kind != BridgeKind::hello && h.kind != BridgeKind::open) return &nonsense;
+  if (!mac_is_right(door.shared, data)) return &forged;
   const uint64_t now = options.clock();
+  const bool known = peer.bytes == from.bytes && same(peer.address, from.address, from.bytes);
+  const bool gone = peer.bytes == 0 || now > heard_ns + ns_of(options.forget);
   if (h.kind == BridgeKind::hello) {
-    const bool gone = peer.bytes == 0 || now > heard_ns + static_cast<uint64_t>(1e9 * double{options.forget});
     if (!known && !gone) {
-      drop(stranger);
-      return refuse(from, h.session, kArmsTaken);
+      post(from, refused_packet(door.shared, kArmsTaken));
+      return &stranger;
     }
-    if (!known || peer.session != h.session) {
-      Peer next = from;
-      next.session = h.session;
-      lend(next);
-    }
-    if (!known) say("lent to the simulator at " + name_of(from));
-    heard_ns = now;
-    answer(from, h.session);
-  } else if (!known || h.session != peer.session) {
-    return drop(stranger);
-  } else if (h.kind == BridgeKind::bye) {
-    lend({});
-    say("given back by the simulator at " + name_of(from));
-  } else if (h.kind == BridgeKind::command) {
-    Side& s = side[h.arm];
-    if (h.sequence <= s.sequence) return drop(old);
-    s.sequence = h.sequence;
-    s.order.draft() = {read_command(data), h.session};
-    s.order.publish();
-    heard_ns = now;
-  } else {
-    return drop(nonsense);
+    post(from, cookie_packet(door, data, &from.address, from.bytes, now));
+    return &accepted;
   }
-  accepted.fetch_add(1, std::memory_order_relaxed);
+  const BridgeKey caller = caller_key(data);
+  if (!cookie_is_right(door, data, &from.address, from.bytes, now)) return &forged;
+  if (known && caller == peer.caller) {  // the answer was lost
+    post(from, opened);
+    return &accepted;
+  }
+  if (std::find(used.begin(), used.end(), caller) != used.end()) return &old;
+  if (!known && !gone) {
+    post(from, refused_packet(door.shared, kArmsTaken));
+    return &stranger;
+  }
+  used[openings++ % used.size()] = caller;
+  Peer next = from;
+  next.caller = caller;
+  opened = opened_packet(door, data, next.in, next.out);
+  lend(next);
+  post(from, opened);
+  heard_ns = 0;  // samples begin with the first packet that is sealed with this session's key
+  if (!known) say("lent to the simulator at " + name_of(from));
+  return &accepted;
+}
+
+// Returns the count that the packet belongs to.
+std::atomic<uint64_t>* ArmServer::Work::take(const uint8_t* data, size_t size, const Peer& from) {
+  BridgeHead h;
+  const BridgeFault fault = read_head(data, size, h);
+  if (fault == BridgeFault::garbage) return &garbage;
+  if (fault == BridgeFault::version) {
+    post(from, refused_packet(door.shared, kOtherVersion));  // its head says which one is spoken here
+    return &version;
+  }
+  if (fault == BridgeFault::nonsense) return &nonsense;
+  if (is_handshake(h.kind)) return shake_hands(data, h, from);
+  if (peer.bytes != from.bytes || !same(peer.address, from.address, from.bytes)) return &stranger;
+  BridgePayload payload;
+  if (!unseal(peer.in, data, payload)) return &forged;
+  uint64_t& newest = last[static_cast<size_t>(h.kind)][h.arm];
+  if (h.counter <= newest) return &old;
+  newest = h.counter;
+  const uint64_t now = options.clock();
+  if (h.kind == BridgeKind::bye) {
+    say("given back by the simulator at " + name_of(peer));
+    lend({});
+  } else if (h.kind == BridgeKind::ask) {
+    heard_ns = now;  // before the answer: whoever has it may count on samples
+    for (size_t k = 0; k < 2; ++k) {
+      write_info(port.arm[k], payload);
+      send_sealed(peer, BridgeKind::info, k, payload);
+    }
+  } else if (h.kind == BridgeKind::patch) {
+    Order& order = side[h.arm].order.draft();
+    if (!read_patch(payload, order.patch)) return &nonsense;
+    heard_ns = now;
+    if (!accept_patch(order.patch, now)) return &old;
+    order.session = peer.session;
+    side[h.arm].order.publish();
+  } else {
+    return &nonsense;
+  }
+  return &accepted;
 }
 
 void ArmServer::Work::receive() {
@@ -225,7 +249,7 @@ void ArmServer::Work::receive() {
       from.bytes = sizeof from.address;
       const ssize_t n = recvfrom(fd, data, sizeof data, MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from.address), &from.bytes);
       if (n < 0) break;
-      take(data, static_cast<size_t>(n), from);
+      take(data, static_cast<size_t>(n), from)->fetch_add(1, std::memory_order_relaxed);
     }
   }
 }
@@ -235,11 +259,7 @@ void ArmServer::Work::stop() {
   if (port.self) port.stop(port.self);
   quit = true;
   if (receiver.joinable()) receiver.join();
-  if (peer.bytes > 0) {
-    BridgeBytes packet;
-    write_plain(packet, head(BridgeKind::bye, 0, peer.session));
-    post(peer, packet);
-  }
+  if (peer.bytes > 0) send_sealed(peer, BridgeKind::bye, 0, {});
   ::close(fd);
   fd = -1;
 }
@@ -249,15 +269,21 @@ ArmServer::ArmServer(ArmPort port, const ArmServerOptions& options) : work_(std:
   w.port = std::move(port);
   w.options = options;
   if (!w.options.clock) w.options.clock = wall_ns;
+  if (!options.key.empty()) w.door.shared = read_bridge_key(options.key);
   for (size_t k = 0; k < 2; ++k) {
-    ServoOptions& o = w.side[k].options;
-    fit_to_arm(o, w.port.arm[k].limits);
-    o.limiter.knee = o.limiter.force;  // the simulator has mapped large forces already; twice would make them too small
-    o.limiter.above = 0;
+    fit_to_arm(w.side[k].options, w.port.arm[k].limits);
+    w.side[k].options.gain = 1;  // patches come in the arm's own frame, with the gain in them
   }
   std::string why;
-  w.fd = bridge_socket(options.listen, true, why);
+  bool local = false;
+  w.fd = bridge_socket(options.listen, true, why, &local);
   if (w.fd < 0) throw InputError("--listen " + options.listen, why, "name an address of this machine and a port that is free");
+  if (!local && options.key.empty()) {
+    ::close(w.fd);
+    w.fd = -1;
+    throw InputError("--listen " + options.listen, "whoever reaches this address could push a hand",
+                     "make a key with --new-key FILE, copy it to the simulator's machine, and listen with --key FILE");
+  }
   sockaddr_storage own{};
   socklen_t bytes = sizeof own;
   getsockname(w.fd, reinterpret_cast<sockaddr*>(&own), &bytes);
@@ -274,10 +300,11 @@ ArmServer::ArmServer(ArmPort port, const ArmServerOptions& options) : work_(std:
 ArmServer::~ArmServer() { stop(); }
 void ArmServer::stop() { work_->stop(); }
 uint16_t ArmServer::port() const { return work_->listens; }
+uint64_t ArmServer::sent_bytes() const { return work_->bytes_out; }
 
 BridgeCounts ArmServer::counts() const {
   const Work& w = *work_;
-  return {w.accepted, w.garbage, w.version, w.nonsense, w.stranger, w.old};
+  return {w.accepted, w.garbage, w.version, w.forged, w.nonsense, w.stranger, w.old};
 }
 
 std::vector<std::string> ArmServer::news() {

@@ -44,9 +44,14 @@ const char* word_of(uint32_t fault) {
   }
 }
 
+struct Hand {
+  ToolInput input;
+  uint64_t sampled_ns = 0;  // on the clock by which the arm's patches age
+};
+
 struct Side {
   Latest<ForcePatch> patch;         // physics -> servo
-  Latest<ToolInput> hand;           // servo -> physics
+  Latest<Hand> hand;                // servo -> physics
   std::atomic<uint32_t> faults{0};  // servo -> physics
   // The servo's.
   ServoHand servo;
@@ -68,13 +73,19 @@ struct Haptics::Work {
   std::array<Side, 2> side;
   uint64_t (*clock)() = wall_ns;
 
+  void send(size_t k, const ForcePatch& patch) {
+    Side& s = side[k];
+    if (port.send_patch) return port.send_patch(port.self, k, to_arm(s.options, patch));
+    s.patch.draft() = patch;
+    s.patch.publish();
+  }
   static Vec3 step(void* user, size_t arm, const ArmSample& sample) {
     Work& w = *static_cast<Work*>(user);
     Side& s = w.side[arm];
     const uint64_t now = w.clock();
     const bool fresh = s.patch.update();
     const ServoOut out = servo_step(s.servo, s.options, sample, fresh ? &s.patch.seen() : nullptr, now);
-    s.hand.draft() = out.hand;
+    s.hand.draft() = {out.hand, sample.time_ns > 0 ? sample.time_ns : now};
     s.hand.publish();
     s.faults.fetch_or(s.servo.limiter.faults, std::memory_order_relaxed);
     s.servo.limiter.faults = 0;
@@ -125,8 +136,7 @@ Haptics::Haptics(ArmPort port, const PictureModel& picture, const HapticsOptions
     o.ratchet = options.ratchet;
     o.force = options.force;
     o.place = workspace_of(arm, k, picture.focus, options.place);
-    ToolInput& nobody = work_->side[k].hand.draft();
-    nobody.connected = 0;
+    work_->side[k].hand.draft().input.connected = 0;
     work_->side[k].hand.publish();
   }
   std::string why;
@@ -140,31 +150,31 @@ bool Haptics::present(size_t k) const { return work_->port.arm[k].present; }
 const ServoOptions& Haptics::servo(size_t k) const { return work_->side[k].options; }
 
 void Haptics::publish(size_t k, const ForcePatch& patch, uint32_t epoch, float speed) {
-  ForcePatch& p = work_->side[k].patch.draft();
-  p = patch;
+  Side& s = work_->side[k];
+  ForcePatch p = patch;
   // A patch is as old as the pose it was computed for, not as the moment at which a slow tick was done with it.
-  p.time_ns = work_->side[k].taken_ns > 0 ? work_->side[k].taken_ns : work_->clock();
+  p.time_ns = s.taken_ns > 0 ? s.taken_ns : work_->clock();
   p.epoch = epoch;
   p.period = patch.period / speed;
   p.expiry = std::max(patch.expiry, 2 * p.period);
-  work_->side[k].patch.publish();
+  work_->send(k, p);
 }
 
 void Haptics::rest(size_t k, uint32_t epoch) {
-  ForcePatch& p = work_->side[k].patch.draft();
-  p = {};
+  hand(k);  // of now: nothing else asks for it while somebody else moves the tool
+  ForcePatch p;
   p.cap = 0;
-  p.time_ns = work_->clock();
+  p.time_ns = work_->side[k].taken_ns;
   p.epoch = epoch;
-  work_->side[k].patch.publish();
+  work_->send(k, p);
 }
 
 ToolInput Haptics::hand(size_t k) {
   Side& s = work_->side[k];
   s.hand.update();
-  ToolInput hand = s.hand.seen();
+  ToolInput hand = s.hand.seen().input;
   const uint64_t now = work_->clock();
-  s.taken_ns = hand.time_ns;
+  s.taken_ns = s.hand.seen().sampled_ns;
   if (!present(k) || hand.time_ns + kLost < now) hand.connected = 0;
   return hand;
 }
@@ -175,9 +185,9 @@ std::vector<std::string> Haptics::news() {
     if (!present(k)) continue;
     Side& s = work_->side[k];
     const std::string who = std::string(k == 0 ? "right arm: " : "left arm: ");
-    for (const std::string& line : new_faults(s.faults.exchange(0, std::memory_order_relaxed), s.told))
-      lines.push_back(who + line);
     const ArmStatus status = work_->port.status(work_->port.self, k);
+    for (const std::string& line : new_faults(s.faults.exchange(0, std::memory_order_relaxed) | status.faults, s.told))
+      lines.push_back(who + line);
     if (status.steps > 0 && status.ready != s.was_ready) {
       lines.push_back(who + (status.ready ? "it is back"
                                           : "lost: " + work_->port.error_text(work_->port.self, status.error) +
