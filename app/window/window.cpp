@@ -15,6 +15,7 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "core/data.h"
 #include "procedure/scene_file.h"
 #include "render/orbit.h"
 #include "render/quality.h"
@@ -33,10 +34,10 @@
 namespace catgut {
 namespace {
 
-constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSansMono.ttf";
-constexpr double kMostPictures = 150;  // [1/s]
-constexpr double kSlowPicture = 0.07;  // [s] a picture that takes longer is drawn coarser
-constexpr double kStallEvery = 2;      // [s] of --stall-ms
+constexpr const char* kFont = "fonts/truetype/dejavu/DejaVuSansMono.ttf";  // in a share folder
+constexpr double kMostPictures = 150;                                      // [1/s]
+constexpr double kSlowPicture = 0.07;                                      // [s] a picture that takes longer is drawn coarser
+constexpr double kStallEvery = 2;                                          // [s] of --stall-ms
 
 std::vector<SceneChoice> scene_choices() {
   // What people practise first, from the simplest; then what is there besides.
@@ -98,7 +99,7 @@ class Window {
       } catch (const InputError& error) { loaded.fault = error.what(); }
     }
     try {
-      renderer_ = make_window_renderer(sdl_.number, width_, height_, kFont);
+      renderer_ = make_window_renderer(sdl_.number, width_, height_, shared_path(kFont));
     } catch (const std::runtime_error& error) { throw InputError("window", error.what(), kHeadless); }
     if (!loaded.fault.empty()) std::fprintf(stderr, "catgut: %s\n", loaded.fault.c_str());
     message_ = loaded.fault;

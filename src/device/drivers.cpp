@@ -10,6 +10,7 @@ namespace catgut {
 namespace {
 
 constexpr ArmDriver kDrivers[] = {
+#ifdef CATGUT_WITH_HAPTICS
     {"touch", "3D Systems Touch", "path of libHD.so",
      [](const std::string& where, std::vector<std::string>& told) {
        TouchOptions o;
@@ -28,6 +29,7 @@ constexpr ArmDriver kDrivers[] = {
        o.where = where;
        return open_haply(o, told);
      }},
+#endif
     {"bridge", "arms of another machine or program", "HOST[:PORT]",
      [](const std::string& where, std::vector<std::string>& told) {
        BridgeOptions o;

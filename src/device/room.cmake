@@ -1,3 +1,10 @@
+if(NOT CATGUT_HAPTICS)  # mouse, gamepad and the bridge to other programs need no library
+  foreach(driver touch force_dimension haply)
+    set_source_files_properties(${PROJECT_SOURCE_DIR}/src/device/${driver}.cpp PROPERTIES HEADER_FILE_ONLY ON)
+  endforeach()
+  return()
+endif()
+set_source_files_properties(${PROJECT_SOURCE_DIR}/src/device/drivers.cpp PROPERTIES COMPILE_DEFINITIONS CATGUT_WITH_HAPTICS)
 # The Haply service speaks JSON over WebSocket: Boost.Beast and nlohmann-json, headers only, in one file.
 find_package(Boost 1.74 REQUIRED)
 find_package(nlohmann_json REQUIRED)

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "core/check.h"
+#include "core/data.h"
 #include "procedure/scene_fields.h"
 #include "procedure/toml.h"
 
@@ -260,7 +261,7 @@ void seek_meshes_beside(SceneSpec& scene, const fs::path& folder) {
 
 std::string scenes_folder() {
   const char* given = std::getenv("CATGUT_SCENES");
-  return given && *given ? given : CATGUT_SCENES_DIR;
+  return given && *given ? given : data_path("scenes");
 }
 
 std::vector<std::string> scene_names() {
@@ -284,7 +285,7 @@ SceneSpec read_scene(const std::string& name_or_path) {
   if (!is_readable_file(path)) {
     const std::vector<std::string> names = scene_names();
     const std::string nearest = bare ? nearest_word(name_or_path, names) : "";
-    std::string next = "give the path of a .toml file";
+    std::string next = "give the path of a .toml file, or set CATGUT_DATA_DIR to the folder that holds Catgut's own scenes/";
     if (!names.empty()) next = fmt::format("the scenes are: {} (or give the path of a .toml file)", fmt::join(names, ", "));
     if (!nearest.empty()) next = fmt::format("did you mean \"{}\"? {}", nearest, next);
     throw InputError(name_or_path, "there is no such scene", next);

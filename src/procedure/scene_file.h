@@ -9,8 +9,8 @@
 
 namespace catgut {
 
-// name_or_path: "purse_string" (from the scenes folder: CATGUT_SCENES in the environment, else beside the sources) or the path
-// of a .toml file. Organ meshes with a relative path are sought beside the file first.
+// name_or_path: "purse_string" (from the scenes folder) or the path of a .toml file. Organ meshes with a relative path are
+// sought beside the file first.
 SceneSpec read_scene(const std::string& name_or_path);
 
 // filename: for messages, and for the scene's name (its stem) when the text does not give one.
@@ -27,6 +27,7 @@ void set_value(SceneSpec& scene, const std::string& key_equals_value, const std:
 // Sets the preset and all it implies; InputError naming the presets when there is none of that name.
 void use_preset(SceneSpec& scene, std::string preset, const std::string& where = "--preset");
 
+// CATGUT_SCENES in the environment, else the folder scenes of Catgut's data (core/data.h); empty: not found.
 std::string scenes_folder();
 std::vector<std::string> scene_names();  // of the files in it, sorted
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <stdexcept>
 
 #include "core/check.h"
 #include "procedure/scene_file.h"
+#include "procedure/scripted_surgeon.h"
 #include "sim/recording.h"
 
 namespace catgut {
@@ -42,37 +42,11 @@ class RecordedHands : public Surgeon {
 
 }  // namespace
 
-SurgeonSkill skill_of(const SceneSpec& scene) {
-  const SurgeonSpec& s = scene.surgeon;
-  SurgeonSkill k;
-  k.bites = s.bites;
-  k.edge_distance = s.edge_distance;
-  k.bite_length = s.bite_length;
-  k.tail = s.tail;
-  k.speed = s.speed;
-  k.drive_speed = s.drive_speed;
-  k.tremor = s.tremor;
-  k.aim_error = s.aim_error;
-  k.wall = scene.body[0].wall;
-  k.seed = scene.seed;
-  return k;
-}
-
 void prepare_for_mouse(SceneSpec& scene) { scene.solver.tool_force = std::min(scene.solver.tool_force, kUnfeltToolForce); }
 
 Hands make_hands(const std::string& who, const SceneSpec& scene, const PictureModel& picture) {
   if (who == "none") return {};
-  if (who == "scripted") {
-    const std::string plan = scene.surgeon.plan.empty() ? scene.technique.name : scene.surgeon.plan;
-    if (plan == "none")
-      throw InputError("--surgeon scripted", "the scene has no technique to carry out", "use --surgeon none, or a recording");
-    try {
-      return {make_surgeon(plan, picture, skill_of(scene)), true};
-    } catch (const std::invalid_argument&) {
-      throw InputError("--surgeon scripted", "there is no script for \"" + plan + "\" in this scene",
-                       "use --surgeon none, or a recording");
-    }
-  }
+  if (who == "scripted") return {scripted_surgeon(scene, picture), true};
   if (!std::filesystem::exists(who))
     throw InputError("--surgeon " + who, "there is no such surgeon and no such file",
                      "write scripted, none or the path of a .cgrec recording");

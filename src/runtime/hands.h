@@ -4,6 +4,7 @@
 #include <string>
 
 #include "exchange/picture.h"
+#include "procedure/scripted_surgeon.h"
 #include "sim/scene.h"
 #include "surgeon/surgeon.h"
 
@@ -13,8 +14,6 @@ struct Hands {
   std::unique_ptr<Surgeon> surgeon;  // null: no hands
   bool settles = true;               // false: a recording brings its own settling time along
 };
-
-SurgeonSkill skill_of(const SceneSpec& scene);
 
 // Physics under hands at a mouse or gamepad. They do not feel where their tools touch and push on: from this on tools slip past
 // each other, instead of being pushed aside from where their hands want them.

@@ -21,11 +21,8 @@
 #include <string_view>
 #include <vector>
 
-#include "core/check.h"
+#include "catgut/catgut.h"
 #include "core/hash.h"
-#include "procedure/scene_file.h"
-#include "runtime/hands.h"
-#include "sim/simulation.h"
 
 namespace {
 using namespace catgut;
@@ -110,7 +107,7 @@ std::vector<Row> run(const Case& which, double seconds, int threads) {
   Jobs jobs(threads);
   Snapshot seen;
   publish(*model, *state, seen);
-  const std::unique_ptr<Surgeon> surgeon = make_hands("scripted", scene, picture_model(*model)).surgeon;
+  const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*model));
 
   const double rate = static_cast<double>(scene.solver.tick_rate);
   const auto ticks = [&](double s) { return static_cast<uint64_t>(std::llround(s * rate)); };

@@ -28,12 +28,25 @@ std::vector<fs::path> pages() {
   return out;
 }
 
+// The sample without the line of its licence.
+std::string program() {
+  const std::string text = read_file(kRoot / "samples/embed/main.cpp");
+  return text.rfind("// SPDX", 0) == 0 ? text.substr(text.find('\n') + 1) : text;
+}
+
 TEST(Docs, the_readme_program_is_the_sample) {
   const std::string readme = read_file(kRoot / "README.md"), fence = "```cpp\n";
   const size_t from = readme.find(fence);
   ASSERT_NE(from, std::string::npos);
   const size_t start = from + fence.size(), end = readme.find("```", start);
-  EXPECT_EQ(readme.substr(start, end - start), read_file(kRoot / "samples/00_readme.cpp"));
+  EXPECT_EQ(readme.substr(start, end - start), program());
+}
+
+TEST(Docs, the_manual_of_the_library_holds_the_sample) {
+  std::istringstream lines(program());
+  std::string comment;
+  for (std::string line; std::getline(lines, line);) comment += line.empty() ? "//\n" : "//   " + line + "\n";
+  EXPECT_NE(read_file(kRoot / "include/catgut/catgut.h").find(comment), std::string::npos);
 }
 
 TEST(Docs, links_lead_somewhere) {

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// procedure: from a scene's tables to its surgeon; see scripted_surgeon.h.
+#include "procedure/scripted_surgeon.h"
+
+#include <stdexcept>
+
+#include "core/check.h"
+
+namespace catgut {
+
+SurgeonSkill skill_of(const SceneSpec& scene) {
+  const SurgeonSpec& s = scene.surgeon;
+  SurgeonSkill k;
+  k.bites = s.bites;
+  k.edge_distance = s.edge_distance;
+  k.bite_length = s.bite_length;
+  k.tail = s.tail;
+  k.speed = s.speed;
+  k.drive_speed = s.drive_speed;
+  k.tremor = s.tremor;
+  k.aim_error = s.aim_error;
+  k.wall = scene.body[0].wall;
+  k.seed = scene.seed;
+  return k;
+}
+
+std::unique_ptr<Surgeon> scripted_surgeon(const SceneSpec& scene, const PictureModel& picture) {
+  const std::string plan = scene.surgeon.plan.empty() ? scene.technique.name : scene.surgeon.plan;
+  if (plan == "none")
+    throw InputError("--surgeon scripted", "the scene has no technique to carry out", "use --surgeon none, or a recording");
+  try {
+    return make_surgeon(plan, picture, skill_of(scene));
+  } catch (const std::invalid_argument&) {
+    throw InputError("--surgeon scripted", "there is no script for \"" + plan + "\" in this scene",
+                     "use --surgeon none, or a recording");
+  }
+}
+
+}  // namespace catgut

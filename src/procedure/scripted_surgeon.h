@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// procedure: the scripted surgeon that a scene asks for: its [surgeon] and [technique] tables as skill and plan.
+#pragma once
+#include <memory>
+
+#include "exchange/picture.h"
+#include "sim/scene.h"
+#include "surgeon/surgeon.h"
+
+namespace catgut {
+
+SurgeonSkill skill_of(const SceneSpec& scene);
+
+// Throws InputError when the scene has no technique, or none that the surgeon knows.
+std::unique_ptr<Surgeon> scripted_surgeon(const SceneSpec& scene, const PictureModel& picture);
+
+}  // namespace catgut
