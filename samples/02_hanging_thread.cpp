@@ -12,23 +12,18 @@ int main() {
   constexpr uint32_t kCount = 60;
   constexpr float kSpacing = 0.002f, kMass = 2e-6f, kG = 9.81f,
                   kH = 1.0f / 960;  // [m], [kg], [m/s^2], [s]
-  ThreadModel model;
+  StrandModel model;
   model.count = kCount;
   model.spacing = kSpacing;
   model.inv_mass = 1 / kMass;
   model.stretch_compliance = 1e-6f;
   model.bend_compliance = 2e4f;
   model.gravity = {0, -kG, 0};
-  Thread thread;
+  Strand thread;
   Column<Vec4> x, v(kCount), before;
   const std::vector<float> inv_mass(kCount, 1 / kMass);
-  for (uint32_t i = 0; i < kCount; ++i) {
-    thread.order.push_back(i);
-    x.push_back(point({kSpacing * static_cast<float>(i), 0, 0}));  // level: it has to fall first
-  }
-  thread.rest.assign(kCount - 1, kSpacing);
-  thread.tension.assign(kCount - 1, 0);
-  thread.cut.assign(kCount - 1, 0);
+  for (uint32_t i = 0; i < kCount; ++i) x.push_back(point({kSpacing * static_cast<float>(i), 0, 0}));  // level: it has to fall
+  reset(model, thread);
   thread.hold.push_back({0, 0, {}});  // node 0 on body 0, the hook, which nothing can move
   const std::vector<RigidModel> hook_model(1);
   std::vector<RigidBody> hook(1);

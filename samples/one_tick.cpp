@@ -15,7 +15,9 @@ namespace {
 
 void print(const char* what, Vec3 p) { std::printf("%-32s (%8.3f, %8.3f, %8.3f) mm\n", what, 1e3 * p.x, 1e3 * p.y, 1e3 * p.z); }
 void print_force(const char* what, Vec3 f) { std::printf("%-32s (%8.4f, %8.4f, %8.4f) N\n", what, f.x, f.y, f.z); }
-Vec3 tip_of(const Model& m, const State& s) { return needle_tip(m.solver.needle_arc, s.solver.body[kNeedle]); }
+Vec3 tip_of(const Model& m, const State& s) {
+  return needle_tip(m.solver.needle_arc[0], s.solver.body[m.solver.needle_body(0)]);
+}
 
 }  // namespace
 
@@ -64,7 +66,7 @@ int main() {
 
   std::printf("[step]\n");
   std::printf("%d substeps of %.4f ms; %u tissue particles in %u clusters, %u thread particles, %zu rigid bodies\n", m.substeps,
-              1e3 * m.solver.h, m.solver.tissue, m.solver.shape.clusters, m.solver.thread.count, s.solver.body.size());
+              1e3 * m.solver.h, m.solver.tissue, m.solver.shape.clusters, m.solver.strand[0].count, s.solver.body.size());
   print("tool in the right hand", s.solver.body[0].x);
   std::printf("%-32s %8.3f mm behind its hand, moved %.3f mm\n", "", 1e3 * distance(s.solver.body[0].x, input.hand[0].pose.p),
               1e3 * distance(s.solver.body[0].x, tool_before));
@@ -94,8 +96,8 @@ int main() {
   print_force("on the right hand", seen.tool[0].force);
   print_force("on the left hand", seen.tool[1].force);
   float most = 0;
-  for (float t : s.solver.thread.tension) most = std::max(most, t);
-  std::printf("%-32s %8.5f N at the needle, %.5f N at most\n", "thread tension", s.solver.thread.tension.back(), most);
+  for (float t : s.solver.strand[0].tension) most = std::max(most, t);
+  std::printf("%-32s %8.5f N at the needle, %.5f N at most\n", "thread tension", s.solver.strand[0].tension.back(), most);
   for (const ChannelPoint& c : s.solver.channel)
     std::printf("%-32s %8.4f N sideways, %.4f N along\n", "channel at the entry", length(c.lambda) / (m.solver.h * m.solver.h),
                 c.drag_lambda / (m.solver.h * m.solver.h));

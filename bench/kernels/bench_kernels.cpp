@@ -96,8 +96,8 @@ ContactView view_of(Sewn& s) {
   const SolverModel& m = s.model->solver;
   SolverState& state = s.state->solver;
   SolverScratch& k = s.state->scratch;
-  return {state.x.data(), k.prev.data(),         m.inv_mass.data(), &m.body,   &state.body,
-          &k.on_body,     k.node_of_slot.data(), &state.thread,     &m.thread, k.locked.data()};
+  return {state.x.data(), k.prev.data(), m.inv_mass.data(),     &m.body,        &state.body, &k.on_body, m.tissue,
+          state.strand,   m.strand,      k.node_of_slot.data(), k.locked.data()};
 }
 
 void ShapeRows(benchmark::State& bench) {
@@ -152,19 +152,19 @@ void ThreadSolve(benchmark::State& bench) {
   const SolverModel& m = s.model->solver;
   SolverState& state = s.state->solver;
   SolverScratch& k = s.state->scratch;
-  const Thread thread = state.thread;
+  const Strand thread = state.strand[0];
   const std::vector<RigidBody> body = state.body;
   measure(
-      bench, m.thread.count, kName[bench.range(0)],
+      bench, m.strand[0].count, kName[bench.range(0)],
       [&] {
-        state.x = s.predicted, state.thread = thread, state.body = body;
-        std::fill(k.thread.lambda.begin(), k.thread.lambda.end(), 0.0f);
+        state.x = s.predicted, state.strand[0] = thread, state.body = body;
+        std::fill(k.thread[0].lambda.begin(), k.thread[0].lambda.end(), 0.0f);
       },
       [&] {
-        solve_thread(m.thread, state.thread, k.thread, state.x.data(), k.prev.data(), m.inv_mass.data(), m.body, state.body,
-                     m.h);
+        solve_thread(m.strand[0], state.strand[0], k.thread[0], state.x.data(), k.prev.data(), m.inv_mass.data(), m.body,
+                     state.body, m.h);
       });
-  state.thread = thread, state.body = body;
+  state.strand[0] = thread, state.body = body;
 }
 void TissuePairsFound(benchmark::State& bench) {
   Sewn& s = scene(bench.range(0));

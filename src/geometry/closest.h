@@ -1,5 +1,6 @@
-// geometry/closest: the point of a triangle mesh nearest to a given one.
+// geometry/closest: nearest points of segments and triangles, and of a triangle mesh.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -7,6 +8,12 @@
 #include "geometry/mesh.h"
 
 namespace catgut {
+
+// Parameter (0..1) of the point of segment a-b nearest to p.
+inline float closest_on_segment(Vec3 p, Vec3 a, Vec3 b) {
+  const Vec3 d = b - a;
+  return std::clamp(dot(p - a, d) / std::max(length2(d), 1e-16f), 0.0f, 1.0f);
+}
 
 // The point of triangle a b c nearest to p (Ericson 2005, section 5.1.5), and its barycentric weights.
 struct ClosestOnTriangle {

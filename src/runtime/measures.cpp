@@ -29,8 +29,11 @@ void measure(const Model& model, const State& state, Measures& out) {
     out.constraints[static_cast<size_t>(kind)] = static_cast<uint32_t>(count);
     return out.most_n[static_cast<size_t>(kind)];
   };
-  float& thread = row(ForceKind::thread, s.thread.tension.size());
-  for (float t : s.thread.tension) thread = std::max(thread, std::abs(t));
+  size_t pairs = 0;
+  for (const Strand& strand : s.strand) pairs += strand.tension.size();
+  float& thread = row(ForceKind::thread, pairs);
+  for (const Strand& strand : s.strand)
+    for (float t : strand.tension) thread = std::max(thread, std::abs(t));
   float& tool = row(ForceKind::tool, s.weld.size());
   for (const Weld& w : s.weld) tool = std::max(tool, length(w.lambda) * inv_h2);
   float& attachment = row(ForceKind::attachment, s.attach.size());

@@ -124,8 +124,8 @@ void reserve_room(const Model& model, State& s) {
   s.event.reserve(kMany);
   s.stitch.reserve(kMany);
   s.stitch_span.reserve(kMany);
-  s.solver.thread.anchor.reserve(model.solver.thread.count);
-  s.solver.thread.hold.reserve(model.solver.thread.count);
+  s.solver.strand[0].anchor.reserve(model.solver.strand[0].count);
+  s.solver.strand[0].hold.reserve(model.solver.strand[0].count);
   s.solver.weld.reserve(kMany);
   s.solver.attach.reserve(kMany);
   s.solver.pin.reserve(kMany);
@@ -263,7 +263,8 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   m.hand_compliance = 1 / scene.solver.hand_stiffness;
   s.tool_force = scene.solver.tool_force;
   s.friction = {scene.solver.friction_tissue, scene.solver.friction_tool, scene.solver.friction_thread};
-  ThreadModel& t = s.thread;
+  s.strand.resize(1);
+  StrandModel& t = s.strand[0];
   t.first_slot = s.tissue;
   t.count = static_cast<uint32_t>(scene.thread.particles);
   t.spacing = scene.thread.spacing;
@@ -274,10 +275,11 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   t.bend_sweeps = scene.solver.bend_sweeps;
   t.distance_sweeps = scene.solver.distance_sweeps;
   t.direct = scene.solver.thread_direct;
+  t.collision_off = scene.suture.collision_off;
   t.gravity = s.gravity;
 
   const NeedleShape needle{scene.needle.radius, scene.needle.arc, scene.needle.wire_radius, scene.needle.mass};
-  s.needle_arc = needle_arc(needle);
+  s.needle_arc = {needle_arc(needle)};
   s.body = {tool_body(), tool_body(), needle_body(needle)};
   s.ground = drape;
 
@@ -288,7 +290,6 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   u.channel_compliance = scene.suture.channel_compliance;
   u.pass_tension = scene.suture.pass_tension;
   u.capstan = scene.suture.capstan;
-  u.collision_off = scene.suture.collision_off;
   u.grasp_reach = scene.suture.grasp_reach;
   u.least_throws = scene.technique.throws;
 
@@ -304,7 +305,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   const float wire = s.ground + scene.needle.wire_radius + 0.0002f;
   const Vec3 beside = two ? Vec3{0.02f, 0, tube + 0.03f} : Vec3{tube + 0.03f, 0, 0.01f};
   m.needle_start = {Vec3{rim.x + beside.x, wire, rim.z + beside.z}, flat.q};
-  const Vec3 swage = transform(m.needle_start, s.needle_arc.point(0));
+  const Vec3 swage = transform(m.needle_start, s.needle_arc[0].point(0));
   std::vector<Vec3> thread = lay_thread(scene.thread, swage);
   for (size_t i = thread.size(); i-- > 0;) m.start.push_back(thread[i]);  // free end first
   m.tool_start = {Pose{rim + Vec3{0.12f, 0.10f, 0.05f}, {}}, Pose{rim + Vec3{-0.12f, 0.10f, 0.05f}, {}}};

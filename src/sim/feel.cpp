@@ -22,13 +22,13 @@ constexpr float kNothing = 0.005f;  // [N] less than this is not felt
 constexpr float kLook = 0.008f;     // [m] how far ahead the next contact is looked for; the broad phase's margin
 
 Vec3 thread_on_tool(const SolverState& s, const ThreadHold& hold) {
-  const auto node = std::find(s.thread.order.begin(), s.thread.order.end(), hold.slot);
-  if (node == s.thread.order.end()) return {};
-  const size_t i = static_cast<size_t>(node - s.thread.order.begin());
-  const auto place = [&](size_t at) { return thread_position(s.thread, at, s.x.data(), s.body); };
+  const auto node = std::find(s.strand[0].order.begin(), s.strand[0].order.end(), hold.slot);
+  if (node == s.strand[0].order.end()) return {};
+  const size_t i = static_cast<size_t>(node - s.strand[0].order.begin());
+  const auto place = [&](size_t at) { return thread_position(s.strand[0], at, s.x.data(), s.body); };
   Vec3 force;
-  if (i > 0) force += normalized(place(i - 1) - place(i)) * s.thread.tension[i - 1];
-  if (i < s.thread.tension.size()) force += normalized(place(i + 1) - place(i)) * s.thread.tension[i];
+  if (i > 0) force += normalized(place(i - 1) - place(i)) * s.strand[0].tension[i - 1];
+  if (i < s.strand[0].tension.size()) force += normalized(place(i + 1) - place(i)) * s.strand[0].tension[i];
   return force;
 }
 
@@ -41,7 +41,7 @@ NeedleResistance resistance_now(const Model& model, const State& state, float te
   const SolverState& s = state.solver;
   const RigidBody& needle = s.body[kNeedle];
   const SutureState& suture = state.suture;
-  const NeedleArc& arc = m.needle_arc;
+  const NeedleArc& arc = m.needle_arc[0];
   const auto along = [&](const BiteEnd& end) {
     return arc.radius * arc.nearest(to_local(needle.pose(), position_of(end.point, s.x.data())));
   };
@@ -89,7 +89,7 @@ void feel_substep(const Model& model, State& state, int i) {
     t.pressed += on.pressed * inv_h2;
     t.by_tool += on.by_tool * inv_h2;
     t.thread += (on.linear - on.pressing - on.rubbing) * inv_h2;
-    for (const ThreadHold& h : s.thread.hold)
+    for (const ThreadHold& h : s.strand[0].hold)
       if (h.body == body) t.thread += thread_on_tool(s, h);
     for (const Attachment& a : s.attach)
       if (a.body == body) t.held += a.lambda * -inv_h2;
@@ -99,8 +99,9 @@ void feel_substep(const Model& model, State& state, int i) {
     if (has_needle) {
       const RigidBody& needle = s.body[kNeedle];
       for (const ChannelPoint& c : s.channel) {
-        const Vec3 way = rotate(
-            needle.q, m.needle_arc.tangent(m.needle_arc.nearest(to_local(needle.pose(), position_of(c.point, s.x.data())))));
+        const Vec3 way =
+            rotate(needle.q,
+                   m.needle_arc[0].tangent(m.needle_arc[0].nearest(to_local(needle.pose(), position_of(c.point, s.x.data())))));
         t.drag += way * (-c.drag_lambda * inv_h2);  // the channel's push on the tissue, turned round: on the needle
       }
     }
@@ -199,19 +200,19 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
   if (hand.held == Held::needle && (!s.channel.empty() || length(needle) > 20 * kNothing)) {
     const RigidBody& body = s.body[kNeedle];
     for (const ChannelPoint& c : s.channel) {
-      const Vec3 way =
-          rotate(body.q, m.needle_arc.tangent(m.needle_arc.nearest(to_local(body.pose(), position_of(c.point, s.x.data())))));
+      const Vec3 way = rotate(
+          body.q, m.needle_arc[0].tangent(m.needle_arc[0].nearest(to_local(body.pose(), position_of(c.point, s.x.data())))));
       stiff += across(way, series(kTissue, 1 / std::max(1e-6f, c.compliance)));
     }
     if (state.suture.attached) stiff += identity(series(kTissue, 1 / std::max(1e-6f, model.suture.attach_compliance)));
     if (s.channel.empty()) stiff += outer(normalized(needle), kTissue);  // its shaft lies against something
     both_ways = true;
-    p.along = rotate(body.q, m.needle_arc.tangent(hand.at * m.needle_arc.arc));
+    p.along = rotate(body.q, m.needle_arc[0].tangent(hand.at * m.needle_arc[0].arc));
   }
   if (length(thread) > 4 * kNothing) {
     // Taut thread is as stiff as the tissue it hangs on, along itself, unless it slides there.
-    const bool slides =
-        std::any_of(s.thread.anchor.begin(), s.thread.anchor.end(), [](const ThreadAnchor& a) { return a.slipping != 0; });
+    const bool slides = std::any_of(s.strand[0].anchor.begin(), s.strand[0].anchor.end(),
+                                    [](const ThreadAnchor& a) { return a.slipping != 0; });
     if (!slides) stiff += outer(normalized(thread), kTissue);
     both_ways = true;
   }
@@ -265,9 +266,8 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     if (c.body != k) continue;
     const Capsule& capsule = m.body[c.body].capsule[c.capsule];
     const Pose pose = s.body[c.body].pose();
-    const Vec3 a = transform(pose, capsule.a), axis = transform(pose, capsule.b) - a, at = xyz(s.x[c.particle]);
-    const float t = std::clamp(dot(at - a, axis) / std::max(length2(axis), 1e-16f), 0.0f, 1.0f);
-    const Vec3 away = a + axis * t - at;
+    const Vec3 a = transform(pose, capsule.a), b = transform(pose, capsule.b), at = xyz(s.x[c.particle]);
+    const Vec3 away = a + (b - a) * closest_on_segment(at, a, b) - at;
     const float gap = length(away) - capsule.radius - m.collision.tool_radius;
     if (gap < nearest) nearest = gap, p.normal = normalized(away);
   }

@@ -20,8 +20,8 @@ void publish_knots(const Model& model, const State& state, Snapshot& out) {
     v.throws = k.throws;
     v.thrown = k.thrown;
     if (state.suture.point.size() > 1)
-      v.way = normalized(position_of(s.thread.anchor[state.suture.point.back().anchor], x) -
-                             position_of(s.thread.anchor[state.suture.point.front().anchor], x),
+      v.way = normalized(position_of(s.strand[0].anchor[state.suture.point.back().anchor], x) -
+                             position_of(s.strand[0].anchor[state.suture.point.front().anchor], x),
                          {1, 0, 0});
     out.knot.push_back(v);
   }
@@ -56,8 +56,8 @@ void publish(const Model& model, const State& state, Snapshot& out) {
     const uint32_t c = m.shape.cluster_of[i];
     out.rotation[i] = {s.rotation.x[c], s.rotation.y[c], s.rotation.z[c], s.rotation.w[c]};
   }
-  out.thread_order = s.thread.order;
-  out.thread_tension = s.thread.tension;
+  out.thread_order = s.strand[0].order;
+  out.thread_tension = s.strand[0].tension;
   for (size_t k = 0; k < 2; ++k) {
     ToolView& t = out.tool[k];
     const HandState& hand = state.suture.hand[k];
@@ -67,9 +67,10 @@ void publish(const Model& model, const State& state, Snapshot& out) {
     t.held = hand.held;
     t.held_at = hand.at;
     t.held_slot = hand.slot;
-    t.held_strands = static_cast<uint32_t>(std::count_if(s.thread.hold.begin(), s.thread.hold.end(), [&](const ThreadHold& h) {
-      return h.body == static_cast<int>(k) && h.kind == HoldKind::jaw;
-    }));
+    t.held_strands =
+        static_cast<uint32_t>(std::count_if(s.strand[0].hold.begin(), s.strand[0].hold.end(), [&](const ThreadHold& h) {
+          return h.body == static_cast<int>(k) && h.kind == HoldKind::jaw;
+        }));
     const ToolLoop& loop = state.suture.loop[k];
     t.loop_wraps = loop.wraps;
     t.loop_handed = loop.handed;
@@ -81,22 +82,21 @@ void publish(const Model& model, const State& state, Snapshot& out) {
     out.patch[k] = state.feel.patch[k];
   }
   // Published at the circle's centre, which is what pictures and plans turn about.
-  out.needle.pose = {transform(s.body[kNeedle].pose(), m.needle_arc.centre), s.body[kNeedle].q};
+  out.needle.pose = {transform(s.body[kNeedle].pose(), m.needle_arc[0].centre), s.body[kNeedle].q};
   out.needle.in_tissue = !state.suture.open.empty();
   out.needle.bite = state.suture.open.empty() ? 0 : state.suture.open.back().bite;
   out.suture_point.clear();
   for (const SuturePoint& p : state.suture.point) {
-    const ThreadAnchor& a = s.thread.anchor[p.anchor];
+    const ThreadAnchor& a = s.strand[0].anchor[p.anchor];
     const Bite& bite = state.suture.bite[p.bite];
     out.suture_point.push_back({position_of(a.point, s.x.data()), p.bite, p.exit, a.slot, a.tension_needle, a.tension_free,
                                 model.wall[m.collision.surface[(p.exit ? bite.exit : bite.entry).triangle][0]]});
   }
-  out.thread_cut = s.thread.cut;
+  out.thread_cut = s.strand[0].cut;
   out.thread_rest = 0;
-  for (size_t i = 0; i < s.thread.rest.size(); ++i)
-    if (!s.thread.cut[i]) out.thread_rest += s.thread.rest[i];
-  out.needle_on_thread =
-      std::any_of(s.thread.hold.begin(), s.thread.hold.end(), [](const ThreadHold& h) { return h.kind == HoldKind::swage; });
+  for (size_t i = 0; i < s.strand[0].rest.size(); ++i)
+    if (!s.strand[0].cut[i]) out.thread_rest += s.strand[0].rest[i];
+  out.needle_on_thread = is_swaged(s.strand[0]);
   publish_knots(model, state, out);
   out.seam.clear();
   for (const ClosurePlan::Pair& p : state.plan.pair)

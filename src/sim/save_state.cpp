@@ -16,8 +16,8 @@ class Validator : public Archive<Validator> {
   explicit Validator(const SolverModel& m) {
     domain(IndexOf::particle, m.count);
     domain(IndexOf::tissue, m.tissue);
-    domain(IndexOf::slot, m.thread.count), first_[static_cast<size_t>(IndexOf::slot)] = m.thread.first_slot;
-    domain(IndexOf::pair, m.thread.count > 0 ? m.thread.count - 1 : 0);
+    domain(IndexOf::slot, m.count - m.tissue), first_[static_cast<size_t>(IndexOf::slot)] = m.tissue;
+    domain(IndexOf::strand, m.strand.size());
     ClusterRotations rotation;
     rotation.reset(m.shape.clusters);
     domain(IndexOf::cluster, rotation.x.size());
@@ -64,22 +64,29 @@ class Validator : public Archive<Validator> {
   bool good_ = true;
 };
 
-// The thread goes on to both sides of a suture point.
-bool thread_fits(const Thread& thread) {
-  return std::all_of(thread.anchor.begin(), thread.anchor.end(),
-                     [&](const ThreadAnchor& a) { return a.slot != thread.order.front() && a.slot != thread.order.back(); });
+// A strand has its own particles, each once; the thread continues to both sides of a suture point.
+bool strand_fits(const StrandModel& model, const Strand& s) {
+  const size_t pairs = model.count > 0 ? model.count - 1 : 0;
+  if (s.order.size() != model.count || s.rest.size() != pairs || s.cut.size() != pairs || s.tension.size() != pairs)
+    return false;
+  std::vector<bool> seen(model.count);
+  for (const uint32_t slot : s.order) {
+    if (!model.has(slot) || seen[slot - model.first_slot]) return false;
+    seen[slot - model.first_slot] = true;
+  }
+  return std::all_of(s.hold.begin(), s.hold.end(), [&](const ThreadHold& h) { return model.has(h.slot); }) &&
+         std::all_of(s.anchor.begin(), s.anchor.end(), [&](const ThreadAnchor& a) {
+           return model.has(a.slot) && a.slot != s.order.front() && a.slot != s.order.back();
+         });
 }
 
-bool knot_fits(const Thread& thread, const Knot& k) {
+bool knot_fits(const Strand& strand, const Knot& k) {
   const bool tightening = k.phase == KnotPhase::tightening;
   if (k.throws == 0 || k.begun + (tightening ? 1 : 0) > k.throws || (k.slots == 0 && (k.begun > 0 || !tightening)))
     return false;
-  const auto anchored = [&](uint32_t slot) {
-    return std::any_of(thread.anchor.begin(), thread.anchor.end(), [&](const ThreadAnchor& t) { return t.slot == slot; });
-  };
   for (uint32_t i = 0; i < k.slots; ++i)
-    if (!anchored(k.slot[i])) return false;
-  return !tightening || (anchored(k.end[0]) && anchored(k.end[1]));
+    if (!is_anchored(strand, k.slot[i])) return false;
+  return !tightening || (is_anchored(strand, k.end[0]) && is_anchored(strand, k.end[1]));
 }
 
 bool suture_fits(const SolverState& solver, const SutureState& u) {
@@ -88,7 +95,7 @@ bool suture_fits(const SolverState& solver, const SutureState& u) {
   if (u.attached && (!tip_attached || phase_of(u) != NeedlePhase::tip_in)) return false;
   for (const OpenBite& open : u.open)
     if (open.phase == NeedlePhase::outside || (open.phase == NeedlePhase::back_in && u.point.empty())) return false;
-  return std::all_of(u.knot.begin(), u.knot.end(), [&](const Knot& k) { return knot_fits(solver.thread, k); });
+  return std::all_of(u.knot.begin(), u.knot.end(), [&](const Knot& k) { return knot_fits(solver.strand[0], k); });
 }
 
 // A technique's rows are those of the plan.
@@ -113,7 +120,7 @@ bool fits(const Model& model, const State& s) {
     const Weld& w = s.solver.weld[static_cast<size_t>(k)];
     if (w.a != k || w.b != -1) return false;
   }
-  return thread_fits(s.solver.thread) && suture_fits(s.solver, s.suture) &&
+  return strand_fits(model.solver.strand[0], s.solver.strand[0]) && suture_fits(s.solver, s.suture) &&
          technique_fits(model.technique.kind, s.technique, s.plan.pair.size(), s.suture.point.size());
 }
 

@@ -35,7 +35,7 @@ void meet_hands(State& state, const TickInput& input) {
 
 // What the technique may see of the tick.
 TechniqueView look(const Model& model, State& state) {
-  const Thread& thread = state.solver.thread;
+  const Strand& thread = state.solver.strand[0];
   state.stitch.clear();
   for (const SuturePoint& p : state.suture.point) {
     StitchPoint s;

@@ -2,6 +2,7 @@
 #include "solver/attach.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 
 namespace catgut {
 
@@ -21,6 +22,33 @@ TissuePoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, V
     t.weight[k] = static_cast<float>(1.0 / t.count + (rest_of(k) - mean).dot(slope));
   }
   return t;
+}
+
+TissuePoint carried_by(const Vec4* rest, const TissuePoint& point, uint32_t count) {
+  if (point.count <= count) return point;
+  const Vec3 at = position_of(point, rest);
+  std::array<uint32_t, TissuePoint::kMost> near = point.particle;
+  std::sort(near.begin(), near.begin() + point.count, [&](uint32_t i, uint32_t j) {
+    const float di = length2(xyz(rest[i]) - at), dj = length2(xyz(rest[j]) - at);
+    return di != dj ? di < dj : i < j;
+  });
+  return spread_point({near.data(), count}, rest, at);
+}
+
+TissuePoint midway(const Vec4* rest, const TissuePoint& a, const TissuePoint& b) {
+  // A point of tissue has room for so many particles; each of the two keeps the half of them that are nearest to it, with
+  // weights that put it where it was.
+  TissuePoint m;
+  for (const TissuePoint* p : {&a, &b}) {
+    const TissuePoint part = carried_by(rest, *p, TissuePoint::kMost / 2);
+    for (uint32_t k = 0; k < part.count; ++k) {
+      uint32_t row = 0;
+      while (row < m.count && m.particle[row] != part.particle[k]) ++row;
+      if (row == m.count) m.particle[m.count++] = part.particle[k];
+      m.weight[row] += 0.5f * part.weight[k];
+    }
+  }
+  return m;
 }
 
 float NeedleArc::nearest(Vec3 p) const {

@@ -30,6 +30,11 @@ inline TissuePoint particle_point(uint32_t i) {
 // precision, so that the point follows every affine motion of its neighbourhood exactly. At most kMost particles are used.
 TissuePoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at);
 
+// The same place at rest, carried by no more than `count` particles, the nearest of those it has.
+TissuePoint carried_by(const Vec4* rest, const TissuePoint& point, uint32_t count);
+// Midway between two points of tissue, wherever the tissue carries them.
+TissuePoint midway(const Vec4* rest, const TissuePoint& a, const TissuePoint& b);
+
 inline Vec3 position_of(const TissuePoint& t, const Vec4* x) {
   Four p{};
   for (uint32_t k = 0; k < t.count; ++k) p += load(x[t.particle[k]]) * t.weight[k];
@@ -65,7 +70,8 @@ struct ChannelPoint {
   float compliance = 0;   // [m/N] sideways
   float drag = 0;         // [N] largest force along the shaft
   float at = 0;           // [rad] where on the arc it was at the start of the substep
-  uint32_t hole = 0;      // which hole it is, for whoever made the row
+  uint32_t suture = 0;    // whose needle
+  uint32_t hole = 0;      // which hole it is, for the stage that made the row
   Vec3 lambda;            // sideways, cleared at the start of a substep
   float drag_lambda = 0;  // along the shaft
 };

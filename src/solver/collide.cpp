@@ -2,7 +2,6 @@
 #include "solver/collide.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace catgut {
@@ -47,110 +46,176 @@ std::pair<float, float> closest_on_segments(Vec3 a0, Vec3 a1, Vec3 b0, Vec3 b1) 
   return {s, t};
 }
 
-void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* x, const ThreadModel& thread_model,
-                                     const Thread& thread, std::span<const uint8_t> thread_collides,
-                                     const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,
-                                     std::span<const uint8_t> body_collides, float margin, Candidates& c) {
+namespace {
+
+size_t segments_of(const Strand& s) { return s.order.size() < 2 ? 0 : s.order.size() - 1; }
+uint32_t first_slot(const CollideView& v) { return v.strand_model.empty() ? 0 : v.strand_model[0].first_slot; }
+
+// Collision flags of all strands, and the boxes of their runs.
+void box_runs(const CollideView& v, Candidates& c) {
+  c.run_low.clear(), c.run_high.clear(), c.run_first.clear();
+  size_t slots = 0;
+  for (const StrandModel& m : v.strand_model) slots += m.count;
+  c.collides.resize(slots);
+  for (size_t k = 0; k < v.strand.size(); ++k) {
+    const Strand& strand = v.strand[k];
+    const StrandModel& m = v.strand_model[k];
+    collision_flags(m, strand, std::span(c.collides).subspan(m.first_slot - first_slot(v), m.count));
+    c.run_first.push_back(static_cast<uint32_t>(c.run_low.size()));
+    const size_t segments = segments_of(strand);
+    for (size_t from = 0; from < segments; from += Candidates::kRun) {
+      Vec3 low = xyz(v.x[strand.order[from]]), high = low;
+      for (size_t i = from; i <= std::min(segments, from + Candidates::kRun); ++i) {
+        const Vec3 p = xyz(v.x[strand.order[i]]);
+        low = least(low, p), high = most(high, p);
+      }
+      c.run_low.push_back(low), c.run_high.push_back(high);
+    }
+  }
+  c.run_first.push_back(static_cast<uint32_t>(c.run_low.size()));
+}
+
+bool collides(const CollideView& v, const Candidates& c, uint32_t slot) { return c.collides[slot - first_slot(v)] != 0; }
+// Whether the segment after a node is there and collides.
+bool segment_collides(const CollideView& v, const Candidates& c, const Strand& s, size_t node) {
+  return !s.cut[node] && collides(v, c, s.order[node]) && collides(v, c, s.order[node + 1]);
+}
+// Calls do_it(node) for the segments of a strand's run.
+template <typename F>
+void for_run(const Candidates& c, const Strand& s, size_t strand, size_t run, const F& do_it) {
+  const size_t from = (run - c.run_first[strand]) * Candidates::kRun, end = std::min(segments_of(s), from + Candidates::kRun);
+  for (size_t i = from; i < end; ++i) do_it(i);
+}
+
+// A capsule p-q against the tissue's particles.
+void find_tissue_near(const CollideView& v, uint32_t body, uint32_t capsule, Vec3 p, Vec3 q, float reach, Candidates& c) {
+  for_blocks_near(c.tissue.boxes, least(p, q) - all(reach), most(p, q) + all(reach), [&](uint32_t block) {
+    const uint32_t end = std::min(v.tissue.particles, (block + 1) * kBlock);
+    for (uint32_t i = block * kBlock; i < end; ++i) {
+      const Vec3 at = xyz(v.x[i]);
+      if (length2(at - (p + (q - p) * closest_on_segment(at, p, q))) < reach * reach) c.tool.push_back({body, capsule, i});
+    }
+  });
+}
+
+// The same against the segments of all strands. `from`, `to`: a box round all that may be near.
+void find_thread_near(const CollideView& v, uint32_t body, uint32_t capsule, Vec3 p, Vec3 q, Vec3 from, Vec3 to, float margin,
+                      Candidates& c) {
+  for (uint32_t k = 0; k < v.strand.size(); ++k) {
+    const Strand& strand = v.strand[k];
+    const float reach = v.model[body].capsule[capsule].radius + v.strand_model[k].radius + margin;
+    for (uint32_t run = c.run_first[k]; run < c.run_first[k + 1]; ++run) {
+      if (!boxes_meet(c.run_low[run], c.run_high[run], from, to)) continue;
+      for_run(c, strand, k, run, [&](size_t i) {
+        if (!segment_collides(v, c, strand, i)) return;
+        const Vec3 a0 = xyz(v.x[strand.order[i]]), a1 = xyz(v.x[strand.order[i + 1]]);
+        if (!boxes_meet(least(a0, a1), most(a0, a1), from, to)) return;
+        const auto [s, t] = closest_on_segments(a0, a1, p, q);
+        if (length2(lerp(a0, a1, s) - lerp(p, q, t)) < reach * reach)
+          c.thread_tool.push_back({body, capsule, k, strand.order[i]});
+      });
+    }
+  }
+}
+
+// Thread on tissue: one triangle each, the nearest of those around the nearest particle; the substeps use its plane.
+void find_thread_on_tissue(const CollideView& v, float margin, Candidates& c) {
+  const TissueCollision& tissue = v.tissue;
+  const Vec4* x = v.x;
+  const float reach = 0.004f + margin;
+  for (uint32_t k = 0; k < v.strand.size(); ++k) {
+    const Strand& strand = v.strand[k];
+    uint32_t guess = tissue.particles;  // the nearest of the node before: with it most boxes are too far at once
+    for (uint32_t run = c.run_first[k]; run < c.run_first[k + 1]; ++run) {
+      c.near_block.clear();
+      for_blocks_near(c.tissue.boxes, c.run_low[run] - all(reach), c.run_high[run] + all(reach),
+                      [&](uint32_t b) { c.near_block.push_back(b); });
+      if (c.near_block.empty()) continue;
+      for_run(c, strand, k, run, [&](size_t node) {
+        const uint32_t slot = strand.order[node];
+        if (!collides(v, c, slot)) return;
+        const Vec3 p = xyz(x[slot]);
+        float closest = reach * reach;
+        uint32_t near = tissue.particles;
+        if (guess < tissue.particles && length2(xyz(x[guess]) - p) < closest)
+          closest = length2(xyz(x[guess]) - p), near = guess;
+        for (uint32_t b : c.near_block) {
+          if (distance_to_block2(c.tissue.boxes, b, p) > closest) continue;
+          const uint32_t end = std::min(tissue.particles, (b + 1) * kBlock);
+          for (uint32_t i = b * kBlock; i < end; ++i) {
+            const float d = length2(xyz(x[i]) - p);
+            if (d < closest) closest = d, near = i;
+          }
+        }
+        guess = near;
+        if (near == tissue.particles) return;
+        float best = 1e30f;
+        uint32_t found = 0;
+        for (uint32_t f = tissue.ring_first[near]; f < tissue.ring_first[near + 1]; ++f) {
+          const Triangle& t = tissue.surface[tissue.ring[f]];
+          const float d = length2(closest_on_triangle(p, xyz(x[t[0]]), xyz(x[t[1]]), xyz(x[t[2]])).point - p);
+          if (d < best) best = d, found = tissue.ring[f];
+        }
+        if (best < margin * margin) c.thread_tissue.push_back({k, slot, found});
+      });
+    }
+  }
+}
+
+// Segments of strands a and b (a <= b), which may be the same.
+void find_thread_on_thread(const CollideView& v, uint32_t a, uint32_t b, Candidates& c) {
+  const Strand &sa = v.strand[a], &sb = v.strand[b];
+  const StrandModel &ma = v.strand_model[a], &mb = v.strand_model[b];
+  const float grow = ma.radius + mb.radius + 0.002f;
+  // Two segments cannot be nearer than their middles less half of both; a segment may be stretched to twice its spacing.
+  const float far = grow + (ma.spacing + mb.spacing);
+  const Vec3* const middle_a = c.middle.data() + (ma.first_slot - first_slot(v));
+  const Vec3* const middle_b = c.middle.data() + (mb.first_slot - first_slot(v));
+  for (uint32_t ra = c.run_first[a]; ra < c.run_first[a + 1]; ++ra)
+    for (uint32_t rb = a == b ? ra : c.run_first[b]; rb < c.run_first[b + 1]; ++rb) {
+      if (!boxes_meet(c.run_low[ra] - all(grow), c.run_high[ra] + all(grow), c.run_low[rb], c.run_high[rb])) continue;
+      for_run(c, sa, a, ra, [&](size_t i) {
+        const size_t from = (rb - c.run_first[b]) * Candidates::kRun;
+        for (size_t j = a == b ? std::max(from, i + 4) : from; j < std::min(segments_of(sb), from + Candidates::kRun); ++j) {
+          if (length2(middle_a[i] - middle_b[j]) > 4 * far * far) continue;
+          if (!segment_collides(v, c, sa, i) || !segment_collides(v, c, sb, j)) continue;
+          const Vec3 i0 = xyz(v.x[sa.order[i]]), i1 = xyz(v.x[sa.order[i + 1]]);
+          const Vec3 j0 = xyz(v.x[sb.order[j]]), j1 = xyz(v.x[sb.order[j + 1]]);
+          const auto [s, t] = closest_on_segments(i0, i1, j0, j1);
+          if (length2(lerp(i0, i1, s) - lerp(j0, j1, t)) < grow * grow)
+            c.thread_pair.push_back({a, sa.order[i], b, sb.order[j]});
+        }
+      });
+    }
+}
+
+}  // namespace
+
+void find_tool_and_thread_candidates(const CollideView& v, float margin, Candidates& c) {
   c.tool.clear();
   c.thread_tool.clear();
   c.thread_tissue.clear();
   c.thread_pair.clear();
-  const size_t segments = thread.order.size() < 2 ? 0 : thread.order.size() - 1;
-  auto collides = [&](uint32_t slot) { return thread_collides[slot - thread_model.first_slot] != 0; };
-
-  // Runs of eight segments in boxes: most of a thread is far from everything.
-  constexpr size_t kRun = 8, kMostRuns = 1024;
-  const size_t runs = std::min(kMostRuns, (segments + kRun - 1) / kRun);
-  std::array<Vec3, kMostRuns> lo, hi;
-  for (size_t r = 0; r < runs; ++r) {
-    lo[r] = hi[r] = xyz(x[thread.order[r * kRun]]);
-    for (size_t i = r * kRun; i <= std::min(segments, (r + 1) * kRun); ++i)
-      lo[r] = least(lo[r], xyz(x[thread.order[i]])), hi[r] = most(hi[r], xyz(x[thread.order[i]]));
-  }
-
-  for (uint32_t b = 0; b < body.size(); ++b) {
-    if (!body_collides[b]) continue;
-    for (uint32_t k = 0; k < model[b].capsule.size(); ++k) {
-      const Capsule& capsule = model[b].capsule[k];
-      const Vec3 p = transform(body[b].pose(), capsule.a), q = transform(body[b].pose(), capsule.b);
-      const float reach = capsule.radius + tissue.tool_radius + margin;
-      const Vec3 from = least(p, q) - all(reach), to = most(p, q) + all(reach);
-      for_blocks_near(c.tissue.boxes, from, to, [&](uint32_t blk) {
-        const uint32_t end = std::min(tissue.particles, (blk + 1) * kBlock);
-        for (uint32_t i = blk * kBlock; i < end; ++i) {
-          const Vec3 at = xyz(x[i]), d = q - p;
-          const float t = std::clamp(dot(at - p, d) / std::max(length2(d), 1e-16f), 0.0f, 1.0f);
-          if (length2(at - (p + d * t)) < reach * reach) c.tool.push_back({b, k, i});
-        }
-      });
-      const float thread_reach = capsule.radius + thread_model.radius + margin;
-      for (size_t r = 0; r < runs; ++r) {
-        if (!boxes_meet(lo[r], hi[r], from, to)) continue;
-        for (size_t i = r * kRun; i < std::min(segments, (r + 1) * kRun); ++i) {
-          const uint32_t s0 = thread.order[i], s1 = thread.order[i + 1];
-          if (thread.cut[i] || !collides(s0) || !collides(s1)) continue;
-          const Vec3 a0 = xyz(x[s0]), a1 = xyz(x[s1]);
-          if (!boxes_meet(least(a0, a1), most(a0, a1), from, to)) continue;
-          const auto [s, t] = closest_on_segments(a0, a1, p, q);
-          if (length2(lerp(a0, a1, s) - lerp(p, q, t)) < thread_reach * thread_reach) c.thread_tool.push_back({b, k, s0});
-        }
-      }
+  box_runs(v, c);
+  for (uint32_t b = 0; b < v.body.size(); ++b) {
+    if (!v.body_collides[b]) continue;
+    for (uint32_t k = 0; k < v.model[b].capsule.size(); ++k) {
+      const Capsule& capsule = v.model[b].capsule[k];
+      const Vec3 p = transform(v.body[b].pose(), capsule.a), q = transform(v.body[b].pose(), capsule.b);
+      const float reach = capsule.radius + v.tissue.tool_radius + margin;
+      find_tissue_near(v, b, k, p, q, reach, c);
+      find_thread_near(v, b, k, p, q, least(p, q) - all(reach), most(p, q) + all(reach), margin, c);
     }
   }
-
-  // Thread on tissue: one triangle each, the nearest of those around the nearest particle; the substeps use its plane.
-  const float reach = 0.004f + margin;
-  uint32_t guess = tissue.particles;  // the nearest of the node before: with it most boxes are too far at once
-  for (size_t r = 0; r < runs; ++r) {
-    c.near_block.clear();
-    for_blocks_near(c.tissue.boxes, lo[r] - all(reach), hi[r] + all(reach), [&](uint32_t b) { c.near_block.push_back(b); });
-    if (c.near_block.empty()) continue;
-    for (size_t k = r * kRun; k < std::min(segments, (r + 1) * kRun); ++k) {
-      const uint32_t slot = thread.order[k];
-      if (!collides(slot)) continue;
-      const Vec3 p = xyz(x[slot]);
-      float closest = reach * reach;
-      uint32_t near = tissue.particles;
-      if (guess < tissue.particles && length2(xyz(x[guess]) - p) < closest) closest = length2(xyz(x[guess]) - p), near = guess;
-      for (uint32_t b : c.near_block) {
-        if (distance_to_block2(c.tissue.boxes, b, p) > closest) continue;
-        const uint32_t end = std::min(tissue.particles, (b + 1) * kBlock);
-        for (uint32_t i = b * kBlock; i < end; ++i) {
-          const float d = length2(xyz(x[i]) - p);
-          if (d < closest) closest = d, near = i;
-        }
-      }
-      guess = near;
-      if (near == tissue.particles) continue;
-      float best = 1e30f;
-      uint32_t found = 0;
-      for (uint32_t f = tissue.ring_first[near]; f < tissue.ring_first[near + 1]; ++f) {
-        const Triangle& t = tissue.surface[tissue.ring[f]];
-        const float d = length2(closest_on_triangle(p, xyz(x[t[0]]), xyz(x[t[1]]), xyz(x[t[2]])).point - p);
-        if (d < best) best = d, found = tissue.ring[f];
-      }
-      if (best < margin * margin) c.thread_tissue.push_back({slot, found});
-    }
+  find_thread_on_tissue(v, margin, c);
+  c.middle.resize(c.collides.size());
+  for (size_t k = 0; k < v.strand.size(); ++k) {
+    const std::vector<uint32_t>& order = v.strand[k].order;
+    Vec3* const middle = c.middle.data() + (v.strand_model[k].first_slot - first_slot(v));
+    for (size_t i = 0; i + 1 < order.size(); ++i) middle[i] = xyz(v.x[order[i]]) + xyz(v.x[order[i + 1]]);  // twice
   }
-
-  const float grow = 2 * thread_model.radius + 0.002f;
-  // Two segments cannot be nearer than their middles less half of both; a segment may be stretched to twice its spacing.
-  const float far = grow + 2 * thread_model.spacing;
-  c.middle.resize(segments);
-  for (size_t i = 0; i < segments; ++i) c.middle[i] = xyz(x[thread.order[i]]) + xyz(x[thread.order[i + 1]]);  // twice
-  for (size_t ra = 0; ra < runs; ++ra)
-    for (size_t rb = ra; rb < runs; ++rb) {
-      if (!boxes_meet(lo[ra] - all(grow), hi[ra] + all(grow), lo[rb], hi[rb])) continue;
-      for (size_t i = ra * kRun; i < std::min(segments, (ra + 1) * kRun); ++i)
-        for (size_t j = std::max(rb * kRun, i + 4); j < std::min(segments, (rb + 1) * kRun); ++j) {
-          if (length2(c.middle[i] - c.middle[j]) > 4 * far * far) continue;
-          const uint32_t i0 = thread.order[i], i1 = thread.order[i + 1], j0 = thread.order[j], j1 = thread.order[j + 1];
-          if (thread.cut[i] || thread.cut[j] || !collides(i0) || !collides(i1) || !collides(j0) || !collides(j1)) continue;
-          const auto [s, t] = closest_on_segments(xyz(x[i0]), xyz(x[i1]), xyz(x[j0]), xyz(x[j1]));
-          if (length2(lerp(xyz(x[i0]), xyz(x[i1]), s) - lerp(xyz(x[j0]), xyz(x[j1]), t)) < grow * grow)
-            c.thread_pair.push_back({i0, j0});
-        }
-    }
+  for (uint32_t a = 0; a < v.strand.size(); ++a)
+    for (uint32_t b = a; b < v.strand.size(); ++b) find_thread_on_thread(v, a, b, c);
 }
 
 void find_tool_pairs(const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,

@@ -17,14 +17,14 @@ struct ToolCandidate {
   uint32_t body, capsule, particle;
 };  // tissue particle near a capsule
 struct ThreadToolCandidate {
-  uint32_t body, capsule, slot;
+  uint32_t body, capsule, strand, slot;
 };  // the segment after `slot` (toward the needle) near a capsule
 struct ThreadTissueCandidate {
-  uint32_t slot, triangle;
+  uint32_t strand, slot, triangle;
 };  // thread particle near the tissue's surface
 struct ThreadPairCandidate {
-  uint32_t a, b;
-};  // segments after slots a and b
+  uint32_t strand_a, a, strand_b, b;
+};  // segments after slots a and b, of one strand or of two
 
 // Capsules of two tools that may meet. They can touch where their axes cross and at each of their four ends; side by side they
 // lie on two places, the ends of their overlap, and do not tilt about one.
@@ -47,17 +47,28 @@ struct Candidates {
   std::vector<ThreadTissueCandidate> thread_tissue;
   std::vector<ThreadPairCandidate> thread_pair;
   std::vector<ToolPair> tool_pair;
-  std::vector<uint32_t> near_block;  // working memory
-  std::vector<Vec3> middle;
+  // Working memory. Strands are cut into runs of kRun segments with a box each: most of a thread is far from everything.
+  static constexpr size_t kRun = 8;
+  std::vector<uint8_t> collides;        // per thread slot (relative to the first strand's first)
+  std::vector<Vec3> run_low, run_high;  // [m] per run, strand after strand
+  std::vector<uint32_t> run_first;      // per strand: its first run; one more at the end
+  std::vector<uint32_t> near_block;
+  std::vector<Vec3> middle;  // [m] per thread slot: twice the middle of the segment after it
 };
 
+// What the search reads.
+struct CollideView {
+  const TissueCollision& tissue;
+  const Vec4* x;
+  std::span<const StrandModel> strand_model;
+  std::span<const Strand> strand;
+  const std::vector<RigidModel>& model;
+  const std::vector<RigidBody>& body;
+  std::span<const uint8_t> body_collides;
+};
 // Everything that involves tools or thread, with a margin [m] for what may happen within the tick. c.tissue.boxes must be up
 // to date.
-// thread_collides: per thread slot (relative to first_slot), 0 where collisions are off (paper 2.3).
-void find_tool_and_thread_candidates(const TissueCollision& tissue, const Vec4* x, const ThreadModel& thread_model,
-                                     const Thread& thread, std::span<const uint8_t> thread_collides,
-                                     const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,
-                                     std::span<const uint8_t> body_collides, float margin, Candidates& c);
+void find_tool_and_thread_candidates(const CollideView& v, float margin, Candidates& c);
 // Once a tick: capsules of different tools that may meet within it. Tools are the bodies whose weight a hand carries; the
 // needle is none, jaws close on it.
 void find_tool_pairs(const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,

@@ -28,17 +28,20 @@ struct Segment {
   uint32_t s0, s1;
   float w0, w1;
 };
-bool segment_after(const ContactView& v, uint32_t slot, Segment& out) {
-  const uint32_t first = v.thread_model->first_slot;
-  const int32_t node = v.node_of_slot[slot - first];
-  if (node < 0 || static_cast<size_t>(node) + 1 >= v.thread->order.size()) return false;
-  if (v.thread->cut[static_cast<size_t>(node)]) return false;  // cut through since the candidates were found: no segment
+bool segment_after(const ContactView& v, uint32_t strand, uint32_t slot, Segment& out) {
+  const Strand& thread = v.strand[strand];
+  const float inv_mass = v.strand_model[strand].inv_mass;
+  const int32_t node = v.node_of_slot[slot - v.first_slot];
+  if (node < 0 || static_cast<size_t>(node) + 1 >= thread.order.size()) return false;
+  if (thread.cut[static_cast<size_t>(node)]) return false;  // cut through since the candidates were found: no segment
   out.s0 = slot;
-  out.s1 = v.thread->order[static_cast<size_t>(node) + 1];
-  out.w0 = v.locked[out.s0 - first] ? 0 : v.thread_model->inv_mass;
-  out.w1 = v.locked[out.s1 - first] ? 0 : v.thread_model->inv_mass;
+  out.s1 = thread.order[static_cast<size_t>(node) + 1];
+  out.w0 = v.locked[out.s0 - v.first_slot] ? 0 : inv_mass;
+  out.w1 = v.locked[out.s1 - v.first_slot] ? 0 : inv_mass;
   return true;
 }
+// [m] up to which a segment lies on the drape. With a direct solve, thread above it meets tools inside that.
+float drape_height(const StrandModel& m, float ground) { return m.direct ? ground + 3 * m.radius : 1e9f; }
 
 }  // namespace
 
@@ -73,7 +76,7 @@ uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tiss
     const RigidModel& m = (*v.model)[c.body];
     const Capsule& capsule = m.capsule[c.capsule];
     const Vec3 p = transform(b.pose(), capsule.a), q = transform(b.pose(), capsule.b), axis = q - p, at = xyz(v.x[c.particle]);
-    const float t = std::clamp(dot(at - p, axis) / std::max(length2(axis), 1e-16f), 0.0f, 1.0f);
+    const float t = closest_on_segment(at, p, q);
     const Vec3 on = p + axis * t, d = at - on;
     const float reach = capsule.radius + tissue.tool_radius, l2 = length2(d);
     if (l2 >= reach * reach || l2 < 1e-16f) continue;
@@ -173,8 +176,8 @@ uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list,
       std::tie(a0, a1) = ends(a, ca), std::tie(b0, b1) = ends(b, cb);
       const bool of_a = end < 2;
       const float here = end % 2 == 0 ? 0.0f : 1.0f;
-      const Vec3 point = of_a ? lerp(a0, a1, here) : lerp(b0, b1, here), from = of_a ? b0 : a0, axis = of_a ? b1 - b0 : a1 - a0;
-      const float there = std::clamp(dot(point - from, axis) / std::max(length2(axis), 1e-16f), 0.0f, 1.0f);
+      const Vec3 point = of_a ? lerp(a0, a1, here) : lerp(b0, b1, here);
+      const float there = of_a ? closest_on_segment(point, b0, b1) : closest_on_segment(point, a0, a1);
       places += hold_apart(v, pair, of_a ? here : there, of_a ? there : here, friction, most_press, pair.done[1 + end]);
     }
     touching += places > 0;
@@ -183,20 +186,20 @@ uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list,
 }
 
 uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float friction,
-                               float height) {
+                               float ground) {
   uint32_t touching = 0;
   for (const ThreadToolCandidate& c : list) {
     Segment s;
-    if (!segment_after(v, c.slot, s) || s.w0 + s.w1 == 0) continue;
+    if (!segment_after(v, c.strand, c.slot, s) || s.w0 + s.w1 == 0) continue;
     RigidBody& b = (*v.body)[c.body];
     const RigidModel& m = (*v.model)[c.body];
     const Capsule& capsule = m.capsule[c.capsule];
     const Vec3 p = transform(b.pose(), capsule.a), q = transform(b.pose(), capsule.b);
     const Vec3 x0 = xyz(v.x[s.s0]), x1 = xyz(v.x[s.s1]);
-    if (std::min(x0.y, x1.y) > height) continue;
+    if (std::min(x0.y, x1.y) > drape_height(v.strand_model[c.strand], ground)) continue;
     const auto [ts, tt] = closest_on_segments(x0, x1, p, q);
     const Vec3 on = lerp(p, q, tt), d = lerp(x0, x1, ts) - on;
-    const float reach = capsule.radius + v.thread_model->radius, l2 = length2(d);
+    const float reach = capsule.radius + v.strand_model[c.strand].radius, l2 = length2(d);
     if (l2 >= reach * reach || l2 < 1e-16f) continue;
     const float a0 = 1 - ts, a1 = ts, wt = s.w0 * a0 * a0 + s.w1 * a1 * a1;
     const float l = std::sqrt(l2), depth = std::min(reach - l, kLargestCorrection);
@@ -215,39 +218,39 @@ uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToo
   return touching;
 }
 
-void find_thread_touch(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float height,
-                       std::vector<ThreadTouch>& touch) {
-  touch.clear();
+void find_thread_touch(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float ground,
+                       std::vector<ThreadScratch>& scratch) {
   for (const ThreadToolCandidate& c : list) {
     Segment s;
-    if (!segment_after(v, c.slot, s) || s.w0 + s.w1 == 0) continue;
+    const StrandModel& model = v.strand_model[c.strand];
+    if (!model.direct || !segment_after(v, c.strand, c.slot, s) || s.w0 + s.w1 == 0) continue;
     const Vec3 x0 = xyz(v.x[s.s0]), x1 = xyz(v.x[s.s1]);
-    if (std::min(x0.y, x1.y) <= height) continue;
+    if (std::min(x0.y, x1.y) <= drape_height(model, ground)) continue;
     const Capsule& capsule = (*v.model)[c.body].capsule[c.capsule];
     const Pose pose = (*v.body)[c.body].pose();
     const Vec3 p = transform(pose, capsule.a), q = transform(pose, capsule.b);
     const auto [ts, tt] = closest_on_segments(x0, x1, p, q);
-    const float reach = capsule.radius + v.thread_model->radius + kNear;
+    const float reach = capsule.radius + model.radius + kNear;
     if (length2(lerp(x0, x1, ts) - lerp(p, q, tt)) > reach * reach) continue;
-    touch.push_back({static_cast<uint32_t>(v.node_of_slot[c.slot - v.thread_model->first_slot]), c.body, c.capsule});
+    scratch[c.strand].touch.push_back({static_cast<uint32_t>(v.node_of_slot[c.slot - v.first_slot]), c.body, c.capsule});
   }
 }
 
 uint32_t solve_thread_on_tissue(const ContactView& v, const TissueCollision& tissue,
                                 const std::vector<ThreadTissueCandidate>& list, float friction) {
   uint32_t touching = 0;
-  const uint32_t first = v.thread_model->first_slot;
   for (const ThreadTissueCandidate& c : list) {
-    if (v.locked[c.slot - first]) continue;
+    if (v.locked[c.slot - v.first_slot]) continue;
+    const StrandModel& model = v.strand_model[c.strand];
     const Triangle& t = tissue.surface[c.triangle];
     const Vec3 a = xyz(v.x[t[0]]), b = xyz(v.x[t[1]]), e = xyz(v.x[t[2]]), p = xyz(v.x[c.slot]);
     const Vec3 n = normalized(cross(b - a, e - a));
     // Beside the triangle's plane by more than the wall is thick: the thread is on another side, leave it.
-    const float gap = dot(p - a, n) - v.thread_model->radius;
+    const float gap = dot(p - a, n) - model.radius;
     if (gap >= 0 || gap < -0.002f) continue;
     const ClosestOnTriangle near = closest_on_triangle(p, a, b, e);
-    if (length2(p - n * (gap + v.thread_model->radius) - near.point) > 1e-6f) continue;  // slid off the triangle by over 1 mm
-    const float wt = v.thread_model->inv_mass;
+    if (length2(p - n * (gap + model.radius) - near.point) > 1e-6f) continue;  // slid off the triangle by over 1 mm
+    const float wt = model.inv_mass;
     float w = wt;
     for (int k = 0; k < 3; ++k)
       w += near.weight[static_cast<size_t>(k)] * near.weight[static_cast<size_t>(k)] * v.inv_mass[t[static_cast<size_t>(k)]];
@@ -266,11 +269,11 @@ uint32_t solve_thread_on_thread(const ContactView& v, const std::vector<ThreadPa
   uint32_t touching = 0;
   for (const ThreadPairCandidate& c : list) {
     Segment a, b;
-    if (!segment_after(v, c.a, a) || !segment_after(v, c.b, b)) continue;
+    if (!segment_after(v, c.strand_a, c.a, a) || !segment_after(v, c.strand_b, c.b, b)) continue;
     const Vec3 a0 = xyz(v.x[a.s0]), a1 = xyz(v.x[a.s1]), b0 = xyz(v.x[b.s0]), b1 = xyz(v.x[b.s1]);
     const auto [s, t] = closest_on_segments(a0, a1, b0, b1);
     const Vec3 d = lerp(b0, b1, t) - lerp(a0, a1, s);
-    const float reach = 2 * v.thread_model->radius, l2 = length2(d);
+    const float reach = v.strand_model[c.strand_a].radius + v.strand_model[c.strand_b].radius, l2 = length2(d);
     if (l2 >= reach * reach || l2 < 1e-16f) continue;
     const float w = a.w0 * (1 - s) * (1 - s) + a.w1 * s * s + b.w0 * (1 - t) * (1 - t) + b.w1 * t * t;
     if (w <= 0) continue;
@@ -290,15 +293,14 @@ uint32_t solve_thread_on_thread(const ContactView& v, const std::vector<ThreadPa
 uint32_t solve_ground(const ContactView& v, float ground, float friction) {
   uint32_t touching = 0;
   const Vec3 n{0, 1, 0};
-  const uint32_t first = v.thread_model->first_slot;
-  for (uint32_t i = 0; i < v.thread_model->count; ++i) {
-    const uint32_t slot = first + i;
-    const float depth = ground + v.thread_model->radius - v.x[slot].y;
-    if (depth <= 0 || v.locked[i]) continue;
-    ++touching;
-    add(v.x[slot], n * depth - friction_step(moved(v, slot), n, depth, friction));
-  }
-  // Bodies that have weight of their own: the needle. Its ends and middle are enough for an arc of capsules.
+  for (const StrandModel& model : v.strand_model)
+    for (uint32_t slot = model.first_slot; slot < model.first_slot + model.count; ++slot) {
+      const float depth = ground + model.radius - v.x[slot].y;
+      if (depth <= 0 || v.locked[slot - v.first_slot]) continue;
+      ++touching;
+      add(v.x[slot], n * depth - friction_step(moved(v, slot), n, depth, friction));
+    }
+  // Bodies that have weight of their own: needles. Their ends and middle are enough for an arc of capsules.
   for (size_t k = 0; k < v.body->size(); ++k) {
     RigidBody& b = (*v.body)[k];
     const RigidModel& m = (*v.model)[k];

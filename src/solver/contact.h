@@ -4,6 +4,7 @@
 // normal correction.
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "solver/collide.h"
@@ -29,10 +30,11 @@ struct ContactView {  // what a contact kernel needs, gathered once per substep
   const std::vector<RigidModel>* model;
   std::vector<RigidBody>* body;
   std::vector<BodyContact>* on_body;
-  const int32_t* node_of_slot;  // relative to first_slot; -1: not in the thread
-  const Thread* thread;
-  const ThreadModel* thread_model;
-  const uint8_t* locked;  // per thread slot (relative): position is somebody else's (anchor or hold)
+  uint32_t first_slot;  // of the first strand
+  std::span<const Strand> strand;
+  std::span<const StrandModel> strand_model;
+  const int32_t* node_of_slot;  // per thread slot (relative to first_slot); -1: not in its strand
+  const uint8_t* locked;        // likewise: an anchor or a hold sets its position
 };
 
 // One sweep each; returns the number of touching candidates.
@@ -46,17 +48,17 @@ uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tiss
 // turn with the welds of the hands come to the balance of both. most_press [kg m]: a pair presses no harder and rather slips
 // past each other; nothing stops a hand that feels nothing, and tools locked behind each other would tear what they hold.
 uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list, float friction, float most_press);
-// Only segments below `height` [m], if the thread's own solve sees to the others.
+// Only segments that lie on the drape at height `ground` [m], if the strand's own solve handles the others.
 uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float friction,
-                               float height);
-// Which are those: segments near a tool, above `height`. Below it thread lies on the drape. Pressed between that and a tool it
-// has nowhere to go (nothing stops such a tool but the hand), and a solve that insisted would shoot it out sideways.
-void find_thread_touch(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float height,
-                       std::vector<ThreadTouch>& touch);
+                               float ground);
+// Adds those others to ThreadScratch::touch of their strand: segments near a tool, off the drape. Thread pressed between drape
+// and tool has nowhere to go (nothing stops such a tool but the hand), and a solve that insisted would shoot it out sideways.
+void find_thread_touch(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float ground,
+                       std::vector<ThreadScratch>& scratch);
 uint32_t solve_thread_on_tissue(const ContactView& v, const TissueCollision& tissue,
                                 const std::vector<ThreadTissueCandidate>& list, float friction);
 uint32_t solve_thread_on_thread(const ContactView& v, const std::vector<ThreadPairCandidate>& list, float friction);
-// The drape: a horizontal plane at height `ground` [m] for thread and needle.
+// The drape: a horizontal plane at height `ground` [m] for threads and needles.
 uint32_t solve_ground(const ContactView& v, float ground, float friction);
 
 }  // namespace catgut

@@ -10,12 +10,12 @@ namespace catgut {
 enum class IndexOf : uint8_t {
   particle,  // all columns: tissue, then thread
   tissue,    // particles of soft bodies
-  slot,      // particles of the thread; the first is not 0
-  pair,      // neighbors along the thread
+  slot,      // particles of all strands; the first is not 0
   cluster,   // of shape matching, padded as its columns are
   body,      // rigid
   triangle,  // of the tissue's surface
-  anchor,    // of the thread
+  strand,    // a suture's; so is its needle
+  anchor,    // of a strand
   bite,
   plan_row,  // of ClosurePlan::pair
   count_
@@ -42,7 +42,7 @@ constexpr void reflect(auto& a, Like<Attachment> auto& t) {
 }
 
 constexpr void reflect(auto& a, Like<ChannelPoint> auto& c) {
-  a(c.point), a(c.compliance), a(c.drag), a(c.at), a(c.hole), a(c.lambda), a(c.drag_lambda);
+  a(c.point), a(c.compliance), a(c.drag), a(c.at), a.index(c.suture, IndexOf::strand), a(c.hole), a(c.lambda), a(c.drag_lambda);
 }
 
 constexpr void reflect(auto& a, Like<TissuePin> auto& p) {
@@ -58,12 +58,10 @@ constexpr void reflect(auto& a, Like<ThreadHold> auto& h) {
   a.index(h.slot, IndexOf::slot), a.index(h.body, IndexOf::body), a(h.local), a.at_most(h.kind, HoldKind::loop);
 }
 
-constexpr void reflect(auto& a, Like<Thread> auto& t) {
-  a.permutation(t.order, IndexOf::slot);
-  a.column(t.rest, IndexOf::pair), a.column(t.cut, IndexOf::pair);
-  a(t.anchor), a(t.hold);
+// That a strand has its own slots, each once, is seen to by load_state.
+constexpr void reflect(auto& a, Like<Strand> auto& t) {
+  a(t.order), a(t.rest), a(t.cut), a(t.anchor), a(t.hold), a(t.tension);
   a.domain(IndexOf::anchor, t.anchor.size());
-  a.column(t.tension, IndexOf::pair);
 }
 
 constexpr void reflect(auto& a, Like<ClusterRotations> auto& r) {
@@ -75,9 +73,9 @@ constexpr void reflect(auto& a, Like<SolverState> auto& s) {
   a.column(s.pair_origin, IndexOf::tissue);
   a(s.rotation);
   a.column(s.body, IndexOf::body);
-  a(s.thread);
+  a.column(s.strand, IndexOf::strand);
   a(s.weld), a(s.attach), a(s.pin), a(s.channel);
-  a.column(s.thread_collides, IndexOf::slot), a.column(s.body_collides, IndexOf::body);
+  a.column(s.body_collides, IndexOf::body);
 }
 
 }  // namespace catgut

@@ -22,7 +22,7 @@ void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   std::fill(scratch.shape.moved.begin(), scratch.shape.moved.end(), Vec4{});
   std::fill(scratch.on_body.begin(), scratch.on_body.end(), BodyContact{});
   for (ToolPair& p : scratch.candidates.tool_pair) p.done = {};
-  std::fill(scratch.thread.lambda.begin(), scratch.thread.lambda.end(), 0.0f);
+  for (ThreadScratch& t : scratch.thread) std::fill(t.lambda.begin(), t.lambda.end(), 0.0f);
 }
 
 // Room for what a tick may find, so that no tick asks for memory. Bounds where there are any (a capsule cannot be near more
@@ -30,7 +30,7 @@ void clear_multipliers(SolverState& state, SolverScratch& scratch) {
 // that nobody writes to are never made.
 void reserve_room(const SolverModel& m, SolverScratch& k) {
   constexpr size_t kPairsOfOne = 32, kBlocksNear = 256, kPins = 256, kPinsBeside = 32;
-  const size_t tissue = m.collision.particles, thread = m.thread.count;
+  const size_t tissue = m.collision.particles, thread = m.count - m.tissue;
   size_t capsules = 0;
   for (const RigidModel& b : m.body) capsules += b.capsule.size();
   Candidates& c = k.candidates;
@@ -40,6 +40,9 @@ void reserve_room(const SolverModel& m, SolverScratch& k) {
   c.thread_pair.reserve(thread * std::min(thread, 2 * kPairsOfOne));
   c.near_block.reserve(tissue / kBlock + 1);
   c.middle.reserve(thread);
+  c.collides.reserve(thread);
+  for (std::vector<Vec3>* box : {&c.run_low, &c.run_high}) box->reserve(thread / Candidates::kRun + m.strand.size());
+  c.run_first.reserve(m.strand.size() + 1);
   PairSearch& p = c.tissue;
   const size_t blocks = (tissue + kBlock - 1) / kBlock, groups = (blocks + kBlock - 1) / kBlock;
   p.pair.reserve(tissue * kPairsOfOne);
@@ -52,15 +55,18 @@ void reserve_room(const SolverModel& m, SolverScratch& k) {
     part.near.reserve(std::min(blocks, kBlocksNear));
     part.near_box.resize(std::min(blocks, kBlocksNear));
   }
-  ThreadScratch& t = k.thread;
-  t.heavy.reserve(thread);
-  t.slide.reserve(thread);  // anchors, of which a thread has no more than particles
-  t.waiting.reserve(thread);
-  t.anchor_node.reserve(thread);
-  t.touch.reserve(thread * capsules);
-  t.contact.reserve(thread);
-  t.on_tool.reserve(m.body.size());
-  t.load.reserve(m.body.size());
+  for (size_t s = 0; s < m.strand.size(); ++s) {
+    ThreadScratch& t = k.thread[s];
+    const size_t nodes = m.strand[s].count;
+    t.heavy.reserve(nodes);
+    t.slide.reserve(nodes);  // anchors, of which a thread has no more than particles
+    t.waiting.reserve(nodes);
+    t.anchor_node.reserve(nodes);
+    t.touch.reserve(nodes * capsules);
+    t.contact.reserve(nodes);
+    t.on_tool.reserve(m.body.size());
+    t.load.reserve(m.body.size());
+  }
   PinWeb& w = k.web;
   w.row.reserve(kPins + 1);
   w.point.reserve(2 * kPins);
@@ -117,12 +123,9 @@ SolverState make_solver_state(const SolverModel& model, std::span<const Vec3> po
   s.pair_origin.assign(s.x.begin(), s.x.begin() + model.tissue);
   s.rotation.reset(model.shape.clusters);
   s.body.resize(model.body.size());
-  s.thread_collides.assign(model.thread.count, 1);
   s.body_collides.assign(model.body.size(), 1);
-  for (uint32_t i = 0; i < model.thread.count; ++i) s.thread.order.push_back(model.thread.first_slot + i);
-  s.thread.rest.assign(model.thread.count > 0 ? model.thread.count - 1 : 0, model.thread.spacing);
-  s.thread.tension.assign(s.thread.rest.size(), 0.0f);
-  s.thread.cut.assign(s.thread.rest.size(), 0);
+  s.strand.resize(model.strand.size());
+  for (size_t k = 0; k < s.strand.size(); ++k) reset(model.strand[k], s.strand[k]);
   return s;
 }
 
@@ -130,13 +133,14 @@ void prepare_scratch(const SolverModel& model, SolverScratch& k) {
   k.prev.assign(model.count, Vec4{});
   k.shape.resize(model.shape);
   k.volume_lambda.assign(model.volume.tet.size(), 0.0f);
-  k.thread.resize(model.thread.count);
+  k.thread.resize(model.strand.size());
+  for (size_t s = 0; s < k.thread.size(); ++s) k.thread[s].resize(model.strand[s].count);
   k.candidates = {};
   k.candidates.tissue.moved.assign((model.shape.groups + kGroupBlock - 1) / kGroupBlock, 0.0f);
   k.candidates.tool_pair.reserve(16);  // nothing is allocated when two tools come near each other
   k.on_body.assign(model.body.size(), {});
-  k.node_of_slot.assign(model.thread.count, -1);
-  k.locked.assign(model.thread.count, 0);
+  k.node_of_slot.assign(model.count - model.tissue, -1);
+  k.locked.assign(model.count - model.tissue, 0);
   reserve_room(model, k);
 }
 
@@ -151,8 +155,8 @@ void find_candidates(const SolverModel& m, const SolverState& s, SolverScratch& 
     weave(s.pin, m.inv_mass.data(), m.tissue, k.web);
   }
   StageTimer timer(times, Stage::broadphase);
-  find_tool_and_thread_candidates(m.collision, s.x.data(), m.thread, s.thread, s.thread_collides, m.body, s.body,
-                                  s.body_collides, margin, k.candidates);
+  find_tool_and_thread_candidates({m.collision, s.x.data(), m.strand, s.strand, m.body, s.body, s.body_collides}, margin,
+                                  k.candidates);
   find_tool_pairs(m.body, s.body, s.body_collides, k.candidates.tool_pair);
 }
 
@@ -198,8 +202,8 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     }
     jobs.each(m.shape.groups, kGroupBlock, [&](size_t first, size_t last) { note_moves(m, s, k, first, last); });
   }
-  ContactView view{x,          k.prev.data(),         w,         &m.body,   &s.body,
-                   &k.on_body, k.node_of_slot.data(), &s.thread, &m.thread, k.locked.data()};
+  const ContactView view{
+      x, k.prev.data(), w, &m.body, &s.body, &k.on_body, m.tissue, s.strand, m.strand, k.node_of_slot.data(), k.locked.data()};
   uint32_t touching = 0;
   {
     StageTimer timer(times, Stage::broadphase);
@@ -223,12 +227,17 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   {
     // Few but stiff and pulling against each other (hand, grasp, channel, tool against tool): they get sweeps of their own.
     StageTimer timer(times, Stage::rigid);
-    RigidBody& needle = s.body[kNeedle];
-    for (ChannelPoint& c : s.channel)
-      c.at = m.needle_arc.nearest(rotate(conjugate(needle.prev_q), position_of(c.point, k.prev.data()) - needle.prev_x));
+    for (ChannelPoint& c : s.channel) {
+      const RigidBody& needle = s.body[m.needle_body(c.suture)];
+      const Vec3 at = position_of(c.point, k.prev.data()) - needle.prev_x;
+      c.at = m.needle_arc[c.suture].nearest(rotate(conjugate(needle.prev_q), at));
+    }
     int sweeps = s.channel.empty() ? 1 : m.rigid_sweeps;
     for (int sweep = 0; sweep < sweeps; ++sweep) {
-      for (ChannelPoint& c : s.channel) solve_channel(c, m.needle_arc, x, w, m.body[kNeedle], needle, h);
+      for (ChannelPoint& c : s.channel) {
+        const uint32_t needle = m.needle_body(c.suture);
+        solve_channel(c, m.needle_arc[c.suture], x, w, m.body[needle], s.body[needle], h);
+      }
       for (Weld& weld : s.weld) solve_weld(m.body, s.body, weld, h);
       const uint32_t n = solve_tools_on_tools(view, k.candidates.tool_pair, m.friction.tool, m.tool_force * h * h);
       if (n > 0) sweeps = m.rigid_sweeps;
@@ -239,13 +248,12 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     StageTimer timer(times, Stage::thread_contact);
     std::fill(k.node_of_slot.begin(), k.node_of_slot.end(), -1);
     std::fill(k.locked.begin(), k.locked.end(), uint8_t{0});
-    for (size_t i = 0; i < s.thread.order.size(); ++i)
-      k.node_of_slot[s.thread.order[i] - m.thread.first_slot] = static_cast<int32_t>(i);
-    for (const ThreadAnchor& a : s.thread.anchor) k.locked[a.slot - m.thread.first_slot] = 1;
-    for (const ThreadHold& a : s.thread.hold) k.locked[a.slot - m.thread.first_slot] = 1;
+    for (const Strand& strand : s.strand) {
+      for (size_t i = 0; i < strand.order.size(); ++i) k.node_of_slot[strand.order[i] - m.tissue] = static_cast<int32_t>(i);
+      for (const ThreadAnchor& a : strand.anchor) k.locked[a.slot - m.tissue] = 1;
+      for (const ThreadHold& a : strand.hold) k.locked[a.slot - m.tissue] = 1;
+    }
   }
-  // With a direct solve, thread that is off the drape meets tools inside that.
-  const float height = m.thread.direct ? m.ground + 3 * m.thread.radius : 1e9f;
   for (int sweep = 0; sweep < m.contact_sweeps; ++sweep) {
     uint32_t n = 0;
     {
@@ -254,7 +262,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     }
     {
       StageTimer timer(times, Stage::thread_contact);
-      n += solve_thread_on_tools(view, k.candidates.thread_tool, m.friction.thread, height);
+      n += solve_thread_on_tools(view, k.candidates.thread_tool, m.friction.thread, m.ground);
       n += solve_thread_on_tissue(view, m.collision, k.candidates.thread_tissue, m.friction.thread);
       n += solve_thread_on_thread(view, k.candidates.thread_pair, m.friction.thread);
       n += solve_ground(view, m.ground, m.friction.tissue);
@@ -264,17 +272,19 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   }
   {
     StageTimer timer(times, Stage::thread_contact);
-    k.thread.touch.clear();
-    if (m.thread.direct) find_thread_touch(view, k.candidates.thread_tool, height, k.thread.touch);
-    k.thread.touch_friction = m.friction.thread;
+    for (ThreadScratch& t : k.thread) t.touch.clear(), t.touch_friction = m.friction.thread;
+    find_thread_touch(view, k.candidates.thread_tool, m.ground, k.thread);
   }
   {
     StageTimer timer(times, Stage::thread);
-    solve_thread(m.thread, s.thread, k.thread, x, k.prev.data(), w, m.body, s.body, h);
-    for (const NodeContact& c : k.thread.contact) touching += c.active;
-    for (size_t b = 0; b < k.thread.on_tool.size(); ++b) {
-      k.on_body[b].linear += k.thread.on_tool[b].linear;
-      k.on_body[b].angular += k.thread.on_tool[b].angular;
+    for (size_t i = 0; i < s.strand.size(); ++i) {
+      ThreadScratch& t = k.thread[i];
+      solve_thread(m.strand[i], s.strand[i], t, x, k.prev.data(), w, m.body, s.body, h);
+      for (const NodeContact& c : t.contact) touching += c.active;
+      for (size_t b = 0; b < t.on_tool.size(); ++b) {
+        k.on_body[b].linear += t.on_tool[b].linear;
+        k.on_body[b].angular += t.on_tool[b].angular;
+      }
     }
   }
   {

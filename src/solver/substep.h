@@ -24,9 +24,9 @@ struct SolverModel {
   ShapeModel shape;
   VolumeModel volume;
   TissueCollision collision;
-  ThreadModel thread;
-  std::vector<RigidModel> body;  // 0, 1: tools; 2: needle
-  NeedleArc needle_arc;
+  std::vector<StrandModel> strand;    // one per suture; their slots follow those of the tissue, strand after strand
+  std::vector<NeedleArc> needle_arc;  // one per suture
+  std::vector<RigidModel> body;       // instruments, then the needle of every suture
   float h = 1.0f / 480;               // [s] substep
   Vec3 gravity{0, -9.81f, 0};         // [m/s^2] on thread and needle
   Vec3 tissue_gravity{0, -9.81f, 0};  // [m/s^2] on tissue: divided by the mass scaling, so that its weight is true
@@ -41,6 +41,13 @@ struct SolverModel {
   Friction friction;
   float tool_force = 8;  // [N] that two tools press each other with at most
   float ground = -1e9f;  // [m] height of the drape
+  // The body of a suture's needle, and the suture of a thread slot.
+  uint32_t needle_body(size_t suture) const { return static_cast<uint32_t>(body.size() - strand.size() + suture); }
+  uint32_t strand_of(uint32_t slot) const {
+    uint32_t k = 0;
+    while (!strand[k].has(slot)) ++k;
+    return k;
+  }
 };
 
 constexpr uint32_t kNeedle = 2;
@@ -49,14 +56,13 @@ struct SolverState {
   Column<Vec4> x, v;          // position [m], velocity [m/s]
   ClusterRotations rotation;  // warm start of the polar decompositions
   std::vector<RigidBody> body;
-  Thread thread;
-  std::vector<Weld> weld;                // tool to hand, needle to tool
-  std::vector<Attachment> attach;        // tissue to needle tip, to a jaw, to its closing target
-  std::vector<TissuePin> pin;            // tissue to tissue: seams, settled stitches
-  std::vector<ChannelPoint> channel;     // needle in its channel
-  std::vector<uint8_t> thread_collides;  // per thread slot (relative)
-  std::vector<uint8_t> body_collides;    // per body
-  Column<Vec4> pair_origin;              // [m] per tissue particle: where its contact pairs were last searched
+  std::vector<Strand> strand;          // one per suture
+  std::vector<Weld> weld;              // tool to hand, needle to tool
+  std::vector<Attachment> attach;      // tissue to needle tip, to a jaw, to its closing target
+  std::vector<TissuePin> pin;          // tissue to tissue: seams, settled stitches
+  std::vector<ChannelPoint> channel;   // needles in their channels
+  std::vector<uint8_t> body_collides;  // per body
+  Column<Vec4> pair_origin;            // [m] per tissue particle: where its contact pairs were last searched
 };
 
 // Working memory and caches: never saved, never hashed. Whatever a stage reads of it was made in the same tick, or is a
@@ -65,14 +71,14 @@ struct SolverScratch {
   Column<Vec4> prev;
   ShapeScratch shape;
   std::vector<float> volume_lambda;
-  ThreadScratch thread;
+  std::vector<ThreadScratch> thread;  // one per strand
   PinWeb web;
   std::vector<PinSpan> pin_span;
   Candidates candidates;
-  std::vector<BodyContact> on_body;  // contact impulses on bodies in the last substep
-  std::vector<int32_t> node_of_slot;
-  std::vector<uint8_t> locked;
-  uint32_t contacts = 0;  // touching in the last substep
+  std::vector<BodyContact> on_body;   // contact impulses on bodies in the last substep
+  std::vector<int32_t> node_of_slot;  // per thread slot (relative to the first strand's first)
+  std::vector<uint8_t> locked;        // likewise
+  uint32_t contacts = 0;              // touching in the last substep
 };
 
 SolverState make_solver_state(const SolverModel& model, std::span<const Vec3> position);

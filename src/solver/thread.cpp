@@ -33,13 +33,13 @@ float held_inverse_mass(const ThreadHold& hold, Vec3 n1, Vec3 n2, const std::vec
   const Vec3 r = rotate(b.q, hold.local);
   return m.inv_mass * dot(n1, n2) + dot(cross(r, n1), inverse_inertia(m, b, cross(r, n2)));
 }
-float node_inverse_mass(const ThreadScratch& s, const Thread& t, size_t i, Vec3 n, const std::vector<RigidModel>& model,
+float node_inverse_mass(const ThreadScratch& s, const Strand& t, size_t i, Vec3 n, const std::vector<RigidModel>& model,
                         const std::vector<RigidBody>& body) {
   return s.hold_at[i] < 0 ? s.w[i] : held_inverse_mass(t.hold[static_cast<size_t>(s.hold_at[i])], n, n, model, body);
 }
 
 // What every node of the order is, and where.
-void gather_nodes(const ThreadModel& model, const Thread& thread, ThreadScratch& s, const Vec4* x, const Vec4* before,
+void gather_nodes(const StrandModel& model, const Strand& thread, ThreadScratch& s, const Vec4* x, const Vec4* before,
                   const float* inv_mass, const std::vector<RigidBody>& body) {
   const size_t nodes = thread.order.size(), pairs = nodes - 1;
   for (size_t i = 0; i < nodes; ++i) {
@@ -99,7 +99,7 @@ void gather_nodes(const ThreadModel& model, const Thread& thread, ThreadScratch&
 // given the inertia m + h^2 T (1/l0 + 1/l1) (Tournier et al. 2015, Stable constrained dynamics); side[i] is the ratio of
 // the inverse masses. With the tangent t = n0 + n1 of unit pair directions, t.t = 2 (1 + c) and n0.t = n1.t = 1 + c, c = n0.n1:
 // no root is needed. Returns the largest residual [m].
-float assemble(const Thread& t, ThreadScratch& s, size_t nodes, float alpha_per_metre, float h,
+float assemble(const Strand& t, ThreadScratch& s, size_t nodes, float alpha_per_metre, float h,
                const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body) {
   std::copy(t.rest.begin(), t.rest.end(), s.rest.begin());
   const float worst = find_directions(s, nodes - 1, alpha_per_metre);
@@ -120,7 +120,7 @@ float assemble(const Thread& t, ThreadScratch& s, size_t nodes, float alpha_per_
 // one more unknown each, coupled to the two pairs beside it. A slide that would run backward (friction stops, it never drives)
 // or beyond what the pair on its side still has is fixed at that bound and the system solved again: an active set, which
 // shrinks every round.
-void solve_with_slides(const ThreadModel& model, const Thread& thread, ThreadScratch& s, size_t pairs, float h) {
+void solve_with_slides(const StrandModel& model, const Strand& thread, ThreadScratch& s, size_t pairs, float h) {
   const double ws = kSlideMass * model.inv_mass;
   const float least = 0.02f * model.spacing;
   Strands<double, 1>& m = s.stretch;
@@ -171,7 +171,7 @@ void solve_with_slides(const ThreadModel& model, const Thread& thread, ThreadScr
 // Applies the positional impulse `p` to whatever node i is, and refreshes its position. Tissue under an anchor waits for
 // push_anchors: its sixteen particles are dear, and the node goes just where they will put it, but for what the pushes of
 // other anchors on the same particles do.
-void push_node(ThreadScratch& s, const Thread& t, size_t i, Vec3 p, const std::vector<RigidModel>& model,
+void push_node(ThreadScratch& s, const Strand& t, size_t i, Vec3 p, const std::vector<RigidModel>& model,
                std::vector<RigidBody>& body) {
   if (s.anchor_at[i] >= 0) {
     s.waiting[static_cast<size_t>(s.anchor_at[i])] += p;
@@ -195,7 +195,7 @@ void push_node(ThreadScratch& s, const Thread& t, size_t i, Vec3 p, const std::v
 }
 
 // Gives the tissue what its anchors were pushed by.
-void push_anchors(ThreadScratch& s, const Thread& t, Vec4* x, const float* inv_mass) {
+void push_anchors(ThreadScratch& s, const Strand& t, Vec4* x, const float* inv_mass) {
   for (size_t k = 0; k < t.anchor.size(); ++k) {
     if (length2(s.waiting[k]) > 0) push(t.anchor[k].point, x, inv_mass, s.waiting[k]);
     s.waiting[k] = {};
@@ -214,7 +214,7 @@ void mark_unfit(ThreadScratch& s, size_t i) { s.unfit[i / 64] |= uint64_t{1} << 
 
 // Gauss-Seidel sweeps over the pairs in their order. After the direct solve nine in ten are right already: those are found at
 // once and passed by; a pair that was moved marks its neighbours, which leaves the order of the work as it would be.
-void sweep_distances(const ThreadModel& model, const Thread& thread, ThreadScratch& s, size_t pairs, float alpha_per_metre,
+void sweep_distances(const StrandModel& model, const Strand& thread, ThreadScratch& s, size_t pairs, float alpha_per_metre,
                      const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body) {
   std::copy(thread.rest.begin(), thread.rest.end(), s.rest.begin());
   find_unfit_pairs(s, pairs, alpha_per_metre);
@@ -262,22 +262,6 @@ void ThreadScratch::resize(uint32_t count) {
   bend.resize(count);
 }
 
-Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vector<RigidBody>& body) {
-  const uint32_t slot = t.order[node];
-  for (const ThreadAnchor& a : t.anchor)
-    if (a.slot == slot) return position_of(a, x);
-  for (const ThreadHold& hold : t.hold)
-    if (hold.slot == slot) return transform(body[static_cast<size_t>(hold.body)].pose(), hold.local);
-  return xyz(x[slot]);
-}
-
-float thread_length(const Thread& t, const Vec4* x, const std::vector<RigidBody>& body) {
-  float sum = 0;
-  for (size_t i = 0; i + 1 < t.order.size(); ++i)
-    if (!t.cut[i]) sum += distance(thread_position(t, i, x, body), thread_position(t, i + 1, x, body));
-  return sum;
-}
-
 void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float compliance, float h, float& lambda) {
   const Vec3 da = a - b, dc = c - b;
   const float la2 = length2(da), lc2 = length2(dc);
@@ -304,7 +288,7 @@ void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float c
   c += gc * (wc * d);
 }
 
-void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& s, Vec4* x, const Vec4* before,
+void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& s, Vec4* x, const Vec4* before,
                   const float* inv_mass, const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body, float h) {
   const size_t nodes = thread.order.size();
   if (nodes < 2) return;

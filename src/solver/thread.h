@@ -2,10 +2,6 @@
 // on triplets, and a direct tridiagonal solve along the whole thread, because a Gauss-Seidel chain of 175 particles at the
 // paper's three sweeps stretches by 18 %.
 //
-// Particles keep their slot for life; `order` lists slots from the free end to the needle. A slot can be
-//   free      a particle of its own,
-//   anchored  locked to a point of the tissue: a suture point (its position and inverse mass are the tissue's), or
-//   held      locked to a place on a rigid body: the needle's swage, a tool's jaw.
 // At an anchor the thread can slide: rest length moves from the pair on one side to the pair on the other, and slides
 // until the tensions differ by no more than the friction. Sliding is solved inside the tridiagonal system, so the total rest
 // length never changes and nothing jumps.
@@ -15,60 +11,12 @@
 #include <span>
 #include <vector>
 
-#include "solver/attach.h"
 #include "solver/bend.h"
+#include "solver/strand.h"
 #include "solver/thread_columns.h"
 #include "solver/thread_touch.h"
 
 namespace catgut {
-
-struct ThreadModel {
-  uint32_t first_slot = 0;  // of the thread's particles in the columns
-  uint32_t count = 0;
-  float spacing = 0;             // [m] rest distance of neighbours at the start
-  float radius = 0;              // [m]
-  float inv_mass = 0;            // [1/kg] of a free particle
-  float stretch_compliance = 0;  // [m/N] per segment of length `spacing`
-  float bend_compliance = 0;     // [1/J]
-  int bend_sweeps = 1, distance_sweeps = 1;
-  bool direct = true;
-  Vec3 gravity;  // [m/s^2] that the predicted positions contain
-};
-
-// A suture point's hold on the thread.
-struct ThreadAnchor {
-  uint32_t slot = 0;
-  TissuePoint point;
-  Vec3 offset;                  // [m] world, from that point: a knot on its way to the tissue, else zero
-  bool knotted = false;         // a locked knot's: the thread never slides here
-  float friction = 0;           // [N] tension difference beyond which thread slides, at no tension
-  float capstan = 0;            // and so much more per newton of tension: coefficient of friction times the angle it bends by
-  int slipping = 0;             // +1: toward the needle, -1: toward the free end, 0: stuck
-  bool blocked_needle = false;  // no particle left to pass toward the needle / toward the free end
-  bool blocked_free = false;
-  float tension_needle = 0, tension_free = 0;  // [N] of the pairs on its two sides, written by solve_thread
-  float threshold() const { return friction + capstan * std::max(0.0f, std::min(tension_needle, tension_free)); }
-};
-
-enum class HoldKind : uint32_t { swage, jaw, loop };  // the needle's own end, a closed jaw, a loop frozen round a tool
-
-struct ThreadHold {
-  uint32_t slot = 0;
-  int body = 0;
-  Vec3 local;  // [m] body frame
-  HoldKind kind = HoldKind::jaw;
-};
-
-inline Vec3 position_of(const ThreadAnchor& a, const Vec4* x) { return position_of(a.point, x) + a.offset; }
-
-struct Thread {
-  std::vector<uint32_t> order;       // slots, free end first
-  std::vector<float> rest;           // [m] per pair (order[i], order[i + 1])
-  std::vector<uint8_t> cut;          // per pair: 1 where the thread was cut through; nothing acts across
-  std::vector<ThreadAnchor> anchor;  // in the order in which they were made
-  std::vector<ThreadHold> hold;
-  std::vector<float> tension;  // [N] per pair, of the last substep; negative: compressed
-};
 
 // The slide at one anchor within a substep.
 struct SlideState {
@@ -127,13 +75,10 @@ inline Vec3 impulse_on(const ThreadScratch& s, size_t i) {
   return way_before(s, i) * (i > 0 ? s.step[i - 1] : 0) - way_after(s, i) * s.step[i];
 }
 
-// Position of node i of the order, whatever it is locked to.
-Vec3 thread_position(const Thread& t, size_t node, const Vec4* x, const std::vector<RigidBody>& body);
-
 // One substep's solve: bending sweeps, direct solve, distance sweeps. Expects cleared multipliers in scratch. Moves thread
 // particles, the tissue under anchors and the bodies that hold it; writes tensions and the slide of every anchor. x: predicted
 // positions; before: those at the start of the substep; h [s].
-void solve_thread(const ThreadModel& model, Thread& thread, ThreadScratch& scratch, Vec4* x, const Vec4* before,
+void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& scratch, Vec4* x, const Vec4* before,
                   const float* inv_mass, const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body, float h);
 
 // One cosine bending constraint (paper 2.1): C = u.v - cos(theta0) with theta0 = pi (straight). Moves the three points by XPBD.
@@ -147,7 +92,5 @@ template <typename Real>
 constexpr Real distance_step(Real l, Real rest, Real w, Real alpha, Real lambda) {
   return (-(l - rest) - alpha * lambda) / (w + alpha);
 }
-
-float thread_length(const Thread& t, const Vec4* x, const std::vector<RigidBody>& body);
 
 }  // namespace catgut

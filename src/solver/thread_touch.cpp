@@ -71,7 +71,7 @@ void feel_friction(ThreadScratch& s, NodeContact& c, const RigidBody& b, float h
 
 }  // namespace
 
-bool meet_tools(const ThreadModel& model, ThreadScratch& s, const std::vector<RigidModel>& body_model,
+bool meet_tools(const StrandModel& model, ThreadScratch& s, const std::vector<RigidModel>& body_model,
                 const std::vector<RigidBody>& body, float h) {
   bool changed = false;
   for (NodeContact& c : s.contact) c.gap = 1;

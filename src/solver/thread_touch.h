@@ -8,7 +8,7 @@
 
 namespace catgut {
 
-struct ThreadModel;
+struct StrandModel;
 struct ThreadScratch;
 
 // A segment of thread near a capsule: what the contact stage hands to the thread's solve.
@@ -37,7 +37,7 @@ struct ToolPush {
 };
 
 // Brings every segment of s.touch out of its tool and finds the nodes that touch. Returns whether that set has changed.
-bool meet_tools(const ThreadModel& model, ThreadScratch& s, const std::vector<RigidModel>& body_model,
+bool meet_tools(const StrandModel& model, ThreadScratch& s, const std::vector<RigidModel>& body_model,
                 const std::vector<RigidBody>& body, float h);
 // Puts right what the pairs see of the nodes that touch: along the normal they move with the tool or not at all.
 void weigh_contacts(ThreadScratch& s, const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body);

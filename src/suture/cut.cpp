@@ -1,4 +1,4 @@
-// suture/cut: scissors. Reads buttons and tools; marks the pair that was cut (Thread::cut), or takes the thread off its needle.
+// suture/cut: scissors. Reads buttons and tools; marks the pair that was cut (Strand::cut), or takes the thread off its needle.
 // To loops, knots, pulls and the solver a cut is an end of the thread. What a wrong cut opens stays open.
 #include <algorithm>
 
@@ -9,20 +9,16 @@ namespace {
 
 constexpr float kOtherStrand = 0.015f;  // [m] along the thread: nearer than this it is the same strand
 
-bool is_anchored(const Thread& t, uint32_t slot) {
-  return std::any_of(t.anchor.begin(), t.anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot; });
-}
-
 // Thread [m] from node i to the nearest suture point or knot that way, and its slot; negative: there is none before the end.
 struct Way {
   float length = -1;
   uint32_t slot = 0;
 };
-Way to_stitch(const Thread& t, size_t i, int way) {
+Way to_stitch(const Strand& t, size_t i, int way) {
   for (float sum = 0;;) {
     if (is_anchored(t, t.order[i])) return {sum, t.order[i]};
-    if (way > 0 ? i + 1 >= t.order.size() || t.cut[i] : i == 0 || t.cut[i - 1]) return {};
-    sum += t.rest[way > 0 ? i : i - 1];
+    if (!continues(t, i, way)) return {};
+    sum += t.rest[pair_beside(i, way)];
     i = way > 0 ? i + 1 : i - 1;
   }
 }
@@ -41,7 +37,7 @@ std::array<uint32_t, 2> pressed_buttons(SutureState& state, const std::array<Too
 
 void cut(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
          const std::array<uint32_t, 2>& pressed, std::vector<Event>& events) {
-  Thread& t = solver.thread;
+  Strand& t = solver.strand[0];
   for (uint8_t who = 0; who < 2; ++who) {
     if (!(pressed[who] & kButtonCut)) continue;
     const Vec3 at = solver.body[who].x;
@@ -49,8 +45,8 @@ void cut(const SolverModel& model, SolverState& solver, const SutureModel& sutur
     size_t i = t.order.size();
     for (size_t k = 0; k + 1 < t.order.size(); ++k) {
       if (t.cut[k]) continue;
-      const Vec3 a = xyz(solver.x[t.order[k]]), b = xyz(solver.x[t.order[k + 1]]), d = b - a;
-      const float s = std::clamp(dot(at - a, d) / std::max(length2(d), 1e-16f), 0.0f, 1.0f), far = distance(a + d * s, at);
+      const Vec3 a = xyz(solver.x[t.order[k]]), b = xyz(solver.x[t.order[k + 1]]);
+      const float s = closest_on_segment(at, a, b), far = distance(a + (b - a) * s, at);
       if (far < best) best = far, along = s, i = k;
     }
     // A hand that holds the needle has the thread cut off it, wherever on the arc it holds.
@@ -70,21 +66,14 @@ void cut(const SolverModel& model, SolverState& solver, const SutureModel& sutur
     if (swage != t.hold.end() && i + 2 == t.order.size()) {
       t.hold.erase(swage);
     } else {
-      t.cut[i] = 1;
-      t.tension[i] = 0;
+      cut_pair(t, i);
       // Turns that are cut through hold nothing.
       for (uint8_t tool = 0; tool < 2; ++tool) {
-        const auto turns = [&](uint32_t s) {
-          return std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) {
-            return h.slot == s && h.body == static_cast<int>(tool) && h.kind == HoldKind::loop;
-          });
-        };
-        if (!turns(slot) || !turns(t.order[i + 1])) continue;
+        if (!is_held_by(t, slot, tool, HoldKind::loop) || !is_held_by(t, t.order[i + 1], tool, HoldKind::loop)) continue;
         take_off_loop(model, solver, suture, state, tool);
         events.push_back({0, EventKind::loop_released, tool, 0, 0, where});
       }
     }
-    update_thread_collisions(model, solver, suture);
     events.push_back({0, EventKind::thread_cut, who, slot, left, where});
 
     const auto fault = [&](uint32_t which, Fault f) {
@@ -114,18 +103,16 @@ void cut(const SolverModel& model, SolverState& solver, const SutureModel& sutur
 void hold_other_strands(SolverState& solver, const SutureModel& suture, const SutureState& state, uint8_t who) {
   // Jaws with a loop round them draw one end through it; the loop's own strands lie near and are not meant.
   if (state.loop[who].wraps > 0) return;
-  Thread& t = solver.thread;
+  Strand& t = solver.strand[0];
   const RigidBody& tool = solver.body[who];
   // Thread from a particle of the order to the nearest one that these jaws hold, or more than kOtherStrand.
   const auto is_other = [&](size_t i) {
     for (const int way : {1, -1}) {
       float sum = 0;
       for (size_t k = i; sum < kOtherStrand;) {
-        if (std::any_of(t.hold.begin(), t.hold.end(),
-                        [&](const ThreadHold& h) { return h.body == static_cast<int>(who) && h.slot == t.order[k]; }))
-          return false;
-        if (way > 0 ? k + 1 >= t.order.size() || t.cut[k] : k == 0 || t.cut[k - 1]) break;
-        sum += t.rest[way > 0 ? k : k - 1];
+        if (is_held_by(t, t.order[k], who)) return false;
+        if (!continues(t, k, way)) break;
+        sum += t.rest[pair_beside(k, way)];
         k = way > 0 ? k + 1 : k - 1;
       }
     }
@@ -137,9 +124,7 @@ void hold_other_strands(SolverState& solver, const SutureModel& suture, const Su
     for (size_t i = 0; i < t.order.size(); ++i) {
       const uint32_t slot = t.order[i];
       const float d = distance(xyz(solver.x[slot]), tool.x);
-      if (d >= best || is_anchored(t, slot) ||
-          std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) { return h.slot == slot; }) || !is_other(i))
-        continue;
+      if (d >= best || is_locked(t, slot) || !is_other(i)) continue;
       best = d, found = i;
     }
     if (found == t.order.size()) return;

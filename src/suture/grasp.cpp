@@ -18,7 +18,7 @@ void release(SolverState& solver, SutureState& state, uint8_t who, float force, 
     std::erase_if(solver.weld, [&](const Weld& w) { return w.a == static_cast<int>(kNeedle) && w.b == body; });
     events.push_back({0, EventKind::needle_released, who, 0, force, solver.body[static_cast<size_t>(body)].x});
   } else if (hand.held == Held::thread) {
-    std::erase_if(solver.thread.hold, [&](const ThreadHold& h) { return h.body == body && h.kind == HoldKind::jaw; });
+    release_holds(solver.strand[0], body, HoldKind::jaw);
     events.push_back({0, EventKind::thread_released, who, hand.slot, force, solver.body[static_cast<size_t>(body)].x});
   }
   if (hand.held == Held::tissue) {
@@ -62,17 +62,14 @@ void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& s
     const bool closing = hand.jaw > kClosed && jaw <= kClosed;
     hand.jaw = jaw;
     if (hand.held != Held::nothing) {
-      if (jaw >= kOpen) {
-        release(solver, state, who, 0, events);
-        update_thread_collisions(model, solver, suture);
-      }
+      if (jaw >= kOpen) { release(solver, state, who, 0, events); }
       continue;
     }
     if (!closing) continue;
     const RigidBody& tool = solver.body[who];
     const RigidBody& needle = solver.body[kNeedle];
-    const float phi = model.needle_arc.nearest(to_local(needle.pose(), tool.x));
-    if (distance(needle_point(model.needle_arc, needle, phi), tool.x) <= suture.grasp_reach) {
+    const float phi = model.needle_arc[0].nearest(to_local(needle.pose(), tool.x));
+    if (distance(needle_point(model.needle_arc[0], needle, phi), tool.x) <= suture.grasp_reach) {
       Weld w;
       w.a = static_cast<int>(kNeedle);
       w.b = who;
@@ -82,26 +79,22 @@ void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& s
       w.angular_compliance = suture.grasp_angular_compliance;
       solver.weld.push_back(w);
       hand.held = Held::needle;
-      hand.at = phi / model.needle_arc.arc;
+      hand.at = phi / model.needle_arc[0].arc;
       events.push_back({0, EventKind::needle_grasped, who, 0, hand.at, tool.x});
       continue;
     }
     float best = suture.grasp_reach;
     int32_t found = -1;
-    for (uint32_t slot : solver.thread.order) {
-      const bool taken =
-          std::any_of(solver.thread.anchor.begin(), solver.thread.anchor.end(), [&](auto& a) { return a.slot == slot; }) ||
-          std::any_of(solver.thread.hold.begin(), solver.thread.hold.end(), [&](auto& h) { return h.slot == slot; }) ||
-          beside_loop(solver.thread, state.loop[who], slot);
+    for (uint32_t slot : solver.strand[0].order) {
+      const bool taken = is_locked(solver.strand[0], slot) || beside_loop(solver.strand[0], state.loop[who], slot);
       const float d = distance(xyz(solver.x[slot]), tool.x);
       if (!taken && d < best) best = d, found = static_cast<int32_t>(slot);
     }
     if (found >= 0) {
       hand.held = Held::thread;
       hand.slot = static_cast<uint32_t>(found);
-      solver.thread.hold.push_back({hand.slot, who, to_local(tool.pose(), xyz(solver.x[hand.slot])), HoldKind::jaw});
+      solver.strand[0].hold.push_back({hand.slot, who, to_local(tool.pose(), xyz(solver.x[hand.slot])), HoldKind::jaw});
       hold_other_strands(solver, suture, state, who);
-      update_thread_collisions(model, solver, suture);
       events.push_back({0, EventKind::thread_grasped, who, hand.slot, 0, tool.x});
     } else {
       take_tissue(model, solver, scratch, suture, hand, who, events);
@@ -120,11 +113,7 @@ void slip(const SolverModel& model, SolverState& solver, const SutureModel& sutu
         if (w.a == static_cast<int>(kNeedle) && w.b == who) force = length(w.lambda) / (model.h * model.h);
     } else if (hand.held == Held::thread) {
       most = suture.thread_grip;
-      const auto at = std::find(solver.thread.order.begin(), solver.thread.order.end(), hand.slot);
-      const size_t i = static_cast<size_t>(at - solver.thread.order.begin());
-      // The larger of the two sides: what the jaw has to hold if the other is slack.
-      if (i > 0) force = std::max(force, solver.thread.tension[i - 1]);
-      if (i < solver.thread.tension.size()) force = std::max(force, solver.thread.tension[i]);
+      force = tension_at(solver.strand[0], node_of(solver.strand[0], hand.slot));
     }
     if (hand.held == Held::tissue) {
       most = suture.tissue_grip;
@@ -133,7 +122,6 @@ void slip(const SolverModel& model, SolverState& solver, const SutureModel& sutu
     }
     if (force <= most) continue;
     release(solver, state, who, force, events);
-    update_thread_collisions(model, solver, suture);
   }
 }
 

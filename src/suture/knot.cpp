@@ -17,16 +17,8 @@ constexpr float kFastest = 0.25f;  // [m/s] at which it does
 
 constexpr float kDrawSpeed = 0.25f;  // [m/s] thread drawn through a locked knot, and particles drawn into it
 constexpr float kSnug = 0.00005f;    // [m] of slack that a snug stitch keeps
-constexpr int kNone = -1;
+constexpr int kNone = kNoAnchor;
 
-size_t node_of(const Thread& t, uint32_t slot) {
-  return static_cast<size_t>(std::find(t.order.begin(), t.order.end(), slot) - t.order.begin());
-}
-int anchor_of(const Thread& t, uint32_t slot) {
-  for (size_t k = 0; k < t.anchor.size(); ++k)
-    if (t.anchor[k].slot == slot) return static_cast<int>(k);
-  return kNone;
-}
 bool is_suture_point(const SutureState& state, int anchor) {
   return std::any_of(state.point.begin(), state.point.end(),
                      [&](const SuturePoint& p) { return p.anchor == static_cast<uint32_t>(anchor); });
@@ -34,8 +26,8 @@ bool is_suture_point(const SutureState& state, int anchor) {
 
 // The next anchor from node i along the thread: toward the needle (way +1) or the free end. An end of the thread, cut or not,
 // is the end. Loops on their way are none: they are thread. `points`: suture points only, not the particles of knots.
-int next_anchor(const Thread& t, const SutureState& state, size_t i, int way, bool points) {
-  while (way > 0 ? i + 1 < t.order.size() && !t.cut[i] : i > 0 && !t.cut[i - 1]) {
+int next_anchor(const Strand& t, const SutureState& state, size_t i, int way, bool points) {
+  while (continues(t, i, way)) {
     i = way > 0 ? i + 1 : i - 1;
     const int k = anchor_of(t, t.order[i]);
     if (k != kNone && (is_suture_point(state, k) || (!points && t.anchor[static_cast<size_t>(k)].knotted))) return k;
@@ -45,39 +37,23 @@ int next_anchor(const Thread& t, const SutureState& state, size_t i, int way, bo
 
 // Where on its thread a place is: on the strand that leads to the free end, on the one that leads to the needle, on a bight
 // between two points of tissue, or on a piece that is tied to nothing.
-enum class Strand { free_end, needle, bight, loose };
+enum class Side { free_end, needle, bight, loose };
 struct Ends {
-  Strand strand = Strand::loose;
+  Side strand = Side::loose;
   int inward = kNone;  // anchor of the stitch or the knot that it comes out of
 };
-Ends ends_of(const Thread& t, const SutureState& state, size_t first, size_t last) {
+Ends ends_of(const Strand& t, const SutureState& state, size_t first, size_t last) {
   const int down = next_anchor(t, state, first, -1, false), up = next_anchor(t, state, last, 1, false);
-  if (down != kNone && up != kNone) return {Strand::bight, down};
-  if (down != kNone) return {Strand::needle, down};
-  if (up != kNone) return {Strand::free_end, up};
+  if (down != kNone && up != kNone) return {Side::bight, down};
+  if (down != kNone) return {Side::needle, down};
+  if (up != kNone) return {Side::free_end, up};
   return {};
 }
 
 // The suture point nearest along the thread to a strand that comes out of anchor k, that anchor included.
-int nearest_point(const Thread& t, const SutureState& state, int k, Strand strand) {
+int nearest_point(const Strand& t, const SutureState& state, int k, Side strand) {
   if (k == kNone || is_suture_point(state, k)) return k;
-  return next_anchor(t, state, node_of(t, t.anchor[static_cast<size_t>(k)].slot), strand == Strand::free_end ? 1 : -1, true);
-}
-
-// Rest length [m] between nodes a and b.
-float thread_between(const Thread& t, size_t a, size_t b) {
-  float sum = 0;
-  for (size_t i = std::min(a, b); i < std::max(a, b); ++i) sum += t.rest[i];
-  return sum;
-}
-
-// [N] of the tighter of the two pairs at a particle.
-float strand_tension(const Thread& t, uint32_t slot) {
-  const size_t i = node_of(t, slot);
-  float most = 0;
-  if (i > 0) most = std::max(most, t.tension[i - 1]);
-  if (i < t.tension.size()) most = std::max(most, t.tension[i]);
-  return most;
+  return next_anchor(t, state, node_of(t, t.anchor[static_cast<size_t>(k)].slot), strand == Side::free_end ? 1 : -1, true);
 }
 
 bool pulls(const SutureState& state, const Knot& knot) {
@@ -85,22 +61,20 @@ bool pulls(const SutureState& state, const Knot& knot) {
   return hand.held == Held::thread && hand.slot == knot.strand;
 }
 // Whether the throw in hand still hangs on one thread: its loop, and the strand that was taken, with the stitch.
-bool is_whole(const Thread& t, const SutureState& state, const Knot& knot) {
+bool is_whole(const Strand& t, const SutureState& state, const Knot& knot) {
   const size_t first = node_of(t, knot.end[0]), last = node_of(t, knot.end[1]), held = node_of(t, knot.strand);
-  return first < last &&
-         std::none_of(t.cut.begin() + static_cast<long>(first), t.cut.begin() + static_cast<long>(last),
-                      [](uint8_t cut) { return cut != 0; }) &&
-         ends_of(t, state, first, last).strand != Strand::loose && ends_of(t, state, held, held).strand != Strand::loose;
+  return first < last && is_whole(t, first, last) && ends_of(t, state, first, last).strand != Side::loose &&
+         ends_of(t, state, held, held).strand != Side::loose;
 }
 
 void release_end(SolverState& solver, SutureState& state, uint32_t slot) {
-  const int k = anchor_of(solver.thread, slot);
+  const int k = anchor_of(solver.strand[0], slot);
   if (k != kNone) erase_anchor(solver, state, static_cast<uint32_t>(k));
 }
 
 // "If the user decides they do not want to proceed ... they can release the free end of the thread. After letting go, the loop
 // will be released, and the knot object will be destroyed." Nothing but positions tells that there was a throw.
-void cancel(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t which,
+void cancel(const SolverModel&, SolverState& solver, const SutureModel&, SutureState& state, uint32_t which,
             std::vector<Event>& events) {
   Knot& knot = state.knot[which];
   const Vec3 where = position_of(knot.target, solver.x.data()) + normalized(knot.from) * knot.left;
@@ -113,12 +87,11 @@ void cancel(const SolverModel& model, SolverState& solver, const SutureModel& su
     knot.throws = knot.begun;
     knot.phase = KnotPhase::locked;
   }
-  update_thread_collisions(model, solver, suture);
 }
 
 // The locked knot that a further throw belongs to: the one out of which both strands come, or out of which the wrapped one
 // comes when it is thrown round a bight or round itself.
-int knot_under(const Thread& t, const SutureState& state, const Ends& loop, const Ends& taken, bool one_strand) {
+int knot_under(const Strand& t, const SutureState& state, const Ends& loop, const Ends& taken, bool one_strand) {
   const auto holds = [&](const Knot& k, int anchor) {
     if (anchor == kNone) return false;
     const uint32_t slot = t.anchor[static_cast<size_t>(anchor)].slot;
@@ -138,17 +111,18 @@ int knot_under(const Thread& t, const SutureState& state, const Ends& loop, cons
 // suture point nearest to the strand that was taken and the one nearest to the loop. For a stitch of two points both are the
 // same. Where a running suture is tied to itself (the end of a Connell: the taken strand is a bight, or the needle's own) there
 // is no other end, and the paper's rule holds as it stands.
-TissuePoint where_to(const SolverModel& model, const Thread& t, const SutureState& state, const Ends& loop, const Ends& taken,
+TissuePoint where_to(const SolverModel& model, const Strand& t, const SutureState& state, const Ends& loop, const Ends& taken,
                      bool one_strand) {
   const auto point = [&](int anchor) -> const TissuePoint& { return t.anchor[static_cast<size_t>(anchor)].point; };
   const size_t points = state.point.size();
   if (one_strand) {
     const int last = static_cast<int>(state.point[points - 1].anchor);
-    return points == 1 ? point(last) : midway(model, point(static_cast<int>(state.point[points - 2].anchor)), point(last));
+    return points == 1 ? point(last)
+                       : midway(model.shape.rest.data(), point(static_cast<int>(state.point[points - 2].anchor)), point(last));
   }
   const int a = nearest_point(t, state, taken.inward, taken.strand), b = nearest_point(t, state, loop.inward, loop.strand);
   if (a == kNone || b == kNone) return point(a == kNone ? (b == kNone ? loop.inward : b) : a);
-  return a == b ? point(a) : midway(model, point(a), point(b));
+  return a == b ? point(a) : midway(model.shape.rest.data(), point(a), point(b));
 }
 
 // "Knots can be created when at least one valid loop and suture point are detected. If the tool that has the loop around it
@@ -156,7 +130,7 @@ TissuePoint where_to(const SolverModel& model, const Thread& t, const SutureStat
 // to the object, and the whole loop detaches from the tool."
 void begin(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint8_t who,
            std::vector<Event>& events) {
-  Thread& t = solver.thread;
+  Strand& t = solver.strand[0];
   const Vec4* x = solver.x.data();
   const ToolLoop loop = state.loop[who];
   const uint32_t strand = state.hand[who].slot;
@@ -164,13 +138,13 @@ void begin(const SolverModel& model, SolverState& solver, const SutureModel& sut
   const size_t first = node_of(t, loop.first), last = node_of(t, loop.last), held = node_of(t, strand);
   const Ends wrapped = ends_of(t, state, first, last), taken = ends_of(t, state, held, held);
   // Two strands are tied to each other if one leads to the free end and the other to the needle.
-  const bool one_strand = wrapped.strand == taken.strand || wrapped.strand == Strand::bight || taken.strand == Strand::bight;
+  const bool one_strand = wrapped.strand == taken.strand || wrapped.strand == Side::bight || taken.strand == Side::bight;
   const int under = knot_under(t, state, wrapped, taken, one_strand);
   const auto fault = [&](uint32_t which, Fault f) {
     events.push_back({0, EventKind::technique_fault, who, which, static_cast<float>(f), tool.x});
   };
   const bool full = under != kNone && state.knot[static_cast<size_t>(under)].throws == KnotView::kMostThrows;
-  if (state.point.empty() || wrapped.strand == Strand::loose || taken.strand == Strand::loose || full) {
+  if (state.point.empty() || wrapped.strand == Side::loose || taken.strand == Side::loose || full) {
     if (!full) fault(static_cast<uint32_t>(state.knot.size()), Fault::knot_without_bite);
     take_off_loop(model, solver, suture, state, who);
     events.push_back({0, EventKind::loop_released, who, 0, 0, tool.x});
@@ -203,7 +177,7 @@ void begin(const SolverModel& model, SolverState& solver, const SutureModel& sut
   made = {};
   made.wraps = loop.wraps;
   made.handed = loop.handed;
-  made.needle_end = wrapped.strand == Strand::free_end ? 0 : 1;
+  made.needle_end = wrapped.strand == Side::free_end ? 0 : 1;
   take_off_loop(model, solver, suture, state, who);
   for (uint32_t slot : knot.end) {
     ThreadAnchor a;
@@ -214,26 +188,23 @@ void begin(const SolverModel& model, SolverState& solver, const SutureModel& sut
     a.capstan = suture.capstan;
     t.anchor.push_back(a);
   }
-  update_thread_collisions(model, solver, suture);
   events.push_back({0, EventKind::knot_begun, who, which, static_cast<float>(made.wraps), place});
 }
 
 // The particle of the taken strand that the knot will hold: of those between the stitch and the jaw, the one nearest to it.
 // -1: there is none.
 int64_t particle_for(const SolverState& solver, const SutureState& state, const Knot& knot) {
-  const Thread& t = solver.thread;
+  const Strand& t = solver.strand[0];
   const size_t held = node_of(t, knot.strand);
   const Ends taken = ends_of(t, state, held, held);
-  if (taken.strand == Strand::bight || taken.strand == Strand::loose) return -1;
+  if (taken.strand == Side::bight || taken.strand == Side::loose) return -1;
   const size_t from = node_of(t, t.anchor[static_cast<size_t>(taken.inward)].slot);
   const Vec3 target = position_of(knot.target, solver.x.data());
   int64_t found = -1;
   float best = 1e30f;
   for (size_t i = std::min(from, held) + 1; i < std::max(from, held); ++i) {
     const uint32_t slot = t.order[i];
-    if (anchor_of(t, slot) != kNone ||
-        std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) { return h.slot == slot; }))
-      continue;
+    if (is_locked(t, slot)) continue;
     const float d = distance(xyz(solver.x[slot]), target);
     if (d < best) best = d, found = slot;
   }
@@ -243,19 +214,19 @@ int64_t particle_for(const SolverState& solver, const SutureState& state, const 
 // "When the knot object reaches the suture point or midpoint between the two previous suture points, it is locked in place, and
 // the attached particles are released." From here on the knot holds the stitch: a particle of the wrapped strand, which is the
 // loop's inner end, and one of the taken strand.
-void lock(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-          SutureState& state, uint32_t which, std::vector<Event>& events) {
-  Thread& t = solver.thread;
+void lock(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel&, SutureState& state,
+          uint32_t which, std::vector<Event>& events) {
+  Strand& t = solver.strand[0];
   Knot& knot = state.knot[which];
   KnotThrow& made = knot.thrown[knot.throws - 1];
   const Vec3 where = position_of(knot.target, solver.x.data());
-  made.tension = strand_tension(t, knot.strand);
+  made.tension = tension_at(t, node_of(t, knot.strand));
   if (knot.slots == 0) {
     const size_t first = node_of(t, knot.end[0]), last = node_of(t, knot.end[1]), held = node_of(t, knot.strand);
     const Ends wrapped = ends_of(t, state, first, last), taken = ends_of(t, state, held, held);
-    const bool free_end_wrapped = wrapped.strand == Strand::free_end;
-    const bool two = (free_end_wrapped && taken.strand == Strand::needle) ||
-                     (wrapped.strand == Strand::needle && taken.strand == Strand::free_end);
+    const bool free_end_wrapped = wrapped.strand == Side::free_end;
+    const bool two = (free_end_wrapped && taken.strand == Side::needle) ||
+                     (wrapped.strand == Side::needle && taken.strand == Side::free_end);
     const int64_t other = two ? particle_for(solver, state, knot) : -1;
     const uint32_t inner = knot.end[free_end_wrapped ? 1 : 0];
     release_end(solver, state, knot.end[free_end_wrapped ? 0 : 1]);
@@ -286,17 +257,16 @@ void lock(const SolverModel& model, SolverState& solver, const SolverScratch& sc
     made.gap = knot.left;
   }
   knot.phase = KnotPhase::locked;
-  update_thread_collisions(model, solver, suture);
   events.push_back({0, EventKind::knot_locked, static_cast<uint8_t>(knot.hand), which, made.tension, where});
 }
 
 // A knot that has just been locked draws its two strands in: what is slack between the stitch and it goes to the outer side, as
 // if the hands drew on both ends, and no faster than they could.
-void draw_snug(const SolverModel& model, SolverState& solver, const SutureModel& suture, const SutureState& state, Knot& knot) {
-  Thread& t = solver.thread;
+void draw_snug(const SolverModel& model, SolverState& solver, const SutureModel&, const SutureState& state, Knot& knot) {
+  Strand& t = solver.strand[0];
   const Vec4* x = solver.x.data();
   const float step = kDrawSpeed * model.h;
-  bool busy = false, passed = false;
+  bool busy = false;
   for (uint32_t i = 0; i < knot.slots; ++i) {
     const int k = anchor_of(t, knot.slot[i]);
     if (k == kNone) continue;
@@ -311,46 +281,14 @@ void draw_snug(const SolverModel& model, SolverState& solver, const SutureModel&
     const int stitch = next_anchor(t, state, node, way, false);
     if (stitch == kNone) continue;
     const ThreadAnchor& s = t.anchor[static_cast<size_t>(stitch)];
-    const float slack = thread_between(t, node, node_of(t, s.slot)) - distance(position_of(a, x), position_of(s, x));
+    const float slack = rest_between(t, node, node_of(t, s.slot)) - distance(position_of(a, x), position_of(s, x));
     if (std::abs(slack) <= kSnug) continue;
-    const std::vector<uint32_t>& order = t.order;
-    const uint32_t beside = order[node - 1];
     if (draw_through(model, solver, a.slot, slack > 0 ? -way : way, std::min(std::abs(slack), step)) > 0) busy = true;
-    passed = passed || order[node - 1] != beside;
   }
   if (!busy) knot.snug = 1;
-  if (passed || !busy) update_thread_collisions(model, solver, suture);
 }
 
 }  // namespace
-
-TissuePoint carried_by(const SolverModel& model, const TissuePoint& point, uint32_t count) {
-  if (point.count <= count) return point;
-  const Vec4* rest = model.shape.rest.data();
-  const Vec3 at = position_of(point, rest);
-  std::array<uint32_t, TissuePoint::kMost> near = point.particle;
-  std::sort(near.begin(), near.begin() + point.count, [&](uint32_t i, uint32_t j) {
-    const float di = length2(xyz(rest[i]) - at), dj = length2(xyz(rest[j]) - at);
-    return di != dj ? di < dj : i < j;
-  });
-  return spread_point({near.data(), count}, rest, at);
-}
-
-TissuePoint midway(const SolverModel& model, const TissuePoint& a, const TissuePoint& b) {
-  // A point of tissue has room for so many particles; each of the two keeps the half of them that are nearest to it, with
-  // weights that put it where it was.
-  TissuePoint m;
-  for (const TissuePoint* p : {&a, &b}) {
-    const TissuePoint part = carried_by(model, *p, TissuePoint::kMost / 2);
-    for (uint32_t k = 0; k < part.count; ++k) {
-      uint32_t row = 0;
-      while (row < m.count && m.particle[row] != part.particle[k]) ++row;
-      if (row == m.count) m.particle[m.count++] = part.particle[k];
-      m.weight[row] += 0.5f * part.weight[k];
-    }
-  }
-  return m;
-}
 
 void take_back_throws(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                       std::vector<Event>& events) {
@@ -362,7 +300,7 @@ void tie(const SolverModel& model, SolverState& solver, const SutureModel& sutur
          std::vector<Event>& events) {
   for (size_t i = state.knot.size(); i-- > 0;)
     if (state.knot[i].phase == KnotPhase::tightening &&
-        (!pulls(state, state.knot[i]) || !is_whole(solver.thread, state, state.knot[i])))
+        (!pulls(state, state.knot[i]) || !is_whole(solver.strand[0], state, state.knot[i])))
       cancel(model, solver, suture, state, static_cast<uint32_t>(i), events);
   for (uint8_t who = 0; who < 2; ++who)
     if (state.loop[who].wraps > 0 && state.hand[who].held == Held::thread) begin(model, solver, suture, state, who, events);
@@ -382,11 +320,11 @@ void tighten(const SolverModel& model, SolverState& solver, const SolverScratch&
     const float gone = distance(solver.body[knot.hand].x, knot.hand_from);
     float left = std::max(0.0f, length(knot.from) - gone);
     // A strand that is drawn taut brings the throw down however short the way of the hand.
-    if (strand_tension(solver.thread, knot.strand) > kTaut)
+    if (tension_at(solver.strand[0], node_of(solver.strand[0], knot.strand)) > kTaut)
       left = std::max(0.0f, std::min(left, knot.left - kFastest * model.h));
     if (left < knot.left) {
       const float part = left / knot.left;
-      for (ThreadAnchor& a : solver.thread.anchor)
+      for (ThreadAnchor& a : solver.strand[0].anchor)
         if (a.slot == knot.end[0] || a.slot == knot.end[1]) a.offset = a.offset * part;
       knot.left = left;
     }

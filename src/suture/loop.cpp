@@ -37,9 +37,8 @@ struct Corner {
 bool touches(const LoopTool& tool, Vec3 p, float reach) {
   if (p.z < 0) return false;
   for (const Capsule& c : tool.capsule) {
-    const Vec3 axis = c.b - c.a;
-    const float t = std::clamp(dot(p - c.a, axis) / std::max(length2(axis), 1e-16f), 0.0f, 1.0f), far = c.radius + reach;
-    if (length2(p - (c.a + axis * t)) <= far * far) return true;
+    const float t = closest_on_segment(p, c.a, c.b), far = c.radius + reach;
+    if (length2(p - (c.a + (c.b - c.a) * t)) <= far * far) return true;
   }
   return false;
 }
@@ -173,16 +172,17 @@ LoopVerdict find_loop(const Vec4* x, std::span<const uint32_t> order, const Loop
 
 namespace {
 
-bool is_held_elsewhere(const Thread& t, uint32_t slot, int body) {
-  return std::any_of(t.anchor.begin(), t.anchor.end(), [&](const ThreadAnchor& a) { return a.slot == slot; }) ||
-         std::any_of(t.hold.begin(), t.hold.end(),
-                     [&](const ThreadHold& h) { return h.slot == slot && !(h.body == body && h.kind == HoldKind::loop); });
+// Locked by something else than the loop round that tool.
+bool is_held_elsewhere(const Strand& t, uint32_t slot, int body) {
+  return is_anchored(t, slot) || std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) {
+           return h.slot == slot && !(h.body == body && h.kind == HoldKind::loop);
+         });
 }
 
 // Figure 10 on every stretch of free thread. A suture point, a jaw and a cut end a stretch: thread beyond them is not drawn
 // through a loop.
 LoopVerdict look(const SolverModel& model, const SolverState& solver, const SutureModel& suture, int body) {
-  const Thread& t = solver.thread;
+  const Strand& t = solver.strand[0];
   const LoopTool tool{solver.body[static_cast<size_t>(body)].pose(), model.body[static_cast<size_t>(body)].capsule};
   LoopVerdict best;
   for (size_t begin = 0, end = 0; begin + 1 < t.order.size(); begin = end) {
@@ -191,7 +191,7 @@ LoopVerdict look(const SolverModel& model, const SolverState& solver, const Sutu
     // Both ends of the stretch belong to it, unless the thread is cut there.
     const size_t last = t.cut[end - 1] ? end - 1 : end;
     LoopVerdict v = find_loop(solver.x.data(), {t.order.data() + begin, last - begin + 1}, tool,
-                              suture.loop_depth * model.thread.spacing, suture.loop_reach);
+                              suture.loop_depth * model.strand[0].spacing, suture.loop_reach);
     v.first += begin, v.last += begin;
     v.touching = std::max(v.touching, best.touching), v.round = std::max(v.round, best.round);
     if (better(v, best)) best = v;
@@ -205,7 +205,7 @@ LoopVerdict look(const SolverModel& model, const SolverState& solver, const Sutu
 // other, walked outward too, turns about that direction. It does not matter which end was wrapped or which way the tool points:
 // two throws with the same sign are a granny, with opposite signs a reef knot. The list runs from the free end to the needle:
 // outward on the needle's side of the stitch, inward on the free end's.
-int32_t handedness(const Thread& t, const LoopVerdict& v) {
+int32_t handedness(const Strand& t, const LoopVerdict& v) {
   for (size_t i = 0; i < v.first; ++i)
     for (const ThreadAnchor& a : t.anchor)
       if (a.slot == t.order[i]) return v.turn;
@@ -214,26 +214,13 @@ int32_t handedness(const Thread& t, const LoopVerdict& v) {
 
 Vec3 middle(const SolverState& solver, const LoopVerdict& v) {
   Vec3 sum{};
-  for (size_t i = v.first; i <= v.last; ++i) sum += xyz(solver.x[solver.thread.order[i]]);
+  for (size_t i = v.first; i <= v.last; ++i) sum += xyz(solver.x[solver.strand[0].order[i]]);
   return sum / static_cast<float>(v.last - v.first + 1);
-}
-
-size_t node_of(const Thread& t, uint32_t slot) {
-  return static_cast<size_t>(std::find(t.order.begin(), t.order.end(), slot) - t.order.begin());
-}
-
-// [N] with which the thread on either side of the loop pulls on it.
-float pull_on(const Thread& t, const ToolLoop& loop) {
-  const size_t first = node_of(t, loop.first), last = node_of(t, loop.last);
-  float most = 0;
-  if (first > 0) most = std::max(most, t.tension[first - 1]);
-  if (last < t.tension.size()) most = std::max(most, t.tension[last]);
-  return most;
 }
 
 }  // namespace
 
-bool beside_loop(const Thread& t, const ToolLoop& loop, uint32_t slot) {
+bool beside_loop(const Strand& t, const ToolLoop& loop, uint32_t slot) {
   if (loop.wraps == 0) return false;
   const size_t i = node_of(t, slot), first = node_of(t, loop.first), last = node_of(t, loop.last);
   if (i >= first && i <= last) return true;
@@ -243,20 +230,18 @@ bool beside_loop(const Thread& t, const ToolLoop& loop, uint32_t slot) {
   return apart < kOwnStrands;
 }
 
-void take_off_loop(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t who) {
-  std::erase_if(solver.thread.hold,
-                [&](const ThreadHold& h) { return h.body == static_cast<int>(who) && h.kind == HoldKind::loop; });
+void take_off_loop(const SolverModel&, SolverState& solver, const SutureModel&, SutureState& state, uint32_t who) {
+  release_holds(solver.strand[0], static_cast<int>(who), HoldKind::loop);
   ToolLoop& loop = state.loop[who];
   const float jaw = loop.jaw;
   loop = {};
   loop.jaw = jaw;
   loop.spent = 1;
-  update_thread_collisions(model, solver, suture);
 }
 
 void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                 std::vector<Event>& events) {
-  Thread& t = solver.thread;
+  Strand& t = solver.strand[0];
   for (uint8_t who = 0; who < 2; ++who) {
     ToolLoop& loop = state.loop[who];
     const HandState& hand = state.hand[who];
@@ -265,7 +250,7 @@ void find_loops(const SolverModel& model, SolverState& solver, const SutureModel
     const bool closes = loop.jaw > kShut && hand.jaw <= kShut;
     loop.jaw = hand.jaw;
     if (loop.wraps > 0) {
-      const float pull = pull_on(t, loop);
+      const float pull = tension_outside(t, node_of(t, loop.first), node_of(t, loop.last));
       if (opened || pull > suture.thread_grip) {
         take_off_loop(model, solver, suture, state, who);
         events.push_back({0, EventKind::loop_released, who, 0, opened ? 0 : pull, tool.x});
@@ -299,7 +284,7 @@ void find_loops(const SolverModel& model, SolverState& solver, const SutureModel
     // the loop."
     for (size_t i = v.first; i <= v.last; ++i) {
       const uint32_t slot = t.order[i];
-      if (std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) { return h.slot == slot; })) continue;
+      if (is_held(t, slot)) continue;
       t.hold.push_back({slot, who, to_local(tool.pose(), xyz(solver.x[slot])), HoldKind::loop});
     }
     const size_t first = loop.wraps > 0 ? std::min(v.first, node_of(t, loop.first)) : v.first;
@@ -308,7 +293,6 @@ void find_loops(const SolverModel& model, SolverState& solver, const SutureModel
     loop.wraps = v.wraps;
     loop.handed = handed;
     loop.told = LoopReason::none;
-    update_thread_collisions(model, solver, suture);
     events.push_back({0, EventKind::loop_formed, who, loop.wraps, static_cast<float>(handed), middle(solver, v)});
   }
 }

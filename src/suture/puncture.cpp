@@ -113,7 +113,7 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
 void puncture(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
               SutureState& state, std::vector<Event>& events) {
   const Vec4* x = solver.x.data();
-  const NeedleArc& arc = model.needle_arc;
+  const NeedleArc& arc = model.needle_arc[0];
   const RigidBody& needle = solver.body[kNeedle];
   const Vec3 tip = needle_tip(arc, needle);
   SurfaceHit hit;

@@ -13,12 +13,6 @@ constexpr uint32_t kCarriers = 6;      // particles that a pin's end hangs on
 constexpr float kSamePlace = 0.003f;   // [m] less than stitches are apart: a second pin there would only fight with the first
 constexpr float kCarries = 0.1f;       // [N] less than this in a passage through a wall, and the wall holds itself
 
-int anchor_at(const Thread& t, uint32_t slot) {
-  for (size_t k = 0; k < t.anchor.size(); ++k)
-    if (t.anchor[k].slot == slot) return static_cast<int>(k);
-  return -1;
-}
-
 // Whether anchors a and b are where the thread goes into and comes out of one bite.
 bool same_bite(const SutureState& state, int a, int b) {
   const auto point_at = [&](int anchor) {
@@ -65,13 +59,13 @@ struct Span {
 // The spans of the anchored part of a piece, from node `lowest` to node `highest`. A knot is no place in the tissue: it lies
 // where its two strands draw it. So where both ends of a stitch meet in one, they are one span, through the knot; and of two
 // spans between the same anchors the shorter is the one that holds.
-std::vector<Span> spans_of(const Thread& t, size_t lowest, size_t highest, const SutureState& state,
+std::vector<Span> spans_of(const Strand& t, size_t lowest, size_t highest, const SutureState& state,
                            const std::vector<uint32_t>& knots) {
   std::vector<Span> spans;
   int before = -1;
   float length = 0, tension = 0;
   for (size_t i = lowest; i <= highest; ++i) {
-    if (const int here = anchor_at(t, t.order[i]); here >= 0) {
+    if (const int here = anchor_of(t, t.order[i]); here >= 0) {
       if (before >= 0) spans.push_back({before, here, length, tension, same_bite(state, before, here)});
       before = here;
       length = tension = 0;
@@ -100,11 +94,11 @@ std::vector<Span> spans_of(const Thread& t, size_t lowest, size_t highest, const
 // The piece of thread from node `first` to node `last`, tied by `knots`, as a settled stitch and the pins that do what it did.
 void settle_piece(const SolverModel& model, SolverState& solver, SutureState& state, size_t first, size_t last,
                   const std::vector<uint32_t>& knots, std::vector<Event>& events) {
-  const Thread& t = solver.thread;
+  const Strand& t = solver.strand[0];
   SettledStitch stitch;
   size_t lowest = last, highest = first;
   for (size_t i = first; i <= last; ++i)
-    if (anchor_at(t, t.order[i]) >= 0) lowest = std::min(lowest, i), highest = std::max(highest, i);
+    if (anchor_of(t, t.order[i]) >= 0) lowest = std::min(lowest, i), highest = std::max(highest, i);
   const size_t pins = solver.pin.size();  // without its own
   for (const Span& span : spans_of(t, lowest, highest, state, knots)) {
     // A passage through a wall holds nothing together but the wall: if it carries nothing, no pin is needed.
@@ -113,12 +107,12 @@ void settle_piece(const SolverModel& model, SolverState& solver, SutureState& st
     const TissuePoint &a = t.anchor[static_cast<size_t>(span.a)].point, &b = t.anchor[static_cast<size_t>(span.b)].point;
     // What a tied stitch pulls is little, and its pins are looked at in every substep from now on. In deformed tissue fewer
     // particles say a little else: nothing may move because of that.
-    pin.a = carried_by(model, a, kCarriers);
-    pin.b = carried_by(model, b, kCarriers);
+    pin.a = carried_by(model.shape.rest.data(), a, kCarriers);
+    pin.b = carried_by(model.shape.rest.data(), b, kCarriers);
     const Vec4* x = solver.x.data();
     const float other = distance(position_of(pin.a, x), position_of(pin.b, x)) - distance(position_of(a, x), position_of(b, x));
     pin.length = std::max(0.0f, span.length + other);
-    pin.compliance = model.thread.stretch_compliance * span.length / model.thread.spacing;
+    pin.compliance = model.strand[0].stretch_compliance * span.length / model.strand[0].spacing;
     pin.owner = span.passage ? PinOwner::passage : PinOwner::stitch;
     if (!held_already(solver, pins, pin)) solver.pin.push_back(pin);
   }
@@ -139,27 +133,21 @@ void settle_piece(const SolverModel& model, SolverState& solver, SutureState& st
 
 }  // namespace
 
-void fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, std::span<const Vec3> start,
+void fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel&, std::span<const Vec3> start,
                   const Pose& needle_start) {
-  Thread& t = solver.thread;
-  const uint32_t first = model.thread.first_slot;
-  for (uint32_t i = 0; i < model.thread.count; ++i) {
-    t.order[i] = first + i;
+  Strand& t = solver.strand[0];
+  const uint32_t first = model.strand[0].first_slot;
+  reset(model.strand[0], t);
+  for (uint32_t i = 0; i < model.strand[0].count; ++i) {
     solver.x[first + i] = point(start[first + i]);
     solver.v[first + i] = {};
   }
-  std::fill(t.rest.begin(), t.rest.end(), model.thread.spacing);
-  std::fill(t.tension.begin(), t.tension.end(), 0.0f);
-  std::fill(t.cut.begin(), t.cut.end(), uint8_t{0});
-  t.anchor.clear();
-  t.hold.clear();
   RigidBody& needle = solver.body[kNeedle];
   needle = {};
   needle.x = needle.prev_x = needle_start.p;
   needle.q = needle.prev_q = needle_start.q;
   // The thread's last particle is the needle's: swaged on.
-  t.hold.push_back({t.order.back(), static_cast<int>(kNeedle), model.needle_arc.point(0), HoldKind::swage});
-  update_thread_collisions(model, solver, suture);
+  t.hold.push_back({t.order.back(), static_cast<int>(kNeedle), model.needle_arc[0].point(0), HoldKind::swage});
 }
 
 bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
@@ -175,7 +163,7 @@ bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel
     fault(state.open.back().bite, Fault::needle_in_tissue, here);
     return false;
   }
-  const Thread& t = solver.thread;
+  const Strand& t = solver.strand[0];
   take_back_throws(model, solver, suture, state, events);
   // Passages that drew their wall in until later stitches took the load off them: a pin that stays is paid for in every
   // substep.

@@ -52,7 +52,7 @@ struct OpenBite {
 struct SuturePoint {
   uint32_t bite = 0;
   bool exit = false;
-  uint32_t anchor = 0;  // index in Thread::anchor
+  uint32_t anchor = 0;  // index in Strand::anchor
 };
 
 struct HandState {
@@ -110,7 +110,6 @@ struct SutureModel {
   float channel_drag = 0.12f;                                          // [N] per end of the channel
   float pass_tension = 0.03f;                                          // [N]
   float capstan = 0.08f;       // thread-tissue friction times the angle by which a suture point bends the thread
-  int collision_off = 3;       // thread particles on each side
   float grasp_reach = 0.003f;  // [m]
   float needle_grip = 40, thread_grip = 15, tissue_grip = 6;  // [N] beyond which a jaw slips
   float tissue_compliance = 5e-4f;                            // [m/N] of tissue held by a jaw
@@ -160,7 +159,7 @@ void slip(const SolverModel& model, SolverState& solver, const SutureModel& sutu
 void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                 std::vector<Event>& events);
 // Whether a particle lies so near to the loop round a tool, along the thread, that jaws which close at the loop do not mean it.
-bool beside_loop(const Thread& thread, const ToolLoop& loop, uint32_t slot);
+bool beside_loop(const Strand& thread, const ToolLoop& loop, uint32_t slot);
 // The loop leaves its tool, to become a knot or to fall off.
 void take_off_loop(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t who);
 
@@ -179,10 +178,6 @@ void tighten(const SolverModel& model, SolverState& solver, const SolverScratch&
 // Takes every throw that is not locked back, whoever pulls on it.
 void take_back_throws(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                       std::vector<Event>& events);
-// The same place at rest, carried by no more than `count` particles, the nearest of those it has.
-TissuePoint carried_by(const SolverModel& model, const TissuePoint& point, uint32_t count);
-// Midway between two points of tissue, wherever the tissue carries them.
-TissuePoint midway(const SolverModel& model, const TissuePoint& a, const TissuePoint& b);
 
 // --- cut.cpp -----------------------------------------------------------------------------------------------------------
 // Buttons that went down since the last tick, by hand; remembers them.
@@ -222,10 +217,6 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
                      SurfaceHit& hit);
 
 // --- pull.cpp ----------------------------------------------------------------------------------------------------------
-// Moves the particle at index `from` of the order to stand right after the particle now at index `after` (figure 8), and gives
-// every pair a rest length so that the sum is what it was. from and after differ; ends of the thread stay ends. A particle that
-// stands right after `after` already stays, and so do the lengths beside it.
-void move_particle(Thread& thread, size_t from, size_t after);
 // After every substep: particles whose turn it is pass their suture point (figures 7 to 9), from the needle end to the free
 // end. A hand that draws thread through the tissue while the needle is still in it is told so, once a bite; the thread comes.
 void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
@@ -240,15 +231,13 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
 // Unlocks the newest suture point again: its thread was drawn back out of the hole. The particle stays where it is, as free
 // thread.
 void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state);
-// Collisions are off for locked and held particles and `collision_off` neighbours on each side, on for all others (paper 2.3).
-void update_thread_collisions(const SolverModel& model, SolverState& solver, const SutureModel& suture);
 // Rest length [m] of the thread between the first and the last suture point along the order; 0 with fewer than two. Across a
 // cut thread, here and in spans: the whole length of the thread, which draws nothing together.
 float length_between_ends(const SolverState& solver, const SutureState& state);
 // Rest length [m] of the thread from each suture point to the next one made after it; 0 for the last. With a knot between
 // them: by how much what lies beyond the knot is longer than the way from the knot to the first of the two.
 void spans(const SolverState& solver, const SutureState& state, std::vector<float>& span);
-// Takes the row out of Thread::anchor and puts the indices right that point behind it.
+// Takes the row out of Strand::anchor and puts the indices right that point behind it.
 void erase_anchor(SolverState& solver, SutureState& state, uint32_t anchor);
 
 // --- closure.cpp -------------------------------------------------------------------------------------------------------

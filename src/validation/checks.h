@@ -21,8 +21,8 @@ struct Lines {
 // A thread whose first node, and last if wanted, is held by the world: only the thread's kernels and the time step around them.
 // Without the substep's limit on speed, so that published cases of metres and kilograms can run as they are.
 struct ThreadRig {
-  ThreadModel model;
-  Thread thread;
+  StrandModel model;
+  Strand thread;
   ThreadScratch scratch;
   Column<Vec4> x, v, prev;
   std::vector<float> inv_mass;

@@ -266,9 +266,9 @@ void fling(uint64_t seed, float seconds, Fling& out) {
         // Every other time at the needle or the thread, so that they are caught and dragged along.
         const float aim = random.uniform();
         if (aim < 0.25f && state->suture.hand[k].held == Held::nothing)
-          h.goal = needle_point(model->solver.needle_arc, state->solver.body[kNeedle], kPi * random.uniform());
+          h.goal = needle_point(model->solver.needle_arc[0], state->solver.body[kNeedle], kPi * random.uniform());
         else if (aim < 0.5f && state->suture.hand[k].held == Held::nothing)
-          h.goal = xyz(state->solver.x[state->solver.thread.order[random.next() % state->solver.thread.order.size()]]);
+          h.goal = xyz(state->solver.x[state->solver.strand[0].order[random.next() % state->solver.strand[0].order.size()]]);
       }
       if (random.uniform() < 0.03f) {
         const Vec3 axis = normalized(Vec3{random.normal(), random.normal(), random.normal()}, {0, 1, 0});
@@ -297,16 +297,16 @@ void fling(uint64_t seed, float seconds, Fling& out) {
       out.grasps += e.kind == EventKind::needle_grasped || e.kind == EventKind::thread_grasped;
       out.bites += e.kind == EventKind::tip_entered;
     }
-    std::vector<uint32_t> order = state->solver.thread.order;
+    std::vector<uint32_t> order = state->solver.strand[0].order;
     std::sort(order.begin(), order.end());
     for (size_t n = 0; n < order.size(); ++n)
-      ASSERT_EQ(order[n], model->solver.thread.first_slot + n) << "seed " << seed << ", tick " << i;
+      ASSERT_EQ(order[n], model->solver.strand[0].first_slot + n) << "seed " << seed << ", tick " << i;
     double rest = 0;
-    for (float r : state->solver.thread.rest) {
+    for (float r : state->solver.strand[0].rest) {
       ASSERT_GE(r, 0.0f) << "seed " << seed << ", tick " << i;
       rest += double{r};
     }
-    ASSERT_NEAR(rest, double{model->solver.thread.spacing} * static_cast<double>(order.size() - 1), 1e-4)
+    ASSERT_NEAR(rest, double{model->solver.strand[0].spacing} * static_cast<double>(order.size() - 1), 1e-4)
         << "seed " << seed << ", tick " << i;
     // Nothing dangles: rows of a bite exist only during one.
     if (phase_of(state->suture) == NeedlePhase::outside) {

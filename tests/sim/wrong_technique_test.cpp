@@ -119,7 +119,6 @@ TEST(WrongTechnique, a_knot_before_any_bite_is_said) {
     Tie r({}, two_ends(technique));
     r.suture().point.clear();
     r.thread().anchor.clear();
-    update_thread_collisions(r.model->solver, r.solver(), r.model->suture);
     r.lay_along(r.setup.older - 1, -1, r.past_the_tip(xyz(r.x()[r.thread().order[r.setup.older]])), 0);
     r.input.hand[0].jaw = 0.3f;
     r.tick();

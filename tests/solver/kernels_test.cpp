@@ -420,9 +420,10 @@ uint64_t pressed_bowel(int workers, double* deepest) {
   m.use_volume = true;
   const std::vector<float> radius(tissue, body.radius), apart(tissue, 0.008f);
   m.collision = make_tissue_collision(m.shape.rest, radius, std::vector<uint32_t>(tissue, 0), apart, body.surface);
-  m.thread.first_slot = tissue, m.thread.count = thread, m.thread.spacing = 0.0016f, m.thread.radius = 0.00015f;
-  m.thread.inv_mass = 1 / 2e-6f, m.thread.stretch_compliance = 1e-6f, m.thread.bend_compliance = 2e4f;
-  m.thread.gravity = m.gravity;
+  StrandModel& t = m.strand.emplace_back();
+  t.first_slot = tissue, t.count = thread, t.spacing = 0.0016f, t.radius = 0.00015f;
+  t.inv_mass = 1 / 2e-6f, t.stretch_compliance = 1e-6f, t.bend_compliance = 2e4f;
+  t.gravity = m.gravity;
   m.h = 1.0f / 960;
   m.shape_stiffness = stiffness_at(0.9f, 1.0f / 480, m.h);
   m.shape_relaxation = 1.3f;
@@ -446,7 +447,7 @@ uint64_t pressed_bowel(int workers, double* deepest) {
   s.weld.push_back(hand);
   // One end of the thread is drawn up by the other hand, through a point of the tissue.
   s.body[1].x = start.back();
-  s.thread.hold.push_back({tissue + thread - 1, 1, {}});
+  s.strand[0].hold.push_back({tissue + thread - 1, 1, {}});
   ThreadAnchor bite;
   bite.slot = tissue + 30;
   uint32_t nearest = 0;
@@ -454,7 +455,7 @@ uint64_t pressed_bowel(int workers, double* deepest) {
     if (distance(start[i], start[bite.slot]) < distance(start[nearest], start[bite.slot])) nearest = i;
   bite.point = particle_point(nearest);
   bite.friction = 0.03f, bite.capstan = 0.08f;
-  s.thread.anchor.push_back(bite);
+  s.strand[0].anchor.push_back(bite);
   Jobs jobs(workers);
   uint32_t contacts = 0;
   for (int i = 0; i < 200; ++i) {

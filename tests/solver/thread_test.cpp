@@ -13,8 +13,8 @@ namespace {
 
 // A straight thread along x between two held ends, one node of it anchored to a pinned particle of tissue (index `nodes`).
 struct Line {
-  ThreadModel model;
-  Thread thread;
+  StrandModel model;
+  Strand thread;
   ThreadScratch scratch;
   Column<Vec4> x, v, prev;
   std::vector<float> inv_mass;
@@ -132,7 +132,7 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
   model.thread_damping = 12;
   model.inv_mass.assign(model.count, 1 / 2e-6f);
   model.inv_mass[0] = 0;
-  ThreadModel& t = model.thread;
+  StrandModel& t = model.strand.emplace_back();
   t.first_slot = 1, t.count = 101, t.spacing = 0.0016f, t.radius = 0.00015f, t.inv_mass = 1 / 2e-6f;
   t.stretch_compliance = 1e-6f, t.bend_compliance = 2e4f;
   const std::vector<float> mass{1.0f};
@@ -143,12 +143,12 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
   SolverScratch scratch;
   prepare_scratch(model, scratch);
   state.body[2].x = start.back();
-  state.thread.hold.push_back({t.first_slot + 100, 2, {}});
+  state.strand[0].hold.push_back({t.first_slot + 100, 2, {}});
   ThreadAnchor a;
   a.slot = t.first_slot + 90;
   a.point = particle_point(0);
   a.friction = 0.03f, a.capstan = 0.08f;
-  state.thread.anchor.push_back(a);
+  state.strand[0].anchor.push_back(a);
   SutureModel suture;
   SutureState stitches;
   stitches.bite.resize(1);
@@ -156,7 +156,7 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
   Jobs jobs(1);
   std::vector<Event> events;
   double most = 0;
-  const double before = std::accumulate(state.thread.rest.begin(), state.thread.rest.end(), 0.0);
+  const double before = std::accumulate(state.strand[0].rest.begin(), state.strand[0].rest.end(), 0.0);
   for (int i = 0; i < 384; ++i) {
     state.body[2].x.x += 0.15f * model.h;
     substep(model, state, scratch, jobs, nullptr);
@@ -164,18 +164,18 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
     // Stretch between the anchor and the hand. A stuck anchor lets go at the end of the substep in which the pull exceeds its
     // friction; this hand starts at full speed, so the first substeps are not a steady pull.
     if (i < 10) continue;
-    const auto& order = state.thread.order;
+    const auto& order = state.strand[0].order;
     const size_t node = static_cast<size_t>(std::find(order.begin(), order.end(), a.slot) - order.begin());
     double now = 0, rest = 0;
     for (size_t k = node; k + 1 < order.size(); ++k) {
-      now += double{distance(thread_position(state.thread, k, state.x.data(), state.body),
-                             thread_position(state.thread, k + 1, state.x.data(), state.body))};
-      rest += double{state.thread.rest[k]};
+      now += double{distance(thread_position(state.strand[0], k, state.x.data(), state.body),
+                             thread_position(state.strand[0], k + 1, state.x.data(), state.body))};
+      rest += double{state.strand[0].rest[k]};
     }
     most = std::max(most, now / rest - 1);
   }
   EXPECT_LT(most, 1e-3);
-  EXPECT_NEAR(std::accumulate(state.thread.rest.begin(), state.thread.rest.end(), 0.0) / before, 1, 1e-6);
+  EXPECT_NEAR(std::accumulate(state.strand[0].rest.begin(), state.strand[0].rest.end(), 0.0) / before, 1, 1e-6);
   EXPECT_GE(std::count_if(events.begin(), events.end(), [](const Event& e) { return e.kind == EventKind::particle_passed; }),
             35);
 }

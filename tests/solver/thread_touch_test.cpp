@@ -50,7 +50,7 @@ struct Wrap {
     model.body[0].capsule.push_back({{0, 0, -0.02f}, {0, 0, 0.02f}, kRadius});
     model.body[1].inv_mass = model.body[2].inv_mass = 100;
     model.body[1].inv_inertia = model.body[2].inv_inertia = {1e6f, 1e6f, 1e6f};
-    ThreadModel& t = model.thread;
+    StrandModel& t = model.strand.emplace_back();
     t.first_slot = 1, t.count = nodes, t.spacing = kSpacing, t.radius = kThread, t.inv_mass = 1 / 2e-6f;
     t.stretch_compliance = 1e-6f, t.bend_compliance = 2e4f;
     if (h > 1.0f / 500) t.distance_sweeps = t.bend_sweeps = 3, model.contact_sweeps = 5;
@@ -60,8 +60,8 @@ struct Wrap {
     state = make_solver_state(model, start);
     state.body[1].x = state.body[1].prev_x = start[1];
     state.body[2].x = state.body[2].prev_x = start.back();
-    state.thread.hold.push_back({1, 1, {}});
-    state.thread.hold.push_back({nodes, 2, {}});
+    state.strand[0].hold.push_back({1, 1, {}});
+    state.strand[0].hold.push_back({nodes, 2, {}});
     prepare_scratch(model, scratch);
     for (int k = 1; k <= 2; ++k) {
       Weld hand;
@@ -74,7 +74,7 @@ struct Wrap {
   }
   // Both ends are pulled by about `newton`, in the directions in which they leave the tool.
   void pull(float newton) {
-    const size_t last = state.thread.order.size() - 1;
+    const size_t last = state.strand[0].order.size() - 1;
     state.weld[0].target.p += normalized(at(0) - at(1)) * (0.01f * newton);
     state.weld[1].target.p += normalized(at(last) - at(last - 1)) * (0.01f * newton);
   }
@@ -89,33 +89,33 @@ struct Wrap {
       look();
     }
   }
-  Vec3 at(size_t i) const { return thread_position(state.thread, i, state.x.data(), state.body); }
+  Vec3 at(size_t i) const { return thread_position(state.strand[0], i, state.x.data(), state.body); }
   double depth(Vec3 p) const {
     const Vec3 local = to_local(state.body[0].pose(), p);
     return double{kRadius} + double{kThread} - double{length(Vec3{local.x, local.y, 0})};
   }
   void look() {
-    for (size_t i = 0; i < state.thread.order.size(); ++i) {
+    for (size_t i = 0; i < state.strand[0].order.size(); ++i) {
       deepest_node = std::max(deepest_node, depth(at(i)));
       if (i > 0) deepest_middle = std::max(deepest_middle, depth((at(i) + at(i - 1)) * 0.5f));
     }
   }
   double stretch() const {
     double rest = 0;
-    for (float r : state.thread.rest) rest += double{r};
-    return double{thread_length(state.thread, state.x.data(), state.body)} / rest - 1;
+    for (float r : state.strand[0].rest) rest += double{r};
+    return double{thread_length(state.strand[0], state.x.data(), state.body)} / rest - 1;
   }
   // How far the thread winds round the tool [turns].
   double turns() const {
     double sum = 0;
-    for (size_t i = 1; i < state.thread.order.size(); ++i) {
+    for (size_t i = 1; i < state.strand[0].order.size(); ++i) {
       const Vec3 a = to_local(state.body[0].pose(), at(i - 1)), b = to_local(state.body[0].pose(), at(i));
       sum += std::atan2(double{a.x} * double{b.y} - double{a.y} * double{b.x},
                         double{a.x} * double{b.x} + double{a.y} * double{b.y});
     }
     return std::abs(sum) / (2 * double{kPi});
   }
-  double tension(size_t pair) const { return double{state.thread.tension[pair]}; }
+  double tension(size_t pair) const { return double{state.strand[0].tension[pair]}; }
   Vec3 force_on_tool() const { return scratch.on_body[0].linear / (model.h * model.h); }
 };
 
@@ -129,7 +129,7 @@ TEST(ThreadOnTool, a_taut_thread_over_a_tool_stays_outside_and_the_tool_feels_it
     EXPECT_LT(std::abs(w.stretch()), 0.01) << h;
     EXPECT_NEAR(w.tension(0), 1, 0.1) << h;
     // Without friction the tension is the same all along, and the tool carries both ends.
-    const double first = w.tension(0), last = w.tension(w.state.thread.tension.size() - 1);
+    const double first = w.tension(0), last = w.tension(w.state.strand[0].tension.size() - 1);
     EXPECT_NEAR(first, last, 0.01) << h;
     EXPECT_NEAR(w.force_on_tool().y, -(first + last), 0.1 * (first + last)) << h;
     EXPECT_NEAR(w.force_on_tool().x, 0, 0.1 * (first + last)) << h;
@@ -156,7 +156,7 @@ TEST(ThreadOnTool, lifted_off_nothing_sticks) {
   w.run(0.5);
   EXPECT_LT(double{w.force_on_tool().y}, -0.5);
   // The tool goes down and away, at 0.1 m/s: the thread's middle must not follow it.
-  const size_t middle = w.state.thread.order.size() / 2;
+  const size_t middle = w.state.strand[0].order.size() / 2;
   const Vec3 was = w.at(middle);
   for (int i = 0; i < 192; ++i) w.state.body[0].x.y -= 0.1f * w.model.h, w.run(double{w.model.h} * 1.01);
   EXPECT_EQ(length(w.force_on_tool()), 0);
@@ -178,7 +178,7 @@ TEST(ThreadOnTool, a_tool_in_a_hand_gives_way_and_rests) {
     w.state.weld.push_back(hand);
     w.pull(1);
     w.run(2);
-    const double force = w.tension(0) + w.tension(w.state.thread.tension.size() - 1);
+    const double force = w.tension(0) + w.tension(w.state.strand[0].tension.size() - 1);
     EXPECT_GT(force, 1.5);
     EXPECT_NEAR(w.force_on_tool().y, -force, 0.05 * force) << h;
     EXPECT_NEAR(w.state.weld[2].lambda.y / (h * h), force, 0.05 * force) << h;
@@ -201,7 +201,7 @@ TEST(ThreadOnTool, friction_makes_a_capstan) {
     for (int i = 0; i < steps; ++i) {
       for (size_t k = 0; k < 2; ++k) w.state.weld[k].target.p.y += (k == 0 ? 0.01f : -0.01f) * h;
       w.run(double{h} * 1.01);
-      if (i >= steps / 2) ratio += w.tension(w.state.thread.tension.size() - 1) / w.tension(0) / (steps - steps / 2);
+      if (i >= steps / 2) ratio += w.tension(w.state.strand[0].tension.size() - 1) / w.tension(0) / (steps - steps / 2);
     }
     const double euler = std::exp(double{kPi} * double{mu});
     EXPECT_NEAR(ratio, euler, 0.3 * euler) << h;

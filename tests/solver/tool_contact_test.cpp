@@ -40,7 +40,7 @@ struct Pair {
     model.friction.tool = friction;
     model.inv_mass.assign(model.count, 1 / 2e-6f);
     model.inv_mass[0] = 0;
-    ThreadModel& t = model.thread;
+    StrandModel& t = model.strand.emplace_back();
     t.first_slot = 1, t.count = kNodes, t.spacing = 0.0016f, t.radius = 0.00015f, t.inv_mass = 1 / 2e-6f;
     model.body.resize(3);
     for (size_t k = 0; k < 2; ++k) {

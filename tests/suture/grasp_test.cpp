@@ -9,7 +9,7 @@ namespace {
 struct Hands : Rig {
   using Rig::Rig;
   // A tool frame at place `at` (0 swage .. 1 tip) of the needle, turned by `turn`.
-  Pose at_needle(float at, Quat turn) { return {needle_point(model->solver.needle_arc, needle(), at * kPi), turn}; }
+  Pose at_needle(float at, Quat turn) { return {needle_point(model->solver.needle_arc[0], needle(), at * kPi), turn}; }
   void show(size_t hand, const Pose& pose, float jaw) {
     input.hand[hand].connected = 1;
     input.hand[hand].pose = pose;
@@ -130,7 +130,7 @@ TEST(Grasp, holds_and_releases_the_nearest_thread) {
   // Paper 2.3: particles in a jaw, and three neighbours a side, do not collide.
   const size_t n = r.node_of(held);
   for (size_t i = n - 3; i <= n + 3; ++i)
-    EXPECT_EQ(r.solver().thread_collides[r.thread().order[i] - r.model->solver.thread.first_slot], 0);
+    EXPECT_EQ(r.collides()[r.thread().order[i] - r.model->solver.strand[0].first_slot], 0);
   for (int i = 1; i <= 60; ++i) {
     r.input.hand[1].pose.p.y += 0.0006f;
     r.tick();
@@ -140,7 +140,7 @@ TEST(Grasp, holds_and_releases_the_nearest_thread) {
   r.open(1);
   EXPECT_EQ(r.count(EventKind::thread_released), 1u);
   EXPECT_EQ(r.thread().hold.size(), 1u);
-  EXPECT_EQ(r.solver().thread_collides[held - r.model->solver.thread.first_slot], 1);
+  EXPECT_EQ(r.collides()[held - r.model->solver.strand[0].first_slot], 1);
   // The jaw leaves; thread is light and air is thick to it, but it sinks.
   const float high = xyz(r.solver().x[held]).y;
   for (int i = 0; i < 20; ++i) r.input.hand[1].pose.p.z += 0.002f, r.tick();

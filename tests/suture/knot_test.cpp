@@ -232,7 +232,7 @@ Written written(Tie& r) {
   w.order = r.thread().order, w.rest = r.thread().rest, w.cut = r.thread().cut;
   for (const ThreadAnchor& a : r.thread().anchor) w.anchored.push_back(a.slot);
   for (const ThreadHold& h : r.thread().hold) w.held.push_back(h.slot);
-  w.collides = r.solver().thread_collides;
+  w.collides = r.collides();
   w.points = r.suture().point.size(), w.knots = r.suture().knot.size(), w.pins = r.solver().pin.size();
   w.attachments = r.solver().attach.size();
   w.wraps = {r.loop(0).wraps, r.loop(1).wraps};
@@ -376,7 +376,7 @@ void running_suture(Rig& rig, bool with_knot, Place& p) {
   lock(rig, 43, p.at);
   const size_t n = rig.thread().order.size();
   const auto arch = [&](size_t a, size_t b, Vec3 from, Vec3 to, Vec3 out) {
-    const float length = static_cast<float>(b - a) * rig.model->solver.thread.spacing, chord = distance(from, to);
+    const float length = static_cast<float>(b - a) * rig.model->solver.strand[0].spacing, chord = distance(from, to);
     const float height = 0.5f * std::sqrt(std::max(0.0f, length * length - chord * chord));
     for (size_t i = a + 1; i < b; ++i) {
       const float s = static_cast<float>(i - a) / static_cast<float>(b - a);
@@ -392,7 +392,7 @@ void running_suture(Rig& rig, bool with_knot, Place& p) {
   if (with_knot) {
     Knot k;
     k.phase = KnotPhase::locked;
-    k.target = midway(rig.model->solver, rig.thread().anchor[0].point, rig.thread().anchor[1].point);
+    k.target = midway(rig.model->solver.shape.rest.data(), rig.thread().anchor[0].point, rig.thread().anchor[1].point);
     k.slot = {rig.thread().order[18], rig.thread().order[27]};
     k.strand = rig.thread().order[10];
     k.slots = 2, k.snug = 1, k.throws = 1;
@@ -406,7 +406,6 @@ void running_suture(Rig& rig, bool with_knot, Place& p) {
       set(rig.solver().x[slot], position_of(k.target, rig.x()));
     }
   }
-  update_thread_collisions(rig.model->solver, rig.solver(), rig.model->suture);
 }
 
 void draw(Rig& rig, const Place& p, float metres) {
@@ -501,7 +500,7 @@ TEST(Midway, is_the_middle_at_rest_and_under_every_affine_motion) {
     while (count < m.shape.cluster_stride && member[count] < m.tissue) ++count;
     return spread_point({member, count}, m.shape.rest.data(), p.at);
   };
-  const TissuePoint a = point(0.3f), b = point(0.6f), c = midway(m, a, b);
+  const TissuePoint a = point(0.3f), b = point(0.6f), c = midway(m.shape.rest.data(), a, b);
   EXPECT_LE(c.count, TissuePoint::kMost);
   float sum = 0;
   for (uint32_t k = 0; k < c.count; ++k) sum += c.weight[k];

@@ -36,9 +36,9 @@ std::vector<Pair> recalculate(std::vector<Pair> pp, uint32_t moved, uint32_t aft
   return pp;
 }
 
-Thread chain(uint32_t nodes, uint32_t first_slot, uint64_t seed) {
+Strand chain(uint32_t nodes, uint32_t first_slot, uint64_t seed) {
   Random random(seed);
-  Thread t;
+  Strand t;
   for (uint32_t i = 0; i < nodes; ++i) t.order.push_back(first_slot + i);
   for (uint32_t i = 0; i + 1 < nodes; ++i) t.rest.push_back(0.0016f * (0.1f + 1.8f * random.uniform()));
   t.cut.assign(t.rest.size(), 0);
@@ -47,7 +47,7 @@ Thread chain(uint32_t nodes, uint32_t first_slot, uint64_t seed) {
 
 TEST(Figure8, the_figure_itself) {
   // p1 .. p8; p2 is moved after p5. (c), (d): p1-p3, p3-p4, p4-p5, p5-p2, p2-p6, p6-p7, p7-p8.
-  Thread t = chain(8, 1, 3);
+  Strand t = chain(8, 1, 3);
   move_particle(t, 1, 4);
   EXPECT_EQ(t.order, (std::vector<uint32_t>{1, 3, 4, 5, 2, 6, 7, 8}));
 }
@@ -57,7 +57,7 @@ TEST(Figure8, order_is_the_papers_for_every_move) {
   for (size_t from = 1; from + 1 < kNodes; ++from)
     for (size_t after = 0; after + 1 < kNodes; ++after) {
       if (from == after || from == after + 1) continue;
-      Thread t = chain(kNodes, kFirst, from * 31 + after);
+      Strand t = chain(kNodes, kFirst, from * 31 + after);
       const double length = std::accumulate(t.rest.begin(), t.rest.end(), 0.0);
       const std::vector<float> rest = t.rest;
       std::vector<Pair> pp;
@@ -88,8 +88,8 @@ TEST(Figure8, order_is_the_papers_for_every_move) {
 
 TEST(Figure8, a_particle_already_there_stays) {
   for (size_t from = 1; from < 9; ++from) {
-    Thread t = chain(10, 0, from);
-    const Thread before = t;
+    Strand t = chain(10, 0, from);
+    const Strand before = t;
     move_particle(t, from, from - 1);
     EXPECT_EQ(t.order, before.order);
     EXPECT_EQ(t.rest, before.rest);
@@ -97,7 +97,7 @@ TEST(Figure8, a_particle_already_there_stays) {
 }
 
 TEST(Figure8, ten_thousand_moves_lose_no_particle_and_no_length) {
-  Thread t = chain(40, 7, 5);
+  Strand t = chain(40, 7, 5);
   const double length = std::accumulate(t.rest.begin(), t.rest.end(), 0.0);
   Random random(11);
   for (int k = 0; k < 10000; ++k) {

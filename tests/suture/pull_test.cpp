@@ -17,7 +17,6 @@ void one_point(Rig& rig, size_t node, Place& p) {
   lay(rig, 0, node - 1, at, p.up, -1);
   lay(rig, node + 1, n - 1, at, p.out, 1);
   put_needle(rig, xyz(rig.solver().x[rig.thread().order.back()]));
-  update_thread_collisions(rig.model->solver, rig.solver(), rig.model->suture);
 }
 
 void draw_out(Rig& rig, const Place& p, float metres, float speed) {
@@ -97,12 +96,12 @@ TEST(Figure7, exactly_one_particle_passes_to_the_midpoint) {
   Rig rig(weightless(40));
   Place p;
   one_point(rig, 30, p);
-  Thread& t = rig.thread();
-  const float spacing = rig.model->solver.thread.spacing;
+  Strand& t = rig.thread();
+  const float spacing = rig.model->solver.strand[0].spacing;
   t.rest[30] += t.rest[29] - 0.05f * spacing;  // as if nearly the whole pair on the free side had slid through
   t.rest[29] = 0.05f * spacing;
   const double length = rig.rest_length();
-  const Thread before = t;
+  const Strand before = t;
   const auto x = rig.solver().x;
   std::vector<Event> events;
   pull(rig.model->solver, rig.solver(), rig.model->suture, rig.suture(), events);
@@ -165,7 +164,7 @@ TEST(Figure7, tension_resolves_after_passing) {
   EXPECT_EQ(rig.count(EventKind::particle_passed), passed) << "a resting thread passes nothing";
   // As much thread came through as the needle took, less what the tissue, held by friction, still leans after it: to one
   // particle.
-  const float leans = dot(rig.point_at(0) - at_rest, p.out), spacing = rig.model->solver.thread.spacing;
+  const float leans = dot(rig.point_at(0) - at_rest, p.out), spacing = rig.model->solver.strand[0].spacing;
   EXPECT_NEAR(static_cast<float>(passed) * spacing + leans, 0.012f, 1.1f * spacing);
 }
 
@@ -180,8 +179,8 @@ TEST(Collisions, are_off_for_the_locked_particle_and_three_neighbours_a_side_and
     const size_t at = rig.node_of_point(0), n = rig.thread().order.size();
     for (size_t i = 0; i < n; ++i) {
       const bool off = (i + 3 >= at && i <= at + 3) || i + 4 >= n;  // the swage is held too
-      const size_t slot = rig.thread().order[i] - rig.model->solver.thread.first_slot;
-      ASSERT_EQ(rig.solver().thread_collides[slot], off ? 0 : 1) << "node " << i << ", locked " << at;
+      const size_t slot = rig.thread().order[i] - rig.model->solver.strand[0].first_slot;
+      ASSERT_EQ(rig.collides()[slot], off ? 0 : 1) << "node " << i << ", locked " << at;
       if (off && i + 4 < n) ever_off[slot] = 1;
     }
   };
@@ -208,7 +207,7 @@ void two_points(Rig& rig, size_t older, size_t newer, Place& p) {
   lay(rig, 0, older - 1, a, first.up, -1);
   lay(rig, newer + 1, n - 1, b, p.out, 1);
   // The slack hangs outside as a flat arch.
-  const float spacing = rig.model->solver.thread.spacing;
+  const float spacing = rig.model->solver.strand[0].spacing;
   const float length = spacing * static_cast<float>(newer - older), chord = distance(a, b);
   const float height = std::sqrt(std::max(0.0f, length * length - chord * chord)) * 0.5f;
   for (size_t i = older + 1; i < newer; ++i) {
@@ -217,7 +216,6 @@ void two_points(Rig& rig, size_t older, size_t newer, Place& p) {
         lerp(a, b, s) + normalized(first.out + p.out) * (height * (1 - std::abs(2 * s - 1))));
   }
   put_needle(rig, xyz(rig.solver().x[rig.thread().order.back()]));
-  update_thread_collisions(rig.model->solver, rig.solver(), rig.model->suture);
 }
 
 // Figure 9: (a), (b) while the thread between two suture points is longer than the way between them, "the particle on the free
@@ -268,8 +266,8 @@ TEST(Figure9, suture_points_are_checked_from_the_needle_end) {
   Place p;
   two_points(rig, 20, 32, p);
   lock(rig, 45, rig.place(0.8f, 0.004f).at);
-  Thread& t = rig.thread();
-  const float used = 0.05f * rig.model->solver.thread.spacing;
+  Strand& t = rig.thread();
+  const float used = 0.05f * rig.model->solver.strand[0].spacing;
   for (size_t node : {size_t{20}, size_t{32}, size_t{45}}) t.rest[node] += t.rest[node - 1] - used, t.rest[node - 1] = used;
   const double length = rig.rest_length();
   std::vector<Event> events;

@@ -41,13 +41,13 @@ TEST(Figure4, the_nearest_is_the_nearest_of_all) {
     const Place p = rig.place(0.27f * static_cast<float>(k), 0.003f + 0.0007f * static_cast<float>(k % 7));
     const Pose circle = rig.circle_at({p.at - p.out * 0.0004f, p.out, p.along, p.up}, 0, 0);
     SolverState solver = rig.solver();
-    solver.body[kNeedle].x = circle.p - rotate(circle.q, rig.model->solver.needle_arc.centre);
+    solver.body[kNeedle].x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].centre);
     solver.body[kNeedle].q = circle.q;
     SutureState suture;
     std::vector<Event> events;
     puncture(rig.model->solver, solver, rig.state->scratch, rig.model->suture, suture, events);
     ASSERT_TRUE(suture.attached) << k;
-    const Vec3 tip = needle_tip(rig.model->solver.needle_arc, solver.body[kNeedle]);
+    const Vec3 tip = needle_tip(rig.model->solver.needle_arc[0], solver.body[kNeedle]);
     uint32_t best = 0;
     for (uint32_t i = 0; i < rig.model->solver.tissue; ++i)
       if (distance(xyz(solver.x[i]), tip) < distance(xyz(solver.x[best]), tip)) best = i;
@@ -67,7 +67,7 @@ TEST(Figure4, a_needle_that_nobody_holds_pierces_nothing) {
   rig.wait(0.1f);
   const Place p = rig.place(0.5f, 0.004f);
   const Pose circle = rig.circle_at({p.at - p.out * 0.0004f, p.out, p.along, p.up}, 0, 0);
-  rig.needle().x = circle.p - rotate(circle.q, rig.model->solver.needle_arc.centre);
+  rig.needle().x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].centre);
   rig.needle().q = circle.q;
   std::vector<Event> events;
   for (const bool held : {false, false, true}) {
@@ -157,7 +157,7 @@ void expect_like_never_begun(Rig& rig) {
   EXPECT_TRUE(rig.suture().point.empty());
   EXPECT_EQ(rig.thread().hold.size(), 1u);  // the swage
   EXPECT_TRUE(std::is_sorted(rig.thread().order.begin(), rig.thread().order.end()));
-  for (float r : rig.thread().rest) EXPECT_FLOAT_EQ(r, rig.model->solver.thread.spacing);
+  for (float r : rig.thread().rest) EXPECT_FLOAT_EQ(r, rig.model->solver.strand[0].spacing);
   EXPECT_EQ(rig.count(EventKind::bite_cancelled), 1u);
   ASSERT_EQ(rig.suture().bite.size(), 1u);
   EXPECT_TRUE(rig.suture().bite[0].cancelled);
@@ -165,7 +165,7 @@ void expect_like_never_begun(Rig& rig) {
   EXPECT_FALSE(rig.suture().bite[0].has_exit);
   // Collisions are as they were: off only for the swaged end and its neighbours.
   const size_t n = rig.thread().order.size();
-  for (size_t i = 0; i < n; ++i) EXPECT_EQ(rig.solver().thread_collides[i], i + 4 < n ? 1 : 0) << i;
+  for (size_t i = 0; i < n; ++i) EXPECT_EQ(rig.collides()[i], i + 4 < n ? 1 : 0) << i;
 }
 
 TEST(Bite, drawn_back_before_the_tip_came_out_leaves_nothing_behind) {

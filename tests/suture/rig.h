@@ -40,10 +40,16 @@ struct Rig {
   }
   SolverState& solver() { return state->solver; }
   SutureState& suture() { return state->suture; }
-  Thread& thread() { return state->solver.thread; }
+  Strand& thread() { return state->solver.strand[0]; }
+  // Per thread slot (relative): whether it collides.
+  std::vector<uint8_t> collides() {
+    std::vector<uint8_t> flag(model->solver.strand[0].count);
+    collision_flags(model->solver.strand[0], thread(), flag);
+    return flag;
+  }
   const Vec4* x() { return state->solver.x.data(); }
   RigidBody& needle() { return state->solver.body[kNeedle]; }
-  Vec3 tip() { return needle_tip(model->solver.needle_arc, needle()); }
+  Vec3 tip() { return needle_tip(model->solver.needle_arc[0], needle()); }
 
   void tick() {
     input.tick = state->tick;
@@ -80,7 +86,7 @@ struct Rig {
   // Moves the ghost evenly to `goal` (frame at the needle's circle's centre).
   void needle_to(const Pose& circle, float seconds) {
     if (ghost < 0) hold_needle();
-    const Pose goal{circle.p - rotate(circle.q, model->solver.needle_arc.centre), circle.q};
+    const Pose goal{circle.p - rotate(circle.q, model->solver.needle_arc[0].centre), circle.q};
     const Pose from = solver().weld[static_cast<size_t>(ghost)].target;
     const int ticks = std::max(1, static_cast<int>(std::lround(seconds / model->dt)));
     for (int i = 1; i <= ticks && !testing::Test::HasFatalFailure(); ++i) {
@@ -89,7 +95,7 @@ struct Rig {
       tick();
     }
   }
-  Pose circle() { return {transform(needle().pose(), model->solver.needle_arc.centre), needle().q}; }
+  Pose circle() { return {transform(needle().pose(), model->solver.needle_arc[0].centre), needle().q}; }
 
   // --- bites ---
   // At `angle` round the opening, `below` the rim.
@@ -145,8 +151,8 @@ struct Rig {
     std::vector<uint32_t> order = thread().order;
     std::sort(order.begin(), order.end());
     for (size_t i = 0; i < order.size(); ++i)
-      if (order[i] != model->solver.thread.first_slot + i) return false;
-    return order.size() == model->solver.thread.count;
+      if (order[i] != model->solver.strand[0].first_slot + i) return false;
+    return order.size() == model->solver.strand[0].count;
   }
   bool nothing_left_of_a_bite() {
     return solver().channel.empty() && !suture().attached && phase_of(suture()) == NeedlePhase::outside &&
@@ -185,7 +191,7 @@ inline void lock(Rig& rig, size_t node, Vec3 at) {
 
 // Lays nodes first..last (inclusive) evenly along `way` from `from`, one spacing apart, starting `skip` spacings away.
 inline void lay(Rig& rig, size_t first, size_t last, Vec3 from, Vec3 way, int direction) {
-  const float spacing = rig.model->solver.thread.spacing;
+  const float spacing = rig.model->solver.strand[0].spacing;
   for (size_t i = first; i <= last; ++i) {
     const size_t steps = direction > 0 ? i - first + 1 : last - i + 1;
     set(rig.solver().x[rig.thread().order[i]], from + way * (spacing * static_cast<float>(steps)));
@@ -196,7 +202,7 @@ inline void lay(Rig& rig, size_t first, size_t last, Vec3 from, Vec3 way, int di
 inline void put_needle(Rig& rig, Vec3 swage) {
   RigidBody& needle = rig.needle();
   needle.q = {};
-  needle.x = swage - rig.model->solver.needle_arc.point(0);
+  needle.x = swage - rig.model->solver.needle_arc[0].point(0);
   needle.prev_x = needle.x, needle.prev_q = needle.q;
   needle.v = needle.omega = {};
   rig.hold_needle();

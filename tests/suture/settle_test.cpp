@@ -52,13 +52,12 @@ float shorter_way(Tie& r) {
 void expect_fresh(Rig& r) {
   const StatePtr fresh = initial_state(*r.model);
   const SolverState &a = r.solver(), &b = fresh->solver;
-  EXPECT_EQ(a.thread.order, b.thread.order);
-  EXPECT_EQ(a.thread.rest, b.thread.rest);
-  EXPECT_EQ(a.thread.cut, b.thread.cut);
-  EXPECT_EQ(a.thread.anchor.size(), 0u);
-  ASSERT_EQ(a.thread.hold.size(), 1u);
-  EXPECT_EQ(a.thread.hold[0].kind, HoldKind::swage);
-  EXPECT_EQ(a.thread_collides, b.thread_collides);
+  EXPECT_EQ(a.strand[0].order, b.strand[0].order);
+  EXPECT_EQ(a.strand[0].rest, b.strand[0].rest);
+  EXPECT_EQ(a.strand[0].cut, b.strand[0].cut);
+  EXPECT_EQ(a.strand[0].anchor.size(), 0u);
+  ASSERT_EQ(a.strand[0].hold.size(), 1u);
+  EXPECT_EQ(a.strand[0].hold[0].kind, HoldKind::swage);
   EXPECT_EQ(a.weld.size(), 2u);
   EXPECT_TRUE(a.channel.empty());
   EXPECT_TRUE(r.suture().point.empty());
@@ -110,7 +109,7 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   EXPECT_EQ(events[1].kind, EventKind::suture_taken);
   EXPECT_EQ(events[1].which, 0u);
   EXPECT_EQ(r.suture().taken, 1u);
-  const uint32_t slots = r.model->solver.thread.first_slot;
+  const uint32_t slots = r.model->solver.strand[0].first_slot;
   for (uint32_t i = slots; i < r.model->solver.count; ++i) EXPECT_EQ(xyz(r.x()[i]), r.model->start[i]);
   EXPECT_EQ(r.needle().x, r.model->needle_start.p);
 }

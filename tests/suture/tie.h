@@ -36,7 +36,6 @@ struct Tie : Rig {
     stand(setup.above);
     lay_stitch();
     lay_strands(setup.turns, setup.way, setup.wrap_tail);
-    update_thread_collisions(model->solver, solver(), model->suture);
   }
   // Puts the tool where a new stitch wants it, jaws open: no way is flown.
   void put_tool() {
