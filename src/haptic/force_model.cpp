@@ -68,49 +68,88 @@ Vec3 linear_force(const ForcePatch& p, Vec3 x, Vec3 v) {
   return surface ? p.normal * std::max(0.0f, dot(damped, p.normal)) : damped;
 }
 
+namespace {
+
+constexpr float kStickTime = 0.005f;   // [s]
+constexpr float kFrictionPart = 0.1f;  // of the arm's stiffness that friction has at least
+
+// Every force of a patch but friction and what is left of a wall that gave way.
+Vec3 smooth_force(const ForceModel& m, Vec3 x, Vec3 v) { return linear_force(m.now, x, v) + m.change; }
+
+// [N/m] that friction may add to the patch's own stiffness along the directions it acts in.
+float room_for_friction(const ForcePatch& p, float budget) {
+  const Sym3& k = p.stiffness;
+  const Vec3 d = length2(p.along) > 0 ? p.along : p.normal;
+  const float along = dot(d, k * d), used = length2(p.along) > 0 ? along : k.xx + k.yy + k.zz - along;
+  return std::max(kFrictionPart * budget, budget - used);
+}
+
+}  // namespace
+
 void receive(ForceModel& m, const ForcePatch& patch, const ForceModelOptions& options) {
   const bool fresh = !m.any || patch.epoch != m.now.epoch || patch.topology != m.now.topology;
-  m.before = fresh ? patch : m.now;
+  const Vec3 before = smooth_force(m, m.last, m.velocity);
   m.now = patch;
-  m.since = 0;
-  m.blend = fresh ? 0 : options.blend * patch.period;
+  if (length2(patch.along) > 0 && patch.drag > 0)  // rubbed along the direction that the patch is stiff in, too
+    m.now.stiffness = clamp_eigenvalues(patch.stiffness, 0, (1 - kFrictionPart) * options.stiffness);
+  // The patch's own damping, and what its stiffness needs.
+  const Sym3 least = m.now.stiffness * options.damping_time;
+  m.now.damping = clamp_eigenvalues(m.now.damping + least, 0, options.damping);
+  m.change = fresh ? Vec3{} : before - linear_force(m.now, m.last, m.velocity);
+  m.fade = std::max(options.blend_least, options.blend * patch.period);
   if (fresh) m.pierced = false, m.dropped = 1;
-  if (patch.coefficient == 0 && patch.drag == 0) m.bristle = {};
+  if (patch.coefficient == 0 && patch.drag == 0) {
+    if (!fresh) m.change -= m.bristle;
+    m.bristle = {}, m.rub = 0;
+  }
 }
 
 Vec3 evaluate(ForceModel& m, Vec3 x, Vec3 v, float dt, const ForceModelOptions& options) {
   const Vec3 moved = m.any ? x - m.last : Vec3{};
   m.last = x;
+  m.velocity = v;
   m.any = true;
   const ForcePatch& p = m.now;
-  m.since += dt;
-  const float part = m.since < m.blend ? m.since / m.blend : 1.0f;
-  Vec3 f = linear_force(p, x, v);
-  if (part < 1) f = lerp(linear_force(m.before, x, v), f, part);
+  m.change *= std::exp(-dt / std::max(1e-4f, m.fade));
+  Vec3 f = smooth_force(m, x, v);
 
-  // Piercing happens between two ticks, and is felt when it happens.
+  // Piercing happens between two ticks, and is felt when it happens. Of the force only the wall's own gives way: not what a
+  // thread pulls, not damping.
   if (p.pierce_force > 0) {
-    const float against = -dot(f, p.pierce);
-    if (!m.pierced && against > p.pierce_force) m.pierced = true, m.pierced_at = against;
+    const float wall = -dot(linear_force(p, x, {}) + m.change - p.thread_direction * p.thread_tension, p.pierce);
+    if (!m.pierced && wall > p.pierce_force) m.pierced = true, m.pierced_at = wall, m.pierced_for = 0;
     if (m.pierced) {
-      m.dropped = std::max(p.pierce_keep, m.dropped - (1 - p.pierce_keep) * dt / options.drop_time);
-      const float left = std::min(against, m.pierced_at * m.dropped);
-      f += p.pierce * (against - left);
+      m.pierced_for += dt;
+      // The physics did not let the tip in after all (the hand drew back): the wall is there again.
+      if (m.pierced_for > options.unconfirmed + 2 * p.period) m.dropped += (1 - p.pierce_keep) * dt / options.wall_back;
+      else m.dropped = std::max(p.pierce_keep, m.dropped - (1 - p.pierce_keep) * dt / options.drop_time);
+      const float left = std::min(wall, m.pierced_at * m.dropped);
+      f += p.pierce * (wall - left);
+      if (m.dropped >= 1) m.pierced = false, m.dropped = 1;
     }
   }
 
-  // Dahl: the contact is dragged along and lags by at most `presliding`. dz = dx - z |dx| / presliding; force = -limit z /
-  // presliding. Bounded, continuous, and it gives back less than it took.
+  // Friction: elastic up to the limit, then it slips (Hayward and Armstrong 2000; the elastic range of the elasto-plastic model
+  // of Dupont, Hayward, Armstrong and Altpeter 2002). Below the limit nothing creeps, however much an encoder dithers. The
+  // spring never adds more than the arm can render beside the patch's own stiffness, and grows stiffer or softer without a step
+  // up.
   const float limit = p.drag + (p.coefficient > 0 ? p.coefficient * pressing(p, x) : 0);
+  m.rubbed = {};
   if (limit > 0) {
-    const Vec3 slide = allowed_slide(p, moved);
-    const float travel = std::min(1.0f, length(slide) / p.presliding);
-    m.bristle = allowed_slide(p, m.bristle + slide - m.bristle * travel);
+    const float room = room_for_friction(p, options.stiffness);
+    const float rub = std::min(room, std::max(m.rub, limit / p.presliding));
+    if (m.rub > rub) m.bristle *= rub / m.rub;  // a softer spring at the same stretch: it gives energy away, it makes none
+    m.rub = rub;
+    m.bristle = allowed_slide(p, m.bristle + allowed_slide(p, moved) * rub);
     const float l = length(m.bristle);
-    if (l > p.presliding) m.bristle *= p.presliding / l;
-    f -= m.bristle * (limit / p.presliding) + allowed_slide(p, v) * p.viscous;
+    if (l > limit) m.bristle *= limit / l;
+    // Damped while it stretches (LuGre's sigma 1); where it slips, that would only be more friction.
+    m.sticks += ((l > limit ? 0.0f : 1.0f) - m.sticks) * std::min(1.0f, dt / kStickTime);
+    m.rubbed = -m.bristle - allowed_slide(p, v) * (p.viscous + m.sticks * rub * options.damping_time);
+    f += m.rubbed;
   } else {
     m.bristle = {};
+    m.rub = 0;
   }
   return f;
 }

@@ -15,22 +15,33 @@ Vec3 linear_force(const ForcePatch& patch, Vec3 x, Vec3 v);
 
 // One hand's memory between two evaluations.
 struct ForceModel {
-  ForcePatch before, now;
+  ForcePatch now;
   bool any = false;
-  float since = 0;       // [s] since `now` came
-  float blend = 0;       // [s] over which `before` gives way to `now`; 0: at once
-  Vec3 last;             // [m] where the hand was
-  Vec3 bristle;          // [m] Dahl's state: how far the contact is dragged along, at most presliding
-  float dropped = 1;     // of the force along the tip: what is left of it since the tip went through, 1: it has not
-  float pierced_at = 0;  // [N] the force at which that was
+  Vec3 last, velocity;    // [m], [m/s] of the hand at the last evaluation
+  Vec3 change;            // [N] what the last patch would still give more than the newest: it fades, so no patch makes a step
+  float fade = 0;         // [s] time constant of that
+  Vec3 bristle;           // [N] friction: a spring that is dragged along and slips at the limit
+  float rub = 0;          // [N/m] that spring
+  float sticks = 0;       // 1: it is being stretched, 0: it slips; smoothed
+  Vec3 rubbed;            // [N] friction in the last force: it can only take energy
+  float dropped = 1;      // of the wall's force at the tip: what is left of it since the tip went through, 1: it has not
+  float pierced_at = 0;   // [N] the force at which that was
+  float pierced_for = 0;  // [s]
   bool pierced = false;
 };
 
 struct ForceModelOptions {
-  // Part of a physics period over which one patch gives way to the next. Interpolates the models' parameters: both are
-  // evaluated where the hand is now, so no frame of delay is added to the feel of moving.
-  float blend = 0.5f;
-  float drop_time = 0.004f;  // [s] from the peak to what is left when the tip goes through: 3 to 5 ms (assumption)
+  // Time constant over which one patch gives way to the next: this part of a physics period, at least `blend_least` [s], so
+  // that patches blend over several servo steps at any rate. What the hand's own motion changes is felt at once.
+  float blend = 0.3f, blend_least = 0.003f;
+  float drop_time = 0.004f;  // [s] from the peak to what is left when the tip goes through: 3 to 5 ms
+  // [s] within which the physics has to let the tip in as well; after that the wall comes back over `wall_back`.
+  float unconfirmed = 0.04f, wall_back = 0.05f;
+  // [s] damping of everything stiff, at least this times the stiffness: what keeps a spring still on an arm that moves some
+  // milliseconds late (Gil et al. 2009: stiffness < damping / (half a period + delay)).
+  float damping_time = 0.0025f;
+  float damping = 4;      // [N s/m] at most
+  float stiffness = 400;  // [N/m] of all springs together along any direction: what the arm can render
 };
 
 // A newer patch. A jump in time, or a change of topology, is taken over at once.

@@ -66,7 +66,8 @@ void fit_to_arm(ServoOptions& o, const ArmLimits& limits) {
   o.passivity.damping = std::min(o.passivity.damping, o.limits.damping);
 }
 
-ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample, const ForcePatch* fresh, uint64_t now_ns) {
+ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample, const ForcePatch* fresh, uint64_t now_ns,
+                    EnergyPool* pool, size_t k) {
   ServoOut out;
   const float gain = o.gain > 0 ? o.gain : o.place.scale;
   const bool ready = sample.state == ArmState::ready && length2(sample.pose.p) < kFarthest * kFarthest &&
@@ -91,20 +92,26 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
   const Pose world = to_world(o.place, {h.at, sample.pose.q});
   const Vec3 velocity = rotate(o.place.turn, h.velocity) * o.place.scale;
   h.fast = std::max(h.fast * std::exp(-dt / kFastTime), length(velocity));
+  // What the motors render is gain * scale times what is stiff in the field.
+  const float most = 1 / std::max(1e-6f, gain * o.place.scale);
+  ForceModelOptions model = o.model;
+  model.stiffness = o.limits.stiffness * most;
+  model.damping = o.limits.damping * most;
   if (fresh) {
     ForcePatch patch = *fresh;
-    // What the motors render is gain * scale times what is stiff in the field.
-    const float most = 1 / std::max(1e-6f, gain * o.place.scale);
     if (!make_safe(patch, o.limits.force / std::max(1e-6f, gain), o.limits.stiffness * most, o.limits.damping * most))
       h.limiter.faults |= kBadModel;
     if (h.has_patch && patch.epoch != h.epoch) disengage(h.limiter);
     h.epoch = patch.epoch;
     h.has_patch = true;
-    receive(h.model, patch, o.model);
+    receive(h.model, patch, model);
   }
   LimiterInput in;
+  PassivityInput net;
   if (h.has_patch) {
-    const Vec3 f = evaluate(h.model, world.p, velocity, dt, o.model);
+    const Vec3 f = evaluate(h.model, world.p, velocity, dt, model);
+    net.rubbed = rotate(conjugate(o.place.turn), h.model.rubbed) * gain;
+    net.stiffness = (length2(f) > 0 ? dot(f, h.model.now.stiffness * f) / length2(f) : 0) + h.model.rub;
     in.wanted = rotate(conjugate(o.place.turn), f) * gain;
     in.cap = h.model.now.cap * gain;
     in.expiry = h.model.now.expiry;
@@ -126,9 +133,16 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
   in.warmth = sample.warmth;
   in.ready = ready && !sample.forced_off && o.force;
   const Vec3 allowed = limit(h.limiter, in, dt, o.limiter);
-  PassivityOptions net = o.passivity;
-  if (h.limiter.engaged == Engaged::no || h.limiter.engaged == Engaged::waiting) net.damping = 0;  // off is off
-  out.force = keep_passive(h.passivity, h.at, h.velocity, allowed, o.limiter.force, dt, net);
+  PassivityOptions brake = o.passivity;
+  if (h.limiter.engaged == Engaged::no || h.limiter.engaged == Engaged::waiting) brake.damping = 0;  // off is off
+  // Softened, capped or on its ramp, the spring that the hand feels is softer than the patch's by as much.
+  const float wanted = length(in.wanted), part = wanted > 0 ? std::min(1.0f, length(allowed) / wanted) : 1;
+  net.x = h.at, net.v = h.velocity, net.dt = dt;
+  net.force = allowed, net.rubbed *= part, net.most = o.limiter.force;
+  net.stiffness *= part / most;
+  net.lent = pool ? lent_to(*pool, k) : 0;
+  out.force = keep_passive(h.passivity, net, brake);
+  if (pool) settle(*pool, k, h.passivity, dt);
   if (h.passivity.braking) h.limiter.faults |= kGenerated;
 
   const uint32_t down = sample.buttons & ~h.buttons;

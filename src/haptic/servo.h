@@ -65,7 +65,8 @@ struct ServoOut {
 };
 
 // fresh: null when the physics has published nothing since. now_ns: the clock that stamps ForcePatch::time_ns.
+// pool: null, or what both hands share, of which this is hand k.
 ServoOut servo_step(ServoHand& hand, const ServoOptions& options, const ArmSample& sample, const ForcePatch* fresh,
-                    uint64_t now_ns);
+                    uint64_t now_ns, EnergyPool* pool = nullptr, size_t k = 0);
 
 }  // namespace catgut

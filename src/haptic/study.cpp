@@ -109,7 +109,10 @@ StudyRow run_study(const StudyCase& c) {
     if (c.rendering == Rendering::held_and_net) {
       PassivityOptions o;
       o.slew = 1e9f;
-      f = keep_passive(net, {x, 0, 0}, {v, 0, 0}, {f, 0, 0}, kClamp, kStep, o).x;
+      PassivityInput in;
+      in.x = {x, 0, 0}, in.v = {v, 0, 0}, in.force = {f, 0, 0};
+      in.most = kClamp, in.dt = kStep;
+      f = keep_passive(net, in, o).x;
     }
     const double error = double{f} - double{std::min(kClamp, press(c, x).force)};
     square += error * error;

@@ -81,6 +81,7 @@ struct ArmServer::Work {
   uint16_t listens = 0;
   std::array<Side, 2> side;
   std::atomic<uint64_t> counter{0};  // of all that is sealed, whatever the session
+  EnergyPool pool;                   // of the servos
   std::thread receiver;
   std::atomic<bool> quit{false};
   std::atomic<uint64_t> accepted{0}, garbage{0}, version{0}, forged{0}, nonsense{0}, stranger{0}, old{0};
@@ -146,7 +147,7 @@ Vec3 ArmServer::Work::step(void* user, size_t arm, const ArmSample& sample) {
     disengage(s.servo.limiter);
   }
   const bool ordered = fresh && peer.bytes > 0 && order.session == peer.session;
-  const Vec3 force = servo_step(s.servo, s.options, sample, ordered ? &order.patch : nullptr, now).force;
+  const Vec3 force = servo_step(s.servo, s.options, sample, ordered ? &order.patch : nullptr, now, &w.pool, arm).force;
   s.faults.fetch_or(s.servo.limiter.faults, std::memory_order_relaxed);
   if (s.servo.steps % kFaultsFor == 0) s.recent = 0;
   s.recent |= s.servo.limiter.faults;

@@ -19,7 +19,6 @@ constexpr float kMoved = 0.0005f;  // [m] that half a newton moves any hand
 struct Side {
   // The servo's.
   Limiter limiter;
-  Passivity net;
   LimiterOptions limits;
   Vec3 from, last;
   size_t axis = 3;

@@ -72,6 +72,7 @@ struct Haptics::Work {
   ArmPort port;
   std::array<Side, 2> side;
   uint64_t (*clock)() = wall_ns;
+  EnergyPool pool;  // of the servos
 
   void send(size_t k, const ForcePatch& patch) {
     Side& s = side[k];
@@ -84,7 +85,7 @@ struct Haptics::Work {
     Side& s = w.side[arm];
     const uint64_t now = w.clock();
     const bool fresh = s.patch.update();
-    const ServoOut out = servo_step(s.servo, s.options, sample, fresh ? &s.patch.seen() : nullptr, now);
+    const ServoOut out = servo_step(s.servo, s.options, sample, fresh ? &s.patch.seen() : nullptr, now, &w.pool, arm);
     s.hand.draft() = {out.hand, sample.time_ns > 0 ? sample.time_ns : now};
     s.hand.publish();
     s.faults.fetch_or(s.servo.limiter.faults, std::memory_order_relaxed);

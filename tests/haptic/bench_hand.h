@@ -1,11 +1,14 @@
 // tests/haptic: a hand, an arm and a piece of tissue in lock step, around the real servo. The arm has mass and friction, the
 // hand is a spring to where it means to be, the tissue is a wall that a needle can go through, worked out at any rate and heard
-// one frame late, as a simulation is.
+// one frame late, as a simulation is. Unkind arms read their position in steps, move late and are called late or not at all.
 #pragma once
 #include <cmath>
+#include <deque>
 #include <functional>
+#include <utility>
 #include <vector>
 
+#include "core/random.h"
 #include "haptic/servo.h"
 
 namespace catgut {
@@ -20,6 +23,19 @@ struct BenchTissue {
   bool held = false;       // the tool holds tissue: a spring both ways, and nothing slides
 };
 
+// What a real arm does and an ideal one does not.
+struct Unkind {
+  float encoder = 0;    // [m] step of the position (Touch: 0.055 mm)
+  float transport = 0;  // [s] from the call that computes a force to the motors
+  float jitter = 0;     // [s] standard deviation of the period
+  float late = 0;       // chance of a call that comes 2 to 8 ms late
+  float lost = 0;       // chance of a call that never comes
+  // Of a bridge: [s] each way, [s] of spread, chance of a lost packet.
+  float link = 0, link_jitter = 0, link_lost = 0;
+};
+// A Touch on a busy computer, with the transport delay given.
+inline Unkind touch_like(float transport = 0.002f) { return {5.5e-5f, transport, 5e-5f, 0.002f, 0.002f, 0, 0, 0}; }
+
 struct Bench {
   BenchTissue tissue;
   float rate = 60;        // [1/s] of the physics
@@ -28,6 +44,9 @@ struct Bench {
   float viscous = 0.5f;   // [N s/m]
   float coulomb = 0.05f;  // [N] of the arm
   float grip = 150, grip_damping = 2;
+  Unkind unkind;
+  EnergyPool* pool = nullptr;       // shared with the other hand, and
+  size_t hand = 0;                  // which of the two this is
   std::function<Vec3(float)> path;  // [m] where the hand means to be
 
   ServoHand servo;
@@ -35,10 +54,14 @@ struct Bench {
   Vec3 x{0, 0.005f, 0}, v;
   bool pierced = false;
   uint32_t topology = 0;
-  double energy = 0, energy_most = 0;  // [J] into the hand
-  float step_most = 0;                 // [N] from one millisecond to the next
+  uint64_t ticks = 0;
+  double energy = 0, energy_most = 0;    // [J] out of the motors
+  double to_hand = 0, to_hand_most = 0;  // [J] of that, what the arm's own damping leaves for the hand
+  float step_most = 0;                   // [N] from one call to the next
   float force_most = 0;
-  Vec3 force;
+  float gap_most = 0;  // [s] between two calls
+  Vec3 force;          // of the last call
+  Vec3 motors;         // [N] that act
   uint64_t now_ns = 1000000000;
   float time = 0;
   float next = 0;
@@ -46,21 +69,41 @@ struct Bench {
   bool thought = false;
   std::function<void(ForcePatch&)> spoil;    // what a bad simulation sends
   std::function<bool(float)> physics_works;  // false: it is stalled
+  // Of unkind arms: what is under way, with the time at which it arrives [tenths of a millisecond since the beginning].
+  Random chance{11};
+  uint64_t part = 0, next_call = 0;
+  std::deque<std::pair<uint64_t, Vec3>> to_motors;
+  std::vector<std::pair<uint64_t, ForcePatch>> patches;
+  std::deque<std::pair<uint64_t, Vec3>> samples;  // on their way to the physics
+  Vec3 seen{0, 0.005f, 0};                        // the newest that arrived there
+  uint64_t seen_ns = 0;
+  ForcePatch arrived;
+  bool any_arrived = false;
+
+  static uint64_t parts(float seconds) { return static_cast<uint64_t>(std::lround(std::max(0.0f, seconds) * 1e4f)); }
+  Vec3 sampled() const {
+    if (unkind.encoder <= 0) return x;
+    const auto step = [this](float f) { return std::round(f / unkind.encoder) * unkind.encoder; };
+    return {step(x.x), step(x.y), step(x.z)};
+  }
+  bool linked() const { return unkind.link > 0 || unkind.link_lost > 0 || unkind.link_jitter > 0; }
+  uint64_t through_link() { return part + parts(unkind.link + unkind.link_jitter * chance.uniform()); }
 
   float wall_force(float z) const { return tissue.a1 * z + tissue.a2 * z * z; }
   ForcePatch think() {
     ForcePatch p;
+    p.tick = ++ticks;
     p.period = 1 / rate;
-    p.time_ns = now_ns;
-    p.point = x;
+    p.time_ns = linked() ? seen_ns : now_ns;
+    p.point = seen;
     if (tissue.held) {
       const float k = tissue.a1 * tissue.coupling / (tissue.a1 + tissue.coupling);
-      p.force = x * -k;
+      p.force = seen * -k;
       p.stiffness = identity(k);
       return p;
     }
     // coupling (u) = f(z), u + z = depth of the hand.
-    const float depth = -x.y;
+    const float depth = -seen.y;
     if (pierced && depth < 0) pierced = false, ++topology;
     if (pierced) {
       p.drag = tissue.cutting + tissue.drag * depth;
@@ -75,7 +118,7 @@ struct Bench {
         p.force = {0, wall_force(z), 0};
         p.gap = p.force.y / slope;
       } else {
-        p.point = {x.x, 0, x.z};
+        p.point = {seen.x, 0, seen.z};
       }
       p.coefficient = tissue.friction;
       if (tissue.pierce_force > 0) {
@@ -94,54 +137,104 @@ struct Bench {
     return p;
   }
 
+  void physics() {
+    if (!linked()) seen = sampled(), seen_ns = now_ns;
+    for (; !samples.empty() && samples.front().first <= part; samples.pop_front())
+      if (samples.front().first > 0)
+        seen = samples.front().second, seen_ns = now_ns - static_cast<uint64_t>(1e9f * unkind.link);
+    if (time < next - 1e-6f) return;
+    next += 1 / rate;
+    const bool works = !physics_works || physics_works(time);
+    ForcePatch fresh;
+    bool any = false;
+    if (!late && works) fresh = think(), any = true;
+    if (late && thought) fresh = thinking, any = true, thought = false;
+    if (late && works) thinking = think(), thought = true;
+    if (!any) return;
+    if (!linked()) fresh.time_ns = now_ns;
+    if (spoil) spoil(fresh);
+    if (chance_of(unkind.link_lost)) return;
+    patches.emplace_back(linked() ? through_link() : part, fresh);
+  }
+  bool chance_of(float p) { return p > 0 && chance.uniform() < p; }
+
+  // The servo's call, and when the next one comes.
+  void call() {
+    // Of what has arrived the newest: what was overtaken on its way is dropped, as the bridge does.
+    const ForcePatch* newest = nullptr;
+    for (auto at = patches.begin(); at != patches.end();) {
+      if (at->first > part) {
+        ++at;
+        continue;
+      }
+      if (!any_arrived || at->second.tick >= arrived.tick) arrived = at->second, any_arrived = true, newest = &arrived;
+      at = patches.erase(at);
+    }
+    ForcePatch taken;
+    if (newest) {
+      taken = *newest;
+      if (linked()) {  // runtime/arm_server's accept_patch
+        taken.period += 1e-9f * static_cast<float>(now_ns - std::min(now_ns, taken.time_ns));
+        taken.expiry = std::min(taken.expiry, 0.03f);
+        taken.time_ns = now_ns;
+      }
+      newest = &taken;
+    }
+    ArmSample sample;
+    sample.state = ArmState::ready;
+    sample.pose.p = sampled();
+    const Vec3 before = force;
+    force = servo_step(servo, options, sample, newest, now_ns, pool, hand).force;
+    step_most = std::max(step_most, length(force - before));
+    force_most = std::max(force_most, length(force));
+    to_motors.emplace_back(part + parts(unkind.transport), force);
+    if (linked() && !chance_of(unkind.link_lost)) samples.emplace_back(through_link(), sample.pose.p);
+    uint64_t period = 10;
+    if (unkind.jitter > 0) {
+      const float spread = chance.uniform() + chance.uniform() + chance.uniform() - 1.5f;  // deviation 1/2
+      period = std::max<uint64_t>(5, parts(0.001f + 2 * unkind.jitter * spread));
+    }
+    if (chance_of(unkind.lost)) period += 10;
+    if (chance_of(unkind.late)) period += parts(0.002f + 0.006f * chance.uniform());
+    next_call = part + period;
+    gap_most = std::max(gap_most, 1e-4f * static_cast<float>(period));
+  }
+
   void run(float seconds) {
     const int steps = static_cast<int>(std::lround(seconds / 0.001f));
-    for (int i = 0; i < steps; ++i) {
-      ForcePatch fresh;
-      bool any = false;
-      if (time >= next - 1e-6f) {
-        next += 1 / rate;
-        const bool works = !physics_works || physics_works(time);
-        if (!late && works) fresh = think(), any = true;
-        if (late && thought) fresh = thinking, any = true, thought = false;
-        if (late && works) thinking = think(), thought = true;
-        if (any) fresh.time_ns = now_ns;
-        if (any && spoil) spoil(fresh);
-      }
-      ArmSample sample;
-      sample.state = ArmState::ready;
-      sample.pose.p = x;
-      const Vec3 before = force;
-      force = servo_step(servo, options, sample, any ? &fresh : nullptr, now_ns).force;
-      step_most = std::max(step_most, length(force - before));
-      force_most = std::max(force_most, length(force));
+    for (int i = 0; i < 10 * steps; ++i) {
+      if (part % 10 == 0) physics();
+      if (part >= next_call) call();
+      for (; !to_motors.empty() && to_motors.front().first <= part; to_motors.pop_front()) motors = to_motors.front().second;
       const Vec3 from = x;
-      constexpr int kParts = 10;
-      for (int k = 0; k < kParts; ++k) {
-        const float h = 0.001f / kParts, at = time + h * static_cast<float>(k);
-        const Vec3 wish = path(at), speed = (path(at + h) - wish) / h;
-        v += (force + (wish - x) * grip + (speed - v) * grip_damping - v * viscous) * (h / mass);
-        // Dry friction takes speed away and never turns it round.
-        const float slow = coulomb * h / mass, l = length(v);
-        v = l > slow ? v * (1 - slow / l) : Vec3{};
-        x += v * h;
-      }
-      energy += double{dot(force, x - from)};
+      constexpr float h = 1e-4f;
+      const float at = time + h * static_cast<float>(part % 10);
+      const Vec3 wish = path(at), speed = (path(at + h) - wish) / h;
+      v += (motors + (wish - x) * grip + (speed - v) * grip_damping - v * viscous) * (h / mass);
+      // Dry friction takes speed away and never turns it round.
+      const float slow = coulomb * h / mass, l = length(v);
+      v = l > slow ? v * (1 - slow / l) : Vec3{};
+      x += v * h;
+      energy += double{dot(motors, x - from)};
       energy_most = std::max(energy_most, energy);
-      now_ns += 1000000;
-      time += 0.001f;
+      to_hand += double{dot(motors - v * viscous, x - from)};
+      to_hand_most = std::max(to_hand_most, to_hand);
+      now_ns += 100000;
+      if (++part % 10 == 0) time += 0.001f;
     }
   }
   // Until the arm is engaged and at full force: the hand waits above the tissue.
   void warm_up(Vec3 at) {
     const auto wanted = path;
+    seen = at;
     path = [at](float) { return at; };
     x = at;
     run(2.3f);
     path = wanted;
     time = next = 0;
-    energy = energy_most = 0;
+    energy = energy_most = to_hand = to_hand_most = 0;
     step_most = force_most = 0;
+    gap_most = 0;
     servo.passivity = {};
   }
 };
