@@ -62,6 +62,7 @@ void check_stiffness(Lines& out);
 void check_momentum(Lines& out);
 void check_rotation(Lines& out);
 void check_volume(Lines& out);
+void check_wall(Lines& out);
 // src/thread. nightly: the whole range of each; otherwise what a few seconds allow.
 void check_capstan(Lines& out, bool nightly);
 void check_overhand(Lines& out, bool nightly);

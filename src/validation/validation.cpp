@@ -112,6 +112,7 @@ std::vector<ValidationLine> run_validation(const std::function<void(const Valida
   validation::check_momentum(lines);
   validation::check_rotation(lines);
   validation::check_volume(lines);
+  validation::check_wall(lines);
   validation::check_capstan(lines, nightly);
   validation::check_overhand(lines, nightly);
   validation::check_holding(lines, nightly);

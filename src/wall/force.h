@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// wall/force: the element formula on sixteen elements at once.
+#pragma once
+#include <cstdint>
+
+#include "wall/column.h"
+#include "wall/element.h"
+
+namespace catgut::wall {
+
+constexpr uint32_t kLanesOfBlock = 16;
+
+// Sixteen elements of one kind; lanes beyond the last element have no stiffness.
+struct alignas(64) ElementBlock {
+  float constant[kConstants][kLanesOfBlock] = {};
+};
+struct alignas(64) BlockCorners {
+  uint32_t column[4][kLanesOfBlock] = {};
+  uint32_t quads = 1;  // 0: triangles
+};
+struct alignas(64) BlockTurn {
+  float x[kLanesOfBlock] = {}, y[kLanesOfBlock] = {}, z[kLanesOfBlock] = {}, w[kLanesOfBlock];
+};
+// Forces on the columns at the corners of each element.
+struct alignas(64) BlockForce {
+  Float4 mid[4][kLanesOfBlock], dir[4][kLanesOfBlock];
+};
+
+// Forces of blocks [first, last) at y (mid-surface point and director of each column in turn); turns the frames by one step.
+// Multiplications and additions are kept apart, and lanes do not mix: every instruction set gives the same bits.
+void block_forces(const ElementBlock* block, const BlockCorners* corners, const Float4* y, BlockTurn* turn, BlockForce* force,
+                  uint32_t first, uint32_t last);
+
+}  // namespace catgut::wall

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// wall: a soft organ wall whose stiffness is the material's. Solid-shell elements (wall/element) on columns of an outer and an
+// inner node, moved by a symplectic step whose mass matrix is enlarged for relative motion only ("selective mass scaling",
+// Olovsson, Simonsson, Unosson 2005, doi 10.1002/nme.1293; inertia as a factored stiffness bound):
+//
+//   f = forces at x + tau v                      tau = h / 4: damping that vanishes at rest
+//   v = exp(-drag h) v + h A^-1 f                A = M + h^2 c L on mid-surface points, a diagonal on directors
+//   impulses of everything else: v += A^-1 J^T p
+//   x = x + h v
+//
+// A resting state has zero force whatever A is, so neither step nor mesh changes the stiffness. L does not act on rigid
+// translation: mass and linear momentum are true. c is chosen at build time so that the largest eigenvalue of h^2 A^-1 K is at
+// most 1.2 (the step is stable below 2.67). Frames: positions in the scene's frame, metres, seconds, newtons.
+#pragma once
+#include <string>
+
+#include "core/jobs.h"
+#include "wall/factor.h"
+#include "wall/force.h"
+#include "wall/laminate.h"
+#include "wall/mesh.h"
+
+namespace catgut::wall {
+
+struct Spec {
+  Mesh mesh;
+  std::vector<Layer> layer{Layer{}};
+  float density = 1050;   // [kg/m^3]
+  float step = 0.001f;    // [s]
+  float drag = 5;         // [1/s] of all motion, beside the damping of strain
+  Vec3 gravity{0, 0, 0};  // [m/s^2]
+};
+
+// What the solver chose, for reports.
+struct InertiaReport {
+  float scale = 0;          // c
+  float largest = 0;        // eigenvalue of h^2 A^-1 K
+  float apparent_mass = 0;  // median over the columns: mass felt by a short push on one, relative to its own
+  uint32_t entries = 0;     // of the factor
+  float rest_mass = 0;      // [kg] of the wall
+};
+
+// Constant after build_wall.
+struct Model {
+  Mesh mesh;  // at rest
+  Laminate laminate;
+  float step = 0, drag = 0, tau = 0;  // [s], [1/s], [s]
+  float max_speed = 3;                // [m/s]
+  Vec3 gravity;
+  std::vector<ElementBlock> block;
+  std::vector<uint32_t> lane_of_face;  // block * 16 + lane
+  std::vector<uint32_t> face_of_lane;  // kNone: an empty lane
+  // Per lane, shared evenly by the corners where they are one number.
+  struct LaneInertia {
+    float mass;     // [kg] per corner
+    float edge[6];  // [N/m] between corners 01 12 23 30 02 13: the stiffness bound
+    float dir;      // [N/m] per corner, of directors
+  };
+  std::vector<LaneInertia> inertia;
+  InertiaReport report;
+};
+
+// Changes in every step.
+struct Motion {
+  Column<Float4> x, v;  // [m], [m/s]: mid-surface point and director of each column in turn
+  std::vector<BlockTurn> turn;
+  uint64_t clamped = 0;  // columns that met the speed limit, over all steps
+};
+
+// Changes when the wall is cut or factored again. A column that was cut is a group of copies that share a row of the factor.
+struct Topology {
+  uint32_t version = 0;                             // counts changes
+  std::vector<BlockCorners> corners;                // columns
+  std::vector<uint32_t> source;                     // per column: the column at rest it is a copy of
+  std::vector<float> mass;                          // [kg] per column
+  std::vector<float> inv_dir;                       // [1/kg] per column; 0: held
+  std::vector<uint32_t> slot;                       // per column: place in the factor's order; kNone: held
+  std::vector<float> share, relative;               // per column: share of its group's mass; [1/kg] of motion against the group
+  std::vector<uint32_t> group_first, group_member;  // groups of two columns and more
+  std::vector<uint32_t> gather_first, gather_from;  // per column: (block * 4 + corner) * 16 + lane
+  Factor factor;
+};
+
+struct State {
+  Topology topology;
+  Motion motion;
+};
+
+// Workspace: nothing in it lasts from step to step.
+struct Scratch {
+  Column<Float4> y, force, external, answer;
+  Column<Float4> rhs;
+  std::vector<BlockForce> block_force;
+};
+
+struct Wall {
+  Model model;
+  State state;
+  Scratch scratch;
+};
+
+// Throws InputError for a mesh, material or step that cannot be simulated.
+Wall build_wall(const Spec& spec);
+Scratch make_scratch(const Model& model, const State& state);
+
+inline uint32_t columns(const State& s) { return static_cast<uint32_t>(s.topology.source.size()); }
+inline Vec3 outer(const State& s, uint32_t c) { return vec3(s.motion.x[2 * c]) + vec3(s.motion.x[2 * c + 1]); }
+inline Vec3 inner(const State& s, uint32_t c) { return vec3(s.motion.x[2 * c]) - vec3(s.motion.x[2 * c + 1]); }
+
+// The first half of a step: forces, and velocities that would follow without impulses. scratch.external (2 per column: on
+// mid-surface point and director, newtons) is added and then cleared.
+void begin_step(const Model& model, State& state, Scratch& scratch, Jobs& jobs);
+// The second half: the speed limit, and positions.
+void finish_step(const Model& model, State& state, Jobs& jobs);
+
+// v += A^-1 p for impulses p (2 per column, [N s]), which may be the scratch's `external`.
+void apply_impulses(State& state, Scratch& scratch, const Column<Float4>& impulse);
+
+// Elastic forces at the present positions, 2 per column, into scratch.force. Frames are turned `turns` steps first.
+void elastic_forces(const Model& model, State& state, Scratch& scratch, int turns = 1);
+
+// Largest eigenvalue of h^2 A^-1 K about the present positions. stiff: as if every fiber were beyond its knee.
+float largest_eigenvalue(const Model& model, const State& state, Scratch& scratch, bool stiff, int iterations = 60);
+
+// Masses, director inertia and gather lists from the corners; then, with `again`, a new factor in which every column has a row
+// of its own. The motion goes on undisturbed.
+void renew_topology(const Model& model, Topology& topology, bool again);
+
+template <class Archive>
+void reflect(Archive& a, BlockCorners& c) {
+  a("column", c.column), a("quads", c.quads);
+}
+template <class Archive>
+void reflect(Archive& a, BlockTurn& t) {
+  a("x", t.x), a("y", t.y), a("z", t.z), a("w", t.w);
+}
+template <class Archive>
+void reflect(Archive& a, Motion& m) {
+  a("x", m.x), a("v", m.v), a("turn", m.turn), a("clamped", m.clamped);
+}
+template <class Archive>
+void reflect(Archive& a, Topology& t) {
+  a("version", t.version), a("corners", t.corners), a("source", t.source), a("mass", t.mass), a("inv_dir", t.inv_dir);
+  a("slot", t.slot), a("share", t.share), a("relative", t.relative);
+  a("group_first", t.group_first), a("group_member", t.group_member);
+  a("gather_first", t.gather_first), a("gather_from", t.gather_from), a("factor", t.factor);
+}
+template <class Archive>
+void reflect(Archive& a, State& s) {
+  a("topology", s.topology), a("motion", s.motion);
+}
+
+}  // namespace catgut::wall
