@@ -16,7 +16,8 @@ struct alignas(64) ElementBlock {
 };
 struct alignas(64) BlockCorners {
   uint32_t column[4][kLanesOfBlock] = {};
-  uint32_t quads = 1;  // 0: triangles
+  uint32_t quads = 1;        // 0: triangles
+  uint32_t unused[15] = {};  // no padding: a state is hashed as bytes
 };
 struct alignas(64) BlockTurn {
   float x[kLanesOfBlock] = {}, y[kLanesOfBlock] = {}, z[kLanesOfBlock] = {}, w[kLanesOfBlock];

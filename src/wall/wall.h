@@ -10,7 +10,8 @@
 //
 // A resting state has zero force whatever A is, so neither step nor mesh changes the stiffness. L does not act on rigid
 // translation: mass and linear momentum are true. c is chosen at build time so that the largest eigenvalue of h^2 A^-1 K is at
-// most 1.2 (the step is stable below 2.67). Frames: positions in the scene's frame, metres, seconds, newtons.
+// most 1.05, and stays below about 1.2 when the wall is cut (the step is stable below 2.67). Frames: positions in the scene's
+// frame, metres, seconds, newtons.
 #pragma once
 #include <string>
 
@@ -69,13 +70,14 @@ struct Motion {
 
 // Changes when the wall is cut or factored again. A column that was cut is a group of copies that share a row of the factor.
 struct Topology {
-  uint32_t version = 0;                             // counts changes
-  std::vector<BlockCorners> corners;                // columns
-  std::vector<uint32_t> source;                     // per column: the column at rest it is a copy of
-  std::vector<float> mass;                          // [kg] per column
-  std::vector<float> inv_dir;                       // [1/kg] per column; 0: held
-  std::vector<uint32_t> slot;                       // per column: place in the factor's order; kNone: held
-  std::vector<float> share, relative;               // per column: share of its group's mass; [1/kg] of motion against the group
+  uint32_t version = 0;               // counts changes
+  std::vector<BlockCorners> corners;  // columns
+  std::vector<uint32_t> source;       // per column: the column at rest it is a copy of
+  std::vector<float> mass;            // [kg] per column
+  std::vector<float> inv_dir;         // [1/kg] per column; 0: held
+  std::vector<uint32_t> slot;         // per column: place in the factor's order; kNone: held
+  // Per column: its share of its group's mass; [1/kg] of motion against the group; the group's sum of share^2 * relative.
+  std::vector<float> share, relative, spread;
   std::vector<uint32_t> group_first, group_member;  // groups of two columns and more
   std::vector<uint32_t> gather_first, gather_from;  // per column: (block * 4 + corner) * 16 + lane
   Factor factor;
@@ -141,7 +143,7 @@ void reflect(Archive& a, Motion& m) {
 template <class Archive>
 void reflect(Archive& a, Topology& t) {
   a("version", t.version), a("corners", t.corners), a("source", t.source), a("mass", t.mass), a("inv_dir", t.inv_dir);
-  a("slot", t.slot), a("share", t.share), a("relative", t.relative);
+  a("slot", t.slot), a("share", t.share), a("relative", t.relative), a("spread", t.spread);
   a("group_first", t.group_first), a("group_member", t.group_member);
   a("gather_first", t.gather_first), a("gather_from", t.gather_from), a("factor", t.factor);
 }

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// wall/contact: contact with friction by impulses. All contacts of a step are solved together on the full compliance W = J A^-1
+// J^T (projected Gauss-Seidel, Moreau's time stepping; Jourdan, Alart, Jean 1998, doi 10.1016/S0045-7825(97)00080-3): a W cut
+// to neighbors or to its diagonal gave forces that flickered or were eight times wrong. The last step's impulses are given to
+// the wall's main solve, so that a resting contact is exact and only changes are iterated.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wall/points.h"
+
+namespace catgut::wall {
+
+// A plane, or a capsule from a to b. Points of the capsule move at the velocities of its ends.
+struct Obstacle {
+  enum class Kind : uint8_t { plane, capsule } kind = Kind::capsule;
+  Vec3 a, b;              // [m] capsule: ends of its axis; plane: a point of it, and its unit normal
+  float radius = 0;       // [m]
+  Vec3 speed_a, speed_b;  // [m/s] of the ends; plane: of all of it
+  float friction = 0.3f;
+};
+
+struct Contact {
+  uint64_t key = 0;  // obstacle, face or column, side: finds the impulses of the last step
+  Weights point;     // of the wall
+  Weights other;     // of the wall too, where `self`; it takes the opposite impulse
+  bool self = false;
+  uint32_t obstacle = 0;
+  float along = 0;  // capsule: where on its axis, 0 at a
+  Vec3 normal;      // out of the obstacle (self: out of the other side), unit
+  float gap = 0;    // [m] at the start of the step
+  Vec3 speed;       // [m/s] of the obstacle there
+  float friction = 0;
+  Vec3 impulse;  // [N s] on `point`
+};
+
+struct ContactSolver {
+  float reach = 0.0003f;  // [m] gaps up to this, and what two steps of the relative motion close, are looked at
+  float push_out = 0.2f;  // [m/s] fastest undoing of an overlap
+  // Contacts close to each other move almost as one, so plain sweeps converge slowly: they are driven on as nonsmooth nonlinear
+  // conjugate gradients (Silcowitz, Niebe, Erleben 2010, doi 10.1007/s00371-010-0502-6). At rest the warm start leaves little.
+  int sweeps = 100;                    // at most
+  float accuracy = 1e-4f;              // of the largest impulse: a sweep that changes less is the last one
+  int swept = 0;                       // in the last step
+  std::vector<Contact> contact, last;  // of this step and of the last one, in the order of their keys
+  std::vector<Vec3> force, torque;     // per obstacle: [N] and [N m] about the scene's origin, of the wall on it
+  Inverse inverse{512};
+  // Workspace.
+  std::vector<float> w;
+  std::vector<Vec3> speed, change, before, onward;
+  std::vector<Weights> points;
+};
+
+// Before begin_step: finds what may touch and gives last step's impulses to the wall (scratch.external). Self contacts may then
+// be added to `contact` by whoever knows of them, with keys above all others.
+void find_contacts(const Model& model, const State& state, std::span<const Obstacle> obstacle, ContactSolver& solver);
+void warm_start(const Model& model, Scratch& scratch, ContactSolver& solver);
+// After begin_step: corrections, and the velocities that follow from them.
+void solve_contacts(const Model& model, State& state, Scratch& scratch, std::span<const Obstacle> obstacle,
+                    ContactSolver& solver);
+
+// Contacts that last from step to step are state.
+template <class Archive>
+void reflect(Archive& a, Weights& w) {
+  a("column", w.column), a("weight", w.weight), a("zeta", w.zeta);
+}
+template <class Archive>
+void reflect(Archive& a, Contact& c) {
+  a("key", c.key), a("point", c.point), a("other", c.other), a("self", c.self), a("impulse", c.impulse), a("normal", c.normal);
+}
+template <class Archive>
+void reflect(Archive& a, ContactSolver& s) {
+  a("contact", s.contact);
+}
+
+}  // namespace catgut::wall

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+// wall/points: see the header.
+#include "wall/points.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/check.h"
+
+namespace catgut::wall {
+
+Weights weights(const Model& m, const Topology& t, const Point& p) {
+  const uint32_t lane = m.lane_of_face[p.face], block = lane / kLanesOfBlock, in = lane % kLanesOfBlock;
+  Weights w;
+  w.zeta = p.zeta;
+  for (int k = 0; k < 4; ++k) w.column[k] = t.corners[block].column[k][in];
+  if (t.corners[block].quads) {
+    const float a = 1 - p.xi, b = 1 + p.xi, c = 1 - p.eta, d = 1 + p.eta;
+    w.weight[0] = 0.25f * a * c, w.weight[1] = 0.25f * b * c, w.weight[2] = 0.25f * b * d, w.weight[3] = 0.25f * a * d;
+  } else {
+    w.weight[1] = 0.5f * p.xi, w.weight[2] = 0.5f * p.eta, w.weight[0] = 1 - w.weight[1] - w.weight[2];
+  }
+  return w;
+}
+
+Weights at_column(uint32_t column, float zeta) { return {{column, column, column, column}, {1, 0, 0, 0}, zeta}; }
+
+namespace {
+Vec3 sum(const Weights& w, const Column<Float4>& of) {
+  Vec3 out{};
+  for (int k = 0; k < 4; ++k)
+    if (w.weight[k] != 0) out += (vec3(of[2 * w.column[k]]) + vec3(of[2 * w.column[k] + 1]) * w.zeta) * w.weight[k];
+  return out;
+}
+}  // namespace
+
+Vec3 place(const Weights& w, const Motion& motion) { return sum(w, motion.x); }
+Vec3 velocity(const Weights& w, const Motion& motion) { return sum(w, motion.v); }
+
+void add_to(Column<Float4>& list, const Weights& w, Vec3 amount) {
+  for (int k = 0; k < 4; ++k) {
+    if (w.weight[k] == 0) continue;
+    Float4 &mid = list[2 * w.column[k]], &dir = list[2 * w.column[k] + 1];
+    mid = float4(vec3(mid) + amount * w.weight[k]);
+    dir = float4(vec3(dir) + amount * (w.weight[k] * w.zeta));
+  }
+}
+
+Point nearest_point(const Model& m, const State& s, Vec3 p, float zeta) {
+  Point best;
+  float best2 = 1e30f;
+  for (uint32_t f = 0; f < m.lane_of_face.size(); ++f) {
+    const uint32_t lane = m.lane_of_face[f], block = lane / kLanesOfBlock, in = lane % kLanesOfBlock;
+    const bool quad = s.topology.corners[block].quads;
+    Vec3 c[4];
+    for (int k = 0; k < 4; ++k) c[k] = place(at_column(s.topology.corners[block].column[k][in], zeta), s.motion);
+    // Gauss-Newton on the bilinear patch; a few steps suffice for faces that are nearly flat.
+    float xi = quad ? 0 : 0.6f, eta = xi;
+    for (int step = 0; step < 6; ++step) {
+      const Weights w = weights(m, s.topology, {f, xi, eta, zeta});
+      const Vec3 at = c[0] * w.weight[0] + c[1] * w.weight[1] + c[2] * w.weight[2] + c[3] * w.weight[3];
+      const Vec3 a = quad ? ((c[1] - c[0]) * (1 - eta) + (c[2] - c[3]) * (1 + eta)) * 0.25f : (c[1] - c[0]) * 0.5f;
+      const Vec3 b = quad ? ((c[3] - c[0]) * (1 - xi) + (c[2] - c[1]) * (1 + xi)) * 0.25f : (c[2] - c[0]) * 0.5f;
+      const Vec3 r = p - at;
+      const float d2 = length2(r);
+      if (d2 < best2) best2 = d2, best = {f, xi, eta, zeta};
+      const float aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), det = aa * bb - ab * ab;
+      if (!(det > 0)) break;
+      const float low = quad ? -1.0f : 0.0f, high = quad ? 1.0f : 2.0f;
+      const float next_xi = std::clamp(xi + (bb * dot(r, a) - ab * dot(r, b)) / det, low, high);
+      float next_eta = std::clamp(eta + (dot(r, b) - ab * (next_xi - xi)) / bb, low, high);
+      if (!quad) next_eta = std::min(next_eta, 2 - next_xi);
+      xi = next_xi, eta = next_eta;
+    }
+  }
+  return best;
+}
+
+void Inverse::need(const Topology& t, std::span<const Weights> points) {
+  if (version_ != t.version || rows_ != t.factor.size || entry_.empty()) {
+    version_ = t.version, rows_ = t.factor.size, next_ = 0, round_ = 0;
+    capacity_ = std::min(capacity_, rows_);
+    entry_.assign(rows_, kNone);
+    slot_.clear(), used_.clear();
+    slot_.reserve(capacity_), used_.reserve(capacity_);
+    value_.resize(size_t{capacity_} * rows_);
+    solve_.resize(rows_);
+  }
+  ++round_;
+  uint32_t missing[4], count = 0;
+  const auto compute = [&] {  // up to four at once, one a lane
+    std::fill(solve_.begin(), solve_.end(), Float4{});
+    for (uint32_t i = 0; i < count; ++i) (&solve_[missing[i]].x)[i] = 1;
+    solve(t.factor, solve_.data());
+    for (uint32_t i = 0; i < count; ++i) {
+      float* to = value_.data() + size_t{entry_[missing[i]]} * rows_;
+      for (uint32_t r = 0; r < rows_; ++r) to[r] = (&solve_[r].x)[i];
+    }
+    count = 0;
+  };
+  // Marks first, so that a new column never takes the place of one that is needed now.
+  for (const Weights& w : points)
+    for (int k = 0; k < 4; ++k) {
+      const uint32_t s = w.weight[k] != 0 ? t.slot[w.column[k]] : kNone;
+      if (s != kNone && entry_[s] != kNone) used_[entry_[s]] = round_;
+    }
+  for (const Weights& w : points)
+    for (int k = 0; k < 4; ++k) {
+      const uint32_t s = w.weight[k] != 0 ? t.slot[w.column[k]] : kNone;
+      if (s == kNone || entry_[s] != kNone) continue;
+      uint32_t e = static_cast<uint32_t>(slot_.size());
+      if (e < capacity_) slot_.push_back(s), used_.push_back(round_);
+      else {
+        uint32_t looked = 0;
+        while (used_[next_] == round_ && looked++ <= capacity_) next_ = (next_ + 1) % capacity_;
+        CATGUT_CHECK(looked <= capacity_);  // more points at once than the capacity
+        e = next_, next_ = (next_ + 1) % capacity_;
+        entry_[slot_[e]] = kNone;
+        slot_[e] = s, used_[e] = round_;
+      }
+      entry_[s] = e;
+      missing[count++] = s;
+      if (count == 4) compute();
+    }
+  if (count > 0) compute();
+}
+
+float Inverse::compliance(const Topology& t, const Weights& a, const Weights& b) const {
+  float sum = 0;
+  for (int i = 0; i < 4; ++i) {
+    const uint32_t ci = a.column[i];
+    if (a.weight[i] == 0 || t.slot[ci] == kNone) continue;
+    const float* column = value_.data() + size_t{entry_[t.slot[ci]]} * rows_;
+    float part = 0;
+    for (int j = 0; j < 4; ++j) {
+      const uint32_t cj = b.column[j];
+      if (b.weight[j] == 0 || t.slot[cj] == kNone) continue;
+      float v = column[t.slot[cj]];
+      if (t.slot[ci] == t.slot[cj]) {
+        // Copies of a cut column, and the director of the same column.
+        v += (ci == cj ? t.relative[ci] : 0) - t.share[ci] * t.relative[ci] - t.share[cj] * t.relative[cj] + t.spread[ci];
+        if (ci == cj) v += a.zeta * b.zeta * t.inv_dir[ci];
+      }
+      part += b.weight[j] * v;
+    }
+    sum += a.weight[i] * part;
+  }
+  return sum;
+}
+
+void Coupling::set_points(const Model& m, const Topology& t, std::span<const Point> points) {
+  material_.assign(points.begin(), points.end());
+  const size_t n = points.size();
+  point.resize(n), at.assign(n, {}), speed.assign(n, {}), impulse.assign(n, {}), w.assign(n * n, 0);
+  for (size_t i = 0; i < n; ++i) point[i] = weights(m, t, material_[i]);
+  version = t.version - 1;  // W is made in `begin`
+}
+
+void Coupling::begin(const Model& m, const State& s) {
+  const size_t n = point.size();
+  step = m.step;
+  if (version != s.topology.version) {
+    version = s.topology.version;
+    for (size_t i = 0; i < n; ++i) point[i] = weights(m, s.topology, material_[i]);
+    inverse.need(s.topology, point);
+    for (size_t i = 0; i < n; ++i)
+      for (size_t j = 0; j <= i; ++j) w[i * n + j] = w[j * n + i] = inverse.compliance(s.topology, point[i], point[j]);
+  }
+  for (size_t i = 0; i < n; ++i) at[i] = place(point[i], s.motion), speed[i] = velocity(point[i], s.motion), impulse[i] = {};
+}
+
+void Coupling::end(State& s, Scratch& k) {
+  std::fill(k.external.begin(), k.external.end(), Float4{});
+  for (size_t i = 0; i < point.size(); ++i) add_to(k.external, point[i], impulse[i]);
+  apply_impulses(s, k, k.external);
+  std::fill(k.external.begin(), k.external.end(), Float4{});
+}
+
+void apply_hold(const Model& m, State& s, Scratch& k, Hold& hold) {
+  const size_t n = hold.point.size();
+  if (n == 0) return;
+  hold.force.assign(n, {});
+  hold.inverse.need(s.topology, hold.point);
+  hold.matrix.resize(n * (n + 3));
+  double* a = hold.matrix.data();
+  double* x = a + n * n;
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t j = 0; j <= i; ++j)
+      a[i * n + j] = static_cast<double>(hold.inverse.compliance(s.topology, hold.point[i], hold.point[j]));
+    // h W p + softness p / h = what is missing; a trace of softness keeps points that move as one from being singular.
+    a[i * n + i] = a[i * n + i] * (1 + 1e-6) + static_cast<double>(hold.softness) / (static_cast<double>(m.step) * m.step);
+    const Vec3 missing = (hold.target[i] - place(hold.point[i], s.motion)) / m.step - velocity(hold.point[i], s.motion);
+    for (size_t d = 0; d < 3; ++d) x[3 * i + d] = static_cast<double>(missing[static_cast<int>(d)]);
+  }
+  // Cholesky in place, then both triangles.
+  for (size_t j = 0; j < n; ++j)
+    for (size_t i = j; i < n; ++i) {
+      double v = a[i * n + j];
+      for (size_t l = 0; l < j; ++l) v -= a[i * n + l] * a[j * n + l];
+      if (i == j) a[i * n + i] = std::sqrt(std::max(v, 1e-12));
+      else a[i * n + j] = v / a[j * n + j];
+    }
+  for (size_t d = 0; d < 3; ++d) {
+    for (size_t i = 0; i < n; ++i) {
+      for (size_t l = 0; l < i; ++l) x[3 * i + d] -= a[i * n + l] * x[3 * l + d];
+      x[3 * i + d] /= a[i * n + i];
+    }
+    for (size_t i = n; i-- > 0;) {
+      for (size_t l = i + 1; l < n; ++l) x[3 * i + d] -= a[l * n + i] * x[3 * l + d];
+      x[3 * i + d] /= a[i * n + i];
+    }
+  }
+  std::fill(k.external.begin(), k.external.end(), Float4{});
+  for (size_t i = 0; i < n; ++i) {
+    const Vec3 p{static_cast<float>(x[3 * i]), static_cast<float>(x[3 * i + 1]), static_cast<float>(x[3 * i + 2])};
+    add_to(k.external, hold.point[i], p);
+    hold.force[i] = p / m.step;
+  }
+  apply_impulses(s, k, k.external);
+  std::fill(k.external.begin(), k.external.end(), Float4{});
+}
+
+}  // namespace catgut::wall

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// wall/points: everything acts on the wall through material points and impulses. A point moves as J x; an impulse p on it
+// changes all velocities by A^-1 J^T p. A is a scalar matrix times the unit matrix, so the compliance W = J A^-1 J^T of two
+// points is one number, the same in every direction. A does not turn with the tissue: columns of A^-1 stay valid until the
+// topology changes.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "wall/wall.h"
+
+namespace catgut::wall {
+
+// A place in the material; a cut does not move it. Quad: xi, eta in -1..1 (corner 0 at -1, -1). Triangle: corner 0 at (0, 0),
+// 1 at (2, 0), 2 at (0, 2). zeta: -1 inner face, 0 mid-surface, 1 outer face.
+struct Point {
+  uint32_t face = 0;
+  float xi = 0, eta = 0, zeta = 0;
+};
+
+// The same for the present topology: sum over columns of weight * (mid + zeta * director). Weights of 0 are allowed.
+struct Weights {
+  uint32_t column[4] = {};
+  float weight[4] = {};
+  float zeta = 0;
+};
+
+Weights weights(const Model& model, const Topology& topology, const Point& point);
+Weights at_column(uint32_t column, float zeta);
+Vec3 place(const Weights& w, const Motion& motion);     // [m]
+Vec3 velocity(const Weights& w, const Motion& motion);  // [m/s]
+// The nearest material point of one side (zeta) of the wall to p.
+Point nearest_point(const Model& model, const State& state, Vec3 p, float zeta);
+
+// Adds an impulse or force on a point to lists of 2 per column.
+void add_to(Column<Float4>& list, const Weights& w, Vec3 amount);
+
+// Columns of A^-1 for mid-surface points, computed when first asked for and kept. What is kept never changes a result.
+class Inverse {
+ public:
+  // capacity: columns that can be kept; at least as many as one call of `need` asks for. A small wall keeps all of them.
+  explicit Inverse(uint32_t capacity = 512) : capacity_(capacity) {}
+  // Makes sure that the columns of these points are there; empties everything when the topology has changed.
+  void need(const Topology& topology, std::span<const Weights> points);
+  // [1/kg] between two points whose columns were asked for.
+  float compliance(const Topology& topology, const Weights& a, const Weights& b) const;
+  // The column of a place of the factor, which was asked for.
+  const float* column(uint32_t slot) const { return value_.data() + size_t{entry_[slot]} * rows_; }
+  uint32_t kept() const { return static_cast<uint32_t>(slot_.size()); }
+
+ private:
+  uint32_t capacity_, version_ = 0, rows_ = 0, next_ = 0, round_ = 0;
+  std::vector<uint32_t> entry_;        // per slot; kNone: not kept
+  std::vector<uint32_t> slot_, used_;  // per entry: its slot, and the last call that asked for it
+  Column<float> value_;
+  Column<Float4> solve_;
+};
+
+// Points that something with smaller steps acts on, such as a thread stepped at 50 us on a wall stepped at 1 ms ("consistent
+// multi-rate"). The wall's step ends at x + h (v + A^-1 J^T sum p): so a point travels through the step at its velocity, and
+// every impulse displaces it as if it acted for the whole step. At the end a point is where the wall arrives.
+//
+//   begin_step(...)                      velocities without the impulses
+//   coupling.begin(...)
+//   for each small step dt:
+//     coupling.advance(dt)               at[i] moves with the wall
+//     ... coupling.push(i, impulse)      at[all] answer; compliance of a force held over dt: (h / dt) W
+//   coupling.end(...)                    impulses become velocities
+//   finish_step(...)
+struct Coupling {
+  std::vector<Weights> point;
+  std::vector<Vec3> at, speed;  // [m], [m/s]
+  std::vector<Vec3> impulse;    // [N s] in this step so far
+  std::vector<float> w;         // [1/kg] n x n
+  Inverse inverse{512};
+  float step = 0;        // [s]
+  uint32_t version = 0;  // of the topology that w belongs to
+
+  void set_points(const Model& model, const Topology& topology, std::span<const Point> points);
+  // After the wall's begin_step. The points given to set_points are looked up again when the topology has changed.
+  void begin(const Model& model, const State& state);
+  void advance(float dt) {
+    for (size_t i = 0; i < at.size(); ++i) at[i] += speed[i] * dt;
+  }
+  void push(size_t i, Vec3 p) {
+    impulse[i] += p;
+    const float* row = w.data() + i * at.size();
+    for (size_t j = 0; j < at.size(); ++j) at[j] += p * (step * row[j]);
+  }
+  void end(State& state, Scratch& scratch);
+
+ private:
+  std::vector<Point> material_;
+};
+
+// Points that are led to given places within the step, such as a grip. softness [m/N]: 0 is rigid. Returns forces [N] on the
+// wall in `force`. After begin_step (and Coupling::end), before finish_step.
+struct Hold {
+  std::vector<Weights> point;
+  std::vector<Vec3> target;  // [m] at the end of the step
+  float softness = 0;
+  std::vector<Vec3> force;  // [N] result
+  Inverse inverse{512};
+  std::vector<double> matrix;
+};
+void apply_hold(const Model& model, State& state, Scratch& scratch, Hold& hold);
+
+}  // namespace catgut::wall

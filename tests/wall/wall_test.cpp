@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: Apache-2.0
+// tests/wall: the step, impulses, contact and cuts of a whole wall, seen from outside. Moduli and forces against closed forms
+// are in `catgut validate` (modulus/, contact/, closure/).
+#include "wall/wall.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+#include <type_traits>
+
+#include "anatomy/bowel.h"
+#include "core/check.h"
+#include "core/hash.h"
+#include "wall/contact.h"
+#include "wall/cut.h"
+
+namespace {
+std::atomic<bool> counting{false};
+std::atomic<int> allocations{0};
+void* counted(size_t n, size_t align) {
+  if (counting.load(std::memory_order_relaxed)) ++allocations;
+  void* p = align > 16 ? std::aligned_alloc(align, (n + align - 1) / align * align) : std::malloc(n);
+  if (!p) throw std::bad_alloc();
+  return p;
+}
+}  // namespace
+void* operator new(size_t n) { return counted(n, 0); }
+void* operator new(size_t n, std::align_val_t a) { return counted(n, static_cast<size_t>(a)); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, size_t, std::align_val_t) noexcept { std::free(p); }
+
+namespace catgut::wall {
+namespace {
+
+Spec small_tube(float step = 0.001f) {
+  Spec s;
+  TubeShape shape;
+  shape.around = 24, shape.rings = 10, shape.length = 0.04f;
+  s.mesh = tube(shape);
+  s.step = step;
+  s.drag = 10;
+  return s;
+}
+void step(Wall& w, Jobs& jobs) {
+  begin_step(w.model, w.state, w.scratch, jobs);
+  finish_step(w.model, w.state, jobs);
+}
+float farthest_from_rest(const Wall& w) {
+  float far = 0;
+  for (uint32_t c = 0; c < columns(w.state); ++c)
+    far = std::max(far, distance(outer(w.state, c), w.model.mesh.outer[w.state.topology.source[c]]));
+  return far;
+}
+
+// Writes and reads whatever `reflect` lists.
+struct Bytes {
+  std::vector<std::byte> data;
+  size_t at = 0;
+  bool reading = false;
+  void raw(void* p, size_t n) {
+    if (reading) {
+      ASSERT_LE(at + n, data.size());
+      std::memcpy(p, data.data() + at, n), at += n;
+    } else {
+      data.insert(data.end(), static_cast<std::byte*>(p), static_cast<std::byte*>(p) + n);
+    }
+  }
+  template <class T>
+  void operator()(const char*, T& value) {
+    if constexpr (std::is_trivially_copyable_v<T>) raw(&value, sizeof value);
+    else if constexpr (requires { value.resize(1); }) {
+      uint64_t n = value.size();
+      raw(&n, sizeof n);
+      value.resize(n);
+      for (auto& v : value) (*this)("", v);
+    } else {
+      reflect(*this, value);
+    }
+  }
+};
+uint64_t hash_of(State& s) {
+  Bytes b;
+  reflect(b, s);
+  return hash_bytes(b.data.data(), b.data.size());
+}
+
+TEST(Wall, has_the_same_bits_for_any_number_of_workers) {
+  std::vector<uint64_t> hash;
+  for (const int workers : {1, 2, 3}) {
+    Wall w = build_wall(small_tube());
+    Jobs jobs(workers);
+    ContactSolver solver;
+    std::vector<Obstacle> tool(1);
+    tool[0].a = {0.021f, -0.01f, -0.012f}, tool[0].b = {0.021f, 0.01f, -0.012f}, tool[0].radius = 0.003f;
+    for (int i = 0; i < 60; ++i) {
+      find_contacts(w.model, w.state, tool, solver);
+      warm_start(w.model, w.scratch, solver);
+      w.scratch.external[0].z += 0.05f;
+      begin_step(w.model, w.state, w.scratch, jobs);
+      solve_contacts(w.model, w.state, w.scratch, tool, solver);
+      finish_step(w.model, w.state, jobs);
+    }
+    EXPECT_GT(length(solver.force[0]), 0.01f);
+    hash.push_back(hash_of(w.state));
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+  EXPECT_EQ(hash[0], hash[2]);
+}
+
+TEST(Wall, goes_on_from_what_reflect_saved_to_the_bit) {
+  Wall w = build_wall(small_tube());
+  Jobs jobs(1);
+  cut(w.model, w.state, w.scratch, std::vector<std::array<uint32_t, 2>>{{0, 24}, {24, 48}});
+  for (int i = 0; i < 20; ++i) w.scratch.external[0].x = 0.1f, step(w, jobs);
+  Bytes saved;
+  reflect(saved, w.state);
+  Wall other = build_wall(small_tube());
+  saved.reading = true;
+  reflect(saved, other.state);
+  EXPECT_EQ(saved.at, saved.data.size());
+  other.scratch = make_scratch(other.model, other.state);
+  for (int i = 0; i < 20; ++i) step(w, jobs), step(other, jobs);
+  EXPECT_EQ(hash_of(w.state), hash_of(other.state));
+}
+
+TEST(Wall, allocates_nothing_in_a_step_with_points_and_contact) {
+  Wall w = build_wall(small_tube());
+  Jobs jobs(1);
+  ContactSolver solver;
+  Coupling thread;
+  const std::vector<Point> hole{{3, 0, 0, 0}, {5, 0, 0, 0}};
+  thread.set_points(w.model, w.state.topology, hole);
+  std::vector<Obstacle> tool(1);
+  tool[0].a = {0.021f, -0.01f, -0.012f}, tool[0].b = {0.021f, 0.01f, -0.012f}, tool[0].radius = 0.003f;
+  for (int i = 0; i < 120; ++i) {
+    counting = i >= 100;  // lists have their room by then
+    find_contacts(w.model, w.state, tool, solver);
+    warm_start(w.model, w.scratch, solver);
+    begin_step(w.model, w.state, w.scratch, jobs);
+    thread.begin(w.model, w.state);
+    thread.advance(0.0005f), thread.push(0, {1e-5f, 0, 0});
+    thread.end(w.state, w.scratch);
+    solve_contacts(w.model, w.state, w.scratch, tool, solver);
+    finish_step(w.model, w.state, jobs);
+    counting = false;
+  }
+  EXPECT_GT(solver.contact.size(), 0u);
+  EXPECT_EQ(allocations.load(), 0);
+}
+
+TEST(Wall, keeps_its_momentum_when_nothing_holds_it) {
+  Spec s = small_tube();
+  std::fill(s.mesh.held.begin(), s.mesh.held.end(), 0);
+  s.drag = 0;
+  Wall w = build_wall(s);
+  w.model.tau = 0;  // the damping of strain is not of Hamilton's kind
+  Jobs jobs(1);
+  const Topology& t = w.state.topology;
+  // A spin, a drift and a squeeze.
+  for (uint32_t c = 0; c < columns(w.state); ++c) {
+    const Vec3 p = vec3(w.state.motion.x[2 * c]), d = vec3(w.state.motion.x[2 * c + 1]);
+    w.state.motion.v[2 * c] = float4(cross(Vec3{1, 2, 0.5f}, p) + Vec3{0.01f, 0, 0.02f} + Vec3{p.x * 2, 0, 0});
+    w.state.motion.v[2 * c + 1] = float4(cross(Vec3{1, 2, 0.5f}, d));
+  }
+  // The inertia that conserves momentum is the enlarged one; applying A to the motion gives it.
+  const auto momentum = [&] {
+    Vec3 linear{}, angular{};
+    const float scale = w.model.step * w.model.step * w.model.report.scale;
+    for (uint32_t c = 0; c < columns(w.state); ++c) {
+      linear += vec3(w.state.motion.v[2 * c]) * t.mass[c];
+      angular += cross(vec3(w.state.motion.x[2 * c]), vec3(w.state.motion.v[2 * c])) * t.mass[c];
+      angular += cross(vec3(w.state.motion.x[2 * c + 1]), vec3(w.state.motion.v[2 * c + 1])) / t.inv_dir[c];
+    }
+    const uint32_t edge[6][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 2}, {1, 3}};
+    for (uint32_t lane = 0; lane < w.model.face_of_lane.size(); ++lane)
+      for (int e = 0; e < 6 && w.model.face_of_lane[lane] != kNone; ++e) {
+        const auto& corner = t.corners[lane / kLanesOfBlock].column;
+        const uint32_t a = corner[edge[e][0]][lane % kLanesOfBlock], b = corner[edge[e][1]][lane % kLanesOfBlock];
+        angular += cross(vec3(w.state.motion.x[2 * a]) - vec3(w.state.motion.x[2 * b]),
+                         vec3(w.state.motion.v[2 * a]) - vec3(w.state.motion.v[2 * b])) *
+                   (scale * w.model.inertia[lane].edge[e]);
+      }
+    return std::pair{linear, angular};
+  };
+  const auto before = momentum();
+  for (int i = 0; i < 500; ++i) step(w, jobs);
+  const auto after = momentum();
+  EXPECT_LT(distance(before.first, after.first), 1e-4f * length(before.first));
+  EXPECT_LT(distance(before.second, after.second), 2e-4f * length(before.second));
+  EXPECT_EQ(w.state.motion.clamped, 0u);
+}
+
+TEST(Wall, falls_as_any_body_and_has_its_true_mass) {
+  Spec s = small_tube();
+  std::fill(s.mesh.held.begin(), s.mesh.held.end(), 0);
+  s.drag = 0, s.gravity = {0, 0, -9.81f};
+  Wall w = build_wall(s);
+  const float volume = 3.14159265f * (0.02f * 0.02f - 0.0175f * 0.0175f) * 0.04f;
+  EXPECT_NEAR(w.model.report.rest_mass / (volume * 1050), 1, 0.02);
+  Jobs jobs(1);
+  for (int i = 0; i < 100; ++i) step(w, jobs);
+  for (uint32_t c = 0; c < columns(w.state); ++c) EXPECT_NEAR(w.state.motion.v[2 * c].z, -0.981f, 1e-4f);
+}
+
+TEST(Wall, answers_a_push_on_a_point_with_its_compliance) {
+  Wall w = build_wall(small_tube());
+  cut(w.model, w.state, w.scratch, std::vector<std::array<uint32_t, 2>>{{0, 24}, {24, 48}});
+  const std::vector<Point> point{{0, 0.3f, -0.2f, 1}, {1, -0.5f, 0.1f, -1}, {23, 0.9f, 0.9f, 0}, {90, 0, 0, 0.5f}};
+  Coupling c;
+  c.set_points(w.model, w.state.topology, point);
+  for (size_t i = 0; i < point.size(); ++i) {
+    Wall pushed = w;
+    c.begin(pushed.model, pushed.state);
+    const Vec3 p{1e-6f, -2e-6f, 3e-6f};
+    c.push(i, p);
+    c.end(pushed.state, pushed.scratch);
+    for (size_t j = 0; j < point.size(); ++j) {
+      const Vec3 v = velocity(c.point[j], pushed.state.motion), want = p * c.w[i * point.size() + j];
+      EXPECT_LT(distance(v, want), 1e-4f * length(want) + 1e-9f) << i << " on " << j;
+    }
+  }
+}
+
+TEST(Inverse, keeps_what_it_likes_without_changing_a_bit) {
+  const Wall w = build_wall(small_tube());
+  std::vector<Weights> point;
+  for (uint32_t f = 0; f < 200; f += 3) point.push_back(weights(w.model, w.state.topology, {f, 0.2f, -0.4f, 0}));
+  Inverse large(1000), little(8);
+  for (size_t i = 0; i + 1 < point.size(); ++i) {
+    large.need(w.state.topology, {&point[i], 2});
+    little.need(w.state.topology, {&point[i], 2});
+    EXPECT_EQ(large.compliance(w.state.topology, point[i], point[i + 1]),
+              little.compliance(w.state.topology, point[i], point[i + 1]));
+  }
+  EXPECT_LE(little.kept(), 8u);
+}
+
+TEST(Wall, bears_five_newtons_and_comes_back) {
+  Spec s;
+  s.mesh = tube({});
+  s.drag = 20;
+  Wall w = build_wall(s);
+  Jobs jobs(1);
+  const uint32_t c = 9 * 32;
+  const Vec3 in = normalized(w.model.mesh.inner[c] - w.model.mesh.outer[c]);
+  for (int i = 0; i < 2500; ++i) {
+    const float force = 5.0f * std::min(1.0f, static_cast<float>(i) / 1000.0f);
+    add_to(w.scratch.external, at_column(c, 1), in * force);
+    step(w, jobs);
+  }
+  const Vec3 held = outer(w.state, c);
+  for (int i = 0; i < 200; ++i) add_to(w.scratch.external, at_column(c, 1), in * 5.0f), step(w, jobs);
+  EXPECT_LT(distance(outer(w.state, c), held), 1e-5f);
+  EXPECT_GT(distance(outer(w.state, c), w.model.mesh.outer[c]), 0.01f);
+  for (int i = 0; i < 4000; ++i) step(w, jobs);
+  EXPECT_LT(farthest_from_rest(w), 1e-4f);
+}
+
+TEST(Wall, comes_back_from_being_dragged_about) {
+  Wall w = build_wall(small_tube());
+  Jobs jobs(1);
+  Hold grip;
+  grip.point = {at_column(5, 1), at_column(5, -1)};
+  grip.softness = 1e-4f;
+  const Vec3 a = outer(w.state, 5), b = inner(w.state, 5);
+  for (int i = 0; i < 600; ++i) {  // 20 mm to and fro at 0.5 m/s
+    const float t = 0.001f * static_cast<float>(i), way = 0.02f * std::sin(25 * t);
+    grip.target = {a + Vec3{0.5f * way, way, 0.3f * way}, b + Vec3{0.5f * way, way, 0.3f * way}};
+    begin_step(w.model, w.state, w.scratch, jobs);
+    apply_hold(w.model, w.state, w.scratch, grip);
+    finish_step(w.model, w.state, jobs);
+    ASSERT_LT(farthest_from_rest(w), 0.05f);
+  }
+  for (int i = 0; i < 3000; ++i) step(w, jobs);
+  EXPECT_LT(farthest_from_rest(w), 1e-4f);
+}
+
+TEST(Wall, recovers_from_being_turned_inside_out_or_squeezed_to_a_point) {
+  for (const int how : {0, 1}) {
+    Wall w = build_wall(small_tube());
+    Jobs jobs(1);
+    for (uint32_t c = 0; c < columns(w.state); ++c) {
+      if (w.model.mesh.held[c]) continue;
+      Float4& dir = w.state.motion.x[2 * c + 1];
+      if (how == 0) dir = float4(-vec3(dir));
+      else w.state.motion.x[2 * c] = float4({0, 0, -0.02f}), dir = {};
+    }
+    for (int i = 0; i < 4000; ++i) step(w, jobs);
+    for (uint32_t c = 0; c < columns(w.state); ++c) ASSERT_TRUE(is_finite(outer(w.state, c)));
+    if (how == 0) { EXPECT_LT(farthest_from_rest(w), 1e-3f) << how; }
+  }
+}
+
+TEST(Cut, divides_a_tube_from_rim_to_rim_and_around) {
+  Wall w = build_wall(small_tube());
+  const uint32_t before = columns(w.state);
+  std::vector<std::array<uint32_t, 2>> edge;
+  for (uint32_t j = 0; j < 24; ++j) edge.push_back({72 + j, 72 + (j + 1) % 24});
+  EXPECT_EQ(cut(w.model, w.state, w.scratch, edge), 24u);
+  const std::vector<uint32_t> piece = pieces(w.state);
+  uint32_t count = 0;
+  for (uint32_t c = 0; c < columns(w.state); ++c) count += piece[c] == c;
+  EXPECT_EQ(count, 2u);
+  EXPECT_EQ(columns(w.state), before + 24);
+  float mass = 0;
+  for (float m : w.state.topology.mass) mass += m;
+  EXPECT_NEAR(mass / w.model.report.rest_mass, 1, 1e-5);
+  // The old factor still moves both together; with a new one the free piece flies away and the held one stays.
+  refactor(w.model, w.state, w.scratch);
+  w.model.gravity = {0, 0, 9.81f};
+  Jobs jobs(1);
+  for (int i = 0; i < 200; ++i) step(w, jobs);
+  EXPECT_GT(outer(w.state, 0).z - w.model.mesh.outer[0].z, 0.05f);
+  EXPECT_LT(std::abs(outer(w.state, 180).z - w.model.mesh.outer[180].z), 0.002f);
+}
+
+TEST(Cut, moves_no_column_and_no_material_point) {
+  Wall w = build_wall(small_tube());
+  Jobs jobs(1);
+  for (int i = 0; i < 50; ++i) w.scratch.external[0].x = 0.3f, step(w, jobs);
+  const std::vector<Point> point{{0, 0.9f, 0.9f, 1}, {23, -0.9f, -0.5f, 0}, {24, 0.99f, 0, -1}};
+  std::vector<Vec3> before;
+  for (const Point& p : point) before.push_back(place(weights(w.model, w.state.topology, p), w.state.motion));
+  cut(w.model, w.state, w.scratch, std::vector<std::array<uint32_t, 2>>{{0, 24}, {24, 48}, {24, 25}});
+  for (size_t i = 0; i < point.size(); ++i)
+    EXPECT_EQ(place(weights(w.model, w.state.topology, point[i]), w.state.motion), before[i]);
+}
+
+TEST(Mesh, of_the_bowel_generator_becomes_quads_with_its_two_rims) {
+  BowelShape shape;
+  const BodyRest body = make_bowel(shape);
+  std::vector<Vec3> out, in;
+  for (size_t i = 0; i + 1 < body.position.size(); i += 2) out.push_back(body.position[i]), in.push_back(body.position[i + 1]);
+  std::vector<std::array<uint32_t, 3>> triangle;
+  for (const Triangle& t : body.surface)
+    if (t[0] % 2 == 0 && t[1] % 2 == 0 && t[2] % 2 == 0) triangle.push_back({t[0] / 2, t[1] / 2, t[2] / 2});
+  const Mesh mesh = from_triangles(out, in, triangle, shape.axis, "bowel");
+  size_t quads = 0;
+  for (const auto& f : mesh.face) quads += f[3] != kNone;
+  EXPECT_EQ(2 * quads + (mesh.face.size() - quads), triangle.size());
+  EXPECT_GT(quads, mesh.face.size() * 9 / 10);
+  EXPECT_EQ(rims(mesh).size(), 2u);
+}
+
+TEST(Wall, that_cannot_be_built_is_refused_with_a_line) {
+  Spec s = small_tube();
+  s.step = 1;
+  EXPECT_THROW(build_wall(s), InputError);
+  s = small_tube(), s.mesh.face[3] = {0, 0, 0, 0};
+  EXPECT_THROW(build_wall(s), InputError);
+  s = small_tube(), s.mesh.face[3][1] = 99999;
+  EXPECT_THROW(build_wall(s), InputError);
+  s = small_tube(), std::swap(s.mesh.outer, s.mesh.inner);
+  EXPECT_THROW(build_wall(s), InputError);
+  s = small_tube(), s.layer.clear();
+  EXPECT_THROW(build_wall(s), InputError);
+  s = small_tube(), s.mesh.outer[2].x = std::nanf("");
+  EXPECT_THROW(build_wall(s), InputError);
+}
+
+}  // namespace
+}  // namespace catgut::wall
