@@ -17,6 +17,7 @@
 #include "runtime/session.h"
 #include "sim/recording.h"
 #include "sim/simulation.h"
+#include "wall/wall.h"
 
 namespace {
 using namespace catgut;
@@ -106,7 +107,33 @@ int write(const std::string& folder) {
   return 0;
 }
 
+// Steps of the wall alone, pulled at one column: 1216 and 4864 nodes.
+void run_walls() {
+  for (const int fine : {1, 2}) {
+    wall::Spec spec;
+    wall::TubeShape shape;
+    shape.around = 32 * fine, shape.rings = 19 * fine;
+    spec.mesh = wall::tube(shape);
+    wall::Wall w = wall::build_wall(spec);
+    Jobs jobs(1);
+    CALLGRIND_START_INSTRUMENTATION;
+    CALLGRIND_ZERO_STATS;
+    CALLGRIND_TOGGLE_COLLECT;
+    for (uint64_t i = 0; i < kTicks; ++i) {
+      w.scratch.external[0].x = 0.1f;
+      wall::begin_step(w.model, w.state, w.scratch, jobs);
+      wall::finish_step(w.model, w.state, jobs);
+    }
+    CALLGRIND_TOGGLE_COLLECT;
+    CALLGRIND_DUMP_STATS;
+    CALLGRIND_STOP_INSTRUMENTATION;
+    std::printf("wall x%d %llu\n", fine * fine, static_cast<unsigned long long>(kTicks));
+    std::fflush(stdout);
+  }
+}
+
 int run(const std::string& folder) {
+  run_walls();
   for (const Scene& s : kScenes) {
     std::shared_ptr<const Model> model;
     for (const Moment& m : s.moment) {

@@ -60,18 +60,4 @@ void warm_start(const Model& model, Scratch& scratch, ContactSolver& solver);
 void solve_contacts(const Model& model, State& state, Scratch& scratch, std::span<const Obstacle> obstacle,
                     ContactSolver& solver);
 
-// Contacts that last from step to step are state.
-template <class Archive>
-void reflect(Archive& a, Weights& w) {
-  a("column", w.column), a("weight", w.weight), a("zeta", w.zeta);
-}
-template <class Archive>
-void reflect(Archive& a, Contact& c) {
-  a("key", c.key), a("point", c.point), a("other", c.other), a("self", c.self), a("impulse", c.impulse), a("normal", c.normal);
-}
-template <class Archive>
-void reflect(Archive& a, ContactSolver& s) {
-  a("contact", s.contact);
-}
-
 }  // namespace catgut::wall

@@ -35,13 +35,4 @@ Factor factorize(uint32_t size, std::span<const Entry> entry);
 // Solves in place; x is in the order of elimination: row r of the matrix at x[place[r]]. Lanes do not mix.
 void solve(const Factor& factor, Float4* x);
 
-template <class Archive>
-void reflect(Archive& a, Panel& p) {
-  a("first", p.first), a("width", p.width), a("index", p.index), a("count", p.count), a("value", p.value);
-}
-template <class Archive>
-void reflect(Archive& a, Factor& f) {
-  a("size", f.size), a("place", f.place), a("panel", f.panel), a("row", f.row), a("value", f.value);
-}
-
 }  // namespace catgut::wall

@@ -54,17 +54,17 @@ void BlockForces(const ElementBlock* block, const BlockCorners* corners, const F
   for (uint32_t b = first; b < last; ++b)
     for (size_t part = 0; part < kLanesOfBlock; part += kWidth) {
       Vec3W mid[4], dir[4];
-      for (size_t k = 0; k < 4; ++k) LoadCorner(at, corners[b].column[k] + part, mid[k], dir[k]);
+      for (size_t k = 0; k < 4; ++k) LoadCorner(at, corners[b].column[k].data() + part, mid[k], dir[k]);
       BlockTurn& frame = turn[b];
-      Turn<Wide> q{hn::Load(d, frame.x + part), hn::Load(d, frame.y + part), hn::Load(d, frame.z + part),
-                   hn::Load(d, frame.w + part)};
+      Turn<Wide> q{hn::Load(d, frame.x.data() + part), hn::Load(d, frame.y.data() + part), hn::Load(d, frame.z.data() + part),
+                   hn::Load(d, frame.w.data() + part)};
       const ConstantsOf constants{block[b].constant[0] + part};
       const Wide quarter(0.25f), half(0.5f), third(1.0f / 3);
       const bool quads = corners[b].quads != 0;
       const Modes<Wide> f =
           element_force(constants, quads ? quad_modes(mid, dir, quarter) : triangle_modes(mid, dir, half, third), q, 1);
-      hn::Store(q.x.v, d, frame.x + part), hn::Store(q.y.v, d, frame.y + part);
-      hn::Store(q.z.v, d, frame.z + part), hn::Store(q.w.v, d, frame.w + part);
+      hn::Store(q.x.v, d, frame.x.data() + part), hn::Store(q.y.v, d, frame.y.data() + part);
+      hn::Store(q.z.v, d, frame.z.data() + part), hn::Store(q.w.v, d, frame.w.data() + part);
       if (quads) quad_corners(f, quarter, mid, dir);
       else triangle_corners(f, half, third, mid, dir);
       const auto zero = hn::Zero(d);

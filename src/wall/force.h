@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // wall/force: the element formula on sixteen elements at once.
 #pragma once
+#include <array>
 #include <cstdint>
 
 #include "wall/column.h"
@@ -15,12 +16,12 @@ struct alignas(64) ElementBlock {
   float constant[kConstants][kLanesOfBlock] = {};
 };
 struct alignas(64) BlockCorners {
-  uint32_t column[4][kLanesOfBlock] = {};
-  uint32_t quads = 1;        // 0: triangles
-  uint32_t unused[15] = {};  // no padding: a state is hashed as bytes
+  std::array<std::array<uint32_t, kLanesOfBlock>, 4> column{};
+  uint32_t quads = 1;                 // 0: triangles
+  std::array<uint32_t, 15> unused{};  // no padding: archives copy it as it lies in memory
 };
 struct alignas(64) BlockTurn {
-  float x[kLanesOfBlock] = {}, y[kLanesOfBlock] = {}, z[kLanesOfBlock] = {}, w[kLanesOfBlock];
+  std::array<float, kLanesOfBlock> x{}, y{}, z{}, w{};
 };
 // Forces on the columns at the corners of each element.
 struct alignas(64) BlockForce {

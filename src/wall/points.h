@@ -4,6 +4,7 @@
 // points is one number, the same in every direction. A does not turn with the tissue: columns of A^-1 stay valid until the
 // topology changes.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -21,8 +22,8 @@ struct Point {
 
 // The same for the present topology: sum over columns of weight * (mid + zeta * director). Weights of 0 are allowed.
 struct Weights {
-  uint32_t column[4] = {};
-  float weight[4] = {};
+  std::array<uint32_t, 4> column{};
+  std::array<float, 4> weight{};
   float zeta = 0;
 };
 

@@ -237,7 +237,7 @@ Wall build_wall(const Spec& spec) {
         in = 0;
         m.block.emplace_back(), t.corners.emplace_back(), w.state.motion.turn.emplace_back();
         t.corners.back().quads = quad;
-        std::fill_n(w.state.motion.turn.back().w, kLanesOfBlock, 1.0f);
+        w.state.motion.turn.back().w.fill(1);
         m.face_of_lane.resize(m.block.size() * kLanesOfBlock, kNone);
         m.inertia.resize(m.face_of_lane.size());
       }

@@ -128,28 +128,4 @@ float largest_eigenvalue(const Model& model, const State& state, Scratch& scratc
 // of its own. The motion goes on undisturbed.
 void renew_topology(const Model& model, Topology& topology, bool again);
 
-template <class Archive>
-void reflect(Archive& a, BlockCorners& c) {
-  a("column", c.column), a("quads", c.quads);
-}
-template <class Archive>
-void reflect(Archive& a, BlockTurn& t) {
-  a("x", t.x), a("y", t.y), a("z", t.z), a("w", t.w);
-}
-template <class Archive>
-void reflect(Archive& a, Motion& m) {
-  a("x", m.x), a("v", m.v), a("turn", m.turn), a("clamped", m.clamped);
-}
-template <class Archive>
-void reflect(Archive& a, Topology& t) {
-  a("version", t.version), a("corners", t.corners), a("source", t.source), a("mass", t.mass), a("inv_dir", t.inv_dir);
-  a("slot", t.slot), a("share", t.share), a("relative", t.relative), a("spread", t.spread);
-  a("group_first", t.group_first), a("group_member", t.group_member);
-  a("gather_first", t.gather_first), a("gather_from", t.gather_from), a("factor", t.factor);
-}
-template <class Archive>
-void reflect(Archive& a, State& s) {
-  a("topology", s.topology), a("motion", s.motion);
-}
-
 }  // namespace catgut::wall

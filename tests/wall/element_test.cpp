@@ -168,7 +168,7 @@ TEST_P(AnElement, has_the_same_forces_in_the_simd_kernel) {
   ElementBlock block;
   BlockCorners corners;
   BlockTurn frame;
-  std::fill_n(frame.w, kLanesOfBlock, 1.0f);
+  frame.w.fill(1);
   corners.quads = shape.mid.size() == 4;
   const uint32_t lane = 5;
   for (uint32_t k = 0; k < kConstants; ++k) block.constant[k][lane] = static_cast<float>(rest.constant[k]);

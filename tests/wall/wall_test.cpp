@@ -7,16 +7,17 @@
 
 #include <atomic>
 #include <cstdlib>
-#include <cstring>
 #include <new>
-#include <type_traits>
 
 #include "anatomy/bowel.h"
+#include "core/archive.h"
 #include "core/check.h"
 #include "core/hash.h"
 #include "wall/contact.h"
 #include "wall/cut.h"
+#include "wall/reflect.h"
 
+#pragma GCC diagnostic ignored "-Wmismatched-new-delete"  // new is malloc here
 namespace {
 std::atomic<bool> counting{false};
 std::atomic<int> allocations{0};
@@ -57,36 +58,16 @@ float farthest_from_rest(const Wall& w) {
   return far;
 }
 
-// Writes and reads whatever `reflect` lists.
-struct Bytes {
-  std::vector<std::byte> data;
-  size_t at = 0;
-  bool reading = false;
-  void raw(void* p, size_t n) {
-    if (reading) {
-      ASSERT_LE(at + n, data.size());
-      std::memcpy(p, data.data() + at, n), at += n;
-    } else {
-      data.insert(data.end(), static_cast<std::byte*>(p), static_cast<std::byte*>(p) + n);
-    }
-  }
-  template <class T>
-  void operator()(const char*, T& value) {
-    if constexpr (std::is_trivially_copyable_v<T>) raw(&value, sizeof value);
-    else if constexpr (requires { value.resize(1); }) {
-      uint64_t n = value.size();
-      raw(&n, sizeof n);
-      value.resize(n);
-      for (auto& v : value) (*this)("", v);
-    } else {
-      reflect(*this, value);
-    }
-  }
-};
-uint64_t hash_of(State& s) {
-  Bytes b;
-  reflect(b, s);
-  return hash_bytes(b.data.data(), b.data.size());
+std::vector<std::byte> saved(const State& s) {
+  std::vector<std::byte> bytes;
+  ByteSink sink{bytes};
+  Writer<ByteSink> write(sink);
+  write(s);
+  return bytes;
+}
+uint64_t hash_of(const State& s) {
+  const std::vector<std::byte> bytes = saved(s);
+  return hash_bytes(bytes.data(), bytes.size());
 }
 
 TEST(Wall, has_the_same_bits_for_any_number_of_workers) {
@@ -117,12 +98,11 @@ TEST(Wall, goes_on_from_what_reflect_saved_to_the_bit) {
   Jobs jobs(1);
   cut(w.model, w.state, w.scratch, std::vector<std::array<uint32_t, 2>>{{0, 24}, {24, 48}});
   for (int i = 0; i < 20; ++i) w.scratch.external[0].x = 0.1f, step(w, jobs);
-  Bytes saved;
-  reflect(saved, w.state);
+  const std::vector<std::byte> bytes = saved(w.state);
   Wall other = build_wall(small_tube());
-  saved.reading = true;
-  reflect(saved, other.state);
-  EXPECT_EQ(saved.at, saved.data.size());
+  Reader read(bytes, "test");
+  read(other.state);
+  EXPECT_EQ(read.at, bytes.size());
   other.scratch = make_scratch(other.model, other.state);
   for (int i = 0; i < 20; ++i) step(w, jobs), step(other, jobs);
   EXPECT_EQ(hash_of(w.state), hash_of(other.state));
