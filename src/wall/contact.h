@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // wall/contact: contact with friction by impulses. All contacts of a step are solved together on the full compliance W = J A^-1
-// J^T (projected Gauss-Seidel, Moreau's time stepping; Jourdan, Alart, Jean 1998, doi 10.1016/S0045-7825(97)00080-3): a W cut
+// J^T (projected Gauss-Seidel, Moreau's time stepping; Jourdan, Alart, Jean 1998, Comput. Methods Appl.
+// Mech. Eng. 155, 31-47): a W cut
 // to neighbors or to its diagonal gave forces that flickered or were eight times wrong. The last step's impulses are given to
 // the wall's main solve, so that a resting contact is exact and only changes are iterated.
 #pragma once

@@ -118,7 +118,7 @@ inline Vec3Of<S> polar_solve(const Vec3Of<S>& s1, const Vec3Of<S>& s2, const Vec
 }
 
 // Force of an element on its modes, and its stored energy [J] if wanted. `q` is turned `steps` Newton steps toward the rotation
-// of the mean deformation (analytic polar decomposition, Kugelstadt et al. 2018, doi 10.1111/cgf.13501): one is enough in a
+// of the mean deformation (analytic polar decomposition, Kugelstadt et al. 2018, doi 10.1111/cgf.13520): one is enough in a
 // simulation, whose frames are warm.
 template <class S, class Get>
 inline Modes<S> element_force(const Get& c, const Modes<S>& m, Turn<S>& q, int steps, S* energy = nullptr) {
