@@ -5,6 +5,7 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "procedure/scene_fields.h"
 
 namespace {
 
@@ -13,6 +14,30 @@ int report(std::string what) {
   std::replace(what.begin(), what.end(), '\n', ' ');
   std::fprintf(stderr, "catgut: %s\n", what.c_str());
   return 2;
+}
+
+// CLI11 only says that an argument was not expected; the nearest command or option is more use.
+std::string parse_fault(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
+  std::vector<std::string> commands;
+  const CLI::App* used = &app;
+  for (const CLI::App* c : app.get_subcommands({})) commands.push_back(c->get_name());
+  for (const CLI::App* c : app.get_subcommands()) used = c;
+  std::string nearest;
+  if (used == &app && argc > 1 && argv[1][0] != '-' && std::find(commands.begin(), commands.end(), argv[1]) == commands.end()) {
+    nearest = catgut::nearest_word(argv[1], commands);
+    return std::string("no command \"") + argv[1] + "\"; " +
+           (nearest.empty() ? "catgut --help lists them" : "did you mean \"" + nearest + "\"?");
+  }
+  std::vector<std::string> options;
+  for (const CLI::Option* o : used->get_options())
+    for (const std::string& name : o->get_lnames()) options.push_back("--" + name);
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = std::string(argv[i]).substr(0, std::string(argv[i]).find('='));
+    if (word.rfind("--", 0) != 0 || std::find(options.begin(), options.end(), word) != options.end()) continue;
+    nearest = catgut::nearest_word(word, options);
+    return "no option " + word + "; " + (nearest.empty() ? "catgut --help lists them" : "did you mean " + nearest + "?");
+  }
+  return std::string(error.what()) + "; see catgut --help";
 }
 
 }  // namespace
@@ -38,7 +63,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& wanted) {  // --help, --version
     return app.exit(wanted);
   } catch (const CLI::ParseError& error) {
-    return report(std::string("command line: ") + error.what() + "; catgut --help explains");
+    return report("command line: " + parse_fault(app, error, argc, argv));
   } catch (const std::exception& error) { return report(error.what()); }
   return exit_code;
 }

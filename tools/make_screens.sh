@@ -2,7 +2,7 @@
 # Makes the pictures of the window anew: docs/media/screen_NAME.jpg for every screen at 1280x720, screen_results_4k.jpg at
 # 3840x2160, and window.jpg, which the README shows. Needs Xvfb; draws with whatever driver is there, which takes some minutes
 # without a graphics card.
-#   tools/make_screens.sh [NAME ...]     only these: start settings practise lesson pause developer results results_4k view window
+#   tools/make_screens.sh [NAME ...]     only these: start settings practice lesson pause developer results results_4k view window
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 root="$PWD"
@@ -31,12 +31,12 @@ wanted=("$@")
 
 shoot screen_start 1280x720 play --screen start
 shoot screen_settings 1280x720 play --screen settings
-shoot screen_practise 1280x720 play purse_string --screen practise --at 1
+shoot screen_practice 1280x720 play purse_string --screen practice --at 1
 shoot screen_lesson 1280x720 play stay --teach --at 1
 shoot screen_pause 1280x720 play stay --surgeon scripted --screen pause --at 7
 shoot screen_developer 1280x720 play stay --surgeon scripted --screen developer --at 5
 shoot screen_results 1280x720 view "$recording" --screen results
 quality=low shoot screen_results_4k 3840x2160 view "$recording" --screen results
 shoot screen_view 1280x720 view "$recording" --screen view --at 38
-shoot window 1280x720 play purse_string --surgeon scripted --screen practise --at 9
+shoot window 1280x720 play purse_string --surgeon scripted --screen practice --at 9
 ls -l "$root"/docs/media/screen_*.jpg "$root/docs/media/window.jpg"

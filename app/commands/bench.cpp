@@ -1,5 +1,5 @@
-// app: `catgut bench`: where the time of a tick goes; what it costs as sutures are added (limits.cpp), in the paper's tables
-// (paper.cpp); with more particles (scale.cpp); what a picture costs (frame.cpp); what a hand feels (haptics.cpp).
+// app: `catgut bench`: time per stage; scaling with suture count (limits.cpp), the paper's tables
+// (paper.cpp), scaling with particle count (scale.cpp), cost of a frame (frame.cpp), force feedback (haptics.cpp).
 #include <cstdio>
 #include <memory>
 
@@ -30,14 +30,14 @@ int bench_stages(const BenchOptions& o) {
   session.threads = o.threads;
   session.seconds = o.seconds;
   session.surgeon = scene.technique.name == "none" ? "none" : "scripted";
-  // Every repetition computes the same bits; the one least disturbed by other programs tells what the code costs.
+  // Every repetition computes the same bits; the fastest is the one least disturbed by other programs.
   RunResult best;
   for (int i = 0; i < o.repeat; ++i) {
     RunResult r = run_session(scene, session, hooks);
     if (i > 0 && r.state_hash != best.state_hash && !r.interrupted) {
       end_progress_line();
       std::fprintf(stderr,
-                   "catgut: bench stages: two runs of %s gave different states; this is a fault in Catgut, please report it\n",
+                   "catgut: bench stages: two runs of %s gave different states; this is a defect in Catgut, please report it\n",
                    name.c_str());
       return 1;
     }
@@ -56,7 +56,7 @@ int bench_stages(const BenchOptions& o) {
 
 int bench(const BenchOptions& o) {
   if (o.scene.size() > 1 && o.what != "paper" && o.what != "limits")
-    throw InputError("bench " + o.what + " --scene", "one scene at a time", "name one");
+    throw InputError("bench " + o.what + " --scene", "one scene only", "name one");
   if (o.what == "haptics") return bench_haptics(o.out, o.scene.empty() ? "purse_string" : o.scene[0]);
   if (o.what == "stages") return bench_stages(o);
   if (o.what == "frame")
@@ -76,18 +76,18 @@ int bench(const BenchOptions& o) {
 
 void add_bench(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<BenchOptions>();
-  CLI::App* command = app.add_subcommand("bench", "measure where the time goes");
+  CLI::App* command = app.add_subcommand("bench", "benchmark and profile");
   command
       ->add_option(
           "what", o->what,
-          "paper: its tables 1 to 4 with ours beside them; stages: where a tick's time goes; limits: what each further "
-          "suture costs; scale: 1, 4 and 16 times the particles, on one thread and on several; frame: a stereo frame without "
-          "a rasteriser; haptics: what a hand feels of a slow simulation")
+          "paper: tables 1 to 4 beside the paper's; stages: time per stage; limits: marginal cost per suture; scale: 1, 4 "
+          "and 16 times the particles, one thread and several; frame: CPU time of a stereo frame without rasterization; "
+          "haptics: comparison of rendering methods")
       ->required()
       ->check(CLI::IsMember({"paper", "limits", "scale", "stages", "frame", "haptics"}))
       ->type_name("paper|limits|scale|stages|frame|haptics");
-  command->add_option("--json", o->json, "stages, scale, frame: results as JSON; - for standard output")->type_name("FILE|-");
-  command->add_option("--repeat", o->repeat, "stages, scale: runs; the one with the fastest median is reported")
+  command->add_option("--json", o->json, "stages, scale, frame: results as JSON; -: standard output")->type_name("FILE|-");
+  command->add_option("--repeat", o->repeat, "stages, scale: runs; reports the one with the lowest median")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   add_threads_option(*command, o->threads);
@@ -96,22 +96,18 @@ void add_bench(CLI::App& app, int& exit_code) {
                    "scene to run (paper: all four techniques; stages: purse_string; frame, scale: lembert; limits: the two "
                    "stress scenes)")
       ->type_name("NAME");
-  command
-      ->add_option("--seconds", o->seconds,
-                   "simulated time; else until the surgeon is done (stages), 4 s (scale), 30 s (frame)")
+  command->add_option("--seconds", o->seconds, "simulated time; default: whole procedure (stages), 4 s (scale), 30 s (frame)")
       ->check(within(0.001, 1e6));
-  command->add_option("--sutures", o->sutures, "limits: bites in each scene")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  command->add_option("--executions", o->executions, "paper: of each technique, each with another seed")
+  command->add_option("--sutures", o->sutures, "limits: bites per scene")->check(CLI::Range(1, 1000))->capture_default_str();
+  command->add_option("--executions", o->executions, "paper: runs per technique, each with its own seed")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   command
       ->add_option("--out", o->out,
-                   "folder. limits: for a table (CSV) and a plot (PNG) of each scene (out/limits); paper: for the tables "
-                   "(tables.md, tables.csv); haptics: for forces.png, what a bite and a knot feel like")
+                   "output folder. limits: CSV and PNG per scene (default out/limits); paper: tables.md, tables.csv; haptics: "
+                   "forces.csv, forces.png")
       ->type_name("DIR");
-  command->add_option("--set", o->set, "change a key of the scene: key=value")->take_all()->allow_extra_args(false);
+  command->add_option("--set", o->set, "override a scene key: key=value; repeatable")->take_all()->allow_extra_args(false);
   command->callback([o, &exit_code] { exit_code = bench(*o); });
 }
 

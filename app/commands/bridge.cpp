@@ -27,13 +27,13 @@ int bridge(const Options& o) {
   }
   const ArmChoice choice = read_arm_choice(o.arms);
   if (choice.as_paper || choice.driver.empty())
-    throw InputError("--arms " + o.arms, "that is no driver of arms", "see catgut devices --help");
+    throw InputError("--arms " + o.arms, "unknown device backend", "see catgut devices --help");
   std::vector<std::string> told;
   ArmPort port = open_arms(choice, told);
   for (const std::string& line : told) std::printf("%s\n", line.c_str());
-  if (!port.any()) throw InputError("bridge", "there is no haptic arm to lend", "see above for what is missing");
+  if (!port.any()) throw InputError("bridge", "no haptic device to serve", "see above for what is missing");
   for (size_t k = 0; k < 2; ++k)
-    if (port.arm[k].present) std::printf("%s arm: %s\n", k == 0 ? "right" : "left", port.arm[k].name.c_str());
+    if (port.arm[k].present) std::printf("%s device: %s\n", k == 0 ? "right" : "left", port.arm[k].name.c_str());
   ArmServerOptions options;
   options.listen = o.listen;
   options.key = o.key;
@@ -55,16 +55,18 @@ int bridge(const Options& o) {
 
 void add_bridge(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("bridge", "lend this machine's haptic arms to a simulator elsewhere");
-  command->add_option("--arms", o->arms, "which, as for play --haptics")->type_name("DRIVER[:WHERE]")->capture_default_str();
+  CLI::App* command = app.add_subcommand("bridge", "serve local haptic devices over the network");
+  command->add_option("--arms", o->arms, "devices to serve, as for play --haptics")
+      ->type_name("DRIVER[:WHERE]")
+      ->capture_default_str();
   command
       ->add_option("--listen", o->listen,
-                   "address and port (0.0.0.0: any address); anything but this machine's own 127.0.0.1 needs --key")
+                   "address and port (0.0.0.0: any address); every address except 127.0.0.1 needs --key")
       ->type_name("HOST[:PORT]")
       ->capture_default_str();
-  command->add_option("--key", o->key, "file with the key that both ends share (mode 600)")->type_name("FILE");
-  command->add_option("--new-key", o->new_key, "make a key, write it to a new file, and end")->type_name("FILE");
-  command->add_option("--seconds", o->seconds, "end after so much time")->check(within(0.1, 1e9))->type_name("S");
+  command->add_option("--key", o->key, "shared key file (mode 600)")->type_name("FILE");
+  command->add_option("--new-key", o->new_key, "create a key file and exit")->type_name("FILE");
+  command->add_option("--seconds", o->seconds, "exit after S seconds")->check(within(0.1, 1e9))->type_name("S");
   command->callback([o, &exit_code] { exit_code = bridge(*o); });
 }
 

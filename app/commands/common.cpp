@@ -30,18 +30,18 @@ CLI::Validator within(double least, double most) {
       [least, most](std::string& text) {
         double value = 0;
         if (CLI::detail::lexical_cast(text, value) && value >= least && value <= most) return std::string();
-        return fmt::format("{} is no number from {} to {}", text, least, most);
+        return fmt::format("{} must be a number in [{}, {}]", text, least, most);
       },
       fmt::format("{} to {}", least, most));
 }
 
 void add_picture_options(CLI::App& command, PictureOptions& options) {
-  command.add_option("--video", options.video, "time-lapse film, FILE.mp4")->type_name("FILE.mp4");
-  command.add_option("--video-speed", options.speed, "simulated seconds per second of film")
+  command.add_option("--video", options.video, "time-lapse video")->type_name("FILE.mp4");
+  command.add_option("--video-speed", options.speed, "simulated seconds per second of video")
       ->check(within(0.01, 1000.0))
       ->capture_default_str();
-  command.add_option("--frames", options.frames, "folder for the film's pictures as PNG")->type_name("DIR");
-  command.add_option("--contact-sheet", options.contact_sheet, "up to twelve moments on one PNG")->type_name("FILE.png");
+  command.add_option("--frames", options.frames, "folder for the video's frames as PNG")->type_name("DIR");
+  command.add_option("--contact-sheet", options.contact_sheet, "up to twelve frames on one PNG")->type_name("FILE.png");
   command
       .add_option_function<std::vector<std::string>>(
           "--still",
@@ -55,7 +55,7 @@ void add_picture_options(CLI::App& command, PictureOptions& options) {
               options.still.emplace_back(at_s, one.substr(colon + 1));
             }
           },
-          "one moment, large and in the best quality: simulated seconds and a PNG; as often as needed")
+          "one frame in best quality: simulated seconds and a PNG file; repeatable")
       ->type_name("S:FILE.png")
       ->take_all()
       ->allow_extra_args(false);
@@ -69,7 +69,7 @@ void check_picture_files(const PictureOptions& options) {
 
 void add_threads_option(CLI::App& command, int& threads) {
   threads = default_threads();
-  command.add_option("--threads", threads, "workers of the solver; the result is the same for any number")
+  command.add_option("--threads", threads, "solver threads; the result does not depend on their number")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
 }
@@ -87,8 +87,8 @@ std::function<void(const Progress&)> progress_line() {
   const bool terminal = isatty(STDERR_FILENO);
   return [terminal, calls = 0](const Progress& p) mutable {
     if (!terminal && ++calls % 5 != 0) return;
-    std::fprintf(stderr, "%s%7.1f of %.0f s  %5.1f x real time  %s%s", terminal ? "\r\033[K" : "", p.simulated_s, p.until_s,
-                 p.real_time_factor, p.doing.c_str(), terminal ? "" : "\n");
+    std::fprintf(stderr, "%s%7.1f of %.0f s  real-time factor %5.1f  %s%s", terminal ? "\r\033[K" : "", p.simulated_s,
+                 p.until_s, p.real_time_factor, p.doing.c_str(), terminal ? "" : "\n");
     std::fflush(stderr);
     line_open = terminal;
   };
@@ -106,7 +106,7 @@ void prepare_output(const std::string& path) {
   if (!folder.empty()) std::filesystem::create_directories(folder, error);
   const bool was_there = std::filesystem::exists(path, error);
   if (std::filesystem::is_directory(path, error) || !std::ofstream(path, std::ios::app))
-    throw InputError(path, "cannot be written", "choose another place");
+    throw InputError(path, "cannot be written", "choose another path");
   if (!was_there) std::filesystem::remove(path, error);  // a run that fails early leaves no empty file behind
 }
 
@@ -115,7 +115,7 @@ void check_output(const std::string& path) {
   std::error_code error;
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   if (!folder.empty() && !std::filesystem::is_directory(folder, error))
-    throw InputError(path, "there is no folder " + folder.string(), "make it, or choose another place");
+    throw InputError(path, "no folder " + folder.string(), "create it, or choose another path");
   prepare_output(path);
 }
 
@@ -130,7 +130,7 @@ void write_output(const std::string& path, const std::string& text) {
 
 std::string this_machine() {
   std::ifstream info("/proc/cpuinfo");
-  std::string name = "an unknown processor";
+  std::string name = "unknown processor";
   for (std::string line; std::getline(info, line);)
     if (line.rfind("model name", 0) == 0) {
       name = line.substr(line.find(':') + 2);

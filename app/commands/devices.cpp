@@ -29,7 +29,7 @@ int calibrate(ArmPort port, const Options& o) {
   for (size_t k = 0; k < 2; ++k) {
     if (!known[k]) continue;
     places[arm[k].serial] = {static_cast<float>(o.scale), static_cast<float>(o.turn), at[k]};
-    std::printf("%s arm: middle at %.0f, %.0f, %.0f mm, scale %g, turned by %g degrees\n", k == 0 ? "right" : "left",
+    std::printf("%s device: center at %.0f, %.0f, %.0f mm, scale %g, rotation %g degrees\n", k == 0 ? "right" : "left",
                 1e3 * double{at[k].x}, 1e3 * double{at[k].y}, 1e3 * double{at[k].z}, o.scale, o.turn);
   }
   if (!known[0] && !known[1]) return 1;
@@ -49,11 +49,11 @@ void print(const ArmPort& port) {
   for (size_t k = 0; k < 2; ++k) {
     const ArmInfo& a = port.arm[k];
     if (!a.present) continue;
-    std::printf("%s: %s arm \"%s\", %s, serial %s, driver %s\n", port.kind, k == 0 ? "right" : "left", a.name.c_str(),
+    std::printf("%s: %s device \"%s\", %s, serial %s, driver %s\n", port.kind, k == 0 ? "right" : "left", a.name.c_str(),
                 a.model.c_str(), a.serial.c_str(), a.driver.c_str());
     ServoOptions servo;
     fit_to_arm(servo, a.limits);
-    std::printf("  force %.2g N, %.2g N for long; %.0f N/m, %.1f N s/m at most; workspace %.0f x %.0f x %.0f mm\n",
+    std::printf("  peak force %.2g N, continuous %.2g N; maximum %.0f N/m, %.1f N s/m; workspace %.0f x %.0f x %.0f mm\n",
                 double{servo.limits.force}, double{servo.limits.continuous}, double{servo.limits.stiffness},
                 double{servo.limits.damping}, 1e3 * double{a.most.x - a.least.x}, 1e3 * double{a.most.y - a.least.y},
                 1e3 * double{a.most.z - a.least.z});
@@ -75,13 +75,12 @@ int devices(const Options& o) {
     any = true;
     if (o.calibrate) code = std::max(code, calibrate(std::move(port), o));
     else if (o.test) code = std::max(code, test(std::move(port)));
-    else std::printf("  catgut devices %s --test pushes gently; catgut play --haptics %s uses them\n", d.word, d.word);
+    else std::printf("  catgut devices %s --test applies small forces; catgut play --haptics %s uses them\n", d.word, d.word);
   }
   if (any && !o.test && !o.calibrate) read_arm_places(arm_places_file());  // says here what a scene would stumble over
   if (any) return code;
   if (o.test || o.calibrate)
-    throw InputError(o.test ? "devices --test" : "devices --calibrate", "there is no haptic arm",
-                     "see above for what is missing");
+    throw InputError(o.test ? "devices --test" : "devices --calibrate", "no haptic device", "see above for what is missing");
   std::printf(
       "Mouse, keyboard and gamepad are hands in the window: catgut play\n"
       "The scripted surgeon needs none: catgut run purse_string --surgeon scripted --headless\n");
@@ -92,19 +91,18 @@ int devices(const Options& o) {
 
 void add_devices(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("devices", "list haptic arms");
-  std::string drivers = "of this driver alone:";
+  CLI::App* command = app.add_subcommand("devices", "list haptic devices");
+  std::string drivers = "this backend only:";
   for (const ArmDriver& d : arm_drivers())
     drivers += std::string("\n") + d.word + (*d.where ? std::string("[:") + d.where + "]" : "") + "  " + d.arms;
   command->add_option("driver", o->which, drivers)->type_name("DRIVER[:WHERE]");
-  CLI::Option* test =
-      command->add_flag("--test", o->test, "push each arm slowly along each axis, after a countdown, and see what it does");
-  command->add_flag("--calibrate", o->calibrate, "lay the arms' workspaces into the field; kept per user and arm")
+  CLI::Option* test = command->add_flag("--test", o->test, "push each device slowly along each axis after a countdown");
+  command->add_flag("--calibrate", o->calibrate, "map the workspaces into the field; saved per user and device")
       ->excludes(test);
-  command->add_option("--scale", o->scale, "calibrate: metres in the field per metre of the stylus")
+  command->add_option("--scale", o->scale, "calibrate: field meters per meter of the stylus")
       ->check(within(0.1, 3.0))
       ->capture_default_str();
-  command->add_option("--turn", o->turn, "calibrate: how far the arms are turned about the vertical [degrees]")
+  command->add_option("--turn", o->turn, "calibrate: rotation about the vertical [degrees]")
       ->check(within(-180.0, 180.0))
       ->capture_default_str();
   command->callback([o, &exit_code] { exit_code = devices(*o); });

@@ -77,9 +77,9 @@ int bench_frame(const FrameOptions& o) {
                     scene.name, caller.size(), median, p99, all_median, all_p99));
   if (o.json != "-")
     std::printf(
-        "%s: %zu stereo frames, nothing rasterised; processor time of one [ms]\n"
+        "%s: %zu stereo frames, not rasterized; CPU time per frame [ms]\n"
         "                     median    p99\n"
-        "picture's thread   %8.2f %6.2f\n"
+        "render thread      %8.2f %6.2f\n"
         "all threads        %8.2f %6.2f\n",
         scene.name.c_str(), caller.size(), median, p99, all_median, all_p99);
   return run.interrupted ? 130 : 0;

@@ -30,8 +30,7 @@ int bench_paper(const PaperOptions& o) {
     scenes.push_back(read_scene(name));
     for (const std::string& setting : o.set) set_value(scenes.back(), setting);
     if (scenes.back().technique.name == "none")
-      throw InputError(name, "it has no technique that the scripted surgeon could sew",
-                       "name purse_string, connell, stay or lembert");
+      throw InputError(name, "it has no technique for the scripted surgeon", "name purse_string, connell, stay or lembert");
   }
   if (!o.out.empty())
     for (const char* name : {"/tables.md", "/tables.csv"}) prepare_output(o.out + name);
@@ -42,7 +41,7 @@ int bench_paper(const PaperOptions& o) {
       "On {}. Mean ± standard deviation over {} executions of their median ticks; the paper's figures beside them (i7-13700KF, "
       "RTX 4070 Ti, drawn in a headset). frame: the surgeon's plan, the tick{} one after another.\n\n",
       this_machine(), o.executions,
-      picture ? " and a stereo picture handed to a driver that rasterises nothing," : " (no pictures in this build)");
+      picture ? " and a stereo frame submitted to a backend that does not rasterize," : " (no pictures in this build)");
   std::fputs(about.c_str(), stdout);
   std::string markdown = about, csv = paper_csv_header();
   bool all_sewn = true, interrupted = false;

@@ -44,11 +44,11 @@ int replay(const ReplayOptions& o) {
   }
   if (o.json != "-")
     std::printf("%s: %llu ticks replayed%s, state %016llx\n", o.file.c_str(), static_cast<unsigned long long>(result.run.ticks),
-                o.check ? ", every hash as recorded" : "", static_cast<unsigned long long>(result.run.state_hash));
+                o.check ? ", all hashes verified" : "", static_cast<unsigned long long>(result.run.state_hash));
   if (result.run.interrupted) return 130;
   // What could be replayed has been; that it is not the whole run is still the file's fault.
   if (recording.truncated)
-    throw InputError(o.file, "the recording is not whole: " + recording.fault, "the ticks before were replayed");
+    throw InputError(o.file, "truncated recording: " + recording.fault, "the ticks it holds were replayed");
   return 0;
 }
 
@@ -56,11 +56,11 @@ int replay(const ReplayOptions& o) {
 
 void add_replay(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<ReplayOptions>();
-  CLI::App* command = app.add_subcommand("replay", "play a recording");
-  command->add_option("file", o->file, "the recording")->required()->type_name("FILE.cgrec");
-  command->add_flag("--check", o->check, "compare the state with the recorded hash after every tick");
+  CLI::App* command = app.add_subcommand("replay", "replay a recording");
+  command->add_option("file", o->file, "recording to replay")->required()->type_name("FILE.cgrec");
+  command->add_flag("--check", o->check, "compare every state hash with the recorded one");
   add_threads_option(*command, o->threads);
-  command->add_option("--json", o->json, "results as JSON; - for standard output")->type_name("FILE|-");
+  command->add_option("--json", o->json, "results as JSON; -: standard output")->type_name("FILE|-");
   add_picture_options(*command, o->pictures);
   command->callback([o, &exit_code] { exit_code = replay(*o); });
 }

@@ -1,6 +1,7 @@
-// app: `catgut run SCENE`: simulates a scene and judges it by its expectations.
+// app: `catgut run SCENE`: simulates a scene and checks its expected results.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
@@ -27,9 +28,15 @@ SceneSpec scene_for(const RunOptions& o) {
   if (!o.preset.empty()) use_preset(scene, o.preset);
   if (o.seed_given) set_value(scene, "seed=" + std::to_string(o.seed), "--seed");
   if (!o.mesh.empty()) {
-    if (scene.body.empty()) throw InputError("--mesh", "the scene has no body to replace", "add a [[body]] to it");
+    if (scene.body.empty()) throw InputError("--mesh", "the scene has no body to replace", "add a [[body]]");
     scene.body[0].mesh = o.mesh;
   }
+  // The scene's exact particle count belongs to its own bodies and thread.
+  const bool other_size = !o.mesh.empty() || std::any_of(o.set.begin(), o.set.end(), [](const std::string& setting) {
+    const std::string key = setting.substr(0, setting.find('='));
+    return key == "thread.particles" || (key.rfind("body", 0) == 0 && key.ends_with(".particles"));
+  });
+  if (other_size) std::erase_if(scene.expect, [](const Expectation& e) { return e.name == "particles"; });
   for (const std::string& setting : o.set) set_value(scene, setting);
   return scene;
 }
@@ -43,8 +50,8 @@ int run(const RunOptions& o) {
   const double until_s = o.session.seconds > 0 ? o.session.seconds : static_cast<double>(scene.duration);
   for (const auto& [at_s, path] : o.pictures.still) {
     if (at_s > until_s)
-      throw InputError("--still", fmt::format("the run is over after {} s at the latest, before {} s", until_s, at_s),
-                       "choose an earlier moment, or a later --seconds");
+      throw InputError("--still", fmt::format("the run ends after {} s at the latest, before {} s", until_s, at_s),
+                       "choose an earlier time, or a larger --seconds");
     prepare_output(path);
   }
 
@@ -59,7 +66,7 @@ int run(const RunOptions& o) {
   const RunResult result = run_session(scene, o.session, hooks);
   end_progress_line();
   if (!o.json.empty()) write_output(o.json, run_json(result));
-  if (o.json != "-") std::fputs(run_summary(result).c_str(), stdout);
+  if (o.json != "-") std::fputs(run_summary(result, !o.no_expect).c_str(), stdout);
   if (pictures) pictures->finish();  // last: a picture that fails takes no results with it
   if (result.interrupted) return 130;
   return o.no_expect || result.expectations_hold() ? 0 : 1;
@@ -70,26 +77,26 @@ int run(const RunOptions& o) {
 void add_run(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<RunOptions>();
   CLI::App* command = app.add_subcommand("run", "simulate a scene");
-  command->add_option("scene", o->scene, "a name from scenes/ or the path of a .toml file")->required()->type_name("SCENE");
-  command->add_option("--surgeon", o->session.surgeon, "scripted, none, or a recording whose hands are played")
+  command->add_option("scene", o->scene, "name from scenes/ or path of a .toml file")->required()->type_name("SCENE");
+  command->add_option("--surgeon", o->session.surgeon, "scripted, none, or a recording whose hands are replayed")
       ->type_name("scripted|none|FILE")
       ->capture_default_str();
-  command->add_flag("--headless", o->headless, "without a window (every run is; the window is catgut play)");
-  command->add_option("--seconds", o->session.seconds, "simulated time, settling included; else the scene's duration")
+  command->add_flag("--headless", o->headless, "no window (always so; catgut play opens one)");
+  command->add_option("--seconds", o->session.seconds, "simulated time including settling; default: the scene's duration")
       ->check(within(0.001, 1e6))
       ->type_name("S");
   CLI::Option* seed =
-      command->add_option("--seed", o->seed, "of the surgeon's tremor and aim; else the scene's")->type_name("N");
+      command->add_option("--seed", o->seed, "random seed of tremor and aim; default: the scene's")->type_name("N");
   add_threads_option(*command, o->session.threads);
-  command->add_option("--preset", o->preset, "of the solver: paper or default")->type_name("paper|default");
-  command->add_option("--set", o->set, "change a key of the scene: key=value, as often as needed")
+  command->add_option("--preset", o->preset, "solver preset")->type_name("paper|default");
+  command->add_option("--set", o->set, "override a scene key; repeatable")
       ->type_name("key=value")
       ->take_all()
       ->allow_extra_args(false);
-  command->add_option("--record", o->session.record, "recording to write")->type_name("FILE.cgrec");
-  command->add_option("--json", o->json, "results as JSON; - for standard output")->type_name("FILE|-");
-  command->add_option("--mesh", o->mesh, "organ surface for the first body, file or file#node")->type_name("FILE");
-  command->add_flag("--no-expect", o->no_expect, "report the scene's expectations without judging the run by them");
+  command->add_option("--record", o->session.record, "write a recording")->type_name("FILE.cgrec");
+  command->add_option("--json", o->json, "results as JSON; -: standard output")->type_name("FILE|-");
+  command->add_option("--mesh", o->mesh, "organ surface of the first body, file or file#node")->type_name("FILE");
+  command->add_flag("--no-expect", o->no_expect, "report expected results without checking them");
   add_picture_options(*command, o->pictures);
   command->callback([o, seed, &exit_code] {
     o->seed_given = seed->count() > 0;

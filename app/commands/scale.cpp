@@ -1,4 +1,4 @@
-// app: `catgut bench scale`: what 1, 4 and 16 times a scene's particles cost, and what a second thread is worth. The paper's
+// app: `catgut bench scale`: scaling with particle count (1, 4, 16 times) and thread count. The paper's
 // substeps and sweeps unless --set says otherwise; every rule is on, and the scripted surgeon begins to work.
 #include <fmt/format.h>
 
@@ -38,8 +38,8 @@ std::string json_text(const std::string& scene, const std::vector<Measured>& all
   return j.dump(2) + "\n";
 }
 
-// The stages that take most of the time, the dearest first.
-std::string dearest(const RunResult& run) {
+// The three most expensive stages.
+std::string most_expensive(const RunResult& run) {
   std::vector<size_t> stage(kStages);
   for (size_t s = 0; s < kStages; ++s) stage[s] = s;
   std::sort(stage.begin(), stage.end(), [&](size_t a, size_t b) { return run.stage_ms[a].median > run.stage_ms[b].median; });
@@ -78,7 +78,7 @@ int bench_scale(const ScaleOptions& o) {
       end_progress_line();
       std::fprintf(
           stderr,
-          "catgut: bench scale: one and %d threads gave different states; this is a fault in Catgut, please report it\n",
+          "catgut: bench scale: one and %d threads gave different states; this is a defect in Catgut, please report it\n",
           o.threads);
       return 1;
     }
@@ -90,15 +90,15 @@ int bench_scale(const ScaleOptions& o) {
     std::printf("%s, preset %s, %g s simulated, best of %d; %s\n\n", scene.name.c_str(), scene.solver.preset.c_str(), o.seconds,
                 o.repeat, this_machine().c_str());
     std::printf(
-        "| particles | threads | solver ms: median | 99 %% | worst | us a particle | one thread over this | dearest stages "
-        "[ms] |\n"
+        "| particles | threads | solver ms: median | 99 %% | worst | us per particle | speedup | most expensive stages [ms] "
+        "|\n"
         "|---|---|---|---|---|---|---|---|\n");
     double one = 0;
     for (const Measured& m : all) {
       const Spread& s = m.run.solver_ms;
       if (m.threads == 1) one = s.median;
       std::printf("| %zu | %d | %.3f | %.3f | %.3f | %.3f | %.2f | %s |\n", m.run.particles, m.threads, s.median, s.p99, s.max,
-                  1000 * s.median / static_cast<double>(m.run.particles), one / s.median, dearest(m.run).c_str());
+                  1000 * s.median / static_cast<double>(m.run.particles), one / s.median, most_expensive(m.run).c_str());
     }
   }
   return hooks.stop->load() ? 130 : 0;

@@ -16,7 +16,7 @@ namespace {
 // Where the scales end [mm]; what is beyond has the last colour, and its number says so.
 constexpr float kMostSpacing = 8, kMostDepth = 2, kMostEdge = 8;
 constexpr size_t kMostNumbered = 26;  // bites; with more the numbers would lie over each other
-// What surgeons' books ask of bites in bowel [mm]: 3 to 5 apart and from the edge.
+// Recommended bite spacing and edge distance in bowel [mm] (EAGLE module 5, docs/references.md).
 constexpr float kGoodFrom = 3, kGoodTo = 5;
 
 ImU32 colour(const ImVec4& c, float alpha = 1) { return ImGui::GetColorU32({c.x, c.y, c.z, c.w * alpha}); }
@@ -103,7 +103,7 @@ void stitch_map_chart(const StitchMap& map, BiteColour by, ImVec2 size) {
     if (b.wall < map.edge.size()) spread = std::max(spread, map.edge[b.wall].length());
   }
   if (walls == 0) {
-    label(list, {at.x + size.x / 2, at.y + size.y / 2}, colour(kQuiet), "no edge is known here: see the list", 0.5f, 0.5f);
+    label(list, {at.x + size.x / 2, at.y + size.y / 2}, colour(kQuiet), "No edge data", 0.5f, 0.5f);
     return;
   }
   // One wall below the edge line; of two the first below and the second above, as they lie when they are sewn together.
@@ -171,8 +171,7 @@ void stitch_map_chart(const StitchMap& map, BiteColour by, ImVec2 size) {
       label(list, {x, away + way * 0.85f * em()}, colour(kQuiet), fmt::format("{:.1f}", bite_value_mm(b, by)), 0.5f,
             way > 0 ? 0.0f : 1.0f, 0.85f);
   }
-  if (map.bite.empty())
-    label(list, {(left + right) / 2, (middle + bottom) / 2}, colour(kQuiet), "no bite was completed", 0.5f, 0.5f);
+  if (map.bite.empty()) label(list, {(left + right) / 2, (middle + bottom) / 2}, colour(kQuiet), "No bites", 0.5f, 0.5f);
 }
 
 void tension_chart(const StitchMap& map, uint64_t from, uint64_t to, double now, ImVec2 size, bool labels) {
@@ -180,19 +179,19 @@ void tension_chart(const StitchMap& map, uint64_t from, uint64_t to, double now,
   const ImVec2 at = ImGui::GetCursorScreenPos();
   ImGui::Dummy(size);
   list.AddRectFilled(at, {at.x + size.x, at.y + size.y}, colour({0, 0, 0, 0.35f}), 4);
-  float most_n = 1;
-  for (const TensionSample& t : map.tension) most_n = std::max(most_n, t.most);
+  float peak_n = 1;
+  for (const TensionSample& t : map.tension) peak_n = std::max(peak_n, t.peak);
   const float left = at.x + (labels ? 3.2f * em() : 0), right = at.x + size.x - (labels ? 1.2f * em() : 0),
               top = at.y + (labels ? 0.9f * em() : 0.2f * em()), bottom = at.y + size.y - (labels ? 1.5f * em() : 0);
   const double span = std::max<double>(1, static_cast<double>(to - from));
   const auto x_of = [&](double tick) {
     return left + (right - left) * static_cast<float>((tick - static_cast<double>(from)) / span);
   };
-  const auto y_of = [&](float n) { return bottom - (bottom - top) * n / (1.08f * most_n); };
+  const auto y_of = [&](float n) { return bottom - (bottom - top) * n / (1.08f * peak_n); };
   const float thin = std::max(1.0f, 0.06f * em());
   if (labels) {
-    const float step = static_cast<float>(grid_step(static_cast<double>(most_n)));
-    for (float n = 0; n <= most_n; n += step) {
+    const float step = static_cast<float>(grid_step(static_cast<double>(peak_n)));
+    for (float n = 0; n <= peak_n; n += step) {
       list.AddLine({left, y_of(n)}, {right, y_of(n)}, colour(kQuiet, n > 0 ? 0.15f : 0.6f), thin);
       label(list, {left - 0.4f * em(), y_of(n)}, colour(kQuiet), fmt::format("{:.3g} N", n), 1, 0.5f, 0.85f);
     }
@@ -215,7 +214,7 @@ void tension_chart(const StitchMap& map, uint64_t from, uint64_t to, double now,
     }
     list.AddPolyline(line.data(), static_cast<int>(line.size()), c, 0, thick);
   };
-  draw(&TensionSample::most, colour(kAccent, labels ? 1.0f : 0.55f), 1.5f * thin);
+  draw(&TensionSample::peak, colour(kAccent, labels ? 1.0f : 0.55f), 1.5f * thin);
   if (labels) draw(&TensionSample::needle, colour(kText, 0.55f), thin);
   for (const Event& e : map.event) {
     const Mark mark = mark_of(e);
@@ -274,10 +273,10 @@ void draw_mark(ImDrawList& list, ImVec2 p, Mark mark, float s) {
 
 void mark_legend() {
   constexpr std::pair<Mark, const char*> kMarks[] = {{Mark::bite, "bite"},
-                                                     {Mark::knot, "throw set"},
+                                                     {Mark::knot, "throw locked"},
                                                      {Mark::cut, "cut"},
-                                                     {Mark::suture, "fresh needle"},
-                                                     {Mark::fault, "went wrong"}};
+                                                     {Mark::suture, "new suture"},
+                                                     {Mark::fault, "fault"}};
   for (const auto& [mark, word] : kMarks) {
     const ImVec2 at = ImGui::GetCursorScreenPos();
     draw_mark(*ImGui::GetWindowDrawList(), {at.x + 0.5f * em(), at.y + 0.5f * em()}, mark, 0.36f * em());

@@ -1,4 +1,4 @@
-// app/window: the inside of a tick, for developers.
+// app/window: the profiler: stage times, constraint forces and live parameters.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,15 +13,15 @@ Choice developer_panel(const WorkView& v, bool can_touch) {
   Choice choice;
   const Measures& m = v.status->measures;
   begin_at("inside", 1, 1, 0.86f);
-  text(kAccent, "Inside (F3)");
+  text(kAccent, "Profiler (F3)");
   ImGui::SameLine();
-  text(kQuiet, fmt::format("{} particles ({} thread), {} clusters, {} contacts, late {}", m.particles, m.thread_particles,
-                           m.clusters, m.contacts, v.status->late));
+  text(kQuiet, fmt::format("{} particles ({} thread), {} clusters, {} contacts, {} dropped ticks", m.particles,
+                           m.thread_particles, m.clusters, m.contacts, v.status->late));
   float most = 0.05f, all = 0;
   for (float ms : m.stage_ms) most = std::max(most, ms), all += ms;
   if (ImGui::BeginTable("inside", 2, ImGuiTableFlags_SizingFixedFit)) {
     ImGui::TableNextColumn();
-    text(kQuiet, fmt::format("stages, {:.2f} ms a tick", all));
+    text(kQuiet, fmt::format("stages, {:.2f} ms per tick", all));
     for (size_t k = 0; k < m.stage_ms.size(); ++k) {
       const ImVec2 at = ImGui::GetCursorScreenPos();
       const float wide = 13 * em();
@@ -32,11 +32,11 @@ Choice developer_panel(const WorkView& v, bool can_touch) {
       ImGui::Dummy({1.2f * em(), em()});
     }
     ImGui::TableNextColumn();
-    text(kQuiet, "largest multiplier of each kind, as force");
-    for (size_t k = 0; k < m.most_n.size(); ++k)
-      text(fmt::format("{:<16}{:8.3f} N  of {}", force_name(static_cast<ForceKind>(k)), m.most_n[k], m.constraints[k]));
+    text(kQuiet, "max constraint force by type");
+    for (size_t k = 0; k < m.peak_n.size(); ++k)
+      text(fmt::format("{:<16}{:8.3f} N  of {}", force_name(static_cast<ForceKind>(k)), m.peak_n[k], m.constraints[k]));
     gap(0.3f);
-    text(kQuiet, can_touch ? "parameters, from the next tick on" : "parameters (Esc to change them)");
+    text(kQuiet, can_touch ? "parameters" : "parameters (Esc to edit)");
     // A slider that is being moved keeps its own value until it is let go: every change builds the model anew.
     static std::array<float, kLiveParameters> moved{};
     static int active = -1;

@@ -20,7 +20,7 @@ void Latency::picture(const LiveStatus& s) {
 }
 
 void Latency::report(int pictures, double seconds) const {
-  std::fprintf(stderr, "catgut: %d pictures in %.1f s\n", pictures, seconds);
+  std::fprintf(stderr, "catgut: %d frames in %.1f s\n", pictures, seconds);
   if (all_ms_.empty()) return;
   std::fprintf(stderr, "catgut: latency [ms] of %zu motions   median     99 %%    worst\n", all_ms_.size());
   const auto row = [](const char* name, const std::vector<float>& v) {

@@ -86,18 +86,18 @@ void lesson_panel(const LessonRun& run, bool hints) {
   const size_t n = lesson.step.size();
   ImGui::ProgressBar(static_cast<float>(run.step()) / static_cast<float>(n), {-1, 0.35f * font}, "");
   if (run.all_done()) {
-    line(kBlue, lesson.title + ": done");
-    line(kQuiet, "The knot holds. Go on as you like, or Esc.");
+    line(kBlue, lesson.title + ": complete");
+    line(kQuiet, "The knot is locked. Continue, or press Esc.");
   } else {
     const LessonStep& s = lesson.step[run.step()];
     line(kBlue, fmt::format("{} of {}  {}", run.step() + 1, n, s.title));
     line(kWhite, s.text);
-    if (run.showing()) line(kOrange, "Watch: the surgeon shows it, then it is your turn (S stops)");
+    if (run.showing()) line(kOrange, "Demonstration: watch, then repeat (S stops)");
     else if (run.gave_up())
-      line(kOrange, "From here it could not be shown: take the needle properly first, or take back the bite (Backspace)");
+      line(kOrange, "Demonstration not possible from here. Grasp the needle, or undo the bite (Backspace).");
     else {
       if (hints) line(kQuiet, s.hint);
-      line(kQuiet, "S  show me");
+      line(kQuiet, "S  demonstration");
     }
   }
   ImGui::End();
@@ -143,8 +143,8 @@ void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel
   const auto say = [](bool ok, const std::string& text) {
     ImGui::TextColored(ok ? kBlue : kOrange, "%s", ((ok ? "+ " : "! ") + text).c_str());
   };
-  say(good, fmt::format("entry {:.1f} mm from the place", 1000 * aside));
-  say(deep_enough, fmt::format("depth {:.1f} of {:.1f} mm", 1000 * depth, 1000 * g.depth));
+  say(good, fmt::format("entry {:.1f} mm from target", 1000 * aside));
+  say(deep_enough, fmt::format("depth {:.1f} mm, target {:.1f} mm", 1000 * depth, 1000 * g.depth));
   ImGui::End();
 }
 

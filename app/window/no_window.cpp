@@ -5,7 +5,8 @@
 namespace catgut {
 
 int play(const PlayOptions&) {
-  throw InputError("window", "this build has none", "run without it: catgut run purse_string --surgeon scripted --headless");
+  throw InputError("window", "this build has no window",
+                   "run without it: catgut run purse_string --surgeon scripted --headless");
 }
 
 }  // namespace catgut

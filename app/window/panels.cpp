@@ -13,20 +13,20 @@ namespace catgut {
 namespace {
 
 const char* kHints =
-    "mouse            move the tool\n"
-    "wheel, Shift     into the picture\n"
-    "left, space      close or open the jaw\n"
-    "right            drive the needle, turn the tool\n"
-    "Ctrl+right, Q E  turn the tool as a ball\n"
-    "W                both hands: wind, draw apart\n"
-    "Tab              the other hand\n"
-    "C  N             cut, fresh needle\n"
+    "mouse            move instrument\n"
+    "wheel, Shift     depth\n"
+    "left, space      close or open jaws\n"
+    "right            drive needle, roll instrument\n"
+    "Ctrl+right, Q E  arcball rotation\n"
+    "W                both hands: wrap, pull apart\n"
+    "Tab              other hand\n"
+    "C  N             cut thread, new suture\n"
     "1 2 3            fine, normal, fast\n"
-    "middle, arrows   look round; Ctrl+wheel: closer\n"
+    "middle, arrows   orbit; Ctrl+wheel: zoom\n"
     "- +              slow motion\n"
-    "Backspace        take back the last bite\n"
-    "F2  F3  F12      settings, inside, picture\n"
-    "Esc              pause     F1 hide this";
+    "Backspace        undo bite\n"
+    "F2  F3  F12      settings, profiler, screenshot\n"
+    "Esc              pause     F1 hide keys";
 
 void quality_choice(Settings& s) {
   for (const Quality q : {Quality::draft, Quality::medium, Quality::good}) {
@@ -36,9 +36,9 @@ void quality_choice(Settings& s) {
 }
 
 void guidance_choice(Settings& s) {
-  const std::pair<Guidance, const char*> kLevels[] = {{Guidance::learn, "learn: where the needle should go is shown"},
-                                                      {Guidance::practise, "practise: what happens is told in words"},
-                                                      {Guidance::exam, "exam: no help and no word until the end"}};
+  const std::pair<Guidance, const char*> kLevels[] = {{Guidance::learn, "learn: needle path shown"},
+                                                      {Guidance::practice, "practice: event messages"},
+                                                      {Guidance::exam, "exam: no feedback until results"}};
   for (const auto& [level, words] : kLevels)
     if (radio(words, s.guidance == level)) s.guidance = level;
 }
@@ -58,14 +58,14 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   begin_box("start", {(screen.x - wide) / 2, (screen.y - high) / 2}, {wide, high}, 0.92f);
   text(kAccent, "Catgut");
   ImGui::SameLine();
-  text(kQuiet, "open surgery, stitch by stitch");
+  text(kQuiet, "open-surgery suturing");
   ImGui::Separator();
   if (!v.message.empty()) bad_text(v.message);
   const float foot = 3.0f * em();
   ImGui::BeginChild("procedures", {0.53f * wide, -foot});
-  if (ImGui::Button("T  Teach me: a first stitch", {-1.0f, 1.75f * em()})) choice.what = Chosen::teach;
+  if (ImGui::Button("T  Tutorial: first stitch", {-1.0f, 1.75f * em()})) choice.what = Chosen::teach;
   gap(0.3f);
-  heading("Procedure and technique");
+  heading("Scenes");
   for (size_t i = 0; i < v.scenes->size(); ++i) {
     const SceneChoice& s = (*v.scenes)[i];
     ImGui::PushStyleVar(ImGuiStyleVar_ButtonTextAlign, {0, 0.5f});
@@ -73,8 +73,7 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
       choice = {Chosen::scene, i};
     ImGui::PopStyleVar();
     ImGui::Indent(1.6f * em());
-    text(kQuiet,
-         fmt::format("{}; on {}", s.technique == "none" ? "no technique: free practice" : "technique: " + s.technique, s.body));
+    text(kQuiet, fmt::format("{}; {}", s.technique == "none" ? "free practice" : "technique: " + s.technique, s.body));
     ImGui::Unindent(1.6f * em());
     gap(0.15f);
   }
@@ -86,23 +85,22 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   gap();
   heading("Hands");
   if (v.watch_only) {
-    text(kQuiet, "as the command line says");
+    text(kQuiet, "set on the command line");
   } else {
-    if (radio("mine", !watch)) watch = false;
+    if (radio("manual", !watch)) watch = false;
     ImGui::SameLine();
-    if (radio("watch the scripted surgeon", watch)) watch = true;
+    if (radio("scripted surgeon", watch)) watch = true;
   }
   hand_choice(settings);
   ImGui::PushStyleColor(ImGuiCol_Text, kQuiet);
-  ImGui::TextWrapped("%s",
-                     v.pad.empty() ? "mouse and keyboard; a gamepad may be plugged in" : ("mouse, keyboard, " + v.pad).c_str());
+  ImGui::TextWrapped("%s", v.pad.empty() ? "mouse and keyboard; gamepad optional" : ("mouse, keyboard, " + v.pad).c_str());
   ImGui::PopStyleColor();
   gap();
-  heading("Picture");
+  heading("Graphics quality");
   quality_choice(settings);
   gap();
-  heading("Recordings in this folder");
-  if (v.recordings->empty()) text(kQuiet, "none yet: catgut play --record FILE.cgrec");
+  heading("Recordings");
+  if (v.recordings->empty()) text(kQuiet, "none; record with catgut play --record FILE.cgrec");
   ImGui::BeginChild("files", {0, 0});
   for (const std::string& file : *v.recordings) {
     ImGui::PushStyleVar(ImGuiStyleVar_ButtonTextAlign, {0, 0.5f});
@@ -117,7 +115,8 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   ImGui::SameLine();
   if (wide_button("Quit (Esc)", 11)) choice.what = Chosen::quit;
   ImGui::SameLine();
-  text(kQuiet, " 1 .. 9, Enter: begin");
+  if (const size_t n = std::min<size_t>(9, v.scenes->size()); n > 0)
+    text(kQuiet, n > 1 ? fmt::format(" 1-{}, Enter: start", n) : " Enter: start");
   ImGui::End();
   return choice;
 }
@@ -144,7 +143,7 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& m
     };
     row("guidance");
     guidance_choice(s);
-    row("picture");
+    row("graphics");
     quality_choice(s);
     row("text size");
     ImGui::SetNextItemWidth(16 * em());
@@ -156,22 +155,22 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& m
     if (!ImGui::IsItemActive()) wanted = s.text_size;
     row("mouse");
     ImGui::SetNextItemWidth(16 * em());
-    ImGui::SliderFloat("##mouse", &s.mouse_speed, 0.2f, 4, "%.2f x of the pointer",
+    ImGui::SliderFloat("##mouse", &s.mouse_speed, 0.2f, 4, "%.2f x pointer",
                        ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
     row("hands");
     hand_choice(s);
-    row("jaw");
-    ImGui::Checkbox("closes only while the button is down", &s.hold_to_close);
-    row("help");
-    ImGui::Checkbox("an open jaw finds the needle (H)", &s.assist);
+    row("jaws");
+    ImGui::Checkbox("hold button to close", &s.hold_to_close);
+    row("grasp assist");
+    ImGui::Checkbox("snap to needle, tail and bite (H)", &s.assist);
     row("show");
     ImGui::Checkbox("suture points (M)", &s.suture_points);
     ImGui::SameLine();
     ImGui::Checkbox("keys (F1)", &s.hints);
     ImGui::EndTable();
   }
-  if (working) text(kQuiet, "picture and hands change with the next scene");
-  text(kQuiet, file.empty() ? "not kept: this user has no folder for settings" : "kept in " + file);
+  if (working) text(kQuiet, "graphics and hands apply to the next scene");
+  text(kQuiet, file.empty() ? "Settings not saved: no config directory" : "Saved in " + file);
   ImGui::Separator();
   if (wide_button("Done (Esc)", 11)) choice.what = Chosen::leave_settings;
   ImGui::SameLine();
@@ -185,15 +184,14 @@ void work_panel(const WorkView& v, const Settings& settings) {
   const bool silent = settings.guidance == Guidance::exam && !v.watching;
   std::vector<Line> state{{kText, v.scene->title}};
   if (s.settling) {
-    state.push_back({kQuiet, "the tissue comes to rest"});
+    state.push_back({kQuiet, "Settling..."});
   } else {
-    const int seconds = static_cast<int>(s.practice.time_s);
     const bool slow = s.time_factor > 0 && s.time_factor < 0.93f * s.speed && !s.paused;
-    state.push_back({kQuiet, fmt::format("{}:{:02}   time x {:.2f}{}", seconds / 60, seconds % 60,
+    state.push_back({kQuiet, fmt::format("{}   real-time factor {:.2f}{}", clock_text(s.practice.time_s),
                                          s.paused ? 0.0f : s.time_factor, s.speed < 1 && !slow ? "  slow motion" : "")});
-    if (slow) state.push_back({kBad, "! this machine is too slow"});
-    state.push_back({kQuiet, fmt::format("tick {:.1f} ms, {:.1f} pictures/s", s.tick_ms, v.pictures_per_s)});
-    if (silent) state.push_back({kQuiet, "exam: no word until the end"});
+    if (slow) state.push_back({kBad, "! below real time"});
+    state.push_back({kQuiet, fmt::format("tick {:.1f} ms, {:.1f} fps", s.tick_ms, v.pictures_per_s)});
+    if (silent) state.push_back({kQuiet, "exam: no feedback"});
     else
       for (const std::string& line : technique_lines(*v.scene, *v.seen, s.practice)) state.push_back({kText, line});
     if (!s.doing.empty()) state.push_back({kQuiet, "surgeon: " + s.doing});
@@ -204,13 +202,13 @@ void work_panel(const WorkView& v, const Settings& settings) {
   if (!v.watching && !s.settling && !v.inside) {
     const size_t k = v.mouse->active;
     const char* speed = v.speed < 1 ? "  fine" : v.speed > 1 ? "  fast" : "";
-    std::vector<Line> hand{{kText, fmt::format("{} ({} hand){}", k == 0 ? "needle driver" : "forceps",
+    std::vector<Line> hand{{kText, fmt::format("{} ({} hand){}", k == 0 ? "needle holder" : "forceps",
                                                (k == 0) != settings.left_handed ? "right" : "left", speed)}};
     if (v.steering->hand[k].snapped) {
       const HelpAt at = v.steering->hand[k].at;
-      hand.push_back({kAccent, at == HelpAt::needle ? "at the needle: close the jaw"
-                               : at == HelpAt::tail ? "at the tail: close the jaw"
-                                                    : "at the bite: drive the needle"});
+      hand.push_back({kAccent, at == HelpAt::needle ? "needle: close jaws"
+                               : at == HelpAt::tail ? "tail: close jaws"
+                                                    : "bite: drive needle"});
     }
     if (!v.pad.empty()) hand.push_back({kQuiet, v.pad});
     lines_at("hand", 1, 1, 0.62f, hand);
@@ -222,7 +220,8 @@ void work_panel(const WorkView& v, const Settings& settings) {
   if (!v.log->empty() && !silent) {
     std::vector<Line> log;
     for (const LogLine& line : *v.log)
-      log.push_back({line.bad ? kBad : kQuiet, fmt::format("{:6.1f} {} {}", line.time_s, line.bad ? '!' : ' ', line.text)});
+      log.push_back(
+          {line.bad ? kBad : kQuiet, fmt::format("{:>7} {} {}", clock_text(line.time_s), line.bad ? '!' : ' ', line.text)});
     lines_at("log", 1, 0, 0.5f, log);
   }
 }
@@ -238,15 +237,15 @@ Choice pause_panel(const WorkView& view) {
     ImGui::PopTextWrapPos();
   }
   gap(0.2f);
-  if (fault.empty() && wide_button("Go on (Esc)", 20)) choice.what = Chosen::resume;
-  if (fault.empty() && wide_button("One tick (.)", 20)) choice.what = Chosen::single_step;
+  if (fault.empty() && wide_button("Resume (Esc)", 20)) choice.what = Chosen::resume;
+  if (fault.empty() && wide_button("Step (.)", 20)) choice.what = Chosen::single_step;
   const uint32_t bites = view.status->to_take_back;
-  if (bites > 0 && wide_button(fmt::format("Take back the last bite ({})", bites).c_str(), 20)) choice.what = Chosen::take_back;
-  if (wide_button("Begin again (F5)", 20)) choice.what = Chosen::restart;
-  if (wide_button("Finish and look back (F10)", 20)) choice.what = Chosen::finish;
+  if (bites > 0 && wide_button(fmt::format("Undo bite ({})", bites).c_str(), 20)) choice.what = Chosen::take_back;
+  if (wide_button("Restart (F5)", 20)) choice.what = Chosen::restart;
+  if (wide_button("Finish and review (F10)", 20)) choice.what = Chosen::finish;
   gap(0.3f);
   if (wide_button("Settings (F2)", 20)) choice.what = Chosen::settings;
-  if (wide_button("Another scene", 20)) choice.what = Chosen::start_screen;
+  if (wide_button("Scene menu", 20)) choice.what = Chosen::start_screen;
   if (wide_button("Quit", 20)) choice.what = Chosen::quit;
   ImGui::End();
   return choice;

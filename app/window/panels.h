@@ -64,7 +64,7 @@ struct PlayedView {
   const PlaybackStatus* status = nullptr;
   const LiveResult* result = nullptr;  // of what is known
   const Snapshot* seen = nullptr;
-  std::string file, version, cut;  // cut: where and how the recording ends when it is not whole
+  std::string file, version, cut;  // cut: where and how a truncated recording ends
 };
 
 // Each may change the settings; `watch`: the scripted surgeon is to work.

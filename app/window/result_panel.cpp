@@ -1,4 +1,4 @@
-// app/window: what was sewn, to look back at: the stitch map, the thread's tension, the events, the numbers.
+// app/window: results: stitch map, thread tension, events, numbers.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ void bite_table(const StitchMap& map) {
   constexpr ImGuiTableFlags kFlags = ImGuiTableFlags_ScrollY | ImGuiTableFlags_RowBg | ImGuiTableFlags_SizingStretchProp;
   if (!ImGui::BeginTable("bites", 7, kFlags)) return;
   ImGui::TableSetupScrollFreeze(0, 1);
-  for (const char* name : {"", "time", "wall", "spacing", "depth", "from edge", "length"}) ImGui::TableSetupColumn(name);
+  for (const char* name : {"", "time", "wall", "spacing", "depth", "edge", "length"}) ImGui::TableSetupColumn(name);
   ImGui::TableHeadersRow();
   for (size_t k = 0; k < map.bite.size(); ++k) {
     const StitchBite& b = map.bite[k];
@@ -37,7 +37,7 @@ void bite_table(const StitchMap& map) {
     ImGui::TableNextColumn();
     text(fmt::format("{}", k + 1));
     ImGui::TableNextColumn();
-    text(kQuiet, fmt::format("{:.1f} s", static_cast<double>(b.tick) * map.tick_s));
+    text(kQuiet, fmt::format("{}", clock_text(static_cast<double>(b.tick) * map.tick_s)));
     ImGui::TableNextColumn();
     text(kQuiet, fmt::format("{}", b.wall + 1));
     ImGui::TableNextColumn();
@@ -52,14 +52,14 @@ void bite_table(const StitchMap& map) {
   ImGui::EndTable();
 }
 
-// Only what is in sight: hours of work have thousands of lines.
+// Draws visible lines only: a long session has thousands.
 void event_list(const std::vector<LogLine>& told) {
   ImGuiListClipper clipper;
   clipper.Begin(static_cast<int>(told.size()));
   while (clipper.Step())
     for (int i = clipper.DisplayStart; i < clipper.DisplayEnd; ++i) {
       const LogLine& line = told[static_cast<size_t>(i)];
-      text(line.bad ? kBad : kQuiet, fmt::format("{:5.1f} {} {}", line.time_s, line.bad ? '!' : ' ', line.text));
+      text(line.bad ? kBad : kQuiet, fmt::format("{:>7} {} {}", clock_text(line.time_s), line.bad ? '!' : ' ', line.text));
     }
 }
 
@@ -85,10 +85,10 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   begin_box("results", {margin, margin}, size, 0.93f);
   text(kAccent, v.scene->title);
   ImGui::SameLine();
-  text(kQuiet, v.from_recording ? "what the recording's hands have sewn" : "what was sewn");
+  text(kQuiet, v.from_recording ? "Results of the recording" : "Results");
   if (v.known < 1) {
     ImGui::SameLine();
-    text(kBad, fmt::format("! so far: {:.0f} % of it is looked through", 100 * v.known));
+    text(kBad, fmt::format("! Analyzing: {:.0f} %", 100 * v.known));
   }
   if (!r.fault.empty()) bad_text(r.fault);
   ImGui::Separator();
@@ -108,7 +108,7 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
     ImGui::EndTable();
   }
   gap();
-  heading("Events [s]");
+  heading("Events");
   ImGui::BeginChild("events", {0, 0});
   event_list(v.told);
   ImGui::EndChild();
@@ -118,9 +118,9 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   ImGui::BeginChild("charts", {0, -foot});
   const ImVec2 space = ImGui::GetContentRegionAvail();
   const std::pair<BiteColour, const char*> kBy[] = {
-      {BiteColour::spacing, "spacing"}, {BiteColour::depth, "depth"}, {BiteColour::edge, "from the edge"}};
+      {BiteColour::spacing, "spacing"}, {BiteColour::depth, "depth"}, {BiteColour::edge, "edge distance"}};
   ImGui::AlignTextToFramePadding();
-  text(kAccent, "Stitches, coloured by");
+  text(kAccent, "Bites, colored by");
   for (const auto& [what, name] : kBy) {
     ImGui::SameLine();
     if (radio(name, by == what)) by = what;
@@ -129,12 +129,12 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   scale_legend(by, std::max(4 * em(), ImGui::GetContentRegionAvail().x - 3.2f * em()));
   ImGui::SameLine(0, 0.6f * em());
   text(kQuiet, "mm");
-  text(kQuiet, "filled: the needle goes in, ring: it comes out; below the number the value [mm]");
+  text(kQuiet, "filled: entry, ring: exit; value in mm below the number");
   stitch_map_chart(r.map, by, {space.x, 0.35f * space.y});
   gap(0.1f);
   text(kAccent, "Thread tension");
   ImGui::SameLine();
-  text(kQuiet, "blue: the most anywhere in the thread; grey: at the needle");
+  text(kQuiet, "blue: maximum along thread; gray: at the needle");
   const uint64_t first = r.map.tension.empty() ? 0 : r.map.tension.front().tick,
                  last = r.map.tension.empty() ? 1 : r.map.tension.back().tick;
   tension_chart(r.map, first, last, -1, {space.x, 0.23f * space.y}, true);
@@ -147,21 +147,21 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   if (v.from_recording) {
     if (wide_button("Back (Esc)", 11)) choice.what = Chosen::leave_results;
   } else {
-    if (wide_button("Once more (Enter)", 11)) choice.what = Chosen::restart;
+    if (wide_button("Retry (Enter)", 11)) choice.what = Chosen::restart;
     ImGui::SameLine();
-    if (wide_button("Another scene (Esc)", 13)) choice.what = Chosen::leave_results;
+    if (wide_button("Scene menu (Esc)", 13)) choice.what = Chosen::leave_results;
     for (const std::string& file : r.recorded) {
       ImGui::SameLine();
-      if (&file == &r.recorded.back() && wide_button("Look at it again", 12)) choice = {Chosen::recording, 0, file};
+      if (&file == &r.recorded.back() && wide_button("Replay", 12)) choice = {Chosen::recording, 0, file};
     }
   }
   ImGui::SameLine();
-  if (wide_button("Save as JSON (J)", 11)) choice.what = Chosen::save_json;
+  if (wide_button("Save JSON (J)", 11)) choice.what = Chosen::save_json;
   ImGui::SameLine();
   if (wide_button("Quit", 6)) choice.what = Chosen::quit;
   ImGui::SameLine();
   if (!v.saved.empty()) text(kQuiet, v.saved);
-  else if (!r.recorded.empty() && !v.from_recording) text(kQuiet, "recorded: " + r.recorded.back());
+  else if (!r.recorded.empty() && !v.from_recording) text(kQuiet, "Recorded: " + r.recorded.back());
   ImGui::End();
   return choice;
 }

@@ -4,26 +4,26 @@
 namespace catgut {
 
 const char* screen_name(Screen screen) {
-  static constexpr const char* kName[] = {"start", "settings", "practise", "pause", "results", "view"};
+  static constexpr const char* kName[] = {"start", "settings", "practice", "pause", "results", "view"};
   return kName[static_cast<size_t>(screen)];
 }
 
 Choice choice_of_key(const WindowInput& in, const ScreenFacts& f) {
-  const bool practise = f.screen == Screen::practise, pause = f.screen == Screen::pause, field = practise || pause;
+  const bool practice = f.screen == Screen::practice, pause = f.screen == Screen::pause, field = practice || pause;
   const bool start = f.screen == Screen::start, view = f.screen == Screen::view, results = f.screen == Screen::results;
   if (view && in.arrow_presses != 0) return {Chosen::go_by, 0, "", in.arrow_presses * f.second};
   const auto when = [](bool holds, Chosen what) { return Choice{holds ? what : Chosen::nothing}; };
   switch (in.key) {
     case Key::escape:
       if (start) return {Chosen::quit};
-      if (practise) return {Chosen::pause};
+      if (practice) return {Chosen::pause};
       if (pause) return when(!f.fault, Chosen::resume);
       if (f.screen == Screen::settings) return {Chosen::leave_settings};
       if (results) return {Chosen::leave_results};
       return {Chosen::start_screen};
     case Key::pause:
       if (view) return {Chosen::play_or_hold};
-      return practise ? Choice{Chosen::pause} : when(pause && !f.fault, Chosen::resume);
+      return practice ? Choice{Chosen::pause} : when(pause && !f.fault, Chosen::resume);
     case Key::enter:
       if (results) return {f.from_recording ? Chosen::leave_results : Chosen::restart};
       if (view) return {Chosen::sewn};
@@ -62,7 +62,7 @@ Choice choice_of_key(const WindowInput& in, const ScreenFacts& f) {
     case Key::save:
       return when(results, Chosen::save_json);
     case Key::show_me:
-      return when(practise, Chosen::show_me);
+      return when(practice, Chosen::show_me);
     case Key::teach:
       return when(start, Chosen::teach);
     case Key::picture:

@@ -9,7 +9,7 @@
 
 namespace catgut {
 
-enum class Screen { start, settings, practise, pause, results, view };
+enum class Screen { start, settings, practice, pause, results, view };
 const char* screen_name(Screen screen);
 
 enum class Chosen {

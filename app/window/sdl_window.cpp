@@ -23,7 +23,7 @@ SdlWindow::SdlWindow(int width, int height) {
   SDL_SetHintWithPriority(SDL_HINT_VIDEODRIVER, "x11", SDL_HINT_DEFAULT);
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
   if (SDL_Init(SDL_INIT_VIDEO | SDL_INIT_GAMECONTROLLER) != 0)
-    throw InputError("window", fmt::format("there is no display here ({})", SDL_GetError()), kHeadless);
+    throw InputError("window", fmt::format("no display ({})", SDL_GetError()), kHeadless);
   window = SDL_CreateWindow("Catgut", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
                             SDL_WINDOW_RESIZABLE | SDL_WINDOW_SHOWN);
   SDL_SysWMinfo info;

@@ -21,10 +21,10 @@ namespace catgut {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr size_t kMostBytes = 64 * 1024;  // nobody has set that much
+constexpr size_t kMostBytes = 64 * 1024;  // far above any valid file
 
 constexpr const char* kQualities[] = {"low", "medium", "high"};
-constexpr const char* kGuidances[] = {"learn", "practise", "exam"};
+constexpr const char* kGuidances[] = {"learn", "practice", "exam"};
 
 // One row per key: how it is read (false: the value will not do) and written. Reader, writer and messages go through this list.
 struct Key {
@@ -77,7 +77,7 @@ Key word(const char* name, const char* wants, Enum Settings::*member, const char
 const std::vector<Key>& keys() {
   static const std::vector<Key> kKeys{
       word("quality", "write \"low\", \"medium\" or \"high\"", &Settings::quality, kQualities),
-      word("guidance", "write \"learn\", \"practise\" or \"exam\"", &Settings::guidance, kGuidances),
+      word("guidance", "write \"learn\", \"practice\" or \"exam\"", &Settings::guidance, kGuidances),
       flag("left_handed", &Settings::left_handed),
       flag("hold_to_close", &Settings::hold_to_close),
       flag("assist", &Settings::assist),
@@ -97,7 +97,7 @@ std::string read_small_file(const std::string& path) {
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (in.bad() || (!in && !in.eof())) throw InputError(path, "the settings cannot be read", "defaults are used");
   text.resize(static_cast<size_t>(in.gcount()));
-  if (text.size() > kMostBytes) throw InputError(path, "these are no settings: the file is too long", "defaults are used");
+  if (text.size() > kMostBytes) throw InputError(path, "the settings file is too long", "defaults are used");
   return text;
 }
 
@@ -116,7 +116,7 @@ void write_whole(const std::string& path, const std::string& text) {
   good = good && std::rename(beside.c_str(), path.c_str()) == 0;
   if (good) return;
   if (file >= 0) ::unlink(beside.c_str());
-  throw InputError(path, "the settings cannot be written", "they last until the program ends");
+  throw InputError(path, "the settings cannot be written", "they apply until the program ends");
 }
 
 }  // namespace
@@ -131,7 +131,7 @@ Settings parse_settings(const std::string& text, const std::string& name) {
   try {
     root = toml::parse(text, name);
   } catch (const toml::parse_error& error) {
-    throw InputError(at(error.source()), std::string(error.description()), "mend it, or delete the file");
+    throw InputError(at(error.source()), std::string(error.description()), "fix the syntax, or delete the file");
   }
   for (const auto& [key, node] : root) {
     const std::string_view wanted = key.str();
@@ -144,16 +144,16 @@ Settings parse_settings(const std::string& text, const std::string& name) {
     if (!found) {
       const std::string nearest = nearest_word(wanted, names);
       throw InputError(at(node.source()), fmt::format("there is no setting \"{}\"", wanted),
-                       nearest.empty() ? "take it out" : fmt::format("did you mean \"{}\"?", nearest));
+                       nearest.empty() ? "remove it" : fmt::format("did you mean \"{}\"?", nearest));
     }
     if (!found->read(node, out))
-      throw InputError(at(node.source()), fmt::format("{} cannot be this", found->name), found->wants);
+      throw InputError(at(node.source()), fmt::format("{} has an invalid value", found->name), found->wants);
   }
   return out;
 }
 
 std::string settings_text(const Settings& settings) {
-  std::string text = "# Catgut's window. It writes this file itself when something is set there.\n";
+  std::string text = "# Settings of Catgut's window, which writes this file.\n";
   for (const Key& k : keys()) text += fmt::format("{} = {}\n", k.name, k.write(settings));
   return text;
 }
@@ -170,7 +170,7 @@ LoadedSettings load_settings(const std::string& path) {
 }
 
 void save_settings(const Settings& settings, const std::string& path) {
-  if (path.empty()) throw InputError("settings", "this user has no folder for them", "set HOME or XDG_CONFIG_HOME");
+  if (path.empty()) throw InputError("settings", "no config directory", "set HOME or XDG_CONFIG_HOME");
   std::error_code error;
   fs::create_directories(fs::path(path).parent_path(), error);
   if (!load_settings(path).fault.empty()) std::rename(path.c_str(), (path + ".bad").c_str());

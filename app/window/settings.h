@@ -9,13 +9,13 @@ namespace catgut {
 // How much the program says while somebody sews.
 enum class Guidance {
   learn,     // the way that the needle should go, suture points and keys are shown
-  practise,  // what happens is told in words
+  practice,  // what happens is told in words
   exam,      // nothing is told or helped until the end
 };
 
 struct Settings {
   Quality quality = Quality::draft;
-  Guidance guidance = Guidance::practise;
+  Guidance guidance = Guidance::practice;
   bool left_handed = false;    // the needle driver is the left hand's
   bool hold_to_close = false;  // the jaw closes only while the button is down
   bool assist = true;          // an open jaw finds the needle
@@ -26,7 +26,7 @@ struct Settings {
   bool operator==(const Settings&) const = default;
 };
 const char* quality_name(Quality quality);     // "low", "medium", "high"
-const char* guidance_name(Guidance guidance);  // "learn", "practise", "exam"
+const char* guidance_name(Guidance guidance);  // "learn", "practice", "exam"
 
 // Throws InputError (file:line, what, what next) for text that is no TOML, unknown keys and values out of range.
 Settings parse_settings(const std::string& text, const std::string& name);

@@ -13,18 +13,14 @@ constexpr float kSpeeds[] = {0.1f, 0.25f, 0.5f, 1, 2, 4, 8};
 constexpr size_t kWordsShown = 7;
 
 const char* kViewKeys =
-    "space            play, hold\n"
-    "left right       a second back, on\n"
-    ",  .             a tick back, on\n"
+    "space            play, pause\n"
+    "left right       1 s back, forward\n"
+    ",  .             1 tick back, forward\n"
     "- +              slower, faster\n"
-    "drag, wheel      look round, closer\n"
-    "Home  M          camera as at first, points\n"
-    "F5  Enter        to the start, what was sewn\n"
-    "F1  Esc          hide this, leave";
-
-std::string clock(double s) {
-  return fmt::format("{}:{:04.1f}", static_cast<int>(s) / 60, s - 60 * (static_cast<int>(s) / 60));
-}
+    "drag, wheel      orbit, zoom\n"
+    "Home  M          reset camera, suture points\n"
+    "F5  Enter        to start, results\n"
+    "F1  Esc          hide keys, back";
 
 }  // namespace
 
@@ -33,19 +29,20 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
   const PlaybackStatus& s = *v.status;
   std::vector<Line> about{{kText, v.scene->title}, {kQuiet, v.file}};
   about.push_back({kQuiet, fmt::format("recorded by {}, {} ticks", v.version, s.ticks)});
-  if (!v.cut.empty()) about.push_back({kBad, "! not whole: " + v.cut});
+  if (!v.cut.empty()) about.push_back({kBad, "! truncated: " + v.cut});
   if (!s.fault.empty()) about.push_back({kBad, "! " + s.fault});
   if (s.differs_at) {
-    about.push_back({kBad, fmt::format("! from tick {} on this is not what was recorded", *s.differs_at)});
-    about.push_back({kBad, "  (another version of the program, or a damaged file)"});
+    about.push_back({kBad, fmt::format("! diverges at tick {}", *s.differs_at)});
+    about.push_back({kBad, "  (other program version or damaged file)"});
   } else if (s.known < s.ticks) {
     const double part = static_cast<double>(s.known) / std::max<double>(1, static_cast<double>(s.ticks));
-    about.push_back({kQuiet, fmt::format("looked through {:.0f} %, every hash as recorded", 100 * part)});
+    about.push_back({kQuiet, fmt::format("verifying hashes: {:.0f} %", 100 * part)});
   } else {
-    about.push_back({kAccent, "every hash is as recorded"});
+    about.push_back({kAccent, "all hashes verified"});
   }
   for (const std::string& line : technique_lines(*v.scene, *v.seen, v.result->practice))
-    if (line.find(" N") != std::string::npos || line.find("needle is in") != std::string::npos) about.push_back({kText, line});
+    if (line.find(" N") != std::string::npos || line.find("needle in tissue") != std::string::npos)
+      about.push_back({kText, line});
   lines_at("recording", 0, 0, 0.66f, about);
 
   // What has just happened, up to the moment that is shown.
@@ -58,11 +55,11 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
     bool bad = false;
     const std::string words = words_for(*e, bad);
     if (words.empty()) continue;
-    happened.insert(
-        happened.begin(),
-        {bad ? kBad : kQuiet, fmt::format("{:6.1f} {} {}", static_cast<double>(e->tick) * s.tick_s, bad ? '!' : ' ', words)});
+    happened.insert(happened.begin(),
+                    {bad ? kBad : kQuiet,
+                     fmt::format("{:>7} {} {}", clock_text(static_cast<double>(e->tick) * s.tick_s), bad ? '!' : ' ', words)});
   }
-  if (happened.empty()) happened.push_back({kQuiet, "nothing has happened yet"});
+  if (happened.empty()) happened.push_back({kQuiet, "no events yet"});
   lines_at("happened", 1, 0, 0.55f, happened);
 
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
@@ -89,13 +86,14 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
   ImGui::SameLine(0, 1.2f * em());
   text(kQuiet, "blue: thread tension");
   gap(0.05f);
-  if (ImGui::Button(s.playing ? "Hold (space)" : "Play (space)", {9 * em(), 0})) choice.what = Chosen::play_or_hold;
+  if (ImGui::Button(s.playing ? "Pause (space)" : "Play (space)", {9 * em(), 0})) choice.what = Chosen::play_or_hold;
   ImGui::SameLine();
   if (ImGui::Button("<< 5 s", {4.5f * em(), 0})) choice = {Chosen::go_by, 0, "", -static_cast<int64_t>(5 / s.tick_s)};
   ImGui::SameLine();
   if (ImGui::Button("5 s >>", {4.5f * em(), 0})) choice = {Chosen::go_by, 0, "", static_cast<int64_t>(5 / s.tick_s)};
   ImGui::SameLine(0, em());
-  text(fmt::format("{} / {}", clock(static_cast<double>(s.at) * s.tick_s), clock(static_cast<double>(s.ticks) * s.tick_s)));
+  text(fmt::format("{} / {}", clock_text(static_cast<double>(s.at) * s.tick_s),
+                   clock_text(static_cast<double>(s.ticks) * s.tick_s)));
   ImGui::SameLine(0, em());
   for (const float speed : kSpeeds) {
     const bool on = std::abs(s.speed - speed) < 0.01f;
@@ -105,9 +103,9 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
     ImGui::SameLine(0, 0.3f * em());
   }
   ImGui::SameLine(0, em());
-  if (ImGui::Button("What was sewn (Enter)")) choice.what = Chosen::sewn;
+  if (ImGui::Button("Results (Enter)")) choice.what = Chosen::sewn;
   ImGui::SameLine();
-  if (ImGui::Button("Leave (Esc)")) choice.what = Chosen::start_screen;
+  if (ImGui::Button("Back (Esc)")) choice.what = Chosen::start_screen;
   ImGui::End();
   return choice;
 }

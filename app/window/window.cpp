@@ -40,7 +40,7 @@ constexpr double kSlowPicture = 0.07;                                      // [s
 constexpr double kStallEvery = 2;                                          // [s] of --stall-ms
 
 std::vector<SceneChoice> scene_choices() {
-  // What people practise first, from the simplest; then what is there besides.
+  // What people practice first, from the simplest; then what is there besides.
   std::vector<std::string> names = scene_names();
   const auto rank = [](const std::string& name) {
     const std::vector<std::string> kFirst{"purse_string", "stay", "connell", "lembert"};
@@ -80,7 +80,7 @@ std::string short_name(const std::string& path) {
 
 // How well this machine draws, on a scene as people see it first.
 Quality measured_quality(int width, int height) {
-  std::fprintf(stderr, "catgut: first start: how well this machine draws is measured, some seconds\n");
+  std::fprintf(stderr, "catgut: first start: measuring graphics speed, a few seconds\n");
   const auto model = build_model(read_scene("purse_string"));
   Snapshot seen;
   publish(*model, *initial_state(*model), seen);
@@ -179,7 +179,7 @@ class Window {
     else lesson_.end();
     hands_.begin(visit_->live.picture(), settings_);
     stage(visit_->live.picture());
-    go(Screen::practise);
+    go(Screen::practice);
   }
 
   void view(const std::string& path) {
@@ -223,8 +223,8 @@ class Window {
 
   void go(Screen screen) {
     // While somebody works the mouse is a hand and not a pointer; what it did before the change is nobody's.
-    SDL_SetRelativeMouseMode(screen == Screen::practise && visit_ && !visit_->watching ? SDL_TRUE : SDL_FALSE);
-    if (visit_) visit_->live.command(screen == Screen::practise ? LiveCommand::resume : LiveCommand::pause);
+    SDL_SetRelativeMouseMode(screen == Screen::practice && visit_ && !visit_->watching ? SDL_TRUE : SDL_FALSE);
+    if (visit_) visit_->live.command(screen == Screen::practice ? LiveCommand::resume : LiveCommand::pause);
     SDL_PumpEvents();
     SDL_FlushEvent(SDL_MOUSEMOTION);
     if (screen == Screen::start) recordings_ = recordings_in(".", made_);
@@ -282,14 +282,14 @@ class Window {
         message_.clear();
         break;
       case Chosen::settings:
-        settings_from_ = screen_ == Screen::practise ? Screen::pause : screen_;
+        settings_from_ = screen_ == Screen::practice ? Screen::pause : screen_;
         go(Screen::settings);
         break;
       case Chosen::leave_settings:
         go(settings_from_);
         break;
       case Chosen::resume:
-        go(Screen::practise);
+        go(Screen::practice);
         break;
       case Chosen::pause:
         go(Screen::pause);
@@ -303,7 +303,7 @@ class Window {
       case Chosen::restart:
         if (live) {
           live->command(LiveCommand::restart);
-          go(Screen::practise);
+          go(Screen::practice);
         } else {
           open(source_, lesson_.on());
         }
@@ -322,13 +322,13 @@ class Window {
         break;
       case Chosen::save_json:
         if (results_.known < 1) {  // half of it in a file would look like all of it
-          results_.saved = "not saved: wait until all of it is looked through";
+          results_.saved = "Not saved: analysis not finished";
           break;
         }
         try {
           const std::string name = free_name("catgut_result_{}.json");
           write_output(name, practice_json(scene_, *results_.result));
-          results_.saved = "saved: " + name;
+          results_.saved = "Saved: " + name;
         } catch (const InputError& error) { results_.saved = error.what(); }
         break;
       case Chosen::change:
@@ -385,7 +385,7 @@ class Window {
   // --- a picture
   // ----------------------------------------------------------------------------------------------------------------
   bool frame(float dt) {
-    const bool working = screen_ == Screen::practise;
+    const bool working = screen_ == Screen::practice;
     const WindowInput in = events_in_.read(working, dt, screen_ == Screen::view || (working && visit_ && visit_->watching));
     quit_ = quit_ || in.quit;
     if (in.resized) resized();
@@ -396,7 +396,7 @@ class Window {
     facts.from_recording = results_.from_recording;
     if (viewing_) facts.second = std::max<int64_t>(1, std::llround(1 / viewing_->playback.status().tick_s));
     carry_out(choice_of_key(in, facts));
-    if ((in.left || in.pad_gone) && screen_ == Screen::practise && visit_ && !visit_->watching) go(Screen::pause);
+    if ((in.left || in.pad_gone) && screen_ == Screen::practice && visit_ && !visit_->watching) go(Screen::pause);
     if (visit_) field(in, dt);
     if (viewing_) {
       const uint64_t known = viewing_->gathered;
@@ -443,7 +443,7 @@ class Window {
 
   void save_picture(const Image& image) {
     const std::string name = free_name("catgut_{}.png");
-    LogLine line{visit_ ? visit_->seen.time_s : 0, "picture: " + name, false};
+    LogLine line{visit_ ? visit_->seen.time_s : 0, "screenshot: " + name, false};
     try {
       write_png(image, name);
     } catch (const std::runtime_error& error) { line.text = error.what(), line.bad = true; }
@@ -461,11 +461,11 @@ class Window {
       v.epoch = status.epoch;
       hands_.jumped(v.live.picture(), v.seen, settings_, status.practice.time_s == 0);
     }
-    if (!status.fault.empty() && screen_ == Screen::practise) go(Screen::pause);
+    if (!status.fault.empty() && screen_ == Screen::practice) go(Screen::pause);
     if (lesson_.on() && lesson_.look(v.live, v.seen, wall_seconds()) && events_)
       std::fprintf(events_, "{\"lesson\":\"%s\"}\n",
                    lesson_.all_done() ? "done" : lesson_.lesson().step[lesson_.step()].name.c_str());
-    if (screen_ != Screen::practise || status.settling || !v.have || v.watching) return;
+    if (screen_ != Screen::practice || status.settling || !v.have || v.watching) return;
     hands_.steering.guide = next_bite(places_, v.live.picture(), v.seen);
     const Camera camera = camera_of(orbit_);
     const ViewFrame view = view_frame(camera.eye, camera.target, camera.up, camera.fov_deg, static_cast<float>(height_));
@@ -496,7 +496,7 @@ class Window {
   // Whoever follows the events also wants to know when hands are let in.
   void tell_screen() {
     if (!events_ || !tell_screen_) return;
-    if (screen_ == Screen::practise && (!visit_->have || visit_->live.status().settling)) return;
+    if (screen_ == Screen::practice && (!visit_->have || visit_->live.status().settling)) return;
     tell_screen_ = false;
     std::fprintf(events_, "{\"screen\":\"%s\"}\n", screen_name(screen_));
     std::fflush(events_);
@@ -530,7 +530,7 @@ class Window {
     if (screen_ == Screen::settings) return settings_panel(settings_, short_name(settings_path()), message_, visit_ != nullptr);
     if (screen_ == Screen::results) { return result_panel(results_, coloured_by_); }
     Settings shown = settings_;
-    if (height_ < 480) shown.hints = false, shown.guidance = std::max(shown.guidance, Guidance::practise);
+    if (height_ < 480) shown.hints = false, shown.guidance = std::max(shown.guidance, Guidance::practice);
     if (viewing_ && viewing_->have) {
       const Viewing& v = *viewing_;
       return view_panel({&v.playback.scene(), &v.playback.status(), &v.result, &v.seen, v.file, v.version, v.cut}, shown);

@@ -1,4 +1,4 @@
-// app/window: the simulator that people sit down at: a window, screens to choose, practise, pause and look back, and hands by
+// app/window: the simulator that people sit down at: a window, screens to choose, practice, pause and look back, and hands by
 // mouse, keyboard and gamepad.
 #pragma once
 #include <functional>
@@ -33,7 +33,7 @@ struct PlayOptions {
   std::string events;      // file to which everything that happens is written as it happens, a JSON object a line; "-"
   std::string screenshot;  // PNG of the window, then quit
   int after = 60;          // pictures before it
-  std::string screen;  // that is in it: start, settings, practise, pause, developer, results, view; empty: whatever is there
+  std::string screen;  // that is in it: start, settings, practice, pause, developer, results, view; empty: whatever is there
   double at = 0;       // [s] of the work, or of the recording, that it shows
   std::string json;    // what was sewn, written when a scene is left; "-"
   double seconds = 0;  // [s] of wall time, then quit; 0: until somebody quits

@@ -4,97 +4,118 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace catgut {
 namespace {
 
-const char* tool_name(uint8_t who) { return who == 0 ? "needle driver" : "forceps"; }
+const char* tool_name(uint8_t who) { return who == 0 ? "needle holder" : "forceps"; }
+
+std::string counted(int n, const char* one) { return fmt::format("{} {}{}", n, one, n == 1 ? "" : "s"); }
 
 std::string fault_words(Fault fault) {
   switch (fault) {
     case Fault::wrong_body:
-      return "the bite belongs on the other side";
+      return "bite on the wrong side";
     case Fault::wrong_layer:
-      return "the bite goes the wrong way through the wall";
+      return "bite through the wall in the wrong direction";
     case Fault::one_wall_only:
       return "tied through one wall only";
     case Fault::knot_without_bite:
-      return "a knot before the bites were complete";
+      return "throw before the bites were complete";
     case Fault::needle_in_tissue:
-      return "pulled with the needle still in the tissue";
+      return "thread pulled with the needle in tissue";
     case Fault::cut_in_stitch:
-      return "cut inside the stitch: it is open";
+      return "cut inside the stitch";
     case Fault::cut_before_knot:
-      return "cut before anything was tied";
+      return "cut before a knot";
     case Fault::too_few_throws:
-      return "too few throws to hold";
+      return "too few throws";
     default:
       return fault_name(fault);
   }
 }
 
+std::string loop_words(LoopReason reason) {
+  switch (reason) {
+    case LoopReason::no_crossing:
+      return "no loop: thread does not cross itself";
+    case LoopReason::tip_outside:
+      return "no loop: tip outside";
+    case LoopReason::too_deep:
+      return "no loop: turns too far apart";
+    default:
+      return "no loop";
+  }
+}
+
 }  // namespace
+
+std::string clock_text(double seconds) {
+  const int tenths = static_cast<int>(std::lround(10 * std::max(0.0, seconds)));
+  return fmt::format("{}:{:02}.{}", tenths / 600, tenths / 10 % 60, tenths % 10);
+}
 
 std::string words_for(const Event& e, bool& bad) {
   bad = false;
   const char* tool = tool_name(e.who);
-  const auto lost = [&](const char* what) {
+  const auto released = [&](const char* what) {
     bad = e.value > 0;
-    return bad ? fmt::format("the {} slipped out of the {} ({:.1f} N)", what, tool, e.value)
-               : fmt::format("{}: {} let go", tool, what);
+    return bad ? fmt::format("{} slipped from {} at {:.1f} N", what, tool, e.value)
+               : fmt::format("{} released by {}", what, tool);
   };
   switch (e.kind) {
     case EventKind::needle_grasped:
-      return fmt::format("{}: needle, {:.0f} % from its back end", tool, 100 * e.value);
+      return fmt::format("needle grasped by {}, {:.0f} % from swage", tool, 100 * e.value);
     case EventKind::needle_released:
-      return lost("needle");
+      return released("needle");
     case EventKind::thread_grasped:
-      return fmt::format("{}: thread", tool);
+      return fmt::format("thread grasped by {}", tool);
     case EventKind::thread_released:
-      return lost("thread");
+      return released("thread");
     case EventKind::tissue_grasped:
-      return fmt::format("{}: tissue", tool);
+      return fmt::format("tissue grasped by {}", tool);
     case EventKind::tissue_released:
-      return lost("tissue");
-    case EventKind::tip_entered:
-      return fmt::format("the needle goes in, {:.0f} degrees off upright", e.value * 180 / kPi);
+      return released("tissue");
+    case EventKind::tip_entered:  // a tip that tissue moved over enters backward: the line counts, not its sense
+      return fmt::format("needle entered, {:.0f}\u00b0 from surface normal", std::min(e.value, kPi - e.value) * 180 / kPi);
     case EventKind::tip_exited:
-      return "the tip is out";
+      return "needle tip exited";
     case EventKind::bite_cancelled:
-      return "the needle was drawn back";
+      return "needle withdrawn";
     case EventKind::bite_completed:
-      return fmt::format("bite {} done, {:.1f} mm", e.which + 1, 1000 * e.value);
+      return fmt::format("bite completed, {:.1f} mm", 1000 * e.value);
     case EventKind::order_broken:
       bad = true;
-      return "this bite is not next to the one before";
+      return "bite out of order";
     case EventKind::ring_complete:
-      return fmt::format("the ring is complete: {} points", e.which);
+      return fmt::format("ring complete, {} suture points", e.which);
     case EventKind::closure_started:
-      return "the opening begins to close";
+      return "closure started";
     case EventKind::closure_finished:
-      return "the opening is closed";
+      return "closure complete";
     case EventKind::thread_ran_out:
       bad = true;
-      return "the thread has run out";
+      return "thread exhausted";
     case EventKind::loop_formed:
-      return fmt::format("a loop of {} round the {}", e.which, tool);
+      return fmt::format("{} on {}", counted(static_cast<int>(e.which), "wrap"), tool);
     case EventKind::loop_rejected:
-      return fmt::format("no loop: {}", loop_reason_name(static_cast<LoopReason>(e.which)));
+      return loop_words(static_cast<LoopReason>(e.which));
     case EventKind::knot_begun:
-      return fmt::format("a throw is begun ({} wraps)", e.value);
+      return fmt::format("throw started, {}", counted(static_cast<int>(std::lround(e.value)), "wrap"));
     case EventKind::knot_locked:
-      return fmt::format("the throw is set, {:.1f} N", e.value);
+      return fmt::format("throw locked at {:.1f} N", e.value);
     case EventKind::knot_cancelled:
       bad = true;
-      return "the throw came undone";
+      return "throw undone";
     case EventKind::thread_cut:
-      return "the thread is cut";
+      return "thread cut";
     case EventKind::suture_taken:
-      return "a fresh needle and thread";
+      return "new suture loaded";
     case EventKind::stitch_settled:
-      return "the stitch is finished";
+      return "suture finished";
     case EventKind::seam_closed:
-      return fmt::format("the edges are together, {:.1f} mm left", 1000 * e.value);
+      return fmt::format("edges approximated, gap {:.1f} mm", 1000 * e.value);
     case EventKind::technique_fault:
       bad = true;
       return fault_words(static_cast<Fault>(e.value));
@@ -116,41 +137,41 @@ std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot&
   if (!seen.seam.empty()) {
     float worst = 1;
     for (const SeamView& s : seen.seam) worst = std::min(worst, s.progress);
-    lines.push_back(fmt::format("edges together {:.0f} %", 100 * worst));
+    lines.push_back(fmt::format("approximation {:.0f} %", 100 * worst));
   }
   if (practice.throws > 0) lines.push_back(fmt::format("knots {}, throws {}", practice.knots, practice.throws));
   if (practice.faults_in_all > 0) lines.push_back(fmt::format("faults {}", practice.faults_in_all));
-  if (seen.needle.in_tissue) lines.push_back(fmt::format("bite {}: the needle is in", seen.needle.bite + 1));
+  if (seen.needle.in_tissue) lines.push_back(fmt::format("bite {}: needle in tissue", practice.bites + 1));
   for (size_t k = 0; k < 2; ++k) {
-    static constexpr const char* kHeld[] = {"nothing", "needle", "thread", "tissue"};
+    static constexpr const char* kHeld[] = {"", "needle", "thread", "tissue"};
     const ToolView& tool = seen.tool[k];
-    if (tool.held != Held::nothing || tool.loop_wraps > 0)
-      lines.push_back(
-          fmt::format("{}: {}{}, {:.1f} N", tool_name(static_cast<uint8_t>(k)), kHeld[static_cast<size_t>(tool.held)],
-                      tool.loop_wraps > 0 ? fmt::format(" and {} wraps", tool.loop_wraps) : "", length(tool.force)));
+    if (tool.held == Held::nothing && tool.loop_wraps == 0) continue;
+    std::string what = kHeld[static_cast<size_t>(tool.held)];
+    if (tool.loop_wraps > 0) what += (what.empty() ? "" : ", ") + counted(static_cast<int>(tool.loop_wraps), "wrap");
+    lines.push_back(fmt::format("{}: {}, {:.1f} N", tool_name(static_cast<uint8_t>(k)), what, length(tool.force)));
   }
   return lines;
 }
 
 std::vector<ResultRow> result_rows(const SceneSpec& scene, const Practice& p) {
   std::vector<ResultRow> rows;
-  const int seconds = static_cast<int>(p.time_s);
-  rows.push_back({"time", fmt::format("{}:{:02}", seconds / 60, seconds % 60)});
-  rows.push_back({"bites", scene.technique.name == "purse_string"
-                               ? fmt::format("{} (at least {} are wanted)", p.bites, scene.technique.min_bites)
-                               : fmt::format("{}", p.bites)});
-  rows.push_back({"needle drawn back", fmt::format("{}", p.bites_cancelled)});
-  if (p.opening_start > 0 && scene.technique.name == "purse_string")
-    rows.push_back({"opening left", fmt::format("{:.0f} %", 100 * p.opening / p.opening_start)});
+  const bool purse_string = scene.technique.name == "purse_string";
+  const auto both = [](const char* unit, double holder, double forceps, int digits) {
+    return fmt::format("needle holder {:.{}f} {}, forceps {:.{}f} {}", holder, digits, unit, forceps, digits, unit);
+  };
+  rows.push_back({"time", clock_text(p.time_s)});
+  rows.push_back({"bites", purse_string ? fmt::format("{} (minimum {})", p.bites, scene.technique.min_bites)
+                                        : fmt::format("{}", p.bites)});
+  rows.push_back({"needle withdrawals", fmt::format("{}", p.bites_cancelled)});
+  if (p.opening_start > 0 && purse_string)
+    rows.push_back({"residual opening", fmt::format("{:.0f} %", 100 * p.opening / p.opening_start)});
   rows.push_back({"knots, throws", fmt::format("{}, {}", p.knots, p.throws)});
   rows.push_back({"cuts", fmt::format("{}", p.cuts)});
-  rows.push_back({"stitches finished", fmt::format("{}", p.stitches_settled)});
-  rows.push_back({"needle slipped", fmt::format("{}", p.needle_slips)});
-  rows.push_back({"way of the tools", fmt::format("driver {:.2f} m, forceps {:.2f} m", static_cast<double>(p.path[0]),
-                                                  static_cast<double>(p.path[1]))});
-  rows.push_back({"most force", fmt::format("driver {:.1f} N, forceps {:.1f} N", static_cast<double>(p.most_force[0]),
-                                            static_cast<double>(p.most_force[1]))});
-  rows.push_back({"taken back", fmt::format("{}", p.taken_back)});
+  rows.push_back({"finished sutures", fmt::format("{}", p.stitches_settled)});
+  rows.push_back({"needle slips", fmt::format("{}", p.needle_slips)});
+  rows.push_back({"path length", both("m", static_cast<double>(p.path[0]), static_cast<double>(p.path[1]), 2)});
+  rows.push_back({"peak force", both("N", static_cast<double>(p.peak_force[0]), static_cast<double>(p.peak_force[1]), 1)});
+  rows.push_back({"undos", fmt::format("{}", p.undos)});
   for (size_t f = 1; f < p.faults.size(); ++f)
     if (p.faults[f] > 0) rows.push_back({"fault", fmt::format("{} x {}", p.faults[f], fault_words(static_cast<Fault>(f)))});
   return rows;

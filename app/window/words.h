@@ -1,4 +1,4 @@
-// app/window: what happened, and where the work stands, in words for a person. Pure: plain data in, text out.
+// app/window: texts of events, progress and results. Pure: plain data in, text out.
 #pragma once
 #include <string>
 #include <vector>
@@ -9,10 +9,13 @@
 
 namespace catgut {
 
-// Empty for what is of no interest while working. bad: something went wrong.
+// "1:07.5": minutes, seconds, tenths; the one form of time on every screen.
+std::string clock_text(double seconds);
+
+// One line for the event log; empty: the event is not shown. bad: an error.
 std::string words_for(const Event& event, bool& bad);
 
-// Where the technique stands, a few short lines.
+// Progress of the technique, a few short lines.
 std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot& seen, const Practice& practice);
 
 struct ResultRow {
@@ -20,7 +23,7 @@ struct ResultRow {
 };
 std::vector<ResultRow> result_rows(const SceneSpec& scene, const Practice& practice);
 
-// One JSON object without a line break.
+// One JSON object on one line.
 std::string event_json(const Event& event);
 
 }  // namespace catgut

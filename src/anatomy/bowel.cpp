@@ -27,8 +27,8 @@ void check(const BowelShape& b) {
     refuse(fmt::format("{} particles cannot make a bowel", b.particles), fmt::format("give {} to {}", kFewest, kMost));
   }
   if (!finite(b.radius) || !finite(b.length) || b.radius < 0.002f || b.radius > 0.5f || b.length < 0.004f || b.length > 2) {
-    refuse(fmt::format("radius {} m and length {} m are no bowel", b.radius, b.length),
-           "give metres: radius 0.002..0.5, length 0.004..2");
+    refuse(fmt::format("radius {} m and length {} m are out of range", b.radius, b.length),
+           "give meters: radius 0.002..0.5, length 0.004..2");
   }
   if (!finite(b.wall) || b.wall < 1e-4f || b.wall > 0.5f * b.radius) {
     refuse(fmt::format("a wall of {} m does not fit a radius of {} m", b.wall, b.radius), "give 0.0001 m to half the radius");
@@ -37,14 +37,14 @@ void check(const BowelShape& b) {
     refuse(fmt::format("haustra {} m deep do not fit a radius of {} m", b.haustra, b.radius),
            "give 0 to a quarter of the radius");
   }
-  if (b.taeniae < 0 || b.taeniae > 12) refuse(fmt::format("{} taeniae", b.taeniae), "give 0 to 12");
-  if (!is_finite(b.position)) refuse("the position is not a number", "give three numbers in metres");
+  if (b.taeniae < 0 || b.taeniae > 12) refuse(fmt::format("{} taeniae are out of range", b.taeniae), "give 0 to 12");
+  if (!is_finite(b.position)) refuse("the position is not a number", "give three numbers in meters");
   if (!is_finite(b.axis) || length(b.axis) < 1e-6f)
-    refuse("the axis has no direction", "give the way the near end faces, e.g. [0, 1, 0]");
+    refuse("the axis has no direction", "give the direction of the near end, e.g. [0, 1, 0]");
   if (!finite(b.density) || b.density <= 0)
-    refuse(fmt::format("a density of {} kg/m^3", b.density), "give a positive number, e.g. 1050");
+    refuse(fmt::format("density {} kg/m^3 is out of range", b.density), "give a positive number, e.g. 1050");
   if (!finite(b.pinned_length) || b.pinned_length < 0 || b.pinned_length > b.length) {
-    refuse(fmt::format("pinned_length {} m", b.pinned_length), "give 0 to the bowel's length");
+    refuse(fmt::format("pinned_length {} m is out of range", b.pinned_length), "give 0 to the bowel's length");
   }
   if (b.inner_radius == 0) return;
   if (!finite(b.inner_radius) || b.inner_radius < 2 * b.wall) {

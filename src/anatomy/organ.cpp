@@ -25,14 +25,15 @@ void check(const OrganImport& o) {
   const auto refuse = [&](const std::string& what, const std::string& next) { throw InputError(o.name, what, next); };
   if (o.particles < 120 || o.particles > 200000)
     refuse(fmt::format("{} particles cannot make an organ", o.particles), "give 120 to 200000");
-  if (!(o.wall >= 1e-4f && o.wall <= 0.05f)) refuse(fmt::format("a wall of {} m", o.wall), "give metres: 0.0001 to 0.05");
-  if (!is_finite(o.position)) refuse("the position is not a number", "give three numbers in metres");
+  if (!(o.wall >= 1e-4f && o.wall <= 0.05f))
+    refuse(fmt::format("wall {} m is out of range", o.wall), "give meters: 0.0001 to 0.05");
+  if (!is_finite(o.position)) refuse("the position is not a number", "give three numbers in meters");
   if (!is_finite(o.axis) || length(o.axis) < 1e-6f)
-    refuse("the axis has no direction", "give the way the rim faces, e.g. [0, 1, 0]");
+    refuse("the axis has no direction", "give the direction of the rim, e.g. [0, 1, 0]");
   if (!(o.density > 0) || !std::isfinite(o.density))
-    refuse(fmt::format("a density of {} kg/m^3", o.density), "give a positive number, e.g. 1050");
+    refuse(fmt::format("density {} kg/m^3 is out of range", o.density), "give a positive number, e.g. 1050");
   if (!(o.pinned_length >= 0 && o.pinned_length <= 2))
-    refuse(fmt::format("pinned_length {} m", o.pinned_length), "give 0 to 2 m");
+    refuse(fmt::format("pinned_length {} m is out of range", o.pinned_length), "give 0 to 2 m");
 }
 
 std::vector<Vec3> points(const TriangleMesh& mesh, const Loop& loop) {
@@ -64,7 +65,8 @@ std::vector<Vec3> place(TriangleMesh& mesh, const OrganImport& o) {
     std::string lengths;
     for (const Loop& l : rims)
       lengths += fmt::format("{}{:.1f}", lengths.empty() ? "" : ", ", 1e3f * loop_length(points(mesh, l)));
-    throw InputError(o.name, fmt::format("there is no rim {}: the openings of {} measure {} mm round", wanted, o.mesh, lengths),
+    throw InputError(o.name,
+                     fmt::format("there is no rim {}: the openings of {} measure {} mm around", wanted, o.mesh, lengths),
                      fmt::format("choose 0 to {}", rims.size() - 1));
   }
   if (rims.empty() && o.rim >= 0) throw InputError(o.name, o.mesh + " is closed and has no rim to choose", "leave rim out");

@@ -33,7 +33,7 @@ int bridge_socket(const std::string& where, bool bind_it, std::string& why, bool
   char* end = nullptr;
   const unsigned long number = std::strtoul(port.c_str(), &end, 10);
   if (host.empty() || port.empty() || *end || number > 65535 || port[0] < '0' || port[0] > '9') {
-    why = "\"" + where + "\" is no HOST:PORT";
+    why = "\"" + where + "\" is not HOST:PORT";
     return -1;
   }
   addrinfo hints{}, *found = nullptr;
@@ -310,9 +310,9 @@ std::string bridge_error(void* self, uint32_t error) {
     case kSilent:
       return "no samples from the bridge at " + where;
     case kTheirs:
-      return "the bridge at " + where + " has lost it";
+      return "the bridge at " + where + " lost the device";
     case kRefused:
-      return "the bridge at " + where + " gave it to another simulator";
+      return "the bridge at " + where + " serves another simulator";
     default:
       return "";
   }
@@ -370,17 +370,17 @@ ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& told
   const bool all = b->known[0] && b->known[1];
   port.arm = b->info;
   if (b->their_version || b->refused == kOtherVersion)
-    told.push_back(who + b->options.where + " speaks version " + std::to_string(b->their_version) +
-                   " of the bridge, this program version " + std::to_string(kBridgeVersion) +
+    told.push_back(who + b->options.where + " uses protocol version " + std::to_string(b->their_version) +
+                   ", this program version " + std::to_string(kBridgeVersion) +
                    "; install the same Catgut on both machines");
-  else if (b->refused) told.push_back(who + "another simulator has the arms at " + b->options.where + "; close it there");
+  else if (b->refused) told.push_back(who + "another simulator uses the devices at " + b->options.where + "; close it there");
   else if (!all && b->count.forged > 0)
     told.push_back(who + b->options.where + " answers with another key; copy the same key file to both machines");
   else if (!all)
-    told.push_back(who + "nobody answers at " + b->options.where +
-                   (b->options.key.empty() ? "; start `catgut bridge` where the arm is, or write --haptics bridge:HOST:PORT"
-                                           : "; start `catgut bridge` where the arm is, with the same key"));
-  else if (!port.arm[0].present && !port.arm[1].present) told.push_back(who + b->options.where + " has no arm");
+    told.push_back(who + "no answer from " + b->options.where +
+                   (b->options.key.empty() ? "; start `catgut bridge` on the device's computer, or use --haptics bridge:HOST:PORT"
+                                           : "; start `catgut bridge` on the device's computer, with the same key"));
+  else if (!port.arm[0].present && !port.arm[1].present) told.push_back(who + b->options.where + " has no device");
   for (size_t k = 0; k < 2; ++k) b->present[k] = port.arm[k].present = port.arm[k].present && all;
   if (!b->present[0] && !b->present[1]) {
     send_sealed(*b, BridgeKind::bye, 0, {});

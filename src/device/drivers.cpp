@@ -30,7 +30,7 @@ constexpr ArmDriver kDrivers[] = {
        return open_haply(o, told);
      }},
 #endif
-    {"bridge", "arms of another machine or program", "HOST[:PORT]",
+    {"bridge", "devices of another machine or program", "HOST[:PORT]",
      [](const std::string& where, std::vector<std::string>& told) {
        BridgeOptions o;
        o.where = where;

@@ -62,7 +62,7 @@ bool prepare(Arm& a, std::string& why) {
     return false;
   }
   if (!status[dhd::kStatusReset]) {
-    why = "it is not calibrated: run the maker's HapticInit, or move it as its manual says, and try again";
+    why = "not calibrated: run HapticInit of the SDK, or calibrate as in its manual, and try again";
     return false;
   }
   // Expert mode is needed for the watchdog alone and is left at once: it would also let wrong calls through.
@@ -70,12 +70,12 @@ bool prepare(Arm& a, std::string& why) {
       a.dhd.dhdEnableExpertMode() != dhd::kError && a.dhd.dhdSetWatchdog(dhd::kWatchdogMost, a.id) != dhd::kError;
   a.dhd.dhdDisableExpertMode();
   if (!watched) {
-    why = "its watchdog cannot be set, and without one a program that dies would leave a force behind";
+    why = "its watchdog cannot be set; without it, a crash would leave a force on";
     return false;
   }
   a.dhd.dhdSetGravityCompensation(dhd::kOn, a.id);
   if (a.dhd.dhdEnableForce(dhd::kOn, a.id) == dhd::kError) {
-    why = "its force cannot be switched on";
+    why = "force output cannot be enabled";
     return false;
   }
   a.gripper = a.dhd.dhdHasGripper(a.id);
@@ -241,7 +241,7 @@ bool load(const ForceDimensionOptions& options, dhd::Library& dhd, std::vector<s
     if (why.empty()) why = dlerror();
   }
   if (!library) {
-    told.push_back("force-dimension: the library of Force Dimension's SDK is not there (" + why +
+    told.push_back("force-dimension: SDK library not found (" + why +
                    "); install the SDK, or set CATGUT_LIBDHD to the path of libdhd.so");
     return false;
   }
@@ -252,8 +252,7 @@ bool load(const ForceDimensionOptions& options, dhd::Library& dhd, std::vector<s
   CATGUT_DHD_FUNCTIONS(CATGUT_DHD_LOAD)
 #undef CATGUT_DHD_LOAD
   if (missing.empty()) return true;
-  told.push_back("force-dimension: the library has no function " + missing +
-                 "; its version is not one that is known here (3.14 to 3.17)");
+  told.push_back("force-dimension: the library lacks the function " + missing + "; supported versions are 3.14 to 3.17");
   return false;
 }
 
@@ -266,8 +265,7 @@ ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<s
   if (!load(options, dhd, told)) return port;
   const int count = dhd.dhdGetDeviceCount();
   if (count <= 0) {
-    told.push_back(
-        "force-dimension: no arm is connected and switched on, or its USB device may not be opened by you (udev rules)");
+    told.push_back("force-dimension: no device, or no permission to open its USB device (udev rules)");
     return port;
   }
   int version[4] = {};
@@ -275,11 +273,11 @@ ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<s
   auto f = std::make_unique<ForceDimension>();
   f->dhd = dhd;
   for (int index = 0; index < count && !(f->arm[0] && f->arm[1]); ++index) {
-    const std::string who = "force-dimension: arm " + std::to_string(index + 1) + " of " + std::to_string(count);
+    const std::string who = "force-dimension: device " + std::to_string(index + 1) + " of " + std::to_string(count);
     const int id = dhd.dhdOpenID(static_cast<dhd::Id>(index));
     if (id < 0) {
       told.push_back(who + " cannot be opened: " + text(dhd.dhdErrorGetStr(dhd.dhdErrorGetLast())) +
-                     "; does another program use it, or may you not open USB devices (udev rules)?");
+                     "; close other programs that use it, and check USB permissions (udev rules)");
       continue;
     }
     auto a = std::make_shared<Arm>();

@@ -357,11 +357,11 @@ std::string error_text(void* self, uint32_t error) {
     case kSilent:
       return "no answer from the Haply service" + there;
     case kGone:
-      return "the Haply service" + there + " has lost it";
+      return "the Haply service" + there + " lost the device";
     case kNonsense:
-      return "an answer of the Haply service" + there + " could not be read";
+      return "invalid answer from the Haply service" + there;
     case kNoLine:
-      return "the line to the Haply service" + there + " is broken";
+      return "lost connection to the Haply service" + there;
     default:
       return "";
   }
@@ -396,7 +396,7 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
     const bool nobody = !h->done || h->failure == boost::system::errc::connection_refused;
     told.push_back(nobody ? "haply: no Inverse service answers at " + there +
                                 "; start it (the Haply Hub does), or write --haptics haply:HOST:PORT"
-                          : "haply: what answers at " + there + " is no Inverse service (" + h->failure.message() + ")");
+                          : "haply: no Inverse service at " + there + " (" + h->failure.message() + ")");
     return port;
   }
   until(*h, when(), [&h] { return h->got || !h->up; });
@@ -409,7 +409,7 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
   const json& all = member(inventory, "inverse3");
   if (!all.is_array()) {
     told.push_back("haply: the service at " + there +
-                   " does not say which arms it has as versions 3.1 to 3.5 do; update it, or name its port for that form");
+                   " has an unknown version (supported: 3.1 to 3.5); update it, or give its port");
     return port;
   }
   std::vector<size_t> order;
@@ -447,7 +447,7 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
   }
   bind_grips(inventory, *h, order);
   if (!port.arm[0].present && !port.arm[1].present) {
-    if (told.empty()) told.push_back("haply: the service at " + there + " has no arm; is one connected and switched on?");
+    if (told.empty()) told.push_back("haply: the service at " + there + " has no device; is one connected and switched on?");
     drop(*h);
     return port;
   }

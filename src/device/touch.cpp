@@ -178,7 +178,7 @@ bool load(const TouchOptions& options, hd::Library& hd, std::vector<std::string>
     if (why.empty()) why = dlerror();
   }
   if (!library) {
-    told.push_back("touch: the device library of OpenHaptics is not there (" + why +
+    told.push_back("touch: OpenHaptics device library not found (" + why +
                    "); install OpenHaptics and the device driver, or set CATGUT_LIBHD to the path of libHD.so");
     return false;
   }
@@ -189,8 +189,7 @@ bool load(const TouchOptions& options, hd::Library& hd, std::vector<std::string>
   CATGUT_HD_FUNCTIONS(CATGUT_HD_LOAD)
 #undef CATGUT_HD_LOAD
   if (missing.empty()) return true;
-  told.push_back("touch: the device library has no function " + missing +
-                 "; its version is not one that is known here (3.0 to 3.5)");
+  told.push_back("touch: the device library lacks the function " + missing + "; supported versions are 3.0 to 3.5");
   return false;
 }
 
@@ -210,9 +209,9 @@ hd::Handle open_arm(const hd::Library& hd, const char* name, hd::Handle ours, in
       std::this_thread::sleep_for(20ms);
       continue;
     }
-    why = e.code == hd::kInvalidLicense ? "the driver has no licence"
+    why = e.code == hd::kInvalidLicense ? "the driver has no license"
           : e.code != hd::kSuccess      ? text(hd.hdGetErrorString(e.code))
-                                        : "the driver does not know it";
+                                        : "unknown to the driver";
     if (!std::getenv("GTDD_HOME")) why += "; GTDD_HOME is not set, which newer drivers need to find their devices";
     return hd::kNoDevice;
   }
@@ -237,7 +236,7 @@ bool prepare(const hd::Library& hd, hd::Handle handle, ArmInfo& info, std::strin
     calibration = hd.hdCheckCalibration();
   }
   if (calibration != hd::kCalibrationOk) {
-    why = "it is not calibrated: put the stylus into its inkwell and try again";
+    why = "not calibrated: put the stylus into its inkwell and try again";
     return false;
   }
   drain(hd);
@@ -252,7 +251,7 @@ bool prepare(const hd::Library& hd, hd::Handle handle, ArmInfo& info, std::strin
   drain(hd);
   for (const hd::Enum what : {hd::kForceOutput, hd::kForceClamping, hd::kForceLimit, hd::kForceRamping}) hd.hdEnable(what);
   if (!hd.hdIsEnabled(hd::kForceOutput)) {
-    why = "its force cannot be switched on";
+    why = "force output cannot be enabled";
     return false;
   }
   drain(hd);
@@ -329,7 +328,8 @@ ArmPort open_touch(const TouchOptions& options, std::vector<std::string>& told) 
   for (size_t k = 0; k < 2; ++k) {
     ArmInfo& info = port.arm[k];
     if (touch->arm[k].handle == hd::kNoDevice) {
-      told.push_back("touch: no " + std::string(k == 0 ? "right" : "left") + " arm (\"" + options.name[k] + "\"): " + why[k]);
+      told.push_back("touch: no " + std::string(k == 0 ? "right" : "left") + " device (\"" + options.name[k] +
+                     "\"): " + why[k]);
       continue;
     }
     if (!prepare(hd, touch->arm[k].handle, info, why[k])) {

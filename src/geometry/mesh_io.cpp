@@ -66,11 +66,11 @@ void append(const aiScene& scene, const Found& found, TriangleMesh& mesh) {
 
 void check_size(float size, const std::string& where) {
   if (size >= 0.005f && size <= 2) return;
-  const char* unit = "no usual unit fits: scale it so that it measures what the organ does";
-  if (size > 2 && size < 20) unit = "looks like centimetres: scale by 0.01";
-  else if (size >= 20 && size <= 2000) unit = "looks like millimetres: scale by 0.001";
-  else if (size > 2000 && size <= 2e6f) unit = "looks like micrometres: scale by 0.000001";
-  else if (size >= 5e-6f && size < 0.005f) unit = "looks like kilometres: scale by 1000";
+  const char* unit = "unknown unit: scale it to the size of the organ";
+  if (size > 2 && size < 20) unit = "looks like centimeters: scale by 0.01";
+  else if (size >= 20 && size <= 2000) unit = "looks like millimeters: scale by 0.001";
+  else if (size > 2000 && size <= 2e6f) unit = "looks like micrometers: scale by 0.000001";
+  else if (size >= 5e-6f && size < 0.005f) unit = "looks like kilometers: scale by 1000";
   throw InputError(where, fmt::format("the surface measures {:.4g} m from corner to corner; an organ has 0.005 to 2 m", size),
                    fmt::format("{} when exporting", unit));
 }
@@ -86,12 +86,11 @@ std::pair<std::string, std::string> split_mesh_path(const std::string& mesh) {
 TriangleMesh read_mesh(const std::string& path, const std::string& node) {
   namespace fs = std::filesystem;
   std::error_code ignored;
-  if (!fs::is_regular_file(path, ignored))
-    throw InputError(path, "no such mesh file", "check the path; it is taken as written");
+  if (!fs::is_regular_file(path, ignored)) throw InputError(path, "no such mesh file", "check the path");
   std::string kind = fs::path(path).extension().string();
   std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (kind != ".gltf" && kind != ".glb" && kind != ".obj" && kind != ".stl") {
-    throw InputError(path, fmt::format("meshes of kind \"{}\" are not read", kind), "export it as .glb, .gltf, .obj or .stl");
+    throw InputError(path, fmt::format("unsupported mesh format \"{}\"", kind), "export it as .glb, .gltf, .obj or .stl");
   }
   Assimp::Importer importer;
   const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate);
@@ -117,7 +116,7 @@ TriangleMesh read_mesh(const std::string& path, const std::string& node) {
     const auto match = std::find_if(nodes.begin(), nodes.end(), [&](const Found& f) { return node == f.node->mName.C_Str(); });
     if (match == nodes.end()) {
       const std::string list = names(*scene, nodes);
-      throw InputError(path, fmt::format("no node is called \"{}\"", node),
+      throw InputError(path, fmt::format("no node \"{}\"", node),
                        "choose one of: " + (list.empty() ? "(none has triangles)" : list));
     }
     // list_nodes goes depth first, so the node and all below it are neighbours in the list.

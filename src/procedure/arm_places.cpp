@@ -20,7 +20,7 @@ namespace catgut {
 namespace {
 
 constexpr std::string_view kKeys[] = {"scale", "turn", "x", "y", "z"};
-constexpr const char* kNext = "put it right, or remove the file and calibrate anew: catgut devices --calibrate";
+constexpr const char* kNext = "correct or remove the file, then run catgut devices --calibrate";
 
 float number(const toml::table& t, const char* key, float otherwise, float least, float most, const std::string& where) {
   const toml::node* node = t.get(key);
@@ -28,7 +28,7 @@ float number(const toml::table& t, const char* key, float otherwise, float least
   const std::optional<double> value = node->value<double>();
   const std::string line = where + ":" + std::to_string(node->source().begin.line);
   if (!value || !(*value >= double{least} && *value <= double{most}))
-    throw InputError(line, std::string(key) + " is no number between " + fmt::format("{} and {}", least, most), kNext);
+    throw InputError(line, std::string(key) + " must be a number between " + fmt::format("{} and {}", least, most), kNext);
   return static_cast<float>(*value);
 }
 
@@ -66,10 +66,10 @@ std::map<std::string, ArmPlace> read_arm_places(const std::string& path) {
       throw InputError(path + ":" + std::to_string(at.source().begin.line), what, kNext);
     };
     const toml::table* t = node.as_table();
-    if (!t) refuse(node, std::string(serial.str()) + " is no table [SERIAL NUMBER]");
+    if (!t) refuse(node, std::string(serial.str()) + " must be a table [SERIAL NUMBER]");
     for (const auto& [key, value] : *t)
       if (std::find(std::begin(kKeys), std::end(kKeys), key.str()) == std::end(kKeys))
-        refuse(value, std::string(key.str()) + " is not known; an arm has scale, turn, x, y and z");
+        refuse(value, std::string(key.str()) + " is unknown; a device has scale, turn, x, y and z");
     ArmPlace p;
     p.scale = number(*t, "scale", p.scale, 0.1f, 3, path);
     p.turn = number(*t, "turn", p.turn, -180, 180, path);
@@ -89,8 +89,8 @@ void write_arm_places(const std::string& path, const std::map<std::string, ArmPl
     file.insert_or_assign(
         serial, toml::table{{"scale", p.scale}, {"turn", p.turn}, {"x", p.middle.x}, {"y", p.middle.y}, {"z", p.middle.z}});
   std::ostringstream out;
-  out << "# Where each haptic arm lies in the field, by serial number; catgut devices --calibrate writes this.\n"
-         "# scale: metres in the field per metre of the stylus; turn [degrees]; x, y, z [m]: what of the arm is the middle of "
+  out << "# Workspace mapping of haptic devices by serial number, written by catgut devices --calibrate.\n"
+         "# scale: field meters per meter of the stylus; turn [degrees]; x, y, z [m]: device position at the center of "
          "the field.\n"
       << file << "\n";
   write_file(path, out.str());

@@ -196,7 +196,7 @@ std::atomic<uint64_t>* ArmServer::Work::shake_hands(const uint8_t* data, const B
   lend(next);
   post(from, opened);
   heard_ns = 0;  // samples begin with the first packet that is sealed with this session's key
-  if (!known) say("lent to the simulator at " + name_of(from));
+  if (!known) say("connected to the simulator at " + name_of(from));
   return &accepted;
 }
 
@@ -219,7 +219,7 @@ std::atomic<uint64_t>* ArmServer::Work::take(const uint8_t* data, size_t size, c
   newest = h.counter;
   const uint64_t now = options.clock();
   if (h.kind == BridgeKind::bye) {
-    say("given back by the simulator at " + name_of(peer));
+    say("released by the simulator at " + name_of(peer));
     lend({});
   } else if (h.kind == BridgeKind::ask) {
     heard_ns = now;  // before the answer: whoever has it may count on samples
@@ -278,12 +278,12 @@ ArmServer::ArmServer(ArmPort port, const ArmServerOptions& options) : work_(std:
   std::string why;
   bool local = false;
   w.fd = bridge_socket(options.listen, true, why, &local);
-  if (w.fd < 0) throw InputError("--listen " + options.listen, why, "name an address of this machine and a port that is free");
+  if (w.fd < 0) throw InputError("--listen " + options.listen, why, "use a local address and a free port");
   if (!local && options.key.empty()) {
     ::close(w.fd);
     w.fd = -1;
-    throw InputError("--listen " + options.listen, "whoever reaches this address could push a hand",
-                     "make a key with --new-key FILE, copy it to the simulator's machine, and listen with --key FILE");
+    throw InputError("--listen " + options.listen, "anyone who reaches this address could apply forces",
+                     "create a key with --new-key FILE, copy it to the simulator's machine, and listen with --key FILE");
   }
   sockaddr_storage own{};
   socklen_t bytes = sizeof own;
@@ -293,7 +293,7 @@ ArmServer::ArmServer(ArmPort port, const ArmServerOptions& options) : work_(std:
   if (!w.port.start(w.port.self, {Work::step, &w}, why)) {
     ::close(w.fd);
     w.fd = -1;
-    throw InputError(w.port.kind, why, "close other programs that use the arms");
+    throw InputError(w.port.kind, why, "close other programs that use the devices");
   }
   w.receiver = std::thread([&w] { w.receive(); });
 }
@@ -317,23 +317,23 @@ std::vector<std::string> ArmServer::news() {
   }
   const uint64_t heard = w.heard_ns, now = w.options.clock();
   const bool silent = heard == 0 || now > heard + 100000000;
-  if (silent != w.was_silent) lines.push_back(silent ? "the simulator is silent; force is off" : "the simulator answers");
+  if (silent != w.was_silent) lines.push_back(silent ? "simulator silent; force off" : "simulator connected");
   w.was_silent = silent;
   for (size_t k = 0; k < 2; ++k) {
     if (!w.port.arm[k].present) continue;
     Side& s = w.side[k];
-    const std::string who = k == 0 ? "right arm: " : "left arm: ";
+    const std::string who = k == 0 ? "right device: " : "left device: ";
     for (const std::string& line : new_faults(s.faults.exchange(0, std::memory_order_relaxed), s.told))
       lines.push_back(who + line);
     const ArmStatus status = w.port.status(w.port.self, k);
     if (status.steps > 0 && status.ready != s.was_ready) {
-      lines.push_back(who + (status.ready ? "it is back" : "lost: " + w.port.error_text(w.port.self, status.error)));
+      lines.push_back(who + (status.ready ? "reconnected" : "lost: " + w.port.error_text(w.port.self, status.error)));
       s.was_ready = status.ready;
     }
   }
   const uint64_t dropped = counts().dropped();
   if (dropped > 2 * w.told_dropped + 9) {  // each time it has doubled: a flood is told, not repeated
-    lines.push_back(std::to_string(dropped) + " packets were no good and dropped");
+    lines.push_back(std::to_string(dropped) + " invalid packets discarded");
     w.told_dropped = dropped;
   }
   return lines;

@@ -80,13 +80,13 @@ ArmTestResult test_arms(ArmPort port, const ArmTestOptions& options, const std::
   }
   std::string why;
   if (!port.start(port.self, {Test::step, &test}, why))
-    throw InputError(port.kind, why, "close other programs that use the arms");
+    throw InputError(port.kind, why, "close other programs that use the devices");
   const auto wait = [&](double seconds) {
     for (const double until = wall_seconds() + seconds; wall_seconds() < until && !stop;)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
   };
   for (int left = static_cast<int>(options.countdown); left > 0 && !stop; --left) {
-    say("hold each stylus lightly, as a pen: " + std::to_string(left));
+    say("hold each stylus lightly, like a pen: " + std::to_string(left));
     wait(1);
   }
   if (options.countdown < 1) wait(double{options.countdown});
@@ -110,7 +110,7 @@ ArmTestResult test_arms(ArmPort port, const ArmTestOptions& options, const std::
     if (!port.arm[k].present) continue;
     const Side& s = test.side[k];
     char text[256];
-    std::snprintf(text, sizeof text, "%s arm: %.0f samples a second; moved %.1f mm right, %.1f mm up, %.1f mm toward you",
+    std::snprintf(text, sizeof text, "%s device: %.0f samples/s; moved %.1f mm right, %.1f mm up, %.1f mm toward you",
                   k == 0 ? "right" : "left", rate, 1e3 * double{s.along[0].load()}, 1e3 * double{s.along[1].load()},
                   1e3 * double{s.along[2].load()});
     std::string line = text;
@@ -118,12 +118,12 @@ ArmTestResult test_arms(ArmPort port, const ArmTestOptions& options, const std::
     for (size_t axis = 0; axis < 3 && !stop; ++axis) {
       const float along = s.along[axis].load();
       if (along < -kMoved)
-        line += std::string("; WRONG WAY when pushed ") + kAxis[axis] + ": a motor or an encoder is flipped", ok = false;
+        line += std::string("; WRONG WAY when pushed ") + kAxis[axis] + ": a motor or encoder is inverted", ok = false;
       else if (along < kMoved)
         line += std::string("; no motion when pushed ") + kAxis[axis] + ": no force, or held too firmly", ok = false;
     }
-    if (s.off) line += "; it ran off: nobody held it, and the force was taken away", ok = false;
-    if (s.lost) line += "; samples were lost", ok = false;
+    if (s.off) line += "; ran away unheld, force switched off", ok = false;
+    if (s.lost) line += "; samples lost", ok = false;
     if (stop) line += "; stopped", ok = false;
     if (ok) line += ": ok";
     result.line.push_back(line);
@@ -146,11 +146,10 @@ std::array<Vec3, 2> held_places(ArmPort port, float countdown, const std::functi
   Watch watch;
   std::string why;
   if (!port.start(port.self, {Watch::step, &watch}, why))
-    throw InputError(port.kind, why, "close other programs that use the arms");
+    throw InputError(port.kind, why, "close other programs that use the devices");
   for (double until = wall_seconds() + double{countdown}, told = 1e9; wall_seconds() < until && !stop;) {
     const double left = std::ceil(until - wall_seconds());
-    if (left < told)
-      say("hold each stylus where the middle of its side of the field shall be: " + std::to_string(static_cast<int>(left)));
+    if (left < told) say("hold each stylus at the center of its side of the field: " + std::to_string(static_cast<int>(left)));
     told = left;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }

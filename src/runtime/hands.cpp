@@ -48,8 +48,8 @@ Hands make_hands(const std::string& who, const SceneSpec& scene, const PictureMo
   if (who == "none") return {};
   if (who == "scripted") return {scripted_surgeon(scene, picture), true};
   if (!std::filesystem::exists(who))
-    throw InputError("--surgeon " + who, "there is no such surgeon and no such file",
-                     "write scripted, none or the path of a .cgrec recording");
+    throw InputError("--surgeon " + who, "unknown surgeon, and no such file",
+                     "use scripted, none or the path of a .cgrec recording");
   Recording recording = read_recording(who);
   const float tick_rate = parse_scene(recording.header.scene, who).solver.tick_rate;
   return {std::make_unique<RecordedHands>(std::move(recording), tick_rate), false};

@@ -20,25 +20,25 @@ constexpr uint64_t kLost = 20000000;  // [ns] without a sample: the device is lo
 const char* word_of(uint32_t fault) {
   switch (fault) {
     case kNotFinite:
-      return "a force or position was no number";
+      return "non-finite force or position";
     case kTooMuch:
-      return "a force far beyond the arm's was asked for; it was not given";
+      return "requested force far above the device limit; not applied";
     case kBadModel:
-      return "a patch of the simulation was unusable";
+      return "invalid force patch";
     case kTimeBack:
-      return "its clock stood still, ran backwards or leapt";
+      return "device clock stopped, ran backwards or jumped";
     case kTooFast:
-      return "it was moved faster than 1 m/s; force is off until it is quiet";
+      return "moved faster than 1 m/s; force off until it is slow";
     case kExpired:
-      return "the simulation did not answer in time; force is off until the hand lets go";
+      return "simulation stalled; force off until the hand releases";
     case kGenerated:
-      return "the energy net had to brake";
+      return "passivity controller active";
     case kTooWarm:
-      return "its motors need rest; force is turned down";
+      return "motors hot; force reduced";
     case kLate:
-      return "the servo was late by more than 5 ms; close other programs, or run with real-time priority";
+      return "servo late by more than 5 ms; close other programs, or run with real-time priority";
     case kElsewhere:
-      return "the simulation's contact was not where the hand is; force is off until it is";
+      return "contact does not match the hand position; force off until it does";
     default:
       return "";
   }
@@ -142,7 +142,7 @@ Haptics::Haptics(ArmPort port, const PictureModel& picture, const HapticsOptions
   }
   std::string why;
   if (work_->port.any() && !work_->port.start(work_->port.self, {Work::step, work_.get()}, why))
-    throw InputError(work_->port.kind, why, "close other programs that use the arms, or go on without: --haptics off");
+    throw InputError(work_->port.kind, why, "close other programs that use the devices, or continue with --haptics off");
 }
 
 Haptics::~Haptics() { stop(); }
@@ -185,14 +185,14 @@ std::vector<std::string> Haptics::news() {
   for (size_t k = 0; k < 2; ++k) {
     if (!present(k)) continue;
     Side& s = work_->side[k];
-    const std::string who = std::string(k == 0 ? "right arm: " : "left arm: ");
+    const std::string who = std::string(k == 0 ? "right device: " : "left device: ");
     const ArmStatus status = work_->port.status(work_->port.self, k);
     for (const std::string& line : new_faults(s.faults.exchange(0, std::memory_order_relaxed) | status.faults, s.told))
       lines.push_back(who + line);
     if (status.steps > 0 && status.ready != s.was_ready) {
-      lines.push_back(who + (status.ready ? "it is back"
+      lines.push_back(who + (status.ready ? "reconnected"
                                           : "lost: " + work_->port.error_text(work_->port.self, status.error) +
-                                                "; its tool stays where it is, the other hand goes on"));
+                                                "; its tool is frozen, the other hand continues"));
       s.was_ready = status.ready;
     } else if (status.ready && status.errors > 0 && s.told_errors == 0) {
       s.told_errors = status.errors;
@@ -247,12 +247,13 @@ ArmChoice read_arm_choice(const std::string& text) {
   for (const ArmDriver& d : arm_drivers()) {
     if (c.driver == d.word) {
       if (std::string_view(d.where).substr(0, 4) == "HOST" && bad_port(c.where))
-        throw InputError("--haptics " + text, "\"" + c.where + "\" is no " + d.where, "give a port from 0 to 65535, or none");
+        throw InputError("--haptics " + text, "\"" + c.where + "\" is not a valid " + d.where,
+                         "give a port from 0 to 65535, or none");
       return c;
     }
     all += std::string(d.word) + ", ";
   }
-  throw InputError("--haptics " + text, "there is no such device", "use " + all + "paper or off");
+  throw InputError("--haptics " + text, "unknown device", "use " + all + "paper or off");
 }
 
 ArmPort open_arms(const ArmChoice& choice, std::vector<std::string>& told) {

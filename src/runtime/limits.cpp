@@ -148,7 +148,7 @@ std::string limits_csv_row(const SutureCost& r) {
 }
 
 std::string limits_table(const LimitsResult& result, size_t bodies) {
-  std::string text = fmt::format("{}: {} particles, {} thread{}; {} of {} sutures in {:.0f} s simulated", result.run.scene,
+  std::string text = fmt::format("{}: {} particles, {} thread{}; {} of {} sutures, {:.0f} s simulated", result.run.scene,
                                  result.run.particles, result.run.threads, result.run.threads == 1 ? "" : "s",
                                  result.row.size(), result.wanted, result.run.simulated_s);
   if (!result.reached()) text += fmt::format(" ({})", result.run.ended);
@@ -163,14 +163,14 @@ std::string limits_table(const LimitsResult& result, size_t bodies) {
   }
   if (const SutureGrowth& g = result.growth; !g.pass.empty())
     text += fmt::format(
-        "suture 1 and suture {} sewn again in turns, {} ticks each, {} times: solver {:.2f} and {:.2f} ms (median), x {:.2f} "
+        "sutures 1 and {} re-run interleaved, {} ticks each, {} times: solver {:.2f} and {:.2f} ms (median), x {:.2f} "
         "(x {:.2f} to {:.2f})\n",
         result.row.back().suture, g.ticks, g.pass.size(), g.middle().first_ms, g.middle().last_ms, g.middle().ratio(),
         g.pass.front().ratio(), g.pass.back().ratio());
   const auto slow =
       std::find_if(result.row.begin(), result.row.end(), [](const SutureCost& r) { return r.fps < kRealTimeFps; });
-  const std::string ours = slow != result.row.end() ? fmt::format("here below it from suture {}", slow->suture)
-                                                    : fmt::format("here never below it up to suture {}", result.row.size());
+  const std::string ours = slow != result.row.end() ? fmt::format("ours from suture {}", slow->suture)
+                                                    : fmt::format("ours not reached up to suture {}", result.row.size());
   text += bodies > 1
               ? fmt::format("paper, two bodies, drawing included: below {} FPS at suture {}, solver 20 ms there; {}\n",
                             kRealTimeFps, kPaperLost, ours)
@@ -181,7 +181,7 @@ std::string limits_table(const LimitsResult& result, size_t bodies) {
 
 Image limits_plot(const LimitsResult& result, size_t bodies, double tick_rate) {
   Plot plot;
-  plot.title = fmt::format("{}: solver time as sutures are added ({} particles, {} thread{})", result.run.scene,
+  plot.title = fmt::format("{}: solver time by suture count ({} particles, {} thread{})", result.run.scene,
                            result.run.particles, result.run.threads, result.run.threads == 1 ? "" : "s");
   plot.x_name = "suture";
   plot.y_name = "ms per tick";

@@ -268,8 +268,8 @@ void Live::Work::tick(bool let_in) {
   told.to_take_back = static_cast<uint32_t>(bites.size());
   if (now.tick % kSanityTicks == 0 && !state_is_sane(*model, *state))
     throw SimulationUnstable(scene.name +
-                             ": the simulation became unstable; take back the last bite, or restart; a recording " +
-                             "helps to find out why");
+                             ": the simulation became unstable; undo the last bite, or restart; keep the " +
+                             "recording to find the cause");
   if (fresh > 0) told.moved_ns = fresh, told.began_ns = began_ns, told.ready_ns = 0;
   if (watch) {
     measure(*model, *state, told.measures);
@@ -326,9 +326,9 @@ void Live::Work::go_back(const Moment& to) {
   before = now;
   rewind(map, now.tick);
   input.hand = to.hand;
-  const uint32_t taken_back = told.practice.taken_back;
+  const uint32_t undos = told.practice.undos;
   told.practice = to.practice;
-  told.practice.taken_back = taken_back;
+  told.practice.undos = undos;
   told.fault.clear();
   ++told.epoch;
   told.tick = now.tick;
@@ -410,7 +410,7 @@ void Live::Work::obey() {
       case LiveCommand::restart:
         end_demonstration();
         bites.clear();
-        told.practice.taken_back = 0;
+        told.practice.undos = 0;
         go_back(settled);
         if (!options.surgeon.empty()) surgeon = make_hands(options.surgeon, scene, picture);
         break;
@@ -419,7 +419,7 @@ void Live::Work::obey() {
         if (bites.empty() || surgeon.surgeon) break;
         const Moment to = std::move(bites.back().before);
         bites.pop_back();
-        ++told.practice.taken_back;
+        ++told.practice.undos;
         go_back(to);
         break;
       }

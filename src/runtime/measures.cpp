@@ -23,11 +23,11 @@ void measure(const Model& model, const State& state, Measures& out) {
   out.thread_particles = m.count - m.tissue;
   out.clusters = m.shape.clusters;
   out.contacts = state.scratch.contacts;
-  out.most_n.fill(0);
+  out.peak_n.fill(0);
   const float inv_h2 = 1 / (m.h * m.h);
   const auto row = [&](ForceKind kind, size_t count) -> float& {
     out.constraints[static_cast<size_t>(kind)] = static_cast<uint32_t>(count);
-    return out.most_n[static_cast<size_t>(kind)];
+    return out.peak_n[static_cast<size_t>(kind)];
   };
   size_t pairs = 0;
   for (const Strand& strand : s.strand) pairs += strand.tension.size();

@@ -26,7 +26,7 @@ const char* force_name(ForceKind kind);
 struct Measures {
   std::array<float, static_cast<size_t>(Stage::count_)> stage_ms{};  // lately
   uint32_t particles = 0, thread_particles = 0, clusters = 0, contacts = 0;
-  std::array<float, static_cast<size_t>(ForceKind::count_)> most_n{};  // [N] in the last substep
+  std::array<float, static_cast<size_t>(ForceKind::count_)> peak_n{};  // [N] in the last substep
   std::array<uint32_t, static_cast<size_t>(ForceKind::count_)> constraints{};
 };
 // All but the times.

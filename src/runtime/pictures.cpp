@@ -119,7 +119,7 @@ struct Pictures::Studio {
       throw InputError(
           "--still",
           fmt::format("the run ended before {} s, so there is no {}", options.still.back().first, options.still.back().second),
-          "choose an earlier moment; everything else was written");
+          "choose an earlier time; everything else was written");
   }
 
   void write_sheet() {

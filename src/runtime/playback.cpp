@@ -138,7 +138,7 @@ void Playback::Work::look_ahead() {
     }
     if (told.known % kGatherEvery == 0 || told.known == told.ticks) tell();
     if (!state_is_sane(*model, *ahead))
-      throw SimulationUnstable(name + ": the simulation became unstable here; what came before can be seen");
+      throw SimulationUnstable(name + ": the simulation became unstable here; earlier ticks can be viewed");
   }
 }
 

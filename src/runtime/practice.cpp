@@ -51,7 +51,7 @@ void note(Practice& p, const Snapshot& seen, float dt) {
     const float way = distance(seen.tool[k].pose.p, p.tip[k]);
     if (p.begun && way < 0.05f) p.path[k] += way;  // a hand that appears somewhere has not gone there
     p.tip[k] = seen.tool[k].pose.p;
-    p.most_force[k] = std::max(p.most_force[k], length(seen.tool[k].force));
+    p.peak_force[k] = std::max(p.peak_force[k], length(seen.tool[k].force));
   }
   p.begun = true;
   p.time_s += static_cast<double>(dt);

@@ -29,11 +29,11 @@ void count(Counts& counts, const Event& event);
 struct Practice : Counts {
   double time_s = 0;             // [s] simulated, since the hands were let in
   float path[2] = {0, 0};        // [m] of each tool's tip
-  float most_force[2] = {0, 0};  // [N] on each hand
+  float peak_force[2] = {0, 0};  // [N] on each hand
   float opening_start = 0;       // [m^2] when the hands were let in; 0: nothing to close
   float opening = 0;             // [m^2] now
   float closure = 0;             // 0 open .. 1
-  uint32_t taken_back = 0;       // bites that were taken back; survives the taking back
+  uint32_t undos = 0;            // bites that were taken back; survives the taking back
   std::array<Vec3, 2> tip{};     // [m] where the tools were, for the path
   bool begun = false;
 };

@@ -71,13 +71,13 @@ Json json_of(const RunResult& r) {
                            "seam_gap",
                            "seam_gap_all",
                            "seam_gap_start",
-                           "needle_off",
+                           "needle_detached",
                            "held_ends",
-                           "ends_uneven",
+                           "tail_asymmetry",
                            "thread_length_error",
                            "thread_length_error_passing",
-                           "lost",
-                           "sane",
+                           "order_errors",
+                           "state_valid",
                            "surgeon_done"})
     j[name] = number_json(value(r, name));
   j["events"] = r.events.empty() ? Json::object() : Json(r.events);
@@ -142,14 +142,14 @@ std::string practice_json(const SceneSpec& scene, const LiveResult& r) {
   j["time_s"] = p.time_s;
   j["bites"] = p.bites;
   j["bites_cancelled"] = p.bites_cancelled;
-  j["taken_back"] = p.taken_back;
+  j["undos"] = p.undos;
   j["knots"] = p.knots;
   j["throws"] = p.throws;
   j["cuts"] = p.cuts;
   j["stitches_settled"] = p.stitches_settled;
   j["needle_slips"] = p.needle_slips;
   j["path_m"] = {p.path[0], p.path[1]};
-  j["most_force_n"] = {newtons(p.most_force[0]), newtons(p.most_force[1])};
+  j["peak_force_n"] = {newtons(p.peak_force[0]), newtons(p.peak_force[1])};
   j["opening_ratio"] = p.opening_start > 0 ? Json(p.opening / p.opening_start) : Json();
   j["faults"] = Json::object();
   for (size_t f = 1; f < p.faults.size(); ++f)
@@ -162,10 +162,10 @@ std::string practice_json(const SceneSpec& scene, const LiveResult& r) {
   }
   j["stitches"] = Json::array();
   for (const StitchBite& b : r.map.bite) j["stitches"].push_back(bite_json(b, r.map.tick_s));
-  j["tension"] = {{"time_s", Json::array()}, {"most_n", Json::array()}, {"needle_n", Json::array()}};
+  j["tension"] = {{"time_s", Json::array()}, {"peak_n", Json::array()}, {"needle_n", Json::array()}};
   for (const TensionSample& t : r.map.tension) {
     j["tension"]["time_s"].push_back(std::round(1e3 * static_cast<double>(t.tick) * r.map.tick_s) / 1e3);
-    j["tension"]["most_n"].push_back(newtons(t.most));
+    j["tension"]["peak_n"].push_back(newtons(t.peak));
     j["tension"]["needle_n"].push_back(newtons(t.needle));
   }
   j["events"] = Json::array();
@@ -183,30 +183,35 @@ std::string practice_json(const SceneSpec& scene, const LiveResult& r) {
   return text(j);
 }
 
-std::string run_summary(const RunResult& r) {
-  std::string out = fmt::format("{}: {:.1f} s simulated in {} ticks, {:.1f} x real time, {} particles, {} thread{}\n", r.scene,
-                                r.simulated_s, r.ticks, r.real_time_factor, r.particles, r.threads, r.threads == 1 ? "" : "s");
-  out += fmt::format("  solver {:.3f} ms a tick (median), {:.3f} (99th percentile), {:.3f} (worst)\n", r.solver_ms.median,
-                     r.solver_ms.p99, r.solver_ms.max);
+std::string run_summary(const RunResult& r, bool judged) {
+  std::string out =
+      fmt::format("{}: {:.1f} s simulated in {} ticks, real-time factor {:.1f}, {} particles, {} thread{}\n", r.scene,
+                  r.simulated_s, r.ticks, r.real_time_factor, r.particles, r.threads, r.threads == 1 ? "" : "s");
+  out += fmt::format("  solver per tick {:.3f} ms (median), {:.3f} ms (99th percentile), {:.3f} ms (maximum)\n",
+                     r.solver_ms.median, r.solver_ms.p99, r.solver_ms.max);
   if (r.late_ticks > 0) {
     // Where the time went in the worst of them.
-    out += fmt::format("  {} ticks took longer than they simulate; the longest, tick {}, {:.1f} ms:", r.late_ticks,
-                       r.longest_tick, r.tick_ms.max);
+    out += fmt::format("  {} ticks exceeded the real-time budget; longest: tick {}, {:.1f} ms:", r.late_ticks, r.longest_tick,
+                       r.tick_ms.max);
     for (size_t s = 0; s < kStages; ++s)
       if (r.longest.ms[s] > 0.05 * r.tick_ms.max)
         out += fmt::format(" {} {:.1f}", stage_name(static_cast<Stage>(s)), r.longest.ms[s]);
     out += "\n";
   }
   out += fmt::format("  {} bites, {} suture points", value(r, "bites"), value(r, "suture_points"));
-  if (value(r, "throws") > 0) out += fmt::format(", {} knots of {} throws", value(r, "knots"), value(r, "throws"));
+  if (value(r, "throws") > 0) out += fmt::format(", {} knots, {} throws", value(r, "knots"), value(r, "throws"));
   if (value(r, "pairs") > 0)
-    out += fmt::format(", {} pairs, {:.1f} mm apart at most", value(r, "pairs"), 1e3 * value(r, "seam_gap_all"));
-  else out += fmt::format(", opening at {:.1f} % of what it was", 100 * value(r, "opening_ratio"));
+    out += fmt::format(", {} pairs, maximum gap {:.1f} mm", value(r, "pairs"), 1e3 * value(r, "seam_gap_all"));
+  else out += fmt::format(", opening {:.1f} %", 100 * value(r, "opening_ratio"));
   out += "\n";
   for (const auto& [name, count] : r.faults) out += fmt::format("  fault: {} ({} x)\n", name, count);
-  out += fmt::format("  ended: {}; state {:016x}\n", r.ended, r.state_hash);
+  out += fmt::format("  end: {}; state {:016x}\n", r.ended, r.state_hash);
   for (const ExpectationResult& e : r.expect)
-    out += fmt::format("  {} {} = {:.6g}, expected {}\n", e.ok ? "ok    " : "FAILED", e.want.name, e.got, want_text(e.want));
+    out += fmt::format("  {} {} = {:.6g}, expected {}\n",
+                       e.ok     ? "ok     "
+                       : judged ? "FAILED "
+                                : "differs",
+                       e.want.name, e.got, want_text(e.want));
   return out;
 }
 
@@ -219,7 +224,7 @@ std::string stage_table(const RunResult& r) {
   row("solver", r.solver_ms);
   row("whole tick", r.tick_ms);
   if (r.ticks > 0)
-    out += fmt::format("{} of {} ticks ({:.3f} %) took longer than the {:.3f} ms that they simulate\n", r.late_ticks, r.ticks,
+    out += fmt::format("{} of {} ticks ({:.3f} %) exceeded the real-time budget of {:.3f} ms\n", r.late_ticks, r.ticks,
                        100.0 * static_cast<double>(r.late_ticks) / static_cast<double>(r.ticks),
                        1000 * r.simulated_s / static_cast<double>(r.ticks));
   return out;

@@ -9,9 +9,10 @@ namespace catgut {
 
 std::string run_json(const RunResult& result);  // an object, indented, with a final newline
 std::string replay_json(const ReplayResult& result, const Recording& recording);
-// What somebody has sewn: counts, every stitch in millimetres, the thread's tension over time, events. Null: not known.
+// Results of a session: counts, every bite [mm], thread tension over time, events. Null: unknown.
 std::string practice_json(const SceneSpec& scene, const LiveResult& result);
-std::string run_summary(const RunResult& result);  // a few lines for a terminal
+// Lines for a terminal. judged: an expectation that does not hold is FAILED, else it only differs.
+std::string run_summary(const RunResult& result, bool judged = true);
 std::string stage_table(const RunResult& result);  // median and 99th percentile of every stage [ms per tick]
 
 }  // namespace catgut

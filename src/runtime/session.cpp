@@ -78,9 +78,9 @@ class Run {
     result.simulated_s = simulated_s();
     result.state_hash = hash_state(*model_, *state_);
     result.interrupted = stopped();
-    if (enough_) result.ended = "enough was seen";
+    if (enough_) result.ended = "stopped by callback";
     if (result.interrupted) result.ended = "interrupted";
-    if (!tally_.sane()) result.ended = "the state was no longer sane";
+    if (!tally_.sane()) result.ended = "invalid state";
     tally_.finish(seen_, result);
   }
 
@@ -135,7 +135,7 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
 
   RunResult result;
   result.surgeon = options.surgeon;
-  result.ended = "the time was over";
+  result.ended = "time limit";
   bool go_on = true;
   while (go_on && run.ticks_ < settle) go_on = one_tick([](const Snapshot&) { return no_hands(); }, "settling");
   run.tally_.open();
@@ -149,7 +149,7 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
   }
   if (hands.surgeon && hands.surgeon->done()) {
     result.value["surgeon_done"] = hands.surgeon->gave_up() ? 0 : 1;
-    result.ended = "the surgeon was done: " + hands.surgeon->doing();
+    result.ended = "surgeon: " + hands.surgeon->doing();
   }
   run.finish(result);
   if (recorder) recorder->finish(result.interrupted);
@@ -176,13 +176,13 @@ ReplayResult replay_session(const Recording& recording, const std::string& name,
 
   ReplayResult result;
   result.run.surgeon = name;
-  result.run.ended = "the recording was over";
+  result.run.ended = "end of recording";
   for (const RecordedTick& t : recording.tick) {
     if (run.ticks_ == settle) run.tally_.open();
     const bool go_on = run.tick([&](const Snapshot&) { return t.input.hand; }, "replay", until_s);
     if (check && hash_state(*run.model_, *run.state_) != t.hash) {
       result.differs_at = run.ticks_;
-      result.run.ended = "the state differed from the recorded one";
+      result.run.ended = "state differs from the recording";
       break;
     }
     if (!go_on) break;

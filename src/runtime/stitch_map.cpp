@@ -67,7 +67,7 @@ void add_bite(StitchMap& map, const PictureModel& picture, const Snapshot& seen,
 }
 
 void sample(StitchMap& map, const Snapshot& seen) {
-  for (float t : seen.thread_tension) map.now.most = std::max(map.now.most, t);
+  for (float t : seen.thread_tension) map.now.peak = std::max(map.now.peak, t);
   if (!seen.thread_tension.empty() && seen.needle_on_thread)
     map.now.needle = std::max(map.now.needle, seen.thread_tension.back());
   map.now.tick = seen.tick;

@@ -39,8 +39,8 @@ struct StitchBite {
 
 struct TensionSample {
   uint64_t tick = 0;  // the last of the samples' time
-  float most = 0;     // [N] anywhere in the thread, the most of that time
-  float needle = 0;   // [N] at the needle, the most of that time
+  float peak = 0;     // [N] maximum along the thread and over the interval
+  float needle = 0;   // [N] at the needle, maximum over the interval
 };
 
 struct StitchMap {

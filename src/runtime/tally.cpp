@@ -139,9 +139,9 @@ void Tally::finish(const Snapshot& last, RunResult& result) const {
   v["last_knot_throws"] = counts_.last_knot_throws;
   v["sutures"] = static_cast<double>(last.settled.size() + counts_.tied());
   judge_seam(last, v);
-  v["needle_off"] = last.needle_on_thread ? 0 : 1;
+  v["needle_detached"] = last.needle_on_thread ? 0 : 1;
   v["held_ends"] = std::max(last.tool[0].held_strands, last.tool[1].held_strands);
-  v["ends_uneven"] = std::max(0.0, ends_uneven_);
+  v["tail_asymmetry"] = std::max(0.0, ends_uneven_);
   for (size_t k = 1; k < counts_.faults.size(); ++k) {
     const std::string name = fault_name(static_cast<Fault>(k));
     if (counts_.faults[k]) result.faults[name] = counts_.faults[k];
@@ -152,8 +152,8 @@ void Tally::finish(const Snapshot& last, RunResult& result) const {
   v["closure"] = last.closure;
   v["thread_length_error"] = length_error_;
   v["thread_length_error_passing"] = length_error_passing_;
-  v["lost"] = lost_;
-  v["sane"] = sane_ ? 1 : 0;
+  v["order_errors"] = lost_;
+  v["state_valid"] = sane_ ? 1 : 0;
   v["simulated_s"] = result.simulated_s;
   v["ticks"] = static_cast<double>(result.ticks);
   v.try_emplace("surgeon_done", 0);

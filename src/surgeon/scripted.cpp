@@ -147,13 +147,13 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
       doing_ = name_of_bite() + "pull the thread";
       return pull(task.kind, seen);
     case TaskKind::hand_back:
-      doing_ = name_of_bite() + "take the needle back";
+      doing_ = name_of_bite() + "return the needle";
       return take_back(seen, true);
     case TaskKind::regrip:
-      doing_ = "take the needle near its end, to tie";
+      doing_ = "grasp the needle near the swage";
       return regrip(seen);
     case TaskKind::draw:
-      doing_ = "draw the suture tight";
+      doing_ = "tighten the suture";
       return draw(seen);
     case TaskKind::throw_:
     case TaskKind::lock_strand:
@@ -164,10 +164,10 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
       doing_ = "cut the thread";
       return cut(task.kind, seen);
     case TaskKind::take_both:
-      doing_ = "take both ends";
+      doing_ = "grasp both ends";
       return take_both(seen);
     case TaskKind::fresh:
-      doing_ = "take a fresh needle";
+      doing_ = "load a new suture";
       return fresh(seen);
     case TaskKind::rest:
       doing_ = "hold";
@@ -249,7 +249,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       return false;
     }
     case withdraw: {  // back the way it came, then the same bite again
-      doing_ = name_of_bite() + "draw back and try again";
+      doing_ = name_of_bite() + "withdraw and retry";
       rest_aside(seen, kForceps);
       psi_ = std::max(psi_ - 2 * skill_.drive_speed / picture_.needle_radius * dt_, -psi_bite - 0.7f);
       BiteFrame f = frame_;
@@ -264,7 +264,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       return false;
     }
     case over:
-      doing_ = name_of_bite() + "take the tip";
+      doing_ = name_of_bite() + "grasp the tip";
       jaw(kForceps, 1);
       if (move(kForceps, raised(forceps_grip(needle), 0.025f), speed)) go(down);
       return false;
@@ -285,7 +285,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       if (move(kDriver, raised(hand_[kDriver].pose, 0.01f), speed) || waited_ > 0.25f) go(bring);
       return false;
     default: {
-      doing_ = name_of_bite() + "bring the needle through";
+      doing_ = name_of_bite() + "pull the needle through";
       rest_aside(seen, kDriver);
       psi_ = std::min(psi_ + 2 * skill_.drive_speed / picture_.needle_radius * dt_, psi_bite + kPi + 0.5f);
       BiteFrame f = frame_;

@@ -288,7 +288,7 @@ TEST(Bowel, RefusesWhatCannotBeBuilt) {
   EXPECT_NE(message(shape).find("axis"), std::string::npos);
   shape = {};
   shape.radius = 20;
-  EXPECT_NE(message(shape).find("metres"), std::string::npos);
+  EXPECT_NE(message(shape).find("meters"), std::string::npos);
   shape = {};
   shape.pinned_length = NAN;
   EXPECT_NE(message(shape).find("pinned_length"), std::string::npos);

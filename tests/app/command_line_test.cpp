@@ -52,7 +52,7 @@ settle = 0.05
 [technique]
 name = "none"
 [expect]
-sane = 1
+state_valid = 1
 particles = 1403
 )";
   }
@@ -96,18 +96,21 @@ TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
   expect_refused("run small.toml --set solver.substep=8", "did you mean \"substeps\"?");
   expect_refused("run small.toml --set body.particles=-5", "out of range");
   expect_refused("run small.toml --preset papr", "there is no preset");
-  expect_refused("run small.toml --surgeon nobody", "no such surgeon");
+  expect_refused("run small.toml --surgeon nobody", "unknown surgeon");
   expect_refused("run small.toml --surgeon scripted", "--surgeon none");
-  expect_refused("run small.toml --bogus", "--bogus");
+  expect_refused("run small.toml --bogus", "no option --bogus");
+  expect_refused("run small.toml --second 3", "no option --second; did you mean --seconds?");
+  expect_refused("runn stay", "no command \"runn\"; did you mean \"run\"?");
+  expect_refused("run small.toml --set camera=1", "a scene has no key \"camera\"; `catgut describe` lists the keys");
   expect_refused("run small.toml --threads 0", "--threads");
   expect_refused("run small.toml --seconds -3", "--seconds");
-  expect_refused("run small.toml --seconds nan", "nan is no number from 0.001 to 1000000");
-  expect_refused("bench scale --seconds nan", "nan is no number");
+  expect_refused("run small.toml --seconds nan", "nan must be a number in [0.001, 1000000]");
+  expect_refused("bench scale --seconds nan", "nan must be a number");
   for (const std::string one : {"stages", "scale", "frame", "haptics"})
-    expect_refused("bench " + one + " --scene small.toml --scene stay", "one scene at a time");
+    expect_refused("bench " + one + " --scene small.toml --scene stay", "one scene only");
   expect_refused("run small.toml --surgeon none --json /proc/nowhere/x.json", "cannot be written");
-  expect_refused("play small.toml --record nowhere/x.cgrec", "nowhere/x.cgrec: there is no folder nowhere; make it");
-  expect_refused("play small.toml --screenshot nowhere/a.png", "there is no folder nowhere");
+  expect_refused("play small.toml --record nowhere/x.cgrec", "nowhere/x.cgrec: no folder nowhere; create it");
+  expect_refused("play small.toml --screenshot nowhere/a.png", "no folder nowhere");
   expect_refused("play small.toml --events /proc/x.json", "cannot be written");
   EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
   expect_refused("run", "scene");
@@ -116,13 +119,13 @@ TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
   expect_refused("replay small.toml", "not a Catgut recording");
   expect_refused("view nothing.cgrec", "there is no such recording");
   expect_refused("view small.toml", "not a Catgut recording");
-  expect_refused("play small.toml --json nowhere/x.json", "there is no folder nowhere");
-  expect_refused("bench paper --scene small.toml", "no technique that the scripted surgeon could sew");
+  expect_refused("play small.toml --json nowhere/x.json", "no folder nowhere");
+  expect_refused("bench paper --scene small.toml", "no technique for the scripted surgeon");
   expect_refused("describe substep", "substeps");
-  expect_refused("devices --test", "no haptic arm");
+  expect_refused("devices --test", "no haptic device");
   expect_refused("play --haptics spoon", "--haptics");
-  expect_refused("devices bridge:host:abc", "\"host:abc\" is no HOST[:PORT]");
-  expect_refused("play stay --haptics haply:host:70000", "is no HOST[:PORT]");
+  expect_refused("devices bridge:host:abc", "\"host:abc\" is not a valid HOST[:PORT]");
+  expect_refused("play stay --haptics haply:host:70000", "is not a valid HOST[:PORT]");
 }
 
 // Arms come and go with a library that is loaded at run time; here it is the simulated one.
@@ -149,14 +152,15 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   EXPECT_LT(catgut::distance(catgut::to_world(w, {kept.at("right-0001").middle, {}}).p, {0.015f, 0.12f, 0.01f}), 1e-6f);
   EXPECT_LT(catgut::distance(catgut::rotate(w.turn, Vec3{1, 0, 0}), {0, 0, -1}), 1e-6f);
   std::ofstream(places) << "[right-0001]\nscale = 50\n";
-  expect_refused("devices --calibrate", "arms.toml:2: scale is no number between");
+  expect_refused("devices --calibrate", "arms.toml:2: scale must be a number between");
   // What is wrong with the file is said by whoever reads it, and nobody writes over it.
-  for (const auto& [text, wrong] : std::map<std::string, std::string>{{"[right-0001\nscale = 1\n", "arms.toml:1: "},
-                                                                      {"[right-0001]\nturn = nan\n", "arms.toml:2: turn is no"},
-                                                                      {"[right-0001]\nx = \"far\"\n", "arms.toml:2: x is no"},
-                                                                      {"[left-0002]\nscael = 2\n", "arms.toml:2: scael is not"},
-                                                                      {"\nright-0001 = 3\n", "arms.toml:2: right-0001 is no"},
-                                                                      {std::string("\0\xff[", 3), "arms.toml:1: "}}) {
+  for (const auto& [text, wrong] :
+       std::map<std::string, std::string>{{"[right-0001\nscale = 1\n", "arms.toml:1: "},
+                                          {"[right-0001]\nturn = nan\n", "arms.toml:2: turn must be"},
+                                          {"[right-0001]\nx = \"far\"\n", "arms.toml:2: x must be"},
+                                          {"[left-0002]\nscael = 2\n", "arms.toml:2: scael is unknown"},
+                                          {"\nright-0001 = 3\n", "arms.toml:2: right-0001 must be"},
+                                          {std::string("\0\xff[", 3), "arms.toml:1: "}}) {
     std::ofstream(places, std::ios::binary) << text;
     expect_refused("devices --calibrate", wrong);
     std::ifstream in(places, std::ios::binary);
@@ -172,20 +176,20 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   const Outcome flipped = run_catgut("devices --test");
   EXPECT_EQ(flipped.code, 1);
   EXPECT_NE(flipped.out.find("WRONG WAY when pushed right"), std::string::npos) << flipped.out;
-  EXPECT_NE(flipped.out.find("left arm: "), std::string::npos) << flipped.out;
+  EXPECT_NE(flipped.out.find("left device: "), std::string::npos) << flipped.out;
   unsetenv("FAKE_HD_FAULT");
   unsetenv("CATGUT_LIBHD");
 }
 
 // One process lends its arms, another finds them; nobody there, or no arm to lend, is a line.
 TEST_F(CommandLine, arms_are_lent_over_the_bridge) {
-  expect_refused("bridge --arms spoon", "there is no such device");
-  expect_refused("play --haptics paper:spoon", "there is no such device");
+  expect_refused("bridge --arms spoon", "unknown device");
+  expect_refused("play --haptics paper:spoon", "unknown device");
   const Outcome nothing = run_catgut("bridge --arms touch:/nowhere/libHD.so");
   EXPECT_EQ(nothing.code, 2);
-  EXPECT_NE(nothing.err.find("no haptic arm to lend"), std::string::npos) << nothing.err;
+  EXPECT_NE(nothing.err.find("no haptic device to serve"), std::string::npos) << nothing.err;
   setenv("CATGUT_LIBHD", CATGUT_FAKE_LIBHD, 1);
-  expect_refused("bridge --listen 203.0.113.7:0", "name an address of this machine");
+  expect_refused("bridge --listen 203.0.113.7:0", "use a local address");
   FILE* lender = popen("echo $$; exec '" CATGUT_APP "' bridge --listen 127.0.0.1:0 --seconds 60", "r");
   unsetenv("CATGUT_LIBHD");
   ASSERT_NE(lender, nullptr);
@@ -196,14 +200,14 @@ TEST_F(CommandLine, arms_are_lent_over_the_bridge) {
   while (port.empty() && fgets(line, sizeof line, lender))
     if (const char* at = std::strstr(line, ", port ")) port = std::to_string(std::atoi(at + 7));
   const Outcome lent = run_catgut("devices bridge:127.0.0.1:" + port);
-  EXPECT_NE(lent.out.find("bridge: left arm"), std::string::npos) << lent.out;
+  EXPECT_NE(lent.out.find("bridge: left device"), std::string::npos) << lent.out;
   EXPECT_NE(lent.out.find("right-0001"), std::string::npos) << lent.out;
   EXPECT_EQ(lent.out.find("touch"), std::string::npos) << "of the driver that was asked for alone";
   kill(pid, SIGTERM);
   while (fgets(line, sizeof line, lender)) {}
   EXPECT_EQ(pclose(lender), 0) << "a clean end";
   const Outcome gone = run_catgut("devices bridge:127.0.0.1:" + port);
-  EXPECT_NE(gone.out.find("bridge: nobody answers"), std::string::npos) << gone.out;
+  EXPECT_NE(gone.out.find("bridge: no answer"), std::string::npos) << gone.out;
 }
 
 TEST_F(CommandLine, faults_in_a_scene_name_its_line) {
@@ -238,11 +242,11 @@ TEST_F(CommandLine, a_mesh_that_cannot_be_used_says_why) {
   mesh("point.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n");
   refused("point.obj", "no area");
   mesh("km.obj", "v 0 0 0\nv 0.0001 0 0\nv 0 0.0001 0\nf 1 2 3\n");  // a decimetre, written in kilometres
-  refused("km.obj", "looks like kilometres: scale by 1000");
+  refused("km.obj", "looks like kilometers: scale by 1000");
   mesh("garbage.glb", "glTF but not really");
   refused("garbage.glb", "cannot be read as a mesh");
   mesh("organ.txt", "v 0 0 0\n");
-  refused("organ.txt", "are not read");
+  refused("organ.txt", "unsupported mesh format");
 }
 
 TEST_F(CommandLine, help_and_descriptions_are_code_0) {
@@ -261,7 +265,7 @@ TEST_F(CommandLine, the_reference_page_is_what_the_program_says) {
   const Outcome o = run_catgut("describe --markdown");
   EXPECT_EQ(o.code, 0);
   EXPECT_TRUE(o.out == read_file(fs::path(CATGUT_SOURCE_DIR) / "docs/scene_reference.md"))
-      << "write it anew: ./catgut describe --markdown > docs/scene_reference.md";
+      << "update it: ./catgut describe --markdown > docs/scene_reference.md";
 }
 
 TEST_F(CommandLine, a_run_reports_all_that_the_contract_names) {
@@ -283,7 +287,17 @@ TEST_F(CommandLine, a_run_reports_all_that_the_contract_names) {
 
 TEST_F(CommandLine, a_failed_expectation_is_code_1) {
   EXPECT_EQ(run_catgut("run small.toml --surgeon none --set expect.bites=3").code, 1);
-  EXPECT_EQ(run_catgut("run small.toml --surgeon none --set expect.bites=3 --no-expect").code, 0);
+  const Outcome unchecked = run_catgut("run small.toml --surgeon none --set expect.bites=3 --no-expect");
+  EXPECT_EQ(unchecked.code, 0);
+  EXPECT_EQ(unchecked.out.find("FAILED"), std::string::npos) << unchecked.out;
+  EXPECT_NE(unchecked.out.find("differs bites = 0, expected 3"), std::string::npos) << unchecked.out;
+}
+
+// The README's line: a thread of another length is no fault of the run.
+TEST_F(CommandLine, another_particle_count_does_not_fail_the_scenes_own) {
+  EXPECT_EQ(run_catgut("run small.toml --surgeon none --set thread.particles=200").code, 0);
+  EXPECT_EQ(run_catgut("run small.toml --surgeon none --set thread.particles=200 --set expect.particles=1403").code, 1);
+  EXPECT_EQ(run_catgut("run small.toml --surgeon none --set body.particles=1300").code, 0);
 }
 
 TEST_F(CommandLine, the_bits_do_not_depend_on_threads) {
@@ -318,7 +332,7 @@ TEST_F(CommandLine, a_cut_recording_is_named_as_such) {
   ASSERT_TRUE(record("a.cgrec"));
   const std::string whole = read_file(folder_ / "a.cgrec");
   std::ofstream(folder_ / "cut.cgrec", std::ios::binary) << whole.substr(0, whole.size() - 10);
-  expect_refused("replay cut.cgrec --check --json cut.json", "the recording is not whole");
+  expect_refused("replay cut.cgrec --check --json cut.json", "truncated recording");
   EXPECT_EQ(json::parse(read_file(folder_ / "cut.json"))["ticks"], 30) << "the ticks it holds are replayed all the same";
   std::ofstream(folder_ / "stump.cgrec", std::ios::binary) << whole.substr(0, 40);
   expect_refused("replay stump.cgrec", "cut or damaged");
@@ -330,7 +344,7 @@ TEST_F(CommandLine, a_cut_recording_is_named_as_such) {
 
 // A picture of a moment the run never has: refused before the work where that is known, and else after everything is written.
 TEST_F(CommandLine, a_picture_of_a_moment_that_never_comes_takes_no_results_with_it) {
-  expect_refused("run small.toml --surgeon none --headless --seconds 1 --still 2:late.png", "the run is over after 1 s");
+  expect_refused("run small.toml --surgeon none --headless --seconds 1 --still 2:late.png", "the run ends after 1 s");
   expect_refused("bench haptics --out /proc/nowhere", "cannot be written");
 
   const Outcome o = run_catgut(
@@ -400,7 +414,7 @@ TEST_F(CommandLine, bench_limits_writes_a_row_for_each_suture) {
 TEST_F(CommandLine, bench_limits_says_how_far_it_came) {
   const Outcome o = run_catgut("bench limits --scene stress_one_body --sutures 3 --set duration=1 --out limits");
   EXPECT_EQ(o.code, 1);
-  EXPECT_NE(o.out.find("0 of 3 sutures in 1 s simulated (the time was over)"), std::string::npos) << o.out;
+  EXPECT_NE(o.out.find("0 of 3 sutures, 1 s simulated (time limit)"), std::string::npos) << o.out;
   EXPECT_EQ(read_table(folder_ / "limits/stress_one_body.csv").size(), 1u);
   expect_refused("bench limits --scene small.toml", "--surgeon none");
   expect_refused("bench limits --out /proc/nowhere", "cannot be written");
@@ -475,7 +489,7 @@ TEST_F(CommandLine, a_killed_run_leaves_what_it_had_recorded) {
   ASSERT_TRUE(WIFSIGNALED(status));
   const size_t saved = ticks();
   ASSERT_GE(saved, 60u) << "a second of it, at least";
-  expect_refused("replay k.cgrec --check --json k.json", "the recording is not whole");
+  expect_refused("replay k.cgrec --check --json k.json", "truncated recording");
   EXPECT_EQ(json::parse(read_file(folder_ / "k.json"))["ticks"], saved);
 }
 

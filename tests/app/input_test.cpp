@@ -188,10 +188,10 @@ TEST(Words, every_event_is_told_or_left_out_on_purpose) {
   Event slipped;
   slipped.kind = EventKind::needle_released;
   bool bad = true;
-  EXPECT_EQ(words_for(slipped, bad), "needle driver: needle let go");
+  EXPECT_EQ(words_for(slipped, bad), "needle released by needle holder");
   EXPECT_FALSE(bad);
   slipped.value = 3.2f;
-  EXPECT_EQ(words_for(slipped, bad), "the needle slipped out of the needle driver (3.2 N)");
+  EXPECT_EQ(words_for(slipped, bad), "needle slipped from needle holder at 3.2 N");
   EXPECT_TRUE(bad);
 }
 

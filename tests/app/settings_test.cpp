@@ -72,8 +72,8 @@ TEST_F(SettingsFile, no_file_is_no_fault) {
 TEST_F(SettingsFile, what_is_wrong_is_one_line_that_names_the_file) {
   const std::pair<const char*, const char*> kWrong[] = {
       {"qualty = \"low\"\n", "settings.toml:1: there is no setting \"qualty\"; did you mean \"quality\"?"},
-      {"\nquality = \"best\"\n", "settings.toml:2: quality cannot be this; write \"low\", \"medium\" or \"high\""},
-      {"quality = 2\n", "quality cannot be this"},
+      {"\nquality = \"best\"\n", "settings.toml:2: quality has an invalid value; write \"low\", \"medium\" or \"high\""},
+      {"quality = 2\n", "quality has an invalid value"},
       {"hints = 1\n", "write true or false"},
       {"text_size = 20\n", "write a number from 0.7 to 2"},
       {"text_size = nan\n", "write a number"},
@@ -163,7 +163,7 @@ TEST(Screens, escape_always_leads_back) {
   ScreenFacts f;
   f.scenes = 3;
   EXPECT_EQ(pressed(Key::escape, f), Chosen::quit);
-  f.screen = Screen::practise;
+  f.screen = Screen::practice;
   EXPECT_EQ(pressed(Key::escape, f), Chosen::pause);
   f.screen = Screen::pause;
   EXPECT_EQ(pressed(Key::escape, f), Chosen::resume);
@@ -204,7 +204,7 @@ TEST(Screens, a_recording_is_gone_along_by_arrows) {
   Choice c = choice_of_key(in, f);
   EXPECT_EQ(c.what, Chosen::go_by);
   EXPECT_EQ(c.by, -120);
-  f.screen = Screen::practise;
+  f.screen = Screen::practice;
   EXPECT_EQ(choice_of_key(in, f).what, Chosen::nothing) << "there they look round";
   f.screen = Screen::view;
   EXPECT_EQ(pressed(Key::space, f), Chosen::play_or_hold);

@@ -142,7 +142,7 @@ TEST_F(Window, somebody_takes_the_needle_and_everything_is_recorded) {
   const fs::path events = folder_ / "events", recording = folder_ / "r.cgrec";
   start({"play", "purse_string", "--size", "640x360", "--quality", "low", "--events", events.string(), "--record",
          recording.string(), "--seconds", "180"});
-  ASSERT_TRUE(happens("practise", 1, 60)) << said();
+  ASSERT_TRUE(happens("practice", 1, 60)) << said();
   pause(500);
   const auto way = from_tool_to_needle();
   drag(way[0], way[1], 20);
@@ -168,7 +168,7 @@ TEST_F(Window, somebody_takes_the_needle_and_everything_is_recorded) {
   EXPECT_TRUE(happens("pause")) << said();
   xdo("key period");
   xdo("key Escape");
-  EXPECT_TRUE(happens("practise", 2)) << said();
+  EXPECT_TRUE(happens("practice", 2)) << said();
   xdo("key F10");
   EXPECT_TRUE(happens("results")) << said();
   xdo("key Escape");
@@ -199,7 +199,7 @@ TEST_F(Window, whatever_happens_to_the_window_nothing_is_lost) {
   const fs::path events = folder_ / "events", recording = folder_ / "r.cgrec", json = folder_ / "r.json";
   start({"play", "stay", "--size", "640x360", "--quality", "low", "--events", events.string(), "--record", recording.string(),
          "--json", json.string(), "--seconds", "180"});
-  ASSERT_TRUE(happens("practise", 1, 60)) << said();
+  ASSERT_TRUE(happens("practice", 1, 60)) << said();
   xdo("search --name Catgut windowsize 500 400");
   pause(700);
   xdo("search --name Catgut windowsize 780 560");
@@ -210,7 +210,7 @@ TEST_F(Window, whatever_happens_to_the_window_nothing_is_lost) {
   pause(500);
   xdo("search --name Catgut windowfocus");
   xdo("key Escape");
-  EXPECT_TRUE(happens("practise", 2)) << said();
+  EXPECT_TRUE(happens("practice", 2)) << said();
   drag(40, 10, 5);
   kill(app_, SIGTERM);
   EXPECT_EQ(exit_code(), 130) << said();
@@ -226,7 +226,7 @@ TEST_F(Window, whatever_happens_to_the_window_nothing_is_lost) {
 TEST_F(Window, a_killed_program_leaves_what_it_had_recorded) {
   const fs::path events = folder_ / "events", recording = folder_ / "r.cgrec";
   start({"play", "stay", "--size", "320x180", "--events", events.string(), "--record", recording.string(), "--seconds", "180"});
-  ASSERT_TRUE(happens("practise", 1, 60)) << said();
+  ASSERT_TRUE(happens("practice", 1, 60)) << said();
   pause(4000);
   kill(app_, SIGKILL);
   exit_code();
@@ -281,7 +281,7 @@ TEST_F(Window, settings_are_kept) {
   fs::create_directories(file.parent_path());
   std::ofstream(file) << "hints = maybe\n";
   start({"play", "stay", "--size", "640x360", "--events", events.string(), "--seconds", "120"});
-  ASSERT_TRUE(happens("practise", 1, 60)) << said();
+  ASSERT_TRUE(happens("practice", 1, 60)) << said();
   EXPECT_NE(said().find("settings.toml:1"), std::string::npos) << said();
   xdo("key h");  // help at the needle: off
   pause(500);

@@ -344,7 +344,7 @@ TEST(Bridge, S6_no_amplification) {
   t.simulator->send(bye);
   ASSERT_TRUE(wait_for([&] {
     for (const std::string& line : t.server->news())
-      if (line.find("given back") != std::string::npos) return true;
+      if (line.find("released by") != std::string::npos) return true;
     return false;
   }));
   t.simulator.reset();
@@ -530,7 +530,7 @@ TEST(Bridge, arms_are_given_back_and_lent_again) {
   t.simulator->send(t.simulator->sealed(BridgeKind::bye, 0, {}));
   ASSERT_TRUE(wait_for([&] {
     for (const std::string& line : t.server->news())
-      if (line.find("given back") != std::string::npos) return true;
+      if (line.find("released by") != std::string::npos) return true;
     return false;
   }));
   t.simulator.reset();
@@ -613,7 +613,7 @@ TEST(Bridge, both_ends) {
   t.both(50, [&](int) { EXPECT_TRUE(t.fake.force(0) == right); });
   EXPECT_FALSE(t.there[1]);
   EXPECT_TRUE(t.there[0]);
-  EXPECT_NE(t.port.error_text(t.port.self, t.port.status(t.port.self, 1).error).find("has lost it"), std::string::npos);
+  EXPECT_NE(t.port.error_text(t.port.self, t.port.status(t.port.self, 1).error).find("lost the device"), std::string::npos);
 
   // The bridge peer: the whole simulator stops, without a word.
   t.hangs = true;
@@ -791,10 +791,10 @@ TEST(Bridge, nothing_to_work_with_is_one_line) {
     EXPECT_EQ(told[0].find('\n'), std::string::npos);
   };
   ArmEnd end;  // at first nobody who answers
-  line(end.where(), "start `catgut bridge` where the arm is");
-  line("127.0.0.1:99999", "is no HOST:PORT");
-  line("127.0.0.1:x", "is no HOST:PORT");
-  line(":5", "is no HOST:PORT");
+  line(end.where(), "start `catgut bridge` on the device's computer");
+  line("127.0.0.1:99999", "is not HOST:PORT");
+  line("127.0.0.1:x", "is not HOST:PORT");
+  line(":5", "is not HOST:PORT");
   // Another version, one that has lent its arms, one that has none, one with another key.
   for (const int kind : {0, 1, 2, 3}) {
     std::atomic<bool> quit{false};
@@ -812,9 +812,9 @@ TEST(Bridge, nothing_to_work_with_is_one_line) {
       }
     });
     line(end.where(),
-         kind == 0   ? "speaks version 3 of the bridge"
-         : kind == 1 ? "another simulator has the arms"
-         : kind == 2 ? "has no arm"
+         kind == 0   ? "uses protocol version 3"
+         : kind == 1 ? "another simulator uses the devices"
+         : kind == 2 ? "has no device"
                      : "another key",
          kind == 3 ? 2.0f : 10.0f);
     quit = true;

@@ -271,11 +271,11 @@ TEST(ForceDimension, nothing_to_work_with_is_one_line) {
     EXPECT_EQ(told.back().find('\n'), std::string::npos);
     if (*name) unsetenv(name);
   };
-  line("FAKE_DHD_COUNT", "0", "no arm is connected");
+  line("FAKE_DHD_COUNT", "0", "no device");
   line("FAKE_DHD_UNCALIBRATED", "1", "HapticInit");
   line("FAKE_DHD_LOCKED", "1", "udev rules");
   line("", "", "install the SDK", "/nowhere/libdhd.so");
-  line("", "", "has no function dhdGetDeviceCount", "libc.so.6");
+  line("", "", "lacks the function dhdGetDeviceCount", "libc.so.6");
 }
 
 TEST(ForceDimension, one_arm_is_enough) {

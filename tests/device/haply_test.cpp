@@ -142,7 +142,7 @@ TEST(Haply, H7_an_arm_is_lost) {
   });
   EXPECT_FALSE(t.there[0]);
   EXPECT_TRUE(t.there[1]);
-  EXPECT_NE(t.port.error_text(t.port.self, t.port.status(t.port.self, 0).error).find("has lost it"), std::string::npos);
+  EXPECT_NE(t.port.error_text(t.port.self, t.port.status(t.port.self, 0).error).find("lost the device"), std::string::npos);
   t.fake.there(1, true);
   t.run(200, [&](int) { ASSERT_EQ(length(t.force(0)), 0) << "what is wanted is not small: it must not engage"; });
   EXPECT_TRUE(t.there[0]);
@@ -252,18 +252,18 @@ TEST(Haply, nothing_to_work_with_is_one_line) {
     gone = fake.where();
   }
   line(gone, "no Inverse service answers");
-  line("127.0.0.1:nothing", "is no Inverse service");
+  line("127.0.0.1:nothing", "no Inverse service at");
   FakeHaply none(HaplyForm::v35, 0);
-  line(none.where(), "has no arm");
+  line(none.where(), "has no device");
   FakeHaply other;
   other.inventory("{\"device\":[]}");
-  line(other.where(), "as versions 3.1 to 3.5 do");
+  line(other.where(), "has an unknown version");
   FakeHaply raw;
   raw.inventory(R"({"inverse3":[{"device_id":"04BA","status":{"calibrated":false}}]})");
   line(raw.where(), "not calibrated");
   FakeHaply quotes;
   quotes.inventory(R"({"inverse3":[{"device_id":"04\"BA"}]})");
-  line(quotes.where(), "has no arm");
+  line(quotes.where(), "has no device");
 }
 
 }  // namespace

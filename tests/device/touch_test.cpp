@@ -327,7 +327,7 @@ TEST(Touch, one_arm_is_missing) {
   t.fake.reset();
   t.open();
   ASSERT_EQ(t.told.size(), 1u);
-  EXPECT_NE(t.told[0].find("no left arm"), std::string::npos) << t.told[0];
+  EXPECT_NE(t.told[0].find("no left device"), std::string::npos) << t.told[0];
   EXPECT_TRUE(t.port.arm[0].present);
   t.run(100);
   EXPECT_EQ(t.calls[0], 100u);
@@ -346,7 +346,7 @@ TEST(Touch, nothing_to_work_with_is_one_line) {
   };
   setenv("FAKE_HD_MISSING", "all", 1);
   fake.reset();
-  line("arm");
+  line("device");
   unsetenv("FAKE_HD_MISSING");
   setenv("FAKE_HD_UNCALIBRATED", "1", 1);
   fake.reset();
@@ -356,7 +356,7 @@ TEST(Touch, nothing_to_work_with_is_one_line) {
   o.library = "/nowhere/libHD.so";
   line("install OpenHaptics", o);
   o.library = "libc.so.6";
-  line("has no function hdInitDevice", o);
+  line("lacks the function hdInitDevice", o);
 }
 
 TEST(Touch, an_arm_left_open_by_a_crash_is_taken_over) {

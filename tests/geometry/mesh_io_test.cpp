@@ -85,7 +85,7 @@ TEST(MeshIo, ChoosesANode) {
   const std::string path = file("two.obj", tube(0.1, "left") + tube(0.1, "right", 73, 1));
   EXPECT_GT(read_mesh(path, "right").position[0].x, 0.05f);
   EXPECT_SAYS(refusal(path), "left, right");
-  EXPECT_SAYS(refusal(path, "middle"), "no node is called \"middle\"");
+  EXPECT_SAYS(refusal(path, "middle"), "no node \"middle\"");
   EXPECT_SAYS(refusal(path, "middle"), "left, right");
 }
 
@@ -93,9 +93,9 @@ TEST(MeshIo, SaysWhatItCannotUse) {
   EXPECT_SAYS(refusal("/no/such/organ.glb"), "no such mesh file");
   EXPECT_SAYS(refusal(file("organ.blend", "x")), ".glb, .gltf, .obj or .stl");
   EXPECT_SAYS(refusal(file("broken.glb", "this is no mesh")), "cannot be read");
-  EXPECT_SAYS(refusal(file("mm.obj", tube(100))), "millimetres: scale by 0.001");
-  EXPECT_SAYS(refusal(file("cm.obj", tube(10))), "centimetres: scale by 0.01");
-  EXPECT_SAYS(refusal(file("km.obj", tube(0.001))), "kilometres: scale by 1000");
+  EXPECT_SAYS(refusal(file("mm.obj", tube(100))), "millimeters: scale by 0.001");
+  EXPECT_SAYS(refusal(file("cm.obj", tube(10))), "centimeters: scale by 0.01");
+  EXPECT_SAYS(refusal(file("km.obj", tube(0.001))), "kilometers: scale by 1000");
   EXPECT_SAYS(refusal(file("flat.obj", "v 0 0 0\nv 0.1 0 0\nv 0.2 0 0\nf 1 2 3\n")), "no area");
   EXPECT_SAYS(refusal(file("points.obj", "v 0 0 0\nv 0.1 0 0\nv 0.2 0 0\np 1 2 3\n")), "triangles");
   EXPECT_SAYS(refusal(file("fins.obj", "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nv 0 -0.1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n")),

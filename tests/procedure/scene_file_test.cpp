@@ -62,7 +62,7 @@ TEST(SceneFile, every_key_survives_writing_and_reading) {
     scene.expect.push_back({"bites", 10, 1e300});
     scene.expect.push_back({"opening_ratio", -1e300, 0.1 + 1e-17 * static_cast<double>(seed)});
     scene.expect.push_back({"particles", 1403, 1403});
-    scene.expect.push_back({"lost", -1.0 / 3, 2e-300});
+    scene.expect.push_back({"order_errors", -1.0 / 3, 2e-300});
     const std::string text = write_scene(scene);
     const SceneSpec again = parse_scene(text, "other.toml");
     ASSERT_TRUE(same_scene(scene, again)) << text;

@@ -363,7 +363,7 @@ TEST(Live, a_bite_can_be_taken_back) {
   EXPECT_TRUE(seen.suture_point.empty());
   EXPECT_EQ(seen.tool[0].held, Held::needle);
   EXPECT_EQ(live.status().practice.bites, 0u);
-  EXPECT_EQ(live.status().practice.taken_back, 1u);
+  EXPECT_EQ(live.status().practice.undos, 1u);
   EXPECT_EQ(live.status().to_take_back, 0u);
   // The hands that were sent before are not followed: the tool stays until newer ones come.
   const Vec3 hand = seen.tool[0].hand.p;

@@ -112,7 +112,7 @@ TEST(StitchMap, what_is_taken_back_has_not_happened) {
   s.bite(Sewn::on_wall(0.1f, 0.004f), Sewn::on_wall(0.4f, 0.004f));
   for (int i = 0; i < 60; ++i) s.tick();
   EXPECT_EQ(s.map.tension.size(), 10u) << "ten a second";
-  EXPECT_FLOAT_EQ(s.map.tension[3].most, 0.5f);
+  EXPECT_FLOAT_EQ(s.map.tension[3].peak, 0.5f);
   s.seen.event.push_back({s.seen.tick + 1, EventKind::suture_taken, 0, 0, 0, {}});
   s.bite(Sewn::on_wall(0.7f, 0.004f), Sewn::on_wall(0.9f, 0.004f));
   EXPECT_EQ(s.map.bite.back().suture, 1u);

@@ -79,8 +79,8 @@ TEST(Tally, uneven_ends_are_those_of_the_first_knot) {
   j.tell(EventKind::knot_begun), j.tick();
   j.seen.suture_point[1].anchored = 9;
   j.tell(EventKind::knot_begun), j.tick();
-  EXPECT_NEAR(j.result().value["ends_uneven"], 1.0 / 3, 1e-6);
-  EXPECT_EQ(Judged().result().value["ends_uneven"], 0) << "no knot";
+  EXPECT_NEAR(j.result().value["tail_asymmetry"], 1.0 / 3, 1e-6);
+  EXPECT_EQ(Judged().result().value["tail_asymmetry"], 0) << "no knot";
 }
 
 TEST(Tally, faults_by_name_ends_in_hand_and_the_needle) {
@@ -100,7 +100,7 @@ TEST(Tally, faults_by_name_ends_in_hand_and_the_needle) {
   EXPECT_EQ(r.value["technique_fault"], 5);
   EXPECT_EQ(r.faults, (std::map<std::string, uint64_t>{{"too_few_throws", 1}, {"wrong_body", 2}}));
   EXPECT_EQ(r.value["held_ends"], 2);
-  EXPECT_EQ(r.value["needle_off"], 1);
+  EXPECT_EQ(r.value["needle_detached"], 1);
 }
 
 }  // namespace

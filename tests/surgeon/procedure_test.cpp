@@ -43,8 +43,8 @@ TEST(Procedure, twenty_seeds_close_the_opening) {
     EXPECT_LE(lengths.worst, 0.01f) << seed;
     EXPECT_LE(lengths.worst_passing, 0.03f) << seed;
     EXPECT_EQ(r.value["order_broken"], 0) << seed;
-    EXPECT_EQ(r.value["lost"], 0) << seed;
-    EXPECT_EQ(r.value["sane"], 1) << seed;
+    EXPECT_EQ(r.value["order_errors"], 0) << seed;
+    EXPECT_EQ(r.value["state_valid"], 1) << seed;
     EXPECT_EQ(r.value["surgeon_done"], 1) << seed;
   }
 }
@@ -60,7 +60,7 @@ TEST(Procedure, shaky_hands_try_again) {
     options.seconds = 22;
     RunResult r = run_session(scene, options);
     EXPECT_GE(r.value["bites"], 1) << seed;
-    EXPECT_EQ(r.value["sane"], 1) << seed;
+    EXPECT_EQ(r.value["state_valid"], 1) << seed;
     EXPECT_GT(r.simulated_s, 21) << seed << ": gave up";
   }
 }

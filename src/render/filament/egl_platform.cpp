@@ -110,7 +110,7 @@ EGLDisplay open_x11(Display* connection) {
   throw std::runtime_error("no window: no EGL driver for this X server (Debian: apt install libgl1-mesa-dri libegl1)");
 }
 
-// 8-bit colour with depth; for a window of the visual that it was made with, or drawing on it fails on some drivers.
+// 8-bit color with depth; for a window of the visual that it was made with, or drawing on it fails on some drivers.
 EGLConfig choose_config(EGLDisplay display, EGLint surface, EGLint visual) {
   const EGLint wanted[] = {
       EGL_SURFACE_TYPE, surface, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_RED_SIZE,   8,  EGL_GREEN_SIZE, 8,
@@ -119,7 +119,7 @@ EGLConfig choose_config(EGLDisplay display, EGLint surface, EGLint visual) {
   eglChooseConfig(display, wanted, nullptr, 0, &count);
   std::vector<EGLConfig> configs(static_cast<size_t>(std::max(count, 0)));
   if (!eglChooseConfig(display, wanted, configs.data(), count, &count) || count < 1)
-    throw std::runtime_error("no pictures: the EGL driver offers no 8-bit colour with depth");
+    throw std::runtime_error("no pictures: the EGL driver offers no 8-bit color with depth");
   for (const EGLConfig config : configs) {
     EGLint has_visual = 0;
     if (visual && eglGetConfigAttrib(display, config, EGL_NATIVE_VISUAL_ID, &has_visual) && has_visual == visual) return config;
