@@ -60,8 +60,7 @@ void add_bridge(CLI::App& app, int& exit_code) {
       ->type_name("DRIVER[:WHERE]")
       ->capture_default_str();
   command
-      ->add_option("--listen", o->listen,
-                   "address and port (0.0.0.0: any address); every address except 127.0.0.1 needs --key")
+      ->add_option("--listen", o->listen, "address and port (0.0.0.0: any address); every address except 127.0.0.1 needs --key")
       ->type_name("HOST[:PORT]")
       ->capture_default_str();
   command->add_option("--key", o->key, "shared key file (mode 600)")->type_name("FILE");

@@ -47,7 +47,7 @@ void write_felt(const std::string& folder, const std::string& scene) {
     if (p.mm < 4) entry = std::max(entry, p.ours), theirs = std::max(theirs, p.paper);
   write_output(folder + "/forces.csv", csv);
   const double exit = c.exit_mm > 0 ? c.exit_mm : 8;
-  Plot bite = force_plot("A full bite: force on the hand against the way of the tip since it went in", "tip [mm]", c.bite);
+  Plot bite = force_plot("Full bite: force on the hand over the path of the tip since entry", "tip [mm]", c.bite);
   bite.x_most = std::min(25.0, std::max(10.0, c.bite.back().mm));
   bite.y_most = 3.5;
   bite.band = {{"entry peak 0.9 +- 0.3 N (starting value; skin with these needles 0.5 to 1.0 N, Maloney et al. 2025)",
@@ -65,7 +65,7 @@ void write_felt(const std::string& folder, const std::string& scene) {
   double far = 10, most = 0;
   for (const FeltPoint& p : c.knot) far = std::max(far, p.mm), most = std::max(most, p.ours);
   Plot knot = force_plot("Tightening the first throw: force on the pulling hand",
-                         "way of the hand since the throw was begun [mm]", c.knot);
+                         "path of the hand since the throw started [mm]", c.knot);
   knot.x_most = far;
   knot.y_most = 4;
   knot.band = {

@@ -38,8 +38,9 @@ int bench_paper(const PaperOptions& o) {
   SessionHooks hooks;
   hooks.stop = &stop_on_interrupt();
   const std::string about = fmt::format(
-      "On {}. Mean ± standard deviation over {} executions of their median ticks; the paper's figures beside them (i7-13700KF, "
-      "RTX 4070 Ti, drawn in a headset). frame: the surgeon's plan, the tick{} one after another.\n\n",
+      "On {}. Mean ± standard deviation of the median ticks of {} executions. The paper's figures are from an i7-13700KF with "
+      "an "
+      "RTX 4070 Ti, rendered in a headset. A frame is the surgeon's plan, the tick{} in sequence.\n\n",
       this_machine(), o.executions,
       picture ? " and a stereo frame submitted to a backend that does not rasterize," : " (no pictures in this build)");
   std::fputs(about.c_str(), stdout);

@@ -90,7 +90,7 @@ int bench_scale(const ScaleOptions& o) {
     std::printf("%s, preset %s, %g s simulated, best of %d; %s\n\n", scene.name.c_str(), scene.solver.preset.c_str(), o.seconds,
                 o.repeat, this_machine().c_str());
     std::printf(
-        "| particles | threads | solver ms: median | 99 %% | worst | us per particle | speedup | most expensive stages [ms] "
+        "| particles | threads | solver ms: median | 99 %% | maximum | us per particle | speedup | most expensive stages [ms] "
         "|\n"
         "|---|---|---|---|---|---|---|---|\n");
     double one = 0;

@@ -147,20 +147,18 @@ int run(int argc, char** argv) {
   if (!json.empty() && !std::ofstream(json, std::ios::app)) throw InputError(json, "cannot be written", "choose another place");
 
   std::printf(
-      "Milliseconds a tick of 1/60 s in 8 substeps, medians (%s), all four in turns tick by tick. Catgut: preset paper, "
-      "everything "
-      "on (shape\n"
-      "matching of the different clusters in 2 sweeps, walls against walls in 10, tools and thread in 5, needle, suture, "
-      "knots, loops,\n"
-      "techniques), %d thread(s). Bullet: %s precision, one thread, 1 sweep over the clusters or 3 over the links; tool "
-      "against tissue, thread\n"
-      "as links on the drape; with links also vertices against faces of other bodies. Carried off: mean way of the tissue from "
-      "where it\n"
-      "began [mm]; contacts: the most. Both in the order of the columns.\n\n",
-      threads == 1 ? "of the thread's own time" : "by the clock", threads, kBulletIsSingle ? "single" : "double");
+      "Milliseconds per tick of 1/60 s in 8 substeps, medians of %s, all four interleaved tick by tick. Catgut: preset paper, "
+      "everything enabled, %d thread(s). Shape\n"
+      "matching runs 2 sweeps over distinct clusters, self-contact 10, tools and thread 5. Bullet: %s precision, one thread, 1 "
+      "sweep over the clusters or 3 over the links. Its tools\n"
+      "touch tissue, its thread is links on the drape, and with links, vertices also meet faces of other bodies. Displacement: "
+      "mean distance of the tissue from its start [mm].\n"
+      "Contacts: maximum. Both in the order of the columns.\n\n",
+      threads == 1 ? "thread CPU time" : "wall time", threads, kBulletIsSingle ? "single" : "double");
   std::printf(
-      "| scene | particles | clusters | edges | Catgut | Bullet, a cluster a particle | Bullet, different clusters | Bullet, "
-      "links | carried off | "
+      "| scene | particles | clusters | edges | Catgut | Bullet, one cluster per particle | Bullet, distinct clusters | "
+      "Bullet, "
+      "links | displacement | "
       "contacts |\n|---|---|---|---|---|---|---|---|---|---|\n");
   nlohmann::ordered_json all;
   const auto one = [&](const std::string& scene, int times, int n) {

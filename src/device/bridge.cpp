@@ -371,15 +371,15 @@ ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& told
   port.arm = b->info;
   if (b->their_version || b->refused == kOtherVersion)
     told.push_back(who + b->options.where + " uses protocol version " + std::to_string(b->their_version) +
-                   ", this program version " + std::to_string(kBridgeVersion) +
-                   "; install the same Catgut on both machines");
+                   ", this program version " + std::to_string(kBridgeVersion) + "; install the same Catgut on both machines");
   else if (b->refused) told.push_back(who + "another simulator uses the devices at " + b->options.where + "; close it there");
   else if (!all && b->count.forged > 0)
     told.push_back(who + b->options.where + " answers with another key; copy the same key file to both machines");
   else if (!all)
     told.push_back(who + "no answer from " + b->options.where +
-                   (b->options.key.empty() ? "; start `catgut bridge` on the device's computer, or use --haptics bridge:HOST:PORT"
-                                           : "; start `catgut bridge` on the device's computer, with the same key"));
+                   (b->options.key.empty()
+                        ? "; start `catgut bridge` on the device's computer, or use --haptics bridge:HOST:PORT"
+                        : "; start `catgut bridge` on the device's computer, with the same key"));
   else if (!port.arm[0].present && !port.arm[1].present) told.push_back(who + b->options.where + " has no device");
   for (size_t k = 0; k < 2; ++k) b->present[k] = port.arm[k].present = port.arm[k].present && all;
   if (!b->present[0] && !b->present[1]) {

@@ -267,8 +267,7 @@ void Live::Work::tick(bool let_in) {
   told.time_s = now.time_s;
   told.to_take_back = static_cast<uint32_t>(bites.size());
   if (now.tick % kSanityTicks == 0 && !state_is_sane(*model, *state))
-    throw SimulationUnstable(scene.name +
-                             ": the simulation became unstable; undo the last bite, or restart; keep the " +
+    throw SimulationUnstable(scene.name + ": the simulation became unstable; undo the last bite, or restart; keep the " +
                              "recording to find the cause");
   if (fresh > 0) told.moved_ns = fresh, told.began_ns = began_ns, told.ready_ns = 0;
   if (watch) {

@@ -144,10 +144,10 @@ PaperTable measure_paper(SceneSpec scene, int executions, int threads,
 }
 
 std::string paper_markdown(const PaperTable& table) {
-  std::string text =
-      fmt::format("{}: {} particles, preset {}, {} substeps {:g} times a second, {} thread{}; {} of {} executions sewn\n\n",
-                  table.technique, table.particles, table.preset, table.substeps, table.tick_rate, table.threads,
-                  table.threads == 1 ? "" : "s", table.sewn, table.executions);
+  std::string text = fmt::format(
+      "{}: {} particles, preset {}, {} substeps {:g} times a second, {} thread{}; {} of {} executions completed\n\n",
+      table.technique, table.particles, table.preset, table.substeps, table.tick_rate, table.threads,
+      table.threads == 1 ? "" : "s", table.sewn, table.executions);
   text += "| phase            |          FPS | paper |     frame ms | paper |    solver ms | paper | solver: paper / ours |\n";
   text += "|------------------|-------------:|------:|-------------:|------:|-------------:|------:|---------------------:|\n";
   for (const PhaseCost& p : table.phase) {
