@@ -100,7 +100,7 @@ std::string words_for(const Event& e, bool& bad) {
     case EventKind::loop_formed:
       return fmt::format("{} on {}", counted(static_cast<int>(e.which), "wrap"), tool);
     case EventKind::loop_rejected:
-      return loop_words(static_cast<LoopReason>(e.which));
+      return loop_words(e.reason);
     case EventKind::knot_begun:
       return fmt::format("throw started, {}", counted(static_cast<int>(std::lround(e.value)), "wrap"));
     case EventKind::knot_locked:
@@ -118,7 +118,7 @@ std::string words_for(const Event& e, bool& bad) {
       return fmt::format("edges approximated, gap {:.1f} mm", 1000 * e.value);
     case EventKind::technique_fault:
       bad = true;
-      return fault_words(static_cast<Fault>(e.value));
+      return fault_words(e.fault);
     default:
       return "";
   }
@@ -178,8 +178,11 @@ std::vector<ResultRow> result_rows(const SceneSpec& scene, const Practice& p) {
 }
 
 std::string event_json(const Event& e) {
-  return fmt::format(R"({{"tick":{},"event":"{}","who":{},"which":{},"value":{:.6g},"where":[{:.5f},{:.5f},{:.5f}]}})", e.tick,
-                     event_name(e.kind), e.who, e.which, e.value, e.where.x, e.where.y, e.where.z);
+  std::string why;
+  if (e.fault != Fault::none) why = fmt::format(R"("fault":"{}",)", fault_name(e.fault));
+  if (e.reason != LoopReason::none) why += fmt::format(R"("reason":"{}",)", loop_reason_name(e.reason));
+  return fmt::format(R"({{"tick":{},"event":"{}","who":{},"which":{},"value":{:.6g},{}"where":[{:.5f},{:.5f},{:.5f}]}})",
+                     e.tick, event_name(e.kind), e.who, e.which, e.value, why, e.where.x, e.where.y, e.where.z);
 }
 
 }  // namespace catgut

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "core/math.h"
 
@@ -29,7 +30,7 @@ enum class EventKind : uint8_t {
   tissue_grasped,     // who: hand, which: particle
   tissue_released,    // who: hand, which: particle, value: 0 or the force at which it slipped out [N]
   loop_formed,        // who: hand with the tool that it lies round, which: wraps, value: +1 or -1, its handedness
-  loop_rejected,      // who: hand, which: LoopReason; told once until the reason changes (2.4)
+  loop_rejected,      // who: hand, reason; reported once until the reason changes (2.4)
   loop_released,      // who: hand; the loop came off without a knot
   knot_begun,         // who: hand that pulls, which: knot, value: wraps
   knot_locked,        // which: knot, value: tension when it was set [N]
@@ -38,7 +39,7 @@ enum class EventKind : uint8_t {
   suture_taken,  // which: how many were taken before; a fresh needle and thread lie ready
   stitch_settled,   // which: settled stitch; its thread is no longer simulated (3.4)
   seam_closed,      // which: row of Snapshot::seam, value: what is left of its gap [m]
-  technique_fault,  // which: bite, knot or suture (see Fault), value: Fault; nothing is repaired
+  technique_fault,  // fault, which: bite, knot or suture (see Fault); nothing is repaired
   count_
 };
 
@@ -69,12 +70,34 @@ const char* loop_reason_name(LoopReason reason);
 const char* event_name(EventKind kind);
 
 struct Event {
-  uint64_t tick = 0;
   EventKind kind{};
   uint8_t who = 0;     // hand, where there is one
   uint32_t which = 0;  // see EventKind
   float value = 0;     // see EventKind
   Vec3 where;          // [m]
+  Fault fault = Fault::none;
+  LoopReason reason = LoopReason::none;
+  uint16_t suture = 0;  // index of the suture it is about, where there is one
+  uint64_t tick = 0;
+};
+
+// The events of a tick, in order. Who adds one says what happened; the list knows when.
+struct EventList {
+  uint64_t tick = 0;
+  std::vector<Event> list;
+
+  void start(uint64_t now) { tick = now, list.clear(); }
+  void add(Event e) {
+    e.tick = tick;
+    list.push_back(e);
+  }
+  void clear() { list.clear(); }
+  bool empty() const { return list.empty(); }
+  size_t size() const { return list.size(); }
+  const Event& operator[](size_t i) const { return list[i]; }
+  const Event& back() const { return list.back(); }
+  const Event* begin() const { return list.data(); }
+  const Event* end() const { return list.data() + list.size(); }
 };
 
 }  // namespace catgut

@@ -14,8 +14,10 @@ constexpr void reflect(auto& a, Like<Sym3> auto& s) { a(s.xx), a(s.yy), a(s.zz),
 constexpr void reflect(auto& a, Like<KnotThrow> auto& t) { a(t.wraps), a(t.handed), a(t.needle_end), a(t.tension), a(t.gap); }
 
 constexpr void reflect(auto& a, Like<Event> auto& e) {
-  a(e.tick), a.at_most(e.kind, EventKind::technique_fault), a(e.who), a(e.which), a(e.value), a(e.where);
+  a.at_most(e.kind, EventKind::technique_fault), a(e.who), a(e.which), a(e.value), a(e.where);
+  a.at_most(e.fault, Fault::too_few_throws), a.at_most(e.reason, LoopReason::too_deep), a(e.suture), a(e.tick);
 }
+constexpr void reflect(auto& a, Like<EventList> auto& e) { a(e.tick), a(e.list); }
 
 constexpr void reflect(auto& a, Like<ForcePatch> auto& p) {
   a(p.tick), a(p.epoch), a(p.topology), a(p.time_ns), a(p.period), a(p.expiry);

@@ -35,11 +35,9 @@ void count(Counts& c, const Event& e) {
     case EventKind::needle_released:
       c.needle_slips += e.value > 0;
       break;
-    case EventKind::technique_fault: {
-      const size_t fault = e.value >= 0 ? static_cast<size_t>(e.value) : c.faults.size();
-      if (fault < c.faults.size()) ++c.faults[fault], ++c.faults_in_all;
+    case EventKind::technique_fault:
+      if (e.fault < Fault::count_) ++c.faults[static_cast<size_t>(e.fault)], ++c.faults_in_all;
       break;
-    }
     default:
       break;
   }

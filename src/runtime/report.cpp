@@ -169,7 +169,7 @@ std::string practice_json(const SceneSpec& scene, const LiveResult& r) {
     j["tension"]["needle_n"].push_back(newtons(t.needle));
   }
   j["events"] = Json::array();
-  for (const Event& e : r.map.event)
+  for (const Event& e : r.map.event) {
     j["events"].push_back({{"tick", e.tick},
                            {"time_s", std::round(1e3 * static_cast<double>(e.tick) * r.map.tick_s) / 1e3},
                            {"event", event_name(e.kind)},
@@ -177,6 +177,9 @@ std::string practice_json(const SceneSpec& scene, const LiveResult& r) {
                            {"which", e.which},
                            {"value", e.value},
                            {"where_mm", point_mm(e.where)}});
+    if (e.fault != Fault::none) j["events"].back()["fault"] = fault_name(e.fault);
+    if (e.reason != LoopReason::none) j["events"].back()["reason"] = loop_reason_name(e.reason);
+  }
   j["recorded"] = r.recorded;
   j["fault"] = r.fault;
   j["state_hash"] = fmt::format("{:016x}", r.state_hash);

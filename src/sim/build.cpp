@@ -121,7 +121,7 @@ TechniqueModel make_technique(const SceneSpec& scene, const std::vector<Rim>& ri
 // long procedure. Only a suture that settles does, for its list of nodes.
 void reserve_room(const Model& model, State& s) {
   constexpr size_t kMany = 256;
-  s.event.reserve(kMany);
+  s.event.list.reserve(kMany);
   s.stitch.reserve(kMany);
   s.stitch_span.reserve(kMany);
   s.solver.strand[0].anchor.reserve(model.solver.strand[0].count);

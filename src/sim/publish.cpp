@@ -111,7 +111,7 @@ void publish(const Model& model, const State& state, Snapshot& out) {
   const std::vector<uint32_t>& rim = model.technique.purse_string.rim_inner;
   out.opening_area = rim.empty() ? 0 : opening_area(rim, s.x.data());
   out.closure = state.plan.progress;
-  out.event = state.event;
+  out.event = state.event.list;
 }
 
 }  // namespace catgut

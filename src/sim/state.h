@@ -22,7 +22,7 @@ struct State {
   std::array<Pose, 2> hand;             // where the hands were at the end of the last tick; written by sim/step
   std::array<uint8_t, 2> hand_known{};  // 0 until a hand has first been connected
   Feel feel;                            // written by sim/feel, read by publish
-  std::vector<Event> event;             // of the last tick
+  EventList event;                      // of the last tick
   // Working memory.
   std::vector<StitchPoint> stitch;
   std::vector<float> stitch_span;

@@ -67,7 +67,7 @@ TechniqueView look(const Model& model, State& state) {
 
 void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times) {
   const SolverModel& solver = model.solver;
-  state.event.clear();
+  state.event.start(state.tick);
   find_boxes(solver, state.solver, state.scratch, jobs, times);
   meet_hands(state, input);
   const std::array<uint32_t, 2> pressed = pressed_buttons(state.suture, input.hand);
@@ -106,7 +106,6 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   }
   for (size_t k = 0; k < 2; ++k)
     if (input.hand[k].connected) state.hand[k] = input.hand[k].pose;
-  for (Event& e : state.event) e.tick = state.tick;
   ++state.tick;
   end_feeling(model, state);
 }

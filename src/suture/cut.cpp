@@ -36,7 +36,7 @@ std::array<uint32_t, 2> pressed_buttons(SutureState& state, const std::array<Too
 }
 
 void cut(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-         const std::array<uint32_t, 2>& pressed, std::vector<Event>& events) {
+         const std::array<uint32_t, 2>& pressed, EventList& events) {
   Strand& t = solver.strand[0];
   for (uint8_t who = 0; who < 2; ++who) {
     if (!(pressed[who] & kButtonCut)) continue;
@@ -71,14 +71,12 @@ void cut(const SolverModel& model, SolverState& solver, const SutureModel& sutur
       for (uint8_t tool = 0; tool < 2; ++tool) {
         if (!is_held_by(t, slot, tool, HoldKind::loop) || !is_held_by(t, t.order[i + 1], tool, HoldKind::loop)) continue;
         take_off_loop(model, solver, suture, state, tool);
-        events.push_back({0, EventKind::loop_released, tool, 0, 0, where});
+        events.add({EventKind::loop_released, tool, 0, 0, where});
       }
     }
-    events.push_back({0, EventKind::thread_cut, who, slot, left, where});
+    events.add({EventKind::thread_cut, who, slot, left, where});
 
-    const auto fault = [&](uint32_t which, Fault f) {
-      events.push_back({0, EventKind::technique_fault, who, which, static_cast<float>(f), where});
-    };
+    const auto fault = [&](uint32_t which, Fault f) { events.add({EventKind::technique_fault, who, which, 0, where, f}); };
     if (stitch_free && stitch_needle) {
       fault(slot, Fault::cut_in_stitch);
       continue;

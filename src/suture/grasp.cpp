@@ -11,19 +11,19 @@ constexpr float kClosed = 0.35f, kOpen = 0.5f;  // jaw thresholds, apart so that
 
 }  // namespace
 
-void release(SolverState& solver, SutureState& state, uint8_t who, float force, std::vector<Event>& events) {
+void release(SolverState& solver, SutureState& state, uint8_t who, float force, EventList& events) {
   HandState& hand = state.hand[who];
   const int body = who;
   if (hand.held == Held::needle) {
     std::erase_if(solver.weld, [&](const Weld& w) { return w.a == static_cast<int>(kNeedle) && w.b == body; });
-    events.push_back({0, EventKind::needle_released, who, 0, force, solver.body[static_cast<size_t>(body)].x});
+    events.add({EventKind::needle_released, who, 0, force, solver.body[static_cast<size_t>(body)].x});
   } else if (hand.held == Held::thread) {
     release_holds(solver.strand[0], body, HoldKind::jaw);
-    events.push_back({0, EventKind::thread_released, who, hand.slot, force, solver.body[static_cast<size_t>(body)].x});
+    events.add({EventKind::thread_released, who, hand.slot, force, solver.body[static_cast<size_t>(body)].x});
   }
   if (hand.held == Held::tissue) {
     std::erase_if(solver.attach, [&](const Attachment& a) { return a.body == body; });
-    events.push_back({0, EventKind::tissue_released, who, hand.slot, force, solver.body[static_cast<size_t>(body)].x});
+    events.add({EventKind::tissue_released, who, hand.slot, force, solver.body[static_cast<size_t>(body)].x});
   }
   hand.held = Held::nothing;
 }
@@ -32,7 +32,7 @@ namespace {
 
 // The jaws close on the wall: its place nearest to them, with the neighbourhood that moves with it, is held where it is.
 void take_tissue(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-                 HandState& hand, uint8_t who, std::vector<Event>& events) {
+                 HandState& hand, uint8_t who, EventList& events) {
   const RigidBody& tool = solver.body[who];
   SurfaceHit hit;
   if (!nearest_surface(model, scratch.candidates, solver.x.data(), tool.x, suture.grasp_reach, hit)) return;
@@ -49,13 +49,13 @@ void take_tissue(const SolverModel& model, SolverState& solver, const SolverScra
   solver.attach.push_back(a);
   hand.held = Held::tissue;
   hand.slot = corner[nearest];
-  events.push_back({0, EventKind::tissue_grasped, who, hand.slot, 0, hit.point});
+  events.add({EventKind::tissue_grasped, who, hand.slot, 0, hit.point});
 }
 
 }  // namespace
 
 void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-           SutureState& state, const std::array<ToolInput, 2>& input, std::vector<Event>& events) {
+           SutureState& state, const std::array<ToolInput, 2>& input, EventList& events) {
   for (uint8_t who = 0; who < 2; ++who) {
     HandState& hand = state.hand[who];
     const float jaw = input[who].connected ? input[who].jaw : hand.jaw;
@@ -80,7 +80,7 @@ void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& s
       solver.weld.push_back(w);
       hand.held = Held::needle;
       hand.at = phi / model.needle_arc[0].arc;
-      events.push_back({0, EventKind::needle_grasped, who, 0, hand.at, tool.x});
+      events.add({EventKind::needle_grasped, who, 0, hand.at, tool.x});
       continue;
     }
     float best = suture.grasp_reach;
@@ -95,15 +95,14 @@ void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& s
       hand.slot = static_cast<uint32_t>(found);
       solver.strand[0].hold.push_back({hand.slot, who, to_local(tool.pose(), xyz(solver.x[hand.slot])), HoldKind::jaw});
       hold_other_strands(solver, suture, state, who);
-      events.push_back({0, EventKind::thread_grasped, who, hand.slot, 0, tool.x});
+      events.add({EventKind::thread_grasped, who, hand.slot, 0, tool.x});
     } else {
       take_tissue(model, solver, scratch, suture, hand, who, events);
     }
   }
 }
 
-void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-          std::vector<Event>& events) {
+void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, EventList& events) {
   for (uint8_t who = 0; who < 2; ++who) {
     HandState& hand = state.hand[who];
     float force = 0, most = 1;

@@ -75,10 +75,10 @@ void release_end(SolverState& solver, SutureState& state, uint32_t slot) {
 // "If the user decides they do not want to proceed ... they can release the free end of the thread. After letting go, the loop
 // will be released, and the knot object will be destroyed." Nothing but positions tells that there was a throw.
 void cancel(const SolverModel&, SolverState& solver, const SutureModel&, SutureState& state, uint32_t which,
-            std::vector<Event>& events) {
+            EventList& events) {
   Knot& knot = state.knot[which];
   const Vec3 where = position_of(knot.target, solver.x.data()) + normalized(knot.from) * knot.left;
-  events.push_back({0, EventKind::knot_cancelled, static_cast<uint8_t>(knot.hand), which, 0, where});
+  events.add({EventKind::knot_cancelled, static_cast<uint8_t>(knot.hand), which, 0, where});
   for (uint32_t slot : knot.end) release_end(solver, state, slot);
   if (knot.begun == 0) {
     state.knot.erase(state.knot.begin() + which);
@@ -129,7 +129,7 @@ TissuePoint where_to(const SolverModel& model, const Strand& t, const SutureStat
 // grabs the free end of the rope passed the loop, a 3D object that represents the knot is created. The loop's ends are attached
 // to the object, and the whole loop detaches from the tool."
 void begin(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint8_t who,
-           std::vector<Event>& events) {
+           EventList& events) {
   Strand& t = solver.strand[0];
   const Vec4* x = solver.x.data();
   const ToolLoop loop = state.loop[who];
@@ -140,14 +140,12 @@ void begin(const SolverModel& model, SolverState& solver, const SutureModel& sut
   // Two strands are tied to each other if one leads to the free end and the other to the needle.
   const bool one_strand = wrapped.strand == taken.strand || wrapped.strand == Side::bight || taken.strand == Side::bight;
   const int under = knot_under(t, state, wrapped, taken, one_strand);
-  const auto fault = [&](uint32_t which, Fault f) {
-    events.push_back({0, EventKind::technique_fault, who, which, static_cast<float>(f), tool.x});
-  };
+  const auto fault = [&](uint32_t which, Fault f) { events.add({EventKind::technique_fault, who, which, 0, tool.x, f}); };
   const bool full = under != kNone && state.knot[static_cast<size_t>(under)].throws == KnotView::kMostThrows;
   if (state.point.empty() || wrapped.strand == Side::loose || taken.strand == Side::loose || full) {
     if (!full) fault(static_cast<uint32_t>(state.knot.size()), Fault::knot_without_bite);
     take_off_loop(model, solver, suture, state, who);
-    events.push_back({0, EventKind::loop_released, who, 0, 0, tool.x});
+    events.add({EventKind::loop_released, who, 0, 0, tool.x});
     return;
   }
   if (!state.open.empty() && !state.open.back().told) {
@@ -188,7 +186,7 @@ void begin(const SolverModel& model, SolverState& solver, const SutureModel& sut
     a.capstan = suture.capstan;
     t.anchor.push_back(a);
   }
-  events.push_back({0, EventKind::knot_begun, who, which, static_cast<float>(made.wraps), place});
+  events.add({EventKind::knot_begun, who, which, static_cast<float>(made.wraps), place});
 }
 
 // The particle of the taken strand that the knot will hold: of those between the stitch and the jaw, the one nearest to it.
@@ -215,7 +213,7 @@ int64_t particle_for(const SolverState& solver, const SutureState& state, const 
 // the attached particles are released." From here on the knot holds the stitch: a particle of the wrapped strand, which is the
 // loop's inner end, and one of the taken strand.
 void lock(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel&, SutureState& state,
-          uint32_t which, std::vector<Event>& events) {
+          uint32_t which, EventList& events) {
   Strand& t = solver.strand[0];
   Knot& knot = state.knot[which];
   KnotThrow& made = knot.thrown[knot.throws - 1];
@@ -257,7 +255,7 @@ void lock(const SolverModel& model, SolverState& solver, const SolverScratch& sc
     made.gap = knot.left;
   }
   knot.phase = KnotPhase::locked;
-  events.push_back({0, EventKind::knot_locked, static_cast<uint8_t>(knot.hand), which, made.tension, where});
+  events.add({EventKind::knot_locked, static_cast<uint8_t>(knot.hand), which, made.tension, where});
 }
 
 // A knot that has just been locked draws its two strands in: what is slack between the stitch and it goes to the outer side, as
@@ -291,13 +289,12 @@ void draw_snug(const SolverModel& model, SolverState& solver, const SutureModel&
 }  // namespace
 
 void take_back_throws(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                      std::vector<Event>& events) {
+                      EventList& events) {
   for (size_t i = state.knot.size(); i-- > 0;)
     if (state.knot[i].phase == KnotPhase::tightening) cancel(model, solver, suture, state, static_cast<uint32_t>(i), events);
 }
 
-void tie(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-         std::vector<Event>& events) {
+void tie(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, EventList& events) {
   for (size_t i = state.knot.size(); i-- > 0;)
     if (state.knot[i].phase == KnotPhase::tightening &&
         (!pulls(state, state.knot[i]) || !is_whole(solver.strand[0], state, state.knot[i])))
@@ -307,7 +304,7 @@ void tie(const SolverModel& model, SolverState& solver, const SutureModel& sutur
 }
 
 void tighten(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-             SutureState& state, std::vector<Event>& events) {
+             SutureState& state, EventList& events) {
   for (uint32_t i = 0; i < state.knot.size(); ++i) {
     Knot& knot = state.knot[i];
     if (knot.phase == KnotPhase::locked) {

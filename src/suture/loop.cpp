@@ -240,7 +240,7 @@ void take_off_loop(const SolverModel&, SolverState& solver, const SutureModel&, 
 }
 
 void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                std::vector<Event>& events) {
+                EventList& events) {
   Strand& t = solver.strand[0];
   for (uint8_t who = 0; who < 2; ++who) {
     ToolLoop& loop = state.loop[who];
@@ -253,7 +253,7 @@ void find_loops(const SolverModel& model, SolverState& solver, const SutureModel
       const float pull = tension_outside(t, node_of(t, loop.first), node_of(t, loop.last));
       if (opened || pull > suture.thread_grip) {
         take_off_loop(model, solver, suture, state, who);
-        events.push_back({0, EventKind::loop_released, who, 0, opened ? 0 : pull, tool.x});
+        events.add({EventKind::loop_released, who, 0, opened ? 0 : pull, tool.x});
         continue;
       }
     }
@@ -269,7 +269,7 @@ void find_loops(const SolverModel& model, SolverState& solver, const SutureModel
       if (loop.wraps == 0 && v.touching >= kSeveral && v.reason != loop.told &&
           (v.reason != LoopReason::no_crossing || (closes && v.round > kMostOfATurn))) {
         loop.told = v.reason;
-        events.push_back({0, EventKind::loop_rejected, who, static_cast<uint32_t>(v.reason), 0, tool.x});
+        events.add({EventKind::loop_rejected, who, 0, 0, tool.x, Fault::none, v.reason});
       }
       continue;
     }
@@ -293,7 +293,7 @@ void find_loops(const SolverModel& model, SolverState& solver, const SutureModel
     loop.wraps = v.wraps;
     loop.handed = handed;
     loop.told = LoopReason::none;
-    events.push_back({0, EventKind::loop_formed, who, loop.wraps, static_cast<float>(handed), middle(solver, v)});
+    events.add({EventKind::loop_formed, who, loop.wraps, static_cast<float>(handed), middle(solver, v)});
   }
 }
 

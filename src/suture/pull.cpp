@@ -72,14 +72,14 @@ static int drawing_hand(const Strand& t, size_t i, int way) {
 // "Pulling" before the bite is done. The needle draws thread through holes too, and should; jaws on the thread should not. One
 // particle may have been about to pass when they took hold; with the second, thread as long as the way between two has come.
 static void judge_drawing(const SolverState& solver, SutureState& state, const ThreadAnchor& a, bool toward_needle,
-                          std::vector<Event>& events) {
+                          EventList& events) {
   if (state.open.empty()) return;
   OpenBite& open = state.open.back();
   const int hand = open.told ? -1 : drawing_hand(solver.strand[0], node_of(solver.strand[0], a.slot), toward_needle ? 1 : -1);
   if (hand < 0 || ++open.drawn < 2) return;
   open.told = 1;
-  events.push_back({0, EventKind::technique_fault, static_cast<uint8_t>(hand), open.bite,
-                    static_cast<float>(Fault::needle_in_tissue), position_of(a, solver.x.data())});
+  events.add({EventKind::technique_fault, static_cast<uint8_t>(hand), open.bite, 0, position_of(a, solver.x.data()),
+              Fault::needle_in_tissue});
 }
 
 // A cut thread holds nothing together: as long as all of it, whatever is drawn.
@@ -143,7 +143,7 @@ bool bring_particle(Strand& t, SolverState& solver) {
 }
 
 bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                        uint32_t bite, bool exit, std::vector<Event>& events) {
+                        uint32_t bite, bool exit, EventList& events) {
   Strand& t = solver.strand[0];
   if (t.order.size() < 3) return false;
   const size_t node = t.order.size() - 2;  // the last is the needle's
@@ -168,8 +168,7 @@ bool place_suture_point(const SolverModel& model, SolverState& solver, const Sut
   solver.v[slot] = {};
   t.anchor.push_back(a);
   state.point.push_back({bite, exit, static_cast<uint32_t>(t.anchor.size() - 1)});
-  events.push_back(
-      {0, EventKind::suture_point, 0, static_cast<uint32_t>(state.point.size() - 1), static_cast<float>(bite), at});
+  events.add({EventKind::suture_point, 0, static_cast<uint32_t>(state.point.size() - 1), static_cast<float>(bite), at});
   return true;
 }
 
@@ -211,7 +210,7 @@ static void feed(Strand& t, const ThreadAnchor& a, size_t i, float used_up, floa
   }
 }
 
-void pull(const SolverModel& model, SolverState& solver, const SutureModel&, SutureState& state, std::vector<Event>& events) {
+void pull(const SolverModel& model, SolverState& solver, const SutureModel&, SutureState& state, EventList& events) {
   Strand& t = solver.strand[0];
   const float used_up = kUsedUp * model.strand[0].spacing;
   const TiedNodes knots = tied_nodes(t);  // no particle passes a knot, so they stay true while others pass
@@ -227,8 +226,7 @@ void pull(const SolverModel& model, SolverState& solver, const SutureModel&, Sut
     a.blocked_needle = tied || t.cut[i - 1] || t.cut[i] || (!from_free && t.rest[i - 1] <= used_up);
     a.blocked_free = tied || t.cut[i - 1] || t.cut[i] || (!from_needle && t.rest[i] <= used_up);
     if (point >= 0 && a.blocked_needle && !was_blocked && !tied && (i == 1 || t.cut[i - 1] || t.cut[i - 2]))
-      events.push_back(
-          {0, EventKind::thread_ran_out, 0, static_cast<uint32_t>(point), 0, position_of(a.point, solver.x.data())});
+      events.add({EventKind::thread_ran_out, 0, static_cast<uint32_t>(point), 0, position_of(a.point, solver.x.data())});
 
     // Toward the needle: the particle on the free side splits the pair on the needle side; the other way round for a pull on
     // the tail.
@@ -237,8 +235,8 @@ void pull(const SolverModel& model, SolverState& solver, const SutureModel&, Sut
     if (!forward && !backward) return;
     pass(solver, i, forward);
     if (point < 0) return;
-    events.push_back({0, EventKind::particle_passed, 0, static_cast<uint32_t>(point), forward ? 1.0f : -1.0f,
-                      position_of(a, solver.x.data())});
+    events.add(
+        {EventKind::particle_passed, 0, static_cast<uint32_t>(point), forward ? 1.0f : -1.0f, position_of(a, solver.x.data())});
     judge_drawing(solver, state, a, forward, events);
   };
   for (size_t k = state.point.size(); k-- > 0;) pass_at(t.anchor[state.point[k].anchor], static_cast<int64_t>(k));

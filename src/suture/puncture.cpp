@@ -40,7 +40,7 @@ void close_hole(SolverState& solver, uint32_t hole) {
 }
 
 // The newest bite is out again the way it came. Its record stays, marked; everything that held needle or tissue there goes.
-void cancel_bite(SolverState& solver, SutureState& state, Vec3 tip, std::vector<Event>& events) {
+void cancel_bite(SolverState& solver, SutureState& state, Vec3 tip, EventList& events) {
   const uint32_t which = state.open.back().bite;
   Bite& bite = state.bite[which];
   drop_attachment(solver, state);
@@ -49,7 +49,7 @@ void cancel_bite(SolverState& solver, SutureState& state, Vec3 tip, std::vector<
   bite.cancelled = true;
   bite.has_exit = false;
   state.open.pop_back();
-  events.push_back({0, EventKind::bite_cancelled, 0, which, bite.depth, tip});
+  events.add({EventKind::bite_cancelled, 0, which, bite.depth, tip});
 }
 
 }  // namespace
@@ -111,7 +111,7 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
 }
 
 void puncture(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-              SutureState& state, std::vector<Event>& events) {
+              SutureState& state, EventList& events) {
   const Vec4* x = solver.x.data();
   const NeedleArc& arc = model.needle_arc[0];
   const RigidBody& needle = solver.body[kNeedle];
@@ -142,7 +142,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
       const float torn = distance(transform(needle.pose(), row->target), state.attached_from);
       if (std::max(dragged, torn) > suture.release_distance) {
         drop_attachment(solver, state);
-        events.push_back({0, EventKind::particle_released, 0, bite.nearest, dragged, xyz(x[bite.nearest])});
+        events.add({EventKind::particle_released, 0, bite.nearest, dragged, xyz(x[bite.nearest])});
       }
     }
     if (!inside) {
@@ -155,7 +155,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
         bite.has_exit = true;
         solver.channel.push_back(channel_at(suture, bite, which, true));
         state.open.back().phase = NeedlePhase::through;
-        events.push_back({0, EventKind::tip_exited, 0, which, bite.depth, hit.point});
+        events.add({EventKind::tip_exited, 0, which, bite.depth, hit.point});
       }
     }
   } else if (newest == NeedlePhase::through && tip_at - along(state.bite[state.open.back().bite].exit) < kEndReached &&
@@ -180,7 +180,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
     state.open.push_back({which, NeedlePhase::tip_in});
     const Vec3 heading = rotate(needle.q, arc.tangent(arc.arc));
     const float angle = std::acos(std::clamp(-dot(heading, hit.normal), -1.0f, 1.0f));
-    events.push_back({0, EventKind::tip_entered, 0, which, angle, hit.point});
+    events.add({EventKind::tip_entered, 0, which, angle, hit.point});
     if (nearest >= 0) {
       // Figure 4: the nearest particle within X of the tip moves with the tip, by the paper's spring.
       Attachment a;
@@ -191,8 +191,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
       a.compliance = suture.attach_compliance;
       solver.attach.push_back(a);
       state.attached = true;
-      events.push_back(
-          {0, EventKind::particle_attached, 0, bite.nearest, distance(state.attached_from, tip), state.attached_from});
+      events.add({EventKind::particle_attached, 0, bite.nearest, distance(state.attached_from, tip), state.attached_from});
     }
     solver.channel.push_back(channel_at(suture, bite, which, false));
   }
@@ -220,7 +219,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
         close_hole(solver, hole_of(oldest.bite, true));
         bite.complete = true;
         const Vec3 out = position_of(bite.exit.point, x);
-        events.push_back({0, EventKind::bite_completed, 0, oldest.bite, distance(position_of(bite.entry.point, x), out), out});
+        events.add({EventKind::bite_completed, 0, oldest.bite, distance(position_of(bite.entry.point, x), out), out});
         state.open.erase(state.open.begin());
       }
     }

@@ -93,7 +93,7 @@ std::vector<Span> spans_of(const Strand& t, size_t lowest, size_t highest, const
 
 // The piece of thread from node `first` to node `last`, tied by `knots`, as a settled stitch and the pins that do what it did.
 void settle_piece(const SolverModel& model, SolverState& solver, SutureState& state, size_t first, size_t last,
-                  const std::vector<uint32_t>& knots, std::vector<Event>& events) {
+                  const std::vector<uint32_t>& knots, EventList& events) {
   const Strand& t = solver.strand[0];
   SettledStitch stitch;
   size_t lowest = last, highest = first;
@@ -127,7 +127,7 @@ void settle_piece(const SolverModel& model, SolverState& solver, SutureState& st
     where = position_of(state.knot[k].target, solver.x.data());
     stitch.knot.push_back(bind(model, solver, where));
   }
-  events.push_back({0, EventKind::stitch_settled, 0, static_cast<uint32_t>(state.settled.size()), 0, where});
+  events.add({EventKind::stitch_settled, 0, static_cast<uint32_t>(state.settled.size()), 0, where});
   state.settled.push_back(std::move(stitch));
 }
 
@@ -152,12 +152,12 @@ void fresh_suture(const SolverModel& model, SolverState& solver, const SutureMod
 
 bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                 std::span<const Vec3> start, const Pose& needle_start, const std::array<uint32_t, 2>& pressed,
-                std::vector<Event>& events) {
+                EventList& events) {
   const auto who = static_cast<uint8_t>(pressed[0] & kButtonNewSuture ? 0 : 1);
   if (!(pressed[who] & kButtonNewSuture)) return false;
   const Vec3 here = solver.body[kNeedle].x;
   const auto fault = [&](uint32_t which, Fault f, Vec3 where) {
-    events.push_back({0, EventKind::technique_fault, who, which, static_cast<float>(f), where});
+    events.add({EventKind::technique_fault, who, which, 0, where, f});
   };
   if (!state.open.empty()) {
     fault(state.open.back().bite, Fault::needle_in_tissue, here);
@@ -204,10 +204,10 @@ bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel
   for (uint8_t k = 0; k < 2; ++k) {
     HandState& hand = state.hand[k];
     const Vec3 at = solver.body[k].x;
-    if (hand.held == Held::needle) events.push_back({0, EventKind::needle_released, k, 0, 0, at});
-    if (hand.held == Held::thread) events.push_back({0, EventKind::thread_released, k, hand.slot, 0, at});
+    if (hand.held == Held::needle) events.add({EventKind::needle_released, k, 0, 0, at});
+    if (hand.held == Held::thread) events.add({EventKind::thread_released, k, hand.slot, 0, at});
     if (hand.held != Held::tissue) hand.held = Held::nothing;
-    if (state.loop[k].wraps > 0) events.push_back({0, EventKind::loop_released, k, 0, 0, at});
+    if (state.loop[k].wraps > 0) events.add({EventKind::loop_released, k, 0, 0, at});
     const float jaw = state.loop[k].jaw;
     state.loop[k] = {};
     state.loop[k].jaw = jaw;
@@ -220,7 +220,7 @@ bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel
   state.point.clear();
   state.knot.clear();
   fresh_suture(model, solver, suture, start, needle_start);
-  events.push_back({0, EventKind::suture_taken, who, state.taken++, 0, solver.body[kNeedle].x});
+  events.add({EventKind::suture_taken, who, state.taken++, 0, solver.body[kNeedle].x});
   return true;
 }
 

@@ -145,19 +145,18 @@ inline NeedlePhase phase_of(const SutureState& s) { return s.open.empty() ? Need
 // Once a tick. A jaw that closes within reach of the needle, else of the thread, else of the tissue's surface holds it at the
 // place and angle where it was caught; opening lets go. scratch: where the last substep left the broad phase.
 void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-           SutureState& state, const std::array<ToolInput, 2>& hand, std::vector<Event>& events);
+           SutureState& state, const std::array<ToolInput, 2>& hand, EventList& events);
 
 // After every substep: a jaw that is pulled on harder than it grips lets slip what it holds (needle: needle_grip, thread:
 // thread_grip, tissue: tissue_grip), before the pull becomes one that no hand could make. Reported as a release with the force
 // [N] as its value.
-void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-          std::vector<Event>& events);
+void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, EventList& events);
 
 // --- loop.cpp ----------------------------------------------------------------------------------------------------------
 // Once a tick. Thread that is laid round a tool whose jaw holds nothing is frozen there; more turns that follow are added to
 // it. Opening the jaws wide, or a pull harder than thread_grip, lets it go.
 void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                std::vector<Event>& events);
+                EventList& events);
 // Whether a particle lies so near to the loop round a tool, along the thread, that jaws which close at the loop do not mean it.
 bool beside_loop(const Strand& thread, const ToolLoop& loop, uint32_t slot);
 // The loop leaves its tool, to become a knot or to fall off.
@@ -165,19 +164,18 @@ void take_off_loop(const SolverModel& model, SolverState& solver, const SutureMo
 
 // --- knot.cpp ----------------------------------------------------------------------------------------------------------
 // A hand lets go of what it holds. force [N]: 0 when the jaw was opened, else what made it slip.
-void release(SolverState& solver, SutureState& state, uint8_t who, float force, std::vector<Event>& events);
+void release(SolverState& solver, SutureState& state, uint8_t who, float force, EventList& events);
 
 // Once a tick. A tool with a loop round it whose jaws have closed on thread beyond the loop begins a throw; one that lets go of
 // it before the throw is locked takes it back.
-void tie(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-         std::vector<Event>& events);
+void tie(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, EventList& events);
 // After every substep: throws go down to the tissue as far as the pulling tool goes away, and lock there; a knot that was just
 // locked draws through what is still slack under it.
 void tighten(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-             SutureState& state, std::vector<Event>& events);
+             SutureState& state, EventList& events);
 // Takes every throw that is not locked back, whoever pulls on it.
 void take_back_throws(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                      std::vector<Event>& events);
+                      EventList& events);
 
 // --- cut.cpp -----------------------------------------------------------------------------------------------------------
 // Buttons that went down since the last tick, by hand; remembers them.
@@ -185,7 +183,7 @@ std::array<uint32_t, 2> pressed_buttons(SutureState& state, const std::array<Too
 // Once a tick. kButtonCut cuts the thread nearest to the tool's jaws; the last pair is the needle's own: there the needle comes
 // off. A cut in a wrong place is reported and stays.
 void cut(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-         const std::array<uint32_t, 2>& pressed, std::vector<Event>& events);
+         const std::array<uint32_t, 2>& pressed, EventList& events);
 // A jaw that has just closed on thread also holds the other strands that lie between its tips: the two ends of a stay suture.
 void hold_other_strands(SolverState& solver, const SutureModel& suture, const SutureState& state, uint8_t who);
 
@@ -195,7 +193,7 @@ void hold_other_strands(SolverState& solver, const SutureModel& suture, const Su
 // True: it was done. start: positions of all particles at the start [m].
 bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                 std::span<const Vec3> start, const Pose& needle_start, const std::array<uint32_t, 2>& pressed,
-                std::vector<Event>& events);
+                EventList& events);
 // Needle and thread as they lie at the start, and nothing that holds them but the swage.
 void fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, std::span<const Vec3> start,
                   const Pose& needle_start);
@@ -203,7 +201,7 @@ void fresh_suture(const SolverModel& model, SolverState& solver, const SutureMod
 // --- puncture.cpp ------------------------------------------------------------------------------------------------------
 // After every substep: the tip trigger, the attached particle, the back-end trigger (paper 2.2, figures 4 and 5).
 void puncture(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-              SutureState& state, std::vector<Event>& events);
+              SutureState& state, EventList& events);
 // Signed distance [m] from p to the tissue's surface (negative inside the wall) and the nearest place on it. False: nothing
 // near.
 struct SurfaceHit {
@@ -219,15 +217,14 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
 // --- pull.cpp ----------------------------------------------------------------------------------------------------------
 // After every substep: particles whose turn it is pass their suture point (figures 7 to 9), from the needle end to the free
 // end. A hand that draws thread through the tissue while the needle is still in it is told so, once a bite; the thread comes.
-void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-          std::vector<Event>& events);
+void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, EventList& events);
 // Moves up to `length` [m] of thread past the locked particle `slot`, toward the needle (way +1) or the free end (-1); the sum
 // of rest lengths stays. Returns how much went: particles that are locked or at an end of the thread do not pass.
 float draw_through(const SolverModel& model, SolverState& solver, uint32_t slot, int way, float length);
 // Locks the next free particle behind the needle to `end` and makes it a suture point (figure 7a). False: no free particle
 // there yet. A needle without thread passes (true) and makes none.
 bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                        uint32_t bite, bool exit, std::vector<Event>& events);
+                        uint32_t bite, bool exit, EventList& events);
 // Unlocks the newest suture point again: its thread was drawn back out of the hole. The particle stays where it is, as free
 // thread.
 void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state);

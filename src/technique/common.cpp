@@ -29,19 +29,19 @@ uint32_t nearest_of(std::span<const uint32_t> group, const Vec4* x, Vec3 p) {
   return found;
 }
 
-void tell(Fault fault, uint32_t which, Vec3 where, uint32_t& told, std::vector<Event>& events) {
+void tell(Fault fault, uint32_t which, Vec3 where, uint32_t& told, EventList& events) {
   const uint32_t bit = 1u << static_cast<uint32_t>(fault);
   if (told & bit) return;
   told |= bit;
-  events.push_back({0, EventKind::technique_fault, 0, which, static_cast<float>(fault), where});
+  events.add({EventKind::technique_fault, 0, which, 0, where, fault});
 }
 
 void hear(std::span<const Event> events, uint32_t& told) {
   for (const Event& e : events)
-    if (e.kind == EventKind::technique_fault) told |= 1u << static_cast<uint32_t>(e.value);
+    if (e.kind == EventKind::technique_fault) told |= 1u << static_cast<uint32_t>(e.fault);
 }
 
-void judge_begun_knots(const TechniqueView& view, bool join_two, uint32_t& told, std::vector<Event>& events) {
+void judge_begun_knots(const TechniqueView& view, bool join_two, uint32_t& told, EventList& events) {
   const size_t before = events.size();
   for (size_t i = 0; i < before; ++i) {
     const Event e = events[i];
@@ -55,18 +55,17 @@ void judge_begun_knots(const TechniqueView& view, bool join_two, uint32_t& told,
 }
 
 bool cut_in_stitch(std::span<const Event> events) {
-  return std::any_of(events.begin(), events.end(), [](const Event& e) {
-    return e.kind == EventKind::technique_fault && e.value == static_cast<float>(Fault::cut_in_stitch);
-  });
+  return std::any_of(events.begin(), events.end(),
+                     [](const Event& e) { return e.kind == EventKind::technique_fault && e.fault == Fault::cut_in_stitch; });
 }
 
-void tell_closed(uint32_t row, const ClosurePlan::Pair& pair, const Vec4* x, uint32_t& told, std::vector<Event>& events) {
+void tell_closed(uint32_t row, const ClosurePlan::Pair& pair, const Vec4* x, uint32_t& told, EventList& events) {
   if (told) return;
   const Vec3 a = position_of(pair.a, x), b = position_of(pair.b, x);
   const float gap = distance(a, b);
   if (gap >= kSeamClosed) return;
   told = 1;
-  events.push_back({0, EventKind::seam_closed, 0, row, gap, 0.5f * (a + b)});
+  events.add({EventKind::seam_closed, 0, row, gap, 0.5f * (a + b)});
 }
 
 }  // namespace catgut

@@ -23,16 +23,16 @@ inline bool one_wall(uint32_t walls) { return (walls & (walls - 1)) == 0; }
 uint32_t nearest_of(std::span<const uint32_t> group, const Vec4* x, Vec3 p);
 
 // told: a bit per fault, of the suture in hand.
-void tell(Fault fault, uint32_t which, Vec3 where, uint32_t& told, std::vector<Event>& events);
+void tell(Fault fault, uint32_t which, Vec3 where, uint32_t& told, EventList& events);
 // Marks as told what the rooms below have told in this tick: a mistake that both see is one fault.
 void hear(std::span<const Event> events, uint32_t& told);
 // Of knots begun in this tick: knot_without_bite and needle_in_tissue; join_two: one_wall_only too.
-void judge_begun_knots(const TechniqueView& view, bool join_two, uint32_t& told, std::vector<Event>& events);
+void judge_begun_knots(const TechniqueView& view, bool join_two, uint32_t& told, EventList& events);
 // Whether the cut of this tick went through the stitch itself.
 bool cut_in_stitch(std::span<const Event> events);
 
 // The row's two points are together for the first time: says so. told is set then.
-void tell_closed(uint32_t row, const ClosurePlan::Pair& pair, const Vec4* x, uint32_t& told, std::vector<Event>& events);
+void tell_closed(uint32_t row, const ClosurePlan::Pair& pair, const Vec4* x, uint32_t& told, EventList& events);
 
 // Toward `wanted`, no faster than `fastest` [1/s].
 inline void advance(float& progress, float wanted, float fastest, float dt) {

@@ -127,8 +127,7 @@ bool is_between(Vec3 v1, Vec3 v2, Vec3 vp, Vec3 axis) {
   return b + c <= a + kSameAngle;  // never less than a
 }
 
-void lembert(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan,
-             std::vector<Event>& events) {
+void lembert(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan, EventList& events) {
   if (model.outer.size() < 3 || model.inner.size() < 3) return;
   hear(events, state.told);
   // Whatever ends a suture: too few throws hold nothing.

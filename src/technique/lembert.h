@@ -41,8 +41,7 @@ struct LembertState {
 };
 
 // Once a tick.
-void lembert(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan,
-             std::vector<Event>& events);
+void lembert(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan, EventList& events);
 
 // "If the angle between v1 and vp and the angle between v2 and vp equals the angle between v1 and v2, then the particle is
 // between sp1 and sp2." All three as seen along `axis`.

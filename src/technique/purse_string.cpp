@@ -51,7 +51,7 @@ int first_out_of_order(std::span<const Vec3> sp, size_t from) {
 }
 
 void purse_string(const PurseStringModel& model, PurseStringState& state, const TechniqueView& view, ClosurePlan& plan,
-                  std::vector<Event>& events) {
+                  EventList& events) {
   if (model.rim_inner.size() < 3) return;
   const Vec4* x = view.x;
   const float loop = view.loop, dt = view.dt;
@@ -72,14 +72,14 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
     for (size_t i = 0; i + 1 < sp.size(); ++i) state.path_start += distance(sp[i], sp[i + 1]);
     for (; state.checked < sp.size(); ++state.checked)
       if (first_out_of_order(sp, state.checked) == static_cast<int>(state.checked))
-        events.push_back({0, EventKind::order_broken, 0, (state.checked + 1) % static_cast<uint32_t>(sp.size()), 0,
-                          sp[(state.checked + 1) % sp.size()]});
+        events.add({EventKind::order_broken, 0, (state.checked + 1) % static_cast<uint32_t>(sp.size()), 0,
+                    sp[(state.checked + 1) % sp.size()]});
   };
   if (!state.ring_complete) {
     // While the ring grows, a point can be checked once three more follow it.
     for (; state.checked + 3 < sp.size(); ++state.checked)
       if (first_out_of_order(std::span(sp).subspan(state.checked, 4)) == 0)
-        events.push_back({0, EventKind::order_broken, 0, state.checked + 1, 0, sp[state.checked + 1]});
+        events.add({EventKind::order_broken, 0, state.checked + 1, 0, sp[state.checked + 1]});
     const Vec3 centre = centre_of(model.rim_outer, x), axis = normalized(newell(model.rim_outer, x));
     if (sp.size() < 2 * static_cast<size_t>(model.min_bites) || sp.size() % 2 != 0) return;  // even: no bite half done
     const float angle = std::abs(turned(sp, centre, axis));
@@ -89,7 +89,7 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
     if (angle < kPi || distance(sp.back(), sp.front()) > 1.5f * step) return;
     state.ring_complete = true;
     measure_ring();
-    events.push_back({0, EventKind::ring_complete, 0, static_cast<uint32_t>(sp.size()), angle, centre});
+    events.add({EventKind::ring_complete, 0, static_cast<uint32_t>(sp.size()), angle, centre});
     return;
   }
 
@@ -123,7 +123,7 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
     // Gathered tissue takes up room on the thread: closing is led by the thread, but the edge arrives before the loop is as
     // short as the bare way round. What is left then is drawn up against the tissue itself.
     state.path_end *= kRoom;
-    events.push_back({0, EventKind::closure_started, 0, 0, opening_area(model.rim_inner, x), anvil});
+    events.add({EventKind::closure_started, 0, 0, opening_area(model.rim_inner, x), anvil});
   }
 
   const float wanted = std::clamp((state.path_start - loop) / (state.path_start - state.path_end), 0.0f, 1.0f);
@@ -131,7 +131,7 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
   if (plan.progress >= 0.99f) {
     state.finished = true;
     plan.progress = 1;
-    events.push_back({0, EventKind::closure_finished, 0, 0, opening_area(model.rim_inner, x), centre_of(model.rim_inner, x)});
+    events.add({EventKind::closure_finished, 0, 0, opening_area(model.rim_inner, x), centre_of(model.rim_inner, x)});
   }
 }
 

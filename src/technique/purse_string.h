@@ -33,7 +33,7 @@ int first_out_of_order(std::span<const Vec3> sp, size_t from = 0);
 
 // Once a tick. Fills `plan` when there is something to close, and reports through `events`.
 void purse_string(const PurseStringModel& model, PurseStringState& state, const TechniqueView& view, ClosurePlan& plan,
-                  std::vector<Event>& events);
+                  EventList& events);
 
 // Area of the opening [m^2]: the inner edge projected on its own best plane.
 float opening_area(std::span<const uint32_t> rim, const Vec4* x);

@@ -97,7 +97,7 @@ Fault judge_stay(std::span<const Pass> pass) {
   return changes > 1 || in_run > 2 ? Fault::wrong_body : Fault::none;
 }
 
-void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, ClosurePlan& plan, std::vector<Event>& events) {
+void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, ClosurePlan& plan, EventList& events) {
   hear(events, state.told);
   if (view.taken != state.taken) {
     // A fresh suture: what no knot holds has lost its thread.

@@ -54,7 +54,7 @@ struct SeamState {
 };
 
 // Once a tick.
-void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, ClosurePlan& plan, std::vector<Event>& events);
+void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, ClosurePlan& plan, EventList& events);
 
 Fault judge_connell(std::span<const Pass> pass);  // of the last pass; Fault::none when it is in order
 Fault judge_stay(std::span<const Pass> pass);

@@ -4,7 +4,7 @@
 namespace catgut {
 
 void technique(const TechniqueModel& model, TechniqueState& state, const TechniqueView& view, ClosurePlan& plan,
-               std::vector<Event>& events) {
+               EventList& events) {
   switch (model.kind) {
     case TechniqueKind::none:
       return;

@@ -31,6 +31,6 @@ struct TechniqueState {
 
 // Once a tick, after its substeps. events: those of the tick so far; the technique adds its own.
 void technique(const TechniqueModel& model, TechniqueState& state, const TechniqueView& view, ClosurePlan& plan,
-               std::vector<Event>& events);
+               EventList& events);
 
 }  // namespace catgut

@@ -55,8 +55,8 @@ struct Sewn {
     b.entry = moved(in), b.exit = moved(out), b.wall = wall, b.depth = 0.0021f;
     const auto n = static_cast<uint32_t>(seen.bite.size());
     seen.bite.push_back(b);
-    seen.event.push_back({seen.tick + 1, EventKind::tip_entered, 0, n, 0.5f, {}});
-    seen.event.push_back({seen.tick + 1, EventKind::bite_completed, 0, n, 0, {}});
+    seen.event.push_back({.kind = EventKind::tip_entered, .which = n, .value = 0.5f, .where = {}, .tick = seen.tick + 1});
+    seen.event.push_back({.kind = EventKind::bite_completed, .which = n, .value = 0, .where = {}, .tick = seen.tick + 1});
     tick();
   }
 };
@@ -113,7 +113,7 @@ TEST(StitchMap, what_is_taken_back_has_not_happened) {
   for (int i = 0; i < 60; ++i) s.tick();
   EXPECT_EQ(s.map.tension.size(), 10u) << "ten a second";
   EXPECT_FLOAT_EQ(s.map.tension[3].peak, 0.5f);
-  s.seen.event.push_back({s.seen.tick + 1, EventKind::suture_taken, 0, 0, 0, {}});
+  s.seen.event.push_back({.kind = EventKind::suture_taken, .which = 0, .value = 0, .where = {}, .tick = s.seen.tick + 1});
   s.bite(Sewn::on_wall(0.7f, 0.004f), Sewn::on_wall(0.9f, 0.004f));
   EXPECT_EQ(s.map.bite.back().suture, 1u);
   rewind(s.map, 30);
@@ -125,8 +125,8 @@ TEST(StitchMap, what_is_taken_back_has_not_happened) {
 
 TEST(StitchMap, numbers_that_no_bite_has_are_left_alone) {
   Sewn s;
-  s.seen.event.push_back({1, EventKind::bite_completed, 0, 77, 0, {}});
-  s.seen.event.push_back({1, EventKind::tip_entered, 0, 0xffffffffu, 0, {}});
+  s.seen.event.push_back({.kind = EventKind::bite_completed, .which = 77, .value = 0, .where = {}, .tick = 1});
+  s.seen.event.push_back({.kind = EventKind::tip_entered, .which = 0xffffffffu, .value = 0, .where = {}, .tick = 1});
   s.tick();
   EXPECT_TRUE(s.map.bite.empty());
 }

@@ -24,7 +24,8 @@ struct Judged {
     }
     tally = std::make_unique<Tally>(scene, picture);
   }
-  void tell(EventKind kind, uint32_t which = 0, float value = 0) { seen.event.push_back({0, kind, 0, which, value, {}}); }
+  void tell(EventKind kind, uint32_t which = 0, float value = 0) { seen.event.push_back({kind, 0, which, value, {}}); }
+  void tell(Fault fault, uint32_t which) { seen.event.push_back({EventKind::technique_fault, 0, which, 0, {}, fault}); }
   void tick() {
     tally->tick(seen);
     seen.event.clear();
@@ -85,11 +86,10 @@ TEST(Tally, uneven_ends_are_those_of_the_first_knot) {
 
 TEST(Tally, faults_by_name_ends_in_hand_and_the_needle) {
   Judged j;
-  j.tell(EventKind::technique_fault, 2, static_cast<float>(Fault::wrong_body));
-  j.tell(EventKind::technique_fault, 3, static_cast<float>(Fault::wrong_body));
-  j.tell(EventKind::technique_fault, 0, static_cast<float>(Fault::too_few_throws));
-  j.tell(EventKind::technique_fault, 0, 77);  // none that we know
-  j.tell(EventKind::technique_fault, 0, -1);
+  j.tell(Fault::wrong_body, 2);
+  j.tell(Fault::wrong_body, 3);
+  j.tell(Fault::too_few_throws, 0);
+  j.tell(static_cast<Fault>(77), 0);  // none that we know
   j.tick();
   j.seen.tool[1].held_strands = 2;
   j.seen.needle_on_thread = false;
@@ -97,7 +97,7 @@ TEST(Tally, faults_by_name_ends_in_hand_and_the_needle) {
   EXPECT_EQ(r.value["fault_wrong_body"], 2);
   EXPECT_EQ(r.value["fault_too_few_throws"], 1);
   EXPECT_EQ(r.value["fault_wrong_layer"], 0);
-  EXPECT_EQ(r.value["technique_fault"], 5);
+  EXPECT_EQ(r.value["technique_fault"], 4);
   EXPECT_EQ(r.faults, (std::map<std::string, uint64_t>{{"too_few_throws", 1}, {"wrong_body", 2}}));
   EXPECT_EQ(r.value["held_ends"], 2);
   EXPECT_EQ(r.value["needle_detached"], 1);

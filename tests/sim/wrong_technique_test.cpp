@@ -23,7 +23,7 @@ void expect_told_once(Rig& r, Fault fault, uint32_t which) {
     ASSERT_FALSE(testing::Test::HasFatalFailure());
     const std::vector<Event> told = faults(r);
     ASSERT_EQ(told.size(), 1u) << (later ? "seconds later" : "at once");
-    EXPECT_STREQ(fault_name(static_cast<Fault>(told[0].value)), fault_name(fault));
+    EXPECT_STREQ(fault_name(told[0].fault), fault_name(fault));
     EXPECT_EQ(told[0].which, which);
     EXPECT_TRUE(is_finite(told[0].where));
     EXPECT_LT(length(told[0].where), 0.2f) << "somewhere in the field";
@@ -260,7 +260,7 @@ TEST(WrongTechnique, cutting_a_knot_of_one_throw_is_one_fault_for_all_who_see_it
   ASSERT_EQ(r.count(EventKind::thread_cut), 1u);
   r.wait(kAfterwards);
   size_t too_few = 0;
-  for (const Event& e : faults(r)) too_few += e.value == static_cast<float>(Fault::too_few_throws);
+  for (const Event& e : faults(r)) too_few += e.fault == Fault::too_few_throws;
   EXPECT_EQ(too_few, 1u);
   EXPECT_EQ(faults(r).size(), before + 1);
 }

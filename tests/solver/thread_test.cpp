@@ -154,7 +154,7 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
   stitches.bite.resize(1);
   stitches.point.push_back({0, false, 0});
   Jobs jobs(1);
-  std::vector<Event> events;
+  EventList events;
   double most = 0;
   const double before = std::accumulate(state.strand[0].rest.begin(), state.strand[0].rest.end(), 0.0);
   for (int i = 0; i < 384; ++i) {

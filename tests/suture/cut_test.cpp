@@ -19,7 +19,7 @@ TEST(Cut, the_nearest_pair_within_reach_once_a_press) {
   EXPECT_EQ(r.thread().cut[12], 1);
   EXPECT_EQ(r.last(EventKind::thread_cut)->which, r.thread().order[12]);
   EXPECT_EQ(r.last(EventKind::thread_cut)->value, -1.0f) << "no stitch to measure to";
-  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::cut_before_knot));
+  EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::cut_before_knot);
   // Held down the button cuts no more, whatever comes between the blades.
   r.input.hand[1].buttons = kButtonCut;
   r.tick();
@@ -96,7 +96,7 @@ TEST(Cut, tells_how_long_the_tail_is_and_that_the_throws_are_too_few) {
   ASSERT_EQ(r.thread().cut[at], 1);
   EXPECT_NEAR(r.last(EventKind::thread_cut)->value, length + 0.5f * rest, 0.0003f);
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
-  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::too_few_throws));
+  EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::too_few_throws);
   EXPECT_EQ(r.last(EventKind::technique_fault)->which, 0u);
   snip(r, between(r, r.node_of(k.slot[0]) - 5));
   EXPECT_EQ(r.count(EventKind::thread_cut), 2u);
@@ -118,7 +118,7 @@ TEST(Cut, in_the_stitch_is_a_fault_and_opens_it) {
   const Vec3 at = between(r, 25);
   snip(r, at);
   ASSERT_EQ(r.count(EventKind::thread_cut), 1u);
-  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::cut_in_stitch));
+  EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::cut_in_stitch);
   EXPECT_GT(length_between_ends(r.solver(), r.suture()), before + 0.01f) << "nothing is drawn together any more";
   r.wait(0.3f);
   EXPECT_EQ(cuts(r), 1u) << "nothing is repaired";

@@ -185,7 +185,7 @@ TEST(Knot, without_a_bite_is_a_fault_and_the_loop_falls_off) {
   r.tick();
   ASSERT_EQ(r.suture().hand[0].held, Held::thread);
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
-  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::knot_without_bite));
+  EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::knot_without_bite);
   EXPECT_EQ(r.count(EventKind::loop_released), 1u);
   EXPECT_TRUE(r.suture().knot.empty());
   EXPECT_EQ(r.holds(HoldKind::loop), 0u);
@@ -198,7 +198,7 @@ TEST(Knot, begun_with_the_needle_still_in_the_tissue_is_said_and_goes_on) {
   r.suture().open.push_back({1, NeedlePhase::tip_in});
   r.take();
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
-  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::needle_in_tissue));
+  EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::needle_in_tissue);
   EXPECT_EQ(r.last(EventKind::technique_fault)->which, 1u);
   EXPECT_EQ(r.count(EventKind::knot_begun), 1u);
 }

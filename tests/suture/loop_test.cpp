@@ -375,7 +375,7 @@ TEST(Loop, a_rejection_is_told_once_and_brushing_thread_is_not_spoken_of) {
   r.wait(0.2f);
   EXPECT_EQ(r.count(EventKind::loop_formed), 0u);
   ASSERT_EQ(r.count(EventKind::loop_rejected), 1u);
-  EXPECT_EQ(r.last(EventKind::loop_rejected)->which, static_cast<uint32_t>(LoopReason::too_deep));
+  EXPECT_EQ(r.last(EventKind::loop_rejected)->reason, LoopReason::too_deep);
 }
 
 // Nothing placed by hand: the forceps carry the thread round the needle driver, and the physics lays it.
@@ -441,7 +441,7 @@ TEST(Loop, a_near_miss_is_spoken_of_when_the_jaws_close) {
   EXPECT_EQ(r.suture().hand[0].held, Held::thread);
   EXPECT_EQ(r.count(EventKind::loop_formed), 0u);
   ASSERT_EQ(r.count(EventKind::loop_rejected), 1u);
-  EXPECT_EQ(r.last(EventKind::loop_rejected)->which, static_cast<uint32_t>(LoopReason::no_crossing));
+  EXPECT_EQ(r.last(EventKind::loop_rejected)->reason, LoopReason::no_crossing);
 }
 
 }  // namespace

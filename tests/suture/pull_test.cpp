@@ -40,7 +40,7 @@ TEST(Figure7, a_suture_point_locks_the_next_free_particle_behind_the_needle) {
   rig.suture().bite.push_back(bite);
   const double length = rig.rest_length();
   const uint32_t next_free = rig.thread().order[n - 2];
-  std::vector<Event> events;
+  EventList events;
   ASSERT_TRUE(place_suture_point(rig.model->solver, rig.solver(), rig.model->suture, rig.suture(), 0, false, events));
   ASSERT_EQ(rig.thread().anchor.size(), 1u);
   EXPECT_EQ(rig.thread().anchor[0].slot, next_free);
@@ -103,7 +103,7 @@ TEST(Figure7, exactly_one_particle_passes_to_the_midpoint) {
   const double length = rig.rest_length();
   const Strand before = t;
   const auto x = rig.solver().x;
-  std::vector<Event> events;
+  EventList events;
   pull(rig.model->solver, rig.solver(), rig.model->suture, rig.suture(), events);
   ASSERT_EQ(events.size(), 1u);
   EXPECT_EQ(events[0].kind, EventKind::particle_passed);
@@ -270,7 +270,7 @@ TEST(Figure9, suture_points_are_checked_from_the_needle_end) {
   const float used = 0.05f * rig.model->solver.strand[0].spacing;
   for (size_t node : {size_t{20}, size_t{32}, size_t{45}}) t.rest[node] += t.rest[node - 1] - used, t.rest[node - 1] = used;
   const double length = rig.rest_length();
-  std::vector<Event> events;
+  EventList events;
   pull(rig.model->solver, rig.solver(), rig.model->suture, rig.suture(), events);
   ASSERT_EQ(events.size(), 3u);
   for (uint32_t k = 0; k < 3; ++k) EXPECT_EQ(events[k].which, 2 - k);

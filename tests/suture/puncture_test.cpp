@@ -44,7 +44,7 @@ TEST(Figure4, the_nearest_is_the_nearest_of_all) {
     solver.body[kNeedle].x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].centre);
     solver.body[kNeedle].q = circle.q;
     SutureState suture;
-    std::vector<Event> events;
+    EventList events;
     puncture(rig.model->solver, solver, rig.state->scratch, rig.model->suture, suture, events);
     ASSERT_TRUE(suture.attached) << k;
     const Vec3 tip = needle_tip(rig.model->solver.needle_arc[0], solver.body[kNeedle]);
@@ -69,7 +69,7 @@ TEST(Figure4, a_needle_that_nobody_holds_pierces_nothing) {
   const Pose circle = rig.circle_at({p.at - p.out * 0.0004f, p.out, p.along, p.up}, 0, 0);
   rig.needle().x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].centre);
   rig.needle().q = circle.q;
-  std::vector<Event> events;
+  EventList events;
   for (const bool held : {false, false, true}) {
     if (held) rig.hold_needle();
     puncture(rig.model->solver, rig.solver(), rig.state->scratch, rig.model->suture, rig.suture(), events);

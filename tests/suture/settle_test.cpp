@@ -28,10 +28,10 @@ void tie_and_cut(Tie& r, int throws = 2) {
 }
 
 std::vector<Event> settle(Tie& r) {
-  std::vector<Event> events;
+  EventList events;
   EXPECT_TRUE(new_suture(r.model->solver, r.solver(), r.model->suture, r.suture(), r.model->start, r.model->needle_start,
                          {kButtonNewSuture, 0}, events));
-  return events;
+  return events.list;
 }
 
 // [m] of thread from the knot to the first suture point, on to the last, and from there to the knot.
@@ -83,7 +83,7 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   const Vec3 ends[2] = {r.point_at(0), r.point_at(1)};
   const Vec3 knot = position_of(k.target, r.x());
   for (size_t i = cut0 + 1; i <= cut1; ++i) where.push_back(xyz(r.x()[order[i]]));
-  std::vector<Event> events;
+  EventList events;
   ASSERT_TRUE(new_suture(r.model->solver, r.solver(), r.model->suture, r.suture(), r.model->start, r.model->needle_start,
                          {kButtonNewSuture, 0}, events));
   // The curve: every particle of the piece, where it was; tails included, what was cut off gone.
@@ -342,7 +342,7 @@ TEST(Settle, not_with_the_needle_in_the_tissue) {
   r.tick();
   press(r, 1);
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u) << "a hand that is not there presses nothing";
-  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::needle_in_tissue));
+  EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::needle_in_tissue);
   EXPECT_EQ(r.last(EventKind::technique_fault)->which, bite);
   EXPECT_EQ(r.count(EventKind::suture_taken), 0u);
   EXPECT_LT(distance(r.needle().x, needle), 0.002f);
@@ -355,7 +355,7 @@ TEST(Settle, what_was_not_tied_is_taken_away_and_said) {
   press(r);
   EXPECT_EQ(r.count(EventKind::knot_cancelled), 1u);
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
-  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::cut_before_knot));
+  EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::cut_before_knot);
   EXPECT_EQ(r.count(EventKind::stitch_settled), 0u);
   EXPECT_EQ(r.count(EventKind::suture_taken), 1u);
   EXPECT_EQ(r.count(EventKind::thread_released), 1u);
@@ -373,7 +373,7 @@ TEST(Settle, a_knot_that_does_not_hold_is_said_and_long_ends_are_trimmed) {
   r.let_go();  // the ghost's weld is the test's own
   press(r);
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
-  EXPECT_EQ(r.last(EventKind::technique_fault)->value, static_cast<float>(Fault::too_few_throws));
+  EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::too_few_throws);
   ASSERT_EQ(r.suture().settled.size(), 1u);
   // Two tails of 30 mm at most, and what is between.
   EXPECT_LT(r.suture().settled[0].node.size(), 2 * 19 + 15u);

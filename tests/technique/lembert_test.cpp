@@ -36,7 +36,7 @@ struct TwoRings : StitchRig {
     tick();
     begin_knot();
     for (int i = 0; i < throws; ++i) lock(), tick();
-    now.push_back({0, EventKind::thread_cut, 0, 0, 0.005f, {}});
+    now.add({EventKind::thread_cut, 0, 0, 0.005f, {}});
     tick(100);
     fresh_suture();
     tick();
@@ -239,7 +239,7 @@ TEST(Lembert, too_few_throws_do_not_hold) {
     t.tick(100);
     EXPECT_FLOAT_EQ(t.plan.pair.back().progress, 1);
     EXPECT_EQ(t.count(EventKind::technique_fault), 0u) << "there may be more to come";
-    if (cut) t.now.push_back({0, EventKind::thread_cut, 0, 0, 0.005f, {}});
+    if (cut) t.now.add({EventKind::thread_cut, 0, 0, 0.005f, {}});
     else t.fresh_suture();
     t.tick(100);
     EXPECT_EQ(t.faults(Fault::too_few_throws), Bites{0});
@@ -271,7 +271,7 @@ TEST(Lembert, needs_two_layers) {
   LembertModel model;
   LembertState state;
   ClosurePlan plan;
-  std::vector<Event> events;
+  EventList events;
   lembert(model, state, {}, plan, events);
   EXPECT_TRUE(plan.pair.empty());
 }

@@ -65,7 +65,7 @@ struct Ring {
   ClosurePlan plan;
   std::vector<Vec4> x;
   std::vector<uint32_t> sp;  // particles that are suture points
-  std::vector<Event> events;
+  EventList events;
   std::vector<Vec3> start;
 
   explicit Ring(int bites) {
@@ -233,7 +233,7 @@ TEST(Closure, needs_an_opening) {
   PurseStringModel model;
   PurseStringState state;
   ClosurePlan plan;
-  std::vector<Event> events;
+  EventList events;
   purse_string(model, state, {}, plan, events);
   EXPECT_TRUE(events.empty());
   EXPECT_TRUE(plan.pull.empty());

@@ -241,7 +241,7 @@ TEST(Knotted, a_stitch_that_is_cut_through_opens) {
   t.tick(120);
   t.lock();
   t.tick();
-  t.now.push_back({0, EventKind::technique_fault, 0, 7, static_cast<float>(Fault::cut_in_stitch), {}});
+  t.now.add({EventKind::technique_fault, 0, 7, 0, {}, Fault::cut_in_stitch});
   t.tick(120);
   for (const ClosurePlan::Pair& p : t.plan.pair) EXPECT_EQ(p.progress, 0);
 }
@@ -336,7 +336,7 @@ TEST(Stay, what_was_told_in_the_tick_is_not_told_again) {
   t.pass(0, t.p[5], kOut, t.p[2], kOut);
   t.pass(1, t.p[10], kOut, t.p[14], kOut);
   t.needle_in_tissue = true;
-  t.now.push_back({0, EventKind::technique_fault, 0, 1, static_cast<float>(Fault::needle_in_tissue), {}});
+  t.now.add({EventKind::technique_fault, 0, 1, 0, {}, Fault::needle_in_tissue});
   t.begin_knot();
   t.tick(2);
   EXPECT_EQ(t.faults(Fault::needle_in_tissue), Bites{1});

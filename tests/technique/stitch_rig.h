@@ -14,7 +14,8 @@ struct StitchRig {
   std::vector<StitchPoint> point;
   std::vector<Bite> bite;
   std::vector<Knot> knot;
-  std::vector<Event> events, now;  // all so far; those of the next tick that come before the technique
+  std::vector<Event> events;  // all so far
+  EventList now;              // those of the next tick that come before the technique
   ClosurePlan plan;
   uint32_t taken = 0;
   bool needle_in_tissue = false;
@@ -37,19 +38,19 @@ struct StitchRig {
       point.push_back(p);
     }
   }
-  void begin_knot(uint32_t which = 0) { now.push_back({0, EventKind::knot_begun, 0, which, 1, {}}); }
+  void begin_knot(uint32_t which = 0) { now.add({EventKind::knot_begun, 0, which, 1, {}}); }
   // One more throw of the newest knot locks.
   void lock(bool new_knot = false) {
     if (knot.empty() || new_knot) knot.push_back({});
     knot.back().phase = KnotPhase::locked;
     ++knot.back().throws;
-    now.push_back({0, EventKind::knot_locked, 0, static_cast<uint32_t>(knot.size()) - 1, 1, {}});
+    now.add({EventKind::knot_locked, 0, static_cast<uint32_t>(knot.size()) - 1, 1, {}});
   }
   void fresh_suture() {
     ++taken;
     point.clear();
     knot.clear();
-    now.push_back({0, EventKind::suture_taken, 0, taken - 1, 0, {}});
+    now.add({EventKind::suture_taken, 0, taken - 1, 0, {}});
   }
   template <typename Model, typename State, typename Technique>
   void tick(const Model& model, State& state, Technique&& technique) {
@@ -79,7 +80,7 @@ struct StitchRig {
   std::vector<uint32_t> faults(Fault fault) const {
     std::vector<uint32_t> which;
     for (const Event& e : events)
-      if (e.kind == EventKind::technique_fault && e.value == static_cast<float>(fault)) which.push_back(e.which);
+      if (e.kind == EventKind::technique_fault && e.fault == fault) which.push_back(e.which);
     return which;
   }
   float gap(size_t row) const {

@@ -52,9 +52,9 @@ class Field {
       TechniqueView view;
       view.point = point_, view.bite = bite_, view.knot = knot_, view.x = state_->solver.x.data();
       view.taken = taken_, view.dt = model_->dt;
-      std::vector<Event> events;
+      EventList events;
       technique(model_->technique, technique_, view, state_->plan, events);
-      for (const Event& e : events) EXPECT_NE(e.kind, EventKind::technique_fault) << fault_name(static_cast<Fault>(e.value));
+      for (const Event& e : events) EXPECT_NE(e.kind, EventKind::technique_fault) << fault_name(e.fault);
       step(*model_, *state_, in_, jobs_);
     }
   }
