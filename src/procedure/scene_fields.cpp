@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "exchange/event.h"
+#include "technique/technique.h"
 
 namespace catgut {
 namespace {
@@ -84,7 +85,7 @@ const Field kField[] = {
     {"suture", "collision_off", "", 0, 100, nullptr, "thread particles without collision on each side of a locked one", TOP(suture.collision_off)},
     {"suture", "grasp_reach", "m", 0, 0.1, nullptr, "maximum distance at which a closing jaw grasps needle or thread", TOP(suture.grasp_reach)},
 
-    {"technique", "name", "", 0, 0, "purse_string|connell|stay|lembert|none", "suturing technique", TOP(technique.name)},
+    {"technique", "name", "", 0, 0, technique_choices(), "suturing technique", TOP(technique.name)},
     {"technique", "anvil", "m", -1, 1, nullptr, "focal point of the closure, relative to the center of the rim", TOP(technique.anvil)},
     {"technique", "anvil_radius", "m", 0, 0.1, nullptr, "radius of the closed rim", TOP(technique.anvil_radius)},
     {"technique", "closure_compliance", "m/N", 0, 1000, nullptr, "compliance of the closing pull toward the anvil", TOP(technique.closure_compliance)},

@@ -8,6 +8,7 @@
 
 #include "core/jobs.h"
 #include "sim/simulation.h"
+#include "technique/technique.h"
 
 namespace catgut {
 namespace {
@@ -53,7 +54,8 @@ class SutureWatch {
  private:
   // Single sutures are done with the last throw of their knot, a running one with every bite.
   size_t completed_in(const Snapshot& seen) {
-    const bool single = scene_.technique.name == "lembert" || scene_.technique.name == "stay";
+    const TechniqueRow* technique = find_technique(scene_.technique.name);
+    const bool single = technique && technique->interrupted;
     size_t completed = 0;
     for (const Event& e : seen.event) {
       if (e.kind == EventKind::suture_taken) throws_ = 0;

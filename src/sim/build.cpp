@@ -79,41 +79,23 @@ std::vector<Vec3> lay_thread(const ThreadSpec& spec, Vec3 start) {
 TechniqueModel make_technique(const SceneSpec& scene, const std::vector<Rim>& rim, float wall, const std::string& where) {
   TechniqueModel t;
   const TechniqueSpec& spec = scene.technique;
-  auto need = [&](size_t walls, const char* why, const char* what_next) {
-    for (size_t w = 0; w < walls; ++w)
-      if (w >= rim.size() || rim[w].outer.empty()) throw InputError(where, why, what_next);
-  };
-  if (spec.name == "purse_string") {
-    t.kind = TechniqueKind::purse_string;
-    need(1, "a purse-string needs an opening and no body has one", "leave one end of the body open");
-    t.purse_string.rim_outer = rim[0].outer;
-    t.purse_string.rim_inner = rim[0].inner;
-    t.purse_string.anvil = spec.anvil;
-    t.purse_string.anvil_radius = spec.anvil_radius;
-    t.purse_string.compliance = spec.closure_compliance;
-    t.purse_string.min_bites = spec.min_bites;
-    t.purse_string.wall = wall;
-  } else if (spec.name == "connell" || spec.name == "stay") {
-    t.kind = spec.name == "connell" ? TechniqueKind::connell : TechniqueKind::stay;
-    need(2, "it joins two open bowel ends and the scene does not have two", "add a second [[body]] with an open end");
-    t.seam.connell = t.kind == TechniqueKind::connell;
-    t.seam.rim = {rim[0].outer, rim[1].outer};
-    t.seam.step = spec.step;
-    t.seam.gap = spec.closed_gap;
-    t.seam.compliance = spec.closure_compliance;
-  } else if (spec.name == "lembert") {
-    t.kind = TechniqueKind::lembert;
-    need(2, "it joins two layers and the scene's body has one", "give the body an inner_radius");
-    // The sides that face each other: what is drawn together meets there, with no wall in between.
-    t.lembert.outer = rim[0].inner;
-    t.lembert.inner = rim[1].outer;
-    t.lembert.gap = spec.closed_gap;
-    t.lembert.compliance = spec.closure_compliance;
-    t.lembert.throws = spec.throws;
-  } else if (spec.name != "none") {
-    throw InputError(where, "technique.name \"" + spec.name + "\" is not known",
-                     "use purse_string, connell, stay, lembert or none");
-  }
+  t.row = find_technique(spec.name);
+  if (!t.row && spec.name != "none")
+    throw InputError(where, "technique.name \"" + spec.name + "\" is not known", std::string("use ") + technique_choices());
+  if (!t.row) return t;
+  for (size_t w = 0; w < t.row->walls; ++w)
+    if (w >= rim.size() || rim[w].outer.empty()) throw InputError(where, t.row->missing, t.row->remedy);
+  TechniqueSetup setup;
+  setup.rim = rim;
+  setup.wall = wall;
+  setup.anvil = spec.anvil;
+  setup.anvil_radius = spec.anvil_radius;
+  setup.compliance = spec.closure_compliance;
+  setup.gap = spec.closed_gap;
+  setup.step = spec.step;
+  setup.min_bites = spec.min_bites;
+  setup.throws = spec.throws;
+  t.row->begin(setup, t);
   return t;
 }
 

@@ -98,20 +98,6 @@ bool suture_fits(const SolverState& solver, const SutureState& u) {
   return std::all_of(u.knot.begin(), u.knot.end(), [&](const Knot& k) { return knot_fits(solver.strand[0], k); });
 }
 
-// A technique's rows are those of the plan.
-bool technique_fits(TechniqueKind kind, const TechniqueState& t, size_t rows, size_t points) {
-  const bool seams = kind == TechniqueKind::connell || kind == TechniqueKind::stay;
-  if (seams ? t.seam.row.size() != rows : !t.seam.row.empty()) return false;
-  for (uint32_t r = 0; r < t.seam.row.size(); ++r)
-    if (t.seam.row[r].leader > r) return false;
-  const LembertState& l = t.lembert;
-  if (kind == TechniqueKind::lembert ? l.row.size() != rows : !l.row.empty()) return false;
-  if (l.tied && l.stitch.empty()) return false;
-  for (const LembertRow& row : l.row)
-    if (row.one >= l.stitch.size() || row.other >= l.stitch.size()) return false;
-  return t.purse_string.checked <= points;
-}
-
 bool fits(const Model& model, const State& s) {
   Validator indices(model.solver);
   indices(s);
@@ -121,7 +107,7 @@ bool fits(const Model& model, const State& s) {
     if (w.a != k || w.b != -1) return false;
   }
   return strand_fits(model.solver.strand[0], s.solver.strand[0]) && suture_fits(s.solver, s.suture) &&
-         technique_fits(model.technique.kind, s.technique, s.plan.pair.size(), s.suture.point.size());
+         technique_fits(model.technique, s.technique, s.plan.pair.size(), s.suture.point.size());
 }
 
 }  // namespace

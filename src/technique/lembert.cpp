@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "technique/common.h"
+#include "technique/technique.h"
 
 namespace catgut {
 namespace {
@@ -170,5 +171,29 @@ void lembert(const LembertModel& model, LembertState& state, const TechniqueView
     tell_closed(r, plan.pair[r], view.x, row.told, events);
   }
 }
+
+const TechniqueRow kLembert{
+    .name = "lembert",
+    .walls = 2,
+    .missing = "it joins two layers and the scene's body has one",
+    .remedy = "give the body an inner_radius",
+    .interrupted = true,
+    .begin =
+        [](const TechniqueSetup& s, TechniqueModel& model) {
+          // The sides that face each other: what is drawn together meets there, with no wall in between.
+          LembertModel& m = model.lembert;
+          m.outer = s.rim[0].inner, m.inner = s.rim[1].outer;
+          m.gap = s.gap, m.compliance = s.compliance, m.throws = s.throws;
+        },
+    .tick = [](const TechniqueModel& m, TechniqueState& s, const TechniqueView& view, ClosurePlan& plan,
+               EventList& events) { lembert(m.lembert, s.lembert, view, plan, events); },
+    .fits =
+        [](const TechniqueState& s, size_t rows, size_t) {
+          const LembertState& l = s.lembert;
+          return l.row.size() == rows && !(l.tied && l.stitch.empty()) &&
+                 std::all_of(l.row.begin(), l.row.end(),
+                             [&](const LembertRow& r) { return r.one < l.stitch.size() && r.other < l.stitch.size(); });
+        },
+};
 
 }  // namespace catgut

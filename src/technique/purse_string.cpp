@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "technique/technique.h"
+
 namespace catgut {
 namespace {
 
@@ -134,5 +136,23 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
     events.add({EventKind::closure_finished, 0, 0, opening_area(model.rim_inner, x), centre_of(model.rim_inner, x)});
   }
 }
+
+const TechniqueRow kPurseString{
+    .name = "purse_string",
+    .walls = 1,
+    .missing = "a purse-string needs an opening and no body has one",
+    .remedy = "leave one end of the body open",
+    .interrupted = false,
+    .begin =
+        [](const TechniqueSetup& s, TechniqueModel& model) {
+          PurseStringModel& m = model.purse_string;
+          m.rim_outer = s.rim[0].outer, m.rim_inner = s.rim[0].inner;
+          m.anvil = s.anvil, m.anvil_radius = s.anvil_radius;
+          m.compliance = s.compliance, m.min_bites = s.min_bites, m.wall = s.wall;
+        },
+    .tick = [](const TechniqueModel& m, TechniqueState& s, const TechniqueView& view, ClosurePlan& plan,
+               EventList& events) { purse_string(m.purse_string, s.purse_string, view, plan, events); },
+    .fits = [](const TechniqueState& s, size_t, size_t points) { return s.purse_string.checked <= points; },
+};
 
 }  // namespace catgut

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "technique/common.h"
+#include "technique/technique.h"
 
 namespace catgut {
 namespace {
@@ -163,5 +164,34 @@ void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, C
     tell_closed(r, pair, view.x, row.told, events);
   }
 }
+
+namespace {
+
+template <bool connell>
+void begin_seam(const TechniqueSetup& s, TechniqueModel& model) {
+  model.seam.connell = connell;
+  model.seam.rim = {s.rim[0].outer, s.rim[1].outer};
+  model.seam.step = s.step, model.seam.gap = s.gap, model.seam.compliance = s.compliance;
+}
+
+void tick_seam(const TechniqueModel& m, TechniqueState& s, const TechniqueView& view, ClosurePlan& plan, EventList& events) {
+  seam(m.seam, s.seam, view, plan, events);
+}
+
+bool seam_fits(const TechniqueState& s, size_t rows, size_t) {
+  const std::vector<SeamRow>& row = s.seam.row;
+  if (row.size() != rows) return false;
+  for (size_t r = 0; r < rows; ++r)
+    if (row[r].leader > r) return false;
+  return true;
+}
+
+constexpr char kNoEnds[] = "it joins two open bowel ends and the scene does not have two",
+               kAddEnd[] = "add a second [[body]] with an open end";
+
+}  // namespace
+
+const TechniqueRow kConnell{"connell", 2, kNoEnds, kAddEnd, false, begin_seam<true>, tick_seam, seam_fits};
+const TechniqueRow kStay{"stay", 2, kNoEnds, kAddEnd, true, begin_seam<false>, tick_seam, seam_fits};
 
 }  // namespace catgut

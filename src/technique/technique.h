@@ -1,11 +1,13 @@
 // technique: which points close with which, and when (paper 2.5). A technique reads what happened in the tick (bites, suture
 // points, knots, events) and answers with a ClosurePlan and with events that say what was wrong. It moves nothing itself.
-// One struct of data per technique and one function each; `technique` below chooses by kind.
+// A technique is one row of `techniques()` and one file, which ends in its row. Its name is compared nowhere else.
 #pragma once
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <vector>
 
+#include "anatomy/body.h"
 #include "suture/suture.h"
 #include "technique/lembert.h"
 #include "technique/purse_string.h"
@@ -13,11 +15,11 @@
 
 namespace catgut {
 
-enum class TechniqueKind : uint8_t { none, purse_string, connell, stay, lembert };
+struct TechniqueRow;
 
 // Constant during a run.
 struct TechniqueModel {
-  TechniqueKind kind = TechniqueKind::none;
+  const TechniqueRow* row = nullptr;  // null: none
   PurseStringModel purse_string;
   SeamModel seam;  // connell and stay
   LembertModel lembert;
@@ -29,8 +31,39 @@ struct TechniqueState {
   LembertState lembert;
 };
 
-// Once a tick, after its substeps. events: those of the tick so far; the technique adds its own.
+// What a scene gives its technique.
+struct TechniqueSetup {
+  std::span<const Rim> rim;  // of the walls, in their order
+  float wall = 0;            // [m] thickness
+  Vec3 anvil;                // [m] relative to the rim's center
+  float anvil_radius = 0;    // [m]
+  float compliance = 0;      // [m/N] of the closing pull
+  float gap = 0, step = 0;   // [m] left between two points, between two pairs
+  int min_bites = 0, throws = 0;
+};
+
+struct TechniqueRow {
+  const char* name;
+  size_t walls;                  // open rims that it needs
+  const char *missing, *remedy;  // what is wrong, and what to do, where a scene has fewer
+  bool interrupted;              // every stitch is a suture of its own
+  void (*begin)(const TechniqueSetup& setup, TechniqueModel& model);
+  // Once a tick, after its substeps. events: those of the tick so far; the technique adds its own.
+  void (*tick)(const TechniqueModel& model, TechniqueState& state, const TechniqueView& view, ClosurePlan& plan,
+               EventList& events);
+  // Whether a state that was read belongs to a plan of so many rows and so many suture points.
+  bool (*fits)(const TechniqueState& state, size_t rows, size_t points);
+};
+extern const TechniqueRow kPurseString, kConnell, kStay, kLembert;  // each at the end of its file
+
+std::span<const TechniqueRow* const> techniques();
+const TechniqueRow* find_technique(std::string_view name);  // null: there is none of that name
+// "purse_string|connell|...|none": what a scene may say.
+const char* technique_choices();
+
 void technique(const TechniqueModel& model, TechniqueState& state, const TechniqueView& view, ClosurePlan& plan,
                EventList& events);
+// Rows of a technique that is not the scene's are empty.
+bool technique_fits(const TechniqueModel& model, const TechniqueState& state, size_t rows, size_t points);
 
 }  // namespace catgut
