@@ -142,6 +142,39 @@ std::vector<Vec3> wall_directions(const TriangleMesh& sheet, float thickness) {
   return direction;
 }
 
+namespace {
+
+// Where a wall of full thickness would fold over itself, as in the hollow of a sharp bend, it is thinner, down to a tenth, and
+// grows back over the neighbors. Returns how many tetrahedra stay inside out, also where half of the wall would be thinner.
+size_t thin_where_folded(BodyRest& body, const TriangleMesh& sheet, std::span<const Vec3> normal, float thickness) {
+  constexpr float kThinnest = 0.1f, kThinner = 0.75f, kGrowth = 1.4f;
+  std::vector<float> share;
+  std::vector<std::vector<uint32_t>> next;
+  for (int round = 0;; ++round) {
+    size_t inverted = 0;
+    std::vector<uint8_t> folded(sheet.position.size(), 0);
+    for (const Tet& t : body.tet) {
+      if (tet_volume(body.position, t) > 0) continue;
+      ++inverted;
+      for (uint32_t p : t) folded[p / 2] = 1;
+    }
+    if (inverted == 0 || round == 30) return inverted;
+    // A wall that is thinner nearly everywhere is not the wall that was asked for.
+    if (2 * std::count_if(share.begin(), share.end(), [](float f) { return f < 0.99f; }) > static_cast<long>(share.size()))
+      return inverted;
+    if (share.empty()) share.assign(sheet.position.size(), 1), next = vertex_neighbours(sheet.triangle, sheet.position.size());
+    for (size_t v = 0; v < share.size(); ++v)
+      if (folded[v]) share[v] = std::max(kThinnest, kThinner * share[v]);
+    for (int pass = 0; pass < 4; ++pass)
+      for (size_t v = 0; v < share.size(); ++v)
+        for (uint32_t u : next[v]) share[v] = std::min(share[v], kGrowth * share[u]);
+    for (size_t v = 0; v < share.size(); ++v)
+      body.position[inner(static_cast<uint32_t>(v))] = sheet.position[v] - normal[v] * (thickness * share[v]);
+  }
+}
+
+}  // namespace
+
 BodyRest thicken(const TriangleMesh& sheet, std::span<const Vec3> normal, const WallSpec& wall) {
   CATGUT_CHECK(normal.size() == sheet.position.size() && !sheet.triangle.empty());
   CATGUT_CHECK(wall.thickness > 0 && wall.density > 0);
@@ -154,11 +187,10 @@ BodyRest thicken(const TriangleMesh& sheet, std::span<const Vec3> normal, const 
   }
   body.radius = 0.5f * wall.thickness;
   for (const Triangle& t : sheet.triangle) add_prism(body.tet, t);
+  const size_t inverted = thin_where_folded(body, sheet, normal, wall.thickness);
   std::vector<double> mass(2 * n, 0.0);
-  size_t inverted = 0;
   for (const Tet& t : body.tet) {
     const double v = tet_volume(body.position, t);
-    inverted += !(v > 0);
     for (uint32_t p : t) mass[p] += 0.25 * wall.density * v;
   }
   if (inverted > 0) {

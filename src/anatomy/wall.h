@@ -21,7 +21,8 @@ struct WallSpec {
 // along normal[v], unit, outward); the extra particle is last. Fills everything of BodyRest but name, visible and the pinned
 // flags (all 0). Rims are in the order and sense of boundary_loops. Clusters: a particle, its neighbours on its side, its
 // partner across the wall and the partner's neighbours; beyond 16 the farthest are left out.
-// Throws InputError when the wall is too thick for the bend of the sheet (a tetrahedron would be inside out).
+// Where the sheet bends too sharply for the wall, the wall is thinner, down to a tenth. Throws InputError when that is still
+// too thick (a tetrahedron would be inside out).
 BodyRest thicken(const TriangleMesh& sheet, std::span<const Vec3> normal, const WallSpec& wall);
 
 // The normals of the sheet, turned toward their neighbours' where a wall of that thickness would otherwise fold over itself.

@@ -5,6 +5,7 @@
 #include <assimp/scene.h>
 #include <fmt/format.h>
 
+#include <assimp/DefaultIOSystem.h>
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <cctype>
@@ -12,11 +13,14 @@
 #include <vector>
 
 #include "core/check.h"
+#include "geometry/gltf_check.h"
 #include "geometry/mesh_clean.h"
 
 namespace catgut {
 
 namespace {
+
+constexpr uintmax_t kLargestMeshFile = 64u << 20;  // [byte]: what is read of it fits into 512 MB
 
 struct Found {
   const aiNode* node;
@@ -64,6 +68,29 @@ void append(const aiScene& scene, const Found& found, TriangleMesh& mesh) {
   }
 }
 
+// A mesh file may name others (buffers, materials). Only regular files of its own folder are opened: no device or pipe that
+// never ends, nothing of another folder.
+class OwnFolder : public Assimp::DefaultIOSystem {
+ public:
+  explicit OwnFolder(const std::string& mesh) : folder_(folder(mesh)) {}
+  bool Exists(const char* file) const override { return allowed(file) && DefaultIOSystem::Exists(file); }
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    return allowed(file) ? DefaultIOSystem::Open(file, mode) : nullptr;
+  }
+
+ private:
+  static std::filesystem::path folder(const std::string& file) {
+    std::error_code ignored;
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file, ignored), ignored).parent_path();
+  }
+  bool allowed(const char* file) const {
+    std::error_code error;
+    return std::filesystem::is_regular_file(file, error) && std::filesystem::file_size(file, error) <= kLargestMeshFile &&
+           folder(file) == folder_;
+  }
+  std::filesystem::path folder_;
+};
+
 void check_size(float size, const std::string& where) {
   if (size >= 0.005f && size <= 2) return;
   const char* unit = "unknown unit: scale it to the size of the organ";
@@ -92,7 +119,11 @@ TriangleMesh read_mesh(const std::string& path, const std::string& node) {
   if (kind != ".gltf" && kind != ".glb" && kind != ".obj" && kind != ".stl") {
     throw InputError(path, fmt::format("unsupported mesh format \"{}\"", kind), "export it as .glb, .gltf, .obj or .stl");
   }
+  if (fs::file_size(path, ignored) > kLargestMeshFile)
+    throw InputError(path, "the mesh file is larger than 64 MB", "export the organ's surface alone, with fewer triangles");
+  if (kind == ".gltf" || kind == ".glb") check_gltf(path);
   Assimp::Importer importer;
+  importer.SetIOHandler(new OwnFolder(path));  // the importer deletes it
   const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate);
   if (!scene || !scene->mRootNode) {
     std::string reason = importer.GetErrorString();

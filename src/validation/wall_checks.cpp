@@ -153,6 +153,23 @@ void check_generated(Lines& out) {
   add_modulus(out, "around/bowel generator, 1228 particles", 6e5, modulus_around(w, t, 500, 1.2));
 }
 
+// Every quad of the tube cut into two prisms, the diagonal by turns: what an organ's mesh has where triangles find no partner.
+void check_prisms(Lines& out) {
+  wall::Spec s = tube_spec(32, 19, 0.001f, {});
+  const auto quads = s.mesh.face;
+  s.mesh.face.clear(), s.mesh.along.clear();
+  for (size_t f = 0; f < quads.size(); ++f) {
+    const auto& q = quads[f];
+    const size_t turn = (f + f / 32) % 2;
+    s.mesh.face.push_back({q[turn], q[turn + 1], q[turn + 2], wall::kNone});
+    s.mesh.face.push_back({q[turn], q[turn + 2], q[(turn + 3) % 4], wall::kNone});
+    s.mesh.along.insert(s.mesh.along.end(), 2, Vec3{0, 0, 1});
+  }
+  const Wall w = wall::build_wall(s);
+  add_modulus(out, "along/prisms, 1216 nodes", 6e5, modulus_along(w, kTube, 1.0, 1.2));
+  add_modulus(out, "around/prisms, 1216 nodes", 6e5, modulus_around(w, kTube, 500, 1.2));
+}
+
 // Unequal moduli along and around, and fibers that straighten.
 void check_material(Lines& out) {
   wall::Layer layer;
@@ -557,6 +574,7 @@ void check_purse(Lines& out) {
 void check_wall(Lines& out) {
   check_substeps(out);
   check_generated(out);
+  check_prisms(out);
   check_material(out);
   check_ring(out);
   check_held(out);

@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <numeric>
 
+#include "anatomy/wall.h"
 #include "body_checks.h"
 #include "core/check.h"
 #include "geometry/polygon.h"
@@ -148,6 +150,32 @@ TEST(Organ, RealColon) {
     std::printf("%s: rim %.1f mm of %zu, wall %.1f cm^3, %zu held, %zu visible\n", node.c_str(), 1e3 * loop_length(loop),
                 loop.size(), 1e6 * total_tet_volume(body), held(body), body.visible.position.size());
   }
+}
+
+// A V with a wall of 2.5 mm on its hollow side: the wall is thin in the bend, full a few millimetres away, and never inside
+// out.
+TEST(Wall, ThinsInASharpBendInsteadOfRefusing) {
+  TriangleMesh sheet;
+  constexpr int kAcross = 31, kRows = 12;
+  for (int j = 0; j < kRows; ++j)
+    for (int i = 0; i < kAcross; ++i) {
+      const float x = 0.0007f * static_cast<float>(i - kAcross / 2);
+      sheet.position.push_back({x, 0.001f * static_cast<float>(j), 0.002f * std::exp(-x * x / (0.0019f * 0.0019f))});
+    }
+  for (uint32_t j = 0; j + 1 < kRows; ++j)
+    for (uint32_t i = 0; i + 1 < kAcross; ++i) {
+      const uint32_t a = j * kAcross + i, b = a + kAcross;
+      sheet.triangle.push_back({a, a + 1, b + 1}), sheet.triangle.push_back({a, b + 1, b});
+    }
+  const BodyRest body = thicken(sheet, wall_directions(sheet, 0.0025f), {});
+  float thinnest = 1, thickest = 0;
+  for (size_t v = 0; v < sheet.position.size(); ++v) {
+    const float t = distance(body.position[2 * v], body.position[2 * v + 1]);
+    thinnest = std::min(thinnest, t), thickest = std::max(thickest, t);
+  }
+  for (const Tet& t : body.tet) EXPECT_GT(tet_volume(body.position, t), 0);
+  EXPECT_LT(thinnest, 0.0020f);
+  EXPECT_NEAR(thickest, 0.0025f, 1e-6f);
 }
 
 }  // namespace

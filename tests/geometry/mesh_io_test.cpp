@@ -104,6 +104,26 @@ TEST(MeshIo, SaysWhatItCannotUse) {
               "2 separate surfaces side by side");
 }
 
+// A kilobyte that asks for gigabytes is refused before anything is asked for.
+TEST(MeshIo, RefusesHostileGltfAtOnce) {
+  const auto gltf = [&](const std::string& more) {
+    return refusal(file("hostile.gltf", "{\"asset\":{\"version\":\"2.0\"}," + more + "}"));
+  };
+  std::string nodes = "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[";
+  for (int i = 1; i <= 30; ++i) nodes += "{\"children\":[" + std::to_string(i) + "," + std::to_string(i) + "]},";
+  EXPECT_SAYS(gltf(nodes + "{}]"), "two share a child");
+  EXPECT_SAYS(gltf("\"nodes\":[{\"children\":[1]},{\"children\":[0]}]"), "form a ring");
+  std::string chain = "\"nodes\":[";
+  for (int i = 1; i <= 300; ++i) chain += "{\"children\":[" + std::to_string(i) + "]},";
+  EXPECT_SAYS(gltf(chain + "{}]"), "nest deeper than 256");
+  EXPECT_SAYS(gltf("\"accessors\":[{\"componentType\":5126,\"count\":300000000,\"type\":\"VEC3\",\"sparse\":{\"count\":1}}],"
+                   "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}]"),
+              "six million");
+  EXPECT_SAYS(gltf("\"extras\":" + std::string(40000, '[') + std::string(40000, ']')), "nests deeper than 64");
+  EXPECT_SAYS(gltf("\"asset\":{\"version\":\"1.0\"}"), "names a member twice");
+  
+}
+
 TEST(MeshIo, KeepsTheOutsideOfADoubleWall) {
   std::string text = tube(0.1, "wall");
   std::string inner = tube(0.09, "wall", 73).substr(7);  // a second, smaller tube inside the first
