@@ -150,14 +150,14 @@ class Check {
       for (const Json& child : list_of(&n, "children")) {
         const auto i = child.index();
         if (!i || *i >= node.size()) refuse("a node has a child that is not there");
-        if (has_parent[*i]++) refuse("its nodes are no tree: two share a child");
+        if (has_parent[*i]++) refuse("its nodes do not form a tree: two share a child");
       }
     for (const Json& scene : list_of(&root_, "scenes")) {
       std::vector<uint8_t> seen(node.size(), 0);
       for (const Json& top : list_of(&scene, "nodes")) {
         const auto i = top.index();
         if (!i || *i >= node.size()) refuse("a scene has a node that is not there");
-        if (seen[*i]++ || has_parent[*i]) refuse("its nodes are no tree: one stands in a scene twice");
+        if (seen[*i]++ || has_parent[*i]) refuse("its nodes do not form a tree: a scene lists one twice");
       }
     }
     // With one parent each, levels below the tops are a forest; what is left is a ring.
@@ -173,7 +173,7 @@ class Check {
         for (const Json& child : list_of(&node[i], "children")) next.push_back(*child.index());
       level = std::move(next);
     }
-    if (reached < node.size()) refuse("its nodes are no tree: they form a ring");
+    if (reached < node.size()) refuse("its nodes do not form a tree: they form a ring");
   }
   double count_of(const Json* accessor) const {
     if (!accessor) return 0;
@@ -235,7 +235,7 @@ void check_gltf(const std::string& path) {
       std::memcpy(&kind, bytes.data() + 16, 4);
     }
     if (version != 2 || kind != 0x4E4F534A || length > bytes.size() - 20)
-      throw InputError(path, "cannot be read as a mesh (it is no whole GLB of version 2)", kAgain);
+      throw InputError(path, "cannot be read as a mesh (it is not a complete GLB of version 2)", kAgain);
     text = text.substr(20, length);
     while (!text.empty() && (text.back() == ' ' || text.back() == '\0')) text.remove_suffix(1);
   } else if (text.substr(0, 3) == "\xEF\xBB\xBF") {

@@ -6,9 +6,9 @@
 
 namespace catgut {
 
-// Throws InputError where the file is no JSON, nests deeper than 64, is not glTF 2, has nodes that are no tree or a tree deeper
-// than 256, or describes more geometry than `kMostGltfValues`. What passes takes less than 512 MB and two seconds to read,
-// compressed meshes (KHR_draco_mesh_compression) excepted, whose size only their decoder knows.
+// Throws InputError where the file is not JSON, nests deeper than 64, is not glTF 2, has nodes that do not form a tree, or a
+// tree deeper than 256, or describes more geometry than `kMostGltfValues`. What passes takes less than 512 MB and two seconds
+// to read, compressed meshes (KHR_draco_mesh_compression) excepted, whose size only their decoder knows.
 void check_gltf(const std::string& path);
 
 constexpr double kMostGltfValues = 6e6;  // vertices of all attributes, and indices, over all primitives

@@ -121,7 +121,6 @@ TEST(MeshIo, RefusesHostileGltfAtOnce) {
               "six million");
   EXPECT_SAYS(gltf("\"extras\":" + std::string(40000, '[') + std::string(40000, ']')), "nests deeper than 64");
   EXPECT_SAYS(gltf("\"asset\":{\"version\":\"1.0\"}"), "names a member twice");
-  
 }
 
 TEST(MeshIo, KeepsTheOutsideOfADoubleWall) {
