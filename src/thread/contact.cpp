@@ -16,15 +16,33 @@ namespace {
 
 constexpr float kDriftLimit = 0.2f;  // of the diameter
 
-Vec3 motion(const Scratch& s, const Active& c) {
-  return c.wi0 * s.u.at(c.i) + c.wi1 * s.u.at(c.i + 1) + c.wj0 * s.u.at(c.j) + c.wj1 * s.u.at(c.j + 1) - c.partner;
+Four motion(const Scratch& s, const Active& c) {
+  const Four* u = s.contact_u.data();
+  return (u[c.i] * c.wi0 + u[c.i + 1] * c.wi1) + (u[c.j] * c.wj0 + u[c.j + 1] * c.wj1) - c.partner;
 }
 
-void apply(Scratch& s, const Active& c, Vec3 impulse) {
-  s.u.add(c.i, c.mi0 * impulse);
-  s.u.add(c.i + 1, c.mi1 * impulse);
-  s.u.add(c.j, c.mj0 * impulse);
-  s.u.add(c.j + 1, c.mj1 * impulse);
+void apply(Scratch& s, const Active& c, Four impulse) {
+  Four* u = s.contact_u.data();
+  u[c.i] += impulse * c.mi0;
+  u[c.i + 1] += impulse * c.mi1;
+  u[c.j] += impulse * c.mj0;
+  u[c.j + 1] += impulse * c.mj1;
+}
+
+void load_motion(Scratch& s) {
+  for (uint32_t i : s.contact_node) s.contact_u[i] = Four{s.u.x[i], s.u.y[i], s.u.z[i], 0};
+}
+void store_motion(Scratch& s) {
+  for (uint32_t i : s.contact_node) {
+    const Four u = s.contact_u[i];
+    s.u.x[i] = u[0], s.u.y[i] = u[1], s.u.z[i] = u[2];
+  }
+}
+void use_node(Scratch& s, uint32_t i) {
+  if (s.touched[i]) return;
+  s.touched[i] = 1;
+  s.contact_node.push_back(i);
+  s.contact_u[i] = Four{s.u.x[i], s.u.y[i], s.u.z[i], 0};
 }
 
 Vec3 tangential(Vec3 v, Vec3 n) { return v - n * dot(v, n); }
@@ -33,11 +51,12 @@ void add_active(const Settings& settings, Scratch& s, Active c, float gap, Vec3 
   c.mi0 = c.wi0 * s.w[c.i], c.mi1 = c.wi1 * s.w[c.i + 1], c.mj0 = c.wj0 * s.w[c.j], c.mj1 = c.wj1 * s.w[c.j + 1];
   const float w = c.wi0 * c.mi0 + c.wi1 * c.mi1 + c.wj0 * c.mj0 + c.wj1 * c.mj1;
   if (w <= 0) return;
+  for (uint32_t i : {c.i, c.i + 1, c.j, c.j + 1}) use_node(s, i);
   c.inverse = 1 / w;
   c.level = gap - dot(c.normal, motion(s, c));
-  c.pull_back = settings.anchor * drift;
+  c.pull_back = four(settings.anchor * drift);
   c.ln = ln;
-  c.lt = tangential(lt, c.normal);
+  c.lt = four(tangential(lt, three(c.normal)));
   s.active.push_back(c);
 }
 
@@ -79,13 +98,13 @@ float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& 
     return c.gap - ready;
   }
   Active active;
-  active.i = i, active.wi0 = 1 - c.s, active.wi1 = c.s, active.normal = c.normal, active.crossing = static_cast<uint32_t>(k);
+  active.i = i, active.wi0 = 1 - c.s, active.wi1 = c.s, active.normal = four(c.normal), active.crossing = static_cast<uint32_t>(k);
   if (other < kTool) {
     active.j = other, active.wj0 = c.t - 1, active.wj1 = -c.t, active.mu = settings.material.friction;
   } else {
     active.j = i;
     active.mu = around.tools[other - kTool].friction;
-    active.partner = lerp(s.tool_move[2 * (other - kTool)], s.tool_move[2 * (other - kTool) + 1], c.t);
+    active.partner = four(lerp(s.tool_move[2 * (other - kTool)], s.tool_move[2 * (other - kTool) + 1], c.t));
   }
   add_active(settings, s, active, c.gap, c.drift, c.normal_impulse, c.friction_impulse);
   return 0;
@@ -103,7 +122,7 @@ void begin_plane(const Settings& settings, State& state, Scratch& s, const Plane
     const bool last = i + 1 == state.nodes();
     c.i = c.j = last ? i - 1 : i;
     (last ? c.wi1 : c.wi0) = 1;
-    c.normal = plane.normal, c.mu = plane.friction;
+    c.normal = four(plane.normal), c.mu = plane.friction;
     const size_t before = s.active.size();
     add_active(settings, s, c, gap, state.plane_drift.at(i), state.plane_normal[i], state.plane_friction.at(i));
     if (s.active.size() > before) s.plane_node.push_back(i);
@@ -113,7 +132,7 @@ void begin_plane(const Settings& settings, State& state, Scratch& s, const Plane
 // The state of friction after a substep: what drifted while sticking.
 Vec3 new_drift(const Settings& settings, const Active& c, Vec3 drift, Vec3 moved) {
   if (c.slipped || c.ln <= 0) return {};
-  const Vec3 d = tangential(drift + moved, c.normal);
+  const Vec3 d = tangential(drift + moved, three(c.normal));
   const float size = length(d), limit = kDriftLimit * settings.material.diameter;
   return size > limit ? d * (limit / size) : d;
 }
@@ -121,7 +140,7 @@ Vec3 new_drift(const Settings& settings, const Active& c, Vec3 drift, Vec3 moved
 }  // namespace
 
 void begin_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around, float time) {
-  s.active.clear(), s.plane_node.clear();
+  s.active.clear(), s.plane_node.clear(), s.contact_node.clear();
   const float* moved = s.segment_move.data();
   const size_t pairs = state.key.size();
   for (size_t k = 0; k < around.tools.size(); ++k) {
@@ -140,24 +159,28 @@ void begin_contacts(const Settings& settings, State& state, Scratch& s, Surround
     state.budget[k] = left;
   }
   if (around.plane) begin_plane(settings, state, s, *around.plane);
+  for (uint32_t i : s.contact_node) s.touched[i] = 0;
   for (const Active& c : s.active) apply(s, c, c.normal * c.ln + c.lt);
+  store_motion(s);
 }
 
 void sweep_contacts(Scratch& s, bool backward) {
+  load_motion(s);
   const size_t count = s.active.size();
   for (size_t k = 0; k < count; ++k) {
     Active& c = s.active[backward ? count - 1 - k : k];
-    const Vec3 moved = motion(s, c);
+    const Four moved = motion(s, c);
     const float along = dot(c.normal, moved);
     const float ln = std::max(0.0f, c.ln - (c.level + along) * c.inverse);
-    Vec3 lt = c.lt - (moved - c.normal * along + c.pull_back) * c.inverse;
-    const float limit = c.mu * ln, size2 = length2(lt);
+    Four lt = c.lt - (moved - c.normal * along + c.pull_back) * c.inverse;
+    const float limit = c.mu * ln, size2 = dot(lt, lt);
     c.slipped = size2 > limit * limit;
     if (c.slipped) lt = lt * (limit / std::sqrt(size2));
-    const Vec3 change = c.normal * (ln - c.ln) + (lt - c.lt);
+    const Four change = c.normal * (ln - c.ln) + (lt - c.lt);
     c.ln = ln, c.lt = lt;
     apply(s, c, change);
   }
+  store_motion(s);
 }
 
 void end_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around) {
@@ -165,19 +188,20 @@ void end_contacts(const Settings& settings, State& state, Scratch& s, Surroundin
   const size_t crossings = s.active.size() - s.plane_node.size();
   for (size_t k = 0; k < s.active.size(); ++k) {
     const Active& c = s.active[k];
-    const Vec3 moved = tangential(motion(s, c), c.normal), impulse = c.normal * c.ln + c.lt;
+    const Vec3 went = three(motion(s, c)), normal = three(c.normal), moved = tangential(went, normal);
+    const Vec3 impulse = three(c.normal * c.ln + c.lt);
     if (c.ln > 0) s.touched[c.i] = s.touched[c.i + 1] = s.touched[c.j] = s.touched[c.j + 1] = 1;
     if (k >= crossings) {
       const uint32_t i = s.plane_node[k - crossings];
       state.plane_drift.set(i, new_drift(settings, c, state.plane_drift.at(i), moved));
-      state.plane_normal[i] = c.ln, state.plane_friction.set(i, c.lt);
+      state.plane_normal[i] = c.ln, state.plane_friction.set(i, three(c.lt));
       around.plane->force -= impulse * newtons;
       continue;
     }
     Crossing& crossing = state.crossing[c.crossing];
     crossing.drift = new_drift(settings, c, crossing.drift, moved);
-    crossing.normal_impulse = c.ln, crossing.friction_impulse = c.lt;
-    crossing.gap = c.level + dot(c.normal, motion(s, c));
+    crossing.normal_impulse = c.ln, crossing.friction_impulse = three(c.lt);
+    crossing.gap = c.level + dot(normal, went);
     crossing.touch = c.ln <= 0 ? Touch::apart : c.slipped ? Touch::slip : Touch::stick;
     const uint32_t other = partner_of(state.key[c.crossing]);
     if (other >= kTool) {

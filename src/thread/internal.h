@@ -34,20 +34,28 @@ struct Padded3 {
   void add(size_t i, Vec3 v) { x[i] += v.x, y[i] += v.y, z[i] += v.z; }
 };
 
+// Three numbers in one register; the fourth stays 0.
+using Four = float __attribute__((vector_size(16)));
+inline Four four(Vec3 v) { return Four{v.x, v.y, v.z, 0}; }
+inline Vec3 three(Four v) { return {v[0], v[1], v[2]}; }
+inline float dot(Four a, Four b) {
+  const Four p = a * b;
+  return (p[0] + p[1]) + p[2];
+}
+
 // A contact that is solved in this substep, with all that a sweep needs.
 struct Active {
-  uint32_t i = 0, j = 0;                     // first nodes of both segments; j = i for a tool or the plane (its weights are 0)
-  float wi0 = 0, wi1 = 0, wj0 = 0, wj1 = 0;  // barycentric weights; those of the second are negative
-  float mi0 = 0, mi1 = 0, mj0 = 0, mj1 = 0;  // the same times the inverse masses
-  float inverse = 0;                         // 1 / effective inverse mass
+  Four normal{}, lt{};
+  Four partner{};     // [m] motion of the tool's contact point in this substep
+  Four pull_back{};   // share of the drift that is taken back
+  // Barycentric weights, those of the second segment negative; the same times the inverse masses.
+  float wi0 = 0, wi1 = 0, wj0 = 0, wj1 = 0, mi0 = 0, mi1 = 0, mj0 = 0, mj1 = 0;
+  uint32_t i = 0, j = 0;  // first nodes of both segments; j = i for a tool or the plane (its weights are 0)
+  float inverse = 0;      // 1 / effective inverse mass
   float mu = 0;
-  Vec3 normal;
-  float level = 0;  // gap - normal . motion, at the moment of the geometry
-  Vec3 partner;     // [m] motion of the tool's contact point in this substep
-  Vec3 pull_back;   // share of the drift that is taken back
+  float level = 0;        // gap - normal . motion, at the moment of the geometry
   float ln = 0;
-  Vec3 lt;
-  uint32_t crossing = 0;  // index in State, or of the node that touches the plane
+  uint32_t crossing = 0;  // index in State
   bool slipped = false;
 };
 
@@ -65,6 +73,8 @@ struct Scratch {
   Padded3 moment;  // per node: B times curvature over length [N]
   Padded rest, inverse_rest, keep, alpha, lambda, step, residual, diag, off, down, up, inverse_diag, tension_sum, segment_move;
   std::vector<Active> active;
+  std::vector<Four> contact_u;          // u of the nodes below, node by node
+  std::vector<uint32_t> contact_node;   // nodes of active contacts, each once
   std::vector<uint32_t> plane_node;
   std::vector<uint8_t> touched;  // per node, in this substep
   // Pair list under construction, and what finds it.

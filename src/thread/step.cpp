@@ -34,6 +34,27 @@ CATGUT_CLONES void calm(size_t nodes, float share, const float* __restrict mass,
   for (size_t k = 0; k < nodes; ++k) v[k] += w[k] * (flow[k] - flow[static_cast<ptrdiff_t>(k) - 1]);
 }
 
+// The longest way [m] of a node since the pairs were listed.
+CATGUT_CLONES float farthest_of(size_t nodes, const float* __restrict x, const float* __restrict y, const float* __restrict z,
+                                const float* __restrict fx, const float* __restrict fy, const float* __restrict fz) {
+  // Lanes by hand: a maximum is the same in any order, but compilers do not reorder floats.
+  float most[16] = {};
+  size_t i = 0;
+  for (; i + 16 <= nodes; i += 16)
+    for (size_t k = 0; k < 16; ++k) {
+      const float dx = x[i + k] - fx[i + k], dy = y[i + k] - fy[i + k], dz = z[i + k] - fz[i + k], d = dx * dx + dy * dy + dz * dz;
+      most[k] = d > most[k] ? d : most[k];
+    }
+  for (; i < nodes; ++i) {
+    const float dx = x[i] - fx[i], dy = y[i] - fy[i], dz = z[i] - fz[i], d = dx * dx + dy * dy + dz * dz;
+    most[0] = d > most[0] ? d : most[0];
+  }
+  return std::sqrt(*std::max_element(most, most + 16));
+}
+float farthest(const State& s) {
+  return farthest_of(s.nodes(), s.x.x.data(), s.x.y.data(), s.x.z.data(), s.listed.x.data(), s.listed.y.data(), s.listed.z.data());
+}
+
 void limit_motion(Scratch& s, size_t nodes, float limit) {
   for (size_t i = 0; i < nodes; ++i) {
     const float size2 = length2(s.u.at(i));
@@ -116,7 +137,7 @@ void record_hold_forces(const Settings& settings, const State& state, const Scra
     if (i > 0) on_node += s.n.at(i - 1) * (s.lambda[i - 1] * per);
     if (i < state.segments()) on_node -= s.n.at(i) * (s.lambda[i] * per);
     for (const Active& c : s.active) {
-      const Vec3 impulse = (c.normal * c.ln + c.lt) * per;
+      const Vec3 impulse = three(c.normal * c.ln + c.lt) * per;
       if (c.i == i) on_node += c.wi0 * impulse;
       if (c.i + 1 == i) on_node += c.wi1 * impulse;
       if (c.j == i) on_node += c.wj0 * impulse;
@@ -166,7 +187,7 @@ State make_state(std::span<const Vec3> path, size_t crossings) {
   CATGUT_CHECK(path.size() >= 4 && path.size() < kTool);
   const size_t n = path.size();
   State s;
-  for (Columns3* c : {&s.x, &s.fine, &s.v, &s.plane_friction, &s.plane_drift}) c->assign(n, 0);
+  for (Columns3* c : {&s.x, &s.fine, &s.v, &s.plane_friction, &s.plane_drift, &s.listed}) c->assign(n, 0);
   s.warm.assign(n, 0), s.plane_normal.assign(n, 0);
   for (size_t i = 0; i < n; ++i) s.x.set(i, path[i]);
   for (size_t i = 0; i + 1 < n; ++i) s.rest.push_back(distance(path[i], path[i + 1]));
@@ -190,6 +211,7 @@ Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_un
                     &s.lambda,       &s.step,        &s.residual,     &s.diag, &s.off,           &s.down, &s.up,
                     &s.inverse_diag, &s.tension_sum, &s.segment_move, &s.half, &s.least_density, &s.span})
     c->resize(max_nodes);
+  s.contact_u.resize(max_nodes + 1), s.contact_node.reserve(max_nodes + 1);
   s.active.reserve(max_crossings + max_nodes), s.plane_node.reserve(max_nodes), s.touched.assign(max_nodes + 1, 0);
   s.new_key.reserve(max_crossings), s.new_budget.reserve(max_crossings), s.new_crossing.reserve(max_crossings);
   s.block_middle.resize(max_nodes / 8 + 2), s.block_radius.resize(max_nodes / 8 + 2);
@@ -212,7 +234,7 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
 
   std::fill_n(s.segment_move.data(), m, 0.0f);
   for (int sub = 0; sub < settings.substeps; ++sub) {
-    if (state.travel > 0.5f * settings.list_margin)
+    if (state.travel + farthest(state) > 0.5f * settings.list_margin)
       refresh_pairs(settings, state, s, around.tools, static_cast<float>(sub) * part);
     const float time = static_cast<float>(sub + 1) * part;
     find_edges(state, s);
@@ -240,10 +262,9 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
       s.tension_sum[i] -= s.lambda[i];
       s.segment_move[i] = std::max(s.move[i], s.move[i + 1]);
     }
-    float farthest = 0;
-    for (size_t i = 0; i < n; ++i) farthest = std::max(farthest, s.move[i]);
-    for (size_t k = 0; k < 2 * around.tools.size(); ++k) farthest = std::max(farthest, length(s.tool_move[k]));
-    state.travel += farthest;
+    float tools_move = 0;
+    for (size_t k = 0; k < 2 * around.tools.size(); ++k) tools_move = std::max(tools_move, length(s.tool_move[k]));
+    state.travel += tools_move;
     move(n, keep, s.u.x.data(), state.x.x.data(), state.fine.x.data(), state.v.x.data());
     move(n, keep, s.u.y.data(), state.x.y.data(), state.fine.y.data(), state.v.y.data());
     move(n, keep, s.u.z.data(), state.x.z.data(), state.fine.z.data(), state.v.z.data());

@@ -83,7 +83,8 @@ struct State {
   // Contact with the plane, per node.
   Column plane_normal;  // [N.s2]
   Columns3 plane_friction, plane_drift;
-  float travel = 0;            // [m] largest motion since the pairs were listed
+  Columns3 listed;               // [m] where the nodes were when the pairs were listed
+  float travel = 0;              // [m] how far the tools went since then; huge: the list is out of date
   uint32_t substeps_done = 0;  // parity decides the order of a sweep
   uint32_t overflow = 0;       // pairs that found no room
   uint32_t refreshes = 0;
@@ -96,7 +97,7 @@ struct State {
 // Every field that is state, in order: for whoever saves, loads, hashes or compares.
 template <typename Archive, typename AnyState>
 void reflect(Archive& archive, AnyState& s) {
-  for (auto* c : {&s.x, &s.fine, &s.v, &s.plane_friction, &s.plane_drift}) {
+  for (auto* c : {&s.x, &s.fine, &s.v, &s.plane_friction, &s.plane_drift, &s.listed}) {
     archive("x", c->x), archive("y", c->y), archive("z", c->z);
   }
   archive("warm", s.warm), archive("rest", s.rest), archive("tension", s.tension), archive("broken", s.broken);

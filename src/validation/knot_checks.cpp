@@ -224,15 +224,18 @@ void check_holding(Lines& out, bool nightly) {
     }
   }
 
-  // Drabble et al. 2021: flat 1.2 mm, hands uncrossed 18.5 mm, tied under tension 50.6 mm of slip.
-  const Settings rough = knot_settings(0.4f);
-  const float flat = hold_knot(square(), rough, 0, Drawing::flat, 3).slip;
-  const float uncrossed = hold_knot(square(), rough, 0, Drawing::uncrossed, 3).slip;
-  const float tense = hold_knot(square(), rough, 0, Drawing::under_tension, 3).slip;
-  const std::string drabble = "order of Drabble et al. 2021, 10.1136/bmjsit-2021-000091";
-  out.add("knot/slip to 3 N, square: flat as a share of uncrossed", 0, double{flat / uncrossed}, 0.9, "", drabble);
-  out.add("knot/slip to 3 N, square: uncrossed as a share of tied under tension", 0, double{uncrossed / tense}, 0.9, "",
+  // Drabble et al. 2021: flat 1.2 mm, hands uncrossed 18.5 mm, tied under tension 50.6 mm of slip. Here at most 8 mm, mean of four
+  // frictions between which the square knot locks.
+  auto slip = [](Drawing drawing) {
+    double sum = 0;
+    for (float m : {0.25f, 0.3f, 0.35f, 0.4f}) sum += 250 * double{hold_knot(square(), knot_settings(m), 0, drawing, 3).slip};
+    return sum;
+  };
+  const double flat = slip(Drawing::flat), uncrossed = slip(Drawing::uncrossed), tense = slip(Drawing::under_tension);
+  const std::string drabble = "order of Drabble et al. 2021, 10.1136/bmjsit-2021-000091: 1.2, 18.5, 50.6 mm";
+  out.add("knot/slip to 3 N, mm: flat square " + number(flat) + " as a share of uncrossed " + number(uncrossed), 0, flat / uncrossed, 0.9, "",
           drabble);
+  out.add("knot/slip to 3 N, mm: uncrossed as a share of tied under tension " + number(tense), 0, uncrossed / tense, 0.9, "", drabble);
 
   Settings held = knot_settings(0.3f);
   Tightened t(lay_knot(square(), held.material.diameter, 1.43f * held.material.diameter));
@@ -264,19 +267,19 @@ void check_ties(Lines& out, bool nightly) {
               static_cast<double>(knot.determinant), 0, "", source);
     }
   } else {
-    int wrong = 0, all = 0;
-    for (uint64_t seed = 0; all < 200; ++seed)
-      for (const Case& c : cases) {
-        if (all == 200) break;
+    for (const Case& c : cases) {
+      int wrong = 0;
+      constexpr int kTies = 34;
+      for (uint64_t seed = 0; seed < kTies; ++seed) {
         TieSettings how;
         how.seed = seed + 1;
         how.speed = 0.1f + 0.4f * Random(seed * 7 + 3).uniform();
         const TiedKnot knot = tie_with_tools(settings, c.tie, how);
         nearest = std::min(nearest, double{knot.nearest});
         wrong += knot.determinant != c.determinant;
-        ++all;
       }
-    out.add("knot/determinant, wrong ones of 200 ties with tools at 0.1 to 0.5 m/s", 0, wrong, 0, "", source);
+      out.add(std::string("knot/determinant, wrong of ") + number(kTies) + " ties at 0.1 to 0.5 m/s: " + c.name, 0, wrong, 0, "", source);
+    }
   }
   out.add("knot/smallest distance of strands in all ties, missing from a diameter", 0, 1 - nearest, 0.2, "diameters",
           "nothing passes: two thicknesses cannot share a place");

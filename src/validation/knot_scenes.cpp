@@ -112,10 +112,10 @@ void tighten(const Settings& settings, Tightened& t, float tails, Drawing drawin
     const float on = std::min(1.0f, static_cast<float>(i) / 50),
                 off = std::min(1.0f, static_cast<float>(ticks + release - i) / 50);
     const float side = drawing == Drawing::uncrossed ? -1.0f : 1.0f, force = side * tails * on * off;
-    // A strand under tension also carries what the other should have shared.
+    // One strand is kept tight at 2.5 times the pull; the other is only wound on it.
     const bool tense = drawing == Drawing::under_tension;
     pull[0].force = k.tail_direction_a * (tense ? 2.5f * force : force);
-    pull[1].force = k.tail_direction_b * (tense ? 0.25f * force : force);
+    pull[1].force = k.tail_direction_b * (tense ? 0.05f * force : force);
     Surroundings around;
     around.pulls = pull, around.holds = hold;
     t.stepper.step(settings, t.knot.state, around);

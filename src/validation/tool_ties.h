@@ -25,7 +25,7 @@ struct TieSettings {
   float speed = 0.3f;                         // [m/s] highest of the hands
   float pull = 2.5f;                          // [N] at which the hands pull a throw tight: their grip gives way beyond
   float segment = 0.7e-3f;                    // [m]
-  float long_strand = 48e-3f, tail = 42e-3f;  // [m]
+  float long_strand = 52e-3f, tail = 42e-3f;  // [m]
   uint64_t seed = 0;                          // of the tremor of the way points, 1 mm; 0: none
 };
 
