@@ -55,7 +55,7 @@ count() {  # count FILE: writes "scene moment instructions-a-tick"
   fi
   [ -f "$root/build/CMakeCache.txt" ] || die "nothing is built yet: ./catgut test, or cmake --preset release"
   # Configured anew, because the target is there only once valgrind is.
-  { cmake -S "$root" -B "$root/build" && cmake --build "$root/build" --target count_ticks; } >"$work/build.log" 2>&1 ||
+  { cmake -S "$root" -B "$root/build" && cmake --build "$root/build" --target count_ticks bench_thread; } >"$work/build.log" 2>&1 ||
     { tail -n 30 "$work/build.log" >&2; die "count_ticks cannot be built"; }
   local program="$root/build/bench/count_ticks"
   (cd "$root" && "$program" write "$work/ticks") || die "the scenes could not be sewn"
@@ -69,6 +69,13 @@ count() {  # count FILE: writes "scene moment instructions-a-tick"
     total="$(grep -a -m 1 '^totals: ' "$work/dump.$number" | cut -d ' ' -f 2)"
     echo "$scene $moment $((total / ticks))" >>"$1"
   done <"$work/moments"
+  # The physical thread: a millisecond with a 2-1-1 knot in 300 segments.
+  valgrind --tool=callgrind --instr-atstart=no --collect-atstart=no --callgrind-out-file="$work/thread" \
+    "$root/build/bench/bench_thread" count >"$work/moments" 2>"$work/valgrind.log" ||
+    { tail -n 30 "$work/valgrind.log" >&2; die "the thread could not be counted"; }
+  read -r scene moment ticks <"$work/moments"
+  total="$(grep -a -m 1 '^totals: ' "$work/thread.1" | cut -d ' ' -f 2)"
+  echo "$scene $moment $((total / ticks))" >>"$1"
 }
 
 case "${1:-}" in

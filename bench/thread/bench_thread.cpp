@@ -17,7 +17,8 @@ int main(int argc, char** argv) {
   using namespace catgut;
   const bool count = argc > 1 && std::string_view(argv[1]) == "count";
   const thread::Settings settings = validation::knot_settings(0.3f);
-  validation::Tightened t(validation::lay_knot(validation::surgeons_211(), settings.material.diameter, 0.5e-3f, 40e-3f, 20.8e-3f));
+  validation::Tightened t(
+      validation::lay_knot(validation::surgeons_211(), settings.material.diameter, 0.5e-3f, 40e-3f, 20.8e-3f));
   thread::State& state = t.knot.state;
   validation::tighten(settings, t, 2, validation::Drawing::flat, 0.2f);
   const thread::Pull pull[2] = {{t.knot.load_a, {-3, 0, 0}}, {t.knot.load_b, {3, 0, 0}}};

@@ -98,7 +98,8 @@ float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& 
     return c.gap - ready;
   }
   Active active;
-  active.i = i, active.wi0 = 1 - c.s, active.wi1 = c.s, active.normal = four(c.normal), active.crossing = static_cast<uint32_t>(k);
+  active.i = i, active.wi0 = 1 - c.s, active.wi1 = c.s, active.normal = four(c.normal),
+  active.crossing = static_cast<uint32_t>(k);
   if (other < kTool) {
     active.j = other, active.wj0 = c.t - 1, active.wj1 = -c.t, active.mu = settings.material.friction;
   } else {

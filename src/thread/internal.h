@@ -46,14 +46,14 @@ inline float dot(Four a, Four b) {
 // A contact that is solved in this substep, with all that a sweep needs.
 struct Active {
   Four normal{}, lt{};
-  Four partner{};     // [m] motion of the tool's contact point in this substep
-  Four pull_back{};   // share of the drift that is taken back
+  Four partner{};    // [m] motion of the tool's contact point in this substep
+  Four pull_back{};  // share of the drift that is taken back
   // Barycentric weights, those of the second segment negative; the same times the inverse masses.
   float wi0 = 0, wi1 = 0, wj0 = 0, wj1 = 0, mi0 = 0, mi1 = 0, mj0 = 0, mj1 = 0;
   uint32_t i = 0, j = 0;  // first nodes of both segments; j = i for a tool or the plane (its weights are 0)
   float inverse = 0;      // 1 / effective inverse mass
   float mu = 0;
-  float level = 0;        // gap - normal . motion, at the moment of the geometry
+  float level = 0;  // gap - normal . motion, at the moment of the geometry
   float ln = 0;
   uint32_t crossing = 0;  // index in State
   bool slipped = false;
@@ -73,8 +73,8 @@ struct Scratch {
   Padded3 moment;  // per node: B times curvature over length [N]
   Padded rest, inverse_rest, keep, alpha, lambda, step, residual, diag, off, down, up, inverse_diag, tension_sum, segment_move;
   std::vector<Active> active;
-  std::vector<Four> contact_u;          // u of the nodes below, node by node
-  std::vector<uint32_t> contact_node;   // nodes of active contacts, each once
+  std::vector<Four> contact_u;         // u of the nodes below, node by node
+  std::vector<uint32_t> contact_node;  // nodes of active contacts, each once
   std::vector<uint32_t> plane_node;
   std::vector<uint8_t> touched;  // per node, in this substep
   // Pair list under construction, and what finds it.

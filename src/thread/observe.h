@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// thread/observe: what a surgeon would call what lies there. Reads the crossings of a State and never acts: the mechanics do not
-// know of it. For teaching and scoring, at any moment.
+// thread/observe: what a surgeon would call what lies there. Reads the crossings of a State and never acts: the mechanics do
+// not know of it. For teaching and scoring, at any moment.
 //
 // Two strands leave a bite; A is the thread before it, B behind it. Within a throw both strands run side by side, so the thread
-// between the two partners of a crossing has the same length everywhere in that throw, and each further throw adds to it. Throws are
-// therefore the clusters of crossings over that length; their crossings' signs give the hand, their number and the turning of both
-// strands about each other the half turns.
+// between the two partners of a crossing has the same length everywhere in that throw, and each further throw adds to it.
+// Throws are therefore the clusters of crossings over that length; their crossings' signs give the hand, their number and the
+// turning of both strands about each other the half turns.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -19,25 +19,25 @@ enum class KnotName : uint8_t { none, single_throw, granny, square, surgeons, sl
 std::string_view name_of(KnotName name);
 
 struct SeenThrow {
-  uint32_t half_turns = 0;       // 3: single throw, 5: double throw; 1: only crossed
-  int hand = 0;                  // +1 right-handed, -1 left-handed
-  float loop = 0;                // [m] of thread between the partners: the loop with everything below
-  float sliding = 0;             // 0: both strands bend alike; 1: one is straight and the other is wound on it
-  float gap = 0;                 // [m] of free thread between this throw and the one below, or the bite: air
-  float confidence = 0;          // 0..1
+  uint32_t half_turns = 0;  // 3: single throw, 5: double throw; 1: only crossed
+  int hand = 0;             // +1 right-handed, -1 left-handed
+  float loop = 0;           // [m] of thread between the partners: the loop with everything below
+  float sliding = 0;        // 0: both strands bend alike; 1: one is straight and the other is wound on it
+  float gap = 0;            // [m] of free thread between this throw and the one below, or the bite: air
+  float confidence = 0;     // 0..1
 };
 constexpr size_t kMostThrows = 12;
 struct SeenKnot {
   std::array<SeenThrow, kMostThrows> item;  // from the bite upward
   uint32_t throws = 0;
-  uint32_t wraps = 0;            // of all throws: half turns less one, halved
+  uint32_t wraps = 0;  // of all throws: half turns less one, halved
   KnotName name = KnotName::none;
-  bool air = false;              // a gap above 1 mm between throws, or to the loop the caller expects
-  float confidence = 0;          // 0..1, of the name: the least of its throws'
+  bool air = false;      // a gap above 1 mm between throws, or to the loop the caller expects
+  float confidence = 0;  // 0..1, of the name: the least of its throws'
 };
 
-// bite_a, bite_b: the nodes between which the thread lies in tissue; tight_loop [m]: the length of thread that a snug first throw
-// leaves between its partners, 0 when unknown (then the first throw is never called an air knot).
-SeenKnot observe(const Settings& settings, const State& state, uint32_t bite_a, uint32_t bite_b, float tight_loop = 0);
+// tight_loop [m]: the length of thread that a snug first throw leaves between its partners, 0 when unknown (then the first
+// throw is never called an air knot).
+SeenKnot observe(const Settings& settings, const State& state, float tight_loop = 0);
 
 }  // namespace catgut::thread

@@ -107,7 +107,8 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
   state.key.assign(s.new_key.begin(), s.new_key.end());
   state.budget.assign(s.new_budget.begin(), s.new_budget.end());
   state.crossing.assign(s.new_crossing.begin(), s.new_crossing.end());
-  for (auto [to, from] : {std::pair{&state.listed.x, &state.x.x}, std::pair{&state.listed.y, &state.x.y}, std::pair{&state.listed.z, &state.x.z}})
+  for (auto [to, from] :
+       {std::pair{&state.listed.x, &state.x.x}, std::pair{&state.listed.y, &state.x.y}, std::pair{&state.listed.z, &state.x.z}})
     to->assign(from->begin(), from->end());
   state.travel = 0;
   ++state.refreshes;

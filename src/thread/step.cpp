@@ -42,7 +42,8 @@ CATGUT_CLONES float farthest_of(size_t nodes, const float* __restrict x, const f
   size_t i = 0;
   for (; i + 16 <= nodes; i += 16)
     for (size_t k = 0; k < 16; ++k) {
-      const float dx = x[i + k] - fx[i + k], dy = y[i + k] - fy[i + k], dz = z[i + k] - fz[i + k], d = dx * dx + dy * dy + dz * dz;
+      const float dx = x[i + k] - fx[i + k], dy = y[i + k] - fy[i + k], dz = z[i + k] - fz[i + k],
+                  d = dx * dx + dy * dy + dz * dz;
       most[k] = d > most[k] ? d : most[k];
     }
   for (; i < nodes; ++i) {
@@ -52,7 +53,8 @@ CATGUT_CLONES float farthest_of(size_t nodes, const float* __restrict x, const f
   return std::sqrt(*std::max_element(most, most + 16));
 }
 float farthest(const State& s) {
-  return farthest_of(s.nodes(), s.x.x.data(), s.x.y.data(), s.x.z.data(), s.listed.x.data(), s.listed.y.data(), s.listed.z.data());
+  return farthest_of(s.nodes(), s.x.x.data(), s.x.y.data(), s.x.z.data(), s.listed.x.data(), s.listed.y.data(),
+                     s.listed.z.data());
 }
 
 void limit_motion(Scratch& s, size_t nodes, float limit) {

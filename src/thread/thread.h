@@ -83,8 +83,8 @@ struct State {
   // Contact with the plane, per node.
   Column plane_normal;  // [N.s2]
   Columns3 plane_friction, plane_drift;
-  Columns3 listed;               // [m] where the nodes were when the pairs were listed
-  float travel = 0;              // [m] how far the tools went since then; huge: the list is out of date
+  Columns3 listed;             // [m] where the nodes were when the pairs were listed
+  float travel = 0;            // [m] how far the tools went since then; huge: the list is out of date
   uint32_t substeps_done = 0;  // parity decides the order of a sweep
   uint32_t overflow = 0;       // pairs that found no room
   uint32_t refreshes = 0;

@@ -67,6 +67,8 @@ void check_wall(Lines& out);
 void check_capstan(Lines& out, bool nightly);
 void check_overhand(Lines& out, bool nightly);
 void check_holding(Lines& out, bool nightly);
+void check_shaking(Lines& out, bool nightly);
+void check_locking(Lines& out);
 void check_ties(Lines& out, bool nightly);
 
 }  // namespace catgut::validation

@@ -224,8 +224,8 @@ void check_holding(Lines& out, bool nightly) {
     }
   }
 
-  // Drabble et al. 2021: flat 1.2 mm, hands uncrossed 18.5 mm, tied under tension 50.6 mm of slip. Here at most 8 mm, mean of four
-  // frictions between which the square knot locks.
+  // Drabble et al. 2021: flat 1.2 mm, hands uncrossed 18.5 mm, tied under tension 50.6 mm of slip. Here at most 8 mm, mean of
+  // four frictions between which the square knot locks.
   auto slip = [](Drawing drawing) {
     double sum = 0;
     for (float m : {0.25f, 0.3f, 0.35f, 0.4f}) sum += 250 * double{hold_knot(square(), knot_settings(m), 0, drawing, 3).slip};
@@ -233,9 +233,10 @@ void check_holding(Lines& out, bool nightly) {
   };
   const double flat = slip(Drawing::flat), uncrossed = slip(Drawing::uncrossed), tense = slip(Drawing::under_tension);
   const std::string drabble = "order of Drabble et al. 2021, 10.1136/bmjsit-2021-000091: 1.2, 18.5, 50.6 mm";
-  out.add("knot/slip to 3 N, mm: flat square " + number(flat) + " as a share of uncrossed " + number(uncrossed), 0, flat / uncrossed, 0.9, "",
+  out.add("knot/slip to 3 N, mm: flat square " + number(flat) + " as a share of uncrossed " + number(uncrossed), 0,
+          flat / uncrossed, 0.9, "", drabble);
+  out.add("knot/slip to 3 N, mm: uncrossed as a share of tied under tension " + number(tense), 0, uncrossed / tense, 0.9, "",
           drabble);
-  out.add("knot/slip to 3 N, mm: uncrossed as a share of tied under tension " + number(tense), 0, uncrossed / tense, 0.9, "", drabble);
 
   Settings held = knot_settings(0.3f);
   Tightened t(lay_knot(square(), held.material.diameter, 1.43f * held.material.diameter));
@@ -243,6 +244,38 @@ void check_holding(Lines& out, bool nightly) {
   const double seconds = nightly ? 60 : 4;
   out.add("knot/creep of a square knot at 3 N for " + number(seconds) + " s", 0, 1e6 * creep(held, t, 3, seconds, seconds / 2),
           1, "um/s", "a knot that holds does not creep");
+}
+
+void check_shaking(Lines& out, bool nightly) {
+  for (const Kind& kind : {Kind{"square", square()}, Kind{"granny", granny()}}) {
+    if (!nightly && kind.throws[1].hand > 0) continue;
+    Settings settings = knot_settings(0.4f);
+    Tightened t(lay_knot(kind.throws, settings.material.diameter, 1.43f * settings.material.diameter));
+    tighten(settings, t, 2);
+    const int cycles = nightly ? 100 : 6;
+    const Shaken shaken = shake(settings, t, cycles, 0.5f, 5);
+    const std::string name = std::string("knot/") + kind.name + " shaken " + number(cycles) + " times at 0.5 m/s and 5 N, ";
+    out.add(name + "determinant", static_cast<double>(shaken.before), static_cast<double>(shaken.after), 0, "",
+            "a knot is a knot");
+    out.add(name + "strands nearer than a diameter by", 0, 1 - double{shaken.nearest}, 0.2, "diameters", "nothing passes");
+  }
+}
+
+// At which friction each knot begins to hold 8 N: a record, with the band in which two neighbors in friction can change their
+// order.
+void check_locking(Lines& out) {
+  struct Expected {
+    Kind kind;
+    double friction;
+  };
+  for (const Expected& e : {Expected{{"granny", granny()}, 0.42}, Expected{{"square", square()}, 0.30}}) {
+    double lock = 0;
+    for (float mu = 0.16f; mu < 0.45f && lock == 0; mu += 0.02f)
+      if (hold_knot(e.kind.throws, knot_settings(mu), 0).held && hold_knot(e.kind.throws, knot_settings(mu + 0.02f), 0).held)
+        lock = double{mu};
+    out.add(std::string("knot/") + e.kind.name + ", friction at which it holds 8 N (segments of 1.43 diameters)", e.friction,
+            lock, 0.25, "", "on record: docs/thread.md");
+  }
 }
 
 void check_ties(Lines& out, bool nightly) {
@@ -278,7 +311,8 @@ void check_ties(Lines& out, bool nightly) {
         nearest = std::min(nearest, double{knot.nearest});
         wrong += knot.determinant != c.determinant;
       }
-      out.add(std::string("knot/determinant, wrong of ") + number(kTies) + " ties at 0.1 to 0.5 m/s: " + c.name, 0, wrong, 0, "", source);
+      out.add(std::string("knot/determinant, wrong of ") + number(kTies) + " ties at 0.1 to 0.5 m/s: " + c.name, 0, wrong, 0,
+              "", source);
     }
   }
   out.add("knot/smallest distance of strands in all ties, missing from a diameter", 0, 1 - nearest, 0.2, "diameters",

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "thread/topology.h"
+
 namespace catgut::validation {
 namespace {
 
@@ -41,7 +43,7 @@ Throws surgeons() { return {{5, 1}, {3, -1}}; }
 Throws three_throws() { return {{3, 1}, {3, -1}, {3, 1}}; }
 Throws surgeons_211() { return {{5, 1}, {3, -1}, {3, 1}}; }
 
-LaidKnot lay_knot(std::span<const Throw> throws, float d, float segment, float load, float tail) {
+LaidKnot lay_knot(std::span<const Throw> throws, float d, float segment, float load, float tail, float drop) {
   // Strand A from its load end up; B is A turned by half a turn about z, because every throw is symmetric under that turn.
   std::vector<Vec3> a;
   const float r = 0.75f * d, bend = 1.5f * d;
@@ -51,7 +53,7 @@ LaidKnot lay_knot(std::span<const Throw> throws, float d, float segment, float l
     for (int i = 1; i <= n; ++i) a.push_back(lerp(from, to, static_cast<float>(i) / static_cast<float>(n)));
   };
   const float first = 0.5f * 2.2f * d * static_cast<float>(throws[0].half_turns);
-  a.push_back({-first - load, 0, -r});
+  a.push_back({-first - load * std::cos(drop), 0, -r - load * std::sin(drop)});
   float z = 0, side = -1;  // A enters from this side
   for (size_t k = 0; k < throws.size(); ++k) {
     const float turns = static_cast<float>(throws[k].half_turns * throws[k].hand) * kPi;
@@ -101,16 +103,16 @@ Settings knot_settings(float friction) {
   return s;
 }
 
-void tighten(const Settings& settings, Tightened& t, float tails, Drawing drawing, float seconds) {
+void tighten(const Settings& settings, Tightened& t, float tails, Drawing drawing, float seconds, bool let_go) {
   const LaidKnot& k = t.knot;
   std::vector<Pull> pull{{k.tail_a(), {}}, {k.tail_b(), {}}};
   std::vector<Hold> hold(2);
   hold[0].node = k.load_a, hold[1].node = k.load_b;
   for (Hold& h : hold) h.from = h.to = k.state.position(h.node), h.stiffness = 500;
-  const int ticks = static_cast<int>(std::lround(seconds * 1000)), release = 50;
+  const int ticks = static_cast<int>(std::lround(seconds * 1000)), release = let_go ? 50 : 0;
   for (int i = 0; i < ticks + release; ++i) {
     const float on = std::min(1.0f, static_cast<float>(i) / 50),
-                off = std::min(1.0f, static_cast<float>(ticks + release - i) / 50);
+                off = let_go ? std::min(1.0f, static_cast<float>(ticks + release - i) / 50) : 1.0f;
     const float side = drawing == Drawing::uncrossed ? -1.0f : 1.0f, force = side * tails * on * off;
     // One strand is kept tight at 2.5 times the pull; the other is only wound on it.
     const bool tense = drawing == Drawing::under_tension;
@@ -173,6 +175,43 @@ double creep(const Settings& settings, Tightened& t, float load, double seconds,
     if (i + 1 == ticks - last) before = apart();
   }
   return (apart() - before) / window;
+}
+
+std::vector<Vec3> closed_curve(const LaidKnot& k) {
+  std::vector<Vec3> p;
+  for (size_t i = 0; i < k.state.nodes(); ++i) {
+    p.push_back(k.state.position(i));
+    if (i == k.load_a) p.push_back(p.back() + Vec3{0, 0, -0.1f}), p.push_back(k.state.position(k.load_b) + Vec3{0, 0, -0.1f});
+  }
+  return thread::close_curve(p, k.tail_direction_a, k.tail_direction_b);
+}
+
+Shaken shake(const Settings& settings, Tightened& t, int cycles, float speed, float load) {
+  constexpr float kReach = 5e-3f;  // [m] to either side
+  const LaidKnot& k = t.knot;
+  Shaken result;
+  result.before = thread::knot_determinant(closed_curve(k));
+  Hold hold;
+  hold.node = k.load_b;
+  const Vec3 center = k.state.position(k.load_b);
+  hold.from = hold.to = center;
+  const int ticks = static_cast<int>(std::ceil(2 * kPi * kReach / speed * 1000));
+  for (int i = 0; i < cycles * ticks; ++i) {
+    const Vec3 way[] = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}};
+    const float angle = 2 * kPi * static_cast<float>(i % ticks + 1) / static_cast<float>(ticks);
+    hold.from = hold.to;
+    hold.to = center + way[i / ticks % 3] * (kReach * std::sin(angle));
+    const Pull pull{k.load_a, {-load * std::min(1.0f, static_cast<float>(i) / 100), 0, 0}};
+    Surroundings around;
+    around.holds = {&hold, 1}, around.pulls = {&pull, 1};
+    t.stepper.step(settings, t.knot.state, around);
+    for (size_t c = 0; c < k.state.key.size(); ++c)
+      if (k.state.crossing[c].normal_impulse > 0)
+        result.nearest = std::min(result.nearest, 1 + k.state.crossing[c].gap / settings.material.diameter);
+    for (float tension : k.state.tension) result.peak = std::max(result.peak, tension);
+  }
+  result.after = thread::knot_determinant(closed_curve(k));
+  return result;
 }
 
 }  // namespace catgut::validation

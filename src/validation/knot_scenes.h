@@ -28,7 +28,7 @@ Throws surgeons_211();  // 2-1-1, square
 
 // Two strands with a knot between them at the origin. Strand A: nodes 0 (tail) .. load_a; strand B: load_a + 1 = load_b .. last
 // (tail). They are one thread whose bite is cut: the segment between the two load ends is broken, unless `joined`.
-// The load ends lie at -x and +x, the tails leave along x above the knot.
+// The load ends lie at -x and +x, `drop` [rad] below the horizontal; the tails leave along x above the knot.
 struct LaidKnot {
   thread::State state;
   uint32_t load_a = 0, load_b = 0;
@@ -36,7 +36,11 @@ struct LaidKnot {
   uint32_t tail_b() const { return static_cast<uint32_t>(state.nodes()) - 1; }
   Vec3 tail_direction_a, tail_direction_b;
 };
-LaidKnot lay_knot(std::span<const Throw> throws, float diameter, float segment, float load = 15e-3f, float tail = 12e-3f);
+LaidKnot lay_knot(std::span<const Throw> throws, float diameter, float segment, float load = 15e-3f, float tail = 12e-3f,
+                  float drop = 0);
+
+// Both strands as one closed curve: joined below the knot, the tails led far away.
+std::vector<Vec3> closed_curve(const LaidKnot& knot);
 
 // The settings of the holding tests: thread of 0.35 mm, EA 500 N, B 1e-8 N.m2, segments of 1.4 diameters.
 thread::Settings knot_settings(float friction);
@@ -49,9 +53,10 @@ struct Tightened {
 // How the tails are drawn. Flat: to the sides on which they leave. Uncrossed: each to the other side, as with hands that should
 // have crossed. Under tension: strand A is kept tight all the time, strand B is wound on it.
 enum class Drawing { flat, uncrossed, under_tension };
-// Pulls the tails with `tails` [N] while springs of 500 N/m (tissue) hold the load ends, then lets the tails go within 50 ms.
-void tighten(const thread::Settings& settings, Tightened& t, float tails, Drawing drawing = Drawing::flat,
-             float seconds = 0.3f);
+// Pulls the tails with `tails` [N] while springs of 500 N/m (tissue) hold the load ends, then lets the tails go within 50 ms,
+// unless they are to be kept pulled.
+void tighten(const thread::Settings& settings, Tightened& t, float tails, Drawing drawing = Drawing::flat, float seconds = 0.3f,
+             bool let_go = true);
 
 struct Holding {
   float peak = 0;     // [N] largest force on the load ends, smoothed over 5 ms
@@ -64,5 +69,14 @@ Holding pull_apart(const thread::Settings& settings, Tightened& t, float tails =
                    float distance = 8e-3f);
 // Holds a constant load [N] for `seconds`; returns the creep speed [m/s] over the last `window` seconds.
 double creep(const thread::Settings& settings, Tightened& t, float load, double seconds, double window);
+
+struct Shaken {
+  uint64_t before = 0, after = 0;  // determinants
+  float nearest = 1;               // smallest distance between touching strands, in diameters
+  float peak = 0;                  // [N] largest tension
+};
+// Shakes one load end to and fro by 10 mm at up to `speed` [m/s], across and along the strands in turn, while the other is
+// pulled.
+Shaken shake(const thread::Settings& settings, Tightened& t, int cycles, float speed, float load);
 
 }  // namespace catgut::validation

@@ -50,7 +50,7 @@ class Tying {
     for (int i = 0; i < 200; ++i) fine.push_back({-1.5e-3f * std::cos(kPi * i / 200), -1.5e-3f * std::sin(kPi * i / 200), 0});
     int wraps = 1;
     for (const TiedThrow& t : tie) wraps = std::max(wraps, t.wraps);
-    const float longest = how.long_strand + 16e-3f * static_cast<float>(wraps - 1) + 6e-3f * static_cast<float>(tie.size() - 1);
+    const float longest = how.long_strand + 8e-3f * static_cast<float>(wraps - 1) + 6e-3f * static_cast<float>(tie.size() - 1);
     line(right, right + long_way * longest);
     const std::vector<Vec3> path = resample(fine, l);
     knot_.state = thread::make_state(path);
@@ -78,7 +78,7 @@ class Tying {
   // The hand takes the long strand where enough is left for so many windings, and no more: slack falls off the jaws. `now` [m]:
   // how much of it lies between the wound and the node that the hand holds.
   void take_strand(float now, int wraps) {
-    const float want = how_.long_strand + 16e-3f * static_cast<float>(wraps - 1);
+    const float want = how_.long_strand + 8e-3f * static_cast<float>(wraps - 1);
     const int shift = static_cast<int>(std::lround((want - now) / how_.segment)),
               last = static_cast<int>(knot_.state.nodes()) - 1;
     hold_[3].node = static_cast<uint32_t>(std::min(last, static_cast<int>(hold_[3].node) + shift));

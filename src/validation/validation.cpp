@@ -116,6 +116,8 @@ std::vector<ValidationLine> run_validation(const std::function<void(const Valida
   validation::check_capstan(lines, nightly);
   validation::check_overhand(lines, nightly);
   validation::check_holding(lines, nightly);
+  validation::check_shaking(lines, nightly);
+  if (nightly) validation::check_locking(lines);
   validation::check_ties(lines, nightly);
   return lines.line;
 }

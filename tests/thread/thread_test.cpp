@@ -6,8 +6,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
+#include "thread/observe.h"
 #include "thread/topology.h"
 #include "validation/knot_scenes.h"
 
@@ -199,15 +201,8 @@ TEST(Thread, holds_a_metre_from_the_origin) {
   EXPECT_LT(std::abs(validation::creep(settings, t, 3, 3, 1)), 1e-6);
 }
 
-// Strands of a laid knot joined into one closed curve: the bite below, the tails far away.
 std::vector<Vec3> closed(const validation::Throws& throws) {
-  const validation::LaidKnot k = validation::lay_knot(throws, 0.35e-3f, 0.5e-3f);
-  std::vector<Vec3> p;
-  for (size_t i = 0; i < k.state.nodes(); ++i) {
-    p.push_back(k.state.position(i));
-    if (i == k.load_a) p.push_back(p.back() + Vec3{0, 0, -0.02f}), p.push_back(k.state.position(k.load_b) + Vec3{0, 0, -0.02f});
-  }
-  return close_curve(p, k.tail_direction_a, k.tail_direction_b);
+  return validation::closed_curve(validation::lay_knot(throws, 0.35e-3f, 0.5e-3f));
 }
 
 TEST(Topology, determinants_are_those_of_the_books) {
@@ -225,6 +220,61 @@ TEST(Topology, determinants_are_those_of_the_books) {
 TEST(Topology, writhe_tells_granny_from_square) {
   EXPECT_NEAR(mean_writhe(closed(validation::square())), 0, 1.5);
   EXPECT_GT(std::abs(mean_writhe(closed(validation::granny()))), 4);
+}
+
+struct Named {
+  validation::Throws throws;
+  KnotName name;
+  uint32_t count, wraps;
+};
+
+TEST(Observe, names_what_was_wound_and_what_is_tight) {
+  const Named all[] = {{validation::granny(), KnotName::granny, 2, 2},
+                       {validation::square(), KnotName::square, 2, 2},
+                       {{{3, -1}, {3, 1}}, KnotName::square, 2, 2},
+                       {{{3, -1}, {3, -1}}, KnotName::granny, 2, 2},
+                       {validation::surgeons(), KnotName::surgeons, 2, 3}};
+  const Settings settings = validation::knot_settings(0.3f);
+  for (const Named& n : all) {
+    validation::Tightened t(validation::lay_knot(n.throws, settings.material.diameter, 0.5e-3f));
+    Surroundings nothing;
+    t.stepper.step(settings, t.knot.state, nothing);
+    for (const bool tight : {false, true}) {
+      if (tight) validation::tighten(settings, t, 2);
+      const SeenKnot seen = observe(settings, t.knot.state);
+      EXPECT_EQ(seen.name, n.name) << name_of(seen.name) << " for " << name_of(n.name) << (tight ? ", tight" : ", wound");
+      EXPECT_EQ(seen.throws, n.count);
+      EXPECT_EQ(seen.wraps, n.wraps);
+      EXPECT_GT(seen.confidence, 0.5f);
+      EXPECT_EQ(seen.item[0].hand, n.throws[0].hand);
+    }
+  }
+}
+
+TEST(Observe, sees_a_single_throw_and_nothing_where_there_is_none) {
+  const Settings settings = validation::knot_settings(0.3f);
+  Surroundings nothing;
+  for (const auto& [throws, wraps] : {std::pair{validation::Throws{{3, 1}}, 1u}, std::pair{validation::Throws{{5, 1}}, 2u},
+                                      std::pair{validation::Throws{{1, 1}}, 0u}}) {
+    validation::Tightened t(validation::lay_knot(throws, settings.material.diameter, 0.5e-3f));
+    t.stepper.step(settings, t.knot.state, nothing);
+    const uint64_t before = hash_state(t.knot.state);
+    const SeenKnot seen = observe(settings, t.knot.state);
+    EXPECT_EQ(seen.name, wraps ? KnotName::single_throw : KnotName::none);
+    EXPECT_EQ(seen.wraps, wraps);
+    EXPECT_EQ(hash_state(t.knot.state), before);  // it watches
+  }
+}
+
+// Two throws laid 3 mm apart and not drawn together.
+TEST(Observe, calls_a_gap_between_throws_an_air_knot) {
+  const Settings settings = validation::knot_settings(0.3f);
+  validation::Tightened t(validation::lay_knot(validation::square(), settings.material.diameter, 0.5e-3f));
+  Surroundings nothing;
+  t.stepper.step(settings, t.knot.state, nothing);
+  EXPECT_TRUE(observe(settings, t.knot.state).air);
+  validation::tighten(settings, t, 2);
+  EXPECT_FALSE(observe(settings, t.knot.state).air);
 }
 
 }  // namespace
