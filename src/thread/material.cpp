@@ -4,15 +4,14 @@
 // Diameters: middle of the range of USP <861> (4-0 0.150-0.199, 3-0 0.200-0.249, 2-0 0.300-0.339, 0 0.350-0.399 mm).
 // Knot-pull strength: minimum averages of USP <861>: absorbable synthetic 9.3 / 17.4 / 26.3 / 38.2 N and nonabsorbable class I
 // 5.9 / 9.4 / 14.1 / 21.2 N for 4-0 / 3-0 / 2-0 / 0.
-// Straight strength: knot-pull strength divided by the knot efficiency of Kim et al. 2007 (10.1007/s10856-007-3043-7): about
-// 0.85. Tensile modulus: silk 8.70 GPa, polyglactin 9.32 GPa (Naleway et al. 2015, 10.1002/jbm.b.33171); polypropylene 2 GPa,
-// polydioxanone 1 GPa: ESTIMATES from supplier data.
-// Bending: a monofilament is a solid rod, B = E pi d^4 / 64. A braid bends like its loose fibres: 1 % of the solid value, as
-// measured on a polyethylene braid (data beside Johanns et al. 2023, 10.1126/sciadv.adg8861): ESTIMATE for silk and
-// polyglactin. Friction: braids hold more than monofilaments and coating lowers it (Surg Gynecol Obstet 1985;161:12 gives the
-// order). The values are ESTIMATES in the range 0.15-0.3 of capstan rigs (Zhang et al. 2017, 10.1007/s40544-017-0140-3) and
-// nitinol knots (0.119; Jawed et al. 2015, 10.1103/PhysRevLett.115.118302). docs/thread.md says at which friction each knot
-// locks here.
+// Straight strength: knot-pull strength divided by the knot efficiency of Kim et al. 2007 (J Mater Sci Mater Med 18:2363):
+// about 0.85. Tensile modulus: silk 8.70 GPa, polyglactin 9.32 GPa (Naleway et al. 2015, 10.1002/jbm.b.33171); polypropylene 2
+// GPa, polydioxanone 1 GPa: ESTIMATES from supplier data. Bending: a monofilament is a solid rod, B = E pi d^4 / 64. A braid
+// bends like its loose fibres: 1 % of the solid value, as measured on a polyethylene braid (data beside Johanns et al.
+// 2023, 10.1126/sciadv.adg8861): ESTIMATE for silk and polyglactin. Friction: braids hold more than monofilaments and coating
+// lowers it (Surg Gynecol Obstet 1985;161:12 gives the order). The values are ESTIMATES in the range 0.15-0.3 of capstan rigs
+// (Zhang et al. 2017, 10.1007/s40544-017-0140-3) and nitinol knots (0.119; Jawed et al. 2015, 10.1103/PhysRevLett.115.118302).
+// docs/thread.md says at which friction each knot locks here.
 #include "thread/material.h"
 
 #include <array>

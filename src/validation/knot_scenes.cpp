@@ -191,19 +191,23 @@ Shaken shake(const Settings& settings, Tightened& t, int cycles, float speed, fl
   const LaidKnot& k = t.knot;
   Shaken result;
   result.before = thread::knot_determinant(closed_curve(k));
-  Hold hold;
-  hold.node = k.load_b;
-  const Vec3 center = k.state.position(k.load_b);
-  hold.from = hold.to = center;
+  // No end is free: what changes the knot then has passed through a strand, and has not gone round an end.
+  Hold hold[4];
+  hold[0].node = k.load_b, hold[1].node = k.tail_a(), hold[2].node = k.tail_b(), hold[3].node = k.load_a;
+  for (Hold& h : hold) h.from = h.to = k.state.position(h.node);
+  hold[1].stiffness = hold[2].stiffness = 200, hold[3].stiffness = 1000;
+  const float stretch = load / hold[3].stiffness, start = hold[3].to.x;
+  const Vec3 center = hold[0].to;
   const int ticks = static_cast<int>(std::ceil(2 * kPi * kReach / speed * 1000));
   for (int i = 0; i < cycles * ticks; ++i) {
     const Vec3 way[] = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}};
     const float angle = 2 * kPi * static_cast<float>(i % ticks + 1) / static_cast<float>(ticks);
-    hold.from = hold.to;
-    hold.to = center + way[i / ticks % 3] * (kReach * std::sin(angle));
-    const Pull pull{k.load_a, {-load * std::min(1.0f, static_cast<float>(i) / 100), 0, 0}};
+    hold[0].from = hold[0].to;
+    hold[0].to = center + way[i / ticks % 3] * (kReach * std::sin(angle));
+    hold[3].from = hold[3].to;
+    hold[3].to.x = start - stretch * std::min(1.0f, static_cast<float>(i) / 100);
     Surroundings around;
-    around.holds = {&hold, 1}, around.pulls = {&pull, 1};
+    around.holds = hold;
     t.stepper.step(settings, t.knot.state, around);
     for (size_t c = 0; c < k.state.key.size(); ++c)
       if (k.state.crossing[c].normal_impulse > 0)
