@@ -293,10 +293,10 @@ void check_ties(Lines& out, bool nightly) {
   if (!nightly) {
     for (const Case& c : {cases[0], cases[2]}) {
       TieSettings how;
-      how.speed = 0.4f;
+      how.speed = 0.3f;
       const TiedKnot knot = tie_with_tools(settings, c.tie, how);
       nearest = std::min(nearest, double{knot.nearest});
-      out.add(std::string("knot/determinant, ") + c.name + " tied with tools at 0.4 m/s", static_cast<double>(c.determinant),
+      out.add(std::string("knot/determinant, ") + c.name + " tied with tools at 0.3 m/s", static_cast<double>(c.determinant),
               static_cast<double>(knot.determinant), 0, "", source);
     }
   } else {
