@@ -20,7 +20,7 @@ int main() {
   std::vector<EventKind> happened;
   publish(*model, *state, seen);
   for (TickInput input; input.tick < 60 * 30 && happened.size() < 5; ++input.tick) {
-    input.hand = hands.surgeon->operate(seen, 1 / scene.solver.tick_rate);
+    input.hand = hands.surgeon->operate(seen, 1 / scene.solver.tick_rate).hand;
     step(*model, *state, input, jobs);
     publish(*model, *state, seen);
     for (const Event& e : seen.event) {

@@ -40,12 +40,12 @@ int main() {
   input.hand[0].connected = input.hand[1].connected = 0;
   while (input.tick < static_cast<uint64_t>(std::lround(scene.settle * scene.solver.tick_rate))) one_tick();
 
-  std::array<Pose, 2> hand_before;
+  std::array<HandState, kMaxHands> hand_before;
   Vec3 tip_before, tool_before;
   std::vector<std::byte> before;
   const auto entered = [&] { return !s.suture.bite.empty(); };
   while (!entered() && input.tick < 60 * 60) {
-    input.hand = hands.surgeon->operate(seen, 1 / scene.solver.tick_rate);
+    input.hand = hands.surgeon->operate(seen, 1 / scene.solver.tick_rate).hand;
     before = save_state(m, s);
     hand_before = s.hand;
     tip_before = tip_of(m, s), tool_before = s.solver.body[0].x;
@@ -59,7 +59,7 @@ int main() {
   std::printf("tick %llu, %.2f s: \"%s\"\n", static_cast<unsigned long long>(input.tick - 1),
               static_cast<double>(input.tick - 1) / scene.solver.tick_rate, hands.surgeon->doing().c_str());
   print("right hand", input.hand[0].pose.p);
-  print("  a tick before", hand_before[0].p);
+  print("  a tick before", hand_before[0].pose.p);
   std::printf("%-32s %8.1f mm/s\n", "  its speed, without tremor", 1e3 * length(input.hand[0].velocity));
   std::printf("%-32s %8.2f closed 0 .. 1 open\n", "  its jaw", input.hand[0].jaw);
   print("left hand, waiting", input.hand[1].pose.p);

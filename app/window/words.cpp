@@ -9,7 +9,10 @@
 namespace catgut {
 namespace {
 
-const char* tool_name(uint8_t who) { return who == 0 ? "needle holder" : "forceps"; }
+const char* tool_name(uint8_t hand) {
+  constexpr const char* kName[kMaxHands] = {"needle holder", "forceps", "assistant right", "assistant left"};
+  return hand < kMaxHands ? kName[hand] : "parked clamp";
+}
 
 std::string counted(int n, const char* one) { return fmt::format("{} {}{}", n, one, n == 1 ? "" : "s"); }
 
@@ -116,6 +119,15 @@ std::string words_for(const Event& e, bool& bad) {
       return "suture finished";
     case EventKind::seam_closed:
       return fmt::format("edges approximated, gap {:.1f} mm", 1000 * e.value);
+    case EventKind::instrument_taken:
+      return "instrument taken";
+    case EventKind::instrument_laid_down:
+      return "instrument laid down";
+    case EventKind::instrument_parked:
+      return "clamp parked";
+    case EventKind::instrument_refused:
+      bad = true;
+      return "instrument unavailable";
     case EventKind::technique_fault:
       bad = true;
       return fault_words(e.fault);

@@ -69,7 +69,10 @@ bool near_on_screen(const ViewFrame& view, Vec3 hand, Vec3 place, float reach, V
 void help_to_bite(Steering& steering, size_t who, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen) {
   SteeredHand& hand = steering.hand[who];
   const bool was = hand.snapped && hand.at == HelpAt::bite;
-  const bool drives = picture.tool[who] == ToolKind::needle_driver && seen.tool[1 - who].held != Held::needle;
+  // A needle is driven with what holds it locked: a needle holder, not forceps.
+  const int tool = seen.tool[who].instrument;
+  const bool drives = tool >= 0 && picture.instrument[static_cast<size_t>(tool)].can(kHoldNeedle | kClamp) &&
+                      seen.tool[1 - who].held != Held::needle;
   if (!steering.guide || !drives || (seen.needle.in_tissue && !was)) {
     hand.snapped = false;
     return;

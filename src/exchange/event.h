@@ -37,9 +37,13 @@ enum class EventKind : uint8_t {
   knot_cancelled,     // which: knot; the free end was let go before it reached the tissue
   thread_cut,    // who: hand, which: slot toward the free end, value: thread to the nearest suture point or knot [m], -1: none
   suture_taken,  // which: how many were taken before; a fresh needle and thread lie ready
-  stitch_settled,   // which: settled stitch; its thread is no longer simulated (3.4)
-  seam_closed,      // which: row of Snapshot::seam, value: what is left of its gap [m]
-  technique_fault,  // fault, which: bite, knot or suture (see Fault); nothing is repaired
+  stitch_settled,        // which: settled stitch; its thread is no longer simulated (3.4)
+  seam_closed,           // which: row of Snapshot::seam, value: what is left of its gap [m]
+  instrument_taken,      // who: hand, which: instrument
+  instrument_laid_down,  // who: hand, which: instrument
+  instrument_parked,     // who: hand, which: instrument; it stays on what it holds
+  instrument_refused,    // who: hand, which: instrument; a command that could not be carried out
+  technique_fault,       // fault, which: bite, knot or suture (see Fault); nothing is repaired
   count_
 };
 
@@ -71,7 +75,7 @@ const char* event_name(EventKind kind);
 
 struct Event {
   EventKind kind{};
-  uint8_t who = 0;     // hand, where there is one
+  uint8_t who = 0;     // hand, where there is one; kNoHand (255): a parked instrument
   uint32_t which = 0;  // see EventKind
   float value = 0;     // see EventKind
   Vec3 where;          // [m]

@@ -8,15 +8,17 @@
 #include "core/math.h"
 #include "exchange/event.h"
 #include "exchange/force_patch.h"
+#include "exchange/instrument.h"
+#include "exchange/tool_input.h"
 
 namespace catgut {
 
-enum class Held : uint8_t { nothing, needle, thread, tissue };
-
+// A hand and the instrument that it has. An empty hand: `pose` is the hand's, nothing is held.
 struct ToolView {
-  Pose pose;      // where the simulated tool is (tissue and thread may hold it back from the hand)
-  Pose hand;      // where the hand is
-  float jaw = 1;  // 0 closed .. 1 open
+  int instrument = -1;  // of Snapshot::instrument; -1: the hand is empty
+  Pose pose;            // where the simulated tool is (tissue and thread may hold it back from the hand)
+  Pose hand;            // where the hand is
+  float jaw = 1;        // 0 closed .. 1 open
   Held held = Held::nothing;
   float held_at = 0;          // needle: place on the arc, 0 swage .. 1 tip
   uint32_t held_slot = 0;     // thread: particle slot; tissue: particle
@@ -27,6 +29,17 @@ struct ToolView {
   uint32_t loop_first = 0, loop_last = 0;  // slots of the loop's ends, free-end side first; valid with a loop
   Vec3 force;                              // [N] on the hand
   Vec3 torque;                             // [N m] on the hand, about the tool's origin
+};
+
+// Every instrument of the scene, whether a hand has it or not.
+struct InstrumentView {
+  Pose pose;
+  float jaw = 1;  // 0 closed .. 1 open
+  InstrumentPlace place = InstrumentPlace::tray;
+  uint8_t hand = kNoHand;  // that has it
+  Held held = Held::nothing;
+  uint32_t held_slot = 0;  // as ToolView::held_slot
+  Vec3 pull;               // [N] on the tissue that it holds
 };
 
 struct NeedleView {
@@ -89,11 +102,12 @@ struct BiteView {
 struct Snapshot {
   uint64_t tick = 0;
   double time_s = 0;
-  std::vector<Vec3> particle;          // [m] tissue particles of every body, then thread slots
-  std::vector<Quat> rotation;          // per tissue particle: rotation of the cluster centred on it
-  std::vector<uint32_t> thread_order;  // particle indices from the free end to the needle
-  std::vector<float> thread_tension;   // [N] per pair of thread_order, size thread_order.size() - 1
-  std::array<ToolView, 2> tool;
+  std::vector<Vec3> particle;            // [m] tissue particles of every body, then thread slots
+  std::vector<Quat> rotation;            // per tissue particle: rotation of the cluster centred on it
+  std::vector<uint32_t> thread_order;    // particle indices from the free end to the needle
+  std::vector<float> thread_tension;     // [N] per pair of thread_order, size thread_order.size() - 1
+  std::array<ToolView, kMaxHands> tool;  // per hand
+  std::vector<InstrumentView> instrument;
   NeedleView needle;
   std::vector<SuturePointView> suture_point;
   std::vector<uint8_t> thread_cut;  // per pair of thread_order: 1 where it was cut through
@@ -103,10 +117,10 @@ struct Snapshot {
   std::vector<SettledView> settled;
   std::vector<SeamView> seam;
   std::vector<BiteView> bite;
-  float opening_area = 0;           // [m^2] of the rim that is being closed
-  float closure = 0;                // 0 open .. 1 at the anvil
-  std::vector<Event> event;         // of this tick
-  std::array<ForcePatch, 2> patch;  // what each hand may feel until the next tick
+  float opening_area = 0;                   // [m^2] of the rim that is being closed
+  float closure = 0;                        // 0 open .. 1 at the anvil
+  std::vector<Event> event;                 // of this tick
+  std::array<ForcePatch, kMaxHands> patch;  // what each hand may feel until the next tick
 };
 
 }  // namespace catgut

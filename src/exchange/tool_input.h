@@ -5,8 +5,11 @@
 #include <cstdint>
 
 #include "core/math.h"
+#include "exchange/command.h"
 
 namespace catgut {
+
+constexpr size_t kMaxHands = 4;  // of a scene
 
 // Bits of ToolInput::buttons. Each acts once, when it goes down.
 constexpr uint32_t kButtonCut = 1u << 0;  // scissors cut the thread where this tool's jaws are
@@ -26,9 +29,30 @@ struct ToolInput {
   uint32_t connected = 1;  // 0: no device; the tool stays where it is and touches nothing
 };
 
+// A hand that is not there.
+inline ToolInput no_hand() {
+  ToolInput input;
+  input.connected = 0;
+  return input;
+}
+
+// One input per hand. Hands 0 and 1 are the surgeon's right and left; 2 and 3 an assistant's, not connected unless set.
+struct HandInputs : std::array<ToolInput, kMaxHands> {
+  HandInputs() {
+    for (size_t k = 2; k < size(); ++k) (*this)[k].connected = 0;
+  }
+};
+
+inline HandInputs no_hands() {
+  HandInputs hands;
+  hands.fill(no_hand());
+  return hands;
+}
+
 struct TickInput {
   uint64_t tick = 0;
-  std::array<ToolInput, 2> hand;  // 0 right (needle driver), 1 left (forceps)
+  HandInputs hand;
+  CommandList commands;
 };
 
 }  // namespace catgut

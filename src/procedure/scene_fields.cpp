@@ -16,6 +16,7 @@ namespace {
 constexpr double kAny = 1e30;  // no bound worth stating
 #define TOP(member) [](SceneSpec& s, size_t) -> FieldRef { return &s.member; }
 #define BODY(member) [](SceneSpec& s, size_t i) -> FieldRef { return &s.body[i].member; }
+#define INSTRUMENT(member) [](SceneSpec& s, size_t i) -> FieldRef { return &s.instrument[i].member; }
 
 // clang-format off
 const Field kField[] = {
@@ -40,6 +41,12 @@ const Field kField[] = {
     {"body", "density", "kg/m^3", 1, 20000, nullptr, "tissue density", BODY(density)},
     {"body", "pinned_length", "m", 0, 2, nullptr, "fixed length at the far end", BODY(pinned_length)},
     {"body", "inner_radius", "m", 0, 1, nullptr, "outer radius of a second tube inside the first, as in a prolapse; 0: none", BODY(inner_radius)},
+
+    {"instrument", "name", "", 0, 0, nullptr, "name in this scene; empty: that of its kind", INSTRUMENT(name)},
+    {"instrument", "kind", "", 0, 0, nullptr, "needle_holder, forceps, debakey, allis, scissors, cautery, retractor, or a kind of the host program", INSTRUMENT(kind)},
+    {"instrument", "where", "", 0, 0, "tray|right|left|assistant_right|assistant_left|parked", "on the tray, in a hand, or (a clamp) closed on tissue without a hand", INSTRUMENT(where)},
+    {"instrument", "at", "m", -1, 1, nullptr, "parked: point whose nearest tissue surface is held", INSTRUMENT(at)},
+    {"instrument", "pull", "N", -100, 100, nullptr, "parked: traction force instead of the weight; zero: the weight", INSTRUMENT(pull)},
 
     {"thread", "particles", "", 2, 10000, nullptr, "thread particles from the free end to the needle", TOP(thread.particles)},
     {"thread", "spacing", "m", 0.0001, 0.1, nullptr, "rest distance of neighboring particles", TOP(thread.spacing)},
@@ -107,6 +114,7 @@ const Field kField[] = {
 // clang-format on
 #undef TOP
 #undef BODY
+#undef INSTRUMENT
 
 struct Section {
   const char* name;
@@ -115,6 +123,7 @@ struct Section {
 constexpr Section kSection[] = {
     {"", "Top level"},
     {"body", "Soft body; one `[[body]]` per organ"},
+    {"instrument", "Instrument; one `[[instrument]]` each. Default: needle holder right, forceps left"},
     {"thread", "Suture thread"},
     {"needle", "Needle, a circular arc"},
     {"solver", "Solver parameters"},
@@ -128,6 +137,7 @@ SceneSpec& defaults() {
   static SceneSpec scene = [] {
     SceneSpec s;
     s.body.resize(1);
+    s.instrument.resize(1);
     return s;
   }();
   return scene;
@@ -174,6 +184,17 @@ const char* section_meaning(std::string_view section) {
   return "";
 }
 
+bool is_list(std::string_view section) { return section == "body" || section == "instrument"; }
+
+size_t rows_of(const SceneSpec& scene, std::string_view section) {
+  return section == "body" ? scene.body.size() : section == "instrument" ? scene.instrument.size() : 1;
+}
+
+void add_row(SceneSpec& scene, std::string_view section) {
+  if (section == "body") scene.body.emplace_back();
+  if (section == "instrument") scene.instrument.emplace_back();
+}
+
 const Field* find_field(std::string_view section, std::string_view key) {
   for (const Field& f : kField)
     if (section == f.section && key == f.key) return &f;
@@ -183,7 +204,7 @@ const Field* find_field(std::string_view section, std::string_view key) {
 std::string full_key(const Field& field) {
   const std::string section = field.section;
   if (section.empty()) return field.key;
-  return section + (section == "body" ? "[]." : ".") + field.key;
+  return section + (is_list(section) ? "[]." : ".") + field.key;
 }
 
 std::string type_name(const Field& field) {

@@ -17,18 +17,22 @@ namespace catgut {
 using FieldRef = std::variant<std::string*, int*, uint64_t*, float*, bool*, Vec3*>;
 
 struct Field {
-  const char* section;  // "" for keys at the top of the file; "body" is a list of tables, [[body]]
+  const char* section;  // "" for keys at the top of the file; see is_list
   const char* key;
   const char* unit;     // SI; "" when the value has none
   double min, max;      // inclusive, per component of a vector; ignored for text and flags
   const char* choices;  // text: the allowed words separated by '|'; nullptr: any text
   const char* meaning;
-  FieldRef (*at)(SceneSpec& scene, size_t body);  // body: index into scene.body, used by section "body" only
+  FieldRef (*at)(SceneSpec& scene, size_t row);  // row: of a list section, else unused
 };
 
 std::span<const Field> scene_fields();
 const std::vector<std::string>& scene_sections();       // "body", "thread", ... in file order, "" left out
 const char* section_meaning(std::string_view section);  // one line for the reference
+// A list of tables, [[body]] or [[instrument]], has as many rows as the file gives it; any other section has one.
+bool is_list(std::string_view section);
+size_t rows_of(const SceneSpec& scene, std::string_view section);
+void add_row(SceneSpec& scene, std::string_view section);
 
 const Field* find_field(std::string_view section, std::string_view key);  // nullptr if there is none
 std::string full_key(const Field& field);                                 // "solver.substeps", "body[].radius", "title"

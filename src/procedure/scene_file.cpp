@@ -208,13 +208,14 @@ SceneSpec scene_of_table(const toml::table& root, const std::string& file) {
       const Field* field = find_field("", section);
       if (!field) unknown_key(where, "", section);
       assign(scene, *field, 0, node, at_line(file, node.source()));
-    } else if (section == "body") {
-      const toml::array* bodies = node.as_array();
-      if (!bodies || !bodies->is_homogeneous(toml::node_type::table))
-        throw InputError(where, "body cannot be " + found_text(node), "write [[body]] in double brackets for every body");
-      for (const toml::node& body : *bodies) {
-        scene.body.emplace_back();
-        read_section(scene, "body", scene.body.size() - 1, *body.as_table(), file);
+    } else if (is_list(section)) {
+      const toml::array* list = node.as_array();
+      if (!list || !list->is_homogeneous(toml::node_type::table))
+        throw InputError(where, section + " cannot be " + found_text(node),
+                         fmt::format("write [[{}]] in double brackets for every {}", section, section));
+      for (const toml::node& row : *list) {
+        add_row(scene, section);
+        read_section(scene, section.c_str(), rows_of(scene, section) - 1, *row.as_table(), file);
       }
     } else if (const toml::table* table = node.as_table()) {
       if (section != "expect") {
@@ -311,8 +312,8 @@ std::string write_scene(const SceneSpec& scene) {
   write_keys("", 0);
   for (const std::string& section : scene_sections()) {
     if (section == "expect") continue;
-    for (size_t b = 0; b < (section == "body" ? s.body.size() : 1); ++b) {
-      out += section == "body" ? std::string("\n[[body]]\n") : fmt::format("\n[{}]\n", section);
+    for (size_t b = 0; b < rows_of(s, section); ++b) {
+      out += is_list(section) ? fmt::format("\n[[{}]]\n", section) : fmt::format("\n[{}]\n", section);
       write_keys(section, b);
     }
   }
@@ -349,19 +350,24 @@ void set_value(SceneSpec& scene, const std::string& key_equals_value, const std:
   std::string section = dot == std::string::npos ? "" : path.substr(0, dot);
   const std::string key = dot == std::string::npos ? path : path.substr(dot + 1);
   size_t first = 0, last = 1;
-  if (section == "body" || section == "body[]") {
-    section = "body";
-    last = scene.body.size();
-    if (last == 0) throw InputError(here, "the scene has no body", "add one to the scene file");
-  } else if (section.rfind("body[", 0) == 0 && section.back() == ']') {
-    const std::string number = section.substr(5, section.size() - 6);
-    const bool digits = !number.empty() && number.size() < 7 && number.find_first_not_of("0123456789") == std::string::npos;
-    first = digits ? std::stoul(number) : scene.body.size();
-    if (first >= scene.body.size())
-      throw InputError(here, fmt::format("the scene has {} bodies, counted from 0", scene.body.size()),
-                       "body.key sets all of them");
-    last = first + 1;
-    section = "body";
+  const size_t bracket = section.find('[');
+  const std::string list = section.substr(0, bracket);
+  if (is_list(list) && (bracket == std::string::npos || section.back() == ']')) {
+    const std::string number = bracket == std::string::npos ? "" : section.substr(bracket + 1, section.size() - bracket - 2);
+    last = rows_of(scene, list);
+    if (number.empty()) {
+      if (last == 0) throw InputError(here, fmt::format("the scene has no {}", list), "add one to the scene file");
+    } else {
+      const bool digits = number.size() < 7 && number.find_first_not_of("0123456789") == std::string::npos;
+      first = digits ? std::stoul(number) : last;
+      if (first >= last)
+        throw InputError(here,
+                         list == "body" ? fmt::format("the scene has {} bodies, counted from 0", last)
+                                        : fmt::format("the scene has {} of [[{}]], counted from 0", last, list),
+                         list + ".key sets all of them");
+      last = first + 1;
+    }
+    section = list;
   }
 
   const auto& sections = scene_sections();
@@ -407,10 +413,11 @@ void use_preset(SceneSpec& scene, std::string preset, const std::string& where) 
 }
 
 bool same_scene(const SceneSpec& a, const SceneSpec& b) {
-  if (a.body.size() != b.body.size() || a.expect.size() != b.expect.size()) return false;
+  if (a.body.size() != b.body.size() || a.instrument.size() != b.instrument.size() || a.expect.size() != b.expect.size())
+    return false;
   SceneSpec x = a, y = b;
   for (const Field& f : scene_fields())
-    for (size_t i = 0; i < (std::strcmp(f.section, "body") == 0 ? x.body.size() : 1); ++i)
+    for (size_t i = 0; i < rows_of(x, f.section); ++i)
       if (value_text(f.at(x, i)) != value_text(f.at(y, i))) return false;  // texts are unique per bit pattern
   for (size_t i = 0; i < a.expect.size(); ++i)
     if (a.expect[i].name != b.expect[i].name || a.expect[i].min != b.expect[i].min || a.expect[i].max != b.expect[i].max)

@@ -11,7 +11,7 @@ namespace {
 
 std::string heading(const std::string& section) {
   if (section.empty()) return "";
-  return section == "body" ? "[[body]]" : fmt::format("[{}]", section);
+  return is_list(section) ? fmt::format("[[{}]]", section) : fmt::format("[{}]", section);
 }
 
 std::string one_key(const Field& f) {

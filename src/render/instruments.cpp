@@ -90,6 +90,112 @@ ToolShape forceps() {
   return tool;
 }
 
+// Long, slim, no teeth: two parallel rows of fine ridges at flat tips.
+ToolShape debakey() {
+  const Vec3 steel = srgb(206, 210, 218), grip = srgb(120, 126, 136);
+  ToolShape tool;
+  tool.pivot = 150 * mm;
+  tool.opening = 0.03f;
+  const Section arm[] = {{{0.5f * mm, 0, -1.5f * mm}, 0.4f * mm, 1.0f * mm}, {{0.6f * mm, 0, 18 * mm}, 0.5f * mm, 1.1f * mm},
+                         {{1.8f * mm, 0, 40 * mm}, 0.7f * mm, 1.8f * mm},    {{4.4f * mm, 0, 60 * mm}, 0.8f * mm, 3.4f * mm},
+                         {{5.4f * mm, 0, 90 * mm}, 0.8f * mm, 4.4f * mm},    {{3.0f * mm, 0, 130 * mm}, 0.8f * mm, 4.2f * mm},
+                         {{0.9f * mm, 0, 158 * mm}, 0.9f * mm, 3.2f * mm}};
+  add_loft(tool.half, arm, steel);
+  for (size_t i = 0; i < tool.half.position.size(); ++i)
+    tool.half.hatched.push_back(tool.half.position[i].z < 18 * mm && tool.half.normal[i].x < -0.4f ? 1.0f : 0.0f);
+  const Section hold[] = {{{5.9f * mm, 0, 64 * mm}, 0.5f * mm, 3.2f * mm}, {{5.9f * mm, 0, 96 * mm}, 0.5f * mm, 3.8f * mm}};
+  add_loft(tool.half, hold, grip);
+  const Section end[] = {{{0, 0, 150 * mm}, 1.5f * mm, 3.6f * mm}, {{0, 0, 160 * mm}, 1.5f * mm, 2.8f * mm}};
+  add_loft(tool.body, end, steel);
+  return tool;
+}
+
+// The two shanks with finger rings that clamps and scissors share; `ratchet`: the catch between them.
+void add_ring_handles(ToolShape& tool, float joint, float length, Vec3 steel, Vec3 ring, bool ratchet) {
+  const Vec3 shank[] = {{1.6f * mm, 0, joint + 4 * mm},
+                        {3.0f * mm, 0, joint + 0.3f * (length - joint)},
+                        {6.0f * mm, 0, joint + 0.7f * (length - joint)},
+                        {11 * mm, 0, length - 14 * mm}};
+  add_line_tube(tool.half, shank, 2.0f * mm, 1.7f * mm, steel);
+  add_ring(tool.half, {14 * mm, 0, length}, 9.5f * mm, 12 * mm, 1.8f * mm, ring);
+  const Section box[] = {{{0, 0, joint - 4 * mm}, 2.4f * mm, 2.0f * mm},
+                         {{0, 0, joint}, 3.6f * mm, 2.6f * mm},
+                         {{0, 0, joint + 5 * mm}, 2.6f * mm, 2.1f * mm}};
+  add_loft(tool.body, box, steel, 5);
+  if (!ratchet) return;
+  const Section teeth[] = {{{4 * mm, 0, length - 22 * mm}, 4.5f * mm, 0.8f * mm},
+                           {{4 * mm, 0, length - 18 * mm}, 4.5f * mm, 0.8f * mm}};
+  add_loft(tool.half, teeth, steel);
+}
+
+// Jaws that bow apart and meet in broad, toothed ends.
+ToolShape allis() {
+  const Vec3 steel = srgb(224, 222, 214), teeth = srgb(150, 146, 138);
+  ToolShape tool;
+  tool.pivot = 45 * mm;
+  tool.opening = 0.18f;
+  const Vec3 bow[] = {{0.9f * mm, 0, 0.5f * mm}, {3.4f * mm, 0, 9 * mm}, {4.0f * mm, 0, 22 * mm}, {1.4f * mm, 0, 43 * mm}};
+  add_line_tube(tool.half, bow, 1.0f * mm, 1.7f * mm, steel);
+  tool.half.hatched.resize(tool.half.position.size(), 0);
+  const Section end[] = {{{0.7f * mm, 0, -1.2f * mm}, 0.6f * mm, 3.0f * mm}, {{0.8f * mm, 0, 1.2f * mm}, 0.7f * mm, 2.6f * mm}};
+  add_loft(tool.half, end, teeth);
+  tool.half.hatched.resize(tool.half.position.size(), 1);
+  add_ring_handles(tool, 45 * mm, 150 * mm, steel, steel, true);
+  return tool;
+}
+
+ToolShape scissors() {
+  const Vec3 steel = srgb(226, 228, 232), black = srgb(44, 46, 52);
+  ToolShape tool;
+  tool.pivot = 40 * mm;
+  tool.opening = 0.22f;
+  const Section blade[] = {{{0.3f * mm, 0, -3 * mm}, 0.25f * mm, 0.4f * mm},
+                           {{0.6f * mm, 0, 4 * mm}, 0.5f * mm, 1.2f * mm},
+                           {{1.3f * mm, 0, 22 * mm}, 1.1f * mm, 1.9f * mm},
+                           {{1.9f * mm, 0, 42 * mm}, 1.8f * mm, 2.3f * mm}};
+  add_loft(tool.half, blade, steel);
+  add_ring_handles(tool, 40 * mm, 145 * mm, steel, black, false);
+  return tool;
+}
+
+// A pencil of plastic with a flat steel tip, its buttons and its cable.
+ToolShape cautery() {
+  const Vec3 plastic = srgb(34, 84, 150), tip = srgb(190, 188, 180), yellow = srgb(236, 200, 60), blue = srgb(90, 170, 230);
+  ToolShape tool;
+  const Section blade[] = {{{0, 0, -1 * mm}, 0.25f * mm, 0.9f * mm}, {{0, 0, 18 * mm}, 0.35f * mm, 1.2f * mm}};
+  add_loft(tool.body, blade, tip);
+  const Section collar[] = {{{0, 0, 17 * mm}, 1.8f * mm, 1.8f * mm}, {{0, 0, 27 * mm}, 4.2f * mm, 4.2f * mm}};
+  add_loft(tool.body, collar, srgb(230, 230, 226), 2.5f);
+  const Section barrel[] = {{{0, 0, 26 * mm}, 4.6f * mm, 4.6f * mm},
+                            {{0, 0, 60 * mm}, 5.4f * mm, 5.4f * mm},
+                            {{0, 0, 140 * mm}, 4.4f * mm, 4.4f * mm}};
+  add_loft(tool.body, barrel, plastic, 2.5f);
+  const Section cut[] = {{{0, 5.0f * mm, 40 * mm}, 1.8f * mm, 1.0f * mm}, {{0, 5.2f * mm, 47 * mm}, 1.8f * mm, 1.0f * mm}};
+  add_loft(tool.body, cut, yellow);
+  const Section coagulate[] = {{{0, 5.3f * mm, 50 * mm}, 1.8f * mm, 1.0f * mm},
+                               {{0, 5.4f * mm, 57 * mm}, 1.8f * mm, 1.0f * mm}};
+  add_loft(tool.body, coagulate, blue);
+  const Vec3 cable[] = {{0, 0, 138 * mm}, {4 * mm, -8 * mm, 165 * mm}, {16 * mm, -30 * mm, 195 * mm}};
+  add_line_tube(tool.body, cable, 1.8f * mm, 1.8f * mm, srgb(40, 42, 46));
+  return tool;
+}
+
+// A flat blade, bent over at its end, on a long handle.
+ToolShape retractor() {
+  const Vec3 steel = srgb(214, 217, 222);
+  ToolShape tool;
+  const Section hook[] = {{{0, -9 * mm, 1 * mm}, 5.5f * mm, 0.7f * mm},
+                          {{0, -2 * mm, -1 * mm}, 5.8f * mm, 0.8f * mm},
+                          {{0, 0, 3 * mm}, 5.8f * mm, 1.0f * mm}};
+  add_loft(tool.body, hook, steel);
+  const Section blade[] = {{{0, 0, 2 * mm}, 5.8f * mm, 0.8f * mm},
+                           {{0, 0, 40 * mm}, 5.4f * mm, 0.9f * mm},
+                           {{0, 0, 70 * mm}, 3.2f * mm, 1.6f * mm},
+                           {{0, 0, 150 * mm}, 3.4f * mm, 2.2f * mm}};
+  add_loft(tool.body, blade, steel);
+  return tool;
+}
+
 }  // namespace
 
 Shape needle_shape(const PictureModel& model) {
@@ -111,6 +217,23 @@ Shape needle_shape(const PictureModel& model) {
   return shape;
 }
 
-ToolShape tool_shape(ToolKind kind) { return kind == ToolKind::needle_driver ? needle_driver() : forceps(); }
+ToolShape tool_shape(const InstrumentPicture& instrument) {
+  struct Row {
+    const char* kind;
+    ToolShape (*shape)();
+  };
+  static constexpr Row kRow[] = {
+      {"needle_holder", needle_driver}, {"forceps", forceps}, {"debakey", debakey},    {"allis", allis},
+      {"scissors", scissors},           {"cautery", cautery}, {"retractor", retractor}};
+  for (const Row& row : kRow)
+    if (instrument.kind == row.kind) return row.shape();
+  ToolShape tool;
+  for (const InstrumentPicture::Rod& rod : instrument.outline) {
+    const Vec3 ends[] = {rod.a, lerp(rod.a, rod.b, 0.5f), rod.b};
+    const float radius[] = {rod.radius, rod.radius, rod.radius};
+    add_tube(tool.body, ends, radius, 14, srgb(200, 202, 208));
+  }
+  return tool;
+}
 
 }  // namespace catgut

@@ -48,7 +48,8 @@ struct ToolShape {
   float pivot = 0;    // [m]
   float opening = 0;  // [rad]
 };
-ToolShape tool_shape(ToolKind kind);
+// By kind; an instrument of a kind that has no shape here is drawn as its outline.
+ToolShape tool_shape(const InstrumentPicture& instrument);
 
 // The sterile drape: a cloth with folds at height centre.y, with a hole along an ellipse about (centre.x, centre.z) that is
 // `hole` wide at least; 0: without a hole.

@@ -33,6 +33,10 @@ void blend(const Snapshot& before, const Snapshot& now, float part, Snapshot& ou
     tool.pose = between(from.pose, tool.pose, part);
     tool.hand = between(from.hand, tool.hand, part);
   }
+  each_row(before.instrument, out.instrument, [&](const InstrumentView& a, InstrumentView& o) {
+    o.jaw = a.jaw + (o.jaw - a.jaw) * part;
+    if (distance(a.pose.p, o.pose.p) < 0.05f) o.pose = between(a.pose, o.pose, part);  // one that was taken did not fly either
+  });
   if (distance(before.needle.pose.p, now.needle.pose.p) < 0.05f)  // nor does a fresh needle
     out.needle.pose = between(before.needle.pose, now.needle.pose, part);
   each_row(before.suture_point, out.suture_point, [&](auto& a, auto& o) { o.position = lerp(a.position, o.position, part); });

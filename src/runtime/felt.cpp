@@ -70,8 +70,8 @@ FeltCurves feel_a_stitch(SceneSpec scene, bool knot, const std::atomic<bool>& st
   bool in_bite = false, bitten = false, in_knot = false;
   size_t puller = 0;
   for (int i = 0; i < last && !stop.load(std::memory_order_relaxed); ++i) {
-    const std::array<ForcePatch, 2> heard = seen.patch;  // a tick late, as arms hear it
-    if (i >= settle) input.hand = hands.surgeon->operate(seen, dt);
+    const std::array<ForcePatch, kMaxHands> heard = seen.patch;  // a tick late, as arms hear it
+    if (i >= settle) input = hands.surgeon->operate(seen, dt);
     step(*model, *state, input, jobs);
     publish(*model, *state, seen);
     follow(paper, seen, picture);

@@ -19,10 +19,19 @@ class RecordedHands : public Surgeon {
  public:
   RecordedHands(Recording recording, float tick_rate) : recording_(std::move(recording)), tick_rate_(tick_rate) {}
 
-  std::array<ToolInput, 2> operate(const Snapshot& seen, float dt) override {
+  TickInput operate(const Snapshot& seen, float dt) override {
+    const size_t before = next_;
     next_ = static_cast<size_t>(std::llround(static_cast<double>(seen.tick) * dt * tick_rate_));
-    if (recording_.tick.empty()) return nobody();
-    return recording_.tick[std::min(next_, recording_.tick.size() - 1)].input.hand;
+    TickInput out;
+    out.hand = no_hands();
+    if (recording_.tick.empty()) return out;
+    const size_t last = recording_.tick.size() - 1;
+    out.hand = recording_.tick[std::min(next_, last)].input.hand;
+    // Each command once, whatever the tick rate.
+    for (size_t t = begun_ ? before + 1 : 0; t <= std::min(next_, last); ++t)
+      for (const Command& c : recording_.tick[t].input.commands) out.commands.push(c);
+    begun_ = true;
+    return out;
   }
   bool done() const override { return next_ + 1 >= recording_.tick.size(); }
   std::string doing() const override {
@@ -30,14 +39,10 @@ class RecordedHands : public Surgeon {
   }
 
  private:
-  static std::array<ToolInput, 2> nobody() {
-    std::array<ToolInput, 2> hands;
-    hands[0].connected = hands[1].connected = 0;
-    return hands;
-  }
   Recording recording_;
   double tick_rate_;
   size_t next_ = 0;
+  bool begun_ = false;
 };
 
 }  // namespace

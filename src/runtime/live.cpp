@@ -38,7 +38,7 @@ double seconds_of(Clock::duration d) { return std::chrono::duration<double>(d).c
 // Everything needed to go on from a moment as if nothing had happened since.
 struct Moment {
   std::vector<std::byte> state;
-  std::array<ToolInput, 2> hand;
+  HandInputs hand;
   Practice practice;
 };
 
@@ -47,12 +47,6 @@ struct BiteMoment {
   Moment before;
 };
 
-ToolInput nobody() {
-  ToolInput input;
-  input.connected = 0;
-  return input;
-}
-
 // Tasks of the surgeon's plan, in a box that commands fit into.
 struct Demonstration {
   std::array<uint8_t, 6> task{};
@@ -60,14 +54,14 @@ struct Demonstration {
   bool from_mark = false;
 };
 
-struct Command {
+struct Request {
   LiveCommand what{};
   bool demonstrate = false;
   Demonstration of;
 };
 
 struct HandMail {
-  ToolInput input = nobody();
+  ToolInput input = no_hand();
   uint32_t epoch = 0;  // that whoever sent it had seen
 };
 
@@ -96,19 +90,20 @@ struct Live::Work {
   double dt = 0;
 
   // --- between the threads -----------------------------------------------------------------------------------------------
-  std::array<Latest<HandMail>, 2> hand_box;        // window -> physics
-  std::array<std::atomic<uint32_t>, 2> pressed{};  // both: buttons that went down since the last tick
-  Ring<Command, 64> commands;                      // window -> physics
-  Ring<std::string, 16> changes;                   // window -> physics
-  std::atomic<bool> quit{false};                   // window -> physics
-  std::atomic<bool> watched{false};                // window -> physics
-  Latest<LiveView> view_box;                       // physics -> window
-  Ring<Event, 1024> events;                        // physics -> window
+  std::array<Latest<HandMail>, kMaxHands> hand_box;        // window -> physics
+  std::array<std::atomic<uint32_t>, kMaxHands> pressed{};  // both: buttons that went down since the last tick
+  Ring<Request, 64> requests;                              // window -> physics
+  Ring<Command, 64> orders;                                // window -> physics: of the hands
+  Ring<std::string, 16> changes;                           // window -> physics
+  std::atomic<bool> quit{false};                           // window -> physics
+  std::atomic<bool> watched{false};                        // window -> physics
+  Latest<LiveView> view_box;                               // physics -> window
+  Ring<Event, 1024> events;                                // physics -> window
   std::thread thread;
 
   // --- the window's ------------------------------------------------------------------------------------------------------
   LiveStatus status;
-  std::array<uint32_t, 2> buttons{};
+  std::array<uint32_t, kMaxHands> buttons{};
 
   // --- the physics thread's ----------------------------------------------------------------------------------------------
   SceneSpec scene;
@@ -124,8 +119,8 @@ struct Live::Work {
   PaperSpring paper;
   LiveResult result;
   TickInput input;
-  std::array<int, 2> unheard{};                  // [ticks] since hands were last heard of, and
-  std::array<float, 2> heard_every{1.0f, 1.0f};  // [ticks] how often they are, lately
+  std::array<int, kMaxHands> unheard{};                  // [ticks] since hands were last heard of, and
+  std::array<float, kMaxHands> heard_every{1, 1, 1, 1};  // [ticks] how often they are, lately
   Snapshot before, now;
   LiveStatus told;
   StitchMap map, learner_map;
@@ -154,6 +149,12 @@ struct Live::Work {
   void end_demonstration();
   void record_from_here();
   void forget_pace() { wall_s = simulated_s = 0; }
+  // The arm that moves a hand, -1: none.
+  int arm_of(size_t hand) const {
+    for (size_t arm = 0; haptics && arm < 2; ++arm)
+      if (haptics->present(arm) && options.arm_hand[arm] == hand) return static_cast<int>(arm);
+    return -1;
+  }
   Moment moment() const { return {save_state(*model, *state), input.hand, told.practice}; }
 };
 
@@ -173,7 +174,8 @@ void Live::Work::begin() {
     HapticsOptions how;
     how.place = read_arm_places(arm_places_file());
     haptics = std::make_unique<Haptics>(std::move(arms), picture, how);
-    for (size_t k = 0; k < 2; ++k) told.arm[k] = haptics->present(k);
+    for (size_t arm = 0; arm < 2; ++arm)
+      if (haptics->present(arm)) told.arm[options.arm_hand[arm]] = true;
   }
   dt = 1.0 / static_cast<double>(scene.solver.tick_rate);
   checkpoint_every = std::max<uint64_t>(1, static_cast<uint64_t>(std::llround(kBeforeBite / dt)));
@@ -208,13 +210,17 @@ void Live::Work::tick(bool let_in) {
     checkpoint[0] = moment();
   }
   input.tick = result.ticks;
+  input.commands.clear();
   if (let_in && (surgeon.surgeon || told.demonstrating)) {
     Surgeon& hands = told.demonstrating ? *demonstrator.surgeon : *surgeon.surgeon;
-    input.hand = hands.operate(now, static_cast<float>(dt));
+    const TickInput wanted = hands.operate(now, static_cast<float>(dt));
+    input.hand = wanted.hand;
+    input.commands = wanted.commands;
     told.doing = hands.doing();
     told.shown = told.demonstrating && hands.done();
   } else if (let_in) {
-    for (size_t k = 0; k < 2; ++k) {
+    for (Command c; input.commands.count < CommandList::kCapacity && orders.pop(c);) input.commands.push(c);
+    for (size_t k = 0; k < kMaxHands; ++k) {
       ++unheard[k];
       if (hand_box[k].update()) {
         heard_every[k] += 0.2f * (static_cast<float>(unheard[k]) - heard_every[k]);
@@ -224,8 +230,9 @@ void Live::Work::tick(bool let_in) {
       const uint32_t down = pressed[k].exchange(0, std::memory_order_relaxed);
       ToolInput& hand = input.hand[k];
       hand.buttons = 0;
-      if (told.arm[k]) {
-        hand = hand_toward(hand, haptics->hand(k), kArmSpeed, 10 * options.hand_turn, static_cast<float>(dt));
+      if (const int arm = arm_of(k); arm >= 0) {
+        hand = hand_toward(hand, haptics->hand(static_cast<size_t>(arm)), kArmSpeed, 10 * options.hand_turn,
+                           static_cast<float>(dt));
         hand.buttons |= down;
         continue;
       }
@@ -299,9 +306,11 @@ void Live::Work::feel() {
   if (drive) arms_drove = true;
   else rest_arms();
   if (as_paper) follow(paper, now, picture);
-  for (size_t k = 0; k < 2 && drive; ++k)
-    haptics->publish(k, as_paper ? paper_patch(paper, now, picture, k) : now.patch[k], told.epoch + handovers,
+  for (size_t arm = 0; arm < 2 && drive; ++arm) {
+    const size_t k = options.arm_hand[arm];
+    haptics->publish(arm, as_paper ? paper_patch(paper, now, picture, k) : now.patch[k], told.epoch + handovers,
                      kLiveSpeeds[speed]);
+  }
   if (now.tick % kNewsTicks != 0 || !options.say) return;
   for (const std::string& line : haptics->news()) options.say(line);
 }
@@ -382,7 +391,7 @@ void Live::Work::end_demonstration() {
 void Live::Work::obey() {
   bool any = false;
   for (std::string c; changes.pop(c); any = true) change_scene(c);
-  for (Command c; commands.pop(c); any = true) {
+  for (Request c; requests.pop(c); any = true) {
     if (c.demonstrate) {
       demonstrate(c.of);
       continue;
@@ -526,15 +535,17 @@ void Live::hand(size_t who, const ToolInput& input) {
 bool Live::change(const std::string& key_equals_value) { return work_->changes.push(key_equals_value); }
 void Live::watch(bool on) { work_->watched = on; }
 
-bool Live::command(LiveCommand command) { return work_->commands.push({command, false, {}}); }
+bool Live::command(LiveCommand command) { return work_->requests.push({command, false, {}}); }
+
+bool Live::instrument(const Command& command) { return work_->orders.push(command); }
 
 bool Live::demonstrate(const std::vector<size_t>& tasks, bool from_mark) {
-  Command c;
+  Request c;
   c.demonstrate = true;
   c.of.from_mark = from_mark;
   for (const size_t t : tasks)
     if (c.of.tasks < c.of.task.size()) c.of.task[c.of.tasks++] = static_cast<uint8_t>(t);
-  return work_->commands.push(c);
+  return work_->requests.push(c);
 }
 
 bool Live::look(Snapshot& out) {

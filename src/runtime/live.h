@@ -45,6 +45,7 @@ struct LiveOptions {
   // Haptic arms, as read_arm_choice (runtime/haptics) reads them; empty or "off": none. What is missing is told and the scene
   // opens without. A hand without an arm stays the window's.
   std::string haptics;
+  std::array<uint8_t, 2> arm_hand{0, 1};        // the hand that each of the two arms moves
   std::function<void(const std::string&)> say;  // a line about the arms, from any thread; empty: nobody is told
 };
 
@@ -56,15 +57,15 @@ struct LiveStatus {
   float tick_ms = 0;      // that a tick takes to compute, lately
   uint64_t late = 0;      // ticks' worth of time that was given up because it could not be caught up
   bool paused = false;
-  bool settling = true;                     // the scene comes to rest; hands are not let in yet
-  uint32_t epoch = 0;                       // counts restarts and bites taken back: hands go on from where the tools are then
-  uint32_t to_take_back = 0;                // bites that take_back can undo
-  uint32_t events_lost = 0;                 // nobody fetched them in time
-  std::array<uint64_t, 2> input_time_ns{};  // ToolInput::time_ns of the hands in the newest tick, for latencies
+  bool settling = true;       // the scene comes to rest; hands are not let in yet
+  uint32_t epoch = 0;         // counts restarts and bites taken back: hands go on from where the tools are then
+  uint32_t to_take_back = 0;  // bites that take_back can undo
+  uint32_t events_lost = 0;   // nobody fetched them in time
+  std::array<uint64_t, kMaxHands> input_time_ns{};  // ToolInput::time_ns of the hands in the newest tick, for latencies
   // Of the newest tick that was the first to have a motion, on wall_ns(), for latencies: when the motion was read (where the
   // device uses that clock), when the tick began, and when its snapshot was ready to be looked at.
   uint64_t moved_ns = 0, began_ns = 0, ready_ns = 0;
-  std::array<bool, 2> arm{};  // a haptic arm moves that hand
+  std::array<bool, kMaxHands> arm{};  // a haptic arm moves that hand
   Practice practice;
   Measures measures;           // filled while watched, see watch()
   std::string doing;           // of the surgeon, when one works
@@ -93,8 +94,11 @@ class Live {
 
   const PictureModel& picture() const;
 
-  // The newest pose of hand `who` (0 or 1). A button that goes down is not lost when it comes up again before the next tick.
+  // The newest pose of hand `who`, below kMaxHands. A button that goes down is not lost when it comes up again before the next
+  // tick.
   void hand(size_t who, const ToolInput& input);
+  // Take, swap, lay down, park or take up an instrument in the next tick. False: as below.
+  bool instrument(const Command& command);
   // False: too many are waiting; try again.
   bool command(LiveCommand command);
 

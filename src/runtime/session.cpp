@@ -40,8 +40,8 @@ class Run {
   template <typename HandsOf>
   bool tick(HandsOf&& hands, const std::string& doing, double until_s) {
     const Clock::time_point start = Clock::now();
+    input_ = hands(seen_);
     input_.tick = ticks_;
-    input_.hand = hands(seen_);
     StageTimes times;
     step(*model_, *state_, input_, jobs_, &times);
     {
@@ -100,10 +100,10 @@ class Run {
   Clock::time_point told_;
 };
 
-std::array<ToolInput, 2> no_hands() {
-  std::array<ToolInput, 2> hands;
-  hands[0].connected = hands[1].connected = 0;
-  return hands;
+TickInput nobody() {
+  TickInput input;
+  input.hand = no_hands();
+  return input;
 }
 
 uint64_t ticks_in(double seconds, double dt) { return static_cast<uint64_t>(std::llround(seconds / dt)); }
@@ -137,7 +137,7 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
   result.surgeon = options.surgeon;
   result.ended = "time limit";
   bool go_on = true;
-  while (go_on && run.ticks_ < settle) go_on = one_tick([](const Snapshot&) { return no_hands(); }, "settling");
+  while (go_on && run.ticks_ < settle) go_on = one_tick([](const Snapshot&) { return nobody(); }, "settling");
   run.tally_.open();
   uint64_t done_for = 0;
   while (go_on && run.ticks_ < last) {
@@ -145,7 +145,7 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
     const float dt = static_cast<float>(run.dt_);
     if (hands.surgeon)
       go_on = one_tick([&](const Snapshot& seen) { return hands.surgeon->operate(seen, dt); }, hands.surgeon->doing());
-    else go_on = one_tick([](const Snapshot&) { return no_hands(); }, "no hands");
+    else go_on = one_tick([](const Snapshot&) { return nobody(); }, "no hands");
   }
   if (hands.surgeon && hands.surgeon->done()) {
     result.value["surgeon_done"] = hands.surgeon->gave_up() ? 0 : 1;
@@ -179,7 +179,7 @@ ReplayResult replay_session(const Recording& recording, const std::string& name,
   result.run.ended = "end of recording";
   for (const RecordedTick& t : recording.tick) {
     if (run.ticks_ == settle) run.tally_.open();
-    const bool go_on = run.tick([&](const Snapshot&) { return t.input.hand; }, "replay", until_s);
+    const bool go_on = run.tick([&](const Snapshot&) { return t.input; }, "replay", until_s);
     if (check && hash_state(*run.model_, *run.state_) != t.hash) {
       result.differs_at = run.ticks_;
       result.run.ended = "state differs from the recording";

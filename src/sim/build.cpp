@@ -1,5 +1,6 @@
 // sim/build: turns a scene's description into a Model and its first State. Reads SceneSpec; calls the anatomy; throws
 // InputError for what a scene may get wrong. Nothing here runs during a tick.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -7,6 +8,8 @@
 #include "anatomy/bowel.h"
 #include "anatomy/organ.h"
 #include "core/check.h"
+#include "geometry/closest.h"
+#include "sim/hands.h"
 #include "sim/model.h"
 #include "sim/state.h"
 #include "suture/needle.h"
@@ -126,13 +129,92 @@ void reserve_room(const Model& model, State& s) {
   s.plan.pair.reserve(kMany);
 }
 
-RigidModel tool_body() {
-  RigidModel m;
-  m.inv_mass = 1 / 0.05f;
-  m.inv_inertia = {2e4f, 2e4f, 4e4f};
-  m.capsule.push_back({{0, 0, 0.0015f}, {0, 0, 0.016f}, 0.0012f});  // jaws
-  m.capsule.push_back({{0, 0, 0.018f}, {0, 0, 0.12f}, 0.0025f});    // shaft
-  return m;
+// The instruments of a scene that names none, as in the paper.
+std::vector<InstrumentSpec> instruments_of(const SceneSpec& scene) {
+  if (!scene.instrument.empty()) return scene.instrument;
+  InstrumentSpec driver, forceps;
+  driver.kind = "needle_holder", driver.where = "right";
+  forceps.kind = "forceps", forceps.where = "left";
+  return {driver, forceps};
+}
+
+std::string known_instruments(std::span<const InstrumentModel> own) {
+  std::string names = "known: ";
+  for (const InstrumentModel& m : own) names += m.name + ", ";
+  for (const InstrumentModel& m : instrument_table()) names += m.name + (&m == &instrument_table().back() ? "" : ", ");
+  return names;
+}
+
+// The place of the tissue's surface nearest to `at`, with the neighborhood that moves with it.
+ParkedStart park_on(const Model& model, size_t instrument, Vec3 at, Vec3 pull, const std::string& where) {
+  const TissueCollision& tissue = model.solver.collision;
+  const auto corner = [&](const Triangle& t, size_t k) { return model.start[t[k]]; };
+  BiteEnd end;
+  ParkedStart p;
+  Vec3 point, normal;
+  float best = 1e30f;
+  for (uint32_t f = 0; f < tissue.surface.size(); ++f) {
+    const Triangle& t = tissue.surface[f];
+    const ClosestOnTriangle near = closest_on_triangle(at, corner(t, 0), corner(t, 1), corner(t, 2));
+    const float d = distance(near.point, at);
+    if (d >= best) continue;
+    best = d, point = near.point, end.triangle = f;
+    normal = normalized(cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0)));
+    for (size_t k = 0; k < 3; ++k) end.weight[k] = near.weight[k];
+  }
+  constexpr float kFar = 0.02f;  // [m] from the tissue: a wrong coordinate rather than a clamp
+  if (best > kFar)
+    throw InputError(where, "instrument.at of a parked instrument is more than 20 mm from any tissue",
+                     "give a place on a body");
+  spread(model.solver, end);
+  p.instrument = instrument;
+  p.point = end.point;
+  const Triangle& t = tissue.surface[end.triangle];
+  p.particle = t[static_cast<size_t>(std::max_element(end.weight.begin(), end.weight.end()) - end.weight.begin())];
+  // The shaft leaves the tissue along the pull, else along the surface's normal.
+  const Vec3 z = normalized(pull, normalized(normal, {0, 1, 0})), x = any_perpendicular(z);
+  p.pose = {point, from_axes(x, cross(z, x), z)};
+  return p;
+}
+
+// `rim`: middle of the field; places are relative to it.
+void add_instruments(Model& m, const SceneSpec& scene, Vec3 rim, const std::string& where) {
+  static const char* const kHandName[kMaxHands] = {"right", "left", "assistant_right", "assistant_left"};
+  const std::vector<InstrumentSpec> specs = instruments_of(scene);
+  m.hand_instrument.fill(-1);
+  for (size_t k = 0; k < kMaxHands; ++k)
+    m.hand_start[k] = {rim + Vec3{k % 2 == 0 ? 0.12f : -0.12f, 0.10f, k < 2 ? 0.05f : -0.08f}, {}};
+  for (size_t i = 0; i < specs.size(); ++i) {
+    const InstrumentSpec& spec = specs[i];
+    const InstrumentModel& kind = m.suture.instrument[i];
+    m.pull.push_back(spec.pull);
+    // A row on the drape to the right, shafts toward the surgeon.
+    m.tray.push_back({Vec3{rim.x + 0.16f + 0.03f * static_cast<float>(i), m.solver.ground + 0.006f, rim.z}, {}});
+    InstrumentPicture picture;
+    picture.name = spec.name.empty() ? spec.kind : spec.name;
+    picture.kind = kind.name;
+    picture.title = kind.title;
+    picture.capabilities = kind.capabilities;
+    for (const Capsule& c : kind.body.capsule) picture.outline.push_back({c.a, c.b, c.radius});
+    for (const InstrumentPicture& other : m.picture.instrument)
+      if (other.name == picture.name && !spec.name.empty())
+        throw InputError(where, "two instruments have the name \"" + picture.name + "\"", "give each a name of its own");
+    m.picture.instrument.push_back(picture);
+    const auto hand = std::find(std::begin(kHandName), std::end(kHandName), spec.where);
+    if (hand != std::end(kHandName)) {
+      int& holds = m.hand_instrument[static_cast<size_t>(hand - std::begin(kHandName))];
+      if (holds >= 0) throw InputError(where, "two instruments are in hand \"" + spec.where + "\"", "put one on the tray");
+      holds = static_cast<int>(i);
+    } else if (spec.where == "parked") {
+      if (!kind.can(kClamp) || !kind.can(kHoldTissue))
+        throw InputError(where, "instrument \"" + picture.name + "\" is parked, but cannot clamp tissue",
+                         "use allis, or put it on the tray");
+      m.parked.push_back(park_on(m, i, spec.at, spec.pull, where));
+    } else if (spec.where != "tray") {
+      throw InputError(where, "instrument.where \"" + spec.where + "\" is not known",
+                       "use right, left, assistant_right, assistant_left, tray or parked");
+    }
+  }
 }
 
 }  // namespace
@@ -160,7 +242,7 @@ bool apply_preset(SolverSpec& s, const std::string& preset) {
   return true;
 }
 
-std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
+std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const InstrumentModel> own) {
   auto model = std::make_shared<Model>();
   Model& m = *model;
   m.scene = scene;
@@ -262,7 +344,13 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
 
   const NeedleShape needle{scene.needle.radius, scene.needle.arc, scene.needle.wire_radius, scene.needle.mass};
   s.needle_arc = {needle_arc(needle)};
-  s.body = {tool_body(), tool_body(), needle_body(needle)};
+  for (const InstrumentSpec& spec : instruments_of(scene)) {
+    const InstrumentModel* kind = find_instrument(spec.kind, own);
+    if (!kind) throw InputError(where, "instrument.kind \"" + spec.kind + "\" is not known", known_instruments(own));
+    m.suture.instrument.push_back(*kind);
+    s.body.push_back(kind->body);
+  }
+  s.body.push_back(needle_body(needle));
   s.ground = drape;
 
   SutureModel& u = m.suture;
@@ -290,7 +378,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene) {
   const Vec3 swage = transform(m.needle_start, s.needle_arc[0].point(0));
   std::vector<Vec3> thread = lay_thread(scene.thread, swage);
   for (size_t i = thread.size(); i-- > 0;) m.start.push_back(thread[i]);  // free end first
-  m.tool_start = {Pose{rim + Vec3{0.12f, 0.10f, 0.05f}, {}}, Pose{rim + Vec3{-0.12f, 0.10f, 0.05f}, {}}};
+  add_instruments(m, scene, rim, where);
 
   PictureModel& p = m.picture;
   p.title = scene.title;
@@ -318,17 +406,7 @@ StatePtr initial_state(const Model& model) {
   s.solver = make_solver_state(model.solver, model.start);
   prepare_scratch(model.solver, s.scratch);
   reserve_room(model, s);
-  for (size_t k = 0; k < 2; ++k) {
-    RigidBody& tool = s.solver.body[k];
-    tool.x = tool.prev_x = model.tool_start[k].p;
-    tool.q = tool.prev_q = model.tool_start[k].q;
-    s.hand[k] = model.tool_start[k];
-    Weld hand;
-    hand.a = static_cast<int>(k);
-    hand.target = model.tool_start[k];
-    s.solver.weld.push_back(hand);
-    s.solver.body_collides[k] = 0;
-  }
+  lay_out_instruments(model, s);
   fresh_suture(model.solver, s.solver, model.suture, model.start, model.needle_start);
   return state;
 }

@@ -39,7 +39,7 @@ constexpr float series(float a, float b) { return a * b / (a + b); }
 NeedleResistance resistance_now(const Model& model, const State& state, float tension) {
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
-  const RigidBody& needle = s.body[kNeedle];
+  const RigidBody& needle = s.body[m.needle_body(0)];
   const SutureState& suture = state.suture;
   const NeedleArc& arc = m.needle_arc[0];
   const auto along = [&](const BiteEnd& end) {
@@ -56,7 +56,8 @@ NeedleResistance resistance_now(const Model& model, const State& state, float te
   const bool tip_in = phase_of(suture) == NeedlePhase::tip_in;
   if (tip_in && suture.attached) {
     for (const Attachment& a : s.attach)
-      if (a.body == static_cast<int>(kNeedle)) indented = distance(transform(needle.pose(), a.target), suture.attached_from);
+      if (a.body == static_cast<int>(m.needle_body(0)))
+        indented = distance(transform(needle.pose(), a.target), suture.attached_from);
   } else if (tip_in) {
     SurfaceHit hit;
     const Vec3 heading = rotate(needle.q, arc.tangent(arc.arc));
@@ -80,10 +81,12 @@ void feel_substep(const Model& model, State& state, int i) {
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
   const float inv_h2 = 1 / (m.h * m.h);
-  for (size_t k = 0; k < 2; ++k) {
+  for (size_t k = 0; k < kMaxHands; ++k) {
     ToolReaction& t = state.feel.tool[k];
-    const int body = static_cast<int>(k);
-    const BodyContact& on = state.scratch.on_body[k];
+    const int body = state.hand[k].instrument;
+    if (body < 0) continue;
+    const Weld& weld = s.weld[static_cast<size_t>(body)];
+    const BodyContact& on = state.scratch.on_body[static_cast<size_t>(body)];
     t.pressing += on.pressing * inv_h2;
     t.rubbing += on.rubbing * inv_h2;
     t.pressed += on.pressed * inv_h2;
@@ -95,9 +98,9 @@ void feel_substep(const Model& model, State& state, int i) {
       if (a.body == body) t.held += a.lambda * -inv_h2;
     bool has_needle = false;
     for (const Weld& w : s.weld)
-      if (w.a == static_cast<int>(kNeedle) && w.b == body) t.needle += w.lambda * -inv_h2, has_needle = true;
+      if (w.b == body) t.needle += w.lambda * -inv_h2, has_needle = true;
     if (has_needle) {
-      const RigidBody& needle = s.body[kNeedle];
+      const RigidBody& needle = s.body[m.needle_body(0)];
       for (const ChannelPoint& c : s.channel) {
         const Vec3 way =
             rotate(needle.q,
@@ -105,8 +108,8 @@ void feel_substep(const Model& model, State& state, int i) {
         t.drag += way * (-c.drag_lambda * inv_h2);  // the channel's push on the tissue, turned round: on the needle
       }
     }
-    t.hand += s.weld[k].lambda * -inv_h2;
-    t.at += s.weld[k].target.p;
+    t.hand += weld.lambda * -inv_h2;
+    t.at += weld.target.p;
     t.substeps += 1;
   }
 }
@@ -142,7 +145,7 @@ float learned(const FeltStiffness& f, float before, float coupling) {
 
 void count_changes(State& state) {
   for (const Event& e : state.event) {
-    std::array<bool, 2> felt{};
+    std::array<bool, kMaxHands> felt{};
     switch (e.kind) {
       case EventKind::needle_grasped:
       case EventKind::needle_released:
@@ -152,22 +155,26 @@ void count_changes(State& state) {
       case EventKind::tissue_released:
       case EventKind::loop_formed:
       case EventKind::loop_released:
-        felt[e.who & 1] = true;
+      case EventKind::instrument_taken:
+      case EventKind::instrument_laid_down:
+      case EventKind::instrument_parked:
+        if (e.who < kMaxHands) felt[e.who] = true;
         break;
       case EventKind::tip_entered:
       case EventKind::particle_released:
       case EventKind::tip_exited:
       case EventKind::bite_cancelled:
-        for (size_t k = 0; k < 2; ++k) felt[k] = state.suture.hand[k].held == Held::needle;
+        for (const InstrumentState& i : state.suture.instrument)
+          if (i.place == InstrumentPlace::hand && i.held == Held::needle) felt[i.hand] = true;
         break;
       case EventKind::thread_cut:
       case EventKind::suture_taken:
-        felt = {true, true};
+        felt.fill(true);
         break;
       default:
         break;
     }
-    for (size_t k = 0; k < 2; ++k) state.feel.topology[k] += felt[k];
+    for (size_t k = 0; k < kMaxHands; ++k) state.feel.topology[k] += felt[k];
   }
 }
 
@@ -175,7 +182,6 @@ void count_changes(State& state) {
 ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
-  const HandState& hand = state.suture.hand[k];
   const ToolReaction& sum = state.feel.tool[k];
   const float part = sum.substeps > 0 ? 1 / sum.substeps : 0, coupling = 1 / model.hand_compliance;
   ForcePatch p;
@@ -183,8 +189,11 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
   p.topology = state.feel.topology[k];
   p.period = model.dt;
   p.expiry = std::max(p.expiry, 2 * model.dt);  // two periods are normal
-  p.point = sum.substeps > 0 ? sum.at * part : state.hand[k].p;
-  if (!s.body_collides[k]) return p;  // no hand there
+  p.point = sum.substeps > 0 ? sum.at * part : state.hand[k].pose.p;
+  if (state.hand[k].instrument < 0) return p;
+  const uint32_t tool = static_cast<uint32_t>(state.hand[k].instrument);
+  if (!s.body_collides[tool]) return p;  // no hand there
+  const InstrumentState& hand = state.suture.instrument[tool];
 
   const Vec3 pressing = sum.pressing * part, thread = sum.thread * part, held = sum.held * part,
              needle = (sum.needle - sum.drag) * part;
@@ -198,7 +207,7 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     both_ways = true;
   }
   if (hand.held == Held::needle && (!s.channel.empty() || length(needle) > 20 * kNothing)) {
-    const RigidBody& body = s.body[kNeedle];
+    const RigidBody& body = s.body[m.needle_body(0)];
     for (const ChannelPoint& c : s.channel) {
       const Vec3 way = rotate(
           body.q, m.needle_arc[0].tangent(m.needle_arc[0].nearest(to_local(body.pose(), position_of(c.point, s.x.data())))));
@@ -230,8 +239,12 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     if (hand.held == Held::needle && !state.suture.open.empty()) {
       // Across the shaft and in turning it is the solver's reaction; along it what a wall really does, never less than the
       // solver says.
-      const ToolReaction& other = state.feel.tool[1 - k];
-      const NeedleResistance r = resistance_now(model, state, other.substeps > 0 ? length(other.held) / other.substeps : 0);
+      float counter = 0;  // [N] with which another hand holds the tissue
+      for (size_t other = 0; other < kMaxHands; ++other) {
+        const ToolReaction& o = state.feel.tool[other];
+        if (other != k && o.substeps > 0) counter = std::max(counter, length(o.held) / o.substeps);
+      }
+      const NeedleResistance r = resistance_now(model, state, counter);
       const float solver = -dot(needle, p.along);
       if (r.spring > solver) p.force -= p.along * (r.spring - solver);
       p.stiffness =
@@ -263,7 +276,7 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
   p.force = {};
   float nearest = kLook;
   for (const ToolCandidate& c : state.scratch.candidates.tool) {
-    if (c.body != k) continue;
+    if (c.body != tool) continue;
     const Capsule& capsule = m.body[c.body].capsule[c.capsule];
     const Pose pose = s.body[c.body].pose();
     const Vec3 a = transform(pose, capsule.a), b = transform(pose, capsule.b), at = xyz(s.x[c.particle]);
@@ -273,12 +286,12 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
   }
   float stands = kBlunt;
   for (const ToolPair& c : state.scratch.candidates.tool_pair) {
-    if (c.a != k && c.b != k) continue;
-    const bool first = c.a == k;
+    if (c.a != tool && c.b != tool) continue;
+    const bool first = c.a == tool;
     const uint32_t to = first ? c.b : c.a;
-    const Capsule &mine = m.body[k].capsule[first ? c.capsule_a : c.capsule_b],
+    const Capsule &mine = m.body[tool].capsule[first ? c.capsule_a : c.capsule_b],
                   &other = m.body[to].capsule[first ? c.capsule_b : c.capsule_a];
-    const Pose here = s.body[k].pose(), there = s.body[to].pose();
+    const Pose here = s.body[tool].pose(), there = s.body[to].pose();
     const Vec3 a0 = transform(here, mine.a), a1 = transform(here, mine.b), b0 = transform(there, other.a),
                b1 = transform(there, other.b);
     const auto [at, on] = closest_on_segments(a0, a1, b0, b1);
@@ -287,7 +300,7 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     if (gap < nearest) nearest = gap, stands = coupling, p.normal = normalized(away);
   }
   if (nearest < kLook) {
-    p.point = state.hand[k].p - p.normal * std::max(0.0f, nearest);
+    p.point = state.hand[k].pose.p - p.normal * std::max(0.0f, nearest);
     p.stiffness = outer(p.normal, series(stands, coupling));
     p.coefficient = m.friction.tool;
   }
@@ -298,8 +311,8 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
 
 void end_feeling(const Model& model, State& state) {
   count_changes(state);
-  for (size_t k = 0; k < 2; ++k) learn(state.feel.stiffness[k], state.feel.tool[k], state.feel.topology[k], model.dt);
-  for (size_t k = 0; k < 2; ++k) state.feel.patch[k] = feel_patch(model, state, k);
+  for (size_t k = 0; k < kMaxHands; ++k) learn(state.feel.stiffness[k], state.feel.tool[k], state.feel.topology[k], model.dt);
+  for (size_t k = 0; k < kMaxHands; ++k) state.feel.patch[k] = feel_patch(model, state, k);
 }
 
 }  // namespace catgut

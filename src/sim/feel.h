@@ -40,11 +40,11 @@ struct FeltStiffness {
 };
 
 struct Feel {
-  std::array<FeltStiffness, 2> stiffness;
+  std::array<FeltStiffness, kMaxHands> stiffness;
   // Counts what changes at once for a hand: taken, let go, pierced (ForcePatch::topology).
-  std::array<uint32_t, 2> topology{};
-  std::array<ForcePatch, 2> patch;  // what each hand may feel until the next tick
-  std::array<ToolReaction, 2> tool;
+  std::array<uint32_t, kMaxHands> topology{};
+  std::array<ForcePatch, kMaxHands> patch;   // what each hand may feel until the next tick
+  std::array<ToolReaction, kMaxHands> tool;  // per hand: of the instrument that it has
 };
 
 constexpr void reflect(auto& a, Like<FeltStiffness> auto& f) {

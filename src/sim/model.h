@@ -1,5 +1,6 @@
 // sim/model: everything about a scene that never changes. Written by sim/build, read by every stage.
 #pragma once
+#include <array>
 #include <vector>
 
 #include "anatomy/body.h"
@@ -11,6 +12,14 @@
 
 namespace catgut {
 
+// An instrument that is parked on tissue when the scene begins.
+struct ParkedStart {
+  size_t instrument = 0;
+  Pose pose;
+  TissuePoint point;      // of tissue, at the jaws
+  uint32_t particle = 0;  // nearest to them
+};
+
 struct Model {
   SceneSpec scene;
   SolverModel solver;
@@ -20,9 +29,13 @@ struct Model {
   std::vector<uint8_t> layer;  // per tissue particle: TissueLayer, serosa outside, mucosa inside
   float dt = 1.0f / 60;        // [s] tick
   int substeps = 8;
-  std::vector<Vec3> start;                                               // [m] of every particle
-  std::vector<Pose> tool_start;                                          // of the two tools
-  Pose needle_start;                                                     // body frame
+  std::vector<Vec3> start;                       // [m] of every particle
+  std::vector<Pose> tray;                        // per instrument: its place on the tray
+  std::vector<Vec3> pull;                        // [N] per instrument: parked, instead of its weight; zero: its weight
+  std::vector<ParkedStart> parked;               // that hold tissue at the start
+  std::array<Pose, kMaxHands> hand_start;        // before a hand is connected
+  std::array<int, kMaxHands> hand_instrument{};  // that a hand has at the start; -1: none
+  Pose needle_start;                             // body frame
   float hand_compliance = 1.0f / 3000, hand_angular_compliance = 0.05f;  // [m/N], [rad/(N m)] tool on its hand
   PictureModel picture;
 };

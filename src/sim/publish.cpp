@@ -8,6 +8,52 @@ namespace catgut {
 
 namespace {
 
+void publish_hands(const Model& model, const State& state, Snapshot& out) {
+  const SolverState& s = state.solver;
+  const float inv_h2 = 1.0f / (model.solver.h * model.solver.h);
+  out.instrument.resize(model.solver.instruments());
+  for (size_t i = 0; i < out.instrument.size(); ++i) {
+    const InstrumentState& tool = state.suture.instrument[i];
+    InstrumentView& v = out.instrument[i];
+    v.pose = s.body[i].pose();
+    v.jaw = tool.jaw;
+    v.place = tool.place;
+    v.hand = tool.hand;
+    v.held = tool.held;
+    v.held_slot = tool.slot;
+    v.pull = {};
+    for (const Attachment& a : s.attach)
+      if (a.body == static_cast<int>(i)) v.pull += a.lambda * inv_h2;
+  }
+  for (size_t k = 0; k < kMaxHands; ++k) {
+    ToolView& t = out.tool[k];
+    t = {};
+    t.pose = t.hand = state.hand[k].pose;
+    t.instrument = state.hand[k].instrument;
+    out.patch[k] = state.feel.patch[k];
+    if (t.instrument < 0) continue;
+    const size_t i = static_cast<size_t>(t.instrument);
+    const InstrumentState& tool = state.suture.instrument[i];
+    t.pose = s.body[i].pose();
+    t.jaw = tool.jaw;
+    t.held = tool.held;
+    t.held_at = tool.at;
+    t.held_slot = tool.slot;
+    t.held_strands =
+        static_cast<uint32_t>(std::count_if(s.strand[0].hold.begin(), s.strand[0].hold.end(), [&](const ThreadHold& h) {
+          return h.body == t.instrument && h.kind == HoldKind::jaw;
+        }));
+    const ToolLoop& loop = state.suture.loop[i];
+    t.loop_wraps = loop.wraps;
+    t.loop_handed = loop.handed;
+    t.loop_first = loop.first;
+    t.loop_last = loop.last;
+    // The weld's multiplier acts on the tool; the hand feels its opposite.
+    t.force = s.weld[i].lambda * -inv_h2;
+    t.torque = s.weld[i].angular_lambda * -inv_h2;
+  }
+}
+
 void publish_knots(const Model& model, const State& state, Snapshot& out) {
   const SolverState& s = state.solver;
   const Vec4* x = s.x.data();
@@ -46,7 +92,6 @@ PictureModel picture_model(const Model& model) { return model.picture; }
 void publish(const Model& model, const State& state, Snapshot& out) {
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
-  const float inv_h2 = 1.0f / (m.h * m.h);
   out.tick = state.tick;
   out.time_s = static_cast<double>(state.tick) / model.scene.solver.tick_rate;
   out.particle.resize(m.count);
@@ -58,31 +103,9 @@ void publish(const Model& model, const State& state, Snapshot& out) {
   }
   out.thread_order = s.strand[0].order;
   out.thread_tension = s.strand[0].tension;
-  for (size_t k = 0; k < 2; ++k) {
-    ToolView& t = out.tool[k];
-    const HandState& hand = state.suture.hand[k];
-    t.pose = s.body[k].pose();
-    t.hand = state.hand[k];
-    t.jaw = hand.jaw;
-    t.held = hand.held;
-    t.held_at = hand.at;
-    t.held_slot = hand.slot;
-    t.held_strands =
-        static_cast<uint32_t>(std::count_if(s.strand[0].hold.begin(), s.strand[0].hold.end(), [&](const ThreadHold& h) {
-          return h.body == static_cast<int>(k) && h.kind == HoldKind::jaw;
-        }));
-    const ToolLoop& loop = state.suture.loop[k];
-    t.loop_wraps = loop.wraps;
-    t.loop_handed = loop.handed;
-    t.loop_first = loop.first;
-    t.loop_last = loop.last;
-    // The weld's multiplier acts on the tool; the hand feels its opposite.
-    t.force = s.weld[k].lambda * -inv_h2;
-    t.torque = s.weld[k].angular_lambda * -inv_h2;
-    out.patch[k] = state.feel.patch[k];
-  }
+  publish_hands(model, state, out);
   // Published at the circle's centre, which is what pictures and plans turn about.
-  out.needle.pose = {transform(s.body[kNeedle].pose(), m.needle_arc[0].centre), s.body[kNeedle].q};
+  out.needle.pose = {transform(s.body[m.needle_body(0)].pose(), m.needle_arc[0].centre), s.body[m.needle_body(0)].q};
   out.needle.in_tissue = !state.suture.open.empty();
   out.needle.bite = state.suture.open.empty() ? 0 : state.suture.open.back().bite;
   out.suture_point.clear();

@@ -128,7 +128,14 @@ Recorder::~Recorder() {
 
 void Recorder::tick(const TickInput& input, uint64_t hash) {
   put(ticks_, input.tick);
-  for (const ToolInput& hand : input.hand) put(ticks_, hand);
+  // Hands that are not there cost nothing; the surgeon's own two are always written.
+  uint32_t hands = kMaxHands;
+  while (hands > 2 && !input.hand[hands - 1].connected) --hands;
+  put(ticks_, hands);
+  for (size_t k = 0; k < hands; ++k) put(ticks_, input.hand[k]);
+  put(ticks_, input.commands.count);
+  for (const Command& c : input.commands)
+    put(ticks_, static_cast<uint8_t>(c.kind)), put(ticks_, c.hand), put(ticks_, c.argument);
   put(ticks_, hash);
   if (++count_ % kTicksPerChunk == 0) flush_ticks();
 }
@@ -201,7 +208,20 @@ Recording parse_recording(const std::string& bytes, const std::string& name) {
       while (c.payload.left() > 0) {
         RecordedTick t;
         t.input.tick = c.payload.integer<uint64_t>();
-        for (ToolInput& hand : t.input.hand) hand = tool(c.payload);
+        const uint32_t hands = c.payload.integer<uint32_t>();
+        for (size_t k = 0; k < kMaxHands; ++k) t.input.hand[k] = k < hands ? tool(c.payload) : no_hand();
+        const uint32_t commands = c.payload.integer<uint32_t>();
+        if (hands > kMaxHands || commands > CommandList::kCapacity) {
+          r.fault = "it is damaged after tick " + std::to_string(r.tick.size());
+          return r;
+        }
+        for (uint32_t k = 0; k < commands; ++k) {
+          Command command;
+          command.kind = static_cast<CommandKind>(c.payload.integer<uint8_t>());
+          command.hand = c.payload.integer<uint8_t>();
+          command.argument = c.payload.integer<uint16_t>();
+          t.input.commands.push(command);
+        }
         t.hash = c.payload.integer<uint64_t>();
         if (c.payload.good()) r.tick.push_back(t);
       }

@@ -16,7 +16,7 @@
 
 namespace catgut {
 
-constexpr uint32_t kRecordingFormat = 1;
+constexpr uint32_t kRecordingFormat = 2;
 
 struct RecordingHeader {
   std::string catgut_version;  // of the program that recorded

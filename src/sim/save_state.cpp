@@ -22,6 +22,7 @@ class Validator : public Archive<Validator> {
     rotation.reset(m.shape.clusters);
     domain(IndexOf::cluster, rotation.x.size());
     domain(IndexOf::body, m.body.size());
+    domain(IndexOf::instrument, m.instruments());
     domain(IndexOf::triangle, m.collision.surface.size());
   }
   bool good() const { return good_; }
@@ -89,24 +90,35 @@ bool knot_fits(const Strand& strand, const Knot& k) {
   return !tightening || (is_anchored(strand, k.end[0]) && is_anchored(strand, k.end[1]));
 }
 
-bool suture_fits(const SolverState& solver, const SutureState& u) {
+bool suture_fits(const SolverModel& model, const SolverState& solver, const SutureState& u) {
   const bool tip_attached = std::any_of(solver.attach.begin(), solver.attach.end(),
-                                        [](const Attachment& t) { return t.body == static_cast<int>(kNeedle); });
+                                        [&](const Attachment& t) { return t.body == static_cast<int>(model.needle_body(0)); });
   if (u.attached && (!tip_attached || phase_of(u) != NeedlePhase::tip_in)) return false;
   for (const OpenBite& open : u.open)
     if (open.phase == NeedlePhase::outside || (open.phase == NeedlePhase::back_in && u.point.empty())) return false;
   return std::all_of(u.knot.begin(), u.knot.end(), [&](const Knot& k) { return knot_fits(solver.strand[0], k); });
 }
 
+// The first welds hold the instruments; a hand and its instrument name each other.
+bool hands_fit(uint32_t instruments, const State& s) {
+  if (s.solver.weld.size() < instruments) return false;
+  for (uint32_t i = 0; i < instruments; ++i) {
+    const Weld& w = s.solver.weld[i];
+    if (w.a != static_cast<int>(i) || w.b != -1) return false;
+    const InstrumentState& tool = s.suture.instrument[i];
+    const bool in_hand = tool.place == InstrumentPlace::hand;
+    if (in_hand ? tool.hand >= kMaxHands || s.hand[tool.hand].instrument != w.a : tool.hand != kNoHand) return false;
+  }
+  for (size_t k = 0; k < kMaxHands; ++k)
+    if (const int i = s.hand[k].instrument; i >= 0 && s.suture.instrument[static_cast<size_t>(i)].hand != k) return false;
+  return true;
+}
+
 bool fits(const Model& model, const State& s) {
   Validator indices(model.solver);
   indices(s);
-  if (!indices.good() || s.solver.weld.size() < 2) return false;
-  for (int k = 0; k < 2; ++k) {  // the first two hold the tools to their hands
-    const Weld& w = s.solver.weld[static_cast<size_t>(k)];
-    if (w.a != k || w.b != -1) return false;
-  }
-  return strand_fits(model.solver.strand[0], s.solver.strand[0]) && suture_fits(s.solver, s.suture) &&
+  return indices.good() && hands_fit(model.solver.instruments(), s) &&
+         strand_fits(model.solver.strand[0], s.solver.strand[0]) && suture_fits(model.solver, s.solver, s.suture) &&
          technique_fits(model.technique, s.technique, s.plan.pair.size(), s.suture.point.size());
 }
 

@@ -30,6 +30,15 @@ struct BodySpec {
   float inner_radius = 0;        // [m] outer radius of a second tube inside the first (a bowel folded into itself); 0: none
 };
 
+// One instrument of the scene. A scene that names none has a needle holder in the right hand and forceps in the left.
+struct InstrumentSpec {
+  std::string name;              // in this scene; empty: that of its kind
+  std::string kind = "forceps";  // of the table in src/instrument
+  std::string where = "tray";    // right, left, assistant_right, assistant_left: in that hand; tray; parked: closed on tissue
+  Vec3 at;                       // [m] parked: the jaws close on the tissue's surface nearest to here
+  Vec3 pull;                     // [N] parked: pulls with this force instead of its weight; zero: its weight
+};
+
 struct ThreadSpec {
   int particles = 175;
   float spacing = 0.0016f;           // [m] rest distance of neighbours
@@ -122,6 +131,7 @@ struct SceneSpec {
   float duration = 240;  // [s] simulated, at most; a run ends earlier when the surgeon is done
   float settle = 0.5f;   // [s] simulated before the hands are let in
   std::vector<BodySpec> body;
+  std::vector<InstrumentSpec> instrument;
   ThreadSpec thread;
   NeedleSpec needle;
   SolverSpec solver;

@@ -4,6 +4,7 @@
 #pragma once
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "exchange/tool_input.h"
+#include "instrument/instrument.h"
 #include "sim/scene.h"
 
 namespace catgut {
@@ -21,7 +23,8 @@ struct Model;  // sim/model.h
 struct State;  // sim/state.h
 
 // Builds the scene. Throws InputError for what a scene may get wrong (mesh missing, too few particles, ...).
-std::shared_ptr<const Model> build_model(const SceneSpec& scene);
+// own: instrument models besides those of the table (instrument/table), by which a scene's instruments may be of that kind.
+std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const InstrumentModel> own = {});
 const SceneSpec& scene_of(const Model& model);
 size_t particle_count(const Model& model);  // tissue + thread
 

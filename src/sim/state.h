@@ -13,16 +13,26 @@
 
 namespace catgut {
 
+// A hand of the surgeon or of an assistant, and what it has.
+struct HandState {
+  Pose pose;            // at the end of the last tick
+  Pose grip;            // of the instrument in the hand's frame: how it lies there
+  int instrument = -1;  // -1: none
+  uint32_t known = 0;   // 0 until the hand has first been connected
+};
+constexpr void reflect(auto& a, Like<HandState> auto& h) {
+  a(h.pose), a(h.grip), a.index_or_none(h.instrument, IndexOf::instrument), a(h.known);
+}
+
 struct State {
   uint64_t tick = 0;
-  SolverState solver;                   // written by solver/substep, suture/*
-  SutureState suture;                   // written by suture/{grasp, puncture, pull}
-  TechniqueState technique;             // written by technique
-  ClosurePlan plan;                     // written by technique, read by suture/closure
-  std::array<Pose, 2> hand;             // where the hands were at the end of the last tick; written by sim/step
-  std::array<uint8_t, 2> hand_known{};  // 0 until a hand has first been connected
-  Feel feel;                            // written by sim/feel, read by publish
-  EventList event;                      // of the last tick
+  SolverState solver;                     // written by solver/substep, suture/*
+  SutureState suture;                     // written by suture/{grasp, puncture, pull}
+  TechniqueState technique;               // written by technique
+  ClosurePlan plan;                       // written by technique, read by suture/closure
+  std::array<HandState, kMaxHands> hand;  // written by sim/hands
+  Feel feel;                              // written by sim/feel, read by publish
+  EventList event;                        // of the last tick
   // Working memory.
   std::vector<StitchPoint> stitch;
   std::vector<float> stitch_span;
@@ -30,7 +40,7 @@ struct State {
 };
 
 constexpr void reflect(auto& a, Like<State> auto& s) {
-  a(s.tick), a(s.solver), a(s.suture), a(s.plan), a(s.technique), a(s.hand), a(s.hand_known), a(s.feel), a(s.event);
+  a(s.tick), a(s.solver), a(s.suture), a(s.plan), a(s.technique), a(s.hand), a(s.feel), a(s.event);
   a.cache(s.stitch), a.cache(s.stitch_span), a.cache(s.scratch);
 }
 

@@ -1,37 +1,13 @@
 // sim/step: THE stage list. Reads one TickInput, moves the state by one tick, leaves the tick's events in it.
 #include <algorithm>
 
+#include "sim/hands.h"
 #include "sim/model.h"
 #include "sim/simulation.h"
 #include "sim/state.h"
 
 namespace catgut {
 namespace {
-
-// A tool follows its hand through a spring. Between two ticks the hand is taken to move evenly, so substeps see no jumps.
-void follow_hands(const Model& model, State& state, const TickInput& input, float part) {
-  for (size_t k = 0; k < 2; ++k) {
-    const Pose& from = state.hand[k];
-    const Pose& to = input.hand[k].connected ? input.hand[k].pose : from;
-    state.solver.weld[k].target = {lerp(from.p, to.p, part), nlerp(from.q, to.q, part)};
-    state.solver.weld[k].compliance = model.hand_compliance;
-    state.solver.weld[k].angular_compliance = model.hand_angular_compliance;
-  }
-}
-
-// A hand that appears is taken over where it is: its tool is placed there, not dragged there through the tissue.
-void meet_hands(State& state, const TickInput& input) {
-  for (size_t k = 0; k < 2; ++k) {
-    state.solver.body_collides[k] = input.hand[k].connected != 0;
-    if (!input.hand[k].connected || state.hand_known[k]) continue;
-    state.hand_known[k] = 1;
-    state.hand[k] = input.hand[k].pose;
-    RigidBody& tool = state.solver.body[k];
-    tool = {};
-    tool.x = tool.prev_x = input.hand[k].pose.p;
-    tool.q = tool.prev_q = input.hand[k].pose.q;
-  }
-}
 
 // What the technique may see of the tick.
 TechniqueView look(const Model& model, State& state) {
@@ -70,7 +46,8 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   state.event.start(state.tick);
   find_boxes(solver, state.solver, state.scratch, jobs, times);
   meet_hands(state, input);
-  const std::array<uint32_t, 2> pressed = pressed_buttons(state.suture, input.hand);
+  handle_instruments(model, state, input);
+  const std::array<uint32_t, kMaxHands> pressed = pressed_buttons(state.suture, input.hand);
   grasp(solver, state.solver, state.scratch, model.suture, state.suture, input.hand, state.event);
   {
     StageTimer timer(times, Stage::loop);
@@ -104,8 +81,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
     technique(model.technique, state.technique, look(model, state), state.plan, state.event);
     close(state.solver, state.plan);
   }
-  for (size_t k = 0; k < 2; ++k)
-    if (input.hand[k].connected) state.hand[k] = input.hand[k].pose;
+  remember_hands(state, input);
   ++state.tick;
   end_feeling(model, state);
 }

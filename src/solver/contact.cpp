@@ -290,7 +290,7 @@ uint32_t solve_thread_on_thread(const ContactView& v, const std::vector<ThreadPa
   return touching;
 }
 
-uint32_t solve_ground(const ContactView& v, float ground, float friction) {
+uint32_t solve_ground(const ContactView& v, const std::vector<Vec3>& body_force, float ground, float friction) {
   uint32_t touching = 0;
   const Vec3 n{0, 1, 0};
   for (const StrandModel& model : v.strand_model)
@@ -300,13 +300,15 @@ uint32_t solve_ground(const ContactView& v, float ground, float friction) {
       ++touching;
       add(v.x[slot], n * depth - friction_step(moved(v, slot), n, depth, friction));
     }
-  // Bodies that have weight of their own: needles. Their ends and middle are enough for an arc of capsules.
+  // Bodies that no hand carries: needles, whose arc of capsules is held up at one end each, and parked instruments, at both.
   for (size_t k = 0; k < v.body->size(); ++k) {
     RigidBody& b = (*v.body)[k];
     const RigidModel& m = (*v.model)[k];
-    if (!m.gravity) continue;
-    for (const Capsule& capsule : m.capsule) {
-      const Vec3 at = transform(b.pose(), capsule.a);
+    const bool falls = length2(body_force[k]) > 0;
+    if (!m.gravity && !falls) continue;
+    for (size_t end = 0; end < (falls ? 2 : 1) * m.capsule.size(); ++end) {
+      const Capsule& capsule = m.capsule[end % m.capsule.size()];
+      const Vec3 at = transform(b.pose(), end < m.capsule.size() ? capsule.a : capsule.b);
       const float depth = ground + capsule.radius - at.y;
       if (depth <= 0) continue;
       ++touching;

@@ -59,6 +59,7 @@ uint32_t solve_thread_on_tissue(const ContactView& v, const TissueCollision& tis
                                 const std::vector<ThreadTissueCandidate>& list, float friction);
 uint32_t solve_thread_on_thread(const ContactView& v, const std::vector<ThreadPairCandidate>& list, float friction);
 // The drape: a horizontal plane at height `ground` [m] for threads and needles.
-uint32_t solve_ground(const ContactView& v, float ground, float friction);
+// body_force [N]: see SolverState.
+uint32_t solve_ground(const ContactView& v, const std::vector<Vec3>& body_force, float ground, float friction);
 
 }  // namespace catgut

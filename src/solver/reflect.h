@@ -12,7 +12,8 @@ enum class IndexOf : uint8_t {
   tissue,    // particles of soft bodies
   slot,      // particles of all strands; the first is not 0
   cluster,   // of shape matching, padded as its columns are
-  body,      // rigid
+  body,      // rigid: instruments, then needles
+  instrument,
   triangle,  // of the tissue's surface
   strand,    // a suture's; so is its needle
   anchor,    // of a strand
@@ -75,7 +76,7 @@ constexpr void reflect(auto& a, Like<SolverState> auto& s) {
   a.column(s.body, IndexOf::body);
   a.column(s.strand, IndexOf::strand);
   a(s.weld), a(s.attach), a(s.pin), a(s.channel);
-  a.column(s.body_collides, IndexOf::body);
+  a.column(s.body_collides, IndexOf::body), a.column(s.body_force, IndexOf::body);
 }
 
 }  // namespace catgut

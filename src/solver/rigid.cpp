@@ -26,6 +26,7 @@ void update_velocity(const RigidModel& m, RigidBody& b, float h, float damping) 
 }
 
 void solve_weld(const std::vector<RigidModel>& model, std::vector<RigidBody>& body, Weld& weld, float h) {
+  if (weld.compliance < 0) return;
   RigidBody& a = body[static_cast<size_t>(weld.a)];
   const RigidModel& ma = model[static_cast<size_t>(weld.a)];
   RigidBody* b = weld.b >= 0 ? &body[static_cast<size_t>(weld.b)] : nullptr;

@@ -59,7 +59,7 @@ void update_velocity(const RigidModel& m, RigidBody& b, float h, float damping);
 struct Weld {
   int a = -1, b = -1;
   Pose local_a, local_b, target;
-  float compliance = 0;          // [m/N]
+  float compliance = 0;          // [m/N]; negative: the weld is open and holds nothing
   float angular_compliance = 0;  // [rad/(N m)]
   Vec3 lambda, angular_lambda;   // cleared at the start of a substep; act on a
 };

@@ -124,6 +124,7 @@ SolverState make_solver_state(const SolverModel& model, std::span<const Vec3> po
   s.rotation.reset(model.shape.clusters);
   s.body.resize(model.body.size());
   s.body_collides.assign(model.body.size(), 1);
+  s.body_force.assign(model.body.size(), {});
   s.strand.resize(model.strand.size());
   for (size_t k = 0; k < s.strand.size(); ++k) reset(model.strand[k], s.strand[k]);
   return s;
@@ -173,7 +174,10 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
       predict_particles(m, s, k, m.tissue_gravity, m.shape.group_first[first], m.shape.group_first[last]);
       make_shape_rows(m.shape, x, k.shape, static_cast<uint32_t>(first), static_cast<uint32_t>(last));
     });
-    for (size_t b = 0; b < s.body.size(); ++b) predict(m.body[b], s.body[b], m.gravity, h);
+    for (size_t b = 0; b < s.body.size(); ++b) {
+      if (length2(s.body_force[b]) > 0) s.body[b].v += s.body_force[b] * (m.body[b].inv_mass * h);
+      predict(m.body[b], s.body[b], m.gravity, h);
+    }
   }
   {
     StageTimer timer(times, Stage::shape);
@@ -265,7 +269,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
       n += solve_thread_on_tools(view, k.candidates.thread_tool, m.friction.thread, m.ground);
       n += solve_thread_on_tissue(view, m.collision, k.candidates.thread_tissue, m.friction.thread);
       n += solve_thread_on_thread(view, k.candidates.thread_pair, m.friction.thread);
-      n += solve_ground(view, m.ground, m.friction.tissue);
+      n += solve_ground(view, s.body_force, m.ground, m.friction.tissue);
     }
     if (sweep == 0) touching += n;
     if (n == 0) break;

@@ -41,8 +41,10 @@ struct SolverModel {
   Friction friction;
   float tool_force = 8;  // [N] that two tools press each other with at most
   float ground = -1e9f;  // [m] height of the drape
-  // The body of a suture's needle, and the suture of a thread slot.
-  uint32_t needle_body(size_t suture) const { return static_cast<uint32_t>(body.size() - strand.size() + suture); }
+  // Instruments are the first bodies, the needle of every suture follows.
+  uint32_t instruments() const { return static_cast<uint32_t>(body.size() - strand.size()); }
+  uint32_t needle_body(size_t suture) const { return instruments() + static_cast<uint32_t>(suture); }
+  // The suture of a thread slot.
   uint32_t strand_of(uint32_t slot) const {
     uint32_t k = 0;
     while (!strand[k].has(slot)) ++k;
@@ -50,18 +52,17 @@ struct SolverModel {
   }
 };
 
-constexpr uint32_t kNeedle = 2;
-
 struct SolverState {
   Column<Vec4> x, v;          // position [m], velocity [m/s]
   ClusterRotations rotation;  // warm start of the polar decompositions
   std::vector<RigidBody> body;
   std::vector<Strand> strand;          // one per suture
-  std::vector<Weld> weld;              // tool to hand, needle to tool
+  std::vector<Weld> weld;              // row i: instrument i to its hand; after them needle to instrument
   std::vector<Attachment> attach;      // tissue to needle tip, to a jaw, to its closing target
   std::vector<TissuePin> pin;          // tissue to tissue: seams, settled stitches
   std::vector<ChannelPoint> channel;   // needles in their channels
   std::vector<uint8_t> body_collides;  // per body
+  std::vector<Vec3> body_force;        // [N] per body, from outside: the weight of a parked instrument
   Column<Vec4> pair_origin;            // [m] per tissue particle: where its contact pairs were last searched
 };
 

@@ -49,7 +49,7 @@ void Scripted::take_over(const Snapshot& seen) {
   pull_from_ = hand_[kForceps].pose;
 }
 
-std::array<ToolInput, 2> Scripted::operate(const Snapshot& seen, float dt) {
+TickInput Scripted::operate(const Snapshot& seen, float dt) {
   if (takes_over_) take_over(seen);
   const std::array<Pose, 2> before{hand_[0].pose, hand_[1].pose};
   buttons_ = {};
@@ -61,11 +61,11 @@ std::array<ToolInput, 2> Scripted::operate(const Snapshot& seen, float dt) {
       begin();
     }
   }
-  std::array<ToolInput, 2> out;
+  TickInput out;
   for (size_t k = 0; k < 2; ++k) {
     tremble(hand_[k], skill_.tremor, random_, dt);
-    out[k] = as_input(hand_[k], before[k], dt, sequence_);
-    out[k].buttons = buttons_[k];
+    out.hand[k] = as_input(hand_[k], before[k], dt, sequence_);
+    out.hand[k].buttons = buttons_[k];
   }
   ++sequence_;
   return out;

@@ -30,7 +30,7 @@ class Scripted final : public Surgeon {
 
   std::string doing() const override;
 
-  std::array<ToolInput, 2> operate(const Snapshot& seen, float dt) override;
+  TickInput operate(const Snapshot& seen, float dt) override;
 
  private:
   // --- the state of a task ----------------------------------------------------------------------------------------------

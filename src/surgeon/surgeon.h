@@ -26,8 +26,9 @@ struct SurgeonSkill {
 class Surgeon {
  public:
   virtual ~Surgeon() = default;
-  // The hands for the next tick, seeing the state after the last one. dt: length of a tick [s].
-  virtual std::array<ToolInput, 2> operate(const Snapshot& seen, float dt) = 0;
+  // Hands and commands for the next tick, seeing the state after the last one; TickInput::tick is left to the caller. dt:
+  // length of a tick [s].
+  virtual TickInput operate(const Snapshot& seen, float dt) = 0;
   virtual bool done() const = 0;  // the plan is finished (or given up)
   virtual bool gave_up() const { return false; }
   virtual std::string doing() const = 0;  // "bite 3 of 12: drive the needle", for progress lines

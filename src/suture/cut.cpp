@@ -25,9 +25,9 @@ Way to_stitch(const Strand& t, size_t i, int way) {
 
 }  // namespace
 
-std::array<uint32_t, 2> pressed_buttons(SutureState& state, const std::array<ToolInput, 2>& hand) {
-  std::array<uint32_t, 2> pressed{};
-  for (size_t who = 0; who < 2; ++who) {
+std::array<uint32_t, kMaxHands> pressed_buttons(SutureState& state, const HandInputs& hand) {
+  std::array<uint32_t, kMaxHands> pressed{};
+  for (size_t who = 0; who < kMaxHands; ++who) {
     const uint32_t now = hand[who].connected ? hand[who].buttons : 0;
     pressed[who] = now & ~state.buttons[who];
     state.buttons[who] = now;
@@ -36,10 +36,11 @@ std::array<uint32_t, 2> pressed_buttons(SutureState& state, const std::array<Too
 }
 
 void cut(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-         const std::array<uint32_t, 2>& pressed, EventList& events) {
+         const std::array<uint32_t, kMaxHands>& pressed, EventList& events) {
   Strand& t = solver.strand[0];
-  for (uint8_t who = 0; who < 2; ++who) {
-    if (!(pressed[who] & kButtonCut)) continue;
+  for (uint8_t who = 0; who < state.instrument.size(); ++who) {
+    const uint8_t by = hand_of(state, who);
+    if (by == kNoHand || !(pressed[by] & kButtonCut) || !suture.instrument[who].can(kCutThread)) continue;
     const Vec3 at = solver.body[who].x;
     float best = suture.cut_reach, along = 0;
     size_t i = t.order.size();
@@ -50,7 +51,7 @@ void cut(const SolverModel& model, SolverState& solver, const SutureModel& sutur
       if (far < best) best = far, along = s, i = k;
     }
     // A hand that holds the needle has the thread cut off it, wherever on the arc it holds.
-    if (state.hand[who].held == Held::needle && !t.cut.back()) i = t.order.size() - 2, along = 1;
+    if (state.instrument[who].held == Held::needle && !t.cut.back()) i = t.order.size() - 2, along = 1;
     if (i == t.order.size()) continue;
 
     const Way free = to_stitch(t, i, -1), needle = to_stitch(t, i + 1, 1);
@@ -68,15 +69,15 @@ void cut(const SolverModel& model, SolverState& solver, const SutureModel& sutur
     } else {
       cut_pair(t, i);
       // Turns that are cut through hold nothing.
-      for (uint8_t tool = 0; tool < 2; ++tool) {
+      for (uint8_t tool = 0; tool < state.instrument.size(); ++tool) {
         if (!is_held_by(t, slot, tool, HoldKind::loop) || !is_held_by(t, t.order[i + 1], tool, HoldKind::loop)) continue;
         take_off_loop(model, solver, suture, state, tool);
-        events.add({EventKind::loop_released, tool, 0, 0, where});
+        events.add({EventKind::loop_released, hand_of(state, tool), 0, 0, where});
       }
     }
-    events.add({EventKind::thread_cut, who, slot, left, where});
+    events.add({EventKind::thread_cut, by, slot, left, where});
 
-    const auto fault = [&](uint32_t which, Fault f) { events.add({EventKind::technique_fault, who, which, 0, where, f}); };
+    const auto fault = [&](uint32_t which, Fault f) { events.add({EventKind::technique_fault, by, which, 0, where, f}); };
     if (stitch_free && stitch_needle) {
       fault(slot, Fault::cut_in_stitch);
       continue;

@@ -57,7 +57,7 @@ int nearest_point(const Strand& t, const SutureState& state, int k, Side strand)
 }
 
 bool pulls(const SutureState& state, const Knot& knot) {
-  const HandState& hand = state.hand[knot.hand];
+  const InstrumentState& hand = state.instrument[knot.hand];
   return hand.held == Held::thread && hand.slot == knot.strand;
 }
 // Whether the throw in hand still hangs on one thread: its loop, and the strand that was taken, with the stitch.
@@ -78,7 +78,7 @@ void cancel(const SolverModel&, SolverState& solver, const SutureModel&, SutureS
             EventList& events) {
   Knot& knot = state.knot[which];
   const Vec3 where = position_of(knot.target, solver.x.data()) + normalized(knot.from) * knot.left;
-  events.add({EventKind::knot_cancelled, static_cast<uint8_t>(knot.hand), which, 0, where});
+  events.add({EventKind::knot_cancelled, hand_of(state, knot.hand), which, 0, where});
   for (uint32_t slot : knot.end) release_end(solver, state, slot);
   if (knot.begun == 0) {
     state.knot.erase(state.knot.begin() + which);
@@ -133,19 +133,21 @@ void begin(const SolverModel& model, SolverState& solver, const SutureModel& sut
   Strand& t = solver.strand[0];
   const Vec4* x = solver.x.data();
   const ToolLoop loop = state.loop[who];
-  const uint32_t strand = state.hand[who].slot;
+  const uint32_t strand = state.instrument[who].slot;
   const RigidBody& tool = solver.body[who];
   const size_t first = node_of(t, loop.first), last = node_of(t, loop.last), held = node_of(t, strand);
   const Ends wrapped = ends_of(t, state, first, last), taken = ends_of(t, state, held, held);
   // Two strands are tied to each other if one leads to the free end and the other to the needle.
   const bool one_strand = wrapped.strand == taken.strand || wrapped.strand == Side::bight || taken.strand == Side::bight;
   const int under = knot_under(t, state, wrapped, taken, one_strand);
-  const auto fault = [&](uint32_t which, Fault f) { events.add({EventKind::technique_fault, who, which, 0, tool.x, f}); };
+  const auto fault = [&](uint32_t which, Fault f) {
+    events.add({EventKind::technique_fault, hand_of(state, who), which, 0, tool.x, f});
+  };
   const bool full = under != kNone && state.knot[static_cast<size_t>(under)].throws == KnotView::kMostThrows;
   if (state.point.empty() || wrapped.strand == Side::loose || taken.strand == Side::loose || full) {
     if (!full) fault(static_cast<uint32_t>(state.knot.size()), Fault::knot_without_bite);
     take_off_loop(model, solver, suture, state, who);
-    events.add({EventKind::loop_released, who, 0, 0, tool.x});
+    events.add({EventKind::loop_released, hand_of(state, who), 0, 0, tool.x});
     return;
   }
   if (!state.open.empty() && !state.open.back().told) {
@@ -186,7 +188,7 @@ void begin(const SolverModel& model, SolverState& solver, const SutureModel& sut
     a.capstan = suture.capstan;
     t.anchor.push_back(a);
   }
-  events.add({EventKind::knot_begun, who, which, static_cast<float>(made.wraps), place});
+  events.add({EventKind::knot_begun, hand_of(state, who), which, static_cast<float>(made.wraps), place});
 }
 
 // The particle of the taken strand that the knot will hold: of those between the stitch and the jaw, the one nearest to it.
@@ -255,7 +257,7 @@ void lock(const SolverModel& model, SolverState& solver, const SolverScratch& sc
     made.gap = knot.left;
   }
   knot.phase = KnotPhase::locked;
-  events.add({EventKind::knot_locked, static_cast<uint8_t>(knot.hand), which, made.tension, where});
+  events.add({EventKind::knot_locked, hand_of(state, knot.hand), which, made.tension, where});
 }
 
 // A knot that has just been locked draws its two strands in: what is slack between the stitch and it goes to the outer side, as
@@ -299,8 +301,9 @@ void tie(const SolverModel& model, SolverState& solver, const SutureModel& sutur
     if (state.knot[i].phase == KnotPhase::tightening &&
         (!pulls(state, state.knot[i]) || !is_whole(solver.strand[0], state, state.knot[i])))
       cancel(model, solver, suture, state, static_cast<uint32_t>(i), events);
-  for (uint8_t who = 0; who < 2; ++who)
-    if (state.loop[who].wraps > 0 && state.hand[who].held == Held::thread) begin(model, solver, suture, state, who, events);
+  for (uint8_t who = 0; who < state.instrument.size(); ++who)
+    if (state.loop[who].wraps > 0 && state.instrument[who].held == Held::thread)
+      begin(model, solver, suture, state, who, events);
 }
 
 void tighten(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,

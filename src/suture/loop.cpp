@@ -17,7 +17,6 @@ constexpr size_t kMostCorners = 512;   // of the thread on one tool: a longer ru
 constexpr size_t kFewest = 3;          // particles of a loop: thread between two of them is straight
 constexpr float kOwnStrands = 0.012f;  // [m] of thread on either side that belong to a loop: jaws do not take them by mistake
 constexpr float kWide = 0.95f;         // a jaw opened this far drops the loop round it
-constexpr float kShut = 0.35f;         // a jaw closed this far has taken what there is, or nothing
 constexpr size_t kSeveral = 6;         // particles that must touch, and
 constexpr float kMostOfATurn =
     1.5f * kPi;                      // [rad] how far thread must go round a tool, before a loop that is none is spoken of
@@ -242,18 +241,19 @@ void take_off_loop(const SolverModel&, SolverState& solver, const SutureModel&, 
 void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                 EventList& events) {
   Strand& t = solver.strand[0];
-  for (uint8_t who = 0; who < 2; ++who) {
+  for (uint8_t who = 0; who < state.instrument.size(); ++who) {
     ToolLoop& loop = state.loop[who];
-    const HandState& hand = state.hand[who];
+    const InstrumentState& hand = state.instrument[who];
+    const InstrumentModel& kind = suture.instrument[who];
     const RigidBody& tool = solver.body[who];
     const bool opened = loop.jaw < kWide && hand.jaw >= kWide && hand.held == Held::nothing;
-    const bool closes = loop.jaw > kShut && hand.jaw <= kShut;
+    const bool closes = loop.jaw > kind.jaw.closed && hand.jaw <= kind.jaw.closed;
     loop.jaw = hand.jaw;
     if (loop.wraps > 0) {
       const float pull = tension_outside(t, node_of(t, loop.first), node_of(t, loop.last));
-      if (opened || pull > suture.thread_grip) {
+      if (opened || pull > kind.thread_grip) {
         take_off_loop(model, solver, suture, state, who);
-        events.add({EventKind::loop_released, who, 0, opened ? 0 : pull, tool.x});
+        events.add({EventKind::loop_released, hand.hand, 0, opened ? 0 : pull, tool.x});
         continue;
       }
     }
@@ -269,7 +269,7 @@ void find_loops(const SolverModel& model, SolverState& solver, const SutureModel
       if (loop.wraps == 0 && v.touching >= kSeveral && v.reason != loop.told &&
           (v.reason != LoopReason::no_crossing || (closes && v.round > kMostOfATurn))) {
         loop.told = v.reason;
-        events.add({EventKind::loop_rejected, who, 0, 0, tool.x, Fault::none, v.reason});
+        events.add({EventKind::loop_rejected, hand.hand, 0, 0, tool.x, Fault::none, v.reason});
       }
       continue;
     }
@@ -293,7 +293,7 @@ void find_loops(const SolverModel& model, SolverState& solver, const SutureModel
     loop.wraps = v.wraps;
     loop.handed = handed;
     loop.told = LoopReason::none;
-    events.add({EventKind::loop_formed, who, loop.wraps, static_cast<float>(handed), middle(solver, v)});
+    events.add({EventKind::loop_formed, hand.hand, loop.wraps, static_cast<float>(handed), middle(solver, v)});
   }
 }
 

@@ -58,7 +58,7 @@ bool is_tied(const Strand& t, const TiedNodes& knots, size_t i) {
 }  // namespace
 
 // Whether jaws draw thread that passes at node i that way: they hold it there, with no other suture point in between.
-static int drawing_hand(const Strand& t, size_t i, int way) {
+static int drawing_instrument(const Strand& t, size_t i, int way) {
   for (size_t k = i; continues(t, k, way);) {
     k = way > 0 ? k + 1 : k - 1;
     const uint32_t slot = t.order[k];
@@ -75,11 +75,12 @@ static void judge_drawing(const SolverState& solver, SutureState& state, const T
                           EventList& events) {
   if (state.open.empty()) return;
   OpenBite& open = state.open.back();
-  const int hand = open.told ? -1 : drawing_hand(solver.strand[0], node_of(solver.strand[0], a.slot), toward_needle ? 1 : -1);
-  if (hand < 0 || ++open.drawn < 2) return;
+  const int tool =
+      open.told ? -1 : drawing_instrument(solver.strand[0], node_of(solver.strand[0], a.slot), toward_needle ? 1 : -1);
+  if (tool < 0 || ++open.drawn < 2) return;
   open.told = 1;
-  events.add({EventKind::technique_fault, static_cast<uint8_t>(hand), open.bite, 0, position_of(a, solver.x.data()),
-              Fault::needle_in_tissue});
+  events.add({EventKind::technique_fault, hand_of(state, static_cast<size_t>(tool)), open.bite, 0,
+              position_of(a, solver.x.data()), Fault::needle_in_tissue});
 }
 
 // A cut thread holds nothing together: as long as all of it, whatever is drawn.

@@ -29,9 +29,9 @@ ChannelPoint channel_at(const SutureModel& suture, const Bite& bite, uint32_t wh
   return c;
 }
 
-void drop_attachment(SolverState& solver, SutureState& state) {
+void drop_attachment(const SolverModel& model, SolverState& solver, SutureState& state) {
   if (!state.attached) return;
-  std::erase_if(solver.attach, [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
+  std::erase_if(solver.attach, [&](const Attachment& a) { return a.body == static_cast<int>(model.needle_body(0)); });
   state.attached = false;
 }
 
@@ -40,10 +40,10 @@ void close_hole(SolverState& solver, uint32_t hole) {
 }
 
 // The newest bite is out again the way it came. Its record stays, marked; everything that held needle or tissue there goes.
-void cancel_bite(SolverState& solver, SutureState& state, Vec3 tip, EventList& events) {
+void cancel_bite(const SolverModel& model, SolverState& solver, SutureState& state, Vec3 tip, EventList& events) {
   const uint32_t which = state.open.back().bite;
   Bite& bite = state.bite[which];
-  drop_attachment(solver, state);
+  drop_attachment(model, solver, state);
   close_hole(solver, hole_of(which, false));
   close_hole(solver, hole_of(which, true));
   bite.cancelled = true;
@@ -114,15 +114,15 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
               SutureState& state, EventList& events) {
   const Vec4* x = solver.x.data();
   const NeedleArc& arc = model.needle_arc[0];
-  const RigidBody& needle = solver.body[kNeedle];
+  const RigidBody& needle = solver.body[model.needle_body(0)];
   const Vec3 tip = needle_tip(arc, needle);
   SurfaceHit hit;
   const bool near = nearest_surface(model, scratch.candidates, x, tip, kReach, hit);
   const bool was_inside = state.tip_inside;
   const bool inside = near && hit.distance < (was_inside ? kHysteresis : -kHysteresis);
   // A needle that lies about pierces nothing: it weighs a few millinewtons.
-  const bool held =
-      std::any_of(solver.weld.begin(), solver.weld.end(), [](const Weld& w) { return w.a == static_cast<int>(kNeedle); });
+  const bool held = std::any_of(solver.weld.begin(), solver.weld.end(),
+                                [&](const Weld& w) { return w.a == static_cast<int>(model.needle_body(0)); });
   state.tip_inside = inside && (held || !state.open.empty());
   // [m] along the shaft from the swage to an end of a bite.
   auto along = [&](const BiteEnd& end) { return arc.radius * arc.nearest(to_local(needle.pose(), position_of(end.point, x))); };
@@ -138,17 +138,17 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
       // Figure 5: dragged beyond the threshold, it is let go and the tissue relaxes.
       const float dragged = distance(xyz(x[bite.nearest]), state.attached_from);
       const auto row = std::find_if(solver.attach.begin(), solver.attach.end(),
-                                    [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
+                                    [&](const Attachment& a) { return a.body == static_cast<int>(model.needle_body(0)); });
       const float torn = distance(transform(needle.pose(), row->target), state.attached_from);
       if (std::max(dragged, torn) > suture.release_distance) {
-        drop_attachment(solver, state);
+        drop_attachment(model, solver, state);
         events.add({EventKind::particle_released, 0, bite.nearest, dragged, xyz(x[bite.nearest])});
       }
     }
     if (!inside) {
-      drop_attachment(solver, state);
+      drop_attachment(model, solver, state);
       if (!near || tip_at - along(bite.entry) < kEndReached) {
-        cancel_bite(solver, state, tip, events);
+        cancel_bite(model, solver, state, tip, events);
       } else {
         bite.exit = hit.end;
         spread(model, bite.exit);
@@ -166,7 +166,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
       close_hole(solver, hole_of(which, true));
       state.open.back().phase = NeedlePhase::tip_in;
     } else {  // torn back through both holes between two substeps: the tip was never seen in the wall
-      cancel_bite(solver, state, tip, events);
+      cancel_bite(model, solver, state, tip, events);
     }
   } else if (held && inside && !was_inside &&
              (newest == NeedlePhase::outside || tip_at - along(state.bite[state.open.back().bite].exit) > kNewWall)) {
@@ -185,7 +185,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
       // Figure 4: the nearest particle within X of the tip moves with the tip, by the paper's spring.
       Attachment a;
       a.point = particle_point(bite.nearest);
-      a.body = static_cast<int>(kNeedle);
+      a.body = static_cast<int>(model.needle_body(0));
       state.attached_from = xyz(x[bite.nearest]);
       a.target = to_local(needle.pose(), state.attached_from);
       a.compliance = suture.attach_compliance;
@@ -225,7 +225,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
     }
   }
   // In the tissue the shaft is held by its channel, not by the surface.
-  solver.body_collides[kNeedle] = state.open.empty();
+  solver.body_collides[model.needle_body(0)] = state.open.empty();
 }
 
 }  // namespace catgut

@@ -21,12 +21,12 @@ constexpr void reflect(auto& a, Like<SuturePoint> auto& p) {
   a.index(p.bite, IndexOf::bite), a(p.exit), a.index(p.anchor, IndexOf::anchor);
 }
 
-constexpr void reflect(auto& a, Like<HandState> auto& h) {
-  a.at_most(h.held, Held::tissue);
-  if (h.held == Held::thread) a.index(h.slot, IndexOf::slot);
-  else if (h.held == Held::tissue) a.index(h.slot, IndexOf::tissue);
-  else a(h.slot);
-  a(h.at), a(h.jaw);
+constexpr void reflect(auto& a, Like<InstrumentState> auto& i) {
+  a.at_most(i.held, Held::tissue);
+  if (i.held == Held::thread) a.index(i.slot, IndexOf::slot);
+  else if (i.held == Held::tissue) a.index(i.slot, IndexOf::tissue);
+  else a(i.slot);
+  a(i.at), a(i.jaw), a.at_most(i.place, InstrumentPlace::parked), a(i.hand);
 }
 
 constexpr void reflect(auto& a, Like<ToolLoop> auto& l) {
@@ -37,7 +37,8 @@ constexpr void reflect(auto& a, Like<ToolLoop> auto& l) {
 }
 
 constexpr void reflect(auto& a, Like<Knot> auto& k) {
-  a.at_most(k.phase, KnotPhase::locked), a.at_most(k.hand, 1u), a(k.begun), a(k.target), a(k.from), a(k.left), a(k.hand_from);
+  a.at_most(k.phase, KnotPhase::locked), a.index(k.hand, IndexOf::instrument), a(k.begun), a(k.target), a(k.from), a(k.left),
+      a(k.hand_from);
   a.index(k.strand, IndexOf::slot), a(k.end), a(k.slot), a.at_most(k.slots, 2u), a(k.snug);
   a.at_most(k.throws, KnotView::kMostThrows), a(k.told), a(k.thrown);
 }
@@ -47,8 +48,9 @@ constexpr void reflect(auto& a, Like<SettledStitch> auto& s) { a(s.node), a(s.kn
 
 constexpr void reflect(auto& a, Like<SutureState> auto& s) {
   a.domain(IndexOf::bite, s.bite.size());
-  a(s.bite), a(s.point), a(s.open), a(s.tip_inside), a(s.attached), a(s.attached_from), a(s.hand), a(s.loop), a(s.knot),
-      a(s.settled), a(s.buttons), a(s.taken);
+  a(s.bite), a(s.point), a(s.open), a(s.tip_inside), a(s.attached), a(s.attached_from),
+      a.column(s.instrument, IndexOf::instrument), a.column(s.loop, IndexOf::instrument), a(s.knot), a(s.settled), a(s.buttons),
+      a(s.taken);
 }
 
 constexpr void reflect(auto& a, Like<ClosurePlan::Pull> auto& p) { a(p.point), a(p.from), a(p.to); }

@@ -142,20 +142,21 @@ void fresh_suture(const SolverModel& model, SolverState& solver, const SutureMod
     solver.x[first + i] = point(start[first + i]);
     solver.v[first + i] = {};
   }
-  RigidBody& needle = solver.body[kNeedle];
+  RigidBody& needle = solver.body[model.needle_body(0)];
   needle = {};
   needle.x = needle.prev_x = needle_start.p;
   needle.q = needle.prev_q = needle_start.q;
   // The thread's last particle is the needle's: swaged on.
-  t.hold.push_back({t.order.back(), static_cast<int>(kNeedle), model.needle_arc[0].point(0), HoldKind::swage});
+  t.hold.push_back({t.order.back(), static_cast<int>(model.needle_body(0)), model.needle_arc[0].point(0), HoldKind::swage});
 }
 
 bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                std::span<const Vec3> start, const Pose& needle_start, const std::array<uint32_t, 2>& pressed,
+                std::span<const Vec3> start, const Pose& needle_start, const std::array<uint32_t, kMaxHands>& pressed,
                 EventList& events) {
-  const auto who = static_cast<uint8_t>(pressed[0] & kButtonNewSuture ? 0 : 1);
-  if (!(pressed[who] & kButtonNewSuture)) return false;
-  const Vec3 here = solver.body[kNeedle].x;
+  uint8_t who = 0;
+  while (who < kMaxHands && !(pressed[who] & kButtonNewSuture)) ++who;
+  if (who == kMaxHands) return false;
+  const Vec3 here = solver.body[model.needle_body(0)].x;
   const auto fault = [&](uint32_t which, Fault f, Vec3 where) {
     events.add({EventKind::technique_fault, who, which, 0, where, f});
   };
@@ -201,26 +202,26 @@ bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel
     first = last + 1;
   }
 
-  for (uint8_t k = 0; k < 2; ++k) {
-    HandState& hand = state.hand[k];
+  for (uint8_t k = 0; k < state.instrument.size(); ++k) {
+    InstrumentState& hand = state.instrument[k];
     const Vec3 at = solver.body[k].x;
-    if (hand.held == Held::needle) events.add({EventKind::needle_released, k, 0, 0, at});
-    if (hand.held == Held::thread) events.add({EventKind::thread_released, k, hand.slot, 0, at});
+    if (hand.held == Held::needle) events.add({EventKind::needle_released, hand.hand, 0, 0, at});
+    if (hand.held == Held::thread) events.add({EventKind::thread_released, hand.hand, hand.slot, 0, at});
     if (hand.held != Held::tissue) hand.held = Held::nothing;
-    if (state.loop[k].wraps > 0) events.add({EventKind::loop_released, k, 0, 0, at});
+    if (state.loop[k].wraps > 0) events.add({EventKind::loop_released, hand.hand, 0, 0, at});
     const float jaw = state.loop[k].jaw;
     state.loop[k] = {};
     state.loop[k].jaw = jaw;
   }
-  std::erase_if(solver.weld, [](const Weld& w) { return w.a == static_cast<int>(kNeedle); });
-  std::erase_if(solver.attach, [](const Attachment& a) { return a.body == static_cast<int>(kNeedle); });
+  std::erase_if(solver.weld, [&](const Weld& w) { return w.a == static_cast<int>(model.needle_body(0)); });
+  std::erase_if(solver.attach, [&](const Attachment& a) { return a.body == static_cast<int>(model.needle_body(0)); });
   solver.channel.clear();
-  solver.body_collides[kNeedle] = 1;
+  solver.body_collides[model.needle_body(0)] = 1;
   state.attached = state.tip_inside = false;
   state.point.clear();
   state.knot.clear();
   fresh_suture(model, solver, suture, start, needle_start);
-  events.add({EventKind::suture_taken, who, state.taken++, 0, solver.body[kNeedle].x});
+  events.add({EventKind::suture_taken, who, state.taken++, 0, solver.body[model.needle_body(0)].x});
   return true;
 }
 

@@ -11,6 +11,7 @@
 #include "exchange/event.h"
 #include "exchange/snapshot.h"
 #include "exchange/tool_input.h"
+#include "instrument/instrument.h"
 #include "solver/substep.h"
 #include "suture/needle.h"
 
@@ -55,13 +56,6 @@ struct SuturePoint {
   uint32_t anchor = 0;  // index in Strand::anchor
 };
 
-struct HandState {
-  Held held = Held::nothing;
-  uint32_t slot = 0;  // held thread particle
-  float at = 0;       // place on the needle's arc [0..1]
-  float jaw = 1;      // of the last tick
-};
-
 // Turns of thread frozen round a tool (2.4, figure 10). Its particles from `first` to `last` along the order are held by the
 // tool (HoldKind::loop).
 struct ToolLoop {
@@ -79,7 +73,7 @@ struct ToolLoop {
 // particle of each of the two strands at one point of the tissue, and nothing runs there again (ThreadAnchor::knotted).
 struct Knot {
   KnotPhase phase = KnotPhase::tightening;  // of the throw in hand
-  uint32_t hand = 0;                        // the tool that pulls it tight
+  uint32_t hand = 0;                        // the instrument that pulls it tight
   uint32_t begun = 0;                       // throws that were locked when the throw in hand was begun
   TissuePoint target;                       // where it goes: the suture point, or the middle between the two ends of its stitch
   Vec3 from;                                // [m] offset of the throw in hand from the target when it was begun
@@ -105,18 +99,18 @@ struct SettledStitch {
 };
 
 struct SutureModel {
+  std::vector<InstrumentModel> instrument;                             // of the scene; row i is rigid body i
   float attach_threshold = 0.006f, release_distance = 0.0022f;         // [m] figures 4 and 5
   float attach_compliance = 1.0f / 1100, channel_compliance = 0.002f;  // [m/N]
   float channel_drag = 0.12f;                                          // [N] per end of the channel
   float pass_tension = 0.03f;                                          // [N]
-  float capstan = 0.08f;       // thread-tissue friction times the angle by which a suture point bends the thread
-  float grasp_reach = 0.003f;  // [m]
-  float needle_grip = 40, thread_grip = 15, tissue_grip = 6;  // [N] beyond which a jaw slips
-  float tissue_compliance = 5e-4f;                            // [m/N] of tissue held by a jaw
-  float tissue_reach = 0.0015f;                               // [m] how near the surface must be to a closing jaw
-  float cut_reach = 0.004f;                                   // [m] how near the scissors must be to the thread
-  int least_throws = 2;                                       // a knot with fewer does not hold
-  float loop_reach = 0.0025f;                                 // [m] how far off a tool thread still lies round it
+  float capstan = 0.08f;            // thread-tissue friction times the angle by which a suture point bends the thread
+  float grasp_reach = 0.003f;       // [m]
+  float tissue_compliance = 5e-4f;  // [m/N] of tissue held by a jaw
+  float tissue_reach = 0.0015f;     // [m] how near the surface must be to a closing jaw
+  float cut_reach = 0.004f;         // [m] how near the scissors must be to the thread
+  int least_throws = 2;             // a knot with fewer does not hold
+  float loop_reach = 0.0025f;       // [m] how far off a tool thread still lies round it
   // Rest distances of neighbours: how far apart along the tool a loop's ends may be. The paper says one, of its coarser thread;
   // a hand that carries thread past the strand it crosses lays ours 2 to 3 mm deep.
   float loop_depth = 2;
@@ -128,33 +122,36 @@ struct SutureState {
   std::vector<SuturePoint> point;  // in the order in which they were made
   std::vector<OpenBite> open;      // the walls that the needle is in, the one nearest to its back end first
   bool tip_inside = false;
-  bool attached = false;  // the newest bite's nearest particle is attached to the tip
-  Vec3 attached_from;     // [m] where that particle was
-  std::array<HandState, 2> hand;
-  std::array<ToolLoop, 2> loop;        // round each tool
-  std::vector<Knot> knot;              // in the order in which they were begun
-  std::vector<SettledStitch> settled;  // in the order in which they settled
-  std::array<uint32_t, 2> buttons{};   // of the last tick
-  uint32_t taken = 0;                  // fresh needles and threads so far
+  bool attached = false;                      // the newest bite's nearest particle is attached to the tip
+  Vec3 attached_from;                         // [m] where that particle was
+  std::vector<InstrumentState> instrument;    // as SutureModel::instrument
+  std::vector<ToolLoop> loop;                 // round each instrument
+  std::vector<Knot> knot;                     // in the order in which they were begun
+  std::vector<SettledStitch> settled;         // in the order in which they settled
+  std::array<uint32_t, kMaxHands> buttons{};  // of each hand in the last tick
+  uint32_t taken = 0;                         // fresh needles and threads so far
 };
+
+// The hand that has the instrument, for events; kNoHand when none does.
+inline uint8_t hand_of(const SutureState& s, size_t instrument) { return s.instrument[instrument].hand; }
 
 // Of the newest bite; outside when the needle is in no wall.
 inline NeedlePhase phase_of(const SutureState& s) { return s.open.empty() ? NeedlePhase::outside : s.open.back().phase; }
 
 // --- grasp.cpp ---------------------------------------------------------------------------------------------------------
-// Once a tick. A jaw that closes within reach of the needle, else of the thread, else of the tissue's surface holds it at the
-// place and angle where it was caught; opening lets go. scratch: where the last substep left the broad phase.
+// Once a tick, for every instrument in a hand. A jaw that closes within reach of the needle, else of the thread, else of the
+// tissue's surface holds it at the place and angle where it was caught; opening lets go. scratch: where the last substep left
+// the broad phase.
 void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-           SutureState& state, const std::array<ToolInput, 2>& hand, EventList& events);
+           SutureState& state, const HandInputs& hand, EventList& events);
 
-// After every substep: a jaw that is pulled on harder than it grips lets slip what it holds (needle: needle_grip, thread:
-// thread_grip, tissue: tissue_grip), before the pull becomes one that no hand could make. Reported as a release with the force
-// [N] as its value.
+// After every substep: a jaw that is pulled on harder than its instrument grips (InstrumentModel) lets slip what it holds,
+// before the pull becomes one that no hand could make. Reported as a release with the force [N] as its value.
 void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, EventList& events);
 
 // --- loop.cpp ----------------------------------------------------------------------------------------------------------
 // Once a tick. Thread that is laid round a tool whose jaw holds nothing is frozen there; more turns that follow are added to
-// it. Opening the jaws wide, or a pull harder than thread_grip, lets it go.
+// it. Opening the jaws wide, or a pull harder than its thread_grip, lets it go.
 void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
                 EventList& events);
 // Whether a particle lies so near to the loop round a tool, along the thread, that jaws which close at the loop do not mean it.
@@ -163,7 +160,7 @@ bool beside_loop(const Strand& thread, const ToolLoop& loop, uint32_t slot);
 void take_off_loop(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t who);
 
 // --- knot.cpp ----------------------------------------------------------------------------------------------------------
-// A hand lets go of what it holds. force [N]: 0 when the jaw was opened, else what made it slip.
+// An instrument lets go of what it holds. force [N]: 0 when the jaw was opened, else what made it slip.
 void release(SolverState& solver, SutureState& state, uint8_t who, float force, EventList& events);
 
 // Once a tick. A tool with a loop round it whose jaws have closed on thread beyond the loop begins a throw; one that lets go of
@@ -179,11 +176,11 @@ void take_back_throws(const SolverModel& model, SolverState& solver, const Sutur
 
 // --- cut.cpp -----------------------------------------------------------------------------------------------------------
 // Buttons that went down since the last tick, by hand; remembers them.
-std::array<uint32_t, 2> pressed_buttons(SutureState& state, const std::array<ToolInput, 2>& hand);
+std::array<uint32_t, kMaxHands> pressed_buttons(SutureState& state, const HandInputs& hand);
 // Once a tick. kButtonCut cuts the thread nearest to the tool's jaws; the last pair is the needle's own: there the needle comes
 // off. A cut in a wrong place is reported and stays.
 void cut(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-         const std::array<uint32_t, 2>& pressed, EventList& events);
+         const std::array<uint32_t, kMaxHands>& pressed, EventList& events);
 // A jaw that has just closed on thread also holds the other strands that lie between its tips: the two ends of a stay suture.
 void hold_other_strands(SolverState& solver, const SutureModel& suture, const SutureState& state, uint8_t who);
 
@@ -192,7 +189,7 @@ void hold_other_strands(SolverState& solver, const SutureModel& suture, const Su
 // rest is taken away, and a fresh needle and thread lie on the drape. Bites stay listed. Not while the needle is in the tissue.
 // True: it was done. start: positions of all particles at the start [m].
 bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                std::span<const Vec3> start, const Pose& needle_start, const std::array<uint32_t, 2>& pressed,
+                std::span<const Vec3> start, const Pose& needle_start, const std::array<uint32_t, kMaxHands>& pressed,
                 EventList& events);
 // Needle and thread as they lie at the start, and nothing that holds them but the swage.
 void fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, std::span<const Vec3> start,

@@ -73,6 +73,7 @@ class Seen {
     for (const Vec3& p : s.particle) motion_.add(p);
     for (const Quat& q : s.rotation) motion_.add(q);
     for (const ToolView& t : s.tool) {
+      if (t.instrument < 0) continue;  // an empty hand
       motion_.add(t.pose);
       motion_.add(t.jaw);
       force_.add(t.force);
@@ -119,7 +120,7 @@ std::vector<Row> run(const Case& which, double seconds, int threads) {
   int second = 1;
   for (uint64_t t = 0; t < last && !surgeon->done(); ++t) {
     if (t < settled) input.hand = nobody.hand;
-    else input.hand = surgeon->operate(seen, static_cast<float>(1 / rate));
+    else input = surgeon->operate(seen, static_cast<float>(1 / rate));
     input.tick = t;
     step(*model, *state, input, jobs);
     publish(*model, *state, seen);

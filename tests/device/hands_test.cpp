@@ -26,6 +26,10 @@ struct Desk {
   std::array<ToolInput, 2> out;
   Desk() {
     picture.field = 0.06f;
+    picture.instrument.resize(2);
+    picture.instrument[0].capabilities = kHoldNeedle | kHoldThread | kHoldTissue | kClamp | kCutThread;  // a needle holder
+    picture.instrument[1].capabilities = kHoldNeedle | kHoldThread | kHoldTissue;                        // forceps
+    seen.tool[0].instrument = 0, seen.tool[1].instrument = 1;
     seen.needle.pose.p = {0.3f, 0, 0};  // out of the help's reach
     steering = start_steering(picture, false);
     turn({});

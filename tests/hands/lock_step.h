@@ -67,7 +67,7 @@ class LockStep : public Desk {
     Snapshot seen = look_.seen;
     for (int i = 0; i < 3600 && !surgeon->done(); ++i) {
       TickInput in;
-      in.hand = surgeon->operate(seen, kTick);
+      in.hand = surgeon->operate(seen, kTick).hand;
       step(*model_, *state_, in, jobs_);
       publish(*model_, *state_, seen);
       if (done(seen)) return true;

@@ -54,10 +54,10 @@ TEST(SceneFile, every_key_survives_writing_and_reading) {
     Random random(seed);
     SceneSpec scene;
     scene.body.resize(seed % 4);
+    scene.instrument.resize(seed % 3);
     for (const Field& f : scene_fields()) {
       if (std::string(f.key) == "preset") continue;
-      const bool body = std::string(f.section) == "body";
-      for (size_t b = 0; b < (body ? scene.body.size() : 1); ++b) randomise(f, f.at(scene, b), random);
+      for (size_t b = 0; b < rows_of(scene, f.section); ++b) randomise(f, f.at(scene, b), random);
     }
     scene.expect.push_back({"bites", 10, 1e300});
     scene.expect.push_back({"opening_ratio", -1e300, 0.1 + 1e-17 * static_cast<double>(seed)});
@@ -84,6 +84,7 @@ TEST(SceneFile, hard_floats_survive) {
 TEST(SceneFile, every_default_lies_in_its_range) {
   SceneSpec scene;
   scene.body.resize(1);
+  scene.instrument.resize(1);
   for (const Field& f : scene_fields()) {
     const std::string text = default_text(f);
     std::string key = full_key(f);

@@ -99,7 +99,7 @@ TEST(Pictures, MovingAParticleMovesThePicture) {
   for (uint32_t i = 0; i < 16; ++i) pushed.particle[i].y += 0.004f;
   EXPECT_GT(difference(s.picture, s.renderer->render(pushed, s.camera)), 200);
   Snapshot moved = s.field.snapshot;
-  moved.tool[0].jaw = 1;
+  moved.instrument[0].jaw = 1;
   EXPECT_GT(difference(s.picture, s.renderer->render(moved, s.camera)), 40);
 }
 

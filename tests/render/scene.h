@@ -104,9 +104,18 @@ inline TestField make_test_field(int around = 96, int rows = 40) {
   s.tool[0].pose = {grip, from_axes(open, cross(back, open), back)};
   s.tool[0].jaw = 0.12f;
   s.tool[0].held = Held::needle;
+  s.tool[0].instrument = 0, s.tool[1].instrument = 1;
   const Vec3 back2 = normalized(Vec3{-0.75f, 0.5f, 0.45f}), open2 = normalized(cross(Vec3{0, 0, 1}, back2));
   s.tool[1].pose = {on_tube(0.0185f, 0.0f, 3.5f), from_axes(open2, cross(back2, open2), back2)};
   s.tool[1].jaw = 0.5f;
+  for (size_t k = 0; k < 2; ++k) {
+    InstrumentPicture picture;
+    picture.kind = k == 0 ? "needle_holder" : "forceps";
+    model.instrument.push_back(picture);
+    InstrumentView view;
+    view.pose = s.tool[k].pose, view.jaw = s.tool[k].jaw, view.place = InstrumentPlace::hand;
+    s.instrument.push_back(view);
+  }
   for (int i = 0; i < 3; ++i)
     for (const bool exit : {false, true}) {
       SuturePointView point;

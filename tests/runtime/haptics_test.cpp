@@ -278,11 +278,11 @@ TEST(Haptics, the_scripted_surgeon_sews_through_the_arms) {
   bool first = true;
   const double until = long_run() ? 240 : 25;
   float most = 0;
-  std::array<ToolInput, 2> want = hands.surgeon->operate(s.seen, dt);
+  HandInputs want = hands.surgeon->operate(s.seen, dt).hand;
   for (size_t k = 0; k < 2; ++k) s.put(k, want[k].pose), s.wish(k, want[k].pose, want[k].jaw);
   s.run(2.4f);
   while (s.seen.time_s < until && !hands.surgeon->done()) {
-    want = hands.surgeon->operate(s.seen, dt);
+    want = hands.surgeon->operate(s.seen, dt).hand;
     for (size_t k = 0; k < 2; ++k) s.wish(k, want[k].pose, want[k].jaw);
     s.tick([&] {
       for (int k = 0; k < 2; ++k) most = std::max(most, length(s.fake.force(k)));

@@ -343,7 +343,7 @@ TEST(Live, a_bite_can_be_taken_back) {
     }
     if (is_working(live.status()) && live.status().tick > acted) {
       acted = live.status().tick;
-      const auto hands = surgeon->operate(seen, dt);
+      const auto hands = surgeon->operate(seen, dt).hand;
       for (size_t k = 0; k < 2; ++k) live.hand(k, hands[k]);
     } else {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));

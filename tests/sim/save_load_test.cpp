@@ -59,7 +59,7 @@ TEST_P(EveryScene, saved_and_loaded_at_every_seventh_tick_goes_on_as_if_nothing_
   for (TickInput input; input.tick < last && !hands.surgeon->done(); ++input.tick) {
     if (input.tick < settle)
       for (ToolInput& h : input.hand) h.connected = 0;
-    else input.hand = hands.surgeon->operate(seen, model->dt);
+    else input.hand = hands.surgeon->operate(seen, model->dt).hand;
     if (input.tick % 7 == 0) {
       // Whoever went on with one worker is compared with two, and the other way round.
       Jobs &mine = compared % 2 ? one : two, &others = compared % 2 ? two : one;

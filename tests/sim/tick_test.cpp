@@ -52,7 +52,7 @@ Played scripted_run(const Model& model, size_t ticks) {
     in.tick = i;
     if (i < 30)
       for (ToolInput& h : in.hand) h.connected = 0;
-    else in.hand = surgeon->operate(seen, model.dt);
+    else in.hand = surgeon->operate(seen, model.dt).hand;
     step(model, *state, in, jobs);
     publish(model, *state, seen);
     run.input.push_back(in);
@@ -228,7 +228,7 @@ TEST(Sane, says_when_a_number_is_not_one_or_something_is_gone) {
   state->solver.v[1300].y = INFINITY;
   EXPECT_FALSE(state_is_sane(*model, *state));
   state->solver.v[1300].y = 0;
-  state->solver.body[kNeedle].q.w = std::nanf("");
+  state->solver.body[model->solver.needle_body(0)].q.w = std::nanf("");
   EXPECT_FALSE(state_is_sane(*model, *state));
 }
 
@@ -265,9 +265,10 @@ void fling(uint64_t seed, float seconds, Fling& out) {
         h.speed = 0.05f + 1.95f * random.uniform();
         // Every other time at the needle or the thread, so that they are caught and dragged along.
         const float aim = random.uniform();
-        if (aim < 0.25f && state->suture.hand[k].held == Held::nothing)
-          h.goal = needle_point(model->solver.needle_arc[0], state->solver.body[kNeedle], kPi * random.uniform());
-        else if (aim < 0.5f && state->suture.hand[k].held == Held::nothing)
+        if (aim < 0.25f && state->suture.instrument[k].held == Held::nothing)
+          h.goal = needle_point(model->solver.needle_arc[0], state->solver.body[model->solver.needle_body(0)],
+                                kPi * random.uniform());
+        else if (aim < 0.5f && state->suture.instrument[k].held == Held::nothing)
           h.goal = xyz(state->solver.x[state->solver.strand[0].order[random.next() % state->solver.strand[0].order.size()]]);
       }
       if (random.uniform() < 0.03f) {

@@ -122,7 +122,7 @@ TEST(WrongTechnique, a_knot_before_any_bite_is_said) {
     r.lay_along(r.setup.older - 1, -1, r.past_the_tip(xyz(r.x()[r.thread().order[r.setup.older]])), 0);
     r.input.hand[0].jaw = 0.3f;
     r.tick();
-    ASSERT_EQ(r.suture().hand[0].held, Held::thread);
+    ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
     expect_told_once(r, Fault::knot_without_bite, 0);
     EXPECT_TRUE(r.suture().knot.empty());
   }
@@ -156,11 +156,11 @@ struct HalfBite : Rig {
     RigidBody& tool = solver().body[1];
     tool = {};
     tool.x = tool.prev_x = hand.pose.p, tool.q = tool.prev_q = hand.pose.q;
-    state->hand[1] = hand.pose;
-    state->hand_known[1] = 1;
+    state->hand[1].pose = hand.pose;
+    state->hand[1].known = 1;
     hand.jaw = 0.3f;
     tick();
-    ASSERT_EQ(suture().hand[1].held, Held::thread);
+    ASSERT_EQ(suture().instrument[1].held, Held::thread);
   }
   void pull(Vec3 by, float seconds) {
     const Vec3 from = input.hand[1].pose.p;

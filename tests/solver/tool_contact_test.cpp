@@ -50,15 +50,15 @@ struct Pair {
       m.capsule.push_back({{0, 0, 0.0015f}, {0, 0, 0.016f}, kJaw});
       m.capsule.push_back({{0, 0, 0.018f}, {0, 0, 0.12f}, kShaft});
     }
-    model.body[kNeedle].inv_mass = 1 / 3e-4f, model.body[kNeedle].inv_inertia = {1e8f, 1e8f, 1e8f};
-    model.body[kNeedle].gravity = true;  // a needle, whose weight nobody carries
-    model.body[kNeedle].capsule.push_back({{}, {0, 0, 0.002f}, 0.0003f});
+    model.body[model.needle_body(0)].inv_mass = 1 / 3e-4f, model.body[model.needle_body(0)].inv_inertia = {1e8f, 1e8f, 1e8f};
+    model.body[model.needle_body(0)].gravity = true;  // a needle, whose weight nobody carries
+    model.body[model.needle_body(0)].capsule.push_back({{}, {0, 0, 0.002f}, 0.0003f});
     const std::vector<float> mass{1.0f};
     model.shape = make_shape_model(std::span(start).first(1), mass, std::vector<std::vector<uint32_t>>{{0}});
     model.collision = make_tissue_collision(model.shape.rest, mass, std::vector<uint32_t>{0}, mass, {});
     state = make_solver_state(model, start);
     prepare_scratch(model, scratch);
-    state.body[kNeedle].x = state.body[kNeedle].prev_x = {3, 3, 3};
+    state.body[model.needle_body(0)].x = state.body[model.needle_body(0)].prev_x = {3, 3, 3};
     const std::array<Pose, 2> at{a, b};
     for (size_t k = 0; k < 2; ++k) {
       state.body[k].x = state.body[k].prev_x = at[k].p;

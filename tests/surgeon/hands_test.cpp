@@ -78,7 +78,7 @@ struct Scene {
   Scene() { publish(*model, *state, seen); }
 };
 
-bool same(const std::array<ToolInput, 2>& a, const std::array<ToolInput, 2>& b) {
+bool same(const HandInputs& a, const HandInputs& b) {
   for (size_t k = 0; k < 2; ++k)
     if (!(a[k].pose == b[k].pose) || !(a[k].velocity == b[k].velocity) || a[k].jaw != b[k].jaw ||
         a[k].sequence != b[k].sequence)
@@ -97,9 +97,9 @@ TEST(Surgeon, same_seed_same_hands_another_seed_other_hands) {
   for (int i = 0; i < 240; ++i) {
     TickInput in;
     in.tick = static_cast<uint64_t>(i);
-    in.hand = a->operate(scene.seen, 1.0f / 60);
-    ASSERT_TRUE(same(in.hand, b->operate(scene.seen, 1.0f / 60))) << i;
-    differ = differ || !same(in.hand, c->operate(scene.seen, 1.0f / 60));
+    in.hand = a->operate(scene.seen, 1.0f / 60).hand;
+    ASSERT_TRUE(same(in.hand, b->operate(scene.seen, 1.0f / 60).hand)) << i;
+    differ = differ || !same(in.hand, c->operate(scene.seen, 1.0f / 60).hand);
     step(*scene.model, *scene.state, in, scene.jobs);
     publish(*scene.model, *scene.state, scene.seen);
   }
@@ -112,12 +112,12 @@ TEST(Surgeon, keeps_to_the_speed_of_its_skill) {
   SurgeonSkill skill;
   skill.tremor = 0;
   const auto surgeon = make_surgeon("purse_string", picture_model(*scene.model), skill);
-  std::array<ToolInput, 2> before = surgeon->operate(scene.seen, 1.0f / 60);
+  HandInputs before = surgeon->operate(scene.seen, 1.0f / 60).hand;
   float fastest = 0;
   for (int i = 0; i < 600; ++i) {
     TickInput in;
     in.tick = static_cast<uint64_t>(i);
-    in.hand = surgeon->operate(scene.seen, 1.0f / 60);
+    in.hand = surgeon->operate(scene.seen, 1.0f / 60).hand;
     for (size_t k = 0; k < 2; ++k) {
       fastest = std::max(fastest, distance(in.hand[k].pose.p, before[k].pose.p) * 60);
       ASSERT_GE(in.hand[k].jaw, 0.0f);

@@ -182,7 +182,7 @@ TEST(Cut, both_ends_are_held_by_one_tool) {
   ToolInput& hand = r.input.hand[0];
   hand.connected = 1, hand.pose = {at, {}}, hand.jaw = 0.3f;
   r.tick();
-  ASSERT_EQ(r.suture().hand[0].held, Held::thread);
+  ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
   std::vector<uint32_t> held;
   for (const ThreadHold& h : r.thread().hold)
     if (h.kind == HoldKind::jaw) held.push_back(h.slot);

@@ -35,11 +35,11 @@ TEST(Grasp, holds_the_needle_where_and_at_the_angle_it_was_caught) {
     Hands r;
     r.wait(0.3f);
     r.show(0, r.at_needle(at, axis_angle(normalized(Vec3{1, 2, 3}), 0.7f + at)), 1);
-    EXPECT_EQ(r.suture().hand[0].held, Held::nothing) << "an open jaw holds nothing";
+    EXPECT_EQ(r.suture().instrument[0].held, Held::nothing) << "an open jaw holds nothing";
     r.close(0);
     ASSERT_EQ(r.count(EventKind::needle_grasped), 1u);
-    EXPECT_EQ(r.suture().hand[0].held, Held::needle);
-    EXPECT_NEAR(r.suture().hand[0].at, at, 0.02f);
+    EXPECT_EQ(r.suture().instrument[0].held, Held::needle);
+    EXPECT_NEAR(r.suture().instrument[0].at, at, 0.02f);
     const Pose caught = r.relative(0);
     // Gently up, about and round: 5 cm/s, 0.6 rad/s.
     const Pose start = r.input.hand[0].pose;
@@ -65,7 +65,7 @@ TEST(Grasp, opening_drops_the_needle) {
   const float up = r.needle().x.y;
   r.open(0);
   EXPECT_EQ(r.count(EventKind::needle_released), 1u);
-  EXPECT_EQ(r.suture().hand[0].held, Held::nothing);
+  EXPECT_EQ(r.suture().instrument[0].held, Held::nothing);
   EXPECT_EQ(r.solver().weld.size(), 2u) << "only the two hands' own";
   // The jaw leaves and the needle falls back to the drape.
   for (int i = 1; i <= 20; ++i) r.input.hand[0].pose.p.z += 0.002f, r.tick();
@@ -81,11 +81,11 @@ TEST(Grasp, a_jaw_out_of_reach_catches_nothing) {
   pose.p.y += 0.006f;
   r.show(0, pose, 1);
   r.close(0);
-  EXPECT_EQ(r.suture().hand[0].held, Held::nothing);
+  EXPECT_EQ(r.suture().instrument[0].held, Held::nothing);
   // A jaw that is already closed catches nothing by being moved onto the needle.
   r.input.hand[0].pose.p.y -= 0.006f;
   r.wait(0.2f);
-  EXPECT_EQ(r.suture().hand[0].held, Held::nothing);
+  EXPECT_EQ(r.suture().instrument[0].held, Held::nothing);
 }
 
 TEST(Grasp, both_tools_hold_the_needle_while_it_is_handed_over) {
@@ -97,16 +97,16 @@ TEST(Grasp, both_tools_hold_the_needle_while_it_is_handed_over) {
   for (int i = 1; i <= 60; ++i) r.input.hand[0].pose.p = start.p + Vec3{0, 0.0008f * static_cast<float>(i), 0}, r.tick();
   r.show(1, r.at_needle(0.9f, axis_angle({0, 0, 1}, 0.5f)), 1);
   r.close(1);
-  EXPECT_EQ(r.suture().hand[0].held, Held::needle);
-  EXPECT_EQ(r.suture().hand[1].held, Held::needle);
+  EXPECT_EQ(r.suture().instrument[0].held, Held::needle);
+  EXPECT_EQ(r.suture().instrument[1].held, Held::needle);
   EXPECT_EQ(r.solver().weld.size(), 4u);
   const Pose first = r.relative(0), second = r.relative(1);
   r.wait(0.3f);
   expect_same(r.relative(0), first);
   expect_same(r.relative(1), second);
   r.open(0);
-  EXPECT_EQ(r.suture().hand[0].held, Held::nothing);
-  EXPECT_EQ(r.suture().hand[1].held, Held::needle);
+  EXPECT_EQ(r.suture().instrument[0].held, Held::nothing);
+  EXPECT_EQ(r.suture().instrument[1].held, Held::needle);
   r.input.hand[0].pose.p.y += 0.03f;
   r.wait(0.5f);
   expect_same(r.relative(1), second);
@@ -123,8 +123,8 @@ TEST(Grasp, holds_and_releases_the_nearest_thread) {
   r.show(1, {at + Vec3{0, 0.0005f, 0}, {}}, 1);
   r.close(1);
   ASSERT_EQ(r.count(EventKind::thread_grasped), 1u);
-  EXPECT_EQ(r.suture().hand[1].held, Held::thread);
-  const uint32_t held = r.suture().hand[1].slot;
+  EXPECT_EQ(r.suture().instrument[1].held, Held::thread);
+  const uint32_t held = r.suture().instrument[1].slot;
   EXPECT_LE(distance(xyz(r.solver().x[held]), r.solver().body[1].x),
             distance(xyz(r.solver().x[slot]), r.solver().body[1].x) + 1e-4f);
   // Paper 2.3: particles in a jaw, and three neighbours a side, do not collide.
@@ -160,7 +160,7 @@ TEST(Grasp, pulling_the_tail_passes_thread_toward_the_free_end) {
   const uint32_t slot = r.thread().order[first - 12];
   r.show(0, {xyz(r.solver().x[slot]), {}}, 1);
   r.close(0);
-  ASSERT_EQ(r.suture().hand[0].held, Held::thread);
+  ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
   const size_t before = r.node_of_point(0);
   const Vec3 way = normalized(p.out + 0.5f * p.up - 0.5f * p.along);
   // The needle's end gives way by as much as the tail is drawn.
@@ -189,8 +189,8 @@ TEST(Grasp, a_jaw_that_closes_on_the_wall_holds_the_tissue_and_draws_it_along) {
   r.show(1, at_rim(r, 1.1f), 1);
   r.close(1);
   ASSERT_EQ(r.count(EventKind::tissue_grasped), 1u);
-  ASSERT_EQ(r.suture().hand[1].held, Held::tissue);
-  const uint32_t particle = r.suture().hand[1].slot;
+  ASSERT_EQ(r.suture().instrument[1].held, Held::tissue);
+  const uint32_t particle = r.suture().instrument[1].slot;
   const Vec3 before = xyz(r.x()[particle]);
   const Pose start = r.input.hand[1].pose;
   const Vec3 out = normalized(Vec3{start.p.x, 0, start.p.z});
@@ -212,12 +212,12 @@ TEST(Grasp, tissue_slips_out_of_a_jaw_that_is_torn_away) {
   r.wait(0.3f);
   r.show(1, at_rim(r, 1.1f), 1);
   r.close(1);
-  ASSERT_EQ(r.suture().hand[1].held, Held::tissue);
+  ASSERT_EQ(r.suture().instrument[1].held, Held::tissue);
   const Pose start = r.input.hand[1].pose;
   const Vec3 out = normalized(Vec3{start.p.x, 0, start.p.z});
   for (int i = 1; i <= 90; ++i) r.input.hand[1].pose.p = start.p + out * (0.001f * static_cast<float>(i)), r.tick();
   ASSERT_EQ(r.count(EventKind::tissue_released), 1u);
-  EXPECT_GT(r.last(EventKind::tissue_released)->value, r.model->suture.tissue_grip);
+  EXPECT_GT(r.last(EventKind::tissue_released)->value, r.model->suture.instrument[1].tissue_grip);
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ TEST(Knot, is_begun_when_the_tool_with_the_loop_takes_the_other_end) {
     const uint32_t first = r.loop().first, last = r.loop().last;
     const int handed = r.loop().handed;
     r.take();
-    ASSERT_EQ(r.suture().hand[0].held, Held::thread);
+    ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
     ASSERT_EQ(r.count(EventKind::knot_begun), 1u);
     EXPECT_EQ(r.last(EventKind::knot_begun)->value, 1.0f);
     EXPECT_EQ(r.loop().wraps, 0u);
@@ -44,7 +44,7 @@ TEST(Knot, is_begun_when_the_tool_with_the_loop_takes_the_other_end) {
     EXPECT_EQ(k.phase, KnotPhase::tightening);
     EXPECT_EQ(k.end[0], first);
     EXPECT_EQ(k.end[1], last);
-    EXPECT_EQ(k.strand, r.suture().hand[0].slot);
+    EXPECT_EQ(k.strand, r.suture().instrument[0].slot);
     EXPECT_EQ(k.throws, 1u);
     EXPECT_EQ(k.thrown[0].handed, handed);
     EXPECT_EQ(k.thrown[0].needle_end, tail ? 0 : 1);
@@ -116,7 +116,7 @@ TEST(Knot, locks_at_the_midpoint_and_holds_both_strands_there) {
   EXPECT_NEAR(rest_between(r, r.node_of(k.slot[1]), r.node_of_point(1)), distance(target_of(r), r.point_at(1)), 0.0003);
   EXPECT_NEAR(r.rest_length(), length, 1e-6);
   EXPECT_TRUE(r.order_is_whole());
-  EXPECT_EQ(r.suture().hand[0].held, Held::thread) << "the hand still has the end";
+  EXPECT_EQ(r.suture().instrument[0].held, Held::thread) << "the hand still has the end";
 }
 
 // "... the knot object moves towards the suture point", if there is one.
@@ -167,7 +167,7 @@ TEST(Knot, of_a_running_suture_tied_to_itself_goes_to_the_midpoint_of_the_last_t
   }
   r.input.hand[0].jaw = 0.3f;
   r.tick();
-  ASSERT_EQ(r.suture().hand[0].held, Held::thread);
+  ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
   ASSERT_EQ(r.suture().knot.size(), 1u);
   EXPECT_LT(distance(target_of(r), 0.5f * (r.point_at(1) + r.point_at(2))), 1e-6f);
   r.pull_tight();
@@ -183,7 +183,7 @@ TEST(Knot, without_a_bite_is_a_fault_and_the_loop_falls_off) {
   r.lay_along(24, -1, r.past_the_tip(xyz(r.x()[r.thread().order[25]])), 0);
   r.input.hand[0].jaw = 0.3f;
   r.tick();
-  ASSERT_EQ(r.suture().hand[0].held, Held::thread);
+  ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
   EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::knot_without_bite);
   EXPECT_EQ(r.count(EventKind::loop_released), 1u);
@@ -214,8 +214,8 @@ TEST(Knot, the_jaws_take_the_other_end_and_not_the_loops_own_strand) {
     nearest = std::min(nearest, distance(xyz(r.x()[r.thread().order[i]]), r.solver().body[0].x));
   ASSERT_LT(nearest, r.model->suture.grasp_reach);
   r.take();
-  ASSERT_EQ(r.suture().hand[0].held, Held::thread);
-  EXPECT_LT(r.node_of(r.suture().hand[0].slot), r.node_of_point(0));
+  ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
+  EXPECT_LT(r.node_of(r.suture().instrument[0].slot), r.node_of_point(0));
   EXPECT_EQ(r.count(EventKind::knot_begun), 1u);
 }
 
@@ -252,7 +252,7 @@ TEST(Knot, letting_go_takes_it_back_and_nothing_is_left_of_it) {
   for (Tie* r : {&tied, &twin}) {
     r->take();
     for (ThreadAnchor& a : r->thread().anchor) a.friction = 100;
-    ASSERT_EQ(r->suture().hand[0].held, Held::thread);
+    ASSERT_EQ(r->suture().instrument[0].held, Held::thread);
     r->move(0, rotate(r->frame.q, Vec3{0, -0.3f, 0.8f}) * 0.006f, 0.2f);
     r->open(0);
   }

@@ -339,7 +339,7 @@ TEST(Loop, a_pull_harder_than_a_grip_strips_it_off) {
   to.p += normalized(xyz(r.x()[r.thread().order.back()]) - r.solver().body[0].x) * 0.03f;
   r.needle_to(to, 0.5f);
   ASSERT_EQ(r.count(EventKind::loop_released), 1u);
-  EXPECT_GT(r.last(EventKind::loop_released)->value, r.model->suture.thread_grip);
+  EXPECT_GT(r.last(EventKind::loop_released)->value, r.model->suture.instrument[0].thread_grip);
   EXPECT_EQ(r.holds(HoldKind::loop), 0u);
 }
 
@@ -348,7 +348,7 @@ TEST(Loop, a_tool_that_holds_something_forms_none) {
   setup.turns = 0;
   Tie r(setup);
   r.take();
-  ASSERT_EQ(r.suture().hand[0].held, Held::thread);
+  ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
   r.lay_along(r.node_of_point(1) + 1, 1, r.round_the_tool(r.point_at(1), 1.25f, 1), r.thread().order.size() - 1);
   r.wait(0.05f);
   EXPECT_EQ(r.count(EventKind::loop_formed), 0u);
@@ -402,7 +402,7 @@ TEST(Loop, a_hand_that_carries_the_thread_round_the_tool_lays_loops) {
       const Vec3 at = xyz(r.x()[r.thread().order[held]]);
       const Quat turned = r.frame.q * axis_angle({1, 0, 0}, kPi);  // the hand comes from the other side
       r.show(1, {at, turned}, 0.3f);
-      ASSERT_EQ(r.suture().hand[1].held, Held::thread);
+      ASSERT_EQ(r.suture().instrument[1].held, Held::thread);
       // Nearly taut, as a surgeon keeps it: what is wound up is no longer between hand and tool. And past the strand that comes
       // from the tissue, not through it.
       const float wound = 0.0015f, loose = 0.0018f, free = to_local(r.frame, at).y;
@@ -438,7 +438,7 @@ TEST(Loop, a_near_miss_is_spoken_of_when_the_jaws_close) {
   r.let_go();
   put_needle(r, xyz(r.x()[r.thread().order.back()]));
   r.take();
-  EXPECT_EQ(r.suture().hand[0].held, Held::thread);
+  EXPECT_EQ(r.suture().instrument[0].held, Held::thread);
   EXPECT_EQ(r.count(EventKind::loop_formed), 0u);
   ASSERT_EQ(r.count(EventKind::loop_rejected), 1u);
   EXPECT_EQ(r.last(EventKind::loop_rejected)->reason, LoopReason::no_crossing);

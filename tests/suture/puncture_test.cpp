@@ -41,22 +41,22 @@ TEST(Figure4, the_nearest_is_the_nearest_of_all) {
     const Place p = rig.place(0.27f * static_cast<float>(k), 0.003f + 0.0007f * static_cast<float>(k % 7));
     const Pose circle = rig.circle_at({p.at - p.out * 0.0004f, p.out, p.along, p.up}, 0, 0);
     SolverState solver = rig.solver();
-    solver.body[kNeedle].x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].centre);
-    solver.body[kNeedle].q = circle.q;
+    solver.body[rig.model->solver.needle_body(0)].x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].centre);
+    solver.body[rig.model->solver.needle_body(0)].q = circle.q;
     SutureState suture;
     EventList events;
     puncture(rig.model->solver, solver, rig.state->scratch, rig.model->suture, suture, events);
     ASSERT_TRUE(suture.attached) << k;
-    const Vec3 tip = needle_tip(rig.model->solver.needle_arc[0], solver.body[kNeedle]);
+    const Vec3 tip = needle_tip(rig.model->solver.needle_arc[0], solver.body[rig.model->solver.needle_body(0)]);
     uint32_t best = 0;
     for (uint32_t i = 0; i < rig.model->solver.tissue; ++i)
       if (distance(xyz(solver.x[i]), tip) < distance(xyz(solver.x[best]), tip)) best = i;
     EXPECT_FLOAT_EQ(distance(xyz(solver.x[suture.bite[0].nearest]), tip), distance(xyz(solver.x[best]), tip)) << k;
     // "Once the closest particle is found, it is constrained to move with the needle tip": from where it is, without a jerk.
     const Attachment& a = solver.attach.back();
-    EXPECT_EQ(a.body, static_cast<int>(kNeedle));
+    EXPECT_EQ(a.body, static_cast<int>(rig.model->solver.needle_body(0)));
     EXPECT_EQ(a.point.particle[0], best);
-    EXPECT_LT(distance(transform(solver.body[kNeedle].pose(), a.target), xyz(solver.x[best])), 1e-6f);
+    EXPECT_LT(distance(transform(solver.body[rig.model->solver.needle_body(0)].pose(), a.target), xyz(solver.x[best])), 1e-6f);
     EXPECT_FLOAT_EQ(a.compliance, rig.model->suture.attach_compliance);
   }
 }
@@ -176,7 +176,7 @@ TEST(Bite, drawn_back_before_the_tip_came_out_leaves_nothing_behind) {
   rig.drive(p, -1.0f, 0.0f);
   ASSERT_EQ(phase_of(rig.suture()), NeedlePhase::tip_in);
   EXPECT_EQ(rig.solver().channel.size(), 1u);
-  EXPECT_EQ(rig.solver().body_collides[kNeedle], 0);
+  EXPECT_EQ(rig.solver().body_collides[rig.model->solver.needle_body(0)], 0);
   rig.drive(p, 0.0f, -1.2f);
   expect_like_never_begun(rig);
 }

@@ -48,7 +48,7 @@ struct Rig {
     return flag;
   }
   const Vec4* x() { return state->solver.x.data(); }
-  RigidBody& needle() { return state->solver.body[kNeedle]; }
+  RigidBody& needle() { return state->solver.body[model->solver.needle_body(0)]; }
   Vec3 tip() { return needle_tip(model->solver.needle_arc[0], needle()); }
 
   void tick() {
@@ -72,7 +72,7 @@ struct Rig {
   // --- the ghost ---
   void hold_needle() {
     Weld w;
-    w.a = static_cast<int>(kNeedle);
+    w.a = static_cast<int>(model->solver.needle_body(0));
     w.target = needle().pose();
     w.compliance = 1e-5f;
     w.angular_compliance = 1e-3f;
@@ -80,7 +80,8 @@ struct Rig {
     solver().weld.push_back(w);
   }
   void let_go() {
-    std::erase_if(solver().weld, [](const Weld& w) { return w.a == static_cast<int>(kNeedle) && w.b < 0; });
+    std::erase_if(solver().weld,
+                  [&](const Weld& w) { return w.a == static_cast<int>(model->solver.needle_body(0)) && w.b < 0; });
     ghost = -1;
   }
   // Moves the ghost evenly to `goal` (frame at the needle's circle's centre).
@@ -156,7 +157,7 @@ struct Rig {
   }
   bool nothing_left_of_a_bite() {
     return solver().channel.empty() && !suture().attached && phase_of(suture()) == NeedlePhase::outside &&
-           solver().body_collides[kNeedle] == 1 &&
+           solver().body_collides[model->solver.needle_body(0)] == 1 &&
            std::none_of(solver().attach.begin(), solver().attach.end(), [](const Attachment& a) { return a.body >= 0; });
   }
 };
@@ -217,14 +218,14 @@ inline void snip(Rig& r, Vec3 at, size_t hand = 1) {
   RigidBody& b = r.solver().body[hand];
   b = {};
   b.x = b.prev_x = at, b.q = b.prev_q = r.input.hand[hand].pose.q;
-  r.state->hand[hand] = r.input.hand[hand].pose;
-  r.state->hand_known[hand] = 1;
+  r.state->hand[hand].pose = r.input.hand[hand].pose;
+  r.state->hand[hand].known = 1;
   r.input.hand[hand].buttons = kButtonCut;
   r.tick();
   r.input.hand[hand].buttons = 0;
   r.input.hand[hand].pose.p += Vec3{0, 0.1f, 0};
   b.x = b.prev_x = r.input.hand[hand].pose.p;
-  r.state->hand[hand] = r.input.hand[hand].pose;
+  r.state->hand[hand].pose = r.input.hand[hand].pose;
   r.tick();
 }
 inline Vec3 between(Rig& r, size_t node, float s = 0.5f) {

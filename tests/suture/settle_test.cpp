@@ -30,7 +30,7 @@ void tie_and_cut(Tie& r, int throws = 2) {
 std::vector<Event> settle(Tie& r) {
   EventList events;
   EXPECT_TRUE(new_suture(r.model->solver, r.solver(), r.model->suture, r.suture(), r.model->start, r.model->needle_start,
-                         {kButtonNewSuture, 0}, events));
+                         {kButtonNewSuture}, events));
   return events.list;
 }
 
@@ -63,7 +63,7 @@ void expect_fresh(Rig& r) {
   EXPECT_TRUE(r.suture().point.empty());
   EXPECT_TRUE(r.suture().knot.empty());
   for (const ToolLoop& l : r.suture().loop) EXPECT_EQ(l.wraps, 0u);
-  for (const HandState& h : r.suture().hand) EXPECT_EQ(h.held, Held::nothing);
+  for (const InstrumentState& h : r.suture().instrument) EXPECT_EQ(h.held, Held::nothing);
 }
 
 TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
@@ -85,7 +85,7 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   for (size_t i = cut0 + 1; i <= cut1; ++i) where.push_back(xyz(r.x()[order[i]]));
   EventList events;
   ASSERT_TRUE(new_suture(r.model->solver, r.solver(), r.model->suture, r.suture(), r.model->start, r.model->needle_start,
-                         {kButtonNewSuture, 0}, events));
+                         {kButtonNewSuture}, events));
   // The curve: every particle of the piece, where it was; tails included, what was cut off gone.
   ASSERT_EQ(r.suture().settled.size(), 1u);
   Snapshot seen;

@@ -42,7 +42,7 @@ struct Tie : Rig {
     RigidBody& b = solver().body[setup.tool];
     b = {};
     b.x = b.prev_x = frame.p, b.q = b.prev_q = frame.q;
-    state->hand[setup.tool] = frame;
+    state->hand[setup.tool].pose = frame;
     suture().loop[setup.tool].spent = 0;
     input.hand[setup.tool].pose = frame;
   }

@@ -94,7 +94,7 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
   move_thread(engine_, thread_, model_, snapshot, tissue_, motion_, cameras[0], pixel);
   move_marks(engine_, mark_, snapshot, tissue_, motion_);
   catgut::set_pose(engine_, needle_, snapshot.needle.pose);
-  for (size_t i = 0; i < tool_.size(); ++i) move_tool(tool_[i], snapshot.tool[i]);
+  for (size_t i = 0; i < std::min(tool_.size(), snapshot.instrument.size()); ++i) move_tool(tool_[i], snapshot.instrument[i]);
   show_markers(snapshot, suture_points);
 }
 
@@ -212,8 +212,9 @@ void Theatre::make_stage() {
     add_cloth(cushion_shape(middle, away, -0.022f, 0.03f, box.low.y + 0.001f, ground.y), 14, sample, true);
   }
   needle_ = make_mesh(engine_, *scene_, needle_shape(model_), needle_material_, true);
+  tool_.resize(model_.instrument.size());
   for (size_t i = 0; i < tool_.size(); ++i) {
-    tool_[i].shape = tool_shape(model_.tool[i]);
+    tool_[i].shape = tool_shape(model_.instrument[i]);
     tool_[i].part = {make_mesh(engine_, *scene_, tool_[i].shape.body, tool_material_, true),
                      make_mesh(engine_, *scene_, tool_[i].shape.half, tool_material_, true),
                      make_mesh(engine_, *scene_, mirrored_x(tool_[i].shape.half), tool_material_, true)};
@@ -240,7 +241,7 @@ void Theatre::add_cloth(const Shape& cloth, float threads_per_cm, std::span<cons
   set_look(engine_, cloth_.back(), look);
 }
 
-void Theatre::move_tool(const ToolView3d& view, const ToolView& tool) {
+void Theatre::move_tool(const ToolView3d& view, const InstrumentView& tool) {
   catgut::set_pose(engine_, view.part[0], tool.pose);
   for (const float side : {1.0f, -1.0f}) {
     // The jaws lie on the -z side of the hinge: turning about +y moves what is at -z toward -x.

@@ -58,7 +58,7 @@ class Theatre {
   void make_materials();
   void make_stage();
   void add_cloth(const Shape& cloth, float threads_per_cm, std::span<const Vec3> tissue, bool casts_shadow);
-  void move_tool(const ToolView3d& view, const ToolView& tool);
+  void move_tool(const ToolView3d& view, const InstrumentView& tool);
   void show_markers(const Snapshot& snapshot, bool wanted);
 
   float coarse_ = 1;
@@ -80,7 +80,7 @@ class Theatre {
   std::vector<TissueView> tissue_;
   ThreadView thread_;
   MarkView mark_;
-  std::array<ToolView3d, 2> tool_;
+  std::vector<ToolView3d> tool_;  // as PictureModel::instrument
   GpuMesh needle_, bed_;
   std::vector<GpuMesh> cloth_;  // each with the shadows on it
   std::vector<GpuMesh> marker_;

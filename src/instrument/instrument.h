@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// instrument: surgical instruments as data. A model says what an instrument is made of and what it can do; the stages in suture
+// ask for capabilities and limits, never for a name. The table of models is instrument/table.cpp; docs/add_an_instrument.md
+// shows how to add one, in the table or from a program of one's own.
+//
+// Tool frame of every instrument, as of ToolInput: origin at the grasp point between the jaw tips, -z the direction in which
+// the instrument points, +z along the shaft toward the hand, x the direction in which the jaws open. SI units.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "exchange/instrument.h"
+#include "solver/rigid.h"
+
+namespace catgut {
+
+struct Jaw {
+  float length = 0;      // [m] from the pivot to the tips; 0: the instrument has no jaws
+  float closed = 0.35f;  // of ToolInput::jaw (0 shut, 1 open): below this the jaws have closed on what lies between them,
+  float open = 0.5f;     // above this they let go. Apart, so that tremor at the threshold drops nothing
+};
+
+struct InstrumentModel {
+  std::string name;   // of the model: "needle_holder"
+  std::string title;  // for people: "Needle holder"
+  uint32_t capabilities = 0;
+  RigidModel body;  // mass, inertia, and the capsules it collides with
+  Jaw jaw;
+  // [N] of pull at which the jaws let slip what they hold.
+  float needle_grip = 0, thread_grip = 0, tissue_grip = 0;
+  bool can(uint32_t capability) const { return (capabilities & capability) == capability; }
+};
+
+// One instrument of a scene, as it is now. Written by sim/hands (place, hand) and suture/grasp (the rest).
+struct InstrumentState {
+  Held held = Held::nothing;
+  uint32_t slot = 0;  // held thread particle, or tissue particle nearest to the jaws
+  float at = 0;       // held needle: place on its arc, 0 swage .. 1 tip
+  float jaw = 1;      // of the last tick
+  InstrumentPlace place = InstrumentPlace::tray;
+  uint8_t hand = kNoHand;  // that has it
+};
+
+// All models of the table, in its order.
+const std::vector<InstrumentModel>& instrument_table();
+// The model of that name, looked for in `own` first; null: there is none.
+const InstrumentModel* find_instrument(const std::string& name, std::span<const InstrumentModel> own = {});
+
+}  // namespace catgut
