@@ -12,3 +12,10 @@ endif()
 set(CATGUT_NUMERIC_FLAGS ${CATGUT_NUMERIC_FLAGS_ALL} ${CATGUT_NUMERIC_FLAGS_PROCESSOR})
 target_compile_options(catgut_numerics INTERFACE ${CATGUT_NUMERIC_FLAGS})
 target_compile_features(catgut_numerics INTERFACE cxx_std_20)
+
+# For rooms with Highway kernels. Arm: registers of unknown length (SVE) cannot be members of structs, so NEON it is; Highway's
+# NEON needs AES, and structs of registers have constructors that only a flag for the whole file reaches.
+set(CATGUT_HIGHWAY_FLAGS "")
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  set(CATGUT_HIGHWAY_FLAGS -march=armv8-a+crypto "-DHWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
+endif()

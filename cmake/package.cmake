@@ -31,12 +31,9 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_LIBRARY_DESCRIPTION "Simulation of open-surgery suturing: C++ library
- Soft tissue, needle and thread in one solver, for programs of your own.")
-set(CPACK_DEBIAN_PROGRAM_DESCRIPTION "Simulator of open-surgery suturing
- Two hands sew soft tissue in real time, with mouse, gamepad or haptic arms.")
-set(CPACK_DEBIAN_DATA_DESCRIPTION "Simulator of open-surgery suturing: scenes
- The scenes that program and library find by name.")
+set(CPACK_DEBIAN_LIBRARY_DESCRIPTION "C++ library: soft tissue, needle and thread in one solver, for programs of your own.")
+set(CPACK_DEBIAN_PROGRAM_DESCRIPTION "Two hands sew soft tissue in real time, with mouse, gamepad or haptic arms.")
+set(CPACK_DEBIAN_DATA_DESCRIPTION "The scenes that program and library find by name.")
 
 # What the program links is read off its binary; what it opens by name while it runs is not.
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
@@ -54,7 +51,8 @@ if(DPKG_QUERY)
     execute_process(COMMAND ${DPKG_QUERY} -S ${development_${name}} OUTPUT_VARIABLE owner ERROR_QUIET)
     if(owner MATCHES "^([^:, ]+)")
       set(owner ${CMAKE_MATCH_1})
-      execute_process(COMMAND ${DPKG_QUERY} -W -f \${source:Upstream-Version} ${owner} OUTPUT_VARIABLE version ERROR_QUIET)
+      execute_process(COMMAND ${DPKG_QUERY} -W -f "\${source:Upstream-Version}\n" ${owner} OUTPUT_VARIABLE version ERROR_QUIET)
+      string(REGEX REPLACE "\n.*" "" version "${version}")  # one line for each architecture
       list(APPEND library_depends "${owner} (>= ${version})")
     endif()
   endforeach()

@@ -2,3 +2,4 @@
 find_package(hwy CONFIG REQUIRED)
 target_link_libraries(catgut_wall ${kind} hwy::hwy)
 target_link_libraries(catgut_wall PRIVATE Eigen3::Eigen)
+target_compile_options(catgut_wall PRIVATE ${CATGUT_HIGHWAY_FLAGS})
