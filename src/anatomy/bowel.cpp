@@ -101,7 +101,7 @@ std::vector<Ring> lay_rings(const BowelShape& shape, const BowelSurface& surface
     std::vector<int> count = ring_counts(shape, surface, rings, full);
     if (sum(count) > n) break;
     const double row = surface.profile_length() / (rings - 1), column = kTwoPi * shape.radius / full;
-    const double fault = std::abs(std::log(row / column / 0.8660254));
+    const double fault = std::abs(portable::log(row / column / 0.8660254));
     if (fault >= best_fault) continue;
     int left = n - sum(count);
     for (int whole = 1; whole >= 0; --whole) {  // full rings first, then those of the domes

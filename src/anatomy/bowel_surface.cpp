@@ -27,7 +27,8 @@ BowelSurface::BowelSurface(const BowelShape& shape) : shape_(shape) {
   dome_arc_.assign(kDomeSteps + 1, 0);
   for (int i = 0; i < kDomeSteps; ++i) {
     const double a = 0.25 * kTwoPi * i / kDomeSteps, b = 0.25 * kTwoPi * (i + 1) / kDomeSteps;
-    const double dr = shape.radius * (std::sin(b) - std::sin(a)), dz = dome_height_ * (std::cos(b) - std::cos(a));
+    const double dr = shape.radius * (portable::sin(b) - portable::sin(a)),
+                 dz = dome_height_ * (portable::cos(b) - portable::cos(a));
     dome_arc_[i + 1] = dome_arc_[i] + std::sqrt(dr * dr + dz * dz);
   }
   if (shape.closed_end) near_dome_ = dome_arc_.back();
@@ -44,9 +45,9 @@ void BowelSurface::profile(double s, double& z, double& r, double& nz, double& n
     const size_t i = std::clamp<size_t>(static_cast<size_t>(at - dome_arc_.begin()), 1, kDomeSteps) - 1;
     const double t = (arc - dome_arc_[i]) / (dome_arc_[i + 1] - dome_arc_[i]);
     const double angle = 0.25 * kTwoPi * (static_cast<double>(i) + t) / kDomeSteps;
-    r = shape_.radius * std::sin(angle);
-    z = -dome_height_ * (1 - std::cos(angle));
-    nr = dome_height_ * std::sin(angle), nz = shape_.radius * std::cos(angle);
+    r = shape_.radius * portable::sin(angle);
+    z = -dome_height_ * (1 - portable::cos(angle));
+    nr = dome_height_ * portable::sin(angle), nz = shape_.radius * portable::cos(angle);
     const double l = std::sqrt(nr * nr + nz * nz);
     nr /= l, nz /= l;
   };
@@ -79,11 +80,11 @@ double BowelSurface::relief(double s, double angle) const {
   const double fade = smooth_step(s / fade_over) * smooth_step((total_ - s) / fade_over);
   if (fade <= 0 || shape_.haustra <= 0) return 0;
   const double folds = std::max(1.0, std::round(total_ / 0.022));
-  const double wave = 0.5 + 0.5 * std::cos(kTwoPi * folds * s / total_);
+  const double wave = 0.5 + 0.5 * portable::cos(kTwoPi * folds * s / total_);
   const double fold = wave * wave;
   double band = 0;
   if (shape_.taeniae > 0) {
-    const double t = 0.5 + 0.5 * std::cos(shape_.taeniae * angle);
+    const double t = 0.5 + 0.5 * portable::cos(shape_.taeniae * angle);
     band = t * t * t * t;
   }
   return -shape_.haustra * fade * (1 - (1 - fold) * (1 - 0.8 * band));
@@ -94,7 +95,7 @@ BowelSurface::P3 BowelSurface::local(double s, double angle) const {
   profile(s, z, r, nz, nr);
   const double h = relief(s, angle);
   const double rr = r + h * nr;
-  return {rr * std::cos(angle), rr * std::sin(angle), z + h * nz};
+  return {rr * portable::cos(angle), rr * portable::sin(angle), z + h * nz};
 }
 
 Vec3 BowelSurface::to_world(P3 p) const {
@@ -192,8 +193,8 @@ VisibleMesh bowel_picture(const BowelShape& shape, const BowelSurface& surface, 
       for (int j = 0; j <= columns; ++j) {
         const Vec3 n = surface.normal(s, angle_of(j));
         const Vec3 middle = surface.point(s, angle_of(j)) - n * half;
-        const Vec3 p = middle - n * (half * std::cos(t)) + out * (swell * std::sin(t));
-        const Vec3 normal = normalized(out * (half * std::sin(t)) - n * (swell * std::cos(t)));
+        const Vec3 p = middle - n * (half * portable::cos(t)) + out * (swell * portable::sin(t));
+        const Vec3 normal = normalized(out * (half * portable::sin(t)) - n * (swell * portable::cos(t)));
         grid.vertex(p, normal, static_cast<float>((s - (far ? -1 : 1) * shape.wall * (1 - i / double(steps))) / 0.01), v_of(j),
                     TissueLayer::cut_edge);
       }

@@ -110,7 +110,7 @@ class MiddleLine {
     const size_t i = static_cast<size_t>(at), j = std::min(i + 1, centre_.size() - 1);
     const float t = at - static_cast<float>(i);
     const Vec3 d = p - lerp(centre_[i], centre_[j], t);
-    return std::atan2(dot(d, lerp(e2_[i], e2_[j], t)), dot(d, lerp(e1_[i], e1_[j], t))) / (2 * kPi) + 0.5f;
+    return portable::atan2(dot(d, lerp(e2_[i], e2_[j], t)), dot(d, lerp(e1_[i], e1_[j], t))) / (2 * kPi) + 0.5f;
   }
 
  private:
@@ -188,8 +188,9 @@ VisibleMesh sheet_picture(const TriangleMesh& sheet, const BodyRest& body, std::
         const Vec3 tangent = b.mesh.position[fine[(j + 1) % count]] - b.mesh.position[fine[(j + count - 1) % count]];
         const Vec3 half = (o - in) * 0.5f, away = normalized(cross(half, tangent));
         const float swell = 0.7f * length(half);
-        const Vec3 p = (o + in) * 0.5f - half * std::cos(a) + away * (swell * std::sin(a));
-        const Vec3 normal = normalized(away * (length(half) * std::sin(a)) - normalized(half) * (swell * std::cos(a)));
+        const Vec3 p = (o + in) * 0.5f - half * portable::cos(a) + away * (swell * portable::sin(a));
+        const Vec3 normal =
+            normalized(away * (length(half) * portable::sin(a)) - normalized(half) * (swell * portable::cos(a)));
         const std::array<float, 2> uv = b.mesh.uv[fine[j]];
         b.vertex(p, normal, {uv[0] - 100 * 2 * length(half) * (1 - static_cast<float>(i) / steps), uv[1]},
                  TissueLayer::cut_edge);

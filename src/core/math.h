@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/elementary.h"
+
 namespace catgut {
 
 struct Vec3 {
@@ -58,15 +60,15 @@ constexpr Vec3 rotate(Quat q, Vec3 v) {
 }
 // Rotation by `angle` about the unit vector `axis`.
 inline Quat axis_angle(Vec3 axis, float angle) {
-  const float s = std::sin(0.5f * angle);
-  return {axis.x * s, axis.y * s, axis.z * s, std::cos(0.5f * angle)};
+  const float s = portable::sin(0.5f * angle);
+  return {axis.x * s, axis.y * s, axis.z * s, portable::cos(0.5f * angle)};
 }
 // Rotation vector (axis times angle, |angle| <= pi) of a unit quaternion.
 inline Vec3 rotation_vector(Quat q) {
   if (q.w < 0) q = {-q.x, -q.y, -q.z, -q.w};
   const Vec3 v{q.x, q.y, q.z};
   const float s = length(v);
-  return s < 1e-6f ? 2.0f * v : v * (2.0f * std::atan2(s, q.w) / s);
+  return s < 1e-6f ? 2.0f * v : v * (2.0f * portable::atan2(s, q.w) / s);
 }
 // The rotation whose columns are the given orthonormal, right-handed axes.
 inline Quat from_axes(Vec3 ax, Vec3 ay, Vec3 az) {

@@ -30,31 +30,36 @@ struct Eigen3 {
   std::array<float, 3> value{};
   std::array<Vec3, 3> vector{};
 };
-inline Eigen3 eigen(const Sym3& s) {
-  float a[3][3] = {{s.xx, s.xy, s.xz}, {s.xy, s.yy, s.yz}, {s.xz, s.yz, s.zz}};
-  float v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+// Diagonalizes the symmetric matrix a; the columns of v, the identity at first, become its eigenvectors.
+template <typename T>
+inline void diagonalize(T (&a)[3][3], T (&v)[3][3]) {
   for (int sweep = 0; sweep < 6; ++sweep)
     for (int p = 0; p < 2; ++p)
       for (int q = p + 1; q < 3; ++q) {
         if (a[p][q] == 0) continue;
-        const float theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+        const T theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
         // For a huge theta the square overflows; then the rotation is none.
-        const float t =
-            std::abs(theta) > 1e9f ? 0 : (theta < 0 ? -1.0f : 1.0f) / (std::abs(theta) + std::sqrt(theta * theta + 1));
-        const float c = 1 / std::sqrt(t * t + 1), d = t * c;
+        const T t =
+            std::abs(theta) > T(1e9) ? 0 : (theta < 0 ? T(-1) : T(1)) / (std::abs(theta) + std::sqrt(theta * theta + 1));
+        const T c = 1 / std::sqrt(t * t + 1), d = t * c;
         for (int k = 0; k < 3; ++k) {
-          const float kp = a[k][p], kq = a[k][q];
+          const T kp = a[k][p], kq = a[k][q];
           a[k][p] = c * kp - d * kq, a[k][q] = d * kp + c * kq;
         }
         for (int k = 0; k < 3; ++k) {
-          const float pk = a[p][k], qk = a[q][k];
+          const T pk = a[p][k], qk = a[q][k];
           a[p][k] = c * pk - d * qk, a[q][k] = d * pk + c * qk;
         }
         for (int k = 0; k < 3; ++k) {
-          const float kp = v[k][p], kq = v[k][q];
+          const T kp = v[k][p], kq = v[k][q];
           v[k][p] = c * kp - d * kq, v[k][q] = d * kp + c * kq;
         }
       }
+}
+inline Eigen3 eigen(const Sym3& s) {
+  float a[3][3] = {{s.xx, s.xy, s.xz}, {s.xy, s.yy, s.yz}, {s.xz, s.yz, s.zz}};
+  float v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  diagonalize(a, v);
   return {{a[0][0], a[1][1], a[2][2]},
           {Vec3{v[0][0], v[1][0], v[2][0]}, Vec3{v[0][1], v[1][1], v[2][1]}, Vec3{v[0][2], v[1][2], v[2][2]}}};
 }

@@ -72,8 +72,8 @@ Vec3 winding_axis(const Winding& w, const AcrossTool& across) {
 Vec3 winding_swage(const Winding& w, const AcrossTool& across, float wound, float& room) {
   const float turned = w.way * wound;
   const Vec3 leave =
-      winding_axis(w, across) + kWindRadius * (across.e2 * (w.way * std::cos(wound)) + across.e1 * std::sin(wound));
-  const Vec3 to = across.e1 * std::cos(turned) - across.e2 * std::sin(turned);
+      winding_axis(w, across) + kWindRadius * (across.e2 * (w.way * portable::cos(wound)) + across.e1 * portable::sin(wound));
+  const Vec3 to = across.e1 * portable::cos(turned) - across.e2 * portable::sin(turned);
   room = to.y < 0 ? std::max(0.012f, (leave.y - w.ground) / -to.y) : 1;
   // The needle's tool comes from the tip's side. A slack strand would slide off there: it is led back.
   return leave + to * std::min(w.free, room) -

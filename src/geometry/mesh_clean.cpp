@@ -113,8 +113,8 @@ double winding(const TriangleMesh& closed, Vec3 p) {
   for (const Triangle& t : closed.triangle) {
     const Vec3 a = closed.position[t[0]] - p, b = closed.position[t[1]] - p, c = closed.position[t[2]] - p;
     const double la = length(a), lb = length(b), lc = length(c);
-    sum += 2 * std::atan2(static_cast<double>(dot(a, cross(b, c))),
-                          la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+    sum += 2 * portable::atan2(static_cast<double>(dot(a, cross(b, c))),
+                               la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
   }
   return sum / (4 * 3.14159265358979);
 }

@@ -286,7 +286,7 @@ MeshQuality mesh_quality(const TriangleMesh& mesh) {
     for (int k = 0; k < 3; ++k) {
       const Vec3 p = mesh.position[t[k]];
       const Vec3 u = mesh.position[t[(k + 1) % 3]] - p, v = mesh.position[t[(k + 2) % 3]] - p;
-      least = std::min(least, std::acos(std::clamp(dot(normalized(u), normalized(v)), -1.0f, 1.0f)));
+      least = std::min(least, portable::acos(std::clamp(dot(normalized(u), normalized(v)), -1.0f, 1.0f)));
       const float l = length(u);
       q.shortest = std::min(q.shortest, l);
       q.longest = std::max(q.longest, l);

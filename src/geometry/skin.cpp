@@ -100,7 +100,7 @@ void bind_skin(VisibleMesh& mesh, std::span<const Vec3> particle_rest, float inf
     std::array<float, 4> weight{};
     for (int k = 0; k < std::min(count, 4); ++k) {
       const float d = std::sqrt(found[k].first);
-      weight[k] = d < reach ? std::pow(1 - d / reach, falloff) : 0.0f;
+      weight[k] = d < reach ? portable::pow(1 - d / reach, falloff) : 0.0f;
       sum += weight[k];
     }
     auto& slot = mesh.skin_particle[v];

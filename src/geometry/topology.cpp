@@ -65,7 +65,7 @@ std::vector<Vec3> vertex_normals(const TriangleMesh& mesh) {
     for (int k = 0; k < 3; ++k) {
       const Vec3 u = normalized(mesh.position[t[(k + 1) % 3]] - mesh.position[t[k]]);
       const Vec3 v = normalized(mesh.position[t[(k + 2) % 3]] - mesh.position[t[k]]);
-      normal[t[k]] += n * std::acos(std::clamp(dot(u, v), -1.0f, 1.0f));
+      normal[t[k]] += n * portable::acos(std::clamp(dot(u, v), -1.0f, 1.0f));
     }
   }
   for (Vec3& n : normal) n = normalized(n);

@@ -71,7 +71,7 @@ std::vector<Vec3> lay_thread(const ThreadSpec& spec, Vec3 start) {
       q = {x0, 0, z0 + way * in_row};
     } else {
       const float a = (in_row - kRow) / kTurn;
-      q = {x0 + kTurn * (1 - std::cos(a)), 0, z0 + way * (kRow + kTurn * std::sin(a))};
+      q = {x0 + kTurn * (1 - portable::cos(a)), 0, z0 + way * (kRow + kTurn * portable::sin(a))};
     }
     p.push_back(start + q);
   }

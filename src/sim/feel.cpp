@@ -121,7 +121,7 @@ Vec3 load_of(const ToolReaction& t) {
 }
 
 void learn(FeltStiffness& f, const ToolReaction& t, uint32_t topology, float dt) {
-  const float keep = std::exp(-dt / kForget);
+  const float keep = portable::exp(-dt / kForget);
   const Vec3 force = load_of(t), point = t.substeps > 0 ? t.at / t.substeps : f.point;
   const bool loaded = length(force) > kNothing;
   if (topology != f.topology || !loaded) {

@@ -1,25 +1,42 @@
 // solver/attach: reads attachments, moves tissue particles and rigid bodies alike. XPBD (Macklin et al. 2016) per attachment.
 #include "solver/attach.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
+#include <array>
+
+#include "core/sym3.h"
 
 namespace catgut {
 
 TissuePoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at) {
   TissuePoint t;
   t.count = static_cast<uint32_t>(std::min<size_t>(particle.size(), TissuePoint::kMost));
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  auto rest_of = [&](uint32_t k) { return Eigen::Vector3d(rest[particle[k]].x, rest[particle[k]].y, rest[particle[k]].z); };
-  for (uint32_t k = 0; k < t.count; ++k) mean += rest_of(k) / t.count;
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (uint32_t k = 0; k < t.count; ++k) spread += (rest_of(k) - mean) * (rest_of(k) - mean).transpose();
+  using Column = std::array<double, 3>;
+  const auto rest_of = [&](uint32_t k) { return Column{rest[particle[k]].x, rest[particle[k]].y, rest[particle[k]].z}; };
+  Column mean{};
+  for (uint32_t k = 0; k < t.count; ++k)
+    for (size_t i = 0; i < 3; ++i) mean[i] += rest_of(k)[i] / t.count;
+  double spread[3][3] = {}, axis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (uint32_t k = 0; k < t.count; ++k)
+    for (size_t i = 0; i < 3; ++i)
+      for (size_t j = 0; j < 3; ++j) spread[i][j] += (rest_of(k)[i] - mean[i]) * (rest_of(k)[j] - mean[j]);
+  diagonalize(spread, axis);
   // b_k = 1/n + (q_k - mean)^T S^-1 (at - mean); the pseudo-inverse leaves directions alone in which the particles do not
-  // spread.
-  const Eigen::Vector3d slope = spread.completeOrthogonalDecomposition().solve(Eigen::Vector3d(at.x, at.y, at.z) - mean);
+  // spread: where they are flat to a part in 100,000, squared here.
+  constexpr double kFlat = 1e-10;
+  const double largest = std::max({spread[0][0], spread[1][1], spread[2][2]});
+  const Column away{at.x - mean[0], at.y - mean[1], at.z - mean[2]};
+  Column slope{};
+  for (size_t e = 0; e < 3; ++e) {
+    if (!(spread[e][e] > kFlat * largest)) continue;
+    const double along = (axis[0][e] * away[0] + axis[1][e] * away[1] + axis[2][e] * away[2]) / spread[e][e];
+    for (size_t i = 0; i < 3; ++i) slope[i] += along * axis[i][e];
+  }
   for (uint32_t k = 0; k < t.count; ++k) {
+    const Column q = rest_of(k);
     t.particle[k] = particle[k];
-    t.weight[k] = static_cast<float>(1.0 / t.count + (rest_of(k) - mean).dot(slope));
+    t.weight[k] = static_cast<float>(1.0 / t.count + (q[0] - mean[0]) * slope[0] + (q[1] - mean[1]) * slope[1] +
+                                     (q[2] - mean[2]) * slope[2]);
   }
   return t;
 }
@@ -52,7 +69,7 @@ TissuePoint midway(const Vec4* rest, const TissuePoint& a, const TissuePoint& b)
 }
 
 float NeedleArc::nearest(Vec3 p) const {
-  float phi = std::atan2(p.y - centre.y, p.x - centre.x);
+  float phi = portable::atan2(p.y - centre.y, p.x - centre.x);
   // Angles of the gap behind the arc belong to whichever end is nearer.
   if (phi < 0 && phi < 0.5f * (arc - 2 * kPi)) phi += 2 * kPi;
   return std::clamp(phi, 0.0f, arc);

@@ -80,8 +80,8 @@ struct ChannelPoint {
 struct NeedleArc {
   float radius = 0, arc = 0;
   Vec3 centre;  // [m] body frame: the body's origin is the centre of mass
-  Vec3 point(float phi) const { return centre + Vec3{radius * std::cos(phi), radius * std::sin(phi), 0}; }
-  Vec3 tangent(float phi) const { return {-std::sin(phi), std::cos(phi), 0}; }  // toward the tip
+  Vec3 point(float phi) const { return centre + Vec3{radius * portable::cos(phi), radius * portable::sin(phi), 0}; }
+  Vec3 tangent(float phi) const { return {-portable::sin(phi), portable::cos(phi), 0}; }  // toward the tip
   // The angle of the point of the arc nearest to p (body frame), clamped to the arc.
   float nearest(Vec3 p) const;
 };

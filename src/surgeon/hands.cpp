@@ -33,7 +33,7 @@ bool move_jaw(ScriptedHand& hand, float goal, float dt) {
 
 void tremble(ScriptedHand& hand, float deviation, Random& random, float dt) {
   // Ornstein-Uhlenbeck: keeps its variance whatever the tick rate.
-  const float keep = std::exp(-2 * kPi * 8 * dt), kick = deviation * std::sqrt(1 - keep * keep);
+  const float keep = portable::exp(-2 * kPi * 8 * dt), kick = deviation * std::sqrt(1 - keep * keep);
   hand.tremor = hand.tremor * keep + Vec3{random.normal(), random.normal(), random.normal()} * kick;
 }
 

@@ -39,7 +39,7 @@ void places_round(const PictureModel& picture, const SurgeonSkill& skill, int bi
   const std::vector<Vec3>& rest = picture.particle_rest;
   const Vec3 u = normalized(Vec3{1, 0, 0} - o.axis * o.axis.x, any_perpendicular(o.axis)), v = cross(o.axis, u);
   const size_t n = rim.size();
-  auto angle_of = [&](Vec3 p) { return std::atan2(dot(p - o.centre, v), dot(p - o.centre, u)); };
+  auto angle_of = [&](Vec3 p) { return portable::atan2(dot(p - o.centre, v), dot(p - o.centre, u)); };
   size_t start = 0;
   float turn = 0;
   for (size_t i = 0; i < n; ++i) {
@@ -71,7 +71,7 @@ BitePlace on_top(const PictureModel& picture, uint32_t wall, float angle, float 
   const OpeningShape o = opening_shape(picture, wall);
   const Vec3 top = normalized(Vec3{0, 1, 0} - o.axis * o.axis.y, any_perpendicular(o.axis)), side = cross(top, Vec3{1, 0, 0});
   BitePlace p;
-  p.out = top * std::cos(angle) - side * std::sin(angle);
+  p.out = top * portable::cos(angle) - side * portable::sin(angle);
   p.at = o.centre + p.out * o.radius - o.axis * edge;
   p.wall = wall;
   return p;
@@ -124,7 +124,7 @@ Plan connell_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;
   const float radius = opening_shape(picture, 0).radius;
-  const float turn = 2 * std::asin(0.5f * skill.bite_length / radius);
+  const float turn = 2 * portable::asin(0.5f * skill.bite_length / radius);
   const int all = (skill.bites + 1) / 2;
   for (int done = 0, row = 0; done < all; ++row) {
     const int sweeps = std::min(kBitesPerThread / 2, all - done);
@@ -197,7 +197,7 @@ Plan lembert_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   const float wall = skill.wall;
   for (int b = 0; b < skill.bites; ++b) {
     const float angle = 2 * kPi * static_cast<float>(b) / static_cast<float>(skill.bites);
-    const Vec3 radial = u * std::cos(angle) + v * std::sin(angle);
+    const Vec3 radial = u * portable::cos(angle) + v * portable::sin(angle);
     BitePlace p;
     const float middle = 0.5f * (outer.radius + inner.radius - wall);
     p.at = outer.centre + radial * middle;

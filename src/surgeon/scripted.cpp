@@ -104,7 +104,7 @@ BiteFrame Scripted::frame(const Snapshot& seen, size_t place) const {
 
 Pose Scripted::needle_at(const BiteFrame& f, float psi) const {
   const Vec3 centre = f.at + f.out * (picture_.needle_radius - bite().depth + depth_error_ + depth_fix_);
-  const Vec3 x = f.out * std::cos(psi) - f.along * std::sin(psi);
+  const Vec3 x = f.out * portable::cos(psi) - f.along * portable::sin(psi);
   // The tip is at the end of the arc: for other arcs than a half circle turn back by what is missing.
   const Pose half{centre, from_axes(x, cross(f.up, x), f.up)};
   return half * Pose{{}, axis_angle({0, 0, 1}, kPi - picture_.needle_arc)};
@@ -112,8 +112,8 @@ Pose Scripted::needle_at(const BiteFrame& f, float psi) const {
 
 Pose Scripted::grip_at(const Pose& needle, float s, float side, float lean, float psi) const {
   const float phi = s * picture_.needle_arc;
-  const Vec3 radial = rotate(needle.q, {std::cos(phi), std::sin(phi), 0});
-  const Vec3 outward = rotate(needle.q, {std::cos(psi), -std::sin(psi), 0});
+  const Vec3 radial = rotate(needle.q, {portable::cos(phi), portable::sin(phi), 0});
+  const Vec3 outward = rotate(needle.q, {portable::cos(psi), -portable::sin(psi), 0});
   const Vec3 z = normalized(rotate(needle.q, {0, 0, side}) + outward * lean);
   const Vec3 y = normalized(cross(z, radial), any_perpendicular(z)), x = cross(y, z);
   return {needle.p + radial * picture_.needle_radius, from_axes(x, y, z)};

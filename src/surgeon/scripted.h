@@ -58,7 +58,7 @@ class Scripted final : public Surgeon {
   // --- bites ------------------------------------------------------------------------------------------------------------
   BiteFrame frame(const Snapshot& seen, size_t place) const;
   const BitePlace& bite() const { return plan_.place[place_]; }
-  float half_bite_angle() const { return std::asin(std::min(0.9f, 0.5f * bite().length / picture_.needle_radius)); }
+  float half_bite_angle() const { return portable::asin(std::min(0.9f, 0.5f * bite().length / picture_.needle_radius)); }
 
   // The needle with its tip `psi` past the deepest place of a bite at frame f.
   Pose needle_at(const BiteFrame& f, float psi) const;

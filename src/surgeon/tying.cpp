@@ -29,7 +29,7 @@ bool Scripted::regrip(const Snapshot& seen) {
     return false;
   }
   const float phi = kTyingAt * picture_.needle_arc;
-  const Vec3 place = transform(seen.needle.pose, picture_.needle_radius * Vec3{std::cos(phi), std::sin(phi), 0});
+  const Vec3 place = transform(seen.needle.pose, picture_.needle_radius * Vec3{portable::cos(phi), portable::sin(phi), 0});
   const Pose grip = tying_pose(kForceps, place);
   switch (stage_) {
     case over:

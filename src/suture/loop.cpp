@@ -93,7 +93,7 @@ void judge_run(const LoopTool& tool, const Vec4* x, std::span<const uint32_t> or
     const Corner next{double{p.x}, double{p.y}, double{p.z}, double{p.z}, i, closed};
     if (i > from) {
       const Corner& was = path[corners - 1];
-      angle += std::atan2(was.x * next.y - was.y * next.x, was.x * next.x + was.y * next.y);
+      angle += portable::atan2(was.x * next.y - was.y * next.x, was.x * next.x + was.y * next.y);
     }
     best.round = std::max(best.round, static_cast<float>(std::abs(angle)));
     // The pair may cross several: the nearest crossing first.

@@ -5,8 +5,8 @@ namespace catgut {
 
 NeedleArc needle_arc(const NeedleShape& shape) {
   // The centre of mass of an arc of half-angle a lies at radius * sin(a) / a from the circle's centre, on its middle line.
-  const float a = 0.5f * shape.arc, d = shape.radius * std::sin(a) / a;
-  return {shape.radius, shape.arc, Vec3{-d * std::cos(a), -d * std::sin(a), 0}};
+  const float a = 0.5f * shape.arc, d = shape.radius * portable::sin(a) / a;
+  return {shape.radius, shape.arc, Vec3{-d * portable::cos(a), -d * portable::sin(a), 0}};
 }
 
 RigidModel needle_body(const NeedleShape& shape) {

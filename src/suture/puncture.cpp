@@ -179,7 +179,7 @@ void puncture(const SolverModel& model, SolverState& solver, const SolverScratch
     state.bite.push_back(bite);
     state.open.push_back({which, NeedlePhase::tip_in});
     const Vec3 heading = rotate(needle.q, arc.tangent(arc.arc));
-    const float angle = std::acos(std::clamp(-dot(heading, hit.normal), -1.0f, 1.0f));
+    const float angle = portable::acos(std::clamp(-dot(heading, hit.normal), -1.0f, 1.0f));
     events.add({EventKind::tip_entered, 0, which, angle, hit.point});
     if (nearest >= 0) {
       // Figure 4: the nearest particle within X of the tip moves with the tip, by the paper's spring.

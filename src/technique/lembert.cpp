@@ -17,7 +17,7 @@ constexpr float kSameAngle = 0.005f;  // [rad] a tenth of a millimetre on the ri
 float signed_angle(Vec3 u, Vec3 v, Vec3 axis) {
   u -= axis * dot(u, axis);
   v -= axis * dot(v, axis);
-  return std::atan2(dot(cross(u, v), axis), dot(u, v));
+  return portable::atan2(dot(cross(u, v), axis), dot(u, v));
 }
 
 struct Ring {

@@ -31,7 +31,7 @@ float turned(std::span<const Vec3> sp, Vec3 centre, Vec3 axis) {
     Vec3 a = sp[i] - centre, b = sp[i + 1] - centre;
     a -= axis * dot(a, axis);
     b -= axis * dot(b, axis);
-    sum += std::atan2(dot(cross(a, b), axis), dot(a, b));
+    sum += portable::atan2(dot(cross(a, b), axis), dot(a, b));
   }
   return sum;
 }

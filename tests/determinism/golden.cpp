@@ -4,11 +4,15 @@
 //   golden check FILE SCENE PRESET       compares the run with the file's rows; exit code 1 at the first difference
 //   golden print [SCENE PRESET]          prints the rows, with a last column for the bytes of the whole state
 //   golden update FILE                   runs everything and writes the file
-// Options after these: --seconds S (at most so much simulated time), --threads N.
+// Options after these: --seconds S (at most so much simulated time), --threads N, --simd NAME (avx3, avx2, sse4, neon: the
+// kernels' instruction set, instead of the best that the processor has).
 //
 // The hashes cover physical quantities of the Snapshot, not the bytes of `State`: a new layout of the state keeps them. Three
 // columns tell what changed: motion (positions and orientations), force (tensions and forces), events (tick, name, place).
 // A row holds the hash of all ticks up to its time, so the first row that differs names the second in which it began.
+#include <hwy/targets.h>
+
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -188,14 +192,28 @@ int check(const char* path, const Case& c, double seconds, int threads) {
 }
 
 int update(const char* path, int threads) {
+  std::vector<std::vector<Row>> rows;  // all of them first: a run that fails leaves the file as it was
+  for (const Case& c : kCase) rows.push_back(run(c, c.seconds, threads));
   FILE* out = std::fopen(path, "w");
   if (!out) throw InputError(path, "it cannot be written", "choose another file");
   std::fputs(
       "# Golden hashes: scene, preset, second, motion, force, events. Written by tests/determinism/golden.cpp (update).\n",
       out);
-  for (const Case& c : kCase)
-    for (const Row& r : run(c, c.seconds, threads)) print(out, c, r, false);
+  for (size_t i = 0; i < rows.size(); ++i)
+    for (const Row& r : rows[i]) print(out, kCase[i], r, false);
   return std::fclose(out) == 0 ? 0 : 2;
+}
+
+void use_simd(const std::string& name) {
+  std::string there;
+  for (int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
+    const int64_t target = left & -left;
+    std::string its_name = hwy::TargetName(target);
+    for (char& c : its_name) c = static_cast<char>(std::tolower(c));
+    if (its_name == name) return hwy::SetSupportedTargetsForTest(target);
+    there += " " + its_name;
+  }
+  throw InputError("--simd " + name, "this processor does not have it", "it has" + there);
 }
 
 int main_of(std::vector<std::string> arg) {
@@ -203,6 +221,7 @@ int main_of(std::vector<std::string> arg) {
   int threads = 1;
   for (size_t i = 0; i + 1 < arg.size();) {
     if (arg[i] == "--seconds") seconds = std::atof(arg[i + 1].c_str());
+    else if (arg[i] == "--simd") use_simd(arg[i + 1]);
     else if (arg[i] == "--threads") threads = std::atoi(arg[i + 1].c_str());
     else {
       ++i;

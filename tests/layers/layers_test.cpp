@@ -89,6 +89,24 @@ TEST(Layers, every_file_opens_with_its_room) {
   }
 }
 
+// What the bits of a run depend on calls functions that have the same bits everywhere.
+TEST(Layers, no_function_of_the_c_library_that_differs_between_machines) {
+  static const std::regex kDiffers(
+      R"re(std::(a?sinh?|a?cosh?|a?tanh?|atan2|exp2?|expm1|log2?|log10|log1p|pow|cbrt|hypot|fma|tgamma|lgamma|erfc?)\()re");
+  const Rooms rooms = read_rooms();
+  for (const std::string& room : rooms.at("procedure"))
+    for (const fs::path& file : sources_under(kSource / room)) {
+      std::ifstream in(file);
+      int number = 0;
+      for (std::string line; std::getline(in, line);) {
+        ++number;
+        EXPECT_FALSE(std::regex_search(line, kDiffers)) << "src/" << fs::relative(file, kSource).string() << ":" << number
+                                                        << ": call portable:: of core/elementary.h instead\n"
+                                                        << line;
+      }
+    }
+}
+
 TEST(Layers, no_file_is_too_long_to_read) {
   for (const fs::path& file : sources_under(kSource)) {
     std::ifstream in(file);
