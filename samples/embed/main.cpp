@@ -11,8 +11,9 @@ int main() {
   catgut::Jobs jobs(2);   // two threads; the bits do not depend on their number
   catgut::Snapshot seen;  // particles, instruments, forces, events
   catgut::publish(*model, *state, seen);
-  for (catgut::TickInput input; input.tick < 1200; ++input.tick) {
-    input.hand = surgeon->operate(seen, 1 / scene.solver.tick_rate);  // or poses of your own device
+  for (uint64_t tick = 0; tick < 1200; ++tick) {
+    catgut::TickInput input = surgeon->operate(seen, 1 / scene.solver.tick_rate);  // or your own devices
+    input.tick = tick;
     catgut::step(*model, *state, input, jobs);
     catgut::publish(*model, *state, seen);
   }

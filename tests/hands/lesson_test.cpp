@@ -45,7 +45,7 @@ TEST(LessonData, what_was_done_at_once_is_behind) {
   seen.bite[1].complete = true;  // through both walls in one sweep
   EXPECT_EQ(next_step(lesson, 1, seen, {}), 4u);
   EXPECT_EQ(step_from(lesson, seen), 4u);
-  const Event begun[] = {{0, EventKind::knot_begun, 0, 0, 1, {}}};
+  const Event begun[] = {{EventKind::knot_begun, 0, 0, 1, {}}};
   EXPECT_EQ(next_step(lesson, 7, seen, {}), 7u);
   EXPECT_EQ(next_step(lesson, 7, seen, begun), 8u) << "shorter than a picture";
 }
