@@ -67,6 +67,17 @@ TickInput Scripted::operate(const Snapshot& seen, float dt) {
     out.hand[k] = as_input(hand_[k], before[k], dt, sequence_);
     out.hand[k].buttons = buttons_[k];
   }
+  // Hands of an assistant, where the scene gives them an instrument, wait open beyond the field.
+  for (size_t k = 2; k < kMaxHands; ++k) {
+    if (seen.tool[k].instrument < 0) continue;
+    ScriptedHand& hand = assistant_[k - 2];
+    if (sequence_ == 0) hand.pose = seen.tool[k].hand;
+    const Pose from = hand.pose;
+    const Vec3 z = normalized(Vec3{k == 2 ? 0.4f : -0.4f, 0.6f, -0.7f}), x = normalized(cross({0, 1, 0}, z));
+    const Vec3 at = picture_.focus + Vec3{k == 2 ? 0.25f : -0.25f, 0.35f, -0.5f} * picture_.field;
+    move_toward(hand, {at, from_axes(x, cross(z, x), z)}, skill_.speed, dt);
+    out.hand[k] = as_input(hand, from, dt, sequence_);
+  }
   ++sequence_;
   return out;
 }

@@ -133,6 +133,7 @@ class Scripted final : public Surgeon {
   Plan plan_;
   Random random_;
   std::array<ScriptedHand, 2> hand_;
+  std::array<ScriptedHand, kMaxHands - 2> assistant_;
   std::array<uint32_t, 2> buttons_{};
   size_t task_ = 0;
   int stage_ = 0;     // within the task
