@@ -27,6 +27,8 @@ enum class Key {
   points,
   hints,
   help_at_needle,
+  next_instrument,  // from the tray into the active hand
+  park,             // the active hand's clamp, or take one up
   finish,
   digit,
   picture,

@@ -54,6 +54,10 @@ Choice choice_of_key(const WindowInput& in, const ScreenFacts& f) {
       return {Chosen::hints};
     case Key::help_at_needle:
       return when(field, Chosen::help_at_needle);
+    case Key::next_instrument:
+      return when(practice, Chosen::next_instrument);
+    case Key::park:
+      return when(practice, Chosen::park);
     case Key::settings:
       if (f.screen == Screen::settings) return {Chosen::leave_settings};
       return when(start || field, Chosen::settings);

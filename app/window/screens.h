@@ -40,6 +40,8 @@ enum class Chosen {
   points,
   hints,
   help_at_needle,
+  next_instrument,
+  park,
   developer,
   picture,
   quit,

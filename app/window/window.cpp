@@ -16,6 +16,7 @@
 #include "commands/commands.h"
 #include "core/check.h"
 #include "core/data.h"
+#include "device/tray.h"
 #include "procedure/scene_file.h"
 #include "render/orbit.h"
 #include "render/quality.h"
@@ -370,6 +371,12 @@ class Window {
       case Chosen::help_at_needle:
         settings_.assist = !settings_.assist;
         break;
+      case Chosen::next_instrument:
+        instrument(next_from_tray(visit_->seen, hands_.mouse.active));
+        break;
+      case Chosen::park:
+        instrument(park_or_take_up(visit_->seen, hands_.mouse.active));
+        break;
       case Chosen::developer:
         developer_ = !developer_;
         break;
@@ -449,6 +456,10 @@ class Window {
     } catch (const std::runtime_error& error) { line.text = error.what(), line.bad = true; }
     if (visit_) visit_->log.push_back(line);
     else std::fprintf(stderr, "catgut: %s\n", line.text.c_str());
+  }
+
+  void instrument(const Command& command) {
+    if (command.kind != CommandKind::none) visit_->live.instrument(command);
   }
 
   // Hands in, the field out.

@@ -6,6 +6,7 @@
 
 #include "device/gamepad.h"
 #include "device/mouse.h"
+#include "device/tray.h"
 #include "procedure/scene_file.h"
 #include "runtime/live.h"
 #include "sim/simulation.h"
@@ -529,6 +530,31 @@ TEST_P(WholeBite, by_mouse_alone) {
   me.tab();
   EXPECT_TRUE(me.drive(1.2f, 1200, [&] { return !me.seen_.needle.in_tissue; }));
   EXPECT_TRUE(me.happened(EventKind::bite_completed));
+}
+
+// One key goes round the tray; what is parked or in the other hand is left alone.
+TEST(Tray, the_key_goes_round_what_lies_there) {
+  Snapshot seen;
+  seen.instrument.resize(4);
+  for (size_t k = 0; k < 2; ++k) {
+    seen.tool[k].instrument = static_cast<int>(k);
+    seen.instrument[k].place = InstrumentPlace::hand;
+  }
+  Command c = next_from_tray(seen, 0);
+  EXPECT_EQ(c.kind, CommandKind::swap);
+  EXPECT_EQ(c.argument, 2);
+  seen.instrument[2].place = InstrumentPlace::parked;
+  EXPECT_EQ(next_from_tray(seen, 0).argument, 3);
+  seen.tool[0].instrument = -1, seen.instrument[0].place = InstrumentPlace::tray;
+  c = next_from_tray(seen, 0);
+  EXPECT_EQ(c.kind, CommandKind::take);
+  EXPECT_EQ(c.argument, 0);
+  c = park_or_take_up(seen, 0);
+  EXPECT_EQ(c.kind, CommandKind::unpark);
+  EXPECT_EQ(c.argument, 2);
+  EXPECT_EQ(park_or_take_up(seen, 1).kind, CommandKind::park);
+  seen.instrument[0].place = seen.instrument[3].place = InstrumentPlace::hand;
+  EXPECT_EQ(next_from_tray(seen, 1).kind, CommandKind::none);
 }
 
 }  // namespace
