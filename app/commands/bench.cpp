@@ -12,6 +12,7 @@ namespace catgut {
 namespace {
 
 struct BenchOptions {
+  std::string log;
   std::string what, json, out;
   std::vector<std::string> scene, set;
   int repeat = 1, threads = 1, sutures = 50, executions = 10;
@@ -57,6 +58,7 @@ int bench_stages(const BenchOptions& o) {
 int bench(const BenchOptions& o) {
   if (o.scene.size() > 1 && o.what != "paper" && o.what != "limits")
     throw InputError("bench " + o.what + " --scene", "one scene only", "name one");
+  if (o.what == "haptics" && !o.log.empty()) return plot_haptics_log(o.log);
   if (o.what == "haptics") return bench_haptics(o.out, o.scene.empty() ? "purse_string" : o.scene[0]);
   if (o.what == "stages") return bench_stages(o);
   if (o.what == "frame")
@@ -107,6 +109,7 @@ void add_bench(CLI::App& app, int& exit_code) {
                    "output folder. limits: CSV and PNG per scene (default out/limits); paper: tables.md, tables.csv; haptics: "
                    "forces.csv, forces.png")
       ->type_name("DIR");
+  command->add_option("--log", o->log, "haptics: plot a log of play --haptics-log to FILE.png instead")->type_name("FILE");
   command->add_option("--set", o->set, "override a scene key: key=value; repeatable")->take_all()->allow_extra_args(false);
   command->callback([o, &exit_code] { exit_code = bench(*o); });
 }

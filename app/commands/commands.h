@@ -64,6 +64,7 @@ StereoPictures stereo_pictures(const PictureModel& model, float every_s);
 
 // `catgut bench haptics` (app/commands/haptics.cpp). folder: empty: the table alone.
 int bench_haptics(const std::string& folder, const std::string& scene);
+int plot_haptics_log(const std::string& file);  // to FILE.png
 
 int play_without_arguments();  // the window's start screen
 

@@ -1,7 +1,10 @@
 // app: `catgut bench haptics`: the comparison of rendering methods and, with --out, what a bite and a knot feel
 // like.
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <fstream>
 
 #include "commands/commands.h"
 #include "core/check.h"
@@ -9,6 +12,7 @@
 #include "procedure/scene_file.h"
 #include "render/plot.h"
 #include "runtime/felt.h"
+#include "runtime/haptics.h"
 #include "suture/forces.h"
 
 namespace catgut {
@@ -81,6 +85,76 @@ void write_felt(const std::string& folder, const std::string& scene) {
 }
 
 }  // namespace
+
+int plot_haptics_log(const std::string& file) {
+  std::ifstream in(file);
+  std::string line;
+  if (!in || !std::getline(in, line) || line != kHapticsLogHead)
+    throw InputError("--log " + file, "it is no log of haptic arms",
+                     "write one with catgut play SCENE --haptics DRIVER --haptics-log FILE");
+  // From each millisecond the three lengths; a pixel shows the largest of those that fall on it.
+  constexpr size_t kColumns = 26;
+  struct Row {
+    double t;
+    std::array<double, 3> force;
+    bool fault;
+  };
+  std::array<std::vector<Row>, 2> row;
+  size_t number = 1, faults = 0;
+  while (std::getline(in, line)) {
+    ++number;
+    std::array<double, kColumns> v{};
+    const char* at = line.c_str();
+    size_t k = 0;
+    for (; k < kColumns; ++k) {
+      char* end = nullptr;
+      v[k] = std::strtod(at, &end);
+      if (end == at) break;
+      at = *end == ',' ? end + 1 : end;
+    }
+    if (k < kColumns && in.peek() == EOF) break;  // the program ended within a line
+    if (k < kColumns || (v[1] != 0 && v[1] != 1))
+      throw InputError("--log " + file, "line " + std::to_string(number) + " cannot be read", "was the file changed?");
+    Row r{v[0], {}, v[24] != 0};
+    for (size_t f = 0; f < 3; ++f) r.force[f] = std::hypot(v[15 + 3 * f], v[16 + 3 * f], v[17 + 3 * f]);
+    faults += r.fault;
+    row[static_cast<size_t>(v[1])].push_back(r);
+  }
+  Image both = make_image(kWide, 2 * kHigh, {});
+  for (size_t k = 0; k < 2; ++k) {
+    Plot plot;
+    plot.title = std::string(k == 0 ? "right" : "left") +
+                 " arm: wanted by the physics' patch, allowed by the limits, written to the motors";
+    plot.x_name = "s", plot.y_name = "N", plot.y_axis = PlotAxis::linear;
+    PlotCurve curve[3] = {{"wanted", kTheirs, {}, true, false},
+                          {"allowed", {90, 150, 90, 255}, {}, true, false},
+                          {"written", kOurs, {}, true, false}};
+    PlotCurve fault{"a fault", {0, 0, 0, 255}, {}, false, true};
+    const size_t every = std::max<size_t>(1, row[k].size() / 1400);
+    float step = 0, peak = 0;
+    for (size_t i = 0; i < row[k].size(); ++i) {
+      const Row& r = row[k][i];
+      const double t = r.t - row[k].front().t;
+      if (r.fault && (i == 0 || !row[k][i - 1].fault)) fault.point.push_back({t, 0});
+      peak = std::max(peak, static_cast<float>(r.force[2]));
+      if (i > 0) step = std::max(step, static_cast<float>(std::abs(r.force[2] - row[k][i - 1].force[2])));
+      if (i % every) continue;
+      for (size_t f = 0; f < 3; ++f) {
+        double most = 0;
+        for (size_t j = i; j < std::min(i + every, row[k].size()); ++j) most = std::max(most, row[k][j].force[f]);
+        curve[f].point.push_back({t, std::min(most, 5.0)});
+      }
+    }
+    plot.curve = {curve[0], curve[1], curve[2], fault};
+    plot.y_most = 4;
+    paste(both, draw_plot(plot, kWide, kHigh), 0, static_cast<int>(k) * kHigh);
+    std::printf("%s arm: %zu ms, %.2f N at most written, largest change of its length %.3f N between two calls\n",
+                k == 0 ? "right" : "left", row[k].size(), double{peak}, double{step});
+  }
+  write_png(both, file + ".png");
+  std::printf("%zu ms with a fault\n%s.png\n", faults, file.c_str());
+  return 0;
+}
 
 int bench_haptics(const std::string& folder, const std::string& scene) {
   if (!folder.empty())

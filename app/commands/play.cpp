@@ -78,6 +78,10 @@ void add_play(CLI::App& app, int& exit_code) {
                    "haptic devices as hands, see catgut devices --help; other hands stay with the mouse; paper[:DRIVER]: the "
                    "paper's spring force")
       ->type_name(drivers + "paper[:DRIVER]|off");
+  command
+      ->add_option("--haptics-log", o->play.live.haptics_log,
+                   "CSV log of every millisecond of the haptic devices; catgut bench haptics --log FILE plots it")
+      ->type_name("FILE");
   command->add_option("--events", o->play.events, "event stream, one JSON object per line; -: standard output")
       ->type_name("FILE|-");
   add_window_options(*command, *o);

@@ -74,13 +74,30 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
   constexpr struct {
     SDL_Keycode code;
     Key key;
-  } kKeys[] = {
-      {SDLK_ESCAPE, Key::escape},       {SDLK_RETURN, Key::enter}, {SDLK_p, Key::pause},      {SDLK_PERIOD, Key::single_step},
-      {SDLK_BACKSPACE, Key::take_back}, {SDLK_F5, Key::restart},   {SDLK_MINUS, Key::slower}, {SDLK_PLUS, Key::faster},
-      {SDLK_EQUALS, Key::faster},       {SDLK_m, Key::points},     {SDLK_F1, Key::hints},     {SDLK_h, Key::help_at_needle},
-      {SDLK_i, Key::next_instrument},   {SDLK_k, Key::park},       {SDLK_F10, Key::finish},   {SDLK_F12, Key::picture},
-      {SDLK_F2, Key::settings},         {SDLK_F3, Key::developer}, {SDLK_j, Key::save},       {SDLK_SPACE, Key::space},
-      {SDLK_COMMA, Key::step_back},     {SDLK_s, Key::show_me},    {SDLK_t, Key::teach}};
+  } kKeys[] = {{SDLK_ESCAPE, Key::escape},
+               {SDLK_RETURN, Key::enter},
+               {SDLK_p, Key::pause},
+               {SDLK_PERIOD, Key::single_step},
+               {SDLK_BACKSPACE, Key::take_back},
+               {SDLK_F5, Key::restart},
+               {SDLK_MINUS, Key::slower},
+               {SDLK_PLUS, Key::faster},
+               {SDLK_EQUALS, Key::faster},
+               {SDLK_m, Key::points},
+               {SDLK_F1, Key::hints},
+               {SDLK_h, Key::help_at_needle},
+               {SDLK_i, Key::next_instrument},
+               {SDLK_k, Key::park},
+               {SDLK_F9, Key::arms_off},
+               {SDLK_F10, Key::finish},
+               {SDLK_F12, Key::picture},
+               {SDLK_F2, Key::settings},
+               {SDLK_F3, Key::developer},
+               {SDLK_j, Key::save},
+               {SDLK_SPACE, Key::space},
+               {SDLK_COMMA, Key::step_back},
+               {SDLK_s, Key::show_me},
+               {SDLK_t, Key::teach}};
   for (const auto& k : kKeys)
     if (k.code == code) keys_.push_back({k.key, 0});
 }

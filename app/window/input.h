@@ -29,6 +29,7 @@ enum class Key {
   help_at_needle,
   next_instrument,  // from the tray into the active hand
   park,             // the active hand's clamp, or take one up
+  arms_off,
   finish,
   digit,
   picture,

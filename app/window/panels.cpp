@@ -26,6 +26,7 @@ const char* kHints =
     "- +              slow motion\n"
     "Backspace        undo bite\n"
     "F2  F3  F12      settings, profiler, screenshot\n"
+    "F9               haptic force on or off\n"
     "Esc              pause     F1 hide keys";
 
 void quality_choice(Settings& s) {
@@ -195,6 +196,13 @@ void work_panel(const WorkView& v, const Settings& settings) {
     else
       for (const std::string& line : technique_lines(*v.scene, *v.seen, s.practice)) state.push_back({kText, line});
     if (!s.doing.empty()) state.push_back({kQuiet, "surgeon: " + s.doing});
+  }
+  for (size_t k = 0; k < 2; ++k) {
+    const ArmView& arm = s.arm_view[k];
+    if (arm.most <= 0) continue;  // no such arm
+    const size_t bars = arm.most > 0 ? static_cast<size_t>(std::clamp(20 * arm.force / arm.most, 0.0f, 20.0f)) : 0;
+    state.push_back({*arm.off ? kBad : kQuiet, fmt::format("{} arm {:.1f} N {:<20}{}{}", k == 0 ? "right" : "left", arm.force,
+                                                           std::string(bars, '|'), *arm.off ? "  no force: " : "", arm.off)});
   }
   if (!s.fault.empty()) state.push_back({kBad, "! " + s.fault});
   lines_at("state", 0, 0, 0.62f, state);

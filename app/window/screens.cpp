@@ -58,6 +58,8 @@ Choice choice_of_key(const WindowInput& in, const ScreenFacts& f) {
       return when(practice, Chosen::next_instrument);
     case Key::park:
       return when(practice, Chosen::park);
+    case Key::arms_off:
+      return when(field, Chosen::arms_off);
     case Key::settings:
       if (f.screen == Screen::settings) return {Chosen::leave_settings};
       return when(start || field, Chosen::settings);

@@ -42,6 +42,7 @@ enum class Chosen {
   help_at_needle,
   next_instrument,
   park,
+  arms_off,  // no force to haptic arms, or again
   developer,
   picture,
   quit,

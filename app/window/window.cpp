@@ -377,6 +377,9 @@ class Window {
       case Chosen::park:
         instrument(park_or_take_up(visit_->seen, hands_.mouse.active));
         break;
+      case Chosen::arms_off:
+        if (live) live->command(LiveCommand::arms_off);
+        break;
       case Chosen::developer:
         developer_ = !developer_;
         break;

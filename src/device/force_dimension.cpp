@@ -3,6 +3,7 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
@@ -10,6 +11,7 @@
 
 #include "device/beat.h"
 #include "device/dhd_api.h"
+#include "device/profiles.h"
 
 namespace catgut {
 namespace {
@@ -21,6 +23,7 @@ constexpr uint32_t kStatusEvery = 20;               // [ms] between looks at whe
 constexpr uint32_t kEnableEvery = 250;              // [ms] between tries to switch it on again
 constexpr auto kReopenEvery = 500ms;                // of a lost arm
 constexpr auto kHangsAfter = 300ms;                 // a thread that does not end by then is left behind
+constexpr double kShut = 0.004, kOpen = 0.018;      // [m] gap between which the jaw follows the fingers
 constexpr double kClosed = 0.007, kOpened = 0.011;  // [m] gap of a gripper that counts as pressed, and as let go again
 
 // Their axes (x toward the user, y right, z up) in ours (x right, y up, z toward the user), and back.
@@ -99,6 +102,7 @@ bool read(Arm& a, ArmSample& s) {
   if (a.gripper && a.dhd.dhdGetGripperGap(&gap, a.id) != dhd::kError) {
     a.closed = gap < (a.closed ? kOpened : kClosed);
     if (a.closed) s.buttons |= 1;
+    s.jaw = static_cast<float>(std::clamp((gap - kShut) / (kOpen - kShut), 0.0, 1.0));
   }
   if (a.sequence % kStatusEvery == 1) {
     int status[dhd::kStatusRoom] = {};
@@ -300,7 +304,7 @@ ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<s
     // The library does not report its devices' limits; these are those of CHAI3D's CDeltaDevices.cpp (docs/references.md).
     const int type = dhd.dhdGetSystemType(a->id);
     const bool falcon = type == dhd::kTypeFalcon, delta = type == dhd::kTypeDelta3 || type == dhd::kTypeOldDelta3;
-    info.limits = {falcon ? 8.0f : delta ? 20.0f : 12.0f, 0, 0, 0};
+    info.limits = limits_of(falcon ? "falcon" : delta ? "delta" : info.model, {falcon ? 8.0f : delta ? 20.0f : 12.0f, 0, 0, 0});
     const float reach = falcon ? 0.04f : delta ? 0.15f : 0.075f;
     info.least = Vec3{-reach, -reach, -reach}, info.most = Vec3{reach, reach, reach};
     f->arm[a->hand] = std::move(a);

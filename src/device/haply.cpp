@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "device/beat.h"
+#include "device/profiles.h"
 
 namespace catgut {
 namespace {
@@ -439,7 +440,7 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
     info.model = word(config, "type");
     info.name = id, info.serial = "haply-" + id;
     info.driver = h->vectors ? "service 3.5" : "service 3.1 to 3.4";
-    info.limits = {0, 0, 0, 0};  // the service does not say
+    info.limits = limits_of(info.model, {0, 0, 0, 0});  // the service does not say
     const float reach = info.model == "minverse" ? 0.04f : 0.1f;
     // About where the cursor is in the middle of its reach (the maker's examples), until `--calibrate` says better.
     const Vec3 middle = ours({0, -0.12f, 0.15f}), box{reach, reach, reach};

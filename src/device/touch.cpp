@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "device/hd_api.h"
+#include "device/profiles.h"
 
 namespace catgut {
 
@@ -244,6 +245,7 @@ bool prepare(const hd::Library& hd, hd::Handle handle, ArmInfo& info, std::strin
   info.limits.continuous = static_cast<float>(number(hd, hd::kMaxContinuousForce));
   info.limits.stiffness = 1e3f * static_cast<float>(number(hd, hd::kMaxStiffness));  // N/mm
   info.limits.damping = 1e3f * static_cast<float>(number(hd, hd::kMaxDamping));
+  info.limits = limits_of(info.model, info.limits);
   double box[6] = {};
   hd.hdGetDoublev(hd::kUsableWorkspace, box);
   info.least = Vec3{static_cast<float>(box[0]), static_cast<float>(box[1]), static_cast<float>(box[2])} * 1e-3f;

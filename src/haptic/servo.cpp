@@ -54,15 +54,15 @@ float off_patch(const ForcePatch& p, Vec3 x) {
 }  // namespace
 
 void fit_to_arm(ServoOptions& o, const ArmLimits& limits) {
-  const auto known = [](float says, float careful) {
-    return says > 0 && std::isfinite(says) ? std::min(says, careful) : careful;
-  };
+  const auto known = [](float says, float careful) { return says > 0 && std::isfinite(says) ? says : careful; };
   o.limits.force = known(limits.force, o.limits.force);
   o.limits.continuous = known(limits.continuous, o.limits.continuous);
   o.limits.stiffness = known(limits.stiffness, o.limits.stiffness);
   o.limits.damping = known(limits.damping, o.limits.damping);
-  o.limiter.force = std::min(o.limiter.force, o.limits.force);
-  o.limiter.continuous = std::min(o.limiter.continuous, o.limits.continuous);
+  // The soft map begins at the same part of the peak for every arm.
+  o.limiter.knee *= o.limits.force / o.limiter.force;
+  o.limiter.force = o.limits.force;
+  o.limiter.continuous = std::min(o.limits.continuous, o.limits.force);
   o.passivity.damping = std::min(o.passivity.damping, o.limits.damping);
 }
 
@@ -89,8 +89,24 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
   }
   h.any = ready;
 
-  const Pose world = to_world(o.place, {h.at, sample.pose.q});
-  const Vec3 velocity = rotate(o.place.turn, h.velocity) * o.place.scale;
+  const uint32_t down = ready ? sample.buttons & ~h.buttons : 0;
+  if (ready) h.buttons = sample.buttons;
+  Pose world = to_world(o.place, {h.at, sample.pose.q});
+  world.p += h.clutch;
+  Vec3 velocity = rotate(o.place.turn, h.velocity) * o.place.scale;
+  if (down & 2) {
+    h.cuts = h.second_ns > 0 && now_ns < h.second_ns + static_cast<uint64_t>(1e9 * double{o.twice});
+    h.second_ns = h.cuts ? 0 : now_ns;
+    h.clutched = o.clutch && !h.cuts;
+    h.held_at = world.p;
+  }
+  if (!(h.buttons & 2)) h.cuts = false;
+  if (h.clutched) {
+    h.clutch += h.held_at - world.p;
+    world.p = h.held_at;
+    velocity = {};
+    if (ready && !(h.buttons & 2)) h.clutched = false;
+  }
   h.fast = std::max(h.fast * std::exp(-dt / kFastTime), length(velocity));
   // What the motors render is gain * scale times what is stiff in the field.
   const float most = 1 / std::max(1e-6f, gain * o.place.scale);
@@ -131,8 +147,9 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
   }
   in.speed = length(h.velocity);
   in.warmth = sample.warmth;
-  in.ready = ready && !sample.forced_off && o.force;
+  in.ready = ready && !sample.forced_off && o.force && !h.clutched;
   const Vec3 allowed = limit(h.limiter, in, dt, o.limiter);
+  out.wanted = in.wanted, out.allowed = allowed;
   PassivityOptions brake = o.passivity;
   if (h.limiter.engaged == Engaged::no || h.limiter.engaged == Engaged::waiting) brake.damping = 0;  // off is off
   // Softened, capped or on its ramp, the spring that the hand feels is softer than the patch's by as much.
@@ -145,14 +162,13 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
   if (pool) settle(*pool, k, h.passivity, dt);
   if (h.passivity.braking) h.limiter.faults |= kGenerated;
 
-  const uint32_t down = sample.buttons & ~h.buttons;
-  h.buttons = ready ? sample.buttons : 0;
   if (o.ratchet) h.closed ^= (down & 1) != 0;
   else if (ready) h.closed = (sample.buttons & 1) != 0;
   out.hand.pose = world;
   out.hand.velocity = velocity;
-  out.hand.jaw = h.closed ? 0.0f : 1.0f;
-  out.hand.buttons = sample.buttons & 2 ? kButtonCut : 0;
+  // A gripper's jaw follows the fingers; a button closes and opens.
+  out.hand.jaw = sample.jaw >= 0 ? std::min(1.0f, sample.jaw) : h.closed ? 0.0f : 1.0f;
+  out.hand.buttons = h.cuts ? kButtonCut : 0;
   out.hand.time_ns = now_ns;
   out.hand.sequence = ++h.sequence;
   out.hand.connected = ready;

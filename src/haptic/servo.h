@@ -35,12 +35,16 @@ struct ServoOptions {
   // [m] world. A patch is refused while the hand is farther from the patch's point than this plus what the hand can have moved
   // since: whatever the reason (another hand's patch, a jump in time, a demonstration), it belongs to another place.
   float reach = 0.004f;
+  // Button 1 held: the tool stays and the arm goes elsewhere (clutch); pressed twice within `twice` [s]: cut. One press does
+  // nothing that cannot be undone.
+  bool clutch = true;
+  float twice = 0.4f;
   bool ratchet = true;  // the button nearest to the tip closes the jaw and, pressed again, opens it; else it is held
   bool force = true;    // false: the arm moves the tool and feels nothing
 };
 // The same patch in the arm's own frame and newtons, for an arm's end that evaluates it elsewhere (no workspace, gain 1).
 ForcePatch to_arm(const ServoOptions& options, const ForcePatch& world);
-// Limits of the chain from those of the arm, the smaller of what is known and what is asked for.
+// Limits of the chain from those of the arm (device/profiles); what is 0 there stays as it is.
 void fit_to_arm(ServoOptions& options, const ArmLimits& limits);
 
 struct ServoHand {
@@ -55,13 +59,17 @@ struct ServoHand {
   bool has_patch = false;
   uint32_t buttons = 0;
   bool closed = false;
+  Vec3 clutch, held_at;    // [m] world: how far the tool was moved by clutching; where it stands meanwhile
+  uint64_t second_ns = 0;  // when button 1 went down last
+  bool clutched = false, cuts = false;
   uint32_t sequence = 0;
   uint64_t steps = 0;
 };
 
 struct ServoOut {
-  Vec3 force;      // [N] arm frame
-  ToolInput hand;  // world; connected 0 while the arm is lost
+  Vec3 force;            // [N] arm frame: what is written
+  Vec3 wanted, allowed;  // [N] arm frame: of the patch; after the limiter, before the energy account
+  ToolInput hand;        // world; connected 0 while the arm is lost
 };
 
 // fresh: null when the physics has published nothing since. now_ns: the clock that stamps ForcePatch::time_ns.

@@ -273,7 +273,8 @@ ArmServer::ArmServer(ArmPort port, const ArmServerOptions& options) : work_(std:
   if (!options.key.empty()) w.door.shared = read_bridge_key(options.key);
   for (size_t k = 0; k < 2; ++k) {
     fit_to_arm(w.side[k].options, w.port.arm[k].limits);
-    w.side[k].options.gain = 1;  // patches come in the arm's own frame, with the gain in them
+    w.side[k].options.clutch = false;  // the simulator's end does that
+    w.side[k].options.gain = 1;        // patches come in the arm's own frame, with the gain in them
   }
   std::string why;
   bool local = false;

@@ -3,18 +3,22 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
+#include <cstdio>
 #include <string_view>
 #include <thread>
 
 #include "core/check.h"
 #include "device/drivers.h"
 #include "exchange/latest.h"
+#include "exchange/ring.h"
 #include "runtime/live.h"
 
 namespace catgut {
 namespace {
 
+constexpr uint64_t kRecently = 1000;  // [steps]
 constexpr uint64_t kLost = 20000000;  // [ns] without a sample: the device is lost (criterion H7, docs/rooms/haptic.md)
 
 const char* word_of(uint32_t fault) {
@@ -44,20 +48,37 @@ const char* word_of(uint32_t fault) {
   }
 }
 
+struct LogRow {
+  uint64_t now_ns = 0;
+  Pose pose;
+  uint64_t tick = 0;
+  float age = 0, stiffness = 0;
+  Vec3 patch, wanted, allowed, written;
+  uint32_t faults = 0, engaged = 0;
+};
+
 struct Hand {
   ToolInput input;
   uint64_t sampled_ns = 0;  // on the clock by which the arm's patches age
+  Vec3 clutch;              // [m] world, see ServoHand
+  bool clutched = false;
 };
 
 struct Side {
   Latest<ForcePatch> patch;         // physics -> servo
   Latest<Hand> hand;                // servo -> physics
   std::atomic<uint32_t> faults{0};  // servo -> physics
+  // servo -> whoever shows it: what was written, the engagement, the faults of the last second
+  std::atomic<float> force{0};
+  std::atomic<Engaged> engaged{Engaged::no};
+  std::atomic<uint32_t> recent{0};
+  std::unique_ptr<Ring<LogRow, 4096>> log;  // servo -> physics; null: nobody keeps it
   // The servo's.
   ServoHand servo;
   ServoOptions options;  // constant once it runs
   ServoTimes times;
   uint64_t last_ns = 0;
+  uint32_t lately = 0;
   // The physics'.
   uint32_t told = 0, told_errors = 0;
   uint64_t taken_ns = 0;  // when the pose was sampled that the physics took last
@@ -76,9 +97,29 @@ struct Haptics::Work {
 
   void send(size_t k, const ForcePatch& patch) {
     Side& s = side[k];
-    if (port.send_patch) return port.send_patch(port.self, k, to_arm(s.options, patch));
+    if (port.send_patch) {  // the arm's end does not know of clutching
+      const Hand& hand = s.hand.seen();
+      ForcePatch p = patch;
+      p.point -= hand.clutch;
+      if (hand.clutched) p.cap = 0;
+      return port.send_patch(port.self, k, to_arm(s.options, p));
+    }
     s.patch.draft() = patch;
     s.patch.publish();
+  }
+  std::FILE* log = nullptr;  // the physics'
+  void write_log(size_t k) {
+    LogRow r;
+    while (side[k].log && side[k].log->pop(r))
+      std::fprintf(log,
+                   "%.6f,%zu,%.7g,%.7g,%.7g,%.6g,%.6g,%.6g,%.6g,%llu,%.6f,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g,%."
+                   "5g,%.5g,%.5g,%u,%u\n",
+                   1e-9 * static_cast<double>(r.now_ns), k, double{r.pose.p.x}, double{r.pose.p.y}, double{r.pose.p.z},
+                   double{r.pose.q.x}, double{r.pose.q.y}, double{r.pose.q.z}, double{r.pose.q.w},
+                   static_cast<unsigned long long>(r.tick), double{r.age}, double{r.patch.x}, double{r.patch.y},
+                   double{r.patch.z}, double{r.stiffness}, double{r.wanted.x}, double{r.wanted.y}, double{r.wanted.z},
+                   double{r.allowed.x}, double{r.allowed.y}, double{r.allowed.z}, double{r.written.x}, double{r.written.y},
+                   double{r.written.z}, r.faults, r.engaged);
   }
   static Vec3 step(void* user, size_t arm, const ArmSample& sample) {
     Work& w = *static_cast<Work*>(user);
@@ -86,9 +127,20 @@ struct Haptics::Work {
     const uint64_t now = w.clock();
     const bool fresh = s.patch.update();
     const ServoOut out = servo_step(s.servo, s.options, sample, fresh ? &s.patch.seen() : nullptr, now, &w.pool, arm);
-    s.hand.draft() = {out.hand, sample.time_ns > 0 ? sample.time_ns : now};
+    s.hand.draft() = {out.hand, sample.time_ns > 0 ? sample.time_ns : now, s.servo.clutch, s.servo.clutched};
     s.hand.publish();
     s.faults.fetch_or(s.servo.limiter.faults, std::memory_order_relaxed);
+    if (s.times.steps % kRecently == 0) s.lately = 0;
+    s.lately |= s.servo.limiter.faults;
+    s.recent.store(s.lately, std::memory_order_relaxed);
+    s.force.store(length(out.force), std::memory_order_relaxed);
+    s.engaged.store(s.servo.limiter.engaged, std::memory_order_relaxed);
+    if (s.log) {
+      const ForcePatch& p = s.servo.model.now;
+      s.log->push({now, sample.pose, p.tick, p.time_ns < now ? 1e-9f * static_cast<float>(now - p.time_ns) : 0,
+                   p.stiffness.xx + p.stiffness.yy + p.stiffness.zz, p.force, out.wanted, out.allowed, out.force,
+                   s.servo.limiter.faults, static_cast<uint32_t>(s.servo.limiter.engaged)});
+    }
     s.servo.limiter.faults = 0;
     if (s.last_ns > 0) count(s.times.period, now - s.last_ns);
     s.last_ns = now;
@@ -129,6 +181,13 @@ Workspace workspace_of(const ArmInfo& arm, size_t k, Vec3 focus, const std::map<
 
 Haptics::Haptics(ArmPort port, const PictureModel& picture, const HapticsOptions& options) : work_(std::make_unique<Work>()) {
   work_->port = std::move(port);
+  if (!options.log.empty()) {
+    work_->log = std::fopen(options.log.c_str(), "w");
+    if (!work_->log)
+      throw InputError("--haptics-log " + options.log, "it cannot be written", "name a file in a folder that exists");
+    std::fprintf(work_->log, "%s\n", kHapticsLogHead);
+    for (Side& s : work_->side) s.log = std::make_unique<Ring<LogRow, 4096>>();
+  }
   if (options.clock) work_->clock = options.clock;
   for (size_t k = 0; k < 2; ++k) {
     ServoOptions& o = work_->side[k].options;
@@ -145,13 +204,19 @@ Haptics::Haptics(ArmPort port, const PictureModel& picture, const HapticsOptions
     throw InputError(work_->port.kind, why, "close other programs that use the devices, or continue with --haptics off");
 }
 
-Haptics::~Haptics() { stop(); }
+Haptics::~Haptics() {
+  stop();
+  if (!work_->log) return;
+  for (size_t k = 0; k < 2; ++k) work_->write_log(k);
+  std::fclose(work_->log);
+}
 
 bool Haptics::present(size_t k) const { return work_->port.arm[k].present; }
 const ServoOptions& Haptics::servo(size_t k) const { return work_->side[k].options; }
 
 void Haptics::publish(size_t k, const ForcePatch& patch, uint32_t epoch, float speed) {
   Side& s = work_->side[k];
+  if (work_->log) work_->write_log(k);
   ForcePatch p = patch;
   // A patch is as old as the pose it was computed for, not as the moment at which a slow tick was done with it.
   p.time_ns = s.taken_ns > 0 ? s.taken_ns : work_->clock();
@@ -162,6 +227,7 @@ void Haptics::publish(size_t k, const ForcePatch& patch, uint32_t epoch, float s
 }
 
 void Haptics::rest(size_t k, uint32_t epoch) {
+  if (work_->log) work_->write_log(k);
   hand(k);  // of now: nothing else asks for it while somebody else moves the tool
   ForcePatch p;
   p.cap = 0;
@@ -200,6 +266,24 @@ std::vector<std::string> Haptics::news() {
     }
   }
   return lines;
+}
+
+ArmView Haptics::view(size_t k) const {
+  const Side& s = work_->side[k];
+  ArmView v;
+  if (!present(k)) return v;
+  const ArmStatus status = work_->port.status(work_->port.self, k);
+  const bool remote = work_->port.send_patch != nullptr;
+  const Engaged engaged = s.engaged;
+  const uint32_t faults = remote ? status.faults : s.recent.load(std::memory_order_relaxed);
+  v.here = status.ready;
+  v.most = s.options.limiter.force;
+  v.force = remote ? status.force : s.force.load(std::memory_order_relaxed);
+  v.felt = remote ? v.here : engaged == Engaged::yes || engaged == Engaged::rising;
+  if (!v.here) v.off = "lost";
+  else if (!v.felt && faults) v.off = word_of(1u << (31 - static_cast<uint32_t>(std::countl_zero(faults))));
+  else if (!v.felt) v.off = "waits until nothing is touched";
+  return v;
 }
 
 ServoTimes Haptics::times(size_t k) const { return work_->side[k].times; }

@@ -31,6 +31,7 @@ struct HapticsOptions {
   uint64_t (*clock)() = nullptr;  // null: wall_ns(); tests hand in their own
   bool ratchet = true;            // the stylus' first button closes the jaw and, pressed again, opens it; else it is held
   bool force = true;              // false: arms move tools and feel nothing
+  std::string log;                // file to which every millisecond is written (CSV, see kHapticsLogHead); empty: none
   std::map<std::string, ArmPlace> place;  // by serial number; an arm that is not in it: the middle of its workspace, 1:1
 };
 // Where the workspace of arm k lies in a scene whose field has its middle at `focus` [m].
@@ -43,6 +44,22 @@ struct ServoTimes {
 };
 // [us] below which `part` (0..1) of the counts lie.
 double quantile_us(const std::array<uint64_t, 512>& counts, double part);
+
+// Columns of the log: seconds on the servo's clock, arm (0 right, 1 left), position [m] and rotation (xyzw) of the stylus in
+// the arm's frame, tick and age [s] of the patch, its force [N] and the trace of its stiffness [N/m] (world), then three forces
+// in the arm's frame [N]: wanted by the patch, allowed by the limits, written to the motors; faults (haptic/limiter, as a
+// number) and the state of engagement (0 off, 1 waiting, 2 rising, 3 on).
+constexpr const char* kHapticsLogHead =
+    "t_s,arm,x,y,z,qx,qy,qz,qw,patch_tick,patch_age_s,patch_fx,patch_fy,patch_fz,stiffness_trace,wanted_x,wanted_y,wanted_z,"
+    "allowed_x,allowed_y,allowed_z,written_x,written_y,written_z,faults,engaged";
+
+// What somebody who holds an arm may want to see of it.
+struct ArmView {
+  bool here = false;          // samples come
+  bool felt = false;          // force is let in
+  float force = 0, most = 0;  // [N] written now; what the arm may give
+  const char* off = "";       // why no force is felt; empty: it is
+};
 
 class Haptics {
  public:
@@ -63,6 +80,7 @@ class Haptics {
   // What happened to arms and servo since the last call, a line each.
   std::vector<std::string> news();
 
+  ArmView view(size_t k) const;      // any thread
   ServoTimes times(size_t k) const;  // valid after stop()
   void stop();                       // force off, no more callbacks
 

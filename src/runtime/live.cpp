@@ -173,6 +173,7 @@ void Live::Work::begin() {
   if (arms.any()) {
     HapticsOptions how;
     how.place = read_arm_places(arm_places_file());
+    how.log = options.haptics_log;
     haptics = std::make_unique<Haptics>(std::move(arms), picture, how);
     for (size_t arm = 0; arm < 2; ++arm)
       if (haptics->present(arm)) told.arm[options.arm_hand[arm]] = true;
@@ -292,7 +293,9 @@ void Live::Work::tick(bool let_in) {
 }
 
 // Whether the arms move the tools, at the hands' own speed. If not, what acts on the tools is not the arms' to feel.
-bool Live::Work::arms_drive() const { return !told.demonstrating && !surgeon.surgeon && !told.paused && speed == 0; }
+bool Live::Work::arms_drive() const {
+  return !told.demonstrating && !surgeon.surgeon && !told.paused && speed == 0 && !told.arms_off;
+}
 
 void Live::Work::rest_arms() {
   handovers += arms_drove;
@@ -322,6 +325,11 @@ void Live::Work::show() {
   view.at = Clock::now();
   view.tick_wall_s = dt / static_cast<double>(kLiveSpeeds[speed]);
   told.speed = kLiveSpeeds[speed];
+  for (size_t k = 0; haptics && k < 2; ++k) {
+    told.arm_view[k] = haptics->view(k);
+    if (told.arm_view[k].here && told.arms_off) told.arm_view[k].off = "switched off (F9)";
+    else if (told.arm_view[k].here && !arms_drive()) told.arm_view[k].off = "off while it does not move the tool";
+  }
   if (told.ready_ns == 0 && told.moved_ns > 0) told.ready_ns = wall_ns();
   view.status = told;
   view.any = true;
@@ -406,6 +414,9 @@ void Live::Work::obey() {
       case LiveCommand::single_step:
         told.paused = true;
         steps += told.fault.empty();
+        break;
+      case LiveCommand::arms_off:
+        told.arms_off = !told.arms_off;
         break;
       case LiveCommand::mark:
         if (told.demonstrating) break;

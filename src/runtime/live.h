@@ -15,6 +15,7 @@
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "exchange/tool_input.h"
+#include "runtime/haptics.h"
 #include "runtime/measures.h"
 #include "runtime/practice.h"
 #include "runtime/stitch_map.h"
@@ -30,6 +31,7 @@ enum class LiveCommand : uint8_t {
   take_back,    // back to a moment before the last bite began; nothing when there is none
   slower,       // the next of kLiveSpeeds
   faster,
+  arms_off,           // no force to the arms, they still move the tools; again: back, through its ramp
   mark,               // this moment is where a demonstration may begin: Live::demonstrate(..., true)
   end_demonstration,  // back to where the learner was
 };
@@ -45,6 +47,7 @@ struct LiveOptions {
   // Haptic arms, as read_arm_choice (runtime/haptics) reads them; empty or "off": none. What is missing is told and the scene
   // opens without. A hand without an arm stays the window's.
   std::string haptics;
+  std::string haptics_log;                      // as HapticsOptions::log
   std::array<uint8_t, 2> arm_hand{0, 1};        // the hand that each of the two arms moves
   std::function<void(const std::string&)> say;  // a line about the arms, from any thread; empty: nobody is told
 };
@@ -66,6 +69,8 @@ struct LiveStatus {
   // device uses that clock), when the tick began, and when its snapshot was ready to be looked at.
   uint64_t moved_ns = 0, began_ns = 0, ready_ns = 0;
   std::array<bool, kMaxHands> arm{};  // a haptic arm moves that hand
+  std::array<ArmView, 2> arm_view{};  // of each arm
+  bool arms_off = false;
   Practice practice;
   Measures measures;           // filled while watched, see watch()
   std::string doing;           // of the surgeon, when one works

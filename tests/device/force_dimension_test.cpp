@@ -125,8 +125,26 @@ TEST(ForceDimension, tells_what_it_found) {
   EXPECT_EQ(t.port.arm[1].serial, "fd-1000") << "the left-handed one is the left hand's";
   EXPECT_EQ(t.port.arm[0].driver, "3.17.5");
   EXPECT_EQ(t.port.arm[0].limits.force, 12);
-  EXPECT_EQ(t.options[0].limiter.force, 3.3f) << "and still no more than a Touch gives";
+  EXPECT_EQ(t.options[0].limiter.force, 12) << "S8: its own, not a Touch's";
   EXPECT_EQ(t.fake.at(0).watchdog, 255);
+}
+
+// S8: a gripper is a jaw, not a switch: it follows the fingers, and a pinch toggles nothing.
+TEST(ForceDimension, S8_the_jaw_follows_the_fingers) {
+  Two t;
+  t.open();
+  const double straight[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  float last = 2;
+  for (const double gap : {0.020, 0.014, 0.010, 0.006, 0.003}) {
+    t.put(0, {}, straight, 0, gap);
+    t.run(20);
+    EXPECT_LT(t.input[0].jaw, last) << gap;
+    last = t.input[0].jaw;
+  }
+  EXPECT_EQ(last, 0);
+  t.put(0, {}, straight, 0, 0.020);
+  t.run(20);
+  EXPECT_EQ(t.input[0].jaw, 1);
 }
 
 TEST(ForceDimension, poses_come_whole) {

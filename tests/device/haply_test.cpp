@@ -92,7 +92,7 @@ TEST(Haply, both_forms_of_the_service) {
     ASSERT_TRUE(t.port.arm[0].present && t.port.arm[1].present);
     EXPECT_EQ(t.port.arm[0].serial, "haply-049D");
     EXPECT_EQ(t.port.arm[1].serial, "haply-04BA") << "as the service says which hand's it is";
-    EXPECT_EQ(t.options[0].limiter.force, 3.3f) << "what is not said is careful";
+    EXPECT_EQ(t.options[0].limiter.force, 2) << "S8: an Inverse3's";
     t.engage(0.5f, 0.4f);
     // H9: two arms, two forces, and both arrive in the form the service reads.
     EXPECT_LT(distance(t.force(0), {0.5f, 0, 0}), 1e-3f);

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "device/hd_api.h"
+#include "device/profiles.h"
 #include "fake_hd/load.h"
 #include "haptic/servo.h"
 
@@ -137,7 +138,32 @@ TEST(Touch, poses_come_whole) {
   EXPECT_EQ(t.sample[0].buttons, 3u);
   EXPECT_EQ(t.sample[1].buttons, 0u);
   EXPECT_EQ(t.input[0].jaw, 0.0f);
-  EXPECT_EQ(t.input[0].buttons, kButtonCut);
+  EXPECT_EQ(t.input[0].buttons, 0u) << "one press of the other button cuts nothing";
+}
+
+// S8: every model has limits of its own; what the library says may lower them, never raise them; the unknown is a Touch.
+TEST(Haptics, S8_limits_are_the_models) {
+  const auto force = [](const char* model) { return limits_of(model, {0, 0, 0, 0}).force; };
+  EXPECT_EQ(force("Touch"), 3.3f);
+  EXPECT_EQ(force("Touch X"), 7.9f);
+  EXPECT_EQ(force("PHANTOM Premium 1.5"), 8.5f);
+  EXPECT_EQ(force("omega.7"), 12);
+  EXPECT_EQ(force("sigma.7"), 12);
+  EXPECT_EQ(force("lambda.7"), 12);
+  EXPECT_EQ(force("Falcon"), 8);
+  EXPECT_EQ(force("inverse3"), 2);
+  EXPECT_EQ(force("minverse"), 2);
+  EXPECT_EQ(force("something new"), 3.3f);
+  EXPECT_EQ(limits_of("omega.3", {5, 0, 1e9f, std::nanf("")}).force, 5);
+  EXPECT_EQ(limits_of("omega.3", {5, 0, 1e9f, std::nanf("")}).stiffness, 5000);
+  EXPECT_EQ(limits_of("Touch", {40, 9, 9000, 90}).force, 3.3f);
+  for (const ArmProfile& p : arm_profiles()) {
+    ServoOptions o;
+    fit_to_arm(o, p.limits);
+    EXPECT_EQ(o.limiter.force, p.limits.force) << p.model;
+    EXPECT_NEAR(o.limiter.knee / o.limiter.force, 1.5f / 3.3f, 1e-4f) << p.model;
+    EXPECT_GT(std::string(p.source).size(), 5u);
+  }
 }
 
 // H9: two arms, two forces, never the other's.

@@ -714,6 +714,47 @@ TEST(Haptics, S11_a_wall_that_was_not_pierced) {
   EXPECT_NEAR(at(0, 50), 1.2f, 0.01f) << "a thread pierces nothing";
 }
 
+// S9: the button beside the jaw's clutches while it is held: the tool stays where it is, nothing is felt, and goes on from
+// there when it is let go. It cuts only when it is pressed twice, soon.
+TEST(Haptics, S9_clutch_and_cut) {
+  ServoHand hand;
+  ServoOptions o;
+  uint64_t now = 1000000000;
+  ArmSample s;
+  s.state = ArmState::ready;
+  ToolInput tool;
+  Vec3 force;
+  const auto run = [&](int ms, uint32_t buttons, Vec3 speed) {
+    uint32_t seen = 0;
+    for (int i = 0; i < ms; ++i, now += 1000000) {
+      s.pose.p += speed * 0.001f;
+      s.buttons = buttons;
+      ForcePatch p;
+      p.point = tool.pose.p, p.time_ns = now, p.force = i > 4 && ms < 1000 ? Vec3{0, 0.5f, 0} : Vec3{};
+      const ServoOut out = servo_step(hand, o, s, &p, now);
+      tool = out.hand, force = out.force;
+      seen |= tool.buttons;
+    }
+    return seen;
+  };
+  run(2500, 0, {});
+  run(50, 0, {});
+  EXPECT_GT(length(force), 0.3f);
+  const Vec3 at = tool.pose.p;
+  EXPECT_EQ(run(500, 2, {0.1f, 0, 0}), 0u) << "held is no cut";
+  EXPECT_LT(distance(tool.pose.p, at), 1.1e-4f) << "the tool stays while the arm moves 50 mm";
+  EXPECT_EQ(length(force), 0);
+  run(1, 0, {});
+  EXPECT_LT(distance(tool.pose.p, at), 1.1e-4f) << "and does not leap";
+  run(500, 0, {0, 0, 0.02f});
+  EXPECT_NEAR(tool.pose.p.z - at.z, 0.01f, 1e-4f) << "it goes on from there";
+  EXPECT_EQ(run(100, 2, {}), 0u);
+  EXPECT_EQ(run(600, 0, {}), 0u);
+  EXPECT_EQ(run(100, 2, {}), 0u) << "one press, and one much later, cut nothing";
+  EXPECT_EQ(run(100, 0, {}), 0u);
+  EXPECT_EQ(run(100, 2, {}), kButtonCut) << "two";
+}
+
 // H8: three newtons asked for during ten minutes: the mean that goes out is one the motors can bear for ever.
 TEST(Haptics, H8_heat) {
   Limiter limiter;

@@ -7,10 +7,12 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <new>
 #include <thread>
 
 #include "../device/fake_hd/load.h"
+#include "core/random.h"
 #include "device/touch.h"
 #include "procedure/scene_file.h"
 #include "runtime/hands.h"
@@ -56,7 +58,7 @@ struct LockStep {
   bool physics_works = true;
   std::array<float, 2> low{1e9f, 1e9f}, high{-1e9f, -1e9f};  // [m] along x, of what hands do
 
-  explicit LockStep(const char* name) : scene(scene_named(name)) {
+  explicit LockStep(const char* name, const std::string& log = "") : scene(scene_named(name)) {
     prepare_for_arms(scene);
     model = build_model(scene);
     state = initial_state(*model);
@@ -68,6 +70,7 @@ struct LockStep {
     HapticsOptions o;
     o.clock = [] { return lock_step_ns; };
     o.ratchet = false;
+    o.log = log;
     haptics = std::make_unique<Haptics>(open_touch({}, told), picture_model(*model), o);
     EXPECT_TRUE(told.empty());
   }
@@ -264,6 +267,132 @@ TEST(Haptics, killing_physics_or_an_arm) {
   EXPECT_FALSE(news.empty());
   for (const std::string& line : news) std::printf("told: %s\n", line.c_str());
   EXPECT_TRUE(s.haptics->news().empty()) << "once";
+}
+
+// Soak: hands press and let go of the Lembert scene on both arms while a fault is injected every few seconds, at random. No
+// step beyond the slew, nothing over the cap, and each fault that cuts the force leaves none within 100 ms. Some seconds in
+// every build; CATGUT_SOAK=3600: an hour of the arms' time.
+TEST(Haptics, soak_with_faults) {
+  const char* set = std::getenv("CATGUT_SOAK");
+  const float seconds = set ? std::strtof(set, nullptr) : 8;
+  LockStep s("lembert");
+  for (int k = 0; k < 2; ++k) s.fake.grip(k, 0.2, 0.002, 0.1, 0.01);
+  approach(s);
+  Random random(set ? 29 : 7);
+  std::array<uint64_t, 9> injected{};
+  double most = 0, step = 0;
+  float left = 0;  // [N] 100 ms after a fault that cuts the force
+  uint64_t ms = 0, felt = 0;
+  const auto each = [&] {
+    ++ms;
+    for (int k = 0; k < 2; ++k) felt += length(s.fake.force(k)) > 0.05f;
+  };
+  const auto motion = [&](float for_s) {
+    for (int i = 0; i < static_cast<int>(for_s * s.scene.solver.tick_rate); ++i) {
+      const float t = 1e-3f * static_cast<float>(ms);
+      // Half of every four seconds the hands touch nothing, so that force can come back.
+      press(s, 0.008f * std::max(0.0f, std::sin(2 * kPi * t / 6)));
+      s.tick(each);
+    }
+  };
+  while (1e-3f * static_cast<float>(ms) < seconds) {
+    motion(1.5f + 4 * random.uniform());
+    const int arm = random.uniform() < 0.5f ? 0 : 1;
+    const int kind = static_cast<int>(8 * random.uniform());
+    ++injected[static_cast<size_t>(kind)];
+    for (int k = 0; k < 2; ++k) {
+      const FakeHdArm a = s.fake.at(k);
+      most = std::max(most, a.force_most), step = std::max(step, a.step_most);
+    }
+    const int lasts = 120 + static_cast<int>(300 * random.uniform());  // [ms]
+    const auto for_ms = [&](int count) { motion(1e-3f * static_cast<float>(count)); };
+    // What the driver cuts by itself is a step of its own: measured anew after it.
+    switch (kind) {
+      case 0:
+      case 1:
+      case 2: {
+        const int fault = kind == 0 ? kFakeCommError : kind == 1 ? kFakeWarmMotors : kFakeTooFast;
+        s.fake.fault(arm, fault, 1);
+        for_ms(2);
+        s.fake.zero(arm);
+        for_ms(98);
+        left = std::max(left, length(s.fake.force(arm)));
+        for_ms(lasts);
+        s.fake.fault(arm, fault, 0);
+        break;
+      }
+      case 3:
+        s.fake.fault(arm, kFakeNan, 1);
+        for_ms(100);
+        left = std::max(left, length(s.fake.force(arm)));
+        s.fake.fault(arm, kFakeNan, 0);
+        break;
+      case 4: {  // the whole scheduler stands still: nothing can be written meanwhile
+        s.fake.fault(arm, kFakeStall, 1);
+        for_ms(8 + lasts % 40);
+        s.fake.fault(arm, kFakeStall, 0);
+        break;
+      }
+      case 5:
+        s.physics_works = false;
+        for_ms(135);
+        for (int k = 0; k < 2; ++k) left = std::max(left, length(s.fake.force(k)));
+        s.physics_works = true;
+        break;
+      case 6:
+        s.fake.raise(arm, 1 - arm, 0x0203, 1, 20);
+        for_ms(100);
+        break;
+      default:
+        for (int k = 0; k < 20; ++k) s.fake.raise(arm, arm, 0x0100 + static_cast<unsigned>(k), k % 3, 1);
+        for_ms(50);
+    }
+  }
+  for (int k = 0; k < 2; ++k) {
+    const FakeHdArm a = s.fake.at(k);
+    most = std::max(most, a.force_most), step = std::max(step, a.step_most);
+  }
+  std::printf("soak: %.0f s, faults by kind", 1e-3 * static_cast<double>(ms));
+  for (size_t k = 0; k < 8; ++k) std::printf(" %llu", static_cast<unsigned long long>(injected[k]));
+  std::printf("; force felt %.0f %% of the time, %.2f N at most, step %.3f N/ms, %.3f N left 100 ms after a fault\n",
+              50.0 * static_cast<double>(felt) / static_cast<double>(ms), most, step, double{left});
+  EXPECT_LE(most, 3.3 + 1e-4);
+  EXPECT_LE(step, 0.5 + 1e-4);
+  EXPECT_EQ(left, 0);
+  EXPECT_GT(felt, ms / 20) << "nothing was felt: it tests nothing";
+}
+
+// The log has every millisecond of both arms, whole.
+TEST(Haptics, the_log_has_every_millisecond) {
+  const std::string file = testing::TempDir() + "arms.csv";
+  uint64_t steps = 0;
+  {
+    LockStep s("lembert", file);
+    approach(s);
+    press(s, 0.006f);
+    s.run(0.5f);
+    steps = s.haptics->times(0).steps;
+  }
+  std::ifstream in(file);
+  std::string line;
+  ASSERT_TRUE(std::getline(in, line));
+  EXPECT_EQ(line, kHapticsLogHead);
+  const auto columns = std::count(line.begin(), line.end(), ',');
+  std::array<uint64_t, 2> rows{};
+  double last[2] = {0, 0}, most = 0;
+  while (std::getline(in, line)) {
+    ASSERT_EQ(std::count(line.begin(), line.end(), ','), columns) << line;
+    const double t = std::strtod(line.c_str(), nullptr);
+    const size_t k = line[line.find(',') + 1] == '0' ? 0 : 1;
+    if (++rows[k] > 1) { EXPECT_NEAR(t - last[k], 1e-3, 2e-6); }
+    last[k] = t;
+    size_t at = 0;
+    for (int c = 0; c < 21; ++c) at = line.find(',', at) + 1;
+    most = std::max(most, std::abs(std::strtod(line.c_str() + at, nullptr)));
+  }
+  EXPECT_EQ(rows[0], steps);
+  EXPECT_EQ(rows[1], steps);
+  EXPECT_GT(most, 0.05) << "the written force";
 }
 
 // The scripted surgeon's hands on the arms: he means, the hands move styluses, the arms' forces push back. A bite in every
