@@ -90,7 +90,7 @@ int plot_haptics_log(const std::string& file) {
   std::ifstream in(file);
   std::string line;
   if (!in || !std::getline(in, line) || line != kHapticsLogHead)
-    throw InputError("--log " + file, "it is no log of haptic arms",
+    throw InputError("--log " + file, "not a haptics log",
                      "write one with catgut play SCENE --haptics DRIVER --haptics-log FILE");
   // From each millisecond the three lengths; a pixel shows the largest of those that fall on it.
   constexpr size_t kColumns = 26;
