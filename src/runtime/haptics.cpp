@@ -268,7 +268,7 @@ std::vector<std::string> Haptics::news() {
   return lines;
 }
 
-ArmView Haptics::view(size_t k) const {
+ArmView Haptics::view(size_t k, const char* off) const {
   const Side& s = work_->side[k];
   ArmView v;
   if (!present(k)) return v;
@@ -281,6 +281,7 @@ ArmView Haptics::view(size_t k) const {
   v.force = remote ? status.force : s.force.load(std::memory_order_relaxed);
   v.felt = remote ? v.here : engaged == Engaged::yes || engaged == Engaged::rising;
   if (!v.here) v.off = "lost";
+  else if (*off) v.off = off;
   else if (!v.felt && faults) v.off = word_of(1u << (31 - static_cast<uint32_t>(std::countl_zero(faults))));
   else if (!v.felt) v.off = "waits until nothing is touched";
   return v;

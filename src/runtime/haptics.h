@@ -80,9 +80,9 @@ class Haptics {
   // What happened to arms and servo since the last call, a line each.
   std::vector<std::string> news();
 
-  ArmView view(size_t k) const;      // any thread
-  ServoTimes times(size_t k) const;  // valid after stop()
-  void stop();                       // force off, no more callbacks
+  ArmView view(size_t k, const char* off) const;  // off: why the run itself gives no force, or ""; any thread
+  ServoTimes times(size_t k) const;               // valid after stop()
+  void stop();                                    // force off, no more callbacks
 
  private:
   struct Work;

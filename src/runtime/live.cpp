@@ -7,6 +7,7 @@
 #include <deque>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include "core/check.h"
 #include "exchange/latest.h"
@@ -298,15 +299,13 @@ bool Live::Work::arms_drive() const {
 }
 
 void Live::Work::rest_arms() {
-  handovers += arms_drove;
-  arms_drove = false;
+  handovers += std::exchange(arms_drove, false);
   for (size_t k = 0; k < 2; ++k) haptics->rest(k, told.epoch + handovers);
 }
 
 void Live::Work::feel() {
   const bool drive = arms_drive();
-  handovers += drive && !arms_drove;
-  if (drive) arms_drove = true;
+  if (drive) handovers += !std::exchange(arms_drove, true);
   else rest_arms();
   if (as_paper) follow(paper, now, picture);
   for (size_t arm = 0; arm < 2 && drive; ++arm) {
@@ -325,11 +324,8 @@ void Live::Work::show() {
   view.at = Clock::now();
   view.tick_wall_s = dt / static_cast<double>(kLiveSpeeds[speed]);
   told.speed = kLiveSpeeds[speed];
-  for (size_t k = 0; haptics && k < 2; ++k) {
-    told.arm_view[k] = haptics->view(k);
-    if (told.arm_view[k].here && told.arms_off) told.arm_view[k].off = "switched off (F9)";
-    else if (told.arm_view[k].here && !arms_drive()) told.arm_view[k].off = "off while it does not move the tool";
-  }
+  const char* off = told.arms_off ? "switched off (F9)" : arms_drive() ? "" : "off while it does not move the instrument";
+  for (size_t k = 0; haptics && k < 2; ++k) told.arm_view[k] = haptics->view(k, off);
   if (told.ready_ns == 0 && told.moved_ns > 0) told.ready_ns = wall_ns();
   view.status = told;
   view.any = true;
