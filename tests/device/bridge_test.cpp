@@ -803,12 +803,10 @@ TEST(Bridge, nothing_to_work_with_is_one_line) {
       while (!quit) {
         const BridgeKey own = end.door.shared;
         if (kind == 3) end.door.shared = random_key();
-        const bool hello = end.answer() == BridgeKind::hello;
+        BridgeBytes refused = refused_packet({}, kArmsTaken);
+        if (kind == 0) refused[4] = 3;
+        end.answer(kind < 2 ? &refused : nullptr);
         end.door.shared = own;
-        if (!hello || kind > 1) continue;
-        BridgeBytes b = refused_packet({}, kArmsTaken);
-        if (kind == 0) b[4] = 3;
-        end.send(b);
       }
     });
     line(end.where(),
