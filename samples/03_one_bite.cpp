@@ -30,10 +30,10 @@ int main() {
       happened.push_back(e.kind);
     }
   }
-  if (seen.bite.size() != 1 || !seen.bite[0].complete) return 1;
-  const float size = distance(seen.bite[0].entry, seen.bite[0].exit);
-  std::printf("entry to exit %.1f mm, deepest %.1f mm\n", 1e3 * size, 1e3 * seen.bite[0].depth);
+  if (seen.active().bite.size() != 1 || !seen.active().bite[0].complete) return 1;
+  const float size = distance(seen.active().bite[0].entry, seen.active().bite[0].exit);
+  std::printf("entry to exit %.1f mm, deepest %.1f mm\n", 1e3 * size, 1e3 * seen.active().bite[0].depth);
   const std::vector<EventKind> right{EventKind::tip_entered, EventKind::tip_exited, EventKind::suture_point,
                                      EventKind::suture_point, EventKind::bite_completed};
-  return happened == right && seen.suture_point.size() == 2 && size > 0.004f && size < 0.010f ? 0 : 1;
+  return happened == right && seen.active().suture_point.size() == 2 && size > 0.004f && size < 0.010f ? 0 : 1;
 }

@@ -43,7 +43,7 @@ int main() {
   std::array<HandState, kMaxHands> hand_before;
   Vec3 tip_before, tool_before;
   std::vector<std::byte> before;
-  const auto entered = [&] { return !s.suture.bite.empty(); };
+  const auto entered = [&] { return !s.suture.suture[0].bite.empty(); };
   while (!entered() && input.tick < 60 * 60) {
     input.hand = hands.surgeon->operate(seen, 1 / scene.solver.tick_rate).hand;
     before = save_state(m, s);
@@ -52,7 +52,7 @@ int main() {
     one_tick();
   }
   if (!entered()) return 1;
-  const Bite& bite = s.suture.bite[0];
+  const Bite& bite = s.suture.suture[0].bite[0];
   const Vec3 tip = tip_of(m, s);
 
   std::printf("[hands]\n");
@@ -83,14 +83,15 @@ int main() {
               bite.entry.weight[0], bite.entry.weight[1], bite.entry.weight[2], bite.entry.point.count);
   std::printf("%-32s %8.3f mm, below the surface %.3f mm\n", "tip from the entry", 1e3 * distance(tip, entry),
               1e3 * bite.depth);
-  if (s.suture.attached) {
+  if (s.suture.suture[0].attached) {
     const Attachment& a = s.solver.attach[0];
     std::printf("%-32s %u, dragged %.3f mm so far, let go beyond %.1f mm\n", "attached particle", bite.nearest,
-                1e3 * distance(xyz(s.solver.x[bite.nearest]), s.suture.attached_from), 1e3 * m.suture.release_distance);
+                1e3 * distance(xyz(s.solver.x[bite.nearest]), s.suture.suture[0].attached_from),
+                1e3 * m.suture.release_distance);
     std::printf("%-32s %8.4f N\n", "  its spring pulls with", length(a.lambda) / (m.solver.h * m.solver.h));
   }
   std::printf("%-32s %zu; suture points: %zu\n", "rows of the needle's channel", s.solver.channel.size(),
-              s.suture.point.size());
+              s.suture.suture[0].point.size());
 
   std::printf("[forces]\n");
   print_force("on the right hand", seen.tool[0].force);
@@ -104,15 +105,15 @@ int main() {
 
   std::printf("[publish]\n");
   std::printf("snapshot of tick %llu: %zu particles, %zu bites, needle in tissue: %s, opening %.1f mm^2\n",
-              static_cast<unsigned long long>(seen.tick), seen.particle.size(), seen.bite.size(),
-              seen.needle.in_tissue ? "yes" : "no", 1e6 * seen.opening_area);
+              static_cast<unsigned long long>(seen.tick), seen.particle.size(), seen.active().bite.size(),
+              seen.active().needle.in_tissue ? "yes" : "no", 1e6 * seen.opening_area);
   std::printf("state: %zu bytes, hash %016llx\n", save_state(m, s).size(), static_cast<unsigned long long>(hash_state(m, s)));
 
   // What the page claims, whatever the numbers are: the tip went in here, and the same input from the same state gives the same
   // bits.
   const uint64_t hash = hash_state(m, s);
   const bool first_event = !seen.event.empty() && seen.event[0].kind == EventKind::tip_entered;
-  const bool inside = bite.depth >= 0 && phase_of(s.suture) == NeedlePhase::tip_in && s.solver.channel.size() == 1;
+  const bool inside = bite.depth >= 0 && phase_of(s.suture.suture[0]) == NeedlePhase::tip_in && s.solver.channel.size() == 1;
   const uint64_t tick = input.tick;
   load_state(m, s, before);
   input.tick = tick - 1;

@@ -121,9 +121,9 @@ void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel
     const auto a = tip(static_cast<float>(i) / kDashes), b = tip((static_cast<float>(i) + 0.6f) / kDashes);
     if (a && b) draw->AddLine(*a, *b, IM_COL32(115, 190, 255, 200), 2);
   }
-  const Vec3 tip = on_needle(picture, seen.needle.pose, 1);
-  const bool inside = seen.needle.in_tissue && !seen.bite.empty();
-  const Vec3 in = inside ? seen.bite.back().entry : tip;
+  const Vec3 tip = on_needle(picture, seen.active().needle.pose, 1);
+  const bool inside = seen.active().needle.in_tissue && !seen.active().bite.empty();
+  const Vec3 in = inside ? seen.active().bite.back().entry : tip;
   const Vec3 off = in - entry_of(g);
   const float aside = length(off - g.out * dot(off, g.out));
   const bool good = aside < kAside;
@@ -132,7 +132,7 @@ void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel
   if (const auto p = at(exit_of(g))) draw->AddCircleFilled(*p, 3, IM_COL32(115, 190, 255, 255));
   if (!inside) return;
   // Toward the edge the needle goes, or from it: how far from the wanted place, in millimetres, in so many words.
-  const float depth = seen.bite.back().depth;
+  const float depth = seen.active().bite.back().depth;
   const bool deep_enough = std::abs(depth - g.depth) < kDeep * g.depth + 0.0003f;
   ImGui::SetNextWindowPos({width - 8, 0.5f * height}, ImGuiCond_Always, {1, 0.5f});
   ImGui::SetNextWindowBgAlpha(0.7f);

@@ -417,7 +417,7 @@ class Window {
       results_.known = whole ? 1 : static_cast<float>(s.known) / static_cast<float>(s.ticks);
     }
     const Snapshot* seen = shown();
-    if (seen && !std::exchange(orbit_set_, true)) orbit_ = start_orbit(picture(), seen->needle.pose.p);
+    if (seen && !std::exchange(orbit_set_, true)) orbit_ = start_orbit(picture(), seen->active().needle.pose.p);
     pose_for_picture();
     tell_screen();
     turn_orbit(orbit_, screen_ == Screen::view && in.arrow_presses ? 0 : in.orbit_right, in.orbit_up, in.closer);

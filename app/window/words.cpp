@@ -146,14 +146,14 @@ std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot&
   } else {
     lines.push_back(fmt::format("bites {}", practice.bites));
   }
-  if (!seen.seam.empty()) {
+  if (!seen.active().seam.empty()) {
     float worst = 1;
-    for (const SeamView& s : seen.seam) worst = std::min(worst, s.progress);
+    for (const SeamView& s : seen.active().seam) worst = std::min(worst, s.progress);
     lines.push_back(fmt::format("approximation {:.0f} %", 100 * worst));
   }
   if (practice.throws > 0) lines.push_back(fmt::format("knots {}, throws {}", practice.knots, practice.throws));
   if (practice.faults_in_all > 0) lines.push_back(fmt::format("faults {}", practice.faults_in_all));
-  if (seen.needle.in_tissue) lines.push_back(fmt::format("bite {}: needle in tissue", practice.bites + 1));
+  if (seen.active().needle.in_tissue) lines.push_back(fmt::format("bite {}: needle in tissue", practice.bites + 1));
   for (size_t k = 0; k < 2; ++k) {
     static constexpr const char* kHeld[] = {"", "needle", "thread", "tissue"};
     const ToolView& tool = seen.tool[k];

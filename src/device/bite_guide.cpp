@@ -4,19 +4,19 @@
 namespace catgut {
 
 float half_bite(const PictureModel& picture, const BiteGuide& g) {
-  return std::asin(std::min(0.9f, 0.5f * g.length / picture.needle_radius));
+  return std::asin(std::min(0.9f, 0.5f * g.length / picture.suture[0].needle_radius));
 }
 
 Pose needle_on(const PictureModel& picture, const BiteGuide& g, float psi, float away) {
-  const Vec3 centre = g.at + g.out * (picture.needle_radius - g.depth + away), up = cross(g.along, g.out);
+  const Vec3 centre = g.at + g.out * (picture.suture[0].needle_radius - g.depth + away), up = cross(g.along, g.out);
   const Vec3 x = g.out * std::cos(psi) - g.along * std::sin(psi);
   // The tip is at the end of the arc: other arcs than a half circle are turned back by what is missing.
-  return Pose{centre, from_axes(x, cross(up, x), up)} * Pose{{}, axis_angle({0, 0, 1}, kPi - picture.needle_arc)};
+  return Pose{centre, from_axes(x, cross(up, x), up)} * Pose{{}, axis_angle({0, 0, 1}, kPi - picture.suture[0].needle_arc)};
 }
 
 Vec3 on_needle(const PictureModel& picture, const Pose& needle, float s) {
-  const float phi = s * picture.needle_arc;
-  return transform(needle, Vec3{std::cos(phi), std::sin(phi), 0} * picture.needle_radius);
+  const float phi = s * picture.suture[0].needle_arc;
+  return transform(needle, Vec3{std::cos(phi), std::sin(phi), 0} * picture.suture[0].needle_radius);
 }
 
 }  // namespace catgut

@@ -25,8 +25,8 @@ enum { lift, lay, beside, wind };  // stages of winding
 float side_of(const Pose& tool) { return rotate(tool.q, {0, 0, 1}).x >= 0 ? 1.0f : -1.0f; }
 
 size_t whole_pairs(const Snapshot& seen) {
-  return seen.thread_tension.size() -
-         static_cast<size_t>(std::count(seen.thread_cut.begin(), seen.thread_cut.end(), uint8_t{1}));
+  return seen.active().thread_tension.size() -
+         static_cast<size_t>(std::count(seen.active().thread_cut.begin(), seen.active().thread_cut.end(), uint8_t{1}));
 }
 
 // The tool that holds the needle by `grip`, when the needle's swage is at a place: its tip up and out of the way, the shaft on
@@ -35,7 +35,7 @@ Pose carrying(const PictureModel& picture, const Pose& grip, Vec3 swage_at, floa
   const float u = rotate(grip.q, {0, 0, 1}).z * side >= 0 ? 1.0f : -1.0f;
   const Vec3 up{u, 0, 0}, along{0, 0, -u}, x = Vec3{0, std::cos(-2.2f), 0} - along * std::sin(-2.2f);
   const Quat q = from_axes(x, cross(up, x), up);
-  return Pose{swage_at - rotate(q, {picture.needle_radius, 0, 0}), q} * grip;
+  return Pose{swage_at - rotate(q, {picture.suture[0].needle_radius, 0, 0}), q} * grip;
 }
 
 void go(BothHands& b, int stage) { b.stage = stage, b.held_for = 0; }
@@ -56,7 +56,7 @@ void wind_on(BothHands& b, size_t winder, std::array<Pose, 2>& hand, const Pose&
   const AcrossTool across(tying_axis(side));
   const Vec3 axis_at = winding_axis(w, across);
   const Pose rest{axis_at - across.z * kTieWindAt, from_tool_axis(across.z)};
-  if (w.free < 0) w.free = (seen.knot.empty() ? kTautInTissue : kTieTaut) * (w.reach - distance(w.start, axis_at));
+  if (w.free < 0) w.free = (seen.active().knot.empty() ? kTautInTissue : kTieTaut) * (w.reach - distance(w.start, axis_at));
   float room = 1;
   const auto swage_at = [&](float wound) { return winding_swage(w, across, wound, room); };
   const float tension = needle_tension(seen);
@@ -112,8 +112,8 @@ void draw_on(const BothHands& b, float amount, size_t needle, std::array<Pose, 2
     way[needle] = normalized(Vec3{-x, 0.35f, 0.1f});
   } else {  // nothing is tied: along the stitch, each end from its own hole
     Vec3 across{1, 0, 0};
-    if (!seen.suture_point.empty())
-      across = normalized(seen.suture_point.back().position - seen.suture_point.front().position, across);
+    if (!seen.active().suture_point.empty())
+      across = normalized(seen.active().suture_point.back().position - seen.active().suture_point.front().position, across);
     way[needle] = normalized(across * 0.8f + Vec3{0, 0.6f, 0});
     way[tail] = normalized(across * -0.8f + Vec3{0, 0.6f, 0});
   }
@@ -125,7 +125,7 @@ void draw_on(const BothHands& b, float amount, size_t needle, std::array<Pose, 2
   }
   // Before a knot the tail's hand only gives a counter-hold: where both sides are drawn hard the tissue follows instead.
   const size_t held = node_of(seen, seen.tool[tail].held_slot);
-  const float pull = held < seen.thread_tension.size() ? seen.thread_tension[held] : 0;
+  const float pull = held < seen.active().thread_tension.size() ? seen.active().thread_tension[held] : 0;
   if (b.winding.way == 0 && pull > kCounterHold) hand[tail].p += normalized(knot - hand[tail].p) * (0.3f * kSpeed * dt);
 }
 
@@ -133,27 +133,28 @@ void draw_on(const BothHands& b, float amount, size_t needle, std::array<Pose, 2
 
 Vec3 on_leash(const PictureModel& picture, const Snapshot& seen, size_t who, Vec3 p) {
   const ToolView& tool = seen.tool[who];
-  if (seen.suture_point.empty() || seen.thread_tension.empty()) return p;
+  if (seen.active().suture_point.empty() || seen.active().thread_tension.empty()) return p;
   const size_t first = first_point_node(seen), last = last_point_node(seen);
-  size_t held = seen.thread_order.size() - 1;
+  size_t held = seen.active().thread_order.size() - 1;
   Vec3 end = tool.pose.p;  // what the hand holds the thread by
-  if (tool.held == Held::needle && !seen.needle.in_tissue && seen.needle_on_thread) end = needle_swage(picture, seen);
+  if (tool.held == Held::needle && !seen.active().needle.in_tissue && seen.active().needle_on_thread)
+    end = needle_swage(picture, seen);
   else if (tool.held == Held::thread) held = node_of(seen, tool.held_slot);
   else return p;
   if (held >= first && held <= last) return p;
   size_t from = held < first ? first : last;
   Vec3 anchor = node_at(seen, from);
-  if (!seen.knot.empty()) {  // a knot holds it: there is what leaves the knot, and nothing slides
-    const Vec3 knot = seen.knot.back().position;
+  if (!seen.active().knot.empty()) {  // a knot holds it: there is what leaves the knot, and nothing slides
+    const Vec3 knot = seen.active().knot.back().position;
     const size_t begin = held < first ? held : last, end_node = held < first ? first : held;
     for (size_t i = begin; i <= end_node; ++i)
       if (length2(node_at(seen, i) - knot) < length2(node_at(seen, from) - knot)) from = i;
     anchor = knot;
   }
-  const float pair = seen.thread_rest / static_cast<float>(std::max<size_t>(1, whole_pairs(seen)));
+  const float pair = seen.active().thread_rest / static_cast<float>(std::max<size_t>(1, whole_pairs(seen)));
   const Vec3 off = end + (p - tool.pose.p) - anchor;
   const float most = static_cast<float>(std::max(from, held) - std::min(from, held)) * pair +
-                     (seen.knot.empty() ? kGiveInTissue : kGiveAtKnot);
+                     (seen.active().knot.empty() ? kGiveInTissue : kGiveAtKnot);
   const float far = length(off);
   return far > most ? p - off * ((far - most) / far) : p;
 }
@@ -170,7 +171,8 @@ bool glide(Pose& pose, const Pose& goal, float speed, float turn, float dt) {
 BothDo both_hands(BothHands& b, float amount, std::array<Pose, 2>& hand, const Pose& grip, const PictureModel& picture,
                   const Snapshot& seen, float dt) {
   const size_t needle = seen.tool[0].held == Held::needle ? 0 : 1, other = 1 - needle;
-  const bool holds = seen.tool[needle].held == Held::needle && !seen.needle.in_tissue && !seen.suture_point.empty();
+  const bool holds =
+      seen.tool[needle].held == Held::needle && !seen.active().needle.in_tissue && !seen.active().suture_point.empty();
   b.follows = false;
   if (!holds || (seen.tool[other].held != Held::nothing && seen.tool[other].held != Held::thread))
     return b.doing = BothDo::nothing;
@@ -201,7 +203,7 @@ BothDo both_hands(BothHands& b, float amount, std::array<Pose, 2>& hand, const P
 void go_along(BothHands& b, size_t who, std::array<Pose, 2>& hand, const Pose& grip, const PictureModel& picture,
               const Snapshot& seen, float dt) {
   const size_t needle = 1 - who;
-  const float strand = length_between(seen, node_of(seen, seen.tool[who].loop_last), seen.thread_order.size() - 1);
+  const float strand = length_between(seen, node_of(seen, seen.tool[who].loop_last), seen.active().thread_order.size() - 1);
   if (!b.follows) b.winding.free = kTieLoose * strand;
   b.follows = true;
   const Pose& tool = seen.tool[who].pose;

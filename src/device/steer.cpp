@@ -73,11 +73,11 @@ void help_to_bite(Steering& steering, size_t who, const ViewFrame& view, const P
   const int tool = seen.tool[who].instrument;
   const bool drives = tool >= 0 && picture.instrument[static_cast<size_t>(tool)].can(kHoldNeedle | kClamp) &&
                       seen.tool[1 - who].held != Held::needle;
-  if (!steering.guide || !drives || (seen.needle.in_tissue && !was)) {
+  if (!steering.guide || !drives || (seen.active().needle.in_tissue && !was)) {
     hand.snapped = false;
     return;
   }
-  if (seen.needle.in_tissue) {  // from here on the hand drives it
+  if (seen.active().needle.in_tissue) {  // from here on the hand drives it
     hand.snapped = false;
     hand.pose = hand.sent.pose;
     return;
@@ -123,7 +123,7 @@ void help(Steering& steering, size_t who, const ViewFrame& view, const PictureMo
   float nearest = 1;
   hand.snapped = false;
   TailGrip tail;
-  if (other_has && !seen.needle.in_tissue && tail_grip(picture, seen, who, tail)) {
+  if (other_has && !seen.active().needle.in_tissue && tail_grip(picture, seen, who, tail)) {
     // Once found it stays with its particle, though another place may be better by a hair.
     if (was && hand.at == HelpAt::tail) tail.slot = hand.tail_slot, tail.pose.p = seen.particle[tail.slot];
     if (near_on_screen(view, hand.pose.p, tail.pose.p, reach(HelpAt::tail), there)) {
@@ -199,24 +199,26 @@ void resume_steering(Steering& steering, const Snapshot& seen) {
 
 Pose good_grip(const PictureModel& picture, const Snapshot& seen, size_t who, Vec3 shaft, Vec3 near) {
   const ToolView& other = seen.tool[1 - who];
-  const Pose& needle = seen.needle.pose;
+  const Pose& needle = seen.active().needle.pose;
   const auto at = [&](float s) {
-    const float phi = s * picture.needle_arc;
-    return needle.p + rotate(needle.q, {std::cos(phi), std::sin(phi), 0}) * picture.needle_radius;
+    const float phi = s * picture.suture[0].needle_arc;
+    return needle.p + rotate(needle.q, {std::cos(phi), std::sin(phi), 0}) * picture.suture[0].needle_radius;
   };
   const auto free = [&](float s) { return other.held != Held::needle || std::abs(other.held_at - s) > kBeside; };
   bool tip = !free(kDriveAt);
   // Stuck in tissue with nobody holding it: whichever end the hand is at.
-  if (seen.needle.in_tissue && free(kDriveAt) && free(kTipAt)) tip = distance(at(kTipAt), near) < distance(at(kDriveAt), near);
+  if (seen.active().needle.in_tissue && free(kDriveAt) && free(kTipAt))
+    tip = distance(at(kTipAt), near) < distance(at(kDriveAt), near);
   const float s = tip ? kTipAt : kDriveAt;
-  const Vec3 radial = rotate(needle.q, {std::cos(s * picture.needle_arc), std::sin(s * picture.needle_arc), 0});
+  const Vec3 radial =
+      rotate(needle.q, {std::cos(s * picture.suture[0].needle_arc), std::sin(s * picture.suture[0].needle_arc), 0});
   // The shaft leaves the needle's plane on the side that it is on already; at the tip it leans back, away from the tissue that
   // the needle comes out of.
   const float side = dot(rotate(needle.q, {0, 0, 1}), shaft) >= 0 ? 1.0f : -1.0f;
   const Vec3 lean = rotate(needle.q, {std::cos(2.6f), -std::sin(2.6f), 0});
   const Vec3 z = normalized(rotate(needle.q, {0, 0, side}) + lean * (tip ? 0.3f : 0.0f));
   const Vec3 y = normalized(cross(z, radial), any_perpendicular(z));
-  return {needle.p + radial * picture.needle_radius, from_axes(cross(y, z), y, z)};
+  return {needle.p + radial * picture.suture[0].needle_radius, from_axes(cross(y, z), y, z)};
 }
 
 std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 2>& motion, const ViewFrame& view,
@@ -227,13 +229,13 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
     const bool holds = seen.tool[k].held == Held::needle;
     if (holds && !hand.holds) {
       if (hand.snapped) hand.pose = hand.help;  // it was grasped where the help had it
-      hand.grip = inverse(seen.needle.pose) * seen.tool[k].pose;
+      hand.grip = inverse(seen.active().needle.pose) * seen.tool[k].pose;
       hand.snapped = false;
     }
     hand.holds = holds;
     // While two tools held it they bent each other's hold a little: what counts is how it lies in this one alone.
-    if (holds && !seen.needle.in_tissue && seen.tool[1 - k].held != Held::needle)
-      hand.grip = inverse(seen.needle.pose) * seen.tool[k].pose;
+    if (holds && !seen.active().needle.in_tissue && seen.tool[1 - k].held != Held::needle)
+      hand.grip = inverse(seen.active().needle.pose) * seen.tool[k].pose;
   }
   both(steering, motion, picture, seen, dt);
   for (size_t k = 0; k < 2; ++k) {

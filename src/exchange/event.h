@@ -38,7 +38,7 @@ enum class EventKind : uint8_t {
   thread_cut,    // who: hand, which: slot toward the free end, value: thread to the nearest suture point or knot [m], -1: none
   suture_taken,  // which: how many were taken before; a fresh needle and thread lie ready
   stitch_settled,        // which: settled stitch; its thread is no longer simulated (3.4)
-  seam_closed,           // which: row of Snapshot::seam, value: what is left of its gap [m]
+  seam_closed,           // which: row of SutureView::seam, value: what is left of its gap [m]
   instrument_taken,      // who: hand, which: instrument
   instrument_laid_down,  // who: hand, which: instrument
   instrument_parked,     // who: hand, which: instrument; it stays on what it holds

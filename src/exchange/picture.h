@@ -26,20 +26,26 @@ struct VisibleMesh {
   std::vector<std::array<float, 4>> skin_weight;       // sum 1
 };
 
+// A needle and its thread, as they are drawn and held.
+struct SuturePicture {
+  uint32_t thread_first = 0;  // slot of the first thread particle in Snapshot::particle
+  uint32_t thread_count = 0;
+  float thread_radius = 0.00015f;       // [m]
+  float thread_spacing = 0.0016f;       // [m] rest distance of neighbors at the start
+  float needle_radius = 0.00828f;       // [m] of the needle's circle
+  float needle_arc = kPi;               // [rad]
+  float needle_wire_radius = 0.00033f;  // [m]
+};
+
 struct PictureModel {
   std::string title;
   std::vector<VisibleMesh> body;
-  std::vector<Vec3> particle_rest;  // [m] rest position of every tissue particle
-  uint32_t thread_first = 0;        // slot of the first thread particle in Snapshot::particle
-  uint32_t thread_count = 0;
-  float thread_radius = 0.00015f;             // [m]
-  float needle_radius = 0.00828f;             // [m] of the needle's circle
-  float needle_arc = kPi;                     // [rad]
-  float needle_wire_radius = 0.00033f;        // [m]
-  std::vector<InstrumentPicture> instrument;  // as Snapshot::instrument
-  Vec3 focus;                                 // [m] centre of the operating field
-  float field = 0.1f;                         // [m] its radius
-  float drape = -0.035f;                      // [m] height of the sterile drape (horizontal), which the organ stands up through
+  std::vector<Vec3> particle_rest;                                    // [m] rest position of every tissue particle
+  std::vector<SuturePicture> suture = std::vector<SuturePicture>(1);  // as Snapshot::suture
+  std::vector<InstrumentPicture> instrument;                          // as Snapshot::instrument
+  Vec3 focus;                                                         // [m] centre of the operating field
+  float field = 0.1f;                                                 // [m] its radius
+  float drape = -0.035f;  // [m] height of the sterile drape (horizontal), which the organ stands up through
   // One per wall that the procedure works on: tissue particles round its near opening, in order, on its outer side. Walls are
   // numbered: one per bowel end, and two (outer, inner) for a bowel folded into itself.
   std::vector<std::vector<uint32_t>> rim;

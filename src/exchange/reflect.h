@@ -27,8 +27,8 @@ constexpr void reflect(auto& a, Like<ForcePatch> auto& p) {
 }
 
 constexpr void reflect(auto& a, Like<ToolView> auto& t) {
-  a(t.instrument), a(t.pose), a(t.hand), a(t.jaw), a(t.held), a(t.held_at), a(t.held_slot), a(t.held_strands);
-  a(t.loop_wraps), a(t.loop_handed), a(t.loop_first), a(t.loop_last), a(t.force), a(t.torque);
+  a(t.instrument), a(t.pose), a(t.hand), a(t.jaw), a(t.held), a(t.held_at), a(t.held_slot), a(t.held_suture), a(t.held_strands);
+  a(t.loop_wraps), a(t.loop_handed), a(t.loop_suture), a(t.loop_first), a(t.loop_last), a(t.force), a(t.torque);
 }
 constexpr void reflect(auto& a, Like<InstrumentView> auto& i) {
   a(i.pose), a(i.jaw), a(i.place), a(i.hand), a(i.held), a(i.held_slot), a(i.pull);
@@ -43,10 +43,13 @@ constexpr void reflect(auto& a, Like<SeamView> auto& s) { a(s.a), a(s.b), a(s.st
 constexpr void reflect(auto& a, Like<BiteView> auto& b) {
   a(b.entry), a(b.exit), a(b.depth), a(b.has_exit), a(b.complete), a(b.wall), a(b.entry_inside), a(b.exit_inside);
 }
+constexpr void reflect(auto& a, Like<SutureView> auto& s) {
+  a(s.needle), a(s.thread_order), a(s.thread_tension), a(s.thread_cut), a(s.thread_rest), a(s.needle_on_thread);
+  a(s.suture_point), a(s.knot), a(s.bite), a(s.seam);
+}
 constexpr void reflect(auto& a, Like<Snapshot> auto& s) {
-  a(s.tick), a(s.time_s), a(s.particle), a(s.rotation), a(s.thread_order), a(s.thread_tension), a(s.tool), a(s.instrument),
-      a(s.needle);
-  a(s.suture_point), a(s.thread_cut), a(s.thread_rest), a(s.needle_on_thread), a(s.knot), a(s.settled), a(s.seam), a(s.bite);
+  a(s.tick), a(s.time_s), a(s.particle), a(s.rotation), a(s.tool), a(s.instrument), a(s.suture), a(s.active_suture),
+      a(s.settled);
   a(s.opening_area), a(s.closure), a(s.event), a(s.patch);
 }
 

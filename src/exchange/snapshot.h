@@ -22,10 +22,12 @@ struct ToolView {
   Held held = Held::nothing;
   float held_at = 0;          // needle: place on the arc, 0 swage .. 1 tip
   uint32_t held_slot = 0;     // thread: particle slot; tissue: particle
+  uint32_t held_suture = 0;   // needle, thread: whose
   uint32_t held_strands = 0;  // strands of thread between the jaws
   uint32_t loop_wraps = 0;    // turns of thread frozen round it, 0: none
   // Walked away from the tissue, the thread turns round the tool +1: counter-clockwise, -1: clockwise as seen from its hand.
   int loop_handed = 0;
+  uint32_t loop_suture = 0;                // whose thread it is
   uint32_t loop_first = 0, loop_last = 0;  // slots of the loop's ends, free-end side first; valid with a loop
   Vec3 force;                              // [N] on the hand
   Vec3 torque;                             // [N m] on the hand, about the tool's origin
@@ -99,28 +101,38 @@ struct BiteView {
   bool entry_inside = false, exit_inside = false;  // that end lies on the mucosa
 };
 
+// One needle with its thread, and what has been sewn with it.
+struct SutureView {
+  NeedleView needle;
+  std::vector<uint32_t> thread_order;  // particle indices from the free end to the needle
+  std::vector<float> thread_tension;   // [N] per pair of thread_order, size thread_order.size() - 1
+  std::vector<uint8_t> thread_cut;     // per pair of thread_order: 1 where it was cut through
+  float thread_rest = 0;               // [m] rest length of all pairs that are not cut
+  bool needle_on_thread = true;        // false once the thread was cut off the needle
+  std::vector<SuturePointView> suture_point;
+  std::vector<KnotView> knot;
+  std::vector<BiteView> bite;
+  std::vector<SeamView> seam;
+};
+
 struct Snapshot {
   uint64_t tick = 0;
   double time_s = 0;
   std::vector<Vec3> particle;            // [m] tissue particles of every body, then thread slots
   std::vector<Quat> rotation;            // per tissue particle: rotation of the cluster centred on it
-  std::vector<uint32_t> thread_order;    // particle indices from the free end to the needle
-  std::vector<float> thread_tension;     // [N] per pair of thread_order, size thread_order.size() - 1
   std::array<ToolView, kMaxHands> tool;  // per hand
   std::vector<InstrumentView> instrument;
-  NeedleView needle;
-  std::vector<SuturePointView> suture_point;
-  std::vector<uint8_t> thread_cut;  // per pair of thread_order: 1 where it was cut through
-  float thread_rest = 0;            // [m] rest length of all pairs that are not cut
-  bool needle_on_thread = true;     // false once the thread was cut off the needle
-  std::vector<KnotView> knot;
+  std::vector<SutureView> suture = std::vector<SutureView>(1);  // at least one
+  uint32_t active_suture = 0;                                   // whose needle was grasped last
   std::vector<SettledView> settled;
-  std::vector<SeamView> seam;
-  std::vector<BiteView> bite;
   float opening_area = 0;                   // [m^2] of the rim that is being closed
   float closure = 0;                        // 0 open .. 1 at the anvil
   std::vector<Event> event;                 // of this tick
   std::array<ForcePatch, kMaxHands> patch;  // what each hand may feel until the next tick
+
+  // The suture in hand.
+  const SutureView& active() const { return suture[active_suture]; }
+  SutureView& active() { return suture[active_suture]; }
 };
 
 }  // namespace catgut

@@ -6,26 +6,26 @@
 namespace catgut {
 
 size_t node_of(const Snapshot& seen, uint32_t slot) {
-  const auto at = std::find(seen.thread_order.begin(), seen.thread_order.end(), slot);
-  return at == seen.thread_order.end() ? 0 : static_cast<size_t>(at - seen.thread_order.begin());
+  const auto at = std::find(seen.active().thread_order.begin(), seen.active().thread_order.end(), slot);
+  return at == seen.active().thread_order.end() ? 0 : static_cast<size_t>(at - seen.active().thread_order.begin());
 }
 
-Vec3 node_at(const Snapshot& seen, size_t node) { return seen.particle[seen.thread_order[node]]; }
+Vec3 node_at(const Snapshot& seen, size_t node) { return seen.particle[seen.active().thread_order[node]]; }
 
 float length_between(const Snapshot& seen, size_t a, size_t b) {
   float sum = 0;
-  for (size_t i = std::min(a, b); i < std::max(a, b) && i + 1 < seen.thread_order.size(); ++i)
+  for (size_t i = std::min(a, b); i < std::max(a, b) && i + 1 < seen.active().thread_order.size(); ++i)
     sum += distance(node_at(seen, i), node_at(seen, i + 1));
   return sum;
 }
 
 size_t node_along(const Snapshot& seen, size_t from, float far, int way) {
-  const size_t last = seen.thread_order.size() - 1;
+  const size_t last = seen.active().thread_order.size() - 1;
   size_t at = from;
   for (float gone = 0; gone < far;) {
     if ((way > 0 && at == last) || (way < 0 && at == 0)) break;
     const size_t next = way > 0 ? at + 1 : at - 1, pair = std::min(at, next);
-    if (pair < seen.thread_cut.size() && seen.thread_cut[pair]) break;
+    if (pair < seen.active().thread_cut.size() && seen.active().thread_cut[pair]) break;
     gone += distance(node_at(seen, at), node_at(seen, next));
     at = next;
   }
@@ -34,21 +34,34 @@ size_t node_along(const Snapshot& seen, size_t from, float far, int way) {
 
 uint32_t locked_throws(const Snapshot& seen) {
   uint32_t sum = 0;
-  for (const KnotView& k : seen.knot) sum += k.throws - (k.phase != KnotPhase::locked && k.throws > 0);
+  for (const KnotView& k : seen.active().knot) sum += k.throws - (k.phase != KnotPhase::locked && k.throws > 0);
   return sum;
 }
 
-float needle_tension(const Snapshot& seen) { return seen.thread_tension.empty() ? 0 : seen.thread_tension.back(); }
+size_t suture_point_count(const Snapshot& seen) {
+  size_t sum = 0;
+  for (const SutureView& s : seen.suture) sum += s.suture_point.size();
+  return sum;
+}
+const SuturePointView& suture_point_at(const Snapshot& seen, size_t i) {
+  size_t k = 0;
+  for (; i >= seen.suture[k].suture_point.size(); ++k) i -= seen.suture[k].suture_point.size();
+  return seen.suture[k].suture_point[i];
+}
+
+float needle_tension(const Snapshot& seen) {
+  return seen.active().thread_tension.empty() ? 0 : seen.active().thread_tension.back();
+}
 
 size_t first_point_node(const Snapshot& seen) {
-  size_t node = seen.thread_order.size();
-  for (const SuturePointView& p : seen.suture_point) node = std::min(node, node_of(seen, p.anchored));
-  return seen.suture_point.empty() ? 0 : node;
+  size_t node = seen.active().thread_order.size();
+  for (const SuturePointView& p : seen.active().suture_point) node = std::min(node, node_of(seen, p.anchored));
+  return seen.active().suture_point.empty() ? 0 : node;
 }
 
 size_t last_point_node(const Snapshot& seen) {
   size_t node = 0;
-  for (const SuturePointView& p : seen.suture_point) node = std::max(node, node_of(seen, p.anchored));
+  for (const SuturePointView& p : seen.active().suture_point) node = std::max(node, node_of(seen, p.anchored));
   return node;
 }
 

@@ -37,13 +37,13 @@ Quat from_tool_axis(Vec3 z) {
 AcrossTool::AcrossTool(Vec3 along) : z(along), e1(normalized(Vec3{0, 1, 0} - z * z.y)), e2(cross(z, e1)) {}
 
 Vec3 stitch_place(const PictureModel& picture, const Snapshot& seen) {
-  if (!seen.knot.empty()) return seen.knot.back().position;
-  if (seen.suture_point.empty()) return picture.focus;
-  return 0.5f * (seen.suture_point.front().position + seen.suture_point.back().position);
+  if (!seen.active().knot.empty()) return seen.active().knot.back().position;
+  if (seen.active().suture_point.empty()) return picture.focus;
+  return 0.5f * (seen.active().suture_point.front().position + seen.active().suture_point.back().position);
 }
 
 Vec3 needle_swage(const PictureModel& picture, const Snapshot& seen) {
-  return transform(seen.needle.pose, {picture.needle_radius, 0, 0});
+  return transform(seen.active().needle.pose, {picture.suture[0].needle_radius, 0, 0});
 }
 
 float feel_strand(float strand, float tension, float dt) {
@@ -51,11 +51,11 @@ float feel_strand(float strand, float tension, float dt) {
 }
 
 void begin_winding(Winding& w, const PictureModel& picture, const Snapshot& seen, float least_free, bool past_knot) {
-  const bool from_point = !seen.suture_point.empty() && (past_knot || seen.knot.empty());
-  w.start = from_point ? seen.suture_point.back().position : stitch_place(picture, seen);
+  const bool from_point = !seen.active().suture_point.empty() && (past_knot || seen.active().knot.empty());
+  w.start = from_point ? seen.active().suture_point.back().position : stitch_place(picture, seen);
   // What the knot holds already is no longer in the hand.
-  const float spent = seen.suture_point.empty() ? 0 : distance(seen.suture_point.back().position, w.start);
-  w.reach = std::max(0.03f, length_between(seen, last_point_node(seen), seen.thread_order.size() - 1) - spent);
+  const float spent = seen.active().suture_point.empty() ? 0 : distance(seen.active().suture_point.back().position, w.start);
+  w.reach = std::max(0.03f, length_between(seen, last_point_node(seen), seen.active().thread_order.size() - 1) - spent);
   // So high that the needle, going round below on a taut strand, keeps clear of the tissue, as far as a short strand allows.
   const float crest = highest_near(picture, seen, w.start), rise = crest - w.start.y;
   w.ground = crest + kNeedleBelow;
@@ -85,7 +85,7 @@ void feel_winding(Winding& w, const Snapshot& seen, const AcrossTool& across, fl
   if (!((behind < 0.005f && room > w.free) || tension > kTieTooTaut)) return;
   // Before the first throw nothing but friction holds the thread in its holes: no more is asked for than there is.
   const float there_is = w.reach - distance(w.start, winding_axis(w, across)) - kTieWound * std::max(0.0f, w.wound) + 0.002f;
-  const float most = seen.knot.empty() ? std::max(0.006f, there_is) : w.reach;
+  const float most = seen.active().knot.empty() ? std::max(0.006f, there_is) : w.reach;
   w.free = std::clamp(feel_strand(w.free, tension, dt), 0.006f, most);
 }
 
@@ -97,7 +97,7 @@ Vec3 strand_above(const Winding& w, const AcrossTool& across, Vec3 turns) {
 
 bool best_tail_grip(const PictureModel& picture, const Snapshot& seen, size_t who, float side, TailDepth depth,
                     const Vec3* tried, TailGrip& out) {
-  if (seen.suture_point.empty() || seen.thread_order.size() < 3) return false;
+  if (seen.active().suture_point.empty() || seen.active().thread_order.size() < 3) return false;
   const Vec3 knot = stitch_place(picture, seen);
   const size_t point = first_point_node(seen), root = node_along(seen, point, distance(node_at(seen, point), knot), -1);
   const float tail = length_between(seen, 0, root);
@@ -109,7 +109,7 @@ bool best_tail_grip(const PictureModel& picture, const Snapshot& seen, size_t wh
   const Vec3 ways[] = {{side, 0.3f, 0.15f}, {0.8f * side, 0.5f, 0.6f}, {0.5f * side, 0.4f, 1}, {0.7f * side, 1, 0.1f}};
   float best = -1e9f;
   for (size_t i = node_along(seen, root, std::min(loop ? 0.010f : 0.016f, 0.5f * tail), -1); i-- > 1;) {
-    if (length_between(seen, 0, i) < 0.2f * tail || (i < seen.thread_cut.size() && seen.thread_cut[i])) break;
+    if (length_between(seen, 0, i) < 0.2f * tail || (i < seen.active().thread_cut.size() && seen.active().thread_cut[i])) break;
     const Vec3 tip = node_at(seen, i);
     for (const Vec3& way : ways) {
       const Vec3 z = normalized(way);
@@ -128,7 +128,7 @@ bool best_tail_grip(const PictureModel& picture, const Snapshot& seen, size_t wh
       good -= depth.worse * std::max(0.0f, knot.y - depth.easy - tip.y);
       // Near the knot little else lies about. Where it was tried in vain it is not tried again.
       good -= 12 * distance(tip, knot) + (tried && distance(tip, *tried) < 0.004f ? 0.5f : 0.0f);
-      if (good > best) best = good, out = {seen.thread_order[i], {tip, from_tool_axis(z)}, tail};
+      if (good > best) best = good, out = {seen.active().thread_order[i], {tip, from_tool_axis(z)}, tail};
     }
   }
   return best > -1e8f;

@@ -41,6 +41,7 @@ struct InstrumentState {
   float jaw = 1;      // of the last tick
   InstrumentPlace place = InstrumentPlace::tray;
   uint8_t hand = kNoHand;  // that has it
+  uint32_t suture = 0;     // whose needle or thread is held
 };
 
 // All models of the table, in its order.

@@ -11,7 +11,8 @@ namespace {
 constexpr float kClosed = 0.98f;  // progress of a seam that counts as approximated
 
 uint32_t complete_bites(const Snapshot& seen) {
-  return static_cast<uint32_t>(std::count_if(seen.bite.begin(), seen.bite.end(), [](const BiteView& b) { return b.complete; }));
+  return static_cast<uint32_t>(
+      std::count_if(seen.active().bite.begin(), seen.active().bite.end(), [](const BiteView& b) { return b.complete; }));
 }
 
 bool happens(std::span<const Event> happened, EventKind kind) {
@@ -115,19 +116,19 @@ bool step_done(const LessonStep& step, const Snapshot& seen, std::span<const Eve
     case LessonGoal::needle_in_driver:
       return seen.tool[0].held == Held::needle && seen.tool[1].held != Held::needle;
     case LessonGoal::bites:
-      return static_cast<float>(complete_bites(seen)) >= step.amount && !seen.needle.in_tissue;
+      return static_cast<float>(complete_bites(seen)) >= step.amount && !seen.active().needle.in_tissue;
     case LessonGoal::tail:
-      return complete_bites(seen) > 0 && !seen.needle.in_tissue && !seen.suture_point.empty() &&
+      return complete_bites(seen) > 0 && !seen.active().needle.in_tissue && !seen.active().suture_point.empty() &&
              length_between(seen, 0, first_point_node(seen)) <= step.amount;
     case LessonGoal::closed:
-      return std::any_of(seen.seam.begin(), seen.seam.end(), [](const SeamView& s) { return s.midpoint; }) &&
-             std::all_of(seen.seam.begin(), seen.seam.end(),
+      return std::any_of(seen.active().seam.begin(), seen.active().seam.end(), [](const SeamView& s) { return s.midpoint; }) &&
+             std::all_of(seen.active().seam.begin(), seen.active().seam.end(),
                          [](const SeamView& s) { return !s.midpoint || s.progress >= kClosed; });
     case LessonGoal::wound:
       return seen.tool[0].loop_wraps > 0 || seen.tool[1].loop_wraps > 0 || happens(happened, EventKind::loop_formed);
     case LessonGoal::tail_through:
       return happens(happened, EventKind::knot_begun) ||
-             (!seen.knot.empty() && seen.knot.back().phase == KnotPhase::tightening);
+             (!seen.active().knot.empty() && seen.active().knot.back().phase == KnotPhase::tightening);
     case LessonGoal::throws:
       return static_cast<float>(locked_throws(seen)) >= step.amount;
   }

@@ -34,7 +34,7 @@ float hidden(const Snapshot& snapshot, Vec3 away, Vec3 target, float half) {
         const float toward = dot(d, away), off2 = length2(d - away * toward);
         return toward > 0 && std::isfinite(off2) ? std::exp(-off2 / (size * size)) : 0.0f;
       };
-      sum += 0.5f * before(snapshot.needle.pose.p, 0.010f) + 0.35f * before(target, 0.6f * half);
+      sum += 0.5f * before(snapshot.active().needle.pose.p, 0.010f) + 0.35f * before(target, 0.6f * half);
     }
   }
   return sum;
@@ -55,7 +55,7 @@ FollowCamera::FollowCamera(const PictureModel& model)
 
 Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
   // Part of the way from the organ's middle to the needle: the work stays in view together with what it is done to.
-  Vec3 offset = snapshot.needle.pose.p - focus_;
+  Vec3 offset = snapshot.active().needle.pose.p - focus_;
   if (!is_finite(offset)) offset = {};
   // Hands that tie or draw thread are farther away: the picture opens up for them, from the tissue to the needle and the tools'
   // tips.

@@ -198,7 +198,7 @@ ToolShape retractor() {
 
 }  // namespace
 
-Shape needle_shape(const PictureModel& model) {
+Shape needle_shape(const SuturePicture& model) {
   constexpr int n = 64;
   std::vector<Vec3> centre;
   std::vector<float> radius;

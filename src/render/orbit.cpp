@@ -16,7 +16,7 @@ Orbit start_orbit(const PictureModel& picture, Vec3 needle) {
     const Camera c = camera_of(o);
     const Vec3 ahead = normalized(c.target - c.eye), right = normalized(cross(ahead, c.up)), d = needle - c.eye;
     const float half = std::tan(0.5f * c.fov_deg * kPi / 180) * dot(d, ahead);
-    if (std::abs(dot(d, cross(right, ahead))) + picture.needle_radius < 0.9f * half) break;
+    if (std::abs(dot(d, cross(right, ahead))) + picture.suture[0].needle_radius < 0.9f * half) break;
     o.half_height *= 1.08f;
   }
   return o;

@@ -39,7 +39,7 @@ Shape mirrored_x(Shape shape);
 // Points of a Catmull-Rom curve through `through`, `per_span` pieces a span, last point included. Written to `out`.
 void smooth_curve(std::span<const Vec3> through, int per_span, std::vector<Vec3>& out);
 
-Shape needle_shape(const PictureModel& model);  // in the needle's frame
+Shape needle_shape(const SuturePicture& model);  // in the needle's frame
 
 // A tool in its frame (origin between the jaw tips, shaft along +z): what stands still, and the half that opens toward +x.
 // The other half is the mirror image. The halves turn about the y axis at z = pivot by up to `opening` radians each.

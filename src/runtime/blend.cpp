@@ -37,10 +37,13 @@ void blend(const Snapshot& before, const Snapshot& now, float part, Snapshot& ou
     o.jaw = a.jaw + (o.jaw - a.jaw) * part;
     if (distance(a.pose.p, o.pose.p) < 0.05f) o.pose = between(a.pose, o.pose, part);  // one that was taken did not fly either
   });
-  if (distance(before.needle.pose.p, now.needle.pose.p) < 0.05f)  // nor does a fresh needle
-    out.needle.pose = between(before.needle.pose, now.needle.pose, part);
-  each_row(before.suture_point, out.suture_point, [&](auto& a, auto& o) { o.position = lerp(a.position, o.position, part); });
-  each_row(before.knot, out.knot, [&](auto& a, auto& o) { o.position = lerp(a.position, o.position, part); });
+  each_row(before.suture, out.suture, [&](const SutureView& from, SutureView& suture) {
+    if (distance(from.needle.pose.p, suture.needle.pose.p) < 0.05f)  // nor does a fresh needle
+      suture.needle.pose = between(from.needle.pose, suture.needle.pose, part);
+    each_row(from.suture_point, suture.suture_point,
+             [&](auto& a, auto& o) { o.position = lerp(a.position, o.position, part); });
+    each_row(from.knot, suture.knot, [&](auto& a, auto& o) { o.position = lerp(a.position, o.position, part); });
+  });
   each_row(before.settled, out.settled, [&](auto& a, auto& o) {
     each_row(a.node, o.node, [&](Vec3 p, Vec3& q) { q = lerp(p, q, part); });
     each_row(a.knot, o.knot, [&](Vec3 p, Vec3& q) { q = lerp(p, q, part); });

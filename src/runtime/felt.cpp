@@ -13,16 +13,17 @@ namespace catgut {
 namespace {
 
 Vec3 tip_of(const Snapshot& seen, const PictureModel& picture) {
-  const float r = picture.needle_radius, a = picture.needle_arc;
-  return transform(seen.needle.pose, Vec3{r * std::cos(a), r * std::sin(a), 0});
+  const float r = picture.suture[0].needle_radius, a = picture.suture[0].needle_arc;
+  return transform(seen.active().needle.pose, Vec3{r * std::cos(a), r * std::sin(a), 0});
 }
 
 // [m] by which the thread is longer than at rest; 0 when it is slack.
 float stretch_of(const Snapshot& seen) {
   float length = 0;
-  for (size_t i = 0; i + 1 < seen.thread_order.size(); ++i)
-    if (!seen.thread_cut[i]) length += distance(seen.particle[seen.thread_order[i]], seen.particle[seen.thread_order[i + 1]]);
-  return std::max(0.0f, length - seen.thread_rest);
+  for (size_t i = 0; i + 1 < seen.active().thread_order.size(); ++i)
+    if (!seen.active().thread_cut[i])
+      length += distance(seen.particle[seen.active().thread_order[i]], seen.particle[seen.active().thread_order[i + 1]]);
+  return std::max(0.0f, length - seen.active().thread_rest);
 }
 
 }  // namespace
@@ -103,7 +104,7 @@ FeltCurves feel_a_stitch(SceneSpec scene, bool knot, const std::atomic<bool>& st
       out.bite.push_back({travel, double{most[0]}, double{length(paper_patch(paper, seen, picture, 0).force)}});
     }
     tip = tip_now;
-    if (!seen.needle.in_tissue || !drives) in_bite = in_bite && drives && seen.needle.in_tissue;
+    if (!seen.active().needle.in_tissue || !drives) in_bite = in_bite && drives && seen.active().needle.in_tissue;
     if (in_knot)
       out.knot.push_back({1e3 * double{distance(at[puller], pulled_from)}, double{most[puller]},
                           double{length(paper_patch(paper, seen, picture, puller).force)}});

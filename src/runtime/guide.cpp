@@ -16,7 +16,7 @@ BitePlaces bite_places(const SceneSpec& scene, const PictureModel& picture) {
 }
 
 std::optional<BiteGuide> next_bite(const BitePlaces& places, const PictureModel& picture, const Snapshot& seen) {
-  auto made = std::count_if(seen.bite.begin(), seen.bite.end(), [](const BiteView& b) { return b.complete; });
+  auto made = std::count_if(seen.active().bite.begin(), seen.active().bite.end(), [](const BiteView& b) { return b.complete; });
   for (const BitePlace& p : places.place) {
     made -= p.walls;
     if (made >= 0) continue;

@@ -31,9 +31,9 @@ class SutureWatch {
     const size_t completed = completed_in(seen);
     if (completed == 0) return true;
     SutureCost cost;
-    cost.bites =
-        static_cast<uint32_t>(std::count_if(seen.bite.begin(), seen.bite.end(), [](const BiteView& b) { return b.complete; }));
-    cost.suture_points = static_cast<uint32_t>(seen.suture_point.size());
+    cost.bites = static_cast<uint32_t>(
+        std::count_if(seen.active().bite.begin(), seen.active().bite.end(), [](const BiteView& b) { return b.complete; }));
+    cost.suture_points = static_cast<uint32_t>(seen.active().suture_point.size());
     cost.settled = static_cast<uint32_t>(seen.settled.size());
     cost.simulated_s = seen.time_s;
     cost.ticks = tick_ms_.size();

@@ -41,8 +41,8 @@ void run_beside(StitchEdge& edge, const StitchEdge& first) {
 }
 
 void add_bite(StitchMap& map, const PictureModel& picture, const Snapshot& seen, const Event& e) {
-  if (e.which >= seen.bite.size()) return;
-  const BiteView& view = seen.bite[e.which];
+  if (e.which >= seen.active().bite.size()) return;
+  const BiteView& view = seen.active().bite[e.which];
   StitchBite b;
   b.tick = e.tick;
   b.bite = e.which;
@@ -67,9 +67,9 @@ void add_bite(StitchMap& map, const PictureModel& picture, const Snapshot& seen,
 }
 
 void sample(StitchMap& map, const Snapshot& seen) {
-  for (float t : seen.thread_tension) map.now.peak = std::max(map.now.peak, t);
-  if (!seen.thread_tension.empty() && seen.needle_on_thread)
-    map.now.needle = std::max(map.now.needle, seen.thread_tension.back());
+  for (float t : seen.active().thread_tension) map.now.peak = std::max(map.now.peak, t);
+  if (!seen.active().thread_tension.empty() && seen.active().needle_on_thread)
+    map.now.needle = std::max(map.now.needle, seen.active().thread_tension.back());
   map.now.tick = seen.tick;
   if (static_cast<double>(++map.in_now) * map.tick_s < kSampleTime - 1e-6) return;
   if (map.tension.size() < kMostSamples) map.tension.push_back(map.now);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "exchange/strand.h"
+
 namespace catgut {
 
 Spread spread_of(std::vector<float> values) {
@@ -24,10 +26,10 @@ namespace {
 
 // |free end - needle end| / sum of the thread outside the first and the last suture point, as it lies. 0 without both.
 double uneven_ends(const Snapshot& seen) {
-  if (seen.suture_point.empty() || seen.thread_order.size() < 2) return 0;
-  const auto begin = seen.thread_order.begin(), end = seen.thread_order.end();
+  if (seen.active().suture_point.empty() || seen.active().thread_order.size() < 2) return 0;
+  const auto begin = seen.active().thread_order.begin(), end = seen.active().thread_order.end();
   std::ptrdiff_t first = end - begin, last = 0;
-  for (const SuturePointView& p : seen.suture_point) {
+  for (const SuturePointView& p : seen.active().suture_point) {
     const auto at = std::find(begin, end, p.anchored) - begin;
     first = std::min(first, at), last = std::max(last, at);
   }
@@ -43,11 +45,7 @@ double uneven_ends(const Snapshot& seen) {
 
 }  // namespace
 
-Tally::Tally(const SceneSpec& scene, const PictureModel& picture)
-    : scene_(scene),
-      thread_first_(picture.thread_first),
-      thread_count_(picture.thread_count),
-      seen_slot_(picture.thread_count) {}
+Tally::Tally(const SceneSpec& scene, const PictureModel& picture) : scene_(scene), suture_(picture.suture) {}
 
 void Tally::open() { opening_wanted_ = true; }
 
@@ -70,15 +68,18 @@ void Tally::tick(const Snapshot& seen) {
 void Tally::judge_seam(const Snapshot& last, std::map<std::string, double>& v) const {
   double gap = 0, all = 0, start = 0;
   bool any = false;
-  for (const SeamView& s : last.seam) {
-    const double d = distance(s.a, s.b);
-    all = std::max(all, d);
-    if (!s.midpoint) continue;
-    gap = std::max(gap, d);
-    start = any ? std::min(start, static_cast<double>(s.start)) : static_cast<double>(s.start);
-    any = true;
-  }
-  v["pairs"] = static_cast<double>(last.seam.size());
+  size_t pairs = 0;
+  for (const SutureView& suture : last.suture)
+    for (const SeamView& s : suture.seam) {
+      const double d = distance(s.a, s.b);
+      ++pairs;
+      all = std::max(all, d);
+      if (!s.midpoint) continue;
+      gap = std::max(gap, d);
+      start = any ? std::min(start, static_cast<double>(s.start)) : static_cast<double>(s.start);
+      any = true;
+    }
+  v["pairs"] = static_cast<double>(pairs);
   v["seam_gap"] = gap;
   v["seam_gap_all"] = all;
   v["seam_gap_start"] = start;
@@ -95,32 +96,42 @@ void Tally::time(const StageTimes& times, double tick_ms) {
 }
 
 float Tally::thread_length_error(const Snapshot& seen) const {
-  if (seen.thread_order.size() < 2) return 0;
-  double length = 0;
-  bool whole = true;
-  for (size_t i = 1; i < seen.thread_order.size(); ++i) {
-    const uint32_t a = seen.thread_order[i - 1], b = seen.thread_order[i];
-    if (i - 1 < seen.thread_cut.size() && seen.thread_cut[i - 1]) {
-      whole = false;
-      continue;
+  float worst = 0;
+  for (size_t k = 0; k < seen.suture.size(); ++k) {
+    const SutureView& suture = seen.suture[k];
+    const std::vector<uint32_t>& order = suture.thread_order;
+    if (order.size() < 2) continue;
+    double length = 0;
+    bool whole = true;
+    for (size_t i = 1; i < order.size(); ++i) {
+      const uint32_t a = order[i - 1], b = order[i];
+      if (i - 1 < suture.thread_cut.size() && suture.thread_cut[i - 1]) {
+        whole = false;
+        continue;
+      }
+      if (a < seen.particle.size() && b < seen.particle.size()) length += distance(seen.particle[a], seen.particle[b]);
     }
-    if (a < seen.particle.size() && b < seen.particle.size()) length += distance(seen.particle[a], seen.particle[b]);
+    // As long as it is whole, the thread is measured against the scene; its pieces against what they say they are.
+    const double rest = whole ? static_cast<double>(order.size() - 1) * suture_[k].thread_spacing : suture.thread_rest;
+    const float error = rest > 0 ? static_cast<float>(std::abs(length - rest) / rest) : 0;
+    worst = std::isfinite(error) ? std::max(worst, error) : error;
+    if (!std::isfinite(error)) break;
   }
-  // As long as it is whole, the thread is measured against the scene; its pieces against what they say they are.
-  const double rest = whole ? static_cast<double>(seen.thread_order.size() - 1) * scene_.thread.spacing : seen.thread_rest;
-  if (rest <= 0) return 0;
-  return static_cast<float>(std::abs(length - rest) / rest);
+  return worst;
 }
 
 uint32_t Tally::lost_slots(const Snapshot& seen) {
-  std::fill(seen_slot_.begin(), seen_slot_.end(), uint8_t{0});
   uint32_t wrong = 0;
-  for (const uint32_t slot : seen.thread_order) {
-    const uint32_t i = slot - thread_first_;  // wraps to a large number below the first
-    if (i >= thread_count_ || seen_slot_[i]) ++wrong;
-    else seen_slot_[i] = 1;
+  for (size_t k = 0; k < seen.suture.size(); ++k) {
+    seen_slot_.assign(suture_[k].thread_count, 0);  // within its capacity after the first
+    for (const uint32_t slot : seen.suture[k].thread_order) {
+      const uint32_t i = slot - suture_[k].thread_first;  // wraps to a large number below the first
+      if (i >= suture_[k].thread_count || seen_slot_[i]) ++wrong;
+      else seen_slot_[i] = 1;
+    }
+    wrong += static_cast<uint32_t>(std::count(seen_slot_.begin(), seen_slot_.end(), uint8_t{0}));
   }
-  return wrong + static_cast<uint32_t>(std::count(seen_slot_.begin(), seen_slot_.end(), uint8_t{0}));
+  return wrong;
 }
 
 void Tally::finish(const Snapshot& last, RunResult& result) const {
@@ -131,15 +142,19 @@ void Tally::finish(const Snapshot& last, RunResult& result) const {
   }
   result.value.erase(event_name(EventKind::suture_point));  // the result suture_points says it
   std::map<std::string, double>& v = result.value;
-  v["bites"] =
-      static_cast<double>(std::count_if(last.bite.begin(), last.bite.end(), [](const BiteView& b) { return b.complete; }));
-  v["suture_points"] = static_cast<double>(last.suture_point.size());
+  size_t bites = 0, off = 0;
+  for (const SutureView& suture : last.suture) {
+    for (const BiteView& b : suture.bite) bites += b.complete;
+    off += !suture.needle_on_thread;
+  }
+  v["bites"] = static_cast<double>(bites);
+  v["suture_points"] = static_cast<double>(suture_point_count(last));
   v["knots"] = counts_.knots;
   v["throws"] = counts_.throws;
   v["last_knot_throws"] = counts_.last_knot_throws;
   v["sutures"] = static_cast<double>(last.settled.size() + counts_.tied());
   judge_seam(last, v);
-  v["needle_detached"] = last.needle_on_thread ? 0 : 1;
+  v["needle_detached"] = static_cast<double>(off);
   v["held_ends"] = std::max(last.tool[0].held_strands, last.tool[1].held_strands);
   v["tail_asymmetry"] = std::max(0.0, ends_uneven_);
   for (size_t k = 1; k < counts_.faults.size(); ++k) {

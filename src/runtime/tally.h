@@ -71,7 +71,7 @@ class Tally {
   void judge_seam(const Snapshot& last, std::map<std::string, double>& value) const;
 
   const SceneSpec& scene_;
-  uint32_t thread_first_, thread_count_;
+  const std::vector<SuturePicture> suture_;
   std::vector<uint8_t> seen_slot_;
   bool opening_wanted_ = true, sane_ = true;
   float opening_at_start_ = 0, length_error_ = 0, length_error_passing_ = 0;

@@ -20,6 +20,7 @@ namespace {
 constexpr float kPaperSubstep = 1.0f / 480;  // [s] at which the paper's deformation resistance is meant
 constexpr float kDrapeBelowRim = 0.035f;     // [m] where a body stands up through the drape
 constexpr float kDrapeBelowBody = 0.010f;    // [m] where a body lies over it
+constexpr float kSutureApart = 0.095f;       // [m] between sutures on the drape: a turn of thread and room for a hand
 
 BodyRest make_body(const BodySpec& spec) {
   if (!spec.mesh.empty()) {
@@ -109,24 +110,66 @@ void reserve_room(const Model& model, State& s) {
   s.event.list.reserve(kMany);
   s.stitch.reserve(kMany);
   s.stitch_span.reserve(kMany);
-  s.solver.strand[0].anchor.reserve(model.solver.strand[0].count);
-  s.solver.strand[0].hold.reserve(model.solver.strand[0].count);
+  for (size_t k = 0; k < s.solver.strand.size(); ++k) {
+    s.solver.strand[k].anchor.reserve(model.solver.strand[k].count);
+    s.solver.strand[k].hold.reserve(model.solver.strand[k].count);
+  }
+  s.suture_event.list.reserve(kMany);
   s.solver.weld.reserve(kMany);
   s.solver.attach.reserve(kMany);
   s.solver.pin.reserve(kMany);
   s.solver.channel.reserve(kMany);
-  s.suture.bite.reserve(kMany);
-  s.suture.point.reserve(kMany);
-  s.suture.open.reserve(kMany);
-  s.suture.knot.reserve(kMany);
   s.suture.settled.reserve(kMany);
-  s.technique.purse_string.where.reserve(kMany);
-  s.technique.seam.row.reserve(kMany);
-  s.technique.seam.pass.reserve(kMany);
-  s.technique.lembert.stitch.reserve(kMany);
-  s.technique.lembert.row.reserve(kMany);
-  s.plan.pull.reserve(kMany);
-  s.plan.pair.reserve(kMany);
+  for (Suture& u : s.suture.suture) {
+    u.bite.reserve(kMany);
+    u.point.reserve(kMany);
+    u.open.reserve(kMany);
+    u.knot.reserve(kMany);
+  }
+  for (TechniqueState& t : s.technique) {
+    t.purse_string.where.reserve(kMany);
+    t.seam.row.reserve(kMany);
+    t.seam.pass.reserve(kMany);
+    t.lembert.stitch.reserve(kMany);
+    t.lembert.row.reserve(kMany);
+  }
+  for (ClosurePlan& p : s.plan) {
+    p.pull.reserve(kMany);
+    p.pair.reserve(kMany);
+  }
+}
+
+StrandModel make_strand(const SceneSpec& scene, const ThreadSpec& spec, uint32_t first_slot, Vec3 gravity) {
+  StrandModel t;
+  t.first_slot = first_slot;
+  t.count = static_cast<uint32_t>(spec.particles);
+  t.spacing = spec.spacing;
+  t.radius = spec.radius;
+  t.inv_mass = 1.0f / spec.mass;
+  t.stretch_compliance = spec.stretch_compliance;
+  t.bend_compliance = scene.solver.bend_compliance;
+  t.bend_sweeps = scene.solver.bend_sweeps;
+  t.distance_sweeps = scene.solver.distance_sweeps;
+  t.direct = scene.solver.thread_direct;
+  t.collision_off = scene.suture.collision_off;
+  t.gravity = gravity;
+  return t;
+}
+
+// Needles and threads lie on the drape to the right of the organ, one behind the other, each needle's circle flat and its
+// thread leading away from its swage. Two bowel ends lie along x, and the needles in front of them.
+void lay_out_sutures(Model& m, const std::vector<NeedleAndThread>& sutures, Vec3 rim, bool two, float tube) {
+  const Pose flat{{}, axis_angle({1, 0, 0}, -0.5f * kPi)};  // body z up: the circle lies in the drape's plane
+  Vec3 beside = two ? Vec3{0.02f, 0, tube + 0.03f} : Vec3{tube + 0.03f, 0, 0.01f};
+  for (size_t k = 0; k < sutures.size(); ++k) {
+    const NeedleSpec& needle = sutures[k].needle;
+    const float wire = m.solver.ground + needle.wire_radius + 0.0002f;
+    const Pose start{Vec3{rim.x + beside.x, wire, rim.z + beside.z}, flat.q};
+    m.needle_start.push_back(start);
+    const std::vector<Vec3> thread = lay_thread(sutures[k].thread, transform(start, m.solver.needle_arc[k].point(0)));
+    for (size_t i = thread.size(); i-- > 0;) m.start.push_back(thread[i]);  // free end first
+    beside.z += kSutureApart;
+  }
 }
 
 // The instruments of a scene that names none, as in the paper.
@@ -219,6 +262,10 @@ void add_instruments(Model& m, const SceneSpec& scene, Vec3 rim, const std::stri
 
 }  // namespace
 
+std::vector<NeedleAndThread> sutures_of(const SceneSpec& scene) {
+  return scene.sutures.empty() ? std::vector{NeedleAndThread{scene.thread, scene.needle}} : scene.sutures;
+}
+
 bool apply_preset(SolverSpec& s, const std::string& preset) {
   const SolverSpec standard;
   if (preset == "default") {
@@ -248,7 +295,9 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   m.scene = scene;
   const std::string where = scene.name.empty() ? "scene" : scene.name;
   if (scene.body.empty()) throw InputError(where, "it has no [[body]]", "add at least one soft body");
-  if (scene.thread.particles < 8) throw InputError(where, "thread.particles is below 8", "a thread needs at least 8 particles");
+  const std::vector<NeedleAndThread> sutures = sutures_of(scene);
+  for (const NeedleAndThread& u : sutures)
+    if (u.thread.particles < 8) throw InputError(where, "thread.particles is below 8", "a thread needs at least 8 particles");
   m.dt = 1.0f / scene.solver.tick_rate;
   m.substeps = scene.solver.substeps;
 
@@ -306,8 +355,12 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
     m.picture.body.push_back(std::move(r.visible));
   }
   s.tissue = static_cast<uint32_t>(rest.size());
-  s.count = s.tissue + static_cast<uint32_t>(scene.thread.particles);
-  s.inv_mass.resize(s.count, 1.0f / scene.thread.mass);
+  s.count = s.tissue;
+  for (const NeedleAndThread& u : sutures) {
+    s.strand.push_back(make_strand(scene, u.thread, s.count, scene.solver.gravity));
+    s.count += s.strand.back().count;
+    s.inv_mass.resize(s.count, s.strand.back().inv_mass);
+  }
   s.shape = make_shape_model(rest, mass, cluster);
   s.use_volume = scene.solver.volume;
   s.volume_compliance = scene.solver.volume_compliance;
@@ -327,30 +380,17 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   m.hand_compliance = 1 / scene.solver.hand_stiffness;
   s.tool_force = scene.solver.tool_force;
   s.friction = {scene.solver.friction_tissue, scene.solver.friction_tool, scene.solver.friction_thread};
-  s.strand.resize(1);
-  StrandModel& t = s.strand[0];
-  t.first_slot = s.tissue;
-  t.count = static_cast<uint32_t>(scene.thread.particles);
-  t.spacing = scene.thread.spacing;
-  t.radius = scene.thread.radius;
-  t.inv_mass = 1.0f / scene.thread.mass;
-  t.stretch_compliance = scene.thread.stretch_compliance;
-  t.bend_compliance = scene.solver.bend_compliance;
-  t.bend_sweeps = scene.solver.bend_sweeps;
-  t.distance_sweeps = scene.solver.distance_sweeps;
-  t.direct = scene.solver.thread_direct;
-  t.collision_off = scene.suture.collision_off;
-  t.gravity = s.gravity;
-
-  const NeedleShape needle{scene.needle.radius, scene.needle.arc, scene.needle.wire_radius, scene.needle.mass};
-  s.needle_arc = {needle_arc(needle)};
   for (const InstrumentSpec& spec : instruments_of(scene)) {
     const InstrumentModel* kind = find_instrument(spec.kind, own);
     if (!kind) throw InputError(where, "instrument.kind \"" + spec.kind + "\" is not known", known_instruments(own));
     m.suture.instrument.push_back(*kind);
     s.body.push_back(kind->body);
   }
-  s.body.push_back(needle_body(needle));
+  for (const NeedleAndThread& u : sutures) {
+    const NeedleShape needle{u.needle.radius, u.needle.arc, u.needle.wire_radius, u.needle.mass};
+    s.needle_arc.push_back(needle_arc(needle));
+    s.body.push_back(needle_body(needle));
+  }
   s.ground = drape;
 
   SutureModel& u = m.suture;
@@ -365,31 +405,23 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
 
   m.technique = make_technique(scene, working_rim, wall, where);
 
-  // The needle lies on the drape to the right of the organ, its circle flat, the thread leading away from its swage. Two bowel
-  // ends lie along x, and the needle in front of them.
   m.start = rest;
   const bool two = scene.body.size() > 1 && lies(scene.body[0]);
   const float tube = scene.body[0].radius;
   const Vec3 rim = two ? 0.5f * (scene.body[0].position + scene.body[1].position) : scene.body[0].position;
-  const Pose flat{{}, axis_angle({1, 0, 0}, -0.5f * kPi)};  // body z up: the circle lies in the drape's plane
-  const float wire = s.ground + scene.needle.wire_radius + 0.0002f;
-  const Vec3 beside = two ? Vec3{0.02f, 0, tube + 0.03f} : Vec3{tube + 0.03f, 0, 0.01f};
-  m.needle_start = {Vec3{rim.x + beside.x, wire, rim.z + beside.z}, flat.q};
-  const Vec3 swage = transform(m.needle_start, s.needle_arc[0].point(0));
-  std::vector<Vec3> thread = lay_thread(scene.thread, swage);
-  for (size_t i = thread.size(); i-- > 0;) m.start.push_back(thread[i]);  // free end first
+  lay_out_sutures(m, sutures, rim, two, tube);
   add_instruments(m, scene, rim, where);
 
   PictureModel& p = m.picture;
   p.title = scene.title;
   p.particle_rest = rest;
   p.wall = m.wall;
-  p.thread_first = s.tissue;
-  p.thread_count = t.count;
-  p.thread_radius = t.radius;
-  p.needle_radius = scene.needle.radius;
-  p.needle_arc = scene.needle.arc;
-  p.needle_wire_radius = scene.needle.wire_radius;
+  p.suture.clear();
+  for (size_t k = 0; k < sutures.size(); ++k) {
+    const NeedleSpec& needle = sutures[k].needle;
+    const StrandModel& t = s.strand[k];
+    p.suture.push_back({t.first_slot, t.count, t.radius, t.spacing, needle.radius, needle.arc, needle.wire_radius});
+  }
   p.focus = two ? rim + Vec3{0, tube, 0} : rim;  // two ends are joined on top, where their rims face each other
   p.field = 3 * tube;
   p.drape = s.ground;
@@ -405,9 +437,14 @@ StatePtr initial_state(const Model& model) {
   State& s = *state;
   s.solver = make_solver_state(model.solver, model.start);
   prepare_scratch(model.solver, s.scratch);
+  const size_t sutures = model.solver.strand.size();
+  s.suture.suture.resize(sutures);
+  s.technique.resize(sutures);
+  s.plan.resize(sutures);
   reserve_room(model, s);
   lay_out_instruments(model, s);
-  fresh_suture(model.solver, s.solver, model.suture, model.start, model.needle_start);
+  for (size_t k = 0; k < model.solver.strand.size(); ++k)
+    fresh_suture(model.solver, s.solver, k, model.start, model.needle_start[k]);
   return state;
 }
 

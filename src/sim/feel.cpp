@@ -21,27 +21,34 @@ constexpr float kTrust = 0.0001f;   // [m] of motion that weighs as much as the 
 constexpr float kNothing = 0.005f;  // [N] less than this is not felt
 constexpr float kLook = 0.008f;     // [m] how far ahead the next contact is looked for; the broad phase's margin
 
-Vec3 thread_on_tool(const SolverState& s, const ThreadHold& hold) {
-  const auto node = std::find(s.strand[0].order.begin(), s.strand[0].order.end(), hold.slot);
-  if (node == s.strand[0].order.end()) return {};
-  const size_t i = static_cast<size_t>(node - s.strand[0].order.begin());
-  const auto place = [&](size_t at) { return thread_position(s.strand[0], at, s.x.data(), s.body); };
+Vec3 thread_on_tool(const SolverState& s, const Strand& strand, const ThreadHold& hold) {
+  const size_t i = node_of(strand, hold.slot);
+  if (i == strand.order.size()) return {};
+  const auto place = [&](size_t at) { return thread_position(strand, at, s.x.data(), s.body); };
   Vec3 force;
-  if (i > 0) force += normalized(place(i - 1) - place(i)) * s.strand[0].tension[i - 1];
-  if (i < s.strand[0].tension.size()) force += normalized(place(i + 1) - place(i)) * s.strand[0].tension[i];
+  if (i > 0) force += normalized(place(i - 1) - place(i)) * strand.tension[i - 1];
+  if (i < strand.tension.size()) force += normalized(place(i + 1) - place(i)) * strand.tension[i];
   return force;
+}
+
+// Along a needle's shaft toward its tip, where the tissue of a channel point lies on it.
+Vec3 along_shaft(const Model& model, const SolverState& s, const ChannelPoint& c) {
+  const NeedleArc& arc = model.solver.needle_arc[c.suture];
+  const RigidBody& needle = s.body[model.solver.needle_body(c.suture)];
+  return rotate(needle.q, arc.tangent(arc.nearest(to_local(needle.pose(), position_of(c.point, s.x.data())))));
 }
 
 Sym3 across(Vec3 n, float k) { return identity(k) + outer(n, -k); }
 constexpr float series(float a, float b) { return a * b / (a + b); }
 
-// What the wall does to a needle that goes through it (suture/forces), at its tip now.
-NeedleResistance resistance_now(const Model& model, const State& state, float tension) {
+// What the wall does to the needle of a suture that goes through it (suture/forces), at its tip now.
+NeedleResistance resistance_now(const Model& model, const State& state, size_t which, float tension) {
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
-  const RigidBody& needle = s.body[m.needle_body(0)];
-  const SutureState& suture = state.suture;
-  const NeedleArc& arc = m.needle_arc[0];
+  const uint32_t body = m.needle_body(which);
+  const RigidBody& needle = s.body[body];
+  const Suture& suture = state.suture.suture[which];
+  const NeedleArc& arc = m.needle_arc[which];
   const auto along = [&](const BiteEnd& end) {
     return arc.radius * arc.nearest(to_local(needle.pose(), position_of(end.point, s.x.data())));
   };
@@ -56,8 +63,7 @@ NeedleResistance resistance_now(const Model& model, const State& state, float te
   const bool tip_in = phase_of(suture) == NeedlePhase::tip_in;
   if (tip_in && suture.attached) {
     for (const Attachment& a : s.attach)
-      if (a.body == static_cast<int>(m.needle_body(0)))
-        indented = distance(transform(needle.pose(), a.target), suture.attached_from);
+      if (a.body == static_cast<int>(body)) indented = distance(transform(needle.pose(), a.target), suture.attached_from);
   } else if (tip_in) {
     SurfaceHit hit;
     const Vec3 heading = rotate(needle.q, arc.tangent(arc.arc));
@@ -92,21 +98,18 @@ void feel_substep(const Model& model, State& state, int i) {
     t.pressed += on.pressed * inv_h2;
     t.by_tool += on.by_tool * inv_h2;
     t.thread += (on.linear - on.pressing - on.rubbing) * inv_h2;
-    for (const ThreadHold& h : s.strand[0].hold)
-      if (h.body == body) t.thread += thread_on_tool(s, h);
+    for (const Strand& strand : s.strand)
+      for (const ThreadHold& h : strand.hold)
+        if (h.body == body) t.thread += thread_on_tool(s, strand, h);
     for (const Attachment& a : s.attach)
       if (a.body == body) t.held += a.lambda * -inv_h2;
-    bool has_needle = false;
-    for (const Weld& w : s.weld)
-      if (w.b == body) t.needle += w.lambda * -inv_h2, has_needle = true;
-    if (has_needle) {
-      const RigidBody& needle = s.body[m.needle_body(0)];
-      for (const ChannelPoint& c : s.channel) {
-        const Vec3 way =
-            rotate(needle.q,
-                   m.needle_arc[0].tangent(m.needle_arc[0].nearest(to_local(needle.pose(), position_of(c.point, s.x.data())))));
-        t.drag += way * (-c.drag_lambda * inv_h2);  // the channel's push on the tissue, turned round: on the needle
-      }
+    const InstrumentState& hand = state.suture.instrument[static_cast<size_t>(body)];
+    if (hand.held == Held::needle) {
+      const int needle = static_cast<int>(m.needle_body(hand.suture));
+      for (const Weld& w : s.weld)
+        if (w.a == needle && w.b == body) t.needle += w.lambda * -inv_h2;
+      for (const ChannelPoint& c : s.channel)  // the channel's push on the tissue, turned round: on the needle
+        if (c.suture == hand.suture) t.drag += along_shaft(model, s, c) * (-c.drag_lambda * inv_h2);
     }
     t.hand += weld.lambda * -inv_h2;
     t.at += weld.target.p;
@@ -206,22 +209,25 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     stiff += identity(series(kTissue, 1 / model.suture.tissue_compliance));
     both_ways = true;
   }
-  if (hand.held == Held::needle && (!s.channel.empty() || length(needle) > 20 * kNothing)) {
-    const RigidBody& body = s.body[m.needle_body(0)];
-    for (const ChannelPoint& c : s.channel) {
-      const Vec3 way = rotate(
-          body.q, m.needle_arc[0].tangent(m.needle_arc[0].nearest(to_local(body.pose(), position_of(c.point, s.x.data())))));
-      stiff += across(way, series(kTissue, 1 / std::max(1e-6f, c.compliance)));
-    }
-    if (state.suture.attached) stiff += identity(series(kTissue, 1 / std::max(1e-6f, model.suture.attach_compliance)));
-    if (s.channel.empty()) stiff += outer(normalized(needle), kTissue);  // its shaft lies against something
+  const bool in_channel =
+      std::any_of(s.channel.begin(), s.channel.end(), [&](const ChannelPoint& c) { return c.suture == hand.suture; });
+  const Suture& suture = state.suture.suture[hand.suture];
+  if (hand.held == Held::needle && (in_channel || length(needle) > 20 * kNothing)) {
+    for (const ChannelPoint& c : s.channel)
+      if (c.suture == hand.suture)
+        stiff += across(along_shaft(model, s, c), series(kTissue, 1 / std::max(1e-6f, c.compliance)));
+    if (suture.attached) stiff += identity(series(kTissue, 1 / std::max(1e-6f, model.suture.attach_compliance)));
+    if (!in_channel) stiff += outer(normalized(needle), kTissue);  // its shaft lies against something
     both_ways = true;
-    p.along = rotate(body.q, m.needle_arc[0].tangent(hand.at * m.needle_arc[0].arc));
+    const NeedleArc& arc = m.needle_arc[hand.suture];
+    p.along = rotate(s.body[m.needle_body(hand.suture)].q, arc.tangent(hand.at * arc.arc));
   }
   if (length(thread) > 4 * kNothing) {
     // Taut thread is as stiff as the tissue it hangs on, along itself, unless it slides there.
-    const bool slides = std::any_of(s.strand[0].anchor.begin(), s.strand[0].anchor.end(),
-                                    [](const ThreadAnchor& a) { return a.slipping != 0; });
+    bool slides = false;
+    for (size_t i = 0; i < s.strand.size(); ++i)
+      for (const ThreadAnchor& a : s.strand[i].anchor)
+        if (hand.held != Held::thread || hand.suture == i) slides = slides || a.slipping != 0;
     if (!slides) stiff += outer(normalized(thread), kTissue);
     both_ways = true;
   }
@@ -236,7 +242,7 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     // The directions are those of what holds the tool; how stiff they are is what the hand has found.
     const float guess = (p.stiffness.xx + p.stiffness.yy + p.stiffness.zz) / 3;
     if (guess > 1) p.stiffness = clamp_eigenvalues(p.stiffness * (learned(felt, guess, coupling) / guess), 0, coupling);
-    if (hand.held == Held::needle && !state.suture.open.empty()) {
+    if (hand.held == Held::needle && !suture.open.empty()) {
       // Across the shaft and in turning it is the solver's reaction; along it what a wall really does, never less than the
       // solver says.
       float counter = 0;  // [N] with which another hand holds the tissue
@@ -244,7 +250,7 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
         const ToolReaction& o = state.feel.tool[other];
         if (other != k && o.substeps > 0) counter = std::max(counter, length(o.held) / o.substeps);
       }
-      const NeedleResistance r = resistance_now(model, state, counter);
+      const NeedleResistance r = resistance_now(model, state, hand.suture, counter);
       const float solver = -dot(needle, p.along);
       if (r.spring > solver) p.force -= p.along * (r.spring - solver);
       p.stiffness =

@@ -63,9 +63,10 @@ void park_here(const Model& model, State& state, size_t i) {
 
 void lay_down(const Model& model, State& state, size_t hand) {
   const size_t i = static_cast<size_t>(state.hand[hand].instrument);
-  release(state.solver, state.suture, static_cast<uint8_t>(i), 0, state.event);
+  SutureContext sewing{model.solver, state.solver, state.scratch, model.suture, state.suture, state.event};
+  release(sewing, static_cast<uint32_t>(i), 0);
   if (state.suture.loop[i].wraps > 0) {
-    take_off_loop(model.solver, state.solver, model.suture, state.suture, static_cast<uint32_t>(i));
+    take_off_loop(sewing, static_cast<uint32_t>(i));
     report(state, EventKind::loop_released, static_cast<uint8_t>(hand), 0);
   }
   report(state, EventKind::instrument_laid_down, static_cast<uint8_t>(hand), i);

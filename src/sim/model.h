@@ -35,11 +35,9 @@ struct Model {
   std::vector<ParkedStart> parked;               // that hold tissue at the start
   std::array<Pose, kMaxHands> hand_start;        // before a hand is connected
   std::array<int, kMaxHands> hand_instrument{};  // that a hand has at the start; -1: none
-  Pose needle_start;                             // body frame
+  std::vector<Pose> needle_start;                // body frame, per suture
   float hand_compliance = 1.0f / 3000, hand_angular_compliance = 0.05f;  // [m/N], [rad/(N m)] tool on its hand
   PictureModel picture;
 };
-
-// How the suture thread and the needle lie at the start is part of building the model.
 
 }  // namespace catgut

@@ -39,13 +39,13 @@ void publish_hands(const Model& model, const State& state, Snapshot& out) {
     t.held = tool.held;
     t.held_at = tool.at;
     t.held_slot = tool.slot;
-    t.held_strands =
-        static_cast<uint32_t>(std::count_if(s.strand[0].hold.begin(), s.strand[0].hold.end(), [&](const ThreadHold& h) {
-          return h.body == t.instrument && h.kind == HoldKind::jaw;
-        }));
+    t.held_suture = tool.suture;
+    for (const Strand& strand : s.strand)
+      for (const ThreadHold& h : strand.hold) t.held_strands += h.body == t.instrument && h.kind == HoldKind::jaw;
     const ToolLoop& loop = state.suture.loop[i];
     t.loop_wraps = loop.wraps;
     t.loop_handed = loop.handed;
+    t.loop_suture = loop.suture;
     t.loop_first = loop.first;
     t.loop_last = loop.last;
     // The weld's multiplier acts on the tool; the hand feels its opposite.
@@ -54,28 +54,75 @@ void publish_hands(const Model& model, const State& state, Snapshot& out) {
   }
 }
 
-void publish_knots(const Model& model, const State& state, Snapshot& out) {
-  const SolverState& s = state.solver;
-  const Vec4* x = s.x.data();
+void publish_knots(const State& state, size_t which, SutureView& out) {
+  const Suture& suture = state.suture.suture[which];
+  const std::vector<ThreadAnchor>& anchor = state.solver.strand[which].anchor;
+  const Vec4* x = state.solver.x.data();
   out.knot.clear();
-  for (const Knot& k : state.suture.knot) {
+  for (const Knot& k : suture.knot) {
     KnotView v;
     v.phase = k.phase;
     v.position = position_of(k.target, x);
     if (k.phase == KnotPhase::tightening && k.begun == 0) v.position += normalized(k.from) * k.left;
     v.throws = k.throws;
     v.thrown = k.thrown;
-    if (state.suture.point.size() > 1)
-      v.way = normalized(position_of(s.strand[0].anchor[state.suture.point.back().anchor], x) -
-                             position_of(s.strand[0].anchor[state.suture.point.front().anchor], x),
-                         {1, 0, 0});
+    if (suture.point.size() > 1)
+      v.way = normalized(
+          position_of(anchor[suture.point.back().anchor], x) - position_of(anchor[suture.point.front().anchor], x), {1, 0, 0});
     out.knot.push_back(v);
   }
+}
+
+void publish_bites(const Model& model, const State& state, size_t which, SutureView& out) {
+  const Suture& suture = state.suture.suture[which];
+  const Strand& strand = state.solver.strand[which];
+  const std::vector<Triangle>& surface = model.solver.collision.surface;
+  const Vec4* x = state.solver.x.data();
+  out.suture_point.clear();
+  for (const SuturePoint& p : suture.point) {
+    const ThreadAnchor& a = strand.anchor[p.anchor];
+    const Bite& bite = suture.bite[p.bite];
+    out.suture_point.push_back({position_of(a.point, x), p.bite, p.exit, a.slot, a.tension_needle, a.tension_free,
+                                model.wall[surface[(p.exit ? bite.exit : bite.entry).triangle][0]]});
+  }
+  out.bite.clear();
+  for (const Bite& b : suture.bite) {
+    const uint32_t in = surface[b.entry.triangle][0], through = surface[b.exit.triangle][0];
+    const auto inside = [&](uint32_t i) { return model.layer[i] == static_cast<uint8_t>(TissueLayer::mucosa); };
+    out.bite.push_back({position_of(b.entry.point, x), position_of(b.exit.point, x), b.depth, b.has_exit, b.complete,
+                        model.wall[in], inside(in), inside(through)});
+  }
+  out.seam.clear();
+  for (const ClosurePlan::Pair& p : state.plan[which].pair)
+    out.seam.push_back({position_of(p.a, x), position_of(p.b, x), p.start, p.progress, p.midpoint != 0});
+}
+
+void publish_suture(const Model& model, const State& state, size_t which, SutureView& out) {
+  const Suture& suture = state.suture.suture[which];
+  const Strand& strand = state.solver.strand[which];
+  const RigidBody& needle = state.solver.body[model.solver.needle_body(which)];
+  // Published at the circle's center, which is what pictures and plans turn about.
+  out.needle.pose = {transform(needle.pose(), model.solver.needle_arc[which].centre), needle.q};
+  out.needle.in_tissue = !suture.open.empty();
+  out.needle.bite = suture.open.empty() ? 0 : suture.open.back().bite;
+  out.thread_order = strand.order;
+  out.thread_tension = strand.tension;
+  out.thread_cut = strand.cut;
+  out.thread_rest = 0;
+  for (size_t i = 0; i < strand.rest.size(); ++i)
+    if (!strand.cut[i]) out.thread_rest += strand.rest[i];
+  out.needle_on_thread = is_swaged(strand);
+  publish_bites(model, state, which, out);
+  publish_knots(state, which, out);
+}
+
+void publish_settled(const Model& model, const State& state, Snapshot& out) {
+  const SolverState& s = state.solver;
   out.settled.clear();
   const auto place = [&](const SettledNode& n) {
     const uint32_t c = model.solver.shape.cluster_of[n.particle];
     const Quat q{s.rotation.x[c], s.rotation.y[c], s.rotation.z[c], s.rotation.w[c]};
-    return xyz(x[n.particle]) + rotate(q, n.offset);
+    return xyz(s.x[n.particle]) + rotate(q, n.offset);
   };
   for (const SettledStitch& stitch : state.suture.settled) {
     SettledView v;
@@ -101,39 +148,15 @@ void publish(const Model& model, const State& state, Snapshot& out) {
     const uint32_t c = m.shape.cluster_of[i];
     out.rotation[i] = {s.rotation.x[c], s.rotation.y[c], s.rotation.z[c], s.rotation.w[c]};
   }
-  out.thread_order = s.strand[0].order;
-  out.thread_tension = s.strand[0].tension;
   publish_hands(model, state, out);
-  // Published at the circle's centre, which is what pictures and plans turn about.
-  out.needle.pose = {transform(s.body[m.needle_body(0)].pose(), m.needle_arc[0].centre), s.body[m.needle_body(0)].q};
-  out.needle.in_tissue = !state.suture.open.empty();
-  out.needle.bite = state.suture.open.empty() ? 0 : state.suture.open.back().bite;
-  out.suture_point.clear();
-  for (const SuturePoint& p : state.suture.point) {
-    const ThreadAnchor& a = s.strand[0].anchor[p.anchor];
-    const Bite& bite = state.suture.bite[p.bite];
-    out.suture_point.push_back({position_of(a.point, s.x.data()), p.bite, p.exit, a.slot, a.tension_needle, a.tension_free,
-                                model.wall[m.collision.surface[(p.exit ? bite.exit : bite.entry).triangle][0]]});
-  }
-  out.thread_cut = s.strand[0].cut;
-  out.thread_rest = 0;
-  for (size_t i = 0; i < s.strand[0].rest.size(); ++i)
-    if (!s.strand[0].cut[i]) out.thread_rest += s.strand[0].rest[i];
-  out.needle_on_thread = is_swaged(s.strand[0]);
-  publish_knots(model, state, out);
-  out.seam.clear();
-  for (const ClosurePlan::Pair& p : state.plan.pair)
-    out.seam.push_back({position_of(p.a, s.x.data()), position_of(p.b, s.x.data()), p.start, p.progress, p.midpoint != 0});
-  out.bite.clear();
-  for (const Bite& b : state.suture.bite) {
-    const uint32_t in = m.collision.surface[b.entry.triangle][0], through = m.collision.surface[b.exit.triangle][0];
-    const auto inside = [&](uint32_t i) { return model.layer[i] == static_cast<uint8_t>(TissueLayer::mucosa); };
-    out.bite.push_back({position_of(b.entry.point, s.x.data()), position_of(b.exit.point, s.x.data()), b.depth, b.has_exit,
-                        b.complete, model.wall[in], inside(in), inside(through)});
-  }
+  out.suture.resize(s.strand.size());
+  for (size_t k = 0; k < s.strand.size(); ++k) publish_suture(model, state, k, out.suture[k]);
+  out.active_suture = state.suture.active;
+  publish_settled(model, state, out);
   const std::vector<uint32_t>& rim = model.technique.purse_string.rim_inner;
   out.opening_area = rim.empty() ? 0 : opening_area(rim, s.x.data());
-  out.closure = state.plan.progress;
+  out.closure = 0;
+  for (const ClosurePlan& plan : state.plan) out.closure = std::max(out.closure, plan.progress);
   out.event = state.event.list;
 }
 

@@ -90,13 +90,25 @@ bool knot_fits(const Strand& strand, const Knot& k) {
   return !tightening || (is_anchored(strand, k.end[0]) && is_anchored(strand, k.end[1]));
 }
 
-bool suture_fits(const SolverModel& model, const SolverState& solver, const SutureState& u) {
-  const bool tip_attached = std::any_of(solver.attach.begin(), solver.attach.end(),
-                                        [&](const Attachment& t) { return t.body == static_cast<int>(model.needle_body(0)); });
+// Suture `which`, and what hands and loops have of it.
+bool suture_fits(const SolverModel& model, const SolverState& solver, const SutureState& state, size_t which) {
+  const Suture& u = state.suture[which];
+  const Strand& strand = solver.strand[which];
+  if (!strand_fits(model.strand[which], strand)) return false;
+  const int needle = static_cast<int>(model.needle_body(which));
+  const bool tip_attached =
+      std::any_of(solver.attach.begin(), solver.attach.end(), [&](const Attachment& t) { return t.body == needle; });
   if (u.attached && (!tip_attached || phase_of(u) != NeedlePhase::tip_in)) return false;
   for (const OpenBite& open : u.open)
     if (open.phase == NeedlePhase::outside || (open.phase == NeedlePhase::back_in && u.point.empty())) return false;
-  return std::all_of(u.knot.begin(), u.knot.end(), [&](const Knot& k) { return knot_fits(solver.strand[0], k); });
+  for (const SuturePoint& p : u.point)
+    if (p.anchor >= strand.anchor.size()) return false;
+  const auto has = [&](uint32_t slot) { return model.strand[which].has(slot); };
+  for (const InstrumentState& h : state.instrument)
+    if (h.suture == which && h.held == Held::thread && !has(h.slot)) return false;
+  for (const ToolLoop& l : state.loop)
+    if (l.suture == which && l.wraps > 0 && (!has(l.first) || !has(l.last))) return false;
+  return std::all_of(u.knot.begin(), u.knot.end(), [&](const Knot& k) { return knot_fits(strand, k) && has(k.strand); });
 }
 
 // The first welds hold the instruments; a hand and its instrument name each other.
@@ -117,9 +129,12 @@ bool hands_fit(uint32_t instruments, const State& s) {
 bool fits(const Model& model, const State& s) {
   Validator indices(model.solver);
   indices(s);
-  return indices.good() && hands_fit(model.solver.instruments(), s) &&
-         strand_fits(model.solver.strand[0], s.solver.strand[0]) && suture_fits(model.solver, s.solver, s.suture) &&
-         technique_fits(model.technique, s.technique, s.plan.pair.size(), s.suture.point.size());
+  if (!indices.good() || !hands_fit(model.solver.instruments(), s)) return false;
+  for (size_t k = 0; k < s.solver.strand.size(); ++k)
+    if (!suture_fits(model.solver, s.solver, s.suture, k) ||
+        !technique_fits(model.technique, s.technique[k], s.plan[k].pair.size(), s.suture.suture[k].point.size()))
+      return false;
+  return true;
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 // SI units throughout. A value left out of a scene file keeps the default given here.
 #pragma once
 #include <cstdint>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -52,6 +51,12 @@ struct NeedleSpec {
   float arc = 3.14159265f;       // [rad]
   float wire_radius = 0.00033f;  // [m]
   float mass = 0.005f;  // [kg] inertia; more than the steel's 0.07 g, to match the scaled inertia of the tissue it moves
+};
+
+// One of several sutures: a needle and the thread swaged to it.
+struct NeedleAndThread {
+  ThreadSpec thread;
+  NeedleSpec needle;
 };
 
 // The solver's knobs. preset = "paper" sets all of them as in section 2.1 of the paper; "default" is what works best.
@@ -134,6 +139,7 @@ struct SceneSpec {
   std::vector<InstrumentSpec> instrument;
   ThreadSpec thread;
   NeedleSpec needle;
+  std::vector<NeedleAndThread> sutures;  // that lie ready at the start; empty: one, of `thread` and `needle`
   SolverSpec solver;
   SutureSpec suture;
   TechniqueSpec technique;
@@ -141,6 +147,8 @@ struct SceneSpec {
   std::vector<Expectation> expect;
 };
 
+// The needles and threads of a scene: at least one.
+std::vector<NeedleAndThread> sutures_of(const SceneSpec& scene);
 // Sets every solver knob to the named preset ("paper" or "default"); false if there is no such preset.
 bool apply_preset(SolverSpec& solver, const std::string& preset);
 

@@ -27,21 +27,23 @@ constexpr void reflect(auto& a, Like<HandState> auto& h) {
 struct State {
   uint64_t tick = 0;
   SolverState solver;                     // written by solver/substep, suture/*
-  SutureState suture;                     // written by suture/{grasp, puncture, pull}
-  TechniqueState technique;               // written by technique
-  ClosurePlan plan;                       // written by technique, read by suture/closure
+  SutureState suture;                     // written by suture
+  std::vector<TechniqueState> technique;  // one per suture; written by technique
+  std::vector<ClosurePlan> plan;          // one per suture; written by technique, read by suture/closure
   std::array<HandState, kMaxHands> hand;  // written by sim/hands
   Feel feel;                              // written by sim/feel, read by publish
   EventList event;                        // of the last tick
   // Working memory.
+  EventList suture_event;  // of one suture, for its technique
   std::vector<StitchPoint> stitch;
   std::vector<float> stitch_span;
   SolverScratch scratch;
 };
 
 constexpr void reflect(auto& a, Like<State> auto& s) {
-  a(s.tick), a(s.solver), a(s.suture), a(s.plan), a(s.technique), a(s.hand), a(s.feel), a(s.event);
-  a.cache(s.stitch), a.cache(s.stitch_span), a.cache(s.scratch);
+  a(s.tick), a(s.solver), a(s.suture), a.column(s.plan, IndexOf::strand), a.column(s.technique, IndexOf::strand);
+  a(s.hand), a(s.feel), a(s.event);
+  a.cache(s.suture_event), a.cache(s.stitch), a.cache(s.stitch_span), a.cache(s.scratch);
 }
 
 }  // namespace catgut

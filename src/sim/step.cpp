@@ -9,13 +9,14 @@
 namespace catgut {
 namespace {
 
-// What the technique may see of the tick.
-TechniqueView look(const Model& model, State& state) {
-  const Strand& thread = state.solver.strand[0];
+// What the technique may see of a suture in the tick.
+TechniqueView look(const Model& model, State& state, size_t which) {
+  const Strand& thread = state.solver.strand[which];
+  const Suture& suture = state.suture.suture[which];
   state.stitch.clear();
-  for (const SuturePoint& p : state.suture.point) {
+  for (const SuturePoint& p : suture.point) {
     StitchPoint s;
-    const BiteEnd& end = p.exit ? state.suture.bite[p.bite].exit : state.suture.bite[p.bite].entry;
+    const BiteEnd& end = p.exit ? suture.bite[p.bite].exit : suture.bite[p.bite].entry;
     s.point = thread.anchor[p.anchor].point;
     s.at = position_of(s.point, state.solver.x.data());
     s.bite = p.bite;
@@ -25,18 +26,37 @@ TechniqueView look(const Model& model, State& state) {
     s.inside = model.layer[corner] == static_cast<uint8_t>(TissueLayer::mucosa);
     state.stitch.push_back(s);
   }
-  spans(state.solver, state.suture, state.stitch_span);
+  spans(thread, suture, state.solver.x.data(), state.stitch_span);
   for (size_t k = 0; k < state.stitch.size(); ++k) state.stitch[k].span = state.stitch_span[k];
   TechniqueView view;
   view.point = state.stitch;
-  view.bite = state.suture.bite;
-  view.knot = state.suture.knot;
+  view.bite = suture.bite;
+  view.knot = suture.knot;
   view.x = state.solver.x.data();
-  view.loop = length_between_ends(state.solver, state.suture);
-  view.needle_in_tissue = !state.suture.open.empty();
-  view.taken = state.suture.taken;
+  view.loop = length_between_ends(thread, suture);
+  view.needle_in_tissue = !suture.open.empty();
+  view.taken = suture.taken;
   view.dt = model.dt;
   return view;
+}
+
+// Every suture is judged and closed by itself, from its own events.
+void follow_technique(const Model& model, State& state) {
+  const size_t before = state.event.size();
+  EventList& own = state.suture_event;
+  for (size_t k = 0; k < state.technique.size(); ++k) {
+    own.start(state.tick);
+    for (size_t i = 0; i < before; ++i)
+      if (state.event[i].suture == k) own.add(state.event[i]);
+    const size_t seen = own.size();
+    technique(model.technique, state.technique[k], look(model, state, k), state.plan[k], own);
+    for (size_t i = seen; i < own.size(); ++i) {
+      Event e = own[i];
+      e.suture = static_cast<uint16_t>(k);
+      state.event.add(e);
+    }
+  }
+  close(state.solver, state.plan);
 }
 
 }  // namespace
@@ -48,13 +68,14 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   meet_hands(state, input);
   handle_instruments(model, state, input);
   const std::array<uint32_t, kMaxHands> pressed = pressed_buttons(state.suture, input.hand);
-  grasp(solver, state.solver, state.scratch, model.suture, state.suture, input.hand, state.event);
+  SutureContext sewing{solver, state.solver, state.scratch, model.suture, state.suture, state.event};
+  grasp(sewing, input.hand);
   {
     StageTimer timer(times, Stage::loop);
-    find_loops(solver, state.solver, model.suture, state.suture, state.event);
-    tie(solver, state.solver, model.suture, state.suture, state.event);
-    cut(solver, state.solver, model.suture, state.suture, pressed, state.event);
-    new_suture(solver, state.solver, model.suture, state.suture, model.start, model.needle_start, pressed, state.event);
+    find_loops(sewing);
+    tie(sewing);
+    cut(sewing, pressed);
+    new_suture(sewing, model.start, model.needle_start, pressed);
   }
   // As far as thread and tools may come nearer to anything in a tick, at half a metre a second; but no less than what a knot's
   // thread jumps when it slips.
@@ -65,21 +86,20 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));
     substep(solver, state.solver, state.scratch, jobs, times);
     feel_substep(model, state, i);
-    slip(solver, state.solver, model.suture, state.suture, state.event);
+    slip(sewing);
     {
       StageTimer timer(times, Stage::puncture);
-      puncture(solver, state.solver, state.scratch, model.suture, state.suture, state.event);
+      puncture(sewing);
     }
     {
       StageTimer timer(times, Stage::pull);
-      pull(solver, state.solver, model.suture, state.suture, state.event);
-      tighten(solver, state.solver, state.scratch, model.suture, state.suture, state.event);
+      pull(sewing);
+      tighten(sewing);
     }
   }
   {
     StageTimer timer(times, Stage::closure);
-    technique(model.technique, state.technique, look(model, state), state.plan, state.event);
-    close(state.solver, state.plan);
+    follow_technique(model, state);
   }
   remember_hands(state, input);
   ++state.tick;

@@ -60,6 +60,7 @@ struct Attachment {
   int body = -1;         // -1: the world
   Vec3 target;           // [m] world, or body frame
   float compliance = 0;  // [m/N]
+  uint32_t suture = 0;   // body -1: whose closure plan made it
   Vec3 lambda;           // [N s^2] cleared at the start of a substep; acts on the tissue
 };
 

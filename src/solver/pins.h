@@ -21,6 +21,7 @@ struct TissuePin {
   float compliance = 0;  // [m/N]
   float lambda = 0;      // [N s^2] of the last substep; negative: it pulls
   PinOwner owner = PinOwner::plan;
+  uint32_t suture = 0;  // whose plan
 };
 
 // One XPBD step of a pin (Macklin et al. 2016) on top of what its lambda says that it pulls already.

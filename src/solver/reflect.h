@@ -16,9 +16,7 @@ enum class IndexOf : uint8_t {
   instrument,
   triangle,  // of the tissue's surface
   strand,    // a suture's; so is its needle
-  anchor,    // of a strand
-  bite,
-  plan_row,  // of ClosurePlan::pair
+  bite,      // of a suture
   count_
 };
 
@@ -39,7 +37,8 @@ constexpr void reflect(auto& a, Like<Weld> auto& w) {
 }
 
 constexpr void reflect(auto& a, Like<Attachment> auto& t) {
-  a(t.point), a.index_or_none(t.body, IndexOf::body), a(t.target), a(t.compliance), a(t.lambda);
+  a(t.point), a.index_or_none(t.body, IndexOf::body), a(t.target), a(t.compliance);
+  a.index(t.suture, IndexOf::strand), a(t.lambda);
 }
 
 constexpr void reflect(auto& a, Like<ChannelPoint> auto& c) {
@@ -48,6 +47,7 @@ constexpr void reflect(auto& a, Like<ChannelPoint> auto& c) {
 
 constexpr void reflect(auto& a, Like<TissuePin> auto& p) {
   a(p.a), a(p.b), a(p.length), a(p.compliance), a(p.lambda), a.at_most(p.owner, PinOwner::passage);
+  a.index(p.suture, IndexOf::strand);
 }
 
 constexpr void reflect(auto& a, Like<ThreadAnchor> auto& t) {
@@ -60,10 +60,7 @@ constexpr void reflect(auto& a, Like<ThreadHold> auto& h) {
 }
 
 // That a strand has its own slots, each once, is seen to by load_state.
-constexpr void reflect(auto& a, Like<Strand> auto& t) {
-  a(t.order), a(t.rest), a(t.cut), a(t.anchor), a(t.hold), a(t.tension);
-  a.domain(IndexOf::anchor, t.anchor.size());
-}
+constexpr void reflect(auto& a, Like<Strand> auto& t) { a(t.order), a(t.rest), a(t.cut), a(t.anchor), a(t.hold), a(t.tension); }
 
 constexpr void reflect(auto& a, Like<ClusterRotations> auto& r) {
   for (auto* each : {&r.x, &r.y, &r.z, &r.w}) a.column(*each, IndexOf::cluster);

@@ -60,7 +60,7 @@ void places_round(const PictureModel& picture, const SurgeonSkill& skill, int bi
     settle_on_serosa(picture.body[0], on_rim, o.axis, cross(o.axis, radial), edge, p);
     p.up = o.axis;
     p.length = skill.bite_length;
-    p.depth = depth_of(p.length, picture.needle_radius, run.back() / (2 * kPi));
+    p.depth = depth_of(p.length, picture.suture[0].needle_radius, run.back() / (2 * kPi));
     p.level = true;
     plan.place.push_back(p);
   }
@@ -133,7 +133,7 @@ Plan connell_plan(const PictureModel& picture, const SurgeonSkill& skill) {
       BitePlace p = on_top(picture, static_cast<uint32_t>(s % 2), angle, skill.edge_distance + kRow * static_cast<float>(row));
       p.up = {1, 0, 0};
       p.length = skill.bite_length;
-      p.depth = depth_of(p.length, picture.needle_radius, radius);
+      p.depth = depth_of(p.length, picture.suture[0].needle_radius, radius);
       p.walls = 2;
       plan.place.push_back(p);
     }
@@ -169,7 +169,7 @@ Plan stay_plan(const PictureModel& picture, const SurgeonSkill& skill) {
     BitePlace p = on_top(picture, wall, 0, skill.edge_distance + 0.5f * skill.bite_length);
     p.up = {0, 0, 1};
     p.length = skill.bite_length;
-    p.depth = depth_of(p.length, picture.needle_radius, 1e9f);
+    p.depth = depth_of(p.length, picture.suture[0].needle_radius, 1e9f);
     plan.place.push_back(p);
   }
   add(plan, TaskKind::pick_up);

@@ -45,7 +45,7 @@ void Scripted::take_over(const Snapshot& seen) {
     if (holds_needle(seen, k)) remember_grip(seen, k);
   }
   frame_ = frame(seen, place_);
-  bites_before_ = seen.bite.size();
+  bites_before_ = seen.active().bite.size();
   pull_from_ = hand_[kForceps].pose;
 }
 
@@ -114,20 +114,20 @@ BiteFrame Scripted::frame(const Snapshot& seen, size_t place) const {
 }
 
 Pose Scripted::needle_at(const BiteFrame& f, float psi) const {
-  const Vec3 centre = f.at + f.out * (picture_.needle_radius - bite().depth + depth_error_ + depth_fix_);
+  const Vec3 centre = f.at + f.out * (picture_.suture[0].needle_radius - bite().depth + depth_error_ + depth_fix_);
   const Vec3 x = f.out * portable::cos(psi) - f.along * portable::sin(psi);
   // The tip is at the end of the arc: for other arcs than a half circle turn back by what is missing.
   const Pose half{centre, from_axes(x, cross(f.up, x), f.up)};
-  return half * Pose{{}, axis_angle({0, 0, 1}, kPi - picture_.needle_arc)};
+  return half * Pose{{}, axis_angle({0, 0, 1}, kPi - picture_.suture[0].needle_arc)};
 }
 
 Pose Scripted::grip_at(const Pose& needle, float s, float side, float lean, float psi) const {
-  const float phi = s * picture_.needle_arc;
+  const float phi = s * picture_.suture[0].needle_arc;
   const Vec3 radial = rotate(needle.q, {portable::cos(phi), portable::sin(phi), 0});
   const Vec3 outward = rotate(needle.q, {portable::cos(psi), -portable::sin(psi), 0});
   const Vec3 z = normalized(rotate(needle.q, {0, 0, side}) + outward * lean);
   const Vec3 y = normalized(cross(z, radial), any_perpendicular(z)), x = cross(y, z);
-  return {needle.p + radial * picture_.needle_radius, from_axes(x, y, z)};
+  return {needle.p + radial * picture_.suture[0].needle_radius, from_axes(x, y, z)};
 }
 
 Pose Scripted::driver_grip(const Pose& needle) const {
@@ -195,7 +195,7 @@ std::string Scripted::name_of_bite() const {
 
 bool Scripted::pick_up(const Snapshot& seen) {
   enum { over, down, close };
-  const Pose grip = driver_grip(seen.needle.pose);
+  const Pose grip = driver_grip(seen.active().needle.pose);
   if (stage_ != over || seen.tick > 0) rest_aside(seen, kForceps);
   switch (stage_) {
     case over:
@@ -216,7 +216,7 @@ bool Scripted::pick_up(const Snapshot& seen) {
 bool Scripted::make_bite(const Snapshot& seen) {
   enum { hover, approach, drive, withdraw, over, down, close, release, retreat, bring };
   const float speed = skill_.speed, psi_bite = half_bite_angle();
-  const Pose& needle = seen.needle.pose;
+  const Pose& needle = seen.active().needle.pose;
   if (stage_ == hover && waited_ <= dt_) aim();
   switch (stage_) {
     case hover: {  // to a place beside the bite, clear of the organ
@@ -234,7 +234,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       frame_.at += frame_.along * aim_along_ + frame_.up * aim_up_;
       psi_ = -psi_bite - 0.45f;
       if (move(kDriver, holding(kDriver, needle_at(frame_, psi_)), careful())) {
-        bites_before_ = seen.bite.size();
+        bites_before_ = seen.active().bite.size();
         go(drive);
       } else if (!patience(5)) {
         gave_up_ = true;
@@ -244,17 +244,18 @@ bool Scripted::make_bite(const Snapshot& seen) {
     case drive: {
       doing_ = name_of_bite() + "drive the needle";
       rest_aside(seen, kForceps);
-      psi_ += skill_.drive_speed / picture_.needle_radius * dt_;
+      psi_ += skill_.drive_speed / picture_.suture[0].needle_radius * dt_;
       move(kDriver, holding(kDriver, needle_at(frame_, psi_)), 2 * speed);
-      const bool out = seen.bite.size() >= bites_before_ + static_cast<size_t>(bite().walls) && seen.bite.back().has_exit;
+      const bool out =
+          seen.active().bite.size() >= bites_before_ + static_cast<size_t>(bite().walls) && seen.active().bite.back().has_exit;
       if (out && psi_ > psi_bite + 0.72f) {
         go(over);
       } else if (psi_ > psi_bite + 1.1f) {
         // The tip is not where it should be: it never went in or not deep enough, or it went too deep to come out.
-        const bool passed = seen.bite.size() > bites_before_ && seen.bite.back().has_exit;
+        const bool passed = seen.active().bite.size() > bites_before_ && seen.active().bite.back().has_exit;
         // Through the first wall and not into the second: that gave way, as soft walls do, by millimetres.
-        const bool gave_way = passed && seen.bite.size() < bites_before_ + static_cast<size_t>(bite().walls);
-        depth_fix_ += gave_way ? -0.0008f : passed || !seen.needle.in_tissue ? -0.0003f : 0.0003f;
+        const bool gave_way = passed && seen.active().bite.size() < bites_before_ + static_cast<size_t>(bite().walls);
+        depth_fix_ += gave_way ? -0.0008f : passed || !seen.active().needle.in_tissue ? -0.0003f : 0.0003f;
         go(withdraw);
       }
       return false;
@@ -262,11 +263,11 @@ bool Scripted::make_bite(const Snapshot& seen) {
     case withdraw: {  // back the way it came, then the same bite again
       doing_ = name_of_bite() + "withdraw and retry";
       rest_aside(seen, kForceps);
-      psi_ = std::max(psi_ - 2 * skill_.drive_speed / picture_.needle_radius * dt_, -psi_bite - 0.7f);
+      psi_ = std::max(psi_ - 2 * skill_.drive_speed / picture_.suture[0].needle_radius * dt_, -psi_bite - 0.7f);
       BiteFrame f = frame_;
       if (!patience(1.5f)) f.at += f.out * std::min(0.01f, 0.01f * (waited_ - 1.5f));  // it sticks: away from the wall
       move(kDriver, holding(kDriver, needle_at(f, psi_)), 2 * speed);
-      if (psi_ <= -psi_bite - 0.7f && !seen.needle.in_tissue) {
+      if (psi_ <= -psi_bite - 0.7f && !seen.active().needle.in_tissue) {
         if (++attempts_ > kAttempts) gave_up_ = true;
         go(hover);
       } else if (!patience(8)) {
@@ -298,12 +299,12 @@ bool Scripted::make_bite(const Snapshot& seen) {
     default: {
       doing_ = name_of_bite() + "pull the needle through";
       rest_aside(seen, kDriver);
-      psi_ = std::min(psi_ + 2 * skill_.drive_speed / picture_.needle_radius * dt_, psi_bite + kPi + 0.5f);
+      psi_ = std::min(psi_ + 2 * skill_.drive_speed / picture_.suture[0].needle_radius * dt_, psi_bite + kPi + 0.5f);
       BiteFrame f = frame_;
       if (!patience(3))  // it sticks: a pull outward frees the back end
         f.at += (f.out + (plan_.lift > 0 ? 0.4f : 0.0f) * f.up) * std::min(0.02f, 0.01f * (waited_ - 3));
       move(kForceps, holding(kForceps, needle_at(f, psi_)), 2 * speed);
-      if (seen.bite.size() > bites_before_ && !seen.needle.in_tissue && seen.bite.back().complete) {
+      if (seen.active().bite.size() > bites_before_ && !seen.active().needle.in_tissue && seen.active().bite.back().complete) {
         pull_from_ = hand_[kForceps].pose;
         return true;
       }
@@ -315,17 +316,17 @@ bool Scripted::make_bite(const Snapshot& seen) {
 
 bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   rest_aside(seen, kDriver);
-  if (seen.suture_point.empty()) return true;
+  if (seen.active().suture_point.empty()) return true;
   const Vec3 way = plan_.lift > 0 ? normalized(frame_.out * 0.85f + frame_.up * 0.4f)
                                   : normalized(frame_.out + frame_.up * (0.35f * plan_.forceps_side));
-  const size_t n = seen.suture_point.size();
+  const size_t n = seen.active().suture_point.size();
   float slack = 0;
   if (kind == TaskKind::pull_tail) {
     slack = length_between(seen, 0, first_point_node(seen)) - skill_.tail;
   } else if (kind == TaskKind::pull_slack) {
     // In the last way from one bite to the next, or from one bowel end to the other: thread there against the straight way.
     for (size_t k = n - 1; k-- > 0;) {
-      const SuturePointView &a = seen.suture_point[k], &b = seen.suture_point[k + 1];
+      const SuturePointView &a = seen.active().suture_point[k], &b = seen.active().suture_point[k + 1];
       if (a.bite == b.bite || (plan_.lift == 0 && a.wall == b.wall)) continue;
       slack = length_between(seen, node_of(seen, a.anchored), node_of(seen, b.anchored)) -
               1.1f * distance(a.position, b.position) - 0.001f;
@@ -344,7 +345,7 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
 
 float Scripted::open_seam(const Snapshot& seen) {
   float open = 0;
-  for (const SeamView& s : seen.seam)
+  for (const SeamView& s : seen.active().seam)
     if (s.midpoint && s.progress < kSecure) open = std::max(open, (1 - s.progress) * s.start);
   return open;
 }
@@ -367,10 +368,10 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
     }
     case over:
       jaw(kDriver, 1);
-      if (move(kDriver, raised(driver_grip(seen.needle.pose), 0.025f), skill_.speed)) go(down);
+      if (move(kDriver, raised(driver_grip(seen.active().needle.pose), 0.025f), skill_.speed)) go(down);
       return false;
     case down:
-      if (move(kDriver, driver_grip(seen.needle.pose), careful())) go(close);
+      if (move(kDriver, driver_grip(seen.active().needle.pose), careful())) go(close);
       return false;
     case close:
       if (!jaw(kDriver, 0) || waited_ < 0.3f) return false;
@@ -426,7 +427,8 @@ bool Scripted::draw(const Snapshot& seen) {
         left = normalized(f.out * 0.5f - f.along * 0.8f + f.up * 0.35f);
         right = normalized(f.out * 0.5f + f.along * 0.8f + f.up * 0.35f);
       } else {
-        const Vec3 across = normalized(seen.suture_point.back().position - seen.suture_point.front().position, {1, 0, 0});
+        const Vec3 across =
+            normalized(seen.active().suture_point.back().position - seen.active().suture_point.front().position, {1, 0, 0});
         left = normalized(across * 0.8f + f.out * 0.6f);
         right = normalized(across * -0.8f + f.out * 0.6f);
       }
@@ -434,7 +436,7 @@ bool Scripted::draw(const Snapshot& seen) {
       // The tail hand gives a counter-hold: it moves out only as far as keeps its own side tight. Where both sides are drawn
       // hard the thread sticks in its holes and the tissue follows the hands instead, so it gives way first.
       const size_t held = node_of(seen, seen.tool[kDriver].held_slot);
-      const float tail = held < seen.thread_tension.size() ? seen.thread_tension[held] : 0;
+      const float tail = held < seen.active().thread_tension.size() ? seen.active().thread_tension[held] : 0;
       if (plan_.lift == 0 && !patience(5) && tail > kCounterHold)
         move(kDriver, {stitch(seen), hand_[kDriver].pose.q}, 0.3f * skill_.speed);
       else move(kDriver, {picture_.focus + right * 0.11f, hand_[kDriver].pose.q}, gently(kDriver));

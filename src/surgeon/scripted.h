@@ -47,7 +47,9 @@ class Scripted final : public Surgeon {
   bool holds_needle(const Snapshot& seen, size_t hand) const { return seen.tool[hand].held == Held::needle; }
   // Tool pose that puts the held needle at `needle`.
   Pose holding(size_t hand, const Pose& needle) const { return needle * hand_[hand].grip; }
-  void remember_grip(const Snapshot& seen, size_t hand) { hand_[hand].grip = inverse(seen.needle.pose) * seen.tool[hand].pose; }
+  void remember_grip(const Snapshot& seen, size_t hand) {
+    hand_[hand].grip = inverse(seen.active().needle.pose) * seen.tool[hand].pose;
+  }
   static Pose raised(const Pose& tool, float by) { return {tool.p + rotate(tool.q, {0, 0, by}), tool.q}; }
 
   void take_over(const Snapshot& seen);
@@ -58,7 +60,9 @@ class Scripted final : public Surgeon {
   // --- bites ------------------------------------------------------------------------------------------------------------
   BiteFrame frame(const Snapshot& seen, size_t place) const;
   const BitePlace& bite() const { return plan_.place[place_]; }
-  float half_bite_angle() const { return portable::asin(std::min(0.9f, 0.5f * bite().length / picture_.needle_radius)); }
+  float half_bite_angle() const {
+    return portable::asin(std::min(0.9f, 0.5f * bite().length / picture_.suture[0].needle_radius));
+  }
 
   // The needle with its tip `psi` past the deepest place of a bite at frame f.
   Pose needle_at(const BiteFrame& f, float psi) const;

@@ -28,8 +28,9 @@ bool Scripted::regrip(const Snapshot& seen) {
     go(over);
     return false;
   }
-  const float phi = kTyingAt * picture_.needle_arc;
-  const Vec3 place = transform(seen.needle.pose, picture_.needle_radius * Vec3{portable::cos(phi), portable::sin(phi), 0});
+  const float phi = kTyingAt * picture_.suture[0].needle_arc;
+  const Vec3 place =
+      transform(seen.active().needle.pose, picture_.suture[0].needle_radius * Vec3{portable::cos(phi), portable::sin(phi), 0});
   const Pose grip = tying_pose(kForceps, place);
   switch (stage_) {
     case over:
@@ -77,7 +78,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
            (task.which > 1 ? "s" : "");
   const ToolView& driver = seen.tool[kDriver];
   const float side = static_cast<float>(task.way);
-  const size_t last = seen.thread_order.size() - 1;
+  const size_t last = seen.active().thread_order.size() - 1;
   if (stage_ == lift && waited_ <= dt_) {
     begin_winding(winding_, picture_, seen, own_strand ? kLeastFreeForOwn : kTieLeastFree, own_strand);
     throws_before_ = locked_throws(seen);
@@ -196,7 +197,7 @@ bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, i
   const Vec3 z = rotate(lying.q, {0, 0, 1});
   const ToolView& driver = seen.tool[kDriver];
   // Straight on from the turns, along the driver and between its jaws; drawn out until it is felt to be taut.
-  const float left = length_between(seen, node_of(seen, driver.loop_last), seen.thread_order.size() - 1);
+  const float left = length_between(seen, node_of(seen, driver.loop_last), seen.active().thread_order.size() - 1);
   if (stage_ != close && waited_ <= dt_) winding_.free = 0.9f * left;
   const float tension = needle_tension(seen);
   const Vec3 ahead = lying.p - z * std::max(0.004f, winding_.free - kWindOwnAt);
@@ -222,13 +223,13 @@ bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, i
 
 bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
   enum { over, down, snip, away };
-  const size_t last = seen.thread_order.size() - 1;
+  const size_t last = seen.active().thread_order.size() - 1;
   if (kind == TaskKind::cut_needle) {  // the forceps holds the needle by its end: cut right there
     if (stage_ == over) {
       buttons_[kForceps] = kButtonCut;
       go(away);
-    } else if (!seen.needle_on_thread || !patience(0.5f)) {
-      if (seen.needle_on_thread) return miss(over), false;
+    } else if (!seen.active().needle_on_thread || !patience(0.5f)) {
+      if (seen.active().needle_on_thread) return miss(over), false;
       return move(kForceps, {hand_[kForceps].pose.p + Vec3{-0.03f, 0.02f, 0}, hand_[kForceps].pose.q}, skill_.speed) ||
              waited_ > 1.5f;
     }
@@ -270,7 +271,7 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
 
 size_t Scripted::count_cuts(const Snapshot& seen) {
   size_t n = 0;
-  for (const uint8_t c : seen.thread_cut) n += c;
+  for (const uint8_t c : seen.active().thread_cut) n += c;
   return n;
 }
 
@@ -304,8 +305,8 @@ bool Scripted::take_both(const Snapshot& seen) {
   const Vec3 thread = node_at(seen, at), knot = stitch(seen);
   Vec3 way = normalized(thread - knot, {1, 0, 0});
   way = normalized(Vec3{way.x, std::max(way.y, 0.0f), way.z}, {1, 0, 0});
-  const float free = length_between(seen, last_point_node(seen), seen.thread_order.size() - 1) -
-                     (seen.suture_point.empty() ? 0 : distance(seen.suture_point.back().position, knot));
+  const float free = length_between(seen, last_point_node(seen), seen.active().thread_order.size() - 1) -
+                     (seen.active().suture_point.empty() ? 0 : distance(seen.active().suture_point.back().position, knot));
   const Pose goal = tying_pose(kDriver, thread);
   const float tension = needle_tension(seen);
   // Over the tissue first, then down beside the tail.

@@ -4,24 +4,28 @@
 
 namespace catgut {
 
-void close(SolverState& solver, const ClosurePlan& plan) {
+namespace {
+
+void close(SolverState& solver, uint32_t suture, const ClosurePlan& plan) {
+  const auto target = [&](size_t k) { return lerp(plan.pull[k].from, plan.pull[k].to, plan.progress); };
   size_t k = 0;
   for (Attachment& a : solver.attach) {
-    if (a.body >= 0) continue;
-    if (k < plan.pull.size()) a.target = lerp(plan.pull[k].from, plan.pull[k].to, plan.progress);
+    if (a.body >= 0 || a.suture != suture) continue;
+    if (k < plan.pull.size()) a.target = target(k);
     ++k;
   }
   for (; k < plan.pull.size(); ++k) {
     Attachment a;
     a.point = plan.pull[k].point;
-    a.target = lerp(plan.pull[k].from, plan.pull[k].to, plan.progress);
+    a.suture = suture;
+    a.target = target(k);
     a.compliance = plan.compliance;
     solver.attach.push_back(a);
   }
-  auto length_of = [](const ClosurePlan::Pair& p) { return p.start + p.progress * (p.end - p.start); };
+  const auto length_of = [](const ClosurePlan::Pair& p) { return p.start + p.progress * (p.end - p.start); };
   k = 0;
   for (TissuePin& pin : solver.pin) {
-    if (pin.owner != PinOwner::plan) continue;
+    if (pin.owner != PinOwner::plan || pin.suture != suture) continue;
     if (k < plan.pair.size()) pin.length = length_of(plan.pair[k]);
     ++k;
   }
@@ -31,8 +35,15 @@ void close(SolverState& solver, const ClosurePlan& plan) {
     pin.b = plan.pair[k].b;
     pin.length = length_of(plan.pair[k]);
     pin.compliance = plan.compliance;
+    pin.suture = suture;
     solver.pin.push_back(pin);
   }
+}
+
+}  // namespace
+
+void close(SolverState& solver, std::span<const ClosurePlan> plan) {
+  for (size_t k = 0; k < plan.size(); ++k) close(solver, static_cast<uint32_t>(k), plan[k]);
 }
 
 }  // namespace catgut

@@ -178,25 +178,29 @@ bool is_held_elsewhere(const Strand& t, uint32_t slot, int body) {
          });
 }
 
-// Figure 10 on every stretch of free thread. A suture point, a jaw and a cut end a stretch: thread beyond them is not drawn
-// through a loop.
-LoopVerdict look(const SolverModel& model, const SolverState& solver, const SutureModel& suture, int body) {
-  const Strand& t = solver.strand[0];
-  const LoopTool tool{solver.body[static_cast<size_t>(body)].pose(), model.body[static_cast<size_t>(body)].capsule};
-  LoopVerdict best;
+// The verdict on one strand, and which strand that is.
+struct Found {
+  LoopVerdict verdict;
+  uint32_t suture = 0;
+};
+
+// Figure 10 on every stretch of free thread of a strand. A suture point, a jaw and a cut end a stretch: thread beyond them is
+// not drawn through a loop. Adds to what was found before.
+void look(const SutureContext& c, uint32_t suture, uint32_t who, Found& best) {
+  const Strand& t = c.solver.strand[suture];
+  const LoopTool tool{c.solver.body[who].pose(), c.model.body[who].capsule};
   for (size_t begin = 0, end = 0; begin + 1 < t.order.size(); begin = end) {
     end = begin + 1;
-    while (end + 1 < t.order.size() && !t.cut[end - 1] && !is_held_elsewhere(t, t.order[end], body)) ++end;
+    while (end + 1 < t.order.size() && !t.cut[end - 1] && !is_held_elsewhere(t, t.order[end], static_cast<int>(who))) ++end;
     // Both ends of the stretch belong to it, unless the thread is cut there.
     const size_t last = t.cut[end - 1] ? end - 1 : end;
-    LoopVerdict v = find_loop(solver.x.data(), {t.order.data() + begin, last - begin + 1}, tool,
-                              suture.loop_depth * model.strand[0].spacing, suture.loop_reach);
+    LoopVerdict v = find_loop(c.solver.x.data(), {t.order.data() + begin, last - begin + 1}, tool,
+                              c.suture.loop_depth * c.model.strand[suture].spacing, c.suture.loop_reach);
     v.first += begin, v.last += begin;
-    v.touching = std::max(v.touching, best.touching), v.round = std::max(v.round, best.round);
-    if (better(v, best)) best = v;
-    best.touching = v.touching, best.round = v.round;
+    v.touching = std::max(v.touching, best.verdict.touching), v.round = std::max(v.round, best.verdict.round);
+    if (better(v, best.verdict)) best = {v, suture};
+    best.verdict.touching = v.touching, best.verdict.round = v.round;
   }
-  return best;
 }
 
 // Handedness. What counts is the half knot that the loop becomes. Its two strands come out of the tissue, and the one that the
@@ -211,10 +215,80 @@ int32_t handedness(const Strand& t, const LoopVerdict& v) {
   return t.anchor.empty() ? v.turn : -v.turn;
 }
 
-Vec3 middle(const SolverState& solver, const LoopVerdict& v) {
+Vec3 middle(const OneSuture& s, const LoopVerdict& v) {
   Vec3 sum{};
-  for (size_t i = v.first; i <= v.last; ++i) sum += xyz(solver.x[solver.strand[0].order[i]]);
+  for (size_t i = v.first; i <= v.last; ++i) sum += s.at(s.strand.order[i]);
   return sum / static_cast<float>(v.last - v.first + 1);
+}
+
+// "All the particles in the loop are attached to the tool using particle attachments. This prevents the user from undoing the
+// loop."
+void freeze(OneSuture& s, uint32_t who, const LoopVerdict& v, int32_t handed) {
+  Strand& t = s.strand;
+  ToolLoop& loop = s.all.state.loop[who];
+  const Pose tool = s.all.solver.body[who].pose();
+  for (size_t i = v.first; i <= v.last; ++i) {
+    const uint32_t slot = t.order[i];
+    if (!is_held(t, slot)) t.hold.push_back({slot, static_cast<int>(who), to_local(tool, s.at(slot)), HoldKind::loop});
+  }
+  const size_t first = loop.wraps > 0 ? std::min(v.first, node_of(t, loop.first)) : v.first;
+  const size_t last = loop.wraps > 0 ? std::max(v.last, node_of(t, loop.last)) : v.last;
+  loop.first = t.order[first], loop.last = t.order[last];
+  loop.wraps = v.wraps;
+  loop.handed = handed;
+  loop.suture = s.index;
+  loop.told = LoopReason::none;
+  s.all.report_tool(s.index, EventKind::loop_formed, who, loop.wraps, static_cast<float>(handed), middle(s, v));
+}
+
+// One tool. A loop that it has already grows by what lies on it now; only its own thread counts then.
+void find_loops_on(SutureContext& c, uint32_t who) {
+  ToolLoop& loop = c.state.loop[who];
+  const InstrumentState& hand = c.state.instrument[who];
+  const InstrumentModel& kind = c.suture.instrument[who];
+  const Vec3 at = c.solver.body[who].x;
+  const bool opened = loop.jaw < kWide && hand.jaw >= kWide && hand.held == Held::nothing;
+  const bool closes = loop.jaw > kind.jaw.closed && hand.jaw <= kind.jaw.closed;
+  loop.jaw = hand.jaw;
+  if (loop.wraps > 0) {
+    const Strand& t = c.solver.strand[loop.suture];
+    const float pull = tension_outside(t, node_of(t, loop.first), node_of(t, loop.last));
+    if (opened || pull > kind.thread_grip) {
+      const uint32_t suture = loop.suture;
+      take_off_loop(c, who);
+      c.report_tool(suture, EventKind::loop_released, who, 0, opened ? 0 : pull, at);
+      return;
+    }
+  }
+  // A tool that holds something is at work with it. Thread that happens to lie round a needle driver while it drives the
+  // needle is no loop, and round jaws that hold the very thread there is nothing to draw through.
+  const bool free = hand.held == Held::nothing;
+  if (!c.solver.body_collides[who] || !(free || (closes && hand.held == Held::thread))) return;
+  Found found;
+  for (uint32_t k = 0; k < c.solver.strand.size(); ++k)
+    if (loop.wraps == 0 || loop.suture == k) look(c, k, who, found);
+  const LoopVerdict& v = found.verdict;
+  if (v.touching == 0) loop.told = LoopReason::none;
+  if (v.wraps == 0) {
+    loop.spent = 0;
+    // Thread that is still being laid has not crossed itself yet: nothing is missing before the jaws close on the other end.
+    if (loop.wraps == 0 && v.touching >= kSeveral && v.reason != loop.told &&
+        (v.reason != LoopReason::no_crossing || (closes && v.round > kMostOfATurn))) {
+      loop.told = v.reason;
+      c.report_tool(found.suture, EventKind::loop_rejected, who, 0, 0, at, Fault::none, v.reason);
+    }
+    return;
+  }
+  OneSuture s(c, found.suture);
+  const int32_t handed = handedness(s.strand, v);
+  if (!free || loop.spent) return;
+  if (loop.wraps > 0) {
+    // The frozen turns are seen again, with those that have been laid since.
+    const bool same =
+        handed == loop.handed && v.first <= node_of(s.strand, loop.last) && node_of(s.strand, loop.first) <= v.last;
+    if (!same || v.wraps <= loop.wraps) return;
+  }
+  freeze(s, who, v, handed);
 }
 
 }  // namespace
@@ -229,72 +303,17 @@ bool beside_loop(const Strand& t, const ToolLoop& loop, uint32_t slot) {
   return apart < kOwnStrands;
 }
 
-void take_off_loop(const SolverModel&, SolverState& solver, const SutureModel&, SutureState& state, uint32_t who) {
-  release_holds(solver.strand[0], static_cast<int>(who), HoldKind::loop);
-  ToolLoop& loop = state.loop[who];
+void take_off_loop(SutureContext& c, uint32_t who) {
+  ToolLoop& loop = c.state.loop[who];
+  release_holds(c.solver.strand[loop.suture], static_cast<int>(who), HoldKind::loop);
   const float jaw = loop.jaw;
   loop = {};
   loop.jaw = jaw;
   loop.spent = 1;
 }
 
-void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                EventList& events) {
-  Strand& t = solver.strand[0];
-  for (uint8_t who = 0; who < state.instrument.size(); ++who) {
-    ToolLoop& loop = state.loop[who];
-    const InstrumentState& hand = state.instrument[who];
-    const InstrumentModel& kind = suture.instrument[who];
-    const RigidBody& tool = solver.body[who];
-    const bool opened = loop.jaw < kWide && hand.jaw >= kWide && hand.held == Held::nothing;
-    const bool closes = loop.jaw > kind.jaw.closed && hand.jaw <= kind.jaw.closed;
-    loop.jaw = hand.jaw;
-    if (loop.wraps > 0) {
-      const float pull = tension_outside(t, node_of(t, loop.first), node_of(t, loop.last));
-      if (opened || pull > kind.thread_grip) {
-        take_off_loop(model, solver, suture, state, who);
-        events.add({EventKind::loop_released, hand.hand, 0, opened ? 0 : pull, tool.x});
-        continue;
-      }
-    }
-    // A tool that holds something is at work with it. Thread that happens to lie round a needle driver while it drives the
-    // needle is no loop, and round jaws that hold the very thread there is nothing to draw through.
-    const bool free = hand.held == Held::nothing;
-    if (!solver.body_collides[who] || !(free || (closes && hand.held == Held::thread))) continue;
-    const LoopVerdict v = look(model, solver, suture, who);
-    if (v.touching == 0) loop.told = LoopReason::none;
-    if (v.wraps == 0) {
-      loop.spent = 0;
-      // Thread that is still being laid has not crossed itself yet: nothing is missing before the jaws close on the other end.
-      if (loop.wraps == 0 && v.touching >= kSeveral && v.reason != loop.told &&
-          (v.reason != LoopReason::no_crossing || (closes && v.round > kMostOfATurn))) {
-        loop.told = v.reason;
-        events.add({EventKind::loop_rejected, hand.hand, 0, 0, tool.x, Fault::none, v.reason});
-      }
-      continue;
-    }
-    const int32_t handed = handedness(t, v);
-    if (!free || loop.spent) continue;
-    if (loop.wraps > 0) {
-      // The frozen turns are seen again, with those that have been laid since.
-      const bool same = handed == loop.handed && v.first <= node_of(t, loop.last) && node_of(t, loop.first) <= v.last;
-      if (!same || v.wraps <= loop.wraps) continue;
-    }
-    // "All the particles in the loop are attached to the tool using particle attachments. This prevents the user from undoing
-    // the loop."
-    for (size_t i = v.first; i <= v.last; ++i) {
-      const uint32_t slot = t.order[i];
-      if (is_held(t, slot)) continue;
-      t.hold.push_back({slot, who, to_local(tool.pose(), xyz(solver.x[slot])), HoldKind::loop});
-    }
-    const size_t first = loop.wraps > 0 ? std::min(v.first, node_of(t, loop.first)) : v.first;
-    const size_t last = loop.wraps > 0 ? std::max(v.last, node_of(t, loop.last)) : v.last;
-    loop.first = t.order[first], loop.last = t.order[last];
-    loop.wraps = v.wraps;
-    loop.handed = handed;
-    loop.told = LoopReason::none;
-    events.add({EventKind::loop_formed, hand.hand, loop.wraps, static_cast<float>(handed), middle(solver, v)});
-  }
+void find_loops(SutureContext& c) {
+  for (uint32_t who = 0; who < c.state.loop.size(); ++who) find_loops_on(c, who);
 }
 
 }  // namespace catgut

@@ -22,8 +22,9 @@ bool can_give_needle(const Strand& t, size_t i) {
 }
 
 // Figure 7c: the particle beside the locked node i takes its place on the other side, at the midpoint of the pair it splits.
-void pass(SolverState& solver, size_t i, bool toward_needle) {
-  Strand& t = solver.strand[0];
+void pass(OneSuture& s, size_t i, bool toward_needle) {
+  Strand& t = s.strand;
+  SolverState& solver = s.all.solver;
   const uint32_t locked = t.order[i], slot = t.order[toward_needle ? i - 1 : i + 1],
                  beyond = t.order[toward_needle ? i + 1 : i - 1];
   if (toward_needle) move_particle(t, i - 1, i);
@@ -71,16 +72,14 @@ static int drawing_instrument(const Strand& t, size_t i, int way) {
 
 // "Pulling" before the bite is done. The needle draws thread through holes too, and should; jaws on the thread should not. One
 // particle may have been about to pass when they took hold; with the second, thread as long as the way between two has come.
-static void judge_drawing(const SolverState& solver, SutureState& state, const ThreadAnchor& a, bool toward_needle,
-                          EventList& events) {
-  if (state.open.empty()) return;
-  OpenBite& open = state.open.back();
-  const int tool =
-      open.told ? -1 : drawing_instrument(solver.strand[0], node_of(solver.strand[0], a.slot), toward_needle ? 1 : -1);
+static void judge_drawing(OneSuture& s, const ThreadAnchor& a, bool toward_needle) {
+  if (s.own.open.empty()) return;
+  OpenBite& open = s.own.open.back();
+  const int tool = open.told ? -1 : drawing_instrument(s.strand, node_of(s.strand, a.slot), toward_needle ? 1 : -1);
   if (tool < 0 || ++open.drawn < 2) return;
   open.told = 1;
-  events.add({EventKind::technique_fault, hand_of(state, static_cast<size_t>(tool)), open.bite, 0,
-              position_of(a, solver.x.data()), Fault::needle_in_tissue});
+  s.all.report_fault(s.index, Fault::needle_in_tissue, hand_of(s.all.state, static_cast<size_t>(tool)), open.bite,
+                     position_of(a, s.x()));
 }
 
 // A cut thread holds nothing together: as long as all of it, whatever is drawn.
@@ -88,8 +87,7 @@ static float length_between(const Strand& t, size_t a, size_t b) {
   return is_whole(t, a, b) ? rest_between(t, a, b) : rest_length(t);
 }
 
-float length_between_ends(const SolverState& solver, const SutureState& state) {
-  const Strand& t = solver.strand[0];
+float length_between_ends(const Strand& t, const Suture& state) {
   if (state.point.size() < 2) return 0;
   size_t lo = t.order.size(), hi = 0;
   for (const SuturePoint& p : state.point) {
@@ -100,9 +98,7 @@ float length_between_ends(const SolverState& solver, const SutureState& state) {
   return length_between(t, lo, hi);
 }
 
-void spans(const SolverState& solver, const SutureState& state, std::vector<float>& span) {
-  const Strand& t = solver.strand[0];
-  const Vec4* x = solver.x.data();
+void spans(const Strand& t, const Suture& state, const Vec4* x, std::vector<float>& span) {
   span.assign(state.point.size(), 0);
   for (size_t k = 0; k + 1 < state.point.size(); ++k) {
     const ThreadAnchor &here = t.anchor[state.point[k].anchor], &next = t.anchor[state.point[k + 1].anchor];
@@ -117,15 +113,17 @@ void spans(const SolverState& solver, const SutureState& state, std::vector<floa
   }
 }
 
-void erase_anchor(SolverState& solver, SutureState& state, uint32_t anchor) {
-  solver.strand[0].anchor.erase(solver.strand[0].anchor.begin() + anchor);
+void erase_anchor(Strand& strand, Suture& state, uint32_t anchor) {
+  strand.anchor.erase(strand.anchor.begin() + anchor);
   for (SuturePoint& p : state.point)
     if (p.anchor > anchor) --p.anchor;
 }
 
 // Two holes may lie closer together than two particles of the thread, and the one before has just taken the last of them: the
 // next free particle behind passes the suture points up to the needle before its turn (figure 7c). False: there is none.
-bool bring_particle(Strand& t, SolverState& solver) {
+static bool bring_particle(OneSuture& s) {
+  Strand& t = s.strand;
+  SolverState& solver = s.all.solver;
   size_t from = t.order.size() - 2;
   const auto in_hole = [&](uint32_t slot) {
     const int k = anchor_of(t, slot);
@@ -143,42 +141,42 @@ bool bring_particle(Strand& t, SolverState& solver) {
   return true;
 }
 
-bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                        uint32_t bite, bool exit, EventList& events) {
-  Strand& t = solver.strand[0];
+bool place_suture_point(OneSuture& s, uint32_t bite, bool exit) {
+  Strand& t = s.strand;
+  SolverState& solver = s.all.solver;
   if (t.order.size() < 3) return false;
   const size_t node = t.order.size() - 2;  // the last is the needle's
   // A needle off which the thread was cut, or with a stump too short to follow it, leaves none in the hole.
   if (!is_swaged(t) || t.cut[node] || t.cut[node - 1]) return true;
-  if (is_locked(t, t.order[node]) && !bring_particle(t, solver)) return false;
+  if (is_locked(t, t.order[node]) && !bring_particle(s)) return false;
   const uint32_t slot = t.order[node];
-  const BiteEnd& end = exit ? state.bite[bite].exit : state.bite[bite].entry;
+  const BiteEnd& end = exit ? s.own.bite[bite].exit : s.own.bite[bite].entry;
   ThreadAnchor a;
   a.slot = slot;
   a.point = end.point;
-  a.friction = suture.pass_tension;
-  a.capstan = suture.capstan;
+  a.friction = s.all.suture.pass_tension;
+  a.capstan = s.all.suture.capstan;
   // The particle steps forward to the hole. Rest length goes with it, so neither side is stretched or squeezed by that.
-  const Vec3 at = position_of(end.point, solver.x.data());
+  const Vec3 at = position_of(end.point, s.x());
   const float sum = t.rest[node - 1] + t.rest[node];
-  const float to_needle =
-      std::clamp(distance(at, xyz(solver.x[t.order[node + 1]])), 0.15f * model.strand[0].spacing, 0.9f * sum);
+  const float to_needle = std::clamp(distance(at, s.at(t.order[node + 1])), 0.15f * s.thread.spacing, 0.9f * sum);
   t.rest[node] = to_needle;
   t.rest[node - 1] = sum - to_needle;
   set(solver.x[slot], at);
   solver.v[slot] = {};
   t.anchor.push_back(a);
-  state.point.push_back({bite, exit, static_cast<uint32_t>(t.anchor.size() - 1)});
-  events.add({EventKind::suture_point, 0, static_cast<uint32_t>(state.point.size() - 1), static_cast<float>(bite), at});
+  s.own.point.push_back({bite, exit, static_cast<uint32_t>(t.anchor.size() - 1)});
+  s.report(EventKind::suture_point, static_cast<uint32_t>(s.own.point.size() - 1), static_cast<float>(bite), at);
   return true;
 }
 
-void remove_last_suture_point(const SolverModel&, SolverState& solver, const SutureModel&, SutureState& state) {
-  if (state.point.empty() || state.open.empty() || state.point.back().bite != state.open.front().bite)
+void remove_last_suture_point(OneSuture& s) {
+  Suture& own = s.own;
+  if (own.point.empty() || own.open.empty() || own.point.back().bite != own.open.front().bite)
     return;  // the needle was drawn through without thread
-  const uint32_t anchor = state.point.back().anchor;
-  state.point.pop_back();
-  erase_anchor(solver, state, anchor);
+  const uint32_t anchor = own.point.back().anchor;
+  own.point.pop_back();
+  erase_anchor(s.strand, own, anchor);
 }
 
 // Two holes may follow each other with no particle between them. When the short pair between them is used up, the nearer hole
@@ -211,58 +209,64 @@ static void feed(Strand& t, const ThreadAnchor& a, size_t i, float used_up, floa
   }
 }
 
-void pull(const SolverModel& model, SolverState& solver, const SutureModel&, SutureState& state, EventList& events) {
-  Strand& t = solver.strand[0];
-  const float used_up = kUsedUp * model.strand[0].spacing;
-  const TiedNodes knots = tied_nodes(t);  // no particle passes a knot, so they stay true while others pass
-  // `point`: the suture point that the anchor is, or -1 for the end of a loop on its way to the tissue.
-  const auto pass_at = [&](ThreadAnchor& a, int64_t point) {
-    const size_t i = node_of(t, a.slot);
-    if (i == 0 || i + 1 >= t.order.size()) return;
-    const bool was_blocked = a.blocked_needle;
-    feed(t, a, i, used_up, 0.25f * model.strand[0].spacing);
-    const bool tied = is_tied(t, knots, i);
-    const bool from_free = !tied && can_give_free(t, i), from_needle = !tied && can_give_needle(t, i);
-    // A cut end has no length to give, however much of the cut pair is written in the list.
-    a.blocked_needle = tied || t.cut[i - 1] || t.cut[i] || (!from_free && t.rest[i - 1] <= used_up);
-    a.blocked_free = tied || t.cut[i - 1] || t.cut[i] || (!from_needle && t.rest[i] <= used_up);
-    if (point >= 0 && a.blocked_needle && !was_blocked && !tied && (i == 1 || t.cut[i - 1] || t.cut[i - 2]))
-      events.add({EventKind::thread_ran_out, 0, static_cast<uint32_t>(point), 0, position_of(a.point, solver.x.data())});
+// What may pass at one anchor. `point`: the suture point that the anchor is, or -1 for the end of a loop on its way to the
+// tissue.
+static void pass_at(OneSuture& s, const TiedNodes& knots, ThreadAnchor& a, int64_t point) {
+  Strand& t = s.strand;
+  const float used_up = kUsedUp * s.thread.spacing;
+  const size_t i = node_of(t, a.slot);
+  if (i == 0 || i + 1 >= t.order.size()) return;
+  const bool was_blocked = a.blocked_needle;
+  feed(t, a, i, used_up, 0.25f * s.thread.spacing);
+  const bool tied = is_tied(t, knots, i);
+  const bool from_free = !tied && can_give_free(t, i), from_needle = !tied && can_give_needle(t, i);
+  // A cut end has no length to give, however much of the cut pair is written in the list.
+  a.blocked_needle = tied || t.cut[i - 1] || t.cut[i] || (!from_free && t.rest[i - 1] <= used_up);
+  a.blocked_free = tied || t.cut[i - 1] || t.cut[i] || (!from_needle && t.rest[i] <= used_up);
+  if (point >= 0 && a.blocked_needle && !was_blocked && !tied && (i == 1 || t.cut[i - 1] || t.cut[i - 2]))
+    s.report(EventKind::thread_ran_out, static_cast<uint32_t>(point), 0, position_of(a.point, s.x()));
 
-    // Toward the needle: the particle on the free side splits the pair on the needle side; the other way round for a pull on
-    // the tail.
-    const bool forward = from_free && t.rest[i - 1] <= used_up;
-    const bool backward = !forward && from_needle && t.rest[i] <= used_up;
-    if (!forward && !backward) return;
-    pass(solver, i, forward);
-    if (point < 0) return;
-    events.add(
-        {EventKind::particle_passed, 0, static_cast<uint32_t>(point), forward ? 1.0f : -1.0f, position_of(a, solver.x.data())});
-    judge_drawing(solver, state, a, forward, events);
-  };
-  for (size_t k = state.point.size(); k-- > 0;) pass_at(t.anchor[state.point[k].anchor], static_cast<int64_t>(k));
-  for (const Knot& knot : state.knot)
-    if (knot.phase == KnotPhase::tightening)
-      for (ThreadAnchor& a : t.anchor)
-        if (a.slot == knot.end[0] || a.slot == knot.end[1]) pass_at(a, -1);
+  // Toward the needle: the particle on the free side splits the pair on the needle side; the other way round for a pull on the
+  // tail.
+  const bool forward = from_free && t.rest[i - 1] <= used_up;
+  const bool backward = !forward && from_needle && t.rest[i] <= used_up;
+  if (!forward && !backward) return;
+  pass(s, i, forward);
+  if (point < 0) return;
+  s.report(EventKind::particle_passed, static_cast<uint32_t>(point), forward ? 1.0f : -1.0f, position_of(a, s.x()));
+  judge_drawing(s, a, forward);
 }
 
-float draw_through(const SolverModel& model, SolverState& solver, uint32_t slot, int way, float length) {
-  Strand& t = solver.strand[0];
-  const float used_up = kUsedUp * model.strand[0].spacing, least = 0.02f * model.strand[0].spacing;
+void pull(SutureContext& c) {
+  for (size_t k = 0; k < c.state.suture.size(); ++k) {
+    OneSuture s(c, k);
+    if (s.strand.anchor.empty()) continue;
+    const TiedNodes knots = tied_nodes(s.strand);  // no particle passes a knot, so they stay true while others pass
+    for (size_t p = s.own.point.size(); p-- > 0;)
+      pass_at(s, knots, s.strand.anchor[s.own.point[p].anchor], static_cast<int64_t>(p));
+    for (const Knot& knot : s.own.knot)
+      if (knot.phase == KnotPhase::tightening)
+        for (ThreadAnchor& a : s.strand.anchor)
+          if (a.slot == knot.end[0] || a.slot == knot.end[1]) pass_at(s, knots, a, -1);
+  }
+}
+
+float draw_through(OneSuture& s, uint32_t slot, int direction, float length) {
+  Strand& t = s.strand;
+  const float used_up = kUsedUp * s.thread.spacing, least = 0.02f * s.thread.spacing;
   float gone = 0;
   for (;;) {
     const size_t i = node_of(t, slot);
     if (i == 0 || i + 1 >= t.order.size() || t.cut[i - 1] || t.cut[i]) return gone;
-    const size_t from = way > 0 ? i - 1 : i, to = way > 0 ? i : i - 1;
+    const size_t from = pair_beside(i, -direction), to = pair_beside(i, direction);
     const float step = std::min(length - gone, t.rest[from] - least);
     if (step > 0) {
       t.rest[from] -= step;
       t.rest[to] += step;
       gone += step;
     }
-    if (t.rest[from] > used_up || !(way > 0 ? can_give_free(t, i) : can_give_needle(t, i))) return gone;
-    pass(solver, i, way > 0);
+    if (t.rest[from] > used_up || !(direction > 0 ? can_give_free(t, i) : can_give_needle(t, i))) return gone;
+    pass(s, i, direction > 0);
   }
 }
 

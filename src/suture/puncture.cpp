@@ -19,37 +19,183 @@ constexpr float kOnShaft = 0.0015f;      // [m] a hole this near to the shaft ha
 
 uint32_t hole_of(uint32_t bite, bool exit) { return 2 * bite + exit; }
 
-ChannelPoint channel_at(const SutureModel& suture, const Bite& bite, uint32_t which, bool exit) {
-  const BiteEnd& end = exit ? bite.exit : bite.entry;
+void open_hole(OneSuture& s, uint32_t which, bool exit) {
   ChannelPoint c;
+  c.suture = s.index;
   c.hole = hole_of(which, exit);
-  c.point = end.point;
-  c.compliance = suture.channel_compliance;
-  c.drag = suture.channel_drag;
-  return c;
+  c.point = (exit ? s.own.bite[which].exit : s.own.bite[which].entry).point;
+  c.compliance = s.all.suture.channel_compliance;
+  c.drag = s.all.suture.channel_drag;
+  s.all.solver.channel.push_back(c);
+}
+void close_hole(OneSuture& s, uint32_t which, bool exit) {
+  std::erase_if(s.all.solver.channel,
+                [&](const ChannelPoint& c) { return c.suture == s.index && c.hole == hole_of(which, exit); });
 }
 
-void drop_attachment(const SolverModel& model, SolverState& solver, SutureState& state) {
-  if (!state.attached) return;
-  std::erase_if(solver.attach, [&](const Attachment& a) { return a.body == static_cast<int>(model.needle_body(0)); });
-  state.attached = false;
-}
-
-void close_hole(SolverState& solver, uint32_t hole) {
-  std::erase_if(solver.channel, [&](const ChannelPoint& c) { return c.hole == hole; });
+void drop_attachment(OneSuture& s) {
+  if (!s.own.attached) return;
+  std::erase_if(s.all.solver.attach, [&](const Attachment& a) { return a.body == static_cast<int>(s.needle); });
+  s.own.attached = false;
 }
 
 // The newest bite is out again the way it came. Its record stays, marked; everything that held needle or tissue there goes.
-void cancel_bite(const SolverModel& model, SolverState& solver, SutureState& state, Vec3 tip, EventList& events) {
-  const uint32_t which = state.open.back().bite;
-  Bite& bite = state.bite[which];
-  drop_attachment(model, solver, state);
-  close_hole(solver, hole_of(which, false));
-  close_hole(solver, hole_of(which, true));
+void cancel_bite(OneSuture& s, Vec3 tip) {
+  const uint32_t which = s.own.open.back().bite;
+  Bite& bite = s.own.bite[which];
+  drop_attachment(s);
+  close_hole(s, which, false);
+  close_hole(s, which, true);
   bite.cancelled = true;
   bite.has_exit = false;
-  state.open.pop_back();
-  events.add({EventKind::bite_cancelled, 0, which, bite.depth, tip});
+  s.own.open.pop_back();
+  s.report(EventKind::bite_cancelled, which, bite.depth, tip);
+}
+
+// Where a needle's tip is in a substep.
+struct Tip {
+  Vec3 at;
+  SurfaceHit hit;  // valid if near
+  bool near = false, inside = false, was_inside = false;
+  bool held = false;  // a jaw holds the needle
+};
+
+// [m] along the shaft from the swage to an end of a bite; of the tip.
+float along(const OneSuture& s, const BiteEnd& end) {
+  return s.arc.radius * s.arc.nearest(to_local(s.body().pose(), position_of(end.point, s.x())));
+}
+float tip_along(const OneSuture& s) { return s.arc.radius * s.arc.arc; }
+
+// Figure 5: a particle that is dragged beyond the threshold is let go and the tissue relaxes.
+void release_dragged(OneSuture& s, const Bite& bite) {
+  if (!s.own.attached) return;
+  const float dragged = distance(s.at(bite.nearest), s.own.attached_from);
+  const auto row = std::find_if(s.all.solver.attach.begin(), s.all.solver.attach.end(),
+                                [&](const Attachment& a) { return a.body == static_cast<int>(s.needle); });
+  const float torn = distance(transform(s.body().pose(), row->target), s.own.attached_from);
+  if (std::max(dragged, torn) <= s.all.suture.release_distance) return;
+  drop_attachment(s);
+  s.report(EventKind::particle_released, bite.nearest, dragged, s.at(bite.nearest));
+}
+
+// NeedlePhase::tip_in, of the newest wall: the tip goes deeper, or comes out on the far side, or the way it came.
+void in_wall(OneSuture& s, const Tip& tip) {
+  const uint32_t which = s.own.open.back().bite;
+  Bite& bite = s.own.bite[which];
+  if (tip.inside) bite.depth = std::max(bite.depth, -tip.hit.distance);
+  release_dragged(s, bite);
+  if (tip.inside) return;
+  drop_attachment(s);
+  if (!tip.near || tip_along(s) - along(s, bite.entry) < kEndReached) {
+    cancel_bite(s, tip.at);
+    return;
+  }
+  bite.exit = tip.hit.end;
+  spread(s.all.model, bite.exit);
+  bite.has_exit = true;
+  open_hole(s, which, true);
+  s.own.open.back().phase = NeedlePhase::through;
+  s.report(EventKind::tip_exited, which, bite.depth, tip.hit.point);
+}
+
+// NeedlePhase::through, of the newest wall: the tip may be drawn back. Returns whether it was.
+bool drawn_back(OneSuture& s, const Tip& tip) {
+  const uint32_t which = s.own.open.back().bite;
+  Bite& bite = s.own.bite[which];
+  if (tip_along(s) - along(s, bite.exit) >= kEndReached) return false;
+  if (!tip.inside && tip_along(s) - along(s, bite.entry) >= kEndReached) return false;
+  if (tip.inside) {
+    bite.has_exit = false;
+    close_hole(s, which, true);
+    s.own.open.back().phase = NeedlePhase::tip_in;
+  } else {  // torn back through both holes between two substeps: the tip was never seen in the wall
+    cancel_bite(s, tip.at);
+  }
+  return true;
+}
+
+// The tip has come to a wall, and the newest one lies far enough behind it: a new bite.
+void enter(OneSuture& s, const Tip& tip) {
+  const SolverModel& model = s.all.model;
+  const uint32_t which = static_cast<uint32_t>(s.own.bite.size());
+  Bite bite;
+  bite.entry = tip.hit.end;
+  spread(model, bite.entry);
+  const int nearest = nearest_particle(model.collision, s.all.scratch.candidates, s.x(), tip.at, s.all.suture.attach_threshold);
+  if (nearest >= 0) bite.nearest = static_cast<uint32_t>(nearest);
+  s.own.bite.push_back(bite);
+  s.own.open.push_back({which, NeedlePhase::tip_in});
+  const Vec3 heading = rotate(s.body().q, s.arc.tangent(s.arc.arc));
+  const float angle = portable::acos(std::clamp(-dot(heading, tip.hit.normal), -1.0f, 1.0f));
+  s.report(EventKind::tip_entered, which, angle, tip.hit.point);
+  if (nearest >= 0) {
+    // Figure 4: the nearest particle within X of the tip moves with the tip, by the paper's spring.
+    Attachment a;
+    a.point = particle_point(bite.nearest);
+    a.body = static_cast<int>(s.needle);
+    s.own.attached_from = s.at(bite.nearest);
+    a.target = to_local(s.body().pose(), s.own.attached_from);
+    a.compliance = s.all.suture.attach_compliance;
+    s.all.solver.attach.push_back(a);
+    s.own.attached = true;
+    s.report(EventKind::particle_attached, bite.nearest, distance(s.own.attached_from, tip.at), s.own.attached_from);
+  }
+  open_hole(s, which, false);
+}
+
+// The oldest wall that the back end has not left. The back-end trigger: when the swage has reached the entry, the thread
+// follows through it; when it has reached the exit, the bite is complete.
+void move_back_end(OneSuture& s) {
+  OpenBite& oldest = s.own.open.front();
+  const uint32_t which = oldest.bite;
+  Bite& bite = s.own.bite[which];
+  if (oldest.phase == NeedlePhase::through) {
+    if (along(s, bite.entry) <= kEndReached && place_suture_point(s, which, false)) {
+      close_hole(s, which, false);
+      oldest.phase = NeedlePhase::back_in;
+    }
+    return;
+  }
+  const float entry_at = along(s, bite.entry);
+  const Vec3 entry = position_of(bite.entry.point, s.x());
+  if (entry_at > kBackOut && entry_at < 0.5f * tip_along(s) &&
+      distance(entry, needle_point(s.arc, s.body(), entry_at / s.arc.radius)) < kOnShaft) {
+    // The back end came out of the entry again: the thread has left the hole, the shaft is in it.
+    remove_last_suture_point(s);
+    open_hole(s, which, false);
+    oldest.phase = NeedlePhase::through;
+  } else if (along(s, bite.exit) <= kEndReached && place_suture_point(s, which, true)) {
+    close_hole(s, which, true);
+    bite.complete = true;
+    const Vec3 out = position_of(bite.exit.point, s.x());
+    s.report(EventKind::bite_completed, which, distance(entry, out), out);
+    s.own.open.erase(s.own.open.begin());
+  }
+}
+
+void puncture(OneSuture& s) {
+  SutureContext& c = s.all;
+  Tip tip;
+  tip.at = needle_tip(s.arc, s.body());
+  tip.near = nearest_surface(c.model, c.scratch.candidates, s.x(), tip.at, kReach, tip.hit);
+  tip.was_inside = s.own.tip_inside;
+  tip.inside = tip.near && tip.hit.distance < (tip.was_inside ? kHysteresis : -kHysteresis);
+  // A needle that lies about pierces nothing: it weighs a few millinewtons.
+  tip.held =
+      std::any_of(c.solver.weld.begin(), c.solver.weld.end(), [&](const Weld& w) { return w.a == static_cast<int>(s.needle); });
+  s.own.tip_inside = tip.inside && (tip.held || !s.own.open.empty());
+
+  const NeedlePhase newest = phase_of(s.own);
+  if (newest == NeedlePhase::tip_in) {
+    in_wall(s, tip);
+  } else if (newest != NeedlePhase::through || !drawn_back(s, tip)) {
+    const bool beyond =
+        newest == NeedlePhase::outside || tip_along(s) - along(s, s.own.bite[s.own.open.back().bite].exit) > kNewWall;
+    if (tip.held && tip.inside && !tip.was_inside && beyond) enter(s, tip);
+  }
+  if (!s.own.open.empty() && s.own.open.front().phase >= NeedlePhase::through) move_back_end(s);
+  // In the tissue the shaft is held by its channel, not by the surface.
+  c.solver.body_collides[s.needle] = s.own.open.empty();
 }
 
 }  // namespace
@@ -110,122 +256,11 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
   return true;
 }
 
-void puncture(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-              SutureState& state, EventList& events) {
-  const Vec4* x = solver.x.data();
-  const NeedleArc& arc = model.needle_arc[0];
-  const RigidBody& needle = solver.body[model.needle_body(0)];
-  const Vec3 tip = needle_tip(arc, needle);
-  SurfaceHit hit;
-  const bool near = nearest_surface(model, scratch.candidates, x, tip, kReach, hit);
-  const bool was_inside = state.tip_inside;
-  const bool inside = near && hit.distance < (was_inside ? kHysteresis : -kHysteresis);
-  // A needle that lies about pierces nothing: it weighs a few millinewtons.
-  const bool held = std::any_of(solver.weld.begin(), solver.weld.end(),
-                                [&](const Weld& w) { return w.a == static_cast<int>(model.needle_body(0)); });
-  state.tip_inside = inside && (held || !state.open.empty());
-  // [m] along the shaft from the swage to an end of a bite.
-  auto along = [&](const BiteEnd& end) { return arc.radius * arc.nearest(to_local(needle.pose(), position_of(end.point, x))); };
-  const float tip_at = arc.radius * arc.arc;
-
-  // --- the tip, in the newest wall ---
-  const NeedlePhase newest = phase_of(state);
-  if (newest == NeedlePhase::tip_in) {
-    const uint32_t which = state.open.back().bite;
-    Bite& bite = state.bite[which];
-    if (inside) bite.depth = std::max(bite.depth, -hit.distance);
-    if (state.attached) {
-      // Figure 5: dragged beyond the threshold, it is let go and the tissue relaxes.
-      const float dragged = distance(xyz(x[bite.nearest]), state.attached_from);
-      const auto row = std::find_if(solver.attach.begin(), solver.attach.end(),
-                                    [&](const Attachment& a) { return a.body == static_cast<int>(model.needle_body(0)); });
-      const float torn = distance(transform(needle.pose(), row->target), state.attached_from);
-      if (std::max(dragged, torn) > suture.release_distance) {
-        drop_attachment(model, solver, state);
-        events.add({EventKind::particle_released, 0, bite.nearest, dragged, xyz(x[bite.nearest])});
-      }
-    }
-    if (!inside) {
-      drop_attachment(model, solver, state);
-      if (!near || tip_at - along(bite.entry) < kEndReached) {
-        cancel_bite(model, solver, state, tip, events);
-      } else {
-        bite.exit = hit.end;
-        spread(model, bite.exit);
-        bite.has_exit = true;
-        solver.channel.push_back(channel_at(suture, bite, which, true));
-        state.open.back().phase = NeedlePhase::through;
-        events.add({EventKind::tip_exited, 0, which, bite.depth, hit.point});
-      }
-    }
-  } else if (newest == NeedlePhase::through && tip_at - along(state.bite[state.open.back().bite].exit) < kEndReached &&
-             (inside || tip_at - along(state.bite[state.open.back().bite].entry) < kEndReached)) {
-    const uint32_t which = state.open.back().bite;
-    if (inside) {  // drawn back into the wall
-      state.bite[which].has_exit = false;
-      close_hole(solver, hole_of(which, true));
-      state.open.back().phase = NeedlePhase::tip_in;
-    } else {  // torn back through both holes between two substeps: the tip was never seen in the wall
-      cancel_bite(model, solver, state, tip, events);
-    }
-  } else if (held && inside && !was_inside &&
-             (newest == NeedlePhase::outside || tip_at - along(state.bite[state.open.back().bite].exit) > kNewWall)) {
-    const uint32_t which = static_cast<uint32_t>(state.bite.size());
-    Bite bite;
-    bite.entry = hit.end;
-    spread(model, bite.entry);
-    const int nearest = nearest_particle(model.collision, scratch.candidates, x, tip, suture.attach_threshold);
-    if (nearest >= 0) bite.nearest = static_cast<uint32_t>(nearest);
-    state.bite.push_back(bite);
-    state.open.push_back({which, NeedlePhase::tip_in});
-    const Vec3 heading = rotate(needle.q, arc.tangent(arc.arc));
-    const float angle = portable::acos(std::clamp(-dot(heading, hit.normal), -1.0f, 1.0f));
-    events.add({EventKind::tip_entered, 0, which, angle, hit.point});
-    if (nearest >= 0) {
-      // Figure 4: the nearest particle within X of the tip moves with the tip, by the paper's spring.
-      Attachment a;
-      a.point = particle_point(bite.nearest);
-      a.body = static_cast<int>(model.needle_body(0));
-      state.attached_from = xyz(x[bite.nearest]);
-      a.target = to_local(needle.pose(), state.attached_from);
-      a.compliance = suture.attach_compliance;
-      solver.attach.push_back(a);
-      state.attached = true;
-      events.add({EventKind::particle_attached, 0, bite.nearest, distance(state.attached_from, tip), state.attached_from});
-    }
-    solver.channel.push_back(channel_at(suture, bite, which, false));
+void puncture(SutureContext& c) {
+  for (size_t k = 0; k < c.state.suture.size(); ++k) {
+    OneSuture s(c, k);
+    puncture(s);
   }
-
-  // --- the back end, in the oldest wall that it has not left ---
-  if (!state.open.empty() && state.open.front().phase >= NeedlePhase::through) {
-    OpenBite& oldest = state.open.front();
-    Bite& bite = state.bite[oldest.bite];
-    if (oldest.phase == NeedlePhase::through) {
-      // The back-end trigger: the swage has reached the entry, the thread follows through it.
-      if (along(bite.entry) <= kEndReached && place_suture_point(model, solver, suture, state, oldest.bite, false, events)) {
-        close_hole(solver, hole_of(oldest.bite, false));
-        oldest.phase = NeedlePhase::back_in;
-      }
-    } else {
-      const float entry_at = along(bite.entry);
-      if (entry_at > kBackOut && entry_at < 0.5f * tip_at &&
-          distance(position_of(bite.entry.point, x), needle_point(arc, needle, entry_at / arc.radius)) < kOnShaft) {
-        // The back end came out of the entry again: the thread has left the hole, the shaft is in it.
-        remove_last_suture_point(model, solver, suture, state);
-        solver.channel.push_back(channel_at(suture, bite, oldest.bite, false));
-        oldest.phase = NeedlePhase::through;
-      } else if (along(bite.exit) <= kEndReached &&
-                 place_suture_point(model, solver, suture, state, oldest.bite, true, events)) {
-        close_hole(solver, hole_of(oldest.bite, true));
-        bite.complete = true;
-        const Vec3 out = position_of(bite.exit.point, x);
-        events.add({EventKind::bite_completed, 0, oldest.bite, distance(position_of(bite.entry.point, x), out), out});
-        state.open.erase(state.open.begin());
-      }
-    }
-  }
-  // In the tissue the shaft is held by its channel, not by the surface.
-  solver.body_collides[model.needle_body(0)] = state.open.empty();
 }
 
 }  // namespace catgut

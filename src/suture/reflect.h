@@ -17,9 +17,7 @@ constexpr void reflect(auto& a, Like<OpenBite> auto& o) {
   a.index(o.bite, IndexOf::bite), a.at_most(o.phase, NeedlePhase::back_in), a(o.drawn), a(o.told);
 }
 
-constexpr void reflect(auto& a, Like<SuturePoint> auto& p) {
-  a.index(p.bite, IndexOf::bite), a(p.exit), a.index(p.anchor, IndexOf::anchor);
-}
+constexpr void reflect(auto& a, Like<SuturePoint> auto& p) { a.index(p.bite, IndexOf::bite), a(p.exit), a(p.anchor); }
 
 constexpr void reflect(auto& a, Like<InstrumentState> auto& i) {
   a.at_most(i.held, Held::tissue);
@@ -27,13 +25,14 @@ constexpr void reflect(auto& a, Like<InstrumentState> auto& i) {
   else if (i.held == Held::tissue) a.index(i.slot, IndexOf::tissue);
   else a(i.slot);
   a(i.at), a(i.jaw), a.at_most(i.place, InstrumentPlace::parked), a(i.hand);
+  a.index(i.suture, IndexOf::strand);
 }
 
 constexpr void reflect(auto& a, Like<ToolLoop> auto& l) {
   a(l.wraps), a(l.handed);
   if (l.wraps > 0) a.index(l.first, IndexOf::slot), a.index(l.last, IndexOf::slot);
   else a(l.first), a(l.last);
-  a.at_most(l.told, LoopReason::too_deep), a(l.spent), a(l.jaw);
+  a.at_most(l.told, LoopReason::too_deep), a(l.spent), a(l.jaw), a.index(l.suture, IndexOf::strand);
 }
 
 constexpr void reflect(auto& a, Like<Knot> auto& k) {
@@ -46,20 +45,19 @@ constexpr void reflect(auto& a, Like<Knot> auto& k) {
 constexpr void reflect(auto& a, Like<SettledNode> auto& n) { a.index(n.particle, IndexOf::tissue), a(n.offset); }
 constexpr void reflect(auto& a, Like<SettledStitch> auto& s) { a(s.node), a(s.knot); }
 
-constexpr void reflect(auto& a, Like<SutureState> auto& s) {
+constexpr void reflect(auto& a, Like<Suture> auto& s) {
   a.domain(IndexOf::bite, s.bite.size());
-  a(s.bite), a(s.point), a(s.open), a(s.tip_inside), a(s.attached), a(s.attached_from),
-      a.column(s.instrument, IndexOf::instrument), a.column(s.loop, IndexOf::instrument), a(s.knot), a(s.settled), a(s.buttons),
-      a(s.taken);
+  a(s.bite), a(s.point), a(s.open), a(s.tip_inside), a(s.attached), a(s.attached_from), a(s.knot), a(s.taken);
+}
+constexpr void reflect(auto& a, Like<SutureState> auto& s) {
+  a.column(s.suture, IndexOf::strand), a.column(s.instrument, IndexOf::instrument), a.column(s.loop, IndexOf::instrument);
+  a(s.settled), a(s.buttons), a.index(s.active, IndexOf::strand);
 }
 
 constexpr void reflect(auto& a, Like<ClosurePlan::Pull> auto& p) { a(p.point), a(p.from), a(p.to); }
 constexpr void reflect(auto& a, Like<ClosurePlan::Pair> auto& p) {
   a(p.a), a(p.b), a(p.start), a(p.end), a(p.progress), a(p.midpoint);
 }
-constexpr void reflect(auto& a, Like<ClosurePlan> auto& p) {
-  a(p.pull), a(p.progress), a(p.compliance), a(p.pair);
-  a.domain(IndexOf::plan_row, p.pair.size());
-}
+constexpr void reflect(auto& a, Like<ClosurePlan> auto& p) { a(p.pull), a(p.progress), a(p.compliance), a(p.pair); }
 
 }  // namespace catgut

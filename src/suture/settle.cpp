@@ -14,7 +14,7 @@ constexpr float kSamePlace = 0.003f;   // [m] less than stitches are apart: a se
 constexpr float kCarries = 0.1f;       // [N] less than this in a passage through a wall, and the wall holds itself
 
 // Whether anchors a and b are where the thread goes into and comes out of one bite.
-bool same_bite(const SutureState& state, int a, int b) {
+bool same_bite(const Suture& state, int a, int b) {
   const auto point_at = [&](int anchor) {
     return std::find_if(state.point.begin(), state.point.end(),
                         [&](const SuturePoint& p) { return static_cast<int>(p.anchor) == anchor; });
@@ -59,7 +59,7 @@ struct Span {
 // The spans of the anchored part of a piece, from node `lowest` to node `highest`. A knot is no place in the tissue: it lies
 // where its two strands draw it. So where both ends of a stitch meet in one, they are one span, through the knot; and of two
 // spans between the same anchors the shorter is the one that holds.
-std::vector<Span> spans_of(const Strand& t, size_t lowest, size_t highest, const SutureState& state,
+std::vector<Span> spans_of(const Strand& t, size_t lowest, size_t highest, const Suture& state,
                            const std::vector<uint32_t>& knots) {
   std::vector<Span> spans;
   int before = -1;
@@ -92,15 +92,17 @@ std::vector<Span> spans_of(const Strand& t, size_t lowest, size_t highest, const
 }
 
 // The piece of thread from node `first` to node `last`, tied by `knots`, as a settled stitch and the pins that do what it did.
-void settle_piece(const SolverModel& model, SolverState& solver, SutureState& state, size_t first, size_t last,
-                  const std::vector<uint32_t>& knots, EventList& events) {
-  const Strand& t = solver.strand[0];
+void settle_piece(OneSuture& one, size_t first, size_t last, const std::vector<uint32_t>& knots) {
+  const SolverModel& model = one.all.model;
+  SolverState& solver = one.all.solver;
+  SutureState& state = one.all.state;
+  const Strand& t = one.strand;
   SettledStitch stitch;
   size_t lowest = last, highest = first;
   for (size_t i = first; i <= last; ++i)
     if (anchor_of(t, t.order[i]) >= 0) lowest = std::min(lowest, i), highest = std::max(highest, i);
   const size_t pins = solver.pin.size();  // without its own
-  for (const Span& span : spans_of(t, lowest, highest, state, knots)) {
+  for (const Span& span : spans_of(t, lowest, highest, one.own, knots)) {
     // A passage through a wall holds nothing together but the wall: if it carries nothing, no pin is needed.
     if (span.passage && span.tension < kCarries) continue;
     TissuePin pin;
@@ -112,7 +114,7 @@ void settle_piece(const SolverModel& model, SolverState& solver, SutureState& st
     const Vec4* x = solver.x.data();
     const float other = distance(position_of(pin.a, x), position_of(pin.b, x)) - distance(position_of(a, x), position_of(b, x));
     pin.length = std::max(0.0f, span.length + other);
-    pin.compliance = model.strand[0].stretch_compliance * span.length / model.strand[0].spacing;
+    pin.compliance = one.thread.stretch_compliance * span.length / one.thread.spacing;
     pin.owner = span.passage ? PinOwner::passage : PinOwner::stitch;
     if (!held_already(solver, pins, pin)) solver.pin.push_back(pin);
   }
@@ -124,104 +126,123 @@ void settle_piece(const SolverModel& model, SolverState& solver, SutureState& st
     stitch.node.push_back(bind(model, solver, thread_position(t, i, solver.x.data(), solver.body)));
   Vec3 where{};
   for (uint32_t k : knots) {
-    where = position_of(state.knot[k].target, solver.x.data());
+    where = position_of(one.own.knot[k].target, solver.x.data());
     stitch.knot.push_back(bind(model, solver, where));
   }
-  events.add({EventKind::stitch_settled, 0, static_cast<uint32_t>(state.settled.size()), 0, where});
+  one.report(EventKind::stitch_settled, static_cast<uint32_t>(state.settled.size()), 0, where);
   state.settled.push_back(std::move(stitch));
 }
 
 }  // namespace
 
-void fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel&, std::span<const Vec3> start,
+void fresh_suture(const SolverModel& model, SolverState& solver, size_t suture, std::span<const Vec3> start,
                   const Pose& needle_start) {
-  Strand& t = solver.strand[0];
-  const uint32_t first = model.strand[0].first_slot;
-  reset(model.strand[0], t);
-  for (uint32_t i = 0; i < model.strand[0].count; ++i) {
-    solver.x[first + i] = point(start[first + i]);
-    solver.v[first + i] = {};
+  Strand& t = solver.strand[suture];
+  const StrandModel& m = model.strand[suture];
+  reset(m, t);
+  for (uint32_t slot = m.first_slot; slot < m.first_slot + m.count; ++slot) {
+    solver.x[slot] = point(start[slot]);
+    solver.v[slot] = {};
   }
-  RigidBody& needle = solver.body[model.needle_body(0)];
+  const uint32_t body = model.needle_body(suture);
+  RigidBody& needle = solver.body[body];
   needle = {};
   needle.x = needle.prev_x = needle_start.p;
   needle.q = needle.prev_q = needle_start.q;
   // The thread's last particle is the needle's: swaged on.
-  t.hold.push_back({t.order.back(), static_cast<int>(model.needle_body(0)), model.needle_arc[0].point(0), HoldKind::swage});
+  t.hold.push_back({t.order.back(), static_cast<int>(body), model.needle_arc[suture].point(0), HoldKind::swage});
 }
 
-bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                std::span<const Vec3> start, const Pose& needle_start, const std::array<uint32_t, kMaxHands>& pressed,
-                EventList& events) {
-  uint8_t who = 0;
-  while (who < kMaxHands && !(pressed[who] & kButtonNewSuture)) ++who;
-  if (who == kMaxHands) return false;
-  const Vec3 here = solver.body[model.needle_body(0)].x;
-  const auto fault = [&](uint32_t which, Fault f, Vec3 where) {
-    events.add({EventKind::technique_fault, who, which, 0, where, f});
-  };
-  if (!state.open.empty()) {
-    fault(state.open.back().bite, Fault::needle_in_tissue, here);
-    return false;
-  }
-  const Strand& t = solver.strand[0];
-  take_back_throws(model, solver, suture, state, events);
-  // Passages that drew their wall in until later stitches took the load off them: a pin that stays is paid for in every
-  // substep.
-  const float least = kCarries * model.h * model.h;
-  std::erase_if(solver.pin, [&](const TissuePin& p) { return p.owner == PinOwner::passage && -p.lambda < least; });
+namespace {
 
-  // Piece by piece between the cuts.
+// What is tied settles, piece by piece between the cuts; thread that was sewn in and never tied is pulled out.
+void settle_thread(OneSuture& s, uint8_t who) {
+  SutureContext& c = s.all;
+  const Strand& t = s.strand;
   std::vector<uint32_t> knots;
   for (size_t first = 0; first < t.order.size();) {
     size_t last = first;
     while (last + 1 < t.order.size() && !t.cut[last]) ++last;
     const auto on_piece = [&](uint32_t slot) {
-      const auto begin = t.order.begin() + static_cast<long>(first), end = t.order.begin() + static_cast<long>(last) + 1;
-      return std::find(begin, end, slot) != end;
+      const size_t node = node_of(t, slot);
+      return node >= first && node <= last;
     };
     knots.clear();
-    for (uint32_t k = 0; k < state.knot.size(); ++k) {
-      const Knot& knot = state.knot[k];
+    for (uint32_t k = 0; k < s.own.knot.size(); ++k) {
+      const Knot& knot = s.own.knot[k];
       if (knot.slots == 0 || !on_piece(knot.slot[0])) continue;
       knots.push_back(k);
-      if (knot.throws < static_cast<uint32_t>(suture.least_throws) && !knot.told)
-        fault(k, Fault::too_few_throws, position_of(knot.target, solver.x.data()));
+      if (knot.throws < static_cast<uint32_t>(c.suture.least_throws) && !knot.told)
+        c.report_fault(s.index, Fault::too_few_throws, who, k, position_of(knot.target, s.x()));
     }
     if (!knots.empty()) {
-      settle_piece(model, solver, state, first, last, knots, events);
+      settle_piece(s, first, last, knots);
     } else {
-      // Thread that was sewn in and never tied is pulled out.
-      for (const SuturePoint& p : state.point) {
+      for (const SuturePoint& p : s.own.point) {
         const ThreadAnchor& a = t.anchor[p.anchor];
         if (!on_piece(a.slot)) continue;
-        fault(a.slot, Fault::cut_before_knot, position_of(a.point, solver.x.data()));
+        c.report_fault(s.index, Fault::cut_before_knot, who, a.slot, position_of(a.point, s.x()));
         break;
       }
     }
     first = last + 1;
   }
+}
 
-  for (uint8_t k = 0; k < state.instrument.size(); ++k) {
-    InstrumentState& hand = state.instrument[k];
-    const Vec3 at = solver.body[k].x;
-    if (hand.held == Held::needle) events.add({EventKind::needle_released, hand.hand, 0, 0, at});
-    if (hand.held == Held::thread) events.add({EventKind::thread_released, hand.hand, hand.slot, 0, at});
-    if (hand.held != Held::tissue) hand.held = Held::nothing;
-    if (state.loop[k].wraps > 0) events.add({EventKind::loop_released, hand.hand, 0, 0, at});
-    const float jaw = state.loop[k].jaw;
-    state.loop[k] = {};
-    state.loop[k].jaw = jaw;
+// Whatever holds needle or thread of the suture lets go.
+void let_go_of(OneSuture& s) {
+  SutureContext& c = s.all;
+  const int needle = static_cast<int>(s.needle);
+  for (uint32_t k = 0; k < c.state.instrument.size(); ++k) {
+    InstrumentState& hand = c.state.instrument[k];
+    const Vec3 at = c.solver.body[k].x;
+    const bool mine = hand.suture == s.index;
+    if (mine && hand.held == Held::needle) c.report_tool(s.index, EventKind::needle_released, k, 0, 0, at);
+    if (mine && hand.held == Held::thread) {
+      for (Strand& strand : c.solver.strand) release_holds(strand, static_cast<int>(k), HoldKind::jaw);
+      c.report_tool(s.index, EventKind::thread_released, k, hand.slot, 0, at);
+    }
+    if (mine && hand.held != Held::tissue) hand.held = Held::nothing;
+    ToolLoop& loop = c.state.loop[k];
+    if (loop.suture != s.index) continue;
+    if (loop.wraps > 0) c.report_tool(s.index, EventKind::loop_released, k, 0, 0, at);
+    const float jaw = loop.jaw;
+    loop = {};
+    loop.jaw = jaw;
   }
-  std::erase_if(solver.weld, [&](const Weld& w) { return w.a == static_cast<int>(model.needle_body(0)); });
-  std::erase_if(solver.attach, [&](const Attachment& a) { return a.body == static_cast<int>(model.needle_body(0)); });
-  solver.channel.clear();
-  solver.body_collides[model.needle_body(0)] = 1;
-  state.attached = state.tip_inside = false;
-  state.point.clear();
-  state.knot.clear();
-  fresh_suture(model, solver, suture, start, needle_start);
-  events.add({EventKind::suture_taken, who, state.taken++, 0, solver.body[model.needle_body(0)].x});
+  std::erase_if(c.solver.weld, [&](const Weld& w) { return w.a == needle; });
+  std::erase_if(c.solver.attach, [&](const Attachment& a) { return a.body == needle; });
+  std::erase_if(c.solver.channel, [&](const ChannelPoint& p) { return p.suture == s.index; });
+  c.solver.body_collides[s.needle] = 1;
+}
+
+}  // namespace
+
+bool new_suture(SutureContext& c, std::span<const Vec3> start, std::span<const Pose> needle_start,
+                const std::array<uint32_t, kMaxHands>& pressed) {
+  uint8_t who = 0;
+  while (who < kMaxHands && !(pressed[who] & kButtonNewSuture)) ++who;
+  if (who == kMaxHands) return false;
+  uint32_t which = c.state.active;
+  for (const InstrumentState& tool : c.state.instrument)
+    if (tool.hand == who && (tool.held == Held::needle || tool.held == Held::thread)) which = tool.suture;
+  OneSuture s(c, which);
+  if (!s.own.open.empty()) {
+    c.report_fault(s.index, Fault::needle_in_tissue, who, s.own.open.back().bite, s.body().x);
+    return false;
+  }
+  take_back_throws(s);
+  // Passages that drew their wall in until later stitches took the load off them: a pin that stays is paid for in every
+  // substep.
+  const float least = kCarries * c.model.h * c.model.h;
+  std::erase_if(c.solver.pin, [&](const TissuePin& p) { return p.owner == PinOwner::passage && -p.lambda < least; });
+  settle_thread(s, who);
+  let_go_of(s);
+  s.own.attached = s.own.tip_inside = false;
+  s.own.point.clear();
+  s.own.knot.clear();
+  fresh_suture(c.model, c.solver, s.index, start, needle_start[s.index]);
+  c.report(s.index, EventKind::suture_taken, who, s.own.taken++, 0, s.body().x);
   return true;
 }
 

@@ -1,4 +1,5 @@
-// suture: the data of guided suturing (paper 2.2, 2.3) and the stages that work on it, in the order of the tick:
+// suture: the data of guided suturing (paper 2.2, 2.3) and the stages that work on it, for any number of sutures, in the order
+// of the tick:
 //   grasp -> loop -> knot -> cut -> settle -> (per substep: solver, slip, puncture, pull, tighten) -> [technique] -> closure.
 // Each stage reads and writes live rows of the solver's state (attachments, channel, anchors, order); none touches a
 // multiplier.
@@ -66,6 +67,7 @@ struct ToolLoop {
   LoopReason told = LoopReason::none;  // the rejection that was last reported
   uint32_t spent = 0;                  // 1: what lies round the tool was let go; it counts again once it has been taken off
   float jaw = 1;                       // of the last tick
+  uint32_t suture = 0;                 // whose thread it is
 };
 
 // A knot: throws that lie on each other, made of loops. While a throw tightens, the ends of its loop are anchored to it with an
@@ -117,88 +119,135 @@ struct SutureModel {
   float grasp_compliance = 2e-5f, grasp_angular_compliance = 0.02f;  // [m/N], [rad/(N m)]
 };
 
-struct SutureState {
+// One needle with its thread, and what has been sewn with it. Its rigid body is SolverModel::needle_body, its thread the strand
+// of the same index.
+struct Suture {
   std::vector<Bite> bite;
   std::vector<SuturePoint> point;  // in the order in which they were made
   std::vector<OpenBite> open;      // the walls that the needle is in, the one nearest to its back end first
   bool tip_inside = false;
-  bool attached = false;                      // the newest bite's nearest particle is attached to the tip
-  Vec3 attached_from;                         // [m] where that particle was
+  bool attached = false;   // the newest bite's nearest particle is attached to the tip
+  Vec3 attached_from;      // [m] where that particle was
+  std::vector<Knot> knot;  // in the order in which they were begun
+  uint32_t taken = 0;      // how often needle and thread were replaced by new ones
+};
+
+struct SutureState {
+  std::vector<Suture> suture;
   std::vector<InstrumentState> instrument;    // as SutureModel::instrument
   std::vector<ToolLoop> loop;                 // round each instrument
-  std::vector<Knot> knot;                     // in the order in which they were begun
   std::vector<SettledStitch> settled;         // in the order in which they settled
   std::array<uint32_t, kMaxHands> buttons{};  // of each hand in the last tick
-  uint32_t taken = 0;                         // fresh needles and threads so far
+  uint32_t active = 0;                        // the suture whose needle was grasped last: a new one replaces it
 };
 
 // The hand that has the instrument, for events; kNoHand when none does.
 inline uint8_t hand_of(const SutureState& s, size_t instrument) { return s.instrument[instrument].hand; }
 
 // Of the newest bite; outside when the needle is in no wall.
-inline NeedlePhase phase_of(const SutureState& s) { return s.open.empty() ? NeedlePhase::outside : s.open.back().phase; }
+inline NeedlePhase phase_of(const Suture& s) { return s.open.empty() ? NeedlePhase::outside : s.open.back().phase; }
+
+// What a stage reads and writes.
+struct SutureContext {
+  const SolverModel& model;
+  SolverState& solver;
+  const SolverScratch& scratch;  // where the broad phase left its boxes
+  const SutureModel& suture;
+  SutureState& state;
+  EventList& events;
+
+  // Events of a suture. `hand`: the one that did it; report_tool: the one that has that instrument.
+  void report(uint32_t of, EventKind kind, uint8_t hand, uint32_t which, float value, Vec3 where, Fault fault = Fault::none,
+              LoopReason reason = LoopReason::none) {
+    events.add({kind, hand, which, value, where, fault, reason, static_cast<uint16_t>(of)});
+  }
+  void report_tool(uint32_t of, EventKind kind, uint32_t tool, uint32_t which, float value, Vec3 where,
+                   Fault fault = Fault::none, LoopReason reason = LoopReason::none) {
+    report(of, kind, hand_of(state, tool), which, value, where, fault, reason);
+  }
+  void report_fault(uint32_t of, Fault fault, uint8_t hand, uint32_t which, Vec3 where) {
+    report(of, EventKind::technique_fault, hand, which, 0, where, fault);
+  }
+};
+
+// One suture of them, with all that is its own.
+struct OneSuture {
+  SutureContext& all;
+  uint32_t index;
+  Suture& own;
+  Strand& strand;
+  const StrandModel& thread;
+  const NeedleArc& arc;
+  uint32_t needle;  // its body
+
+  OneSuture(SutureContext& c, size_t i)
+      : all(c),
+        index(static_cast<uint32_t>(i)),
+        own(c.state.suture[i]),
+        strand(c.solver.strand[i]),
+        thread(c.model.strand[i]),
+        arc(c.model.needle_arc[i]),
+        needle(c.model.needle_body(i)) {}
+  const Vec4* x() const { return all.solver.x.data(); }
+  Vec3 at(uint32_t slot) const { return xyz(all.solver.x[slot]); }
+  RigidBody& body() const { return all.solver.body[needle]; }
+  void report(EventKind kind, uint32_t which, float value, Vec3 where) { all.report(index, kind, 0, which, value, where); }
+};
 
 // --- grasp.cpp ---------------------------------------------------------------------------------------------------------
-// Once a tick, for every instrument in a hand. A jaw that closes within reach of the needle, else of the thread, else of the
-// tissue's surface holds it at the place and angle where it was caught; opening lets go. scratch: where the last substep left
-// the broad phase.
-void grasp(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-           SutureState& state, const HandInputs& hand, EventList& events);
+// Once a tick, for every instrument in a hand. A jaw that closes within reach of a needle, else of a thread, else of the
+// tissue's surface holds it at the place and angle where it was caught; opening lets go.
+void grasp(SutureContext& c, const HandInputs& hand);
 
 // After every substep: a jaw that is pulled on harder than its instrument grips (InstrumentModel) lets slip what it holds,
 // before the pull becomes one that no hand could make. Reported as a release with the force [N] as its value.
-void slip(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, EventList& events);
+void slip(SutureContext& c);
+// An instrument lets go of what it holds. force [N]: 0 when the jaw was opened, else what made it slip.
+void release(SutureContext& c, uint32_t who, float force);
 
 // --- loop.cpp ----------------------------------------------------------------------------------------------------------
 // Once a tick. Thread that is laid round a tool whose jaw holds nothing is frozen there; more turns that follow are added to
-// it. Opening the jaws wide, or a pull harder than its thread_grip, lets it go.
-void find_loops(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                EventList& events);
+// it. Opening the jaws wide, or a pull harder than thread_grip, lets it go.
+void find_loops(SutureContext& c);
 // Whether a particle lies so near to the loop round a tool, along the thread, that jaws which close at the loop do not mean it.
 bool beside_loop(const Strand& thread, const ToolLoop& loop, uint32_t slot);
 // The loop leaves its tool, to become a knot or to fall off.
-void take_off_loop(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, uint32_t who);
+void take_off_loop(SutureContext& c, uint32_t who);
 
 // --- knot.cpp ----------------------------------------------------------------------------------------------------------
-// An instrument lets go of what it holds. force [N]: 0 when the jaw was opened, else what made it slip.
-void release(SolverState& solver, SutureState& state, uint8_t who, float force, EventList& events);
-
 // Once a tick. A tool with a loop round it whose jaws have closed on thread beyond the loop begins a throw; one that lets go of
-// it before the throw is locked takes it back.
-void tie(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, EventList& events);
+// it before the throw is locked takes it back. A thread is tied to itself only: jaws that hold another suture's take the loop
+// off.
+void tie(SutureContext& c);
 // After every substep: throws go down to the tissue as far as the pulling tool goes away, and lock there; a knot that was just
 // locked draws through what is still slack under it.
-void tighten(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-             SutureState& state, EventList& events);
-// Takes every throw that is not locked back, whoever pulls on it.
-void take_back_throws(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                      EventList& events);
+void tighten(SutureContext& c);
+// Takes every throw of a suture back that is not locked, whatever pulls on it.
+void take_back_throws(OneSuture& s);
 
 // --- cut.cpp -----------------------------------------------------------------------------------------------------------
 // Buttons that went down since the last tick, by hand; remembers them.
 std::array<uint32_t, kMaxHands> pressed_buttons(SutureState& state, const HandInputs& hand);
 // Once a tick. kButtonCut cuts the thread nearest to the tool's jaws; the last pair is the needle's own: there the needle comes
 // off. A cut in a wrong place is reported and stays.
-void cut(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-         const std::array<uint32_t, kMaxHands>& pressed, EventList& events);
+void cut(SutureContext& c, const std::array<uint32_t, kMaxHands>& pressed);
 // A jaw that has just closed on thread also holds the other strands that lie between its tips: the two ends of a stay suture.
-void hold_other_strands(SolverState& solver, const SutureModel& suture, const SutureState& state, uint8_t who);
+void hold_other_strands(SutureContext& c, uint32_t who);
 
 // --- settle.cpp --------------------------------------------------------------------------------------------------------
-// Once a tick. kButtonNewSuture of either hand: what is tied settles, tails included, its thread's pull goes over to pins; the
-// rest is taken away, and a fresh needle and thread lie on the drape. Bites stay listed. Not while the needle is in the tissue.
-// True: it was done. start: positions of all particles at the start [m].
-bool new_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                std::span<const Vec3> start, const Pose& needle_start, const std::array<uint32_t, kMaxHands>& pressed,
-                EventList& events);
+// Once a tick. kButtonNewSuture of a hand replaces the suture whose needle or thread that hand holds, else the active one:
+// what is tied settles, tails included, its thread's pull goes over to pins; the rest is taken away, and a new needle and
+// thread lie on the drape. Bites stay listed. Not while the needle is in the tissue. True: it was done. start: positions of all
+// particles at the start [m]; needle_start: of every suture's needle.
+bool new_suture(SutureContext& c, std::span<const Vec3> start, std::span<const Pose> needle_start,
+                const std::array<uint32_t, kMaxHands>& pressed);
 // Needle and thread as they lie at the start, and nothing that holds them but the swage.
-void fresh_suture(const SolverModel& model, SolverState& solver, const SutureModel& suture, std::span<const Vec3> start,
+void fresh_suture(const SolverModel& model, SolverState& solver, size_t suture, std::span<const Vec3> start,
                   const Pose& needle_start);
 
 // --- puncture.cpp ------------------------------------------------------------------------------------------------------
 // After every substep: the tip trigger, the attached particle, the back-end trigger (paper 2.2, figures 4 and 5).
-void puncture(const SolverModel& model, SolverState& solver, const SolverScratch& scratch, const SutureModel& suture,
-              SutureState& state, EventList& events);
+void puncture(SutureContext& c);
 // Signed distance [m] from p to the tissue's surface (negative inside the wall) and the nearest place on it. False: nothing
 // near.
 struct SurfaceHit {
@@ -213,26 +262,25 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
 
 // --- pull.cpp ----------------------------------------------------------------------------------------------------------
 // After every substep: particles whose turn it is pass their suture point (figures 7 to 9), from the needle end to the free
-// end. A hand that draws thread through the tissue while the needle is still in it is told so, once a bite; the thread comes.
-void pull(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state, EventList& events);
-// Moves up to `length` [m] of thread past the locked particle `slot`, toward the needle (way +1) or the free end (-1); the sum
-// of rest lengths stays. Returns how much went: particles that are locked or at an end of the thread do not pass.
-float draw_through(const SolverModel& model, SolverState& solver, uint32_t slot, int way, float length);
-// Locks the next free particle behind the needle to `end` and makes it a suture point (figure 7a). False: no free particle
-// there yet. A needle without thread passes (true) and makes none.
-bool place_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state,
-                        uint32_t bite, bool exit, EventList& events);
+// end. A hand that draws thread through the tissue while the needle is still in it is reported, once a bite; the thread comes.
+void pull(SutureContext& c);
+// Moves up to `length` [m] of thread past the locked particle `slot`, toward the needle (direction +1) or the free end (-1);
+// the sum of rest lengths stays. Returns how much went: particles that are locked or at an end of the thread do not pass.
+float draw_through(OneSuture& s, uint32_t slot, int direction, float length);
+// Locks the next free particle behind the needle to an end of a bite and makes it a suture point (figure 7a). False: no free
+// particle there yet. A needle without thread passes (true) and makes none.
+bool place_suture_point(OneSuture& s, uint32_t bite, bool exit);
 // Unlocks the newest suture point again: its thread was drawn back out of the hole. The particle stays where it is, as free
 // thread.
-void remove_last_suture_point(const SolverModel& model, SolverState& solver, const SutureModel& suture, SutureState& state);
+void remove_last_suture_point(OneSuture& s);
 // Rest length [m] of the thread between the first and the last suture point along the order; 0 with fewer than two. Across a
 // cut thread, here and in spans: the whole length of the thread, which draws nothing together.
-float length_between_ends(const SolverState& solver, const SutureState& state);
+float length_between_ends(const Strand& strand, const Suture& suture);
 // Rest length [m] of the thread from each suture point to the next one made after it; 0 for the last. With a knot between
 // them: by how much what lies beyond the knot is longer than the way from the knot to the first of the two.
-void spans(const SolverState& solver, const SutureState& state, std::vector<float>& span);
+void spans(const Strand& strand, const Suture& suture, const Vec4* x, std::vector<float>& span);
 // Takes the row out of Strand::anchor and puts the indices right that point behind it.
-void erase_anchor(SolverState& solver, SutureState& state, uint32_t anchor);
+void erase_anchor(Strand& strand, Suture& suture, uint32_t anchor);
 
 // --- closure.cpp -------------------------------------------------------------------------------------------------------
 // What a technique wants closed: points of tissue and where they go. At progress s each is pulled toward from + s (to - from).
@@ -253,7 +301,7 @@ struct ClosurePlan {
   };
   std::vector<Pair> pair;  // rows are added, never removed
 };
-// Once a tick: makes the plan's attachments, or moves their targets.
-void close(SolverState& solver, const ClosurePlan& plan);
+// Once a tick: makes the attachments and pins of every suture's plan, or moves their targets.
+void close(SolverState& solver, std::span<const ClosurePlan> plan);
 
 }  // namespace catgut

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// technique/reflect: the members of the techniques' state, for archives (core/reflect.h). The plan comes before them: their
-// rows are its rows.
+// technique/reflect: the members of the techniques' state, for archives (core/reflect.h). Their rows are those of the plan:
+// load_state checks that.
 #pragma once
 #include "suture/reflect.h"
 #include "technique/technique.h"
@@ -13,14 +13,14 @@ constexpr void reflect(auto& a, Like<PurseStringState> auto& p) {
 }
 
 constexpr void reflect(auto& a, Like<SeamRow> auto& r) {
-  a.index(r.leader, IndexOf::plan_row), a(r.point), a(r.from), a.at_most(r.hold, SeamHold::nothing), a(r.told);
+  a(r.leader), a(r.point), a(r.from), a.at_most(r.hold, SeamHold::nothing), a(r.told);
 }
 constexpr void reflect(auto& a, Like<SeamState> auto& s) {
   a(s.row), a.at_most(s.first_row, s.row.size()), a(s.taken), a(s.points), a(s.passes), a(s.throws), a(s.told);
   a.cache(s.pass);
 }
 
-constexpr void reflect(auto& a, Like<LembertStitch> auto& s) { a.index(s.row, IndexOf::plan_row), a(s.suture), a(s.holds); }
+constexpr void reflect(auto& a, Like<LembertStitch> auto& s) { a(s.row), a(s.suture), a(s.holds); }
 constexpr void reflect(auto& a, Like<LembertRow> auto& r) { a(r.one), a(r.other), a(r.told); }
 constexpr void reflect(auto& a, Like<LembertState> auto& l) {
   a(l.stitch), a(l.row), a(l.taken), a(l.throws), a(l.knot), a.at_most(l.tied, 1u), a(l.told);

@@ -124,7 +124,7 @@ std::array<float, 2> from_tool_to_needle() {
   Snapshot seen;
   publish(*model, *state, seen);
   const PictureModel picture = picture_model(*model);
-  const Camera c = camera_of(start_orbit(picture, seen.needle.pose.p));
+  const Camera c = camera_of(start_orbit(picture, seen.active().needle.pose.p));
   const ViewFrame view = view_frame(c.eye, c.target, c.up, c.fov_deg, kHeight);
   const auto on_screen = [&](Vec3 p) {
     const Vec3 d = p - view.eye;

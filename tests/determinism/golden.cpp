@@ -83,13 +83,16 @@ class Seen {
       force_.add(t.force);
       force_.add(t.torque);
     }
-    motion_.add(s.needle.pose);
-    for (uint32_t i : s.thread_order) motion_.add(i);
-    for (const SuturePointView& p : s.suture_point) motion_.add(p.position);
-    for (const KnotView& k : s.knot) motion_.add(k.position);
+    for (const SutureView& suture : s.suture) {
+      motion_.add(suture.needle.pose);
+      for (uint32_t i : suture.thread_order) motion_.add(i);
+      for (const SuturePointView& p : suture.suture_point) motion_.add(p.position);
+      for (const KnotView& k : suture.knot) motion_.add(k.position);
+    }
     motion_.add(s.opening_area);
     motion_.add(s.closure);
-    for (float tension : s.thread_tension) force_.add(tension);
+    for (const SutureView& suture : s.suture)
+      for (float tension : suture.thread_tension) force_.add(tension);
     for (const Event& e : s.event) {
       events_.add(static_cast<uint32_t>(e.tick));
       const std::string_view name = event_name(e.kind);

@@ -31,7 +31,7 @@ struct Desk {
     picture.instrument[0].capabilities = kHoldNeedle | kHoldThread | kHoldTissue | kClamp | kCutThread;  // a needle holder
     picture.instrument[1].capabilities = kHoldNeedle | kHoldThread | kHoldTissue;                        // forceps
     seen.tool[0].instrument = 0, seen.tool[1].instrument = 1;
-    seen.needle.pose.p = {0.3f, 0, 0};  // out of the help's reach
+    seen.active().needle.pose.p = {0.3f, 0, 0};  // out of the help's reach
     steering = start_steering(picture, false);
     turn({});
   }
@@ -132,17 +132,17 @@ TEST(Mouse, keys_are_buttons_of_the_active_hand_while_they_are_down) {
 
 TEST(Mouse, the_right_button_turns_a_held_needle_about_its_own_circle) {
   Desk d;
-  d.seen.needle.pose = {{0.01f, 0.02f, 0.03f}, axis_angle(normalized(Vec3{1, 2, 3}), 0.7f)};
+  d.seen.active().needle.pose = {{0.01f, 0.02f, 0.03f}, axis_angle(normalized(Vec3{1, 2, 3}), 0.7f)};
   d.seen.tool[0].held = Held::needle;
   const Pose grip{{0.004f, 0.007f, 0}, axis_angle({1, 0, 0}, 0.4f)};
-  d.seen.tool[0].pose = d.steering.hand[0].pose = d.seen.needle.pose * grip;
+  d.seen.tool[0].pose = d.steering.hand[0].pose = d.seen.active().needle.pose * grip;
   d.turn({});
   MouseInput in = moved(100, 0);
   in.turn = true;
   d.turn(in);
   const Pose needle = d.out[0].pose * inverse(grip);
-  EXPECT_LT(distance(needle.p, d.seen.needle.pose.p), 1e-6f) << "its centre stays";
-  const Vec3 turned = rotation_vector(conjugate(d.seen.needle.pose.q) * needle.q);
+  EXPECT_LT(distance(needle.p, d.seen.active().needle.pose.p), 1e-6f) << "its centre stays";
+  const Vec3 turned = rotation_vector(conjugate(d.seen.active().needle.pose.q) * needle.q);
   EXPECT_NEAR(turned.z, 0.6f, 1e-4f) << "tip first";
   EXPECT_NEAR(std::hypot(turned.x, turned.y), 0, 1e-4f);
 }
@@ -184,10 +184,10 @@ TEST(Steer, after_a_jump_in_time_hands_go_on_from_the_tools) {
   Desk d;
   d.turn(moved(80, 30));
   const Pose grip{{0.004f, 0.007f, 0}, axis_angle({1, 0, 0}, 0.4f)};
-  d.seen.needle.pose = {{0.01f, 0.02f, 0.03f}, axis_angle(normalized(Vec3{1, 2, 3}), 0.7f)};
+  d.seen.active().needle.pose = {{0.01f, 0.02f, 0.03f}, axis_angle(normalized(Vec3{1, 2, 3}), 0.7f)};
   d.seen.tool[0].held = Held::needle;
   d.seen.tool[0].jaw = 0;
-  d.seen.tool[0].pose = d.seen.tool[0].hand = d.seen.needle.pose * grip;
+  d.seen.tool[0].pose = d.seen.tool[0].hand = d.seen.active().needle.pose * grip;
   d.seen.tool[1].hand = {{-0.05f, 0.01f, 0}, {}};
   resume_steering(d.steering, d.seen);
   d.turn({});
@@ -197,19 +197,21 @@ TEST(Steer, after_a_jump_in_time_hands_go_on_from_the_tools) {
   MouseInput in = moved(50, 0);
   in.turn = true;
   d.turn(in);
-  EXPECT_LT(distance((d.out[0].pose * inverse(grip)).p, d.seen.needle.pose.p), 1e-6f) << "and turns it about its own centre";
+  EXPECT_LT(distance((d.out[0].pose * inverse(grip)).p, d.seen.active().needle.pose.p), 1e-6f)
+      << "and turns it about its own centre";
 }
 
 TEST(Help, takes_an_open_jaw_to_the_good_place_and_lets_go_of_a_moving_hand) {
   Desk d;
-  d.seen.needle.pose = {d.out[0].pose.p + d.view.ahead * 0.04f, axis_angle({1, 0, 0}, -0.5f * kPi)};
-  const float phi = 0.35f * d.picture.needle_arc;
-  const Vec3 place = transform(d.seen.needle.pose, Vec3{std::cos(phi), std::sin(phi), 0} * d.picture.needle_radius);
+  d.seen.active().needle.pose = {d.out[0].pose.p + d.view.ahead * 0.04f, axis_angle({1, 0, 0}, -0.5f * kPi)};
+  const float phi = 0.35f * d.picture.suture[0].needle_arc;
+  const Vec3 place =
+      transform(d.seen.active().needle.pose, Vec3{std::cos(phi), std::sin(phi), 0} * d.picture.suture[0].needle_radius);
   // To the pointer's place over the needle, 40 mm in front of it.
   const auto to = on_screen(d.view, place), from = on_screen(d.view, d.out[0].pose.p);
   d.turn(moved(to[0] - from[0], to[1] - from[1]));
   EXPECT_LT(distance(d.out[0].pose.p, place), 1e-5f);
-  const Vec3 along = rotate(d.seen.needle.pose.q, {-std::sin(phi), std::cos(phi), 0});
+  const Vec3 along = rotate(d.seen.active().needle.pose.q, {-std::sin(phi), std::cos(phi), 0});
   for (const Vec3 axis : {Vec3{1, 0, 0}, Vec3{0, 0, 1}})
     EXPECT_NEAR(dot(rotate(d.out[0].pose.q, axis), along), 0, 1e-3f) << "across the needle";
   EXPECT_GT(rotate(d.out[0].pose.q, {0, 0, 1}).y, 0.7f) << "from above, where the shaft was";
@@ -237,17 +239,17 @@ TEST(Help, takes_an_open_jaw_to_the_good_place_and_lets_go_of_a_moving_hand) {
 void with_a_stitch(Desk& d) {
   for (uint32_t i = 0; i < 41; ++i) {
     const float s = 0.002f * static_cast<float>(i);
-    d.seen.thread_order.push_back(i);
+    d.seen.active().thread_order.push_back(i);
     d.seen.particle.push_back(i <= 15 ? Vec3{0, 0, 0.03f - s} : Vec3{0.03f - s, 0.002f, 0});
   }
-  d.seen.thread_tension.resize(40);
-  d.seen.thread_cut.resize(40);
-  d.seen.thread_rest = 0.08f;
-  d.seen.suture_point.resize(1);
-  d.seen.suture_point[0].anchored = 15;
-  d.seen.needle.pose.p = d.seen.particle[40] - Vec3{d.picture.needle_radius, 0, 0};
+  d.seen.active().thread_tension.resize(40);
+  d.seen.active().thread_cut.resize(40);
+  d.seen.active().thread_rest = 0.08f;
+  d.seen.active().suture_point.resize(1);
+  d.seen.active().suture_point[0].anchored = 15;
+  d.seen.active().needle.pose.p = d.seen.particle[40] - Vec3{d.picture.suture[0].needle_radius, 0, 0};
   d.seen.tool[1].held = Held::needle;
-  d.seen.tool[1].pose = d.steering.hand[1].pose = {d.seen.needle.pose.p, axis_angle({0, 1, 0}, -0.5f * kPi)};
+  d.seen.tool[1].pose = d.steering.hand[1].pose = {d.seen.active().needle.pose.p, axis_angle({0, 1, 0}, -0.5f * kPi)};
 }
 
 TEST(Help, one_gesture_moves_both_hands_unless_it_is_switched_off) {
@@ -275,8 +277,8 @@ TEST(Help, an_end_is_not_drawn_farther_than_it_is_long) {
   const Vec3 here = d.seen.tool[1].pose.p, far = here + Vec3{-0.2f, 0.1f, 0};
   EXPECT_TRUE(on_leash(d.picture, d.seen, 1, here) == here);
   EXPECT_NEAR(distance(swage_with(on_leash(d.picture, d.seen, 1, far)), stitch), strand + 0.01f, 1e-4f);
-  d.seen.knot.resize(1);
-  d.seen.knot[0].position = stitch;
+  d.seen.active().knot.resize(1);
+  d.seen.active().knot[0].position = stitch;
   EXPECT_NEAR(distance(swage_with(on_leash(d.picture, d.seen, 1, far)), stitch), strand + 0.002f, 1e-4f) << "nothing slides";
   EXPECT_TRUE(on_leash(d.picture, d.seen, 0, far) == far) << "an empty hand goes where it likes";
 }
@@ -295,9 +297,10 @@ TEST(Help, the_jaws_find_the_tail_while_the_other_hand_has_the_needle) {
 
 TEST(Help, a_held_needle_comes_to_the_bite_and_is_driven_from_there) {
   Desk d;
-  d.seen.needle.pose = {{0.03f, 0.03f, 0}, axis_angle({1, 0, 0}, 0.3f)};
+  d.seen.active().needle.pose = {{0.03f, 0.03f, 0}, axis_angle({1, 0, 0}, 0.3f)};
   d.seen.tool[0].held = Held::needle;
-  d.seen.tool[0].pose = d.steering.hand[0].pose = d.seen.needle.pose * Pose{{0.004f, 0.007f, 0}, axis_angle({1, 0, 0}, 0.4f)};
+  d.seen.tool[0].pose = d.steering.hand[0].pose =
+      d.seen.active().needle.pose * Pose{{0.004f, 0.007f, 0}, axis_angle({1, 0, 0}, 0.4f)};
   d.steering.guide = BiteGuide{{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, 0.008f, 0.001f};
   d.turn({});
   EXPECT_FALSE(d.steering.hand[0].snapped) << "too far";
@@ -305,11 +308,11 @@ TEST(Help, a_held_needle_comes_to_the_bite_and_is_driven_from_there) {
   d.turn(moved(to[0] - from[0], to[1] - from[1]));
   ASSERT_TRUE(d.steering.hand[0].snapped);
   for (int i = 0; i < 240; ++i) {  // the tool and the needle in it go where they are sent
-    d.seen.needle.pose = d.out[0].pose * inverse(d.steering.hand[0].grip);
+    d.seen.active().needle.pose = d.out[0].pose * inverse(d.steering.hand[0].grip);
     d.seen.tool[0].pose = d.out[0].pose;
     d.turn({});
   }
-  const Vec3 before = on_needle(d.picture, d.seen.needle.pose, 1);
+  const Vec3 before = on_needle(d.picture, d.seen.active().needle.pose, 1);
   EXPECT_LT(distance(before, entry_of(*d.steering.guide)), 0.006f);
   EXPECT_GT(before.y, 0) << "the tip is before the tissue";
   MouseInput in = moved(80, 0);
@@ -323,11 +326,11 @@ TEST(Help, a_held_needle_comes_to_the_bite_and_is_driven_from_there) {
 
 TEST(Help, the_second_hand_takes_the_other_place) {
   Desk d;
-  d.seen.needle.pose = {};
+  d.seen.active().needle.pose = {};
   d.seen.tool[0].held = Held::needle;
   d.seen.tool[0].held_at = 0.35f;
   const Pose tip = good_grip(d.picture, d.seen, 1, {0, 0, 1}, {});
-  EXPECT_LT(tip.p.x, -0.9f * d.picture.needle_radius);
+  EXPECT_LT(tip.p.x, -0.9f * d.picture.suture[0].needle_radius);
   d.seen.tool[0].held_at = 0.93f;
   EXPECT_GT(good_grip(d.picture, d.seen, 1, {0, 0, 1}, {}).p.x, 0);
 }
@@ -464,8 +467,8 @@ class MousePerson {
     return std::any_of(events_.begin(), events_.end(), [&](const Event& e) { return e.kind == kind; });
   }
   Vec3 on_needle(float s) const {
-    const float phi = s * picture_.needle_arc;
-    return transform(seen_.needle.pose, Vec3{std::cos(phi), std::sin(phi), 0} * picture_.needle_radius);
+    const float phi = s * picture_.suture[0].needle_arc;
+    return transform(seen_.active().needle.pose, Vec3{std::cos(phi), std::sin(phi), 0} * picture_.suture[0].needle_radius);
   }
 
   const int ticks_;
@@ -502,15 +505,15 @@ TEST_P(WholeBite, by_mouse_alone) {
   const Plan plan = make_plan("purse_string", me.picture_, SurgeonSkill{});
   const BitePlace& bite = plan.place[0];
   const Vec3 out = normalized(bite.out - bite.up * dot(bite.out, bite.up)), along = cross(out, bite.up);
-  const float half = std::asin(0.5f * bite.length / me.picture_.needle_radius);
+  const float half = std::asin(0.5f * bite.length / me.picture_.suture[0].needle_radius);
   const auto needle_at = [&](float psi, float away, float lift) {
     const Vec3 x = out * std::cos(psi) - along * std::sin(psi);
-    return Pose{bite.at + out * (me.picture_.needle_radius - bite.depth + away) + bite.up * lift,
+    return Pose{bite.at + out * (me.picture_.suture[0].needle_radius - bite.depth + away) + bite.up * lift,
                 from_axes(x, cross(bite.up, x), bite.up)};
   };
   ASSERT_TRUE(me.bring_needle(needle_at(-half - 0.7f, 0.02f, 0.012f), 1500));
   ASSERT_TRUE(me.bring_needle(needle_at(-half - 0.5f, -0.0003f, 0), 600));
-  EXPECT_TRUE(me.drive(0.8f, 800, [&] { return !me.seen_.bite.empty() && me.seen_.bite.back().has_exit; }))
+  EXPECT_TRUE(me.drive(0.8f, 800, [&] { return !me.seen_.active().bite.empty() && me.seen_.active().bite.back().has_exit; }))
       << "the right button, the mouse to the right";
   EXPECT_TRUE(me.happened(EventKind::tip_entered));
   ASSERT_TRUE(me.happened(EventKind::tip_exited));
@@ -528,7 +531,7 @@ TEST_P(WholeBite, by_mouse_alone) {
   me.point_at([&] { return me.picture_.focus + Vec3{0.06f, 0.06f, 0.04f}; }, true, 200);
   ASSERT_EQ(me.seen_.tool[0].held, Held::nothing);
   me.tab();
-  EXPECT_TRUE(me.drive(1.2f, 1200, [&] { return !me.seen_.needle.in_tissue; }));
+  EXPECT_TRUE(me.drive(1.2f, 1200, [&] { return !me.seen_.active().needle.in_tissue; }));
   EXPECT_TRUE(me.happened(EventKind::bite_completed));
 }
 

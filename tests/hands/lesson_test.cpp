@@ -36,13 +36,13 @@ TEST(LessonData, every_step_says_what_to_do_and_who_shows_it) {
 TEST(LessonData, what_was_done_at_once_is_behind) {
   const Lesson& lesson = first_stitch();
   Snapshot seen;
-  seen.thread_order = {0, 1};
+  seen.active().thread_order = {0, 1};
   seen.particle = {{}, {0.2f, 0, 0}};
   EXPECT_EQ(next_step(lesson, 0, seen, {}), 0u);
-  seen.bite.resize(2);
-  seen.bite[0].complete = true;
+  seen.active().bite.resize(2);
+  seen.active().bite[0].complete = true;
   EXPECT_EQ(next_step(lesson, 1, seen, {}), 2u);
-  seen.bite[1].complete = true;  // through both walls in one sweep
+  seen.active().bite[1].complete = true;  // through both walls in one sweep
   EXPECT_EQ(next_step(lesson, 1, seen, {}), 4u);
   EXPECT_EQ(step_from(lesson, seen), 4u);
   const Event begun[] = {{EventKind::knot_begun, 0, 0, 1, {}}};

@@ -140,12 +140,12 @@ bool Person::both(float amount, const std::function<bool()>& done, float patienc
 
 bool Person::take_needle() {
   doing_ = "take the needle";
-  return take(0, Held::needle, HelpAt::needle, [&] { return on_needle(desk_.picture(), seen().needle.pose, 0.35f); });
+  return take(0, Held::needle, HelpAt::needle, [&] { return on_needle(desk_.picture(), seen().active().needle.pose, 0.35f); });
 }
 
 bool Person::bite() {
   doing_ = "bring the needle to the bite";
-  const size_t before = seen().bite.size(), completed = desk_.count(EventKind::bite_completed);
+  const size_t before = seen().active().bite.size(), completed = desk_.count(EventKind::bite_completed);
   if (!desk_.look().steering.guide) return false;
   // Where it was when it was last seen: with the needle's last step the guide is that of the next bite.
   BiteGuide last;
@@ -156,22 +156,22 @@ bool Person::bite() {
   if (!wait(6, [&] { return hand(0).hovered && distance(seen().tool[0].pose.p, hand(0).help.p) < 0.002f; })) return false;
   doing_ = "drive the needle";
   const bool out = drive(0, [&] {
-    if (seen().bite.size() <= before || !seen().bite.back().has_exit) return false;
+    if (seen().active().bite.size() <= before || !seen().active().bite.back().has_exit) return false;
     // The hand is ahead of the picture.
     const Pose meant = hand(0).pose * inverse(hand(0).grip);
-    const Vec3 exit = seen().bite.back().exit;
-    return distance(on_needle(desk_.picture(), seen().needle.pose, 1), exit) > 0.0062f ||
+    const Vec3 exit = seen().active().bite.back().exit;
+    return distance(on_needle(desk_.picture(), seen().active().needle.pose, 1), exit) > 0.0062f ||
            distance(on_needle(desk_.picture(), meant, 1), exit) > 0.0075f;
   });
   if (!out) return false;
   doing_ = "take the tip";
-  if (!take(1, Held::needle, HelpAt::needle, [&] { return on_needle(desk_.picture(), seen().needle.pose, 0.93f); }))
+  if (!take(1, Held::needle, HelpAt::needle, [&] { return on_needle(desk_.picture(), seen().active().needle.pose, 0.93f); }))
     return false;
   doing_ = "let the driver go";
   if (!let_go(0)) return false;
   aside(0);
   doing_ = "bring the needle through";
-  return drive(1, [&] { return !seen().needle.in_tissue && desk_.count(EventKind::bite_completed) > completed; });
+  return drive(1, [&] { return !seen().active().needle.in_tissue && desk_.count(EventKind::bite_completed) > completed; });
 }
 
 bool Person::hand_back() {
@@ -179,7 +179,7 @@ bool Person::hand_back() {
   const Vec3 place = desk_.picture().focus + Vec3{0, 0.06f, 0.03f};
   point(
       1, [=] { return place; }, [&] { return distance(hand(1).pose.p, place) < 0.01f; }, true);
-  if (!take(0, Held::needle, HelpAt::needle, [&] { return on_needle(desk_.picture(), seen().needle.pose, 0.35f); }))
+  if (!take(0, Held::needle, HelpAt::needle, [&] { return on_needle(desk_.picture(), seen().active().needle.pose, 0.35f); }))
     return false;
   if (!let_go(1)) return false;
   aside(1);
@@ -202,8 +202,9 @@ bool Person::take_tail() {
 }
 
 bool Person::lay_tail() {
-  const Vec3 at = seen().knot.empty() ? 0.5f * (seen().suture_point.front().position + seen().suture_point.back().position)
-                                      : seen().knot.back().position;
+  const Vec3 at = seen().active().knot.empty()
+                      ? 0.5f * (seen().active().suture_point.front().position + seen().active().suture_point.back().position)
+                      : seen().active().knot.back().position;
   const Vec3 place = at + 0.034f * normalized(Vec3{0.9f, 0.3f, 0.5f});
   point(
       0, [=] { return place; }, [&] { return distance(hand(0).pose.p, place) < 0.006f; }, true, 2.5f);
@@ -215,9 +216,9 @@ bool Person::lay_tail() {
 
 bool Person::draw_together() {
   const auto closed = [&] {
-    for (const SeamView& s : seen().seam)
+    for (const SeamView& s : seen().active().seam)
       if (s.midpoint && s.progress < 0.985f) return false;
-    return !seen().seam.empty();
+    return !seen().active().seam.empty();
   };
   // Where it sticks, or the tail slips: let go and take it anew.
   for (int attempt = 0; attempt < 3; ++attempt) {

@@ -21,8 +21,8 @@ void make_a_stitch(Desk& desk) {
   EXPECT_GE(desk.count(EventKind::seam_closed), 1u);
   EXPECT_EQ(desk.count(EventKind::knot_locked), 2u);
   EXPECT_EQ(desk.count(EventKind::technique_fault), 0u);
-  ASSERT_EQ(desk.look().seen.knot.size(), 1u);
-  const KnotView& knot = desk.look().seen.knot[0];
+  ASSERT_EQ(desk.look().seen.active().knot.size(), 1u);
+  const KnotView& knot = desk.look().seen.active().knot[0];
   EXPECT_EQ(knot.throws, 2u);
   EXPECT_NE(knot.thrown[0].handed, knot.thrown[1].handed) << "a reef knot, no granny";
 }

@@ -302,13 +302,13 @@ TEST_F(StitchAtTheWindow, a_lesson_shows_a_step_and_sees_it_done) {
   size_t before = 99, after = 0, grasped = 0;
   desk.sit(
       [&] {
-        const Vec3 lay = desk.look().seen.needle.pose.p;
+        const Vec3 lay = desk.look().seen.active().needle.pose.p;
         before = desk.lesson_step();
         desk.press("s");
         shown = desk.until_showing(true) && desk.until_showing(false);
         grasped = desk.count(EventKind::needle_grasped);
-        undone = desk.look().seen.tool[0].held == Held::nothing && distance(desk.look().seen.needle.pose.p, lay) < 0.001f &&
-                 desk.lesson_step() == 0;
+        undone = desk.look().seen.tool[0].held == Held::nothing &&
+                 distance(desk.look().seen.active().needle.pose.p, lay) < 0.001f && desk.lesson_step() == 0;
         taken = me.take_needle();
         for (int i = 0; i < 5; ++i) desk.act({});
         after = desk.lesson_step();

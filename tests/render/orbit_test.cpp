@@ -18,9 +18,9 @@ TEST(Orbit, organ_and_needle_are_in_the_first_picture_of_every_scene) {
     Snapshot seen;
     publish(*model, *state, seen);
     const PictureModel picture = picture_model(*model);
-    const Camera c = camera_of(start_orbit(picture, seen.needle.pose.p));
+    const Camera c = camera_of(start_orbit(picture, seen.active().needle.pose.p));
     const Vec3 ahead = normalized(c.target - c.eye), right = normalized(cross(ahead, c.up)), up = cross(right, ahead);
-    for (const Vec3 p : {picture.focus, seen.needle.pose.p}) {
+    for (const Vec3 p : {picture.focus, seen.active().needle.pose.p}) {
       const Vec3 d = p - c.eye;
       const float half = std::tan(0.5f * c.fov_deg * kPi / 180) * dot(d, ahead);
       EXPECT_LT(std::abs(dot(d, up)), 0.9f * half) << name;

@@ -83,7 +83,7 @@ TEST(Pictures, TheThreadShowsInItsColour) {
     for (int x = 0; x < kWidth; ++x) blue += bluish(pixel(s.picture, x, y));
   EXPECT_GT(blue, 30);
   Snapshot without = s.field.snapshot;
-  without.thread_order.clear();
+  without.active().thread_order.clear();
   const Image bare = s.renderer->render(without, s.camera);
   int left = 0;
   for (int y = 0; y < kHeight; ++y)
@@ -116,13 +116,13 @@ TEST(Pictures, WildSnapshotsDoNotBringItDown) {
   Stage& s = stage();
   Snapshot wild = s.field.snapshot;
   wild.particle[3] = {NAN, 1e30f, 0};
-  wild.particle[wild.thread_order[5]] = {NAN, NAN, NAN};
-  wild.thread_order.resize(1);
-  wild.needle.pose.p = {NAN, 0, 0};
+  wild.particle[wild.active().thread_order[5]] = {NAN, NAN, NAN};
+  wild.active().thread_order.resize(1);
+  wild.active().needle.pose.p = {NAN, 0, 0};
   EXPECT_NO_THROW(s.renderer->render(wild, s.camera));
   Snapshot long_thread = s.field.snapshot;
-  const auto once = long_thread.thread_order;
-  long_thread.thread_order.insert(long_thread.thread_order.end(), once.begin(), once.end());
+  const auto once = long_thread.active().thread_order;
+  long_thread.active().thread_order.insert(long_thread.active().thread_order.end(), once.begin(), once.end());
   EXPECT_NO_THROW(s.renderer->render(long_thread, s.camera));
   EXPECT_EQ(difference(s.picture, s.renderer->render(s.field.snapshot, s.camera)), 0);
 }
@@ -196,8 +196,8 @@ TEST(FollowCameras, NeverJump) {
   for (int i = 0; i < 600; ++i) {
     // The needle goes round, and every two seconds is somewhere else altogether.
     const float a = 0.01f * float(i) + 2.3f * float(i / 60);
-    s.needle.pose.p = Vec3{0.02f * std::cos(a), 0.01f, 0.02f * std::sin(a)};
-    if (i % 97 == 0) s.needle.pose.p = {NAN, 0, 0};
+    s.active().needle.pose.p = Vec3{0.02f * std::cos(a), 0.01f, 0.02f * std::sin(a)};
+    if (i % 97 == 0) s.active().needle.pose.p = {NAN, 0, 0};
     const Camera now = follow.update(s, dt);
     ASSERT_TRUE(is_finite(now.eye));
     EXPECT_LT(distance(now.eye, last.eye), 0.004f) << "frame " << i;

@@ -73,7 +73,7 @@ inline TestField make_test_field(int around = 96, int rows = 40) {
   model.body.push_back(std::move(mesh));
   model.focus = {0, 0, 0};
   model.field = 0.08f;
-  model.thread_first = uint32_t(model.particle_rest.size());
+  model.suture[0].thread_first = uint32_t(model.particle_rest.size());
 
   Snapshot& s = field.snapshot;
   s.particle = model.particle_rest;
@@ -90,16 +90,17 @@ inline TestField make_test_field(int around = 96, int rows = 40) {
     thread.push_back(lerp(last, swage, t) +
                      Vec3{0.004f * std::sin(5 * t), 0.012f * std::sin(kPi * t), 0.006f * std::sin(kPi * t)});
   }
-  model.thread_count = uint32_t(thread.size());
+  model.suture[0].thread_count = uint32_t(thread.size());
   for (const Vec3 p : thread) {
-    s.thread_order.push_back(uint32_t(s.particle.size()));
+    s.active().thread_order.push_back(uint32_t(s.particle.size()));
     s.particle.push_back(p);
   }
   // The needle stands upright on the near rim with its swage up, held a third of the way along.
   const Vec3 nx = normalized(Vec3{0.25f, 0.35f, 0.9f}), nz = normalized(cross(nx, {0.2f, 1, 0})), ny = cross(nz, nx);
-  s.needle.pose.q = from_axes(nx, ny, nz);
-  s.needle.pose.p = swage - rotate(s.needle.pose.q, {model.needle_radius, 0, 0});
-  const Vec3 grip = transform(s.needle.pose, {model.needle_radius * std::cos(0.9f), model.needle_radius * std::sin(0.9f), 0});
+  s.active().needle.pose.q = from_axes(nx, ny, nz);
+  s.active().needle.pose.p = swage - rotate(s.active().needle.pose.q, {model.suture[0].needle_radius, 0, 0});
+  const Vec3 grip = transform(s.active().needle.pose, {model.suture[0].needle_radius * std::cos(0.9f),
+                                                       model.suture[0].needle_radius * std::sin(0.9f), 0});
   const Vec3 back = normalized(Vec3{0.55f, 0.55f, 0.65f}), open = normalized(cross(Vec3{0, 1, 0}, back));
   s.tool[0].pose = {grip, from_axes(open, cross(back, open), back)};
   s.tool[0].jaw = 0.12f;
@@ -121,7 +122,7 @@ inline TestField make_test_field(int around = 96, int rows = 40) {
       SuturePointView point;
       point.position = on_tube(exit ? 0.017f : 0.0205f, -0.004f, -1.8f + 0.33f * float(i));
       point.exit = exit;
-      s.suture_point.push_back(point);
+      s.active().suture_point.push_back(point);
     }
   return field;
 }

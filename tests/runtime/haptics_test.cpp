@@ -532,7 +532,7 @@ TEST(Haptics, S1_a_demonstration_leaves_the_learners_hands_alone) {
   const std::array<Vec3, 2> from{seen.tool[0].pose.p, seen.tool[1].pose.p};
   for (size_t k = 0; k < 2; ++k) force[k] = away[k] = 0;
   ASSERT_TRUE(live.demonstrate({0, 1}, false));
-  ASSERT_TRUE(wait(120, [&] { return distance(seen.tool[0].pose.p, from[0]) > 0.02f && seen.needle.in_tissue; }))
+  ASSERT_TRUE(wait(120, [&] { return distance(seen.tool[0].pose.p, from[0]) > 0.02f && seen.active().needle.in_tissue; }))
       << "the demonstration shows nothing";
   wait(1, never);
   for (size_t k = 0; k < 2; ++k) {

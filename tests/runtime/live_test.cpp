@@ -359,8 +359,8 @@ TEST(Live, a_bite_can_be_taken_back) {
   live.look(seen);
   EXPECT_LT(seen.tick, entered_at - static_cast<uint64_t>(0.2f / dt));
   EXPECT_GT(seen.tick + static_cast<uint64_t>(2.0f / dt), entered_at) << "not further back than needed";
-  EXPECT_TRUE(seen.bite.empty());
-  EXPECT_TRUE(seen.suture_point.empty());
+  EXPECT_TRUE(seen.active().bite.empty());
+  EXPECT_TRUE(seen.active().suture_point.empty());
   EXPECT_EQ(seen.tool[0].held, Held::needle);
   EXPECT_EQ(live.status().practice.bites, 0u);
   EXPECT_EQ(live.status().practice.undos, 1u);

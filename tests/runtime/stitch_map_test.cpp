@@ -53,8 +53,8 @@ struct Sewn {
   void bite(Vec3 in, Vec3 out, uint32_t wall = 0) {
     BiteView b;
     b.entry = moved(in), b.exit = moved(out), b.wall = wall, b.depth = 0.0021f;
-    const auto n = static_cast<uint32_t>(seen.bite.size());
-    seen.bite.push_back(b);
+    const auto n = static_cast<uint32_t>(seen.active().bite.size());
+    seen.active().bite.push_back(b);
     seen.event.push_back({.kind = EventKind::tip_entered, .which = n, .value = 0.5f, .where = {}, .tick = seen.tick + 1});
     seen.event.push_back({.kind = EventKind::bite_completed, .which = n, .value = 0, .where = {}, .tick = seen.tick + 1});
     tick();
@@ -108,7 +108,7 @@ TEST(StitchMap, between_two_stretches_of_a_closed_edge) {
 
 TEST(StitchMap, what_is_taken_back_has_not_happened) {
   Sewn s;
-  s.seen.thread_tension = {0.1f, 0.5f};
+  s.seen.active().thread_tension = {0.1f, 0.5f};
   s.bite(Sewn::on_wall(0.1f, 0.004f), Sewn::on_wall(0.4f, 0.004f));
   for (int i = 0; i < 60; ++i) s.tick();
   EXPECT_EQ(s.map.tension.size(), 10u) << "ten a second";

@@ -17,10 +17,11 @@ struct Judged {
   Judged() {
     scene.thread.particles = 11;
     scene.thread.spacing = 0.01f;
-    picture.thread_count = 11;
+    picture.suture[0].thread_count = 11;
+    picture.suture[0].thread_spacing = 0.01f;
     for (uint32_t i = 0; i < 11; ++i) {
       seen.particle.push_back({0.01f * static_cast<float>(i), 0, 0});
-      seen.thread_order.push_back(i);
+      seen.active().thread_order.push_back(i);
     }
     tally = std::make_unique<Tally>(scene, picture);
   }
@@ -63,7 +64,9 @@ TEST(Tally, knots_and_throws_are_counted_through_settling) {
 TEST(Tally, gaps_are_the_widest_at_the_end_and_the_narrowest_at_the_start) {
   Judged j;
   EXPECT_EQ(j.result().value["seam_gap_start"], 0);
-  const auto row = [&](float gap, float start, bool midpoint) { j.seen.seam.push_back({{}, {gap, 0, 0}, start, 1, midpoint}); };
+  const auto row = [&](float gap, float start, bool midpoint) {
+    j.seen.active().seam.push_back({{}, {gap, 0, 0}, start, 1, midpoint});
+  };
   row(0.0005f, 0.010f, true), row(0.0007f, 0.009f, true), row(0.002f, 0.004f, false);
   RunResult r = j.result();
   EXPECT_EQ(r.value["pairs"], 3);
@@ -74,11 +77,11 @@ TEST(Tally, gaps_are_the_widest_at_the_end_and_the_narrowest_at_the_start) {
 
 TEST(Tally, uneven_ends_are_those_of_the_first_knot) {
   Judged j;
-  j.seen.suture_point.resize(2);
-  j.seen.suture_point[0].anchored = 3;  // 30 mm of free end
-  j.seen.suture_point[1].anchored = 4;  // 60 mm on the needle's side
+  j.seen.active().suture_point.resize(2);
+  j.seen.active().suture_point[0].anchored = 3;  // 30 mm of free end
+  j.seen.active().suture_point[1].anchored = 4;  // 60 mm on the needle's side
   j.tell(EventKind::knot_begun), j.tick();
-  j.seen.suture_point[1].anchored = 9;
+  j.seen.active().suture_point[1].anchored = 9;
   j.tell(EventKind::knot_begun), j.tick();
   EXPECT_NEAR(j.result().value["tail_asymmetry"], 1.0 / 3, 1e-6);
   EXPECT_EQ(Judged().result().value["tail_asymmetry"], 0) << "no knot";
@@ -92,7 +95,7 @@ TEST(Tally, faults_by_name_ends_in_hand_and_the_needle) {
   j.tell(static_cast<Fault>(77), 0);  // none that we know
   j.tick();
   j.seen.tool[1].held_strands = 2;
-  j.seen.needle_on_thread = false;
+  j.seen.active().needle_on_thread = false;
   RunResult r = j.result();
   EXPECT_EQ(r.value["fault_wrong_body"], 2);
   EXPECT_EQ(r.value["fault_too_few_throws"], 1);

@@ -65,7 +65,7 @@ TEST_P(EveryScene, saved_and_loaded_at_every_seventh_tick_goes_on_as_if_nothing_
       Jobs &mine = compared % 2 ? one : two, &others = compared % 2 ? two : one;
       ASSERT_NO_FATAL_FAILURE(step_both(*model, *state, input, mine, others, other));
       ++compared;
-      in_tissue += !state->suture.open.empty();
+      in_tissue += !state->suture.suture[0].open.empty();
       events += state->event.size();
     } else {
       step(*model, *state, input, one);

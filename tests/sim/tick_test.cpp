@@ -57,7 +57,7 @@ Played scripted_run(const Model& model, size_t ticks) {
     publish(model, *state, seen);
     run.input.push_back(in);
     run.hash.push_back(hash_state(model, *state));
-    if (!run.mid_bite && phase_of(state->suture) == NeedlePhase::through) run.mid_bite = i + 5;
+    if (!run.mid_bite && phase_of(state->suture.suture[0]) == NeedlePhase::through) run.mid_bite = i + 5;
   }
   return run;
 }
@@ -98,7 +98,7 @@ TEST_F(Scripted, saved_in_the_middle_of_a_bite_and_loaded_it_goes_on_bit_for_bit
   StatePtr state = initial_state(*model_);
   play(*state, 0, run_->mid_bite, 1);
   const std::vector<std::byte> bytes = save_state(*model_, *state);
-  EXPECT_NE(phase_of(state->suture), NeedlePhase::outside);
+  EXPECT_NE(phase_of(state->suture.suture[0]), NeedlePhase::outside);
   StatePtr other = initial_state(*model_);
   load_state(*model_, *other, bytes);
   EXPECT_EQ(hash_state(*model_, *other), run_->hash[run_->mid_bite - 1]);
@@ -121,8 +121,8 @@ TEST_F(Scripted, publishing_changes_nothing_and_says_the_same_twice) {
   }
   publish(*model_, *state, b);
   EXPECT_EQ(a.particle, b.particle);
-  EXPECT_EQ(a.thread_order, b.thread_order);
-  EXPECT_EQ(a.thread_tension, b.thread_tension);
+  EXPECT_EQ(a.active().thread_order, b.active().thread_order);
+  EXPECT_EQ(a.active().thread_tension, b.active().thread_tension);
   EXPECT_EQ(a.opening_area, b.opening_area);
   EXPECT_EQ(a.tick, b.tick);
 }
@@ -140,12 +140,12 @@ TEST(WholeRun, saved_in_the_middle_of_the_closure_and_loaded_it_goes_on_bit_for_
   // A closure under way: the plan of a ring, half done.
   for (uint32_t i : model->technique.purse_string.rim_inner) {
     const Vec3 from = xyz(state->solver.x[i]);
-    state->plan.pull.push_back({particle_point(i), from, Vec3{0.3f * from.x, from.y, 0.3f * from.z}});
+    state->plan[0].pull.push_back({particle_point(i), from, Vec3{0.3f * from.x, from.y, 0.3f * from.z}});
   }
-  state->plan.compliance = model->technique.purse_string.compliance;
-  state->plan.progress = 0.4f;
-  state->technique.purse_string.ring_complete = state->technique.purse_string.closing = true;
-  state->technique.purse_string.path_start = 0.12f, state->technique.purse_string.path_end = 0.05f;
+  state->plan[0].compliance = model->technique.purse_string.compliance;
+  state->plan[0].progress = 0.4f;
+  state->technique[0].purse_string.ring_complete = state->technique[0].purse_string.closing = true;
+  state->technique[0].purse_string.path_start = 0.12f, state->technique[0].purse_string.path_end = 0.05f;
   for (int i = 0; i < 20; ++i) step(*model, *state, idle, jobs);
   ASSERT_FALSE(state->solver.attach.empty());
   const std::vector<std::byte> bytes = save_state(*model, *state);
@@ -310,8 +310,8 @@ void fling(uint64_t seed, float seconds, Fling& out) {
     ASSERT_NEAR(rest, double{model->solver.strand[0].spacing} * static_cast<double>(order.size() - 1), 1e-4)
         << "seed " << seed << ", tick " << i;
     // Nothing dangles: rows of a bite exist only during one.
-    if (phase_of(state->suture) == NeedlePhase::outside) {
-      ASSERT_TRUE(state->solver.channel.empty() && !state->suture.attached);
+    if (phase_of(state->suture.suture[0]) == NeedlePhase::outside) {
+      ASSERT_TRUE(state->solver.channel.empty() && !state->suture.suture[0].attached);
     }
     ASSERT_LE(state->solver.weld.size(), 4u);
   }

@@ -108,7 +108,7 @@ TEST(WrongTechnique, a_stitch_tied_through_one_wall_is_said) {
   r.pull_tight();
   EXPECT_EQ(r.count(EventKind::knot_locked), 1u) << "it is tied all the same";
   expect_told_once(r, Fault::one_wall_only, 1);
-  EXPECT_TRUE(r.state->plan.pair.empty()) << "and draws nothing to the other wall";
+  EXPECT_TRUE(r.state->plan[0].pair.empty()) << "and draws nothing to the other wall";
 }
 
 // --- a knot before any suture point --------------------------------------------------------------------------------------
@@ -117,14 +117,14 @@ TEST(WrongTechnique, a_knot_before_any_bite_is_said) {
   for (const char* technique : {"none", "stay"}) {
     SCOPED_TRACE(technique);
     Tie r({}, two_ends(technique));
-    r.suture().point.clear();
+    r.sewn().point.clear();
     r.thread().anchor.clear();
     r.lay_along(r.setup.older - 1, -1, r.past_the_tip(xyz(r.x()[r.thread().order[r.setup.older]])), 0);
     r.input.hand[0].jaw = 0.3f;
     r.tick();
     ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
     expect_told_once(r, Fault::knot_without_bite, 0);
-    EXPECT_TRUE(r.suture().knot.empty());
+    EXPECT_TRUE(r.sewn().knot.empty());
   }
 }
 
@@ -177,7 +177,7 @@ struct HalfBite : Rig {
 
 TEST(WrongTechnique, pulling_the_tail_with_the_needle_in_the_tissue_is_said_once_a_bite) {
   HalfBite r;
-  ASSERT_NE(phase_of(r.suture()), NeedlePhase::outside);
+  ASSERT_NE(phase_of(r.sewn()), NeedlePhase::outside);
   ASSERT_TRUE(faults(r).empty()) << "the needle itself drew the thread so far";
   r.take(-8);
   r.pull(r.first.out * 0.02f + r.first.up * 0.02f, 0.5f);
@@ -256,7 +256,7 @@ TEST(WrongTechnique, cutting_a_knot_of_one_throw_is_one_fault_for_all_who_see_it
   ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
   const size_t before = faults(r).size();  // both points lie in one layer, which is said when it locks
   r.open(0);
-  snip(r, between(r, r.node_of(r.suture().knot[0].slot[0]) - 6));
+  snip(r, between(r, r.node_of(r.sewn().knot[0].slot[0]) - 6));
   ASSERT_EQ(r.count(EventKind::thread_cut), 1u);
   r.wait(kAfterwards);
   size_t too_few = 0;

@@ -132,6 +132,7 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
   model.thread_damping = 12;
   model.inv_mass.assign(model.count, 1 / 2e-6f);
   model.inv_mass[0] = 0;
+  model.needle_arc.resize(1);
   StrandModel& t = model.strand.emplace_back();
   t.first_slot = 1, t.count = 101, t.spacing = 0.0016f, t.radius = 0.00015f, t.inv_mass = 1 / 2e-6f;
   t.stretch_compliance = 1e-6f, t.bend_compliance = 2e4f;
@@ -151,8 +152,9 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
   state.strand[0].anchor.push_back(a);
   SutureModel suture;
   SutureState stitches;
-  stitches.bite.resize(1);
-  stitches.point.push_back({0, false, 0});
+  stitches.suture.resize(1);
+  stitches.suture[0].bite.resize(1);
+  stitches.suture[0].point.push_back({0, false, 0});
   Jobs jobs(1);
   EventList events;
   double most = 0;
@@ -160,7 +162,8 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
   for (int i = 0; i < 384; ++i) {
     state.body[2].x.x += 0.15f * model.h;
     substep(model, state, scratch, jobs, nullptr);
-    pull(model, state, suture, stitches, events);
+    SutureContext sewing{model, state, scratch, suture, stitches, events};
+    pull(sewing);
     // Stretch between the anchor and the hand. A stuck anchor lets go at the end of the substep in which the pull exceeds its
     // friction; this hand starts at full speed, so the first substeps are not a steady pull.
     if (i < 10) continue;

@@ -16,8 +16,9 @@ struct Lengths {
   float worst = 0, worst_passing = 0;
   void tick(const Snapshot& seen) {
     double length = 0;
-    for (size_t i = 1; i < seen.thread_order.size(); ++i)
-      length += double{distance(seen.particle[seen.thread_order[i - 1]], seen.particle[seen.thread_order[i]])};
+    for (size_t i = 1; i < seen.active().thread_order.size(); ++i)
+      length +=
+          double{distance(seen.particle[seen.active().thread_order[i - 1]], seen.particle[seen.active().thread_order[i]])};
     bool passing = false;
     for (const Event& e : seen.event) passing = passing || e.kind == EventKind::particle_passed;
     float& worst_of = passing ? worst_passing : worst;

@@ -57,7 +57,7 @@ TEST(Cut, at_the_swage_takes_the_thread_off_the_needle) {
   EXPECT_TRUE(r.thread().hold.empty());
   Snapshot seen;
   publish(*r.model, *r.state, seen);
-  EXPECT_FALSE(seen.needle_on_thread);
+  EXPECT_FALSE(seen.active().needle_on_thread);
   r.hold_needle();
   Pose to = r.circle();
   to.p += Vec3{0.1f, 0.06f, 0};
@@ -86,7 +86,7 @@ TEST(Cut, tells_how_long_the_tail_is_and_that_the_throws_are_too_few) {
   r.pull_tight();
   ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
   r.open(0);
-  const Knot k = r.suture().knot[0];
+  const Knot k = r.sewn().knot[0];
   const size_t at = r.node_of(k.slot[1]) + 4;
   float length = 0;
   for (size_t i = r.node_of(k.slot[1]); i < at; ++i) length += r.thread().rest[i];
@@ -102,7 +102,7 @@ TEST(Cut, tells_how_long_the_tail_is_and_that_the_throws_are_too_few) {
   EXPECT_EQ(r.count(EventKind::thread_cut), 2u);
   EXPECT_EQ(r.count(EventKind::technique_fault), 1u) << "of one knot it is said once";
   // The knot holds what it held.
-  EXPECT_EQ(r.suture().knot[0].slots, 2u);
+  EXPECT_EQ(r.sewn().knot[0].slots, 2u);
   EXPECT_EQ(r.thread().anchor.size(), 4u);
 }
 
@@ -111,7 +111,7 @@ TEST(Cut, in_the_stitch_is_a_fault_and_opens_it) {
   r.wait(0.1f);
   lock(r, 20, r.place(0.0f, 0.004f).at);
   lock(r, 30, r.place(0.5f, 0.004f).at);
-  const float before = length_between_ends(r.solver(), r.suture());
+  const float before = length_between_ends(r.thread(), r.sewn());
   const Vec3 a = r.point_at(0), b = r.point_at(1);
   for (size_t i = 21; i < 30; ++i)
     set(r.solver().x[r.thread().order[i]], lerp(a, b, static_cast<float>(i - 20) / 10) + r.place(0.25f).out * 0.004f);
@@ -119,7 +119,7 @@ TEST(Cut, in_the_stitch_is_a_fault_and_opens_it) {
   snip(r, at);
   ASSERT_EQ(r.count(EventKind::thread_cut), 1u);
   EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::cut_in_stitch);
-  EXPECT_GT(length_between_ends(r.solver(), r.suture()), before + 0.01f) << "nothing is drawn together any more";
+  EXPECT_GT(length_between_ends(r.thread(), r.sewn()), before + 0.01f) << "nothing is drawn together any more";
   r.wait(0.3f);
   EXPECT_EQ(cuts(r), 1u) << "nothing is repaired";
 }
@@ -161,11 +161,11 @@ TEST(Cut, off_the_stitch_takes_a_throw_back) {
   setup.older = 45, setup.newer = 50;
   Tie r(setup);
   r.take();
-  ASSERT_EQ(r.suture().knot.size(), 1u);
+  ASSERT_EQ(r.sewn().knot.size(), 1u);
   r.thread().cut[r.node_of_point(0) - 3] = 1;  // the taken end, between jaw and stitch
   r.tick();
   EXPECT_EQ(r.count(EventKind::knot_cancelled), 1u);
-  EXPECT_TRUE(r.suture().knot.empty());
+  EXPECT_TRUE(r.sewn().knot.empty());
   EXPECT_EQ(r.thread().anchor.size(), 2u);
 }
 

@@ -9,7 +9,7 @@
 namespace catgut {
 namespace {
 
-Vec3 target_of(Tie& r, size_t k = 0) { return position_of(r.suture().knot[k].target, r.x()); }
+Vec3 target_of(Tie& r, size_t k = 0) { return position_of(r.sewn().knot[k].target, r.x()); }
 const ThreadAnchor* anchor_at(Tie& r, uint32_t slot) {
   for (const ThreadAnchor& a : r.thread().anchor)
     if (a.slot == slot) return &a;
@@ -39,8 +39,8 @@ TEST(Knot, is_begun_when_the_tool_with_the_loop_takes_the_other_end) {
     EXPECT_EQ(r.loop().wraps, 0u);
     EXPECT_EQ(r.holds(HoldKind::loop), 0u);
     EXPECT_EQ(r.count(EventKind::loop_released), 0u) << "it became a throw";
-    ASSERT_EQ(r.suture().knot.size(), 1u);
-    const Knot& k = r.suture().knot[0];
+    ASSERT_EQ(r.sewn().knot.size(), 1u);
+    const Knot& k = r.sewn().knot[0];
     EXPECT_EQ(k.phase, KnotPhase::tightening);
     EXPECT_EQ(k.end[0], first);
     EXPECT_EQ(k.end[1], last);
@@ -62,21 +62,21 @@ TEST(Knot, is_begun_when_the_tool_with_the_loop_takes_the_other_end) {
 TEST(Knot, comes_down_as_far_as_the_tool_goes_away_and_does_not_go_back_up) {
   Tie r;
   r.take();
-  ASSERT_EQ(r.suture().knot.size(), 1u);
-  const float far = length(r.suture().knot[0].from);
+  ASSERT_EQ(r.sewn().knot.size(), 1u);
+  const float far = length(r.sewn().knot[0].from);
   EXPECT_NEAR(far, 0.015f, 0.002f);
-  const Vec3 from = r.suture().knot[0].hand_from, away = rotate(r.frame.q, Vec3{0, 0.6f, 0.8f});
+  const Vec3 from = r.sewn().knot[0].hand_from, away = rotate(r.frame.q, Vec3{0, 0.6f, 0.8f});
   for (int i = 0; i < 4; ++i) {
     r.move(0, away * 0.0015f, 0.1f);
     const float gone = distance(r.solver().body[0].x, from);
-    ASSERT_EQ(r.suture().knot[0].phase, KnotPhase::tightening);
-    EXPECT_NEAR(r.suture().knot[0].left, far - gone, 0.0005f);
-    const ThreadAnchor* a = anchor_at(r, r.suture().knot[0].end[0]);
-    EXPECT_NEAR(length(a->offset), r.suture().knot[0].left, 0.003f);
+    ASSERT_EQ(r.sewn().knot[0].phase, KnotPhase::tightening);
+    EXPECT_NEAR(r.sewn().knot[0].left, far - gone, 0.0005f);
+    const ThreadAnchor* a = anchor_at(r, r.sewn().knot[0].end[0]);
+    EXPECT_NEAR(length(a->offset), r.sewn().knot[0].left, 0.003f);
   }
-  const float left = r.suture().knot[0].left;
+  const float left = r.sewn().knot[0].left;
   r.move(0, away * -0.004f, 0.2f);
-  EXPECT_LE(r.suture().knot[0].left, left);
+  EXPECT_LE(r.sewn().knot[0].left, left);
   EXPECT_EQ(r.count(EventKind::knot_locked), 0u);
 }
 
@@ -86,11 +86,11 @@ TEST(Knot, locks_at_the_midpoint_and_holds_both_strands_there) {
   Tie r;
   const double length = r.rest_length();
   r.take();
-  const uint32_t outer = r.suture().knot[0].end[1];
+  const uint32_t outer = r.sewn().knot[0].end[1];
   r.pull_tight();
   ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
-  ASSERT_EQ(r.suture().knot.size(), 1u);
-  const Knot& k = r.suture().knot[0];
+  ASSERT_EQ(r.sewn().knot.size(), 1u);
+  const Knot& k = r.sewn().knot[0];
   EXPECT_EQ(k.phase, KnotPhase::locked);
   EXPECT_LT(distance(target_of(r), r.middle()), 1e-6f);
   ASSERT_EQ(k.slots, 2u);
@@ -123,18 +123,18 @@ TEST(Knot, locks_at_the_midpoint_and_holds_both_strands_there) {
 TEST(Knot, goes_to_the_suture_point_if_there_is_one) {
   Tie r;
   // The older point goes; its thread is free end from there on.
-  r.suture().point[0] = r.suture().point[1];
-  r.suture().point.pop_back();
+  r.sewn().point[0] = r.sewn().point[1];
+  r.sewn().point.pop_back();
   r.thread().anchor.erase(r.thread().anchor.begin());
-  r.suture().point[0].anchor = 0;
+  r.sewn().point[0].anchor = 0;
   r.lay_along(r.node_of_point(0) - 1, -1, r.past_the_tip(r.point_at(0)), 0);
   r.input.hand[0].jaw = 0.3f;
   r.tick();
-  ASSERT_EQ(r.suture().knot.size(), 1u);
+  ASSERT_EQ(r.sewn().knot.size(), 1u);
   EXPECT_LT(distance(target_of(r), r.point_at(0)), 1e-7f);
   r.pull_tight();
   ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
-  EXPECT_EQ(r.suture().knot[0].slots, 2u);
+  EXPECT_EQ(r.sewn().knot[0].slots, 2u);
 }
 
 // More points than two: what is tied together is the two ends of the stitch.
@@ -146,7 +146,7 @@ TEST(Knot, of_a_long_stitch_goes_between_its_two_ends) {
   lock(r, 35, r.place(0.42f, 0.004f).at);
   const Vec3 ends = 0.5f * (r.point_at(0) + r.point_at(1));  // the first two that were made: the outermost along the thread
   r.take();
-  ASSERT_EQ(r.suture().knot.size(), 1u);
+  ASSERT_EQ(r.sewn().knot.size(), 1u);
   EXPECT_LT(distance(target_of(r), 0.5f * (r.point_at(0) + r.point_at(1))), 1e-6f);
   EXPECT_LT(distance(target_of(r), ends), 0.001f);
 }
@@ -168,17 +168,17 @@ TEST(Knot, of_a_running_suture_tied_to_itself_goes_to_the_midpoint_of_the_last_t
   r.input.hand[0].jaw = 0.3f;
   r.tick();
   ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
-  ASSERT_EQ(r.suture().knot.size(), 1u);
+  ASSERT_EQ(r.sewn().knot.size(), 1u);
   EXPECT_LT(distance(target_of(r), 0.5f * (r.point_at(1) + r.point_at(2))), 1e-6f);
   r.pull_tight();
   ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
-  EXPECT_EQ(r.suture().knot[0].slots, 1u);
-  EXPECT_GT(r.node_of(r.suture().knot[0].slot[0]), r.node_of_point(1)) << "a particle of the needle's strand";
+  EXPECT_EQ(r.sewn().knot[0].slots, 1u);
+  EXPECT_GT(r.node_of(r.sewn().knot[0].slot[0]), r.node_of_point(1)) << "a particle of the needle's strand";
 }
 
 TEST(Knot, without_a_bite_is_a_fault_and_the_loop_falls_off) {
   Tie r;
-  r.suture().point.clear();
+  r.sewn().point.clear();
   r.thread().anchor.clear();
   r.lay_along(24, -1, r.past_the_tip(xyz(r.x()[r.thread().order[25]])), 0);
   r.input.hand[0].jaw = 0.3f;
@@ -187,15 +187,15 @@ TEST(Knot, without_a_bite_is_a_fault_and_the_loop_falls_off) {
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
   EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::knot_without_bite);
   EXPECT_EQ(r.count(EventKind::loop_released), 1u);
-  EXPECT_TRUE(r.suture().knot.empty());
+  EXPECT_TRUE(r.sewn().knot.empty());
   EXPECT_EQ(r.holds(HoldKind::loop), 0u);
   EXPECT_TRUE(r.thread().anchor.empty());
 }
 
 TEST(Knot, begun_with_the_needle_still_in_the_tissue_is_said_and_goes_on) {
   Tie r;
-  r.suture().bite.resize(2);
-  r.suture().open.push_back({1, NeedlePhase::tip_in});
+  r.sewn().bite.resize(2);
+  r.sewn().open.push_back({1, NeedlePhase::tip_in});
   r.take();
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
   EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::needle_in_tissue);
@@ -233,7 +233,7 @@ Written written(Tie& r) {
   for (const ThreadAnchor& a : r.thread().anchor) w.anchored.push_back(a.slot);
   for (const ThreadHold& h : r.thread().hold) w.held.push_back(h.slot);
   w.collides = r.collides();
-  w.points = r.suture().point.size(), w.knots = r.suture().knot.size(), w.pins = r.solver().pin.size();
+  w.points = r.sewn().point.size(), w.knots = r.sewn().knot.size(), w.pins = r.solver().pin.size();
   w.attachments = r.solver().attach.size();
   w.wraps = {r.loop(0).wraps, r.loop(1).wraps};
   return w;
@@ -271,7 +271,7 @@ TEST(Knot, letting_go_takes_it_back_and_nothing_is_left_of_it) {
   EXPECT_EQ(a.pins, b.pins);
   EXPECT_EQ(a.attachments, b.attachments);
   EXPECT_EQ(a.wraps, b.wraps);
-  for (size_t k = 0; k < 2; ++k) EXPECT_EQ(tied.suture().point[k].anchor, twin.suture().point[k].anchor);
+  for (size_t k = 0; k < 2; ++k) EXPECT_EQ(tied.sewn().point[k].anchor, twin.sewn().point[k].anchor);
 }
 
 TEST(Knot, a_further_throw_lies_on_the_first_and_a_reef_differs_from_a_granny) {
@@ -282,19 +282,19 @@ TEST(Knot, a_further_throw_lies_on_the_first_and_a_reef_differs_from_a_granny) {
     r.take();
     r.pull_tight();
     ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
-    const std::array<uint32_t, 2> slot = r.suture().knot[0].slot;
+    const std::array<uint32_t, 2> slot = r.sewn().knot[0].slot;
     const double inside = rest_between(r, r.node_of(slot[0]), r.node_of(slot[1]));
     r.wrap(second);
     ASSERT_EQ(r.loop().wraps, 1u);
     r.take();
-    ASSERT_EQ(r.suture().knot.size(), 1u) << "the same knot";
-    EXPECT_EQ(r.suture().knot[0].throws, 2u);
-    EXPECT_EQ(r.suture().knot[0].begun, 1u);
-    EXPECT_EQ(r.suture().knot[0].phase, KnotPhase::tightening);
+    ASSERT_EQ(r.sewn().knot.size(), 1u) << "the same knot";
+    EXPECT_EQ(r.sewn().knot[0].throws, 2u);
+    EXPECT_EQ(r.sewn().knot[0].begun, 1u);
+    EXPECT_EQ(r.sewn().knot[0].phase, KnotPhase::tightening);
     EXPECT_EQ(r.last(EventKind::knot_begun)->which, 0u);
     r.pull_tight();
     ASSERT_EQ(r.count(EventKind::knot_locked), 2u);
-    const Knot& k = r.suture().knot[0];
+    const Knot& k = r.sewn().knot[0];
     EXPECT_EQ(k.phase, KnotPhase::locked);
     EXPECT_EQ(k.slot, slot);
     EXPECT_EQ(r.thread().anchor.size(), 4u);
@@ -311,15 +311,15 @@ TEST(Knot, taking_back_a_further_throw_leaves_the_first) {
   r.take();
   r.pull_tight();
   ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
-  const Knot before = r.suture().knot[0];
+  const Knot before = r.sewn().knot[0];
   r.wrap(-1);
   r.take();
-  ASSERT_EQ(r.suture().knot[0].throws, 2u);
+  ASSERT_EQ(r.sewn().knot[0].throws, 2u);
   r.move(0, rotate(r.frame.q, Vec3{0, 0, 0.003f}), 0.1f);
   r.open(0);
   EXPECT_EQ(r.count(EventKind::knot_cancelled), 1u);
-  ASSERT_EQ(r.suture().knot.size(), 1u);
-  const Knot& k = r.suture().knot[0];
+  ASSERT_EQ(r.sewn().knot.size(), 1u);
+  const Knot& k = r.sewn().knot[0];
   EXPECT_EQ(k.phase, KnotPhase::locked);
   EXPECT_EQ(k.throws, 1u);
   EXPECT_EQ(k.slot, before.slot);
@@ -335,7 +335,7 @@ TEST(PullWithKnot, no_particle_passes_a_locked_knot) {
   r.take();
   r.pull_tight();
   ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
-  const Knot k = r.suture().knot[0];
+  const Knot k = r.sewn().knot[0];
   const std::array<size_t, 4> nodes = {r.node_of(k.slot[0]), r.node_of_point(0), r.node_of_point(1), r.node_of(k.slot[1])};
   const std::vector<float> rest(r.thread().rest.begin() + static_cast<long>(nodes[0]),
                                 r.thread().rest.begin() + static_cast<long>(nodes[3]));
@@ -396,7 +396,7 @@ void running_suture(Rig& rig, bool with_knot, Place& p) {
     k.slot = {rig.thread().order[18], rig.thread().order[27]};
     k.strand = rig.thread().order[10];
     k.slots = 2, k.snug = 1, k.throws = 1;
-    rig.suture().knot.push_back(k);
+    rig.sewn().knot.push_back(k);
     for (uint32_t slot : k.slot) {
       ThreadAnchor a;
       a.slot = slot;
@@ -437,7 +437,7 @@ TEST(PullWithKnot, slack_is_resolved_up_to_the_knot_and_no_further) {
   Place p;
   running_suture(rig, true, p);
   const size_t tail = rig.node_of_point(0), second = rig.node_of_point(1);
-  const uint32_t needle_side = rig.suture().knot[0].slot[1];
+  const uint32_t needle_side = rig.sewn().knot[0].slot[1];
   const size_t knot = rig.node_of(needle_side);
   const std::vector<float> rest(rig.thread().rest.begin(), rig.thread().rest.begin() + static_cast<long>(knot));
   const double length = rig.rest_length();
@@ -465,7 +465,9 @@ TEST(DrawThrough, moves_exactly_that_much_and_loses_nothing) {
         return s;
       };
       const double length = rig.rest_length(), before = behind();
-      EXPECT_NEAR(draw_through(rig.model->solver, rig.solver(), slot, way, metres), metres, 1e-7f);
+      SutureContext context = rig.context();
+      OneSuture one(context, 0);
+      EXPECT_NEAR(draw_through(one, slot, way, metres), metres, 1e-7f);
       EXPECT_NEAR(behind(), before - way * double{metres}, 1e-6);
       EXPECT_NEAR(rig.rest_length(), length, 1e-7);
       EXPECT_TRUE(rig.order_is_whole());
@@ -480,7 +482,9 @@ TEST(DrawThrough, stops_where_the_next_particle_is_locked) {
   lock(rig, 28, rig.place(0.5f).at);
   const uint32_t slot = rig.thread().order[28];
   const float three = rig.thread().rest[25] + rig.thread().rest[26] + rig.thread().rest[27];
-  const float gone = draw_through(rig.model->solver, rig.solver(), slot, 1, 0.05f);
+  SutureContext context = rig.context();
+  OneSuture one(context, 0);
+  const float gone = draw_through(one, slot, 1, 0.05f);
   EXPECT_LT(gone, three);
   EXPECT_GT(gone, three - 0.0002f);
   EXPECT_EQ(rig.node_of(slot), 26u);
@@ -568,7 +572,7 @@ TEST(KnotState, survives_hands_that_do_anything) {
     for (int i = 0; i < 60; ++i) {
       switch (random.next() % 9) {
         case 0:
-          if (r.suture().point.size() >= 2) r.take(random.next() % 2);
+          if (r.sewn().point.size() >= 2) r.take(random.next() % 2);
           break;
         case 1:
           r.open(random.next() % 2, random.next() % 2 ? 1.0f : 0.7f);
@@ -580,7 +584,7 @@ TEST(KnotState, survives_hands_that_do_anything) {
           r.move(0, rotate(r.frame.q, Vec3{random.uniform() - 0.5f, random.uniform(), random.uniform() - 0.5f}) * 0.02f, 0.2f);
           break;
         case 4:
-          if (r.suture().point.size() >= 2) r.wrap(random.next() % 2 ? 1 : -1, random.next() % 2 ? 1.25f : 2.25f);
+          if (r.sewn().point.size() >= 2) r.wrap(random.next() % 2 ? 1 : -1, random.next() % 2 ? 1.25f : 2.25f);
           break;
         case 5:
           snip(r, between(r, random.next() % (r.thread().order.size() - 1), random.uniform()));
@@ -596,7 +600,7 @@ TEST(KnotState, survives_hands_that_do_anything) {
           r.input.hand[1] = r.input.hand[0], r.input.hand[1].pose.p += Vec3{0.002f, 0, 0}, r.tick();
           break;
         case 8:
-          if (r.suture().point.size() < 2 && r.thread().anchor.empty()) r.sew(6 * random.uniform()), r.put_tool(), r.tick();
+          if (r.sewn().point.size() < 2 && r.thread().anchor.empty()) r.sew(6 * random.uniform()), r.put_tool(), r.tick();
           break;
       }
       if (HasFatalFailure()) return;

@@ -37,11 +37,12 @@ TEST(Figure7, a_suture_point_locks_the_next_free_particle_behind_the_needle) {
   Bite bite;
   const int near = nearest_particle(rig.model->solver.collision, rig.state->scratch.candidates, rig.x(), p.at, 0.01f);
   bite.entry.point = particle_point(static_cast<uint32_t>(near));
-  rig.suture().bite.push_back(bite);
+  rig.sewn().bite.push_back(bite);
   const double length = rig.rest_length();
   const uint32_t next_free = rig.thread().order[n - 2];
-  EventList events;
-  ASSERT_TRUE(place_suture_point(rig.model->solver, rig.solver(), rig.model->suture, rig.suture(), 0, false, events));
+  SutureContext context = rig.context();
+  OneSuture one(context, 0);
+  ASSERT_TRUE(place_suture_point(one, 0, false));
   ASSERT_EQ(rig.thread().anchor.size(), 1u);
   EXPECT_EQ(rig.thread().anchor[0].slot, next_free);
   EXPECT_LT(distance(xyz(rig.x()[next_free]), position_of(bite.entry.point, rig.x())), 1e-7f);
@@ -50,8 +51,8 @@ TEST(Figure7, a_suture_point_locks_the_next_free_particle_behind_the_needle) {
   // A second hole right behind the first: the particle behind passes the first suture point before its turn (figure 7c).
   const uint32_t behind = rig.thread().order[n - 3];
   bite.exit.point = bite.entry.point;
-  rig.suture().bite[0] = bite;
-  ASSERT_TRUE(place_suture_point(rig.model->solver, rig.solver(), rig.model->suture, rig.suture(), 0, true, events));
+  rig.sewn().bite[0] = bite;
+  ASSERT_TRUE(place_suture_point(one, 0, true));
   ASSERT_EQ(rig.thread().anchor.size(), 2u);
   EXPECT_EQ(rig.thread().anchor[1].slot, behind);
   EXPECT_EQ(rig.node_of(next_free), n - 3) << "the first suture point keeps its particle";
@@ -104,7 +105,8 @@ TEST(Figure7, exactly_one_particle_passes_to_the_midpoint) {
   const Strand before = t;
   const auto x = rig.solver().x;
   EventList events;
-  pull(rig.model->solver, rig.solver(), rig.model->suture, rig.suture(), events);
+  SutureContext sewing = rig.context(events);
+  pull(sewing);
   ASSERT_EQ(events.size(), 1u);
   EXPECT_EQ(events[0].kind, EventKind::particle_passed);
   EXPECT_EQ(events[0].value, 1.0f);
@@ -118,7 +120,7 @@ TEST(Figure7, exactly_one_particle_passes_to_the_midpoint) {
   EXPECT_NEAR(rig.rest_length(), length, 1e-7);
   // Its turn is over: called again, nothing passes.
   events.clear();
-  pull(rig.model->solver, rig.solver(), rig.model->suture, rig.suture(), events);
+  pull(sewing);
   EXPECT_TRUE(events.empty());
 }
 
@@ -271,7 +273,8 @@ TEST(Figure9, suture_points_are_checked_from_the_needle_end) {
   for (size_t node : {size_t{20}, size_t{32}, size_t{45}}) t.rest[node] += t.rest[node - 1] - used, t.rest[node - 1] = used;
   const double length = rig.rest_length();
   EventList events;
-  pull(rig.model->solver, rig.solver(), rig.model->suture, rig.suture(), events);
+  SutureContext sewing = rig.context(events);
+  pull(sewing);
   ASSERT_EQ(events.size(), 3u);
   for (uint32_t k = 0; k < 3; ++k) EXPECT_EQ(events[k].which, 2 - k);
   EXPECT_NEAR(rig.rest_length(), length, 1e-7);

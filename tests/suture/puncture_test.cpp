@@ -22,7 +22,7 @@ TEST(Figure4, nearest_particle_within_x_is_attached_when_the_tip_enters) {
   ASSERT_EQ(rig.count(EventKind::particle_attached), 1u);
   const Event& e = *rig.last(EventKind::particle_attached);
   EXPECT_LE(e.value, rig.model->suture.attach_threshold);
-  EXPECT_EQ(rig.suture().bite[0].nearest, e.which);
+  EXPECT_EQ(rig.sewn().bite[0].nearest, e.which);
   // No particle was nearer to the tip. A few substeps have passed since: tip and tissue have moved by less than half a
   // millimetre.
   float nearest = std::numeric_limits<float>::max();
@@ -41,22 +41,26 @@ TEST(Figure4, the_nearest_is_the_nearest_of_all) {
     const Place p = rig.place(0.27f * static_cast<float>(k), 0.003f + 0.0007f * static_cast<float>(k % 7));
     const Pose circle = rig.circle_at({p.at - p.out * 0.0004f, p.out, p.along, p.up}, 0, 0);
     SolverState solver = rig.solver();
-    solver.body[rig.model->solver.needle_body(0)].x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].centre);
-    solver.body[rig.model->solver.needle_body(0)].q = circle.q;
-    SutureState suture;
+    RigidBody& needle = solver.body[rig.needle_body()];
+    needle.x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].centre);
+    needle.q = circle.q;
+    SutureState sutures;
+    sutures.suture.resize(1);
     EventList events;
-    puncture(rig.model->solver, solver, rig.state->scratch, rig.model->suture, suture, events);
+    SutureContext sewing{rig.model->solver, solver, rig.state->scratch, rig.model->suture, sutures, events};
+    puncture(sewing);
+    const Suture& suture = sutures.suture[0];
     ASSERT_TRUE(suture.attached) << k;
-    const Vec3 tip = needle_tip(rig.model->solver.needle_arc[0], solver.body[rig.model->solver.needle_body(0)]);
+    const Vec3 tip = needle_tip(rig.model->solver.needle_arc[0], needle);
     uint32_t best = 0;
     for (uint32_t i = 0; i < rig.model->solver.tissue; ++i)
       if (distance(xyz(solver.x[i]), tip) < distance(xyz(solver.x[best]), tip)) best = i;
     EXPECT_FLOAT_EQ(distance(xyz(solver.x[suture.bite[0].nearest]), tip), distance(xyz(solver.x[best]), tip)) << k;
     // "Once the closest particle is found, it is constrained to move with the needle tip": from where it is, without a jerk.
     const Attachment& a = solver.attach.back();
-    EXPECT_EQ(a.body, static_cast<int>(rig.model->solver.needle_body(0)));
+    EXPECT_EQ(a.body, static_cast<int>(rig.needle_body()));
     EXPECT_EQ(a.point.particle[0], best);
-    EXPECT_LT(distance(transform(solver.body[rig.model->solver.needle_body(0)].pose(), a.target), xyz(solver.x[best])), 1e-6f);
+    EXPECT_LT(distance(transform(needle.pose(), a.target), xyz(solver.x[best])), 1e-6f);
     EXPECT_FLOAT_EQ(a.compliance, rig.model->suture.attach_compliance);
   }
 }
@@ -69,12 +73,12 @@ TEST(Figure4, a_needle_that_nobody_holds_pierces_nothing) {
   const Pose circle = rig.circle_at({p.at - p.out * 0.0004f, p.out, p.along, p.up}, 0, 0);
   rig.needle().x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].centre);
   rig.needle().q = circle.q;
-  EventList events;
+  SutureContext sewing = rig.context();
   for (const bool held : {false, false, true}) {
     if (held) rig.hold_needle();
-    puncture(rig.model->solver, rig.solver(), rig.state->scratch, rig.model->suture, rig.suture(), events);
-    EXPECT_EQ(rig.suture().bite.size(), held ? 1u : 0u);
-    EXPECT_EQ(rig.suture().attached, held);
+    puncture(sewing);
+    EXPECT_EQ(rig.sewn().bite.size(), held ? 1u : 0u);
+    EXPECT_EQ(rig.sewn().attached, held);
   }
 }
 
@@ -89,7 +93,7 @@ TEST(Figure4, no_particle_within_x_attaches_none) {
   rig.drive(p, -1.0f, 0.0f);
   EXPECT_EQ(rig.count(EventKind::tip_entered), 1u);
   EXPECT_EQ(rig.count(EventKind::particle_attached), 0u);
-  EXPECT_FALSE(rig.suture().attached);
+  EXPECT_FALSE(rig.sewn().attached);
   EXPECT_TRUE(rig.solver().attach.empty());
 }
 
@@ -113,7 +117,7 @@ TEST(Figure5, dragged_beyond_the_threshold_it_is_released_and_the_tissue_relaxes
   }
   ASSERT_EQ(rig.count(EventKind::particle_released), 1u);
   EXPECT_EQ(rig.last(EventKind::particle_released)->which, dragged);
-  EXPECT_FALSE(rig.suture().attached);
+  EXPECT_FALSE(rig.sewn().attached);
   EXPECT_TRUE(rig.solver().attach.empty());
   // The needle goes away; after two seconds every particle is where it was, to 0.3 mm (the wall is 2.5 mm thick).
   const float psi = -0.15f;
@@ -141,11 +145,11 @@ TEST(Bite, back_end_trigger_completes_it_and_makes_its_suture_points) {
   EXPECT_EQ(rig.count(EventKind::bite_completed), 0u);
   rig.drive(p, 1.2f, 4.3f);
   ASSERT_EQ(rig.count(EventKind::bite_completed), 1u);
-  ASSERT_EQ(rig.suture().point.size(), 2u);
-  EXPECT_FALSE(rig.suture().point[0].exit);
-  EXPECT_TRUE(rig.suture().point[1].exit);
+  ASSERT_EQ(rig.sewn().point.size(), 2u);
+  EXPECT_FALSE(rig.sewn().point[0].exit);
+  EXPECT_TRUE(rig.sewn().point[1].exit);
   EXPECT_GT(rig.node_of_point(1), rig.node_of_point(0)) << "the exit is nearer to the needle";
-  EXPECT_TRUE(rig.suture().bite[0].complete);
+  EXPECT_TRUE(rig.sewn().bite[0].complete);
   EXPECT_TRUE(rig.nothing_left_of_a_bite());
   EXPECT_TRUE(rig.order_is_whole());
   EXPECT_EQ(rig.count(EventKind::bite_cancelled), 0u);
@@ -154,15 +158,15 @@ TEST(Bite, back_end_trigger_completes_it_and_makes_its_suture_points) {
 void expect_like_never_begun(Rig& rig) {
   EXPECT_TRUE(rig.nothing_left_of_a_bite());
   EXPECT_TRUE(rig.thread().anchor.empty());
-  EXPECT_TRUE(rig.suture().point.empty());
+  EXPECT_TRUE(rig.sewn().point.empty());
   EXPECT_EQ(rig.thread().hold.size(), 1u);  // the swage
   EXPECT_TRUE(std::is_sorted(rig.thread().order.begin(), rig.thread().order.end()));
   for (float r : rig.thread().rest) EXPECT_FLOAT_EQ(r, rig.model->solver.strand[0].spacing);
   EXPECT_EQ(rig.count(EventKind::bite_cancelled), 1u);
-  ASSERT_EQ(rig.suture().bite.size(), 1u);
-  EXPECT_TRUE(rig.suture().bite[0].cancelled);
-  EXPECT_FALSE(rig.suture().bite[0].complete);
-  EXPECT_FALSE(rig.suture().bite[0].has_exit);
+  ASSERT_EQ(rig.sewn().bite.size(), 1u);
+  EXPECT_TRUE(rig.sewn().bite[0].cancelled);
+  EXPECT_FALSE(rig.sewn().bite[0].complete);
+  EXPECT_FALSE(rig.sewn().bite[0].has_exit);
   // Collisions are as they were: off only for the swaged end and its neighbours.
   const size_t n = rig.thread().order.size();
   for (size_t i = 0; i < n; ++i) EXPECT_EQ(rig.collides()[i], i + 4 < n ? 1 : 0) << i;
@@ -174,9 +178,9 @@ TEST(Bite, drawn_back_before_the_tip_came_out_leaves_nothing_behind) {
   const Place p = rig.place(0.4f);
   rig.approach(p);
   rig.drive(p, -1.0f, 0.0f);
-  ASSERT_EQ(phase_of(rig.suture()), NeedlePhase::tip_in);
+  ASSERT_EQ(phase_of(rig.sewn()), NeedlePhase::tip_in);
   EXPECT_EQ(rig.solver().channel.size(), 1u);
-  EXPECT_EQ(rig.solver().body_collides[rig.model->solver.needle_body(0)], 0);
+  EXPECT_EQ(rig.solver().body_collides[rig.needle_body()], 0);
   rig.drive(p, 0.0f, -1.2f);
   expect_like_never_begun(rig);
 }
@@ -187,7 +191,7 @@ TEST(Bite, drawn_back_after_the_tip_came_out_leaves_nothing_behind) {
   const Place p = rig.place(0.4f);
   rig.approach(p);
   rig.drive(p, -1.0f, 1.2f);
-  ASSERT_EQ(phase_of(rig.suture()), NeedlePhase::through);
+  ASSERT_EQ(phase_of(rig.sewn()), NeedlePhase::through);
   EXPECT_EQ(rig.solver().channel.size(), 2u);
   rig.drive(p, 1.2f, -1.2f);
   expect_like_never_begun(rig);
@@ -200,7 +204,7 @@ TEST(Bite, torn_back_in_one_tick_leaves_nothing_behind) {
   const Place p = rig.place(0.4f);
   rig.approach(p);
   rig.drive(p, -1.0f, 1.2f);
-  ASSERT_EQ(phase_of(rig.suture()), NeedlePhase::through);
+  ASSERT_EQ(phase_of(rig.sewn()), NeedlePhase::through);
   rig.drive(p, 1.2f, -1.3f, 0.0011f, 200.0f);
   rig.draw(p, 0.03f, 0.1f);
   rig.wait(0.3f);
@@ -215,15 +219,15 @@ TEST(Bite, drawn_back_after_the_back_end_went_in_frees_the_thread) {
   rig.approach(p);
   float psi = 1.2f;
   rig.drive(p, -1.0f, psi);
-  while (phase_of(rig.suture()) == NeedlePhase::through && psi < 4.2f) rig.drive(p, psi, psi + 0.06f), psi += 0.06f;
-  ASSERT_EQ(phase_of(rig.suture()), NeedlePhase::back_in);
+  while (phase_of(rig.sewn()) == NeedlePhase::through && psi < 4.2f) rig.drive(p, psi, psi + 0.06f), psi += 0.06f;
+  ASSERT_EQ(phase_of(rig.sewn()), NeedlePhase::back_in);
   ASSERT_EQ(rig.thread().anchor.size(), 1u);
   const double length = rig.rest_length();
   rig.drive(p, psi, -1.2f);
   rig.draw(p, 0.02f, 0.2f);
   EXPECT_TRUE(rig.nothing_left_of_a_bite());
   EXPECT_TRUE(rig.thread().anchor.empty());
-  EXPECT_TRUE(rig.suture().point.empty());
+  EXPECT_TRUE(rig.sewn().point.empty());
   EXPECT_EQ(rig.count(EventKind::bite_cancelled), 1u);
   EXPECT_TRUE(rig.order_is_whole());
   EXPECT_NEAR(rig.rest_length(), length, 1e-6);
@@ -258,14 +262,14 @@ TEST(Bite, keeps_where_the_tip_crossed_the_surface) {
     float psi = -1.0f;
     const auto in = crossing(psi, EventKind::tip_entered, 0.2f);
     ASSERT_EQ(rig.count(EventKind::tip_entered), 1u) << angle;
-    const Bite& bite = rig.suture().bite[0];
+    const Bite& bite = rig.sewn().bite[0];
     EXPECT_LT(distance(rig.last(EventKind::tip_entered)->where, position_of(bite.entry.point, rig.x())), 0.0005f);
     EXPECT_LT(off_segment(rig.last(EventKind::tip_entered)->where, in), 0.0002f) << angle;
     const auto out = crossing(psi, EventKind::tip_exited, 1.6f);
     ASSERT_EQ(rig.count(EventKind::tip_exited), 1u) << angle;
     EXPECT_LT(off_segment(rig.last(EventKind::tip_exited)->where, out), 0.0002f) << angle;
     // Triangle and weights name the same place as the spread point, to the spread's own error under strain.
-    for (const BiteEnd* end : {&rig.suture().bite[0].entry, &rig.suture().bite[0].exit}) {
+    for (const BiteEnd* end : {&rig.sewn().bite[0].entry, &rig.sewn().bite[0].exit}) {
       const Triangle& t = rig.model->solver.collision.surface[end->triangle];
       Vec3 on{};
       for (size_t k = 0; k < 3; ++k) on += xyz(rig.model->solver.shape.rest[t[k]]) * end->weight[k];
@@ -273,8 +277,8 @@ TEST(Bite, keeps_where_the_tip_crossed_the_surface) {
       EXPECT_NEAR(end->weight[0] + end->weight[1] + end->weight[2], 1.0f, 1e-5f);
     }
     // Asked for 1.1 mm below the surface; the wall gives way a little.
-    EXPECT_GT(rig.suture().bite[0].depth, 0.0003f);
-    EXPECT_LT(rig.suture().bite[0].depth, 0.0016f);
+    EXPECT_GT(rig.sewn().bite[0].depth, 0.0003f);
+    EXPECT_LT(rig.sewn().bite[0].depth, 0.0016f);
   }
 }
 
@@ -286,10 +290,10 @@ TEST(Bite, deeper_needle_deeper_bite) {
     const Place p = rig.place(0.4f);
     rig.approach(p, deep);
     rig.drive(p, -1.0f, 1.3f, deep);
-    ASSERT_TRUE(rig.suture().bite[0].has_exit) << deep;
-    EXPECT_GT(rig.suture().bite[0].depth, before);
-    EXPECT_LT(rig.suture().bite[0].depth, deep + 0.0003f);
-    before = rig.suture().bite[0].depth;
+    ASSERT_TRUE(rig.sewn().bite[0].has_exit) << deep;
+    EXPECT_GT(rig.sewn().bite[0].depth, before);
+    EXPECT_LT(rig.sewn().bite[0].depth, deep + 0.0003f);
+    before = rig.sewn().bite[0].depth;
   }
 }
 
@@ -332,20 +336,20 @@ TEST(TwoWalls, one_sweep_through_the_lumen_makes_two_bites) {
   size_t most_open = 0;
   for (float psi = -1.0f; psi < 4.3f; psi += 0.06f) {
     rig.drive(p, psi, psi + 0.06f, 0.0027f);
-    most_open = std::max(most_open, rig.suture().open.size());
+    most_open = std::max(most_open, rig.sewn().open.size());
   }
   ASSERT_EQ(most_open, 2u) << "the needle was in both walls at once";
-  ASSERT_EQ(rig.suture().bite.size(), 2u);
-  EXPECT_TRUE(rig.suture().bite[0].complete && rig.suture().bite[1].complete);
+  ASSERT_EQ(rig.sewn().bite.size(), 2u);
+  EXPECT_TRUE(rig.sewn().bite[0].complete && rig.sewn().bite[1].complete);
   EXPECT_EQ(rig.count(EventKind::bite_completed), 2u);
-  ASSERT_EQ(rig.suture().point.size(), 4u);
+  ASSERT_EQ(rig.sewn().point.size(), 4u);
   const auto inside = [&](const BiteEnd& end) {
     return rig.model->layer[rig.model->solver.collision.surface[end.triangle][0]] == static_cast<uint8_t>(TissueLayer::mucosa);
   };
-  EXPECT_FALSE(inside(rig.suture().bite[0].entry));
-  EXPECT_TRUE(inside(rig.suture().bite[0].exit));
-  EXPECT_TRUE(inside(rig.suture().bite[1].entry));
-  EXPECT_FALSE(inside(rig.suture().bite[1].exit));
+  EXPECT_FALSE(inside(rig.sewn().bite[0].entry));
+  EXPECT_TRUE(inside(rig.sewn().bite[0].exit));
+  EXPECT_TRUE(inside(rig.sewn().bite[1].entry));
+  EXPECT_FALSE(inside(rig.sewn().bite[1].exit));
   // The suture points follow each other along the thread, from the free end to the needle.
   for (size_t k = 0; k + 1 < 4; ++k) EXPECT_LT(rig.node_of_point(k), rig.node_of_point(k + 1)) << k;
   EXPECT_TRUE(rig.order_is_whole());
@@ -361,11 +365,11 @@ TEST(TwoWalls, drawn_back_the_same_way_both_bites_are_cancelled) {
   const Place p = rig.place(0.4f, 0.006f);
   rig.approach(p, 0.0027f);
   float psi = -1.0f;
-  while (rig.suture().open.size() < 2 && psi < 1.5f) rig.drive(p, psi, psi + 0.06f, 0.0027f), psi += 0.06f;
-  ASSERT_EQ(rig.suture().open.size(), 2u);
+  while (rig.sewn().open.size() < 2 && psi < 1.5f) rig.drive(p, psi, psi + 0.06f, 0.0027f), psi += 0.06f;
+  ASSERT_EQ(rig.sewn().open.size(), 2u);
   rig.drive(p, psi, -1.2f, 0.0027f);
   EXPECT_EQ(rig.count(EventKind::bite_cancelled), 2u);
-  EXPECT_TRUE(rig.suture().point.empty());
+  EXPECT_TRUE(rig.sewn().point.empty());
   EXPECT_TRUE(rig.nothing_left_of_a_bite());
 }
 

@@ -48,7 +48,13 @@ struct Rig {
     return flag;
   }
   const Vec4* x() { return state->solver.x.data(); }
-  RigidBody& needle() { return state->solver.body[model->solver.needle_body(0)]; }
+  SutureContext context(EventList& events) {
+    return {model->solver, state->solver, state->scratch, model->suture, state->suture, events};
+  }
+  SutureContext context() { return context(state->event); }
+  Suture& sewn() { return state->suture.suture[0]; }
+  uint32_t needle_body() { return model->solver.needle_body(0); }
+  RigidBody& needle() { return state->solver.body[needle_body()]; }
   Vec3 tip() { return needle_tip(model->solver.needle_arc[0], needle()); }
 
   void tick() {
@@ -72,7 +78,7 @@ struct Rig {
   // --- the ghost ---
   void hold_needle() {
     Weld w;
-    w.a = static_cast<int>(model->solver.needle_body(0));
+    w.a = static_cast<int>(needle_body());
     w.target = needle().pose();
     w.compliance = 1e-5f;
     w.angular_compliance = 1e-3f;
@@ -80,8 +86,7 @@ struct Rig {
     solver().weld.push_back(w);
   }
   void let_go() {
-    std::erase_if(solver().weld,
-                  [&](const Weld& w) { return w.a == static_cast<int>(model->solver.needle_body(0)) && w.b < 0; });
+    std::erase_if(solver().weld, [&](const Weld& w) { return w.a == static_cast<int>(needle_body()) && w.b < 0; });
     ghost = -1;
   }
   // Moves the ghost evenly to `goal` (frame at the needle's circle's centre).
@@ -145,8 +150,8 @@ struct Rig {
   size_t node_of(uint32_t slot) {
     return static_cast<size_t>(std::find(thread().order.begin(), thread().order.end(), slot) - thread().order.begin());
   }
-  size_t node_of_point(size_t k) { return node_of(thread().anchor[suture().point[k].anchor].slot); }
-  Vec3 point_at(size_t k) { return position_of(thread().anchor[suture().point[k].anchor].point, x()); }
+  size_t node_of_point(size_t k) { return node_of(thread().anchor[sewn().point[k].anchor].slot); }
+  Vec3 point_at(size_t k) { return position_of(thread().anchor[sewn().point[k].anchor].point, x()); }
   double rest_length() { return std::accumulate(thread().rest.begin(), thread().rest.end(), 0.0); }
   bool order_is_whole() {
     std::vector<uint32_t> order = thread().order;
@@ -156,8 +161,8 @@ struct Rig {
     return order.size() == model->solver.strand[0].count;
   }
   bool nothing_left_of_a_bite() {
-    return solver().channel.empty() && !suture().attached && phase_of(suture()) == NeedlePhase::outside &&
-           solver().body_collides[model->solver.needle_body(0)] == 1 &&
+    return solver().channel.empty() && !sewn().attached && phase_of(sewn()) == NeedlePhase::outside &&
+           solver().body_collides[needle_body()] == 1 &&
            std::none_of(solver().attach.begin(), solver().attach.end(), [](const Attachment& a) { return a.body >= 0; });
   }
 };
@@ -184,9 +189,9 @@ inline void lock(Rig& rig, size_t node, Vec3 at) {
   a.friction = rig.model->suture.pass_tension;
   a.capstan = rig.model->suture.capstan;
   set(rig.solver().x[a.slot], position_of(a.point, rig.x()));
-  rig.suture().point.push_back(
-      {static_cast<uint32_t>(rig.suture().bite.size()), false, static_cast<uint32_t>(rig.thread().anchor.size())});
-  rig.suture().bite.push_back(bite);
+  rig.sewn().point.push_back(
+      {static_cast<uint32_t>(rig.sewn().bite.size()), false, static_cast<uint32_t>(rig.thread().anchor.size())});
+  rig.sewn().bite.push_back(bite);
   rig.thread().anchor.push_back(a);
 }
 

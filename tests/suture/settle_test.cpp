@@ -22,21 +22,21 @@ void tie_and_cut(Tie& r, int throws = 2) {
   }
   ASSERT_EQ(r.count(EventKind::knot_locked), before + static_cast<size_t>(throws));
   r.open(0);
-  const Knot k = r.suture().knot.back();
+  const Knot k = r.sewn().knot.back();
   snip(r, between(r, r.node_of(k.slot[0]) - 5));
   snip(r, between(r, r.node_of(k.slot[1]) + 4));
 }
 
 std::vector<Event> settle(Tie& r) {
   EventList events;
-  EXPECT_TRUE(new_suture(r.model->solver, r.solver(), r.model->suture, r.suture(), r.model->start, r.model->needle_start,
-                         {kButtonNewSuture}, events));
+  SutureContext sewing = r.context(events);
+  EXPECT_TRUE(new_suture(sewing, r.model->start, r.model->needle_start, {kButtonNewSuture}));
   return events.list;
 }
 
 // [m] of thread from the knot to the first suture point, on to the last, and from there to the knot.
 std::array<float, 3> lengths(Tie& r) {
-  const Knot& k = r.suture().knot[0];
+  const Knot& k = r.sewn().knot[0];
   const std::array<size_t, 4> at = {r.node_of(k.slot[0]), r.node_of_point(0), r.node_of_point(1), r.node_of(k.slot[1])};
   std::array<float, 3> length{};
   for (size_t p = 0; p < 3; ++p)
@@ -60,8 +60,8 @@ void expect_fresh(Rig& r) {
   EXPECT_EQ(a.strand[0].hold[0].kind, HoldKind::swage);
   EXPECT_EQ(a.weld.size(), 2u);
   EXPECT_TRUE(a.channel.empty());
-  EXPECT_TRUE(r.suture().point.empty());
-  EXPECT_TRUE(r.suture().knot.empty());
+  EXPECT_TRUE(r.sewn().point.empty());
+  EXPECT_TRUE(r.sewn().knot.empty());
   for (const ToolLoop& l : r.suture().loop) EXPECT_EQ(l.wraps, 0u);
   for (const InstrumentState& h : r.suture().instrument) EXPECT_EQ(h.held, Held::nothing);
 }
@@ -72,7 +72,7 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   Tie r(setup);
   tie_and_cut(r);
   if (HasFatalFailure()) return;
-  const Knot k = r.suture().knot[0];
+  const Knot k = r.sewn().knot[0];
   const size_t first = r.node_of(k.slot[0]);
   std::vector<Vec3> where;
   const std::vector<uint32_t> order = r.thread().order;
@@ -84,8 +84,8 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   const Vec3 knot = position_of(k.target, r.x());
   for (size_t i = cut0 + 1; i <= cut1; ++i) where.push_back(xyz(r.x()[order[i]]));
   EventList events;
-  ASSERT_TRUE(new_suture(r.model->solver, r.solver(), r.model->suture, r.suture(), r.model->start, r.model->needle_start,
-                         {kButtonNewSuture}, events));
+  SutureContext sewing = r.context(events);
+  ASSERT_TRUE(new_suture(sewing, r.model->start, r.model->needle_start, {kButtonNewSuture}));
   // The curve: every particle of the piece, where it was; tails included, what was cut off gone.
   ASSERT_EQ(r.suture().settled.size(), 1u);
   Snapshot seen;
@@ -103,15 +103,15 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   EXPECT_LT(distance(position_of(pin.a, r.x()), ends[0]), 1e-4f);
   EXPECT_LT(distance(position_of(pin.b, r.x()), ends[1]), 1e-4f);
   expect_fresh(r);
-  EXPECT_EQ(r.suture().bite.size(), 2u) << "bites stay listed";
+  EXPECT_EQ(r.sewn().bite.size(), 2u) << "bites stay listed";
   ASSERT_EQ(events.size(), 2u);
   EXPECT_EQ(events[0].kind, EventKind::stitch_settled);
   EXPECT_EQ(events[1].kind, EventKind::suture_taken);
   EXPECT_EQ(events[1].which, 0u);
-  EXPECT_EQ(r.suture().taken, 1u);
+  EXPECT_EQ(r.sewn().taken, 1u);
   const uint32_t slots = r.model->solver.strand[0].first_slot;
   for (uint32_t i = slots; i < r.model->solver.count; ++i) EXPECT_EQ(xyz(r.x()[i]), r.model->start[i]);
-  EXPECT_EQ(r.needle().x, r.model->needle_start.p);
+  EXPECT_EQ(r.needle().x, r.model->needle_start[0].p);
 }
 
 // Thread holds two points from both sides; the pin is as long as the shorter way.
@@ -148,7 +148,7 @@ struct TwoBites : Tie {
     const Vec3 from = point_at(0), to = point_at(1);
     for (const size_t k : {size_t{1}, size_t{2}}) lock(*this, node[k], lerp(from, to, k == 1 ? 0.3f : 0.7f));
     for (size_t k = 0; k < 4; ++k) slot[k] = thread().order[node[k]];
-    auto& point = suture().point;  // the first, the last, and the two between
+    auto& point = sewn().point;  // the first, the last, and the two between
     if (one_wall) point[2].bite = point[0].bite;
     point[3].bite = point[1].bite;
     for (size_t i = node[0]; i < node[3]; ++i) thread().tension[i] = 0;
@@ -269,7 +269,7 @@ TEST(Settle, a_pin_hangs_on_six_particles_at_most) {
   tie_and_cut(r);
   if (HasFatalFailure()) return;
   // The first point hangs on as many particles as there can be.
-  TissuePoint& point = r.thread().anchor[r.suture().point[0].anchor].point;
+  TissuePoint& point = r.thread().anchor[r.sewn().point[0].anchor].point;
   const Vec3 at = r.point_at(0);
   std::vector<uint32_t> near(r.model->solver.tissue);
   for (uint32_t i = 0; i < near.size(); ++i) near[i] = i;
@@ -281,7 +281,7 @@ TEST(Settle, a_pin_hangs_on_six_particles_at_most) {
   // The outermost of them, which the pin will do without, have been moved.
   for (uint32_t i = TissuePoint::kMost - 4; i < TissuePoint::kMost; ++i)
     set(r.solver().x[near[i]], xyz(r.x()[near[i]]) + Vec3{0, 0.003f, 0});
-  const TissuePoint a = point, b = r.thread().anchor[r.suture().point[1].anchor].point;
+  const TissuePoint a = point, b = r.thread().anchor[r.sewn().point[1].anchor].point;
   const float length = shorter_way(r);
   settle(r);
   ASSERT_EQ(r.solver().pin.size(), 1u);
@@ -309,8 +309,8 @@ TEST(Settle, the_pins_hold_what_the_thread_held) {
     Tie r(setup);
     tie_and_cut(r);
     if (HasFatalFailure()) return;
-    const TissuePoint a = r.thread().anchor[r.suture().point[0].anchor].point,
-                      b = r.thread().anchor[r.suture().point[1].anchor].point;
+    const TissuePoint a = r.thread().anchor[r.sewn().point[0].anchor].point,
+                      b = r.thread().anchor[r.sewn().point[1].anchor].point;
     press(r);
     if (!held) r.solver().pin.clear();
     const Vec3 pa = position_of(a, r.x()), pb = position_of(b, r.x()), way = normalized(pb - pa);
@@ -333,8 +333,8 @@ TEST(Settle, not_with_the_needle_in_the_tissue) {
   const Place p = r.place(0.4f);
   r.approach(p);
   r.drive(p, -1.0f, 0.4f);
-  ASSERT_NE(phase_of(r.suture()), NeedlePhase::outside);
-  const uint32_t bite = r.suture().open.back().bite;
+  ASSERT_NE(phase_of(r.sewn()), NeedlePhase::outside);
+  const uint32_t bite = r.sewn().open.back().bite;
   const Vec3 needle = r.needle().x;
   press(r, 1);
   r.input.hand[1].connected = 1;
@@ -351,7 +351,7 @@ TEST(Settle, not_with_the_needle_in_the_tissue) {
 TEST(Settle, what_was_not_tied_is_taken_away_and_said) {
   Tie r;
   r.take();
-  ASSERT_EQ(r.suture().knot.size(), 1u);
+  ASSERT_EQ(r.sewn().knot.size(), 1u);
   press(r);
   EXPECT_EQ(r.count(EventKind::knot_cancelled), 1u);
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
@@ -404,8 +404,8 @@ TEST(Settle, ten_stitches_leave_nothing_but_themselves) {
     EXPECT_TRUE(r.solver().attach.empty());
     EXPECT_TRUE(r.thread().anchor.empty());
     EXPECT_EQ(r.thread().hold.size(), 1u);
-    EXPECT_TRUE(r.suture().knot.empty());
-    EXPECT_TRUE(r.suture().point.empty());
+    EXPECT_TRUE(r.sewn().knot.empty());
+    EXPECT_TRUE(r.sewn().point.empty());
     bytes.push_back(save_state(*r.model, *r.state).size());
     const std::vector<std::byte> saved = save_state(*r.model, *r.state);
     StatePtr again = initial_state(*r.model);
@@ -416,7 +416,7 @@ TEST(Settle, ten_stitches_leave_nothing_but_themselves) {
     r.tick();
     EXPECT_EQ(hash_state(*r.model, *again), hash_state(*r.model, *r.state));
   }
-  EXPECT_EQ(r.suture().taken, 10u);
+  EXPECT_EQ(r.sewn().taken, 10u);
   // Each leaves its curve, its pins and its bites: the same for every stitch, but for how long its tails are.
   for (size_t k = 1; k < bytes.size(); ++k) EXPECT_LT(bytes[k] - bytes[k - 1], 3000u);
 }
@@ -436,7 +436,7 @@ TEST(Settle, replays_the_same) {
       step(*r.model, *r.state, r.input, jobs);
       hash[run].push_back(hash_state(*r.model, *r.state));
     }
-    EXPECT_EQ(r.suture().taken, 2u);
+    EXPECT_EQ(r.sewn().taken, 2u);
   }
   EXPECT_EQ(hash[0], hash[1]);
 }

@@ -139,10 +139,10 @@ struct Tie : Rig {
   }
   // The nodes out of which the two strands come: those of the last locked knot, or of the outermost suture points.
   std::array<size_t, 2> roots() {
-    if (!suture().knot.empty() && suture().knot.back().slots == 2)
-      return {node_of(suture().knot.back().slot[0]), node_of(suture().knot.back().slot[1])};
+    if (!sewn().knot.empty() && sewn().knot.back().slots == 2)
+      return {node_of(sewn().knot.back().slot[0]), node_of(sewn().knot.back().slot[1])};
     size_t a = thread().order.size(), b = 0;
-    for (size_t k = 0; k < suture().point.size(); ++k) a = std::min(a, node_of_point(k)), b = std::max(b, node_of_point(k));
+    for (size_t k = 0; k < sewn().point.size(); ++k) a = std::min(a, node_of_point(k)), b = std::max(b, node_of_point(k));
     return {a, b};
   }
   Vec3 at_node(size_t i) { return thread_position(thread(), i, x(), solver().body); }
@@ -169,8 +169,7 @@ struct Tie : Rig {
   void pull_tight(float most = 0.024f) {
     constexpr float kStep = 0.001f;
     const auto set = [&] {
-      return std::all_of(suture().knot.begin(), suture().knot.end(),
-                         [](const Knot& k) { return k.phase == KnotPhase::locked; });
+      return std::all_of(sewn().knot.begin(), sewn().knot.end(), [](const Knot& k) { return k.phase == KnotPhase::locked; });
     };
     for (float gone = 0; gone < most && !set(); gone += kStep)
       move(setup.tool, rotate(frame.q, Vec3{0, 0.7f, 0.7f}) * kStep, kStep / 0.06f);

@@ -53,7 +53,7 @@ class Field {
       view.point = point_, view.bite = bite_, view.knot = knot_, view.x = state_->solver.x.data();
       view.taken = taken_, view.dt = model_->dt;
       EventList events;
-      technique(model_->technique, technique_, view, state_->plan, events);
+      technique(model_->technique, technique_, view, state_->plan[0], events);
       for (const Event& e : events) EXPECT_NE(e.kind, EventKind::technique_fault) << fault_name(e.fault);
       step(*model_, *state_, in_, jobs_);
     }
@@ -61,7 +61,7 @@ class Field {
   // [m] of the widest pair; midpoints only, or all.
   float gap(bool all) const {
     float most = 0;
-    for (const ClosurePlan::Pair& p : state_->plan.pair)
+    for (const ClosurePlan::Pair& p : state_->plan[0].pair)
       if (all || p.midpoint)
         most = std::max(most, distance(position_of(p.a, state_->solver.x.data()), position_of(p.b, state_->solver.x.data())));
     return most;
@@ -142,7 +142,7 @@ TEST(Tissue, connell_edges_come_together_and_turn_inward) {
   // The cut edges lie below the places that the thread joined.
   Vec3 joined{};
   size_t midpoints = 0;
-  for (const ClosurePlan::Pair& p : f.state().plan.pair)
+  for (const ClosurePlan::Pair& p : f.state().plan[0].pair)
     if (p.midpoint) joined += position_of(p.a, f.state().solver.x.data()), ++midpoints;
   ASSERT_EQ(midpoints, 4u);
   joined = joined / 4.0f;
@@ -172,7 +172,7 @@ TEST(Tissue, lembert_ring_closes) {
   // No place of the two facing edges was left out.
   for (const auto* group : {&f.model().technique.lembert.outer, &f.model().technique.lembert.inner})
     for (uint32_t i : *group) {
-      const auto& pair = f.state().plan.pair;
+      const auto& pair = f.state().plan[0].pair;
       EXPECT_TRUE(std::any_of(pair.begin(), pair.end(), [&](auto& p) { return p.a.particle[0] == i || p.b.particle[0] == i; }));
     }
 }

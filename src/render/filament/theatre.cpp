@@ -9,6 +9,7 @@
 #include <filament/Viewport.h>
 #include <utils/EntityManager.h>
 
+#include "exchange/strand.h"
 #include "render/filament/materials.h"
 
 namespace catgut {
@@ -45,7 +46,8 @@ Theatre::~Theatre() {
   for (TissueView& t : tissue_) destroy_mesh(engine_, *scene_, t.gpu);
   for (ToolView3d& t : tool_)
     for (GpuMesh& m : t.part) destroy_mesh(engine_, *scene_, m);
-  for (GpuMesh* m : {&needle_, &bed_, &thread_.gpu, &mark_.gpu}) destroy_mesh(engine_, *scene_, *m);
+  for (GpuMesh& m : needle_) destroy_mesh(engine_, *scene_, m);
+  for (GpuMesh* m : {&bed_, &thread_.gpu, &mark_.gpu}) destroy_mesh(engine_, *scene_, *m);
   for (GpuMesh& m : cloth_) destroy_mesh(engine_, *scene_, m);
   for (GpuMesh& m : marker_) destroy_mesh(engine_, *scene_, m);
   engine_.destroy(tissue_material_);
@@ -93,7 +95,8 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
   for (TissueView& t : tissue_) move_tissue(engine_, t, motion_, snapshot);
   move_thread(engine_, thread_, model_, snapshot, tissue_, motion_, cameras[0], pixel);
   move_marks(engine_, mark_, snapshot, tissue_, motion_);
-  catgut::set_pose(engine_, needle_, snapshot.needle.pose);
+  for (size_t i = 0; i < std::min(needle_.size(), snapshot.suture.size()); ++i)
+    catgut::set_pose(engine_, needle_[i], snapshot.suture[i].needle.pose);
   for (size_t i = 0; i < std::min(tool_.size(), snapshot.instrument.size()); ++i) move_tool(tool_[i], snapshot.instrument[i]);
   show_markers(snapshot, suture_points);
 }
@@ -211,7 +214,8 @@ void Theatre::make_stage() {
     add_cloth(swab_shape(mesh.position, away, ground.y), 14, sample, true);
     add_cloth(cushion_shape(middle, away, -0.022f, 0.03f, box.low.y + 0.001f, ground.y), 14, sample, true);
   }
-  needle_ = make_mesh(engine_, *scene_, needle_shape(model_), needle_material_, true);
+  for (const SuturePicture& suture : model_.suture)
+    needle_.push_back(make_mesh(engine_, *scene_, needle_shape(suture), needle_material_, true));
   tool_.resize(model_.instrument.size());
   for (size_t i = 0; i < tool_.size(); ++i) {
     tool_[i].shape = tool_shape(model_.instrument[i]);
@@ -253,17 +257,17 @@ void Theatre::move_tool(const ToolView3d& view, const InstrumentView& tool) {
 
 // Markers come and go with the suture points; they are few, so each is a drawable of its own that is parked when unused.
 void Theatre::show_markers(const Snapshot& snapshot, bool wanted) {
-  const size_t count = wanted ? snapshot.suture_point.size() : 0;
+  const size_t count = wanted ? suture_point_count(snapshot) : 0;
   while (marker_.size() < 2 * count) {
     Shape ball;
     add_ball(ball, {}, 0.00045f, marker_.size() % 2 ? srgb(60, 220, 235) : srgb(250, 215, 60));
     marker_.push_back(make_mesh(engine_, *scene_, ball, marker_material_, false));
   }
   for (size_t i = 0; i < marker_.size(); ++i) {
-    const bool shown = i / 2 < count && snapshot.suture_point[i / 2].exit == (i % 2 == 1);
+    const bool shown = i / 2 < count && suture_point_at(snapshot, i / 2).exit == (i % 2 == 1);
     scene_->remove(marker_[i].entity);
     if (!shown) continue;
-    catgut::set_pose(engine_, marker_[i], {snapshot.suture_point[i / 2].position, {}});
+    catgut::set_pose(engine_, marker_[i], {suture_point_at(snapshot, i / 2).position, {}});
     scene_->addEntity(marker_[i].entity);
   }
 }

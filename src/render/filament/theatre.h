@@ -81,7 +81,8 @@ class Theatre {
   ThreadView thread_;
   MarkView mark_;
   std::vector<ToolView3d> tool_;  // as PictureModel::instrument
-  GpuMesh needle_, bed_;
+  std::vector<GpuMesh> needle_;   // per suture
+  GpuMesh bed_;
   std::vector<GpuMesh> cloth_;  // each with the shadows on it
   std::vector<GpuMesh> marker_;
 };

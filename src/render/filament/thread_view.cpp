@@ -3,11 +3,14 @@
 
 #include <cmath>
 
+#include "exchange/strand.h"
+
 namespace catgut {
 namespace {
 
 constexpr int kSides = 8, kPerSpan = 4, kPerTurn = 14;
 constexpr uint32_t kRing = kSides + 1;
+constexpr float kKnotReach = 0.006f;     // [m] to the tissue that a knot lies on
 constexpr uint32_t kRoomForTied = 4000;  // points of the curve for knots and settled stitches; what is beyond is not drawn
 const Vec3 kViolet = srgb(98, 62, 178), kGuide = srgb(176, 150, 238);
 
@@ -97,13 +100,34 @@ void write_tube(ThreadView& view, const Surface& surface) {
   }
 }
 
+// A suture's thread in its pieces, and the guide to its needle.
+void add_suture(ThreadView& view, const SuturePicture& model, const SutureView& suture, std::span<const Vec3> particle,
+                float width) {
+  for (size_t i = 0; i < suture.thread_order.size(); ++i) {
+    const uint32_t slot = suture.thread_order[i];
+    if (slot < particle.size() && is_finite(particle[slot])) view.through.push_back(particle[slot]);
+    if (i < suture.thread_cut.size() && suture.thread_cut[i]) add_strand(view, width);
+  }
+  add_strand(view, width);
+  const Pose& needle = suture.needle.pose;
+  if (!suture.needle.in_tissue || suture.needle.bite >= suture.bite.size() || !is_finite(needle.p)) return;
+  // It follows the needle's own arc as far as the needle goes, so that it shows the way the thread will take.
+  const Vec3 entry = suture.bite[suture.needle.bite].entry, swage = transform(needle, {model.needle_radius, 0, 0});
+  const Vec3 middle = 0.5f * (entry + swage), bow = normalized(middle - needle.p, {0, 1, 0});
+  view.through = {entry, middle + bow * (0.12f * distance(entry, swage)), swage};
+  if (is_finite(entry)) add_strand(view, 0.8f * width, true);
+  view.through.clear();
+}
+
 }  // namespace
 
 ThreadView make_thread_view(filament::Engine& engine, filament::Scene& scene, const PictureModel& model,
                             filament::MaterialInstance* material) {
   ThreadView view;
-  if (model.thread_count < 2) return view;
-  view.capacity = (model.thread_count - 1) * kPerSpan + 1 + kRoomForTied;
+  for (const SuturePicture& suture : model.suture)
+    if (suture.thread_count > 1) view.capacity += (suture.thread_count - 1) * kPerSpan + 1;
+  if (view.capacity == 0) return view;
+  view.capacity += kRoomForTied;
   view.look.resize(size_t(view.capacity) * kRing);
   std::vector<std::array<uint32_t, 3>> triangle;
   for (uint32_t i = 0; i + 1 < view.capacity; ++i)
@@ -125,36 +149,25 @@ void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel&
   if (view.capacity == 0) return;
   view.curve.clear(), view.radius.clear(), view.guide.clear(), view.through.clear();
   const Vec3 ahead = normalized(camera.target - camera.eye);
-  const float width = std::max(model.thread_radius, 0.75f * pixel * std::max(0.0f, dot(camera.target - camera.eye, ahead)));
-  for (size_t i = 0; i < snapshot.thread_order.size(); ++i) {
-    const uint32_t slot = snapshot.thread_order[i];
-    if (slot < snapshot.particle.size() && is_finite(snapshot.particle[slot])) view.through.push_back(snapshot.particle[slot]);
-    if (i < snapshot.thread_cut.size() && snapshot.thread_cut[i]) add_strand(view, width);
-  }
-  add_strand(view, width);
-  const Pose& needle = snapshot.needle.pose;
-  if (snapshot.needle.in_tissue && snapshot.needle.bite < snapshot.bite.size() && is_finite(needle.p)) {
-    // It follows the needle's own arc as far as the needle goes, so that it shows the way the thread will take.
-    const Vec3 entry = snapshot.bite[snapshot.needle.bite].entry, swage = transform(needle, {model.needle_radius, 0, 0});
-    const Vec3 middle = 0.5f * (entry + swage), bow = normalized(middle - needle.p, {0, 1, 0});
-    view.through = {entry, middle + bow * (0.12f * distance(entry, swage)), swage};
-    if (is_finite(entry)) add_strand(view, 0.8f * width, true);
-    view.through.clear();
-  }
-  const float reach = 0.006f;
+  const float seen = 0.75f * pixel * std::max(0.0f, dot(camera.target - camera.eye, ahead));  // [m] that can be seen
   size_t tied = 0;
-  for (const KnotView& knot : snapshot.knot) {
-    const Vec3 out = normal_at(tissue_at(view.on_tissue, tied++, knot.position, reach, tissue), tissue, motion);
-    for (uint32_t k = 0; k < std::min<uint32_t>(knot.throws, KnotView::kMostThrows); ++k)
-      add_throw(view, knot.position, knot.way, out, (0.8f + 2.7f * static_cast<float>(k)) * width, knot.thrown[k].wraps,
-                knot.thrown[k].handed, width);
+  for (size_t i = 0; i < std::min(model.suture.size(), snapshot.suture.size()); ++i) {
+    const float width = std::max(model.suture[i].thread_radius, seen);
+    add_suture(view, model.suture[i], snapshot.suture[i], snapshot.particle, width);
+    for (const KnotView& knot : snapshot.suture[i].knot) {
+      const Vec3 out = normal_at(tissue_at(view.on_tissue, tied++, knot.position, kKnotReach, tissue), tissue, motion);
+      for (uint32_t k = 0; k < std::min<uint32_t>(knot.throws, KnotView::kMostThrows); ++k)
+        add_throw(view, knot.position, knot.way, out, (0.8f + 2.7f * static_cast<float>(k)) * width, knot.thrown[k].wraps,
+                  knot.thrown[k].handed, width);
+    }
   }
+  const float width = std::max(model.suture.front().thread_radius, seen);
   for (const SettledView& stitch : snapshot.settled) {
     view.through.assign(stitch.node.begin(), stitch.node.end());
     const Vec3 way = stitch.node.size() > 1 ? normalized(stitch.node.back() - stitch.node.front(), {1, 0, 0}) : Vec3{1, 0, 0};
     add_strand(view, width);
     for (const Vec3& at : stitch.knot) {
-      const Vec3 out = normal_at(tissue_at(view.on_tissue, tied++, at, reach, tissue), tissue, motion);
+      const Vec3 out = normal_at(tissue_at(view.on_tissue, tied++, at, kKnotReach, tissue), tissue, motion);
       add_throw(view, at, way, out, 0.8f * width, 2, 1, width);
       add_throw(view, at, way, out, 3.5f * width, 1, -1, width);
     }
@@ -202,12 +215,12 @@ MarkView make_mark_view(filament::Engine& engine, filament::Scene& scene, filame
 
 void move_marks(filament::Engine& engine, MarkView& view, const Snapshot& snapshot, std::span<const TissueView> tissue,
                 const Motions& motion) {
-  const uint32_t count = uint32_t(std::min<size_t>(snapshot.suture_point.size(), kMostMarks));
+  const uint32_t count = uint32_t(std::min<size_t>(suture_point_count(snapshot), kMostMarks));
   set_drawn(engine, view.gpu, count * kMarkSides * 3);
   if (count == 0) return;
   const Surface surface = new_surface(count * kMarkCorners);
   for (uint32_t m = 0; m < count; ++m) {
-    const SuturePointView& point = snapshot.suture_point[m];
+    const SuturePointView& point = suture_point_at(snapshot, m);
     const Nearest at = tissue_at(view.on_tissue, m, point.position, 0.003f, tissue);
     const Vec3 out = normal_at(at, tissue, motion);
     Vec3 centre = point.position;

@@ -200,19 +200,23 @@ void reach_from(TissueView& view, Vec3 point, std::vector<Reached>& out) {
 
 // Tension whitens the tissue round every suture point; it comes and goes over some pictures, as blood does.
 void blanch(filament::Engine& engine, TissueView& view, const Snapshot& snapshot) {
-  const size_t count = snapshot.suture_point.size();
   bool changed = false;
   const bool first = !view.shown;
   view.shown = true;
-  if (view.reached.size() > count) {  // a bite was taken back, or a fresh suture begun
+  view.reached.resize(snapshot.suture.size());
+  bool fewer = false;  // a bite was taken back, or a new suture begun
+  for (size_t s = 0; s < view.reached.size(); ++s)
+    fewer = fewer || view.reached[s].size() > snapshot.suture[s].suture_point.size();
+  if (fewer) {
     for (VertexLive& live : view.live) live.bloody = 0;
-    view.reached.clear();
+    for (auto& reached : view.reached) reached.clear();
   }
-  while (view.reached.size() < count) {
-    changed = true;
-    view.reached.emplace_back();
-    reach_from(view, snapshot.suture_point[view.reached.size() - 1].position, view.reached.back());
-  }
+  for (size_t s = 0; s < view.reached.size(); ++s)
+    while (view.reached[s].size() < snapshot.suture[s].suture_point.size()) {
+      changed = true;
+      const Vec3 point = snapshot.suture[s].suture_point[view.reached[s].size()].position;
+      reach_from(view, point, view.reached[s].emplace_back());
+    }
   for (const uint32_t v : view.pressed) view.press[v] = 0;
   const auto add = [&](const std::vector<Reached>& reached, float white) {
     for (const Reached& r : reached) {
@@ -221,11 +225,12 @@ void blanch(filament::Engine& engine, TissueView& view, const Snapshot& snapshot
       view.press[r.vertex] = std::max(view.press[r.vertex], r.weight * white);
     }
   };
-  for (size_t i = 0; i < count; ++i) {
-    const SuturePointView& point = snapshot.suture_point[i];
-    const float white = whiteness(std::max(point.tension_needle, point.tension_free));
-    if (white > 0.02f) add(view.reached[i], white);
-  }
+  for (size_t s = 0; s < view.reached.size(); ++s)
+    for (size_t i = 0; i < view.reached[s].size(); ++i) {
+      const SuturePointView& point = snapshot.suture[s].suture_point[i];
+      const float white = whiteness(std::max(point.tension_needle, point.tension_free));
+      if (white > 0.02f) add(view.reached[s][i], white);
+    }
   for (const uint32_t v : view.pressed) {
     const int want = int(255 * view.press[v]), have = view.live[v].blanched;
     if (want == have) continue;

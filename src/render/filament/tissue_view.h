@@ -25,10 +25,10 @@ struct TissueView {
   std::vector<PackedFrame> frame;
   std::vector<VertexLive> live;
   std::vector<float> press;  // per vertex, of this picture
-  // Where thread goes through the wall, found when it is first seen: by number of the suture point.
-  std::vector<std::vector<Reached>> reached;
-  std::vector<uint32_t> pressed;  // vertices with anything in `press`
-  bool shown = false;             // in a picture before
+  // Where thread goes through the wall, found when it is first seen: by suture and number of the suture point.
+  std::vector<std::vector<std::vector<Reached>>> reached;  // per suture
+  std::vector<uint32_t> pressed;                           // vertices with anything in `press`
+  bool shown = false;                                      // in a picture before
   GpuMesh gpu;
 };
 
