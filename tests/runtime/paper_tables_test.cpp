@@ -40,7 +40,7 @@ TEST(PaperTables, a_row_holds_ours_and_theirs) {
   table.executions = table.sewn = 2;
   table.phase = {{"During looping", {1, 3}, {4, 4}}, {"A phase of our own", {1, 1}, {1, 1}}};
   const std::string text = paper_markdown(table);
-  EXPECT_NE(text.find("2 of 2 executions sewn"), std::string::npos) << text;
+  EXPECT_NE(text.find("2 of 2 executions completed"), std::string::npos) << text;
   const size_t row = text.find("| During looping");
   ASSERT_NE(row, std::string::npos) << text;
   const std::string line = text.substr(row, text.find('\n', row) - row);
