@@ -9,7 +9,7 @@ namespace catgut {
 // How much the program says while somebody sews.
 enum class Guidance {
   learn,     // the way that the needle should go, suture points and keys are shown
-  practice,  // what happens is told in words
+  practice,  // events appear as messages
   exam,      // nothing is told or helped until the end
 };
 
