@@ -388,7 +388,7 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
 }
 
 bool Scripted::draw(const Snapshot& seen) {
-  enum { over, down, close, pull, lay, open };
+  enum { over, down, close, tighten, lay, open };
   const size_t first = first_point_node(seen);
   const BiteFrame f = frame(seen, 0);
   switch (stage_) {
@@ -410,11 +410,11 @@ bool Scripted::draw(const Snapshot& seen) {
         else if (!patience(4)) gave_up_ = true;
       } else if (jaw(kDriver, 0) && waited_ > 0.3f) {
         if (seen.tool[kDriver].held != Held::thread) return miss(over), false;
-        go(pull);
+        go(tighten);
       }
       return false;
     }
-    case pull: {
+    case tighten: {
       // A surgeon feels the thread: the harder it pulls back, the slower the hand.
       auto gently = [&](size_t hand) {
         return 0.25f * skill_.speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.02f, 1.0f);
