@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: the program `catgut`. Reads the command line, runs one command, and turns every fault into one line on standard error.
 #include <algorithm>
 #include <cstdio>

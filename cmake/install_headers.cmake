@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 cmake_policy(VERSION 3.25)
 # Runs at install time. Installs the headers that include/catgut/catgut.h reaches, all of them under include/catgut/: in an
 # embedder's path, "core/math.h" could be anybody's. What is reached is public, nothing else is.

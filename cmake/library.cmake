@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The library that other programs link: every room at or below `procedure`, in one archive, with the headers that
 # include/catgut/catgut.h reaches. Installed as component "library".
 get_property(library_rooms GLOBAL PROPERTY CATGUT_BELOW_procedure)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # catgut_numerics: the compiler flags on which the bits of a run depend. Every room links it PUBLIC, and so does every program
 # that compiles inline functions of our headers: the linker keeps one copy of each, whoever compiled it.
 add_library(catgut_numerics INTERFACE)

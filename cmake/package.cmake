@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Installation of the program, and the Debian packages: catgut (program), catgut-data (scenes), libcatgut-dev (library).
 #   cmake --build build --target package      writes them into the build folder
 if(CATGUT_APP)
@@ -6,7 +7,7 @@ if(CATGUT_APP)
   install(FILES packaging/catgut.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps COMPONENT program)
 endif()
 
-# A package has to carry its licence where Debian looks for it.
+# A package has to carry its license where Debian looks for it.
 set(package_program catgut)
 set(package_data catgut-data)
 set(package_library libcatgut-dev)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A piece of bowel, and one hand that presses on its rim: the tissue gives way, pushes back, and recovers.
 // Shows: a scene made in code, the tick, what is published, the force on a hand.
 #include <algorithm>
@@ -9,7 +10,7 @@ using namespace catgut;
 
 int main() {
   SceneSpec scene;
-  scene.body.emplace_back();  // an open tube, 40 mm across, its rim's centre at the origin
+  scene.body.emplace_back();  // an open tube, 40 mm across, its rim's center at the origin
   scene.technique.name = "none";
   const auto model = build_model(scene);
   const auto state = initial_state(*model);
@@ -42,5 +43,5 @@ int main() {
   run(2.0, above, above);
   const float left = moved();
   std::printf("released: %.2f mm from where it was, %.1e J still moving\n", 1e3 * left, kinetic_energy(*model, *state));
-  return state_is_sane(*model, *state) && pressed > 0.001f && force > 0.02f && left < 0.0005f ? 0 : 1;
+  return state_is_valid(*model, *state) && pressed > 0.001f && force > 0.02f && left < 0.0005f ? 0 : 1;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A thread hangs from a hook. The tension that the solver reports in each pair is the weight of the thread below it.
 // Shows: one kernel of the solver used alone, without a scene; a multiplier is a force in newtons.
 #include <algorithm>

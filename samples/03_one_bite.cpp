@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One bite through the rim of a colon: a scene file, a pair of hands, and what the simulator reports about the stitch.
 // Shows: scenes by name, hands that look at the last snapshot before they move, events in the order in which they happen.
 #include <cstdio>

@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sample: a haptic arm of your own. Fill an ArmPort with the functions of your driver; everything that makes force safe is done
-// by whoever calls it. Here the "driver" is a thread whose stylus drops slowly onto the bowel's wall; a real one calls `step`
-// from its own callback, a thousand times a second, with what its encoders say, and gives the motors what comes back.
+// by a caller that calls it. Here the "driver" is a thread whose stylus drops slowly onto the bowel's wall; a real one calls
+// `step` from its own callback, a thousand times a second, with what its encoders say, and gives the motors what comes back.
 #include <atomic>
 #include <chrono>
 #include <cstdio>

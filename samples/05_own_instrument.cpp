@@ -46,5 +46,5 @@ int main() {
   std::printf("%s: holds %s, pulls %.3f N, drew the rim %.1f mm outward\n", picture_model(*model).instrument[0].title.c_str(),
               v.held == Held::tissue ? "tissue" : "nothing", length(v.pull), 1e3 * moved);
   const bool pulls = std::abs(length(v.pull) - 0.2f) < 0.05f;
-  return state_is_sane(*model, *state) && v.held == Held::tissue && pulls && moved > 0.0005f ? 0 : 1;
+  return state_is_valid(*model, *state) && v.held == Held::tissue && pulls && moved > 0.0005f ? 0 : 1;
 }

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """An arm in another language: what a program must do to be a haptic arm of Catgut over the bridge (src/device/bridge_packet.h has
 the packets). Here the "arm" is a point of 0.1 kg on a spring, moved by the force that it computes; put your encoders and motors in
 its place, and keep the order in render(): expiry, cap, ramp, slew. A hand is at the other end.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The numbers of docs/one_tick.md: runs the purse-string as `catgut run purse_string --seed 1` does, up to the tick in which
 // the tip of the first bite goes in, and prints what went into that tick and what came out. tools/update_docs.sh copies the
 // printed blocks into the page. Reads the State itself (sim/state.h), which a program of yours has no need to do.
@@ -99,7 +100,7 @@ int main() {
   float most = 0;
   for (float t : s.solver.strand[0].tension) most = std::max(most, t);
   std::printf("%-32s %8.5f N at the needle, %.5f N at most\n", "thread tension", s.solver.strand[0].tension.back(), most);
-  for (const ChannelPoint& c : s.solver.channel)
+  for (const NeedleTrackConstraint& c : s.solver.channel)
     std::printf("%-32s %8.4f N sideways, %.4f N along\n", "channel at the entry", length(c.lambda) / (m.solver.h * m.solver.h),
                 c.drag_lambda / (m.solver.h * m.solver.h));
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # The golden hashes for every compiler and architecture: GCC and Clang on x86-64, each with the kernels for AVX-512, AVX2 and
 # SSE4 (the last is all that the rest of the code uses), and AArch64, cross-built and run by qemu-user. Compares the bytes of the whole
 # state too, between the builds. Builds the library alone, in build/determinism. What is missing is installed (Debian 12).

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # What strangers do with Catgut, done from outside: installs the library and builds a program against it, without SDL, Filament,
 # Boost or GoogleTest; writes the Debian packages, unpacks them, runs the program from there and builds against the unpacked library.
 # Needs a built program in build/ (./catgut --version, or ninja -C build) and Debian's dpkg-dev.

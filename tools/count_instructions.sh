@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Instructions that a tick of every technique's scene takes, at rest and in the middle of the work, compared with those on record
 # in bench/instructions.txt. Times on shared machines swing by tens of per cent, counts by nothing, so a tenth more is news.
 #   tools/count_instructions.sh            counts and compares; exit code 1 when a count is more than 10 % above its record

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Makes the pictures of the README anew: docs/media/purse_string.webp (the first bites at eight times real time, then the closure
 # at four times) and docs/media/contact_sheet.jpg; and of the other three sutures docs/media/NAME.webp and NAME_sheet.jpg, whole,
 # faster than real time. Runs the scenes, which takes some ten minutes.

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Makes the pictures of the window anew: docs/media/screen_NAME.jpg for every screen at 1280x720, screen_results_4k.jpg at
 # 3840x2160, and window.jpg, which the README shows. Needs Xvfb; draws with whatever driver is there, which takes some minutes
 # without a graphics card.

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Makes docs/media/NAME.jpg anew: one moment of each technique in progress, in the best quality. Runs the scenes up to that
 # moment, which takes a minute or two.
 #   tools/make_stills.sh [FOLDER]     where the PNGs are, or go: NAME_still.png; made when they are missing

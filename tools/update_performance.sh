@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Writes docs/performance.md and its pictures from measurements on this machine, which should have nothing else to do.
 #   tools/update_performance.sh                all of it (half an hour on two cores)
 #   tools/update_performance.sh scale stages   only these parts; the others keep their last measurement

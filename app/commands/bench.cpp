@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: `catgut bench`: time per stage; scaling with suture count (limits.cpp), the paper's tables
 // (paper.cpp), scaling with particle count (scale.cpp), cost of a frame (frame.cpp), force feedback (haptics.cpp).
 #include <cstdio>

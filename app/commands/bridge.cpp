@@ -1,4 +1,5 @@
-// app: `catgut bridge`: lends the haptic arms of this machine to a simulator on another one (or in another process here).
+// SPDX-License-Identifier: Apache-2.0
+// app: `catgut bridge`: serves the haptic arms of this machine to a simulator on another one (or in another process here).
 #include <cstdio>
 #include <memory>
 #include <thread>
@@ -28,9 +29,9 @@ int bridge(const Options& o) {
   const ArmChoice choice = read_arm_choice(o.arms);
   if (choice.as_paper || choice.driver.empty())
     throw InputError("--arms " + o.arms, "unknown device backend", "see catgut devices --help");
-  std::vector<std::string> told;
-  ArmPort port = open_arms(choice, told);
-  for (const std::string& line : told) std::printf("%s\n", line.c_str());
+  std::vector<std::string> messages;
+  ArmPort port = open_arms(choice, messages);
+  for (const std::string& line : messages) std::printf("%s\n", line.c_str());
   if (!port.any()) throw InputError("bridge", "no haptic device to serve", "see above for what is missing");
   for (size_t k = 0; k < 2; ++k)
     if (port.arm[k].present) std::printf("%s device: %s\n", k == 0 ? "right" : "left", port.arm[k].name.c_str());

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: the commands of the program, one file each. A command adds itself to the command line and, when it was chosen, sets the
 // exit code: 0 done, 1 the expectation or check failed, 2 bad input, 130 interrupted.
 #pragma once
@@ -57,7 +58,7 @@ struct FrameOptions {
   double seconds = 0;  // [s] simulated
 };
 int bench_frame(const FrameOptions& options);
-// What a headset's picture of each snapshot costs, `every_s` [s] simulated apart, nothing rasterised. Throws std::runtime_error
+// What a headset's picture of each snapshot costs, `every_s` [s] simulated apart, nothing rasterized. Throws std::runtime_error
 // in a build without pictures.
 using StereoPictures = std::function<FrameCost::Times(const Snapshot&)>;
 StereoPictures stereo_pictures(const PictureModel& model, float every_s);
@@ -87,8 +88,8 @@ void end_progress_line();
 
 // Makes the folder of an output file and checks that the file can be written; before the work, not after it. "" and "-" pass.
 void prepare_output(const std::string& path);
-// The same where no folder may be made: whoever sits down at a window has not asked for one, and a slip of the pen would send
-// the recording of an hour's work to a place where nobody looks for it.
+// The same where no folder may be made: a caller that sits down at a window has not asked for one, and a slip of the pen would
+// send the recording of an hour's work to a place where no one looks for it.
 void check_output(const std::string& path);
 // path "-": standard output.
 void write_output(const std::string& path, const std::string& text);

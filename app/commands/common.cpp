@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: what the commands share; see commands.h.
 #include <fmt/format.h>
 #include <signal.h>

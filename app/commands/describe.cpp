@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: `catgut describe [KEY]`: the manual of scene files.
 #include <cstdio>
 #include <memory>

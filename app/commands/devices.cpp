@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: `catgut devices`: which haptic arms are connected and what they can do, driver by driver; with --test, a slow small push
 // of each.
 #include <algorithm>
@@ -67,9 +68,9 @@ int devices(const Options& o) {
   const ArmChoice wanted = read_arm_choice(o.which);
   for (const ArmDriver& d : arm_drivers()) {
     if (!wanted.driver.empty() && wanted.driver != d.word) continue;
-    std::vector<std::string> told;
-    ArmPort port = open_arms({d.word, wanted.where, false}, told);
-    for (const std::string& line : told) std::printf("%s\n", line.c_str());
+    std::vector<std::string> messages;
+    ArmPort port = open_arms({d.word, wanted.where, false}, messages);
+    for (const std::string& line : messages) std::printf("%s\n", line.c_str());
     print(port);
     if (!port.any()) continue;
     any = true;

@@ -1,4 +1,5 @@
-// app: `catgut bench frame`: what a headset's frame costs the processor, without a rasteriser, while a scene is worked on.
+// SPDX-License-Identifier: Apache-2.0
+// app: `catgut bench frame`: what a headset's frame costs the processor, without a rasterizer, while a scene is worked on.
 #include <fmt/format.h>
 
 #include <algorithm>

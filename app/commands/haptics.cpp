@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: `catgut bench haptics`: the comparison of rendering methods and, with --out, what a bite and a knot feel
 // like.
 #include <array>
@@ -11,18 +12,18 @@
 #include "haptic/study.h"
 #include "procedure/scene_file.h"
 #include "render/plot.h"
-#include "runtime/felt.h"
+#include "runtime/force_curves.h"
 #include "runtime/haptics.h"
 #include "suture/forces.h"
 
 namespace catgut {
 namespace {
 
-constexpr Colour kOurs{30, 90, 170, 255}, kTheirs{200, 70, 50, 255}, kBandEntry{214, 232, 214, 255},
+constexpr Color kOurs{30, 90, 170, 255}, kTheirs{200, 70, 50, 255}, kBandEntry{214, 232, 214, 255},
     kBandShaft{226, 222, 240, 255};
 constexpr int kWide = 760, kHigh = 430;
 
-// Force in newtons over millimetres, both from zero.
+// Force in newtons over millimeters, both from zero.
 Plot force_plot(const std::string& title, const std::string& x_name, const std::vector<FeltPoint>& felt) {
   Plot plot;
   plot.title = title, plot.x_name = x_name, plot.y_name = "N";

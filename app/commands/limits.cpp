@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: `catgut bench limits`: how many sutures one body and two bodies bear (paper 3.5).
 #include <cstdio>
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: `catgut bench paper`: tables 1 to 4 of the paper, our figures beside its own.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: `catgut play [SCENE]`, and `catgut` without arguments: the window.
 #include <memory>
 
@@ -51,7 +52,7 @@ void add_window_options(CLI::App& command, WindowCommand& o) {
 void read_window_options(WindowCommand& o) {
   read_size(o.size, o.play);
   o.play.quality_given = !o.quality.empty();
-  o.play.quality = o.quality == "high" ? Quality::good : o.quality == "medium" ? Quality::medium : Quality::draft;
+  o.play.quality = o.quality == "high" ? Quality::high : o.quality == "medium" ? Quality::medium : Quality::low;
 }
 
 }  // namespace
@@ -87,12 +88,12 @@ void add_play(CLI::App& app, int& exit_code) {
   add_window_options(*command, *o);
   command->callback([o, &exit_code] {
     read_window_options(*o);
-    read_arm_choice(o->play.live.haptics);  // its faults are told before a window opens
+    read_arm_choice(o->play.live.haptics);  // its faults are reported before a window opens
     if (o->play.teach && o->play.scene.empty()) o->play.scene = first_stitch().scene;
     if (o->play.teach && (o->play.scene != first_stitch().scene || !o->play.live.surgeon.empty()))
       throw InputError("--teach", "the tutorial needs the scene \"" + first_stitch().scene + "\" and manual control",
                        "write catgut play " + first_stitch().scene + " --teach");
-    if (!o->play.scene.empty()) read_scene(o->play.scene);  // its faults are told before a window opens
+    if (!o->play.scene.empty()) read_scene(o->play.scene);  // its faults are reported before a window opens
     o->play.live.say = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
     check_suffix(o->play.live.record, ".cgrec", "--record");
     check_suffix(o->play.json, ".json", "--json");

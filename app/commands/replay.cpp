@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: `catgut replay FILE`: plays a recording; with --check, proves that today's program gives the recorded bits.
 #include <cstdio>
 #include <memory>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: `catgut run SCENE`: simulates a scene and checks its expected results.
 #include <fmt/format.h>
 

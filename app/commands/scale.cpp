@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: `catgut bench scale`: scaling with particle count (1, 4, 16 times) and thread count. The paper's
 // substeps and sweeps unless --set says otherwise; every rule is on, and the scripted surgeon begins to work.
 #include <fmt/format.h>
@@ -95,7 +96,7 @@ int bench_scale(const ScaleOptions& o) {
         "|---|---|---|---|---|---|---|---|\n");
     double one = 0;
     for (const Measured& m : all) {
-      const Spread& s = m.run.solver_ms;
+      const Percentiles& s = m.run.solver_ms;
       if (m.threads == 1) one = s.median;
       std::printf("| %zu | %d | %.3f | %.3f | %.3f | %.3f | %.2f | %s |\n", m.run.particles, m.threads, s.median, s.p99, s.max,
                   1000 * s.median / static_cast<double>(m.run.particles), one / s.median, most_expensive(m.run).c_str());

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app: `catgut validate`: what the solver computes beside closed forms and published numbers.
 #include <cstdio>
 #include <memory>

@@ -1,5 +1,6 @@
-// app/window: what was sewn as pictures made of lines: the edge unrolled with every bite on it, and the thread's tension over
-// time. Drawn with ImGui's lists into the space that is left in the panel.
+// SPDX-License-Identifier: Apache-2.0
+// app/window: what was sutured as pictures made of lines: the edge unrolled with every bite on it, and the thread's tension
+// over time. Drawn with ImGui's lists into the space that is left in the panel.
 #pragma once
 #include <imgui.h>
 
@@ -9,16 +10,16 @@
 
 namespace catgut {
 
-enum class BiteColour { spacing, depth, edge };
+enum class BiteColor { spacing, depth, edge };
 
-// Dark blue over grey to yellow (cividis): the same order of lightness for every kind of eye. part: 0..1.
-ImU32 scale_colour(float part, float alpha = 1);
-// What a bite is coloured by, 0..1, and whether it is known.
-float bite_part(const StitchBite& bite, BiteColour by, bool& known);
+// Dark blue over gray to yellow (cividis): the same order of lightness for every kind of eye. part: 0..1.
+ImU32 scale_color(float part, float alpha = 1);
+// What a bite is colored by, 0..1, and whether it is known.
+float bite_part(const StitchBite& bite, BiteColor by, bool& known);
 
 // The edges of all walls side by side, cut open at their start: along the edge to the right, away from it up or down.
-void stitch_map_chart(const StitchMap& map, BiteColour by, ImVec2 size);
-void scale_legend(BiteColour by, float width);
+void stitch_map_chart(const StitchMap& map, BiteColor by, ImVec2 size);
+void scale_legend(BiteColor by, float width);
 
 // from, to: ticks at the left and right end. now: a line there; negative: none.
 void tension_chart(const StitchMap& map, uint64_t from, uint64_t to, double now, ImVec2 size, bool labels);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: the profiler: stage times, constraint forces and live parameters.
 #include <fmt/format.h>
 
@@ -37,7 +38,7 @@ Choice developer_panel(const WorkView& v, bool can_touch) {
       text(fmt::format("{:<16}{:8.3f} N  of {}", force_name(static_cast<ForceKind>(k)), m.peak_n[k], m.constraints[k]));
     gap(0.3f);
     text(kQuiet, can_touch ? "parameters" : "parameters (Esc to edit)");
-    // A slider that is being moved keeps its own value until it is let go: every change builds the model anew.
+    // A slider that is being moved keeps its own value until it is let go: every change builds the model again.
     static std::array<float, kLiveParameters> moved{};
     static int active = -1;
     for (size_t k = 0; k < kLiveParameters; ++k) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: see hands.h.
 #include "window/hands.h"
 

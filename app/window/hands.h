@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: from what was read since the last picture to the hands that are published: mouse and gamepad together.
 #pragma once
 #include <array>
@@ -18,7 +19,7 @@ struct WindowHands {
   uint64_t moved_ns = 0;  // when the newest motion was read
 
   void begin(const PictureModel& picture, const Settings& settings);
-  // After a restart or a bite taken back the hands go on from where the tools are.
+  // After a restart or a bite undone the hands continue from where the tools are.
   void jumped(const PictureModel& picture, const Snapshot& seen, const Settings& settings, bool at_start);
   std::array<ToolInput, 2> move(const WindowInput& in, const Settings& settings, const ViewFrame& view,
                                 const PictureModel& picture, const Snapshot& seen, float dt);

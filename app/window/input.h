@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: what the window's events say, as plain data: for the hands, for the camera, for the panels, for the screens. The
 // only file beside window.cpp that knows SDL.
 #pragma once
@@ -13,7 +14,7 @@
 
 namespace catgut {
 
-// Keys that are told once when they go down.
+// Keys that are reported once when they go down.
 enum class Key {
   none,
   escape,
@@ -75,7 +76,7 @@ class WindowEvents {
   void key(const SDL_KeyboardEvent& e, WindowInput& in);
   void read_pad(GamepadInput& pad) const;
 
-  std::deque<std::pair<Key, int>> keys_;  // with the digit, not told yet
+  std::deque<std::pair<Key, int>> keys_;  // with the digit, not reported yet
   SDL_GameController* pad_ = nullptr;
   std::string pad_name_;
   bool clicked_ = false;  // the left button went down since the panels were last drawn

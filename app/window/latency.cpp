@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: see latency.h.
 #include "window/latency.h"
 
 #include <algorithm>
 #include <cstdio>
 
-#include "runtime/tally.h"
+#include "runtime/metrics_collector.h"
 
 namespace catgut {
 
@@ -24,7 +25,7 @@ void Latency::report(int pictures, double seconds) const {
   if (all_ms_.empty()) return;
   std::fprintf(stderr, "catgut: latency [ms] of %zu motions   median     99 %%    worst\n", all_ms_.size());
   const auto row = [](const char* name, const std::vector<float>& v) {
-    const Spread s = spread_of(v);
+    const Percentiles s = percentiles_of(v);
     std::fprintf(stderr, "catgut:   %-26s %8.1f %8.1f %8.1f\n", name, s.median, s.p99, s.max);
   };
   row("input -> tick", to_tick_ms_);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: how long it takes from a hand's motion to what came of it.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: see lesson_panel.h.
 #include "window/lesson_panel.h"
 
@@ -14,11 +15,11 @@ namespace {
 
 constexpr double kLinger = 1.2;                  // [s] that what was shown stays in sight
 constexpr float kAside = 0.0015f, kDeep = 0.4f;  // [m] from the place, part of the wanted depth: still as it should be
-// Told apart by people who do not see red and green alike.
+// Distinguished by people who do not see red and green alike.
 const ImVec4 kBlue{0.45f, 0.75f, 1.0f, 1}, kOrange{1.0f, 0.66f, 0.25f, 1}, kQuiet{0.78f, 0.84f, 0.83f, 1}, kWhite{1, 1, 1, 1};
 
-void line(const ImVec4& colour, const std::string& text) {
-  ImGui::PushStyleColor(ImGuiCol_Text, colour);
+void line(const ImVec4& color, const std::string& text) {
+  ImGui::PushStyleColor(ImGuiCol_Text, color);
   ImGui::TextWrapped("%s", text.c_str());
   ImGui::PopStyleColor();
 }
@@ -46,7 +47,7 @@ bool LessonRun::look(Live& live, const Snapshot& seen, double wall_s) {
     if (shown_at_ >= 0 && wall_s - shown_at_ > kLinger && live.command(LiveCommand::end_demonstration)) shown_at_ = 1e300;
     return false;
   }
-  if (status.epoch != epoch_) {  // a bite was taken back, or it was begun again
+  if (status.epoch != epoch_) {  // a bite was undone, or it was begun again
     epoch_ = status.epoch;
     step_ = step_from(*lesson_, seen);
   } else {
@@ -113,7 +114,7 @@ void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel
     const float scale = 1 / (view.pixel * deep);
     return ImVec2(0.5f * width + dot(d, view.right) * scale, 0.5f * height - dot(d, view.up) * scale);
   };
-  // The way of the tip: dashed above the tissue and below it alike, so that it is seen through.
+  // The path of the tip: dashed above the tissue and below it alike, so that it is seen through.
   const float half = half_bite(picture, g), from = -half - 0.5f, to = half + 0.6f;
   constexpr int kDashes = 24;
   for (int i = 0; i < kDashes; ++i) {
@@ -131,7 +132,7 @@ void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel
     draw->AddCircle(*p, 7, good ? IM_COL32(115, 190, 255, 255) : IM_COL32(255, 168, 64, 255), 20, 2);
   if (const auto p = at(exit_of(g))) draw->AddCircleFilled(*p, 3, IM_COL32(115, 190, 255, 255));
   if (!inside) return;
-  // Toward the edge the needle goes, or from it: how far from the wanted place, in millimetres, in so many words.
+  // Toward the edge the needle goes, or from it: how far from the wanted place, in millimeters, as text.
   const float depth = seen.active().bite.back().depth;
   const bool deep_enough = std::abs(depth - g.depth) < kDeep * g.depth + 0.0003f;
   ImGui::SetNextWindowPos({width - 8, 0.5f * height}, ImGuiCond_Always, {1, 0.5f});

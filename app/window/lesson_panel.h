@@ -1,5 +1,6 @@
-// app/window: a lesson at the window: which step somebody is at, what to do, and the surgeon who shows it on request. Time and
-// state are runtime/live's, the steps and how they are recognised procedure/lesson's.
+// SPDX-License-Identifier: Apache-2.0
+// app/window: a lesson at the window: which step a user is at, what to do, and the surgeon who shows it on request. Time and
+// state are runtime/live's, the steps and how they are recognized procedure/lesson's.
 #pragma once
 #include <vector>
 
@@ -20,8 +21,8 @@ class LessonRun {
   bool showing() const { return showing_; }
   bool gave_up() const { return gave_up_; }
 
-  void told(const Event& event) { happened_.push_back(event); }
-  // After every look at the field and its events: recognises steps, ends a demonstration that has shown what it should. True:
+  void note_event(const Event& event) { happened_.push_back(event); }
+  // After every look at the field and its events: recognizes steps, ends a demonstration that has shown what it should. True:
   // another step than before.
   bool look(Live& live, const Snapshot& seen, double wall_s);
   // The key: the surgeon shows the step, or stops showing.
@@ -40,7 +41,7 @@ class LessonRun {
 void lesson_panel(const LessonRun& run, bool hints);
 
 // Where the next bite goes and how near the needle is to it, over the picture: the circle that its tip should follow, and,
-// while it is in the tissue, bite distance and depth in words and colours (blue: as it should be, orange: not). size: of the
+// while it is in the tissue, bite distance and depth in words and colors (blue: as it should be, orange: not). size: of the
 // window.
 void guide_overlay(const BiteGuide& guide, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen,
                    float width, float height);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: what a build without pictures (CATGUT_RENDER=OFF) answers.
 #include "core/check.h"
 #include "window/window.h"

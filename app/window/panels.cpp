@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: see panels.h. Start, settings, work and pause; the others have files of their own.
 #include "window/panels.h"
 
@@ -30,8 +31,8 @@ const char* kHints =
     "Esc              pause     F1 hide keys";
 
 void quality_choice(Settings& s) {
-  for (const Quality q : {Quality::draft, Quality::medium, Quality::good}) {
-    if (q != Quality::draft) ImGui::SameLine();
+  for (const Quality q : {Quality::low, Quality::medium, Quality::high}) {
+    if (q != Quality::low) ImGui::SameLine();
     if (radio(quality_name(q), s.quality == q)) s.quality = q;
   }
 }
@@ -188,13 +189,13 @@ void work_panel(const WorkView& v, const Settings& settings) {
     state.push_back({kQuiet, "Settling..."});
   } else {
     const bool slow = s.time_factor > 0 && s.time_factor < 0.93f * s.speed && !s.paused;
-    state.push_back({kQuiet, fmt::format("{}   real-time factor {:.2f}{}", clock_text(s.practice.time_s),
+    state.push_back({kQuiet, fmt::format("{}   real-time factor {:.2f}{}", clock_text(s.metrics.time_s),
                                          s.paused ? 0.0f : s.time_factor, s.speed < 1 && !slow ? "  slow motion" : "")});
     if (slow) state.push_back({kBad, "! below real time"});
     state.push_back({kQuiet, fmt::format("tick {:.1f} ms, {:.1f} fps", s.tick_ms, v.pictures_per_s)});
     if (silent) state.push_back({kQuiet, "exam: no feedback"});
     else
-      for (const std::string& line : technique_lines(*v.scene, *v.seen, s.practice)) state.push_back({kText, line});
+      for (const std::string& line : technique_lines(*v.scene, *v.seen, s.metrics)) state.push_back({kText, line});
     if (!s.doing.empty()) state.push_back({kQuiet, "surgeon: " + s.doing});
   }
   for (size_t k = 0; k < 2; ++k) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: the panels over the picture, drawn with Dear ImGui. They show what they are given and say what was chosen;
 // nothing happens here.
 #pragma once
@@ -33,7 +34,7 @@ struct LogLine {
   bool bad = false;
 };
 
-// What is drawn over the field while somebody works.
+// What is drawn over the field while a user works.
 struct WorkView {
   const SceneSpec* scene = nullptr;
   const LiveStatus* status = nullptr;
@@ -51,13 +52,13 @@ struct WorkView {
 struct ResultView {
   const SceneSpec* scene = nullptr;
   const LiveResult* result = nullptr;
-  std::vector<LogLine> told;    // all that happened, in words
+  std::vector<LogLine> log;     // all that happened, in words
   std::string saved;            // name of the JSON file, or why there is none
-  bool from_recording = false;  // it was looked at, not sewn just now
-  float known = 1;              // part of the recording that was looked through: what is shown is of that part
+  bool from_recording = false;  // it was looked at, not sutured just now
+  float known = 1;              // part of the recording that was scanned: what is shown is of that part
 };
 
-std::vector<LogLine> told_in_words(const StitchMap& map);
+std::vector<LogLine> event_log(const StitchMap& map);
 
 struct PlayedView {
   const SceneSpec* scene = nullptr;
@@ -74,7 +75,7 @@ void work_panel(const WorkView& view, const Settings& settings);
 Choice pause_panel(const WorkView& view);
 // can_touch: the mouse is a pointer now and sliders can be moved.
 Choice developer_panel(const WorkView& view, bool can_touch);
-Choice result_panel(const ResultView& view, BiteColour& by);
+Choice result_panel(const ResultView& view, BiteColor& by);
 Choice view_panel(const PlayedView& view, const Settings& settings);
 
 }  // namespace catgut

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: results: stitch map, thread tension, events, numbers.
 #include <fmt/format.h>
 
@@ -9,17 +10,17 @@
 namespace catgut {
 namespace {
 
-std::string millimetres(float metres) { return metres < 0 ? "-" : fmt::format("{:.1f}", 1000 * metres); }
+std::string millimeters(float meters) { return meters < 0 ? "-" : fmt::format("{:.1f}", 1000 * meters); }
 
-// A number with the colour that its bite has in the map.
-void swatch(const StitchBite& b, BiteColour by, const std::string& number) {
+// A number with the color that its bite has in the map.
+void swatch(const StitchBite& b, BiteColor by, const std::string& number) {
   bool known = false;
   const float part = bite_part(b, by, known);
   const ImVec2 at = ImGui::GetCursorScreenPos();
   const float s = 0.6f * em();
   if (known)
-    ImGui::GetWindowDrawList()->AddRectFilled({at.x, at.y + 0.2f * em()}, {at.x + s, at.y + 0.2f * em() + s},
-                                              scale_colour(part), 2);
+    ImGui::GetWindowDrawList()->AddRectFilled({at.x, at.y + 0.2f * em()}, {at.x + s, at.y + 0.2f * em() + s}, scale_color(part),
+                                              2);
   ImGui::Dummy({s, s});
   ImGui::SameLine(0, 0.4f * em());
   text(number);
@@ -41,31 +42,31 @@ void bite_table(const StitchMap& map) {
     ImGui::TableNextColumn();
     text(kQuiet, fmt::format("{}", b.wall + 1));
     ImGui::TableNextColumn();
-    swatch(b, BiteColour::spacing, millimetres(b.spacing));
+    swatch(b, BiteColor::spacing, millimeters(b.spacing));
     ImGui::TableNextColumn();
-    swatch(b, BiteColour::depth, millimetres(b.depth));
+    swatch(b, BiteColor::depth, millimeters(b.depth));
     ImGui::TableNextColumn();
-    text(millimetres(b.entry_edge) + " / " + millimetres(b.exit_edge));
+    text(millimeters(b.entry_edge) + " / " + millimeters(b.exit_edge));
     ImGui::TableNextColumn();
-    text(millimetres(b.length));
+    text(millimeters(b.length));
   }
   ImGui::EndTable();
 }
 
 // Draws visible lines only: a long session has thousands.
-void event_list(const std::vector<LogLine>& told) {
+void event_list(const std::vector<LogLine>& log) {
   ImGuiListClipper clipper;
-  clipper.Begin(static_cast<int>(told.size()));
+  clipper.Begin(static_cast<int>(log.size()));
   while (clipper.Step())
     for (int i = clipper.DisplayStart; i < clipper.DisplayEnd; ++i) {
-      const LogLine& line = told[static_cast<size_t>(i)];
+      const LogLine& line = log[static_cast<size_t>(i)];
       text(line.bad ? kBad : kQuiet, fmt::format("{:>7} {} {}", clock_text(line.time_s), line.bad ? '!' : ' ', line.text));
     }
 }
 
 }  // namespace
 
-std::vector<LogLine> told_in_words(const StitchMap& map) {
+std::vector<LogLine> event_log(const StitchMap& map) {
   std::vector<LogLine> out;
   for (const Event& e : map.event) {
     LogLine line;
@@ -76,7 +77,7 @@ std::vector<LogLine> told_in_words(const StitchMap& map) {
   return out;
 }
 
-Choice result_panel(const ResultView& v, BiteColour& by) {
+Choice result_panel(const ResultView& v, BiteColor& by) {
   Choice choice;
   const LiveResult& r = *v.result;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
@@ -98,7 +99,7 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   if (ImGui::BeginTable("rows", 2)) {
     ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 10 * em());
     ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch);
-    for (const ResultRow& row : result_rows(*v.scene, r.practice)) {
+    for (const ResultRow& row : result_rows(*v.scene, r.metrics)) {
       ImGui::TableNextRow();
       ImGui::TableNextColumn();
       text(row.name == "fault" ? kBad : kQuiet, (row.name == "fault" ? "! " : "") + row.name);
@@ -110,15 +111,15 @@ Choice result_panel(const ResultView& v, BiteColour& by) {
   gap();
   heading("Events");
   ImGui::BeginChild("events", {0, 0});
-  event_list(v.told);
+  event_list(v.log);
   ImGui::EndChild();
   ImGui::EndChild();
   ImGui::SameLine(0, em());
 
   ImGui::BeginChild("charts", {0, -foot});
   const ImVec2 space = ImGui::GetContentRegionAvail();
-  const std::pair<BiteColour, const char*> kBy[] = {
-      {BiteColour::spacing, "spacing"}, {BiteColour::depth, "depth"}, {BiteColour::edge, "edge distance"}};
+  const std::pair<BiteColor, const char*> kBy[] = {
+      {BiteColor::spacing, "spacing"}, {BiteColor::depth, "depth"}, {BiteColor::edge, "edge distance"}};
   ImGui::AlignTextToFramePadding();
   text(kAccent, "Bites, colored by");
   for (const auto& [what, name] : kBy) {

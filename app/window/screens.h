@@ -1,5 +1,6 @@
-// app/window: which screens there are, what can be chosen on them, and what a key chooses. Pure: plain data in and out; whoever
-// owns the window carries the choices out.
+// SPDX-License-Identifier: Apache-2.0
+// app/window: which screens there are, what can be chosen on them, and what a key chooses. Pure: plain data in and out; a
+// caller that owns the window carries the choices out.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -35,7 +36,7 @@ enum class Chosen {
   go_to,         // which: tick of the recording
   go_by,         // by: so many ticks
   speed,         // of: real time
-  sewn,          // what a recording's hands have sewn
+  sewn,          // what a recording's hands have sutured
   leave_results,
   points,
   hints,

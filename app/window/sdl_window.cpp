@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: see sdl_window.h.
 #include "window/sdl_window.h"
 

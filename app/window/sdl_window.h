@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: SDL and its window.
 #pragma once
 #include <SDL.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: what a person has set, and the small TOML file that keeps it from one day to the next.
 #pragma once
 #include <string>
@@ -6,15 +7,15 @@
 
 namespace catgut {
 
-// How much the program says while somebody sews.
+// How much the program says while a user sews.
 enum class Guidance {
   learn,     // the way that the needle should go, suture points and keys are shown
   practice,  // events appear as messages
-  exam,      // nothing is told or helped until the end
+  exam,      // nothing is reported or helped until the end
 };
 
 struct Settings {
-  Quality quality = Quality::draft;
+  Quality quality = Quality::low;
   Guidance guidance = Guidance::practice;
   bool left_handed = false;    // the needle driver is the left hand's
   bool hold_to_close = false;  // the jaw closes only while the button is down

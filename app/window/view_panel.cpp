@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: the replay viewer's panels: what is shown, and a line of time to go along.
 #include <fmt/format.h>
 
@@ -40,7 +41,7 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
   } else {
     about.push_back({kAccent, "all hashes verified"});
   }
-  for (const std::string& line : technique_lines(*v.scene, *v.seen, v.result->practice))
+  for (const std::string& line : technique_lines(*v.scene, *v.seen, v.result->metrics))
     if (line.find(" N") != std::string::npos || line.find("needle in tissue") != std::string::npos)
       about.push_back({kText, line});
   lines_at("recording", 0, 0, 0.66f, about);

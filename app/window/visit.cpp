@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: see visit.h.
 #include "window/visit.h"
 
@@ -13,8 +14,8 @@ constexpr size_t kMostListed = 40;
 
 }  // namespace
 
-Visit::Visit(const SceneSpec& s, const LiveOptions& options, std::FILE* events, std::function<void(const Event&)> told)
-    : scene(s), live(s, options), watching(!options.surgeon.empty()), events_(events), told_(std::move(told)) {}
+Visit::Visit(const SceneSpec& s, const LiveOptions& options, std::FILE* events, std::function<void(const Event&)> on_event)
+    : scene(s), live(s, options), watching(!options.surgeon.empty()), events_(events), on_event_(std::move(on_event)) {}
 
 void Visit::look() {
   have = live.look(seen);
@@ -24,7 +25,7 @@ void Visit::look() {
 void Visit::take_events() {
   for (Event e; live.event(e);) {
     if (events_) std::fprintf(events_, "%s\n", event_json(e).c_str());
-    if (told_) told_(e);
+    if (on_event_) on_event_(e);
     LogLine line;
     line.text = words_for(e, line.bad);
     line.time_s = static_cast<double>(e.tick) / static_cast<double>(scene.solver.tick_rate);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: a scene from its opening to its end, and a recording that is looked at: what runs, and what of it the screens
 // show.
 #pragma once
@@ -12,11 +13,11 @@
 
 namespace catgut {
 
-// Somebody works, or a surgeon is watched.
+// A user works, or a surgeon is watched.
 struct Visit {
-  // events: everything that happens is written there, a JSON object a line; null: nowhere. told: hears it too, or is empty.
+  // events: everything that happens is written there, a JSON object a line; null: nowhere. reported: hears it too, or is empty.
   // Throws InputError.
-  Visit(const SceneSpec& scene, const LiveOptions& options, std::FILE* events, std::function<void(const Event&)> told);
+  Visit(const SceneSpec& scene, const LiveOptions& options, std::FILE* events, std::function<void(const Event&)> on_event);
 
   void look();  // at the newest picture and what has happened
   LiveResult finish();
@@ -32,7 +33,7 @@ struct Visit {
  private:
   void take_events();
   std::FILE* events_;
-  std::function<void(const Event&)> told_;
+  std::function<void(const Event&)> on_event_;
 };
 
 // A recording. Throws InputError.

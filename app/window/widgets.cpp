@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: see widgets.h.
 #include "window/widgets.h"
 
@@ -46,8 +47,8 @@ void style_panels(float scale) {
 
 void text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
 
-void text(const ImVec4& colour, const std::string& line) {
-  ImGui::PushStyleColor(ImGuiCol_Text, colour);
+void text(const ImVec4& color, const std::string& line) {
+  ImGui::PushStyleColor(ImGuiCol_Text, color);
   text(line);
   ImGui::PopStyleColor();
 }
@@ -96,7 +97,7 @@ void lines_at(const char* name, float x, float y, float alpha, const std::vector
   const float margin = 0.6f * em();
   begin_box(name, {margin + x * (screen.x - 2 * margin - size.x), margin + y * (screen.y - 2 * margin - size.y) - above_bottom},
             size, alpha, kOverlay | ImGuiWindowFlags_NoScrollbar);
-  for (const auto& [colour, line] : lines) text(colour, line);
+  for (const auto& [color, line] : lines) text(color, line);
   ImGui::End();
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: the few things all panels are made of: their look, their places, lines of text, buttons.
 #pragma once
 #include <imgui.h>
@@ -8,14 +9,14 @@
 
 namespace catgut {
 
-// One accent, and orange for what went wrong: told apart by every kind of eye, and what is wrong also has a mark before it.
+// One accent, and orange for what went wrong: distinguished by every kind of eye, and what is wrong also has a mark before it.
 const ImVec4 kText{0.93f, 0.95f, 0.95f, 1}, kQuiet{0.70f, 0.77f, 0.79f, 1}, kAccent{0.45f, 0.80f, 0.98f, 1},
     kBad{1.0f, 0.66f, 0.30f, 1};
 
 void style_panels(float scale);  // once, and when the window or the text size has changed
 
 void text(const std::string& line);
-void text(const ImVec4& colour, const std::string& line);
+void text(const ImVec4& color, const std::string& line);
 void bad_text(const std::string& line);  // orange, after an exclamation mark
 void heading(const std::string& line);
 void gap(float lines = 0.5f);
@@ -27,7 +28,7 @@ bool begin_at(const char* name, float x, float y, float alpha, ImGuiWindowFlags 
 bool begin_box(const char* name, ImVec2 place, ImVec2 size, float alpha, ImGuiWindowFlags more = 0);
 constexpr ImGuiWindowFlags kOverlay = ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
 
-// Lines over the picture, at a place as above. Its size is reckoned from the lines, because a panel that ImGui fits by itself
+// Lines over the picture, at a place as above. Its size is reckoned from the lines, because a panel that ImGui fits on its own
 // is one picture late, which is long where pictures are slow.
 using Line = std::pair<ImVec4, std::string>;
 void lines_at(const char* name, float x, float y, float alpha, const std::vector<Line>& lines, float above_bottom = 0);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: the loop of the window: events, hands, one picture; and the carrying out of what was chosen. Physics has its own
 // thread (runtime/live, runtime/playback) and never waits for this one.
 #include "window/window.h"
@@ -148,7 +149,7 @@ class Window {
         const double left = 1.0 / kMostPictures - (drawn - now);
         if (left > 0) SDL_Delay(static_cast<uint32_t>(1000 * left));
       } else {
-        SDL_Delay(1);  // the driver is behind: hands go on, and the processor is left to it
+        SDL_Delay(1);  // the driver is behind: hands continue, and the processor is left to it
       }
       if (photographed_) break;
     }
@@ -171,8 +172,8 @@ class Window {
     if (live.surgeon.empty() && watch_ && !teach) live.surgeon = "scripted";
     leave();
     visit_ = std::make_unique<Visit>(scene, live, events_, [this](const Event& e) {
-      if (options_.told) options_.told(e);
-      if (lesson_.on()) lesson_.told(e);
+      if (options_.on_event) options_.on_event(e);
+      if (lesson_.on()) lesson_.note_event(e);
     });
     source_ = name;
     places_ = bite_places(scene, visit_->live.picture());
@@ -194,7 +195,7 @@ class Window {
 
   void stage(const PictureModel& picture) {
     renderer_->stage(&picture, settings_.quality);
-    if (coarse_ < 1) renderer_->draw_coarser(coarse_);
+    if (coarse_ < 1) renderer_->set_resolution_scale(coarse_);
     orbit_set_ = false;
     have_last_ = false;
   }
@@ -211,11 +212,11 @@ class Window {
     LiveResult result = visit_->finish();
     made_.insert(made_.end(), result.recorded.begin(), result.recorded.end());
     if (!options_.json.empty()) try {
-        write_output(of_visit(options_.json, opened_), practice_json(visit_->scene, result));
+        write_output(of_visit(options_.json, opened_), session_json(visit_->scene, result));
       } catch (const InputError& error) { message_ = json_fault_ = error.what(); }
     scene_ = visit_->scene;
     result_ = result;
-    results_ = {&scene_, &result_, told_in_words(result.map), "", false, 1};
+    results_ = {&scene_, &result_, event_log(result.map), "", false, 1};
     std::swap(last_, visit_->seen);
     have_last_ = have;
     visit_.reset();
@@ -223,7 +224,7 @@ class Window {
   }
 
   void go(Screen screen) {
-    // While somebody works the mouse is a hand and not a pointer; what it did before the change is nobody's.
+    // While a user works the mouse is a hand and not a pointer; what it did before the change is no one's.
     SDL_SetRelativeMouseMode(screen == Screen::practice && visit_ && !visit_->watching ? SDL_TRUE : SDL_FALSE);
     if (visit_) visit_->live.command(screen == Screen::practice ? LiveCommand::resume : LiveCommand::pause);
     SDL_PumpEvents();
@@ -256,7 +257,7 @@ class Window {
   void carry_out(const Choice& choice) {
     try {
       do_it(choice);
-    } catch (const InputError& error) {  // told where the next thing can be chosen
+    } catch (const InputError& error) {  // reported where the next thing can be chosen
       message_ = error.what();
       if (!visit_ && !viewing_) show_start();
     }
@@ -328,7 +329,7 @@ class Window {
         }
         try {
           const std::string name = free_name("catgut_result_{}.json");
-          write_output(name, practice_json(scene_, *results_.result));
+          write_output(name, session_json(scene_, *results_.result));
           results_.saved = "Saved: " + name;
         } catch (const InputError& error) { results_.saved = error.what(); }
         break;
@@ -355,7 +356,7 @@ class Window {
         if (!viewing_) break;
         viewing_->playback.play(false);
         scene_ = viewing_->playback.scene();
-        results_ = {&scene_, &viewing_->result, told_in_words(viewing_->result.map), "", true, 0};
+        results_ = {&scene_, &viewing_->result, event_log(viewing_->result.map), "", true, 0};
         go(Screen::results);
         break;
       case Chosen::leave_results:
@@ -411,7 +412,7 @@ class Window {
     if (viewing_) {
       const uint64_t known = viewing_->gathered;
       viewing_->look();
-      if (results_.from_recording && known != viewing_->gathered) results_.told = told_in_words(viewing_->result.map);
+      if (results_.from_recording && known != viewing_->gathered) results_.log = event_log(viewing_->result.map);
       const PlaybackStatus& s = viewing_->playback.status();
       const bool whole = s.known >= s.ticks || !s.fault.empty();
       results_.known = whole ? 1 : static_cast<float>(s.known) / static_cast<float>(s.ticks);
@@ -473,7 +474,7 @@ class Window {
     const LiveStatus& status = v.live.status();
     if (status.epoch != v.epoch) {
       v.epoch = status.epoch;
-      hands_.jumped(v.live.picture(), v.seen, settings_, status.practice.time_s == 0);
+      hands_.jumped(v.live.picture(), v.seen, settings_, status.metrics.time_s == 0);
     }
     if (!status.fault.empty() && screen_ == Screen::practice) go(Screen::pause);
     if (lesson_.on() && lesson_.look(v.live, v.seen, wall_seconds()) && events_)
@@ -495,7 +496,7 @@ class Window {
       std::fprintf(events_, "{\"shows\":\"%s\"}\n", lesson_.lesson().step[lesson_.step()].name.c_str());
   }
 
-  // What is shown of how it should be done, as far as somebody wants it.
+  // What is shown of how it should be done, as far as a user wants it.
   void guidance() {
     const Guidance level = settings_.guidance;
     if (lesson_.on()) lesson_panel(lesson_, level != Guidance::exam);
@@ -507,7 +508,7 @@ class Window {
     }
   }
 
-  // Whoever follows the events also wants to know when hands are let in.
+  // A caller that follows the events also wants to know when hands are let in.
   void tell_screen() {
     if (!events_ || !tell_screen_) return;
     if (screen_ == Screen::practice && (!visit_->have || visit_->live.status().settling)) return;
@@ -522,7 +523,7 @@ class Window {
     const std::string& wanted = options_.screen;
     if (visit_) {
       const LiveStatus& s = visit_->live.status();
-      if (!visit_->have || s.settling || s.practice.time_s < options_.at) return;
+      if (!visit_->have || s.settling || s.metrics.time_s < options_.at) return;
       if (wanted == "pause") go(Screen::pause);
       if (wanted == "results") carry_out({Chosen::finish});
       developer_ = wanted == "developer";
@@ -542,7 +543,7 @@ class Window {
       return start_panel({&scenes_, &recordings_, message_, events_in_.pad_name(), !options_.live.surgeon.empty()}, settings_,
                          watch_);
     if (screen_ == Screen::settings) return settings_panel(settings_, short_name(settings_path()), message_, visit_ != nullptr);
-    if (screen_ == Screen::results) { return result_panel(results_, coloured_by_); }
+    if (screen_ == Screen::results) { return result_panel(results_, colored_by_); }
     Settings shown = settings_;
     if (height_ < 480) shown.hints = false, shown.guidance = std::max(shown.guidance, Guidance::practice);
     if (viewing_ && viewing_->have) {
@@ -585,11 +586,10 @@ class Window {
   // picture that is kept may take its time.
   void coarser_if_slow() {
     const float least = std::clamp(180.0f / static_cast<float>(height_), 0.25f, 1.0f);
-    if (!(visit_ || viewing_) || settings_.quality != Quality::draft || coarse_ <= least || !options_.screenshot.empty())
-      return;
+    if (!(visit_ || viewing_) || settings_.quality != Quality::low || coarse_ <= least || !options_.screenshot.empty()) return;
     if (++pictures_so_ < 12 || picture_s_ < picture_count_ * kSlowPicture) return;
     coarse_ = std::max(least, 0.7f * coarse_);
-    renderer_->draw_coarser(coarse_);
+    renderer_->set_resolution_scale(coarse_);
     pictures_so_ = 0;
     picture_s_ = picture_count_ = 0;
   }
@@ -615,14 +615,14 @@ class Window {
   SceneSpec scene_;  // of the results
   LiveResult result_;
   ResultView results_;
-  BiteColour coloured_by_ = BiteColour::spacing;
+  BiteColor colored_by_ = BiteColor::spacing;
   Snapshot last_;  // behind the results
   bool have_last_ = false;
   WindowHands hands_;
   BitePlaces places_;
   LessonRun lesson_;
   Orbit orbit_;
-  bool orbit_set_ = false;  // false: chosen anew with the next snapshot
+  bool orbit_set_ = false;  // false: chosen again with the next snapshot
   Latency latency_;
   double picture_s_ = 0, picture_count_ = 0;  // lately
   float coarse_ = 1;                          // of the window's pixels each way

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: the simulator that people sit down at: a window, screens to choose, practice, pause and look back, and hands by
 // mouse, keyboard and gamepad.
 #pragma once
@@ -11,7 +12,7 @@
 
 namespace catgut {
 
-// What somebody at the window sees and has in hand, after a picture in which hands were let in.
+// What a user at the window sees and has in hand, after a picture in which hands were let in.
 struct WindowLook {
   const Snapshot& seen;
   const ViewFrame& view;
@@ -25,7 +26,7 @@ struct PlayOptions {
   std::string scene;  // opens straight into it; empty: the start screen
   std::string view;   // or a recording, to look at
   LiveOptions live;
-  Quality quality = Quality::draft;
+  Quality quality = Quality::low;
   bool quality_given = false;
   int width = 1280, height = 720;
   bool left_handed = false;
@@ -35,12 +36,12 @@ struct PlayOptions {
   int after = 60;          // pictures before it
   std::string screen;  // that is in it: start, settings, practice, pause, developer, results, view; empty: whatever is there
   double at = 0;       // [s] of the work, or of the recording, that it shows
-  std::string json;    // what was sewn, written when a scene is left; "-"
-  double seconds = 0;  // [s] of wall time, then quit; 0: until somebody quits
-  // For whoever looks on from within the program (a test that sits at the window): every such picture, false closes the window;
-  // and every event.
+  std::string json;    // what was sutured, written when a scene is left; "-"
+  double seconds = 0;  // [s] of wall time, then quit; 0: until a user quits
+  // For a caller that looks on from within the program (a test that sits at the window): every such picture, false closes the
+  // window; and every event.
   std::function<bool(const WindowLook&)> watch;
-  std::function<void(const Event&)> told;
+  std::function<void(const Event&)> on_event;
   int stall_ms = 0;  // for tests: the loop stands still so long, every two seconds
 };
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: see words.h.
 #include "window/words.h"
 
@@ -84,11 +85,11 @@ std::string words_for(const Event& e, bool& bad) {
       return fmt::format("needle entered, {:.0f}\u00b0 from surface normal", std::min(e.value, kPi - e.value) * 180 / kPi);
     case EventKind::tip_exited:
       return "needle tip exited";
-    case EventKind::bite_cancelled:
+    case EventKind::bite_withdrawn:
       return "needle withdrawn";
     case EventKind::bite_completed:
       return fmt::format("bite completed, {:.1f} mm", 1000 * e.value);
-    case EventKind::order_broken:
+    case EventKind::bite_out_of_order:
       bad = true;
       return "bite out of order";
     case EventKind::ring_complete:
@@ -97,25 +98,25 @@ std::string words_for(const Event& e, bool& bad) {
       return "closure started";
     case EventKind::closure_finished:
       return "closure complete";
-    case EventKind::thread_ran_out:
+    case EventKind::thread_exhausted:
       bad = true;
       return "thread exhausted";
     case EventKind::loop_formed:
       return fmt::format("{} on {}", counted(static_cast<int>(e.which), "wrap"), tool);
     case EventKind::loop_rejected:
       return loop_words(e.reason);
-    case EventKind::knot_begun:
+    case EventKind::throw_started:
       return fmt::format("throw started, {}", counted(static_cast<int>(std::lround(e.value)), "wrap"));
-    case EventKind::knot_locked:
+    case EventKind::throw_locked:
       return fmt::format("throw locked at {:.1f} N", e.value);
-    case EventKind::knot_cancelled:
+    case EventKind::throw_undone:
       bad = true;
       return "throw undone";
     case EventKind::thread_cut:
       return "thread cut";
-    case EventKind::suture_taken:
+    case EventKind::suture_loaded:
       return "new suture loaded";
-    case EventKind::stitch_settled:
+    case EventKind::suture_baked:
       return "suture finished";
     case EventKind::seam_closed:
       return fmt::format("edges approximated, gap {:.1f} mm", 1000 * e.value);
@@ -136,24 +137,24 @@ std::string words_for(const Event& e, bool& bad) {
   }
 }
 
-std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot& seen, const Practice& practice) {
+std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot& seen, const SessionMetrics& metrics) {
   std::vector<std::string> lines;
   const std::string& name = scene.technique.name;
   if (name == "purse_string") {
-    lines.push_back(fmt::format("bites {} of {}", practice.bites, scene.technique.min_bites));
-    if (practice.opening_start > 0)
-      lines.push_back(fmt::format("opening {:.0f} %", 100 * practice.opening / practice.opening_start));
+    lines.push_back(fmt::format("bites {} of {}", metrics.bites, scene.technique.min_bites));
+    if (metrics.opening_start > 0)
+      lines.push_back(fmt::format("opening {:.0f} %", 100 * metrics.opening / metrics.opening_start));
   } else {
-    lines.push_back(fmt::format("bites {}", practice.bites));
+    lines.push_back(fmt::format("bites {}", metrics.bites));
   }
   if (!seen.active().seam.empty()) {
     float worst = 1;
     for (const SeamView& s : seen.active().seam) worst = std::min(worst, s.progress);
     lines.push_back(fmt::format("approximation {:.0f} %", 100 * worst));
   }
-  if (practice.throws > 0) lines.push_back(fmt::format("knots {}, throws {}", practice.knots, practice.throws));
-  if (practice.faults_in_all > 0) lines.push_back(fmt::format("faults {}", practice.faults_in_all));
-  if (seen.active().needle.in_tissue) lines.push_back(fmt::format("bite {}: needle in tissue", practice.bites + 1));
+  if (metrics.throws > 0) lines.push_back(fmt::format("knots {}, throws {}", metrics.knots, metrics.throws));
+  if (metrics.faults_in_all > 0) lines.push_back(fmt::format("faults {}", metrics.faults_in_all));
+  if (seen.active().needle.in_tissue) lines.push_back(fmt::format("bite {}: needle in tissue", metrics.bites + 1));
   for (size_t k = 0; k < 2; ++k) {
     static constexpr const char* kHeld[] = {"", "needle", "thread", "tissue"};
     const ToolView& tool = seen.tool[k];
@@ -165,7 +166,7 @@ std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot&
   return lines;
 }
 
-std::vector<ResultRow> result_rows(const SceneSpec& scene, const Practice& p) {
+std::vector<ResultRow> result_rows(const SceneSpec& scene, const SessionMetrics& p) {
   std::vector<ResultRow> rows;
   const bool purse_string = scene.technique.name == "purse_string";
   const auto both = [](const char* unit, double holder, double forceps, int digits) {
@@ -174,12 +175,12 @@ std::vector<ResultRow> result_rows(const SceneSpec& scene, const Practice& p) {
   rows.push_back({"time", clock_text(p.time_s)});
   rows.push_back({"bites", purse_string ? fmt::format("{} (minimum {})", p.bites, scene.technique.min_bites)
                                         : fmt::format("{}", p.bites)});
-  rows.push_back({"needle withdrawals", fmt::format("{}", p.bites_cancelled)});
+  rows.push_back({"needle withdrawals", fmt::format("{}", p.bites_withdrawn)});
   if (p.opening_start > 0 && purse_string)
     rows.push_back({"residual opening", fmt::format("{:.0f} %", 100 * p.opening / p.opening_start)});
   rows.push_back({"knots, throws", fmt::format("{}, {}", p.knots, p.throws)});
   rows.push_back({"cuts", fmt::format("{}", p.cuts)});
-  rows.push_back({"finished sutures", fmt::format("{}", p.stitches_settled)});
+  rows.push_back({"finished sutures", fmt::format("{}", p.sutures_baked)});
   rows.push_back({"needle slips", fmt::format("{}", p.needle_slips)});
   rows.push_back({"path length", both("m", static_cast<double>(p.path[0]), static_cast<double>(p.path[1]), 2)});
   rows.push_back({"peak force", both("N", static_cast<double>(p.peak_force[0]), static_cast<double>(p.peak_force[1]), 1)});

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // app/window: texts of events, progress and results. Pure: plain data in, text out.
 #pragma once
 #include <string>
 #include <vector>
 
 #include "exchange/snapshot.h"
-#include "runtime/practice.h"
+#include "runtime/session_metrics.h"
 #include "sim/scene.h"
 
 namespace catgut {
@@ -16,12 +17,12 @@ std::string clock_text(double seconds);
 std::string words_for(const Event& event, bool& bad);
 
 // Progress of the technique, a few short lines.
-std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot& seen, const Practice& practice);
+std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot& seen, const SessionMetrics& metrics);
 
 struct ResultRow {
   std::string name, value;
 };
-std::vector<ResultRow> result_rows(const SceneSpec& scene, const Practice& practice);
+std::vector<ResultRow> result_rows(const SceneSpec& scene, const SessionMetrics& metrics);
 
 // One JSON object on one line.
 std::string event_json(const Event& event);

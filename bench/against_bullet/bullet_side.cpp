@@ -1,5 +1,6 @@
-// bench/against_bullet: see bullet_side.h. Lengths are centimetres here: Bullet adds fixed small numbers (1e-4 in the moments
-// of a cluster) that are nothing beside lengths near 1 and too much beside millimetres in metres.
+// SPDX-License-Identifier: Apache-2.0
+// bench/against_bullet: see bullet_side.h. Lengths are centimeters here: Bullet adds fixed small numbers (1e-4 in the moments
+// of a cluster) that are nothing beside lengths near 1 and too much beside millimeters in meters.
 #include "bullet_side.h"
 
 #include <BulletSoftBody/btSoftBody.h>
@@ -13,11 +14,11 @@
 namespace catgut {
 namespace {
 
-constexpr float kCentimetres = 100;
+constexpr float kCentimeters = 100;
 constexpr int kTool = 1, kTissue = 2, kThread = 4, kDrape = 8;  // collision groups
 constexpr float kMatching = 0.1f;  // of a cluster: they are not averaged, and 14 of them move every particle
 
-btVector3 scaled(Vec3 p) { return {p.x * kCentimetres, p.y * kCentimetres, p.z * kCentimetres}; }
+btVector3 scaled(Vec3 p) { return {p.x * kCentimeters, p.y * kCentimeters, p.z * kCentimeters}; }
 
 btTransform placed(const Pose& pose, const Capsule& capsule) {
   const Vec3 a = transform(pose, capsule.a), b = transform(pose, capsule.b);
@@ -62,12 +63,12 @@ struct BulletSide::World {
     thread_info.m_gravity = scaled(m.gravity);
 
     for (const Capsule& c : m.body[0].capsule) {
-      shape.push_back(std::make_unique<btCapsuleShape>(c.radius * kCentimetres, distance(c.a, c.b) * kCentimetres));
+      shape.push_back(std::make_unique<btCapsuleShape>(c.radius * kCentimeters, distance(c.a, c.b) * kCentimeters));
       add_rigid(placed(tool_pose(work, 0), c), kTool, kTissue | kThread);
     }
     capsules = rigid.size();
     shape.push_back(std::make_unique<btBoxShape>(btVector3(100, 1, 100)));
-    add_rigid(btTransform(btQuaternion::getIdentity(), btVector3(0, m.ground * kCentimetres - 1, 0)), kDrape, kThread);
+    add_rigid(btTransform(btQuaternion::getIdentity(), btVector3(0, m.ground * kCentimeters - 1, 0)), kDrape, kThread);
 
     // What is not connected makes soft bodies of its own: Bullet's tree of faces never ends for a body in two parts.
     node_of.assign(m.tissue, -1);
@@ -99,7 +100,7 @@ struct BulletSide::World {
     }
     soft.push_back(std::make_unique<btSoftBody>(&info, static_cast<int>(at.size()), at.data(), mass.data()));
     btSoftBody& body = *soft.back();
-    body.getCollisionShape()->setMargin(margin * kCentimetres);
+    body.getCollisionShape()->setMargin(margin * kCentimeters);
     body.m_cfg.piterations = 3;
     body.m_cfg.kKHR = 1;  // a tool that is moved does not sink in
     body.m_cfg.collisions = btSoftBody::fCollision::SDF_RS;
@@ -204,7 +205,7 @@ double BulletSide::carried_off() const {
   world_->each_tissue_node([&](btSoftBody::Node& n, const btVector3& at) {
     if (n.m_im > 0) sum += static_cast<double>((n.m_x - at).length()), ++count;
   });
-  return sum / count / static_cast<double>(kCentimetres);
+  return sum / count / static_cast<double>(kCentimeters);
 }
 
 size_t BulletSide::contacts() const {

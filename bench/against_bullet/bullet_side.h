@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bench/against_bullet: a workload in Bullet's soft bodies.
 #pragma once
 #include <memory>
@@ -7,7 +8,7 @@
 namespace catgut {
 
 enum class BulletWay {
-  clusters,        // shape matching of one cluster a particle: itself and its neighbours
+  clusters,        // shape matching of one cluster a particle: itself and its neighbors
   fewer_clusters,  // the same without clusters that have the same members as another, which Catgut leaves out too
   links            // links along the edges, and contact of vertices with faces between soft bodies
 };

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bench/against_bullet: Catgut and Bullet's soft bodies given the same tissue, thread, pins, gravity, tool and substeps, in one
 // program and tick by tick in turns, so that a processor that changes its clock or is shared does it to all alike.
 // docs/benchmarks.md says what each side really simulates.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bench/against_bullet: see workload.h.
 #include "workload.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bench/against_bullet: the work that both sides are given: one of Catgut's own scenes, its particles, clusters, pins and
 // thread, and a tool that presses the wall in and lets it go again once a second.
 #pragma once

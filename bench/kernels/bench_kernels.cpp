@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bench/kernels: the solver's kernels one by one, on states from the middle of the work of a small scene and of a large one.
 // Time per item (a cluster, a particle, a pair ...) is what to compare; a kernel that changes its input gets the same input
 // every time.
@@ -177,7 +178,7 @@ void TissuePairsFound(benchmark::State& bench) {
                           s.state->scratch.candidates.tissue, jobs);
       });
 }
-// Whether they have to be found anew.
+// Whether they have to be found again.
 void TissueMovesLookedAt(benchmark::State& bench) {
   Sewn& s = scene(bench.range(0));
   const SolverModel& m = s.model->solver;
@@ -223,12 +224,12 @@ void Pins(benchmark::State& bench) {
   const SolverModel& m = s.model->solver;
   SolverState& state = s.state->solver;
   SolverScratch& k = s.state->scratch;
-  const std::vector<TissuePin> pin = state.pin;
-  weave(state.pin, m.inv_mass.data(), m.tissue, k.web);
+  const std::vector<Tether> pin = state.pin;
+  build_graph(state.pin, m.inv_mass.data(), m.tissue, k.web);
   measure(
       bench, pin.size() * static_cast<size_t>(m.pin_sweeps), kName[bench.range(0)],
       [&] { state.x = s.predicted, state.pin = pin; },
-      [&] { solve_pins(state.pin, k.web, state.x.data(), m.h, m.pin_sweeps, m.pin_tolerance, k.pin_span); });
+      [&] { solve_tethers(state.pin, k.web, state.x.data(), m.h, m.pin_sweeps, m.pin_tolerance, k.pin_span); });
   state.pin = pin;
 }
 void WholeSubstep(benchmark::State& bench) {
@@ -241,7 +242,7 @@ void WholeSubstep(benchmark::State& bench) {
   s.state->solver = before;
 }
 
-// An empty stage of four blocks: what it costs to share one out and to wait for it. Workers on a busy machine wait long.
+// An empty stage of four blocks: its cost to share one out and to wait for it. Workers on a busy machine wait long.
 void ForkJoin(benchmark::State& bench) {
   Jobs jobs(static_cast<int>(bench.range(0)));
   for (auto _ : bench) jobs.each(4, 1, [](size_t first, size_t) { benchmark::DoNotOptimize(first); });

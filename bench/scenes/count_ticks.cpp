@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bench/scenes: ticks whose instructions are counted. On a shared machine times swing by tens of per cent; instructions do not.
 //   count_ticks write DIR   sews every scene as far as is needed, at full speed, and keeps some ticks of each moment below as a
 //                           small recording: the state before them and the hands
@@ -38,8 +39,8 @@ struct Scene {
 const std::vector<Scene> kScenes{
     {"purse_string", {{"rest", {}, 0, 12}, {"bite", EventKind::tip_entered, 3, 6}, {"draw", EventKind::bite_completed, 3, 60}}},
     {"connell", {{"rest", {}, 0, 12}, {"bite", EventKind::tip_entered, 3, 6}, {"draw", EventKind::bite_completed, 3, 60}}},
-    {"stay", {{"rest", {}, 0, 12}, {"bite", EventKind::tip_entered, 1, 6}, {"knot", EventKind::knot_begun, 1, 6}}},
-    {"lembert", {{"rest", {}, 0, 12}, {"bite", EventKind::tip_entered, 1, 6}, {"knot", EventKind::knot_begun, 1, 6}}},
+    {"stay", {{"rest", {}, 0, 12}, {"bite", EventKind::tip_entered, 1, 6}, {"knot", EventKind::throw_started, 1, 6}}},
+    {"lembert", {{"rest", {}, 0, 12}, {"bite", EventKind::tip_entered, 1, 6}, {"knot", EventKind::throw_started, 1, 6}}},
 };
 
 std::string file_of(const std::string& folder, const Scene& scene, const Moment& moment) {

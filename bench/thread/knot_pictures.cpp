@@ -41,7 +41,7 @@ int main(int argc, char** argv) {
       for (uint32_t i = 0; i < s.segments(); ++i)
         if (!s.broken[i])
           capsules.push_back(
-              {s.position(i), s.position(i + 1), r, i < t.knot.load_a ? Colour{70, 120, 215, 255} : Colour{214, 160, 60, 255}});
+              {s.position(i), s.position(i + 1), r, i < t.knot.load_a ? Color{70, 120, 215, 255} : Color{214, 160, 60, 255}});
       // In the middle of what touches.
       Vec3 middle{};
       float count = 0;

@@ -20,7 +20,7 @@
 //       catgut::publish(*model, *state, seen);
 //     }
 //     std::printf("%.1f s: %s\n", seen.time_s, surgeon->doing().c_str());
-//     return catgut::state_is_sane(*model, *state) ? 0 : 1;
+//     return catgut::state_is_valid(*model, *state) ? 0 : 1;
 //   }
 //
 // Build it, with an installed Catgut (samples/embed is this program with its CMakeLists.txt):
@@ -31,7 +31,7 @@
 // The target carries compiler flags (-ffp-contract=off among them). Inline functions of these headers are compiled in your
 // program too, and its bits equal those of other programs only with the same flags.
 //
-// Units and frames. SI: metres, kilograms, seconds, newtons, radians. Right-handed: x to the right, y up, z toward the surgeon.
+// Units and frames. SI: meters, kilograms, seconds, newtons, radians. Right-handed: x to the right, y up, z toward the surgeon.
 // A pose is a position and a unit quaternion (x, y, z, w). Instrument frame: see exchange/tool_input.h.
 //
 // Time. One call of `step` is one tick of 1 / scene.solver.tick_rate seconds. Nothing here reads a clock. The same scene and

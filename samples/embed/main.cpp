@@ -18,5 +18,5 @@ int main() {
     catgut::publish(*model, *state, seen);
   }
   std::printf("%.1f s: %s\n", seen.time_s, surgeon->doing().c_str());
-  return catgut::state_is_sane(*model, *state) ? 0 : 1;
+  return catgut::state_is_valid(*model, *state) ? 0 : 1;
 }

@@ -1,4 +1,5 @@
-// anatomy: a soft body at rest, whoever made it (the bowel generator or the import of an organ surface).
+// SPDX-License-Identifier: Apache-2.0
+// anatomy: a soft body at rest, a caller that made it (the bowel generator or the import of an organ surface).
 // Particles, clusters and surface are what the solver moves; the visible mesh is what the picture shows.
 #pragma once
 #include <array>
@@ -19,13 +20,13 @@ struct Rim {
 
 struct BodyRest {
   std::string name;
-  std::vector<Vec3> position;   // [m] one per particle, neighbours close in memory (space-filling or lattice order)
+  std::vector<Vec3> position;   // [m] one per particle, neighbors close in memory (space-filling or lattice order)
   std::vector<float> mass;      // [kg]
   std::vector<uint8_t> pinned;  // 1: held by the surroundings, never moves
   std::vector<TissueLayer>
       layer;         // serosa: outer side of the wall, mucosa: inner side; the other way round where it is everted
   float radius = 0;  // [m] contact radius of a particle
-  std::vector<std::vector<uint32_t>> cluster;  // cluster c is centred on particle c; first member is c; at most 16 members
+  std::vector<std::vector<uint32_t>> cluster;  // cluster c is centered on particle c; first member is c; at most 16 members
   std::vector<Tet> tet;                        // the wall's volume
   std::vector<Triangle> surface;               // watertight, particle indices, counter-clockwise seen from outside the tissue
   std::vector<Rim> rim;                        // openings; rim[w] with w < walls is where the procedure works on wall w

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // anatomy/bowel: builds the tube ring by ring and hands the sheet to the wall. Reads a BowelShape.
 #include "anatomy/bowel.h"
 

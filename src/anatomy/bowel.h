@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // anatomy/bowel: makes a piece of large bowel at rest: a tube with a wall, sacculations (haustra) between longitudinal bands
 // (taeniae), serosa outside and mucosa inside, open or closed ends. No mesh from outside is needed.
 #pragma once
@@ -17,14 +18,14 @@ struct BowelShape {
   bool closed_end = false;       // near end (where the procedure works) closed by a dome
   float haustra = 0.0008f;       // [m] depth of folds and bands; fades out toward both ends, so that a rim is a true circle
   int taeniae = 3;               // longitudinal bands, 0..12
-  Vec3 position;                 // [m] centre of the near end's rim (closed: the top of its dome)
+  Vec3 position;                 // [m] center of the near end's rim (closed: the top of its dome)
   Vec3 axis{0, 1, 0};            // the way the near end faces; need not be of unit length
   float density = 1050;          // [kg/m^3]
   float pinned_length = 0.008f;  // [m] of the far end that the surroundings hold; 0 holds nothing
   float inner_radius = 0;        // [m] outer radius of a second tube inside the first; 0: none
 };
 
-// Particles run ring by ring from the near end; a place on the sheet is two neighbouring particles, outer (even index) then
+// Particles run ring by ring from the near end; a place on the sheet is two neighboring particles, outer (even index) then
 // inner (odd index). rim[0] is the near end, rim[1] the far end, as far as they are open; a rim runs counter-clockwise seen
 // from outside its opening. visible: about 20,000 vertices whose outer side passes through the outer particles.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // anatomy/bowel_surface: the smooth parametric surface of a bowel that particles and picture share.
 #include "anatomy/bowel_surface.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // anatomy/bowel_surface: the smooth outer surface of the generated bowel as a function of two numbers: s, the way along the
 // profile from the near end [m], and the angle round the axis [rad]. Particles and picture are both sampled from it.
 #pragma once

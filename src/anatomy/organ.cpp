@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // anatomy/organ: reads an organ's surface from a file and makes a soft body of it. See the header for the steps.
 #include "anatomy/organ.h"
 
@@ -70,23 +71,23 @@ std::vector<Vec3> place(TriangleMesh& mesh, const OrganImport& o) {
                      fmt::format("choose 0 to {}", rims.size() - 1));
   }
   if (rims.empty() && o.rim >= 0) throw InputError(o.name, o.mesh + " is closed and has no rim to choose", "leave rim out");
-  Vec3 centre;
+  Vec3 center;
   Quat turn;
   if (rims.empty()) {
     double area = 0;
     for (const Triangle& t : mesh.triangle) {
       const Vec3 a = mesh.position[t[0]], b = mesh.position[t[1]], c = mesh.position[t[2]];
       const float w = length(cross(b - a, c - a));
-      centre += (a + b + c) * (w / 3);
+      center += (a + b + c) * (w / 3);
       area += w;
     }
-    centre = centre / static_cast<float>(area);
+    center = center / static_cast<float>(area);
   } else {
     const auto p = points(mesh, rims[wanted]);
-    centre = loop_centre(p);
+    center = loop_center(p);
     turn = turn_onto(loop_normal(p), normalized(o.axis));
   }
-  for (Vec3& p : mesh.position) p = o.position + rotate(turn, p - centre);
+  for (Vec3& p : mesh.position) p = o.position + rotate(turn, p - center);
   return rims.empty() ? std::vector<Vec3>{} : points(mesh, rims[wanted]);
 }
 
@@ -106,9 +107,9 @@ Loop find_rim(const TriangleMesh& sheet, const std::vector<Vec3>& chosen) {
   return best;
 }
 
-// Renumbers ring by ring outward from `start`: the solver reads neighbours from neighbouring memory.
+// Renumbers ring by ring outward from `start`: the solver reads neighbors from neighboring memory.
 TriangleMesh in_rings(const TriangleMesh& sheet, const Loop& start) {
-  const auto next = vertex_neighbours(sheet.triangle, sheet.position.size());
+  const auto next = vertex_neighbors(sheet.triangle, sheet.position.size());
   std::vector<uint32_t> order = start, number(sheet.position.size(), ~0u);
   for (uint32_t i = 0; i < order.size(); ++i) number[order[i]] = i;
   for (size_t head = 0; head < order.size(); ++head) {
@@ -129,7 +130,7 @@ TriangleMesh in_rings(const TriangleMesh& sheet, const Loop& start) {
 
 // [m] of each vertex from `start` along edges (Dijkstra).
 std::vector<float> way_from(const TriangleMesh& sheet, const Loop& start) {
-  const auto next = vertex_neighbours(sheet.triangle, sheet.position.size());
+  const auto next = vertex_neighbors(sheet.triangle, sheet.position.size());
   std::vector<float> way(sheet.position.size(), 3e38f);
   std::set<std::pair<float, uint32_t>> open;
   for (uint32_t v : start) open.insert({way[v] = 0, v});
@@ -156,7 +157,7 @@ std::vector<float> ease_along(const TriangleMesh& sheet, std::vector<float> alon
     for (uint32_t v : rim) mean += along[v] / static_cast<float>(rim.size());
     for (uint32_t v : rim) along[v] = mean, fixed[v] = 1;
   }
-  const auto next = vertex_neighbours(sheet.triangle, along.size());
+  const auto next = vertex_neighbors(sheet.triangle, along.size());
   constexpr int sweeps = 400;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     for (size_t v = 0; v < along.size(); ++v) {

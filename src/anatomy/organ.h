@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // anatomy/organ: makes a soft body at rest from the surface of an organ in a mesh file.
 #pragma once
 #include <string>
@@ -8,11 +9,11 @@ namespace catgut {
 
 struct OrganImport {
   std::string name = "organ";
-  std::string mesh;              // path[#node] of a .glb, .gltf, .obj or .stl in metres
+  std::string mesh;              // path[#node] of a .glb, .gltf, .obj or .stl in meters
   int particles = 1228;          // exact; odd counts get one particle at mid-wall
   float wall = 0.0025f;          // [m] thickness, built inward from the file's surface
   int rim = -1;                  // opening the procedure works on: 0 the longest, 1 the next ...; -1 the longest
-  Vec3 position;                 // [m] where that rim's centre goes (no opening: the middle of the surface)
+  Vec3 position;                 // [m] where that rim's center goes (no opening: the middle of the surface)
   Vec3 axis{0, 1, 0};            // the way the rim is made to face (no opening: unused, the file's attitude is kept)
   float density = 1050;          // [kg/m^3]
   float pinned_length = 0.008f;  // [m] held by the surroundings, see below; 0 holds nothing

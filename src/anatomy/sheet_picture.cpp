@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // anatomy/sheet_picture: the visible mesh of a body made from a triangulated sheet.
 #include "anatomy/sheet_picture.h"
 
@@ -68,7 +69,7 @@ Vec3 blend(const Sample& s, std::span<const Vec3> value) {
 }
 
 // Phong tessellation (Boubekeur and Alexa 2008): the flat place pulled toward the tangent planes of its corners. It passes
-// through the corners, and along an edge depends only on that edge, so neighbours meet.
+// through the corners, and along an edge depends only on that edge, so neighbors meet.
 Vec3 curved(const Sample& s, std::span<const Vec3> position, std::span<const Vec3> normal) {
   const Vec3 flat = blend(s, position);
   Vec3 pull;
@@ -87,13 +88,13 @@ class MiddleLine {
     const size_t bins = std::clamp<size_t>(static_cast<size_t>(end / 0.012f), 1, 100);
     step_ = std::max(end, 1e-6f) / static_cast<float>(bins);
     std::vector<float> count(bins, 0), radius(bins, 0);
-    centre_.resize(bins);
+    center_.resize(bins);
     const auto bin = [&](size_t v) { return std::min(bins - 1, static_cast<size_t>(std::max(along[v], 0.0f) / step_)); };
-    for (size_t v = 0; v < along.size(); ++v) centre_[bin(v)] += sheet.position[v], count[bin(v)] += 1;
-    for (size_t i = 0; i < bins; ++i) centre_[i] = count[i] > 0 ? centre_[i] / count[i] : i > 0 ? centre_[i - 1] : Vec3{};
+    for (size_t v = 0; v < along.size(); ++v) center_[bin(v)] += sheet.position[v], count[bin(v)] += 1;
+    for (size_t i = 0; i < bins; ++i) center_[i] = count[i] > 0 ? center_[i] / count[i] : i > 0 ? center_[i - 1] : Vec3{};
     double mean = 0;
     for (size_t v = 0; v < along.size(); ++v)
-      mean += distance(sheet.position[v], centre_[bin(v)]) / static_cast<double>(along.size());
+      mean += distance(sheet.position[v], center_[bin(v)]) / static_cast<double>(along.size());
     mean_radius_ = static_cast<float>(mean);
     Vec3 e1 = any_perpendicular(direction(0));
     for (size_t i = 0; i < bins; ++i) {
@@ -106,19 +107,19 @@ class MiddleLine {
   float mean_radius() const { return mean_radius_; }
   // 0..1 round the line
   float turn(Vec3 p, float along) const {
-    const float at = std::clamp(along / step_ - 0.5f, 0.0f, static_cast<float>(centre_.size() - 1));
-    const size_t i = static_cast<size_t>(at), j = std::min(i + 1, centre_.size() - 1);
+    const float at = std::clamp(along / step_ - 0.5f, 0.0f, static_cast<float>(center_.size() - 1));
+    const size_t i = static_cast<size_t>(at), j = std::min(i + 1, center_.size() - 1);
     const float t = at - static_cast<float>(i);
-    const Vec3 d = p - lerp(centre_[i], centre_[j], t);
+    const Vec3 d = p - lerp(center_[i], center_[j], t);
     return portable::atan2(dot(d, lerp(e2_[i], e2_[j], t)), dot(d, lerp(e1_[i], e1_[j], t))) / (2 * kPi) + 0.5f;
   }
 
  private:
   Vec3 direction(size_t i) const {
-    const size_t a = i > 0 ? i - 1 : 0, b = std::min(i + 1, centre_.size() - 1);
-    return normalized(centre_[b] - centre_[a], Vec3{0, -1, 0});
+    const size_t a = i > 0 ? i - 1 : 0, b = std::min(i + 1, center_.size() - 1);
+    return normalized(center_[b] - center_[a], Vec3{0, -1, 0});
   }
-  std::vector<Vec3> centre_, e1_, e2_;
+  std::vector<Vec3> center_, e1_, e2_;
   float step_ = 0, mean_radius_ = 0;
 };
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // anatomy/sheet_picture: the visible mesh of a body that was thickened from a triangle sheet.
 #pragma once
 #include <span>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // anatomy/wall: thickens a sheet into a wall of particles, clusters, tetrahedra and a watertight surface.
 #include "anatomy/wall.h"
 
@@ -16,7 +17,7 @@ constexpr size_t kClusterMembers = 16;
 uint32_t outer(uint32_t v) { return 2 * v; }
 uint32_t inner(uint32_t v) { return 2 * v + 1; }
 
-// Members by distance from the centre: the farthest are the ones to do without.
+// Members by distance from the center: the farthest are the ones to do without.
 void keep_nearest(std::vector<uint32_t>& member, std::span<const Vec3> position) {
   if (member.size() <= kClusterMembers) return;
   const Vec3 c = position[member[0]];
@@ -30,7 +31,7 @@ void keep_nearest(std::vector<uint32_t>& member, std::span<const Vec3> position)
 
 void add_clusters(BodyRest& body, const TriangleMesh& sheet) {
   const uint32_t n = static_cast<uint32_t>(sheet.position.size());
-  const auto next = vertex_neighbours(sheet.triangle, n);
+  const auto next = vertex_neighbors(sheet.triangle, n);
   body.cluster.resize(2 * n);
   for (uint32_t v = 0; v < n; ++v) {
     for (const uint32_t side : {0u, 1u}) {
@@ -45,7 +46,7 @@ void add_clusters(BodyRest& body, const TriangleMesh& sheet) {
 }
 
 // A prism between the two sides falls into three tetrahedra. Each of its square faces is cut from the inner particle of the
-// lower sheet vertex to the outer particle of the higher one: the neighbour, which sees the same two vertices, cuts it alike.
+// lower sheet vertex to the outer particle of the higher one: the neighbor, which sees the same two vertices, cuts it alike.
 void add_prism(std::vector<Tet>& tet, Triangle t) {
   // Rotating the smallest to the front keeps the orientation; then at most the last two are out of order.
   std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
@@ -110,7 +111,7 @@ double tet_volume(std::span<const Vec3> position, const Tet& tet) {
 
 std::vector<Vec3> wall_directions(const TriangleMesh& sheet, float thickness) {
   std::vector<Vec3> direction = vertex_normals(sheet);
-  const auto next = vertex_neighbours(sheet.triangle, sheet.position.size());
+  const auto next = vertex_neighbors(sheet.triangle, sheet.position.size());
   std::vector<Tet> tet;
   for (const Triangle& t : sheet.triangle) add_prism(tet, t);
   std::vector<Vec3> position(2 * sheet.position.size());
@@ -162,7 +163,7 @@ size_t thin_where_folded(BodyRest& body, const TriangleMesh& sheet, std::span<co
     // A wall that is thinner nearly everywhere is not the wall that was asked for.
     if (2 * std::count_if(share.begin(), share.end(), [](float f) { return f < 0.99f; }) > static_cast<long>(share.size()))
       return inverted;
-    if (share.empty()) share.assign(sheet.position.size(), 1), next = vertex_neighbours(sheet.triangle, sheet.position.size());
+    if (share.empty()) share.assign(sheet.position.size(), 1), next = vertex_neighbors(sheet.triangle, sheet.position.size());
     for (size_t v = 0; v < share.size(); ++v)
       if (folded[v]) share[v] = std::max(kThinnest, kThinner * share[v]);
     for (int pass = 0; pass < 4; ++pass)

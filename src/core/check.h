@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // core/check: the one way bad input is reported.
 // Every reader (scene, mesh, recording, device, command line) throws InputError with one line that says where, what and what
 // next; the program prints it and exits with code 2. Programming mistakes are CATGUT_CHECK, which stops at once.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // core/hash: the 64-bit hash (XXH3) that stamps a state, a chunk of a recording or a cache key. Same bits on every machine.
 #pragma once
 // By memcpy: the other ways read through a pointer of another type, and inlined into code that wrote floats GCC may then read

@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 // core/jobs: the workers behind Jobs::each. Reads the published job; writes nothing but what the job's own blocks write.
 // Every worker has a desk: one cache line with the job and a ticket (generation, first, last): blocks of its own share that
-// nobody has begun. It takes them from the front, and whoever has waited for it too long takes them from the back. A claim
-// names the generation, so a worker that wakes late finds nothing to claim and never touches a job that is over.
+// no one has begun. It takes them from the front, and a caller that has waited for it too long takes them from the back. A
+// claim names the generation, so a worker that wakes late finds nothing to claim and never touches a job that is over.
 #include "core/jobs.h"
 
 #include <algorithm>
@@ -45,14 +46,14 @@ constexpr size_t kMostBlocks = 0xffff;
 }  // namespace
 
 struct Jobs::Pool {
-  struct alignas(64) Desk {
+  struct alignas(64) WorkQueue {
     std::atomic<uint64_t> ticket{0};
     // The job: written before the ticket is published, stable until every claimed block is done.
     Call call = nullptr;
     void* work = nullptr;
     size_t count = 0, block = 0;
   };
-  std::vector<Desk> desk;  // the caller's first
+  std::vector<WorkQueue> queue;  // the caller's first
   uint64_t generation = 0;
   alignas(64) std::atomic<size_t> done{0};  // blocks finished in this generation
 
@@ -63,10 +64,10 @@ struct Jobs::Pool {
   std::vector<std::thread> threads;
   std::chrono::steady_clock::time_point alone_until{};
 
-  explicit Pool(int workers) : desk(static_cast<size_t>(workers)) {}
+  explicit Pool(int workers) : queue(static_cast<size_t>(workers)) {}
 
   // Runs what is left at a desk, from the front if it is one's own; returns how many blocks that were.
-  static size_t clear(Desk& d, bool own) {
+  static size_t drain(WorkQueue& d, bool own) {
     size_t n = 0;
     uint64_t t = d.ticket.load(std::memory_order_acquire);
     while (!is_empty(t)) {
@@ -83,7 +84,7 @@ struct Jobs::Pool {
   void work_loop(size_t me) {
     int idle = 0;
     while (!stop.load(std::memory_order_relaxed)) {
-      const size_t n = clear(desk[me], true);
+      const size_t n = drain(queue[me], true);
       if (n > 0) {
         done.fetch_add(n, std::memory_order_release);
         idle = 0;
@@ -94,7 +95,7 @@ struct Jobs::Pool {
       } else {
         std::unique_lock<std::mutex> lock(mutex);
         asleep.fetch_add(1);
-        wake.wait(lock, [&] { return stop.load() || !is_empty(desk[me].ticket.load()); });
+        wake.wait(lock, [&] { return stop.load() || !is_empty(queue[me].ticket.load()); });
         asleep.fetch_sub(1);
         idle = 0;
       }
@@ -111,7 +112,7 @@ struct Jobs::Pool {
         continue;
       }
       size_t n = 0;
-      for (size_t k = 1; k < desk.size() && n == 0; ++k) n = clear(desk[k], false);
+      for (size_t k = 1; k < queue.size() && n == 0; ++k) n = drain(queue[k], false);
       finished += n;
       if (n > 0) continue;
       if (spins < kSpins) {
@@ -146,7 +147,7 @@ Jobs::~Jobs() {
 void Jobs::run(size_t blocks, Call call, void* work, size_t count, size_t block) {
   if (blocks == 0) return;
   const bool alone = !pool_ || blocks == 1 || blocks > kMostBlocks ||
-                     (pool_->alone_until != std::chrono::steady_clock::time_point{} && still_alone());
+                     (pool_->alone_until != std::chrono::steady_clock::time_point{} && fallback_active());
   if (alone) {
     for (size_t b = 0; b < blocks; ++b) call(work, b, count, block);
     return;
@@ -155,9 +156,9 @@ void Jobs::run(size_t blocks, Call call, void* work, size_t count, size_t block)
   p.done.store(0, std::memory_order_relaxed);
   ++p.generation;
   // Block b of any job of as many blocks goes to the same worker: what it wrote in one stage is in its cache in the next.
-  const size_t workers = p.desk.size();
+  const size_t workers = p.queue.size();
   for (size_t k = workers; k-- > 0;) {
-    Pool::Desk& d = p.desk[k];
+    Pool::WorkQueue& d = p.queue[k];
     d.call = call, d.work = work, d.count = count, d.block = block;
     d.ticket.store(make_ticket(p.generation, blocks * k / workers, blocks * (k + 1) / workers));
   }
@@ -166,10 +167,10 @@ void Jobs::run(size_t blocks, Call call, void* work, size_t count, size_t block)
     { std::lock_guard<std::mutex> lock(p.mutex); }
     p.wake.notify_all();
   }
-  p.finish(blocks, Pool::clear(p.desk[0], true));
+  p.finish(blocks, Pool::drain(p.queue[0], true));
 }
 
-bool Jobs::still_alone() {
+bool Jobs::fallback_active() {
   if (std::chrono::steady_clock::now() < pool_->alone_until) return true;
   pool_->alone_until = {};
   return false;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // core/jobs: fork-join over fixed blocks. A tick has hundreds of stages of 5..50 us, so waiting is a bounded spin, then yield
 // (a futex round trip alone costs 3 us). The blocks depend only on the amount of work, never on the number of workers, and a
 // block is computed by one worker from start to end: the same bits for any worker count. Each worker has the same part of the
@@ -20,8 +21,8 @@ class Jobs {
   int threads() const { return threads_; }
 
   // Calls work(first, last) for consecutive blocks of at most `block` items that cover [0, count); returns when all are done.
-  // When another program takes a worker's core, the caller does that worker's blocks, and goes on alone for 50 ms if it had to
-  // wait for one that was begun.
+  // When another program takes a worker's core, the caller does that worker's blocks, and continues alone for 50 ms if it had
+  // to wait for one that was begun.
   template <typename Work>
   void each(size_t count, size_t block, Work&& work) {
     run((count + block - 1) / block,
@@ -35,7 +36,7 @@ class Jobs {
  private:
   using Call = void (*)(void* work, size_t block_index, size_t count, size_t block);
   void run(size_t blocks, Call call, void* work, size_t count, size_t block);
-  bool still_alone();
+  bool fallback_active();
   struct Pool;
   std::unique_ptr<Pool> pool_;
   int threads_ = 1;

@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // core/math: small fixed-size vectors, quaternions and poses for everything outside the SIMD kernels.
-// Frames are right-handed: x to the right, y up, z toward the surgeon. Lengths in metres, angles in radians.
+// Frames are right-handed: x to the right, y up, z toward the surgeon. Lengths in meters, angles in radians.
 #pragma once
 #include <algorithm>
 #include <cmath>

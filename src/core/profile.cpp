@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // core/profile: the names of the stages, as the stage table prints them.
 #include "core/profile.h"
 

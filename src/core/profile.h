@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // core/profile: where a tick's time goes. Fixed stages, one accumulator each; times never reach the state, only the report.
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // core/random: a small counter-free generator (PCG32, O'Neill 2014) whose whole state is one integer, so that it can be saved,
 // hashed and replayed. Not for anything secret.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // core/sym3: symmetric 3x3 matrices (stiffness, damping, projections) and their eigenvalues, for code that may neither allocate
 // nor loop without a bound: the servo of a haptic arm.
 #pragma once

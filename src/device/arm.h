@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: a haptic arm, whatever its maker. A driver opens up to two arms and calls back once a millisecond for each of them,
 // from its own thread (or from one thread for each arm): sample in, force out, both in the arm's own frame (exchange/arm).
 // Drivers load the maker's library at run time; nothing of it is needed to build. What is missing (library, device, permission,
-// version) becomes one line for the user, and the program goes on without.
+// version) becomes one line for the user, and the program continues without.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: see bite_guide.h.
 #include "device/bite_guide.h"
 
@@ -8,10 +9,10 @@ float half_bite(const PictureModel& picture, const BiteGuide& g) {
 }
 
 Pose needle_on(const PictureModel& picture, const BiteGuide& g, float psi, float away) {
-  const Vec3 centre = g.at + g.out * (picture.suture[0].needle_radius - g.depth + away), up = cross(g.along, g.out);
+  const Vec3 center = g.at + g.out * (picture.suture[0].needle_radius - g.depth + away), up = cross(g.along, g.out);
   const Vec3 x = g.out * std::cos(psi) - g.along * std::sin(psi);
   // The tip is at the end of the arc: other arcs than a half circle are turned back by what is missing.
-  return Pose{centre, from_axes(x, cross(up, x), up)} * Pose{{}, axis_angle({0, 0, 1}, kPi - picture.suture[0].needle_arc)};
+  return Pose{center, from_axes(x, cross(up, x), up)} * Pose{{}, axis_angle({0, 0, 1}, kPi - picture.suture[0].needle_arc)};
 }
 
 Vec3 on_needle(const PictureModel& picture, const Pose& needle, float s) {

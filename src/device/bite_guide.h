@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: where the next bite should go, as a circle for the needle: for the help that brings a held needle there, for the
-// ghost that is drawn, and for telling somebody how near the tip is to it. Plain data and arithmetic.
+// ghost that is drawn, and for telling a user how near the tip is to it. Plain data and arithmetic.
 #pragma once
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: see both_hands.h.
 #include "device/both_hands.h"
 
@@ -83,7 +84,7 @@ void wind_on(BothHands& b, size_t winder, std::array<Pose, 2>& hand, const Pose&
       glide(hand[lying], rest, kCareful, kTurn, dt);
       // The needle is not hurried on while it lags behind.
       const float keep_up = std::clamp(1.5f - behind / 0.006f, 0.0f, 1.0f);
-      // Not farther than the next loop: a spiral that goes on is none.
+      // Not farther than the next loop: a spiral that continues is none.
       const float next = static_cast<float>(seen.tool[lying].loop_wraps + 1) * 2 * kPi;
       const float most_turn = std::max(next + kOver, w.wound), before = w.wound;
       const float turn = std::clamp(b.wish, -2 * kWindRate * dt, kWindRate * dt * keep_up);
@@ -94,7 +95,7 @@ void wind_on(BothHands& b, size_t winder, std::array<Pose, 2>& hand, const Pose&
       // Wound and no loop yet: its ends lie too far apart along the tool, and are led together.
       if (w.wound > next + kOver - 0.1f) w.lean = std::max(-2 * kTieLean, w.lean - kTieLean * dt);
       carry(1.2f * kSpeed);
-      // Wound back: what was tried is forgotten, and the tool is laid to the strand anew.
+      // Wound back: what was tried is forgotten, and the tool is laid to the strand again.
       if (before >= 0 && w.wound < 0) begin(b, picture, seen);
       return;
     }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: what takes two hands at once, for people who can move only one of them: laying the needle's strand round the other
 // tool, and drawing both ends apart. One motion says how far; where the hands go follows from what is seen and felt. Pure, like
 // device/steer, which calls it. An instrument tie as docs/rooms/surgeon.md describes it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device/bridge: see the header.
 #include "device/bridge.h"
 
@@ -17,7 +18,7 @@
 #include <thread>
 
 #include "core/check.h"
-#include "device/beat.h"
+#include "device/periodic_timer.h"
 #include "exchange/latest.h"
 
 namespace catgut {
@@ -44,7 +45,7 @@ int bridge_socket(const std::string& where, bool bind_it, std::string& why, bool
     return -1;
   }
   int fd = -1;
-  // Of a name that has addresses of both kinds the older one: on it `catgut bridge` listens unless it is told otherwise.
+  // Of a name that has addresses of both kinds the older one: on it `catgut bridge` listens unless an address is given.
   std::vector<const addrinfo*> order;
   for (const addrinfo* a = found; a; a = a->ai_next) order.insert(a->ai_family == AF_INET ? order.begin() : order.end(), a);
   for (const addrinfo* a : order) {
@@ -115,7 +116,7 @@ struct Bridge {
   uint16_t their_version = 0;
   BridgeCounts count;
   // For any thread: the above, copied once per round.
-  std::atomic<uint64_t> accepted{0}, garbage{0}, version{0}, forged{0}, nonsense{0}, stranger{0}, old{0};
+  std::atomic<uint64_t> accepted{0}, garbage{0}, version{0}, forged{0}, invalid{0}, unknown_peer{0}, old{0};
 };
 
 // Lost packets are the other end's watchdog's business: nothing is waited for, only the handshake is repeated.
@@ -147,8 +148,8 @@ void take_one(Bridge& b, const uint8_t* data, size_t size) {
     ++b.count.version, b.their_version = h.version;
     return;
   }
-  if (fault == BridgeFault::nonsense) {
-    ++b.count.nonsense;
+  if (fault == BridgeFault::invalid) {
+    ++b.count.invalid;
     return;
   }
   if (is_handshake(h.kind)) {
@@ -166,7 +167,7 @@ void take_one(Bridge& b, const uint8_t* data, size_t size) {
       b.sent = 0;
       send_sealed(b, BridgeKind::ask, 0, {});
     } else {
-      ++b.count.stranger;
+      ++b.count.unknown_peer;
       return;
     }
     ++b.count.accepted;
@@ -205,7 +206,7 @@ void take_one(Bridge& b, const uint8_t* data, size_t size) {
       e.faults.store(faults, std::memory_order_relaxed);
     }
   }
-  ++(fine ? b.count.accepted : b.count.nonsense);
+  ++(fine ? b.count.accepted : b.count.invalid);
 }
 
 void take(Bridge& b) {
@@ -260,7 +261,7 @@ void run(Bridge& b) {
       all_silent &= silent(b, b.end[k], now);
     }
     b.accepted = b.count.accepted, b.garbage = b.count.garbage, b.version = b.count.version, b.forged = b.count.forged;
-    b.nonsense = b.count.nonsense, b.stranger = b.count.stranger, b.old = b.count.old;
+    b.invalid = b.count.invalid, b.unknown_peer = b.count.unknown_peer, b.old = b.count.old;
     if (b.opened && now > b.said_ns + kAskEvery) send_sealed(b, BridgeKind::ask, 0, {});
     if (!all_silent || now < b.called_ns + static_cast<uint64_t>(1e9 * double{b.options.again_after})) continue;
     // A handshake takes two round trips: it is begun again only when it has had the time for them.
@@ -327,7 +328,7 @@ void close_bridge(void* self) {
 
 }  // namespace
 
-ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& told) {
+ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& messages) {
   ArmPort port;
   port.kind = "bridge";
   auto b = std::make_unique<Bridge>();
@@ -343,7 +344,7 @@ ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& told
   bool local = false;
   b->fd = bridge_socket(b->options.where, false, why, &local);
   if (b->fd < 0) {
-    told.push_back(who + why + "; write --haptics bridge:HOST:PORT, or set CATGUT_BRIDGE");
+    messages.push_back(who + why + "; write --haptics bridge:HOST:PORT, or set CATGUT_BRIDGE");
     return port;
   }
   try {
@@ -352,7 +353,7 @@ ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& told
       why = b->options.where + " is another machine and needs a key; set CATGUT_BRIDGE_KEY to the file of its key";
   } catch (const InputError& error) { why = error.what(); }
   if (!why.empty()) {
-    told.push_back(who + why);
+    messages.push_back(who + why);
     ::close(b->fd);
     return port;
   }
@@ -370,17 +371,19 @@ ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& told
   const bool all = b->known[0] && b->known[1];
   port.arm = b->info;
   if (b->their_version || b->refused == kOtherVersion)
-    told.push_back(who + b->options.where + " uses protocol version " + std::to_string(b->their_version) +
-                   ", this program version " + std::to_string(kBridgeVersion) + "; install the same Catgut on both machines");
-  else if (b->refused) told.push_back(who + "another simulator uses the devices at " + b->options.where + "; close it there");
+    messages.push_back(who + b->options.where + " uses protocol version " + std::to_string(b->their_version) +
+                       ", this program version " + std::to_string(kBridgeVersion) +
+                       "; install the same Catgut on both machines");
+  else if (b->refused)
+    messages.push_back(who + "another simulator uses the devices at " + b->options.where + "; close it there");
   else if (!all && b->count.forged > 0)
-    told.push_back(who + b->options.where + " answers with another key; copy the same key file to both machines");
+    messages.push_back(who + b->options.where + " answers with another key; copy the same key file to both machines");
   else if (!all)
-    told.push_back(who + "no answer from " + b->options.where +
-                   (b->options.key.empty()
-                        ? "; start `catgut bridge` on the device's computer, or use --haptics bridge:HOST:PORT"
-                        : "; start `catgut bridge` on the device's computer, with the same key"));
-  else if (!port.arm[0].present && !port.arm[1].present) told.push_back(who + b->options.where + " has no device");
+    messages.push_back(who + "no answer from " + b->options.where +
+                       (b->options.key.empty()
+                            ? "; start `catgut bridge` on the device's computer, or use --haptics bridge:HOST:PORT"
+                            : "; start `catgut bridge` on the device's computer, with the same key"));
+  else if (!port.arm[0].present && !port.arm[1].present) messages.push_back(who + b->options.where + " has no device");
   for (size_t k = 0; k < 2; ++k) b->present[k] = port.arm[k].present = port.arm[k].present && all;
   if (!b->present[0] && !b->present[1]) {
     send_sealed(*b, BridgeKind::bye, 0, {});
@@ -395,7 +398,7 @@ ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& told
 
 BridgeCounts bridge_counts(const ArmPort& port) {
   const Bridge& b = *static_cast<const Bridge*>(port.self);
-  return {b.accepted, b.garbage, b.version, b.forged, b.nonsense, b.stranger, b.old};
+  return {b.accepted, b.garbage, b.version, b.forged, b.invalid, b.unknown_peer, b.old};
 }
 
 }  // namespace catgut

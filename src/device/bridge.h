@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: an arm that hangs on another machine, or is driven by a program in another language, over UDP. Here is the
 // simulator's end; the packets and their cryptography are in device/bridge_packet, the arm's end is runtime/arm_server
 // (`catgut bridge`), or whatever speaks that layout, as samples/bridge_arm.py does.
@@ -25,9 +26,9 @@ struct BridgeOptions {
   float forget = 0.02f;      // [s] without a sample: the arm is lost
   float again_after = 0.1f;  // [s] between hellos while it is
 };
-// The simulator's end. `told` gets a line when nobody answers, or not as hoped. Whoever answers is asked for its arms again
-// whenever they fall silent, so that it may be restarted.
-ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& told);
+// The simulator's end. `reported` gets a line when no one answers, or not as hoped. Its peer is asked for its arms
+// again whenever they fall silent, so that it may be restarted.
+ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& messages);
 BridgeCounts bridge_counts(const ArmPort& port);  // of a port that open_bridge made
 
 }  // namespace catgut

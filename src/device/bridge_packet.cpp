@@ -125,7 +125,7 @@ BridgeFault read_head(const uint8_t* data, size_t size, BridgeHead& h) {
   h.counter = get<uint64_t>(data + 8);
   if (h.version != kBridgeVersion) return BridgeFault::version;
   const bool fine = data[6] >= 1 && data[6] < kBridgeKinds && h.arm < 2;
-  return fine ? BridgeFault::none : BridgeFault::nonsense;
+  return fine ? BridgeFault::none : BridgeFault::invalid;
 }
 
 void seal(const BridgeKey& key, const BridgeHead& head, const BridgePayload& payload, BridgeBytes& out) {
@@ -203,7 +203,7 @@ BridgeBytes opened_packet(const BridgeDoor& d, const uint8_t* open, BridgeKey& i
   BridgeKey own;
   crypto_scalarmult_base(own.data(), secret.data());
   if (!session_keys(d.shared, secret, open + 16, open + 16, own.data(), open + 48, in, out))
-    in = random_key(), out = random_key();  // nobody has these: such a session stays silent
+    in = random_key(), out = random_key();  // no one has these: such a session stays silent
   return handshake(d.shared, BridgeKind::opened, open + 16, own.data());
 }
 
@@ -297,7 +297,7 @@ bool read_sample(const BridgePayload& p, ArmSample& s, Vec3& force, uint32_t& fa
 
 void write_patch(const ForcePatch& f, BridgePayload& p) {
   p.fill(0);
-  put(&p[0], f.time_ns), put(&p[8], f.tick), put(&p[16], f.epoch), put(&p[20], f.topology);
+  put(&p[0], f.time_ns), put(&p[8], f.tick), put(&p[16], f.epoch), put(&p[20], f.discontinuity_id);
   put_float(&p[24], f.period), put_float(&p[28], f.expiry);
   put_vec(&p[32], f.point), put_vec(&p[44], f.force), put_sym(&p[56], f.stiffness), put_sym(&p[80], f.damping);
   put_vec(&p[104], f.normal), put_float(&p[116], f.gap);
@@ -310,7 +310,7 @@ bool read_patch(const BridgePayload& p, ForcePatch& f) {
   if (!floats_are_sane(p, 24, 37)) return false;
   f = {};
   f.time_ns = get<uint64_t>(&p[0]), f.tick = get<uint64_t>(&p[8]);
-  f.epoch = get<uint32_t>(&p[16]), f.topology = get<uint32_t>(&p[20]);
+  f.epoch = get<uint32_t>(&p[16]), f.discontinuity_id = get<uint32_t>(&p[20]);
   f.period = get_float(&p[24]), f.expiry = get_float(&p[28]);
   f.point = get_vec(&p[32]), f.force = get_vec(&p[44]), f.stiffness = get_sym(&p[56]), f.damping = get_sym(&p[80]);
   f.normal = get_vec(&p[104]), f.gap = get_float(&p[116]);

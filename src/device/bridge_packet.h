@@ -60,16 +60,16 @@ struct BridgeHead {
 // What came in since the beginning, by what was done with it.
 struct BridgeCounts {
   uint64_t accepted = 0;
-  uint64_t garbage = 0;   // wrong size or magic
-  uint64_t version = 0;   // another version's
-  uint64_t forged = 0;    // the tag is not that of the key
-  uint64_t nonsense = 0;  // rightly sealed, but a number that no arm has, or a kind that this end does not take
-  uint64_t stranger = 0;  // another sender's
-  uint64_t old = 0;       // repeated, overtaken, or too old to be believed
-  uint64_t dropped() const { return garbage + version + forged + nonsense + stranger + old; }
+  uint64_t garbage = 0;       // wrong size or magic
+  uint64_t version = 0;       // another version's
+  uint64_t forged = 0;        // the tag is not that of the key
+  uint64_t invalid = 0;       // rightly sealed, but a number that no arm has, or a kind that this end does not take
+  uint64_t unknown_peer = 0;  // another sender's
+  uint64_t old = 0;           // repeated, overtaken, or too old to be believed
+  uint64_t dropped() const { return garbage + version + forged + invalid + unknown_peer + old; }
 };
 
-enum class BridgeFault : uint8_t { none, garbage, version, nonsense };
+enum class BridgeFault : uint8_t { none, garbage, version, invalid };
 // Whether `size` bytes have the form of a packet; `head` is filled when the fault is none or version. Any bytes may be given.
 BridgeFault read_head(const uint8_t* data, size_t size, BridgeHead& head);
 inline bool is_handshake(BridgeKind k) { return k <= BridgeKind::refused; }

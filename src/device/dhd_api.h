@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: the part of Force Dimension's library (libdhd) that we call: our own declarations of its names, types and numbers, so
-// that neither its headers nor its licence are needed to build. docs/references.md (DHD) says where each comes from.
+// that neither its headers nor its license are needed to build. docs/references.md (DHD) says where each comes from.
 //
 // Traps: ids are a plain `char`, and what answers yes or no is one byte (bool), whose upper three are rubbish in a register;
 // the status array grew from 13 to more than 16 entries over the versions, and the library fills its own idea of it; a result

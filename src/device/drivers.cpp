@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device/drivers: see the header. A new driver is a line here.
 #include "device/drivers.h"
 
@@ -12,29 +13,29 @@ namespace {
 constexpr ArmDriver kDrivers[] = {
 #ifdef CATGUT_WITH_HAPTICS
     {"touch", "3D Systems Touch", "path of libHD.so",
-     [](const std::string& where, std::vector<std::string>& told) {
+     [](const std::string& where, std::vector<std::string>& messages) {
        TouchOptions o;
        o.library = where;
-       return open_touch(o, told);
+       return open_touch(o, messages);
      }},
     {"force-dimension", "Force Dimension omega, delta, lambda, sigma; Novint Falcon", "path of libdhd.so",
-     [](const std::string& where, std::vector<std::string>& told) {
+     [](const std::string& where, std::vector<std::string>& messages) {
        ForceDimensionOptions o;
        o.library = where;
-       return open_force_dimension(o, told);
+       return open_force_dimension(o, messages);
      }},
     {"haply", "Haply Inverse3 and Minverse", "HOST[:PORT]",
-     [](const std::string& where, std::vector<std::string>& told) {
+     [](const std::string& where, std::vector<std::string>& messages) {
        HaplyOptions o;
        o.where = where;
-       return open_haply(o, told);
+       return open_haply(o, messages);
      }},
 #endif
     {"bridge", "devices of another machine or program", "HOST[:PORT]",
-     [](const std::string& where, std::vector<std::string>& told) {
+     [](const std::string& where, std::vector<std::string>& messages) {
        BridgeOptions o;
        o.where = where;
-       return open_bridge(o, told);
+       return open_bridge(o, messages);
      }},
 };
 

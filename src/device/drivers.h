@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: the drivers of haptic arms there are. The one list: the command line, `catgut devices` and the help read it.
 #pragma once
 #include <span>
@@ -10,8 +11,8 @@ struct ArmDriver {
   const char* word;   // as people choose it
   const char* arms;   // what it drives, for people
   const char* where;  // what may follow the word after a colon, for people; "": the driver takes nothing
-  // `told` gets a line for whatever is missing; the port has no arms when there is nothing to work with.
-  ArmPort (*open)(const std::string& where, std::vector<std::string>& told);
+  // `reported` gets a line for whatever is missing; the port has no arms when there is nothing to work with.
+  ArmPort (*open)(const std::string& where, std::vector<std::string>& messages);
 };
 std::span<const ArmDriver> arm_drivers();
 

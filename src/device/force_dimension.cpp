@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device/force_dimension: see the header. Below, Arm's members say which thread may use them.
 #include "device/force_dimension.h"
 
@@ -9,8 +10,8 @@
 #include <cstdlib>
 #include <thread>
 
-#include "device/beat.h"
 #include "device/dhd_api.h"
+#include "device/periodic_timer.h"
 #include "device/profiles.h"
 
 namespace catgut {
@@ -111,7 +112,7 @@ bool read(Arm& a, ArmSample& s) {
     a.forced_off = !status[dhd::kStatusForce];
     a.cut_for = a.forced_off ? a.cut_for + kStatusEvery : 0;
     // What the firmware cut because we were late or the hand was fast comes back (and then through the servo's ramp); what
-    // somebody switched off at the arm stays off until he switches it on.
+    // a user switched off at the arm stays off until he switches it on.
     if (a.cut_for >= kEnableEvery && (cause == dhd::kCauseWatchdog || cause == dhd::kCauseVelocity))
       a.dhd.dhdEnableForce(dhd::kOn, a.id), a.cut_for = 0;
   }
@@ -207,7 +208,7 @@ void stop(void* self) {
       f.thread[k].join();
       continue;
     }
-    // It hangs in the library; the arm's watchdog has taken the force off long ago. It will find nobody to call.
+    // It hangs in the library; the arm's watchdog has taken the force off long ago. It will find no one to call.
     a.left = true;
     while (a.calling) std::this_thread::yield();
     f.thread[k].detach();
@@ -232,7 +233,7 @@ void close(void* self) {
   delete f;
 }
 
-bool load(const ForceDimensionOptions& options, dhd::Library& dhd, std::vector<std::string>& told) {
+bool load(const ForceDimensionOptions& options, dhd::Library& dhd, std::vector<std::string>& messages) {
   std::vector<std::string> names{"libdhd.so", "libdhd.so.3", "libdrd.so", "libdrd.so.3"};  // the latter contains the former
   const char* set = std::getenv("CATGUT_LIBDHD");
   if (set && *set) names = {set};
@@ -245,8 +246,8 @@ bool load(const ForceDimensionOptions& options, dhd::Library& dhd, std::vector<s
     if (why.empty()) why = dlerror();
   }
   if (!library) {
-    told.push_back("force-dimension: SDK library not found (" + why +
-                   "); install the SDK, or set CATGUT_LIBDHD to the path of libdhd.so");
+    messages.push_back("force-dimension: SDK library not found (" + why +
+                       "); install the SDK, or set CATGUT_LIBDHD to the path of libdhd.so");
     return false;
   }
   std::string missing;
@@ -256,20 +257,20 @@ bool load(const ForceDimensionOptions& options, dhd::Library& dhd, std::vector<s
   CATGUT_DHD_FUNCTIONS(CATGUT_DHD_LOAD)
 #undef CATGUT_DHD_LOAD
   if (missing.empty()) return true;
-  told.push_back("force-dimension: the library lacks the function " + missing + "; supported versions are 3.14 to 3.17");
+  messages.push_back("force-dimension: the library lacks the function " + missing + "; supported versions are 3.14 to 3.17");
   return false;
 }
 
 }  // namespace
 
-ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<std::string>& told) {
+ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<std::string>& messages) {
   ArmPort port;
   port.kind = "force-dimension";
   dhd::Library dhd;
-  if (!load(options, dhd, told)) return port;
+  if (!load(options, dhd, messages)) return port;
   const int count = dhd.dhdGetDeviceCount();
   if (count <= 0) {
-    told.push_back("force-dimension: no device, or no permission to open its USB device (udev rules)");
+    messages.push_back("force-dimension: no device, or no permission to open its USB device (udev rules)");
     return port;
   }
   int version[4] = {};
@@ -280,15 +281,15 @@ ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<s
     const std::string who = "force-dimension: device " + std::to_string(index + 1) + " of " + std::to_string(count);
     const int id = dhd.dhdOpenID(static_cast<dhd::Id>(index));
     if (id < 0) {
-      told.push_back(who + " cannot be opened: " + text(dhd.dhdErrorGetStr(dhd.dhdErrorGetLast())) +
-                     "; close other programs that use it, and check USB permissions (udev rules)");
+      messages.push_back(who + " cannot be opened: " + text(dhd.dhdErrorGetStr(dhd.dhdErrorGetLast())) +
+                         "; close other programs that use it, and check USB permissions (udev rules)");
       continue;
     }
     auto a = std::make_shared<Arm>();
     a->dhd = dhd, a->index = index, a->id = static_cast<dhd::Id>(id), a->paced = options.paced;
     std::string why;
     if (!prepare(*a, why)) {
-      told.push_back(who + " cannot be used: " + why);
+      messages.push_back(who + " cannot be used: " + why);
       dhd.dhdClose(a->id);
       continue;
     }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: Force Dimension's arms (omega, delta, lambda, sigma; Novint Falcon) by dlopen of libdhd. Each arm has a thread of its
 // own: the library's calls wait for the device, and one that hangs must not take the other hand with it. The arm's own watchdog
 // is set to 31.9 ms: a process that dies, or a thread that hangs, leaves no force behind.
@@ -13,7 +14,7 @@ struct ForceDimensionOptions {
   bool paced = true;    // false: as fast as the library lets us, for doubles that keep time themselves
 };
 
-// The first two arms the library finds; left-handed ones are the left hand's. `told` gets a line for whatever is missing.
-ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<std::string>& told);
+// The first two arms the library finds; left-handed ones are the left hand's. `reported` gets a line for whatever is missing.
+ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<std::string>& messages);
 
 }  // namespace catgut

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: see gamepad.h.
 #include "device/gamepad.h"
 
@@ -6,7 +7,7 @@
 namespace catgut {
 namespace {
 
-constexpr float kDead = 0.15f;      // of a stick's way: worn sticks do not come to rest at zero
+constexpr float kDead = 0.15f;      // of a stick's way: worn sticks do not settle at zero
 constexpr float kSpeed = 0.08f;     // [m/s] with the stick all the way
 constexpr float kTurnSpeed = 2.0f;  // [rad/s]
 constexpr float kBothSpeed = 4.0f;  // [rad/s]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: both hands by one gamepad. Each stick moves its hand on the screen, its trigger closes the jaw as far as it is
 // pulled, and with the shoulder button above it the stick drives the needle (sideways) and moves into the picture (up and
 // down). Pure, like device/mouse.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device/haply: see the header. Everything of the line belongs to the thread, and before it runs to the opener.
 #include "device/haply.h"
 
@@ -13,7 +14,7 @@
 #include <optional>
 #include <thread>
 
-#include "device/beat.h"
+#include "device/periodic_timer.h"
 #include "device/profiles.h"
 
 namespace catgut {
@@ -322,7 +323,7 @@ void run(Haply& h) {
       error = h.up ? kSilent : kNoLine;
     }
     serve(h, error);
-    // A line that is dead, or says nothing, is begun anew.
+    // A line that is dead, or says nothing, is begun again.
     if (error && now > again && now > heard + kReconnectEvery) {
       connect(h);
       again = now + kReconnectEvery;
@@ -376,7 +377,7 @@ void close(void* self) {
 
 }  // namespace
 
-ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) {
+ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& messages) {
   ArmPort port;
   port.kind = "haply";
   auto h = std::make_unique<Haply>();
@@ -395,9 +396,9 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
   until(*h, when(), [&h] { return h->done; });
   if (!h->up) {
     const bool nobody = !h->done || h->failure == boost::system::errc::connection_refused;
-    told.push_back(nobody ? "haply: no Inverse service answers at " + there +
-                                "; start it (the Haply Hub does), or write --haptics haply:HOST:PORT"
-                          : "haply: no Inverse service at " + there + " (" + h->failure.message() + ")");
+    messages.push_back(nobody ? "haply: no Inverse service answers at " + there +
+                                    "; start it (the Haply Hub does), or write --haptics haply:HOST:PORT"
+                              : "haply: no Inverse service at " + there + " (" + h->failure.message() + ")");
     return port;
   }
   until(*h, when(), [&h] { return h->got || !h->up; });
@@ -409,8 +410,8 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
   }
   const json& all = member(inventory, "inverse3");
   if (!all.is_array()) {
-    told.push_back("haply: the service at " + there +
-                   " has an unknown version (supported: 3.1 to 3.5); update it, or give its port");
+    messages.push_back("haply: the service at " + there +
+                       " has an unknown version (supported: 3.1 to 3.5); update it, or give its port");
     return port;
   }
   std::vector<size_t> order;
@@ -422,8 +423,8 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
     if (id.empty() || id.find_first_of("\"\\?") != std::string::npos) continue;
     const json& calibrated = member(member(device, "status"), "calibrated");
     if (calibrated.is_boolean() && !calibrated.get<bool>()) {
-      told.push_back("haply: arm " + id +
-                     " is not calibrated: put its grip into the inkwell until its light is steady, and try again");
+      messages.push_back("haply: arm " + id +
+                         " is not calibrated: put its grip into the inkwell until its light is steady, and try again");
       continue;
     }
     // What 3.5 brought, in the state it first sends.
@@ -448,7 +449,8 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& told) 
   }
   bind_grips(inventory, *h, order);
   if (!port.arm[0].present && !port.arm[1].present) {
-    if (told.empty()) told.push_back("haply: the service at " + there + " has no device; is one connected and switched on?");
+    if (messages.empty())
+      messages.push_back("haply: the service at " + there + " has no device; is one connected and switched on?");
     drop(*h);
     return port;
   }

@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: the part of OpenHaptics' device library (libHD) that we call: our own declarations of its names, types and numbers,
-// so that neither its headers nor its licence are needed to build. docs/references.md (OpenHaptics headers) says where each
+// so that neither its headers nor its license are needed to build. docs/references.md (OpenHaptics headers) says where each
 // comes from.
 //
 // Three traps that other bindings fell into, each held by a static_assert below or by tests/device: the error record has three

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: see mouse.h.
 #include "device/mouse.h"
 

@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: hands by mouse and keyboard. The mouse moves the active tool where it moves on the screen; wheel, or Shift and the
 // mouse, into the picture; the right button turns, the left one closes. Pure: what was pressed since the last picture in,
-// motions out; whoever owns the window fills a MouseInput.
+// motions out; a caller that owns the window fills a MouseInput.
 #pragma once
 #include <array>
 

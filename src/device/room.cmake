@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 if(NOT CATGUT_HAPTICS)  # mouse, gamepad and the bridge to other programs need no library
   foreach(driver touch force_dimension haply)
     set_source_files_properties(${PROJECT_SOURCE_DIR}/src/device/${driver}.cpp PROPERTIES HEADER_FILE_ONLY ON)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: see steer.h.
 #include "device/steer.h"
 
@@ -12,7 +13,7 @@ constexpr float kDriveAt = 0.35f, kTipAt = 0.93f;  // places on the needle's arc
 constexpr float kBeside = 0.3f;                    // of the arc: two jaws nearer than this would meet
 constexpr float kCatch = 0.009f;     // [m] across the view: nearer than this to the good place, the help takes the tool
 constexpr float kLetGo = 0.014f;     // and farther than this it lets go
-constexpr float kCatchDeep = 0.12f;  // [m] along the view, where nobody can judge distances on a flat screen
+constexpr float kCatchDeep = 0.12f;  // [m] along the view, where no one can judge distances on a flat screen
 constexpr float kThere = 0.0015f;    // [m] the tool is at the needle
 constexpr float kPatience = 0.6f;    // [s] a closing jaw waits for that
 constexpr float kBiteCatch = 0.012f, kBiteLetGo = 0.02f;  // [m] across the view, of the needle from the place of a bite
@@ -22,7 +23,7 @@ constexpr float kHelpSpeed = 0.2f, kHelpTurn = 5.0f;      // [m/s], [rad/s] of a
 constexpr float kAboveTail = 0.012f;                      // [m]
 constexpr float kLoopSpeed = 0.1f;                        // [m/s] of a tool that carries a loop
 constexpr float kKeepsLoop = 0.7f;                        // opening of a jaw that lets go without shaking off a loop
-constexpr float kReach = 0.35f;                           // [m] from the field's centre: no hand gets lost
+constexpr float kReach = 0.35f;                           // [m] from the field's center: no hand gets lost
 
 Vec3 shaft_of(const Pose& tool) { return rotate(tool.q, {0, 0, 1}); }
 
@@ -36,7 +37,7 @@ void drive_needle(SteeredHand& hand, float angle) {
   hand.pose = needle * Pose{{}, axis_angle({0, 0, 1}, angle)} * hand.grip;
 }
 
-// force: [N] on the hand, zero where nobody is to feel it.
+// force: [N] on the hand, zero where no one is to feel it.
 void move(SteeredHand& hand, const HandMotion& m, const ViewFrame& view, const PictureModel& picture, Vec3 force) {
   // Into the picture is along the line of sight: the tool stays under the pointer.
   Vec3 way = view.right * m.right + view.up * m.up + normalized(hand.pose.p - view.eye, view.ahead) * m.ahead;
@@ -89,7 +90,7 @@ void help_to_bite(Steering& steering, size_t who, const ViewFrame& view, const P
   const Vec3 tip = on_needle(picture, needle, 1), middle = on_needle(picture, needle, 0.5f);
   Vec3 there, other;
   const float reach = was ? kBiteLetGo : kBiteCatch;
-  // Whichever somebody takes for the pointer: the needle's tip, or the tool.
+  // Whichever a user takes for the pointer: the needle's tip, or the tool.
   hand.snapped = hand.driven > 0 || near_on_screen(view, tip, entry_of(g), reach, there) ||
                  near_on_screen(view, hand.pose.p, entry_of(g), reach, other) ||
                  near_on_screen(view, middle, g.at, reach, other);
@@ -206,7 +207,7 @@ Pose good_grip(const PictureModel& picture, const Snapshot& seen, size_t who, Ve
   };
   const auto free = [&](float s) { return other.held != Held::needle || std::abs(other.held_at - s) > kBeside; };
   bool tip = !free(kDriveAt);
-  // Stuck in tissue with nobody holding it: whichever end the hand is at.
+  // Stuck in tissue with no one holding it: whichever end the hand is at.
   if (seen.active().needle.in_tissue && free(kDriveAt) && free(kTipAt))
     tip = distance(at(kTipAt), near) < distance(at(kDriveAt), near);
   const float s = tip ? kTipAt : kDriveAt;
@@ -264,7 +265,7 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
       }
     }
     in.jaw = hand.closed ? 0.0f : hand.opening;
-    // A jaw that is told to close on the way to the needle closes when it is there.
+    // A jaw that is reported to close on the way to the needle closes when it is there.
     const bool at_jaw = hand.snapped && hand.at != HelpAt::bite;
     const bool coming = at_jaw && hand.closed &&
                         (distance(seen.tool[k].pose.p, hand.help.p) > kThere || (hand.at == HelpAt::tail && !hand.hovered));

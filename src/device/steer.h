@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: two hands for people without instruments: what turns small motions (of a mouse, of a stick) into whole ToolInputs.
 // Pure functions over plain data: reads motions, the view and the last Snapshot; no clock, no window, no driver.
 //
@@ -20,7 +21,7 @@
 
 namespace catgut {
 
-// From where somebody looks. Unit vectors at right angles; [m].
+// From where a user looks. Unit vectors at right angles; [m].
 struct ViewFrame {
   Vec3 eye, right{1, 0, 0}, up{0, 1, 0}, ahead{0, 0, -1};
   float pixel = 0.001f;  // [m] that a pixel covers at 1 m from the eye
@@ -42,7 +43,7 @@ struct SteeredHand {
   Pose pose;             // where the hand is, before any help
   bool closed = false;   // what the jaw is asked to be
   float opening = 1;     // of the jaw when it is not closed: a trigger half pulled
-  uint32_t buttons = 0;  // kButtonCut, ...; whoever reads keys sets them anew before every steer()
+  uint32_t buttons = 0;  // kButtonCut, ...; a caller that reads keys sets them again before every steer()
   bool holds = false;    // the needle
   Pose grip;             // tool in the needle's frame, from the moment it was grasped
   bool snapped = false;  // the help has the tool, at
@@ -59,7 +60,7 @@ struct SteeredHand {
 struct Steering {
   std::array<SteeredHand, 2> hand;  // 0 needle driver, 1 forceps
   bool assist = true;               // help, all of it
-  std::optional<BiteGuide> guide;   // where the next bite should go; whoever knows sets it before every steer()
+  std::optional<BiteGuide> guide;   // where the next bite should go; a caller that knows sets it before every steer()
   BothHands both;
   uint32_t sequence = 0;
 };
@@ -67,7 +68,7 @@ struct Steering {
 // Hands beside the field, the driver on the right, or on the left for left-handed people.
 Steering start_steering(const PictureModel& picture, bool left_handed);
 
-// After a restart, or a bite taken back: the hands go on from where the tools are now.
+// After a restart, or a bite undone: the hands continue from where the tools are now.
 void resume_steering(Steering& steering, const Snapshot& seen);
 
 // Moves the hands and gives what a device would publish now. dt: [s] since the last call. time_ns: when the motion was made,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device/touch: see the header. Below, Touch's members say which thread may use them.
 #include "device/touch.h"
 
@@ -156,7 +157,7 @@ hd::Code CATGUT_HD_CALL serve_both(void* self) {
   Touch& t = *static_cast<Touch*>(self);
   for (size_t k = 0; k < t.arm.size(); ++k) serve(t, k);
   if (!t.stopping.load(std::memory_order_relaxed) || !t.arm[0].at_rest || !t.arm[1].at_rest) return hd::kCallbackContinue;
-  switch_off(t);  // here, where nobody else makes another arm current meanwhile
+  switch_off(t);  // here, where no one else makes another arm current meanwhile
   t.stopped.store(true, std::memory_order_release);
   return hd::kCallbackDone;
 }
@@ -165,7 +166,7 @@ void drain(const hd::Library& hd) {
   for (int k = 0; k < 100 && hd.hdGetError().code != hd::kSuccess; ++k) {}
 }
 
-bool load(const TouchOptions& options, hd::Library& hd, std::vector<std::string>& told) {
+bool load(const TouchOptions& options, hd::Library& hd, std::vector<std::string>& messages) {
   std::vector<std::string> names;
   if (const char* set = std::getenv("CATGUT_LIBHD"); !options.library.empty() || (set && *set))
     names.push_back(options.library.empty() ? set : options.library);
@@ -179,8 +180,8 @@ bool load(const TouchOptions& options, hd::Library& hd, std::vector<std::string>
     if (why.empty()) why = dlerror();
   }
   if (!library) {
-    told.push_back("touch: OpenHaptics device library not found (" + why +
-                   "); install OpenHaptics and the device driver, or set CATGUT_LIBHD to the path of libHD.so");
+    messages.push_back("touch: OpenHaptics device library not found (" + why +
+                       "); install OpenHaptics and the device driver, or set CATGUT_LIBHD to the path of libHD.so");
     return false;
   }
   std::string missing;
@@ -190,7 +191,7 @@ bool load(const TouchOptions& options, hd::Library& hd, std::vector<std::string>
   CATGUT_HD_FUNCTIONS(CATGUT_HD_LOAD)
 #undef CATGUT_HD_LOAD
   if (missing.empty()) return true;
-  told.push_back("touch: the device library lacks the function " + missing + "; supported versions are 3.0 to 3.5");
+  messages.push_back("touch: the device library lacks the function " + missing + "; supported versions are 3.0 to 3.5");
   return false;
 }
 
@@ -310,11 +311,11 @@ void close(void* self) {
 
 }  // namespace
 
-ArmPort open_touch(const TouchOptions& options, std::vector<std::string>& told) {
+ArmPort open_touch(const TouchOptions& options, std::vector<std::string>& messages) {
   ArmPort port;
   port.kind = "touch";
   hd::Library hd;
-  if (!load(options, hd, told)) return port;
+  if (!load(options, hd, messages)) return port;
   auto touch = std::make_unique<Touch>();
   touch->hd = hd;
   std::array<std::string, 2> why;
@@ -330,12 +331,12 @@ ArmPort open_touch(const TouchOptions& options, std::vector<std::string>& told) 
   for (size_t k = 0; k < 2; ++k) {
     ArmInfo& info = port.arm[k];
     if (touch->arm[k].handle == hd::kNoDevice) {
-      told.push_back("touch: no " + std::string(k == 0 ? "right" : "left") + " device (\"" + options.name[k] +
-                     "\"): " + why[k]);
+      messages.push_back("touch: no " + std::string(k == 0 ? "right" : "left") + " device (\"" + options.name[k] +
+                         "\"): " + why[k]);
       continue;
     }
     if (!prepare(hd, touch->arm[k].handle, info, why[k])) {
-      told.push_back("touch: \"" + info.name + "\" cannot be used: " + why[k]);
+      messages.push_back("touch: \"" + info.name + "\" cannot be used: " + why[k]);
       hd.hdDisableDevice(touch->arm[k].handle);
       touch->arm[k].handle = hd::kNoDevice;
       continue;

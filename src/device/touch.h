@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: 3D Systems Touch (and other arms of OpenHaptics' device library) by dlopen. Both arms are served by ONE scheduler
 // callback: the library works on a current device, and callbacks of one arm each would write their force to the other.
 #pragma once
@@ -13,7 +14,7 @@ struct TouchOptions {
   int retries = 10;  // of an arm that a crashed program left open
 };
 
-// `told` gets a line for whatever is missing. The port has no arms (any() is false) when there is nothing to work with.
-ArmPort open_touch(const TouchOptions& options, std::vector<std::string>& told);
+// `reported` gets a line for whatever is missing. The port has no arms (any() is false) when there is nothing to work with.
+ArmPort open_touch(const TouchOptions& options, std::vector<std::string>& messages);
 
 }  // namespace catgut

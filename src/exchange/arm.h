@@ -1,4 +1,5 @@
-// exchange: what a haptic arm tells the servo a thousand times a second. In the arm's own frame (x right, y up, z toward the
+// SPDX-License-Identifier: Apache-2.0
+// exchange: what a haptic arm reports the servo a thousand times a second. In the arm's own frame (x right, y up, z toward the
 // user, origin where the maker put it), SI units.
 #pragma once
 #include <cstdint>
@@ -18,7 +19,7 @@ struct ArmSample {
   Vec3 velocity;            // [m/s] as the driver filters it
   uint32_t buttons = 0;     // bit 0: the one nearest to the tip
   float warmth = 0;         // of the warmest motor, 0 cold .. 1 too hot
-  bool forced_off = false;  // the driver cut the force by itself (too fast, too warm); it will come back
+  bool forced_off = false;  // the driver cut the force on its own (too fast, too warm); it will come back
   float jaw = -1;           // of a gripper: 0 closed .. 1 open; negative: the arm has none
   uint64_t time_ns = 0;     // on the clock of the arm's end, where that is not the callback's; 0: it is
   uint32_t sequence = 0;

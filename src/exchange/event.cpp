@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // exchange/event: the names under which events appear in JSON, logs and scene expectations.
 #include "exchange/event.h"
 
@@ -6,11 +7,11 @@ namespace catgut {
 const char* event_name(EventKind kind) {
   static constexpr const char* kName[] = {
       "needle_grasped",       "needle_released",   "thread_grasped",     "thread_released", "tip_entered",
-      "particle_attached",    "particle_released", "tip_exited",         "bite_cancelled",  "suture_point",
-      "bite_completed",       "particle_passed",   "order_broken",       "ring_complete",   "closure_started",
-      "closure_finished",     "thread_ran_out",    "tissue_grasped",     "tissue_released", "loop_formed",
-      "loop_rejected",        "loop_released",     "knot_begun",         "knot_locked",     "knot_cancelled",
-      "thread_cut",           "suture_taken",      "stitch_settled",     "seam_closed",     "instrument_taken",
+      "particle_attached",    "particle_released", "tip_exited",         "bite_withdrawn",  "suture_point",
+      "bite_completed",       "particle_passed",   "bite_out_of_order",  "ring_complete",   "closure_started",
+      "closure_finished",     "thread_exhausted",  "tissue_grasped",     "tissue_released", "loop_formed",
+      "loop_rejected",        "loop_released",     "throw_started",      "throw_locked",    "throw_undone",
+      "thread_cut",           "suture_loaded",     "suture_baked",       "seam_closed",     "instrument_taken",
       "instrument_laid_down", "instrument_parked", "instrument_refused", "technique_fault"};
   static_assert(sizeof(kName) / sizeof(kName[0]) == static_cast<size_t>(EventKind::count_));
   return kind < EventKind::count_ ? kName[static_cast<int>(kind)] : "unknown";

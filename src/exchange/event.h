@@ -1,4 +1,5 @@
-// exchange: what happened in a tick, in an order that is the same on every run. Nobody calls upward: rooms below tell rooms
+// SPDX-License-Identifier: Apache-2.0
+// exchange: what happened in a tick, in an order that is the same on every run. No one calls upward: rooms below tell rooms
 // above through these.
 #pragma once
 #include <cstddef>
@@ -18,27 +19,27 @@ enum class EventKind : uint8_t {
   particle_attached,  // which: particle (paper 2.2, fig. 4), value: its distance to the tip [m]
   particle_released,  // which: particle, value: how far it was dragged [m] (fig. 5b)
   tip_exited,         // which: bite
-  bite_cancelled,     // the needle was drawn back; which: bite
+  bite_withdrawn,     // the needle was withdrawn; which: bite
   suture_point,       // which: suture point, value: index of the bite
   bite_completed,     // which: bite, value: length from entry to exit [m]
   particle_passed,    // which: suture point, value: +1 toward the needle, -1 toward the free end (figs. 7, 8)
-  order_broken,       // which: suture point that is not next to the one before (2.5.1)
+  bite_out_of_order,  // which: suture point that is not next to the one before (2.5.1)
   ring_complete,      // which: number of suture points
   closure_started,    // value: opening area [m^2]
   closure_finished,   // value: opening area [m^2]
-  thread_ran_out,     // which: suture point; the free end reached it and holds
+  thread_exhausted,   // which: suture point; the free end reached it and holds
   tissue_grasped,     // who: hand, which: particle
   tissue_released,    // who: hand, which: particle, value: 0 or the force at which it slipped out [N]
   loop_formed,        // who: hand with the tool that it lies round, which: wraps, value: +1 or -1, its handedness
   loop_rejected,      // who: hand, reason; reported once until the reason changes (2.4)
   loop_released,      // who: hand; the loop came off without a knot
-  knot_begun,         // who: hand that pulls, which: knot, value: wraps
-  knot_locked,        // which: knot, value: tension when it was set [N]
-  knot_cancelled,     // which: knot; the free end was let go before it reached the tissue
-  thread_cut,    // who: hand, which: slot toward the free end, value: thread to the nearest suture point or knot [m], -1: none
-  suture_taken,  // which: how many were taken before; a fresh needle and thread lie ready
-  stitch_settled,        // which: settled stitch; its thread is no longer simulated (3.4)
-  seam_closed,           // which: row of SutureView::seam, value: what is left of its gap [m]
+  throw_started,      // who: hand that pulls, which: knot, value: wraps
+  throw_locked,       // which: knot, value: tension when it was set [N]
+  throw_undone,       // which: knot; the free end was let go before it reached the tissue
+  thread_cut,     // who: hand, which: slot toward the free end, value: thread to the nearest suture point or knot [m], -1: none
+  suture_loaded,  // which: how many were taken before; a fresh needle and thread lie ready
+  suture_baked,   // which: settled stitch; its thread is no longer simulated (3.4)
+  seam_closed,    // which: row of SutureView::seam, value: what is left of its gap [m]
   instrument_taken,      // who: hand, which: instrument
   instrument_laid_down,  // who: hand, which: instrument
   instrument_parked,     // who: hand, which: instrument; it stays on what it holds

@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // exchange: what a hand may feel until the next tick. Physics is slow and a hand is fast: a force that is held for a frame
-// pumps energy into the hand, so the simulation never sends a force. It sends the neighbourhood of one: how force changes when
+// pumps energy into the hand, so the simulation never sends a force. It sends the neighborhood of one: how force changes when
 // the hand moves, where contact ends, how it rubs, and until when all this may be believed. The servo evaluates it a thousand
 // times a second (haptic/force_model). Self-contained, no pointers. World frame, SI units; forces act on the hand.
 #pragma once
@@ -11,11 +12,12 @@ namespace catgut {
 
 struct ForcePatch {
   uint64_t tick = 0;
-  uint32_t epoch = 0;     // counts jumps in time (begin again, take back): what was felt before is void
-  uint32_t topology = 0;  // counts what changes at once (pierced, taken, let go): the new patch is not blended with the old
-  uint64_t time_ns = 0;   // on the servo's clock, when the physics was done with it
-  float period = 0;       // [s] between two ticks
-  float expiry = 0.03f;   // [s] of age from which it is no longer believed (Force Dimension's watchdog: 31.9 ms at most)
+  uint32_t epoch = 0;  // counts jumps in time (begin again, undo): what was felt before is void
+  uint32_t discontinuity_id =
+      0;                 // counts what changes at once (pierced, taken, let go): the new patch is not blended with the old
+  uint64_t time_ns = 0;  // on the servo's clock, when the physics was done with it
+  float period = 0;      // [s] between two ticks
+  float expiry = 0.03f;  // [s] of age from which it is no longer believed (Force Dimension's watchdog: 31.9 ms at most)
 
   // The linear part: force + stiffness (point - x) - damping v. Stiffness and damping are symmetric and positive semidefinite.
   Vec3 point;      // [m] where the hand was

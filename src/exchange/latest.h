@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 // exchange: a box for the newest value, between one writer and one reader that never wait for each other: three slots, of which
 // the writer fills one, the reader looks at one, and the third is the newest that was finished. What the reader did not come
 // for in time is written over: newest wins. (What must not be lost goes through exchange/ring.)
 //
-// No allocation and no lock. A payload with vectors keeps their memory from one round to the next: fill the draft anew instead
+// No allocation and no lock. A payload with vectors keeps their memory from one round to the next: fill the draft again instead
 // of building another.
 #pragma once
 #include <array>

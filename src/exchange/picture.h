@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // exchange: what a picture of the scene needs and that never changes during a run. Built once from the model, then only
 // Snapshots flow to the renderer.
 #pragma once
@@ -19,7 +20,7 @@ enum class TissueLayer : uint8_t { serosa = 0, mucosa = 1, cut_edge = 2 };
 struct VisibleMesh {
   std::vector<Vec3> position;                          // [m] at rest
   std::vector<Vec3> normal;                            // unit, at rest, outward
-  std::vector<std::array<float, 2>> uv;                // metres along and around the organ / 0.01, for textures
+  std::vector<std::array<float, 2>> uv;                // meters along and around the organ / 0.01, for textures
   std::vector<TissueLayer> layer;                      // per vertex
   std::vector<std::array<uint32_t, 3>> triangle;       // counter-clockwise seen from outside
   std::vector<std::array<uint32_t, 4>> skin_particle;  // indices into Snapshot::particle
@@ -43,7 +44,7 @@ struct PictureModel {
   std::vector<Vec3> particle_rest;                                    // [m] rest position of every tissue particle
   std::vector<SuturePicture> suture = std::vector<SuturePicture>(1);  // as Snapshot::suture
   std::vector<InstrumentPicture> instrument;                          // as Snapshot::instrument
-  Vec3 focus;                                                         // [m] centre of the operating field
+  Vec3 focus;                                                         // [m] center of the operating field
   float field = 0.1f;                                                 // [m] its radius
   float drape = -0.035f;  // [m] height of the sterile drape (horizontal), which the organ stands up through
   // One per wall that the procedure works on: tissue particles round its near opening, in order, on its outer side. Walls are

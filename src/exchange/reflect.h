@@ -11,7 +11,9 @@ namespace catgut {
 
 constexpr void reflect(auto& a, Like<Sym3> auto& s) { a(s.xx), a(s.yy), a(s.zz), a(s.xy), a(s.xz), a(s.yz); }
 
-constexpr void reflect(auto& a, Like<KnotThrow> auto& t) { a(t.wraps), a(t.handed), a(t.needle_end), a(t.tension), a(t.gap); }
+constexpr void reflect(auto& a, Like<KnotThrow> auto& t) {
+  a(t.wraps), a(t.chirality), a(t.needle_end), a(t.tension), a(t.gap);
+}
 
 constexpr void reflect(auto& a, Like<Event> auto& e) {
   a.at_most(e.kind, EventKind::technique_fault), a(e.who), a(e.which), a(e.value), a(e.where);
@@ -20,7 +22,7 @@ constexpr void reflect(auto& a, Like<Event> auto& e) {
 constexpr void reflect(auto& a, Like<EventList> auto& e) { a(e.tick), a(e.list); }
 
 constexpr void reflect(auto& a, Like<ForcePatch> auto& p) {
-  a(p.tick), a(p.epoch), a(p.topology), a(p.time_ns), a(p.period), a(p.expiry);
+  a(p.tick), a(p.epoch), a(p.discontinuity_id), a(p.time_ns), a(p.period), a(p.expiry);
   a(p.point), a(p.force), a(p.stiffness), a(p.damping), a(p.normal), a(p.gap);
   a(p.coefficient), a(p.drag), a(p.presliding), a(p.viscous), a(p.along);
   a(p.pierce), a(p.pierce_force), a(p.pierce_keep), a(p.thread_direction), a(p.thread_tension), a(p.cap);

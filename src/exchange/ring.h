@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // exchange: a queue of fixed size between one writer and one reader that never wait for each other. Nothing is lost on the way:
 // when it is full push() says so and the writer decides. For commands and events; poses go through exchange/latest.
 #pragma once

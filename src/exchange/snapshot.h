@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // exchange: the state of the operating field after a tick, for the picture, the surgeon, the host and (later) assessment.
 // Self-contained: plain values, no pointers into the simulation.
 #pragma once
@@ -45,7 +46,7 @@ struct InstrumentView {
 };
 
 struct NeedleView {
-  Pose pose;  // frame at the circle's centre: point(phi) = radius (cos phi, sin phi, 0), phi from 0 (swage) to arc (tip)
+  Pose pose;  // frame at the circle's center: point(phi) = radius (cos phi, sin phi, 0), phi from 0 (swage) to arc (tip)
   bool in_tissue = false;
   uint32_t bite = 0;  // the bite being made, valid while in_tissue
 };
@@ -62,7 +63,7 @@ struct SuturePointView {
 // One throw of a knot, for the picture and for who judges it (square, granny, 2-1-1, air knot).
 struct KnotThrow {
   uint32_t wraps = 1;
-  int32_t handed = 1;      // of the loop, +1 or -1 (ToolView::loop_handed): a reef knot's two differ, a granny's do not
+  int32_t chirality = 1;   // of the loop, +1 or -1 (ToolView::loop_handed): a reef knot's two differ, a granny's do not
   int32_t needle_end = 1;  // 1: the end with the needle was wrapped, 0: the free end
   float tension = 0;       // [N] of the pulled strand when it was set
   float gap = 0;           // [m] to the tissue, or to the throw before it, when it was set
@@ -71,12 +72,12 @@ struct KnotThrow {
 enum class KnotPhase : uint32_t { tightening, locked };
 
 struct KnotView {
-  static constexpr size_t kMostThrows = 8;
+  static constexpr size_t kMaxThrows = 8;
   KnotPhase phase = KnotPhase::tightening;
   Vec3 position;  // [m]
   Vec3 way;       // unit: along the stitch it ties, from its free-end side to its needle side
   uint32_t throws = 0;
-  std::array<KnotThrow, kMostThrows> thrown;
+  std::array<KnotThrow, kMaxThrows> thrown;
 };
 
 // A tied stitch that is no longer simulated: its thread as a curve that the tissue carries, tails included.
@@ -101,7 +102,7 @@ struct BiteView {
   bool entry_inside = false, exit_inside = false;  // that end lies on the mucosa
 };
 
-// One needle with its thread, and what has been sewn with it.
+// One needle with its thread, and what has been sutured with it.
 struct SutureView {
   NeedleView needle;
   std::vector<uint32_t> thread_order;  // particle indices from the free end to the needle
@@ -119,7 +120,7 @@ struct Snapshot {
   uint64_t tick = 0;
   double time_s = 0;
   std::vector<Vec3> particle;            // [m] tissue particles of every body, then thread slots
-  std::vector<Quat> rotation;            // per tissue particle: rotation of the cluster centred on it
+  std::vector<Quat> rotation;            // per tissue particle: rotation of the cluster centered on it
   std::array<ToolView, kMaxHands> tool;  // per hand
   std::vector<InstrumentView> instrument;
   std::vector<SutureView> suture = std::vector<SutureView>(1);  // at least one

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // exchange: see strand.h.
 #include "exchange/strand.h"
 

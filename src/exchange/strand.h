@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // exchange: what can be seen and measured of the thread in a Snapshot: how long a piece of it is, which strand lies where. For
 // callers that handle it: the scripted surgeon, the help that hands without hardware get.
 #pragma once

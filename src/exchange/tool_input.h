@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // exchange: the only way into a tick. A device (or the scripted surgeon, or a recording) publishes one whole ToolInput per
 // hand; the host adds commands; together they are the TickInput.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // exchange: see tying.h.
 #include "exchange/tying.h"
 
@@ -83,7 +84,7 @@ Vec3 winding_swage(const Winding& w, const AcrossTool& across, float wound, floa
 void feel_winding(Winding& w, const Snapshot& seen, const AcrossTool& across, float behind, float room, float dt) {
   const float tension = needle_tension(seen);
   if (!((behind < 0.005f && room > w.free) || tension > kTieTooTaut)) return;
-  // Before the first throw nothing but friction holds the thread in its holes: no more is asked for than there is.
+  // Before the first throw nothing but friction holds the thread in its holes: no more is requested than there is.
   const float there_is = w.reach - distance(w.start, winding_axis(w, across)) - kTieWound * std::max(0.0f, w.wound) + 0.002f;
   const float most = seen.active().knot.empty() ? std::max(0.006f, there_is) : w.reach;
   w.free = std::clamp(feel_strand(w.free, tension, dt), 0.006f, most);
@@ -118,7 +119,7 @@ bool best_tail_grip(const PictureModel& picture, const Snapshot& seen, size_t wh
       const float s = std::clamp(dot(tip - knot, run) / std::max(length2(run), 1e-12f), 0.0f, 1.0f);
       float good = loop ? std::min(distance(tip, knot + run * s), kTieClear) / kTieClear : 1;
       if (length(run) > leash) good -= 1 + 100 * (length(run) - leash);
-      // Tissue in the way of the shaft.
+      // Tissue in the path of the shaft.
       for (size_t k = 0; k < picture.particle_rest.size(); ++k) {
         const Vec3 d = seen.particle[k] - tip;
         const float along = dot(d, z);

@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // exchange: the geometry of an instrument tie, read off a Snapshot: where the strand is wound, where the needle goes meanwhile,
-// where the tail is best taken. For whoever ties: the scripted surgeon, the help that hands without hardware get. Why it is
-// done so: docs/rooms/surgeon.md, "An instrument tie".
+// where the tail is best taken. For a caller that ties: the scripted surgeon, the help that hands without hardware get. Why it
+// is done so: docs/rooms/surgeon.md, "An instrument tie".
 //
 // One hand holds the needle, the other lays its tool across the strand. A throw:
 //
@@ -80,11 +81,11 @@ void feel_winding(Winding& w, const Snapshot& seen, const AcrossTool& across, fl
 Vec3 strand_above(const Winding& w, const AcrossTool& across, Vec3 turns);
 
 // A tail that has slipped down between the edges: easy to take as far as `easy` [m] below the knot, then worse by `worse` a
-// metre.
+// meter.
 struct TailDepth {
   float easy, worse;
 };
-// The script comes down as carefully as it likes. Somebody at a mouse or a gamepad, seeing few pictures a second, does not
+// The script comes down as carefully as it likes. A user at a mouse or a gamepad, seeing few pictures a second, does not
 // finish a stitch with the script's figures (tests/hands).
 constexpr TailDepth kTailByScript{0.010f, 50}, kTailByHand{0.006f, 30};
 

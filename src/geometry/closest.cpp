@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/closest: nearest points on triangles, one by one or through a tree of boxes. Reads meshes, writes nothing.
 #include "geometry/closest.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/closest: nearest points of segments and triangles, and of a triangle mesh.
 #pragma once
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/editable_mesh: the collapse, split and flip of edges that remeshing is made of.
 #include "geometry/editable_mesh.h"
 
@@ -25,7 +26,7 @@ EditableMesh::EditableMesh(const TriangleMesh& mesh)
   for (const auto& a : around_) alive_ += !a.empty();
 }
 
-std::vector<uint32_t> EditableMesh::neighbours(uint32_t v) const {
+std::vector<uint32_t> EditableMesh::neighbors(uint32_t v) const {
   std::vector<uint32_t> out;
   for (uint32_t t : around_[v]) {
     for (uint32_t u : triangle_[t]) {
@@ -70,7 +71,7 @@ bool EditableMesh::rim_edge(uint32_t a, uint32_t b) const {
 std::vector<std::pair<uint32_t, uint32_t>> EditableMesh::edges() const {
   std::vector<std::pair<uint32_t, uint32_t>> out;
   for (uint32_t v = 0; v < around_.size(); ++v) {
-    for (uint32_t u : neighbours(v)) {
+    for (uint32_t u : neighbors(v)) {
       if (v < u) out.push_back({v, u});
     }
   }
@@ -110,12 +111,12 @@ bool EditableMesh::collapse(uint32_t a, uint32_t b, Vec3 p, size_t rim_left) {
   uint32_t wing[2];
   const int wings = opposite(a, b, wing);
   if (rim_[a] && rim_[b] && (wings != 1 || rim_left <= 5)) return false;  // would pinch or close an opening
-  const auto na = neighbours(a), nb = neighbours(b);
+  const auto na = neighbors(a), nb = neighbors(b);
   std::vector<uint32_t> common;
   std::set_intersection(na.begin(), na.end(), nb.begin(), nb.end(), std::back_inserter(common));
   if (static_cast<int>(common.size()) != wings) return false;  // link condition
   for (uint32_t w : common) {
-    if (neighbours(w).size() <= (rim_[w] ? 3u : 4u)) return false;  // a wing vertex loses a neighbour
+    if (neighbors(w).size() <= (rim_[w] ? 3u : 4u)) return false;  // a wing vertex loses a neighbor
   }
   for (const uint32_t v : {a, b}) {
     for (uint32_t t : around_[v]) {
@@ -144,9 +145,9 @@ bool EditableMesh::collapse(uint32_t a, uint32_t b, Vec3 p, size_t rim_left) {
 bool EditableMesh::flip(uint32_t a, uint32_t b) {
   uint32_t c[2];
   if (opposite(a, b, c) != 2) return false;
-  const auto nc = neighbours(c[0]);
+  const auto nc = neighbors(c[0]);
   if (std::binary_search(nc.begin(), nc.end(), c[1])) return false;
-  if (neighbours(a).size() <= 3 || neighbours(b).size() <= 3) return false;
+  if (neighbors(a).size() <= 3 || neighbors(b).size() <= 3) return false;
   // Triangles a b c0 and b a c1 become c0 c1 b and c1 c0 a... written so that each keeps facing the same way.
   const Triangle old0{a, b, c[0]}, old1{b, a, c[1]}, new0{c[0], a, c[1]}, new1{c[1], b, c[0]};
   const Vec3 up = area_vector(old0) + area_vector(old1);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/editable_mesh: a manifold surface whose edges can be split, collapsed and flipped one at a time. Used by remesh.
 // Vertices and triangles keep their numbers for life; dead ones stay as gaps until `finish`.
 #pragma once
@@ -18,8 +19,8 @@ class EditableMesh {
   size_t slots() const { return position.size(); }
   bool alive(uint32_t v) const { return !around_[v].empty(); }
   bool on_rim(uint32_t v) const { return rim_[v]; }
-  std::vector<uint32_t> neighbours(uint32_t v) const;  // ascending
-  Vec3 normal(uint32_t v) const;                       // area weighted; {0,0,0} without area
+  std::vector<uint32_t> neighbors(uint32_t v) const;  // ascending
+  Vec3 normal(uint32_t v) const;                      // area weighted; {0,0,0} without area
   // The vertices opposite the edge, one per triangle on it (0, 1 or 2). first is the one of the triangle that runs a to b.
   int opposite(uint32_t a, uint32_t b, uint32_t out[2]) const;
   bool rim_edge(uint32_t a, uint32_t b) const;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/mesh: an indexed triangle mesh, the common coin of importers, generators and the picture.
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/mesh_clean: welds, orients and checks what a file gave. Says plainly what cannot be used.
 #include "geometry/mesh_clean.h"
 
@@ -50,7 +51,7 @@ void check_edges(const TriangleMesh& mesh, const std::vector<HalfEdge>& edge, co
                    "clean it in a mesh editor (Blender: Merge by Distance, then Select Non Manifold), or choose a single node");
 }
 
-// Turns triangles until neighbours agree; returns the piece each triangle belongs to (pieces join along edges).
+// Turns triangles until neighbors agree; returns the piece each triangle belongs to (pieces join along edges).
 std::vector<uint32_t> orient_pieces(TriangleMesh& mesh, const std::vector<HalfEdge>& edge, uint32_t& pieces,
                                     const std::string& where) {
   struct Link {

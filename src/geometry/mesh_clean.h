@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/mesh_clean: makes a manifold, evenly oriented surface of a triangle soup, or says why it cannot.
 #pragma once
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/mesh_io: reads surfaces through assimp. Reads files; throws InputError.
 #include "geometry/mesh_io.h"
 
@@ -150,7 +151,7 @@ TriangleMesh read_mesh(const std::string& path, const std::string& node) {
       throw InputError(path, fmt::format("no node \"{}\"", node),
                        "choose one of: " + (list.empty() ? "(none has triangles)" : list));
     }
-    // list_nodes goes depth first, so the node and all below it are neighbours in the list.
+    // list_nodes goes depth first, so the node and all below it are neighbors in the list.
     for (auto f = match; f != nodes.end(); ++f) {
       const aiNode* up = f->node;
       while (up && up != match->node) up = up->mParent;

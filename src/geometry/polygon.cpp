@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/polygon: measures of closed loops in space (Newell).
 #include "geometry/polygon.h"
 
@@ -24,7 +25,7 @@ float loop_length(std::span<const Vec3> loop) {
   return sum;
 }
 
-Vec3 loop_centre(std::span<const Vec3> loop) {
+Vec3 loop_center(std::span<const Vec3> loop) {
   if (loop.empty()) return {};
   Vec3 sum;
   float weight = 0;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/polygon: measures of a closed loop of points (the rim of an opening, a loop of thread). The last point joins the
 // first.
 #pragma once
@@ -13,7 +14,7 @@ float loop_area(std::span<const Vec3> loop);
 Vec3 loop_normal(std::span<const Vec3> loop);
 // [m] round the loop.
 float loop_length(std::span<const Vec3> loop);
-// [m] centre of the loop as a curve (each edge weighted by its length: uneven spacing does not pull it aside).
-Vec3 loop_centre(std::span<const Vec3> loop);
+// [m] center of the loop as a curve (each edge weighted by its length: uneven spacing does not pull it aside).
+Vec3 loop_center(std::span<const Vec3> loop);
 
 }  // namespace catgut

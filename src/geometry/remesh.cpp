@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/remesh: brings a surface to an exact number of evenly spread vertices.
 #include "geometry/remesh.h"
 
@@ -96,7 +97,7 @@ class Remesher {
     queue_.insert({l, e});
   }
   void forget(uint32_t v) {
-    for (uint32_t u : edit_.neighbours(v)) {
+    for (uint32_t u : edit_.neighbors(v)) {
       const auto known = length_.find(std::minmax(u, v));
       if (known == length_.end()) continue;
       queue_.erase({known->second, known->first});
@@ -104,7 +105,7 @@ class Remesher {
     }
   }
   void learn(uint32_t v) {
-    for (uint32_t u : edit_.neighbours(v)) {
+    for (uint32_t u : edit_.neighbors(v)) {
       if (!length_.count(std::minmax(u, v))) enqueue(std::minmax(u, v));
     }
   }
@@ -183,7 +184,7 @@ class Remesher {
   }
 
   void even_out() {
-    // No more than a tenth of the vertices in a round: the smoothing between rounds tells which are really too far apart.
+    // No more than a tenth of the vertices in a round: the smoothing between rounds reports which are really too far apart.
     const size_t most = target_ / 10 + 1;
     for (size_t i = 0; i < most && !queue_.empty() && queue_.rbegin()->first > 1.4f * edge_; ++i)
       split(queue_.rbegin()->second);
@@ -205,7 +206,7 @@ class Remesher {
     }
   }
   int off(uint32_t v, int change) const {
-    const int d = static_cast<int>(edit_.neighbours(v).size()) + change - (edit_.on_rim(v) ? 4 : 6);
+    const int d = static_cast<int>(edit_.neighbors(v).size()) + change - (edit_.on_rim(v) ? 4 : 6);
     return d * d;
   }
   bool fewer_odd(uint32_t a, uint32_t b, const uint32_t c[2]) const {
@@ -224,7 +225,7 @@ class Remesher {
   void slide_inside() {
     for (uint32_t v = 0; v < edit_.slots(); ++v) {
       if (!edit_.alive(v) || edit_.on_rim(v)) continue;
-      const auto next = edit_.neighbours(v);
+      const auto next = edit_.neighbors(v);
       Vec3 middle;
       for (uint32_t u : next) middle += edit_.position[u] / static_cast<float>(next.size());
       const Vec3 n = edit_.normal(v), step = middle - edit_.position[v];

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/remesh: the same surface with another number of vertices, evenly spread: particles want equal distances, organ files
 // rarely have them.
 #pragma once
@@ -9,7 +10,7 @@ namespace catgut {
 
 // A manifold surface with exactly `vertices` vertices on `mesh` (manifold, one piece, as clean_mesh leaves it) and triangles as
 // near equilateral as its shape allows. Edges are split and collapsed one at a time (link condition: the surface keeps its
-// kind), flipped toward six neighbours, and vertices slide along the surface. Vertices on a rim slide along the rim only and
+// kind), flipped toward six neighbors, and vertices slide along the surface. Vertices on a rim slide along the rim only and
 // end evenly spaced on it. The same input gives the same bits. where: the file, for messages. Throws InputError when so few
 // vertices cannot carry the surface.
 TriangleMesh remesh(const TriangleMesh& mesh, size_t vertices, const std::string& where);

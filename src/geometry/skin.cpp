@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/skin: linear skinning of the visible mesh (paper 2.1). Reads particles, writes vertices.
 #include "geometry/skin.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/skin: moves a visible mesh with its particles by linear skinning (paper 2.1: "adjustable influence radii and
 // falloff").
 #pragma once
@@ -8,7 +9,7 @@
 namespace catgut {
 
 // Fills skin_particle and skin_weight of `mesh`: each vertex follows its (up to four) nearest particles within `influence` [m],
-// weight (1 - d / reach)^falloff normalised, where reach = the smaller of `influence` and the distance of the fifth nearest: a
+// weight (1 - d / reach)^falloff normalized, where reach = the smaller of `influence` and the distance of the fifth nearest: a
 // particle's weight has faded to nothing where another takes its place among the four, so the picture has no seams.
 // A vertex with none in reach follows its nearest alone. particle_rest must not be empty.
 void bind_skin(VisibleMesh& mesh, std::span<const Vec3> particle_rest, float influence, float falloff);

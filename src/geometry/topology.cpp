@@ -1,11 +1,12 @@
-// geometry/topology: who is whose neighbour in a triangle mesh; boundary loops, normals, area and volume.
+// SPDX-License-Identifier: Apache-2.0
+// geometry/topology: who is whose neighbor in a triangle mesh; boundary loops, normals, area and volume.
 #include "geometry/topology.h"
 
 #include <algorithm>
 
 namespace catgut {
 
-std::vector<std::vector<uint32_t>> vertex_neighbours(std::span<const Triangle> triangle, size_t vertices) {
+std::vector<std::vector<uint32_t>> vertex_neighbors(std::span<const Triangle> triangle, size_t vertices) {
   std::vector<std::vector<uint32_t>> next(vertices);
   for (const Triangle& t : triangle) {
     for (int k = 0; k < 3; ++k) {
@@ -21,7 +22,7 @@ std::vector<std::vector<uint32_t>> vertex_neighbours(std::span<const Triangle> t
 }
 
 std::vector<std::vector<uint32_t>> boundary_loops(std::span<const Triangle> triangle) {
-  // Half-edge h = 3 t + k runs from corner k to corner k + 1 of triangle t; its twin runs the other way in the neighbour.
+  // Half-edge h = 3 t + k runs from corner k to corner k + 1 of triangle t; its twin runs the other way in the neighbor.
   const uint32_t count = static_cast<uint32_t>(3 * triangle.size());
   const auto from = [&](uint32_t h) { return triangle[h / 3][h % 3]; };
   const auto to = [&](uint32_t h) { return triangle[h / 3][(h + 1) % 3]; };

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // geometry/topology: who is next to whom in a triangle mesh. Plain functions over index lists; results depend only on the
 // mesh, in ascending or walking order, never on hashing.
 #pragma once
@@ -10,11 +11,11 @@
 namespace catgut {
 
 // For each of `vertices` vertices, those that share an edge with it, ascending.
-std::vector<std::vector<uint32_t>> vertex_neighbours(std::span<const Triangle> triangle, size_t vertices);
+std::vector<std::vector<uint32_t>> vertex_neighbors(std::span<const Triangle> triangle, size_t vertices);
 
 // The openings of a manifold surface: each loop in walking order, counter-clockwise seen from outside the opening (its
 // loop_normal points out of the organ when triangles are counter-clockwise seen from outside). Loops come by ascending
-// smallest vertex, each beginning with it. Where two openings touch in one vertex they are told apart by the triangle fan.
+// smallest vertex, each beginning with it. Where two openings touch in one vertex they are reported apart by the triangle fan.
 std::vector<std::vector<uint32_t>> boundary_loops(std::span<const Triangle> triangle);
 
 // Unit normals, each triangle's weighted by its angle at the vertex; {0,0,0} for a vertex without area.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // haptic/force_model: see the header.
 #include "haptic/force_model.h"
 
@@ -33,7 +34,7 @@ bool make_safe(ForcePatch& p, float force, float stiffness, float damping) {
   if (!finite) {
     const ForcePatch was = p;
     p = {};
-    p.tick = was.tick, p.epoch = was.epoch, p.topology = was.topology, p.time_ns = was.time_ns;
+    p.tick = was.tick, p.epoch = was.epoch, p.discontinuity_id = was.discontinuity_id, p.time_ns = was.time_ns;
     p.cap = 0;
     return false;
   }
@@ -87,7 +88,7 @@ float room_for_friction(const ForcePatch& p, float budget) {
 }  // namespace
 
 void receive(ForceModel& m, const ForcePatch& patch, const ForceModelOptions& options) {
-  const bool fresh = !m.any || patch.epoch != m.now.epoch || patch.topology != m.now.topology;
+  const bool fresh = !m.any || patch.epoch != m.now.epoch || patch.discontinuity_id != m.now.discontinuity_id;
   const Vec3 before = smooth_force(m, m.last, m.velocity);
   m.now = patch;
   if (length2(patch.along) > 0 && patch.drag > 0)  // rubbed along the direction that the patch is stiff in, too

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // haptic: what a patch means at the place where the hand is now. Reads ForcePatch, writes a force [N] in the world frame.
 // Pure: no clock, no lock, no allocation; the same calls give the same bits. Sources: docs/references.md.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // haptic/limiter: see the header. The order of the steps is that of docs/rooms/haptic.md.
 #include "haptic/limiter.h"
 
@@ -30,7 +31,7 @@ Vec3 limit(Limiter& s, const LimiterInput& in, float raw_dt, const LimiterOption
   const float dt = safe_dt(s, raw_dt, o), slew_dt = std::min(dt, o.slew_time);
   Vec3 f = in.wanted;
 
-  // Finite. What is no number is no force, and whoever made it is not believed until things are quiet again.
+  // Finite. What is not a number is no force, and a caller that made it is not believed until things are quiet again.
   if (!is_finite(f) || !std::isfinite(in.speed) || !std::isfinite(in.warmth) || !std::isfinite(in.cap)) {
     s.faults |= kNotFinite;
     f = {};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // haptic: everything between the force that was worked out and the motors, in this order: finite, age of
 // the model, soft map, clamp, slew, heat, ramp-in; the energy controller (haptic/passivity) comes after it. Reads a wanted
 // force, writes an allowed one; both in the arm's frame [N]. Pure: time is handed in.
@@ -13,14 +14,14 @@ struct LimiterOptions {
   float force = 3.3f;        // [N] length of the vector, not per axis (Touch: 3.3)
   float continuous = 0.88f;  // [N] leaky RMS (Touch's data sheet, from memory: the driver's own number replaces it)
   float knee = 1.5f;         // [N] up to here 1:1; beyond it
-  float above = 0.5f;        // so much per newton: a bowel that tears at 4.6 N stays stronger than a knot that ties at 3.8
+  float above = 0.5f;        // that much per newton: a bowel that tears at 4.6 N stays stronger than a knot that ties at 3.8
   float slew = 500;          // [N/s] 0.5 N/ms: a puncture's drop of 1 to 1.8 N in 3 to 5 ms passes
   float slew_recovery = 20;  // [N/s] 0.02 N/ms while force comes back
   // [s] the slew acts on at most this much of a step: after a gap the motors get the step of one millisecond, not of the gap.
   float slew_time = 0.001f;
   float late = 0.005f;        // [s] a longer gap between two steps is a fault, and force recovers slowly
   float decay = 0.02f;        // [s] time constant once the model has expired
-  float off_after = 0.06f;    // [s] after expiry: off, and engage anew; with an expiry of 30 ms, within 100 ms
+  float off_after = 0.06f;    // [s] after expiry: off, and engage again; with an expiry of 30 ms, within 100 ms
   float heat_time = 10;       // [s] of the leaky mean (an assumption; no motor model was found)
   float margin = 0.95f;       // of the continuous force: a mean over minutes contains what the leaky one let through at first
   float warm = 0.8f;          // of ArmSample::warmth from which force backs off to nothing at 1
@@ -55,7 +56,7 @@ struct Limiter {
   bool recovering = false;  // slew_recovery holds until force has caught up
   float heat = 0;           // [N^2] leaky mean of what went out
   Vec3 out;                 // [N] the last force
-  uint32_t faults = 0;      // LimiterFault bits seen so far; whoever may log does so once for each
+  uint32_t faults = 0;      // LimiterFault bits seen so far; a caller that may log does so once for each
 };
 
 struct LimiterInput {
@@ -70,7 +71,7 @@ struct LimiterInput {
 
 // dt [s]: since the last call; whatever is not between 0 and 20 ms counts as 1 ms and as a fault.
 Vec3 limit(Limiter& limiter, const LimiterInput& in, float dt, const LimiterOptions& options = {});
-// The force goes off (through the slew) and has to engage anew.
+// The force goes off (through the slew) and has to engage again.
 void disengage(Limiter& limiter);
 // dt, or 1 ms where it cannot be right (kTimeBack); a gap longer than `late` is a fault (kLate) and starts a recovery.
 float safe_dt(Limiter& limiter, float dt, const LimiterOptions& options = {});

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // haptic/passivity: see the header.
 #include "haptic/passivity.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // haptic: a net under everything else. Counts the energy that went into the hand and, when it is more than the rendering can
 // have held, brakes the hand as far as the arm may brake (time-domain passivity, Hannaford and Ryu 2002). It keeps things safe,
 // not good: alone under a held force it leaves a limit cycle of a millimeter (`catgut bench haptics`). Pure; in the arm's

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // haptic/servo: see the header.
 #include "haptic/servo.h"
 
@@ -134,7 +135,7 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
     const uint64_t made = h.model.now.time_ns;
     if (made > now_ns + 5000000) h.limiter.faults |= kTimeBack;
     in.age = made < now_ns ? 1e-9f * static_cast<float>(now_ns - made) : 0;
-    // Nothing is to be felt (cap 0: somebody else moves the tool), or the patch belongs to another place.
+    // Nothing is to be felt (cap 0: someone else moves the tool), or the patch belongs to another place.
     if (h.model.now.cap <= 0) disengage(h.limiter);
     const ForcePatch& p = h.model.now;
     if (p.cap > 0 && ready && off_patch(p, world.p) > o.reach + h.fast * (in.age + p.period)) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // haptic: one millisecond of one hand. Reads an ArmSample and, when there is one, a newer ForcePatch; writes the force for the
 // motors and the whole pose for the simulation. Nothing here waits, allocates, logs or reads a clock: it runs in the callback
 // of the arm's driver. docs/rooms/haptic.md has the chain.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // haptic: the multi-rate comparison of docs/rooms/haptic.md, with the code that drives the arms. One dimension: a hand presses
 // a wall of tissue, holds, and lets go, on an arm, while a slow simulation computes the tissue. Who renders what in between
 // decides whether the hand feels tissue or a machine gun. `catgut bench haptics` prints it, tests/haptic holds it to its

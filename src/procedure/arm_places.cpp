@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // procedure/arm_places: see the header.
 #include "procedure/arm_places.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // procedure: where each haptic arm's workspace lies in the field, kept per user (the file) and per arm (its serial number).
 // Written by `catgut devices --calibrate`, read when a scene opens.
 #pragma once
@@ -9,7 +10,7 @@
 namespace catgut {
 
 struct ArmPlace {
-  float scale = 1;  // metres in the field per metre of the stylus
+  float scale = 1;  // meters in the field per meter of the stylus
   float turn = 0;   // [degrees] of the arm about the vertical, counter-clockwise from above
   Vec3 middle;      // [m] arm frame: what becomes the middle of the hand's side of the field
 };

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // procedure: see lesson.h.
 #include "procedure/lesson.h"
 
@@ -19,7 +20,7 @@ bool happens(std::span<const Event> happened, EventKind kind) {
   return std::any_of(happened.begin(), happened.end(), [&](const Event& e) { return e.kind == kind; });
 }
 
-// Goals that stay met, and that nobody meets without having done what comes before.
+// Goals that stay met, and that no one meets without having done what comes before.
 bool lasts(LessonGoal goal) { return goal == LessonGoal::bites || goal == LessonGoal::closed || goal == LessonGoal::throws; }
 
 }  // namespace
@@ -32,7 +33,7 @@ const Lesson& first_stitch() {
         "Grasp the needle",
         "Move the needle holder to the needle and close the jaws.",
         "Move the mouse until the needle holder snaps to the needle, then click.",
-        LessonGoal::needle_in_driver,
+        LessonGoal::needle_in_holder,
         0,
         {0},
         0},
@@ -48,7 +49,7 @@ const Lesson& first_stitch() {
         "Return the needle",
         "Grasp the needle with the needle holder, then release the forceps.",
         "Lift the forceps. Tab, point at the needle, click. Tab, click to open the forceps.",
-        LessonGoal::needle_in_driver,
+        LessonGoal::needle_in_holder,
         0,
         {2},
         2},
@@ -113,7 +114,7 @@ const Lesson& first_stitch() {
 
 bool step_done(const LessonStep& step, const Snapshot& seen, std::span<const Event> happened) {
   switch (step.goal) {
-    case LessonGoal::needle_in_driver:
+    case LessonGoal::needle_in_holder:
       return seen.tool[0].held == Held::needle && seen.tool[1].held != Held::needle;
     case LessonGoal::bites:
       return static_cast<float>(complete_bites(seen)) >= step.amount && !seen.active().needle.in_tissue;
@@ -127,7 +128,7 @@ bool step_done(const LessonStep& step, const Snapshot& seen, std::span<const Eve
     case LessonGoal::wound:
       return seen.tool[0].loop_wraps > 0 || seen.tool[1].loop_wraps > 0 || happens(happened, EventKind::loop_formed);
     case LessonGoal::tail_through:
-      return happens(happened, EventKind::knot_begun) ||
+      return happens(happened, EventKind::throw_started) ||
              (!seen.active().knot.empty() && seen.active().knot.back().phase == KnotPhase::tightening);
     case LessonGoal::throws:
       return static_cast<float>(locked_throws(seen)) >= step.amount;

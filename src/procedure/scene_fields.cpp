@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // procedure: the table of scene keys. Reads sim/scene.h's defaults; writes nothing.
 #include "procedure/scene_fields.h"
 
@@ -86,9 +87,9 @@ const Field kField[] = {
     {"suture", "attach_threshold", "m", 0, 0.1, nullptr, "maximum distance of an attached particle from the needle tip (X of figure 4)", TOP(suture.attach_threshold)},
     {"suture", "release_distance", "m", 0, 0.1, nullptr, "drag distance at which the attached particle is released (figure 5)", TOP(suture.release_distance)},
     {"suture", "attach_compliance", "m/N", 0, 1000, nullptr, "compliance of that attachment", TOP(suture.attach_compliance)},
-    {"suture", "channel_compliance", "m/N", 0, 1000, nullptr, "lateral compliance of the needle track", TOP(suture.channel_compliance)},
+    {"suture", "track_compliance", "m/N", 0, 1000, nullptr, "lateral compliance of the needle track", TOP(suture.track_compliance)},
     {"suture", "pass_tension", "N", 0, 1000, nullptr, "tension difference above which thread slides through a suture point", TOP(suture.pass_tension)},
-    {"suture", "capstan", "", 0, 10, nullptr, "capstan friction: increase of pass_tension per newton of tension, friction coefficient times bending angle", TOP(suture.capstan)},
+    {"suture", "capstan_friction", "", 0, 10, nullptr, "capstan friction: increase of pass_tension per newton of tension, friction coefficient times bending angle", TOP(suture.capstan_friction)},
     {"suture", "collision_off", "", 0, 100, nullptr, "thread particles without collision on each side of a locked one", TOP(suture.collision_off)},
     {"suture", "grasp_reach", "m", 0, 0.1, nullptr, "maximum distance at which a closing jaw grasps needle or thread", TOP(suture.grasp_reach)},
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // procedure: the one table of everything a scene file can say. The reader, the writer, --set, `catgut describe`,
 // docs/scene_reference.md and the tests all walk it, so a key added here is complete everywhere at once.
 // Default values are not repeated in the table: they are read from a default-constructed SceneSpec.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // procedure: reads and writes scene files. Walks the table in scene_fields; knows no key of its own but `expect`.
 #include "procedure/scene_file.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // procedure: scene files. A scene is a TOML file of the keys in scene_fields; whatever it leaves out keeps the default of
 // sim/scene.h. Every fault is an InputError of one line that names file:line, the fault and the nearest right key.
 #pragma once

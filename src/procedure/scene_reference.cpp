@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // procedure: writes the manual of scene files from the table; see scene_reference.h.
 #include "procedure/scene_reference.h"
 

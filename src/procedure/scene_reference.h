@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // procedure: the manual of scene files, written from the table of keys: for `catgut describe` and docs/scene_reference.md.
 #pragma once
 #include <string>

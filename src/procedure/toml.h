@@ -1,8 +1,9 @@
-// procedure: toml++ with one fault mended. Whoever reads TOML includes this and never toml++ itself: two versions of its tables
-// in one program would be one too many.
+// SPDX-License-Identifier: Apache-2.0
+// procedure: toml++ with one fault mended. A caller that reads TOML includes this and never toml++ itself: two versions of its
+// tables in one program would be one too many.
 #pragma once
 // clang-format off
-// toml++ 3.3 tells blanks and letters by tables that call most of what they do not hold unreachable, which is undefined behaviour
+// toml++ 3.3 reports blanks and letters by tables that call most of what they do not hold unreachable, which is undefined behavior
 // on text that anybody may write. Here what is not in the table is simply not of that kind.
 #include <toml++/impl/preprocessor.h>
 #undef TOML_UNREACHABLE

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/camera: see camera.h.
 #include "render/camera.h"
 

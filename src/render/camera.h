@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/camera: where pictures are taken from. Reads the model and snapshots; writes nothing.
 #pragma once
 #include "core/math.h"

@@ -40,7 +40,7 @@ Image draw_capsules(std::span<const DrawnCapsule> capsules, const CapsuleView& v
         const Vec3 normal = Vec3{qx, qy, rise} / r;
         const float shade = 0.30f + 0.70f * std::max(0.0f, dot(normal, light)), edge = rise / r < 0.25f ? 0.45f : 1.0f;
         for (size_t i = 0; i < 3; ++i)
-          image.rgba[4 * k + i] = static_cast<uint8_t>(std::min(255.0f, shade * edge * static_cast<float>(c.colour[i])));
+          image.rgba[4 * k + i] = static_cast<uint8_t>(std::min(255.0f, shade * edge * static_cast<float>(c.color[i])));
       }
   }
   return image;

@@ -12,7 +12,7 @@ namespace catgut {
 struct DrawnCapsule {
   Vec3 a, b;         // [m]
   float radius = 0;  // [m]
-  Colour colour{255, 255, 255, 255};
+  Color color{255, 255, 255, 255};
 };
 struct CapsuleView {
   Vec3 center;                           // [m] in the middle of the picture

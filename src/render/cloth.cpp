@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/shapes: drape, wound and gauze; see shapes.h. Height fields, worked out once.
 #include <functional>
 
@@ -48,7 +49,7 @@ float lobules(float x, float z, float size) {
 
 // A grid of (rows + 1) x (columns + 1) vertices at place(i, j), seen from where its normals point.
 void add_grid(Shape& shape, int rows, int columns, float repeat, const std::function<Vec3(float, float)>& place,
-              const std::function<Vec3(Vec3)>& colour) {
+              const std::function<Vec3(Vec3)>& color) {
   const uint32_t first = uint32_t(shape.position.size());
   for (int i = 0; i <= rows; ++i)
     for (int j = 0; j <= columns; ++j) {
@@ -62,7 +63,7 @@ void add_grid(Shape& shape, int rows, int columns, float repeat, const std::func
       shape.normal.push_back(n);
       shape.tangent.push_back(normalized(Vec3{1, 0, 0} - n * n.x, {0, 0, 1}));
       shape.uv.push_back({p.x / repeat, p.z / repeat});
-      shape.colour.push_back(colour(p));
+      shape.color.push_back(color(p));
     }
   for (uint32_t i = 0; i < uint32_t(rows); ++i)
     for (uint32_t j = 0; j < uint32_t(columns); ++j) {
@@ -84,7 +85,7 @@ float hole_radius(float hole, float angle) {
   return hole * (1.10f + 0.10f * std::cos(2 * angle - 0.5f) + 0.015f * std::sin(5 * angle));
 }
 
-Shape drape_shape(Vec3 centre, float hole, float size) {
+Shape drape_shape(Vec3 center, float hole, float size) {
   const auto place = [&](float s, float t) {
     const float a = 2 * kPi * t, edge = hole > 0 ? hole_radius(hole, a) : 0, r = edge + (size - edge) * s * (0.04f + 0.96f * s);
     const float x = r * std::cos(a), z = -r * std::sin(a), in = r - edge;
@@ -94,11 +95,11 @@ Shape drape_shape(Vec3 centre, float hole, float size) {
     const float out = hole > 0 ? std::clamp((in - 0.004f) / 0.03f, 0.0f, 1.0f) : 1;
     const float y =
         roll + out * (1.6f * mm * (cloth_height(x, z) - 1.4f) + 5.5f * mm * folds(x, z)) - 0.05f * std::max(0.0f, in - 0.06f);
-    return centre + Vec3{x, y, z};
+    return center + Vec3{x, y, z};
   };
   Shape shape;
   add_grid(shape, 48, 96, 0.01f, place, [&](Vec3 p) {
-    const float x = p.x - centre.x, z = p.z - centre.z, r = std::hypot(x, z),
+    const float x = p.x - center.x, z = p.z - center.z, r = std::hypot(x, z),
                 edge = hole > 0 ? hole_radius(hole, std::atan2(-z, x)) : -1;
     // Worn and damp near the wound, never quite even elsewhere.
     const float dry = std::clamp((r - edge) / 0.02f, 0.0f, 1.0f), wear = 0.04f * cloth_height(0.6f * x + 0.2f, 0.7f * z);
@@ -107,18 +108,18 @@ Shape drape_shape(Vec3 centre, float hole, float size) {
   return shape;
 }
 
-Shape wound_bed_shape(Vec3 centre, float radius) {
+Shape wound_bed_shape(Vec3 center, float radius) {
   const auto height = [](float x, float z) {
     const float big = lobules(x, z, 7.5f * mm), small = lobules(x + 0.31f, z, 3.0f * mm);
     return 2.6f * mm * std::sqrt(big) + 0.7f * mm * std::sqrt(small);
   };
   const auto place = [&](float s, float t) {
     const float a = 2 * kPi * t, r = hole_radius(radius, a) * (0.45f + 0.55f * s), x = r * std::cos(a), z = -r * std::sin(a);
-    return centre + Vec3{x, height(x, z) - 2.5f * mm, z};
+    return center + Vec3{x, height(x, z) - 2.5f * mm, z};
   };
   Shape shape;
   add_grid(shape, 30, 110, 0.04f, place, [&](Vec3 p) {
-    const float x = p.x - centre.x, z = p.z - centre.z;
+    const float x = p.x - center.x, z = p.z - center.z;
     const float top = std::sqrt(lobules(x, z, 7.5f * mm)),
                 blush = std::clamp(0.45f + 0.4f * cloth_height(1.7f * x, 1.9f * z + 0.1f), 0.0f, 1.0f);
     const Vec3 fat = lerp(srgb(252, 228, 168), srgb(244, 198, 150), blush);

@@ -1,4 +1,5 @@
-// render/frame_cost: what a frame costs the processor before anything is rasterised: moving the meshes, handing them over and
+// SPDX-License-Identifier: Apache-2.0
+// render/frame_cost: what a frame costs the processor before anything is rasterized: moving the meshes, handing them over and
 // recording the draws for every eye, on Filament's backend that draws nothing. What is left of a headset's 11 ms is the
 // graphics card's and the simulation's.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/image: see image.h.
 #include "render/image.h"
 
@@ -16,7 +17,7 @@ namespace {
 
 constexpr int kLetterWidth = 6, kLetterHeight = 8;  // one empty column and row between letters
 
-void blend_pixel(Image& image, int x, int y, Colour c) {
+void blend_pixel(Image& image, int x, int y, Color c) {
   if (x < 0 || y < 0 || x >= image.width || y >= image.height) return;
   uint8_t* p = &image.rgba[(size_t(y) * size_t(image.width) + size_t(x)) * 4];
   for (size_t k = 0; k < 3; ++k) p[k] = uint8_t((p[k] * (255 - c[3]) + c[k] * c[3] + 127) / 255);
@@ -25,13 +26,13 @@ void blend_pixel(Image& image, int x, int y, Colour c) {
 
 }  // namespace
 
-Image make_image(int width, int height, Colour fill) {
+Image make_image(int width, int height, Color fill) {
   Image image{width, height, std::vector<uint8_t>(size_t(width) * size_t(height) * 4)};
   for (size_t i = 0; i < image.rgba.size(); ++i) image.rgba[i] = fill[i % 4];
   return image;
 }
 
-Colour pixel(const Image& image, int x, int y) {
+Color pixel(const Image& image, int x, int y) {
   if (x < 0 || y < 0 || x >= image.width || y >= image.height) return {};
   const uint8_t* p = &image.rgba[(size_t(y) * size_t(image.width) + size_t(x)) * 4];
   return {p[0], p[1], p[2], p[3]};
@@ -39,7 +40,7 @@ Colour pixel(const Image& image, int x, int y) {
 
 int text_width(std::string_view text, int scale) { return int(text.size()) * kLetterWidth * scale; }
 
-void draw_text(Image& image, int x, int y, std::string_view text, Colour colour, int scale) {
+void draw_text(Image& image, int x, int y, std::string_view text, Color color, int scale) {
   for (const char letter : text) {
     static constexpr uint8_t box[5] = {0x7f, 0x41, 0x41, 0x41, 0x7f};
     const uint8_t* columns = letter >= 32 && letter <= 126 ? kFont5x7[letter - 32] : box;
@@ -47,7 +48,7 @@ void draw_text(Image& image, int x, int y, std::string_view text, Colour colour,
       for (int j = 0; j < 7; ++j)
         if (columns[i] >> j & 1)
           for (int a = 0; a < scale; ++a)
-            for (int b = 0; b < scale; ++b) blend_pixel(image, x + i * scale + a, y + j * scale + b, colour);
+            for (int b = 0; b < scale; ++b) blend_pixel(image, x + i * scale + a, y + j * scale + b, color);
     x += kLetterWidth * scale;
   }
 }

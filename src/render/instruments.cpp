@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/shapes: needle, needle driver and forceps; see shapes.h. Sizes follow the instruments on a surgeon's table:
 // a 180 mm needle holder with gold rings, 150 mm tissue forceps.
 #include <vector>
@@ -9,22 +10,22 @@ namespace {
 
 constexpr float mm = 0.001f;
 
-void add_line_tube(Shape& shape, std::span<const Vec3> through, float r0, float r1, Vec3 colour) {
-  std::vector<Vec3> centre;
-  smooth_curve(through, 8, centre);
-  std::vector<float> radius(centre.size());
-  for (size_t i = 0; i < centre.size(); ++i) radius[i] = r0 + (r1 - r0) * float(i) / float(centre.size() - 1);
-  add_tube(shape, centre, radius, 14, colour);
+void add_line_tube(Shape& shape, std::span<const Vec3> through, float r0, float r1, Vec3 color) {
+  std::vector<Vec3> center;
+  smooth_curve(through, 8, center);
+  std::vector<float> radius(center.size());
+  for (size_t i = 0; i < center.size(); ++i) radius[i] = r0 + (r1 - r0) * float(i) / float(center.size() - 1);
+  add_tube(shape, center, radius, 14, color);
 }
 
-void add_ring(Shape& shape, Vec3 centre, float rx, float rz, float wire, Vec3 colour) {
+void add_ring(Shape& shape, Vec3 center, float rx, float rz, float wire, Vec3 color) {
   std::vector<Vec3> points;
   for (int i = 0; i <= 40; ++i) {
     const float a = 2 * kPi * float(i) / 40;
-    points.push_back(centre + Vec3{rx * std::cos(a), 0, rz * std::sin(a)});
+    points.push_back(center + Vec3{rx * std::cos(a), 0, rz * std::sin(a)});
   }
   const std::vector<float> radius(points.size(), wire);
-  add_tube(shape, points, radius, 12, colour);
+  add_tube(shape, points, radius, 12, color);
 }
 
 ToolShape needle_driver() {
@@ -200,12 +201,12 @@ ToolShape retractor() {
 
 Shape needle_shape(const SuturePicture& model) {
   constexpr int n = 64;
-  std::vector<Vec3> centre;
+  std::vector<Vec3> center;
   std::vector<float> radius;
   const float wire = model.needle_wire_radius, r = model.needle_radius;
   for (int i = 0; i <= n; ++i) {
     const float s = float(i) / n, phi = s * model.needle_arc;
-    centre.push_back({r * std::cos(phi), r * std::sin(phi), 0});
+    center.push_back({r * std::cos(phi), r * std::sin(phi), 0});
     // The swage is drilled and a little thicker than the thread it holds; the last fifth tapers to the point.
     const float to_tip = (1 - s) / 0.2f;
     radius.push_back(wire * (to_tip < 1  ? 0.04f + 0.96f * std::sqrt(to_tip) * (1.5f - 0.5f * to_tip)
@@ -213,7 +214,7 @@ Shape needle_shape(const SuturePicture& model) {
                                          : 1.0f));
   }
   Shape shape;
-  add_tube(shape, centre, radius, 12, srgb(228, 230, 234));
+  add_tube(shape, center, radius, 12, srgb(228, 230, 234));
   return shape;
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render: what a build without pictures (CATGUT_RENDER=OFF) answers. Physics, recordings and tests of them need no graphics.
 #include <stdexcept>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/orbit: see orbit.h.
 #include "render/orbit.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/orbit: a camera that goes round the operating field and stays where it was left: hands that are moved as they are seen
 // need a picture that does not move under them.
 #pragma once

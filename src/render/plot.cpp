@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/plot: see plot.h.
 #include "render/plot.h"
 
@@ -8,16 +9,16 @@
 namespace catgut {
 namespace {
 
-constexpr Colour kPaper{252, 252, 250, 255}, kInk{40, 44, 48, 255}, kFaint{226, 228, 226, 255}, kLevel{150, 60, 50, 255};
+constexpr Color kPaper{252, 252, 250, 255}, kInk{40, 44, 48, 255}, kFaint{226, 228, 226, 255}, kLevel{150, 60, 50, 255};
 constexpr int kKeyLine = 14;  // [pixels] a line of the key
 
-void dot(Image& image, int x, int y, Colour c) {
+void dot(Image& image, int x, int y, Color c) {
   if (x < 0 || y < 0 || x >= image.width || y >= image.height) return;
   std::copy(c.begin(), c.end(), image.rgba.begin() + (std::ptrdiff_t{y} * image.width + x) * 4);
 }
 
 // dash: so many pixels drawn, so many not; 0: all of them.
-void line(Image& image, int x0, int y0, int x1, int y1, Colour c, int thick = 1, int dash = 0) {
+void line(Image& image, int x0, int y0, int x1, int y1, Color c, int thick = 1, int dash = 0) {
   const int steps = std::max({std::abs(x1 - x0), std::abs(y1 - y0), 1});
   for (int i = 0; i <= steps; ++i) {
     if (dash > 0 && i / dash % 2 != 0) continue;
@@ -76,9 +77,9 @@ Image draw_plot(const Plot& plot, int width, int height) {
     for (int x = std::max(left, at_x(b.from)); x <= std::min(right, at_x(b.to)); ++x) {
       const double part = (x - at_x(b.from)) / std::max(1.0, static_cast<double>(at_x(b.to) - at_x(b.from)));
       const auto along = [&](const std::array<double, 2>& y) { return at_y(y[0] + part * (y[1] - y[0])); };
-      for (int y = along(b.high); y <= along(b.low); ++y) dot(image, x, y, b.colour);
+      for (int y = along(b.high); y <= along(b.low); ++y) dot(image, x, y, b.color);
     }
-    line(image, left, key, left + 12, key, b.colour, 8);
+    line(image, left, key, left + 12, key, b.color, 8);
     draw_text(image, left + 28, key, b.name, kInk);
     key += kKeyLine;
   }
@@ -118,12 +119,12 @@ Image draw_plot(const Plot& plot, int width, int height) {
       }
       const int x = at_x(p[0]), y = at_y(p[1]);
       if (!c.joined) {
-        line(image, x - 3, y - 3, x + 3, y + 3, c.colour, 2);
-        line(image, x - 3, y + 3, x + 3, y - 3, c.colour, 2);
+        line(image, x - 3, y - 3, x + 3, y + 3, c.color, 2);
+        line(image, x - 3, y + 3, x + 3, y - 3, c.color, 2);
       } else {
-        if (before) line(image, at_x((*before)[0]), at_y((*before)[1]), x, y, c.colour, 2);
+        if (before) line(image, at_x((*before)[0]), at_y((*before)[1]), x, y, c.color, 2);
         for (int a = -1; c.dots && a <= 2; ++a)
-          for (int b = -1; b <= 2; ++b) dot(image, x + a, y + b, c.colour);
+          for (int b = -1; b <= 2; ++b) dot(image, x + a, y + b, c.color);
       }
       before = &p;
     }
@@ -134,7 +135,7 @@ Image draw_plot(const Plot& plot, int width, int height) {
   draw_text(image, (left + right - text_width(plot.x_name)) / 2, bottom + 20, plot.x_name, kInk);
   int x = left;
   for (const PlotCurve& c : plot.curve) {
-    line(image, x, height - 16, x + 12, height - 16, c.colour, 3);
+    line(image, x, height - 16, x + 12, height - 16, c.color, 3);
     draw_text(image, x + 18, height - 18, c.name, kInk);
     x += 18 + text_width(c.name) + 18;
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render: a small plot: curves over a common x axis, a logarithmic or linear y axis, shaded bands and level lines with a name.
 // For reports of the program itself; needs neither a graphics card nor a font file.
 #pragma once
@@ -11,7 +12,7 @@ namespace catgut {
 
 struct PlotCurve {
   std::string name;
-  Colour colour{};
+  Color color{};
   std::vector<std::array<double, 2>> point;  // on a logarithmic axis y above 0, others are left out
   bool joined = true;                        // false: points alone, as crosses
   bool dots = true;                          // on a joined curve: where its points are
@@ -23,7 +24,7 @@ struct PlotLevel {
 // What is expected between `from` and `to`, behind the curves: from `low` to `high` at either end. Its name stands in the key.
 struct PlotBand {
   std::string name;
-  Colour colour{};
+  Color color{};
   double from = 0, to = 0;
   std::array<double, 2> low{}, high{};
 };

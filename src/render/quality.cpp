@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/quality: see quality.h.
 #include "render/quality.h"
 
@@ -28,7 +29,7 @@ double median_frame(Renderer& renderer, const Snapshot& snapshot, const Camera& 
 }  // namespace
 
 Quality best_quality(std::span<const QualityTrial> trials, double budget_ms) {
-  Quality best = Quality::draft;
+  Quality best = Quality::low;
   for (const QualityTrial& t : trials)
     if (t.frame_ms <= budget_ms && t.quality > best) best = t.quality;
   return best;
@@ -39,18 +40,18 @@ QualityChoice choose_quality(const PictureModel& model, const Snapshot& snapshot
   const Camera camera = overview(model);
   width = std::clamp(width, 16, 8192), height = std::clamp(height, 16, 8192);
   try {
-    // Without a graphics card a whole picture takes a second: a small one tells as much in less.
+    // Without a graphics card a whole picture takes a second: a small one reports as much in less.
     {
-      const auto small = make_renderer(model, std::max(16, width / 4), std::max(16, height / 4), Quality::draft);
+      const auto small = make_renderer(model, std::max(16, width / 4), std::max(16, height / 4), Quality::low);
       const double least = median_frame(*small, snapshot, camera, budget_ms);
-      if (least > budget_ms) return {Quality::draft, {{Quality::draft, least}}};
+      if (least > budget_ms) return {Quality::low, {{Quality::low, least}}};
     }
-    for (const Quality quality : {Quality::draft, Quality::medium, Quality::good}) {
+    for (const Quality quality : {Quality::low, Quality::medium, Quality::high}) {
       const auto renderer = make_renderer(model, width, height, quality);
       choice.trials.push_back({quality, median_frame(*renderer, snapshot, camera, budget_ms)});
       if (choice.trials.back().frame_ms > budget_ms) break;
     }
-  } catch (const std::runtime_error&) {}  // whoever makes the window's renderer hears of it there
+  } catch (const std::runtime_error&) {}  // a caller that makes the window's renderer hears of it there
   choice.quality = best_quality(choice.trials, budget_ms);
   return choice;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/quality: which of the three levels of quality a machine bears, by a short measurement at its first start.
 #pragma once
 #include <span>
@@ -10,7 +11,7 @@
 namespace catgut {
 
 struct QualityTrial {
-  Quality quality = Quality::draft;
+  Quality quality = Quality::low;
   double frame_ms = 0;  // [ms] the median of some frames, until the last pixel was there; of frames a quarter of the size each
                         // way where even those were too slow
 };
@@ -22,7 +23,7 @@ Quality best_quality(std::span<const QualityTrial> trials, double budget_ms);
 constexpr double kFrameBudget = 12;
 
 struct QualityChoice {
-  Quality quality = Quality::draft;
+  Quality quality = Quality::low;
   std::vector<QualityTrial> trials;  // from draft up; what comes after one that is too slow is not tried
 };
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render: pictures of the operating field. Reads the PictureModel once and a Snapshot per picture; writes pixels and nothing
 // else. Nothing outside this room includes a header of the graphics library.
 #pragma once
@@ -13,9 +14,9 @@ namespace catgut {
 
 // Which one a machine bears: render/quality.h.
 enum class Quality {
-  draft,   // one sample a pixel, 1024 shadow map: for previews and for machines without a graphics card
+  low,     // one sample a pixel, 1024 shadow map: for previews and for machines without a graphics card
   medium,  // four samples, 2048 shadow map
-  good     // and a 4096 shadow map, ambient occlusion, a glow about highlights
+  high     // and a 4096 shadow map, ambient occlusion, a glow about highlights
 };
 
 struct Overlay {

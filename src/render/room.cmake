@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # render: PNG through libstb; pictures through Filament when CATGUT_RENDER is on. Video needs only the ffmpeg program at run time.
 find_library(STB_LIBRARY stb REQUIRED)
 target_link_libraries(catgut_render PRIVATE ${STB_LIBRARY})

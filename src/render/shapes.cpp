@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/shapes: the building blocks; see shapes.h. Tools and needle are in instruments.cpp, what lies about them in cloth.cpp.
 #include "render/shapes.h"
 
@@ -17,12 +18,12 @@ void smooth_normals(Shape& shape, size_t first, size_t first_triangle) {
   for (size_t v = first; v < shape.position.size(); ++v) shape.normal[v] = normalized(shape.normal[v], {0, 1, 0});
 }
 
-void add_vertex(Shape& shape, Vec3 p, Vec3 n, Vec3 t, float u, float v, Vec3 colour) {
+void add_vertex(Shape& shape, Vec3 p, Vec3 n, Vec3 t, float u, float v, Vec3 color) {
   shape.position.push_back(p);
   shape.normal.push_back(n);
   shape.tangent.push_back(t);
   shape.uv.push_back({u, v});
-  shape.colour.push_back(colour);
+  shape.color.push_back(color);
 }
 
 // Two triangles a step between the rings of `sides` corners that start at a and b (b further along the axis).
@@ -44,32 +45,32 @@ Vec3 srgb(int r, int g, int b) {
   return {linear(r), linear(g), linear(b)};
 }
 
-void add_tube(Shape& shape, std::span<const Vec3> centre, std::span<const float> radius, int sides, Vec3 colour) {
-  if (centre.size() < 2) return;
+void add_tube(Shape& shape, std::span<const Vec3> center, std::span<const float> radius, int sides, Vec3 color) {
+  if (center.size() < 2) return;
   const uint32_t first = uint32_t(shape.position.size());
-  Vec3 along = normalized(centre[1] - centre[0], {0, 0, 1});
+  Vec3 along = normalized(center[1] - center[0], {0, 0, 1});
   Vec3 side = any_perpendicular(along);
   float u = 0;
-  for (size_t i = 0; i < centre.size(); ++i) {
-    const Vec3 next = i + 1 < centre.size() ? centre[i + 1] : centre[i], last = i > 0 ? centre[i - 1] : centre[i];
+  for (size_t i = 0; i < center.size(); ++i) {
+    const Vec3 next = i + 1 < center.size() ? center[i + 1] : center[i], last = i > 0 ? center[i - 1] : center[i];
     along = normalized(next - last, along);
     side = normalized(side - along * dot(side, along), any_perpendicular(along));
     const Vec3 up = cross(along, side);
-    if (i > 0) u += distance(centre[i], centre[i - 1]);
+    if (i > 0) u += distance(center[i], center[i - 1]);
     for (int k = 0; k <= sides; ++k) {
       const float a = 2 * kPi * float(k) / float(sides);
       const Vec3 n = side * std::cos(a) + up * std::sin(a);
-      add_vertex(shape, centre[i] + radius[i] * n, n, along, u, float(k) / float(sides), colour);
+      add_vertex(shape, center[i] + radius[i] * n, n, along, u, float(k) / float(sides), color);
     }
   }
   const uint32_t ring = uint32_t(sides + 1);
-  for (uint32_t i = 0; i + 1 < uint32_t(centre.size()); ++i)
+  for (uint32_t i = 0; i + 1 < uint32_t(center.size()); ++i)
     join_rings(shape, first + i * ring, first + (i + 1) * ring, sides, sides + 1);
   for (const bool end : {false, true}) {
-    const size_t i = end ? centre.size() - 1 : 0;
-    const Vec3 out = end ? normalized(centre[i] - centre[i - 1]) : normalized(centre[0] - centre[1]);
+    const size_t i = end ? center.size() - 1 : 0;
+    const Vec3 out = end ? normalized(center[i] - center[i - 1]) : normalized(center[0] - center[1]);
     const uint32_t from = first + uint32_t(i) * ring, middle = uint32_t(shape.position.size());
-    add_vertex(shape, centre[i], out, any_perpendicular(out), end ? u : 0, 0, colour);
+    add_vertex(shape, center[i], out, any_perpendicular(out), end ? u : 0, 0, color);
     for (uint32_t k = 0; k < uint32_t(sides); ++k) {
       if (end) shape.triangle.push_back({from + k, from + k + 1, middle});
       else shape.triangle.push_back({from + k + 1, from + k, middle});
@@ -77,22 +78,22 @@ void add_tube(Shape& shape, std::span<const Vec3> centre, std::span<const float>
   }
 }
 
-void add_loft(Shape& shape, std::span<const Section> sections, Vec3 colour, float squareness) {
+void add_loft(Shape& shape, std::span<const Section> sections, Vec3 color, float squareness) {
   constexpr int sides = 20;
   const uint32_t first = uint32_t(shape.position.size());
   const size_t first_triangle = shape.triangle.size();
   // Sections may come in either direction along z; the corners' order follows so that the faces look outward.
-  const float turn = sections.back().centre.z > sections.front().centre.z ? 1.0f : -1.0f;
+  const float turn = sections.back().center.z > sections.front().center.z ? 1.0f : -1.0f;
   const auto ring = [&](const Section& s, float u) {
     for (int k = 0; k < sides; ++k) {
       const float a = turn * 2 * kPi * float(k) / sides, c = std::cos(a), d = std::sin(a), e = 2 / squareness;
       const float x = std::copysign(std::pow(std::abs(c), e), c), y = std::copysign(std::pow(std::abs(d), e), d);
-      add_vertex(shape, s.centre + Vec3{s.half_x * x, s.half_y * y, 0}, {}, {0, 0, 1}, u, float(k) / sides, colour);
+      add_vertex(shape, s.center + Vec3{s.half_x * x, s.half_y * y, 0}, {}, {0, 0, 1}, u, float(k) / sides, color);
     }
   };
   float u = 0;
   for (size_t i = 0; i < sections.size(); ++i) {
-    if (i > 0) u += distance(sections[i].centre, sections[i - 1].centre);
+    if (i > 0) u += distance(sections[i].center, sections[i - 1].center);
     ring(sections[i], u);
     if (i > 0) {
       const uint32_t b = first + uint32_t(i) * sides;
@@ -114,14 +115,14 @@ void add_loft(Shape& shape, std::span<const Section> sections, Vec3 colour, floa
   }
 }
 
-void add_ball(Shape& shape, Vec3 centre, float radius, Vec3 colour) {
+void add_ball(Shape& shape, Vec3 center, float radius, Vec3 color) {
   constexpr int around = 12, up = 8;
   const uint32_t first = uint32_t(shape.position.size());
   for (int i = 0; i <= up; ++i)
     for (int k = 0; k <= around; ++k) {
       const float p = kPi * float(i) / up, a = 2 * kPi * float(k) / around;
       const Vec3 n{std::sin(p) * std::cos(a), -std::cos(p), -std::sin(p) * std::sin(a)};
-      add_vertex(shape, centre + radius * n, n, {-std::sin(a), 0, -std::cos(a)}, float(k) / around, float(i) / up, colour);
+      add_vertex(shape, center + radius * n, n, {-std::sin(a), 0, -std::cos(a)}, float(k) / around, float(i) / up, color);
     }
   for (uint32_t i = 0; i < up; ++i)
     join_rings(shape, first + i * (around + 1), first + (i + 1) * (around + 1), around, around + 1);
@@ -133,7 +134,7 @@ void add_shape(Shape& to, const Shape& from) {
   to.normal.insert(to.normal.end(), from.normal.begin(), from.normal.end());
   to.tangent.insert(to.tangent.end(), from.tangent.begin(), from.tangent.end());
   to.uv.insert(to.uv.end(), from.uv.begin(), from.uv.end());
-  to.colour.insert(to.colour.end(), from.colour.begin(), from.colour.end());
+  to.color.insert(to.color.end(), from.color.begin(), from.color.end());
   to.hatched.resize(first, 0);
   to.hatched.insert(to.hatched.end(), from.hatched.begin(), from.hatched.end());
   for (const auto [a, b, c] : from.triangle) to.triangle.push_back({a + first, b + first, c + first});
@@ -159,7 +160,7 @@ void smooth_curve(std::span<const Vec3> through, int per_span, std::vector<Vec3>
   const size_t n = through.size();
   for (size_t i = 0; i + 1 < n; ++i) {
     const Vec3 b = through[i], c = through[i + 1];
-    // Mirrored neighbours at the ends keep the curve straight there.
+    // Mirrored neighbors at the ends keep the curve straight there.
     const Vec3 a = i > 0 ? through[i - 1] : 2.0f * b - c, d = i + 2 < n ? through[i + 2] : 2.0f * c - b;
     for (int k = 0; k < per_span; ++k) {
       const float t = float(k) / float(per_span), t2 = t * t, t3 = t2 * t;

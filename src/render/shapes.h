@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/shapes: triangle meshes made from a few numbers: tubes, lofts, tools, needle, drape. Plain geometry, no graphics
 // library; [m] throughout, counter-clockwise seen from outside.
 #pragma once
@@ -13,25 +14,25 @@ namespace catgut {
 struct Shape {
   std::vector<Vec3> position, normal, tangent;  // tangent: along the u of uv
   std::vector<std::array<float, 2>> uv;
-  std::vector<Vec3> colour;    // linear
+  std::vector<Vec3> color;     // linear
   std::vector<float> hatched;  // 1 on gripping faces of tools; may be shorter than the rest, which is then smooth
   std::vector<std::array<uint32_t, 3>> triangle;
 };
 
-Vec3 srgb(int r, int g, int b);  // linear colour of 8-bit sRGB values
+Vec3 srgb(int r, int g, int b);  // linear color of 8-bit sRGB values
 
-// A round tube along `centre` with a radius per point, `sides` corners and closed ends. u runs along it [m], v round it 0..1.
+// A round tube along `center` with a radius per point, `sides` corners and closed ends. u runs along it [m], v round it 0..1.
 // The frame is carried along the curve without turning about it, so a pattern on the tube does not twist.
-void add_tube(Shape& shape, std::span<const Vec3> centre, std::span<const float> radius, int sides, Vec3 colour);
+void add_tube(Shape& shape, std::span<const Vec3> center, std::span<const float> radius, int sides, Vec3 color);
 
 // Cross-sections in the xy plane with rounded corners, joined along their order.
 struct Section {
-  Vec3 centre;
+  Vec3 center;
   float half_x = 0, half_y = 0;
 };
-void add_loft(Shape& shape, std::span<const Section> sections, Vec3 colour, float squareness = 4);
+void add_loft(Shape& shape, std::span<const Section> sections, Vec3 color, float squareness = 4);
 
-void add_ball(Shape& shape, Vec3 centre, float radius, Vec3 colour);
+void add_ball(Shape& shape, Vec3 center, float radius, Vec3 color);
 void add_shape(Shape& to, const Shape& from);
 Shape moved(Shape shape, const Pose& pose);
 Shape mirrored_x(Shape shape);
@@ -51,11 +52,11 @@ struct ToolShape {
 // By kind; an instrument of a kind that has no shape here is drawn as its outline.
 ToolShape tool_shape(const InstrumentPicture& instrument);
 
-// The sterile drape: a cloth with folds at height centre.y, with a hole along an ellipse about (centre.x, centre.z) that is
+// The sterile drape: a cloth with folds at height center.y, with a hole along an ellipse about (center.x, center.z) that is
 // `hole` wide at least; 0: without a hole.
-Shape drape_shape(Vec3 centre, float hole, float size);
+Shape drape_shape(Vec3 center, float hole, float size);
 // What lies in the drape's hole round the organ: the fat of the wound's edges.
-Shape wound_bed_shape(Vec3 centre, float radius);
+Shape wound_bed_shape(Vec3 center, float radius);
 float hole_radius(float hole, float angle);  // [m] of the ellipse
 
 // A damp gauze swab laid over the end of an organ that lies on the drape. `body`: its surface; `away`: unit, level, from the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/skinned: see skinned.h.
 #include "render/skinned.h"
 

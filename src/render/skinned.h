@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/skinned: a mesh that follows particles, several frames of surface at a time: what geometry/skin computes, with the
 // texture's direction beside the normal, in the order and the form in which it is drawn. Once per picture, however many eyes
 // look at it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/video: see video.h. POSIX: the encoder is a child process that reads raw pixels from a pipe.
 #include "render/video.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/video: pictures piped to the `ffmpeg` program as they are made. The program and not the library, so that Catgut links
 // no encoder. Writes the file at `path` (H.264, yuv420p, so that every player shows it).
 #pragma once

@@ -1,5 +1,6 @@
-// render: the operating field in a window, with panels over it. The window itself belongs to whoever reads its events; here it
-// is a number of the X server's. Panels are Dear ImGui's: its context exists as long as the WindowRenderer does.
+// SPDX-License-Identifier: Apache-2.0
+// render: the operating field in a window, with panels over it. The window itself belongs to a caller that reads its events;
+// here it is a number of the X server's. Panels are Dear ImGui's: its context exists as long as the WindowRenderer does.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -22,7 +23,7 @@ class WindowRenderer {
   virtual void stage(const PictureModel* model, Quality quality) = 0;
   // From now on, and until the next stage(), the field has only `part` (0.25 .. 1) of the window's pixels each way; panels stay
   // sharp. Half the pixels take about a third of the time on a processor.
-  virtual void draw_coarser(float part) = 0;
+  virtual void set_resolution_scale(float part) = 0;
   virtual void resize(int width, int height) = 0;  // [pixels], when the window has changed
   // [pixels] of a line of the panels' text. Between frames; 16 at first.
   virtual void text_height(float pixels) = 0;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime/arm_server: see the header. Below, comments say which thread may touch what.
 #include "runtime/arm_server.h"
 
@@ -25,22 +26,22 @@ namespace {
 
 constexpr float kExpiry = 0.03f;         // [s] of silence from which a patch is no longer believed, whatever it says
 constexpr uint64_t kOldest = 150000000;  // [ns] of age of the sample that a patch was computed for
-constexpr uint64_t kFaultsFor = 256;     // [steps] for which a fault is told to the simulator: packets get lost
+constexpr uint64_t kFaultsFor = 256;     // [steps] for which a fault is reported to the simulator: packets get lost
 
 struct Peer {
   sockaddr_storage address{};
-  socklen_t bytes = 0;   // 0: nobody
+  socklen_t bytes = 0;   // 0: no one
   uint64_t session = 0;  // counts them
   BridgeKey caller{}, in{}, out{};
 };
-struct Order {
+struct ForceCommand {
   ForcePatch patch;
   uint64_t session = 0;
 };
 
 struct Side {
-  Latest<Order> order;  // receiver -> driver
-  Latest<Peer> peer;    // receiver -> driver
+  Latest<ForceCommand> force_command;  // receiver -> driver
+  Latest<Peer> peer;                   // receiver -> driver
   // The driver's.
   ServoOptions options;  // constant once it runs
   ServoHand servo;
@@ -48,8 +49,8 @@ struct Side {
   uint32_t recent = 0;  // faults
   // For any thread.
   std::atomic<uint32_t> faults{0};
-  // Of whoever asks for news.
-  uint32_t told = 0;
+  // Of a caller that asks for news.
+  uint32_t messages = 0;
   bool was_ready = true;
 };
 
@@ -84,7 +85,7 @@ struct ArmServer::Work {
   EnergyPool pool;                   // of the servos
   std::thread receiver;
   std::atomic<bool> quit{false};
-  std::atomic<uint64_t> accepted{0}, garbage{0}, version{0}, forged{0}, nonsense{0}, stranger{0}, old{0};
+  std::atomic<uint64_t> accepted{0}, garbage{0}, version{0}, forged{0}, invalid{0}, unknown_peer{0}, old{0};
   std::atomic<uint64_t> heard_ns{0}, bytes_out{0};
   // The receiver's.
   BridgeDoor door;
@@ -94,7 +95,7 @@ struct ArmServer::Work {
   std::array<BridgeKey, 64> used{};  // keys of callers that had a session: what they said once opens nothing again
   size_t openings = 0;
   BridgeBytes opened{};  // the answer that began this session
-  // Between the receiver, which rarely changes hands, and whoever asks for news; never the driver's.
+  // Between the receiver, which rarely changes hands, and a caller that asks for news; never the driver's.
   std::mutex lock;
   std::vector<std::string> news;
   bool was_silent = true;
@@ -115,7 +116,7 @@ struct ArmServer::Work {
     seal(to.out, {kind, static_cast<uint8_t>(arm), kBridgeVersion, n}, payload, packet);
     post(to, packet);
   }
-  void lend(const Peer& to) {
+  void assign_client(const Peer& to) {
     peer = to;
     peer.session = ++sessions;
     last = {};
@@ -126,7 +127,7 @@ struct ArmServer::Work {
   }
 
   static Vec3 step(void* user, size_t arm, const ArmSample& sample);
-  std::atomic<uint64_t>* take(const uint8_t* data, size_t size, const Peer& from);
+  std::atomic<uint64_t>* handle_packet(const uint8_t* data, size_t size, const Peer& from);
   std::atomic<uint64_t>* shake_hands(const uint8_t* data, const BridgeHead& head, const Peer& from);
   void receive();
   void stop();
@@ -138,16 +139,16 @@ Vec3 ArmServer::Work::step(void* user, size_t arm, const ArmSample& sample) {
   Side& s = w.side[arm];
   const uint64_t now = w.options.clock();
   s.peer.update();
-  const bool fresh = s.order.update();
+  const bool fresh = s.force_command.update();
   const Peer& peer = s.peer.seen();
-  const Order& order = s.order.seen();
+  const ForceCommand& force_command = s.force_command.seen();
   if (peer.session != s.session) {  // what the last one wanted is void
     s.session = peer.session;
     s.servo.has_patch = false;
     disengage(s.servo.limiter);
   }
-  const bool ordered = fresh && peer.bytes > 0 && order.session == peer.session;
-  const Vec3 force = servo_step(s.servo, s.options, sample, ordered ? &order.patch : nullptr, now, &w.pool, arm).force;
+  const bool ordered = fresh && peer.bytes > 0 && force_command.session == peer.session;
+  const Vec3 force = servo_step(s.servo, s.options, sample, ordered ? &force_command.patch : nullptr, now, &w.pool, arm).force;
   s.faults.fetch_or(s.servo.limiter.faults, std::memory_order_relaxed);
   if (s.servo.steps % kFaultsFor == 0) s.recent = 0;
   s.recent |= s.servo.limiter.faults;
@@ -165,7 +166,7 @@ Vec3 ArmServer::Work::step(void* user, size_t arm, const ArmSample& sample) {
 
 // Hello and open: nothing is kept of who has not proved that he has the key and hears at the address he writes from.
 std::atomic<uint64_t>* ArmServer::Work::shake_hands(const uint8_t* data, const BridgeHead& h, const Peer& from) {
-  if (h.kind != BridgeKind::hello && h.kind != BridgeKind::open) return &nonsense;
+  if (h.kind != BridgeKind::hello && h.kind != BridgeKind::open) return &invalid;
   if (!mac_is_right(door.shared, data)) return &forged;
   const uint64_t now = options.clock();
   const bool known = peer.bytes == from.bytes && same(peer.address, from.address, from.bytes);
@@ -173,7 +174,7 @@ std::atomic<uint64_t>* ArmServer::Work::shake_hands(const uint8_t* data, const B
   if (h.kind == BridgeKind::hello) {
     if (!known && !gone) {
       post(from, refused_packet(door.shared, kArmsTaken));
-      return &stranger;
+      return &unknown_peer;
     }
     post(from, cookie_packet(door, data, &from.address, from.bytes, now));
     return &accepted;
@@ -187,13 +188,13 @@ std::atomic<uint64_t>* ArmServer::Work::shake_hands(const uint8_t* data, const B
   if (std::find(used.begin(), used.end(), caller) != used.end()) return &old;
   if (!known && !gone) {
     post(from, refused_packet(door.shared, kArmsTaken));
-    return &stranger;
+    return &unknown_peer;
   }
   used[openings++ % used.size()] = caller;
   Peer next = from;
   next.caller = caller;
   opened = opened_packet(door, data, next.in, next.out);
-  lend(next);
+  assign_client(next);
   post(from, opened);
   heard_ns = 0;  // samples begin with the first packet that is sealed with this session's key
   if (!known) say("connected to the simulator at " + name_of(from));
@@ -201,7 +202,7 @@ std::atomic<uint64_t>* ArmServer::Work::shake_hands(const uint8_t* data, const B
 }
 
 // Returns the count that the packet belongs to.
-std::atomic<uint64_t>* ArmServer::Work::take(const uint8_t* data, size_t size, const Peer& from) {
+std::atomic<uint64_t>* ArmServer::Work::handle_packet(const uint8_t* data, size_t size, const Peer& from) {
   BridgeHead h;
   const BridgeFault fault = read_head(data, size, h);
   if (fault == BridgeFault::garbage) return &garbage;
@@ -209,9 +210,9 @@ std::atomic<uint64_t>* ArmServer::Work::take(const uint8_t* data, size_t size, c
     post(from, refused_packet(door.shared, kOtherVersion));  // its head says which one is spoken here
     return &version;
   }
-  if (fault == BridgeFault::nonsense) return &nonsense;
+  if (fault == BridgeFault::invalid) return &invalid;
   if (is_handshake(h.kind)) return shake_hands(data, h, from);
-  if (peer.bytes != from.bytes || !same(peer.address, from.address, from.bytes)) return &stranger;
+  if (peer.bytes != from.bytes || !same(peer.address, from.address, from.bytes)) return &unknown_peer;
   BridgePayload payload;
   if (!unseal(peer.in, data, payload)) return &forged;
   uint64_t& newest = last[static_cast<size_t>(h.kind)][h.arm];
@@ -220,22 +221,22 @@ std::atomic<uint64_t>* ArmServer::Work::take(const uint8_t* data, size_t size, c
   const uint64_t now = options.clock();
   if (h.kind == BridgeKind::bye) {
     say("released by the simulator at " + name_of(peer));
-    lend({});
+    assign_client({});
   } else if (h.kind == BridgeKind::ask) {
-    heard_ns = now;  // before the answer: whoever has it may count on samples
+    heard_ns = now;  // before the answer: a caller that has it may count on samples
     for (size_t k = 0; k < 2; ++k) {
       write_info(port.arm[k], payload);
       send_sealed(peer, BridgeKind::info, k, payload);
     }
   } else if (h.kind == BridgeKind::patch) {
-    Order& order = side[h.arm].order.draft();
-    if (!read_patch(payload, order.patch)) return &nonsense;
+    ForceCommand& force_command = side[h.arm].force_command.draft();
+    if (!read_patch(payload, force_command.patch)) return &invalid;
     heard_ns = now;
-    if (!accept_patch(order.patch, now)) return &old;
-    order.session = peer.session;
-    side[h.arm].order.publish();
+    if (!accept_patch(force_command.patch, now)) return &old;
+    force_command.session = peer.session;
+    side[h.arm].force_command.publish();
   } else {
-    return &nonsense;
+    return &invalid;
   }
   return &accepted;
 }
@@ -250,7 +251,7 @@ void ArmServer::Work::receive() {
       from.bytes = sizeof from.address;
       const ssize_t n = recvfrom(fd, data, sizeof data, MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from.address), &from.bytes);
       if (n < 0) break;
-      take(data, static_cast<size_t>(n), from)->fetch_add(1, std::memory_order_relaxed);
+      handle_packet(data, static_cast<size_t>(n), from)->fetch_add(1, std::memory_order_relaxed);
     }
   }
 }
@@ -306,7 +307,7 @@ uint64_t ArmServer::sent_bytes() const { return work_->bytes_out; }
 
 BridgeCounts ArmServer::counts() const {
   const Work& w = *work_;
-  return {w.accepted, w.garbage, w.version, w.forged, w.nonsense, w.stranger, w.old};
+  return {w.accepted, w.garbage, w.version, w.forged, w.invalid, w.unknown_peer, w.old};
 }
 
 std::vector<std::string> ArmServer::news() {
@@ -324,7 +325,7 @@ std::vector<std::string> ArmServer::news() {
     if (!w.port.arm[k].present) continue;
     Side& s = w.side[k];
     const std::string who = k == 0 ? "right device: " : "left device: ";
-    for (const std::string& line : new_faults(s.faults.exchange(0, std::memory_order_relaxed), s.told))
+    for (const std::string& line : new_faults(s.faults.exchange(0, std::memory_order_relaxed), s.messages))
       lines.push_back(who + line);
     const ArmStatus status = w.port.status(w.port.self, k);
     if (status.steps > 0 && status.ready != s.was_ready) {
@@ -333,7 +334,7 @@ std::vector<std::string> ArmServer::news() {
     }
   }
   const uint64_t dropped = counts().dropped();
-  if (dropped > 2 * w.told_dropped + 9) {  // each time it has doubled: a flood is told, not repeated
+  if (dropped > 2 * w.told_dropped + 9) {  // each time it has doubled: a flood is reported, not repeated
     lines.push_back(std::to_string(dropped) + " invalid packets discarded");
     w.told_dropped = dropped;
   }

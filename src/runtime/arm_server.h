@@ -1,7 +1,8 @@
-// runtime: the arm's end of the bridge (device/bridge): runs the arms of this machine and lends them to one simulator
+// SPDX-License-Identifier: Apache-2.0
+// runtime: the arm's end of the bridge (device/bridge): runs the arms of this machine and serves them to one simulator
 // elsewhere. It owns the millisecond and does not trust the other end: patches pass the same servo and limits as in a scene
 // (haptic/servo). When they stop, the force is zero within 100 ms by this machine's clock, without a step beyond the slew
-// limit. Each arm by itself.
+// limit. Each arm on its own.
 //
 // Who has not proved that he has the key gets at most as many bytes as he sent. Samples go out while valid packets come in, and
 // for 200 ms after. Anything but the loopback needs a key.
@@ -33,7 +34,7 @@ bool accept_patch(ForcePatch& patch, uint64_t now_ns);
 
 class ArmServer {
  public:
-  // Takes the port over, starts it, and lends its arms. Throws InputError when it cannot listen, has no key where one is
+  // Takes the port over, starts it, and serves its arms. Throws InputError when it cannot listen, has no key where one is
   // needed, or the arms do not start.
   ArmServer(ArmPort port, const ArmServerOptions& options);
   ~ArmServer();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime/arm_test: see the header.
 #include "runtime/arm_test.h"
 
@@ -147,10 +148,11 @@ std::array<Vec3, 2> held_places(ArmPort port, float countdown, const std::functi
   std::string why;
   if (!port.start(port.self, {Watch::step, &watch}, why))
     throw InputError(port.kind, why, "close other programs that use the devices");
-  for (double until = wall_seconds() + double{countdown}, told = 1e9; wall_seconds() < until && !stop;) {
+  for (double until = wall_seconds() + double{countdown}, messages = 1e9; wall_seconds() < until && !stop;) {
     const double left = std::ceil(until - wall_seconds());
-    if (left < told) say("hold each stylus at the center of its side of the field: " + std::to_string(static_cast<int>(left)));
-    told = left;
+    if (left < messages)
+      say("hold each stylus at the center of its side of the field: " + std::to_string(static_cast<int>(left)));
+    messages = left;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   port.stop(port.self);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: `catgut devices --calibrate`, and `--test`: a slow, small push of each arm along each axis, through the same limits
 // as in a scene, and what the stylus does under it.
 #pragma once
@@ -15,7 +16,7 @@ struct ArmTestOptions {
   float force = 0.5f;   // [N] at most
   float countdown = 3;  // [s] for the hands to take hold
   float push = 2;       // [s] per axis: up, a moment, down
-  float far = 0.05f;    // [m] a stylus that runs further off ends its arm's test: nobody holds it
+  float far = 0.05f;    // [m] a stylus that runs further off ends its arm's test: no one holds it
 };
 struct ArmTestResult {
   bool ok = true;

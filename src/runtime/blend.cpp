@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: see blend.h.
 #include "runtime/blend.h"
 
@@ -6,7 +7,7 @@ namespace {
 
 Pose between(const Pose& a, const Pose& b, float part) { return {lerp(a.p, b.p, part), nlerp(a.q, b.q, part)}; }
 
-// The same rows in the same order, as far as a picture can tell: rows are only ever added behind, or the list begins anew.
+// The same rows in the same order, as far as a picture can tell: rows are only ever added behind, or the list begins again.
 template <typename Row, typename Move>
 void each_row(const std::vector<Row>& before, std::vector<Row>& out, Move&& move) {
   if (before.size() != out.size()) return;

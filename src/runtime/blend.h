@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: a picture between two ticks. Reads two snapshots; writes a third.
 #pragma once
 #include "exchange/snapshot.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: where the next bite of a technique should go, for people: the places are those of the surgeon's plan, where the
 // tissue has carried them by now.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: makes the hands of a run; see hands.h.
 #include "runtime/hands.h"
 

@@ -1,4 +1,5 @@
-// runtime: who holds the tools in a run: the scripted surgeon, nobody, or the hands of a recording.
+// SPDX-License-Identifier: Apache-2.0
+// runtime: who holds the tools in a run: the scripted surgeon, no one, or the hands of a recording.
 #pragma once
 #include <memory>
 #include <string>

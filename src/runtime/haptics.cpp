@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime/haptics: see the header. Below, Side's members say which of the threads may touch them.
 #include "runtime/haptics.h"
 
@@ -68,11 +69,11 @@ struct Side {
   Latest<ForcePatch> patch;         // physics -> servo
   Latest<Hand> hand;                // servo -> physics
   std::atomic<uint32_t> faults{0};  // servo -> physics
-  // servo -> whoever shows it: what was written, the engagement, the faults of the last second
+  // servo -> a caller that shows it: what was written, the engagement, the faults of the last second
   std::atomic<float> force{0};
   std::atomic<Engaged> engaged{Engaged::no};
   std::atomic<uint32_t> recent{0};
-  std::unique_ptr<Ring<LogRow, 4096>> log;  // servo -> physics; null: nobody keeps it
+  std::unique_ptr<Ring<LogRow, 4096>> log;  // servo -> physics; null: no one keeps it
   // The servo's.
   ServoHand servo;
   ServoOptions options;  // constant once it runs
@@ -80,7 +81,7 @@ struct Side {
   uint64_t last_ns = 0;
   uint32_t lately = 0;
   // The physics'.
-  uint32_t told = 0, told_errors = 0;
+  uint32_t messages = 0, told_errors = 0;
   uint64_t taken_ns = 0;  // when the pose was sampled that the physics took last
   bool was_ready = true;
 };
@@ -228,7 +229,7 @@ void Haptics::publish(size_t k, const ForcePatch& patch, uint32_t epoch, float s
 
 void Haptics::rest(size_t k, uint32_t epoch) {
   if (work_->log) work_->write_log(k);
-  hand(k);  // of now: nothing else asks for it while somebody else moves the tool
+  hand(k);  // of now: nothing else asks for it while someone else moves the tool
   ForcePatch p;
   p.cap = 0;
   p.time_ns = work_->side[k].taken_ns;
@@ -253,7 +254,7 @@ std::vector<std::string> Haptics::news() {
     Side& s = work_->side[k];
     const std::string who = std::string(k == 0 ? "right device: " : "left device: ");
     const ArmStatus status = work_->port.status(work_->port.self, k);
-    for (const std::string& line : new_faults(s.faults.exchange(0, std::memory_order_relaxed) | status.faults, s.told))
+    for (const std::string& line : new_faults(s.faults.exchange(0, std::memory_order_relaxed) | status.faults, s.messages))
       lines.push_back(who + line);
     if (status.steps > 0 && status.ready != s.was_ready) {
       lines.push_back(who + (status.ready ? "reconnected"
@@ -293,10 +294,10 @@ void Haptics::stop() {
   if (work_->port.self) work_->port.stop(work_->port.self);
 }
 
-std::vector<std::string> new_faults(uint32_t faults, uint32_t& told) {
+std::vector<std::string> new_faults(uint32_t faults, uint32_t& messages) {
   std::vector<std::string> lines;
-  const uint32_t fresh = faults & ~told;
-  told |= fresh;
+  const uint32_t fresh = faults & ~messages;
+  messages |= fresh;
   for (uint32_t bit = 1; bit != 0 && bit <= fresh; bit <<= 1)
     if (fresh & bit) lines.push_back(word_of(bit));
   return lines;
@@ -341,9 +342,9 @@ ArmChoice read_arm_choice(const std::string& text) {
   throw InputError("--haptics " + text, "unknown device", "use " + all + "paper or off");
 }
 
-ArmPort open_arms(const ArmChoice& choice, std::vector<std::string>& told) {
+ArmPort open_arms(const ArmChoice& choice, std::vector<std::string>& messages) {
   for (const ArmDriver& d : arm_drivers())
-    if (choice.driver == d.word) return d.open(choice.where, told);
+    if (choice.driver == d.word) return d.open(choice.where, messages);
   return {};
 }
 

@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: two haptic arms in a run. Ties the driver (device/arm), the servo (haptic/servo) and the physics together: the
 // servo's millisecond runs in the driver's thread, the physics publishes a patch a tick and takes the newest poses, and they
 // meet at exchange/latest alone: no lock, no allocation and no logging on the servo's side. What went wrong there is a bit or a
-// number, and becomes a line here, told once.
+// number, and becomes a line here, reported once.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -53,7 +54,7 @@ constexpr const char* kHapticsLogHead =
     "t_s,arm,x,y,z,qx,qy,qz,qw,patch_tick,patch_age_s,patch_fx,patch_fy,patch_fz,stiffness_trace,wanted_x,wanted_y,wanted_z,"
     "allowed_x,allowed_y,allowed_z,written_x,written_y,written_z,faults,engaged";
 
-// What somebody who holds an arm may want to see of it.
+// What a user who holds an arm may want to see of it.
 struct ArmView {
   bool here = false;          // samples come
   bool felt = false;          // force is let in
@@ -74,7 +75,7 @@ class Haptics {
 
   // Of the thread that runs the physics.
   void publish(size_t k, const ForcePatch& patch, uint32_t epoch, float speed);  // speed: of real time
-  // Nothing is to be felt, and that is meant: somebody else moves the tool, or time does not run as fast as the hand's.
+  // Nothing is to be felt, and that is meant: someone else moves the tool, or time does not run as fast as the hand's.
   void rest(size_t k, uint32_t epoch);
   ToolInput hand(size_t k);  // the newest; not connected when no sample came for 20 ms
   // What happened to arms and servo since the last call, a line each.
@@ -89,8 +90,8 @@ class Haptics {
   std::unique_ptr<Work> work_;
 };
 
-// What the LimiterFault bits in `faults` that are not in `told` mean, a line each; they are in `told` afterwards.
-std::vector<std::string> new_faults(uint32_t faults, uint32_t& told);
+// What the LimiterFault bits in `faults` that are not in `reported` mean, a line each; they are in `reported` afterwards.
+std::vector<std::string> new_faults(uint32_t faults, uint32_t& messages);
 
 // Which arms, as people write it: DRIVER[:WHERE] of device/drivers ("touch", "bridge:10.0.0.2"); "paper" or
 // "paper:DRIVER[:WHERE]": the same arms with the paper's spring, the Touch's when none is named; "off" or nothing: none.
@@ -99,7 +100,7 @@ struct ArmChoice {
   bool as_paper = false;
 };
 ArmChoice read_arm_choice(const std::string& text);  // throws InputError for a word that is no driver
-// `told` gets a line for what is missing. No driver: no arms.
-ArmPort open_arms(const ArmChoice& choice, std::vector<std::string>& told);
+// `reported` gets a line for what is missing. No driver: no arms.
+ArmPort open_arms(const ArmChoice& choice, std::vector<std::string>& messages);
 
 }  // namespace catgut

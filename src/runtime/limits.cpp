@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime/limits: see limits.h.
 #include "runtime/limits.h"
 
@@ -37,8 +38,8 @@ class SutureWatch {
     cost.settled = static_cast<uint32_t>(seen.settled.size());
     cost.simulated_s = seen.time_s;
     cost.ticks = tick_ms_.size();
-    cost.solver_ms = spread_of(std::move(solver_ms_));
-    cost.tick_ms = spread_of(std::move(tick_ms_));
+    cost.solver_ms = percentiles_of(std::move(solver_ms_));
+    cost.tick_ms = percentiles_of(std::move(tick_ms_));
     cost.contacts = contacts_;
     cost.fps = cost.tick_ms.median > 0 ? 1000 / cost.tick_ms.median : 0;
     for (size_t k = completed; k > 0 && !result_.reached(); --k) {
@@ -58,8 +59,8 @@ class SutureWatch {
     const bool single = technique && technique->interrupted;
     size_t completed = 0;
     for (const Event& e : seen.event) {
-      if (e.kind == EventKind::suture_taken) throws_ = 0;
-      if (single && e.kind == EventKind::knot_locked) completed += ++throws_ == scene_.technique.throws;
+      if (e.kind == EventKind::suture_loaded) throws_ = 0;
+      if (single && e.kind == EventKind::throw_locked) completed += ++throws_ == scene_.technique.throws;
       if (!single && e.kind == EventKind::bite_completed) ++completed;
     }
     return completed;
@@ -73,7 +74,7 @@ class SutureWatch {
   uint32_t contacts_ = 0;
 };
 
-// One suture as it was sewn: the state before it and the hands of its ticks.
+// One suture as it was sutured: the state before it and the hands of its ticks.
 struct Stretch {
   std::vector<std::byte> start;
   std::vector<TickInput> input;
@@ -100,7 +101,7 @@ SutureGrowth sew_in_turns(const SceneSpec& scene, int threads, const Stretch& fi
       first_ms.push_back(solver_ms(*a, first.input[i]));
       last_ms.push_back(solver_ms(*b, last.input[i]));
     }
-    const SutureGrowth::Pass pass{spread_of(std::move(first_ms)).median, spread_of(std::move(last_ms)).median};
+    const SutureGrowth::Pass pass{percentiles_of(std::move(first_ms)).median, percentiles_of(std::move(last_ms)).median};
     const auto larger = [](const SutureGrowth::Pass& p, const SutureGrowth::Pass& q) { return p.ratio() < q.ratio(); };
     growth.pass.insert(std::upper_bound(growth.pass.begin(), growth.pass.end(), pass, larger), pass);
   }

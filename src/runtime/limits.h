@@ -1,6 +1,7 @@
-// runtime: how many sutures a scene bears (paper 3.5, figures 20 to 23): what a tick costs while each further one is sewn. Runs
-// the scene with the scripted surgeon in lock step; one row per suture: a bite of a running thread, which is a pair of suture
-// points, or a single suture (techniques stay and lembert) with its knot.
+// SPDX-License-Identifier: Apache-2.0
+// runtime: how many sutures a scene bears (paper 3.5, figures 20 to 23): what a tick costs while each further one is sutured.
+// Runs the scene with the scripted surgeon in lock step; one row per suture: a bite of a running thread, which is a pair of
+// suture points, or a single suture (techniques stay and lembert) with its knot.
 #pragma once
 #include <functional>
 #include <span>
@@ -21,12 +22,12 @@ struct SutureCost {
   uint32_t settled = 0;        // stitches that are tied and no longer simulated
   double simulated_s = 0;
   uint64_t ticks = 0;
-  Spread solver_ms, tick_ms;  // per tick; tick_ms: surgeon, step and publish
-  uint32_t contacts = 0;      // the most in a substep
-  double fps = 0;             // that the median tick would allow, with nothing drawn
+  Percentiles solver_ms, tick_ms;  // per tick; tick_ms: surgeon, step and publish
+  uint32_t contacts = 0;           // the most in a substep
+  double fps = 0;                  // that the median tick would allow, with nothing drawn
 };
 
-// The first and the last suture sewn again, by the same hands from the same states, in turns: a tick of the one, a tick of the
+// The first and the last suture re-run, by the same hands from the same states, in turns: a tick of the one, a tick of the
 // other. A processor that changes its clock or is shared does it to both alike, so that their ratio can be trusted where the
 // rows' times cannot; and as it is not quite the same slow or fast, all of that several times.
 struct SutureGrowth {

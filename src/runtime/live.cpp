@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: physics on a thread of its own; see live.h. Below, Work's members say which of the two threads may touch them.
 #include "runtime/live.h"
 
@@ -14,7 +15,7 @@
 #include "exchange/ring.h"
 #include "procedure/scene_file.h"
 #include "runtime/blend.h"
-#include "runtime/felt.h"
+#include "runtime/force_curves.h"
 #include "runtime/hands.h"
 #include "runtime/haptics.h"
 #include "runtime/session.h"
@@ -25,22 +26,22 @@ namespace catgut {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr int kCatchUp = 4;            // late ticks made up for at once; what is later than that is given up
-constexpr size_t kMostTakenBack = 32;  // bites kept, some 200 kB each
-constexpr double kBeforeBite = 0.25;   // [s] at least between the moment that is gone back to and the tip going in
-constexpr uint64_t kSanityTicks = 16;  // as in runtime/session
-constexpr uint64_t kNewsTicks = 64;    // how often arms are asked what went wrong
-constexpr double kFactorTime = 0.5;    // [s] over which `lately` looks back
-constexpr float kArmSpeed = 1.0f;      // [m/s] at which a tool comes to an arm that was found elsewhere than it was lost
+constexpr int kCatchUp = 4;              // late ticks made up for at once; what is later than that is given up
+constexpr size_t kMostTakenBack = 32;    // bites kept, some 200 kB each
+constexpr double kBeforeBite = 0.25;     // [s] at least between the moment that is gone back to and the tip going in
+constexpr uint64_t kValidityTicks = 16;  // as in runtime/session
+constexpr uint64_t kNewsTicks = 64;      // how often arms are asked what went wrong
+constexpr double kFactorTime = 0.5;      // [s] over which `lately` looks back
+constexpr float kArmSpeed = 1.0f;        // [m/s] at which a tool comes to an arm that was found elsewhere than it was lost
 constexpr auto kNap = std::chrono::milliseconds(2);  // how soon a command is heard while nothing is due
 
 double seconds_of(Clock::duration d) { return std::chrono::duration<double>(d).count(); }
 
-// Everything needed to go on from a moment as if nothing had happened since.
+// Everything needed to continue from a moment as if nothing had happened since.
 struct Moment {
   std::vector<std::byte> state;
   HandInputs hand;
-  Practice practice;
+  SessionMetrics metrics;
 };
 
 struct BiteMoment {
@@ -61,9 +62,9 @@ struct Request {
   Demonstration of;
 };
 
-struct HandMail {
+struct HandMessage {
   ToolInput input = no_hand();
-  uint32_t epoch = 0;  // that whoever sent it had seen
+  uint32_t epoch = 0;  // that a caller that sent it had seen
 };
 
 struct LiveView {
@@ -91,7 +92,7 @@ struct Live::Work {
   double dt = 0;
 
   // --- between the threads -----------------------------------------------------------------------------------------------
-  std::array<Latest<HandMail>, kMaxHands> hand_box;        // window -> physics
+  std::array<Latest<HandMessage>, kMaxHands> hand_box;     // window -> physics
   std::array<std::atomic<uint32_t>, kMaxHands> pressed{};  // both: buttons that went down since the last tick
   Ring<Request, 64> requests;                              // window -> physics
   Ring<Command, 64> orders;                                // window -> physics: of the hands
@@ -123,7 +124,7 @@ struct Live::Work {
   std::array<int, kMaxHands> unheard{};                  // [ticks] since hands were last heard of, and
   std::array<float, kMaxHands> heard_every{1, 1, 1, 1};  // [ticks] how often they are, lately
   Snapshot before, now;
-  LiveStatus told;
+  LiveStatus published;
   StitchMap map, learner_map;
   Moment settled, mark, learner;
   Hands demonstrator;
@@ -138,12 +139,12 @@ struct Live::Work {
   void begin();
   void run();
   void main_loop();
-  void obey();
+  void process_commands();
   void tick(bool let_in);
   void feel();
   bool arms_drive() const;
   void rest_arms();
-  void show();
+  void publish_view();
   void go_back(const Moment& to);
   void change_scene(const std::string& key_equals_value);
   void demonstrate(const Demonstration& what);
@@ -156,7 +157,7 @@ struct Live::Work {
       if (haptics->present(arm) && options.arm_hand[arm] == hand) return static_cast<int>(arm);
     return -1;
   }
-  Moment moment() const { return {save_state(*model, *state), input.hand, told.practice}; }
+  Moment moment() const { return {save_state(*model, *state), input.hand, published.metrics}; }
 };
 
 void Live::Work::begin() {
@@ -177,7 +178,7 @@ void Live::Work::begin() {
     how.log = options.haptics_log;
     haptics = std::make_unique<Haptics>(std::move(arms), picture, how);
     for (size_t arm = 0; arm < 2; ++arm)
-      if (haptics->present(arm)) told.arm[options.arm_hand[arm]] = true;
+      if (haptics->present(arm)) published.arm[options.arm_hand[arm]] = true;
   }
   dt = 1.0 / static_cast<double>(scene.solver.tick_rate);
   checkpoint_every = std::max<uint64_t>(1, static_cast<uint64_t>(std::llround(kBeforeBite / dt)));
@@ -189,7 +190,7 @@ void Live::Work::begin() {
   map = start_map(picture, dt);
   publish(*model, *state, now);
   before = now;
-  told.paused = options.start_paused;
+  published.paused = options.start_paused;
   thread = std::thread([this] { run(); });
 }
 
@@ -207,19 +208,19 @@ void Live::Work::tick(bool let_in) {
   const Clock::time_point start = Clock::now();
   const uint64_t began_ns = wall_ns();
   uint64_t fresh = 0;  // time_ns of the newest motion that this tick is the first to have
-  if (let_in && told.tick % checkpoint_every == 0) {
+  if (let_in && published.tick % checkpoint_every == 0) {
     std::swap(checkpoint[0], checkpoint[1]);
     checkpoint[0] = moment();
   }
   input.tick = result.ticks;
   input.commands.clear();
-  if (let_in && (surgeon.surgeon || told.demonstrating)) {
-    Surgeon& hands = told.demonstrating ? *demonstrator.surgeon : *surgeon.surgeon;
+  if (let_in && (surgeon.surgeon || published.demonstrating)) {
+    Surgeon& hands = published.demonstrating ? *demonstrator.surgeon : *surgeon.surgeon;
     const TickInput wanted = hands.operate(now, static_cast<float>(dt));
     input.hand = wanted.hand;
     input.commands = wanted.commands;
-    told.doing = hands.doing();
-    told.shown = told.demonstrating && hands.done();
+    published.doing = hands.doing();
+    published.shown = published.demonstrating && hands.done();
   } else if (let_in) {
     for (Command c; input.commands.count < CommandList::kCapacity && orders.pop(c);) input.commands.push(c);
     for (size_t k = 0; k < kMaxHands; ++k) {
@@ -228,7 +229,7 @@ void Live::Work::tick(bool let_in) {
         heard_every[k] += 0.2f * (static_cast<float>(unheard[k]) - heard_every[k]);
         unheard[k] = 0;
       }
-      const HandMail& mail = hand_box[k].seen();
+      const HandMessage& mail = hand_box[k].seen();
       const uint32_t down = pressed[k].exchange(0, std::memory_order_relaxed);
       ToolInput& hand = input.hand[k];
       hand.buttons = 0;
@@ -239,12 +240,12 @@ void Live::Work::tick(bool let_in) {
         continue;
       }
       // Mail from before a jump in time is about tools that were elsewhere: until newer comes the hand stays.
-      if (mail.epoch != told.epoch) continue;
+      if (mail.epoch != published.epoch) continue;
       hand = hand_toward(hand, mail.input, options.hand_speed, options.hand_turn, static_cast<float>(dt),
                          hand_share(heard_every[k]));
       hand.buttons |= down;
-      fresh = std::max(fresh, mail.input.time_ns > told.input_time_ns[k] ? mail.input.time_ns : 0);
-      told.input_time_ns[k] = mail.input.time_ns;
+      fresh = std::max(fresh, mail.input.time_ns > published.input_time_ns[k] ? mail.input.time_ns : 0);
+      published.input_time_ns[k] = mail.input.time_ns;
     }
   }
   const bool watch = watched.load(std::memory_order_relaxed);
@@ -259,48 +260,48 @@ void Live::Work::tick(bool let_in) {
   ++result.ticks;
   if (recorder) recorder->tick(input, hash_state(*model, *state));
   if (let_in) {
-    note(told.practice, now, static_cast<float>(dt));
+    update(published.metrics, now, static_cast<float>(dt));
     note(map, picture, now);
   }
   for (const Event& e : now.event) {
-    told.events_lost += !events.push(e);
-    if (told.demonstrating) continue;  // nobody takes back what was only shown
+    published.events_lost += !events.push(e);
+    if (published.demonstrating) continue;  // no one undoes what was only shown
     if (e.kind == EventKind::tip_entered && checkpoint[0]) {
       bites.push_back({e.which, checkpoint[1] ? *checkpoint[1] : *checkpoint[0]});
       if (bites.size() > kMostTakenBack) bites.pop_front();
-    } else if (e.kind == EventKind::bite_cancelled) {
+    } else if (e.kind == EventKind::bite_withdrawn) {
       if (!bites.empty() && bites.back().bite == e.which) bites.pop_back();
     }
   }
-  told.tick = now.tick;
-  told.time_s = now.time_s;
-  told.to_take_back = static_cast<uint32_t>(bites.size());
-  if (now.tick % kSanityTicks == 0 && !state_is_sane(*model, *state))
+  published.tick = now.tick;
+  published.time_s = now.time_s;
+  published.to_take_back = static_cast<uint32_t>(bites.size());
+  if (now.tick % kValidityTicks == 0 && !state_is_valid(*model, *state))
     throw SimulationUnstable(scene.name + ": the simulation became unstable; undo the last bite, or restart; keep the " +
                              "recording to find the cause");
-  if (fresh > 0) told.moved_ns = fresh, told.began_ns = began_ns, told.ready_ns = 0;
+  if (fresh > 0) published.moved_ns = fresh, published.began_ns = began_ns, published.ready_ns = 0;
   if (watch) {
-    measure(*model, *state, told.measures);
-    told.measures.contacts = times.contacts;
+    measure(*model, *state, published.measures);
+    published.measures.contacts = times.contacts;
     for (size_t k = 0; k < times.ms.size(); ++k) {  // smoothed: a number that flickers cannot be read
-      float& ms = told.measures.stage_ms[k];
+      float& ms = published.measures.stage_ms[k];
       ms += 0.05f * (static_cast<float>(times.ms[k]) - ms);
     }
   }
   const double spent = seconds_of(Clock::now() - start), keep = std::exp(-dt / kFactorTime);
   spent_s = spent_s * keep + spent;
   ticks_weight = ticks_weight * keep + 1;
-  told.tick_ms = static_cast<float>(1000 * spent_s / ticks_weight);
+  published.tick_ms = static_cast<float>(1000 * spent_s / ticks_weight);
 }
 
 // Whether the arms move the tools, at the hands' own speed. If not, what acts on the tools is not the arms' to feel.
 bool Live::Work::arms_drive() const {
-  return !told.demonstrating && !surgeon.surgeon && !told.paused && speed == 0 && !told.arms_off;
+  return !published.demonstrating && !surgeon.surgeon && !published.paused && speed == 0 && !published.arms_off;
 }
 
 void Live::Work::rest_arms() {
   handovers += std::exchange(arms_drove, false);
-  for (size_t k = 0; k < 2; ++k) haptics->rest(k, told.epoch + handovers);
+  for (size_t k = 0; k < 2; ++k) haptics->rest(k, published.epoch + handovers);
 }
 
 void Live::Work::feel() {
@@ -310,24 +311,24 @@ void Live::Work::feel() {
   if (as_paper) follow(paper, now, picture);
   for (size_t arm = 0; arm < 2 && drive; ++arm) {
     const size_t k = options.arm_hand[arm];
-    haptics->publish(arm, as_paper ? paper_patch(paper, now, picture, k) : now.patch[k], told.epoch + handovers,
+    haptics->publish(arm, as_paper ? paper_patch(paper, now, picture, k) : now.patch[k], published.epoch + handovers,
                      kLiveSpeeds[speed]);
   }
   if (now.tick % kNewsTicks != 0 || !options.say) return;
   for (const std::string& line : haptics->news()) options.say(line);
 }
 
-void Live::Work::show() {
+void Live::Work::publish_view() {
   LiveView& view = view_box.draft();
   view.before = before;
   view.now = now;
   view.at = Clock::now();
   view.tick_wall_s = dt / static_cast<double>(kLiveSpeeds[speed]);
-  told.speed = kLiveSpeeds[speed];
-  const char* off = told.arms_off ? "switched off (F9)" : arms_drive() ? "" : "off while it does not move the instrument";
-  for (size_t k = 0; haptics && k < 2; ++k) told.arm_view[k] = haptics->view(k, off);
-  if (told.ready_ns == 0 && told.moved_ns > 0) told.ready_ns = wall_ns();
-  view.status = told;
+  published.speed = kLiveSpeeds[speed];
+  const char* off = published.arms_off ? "switched off (F9)" : arms_drive() ? "" : "off while it does not move the instrument";
+  for (size_t k = 0; haptics && k < 2; ++k) published.arm_view[k] = haptics->view(k, off);
+  if (published.ready_ns == 0 && published.moved_ns > 0) published.ready_ns = wall_ns();
+  view.status = published;
   view.any = true;
   view_box.publish();
 }
@@ -338,22 +339,21 @@ void Live::Work::go_back(const Moment& to) {
   before = now;
   rewind(map, now.tick);
   input.hand = to.hand;
-  const uint32_t undos = told.practice.undos;
-  told.practice = to.practice;
-  told.practice.undos = undos;
-  told.fault.clear();
-  ++told.epoch;
-  told.tick = now.tick;
-  told.time_s = now.time_s;
+  const uint32_t undos = published.metrics.undos;
+  published.metrics = to.metrics;
+  published.metrics.undos = undos;
+  published.fault.clear();
+  ++published.epoch;
+  published.tick = now.tick;
+  published.time_s = now.time_s;
   checkpoint = {};
   checkpoint[0] = to;
-  told.to_take_back = static_cast<uint32_t>(bites.size());
+  published.to_take_back = static_cast<uint32_t>(bites.size());
   record_from_here();
   forget_pace();
 }
 
-// What was simulated so far stays; a tick's bits depend on the scene, the state and the hands, and the recording's next file
-// has all three.
+// The simulated past stays. The recording's next file has the scene, the state and the hands, which decide every later bit.
 void Live::Work::change_scene(const std::string& key_equals_value) {
   try {
     SceneSpec changed = scene;
@@ -364,35 +364,35 @@ void Live::Work::change_scene(const std::string& key_equals_value) {
     scene = changed;
     model = next;
     state = std::move(same);
-    told.refused.clear();
+    published.refused.clear();
     record_from_here();
-  } catch (const InputError& error) { told.refused = error.what(); }
+  } catch (const InputError& error) { published.refused = error.what(); }
   forget_pace();
 }
 
 void Live::Work::demonstrate(const Demonstration& what) {
-  if (surgeon.surgeon || told.demonstrating || told.settling || !told.fault.empty()) return;
+  if (surgeon.surgeon || published.demonstrating || published.settling || !published.fault.empty()) return;
   const std::string plan = scene.surgeon.plan.empty() ? scene.technique.name : scene.surgeon.plan;
   try {
     demonstrator.surgeon =
         make_demonstrator(plan, picture, skill_of(scene), {what.task.begin(), what.task.begin() + what.tasks});
-  } catch (const std::invalid_argument&) { return; }  // a scene that nobody can show
+  } catch (const std::invalid_argument&) { return; }  // a scene that no one can show
   learner = moment();
   learner_map = map;
   if (what.from_mark && marked) go_back(mark);
-  told.demonstrating = true;
-  told.shown = false;
+  published.demonstrating = true;
+  published.shown = false;
 }
 
 void Live::Work::end_demonstration() {
-  if (!told.demonstrating) return;
-  told.demonstrating = told.shown = false;
-  told.doing.clear();
+  if (!published.demonstrating) return;
+  published.demonstrating = published.shown = false;
+  published.doing.clear();
   go_back(learner);
   map = learner_map;
 }
 
-void Live::Work::obey() {
+void Live::Work::process_commands() {
   bool any = false;
   for (std::string c; changes.pop(c); any = true) change_scene(c);
   for (Request c; requests.pop(c); any = true) {
@@ -402,20 +402,20 @@ void Live::Work::obey() {
     }
     switch (c.what) {
       case LiveCommand::pause:
-        told.paused = true;
+        published.paused = true;
         break;
       case LiveCommand::resume:
-        told.paused = !told.fault.empty();
+        published.paused = !published.fault.empty();
         break;
       case LiveCommand::single_step:
-        told.paused = true;
-        steps += told.fault.empty();
+        published.paused = true;
+        steps += published.fault.empty();
         break;
       case LiveCommand::arms_off:
-        told.arms_off = !told.arms_off;
+        published.arms_off = !published.arms_off;
         break;
       case LiveCommand::mark:
-        if (told.demonstrating) break;
+        if (published.demonstrating) break;
         mark = moment();
         marked = true;
         break;
@@ -425,7 +425,7 @@ void Live::Work::obey() {
       case LiveCommand::restart:
         end_demonstration();
         bites.clear();
-        told.practice.undos = 0;
+        published.metrics.undos = 0;
         go_back(settled);
         if (!options.surgeon.empty()) surgeon = make_hands(options.surgeon, scene, picture);
         break;
@@ -434,7 +434,7 @@ void Live::Work::obey() {
         if (bites.empty() || surgeon.surgeon) break;
         const Moment to = std::move(bites.back().before);
         bites.pop_back();
-        ++told.practice.undos;
+        ++published.metrics.undos;
         go_back(to);
         break;
       }
@@ -448,16 +448,16 @@ void Live::Work::obey() {
         break;
     }
   }
-  if (any) show();
+  if (any) publish_view();
 }
 
 void Live::Work::main_loop() {
   Clock::time_point due = Clock::now(), last = due;
   while (!quit.load(std::memory_order_relaxed)) {
-    obey();
+    process_commands();
     const Clock::time_point at = Clock::now();
     const bool stepping = steps > 0;
-    if (told.paused && !stepping) {
+    if (published.paused && !stepping) {
       if (haptics) rest_arms();
       std::this_thread::sleep_for(kNap);
       due = last = Clock::now();
@@ -474,44 +474,44 @@ void Live::Work::main_loop() {
     last = done;
     wall_s = wall_s * keep + passed;
     simulated_s = simulated_s * keep + dt;
-    told.time_factor = static_cast<float>(simulated_s / std::max(wall_s, 1e-6));
+    published.time_factor = static_cast<float>(simulated_s / std::max(wall_s, 1e-6));
     const double period = dt / static_cast<double>(kLiveSpeeds[speed]);
     due += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(period));
     const double behind = seconds_of(done - due);
     if (stepping) {
       due = done;
     } else if (behind > kCatchUp * period) {
-      told.late += static_cast<uint64_t>(behind / period);
+      published.late += static_cast<uint64_t>(behind / period);
       due = done;
     }
-    show();
+    publish_view();
   }
 }
 
 void Live::Work::run() {
   bool was_settled = false;
   while (!quit.load(std::memory_order_relaxed)) try {
-      if (!was_settled) {  // as fast as it goes: nobody is let in yet
-        show();
+      if (!was_settled) {  // as fast as it goes: no one is let in yet
+        publish_view();
         const auto ticks = static_cast<uint64_t>(std::llround(static_cast<double>(scene.settle) / dt));
         while (result.ticks < ticks && !quit.load(std::memory_order_relaxed)) tick(false);
         settled = moment();
-        told.settling = false;
+        published.settling = false;
         was_settled = true;
-        show();
+        publish_view();
       }
       main_loop();
-    } catch (const std::exception& error) {  // shown in the window; the user restarts, takes back, or leaves
-      told.fault = error.what();
-      told.paused = true;
+    } catch (const std::exception& error) {  // shown in the window; the user restarts, undoes, or leaves
+      published.fault = error.what();
+      published.paused = true;
       steps = 0;
-      if (!was_settled) settled = moment(), was_settled = true, told.settling = false;
+      if (!was_settled) settled = moment(), was_settled = true, published.settling = false;
       if (recorder) recorder.reset();
-      show();
+      publish_view();
     }
   if (haptics) haptics->stop();
-  told.fault.swap(result.fault);
-  result.practice = told.practice;
+  published.fault.swap(result.fault);
+  result.metrics = published.metrics;
   result.map = std::move(map);
   result.state_hash = hash_state(*model, *state);
   try {
@@ -531,7 +531,7 @@ Live::~Live() { finish(); }
 const PictureModel& Live::picture() const { return work_->picture; }
 
 void Live::hand(size_t who, const ToolInput& input) {
-  HandMail& mail = work_->hand_box[who].draft();
+  HandMessage& mail = work_->hand_box[who].draft();
   mail.input = input;
   mail.epoch = work_->status.epoch;
   work_->pressed[who].fetch_or(input.buttons & ~work_->buttons[who], std::memory_order_relaxed);

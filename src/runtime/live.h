@@ -1,7 +1,8 @@
-// runtime: a scene that people work in. Physics runs on a thread of its own at the scene's fixed tick; whoever holds the window
-// publishes hands and commands and looks at pictures, and neither waits for the other. Ticks that come late are caught up, a
-// few at a time; a machine that cannot keep up makes time itself go slower, and says by how much. What is simulated depends on
-// the hands and the tick alone, as in runtime/session: with `record` every tick can be replayed bit for bit.
+// SPDX-License-Identifier: Apache-2.0
+// runtime: a scene that people work in. Physics runs on a thread of its own at the scene's fixed tick; a caller that holds the
+// window publishes hands and commands and looks at pictures, and neither waits for the other. Ticks that come late are caught
+// up, a few at a time; a machine that cannot keep up makes time itself go slower, and says by how much. What is simulated
+// depends on the hands and the tick alone, as in runtime/session: with `record` every tick can be replayed bit for bit.
 //
 // One thread at a time calls a Live's functions (the window's); they never block, except finish() and the destructor.
 #pragma once
@@ -17,7 +18,7 @@
 #include "exchange/tool_input.h"
 #include "runtime/haptics.h"
 #include "runtime/measures.h"
-#include "runtime/practice.h"
+#include "runtime/session_metrics.h"
 #include "runtime/stitch_map.h"
 #include "sim/scene.h"
 
@@ -44,12 +45,12 @@ struct LiveOptions {
   float hand_speed = 0.6f;  // [m/s] and
   float hand_turn = 12.0f;  // [rad/s] at most for a tool: a device that jumps (a mouse under a slow picture) tears nothing
   bool start_paused = false;
-  // Haptic arms, as read_arm_choice (runtime/haptics) reads them; empty or "off": none. What is missing is told and the scene
-  // opens without. A hand without an arm stays the window's.
+  // Haptic arms, as read_arm_choice (runtime/haptics) reads them; empty or "off": none. What is missing is reported and the
+  // scene opens without. A hand without an arm stays the window's.
   std::string haptics;
   std::string haptics_log;                      // as HapticsOptions::log
   std::array<uint8_t, 2> arm_hand{0, 1};        // the hand that each of the two arms moves
-  std::function<void(const std::string&)> say;  // a line about the arms, from any thread; empty: nobody is told
+  std::function<void(const std::string&)> say;  // a line about the arms, from any thread; empty: lines are dropped
 };
 
 struct LiveStatus {
@@ -60,10 +61,10 @@ struct LiveStatus {
   float tick_ms = 0;      // that a tick takes to compute, lately
   uint64_t late = 0;      // ticks' worth of time that was given up because it could not be caught up
   bool paused = false;
-  bool settling = true;       // the scene comes to rest; hands are not let in yet
-  uint32_t epoch = 0;         // counts restarts and bites taken back: hands go on from where the tools are then
+  bool settling = true;       // the scene settles; hands are not let in yet
+  uint32_t epoch = 0;         // counts restarts and bites undone: hands continue from where the tools are then
   uint32_t to_take_back = 0;  // bites that take_back can undo
-  uint32_t events_lost = 0;   // nobody fetched them in time
+  uint32_t events_lost = 0;   // no one fetched them in time
   std::array<uint64_t, kMaxHands> input_time_ns{};  // ToolInput::time_ns of the hands in the newest tick, for latencies
   // Of the newest tick that was the first to have a motion, on wall_ns(), for latencies: when the motion was read (where the
   // device uses that clock), when the tick began, and when its snapshot was ready to be looked at.
@@ -71,7 +72,7 @@ struct LiveStatus {
   std::array<bool, kMaxHands> arm{};  // a haptic arm moves that hand
   std::array<ArmView, 2> arm_view{};  // of each arm
   bool arms_off = false;
-  Practice practice;
+  SessionMetrics metrics;
   Measures measures;           // filled while watched, see watch()
   std::string doing;           // of the surgeon, when one works
   bool demonstrating = false;  // the surgeon shows something; what was before comes back
@@ -81,11 +82,11 @@ struct LiveStatus {
 };
 
 struct LiveResult {
-  Practice practice;
+  SessionMetrics metrics;
   StitchMap map;
-  uint64_t ticks = 0;  // all that were computed, those taken back included
+  uint64_t ticks = 0;  // all that were computed, those undone included
   uint64_t state_hash = 0;
-  std::vector<std::string> recorded;  // files written: a restart or a bite taken back begins the next one (NAME.2.cgrec ...)
+  std::vector<std::string> recorded;  // files written: a restart or a bite undone begins the next one (NAME.2.cgrec ...)
   std::string fault;
 };
 
@@ -108,7 +109,7 @@ class Live {
   bool command(LiveCommand command);
 
   // For developers: "solver.damping=6" from the next tick on, as in --set; sizes and numbers of things cannot change. The model
-  // is built anew, which may cost some ticks' time. The recording goes on in another file, whose scene says so. False: as
+  // is built again, which may cost some ticks' time. The recording continues in another file, whose scene says so. False: as
   // above.
   bool change(const std::string& key_equals_value);
   void watch(bool on);  // measures are wanted; they cost some microseconds a tick

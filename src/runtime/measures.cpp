@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: see measures.h.
 #include "runtime/measures.h"
 
@@ -39,10 +40,10 @@ void measure(const Model& model, const State& state, Measures& out) {
   float& attachment = row(ForceKind::attachment, s.attach.size());
   for (const Attachment& a : s.attach) attachment = std::max(attachment, length(a.lambda) * inv_h2);
   float& channel = row(ForceKind::channel, s.channel.size());
-  for (const ChannelPoint& c : s.channel)
+  for (const NeedleTrackConstraint& c : s.channel)
     channel = std::max({channel, length(c.lambda) * inv_h2, std::abs(c.drag_lambda) * inv_h2});
   float& seam = row(ForceKind::seam, s.pin.size());
-  for (const TissuePin& p : s.pin) seam = std::max(seam, std::abs(p.lambda) * inv_h2);
+  for (const Tether& p : s.pin) seam = std::max(seam, std::abs(p.lambda) * inv_h2);
 }
 
 const std::array<LiveParameter, kLiveParameters>& live_parameters() {
@@ -53,7 +54,7 @@ const std::array<LiveParameter, kLiveParameters>& live_parameters() {
       {"solver.friction_tissue", 0, 1, [](const SceneSpec& s) { return s.solver.friction_tissue; }},
       {"solver.friction_thread", 0, 1, [](const SceneSpec& s) { return s.solver.friction_thread; }},
       {"suture.pass_tension", 0.001f, 0.5f, [](const SceneSpec& s) { return s.suture.pass_tension; }},
-      {"suture.capstan", 0, 0.5f, [](const SceneSpec& s) { return s.suture.capstan; }},
+      {"suture.capstan_friction", 0, 0.5f, [](const SceneSpec& s) { return s.suture.capstan_friction; }},
       {"suture.release_distance", 0.0005f, 0.008f, [](const SceneSpec& s) { return s.suture.release_distance; }},
       {"technique.closure_compliance", 0.000002f, 0.002f, [](const SceneSpec& s) { return s.technique.closure_compliance; }},
   }};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: what the inside of a tick looks like from outside, for developers' panels: where its time goes, how much there is of
 // everything, and the largest force of every kind of constraint. Reads Model and State; changes nothing.
 #pragma once
@@ -32,7 +33,7 @@ struct Measures {
 // All but the times.
 void measure(const Model& model, const State& state, Measures& out);
 
-// What can be changed between two ticks while somebody works, with the range that a slider has.
+// What can be changed between two ticks while a user works, with the range that a slider has.
 struct LiveParameter {
   const char* key;  // of a scene file
   float low, high;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime/paper_tables: see paper_tables.h.
 #include "runtime/paper_tables.h"
 
@@ -88,9 +89,9 @@ T& of_phase(std::vector<T>& list, const std::string& phase) {
 std::string PaperPhase::operator()(std::span<const Event> events, bool settled, bool done) {
   if (!settled) return "Start";
   for (const Event& e : events) {
-    if (e.kind == EventKind::loop_formed || e.kind == EventKind::knot_begun) looping_ = true;
-    if (e.kind == EventKind::tip_entered || e.kind == EventKind::suture_taken) looping_ = false;
-    if (e.kind == EventKind::suture_taken) ++suture_;
+    if (e.kind == EventKind::loop_formed || e.kind == EventKind::throw_started) looping_ = true;
+    if (e.kind == EventKind::tip_entered || e.kind == EventKind::suture_loaded) looping_ = false;
+    if (e.kind == EventKind::suture_loaded) ++suture_;
   }
   if (done) return "After completion";
   if (numbered_) return fmt::format("{} #{}", looping_ ? "Loop" : "Suture", suture_);
@@ -136,8 +137,8 @@ PaperTable measure_paper(SceneSpec scene, int executions, int threads,
     table.sewn += run.expectations_hold();
     for (Ticks& t : ticks) {
       PhaseCost& cost = of_phase(table.phase, t.phase);
-      cost.solver_ms.push_back(spread_of(std::move(t.solver_ms)).median);
-      cost.frame_ms.push_back(spread_of(std::move(t.tick_ms)).median + spread_of(std::move(t.picture_ms)).median);
+      cost.solver_ms.push_back(percentiles_of(std::move(t.solver_ms)).median);
+      cost.frame_ms.push_back(percentiles_of(std::move(t.tick_ms)).median + percentiles_of(std::move(t.picture_ms)).median);
     }
   }
   return table;

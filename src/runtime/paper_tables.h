@@ -1,6 +1,7 @@
-// runtime: the paper's tables 1 to 4 with our figures beside its own: what a technique costs at rest, while it is sewn, while
-// its knots are made, and when it is done (sections 3.1 to 3.4). The scripted surgeon sews it a few times, each with hands of
-// his own (another seed).
+// SPDX-License-Identifier: Apache-2.0
+// runtime: the paper's tables 1 to 4 with our figures beside its own: what a technique costs at rest, while it is sutured,
+// while its knots are made, and when it is done (sections 3.1 to 3.4). The scripted surgeon sews it a few times, each with
+// hands of his own (another seed).
 #pragma once
 #include <functional>
 #include <span>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: takes the pictures of a run; see pictures.h.
 #include "runtime/pictures.h"
 
@@ -25,7 +26,7 @@ constexpr size_t kMostMoments = 48;    // pictures kept in memory; beyond it eve
 bool is_moment(const Snapshot& seen) {
   return std::any_of(seen.event.begin(), seen.event.end(), [](const Event& e) {
     return e.kind == EventKind::bite_completed || e.kind == EventKind::closure_started ||
-           e.kind == EventKind::closure_finished || e.kind == EventKind::loop_formed || e.kind == EventKind::knot_locked;
+           e.kind == EventKind::closure_finished || e.kind == EventKind::loop_formed || e.kind == EventKind::throw_locked;
   });
 }
 
@@ -57,7 +58,7 @@ struct Pictures::Studio {
 
   Studio(const PictureOptions& o, const PictureModel& m) : options(o), follow(m), camera(overview(m)), model(m) {
     std::sort(options.still.begin(), options.still.end(), std::greater<>());  // the next one last
-    renderer = make_renderer(model, o.width, o.height, Quality::draft);
+    renderer = make_renderer(model, o.width, o.height, Quality::low);
     if (!o.video.empty()) film = std::make_unique<VideoWriter>(o.video, o.width, o.height, o.rate);
     if (!o.frames.empty()) std::filesystem::create_directories(o.frames);
   }
@@ -85,7 +86,7 @@ struct Pictures::Studio {
 
   // From where the work is seen best at that moment, whatever the film's camera does.
   void take_still(const Snapshot& seen) {
-    if (!still_renderer) still_renderer = make_renderer(model, options.still_width, options.still_height, Quality::good);
+    if (!still_renderer) still_renderer = make_renderer(model, options.still_width, options.still_height, Quality::high);
     write_png(still_renderer->render(seen, FollowCamera(model).update(seen, 0)), options.still.back().second);
     options.still.pop_back();
   }

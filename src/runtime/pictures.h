@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: the pictures of a run: single frames, a time-lapse film, a contact sheet of its moments. Reads snapshots as the run
 // goes; writes files. The only file above the render room that knows the renderer.
 #pragma once

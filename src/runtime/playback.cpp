@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: see playback.h. Below, Work's members say which of the two threads may touch them.
 #include "runtime/playback.h"
 
@@ -19,15 +20,15 @@ namespace catgut {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr double kKeepEvery = 1.0;  // [s] between kept states; a step back costs at most so much simulation
+constexpr double kKeepEvery = 1.0;  // [s] between kept states; a step back costs at most that much simulation
 constexpr size_t kMostKept = 600;   // some 200 kB each; with more every other one is dropped
-constexpr int kTogether = 8;        // ticks looked through before wishes are heard again
+constexpr int kTogether = 8;        // ticks scanned before wishes are heard again
 constexpr int kGatherEvery = 30;    // ticks between two tellings of what was gathered
 constexpr auto kNap = std::chrono::milliseconds(2);
 
 double seconds_of(Clock::duration d) { return std::chrono::duration<double>(d).count(); }
 
-struct Wish {
+struct Request {
   bool playing = false;
   float speed = 1;
   uint64_t go_to = 0;
@@ -42,7 +43,7 @@ struct PlayView {
   bool any = false;
 };
 
-struct Kept {
+struct Keyframe {
   uint64_t at = 0;
   std::vector<std::byte> state;
 };
@@ -60,7 +61,7 @@ struct Playback::Work {
 
   // --- between the threads -----------------------------------------------------------------------------------------------
   mutable std::mutex mutex;  // of the next two; held for copies only
-  Wish wish;
+  Request request;
   LiveResult gathered;
   Latest<PlayView> view_box;
   std::atomic<bool> quit{false};
@@ -71,13 +72,13 @@ struct Playback::Work {
 
   // --- the playing thread's ----------------------------------------------------------------------------------------------
   Jobs jobs{1};
-  StatePtr ahead, shown;  // looked through; in the picture
+  StatePtr ahead, shown;  // scanned; in the picture
   uint64_t at = 0;        // ticks that `shown` has played
   LiveResult so_far;
-  std::vector<Kept> kept;
+  std::vector<Keyframe> keyframe;
   uint64_t keep_every = 60;
-  Snapshot scout, before, now;
-  PlaybackStatus told;
+  Snapshot scan_snapshot, before, now;
+  PlaybackStatus published;
   uint64_t heard = 0;
 
   void begin();
@@ -86,8 +87,8 @@ struct Playback::Work {
   void tell();
   void move_to(uint64_t to);
   void step_shown();
-  void show();
-  bool hear(Wish& out);
+  void publish_view();
+  bool poll_request(Request& out);
 };
 
 void Playback::Work::begin() {
@@ -104,40 +105,40 @@ void Playback::Work::begin() {
   load_state(*model, *shown, recording.start);
   publish(*model, *shown, now);
   before = now;
-  kept.push_back({0, recording.start});
+  keyframe.push_back({0, recording.start});
   so_far.map = start_map(picture, dt);
   so_far.recorded = {name};
-  told.ticks = recording.tick.size();
-  told.first = now.tick;
-  told.tick_s = dt;
+  published.ticks = recording.tick.size();
+  published.first = now.tick;
+  published.tick_s = dt;
   gathered = so_far;
   thread = std::thread([this] { run(); });
 }
 
 // Some ticks further into the recording, with all that is to be known about them.
 void Playback::Work::look_ahead() {
-  for (int i = 0; i < kTogether && told.known < told.ticks; ++i) {
-    const RecordedTick& t = recording.tick[told.known];
+  for (int i = 0; i < kTogether && published.known < published.ticks; ++i) {
+    const RecordedTick& t = recording.tick[published.known];
     step(*model, *ahead, t.input, jobs);
-    publish(*model, *ahead, scout);
-    ++told.known;
+    publish(*model, *ahead, scan_snapshot);
+    ++published.known;
     ++so_far.ticks;
     so_far.state_hash = hash_state(*model, *ahead);
-    if (!told.differs_at && so_far.state_hash != t.hash) told.differs_at = told.known;
-    if (scout.tick > settle) {
-      note(so_far.practice, scout, static_cast<float>(dt));
-      note(so_far.map, picture, scout);
+    if (!published.differs_at && so_far.state_hash != t.hash) published.differs_at = published.known;
+    if (scan_snapshot.tick > settle) {
+      update(so_far.metrics, scan_snapshot, static_cast<float>(dt));
+      note(so_far.map, picture, scan_snapshot);
     }
-    if (told.known % keep_every == 0) {
-      kept.push_back({told.known, save_state(*model, *ahead)});
-      if (kept.size() > kMostKept) {
-        for (size_t k = 1; 2 * k < kept.size(); ++k) kept[k] = std::move(kept[2 * k]);
-        kept.resize((kept.size() + 1) / 2);
+    if (published.known % keep_every == 0) {
+      keyframe.push_back({published.known, save_state(*model, *ahead)});
+      if (keyframe.size() > kMostKept) {
+        for (size_t k = 1; 2 * k < keyframe.size(); ++k) keyframe[k] = std::move(keyframe[2 * k]);
+        keyframe.resize((keyframe.size() + 1) / 2);
         keep_every *= 2;
       }
     }
-    if (told.known % kGatherEvery == 0 || told.known == told.ticks) tell();
-    if (!state_is_sane(*model, *ahead))
+    if (published.known % kGatherEvery == 0 || published.known == published.ticks) tell();
+    if (!state_is_valid(*model, *ahead))
       throw SimulationUnstable(name + ": the simulation became unstable here; earlier ticks can be viewed");
   }
 }
@@ -145,7 +146,7 @@ void Playback::Work::look_ahead() {
 void Playback::Work::tell() {
   const std::lock_guard lock(mutex);
   gathered = so_far;
-  ++told.gathered;
+  ++published.gathered;
 }
 
 void Playback::Work::step_shown() {
@@ -153,12 +154,12 @@ void Playback::Work::step_shown() {
   step(*model, *shown, t.input, jobs);
   ++at;
   // Kept states and what follows them must be the recorded ones too, not only the pass that made them.
-  if (hash_state(*model, *shown) != t.hash && (!told.differs_at || *told.differs_at > at)) told.differs_at = at;
+  if (hash_state(*model, *shown) != t.hash && (!published.differs_at || *published.differs_at > at)) published.differs_at = at;
 }
 
 void Playback::Work::move_to(uint64_t to) {
-  const Kept* from = nullptr;
-  for (const Kept& k : kept)
+  const Keyframe* from = nullptr;
+  for (const Keyframe& k : keyframe)
     if (k.at <= to) from = &k;
   if (at > to || from->at > at) {
     load_state(*model, *shown, from->state);
@@ -172,74 +173,74 @@ void Playback::Work::move_to(uint64_t to) {
   publish(*model, *shown, now);
 }
 
-void Playback::Work::show() {
+void Playback::Work::publish_view() {
   PlayView& view = view_box.draft();
   view.before = before;
   view.now = now;
   view.at = Clock::now();
-  view.tick_wall_s = dt / std::max(static_cast<double>(told.speed), 0.01);
-  told.at = at;
-  view.status = told;
+  view.tick_wall_s = dt / std::max(static_cast<double>(published.speed), 0.01);
+  published.at = at;
+  view.status = published;
   view.any = true;
   view_box.publish();
 }
 
 // True: there is somewhere else to go.
-bool Playback::Work::hear(Wish& out) {
+bool Playback::Work::poll_request(Request& out) {
   const std::lock_guard lock(mutex);
-  out = wish;
-  return std::exchange(heard, wish.times) != wish.times;
+  out = request;
+  return std::exchange(heard, request.times) != request.times;
 }
 
 void Playback::Work::run() {
   Clock::time_point due = Clock::now(), shown_at = due;
-  show();
-  bool whole = true;  // looking ahead goes on
-  Wish w;
+  publish_view();
+  bool whole = true;  // looking ahead continues
+  Request w;
   uint64_t to = 0;
   bool going = false;
   while (!quit.load(std::memory_order_relaxed)) {
-    if (hear(w)) to = std::min(w.go_to, told.ticks), going = true;
-    const bool starts = w.playing && !told.playing;
-    if (starts || w.speed != told.speed) due = Clock::now();
-    const bool changed = w.playing != told.playing || w.speed != told.speed;
-    told.playing = w.playing;
-    told.speed = w.speed;
+    if (poll_request(w)) to = std::min(w.go_to, published.ticks), going = true;
+    const bool starts = w.playing && !published.playing;
+    if (starts || w.speed != published.speed) due = Clock::now();
+    const bool changed = w.playing != published.playing || w.speed != published.speed;
+    published.playing = w.playing;
+    published.speed = w.speed;
     try {
-      if (going && (to <= told.known || !whole)) {
-        move_to(std::min(to, told.known));
+      if (going && (to <= published.known || !whole)) {
+        move_to(std::min(to, published.known));
         going = false;
         due = Clock::now();
-        show();
+        publish_view();
         continue;
       }
-      const double period = dt / static_cast<double>(std::max(told.speed, 0.01f));
-      if (told.playing && at < told.known && Clock::now() >= due) {
+      const double period = dt / static_cast<double>(std::max(published.speed, 0.01f));
+      if (published.playing && at < published.known && Clock::now() >= due) {
         std::swap(before, now);
         step_shown();
         publish(*model, *shown, now);
         due += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(period));
         if (seconds_of(Clock::now() - due) > 4 * period) due = Clock::now();
         // At high speeds not every tick is worth a copy: no display shows more.
-        if (at == told.known || seconds_of(Clock::now() - shown_at) > 0.008) show(), shown_at = Clock::now();
+        if (at == published.known || seconds_of(Clock::now() - shown_at) > 0.008) publish_view(), shown_at = Clock::now();
         continue;
       }
-      if (whole && told.known < told.ticks) {
+      if (whole && published.known < published.ticks) {
         look_ahead();
-        if (seconds_of(Clock::now() - shown_at) > 0.05 || told.known == told.ticks) {
-          if (!told.playing) before = now;
-          show(), shown_at = Clock::now();
+        if (seconds_of(Clock::now() - shown_at) > 0.05 || published.known == published.ticks) {
+          if (!published.playing) before = now;
+          publish_view(), shown_at = Clock::now();
         }
         continue;
       }
     } catch (const std::exception& error) {
-      told.fault = error.what();
+      published.fault = error.what();
       whole = going = false;
       tell();
-      show();
+      publish_view();
       continue;
     }
-    if (changed) show();
+    if (changed) publish_view();
     std::this_thread::sleep_for(kNap);
   }
 }
@@ -260,18 +261,18 @@ const PictureModel& Playback::picture() const { return work_->picture; }
 
 void Playback::play(bool on) {
   const std::lock_guard lock(work_->mutex);
-  work_->wish.playing = on;
+  work_->request.playing = on;
 }
 
 void Playback::speed(float of_real_time) {
   const std::lock_guard lock(work_->mutex);
-  work_->wish.speed = std::clamp(of_real_time, 0.05f, 16.0f);
+  work_->request.speed = std::clamp(of_real_time, 0.05f, 16.0f);
 }
 
 void Playback::go_to(uint64_t tick) {
   const std::lock_guard lock(work_->mutex);
-  work_->wish.go_to = tick;
-  ++work_->wish.times;
+  work_->request.go_to = tick;
+  ++work_->request.times;
 }
 
 bool Playback::look(Snapshot& out) {

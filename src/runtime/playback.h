@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: a recording to look at: played, held, and gone through in both directions, at any speed. On a thread of its own, as
 // runtime/live is. It first looks through the whole recording as fast as it goes, in between what is shown: states are kept on
-// the way, so that going back is quick, every tick's hash is compared with the recorded one, and what was sewn is gathered.
+// the way, so that going back is quick, every tick's hash is compared with the recorded one, and what was sutured is gathered.
 //
 // One thread at a time calls a Playback's functions (the window's); none of them waits for the simulation, except the
 // constructor and the destructor.
@@ -19,7 +20,7 @@ namespace catgut {
 
 struct PlaybackStatus {
   uint64_t ticks = 0;  // recorded
-  uint64_t known = 0;  // ticks looked through so far; nothing later can be shown yet
+  uint64_t known = 0;  // ticks scanned so far; nothing later can be shown yet
   uint64_t at = 0;     // ticks played until what is shown
   uint64_t first = 0;  // tick of the start state: a recording may begin in the middle of the work
   double tick_s = 1.0 / 60;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: writes results; see report.h. Numbers that are not finite become null, as JSON wants.
 #include "runtime/report.h"
 
@@ -10,7 +11,7 @@ namespace catgut {
 namespace {
 using Json = nlohmann::ordered_json;
 
-Json spread_json(const Spread& s) { return {{"median", s.median}, {"p99", s.p99}, {"p999", s.p999}, {"max", s.max}}; }
+Json percentiles_json(const Percentiles& s) { return {{"median", s.median}, {"p99", s.p99}, {"p999", s.p999}, {"max", s.max}}; }
 
 // Counts are written without a fraction: 12, not 12.0.
 Json number_json(double v) {
@@ -51,13 +52,13 @@ Json json_of(const RunResult& r) {
   j["ticks"] = r.ticks;
   j["simulated_s"] = r.simulated_s;
   j["real_time_factor"] = r.real_time_factor;
-  j["solver_ms"] = spread_json(r.solver_ms);
-  j["tick_ms"] = spread_json(r.tick_ms);
-  j["late_ticks"] = r.late_ticks;
+  j["solver_ms"] = percentiles_json(r.solver_ms);
+  j["tick_ms"] = percentiles_json(r.tick_ms);
+  j["overrun_ticks"] = r.overrun_ticks;
   j["longest_tick"] = {{"tick", r.longest_tick}, {"ms", r.tick_ms.max}, {"stages", Json::object()}};
   for (size_t s = 0; s < kStages; ++s) j["longest_tick"]["stages"][stage_name(static_cast<Stage>(s))] = r.longest.ms[s];
   j["stages"] = Json::object();
-  for (size_t s = 0; s < kStages; ++s) j["stages"][stage_name(static_cast<Stage>(s))] = spread_json(r.stage_ms[s]);
+  for (size_t s = 0; s < kStages; ++s) j["stages"][stage_name(static_cast<Stage>(s))] = percentiles_json(r.stage_ms[s]);
   j["contacts"] = r.contacts;
   for (const char* name : {"bites",
                            "sutures",
@@ -109,9 +110,9 @@ std::string replay_json(const ReplayResult& result, const Recording& recording) 
 
 namespace {
 
-double mm(float metres) { return std::round(1e6 * static_cast<double>(metres)) / 1e3; }
+double mm(float meters) { return std::round(1e6 * static_cast<double>(meters)) / 1e3; }
 double newtons(float force) { return std::round(1e4 * static_cast<double>(force)) / 1e4; }
-Json mm_or_null(float metres) { return metres < 0 ? Json() : Json(mm(metres)); }
+Json mm_or_null(float meters) { return meters < 0 ? Json() : Json(mm(meters)); }
 Json point_mm(Vec3 p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
 
 Json bite_json(const StitchBite& b, double tick_s) {
@@ -132,8 +133,8 @@ Json bite_json(const StitchBite& b, double tick_s) {
 
 }  // namespace
 
-std::string practice_json(const SceneSpec& scene, const LiveResult& r) {
-  const Practice& p = r.practice;
+std::string session_json(const SceneSpec& scene, const LiveResult& r) {
+  const SessionMetrics& p = r.metrics;
   Json j;
   j["catgut"] = catgut_version();
   j["scene"] = scene.name;
@@ -141,12 +142,12 @@ std::string practice_json(const SceneSpec& scene, const LiveResult& r) {
   j["technique"] = scene.technique.name;
   j["time_s"] = p.time_s;
   j["bites"] = p.bites;
-  j["bites_cancelled"] = p.bites_cancelled;
+  j["bites_withdrawn"] = p.bites_withdrawn;
   j["undos"] = p.undos;
   j["knots"] = p.knots;
   j["throws"] = p.throws;
   j["cuts"] = p.cuts;
-  j["stitches_settled"] = p.stitches_settled;
+  j["sutures_baked"] = p.sutures_baked;
   j["needle_slips"] = p.needle_slips;
   j["path_m"] = {p.path[0], p.path[1]};
   j["peak_force_n"] = {newtons(p.peak_force[0]), newtons(p.peak_force[1])};
@@ -192,10 +193,10 @@ std::string run_summary(const RunResult& r, bool judged) {
                   r.simulated_s, r.ticks, r.real_time_factor, r.particles, r.threads, r.threads == 1 ? "" : "s");
   out += fmt::format("  solver per tick {:.3f} ms (median), {:.3f} ms (99th percentile), {:.3f} ms (maximum)\n",
                      r.solver_ms.median, r.solver_ms.p99, r.solver_ms.max);
-  if (r.late_ticks > 0) {
+  if (r.overrun_ticks > 0) {
     // Where the time went in the worst of them.
-    out += fmt::format("  {} ticks exceeded the real-time budget; longest: tick {}, {:.1f} ms:", r.late_ticks, r.longest_tick,
-                       r.tick_ms.max);
+    out += fmt::format("  {} ticks exceeded the real-time budget; longest: tick {}, {:.1f} ms:", r.overrun_ticks,
+                       r.longest_tick, r.tick_ms.max);
     for (size_t s = 0; s < kStages; ++s)
       if (r.longest.ms[s] > 0.05 * r.tick_ms.max)
         out += fmt::format(" {} {:.1f}", stage_name(static_cast<Stage>(s)), r.longest.ms[s]);
@@ -220,15 +221,15 @@ std::string run_summary(const RunResult& r, bool judged) {
 
 std::string stage_table(const RunResult& r) {
   std::string out = fmt::format("{:<16}{:>12}{:>12}{:>12}{:>12}\n", "stage", "median ms", "p99 ms", "p99.9 ms", "max ms");
-  const auto row = [&](const char* name, const Spread& s) {
+  const auto row = [&](const char* name, const Percentiles& s) {
     out += fmt::format("{:<16}{:>12.4f}{:>12.4f}{:>12.4f}{:>12.4f}\n", name, s.median, s.p99, s.p999, s.max);
   };
   for (size_t s = 0; s < kStages; ++s) row(stage_name(static_cast<Stage>(s)), r.stage_ms[s]);
   row("solver", r.solver_ms);
   row("whole tick", r.tick_ms);
   if (r.ticks > 0)
-    out += fmt::format("{} of {} ticks ({:.3f} %) exceeded the real-time budget of {:.3f} ms\n", r.late_ticks, r.ticks,
-                       100.0 * static_cast<double>(r.late_ticks) / static_cast<double>(r.ticks),
+    out += fmt::format("{} of {} ticks ({:.3f} %) exceeded the real-time budget of {:.3f} ms\n", r.overrun_ticks, r.ticks,
+                       100.0 * static_cast<double>(r.overrun_ticks) / static_cast<double>(r.ticks),
                        1000 * r.simulated_s / static_cast<double>(r.ticks));
   return out;
 }

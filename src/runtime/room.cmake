@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 target_compile_definitions(catgut_runtime PRIVATE CATGUT_VERSION="${PROJECT_VERSION}")
 target_link_libraries(catgut_runtime PRIVATE fmt::fmt)
 find_package(nlohmann_json REQUIRED)

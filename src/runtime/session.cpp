@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: the run loop. Per tick: the hands see the last snapshot, step, publish, measure, tell. See session.h.
 #include "runtime/session.h"
 
@@ -15,8 +16,8 @@ namespace catgut {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr double kAfterDone = 0.5;     // [s] simulated: what was let go comes to rest
-constexpr uint64_t kSanityTicks = 16;  // a state that has gone wrong is noticed within a moment, at no measurable cost
+constexpr double kAfterDone = 0.5;       // [s] simulated: what was let go settles
+constexpr uint64_t kValidityTicks = 16;  // a state that has gone wrong is noticed within a moment, at no measurable cost
 
 double ms_since(Clock::time_point start) { return std::chrono::duration<double, std::milli>(Clock::now() - start).count(); }
 
@@ -28,12 +29,12 @@ class Run {
         picture_(picture_model(*model_)),
         state_(initial_state(*model_)),
         jobs_(threads),
-        tally_(scene_of(*model_), picture_),
+        metrics_(scene_of(*model_), picture_),
         hooks_(hooks),
         dt_(1 / scene.solver.tick_rate) {
     publish(*model_, *state_, seen_);
     if (hooks_.on_start) hooks_.on_start(picture_);
-    told_ = Clock::now();
+    reported_at_ = Clock::now();
   }
 
   // hands: asked for the input of the tick. False when the run has to end: stopped, or no longer sane.
@@ -49,25 +50,25 @@ class Run {
       publish(*model_, *state_, seen_);
     }
     const double tick_ms = ms_since(start);
-    tally_.time(times, tick_ms);
+    metrics_.time(times, tick_ms);
     ++ticks_;
-    tally_.tick(seen_);
-    if (ticks_ % kSanityTicks == 0 && !state_is_sane(*model_, *state_)) tally_.not_sane();
+    metrics_.tick(seen_);
+    if (ticks_ % kValidityTicks == 0 && !state_is_valid(*model_, *state_)) metrics_.invalidate();
     if (hooks_.on_tick) hooks_.on_tick(seen_, doing);
     if (hooks_.on_step) hooks_.on_step(*model_, *state_, input_);
     if (hooks_.on_cost && !hooks_.on_cost(seen_, times, tick_ms)) enough_ = true;
-    if (hooks_.on_progress && ms_since(told_) > 1000) {
-      told_ = Clock::now();
-      hooks_.on_progress({simulated_s(), until_s, simulated_s() * 1000 / tally_.spent_ms(), doing});
+    if (hooks_.on_progress && ms_since(reported_at_) > 1000) {
+      reported_at_ = Clock::now();
+      hooks_.on_progress({simulated_s(), until_s, simulated_s() * 1000 / metrics_.spent_ms(), doing});
     }
-    return !stopped() && !enough_ && tally_.sane();
+    return !stopped() && !enough_ && metrics_.sane();
   }
 
   bool stopped() const { return hooks_.stop && hooks_.stop->load(std::memory_order_relaxed); }
   double simulated_s() const { return static_cast<double>(ticks_) * dt_; }
 
   void finish(RunResult& result) {
-    if (!state_is_sane(*model_, *state_)) tally_.not_sane();
+    if (!state_is_valid(*model_, *state_)) metrics_.invalidate();
     const SceneSpec& scene = scene_of(*model_);
     result.scene = scene.name;
     result.title = scene.title;
@@ -80,15 +81,15 @@ class Run {
     result.interrupted = stopped();
     if (enough_) result.ended = "stopped by callback";
     if (result.interrupted) result.ended = "interrupted";
-    if (!tally_.sane()) result.ended = "invalid state";
-    tally_.finish(seen_, result);
+    if (!metrics_.sane()) result.ended = "invalid state";
+    metrics_.finish(seen_, result);
   }
 
   std::shared_ptr<const Model> model_;
   PictureModel picture_;
   StatePtr state_;
   Jobs jobs_;
-  Tally tally_;
+  MetricsCollector metrics_;
   const SessionHooks& hooks_;
   Snapshot seen_;
   TickInput input_;
@@ -97,7 +98,7 @@ class Run {
   const double dt_;
 
  private:
-  Clock::time_point told_;
+  Clock::time_point reported_at_;
 };
 
 TickInput nobody() {
@@ -138,7 +139,7 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
   result.ended = "time limit";
   bool go_on = true;
   while (go_on && run.ticks_ < settle) go_on = one_tick([](const Snapshot&) { return nobody(); }, "settling");
-  run.tally_.open();
+  run.metrics_.open();
   uint64_t done_for = 0;
   while (go_on && run.ticks_ < last) {
     if (hands.surgeon && hands.surgeon->done() && done_for++ >= after_done) break;
@@ -178,7 +179,7 @@ ReplayResult replay_session(const Recording& recording, const std::string& name,
   result.run.surgeon = name;
   result.run.ended = "end of recording";
   for (const RecordedTick& t : recording.tick) {
-    if (run.ticks_ == settle) run.tally_.open();
+    if (run.ticks_ == settle) run.metrics_.open();
     const bool go_on = run.tick([&](const Snapshot&) { return t.input; }, "replay", until_s);
     if (check && hash_state(*run.model_, *run.state_) != t.hash) {
       result.differs_at = run.ticks_;

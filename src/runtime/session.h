@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: runs a scene from its first tick to its last, in lock step: as fast as it goes, on the caller's thread. The only
 // room that reads a clock; times go into reports, never into the physics, so a run's bits depend on its inputs alone.
 #pragma once
@@ -10,7 +11,7 @@
 #include "core/jobs.h"
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
-#include "runtime/tally.h"
+#include "runtime/metrics_collector.h"
 #include "sim/recording.h"
 #include "sim/scene.h"
 #include "surgeon/surgeon.h"
@@ -28,7 +29,7 @@ struct Progress {
   std::string doing;
 };
 
-// What a run tells while it goes. Each may be empty.
+// What a run reports while it goes. Each may be empty.
 struct SessionHooks {
   std::function<void(const PictureModel&)> on_start;
   std::function<void(const Snapshot&, const std::string& doing)> on_tick;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: see stitch_map.h.
 #include "runtime/stitch_map.h"
 
@@ -99,7 +100,7 @@ StitchMap start_map(const PictureModel& picture, double tick_s) {
 
 void note(StitchMap& map, const PictureModel& picture, const Snapshot& seen) {
   for (const Event& e : seen.event) {
-    if (e.kind == EventKind::suture_taken) ++map.sutures;
+    if (e.kind == EventKind::suture_loaded) ++map.sutures;
     if (e.kind == EventKind::tip_entered && e.which < 10000) {
       if (map.angle.size() <= e.which) map.angle.resize(e.which + 1, -1);
       map.angle[e.which] = e.value;
@@ -112,7 +113,7 @@ void note(StitchMap& map, const PictureModel& picture, const Snapshot& seen) {
 
 void rewind(StitchMap& map, uint64_t tick) {
   for (auto e = map.event.rbegin(); e != map.event.rend() && e->tick > tick; ++e)
-    if (e->kind == EventKind::suture_taken && map.sutures > 0) --map.sutures;
+    if (e->kind == EventKind::suture_loaded && map.sutures > 0) --map.sutures;
   drop_after(map.event, tick);
   drop_after(map.bite, tick);
   drop_after(map.tension, tick);

@@ -1,9 +1,10 @@
-// runtime: where the stitches lie and how the thread was drawn: what somebody who has sewn wants to look back at. Gathered from
-// the published snapshots tick by tick, as runtime/practice is. Reads PictureModel and Snapshot.
+// SPDX-License-Identifier: Apache-2.0
+// runtime: where the stitches lie and how the thread was drawn: what a user who has sutured wants to look back at. Gathered
+// from the published snapshots tick by tick, as runtime/session_metrics is. Reads PictureModel and Snapshot.
 //
 // Lengths are measured on the tissue at rest, because that is where a bite stays: while the needle is in it, or an opening is
 // drawn together, the same two points may be much nearer or further apart. Everything is only ever added behind, in the order
-// of time, so that taking back a bite is dropping what came later.
+// of time, so that undoing a bite is dropping what came later.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -13,7 +14,7 @@
 
 namespace catgut {
 
-// The edge that is sewn, at rest: the row of tissue particles round the opening of one wall, closed.
+// The edge that is sutured, at rest: the row of tissue particles round the opening of one wall, closed.
 struct StitchEdge {
   std::vector<Vec3> point;   // [m]
   std::vector<float> along;  // [m] from point[0], one more than points: the last is the edge's length

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sim/build: turns a scene's description into a Model and its first State. Reads SceneSpec; calls the anatomy; throws
 // InputError for what a scene may get wrong. Nothing here runs during a tick.
 #include <algorithm>
@@ -330,7 +331,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
       mass.push_back(r.mass[i]);
       s.inv_mass.push_back(r.pinned[i] ? 0.0f : 1.0f / (r.mass[i] * scene.solver.mass_scale));
       radius.push_back(r.radius);
-      // Neighbours in the wall are held apart by its shape, not by contact, however fine the particles.
+      // Neighbors in the wall are held apart by its shape, not by contact, however fine the particles.
       apart.push_back(static_cast<float>(std::max(2.2 * spacing, 2 * r.radius + spacing)));
       const size_t wall_here = working_rim.size() + (r.wall.empty() ? 0 : r.wall[i]);
       body.push_back(static_cast<uint32_t>(wall_here));  // two layers of one body meet as two bodies do
@@ -397,11 +398,11 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   u.attach_threshold = scene.suture.attach_threshold;
   u.release_distance = scene.suture.release_distance;
   u.attach_compliance = scene.suture.attach_compliance;
-  u.channel_compliance = scene.suture.channel_compliance;
+  u.track_compliance = scene.suture.track_compliance;
   u.pass_tension = scene.suture.pass_tension;
-  u.capstan = scene.suture.capstan;
+  u.capstan_friction = scene.suture.capstan_friction;
   u.grasp_reach = scene.suture.grasp_reach;
-  u.least_throws = scene.technique.throws;
+  u.min_throws = scene.technique.throws;
 
   m.technique = make_technique(scene, working_rim, wall, where);
 

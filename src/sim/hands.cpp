@@ -66,7 +66,7 @@ void lay_down(const Model& model, State& state, size_t hand) {
   SutureContext sewing{model.solver, state.solver, state.scratch, model.suture, state.suture, state.event};
   release(sewing, static_cast<uint32_t>(i), 0);
   if (state.suture.loop[i].wraps > 0) {
-    take_off_loop(sewing, static_cast<uint32_t>(i));
+    release_loop(sewing, static_cast<uint32_t>(i));
     report(state, EventKind::loop_released, static_cast<uint8_t>(hand), 0);
   }
   report(state, EventKind::instrument_laid_down, static_cast<uint8_t>(hand), i);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sim/model: everything about a scene that never changes. Written by sim/build, read by every stage.
 #pragma once
 #include <array>
@@ -16,7 +17,7 @@ namespace catgut {
 struct ParkedStart {
   size_t instrument = 0;
   Pose pose;
-  TissuePoint point;      // of tissue, at the jaws
+  EmbeddedPoint point;    // of tissue, at the jaws
   uint32_t particle = 0;  // nearest to them
 };
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sim/publish: reads the state after a tick, writes the Snapshot that pictures, surgeon and host see. Changes nothing.
 #include <algorithm>
 
@@ -30,7 +31,7 @@ void publish_hands(const Model& model, const State& state, Snapshot& out) {
     t = {};
     t.pose = t.hand = state.hand[k].pose;
     t.instrument = state.hand[k].instrument;
-    out.patch[k] = state.feel.patch[k];
+    out.patch[k] = state.haptics.patch[k];
     if (t.instrument < 0) continue;
     const size_t i = static_cast<size_t>(t.instrument);
     const InstrumentState& tool = state.suture.instrument[i];
@@ -44,7 +45,7 @@ void publish_hands(const Model& model, const State& state, Snapshot& out) {
       for (const ThreadHold& h : strand.hold) t.held_strands += h.body == t.instrument && h.kind == HoldKind::jaw;
     const ToolLoop& loop = state.suture.loop[i];
     t.loop_wraps = loop.wraps;
-    t.loop_handed = loop.handed;
+    t.loop_handed = loop.chirality;
     t.loop_suture = loop.suture;
     t.loop_first = loop.first;
     t.loop_last = loop.last;
@@ -102,7 +103,7 @@ void publish_suture(const Model& model, const State& state, size_t which, Suture
   const Strand& strand = state.solver.strand[which];
   const RigidBody& needle = state.solver.body[model.solver.needle_body(which)];
   // Published at the circle's center, which is what pictures and plans turn about.
-  out.needle.pose = {transform(needle.pose(), model.solver.needle_arc[which].centre), needle.q};
+  out.needle.pose = {transform(needle.pose(), model.solver.needle_arc[which].center), needle.q};
   out.needle.in_tissue = !suture.open.empty();
   out.needle.bite = suture.open.empty() ? 0 : suture.open.back().bite;
   out.thread_order = strand.order;
@@ -119,15 +120,15 @@ void publish_suture(const Model& model, const State& state, size_t which, Suture
 void publish_settled(const Model& model, const State& state, Snapshot& out) {
   const SolverState& s = state.solver;
   out.settled.clear();
-  const auto place = [&](const SettledNode& n) {
+  const auto place = [&](const BakedNode& n) {
     const uint32_t c = model.solver.shape.cluster_of[n.particle];
     const Quat q{s.rotation.x[c], s.rotation.y[c], s.rotation.z[c], s.rotation.w[c]};
     return xyz(s.x[n.particle]) + rotate(q, n.offset);
   };
-  for (const SettledStitch& stitch : state.suture.settled) {
+  for (const BakedSuture& stitch : state.suture.settled) {
     SettledView v;
-    for (const SettledNode& n : stitch.node) v.node.push_back(place(n));
-    for (const SettledNode& n : stitch.knot) v.knot.push_back(place(n));
+    for (const BakedNode& n : stitch.node) v.node.push_back(place(n));
+    for (const BakedNode& n : stitch.knot) v.knot.push_back(place(n));
     out.settled.push_back(std::move(v));
   }
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sim: reads and writes recordings. Knows TickInput field by field and nothing of what is inside a state.
 #include "sim/recording.h"
 

@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // sim: recordings (.cgrec). Start state + the hands of every tick + a hash per tick: enough to replay a run bit for bit, to
-// check that a change did not alter the physics, and to hand a bug to somebody else.
+// check that a change did not alter the physics, and to hand a bug to someone else.
 //
 // The file: 8 bytes of magic, format version (u32), then chunks {kind u32, size u64, hash u64, payload}. Little endian, packed
 // field by field, so that neither padding nor the compiler leaks into it. The hash covers kind, size and payload. Chunks are

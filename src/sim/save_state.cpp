@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sim/save_state: the whole state as bytes, back again, and its hash. What the state is made of stands in the reflect of its
 // types; here are the archives over it, and what a state that was read has to fulfil.
 #include <algorithm>
@@ -164,7 +165,7 @@ uint64_t hash_state(const Model&, const State& state) {
   return hasher.digest();
 }
 
-bool state_is_sane(const Model& model, const State& state, float limit) {
+bool state_is_valid(const Model& model, const State& state, float limit) {
   auto ok = [limit](Vec3 p) { return is_finite(p) && length2(p) <= limit * limit; };
   for (uint32_t i = 0; i < model.solver.count; ++i)
     if (!ok(xyz(state.solver.x[i])) || !is_finite(xyz(state.solver.v[i]))) return false;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sim/scene: everything a scene file can say, as plain data. The table in procedure/scene_fields names each member once for
 // the reader, the writer, `catgut describe` and the reference page; sim/build turns a SceneSpec into a Model.
 // SI units throughout. A value left out of a scene file keeps the default given here.
@@ -22,7 +23,7 @@ struct BodySpec {
   bool closed_end = false;       // near end (where the procedure works) closed by a cap
   float haustra = 0.0008f;       // [m] depth of the sacculations; they fade out toward an open rim
   int taeniae = 3;               // longitudinal bands
-  Vec3 position;                 // [m] centre of the near end
+  Vec3 position;                 // [m] center of the near end
   Vec3 axis{0, 1, 0};            // the way the near end faces
   float density = 1050;          // [kg/m^3]
   float pinned_length = 0.035f;  // [m] of the far end that the surroundings hold
@@ -40,7 +41,7 @@ struct InstrumentSpec {
 
 struct ThreadSpec {
   int particles = 175;
-  float spacing = 0.0016f;           // [m] rest distance of neighbours
+  float spacing = 0.0016f;           // [m] rest distance of neighbors
   float radius = 0.00015f;           // [m]
   float mass = 2e-6f;                // [kg] per particle
   float stretch_compliance = 1e-6f;  // [m/N] per segment
@@ -91,9 +92,10 @@ struct SutureSpec {
   float attach_threshold = 0.006f;     // [m] X of figure 4: the nearest particle must be this near to the tip
   float release_distance = 0.0022f;    // [m] drag beyond which the attached particle is let go (figure 5)
   float attach_compliance = 0.00091f;  // [m/N] of that attachment: 1 / 1100 N/m, the paper's spring
-  float channel_compliance = 0.002f;   // [m/N] the bitten tissue holds the needle's shaft sideways
+  float track_compliance = 0.002f;     // [m/N] the bitten tissue holds the needle's shaft sideways
   float pass_tension = 0.03f;          // [N] tension difference beyond which thread slides through a suture point
-  float capstan = 0.08f;       // and so much more per newton of tension (friction coefficient times the angle of the bend)
+  float capstan_friction =
+      0.08f;                   // and that much more per newton of tension (friction coefficient times the angle of the bend)
   int collision_off = 3;       // thread particles on each side of a locked one that do not collide
   float grasp_reach = 0.003f;  // [m] how near a closing jaw must be to hold needle or thread
 };
@@ -101,7 +103,7 @@ struct SutureSpec {
 // The technique's plan.
 struct TechniqueSpec {
   std::string name = "purse_string";   // or connell, stay, lembert, none
-  Vec3 anvil;                          // [m] focal point of the closure, relative to the rim's centre
+  Vec3 anvil;                          // [m] focal point of the closure, relative to the rim's center
   float anvil_radius = 0.004f;         // [m] the rim ends on a ring of this radius
   float closure_compliance = 0.0001f;  // [m/N] of the pull of the edge particles toward it
   int min_bites = 10;

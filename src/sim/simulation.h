@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sim: the engine's face. `Model` never changes, `State` is all that does, `step` is the tick, and the same inputs give the
 // same bits for any number of workers. Everything above (command line, window, recording, embedding) is built on these few
 // calls.
@@ -49,14 +50,14 @@ std::vector<std::byte> save_state(const Model& model, const State& state);
 void load_state(const Model& model, State& state, const std::vector<std::byte>& bytes);
 uint64_t hash_state(const Model& model, const State& state);
 
-// The numbers of a run left what the solver can handle: no fault of the input. Whoever runs ticks checks for it with
-// state_is_sane.
+// The numbers of a run left what the solver can handle: no fault of the input. A caller that runs ticks checks for it with
+// state_is_valid.
 struct SimulationUnstable : std::runtime_error {
   explicit SimulationUnstable(const std::string& what) : std::runtime_error(what) {}
 };
 
-// True when nothing in the state is NaN or infinite and no particle is further than `limit` metres from the origin.
-bool state_is_sane(const Model& model, const State& state, float limit = 1.0f);
+// True when nothing in the state is NaN or infinite and no particle is further than `limit` meters from the origin.
+bool state_is_valid(const Model& model, const State& state, float limit = 1.0f);
 double kinetic_energy(const Model& model, const State& state);  // [J]
 
 }  // namespace catgut

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sim/state: everything that changes, and the scratch that stages reuse. What reflect names is the state: it is saved, hashed
 // and published. The rest is working memory of a tick.
 #pragma once
@@ -6,7 +7,7 @@
 
 #include "exchange/event.h"
 #include "exchange/tool_input.h"
-#include "sim/feel.h"
+#include "sim/haptic_feedback.h"
 #include "solver/substep.h"
 #include "suture/reflect.h"
 #include "technique/reflect.h"
@@ -31,7 +32,7 @@ struct State {
   std::vector<TechniqueState> technique;  // one per suture; written by technique
   std::vector<ClosurePlan> plan;          // one per suture; written by technique, read by suture/closure
   std::array<HandState, kMaxHands> hand;  // written by sim/hands
-  Feel feel;                              // written by sim/feel, read by publish
+  HapticFeedback haptics;                 // written by sim/haptic_feedback, read by publish
   EventList event;                        // of the last tick
   // Working memory.
   EventList suture_event;  // of one suture, for its technique
@@ -42,7 +43,7 @@ struct State {
 
 constexpr void reflect(auto& a, Like<State> auto& s) {
   a(s.tick), a(s.solver), a(s.suture), a.column(s.plan, IndexOf::strand), a.column(s.technique, IndexOf::strand);
-  a(s.hand), a(s.feel), a(s.event);
+  a(s.hand), a(s.haptics), a(s.event);
   a.cache(s.suture_event), a.cache(s.stitch), a.cache(s.stitch_span), a.cache(s.scratch);
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sim/step: THE stage list. Reads one TickInput, moves the state by one tick, leaves the tick's events in it.
 #include <algorithm>
 
@@ -35,12 +36,12 @@ TechniqueView look(const Model& model, State& state, size_t which) {
   view.x = state.solver.x.data();
   view.loop = length_between_ends(thread, suture);
   view.needle_in_tissue = !suture.open.empty();
-  view.taken = suture.taken;
+  view.suture_index = suture.suture_index;
   view.dt = model.dt;
   return view;
 }
 
-// Every suture is judged and closed by itself, from its own events.
+// Every suture is judged and closed on its own, from its own events.
 void follow_technique(const Model& model, State& state) {
   const size_t before = state.event.size();
   EventList& own = state.suture_event;
@@ -77,15 +78,15 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
     cut(sewing, pressed);
     new_suture(sewing, model.start, model.needle_start, pressed);
   }
-  // As far as thread and tools may come nearer to anything in a tick, at half a metre a second; but no less than what a knot's
+  // As far as thread and tools may come nearer to anything in a tick, at half a meter a second; but no less than what a knot's
   // thread jumps when it slips.
   const float margin = std::clamp(0.5f * model.dt, 0.002f, 0.008f);
   find_candidates(solver, state.solver, state.scratch, margin, times);
-  begin_feeling(state);
+  begin_haptics(state);
   for (int i = 1; i <= model.substeps; ++i) {
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));
     substep(solver, state.solver, state.scratch, jobs, times);
-    feel_substep(model, state, i);
+    accumulate_haptics(model, state, i);
     slip(sewing);
     {
       StageTimer timer(times, Stage::puncture);
@@ -103,7 +104,7 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   }
   remember_hands(state, input);
   ++state.tick;
-  end_feeling(model, state);
+  finish_haptics(model, state);
 }
 
 }  // namespace catgut

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/attach: reads attachments, moves tissue particles and rigid bodies alike. XPBD (Macklin et al. 2016) per attachment.
 #include "solver/attach.h"
 
@@ -8,9 +9,9 @@
 
 namespace catgut {
 
-TissuePoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at) {
-  TissuePoint t;
-  t.count = static_cast<uint32_t>(std::min<size_t>(particle.size(), TissuePoint::kMost));
+EmbeddedPoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at) {
+  EmbeddedPoint t;
+  t.count = static_cast<uint32_t>(std::min<size_t>(particle.size(), EmbeddedPoint::kMaxParticles));
   using Column = std::array<double, 3>;
   const auto rest_of = [&](uint32_t k) { return Column{rest[particle[k]].x, rest[particle[k]].y, rest[particle[k]].z}; };
   Column mean{};
@@ -41,10 +42,10 @@ TissuePoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, V
   return t;
 }
 
-TissuePoint carried_by(const Vec4* rest, const TissuePoint& point, uint32_t count) {
+EmbeddedPoint carried_by(const Vec4* rest, const EmbeddedPoint& point, uint32_t count) {
   if (point.count <= count) return point;
   const Vec3 at = position_of(point, rest);
-  std::array<uint32_t, TissuePoint::kMost> near = point.particle;
+  std::array<uint32_t, EmbeddedPoint::kMaxParticles> near = point.particle;
   std::sort(near.begin(), near.begin() + point.count, [&](uint32_t i, uint32_t j) {
     const float di = length2(xyz(rest[i]) - at), dj = length2(xyz(rest[j]) - at);
     return di != dj ? di < dj : i < j;
@@ -52,12 +53,12 @@ TissuePoint carried_by(const Vec4* rest, const TissuePoint& point, uint32_t coun
   return spread_point({near.data(), count}, rest, at);
 }
 
-TissuePoint midway(const Vec4* rest, const TissuePoint& a, const TissuePoint& b) {
+EmbeddedPoint midway(const Vec4* rest, const EmbeddedPoint& a, const EmbeddedPoint& b) {
   // A point of tissue has room for so many particles; each of the two keeps the half of them that are nearest to it, with
   // weights that put it where it was.
-  TissuePoint m;
-  for (const TissuePoint* p : {&a, &b}) {
-    const TissuePoint part = carried_by(rest, *p, TissuePoint::kMost / 2);
+  EmbeddedPoint m;
+  for (const EmbeddedPoint* p : {&a, &b}) {
+    const EmbeddedPoint part = carried_by(rest, *p, EmbeddedPoint::kMaxParticles / 2);
     for (uint32_t k = 0; k < part.count; ++k) {
       uint32_t row = 0;
       while (row < m.count && m.particle[row] != part.particle[k]) ++row;
@@ -69,7 +70,7 @@ TissuePoint midway(const Vec4* rest, const TissuePoint& a, const TissuePoint& b)
 }
 
 float NeedleArc::nearest(Vec3 p) const {
-  float phi = portable::atan2(p.y - centre.y, p.x - centre.x);
+  float phi = portable::atan2(p.y - center.y, p.x - center.x);
   // Angles of the gap behind the arc belong to whichever end is nearer.
   if (phi < 0 && phi < 0.5f * (arc - 2 * kPi)) phi += 2 * kPi;
   return std::clamp(phi, 0.0f, arc);
@@ -100,8 +101,8 @@ void solve_attachment(Attachment& a, Vec4* x, const float* w, const std::vector<
   push(m, b, -d, r);
 }
 
-void solve_channel(ChannelPoint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model, RigidBody& needle,
-                   float h) {
+void solve_needle_track(NeedleTrackConstraint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model,
+                        RigidBody& needle, float h) {
   const Vec3 p = position_of(c.point, x);
   const Vec3 local = to_local(needle.pose(), p);
   const float phi = arc.nearest(local);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/attach: compliant attachments of tissue. Points of tissue are weighted sums of a few particles, so that a bite sits
 // where the needle went in and not on the nearest particle; the paper's nearest particle is the case of one weight 1.
 #pragma once
@@ -11,42 +12,42 @@
 
 namespace catgut {
 
-// A material point: sum of weight * particle. Spread over a neighbourhood it also has the inertia of one: a thread that pulls
-// on three particles alone would drag them millimetres in a substep before their neighbours could answer.
-struct TissuePoint {
-  static constexpr uint32_t kMost = 16;
+// A material point: sum of weight * particle. Percentiles over a neighborhood it also has the inertia of one: a thread that
+// pulls on three particles alone would drag them millimeters in a substep before their neighbors could answer.
+struct EmbeddedPoint {
+  static constexpr uint32_t kMaxParticles = 16;
   uint32_t count = 0;
-  std::array<uint32_t, kMost> particle{};
-  std::array<float, kMost> weight{};  // sum 1
+  std::array<uint32_t, kMaxParticles> particle{};
+  std::array<float, kMaxParticles> weight{};  // sum 1
 };
-inline TissuePoint particle_point(uint32_t i) {
-  TissuePoint t;
+inline EmbeddedPoint particle_point(uint32_t i) {
+  EmbeddedPoint t;
   t.count = 1;
   t.particle[0] = i;
   t.weight[0] = 1;
   return t;
 }
 // The smoothest weights over `particle` (at rest positions `rest`) whose weighted sum is `at`: least squares with linear
-// precision, so that the point follows every affine motion of its neighbourhood exactly. At most kMost particles are used.
-TissuePoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at);
+// precision, so that the point follows every affine motion of its neighborhood exactly. At most kMost particles are used.
+EmbeddedPoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at);
 
 // The same place at rest, carried by no more than `count` particles, the nearest of those it has.
-TissuePoint carried_by(const Vec4* rest, const TissuePoint& point, uint32_t count);
+EmbeddedPoint carried_by(const Vec4* rest, const EmbeddedPoint& point, uint32_t count);
 // Midway between two points of tissue, wherever the tissue carries them.
-TissuePoint midway(const Vec4* rest, const TissuePoint& a, const TissuePoint& b);
+EmbeddedPoint midway(const Vec4* rest, const EmbeddedPoint& a, const EmbeddedPoint& b);
 
-inline Vec3 position_of(const TissuePoint& t, const Vec4* x) {
+inline Vec3 position_of(const EmbeddedPoint& t, const Vec4* x) {
   Four p{};
   for (uint32_t k = 0; k < t.count; ++k) p += load(x[t.particle[k]]) * t.weight[k];
   return {p[0], p[1], p[2]};
 }
-inline float inverse_mass_of(const TissuePoint& t, const float* w) {
+inline float inverse_mass_of(const EmbeddedPoint& t, const float* w) {
   float s = 0;
   for (uint32_t k = 0; k < t.count; ++k) s += t.weight[k] * t.weight[k] * w[t.particle[k]];
   return s;
 }
 // Applies the positional impulse p [kg m] at the point.
-inline void push(const TissuePoint& t, Vec4* x, const float* w, Vec3 p) {
+inline void push(const EmbeddedPoint& t, Vec4* x, const float* w, Vec3 p) {
   const Four four{p.x, p.y, p.z, 0};
   for (uint32_t k = 0; k < t.count; ++k) {
     Vec4& at = x[t.particle[k]];
@@ -56,7 +57,7 @@ inline void push(const TissuePoint& t, Vec4* x, const float* w, Vec3 p) {
 
 // Particle (or weighted point) to a fixed place in the world, or to a place in a body's frame.
 struct Attachment {
-  TissuePoint point;
+  EmbeddedPoint point;
   int body = -1;         // -1: the world
   Vec3 target;           // [m] world, or body frame
   float compliance = 0;  // [m/N]
@@ -66,8 +67,8 @@ struct Attachment {
 
 // The shaft of the needle in its channel: the tissue point lies on the arc of the needle (particle-line attachment). It slides
 // along the arc against a Coulomb-like drag and is held sideways by `compliance`.
-struct ChannelPoint {
-  TissuePoint point;
+struct NeedleTrackConstraint {
+  EmbeddedPoint point;
   float compliance = 0;   // [m/N] sideways
   float drag = 0;         // [N] largest force along the shaft
   float at = 0;           // [rad] where on the arc it was at the start of the substep
@@ -77,11 +78,11 @@ struct ChannelPoint {
   float drag_lambda = 0;  // along the shaft
 };
 
-// The needle's circle in its body frame: centre at `centre`, in the xy plane, from angle 0 (swage) to `arc` (tip).
+// The needle's circle in its body frame: center at `center`, in the xy plane, from angle 0 (swage) to `arc` (tip).
 struct NeedleArc {
   float radius = 0, arc = 0;
-  Vec3 centre;  // [m] body frame: the body's origin is the centre of mass
-  Vec3 point(float phi) const { return centre + Vec3{radius * portable::cos(phi), radius * portable::sin(phi), 0}; }
+  Vec3 center;  // [m] body frame: the body's origin is the center of mass
+  Vec3 point(float phi) const { return center + Vec3{radius * portable::cos(phi), radius * portable::sin(phi), 0}; }
   Vec3 tangent(float phi) const { return {-portable::sin(phi), portable::cos(phi), 0}; }  // toward the tip
   // The angle of the point of the arc nearest to p (body frame), clamped to the arc.
   float nearest(Vec3 p) const;
@@ -89,7 +90,7 @@ struct NeedleArc {
 
 void solve_attachment(Attachment& a, Vec4* x, const float* w, const std::vector<RigidModel>& model,
                       std::vector<RigidBody>& body, float h);
-void solve_channel(ChannelPoint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model, RigidBody& needle,
-                   float h);
+void solve_needle_track(NeedleTrackConstraint& c, const NeedleArc& arc, Vec4* x, const float* w, const RigidModel& model,
+                        RigidBody& needle, float h);
 
 }  // namespace catgut

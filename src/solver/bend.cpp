@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/bend: see the header. Compiled once per instruction set (Highway); no fused multiply-add, as in shape_match.
 #include "solver/bend.h"
 
@@ -20,13 +21,13 @@ HWY_INLINE V3 Sub3(V3 a, V3 b) { return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), h
 HWY_INLINE V3 Mul3(V3 a, V s) { return {hn::Mul(a.x, s), hn::Mul(a.y, s), hn::Mul(a.z, s)}; }
 HWY_INLINE V Dot3(V3 a, V3 b) { return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z)); }
 
-// Triplets of one colour: end columns a and c, middle column b, each starting at its own offset; `count` of them.
-struct Colour {
+// Triplets of one color: end columns a and c, middle column b, each starting at its own offset; `count` of them.
+struct Color {
   float *ax, *ay, *az, *aw, *bx, *by, *bz, *bw, *cx, *cy, *cz, *cw, *lambda, *whole;
   size_t count;
 };
 
-void Sweep(const Colour& t, float alpha) {
+void Sweep(const Color& t, float alpha) {
   const D d;
   const size_t lanes = hn::Lanes(d);
   const V one = hn::Set(d, 1.0f), tiny = hn::Set(d, 1e-18f), va = hn::Set(d, alpha), zero = hn::Zero(d);
@@ -56,12 +57,12 @@ void Sweep(const Colour& t, float alpha) {
                                                         hn::Mul(hn::Mul(wc, wc), gc2)));
     const V limit = hn::Mul(hn::Set(d, 0.01f), hn::Min(la2, lc2));
     const auto over = hn::Gt(most, limit);
-    if (!hn::AllFalse(d, over))  // rare, and the root and the division are dear
+    if (!hn::AllFalse(d, over))  // rare, and the root and the division are expensive
       step = hn::IfThenElse(over, hn::Mul(step, hn::Sqrt(hn::Div(limit, hn::IfThenElse(over, most, one)))), step);
     step = hn::IfThenElseZero(live, step);
     hn::StoreU(hn::Add(lambda, step), d, t.lambda + k);
     const V sa = hn::Mul(wa, step), sb = hn::Mul(wb, step), sc = hn::Mul(wc, step);
-    // Whole vectors are stored; lanes without mass write back what they read, and colours touch each node once.
+    // Whole vectors are stored; lanes without mass write back what they read, and colors touch each node once.
     hn::StoreU(hn::Add(a.x, hn::Mul(ga.x, sa)), d, t.ax + k);
     hn::StoreU(hn::Add(a.y, hn::Mul(ga.y, sa)), d, t.ay + k);
     hn::StoreU(hn::Add(a.z, hn::Mul(ga.z, sa)), d, t.az + k);
@@ -79,7 +80,7 @@ void AllBends(BendScratch& s, size_t nodes, float alpha, int sweeps) {
     for (size_t middle = 1; middle <= 3; ++middle) {
       if (middle + 1 >= nodes) continue;
       const size_t a = (middle - 1) % 3, b = middle % 3, c = (middle + 1) % 3;
-      // Offsets of the first triplet of the colour within each column.
+      // Offsets of the first triplet of the color within each column.
       const size_t oa = (middle - 1) / 3, ob = middle / 3, oc = (middle + 1) / 3;
       const size_t count = (nodes - 2 - middle) / 3 + 1;
       Sweep({s.x[a].data() + oa, s.y[a].data() + oa, s.z[a].data() + oa, s.w[a].data() + oa, s.x[b].data() + ob,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/collide: reads positions, writes candidate lists. See the header for why they are reused.
 #include "solver/collide.h"
 

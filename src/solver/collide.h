@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/collide: who may touch whom, where tools or thread are concerned; found once a tick. (Tissue and tissue:
 // tissue_pairs.)
 #pragma once

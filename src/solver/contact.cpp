@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/contact: reads candidates, moves particles and bodies. See the header.
 #include "solver/contact.h"
 

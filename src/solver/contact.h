@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/contact: unilateral contact with Coulomb friction in positions: tissue on tissue, tools on tissue and on each other,
 // thread (as capsules) on tools, on itself and on the tissue's surface, and the drape under everything. Normal part: C = gap >=
 // 0, undone at once (contacts are hard). Friction undoes the slip since the start of the substep, at most friction times the
@@ -44,7 +45,7 @@ uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tiss
                                float friction);
 // Tools on each other. Steel does not give: what a substep has brought them into each other is undone in it, whichever side the
 // axes are on by now; overlap from before (hands that appear within each other) at 0.1 mm a substep, which is no blow. Impulses
-// accumulate over the sweeps of a substep, and a later sweep takes back what an earlier one did too much of, so that sweeps in
+// accumulate over the sweeps of a substep, and a later sweep undoes what an earlier one did too much of, so that sweeps in
 // turn with the welds of the hands come to the balance of both. most_press [kg m]: a pair presses no harder and rather slips
 // past each other; nothing stops a hand that feels nothing, and tools locked behind each other would tear what they hold.
 uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list, float friction, float most_press);

@@ -22,10 +22,10 @@ enum class IndexOf : uint8_t {
 
 constexpr void reflect(auto& a, Like<Vec4> auto& v) { a(v.x), a(v.y), a(v.z), a(v.w); }
 
-constexpr void reflect(auto& a, Like<TissuePoint> auto& t) {
-  a.at_most(t.count, TissuePoint::kMost);
+constexpr void reflect(auto& a, Like<EmbeddedPoint> auto& t) {
+  a.at_most(t.count, EmbeddedPoint::kMaxParticles);
   // Beyond count the rows are unused, and zero.
-  for (uint32_t k = 0; k < TissuePoint::kMost; ++k) a.index(t.particle[k], IndexOf::tissue);
+  for (uint32_t k = 0; k < EmbeddedPoint::kMaxParticles; ++k) a.index(t.particle[k], IndexOf::tissue);
   a(t.weight);
 }
 
@@ -41,17 +41,17 @@ constexpr void reflect(auto& a, Like<Attachment> auto& t) {
   a.index(t.suture, IndexOf::strand), a(t.lambda);
 }
 
-constexpr void reflect(auto& a, Like<ChannelPoint> auto& c) {
+constexpr void reflect(auto& a, Like<NeedleTrackConstraint> auto& c) {
   a(c.point), a(c.compliance), a(c.drag), a(c.at), a.index(c.suture, IndexOf::strand), a(c.hole), a(c.lambda), a(c.drag_lambda);
 }
 
-constexpr void reflect(auto& a, Like<TissuePin> auto& p) {
-  a(p.a), a(p.b), a(p.length), a(p.compliance), a(p.lambda), a.at_most(p.owner, PinOwner::passage);
+constexpr void reflect(auto& a, Like<Tether> auto& p) {
+  a(p.a), a(p.b), a(p.length), a(p.compliance), a(p.lambda), a.at_most(p.owner, TetherOwner::passage);
   a.index(p.suture, IndexOf::strand);
 }
 
 constexpr void reflect(auto& a, Like<ThreadAnchor> auto& t) {
-  a.index(t.slot, IndexOf::slot), a(t.point), a(t.offset), a(t.knotted), a(t.friction), a(t.capstan), a(t.slipping);
+  a.index(t.slot, IndexOf::slot), a(t.point), a(t.offset), a(t.knotted), a(t.friction), a(t.capstan_friction), a(t.slipping);
   a(t.blocked_needle), a(t.blocked_free), a(t.tension_needle), a(t.tension_free);
 }
 

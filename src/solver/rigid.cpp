@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/rigid: reads rigid models, moves rigid bodies. See the header for the paper.
 #include "solver/rigid.h"
 

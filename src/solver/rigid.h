@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/rigid: six-degree-of-freedom bodies (needle and tools) inside the XPBD substep (Mueller et al. 2020, Detailed rigid
 // body simulation with extended position based dynamics): one solver, two-way coupling, one force.
 #pragma once
@@ -20,7 +21,7 @@ struct RigidModel {
 };
 
 struct RigidBody {
-  Vec3 x;  // [m] centre of mass
+  Vec3 x;  // [m] center of mass
   Quat q;
   Vec3 v, omega;  // [m/s], [rad/s]
   Vec3 prev_x;    // at the start of the substep

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The SIMD kernels use Highway: one source, every instruction set, chosen at run time.
 find_library(HWY_LIBRARY hwy REQUIRED)
 find_path(HWY_INCLUDE hwy/highway.h REQUIRED)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/shape_match: see the header. Compiled once per instruction set (Highway) and chosen at run time. Multiplications and
 // additions are kept apart (no fused multiply-add) so that every instruction set gives the same bits.
 #include "solver/shape_match.h"
@@ -39,7 +40,7 @@ HWY_INLINE Parts SumRows(const float* HWY_RESTRICT row, const uint32_t* HWY_REST
     sum.part[p] = hn::Add(hn::Add(acc[0].part[p], acc[1].part[p]), hn::Add(acc[2].part[p], acc[3].part[p]));
   return sum;
 }
-constexpr uint32_t kShell = 8;  // rows in a sum of a wall of two layers: seven neighbours, padded
+constexpr uint32_t kShell = 8;  // rows in a sum of a wall of two layers: seven neighbors, padded
 
 // Which component of (q, 1) each lane of a row is multiplied by: column j of the moments is m x q_j.
 alignas(64) constexpr int32_t kColumn[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
@@ -225,7 +226,7 @@ HWY_INLINE void MatchClusters(const ShapeModel& model, ClusterRotations& rotatio
   const Wide<N> one = Number<N>(1.0f), half = Number<N>(0.5f), tiny = Number<N>(1e-30f);
   const Wide<N> inv = LoadWide<N>(model.inv_cluster_mass.data() + at);
   const Wide3<N> c{m[3][0] * inv, m[3][1] * inv, m[3][2] * inv};
-  // A = sum m (x - c) q^T: centred after summing.
+  // A = sum m (x - c) q^T: centered after summing.
   Wide3<N> a[3], r[3];
   for (size_t j = 0; j < 3; ++j) a[j] = {m[j][0] - c.x * m[j][3], m[j][1] - c.y * m[j][3], m[j][2] - c.z * m[j][3]};
 
@@ -261,7 +262,7 @@ HWY_INLINE void MatchClusters(const ShapeModel& model, ClusterRotations& rotatio
     turn.y.part[k] = hn::IfThenElse(safe, turn.y.part[k], hn::Mul(damp, g.y.part[k]));
     turn.z.part[k] = hn::IfThenElse(safe, turn.z.part[k], hn::Mul(damp, g.z.part[k]));
   }
-  // q <- q (1, turn/2), renormalised: the rotation is in the cluster's own frame, hence on the right.
+  // q <- q (1, turn/2), renormalized: the rotation is in the cluster's own frame, hence on the right.
   const Wide3<N> t{half * turn.x, half * turn.y, half * turn.z};
   const Wide<N> nx = q.x + (w * t.x + (q.y * t.z - q.z * t.y)), ny = q.y + (w * t.y + (q.z * t.x - q.x * t.z));
   const Wide<N> nz = q.z + (w * t.z + (q.x * t.y - q.y * t.x)), nw = w - Dot(q, t);
@@ -270,9 +271,9 @@ HWY_INLINE void MatchClusters(const ShapeModel& model, ClusterRotations& rotatio
   StoreWide(q.x, rotation.x.data() + at), StoreWide(q.y, rotation.y.data() + at);
   StoreWide(q.z, rotation.z.data() + at), StoreWide(w, rotation.w.data() + at);
   Columns(q, w, r);
-  // Where the centre goes: c - R c0.
-  const Wide<N> c0x = LoadWide<N>(model.rest_centre[0].data() + at), c0y = LoadWide<N>(model.rest_centre[1].data() + at);
-  const Wide<N> c0z = LoadWide<N>(model.rest_centre[2].data() + at);
+  // Where the center goes: c - R c0.
+  const Wide<N> c0x = LoadWide<N>(model.rest_center[0].data() + at), c0y = LoadWide<N>(model.rest_center[1].data() + at);
+  const Wide<N> c0z = LoadWide<N>(model.rest_center[2].data() + at);
   const Wide3<N> to{c.x - (r[0].x * c0x + r[1].x * c0y + r[2].x * c0z), c.y - (r[0].y * c0x + r[1].y * c0y + r[2].y * c0z),
                     c.z - (r[0].z * c0x + r[1].z * c0y + r[2].z * c0z)};
   const Wide3<N>* affine[4] = {&r[0], &r[1], &r[2], &to};
@@ -443,7 +444,7 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
   constexpr uint32_t kRow = sizeof(Row) / sizeof(float);
   ShapeModel m;
   const uint32_t particles = static_cast<uint32_t>(rest.size());
-  // The members as a set, in ascending order, are the key: partners across the wall list the same neighbourhood.
+  // The members as a set, in ascending order, are the key: partners across the wall list the same neighborhood.
   std::map<std::vector<uint32_t>, uint32_t> known;
   std::vector<const std::vector<uint32_t>*> unique;
   for (const std::vector<uint32_t>& c : cluster) {
@@ -470,7 +471,7 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
   }
   m.cluster_stride = static_cast<uint32_t>((widest + 3) / 4 * 4);
   m.member.assign(size_t{m.clusters} * m.cluster_stride, particles);
-  for (Column<float>& axis : m.rest_centre) axis.assign((m.clusters + 15) / 16 * 16, 0.0f);
+  for (Column<float>& axis : m.rest_center) axis.assign((m.clusters + 15) / 16 * 16, 0.0f);
   for (uint32_t c = 0; c < m.clusters; ++c) {
     double sum = 0, sx = 0, sy = 0, sz = 0;
     for (size_t k = 0; k < unique[c]->size(); ++k) {
@@ -479,8 +480,8 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
       const double w = m.relative_mass[id];
       sum += w, sx += w * rest[id].x, sy += w * rest[id].y, sz += w * rest[id].z;
     }
-    m.rest_centre[0][c] = static_cast<float>(sx / sum), m.rest_centre[1][c] = static_cast<float>(sy / sum);
-    m.rest_centre[2][c] = static_cast<float>(sz / sum);
+    m.rest_center[0][c] = static_cast<float>(sx / sum), m.rest_center[1][c] = static_cast<float>(sy / sum);
+    m.rest_center[2][c] = static_cast<float>(sz / sum);
   }
   // Groups: runs of particles with the same list of clusters.
   for (uint32_t i = 0; i < particles; ++i) {
@@ -506,7 +507,7 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
   widest = 0;
   for (const auto& g : held) widest = std::max(widest, g.size());
   m.member_stride = padded(widest);
-  const size_t batched = m.rest_centre[0].size();
+  const size_t batched = m.rest_center[0].size();
   m.group_member.assign(batched * m.member_stride, kRow * m.groups);
   for (size_t at = 0; at < batched; ++at) {
     const size_t c = std::min<size_t>(at, m.clusters - 1);  // the places after the last cluster repeat it

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/shape_match: shape matching over overlapping clusters (paper 2.1; Mueller et al. 2005), as an XPBD constraint
 // C_k = x_k - g_k per particle, where g_k is the mean of the goals of all clusters that hold k.
 // Both passes are sums of listed 64-byte rows in a fixed order: no gathers, no scatter, no atomics, the same bits for any
@@ -34,11 +35,11 @@ struct ShapeModel {
   Column<Vec4> rest;                         // per particle, (x, y, z, 1)
   Column<float> relative_mass;               // per particle: m_k / mean m, the weights of the moments
   Column<Vec4> weighted_rest;                // per particle: relative mass times rest
-  std::array<Column<float>, 3> rest_centre;  // per cluster, by components: mass-weighted
+  std::array<Column<float>, 3> rest_center;  // per cluster, by components: mass-weighted
   Column<float> inv_cluster_mass;            // per cluster: 1 / sum of relative masses; padded as the lists are
-  std::vector<uint32_t> cluster_of;          // per particle: the cluster centred on it
+  std::vector<uint32_t> cluster_of;          // per particle: the cluster centered on it
 };
-// cluster[i] is centred on particle i. Clusters of the same members are one: it would only be solved twice to the same end.
+// cluster[i] is centered on particle i. Clusters of the same members are one: it would only be solved twice to the same end.
 ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> mass,
                             std::span<const std::vector<uint32_t>> cluster);
 

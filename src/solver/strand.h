@@ -42,16 +42,16 @@ struct StrandModel {
 // A suture point's hold on the thread.
 struct ThreadAnchor {
   uint32_t slot = 0;
-  TissuePoint point;
+  EmbeddedPoint point;
   Vec3 offset;                  // [m] world, from that point: a knot on its way to the tissue, else zero
   bool knotted = false;         // a locked knot's: the thread never slides here
   float friction = 0;           // [N] tension difference beyond which thread slides, at no tension
-  float capstan = 0;            // additional threshold per newton of tension: friction coefficient times bend angle
+  float capstan_friction = 0;   // additional threshold per newton of tension: friction coefficient times bend angle
   int slipping = 0;             // +1: toward the needle, -1: toward the free end, 0: stuck
   bool blocked_needle = false;  // no particle left to pass toward the needle / toward the free end
   bool blocked_free = false;
   float tension_needle = 0, tension_free = 0;  // [N] of the pairs on its two sides, written by solve_thread
-  float threshold() const { return friction + capstan * std::max(0.0f, std::min(tension_needle, tension_free)); }
+  float threshold() const { return friction + capstan_friction * std::max(0.0f, std::min(tension_needle, tension_free)); }
 };
 
 enum class HoldKind : uint32_t { swage, jaw, loop };  // the needle's own end, a closed jaw, a loop frozen round a tool

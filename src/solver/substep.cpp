@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/substep: reads the model; moves every particle and body of the state. Section 2.1 of the paper, with its order:
 // predict, shape (and volume), tissue contact, attachments and bodies, contacts of tools and thread, the thread itself,
 // velocities. The thread comes last so that what is drawn and felt is a thread of the right length.
@@ -17,7 +18,7 @@ constexpr float kTopSpeed = 5.0f;  // [m/s] of a particle; a hand cannot throw t
 void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   for (Weld& w : state.weld) w.lambda = w.angular_lambda = {};
   for (Attachment& a : state.attach) a.lambda = {};
-  for (ChannelPoint& c : state.channel) c.lambda = {}, c.drag_lambda = 0;
+  for (NeedleTrackConstraint& c : state.channel) c.lambda = {}, c.drag_lambda = 0;
   std::fill(scratch.volume_lambda.begin(), scratch.volume_lambda.end(), 0.0f);
   std::fill(scratch.shape.moved.begin(), scratch.shape.moved.end(), Vec4{});
   std::fill(scratch.on_body.begin(), scratch.on_body.end(), BodyContact{});
@@ -27,7 +28,7 @@ void clear_multipliers(SolverState& state, SolverScratch& scratch) {
 
 // Room for what a tick may find, so that no tick asks for memory. Bounds where there are any (a capsule cannot be near more
 // than all particles), elsewhere several times the most that was ever seen; what outgrows even that grows as vectors do. Pages
-// that nobody writes to are never made.
+// that no one writes to are never made.
 void reserve_room(const SolverModel& m, SolverScratch& k) {
   constexpr size_t kPairsOfOne = 32, kBlocksNear = 256, kPins = 256, kPinsBeside = 32;
   const size_t tissue = m.collision.particles, thread = m.count - m.tissue;
@@ -58,7 +59,7 @@ void reserve_room(const SolverModel& m, SolverScratch& k) {
   for (size_t s = 0; s < m.strand.size(); ++s) {
     ThreadScratch& t = k.thread[s];
     const size_t nodes = m.strand[s].count;
-    t.heavy.reserve(nodes);
+    t.constrained.reserve(nodes);
     t.slide.reserve(nodes);  // anchors, of which a thread has no more than particles
     t.waiting.reserve(nodes);
     t.anchor_node.reserve(nodes);
@@ -67,17 +68,17 @@ void reserve_room(const SolverModel& m, SolverScratch& k) {
     t.on_tool.reserve(m.body.size());
     t.load.reserve(m.body.size());
   }
-  PinWeb& w = k.web;
+  TetherGraph& w = k.web;
   w.row.reserve(kPins + 1);
   w.point.reserve(2 * kPins);
   w.first.reserve(kPins + 1);
   w.strand.reserve(kPins * kPinsBeside);
-  for (std::vector<uint32_t>* each : {&w.rope, &w.slack, &w.before}) each->reserve(kPins);
-  for (std::vector<uint32_t>* part : {&w.particle, &w.on}) part->reserve(2 * TissuePoint::kMost * kPins);
-  for (std::vector<float>* part : {&w.share, &w.move, &w.weight}) part->reserve(2 * TissuePoint::kMost * kPins);
+  for (std::vector<uint32_t>* each : {&w.active, &w.slack, &w.before}) each->reserve(kPins);
+  for (std::vector<uint32_t>* part : {&w.particle, &w.on}) part->reserve(2 * EmbeddedPoint::kMaxParticles * kPins);
+  for (std::vector<float>* part : {&w.share, &w.move, &w.weight}) part->reserve(2 * EmbeddedPoint::kMaxParticles * kPins);
   w.start.reserve(m.tissue + 2);
   w.listed.reserve(kPins);
-  for (std::vector<float>* each : {&w.length, &w.compliance, &w.by_rope}) each->reserve(kPins);
+  for (std::vector<float>* each : {&w.length, &w.compliance, &w.by_active}) each->reserve(kPins);
   k.pin_span.reserve(kPins);
 }
 
@@ -153,7 +154,7 @@ void find_boxes(const SolverModel& m, const SolverState& s, SolverScratch& k, Jo
 void find_candidates(const SolverModel& m, const SolverState& s, SolverScratch& k, float margin, StageTimes* times) {
   {
     StageTimer timer(times, Stage::attach);
-    weave(s.pin, m.inv_mass.data(), m.tissue, k.web);
+    build_graph(s.pin, m.inv_mass.data(), m.tissue, k.web);
   }
   StageTimer timer(times, Stage::broadphase);
   find_tool_and_thread_candidates({m.collision, s.x.data(), m.strand, s.strand, m.body, s.body, s.body_collides}, margin,
@@ -196,7 +197,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     StageTimer timer(times, Stage::volume);
     for (int sweep = 0; sweep < m.volume_sweeps; ++sweep) {
       uint32_t start = 0;
-      for (const uint32_t end : m.volume.colour_end) {
+      for (const uint32_t end : m.volume.color_end) {
         jobs.each(end - start, kParticleBlock, [&](size_t first, size_t last) {
           solve_volume(m.volume, x, w, m.volume_compliance, h, k.volume_lambda.data(), start + static_cast<uint32_t>(first),
                        start + static_cast<uint32_t>(last));
@@ -226,21 +227,21 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
   {
     StageTimer timer(times, Stage::attach);
     for (Attachment& a : s.attach) solve_attachment(a, x, w, m.body, s.body, h);
-    solve_pins(s.pin, k.web, x, h, m.pin_sweeps, m.pin_tolerance, k.pin_span);
+    solve_tethers(s.pin, k.web, x, h, m.pin_sweeps, m.pin_tolerance, k.pin_span);
   }
   {
     // Few but stiff and pulling against each other (hand, grasp, channel, tool against tool): they get sweeps of their own.
     StageTimer timer(times, Stage::rigid);
-    for (ChannelPoint& c : s.channel) {
+    for (NeedleTrackConstraint& c : s.channel) {
       const RigidBody& needle = s.body[m.needle_body(c.suture)];
       const Vec3 at = position_of(c.point, k.prev.data()) - needle.prev_x;
       c.at = m.needle_arc[c.suture].nearest(rotate(conjugate(needle.prev_q), at));
     }
     int sweeps = s.channel.empty() ? 1 : m.rigid_sweeps;
     for (int sweep = 0; sweep < sweeps; ++sweep) {
-      for (ChannelPoint& c : s.channel) {
+      for (NeedleTrackConstraint& c : s.channel) {
         const uint32_t needle = m.needle_body(c.suture);
-        solve_channel(c, m.needle_arc[c.suture], x, w, m.body[needle], s.body[needle], h);
+        solve_needle_track(c, m.needle_arc[c.suture], x, w, m.body[needle], s.body[needle], h);
       }
       for (Weld& weld : s.weld) solve_weld(m.body, s.body, weld, h);
       const uint32_t n = solve_tools_on_tools(view, k.candidates.tool_pair, m.friction.tool, m.tool_force * h * h);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/substep: THE loop. One call advances everything soft, rigid and thin by one substep of XPBD (Macklin et al. 2016;
 // small steps: Macklin et al. 2019). Multipliers are cleared here and nowhere else, at the start of a substep, and
 // accumulate over its sweeps: lambda / h^2 at its end is the force in newtons.
@@ -9,8 +10,8 @@
 #include "solver/attach.h"
 #include "solver/collide.h"
 #include "solver/contact.h"
-#include "solver/pins.h"
 #include "solver/shape_match.h"
+#include "solver/tethers.h"
 #include "solver/thread.h"
 #include "solver/volume.h"
 
@@ -32,7 +33,7 @@ struct SolverModel {
   Vec3 tissue_gravity{0, -9.81f, 0};  // [m/s^2] on tissue: divided by the mass scaling, so that its weight is true
   int shape_sweeps = 1, self_sweeps = 1, contact_sweeps = 1, volume_sweeps = 1, rigid_sweeps = 4;
   float pin_tolerance = 3e-5f;  // [m] a tenth of the thread's diameter
-  int pin_sweeps = 4;  // the pins of a seam share tissue with their neighbours: after one sweep they would stay 1 mm apart
+  int pin_sweeps = 4;  // the pins of a seam share tissue with their neighbors: after one sweep they would stay 1 mm apart
   float shape_stiffness = 0.65f;  // s of solve_shape_particles at this h
   float shape_relaxation = 1;
   bool use_volume = false;
@@ -56,14 +57,14 @@ struct SolverState {
   Column<Vec4> x, v;          // position [m], velocity [m/s]
   ClusterRotations rotation;  // warm start of the polar decompositions
   std::vector<RigidBody> body;
-  std::vector<Strand> strand;          // one per suture
-  std::vector<Weld> weld;              // row i: instrument i to its hand; after them needle to instrument
-  std::vector<Attachment> attach;      // tissue to needle tip, to a jaw, to its closing target
-  std::vector<TissuePin> pin;          // tissue to tissue: seams, settled stitches
-  std::vector<ChannelPoint> channel;   // needles in their channels
-  std::vector<uint8_t> body_collides;  // per body
-  std::vector<Vec3> body_force;        // [N] per body, from outside: the weight of a parked instrument
-  Column<Vec4> pair_origin;            // [m] per tissue particle: where its contact pairs were last searched
+  std::vector<Strand> strand;                  // one per suture
+  std::vector<Weld> weld;                      // row i: instrument i to its hand; after them needle to instrument
+  std::vector<Attachment> attach;              // tissue to needle tip, to a jaw, to its closing target
+  std::vector<Tether> pin;                     // tissue to tissue: seams, settled stitches
+  std::vector<NeedleTrackConstraint> channel;  // needles in their channels
+  std::vector<uint8_t> body_collides;          // per body
+  std::vector<Vec3> body_force;                // [N] per body, from outside: the weight of a parked instrument
+  Column<Vec4> pair_origin;                    // [m] per tissue particle: where its contact pairs were last searched
 };
 
 // Working memory and caches: never saved, never hashed. Whatever a stage reads of it was made in the same tick, or is a
@@ -73,8 +74,8 @@ struct SolverScratch {
   ShapeScratch shape;
   std::vector<float> volume_lambda;
   std::vector<ThreadScratch> thread;  // one per strand
-  PinWeb web;
-  std::vector<PinSpan> pin_span;
+  TetherGraph web;
+  std::vector<TetherSpan> pin_span;
   Candidates candidates;
   std::vector<BodyContact> on_body;   // contact impulses on bodies in the last substep
   std::vector<int32_t> node_of_slot;  // per thread slot (relative to the first strand's first)

@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/thread: reads the order, anchors and holds; moves particles, tissue and bodies; writes tensions and slides.
 // The direct solve is a Newton step on all stretch constraints at once; their matrix J M^-1 J^T is tridiagonal in the order of
-// the thread. Bare Newton is singular where a slack thread folds, so it is regularised and its step limited; the sweeps
+// the thread. Bare Newton is singular where a slack thread folds, so it is regularized and its step limited; the sweeps
 // after it clean up. Rest-length slide at an anchor is one more coordinate s with inverse mass w of a thread particle:
 // rest[needle side] += s, rest[free side] -= s, which only adds to the two pairs beside the anchor and their coupling.
 #include "solver/thread.h"
@@ -47,43 +48,43 @@ void gather_nodes(const StrandModel& model, const Strand& thread, ThreadScratch&
     put_node(s, i, xyz(x[slot]));
     s.from_x[i] = before[slot].x, s.from_y[i] = before[slot].y, s.from_z[i] = before[slot].z;
     s.w[i] = model.inv_mass;
-    s.loose[i] = 1;
+    s.is_free[i] = 1;
     s.anchor_at[i] = s.hold_at[i] = -1;
     s.node_of_slot[slot - model.first_slot] = static_cast<int32_t>(i);
   }
   for (size_t i = 0; i < pairs; ++i) {
-    s.keep[i] = thread.cut[i] ? 0 : 1;
+    s.intact[i] = thread.cut[i] ? 0 : 1;
     s.rest[i] = thread.rest[i];
     s.tension[i] = thread.cut[i] ? 0 : thread.tension[i];
   }
   // What lies behind the last pair is no pair; the thread may have had more of them before.
-  s.tension[pairs] = s.keep[pairs] = s.step[pairs] = s.lambda[pairs] = s.loose[nodes] = 0;
+  s.tension[pairs] = s.intact[pairs] = s.step[pairs] = s.lambda[pairs] = s.is_free[nodes] = 0;
   auto node_of = [&](uint32_t slot) { return static_cast<uint32_t>(s.node_of_slot[slot - model.first_slot]); };
-  s.heavy.clear();
+  s.constrained.clear();
   s.anchor_node.resize(thread.anchor.size());
   s.waiting.assign(thread.anchor.size(), {});
   for (size_t k = 0; k < thread.anchor.size(); ++k) {
     const uint32_t i = s.anchor_node[k] = node_of(thread.anchor[k].slot);
-    if (s.anchor_at[i] < 0) s.heavy.push_back(i);
+    if (s.anchor_at[i] < 0) s.constrained.push_back(i);
     s.anchor_at[i] = static_cast<int32_t>(k);
     put_node(s, i, position_of(thread.anchor[k], x));
     s.w[i] = inverse_mass_of(thread.anchor[k].point, inv_mass);
-    s.loose[i] = 0;
+    s.is_free[i] = 0;
   }
   for (size_t k = 0; k < thread.hold.size(); ++k) {
     const uint32_t i = node_of(thread.hold[k].slot);
-    if (s.anchor_at[i] >= 0) continue;  // tissue keeps it: the tool's hold on it is felt through the neighbours
-    if (s.hold_at[i] < 0) s.heavy.push_back(i);
+    if (s.anchor_at[i] >= 0) continue;  // tissue keeps it: the tool's hold on it is felt through the neighbors
+    if (s.hold_at[i] < 0) s.constrained.push_back(i);
     s.hold_at[i] = static_cast<int32_t>(k);
     put_node(s, i, transform(body[static_cast<size_t>(thread.hold[k].body)].pose(), thread.hold[k].local));
-    s.w[i] = s.loose[i] = 0;
+    s.w[i] = s.is_free[i] = 0;
   }
   for (const NodeContact& c : s.contact) s.contact_at[c.node] = -1;  // of the substep before
   s.contact.clear();
   s.on_tool.assign(body.size(), {});
   for (const ThreadTouch& t : s.touch)
     for (uint32_t i = t.pair; i <= t.pair + 1; ++i) {
-      if (s.loose[i] == 0 || s.contact_at[i] >= 0) continue;
+      if (s.is_free[i] == 0 || s.contact_at[i] >= 0) continue;
       s.contact_at[i] = static_cast<int32_t>(s.contact.size());
       s.contact.push_back({});
       s.contact.back().node = i;
@@ -94,17 +95,17 @@ void gather_nodes(const StrandModel& model, const Strand& thread, ThreadScratch&
 // The tridiagonal matrix J M^-1 J^T of all stretch constraints, as what every pair sees of its two nodes, and its right-hand
 // side, for the positions as they are.
 //
-// Geometric stiffness. A taut thread resists being moved sideways with tension / length, which the bare linearisation does not
+// Geometric stiffness. A taut thread resists being moved sideways with tension / length, which the bare linearization does not
 // know: it would shorten a taut zigzag by throwing its light nodes sideways, and never converge. So sideways a free node is
 // given the inertia m + h^2 T (1/l0 + 1/l1) (Tournier et al. 2015, Stable constrained dynamics); side[i] is the ratio of
 // the inverse masses. With the tangent t = n0 + n1 of unit pair directions, t.t = 2 (1 + c) and n0.t = n1.t = 1 + c, c = n0.n1:
 // no root is needed. Returns the largest residual [m].
-float assemble(const Strand& t, ThreadScratch& s, size_t nodes, float alpha_per_metre, float h,
+float assemble(const Strand& t, ThreadScratch& s, size_t nodes, float alpha_per_meter, float h,
                const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body) {
   std::copy(t.rest.begin(), t.rest.end(), s.rest.begin());
-  const float worst = find_directions(s, nodes - 1, alpha_per_metre);
+  const float worst = find_directions(s, nodes - 1, alpha_per_meter);
   find_masses(s, nodes, h);
-  for (const uint32_t i : s.heavy) {
+  for (const uint32_t i : s.constrained) {
     if (s.hold_at[i] < 0) continue;
     const ThreadHold& hold = t.hold[static_cast<size_t>(s.hold_at[i])];
     const Vec3 n0 = way_before(s, i), n1 = way_after(s, i);
@@ -112,7 +113,7 @@ float assemble(const Strand& t, ThreadScratch& s, size_t nodes, float alpha_per_
     s.mass_after[i] = held_inverse_mass(hold, n1, n1, body_model, body);
     s.across[i] = held_inverse_mass(hold, n0, n1, body_model, body);
   }
-  weigh_contacts(s, body_model, body);
+  compute_effective_masses(s, body_model, body);
   return worst;
 }
 
@@ -123,7 +124,7 @@ float assemble(const Strand& t, ThreadScratch& s, size_t nodes, float alpha_per_
 void solve_with_slides(const StrandModel& model, const Strand& thread, ThreadScratch& s, size_t pairs, float h) {
   const double ws = kSlideMass * model.inv_mass;
   const float least = 0.02f * model.spacing;
-  Strands<double, 1>& m = s.stretch;
+  PartitionedTridiagonal<double, 1>& m = s.stretch;
   PaddedColumn<double>& rhs = m.right[0];
   auto drag_of = [&](const ThreadAnchor& a, const SlideState& k) {
     return k.dragged ? 0.0 : -a.slipping * double{a.threshold()} * h * h;  // a known force on the slide, spent once a substep
@@ -132,7 +133,7 @@ void solve_with_slides(const StrandModel& model, const Strand& thread, ThreadScr
   auto slides = [&](size_t k) {
     const size_t i = s.anchor_node[k];
     return thread.anchor[k].slipping != 0 && s.anchor_at[i] == static_cast<int32_t>(k) && i > 0 && i < pairs &&
-           s.keep[i - 1] > 0 && s.keep[i] > 0;
+           s.intact[i - 1] > 0 && s.intact[i] > 0;
   };
   for (SlideState& k : s.slide) k.fixed = false;
   for (int round = 0; round < kSlideRounds; ++round) {
@@ -148,7 +149,7 @@ void solve_with_slides(const StrandModel& model, const Strand& thread, ThreadScr
       m.diag[i] += ws, m.diag[i - 1] += ws;
       m.off[i - 1] -= ws;
     }
-    solve_strands(m, pairs);
+    solve_partitions(m, pairs);
     bool again = false;
     for (size_t j = 0; j < s.slide.size(); ++j) {
       SlideState& k = s.slide[j];
@@ -169,7 +170,7 @@ void solve_with_slides(const StrandModel& model, const Strand& thread, ThreadScr
 }
 
 // Applies the positional impulse `p` to whatever node i is, and refreshes its position. Tissue under an anchor waits for
-// push_anchors: its sixteen particles are dear, and the node goes just where they will put it, but for what the pushes of
+// push_anchors: its sixteen particles are expensive, and the node goes just where they will put it, but for what the pushes of
 // other anchors on the same particles do.
 void push_node(ThreadScratch& s, const Strand& t, size_t i, Vec3 p, const std::vector<RigidModel>& model,
                std::vector<RigidBody>& body) {
@@ -205,26 +206,26 @@ void push_anchors(ThreadScratch& s, const Strand& t, Vec4* x, const float* inv_m
 // The next pair from i on that is marked, or `pairs`.
 size_t next_unfit(const ThreadScratch& s, size_t i, size_t pairs) {
   for (; i < pairs; i = (i / 64 + 1) * 64) {
-    const uint64_t word = s.unfit[i / 64] >> (i % 64);
+    const uint64_t word = s.violated[i / 64] >> (i % 64);
     if (word != 0) return i + static_cast<size_t>(std::countr_zero(word));
   }
   return pairs;
 }
-void mark_unfit(ThreadScratch& s, size_t i) { s.unfit[i / 64] |= uint64_t{1} << (i % 64); }
+void mark_unfit(ThreadScratch& s, size_t i) { s.violated[i / 64] |= uint64_t{1} << (i % 64); }
 
 // Gauss-Seidel sweeps over the pairs in their order. After the direct solve nine in ten are right already: those are found at
-// once and passed by; a pair that was moved marks its neighbours, which leaves the order of the work as it would be.
-void sweep_distances(const StrandModel& model, const Strand& thread, ThreadScratch& s, size_t pairs, float alpha_per_metre,
+// once and passed by; a pair that was moved marks its neighbors, which leaves the order of the work as it would be.
+void sweep_distances(const StrandModel& model, const Strand& thread, ThreadScratch& s, size_t pairs, float alpha_per_meter,
                      const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body) {
   std::copy(thread.rest.begin(), thread.rest.end(), s.rest.begin());
-  find_unfit_pairs(s, pairs, alpha_per_metre);
+  mark_violated_segments(s, pairs, alpha_per_meter);
   for (int sweep = 0; sweep < model.distance_sweeps; ++sweep)
     for (size_t i = next_unfit(s, 0, pairs); i < pairs; i = next_unfit(s, i + 1, pairs)) {
       const Vec3 d = node(s, i + 1) - node(s, i);
-      const float l2 = length2(d), rest = s.rest[i], alpha = alpha_per_metre * rest, compliant = alpha * s.lambda[i];
+      const float l2 = length2(d), rest = s.rest[i], alpha = alpha_per_meter * rest, compliant = alpha * s.lambda[i];
       const bool fit = std::abs(l2 - rest * rest) < kFitLength * rest && std::abs(compliant) < kFitCompliant;
-      if (fit || l2 < 1e-18f || s.keep[i] == 0) {
-        s.unfit[i / 64] &= ~(uint64_t{1} << (i % 64));
+      if (fit || l2 < 1e-18f || s.intact[i] == 0) {
+        s.violated[i / 64] &= ~(uint64_t{1} << (i % 64));
         continue;
       }
       const float l = std::sqrt(l2);
@@ -245,9 +246,9 @@ void sweep_distances(const StrandModel& model, const Strand& thread, ThreadScrat
 
 void ThreadScratch::resize(uint32_t count) {
   for (PaddedColumn<float>* c :
-       {&x,       &y,      &z,      &w,      &loose,  &mass_before, &mass_after, &across,  &side,     &tilt, &rest,
-        &tension, &nx,     &ny,     &nz,     &keep,   &lambda,      &inv_length, &alpha,   &residual, &step, &from_x,
-        &from_y,  &from_z, &gone_x, &gone_y, &gone_z, &moved_x,     &moved_y,    &moved_z, &stiff})
+       {&x,       &y,      &z,      &w,      &is_free, &mass_before, &mass_after, &across,  &side,     &tilt, &rest,
+        &tension, &nx,     &ny,     &nz,     &intact,  &lambda,      &inv_length, &alpha,   &residual, &step, &from_x,
+        &from_y,  &from_z, &gone_x, &gone_y, &gone_z,  &moved_x,     &moved_y,    &moved_z, &stiff})
     c->assign(count, 0);
   anchor_at.assign(count, -1);
   hold_at.assign(count, -1);
@@ -255,8 +256,8 @@ void ThreadScratch::resize(uint32_t count) {
   contact.clear();
   touch.clear();
   node_of_slot.assign(count, -1);
-  heavy.clear();
-  unfit.assign(count / 64 + 1, 0);
+  constrained.clear();
+  violated.assign(count / 64 + 1, 0);
   stretch.resize(count);
   motion.resize(count);
   bend.resize(count);
@@ -278,7 +279,7 @@ void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float c
   // 180 degrees the direction is undefined and there is nothing to apply.
   if (w < 1e-12f * (wa + wb + wc) * inv_la * inv_lc) return;
   float d = -(violation + alpha * lambda) / (w + alpha);
-  // A rigid bend (compliance 0) linearised far from straight would overshoot: no more than a tenth of a segment at a time.
+  // A rigid bend (compliance 0) linearized far from straight would overshoot: no more than a tenth of a segment at a time.
   const float most = std::max({wa * wa * length2(ga), wb * wb * length2(gb), wc * wc * length2(gc)}) * d * d;
   const float limit2 = 0.01f * std::min(la2, lc2);
   if (most > limit2) d *= std::sqrt(limit2 / most);
@@ -294,35 +295,35 @@ void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& s, Ve
   if (nodes < 2) return;
   const size_t pairs = nodes - 1;
   const float inv_h2 = 1.0f / (h * h);
-  const float alpha_per_metre = model.stretch_compliance / model.spacing * inv_h2;
+  const float alpha_per_meter = model.stretch_compliance / model.spacing * inv_h2;
 
   gather_nodes(model, thread, s, x, before, inv_mass, body);
   if (model.direct) smooth_motion(s, nodes, model.inv_mass, 0.1f * model.spacing, model.gravity * (h * h), h);
   if (model.bend_sweeps > 0) {
     // Locked nodes do not give way to bending: tissue and tools are far heavier than the thread.
-    for (size_t colour = 0; colour < 3; ++colour)
-      for (size_t i = colour, k = 0; i < nodes; i += 3, ++k) {
-        s.bend.set(colour, k, node(s, i), s.loose[i] * model.inv_mass);
-        s.bend.whole[colour][k] = i > 0 ? s.keep[i - 1] * s.keep[i] : 0;
+    for (size_t color = 0; color < 3; ++color)
+      for (size_t i = color, k = 0; i < nodes; i += 3, ++k) {
+        s.bend.set(color, k, node(s, i), s.is_free[i] * model.inv_mass);
+        s.bend.whole[color][k] = i > 0 ? s.intact[i - 1] * s.intact[i] : 0;
       }
     solve_bends(s.bend, nodes, model.bend_compliance, h, model.bend_sweeps);
-    for (size_t colour = 0; colour < 3; ++colour)
-      for (size_t i = colour, k = 0; i < nodes; i += 3, ++k) put_node(s, i, s.bend.at(colour, k));
+    for (size_t color = 0; color < 3; ++color)
+      for (size_t i = color, k = 0; i < nodes; i += 3, ++k) put_node(s, i, s.bend.at(color, k));
   }
 
   if (model.direct) {
     bool changed = false;
     s.slide.assign(thread.anchor.size(), {});  // within its capacity: no allocation once as many anchors were seen
     for (int step = 0; step < kNewtonSteps || (changed && step < kContactSteps); ++step) {
-      if (meet_tools(model, s, body_model, body, h)) changed = true;
-      const float residual = assemble(thread, s, nodes, alpha_per_metre, h, body_model, body);
+      if (update_contacts(model, s, body_model, body, h)) changed = true;
+      const float residual = assemble(thread, s, nodes, alpha_per_meter, h, body_model, body);
       if (step > 0 && !changed && residual < kGoodEnough) break;
       solve_with_slides(model, thread, s, pairs, h);
 
       // Light nodes are held back below, heavy ones are not: a step far too long would push a needle again and again for the
       // same stretch, and feed energy in. So the whole step is shortened.
       float most = 0;
-      for (const uint32_t i : s.heavy) {
+      for (const uint32_t i : s.constrained) {
         const bool moves =
             s.hold_at[i] >= 0
                 ? body_model[static_cast<size_t>(thread.hold[static_cast<size_t>(s.hold_at[i])].body)].inv_mass > 0
@@ -338,13 +339,13 @@ void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& s, Ve
       }
 
       // A bent stretch of light thread between heavy ends: the impulse that moves the ends would throw the light nodes far
-      // sideways, because the linearisation does not know that they come to rest on the straight line. So a light node takes a
+      // sideways, because the linearization does not know that they settle on the straight line. So a light node takes a
       // bounded step, heavy ones their full one; the next step sees the new directions.
-      for (const uint32_t i : s.heavy) push_node(s, thread, i, impulse_on(s, i), body_model, body);
+      for (const uint32_t i : s.constrained) push_node(s, thread, i, impulse_on(s, i), body_model, body);
       push_anchors(s, thread, x, inv_mass);
-      for (const uint32_t i : s.heavy)  // where the pushes of all have put them
+      for (const uint32_t i : s.constrained)  // where the pushes of all have put them
         if (s.anchor_at[i] >= 0) put_node(s, i, position_of(thread.anchor[static_cast<size_t>(s.anchor_at[i])], x));
-      hold_contacts(s);
+      save_positions(s);
       move_loose_nodes(s, nodes, kLargestStep * model.spacing);
       changed = move_contacts(s, kLargestStep * model.spacing, body_model, body);
       for (size_t j = 0; j < s.slide.size(); ++j) {
@@ -358,9 +359,9 @@ void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& s, Ve
     }
   }
 
-  sweep_distances(model, thread, s, pairs, alpha_per_metre, body_model, body);
+  sweep_distances(model, thread, s, pairs, alpha_per_meter, body_model, body);
   push_anchors(s, thread, x, inv_mass);
-  meet_tools(model, s, body_model, body, h);
+  update_contacts(model, s, body_model, body, h);
 
   for (size_t i = 0; i < nodes; ++i) set(x[thread.order[i]], node(s, i));
   for (size_t i = 0; i < pairs; ++i) thread.tension[i] = -s.lambda[i] * inv_h2;

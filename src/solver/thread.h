@@ -1,4 +1,5 @@
-// solver/thread: the suture thread as an XPBD chain (paper 2.1, 2.3): distance constraints between neighbours, cosine bending
+// SPDX-License-Identifier: Apache-2.0
+// solver/thread: the suture thread as an XPBD chain (paper 2.1, 2.3): distance constraints between neighbors, cosine bending
 // on triplets, and a direct tridiagonal solve along the whole thread, because a Gauss-Seidel chain of 175 particles at the
 // paper's three sweeps stretches by 18 %.
 //
@@ -30,23 +31,23 @@ struct ThreadScratch {
   // Per node of the order.
   PaddedColumn<float> x, y, z;              // [m]
   PaddedColumn<float> w;                    // [1/kg] inverse mass; of the tissue where anchored, 0 where held
-  PaddedColumn<float> loose;                // 1 where the node is a particle of its own, 0 where anchored or held
+  PaddedColumn<float> is_free;              // 1 where the node is a particle of its own, 0 where anchored or held
   std::vector<int32_t> anchor_at, hold_at;  // index of its anchor, of its hold, or -1
   // W of the node as its two pairs see it: n0 W n0, n1 W n1, n0 W n1 with n0, n1 the pairs' directions.
   PaddedColumn<float> mass_before, mass_after, across;
   // An impulse p moves a loose node by w (side p + tilt (p.t) t), with t the sum of the pairs' directions (see find_masses).
   PaddedColumn<float> side, tilt;
-  std::vector<uint32_t> heavy;  // nodes that are anchored or held: few
+  std::vector<uint32_t> constrained;  // nodes that are anchored or held: few
   // Per pair.
-  PaddedColumn<float> rest, tension, keep;  // copies of the thread's; keep: 0 where it is cut
-  PaddedColumn<float> nx, ny, nz;           // unit direction toward the needle; 0 where cut
-  PaddedColumn<float> inv_length;           // [1/m]
-  PaddedColumn<float> alpha, residual;      // [m/N / s^2], [m]
-  PaddedColumn<float> lambda;               // cleared at the start of a substep
-  PaddedColumn<float> step;                 // its change in this Newton step
-  std::vector<uint64_t> unfit;              // a bit per pair
-  Strands<double, 1> stretch;
-  Strands<float, 3> motion;
+  PaddedColumn<float> rest, tension, intact;  // copies of the thread's; keep: 0 where it is cut
+  PaddedColumn<float> nx, ny, nz;             // unit direction toward the needle; 0 where cut
+  PaddedColumn<float> inv_length;             // [1/m]
+  PaddedColumn<float> alpha, residual;        // [m/N / s^2], [m]
+  PaddedColumn<float> lambda;                 // cleared at the start of a substep
+  PaddedColumn<float> step;                   // its change in this Newton step
+  std::vector<uint64_t> violated;             // a bit per pair
+  PartitionedTridiagonal<double, 1> stretch;
+  PartitionedTridiagonal<float, 3> motion;
   BendScratch bend;
   std::vector<SlideState> slide;      // per anchor
   std::vector<Vec3> waiting;          // per anchor: impulse that its tissue has yet to get [kg m]
@@ -85,7 +86,7 @@ void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& scrat
 // Straight (u.v = -1) has no gradient and needs none; fully folded (u.v = +1) has none either: it is left to others.
 void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float compliance, float h, float& lambda);
 
-// XPBD's multiplier step of one distance constraint (Macklin et al. 2016, eq. 18): length l, rest length, generalised inverse
+// XPBD's multiplier step of one distance constraint (Macklin et al. 2016, eq. 18): length l, rest length, generalized inverse
 // mass w [1/kg], alpha = compliance / h^2, multiplier so far lambda. Any real type: the sweeps run it in float, `catgut
 // validate` in double too.
 template <typename Real>

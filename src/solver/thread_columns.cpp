@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/thread_columns: see the header. Compiled once per instruction set (Highway); no fused multiply-add, as in shape_match.
 #include "solver/thread_columns.h"
 
@@ -39,7 +40,7 @@ HWY_INLINE hn::Mask<D> In(ptrdiff_t i, size_t count) {
   return hn::FirstN(D(), static_cast<size_t>(left < 0 ? 0 : left));
 }
 
-float FindDirections(ThreadScratch& s, size_t pairs, float alpha_per_metre) {
+float FindDirections(ThreadScratch& s, size_t pairs, float alpha_per_meter) {
   const D d;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), shortest = hn::Set(d, 1e-5f), apart = hn::Set(d, 1e-12f);
   V worst = zero;
@@ -47,16 +48,16 @@ float FindDirections(ThreadScratch& s, size_t pairs, float alpha_per_metre) {
   for (ptrdiff_t i = 0; i <= static_cast<ptrdiff_t>(pairs); i += kStep) {
     const auto in = In(i, pairs);
     const V3 way = Get3(s.x, s.y, s.z, i + 1) - Get3(s.x, s.y, s.z, i);
-    const V length = hn::Sqrt(Dot(way, way)), rest = Get(s.rest, i), keep = Get(s.keep, i);
+    const V length = hn::Sqrt(Dot(way, way)), rest = Get(s.rest, i), intact = Get(s.intact, i);
     const auto distinct = hn::Gt(length, apart);
     const V inverse = hn::Div(one, hn::IfThenElse(distinct, length, one));
     const V3 n{hn::IfThenElseZero(distinct, hn::Mul(way.x, inverse)),
                hn::IfThenElse(distinct, hn::Mul(way.y, inverse), one),  // no direction is as good as any
                hn::IfThenElseZero(distinct, hn::Mul(way.z, inverse))};
-    const V there = hn::IfThenElseZero(in, keep);
+    const V there = hn::IfThenElseZero(in, intact);
     Put3(n * there, s.nx, s.ny, s.nz, i);
     Put(hn::Mul(there, hn::Div(one, hn::Max(length, shortest))), s.inv_length, i);
-    const V alpha = hn::IfThenElseZero(in, hn::Mul(hn::Set(d, alpha_per_metre), rest));
+    const V alpha = hn::IfThenElseZero(in, hn::Mul(hn::Set(d, alpha_per_meter), rest));
     const V residual = hn::Mul(there, hn::Sub(hn::Sub(rest, length), hn::Mul(alpha, Get(s.lambda, i))));
     Put(alpha, s.alpha, i);
     Put(residual, s.residual, i);
@@ -75,7 +76,7 @@ void FindMasses(ThreadScratch& s, size_t nodes, float h) {
     const V after = hn::Max(Get(s.tension, i), hn::Mul(Get(s.lambda, i), minus_inv_h2));
     const V pull = hn::Min(before, after);
     auto taut = hn::And(hn::Gt(pull, zero), hn::Gt(c, hn::Set(d, -0.999f)));
-    taut = hn::And(taut, hn::Gt(Get(s.loose, i), zero));
+    taut = hn::And(taut, hn::Gt(Get(s.is_free, i), zero));
     const V curve = hn::Add(Get(s.inv_length, i - 1), Get(s.inv_length, i));
     const V ratio = hn::Div(one, hn::Add(one, hn::Mul(hn::Mul(hn::Mul(w, h2), pull), curve)));
     const V side = hn::IfThenElse(taut, ratio, one), give = hn::Sub(one, side), both = hn::Add(one, c);
@@ -89,17 +90,17 @@ void FindMasses(ThreadScratch& s, size_t nodes, float h) {
   }
 }
 
-void FindMatrix(ThreadScratch& s, size_t pairs, double regularisation) {
+void FindMatrix(ThreadScratch& s, size_t pairs, double regularization) {
   const hn::CappedTag<double, 8> dd;
   const hn::Rebind<float, decltype(dd)> df;
   using W = hn::Vec<decltype(dd)>;
   constexpr ptrdiff_t kLanes = HWY_MIN(8, HWY_MAX_BYTES / sizeof(double));
-  const W whole = hn::Set(dd, 1 + regularisation), one = hn::Set(dd, 1.0);
+  const W whole = hn::Set(dd, 1 + regularization), one = hn::Set(dd, 1.0);
   auto get = [&](const PaddedColumn<float>& c, ptrdiff_t i) { return hn::PromoteTo(dd, hn::LoadU(df, c.data() + i)); };
   for (ptrdiff_t i = 0; i < static_cast<ptrdiff_t>(pairs); i += kLanes) {
-    const W keep = get(s.keep, i), both = hn::Mul(keep, get(s.keep, i + 1));
+    const W intact = get(s.intact, i), both = hn::Mul(intact, get(s.intact, i + 1));
     const W mass = hn::Mul(hn::Add(get(s.mass_after, i), get(s.mass_before, i + 1)), whole);
-    const W diag = hn::Add(hn::Mul(keep, hn::Add(get(s.alpha, i), mass)), hn::Sub(one, keep));
+    const W diag = hn::Add(hn::Mul(intact, hn::Add(get(s.alpha, i), mass)), hn::Sub(one, intact));
     hn::StoreU(diag, dd, s.stretch.diag.data() + i);
     hn::StoreU(hn::Neg(hn::Mul(both, get(s.across, i + 1))), dd, s.stretch.off.data() + i);
     hn::StoreU(get(s.residual, i), dd, s.stretch.right[0].data() + i);  // 0 where cut
@@ -114,7 +115,7 @@ void MoveLooseNodes(ThreadScratch& s, size_t nodes, float limit) {
     const V3 n0 = Get3(s.nx, s.ny, s.nz, i - 1), n1 = Get3(s.nx, s.ny, s.nz, i), t = n0 + n1;
     V3 p = n0 * Get(s.step, i - 1) - n1 * step;
     p = p * Get(s.side, i) + t * hn::Mul(Get(s.tilt, i), Dot(p, t));
-    p = p * hn::Mul(Get(s.w, i), Get(s.loose, i));
+    p = p * hn::Mul(Get(s.w, i), Get(s.is_free, i));
     const V reach2 = Dot(p, p);
     const auto far = hn::Gt(reach2, most2);
     p = p * hn::IfThenElse(far, hn::Div(most, hn::Sqrt(hn::IfThenElse(far, reach2, one))), one);
@@ -126,25 +127,25 @@ void MoveLooseNodes(ThreadScratch& s, size_t nodes, float limit) {
   }
 }
 
-void FindUnfitPairs(ThreadScratch& s, size_t pairs, float alpha_per_metre) {
+void FindUnfitPairs(ThreadScratch& s, size_t pairs, float alpha_per_meter) {
   const D d;
-  for (uint64_t& word : s.unfit) word = 0;
+  for (uint64_t& word : s.violated) word = 0;
   for (ptrdiff_t i = 0; i < static_cast<ptrdiff_t>(pairs); i += kStep) {
     const V3 way = Get3(s.x, s.y, s.z, i + 1) - Get3(s.x, s.y, s.z, i);
     const V rest = Get(s.rest, i), off = hn::Abs(hn::Sub(Dot(way, way), hn::Mul(rest, rest)));
-    const V compliant = hn::Abs(hn::Mul(hn::Mul(hn::Set(d, alpha_per_metre), rest), Get(s.lambda, i)));
-    auto unfit = hn::Or(hn::Ge(off, hn::Mul(hn::Set(d, kFitLength), rest)), hn::Ge(compliant, hn::Set(d, kFitCompliant)));
-    unfit = hn::And(hn::And(unfit, In(i, pairs)), hn::Gt(Get(s.keep, i), hn::Zero(d)));
+    const V compliant = hn::Abs(hn::Mul(hn::Mul(hn::Set(d, alpha_per_meter), rest), Get(s.lambda, i)));
+    auto violated = hn::Or(hn::Ge(off, hn::Mul(hn::Set(d, kFitLength), rest)), hn::Ge(compliant, hn::Set(d, kFitCompliant)));
+    violated = hn::And(hn::And(violated, In(i, pairs)), hn::Gt(Get(s.intact, i), hn::Zero(d)));
     uint8_t bytes[8] = {};
-    hn::StoreMaskBits(d, unfit, bytes);
+    hn::StoreMaskBits(d, violated, bytes);
     const uint64_t bits = uint64_t{bytes[0]} | uint64_t{bytes[1]} << 8;
-    s.unfit[static_cast<size_t>(i) / 64] |= bits << (static_cast<size_t>(i) % 64);
+    s.violated[static_cast<size_t>(i) / 64] |= bits << (static_cast<size_t>(i) % 64);
   }
 }
 
 // The inertia and the weight that carried the nodes to where they are now must meet the same geometric stiffness as the
 // constraints will: implicit Euler is (M + h^2 K) dx = h M v + h^2 f, with K the tension's Laplacian. Without it a taut thread
-// swings sideways as freely as a slack one while its tension may hardly pull it back: it would gain energy, or come to rest
+// swings sideways as freely as a slack one while its tension may hardly pull it back: it would gain energy, or settle
 // stretched.
 //   The part from velocities, d = p - before - h^2 g, is smoothed by (1 + K) d' = d along the thread with locked nodes fixed: a
 //   thread that moves as a whole keeps its motion, a taut one loses its flutter, a slack one (no tension) is left alone. The
@@ -165,20 +166,20 @@ bool BeginSmoothing(ThreadScratch& s, size_t nodes, float inv_mass, float shorte
   const V3 weight{hn::Set(d, fall.x), hn::Set(d, fall.y), hn::Set(d, fall.z)};
   for (ptrdiff_t i = 0; i < static_cast<ptrdiff_t>(nodes); i += kStep) {
     const auto in = In(i, nodes);
-    const V3 gone = Get3(s.x, s.y, s.z, i) - Get3(s.from_x, s.from_y, s.from_z, i) - weight * Get(s.loose, i);
+    const V3 gone = Get3(s.x, s.y, s.z, i) - Get3(s.from_x, s.from_y, s.from_z, i) - weight * Get(s.is_free, i);
     Put3({hn::IfThenElseZero(in, gone.x), hn::IfThenElseZero(in, gone.y), hn::IfThenElseZero(in, gone.z)}, s.gone_x, s.gone_y,
          s.gone_z, i);
   }
   for (ptrdiff_t i = 0; i < static_cast<ptrdiff_t>(nodes); i += kStep) {
-    const V loose = Get(s.loose, i), left = Get(s.stiff, i - 1), right = Get(s.stiff, i), after = Get(s.loose, i + 1);
-    const V held_left = hn::Mul(hn::Mul(left, loose), hn::Sub(one, Get(s.loose, i - 1)));
-    const V held_right = hn::Mul(hn::Mul(right, loose), hn::Sub(one, after));
-    // The known motion of a held neighbour goes to the right-hand side; the matrix stays symmetric.
+    const V is_free = Get(s.is_free, i), left = Get(s.stiff, i - 1), right = Get(s.stiff, i), after = Get(s.is_free, i + 1);
+    const V held_left = hn::Mul(hn::Mul(left, is_free), hn::Sub(one, Get(s.is_free, i - 1)));
+    const V held_right = hn::Mul(hn::Mul(right, is_free), hn::Sub(one, after));
+    // The known motion of a held neighbor goes to the right-hand side; the matrix stays symmetric.
     const V3 rhs = Get3(s.gone_x, s.gone_y, s.gone_z, i) + Get3(s.gone_x, s.gone_y, s.gone_z, i - 1) * held_left +
                    Get3(s.gone_x, s.gone_y, s.gone_z, i + 1) * held_right;
     Put3(rhs, s.motion.right[0], s.motion.right[1], s.motion.right[2], i);
-    Put(hn::Add(one, hn::Mul(loose, hn::Add(left, right))), s.motion.diag, i);
-    Put(hn::Neg(hn::Mul(right, hn::Mul(loose, after))), s.motion.off, i);
+    Put(hn::Add(one, hn::Mul(is_free, hn::Add(left, right))), s.motion.diag, i);
+    Put(hn::Neg(hn::Mul(right, hn::Mul(is_free, after))), s.motion.off, i);
   }
   return true;
 }
@@ -199,30 +200,30 @@ void EndSmoothing(ThreadScratch& s, size_t nodes, Vec3 fall, float h) {
     const V3 along = t * hn::Div(Dot(weight, t), hn::Max(Dot(t, t), tiny));
     const V share = hn::IfThenElse(taut, rho, one);
     const V3 felt = along + (weight - along) * share;
-    const V loose = Get(s.loose, i);
+    const V is_free = Get(s.is_free, i);
     Put3((Get3(s.motion.right[0], s.motion.right[1], s.motion.right[2], i) + V3{hn::IfThenElse(taut, felt.x, weight.x),
                                                                                 hn::IfThenElse(taut, felt.y, weight.y),
                                                                                 hn::IfThenElse(taut, felt.z, weight.z)}) *
-             loose,
+             is_free,
          s.moved_x, s.moved_y, s.moved_z, i);
   }
   for (ptrdiff_t i = 0; i < static_cast<ptrdiff_t>(nodes); i += kStep) {
-    const auto loose = hn::And(In(i, nodes), hn::Gt(Get(s.loose, i), zero));
+    const auto is_free = hn::And(In(i, nodes), hn::Gt(Get(s.is_free, i), zero));
     const V3 at = Get3(s.x, s.y, s.z, i);
     const V3 to = Get3(s.from_x, s.from_y, s.from_z, i) + Get3(s.moved_x, s.moved_y, s.moved_z, i);
-    Put3({hn::IfThenElse(loose, to.x, at.x), hn::IfThenElse(loose, to.y, at.y), hn::IfThenElse(loose, to.z, at.z)}, s.x, s.y,
-         s.z, i);
+    Put3({hn::IfThenElse(is_free, to.x, at.x), hn::IfThenElse(is_free, to.y, at.y), hn::IfThenElse(is_free, to.z, at.z)}, s.x,
+         s.y, s.z, i);
   }
 }
 
 template <typename T, size_t kRight>
-HWY_INLINE void Solve(Strands<T, kRight>& s, size_t count) {
-  const hn::CappedTag<T, kStrands> d;
+HWY_INLINE void Solve(PartitionedTridiagonal<T, kRight>& s, size_t count) {
+  const hn::CappedTag<T, kPartitions> d;
   using W = hn::Vec<decltype(d)>;
   using Index = hn::Vec<hn::RebindToSigned<decltype(d)>>;
-  constexpr size_t kLanes = HWY_MIN(kStrands, HWY_MAX_BYTES / sizeof(T)), kParts = kStrands / kLanes;
-  const size_t rows = HWY_MAX(size_t{2}, (count + kStrands - 1) / kStrands);
-  for (size_t i = count; i < rows * kStrands; ++i) {
+  constexpr size_t kLanes = HWY_MIN(kPartitions, HWY_MAX_BYTES / sizeof(T)), kParts = kPartitions / kLanes;
+  const size_t rows = HWY_MAX(size_t{2}, (count + kPartitions - 1) / kPartitions);
+  for (size_t i = count; i < rows * kPartitions; ++i) {
     s.diag[i] = 1, s.off[i] = 0;
     for (size_t j = 0; j < kRight; ++j) s.right[j][i] = 0;
   }
@@ -234,7 +235,8 @@ HWY_INLINE void Solve(Strands<T, kRight>& s, size_t count) {
     using I = hn::TFromD<decltype(di)>;
     lane[p] = hn::Mul(hn::Iota(di, static_cast<I>(p * kLanes)), hn::Set(di, static_cast<I>(rows)));
   }
-  const size_t last = rows - 1, separator = last * kStrands, end = separator - kStrands;  // first elements of the last two rows
+  const size_t last = rows - 1, separator = last * kPartitions,
+               end = separator - kPartitions;  // first elements of the last two rows
   const W one = hn::Set(d, T{1});
   // Influences die away along a strand. Denormal numbers, which they would end as, cost a hundred cycles each.
   auto felt = [&](W v) HWY_ATTR { return hn::IfThenElseZero(hn::Gt(hn::Abs(v), hn::Set(d, T{1e-18f})), v); };
@@ -260,7 +262,7 @@ HWY_INLINE void Solve(Strands<T, kRight>& s, size_t count) {
   }
   for (size_t row = 1; row < last; ++row)
     for (size_t p = 0; p < kParts; ++p) {
-      const size_t k = row * kStrands + p * kLanes;
+      const size_t k = row * kPartitions + p * kLanes;
       const W f = hn::Mul(o[p], inverse[p]);
       inverse[p] = hn::Div(one, hn::Sub(hn::GatherIndex(d, s.diag.data() + row, lane[p]), hn::Mul(f, o[p])));
       o[p] = hn::GatherIndex(d, s.off.data() + row, lane[p]);
@@ -287,7 +289,7 @@ HWY_INLINE void Solve(Strands<T, kRight>& s, size_t count) {
     }
   }
   for (size_t row = end; row > 0;) {
-    row -= kStrands;
+    row -= kPartitions;
     for (size_t p = 0; p < kParts; ++p) {
       const size_t k = row + p * kLanes;
       const W out = hn::Load(d, link + k), i = hn::Load(d, inv + k);
@@ -302,11 +304,11 @@ HWY_INLINE void Solve(Strands<T, kRight>& s, size_t count) {
     }
   }
   // The separators among themselves.
-  T pivot[kStrands], upper[kStrands];
-  alignas(64) T value[kRight][kStrands + 1] = {};  // value[j][c + 1] of separator c; 0 before the first
-  for (size_t c = 0; c < kStrands; ++c) {
-    const size_t i = c * rows + last, next = c + 1 < kStrands ? c + 1 : c;
-    const T in = link[end + c], out = c + 1 < kStrands ? s.off[i] : T{0};
+  T pivot[kPartitions], upper[kPartitions];
+  alignas(64) T value[kRight][kPartitions + 1] = {};  // value[j][c + 1] of separator c; 0 before the first
+  for (size_t c = 0; c < kPartitions; ++c) {
+    const size_t i = c * rows + last, next = c + 1 < kPartitions ? c + 1 : c;
+    const T in = link[end + c], out = c + 1 < kPartitions ? s.off[i] : T{0};
     const T lower = -in * before[end + c];
     T diagonal = s.diag[i] - in * after[end + c] - out * before[next], f = 0;
     upper[c] = -out * after[next];
@@ -322,7 +324,7 @@ HWY_INLINE void Solve(Strands<T, kRight>& s, size_t count) {
   }
   for (size_t j = 0; j < kRight; ++j) {
     T behind_it = 0;
-    for (size_t c = kStrands; c-- > 0;) {
+    for (size_t c = kPartitions; c-- > 0;) {
       behind_it = value[j][c + 1] = (value[j][c + 1] - upper[c] * behind_it) * pivot[c];
       s.right[j][c * rows + last] = behind_it;
     }
@@ -332,14 +334,14 @@ HWY_INLINE void Solve(Strands<T, kRight>& s, size_t count) {
     for (size_t p = 0; p < kParts; ++p) {
       const W left = hn::LoadU(d, value[j] + p * kLanes), right = hn::LoadU(d, value[j] + p * kLanes + 1);
       for (size_t row = 0; row < last; ++row) {
-        const size_t k = row * kStrands + p * kLanes;
+        const size_t k = row * kPartitions + p * kLanes;
         const W inside = hn::Add(hn::Mul(hn::Load(d, before + k), left), hn::Mul(hn::Load(d, after + k), right));
         hn::ScatterIndex(hn::Sub(hn::Load(d, s.value[j].data() + k), inside), d, s.right[j].data() + row, lane[p]);
       }
     }
 }
-void SolveStretch(Strands<double, 1>& s, size_t count) { Solve(s, count); }
-void SolveMotion(Strands<float, 3>& s, size_t count) { Solve(s, count); }
+void SolveStretch(PartitionedTridiagonal<double, 1>& s, size_t count) { Solve(s, count); }
+void SolveMotion(PartitionedTridiagonal<float, 3>& s, size_t count) { Solve(s, count); }
 
 bool SmoothMotion(ThreadScratch& s, size_t nodes, float inv_mass, float shortest, Vec3 fall, float h) {
   if (!BeginSmoothing(s, nodes, inv_mass, shortest, fall, h)) return false;
@@ -365,22 +367,26 @@ HWY_EXPORT(SmoothMotion);
 HWY_EXPORT(SolveStretch);
 HWY_EXPORT(SolveMotion);
 
-float find_directions(ThreadScratch& s, size_t pairs, float alpha_per_metre) {
-  return HWY_DYNAMIC_DISPATCH(FindDirections)(s, pairs, alpha_per_metre);
+float find_directions(ThreadScratch& s, size_t pairs, float alpha_per_meter) {
+  return HWY_DYNAMIC_DISPATCH(FindDirections)(s, pairs, alpha_per_meter);
 }
 void find_masses(ThreadScratch& s, size_t nodes, float h) { HWY_DYNAMIC_DISPATCH(FindMasses)(s, nodes, h); }
-void find_matrix(ThreadScratch& s, size_t pairs, double regularisation) {
-  HWY_DYNAMIC_DISPATCH(FindMatrix)(s, pairs, regularisation);
+void find_matrix(ThreadScratch& s, size_t pairs, double regularization) {
+  HWY_DYNAMIC_DISPATCH(FindMatrix)(s, pairs, regularization);
 }
 void move_loose_nodes(ThreadScratch& s, size_t nodes, float limit) { HWY_DYNAMIC_DISPATCH(MoveLooseNodes)(s, nodes, limit); }
-void find_unfit_pairs(ThreadScratch& s, size_t pairs, float alpha_per_metre) {
-  HWY_DYNAMIC_DISPATCH(FindUnfitPairs)(s, pairs, alpha_per_metre);
+void mark_violated_segments(ThreadScratch& s, size_t pairs, float alpha_per_meter) {
+  HWY_DYNAMIC_DISPATCH(FindUnfitPairs)(s, pairs, alpha_per_meter);
 }
 bool smooth_motion(ThreadScratch& s, size_t nodes, float inv_mass, float shortest, Vec3 fall, float h) {
   return HWY_DYNAMIC_DISPATCH(SmoothMotion)(s, nodes, inv_mass, shortest, fall, h);
 }
-void solve_strands(Strands<double, 1>& system, size_t count) { HWY_DYNAMIC_DISPATCH(SolveStretch)(system, count); }
-void solve_strands(Strands<float, 3>& system, size_t count) { HWY_DYNAMIC_DISPATCH(SolveMotion)(system, count); }
+void solve_partitions(PartitionedTridiagonal<double, 1>& system, size_t count) {
+  HWY_DYNAMIC_DISPATCH(SolveStretch)(system, count);
+}
+void solve_partitions(PartitionedTridiagonal<float, 3>& system, size_t count) {
+  HWY_DYNAMIC_DISPATCH(SolveMotion)(system, count);
+}
 
 }  // namespace catgut
 #endif  // HWY_ONCE

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/thread_columns: the parts of a thread's solve that do the same to every node, in SIMD; thread.cpp puts right the few
 // nodes that are something else than a particle. Reads and writes ThreadScratch only. The same bits for any width of SIMD.
 #pragma once
@@ -9,7 +10,7 @@
 
 namespace catgut {
 
-// A column with zeros before its first and behind its last element: kernels may look at neighbours and work in whole vectors.
+// A column with zeros before its first and behind its last element: kernels may look at neighbors and work in whole vectors.
 template <typename T>
 class PaddedColumn {
  public:
@@ -35,9 +36,9 @@ class PaddedColumn {
 // separators as unknowns, the eight separators are solved by themselves (their matrix, a Schur complement, is positive
 // definite again), and the inside follows in parallel (Wang 1981, A parallel method for tridiagonal equations).
 // Row i of the system is row i % rows of strand i / rows. Rows behind the last are identity.
-constexpr size_t kStrands = 8;
+constexpr size_t kPartitions = 8;
 template <typename T, size_t kRight>
-struct Strands {
+struct PartitionedTridiagonal {
   // The system in its own order: off[i] between rows i and i + 1; right-hand sides, then solutions.
   PaddedColumn<T> diag, off, right[kRight];
   // Row by row of all strands: off, inverse pivots, influence of the separator before and of the one behind, values.
@@ -45,31 +46,31 @@ struct Strands {
   void resize(size_t count) {
     for (PaddedColumn<T>* c : {&diag, &off}) c->assign(count, T{});
     for (PaddedColumn<T>& c : right) c.assign(count, T{});
-    const size_t most = std::max<size_t>(2, count / kStrands + 1) * kStrands;
+    const size_t most = std::max<size_t>(2, count / kPartitions + 1) * kPartitions;
     for (Column<T>* c : {&link, &inverse, &before, &after}) c->assign(most, T{});
     for (Column<T>& c : value) c.assign(most, T{});
   }
 };
 // Solves the first `count` rows. Overwrites up to 15 rows behind them.
-void solve_strands(Strands<double, 1>& system, size_t count);
-void solve_strands(Strands<float, 3>& system, size_t count);
+void solve_partitions(PartitionedTridiagonal<double, 1>& system, size_t count);
+void solve_partitions(PartitionedTridiagonal<float, 3>& system, size_t count);
 
 struct ThreadScratch;
 // Directions, inverse lengths, compliances and residuals of all pairs. Returns the largest residual [m].
-float find_directions(ThreadScratch& s, size_t pairs, float alpha_per_metre);
+float find_directions(ThreadScratch& s, size_t pairs, float alpha_per_meter);
 // What the pairs see of their nodes, as if none were held by a body.
 void find_masses(ThreadScratch& s, size_t nodes, float h);
 // The matrix and right-hand side of the stretch constraints in s.stretch. A pair that is cut has no row of its own.
-void find_matrix(ThreadScratch& s, size_t pairs, double regularisation);
+void find_matrix(ThreadScratch& s, size_t pairs, double regularization);
 // Moves the loose nodes by the impulses in s.step, none further than `limit` [m], and adds them to the multipliers.
 void move_loose_nodes(ThreadScratch& s, size_t nodes, float limit);
 // Marks in s.unfit the pairs that a distance sweep would change.
-void find_unfit_pairs(ThreadScratch& s, size_t pairs, float alpha_per_metre);
+void mark_violated_segments(ThreadScratch& s, size_t pairs, float alpha_per_meter);
 // Lets the inertia and the weight that carried the nodes here meet the thread's tension. `fall` [m] is what weight does in a
 // substep. Returns false, with nothing done, where nothing is taut.
 bool smooth_motion(ThreadScratch& s, size_t nodes, float inv_mass, float shortest, Vec3 fall, float h);
 
-// A distance constraint is right to a tenth of a micrometre, as the direct solve leaves most pairs: that spares its root and
+// A distance constraint is right to a tenth of a micrometer, as the direct solve leaves most pairs: that spares its root and
 // its division. `compliant`: compliance times multiplier [m].
 constexpr float kFitLength = 2e-7f, kFitCompliant = 1e-7f;
 

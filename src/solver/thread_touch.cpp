@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/thread_touch: reads and writes ThreadScratch, pushes tools. See the header.
 #include "solver/thread_touch.h"
 
@@ -13,7 +14,7 @@ namespace {
 constexpr float kTouching = 2e-5f;   // [m] nearer than this is touching
 constexpr float kConcerned = 0.25f;  // a segment touched this far along it concerns its other node
 constexpr float kRecovery = 0.1f;    // [m/s] at which overlap from before the substep is undone: it must not throw the thread
-// [m/s] of sliding at which friction reaches its limit; below, it falls with the speed. A rigid grip would turn micrometres
+// [m/s] of sliding at which friction reaches its limit; below, it falls with the speed. A rigid grip would turn micrometers
 // into newtons (segments of thread are as stiff as that), and nodes that stick and slip by turns would pluck the thread.
 constexpr float kCreep = 0.005f;
 
@@ -71,13 +72,13 @@ void feel_friction(ThreadScratch& s, NodeContact& c, const RigidBody& b, float h
 
 }  // namespace
 
-bool meet_tools(const StrandModel& model, ThreadScratch& s, const std::vector<RigidModel>& body_model,
-                const std::vector<RigidBody>& body, float h) {
+bool update_contacts(const StrandModel& model, ThreadScratch& s, const std::vector<RigidModel>& body_model,
+                     const std::vector<RigidBody>& body, float h) {
   bool changed = false;
   for (NodeContact& c : s.contact) c.gap = 1;
   for (const ThreadTouch& touch : s.touch) {
     const size_t i = touch.pair;
-    if (s.keep[i] == 0) continue;
+    if (s.intact[i] == 0) continue;
     const Capsule& capsule = body_model[touch.body].capsule[touch.capsule];
     const Pose pose = body[touch.body].pose();
     const float reach = capsule.radius + model.radius;
@@ -93,9 +94,9 @@ bool meet_tools(const StrandModel& model, ThreadScratch& s, const std::vector<Ri
           meet(came_from(s, i), came_from(s, i + 1), transform(then, capsule.a), transform(then, capsule.b), reach);
       const float before = length2(was.n) > 0 ? was.gap : m.gap;
       const float depth = std::max(0.0f, std::min(0.0f, before + kRecovery * h) - m.gap);
-      const float w = s.loose[i] * part[0] * part[0] + s.loose[i + 1] * part[1] * part[1];
+      const float w = s.is_free[i] * part[0] * part[0] + s.is_free[i + 1] * part[1] * part[1];
       for (size_t k = 0; k < 2 && w > 0; ++k)
-        if (s.loose[i + k] > 0) put_node(s, i + k, node(s, i + k) + m.n * (depth * part[k] / w));
+        if (s.is_free[i + k] > 0) put_node(s, i + k, node(s, i + k) + m.n * (depth * part[k] / w));
     }
     for (size_t k = 0; k < 2; ++k) {
       if (part[k] < kConcerned || s.contact_at[i + k] < 0) continue;
@@ -119,7 +120,7 @@ bool meet_tools(const StrandModel& model, ThreadScratch& s, const std::vector<Ri
   return changed;
 }
 
-void weigh_contacts(ThreadScratch& s, const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body) {
+void compute_effective_masses(ThreadScratch& s, const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body) {
   // A tool gives way to all that push it. A node reckons with the whole push along its own normal, as the tensions have it,
   // over its own share.
   s.load.assign(body.size(), {});
@@ -156,7 +157,7 @@ void push_tool(ThreadScratch& s, const NodeContact& c, Vec3 p, const std::vector
   s.on_tool[c.body].angular += cross(r, p);
 }
 
-void hold_contacts(ThreadScratch& s) {
+void save_positions(ThreadScratch& s) {
   for (NodeContact& c : s.contact) c.from = node(s, c.node);
 }
 

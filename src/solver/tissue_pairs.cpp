@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/tissue_pairs: reads positions, writes boxes and pairs. Compiled once per instruction set (Highway) and chosen at run
 // time. Comparisons only decide what is worth a closer look, so every instruction set finds every pair that touches.
 #include "solver/tissue_pairs.h"
@@ -119,8 +120,8 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
       from[axis] = built.block.lower[axis][ba] - reach, to[axis] = built.block.upper[axis][ba] + reach;
     part.near.clear();
     bool anew = false;
-    const TissueCollision::Kin* kin = tissue.kin.data() + tissue.kin_first[ba];
-    const TissueCollision::Kin* const last_kin = tissue.kin.data() + tissue.kin_first[ba + 1];
+    const TissueCollision::ExclusionMask* exclusion = tissue.exclusion.data() + tissue.exclusion_first[ba];
+    const TissueCollision::ExclusionMask* const last_kin = tissue.exclusion.data() + tissue.exclusion_first[ba + 1];
     for (uint32_t base = g / 16 * 16; base < boxes.groups; base += 16) {
       uint32_t groups = BoxesThatMeet(boxes.group, base, from, to);
       for (; groups != 0; groups &= groups - 1) {
@@ -131,15 +132,16 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
         anew = anew || (blocks & search.part[other].moved) != 0;
         for (; blocks != 0; blocks &= blocks - 1) {
           const uint32_t bb = other * kBlock + static_cast<uint32_t>(__builtin_ctz(blocks));
-          while (kin != last_kin && kin->block < bb) ++kin;
-          part.near.push_back({bb, kin != last_kin && kin->block == bb ? kin->may.data() : nullptr});
+          while (exclusion != last_kin && exclusion->block < bb) ++exclusion;
+          part.near.push_back({bb, exclusion != last_kin && exclusion->block == bb ? exclusion->allowed.data() : nullptr});
         }
       }
     }
     if (!anew) continue;  // itself is among them
     std::vector<PairCandidate>& pair = search.of_block[ba];
     pair.clear();
-    // Their boxes side by side: most of a near block's particles are out of a particle's reach, and one test tells for sixteen.
+    // Their boxes side by side: most of a near block's particles are out of a particle's reach, and one test reports for
+    // sixteen.
     Boxes& near_box = part.near_box;
     if (near_box.lower[0].size() < part.near.size()) near_box.resize(part.near.size());
     const size_t padded = (part.near.size() + 15) / 16 * 16;
@@ -166,10 +168,10 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
         if (part.near.size() - first < 16) blocks &= (1u << (part.near.size() - first)) - 1;
         for (; blocks != 0; blocks &= blocks - 1) {
           const PairSearch::Near& near = part.near[first + static_cast<size_t>(__builtin_ctz(blocks))];
-          const uint32_t may = near.may ? near.may[i - ba * kBlock] : 0xffffu;
-          if (may == 0) continue;  // neighbours in the wall
+          const uint32_t allowed = near.allowed ? near.allowed[i - ba * kBlock] : 0xffffu;
+          if (allowed == 0) continue;  // neighbors in the wall
           uint32_t close =
-              may & Sixteen([&](size_t k) HWY_ATTR {
+              allowed & Sixteen([&](size_t k) HWY_ATTR {
                 const size_t at = size_t{near.block} * kBlock + k;
                 const V dx = hn::Sub(hn::Load(d, search.at[0].data() + at), px);
                 const V dy = hn::Sub(hn::Load(d, search.at[1].data() + at), py);
@@ -201,7 +203,7 @@ HWY_EXPORT(PairsOfGroup);
 
 namespace {
 
-// Which particles of neighbouring blocks are too near each other at rest ever to collide.
+// Which particles of neighboring blocks are too near each other at rest ever to collide.
 void find_kin(TissueCollision& t, std::span<const Vec4> rest) {
   BlockBoxes boxes;
   Jobs alone;
@@ -209,24 +211,25 @@ void find_kin(TissueCollision& t, std::span<const Vec4> rest) {
   float furthest = 0;
   for (const float reach : t.rest_reach) furthest = std::max(furthest, reach);
   for (uint32_t ba = 0; ba < boxes.blocks; ++ba) {
-    t.kin_first.push_back(static_cast<uint32_t>(t.kin.size()));
+    t.exclusion_first.push_back(static_cast<uint32_t>(t.exclusion.size()));
     auto corner = [&](const std::array<Column<float>, 3>& of) { return Vec3{of[0][ba], of[1][ba], of[2][ba]}; };
     const Vec3 grow{furthest, furthest, furthest};
     for_blocks_near(boxes, corner(boxes.block.lower) - grow, corner(boxes.block.upper) + grow, [&](uint32_t bb) {
       if (bb < ba) return;
-      TissueCollision::Kin kin{bb, {}};
+      TissueCollision::ExclusionMask exclusion{bb, {}};
       bool all = bb != ba;
       for (uint32_t i = ba * kBlock; i < std::min(t.particles, (ba + 1) * kBlock); ++i)
         for (uint32_t j = bb * kBlock; j < std::min(t.particles, (bb + 1) * kBlock); ++j) {
           const float apart = std::max(t.rest_reach[i], t.rest_reach[j]);
-          const bool may = i < j && (t.body[i] != t.body[j] || length2(xyz(rest[j]) - xyz(rest[i])) >= apart * apart);
-          all = all && may;
-          if (may) kin.may[i % kBlock] = static_cast<uint16_t>(kin.may[i % kBlock] | 1u << (j % kBlock));
+          const bool allowed = i < j && (t.body[i] != t.body[j] || length2(xyz(rest[j]) - xyz(rest[i])) >= apart * apart);
+          all = all && allowed;
+          if (allowed)
+            exclusion.allowed[i % kBlock] = static_cast<uint16_t>(exclusion.allowed[i % kBlock] | 1u << (j % kBlock));
         }
-      if (!all) t.kin.push_back(kin);
+      if (!all) t.exclusion.push_back(exclusion);
     });
   }
-  t.kin_first.push_back(static_cast<uint32_t>(t.kin.size()));
+  t.exclusion_first.push_back(static_cast<uint32_t>(t.exclusion.size()));
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/tissue_pairs: which particles of the tissue may touch each other. Candidates are found with a margin and kept until
 // something has moved by more than half of it, so most substeps only check the distance moved, and then only blocks that have
 // moved are searched again. A pair that touches when its contacts are solved is always listed; a pair that comes to touch while
@@ -20,7 +21,7 @@ namespace catgut {
 constexpr uint32_t kBlock = 16;  // particles in a block, and blocks in a group
 constexpr float kNowhere = std::numeric_limits<float>::quiet_NaN();
 
-// What of the tissue collides. Consecutive particles must be neighbours in space, which bodies promise: the search goes by
+// What of the tissue collides. Consecutive particles must be neighbors in space, which bodies promise: the search goes by
 // boxes round 16 of them and round 16 such boxes.
 struct TissueCollision {
   uint32_t particles = 0;
@@ -30,14 +31,14 @@ struct TissueCollision {
   std::vector<Triangle> surface;
   std::vector<uint32_t> ring_first;  // per particle: first of its triangles in ring, size particles + 1
   std::vector<uint32_t> ring;        // triangles around each particle
-  // Blocks with particles that never collide with some of a block's own: neighbours in the wall. First of a block's in kin,
+  // Blocks with particles that never collide with some of a block's own: neighbors in the wall. First of a block's in kin,
   // size blocks + 1, ascending, the block itself the first of them.
-  struct Kin {
+  struct ExclusionMask {
     uint32_t block;
-    std::array<uint16_t, kBlock> may;  // bit j of may[i]: particle i of the one and j of the other may touch, i < j
+    std::array<uint16_t, kBlock> allowed;  // bit j of may[i]: particle i of the one and j of the other may touch, i < j
   };
-  std::vector<uint32_t> kin_first;
-  std::vector<Kin> kin;
+  std::vector<uint32_t> exclusion_first;
+  std::vector<ExclusionMask> exclusion;
   float tool_radius = 0.0006f;  // [m] of a particle against tools
   float largest_radius = 0;
   float pair_margin = 0.002f;  // [m] pairs this much further apart than touching are candidates
@@ -67,18 +68,18 @@ struct PairSearch {
   BlockBoxes boxes;          // as of the last call of make_boxes
   std::vector<float> moved;  // [m] distance of particles from their origins (furthest_move): one for each part of the tissue
   BlockBoxes built;          // around the origins
-  BlockBoxes swept;          // around the origins before and after the search that is going on
-  // The origins by components, padded to whole blocks with places that are no numbers: near nothing, however far away a damaged
-  // state may have put its particles.
+  BlockBoxes swept;          // around the origins before and after the search that is continuing
+  // The origins by components, padded to whole blocks with places that are not numbers: near nothing, however far away a
+  // damaged state may have put its particles.
   std::array<Column<float>, 3> at;
   Column<float> radius;
   std::vector<std::vector<PairCandidate>> of_block;  // pairs whose first particle is in it
   struct Near {
     uint32_t block;
-    const uint16_t* may;  // as in Kin; null: every pair
+    const uint16_t* allowed;  // as in Kin; null: every pair
   };
   struct Part {              // for a group of blocks
-    uint32_t moved = 0;      // bit k: its block k is looked for anew
+    uint32_t moved = 0;      // bit k: its block k is looked for again
     std::vector<Near> near;  // blocks near the one that is looked at, and their boxes
     Boxes near_box;
   };
@@ -86,7 +87,7 @@ struct PairSearch {
 };
 
 void make_boxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes, Jobs& jobs);
-// [m] no less than the furthest that any of n particles has moved, and not much more where neighbours move alike: the length of
+// [m] no less than the furthest that any of n particles has moved, and not much more where neighbors move alike: the length of
 // the furthest moves along each axis.
 float furthest_move(const Vec4* x, const Vec4* from, size_t n);
 // Whether search.pair may lack a pair that touches, given search.moved.

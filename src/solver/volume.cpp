@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solver/volume: reads tetrahedra, moves particles. Equations: Mueller et al. 2014 (strain based dynamics), paper 2.1.
 #include "solver/volume.h"
 
@@ -9,25 +10,25 @@ namespace catgut {
 float tet_volume(Vec3 a, Vec3 b, Vec3 c, Vec3 d) { return dot(cross(b - a, c - a), d - a) / 6.0f; }
 
 VolumeModel make_volume_model(std::span<const Vec3> rest, std::span<const Tet> tet) {
-  // Greedy colouring in order: the smallest colour not yet used by any of the four particles.
+  // Greedy coloring in order: the smallest color not yet used by any of the four particles.
   std::vector<uint64_t> used(rest.size(), 0);
-  std::vector<uint32_t> colour(tet.size()), order(tet.size());
+  std::vector<uint32_t> color(tet.size()), order(tet.size());
   for (size_t t = 0; t < tet.size(); ++t) {
     uint64_t busy = 0;
     for (uint32_t k : tet[t]) busy |= used[k];
     uint32_t c = 0;
     while (c < 63 && (busy >> c & 1)) ++c;
     for (uint32_t k : tet[t]) used[k] |= uint64_t{1} << c;
-    colour[t] = c;
+    color[t] = c;
   }
   std::iota(order.begin(), order.end(), 0u);
-  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return colour[a] < colour[b]; });
+  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return color[a] < color[b]; });
   VolumeModel m;
   for (size_t i = 0; i < order.size(); ++i) {
     const Tet& t = tet[order[i]];
     m.tet.push_back(t);
     m.rest.push_back(tet_volume(rest[t[0]], rest[t[1]], rest[t[2]], rest[t[3]]));
-    if (i + 1 == order.size() || colour[order[i + 1]] != colour[order[i]]) m.colour_end.push_back(static_cast<uint32_t>(i + 1));
+    if (i + 1 == order.size() || color[order[i + 1]] != color[order[i]]) m.color_end.push_back(static_cast<uint32_t>(i + 1));
   }
   return m;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // surgeon/hands: see the header.
 #include "surgeon/hands.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // surgeon/hands: how a scripted hand moves. Plain kinematics: toward a goal at a bounded speed, with a tremor on top. Knows
 // nothing of the simulation.
 #pragma once

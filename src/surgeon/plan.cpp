@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // surgeon/plan: the four techniques of paper 2.5 as a surgeon does them. Reads the picture at rest; see plan.h.
 #include "surgeon/plan.h"
 
@@ -39,12 +40,12 @@ void places_round(const PictureModel& picture, const SurgeonSkill& skill, int bi
   const std::vector<Vec3>& rest = picture.particle_rest;
   const Vec3 u = normalized(Vec3{1, 0, 0} - o.axis * o.axis.x, any_perpendicular(o.axis)), v = cross(o.axis, u);
   const size_t n = rim.size();
-  auto angle_of = [&](Vec3 p) { return portable::atan2(dot(p - o.centre, v), dot(p - o.centre, u)); };
+  auto angle_of = [&](Vec3 p) { return portable::atan2(dot(p - o.center, v), dot(p - o.center, u)); };
   size_t start = 0;
   float turn = 0;
   for (size_t i = 0; i < n; ++i) {
     if (std::abs(angle_of(rest[rim[i]])) < std::abs(angle_of(rest[rim[start]]))) start = i;
-    turn += dot(cross(rest[rim[i]] - o.centre, rest[rim[(i + 1) % n]] - o.centre), o.axis);
+    turn += dot(cross(rest[rim[i]] - o.center, rest[rim[(i + 1) % n]] - o.center), o.axis);
   }
   const bool counter = turn > 0;  // go clockwise seen from above: the way a right hand's needle turns
   auto rim_at = [&](size_t i) { return rest[rim[(start + (counter ? n - i % n : i % n)) % n]]; };
@@ -55,7 +56,7 @@ void places_round(const PictureModel& picture, const SurgeonSkill& skill, int bi
     size_t i = 0;
     while (i + 1 < n && run[i + 1] <= want) ++i;
     const Vec3 on_rim = lerp(rim_at(i), rim_at(i + 1), (want - run[i]) / std::max(run[i + 1] - run[i], 1e-6f));
-    const Vec3 radial = normalized(on_rim - o.centre - o.axis * dot(on_rim - o.centre, o.axis));
+    const Vec3 radial = normalized(on_rim - o.center - o.axis * dot(on_rim - o.center, o.axis));
     BitePlace p;
     settle_on_serosa(picture.body[0], on_rim, o.axis, cross(o.axis, radial), edge, p);
     p.up = o.axis;
@@ -72,7 +73,7 @@ BitePlace on_top(const PictureModel& picture, uint32_t wall, float angle, float 
   const Vec3 top = normalized(Vec3{0, 1, 0} - o.axis * o.axis.y, any_perpendicular(o.axis)), side = cross(top, Vec3{1, 0, 0});
   BitePlace p;
   p.out = top * portable::cos(angle) - side * portable::sin(angle);
-  p.at = o.centre + p.out * o.radius - o.axis * edge;
+  p.at = o.center + p.out * o.radius - o.axis * edge;
   p.wall = wall;
   return p;
 }
@@ -119,7 +120,7 @@ Plan running_plan(const PictureModel& picture, const SurgeonSkill& skill) {
 
 // 2.5.2: sweeps along the edge, each outside in and inside out again on one bowel, then straight across to the other. The first
 // crossing is tied like a stay suture, so that the thread has something to pull against; the last throw locks the running
-// thread. More bites than one thread holds go on in a second row, with a fresh thread.
+// thread. More bites than one thread holds continue in a second row, with a fresh thread.
 Plan connell_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;
@@ -200,7 +201,7 @@ Plan lembert_plan(const PictureModel& picture, const SurgeonSkill& skill) {
     const Vec3 radial = u * portable::cos(angle) + v * portable::sin(angle);
     BitePlace p;
     const float middle = 0.5f * (outer.radius + inner.radius - wall);
-    p.at = outer.centre + radial * middle;
+    p.at = outer.center + radial * middle;
     p.out = outer.axis;
     p.up = cross(-radial, outer.axis);  // so that cross(out, up) leads inward
     p.length = outer.radius - inner.radius + wall;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // surgeon/plan: what a technique asks of two hands, as a list of tasks with the places of its bites. The engine
 // (surgeon/scripted) carries the tasks out one after the other; each looks at what really happened before the next begins.
 #pragma once
@@ -21,7 +22,7 @@ struct BitePlace {
   int walls = 1;       // passages through a wall that the sweep makes
 };
 
-// Where a bite is made, in the world as it is now: a place, outward, the way of the needle, the axis about which it turns.
+// Where a bite is made, in the world as it is now: a place, outward, the path of the needle, the axis about which it turns.
 struct BiteFrame {
   Vec3 at, out, along, up;
 };
@@ -43,7 +44,7 @@ enum class TaskKind {
   cut_needle,     // at the needle
   take_both,      // the driver takes both strands of the knot between its jaws
   fresh,          // a fresh needle and thread
-  rest            // hands off; what was let go comes to rest
+  rest            // hands off; what was let go settles
 };
 
 struct Task {

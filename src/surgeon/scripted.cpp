@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // surgeon/scripted: tasks, bites and pulling thread; see scripted.h.
 #include "surgeon/scripted.h"
 
@@ -15,7 +16,7 @@ constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f;  // places on the needle'
 
 Scripted::Scripted(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill)
     : picture_(picture), skill_(skill), plan_(make_plan(technique, picture, skill)), random_(skill.seed) {
-  hand_[kDriver].pose = {picture.focus + Vec3{0.06f, 0.08f, 0.05f}, {}};
+  hand_[kNeedleHolder].pose = {picture.focus + Vec3{0.06f, 0.08f, 0.05f}, {}};
   hand_[kForceps].pose = {picture.focus + Vec3{-0.08f, 0.08f, 0.06f}, {}};
 }
 
@@ -102,8 +103,8 @@ void Scripted::miss(int back_to) {
 
 void Scripted::rest_aside(const Snapshot& seen, size_t hand) {
   const BiteFrame f = frame(seen, place_);
-  const float side = hand == kDriver ? plan_.driver_side : plan_.forceps_side;
-  const Vec3 lateral = plan_.forceps_side == plan_.driver_side ? f.along * (hand == kDriver ? -0.05f : 0.05f) : Vec3{};
+  const float side = hand == kNeedleHolder ? plan_.driver_side : plan_.forceps_side;
+  const Vec3 lateral = plan_.forceps_side == plan_.driver_side ? f.along * (hand == kNeedleHolder ? -0.05f : 0.05f) : Vec3{};
   const Vec3 p = picture_.focus + f.out * 0.07f + f.up * (0.09f * side) + lateral;
   move(hand, {p, hand_[hand].pose.q}, skill_.speed);
   jaw(hand, 1);
@@ -114,10 +115,10 @@ BiteFrame Scripted::frame(const Snapshot& seen, size_t place) const {
 }
 
 Pose Scripted::needle_at(const BiteFrame& f, float psi) const {
-  const Vec3 centre = f.at + f.out * (picture_.suture[0].needle_radius - bite().depth + depth_error_ + depth_fix_);
+  const Vec3 center = f.at + f.out * (picture_.suture[0].needle_radius - bite().depth + depth_error_ + depth_fix_);
   const Vec3 x = f.out * portable::cos(psi) - f.along * portable::sin(psi);
   // The tip is at the end of the arc: for other arcs than a half circle turn back by what is missing.
-  const Pose half{centre, from_axes(x, cross(f.up, x), f.up)};
+  const Pose half{center, from_axes(x, cross(f.up, x), f.up)};
   return half * Pose{{}, axis_angle({0, 0, 1}, kPi - picture_.suture[0].needle_arc)};
 }
 
@@ -199,16 +200,16 @@ bool Scripted::pick_up(const Snapshot& seen) {
   if (stage_ != over || seen.tick > 0) rest_aside(seen, kForceps);
   switch (stage_) {
     case over:
-      jaw(kDriver, 1);
-      if (move(kDriver, raised(grip, 0.03f), skill_.speed)) go(down);
+      jaw(kNeedleHolder, 1);
+      if (move(kNeedleHolder, raised(grip, 0.03f), skill_.speed)) go(down);
       return false;
     case down:
-      if (move(kDriver, grip, careful())) go(close);
+      if (move(kNeedleHolder, grip, careful())) go(close);
       return false;
     default:
-      if (!jaw(kDriver, 0) || waited_ < 0.35f) return false;
-      if (!holds_needle(seen, kDriver)) return miss(over), false;
-      remember_grip(seen, kDriver);
+      if (!jaw(kNeedleHolder, 0) || waited_ < 0.35f) return false;
+      if (!holds_needle(seen, kNeedleHolder)) return miss(over), false;
+      remember_grip(seen, kNeedleHolder);
       return true;
   }
 }
@@ -224,7 +225,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       rest_aside(seen, kForceps);
       BiteFrame f = frame(seen, place_);
       f.at += f.out * 0.022f + f.up * plan_.lift;
-      if (move(kDriver, holding(kDriver, needle_at(f, -psi_bite - 0.7f)), speed)) go(approach);
+      if (move(kNeedleHolder, holding(kNeedleHolder, needle_at(f, -psi_bite - 0.7f)), speed)) go(approach);
       else if (!patience(6)) gave_up_ = true;
       return false;
     }
@@ -233,7 +234,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       frame_ = frame(seen, place_);
       frame_.at += frame_.along * aim_along_ + frame_.up * aim_up_;
       psi_ = -psi_bite - 0.45f;
-      if (move(kDriver, holding(kDriver, needle_at(frame_, psi_)), careful())) {
+      if (move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), careful())) {
         bites_before_ = seen.active().bite.size();
         go(drive);
       } else if (!patience(5)) {
@@ -245,7 +246,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       doing_ = name_of_bite() + "drive the needle";
       rest_aside(seen, kForceps);
       psi_ += skill_.drive_speed / picture_.suture[0].needle_radius * dt_;
-      move(kDriver, holding(kDriver, needle_at(frame_, psi_)), 2 * speed);
+      move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
       const bool out =
           seen.active().bite.size() >= bites_before_ + static_cast<size_t>(bite().walls) && seen.active().bite.back().has_exit;
       if (out && psi_ > psi_bite + 0.72f) {
@@ -253,7 +254,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       } else if (psi_ > psi_bite + 1.1f) {
         // The tip is not where it should be: it never went in or not deep enough, or it went too deep to come out.
         const bool passed = seen.active().bite.size() > bites_before_ && seen.active().bite.back().has_exit;
-        // Through the first wall and not into the second: that gave way, as soft walls do, by millimetres.
+        // Through the first wall and not into the second: that gave way, as soft walls do, by millimeters.
         const bool gave_way = passed && seen.active().bite.size() < bites_before_ + static_cast<size_t>(bite().walls);
         depth_fix_ += gave_way ? -0.0008f : passed || !seen.active().needle.in_tissue ? -0.0003f : 0.0003f;
         go(withdraw);
@@ -266,7 +267,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       psi_ = std::max(psi_ - 2 * skill_.drive_speed / picture_.suture[0].needle_radius * dt_, -psi_bite - 0.7f);
       BiteFrame f = frame_;
       if (!patience(1.5f)) f.at += f.out * std::min(0.01f, 0.01f * (waited_ - 1.5f));  // it sticks: away from the wall
-      move(kDriver, holding(kDriver, needle_at(f, psi_)), 2 * speed);
+      move(kNeedleHolder, holding(kNeedleHolder, needle_at(f, psi_)), 2 * speed);
       if (psi_ <= -psi_bite - 0.7f && !seen.active().needle.in_tissue) {
         if (++attempts_ > kAttempts) gave_up_ = true;
         go(hover);
@@ -291,14 +292,14 @@ bool Scripted::make_bite(const Snapshot& seen) {
       go(release);
       return false;
     case release:
-      if (jaw(kDriver, 1)) go(retreat);
+      if (jaw(kNeedleHolder, 1)) go(retreat);
       return false;
     case retreat:
-      if (move(kDriver, raised(hand_[kDriver].pose, 0.01f), speed) || waited_ > 0.25f) go(bring);
+      if (move(kNeedleHolder, raised(hand_[kNeedleHolder].pose, 0.01f), speed) || waited_ > 0.25f) go(bring);
       return false;
     default: {
       doing_ = name_of_bite() + "pull the needle through";
-      rest_aside(seen, kDriver);
+      rest_aside(seen, kNeedleHolder);
       psi_ = std::min(psi_ + 2 * skill_.drive_speed / picture_.suture[0].needle_radius * dt_, psi_bite + kPi + 0.5f);
       BiteFrame f = frame_;
       if (!patience(3))  // it sticks: a pull outward frees the back end
@@ -315,7 +316,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
 }
 
 bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
-  rest_aside(seen, kDriver);
+  rest_aside(seen, kNeedleHolder);
   if (seen.active().suture_point.empty()) return true;
   const Vec3 way = plan_.lift > 0 ? normalized(frame_.out * 0.85f + frame_.up * 0.4f)
                                   : normalized(frame_.out + frame_.up * (0.35f * plan_.forceps_side));
@@ -355,8 +356,10 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
   switch (stage_) {
     case bring: {
       // It is taken from the driver's side: there he waits, or he would have to go past the forceps.
-      if (present) rest_aside(seen, kDriver);
-      else move(kDriver, {stitch(seen) + Vec3{0.09f * plan_.driver_side, 0.09f, 0}, tying_pose(kDriver, {}).q}, skill_.speed);
+      if (present) rest_aside(seen, kNeedleHolder);
+      else
+        move(kNeedleHolder, {stitch(seen) + Vec3{0.09f * plan_.driver_side, 0.09f, 0}, tying_pose(kNeedleHolder, {}).q},
+             skill_.speed);
       const size_t next = std::min(place_ + 1, plan_.place.size() - 1);
       // Before a bite the needle is brought beside its place; before a knot high above the stitch, its tip up and out of the
       // way.
@@ -367,16 +370,16 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
       return false;
     }
     case over:
-      jaw(kDriver, 1);
-      if (move(kDriver, raised(driver_grip(seen.active().needle.pose), 0.025f), skill_.speed)) go(down);
+      jaw(kNeedleHolder, 1);
+      if (move(kNeedleHolder, raised(driver_grip(seen.active().needle.pose), 0.025f), skill_.speed)) go(down);
       return false;
     case down:
-      if (move(kDriver, driver_grip(seen.active().needle.pose), careful())) go(close);
+      if (move(kNeedleHolder, driver_grip(seen.active().needle.pose), careful())) go(close);
       return false;
     case close:
-      if (!jaw(kDriver, 0) || waited_ < 0.3f) return false;
-      if (!holds_needle(seen, kDriver)) return miss(over), false;
-      remember_grip(seen, kDriver);
+      if (!jaw(kNeedleHolder, 0) || waited_ < 0.3f) return false;
+      if (!holds_needle(seen, kNeedleHolder)) return miss(over), false;
+      remember_grip(seen, kNeedleHolder);
       go(give);
       return false;
     case give:
@@ -402,14 +405,14 @@ bool Scripted::draw(const Snapshot& seen) {
       const Vec3 x = normalized(f.along - z * dot(f.along, z), any_perpendicular(z));
       const Pose goal{thread, from_axes(x, cross(z, x), z)};
       if (stage_ == over) {
-        jaw(kDriver, 1);
-        if (move(kDriver, raised(goal, 0.03f), skill_.speed)) go(down);
+        jaw(kNeedleHolder, 1);
+        if (move(kNeedleHolder, raised(goal, 0.03f), skill_.speed)) go(down);
         else if (!patience(8)) gave_up_ = true;
       } else if (stage_ == down) {
-        if (move(kDriver, goal, careful())) go(close);
+        if (move(kNeedleHolder, goal, careful())) go(close);
         else if (!patience(4)) gave_up_ = true;
-      } else if (jaw(kDriver, 0) && waited_ > 0.3f) {
-        if (seen.tool[kDriver].held != Held::thread) return miss(over), false;
+      } else if (jaw(kNeedleHolder, 0) && waited_ > 0.3f) {
+        if (seen.tool[kNeedleHolder].held != Held::thread) return miss(over), false;
         go(tighten);
       }
       return false;
@@ -435,11 +438,11 @@ bool Scripted::draw(const Snapshot& seen) {
       move(kForceps, {picture_.focus + left * 0.35f, hand_[kForceps].pose.q}, gently(kForceps));
       // The tail hand gives a counter-hold: it moves out only as far as keeps its own side tight. Where both sides are drawn
       // hard the thread sticks in its holes and the tissue follows the hands instead, so it gives way first.
-      const size_t held = node_of(seen, seen.tool[kDriver].held_slot);
+      const size_t held = node_of(seen, seen.tool[kNeedleHolder].held_slot);
       const float tail = held < seen.active().thread_tension.size() ? seen.active().thread_tension[held] : 0;
       if (plan_.lift == 0 && !patience(5) && tail > kCounterHold)
-        move(kDriver, {stitch(seen), hand_[kDriver].pose.q}, 0.3f * skill_.speed);
-      else move(kDriver, {picture_.focus + right * 0.11f, hand_[kDriver].pose.q}, gently(kDriver));
+        move(kNeedleHolder, {stitch(seen), hand_[kNeedleHolder].pose.q}, 0.3f * skill_.speed);
+      else move(kNeedleHolder, {picture_.focus + right * 0.11f, hand_[kNeedleHolder].pose.q}, gently(kNeedleHolder));
       if (!patience(20)) gave_up_ = true;
       return false;
     }
@@ -448,8 +451,8 @@ bool Scripted::draw(const Snapshot& seen) {
       return false;
     default:
       if (plan_.lift > 0) return true;  // a purse-string stays in the hands
-      jaw(kDriver, 1);
-      return move(kDriver, raised(hand_[kDriver].pose, 0.02f), skill_.speed) || waited_ > 0.8f;
+      jaw(kNeedleHolder, 1);
+      return move(kNeedleHolder, raised(hand_[kNeedleHolder].pose, 0.02f), skill_.speed) || waited_ > 0.8f;
   }
 }
 

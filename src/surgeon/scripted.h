@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 // surgeon/scripted: carries out a plan's tasks with two hands. The needle driver (right) drives a bite by turning the needle
 // about its own circle; the forceps (left) takes the tip, brings it through and pulls the thread; knots are tied with the
 // instrument. Reads Snapshots only; each step looks at what really happened before the next begins. What goes wrong is tried
-// again: a bite whose tip did not come out is drawn back and driven a little shallower or deeper, a missed grasp is approached
-// anew, a throw whose loop did not hold is wound again. Bites are in scripted.cpp, knots and scissors in tying.cpp.
+// again: a bite whose tip did not come out is withdrawn and driven a little shallower or deeper, a missed grasp is approached
+// again, a throw whose loop did not hold is wound again. Bites are in scripted.cpp, knots and scissors in tying.cpp.
 #pragma once
 #include <array>
 #include <string>
@@ -15,14 +16,14 @@
 
 namespace catgut {
 
-constexpr size_t kDriver = 0, kForceps = 1;
+constexpr size_t kNeedleHolder = 0, kForceps = 1;
 constexpr int kAttempts = 8;  // at one bite, at one grasp, at one throw
 
 class Scripted final : public Surgeon {
  public:
   Scripted(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
 
-  // Only these tasks of the plan, with the tools as somebody else left them.
+  // Only these tasks of the plan, with the tools as someone else left them.
   void take_over_for(const std::vector<size_t>& tasks);
 
   bool done() const override { return gave_up_ || task_ >= plan_.task.size(); }

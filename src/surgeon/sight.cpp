@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // surgeon/sight: see sight.h.
 #include "surgeon/sight.h"
 
@@ -39,18 +40,18 @@ OpeningShape opening_shape(const PictureModel& picture, uint32_t wall) {
   OpeningShape o;
   const float n = static_cast<float>(rim.size());
   Vec3 normal{}, body{};
-  for (uint32_t i : rim) o.centre += rest[i] / n;
+  for (uint32_t i : rim) o.center += rest[i] / n;
   for (size_t i = 0; i < rim.size(); ++i) {
     const Vec3 a = rest[rim[i]], b = rest[rim[(i + 1) % rim.size()]];
-    normal += cross(a - o.centre, b - o.centre);
+    normal += cross(a - o.center, b - o.center);
     o.round += distance(a, b);
-    o.radius += distance(a, o.centre) / n;
+    o.radius += distance(a, o.center) / n;
   }
   float count = 0;
   for (size_t i = 0; i < rest.size(); ++i)
     if (i >= picture.wall.size() || picture.wall[i] == wall) body += rest[i], ++count;
   o.axis = normalized(normal);
-  if (dot(o.axis, o.centre - body / count) < 0) o.axis = -o.axis;  // out of the opening
+  if (dot(o.axis, o.center - body / count) < 0) o.axis = -o.axis;  // out of the opening
   return o;
 }
 

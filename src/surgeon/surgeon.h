@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // surgeon: a scripted pair of hands. To the simulation it is just another device: it sees the published Snapshot and answers
 // with ToolInputs, like a human; it cannot reach into the state. Motion plans react to what they see.
 #pragma once
@@ -34,8 +35,8 @@ class Surgeon {
   virtual std::string doing() const = 0;  // "bite 3 of 12: drive the needle", for progress lines
 };
 
-// Shows a part of the work: tasks of the plan, by number and in this order, taking over from whoever had the tools. It begins
-// where they are and with what they hold. Throws as make_surgeon, or where the plan has no such task.
+// Shows a part of the work: tasks of the plan, by number and in this order, taking over from a caller that had the tools. It
+// begins where they are and with what they hold. Throws as make_surgeon, or where the plan has no such task.
 std::unique_ptr<Surgeon> make_demonstrator(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill,
                                            const std::vector<size_t>& tasks);
 

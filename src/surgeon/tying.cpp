@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // surgeon/tying: instrument ties, scissors, a fresh needle; see scripted.h.
 #include <cmath>
 
@@ -17,12 +18,14 @@ constexpr float kTyingAt = 0.12f;             // place on the needle's arc: behi
 
 }  // namespace
 
-Pose Scripted::tying_pose(size_t hand, Vec3 at) { return {at, from_tool_axis(tying_axis(hand == kDriver ? 1.0f : -1.0f))}; }
+Pose Scripted::tying_pose(size_t hand, Vec3 at) {
+  return {at, from_tool_axis(tying_axis(hand == kNeedleHolder ? 1.0f : -1.0f))};
+}
 
 bool Scripted::regrip(const Snapshot& seen) {
   enum { first = 0, over = 10, down, close, give };
   if (stage_ < over) {
-    if (!holds_needle(seen, kDriver) || stage_ > first) {
+    if (!holds_needle(seen, kNeedleHolder) || stage_ > first) {
       if (!take_back(seen, false)) return false;
     }
     go(over);
@@ -49,8 +52,8 @@ bool Scripted::regrip(const Snapshot& seen) {
       go(give);
       return false;
     default:
-      jaw(kDriver, 1);
-      return move(kDriver, raised(hand_[kDriver].pose, 0.02f), skill_.speed) || waited_ > 0.6f;
+      jaw(kNeedleHolder, 1);
+      return move(kNeedleHolder, raised(hand_[kNeedleHolder].pose, 0.02f), skill_.speed) || waited_ > 0.6f;
   }
 }
 
@@ -59,14 +62,14 @@ bool Scripted::carry_swage(const Snapshot& seen, Vec3 goal, float speed) {
 }
 
 bool Scripted::lay_tail(const Snapshot& seen) {
-  const float tail = length_between(seen, first_point_node(seen), node_of(seen, seen.tool[kDriver].held_slot));
+  const float tail = length_between(seen, first_point_node(seen), node_of(seen, seen.tool[kNeedleHolder].held_slot));
   const Vec3 place = stitch(seen) + std::min(kTailAside, 0.8f * tail) * normalized(Vec3{-0.2f, 0.2f, 1.0f});
-  return move(kDriver, {place, hand_[kDriver].pose.q}, skill_.speed);
+  return move(kNeedleHolder, {place, hand_[kNeedleHolder].pose.q}, skill_.speed);
 }
 
 void Scripted::choose_grasp(const Snapshot& seen) {
   TailGrip grip;
-  if (best_tail_grip(picture_, seen, kDriver, 1, kTailByScript, misses_ > 0 ? &tried_ : nullptr, grip))
+  if (best_tail_grip(picture_, seen, kNeedleHolder, 1, kTailByScript, misses_ > 0 ? &tried_ : nullptr, grip))
     take_slot_ = grip.slot, take_turn_ = grip.pose.q;
   tried_ = node_at(seen, node_of(seen, take_slot_));
 }
@@ -76,7 +79,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   const bool own_strand = task.kind == TaskKind::lock_strand;
   doing_ = std::string(own_strand ? "lock the thread: " : "throw: ") + std::to_string(task.which) + " wrap" +
            (task.which > 1 ? "s" : "");
-  const ToolView& driver = seen.tool[kDriver];
+  const ToolView& driver = seen.tool[kNeedleHolder];
   const float side = static_cast<float>(task.way);
   const size_t last = seen.active().thread_order.size() - 1;
   if (stage_ == lift && waited_ <= dt_) {
@@ -84,10 +87,10 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     throws_before_ = locked_throws(seen);
   }
   winding_.way = side;
-  const AcrossTool across(rotate(tying_pose(kDriver, {}).q, {0, 0, 1}));
+  const AcrossTool across(rotate(tying_pose(kNeedleHolder, {}).q, {0, 0, 1}));
   const Vec3 axis_at = winding_axis(winding_, across);
   const float wind_at = own_strand ? kWindOwnAt : kTieWindAt;
-  const Pose lying = tying_pose(kDriver, axis_at - across.z * wind_at);
+  const Pose lying = tying_pose(kNeedleHolder, axis_at - across.z * wind_at);
   float room = 1;
   auto swage_at = [&](float w) { return winding_swage(winding_, across, w, room); };
   const float tension = needle_tension(seen);
@@ -96,19 +99,19 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   if (stage_ == beside || stage_ == wind) feel_winding(winding_, seen, across, behind, room, dt_);
   switch (stage_) {
     case lift:
-      jaw(kDriver, kHalfOpen);
-      move(kDriver, {lying.p - across.e2 * (side * 0.03f) + Vec3{0, 0.01f, 0}, lying.q}, skill_.speed);
+      jaw(kNeedleHolder, kHalfOpen);
+      move(kNeedleHolder, {lying.p - across.e2 * (side * 0.03f) + Vec3{0, 0.01f, 0}, lying.q}, skill_.speed);
       if (carry_swage(seen, swage_at(winding_.wound), skill_.speed)) go(lay);
       else if (!patience(8)) go(lay);
       return false;
     case lay:
       carry_swage(seen, swage_at(winding_.wound), skill_.speed);
-      if (move(kDriver, {lying.p - across.e2 * (side * 0.012f), lying.q}, skill_.speed)) go(beside);
+      if (move(kNeedleHolder, {lying.p - across.e2 * (side * 0.012f), lying.q}, skill_.speed)) go(beside);
       else if (!patience(6)) gave_up_ = true;
       return false;
     case beside:
       carry_swage(seen, swage_at(winding_.wound), careful());
-      if ((move(kDriver, lying, careful()) && tension > 0.02f) || !patience(4)) go(wind);
+      if ((move(kNeedleHolder, lying, careful()) && tension > 0.02f) || !patience(4)) go(wind);
       return false;
     case wind: {
       const float want = static_cast<float>(task.which) * 2 * kPi + 0.6f;
@@ -119,7 +122,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
         winding_.wound += turn, winding_.free = std::max(0.006f, winding_.free - kTieWound * turn);
       else winding_.lean = std::max(-2 * kTieLean, winding_.lean - kTieLean * dt_);
       carry_swage(seen, swage_at(winding_.wound), 1.2f * skill_.speed);
-      move(kDriver, lying, careful());
+      move(kNeedleHolder, lying, careful());
       if (driver.loop_wraps >= static_cast<uint32_t>(task.which)) go(over);
       else if (!patience(9)) go(unwind);
       return false;
@@ -136,22 +139,22 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       if (stage_ == over && waited_ <= dt_)
         winding_.free = kTieLoose * length_between(seen, node_of(seen, driver.loop_last), last);
       if (tension > kTieTooTaut) winding_.free = std::max(0.002f, feel_strand(winding_.free, tension, dt_));
-      const Vec3 turns = hand_[kDriver].pose.p + rotate(hand_[kDriver].pose.q, {0, 0, kTieWindAt});
+      const Vec3 turns = hand_[kNeedleHolder].pose.p + rotate(hand_[kNeedleHolder].pose.q, {0, 0, kTieWindAt});
       carry_swage(seen, strand_above(winding_, across, turns), 2 * skill_.speed);
       const float calm = std::clamp(1.5f - tension, 0.05f, 1.0f);
       if (stage_ == over) {
-        jaw(kDriver, kHalfOpen);
-        if (move(kDriver, raised(goal, 0.012f), 0.6f * skill_.speed * calm)) go(down);
+        jaw(kNeedleHolder, kHalfOpen);
+        if (move(kNeedleHolder, raised(goal, 0.012f), 0.6f * skill_.speed * calm)) go(down);
         else if (!patience(6)) miss(unwind);
       } else if (stage_ == down) {
-        if (move(kDriver, goal, careful() * calm)) go(close);
+        if (move(kNeedleHolder, goal, careful() * calm)) go(close);
         else if (!patience(4)) miss(over);
-      } else if (driver.held == Held::nothing && !move(kDriver, goal, careful() * calm)) {  // it has moved: after it
-        jaw(kDriver, kHalfOpen);
+      } else if (driver.held == Held::nothing && !move(kNeedleHolder, goal, careful() * calm)) {  // it has moved: after it
+        jaw(kNeedleHolder, kHalfOpen);
         if (!patience(4)) miss(over);
-      } else if (jaw(kDriver, 0) && waited_ > 0.35f) {
+      } else if (jaw(kNeedleHolder, 0) && waited_ > 0.35f) {
         if (driver.held == Held::thread && node_of(seen, driver.held_slot) < first) {
-          pull_from_ = hand_[kDriver].pose;
+          pull_from_ = hand_[kNeedleHolder].pose;
           go(tighten);
         } else {
           miss(over);
@@ -168,7 +171,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       // Where the hands cross, the driver, which has the tail, passes in front.
       const float front = side < 0 ? kTieCrossing : 0;
       const Vec3 right = normalized(Vec3{side, 0.35f, 0.1f + front}), left = normalized(Vec3{-side, 0.35f, 0.1f - front});
-      move(kDriver, {pull_from_.p + right * 0.08f, hand_[kDriver].pose.q}, gently(kDriver));
+      move(kNeedleHolder, {pull_from_.p + right * 0.08f, hand_[kNeedleHolder].pose.q}, gently(kNeedleHolder));
       carry_swage(seen, winding_.start + (own_strand ? Vec3{0, 1, 0} : left) * (0.9f * winding_.reach), gently(kForceps));
       if (locked && (waited_ > 0.5f || driver.held != Held::thread)) go(driver.held == Held::thread ? lay_down : open);
       else if (driver.held != Held::thread) miss(lift);
@@ -179,14 +182,14 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       if (own_strand || lay_tail(seen) || !patience(2.5f)) go(open);
       return false;
     case open:
-      jaw(kDriver, kHalfOpen);
-      return move(kDriver, raised(hand_[kDriver].pose, 0.02f), skill_.speed) || waited_ > 0.8f;
+      jaw(kNeedleHolder, kHalfOpen);
+      return move(kNeedleHolder, raised(hand_[kNeedleHolder].pose, 0.02f), skill_.speed) || waited_ > 0.8f;
     default:  // unwind: shake the loop off and begin again
       // Not before the jaws are open, and not against a taut strand: it would draw the tail out of the tissue.
-      if (!jaw(kDriver, 1)) return false;
+      if (!jaw(kNeedleHolder, 1)) return false;
       winding_.wound = std::max(kTieBefore, winding_.wound - 4 * dt_);
       carry_swage(seen, swage_at(winding_.wound), skill_.speed);
-      if ((move(kDriver, raised(lying, 0.03f), skill_.speed * std::clamp(1 - 2 * tension, 0.0f, 1.0f)) && waited_ > 1) ||
+      if ((move(kNeedleHolder, raised(lying, 0.03f), skill_.speed * std::clamp(1 - 2 * tension, 0.0f, 1.0f)) && waited_ > 1) ||
           !patience(5))
         miss(lift);
       return false;
@@ -195,7 +198,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
 
 bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again) {
   const Vec3 z = rotate(lying.q, {0, 0, 1});
-  const ToolView& driver = seen.tool[kDriver];
+  const ToolView& driver = seen.tool[kNeedleHolder];
   // Straight on from the turns, along the driver and between its jaws; drawn out until it is felt to be taut.
   const float left = length_between(seen, node_of(seen, driver.loop_last), seen.active().thread_order.size() - 1);
   if (stage_ != close && waited_ <= dt_) winding_.free = 0.9f * left;
@@ -204,15 +207,15 @@ bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, i
   const bool there = distance(swage(seen), ahead) < 0.002f;
   if (there || tension > kTieTooTaut) winding_.free = feel_strand(winding_.free, tension, dt_);
   if (stage_ != close) {
-    jaw(kDriver, kHalfOpen);
-    move(kDriver, lying, careful());
+    jaw(kNeedleHolder, kHalfOpen);
+    move(kNeedleHolder, lying, careful());
     carry_swage(seen, ahead, 0.5f * skill_.speed);
     if ((there && tension > 0.03f && waited_ > 0.5f) || !patience(5)) go(close);
     return false;
   }
-  if (jaw(kDriver, 0) && waited_ > 0.35f) {
+  if (jaw(kNeedleHolder, 0) && waited_ > 0.35f) {
     if (driver.held == Held::thread && node_of(seen, driver.held_slot) > last_point_node(seen)) {
-      pull_from_ = hand_[kDriver].pose;
+      pull_from_ = hand_[kNeedleHolder].pose;
       go(tighten);
     } else {
       miss(again);
@@ -247,22 +250,22 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
     for (size_t k = first; k <= end; ++k) clear = std::min(clear, distance(node_at(seen, i), node_at(seen, k)));
     if (clear > clearest) clearest = clear, at = i;
   }
-  const Pose goal = tying_pose(kDriver, node_at(seen, std::clamp<size_t>(at, 1, last - 1)));
+  const Pose goal = tying_pose(kNeedleHolder, node_at(seen, std::clamp<size_t>(at, 1, last - 1)));
   switch (stage_) {
     case over:
       cuts_before_ = count_cuts(seen);
-      jaw(kDriver, kHalfOpen);
-      if (move(kDriver, raised(goal, 0.015f), skill_.speed) || !patience(5)) go(down);
+      jaw(kNeedleHolder, kHalfOpen);
+      if (move(kNeedleHolder, raised(goal, 0.015f), skill_.speed) || !patience(5)) go(down);
       return false;
     case down:
-      if (move(kDriver, goal, careful()) || !patience(3)) go(snip);
+      if (move(kNeedleHolder, goal, careful()) || !patience(3)) go(snip);
       return false;
     case snip:
-      buttons_[kDriver] = kButtonCut;
+      buttons_[kNeedleHolder] = kButtonCut;
       go(away);
       return false;
     default:
-      move(kDriver, raised(hand_[kDriver].pose, 0.015f), skill_.speed);
+      move(kNeedleHolder, raised(hand_[kNeedleHolder].pose, 0.015f), skill_.speed);
       if (waited_ < 0.3f) return false;
       if (count_cuts(seen) == cuts_before_) return miss(over), false;
       return true;
@@ -277,7 +280,7 @@ size_t Scripted::count_cuts(const Snapshot& seen) {
 
 bool Scripted::fresh(const Snapshot& seen) {
   enum { aside, let_go, ask, wait };
-  rest_aside(seen, kDriver);
+  rest_aside(seen, kNeedleHolder);
   if (stage_ != aside) rest_aside(seen, kForceps);
   switch (stage_) {
     case aside:  // the old needle is not dropped into the wound
@@ -287,7 +290,7 @@ bool Scripted::fresh(const Snapshot& seen) {
       if (waited_ > 0.6f) go(ask);
       return false;
     case ask:
-      buttons_[kDriver] = kButtonNewSuture;
+      buttons_[kNeedleHolder] = kButtonNewSuture;
       settled_before_ = seen.settled.size();
       go(wait);
       return false;
@@ -307,7 +310,7 @@ bool Scripted::take_both(const Snapshot& seen) {
   way = normalized(Vec3{way.x, std::max(way.y, 0.0f), way.z}, {1, 0, 0});
   const float free = length_between(seen, last_point_node(seen), seen.active().thread_order.size() - 1) -
                      (seen.active().suture_point.empty() ? 0 : distance(seen.active().suture_point.back().position, knot));
-  const Pose goal = tying_pose(kDriver, thread);
+  const Pose goal = tying_pose(kNeedleHolder, thread);
   const float tension = needle_tension(seen);
   // Over the tissue first, then down beside the tail.
   const float up = stage_ == lay && waited_ < 0.8f ? 1.5f : 0.25f;
@@ -315,20 +318,20 @@ bool Scripted::take_both(const Snapshot& seen) {
               skill_.speed * std::clamp(1.2f - tension, 0.0f, 1.0f));
   switch (stage_) {
     case lay:
-      jaw(kDriver, kHalfOpen);
-      move(kDriver, raised(goal, 0.03f), skill_.speed);
+      jaw(kNeedleHolder, kHalfOpen);
+      move(kNeedleHolder, raised(goal, 0.03f), skill_.speed);
       if (waited_ > 2.0f) go(over);
       return false;
     case over:
-      jaw(kDriver, kHalfOpen);
-      if (move(kDriver, raised(goal, 0.02f), skill_.speed) || !patience(4)) go(down);
+      jaw(kNeedleHolder, kHalfOpen);
+      if (move(kNeedleHolder, raised(goal, 0.02f), skill_.speed) || !patience(4)) go(down);
       return false;
     case down:
-      if (move(kDriver, goal, careful()) || !patience(4)) go(close);
+      if (move(kNeedleHolder, goal, careful()) || !patience(4)) go(close);
       return false;
     default:
-      if (!jaw(kDriver, 0) || waited_ < 0.35f) return false;
-      if (seen.tool[kDriver].held != Held::thread || seen.tool[kDriver].held_strands < 2) return miss(over), false;
+      if (!jaw(kNeedleHolder, 0) || waited_ < 0.35f) return false;
+      if (seen.tool[kNeedleHolder].held != Held::thread || seen.tool[kNeedleHolder].held_strands < 2) return miss(over), false;
       return true;
   }
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture/closure: carries out a technique's ClosurePlan (paper 2.5: points are pulled together over time, all arriving at
 // once). Reads the plan; keeps one world attachment per pulled point and one pin per pair.
 #include "suture/suture.h"
@@ -24,13 +25,13 @@ void close(SolverState& solver, uint32_t suture, const ClosurePlan& plan) {
   }
   const auto length_of = [](const ClosurePlan::Pair& p) { return p.start + p.progress * (p.end - p.start); };
   k = 0;
-  for (TissuePin& pin : solver.pin) {
-    if (pin.owner != PinOwner::plan || pin.suture != suture) continue;
+  for (Tether& pin : solver.pin) {
+    if (pin.owner != TetherOwner::plan || pin.suture != suture) continue;
     if (k < plan.pair.size()) pin.length = length_of(plan.pair[k]);
     ++k;
   }
   for (; k < plan.pair.size(); ++k) {
-    TissuePin pin;
+    Tether pin;
     pin.a = plan.pair[k].a;
     pin.b = plan.pair[k].b;
     pin.length = length_of(plan.pair[k]);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture/cut: scissors. Reads buttons and tools; marks the pair that was cut (Strand::cut), or takes the thread off its needle.
 // To loops, knots, pulls and the solver a cut is an end of the thread. What a wrong cut opens stays open.
 #include <algorithm>
@@ -69,8 +70,8 @@ void judge_cut_knot(OneSuture& s, uint8_t by, uint32_t root, Vec3 where) {
   for (uint32_t k = 0; k < s.own.knot.size(); ++k) {
     Knot& knot = s.own.knot[k];
     const bool its_own = std::find(knot.slot.begin(), knot.slot.begin() + knot.slots, root) != knot.slot.begin() + knot.slots;
-    if (!its_own || knot.told || knot.throws >= static_cast<uint32_t>(s.all.suture.least_throws)) continue;
-    knot.told = 1;
+    if (!its_own || knot.reported || knot.throws >= static_cast<uint32_t>(s.all.suture.min_throws)) continue;
+    knot.reported = 1;
     s.all.report_fault(s.index, Fault::too_few_throws, by, k, where);
   }
 }
@@ -95,7 +96,7 @@ void cut_at(OneSuture& s, uint8_t by, size_t i, float along) {
     for (uint32_t tool = 0; tool < c.state.loop.size(); ++tool) {
       const int body = static_cast<int>(tool);
       if (!is_held_by(t, slot, body, HoldKind::loop) || !is_held_by(t, t.order[i + 1], body, HoldKind::loop)) continue;
-      take_off_loop(c, tool);
+      release_loop(c, tool);
       c.report_tool(s.index, EventKind::loop_released, tool, 0, 0, where);
     }
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture: how hard it is to push a needle through bowel, as named numbers with their sources, and as a function of where the
 // needle is. Felt by the hand, not by the tissue: the simulated tissue answers the tip with the paper's spring (2.2), which
 // knows neither a wall that stiffens before it gives way nor what rubs along a shaft. Sources: docs/references.md;
@@ -23,7 +24,7 @@ constexpr float kTension = 0.3f;       // [1/N] more of everything in tissue tha
 constexpr float kPresliding = 0.001f;  // [m] friction builds up over 1 to 2 mm (Kim & Lee 2016: Dahl, RMS below 0.13 N)
 
 struct NeedleResistance {
-  float spring = 0, stiffness = 0;  // [N], [N/m] against going on: the wall before it gives way
+  float spring = 0, stiffness = 0;  // [N], [N/m] against continuing: the wall before it gives way
   float drag = 0;                   // [N] cutting and shaft, whichever way it moves
   float pierce = 0;                 // [N] at which the wall gives way; 0: nothing is ahead
 };

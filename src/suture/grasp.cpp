@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture/grasp: jaws that hold needle, thread or tissue. Reads jaws and poses; adds and removes welds, thread holds and
 // attachments of tissue.
 #include <algorithm>

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture/knot: a loop becomes a throw, the throw goes down to the tissue and locks there (paper 2.4). Reads loops, hands and
 // the thread's order; writes knots, their anchors and, once a knot is locked, what was slack under it.
 //
 // A tool with a loop round it takes thread beyond the loop: the other end of the stitch, as a rule, which is thereby drawn
 // through the loop. From then on the loop is a throw: it leaves the tool and hangs on the two ends of its own thread between
-// tool and tissue. The further the tool goes away, the nearer it comes. Until it is there it can be taken back by letting go.
+// tool and tissue. The further the tool goes away, the nearer it comes. Until it is there it can be undone by letting go.
 #include <algorithm>
 #include <cmath>
 
@@ -74,11 +75,11 @@ void release_end(OneSuture& s, uint32_t slot) {
 }
 
 // "If the user decides they do not want to proceed ... they can release the free end of the thread. After letting go, the loop
-// will be released, and the knot object will be destroyed." Nothing but positions tells that there was a throw.
+// will be released, and the knot object will be destroyed." Nothing but positions reports that there was a throw.
 void cancel(OneSuture& s, uint32_t which) {
   Knot& knot = s.own.knot[which];
   const Vec3 where = position_of(knot.target, s.x()) + normalized(knot.from) * knot.left;
-  s.all.report_tool(s.index, EventKind::knot_cancelled, knot.hand, which, 0, where);
+  s.all.report_tool(s.index, EventKind::throw_undone, knot.hand, which, 0, where);
   for (uint32_t slot : knot.end) release_end(s, slot);
   if (knot.begun == 0) {
     s.own.knot.erase(s.own.knot.begin() + which);
@@ -111,11 +112,11 @@ int knot_under(const Strand& t, const Suture& state, const Ends& loop, const End
 // suture point nearest to the strand that was taken and the one nearest to the loop. For a stitch of two points both are the
 // same. Where a running suture is tied to itself (the end of a Connell: the taken strand is a bight, or the needle's own) there
 // is no other end, and the paper's rule holds as it stands.
-TissuePoint where_to(const OneSuture& s, const Ends& loop, const Ends& taken, bool one_strand) {
+EmbeddedPoint where_to(const OneSuture& s, const Ends& loop, const Ends& taken, bool one_strand) {
   const Strand& t = s.strand;
   const Suture& state = s.own;
   const Vec4* rest = s.all.model.shape.rest.data();
-  const auto point = [&](int anchor) -> const TissuePoint& { return t.anchor[static_cast<size_t>(anchor)].point; };
+  const auto point = [&](int anchor) -> const EmbeddedPoint& { return t.anchor[static_cast<size_t>(anchor)].point; };
   const size_t points = state.point.size();
   if (one_strand) {
     const int last = static_cast<int>(state.point[points - 1].anchor);
@@ -143,17 +144,17 @@ void begin(SutureContext& c, uint32_t who) {
   // Two strands are tied to each other if one leads to the free end and the other to the needle.
   const bool one_strand = wrapped.strand == taken.strand || wrapped.strand == Side::bight || taken.strand == Side::bight;
   const int under = knot_under(t, own, wrapped, taken, one_strand);
-  const bool full = under != kNone && own.knot[static_cast<size_t>(under)].throws == KnotView::kMostThrows;
+  const bool full = under != kNone && own.knot[static_cast<size_t>(under)].throws == KnotView::kMaxThrows;
   if (own.point.empty() || wrapped.strand == Side::loose || taken.strand == Side::loose || full) {
     if (!full)
       c.report_fault(s.index, Fault::knot_without_bite, hand_of(c.state, who), static_cast<uint32_t>(own.knot.size()), tool.x);
-    take_off_loop(c, who);
+    release_loop(c, who);
     c.report_tool(s.index, EventKind::loop_released, who, 0, 0, tool.x);
     return;
   }
-  if (!own.open.empty() && !own.open.back().told) {
+  if (!own.open.empty() && !own.open.back().reported) {
     c.report_fault(s.index, Fault::needle_in_tissue, hand_of(c.state, who), own.open.back().bite, tool.x);
-    own.open.back().told = 1;
+    own.open.back().reported = 1;
   }
 
   uint32_t which = static_cast<uint32_t>(under);
@@ -177,19 +178,19 @@ void begin(SutureContext& c, uint32_t who) {
   KnotThrow& made = knot.thrown[knot.throws - 1];
   made = {};
   made.wraps = loop.wraps;
-  made.handed = loop.handed;
+  made.chirality = loop.chirality;
   made.needle_end = wrapped.strand == Side::free_end ? 0 : 1;
-  take_off_loop(c, who);
+  release_loop(c, who);
   for (uint32_t slot : knot.end) {
     ThreadAnchor a;
     a.slot = slot;
     a.point = knot.target;
     a.offset = s.at(slot) - target;
     a.friction = c.suture.pass_tension;
-    a.capstan = c.suture.capstan;
+    a.capstan_friction = c.suture.capstan_friction;
     t.anchor.push_back(a);
   }
-  c.report_tool(s.index, EventKind::knot_begun, who, which, static_cast<float>(made.wraps), place);
+  c.report_tool(s.index, EventKind::throw_started, who, which, static_cast<float>(made.wraps), place);
 }
 
 // The particle of the taken strand that the knot will hold: of those between the stitch and the jaw, the one nearest to it.
@@ -240,7 +241,7 @@ void hold_strands(OneSuture& s, Knot& knot, Vec3 where) {
     knot.slot = free_end_wrapped ? std::array{inner, a.slot} : std::array{a.slot, inner};
     knot.slots = 2;
   }
-  knot.snug = 0;
+  knot.slack_removed = 0;
 }
 
 // "When the knot object reaches the suture point or midpoint between the two previous suture points, it is locked in place, and
@@ -262,7 +263,7 @@ void lock(OneSuture& s, uint32_t which) {
     made.gap = knot.left;
   }
   knot.phase = KnotPhase::locked;
-  s.all.report_tool(s.index, EventKind::knot_locked, knot.hand, which, made.tension, where);
+  s.all.report_tool(s.index, EventKind::throw_locked, knot.hand, which, made.tension, where);
 }
 
 // A knot that has just been locked draws its two strands in: what is slack between the stitch and it goes to the outer side, as
@@ -290,7 +291,7 @@ void draw_snug(OneSuture& s, Knot& knot) {
     if (std::abs(slack) <= kSnug) continue;
     if (draw_through(s, a.slot, slack > 0 ? -way : way, std::min(std::abs(slack), step)) > 0) busy = true;
   }
-  if (!busy) knot.snug = 1;
+  if (!busy) knot.slack_removed = 1;
 }
 
 // "As the tool moves away from its original position, the knot object moves towards the suture point." It never goes back up
@@ -298,7 +299,7 @@ void draw_snug(OneSuture& s, Knot& knot) {
 bool bring_down(OneSuture& s, Knot& knot) {
   const float gone = distance(s.all.solver.body[knot.hand].x, knot.hand_from);
   float left = std::max(0.0f, length(knot.from) - gone);
-  // A strand that is drawn taut brings the throw down however short the way of the hand.
+  // A strand that is drawn taut brings the throw down however short the path of the hand.
   if (tension_at(s.strand, node_of(s.strand, knot.strand)) > kTaut)
     left = std::max(0.0f, std::min(left, knot.left - kFastest * s.all.model.h));
   if (left < knot.left) {
@@ -312,7 +313,7 @@ bool bring_down(OneSuture& s, Knot& knot) {
 
 }  // namespace
 
-void take_back_throws(OneSuture& s) {
+void undo_throws(OneSuture& s) {
   for (size_t i = s.own.knot.size(); i-- > 0;)
     if (s.own.knot[i].phase == KnotPhase::tightening) cancel(s, static_cast<uint32_t>(i));
 }
@@ -334,8 +335,8 @@ void tighten(SutureContext& c) {
     for (uint32_t i = 0; i < s.own.knot.size(); ++i) {
       Knot& knot = s.own.knot[i];
       if (knot.phase == KnotPhase::locked) {
-        if (!knot.snug) draw_snug(s, knot);
-      } else if (pulls(s, knot) && bring_down(s, knot)) {  // one that no hand pulls is taken back at the next tick
+        if (!knot.slack_removed) draw_snug(s, knot);
+      } else if (pulls(s, knot) && bring_down(s, knot)) {  // one that no hand pulls is undone at the next tick
         lock(s, i);
       }
     }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture/loop: reads thread and tools; freezes loops on them (paper 2.4, figure 10).
 //
 // A surgeon lays the thread round the needle driver before it takes the other end. Whether it lies round it is asked of the
@@ -31,7 +32,7 @@ struct Corner {
 };
 
 // Touching. A loop is a polygon with corners a spacing apart, and thread is stiff: even a tight one stands off the tool by
-// half a millimetre at its corners, a slack one by two. So touching means within `reach` of the surface. Beyond the tip there
+// half a millimeter at its corners, a slack one by two. So touching means within `reach` of the surface. Beyond the tip there
 // is no tool: what lies there slips off, however near it is.
 bool touches(const LoopTool& tool, Vec3 p, float reach) {
   if (p.z < 0) return false;
@@ -76,7 +77,7 @@ bool better(const LoopVerdict& a, const LoopVerdict& b) {
 
 // One run of consecutive particles that touch the tool, walked pair by pair in order. Every pair is tested against all pairs
 // before it. Where it crosses one, the thread between the crossing pairs is a closed polygon in the picture. The loop is
-// judged, then cut out, and the walk goes on from the crossing: so every polygon is simple, for which the even-odd rule is
+// judged, then cut out, and the walk continues from the crossing: so every polygon is simple, for which the even-odd rule is
 // exact (a double turn judged as one polygon would count as outside), turns add up to the winding number, and a loop that comes
 // later is found like the first.
 void judge_run(const LoopTool& tool, const Vec4* x, std::span<const uint32_t> order, size_t begin, size_t end, float pair,
@@ -223,7 +224,7 @@ Vec3 middle(const OneSuture& s, const LoopVerdict& v) {
 
 // "All the particles in the loop are attached to the tool using particle attachments. This prevents the user from undoing the
 // loop."
-void freeze(OneSuture& s, uint32_t who, const LoopVerdict& v, int32_t handed) {
+void freeze(OneSuture& s, uint32_t who, const LoopVerdict& v, int32_t chirality) {
   Strand& t = s.strand;
   ToolLoop& loop = s.all.state.loop[who];
   const Pose tool = s.all.solver.body[who].pose();
@@ -235,10 +236,10 @@ void freeze(OneSuture& s, uint32_t who, const LoopVerdict& v, int32_t handed) {
   const size_t last = loop.wraps > 0 ? std::max(v.last, node_of(t, loop.last)) : v.last;
   loop.first = t.order[first], loop.last = t.order[last];
   loop.wraps = v.wraps;
-  loop.handed = handed;
+  loop.chirality = chirality;
   loop.suture = s.index;
-  loop.told = LoopReason::none;
-  s.all.report_tool(s.index, EventKind::loop_formed, who, loop.wraps, static_cast<float>(handed), middle(s, v));
+  loop.reported = LoopReason::none;
+  s.all.report_tool(s.index, EventKind::loop_formed, who, loop.wraps, static_cast<float>(chirality), middle(s, v));
 }
 
 // One tool. A loop that it has already grows by what lies on it now; only its own thread counts then.
@@ -255,7 +256,7 @@ void find_loops_on(SutureContext& c, uint32_t who) {
     const float pull = tension_outside(t, node_of(t, loop.first), node_of(t, loop.last));
     if (opened || pull > kind.thread_grip) {
       const uint32_t suture = loop.suture;
-      take_off_loop(c, who);
+      release_loop(c, who);
       c.report_tool(suture, EventKind::loop_released, who, 0, opened ? 0 : pull, at);
       return;
     }
@@ -268,27 +269,27 @@ void find_loops_on(SutureContext& c, uint32_t who) {
   for (uint32_t k = 0; k < c.solver.strand.size(); ++k)
     if (loop.wraps == 0 || loop.suture == k) look(c, k, who, found);
   const LoopVerdict& v = found.verdict;
-  if (v.touching == 0) loop.told = LoopReason::none;
+  if (v.touching == 0) loop.reported = LoopReason::none;
   if (v.wraps == 0) {
-    loop.spent = 0;
+    loop.ignored_until_clear = 0;
     // Thread that is still being laid has not crossed itself yet: nothing is missing before the jaws close on the other end.
-    if (loop.wraps == 0 && v.touching >= kSeveral && v.reason != loop.told &&
+    if (loop.wraps == 0 && v.touching >= kSeveral && v.reason != loop.reported &&
         (v.reason != LoopReason::no_crossing || (closes && v.round > kMostOfATurn))) {
-      loop.told = v.reason;
+      loop.reported = v.reason;
       c.report_tool(found.suture, EventKind::loop_rejected, who, 0, 0, at, Fault::none, v.reason);
     }
     return;
   }
   OneSuture s(c, found.suture);
-  const int32_t handed = handedness(s.strand, v);
-  if (!free || loop.spent) return;
+  const int32_t chirality = handedness(s.strand, v);
+  if (!free || loop.ignored_until_clear) return;
   if (loop.wraps > 0) {
     // The frozen turns are seen again, with those that have been laid since.
     const bool same =
-        handed == loop.handed && v.first <= node_of(s.strand, loop.last) && node_of(s.strand, loop.first) <= v.last;
+        chirality == loop.chirality && v.first <= node_of(s.strand, loop.last) && node_of(s.strand, loop.first) <= v.last;
     if (!same || v.wraps <= loop.wraps) return;
   }
-  freeze(s, who, v, handed);
+  freeze(s, who, v, chirality);
 }
 
 }  // namespace
@@ -303,13 +304,13 @@ bool beside_loop(const Strand& t, const ToolLoop& loop, uint32_t slot) {
   return apart < kOwnStrands;
 }
 
-void take_off_loop(SutureContext& c, uint32_t who) {
+void release_loop(SutureContext& c, uint32_t who) {
   ToolLoop& loop = c.state.loop[who];
   release_holds(c.solver.strand[loop.suture], static_cast<int>(who), HoldKind::loop);
   const float jaw = loop.jaw;
   loop = {};
   loop.jaw = jaw;
-  loop.spent = 1;
+  loop.ignored_until_clear = 1;
 }
 
 void find_loops(SutureContext& c) {

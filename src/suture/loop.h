@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture/loop: is the thread laid round a tool (paper 2.4, figure 10)? A pure function of where thread and tool are; the stage
 // that freezes the loop it finds is in suture.h.
 #pragma once
@@ -25,7 +26,7 @@ struct LoopVerdict {
   float round = 0;      // [rad] the furthest that a run goes round the tool, loop or not
 };
 
-// x: particle positions; order: slots, consecutive ones joined by thread; pair [m]: rest distance of neighbours, the deepest
+// x: particle positions; order: slots, consecutive ones joined by thread; pair [m]: rest distance of neighbors, the deepest
 // that a loop may be (the paper's "one particle pair"); reach [m]: how far off the tool's surface thread still counts as
 // touching.
 LoopVerdict find_loop(const Vec4* x, std::span<const uint32_t> order, const LoopTool& tool, float pair, float reach);

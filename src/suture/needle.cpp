@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture/needle: reads the needle's shape, writes its rigid model. Textbook inertia of a uniform circular arc.
 #include "suture/needle.h"
 
 namespace catgut {
 
 NeedleArc needle_arc(const NeedleShape& shape) {
-  // The centre of mass of an arc of half-angle a lies at radius * sin(a) / a from the circle's centre, on its middle line.
+  // The center of mass of an arc of half-angle a lies at radius * sin(a) / a from the circle's center, on its middle line.
   const float a = 0.5f * shape.arc, d = shape.radius * portable::sin(a) / a;
   return {shape.radius, shape.arc, Vec3{-d * portable::cos(a), -d * portable::sin(a), 0}};
 }

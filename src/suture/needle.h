@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture/needle: the curved swaged needle as a rigid body, and where it is.
-// Frame: the body's origin is the centre of mass of the arc; the circle lies in the body's xy plane (see NeedleArc).
+// Frame: the body's origin is the center of mass of the arc; the circle lies in the body's xy plane (see NeedleArc).
 #pragma once
 #include "solver/attach.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture/pull: thread through suture points (paper 2.3, figures 7 to 9). Reads tensions and rest lengths; edits the order list,
 // never a slot. Thread slides at an anchor inside the solver (see solver/thread); here, when the pair on one side of an anchor
 // is used up, its particle passes: it takes its new place in the order and stands at the midpoint of the pair it splits (figure
@@ -13,7 +14,7 @@ namespace {
 
 constexpr float kUsedUp = 0.1f;  // of the spacing: the pair beside an anchor is so short that its particle's turn has come
 
-// Whether the particle beside the locked node i may pass it: there is one, it is free, and thread goes on behind it.
+// Whether the particle beside the locked node i may pass it: there is one, it is free, and thread continues behind it.
 bool can_give_free(const Strand& t, size_t i) {
   return i >= 2 && i + 1 < t.order.size() && !is_locked(t, t.order[i - 1]) && !t.cut[i - 1] && !t.cut[i - 2] && !t.cut[i];
 }
@@ -75,9 +76,9 @@ static int drawing_instrument(const Strand& t, size_t i, int way) {
 static void judge_drawing(OneSuture& s, const ThreadAnchor& a, bool toward_needle) {
   if (s.own.open.empty()) return;
   OpenBite& open = s.own.open.back();
-  const int tool = open.told ? -1 : drawing_instrument(s.strand, node_of(s.strand, a.slot), toward_needle ? 1 : -1);
+  const int tool = open.reported ? -1 : drawing_instrument(s.strand, node_of(s.strand, a.slot), toward_needle ? 1 : -1);
   if (tool < 0 || ++open.drawn < 2) return;
-  open.told = 1;
+  open.reported = 1;
   s.all.report_fault(s.index, Fault::needle_in_tissue, hand_of(s.all.state, static_cast<size_t>(tool)), open.bite,
                      position_of(a, s.x()));
 }
@@ -155,7 +156,7 @@ bool place_suture_point(OneSuture& s, uint32_t bite, bool exit) {
   a.slot = slot;
   a.point = end.point;
   a.friction = s.all.suture.pass_tension;
-  a.capstan = s.all.suture.capstan;
+  a.capstan_friction = s.all.suture.capstan_friction;
   // The particle steps forward to the hole. Rest length goes with it, so neither side is stretched or squeezed by that.
   const Vec3 at = position_of(end.point, s.x());
   const float sum = t.rest[node - 1] + t.rest[node];
@@ -224,7 +225,7 @@ static void pass_at(OneSuture& s, const TiedNodes& knots, ThreadAnchor& a, int64
   a.blocked_needle = tied || t.cut[i - 1] || t.cut[i] || (!from_free && t.rest[i - 1] <= used_up);
   a.blocked_free = tied || t.cut[i - 1] || t.cut[i] || (!from_needle && t.rest[i] <= used_up);
   if (point >= 0 && a.blocked_needle && !was_blocked && !tied && (i == 1 || t.cut[i - 1] || t.cut[i - 2]))
-    s.report(EventKind::thread_ran_out, static_cast<uint32_t>(point), 0, position_of(a.point, s.x()));
+    s.report(EventKind::thread_exhausted, static_cast<uint32_t>(point), 0, position_of(a.point, s.x()));
 
   // Toward the needle: the particle on the free side splits the pair on the needle side; the other way round for a pull on the
   // tail.

@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture/puncture: the needle's two triggers (paper 2.2, figures 4 and 5). Reads the needle and the tissue's surface; writes
 // bites, the attachment of the nearest particle, the channel in which the shaft runs, and asks for suture points. The tip is
-// tracked against the surface itself, so a bite keeps where it went in and out to a fraction of a millimetre; the nearest
+// tracked against the surface itself, so a bite keeps where it went in and out to a fraction of a millimeter; the nearest
 // particle is what drags the tissue along, as in the paper.
 #include <algorithm>
 #include <cmath>
@@ -12,7 +13,7 @@ namespace {
 
 constexpr float kReach = 0.008f;         // [m] the tip looks this far for the surface
 constexpr float kEndReached = 0.0008f;   // [m] along the shaft: an end of the needle is at the hole
-constexpr float kNewWall = 0.0015f;      // [m] of shaft beyond the last exit: the tip goes in again, it was not drawn back
+constexpr float kNewWall = 0.0015f;      // [m] of shaft beyond the last exit: the tip goes in again, it was not withdrawn
 constexpr float kHysteresis = 0.00002f;  // [m] so that a tip resting on the surface does not chatter
 constexpr float kBackOut = 0.002f;       // [m] of shaft outside the entry again: the thread is no longer in the hole
 constexpr float kOnShaft = 0.0015f;      // [m] a hole this near to the shaft has the shaft in it
@@ -20,17 +21,17 @@ constexpr float kOnShaft = 0.0015f;      // [m] a hole this near to the shaft ha
 uint32_t hole_of(uint32_t bite, bool exit) { return 2 * bite + exit; }
 
 void open_hole(OneSuture& s, uint32_t which, bool exit) {
-  ChannelPoint c;
+  NeedleTrackConstraint c;
   c.suture = s.index;
   c.hole = hole_of(which, exit);
   c.point = (exit ? s.own.bite[which].exit : s.own.bite[which].entry).point;
-  c.compliance = s.all.suture.channel_compliance;
-  c.drag = s.all.suture.channel_drag;
+  c.compliance = s.all.suture.track_compliance;
+  c.drag = s.all.suture.track_drag;
   s.all.solver.channel.push_back(c);
 }
 void close_hole(OneSuture& s, uint32_t which, bool exit) {
   std::erase_if(s.all.solver.channel,
-                [&](const ChannelPoint& c) { return c.suture == s.index && c.hole == hole_of(which, exit); });
+                [&](const NeedleTrackConstraint& c) { return c.suture == s.index && c.hole == hole_of(which, exit); });
 }
 
 void drop_attachment(OneSuture& s) {
@@ -46,10 +47,10 @@ void cancel_bite(OneSuture& s, Vec3 tip) {
   drop_attachment(s);
   close_hole(s, which, false);
   close_hole(s, which, true);
-  bite.cancelled = true;
+  bite.canceled = true;
   bite.has_exit = false;
   s.own.open.pop_back();
-  s.report(EventKind::bite_cancelled, which, bite.depth, tip);
+  s.report(EventKind::bite_withdrawn, which, bite.depth, tip);
 }
 
 // Where a needle's tip is in a substep.
@@ -98,7 +99,7 @@ void in_wall(OneSuture& s, const Tip& tip) {
   s.report(EventKind::tip_exited, which, bite.depth, tip.hit.point);
 }
 
-// NeedlePhase::through, of the newest wall: the tip may be drawn back. Returns whether it was.
+// NeedlePhase::through, of the newest wall: the tip may be withdrawn. Returns whether it was.
 bool drawn_back(OneSuture& s, const Tip& tip) {
   const uint32_t which = s.own.open.back().bite;
   Bite& bite = s.own.bite[which];
@@ -220,7 +221,7 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
   const TissueCollision& tissue = model.collision;
   const int near = nearest_particle(tissue, candidates, x, p, reach);
   if (near < 0) return false;
-  // Triangles round the nearest particle and round its neighbours: the nearest triangle need not touch the nearest particle.
+  // Triangles round the nearest particle and round its neighbors: the nearest triangle need not touch the nearest particle.
   float best = 1e30f;
   Vec3 normal{};
   auto look = [&](uint32_t f) {
@@ -246,8 +247,8 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
     if (count < seen.size()) seen[count++] = f;
     look(f);
   };
-  const size_t centre = static_cast<size_t>(near);
-  for (uint32_t r = tissue.ring_first[centre]; r < tissue.ring_first[centre + 1]; ++r)
+  const size_t center = static_cast<size_t>(near);
+  for (uint32_t r = tissue.ring_first[center]; r < tissue.ring_first[center + 1]; ++r)
     for (uint32_t k : tissue.surface[tissue.ring[r]])
       for (uint32_t q = tissue.ring_first[k]; q < tissue.ring_first[k + 1]; ++q) look_once(tissue.ring[q]);
   if (count == 0) return false;

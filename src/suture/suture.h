@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // suture: the data of guided suturing (paper 2.2, 2.3) and the stages that work on it, for any number of sutures, in the order
 // of the tick:
 //   grasp -> loop -> knot -> cut -> settle -> (per substep: solver, slip, puncture, pull, tighten) -> [technique] -> closure.
@@ -22,7 +23,7 @@ namespace catgut {
 struct BiteEnd {
   uint32_t triangle = 0;
   std::array<float, 3> weight{};  // barycentric
-  TissuePoint point;              // the same as a weighted point of particles, carried by the tissue
+  EmbeddedPoint point;            // the same as a weighted point of particles, carried by the tissue
 };
 
 struct Bite {
@@ -30,7 +31,7 @@ struct Bite {
   float depth = 0;  // [m] deepest the tip went below the surface
   bool has_exit = false;
   bool complete = false;
-  bool cancelled = false;
+  bool canceled = false;
   uint32_t nearest = 0;  // the paper's p7: nearest particle when the tip went in
 };
 
@@ -47,8 +48,8 @@ enum class NeedlePhase : uint8_t {
 struct OpenBite {
   uint32_t bite = 0;
   NeedlePhase phase = NeedlePhase::tip_in;
-  uint32_t drawn = 0;  // particles that a hand on the thread has drawn through the tissue since the tip went in
-  uint32_t told = 0;   // 1: needle_in_tissue was said of it
+  uint32_t drawn = 0;     // particles that a hand on the thread has drawn through the tissue since the tip went in
+  uint32_t reported = 0;  // 1: needle_in_tissue was said of it
 };
 
 struct SuturePoint {
@@ -62,12 +63,12 @@ struct SuturePoint {
 struct ToolLoop {
   uint32_t wraps = 0;  // whole turns; 0: there is no loop
   // +1: walked away from the tissue, the thread turns round the tool counter-clockwise as seen from the hand; -1: clockwise.
-  int32_t handed = 0;
-  uint32_t first = 0, last = 0;        // slots, free-end side first
-  LoopReason told = LoopReason::none;  // the rejection that was last reported
-  uint32_t spent = 0;                  // 1: what lies round the tool was let go; it counts again once it has been taken off
-  float jaw = 1;                       // of the last tick
-  uint32_t suture = 0;                 // whose thread it is
+  int32_t chirality = 0;
+  uint32_t first = 0, last = 0;            // slots, free-end side first
+  LoopReason reported = LoopReason::none;  // the rejection that was last reported
+  uint32_t ignored_until_clear = 0;        // 1: what lies round the tool was let go; it counts again once it has been taken off
+  float jaw = 1;                           // of the last tick
+  uint32_t suture = 0;                     // whose thread it is
 };
 
 // A knot: throws that lie on each other, made of loops. While a throw tightens, the ends of its loop are anchored to it with an
@@ -77,7 +78,7 @@ struct Knot {
   KnotPhase phase = KnotPhase::tightening;  // of the throw in hand
   uint32_t hand = 0;                        // the instrument that pulls it tight
   uint32_t begun = 0;                       // throws that were locked when the throw in hand was begun
-  TissuePoint target;                       // where it goes: the suture point, or the middle between the two ends of its stitch
+  EmbeddedPoint target;                     // where it goes: the suture point, or the middle between the two ends of its stitch
   Vec3 from;                                // [m] offset of the throw in hand from the target when it was begun
   float left = 0;                           // [m] of that offset
   Vec3 hand_from;                           // [m] where the pulling tool was then
@@ -85,58 +86,58 @@ struct Knot {
   std::array<uint32_t, 2> end{};            // slots of the loop's two ends, free-end side first; anchored while it tightens
   std::array<uint32_t, 2> slot{};           // the particles that it holds once locked: free-end side, needle side
   uint32_t slots = 0;                       // how many of them are valid: 1 when it was tied on one strand alone; 0: none yet
-  uint32_t snug = 0;                        // 1: what was slack between it and the stitch has been drawn through
+  uint32_t slack_removed = 0;               // 1: what was slack between it and the stitch has been drawn through
   uint32_t throws = 0;                      // the throw in hand included
-  uint32_t told = 0;                        // 1: it has been said that it has too few throws
-  std::array<KnotThrow, KnotView::kMostThrows> thrown;
+  uint32_t reported = 0;                    // 1: it has been said that it has too few throws
+  std::array<KnotThrow, KnotView::kMaxThrows> thrown;
 };
 
 // A tied stitch whose thread is no longer simulated: every node follows the cluster of one tissue particle.
-struct SettledNode {
+struct BakedNode {
   uint32_t particle = 0;
   Vec3 offset;  // [m] in the rest frame of that particle's cluster
 };
-struct SettledStitch {
-  std::vector<SettledNode> node, knot;
+struct BakedSuture {
+  std::vector<BakedNode> node, knot;
 };
 
 struct SutureModel {
-  std::vector<InstrumentModel> instrument;                             // of the scene; row i is rigid body i
-  float attach_threshold = 0.006f, release_distance = 0.0022f;         // [m] figures 4 and 5
-  float attach_compliance = 1.0f / 1100, channel_compliance = 0.002f;  // [m/N]
-  float channel_drag = 0.12f;                                          // [N] per end of the channel
-  float pass_tension = 0.03f;                                          // [N]
-  float capstan = 0.08f;            // thread-tissue friction times the angle by which a suture point bends the thread
+  std::vector<InstrumentModel> instrument;                           // of the scene; row i is rigid body i
+  float attach_threshold = 0.006f, release_distance = 0.0022f;       // [m] figures 4 and 5
+  float attach_compliance = 1.0f / 1100, track_compliance = 0.002f;  // [m/N]
+  float track_drag = 0.12f;                                          // [N] per end of the channel
+  float pass_tension = 0.03f;                                        // [N]
+  float capstan_friction = 0.08f;   // thread-tissue friction times the angle by which a suture point bends the thread
   float grasp_reach = 0.003f;       // [m]
   float tissue_compliance = 5e-4f;  // [m/N] of tissue held by a jaw
   float tissue_reach = 0.0015f;     // [m] how near the surface must be to a closing jaw
   float cut_reach = 0.004f;         // [m] how near the scissors must be to the thread
-  int least_throws = 2;             // a knot with fewer does not hold
+  int min_throws = 2;               // a knot with fewer does not hold
   float loop_reach = 0.0025f;       // [m] how far off a tool thread still lies round it
-  // Rest distances of neighbours: how far apart along the tool a loop's ends may be. The paper says one, of its coarser thread;
+  // Rest distances of neighbors: how far apart along the tool a loop's ends may be. The paper says one, of its coarser thread;
   // a hand that carries thread past the strand it crosses lays ours 2 to 3 mm deep.
   float loop_depth = 2;
   float grasp_compliance = 2e-5f, grasp_angular_compliance = 0.02f;  // [m/N], [rad/(N m)]
 };
 
-// One needle with its thread, and what has been sewn with it. Its rigid body is SolverModel::needle_body, its thread the strand
-// of the same index.
+// One needle with its thread, and what has been sutured with it. Its rigid body is SolverModel::needle_body, its thread the
+// strand of the same index.
 struct Suture {
   std::vector<Bite> bite;
   std::vector<SuturePoint> point;  // in the order in which they were made
   std::vector<OpenBite> open;      // the walls that the needle is in, the one nearest to its back end first
   bool tip_inside = false;
-  bool attached = false;   // the newest bite's nearest particle is attached to the tip
-  Vec3 attached_from;      // [m] where that particle was
-  std::vector<Knot> knot;  // in the order in which they were begun
-  uint32_t taken = 0;      // how often needle and thread were replaced by new ones
+  bool attached = false;      // the newest bite's nearest particle is attached to the tip
+  Vec3 attached_from;         // [m] where that particle was
+  std::vector<Knot> knot;     // in the order in which they were begun
+  uint32_t suture_index = 0;  // how often needle and thread were replaced by new ones
 };
 
 struct SutureState {
   std::vector<Suture> suture;
   std::vector<InstrumentState> instrument;    // as SutureModel::instrument
   std::vector<ToolLoop> loop;                 // round each instrument
-  std::vector<SettledStitch> settled;         // in the order in which they settled
+  std::vector<BakedSuture> settled;           // in the order in which they settled
   std::array<uint32_t, kMaxHands> buttons{};  // of each hand in the last tick
   uint32_t active = 0;                        // the suture whose needle was grasped last: a new one replaces it
 };
@@ -212,7 +213,7 @@ void find_loops(SutureContext& c);
 // Whether a particle lies so near to the loop round a tool, along the thread, that jaws which close at the loop do not mean it.
 bool beside_loop(const Strand& thread, const ToolLoop& loop, uint32_t slot);
 // The loop leaves its tool, to become a knot or to fall off.
-void take_off_loop(SutureContext& c, uint32_t who);
+void release_loop(SutureContext& c, uint32_t who);
 
 // --- knot.cpp ----------------------------------------------------------------------------------------------------------
 // Once a tick. A tool with a loop round it whose jaws have closed on thread beyond the loop begins a throw; one that lets go of
@@ -223,7 +224,7 @@ void tie(SutureContext& c);
 // locked draws through what is still slack under it.
 void tighten(SutureContext& c);
 // Takes every throw of a suture back that is not locked, whatever pulls on it.
-void take_back_throws(OneSuture& s);
+void undo_throws(OneSuture& s);
 
 // --- cut.cpp -----------------------------------------------------------------------------------------------------------
 // Buttons that went down since the last tick, by hand; remembers them.
@@ -270,7 +271,7 @@ float draw_through(OneSuture& s, uint32_t slot, int direction, float length);
 // Locks the next free particle behind the needle to an end of a bite and makes it a suture point (figure 7a). False: no free
 // particle there yet. A needle without thread passes (true) and makes none.
 bool place_suture_point(OneSuture& s, uint32_t bite, bool exit);
-// Unlocks the newest suture point again: its thread was drawn back out of the hole. The particle stays where it is, as free
+// Unlocks the newest suture point again: its thread was withdrawn out of the hole. The particle stays where it is, as free
 // thread.
 void remove_last_suture_point(OneSuture& s);
 // Rest length [m] of the thread between the first and the last suture point along the order; 0 with fewer than two. Across a
@@ -286,7 +287,7 @@ void erase_anchor(Strand& strand, Suture& suture, uint32_t anchor);
 // What a technique wants closed: points of tissue and where they go. At progress s each is pulled toward from + s (to - from).
 struct ClosurePlan {
   struct Pull {
-    TissuePoint point;
+    EmbeddedPoint point;
     Vec3 from, to;  // [m]
   };
   std::vector<Pull> pull;
@@ -294,7 +295,7 @@ struct ClosurePlan {
   float compliance = 0;  // [m/N], of both
   // Two points of tissue that are drawn together, from `start` apart to `end` apart.
   struct Pair {
-    TissuePoint a, b;
+    EmbeddedPoint a, b;
     float start = 0, end = 0;  // [m]
     float progress = 0;        // 0..1
     uint32_t midpoint = 0;     // 1: between suture points, 0: one of the pairs in between (figures 13 and 15)

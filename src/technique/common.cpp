@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // technique/common: see common.h.
 #include "technique/common.h"
 
@@ -29,28 +30,28 @@ uint32_t nearest_of(std::span<const uint32_t> group, const Vec4* x, Vec3 p) {
   return found;
 }
 
-void tell(Fault fault, uint32_t which, Vec3 where, uint32_t& told, EventList& events) {
+void report_fault(Fault fault, uint32_t which, Vec3 where, uint32_t& reported, EventList& events) {
   const uint32_t bit = 1u << static_cast<uint32_t>(fault);
-  if (told & bit) return;
-  told |= bit;
+  if (reported & bit) return;
+  reported |= bit;
   events.add({EventKind::technique_fault, 0, which, 0, where, fault});
 }
 
-void hear(std::span<const Event> events, uint32_t& told) {
+void merge_reported(std::span<const Event> events, uint32_t& reported) {
   for (const Event& e : events)
-    if (e.kind == EventKind::technique_fault) told |= 1u << static_cast<uint32_t>(e.fault);
+    if (e.kind == EventKind::technique_fault) reported |= 1u << static_cast<uint32_t>(e.fault);
 }
 
-void judge_begun_knots(const TechniqueView& view, bool join_two, uint32_t& told, EventList& events) {
+void judge_begun_knots(const TechniqueView& view, bool join_two, uint32_t& reported, EventList& events) {
   const size_t before = events.size();
   for (size_t i = 0; i < before; ++i) {
     const Event e = events[i];
-    if (e.kind != EventKind::knot_begun) continue;
+    if (e.kind != EventKind::throw_started) continue;
     const uint32_t newest = view.bite.empty() ? 0 : static_cast<uint32_t>(view.bite.size() - 1);
-    if (view.point.empty()) tell(Fault::knot_without_bite, e.which, e.where, told, events);
-    else if (view.needle_in_tissue) tell(Fault::needle_in_tissue, newest, e.where, told, events);
+    if (view.point.empty()) report_fault(Fault::knot_without_bite, e.which, e.where, reported, events);
+    else if (view.needle_in_tissue) report_fault(Fault::needle_in_tissue, newest, e.where, reported, events);
     else if (join_two && one_wall(walls_taken(view.point)))
-      tell(Fault::one_wall_only, view.point.back().bite, e.where, told, events);
+      report_fault(Fault::one_wall_only, view.point.back().bite, e.where, reported, events);
   }
 }
 
@@ -59,12 +60,12 @@ bool cut_in_stitch(std::span<const Event> events) {
                      [](const Event& e) { return e.kind == EventKind::technique_fault && e.fault == Fault::cut_in_stitch; });
 }
 
-void tell_closed(uint32_t row, const ClosurePlan::Pair& pair, const Vec4* x, uint32_t& told, EventList& events) {
-  if (told) return;
+void tell_closed(uint32_t row, const ClosurePlan::Pair& pair, const Vec4* x, uint32_t& reported, EventList& events) {
+  if (reported) return;
   const Vec3 a = position_of(pair.a, x), b = position_of(pair.b, x);
   const float gap = distance(a, b);
   if (gap >= kSeamClosed) return;
-  told = 1;
+  reported = 1;
   events.add({EventKind::seam_closed, 0, row, gap, 0.5f * (a + b)});
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // technique/lembert: see lembert.h.
 #include "technique/lembert.h"
 
@@ -11,7 +12,7 @@
 namespace catgut {
 namespace {
 
-constexpr float kSameAngle = 0.005f;  // [rad] a tenth of a millimetre on the rim
+constexpr float kSameAngle = 0.005f;  // [rad] a tenth of a millimeter on the rim
 
 // From u to v about the unit vector axis, -pi..pi.
 float signed_angle(Vec3 u, Vec3 v, Vec3 axis) {
@@ -21,24 +22,24 @@ float signed_angle(Vec3 u, Vec3 v, Vec3 axis) {
 }
 
 struct Ring {
-  Vec3 centre, axis;
+  Vec3 center, axis;
 };
 
 // cp of 2.5.4, and the way that the ring faces.
 Ring ring_of(const LembertModel& model, const Vec4* x) {
   Ring ring;
   for (const auto* group : {&model.outer, &model.inner})
-    for (uint32_t i : *group) ring.centre += xyz(x[i]);
-  ring.centre = ring.centre / static_cast<float>(model.outer.size() + model.inner.size());
+    for (uint32_t i : *group) ring.center += xyz(x[i]);
+  ring.center = ring.center / static_cast<float>(model.outer.size() + model.inner.size());
   Vec3 newell{};
   for (size_t i = 0; i < model.outer.size(); ++i)
-    newell += cross(xyz(x[model.outer[i]]) - ring.centre, xyz(x[model.outer[(i + 1) % model.outer.size()]]) - ring.centre);
+    newell += cross(xyz(x[model.outer[i]]) - ring.center, xyz(x[model.outer[(i + 1) % model.outer.size()]]) - ring.center);
   ring.axis = normalized(newell, {0, 1, 0});
   return ring;
 }
 
 // The place nearest to p on the line through a group's particles, the nearer of its two particles first.
-TissuePoint on_ring(std::span<const uint32_t> group, const Vec4* x, Vec3 p) {
+EmbeddedPoint on_ring(std::span<const uint32_t> group, const Vec4* x, Vec3 p) {
   const size_t n = group.size();
   float best = std::numeric_limits<float>::max(), at = 0;
   size_t found = 0;
@@ -49,7 +50,7 @@ TissuePoint on_ring(std::span<const uint32_t> group, const Vec4* x, Vec3 p) {
     if (d < best) best = d, found = k, at = t;
   }
   const uint32_t one = group[found], next = group[(found + 1) % n];
-  TissuePoint point = particle_point(at > 0.5f ? next : one);
+  EmbeddedPoint point = particle_point(at > 0.5f ? next : one);
   const float rest = std::min(at, 1 - at);
   if (rest < 0.01f) return point;
   point.count = 2;
@@ -59,7 +60,7 @@ TissuePoint on_ring(std::span<const uint32_t> group, const Vec4* x, Vec3 p) {
   return point;
 }
 
-void add_pair(const LembertModel& model, LembertState& state, const Vec4* x, const TissuePoint& a, const TissuePoint& b,
+void add_pair(const LembertModel& model, LembertState& state, const Vec4* x, const EmbeddedPoint& a, const EmbeddedPoint& b,
               LembertRow row, uint32_t midpoint, ClosurePlan& plan) {
   const float apart = distance(position_of(a, x), position_of(b, x));
   plan.compliance = model.compliance;
@@ -71,21 +72,21 @@ void add_pair(const LembertModel& model, LembertState& state, const Vec4* x, con
 void pair_between(const LembertModel& model, LembertState& state, const TechniqueView& view, const Ring& ring, uint32_t one,
                   uint32_t other, ClosurePlan& plan) {
   const Vec4* x = view.x;
-  const auto from_centre = [&](uint32_t stitch) {
+  const auto from_center = [&](uint32_t stitch) {
     const ClosurePlan::Pair& p = plan.pair[state.stitch[stitch].row];
-    return 0.5f * (position_of(p.a, x) + position_of(p.b, x)) - ring.centre;
+    return 0.5f * (position_of(p.a, x) + position_of(p.b, x)) - ring.center;
   };
-  const Vec3 v1 = from_centre(one), v2 = from_centre(other);
+  const Vec3 v1 = from_center(one), v2 = from_center(other);
   const auto taken = [&](uint32_t i) {
     return std::any_of(plan.pair.begin(), plan.pair.end(),
                        [&](const ClosurePlan::Pair& p) { return p.a.particle[0] == i || p.b.particle[0] == i; });
   };
   for (uint32_t i : model.outer)
-    if (is_between(v1, v2, xyz(x[i]) - ring.centre, ring.axis) && !taken(i))
+    if (is_between(v1, v2, xyz(x[i]) - ring.center, ring.axis) && !taken(i))
       add_pair(model, state, x, particle_point(i), particle_point(nearest_of(model.inner, x, xyz(x[i]))), {one, other, 0}, 0,
                plan);
   for (uint32_t i : model.inner)
-    if (is_between(v1, v2, xyz(x[i]) - ring.centre, ring.axis) && !taken(i))
+    if (is_between(v1, v2, xyz(x[i]) - ring.center, ring.axis) && !taken(i))
       add_pair(model, state, x, particle_point(nearest_of(model.outer, x, xyz(x[i]))), particle_point(i), {one, other, 0}, 0,
                plan);
 }
@@ -102,21 +103,21 @@ void tie(const LembertModel& model, LembertState& state, const TechniqueView& vi
   const uint32_t stitch = static_cast<uint32_t>(state.stitch.size()), nearest = nearest_of(model.outer, view.x, at);
   const auto drawn =
       std::find_if(plan.pair.begin(), plan.pair.end(), [&](const ClosurePlan::Pair& p) { return p.a.particle[0] == nearest; });
-  state.stitch.push_back({static_cast<uint32_t>(drawn - plan.pair.begin()), view.taken, 1});
+  state.stitch.push_back({static_cast<uint32_t>(drawn - plan.pair.begin()), view.suture_index, 1});
   if (drawn != plan.pair.end()) drawn->midpoint = 1;
   else add_pair(model, state, view.x, particle_point(nearest), on_ring(model.inner, view.x, at), {stitch, stitch, 0}, 1, plan);
   // The nearest stitch each way round.
   for (const float way : {1.0f, -1.0f}) {
     float least = model.widest;
-    int neighbour = -1;
+    int neighbor = -1;
     for (uint32_t s = 0; s < stitch; ++s) {
       if (!state.stitch[s].holds) continue;
       const ClosurePlan::Pair& p = plan.pair[state.stitch[s].row];
       const Vec3 there = 0.5f * (position_of(p.a, view.x) + position_of(p.b, view.x));
-      const float angle = way * signed_angle(at - ring.centre, there - ring.centre, ring.axis);
-      if (angle > 0 && angle < least) least = angle, neighbour = static_cast<int>(s);
+      const float angle = way * signed_angle(at - ring.center, there - ring.center, ring.axis);
+      if (angle > 0 && angle < least) least = angle, neighbor = static_cast<int>(s);
     }
-    if (neighbour >= 0) pair_between(model, state, view, ring, stitch, static_cast<uint32_t>(neighbour), plan);
+    if (neighbor >= 0) pair_between(model, state, view, ring, stitch, static_cast<uint32_t>(neighbor), plan);
   }
 }
 
@@ -130,20 +131,20 @@ bool is_between(Vec3 v1, Vec3 v2, Vec3 vp, Vec3 axis) {
 
 void lembert(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan, EventList& events) {
   if (model.outer.size() < 3 || model.inner.size() < 3) return;
-  hear(events, state.told);
+  merge_reported(events, state.reported);
   // Whatever ends a suture: too few throws hold nothing.
   const auto end_suture = [&] {
     if (state.throws == 0 || state.throws >= static_cast<uint32_t>(model.throws)) return;
     const Vec3 where = view.point.empty() ? Vec3{} : view.point.back().at;
-    tell(Fault::too_few_throws, state.knot, where, state.told, events);
+    report_fault(Fault::too_few_throws, state.knot, where, state.reported, events);
     if (state.tied) state.stitch.back().holds = 0;
   };
-  if (view.taken != state.taken) {
+  if (view.suture_index != state.suture_index) {
     end_suture();
-    state.taken = view.taken;
-    state.throws = state.knot = state.tied = state.told = 0;
+    state.suture_index = view.suture_index;
+    state.throws = state.knot = state.tied = state.reported = 0;
   }
-  judge_begun_knots(view, false, state.told, events);
+  judge_begun_knots(view, false, state.reported, events);
 
   const bool first = state.throws == 0;
   state.throws = locked_throws(view.knot);
@@ -151,7 +152,7 @@ void lembert(const LembertModel& model, LembertState& state, const TechniqueView
   if (first && state.throws > 0 && !view.point.empty()) {
     if (one_wall(walls_taken(view.point))) {
       // Tied to itself: it draws no layer to the other.
-      tell(Fault::one_wall_only, view.point.back().bite, view.point.back().at, state.told, events);
+      report_fault(Fault::one_wall_only, view.point.back().bite, view.point.back().at, state.reported, events);
     } else {
       tie(model, state, view, plan);
       state.tied = 1;
@@ -168,7 +169,7 @@ void lembert(const LembertModel& model, LembertState& state, const TechniqueView
         (state.stitch[row.one].holds && state.stitch[row.other].holds) ||
         std::any_of(state.stitch.begin(), state.stitch.end(), [&](const LembertStitch& s) { return s.row == r && s.holds; });
     advance(plan.pair[r].progress, holds ? 1.0f : 0.0f, model.fastest, view.dt);
-    tell_closed(r, plan.pair[r], view.x, row.told, events);
+    tell_closed(r, plan.pair[r], view.x, row.reported, events);
   }
 }
 

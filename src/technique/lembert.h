@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // technique/lembert: interrupted stitches through both layers of a cut bowel; a locked knot draws inner and outer layer
-// together there and, by the angle rule, between it and its neighbours (paper 2.5.4, figure 15). Reads suture points and knots;
+// together there and, by the angle rule, between it and its neighbors (paper 2.5.4, figure 15). Reads suture points and knots;
 // answers with pairs of a ClosurePlan, and with events for what was wrong.
 #pragma once
 #include <span>
@@ -15,29 +16,29 @@ struct LembertModel {
   float gap = 0.0005f;       // [m]
   float compliance = 1e-5f;  // [m/N]
   float fastest = 1.0f;      // [1/s] of progress
-  float widest = 2.2f;       // [rad] neighbouring stitches further apart than this are not neighbours
+  float widest = 2.2f;       // [rad] neighboring stitches further apart than this are not neighbors
   int throws = 2;            // fewer than this hold nothing
 };
 
 // A tied stitch.
 struct LembertStitch {
-  uint32_t row = 0;     // of the plan: its pair, which a neighbour nearer than the next particle shares
+  uint32_t row = 0;     // of the plan: its pair, which a neighbor nearer than the next particle shares
   uint32_t suture = 0;  // sutures settled before it
   uint32_t holds = 1;   // 0: it had too few throws, or was cut through
 };
 // What the technique remembers of a row of ClosurePlan::pair.
 struct LembertRow {
   uint32_t one = 0, other = 0;  // the stitches between which it lies: it is closed while both hold, or one whose pair it is
-  uint32_t told = 0;            // 1: seam_closed was said
+  uint32_t reported = 0;        // 1: seam_closed was said
 };
 
 struct LembertState {
   std::vector<LembertStitch> stitch;  // in the order in which they were tied
   std::vector<LembertRow> row;        // one per row of the plan
-  uint32_t taken = 0;                 // sutures settled before the one in hand
+  uint32_t suture_index = 0;          // sutures settled before the one in hand
   uint32_t throws = 0, knot = 0;      // its locked throws; its newest knot
   uint32_t tied = 0;                  // 1: its stitch is in the list
-  uint32_t told = 0;                  // a bit per Fault
+  uint32_t reported = 0;              // a bit per Fault
 };
 
 // Once a tick.

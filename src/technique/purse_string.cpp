@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // technique/purse_string: reads suture points and thread length, answers with a ClosurePlan. Paper 2.5.1, figure 11.
 #include "technique/purse_string.h"
 
@@ -11,7 +12,7 @@ namespace {
 
 constexpr float kRoom = 1.3f;  // length of thread round the closed edge, over the bare way round it
 
-Vec3 centre_of(std::span<const uint32_t> rim, const Vec4* x) {
+Vec3 center_of(std::span<const uint32_t> rim, const Vec4* x) {
   Vec3 c{};
   for (uint32_t i : rim) c += xyz(x[i]);
   return rim.empty() ? c : c / static_cast<float>(rim.size());
@@ -19,16 +20,16 @@ Vec3 centre_of(std::span<const uint32_t> rim, const Vec4* x) {
 // Newell's vector: normal of the loop's best plane, its length twice the projected area.
 Vec3 newell(std::span<const uint32_t> rim, const Vec4* x) {
   Vec3 n{};
-  const Vec3 c = centre_of(rim, x);
+  const Vec3 c = center_of(rim, x);
   for (size_t i = 0; i < rim.size(); ++i) n += cross(xyz(x[rim[i]]) - c, xyz(x[rim[(i + 1) % rim.size()]]) - c);
   return n;
 }
 
 // How far round the opening the suture points go, as a signed angle [rad] about the axis.
-float turned(std::span<const Vec3> sp, Vec3 centre, Vec3 axis) {
+float turned(std::span<const Vec3> sp, Vec3 center, Vec3 axis) {
   float sum = 0;
   for (size_t i = 0; i + 1 < sp.size(); ++i) {
-    Vec3 a = sp[i] - centre, b = sp[i + 1] - centre;
+    Vec3 a = sp[i] - center, b = sp[i + 1] - center;
     a -= axis * dot(a, axis);
     b -= axis * dot(b, axis);
     sum += portable::atan2(dot(cross(a, b), axis), dot(a, b));
@@ -74,24 +75,24 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
     for (size_t i = 0; i + 1 < sp.size(); ++i) state.path_start += distance(sp[i], sp[i + 1]);
     for (; state.checked < sp.size(); ++state.checked)
       if (first_out_of_order(sp, state.checked) == static_cast<int>(state.checked))
-        events.add({EventKind::order_broken, 0, (state.checked + 1) % static_cast<uint32_t>(sp.size()), 0,
+        events.add({EventKind::bite_out_of_order, 0, (state.checked + 1) % static_cast<uint32_t>(sp.size()), 0,
                     sp[(state.checked + 1) % sp.size()]});
   };
   if (!state.ring_complete) {
     // While the ring grows, a point can be checked once three more follow it.
     for (; state.checked + 3 < sp.size(); ++state.checked)
       if (first_out_of_order(std::span(sp).subspan(state.checked, 4)) == 0)
-        events.add({EventKind::order_broken, 0, state.checked + 1, 0, sp[state.checked + 1]});
-    const Vec3 centre = centre_of(model.rim_outer, x), axis = normalized(newell(model.rim_outer, x));
+        events.add({EventKind::bite_out_of_order, 0, state.checked + 1, 0, sp[state.checked + 1]});
+    const Vec3 center = center_of(model.rim_outer, x), axis = normalized(newell(model.rim_outer, x));
     if (sp.size() < 2 * static_cast<size_t>(model.min_bites) || sp.size() % 2 != 0) return;  // even: no bite half done
-    const float angle = std::abs(turned(sp, centre, axis));
+    const float angle = std::abs(turned(sp, center, axis));
     // The way back from the last to the first is at most one and a half of the largest steps so far.
     float step = 0;
     for (size_t i = 0; i + 1 < sp.size(); ++i) step = std::max(step, distance(sp[i], sp[i + 1]));
     if (angle < kPi || distance(sp.back(), sp.front()) > 1.5f * step) return;
     state.ring_complete = true;
     measure_ring();
-    events.add({EventKind::ring_complete, 0, static_cast<uint32_t>(sp.size()), angle, centre});
+    events.add({EventKind::ring_complete, 0, static_cast<uint32_t>(sp.size()), angle, center});
     return;
   }
 
@@ -101,8 +102,8 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
     // Closing begins when the thread in the ring is as short as the way round it: the slack is out.
     if (loop > 0.995f * state.path_start) return;
     state.closing = true;
-    const Vec3 centre = centre_of(model.rim_outer, x), axis = normalized(newell(model.rim_outer, x));
-    const Vec3 anvil = centre + model.anvil;
+    const Vec3 center = center_of(model.rim_outer, x), axis = normalized(newell(model.rim_outer, x));
+    const Vec3 anvil = center + model.anvil;
     auto toward = [&](Vec3 from, float radius) {
       Vec3 out = from - anvil;
       const float height = dot(out, axis);
@@ -110,7 +111,7 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
       // Gathered tissue keeps a little of its height, so that the edge does not fold into a single plane.
       return anvil + normalized(out) * radius + axis * (0.5f * height);
     };
-    auto add_pull = [&](const TissuePoint& p, float radius) {
+    auto add_pull = [&](const EmbeddedPoint& p, float radius) {
       const Vec3 from = position_of(p, x);
       plan.pull.push_back({p, from, toward(from, radius)});
     };
@@ -133,7 +134,7 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
   if (plan.progress >= 0.99f) {
     state.finished = true;
     plan.progress = 1;
-    events.add({EventKind::closure_finished, 0, 0, opening_area(model.rim_inner, x), centre_of(model.rim_inner, x)});
+    events.add({EventKind::closure_finished, 0, 0, opening_area(model.rim_inner, x), center_of(model.rim_inner, x)});
   }
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // technique/purse_string: paper 2.5.1. Bites in and out round an opening; nothing is closed until the ring is complete; then,
 // as the thread is drawn tight, every edge particle travels to the anvil, all arriving together. Talks to the mechanics through
 // events (in) and a ClosurePlan (out) alone.
@@ -11,7 +12,7 @@ namespace catgut {
 
 struct PurseStringModel {
   std::vector<uint32_t> rim_outer, rim_inner;  // particles round the opening, in order; partners share an index
-  Vec3 anvil;                                  // [m] relative to the rim's centre at the start of the closure
+  Vec3 anvil;                                  // [m] relative to the rim's center at the start of the closure
   float anvil_radius = 0.004f;                 // [m]
   float wall = 0.0025f;                        // [m]
   float compliance = 5e-4f;                    // [m/N]

@@ -13,17 +13,17 @@ constexpr void reflect(auto& a, Like<PurseStringState> auto& p) {
 }
 
 constexpr void reflect(auto& a, Like<SeamRow> auto& r) {
-  a(r.leader), a(r.point), a(r.from), a.at_most(r.hold, SeamHold::nothing), a(r.told);
+  a(r.leader), a(r.point), a(r.from), a.at_most(r.hold, SeamHold::nothing), a(r.reported);
 }
 constexpr void reflect(auto& a, Like<SeamState> auto& s) {
-  a(s.row), a.at_most(s.first_row, s.row.size()), a(s.taken), a(s.points), a(s.passes), a(s.throws), a(s.told);
+  a(s.row), a.at_most(s.first_row, s.row.size()), a(s.suture_index), a(s.points), a(s.passes), a(s.throws), a(s.reported);
   a.cache(s.pass);
 }
 
 constexpr void reflect(auto& a, Like<LembertStitch> auto& s) { a(s.row), a(s.suture), a(s.holds); }
-constexpr void reflect(auto& a, Like<LembertRow> auto& r) { a(r.one), a(r.other), a(r.told); }
+constexpr void reflect(auto& a, Like<LembertRow> auto& r) { a(r.one), a(r.other), a(r.reported); }
 constexpr void reflect(auto& a, Like<LembertState> auto& l) {
-  a(l.stitch), a(l.row), a(l.taken), a(l.throws), a(l.knot), a.at_most(l.tied, 1u), a(l.told);
+  a(l.stitch), a(l.row), a(l.suture_index), a(l.throws), a(l.knot), a.at_most(l.tied, 1u), a(l.reported);
 }
 
 constexpr void reflect(auto& a, Like<TechniqueState> auto& t) { a(t.purse_string), a(t.seam), a(t.lembert); }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // technique/seam: see seam.h.
 #include "technique/seam.h"
 
@@ -35,7 +36,7 @@ void pair_in_between(const SeamModel& model, SeamState& state, const Vec4* x, Ve
     const bool used = std::any_of(plan.pair.begin(), plan.pair.end(), [&](const ClosurePlan::Pair& p) {
       return !p.midpoint && (p.a.particle[0] == a || p.b.particle[0] == b);
     });
-    if (used) continue;  // the line is cut finer than the rim: its neighbour has this particle
+    if (used) continue;  // the line is cut finer than the rim: its neighbor has this particle
     const float apart = distance(xyz(x[a]), xyz(x[b]));
     plan.pair.push_back({particle_point(a), particle_point(b), apart, std::min(apart, model.gap), 0, 0});
     SeamRow row;
@@ -67,7 +68,7 @@ void add_midpoint(const SeamModel& model, SeamState& state, const TechniqueView&
 
 }  // namespace
 
-// A A B B A A ...: each first pass from outside in, each second from inside out. After a fault the pattern goes on from the
+// A A B B A A ...: each first pass from outside in, each second from inside out. After a fault the pattern continues from the
 // bite that broke it, so that one mistake is one fault.
 Fault judge_connell(std::span<const Pass> pass) {
   uint32_t wall = 0, in_run = 0;
@@ -99,22 +100,22 @@ Fault judge_stay(std::span<const Pass> pass) {
 }
 
 void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, ClosurePlan& plan, EventList& events) {
-  hear(events, state.told);
-  if (view.taken != state.taken) {
+  merge_reported(events, state.reported);
+  if (view.suture_index != state.suture_index) {
     // A fresh suture: what no knot holds has lost its thread.
     for (size_t r = state.first_row; r < state.row.size(); ++r)
       if (state.row[r].hold == SeamHold::thread) state.row[r].hold = SeamHold::nothing;
-    state.taken = view.taken;
+    state.suture_index = view.suture_index;
     state.first_row = static_cast<uint32_t>(state.row.size());
-    state.points = state.passes = state.throws = state.told = 0;
+    state.points = state.passes = state.throws = state.reported = 0;
   }
   if (cut_in_stitch(events)) {
     for (size_t r = state.first_row; r < state.row.size(); ++r) state.row[r].hold = SeamHold::nothing;
   }
-  judge_begun_knots(view, true, state.told, events);
+  judge_begun_knots(view, true, state.reported, events);
 
   // A point counts once its bite is complete ("When a bite is completed, the needle creates a suture point"): until then the
-  // needle can still be drawn back.
+  // needle can still be withdrawn.
   size_t points = 0;
   while (points < view.point.size() && view.bite[view.point[points].bite].complete) ++points;
   if (points > state.points) {
@@ -123,8 +124,8 @@ void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, C
     for (; state.passes < pass.size(); ++state.passes) {
       const std::span<const Pass> so_far(pass.data(), state.passes + 1);
       const Fault fault = model.connell ? judge_connell(so_far) : judge_stay(so_far);
-      uint32_t fresh = 0;  // every bite that is out of order is told, once
-      if (fault != Fault::none) tell(fault, pass[state.passes].bite, view.point[points - 1].at, fresh, events);
+      uint32_t fresh = 0;  // every bite that is out of order is reported, once
+      if (fault != Fault::none) report_fault(fault, pass[state.passes].bite, view.point[points - 1].at, fresh, events);
     }
     // "If the two most recent suture points are on the same soft body, the thread is simply pulled through without closing the
     // gap between tissues yet. If [they] are on different soft bodies, the system automatically pulls those two tissue points
@@ -149,7 +150,7 @@ void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, C
     const SeamRow& leader = state.row[row.leader];
     if (row.leader != r) {
       pair.progress = plan.pair[row.leader].progress;
-      tell_closed(r, pair, view.x, row.told, events);
+      tell_closed(r, pair, view.x, row.reported, events);
       continue;
     }
     float wanted = pair.progress;
@@ -161,7 +162,7 @@ void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, C
       if (leader.hold == SeamHold::knot) wanted = std::max(wanted, pair.progress);
     }
     advance(pair.progress, wanted, model.fastest, view.dt);
-    tell_closed(r, pair, view.x, row.told, events);
+    tell_closed(r, pair, view.x, row.reported, events);
   }
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // technique/seam: two bowel ends drawn together along a line (paper 2.5.2 Connell, 2.5.3 stay; figures 12 to 14). Where the
 // thread crosses from one end to the other a midpoint is made and both points are drawn to it, as far as the needle has pulled
 // the thread through; between two midpoints the edges follow. Reads suture points, lengths of thread and knots; answers with
@@ -33,7 +34,7 @@ struct SeamRow {
   uint32_t point = 0;   // midpoint: index of the first of its two suture points
   float from = 0;       // [m] midpoint: length of thread between the two at which closing begins
   SeamHold hold = SeamHold::thread;
-  uint32_t told = 0;  // 1: seam_closed was said
+  uint32_t reported = 0;  // 1: seam_closed was said
 };
 
 // How the bites of a suture follow each other, as the order rules see them.
@@ -43,14 +44,14 @@ struct Pass {
 };
 
 struct SeamState {
-  std::vector<SeamRow> row;  // one per row of the plan
-  uint32_t first_row = 0;    // of the suture in hand
-  uint32_t taken = 0;        // sutures settled before it
-  uint32_t points = 0;       // its suture points that were looked at for crossings
-  uint32_t passes = 0;       // its bites that were judged
-  uint32_t throws = 0;       // its locked throws
-  uint32_t told = 0;         // a bit per Fault
-  std::vector<Pass> pass;    // working memory, not saved
+  std::vector<SeamRow> row;   // one per row of the plan
+  uint32_t first_row = 0;     // of the suture in hand
+  uint32_t suture_index = 0;  // sutures settled before it
+  uint32_t points = 0;        // its suture points that were looked at for crossings
+  uint32_t passes = 0;        // its bites that were judged
+  uint32_t throws = 0;        // its locked throws
+  uint32_t reported = 0;      // a bit per Fault
+  std::vector<Pass> pass;     // working memory, not saved
 };
 
 // Once a tick.

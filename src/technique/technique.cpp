@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // technique: the table of techniques; see technique.h.
 #include "technique/technique.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // technique: which points close with which, and when (paper 2.5). A technique reads what happened in the tick (bites, suture
 // points, knots, events) and answers with a ClosurePlan and with events that say what was wrong. It moves nothing itself.
 // A technique is one row of `techniques()` and one file, which ends in its row. Its name is compared nowhere else.

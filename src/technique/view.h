@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // technique/view: what a technique may see of the tick. Plain spans into the simulation's state, valid during the call.
 #pragma once
 #include <cstdint>
@@ -11,7 +12,7 @@ namespace catgut {
 // One end of a bite as the techniques see it.
 struct StitchPoint {
   Vec3 at;              // [m] now
-  TissuePoint point;    // the same, carried by the tissue
+  EmbeddedPoint point;  // the same, carried by the tissue
   uint32_t bite = 0;    // index in `bite`
   uint32_t wall = 0;    // bowel end (connell, stay) or layer (lembert: 0 outer, 1 inner)
   bool exit = false;    // the exit end of its bite, else the entry
@@ -26,8 +27,8 @@ struct TechniqueView {
   const Vec4* x = nullptr;  // particle positions [m]
   float loop = 0;           // [m] rest length of thread from the first suture point to the last
   bool needle_in_tissue = false;
-  uint32_t taken = 0;  // fresh sutures so far: points and knots before that are settled and no longer listed
-  float dt = 0;        // [s] length of a tick
+  uint32_t suture_index = 0;  // fresh sutures so far: points and knots before that are settled and no longer listed
+  float dt = 0;               // [s] length of a tick
 };
 
 }  // namespace catgut

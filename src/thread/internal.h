@@ -16,7 +16,7 @@
 
 namespace catgut::thread {
 
-// A column with room before element 0 and behind the last: neighbours of the ends can be read, and are 0.
+// A column with room before element 0 and behind the last: neighbors of the ends can be read, and are 0.
 struct Padded {
   static constexpr size_t kPad = 16;
   std::vector<float> memory;
@@ -47,7 +47,7 @@ inline float dot(Four a, Four b) {
 struct Active {
   Four normal{}, lt{};
   Four partner{};    // [m] motion of the tool's contact point in this substep
-  Four pull_back{};  // share of the drift that is taken back
+  Four pull_back{};  // share of the drift that is undone
   // Barycentric weights, those of the second segment negative; the same times the inverse masses.
   float wi0 = 0, wi1 = 0, wj0 = 0, wj1 = 0, mi0 = 0, mi1 = 0, mj0 = 0, mj1 = 0;
   uint32_t i = 0, j = 0;  // first nodes of both segments; j = i for a tool or the plane (its weights are 0)

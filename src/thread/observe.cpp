@@ -118,7 +118,7 @@ SeenKnot observe(const Settings& settings, const State& state, float tight_loop)
             [](const Seen& x, const Seen& y) { return x.loop != y.loop ? x.loop < y.loop : x.a < y.a; });
   SeenKnot knot;
   float below = tight_loop;
-  for (size_t first = 0, k = 1; k <= seen.size() && knot.throws < kMostThrows; ++k) {
+  for (size_t first = 0, k = 1; k <= seen.size() && knot.throws < kMaxThrows; ++k) {
     if (k < seen.size() && seen[k].loop - seen[k - 1].loop < kApart * d) continue;
     SeenThrow t = look_at(settings, state, seen, along, first, k);
     // Half of the loop's growth is each strand's; a snug throw takes up about five diameters of each.

@@ -26,9 +26,9 @@ struct SeenThrow {
   float gap = 0;            // [m] of free thread between this throw and the one below, or the bite: air
   float confidence = 0;     // 0..1
 };
-constexpr size_t kMostThrows = 12;
+constexpr size_t kMaxThrows = 12;
 struct SeenKnot {
-  std::array<SeenThrow, kMostThrows> item;  // from the bite upward
+  std::array<SeenThrow, kMaxThrows> item;  // from the bite upward
   uint32_t throws = 0;
   uint32_t wraps = 0;  // of all throws: half turns less one, halved
   KnotName name = KnotName::none;

@@ -3,7 +3,7 @@
 // surrounds the thread (holds, tools, a plane); writes State. Section 4 of the paper asks for it; docs/thread.md explains it.
 //
 // Units: SI, float32. Frame: any inertial frame; positions keep 48 bits (a float and the remainder below its resolution), so
-// that a thread may lie a metre from the origin. One thread, one worker: the bits never depend on the number of workers. A step
+// that a thread may lie a meter from the origin. One thread, one worker: the bits never depend on the number of workers. A step
 // makes no allocation: every list has the capacity that `make_state` gave it. Where a list is full, `overflow` counts.
 #pragma once
 #include <array>
@@ -39,8 +39,8 @@ struct Settings {
   // light again within `mass_decay` [s].
   float free_density = 0.05f, touch_density = 0.4f, mass_decay = 0.02f, load_limit = 0.2f;
   float damping = 5;            // drag [1/s]
-  float inner_damping = 0.02f;  // of velocity differences between neighbours, per substep; conserves momentum
-  float anchor = 0.2f;          // share of the remembered tangential drift that a sticking contact takes back per substep
+  float inner_damping = 0.02f;  // of velocity differences between neighbors, per substep; conserves momentum
+  float anchor = 0.2f;          // share of the remembered tangential drift that a sticking contact undoes per substep
   float list_margin = 0.6e-3f;  // pairs nearer than d + margin are listed [m]
   float max_move = 0.125f;      // of the diameter, per substep
   Vec3 gravity{};               // [m/s2]
@@ -94,7 +94,7 @@ struct State {
   Vec3 position(size_t i) const { return x.at(i) + fine.at(i); }
 };
 
-// Every field that is state, in order: for whoever saves, loads, hashes or compares.
+// Every field that is state, in order: for a caller that saves, loads, hashes or compares.
 template <typename Archive, typename AnyState>
 void reflect(Archive& archive, AnyState& s) {
   for (auto* c : {&s.x, &s.fine, &s.v, &s.plane_friction, &s.plane_drift, &s.listed}) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // validation: what the checks share: where lines go, and small worlds to run the kernels in.
 #pragma once
 #include <functional>
@@ -19,7 +20,7 @@ struct Lines {
 };
 
 // A thread whose first node, and last if wanted, is held by the world: only the thread's kernels and the time step around them.
-// Without the substep's limit on speed, so that published cases of metres and kilograms can run as they are.
+// Without the substep's limit on speed, so that published cases of meters and kilograms can run as they are.
 struct ThreadRig {
   StrandModel model;
   Strand thread;
@@ -51,7 +52,7 @@ struct Block {
   int n = 0;
   uint32_t at(int i, int j, int k) const { return static_cast<uint32_t>((k * n + j) * n + i); }
 };
-// n x n x n particles, `spacing` apart, centred on the origin; five tetrahedra a cell, mirrored from cell to cell.
+// n x n x n particles, `spacing` apart, centered on the origin; five tetrahedra a cell, mirrored from cell to cell.
 Block make_block(int n, float spacing);
 
 void check_oscillator(Lines& out);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // validation: the thread and the attachments: oscillator, hanging chain, catenary, bending.
 #include <Eigen/Dense>
 #include <algorithm>
@@ -234,7 +235,7 @@ void check_catenary(Lines& out) {
     int bend_sweeps;
     double span;
   };
-  // A heavy metre, and the suture of the scenes at its own substep: light, finely divided, with bending.
+  // A heavy meter, and the suture of the scenes at its own substep: light, finely divided, with bending.
   const Case chain{"1 m chain", 201, 0.005f, 0.001f, 0, 1.0f / 480, 0, 0},
       suture{"suture", 175, 0.0016f, 2e-6f, 1e-6f, 1.0f / 960, 1, 0};
   std::vector<Case> all;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // validation: soft tissue: stiffness that does not depend on the solver's settings, momentum, rotation, volume.
 #include <algorithm>
 #include <array>
@@ -15,7 +16,7 @@ namespace {
 constexpr float kReference = 1.0f / 480;  // [s] the substep that a stiffness is given for
 constexpr std::array<int, 3> kSubsteps{8, 16, 32};
 
-struct Spread {
+struct Percentiles {
   double low = 1e300, high = -1e300;
   void add(double v) { low = std::min(low, v), high = std::max(high, v); }
   double relative() const { return (high - low) / std::abs(0.5 * (high + low)); }
@@ -99,7 +100,7 @@ double hung_block(const HungBlock& s, float h, Jobs& jobs, std::vector<Vec4>* en
 
 struct Momentum {
   double mass = 0;
-  std::array<double, 3> linear{}, angular{}, centre{};
+  std::array<double, 3> linear{}, angular{}, center{};
 };
 Momentum momentum_of(const TissueWorld& w) {
   Momentum m;
@@ -109,13 +110,13 @@ Momentum momentum_of(const TissueWorld& w) {
     const std::array<double, 3> v{double{s.v[i].x}, double{s.v[i].y}, double{s.v[i].z}},
         x{double{s.x[i].x}, double{s.x[i].y}, double{s.x[i].z}};
     m.mass += k;
-    for (size_t c = 0; c < 3; ++c) m.linear[c] += k * v[c], m.centre[c] += k * x[c];
+    for (size_t c = 0; c < 3; ++c) m.linear[c] += k * v[c], m.center[c] += k * x[c];
   }
-  for (double& c : m.centre) c /= m.mass;
+  for (double& c : m.center) c /= m.mass;
   for (uint32_t i = 0; i < w.model.tissue; ++i) {
     const double k = 1.0 / double{w.model.inv_mass[i]};
     const std::array<double, 3> v{double{s.v[i].x}, double{s.v[i].y}, double{s.v[i].z}},
-        x{double{s.x[i].x} - m.centre[0], double{s.x[i].y} - m.centre[1], double{s.x[i].z} - m.centre[2]};
+        x{double{s.x[i].x} - m.center[0], double{s.x[i].y} - m.center[1], double{s.x[i].z} - m.center[2]};
     for (size_t c = 0; c < 3; ++c) m.angular[c] += k * (x[(c + 1) % 3] * v[(c + 2) % 3] - x[(c + 2) % 3] * v[(c + 1) % 3]);
   }
   return m;
@@ -129,16 +130,16 @@ double distance_of(const std::array<double, 3>& a, const std::array<double, 3>& 
 struct Drift {
   double linear = 0;        // change of linear momentum over the sum of m |v|
   double angular = 0;       // change of angular momentum over itself
-  double acceleration = 0;  // [m/s^2] of the centre of mass
+  double acceleration = 0;  // [m/s^2] of the center of mass
 };
 // Spinning and squeezed by a tenth, thrown with `speed`: what changes in a second without any outer force.
 Drift drift(TissueWorld& world, std::span<const Vec3> rest, Vec3 speed) {
   world.model.h = 1.0f / 960;
   world.model.shape_stiffness = stiffness_at(0.9f, kReference, world.model.h);
-  Vec3 centre{};
-  for (const Vec3& p : rest) centre += p / static_cast<float>(rest.size());
+  Vec3 center{};
+  for (const Vec3& p : rest) center += p / static_cast<float>(rest.size());
   std::vector<Vec3> start;
-  for (const Vec3& p : rest) start.push_back({p.x - centre.x, (p.y - centre.y) * 0.9f, p.z - centre.z});
+  for (const Vec3& p : rest) start.push_back({p.x - center.x, (p.y - center.y) * 0.9f, p.z - center.z});
   world.start(start);
   for (uint32_t i = 0; i < world.model.tissue; ++i) set(world.state.v[i], speed + cross(Vec3{0.6f, 2.0f, 0.4f}, start[i]));
   double size = 0;
@@ -158,7 +159,7 @@ double angle_between(Quat a, Quat b) { return double{length(rotation_vector(a * 
 
 void check_stiffness(Lines& out) {
   const std::string grid = "sweeps 1, 4, 16 x substeps 8, 16, 32";
-  Spread attachment, soft_chain, direct_chain, soft_shape, stiff_shape, volume;
+  Percentiles attachment, soft_chain, direct_chain, soft_shape, stiff_shape, volume;
   Jobs one(1);
   // Soft means compliance well above h^2 / m: then one sweep has converged, and any dependence left is a fault of the
   // multipliers.

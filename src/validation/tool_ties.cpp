@@ -103,7 +103,7 @@ class Tying {
     move("fetch", tail_at_ + shaft * kInFront, hands_.forceps);
     gripped_ = true;
     move("draw through", work + shaft * 28e-3f + tremor(), hands_.forceps);
-    // The winding hand goes on over the top to the other side: that completes the throw.
+    // The winding hand continues over the top to the other side: that completes the throw.
     circle("cross", side, start + turns, start + turns + sense * kPi / 2);
     move("cross", {side * 30e-3f, 12e-3f, 0}, Vec3{-side * 24e-3f, 16e-3f, 0} + tremor());
     move("pull", {side * 40e-3f, 3e-3f, 0}, {-side * 40e-3f, 3e-3f, 0});
@@ -140,7 +140,7 @@ class Tying {
     if (how_.seed == 0) return {};
     return Vec3{random_.uniform() - 0.5f, random_.uniform() - 0.5f, random_.uniform() - 0.5f} * 2e-3f;
   }
-  // The tail is laid nearly straight: what sags gets into the way of the winding hand.
+  // The tail is laid nearly straight: what sags gets into the path of the winding hand.
   Vec3 laid_tail(float side) const { return {side * -0.88f * tail_, 8e-3f, 0}; }
   // The winding hand at an angle about the needle holder's shaft; 0: toward the viewer, pi/2: above.
   static Vec3 work_hand(float side, float angle) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // validation: the list of checks and the small worlds they run in.
 #include "validation/validation.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // validation: what the solver computes beside what mechanics says: closed forms, published numbers and invariances. Every line
 // runs the kernels of the simulation itself and can fail; `catgut validate` prints them, tests/validation asserts them.
 #pragma once

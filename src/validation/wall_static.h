@@ -25,7 +25,7 @@ struct StaticString {
 class StaticWall {
  public:
   explicit StaticWall(const wall::Wall& wall);
-  // Newton's method then starts from where the simulation came to rest: of several solutions (folds) it looks at that one.
+  // Newton's method then starts from where the simulation settled: of several solutions (folds) it looks at that one.
   void start_from(const wall::State& state);
   // Loads grow in `steps` equal steps, strings shorten from `string_from` [m]. Returns the residual relative to the loads.
   double solve(const std::vector<StaticLoad>& load, const std::vector<StaticString>& string, double string_from, int steps);

@@ -54,7 +54,7 @@ struct ContactSolver {
 };
 
 // Before begin_step: finds what may touch and gives last step's impulses to the wall (scratch.external). Self contacts may then
-// be added to `contact` by whoever knows of them, with keys above all others.
+// be added to `contact` by a caller that knows of them, with keys above all others.
 void find_contacts(const Model& model, const State& state, std::span<const Obstacle> obstacle, ContactSolver& solver);
 void warm_start(const Model& model, Scratch& scratch, ContactSolver& solver);
 // After begin_step: corrections, and the velocities that follow from them.

@@ -277,7 +277,7 @@ Wall build_wall(const Spec& spec) {
     if (m.report.largest <= kLargest && (m.report.largest > 0.9f * kLargest || m.report.scale <= 0.3f)) break;
     if (round == 3 && m.report.largest <= kLargest) break;
     m.report.scale = std::max(0.3f, m.report.scale * m.report.largest / (0.96f * kLargest));
-    if (round == 3) m.report.scale *= 1.05f, round = 2;  // go on until it holds
+    if (round == 3) m.report.scale *= 1.05f, round = 2;  // continue until it holds
     CATGUT_CHECK(m.report.scale < 1e6f);
   }
   m.report.entries = 0;

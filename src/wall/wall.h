@@ -11,7 +11,7 @@
 // A resting state has zero force whatever A is, so neither step nor mesh changes the stiffness. L does not act on rigid
 // translation: mass and linear momentum are true. c is chosen at build time so that the largest eigenvalue of h^2 A^-1 K is at
 // most 1.05, and stays below about 1.2 when the wall is cut (the step is stable below 2.67). Frames: positions in the scene's
-// frame, metres, seconds, newtons.
+// frame, meters, seconds, newtons.
 #pragma once
 #include <string>
 
@@ -125,7 +125,7 @@ void elastic_forces(const Model& model, State& state, Scratch& scratch, int turn
 float largest_eigenvalue(const Model& model, const State& state, Scratch& scratch, bool stiff, int iterations = 60);
 
 // Masses, director inertia and gather lists from the corners; then, with `again`, a new factor in which every column has a row
-// of its own. The motion goes on undisturbed.
+// of its own. The motion continues undisturbed.
 void renew_topology(const Model& model, Topology& topology, bool again);
 
 }  // namespace catgut::wall

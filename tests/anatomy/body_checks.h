@@ -1,4 +1,5 @@
-// What every body must fulfil, whoever made it.
+// SPDX-License-Identifier: Apache-2.0
+// What every body must fulfil, a caller that made it.
 #pragma once
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "anatomy/bowel.h"
 
 #include <gtest/gtest.h>
@@ -50,7 +51,7 @@ TEST(Bowel, RimIsTheCircleOfTheSpecification) {
   expect_sound(body, 1228);
   const auto loop = points(body, body.rim[0].outer);
   EXPECT_NEAR(loop_length(loop), 0.126, 0.001);
-  EXPECT_NEAR(distance(loop_centre(loop), shape.position), 0, 1e-5);
+  EXPECT_NEAR(distance(loop_center(loop), shape.position), 0, 1e-5);
   EXPECT_NEAR(dot(loop_normal(loop), normalized(shape.axis)), 1, 1e-5);
   EXPECT_NEAR(dot(loop_normal(points(body, body.rim[1].outer)), normalized(shape.axis)), -1, 1e-5);
   for (size_t i = 0; i < loop.size(); ++i) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "anatomy/organ.h"
 
 #include <gtest/gtest.h>
@@ -63,7 +64,7 @@ size_t held(const BodyRest& body) { return static_cast<size_t>(std::accumulate(b
 
 void expect_placed(const BodyRest& body, const OrganImport& o) {
   const auto loop = points(body, body.rim[0].outer);
-  EXPECT_LT(distance(loop_centre(loop), o.position), 0.001f);
+  EXPECT_LT(distance(loop_center(loop), o.position), 0.001f);
   EXPECT_GT(dot(loop_normal(loop), normalized(o.axis)), 0.99f);
   for (const uint32_t v : body.rim[0].outer) EXPECT_FALSE(body.pinned[v]);
 }
@@ -152,7 +153,7 @@ TEST(Organ, RealColon) {
   }
 }
 
-// A V with a wall of 2.5 mm on its hollow side: the wall is thin in the bend, full a few millimetres away, and never inside
+// A V with a wall of 2.5 mm on its hollow side: the wall is thin in the bend, full a few millimeters away, and never inside
 // out.
 TEST(Wall, ThinsInASharpBendInsteadOfRefusing) {
   TriangleMesh sheet;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/app: the command line is a contract that scripts depend on: exit codes, one line per fault, JSON on request.
 // Runs the built program as a user would.
 #include <gtest/gtest.h>
@@ -153,7 +154,7 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   EXPECT_LT(catgut::distance(catgut::rotate(w.turn, Vec3{1, 0, 0}), {0, 0, -1}), 1e-6f);
   std::ofstream(places) << "[right-0001]\nscale = 50\n";
   expect_refused("devices --calibrate", "arms.toml:2: scale must be a number between");
-  // What is wrong with the file is said by whoever reads it, and nobody writes over it.
+  // What is wrong with the file is said by a caller that reads it, and no one writes over it.
   for (const auto& [text, wrong] :
        std::map<std::string, std::string>{{"[right-0001\nscale = 1\n", "arms.toml:1: "},
                                           {"[right-0001]\nturn = nan\n", "arms.toml:2: turn must be"},
@@ -181,7 +182,7 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   unsetenv("CATGUT_LIBHD");
 }
 
-// One process lends its arms, another finds them; nobody there, or no arm to lend, is a line.
+// One process serves its arms, another finds them; no one there, or no arm to lend, is a line.
 TEST_F(CommandLine, arms_are_lent_over_the_bridge) {
   expect_refused("bridge --arms spoon", "unknown device");
   expect_refused("play --haptics paper:spoon", "unknown device");
@@ -241,7 +242,7 @@ TEST_F(CommandLine, a_mesh_that_cannot_be_used_says_why) {
   refused("flat.obj", "no area");
   mesh("point.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n");
   refused("point.obj", "no area");
-  mesh("km.obj", "v 0 0 0\nv 0.0001 0 0\nv 0 0.0001 0\nf 1 2 3\n");  // a decimetre, written in kilometres
+  mesh("km.obj", "v 0 0 0\nv 0.0001 0 0\nv 0 0.0001 0\nf 1 2 3\n");  // a decimeter, written in kilometers
   refused("km.obj", "looks like kilometers: scale by 1000");
   mesh("garbage.glb", "glTF but not really");
   refused("garbage.glb", "cannot be read as a mesh");

@@ -1,5 +1,6 @@
-// tests/app: what SDL says becomes what hands and panels are told. Events are pushed into SDL's own queue, and the gamepad is
-// one of SDL's virtual ones: no display is needed.
+// SPDX-License-Identifier: Apache-2.0
+// tests/app: what SDL says becomes what hands and panels are reported. Events are pushed into SDL's own queue, and the gamepad
+// is one of SDL's virtual ones: no display is needed.
 #ifdef CATGUT_TESTS_WINDOW
 #include <SDL.h>
 #include <gtest/gtest.h>
@@ -159,7 +160,7 @@ TEST_F(WindowEventsTest, a_gamepad_comes_works_and_goes) {
   SDL_JoystickSetVirtualButton(stick, SDL_CONTROLLER_BUTTON_RIGHTSHOULDER, SDL_PRESSED);
   SDL_JoystickSetVirtualButton(stick, SDL_CONTROLLER_BUTTON_START, SDL_PRESSED);
   SDL_JoystickSetVirtualButton(stick, SDL_CONTROLLER_BUTTON_B, SDL_PRESSED);
-  read();  // SDL hears of a virtual stick when it is asked for events
+  read();  // SDL hears of a virtual stick when it is requested events
   in = read();
   EXPECT_NEAR(in.pad.left.x, 1, 1e-3f);
   EXPECT_NEAR(in.pad.right.y, -1, 1e-3f);
@@ -176,15 +177,15 @@ TEST_F(WindowEventsTest, a_gamepad_comes_works_and_goes) {
 }
 
 TEST(Words, every_event_is_told_or_left_out_on_purpose) {
-  size_t told = 0;
+  size_t messages = 0;
   for (size_t k = 0; k < static_cast<size_t>(EventKind::count_); ++k) {
     Event e;
     e.kind = static_cast<EventKind>(k);
     bool bad = false;
-    told += !words_for(e, bad).empty();
+    messages += !words_for(e, bad).empty();
     EXPECT_EQ(event_json(e).find('\n'), std::string::npos);
   }
-  EXPECT_GE(told, 25u);
+  EXPECT_GE(messages, 25u);
   Event slipped;
   slipped.kind = EventKind::needle_released;
   bool bad = true;

@@ -1,5 +1,6 @@
-// tests/app: the settings file: what is written is read, what is wrong is told in a line, and no file is lost. And what keys
-// choose on which screen.
+// SPDX-License-Identifier: Apache-2.0
+// tests/app: the settings file: what is written is read, what is wrong is reported in a line, and no file is lost. And what
+// keys choose on which screen.
 #ifdef CATGUT_TESTS_WINDOW
 #include "window/settings.h"
 
@@ -43,7 +44,7 @@ class SettingsFile : public testing::Test {
 
 Settings all_changed() {
   Settings s;
-  s.quality = Quality::good;
+  s.quality = Quality::high;
   s.guidance = Guidance::exam;
   s.left_handed = s.hold_to_close = s.suture_points = true;
   s.assist = s.hints = false;

@@ -1,4 +1,5 @@
-// tests/app: somebody sits down at the window. A real X server (Xvfb), real mouse and keyboard events (xdotool); what is
+// SPDX-License-Identifier: Apache-2.0
+// tests/app: a user sits down at the window. A real X server (Xvfb), real mouse and keyboard events (xdotool); what is
 // checked is what happened in the simulation and what was recorded, not pixels. Skips where one of the two is missing.
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -61,7 +62,7 @@ class Window : public testing::Test {
     setenv("DISPLAY", x_->display.c_str(), 1);
     setenv("SDL_VIDEODRIVER", "x11", 1);
     setenv("XDG_RUNTIME_DIR", folder_.c_str(), 1);
-    setenv("XDG_CONFIG_HOME", folder_.c_str(), 1);  // whoever runs the tests keeps their own settings
+    setenv("XDG_CONFIG_HOME", folder_.c_str(), 1);  // a caller that runs the tests keeps their own settings
     if (chdir(folder_.c_str()) != 0) _exit(97);     // what the program writes beside it goes with the folder
     if (!std::freopen((folder_ / "stderr").c_str(), "w", stderr)) _exit(98);
     std::vector<char*> argv{const_cast<char*>("catgut")};
@@ -160,7 +161,7 @@ TEST_F(Window, somebody_takes_the_needle_and_everything_is_recorded) {
   pause(500);
   drag(60, 20);
   xdo("key n");
-  EXPECT_TRUE(happens("suture_taken")) << said();
+  EXPECT_TRUE(happens("suture_loaded")) << said();
   pause(500);
 
   // The screens, by keys.
@@ -275,7 +276,7 @@ TEST_F(Window, a_recording_is_looked_at_and_what_was_sewn_is_shown) {
   EXPECT_LT(red(sewn), red(field) / 2) << "the panel covers it";
 }
 
-// A setting that is changed in the window is there the next time, and a file that is not understood stops nobody.
+// A setting that is changed in the window is there the next time, and a file that is not understood stops no one.
 TEST_F(Window, settings_are_kept) {
   const fs::path file = folder_ / "catgut" / "settings.toml", events = folder_ / "events";
   fs::create_directories(file.parent_path());
@@ -304,7 +305,7 @@ TEST_F(Window, a_screenshot_shows_the_field) {
   int red = 0, green = 0;
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
-      const Colour c = pixel(image, x, y);
+      const Color c = pixel(image, x, y);
       red += c[0] > c[1] + 20 && c[0] > c[2] + 20;
       green += c[1] > c[0] + 20;
     }

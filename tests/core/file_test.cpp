@@ -55,7 +55,7 @@ TEST_F(File, follows_a_link) {
 }
 
 // The disk is full after 4096 bytes: the old file survives, nothing else stays behind. In a child process, since the limit
-// cannot be taken back.
+// cannot be undone.
 TEST_F(File, survives_a_full_disk) {
   const fs::path path = folder_ / "a.json";
   write_file(path.string(), "old");

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/core: the fork-join, the hash and the random numbers that everything reproducible stands on.
 #include "core/jobs.h"
 

@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/cost: a tick asks for no memory. An allocation is fast nearly always, and now and then takes the milliseconds that a
 // hand feels. Every allocation of this program is counted (malloc itself, on which new stands), but only inside `step`: what
-// the surgeon plans, what is published and what is recorded are not the tick. Scenes are sewn by the scripted surgeon; with
+// the surgeon plans, what is published and what is recorded are not the tick. Scenes are sutured by the scripted surgeon; with
 // CATGUT_LONG to their end.
 #include <execinfo.h>
 #include <gtest/gtest.h>
@@ -111,7 +112,7 @@ TEST_P(TickAllocation, none_from_when_the_hands_are_let_in) {
     const uint64_t n = allocations_of([&] { step(*model, *state, input, jobs); });
     if (input.tick >= settle) {
       const bool settles = std::any_of(state->event.begin(), state->event.end(),
-                                       [](const Event& e) { return e.kind == EventKind::suture_taken; });
+                                       [](const Event& e) { return e.kind == EventKind::suture_loaded; });
       (state->event.empty() ? quiet : settles ? settling : eventful).add(n);
       if (n > 0 && !settles && first.empty())
         first = "tick " + std::to_string(input.tick) + ", " + std::to_string(state->event.size()) + " events:\n" + sites();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/cost: the alarm of tools/count_instructions.sh goes off when it should. Counting itself takes valgrind and half a
 // minute, and is a step of CI of its own.
 #include <gtest/gtest.h>

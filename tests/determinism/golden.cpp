@@ -4,7 +4,7 @@
 //   golden check FILE SCENE PRESET       compares the run with the file's rows; exit code 1 at the first difference
 //   golden print [SCENE PRESET]          prints the rows, with a last column for the bytes of the whole state
 //   golden update FILE                   runs everything and writes the file
-// Options after these: --seconds S (at most so much simulated time), --threads N, --simd NAME (avx3, avx2, sse4, neon: the
+// Options after these: --seconds S (at most that much simulated time), --threads N, --simd NAME (avx3, avx2, sse4, neon: the
 // kernels' instruction set, instead of the best that the processor has).
 //
 // The hashes cover physical quantities of the Snapshot, not the bytes of `State`: a new layout of the state keeps them. Three

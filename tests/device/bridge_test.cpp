@@ -1,5 +1,6 @@
-// tests/device: the bridge. The arm's end (runtime/arm_server) lends the simulated arms of fake_hd, a millisecond at a time, to
-// a simulator that is a few lines of this test; the simulator's end (device/bridge) is tested against that arm's end, and
+// SPDX-License-Identifier: Apache-2.0
+// tests/device: the bridge. The arm's end (runtime/arm_server) serves the simulated arms of fake_hd, a millisecond at a time,
+// to a simulator that is a few lines of this test; the simulator's end (device/bridge) is tested against that arm's end, and
 // against an arm written in Python. Every port is one that the system gives.
 #include "device/bridge.h"
 
@@ -116,7 +117,7 @@ struct Simulator {
 // The simulated arms, lent. What is measured is measured in their own milliseconds.
 struct Lent {
   FakeHd fake{true};
-  std::vector<std::string> told;
+  std::vector<std::string> messages;
   std::unique_ptr<ArmServer> server;
   std::unique_ptr<Simulator> simulator;
   std::array<Vec3, 2> force{};              // the simulator's patches ask for
@@ -128,8 +129,8 @@ struct Lent {
     o.listen = "127.0.0.1:0";
     o.clock = [] { return test_ns.load(); };
     o.forget = forget;
-    server = std::make_unique<ArmServer>(open_touch({}, told), o);
-    EXPECT_TRUE(told.empty());
+    server = std::make_unique<ArmServer>(open_touch({}, messages), o);
+    EXPECT_TRUE(messages.empty());
   }
   void connect() {
     simulator = std::make_unique<Simulator>(server->port());
@@ -162,7 +163,7 @@ struct Lent {
     connect();
     run(2100);
     force = {right, left};
-    run(settle);  // the hand comes to rest
+    run(settle);  // the hand settles
     server->news();
     fake.zero(0), fake.zero(1);
   }
@@ -171,7 +172,7 @@ struct Lent {
 // The layout is a promise to programs in other languages: byte for byte.
 TEST(Bridge, a_packet_is_what_it_says) {
   ForcePatch f;
-  f.time_ns = 11, f.tick = 12, f.epoch = 13, f.topology = 14, f.period = 0.5f;
+  f.time_ns = 11, f.tick = 12, f.epoch = 13, f.discontinuity_id = 14, f.period = 0.5f;
   f.point = {1, -2, 0.5f}, f.force = {3, 0, 0}, f.stiffness = {1, 2, 3, 4, 5, 6}, f.damping = identity(2);
   f.normal = {0, 1, 0}, f.gap = 0.25f, f.along = {1, 0, 0}, f.pierce = {0, 0, 1}, f.pierce_force = 0.75f, f.cap = 2;
   BridgePayload p;
@@ -245,7 +246,7 @@ TEST(Bridge, whatever_bytes_come) {
   std::mt19937 draw(7);
   const auto any = [&draw](uint32_t below) { return draw() % below; };
   const BridgeCounts before = t.server->counts();
-  Simulator stranger(t.server->port());
+  Simulator unknown_peer(t.server->port());
   uint64_t sent = 0;
   for (int round = 0; round < 60; ++round) {
     for (int k = 0; k < 50; ++k, ++sent) {
@@ -260,8 +261,8 @@ TEST(Bridge, whatever_bytes_come) {
         bad.resize(any(256));
       }
       // From the simulator's own address and from a stranger's.
-      (any(2) ? *t.simulator : stranger).send(bad.data(), bad.size());
-      if (any(4) == 0) stranger.send(good), ++sent;  // rightly sealed, but from another address
+      (any(2) ? *t.simulator : unknown_peer).send(bad.data(), bad.size());
+      if (any(4) == 0) unknown_peer.send(good), ++sent;  // rightly sealed, but from another address
     }
     t.ms();
     ASSERT_TRUE(t.fake.force(0) == held[0] && t.fake.force(1) == held[1]) << "nothing of it reaches the motors";
@@ -269,7 +270,7 @@ TEST(Bridge, whatever_bytes_come) {
   ASSERT_TRUE(wait_for([&] { return t.server->counts().dropped() >= before.dropped() + sent; }));
   EXPECT_GT(t.server->counts().garbage, 1000u);
   EXPECT_GT(t.server->counts().forged, 100u);
-  EXPECT_GT(t.server->counts().stranger, 100u);
+  EXPECT_GT(t.server->counts().unknown_peer, 100u);
 }
 
 // Each for itself: what is dropped is dropped for the reason that is counted.
@@ -309,10 +310,10 @@ TEST(Bridge, what_is_dropped_and_why) {
   });
   EXPECT_TRUE(wait_for([&] { return s.take(), s.refused == kOtherVersion; })) << "and whoever asked is told";
   EXPECT_EQ(s.refused_version, kBridgeVersion);
-  drops("an arm beyond two", &BridgeCounts::nonsense, [&] { s.send(s.sealed(BridgeKind::bye, 2, {})); });
-  drops("a kind that is none", &BridgeCounts::nonsense, [&] { s.send(s.sealed(static_cast<BridgeKind>(99), 0, {})); });
-  drops("a kind that the arm's end sends", &BridgeCounts::nonsense, [&] { s.send(s.sealed(BridgeKind::info, 0, {})); });
-  drops("a force that no arm has", &BridgeCounts::nonsense, [&] { s.send(s.order(0, {1e20f, 0, 0})); });
+  drops("an arm beyond two", &BridgeCounts::invalid, [&] { s.send(s.sealed(BridgeKind::bye, 2, {})); });
+  drops("a kind that is none", &BridgeCounts::invalid, [&] { s.send(s.sealed(static_cast<BridgeKind>(99), 0, {})); });
+  drops("a kind that the arm's end sends", &BridgeCounts::invalid, [&] { s.send(s.sealed(BridgeKind::info, 0, {})); });
+  drops("a force that no arm has", &BridgeCounts::invalid, [&] { s.send(s.order(0, {1e20f, 0, 0})); });
   const BridgeBytes first = s.order(0, {3, 0, 0}), second = s.order(0, {0.8f, 0, 0});
   s.send(second);
   drops("overtaken", &BridgeCounts::old, [&] { s.send(first); });
@@ -321,7 +322,7 @@ TEST(Bridge, what_is_dropped_and_why) {
     Simulator other(t.server->port());
     other.send(s.open);
   });
-  drops("another simulator", &BridgeCounts::stranger, [&] {
+  drops("another simulator", &BridgeCounts::unknown_peer, [&] {
     Simulator other(t.server->port());
     EXPECT_FALSE(other.connect());
     EXPECT_EQ(other.refused, kArmsTaken);
@@ -349,9 +350,9 @@ TEST(Bridge, S6_no_amplification) {
   }));
   t.simulator.reset();
   BridgeKey wrong = random_key();
-  BridgeCaller stranger;
-  stranger.shared = wrong;
-  begin_call(stranger);
+  BridgeCaller unknown_peer;
+  unknown_peer.shared = wrong;
+  begin_call(unknown_peer);
   BridgeBytes other_version = hello;
   other_version[4] = 9;
   struct Try {
@@ -360,7 +361,7 @@ TEST(Bridge, S6_no_amplification) {
     bool answered;
   };
   for (const Try& a : {Try{"hello", hello, true}, Try{"open of another address", open, false}, Try{"patch", patch, false},
-                       Try{"bye", bye, false}, Try{"hello with another key", hello_packet(stranger), false},
+                       Try{"bye", bye, false}, Try{"hello with another key", hello_packet(unknown_peer), false},
                        Try{"another version", other_version, true}}) {
     Simulator s(t.server->port());
     const BridgeCounts before = t.server->counts();
@@ -408,17 +409,17 @@ TEST(Bridge, S6_keys) {
   EXPECT_THROW(read_bridge_key(open_file), InputError);
   EXPECT_NO_THROW(read_bridge_key(file));
   FakeHd fake(true);
-  std::vector<std::string> told;
+  std::vector<std::string> messages;
   ArmServerOptions o;
   o.clock = [] { return test_ns.load(); };
   o.listen = "0.0.0.0:0";
   try {
-    ArmServer server(open_touch({}, told), o);
+    ArmServer server(open_touch({}, messages), o);
     ADD_FAILURE() << "it listens to everybody";
   } catch (const InputError& error) { EXPECT_NE(std::string(error.what()).find("--key"), std::string::npos) << error.what(); }
   fake.reset();
   o.key = file;
-  ArmServer server(open_touch({}, told), o);
+  ArmServer server(open_touch({}, messages), o);
   Simulator right(server.port(), read_bridge_key(file)), none(server.port()), wrong(server.port(), random_key());
   none.send(hello_packet(none.caller)), wrong.send(hello_packet(wrong.caller));
   EXPECT_TRUE(right.connect());
@@ -428,15 +429,15 @@ TEST(Bridge, S6_keys) {
   // The simulator's end, the same way round: another machine without a key is not even asked.
   BridgeOptions to;
   to.where = "192.0.2.1";
-  EXPECT_FALSE(open_bridge(to, told).any());
-  ASSERT_FALSE(told.empty());
-  EXPECT_NE(told.back().find("needs a key"), std::string::npos) << told.back();
+  EXPECT_FALSE(open_bridge(to, messages).any());
+  ASSERT_FALSE(messages.empty());
+  EXPECT_NE(messages.back().find("needs a key"), std::string::npos) << messages.back();
   right.send(right.sealed(BridgeKind::bye, 0, {}));
-  told.clear();
+  messages.clear();
   to.where = "127.0.0.1:" + std::to_string(server.port()), to.key = file, to.patience = 5;
-  EXPECT_TRUE(open_bridge(to, told).any());
+  EXPECT_TRUE(open_bridge(to, messages).any());
   to.key.clear(), to.patience = 0.1f;
-  EXPECT_FALSE(open_bridge(to, told).any());
+  EXPECT_FALSE(open_bridge(to, messages).any());
 }
 
 // "Killing the bridge peer at any moment brings the force to zero within 100 ms without a step beyond the slew limit."
@@ -463,9 +464,9 @@ TEST(Bridge, the_simulator_dies) {
     EXPECT_EQ(length(t.fake.force(a)), 0);
     EXPECT_LE(t.fake.at(a).step_most, 0.5 + 1e-4);
   }
-  bool told = false;
-  for (const std::string& line : t.server->news()) told |= line.find("silent") != std::string::npos;
-  EXPECT_TRUE(told);
+  bool messages = false;
+  for (const std::string& line : t.server->news()) messages |= line.find("silent") != std::string::npos;
+  EXPECT_TRUE(messages);
   // It comes back with the force it had wanted: nothing is let in until little is wanted, and then over two seconds.
   t.answers = {true, true};
   t.simulator->send(t.simulator->sealed(BridgeKind::ask, 0, {}));
@@ -481,7 +482,7 @@ TEST(Bridge, the_simulator_dies) {
   EXPECT_LT(length(t.fake.force(0)), 0.2f);
 }
 
-// The same where only one arm's orders stop, or one arm is lost at this end: the other's force goes on to the bit.
+// The same where only one arm's orders stop, or one arm is lost at this end: the other's force continues to the bit.
 TEST(Bridge, the_other_hand_never_notices) {
   for (const bool lost : {false, true}) {
     SCOPED_TRACE(lost);
@@ -570,8 +571,8 @@ struct Both : Lent {
   explicit Both(BridgeOptions o = {}) {
     o.where = "127.0.0.1:" + std::to_string(server->port());
     o.patience = 5;
-    port = open_bridge(o, told);
-    for (const std::string& line : told) ADD_FAILURE() << line;
+    port = open_bridge(o, messages);
+    for (const std::string& line : messages) ADD_FAILURE() << line;
     std::string why;
     EXPECT_TRUE(port.any() && port.start(port.self, {step, this}, why));
   }
@@ -663,7 +664,7 @@ TEST(Bridge, the_arms_end_is_restarted) {
   o.listen = "127.0.0.1:" + std::to_string(port);
   o.clock = [] { return test_ns.load(); };
   t.fake.reset();
-  t.server = std::make_unique<ArmServer>(open_touch({}, t.told), o);
+  t.server = std::make_unique<ArmServer>(open_touch({}, t.messages), o);
   ASSERT_TRUE(wait_for([&] {
     test_ns += 1000000;
     t.fake.step(1);
@@ -755,8 +756,8 @@ TEST(Bridge, garbage_from_the_arms_end) {
   BridgeOptions o;
   o.where = end.where();
   o.patience = 5;
-  std::vector<std::string> told;
-  ArmPort port = open_bridge(o, told);
+  std::vector<std::string> messages;
+  ArmPort port = open_bridge(o, messages);
   EXPECT_TRUE(port.any());
   if (port.any()) {
     static std::atomic<int> ready{0};
@@ -781,16 +782,16 @@ TEST(Bridge, garbage_from_the_arms_end) {
 
 TEST(Bridge, nothing_to_work_with_is_one_line) {
   const auto line = [](const std::string& where, const char* needle, float patience = 0.2f) {
-    std::vector<std::string> told;
+    std::vector<std::string> messages;
     BridgeOptions o;
     o.where = where;
     o.patience = patience;
-    EXPECT_FALSE(open_bridge(o, told).any()) << where;
-    ASSERT_EQ(told.size(), 1u) << where;
-    EXPECT_NE(told[0].find(needle), std::string::npos) << told[0];
-    EXPECT_EQ(told[0].find('\n'), std::string::npos);
+    EXPECT_FALSE(open_bridge(o, messages).any()) << where;
+    ASSERT_EQ(messages.size(), 1u) << where;
+    EXPECT_NE(messages[0].find(needle), std::string::npos) << messages[0];
+    EXPECT_EQ(messages[0].find('\n'), std::string::npos);
   };
-  ArmEnd end;  // at first nobody who answers
+  ArmEnd end;  // at first no one who answers
   line(end.where(), "start `catgut bridge` on the device's computer");
   line("127.0.0.1:99999", "is not HOST:PORT");
   line("127.0.0.1:x", "is not HOST:PORT");
@@ -838,9 +839,9 @@ TEST(Bridge, an_arm_in_python) {
   BridgeOptions o;
   o.where = "127.0.0.1:" + text.substr(text.find_last_of(' ') + 1);
   o.patience = 5;
-  std::vector<std::string> told;
-  ArmPort port = open_bridge(o, told);
-  for (const std::string& line : told) ADD_FAILURE() << line;
+  std::vector<std::string> messages;
+  ArmPort port = open_bridge(o, messages);
+  for (const std::string& line : messages) ADD_FAILURE() << line;
   EXPECT_TRUE(port.arm[0].present && !port.arm[1].present);
   EXPECT_EQ(port.arm[0].serial, "py-1");
   if (port.any()) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/device: the driver of Force Dimension's arms against a simulated libdhd, through the same dlopen and the same symbols
 // as the real one; the servo in between is the real one. In the double the first device is the left hand's.
 #include "device/force_dimension.h"
@@ -59,7 +60,7 @@ struct FakeDhd {
 // Both arms on servos, a millisecond at a time.
 struct Two {
   FakeDhd fake{true};
-  std::vector<std::string> told;
+  std::vector<std::string> messages;
   ArmPort port;
   std::array<ServoHand, 2> hand;
   std::array<ServoOptions, 2> options;
@@ -83,7 +84,7 @@ struct Two {
   void open() {
     ForceDimensionOptions o;
     o.paced = false;
-    port = open_force_dimension(o, told);
+    port = open_force_dimension(o, messages);
     for (size_t k = 0; k < 2; ++k) fit_to_arm(options[k], port.arm[k].limits);
     std::string why;
     if (port.any()) { ASSERT_TRUE(port.start(port.self, {step, this}, why)) << why; }
@@ -119,7 +120,7 @@ constexpr double kStraight[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 TEST(ForceDimension, tells_what_it_found) {
   Two t;
   t.open();
-  EXPECT_TRUE(t.told.empty());
+  EXPECT_TRUE(t.messages.empty());
   ASSERT_TRUE(t.port.arm[0].present && t.port.arm[1].present);
   EXPECT_EQ(t.port.arm[0].serial, "fd-1001");
   EXPECT_EQ(t.port.arm[1].serial, "fd-1000") << "the left-handed one is the left hand's";
@@ -195,7 +196,7 @@ TEST(ForceDimension, the_physics_dies) {
   EXPECT_LE(t.fake.at(0).step_most, 0.5 + 1e-4);
 }
 
-// An arm is unplugged and plugged in again: its force is gone, the other hand's goes on to the bit, and it comes back through
+// An arm is unplugged and plugged in again: its force is gone, the other hand's continues to the bit, and it comes back through
 // the ramp.
 TEST(ForceDimension, H7_an_arm_is_unplugged) {
   Two t;
@@ -245,7 +246,7 @@ TEST(ForceDimension, an_arm_hangs) {
   t.port.reset();
   EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(5));
   EXPECT_EQ(t.fake.at(1).output, 0) << "the other one was left as it should be";
-  t.fake.fault(FakeDhd::device(0), kDhdHang, 0);  // the thread that was left behind finds nobody, and ends
+  t.fake.fault(FakeDhd::device(0), kDhdHang, 0);  // the thread that was left behind finds no one, and ends
   t.fake.fault(FakeDhd::device(0), kDhdUnplugged, 1);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
 }
@@ -280,13 +281,13 @@ TEST(ForceDimension, nothing_to_work_with_is_one_line) {
   const auto line = [&fake](const char* name, const char* value, const char* needle, const std::string& library = "") {
     if (*name) setenv(name, value, 1);
     fake.reset();
-    std::vector<std::string> told;
+    std::vector<std::string> messages;
     ForceDimensionOptions o;
     o.library = library;
-    EXPECT_FALSE(open_force_dimension(o, told).any()) << needle;
-    ASSERT_FALSE(told.empty());
-    EXPECT_NE(told.back().find(needle), std::string::npos) << told.back();
-    EXPECT_EQ(told.back().find('\n'), std::string::npos);
+    EXPECT_FALSE(open_force_dimension(o, messages).any()) << needle;
+    ASSERT_FALSE(messages.empty());
+    EXPECT_NE(messages.back().find(needle), std::string::npos) << messages.back();
+    EXPECT_EQ(messages.back().find('\n'), std::string::npos);
     if (*name) unsetenv(name);
   };
   line("FAKE_DHD_COUNT", "0", "no device");
@@ -301,7 +302,7 @@ TEST(ForceDimension, one_arm_is_enough) {
   setenv("FAKE_DHD_COUNT", "1", 1);
   t.fake.reset();
   t.open();
-  EXPECT_TRUE(t.told.empty());
+  EXPECT_TRUE(t.messages.empty());
   EXPECT_TRUE(!t.port.arm[0].present && t.port.arm[1].present);
   t.run(20);
   EXPECT_EQ(t.port.status(t.port.self, 0).steps, 0u);
@@ -312,8 +313,8 @@ TEST(ForceDimension, one_arm_is_enough) {
 // Leaving takes the force off by the slew, then switches the motors off. In real time, as the arm keeps it.
 TEST(ForceDimension, leaving) {
   FakeDhd fake(false);
-  std::vector<std::string> told;
-  ArmPort port = open_force_dimension({}, told);
+  std::vector<std::string> messages;
+  ArmPort port = open_force_dimension({}, messages);
   ASSERT_TRUE(port.any());
   const auto hold = [](void*, size_t, const ArmSample&) { return Vec3{0, 2, 0}; };
   std::string why;

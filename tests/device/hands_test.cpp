@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/device: motions do what they look like, the help goes where the needle is best held, and a mouse alone can make a bite.
 #include <gtest/gtest.h>
 
@@ -18,14 +19,14 @@ namespace {
 
 constexpr float kDt = 1.0f / 60;
 
-struct Desk {
+struct WorkQueue {
   PictureModel picture;
   Snapshot seen;
   ViewFrame view = view_frame({0.02f, 0.2f, 0.25f}, {}, {0, 1, 0}, 30, 720);
   Steering steering;
   MouseHand mouse;
   std::array<ToolInput, 2> out;
-  Desk() {
+  WorkQueue() {
     picture.field = 0.06f;
     picture.instrument.resize(2);
     picture.instrument[0].capabilities = kHoldNeedle | kHoldThread | kHoldTissue | kClamp | kCutThread;  // a needle holder
@@ -54,7 +55,7 @@ MouseInput moved(float right, float down) {
 }
 
 TEST(Mouse, the_tool_stays_under_the_pointer) {
-  Desk d;
+  WorkQueue d;
   const auto from = on_screen(d.view, d.out[0].pose.p);
   const Vec3 start = d.out[0].pose.p, other = d.out[1].pose.p;
   d.turn(moved(30, -20));
@@ -67,7 +68,7 @@ TEST(Mouse, the_tool_stays_under_the_pointer) {
 }
 
 TEST(Mouse, wheel_and_shift_go_into_the_picture) {
-  Desk d;
+  WorkQueue d;
   const Vec3 start = d.out[0].pose.p;
   MouseInput in;
   in.wheel = 3;
@@ -82,7 +83,7 @@ TEST(Mouse, wheel_and_shift_go_into_the_picture) {
 }
 
 TEST(Mouse, tab_changes_hands_and_speed_scales) {
-  Desk d;
+  WorkQueue d;
   MouseInput in = moved(10, 0);
   in.hand_changes = 1;
   const Vec3 right = d.out[0].pose.p, left = d.out[1].pose.p;
@@ -101,7 +102,7 @@ TEST(Mouse, tab_changes_hands_and_speed_scales) {
 }
 
 TEST(Mouse, the_jaw_is_a_ratchet_or_is_held) {
-  Desk d;
+  WorkQueue d;
   MouseInput press;
   press.jaw_presses = 1;
   press.jaw_down = true;
@@ -120,7 +121,7 @@ TEST(Mouse, the_jaw_is_a_ratchet_or_is_held) {
 }
 
 TEST(Mouse, keys_are_buttons_of_the_active_hand_while_they_are_down) {
-  Desk d;
+  WorkQueue d;
   MouseInput in;
   in.cut = in.fresh = true;
   d.turn(in);
@@ -131,7 +132,7 @@ TEST(Mouse, keys_are_buttons_of_the_active_hand_while_they_are_down) {
 }
 
 TEST(Mouse, the_right_button_turns_a_held_needle_about_its_own_circle) {
-  Desk d;
+  WorkQueue d;
   d.seen.active().needle.pose = {{0.01f, 0.02f, 0.03f}, axis_angle(normalized(Vec3{1, 2, 3}), 0.7f)};
   d.seen.tool[0].held = Held::needle;
   const Pose grip{{0.004f, 0.007f, 0}, axis_angle({1, 0, 0}, 0.4f)};
@@ -141,14 +142,14 @@ TEST(Mouse, the_right_button_turns_a_held_needle_about_its_own_circle) {
   in.turn = true;
   d.turn(in);
   const Pose needle = d.out[0].pose * inverse(grip);
-  EXPECT_LT(distance(needle.p, d.seen.active().needle.pose.p), 1e-6f) << "its centre stays";
+  EXPECT_LT(distance(needle.p, d.seen.active().needle.pose.p), 1e-6f) << "its center stays";
   const Vec3 turned = rotation_vector(conjugate(d.seen.active().needle.pose.q) * needle.q);
   EXPECT_NEAR(turned.z, 0.6f, 1e-4f) << "tip first";
   EXPECT_NEAR(std::hypot(turned.x, turned.y), 0, 1e-4f);
 }
 
 TEST(Mouse, without_a_needle_the_tool_turns_about_its_shaft_or_as_a_ball) {
-  Desk d;
+  WorkQueue d;
   const Pose start = d.out[0].pose;
   MouseInput in = moved(50, 0);
   in.turn = true;
@@ -164,7 +165,7 @@ TEST(Mouse, without_a_needle_the_tool_turns_about_its_shaft_or_as_a_ball) {
 }
 
 TEST(Steer, left_handed_is_the_mirror_image) {
-  Desk d;
+  WorkQueue d;
   const Steering left = start_steering(d.picture, true), right = start_steering(d.picture, false);
   for (size_t k = 0; k < 2; ++k) {
     EXPECT_EQ(left.hand[k].pose.p.x, -right.hand[k].pose.p.x);
@@ -174,14 +175,14 @@ TEST(Steer, left_handed_is_the_mirror_image) {
 }
 
 TEST(Steer, no_motion_takes_a_hand_out_of_reach) {
-  Desk d;
+  WorkQueue d;
   for (int i = 0; i < 50; ++i) d.turn(moved(900, -700));
   EXPECT_LT(length(d.out[0].pose.p), 0.36f);
   EXPECT_TRUE(is_finite(d.out[0].pose.p));
 }
 
 TEST(Steer, after_a_jump_in_time_hands_go_on_from_the_tools) {
-  Desk d;
+  WorkQueue d;
   d.turn(moved(80, 30));
   const Pose grip{{0.004f, 0.007f, 0}, axis_angle({1, 0, 0}, 0.4f)};
   d.seen.active().needle.pose = {{0.01f, 0.02f, 0.03f}, axis_angle(normalized(Vec3{1, 2, 3}), 0.7f)};
@@ -198,11 +199,11 @@ TEST(Steer, after_a_jump_in_time_hands_go_on_from_the_tools) {
   in.turn = true;
   d.turn(in);
   EXPECT_LT(distance((d.out[0].pose * inverse(grip)).p, d.seen.active().needle.pose.p), 1e-6f)
-      << "and turns it about its own centre";
+      << "and turns it about its own center";
 }
 
 TEST(Help, takes_an_open_jaw_to_the_good_place_and_lets_go_of_a_moving_hand) {
-  Desk d;
+  WorkQueue d;
   d.seen.active().needle.pose = {d.out[0].pose.p + d.view.ahead * 0.04f, axis_angle({1, 0, 0}, -0.5f * kPi)};
   const float phi = 0.35f * d.picture.suture[0].needle_arc;
   const Vec3 place =
@@ -236,7 +237,7 @@ TEST(Help, takes_an_open_jaw_to_the_good_place_and_lets_go_of_a_moving_hand) {
 }
 
 // Thread from a stitch in the middle of the field to the needle, which the forceps holds; the tail lies in front.
-void with_a_stitch(Desk& d) {
+void with_a_stitch(WorkQueue& d) {
   for (uint32_t i = 0; i < 41; ++i) {
     const float s = 0.002f * static_cast<float>(i);
     d.seen.active().thread_order.push_back(i);
@@ -256,7 +257,7 @@ TEST(Help, one_gesture_moves_both_hands_unless_it_is_switched_off) {
   MouseInput in = moved(60, 0);
   in.both = true;
   for (const bool assist : {true, false}) {
-    Desk d;
+    WorkQueue d;
     with_a_stitch(d);
     d.steering.assist = assist;
     const Vec3 driver = d.steering.hand[0].pose.p, forceps = d.steering.hand[1].pose.p;
@@ -269,7 +270,7 @@ TEST(Help, one_gesture_moves_both_hands_unless_it_is_switched_off) {
 }
 
 TEST(Help, an_end_is_not_drawn_farther_than_it_is_long) {
-  Desk d;
+  WorkQueue d;
   with_a_stitch(d);
   const float strand = 0.05f;  // from the stitch to the needle
   const Vec3 stitch = d.seen.particle[15];
@@ -284,7 +285,7 @@ TEST(Help, an_end_is_not_drawn_farther_than_it_is_long) {
 }
 
 TEST(Help, the_jaws_find_the_tail_while_the_other_hand_has_the_needle) {
-  Desk d;
+  WorkQueue d;
   with_a_stitch(d);
   TailGrip grip;
   ASSERT_TRUE(tail_grip(d.picture, d.seen, 0, grip));
@@ -296,7 +297,7 @@ TEST(Help, the_jaws_find_the_tail_while_the_other_hand_has_the_needle) {
 }
 
 TEST(Help, a_held_needle_comes_to_the_bite_and_is_driven_from_there) {
-  Desk d;
+  WorkQueue d;
   d.seen.active().needle.pose = {{0.03f, 0.03f, 0}, axis_angle({1, 0, 0}, 0.3f)};
   d.seen.tool[0].held = Held::needle;
   d.seen.tool[0].pose = d.steering.hand[0].pose =
@@ -325,7 +326,7 @@ TEST(Help, a_held_needle_comes_to_the_bite_and_is_driven_from_there) {
 }
 
 TEST(Help, the_second_hand_takes_the_other_place) {
-  Desk d;
+  WorkQueue d;
   d.seen.active().needle.pose = {};
   d.seen.tool[0].held = Held::needle;
   d.seen.tool[0].held_at = 0.35f;
@@ -336,7 +337,7 @@ TEST(Help, the_second_hand_takes_the_other_place) {
 }
 
 TEST(Gamepad, each_stick_moves_its_hand) {
-  Desk d;
+  WorkQueue d;
   GamepadHand pad;
   GamepadInput in;
   in.right.x = 1;
@@ -357,7 +358,7 @@ TEST(Gamepad, each_stick_moves_its_hand) {
 }
 
 TEST(Gamepad, triggers_close_the_jaws_and_leave_a_mouses_alone) {
-  Desk d;
+  WorkQueue d;
   GamepadHand pad;
   GamepadInput in;
   d.steering.hand[0].closed = true;  // by the mouse
@@ -379,7 +380,7 @@ TEST(Gamepad, triggers_close_the_jaws_and_leave_a_mouses_alone) {
   EXPECT_EQ(d.out[0].buttons, kButtonCut);
 }
 
-// Somebody who looks at the picture and has nothing but a mouse: every step below is pixels, notches and buttons.
+// A user who looks at the picture and has nothing but a mouse: every step below is pixels, notches and buttons.
 class MousePerson {
  public:
   // ticks: of the simulation between two pictures; hands get there as they do in runtime/live.

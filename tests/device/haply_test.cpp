@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/device: the driver of Haply's arms against a service of the same shape, over a WebSocket as with the real one; the
 // servo in between is the real one. Messages are counted: one is a millisecond of the arms. The first device is the left
 // hand's.
@@ -32,7 +33,7 @@ Vec3 force_of(const FakeHaply::Arm& a) {
 
 struct Two {
   FakeHaply fake;
-  std::vector<std::string> told;
+  std::vector<std::string> messages;
   ArmPort port;
   std::array<ServoHand, 2> hand;
   std::array<ServoOptions, 2> options;
@@ -63,8 +64,8 @@ struct Two {
     HaplyOptions o;
     o.where = fake.where();
     o.patience = 5, o.forget = 5, o.paced = false;  // this machine may be busy
-    port = open_haply(o, told);
-    for (const std::string& line : told) ADD_FAILURE() << line;
+    port = open_haply(o, messages);
+    for (const std::string& line : messages) ADD_FAILURE() << line;
     for (size_t k = 0; k < 2; ++k) fit_to_arm(options[k], port.arm[k].limits), options[k].limiter.ramp = 0.2f;
     std::string why;
     if (port.any()) { EXPECT_TRUE(port.start(port.self, {step, this}, why)) << why; }
@@ -75,8 +76,8 @@ struct Two {
   }
   Vec3 force(size_t h) const { return force_of(fake.at(h == 0 ? 1 : 0)); }
   template <typename F>
-  void run(int messages, const F& each) {
-    for (int k = 0; k < messages; ++k) fake.step(1), each(k);
+  void run(int packets, const F& each) {
+    for (int k = 0; k < packets; ++k) fake.step(1), each(k);
   }
   void engage(float right, float left) {
     fake.step(300);
@@ -130,7 +131,7 @@ TEST(Haply, the_physics_dies) {
   EXPECT_LE(t.fake.at(1).step_most, 0.5 + 1e-4);
 }
 
-// One arm is lost and comes back; the other's force goes on to the bit.
+// One arm is lost and comes back; the other's force continues to the bit.
 TEST(Haply, H7_an_arm_is_lost) {
   Two t;
   t.engage(0.9f, 0.6f);
@@ -201,8 +202,8 @@ TEST(Haply, the_service_stands_still) {
   HaplyOptions o;
   o.where = fake.where();
   o.patience = 5;
-  std::vector<std::string> told;
-  ArmPort port = open_haply(o, told);
+  std::vector<std::string> messages;
+  ArmPort port = open_haply(o, messages);
   ASSERT_TRUE(port.any());
   static std::atomic<uint64_t> lost{0};
   lost = 0;
@@ -237,14 +238,14 @@ TEST(Haply, the_service_stands_still) {
 
 TEST(Haply, nothing_to_work_with_is_one_line) {
   const auto line = [](const std::string& where, const char* needle) {
-    std::vector<std::string> told;
+    std::vector<std::string> messages;
     HaplyOptions o;
     o.where = where;
     o.patience = 0.2f;
-    EXPECT_FALSE(open_haply(o, told).any()) << needle;
-    ASSERT_EQ(told.size(), 1u);
-    EXPECT_NE(told[0].find(needle), std::string::npos) << told[0];
-    EXPECT_EQ(told[0].find('\n'), std::string::npos);
+    EXPECT_FALSE(open_haply(o, messages).any()) << needle;
+    ASSERT_EQ(messages.size(), 1u);
+    EXPECT_NE(messages[0].find(needle), std::string::npos) << messages[0];
+    EXPECT_EQ(messages[0].find('\n'), std::string::npos);
   };
   std::string gone;
   {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/device: the driver of the Touch against a simulated libHD, through the same dlopen and the same symbols as the real
 // one. Criteria H1, H7 and H9 of docs/rooms/haptic.md; the servo in between is the real one.
 #include "device/touch.h"
@@ -17,7 +18,7 @@ namespace {
 // Both arms on servos of their own, fed with a patch each.
 struct Two {
   FakeHd fake{true};
-  std::vector<std::string> told;
+  std::vector<std::string> messages;
   ArmPort port;
   std::array<ServoHand, 2> hand;
   std::array<ServoOptions, 2> options;
@@ -41,7 +42,7 @@ struct Two {
     return out.force;
   }
   void open() {
-    port = open_touch({}, told);
+    port = open_touch({}, messages);
     std::string why;
     if (port.any()) { ASSERT_TRUE(port.start(port.self, {step, this}, why)) << why; }
     for (size_t k = 0; k < 2; ++k) fit_to_arm(options[k], port.arm[k].limits);
@@ -115,7 +116,7 @@ TEST(Touch, tells_what_it_found) {
   Two t;
   t.open();
   ASSERT_TRUE(t.port.arm[0].present && t.port.arm[1].present);
-  EXPECT_TRUE(t.told.empty());
+  EXPECT_TRUE(t.messages.empty());
   EXPECT_EQ(t.port.arm[0].serial, "right-0001");
   EXPECT_EQ(t.port.arm[1].serial, "left-0002");
   EXPECT_FLOAT_EQ(t.port.arm[1].limits.force, 3.3f);
@@ -125,7 +126,7 @@ TEST(Touch, tells_what_it_found) {
   EXPECT_FLOAT_EQ(t.port.arm[0].most.x, 0.08f);
 }
 
-// Positions in metres, the matrix by columns, buttons as bits.
+// Positions in meters, the matrix by columns, buttons as bits.
 TEST(Touch, poses_come_whole) {
   Two t;
   t.open();
@@ -177,8 +178,8 @@ TEST(Haptics, H9_forces_are_never_swapped) {
   EXPECT_EQ(bad, 0);
 }
 
-// H7: an arm is lost at any moment and comes back. Its force is gone and returns through the ramp; the other hand's goes on as
-// if nothing had happened, to the bit.
+// H7: an arm is lost at any moment and comes back. Its force is gone and returns through the ramp; the other hand's continues
+// as if nothing had happened, to the bit.
 TEST(Haptics, H7_an_arm_is_lost_and_comes_back) {
   for (const int lost : {0, 1}) {
     SCOPED_TRACE(lost);
@@ -255,9 +256,9 @@ TEST(Touch, force_errors_are_reported_wherever_they_are_raised) {
       engage(t, {0.9f, 0, 0}, {0, 0.5f, 0});
       ASSERT_NEAR(length(t.fake.force(0)), 0.9f, 0.01f);
       t.fake.raise(0, 0, code, where, 300);
-      int told = 0;
-      t.run(300, [&](int) { told += t.sample[0].forced_off; });
-      EXPECT_GE(told, 298);
+      int messages = 0;
+      t.run(300, [&](int) { messages += t.sample[0].forced_off; });
+      EXPECT_GE(messages, 298);
       EXPECT_EQ(length(t.fake.force(0)), 0) << "nothing is left to come back at once";
       EXPECT_NEAR(length(t.fake.force(1)), 0.5f, 0.01f) << "the other hand's";
       EXPECT_EQ(t.port.status(t.port.self, 0).error, code);
@@ -267,7 +268,8 @@ TEST(Touch, force_errors_are_reported_wherever_they_are_raised) {
     }
 }
 
-// An error belongs to the arm that its record names, in whoever's frame it is found; the worst of several is the one shown.
+// An error belongs to the arm that its record names, in a caller that's frame it is found; the worst of several is the one
+// shown.
 TEST(Touch, errors_go_to_the_arm_they_name) {
   Two t;
   t.open();
@@ -318,7 +320,7 @@ TEST(Touch, a_flipped_axis) {
 }
 
 // The scheduler itself stops: nothing can be written any more. What the arm does then is its maker's watchdog's; ours is that
-// the steps stop, which whoever feeds the simulation sees.
+// the steps stop, which a caller that feeds the simulation sees.
 TEST(Touch, the_scheduler_stalls) {
   Two t;
   t.open();
@@ -352,8 +354,8 @@ TEST(Touch, one_arm_is_missing) {
   setenv("FAKE_HD_MISSING", "left", 1);
   t.fake.reset();
   t.open();
-  ASSERT_EQ(t.told.size(), 1u);
-  EXPECT_NE(t.told[0].find("no left device"), std::string::npos) << t.told[0];
+  ASSERT_EQ(t.messages.size(), 1u);
+  EXPECT_NE(t.messages[0].find("no left device"), std::string::npos) << t.messages[0];
   EXPECT_TRUE(t.port.arm[0].present);
   t.run(100);
   EXPECT_EQ(t.calls[0], 100u);
@@ -363,12 +365,12 @@ TEST(Touch, one_arm_is_missing) {
 TEST(Touch, nothing_to_work_with_is_one_line) {
   FakeHd fake(true);
   const auto line = [](const char* needle, const TouchOptions& options = {}) {
-    std::vector<std::string> told;
-    const ArmPort port = open_touch(options, told);
+    std::vector<std::string> messages;
+    const ArmPort port = open_touch(options, messages);
     EXPECT_FALSE(port.any());
-    ASSERT_FALSE(told.empty());
-    EXPECT_NE(told.back().find(needle), std::string::npos) << told.back();
-    EXPECT_EQ(told.back().find('\n'), std::string::npos);
+    ASSERT_FALSE(messages.empty());
+    EXPECT_NE(messages.back().find(needle), std::string::npos) << messages.back();
+    EXPECT_EQ(messages.back().find('\n'), std::string::npos);
   };
   setenv("FAKE_HD_MISSING", "all", 1);
   fake.reset();
@@ -396,8 +398,8 @@ TEST(Touch, an_arm_left_open_by_a_crash_is_taken_over) {
 // Leaving takes the force off by the slew, then switches the motors off.
 TEST(Touch, leaving) {
   FakeHd fake(false);  // with its own thread, as stop() waits for it
-  std::vector<std::string> told;
-  ArmPort port = open_touch({}, told);
+  std::vector<std::string> messages;
+  ArmPort port = open_touch({}, messages);
   ASSERT_TRUE(port.any());
   std::string why;
   struct Hold {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/docs: what the pages say about the repository is so: the README's program is the sample that is built and run, links
 // lead somewhere, files that are named exist.
 #include <gtest/gtest.h>

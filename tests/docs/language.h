@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/docs: the checker of our language. Pure: text in, findings out, so that a test can show that it finds what it should.
 #pragma once
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/docs: the language of pages, screens, messages and names is that of docs/glossary.md. The first tests show that the
 // checker finds what it should.
 #include "language.h"

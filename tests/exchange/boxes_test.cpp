@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/exchange: the boxes between threads: newest wins and never torn, nothing lost and in order, no memory asked for.
 // Meaningful under the thread sanitizer: payloads are plain data, so a missing order between the threads would show as a race.
 #include <gtest/gtest.h>

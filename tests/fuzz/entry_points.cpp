@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/fuzz: see entry_points.h.
 #include "entry_points.h"
 
@@ -130,7 +131,7 @@ bool state(const uint8_t* data, size_t size) {
   const StatePtr state = initial_state(model);
   if (!guarded([&] { load_state(model, *state, bytes); })) return false;
   if (save_state(model, *state) != bytes) fault("a state changed in loading and saving");
-  // What was accepted must be safe to go on from, however odd.
+  // What was accepted must be safe to continue from, however odd.
   Jobs jobs(1);
   TickInput input;
   Snapshot seen;
@@ -138,7 +139,7 @@ bool state(const uint8_t* data, size_t size) {
     step(model, *state, input, jobs);
     publish(model, *state, seen);
   }
-  state_is_sane(model, *state);
+  state_is_valid(model, *state);
   return true;
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/fuzz: every door through which bytes from outside come in. Each entry point takes any bytes and returns when they were
 // read or refused with an InputError of one line; whatever else happens (another exception, a crash, no end) is a fault.
 // Driven by libFuzzer (tests/fuzz/libfuzzer, -DCATGUT_FUZZ=ON with clang) and by fuzz_test.cpp in every build.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/fuzz: the fuzzing that every build does: each file of the corpus as it is, and two thousand seeded mutations of them.
 // The same seeds every time: a failure here is the same failure everywhere. For longer hunts see docs/fuzzing.md.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "geometry/mesh_io.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,7 @@ std::string file(const std::string& name, const std::string& text) {
   return path;
 }
 
-// An open tube along y as OBJ text, `scale` metres to the decimetre or so.
+// An open tube along y as OBJ text, `scale` meters to the decimeter or so.
 std::string tube(double scale, const std::string& name = "tube", int first = 1, double shift = 0) {
   std::string text = "o " + name + "\n";
   for (int i = 0; i < 6; ++i) {
@@ -104,7 +105,7 @@ TEST(MeshIo, SaysWhatItCannotUse) {
               "2 separate surfaces side by side");
 }
 
-// A kilobyte that asks for gigabytes is refused before anything is asked for.
+// A kilobyte that asks for gigabytes is refused before anything is requested.
 TEST(MeshIo, RefusesHostileGltfAtOnce) {
   const auto gltf = [&](const std::string& more) {
     return refusal(file("hostile.gltf", "{\"asset\":{\"version\":\"2.0\"}," + more + "}"));

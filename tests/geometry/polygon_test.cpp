@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "geometry/polygon.h"
 
 #include <gtest/gtest.h>
@@ -9,23 +10,23 @@
 namespace catgut {
 namespace {
 
-std::vector<Vec3> circle(int n, float r, Vec3 centre, Vec3 axis) {
+std::vector<Vec3> circle(int n, float r, Vec3 center, Vec3 axis) {
   const Vec3 e1 = any_perpendicular(axis), e2 = cross(axis, e1);
   std::vector<Vec3> loop;
   for (int i = 0; i < n; ++i) {
     const float a = 2 * kPi * static_cast<float>(i) / static_cast<float>(n);
-    loop.push_back(centre + e1 * (r * std::cos(a)) + e2 * (r * std::sin(a)));
+    loop.push_back(center + e1 * (r * std::cos(a)) + e2 * (r * std::sin(a)));
   }
   return loop;
 }
 
 TEST(Polygon, CircleFarFromTheOrigin) {
-  const Vec3 axis = normalized(Vec3{1, -2, 0.5f}), centre{3, 1, -2};
-  const auto loop = circle(200, 0.02f, centre, axis);
+  const Vec3 axis = normalized(Vec3{1, -2, 0.5f}), center{3, 1, -2};
+  const auto loop = circle(200, 0.02f, center, axis);
   EXPECT_NEAR(loop_area(loop), 3.14159f * 0.0004f, 1e-6f);
   EXPECT_NEAR(loop_length(loop), 0.12566f, 1e-4f);
   EXPECT_NEAR(dot(loop_normal(loop), axis), 1, 1e-4f);
-  EXPECT_LT(distance(loop_centre(loop), centre), 1e-6f);
+  EXPECT_LT(distance(loop_center(loop), center), 1e-6f);
 }
 
 TEST(Polygon, TooFewPointsHaveNoArea) {
@@ -53,7 +54,7 @@ TEST(Topology, RimsRunCounterClockwiseSeenFromTheirOpening) {
     EXPECT_EQ(p.size(), 4u);
     EXPECT_NEAR(loop_normal(p).y, up, 1e-6f);
   }
-  EXPECT_EQ(vertex_neighbours(box.triangle, 8)[0], (std::vector<uint32_t>{1, 3, 4, 5}));
+  EXPECT_EQ(vertex_neighbors(box.triangle, 8)[0], (std::vector<uint32_t>{1, 3, 4, 5}));
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "geometry/skin.h"
 
 #include <gtest/gtest.h>
@@ -82,7 +83,7 @@ TEST(Skin, RigidMotionStaysRigid) {
 }
 
 // A stretch by 20 % along and a shear, rotations left at rest: the picture must follow within a fraction of the particle
-// spacing and without steps between neighbouring vertices.
+// spacing and without steps between neighboring vertices.
 TEST(Skin, StretchIsFollowedSmoothly) {
   const int fine = 140;
   const Patch p = make_patch(fine);

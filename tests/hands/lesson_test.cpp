@@ -1,4 +1,5 @@
-// tests/hands: the lesson: every step is recognised when somebody does it, not before; and the scripted surgeon can show each
+// SPDX-License-Identifier: Apache-2.0
+// tests/hands: the lesson: every step is recognized when a user does it, not before; and the scripted surgeon can show each
 // from where a learner is, with the needle as a learner holds it.
 #include <gtest/gtest.h>
 
@@ -45,12 +46,12 @@ TEST(LessonData, what_was_done_at_once_is_behind) {
   seen.active().bite[1].complete = true;  // through both walls in one sweep
   EXPECT_EQ(next_step(lesson, 1, seen, {}), 4u);
   EXPECT_EQ(step_from(lesson, seen), 4u);
-  const Event begun[] = {{EventKind::knot_begun, 0, 0, 1, {}}};
+  const Event begun[] = {{EventKind::throw_started, 0, 0, 1, {}}};
   EXPECT_EQ(next_step(lesson, 7, seen, {}), 7u);
   EXPECT_EQ(next_step(lesson, 7, seen, begun), 8u) << "shorter than a picture";
 }
 
-// Somebody goes through the lesson with the mouse. Before every step the surgeon shows it, from where they are; then what was
+// A user goes through the lesson with the mouse. Before every step the surgeon shows it, from where they are; then what was
 // shown is undone, as the window does it.
 TEST(Lessons, each_step_is_shown_undone_and_done_by_mouse) {
   AtTheMouse desk(1);

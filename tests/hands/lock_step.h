@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/hands: a desk without a window: device rooms and the simulation alone, in lock step.
 #pragma once
 #include "device/gamepad.h"
@@ -19,7 +20,7 @@ inline SceneSpec at_the_mouse(const std::string& name) {
 }
 
 // ticks: of the simulation between two pictures; hands get there as they do in runtime/live.
-class LockStep : public Desk {
+class LockStep : public WorkQueue {
  public:
   explicit LockStep(int ticks)
       : ticks_(ticks),

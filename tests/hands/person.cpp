@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/hands: see person.h.
 #include "person.h"
 
@@ -35,7 +36,7 @@ MouseInput by_mouse(const Act& act, const Look& look, float speed) {
 
 GamepadInput by_pad(const Act& act, const Look& look, GamepadInput& pad) {
   const HandMotion& m = act.motion;
-  // How far a stick goes for so much of its full speed: the inverse of what the device does with it.
+  // How far a stick goes for that much of its full speed: the inverse of what the device does with it.
   const auto stick = [&](float amount, float full) {
     const float part = std::min(1.0f, std::abs(amount) / (full * look.dt));
     return part < 0.003f ? 0.0f : std::copysign(0.15f + 0.85f * std::sqrt(part), amount);
@@ -208,7 +209,7 @@ bool Person::lay_tail() {
   const Vec3 place = at + 0.034f * normalized(Vec3{0.9f, 0.3f, 0.5f});
   point(
       0, [=] { return place; }, [&] { return distance(hand(0).pose.p, place) < 0.006f; }, true, 2.5f);
-  wait(0.5f, [] { return false; });  // it comes to rest before it is let go
+  wait(0.5f, [] { return false; });  // it settles before it is let go
   if (!let_go(0)) return false;
   aside(0);
   return true;
@@ -220,7 +221,7 @@ bool Person::draw_together() {
       if (s.midpoint && s.progress < 0.985f) return false;
     return !seen().active().seam.empty();
   };
-  // Where it sticks, or the tail slips: let go and take it anew.
+  // Where it sticks, or the tail slips: let go and take it again.
   for (int attempt = 0; attempt < 3; ++attempt) {
     doing_ = "take the tail";
     if (!take_tail()) return false;
@@ -247,8 +248,8 @@ bool Person::wind(int way) {
 
 bool Person::set_throw() {
   doing_ = "draw the throw down";
-  const size_t locked = desk_.count(EventKind::knot_locked);
-  const auto set = [&] { return desk_.count(EventKind::knot_locked) > locked; };
+  const size_t locked = desk_.count(EventKind::throw_locked);
+  const auto set = [&] { return desk_.count(EventKind::throw_locked) > locked; };
   if (!both(4, [&] { return set() || seen().tool[0].held == Held::nothing; }) || !set()) return false;
   doing_ = "lay the tail down";
   return lay_tail();

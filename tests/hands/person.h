@@ -1,6 +1,7 @@
-// tests/hands: somebody who sees the picture and has one device, and what they do to make a stitch. A Desk is where they sit:
-// it turns what a hand is meant to do into the device's own events and gives the next picture. What is asked of a hand is what
-// is seen: point there, click, drag; the person never says where a tool is in space.
+// SPDX-License-Identifier: Apache-2.0
+// tests/hands: a user who sees the picture and has one device, and what they do to make a stitch. A WorkQueue is where they
+// sit: it turns what a hand is meant to do into the device's own events and gives the next picture. What is asked of a hand is
+// what is seen: point there, click, drag; the person never says where a tool is in space.
 #pragma once
 #include <array>
 #include <functional>
@@ -25,9 +26,9 @@ struct Act {
   bool click = false;  // close the jaw, or open it
 };
 
-class Desk {
+class WorkQueue {
  public:
-  virtual ~Desk() = default;
+  virtual ~WorkQueue() = default;
   virtual const PictureModel& picture() const = 0;
   virtual const Look& look() const = 0;
   // Does it, and waits for a picture that shows it. False: the simulation has ended.
@@ -37,7 +38,7 @@ class Desk {
 
 class Person {
  public:
-  explicit Person(Desk& desk) : desk_(desk) {}
+  explicit Person(WorkQueue& desk) : desk_(desk) {}
 
   bool take_needle();
   bool bite();       // the driver holds the needle; afterwards the forceps has brought it through
@@ -63,7 +64,7 @@ class Person {
   bool both(float amount, const std::function<bool()>& done, float patience = 25);
   bool lay_tail();
 
-  Desk& desk_;
+  WorkQueue& desk_;
   std::string doing_;
 };
 

@@ -1,4 +1,5 @@
-// tests/hands: a whole stitch of the stay scene, from the needle on the drape to a knot of two throws, by somebody with a mouse
+// SPDX-License-Identifier: Apache-2.0
+// tests/hands: a whole stitch of the stay scene, from the needle on the drape to a knot of two throws, by a user with a mouse
 // or a gamepad. In lock step, without a window.
 #include <gtest/gtest.h>
 
@@ -7,7 +8,7 @@
 namespace catgut {
 namespace {
 
-void make_a_stitch(Desk& desk) {
+void make_a_stitch(WorkQueue& desk) {
   Person me(desk);
   ASSERT_TRUE(me.take_needle()) << me.doing();
   ASSERT_TRUE(me.bite()) << me.doing();
@@ -19,12 +20,12 @@ void make_a_stitch(Desk& desk) {
   ASSERT_TRUE(me.tie(-1)) << me.doing();
   EXPECT_EQ(desk.count(EventKind::bite_completed), 2u);
   EXPECT_GE(desk.count(EventKind::seam_closed), 1u);
-  EXPECT_EQ(desk.count(EventKind::knot_locked), 2u);
+  EXPECT_EQ(desk.count(EventKind::throw_locked), 2u);
   EXPECT_EQ(desk.count(EventKind::technique_fault), 0u);
   ASSERT_EQ(desk.look().seen.active().knot.size(), 1u);
   const KnotView& knot = desk.look().seen.active().knot[0];
   EXPECT_EQ(knot.throws, 2u);
-  EXPECT_NE(knot.thrown[0].handed, knot.thrown[1].handed) << "a reef knot, no granny";
+  EXPECT_NE(knot.thrown[0].chirality, knot.thrown[1].chirality) << "a reef knot, no granny";
 }
 
 // A picture every tick, and ten pictures a second, which is what a machine without a graphics card gives.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/hands: the same stitch at the window itself. The program's own loop, physics on its thread, pictures drawn; an X server
 // of our own, and the mouse and keyboard events that the server makes for us (XTest), or a gamepad that SDL finds. What is
 // checked is what happened, never a pixel. Everything waits for what it sees, so a slow machine only takes longer.
@@ -27,9 +28,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Somebody's eyes and, in what derives from it, their device. The window runs on the thread that called sit(); the person on
+// A user's eyes and, in what derives from it, their device. The window runs on the thread that called sit(); the person on
 // one of their own.
-class AtTheWindow : public Desk {
+class AtTheWindow : public WorkQueue {
  public:
   explicit AtTheWindow(int seconds) : until_(Clock::now() + std::chrono::seconds(seconds)) {
     picture_ = picture_model(*build_model(read_scene("stay")));
@@ -49,7 +50,7 @@ class AtTheWindow : public Desk {
       if (!see(1)) return false;
     return showing_ == wanted && see(3);
   }
-  // Somebody who has made a mess of it begins again.
+  // A user who has made a mess of it begins again.
   virtual void begin_again() = 0;
   bool restarted() {
     for (int i = 0; i < 200 && (epoch_ == begun_ || !see(1)); ++i)
@@ -85,7 +86,7 @@ class AtTheWindow : public Desk {
       changed_.notify_all();
       return !gone_ && Clock::now() < until_;
     };
-    options.told = [&](const Event& e) { ++happened_[static_cast<size_t>(e.kind)]; };
+    options.on_event = [&](const Event& e) { ++happened_[static_cast<size_t>(e.kind)]; };
     const int code = play(options);
     {
       const std::lock_guard lock(mutex_);
@@ -275,11 +276,11 @@ void expect_a_stitch(AtTheWindow& desk, const std::string& stopped_at) {
   EXPECT_GE(desk.count(EventKind::particle_passed), 10u) << "thread was pulled through";
   EXPECT_GE(desk.count(EventKind::seam_closed), 1u);
   EXPECT_GE(desk.count(EventKind::loop_formed), 1u);
-  EXPECT_GE(desk.count(EventKind::knot_begun), 1u);
-  EXPECT_GE(desk.count(EventKind::knot_locked), 1u);
+  EXPECT_GE(desk.count(EventKind::throw_started), 1u);
+  EXPECT_GE(desk.count(EventKind::throw_locked), 1u);
 }
 
-// With the lesson open, which tells what to do: it follows to its end.
+// With the lesson open, which reports what to do: it follows to its end.
 TEST_F(StitchAtTheWindow, by_mouse_and_keyboard) {
   XMouse desk(x_->display, 480);
   if (!desk.ready()) GTEST_SKIP() << "no XTest here";
@@ -293,7 +294,7 @@ TEST_F(StitchAtTheWindow, by_mouse_and_keyboard) {
   EXPECT_GE(went.size(), 6u) << "step by step; some are done in one movement";
 }
 
-// "Show me", then the learner's turn: nothing of what was shown is left, and what the learner does is recognised.
+// "Show me", then the learner's turn: nothing of what was shown is left, and what the learner does is recognized.
 TEST_F(StitchAtTheWindow, a_lesson_shows_a_step_and_sees_it_done) {
   XMouse desk(x_->display, 180);
   if (!desk.ready()) GTEST_SKIP() << "no XTest here";

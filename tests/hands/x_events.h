@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/hands: mouse and keyboard events made by the X server (XTest), on a connection of our own: to the program they come
 // from outside, like anybody's.
 #pragma once

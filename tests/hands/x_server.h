@@ -1,5 +1,6 @@
-// tests: an X server (Xvfb) of our own, for whoever sits down at the window: on a machine with a desktop a test must not take
-// the mouse away.
+// SPDX-License-Identifier: Apache-2.0
+// tests: an X server (Xvfb) of our own, for a caller that sits down at the window: on a machine with a desktop a test must not
+// take the mouse away.
 #pragma once
 #include <signal.h>
 #include <sys/wait.h>

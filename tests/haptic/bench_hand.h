@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/haptic: a hand, an arm and a piece of tissue in lock step, around the real servo. The arm has mass and friction, the
 // hand is a spring to where it means to be, the tissue is a wall that a needle can go through, worked out at any rate and heard
 // one frame late, as a simulation is. Unkind arms read their position in steps, move late and are called late or not at all.
@@ -19,7 +20,7 @@ struct BenchTissue {
   float friction = 0.3f;
   float pierce_force = 0;  // [N] 0: a wall that nothing pierces
   float cutting = 0.2f;    // [N] while the tip is in
-  float drag = 40;         // [N/m] shaft friction per metre of needle in the tissue
+  float drag = 40;         // [N/m] shaft friction per meter of needle in the tissue
   bool held = false;       // the tool holds tissue: a spring both ways, and nothing slides
 };
 
@@ -53,7 +54,7 @@ struct Bench {
   ServoOptions options;
   Vec3 x{0, 0.005f, 0}, v;
   bool pierced = false;
-  uint32_t topology = 0;
+  uint32_t discontinuity_id = 0;
   uint64_t ticks = 0;
   double energy = 0, energy_most = 0;    // [J] out of the motors
   double to_hand = 0, to_hand_most = 0;  // [J] of that, what the arm's own damping leaves for the hand
@@ -104,7 +105,7 @@ struct Bench {
     }
     // coupling (u) = f(z), u + z = depth of the hand.
     const float depth = -seen.y;
-    if (pierced && depth < 0) pierced = false, ++topology;
+    if (pierced && depth < 0) pierced = false, ++discontinuity_id;
     if (pierced) {
       p.drag = tissue.cutting + tissue.drag * depth;
       p.along = {0, 1, 0};
@@ -127,13 +128,13 @@ struct Bench {
         p.pierce_keep = std::min(1.0f, (tissue.cutting + 0.05f) / tissue.pierce_force);
         if (depth > 0 && p.force.y > tissue.pierce_force) {
           pierced = true;
-          ++topology;
-          p.topology = topology;
+          ++discontinuity_id;
+          p.discontinuity_id = discontinuity_id;
           return think();
         }
       }
     }
-    p.topology = topology;
+    p.discontinuity_id = discontinuity_id;
     return p;
   }
 

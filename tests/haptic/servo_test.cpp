@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/haptic: the criteria of docs/rooms/haptic.md that need no driver, by name, in lock step: H3 passivity, H5 stall, H6
 // garbage, H8 heat, H10 determinism; and the multi-rate comparison.
 #include "haptic/servo.h"
@@ -30,7 +31,7 @@ std::vector<Gesture> gestures() {
   needle.pierce_force = 0.9f;
   held.held = true;
   return {
-      // A heavy hand that hardly grips rings down by itself, at full rate too: what swings a second later is the rendering's.
+      // A heavy hand that hardly grips rings down on its own, at full rate too: what swings a second later is the rendering's.
       {"press", 3.2f, wall,
        [](float t) {
          return Vec3{0, 0.005f - 0.012f * (smooth((t - 0.1f) / 0.4f) - smooth((t - 2.6f) / 0.4f)), 0};
@@ -541,7 +542,7 @@ TEST(Haptics, S4_a_held_needle_does_not_creep) {
       b.spoil = rubs(0.7f);
       const float far = lean / 50;
       b.path = [far](float t) {
-        // A hand trembles: half a tenth of a millimetre at 9 Hz.
+        // A hand trembles: half a tenth of a millimeter at 9 Hz.
         return Vec3{0, far * smooth(t / 0.5f) + 0.00005f * std::sin(2 * kPi * 9 * t), 0};
       };
       b.warm_up({});
@@ -714,7 +715,7 @@ TEST(Haptics, S11_a_wall_that_was_not_pierced) {
   EXPECT_NEAR(at(0, 50), 1.2f, 0.01f) << "a thread pierces nothing";
 }
 
-// S9: the button beside the jaw's clutches while it is held: the tool stays where it is, nothing is felt, and goes on from
+// S9: the button beside the jaw's clutches while it is held: the tool stays where it is, nothing is felt, and continues from
 // there when it is let go. It cuts only when it is pressed twice, soon.
 TEST(Haptics, S9_clutch_and_cut) {
   ServoHand hand;

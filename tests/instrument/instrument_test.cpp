@@ -98,7 +98,7 @@ TEST(Instrument, every_row_of_the_table_can_be_in_a_scene) {
     Field f(scene_with("[[instrument]]\nkind = \"" + kind.name + "\"\nwhere = \"right\"\n"));
     f.connect(0, {0.05f, 0.05f, 0});
     f.run(30);
-    EXPECT_TRUE(state_is_sane(*f.model, *f.state)) << kind.name;
+    EXPECT_TRUE(state_is_valid(*f.model, *f.state)) << kind.name;
     EXPECT_LT(distance(f.seen.tool[0].pose.p, f.input.hand[0].pose.p), 1e-3f) << kind.name << " does not follow its hand";
     for (uint32_t bit = 1; bit <= kRetract; bit <<= 1) EXPECT_STRNE(capability_name(bit), "");
   }
@@ -204,7 +204,7 @@ TEST(Instrument, a_parked_clamp_pulls_with_the_stated_force) {
     EXPECT_EQ(v.held, Held::tissue);
     EXPECT_NEAR(v.pull.x, pull, 0.05f * pull);
     EXPECT_LT(std::hypot(v.pull.y, v.pull.z), 0.05f * pull);
-    EXPECT_TRUE(state_is_sane(*f.model, *f.state));
+    EXPECT_TRUE(state_is_valid(*f.model, *f.state));
     moved[i] = f.seen.particle[v.held_slot].x - bare.seen.particle[v.held_slot].x;
   }
   EXPECT_GT(moved[0], 0.0f);
@@ -221,7 +221,7 @@ TEST(Instrument, a_parked_clamp_pulls_with_its_weight) {
   EXPECT_LT(length(f.seen.instrument[0].pull), 1.2f * weight) << "it cannot pull harder than it weighs";
 }
 
-// Harder than an Allis grips: it slips off, as an event of nobody's hand.
+// Harder than an Allis grips: it slips off, as an event of no one's hand.
 TEST(Instrument, a_clamp_that_is_pulled_too_hard_slips) {
   Field f(scene_with("[[instrument]]\nkind = \"allis\"\nwhere = \"parked\"\nat = [0.02, 0.0, 0.0]\npull = [20.0, 0.0, 0.0]\n"));
   f.run(240);

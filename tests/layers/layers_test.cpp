@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/layers: the arrows between rooms. Reads build/rooms.txt (written by catgut_room in CMake) and every source file; an
 // #include that runs up or sideways fails here with its file and line.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/procedure: every key of the table goes through the reader, the writer and --set, and every fault names its place.
 #include "procedure/scene_file.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/render: the camera of people who work: everything they need is in the picture from the start.
 #include "render/orbit.h"
 

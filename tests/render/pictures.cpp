@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/render: pictures show what the snapshot says; files of them can be written and read. Needs an EGL driver, else skips.
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -19,7 +20,7 @@ constexpr int kWidth = 320, kHeight = 180;
 // One renderer and one picture for all tests: starting it takes longer than the pictures.
 struct Stage {
   TestField field = make_test_field();
-  std::unique_ptr<Renderer> renderer = make_renderer(field.model, kWidth, kHeight, Quality::draft);
+  std::unique_ptr<Renderer> renderer = make_renderer(field.model, kWidth, kHeight, Quality::low);
   Camera camera = overview(field.model);
   Image picture = renderer->render(field.snapshot, camera);
 };
@@ -52,9 +53,9 @@ int difference(const Image& a, const Image& b) {
   return changed;
 }
 
-bool reddish(Colour c) { return c[0] > c[1] + 8 && c[0] > c[2]; }
-bool greenish(Colour c) { return c[1] > c[0] + 8; }
-bool bluish(Colour c) { return c[2] > c[0] + 12 && c[2] > c[1] + 12; }
+bool reddish(Color c) { return c[0] > c[1] + 8 && c[0] > c[2]; }
+bool greenish(Color c) { return c[1] > c[0] + 8; }
+bool bluish(Color c) { return c[2] > c[0] + 12 && c[2] > c[1] + 12; }
 
 TEST(Pictures, TissueIsWhereTheMeshIsAndTheDrapeRoundIt) {
   NEEDS_RENDERER();
@@ -75,7 +76,7 @@ TEST(Pictures, TissueIsWhereTheMeshIsAndTheDrapeRoundIt) {
   EXPECT_TRUE(greenish(pixel(s.picture, kWidth / 2, 3)));
 }
 
-TEST(Pictures, TheThreadShowsInItsColour) {
+TEST(Pictures, TheThreadShowsInItsColor) {
   NEEDS_RENDERER();
   Stage& s = stage();
   int blue = 0;
@@ -129,7 +130,7 @@ TEST(Pictures, WildSnapshotsDoNotBringItDown) {
 
 TEST(Pictures, SizesThatCannotBeAreRefused) {
   const TestField field = make_test_field(8, 2);
-  EXPECT_THROW(make_renderer(field.model, 0, 100, Quality::draft), std::runtime_error);
+  EXPECT_THROW(make_renderer(field.model, 0, 100, Quality::low), std::runtime_error);
 }
 
 TEST(Pngs, RoundTrip) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/render: where a plot puts what it is given. Plain pixels: no driver, no file.
 #include "render/plot.h"
 
@@ -6,7 +7,7 @@
 namespace catgut {
 namespace {
 
-constexpr Colour kBlue{0, 0, 255, 255}, kRed{255, 0, 0, 255}, kGreen{0, 160, 0, 255};
+constexpr Color kBlue{0, 0, 255, 255}, kRed{255, 0, 0, 255}, kGreen{0, 160, 0, 255};
 
 // Where the axes are, as plot.cpp lays them out: room for numbers at the left and below, a line of the key for every band.
 struct Box {
@@ -19,15 +20,15 @@ Box box_of(const Image& image, const Plot& plot) {
   return box;
 }
 
-size_t count(const Image& image, Colour c, int x0, int x1, int y0, int y1) {
+size_t count(const Image& image, Color c, int x0, int x1, int y0, int y1) {
   size_t n = 0;
   for (int y = y0; y <= y1; ++y)
     for (int x = x0; x <= x1; ++x) n += pixel(image, x, y) == c;
   return n;
 }
 
-// The rows that hold the colour in a column of the plot.
-std::array<int, 2> rows(const Image& image, const Box& box, int x, Colour c) {
+// The rows that hold the color in a column of the plot.
+std::array<int, 2> rows(const Image& image, const Box& box, int x, Color c) {
   std::array<int, 2> found{-1, -1};
   for (int y = box.top; y <= box.bottom; ++y)
     if (pixel(image, x, y) == c) found = {found[0] < 0 ? y : found[0], y};
@@ -76,7 +77,7 @@ TEST(Plot, nothing_is_drawn_beyond_the_axes) {
   plot.x_most = 10, plot.y_most = 4;
   const Image image = draw_plot(plot);
   const Box box = box_of(image, plot);
-  for (const Colour c : {kBlue, kRed, kGreen}) {
+  for (const Color c : {kBlue, kRed, kGreen}) {
     EXPECT_EQ(count(image, c, box.right + 2, image.width - 1, 0, box.bottom), 0u);
     EXPECT_EQ(count(image, c, 0, image.width - 1, 0, box.top - 1), 0u);
     EXPECT_EQ(count(image, c, 0, box.left - 1, 0, box.bottom), 0u);

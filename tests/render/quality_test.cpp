@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/render: which level of quality a machine gets, and that a frame's own cost can be measured anywhere.
 #include "render/quality.h"
 
@@ -12,15 +13,15 @@ namespace {
 using Trials = std::vector<QualityTrial>;
 
 TEST(Qualities, TheBestThatKeepsTheFrameRate) {
-  EXPECT_EQ(best_quality(Trials{{Quality::draft, 2}, {Quality::medium, 5}, {Quality::good, 11}}, 12), Quality::good);
-  EXPECT_EQ(best_quality(Trials{{Quality::draft, 2}, {Quality::medium, 5}, {Quality::good, 13}}, 12), Quality::medium);
-  EXPECT_EQ(best_quality(Trials{{Quality::draft, 9}, {Quality::medium, 12.1}}, 12), Quality::draft);
-  EXPECT_EQ(best_quality(Trials{{Quality::good, 12}, {Quality::draft, 3}}, 12), Quality::good);  // in any order
+  EXPECT_EQ(best_quality(Trials{{Quality::low, 2}, {Quality::medium, 5}, {Quality::high, 11}}, 12), Quality::high);
+  EXPECT_EQ(best_quality(Trials{{Quality::low, 2}, {Quality::medium, 5}, {Quality::high, 13}}, 12), Quality::medium);
+  EXPECT_EQ(best_quality(Trials{{Quality::low, 9}, {Quality::medium, 12.1}}, 12), Quality::low);
+  EXPECT_EQ(best_quality(Trials{{Quality::high, 12}, {Quality::low, 3}}, 12), Quality::high);  // in any order
 }
 
 TEST(Qualities, DraftWhenNothingIsFastEnoughOrKnown) {
-  EXPECT_EQ(best_quality(Trials{{Quality::draft, 300}}, 12), Quality::draft);
-  EXPECT_EQ(best_quality(Trials{}, 12), Quality::draft);
+  EXPECT_EQ(best_quality(Trials{{Quality::low, 300}}, 12), Quality::low);
+  EXPECT_EQ(best_quality(Trials{}, 12), Quality::low);
 }
 
 TEST(Qualities, MeasuredFromDraftUpUntilTooSlow) {
@@ -28,11 +29,11 @@ TEST(Qualities, MeasuredFromDraftUpUntilTooSlow) {
   const TestField field = make_test_field(24, 8);
   const QualityChoice none = choose_quality(field.model, field.snapshot, 64, 48, 0);  // no frame takes no time
   ASSERT_EQ(none.trials.size(), 1u);
-  EXPECT_EQ(none.quality, Quality::draft);
+  EXPECT_EQ(none.quality, Quality::low);
   EXPECT_GT(none.trials[0].frame_ms, 0);
   const QualityChoice all = choose_quality(field.model, field.snapshot, 64, 48, 1e9);
   EXPECT_EQ(all.trials.size(), 3u);
-  EXPECT_EQ(all.quality, Quality::good);
+  EXPECT_EQ(all.quality, Quality::high);
 }
 
 TEST(FrameCosts, AStereoFrameIsMadeWithoutADriver) {

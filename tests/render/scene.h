@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/render: a small operating field made up for the tests: an open bowel end, thread, needle and two tools.
 #pragma once
 #include "exchange/picture.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/render: the drawn surface follows the particles as geometry/skin says it does.
 #include "render/skinned.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/runtime: two simulated arms, the real driver, the real servo and the real physics together: in lock step, where every
 // millisecond is counted, and as people run it, each in its own thread. Criteria of docs/rooms/haptic.md: H2, H3, H5 and H7
 // while physics runs the Lembert scene.
@@ -66,13 +67,13 @@ struct LockStep {
     const int settle = static_cast<int>(scene.settle * scene.solver.tick_rate);
     for (int i = 0; i < settle; ++i) step(*model, *state, input, jobs);
     catgut::publish(*model, *state, seen);
-    std::vector<std::string> told;
+    std::vector<std::string> messages;
     HapticsOptions o;
     o.clock = [] { return lock_step_ns; };
     o.ratchet = false;
     o.log = log;
-    haptics = std::make_unique<Haptics>(open_touch({}, told), picture_model(*model), o);
-    EXPECT_TRUE(told.empty());
+    haptics = std::make_unique<Haptics>(open_touch({}, messages), picture_model(*model), o);
+    EXPECT_TRUE(messages.empty());
   }
   // Where the hand must be, on its arm, for its tool to be at `world`.
   void wish(size_t k, const Pose& world, float jaw) {
@@ -306,7 +307,7 @@ TEST(Haptics, soak_with_faults) {
     }
     const int lasts = 120 + static_cast<int>(300 * random.uniform());  // [ms]
     const auto for_ms = [&](int count) { motion(1e-3f * static_cast<float>(count)); };
-    // What the driver cuts by itself is a step of its own: measured anew after it.
+    // What the driver cuts on its own is a step of its own: measured again after it.
     switch (kind) {
       case 0:
       case 1:
@@ -468,8 +469,8 @@ TEST(Haptics, H2_no_allocation) {
   EXPECT_EQ(haptics.times(0).steps, 20000u);
 }
 
-// As people run it: physics, servo and whoever looks each in their own thread. The tool goes where the stylus goes. The times
-// of H2 are printed, and held to only with CATGUT_LONG=1: this machine may be busy.
+// As people run it: physics, servo and a caller that looks each in their own thread. The tool goes where the stylus goes. The
+// times of H2 are printed, and held to only with CATGUT_LONG=1: this machine may be busy.
 TEST(Haptics, H2_a_live_scene_with_arms) {
   FakeHd fake(false);
   LiveOptions options;
@@ -504,7 +505,7 @@ TEST(Haptics, H2_a_live_scene_with_arms) {
 }
 
 // S1: while the surgeon shows something, while time stands still, and while it runs slower than the hand, the arms' hands are
-// nobody's to push: what acts on the tools then is not theirs. And none of it is told as a fault.
+// no one's to push: what acts on the tools then is not theirs. And none of it is reported as a fault.
 TEST(Haptics, S1_a_demonstration_leaves_the_learners_hands_alone) {
   FakeHd fake(false);
   LiveOptions options;
@@ -561,8 +562,8 @@ TEST(Haptics, H2_times) {
   const auto model = build_model(scene);
   StatePtr state = initial_state(*model);
   Jobs jobs(1);
-  std::vector<std::string> told;
-  Haptics haptics(open_touch({}, told), picture_model(*model), {});
+  std::vector<std::string> messages;
+  Haptics haptics(open_touch({}, messages), picture_model(*model), {});
   TickInput input;
   Snapshot seen;
   const double start = wall_seconds(), until = start + (long_run() ? 60 : 2);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/runtime: what `catgut bench limits` makes of its measurements; that it measures is tested in tests/app.
 #include <gtest/gtest.h>
 
@@ -18,7 +19,7 @@ std::vector<SutureCost> rows(size_t n, double first_ms, double last_ms) {
   return row;
 }
 
-// The sutures that are sewn again in turns are the first and the last, tick by tick as they were.
+// The sutures that are re-run in turns are the first and the last, tick by tick as they were.
 TEST(Limits, growth_is_measured_on_the_first_and_the_last_suture_sewn_again) {
   const LimitsResult result = measure_limits(read_scene("stress_one_body"), 3, 1, {});
   ASSERT_EQ(result.row.size(), 3u);
@@ -54,8 +55,8 @@ TEST(Limits, the_plot_shows_the_numbers) {
     result.row = rows(10, ms, ms);
     const Image image = limits_plot(result, 1, 60);
     int first = -1, last = -1;
-    for (int y = 40; y < image.height - 60; ++y)  // the median's colour in the middle of the plot
-      if (pixel(image, image.width / 2, y) == Colour{30, 90, 160, 255}) last = y, first = first < 0 ? y : first;
+    for (int y = 40; y < image.height - 60; ++y)  // the median's color in the middle of the plot
+      if (pixel(image, image.width / 2, y) == Color{30, 90, 160, 255}) last = y, first = first < 0 ? y : first;
     EXPECT_GE(first, 0) << ms;
     return 0.5 * (first + last);
   };

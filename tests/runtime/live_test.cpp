@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/runtime: the live loop: its pace, its commands, and that what it records is what happened. Loose bounds on time: the
 // machine that runs this may be busy. Meaningful under the thread sanitizer.
 #include "runtime/live.h"
@@ -126,7 +127,7 @@ TEST(Live, tools_follow_the_hands_at_a_hands_speed) {
   live.hand(0, open);  // before the next tick
   one_tick();
   bool taken = false;
-  for (Event e; live.event(e);) taken = taken || e.kind == EventKind::suture_taken;
+  for (Event e; live.event(e);) taken = taken || e.kind == EventKind::suture_loaded;
   EXPECT_TRUE(taken) << "a button pressed and let go between two ticks still counts";
 }
 
@@ -141,14 +142,14 @@ TEST(Live, restart_is_the_settled_scene) {
   for (int i = 0; i < 5; ++i) live.command(LiveCommand::single_step);
   ASSERT_TRUE(wait_for(live, 10, [&](auto& s) { return s.tick == first.tick + 5; }));
   live.look(later);
-  EXPECT_GT(live.status().practice.time_s, 0.05);
+  EXPECT_GT(live.status().metrics.time_s, 0.05);
   live.command(LiveCommand::restart);
   ASSERT_TRUE(wait_for(live, 5, [](auto& s) { return s.epoch == 1; }));
   live.look(again);
   EXPECT_EQ(again.tick, first.tick);
   EXPECT_TRUE(again.particle == first.particle);
   EXPECT_FALSE(later.particle == first.particle);
-  EXPECT_EQ(live.status().practice.time_s, 0);
+  EXPECT_EQ(live.status().metrics.time_s, 0);
 }
 
 TEST(Live, the_recording_replays) {
@@ -257,7 +258,7 @@ TEST(Live, a_parameter_changed_in_between_is_in_the_recording) {
     ASSERT_TRUE(wait_for(live, 20, [&](auto& s) { return !s.refused.empty(); }));
     EXPECT_NE(live.status().refused.find("did you mean"), std::string::npos);
     EXPECT_EQ(live.status().epoch, 0u) << "nobody jumps";
-    EXPECT_GT(live.status().practice.time_s, 0.1);
+    EXPECT_GT(live.status().metrics.time_s, 0.1);
     at = live.status().tick;
     ASSERT_TRUE(wait_for(live, 10, [&](auto& s) { return s.tick > at + 10; }));
     const Measures& m = live.status().measures;
@@ -322,7 +323,7 @@ TEST(Live, what_cannot_be_recorded_is_refused_before_it_starts) {
   EXPECT_THROW(Live(small_scene(), options), InputError);
 }
 
-// A whole bite by hands that come through the box as any device's would; then it is taken back.
+// A whole bite by hands that come through the box as any device's would; then it is undone.
 TEST(Live, a_bite_can_be_taken_back) {
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
   GTEST_SKIP() << "a bite in real time is out of reach under a sanitizer";
@@ -350,9 +351,9 @@ TEST(Live, a_bite_can_be_taken_back) {
     }
   }
   ASSERT_TRUE(completed) << surgeon->doing();
-  ASSERT_TRUE(wait_for(live, 5, [](auto& s) { return s.practice.bites == 1; }));
+  ASSERT_TRUE(wait_for(live, 5, [](auto& s) { return s.metrics.bites == 1; }));
   ASSERT_EQ(live.status().to_take_back, 1u);
-  EXPECT_GT(live.status().practice.path[0], 0.05f);
+  EXPECT_GT(live.status().metrics.path[0], 0.05f);
   live.command(LiveCommand::take_back);
   live.command(LiveCommand::pause);
   ASSERT_TRUE(wait_for(live, 5, [](auto& s) { return s.epoch == 1 && s.paused; }));
@@ -362,8 +363,8 @@ TEST(Live, a_bite_can_be_taken_back) {
   EXPECT_TRUE(seen.active().bite.empty());
   EXPECT_TRUE(seen.active().suture_point.empty());
   EXPECT_EQ(seen.tool[0].held, Held::needle);
-  EXPECT_EQ(live.status().practice.bites, 0u);
-  EXPECT_EQ(live.status().practice.undos, 1u);
+  EXPECT_EQ(live.status().metrics.bites, 0u);
+  EXPECT_EQ(live.status().metrics.undos, 1u);
   EXPECT_EQ(live.status().to_take_back, 0u);
   // The hands that were sent before are not followed: the tool stays until newer ones come.
   const Vec3 hand = seen.tool[0].hand.p;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/runtime: the paper's tables: which phase a tick belongs to, and that the figures stand where they belong.
 #include <gtest/gtest.h>
 
@@ -20,8 +21,8 @@ TEST(PaperTables, a_tick_belongs_to_one_phase) {
   EXPECT_EQ(at({}), "During suturing");
   EXPECT_EQ(at({of(EventKind::tip_entered), of(EventKind::bite_completed)}), "During suturing");
   EXPECT_EQ(at({of(EventKind::loop_formed)}), "During looping");
-  EXPECT_EQ(at({of(EventKind::knot_begun)}), "During looping");
-  EXPECT_EQ(at({of(EventKind::knot_locked)}), "During looping") << "until something else is begun";
+  EXPECT_EQ(at({of(EventKind::throw_started)}), "During looping");
+  EXPECT_EQ(at({of(EventKind::throw_locked)}), "During looping") << "until something else is begun";
   EXPECT_EQ(at({of(EventKind::tip_entered)}), "During suturing");
   EXPECT_EQ(at({of(EventKind::loop_formed)}), "During looping");
   EXPECT_EQ(at({}, true), "After completion");
@@ -30,7 +31,7 @@ TEST(PaperTables, a_tick_belongs_to_one_phase) {
   const auto then = [&](EventKind kind) { return lembert(std::vector<Event>{of(kind)}, true, false); };
   EXPECT_EQ(then(EventKind::tip_entered), "Suture #1");
   EXPECT_EQ(then(EventKind::loop_formed), "Loop #1");
-  EXPECT_EQ(then(EventKind::suture_taken), "Suture #2");
+  EXPECT_EQ(then(EventKind::suture_loaded), "Suture #2");
   EXPECT_EQ(then(EventKind::loop_formed), "Loop #2");
 }
 
@@ -53,7 +54,7 @@ TEST(PaperTables, a_row_holds_ours_and_theirs) {
   EXPECT_NE(paper_csv(table).find("A phase of our own,2,1000.0,0.0,1.000,0.000,1.000,0.000,,,\n"), std::string::npos);
 }
 
-// Every tick is counted once, every fourth picture asked for, and a run that was cut short is not called sewn.
+// Every tick is counted once, every fourth picture asked for, and a run that was cut short is not called sutured.
 TEST(PaperTables, executions_are_measured_phase_by_phase) {
   SceneSpec scene = read_scene("purse_string");
   set_value(scene, "duration=1");

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/runtime: a recording that is looked at: any place of it shows what was there, in whatever order one comes to it.
 #include "runtime/playback.h"
 
@@ -116,8 +117,8 @@ TEST(Playback, what_was_sewn_is_gathered) {
   const LiveResult r = p.result();
   EXPECT_EQ(r.ticks, 180u);
   EXPECT_EQ(r.state_hash, poked().tick.back().hash);
-  EXPECT_NEAR(r.practice.time_s, 177 / 60.0, 1e-6) << "settling is not practice";
-  EXPECT_GT(r.practice.path[0], 0.05f);
+  EXPECT_NEAR(r.metrics.time_s, 177 / 60.0, 1e-6) << "settling is not practice";
+  EXPECT_GT(r.metrics.path[0], 0.05f);
   EXPECT_GE(r.map.tension.size(), 28u);
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/runtime: where stitches lie, from tissue made by hand and from a surgeon's first bites.
 #include "runtime/stitch_map.h"
 
@@ -78,7 +79,7 @@ TEST(StitchMap, a_bite_lies_where_it_lies_on_the_tissue_at_rest) {
 TEST(StitchMap, spacing_is_the_edge_that_nothing_holds) {
   Sewn s;
   s.bite(Sewn::on_wall(0.1f, 0.004f), Sewn::on_wall(0.4f, 0.004f));
-  s.bite(Sewn::on_wall(0.7f, 0.004f), Sewn::on_wall(0.6f, 0.004f));  // sewn backward: its near end counts
+  s.bite(Sewn::on_wall(0.7f, 0.004f), Sewn::on_wall(0.6f, 0.004f));  // sutured backward: its near end counts
   s.bite(Sewn::on_wall(0.7f, 0.004f, 1), Sewn::on_wall(0.9f, 0.004f, 1), 1);
   s.bite(Sewn::on_wall(0.65f, 0.004f), Sewn::on_wall(0.8f, 0.004f));
   EXPECT_NEAR(s.map.bite[1].spacing, 0.2f * 0.02f, 2e-4f);
@@ -113,7 +114,7 @@ TEST(StitchMap, what_is_taken_back_has_not_happened) {
   for (int i = 0; i < 60; ++i) s.tick();
   EXPECT_EQ(s.map.tension.size(), 10u) << "ten a second";
   EXPECT_FLOAT_EQ(s.map.tension[3].peak, 0.5f);
-  s.seen.event.push_back({.kind = EventKind::suture_taken, .which = 0, .value = 0, .where = {}, .tick = s.seen.tick + 1});
+  s.seen.event.push_back({.kind = EventKind::suture_loaded, .which = 0, .value = 0, .where = {}, .tick = s.seen.tick + 1});
   s.bite(Sewn::on_wall(0.7f, 0.004f), Sewn::on_wall(0.9f, 0.004f));
   EXPECT_EQ(s.map.bite.back().suture, 1u);
   rewind(s.map, 30);
@@ -144,7 +145,7 @@ TEST(StitchMap, a_surgeons_bites_are_where_he_was_told_to_make_them) {
   hooks.on_start = [&](const PictureModel& p) { picture = p, result.map = start_map(p, 1.0 / 60); };
   hooks.on_tick = [&](const Snapshot& seen, const std::string&) {
     note(result.map, picture, seen);
-    note(result.practice, seen, 1.0f / 60);
+    update(result.metrics, seen, 1.0f / 60);
   };
   run_session(scene, options, hooks);
   ASSERT_GE(result.map.bite.size(), 2u);
@@ -157,7 +158,7 @@ TEST(StitchMap, a_surgeons_bites_are_where_he_was_told_to_make_them) {
   const float pitch = result.map.edge[0].length() / static_cast<float>(scene.surgeon.bites);
   EXPECT_NEAR(result.map.bite[1].spacing, pitch - scene.surgeon.bite_length, 0.003f);
 
-  const auto json = nlohmann::json::parse(practice_json(scene, result));
+  const auto json = nlohmann::json::parse(session_json(scene, result));
   EXPECT_EQ(json["stitches"].size(), result.map.bite.size());
   EXPECT_TRUE(json["stitches"][0]["spacing_mm"].is_null());
   EXPECT_NEAR(json["stitches"][1]["spacing_mm"].get<double>(), 1e3 * static_cast<double>(result.map.bite[1].spacing), 0.01);

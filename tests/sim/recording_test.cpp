@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/sim: a recording survives what happens to files: cut anywhere, a flipped bit, another version.
 #include "sim/recording.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/sim: State is all that changes. A run that is saved, loaded into a fresh state and continued cannot be told from the
-// run that went on: same hash, same events, same Snapshot with all that hands feel. And reflect names every member.
+// tests/sim: State is all that changes. A run that is saved, loaded into a fresh state and continued cannot be reported from
+// the run that continued: same hash, same events, same Snapshot with all that hands feel. And reflect names every member.
 #include <gtest/gtest-spi.h>
 #include <gtest/gtest.h>
 
@@ -61,7 +61,7 @@ TEST_P(EveryScene, saved_and_loaded_at_every_seventh_tick_goes_on_as_if_nothing_
       for (ToolInput& h : input.hand) h.connected = 0;
     else input.hand = hands.surgeon->operate(seen, model->dt).hand;
     if (input.tick % 7 == 0) {
-      // Whoever went on with one worker is compared with two, and the other way round.
+      // A caller that continued with one worker is compared with two, and the other way round.
       Jobs &mine = compared % 2 ? one : two, &others = compared % 2 ? two : one;
       ASSERT_NO_FATAL_FAILURE(step_both(*model, *state, input, mine, others, other));
       ++compared;
@@ -179,7 +179,7 @@ TEST(Reflect, the_test_itself_notices_a_forgotten_member) {
 }
 
 TEST(Reflect, types_without_padding_are_copied_whole_and_others_are_not) {
-  EXPECT_TRUE(kPacked<TissuePoint> && kPacked<Weld> && kPacked<Attachment> && kPacked<TissuePin> && kPacked<Vec4>);
+  EXPECT_TRUE(kPacked<EmbeddedPoint> && kPacked<Weld> && kPacked<Attachment> && kPacked<Tether> && kPacked<Vec4>);
   EXPECT_FALSE(kPacked<ThreadAnchor>) << "its flags could be read as values that no flag has";
   EXPECT_FALSE(kPacked<Forgetful>);
   EXPECT_FALSE(kPacked<Event>);

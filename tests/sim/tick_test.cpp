@@ -1,4 +1,5 @@
-// tests/sim: the promises of the tick: same inputs, same bits, whatever the workers; a saved state goes on as if nothing had
+// SPDX-License-Identifier: Apache-2.0
+// tests/sim: the promises of the tick: same inputs, same bits, whatever the workers; a saved state continues as if nothing had
 // happened; publishing changes nothing; hands flung about at random break nothing.
 #include <gtest/gtest.h>
 
@@ -181,7 +182,7 @@ TEST(Load, bytes_of_another_scene_are_refused) {
   EXPECT_EQ(save_state(*model, *state), before) << "a refused load changes nothing";
 }
 
-// A damaged state is refused or is a state of this scene: a tick on it is defined behaviour, whatever the numbers say.
+// A damaged state is refused or is a state of this scene: a tick on it is defined behavior, whatever the numbers say.
 TEST(Load, damaged_bytes_never_crash) {
   const auto model = build_model(short_scene());
   StatePtr state = initial_state(*model);
@@ -217,19 +218,19 @@ TEST(Scene, a_bound_on_what_tools_press_reaches_the_solver) {
 TEST(Sane, says_when_a_number_is_not_one_or_something_is_gone) {
   const auto model = build_model(short_scene());
   StatePtr state = initial_state(*model);
-  EXPECT_TRUE(state_is_sane(*model, *state));
+  EXPECT_TRUE(state_is_valid(*model, *state));
   const float x = state->solver.x[100].x;
   state->solver.x[100].x = std::nanf("");
-  EXPECT_FALSE(state_is_sane(*model, *state));
+  EXPECT_FALSE(state_is_valid(*model, *state));
   state->solver.x[100].x = 1.5f;
-  EXPECT_FALSE(state_is_sane(*model, *state));
-  EXPECT_TRUE(state_is_sane(*model, *state, 2));
+  EXPECT_FALSE(state_is_valid(*model, *state));
+  EXPECT_TRUE(state_is_valid(*model, *state, 2));
   state->solver.x[100].x = x;
   state->solver.v[1300].y = INFINITY;
-  EXPECT_FALSE(state_is_sane(*model, *state));
+  EXPECT_FALSE(state_is_valid(*model, *state));
   state->solver.v[1300].y = 0;
   state->solver.body[model->solver.needle_body(0)].q.w = std::nanf("");
-  EXPECT_FALSE(state_is_sane(*model, *state));
+  EXPECT_FALSE(state_is_valid(*model, *state));
 }
 
 // --- hands flung about ---------------------------------------------------------------------------------------------------
@@ -291,7 +292,7 @@ void fling(uint64_t seed, float seconds, Fling& out) {
     const auto start = std::chrono::steady_clock::now();
     step(*model, *state, in, jobs);
     ms.push_back(std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count());
-    ASSERT_TRUE(state_is_sane(*model, *state, 1.0f)) << "seed " << seed << ", tick " << i;
+    ASSERT_TRUE(state_is_valid(*model, *state, 1.0f)) << "seed " << seed << ", tick " << i;
     for (const RigidBody& b : state->solver.body) ASSERT_LT(length(b.x), 1.0f) << "seed " << seed << ", tick " << i;
     out.largest_energy = std::max(out.largest_energy, kinetic_energy(*model, *state));
     for (const Event& e : state->event) {
@@ -315,11 +316,11 @@ void fling(uint64_t seed, float seconds, Fling& out) {
     }
     ASSERT_LE(state->solver.weld.size(), 4u);
   }
-  // The hands leave: everything comes to rest.
+  // The hands leave: everything settles.
   TickInput none;
   for (ToolInput& h : none.hand) h.connected = 0;
   for (int i = 0; i < 180; ++i) step(*model, *state, none, jobs);
-  ASSERT_TRUE(state_is_sane(*model, *state, 1.0f));
+  ASSERT_TRUE(state_is_valid(*model, *state, 1.0f));
   EXPECT_LT(kinetic_energy(*model, *state), 0.02) << "seed " << seed;
   std::sort(ms.begin(), ms.end());
   out.median_ms = ms[ms.size() / 2], out.p99_ms = ms[ms.size() * 99 / 100];

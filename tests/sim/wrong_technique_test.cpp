@@ -1,5 +1,6 @@
-// tests/sim: what is done wrong is told, once, and nothing else happens: whole ticks with hands and needle on real tissue, one
-// test per mistake, and some seconds after each in which the state stays sane (the rig asserts it every tick).
+// SPDX-License-Identifier: Apache-2.0
+// tests/sim: what is done wrong is reported, once, and nothing else happens: whole ticks with hands and needle on real tissue,
+// one test per mistake, and some seconds after each in which the state stays sane (the rig asserts it every tick).
 #include <gtest/gtest.h>
 
 #include "../suture/tie.h"
@@ -21,12 +22,12 @@ void expect_told_once(Rig& r, Fault fault, uint32_t which) {
   for (const bool later : {false, true}) {
     if (later) r.wait(kAfterwards);
     ASSERT_FALSE(testing::Test::HasFatalFailure());
-    const std::vector<Event> told = faults(r);
-    ASSERT_EQ(told.size(), 1u) << (later ? "seconds later" : "at once");
-    EXPECT_STREQ(fault_name(told[0].fault), fault_name(fault));
-    EXPECT_EQ(told[0].which, which);
-    EXPECT_TRUE(is_finite(told[0].where));
-    EXPECT_LT(length(told[0].where), 0.2f) << "somewhere in the field";
+    const std::vector<Event> reported = faults(r);
+    ASSERT_EQ(reported.size(), 1u) << (later ? "seconds later" : "at once");
+    EXPECT_STREQ(fault_name(reported[0].fault), fault_name(fault));
+    EXPECT_EQ(reported[0].which, which);
+    EXPECT_TRUE(is_finite(reported[0].where));
+    EXPECT_LT(length(reported[0].where), 0.2f) << "somewhere in the field";
   }
   EXPECT_TRUE(r.order_is_whole());
 }
@@ -74,16 +75,16 @@ TEST(WrongTechnique, purse_string_bites_out_of_order_are_said) {
   Rig r;
   r.wait(0.3f);
   for (const float angle : {0.2f, 1.2f, 0.7f, 1.7f}) bite_and_draw(r, r.place(angle));
-  const size_t told = r.count(EventKind::order_broken);
-  ASSERT_GE(told, 1u);
+  const size_t reported = r.count(EventKind::bite_out_of_order);
+  ASSERT_GE(reported, 1u);
   std::vector<uint32_t> which;
   for (const Event& e : r.seen)
-    if (e.kind == EventKind::order_broken) which.push_back(e.which);
+    if (e.kind == EventKind::bite_out_of_order) which.push_back(e.which);
   EXPECT_EQ(which.front(), 2u) << "the third point is further from the second than the fifth is";
   std::sort(which.begin(), which.end());
   EXPECT_EQ(std::adjacent_find(which.begin(), which.end()), which.end()) << "each once";
   r.wait(kAfterwards);
-  EXPECT_EQ(r.count(EventKind::order_broken), told);
+  EXPECT_EQ(r.count(EventKind::bite_out_of_order), reported);
   EXPECT_TRUE(faults(r).empty());
 }
 
@@ -104,9 +105,9 @@ TEST(WrongTechnique, a_stitch_tied_through_one_wall_is_said) {
   Tie r({}, two_ends("stay"));
   ASSERT_TRUE(faults(r).empty());
   r.take();
-  ASSERT_EQ(r.count(EventKind::knot_begun), 1u);
+  ASSERT_EQ(r.count(EventKind::throw_started), 1u);
   r.pull_tight();
-  EXPECT_EQ(r.count(EventKind::knot_locked), 1u) << "it is tied all the same";
+  EXPECT_EQ(r.count(EventKind::throw_locked), 1u) << "it is tied all the same";
   expect_told_once(r, Fault::one_wall_only, 1);
   EXPECT_TRUE(r.state->plan[0].pair.empty()) << "and draws nothing to the other wall";
 }
@@ -185,10 +186,10 @@ TEST(WrongTechnique, pulling_the_tail_with_the_needle_in_the_tissue_is_said_once
   expect_told_once(r, Fault::needle_in_tissue, 1);
   EXPECT_EQ(faults(r)[0].who, 1);
 
-  // Drawn back and driven anew, it is another bite, and the same mistake is another fault.
+  // Drawn back and driven again, it is another bite, and the same mistake is another fault.
   r.let_thread_go();
   r.drive(r.second, 1.2f, -1.3f);
-  ASSERT_EQ(r.count(EventKind::bite_cancelled), 1u);
+  ASSERT_EQ(r.count(EventKind::bite_withdrawn), 1u);
   r.enter();
   r.take(-8);
   r.pull(r.first.out * 0.03f + r.first.up * 0.03f, 0.5f);
@@ -253,7 +254,7 @@ TEST(WrongTechnique, cutting_a_knot_of_one_throw_is_one_fault_for_all_who_see_it
   Tie r({}, scene);
   r.take();
   r.pull_tight();
-  ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+  ASSERT_EQ(r.count(EventKind::throw_locked), 1u);
   const size_t before = faults(r).size();  // both points lie in one layer, which is said when it locks
   r.open(0);
   snip(r, between(r, r.node_of(r.sewn().knot[0].slot[0]) - 6));

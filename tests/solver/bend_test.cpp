@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests of solver/bend: the SIMD sweep that threads run against solve_bend, the scalar form that `catgut validate` checks.
 #include "solver/bend.h"
 
@@ -11,7 +12,7 @@
 namespace catgut {
 namespace {
 
-TEST(Bend, the_simd_sweep_is_the_scalar_update_by_colours) {
+TEST(Bend, the_simd_sweep_is_the_scalar_update_by_colors) {
   for (const size_t nodes : {3u, 4u, 5u, 17u, 50u, 175u}) {
     Random r(nodes);
     std::vector<Vec3> p;
@@ -25,8 +26,8 @@ TEST(Bend, the_simd_sweep_is_the_scalar_update_by_colours) {
     const float compliance = 1e4f, h = 1.0f / 480;
     std::vector<float> lambda(nodes, 0);
     for (int sweep = 0; sweep < 3; ++sweep)
-      for (size_t colour = 1; colour <= 3; ++colour)
-        for (size_t i = colour; i + 1 < nodes; i += 3)
+      for (size_t color = 1; color <= 3; ++color)
+        for (size_t i = color; i + 1 < nodes; i += 3)
           solve_bend(want[i - 1], want[i], want[i + 1], w[i - 1], w[i], w[i + 1], compliance, h, lambda[i]);
     BendScratch scratch;
     scratch.resize(nodes);

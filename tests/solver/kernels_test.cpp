@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/solver: volume, attachments and welds, nearest points, and the whole substep's independence of workers.
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
@@ -55,12 +56,12 @@ TEST(Volume, gradients_agree_with_central_differences) {
   }
 }
 
-TEST(Volume, tetrahedra_of_a_colour_share_no_particle) {
+TEST(Volume, tetrahedra_of_a_color_share_no_particle) {
   const BodyRest body = make_bowel({});
   const VolumeModel m = make_volume_model(body.position, body.tet);
   ASSERT_EQ(m.tet.size(), body.tet.size());
   uint32_t start = 0;
-  for (const uint32_t end : m.colour_end) {
+  for (const uint32_t end : m.color_end) {
     std::vector<uint8_t> used(body.position.size(), 0);
     for (uint32_t t = start; t < end; ++t)
       for (uint32_t k : m.tet[t]) {
@@ -126,7 +127,7 @@ TEST(Attachment, its_multiplier_is_the_load) {
       Column<Vec4> x;
       std::vector<float> w;
       std::vector<Vec3> v(3);
-      TissuePoint weighted;
+      EmbeddedPoint weighted;
       weighted.count = 3;
       for (uint32_t i = 0; i < 3; ++i) {
         x.push_back(point({0.01f * static_cast<float>(i), 0, 0}));
@@ -158,7 +159,7 @@ TEST(Attachment, a_spread_point_follows_every_affine_motion) {
   std::vector<uint32_t> id;
   for (uint32_t i = 0; i < 12; ++i) rest.push_back(point(random_point(r, 0.005f))), id.push_back(i);
   const Vec3 at{0.001f, -0.0005f, 0.0007f};
-  const TissuePoint t = spread_point(id, rest.data(), at);
+  const EmbeddedPoint t = spread_point(id, rest.data(), at);
   EXPECT_LT(distance(position_of(t, rest.data()), at), 1e-7f);
   auto affine = [](Vec3 p) {
     return Vec3{1.2f * p.x + 0.1f * p.y - 0.3f * p.z + 0.05f, 0.9f * p.y - 0.2f * p.x, 0.4f * p.y + 1.1f * p.z - 0.02f};
@@ -176,7 +177,7 @@ TEST(Weld, a_rigid_one_carries_force_and_torque) {
   std::vector<RigidBody> body(1);
   Weld weld;
   weld.a = 0;
-  weld.local_a.p = {0.03f, 0, 0};  // held 30 mm beside its centre of mass
+  weld.local_a.p = {0.03f, 0, 0};  // held 30 mm beside its center of mass
   weld.target = Pose{{0.03f, 0, 0}, {}};
   const float h = 1.0f / 960;
   for (int i = 0; i < 4000; ++i) {
@@ -196,7 +197,7 @@ TEST(Weld, a_rigid_one_carries_force_and_torque) {
 struct Pinned {
   Column<Vec4> x{point({0, 0, 0}), point({0.02f, 0, 0})}, v{2}, prev{2};
   std::vector<float> w{50, 20};
-  TissuePin pin;
+  Tether pin;
   float h = 1.0f / 960;
   Pinned(float length, float compliance) {
     pin.a = particle_point(0), pin.b = particle_point(1);
@@ -210,7 +211,7 @@ struct Pinned {
       add(v[i], pull * ((i == 0 ? -1.0f : 1.0f) * w[i] * h));
       add(x[i], xyz(v[i]) * h);
     }
-    solve_pin(pin, x.data(), w.data(), h);
+    solve_tether(pin, x.data(), w.data(), h);
     for (size_t i = 0; i < 2; ++i) set(v[i], (xyz(x[i]) - xyz(prev[i])) / (h * (1 + damping * h)));
   }
   float apart() const { return distance(xyz(x[0]), xyz(x[1])); }
@@ -221,7 +222,7 @@ TEST(Pin, draws_together_what_is_too_far_apart_and_carries_the_pull) {
     Pinned p(0.01f, compliance);
     for (int i = 0; i < 3000; ++i) p.step({}, 30);
     EXPECT_LT(p.apart(), 0.01 + 1e-5) << "nearer is no fault: a rope does not push them apart";
-    EXPECT_NEAR(p.x[0].x / 50 + p.x[1].x / 20, 0.02 / 20, 1e-5) << "the centre of mass stays";
+    EXPECT_NEAR(p.x[0].x / 50 + p.x[1].x / 20, 0.02 / 20, 1e-5) << "the center of mass stays";
     for (int i = 0; i < 6000; ++i) p.step({0.5f, 0, 0}, 30);
     EXPECT_NEAR(p.pin.lambda / (p.h * p.h), -0.5, 0.005);
     EXPECT_NEAR(p.apart(), 0.01f + 0.5f * compliance, 1e-5);
@@ -231,7 +232,7 @@ TEST(Pin, draws_together_what_is_too_far_apart_and_carries_the_pull) {
 TEST(Pin, never_pushes) {
   Pinned p(0.03f, 0);
   const Column<Vec4> start = p.x;
-  solve_pin(p.pin, p.x.data(), p.w.data(), p.h);
+  solve_tether(p.pin, p.x.data(), p.w.data(), p.h);
   EXPECT_EQ(p.apart(), 0.02f);
   EXPECT_EQ(p.pin.lambda, 0);
   // Pushed together from outside, they come as near as they are pushed: the free fall of both.
@@ -249,7 +250,7 @@ TEST(Pin, never_pushes) {
   // Sweeps too many and too far: what pulled may be given back, never more.
   p.pin.lambda = -1e-9f;
   set(p.x[1], xyz(p.x[0]) + Vec3{0.01f, 0, 0});
-  solve_pin(p.pin, p.x.data(), p.w.data(), p.h);
+  solve_tether(p.pin, p.x.data(), p.w.data(), p.h);
   EXPECT_EQ(p.pin.lambda, 0);
   EXPECT_NEAR(p.apart(), 0.01, 1e-6);
 }
@@ -258,21 +259,21 @@ TEST(Pin, never_pushes) {
 struct RopeWeb {
   Column<Vec4> x{60};
   std::vector<float> w{std::vector<float>(60)};
-  std::vector<TissuePin> pin{std::vector<TissuePin>(30)};
+  std::vector<Tether> pin{std::vector<Tether>(30)};
   explicit RopeWeb(Random& random) {
     const auto around = [&](float size) {
       return Vec3{random.uniform() - 0.5f, random.uniform() - 0.5f, random.uniform() - 0.5f} * size;
     };
     for (Vec4& p : x) p = point(around(0.05f));
     for (float& m : w) m = random.uniform() < 0.1f ? 0 : 20 + 30 * random.uniform();
-    for (TissuePin& p : pin) {
-      for (TissuePoint* end : {&p.a, &p.b}) {
+    for (Tether& p : pin) {
+      for (EmbeddedPoint* end : {&p.a, &p.b}) {
         const uint32_t first = static_cast<uint32_t>(random.next() % 50);
         std::vector<uint32_t> group;
         for (uint32_t k = 0; k < 1 + random.next() % 10; ++k) group.push_back(first + k);
         *end = spread_point(group, x.data(), xyz(x[first]) + around(0.002f));
       }
-      // Slack by anything from nothing to a centimetre, or taut by a millimetre at most.
+      // Slack by anything from nothing to a centimeter, or taut by a millimeter at most.
       const float apart = distance(position_of(p.a, x.data()), position_of(p.b, x.data())), u = random.uniform();
       p.length =
           std::max(0.0f, apart + (u < 0.3f ? -0.001f * random.uniform() : 0.01f * std::pow(10.0f, -5 * random.uniform())));
@@ -281,8 +282,8 @@ struct RopeWeb {
   }
 };
 
-void pulled_before(std::vector<TissuePin>& pin) {
-  for (TissuePin& p : pin) p.lambda = -1e-9f;
+void pulled_before(std::vector<Tether>& pin) {
+  for (Tether& p : pin) p.lambda = -1e-9f;
 }
 
 // Pins that see each other through the web do what pins that see each other's particles do, and then those that are not in it,
@@ -290,27 +291,27 @@ void pulled_before(std::vector<TissuePin>& pin) {
 TEST(Pin, many_at_once_are_each_of_them_in_turn) {
   Random random(11);
   size_t pulling = 0, slack = 0, caught = 0;
-  PinWeb web;
-  std::vector<PinSpan> work;
+  TetherGraph web;
+  std::vector<TetherSpan> work;
   const float h = 1.0f / 960;
   for (int round = 0; round < 200; ++round) {
     const RopeWeb start(random);
     for (int draw = 0; draw < 2; ++draw) {  // of those that pulled before: the same pins, another web
       RopeWeb one = start, all = start;
-      std::vector<TissuePin*> rope, slack_before;
+      std::vector<Tether*> rope, slack_before;
       for (size_t i = 0; i < all.pin.size(); ++i) {
         const bool pulls = random.uniform() < 0.7f;
         if (pulls) all.pin[i].lambda = -1e-9f;
         (pulls ? rope : slack_before).push_back(&one.pin[i]);
       }
-      weave(all.pin, all.w.data(), static_cast<uint32_t>(all.x.size()), web);  // the last web's memory is still in it
+      build_graph(all.pin, all.w.data(), static_cast<uint32_t>(all.x.size()), web);  // the last web's memory is still in it
       for (int sweep = 0; sweep < 4; ++sweep)
-        for (TissuePin* p : rope) solve_pin(*p, one.x.data(), one.w.data(), h);
-      for (TissuePin* p : slack_before) {
-        solve_pin(*p, one.x.data(), one.w.data(), h);
+        for (Tether* p : rope) solve_tether(*p, one.x.data(), one.w.data(), h);
+      for (Tether* p : slack_before) {
+        solve_tether(*p, one.x.data(), one.w.data(), h);
         caught += p->lambda < 0;
       }
-      solve_pins(all.pin, web, all.x.data(), h, 4, 0, work);
+      solve_tethers(all.pin, web, all.x.data(), h, 4, 0, work);
       for (size_t i = 0; i < one.x.size(); ++i) {
         ASSERT_LT(distance(xyz(one.x[i]), xyz(all.x[i])), 1e-6f) << "web " << round << ", particle " << i;
         ASSERT_EQ(all.x[i].w, 1) << "web " << round << ", particle " << i;
@@ -330,17 +331,17 @@ TEST(Pin, many_at_once_are_each_of_them_in_turn) {
 struct OneRope {
   std::vector<Vec4> x;
   std::vector<float> w{1 / 1e-5f, 1 / 1e-5f};
-  std::vector<TissuePin> pin{1};
-  PinWeb web;
-  std::vector<PinSpan> work;
+  std::vector<Tether> pin{1};
+  TetherGraph web;
+  std::vector<TetherSpan> work;
   OneRope(float apart, float length) : x{point({0, 0, 0}), point({apart, 0, 0})} {
     pin[0].a = particle_point(0), pin[0].b = particle_point(1), pin[0].length = length;
   }
-  void weave() { catgut::weave(pin, w.data(), 2, web); }
+  void build_graph() { catgut::build_graph(pin, w.data(), 2, web); }
   float apart() const { return x[1].x - x[0].x; }
   float substep(float pulled_to) {
     x[1].x = x[0].x + pulled_to;
-    solve_pins(pin, web, x.data(), 1.0f / 960, 4, 3e-5f, work);
+    solve_tethers(pin, web, x.data(), 1.0f / 960, 4, 3e-5f, work);
     return apart();
   }
 };
@@ -349,18 +350,18 @@ struct OneRope {
 TEST(Pin, taut_ones_are_in_the_web) {
   OneRope r(0.002f, 0.003f);
   const auto tick = [&](float pulled_to) {
-    r.weave();
+    r.build_graph();
     return r.substep(pulled_to);
   };
   EXPECT_NEAR(tick(0.002f), 0.002f, 1e-9f);
-  EXPECT_EQ(r.web.rope.size(), 0u);
+  EXPECT_EQ(r.web.active.size(), 0u);
   EXPECT_NEAR(tick(0.0031f), 0.003f, 1e-8f);
-  EXPECT_EQ(r.web.rope.size(), 0u);
+  EXPECT_EQ(r.web.active.size(), 0u);
   EXPECT_NEAR(r.substep(0.0029f), 0.0029f, 1e-9f) << "what it pulled is not given back";
   EXPECT_EQ(r.pin[0].lambda, 0);
   EXPECT_NEAR(r.substep(0.0031f), 0.003f, 1e-8f);
   EXPECT_NEAR(tick(0.0031f), 0.003f, 1e-8f);
-  EXPECT_EQ(r.web.rope.size(), 1u);
+  EXPECT_EQ(r.web.active.size(), 1u);
   EXPECT_NEAR(tick(0.0029f), 0.0029f, 1e-9f);
   EXPECT_NEAR(tick(0.0029f), 0.0029f, 1e-9f);
   EXPECT_EQ(r.web.slack.size(), 1u);
@@ -369,21 +370,21 @@ TEST(Pin, taut_ones_are_in_the_web) {
 // With a tolerance some are left alone, and when all are no rope is further off than that.
 TEST(Pin, a_tolerance_is_what_a_rope_may_be_too_long_by) {
   Random random(12);
-  std::vector<PinSpan> work;
+  std::vector<TetherSpan> work;
   const float h = 1.0f / 960, tolerance = 1e-5f;
   size_t still = 0;
   for (int web = 0; web < 200; ++web) {
     RopeWeb r(random);
-    PinWeb known;
+    TetherGraph known;
     pulled_before(r.pin);
-    weave(r.pin, r.w.data(), static_cast<uint32_t>(r.x.size()), known);
+    build_graph(r.pin, r.w.data(), static_cast<uint32_t>(r.x.size()), known);
     RopeWeb more = r;
-    solve_pins(r.pin, known, r.x.data(), h, 400, tolerance, work);
-    solve_pins(more.pin, known, more.x.data(), h, 401, tolerance, work);
-    const auto pulls_alike = [](const TissuePin& a, const TissuePin& b) { return a.lambda == b.lambda; };
+    solve_tethers(r.pin, known, r.x.data(), h, 400, tolerance, work);
+    solve_tethers(more.pin, known, more.x.data(), h, 401, tolerance, work);
+    const auto pulls_alike = [](const Tether& a, const Tether& b) { return a.lambda == b.lambda; };
     if (!std::equal(r.pin.begin(), r.pin.end(), more.pin.begin(), pulls_alike)) continue;  // they cannot all be as short
     ++still;
-    for (const TissuePin& p : r.pin) {
+    for (const Tether& p : r.pin) {
       const float l = distance(position_of(p.a, r.x.data()), position_of(p.b, r.x.data()));
       EXPECT_LE(l, p.length - p.compliance / (h * h) * p.lambda + tolerance + 1e-7f) << "web " << web;
     }
@@ -396,7 +397,7 @@ TEST(Pin, a_tolerance_is_what_a_rope_may_be_too_long_by) {
 TEST(Pin, a_tolerance_makes_no_rope_twitch) {
   OneRope r(0.002f, 0.002f);
   pulled_before(r.pin);
-  r.weave();
+  r.build_graph();
   for (int i = 0; i < 50; ++i) {
     EXPECT_NEAR(r.substep(r.apart() + 3e-6f), 0.002f, 1e-8f) << i;
     EXPECT_LT(r.pin[0].lambda, 0) << i;
@@ -454,7 +455,7 @@ uint64_t pressed_bowel(int workers, double* deepest) {
   for (uint32_t i = 1; i < tissue; ++i)
     if (distance(start[i], start[bite.slot]) < distance(start[nearest], start[bite.slot])) nearest = i;
   bite.point = particle_point(nearest);
-  bite.friction = 0.03f, bite.capstan = 0.08f;
+  bite.friction = 0.03f, bite.capstan_friction = 0.08f;
   s.strand[0].anchor.push_back(bite);
   Jobs jobs(workers);
   uint32_t contacts = 0;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/solver: shape matching against references in double precision: polar decomposition, rows, workers.
 #include "solver/shape_match.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests of solver/thread_columns: the system in strands against a dense solve.
 #include "solver/thread_columns.h"
 
@@ -11,7 +12,7 @@ namespace catgut {
 namespace {
 
 template <typename T, size_t kRight>
-double worst_error(size_t count, double coupling, double reserve, Strands<T, kRight>& s) {
+double worst_error(size_t count, double coupling, double reserve, PartitionedTridiagonal<T, kRight>& s) {
   Random r(count);
   const Eigen::Index n = static_cast<Eigen::Index>(count);
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n, n), right(n, static_cast<Eigen::Index>(kRight));
@@ -29,7 +30,7 @@ double worst_error(size_t count, double coupling, double reserve, Strands<T, kRi
     }
   }
   const Eigen::MatrixXd want = matrix.ldlt().solve(right);
-  solve_strands(s, count);
+  solve_partitions(s, count);
   double worst = 0;
   for (size_t j = 0; j < kRight; ++j)
     for (size_t i = 0; i < count; ++i)
@@ -38,9 +39,9 @@ double worst_error(size_t count, double coupling, double reserve, Strands<T, kRi
   return worst / want.cwiseAbs().maxCoeff();
 }
 
-TEST(Strands, agree_with_a_dense_solve) {
-  Strands<double, 1> stretch;
-  Strands<float, 3> motion;
+TEST(PartitionedTridiagonal, agree_with_a_dense_solve) {
+  PartitionedTridiagonal<double, 1> stretch;
+  PartitionedTridiagonal<float, 3> motion;
   stretch.resize(500), motion.resize(500);
   // Longer and shorter in turn: what a longer system left behind must not reach a shorter one.
   for (const size_t count : {500u, 1u, 2u, 3u, 7u, 8u, 9u, 15u, 16u, 17u, 64u, 101u, 174u, 175u, 500u, 23u}) {

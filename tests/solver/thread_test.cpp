@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/solver: the thread slides through an anchor against friction, keeps its length, and weighs what it weighs.
 #include "solver/thread.h"
 
@@ -101,7 +102,7 @@ TEST(ThreadSlide, with_no_friction_both_sides_pull_alike) {
 
 TEST(ThreadSlide, capstan_ratio) {
   Line line = soft_line();
-  line.anchor().capstan = 0.5f;
+  line.anchor().capstan_friction = 0.5f;
   line.body[0].x.x -= 0.004f;  // 0.02 N on the free side before anything slides
   for (int i = 0; i < 960; ++i) line.step();
   line.pull(0.012f, 1);
@@ -148,7 +149,7 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
   ThreadAnchor a;
   a.slot = t.first_slot + 90;
   a.point = particle_point(0);
-  a.friction = 0.03f, a.capstan = 0.08f;
+  a.friction = 0.03f, a.capstan_friction = 0.08f;
   state.strand[0].anchor.push_back(a);
   SutureModel suture;
   SutureState stitches;

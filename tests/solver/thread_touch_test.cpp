@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests of solver/thread_touch: a taut thread round a tool stays round it, and the tool feels it.
 #include <gtest/gtest.h>
 
@@ -165,7 +166,7 @@ TEST(ThreadOnTool, lifted_off_nothing_sticks) {
   EXPECT_LT(w.depth(w.at(middle)), -0.002);
 }
 
-// A tool that a hand holds by a spring gives way until the spring carries the thread's force, and comes to rest.
+// A tool that a hand holds by a spring gives way until the spring carries the thread's force, and settles.
 TEST(ThreadOnTool, a_tool_in_a_hand_gives_way_and_rests) {
   for (const float h : {1.0f / 480, 1.0f / 960}) {
     Wrap w(0.5f, 0, 0, h);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/solver: the search for pairs of tissue against looking at every pair.
 #include "solver/tissue_pairs.h"
 
@@ -66,7 +67,7 @@ TEST(TissuePairs, finds_what_looking_at_every_pair_finds) {
       find_tissue_pairs(s.tissue, s.x.data(), origin, search, jobs);
       const auto found = listed(search);
       EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
-      // At the very edge of the margin rounding decides; a micrometre inside of it nothing may be missing.
+      // At the very edge of the margin rounding decides; a micrometer inside of it nothing may be missing.
       const auto wanted = every_pair_within(s, s.tissue.pair_margin - 1e-6f),
                  most = every_pair_within(s, s.tissue.pair_margin + 1e-6f);
       EXPECT_GT(wanted.size(), 1000u);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests of solver/contact, tools on tools: what two hands push against each other with, in closed form; nothing passes through;
 // Coulomb; momentum; and tools that are apart are as if there were no such contact.
 #include <gtest/gtest.h>
@@ -51,7 +52,7 @@ struct Pair {
       m.capsule.push_back({{0, 0, 0.018f}, {0, 0, 0.12f}, kShaft});
     }
     model.body[model.needle_body(0)].inv_mass = 1 / 3e-4f, model.body[model.needle_body(0)].inv_inertia = {1e8f, 1e8f, 1e8f};
-    model.body[model.needle_body(0)].gravity = true;  // a needle, whose weight nobody carries
+    model.body[model.needle_body(0)].gravity = true;  // a needle, whose weight no one carries
     model.body[model.needle_body(0)].capsule.push_back({{}, {0, 0, 0.002f}, 0.0003f});
     const std::vector<float> mass{1.0f};
     model.shape = make_shape_model(std::span(start).first(1), mass, std::vector<std::vector<uint32_t>>{{0}});
@@ -162,7 +163,7 @@ TEST(ToolsOnTools, nothing_passes_through) {
       }
 }
 
-// A hand that feels nothing goes on: it never presses harder than the bound, and the tools slip past each other in the end
+// A hand that feels nothing continues: it never presses harder than the bound, and the tools slip past each other in the end
 // instead of staying locked behind each other.
 TEST(ToolsOnTools, beyond_the_bound_they_slip_past_each_other) {
   for (const float speed : {0.05f, 0.2f, 0.5f}) {
@@ -181,7 +182,7 @@ TEST(ToolsOnTools, beyond_the_bound_they_slip_past_each_other) {
   }
 }
 
-// Nobody holds them, nothing slows them: what one loses the other has, in turning too.
+// No one holds them, nothing slows them: what one loses the other has, in turning too.
 TEST(ToolsOnTools, free_tools_keep_momentum) {
   for (const float friction : {0.0f, 0.3f}) {
     Pair p({{-0.03f, 0, 0}, kLevel}, {{0, 0.008f, -0.05f}, kAcross}, friction, false);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/surgeon: scripted hands move like hands, and only through ToolInput. The surgeon's room cannot include the simulation
 // (tests/layers reads its arrows), so it sees Snapshots alone; here two surgeons who see the same do the same.
 #include "surgeon/hands.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/surgeon: the whole scripted purse-string, seed by seed. Twenty of them take minutes: set CATGUT_LONG=1.
 #include <gtest/gtest.h>
 
@@ -43,14 +44,14 @@ TEST(Procedure, twenty_seeds_close_the_opening) {
     EXPECT_LE(r.value["opening_ratio"], 0.15) << seed;
     EXPECT_LE(lengths.worst, 0.01f) << seed;
     EXPECT_LE(lengths.worst_passing, 0.03f) << seed;
-    EXPECT_EQ(r.value["order_broken"], 0) << seed;
+    EXPECT_EQ(r.value["bite_out_of_order"], 0) << seed;
     EXPECT_EQ(r.value["order_errors"], 0) << seed;
     EXPECT_EQ(r.value["state_valid"], 1) << seed;
     EXPECT_EQ(r.value["surgeon_done"], 1) << seed;
   }
 }
 
-// Half a millimetre of tremor, a millimetre of aim: the first attempts fail, and the surgeon tries again instead of giving up.
+// Half a millimeter of tremor, a millimeter of aim: the first attempts fail, and the surgeon tries again instead of giving up.
 TEST(Procedure, shaky_hands_try_again) {
   for (uint64_t seed : {3, 6}) {
     SceneSpec scene = read_scene("purse_string");

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/suture: scissors: a cut is an end of the thread to everything, and a wrong one is said and stays.
 #include <gtest/gtest.h>
 
@@ -84,7 +85,7 @@ TEST(Cut, tells_how_long_the_tail_is_and_that_the_throws_are_too_few) {
   Tie r({}, scene);
   r.take();
   r.pull_tight();
-  ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+  ASSERT_EQ(r.count(EventKind::throw_locked), 1u);
   r.open(0);
   const Knot k = r.sewn().knot[0];
   const size_t at = r.node_of(k.slot[1]) + 4;
@@ -140,7 +141,7 @@ TEST(Cut, to_a_pull_is_the_end_of_the_thread) {
     r.needle_to(to, 1.0f / 60);
   }
   EXPECT_GE(r.count(EventKind::particle_passed), 3u);
-  EXPECT_GE(r.count(EventKind::thread_ran_out), 1u);
+  EXPECT_GE(r.count(EventKind::thread_exhausted), 1u);
   EXPECT_TRUE(std::equal(order.begin(), order.end(), r.thread().order.begin())) << "what is beyond the cut stays";
   EXPECT_EQ(r.thread().cut[24], 1);
   EXPECT_EQ(cuts(r), 1u);
@@ -164,7 +165,7 @@ TEST(Cut, off_the_stitch_takes_a_throw_back) {
   ASSERT_EQ(r.sewn().knot.size(), 1u);
   r.thread().cut[r.node_of_point(0) - 3] = 1;  // the taken end, between jaw and stitch
   r.tick();
-  EXPECT_EQ(r.count(EventKind::knot_cancelled), 1u);
+  EXPECT_EQ(r.count(EventKind::throw_undone), 1u);
   EXPECT_TRUE(r.sewn().knot.empty());
   EXPECT_EQ(r.thread().anchor.size(), 2u);
 }

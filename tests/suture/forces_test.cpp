@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/suture: the law of pushing a needle through bowel, at the places where its numbers come from.
 #include "suture/forces.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/suture: jaws that hold needle or thread, where and at the angle they caught it.
 #include <gtest/gtest.h>
 
@@ -127,7 +128,7 @@ TEST(Grasp, holds_and_releases_the_nearest_thread) {
   const uint32_t held = r.suture().instrument[1].slot;
   EXPECT_LE(distance(xyz(r.solver().x[held]), r.solver().body[1].x),
             distance(xyz(r.solver().x[slot]), r.solver().body[1].x) + 1e-4f);
-  // Paper 2.3: particles in a jaw, and three neighbours a side, do not collide.
+  // Paper 2.3: particles in a jaw, and three neighbors a side, do not collide.
   const size_t n = r.node_of(held);
   for (size_t i = n - 3; i <= n + 3; ++i)
     EXPECT_EQ(r.collides()[r.thread().order[i] - r.model->solver.strand[0].first_slot], 0);

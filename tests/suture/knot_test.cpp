@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/suture: throws and knots (paper 2.4, its last two paragraphs), sentence by sentence.
 #include <gtest/gtest.h>
 
@@ -31,11 +32,11 @@ TEST(Knot, is_begun_when_the_tool_with_the_loop_takes_the_other_end) {
     Tie r(setup);
     ASSERT_EQ(r.loop().wraps, 1u);
     const uint32_t first = r.loop().first, last = r.loop().last;
-    const int handed = r.loop().handed;
+    const int chirality = r.loop().chirality;
     r.take();
     ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
-    ASSERT_EQ(r.count(EventKind::knot_begun), 1u);
-    EXPECT_EQ(r.last(EventKind::knot_begun)->value, 1.0f);
+    ASSERT_EQ(r.count(EventKind::throw_started), 1u);
+    EXPECT_EQ(r.last(EventKind::throw_started)->value, 1.0f);
     EXPECT_EQ(r.loop().wraps, 0u);
     EXPECT_EQ(r.holds(HoldKind::loop), 0u);
     EXPECT_EQ(r.count(EventKind::loop_released), 0u) << "it became a throw";
@@ -46,7 +47,7 @@ TEST(Knot, is_begun_when_the_tool_with_the_loop_takes_the_other_end) {
     EXPECT_EQ(k.end[1], last);
     EXPECT_EQ(k.strand, r.suture().instrument[0].slot);
     EXPECT_EQ(k.throws, 1u);
-    EXPECT_EQ(k.thrown[0].handed, handed);
+    EXPECT_EQ(k.thrown[0].chirality, chirality);
     EXPECT_EQ(k.thrown[0].needle_end, tail ? 0 : 1);
     for (uint32_t slot : k.end) {
       const ThreadAnchor* a = anchor_at(r, slot);
@@ -77,7 +78,7 @@ TEST(Knot, comes_down_as_far_as_the_tool_goes_away_and_does_not_go_back_up) {
   const float left = r.sewn().knot[0].left;
   r.move(0, away * -0.004f, 0.2f);
   EXPECT_LE(r.sewn().knot[0].left, left);
-  EXPECT_EQ(r.count(EventKind::knot_locked), 0u);
+  EXPECT_EQ(r.count(EventKind::throw_locked), 0u);
 }
 
 // "When the knot object reaches the suture point or midpoint between the two previous suture points, it is locked in place, and
@@ -88,7 +89,7 @@ TEST(Knot, locks_at_the_midpoint_and_holds_both_strands_there) {
   r.take();
   const uint32_t outer = r.sewn().knot[0].end[1];
   r.pull_tight();
-  ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+  ASSERT_EQ(r.count(EventKind::throw_locked), 1u);
   ASSERT_EQ(r.sewn().knot.size(), 1u);
   const Knot& k = r.sewn().knot[0];
   EXPECT_EQ(k.phase, KnotPhase::locked);
@@ -107,11 +108,11 @@ TEST(Knot, locks_at_the_midpoint_and_holds_both_strands_there) {
   EXPECT_GT(r.node_of(k.slot[1]), r.node_of_point(1));
   EXPECT_EQ(k.throws, 1u);
   EXPECT_EQ(k.thrown[0].wraps, 1u);
-  EXPECT_EQ(k.thrown[0].handed, 1);
-  EXPECT_EQ(k.thrown[0].tension, r.last(EventKind::knot_locked)->value);
+  EXPECT_EQ(k.thrown[0].chirality, 1);
+  EXPECT_EQ(k.thrown[0].tension, r.last(EventKind::throw_locked)->value);
   EXPECT_LT(k.thrown[0].gap, 0.003f);
   // Snug: no more thread between knot and suture points than the way there is long.
-  EXPECT_EQ(k.snug, 1u);
+  EXPECT_EQ(k.slack_removed, 1u);
   EXPECT_NEAR(rest_between(r, r.node_of(k.slot[0]), r.node_of_point(0)), distance(target_of(r), r.point_at(0)), 0.0003);
   EXPECT_NEAR(rest_between(r, r.node_of(k.slot[1]), r.node_of_point(1)), distance(target_of(r), r.point_at(1)), 0.0003);
   EXPECT_NEAR(r.rest_length(), length, 1e-6);
@@ -133,7 +134,7 @@ TEST(Knot, goes_to_the_suture_point_if_there_is_one) {
   ASSERT_EQ(r.sewn().knot.size(), 1u);
   EXPECT_LT(distance(target_of(r), r.point_at(0)), 1e-7f);
   r.pull_tight();
-  ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+  ASSERT_EQ(r.count(EventKind::throw_locked), 1u);
   EXPECT_EQ(r.sewn().knot[0].slots, 2u);
 }
 
@@ -171,7 +172,7 @@ TEST(Knot, of_a_running_suture_tied_to_itself_goes_to_the_midpoint_of_the_last_t
   ASSERT_EQ(r.sewn().knot.size(), 1u);
   EXPECT_LT(distance(target_of(r), 0.5f * (r.point_at(1) + r.point_at(2))), 1e-6f);
   r.pull_tight();
-  ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+  ASSERT_EQ(r.count(EventKind::throw_locked), 1u);
   EXPECT_EQ(r.sewn().knot[0].slots, 1u);
   EXPECT_GT(r.node_of(r.sewn().knot[0].slot[0]), r.node_of_point(1)) << "a particle of the needle's strand";
 }
@@ -200,7 +201,7 @@ TEST(Knot, begun_with_the_needle_still_in_the_tissue_is_said_and_goes_on) {
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
   EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::needle_in_tissue);
   EXPECT_EQ(r.last(EventKind::technique_fault)->which, 1u);
-  EXPECT_EQ(r.count(EventKind::knot_begun), 1u);
+  EXPECT_EQ(r.count(EventKind::throw_started), 1u);
 }
 
 // Jaws that close right at the loop mean the other end, however near the loop's own strands are.
@@ -216,7 +217,7 @@ TEST(Knot, the_jaws_take_the_other_end_and_not_the_loops_own_strand) {
   r.take();
   ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
   EXPECT_LT(r.node_of(r.suture().instrument[0].slot), r.node_of_point(0));
-  EXPECT_EQ(r.count(EventKind::knot_begun), 1u);
+  EXPECT_EQ(r.count(EventKind::throw_started), 1u);
 }
 
 // What a state says apart from positions and from what follows from them.
@@ -256,9 +257,9 @@ TEST(Knot, letting_go_takes_it_back_and_nothing_is_left_of_it) {
     r->move(0, rotate(r->frame.q, Vec3{0, -0.3f, 0.8f}) * 0.006f, 0.2f);
     r->open(0);
   }
-  ASSERT_EQ(tied.count(EventKind::knot_begun), 1u);
-  ASSERT_EQ(tied.count(EventKind::knot_cancelled), 1u);
-  EXPECT_EQ(twin.count(EventKind::knot_begun), 0u);
+  ASSERT_EQ(tied.count(EventKind::throw_started), 1u);
+  ASSERT_EQ(tied.count(EventKind::throw_undone), 1u);
+  EXPECT_EQ(twin.count(EventKind::throw_started), 0u);
   const Written a = written(tied), b = written(twin);
   EXPECT_EQ(a.order, b.order);
   EXPECT_EQ(a.rest, b.rest);
@@ -281,7 +282,7 @@ TEST(Knot, a_further_throw_lies_on_the_first_and_a_reef_differs_from_a_granny) {
     Tie r(setup);
     r.take();
     r.pull_tight();
-    ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+    ASSERT_EQ(r.count(EventKind::throw_locked), 1u);
     const std::array<uint32_t, 2> slot = r.sewn().knot[0].slot;
     const double inside = rest_between(r, r.node_of(slot[0]), r.node_of(slot[1]));
     r.wrap(second);
@@ -291,14 +292,14 @@ TEST(Knot, a_further_throw_lies_on_the_first_and_a_reef_differs_from_a_granny) {
     EXPECT_EQ(r.sewn().knot[0].throws, 2u);
     EXPECT_EQ(r.sewn().knot[0].begun, 1u);
     EXPECT_EQ(r.sewn().knot[0].phase, KnotPhase::tightening);
-    EXPECT_EQ(r.last(EventKind::knot_begun)->which, 0u);
+    EXPECT_EQ(r.last(EventKind::throw_started)->which, 0u);
     r.pull_tight();
-    ASSERT_EQ(r.count(EventKind::knot_locked), 2u);
+    ASSERT_EQ(r.count(EventKind::throw_locked), 2u);
     const Knot& k = r.sewn().knot[0];
     EXPECT_EQ(k.phase, KnotPhase::locked);
     EXPECT_EQ(k.slot, slot);
     EXPECT_EQ(r.thread().anchor.size(), 4u);
-    EXPECT_EQ(k.thrown[0].handed * k.thrown[1].handed, second) << "opposite signs: a reef knot";
+    EXPECT_EQ(k.thrown[0].chirality * k.thrown[1].chirality, second) << "opposite signs: a reef knot";
     EXPECT_EQ(rest_between(r, r.node_of(slot[0]), r.node_of(slot[1])), inside);
     EXPECT_TRUE(r.order_is_whole());
   }
@@ -310,14 +311,14 @@ TEST(Knot, taking_back_a_further_throw_leaves_the_first) {
   Tie r(setup);
   r.take();
   r.pull_tight();
-  ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+  ASSERT_EQ(r.count(EventKind::throw_locked), 1u);
   const Knot before = r.sewn().knot[0];
   r.wrap(-1);
   r.take();
   ASSERT_EQ(r.sewn().knot[0].throws, 2u);
   r.move(0, rotate(r.frame.q, Vec3{0, 0, 0.003f}), 0.1f);
   r.open(0);
-  EXPECT_EQ(r.count(EventKind::knot_cancelled), 1u);
+  EXPECT_EQ(r.count(EventKind::throw_undone), 1u);
   ASSERT_EQ(r.sewn().knot.size(), 1u);
   const Knot& k = r.sewn().knot[0];
   EXPECT_EQ(k.phase, KnotPhase::locked);
@@ -334,7 +335,7 @@ TEST(PullWithKnot, no_particle_passes_a_locked_knot) {
   Tie r;
   r.take();
   r.pull_tight();
-  ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+  ASSERT_EQ(r.count(EventKind::throw_locked), 1u);
   const Knot k = r.sewn().knot[0];
   const std::array<size_t, 4> nodes = {r.node_of(k.slot[0]), r.node_of_point(0), r.node_of_point(1), r.node_of(k.slot[1])};
   const std::vector<float> rest(r.thread().rest.begin() + static_cast<long>(nodes[0]),
@@ -366,7 +367,7 @@ TEST(PullWithKnot, no_particle_passes_a_locked_knot) {
   }
 }
 
-// A running suture goes on from a knot: knot at 20 and 26, then two points with slack between them and behind them.
+// A running suture continues from a knot: knot at 20 and 26, then two points with slack between them and behind them.
 void running_suture(Rig& rig, bool with_knot, Place& p) {
   rig.wait(0.1f);
   lock(rig, 20, rig.place(0.0f, 0.004f).at);
@@ -395,7 +396,7 @@ void running_suture(Rig& rig, bool with_knot, Place& p) {
     k.target = midway(rig.model->solver.shape.rest.data(), rig.thread().anchor[0].point, rig.thread().anchor[1].point);
     k.slot = {rig.thread().order[18], rig.thread().order[27]};
     k.strand = rig.thread().order[10];
-    k.slots = 2, k.snug = 1, k.throws = 1;
+    k.slots = 2, k.slack_removed = 1, k.throws = 1;
     rig.sewn().knot.push_back(k);
     for (uint32_t slot : k.slot) {
       ThreadAnchor a;
@@ -408,8 +409,8 @@ void running_suture(Rig& rig, bool with_knot, Place& p) {
   }
 }
 
-void draw(Rig& rig, const Place& p, float metres) {
-  for (int i = 0; i < static_cast<int>(metres / 0.0002f); ++i) {
+void draw(Rig& rig, const Place& p, float meters) {
+  for (int i = 0; i < static_cast<int>(meters / 0.0002f); ++i) {
     Pose to = rig.circle();
     to.p += p.out * 0.0002f;
     rig.needle_to(to, 1.0f / 60);
@@ -454,7 +455,7 @@ TEST(PullWithKnot, slack_is_resolved_up_to_the_knot_and_no_further) {
 
 TEST(DrawThrough, moves_exactly_that_much_and_loses_nothing) {
   for (const int way : {1, -1})
-    for (const float metres : {0.0003f, 0.0016f, 0.0101f, 0.02f}) {
+    for (const float meters : {0.0003f, 0.0016f, 0.0101f, 0.02f}) {
       Rig rig(weightless(50));
       rig.wait(0.05f);
       lock(rig, 25, rig.place(0.4f).at);
@@ -467,8 +468,8 @@ TEST(DrawThrough, moves_exactly_that_much_and_loses_nothing) {
       const double length = rig.rest_length(), before = behind();
       SutureContext context = rig.context();
       OneSuture one(context, 0);
-      EXPECT_NEAR(draw_through(one, slot, way, metres), metres, 1e-7f);
-      EXPECT_NEAR(behind(), before - way * double{metres}, 1e-6);
+      EXPECT_NEAR(draw_through(one, slot, way, meters), meters, 1e-7f);
+      EXPECT_NEAR(behind(), before - way * double{meters}, 1e-6);
       EXPECT_NEAR(rig.rest_length(), length, 1e-7);
       EXPECT_TRUE(rig.order_is_whole());
       for (float r : rig.thread().rest) EXPECT_GT(r, 0);
@@ -504,8 +505,8 @@ TEST(Midway, is_the_middle_at_rest_and_under_every_affine_motion) {
     while (count < m.shape.cluster_stride && member[count] < m.tissue) ++count;
     return spread_point({member, count}, m.shape.rest.data(), p.at);
   };
-  const TissuePoint a = point(0.3f), b = point(0.6f), c = midway(m.shape.rest.data(), a, b);
-  EXPECT_LE(c.count, TissuePoint::kMost);
+  const EmbeddedPoint a = point(0.3f), b = point(0.6f), c = midway(m.shape.rest.data(), a, b);
+  EXPECT_LE(c.count, EmbeddedPoint::kMaxParticles);
   float sum = 0;
   for (uint32_t k = 0; k < c.count; ++k) sum += c.weight[k];
   EXPECT_NEAR(sum, 1, 1e-5f);
@@ -516,8 +517,8 @@ TEST(Midway, is_the_middle_at_rest_and_under_every_affine_motion) {
   EXPECT_LT(distance(position_of(c, bent.data()), 0.5f * (position_of(a, bent.data()) + position_of(b, bent.data()))), 1e-5f);
 }
 
-// A state that is saved with a loop, with a throw on its way, with a knot that is being drawn snug or with a locked one goes on
-// as if nothing had happened.
+// A state that is saved with a loop, with a throw on its way, with a knot that is being drawn snug or with a locked one
+// continues as if nothing had happened.
 TEST(KnotState, is_saved_whole) {
   Tie r;
   std::vector<std::vector<std::byte>> saved;
@@ -541,7 +542,7 @@ TEST(KnotState, is_saved_whole) {
       input.push_back(r.input), hash.push_back(hash_state(*r.model, *r.state));
     }
   }
-  ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+  ASSERT_EQ(r.count(EventKind::throw_locked), 1u);
   for (size_t s = 0; s < saved.size(); ++s) {
     StatePtr again = initial_state(*r.model);
     load_state(*r.model, *again, saved[s]);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/suture: loops of thread round a tool (paper 2.4, figure 10). A zoo of shapes, each made by code and named for what it
 // is; then loops that hands lay in a whole scene.
 #include "suture/loop.h"
@@ -29,13 +30,13 @@ Curve line(Vec3 a, Vec3 b) {
   for (int i = 0; i <= n; ++i) c.push_back(lerp(a, b, static_cast<float>(i) / static_cast<float>(n)));
   return c;
 }
-// An arc round the tool's axis (or round `centre`) from angle a by `angle`, its radii and its depth changing evenly.
+// An arc round the tool's axis (or round `center`) from angle a by `angle`, its radii and its depth changing evenly.
 struct Arc {
   float from = 0, angle = kTurn;
   float radius = kOn, radius_end = 0;     // [m] 0: as at the start
   float depth = 0.008f, pitch = 0.0004f;  // [m] z at the start; advance per turn toward the hand
   float flat = 1;                         // the y radius over the x radius
-  Vec3 centre;
+  Vec3 center;
 };
 Curve arc(const Arc& a) {
   Curve c;
@@ -43,7 +44,7 @@ Curve arc(const Arc& a) {
   const float end = a.radius_end > 0 ? a.radius_end : a.radius;
   for (int i = 0; i <= n; ++i) {
     const float s = static_cast<float>(i) / n, phi = a.from + a.angle * s, r = a.radius + (end - a.radius) * s;
-    c.push_back(a.centre +
+    c.push_back(a.center +
                 Vec3{r * std::cos(phi), a.flat * r * std::sin(phi), a.depth + a.pitch * std::abs(a.angle) / kTurn * s});
   }
   return c;
@@ -145,7 +146,7 @@ std::vector<Shape> zoo() {
   is("loose ellipse, flat", with_leads(arc(a)), 1, 1);
   a = coil(1.3f, 0.0019f), a.flat = 1.7f;
   is("loose ellipse, tall", with_leads(arc(a)), 1, 1);
-  a = coil(1.2f, 0.0022f), a.centre = {0.001f, -0.0006f, 0};
+  a = coil(1.2f, 0.0022f), a.center = {0.001f, -0.0006f, 0};
   is("loop that hangs to one side", with_leads(arc(a)), 1, 1);
   a = coil(2.2f, 0.0032f), a.radius_end = 0.0016f;
   is("spiral that closes up", with_leads(arc(a)), 2, 1);
@@ -158,7 +159,7 @@ std::vector<Shape> zoo() {
   a = coil(2.2f, 0.003f), a.depth = 0.0163f;
   is("double wrap where jaws and shaft meet", with_leads(arc(a)), 2, 1);
   a = coil(2.15f, 0.0021f), a.pitch = 0.001f;
-  is("double wrap with a millimetre between its turns", with_leads(arc(a)), 2, 1);
+  is("double wrap with a millimeter between its turns", with_leads(arc(a)), 2, 1);
   is("wrap with a kink beside it",
      with_leads(arc(coil(1.2f))) + arc({0, -0.9f * kTurn, 0.0022f, 0, 0.008f, 0, 1, Vec3{0.03f, 0.008f, 0}}), 1, 1, 0.0016f);
   is("single wrap, then straight along the shaft",
@@ -194,15 +195,15 @@ std::vector<Shape> zoo() {
   none("helix of two turns toward the tip", with_leads(arc(a)), LoopReason::too_deep);
   a = coil(1.2f), a.pitch = 0.008f;
   none("one turn stretched over 8 mm of the jaws", with_leads(arc(a)), LoopReason::too_deep);
-  a = coil(1.2f, 0.0009f), a.centre = {0.0025f, 0, 0};
+  a = coil(1.2f, 0.0009f), a.center = {0.0025f, 0, 0};
   none("loop beside the tool", with_leads(arc(a)), LoopReason::tip_outside, 0.0008f);
-  a = coil(2.2f, 0.0009f), a.centre = {0, -0.0025f, 0};
+  a = coil(2.2f, 0.0009f), a.center = {0, -0.0025f, 0};
   none("double loop beside the tool", with_leads(arc(a)), LoopReason::tip_outside, 0.0008f);
   a = coil(1.2f, 0.0018f), a.depth = -0.003f;
   none("loop beyond the tip", with_leads(arc(a)), LoopReason::no_crossing);
   a = coil(2.2f, 0.0018f), a.depth = -0.0012f;
   none("double loop just beyond the tip", with_leads(arc(a)), LoopReason::no_crossing);
-  a = coil(1.2f, 0.0018f), a.centre = {0.03f, 0, 0};
+  a = coil(1.2f, 0.0018f), a.center = {0.03f, 0, 0};
   none("loop round nothing", with_leads(arc(a)), LoopReason::no_crossing);
   a = coil(1.2f, 0.012f);
   none("loop of thread far round the tool, touching nothing", with_leads(arc(a)), LoopReason::no_crossing);
@@ -262,7 +263,7 @@ TEST(Loop, its_particles_are_frozen_on_the_tool_and_go_where_it_goes) {
     EXPECT_EQ(r.last(EventKind::loop_formed)->which, 1u);
     EXPECT_EQ(r.last(EventKind::loop_formed)->value, static_cast<float>(way));
     EXPECT_EQ(r.loop().wraps, 1u);
-    EXPECT_EQ(r.loop().handed, way);
+    EXPECT_EQ(r.loop().chirality, way);
     const size_t first = r.node_of(r.loop().first), last = r.node_of(r.loop().last);
     EXPECT_EQ(r.holds(HoldKind::loop), last - first + 1);
     std::vector<Vec3> where;
@@ -285,7 +286,7 @@ TEST(Loop, handedness_is_that_of_the_half_knot_whichever_end_was_wrapped) {
       setup.older = 45, setup.newer = 50;
       Tie r(setup);
       ASSERT_EQ(r.loop().wraps, 1u) << (tail ? "tail" : "needle end");
-      EXPECT_EQ(r.loop().handed, way) << (tail ? "tail" : "needle end");
+      EXPECT_EQ(r.loop().chirality, way) << (tail ? "tail" : "needle end");
     }
 }
 
@@ -417,7 +418,7 @@ TEST(Loop, a_hand_that_carries_the_thread_round_the_tool_lays_loops) {
       }
       r.wait(0.2f);
       EXPECT_EQ(r.loop().wraps, turns < 2 ? 1u : 2u) << "way " << way;
-      EXPECT_EQ(r.loop().handed, way);
+      EXPECT_EQ(r.loop().chirality, way);
       EXPECT_EQ(r.count(EventKind::loop_rejected), 0u) << "half a turn on the way to a whole one is no mistake";
     }
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/suture: the order list (paper 2.3, figure 8), against the paper's own procedure on a list of pairs.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/suture: thread through suture points (paper 2.3, figures 7 and 9). Weightless and laid by hand, so that every length is
 // known (see rig.h).
 #include <gtest/gtest.h>
@@ -19,10 +20,10 @@ void one_point(Rig& rig, size_t node, Place& p) {
   put_needle(rig, xyz(rig.solver().x[rig.thread().order.back()]));
 }
 
-void draw_out(Rig& rig, const Place& p, float metres, float speed) {
+void draw_out(Rig& rig, const Place& p, float meters, float speed) {
   Pose to = rig.circle();
-  to.p += p.out * metres;
-  rig.needle_to(to, metres / speed);
+  to.p += p.out * meters;
+  rig.needle_to(to, meters / speed);
 }
 
 // "The simulator temporarily anchors the next free particle at the needle's end to the suture point. This locks the thread at
@@ -66,7 +67,7 @@ TEST(Figure7, a_suture_point_locks_the_next_free_particle_behind_the_needle) {
 // passes.
 TEST(Figure7, tension_below_the_threshold_passes_nothing_above_it_thread_passes) {
   SceneSpec scene = weightless(40);
-  scene.suture.pass_tension = 0.013f;  // one particle of tissue gives way by a millimetre for each 1.4 mN
+  scene.suture.pass_tension = 0.013f;  // one particle of tissue gives way by a millimeter for each 1.4 mN
   Rig rig(scene);
   Place p;
   one_point(rig, 34, p);
@@ -92,7 +93,7 @@ TEST(Figure7, tension_below_the_threshold_passes_nothing_above_it_thread_passes)
 }
 
 // Figure 7c: "The particle on the free end of the suture point moves to the midpoint of the needle end particle and the suture
-// point." The stage by itself, on a state whose turn it is: exactly one particle, exactly the midpoint, nothing else moves.
+// point." The stage on its own, on a state whose turn it is: exactly one particle, exactly the midpoint, nothing else moves.
 TEST(Figure7, exactly_one_particle_passes_to_the_midpoint) {
   Rig rig(weightless(40));
   Place p;
@@ -172,7 +173,7 @@ TEST(Figure7, tension_resolves_after_passing) {
 
 // "If p10 is locked to a suture point, p11 through p13 and p7 through p9 will have collision disabled along with p10. ... A
 // particle's ability to collide is restored as the thread is pulled through the suture point."
-TEST(Collisions, are_off_for_the_locked_particle_and_three_neighbours_a_side_and_come_back) {
+TEST(Collisions, are_off_for_the_locked_particle_and_three_neighbors_a_side_and_come_back) {
   Rig rig(weightless(40));
   Place p;
   one_point(rig, 20, p);
@@ -294,8 +295,8 @@ TEST(RanOut, the_free_end_holds_at_the_first_suture_point) {
     ASSERT_EQ(rig.thread().order.front(), end);
   }
   EXPECT_EQ(rig.node_of_point(0), 1u);
-  EXPECT_GE(rig.count(EventKind::thread_ran_out), 1u);
-  EXPECT_LE(rig.count(EventKind::thread_ran_out), 3u) << "said, not shouted";
+  EXPECT_GE(rig.count(EventKind::thread_exhausted), 1u);
+  EXPECT_LE(rig.count(EventKind::thread_exhausted), 3u) << "said, not shouted";
   EXPECT_NEAR(rig.rest_length(), length, 1e-6);
   for (float r : rig.thread().rest) EXPECT_GT(r, 0.0f);
   // The needle comes back: the tissue relaxes, everything is still there.
@@ -310,8 +311,8 @@ TEST(RanOut, with_two_points_the_older_one_holds) {
   Place p;
   two_points(rig, 5, 14, p);
   for (int i = 0; i < 90; ++i) draw_out(rig, p, 0.00025f, 0.015f);
-  EXPECT_GE(rig.count(EventKind::thread_ran_out), 1u);
-  EXPECT_EQ(rig.last(EventKind::thread_ran_out)->which, 0u);
+  EXPECT_GE(rig.count(EventKind::thread_exhausted), 1u);
+  EXPECT_EQ(rig.last(EventKind::thread_exhausted)->which, 0u);
   EXPECT_EQ(rig.node_of_point(0), 1u);
   EXPECT_TRUE(rig.order_is_whole());
   EXPECT_GT(rig.node_of_point(1), rig.node_of_point(0));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/suture: the needle's triggers (paper 2.2, figures 4 and 5).
 #include <gtest/gtest.h>
 
@@ -24,7 +25,7 @@ TEST(Figure4, nearest_particle_within_x_is_attached_when_the_tip_enters) {
   EXPECT_LE(e.value, rig.model->suture.attach_threshold);
   EXPECT_EQ(rig.sewn().bite[0].nearest, e.which);
   // No particle was nearer to the tip. A few substeps have passed since: tip and tissue have moved by less than half a
-  // millimetre.
+  // millimeter.
   float nearest = std::numeric_limits<float>::max();
   for (uint32_t i = 0; i < rig.model->solver.tissue; ++i)
     nearest = std::min(nearest, distance(xyz(rig.x()[i]), rig.last(EventKind::tip_entered)->where));
@@ -42,7 +43,7 @@ TEST(Figure4, the_nearest_is_the_nearest_of_all) {
     const Pose circle = rig.circle_at({p.at - p.out * 0.0004f, p.out, p.along, p.up}, 0, 0);
     SolverState solver = rig.solver();
     RigidBody& needle = solver.body[rig.needle_body()];
-    needle.x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].centre);
+    needle.x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].center);
     needle.q = circle.q;
     SutureState sutures;
     sutures.suture.resize(1);
@@ -71,7 +72,7 @@ TEST(Figure4, a_needle_that_nobody_holds_pierces_nothing) {
   rig.wait(0.1f);
   const Place p = rig.place(0.5f, 0.004f);
   const Pose circle = rig.circle_at({p.at - p.out * 0.0004f, p.out, p.along, p.up}, 0, 0);
-  rig.needle().x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].centre);
+  rig.needle().x = circle.p - rotate(circle.q, rig.model->solver.needle_arc[0].center);
   rig.needle().q = circle.q;
   SutureContext sewing = rig.context();
   for (const bool held : {false, false, true}) {
@@ -123,7 +124,7 @@ TEST(Figure5, dragged_beyond_the_threshold_it_is_released_and_the_tissue_relaxes
   const float psi = -0.15f;
   rig.needle_to(rig.circle_at(p, psi), 0.2f);
   rig.drive(p, psi, -1.2f);
-  EXPECT_EQ(rig.count(EventKind::bite_cancelled), 1u);
+  EXPECT_EQ(rig.count(EventKind::bite_withdrawn), 1u);
   rig.draw(p, 0.03f, 0.3f);
   rig.wait(2.0f);
   float worst = 0;
@@ -152,7 +153,7 @@ TEST(Bite, back_end_trigger_completes_it_and_makes_its_suture_points) {
   EXPECT_TRUE(rig.sewn().bite[0].complete);
   EXPECT_TRUE(rig.nothing_left_of_a_bite());
   EXPECT_TRUE(rig.order_is_whole());
-  EXPECT_EQ(rig.count(EventKind::bite_cancelled), 0u);
+  EXPECT_EQ(rig.count(EventKind::bite_withdrawn), 0u);
 }
 
 void expect_like_never_begun(Rig& rig) {
@@ -162,12 +163,12 @@ void expect_like_never_begun(Rig& rig) {
   EXPECT_EQ(rig.thread().hold.size(), 1u);  // the swage
   EXPECT_TRUE(std::is_sorted(rig.thread().order.begin(), rig.thread().order.end()));
   for (float r : rig.thread().rest) EXPECT_FLOAT_EQ(r, rig.model->solver.strand[0].spacing);
-  EXPECT_EQ(rig.count(EventKind::bite_cancelled), 1u);
+  EXPECT_EQ(rig.count(EventKind::bite_withdrawn), 1u);
   ASSERT_EQ(rig.sewn().bite.size(), 1u);
-  EXPECT_TRUE(rig.sewn().bite[0].cancelled);
+  EXPECT_TRUE(rig.sewn().bite[0].canceled);
   EXPECT_FALSE(rig.sewn().bite[0].complete);
   EXPECT_FALSE(rig.sewn().bite[0].has_exit);
-  // Collisions are as they were: off only for the swaged end and its neighbours.
+  // Collisions are as they were: off only for the swaged end and its neighbors.
   const size_t n = rig.thread().order.size();
   for (size_t i = 0; i < n; ++i) EXPECT_EQ(rig.collides()[i], i + 4 < n ? 1 : 0) << i;
 }
@@ -228,7 +229,7 @@ TEST(Bite, drawn_back_after_the_back_end_went_in_frees_the_thread) {
   EXPECT_TRUE(rig.nothing_left_of_a_bite());
   EXPECT_TRUE(rig.thread().anchor.empty());
   EXPECT_TRUE(rig.sewn().point.empty());
-  EXPECT_EQ(rig.count(EventKind::bite_cancelled), 1u);
+  EXPECT_EQ(rig.count(EventKind::bite_withdrawn), 1u);
   EXPECT_TRUE(rig.order_is_whole());
   EXPECT_NEAR(rig.rest_length(), length, 1e-6);
   // And the next bite works as the first would have.
@@ -298,7 +299,7 @@ TEST(Bite, deeper_needle_deeper_bite) {
 }
 
 // The weights of a suture point: sum 1, exact at rest, exact under every affine motion.
-TEST(Spread, reproduces_the_place_at_rest_and_under_affine_motion) {
+TEST(Percentiles, reproduces_the_place_at_rest_and_under_affine_motion) {
   Rig rig;
   rig.wait(0.1f);
   const ShapeModel& shape = rig.model->solver.shape;
@@ -309,7 +310,7 @@ TEST(Spread, reproduces_the_place_at_rest_and_under_affine_motion) {
     while (count < shape.cluster_stride && member[count] < rig.model->solver.tissue) ++count;
     const float f = static_cast<float>(k);
     const Vec3 at = xyz(shape.rest[corner]) + Vec3{0.0007f * std::sin(f), 0.0007f * std::cos(2 * f), 0.0005f * std::sin(3 * f)};
-    const TissuePoint t = spread_point({member, count}, shape.rest.data(), at);
+    const EmbeddedPoint t = spread_point({member, count}, shape.rest.data(), at);
     double sum = 0;
     for (uint32_t i = 0; i < t.count; ++i) sum += double{t.weight[i]};
     EXPECT_NEAR(sum, 1.0, 1e-6);
@@ -357,7 +358,7 @@ TEST(TwoWalls, one_sweep_through_the_lumen_makes_two_bites) {
   EXPECT_NEAR(rig.rest_length(), 174 * 0.0016, 1e-6);
 }
 
-TEST(TwoWalls, drawn_back_the_same_way_both_bites_are_cancelled) {
+TEST(TwoWalls, drawn_back_the_same_way_both_bites_are_canceled) {
   SceneSpec scene = plain_scene();
   scene.body[0].wall = 0.0016f;
   Rig rig(scene);
@@ -368,7 +369,7 @@ TEST(TwoWalls, drawn_back_the_same_way_both_bites_are_cancelled) {
   while (rig.sewn().open.size() < 2 && psi < 1.5f) rig.drive(p, psi, psi + 0.06f, 0.0027f), psi += 0.06f;
   ASSERT_EQ(rig.sewn().open.size(), 2u);
   rig.drive(p, psi, -1.2f, 0.0027f);
-  EXPECT_EQ(rig.count(EventKind::bite_cancelled), 2u);
+  EXPECT_EQ(rig.count(EventKind::bite_withdrawn), 2u);
   EXPECT_TRUE(rig.sewn().point.empty());
   EXPECT_TRUE(rig.nothing_left_of_a_bite());
 }

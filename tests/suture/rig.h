@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/suture: a whole scene in which a ghost drives the needle. The ghost is one more weld of the needle to a place in the
 // world, so that a test says exactly where the needle goes; jaws, hands and mechanics are the real ones.
 #pragma once
@@ -61,7 +62,7 @@ struct Rig {
     input.tick = state->tick;
     step(*model, *state, input, jobs);
     seen.insert(seen.end(), state->event.begin(), state->event.end());
-    ASSERT_TRUE(state_is_sane(*model, *state)) << "at tick " << state->tick;
+    ASSERT_TRUE(state_is_valid(*model, *state)) << "at tick " << state->tick;
   }
   void wait(float seconds) {
     for (int i = static_cast<int>(std::lround(seconds / model->dt)); i > 0 && !testing::Test::HasFatalFailure(); --i) tick();
@@ -89,10 +90,10 @@ struct Rig {
     std::erase_if(solver().weld, [&](const Weld& w) { return w.a == static_cast<int>(needle_body()) && w.b < 0; });
     ghost = -1;
   }
-  // Moves the ghost evenly to `goal` (frame at the needle's circle's centre).
+  // Moves the ghost evenly to `goal` (frame at the needle's circle's center).
   void needle_to(const Pose& circle, float seconds) {
     if (ghost < 0) hold_needle();
-    const Pose goal{circle.p - rotate(circle.q, model->solver.needle_arc[0].centre), circle.q};
+    const Pose goal{circle.p - rotate(circle.q, model->solver.needle_arc[0].center), circle.q};
     const Pose from = solver().weld[static_cast<size_t>(ghost)].target;
     const int ticks = std::max(1, static_cast<int>(std::lround(seconds / model->dt)));
     for (int i = 1; i <= ticks && !testing::Test::HasFatalFailure(); ++i) {
@@ -101,7 +102,7 @@ struct Rig {
       tick();
     }
   }
-  Pose circle() { return {transform(needle().pose(), model->solver.needle_arc[0].centre), needle().q}; }
+  Pose circle() { return {transform(needle().pose(), model->solver.needle_arc[0].center), needle().q}; }
 
   // --- bites ---
   // At `angle` round the opening, `below` the rim.
@@ -139,10 +140,10 @@ struct Rig {
     approach(p, deep);
     drive(p, -1.0f, 4.3f, deep);
   }
-  // Draws the needle away from the tissue, `metres` outward over `seconds`.
-  void draw(const Place& p, float metres, float seconds) {
+  // Draws the needle away from the tissue, `meters` outward over `seconds`.
+  void draw(const Place& p, float meters, float seconds) {
     Pose to = circle();
-    to.p += normalized(p.out + 0.4f * p.up) * metres;
+    to.p += normalized(p.out + 0.4f * p.up) * meters;
     needle_to(to, seconds);
   }
 
@@ -187,7 +188,7 @@ inline void lock(Rig& rig, size_t node, Vec3 at) {
   a.slot = rig.thread().order[node];
   a.point = bite.entry.point;
   a.friction = rig.model->suture.pass_tension;
-  a.capstan = rig.model->suture.capstan;
+  a.capstan_friction = rig.model->suture.capstan_friction;
   set(rig.solver().x[a.slot], position_of(a.point, rig.x()));
   rig.sewn().point.push_back(
       {static_cast<uint32_t>(rig.sewn().bite.size()), false, static_cast<uint32_t>(rig.thread().anchor.size())});

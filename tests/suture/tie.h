@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/suture: a stitch of two suture points, and a tool above it with one of the two strands laid round it. Everything is
 // placed by hand, so that every length is known; from there on hands and mechanics are the real ones.
 #pragma once
@@ -43,7 +44,7 @@ struct Tie : Rig {
     b = {};
     b.x = b.prev_x = frame.p, b.q = b.prev_q = frame.q;
     state->hand[setup.tool].pose = frame;
-    suture().loop[setup.tool].spent = 0;
+    suture().loop[setup.tool].ignored_until_clear = 0;
     input.hand[setup.tool].pose = frame;
   }
   static SceneSpec fitting(SceneSpec scene, const TieSetup& s) {
@@ -156,7 +157,7 @@ struct Tie : Rig {
     if (ghost >= 0) let_go();
     put_needle(*this, xyz(solver().x[thread().order.back()]));
   }
-  // The tool lets go, comes back over the stitch, and has thread laid round it anew.
+  // The tool lets go, comes back over the stitch, and has thread laid round it again.
   void wrap(int way, float turns = 1.25f) {
     open(setup.tool);
     stand(setup.above);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/technique: the rules of the Lembert suture (paper 2.5.4, figure 15), on rings of points alone.
 #include "technique/lembert.h"
 
@@ -42,7 +43,7 @@ struct TwoRings : StitchRig {
     tick();
   }
   float degrees_of(uint32_t i) const { return std::atan2(-x[i].z, x[i].x) / kDegree; }
-  float degrees_of(const TissuePoint& p) const {
+  float degrees_of(const EmbeddedPoint& p) const {
     const Vec3 at = position_of(p, x.data());
     return std::atan2(-at.z, at.x) / kDegree;
   }
@@ -169,7 +170,7 @@ TEST(Lembert, stitches_closer_than_particles_share_their_pairs) {
 
 // "If multiple Lembert sutures are made close together, the bowel's flesh between the two sutures should also be pulled
 // closed."
-TEST(Lembert, all_particles_between_two_neighbours_are_covered) {
+TEST(Lembert, all_particles_between_two_neighbors_are_covered) {
   TwoRings t;
   t.suture(10);
   EXPECT_EQ(t.plan.pair.size(), 1u);
@@ -191,7 +192,7 @@ TEST(Lembert, all_particles_between_two_neighbours_are_covered) {
   }
 }
 
-TEST(Lembert, stitches_far_apart_are_no_neighbours) {
+TEST(Lembert, stitches_far_apart_are_no_neighbors) {
   TwoRings t;
   t.suture(0);
   t.suture(135);  // 2.36 rad
@@ -248,7 +249,7 @@ TEST(Lembert, too_few_throws_do_not_hold) {
     EXPECT_EQ(t.faults(Fault::too_few_throws).size(), 1u) << "told once";
     EXPECT_FLOAT_EQ(t.plan.pair[0].progress, 1) << "the good one holds";
     for (size_t row = 1; row < t.plan.pair.size(); ++row) EXPECT_EQ(t.plan.pair[row].progress, 0) << row;
-    // What does not hold is nobody's neighbour.
+    // What does not hold is no one's neighbor.
     const size_t rows = t.plan.pair.size();
     t.suture(120);
     for (size_t row = rows; row < t.plan.pair.size(); ++row) EXPECT_EQ(t.state.row[row].other == 1, false);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/technique: the purse-string's rules (paper 2.5.1, figure 11), on rings of points alone.
 #include "technique/purse_string.h"
 
@@ -58,7 +59,7 @@ TEST(Adjacency, says_nothing_about_fewer_than_four_points) {
   for (size_t n = 0; n < 4; ++n) EXPECT_EQ(first_out_of_order(std::vector<Vec3>(n)), -1);
 }
 
-// A rim of particles (outer and inner), suture points that are particles of their own, and the technique by itself.
+// A rim of particles (outer and inner), suture points that are particles of their own, and the technique on its own.
 struct Ring {
   PurseStringModel model;
   PurseStringState state;
@@ -129,15 +130,15 @@ TEST(RingOfBites, a_crossing_is_said_and_does_not_stop_anything) {
   Ring r(12);
   std::swap(r.sp[8], r.sp[16]);
   for (size_t n = 1; n <= r.sp.size(); ++n) r.tick(1, 1.0f / 60, n);
-  EXPECT_GE(r.count(EventKind::order_broken), 1u);
+  EXPECT_GE(r.count(EventKind::bite_out_of_order), 1u);
   for (const Event& e : r.events)
-    if (e.kind == EventKind::order_broken) { EXPECT_LT(e.which, r.sp.size()); }
+    if (e.kind == EventKind::bite_out_of_order) { EXPECT_LT(e.which, r.sp.size()); }
 }
 
 TEST(RingOfBites, a_good_ring_breaks_no_order) {
   Ring r(12);
   for (size_t n = 1; n <= r.sp.size(); ++n) r.tick(1, 1.0f / 60, n);
-  EXPECT_EQ(r.count(EventKind::order_broken), 0u);
+  EXPECT_EQ(r.count(EventKind::bite_out_of_order), 0u);
 }
 
 // "... without pulling the tissue inward until the very end", "when the thread is tightened".
@@ -168,7 +169,7 @@ TEST(Closure, begins_after_one_bite_more_than_the_ring_needed) {
   EXPECT_TRUE(r.state.closing);
   EXPECT_EQ(r.plan.pull.size(), 48u + 48u + 26u);
   EXPECT_EQ(r.count(EventKind::ring_complete), 1u);
-  EXPECT_EQ(r.count(EventKind::order_broken), 0u);
+  EXPECT_EQ(r.count(EventKind::bite_out_of_order), 0u);
 }
 
 // Figure 11: "Each particle is pulled over time, ensuring all particles arrive at the location simultaneously."

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/technique: the rules of Connell and stay (paper 2.5.2, 2.5.3, figures 12 to 14), on rows of points alone.
 #include "technique/seam.h"
 
@@ -86,7 +87,7 @@ TEST(Midpoint, waits_for_the_bite_to_be_complete) {
   TwoEdges t;
   t.through_first(t.p[2]);
   t.pass(1, t.p[10], kOut, t.p[14], kIn);
-  t.bite.back().complete = false;  // the needle can still be drawn back
+  t.bite.back().complete = false;  // the needle can still be withdrawn
   t.tick(5);
   EXPECT_TRUE(t.plan.pair.empty());
   t.bite.back().complete = true;
@@ -201,7 +202,7 @@ TEST(Knotted, holds_what_was_made_before_it) {
   t.point[3].span = 0.1f;
   t.tick(120);
   EXPECT_FLOAT_EQ(t.plan.pair[0].progress, 1);
-  // The seam goes on after a first crossing that was tied.
+  // The seam continues after a first crossing that was tied.
   t.pass(1, t.p[14], kIn, t.p[12], kOut);
   t.pass(0, t.p[4], kOut, t.p[8], kIn);
   t.tick();
@@ -330,7 +331,7 @@ TEST(BegunKnot, wants_bites_in_two_walls_and_the_needle_out) {
   EXPECT_EQ(t.faults(Fault::knot_without_bite).size(), 2u) << "a new suture, a new mistake";
 }
 
-// The suture room tells it to whoever sews without a technique too.
+// The suture room reports it to a caller that sews without a technique too.
 TEST(Stay, what_was_told_in_the_tick_is_not_told_again) {
   TwoEdges t(false);
   t.pass(0, t.p[5], kOut, t.p[2], kOut);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/technique: a view made by hand: particles anywhere, bites through them, thread of any length, knots as wanted.
 #pragma once
 #include <gtest/gtest.h>
@@ -38,26 +39,26 @@ struct StitchRig {
       point.push_back(p);
     }
   }
-  void begin_knot(uint32_t which = 0) { now.add({EventKind::knot_begun, 0, which, 1, {}}); }
+  void begin_knot(uint32_t which = 0) { now.add({EventKind::throw_started, 0, which, 1, {}}); }
   // One more throw of the newest knot locks.
   void lock(bool new_knot = false) {
     if (knot.empty() || new_knot) knot.push_back({});
     knot.back().phase = KnotPhase::locked;
     ++knot.back().throws;
-    now.add({EventKind::knot_locked, 0, static_cast<uint32_t>(knot.size()) - 1, 1, {}});
+    now.add({EventKind::throw_locked, 0, static_cast<uint32_t>(knot.size()) - 1, 1, {}});
   }
   void fresh_suture() {
     ++taken;
     point.clear();
     knot.clear();
-    now.add({EventKind::suture_taken, 0, taken - 1, 0, {}});
+    now.add({EventKind::suture_loaded, 0, taken - 1, 0, {}});
   }
   template <typename Model, typename State, typename Technique>
   void tick(const Model& model, State& state, Technique&& technique) {
     for (StitchPoint& p : point) p.at = position_of(p.point, x.data());
     TechniqueView view;
     view.point = point, view.bite = bite, view.knot = knot, view.x = x.data();
-    view.needle_in_tissue = needle_in_tissue, view.taken = taken, view.dt = kTick;
+    view.needle_in_tissue = needle_in_tissue, view.suture_index = taken, view.dt = kTick;
     technique(model, state, view, plan, now);
     events.insert(events.end(), now.begin(), now.end());
     now.clear();

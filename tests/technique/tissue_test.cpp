@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/technique: what the techniques ask for, asked of real tissue: the bodies of the scenes, pins instead of thread, no
-// hands. That a plan closes is the plan's part; that tissue follows it to half a millimetre and stays calm is tested here.
+// hands. That a plan closes is the plan's part; that tissue follows it to half a millimeter and stays calm is tested here.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -51,7 +52,7 @@ class Field {
       for (StitchPoint& p : point_) p.at = position_of(p.point, state_->solver.x.data());
       TechniqueView view;
       view.point = point_, view.bite = bite_, view.knot = knot_, view.x = state_->solver.x.data();
-      view.taken = taken_, view.dt = model_->dt;
+      view.suture_index = taken_, view.dt = model_->dt;
       EventList events;
       technique(model_->technique, technique_, view, state_->plan[0], events);
       for (const Event& e : events) EXPECT_NE(e.kind, EventKind::technique_fault) << fault_name(e.fault);
@@ -107,9 +108,9 @@ TEST(Scenes, lie_calmly_when_nobody_touches_them) {
     f.ticks(30);
     const double early = kinetic_energy(f.model(), f.state());
     f.ticks(90);
-    EXPECT_TRUE(state_is_sane(f.model(), f.state()));
+    EXPECT_TRUE(state_is_valid(f.model(), f.state()));
     EXPECT_LT(kinetic_energy(f.model(), f.state()), 0.5 * early);
-    EXPECT_LT(f.moved(), 0.0005f) << "they sag less than half a millimetre";
+    EXPECT_LT(f.moved(), 0.0005f) << "they sag less than half a millimeter";
     float lowest = 1;
     for (uint32_t i = 0; i < f.model().solver.tissue; ++i)
       if (f.model().solver.inv_mass[i] > 0) lowest = std::min(lowest, f.at(i).y);
@@ -135,7 +136,7 @@ TEST(Tissue, connell_edges_come_together_and_turn_inward) {
     for (int i = 0; i < 90; ++i) f.span(crossing) = std::max(0.0005f, 0.02f - 0.0003f * static_cast<float>(i)), f.ticks(1);
   }
   f.ticks(90);
-  EXPECT_TRUE(state_is_sane(f.model(), f.state()));
+  EXPECT_TRUE(state_is_valid(f.model(), f.state()));
   EXPECT_LT(f.gap(false), 0.001f);
   EXPECT_LT(f.gap(true), 0.001f);
   EXPECT_LT(kinetic_energy(f.model(), f.state()), 1e-8);
@@ -166,7 +167,7 @@ TEST(Tissue, lembert_ring_closes) {
     f.fresh();
   }
   f.ticks(60);
-  EXPECT_TRUE(state_is_sane(f.model(), f.state()));
+  EXPECT_TRUE(state_is_valid(f.model(), f.state()));
   EXPECT_LT(f.gap(true), 0.001f);
   EXPECT_LT(kinetic_energy(f.model(), f.state()), 1e-8);
   // No place of the two facing edges was left out.

@@ -191,8 +191,8 @@ TEST(Thread, continues_from_a_copy_to_the_bit) {
   EXPECT_NE(hash_state(run.knot.state), hash_state(copy));
 }
 
-// A knot a metre away holds as one at the origin: positions keep more than a float.
-TEST(Thread, holds_a_metre_from_the_origin) {
+// A knot a meter away holds as one at the origin: positions keep more than a float.
+TEST(Thread, holds_a_meter_from_the_origin) {
   const Settings settings = validation::knot_settings(0.4f);
   validation::LaidKnot laid = validation::lay_knot(validation::square(), settings.material.diameter, 0.5e-3f);
   for (size_t i = 0; i < laid.state.nodes(); ++i) laid.state.x.add(i, {1.3f, -0.9f, 1.1f});

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/validation: every line of `catgut validate` holds.
 #include "validation/validation.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/egl_platform: see egl_platform.h.
 //
 // The one file that leans on a private interface. Filament 1.9.25's own platform on Linux needs an X server; its base class

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/environment: a theatre lamp, a ring of dimmer lamps, pale walls and a green floor. What wet tissue and steel
 // mirror decides whether they look wet and like steel.
 #include "render/filament/environment.h"

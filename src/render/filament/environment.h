@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/environment: the light of the operating theatre, computed here so that no picture file is needed.
 #pragma once
 #include <filament/Engine.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render: pictures read back from the Filament renderer, without a window. See renderer.h.
 #include <stdexcept>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/materials: see materials.h. The .inc files are written by matc at build time from materials/*.mat.
 #include "render/filament/materials.h"
 

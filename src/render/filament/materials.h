@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/materials: the compiled materials, embedded so that a build has no files to find at run time.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/mesh: see mesh.h.
 #include "render/filament/mesh.h"
 
@@ -66,7 +67,7 @@ VertexBuffer::BufferDescriptor copy_of(std::span<const T> data) {
 }
 
 filament::Box to_box(Box3 b) {
-  // Filament's box is centre and half extent. Never flat: a plane would drop out of its culling.
+  // Filament's box is center and half extent. Never flat: a plane would drop out of its culling.
   const Vec3 half = 0.5f * (b.high - b.low) + Vec3{1e-4f, 1e-4f, 1e-4f};
   return {f3(0.5f * (b.low + b.high)), f3(half)};
 }
@@ -125,7 +126,7 @@ GpuMesh make_mesh(filament::Engine& engine, filament::Scene& scene, const Shape&
                   bool casts_shadow, bool live) {
   std::vector<VertexLook> look(shape.position.size());
   for (size_t i = 0; i < look.size(); ++i) {
-    const Vec3 c = shape.colour[i];
+    const Vec3 c = shape.color[i];
     const float hatched = i < shape.hatched.size() ? shape.hatched[i] : 0;
     look[i] = {{c.x, c.y, c.z, 1 - hatched}, {shape.uv[i][0], shape.uv[i][1]}, {1, 0}};
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/mesh: one drawable: buffers on the graphics side, refilled from plain vectors when its shape changes.
 #pragma once
 #include <array>
@@ -19,7 +20,7 @@ namespace catgut {
 
 // What of a vertex never moves. Eight floats, uploaded once.
 struct VertexLook {
-  float colour[4];  // linear
+  float color[4];  // linear
   float uv0[2];
   float uv1[2];
 };

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/environment: the tissue's tileable patterns; see environment.h.
 #include <cstdlib>
 #include <cstring>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament: see start_engine.h.
 #include "render/filament/start_engine.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament: an engine on a platform of ours.
 #pragma once
 #include <backend/Platform.h>

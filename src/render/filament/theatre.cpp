@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament: what is in a picture, however it is shown. See theatre.h.
 #include "render/filament/theatre.h"
 
@@ -101,7 +102,7 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
   show_markers(snapshot, suture_points);
 }
 
-void Theatre::draw_coarser(float part) {
+void Theatre::set_resolution_scale(float part) {
   coarse_ = part;
   filament::View::DynamicResolutionOptions coarse;
   coarse.enabled = part < 1;
@@ -112,8 +113,8 @@ void Theatre::draw_coarser(float part) {
 }
 
 void Theatre::set_quality(filament::View& view, Quality quality) {
-  const bool good = quality == Quality::good;
-  view.setSampleCount(quality == Quality::draft ? 1 : 4);
+  const bool good = quality == Quality::high;
+  view.setSampleCount(quality == Quality::low ? 1 : 4);
   view.setAntiAliasing(filament::View::AntiAliasing::FXAA);
   view.setDithering(filament::View::Dithering::NONE);
   filament::View::AmbientOcclusionOptions ao;
@@ -125,8 +126,8 @@ void Theatre::set_quality(filament::View& view, Quality quality) {
   ao.quality = filament::View::QualityLevel::MEDIUM;
   view.setAmbientOcclusionOptions(ao);
   filament::View::BloomOptions bloom;
-  // Never off: without it Filament grades the colours inside the main pass by framebuffer fetch, which Mesa's software
-  // rasteriser gets wrong (the picture turns into coloured tiles). A tiny one costs nothing.
+  // Never off: without it Filament grades the colors inside the main pass by framebuffer fetch, which Mesa's software
+  // rasterizer gets wrong (the picture turns into colored tiles). A tiny one costs nothing.
   bloom.enabled = true;
   bloom.strength = good ? 0.06f : 0.02f;
   bloom.resolution = good ? 360 : 16;
@@ -140,9 +141,9 @@ void Theatre::set_light(Quality quality) {
   scene_->setIndirectLight(environment_.light);
   skybox_ = filament::Skybox::Builder().color({0.012f, 0.03f, 0.028f, 1}).build(engine_);
   scene_->setSkybox(skybox_);
-  // Shadows at the scale of a thread: the library's own bias of a millimetre would swallow the thread's and needle's.
+  // Shadows at the scale of a thread: the library's own bias of a millimeter would swallow the thread's and needle's.
   filament::LightManager::ShadowOptions& shadow = shadow_;
-  shadow.mapSize = quality == Quality::draft ? 1024 : quality == Quality::medium ? 2048 : 4096;
+  shadow.mapSize = quality == Quality::low ? 1024 : quality == Quality::medium ? 2048 : 4096;
   shadow.constantBias = 0.0002f;
   shadow.normalBias = 0.8f;
   lamp_ = utils::EntityManager::get().create();
@@ -187,7 +188,7 @@ void Theatre::make_stage() {
     tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_));
     all.insert(all.end(), mesh.position.begin(), mesh.position.end());
   }
-  // The drape lies where the model says. What stands up through it has a hole there, which it clears by a centimetre; what lies
+  // The drape lies where the model says. What stands up through it has a hole there, which it clears by a centimeter; what lies
   // on it is held by gauze at its far end, as a surgeon's assistant would.
   Vec3 ground{model_.focus.x, model_.drape, model_.focus.z};
   std::vector<Vec3> through, sample;
@@ -229,7 +230,7 @@ void Theatre::make_stage() {
 void Theatre::add_cloth(const Shape& cloth, float threads_per_cm, std::span<const Vec3> tissue, bool casts_shadow) {
   std::vector<VertexLook> look(cloth.position.size());
   for (size_t i = 0; i < look.size(); ++i) {
-    const Vec3 c = cloth.colour[i], p = cloth.position[i], n = cloth.normal[i];
+    const Vec3 c = cloth.color[i], p = cloth.position[i], n = cloth.normal[i];
     float near = 1;
     for (const Vec3 t : tissue) near = std::min(near, length2(t - p));
     const float open = 1 - 0.5f * std::exp(-std::sqrt(near) / 0.012f);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament: what is in a picture, however it is shown: theatre light, tissue, thread, needle, tools and drape. Reads the
 // PictureModel once and a Snapshot per picture; writes a view of the engine that it was made for.
 #pragma once
@@ -43,7 +44,7 @@ class Theatre {
   }
   // Draws the field with `part` of the picture's points each way and stretches it: for windows on machines without a graphics
   // card.
-  void draw_coarser(float part);
+  void set_resolution_scale(float part);
   filament::View* view(int eye = 0) const { return eye_[size_t(eye)].view; }
 
  private:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/thread_view: see thread_view.h.
 #include "render/filament/thread_view.h"
 
@@ -50,7 +51,7 @@ Nearest tissue_at(std::vector<Nearest>& known, size_t i, Vec3 point, float reach
 
 // One throw: its two strands lie turned about each other along the stitch, one wrap more than they cross, and dip toward the
 // tissue at both ends. `above`: how far the throw lies from the knot's place along `out`.
-void add_throw(ThreadView& view, Vec3 at, Vec3 way, Vec3 out, float above, uint32_t wraps, int handed, float width) {
+void add_throw(ThreadView& view, Vec3 at, Vec3 way, Vec3 out, float above, uint32_t wraps, int chirality, float width) {
   way = normalized(way - out * dot(way, out), any_perpendicular(out));
   const Vec3 side = cross(way, out);
   const float turns = 0.5f * (static_cast<float>(std::min(wraps, 6u)) + 1), along = 4.2f * width * turns;
@@ -59,7 +60,7 @@ void add_throw(ThreadView& view, Vec3 at, Vec3 way, Vec3 out, float above, uint3
     view.piece.clear();
     for (int i = -2; i <= points + 2; ++i) {
       const float part = static_cast<float>(i) / static_cast<float>(points),
-                  a = start + static_cast<float>(handed) * 2 * kPi * turns * part;
+                  a = start + static_cast<float>(chirality) * 2 * kPi * turns * part;
       const float bow = 2 * part - 1, sag = width * (0.9f * bow * bow);
       view.piece.push_back(at + out * (above - sag + 1.02f * width * std::cos(a)) + side * (1.02f * width * std::sin(a)) +
                            way * (along * (part - 0.5f)));
@@ -156,9 +157,9 @@ void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel&
     add_suture(view, model.suture[i], snapshot.suture[i], snapshot.particle, width);
     for (const KnotView& knot : snapshot.suture[i].knot) {
       const Vec3 out = normal_at(tissue_at(view.on_tissue, tied++, knot.position, kKnotReach, tissue), tissue, motion);
-      for (uint32_t k = 0; k < std::min<uint32_t>(knot.throws, KnotView::kMostThrows); ++k)
+      for (uint32_t k = 0; k < std::min<uint32_t>(knot.throws, KnotView::kMaxThrows); ++k)
         add_throw(view, knot.position, knot.way, out, (0.8f + 2.7f * static_cast<float>(k)) * width, knot.thrown[k].wraps,
-                  knot.thrown[k].handed, width);
+                  knot.thrown[k].chirality, width);
     }
   }
   const float width = std::max(model.suture.front().thread_radius, seen);
@@ -223,10 +224,10 @@ void move_marks(filament::Engine& engine, MarkView& view, const Snapshot& snapsh
     const SuturePointView& point = suture_point_at(snapshot, m);
     const Nearest at = tissue_at(view.on_tissue, m, point.position, 0.003f, tissue);
     const Vec3 out = normal_at(at, tissue, motion);
-    Vec3 centre = point.position;
+    Vec3 center = point.position;
     // On the drawn surface, which may lie a little off the particles'.
-    if (at.body >= 0) centre -= out * dot(centre - tissue[size_t(at.body)].position[at.vertex], out);
-    centre += out * 0.00012f;
+    if (at.body >= 0) center -= out * dot(center - tissue[size_t(at.body)].position[at.vertex], out);
+    center += out * 0.00012f;
     const Vec3 x = any_perpendicular(out), y = cross(out, x);
     // A pulled thread draws its puncture open.
     const float pulled = std::max(point.tension_needle, point.tension_free),
@@ -234,7 +235,7 @@ void move_marks(filament::Engine& engine, MarkView& view, const Snapshot& snapsh
     for (uint32_t i = 0; i < kMarkCorners; ++i) {
       const float a = 2 * kPi * float((i + kMarkSides - 1) % kMarkSides) / kMarkSides;
       const float r = i == 0 ? 0 : i <= kMarkSides ? inner : 0.00062f;
-      surface.position[m * kMarkCorners + i] = centre + r * (x * std::cos(a) + y * std::sin(a));
+      surface.position[m * kMarkCorners + i] = center + r * (x * std::cos(a) + y * std::sin(a));
       surface.frame[m * kMarkCorners + i] = pack_frame(Quat{});
     }
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/thread_view: suture threads as smooth tubes through their particles, in as many pieces as they were cut into;
 // knots as the two strands of every throw turned about each other; settled stitches; the visual guide from a bite's entry to
 // the needle (paper 2.2). All of it is one mesh.

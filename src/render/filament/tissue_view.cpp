@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/tissue_view: see tissue_view.h.
 #include "render/filament/tissue_view.h"
 
@@ -204,7 +205,7 @@ void blanch(filament::Engine& engine, TissueView& view, const Snapshot& snapshot
   const bool first = !view.shown;
   view.shown = true;
   view.reached.resize(snapshot.suture.size());
-  bool fewer = false;  // a bite was taken back, or a new suture begun
+  bool fewer = false;  // a bite was undone, or a new suture begun
   for (size_t s = 0; s < view.reached.size(); ++s)
     fewer = fewer || view.reached[s].size() > snapshot.suture[s].suture_point.size();
   if (fewer) {

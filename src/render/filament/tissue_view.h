@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render/filament/tissue_view: one soft body's visible surface, moved by geometry/skin.
 // Reads the model's VisibleMesh once and a snapshot per picture; writes its own buffers.
 #pragma once

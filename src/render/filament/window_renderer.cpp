@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render: the Filament renderer in a window; see render/window.h. The panels are a view of their own, drawn last.
 #include "render/window.h"
 
@@ -66,8 +67,8 @@ class FilamentWindow final : public WindowRenderer {
     theatre_ = std::make_unique<Theatre>(*engine_, *model, quality);
   }
 
-  void draw_coarser(float part) override {
-    if (theatre_) theatre_->draw_coarser(part);
+  void set_resolution_scale(float part) override {
+    if (theatre_) theatre_->set_resolution_scale(part);
   }
 
   void resize(int width, int height) override {

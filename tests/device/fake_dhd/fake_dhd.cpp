@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/device/fake_dhd: a libdhd.so with two arms behind the very functions and types of the real one: positions that follow a
 // hand, calls that wait for the device, a firmware watchdog. Written from the published description of that library alone and
 // deliberately without our own declarations of it, so that the two can disagree.

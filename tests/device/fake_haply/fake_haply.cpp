@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/device/fake_haply: see the header. Written from the maker's published description of the service.
 #include "fake_haply.h"
 
@@ -107,7 +108,7 @@ struct FakeHaply::Work {
       {
         std::unique_lock<std::mutex> hold(lock);
         if (held) change.wait_for(hold, std::chrono::milliseconds(30), [&] { return quit || !held || allowed > 0; });
-        if (held && allowed == 0 && !stepped) idle();  // the service's own watchdog, where time passes by itself
+        if (held && allowed == 0 && !stepped) idle();  // the service's own watchdog, where time passes on its own
         change.wait(hold, [&] { return quit || !held || allowed > 0; });
         if (quit) break;
         if (allowed > 0) --allowed;

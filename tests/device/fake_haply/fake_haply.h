@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/device/fake_haply: a service of the shape of Haply's: a WebSocket on a port that the system gives, one state for each
-// message, forces that last as long as messages come. Its own axes: x right, y forward, z up; metres and newtons.
+// message, forces that last as long as messages come. Its own axes: x right, y forward, z up; meters and newtons.
 #pragma once
 #include <array>
 #include <atomic>

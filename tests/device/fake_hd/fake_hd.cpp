@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/device/fake_hd: a libHD.so that simulates two arms, each with mass, friction and a human hand, behind the very
 // functions, types and error codes of the real one. Written from the published description of that library alone and
 // deliberately without our own declarations of it, so that the two can disagree.

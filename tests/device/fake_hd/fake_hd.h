@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/device/fake_hd: what a test may ask of the simulated libHD beside its real functions. Loaded by name, like those.
 #pragma once
 
@@ -7,7 +8,7 @@ enum FakeHdFault {
   kFakeCommError = 1,   // the arm is off the line: errors, no new pose
   kFakeWarmMotors = 2,  // the driver cuts the force
   kFakeStall = 3,       // the whole scheduler stops calling back
-  kFakeNan = 4,         // positions that are no numbers
+  kFakeNan = 4,         // positions that are not numbers
   kFakeFlipX = 5,       // the x motor is wired the wrong way round
   kFakeTooFast = 6,     // HD_EXCEEDED_MAX_VELOCITY: the driver cuts the force
 };

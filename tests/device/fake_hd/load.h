@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/device/fake_hd: the test's side of the simulated libHD: its extra functions, found in the library that the driver
 // loaded.
 #pragma once

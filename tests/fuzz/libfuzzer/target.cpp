@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/fuzz: one libFuzzer program per entry point; CATGUT_FUZZ_ENTRY names it.
 #include "../entry_points.h"
 

@@ -1,5 +1,6 @@
-// runtime/felt: see the header.
-#include "runtime/felt.h"
+// SPDX-License-Identifier: Apache-2.0
+// runtime/force_curves: see the header.
+#include "runtime/force_curves.h"
 
 #include <algorithm>
 #include <cmath>
@@ -31,8 +32,8 @@ float stretch_of(const Snapshot& seen) {
 void follow(PaperSpring& spring, const Snapshot& seen, const PictureModel& picture) {
   for (const Event& e : seen.event) {
     if (e.kind == EventKind::particle_attached) spring.attached = true, spring.from = tip_of(seen, picture);
-    if (e.kind == EventKind::particle_released || e.kind == EventKind::tip_exited || e.kind == EventKind::bite_cancelled ||
-        e.kind == EventKind::suture_taken)
+    if (e.kind == EventKind::particle_released || e.kind == EventKind::tip_exited || e.kind == EventKind::bite_withdrawn ||
+        e.kind == EventKind::suture_loaded)
       spring.attached = false;
   }
 }
@@ -40,7 +41,8 @@ void follow(PaperSpring& spring, const Snapshot& seen, const PictureModel& pictu
 ForcePatch paper_patch(const PaperSpring& spring, const Snapshot& seen, const PictureModel& picture, size_t k) {
   ForcePatch p;
   const ForcePatch& now = seen.patch[k];
-  p.tick = now.tick, p.topology = now.topology, p.period = now.period, p.expiry = now.expiry, p.point = now.point;
+  p.tick = now.tick, p.discontinuity_id = now.discontinuity_id, p.period = now.period, p.expiry = now.expiry,
+  p.point = now.point;
   if (spring.attached && seen.tool[k].held == Held::needle) p.force += (spring.from - tip_of(seen, picture)) * kPaperStiffness;
   if (seen.tool[k].held == Held::thread) p.force += now.thread_direction * (kPaperStiffness * stretch_of(seen));
   const float most = length(p.force);
@@ -93,10 +95,10 @@ FeltCurves feel_a_stitch(SceneSpec scene, bool knot, const std::atomic<bool>& st
     for (const Event& e : seen.event) {
       if (e.kind == EventKind::tip_entered && !bitten) in_bite = bitten = true, travel = 0, tip = tip_now;
       if (e.kind == EventKind::tip_exited && in_bite && out.exit_mm == 0) out.exit_mm = travel;
-      if (e.kind == EventKind::knot_begun && !in_knot && out.knot.empty())
+      if (e.kind == EventKind::throw_started && !in_knot && out.knot.empty())
         in_knot = true, puller = e.who, pulled_from = at[e.who];
-      if (e.kind == EventKind::knot_locked && in_knot) return out;
-      if (e.kind == EventKind::knot_cancelled) in_knot = false, out.knot.clear();
+      if (e.kind == EventKind::throw_locked && in_knot) return out;
+      if (e.kind == EventKind::throw_undone) in_knot = false, out.knot.clear();
     }
     const bool drives = seen.tool[0].held == Held::needle;
     if (in_bite && drives) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/suture: a fresh needle and thread: what is tied settles, the rest goes, and nothing grows but what it leaves behind.
 #include <gtest/gtest.h>
 
@@ -14,13 +15,13 @@ void press(Rig& r, size_t hand = 0) {
 
 // Ties two throws, or one, and cuts both ends.
 void tie_and_cut(Tie& r, int throws = 2) {
-  const size_t before = r.count(EventKind::knot_locked);
+  const size_t before = r.count(EventKind::throw_locked);
   for (int k = 0; k < throws; ++k) {
     if (k > 0) r.wrap(k % 2 ? -1 : 1);
     r.take();
     r.pull_tight();
   }
-  ASSERT_EQ(r.count(EventKind::knot_locked), before + static_cast<size_t>(throws));
+  ASSERT_EQ(r.count(EventKind::throw_locked), before + static_cast<size_t>(throws));
   r.open(0);
   const Knot k = r.sewn().knot.back();
   snip(r, between(r, r.node_of(k.slot[0]) - 5));
@@ -97,18 +98,18 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   EXPECT_LT(distance(seen.settled[0].knot[0], knot), 1e-5f);
   // Both ways between the points are thread that holds them; the shorter is the one that does.
   ASSERT_EQ(r.solver().pin.size(), 1u);
-  const TissuePin& pin = r.solver().pin[0];
-  EXPECT_EQ(pin.owner, PinOwner::stitch);
+  const Tether& pin = r.solver().pin[0];
+  EXPECT_EQ(pin.owner, TetherOwner::stitch);
   EXPECT_NEAR(pin.length, way, 1e-7f);
   EXPECT_LT(distance(position_of(pin.a, r.x()), ends[0]), 1e-4f);
   EXPECT_LT(distance(position_of(pin.b, r.x()), ends[1]), 1e-4f);
   expect_fresh(r);
   EXPECT_EQ(r.sewn().bite.size(), 2u) << "bites stay listed";
   ASSERT_EQ(events.size(), 2u);
-  EXPECT_EQ(events[0].kind, EventKind::stitch_settled);
-  EXPECT_EQ(events[1].kind, EventKind::suture_taken);
+  EXPECT_EQ(events[0].kind, EventKind::suture_baked);
+  EXPECT_EQ(events[1].kind, EventKind::suture_loaded);
   EXPECT_EQ(events[1].which, 0u);
-  EXPECT_EQ(r.sewn().taken, 1u);
+  EXPECT_EQ(r.sewn().suture_index, 1u);
   const uint32_t slots = r.model->solver.strand[0].first_slot;
   for (uint32_t i = slots; i < r.model->solver.count; ++i) EXPECT_EQ(xyz(r.x()[i]), r.model->start[i]);
   EXPECT_EQ(r.needle().x, r.model->needle_start[0].p);
@@ -175,7 +176,7 @@ TEST(Settle, both_ends_of_a_stitch_are_held_through_its_knot) {
   for (size_t k = 0; k < 4; ++k) at[k] = r.at_point(k);
   settle(r);
   ASSERT_EQ(r.solver().pin.size(), 2u);
-  const TissuePin &round = r.solver().pin[0], &inner = r.solver().pin[1];
+  const Tether &round = r.solver().pin[0], &inner = r.solver().pin[1];
   EXPECT_NEAR(round.length, length[0] + length[2], 1e-7f);
   EXPECT_LT(distance(position_of(round.a, r.x()), at[0]), 1e-4f);
   EXPECT_LT(distance(position_of(round.b, r.x()), at[3]), 1e-4f);
@@ -192,10 +193,10 @@ TEST(Settle, a_wall_that_carries_nothing_gets_no_pin) {
     bool one_wall;
     float tension;  // [N] at one place inside
     size_t pins;
-    PinOwner owner;
+    TetherOwner owner;
   };
-  for (const Case& c : {Case{"two walls, slack", false, 0, 3, PinOwner::stitch}, Case{"one wall, slack", true, 0.09f, 2, {}},
-                        Case{"one wall, drawn in", true, 0.11f, 3, PinOwner::passage}}) {
+  for (const Case& c : {Case{"two walls, slack", false, 0, 3, TetherOwner::stitch}, Case{"one wall, slack", true, 0.09f, 2, {}},
+                        Case{"one wall, drawn in", true, 0.11f, 3, TetherOwner::passage}}) {
     SCOPED_TRACE(c.what);
     TwoBites r(c.one_wall);
     if (HasFatalFailure()) return;
@@ -204,7 +205,7 @@ TEST(Settle, a_wall_that_carries_nothing_gets_no_pin) {
     settle(r);
     ASSERT_EQ(r.solver().pin.size(), c.pins);
     if (c.pins < 3) continue;
-    const TissuePin& pin = r.solver().pin[1];
+    const Tether& pin = r.solver().pin[1];
     EXPECT_EQ(pin.owner, c.owner);
     EXPECT_LT(distance(position_of(pin.a, r.x()), in), 1e-4f);
     EXPECT_LT(distance(position_of(pin.b, r.x()), out), 1e-4f);
@@ -219,8 +220,8 @@ TEST(Settle, a_passage_is_pinned_as_long_as_it_carries_something) {
     r.thread().tension[r.node_of(r.slot[0]) + 1] = 0.2f;
     settle(r);
     ASSERT_EQ(r.solver().pin.size(), 3u);
-    for (TissuePin& pin : r.solver().pin)
-      pin.lambda = pin.owner == PinOwner::passage ? -pull * r.model->solver.h * r.model->solver.h : 0;
+    for (Tether& pin : r.solver().pin)
+      pin.lambda = pin.owner == TetherOwner::passage ? -pull * r.model->solver.h * r.model->solver.h : 0;
     settle(r);
     EXPECT_EQ(r.solver().pin.size(), pull > 0.1f ? 3u : 2u) << "and what holds walls together stays, slack or not";
   }
@@ -243,7 +244,7 @@ TEST(Settle, places_that_a_pin_holds_already_get_no_second) {
     tie_and_cut(r);
     if (HasFatalFailure()) return;
     const float length = shorter_way(r);
-    TissuePin there;
+    Tether there;
     const auto particle_near = [&](Vec3 at) {
       uint32_t best = 0;
       for (uint32_t i = 1; i < r.model->solver.tissue; ++i)
@@ -254,7 +255,7 @@ TEST(Settle, places_that_a_pin_holds_already_get_no_second) {
     there.b = particle_near(r.point_at(1) + Vec3{0, 0, c.aside});
     ASSERT_EQ(distance(position_of(there.a, r.x()), r.point_at(0)) < 0.003f, c.aside < 0.01f);
     there.length = length + c.longer;
-    there.owner = PinOwner::stitch;  // a plan's pins are made anew every tick
+    there.owner = TetherOwner::stitch;  // a plan's pins are made again every tick
     r.solver().pin.push_back(there);
     settle(r);
     EXPECT_EQ(r.solver().pin.size(), c.pins);
@@ -269,31 +270,31 @@ TEST(Settle, a_pin_hangs_on_six_particles_at_most) {
   tie_and_cut(r);
   if (HasFatalFailure()) return;
   // The first point hangs on as many particles as there can be.
-  TissuePoint& point = r.thread().anchor[r.sewn().point[0].anchor].point;
+  EmbeddedPoint& point = r.thread().anchor[r.sewn().point[0].anchor].point;
   const Vec3 at = r.point_at(0);
   std::vector<uint32_t> near(r.model->solver.tissue);
   for (uint32_t i = 0; i < near.size(); ++i) near[i] = i;
   std::sort(near.begin(), near.end(),
             [&](uint32_t a, uint32_t b) { return distance(xyz(r.x()[a]), at) < distance(xyz(r.x()[b]), at); });
-  point.count = TissuePoint::kMost;
+  point.count = EmbeddedPoint::kMaxParticles;
   for (uint32_t i = 0; i < point.count; ++i)
-    point.particle[i] = near[i], point.weight[i] = 1.0f / static_cast<float>(TissuePoint::kMost);
+    point.particle[i] = near[i], point.weight[i] = 1.0f / static_cast<float>(EmbeddedPoint::kMaxParticles);
   // The outermost of them, which the pin will do without, have been moved.
-  for (uint32_t i = TissuePoint::kMost - 4; i < TissuePoint::kMost; ++i)
+  for (uint32_t i = EmbeddedPoint::kMaxParticles - 4; i < EmbeddedPoint::kMaxParticles; ++i)
     set(r.solver().x[near[i]], xyz(r.x()[near[i]]) + Vec3{0, 0.003f, 0});
-  const TissuePoint a = point, b = r.thread().anchor[r.sewn().point[1].anchor].point;
+  const EmbeddedPoint a = point, b = r.thread().anchor[r.sewn().point[1].anchor].point;
   const float length = shorter_way(r);
   settle(r);
   ASSERT_EQ(r.solver().pin.size(), 1u);
-  for (const TissuePin& pin : r.solver().pin)
-    for (const TissuePoint* end : {&pin.a, &pin.b}) {
+  for (const Tether& pin : r.solver().pin)
+    for (const EmbeddedPoint* end : {&pin.a, &pin.b}) {
       EXPECT_GE(end->count, 1u);
       EXPECT_LE(end->count, 6u);
       float weight = 0;
       for (uint32_t i = 0; i < end->count; ++i) weight += end->weight[i];
       EXPECT_NEAR(weight, 1, 1e-5f);
     }
-  const TissuePin& pin = r.solver().pin[0];
+  const Tether& pin = r.solver().pin[0];
   const float before = distance(position_of(a, r.x()), position_of(b, r.x())) - length,
               now = distance(position_of(pin.a, r.x()), position_of(pin.b, r.x())) - pin.length;
   EXPECT_GT(distance(position_of(a, r.x()), position_of(pin.a, r.x())), 1e-4f) << "the end lies elsewhere";
@@ -309,8 +310,8 @@ TEST(Settle, the_pins_hold_what_the_thread_held) {
     Tie r(setup);
     tie_and_cut(r);
     if (HasFatalFailure()) return;
-    const TissuePoint a = r.thread().anchor[r.sewn().point[0].anchor].point,
-                      b = r.thread().anchor[r.sewn().point[1].anchor].point;
+    const EmbeddedPoint a = r.thread().anchor[r.sewn().point[0].anchor].point,
+                        b = r.thread().anchor[r.sewn().point[1].anchor].point;
     press(r);
     if (!held) r.solver().pin.clear();
     const Vec3 pa = position_of(a, r.x()), pb = position_of(b, r.x()), way = normalized(pb - pa);
@@ -344,7 +345,7 @@ TEST(Settle, not_with_the_needle_in_the_tissue) {
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u) << "a hand that is not there presses nothing";
   EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::needle_in_tissue);
   EXPECT_EQ(r.last(EventKind::technique_fault)->which, bite);
-  EXPECT_EQ(r.count(EventKind::suture_taken), 0u);
+  EXPECT_EQ(r.count(EventKind::suture_loaded), 0u);
   EXPECT_LT(distance(r.needle().x, needle), 0.002f);
 }
 
@@ -353,11 +354,11 @@ TEST(Settle, what_was_not_tied_is_taken_away_and_said) {
   r.take();
   ASSERT_EQ(r.sewn().knot.size(), 1u);
   press(r);
-  EXPECT_EQ(r.count(EventKind::knot_cancelled), 1u);
+  EXPECT_EQ(r.count(EventKind::throw_undone), 1u);
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
   EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::cut_before_knot);
-  EXPECT_EQ(r.count(EventKind::stitch_settled), 0u);
-  EXPECT_EQ(r.count(EventKind::suture_taken), 1u);
+  EXPECT_EQ(r.count(EventKind::suture_baked), 0u);
+  EXPECT_EQ(r.count(EventKind::suture_loaded), 1u);
   EXPECT_EQ(r.count(EventKind::thread_released), 1u);
   EXPECT_TRUE(r.suture().settled.empty());
   EXPECT_TRUE(r.solver().pin.empty());
@@ -369,7 +370,7 @@ TEST(Settle, a_knot_that_does_not_hold_is_said_and_long_ends_are_trimmed) {
   Tie r(setup);
   r.take();
   r.pull_tight();
-  ASSERT_EQ(r.count(EventKind::knot_locked), 1u);
+  ASSERT_EQ(r.count(EventKind::throw_locked), 1u);
   r.let_go();  // the ghost's weld is the test's own
   press(r);
   ASSERT_EQ(r.count(EventKind::technique_fault), 1u);
@@ -416,7 +417,7 @@ TEST(Settle, ten_stitches_leave_nothing_but_themselves) {
     r.tick();
     EXPECT_EQ(hash_state(*r.model, *again), hash_state(*r.model, *r.state));
   }
-  EXPECT_EQ(r.sewn().taken, 10u);
+  EXPECT_EQ(r.sewn().suture_index, 10u);
   // Each leaves its curve, its pins and its bites: the same for every stitch, but for how long its tails are.
   for (size_t k = 1; k < bytes.size(); ++k) EXPECT_LT(bytes[k] - bytes[k - 1], 3000u);
 }
@@ -436,7 +437,7 @@ TEST(Settle, replays_the_same) {
       step(*r.model, *r.state, r.input, jobs);
       hash[run].push_back(hash_state(*r.model, *r.state));
     }
-    EXPECT_EQ(r.sewn().taken, 2u);
+    EXPECT_EQ(r.sewn().suture_index, 2u);
   }
   EXPECT_EQ(hash[0], hash[1]);
 }

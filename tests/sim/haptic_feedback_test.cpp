@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/sim: what is published for the hands. The patch is made of the solver's own multipliers; it changes nothing; and a hand
-// that feels it between two ticks at 60 Hz feels what a simulation at 960 Hz would have told it (criterion H4,
+// that feels it between two ticks at 60 Hz feels what a simulation at 960 Hz would have reported it (criterion H4,
 // docs/rooms/haptic.md).
-#include "sim/feel.h"
+#include "sim/haptic_feedback.h"
 
 #include <gtest/gtest.h>
 
@@ -65,7 +66,7 @@ float smooth(float s) {
 }
 
 // The forces that balance on a tool at rest, from different multipliers of the solver: what presses on it and what holds it.
-TEST(Feel, the_patch_is_what_the_coupling_carries) {
+TEST(HapticFeedback, the_patch_is_what_the_coupling_carries) {
   for (const char* scene : {"purse_string", "lembert"}) {
     SCOPED_TRACE(scene);
     Field f(scene);
@@ -78,12 +79,12 @@ TEST(Feel, the_patch_is_what_the_coupling_carries) {
     EXPECT_LT(distance(p.force, carried), 0.15f * length(carried)) << length(p.force) << " " << length(carried);
     EXPECT_GT(p.normal.x, 0.9f);
     EXPECT_GT(p.gap, 0);
-    EXPECT_EQ(p.topology, f.seen.patch[0].topology);
+    EXPECT_EQ(p.discontinuity_id, f.seen.patch[0].discontinuity_id);
     EXPECT_NEAR(f.seen.patch[1].force.x, 0, 1e-6f) << "the other hand is not there";
   }
 }
 
-TEST(Feel, a_free_tool_feels_nothing_however_it_moves) {
+TEST(HapticFeedback, a_free_tool_feels_nothing_however_it_moves) {
   Field f("purse_string");
   const Vec3 far = f.rim + Vec3{0.08f, 0.05f, 0};
   for (int i = 0; i < 60; ++i) {
@@ -103,7 +104,7 @@ ToolInput left_level(const Field& f) {
 Vec3 beside_left(const Field& f, float gap) { return f.rim + Vec3{0, 0.05f, 0.005f + gap}; }
 
 // Each hand feels the other tool: the same force, the other way; where it is before it is met; nothing when it is gone.
-TEST(Feel, the_other_tool) {
+TEST(HapticFeedback, the_other_tool) {
   Field f("purse_string");
   f.input.hand[1] = left_level(f);
   for (int i = 0; i < 20; ++i) f.tick(hand(beside_left(f, 0.003f), 1));
@@ -138,7 +139,7 @@ TEST(Feel, the_other_tool) {
   EXPECT_EQ(length(f.seen.patch[0].normal), 0);
 }
 
-TEST(Feel, the_next_contact_is_told_before_it_comes) {
+TEST(HapticFeedback, the_next_contact_is_told_before_it_comes) {
   Field f("purse_string");
   const Vec3 near = f.rim + Vec3{f.radius + 0.004f, -0.006f, 0};
   for (int i = 0; i < 10; ++i) f.tick(hand(near, 1));

@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: see practice.h.
-#include "runtime/practice.h"
+#include "runtime/session_metrics.h"
 
 #include <algorithm>
 
@@ -11,10 +12,10 @@ void count(Counts& c, const Event& e) {
     case EventKind::bite_completed:
       ++c.bites;
       break;
-    case EventKind::bite_cancelled:
-      ++c.bites_cancelled;
+    case EventKind::bite_withdrawn:
+      ++c.bites_withdrawn;
       break;
-    case EventKind::knot_locked: {  // one more throw
+    case EventKind::throw_locked: {  // one more throw
       uint8_t& throws = c.throws_of_knot[std::min<size_t>(e.which, c.throws_of_knot.size() - 1)];
       c.knots += throws == 0;
       throws = static_cast<uint8_t>(std::min(throws + 1, 255));
@@ -22,11 +23,11 @@ void count(Counts& c, const Event& e) {
       ++c.throws;
       break;
     }
-    case EventKind::suture_taken:
+    case EventKind::suture_loaded:
       c.throws_of_knot.fill(0);
       break;
-    case EventKind::stitch_settled:
-      ++c.stitches_settled;
+    case EventKind::suture_baked:
+      ++c.sutures_baked;
       c.throws_of_knot.fill(0);
       break;
     case EventKind::thread_cut:
@@ -43,7 +44,7 @@ void count(Counts& c, const Event& e) {
   }
 }
 
-void note(Practice& p, const Snapshot& seen, float dt) {
+void update(SessionMetrics& p, const Snapshot& seen, float dt) {
   if (!p.begun) p.opening_start = seen.opening_area;
   for (size_t k = 0; k < 2; ++k) {
     const float way = distance(seen.tool[k].pose.p, p.tip[k]);

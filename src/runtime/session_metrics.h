@@ -1,5 +1,6 @@
-// runtime: what somebody at the instruments has done so far, gathered from the published snapshots tick by tick. Plain values,
-// so that taking back a bite takes back what it counted too.
+// SPDX-License-Identifier: Apache-2.0
+// runtime: what a user at the instruments has done so far, gathered from the published snapshots tick by tick. Plain values,
+// so that undoing a bite undoes what it counted too.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -8,37 +9,38 @@
 
 namespace catgut {
 
-// What the events of a run add up to; results of runs (runtime/tally) and of practice are counted here and nowhere else.
+// What the events of a run add up to; results of runs (runtime/metrics_collector) and of practice are counted here and nowhere
+// else.
 struct Counts {
   std::array<uint32_t, static_cast<size_t>(EventKind::count_)> events{};  // of each kind
   std::array<uint32_t, static_cast<size_t>(Fault::count_)> faults{};
   uint32_t faults_in_all = 0;
   uint32_t bites = 0;            // completed
-  uint32_t bites_cancelled = 0;  // the needle was drawn back
+  uint32_t bites_withdrawn = 0;  // the needle was withdrawn
   uint32_t knots = 0;            // with at least one locked throw, settled ones included
   uint32_t throws = 0;
   uint32_t last_knot_throws = 0;  // of the knot that was tied last
   uint32_t cuts = 0;
-  uint32_t stitches_settled = 0;
+  uint32_t sutures_baked = 0;
   uint32_t needle_slips = 0;                 // the needle was torn out of a jaw
   std::array<uint8_t, 32> throws_of_knot{};  // of the suture in hand; knots are numbered from 0 in every suture
   bool tied() const { return throws_of_knot != decltype(throws_of_knot){}; }  // the suture in hand has a knot
 };
 void count(Counts& counts, const Event& event);
 
-struct Practice : Counts {
+struct SessionMetrics : Counts {
   double time_s = 0;             // [s] simulated, since the hands were let in
   float path[2] = {0, 0};        // [m] of each tool's tip
   float peak_force[2] = {0, 0};  // [N] on each hand
   float opening_start = 0;       // [m^2] when the hands were let in; 0: nothing to close
   float opening = 0;             // [m^2] now
   float closure = 0;             // 0 open .. 1
-  uint32_t undos = 0;            // bites that were taken back; survives the taking back
+  uint32_t undos = 0;            // bites that were undone; survives the undoing
   std::array<Vec3, 2> tip{};     // [m] where the tools were, for the path
   bool begun = false;
 };
 
 // After every tick. dt: length of a tick [s].
-void note(Practice& practice, const Snapshot& seen, float dt);
+void update(SessionMetrics& metrics, const Snapshot& seen, float dt);
 
 }  // namespace catgut

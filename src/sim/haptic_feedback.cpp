@@ -1,5 +1,6 @@
-// sim/feel: see the header. Sources of the numbers: docs/references.md.
-#include "sim/feel.h"
+// SPDX-License-Identifier: Apache-2.0
+// sim/haptic_feedback: see the header. Sources of the numbers: docs/references.md.
+#include "sim/haptic_feedback.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,13 +14,14 @@ namespace {
 
 // The last quarter of a tick's substeps: enough for contacts that come and go between two of them, and young.
 constexpr int kLastPart = 4;
-// [N/m] before anything has been learned: what the generated bowel answers a blunt tool with (60 to 120, tests/sim/feel_test),
-// and tissue that is held in its plane (point load, docs/references.md: 800 to 1400; half of that near a free edge).
+// [N/m] before anything has been learned: what the generated bowel answers a blunt tool with (60 to 120,
+// tests/sim/haptic_feedback_test), and tissue that is held in its plane (point load, docs/references.md: 800 to 1400; half of
+// that near a free edge).
 constexpr float kBlunt = 100, kTissue = 600;
-constexpr float kForget = 0.06f;    // [s] after which what was learned counts for a third
-constexpr float kTrust = 0.0001f;   // [m] of motion that weighs as much as the value above
-constexpr float kNothing = 0.005f;  // [N] less than this is not felt
-constexpr float kLook = 0.008f;     // [m] how far ahead the next contact is looked for; the broad phase's margin
+constexpr float kTimeConstant = 0.06f;   // [s] after which what was learned counts for a third
+constexpr float kPriorWeight = 0.0001f;  // [m] of motion that weighs as much as the value above
+constexpr float kMinForce = 0.005f;      // [N] less than this is not felt
+constexpr float kLook = 0.008f;          // [m] how far ahead the next contact is looked for; the broad phase's margin
 
 Vec3 thread_on_tool(const SolverState& s, const Strand& strand, const ThreadHold& hold) {
   const size_t i = node_of(strand, hold.slot);
@@ -32,7 +34,7 @@ Vec3 thread_on_tool(const SolverState& s, const Strand& strand, const ThreadHold
 }
 
 // Along a needle's shaft toward its tip, where the tissue of a channel point lies on it.
-Vec3 along_shaft(const Model& model, const SolverState& s, const ChannelPoint& c) {
+Vec3 along_shaft(const Model& model, const SolverState& s, const NeedleTrackConstraint& c) {
   const NeedleArc& arc = model.solver.needle_arc[c.suture];
   const RigidBody& needle = s.body[model.solver.needle_body(c.suture)];
   return rotate(needle.q, arc.tangent(arc.nearest(to_local(needle.pose(), position_of(c.point, s.x.data())))));
@@ -77,18 +79,18 @@ NeedleResistance resistance_now(const Model& model, const State& state, size_t w
 
 }  // namespace
 
-void begin_feeling(State& state) {
-  for (ToolReaction& t : state.feel.tool) t = {};
+void begin_haptics(State& state) {
+  for (ToolReaction& t : state.haptics.tool) t = {};
 }
 
-void feel_substep(const Model& model, State& state, int i) {
+void accumulate_haptics(const Model& model, State& state, int i) {
   const int first = model.substeps - std::max(1, model.substeps / kLastPart) + 1;
   if (i < first) return;
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
   const float inv_h2 = 1 / (m.h * m.h);
   for (size_t k = 0; k < kMaxHands; ++k) {
-    ToolReaction& t = state.feel.tool[k];
+    ToolReaction& t = state.haptics.tool[k];
     const int body = state.hand[k].instrument;
     if (body < 0) continue;
     const Weld& weld = s.weld[static_cast<size_t>(body)];
@@ -108,7 +110,7 @@ void feel_substep(const Model& model, State& state, int i) {
       const int needle = static_cast<int>(m.needle_body(hand.suture));
       for (const Weld& w : s.weld)
         if (w.a == needle && w.b == body) t.needle += w.lambda * -inv_h2;
-      for (const ChannelPoint& c : s.channel)  // the channel's push on the tissue, turned round: on the needle
+      for (const NeedleTrackConstraint& c : s.channel)  // the channel's push on the tissue, turned round: on the needle
         if (c.suture == hand.suture) t.drag += along_shaft(model, s, c) * (-c.drag_lambda * inv_h2);
     }
     t.hand += weld.lambda * -inv_h2;
@@ -123,11 +125,11 @@ Vec3 load_of(const ToolReaction& t) {
   return t.substeps > 0 ? (t.pressing + t.thread + t.held + t.needle - t.drag) / t.substeps : Vec3{};
 }
 
-void learn(FeltStiffness& f, const ToolReaction& t, uint32_t topology, float dt) {
-  const float keep = portable::exp(-dt / kForget);
+void update_stiffness_estimate(StiffnessEstimate& f, const ToolReaction& t, uint32_t discontinuity_id, float dt) {
+  const float keep = portable::exp(-dt / kTimeConstant);
   const Vec3 force = load_of(t), point = t.substeps > 0 ? t.at / t.substeps : f.point;
-  const bool loaded = length(force) > kNothing;
-  if (topology != f.topology || !loaded) {
+  const bool loaded = length(force) > kMinForce;
+  if (discontinuity_id != f.discontinuity_id || !loaded) {
     f.work = f.travel = 0;
   } else if (f.loaded) {
     Vec3 dx = point - f.point, df = force - f.force;
@@ -138,12 +140,12 @@ void learn(FeltStiffness& f, const ToolReaction& t, uint32_t topology, float dt)
     f.work = keep * f.work - dot(df, dx);
     f.travel = keep * f.travel + length2(dx);
   }
-  f.point = point, f.force = force, f.topology = topology, f.loaded = loaded;
+  f.point = point, f.force = force, f.discontinuity_id = discontinuity_id, f.loaded = loaded;
 }
 
 // [N/m] as the hand feels it, `before` it has been felt.
-float learned(const FeltStiffness& f, float before, float coupling) {
-  return std::clamp((f.work + before * kTrust * kTrust) / (f.travel + kTrust * kTrust), 0.0f, coupling);
+float learned(const StiffnessEstimate& f, float before, float coupling) {
+  return std::clamp((f.work + before * kPriorWeight * kPriorWeight) / (f.travel + kPriorWeight * kPriorWeight), 0.0f, coupling);
 }
 
 void count_changes(State& state) {
@@ -166,30 +168,30 @@ void count_changes(State& state) {
       case EventKind::tip_entered:
       case EventKind::particle_released:
       case EventKind::tip_exited:
-      case EventKind::bite_cancelled:
+      case EventKind::bite_withdrawn:
         for (const InstrumentState& i : state.suture.instrument)
           if (i.place == InstrumentPlace::hand && i.held == Held::needle) felt[i.hand] = true;
         break;
       case EventKind::thread_cut:
-      case EventKind::suture_taken:
+      case EventKind::suture_loaded:
         felt.fill(true);
         break;
       default:
         break;
     }
-    for (size_t k = 0; k < kMaxHands; ++k) state.feel.topology[k] += felt[k];
+    for (size_t k = 0; k < kMaxHands; ++k) state.haptics.discontinuity_id[k] += felt[k];
   }
 }
 
 // The patch of hand k.
-ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
+ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
-  const ToolReaction& sum = state.feel.tool[k];
+  const ToolReaction& sum = state.haptics.tool[k];
   const float part = sum.substeps > 0 ? 1 / sum.substeps : 0, coupling = 1 / model.hand_compliance;
   ForcePatch p;
   p.tick = state.tick;
-  p.topology = state.feel.topology[k];
+  p.discontinuity_id = state.haptics.discontinuity_id[k];
   p.period = model.dt;
   p.expiry = std::max(p.expiry, 2 * model.dt);  // two periods are normal
   p.point = sum.substeps > 0 ? sum.at * part : state.hand[k].pose.p;
@@ -200,9 +202,9 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
 
   const Vec3 pressing = sum.pressing * part, thread = sum.thread * part, held = sum.held * part,
              needle = (sum.needle - sum.drag) * part;
-  if (length(thread) > kNothing) p.thread_direction = normalized(thread), p.thread_tension = length(thread);
+  if (length(thread) > kMinForce) p.thread_direction = normalized(thread), p.thread_tension = length(thread);
 
-  // How stiff the tool stands: what each load path would answer a millimetre with.
+  // How stiff the tool stands: what each load path would answer a millimeter with.
   Sym3 stiff;
   bool both_ways = false;
   if (hand.held == Held::tissue) {
@@ -210,10 +212,10 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     both_ways = true;
   }
   const bool in_channel =
-      std::any_of(s.channel.begin(), s.channel.end(), [&](const ChannelPoint& c) { return c.suture == hand.suture; });
+      std::any_of(s.channel.begin(), s.channel.end(), [&](const NeedleTrackConstraint& c) { return c.suture == hand.suture; });
   const Suture& suture = state.suture.suture[hand.suture];
-  if (hand.held == Held::needle && (in_channel || length(needle) > 20 * kNothing)) {
-    for (const ChannelPoint& c : s.channel)
+  if (hand.held == Held::needle && (in_channel || length(needle) > 20 * kMinForce)) {
+    for (const NeedleTrackConstraint& c : s.channel)
       if (c.suture == hand.suture)
         stiff += across(along_shaft(model, s, c), series(kTissue, 1 / std::max(1e-6f, c.compliance)));
     if (suture.attached) stiff += identity(series(kTissue, 1 / std::max(1e-6f, model.suture.attach_compliance)));
@@ -222,7 +224,7 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     const NeedleArc& arc = m.needle_arc[hand.suture];
     p.along = rotate(s.body[m.needle_body(hand.suture)].q, arc.tangent(hand.at * arc.arc));
   }
-  if (length(thread) > 4 * kNothing) {
+  if (length(thread) > 4 * kMinForce) {
     // Taut thread is as stiff as the tissue it hangs on, along itself, unless it slides there.
     bool slides = false;
     for (size_t i = 0; i < s.strand.size(); ++i)
@@ -235,9 +237,9 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
   // Steel does not give, the hand that holds it does.
   const float behind = 2 * sum.by_tool > sum.pressed ? coupling : kBlunt;
   p.force = pressing + thread + held + needle;
-  const FeltStiffness& felt = state.feel.stiffness[k];
+  const StiffnessEstimate& felt = state.haptics.stiffness[k];
   if (both_ways) {
-    if (length(pressing) > kNothing) stiff += outer(normalized(pressing), behind);
+    if (length(pressing) > kMinForce) stiff += outer(normalized(pressing), behind);
     p.stiffness = in_series(stiff, coupling);
     // The directions are those of what holds the tool; how stiff they are is what the hand has found.
     const float guess = (p.stiffness.xx + p.stiffness.yy + p.stiffness.zz) / 3;
@@ -247,7 +249,7 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
       // solver says.
       float counter = 0;  // [N] with which another hand holds the tissue
       for (size_t other = 0; other < kMaxHands; ++other) {
-        const ToolReaction& o = state.feel.tool[other];
+        const ToolReaction& o = state.haptics.tool[other];
         if (other != k && o.substeps > 0) counter = std::max(counter, length(o.held) / o.substeps);
       }
       const NeedleResistance r = resistance_now(model, state, hand.suture, counter);
@@ -265,7 +267,7 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
     return p;
   }
   const float push = length(pressing);
-  if (push > kNothing) {
+  if (push > kMinForce) {
     const Vec3 n = pressing / push;
     p.normal = n;
     // Squeezed from several sides the tool is held both ways, and what lifts it off one side presses it on another.
@@ -315,10 +317,11 @@ ForcePatch feel_patch(const Model& model, const State& state, size_t k) {
 
 }  // namespace
 
-void end_feeling(const Model& model, State& state) {
+void finish_haptics(const Model& model, State& state) {
   count_changes(state);
-  for (size_t k = 0; k < kMaxHands; ++k) learn(state.feel.stiffness[k], state.feel.tool[k], state.feel.topology[k], model.dt);
-  for (size_t k = 0; k < kMaxHands; ++k) state.feel.patch[k] = feel_patch(model, state, k);
+  for (size_t k = 0; k < kMaxHands; ++k)
+    update_stiffness_estimate(state.haptics.stiffness[k], state.haptics.tool[k], state.haptics.discontinuity_id[k], model.dt);
+  for (size_t k = 0; k < kMaxHands; ++k) state.haptics.patch[k] = haptic_patch(model, state, k);
 }
 
 }  // namespace catgut

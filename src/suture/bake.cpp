@@ -1,4 +1,5 @@
-// suture/settle: a fresh needle and thread (kButtonNewSuture). Reads the thread and its knots; what is tied becomes a settled
+// SPDX-License-Identifier: Apache-2.0
+// suture/bake: a fresh needle and thread (kButtonNewSuture). Reads the thread and its knots; what is tied becomes a settled
 // stitch, everything else of the old suture goes. Cost stays flat however many stitches a procedure has (paper 3.4): a settled
 // stitch is a curve that the tissue carries and a few pins between the points that its thread held together.
 #include <algorithm>
@@ -25,10 +26,10 @@ bool same_bite(const Suture& state, int a, int b) {
 
 // Whether one of the first `pins` pins holds the places of `pin` together at least as closely: one of the technique's closure,
 // or of a stitch beside this one.
-bool held_already(const SolverState& solver, size_t pins, const TissuePin& pin) {
+bool held_already(const SolverState& solver, size_t pins, const Tether& pin) {
   const Vec4* x = solver.x.data();
   const Vec3 a = position_of(pin.a, x), b = position_of(pin.b, x);
-  return std::any_of(solver.pin.begin(), solver.pin.begin() + static_cast<long>(pins), [&](const TissuePin& other) {
+  return std::any_of(solver.pin.begin(), solver.pin.begin() + static_cast<long>(pins), [&](const Tether& other) {
     const Vec3 oa = position_of(other.a, x), ob = position_of(other.b, x);
     const float apart = std::min(std::max(distance(a, oa), distance(b, ob)), std::max(distance(a, ob), distance(b, oa)));
     return apart < kSamePlace && other.length <= pin.length;
@@ -36,8 +37,8 @@ bool held_already(const SolverState& solver, size_t pins, const TissuePin& pin) 
 }
 
 // A place bound to the nearest tissue particle, in the frame of that particle's cluster.
-SettledNode bind(const SolverModel& model, const SolverState& solver, Vec3 at) {
-  SettledNode n;
+BakedNode bind(const SolverModel& model, const SolverState& solver, Vec3 at) {
+  BakedNode n;
   float best = 1e30f;
   for (uint32_t i = 0; i < model.tissue; ++i) {
     const float d = length2(xyz(solver.x[i]) - at);
@@ -97,7 +98,7 @@ void settle_piece(OneSuture& one, size_t first, size_t last, const std::vector<u
   SolverState& solver = one.all.solver;
   SutureState& state = one.all.state;
   const Strand& t = one.strand;
-  SettledStitch stitch;
+  BakedSuture stitch;
   size_t lowest = last, highest = first;
   for (size_t i = first; i <= last; ++i)
     if (anchor_of(t, t.order[i]) >= 0) lowest = std::min(lowest, i), highest = std::max(highest, i);
@@ -105,8 +106,8 @@ void settle_piece(OneSuture& one, size_t first, size_t last, const std::vector<u
   for (const Span& span : spans_of(t, lowest, highest, one.own, knots)) {
     // A passage through a wall holds nothing together but the wall: if it carries nothing, no pin is needed.
     if (span.passage && span.tension < kCarries) continue;
-    TissuePin pin;
-    const TissuePoint &a = t.anchor[static_cast<size_t>(span.a)].point, &b = t.anchor[static_cast<size_t>(span.b)].point;
+    Tether pin;
+    const EmbeddedPoint &a = t.anchor[static_cast<size_t>(span.a)].point, &b = t.anchor[static_cast<size_t>(span.b)].point;
     // What a tied stitch pulls is little, and its pins are looked at in every substep from now on. In deformed tissue fewer
     // particles say a little else: nothing may move because of that.
     pin.a = carried_by(model.shape.rest.data(), a, kCarriers);
@@ -115,7 +116,7 @@ void settle_piece(OneSuture& one, size_t first, size_t last, const std::vector<u
     const float other = distance(position_of(pin.a, x), position_of(pin.b, x)) - distance(position_of(a, x), position_of(b, x));
     pin.length = std::max(0.0f, span.length + other);
     pin.compliance = one.thread.stretch_compliance * span.length / one.thread.spacing;
-    pin.owner = span.passage ? PinOwner::passage : PinOwner::stitch;
+    pin.owner = span.passage ? TetherOwner::passage : TetherOwner::stitch;
     if (!held_already(solver, pins, pin)) solver.pin.push_back(pin);
   }
   float tail = 0;
@@ -129,7 +130,7 @@ void settle_piece(OneSuture& one, size_t first, size_t last, const std::vector<u
     where = position_of(one.own.knot[k].target, solver.x.data());
     stitch.knot.push_back(bind(model, solver, where));
   }
-  one.report(EventKind::stitch_settled, static_cast<uint32_t>(state.settled.size()), 0, where);
+  one.report(EventKind::suture_baked, static_cast<uint32_t>(state.settled.size()), 0, where);
   state.settled.push_back(std::move(stitch));
 }
 
@@ -155,7 +156,7 @@ void fresh_suture(const SolverModel& model, SolverState& solver, size_t suture, 
 
 namespace {
 
-// What is tied settles, piece by piece between the cuts; thread that was sewn in and never tied is pulled out.
+// What is tied settles, piece by piece between the cuts; thread that was sutured in and never tied is pulled out.
 void settle_thread(OneSuture& s, uint8_t who) {
   SutureContext& c = s.all;
   const Strand& t = s.strand;
@@ -172,7 +173,7 @@ void settle_thread(OneSuture& s, uint8_t who) {
       const Knot& knot = s.own.knot[k];
       if (knot.slots == 0 || !on_piece(knot.slot[0])) continue;
       knots.push_back(k);
-      if (knot.throws < static_cast<uint32_t>(c.suture.least_throws) && !knot.told)
+      if (knot.throws < static_cast<uint32_t>(c.suture.min_throws) && !knot.reported)
         c.report_fault(s.index, Fault::too_few_throws, who, k, position_of(knot.target, s.x()));
     }
     if (!knots.empty()) {
@@ -212,7 +213,7 @@ void let_go_of(OneSuture& s) {
   }
   std::erase_if(c.solver.weld, [&](const Weld& w) { return w.a == needle; });
   std::erase_if(c.solver.attach, [&](const Attachment& a) { return a.body == needle; });
-  std::erase_if(c.solver.channel, [&](const ChannelPoint& p) { return p.suture == s.index; });
+  std::erase_if(c.solver.channel, [&](const NeedleTrackConstraint& p) { return p.suture == s.index; });
   c.solver.body_collides[s.needle] = 1;
 }
 
@@ -231,18 +232,18 @@ bool new_suture(SutureContext& c, std::span<const Vec3> start, std::span<const P
     c.report_fault(s.index, Fault::needle_in_tissue, who, s.own.open.back().bite, s.body().x);
     return false;
   }
-  take_back_throws(s);
+  undo_throws(s);
   // Passages that drew their wall in until later stitches took the load off them: a pin that stays is paid for in every
   // substep.
   const float least = kCarries * c.model.h * c.model.h;
-  std::erase_if(c.solver.pin, [&](const TissuePin& p) { return p.owner == PinOwner::passage && -p.lambda < least; });
+  std::erase_if(c.solver.pin, [&](const Tether& p) { return p.owner == TetherOwner::passage && -p.lambda < least; });
   settle_thread(s, who);
   let_go_of(s);
   s.own.attached = s.own.tip_inside = false;
   s.own.point.clear();
   s.own.knot.clear();
   fresh_suture(c.model, c.solver, s.index, start, needle_start[s.index]);
-  c.report(s.index, EventKind::suture_taken, who, s.own.taken++, 0, s.body().x);
+  c.report(s.index, EventKind::suture_loaded, who, s.own.suture_index++, 0, s.body().x);
   return true;
 }
 

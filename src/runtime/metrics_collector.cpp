@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: gathers a run's results; see tally.h for what each means.
-#include "runtime/tally.h"
+#include "runtime/metrics_collector.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +9,7 @@
 
 namespace catgut {
 
-Spread spread_of(std::vector<float> values) {
+Percentiles percentiles_of(std::vector<float> values) {
   if (values.empty()) return {};
   std::sort(values.begin(), values.end());
   const auto at = [&](double part) {
@@ -25,7 +26,7 @@ bool RunResult::expectations_hold() const {
 namespace {
 
 // |free end - needle end| / sum of the thread outside the first and the last suture point, as it lies. 0 without both.
-double uneven_ends(const Snapshot& seen) {
+double tail_asymmetry(const Snapshot& seen) {
   if (seen.active().suture_point.empty() || seen.active().thread_order.size() < 2) return 0;
   const auto begin = seen.active().thread_order.begin(), end = seen.active().thread_order.end();
   std::ptrdiff_t first = end - begin, last = 0;
@@ -45,27 +46,28 @@ double uneven_ends(const Snapshot& seen) {
 
 }  // namespace
 
-Tally::Tally(const SceneSpec& scene, const PictureModel& picture) : scene_(scene), suture_(picture.suture) {}
+MetricsCollector::MetricsCollector(const SceneSpec& scene, const PictureModel& picture)
+    : scene_(scene), suture_(picture.suture) {}
 
-void Tally::open() { opening_wanted_ = true; }
+void MetricsCollector::open() { opening_wanted_ = true; }
 
-void Tally::tick(const Snapshot& seen) {
+void MetricsCollector::tick(const Snapshot& seen) {
   if (opening_wanted_) opening_at_start_ = seen.opening_area;
   opening_wanted_ = false;
   bool passing = false;
   for (const Event& e : seen.event) {
     count(counts_, e);
     passing = passing || e.kind == EventKind::particle_passed;
-    if (e.kind == EventKind::knot_begun && ends_uneven_ < 0) ends_uneven_ = uneven_ends(seen);
+    if (e.kind == EventKind::throw_started && tail_asymmetry_ < 0) tail_asymmetry_ = tail_asymmetry(seen);
   }
   const float error = thread_length_error(seen);
-  if (!std::isfinite(error)) sane_ = false;
+  if (!std::isfinite(error)) valid_ = false;
   float& worst = passing ? length_error_passing_ : length_error_;
   worst = std::max(worst, error);
-  lost_ = std::max(lost_, lost_slots(seen));
+  order_errors_ = std::max(order_errors_, count_order_errors(seen));
 }
 
-void Tally::judge_seam(const Snapshot& last, std::map<std::string, double>& v) const {
+void MetricsCollector::measure_seam(const Snapshot& last, std::map<std::string, double>& v) const {
   double gap = 0, all = 0, start = 0;
   bool any = false;
   size_t pairs = 0;
@@ -85,17 +87,17 @@ void Tally::judge_seam(const Snapshot& last, std::map<std::string, double>& v) c
   v["seam_gap_start"] = start;
 }
 
-void Tally::time(const StageTimes& times, double tick_ms) {
+void MetricsCollector::time(const StageTimes& times, double tick_ms) {
   solver_ms_.push_back(static_cast<float>(times.solver_ms()));
   tick_ms_.push_back(static_cast<float>(tick_ms));
   for (size_t s = 0; s < kStages; ++s) stage_ms_[s].push_back(static_cast<float>(times.ms[s]));
   contacts_ = std::max(contacts_, times.contacts);
   spent_ms_ += tick_ms;
-  if (tick_ms > 1000.0 / scene_.solver.tick_rate) ++late_ticks_;
+  if (tick_ms > 1000.0 / scene_.solver.tick_rate) ++overrun_ticks_;
   if (tick_ms > longest_ms_) longest_ms_ = tick_ms, longest_ = times, longest_tick_ = tick_ms_.size();
 }
 
-float Tally::thread_length_error(const Snapshot& seen) const {
+float MetricsCollector::thread_length_error(const Snapshot& seen) const {
   float worst = 0;
   for (size_t k = 0; k < seen.suture.size(); ++k) {
     const SutureView& suture = seen.suture[k];
@@ -120,7 +122,7 @@ float Tally::thread_length_error(const Snapshot& seen) const {
   return worst;
 }
 
-uint32_t Tally::lost_slots(const Snapshot& seen) {
+uint32_t MetricsCollector::count_order_errors(const Snapshot& seen) {
   uint32_t wrong = 0;
   for (size_t k = 0; k < seen.suture.size(); ++k) {
     seen_slot_.assign(suture_[k].thread_count, 0);  // within its capacity after the first
@@ -134,7 +136,7 @@ uint32_t Tally::lost_slots(const Snapshot& seen) {
   return wrong;
 }
 
-void Tally::finish(const Snapshot& last, RunResult& result) const {
+void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   for (size_t k = 0; k < counts_.events.size(); ++k) {
     const char* name = event_name(static_cast<EventKind>(k));
     if (counts_.events[k]) result.events[name] = counts_.events[k];
@@ -153,10 +155,10 @@ void Tally::finish(const Snapshot& last, RunResult& result) const {
   v["throws"] = counts_.throws;
   v["last_knot_throws"] = counts_.last_knot_throws;
   v["sutures"] = static_cast<double>(last.settled.size() + counts_.tied());
-  judge_seam(last, v);
+  measure_seam(last, v);
   v["needle_detached"] = static_cast<double>(off);
   v["held_ends"] = std::max(last.tool[0].held_strands, last.tool[1].held_strands);
-  v["tail_asymmetry"] = std::max(0.0, ends_uneven_);
+  v["tail_asymmetry"] = std::max(0.0, tail_asymmetry_);
   for (size_t k = 1; k < counts_.faults.size(); ++k) {
     const std::string name = fault_name(static_cast<Fault>(k));
     if (counts_.faults[k]) result.faults[name] = counts_.faults[k];
@@ -167,18 +169,18 @@ void Tally::finish(const Snapshot& last, RunResult& result) const {
   v["closure"] = last.closure;
   v["thread_length_error"] = length_error_;
   v["thread_length_error_passing"] = length_error_passing_;
-  v["order_errors"] = lost_;
-  v["state_valid"] = sane_ ? 1 : 0;
+  v["order_errors"] = order_errors_;
+  v["state_valid"] = valid_ ? 1 : 0;
   v["simulated_s"] = result.simulated_s;
   v["ticks"] = static_cast<double>(result.ticks);
   v.try_emplace("surgeon_done", 0);
 
-  result.solver_ms = spread_of(solver_ms_);
-  result.tick_ms = spread_of(tick_ms_);
+  result.solver_ms = percentiles_of(solver_ms_);
+  result.tick_ms = percentiles_of(tick_ms_);
   result.longest = longest_;
   result.longest_tick = longest_tick_;
-  result.late_ticks = late_ticks_;
-  for (size_t s = 0; s < kStages; ++s) result.stage_ms[s] = spread_of(stage_ms_[s]);
+  result.overrun_ticks = overrun_ticks_;
+  for (size_t s = 0; s < kStages; ++s) result.stage_ms[s] = percentiles_of(stage_ms_[s]);
   result.contacts = contacts_;
   result.real_time_factor = spent_ms_ > 0 ? result.simulated_s * 1000 / spent_ms_ : 0;
   for (const Expectation& want : scene_.expect) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: what a run is judged by, gathered from the published snapshots tick by tick. Reads Snapshot and StageTimes; writes
 // RunResult. It sees only what a picture or a host would see, so it cannot flatter the engine.
 #pragma once
@@ -10,17 +11,17 @@
 #include "core/profile.h"
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
-#include "runtime/practice.h"
+#include "runtime/session_metrics.h"
 #include "sim/scene.h"
 
 namespace catgut {
 
 constexpr size_t kStages = static_cast<size_t>(Stage::count_);
 
-struct Spread {
+struct Percentiles {
   double median = 0, p99 = 0, p999 = 0, max = 0;
 };
-Spread spread_of(std::vector<float> values);  // all zero for none
+Percentiles percentiles_of(std::vector<float> values);  // all zero for none
 
 struct ExpectationResult {
   Expectation want;
@@ -34,15 +35,15 @@ struct RunResult {
   size_t particles = 0;
   uint64_t ticks = 0;
   double simulated_s = 0;
-  double real_time_factor = 0;                // simulated time over the time spent in step, publish and the surgeon's plan
-  Spread solver_ms, tick_ms;                  // per tick
-  std::array<Spread, kStages> stage_ms;       // per tick
-  StageTimes longest;                         // of the tick that took longest
-  uint64_t longest_tick = 0, late_ticks = 0;  // its number; ticks that took longer than they simulate
-  uint32_t contacts = 0;                      // the most in a substep
-  std::map<std::string, uint64_t> events;     // by kind, only those that happened
-  std::map<std::string, uint64_t> faults;     // technique_fault events by name, only those that happened
-  std::map<std::string, double> value;        // every name of result_names
+  double real_time_factor = 0;                   // simulated time over the time spent in step, publish and the surgeon's plan
+  Percentiles solver_ms, tick_ms;                // per tick
+  std::array<Percentiles, kStages> stage_ms;     // per tick
+  StageTimes longest;                            // of the tick that took longest
+  uint64_t longest_tick = 0, overrun_ticks = 0;  // its number; ticks that took longer than they simulate
+  uint32_t contacts = 0;                         // the most in a substep
+  std::map<std::string, uint64_t> events;        // by kind, only those that happened
+  std::map<std::string, uint64_t> faults;        // technique_fault events by name, only those that happened
+  std::map<std::string, double> value;           // every name of result_names
   std::vector<ExpectationResult> expect;
   uint64_t state_hash = 0;
   bool interrupted = false;
@@ -51,15 +52,15 @@ struct RunResult {
   bool expectations_hold() const;
 };
 
-class Tally {
+class MetricsCollector {
  public:
-  Tally(const SceneSpec& scene, const PictureModel& picture);
+  MetricsCollector(const SceneSpec& scene, const PictureModel& picture);
 
   void open();                      // the hands are let in now: the next snapshot's opening is the whole opening
   void tick(const Snapshot& seen);  // after every tick
   void time(const StageTimes& times, double tick_ms);
-  void not_sane() { sane_ = false; }
-  bool sane() const { return sane_; }
+  void invalidate() { valid_ = false; }
+  bool sane() const { return valid_; }
   double spent_ms() const { return spent_ms_; }
 
   // Fills values, events, spreads and expectations; the rest of `result` must be there already.
@@ -67,22 +68,22 @@ class Tally {
 
  private:
   float thread_length_error(const Snapshot& seen) const;
-  uint32_t lost_slots(const Snapshot& seen);
-  void judge_seam(const Snapshot& last, std::map<std::string, double>& value) const;
+  uint32_t count_order_errors(const Snapshot& seen);
+  void measure_seam(const Snapshot& last, std::map<std::string, double>& value) const;
 
   const SceneSpec& scene_;
   const std::vector<SuturePicture> suture_;
   std::vector<uint8_t> seen_slot_;
-  bool opening_wanted_ = true, sane_ = true;
+  bool opening_wanted_ = true, valid_ = true;
   float opening_at_start_ = 0, length_error_ = 0, length_error_passing_ = 0;
-  uint32_t lost_ = 0, contacts_ = 0;
-  Counts counts_;            // a Snapshot lists no settled knots
-  double ends_uneven_ = -1;  // -1: no knot was begun yet
+  uint32_t order_errors_ = 0, contacts_ = 0;
+  Counts counts_;               // a Snapshot lists no settled knots
+  double tail_asymmetry_ = -1;  // -1: no knot was begun yet
   std::vector<float> solver_ms_, tick_ms_;
   std::array<std::vector<float>, kStages> stage_ms_;
   double spent_ms_ = 0, longest_ms_ = 0;
   StageTimes longest_;
-  uint64_t longest_tick_ = 0, late_ticks_ = 0;
+  uint64_t longest_tick_ = 0, overrun_ticks_ = 0;
 };
 
 }  // namespace catgut

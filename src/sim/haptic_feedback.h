@@ -1,5 +1,6 @@
-// sim/feel: what each hand feels of a tick, from the solver's own multipliers. Writes State::feel, which nothing that moves
-// reads.
+// SPDX-License-Identifier: Apache-2.0
+// sim/haptic_feedback: what each hand feels of a tick, from the solver's own multipliers. Writes State::haptics, which nothing
+// that moves reads.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -31,32 +32,34 @@ struct ToolReaction {
 
 // How stiff the tissue is to a hand, learned from what it does: least squares over the last ticks, which forgets. A wall that
 // bends answers ten times softer than one that is pulled in its plane, and no table knows which it is.
-struct FeltStiffness {
+struct StiffnessEstimate {
   Vec3 point, force;  // [m], [N] of the tick before
-  uint32_t topology = 0;
+  uint32_t discontinuity_id = 0;
   bool loaded = false;  // there was a force in the tick before
   float work = 0;       // [N m] sum of -dF . dx
   float travel = 0;     // [m^2] sum of dx . dx
 };
 
-struct Feel {
-  std::array<FeltStiffness, kMaxHands> stiffness;
+struct HapticFeedback {
+  std::array<StiffnessEstimate, kMaxHands> stiffness;
   // Counts what changes at once for a hand: taken, let go, pierced (ForcePatch::topology).
-  std::array<uint32_t, kMaxHands> topology{};
+  std::array<uint32_t, kMaxHands> discontinuity_id{};
   std::array<ForcePatch, kMaxHands> patch;   // what each hand may feel until the next tick
   std::array<ToolReaction, kMaxHands> tool;  // per hand: of the instrument that it has
 };
 
-constexpr void reflect(auto& a, Like<FeltStiffness> auto& f) {
-  a(f.point), a(f.force), a(f.topology), a(f.loaded), a(f.work), a(f.travel);
+constexpr void reflect(auto& a, Like<StiffnessEstimate> auto& f) {
+  a(f.point), a(f.force), a(f.discontinuity_id), a(f.loaded), a(f.work), a(f.travel);
 }
-constexpr void reflect(auto& a, Like<Feel> auto& f) { a(f.stiffness), a(f.topology), a(f.patch), a.cache(f.tool); }
+constexpr void reflect(auto& a, Like<HapticFeedback> auto& f) {
+  a(f.stiffness), a(f.discontinuity_id), a(f.patch), a.cache(f.tool);
+}
 
 // Once a tick, before its substeps.
-void begin_feeling(State& state);
+void begin_haptics(State& state);
 // After substep i of the tick's, 1 to model.substeps.
-void feel_substep(const Model& model, State& state, int i);
+void accumulate_haptics(const Model& model, State& state, int i);
 // After the tick's last stage: counts what changed at once, learns how stiff things are, finishes the patches.
-void end_feeling(const Model& model, State& state);
+void finish_haptics(const Model& model, State& state);
 
 }  // namespace catgut

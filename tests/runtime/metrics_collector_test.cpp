@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // tests/runtime: what a run is judged by, from snapshots made by hand.
-#include "runtime/tally.h"
+#include "runtime/metrics_collector.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,7 @@ struct Judged {
   SceneSpec scene;
   PictureModel picture;
   Snapshot seen;
-  std::unique_ptr<Tally> tally;
+  std::unique_ptr<MetricsCollector> tally;
 
   Judged() {
     scene.thread.particles = 11;
@@ -23,7 +24,7 @@ struct Judged {
       seen.particle.push_back({0.01f * static_cast<float>(i), 0, 0});
       seen.active().thread_order.push_back(i);
     }
-    tally = std::make_unique<Tally>(scene, picture);
+    tally = std::make_unique<MetricsCollector>(scene, picture);
   }
   void tell(EventKind kind, uint32_t which = 0, float value = 0) { seen.event.push_back({kind, 0, which, value, {}}); }
   void tell(Fault fault, uint32_t which) { seen.event.push_back({EventKind::technique_fault, 0, which, 0, {}, fault}); }
@@ -38,21 +39,21 @@ struct Judged {
   }
 };
 
-TEST(Tally, every_result_has_a_value) {
+TEST(MetricsCollector, every_result_has_a_value) {
   const RunResult r = Judged().result();
   for (const ResultName& name : result_names()) EXPECT_TRUE(r.value.count(name.name)) << name.name;
 }
 
-TEST(Tally, knots_and_throws_are_counted_through_settling) {
+TEST(MetricsCollector, knots_and_throws_are_counted_through_settling) {
   Judged j;
   for (uint32_t suture = 0; suture < 5; ++suture) {
-    j.tell(EventKind::knot_locked, 0), j.tick();
-    j.tell(EventKind::knot_locked, 0);
-    if (suture == 2) j.tell(EventKind::knot_locked, 1);  // a second knot on the same thread
+    j.tell(EventKind::throw_locked, 0), j.tick();
+    j.tell(EventKind::throw_locked, 0);
+    if (suture == 2) j.tell(EventKind::throw_locked, 1);  // a second knot on the same thread
     j.tick();
     if (suture == 4) break;
     j.seen.settled.emplace_back();
-    j.tell(EventKind::stitch_settled, suture), j.tell(EventKind::suture_taken, suture), j.tick();
+    j.tell(EventKind::suture_baked, suture), j.tell(EventKind::suture_loaded, suture), j.tick();
   }
   RunResult r = j.result();
   EXPECT_EQ(r.value["knots"], 6);
@@ -61,7 +62,7 @@ TEST(Tally, knots_and_throws_are_counted_through_settling) {
   EXPECT_EQ(r.value["sutures"], 5) << "four settled, one in hand";
 }
 
-TEST(Tally, gaps_are_the_widest_at_the_end_and_the_narrowest_at_the_start) {
+TEST(MetricsCollector, gaps_are_the_widest_at_the_end_and_the_narrowest_at_the_start) {
   Judged j;
   EXPECT_EQ(j.result().value["seam_gap_start"], 0);
   const auto row = [&](float gap, float start, bool midpoint) {
@@ -75,19 +76,19 @@ TEST(Tally, gaps_are_the_widest_at_the_end_and_the_narrowest_at_the_start) {
   EXPECT_FLOAT_EQ(static_cast<float>(r.value["seam_gap_start"]), 0.009f);
 }
 
-TEST(Tally, uneven_ends_are_those_of_the_first_knot) {
+TEST(MetricsCollector, uneven_ends_are_those_of_the_first_knot) {
   Judged j;
   j.seen.active().suture_point.resize(2);
   j.seen.active().suture_point[0].anchored = 3;  // 30 mm of free end
   j.seen.active().suture_point[1].anchored = 4;  // 60 mm on the needle's side
-  j.tell(EventKind::knot_begun), j.tick();
+  j.tell(EventKind::throw_started), j.tick();
   j.seen.active().suture_point[1].anchored = 9;
-  j.tell(EventKind::knot_begun), j.tick();
+  j.tell(EventKind::throw_started), j.tick();
   EXPECT_NEAR(j.result().value["tail_asymmetry"], 1.0 / 3, 1e-6);
   EXPECT_EQ(Judged().result().value["tail_asymmetry"], 0) << "no knot";
 }
 
-TEST(Tally, faults_by_name_ends_in_hand_and_the_needle) {
+TEST(MetricsCollector, faults_by_name_ends_in_hand_and_the_needle) {
   Judged j;
   j.tell(Fault::wrong_body, 2);
   j.tell(Fault::wrong_body, 3);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // runtime: what a hand feels of a bite and of a knot, as curves: ours beside the paper's spring, which `catgut play --haptics
 // paper` renders as well. `catgut bench haptics --out DIR` draws them.
 #pragma once
@@ -30,7 +31,7 @@ struct FeltCurves {
   std::vector<FeltPoint> bite, knot;
   double exit_mm = 0;  // where the tip came out again; 0: it did not
 };
-// The scripted surgeon's first bite and, if it is asked for, first throw in the scene (as under arms), each felt at 1 kHz
+// The scripted surgeon's first bite and, if it is requested, first throw in the scene (as under arms), each felt at 1 kHz
 // through the force model.
 FeltCurves feel_a_stitch(SceneSpec scene, bool knot, const std::atomic<bool>& stop);
 

@@ -1,5 +1,6 @@
-// solver/pins: reads pins, moves tissue particles. See the header.
-#include "solver/pins.h"
+// SPDX-License-Identifier: Apache-2.0
+// solver/tethers: reads pins, moves tissue particles. See the header.
+#include "solver/tethers.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,10 +15,10 @@ constexpr float kNoLength = 1e-9f;  // [m] a span shorter than this has no direc
 
 // A pin as one sum over all the particles of its two points: their difference is sum(share * x), and a pull of 1 along it moves
 // particle k by move[k]. An even number, so that two sums run side by side.
-struct PinRow {
+struct TetherRow {
   uint32_t count = 0;
-  std::array<uint32_t, 2 * TissuePoint::kMost> particle{};
-  std::array<float, 2 * TissuePoint::kMost> share{}, move{};
+  std::array<uint32_t, 2 * EmbeddedPoint::kMaxParticles> particle{};
+  std::array<float, 2 * EmbeddedPoint::kMaxParticles> share{}, move{};
 };
 
 // The same where it lies.
@@ -26,15 +27,15 @@ struct RowView {
   const float *share, *move;
   uint32_t count;
 };
-RowView view(const PinRow& r) { return {r.particle.data(), r.share.data(), r.move.data(), r.count}; }
-RowView row_at(const PinWeb& web, uint32_t pin) {
+RowView view(const TetherRow& r) { return {r.particle.data(), r.share.data(), r.move.data(), r.count}; }
+RowView row_at(const TetherGraph& web, uint32_t pin) {
   const uint32_t first = web.row[pin];
   return {&web.particle[first], &web.share[first], &web.move[first], web.row[pin + 1] - first};
 }
 
-PinRow row_of(const TissuePin& pin, const float* w) {
-  PinRow row;
-  const auto take = [&](const TissuePoint& t, float sign) {
+TetherRow row_of(const Tether& pin, const float* w) {
+  TetherRow row;
+  const auto take = [&](const EmbeddedPoint& t, float sign) {
     for (uint32_t k = 0; k < t.count; ++k) {
       uint32_t at = 0;
       while (at < row.count && row.particle[at] != t.particle[k]) ++at;
@@ -71,12 +72,12 @@ float length2_of(Four span) {
 }
 float length_of(Four span) { return std::sqrt(length2_of(span)); }
 
-// What a pull adds to lambda when the pin is `off` too long, what it pulls already allowed for: it takes back no more than
+// What a pull adds to lambda when the pin is `off` too long, what it pulls already allowed for: it undoes no more than
 // that.
 float step_of(float off, float give, float lambda) { return std::min(-off * give, -lambda); }
 float give_of(float inv_mass, float alpha) { return inv_mass + alpha > 0 ? 1 / (inv_mass + alpha) : 0.0f; }
 
-void solve_row(TissuePin& pin, const RowView& row, Vec4* x, float h) {
+void solve_row(Tether& pin, const RowView& row, Vec4* x, float h) {
   const Four span = span_of(x, row);
   const float l = length_of(span), alpha = pin.compliance / (h * h);
   if (l <= pin.length && pin.lambda >= 0) return;
@@ -88,18 +89,18 @@ void solve_row(TissuePin& pin, const RowView& row, Vec4* x, float h) {
 }
 
 // Bit for bit, with what lies unused: there is no cheaper way to see that nothing changed, and at worst a row is found again.
-bool same(const TissuePoint& a, const TissuePoint& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+bool same(const EmbeddedPoint& a, const EmbeddedPoint& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
-void find_rows(std::span<const TissuePin> pin, const float* w, PinWeb& web) {
+void find_rows(std::span<const Tether> pin, const float* w, TetherGraph& web) {
   web.point.clear();
   web.particle.clear();
   web.share.clear();
   web.move.clear();
   web.row.assign(1, 0);
-  for (const TissuePin& p : pin) {
+  for (const Tether& p : pin) {
     web.point.push_back(p.a);
     web.point.push_back(p.b);
-    const PinRow row = row_of(p, w);
+    const TetherRow row = row_of(p, w);
     web.particle.insert(web.particle.end(), row.particle.begin(), row.particle.begin() + row.count);
     web.share.insert(web.share.end(), row.share.begin(), row.share.begin() + row.count);
     web.move.insert(web.move.end(), row.move.begin(), row.move.begin() + row.count);
@@ -107,17 +108,17 @@ void find_rows(std::span<const TissuePin> pin, const float* w, PinWeb& web) {
   }
 }
 
-void find_strands(uint32_t particles, PinWeb& web) {
-  const size_t ropes = web.rope.size();
+void find_strands(uint32_t particles, TetherGraph& web) {
+  const size_t ropes = web.active.size();
   // By particle: the ropes that it is part of, and its share there.
   web.start.assign(particles + 2, 0);
-  for (const uint32_t i : web.rope)
+  for (const uint32_t i : web.active)
     for (uint32_t k = web.row[i]; k < web.row[i + 1]; ++k) ++web.start[web.particle[k] + 2];
   for (size_t i = 1; i < web.start.size(); ++i) web.start[i] += web.start[i - 1];
   web.on.resize(web.start.back());
   web.weight.resize(web.start.back());
   for (uint32_t n = 0; n < ropes; ++n)
-    for (uint32_t k = web.row[web.rope[n]]; k < web.row[web.rope[n] + 1]; ++k) {
+    for (uint32_t k = web.row[web.active[n]]; k < web.row[web.active[n] + 1]; ++k) {
       const uint32_t at = web.start[web.particle[k] + 1]++;  // runs through its part to where the next begins
       web.on[at] = n;
       web.weight[at] = web.share[k];
@@ -125,22 +126,22 @@ void find_strands(uint32_t particles, PinWeb& web) {
 
   web.first.assign(1, 0);
   web.strand.clear();
-  web.by_rope.assign(ropes, 0);
+  web.by_active.assign(ropes, 0);
   web.listed.assign(ropes, 0);
   for (uint32_t n = 0; n < ropes; ++n) {
     web.strand.push_back({n, 0});
     web.listed[n] = 1;
-    for (uint32_t k = web.row[web.rope[n]]; k < web.row[web.rope[n] + 1]; ++k)
+    for (uint32_t k = web.row[web.active[n]]; k < web.row[web.active[n] + 1]; ++k)
       for (uint32_t r = web.start[web.particle[k]]; r < web.start[web.particle[k] + 1]; ++r) {
         const uint32_t j = web.on[r];
         if (!web.listed[j]) web.listed[j] = 1, web.strand.push_back({j, 0});
-        web.by_rope[j] += web.move[k] * web.weight[r];
+        web.by_active[j] += web.move[k] * web.weight[r];
       }
     for (size_t r = web.first.back(); r < web.strand.size(); ++r) {
-      PinWeb::Strand& strand = web.strand[r];
-      strand.coupling = web.by_rope[strand.rope];
-      web.by_rope[strand.rope] = 0;
-      web.listed[strand.rope] = 0;
+      TetherGraph::Strand& strand = web.strand[r];
+      strand.coupling = web.by_active[strand.active];
+      web.by_active[strand.active] = 0;
+      web.listed[strand.active] = 0;
     }
     web.first.push_back(static_cast<uint32_t>(web.strand.size()));
   }
@@ -148,39 +149,39 @@ void find_strands(uint32_t particles, PinWeb& web) {
 
 }  // namespace
 
-void solve_pin(TissuePin& pin, Vec4* x, const float* w, float h) { solve_row(pin, view(row_of(pin, w)), x, h); }
+void solve_tether(Tether& pin, Vec4* x, const float* w, float h) { solve_row(pin, view(row_of(pin, w)), x, h); }
 
-void weave(std::span<const TissuePin> pin, const float* w, uint32_t particles, PinWeb& web) {
+void build_graph(std::span<const Tether> pin, const float* w, uint32_t particles, TetherGraph& web) {
   bool still = web.point.size() == 2 * pin.size();
   for (size_t i = 0; still && i < pin.size(); ++i)
     still = same(web.point[2 * i], pin[i].a) && same(web.point[2 * i + 1], pin[i].b);
   if (!still) find_rows(pin, w, web);
   web.length.resize(pin.size());
   web.compliance.resize(pin.size());
-  web.before.swap(web.rope);
-  web.rope.clear();
+  web.before.swap(web.active);
+  web.active.clear();
   web.slack.clear();
   for (uint32_t i = 0; i < pin.size(); ++i) {
     web.length[i] = pin[i].length;
     web.compliance[i] = pin[i].compliance;
-    (pin[i].lambda < 0 ? web.rope : web.slack).push_back(i);
+    (pin[i].lambda < 0 ? web.active : web.slack).push_back(i);
   }
-  if (!still || web.rope != web.before) find_strands(particles, web);
+  if (!still || web.active != web.before) find_strands(particles, web);
 }
 
-void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, float h, int sweeps, float tolerance,
-                std::vector<PinSpan>& work) {
-  CATGUT_CHECK(web.rope.size() + web.slack.size() == pin.size());
+void solve_tethers(std::span<Tether> pin, const TetherGraph& web, Vec4* x, float h, int sweeps, float tolerance,
+                   std::vector<TetherSpan>& work) {
+  CATGUT_CHECK(web.active.size() + web.slack.size() == pin.size());
   // Plain pointers: what is stored through them cannot be taken for a change of where vectors are.
   const uint32_t* const first = web.first.data();
-  const PinWeb::Strand* const strand = web.strand.data();
-  const size_t ropes = web.rope.size();
+  const TetherGraph::Strand* const strand = web.strand.data();
+  const size_t ropes = web.active.size();
   work.resize(ropes);
-  PinSpan* const rope = work.data();
+  TetherSpan* const active = work.data();
   const float inv_h2 = 1.0f / (h * h);
   for (size_t n = 0; n < ropes; ++n) {
-    PinSpan& r = rope[n];
-    const uint32_t i = web.rope[n];
+    TetherSpan& r = active[n];
+    const uint32_t i = web.active[n];
     store(r.span, span_of(x, row_at(web, i)));
     r.pull = {};
     r.length = web.length[i];
@@ -191,7 +192,7 @@ void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, float h, i
 
   for (int sweep = 0; sweep < sweeps; ++sweep)
     for (size_t n = 0; n < ropes; ++n) {
-      PinSpan& r = rope[n];
+      TetherSpan& r = active[n];
       const Four span = load(r.span);
       const float l2 = length2_of(span);
       if (l2 <= r.length * r.length && r.lambda >= 0) continue;
@@ -202,16 +203,16 @@ void solve_pins(std::span<TissuePin> pin, const PinWeb& web, Vec4* x, float h, i
       const Four pull = span * (step / std::max(l, kNoLength));
       store(r.pull, load(r.pull) + pull);
       for (uint32_t k = first[n]; k < first[n + 1]; ++k) {
-        Vec4& other = rope[strand[k].rope].span;
+        Vec4& other = active[strand[k].active].span;
         store(other, load(other) + pull * strand[k].coupling);
       }
     }
 
   for (size_t n = 0; n < ropes; ++n) {
-    const uint32_t i = web.rope[n];
-    pin[i].lambda = rope[n].lambda;
-    if (rope[n].lambda == 0 && xyz(rope[n].pull) == Vec3{}) continue;
-    give_pull(load(rope[n].pull), row_at(web, i), x);
+    const uint32_t i = web.active[n];
+    pin[i].lambda = active[n].lambda;
+    if (active[n].lambda == 0 && xyz(active[n].pull) == Vec3{}) continue;
+    give_pull(load(active[n].pull), row_at(web, i), x);
   }
   for (const uint32_t i : web.slack) {  // nearly all of them still are: that is seen without a root
     pin[i].lambda = 0;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device: the millisecond of drivers whose maker's library has no scheduler of its own.
 #pragma once
 #include <pthread.h>
