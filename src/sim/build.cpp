@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/build: turns a scene's description into a Model and its first State. Reads SceneSpec; calls the anatomy; throws
-// InputError for what a scene may get wrong. Nothing here runs during a tick.
+// sim/build: turns a scene's description into a Model and its first State. Reads SceneSpec; calls anatomy. Throws InputError
+// for errors in the scene. Nothing here runs during a tick.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -18,10 +18,10 @@
 namespace catgut {
 namespace {
 
-constexpr float kPaperSubstep = 1.0f / 480;  // [s] at which the paper's deformation resistance is meant
-constexpr float kDrapeBelowRim = 0.035f;     // [m] where a body stands up through the drape
-constexpr float kDrapeBelowBody = 0.010f;    // [m] where a body lies over it
-constexpr float kSutureApart = 0.095f;       // [m] between sutures on the drape: a turn of thread and room for a hand
+constexpr float kPaperSubstep = 1.0f / 480;  // [s] substep for which the paper's deformation resistance is defined
+constexpr float kDrapeBelowRim = 0.035f;     // [m] below the rim, where a body stands up through the drape
+constexpr float kDrapeBelowBody = 0.010f;    // [m] below the body, where it lies on the drape
+constexpr float kSutureApart = 0.095f;       // [m] between sutures on the drape: one turn of thread and room for a hand
 
 BodyRest make_body(const BodySpec& spec) {
   if (!spec.mesh.empty()) {
@@ -54,10 +54,10 @@ BodyRest make_body(const BodySpec& spec) {
   return make_bowel(s);
 }
 
-// A bowel end that points sideways rather than up.
+// A bowel end whose axis is closer to horizontal than to vertical.
 bool lies(const BodySpec& body) { return std::abs(body.axis.y) < 0.7f * length(body.axis); }
 
-// The thread lies on the drape in even turns, beginning at `start` and leading away along +x: what a nurse would hand over.
+// The thread lies on the drape in parallel rows. It begins at `start` and leads away along +x.
 std::vector<Vec3> lay_thread(const ThreadSpec& spec, Vec3 start) {
   constexpr float kRow = 0.07f, kTurn = 0.005f;  // [m] length of a row, radius of its turns
   const float turn = kPi * kTurn;
@@ -80,7 +80,7 @@ std::vector<Vec3> lay_thread(const ThreadSpec& spec, Vec3 start) {
   return p;
 }
 
-// The rims are those of the walls, in their order.
+// The walls' rims, in the order of the walls.
 TechniqueModel make_technique(const SceneSpec& scene, const std::vector<Rim>& rim, float wall, const std::string& where) {
   TechniqueModel t;
   const TechniqueSpec& spec = scene.technique;
@@ -104,8 +104,8 @@ TechniqueModel make_technique(const SceneSpec& scene, const std::vector<Rim>& ri
   return t;
 }
 
-// Room for what a procedure adds to the state, so that ticks in which something happens ask for no memory either: four times a
-// long procedure. Only a suture that settles does, for its list of nodes.
+// Reserves memory for what a procedure adds to the state, so that event ticks do not allocate either: four times a long
+// procedure. Only baking a suture allocates, for its node list.
 void reserve_room(const Model& model, State& s) {
   constexpr size_t kMany = 256;
   s.event.list.reserve(kMany);
@@ -157,10 +157,10 @@ StrandModel make_strand(const SceneSpec& scene, const ThreadSpec& spec, uint32_t
   return t;
 }
 
-// Needles and threads lie on the drape to the right of the organ, one behind the other, each needle's circle flat and its
-// thread leading away from its swage. Two bowel ends lie along x, and the needles in front of them.
+// Needles and threads lie on the drape to the right of the organ, one behind the other. Each needle's circle lies flat and its
+// thread leads away from its swage. Two bowel ends lie along x, with the needles in front of them.
 void lay_out_sutures(Model& m, const std::vector<NeedleAndThread>& sutures, Vec3 rim, bool two, float tube) {
-  const Pose flat{{}, axis_angle({1, 0, 0}, -0.5f * kPi)};  // body z up: the circle lies in the drape's plane
+  const Pose flat{{}, axis_angle({1, 0, 0}, -0.5f * kPi)};  // body z up: the circle lies in the plane of the drape
   Vec3 beside = two ? Vec3{0.02f, 0, tube + 0.03f} : Vec3{tube + 0.03f, 0, 0.01f};
   for (size_t k = 0; k < sutures.size(); ++k) {
     const NeedleSpec& needle = sutures[k].needle;
@@ -173,7 +173,7 @@ void lay_out_sutures(Model& m, const std::vector<NeedleAndThread>& sutures, Vec3
   }
 }
 
-// The instruments of a scene that names none, as in the paper.
+// Default instruments of a scene that lists none, as in the paper.
 std::vector<InstrumentSpec> instruments_of(const SceneSpec& scene) {
   if (!scene.instrument.empty()) return scene.instrument;
   InstrumentSpec driver, forceps;
@@ -189,7 +189,7 @@ std::string known_instruments(std::span<const InstrumentModel> own) {
   return names;
 }
 
-// The place of the tissue's surface nearest to `at`, with the neighborhood that moves with it.
+// The point of the tissue surface nearest to `at`, embedded in its neighborhood.
 ParkedStart park_on(const Model& model, size_t instrument, Vec3 at, Vec3 pull, const std::string& where) {
   const TissueCollision& tissue = model.solver.collision;
   const auto corner = [&](const Triangle& t, size_t k) { return model.start[t[k]]; };
@@ -206,7 +206,7 @@ ParkedStart park_on(const Model& model, size_t instrument, Vec3 at, Vec3 pull, c
     normal = normalized(cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0)));
     for (size_t k = 0; k < 3; ++k) end.weight[k] = near.weight[k];
   }
-  constexpr float kFar = 0.02f;  // [m] from the tissue: a wrong coordinate rather than a clamp
+  constexpr float kFar = 0.02f;  // [m] from the tissue: beyond this the coordinate is an error
   if (best > kFar)
     throw InputError(where, "instrument.at of a parked instrument is more than 20 mm from any tissue",
                      "give a place on a body");
@@ -215,13 +215,13 @@ ParkedStart park_on(const Model& model, size_t instrument, Vec3 at, Vec3 pull, c
   p.point = end.point;
   const Triangle& t = tissue.surface[end.triangle];
   p.particle = t[static_cast<size_t>(std::max_element(end.weight.begin(), end.weight.end()) - end.weight.begin())];
-  // The shaft leaves the tissue along the pull, else along the surface's normal.
+  // The shaft leaves the tissue along the pull if there is one, otherwise along the surface normal.
   const Vec3 z = normalized(pull, normalized(normal, {0, 1, 0})), x = any_perpendicular(z);
   p.pose = {point, from_axes(x, cross(z, x), z)};
   return p;
 }
 
-// `rim`: middle of the field; places are relative to it.
+// `rim`: center of the field; positions are relative to it.
 void add_instruments(Model& m, const SceneSpec& scene, Vec3 rim, const std::string& where) {
   static const char* const kHandName[kMaxHands] = {"right", "left", "assistant_right", "assistant_left"};
   const std::vector<InstrumentSpec> specs = instruments_of(scene);
@@ -232,7 +232,7 @@ void add_instruments(Model& m, const SceneSpec& scene, Vec3 rim, const std::stri
     const InstrumentSpec& spec = specs[i];
     const InstrumentModel& kind = m.suture.instrument[i];
     m.pull.push_back(spec.pull);
-    // A row on the drape to the right, shafts toward the surgeon.
+    // The tray: a row on the drape to the right, shafts toward the surgeon.
     m.tray.push_back({Vec3{rim.x + 0.16f + 0.03f * static_cast<float>(i), m.solver.ground + 0.006f, rim.z}, {}});
     InstrumentPicture picture;
     picture.name = spec.name.empty() ? spec.kind : spec.name;
@@ -282,8 +282,8 @@ bool apply_preset(SolverSpec& s, const std::string& preset) {
   s.shape_relaxation = 1;
   s.distance_sweeps = 3;
   s.bend_sweeps = 3;
-  // The paper gives 0.02 without a unit, for particles of unit mass as such solvers have them. What matters is compliance
-  // against inverse mass: for our thread's 2 mg that is 0.02 / 2e-6 = 1e4 per joule.
+  // The paper gives 0.02 without a unit, presumably for unit mass. What matters is the ratio of compliance to inverse mass:
+  // for this thread's 2 mg particles, 0.02 corresponds to 0.02 / 2e-6 = 1e4 per joule.
   s.bend_compliance = 1e4f;
   s.self_contact_sweeps = 10;
   s.contact_sweeps = 5;
@@ -302,7 +302,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   m.dt = 1.0f / scene.solver.tick_rate;
   m.substeps = scene.solver.substeps;
 
-  // Soft bodies one after the other in the columns; the thread after them.
+  // Soft bodies one after the other in the columns, followed by the thread.
   SolverModel& s = m.solver;
   std::vector<Vec3> rest;
   std::vector<float> mass, radius, apart;
@@ -331,10 +331,10 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
       mass.push_back(r.mass[i]);
       s.inv_mass.push_back(r.pinned[i] ? 0.0f : 1.0f / (r.mass[i] * scene.solver.mass_scale));
       radius.push_back(r.radius);
-      // Neighbors in the wall are held apart by its shape, not by contact, however fine the particles.
+      // Shape matching keeps neighbors in the wall apart, contact does not, at any particle size.
       apart.push_back(static_cast<float>(std::max(2.2 * spacing, 2 * r.radius + spacing)));
       const size_t wall_here = working_rim.size() + (r.wall.empty() ? 0 : r.wall[i]);
-      body.push_back(static_cast<uint32_t>(wall_here));  // two layers of one body meet as two bodies do
+      body.push_back(static_cast<uint32_t>(wall_here));  // two layers of one body collide like two bodies
       m.wall.push_back(static_cast<uint8_t>(wall_here));
       m.layer.push_back(static_cast<uint8_t>(r.layer[i]));
     }

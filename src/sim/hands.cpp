@@ -10,9 +10,9 @@
 namespace catgut {
 namespace {
 
-constexpr float kOpenWeld = -1;  // Weld::compliance of an instrument that no hand has
-// [m] from the hand to the grasp point of a parked instrument that it takes up: a hand that reaches for the handles is a
-// shaft's length away from the jaws. Chosen.
+constexpr float kOpenWeld = -1;  // Weld::compliance of an instrument without a hand
+// [m] from the hand to the grasp point of a parked instrument that it takes. The handles are a shaft's length away from
+// the jaws. Chosen.
 constexpr float kReach = 0.15f;
 
 void place_at(RigidBody& body, const Pose& pose) {
@@ -37,7 +37,7 @@ void put_on_tray(const Model& model, State& state, size_t i) {
   place_at(state.solver.body[i], model.tray[i]);
 }
 
-// `pose`: where the instrument is then; it keeps its place in the hand's frame.
+// `pose`: the pose of the instrument at that moment; its offset in the hand's frame is kept.
 void put_in_hand(State& state, size_t i, size_t hand, const Pose& pose, float jaw) {
   HandState& h = state.hand[hand];
   InstrumentState& tool = state.suture.instrument[i];
@@ -119,7 +119,7 @@ bool carry_out(const Model& model, State& state, const TickInput& input, const C
       return true;
     }
     default:
-      return true;  // another stage's
+      return true;  // handled by another stage
   }
 }
 
@@ -164,7 +164,7 @@ void meet_hands(State& state, const TickInput& input) {
     if (!connected || hand.known) continue;
     hand.known = 1;
     hand.pose = input.hand[k].pose;
-    // A product with no grip would round the hand's orientation.
+    // A product with zero grip would round the hand's orientation.
     if (hand.instrument >= 0)
       place_at(state.solver.body[static_cast<size_t>(hand.instrument)],
                hand.grip == Pose{} ? hand.pose : hand.pose * hand.grip);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/hands: hands and the instruments they have. Reads TickInput; writes State::hand, the place and hand of every
-// InstrumentState, and the welds that hold instruments. What the jaws of an instrument do is suture/grasp's.
+// sim/hands: hands and the instruments they hold. Reads TickInput; writes State::hand, the pose and hand of every
+// InstrumentState, and the welds that hold instruments. suture/grasp handles the jaws.
 #pragma once
 #include "exchange/tool_input.h"
 
@@ -9,18 +9,18 @@ namespace catgut {
 struct Model;
 struct State;
 
-// Places every instrument as the scene has it at the start: in a hand, on the tray, or parked on tissue.
+// Places every instrument as the scene defines: in a hand, on the tray, or parked on tissue.
 void lay_out_instruments(const Model& model, State& state);
-// Once a tick, before everything else. A hand that appears is taken over where it is: its instrument is placed there, not
+// Once per tick, before everything else. When a hand connects, its instrument is placed at the hand's pose; it is not
 // dragged there through the tissue.
 void meet_hands(State& state, const TickInput& input);
-// Once a tick: take, swap, lay_down, park and unpark, in their order. Each is reported as an event; one that cannot be carried
-// out (hand not empty or not connected, instrument in use or out of reach, not a clamp, nothing held) is instrument_refused.
+// Once per tick: processes take, swap, lay_down, park and unpark in order. Each emits an event; a command that is invalid
+// (hand not empty or not connected, instrument in use or out of reach, not a clamp, nothing held) emits instrument_refused.
 void handle_instruments(const Model& model, State& state, const TickInput& input);
-// Before every substep: an instrument follows its hand through a spring. Between two ticks the hand moves evenly: at `part`
-// (0..1) of the tick.
+// Before every substep: an instrument follows its hand through a spring. `part` (0..1) is the fraction of the tick; the hand
+// pose is interpolated linearly over the tick.
 void follow_hands(const Model& model, State& state, const TickInput& input, float part);
-// At the end of a tick: remembers where the hands are.
+// At the end of a tick: stores the hand poses.
 void remember_hands(State& state, const TickInput& input);
 
 }  // namespace catgut

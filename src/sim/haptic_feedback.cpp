@@ -12,16 +12,16 @@
 namespace catgut {
 namespace {
 
-// The last quarter of a tick's substeps: enough for contacts that come and go between two of them, and young.
+// The last quarter of a tick's substeps: recent, and long enough to average contacts that alternate between two substeps.
 constexpr int kLastPart = 4;
-// [N/m] before anything has been learned: what the generated bowel answers a blunt tool with (60 to 120,
-// tests/sim/haptic_feedback_test), and tissue that is held in its plane (point load, docs/references.md: 800 to 1400; half of
-// that near a free edge).
+// [N/m] before any estimate: the response of the generated bowel to a blunt tool is 60 to 120 (tests/sim/haptic_feedback_test);
+// tissue held in its plane responds with 800 to 1400 under a point load (docs/references.md), about half of that near a
+// free edge.
 constexpr float kBlunt = 100, kTissue = 600;
-constexpr float kTimeConstant = 0.06f;   // [s] after which what was learned counts for a third
-constexpr float kPriorWeight = 0.0001f;  // [m] of motion that weighs as much as the value above
-constexpr float kMinForce = 0.005f;      // [N] less than this is not felt
-constexpr float kLook = 0.008f;          // [m] how far ahead the next contact is looked for; the broad phase's margin
+constexpr float kTimeConstant = 0.06f;   // [s] time constant of exponential forgetting
+constexpr float kPriorWeight = 0.0001f;  // [m] of motion that weighs as much as the prior
+constexpr float kMinForce = 0.005f;      // [N] smaller forces are ignored
+constexpr float kLook = 0.008f;          // [m] search distance for the next contact; margin of the broad phase
 
 Vec3 thread_on_tool(const SolverState& s, const Strand& strand, const ThreadHold& hold) {
   const size_t i = node_of(strand, hold.slot);
@@ -33,7 +33,7 @@ Vec3 thread_on_tool(const SolverState& s, const Strand& strand, const ThreadHold
   return force;
 }
 
-// Along a needle's shaft toward its tip, where the tissue of a channel point lies on it.
+// Along the needle's shaft toward its tip, at the tissue of a track point.
 Vec3 along_shaft(const Model& model, const SolverState& s, const NeedleTrackConstraint& c) {
   const NeedleArc& arc = model.solver.needle_arc[c.suture];
   const RigidBody& needle = s.body[model.solver.needle_body(c.suture)];
@@ -43,7 +43,7 @@ Vec3 along_shaft(const Model& model, const SolverState& s, const NeedleTrackCons
 Sym3 across(Vec3 n, float k) { return identity(k) + outer(n, -k); }
 constexpr float series(float a, float b) { return a * b / (a + b); }
 
-// What the wall does to the needle of a suture that goes through it (suture/forces), at its tip now.
+// Force of the wall on the needle tip of a suture that passes through it (suture/forces).
 NeedleResistance resistance_now(const Model& model, const State& state, size_t which, float tension) {
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
@@ -69,7 +69,7 @@ NeedleResistance resistance_now(const Model& model, const State& state, size_t w
   } else if (tip_in) {
     SurfaceHit hit;
     const Vec3 heading = rotate(needle.q, arc.tangent(arc.arc));
-    // Only on its way out: close to the surface that it went in by, the tip points the other way.
+    // Only when it leaves: near the surface of entry the tip points the other way.
     if (nearest_surface(m, state.scratch.candidates, s.x.data(), needle_tip(arc, needle), kLook, hit) &&
         dot(heading, hit.normal) > 0.2f)
       to_exit = std::max(0.0f, -hit.distance);
@@ -110,7 +110,7 @@ void accumulate_haptics(const Model& model, State& state, int i) {
       const int needle = static_cast<int>(m.needle_body(hand.suture));
       for (const Weld& w : s.weld)
         if (w.a == needle && w.b == body) t.needle += w.lambda * -inv_h2;
-      for (const NeedleTrackConstraint& c : s.channel)  // the channel's push on the tissue, turned round: on the needle
+      for (const NeedleTrackConstraint& c : s.channel)  // the track's push on the tissue, negated: on the needle
         if (c.suture == hand.suture) t.drag += along_shaft(model, s, c) * (-c.drag_lambda * inv_h2);
     }
     t.hand += weld.lambda * -inv_h2;
@@ -134,7 +134,7 @@ void update_stiffness_estimate(StiffnessEstimate& f, const ToolReaction& t, uint
   } else if (f.loaded) {
     Vec3 dx = point - f.point, df = force - f.force;
     if (length2(t.pressing) > 0 && length2(t.held) + length2(t.needle) + length2(t.thread) == 0) {
-      const Vec3 n = normalized(force);  // a surface is stiff along its normal alone
+      const Vec3 n = normalized(force);  // a surface is stiff along its normal only
       dx = n * dot(dx, n), df = n * dot(df, n);
     }
     f.work = keep * f.work - dot(df, dx);
@@ -143,7 +143,7 @@ void update_stiffness_estimate(StiffnessEstimate& f, const ToolReaction& t, uint
   f.point = point, f.force = force, f.discontinuity_id = discontinuity_id, f.loaded = loaded;
 }
 
-// [N/m] as the hand feels it, `before` it has been felt.
+// [N/m] as rendered to the hand; `before`: prior value, before contact.
 float learned(const StiffnessEstimate& f, float before, float coupling) {
   return std::clamp((f.work + before * kPriorWeight * kPriorWeight) / (f.travel + kPriorWeight * kPriorWeight), 0.0f, coupling);
 }
@@ -183,7 +183,7 @@ void count_changes(State& state) {
   }
 }
 
-// The patch of hand k.
+// The force patch of hand k.
 ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
@@ -193,18 +193,18 @@ ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
   p.tick = state.tick;
   p.discontinuity_id = state.haptics.discontinuity_id[k];
   p.period = model.dt;
-  p.expiry = std::max(p.expiry, 2 * model.dt);  // two periods are normal
+  p.expiry = std::max(p.expiry, 2 * model.dt);  // two periods are normal jitter
   p.point = sum.substeps > 0 ? sum.at * part : state.hand[k].pose.p;
   if (state.hand[k].instrument < 0) return p;
   const uint32_t tool = static_cast<uint32_t>(state.hand[k].instrument);
-  if (!s.body_collides[tool]) return p;  // no hand there
+  if (!s.body_collides[tool]) return p;  // no hand connected
   const InstrumentState& hand = state.suture.instrument[tool];
 
   const Vec3 pressing = sum.pressing * part, thread = sum.thread * part, held = sum.held * part,
              needle = (sum.needle - sum.drag) * part;
   if (length(thread) > kMinForce) p.thread_direction = normalized(thread), p.thread_tension = length(thread);
 
-  // How stiff the tool stands: what each load path would answer a millimeter with.
+  // Stiffness at the tool: the response of each load path per meter [N/m].
   Sym3 stiff;
   bool both_ways = false;
   if (hand.held == Held::tissue) {
@@ -219,13 +219,13 @@ ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
       if (c.suture == hand.suture)
         stiff += across(along_shaft(model, s, c), series(kTissue, 1 / std::max(1e-6f, c.compliance)));
     if (suture.attached) stiff += identity(series(kTissue, 1 / std::max(1e-6f, model.suture.attach_compliance)));
-    if (!in_channel) stiff += outer(normalized(needle), kTissue);  // its shaft lies against something
+    if (!in_channel) stiff += outer(normalized(needle), kTissue);  // the shaft lies against tissue
     both_ways = true;
     const NeedleArc& arc = m.needle_arc[hand.suture];
     p.along = rotate(s.body[m.needle_body(hand.suture)].q, arc.tangent(hand.at * arc.arc));
   }
   if (length(thread) > 4 * kMinForce) {
-    // Taut thread is as stiff as the tissue it hangs on, along itself, unless it slides there.
+    // Taut thread is as stiff as the tissue that it is attached to, along its direction, unless it slides there.
     bool slides = false;
     for (size_t i = 0; i < s.strand.size(); ++i)
       for (const ThreadAnchor& a : s.strand[i].anchor)
@@ -234,19 +234,19 @@ ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
     both_ways = true;
   }
 
-  // Steel does not give, the hand that holds it does.
+  // Rigid against rigid: the stiffness is that of the hand coupling.
   const float behind = 2 * sum.by_tool > sum.pressed ? coupling : kBlunt;
   p.force = pressing + thread + held + needle;
   const StiffnessEstimate& felt = state.haptics.stiffness[k];
   if (both_ways) {
     if (length(pressing) > kMinForce) stiff += outer(normalized(pressing), behind);
     p.stiffness = in_series(stiff, coupling);
-    // The directions are those of what holds the tool; how stiff they are is what the hand has found.
+    // Directions come from the constraints that load the tool, stiffness from the online estimate.
     const float guess = (p.stiffness.xx + p.stiffness.yy + p.stiffness.zz) / 3;
     if (guess > 1) p.stiffness = clamp_eigenvalues(p.stiffness * (learned(felt, guess, coupling) / guess), 0, coupling);
     if (hand.held == Held::needle && !suture.open.empty()) {
-      // Across the shaft and in turning it is the solver's reaction; along it what a wall really does, never less than the
-      // solver says.
+      // Across the shaft and in rotation: the solver's reaction. Along the shaft: the wall's force law, no less than
+      // the solver's.
       float counter = 0;  // [N] with which another hand holds the tissue
       for (size_t other = 0; other < kMaxHands; ++other) {
         const ToolReaction& o = state.haptics.tool[other];
@@ -270,7 +270,7 @@ ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
   if (push > kMinForce) {
     const Vec3 n = pressing / push;
     p.normal = n;
-    // Squeezed from several sides the tool is held both ways, and what lifts it off one side presses it on another.
+    // Squeezed from several sides, the tool is supported in both directions: motion away from one side loads the other.
     if (push < 0.5f * sum.pressed * part) p.normal = {};
     const float slope = std::max(1.0f, learned(felt, series(behind, coupling), coupling));
     p.stiffness = length2(p.normal) > 0 ? outer(n, slope) : identity(slope);
@@ -280,7 +280,7 @@ ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
     return p;
   }
 
-  // Nothing yet: where it would begin. The tool is where the hand is.
+  // No contact: the plane where contact would begin. The tool is at the hand's pose.
   p.force = {};
   float nearest = kLook;
   for (const ToolCandidate& c : state.scratch.candidates.tool) {

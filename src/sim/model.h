@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/model: everything about a scene that never changes. Written by sim/build, read by every stage.
+// sim/model: everything about a scene that is constant during a run. Written by sim/build, read by every stage.
 #pragma once
 #include <array>
 #include <vector>
@@ -13,12 +13,12 @@
 
 namespace catgut {
 
-// An instrument that is parked on tissue when the scene begins.
+// An instrument that is parked on tissue at the start of the scene.
 struct ParkedStart {
   size_t instrument = 0;
   Pose pose;
   EmbeddedPoint point;    // of tissue, at the jaws
-  uint32_t particle = 0;  // nearest to them
+  uint32_t particle = 0;  // nearest to the jaws
 };
 
 struct Model {
@@ -31,13 +31,13 @@ struct Model {
   float dt = 1.0f / 60;        // [s] tick
   int substeps = 8;
   std::vector<Vec3> start;                       // [m] of every particle
-  std::vector<Pose> tray;                        // per instrument: its place on the tray
-  std::vector<Vec3> pull;                        // [N] per instrument: parked, instead of its weight; zero: its weight
-  std::vector<ParkedStart> parked;               // that hold tissue at the start
-  std::array<Pose, kMaxHands> hand_start;        // before a hand is connected
-  std::array<int, kMaxHands> hand_instrument{};  // that a hand has at the start; -1: none
+  std::vector<Pose> tray;                        // per instrument: its pose on the tray
+  std::vector<Vec3> pull;                        // [N] per parked instrument: replaces its weight; zero: its weight
+  std::vector<ParkedStart> parked;               // instruments that hold tissue at the start
+  std::array<Pose, kMaxHands> hand_start;        // before a hand connects
+  std::array<int, kMaxHands> hand_instrument{};  // held by each hand at the start; -1: none
   std::vector<Pose> needle_start;                // body frame, per suture
-  float hand_compliance = 1.0f / 3000, hand_angular_compliance = 0.05f;  // [m/N], [rad/(N m)] tool on its hand
+  float hand_compliance = 1.0f / 3000, hand_angular_compliance = 0.05f;  // [m/N], [rad/(N m)] coupling of tool and hand
   PictureModel picture;
 };
 

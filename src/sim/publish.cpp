@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/publish: reads the state after a tick, writes the Snapshot that pictures, surgeon and host see. Changes nothing.
+// sim/publish: reads the state after a tick, writes the Snapshot for rendering, surgeon and host. Does not change the state.
 #include <algorithm>
 
 #include "sim/model.h"
@@ -49,7 +49,7 @@ void publish_hands(const Model& model, const State& state, Snapshot& out) {
     t.loop_suture = loop.suture;
     t.loop_first = loop.first;
     t.loop_last = loop.last;
-    // The weld's multiplier acts on the tool; the hand feels its opposite.
+    // The weld's multiplier acts on the tool; the reaction acts on the hand.
     t.force = s.weld[i].lambda * -inv_h2;
     t.torque = s.weld[i].angular_lambda * -inv_h2;
   }
@@ -102,7 +102,7 @@ void publish_suture(const Model& model, const State& state, size_t which, Suture
   const Suture& suture = state.suture.suture[which];
   const Strand& strand = state.solver.strand[which];
   const RigidBody& needle = state.solver.body[model.solver.needle_body(which)];
-  // Published at the circle's center, which is what pictures and plans turn about.
+  // The published pose is at the circle's center, the reference point of rendering and plans.
   out.needle.pose = {transform(needle.pose(), model.solver.needle_arc[which].center), needle.q};
   out.needle.in_tissue = !suture.open.empty();
   out.needle.bite = suture.open.empty() ? 0 : suture.open.back().bite;

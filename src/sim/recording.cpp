@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim: reads and writes recordings. Knows TickInput field by field and nothing of what is inside a state.
+// sim: reads and writes recordings. Knows the fields of TickInput; treats a state as opaque bytes.
 #include "sim/recording.h"
 
 #include <bit>
@@ -14,8 +14,8 @@
 namespace catgut {
 namespace {
 
-constexpr char kMagic[8] = {'C', 'A', 'T', 'G', 'U', 'T', '\x1a', '\n'};  // \x1a\n: shows up a transfer in text mode
-constexpr size_t kTicksPerChunk = 60;  // what a crash may cost: one second at 60 ticks a second
+constexpr char kMagic[8] = {'C', 'A', 'T', 'G', 'U', 'T', '\x1a', '\n'};  // detects transfers in text mode
+constexpr size_t kTicksPerChunk = 60;  // lost by a crash at most: one second at 60 ticks per second
 enum Kind : uint32_t { kHeader = 1, kStart = 2, kTicks = 3, kEnd = 4 };
 constexpr size_t kChunkHead = 4 + 8 + 8;
 
@@ -27,7 +27,7 @@ void put(std::string& out, float value) { put(out, std::bit_cast<uint32_t>(value
 void put(std::string& out, Vec3 v) { put(out, v.x), put(out, v.y), put(out, v.z); }
 void put(std::string& out, const std::string& text) { put(out, static_cast<uint64_t>(text.size())), out += text; }
 
-// Reads forward; past the end everything is zero and good() is false.
+// Sequential reader; past the end it returns zero and good() is false.
 class Reader {
  public:
   Reader(const char* at, size_t size) : at_(at), left_(size) {}
@@ -123,13 +123,13 @@ Recorder::Recorder(const std::string& path, const RecordingHeader& header, const
 Recorder::~Recorder() {
   try {
     if (file_) flush_ticks();
-  } catch (const InputError&) {  // the run is being abandoned for another reason, which is the one to report
+  } catch (const InputError&) {  // the run is ending because of another error; that one is reported
   }
 }
 
 void Recorder::tick(const TickInput& input, uint64_t hash) {
   put(ticks_, input.tick);
-  // Hands that are not there cost nothing; the surgeon's own two are always written.
+  // Disconnected hands take no space; the surgeon's own two are always written.
   uint32_t hands = kMaxHands;
   while (hands > 2 && !input.hand[hands - 1].connected) --hands;
   put(ticks_, hands);
@@ -198,7 +198,7 @@ Recording parse_recording(const std::string& bytes, const std::string& name) {
   const auto* state = reinterpret_cast<const std::byte*>(start.payload.take(state_size));
   r.start.assign(state, state + state_size);
 
-  r.truncated = true;  // until the end chunk says otherwise
+  r.truncated = true;  // until the end chunk is found
   while (in.left() > 0) {
     Chunk c = next_chunk(in);
     if (!c.whole) {
@@ -232,7 +232,7 @@ Recording parse_recording(const std::string& bytes, const std::string& name) {
       r.truncated = count != r.tick.size();
       if (r.truncated) r.fault = "it holds " + std::to_string(r.tick.size()) + " of " + std::to_string(count) + " ticks";
       return r;
-    }  // another kind is a later version's addition that this one can do without
+    }  // a later version may add chunk kinds: skip unknown ones
   }
   r.fault = "it ends without an end mark after tick " + std::to_string(r.tick.size());
   return r;

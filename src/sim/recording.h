@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim: recordings (.cgrec). Start state + the hands of every tick + a hash per tick: enough to replay a run bit for bit, to
-// check that a change did not alter the physics, and to hand a bug to someone else.
+// sim: recordings (.cgrec). Start state, inputs and one hash per tick: enough to replay a run bit for bit, to check that a
+// change did not alter the physics, and to reproduce a bug elsewhere.
 //
 // The file: 8 bytes of magic, format version (u32), then chunks {kind u32, size u64, hash u64, payload}. Little endian, packed
-// field by field, so that neither padding nor the compiler leaks into it. The hash covers kind, size and payload. Chunks are
-// written whole and flushed: a program killed at any byte leaves a file that reads up to its last whole chunk.
+// field by field, independent of padding and compiler. The hash covers kind, size and payload. Chunks are written and flushed
+// as a unit: if the program is killed at any byte, the file is readable up to its last complete chunk.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -20,9 +20,9 @@ namespace catgut {
 constexpr uint32_t kRecordingFormat = 2;
 
 struct RecordingHeader {
-  std::string catgut_version;  // of the program that recorded
+  std::string catgut_version;  // of the recording program
   uint32_t state_version = 0;  // kStateVersion of its state
-  std::string scene;           // the whole scene, as write_scene gives it
+  std::string scene;           // the complete scene, as write_scene gives it
 };
 
 struct RecordedTick {
@@ -34,16 +34,16 @@ struct Recording {
   RecordingHeader header;
   std::vector<std::byte> start;  // save_state before the first tick
   std::vector<RecordedTick> tick;
-  bool truncated = false;    // it ends without its end chunk: the ticks up to there are whole
+  bool truncated = false;    // no end chunk: the ticks before that are complete
   bool interrupted = false;  // the user stopped the run
-  std::string fault;         // truncated: where and how it ends, in words
+  std::string fault;         // truncated: position and cause, as text
 };
 
-// Writes as it goes. Throws InputError when the file cannot be created or written (disk full, ...).
+// Writes incrementally. Throws InputError when the file cannot be created or written (disk full, ...).
 class Recorder {
  public:
   Recorder(const std::string& path, const RecordingHeader& header, const std::vector<std::byte>& start);
-  ~Recorder();  // writes the ticks at hand but no end chunk: only finish() says that the run is whole
+  ~Recorder();  // writes the pending ticks but no end chunk: only finish() marks the run as complete
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
@@ -61,10 +61,10 @@ class Recorder {
 };
 
 // Throws InputError for a file that is missing, is not a recording, has another format version, or whose header or start state
-// is damaged. A file damaged or cut further on gives the ticks before the damage, `truncated` and `fault`.
+// is damaged. Damage further on yields the ticks before it, `truncated` and `fault`.
 Recording read_recording(const std::string& path);
 
-// The same on bytes in memory; name: for messages.
+// The same from bytes in memory; name: for messages.
 Recording parse_recording(const std::string& bytes, const std::string& name);
 
 }  // namespace catgut

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/save_state: the whole state as bytes, back again, and its hash. What the state is made of stands in the reflect of its
-// types; here are the archives over it, and what a state that was read has to fulfil.
+// sim/save_state: serializes the state, restores it, and hashes it. The reflect functions list the fields of each type; this
+// file has the archives over them and the validity checks of a loaded state.
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +11,7 @@
 namespace catgut {
 namespace {
 
-// Whether every index leads somewhere and every enumerator is one: the stages trust them.
+// Validates that every index is in range and every enumerator is known: the stages rely on it.
 class Validator : public Archive<Validator> {
  public:
   explicit Validator(const SolverModel& m) {
@@ -37,7 +37,7 @@ class Validator : public Archive<Validator> {
     if constexpr (!kLeaf<T>)
       for (const T& element : v) (*this)(element);
   }
-  void index(auto& v, IndexOf of) {  // below the first it wraps to a large number
+  void index(auto& v, IndexOf of) {  // below `first` it wraps to a large number
     good_ = good_ && static_cast<uint32_t>(v) - first_[static_cast<size_t>(of)] < size_[static_cast<size_t>(of)];
   }
   void index_or_none(auto& v, IndexOf of) {
@@ -66,7 +66,7 @@ class Validator : public Archive<Validator> {
   bool good_ = true;
 };
 
-// A strand has its own particles, each once; the thread continues to both sides of a suture point.
+// A strand has its own particles, each once; thread exists on both sides of a suture point.
 bool strand_fits(const StrandModel& model, const Strand& s) {
   const size_t pairs = model.count > 0 ? model.count - 1 : 0;
   if (s.order.size() != model.count || s.rest.size() != pairs || s.cut.size() != pairs || s.tension.size() != pairs)
@@ -91,7 +91,7 @@ bool knot_fits(const Strand& strand, const Knot& k) {
   return !tightening || (is_anchored(strand, k.end[0]) && is_anchored(strand, k.end[1]));
 }
 
-// Suture `which`, and what hands and loops have of it.
+// Suture `which`, and the hands and loops that refer to it.
 bool suture_fits(const SolverModel& model, const SolverState& solver, const SutureState& state, size_t which) {
   const Suture& u = state.suture[which];
   const Strand& strand = solver.strand[which];
@@ -112,7 +112,7 @@ bool suture_fits(const SolverModel& model, const SolverState& solver, const Sutu
   return std::all_of(u.knot.begin(), u.knot.end(), [&](const Knot& k) { return knot_fits(strand, k) && has(k.strand); });
 }
 
-// The first welds hold the instruments; a hand and its instrument name each other.
+// The first welds hold the instruments; a hand and its instrument refer to each other.
 bool hands_fit(uint32_t instruments, const State& s) {
   if (s.solver.weld.size() < instruments) return false;
   for (uint32_t i = 0; i < instruments; ++i) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/scene: everything a scene file can say, as plain data. The table in procedure/scene_fields names each member once for
+// sim/scene: the complete content of a scene file as plain data. The table in procedure/scene_fields names each member once for
 // the reader, the writer, `catgut describe` and the reference page; sim/build turns a SceneSpec into a Model.
-// SI units throughout. A value left out of a scene file keeps the default given here.
+// SI units throughout. A key left out of a scene file keeps the default given here.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -24,19 +24,19 @@ struct BodySpec {
   float haustra = 0.0008f;       // [m] depth of the sacculations; they fade out toward an open rim
   int taeniae = 3;               // longitudinal bands
   Vec3 position;                 // [m] center of the near end
-  Vec3 axis{0, 1, 0};            // the way the near end faces
+  Vec3 axis{0, 1, 0};            // direction in which the near end faces
   float density = 1050;          // [kg/m^3]
-  float pinned_length = 0.035f;  // [m] of the far end that the surroundings hold
+  float pinned_length = 0.035f;  // [m] length of the far end that is fixed
   float inner_radius = 0;        // [m] outer radius of a second tube inside the first (a bowel folded into itself); 0: none
 };
 
 // One instrument of the scene. A scene that names none has a needle holder in the right hand and forceps in the left.
 struct InstrumentSpec {
-  std::string name;              // in this scene; empty: that of its kind
+  std::string name;              // unique in this scene; empty: that of its kind
   std::string kind = "forceps";  // of the table in src/instrument
   std::string where = "tray";    // right, left, assistant_right, assistant_left: in that hand; tray; parked: closed on tissue
-  Vec3 at;                       // [m] parked: the jaws close on the tissue's surface nearest to here
-  Vec3 pull;                     // [N] parked: pulls with this force instead of its weight; zero: its weight
+  Vec3 at;                       // [m] parked: the jaws close on the tissue surface nearest to this point
+  Vec3 pull;                     // [N] parked: this force replaces its weight; zero: its weight
 };
 
 struct ThreadSpec {
@@ -51,7 +51,7 @@ struct NeedleSpec {
   float radius = 0.00828f;       // [m] of the circle: half circle of 26 mm arc
   float arc = 3.14159265f;       // [rad]
   float wire_radius = 0.00033f;  // [m]
-  float mass = 0.005f;  // [kg] inertia; more than the steel's 0.07 g, to match the scaled inertia of the tissue it moves
+  float mass = 0.005f;           // [kg] inertia; larger than the steel's 0.07 g, to match the scaled inertia of the tissue
 };
 
 // One of several sutures: a needle and the thread swaged to it.
@@ -60,7 +60,7 @@ struct NeedleAndThread {
   NeedleSpec needle;
 };
 
-// The solver's knobs. preset = "paper" sets all of them as in section 2.1 of the paper; "default" is what works best.
+// Solver parameters. preset = "paper" sets all of them as in section 2.1 of the paper; "default" gives the best results.
 struct SolverSpec {
   std::string preset = "default";
   float tick_rate = 60;  // [1/s] ticks
@@ -79,25 +79,25 @@ struct SolverSpec {
   float damping = 4;             // [1/s] of tissue velocities
   float thread_damping = 12;     // [1/s] of thread velocities
   Vec3 gravity{0, -9.81f, 0};    // [m/s^2]
-  float mass_scale = 80;         // tissue inertia times this at unchanged weight: sets the force with which tissue answers
+  float mass_scale = 80;         // factor of tissue inertia at unchanged weight: sets the reaction force of tissue
   float friction_tissue = 0.3f;  // coefficients of Coulomb friction
   float friction_tool = 0.1f;
   float friction_thread = 0.15f;
   float hand_stiffness = 3000;  // [N/m] of the coupling between a hand and its tool
-  float tool_force = 8;         // [N] with which two tools press each other at most; more than an arm renders
+  float tool_force = 8;         // [N] maximum force between two tools; above what a haptic device renders
 };
 
 // Guided mechanics (paper 2.2, 2.3).
 struct SutureSpec {
-  float attach_threshold = 0.006f;     // [m] X of figure 4: the nearest particle must be this near to the tip
-  float release_distance = 0.0022f;    // [m] drag beyond which the attached particle is let go (figure 5)
+  float attach_threshold = 0.006f;     // [m] X of figure 4: maximum distance from the tip to the nearest particle
+  float release_distance = 0.0022f;    // [m] drag beyond which the attached particle is released (figure 5)
   float attach_compliance = 0.00091f;  // [m/N] of that attachment: 1 / 1100 N/m, the paper's spring
-  float track_compliance = 0.002f;     // [m/N] the bitten tissue holds the needle's shaft sideways
+  float track_compliance = 0.002f;     // [m/N] lateral compliance of the needle track
   float pass_tension = 0.03f;          // [N] tension difference beyond which thread slides through a suture point
   float capstan_friction =
-      0.08f;                   // and that much more per newton of tension (friction coefficient times the angle of the bend)
+      0.08f;                   // additional threshold per newton of tension (friction coefficient times the angle of the bend)
   int collision_off = 3;       // thread particles on each side of a locked one that do not collide
-  float grasp_reach = 0.003f;  // [m] how near a closing jaw must be to hold needle or thread
+  float grasp_reach = 0.003f;  // [m] within which a closing jaw grasps needle or thread
 };
 
 // The technique's plan.
@@ -105,16 +105,16 @@ struct TechniqueSpec {
   std::string name = "purse_string";   // or connell, stay, lembert, none
   Vec3 anvil;                          // [m] focal point of the closure, relative to the rim's center
   float anvil_radius = 0.004f;         // [m] the rim ends on a ring of this radius
-  float closure_compliance = 0.0001f;  // [m/N] of the pull of the edge particles toward it
+  float closure_compliance = 0.0001f;  // [m/N] of the closure of edge particles toward the anvil
   int min_bites = 10;
-  float closed_gap = 0.0005f;  // [m] left between two points that a seam or a knot draws together
-  float step = 0.003f;         // [m] between the pairs that a seam draws together in between (dist_threshold of 2.5.2)
-  int throws = 2;              // with fewer a knot does not hold
+  float closed_gap = 0.0005f;  // [m] gap that a seam or a knot leaves between two closed points
+  float step = 0.003f;         // [m] between interpolated pairs of a seam (dist_threshold of 2.5.2)
+  int throws = 2;              // a knot with fewer does not hold
 };
 
 // The scripted surgeon.
 struct SurgeonSpec {
-  std::string plan;  // what he does; empty: the technique
+  std::string plan;  // which technique to perform; empty: that of the scene
   int bites = 12;
   float edge_distance = 0.004f;  // [m] of the bites from the rim
   float bite_length = 0.007f;    // [m] along the rim
@@ -125,7 +125,7 @@ struct SurgeonSpec {
   float aim_error = 0.0003f;     // [m] standard deviation
 };
 
-// What must hold at the end: every scene is a test. min/max of a named result (see docs/scene_reference).
+// Expected results at the end: every scene is a test. min/max of a named result (see docs/scene_reference).
 struct Expectation {
   std::string name;
   double min = -1e300, max = 1e300;
@@ -135,13 +135,13 @@ struct SceneSpec {
   std::string name;  // of the file, without .toml
   std::string title;
   uint64_t seed = 1;
-  float duration = 240;  // [s] simulated, at most; a run ends earlier when the surgeon is done
-  float settle = 0.5f;   // [s] simulated before the hands are let in
+  float duration = 240;  // [s] maximum simulated time; a run ends earlier when the surgeon has finished
+  float settle = 0.5f;   // [s] of settling before the hands connect
   std::vector<BodySpec> body;
   std::vector<InstrumentSpec> instrument;
   ThreadSpec thread;
   NeedleSpec needle;
-  std::vector<NeedleAndThread> sutures;  // that lie ready at the start; empty: one, of `thread` and `needle`
+  std::vector<NeedleAndThread> sutures;  // ready at the start; empty: one, of `thread` and `needle`
   SolverSpec solver;
   SutureSpec suture;
   TechniqueSpec technique;
@@ -151,7 +151,7 @@ struct SceneSpec {
 
 // The needles and threads of a scene: at least one.
 std::vector<NeedleAndThread> sutures_of(const SceneSpec& scene);
-// Sets every solver knob to the named preset ("paper" or "default"); false if there is no such preset.
+// Sets all solver parameters to the named preset ("paper" or "default"); false if there is no such preset.
 bool apply_preset(SolverSpec& solver, const std::string& preset);
 
 }  // namespace catgut

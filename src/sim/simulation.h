@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim: the engine's face. `Model` never changes, `State` is all that does, `step` is the tick, and the same inputs give the
-// same bits for any number of workers. Everything above (command line, window, recording, embedding) is built on these few
-// calls.
+// sim: the engine's API. `Model` is constant, `State` is everything that changes, `step` computes one tick. Equal inputs give
+// equal bits for any number of workers. Everything above (command line, window, recording, embedding) is built on these few
+// functions.
 #pragma once
 #include <cstddef>
 #include <memory>
@@ -23,8 +23,8 @@ namespace catgut {
 struct Model;  // sim/model.h
 struct State;  // sim/state.h
 
-// Builds the scene. Throws InputError for what a scene may get wrong (mesh missing, too few particles, ...).
-// own: instrument models besides those of the table (instrument/table), by which a scene's instruments may be of that kind.
+// Builds the scene. Throws InputError for errors in the scene (mesh missing, too few particles, ...).
+// own: instrument models in addition to the built-in table (instrument/table); scene instruments may be of these kinds.
 std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const InstrumentModel> own = {});
 const SceneSpec& scene_of(const Model& model);
 size_t particle_count(const Model& model);  // tissue + thread
@@ -38,19 +38,19 @@ StatePtr initial_state(const Model& model);
 // One tick of 1 / tick_rate seconds. times may be null.
 void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times = nullptr);
 
-// Copies the state after the last tick into the snapshot (reusing its memory): the same state gives the same snapshot, whether
-// it was reached by ticks or loaded.
+// Copies the state after the last tick into the snapshot (reusing its memory). Equal states give equal snapshots, whether
+// reached by ticks or loaded.
 void publish(const Model& model, const State& state, Snapshot& snapshot);
 PictureModel picture_model(const Model& model);
 
-// The whole state as bytes (versioned by kStateVersion) and back. load_state throws InputError if the bytes do not fit the
-// model.
+// Saves the whole state as bytes (versioned by kStateVersion) and restores it. load_state throws InputError if the bytes do not
+// fit the model.
 constexpr uint32_t kStateVersion = 4;
 std::vector<std::byte> save_state(const Model& model, const State& state);
 void load_state(const Model& model, State& state, const std::vector<std::byte>& bytes);
 uint64_t hash_state(const Model& model, const State& state);
 
-// The numbers of a run left what the solver can handle: no fault of the input. A caller that runs ticks checks for it with
+// Numerical instability: values left the solver's range. Not an input error. A caller that runs ticks checks for it with
 // state_is_valid.
 struct SimulationUnstable : std::runtime_error {
   explicit SimulationUnstable(const std::string& what) : std::runtime_error(what) {}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/state: everything that changes, and the scratch that stages reuse. What reflect names is the state: it is saved, hashed
-// and published. The rest is working memory of a tick.
+// sim/state: everything that changes, and the scratch that stages reuse. Members listed in reflect are the state: saved, hashed
+// and published. The others are working memory of a tick.
 #pragma once
 #include <array>
 #include <vector>
@@ -14,12 +14,12 @@
 
 namespace catgut {
 
-// A hand of the surgeon or of an assistant, and what it has.
+// A hand of the surgeon or of an assistant, and the instrument it holds.
 struct HandState {
   Pose pose;            // at the end of the last tick
-  Pose grip;            // of the instrument in the hand's frame: how it lies there
+  Pose grip;            // pose of the instrument in the hand's frame
   int instrument = -1;  // -1: none
-  uint32_t known = 0;   // 0 until the hand has first been connected
+  uint32_t known = 0;   // 0 until the hand has connected for the first time
 };
 constexpr void reflect(auto& a, Like<HandState> auto& h) {
   a(h.pose), a(h.grip), a.index_or_none(h.instrument, IndexOf::instrument), a(h.known);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/step: THE stage list. Reads one TickInput, moves the state by one tick, leaves the tick's events in it.
+// sim/step: THE stage list. Reads one TickInput, advances the state by one tick, leaves the tick's events in it.
 #include <algorithm>
 
 #include "sim/hands.h"
@@ -10,7 +10,7 @@
 namespace catgut {
 namespace {
 
-// What the technique may see of a suture in the tick.
+// Input of the technique: its view of a suture in this tick.
 TechniqueView look(const Model& model, State& state, size_t which) {
   const Strand& thread = state.solver.strand[which];
   const Suture& suture = state.suture.suture[which];
@@ -41,7 +41,7 @@ TechniqueView look(const Model& model, State& state, size_t which) {
   return view;
 }
 
-// Every suture is judged and closed on its own, from its own events.
+// Every suture is evaluated and closed independently, from its own events.
 void follow_technique(const Model& model, State& state) {
   const size_t before = state.event.size();
   EventList& own = state.suture_event;
@@ -78,8 +78,8 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
     cut(sewing, pressed);
     new_suture(sewing, model.start, model.needle_start, pressed);
   }
-  // As far as thread and tools may come nearer to anything in a tick, at half a meter a second; but no less than what a knot's
-  // thread jumps when it slips.
+  // Margin: the distance that thread and tools can approach in a tick at 0.5 m/s, but at least the jump of a knot's thread
+  // when it slips.
   const float margin = std::clamp(0.5f * model.dt, 0.002f, 0.008f);
   find_candidates(solver, state.solver, state.scratch, margin, times);
   begin_haptics(state);

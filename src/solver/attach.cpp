@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// solver/attach: reads attachments, moves tissue particles and rigid bodies alike. XPBD (Macklin et al. 2016) per attachment.
+// solver/attach: reads attachments, moves tissue particles and rigid bodies. XPBD (Macklin et al. 2016) per attachment.
 #include "solver/attach.h"
 
 #include <algorithm>
@@ -22,8 +22,8 @@ EmbeddedPoint spread_point(std::span<const uint32_t> particle, const Vec4* rest,
     for (size_t i = 0; i < 3; ++i)
       for (size_t j = 0; j < 3; ++j) spread[i][j] += (rest_of(k)[i] - mean[i]) * (rest_of(k)[j] - mean[j]);
   diagonalize(spread, axis);
-  // b_k = 1/n + (q_k - mean)^T S^-1 (at - mean); the pseudo-inverse leaves directions alone in which the particles do not
-  // spread: where they are flat to a part in 100,000, squared here.
+  // b_k = 1/n + (q_k - mean)^T S^-1 (at - mean); the pseudo-inverse ignores directions in which the particles do not
+  // spread: flat to 1 part in 100,000, squared here.
   constexpr double kFlat = 1e-10;
   const double largest = std::max({spread[0][0], spread[1][1], spread[2][2]});
   const Column away{at.x - mean[0], at.y - mean[1], at.z - mean[2]};
@@ -54,8 +54,8 @@ EmbeddedPoint carried_by(const Vec4* rest, const EmbeddedPoint& point, uint32_t 
 }
 
 EmbeddedPoint midway(const Vec4* rest, const EmbeddedPoint& a, const EmbeddedPoint& b) {
-  // A point of tissue has room for so many particles; each of the two keeps the half of them that are nearest to it, with
-  // weights that put it where it was.
+  // An embedded point holds a limited number of particles. Each of the two keeps the half of its particles nearest to it, with
+  // weights that preserve its position.
   EmbeddedPoint m;
   for (const EmbeddedPoint* p : {&a, &b}) {
     const EmbeddedPoint part = carried_by(rest, *p, EmbeddedPoint::kMaxParticles / 2);
@@ -71,7 +71,7 @@ EmbeddedPoint midway(const Vec4* rest, const EmbeddedPoint& a, const EmbeddedPoi
 
 float NeedleArc::nearest(Vec3 p) const {
   float phi = portable::atan2(p.y - center.y, p.x - center.x);
-  // Angles of the gap behind the arc belong to whichever end is nearer.
+  // Angles in the gap behind the arc are clamped to the nearer end.
   if (phi < 0 && phi < 0.5f * (arc - 2 * kPi)) phi += 2 * kPi;
   return std::clamp(phi, 0.0f, arc);
 }
@@ -113,7 +113,7 @@ void solve_needle_track(NeedleTrackConstraint& c, const NeedleArc& arc, Vec4* x,
 
   const Vec3 r = rotate(needle.q, on_arc);
   Vec3 gap = needle.x + r - p;
-  gap -= tangent * dot(gap, tangent);  // sideways only: beyond an end of the arc nothing pulls it back along the shaft
+  gap -= tangent * dot(gap, tangent);  // lateral only: beyond an end of the arc nothing restores it along the shaft
   const float alpha = c.compliance * inv_h2;
   const Vec3 residual = gap - alpha * c.lambda;
   const Vec3 n = normalized(residual);
@@ -124,8 +124,8 @@ void solve_needle_track(NeedleTrackConstraint& c, const NeedleArc& arc, Vec4* x,
     push(model, needle, -d, r);
   }
 
-  // Drag: undo the slip since the start of the substep, as far as the largest force allows.
-  const float slip = arc.radius * (phi - c.at);  // tissue moved toward the tip by this
+  // Drag: undo the slip since the start of the substep, limited by the maximum force.
+  const float slip = arc.radius * (phi - c.at);  // displacement of the tissue toward the tip
   const float wt = wp + inverse_mass_at(model, needle, r, tangent);
   const float limit = c.drag * h * h;
   const float wanted = std::clamp(c.drag_lambda - slip / wt, -limit, limit);

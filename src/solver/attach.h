@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// solver/attach: compliant attachments of tissue. Points of tissue are weighted sums of a few particles, so that a bite sits
-// where the needle went in and not on the nearest particle; the paper's nearest particle is the case of one weight 1.
+// solver/attach: compliant attachments of tissue. Embedded points are weighted sums of a few particles, so that a bite lies
+// where the needle entered instead of at the nearest particle. The paper's nearest particle is the case of one weight 1.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace catgut {
 
-// A material point: sum of weight * particle. Percentiles over a neighborhood it also has the inertia of one: a thread that
-// pulls on three particles alone would drag them millimeters in a substep before their neighbors could answer.
+// A material point: sum of weight * particle. Spread over a neighborhood, it also has the neighborhood's inertia: a thread that
+// pulled on three particles alone would displace them by millimeters in a substep, before their neighbors could react.
 struct EmbeddedPoint {
   static constexpr uint32_t kMaxParticles = 16;
   uint32_t count = 0;
@@ -28,12 +28,12 @@ inline EmbeddedPoint particle_point(uint32_t i) {
   return t;
 }
 // The smoothest weights over `particle` (at rest positions `rest`) whose weighted sum is `at`: least squares with linear
-// precision, so that the point follows every affine motion of its neighborhood exactly. At most kMost particles are used.
+// precision, so that the point follows every affine motion of its neighborhood exactly. Uses at most kMaxParticles particles.
 EmbeddedPoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at);
 
-// The same place at rest, carried by no more than `count` particles, the nearest of those it has.
+// The same rest position, carried by no more than `count` particles, the nearest of those it has.
 EmbeddedPoint carried_by(const Vec4* rest, const EmbeddedPoint& point, uint32_t count);
-// Midway between two points of tissue, wherever the tissue carries them.
+// Midpoint of two embedded points.
 EmbeddedPoint midway(const Vec4* rest, const EmbeddedPoint& a, const EmbeddedPoint& b);
 
 inline Vec3 position_of(const EmbeddedPoint& t, const Vec4* x) {
@@ -65,16 +65,16 @@ struct Attachment {
   Vec3 lambda;           // [N s^2] cleared at the start of a substep; acts on the tissue
 };
 
-// The shaft of the needle in its channel: the tissue point lies on the arc of the needle (particle-line attachment). It slides
-// along the arc against a Coulomb-like drag and is held sideways by `compliance`.
+// The needle's shaft in its track: the tissue point lies on the needle's arc (particle-line attachment). It slides along
+// the arc against Coulomb-like drag; `compliance` constrains it laterally.
 struct NeedleTrackConstraint {
   EmbeddedPoint point;
-  float compliance = 0;   // [m/N] sideways
-  float drag = 0;         // [N] largest force along the shaft
-  float at = 0;           // [rad] where on the arc it was at the start of the substep
+  float compliance = 0;   // [m/N] lateral
+  float drag = 0;         // [N] maximum force along the shaft
+  float at = 0;           // [rad] position on the arc at the start of the substep
   uint32_t suture = 0;    // whose needle
-  uint32_t hole = 0;      // which hole it is, for the stage that made the row
-  Vec3 lambda;            // sideways, cleared at the start of a substep
+  uint32_t hole = 0;      // hole index, for the stage that made the row
+  Vec3 lambda;            // lateral, cleared at the start of a substep
   float drag_lambda = 0;  // along the shaft
 };
 
@@ -84,7 +84,7 @@ struct NeedleArc {
   Vec3 center;  // [m] body frame: the body's origin is the center of mass
   Vec3 point(float phi) const { return center + Vec3{radius * portable::cos(phi), radius * portable::sin(phi), 0}; }
   Vec3 tangent(float phi) const { return {-portable::sin(phi), portable::cos(phi), 0}; }  // toward the tip
-  // The angle of the point of the arc nearest to p (body frame), clamped to the arc.
+  // The angle of the arc point nearest to p (body frame), clamped to the arc.
   float nearest(Vec3 p) const;
 };
 

@@ -35,7 +35,7 @@ void Sweep(const Color& t, float alpha) {
     const V3 a{hn::LoadU(d, t.ax + k), hn::LoadU(d, t.ay + k), hn::LoadU(d, t.az + k)};
     const V3 b{hn::LoadU(d, t.bx + k), hn::LoadU(d, t.by + k), hn::LoadU(d, t.bz + k)};
     const V3 c{hn::LoadU(d, t.cx + k), hn::LoadU(d, t.cy + k), hn::LoadU(d, t.cz + k)};
-    // Lanes past the last triplet belong to the padding or to a triplet that is not complete: they get no mass.
+    // Lanes past the last triplet belong to padding or to an incomplete triplet: they get no mass.
     const auto in = hn::FirstN(d, HWY_MIN(lanes, t.count - k));
     const V wa = hn::IfThenElseZero(in, hn::LoadU(d, t.aw + k)), wb = hn::IfThenElseZero(in, hn::LoadU(d, t.bw + k));
     const V wc = hn::IfThenElseZero(in, hn::LoadU(d, t.cw + k)), lambda = hn::LoadU(d, t.lambda + k);
@@ -62,7 +62,7 @@ void Sweep(const Color& t, float alpha) {
     step = hn::IfThenElseZero(live, step);
     hn::StoreU(hn::Add(lambda, step), d, t.lambda + k);
     const V sa = hn::Mul(wa, step), sb = hn::Mul(wb, step), sc = hn::Mul(wc, step);
-    // Whole vectors are stored; lanes without mass write back what they read, and colors touch each node once.
+    // Whole vectors are stored; lanes without mass write back what they read. Each color touches a node once.
     hn::StoreU(hn::Add(a.x, hn::Mul(ga.x, sa)), d, t.ax + k);
     hn::StoreU(hn::Add(a.y, hn::Mul(ga.y, sa)), d, t.ay + k);
     hn::StoreU(hn::Add(a.z, hn::Mul(ga.z, sa)), d, t.az + k);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // solver/bend: cosine bending along a thread (paper 2.1) in SIMD. Every third triplet shares no particle with the next, so the
-// triplets fall into three colors; nodes are kept by their index modulo three, which makes the three points of all triplets of
-// a color contiguous columns. The same update as solve_bend (solver/thread.h), lane by lane, the same bits for any width of
-// SIMD.
+// triplets have three colors. Nodes are stored by index modulo three, which makes the three points of all triplets of a color
+// contiguous columns. The update equals solve_bend (solver/thread.h) lane by lane, with the same bits for any SIMD
+// width.
 #pragma once
 #include <span>
 
@@ -11,11 +11,11 @@
 
 namespace catgut {
 
-// Nodes i of a thread as columns by i % 3, padded so that kernels may read past the end.
+// Nodes i of a thread as columns by i % 3, padded so that kernels may read beyond the end.
 struct BendScratch {
   Column<float> x[3], y[3], z[3], w[3];
   Column<float> lambda[3];  // per triplet, by the color of its middle node (i % 3)
-  Column<float> whole[3];   // likewise: 0 where one of its pairs is cut through, 1 otherwise
+  Column<float> whole[3];   // likewise: 0 where one of its pairs is cut, 1 otherwise
   void resize(size_t nodes);
   // Node 3 k + color.
   void set(size_t color, size_t k, Vec3 p, float mass) {

@@ -18,7 +18,7 @@ Vec3 all(float s) { return {s, s, s}; }
 }  // namespace
 
 int nearest_particle(const TissueCollision& tissue, const Candidates& c, const Vec4* x, Vec3 p, float reach) {
-  constexpr float kOld = 0.002f;  // [m] boxes are of the start of the tick: more than tissue moves in one
+  constexpr float kOld = 0.002f;  // [m] boxes date from the start of the tick: more than tissue moves in one tick
   float best = reach * reach;
   int found = -1;
   for_blocks_near(c.tissue.boxes, p - all(reach + kOld), p + all(reach + kOld), [&](uint32_t b) {
@@ -99,7 +99,7 @@ void find_tissue_near(const CollideView& v, uint32_t body, uint32_t capsule, Vec
   });
 }
 
-// The same against the segments of all strands. `from`, `to`: a box round all that may be near.
+// The same against the segments of all strands. `from`, `to`: a bounding box of all candidates.
 void find_thread_near(const CollideView& v, uint32_t body, uint32_t capsule, Vec3 p, Vec3 q, Vec3 from, Vec3 to, float margin,
                       Candidates& c) {
   for (uint32_t k = 0; k < v.strand.size(); ++k) {
@@ -119,14 +119,14 @@ void find_thread_near(const CollideView& v, uint32_t body, uint32_t capsule, Vec
   }
 }
 
-// Thread on tissue: one triangle each, the nearest of those around the nearest particle; the substeps use its plane.
+// Thread on tissue: one triangle each, the nearest of those around the nearest particle. Substeps use its plane.
 void find_thread_on_tissue(const CollideView& v, float margin, Candidates& c) {
   const TissueCollision& tissue = v.tissue;
   const Vec4* x = v.x;
   const float reach = 0.004f + margin;
   for (uint32_t k = 0; k < v.strand.size(); ++k) {
     const Strand& strand = v.strand[k];
-    uint32_t guess = tissue.particles;  // the nearest of the node before: with it most boxes are too far at once
+    uint32_t guess = tissue.particles;  // the nearest of the previous node: most boxes are then rejected at once
     for (uint32_t run = c.run_first[k]; run < c.run_first[k + 1]; ++run) {
       c.near_block.clear();
       for_blocks_near(c.tissue.boxes, c.run_low[run] - all(reach), c.run_high[run] + all(reach),
@@ -168,7 +168,7 @@ void find_thread_on_thread(const CollideView& v, uint32_t a, uint32_t b, Candida
   const Strand &sa = v.strand[a], &sb = v.strand[b];
   const StrandModel &ma = v.strand_model[a], &mb = v.strand_model[b];
   const float grow = ma.radius + mb.radius + 0.002f;
-  // Two segments cannot be nearer than their middles less half of both; a segment may be stretched to twice its spacing.
+  // Two segments are no nearer than their midpoints minus half of both; a segment may be stretched to twice its spacing.
   const float far = grow + (ma.spacing + mb.spacing);
   const Vec3* const middle_a = c.middle.data() + (ma.first_slot - first_slot(v));
   const Vec3* const middle_b = c.middle.data() + (mb.first_slot - first_slot(v));
@@ -221,8 +221,8 @@ void find_tool_and_thread_candidates(const CollideView& v, float margin, Candida
 
 void find_tool_pairs(const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,
                      std::span<const uint8_t> body_collides, std::vector<ToolPair>& pair) {
-  // [m] two hands that rush at each other with 1.5 m/s each, for a tick of 60 Hz. There are four pairs at most: a wide margin
-  // is cheap, and hands are the fastest things there are.
+  // [m] two hands approaching each other at 1.5 m/s each, over a 60 Hz tick. At most four pairs exist, so a wide margin is
+  // cheap, and hands are the fastest objects.
   constexpr float kMargin = 0.05f;
   pair.clear();
   for (uint32_t a = 0; a < body.size(); ++a)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// solver/collide: who may touch whom, where tools or thread are concerned; found once a tick. (Tissue and tissue:
+// solver/collide: broad phase for tools and thread, once per tick. (Tissue against tissue:
 // tissue_pairs.)
 #pragma once
 #include <array>
@@ -27,13 +27,13 @@ struct ThreadPairCandidate {
   uint32_t strand_a, a, strand_b, b;
 };  // segments after slots a and b, of one strand or of two
 
-// Capsules of two tools that may meet. They can touch where their axes cross and at each of their four ends; side by side they
-// lie on two places, the ends of their overlap, and do not tilt about one.
+// Capsules of two tools that may touch. They can touch where their axes cross and at each of their four ends. Parallel capsules
+// touch at two points, the ends of their overlap, and do not tilt about one.
 struct ToolPair {
   uint32_t a, b;                  // bodies
-  uint32_t capsule_a, capsule_b;  // theirs
-  // Positional impulses on b so far in this substep, per place: crossing, first and second end of a, of b. Cleared at the start
-  // of a substep.
+  uint32_t capsule_a, capsule_b;  // their capsules
+  // Accumulated positional impulses on b in this substep, per point: crossing, first and second end of a, of b. Cleared at the
+  // start of a substep.
   struct Impulse {
     float normal = 0;  // [kg m]
     Vec3 rub;          // [kg m]
@@ -42,13 +42,13 @@ struct ToolPair {
 };
 
 struct Candidates {
-  PairSearch tissue;  // its boxes are everybody's
+  PairSearch tissue;  // its boxes are used by all searches
   std::vector<ToolCandidate> tool;
   std::vector<ThreadToolCandidate> thread_tool;
   std::vector<ThreadTissueCandidate> thread_tissue;
   std::vector<ThreadPairCandidate> thread_pair;
   std::vector<ToolPair> tool_pair;
-  // Working memory. Strands are cut into runs of kRun segments with a box each: most of a thread is far from everything.
+  // Working memory. Strands are split into runs of kRun segments with a box each: most of a thread is far from everything.
   static constexpr size_t kRun = 8;
   std::vector<uint8_t> collides;        // per thread slot (relative to the first strand's first)
   std::vector<Vec3> run_low, run_high;  // [m] per run, strand after strand
@@ -57,7 +57,7 @@ struct Candidates {
   std::vector<Vec3> middle;  // [m] per thread slot: twice the middle of the segment after it
 };
 
-// What the search reads.
+// Inputs of the search.
 struct CollideView {
   const TissueCollision& tissue;
   const Vec4* x;
@@ -67,17 +67,17 @@ struct CollideView {
   const std::vector<RigidBody>& body;
   std::span<const uint8_t> body_collides;
 };
-// Everything that involves tools or thread, with a margin [m] for what may happen within the tick. c.tissue.boxes must be up
+// Finds all candidates that involve tools or thread, with a margin [m] for motion within the tick. c.tissue.boxes must be up
 // to date.
 void find_tool_and_thread_candidates(const CollideView& v, float margin, Candidates& c);
-// Once a tick: capsules of different tools that may meet within it. Tools are the bodies whose weight a hand carries; the
-// needle is none, jaws close on it.
+// Once per tick: capsules of different tools that may touch within it. Tools are bodies whose weight a hand carries; the
+// needle is excluded, because jaws close on it.
 void find_tool_pairs(const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,
                      std::span<const uint8_t> body_collides, std::vector<ToolPair>& pair);
 
 // Nearest tissue particle to p within `reach`, or -1.
 int nearest_particle(const TissueCollision& tissue, const Candidates& c, const Vec4* x, Vec3 p, float reach);
-// Parameters (0..1) of the nearest points of segments a0-a1 and b0-b1.
+// Parameters (0..1) of the closest points of segments a0-a1 and b0-b1.
 std::pair<float, float> closest_on_segments(Vec3 a0, Vec3 a1, Vec3 b0, Vec3 b1);
 
 }  // namespace catgut

@@ -9,10 +9,10 @@
 namespace catgut {
 namespace {
 
-constexpr float kNear = 0.001f;               // [m] as far as the thread's solve may move a node at once
-constexpr float kLargestCorrection = 0.001f;  // [m] per contact and sweep: deep overlap is undone over some substeps
-constexpr float kUndoneTools = 0.0001f;       // [m] of such overlap of tools, per substep
-constexpr float kSameAxis = 0.00001f;         // [m] between axes that have no side any more
+constexpr float kNear = 0.001f;               // [m] maximum motion of a node by the thread's solve in one step
+constexpr float kLargestCorrection = 0.001f;  // [m] per contact and sweep: deep overlap is resolved over several substeps
+constexpr float kUndoneTools = 0.0001f;       // [m] of earlier tool overlap resolved per substep
+constexpr float kSameAxis = 0.00001f;         // [m] between axes: below this no side is defined
 
 // The part of the relative slip `slip` that friction undoes, given the normal correction.
 Vec3 friction_step(Vec3 slip, Vec3 n, float normal, float friction) {
@@ -24,7 +24,7 @@ Vec3 friction_step(Vec3 slip, Vec3 n, float normal, float friction) {
 
 Vec3 moved(const ContactView& v, uint32_t i) { return xyz(v.x[i]) - xyz(v.prev[i]); }
 
-// Effective inverse masses of the two ends of a thread segment: locked ends do not give way here.
+// Effective inverse masses of the two ends of a thread segment: locked ends do not move here.
 struct Segment {
   uint32_t s0, s1;
   float w0, w1;
@@ -34,14 +34,14 @@ bool segment_after(const ContactView& v, uint32_t strand, uint32_t slot, Segment
   const float inv_mass = v.strand_model[strand].inv_mass;
   const int32_t node = v.node_of_slot[slot - v.first_slot];
   if (node < 0 || static_cast<size_t>(node) + 1 >= thread.order.size()) return false;
-  if (thread.cut[static_cast<size_t>(node)]) return false;  // cut through since the candidates were found: no segment
+  if (thread.cut[static_cast<size_t>(node)]) return false;  // cut since the candidates were found: no segment
   out.s0 = slot;
   out.s1 = thread.order[static_cast<size_t>(node) + 1];
   out.w0 = v.locked[out.s0 - v.first_slot] ? 0 : inv_mass;
   out.w1 = v.locked[out.s1 - v.first_slot] ? 0 : inv_mass;
   return true;
 }
-// [m] up to which a segment lies on the drape. With a direct solve, thread above it meets tools inside that.
+// [m] height up to which a segment lies on the drape. The direct solve handles tool contact above it.
 float drape_height(const StrandModel& m, float ground) { return m.direct ? ground + 3 * m.radius : 1e9f; }
 
 }  // namespace
@@ -62,7 +62,7 @@ uint32_t solve_tissue_pairs(const ContactView& v, const TissueCollision& tissue,
     const float l = std::sqrt(l2), depth = std::min(reach - l, kLargestCorrection);
     const Vec3 n = d / l;
     const Vec3 step = (n * depth - friction_step(moved(v, c.b) - moved(v, c.a), n, depth, friction)) / w;
-    // In one piece each, as they are loaded again soon: a processor waits where it has to gather what it has just stored.
+    // Stored as whole vectors because they are loaded again soon: gathering recently stored parts stalls the processor.
     store(v.x[c.a], load(x[c.a]) + Four{step.x, step.y, step.z, 0} * -wa);
     store(v.x[c.b], load(x[c.b]) + Four{step.x, step.y, step.z, 0} * wb);
   }
@@ -103,7 +103,7 @@ uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tiss
 
 namespace {
 
-// Holds the places s and t (0..1) of the axes apart; whether they touch.
+// Separates points s and t (0..1) of the axes; returns whether they touch.
 bool hold_apart(const ContactView& v, const ToolPair& pair, float s, float t, float friction, float most_press,
                 ToolPair::Impulse& done) {
   RigidBody &a = (*v.body)[pair.a], &b = (*v.body)[pair.b];
@@ -116,18 +116,18 @@ bool hold_apart(const ContactView& v, const ToolPair& pair, float s, float t, fl
   const float l = std::sqrt(l2);
   Vec3 n = d / std::max(l, 1e-12f);
   float gap = l - reach;
-  if (l < kSameAxis) {  // any way out will do, if all places of the pair take the same
+  if (l < kSameAxis) {  // any direction works if all points of the pair use the same one
     const Vec3 axis = normalized(rotate(a.q, ca.b - ca.a), {0, 0, 1});
     n = normalized(cross(axis, rotate(b.q, cb.b - cb.a)), any_perpendicular(axis));
   } else if (dot(d, before) < 0 && length2(before) > 0.25f * reach * reach) {
-    n = -n, gap = -l - reach;  // through each other within the substep: back to where they were
+    n = -n, gap = -l - reach;  // passed through each other within the substep: move back
   }
   const float goal = std::min(0.0f, length(before) - reach + kUndoneTools);
-  // One place for both, on their surfaces: otherwise friction would turn them out of nothing.
+  // One common point on both surfaces: otherwise friction would create a torque.
   const Vec3 at = on_a + n * (ca.radius + 0.5f * gap), ra = at - a.x, rb = at - b.x;
   const float w = inverse_mass_at(ma, a, ra, n) + inverse_mass_at(mb, b, rb, n);
   if (w <= 0) return false;
-  float room = most_press;  // what the other places have left
+  float room = most_press;  // left over by the other points
   for (const ToolPair::Impulse& place : pair.done) room -= place.normal;
   const float press = std::max(std::min((goal - gap) / w, std::max(0.0f, room)), -done.normal);
   done.normal += press;
@@ -173,7 +173,7 @@ uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list,
     if ((s > 0 && s < 1 && t > 0 && t < 1) || pair.done[0].normal > 0)
       places += hold_apart(v, pair, s, t, friction, most_press, pair.done[0]);
     for (size_t end = 0; end < 4; ++end) {
-      // Each place sees what the ones before it have moved.
+      // Each point sees the motion of the ones before it.
       std::tie(a0, a1) = ends(a, ca), std::tie(b0, b1) = ends(b, cb);
       const bool of_a = end < 2;
       const float here = end % 2 == 0 ? 0.0f : 1.0f;
@@ -246,11 +246,11 @@ uint32_t solve_thread_on_tissue(const ContactView& v, const TissueCollision& tis
     const Triangle& t = tissue.surface[c.triangle];
     const Vec3 a = xyz(v.x[t[0]]), b = xyz(v.x[t[1]]), e = xyz(v.x[t[2]]), p = xyz(v.x[c.slot]);
     const Vec3 n = normalized(cross(b - a, e - a));
-    // Beside the triangle's plane by more than the wall is thick: the thread is on another side, leave it.
+    // Further beside the triangle's plane than the wall is thick: the thread is on another side; skip.
     const float gap = dot(p - a, n) - model.radius;
     if (gap >= 0 || gap < -0.002f) continue;
     const ClosestOnTriangle near = closest_on_triangle(p, a, b, e);
-    if (length2(p - n * (gap + model.radius) - near.point) > 1e-6f) continue;  // slid off the triangle by over 1 mm
+    if (length2(p - n * (gap + model.radius) - near.point) > 1e-6f) continue;  // more than 1 mm off the triangle
     const float wt = model.inv_mass;
     float w = wt;
     for (int k = 0; k < 3; ++k)
@@ -301,7 +301,7 @@ uint32_t solve_ground(const ContactView& v, const std::vector<Vec3>& body_force,
       ++touching;
       add(v.x[slot], n * depth - friction_step(moved(v, slot), n, depth, friction));
     }
-  // Bodies that no hand carries: needles, whose arc of capsules is held up at one end each, and parked instruments, at both.
+  // Bodies without a hand: a needle's arc of capsules is supported at one end each, parked instruments at both.
   for (size_t k = 0; k < v.body->size(); ++k) {
     RigidBody& b = (*v.body)[k];
     const RigidModel& m = (*v.model)[k];

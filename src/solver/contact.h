@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // solver/contact: unilateral contact with Coulomb friction in positions: tissue on tissue, tools on tissue and on each other,
 // thread (as capsules) on tools, on itself and on the tissue's surface, and the drape under everything. Normal part: C = gap >=
-// 0, undone at once (contacts are hard). Friction undoes the slip since the start of the substep, at most friction times the
+// 0, resolved at once (contacts are hard). Friction undoes the slip since the start of the substep, at most friction times the
 // normal correction.
 #pragma once
 #include <cstdint>
@@ -18,13 +18,13 @@ struct Friction {
 // The force of contacts on each body in this substep: positional impulse sums [kg m]; divide by h^2 for newtons.
 struct BodyContact {
   Vec3 linear, angular;
-  // Of `linear`, what tissue and the other tool do: pressing along the contacts' normals, rubbing across them; and all pressing
-  // regardless of its direction. For who renders friction by himself.
+  // Of `linear`, the part of tissue and of the other tool: normal and tangential; and the sum of normal impulses regardless of
+  // direction. For callers that render friction themselves.
   Vec3 pressing, rubbing;
-  float pressed = 0, by_tool = 0;  // and how much of `pressed` the other tool does
+  float pressed = 0, by_tool = 0;  // `by_tool`: part of `pressed` from the other tool
 };
 
-struct ContactView {  // what a contact kernel needs, gathered once per substep
+struct ContactView {  // input of a contact kernel, gathered once per substep
   Vec4* x;
   const Vec4* prev;
   const float* inv_mass;
@@ -43,17 +43,17 @@ uint32_t solve_tissue_pairs(const ContactView& v, const TissueCollision& tissue,
                             float friction);
 uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tissue, const std::vector<ToolCandidate>& list,
                                float friction);
-// Tools on each other. Steel does not give: what a substep has brought them into each other is undone in it, whichever side the
-// axes are on by now; overlap from before (hands that appear within each other) at 0.1 mm a substep, which is no blow. Impulses
-// accumulate over the sweeps of a substep, and a later sweep undoes what an earlier one did too much of, so that sweeps in
-// turn with the welds of the hands come to the balance of both. most_press [kg m]: a pair presses no harder and rather slips
-// past each other; nothing stops a hand that feels nothing, and tools locked behind each other would tear what they hold.
+// Tools on each other, rigid. Overlap from this substep is resolved in it, whichever side the axes are on now. Earlier overlap
+// (hands that connect inside each other) is resolved at 0.1 mm per substep, to avoid a jerk. Impulses accumulate over the
+// sweeps of a substep and may decrease in a later sweep, so that sweeps alternating with the hand welds converge to the
+// balance of both. most_press [kg m]: maximum impulse of a pair; above it the tools slip past each other. Without force
+// feedback nothing stops a hand, and interlocked tools would tear what they hold.
 uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list, float friction, float most_press);
 // Only segments that lie on the drape at height `ground` [m], if the strand's own solve handles the others.
 uint32_t solve_thread_on_tools(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float friction,
                                float ground);
-// Adds those others to ThreadScratch::touch of their strand: segments near a tool, off the drape. Thread pressed between drape
-// and tool has nowhere to go (nothing stops such a tool but the hand), and a solve that insisted would shoot it out sideways.
+// Adds those others to ThreadScratch::touch of their strand: segments near a tool, above the drape. Thread squeezed between
+// drape and tool is excluded: no solution exists between two rigid surfaces, and a direct solve would eject it sideways.
 void find_thread_touch(const ContactView& v, const std::vector<ThreadToolCandidate>& list, float ground,
                        std::vector<ThreadScratch>& scratch);
 uint32_t solve_thread_on_tissue(const ContactView& v, const TissueCollision& tissue,

@@ -20,7 +20,7 @@ constexpr Vec3 xyz(const Vec4& a) { return {a.x, a.y, a.z}; }
 constexpr Vec4 point(Vec3 a) { return {a.x, a.y, a.z, 1}; }
 constexpr void add(Vec4& a, Vec3 d) { a.x += d.x, a.y += d.y, a.z += d.z; }
 constexpr void set(Vec4& a, Vec3 v) { a.x = v.x, a.y = v.y, a.z = v.z; }
-// A position or velocity as one register: the fourth lane (1, or 0) takes part in no change.
+// A position or velocity as one register: the fourth lane (1, or 0) never changes.
 using Four = float __attribute__((vector_size(16)));
 inline Four load(const Vec4& a) {
   Four f;
@@ -29,7 +29,7 @@ inline Four load(const Vec4& a) {
 }
 inline void store(Vec4& a, Four f) { std::memcpy(&a.x, &f, sizeof f); }
 
-// std::vector storage aligned to a cache line, for columns that SIMD kernels load whole.
+// std::vector storage aligned to a cache line, for columns that SIMD kernels load as whole vectors.
 template <typename T>
 struct CacheAligned {
   using value_type = T;

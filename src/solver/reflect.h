@@ -6,7 +6,7 @@
 
 namespace catgut {
 
-// What an index in the state counts.
+// The domain of an index in the state.
 enum class IndexOf : uint8_t {
   particle,  // all columns: tissue, then thread
   tissue,    // particles of soft bodies
@@ -16,7 +16,7 @@ enum class IndexOf : uint8_t {
   instrument,
   triangle,  // of the tissue's surface
   strand,    // a suture's; so is its needle
-  bite,      // of a suture
+  bite,      // belongs to a suture
   count_
 };
 
@@ -24,7 +24,7 @@ constexpr void reflect(auto& a, Like<Vec4> auto& v) { a(v.x), a(v.y), a(v.z), a(
 
 constexpr void reflect(auto& a, Like<EmbeddedPoint> auto& t) {
   a.at_most(t.count, EmbeddedPoint::kMaxParticles);
-  // Beyond count the rows are unused, and zero.
+  // Rows beyond count are unused and zero.
   for (uint32_t k = 0; k < EmbeddedPoint::kMaxParticles; ++k) a.index(t.particle[k], IndexOf::tissue);
   a(t.weight);
 }
@@ -59,7 +59,7 @@ constexpr void reflect(auto& a, Like<ThreadHold> auto& h) {
   a.index(h.slot, IndexOf::slot), a.index(h.body, IndexOf::body), a(h.local), a.at_most(h.kind, HoldKind::loop);
 }
 
-// That a strand has its own slots, each once, is seen to by load_state.
+// load_state checks that a strand has its own slots, each once.
 constexpr void reflect(auto& a, Like<Strand> auto& t) { a(t.order), a(t.rest), a(t.cut), a(t.anchor), a(t.hold), a(t.tension); }
 
 constexpr void reflect(auto& a, Like<ClusterRotations> auto& r) {

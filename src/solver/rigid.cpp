@@ -4,7 +4,7 @@
 
 namespace catgut {
 namespace {
-constexpr float kTopSpeed = 5, kTopSpin = 300;  // [m/s], [rad/s]: no hand moves a tool or a needle faster
+constexpr float kTopSpeed = 5, kTopSpin = 300;  // [m/s], [rad/s]: above any tool or needle speed by hand
 }
 
 void predict(const RigidModel& m, RigidBody& b, Vec3 gravity, float h) {
@@ -34,7 +34,7 @@ void solve_weld(const std::vector<RigidModel>& model, std::vector<RigidBody>& bo
   const RigidModel* mb = b ? &model[static_cast<size_t>(weld.b)] : nullptr;
   const float inv_h2 = 1.0f / (h * h);
 
-  // Rotation first: the arm of the positional part then already points the right way.
+  // Rotation first, so that the lever arm of the positional part is current.
   const Quat qa = a.q * weld.local_a.q;
   const Quat qb = b ? b->q * weld.local_b.q : weld.target.q;
   const Vec3 error = rotation_vector(qb * conjugate(qa));  // turning a by this closes the gap

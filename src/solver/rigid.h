@@ -55,12 +55,12 @@ void predict(const RigidModel& m, RigidBody& b, Vec3 gravity, float h);
 // Velocities from the change of pose; `damping` [1/s].
 void update_velocity(const RigidModel& m, RigidBody& b, float h, float damping);
 
-// Holds frame `local_a` of body a to frame `local_b` of body b, or, with b < 0, to the world frame `target`: a compliant
+// Holds frame `local_a` of body a to frame `local_b` of body b, or, if b < 0, to the world frame `target`: a compliant
 // six-degree-of-freedom weld. The multipliers are the force [N] and torque [N m] times h^2.
 struct Weld {
   int a = -1, b = -1;
   Pose local_a, local_b, target;
-  float compliance = 0;          // [m/N]; negative: the weld is open and holds nothing
+  float compliance = 0;          // [m/N]; negative: the weld is open
   float angular_compliance = 0;  // [rad/(N m)]
   Vec3 lambda, angular_lambda;   // cleared at the start of a substep; act on a
 };

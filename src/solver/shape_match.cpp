@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // solver/shape_match: see the header. Compiled once per instruction set (Highway) and chosen at run time. Multiplications and
-// additions are kept apart (no fused multiply-add) so that every instruction set gives the same bits.
+// additions are separate (no fused multiply-add) so that every instruction set gives the same bits.
 #include "solver/shape_match.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -23,8 +23,8 @@ struct Parts {
   hn::Vec<D> part[kParts];
 };
 
-// Sum of the `n` rows named by `index`, a multiple of 4; kRows: n where it is known, 0 where not. Four independent partial sums
-// hide the latency of the additions.
+// Sum of the `n` rows named by `index`, a multiple of 4; kRows: n if known at compile time, else 0. Four independent partial
+// sums hide the latency of the additions.
 template <uint32_t kRows>
 HWY_INLINE Parts SumRows(const float* HWY_RESTRICT row, const uint32_t* HWY_RESTRICT index, uint32_t n) {
   const D d;
@@ -40,12 +40,12 @@ HWY_INLINE Parts SumRows(const float* HWY_RESTRICT row, const uint32_t* HWY_REST
     sum.part[p] = hn::Add(hn::Add(acc[0].part[p], acc[1].part[p]), hn::Add(acc[2].part[p], acc[3].part[p]));
   return sum;
 }
-constexpr uint32_t kShell = 8;  // rows in a sum of a wall of two layers: seven neighbors, padded
+constexpr uint32_t kShell = 8;  // rows in a sum for a two-layer wall: seven neighbors, padded
 
-// Which component of (q, 1) each lane of a row is multiplied by: column j of the moments is m x q_j.
+// Component of (q, 1) by which each lane of a row is multiplied: column j of the moments is m x q_j.
 alignas(64) constexpr int32_t kColumn[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
 
-// Whether each of these groups has two particles, as most of a wall of two layers have.
+// Whether each of these groups has two particles, as in most of a two-layer wall.
 HWY_INLINE bool AllPairs(const uint32_t* HWY_RESTRICT group, uint32_t first, uint32_t last) {
   uint32_t other = 0;
   for (uint32_t g = first; g < last; ++g) other |= (group[g + 1] - group[g]) ^ 2u;
@@ -57,7 +57,7 @@ void MakeRows(const ShapeModel& model, const Vec4* x, ShapeScratch& scratch, uin
   Row* row = scratch.row.data();
   const Vec4* rest = model.weighted_rest.data();
   const uint32_t* group = model.group_first.data();
-  // Each part takes its own columns out of a (q, 1) that is repeated in every block of four lanes.
+  // Each part extracts its own columns of a (q, 1) that is repeated in every block of four lanes.
   hn::Vec<hn::RebindToSigned<D>> lanes[kParts];
   for (size_t p = 0; p < kParts; ++p) lanes[p] = hn::Load(hn::RebindToSigned<D>(), kColumn + p * kLanes);
   auto add = [&](Parts& sum, uint32_t i) HWY_ATTR {
@@ -77,7 +77,7 @@ void MakeRows(const ShapeModel& model, const Vec4* x, ShapeScratch& scratch, uin
     for (uint32_t g = first; g < last; ++g) of_group(g, group[g], group[g + 1]);
 }
 
-// Registers of four-lane blocks: blocks change places with registers, as rows with columns of a matrix.
+// Registers of four-lane blocks: swaps blocks with registers, like rows and columns of a matrix.
 template <class Dx, class V = hn::Vec<Dx>>
 HWY_INLINE void TransposeBlocks(Dx d, V* HWY_RESTRICT v) {
   if constexpr (kLanes == 16) {
@@ -93,7 +93,7 @@ HWY_INLINE void TransposeBlocks(Dx d, V* HWY_RESTRICT v) {
   }
 }
 
-// The same within each block: lanes change places with the four registers.
+// The same within each block: swaps lanes with the four registers.
 template <class Dx, class V = hn::Vec<Dx>>
 HWY_INLINE void TransposeLanes(Dx d, V* HWY_RESTRICT v) {
   const hn::Repartition<double, Dx> pairs;
@@ -108,7 +108,7 @@ HWY_INLINE void TransposeLanes(Dx d, V* HWY_RESTRICT v) {
 }
 
 // Rows of kLanes clusters <-> registers with one component of each: column[j][k] is component k of column j. Clusters k, 4 + k,
-// 8 + k ... go through TransposeBlocks together, so that TransposeLanes leaves each in the lane of its own number.
+// 8 + k ... pass through TransposeBlocks together, so that TransposeLanes leaves each in the lane of its own number.
 template <class Dx, class V = hn::Vec<Dx>>
 HWY_INLINE void ColumnsOfRows(Dx d, const float (*HWY_RESTRICT row)[16], V (*HWY_RESTRICT column)[4]) {
   constexpr size_t kBlocks = kLanes / 4;
@@ -134,8 +134,8 @@ HWY_INLINE void RowsOfColumns(Dx d, V (*HWY_RESTRICT column)[4], float (*HWY_RES
     }
 }
 
-// N registers of numbers in step. One polar decomposition is a long chain of steps that wait for each other, divisions and a
-// root among them; two at once take hardly longer than one.
+// N registers in lockstep. A polar decomposition is a long dependency chain with divisions and a square root; two interleaved
+// ones take hardly longer than one.
 template <size_t N>
 struct Wide {
   hn::Vec<D> part[N];
@@ -249,13 +249,13 @@ HWY_INLINE void MatchClusters(const ShapeModel& model, ClusterRotations& rotatio
   const Wide<N> inv_det = one / Max(det, tiny);
   Wide3<N> turn{inv_det * (k00 * g.x + k01 * g.y + k02 * g.z), inv_det * (k01 * g.x + k11 * g.y + k12 * g.z),
                 inv_det * (k02 * g.x + k12 * g.y + k22 * g.z)};
-  // Positive definite with some reserve and a step below half a radian, else the always-safe damped step g / tr.
+  // Positive definite with a margin and a step below half a radian; otherwise the unconditionally stable damped step g / tr.
   const Wide<N> step2 = Dot(turn, turn), least = Number<N>(1e-3f) * (size * (size * size));
   for (size_t k = 0; k < N; ++k) {
     const auto safe = hn::And(hn::And(hn::Gt(trace.part[k], tiny.part[k]), hn::Gt(det.part[k], least.part[k])),
                               hn::Lt(step2.part[k], hn::Set(d, 0.25f)));
     if (HWY_LIKELY(hn::AllTrue(d, safe))) continue;
-    // Bounded by one even where there is nothing to turn by (a cluster shrunk to a point has only rounding for moments).
+    // Bounded by one even without a defined rotation (the moments of a cluster shrunk to a point are rounding errors).
     const auto sum = hn::Add(hn::Add(hn::Abs(g.x.part[k]), hn::Abs(g.y.part[k])), hn::Abs(g.z.part[k]));
     const auto damp = hn::Div(one.part[k], hn::Add(size.part[k], sum));
     turn.x.part[k] = hn::IfThenElse(safe, turn.x.part[k], hn::Mul(damp, g.x.part[k]));
@@ -271,7 +271,7 @@ HWY_INLINE void MatchClusters(const ShapeModel& model, ClusterRotations& rotatio
   StoreWide(q.x, rotation.x.data() + at), StoreWide(q.y, rotation.y.data() + at);
   StoreWide(q.z, rotation.z.data() + at), StoreWide(w, rotation.w.data() + at);
   Columns(q, w, r);
-  // Where the center goes: c - R c0.
+  // Translation: c - R c0.
   const Wide<N> c0x = LoadWide<N>(model.rest_center[0].data() + at), c0y = LoadWide<N>(model.rest_center[1].data() + at);
   const Wide<N> c0z = LoadWide<N>(model.rest_center[2].data() + at);
   const Wide3<N> to{c.x - (r[0].x * c0x + r[1].x * c0y + r[2].x * c0z), c.y - (r[0].y * c0x + r[1].y * c0y + r[2].y * c0z),
@@ -305,7 +305,7 @@ HWY_INLINE void ClustersOf(const ShapeModel& model, ClusterRotations& rotation, 
     uint32_t c = 0;
     for (; c + 2 * kLanes <= padded; c += 2 * kLanes) MatchClusters<2>(model, rotation, base + c, moment + c);
     if (c < padded) MatchClusters<1>(model, rotation, base + c, moment + c);
-    // Not past the last cluster: the transform after it stays zero.
+    // Not beyond the last cluster: the transform after it stays zero.
     for (c = 0; c < n; ++c)
       for (size_t p = 0; p < kParts; ++p)
         hn::Store(hn::Load(d, moment[c] + p * kLanes), d, scratch.transform[base + c].f + p * kLanes);
@@ -316,7 +316,7 @@ void Clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch&
   else ClustersOf<0>(model, rotation, scratch, first, last);
 }
 
-// Column j of the mean transforms of groups g, g + 1, ... as their particles need it: one block for each, two a group.
+// Column j of the mean transforms of groups g, g + 1, ... in the order of their particles: one block each, two per group.
 struct PairColumns {
   hn::Vec<D> column[4];
 };
@@ -381,7 +381,7 @@ HWY_INLINE void ParticlesOf(const ShapeModel& model, Vec4* HWY_RESTRICT x, const
     if (AllPairs(group, first, last))
       for (; g + kPairs <= last; g += kPairs) {
         Parts mean[kPairs];
-        float all = 1;  // not zero unless one of them is pinned
+        float all = 1;  // nonzero unless one of them is pinned
         for (uint32_t k = 0; k < kPairs; ++k) {
           mean[k] = mean_of(g + k);
           all *= inv_mass[group[g] + 2 * k] * inv_mass[group[g] + 2 * k + 1];
@@ -444,7 +444,7 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
   constexpr uint32_t kRow = sizeof(Row) / sizeof(float);
   ShapeModel m;
   const uint32_t particles = static_cast<uint32_t>(rest.size());
-  // The members as a set, in ascending order, are the key: partners across the wall list the same neighborhood.
+  // The sorted members are the key: partners across the wall list the same neighborhood.
   std::map<std::vector<uint32_t>, uint32_t> known;
   std::vector<const std::vector<uint32_t>*> unique;
   for (const std::vector<uint32_t>& c : cluster) {
@@ -510,9 +510,9 @@ ShapeModel make_shape_model(std::span<const Vec3> rest, std::span<const float> m
   const size_t batched = m.rest_center[0].size();
   m.group_member.assign(batched * m.member_stride, kRow * m.groups);
   for (size_t at = 0; at < batched; ++at) {
-    const size_t c = std::min<size_t>(at, m.clusters - 1);  // the places after the last cluster repeat it
+    const size_t c = std::min<size_t>(at, m.clusters - 1);  // padding repeats the last cluster
     for (size_t k = 0; k < held[c].size(); ++k) m.group_member[at * m.member_stride + k] = kRow * held[c][k];
-    // In the order in which the kernels add up rows, so that it is the mass that the moments hold.
+    // In the order in which the kernels add rows, so that it equals the mass in the moments.
     float part[4] = {};
     for (size_t k = 0; k < held[c].size(); ++k) {
       float row = 0;

@@ -77,7 +77,7 @@ void collision_flags(const StrandModel& model, const Strand& s, std::span<uint8_
   for (const ThreadAnchor& a : s.anchor) off_beside(a.slot);
   for (const ThreadHold& h : s.hold)
     if (h.kind != HoldKind::loop) off_beside(h.slot);
-  // The two ends of such a loop are anchored one after the other.
+  // The two ends of such a loop are anchored in sequence.
   const auto travels = [](const ThreadAnchor& a) { return !a.knotted && length2(a.offset) > 0; };
   for (size_t k = 0; k + 1 < s.anchor.size(); ++k) {
     if (!travels(s.anchor[k]) || !travels(s.anchor[k + 1])) continue;

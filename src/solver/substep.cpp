@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // solver/substep: reads the model; moves every particle and body of the state. Section 2.1 of the paper, with its order:
 // predict, shape (and volume), tissue contact, attachments and bodies, contacts of tools and thread, the thread itself,
-// velocities. The thread comes last so that what is drawn and felt is a thread of the right length.
+// velocities. The thread is last, so that rendering and haptics see a thread of the correct length.
 #include "solver/substep.h"
 
 #include <algorithm>
@@ -10,10 +10,10 @@
 namespace catgut {
 namespace {
 
-// Items per block of a stage: fixed, never a function of the number of workers. What is done to every particle goes by groups
-// of the shape, so that a worker finds what it left in its cache in the stage before.
+// Items per block of a stage: constant, never a function of the number of workers. Per-particle work is split by groups of the
+// shape, so that a worker finds its data of the previous stage in its cache.
 constexpr size_t kParticleBlock = 256, kGroupBlock = 32, kClusterBlock = 32;
-constexpr float kTopSpeed = 5.0f;  // [m/s] of a particle; a hand cannot throw tissue faster
+constexpr float kTopSpeed = 5.0f;  // [m/s] of a particle; above any tissue speed by hand
 
 void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   for (Weld& w : state.weld) w.lambda = w.angular_lambda = {};
@@ -26,9 +26,9 @@ void clear_multipliers(SolverState& state, SolverScratch& scratch) {
   for (ThreadScratch& t : scratch.thread) std::fill(t.lambda.begin(), t.lambda.end(), 0.0f);
 }
 
-// Room for what a tick may find, so that no tick asks for memory. Bounds where there are any (a capsule cannot be near more
-// than all particles), elsewhere several times the most that was ever seen; what outgrows even that grows as vectors do. Pages
-// that no one writes to are never made.
+// Reserves memory for everything a tick may find, so that no tick allocates. Uses bounds where they exist (a capsule is near at
+// most all particles), otherwise several times the largest count observed. Beyond that, vectors grow. Unused pages are never
+// committed.
 void reserve_room(const SolverModel& m, SolverScratch& k) {
   constexpr size_t kPairsOfOne = 32, kBlocksNear = 256, kPins = 256, kPinsBeside = 32;
   const size_t tissue = m.collision.particles, thread = m.count - m.tissue;
@@ -60,7 +60,7 @@ void reserve_room(const SolverModel& m, SolverScratch& k) {
     ThreadScratch& t = k.thread[s];
     const size_t nodes = m.strand[s].count;
     t.constrained.reserve(nodes);
-    t.slide.reserve(nodes);  // anchors, of which a thread has no more than particles
+    t.slide.reserve(nodes);  // anchors, at most one per particle
     t.waiting.reserve(nodes);
     t.anchor_node.reserve(nodes);
     t.touch.reserve(nodes * capsules);
@@ -100,7 +100,7 @@ void update_velocities(const SolverModel& m, SolverState& s, const SolverScratch
   for (size_t i = first; i < last; ++i) store(s.v[i], (load(s.x[i]) - load(k.prev[i])) * keep);
 }
 
-// How far tissue has moved since its pairs were found, for the particles of groups [first, last).
+// Maximum displacement of tissue since its pairs were found, for the particles of groups [first, last).
 void note_moves(const SolverModel& m, const SolverState& s, SolverScratch& k, size_t first, size_t last) {
   PairSearch& search = k.candidates.tissue;
   const uint32_t from = m.shape.group_first[first], to = m.shape.group_first[last];
@@ -139,7 +139,7 @@ void prepare_scratch(const SolverModel& model, SolverScratch& k) {
   for (size_t s = 0; s < k.thread.size(); ++s) k.thread[s].resize(model.strand[s].count);
   k.candidates = {};
   k.candidates.tissue.moved.assign((model.shape.groups + kGroupBlock - 1) / kGroupBlock, 0.0f);
-  k.candidates.tool_pair.reserve(16);  // nothing is allocated when two tools come near each other
+  k.candidates.tool_pair.reserve(16);  // no allocation when two tools approach
   k.on_body.assign(model.body.size(), {});
   k.node_of_slot.assign(model.count - model.tissue, -1);
   k.locked.assign(model.count - model.tissue, 0);
@@ -230,7 +230,7 @@ void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs,
     solve_tethers(s.pin, k.web, x, h, m.pin_sweeps, m.pin_tolerance, k.pin_span);
   }
   {
-    // Few but stiff and pulling against each other (hand, grasp, channel, tool against tool): they get sweeps of their own.
+    // Few, stiff and opposed to each other (hand, grasp, track, tool against tool): they get sweeps of their own.
     StageTimer timer(times, Stage::rigid);
     for (NeedleTrackConstraint& c : s.channel) {
       const RigidBody& needle = s.body[m.needle_body(c.suture)];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// solver/tethers: reads pins, moves tissue particles. See the header.
+// solver/tethers: reads tethers, moves tissue particles. See the header.
 #include "solver/tethers.h"
 
 #include <algorithm>
@@ -13,15 +13,15 @@ namespace {
 
 constexpr float kNoLength = 1e-9f;  // [m] a span shorter than this has no direction
 
-// A pin as one sum over all the particles of its two points: their difference is sum(share * x), and a pull of 1 along it moves
-// particle k by move[k]. An even number, so that two sums run side by side.
+// A tether as one sum over all the particles of its two points: their difference is sum(share * x), and a unit pull along it
+// moves particle k by move[k]. The count is even, so that two sums run side by side.
 struct TetherRow {
   uint32_t count = 0;
   std::array<uint32_t, 2 * EmbeddedPoint::kMaxParticles> particle{};
   std::array<float, 2 * EmbeddedPoint::kMaxParticles> share{}, move{};
 };
 
-// The same where it lies.
+// The same at the current positions.
 struct RowView {
   const uint32_t* particle;
   const float *share, *move;
@@ -45,12 +45,12 @@ TetherRow row_of(const Tether& pin, const float* w) {
   };
   take(pin.a, 1);
   take(pin.b, -1);
-  if (row.count % 2) row.particle[row.count] = row.particle[row.count - 1], ++row.count;  // with no share in it
+  if (row.count % 2) row.particle[row.count] = row.particle[row.count - 1], ++row.count;  // with zero share
   for (uint32_t k = 0; k < row.count; ++k) row.move[k] = row.share[k] * w[row.particle[k]];
   return row;
 }
 
-// [m] Nothing in the fourth lane, where positions have their 1.
+// [m] Zero in the fourth lane, where positions have their 1.
 Four span_of(const Vec4* x, const RowView& row) {
   Four even{}, odd{};
   for (uint32_t k = 0; k < row.count; k += 2) {
@@ -72,7 +72,7 @@ float length2_of(Four span) {
 }
 float length_of(Four span) { return std::sqrt(length2_of(span)); }
 
-// What a pull adds to lambda when the pin is `off` too long, what it pulls already allowed for: it undoes no more than
+// The change of lambda when the tether is `off` too long, including its present pull: it undoes no more than
 // that.
 float step_of(float off, float give, float lambda) { return std::min(-off * give, -lambda); }
 float give_of(float inv_mass, float alpha) { return inv_mass + alpha > 0 ? 1 / (inv_mass + alpha) : 0.0f; }
@@ -88,7 +88,7 @@ void solve_row(Tether& pin, const RowView& row, Vec4* x, float h) {
   give_pull(span * (step / std::max(l, kNoLength)), row, x);
 }
 
-// Bit for bit, with what lies unused: there is no cheaper way to see that nothing changed, and at worst a row is found again.
+// Compares bits, unused rows included: the cheapest way to detect a change; a false difference only rebuilds a row.
 bool same(const EmbeddedPoint& a, const EmbeddedPoint& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
 void find_rows(std::span<const Tether> pin, const float* w, TetherGraph& web) {
@@ -110,7 +110,7 @@ void find_rows(std::span<const Tether> pin, const float* w, TetherGraph& web) {
 
 void find_strands(uint32_t particles, TetherGraph& web) {
   const size_t ropes = web.active.size();
-  // By particle: the ropes that it is part of, and its share there.
+  // By particle: the tethers that it is part of, and its share there.
   web.start.assign(particles + 2, 0);
   for (const uint32_t i : web.active)
     for (uint32_t k = web.row[i]; k < web.row[i + 1]; ++k) ++web.start[web.particle[k] + 2];
@@ -119,7 +119,7 @@ void find_strands(uint32_t particles, TetherGraph& web) {
   web.weight.resize(web.start.back());
   for (uint32_t n = 0; n < ropes; ++n)
     for (uint32_t k = web.row[web.active[n]]; k < web.row[web.active[n] + 1]; ++k) {
-      const uint32_t at = web.start[web.particle[k] + 1]++;  // runs through its part to where the next begins
+      const uint32_t at = web.start[web.particle[k] + 1]++;  // advances through its part to the start of the next
       web.on[at] = n;
       web.weight[at] = web.share[k];
     }
@@ -172,7 +172,7 @@ void build_graph(std::span<const Tether> pin, const float* w, uint32_t particles
 void solve_tethers(std::span<Tether> pin, const TetherGraph& web, Vec4* x, float h, int sweeps, float tolerance,
                    std::vector<TetherSpan>& work) {
   CATGUT_CHECK(web.active.size() + web.slack.size() == pin.size());
-  // Plain pointers: what is stored through them cannot be taken for a change of where vectors are.
+  // Plain pointers, so that the compiler knows that stores through them do not change the vectors.
   const uint32_t* const first = web.first.data();
   const TetherGraph::Strand* const strand = web.strand.data();
   const size_t ropes = web.active.size();
@@ -214,7 +214,7 @@ void solve_tethers(std::span<Tether> pin, const TetherGraph& web, Vec4* x, float
     if (active[n].lambda == 0 && xyz(active[n].pull) == Vec3{}) continue;
     give_pull(load(active[n].pull), row_at(web, i), x);
   }
-  for (const uint32_t i : web.slack) {  // nearly all of them still are: that is seen without a root
+  for (const uint32_t i : web.slack) {  // nearly all are still slack: detected without a square root
     pin[i].lambda = 0;
     if (length2_of(span_of(x, row_at(web, i))) > web.length[i] * web.length[i]) solve_row(pin[i], row_at(web, i), x, h);
   }

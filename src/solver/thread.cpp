@@ -2,8 +2,8 @@
 // solver/thread: reads the order, anchors and holds; moves particles, tissue and bodies; writes tensions and slides.
 // The direct solve is a Newton step on all stretch constraints at once; their matrix J M^-1 J^T is tridiagonal in the order of
 // the thread. Bare Newton is singular where a slack thread folds, so it is regularized and its step limited; the sweeps
-// after it clean up. Rest-length slide at an anchor is one more coordinate s with inverse mass w of a thread particle:
-// rest[needle side] += s, rest[free side] -= s, which only adds to the two pairs beside the anchor and their coupling.
+// after it remove the residual. Rest-length slide at an anchor is one more coordinate s with inverse mass w of a particle:
+// rest[needle side] += s, rest[free side] -= s. It only adds to the two pairs beside the anchor and their coupling.
 #include "solver/thread.h"
 
 #include <algorithm>
@@ -14,19 +14,19 @@ namespace catgut {
 namespace {
 
 constexpr int kNewtonSteps = 2;
-constexpr int kContactSteps = 5;      // as long as nodes come to touch a tool or leave it
-constexpr float kGoodEnough = 2e-6f;  // [m] a second step is spared when no pair is off by more
-// Of the diagonal. A light thread drawn straight between heavy ends has one soft mode, a hundred thousand times softer than the
-// diagonal, and it is the one that matters: more than this would hide it.
+constexpr int kContactSteps = 5;      // while nodes start or end contact with a tool
+constexpr float kGoodEnough = 2e-6f;  // [m] a second step is skipped when no residual is larger
+// Relative to the diagonal. A light thread straight between heavy ends has one soft mode, 1e5 times softer than the diagonal,
+// and that mode matters: a larger value would suppress it.
 constexpr double kRegularisation = 1e-6;
-// Inverse mass of a sliding coordinate over that of a thread particle. It has no velocity of its own, so this acts as a small
-// viscous drag: 7 mN at 0.15 m/s and 1 ms. Lighter would let friction overshoot the length of a segment within a substep.
+// Inverse mass of a sliding coordinate relative to a thread particle. It has no velocity of its own, so this acts as a small
+// viscous drag: 7 mN at 0.15 m/s and 1 ms. A lighter one would let friction overshoot a segment's length within a substep.
 constexpr double kSlideMass = 0.04;
 constexpr int kSlideRounds = 4;
-constexpr float kMostForce = 20;      // [N] by which a Newton step may move a heavy node: about what breaks a thread
-constexpr float kLargestStep = 0.6f;  // of the spacing, per Newton step
+constexpr float kMostForce = 20;      // [N] limit of a Newton step on a heavy node: about the strength of a thread
+constexpr float kLargestStep = 0.6f;  // fraction of the spacing, per Newton step
 
-// A held node seen by two pair directions: n1^T W n2 of the rigid body at that place.
+// A held node seen by two pair directions: n1^T W n2 of the rigid body at that point.
 float held_inverse_mass(const ThreadHold& hold, Vec3 n1, Vec3 n2, const std::vector<RigidModel>& model,
                         const std::vector<RigidBody>& body) {
   const RigidBody& b = body[static_cast<size_t>(hold.body)];
@@ -39,7 +39,7 @@ float node_inverse_mass(const ThreadScratch& s, const Strand& t, size_t i, Vec3 
   return s.hold_at[i] < 0 ? s.w[i] : held_inverse_mass(t.hold[static_cast<size_t>(s.hold_at[i])], n, n, model, body);
 }
 
-// What every node of the order is, and where.
+// Kind and position of every node of the order.
 void gather_nodes(const StrandModel& model, const Strand& thread, ThreadScratch& s, const Vec4* x, const Vec4* before,
                   const float* inv_mass, const std::vector<RigidBody>& body) {
   const size_t nodes = thread.order.size(), pairs = nodes - 1;
@@ -57,7 +57,7 @@ void gather_nodes(const StrandModel& model, const Strand& thread, ThreadScratch&
     s.rest[i] = thread.rest[i];
     s.tension[i] = thread.cut[i] ? 0 : thread.tension[i];
   }
-  // What lies behind the last pair is no pair; the thread may have had more of them before.
+  // Clear the rows behind the last pair; the thread may have had more pairs before.
   s.tension[pairs] = s.intact[pairs] = s.step[pairs] = s.lambda[pairs] = s.is_free[nodes] = 0;
   auto node_of = [&](uint32_t slot) { return static_cast<uint32_t>(s.node_of_slot[slot - model.first_slot]); };
   s.constrained.clear();
@@ -73,13 +73,13 @@ void gather_nodes(const StrandModel& model, const Strand& thread, ThreadScratch&
   }
   for (size_t k = 0; k < thread.hold.size(); ++k) {
     const uint32_t i = node_of(thread.hold[k].slot);
-    if (s.anchor_at[i] >= 0) continue;  // tissue keeps it: the tool's hold on it is felt through the neighbors
+    if (s.anchor_at[i] >= 0) continue;  // the tissue owns it: the tool's hold acts through the neighbors
     if (s.hold_at[i] < 0) s.constrained.push_back(i);
     s.hold_at[i] = static_cast<int32_t>(k);
     put_node(s, i, transform(body[static_cast<size_t>(thread.hold[k].body)].pose(), thread.hold[k].local));
     s.w[i] = s.is_free[i] = 0;
   }
-  for (const NodeContact& c : s.contact) s.contact_at[c.node] = -1;  // of the substep before
+  for (const NodeContact& c : s.contact) s.contact_at[c.node] = -1;  // of the previous substep
   s.contact.clear();
   s.on_tool.assign(body.size(), {});
   for (const ThreadTouch& t : s.touch)
@@ -92,14 +92,14 @@ void gather_nodes(const StrandModel& model, const Strand& thread, ThreadScratch&
     }
 }
 
-// The tridiagonal matrix J M^-1 J^T of all stretch constraints, as what every pair sees of its two nodes, and its right-hand
-// side, for the positions as they are.
+// The tridiagonal matrix J M^-1 J^T of all stretch constraints, as coefficients of every pair's two nodes, and its right-hand
+// side, at the current positions.
 //
-// Geometric stiffness. A taut thread resists being moved sideways with tension / length, which the bare linearization does not
-// know: it would shorten a taut zigzag by throwing its light nodes sideways, and never converge. So sideways a free node is
-// given the inertia m + h^2 T (1/l0 + 1/l1) (Tournier et al. 2015, Stable constrained dynamics); side[i] is the ratio of
+// Geometric stiffness. A taut thread resists lateral motion with tension / length, which the bare linearization omits: it
+// would shorten a taut zigzag by moving its light nodes sideways, and never converge. Laterally, a free node therefore
+// has the inertia m + h^2 T (1/l0 + 1/l1) (Tournier et al. 2015, Stable constrained dynamics); side[i] is the ratio of
 // the inverse masses. With the tangent t = n0 + n1 of unit pair directions, t.t = 2 (1 + c) and n0.t = n1.t = 1 + c, c = n0.n1:
-// no root is needed. Returns the largest residual [m].
+// this needs no square root. Returns the largest residual [m].
 float assemble(const Strand& t, ThreadScratch& s, size_t nodes, float alpha_per_meter, float h,
                const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body) {
   std::copy(t.rest.begin(), t.rest.end(), s.rest.begin());
@@ -118,8 +118,8 @@ float assemble(const Strand& t, ThreadScratch& s, size_t nodes, float alpha_per_
 }
 
 // Solves the tridiagonal system for the change of the multipliers (into s.step), together with the slides at slipping anchors:
-// one more unknown each, coupled to the two pairs beside it. A slide that would run backward (friction stops, it never drives)
-// or beyond what the pair on its side still has is fixed at that bound and the system solved again: an active set, which
+// one more unknown each, coupled to the two pairs beside it. A slide is fixed at a bound if it would run backward (friction
+// never drives) or beyond what the pair on its side has left. The system is then solved again: an active set that
 // shrinks every round.
 void solve_with_slides(const StrandModel& model, const Strand& thread, ThreadScratch& s, size_t pairs, float h) {
   const double ws = kSlideMass * model.inv_mass;
@@ -127,9 +127,9 @@ void solve_with_slides(const StrandModel& model, const Strand& thread, ThreadScr
   PartitionedTridiagonal<double, 1>& m = s.stretch;
   PaddedColumn<double>& rhs = m.right[0];
   auto drag_of = [&](const ThreadAnchor& a, const SlideState& k) {
-    return k.dragged ? 0.0 : -a.slipping * double{a.threshold()} * h * h;  // a known force on the slide, spent once a substep
+    return k.dragged ? 0.0 : -a.slipping * double{a.threshold()} * h * h;  // a known force on the slide, once per substep
   };
-  // Only between two whole pairs can the thread slide.
+  // The thread can slide only between two uncut pairs.
   auto slides = [&](size_t k) {
     const size_t i = s.anchor_node[k];
     return thread.anchor[k].slipping != 0 && s.anchor_at[i] == static_cast<int32_t>(k) && i > 0 && i < pairs &&
@@ -143,7 +143,7 @@ void solve_with_slides(const StrandModel& model, const Strand& thread, ThreadScr
       const SlideState& k = s.slide[j];
       const size_t i = s.anchor_node[j];
       const double known = k.fixed ? k.step : ws * drag_of(thread.anchor[j], k);
-      rhs[i] += known;  // C of the needle side falls by the slide
+      rhs[i] += known;  // C of the needle side decreases by the slide
       rhs[i - 1] -= known;
       if (k.fixed) continue;
       m.diag[i] += ws, m.diag[i - 1] += ws;
@@ -169,9 +169,9 @@ void solve_with_slides(const StrandModel& model, const Strand& thread, ThreadScr
   for (size_t i = 0; i < pairs; ++i) s.step[i] = static_cast<float>(rhs[i]);
 }
 
-// Applies the positional impulse `p` to whatever node i is, and refreshes its position. Tissue under an anchor waits for
-// push_anchors: its sixteen particles are expensive, and the node goes just where they will put it, but for what the pushes of
-// other anchors on the same particles do.
+// Applies the positional impulse `p` to node i, of any kind, and refreshes its position. Tissue under an anchor waits for
+// push_anchors, because its sixteen particles are expensive. The node moves as they will, except for impulses of other
+// anchors on the same particles.
 void push_node(ThreadScratch& s, const Strand& t, size_t i, Vec3 p, const std::vector<RigidModel>& model,
                std::vector<RigidBody>& body) {
   if (s.anchor_at[i] >= 0) {
@@ -183,7 +183,7 @@ void push_node(ThreadScratch& s, const Strand& t, size_t i, Vec3 p, const std::v
     push(model[static_cast<size_t>(hold.body)], b, p, rotate(b.q, hold.local));
     put_node(s, i, transform(b.pose(), hold.local));
   } else {
-    // Into a tool that it touches it does not go: the tool takes that part.
+    // It does not move into a tool that it touches: the tool receives that part.
     if (s.contact_at[i] >= 0) {
       const NodeContact& c = s.contact[static_cast<size_t>(s.contact_at[i])];
       if (const float into = dot(p, c.n); c.active && into < 0) {
@@ -195,7 +195,7 @@ void push_node(ThreadScratch& s, const Strand& t, size_t i, Vec3 p, const std::v
   }
 }
 
-// Gives the tissue what its anchors were pushed by.
+// Applies the accumulated anchor impulses to the tissue.
 void push_anchors(ThreadScratch& s, const Strand& t, Vec4* x, const float* inv_mass) {
   for (size_t k = 0; k < t.anchor.size(); ++k) {
     if (length2(s.waiting[k]) > 0) push(t.anchor[k].point, x, inv_mass, s.waiting[k]);
@@ -203,7 +203,7 @@ void push_anchors(ThreadScratch& s, const Strand& t, Vec4* x, const float* inv_m
   }
 }
 
-// The next pair from i on that is marked, or `pairs`.
+// The next marked pair from i on, or `pairs`.
 size_t next_unfit(const ThreadScratch& s, size_t i, size_t pairs) {
   for (; i < pairs; i = (i / 64 + 1) * 64) {
     const uint64_t word = s.violated[i / 64] >> (i % 64);
@@ -213,8 +213,8 @@ size_t next_unfit(const ThreadScratch& s, size_t i, size_t pairs) {
 }
 void mark_unfit(ThreadScratch& s, size_t i) { s.violated[i / 64] |= uint64_t{1} << (i % 64); }
 
-// Gauss-Seidel sweeps over the pairs in their order. After the direct solve nine in ten are right already: those are found at
-// once and passed by; a pair that was moved marks its neighbors, which leaves the order of the work as it would be.
+// Gauss-Seidel sweeps over the pairs in order. After the direct solve nine in ten are satisfied: they are detected at once and
+// skipped. A pair that moves marks its neighbors, which preserves the order of work.
 void sweep_distances(const StrandModel& model, const Strand& thread, ThreadScratch& s, size_t pairs, float alpha_per_meter,
                      const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body) {
   std::copy(thread.rest.begin(), thread.rest.end(), s.rest.begin());
@@ -271,15 +271,15 @@ void solve_bend(Vec3& a, Vec3& b, Vec3& c, float wa, float wb, float wc, float c
   const Vec3 u = da * inv_la, v = dc * inv_lc;
   const float cosine = std::clamp(dot(u, v), -1.0f, 1.0f);
   const float violation = cosine + 1.0f;
-  if (violation < 1e-6f && lambda == 0) return;  // straight to a tenth of a degree
+  if (violation < 1e-6f && lambda == 0) return;  // straight to 0.1 degree
   const Vec3 ga = (v - u * cosine) * inv_la, gc = (u - v * cosine) * inv_lc, gb = -(ga + gc);
   const float w = wa * length2(ga) + wb * length2(gb) + wc * length2(gc);
   const float alpha = compliance / (h * h);
-  // Near straight the violation falls with the square of the angle and w with it, so the step stays bounded; at exactly 0 or
-  // 180 degrees the direction is undefined and there is nothing to apply.
+  // Near straight the violation decreases with the square of the angle and w with it, so the step stays bounded. At 0 and at
+  // 180 degrees the direction is undefined and no correction applies.
   if (w < 1e-12f * (wa + wb + wc) * inv_la * inv_lc) return;
   float d = -(violation + alpha * lambda) / (w + alpha);
-  // A rigid bend (compliance 0) linearized far from straight would overshoot: no more than a tenth of a segment at a time.
+  // A rigid bend (compliance 0) linearized far from straight would overshoot: at most a tenth of a segment per step.
   const float most = std::max({wa * wa * length2(ga), wb * wb * length2(gb), wc * wc * length2(gc)}) * d * d;
   const float limit2 = 0.01f * std::min(la2, lc2);
   if (most > limit2) d *= std::sqrt(limit2 / most);
@@ -300,7 +300,7 @@ void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& s, Ve
   gather_nodes(model, thread, s, x, before, inv_mass, body);
   if (model.direct) smooth_motion(s, nodes, model.inv_mass, 0.1f * model.spacing, model.gravity * (h * h), h);
   if (model.bend_sweeps > 0) {
-    // Locked nodes do not give way to bending: tissue and tools are far heavier than the thread.
+    // Locked nodes do not move by bending: tissue and tools are far heavier than the thread.
     for (size_t color = 0; color < 3; ++color)
       for (size_t i = color, k = 0; i < nodes; i += 3, ++k) {
         s.bend.set(color, k, node(s, i), s.is_free[i] * model.inv_mass);
@@ -313,15 +313,15 @@ void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& s, Ve
 
   if (model.direct) {
     bool changed = false;
-    s.slide.assign(thread.anchor.size(), {});  // within its capacity: no allocation once as many anchors were seen
+    s.slide.assign(thread.anchor.size(), {});  // within its capacity: no allocation after the largest anchor count so far
     for (int step = 0; step < kNewtonSteps || (changed && step < kContactSteps); ++step) {
       if (update_contacts(model, s, body_model, body, h)) changed = true;
       const float residual = assemble(thread, s, nodes, alpha_per_meter, h, body_model, body);
       if (step > 0 && !changed && residual < kGoodEnough) break;
       solve_with_slides(model, thread, s, pairs, h);
 
-      // Light nodes are held back below, heavy ones are not: a step far too long would push a needle again and again for the
-      // same stretch, and feed energy in. So the whole step is shortened.
+      // Light nodes are limited below, heavy ones are not: a long step would move a needle repeatedly for the same stretch,
+      // and add energy. The whole step is therefore scaled.
       float most = 0;
       for (const uint32_t i : s.constrained) {
         const bool moves =
@@ -338,12 +338,12 @@ void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& s, Ve
         for (SlideState& k : s.slide) k.step *= part;
       }
 
-      // A bent stretch of light thread between heavy ends: the impulse that moves the ends would throw the light nodes far
-      // sideways, because the linearization does not know that they settle on the straight line. So a light node takes a
-      // bounded step, heavy ones their full one; the next step sees the new directions.
+      // A bent stretch of light thread between heavy ends: the impulse that moves the ends would move the light nodes far
+      // sideways, because the linearization does not include that they settle on the straight line. Light nodes therefore
+      // take a bounded step, heavy ones a full step; the next step uses the new directions.
       for (const uint32_t i : s.constrained) push_node(s, thread, i, impulse_on(s, i), body_model, body);
       push_anchors(s, thread, x, inv_mass);
-      for (const uint32_t i : s.constrained)  // where the pushes of all have put them
+      for (const uint32_t i : s.constrained)  // at the sum of all impulses
         if (s.anchor_at[i] >= 0) put_node(s, i, position_of(thread.anchor[static_cast<size_t>(s.anchor_at[i])], x));
       save_positions(s);
       move_loose_nodes(s, nodes, kLargestStep * model.spacing);
@@ -366,7 +366,7 @@ void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& s, Ve
   for (size_t i = 0; i < nodes; ++i) set(x[thread.order[i]], node(s, i));
   for (size_t i = 0; i < pairs; ++i) thread.tension[i] = -s.lambda[i] * inv_h2;
 
-  // Stick or slip for the next substep, from this one's tensions.
+  // Stick or slip for the next substep, from the present tensions.
   for (size_t j = 0; j < thread.anchor.size(); ++j) {
     const size_t i = s.anchor_node[j];
     if (i == 0 || i >= pairs || s.anchor_at[i] != static_cast<int32_t>(j)) continue;
@@ -380,7 +380,7 @@ void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& s, Ve
     const bool whole = !thread.cut[i] && !thread.cut[i - 1];
     const bool may = whole && !a.knotted && ((wants > 0 && !a.blocked_needle) || (wants < 0 && !a.blocked_free));
     if (a.slipping == 0) a.slipping = may ? wants : 0;
-    // While it slips the difference sits at the friction; it sticks again when the pull falls clearly below that.
+    // While it slips, the difference equals the friction; it sticks when the pull falls clearly below that.
     else if (!whole || static_cast<float>(a.slipping) * difference < 0.5f * threshold) a.slipping = 0;
     else if ((a.slipping > 0 && a.blocked_needle) || (a.slipping < 0 && a.blocked_free)) a.slipping = 0;
   }

@@ -44,7 +44,7 @@ float FindDirections(ThreadScratch& s, size_t pairs, float alpha_per_meter) {
   const D d;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), shortest = hn::Set(d, 1e-5f), apart = hn::Set(d, 1e-12f);
   V worst = zero;
-  // One beyond the last: its direction is that of no pair, zero, and the last node reads it.
+  // One beyond the last: it has no pair, so its direction is zero, and the last node reads it.
   for (ptrdiff_t i = 0; i <= static_cast<ptrdiff_t>(pairs); i += kStep) {
     const auto in = In(i, pairs);
     const V3 way = Get3(s.x, s.y, s.z, i + 1) - Get3(s.x, s.y, s.z, i);
@@ -52,7 +52,7 @@ float FindDirections(ThreadScratch& s, size_t pairs, float alpha_per_meter) {
     const auto distinct = hn::Gt(length, apart);
     const V inverse = hn::Div(one, hn::IfThenElse(distinct, length, one));
     const V3 n{hn::IfThenElseZero(distinct, hn::Mul(way.x, inverse)),
-               hn::IfThenElse(distinct, hn::Mul(way.y, inverse), one),  // no direction is as good as any
+               hn::IfThenElse(distinct, hn::Mul(way.y, inverse), one),  // without a direction, any is as good
                hn::IfThenElseZero(distinct, hn::Mul(way.z, inverse))};
     const V there = hn::IfThenElseZero(in, intact);
     Put3(n * there, s.nx, s.ny, s.nz, i);
@@ -143,14 +143,14 @@ void FindUnfitPairs(ThreadScratch& s, size_t pairs, float alpha_per_meter) {
   }
 }
 
-// The inertia and the weight that carried the nodes to where they are now must meet the same geometric stiffness as the
-// constraints will: implicit Euler is (M + h^2 K) dx = h M v + h^2 f, with K the tension's Laplacian. Without it a taut thread
-// swings sideways as freely as a slack one while its tension may hardly pull it back: it would gain energy, or settle
+// The inertia and the weight in the prediction must see the same geometric stiffness as the constraints: implicit Euler is
+// (M + h^2 K) dx = h M v + h^2 f, with K the tension's Laplacian. Without it, a taut thread swings laterally as freely as
+// a slack one, while its tension hardly restores it. It would gain energy, or settle
 // stretched.
-//   The part from velocities, d = p - before - h^2 g, is smoothed by (1 + K) d' = d along the thread with locked nodes fixed: a
-//   thread that moves as a whole keeps its motion, a taut one loses its flutter, a slack one (no tension) is left alone. The
-//   weight's part across the thread is scaled by the node's own ratio, as its constraint impulses are: at rest the two then
-//   balance, and the thread hangs as a catenary (catgut validate).
+//   The velocity part, d = p - before - h^2 g, is smoothed by (1 + K) d' = d along the thread with locked nodes fixed. Rigid
+//   motion of the thread is preserved, a taut thread loses its flutter, a slack one (no tension) is unchanged. The lateral part
+//   of the weight is scaled by the node's own ratio, like its constraint impulses. At rest the two balance,
+//   and the thread hangs as a catenary (catgut validate).
 bool BeginSmoothing(ThreadScratch& s, size_t nodes, float inv_mass, float shortest, Vec3 fall, float h) {
   const D d;
   const V one = hn::Set(d, 1.0f), zero = hn::Zero(d), per_newton = hn::Set(d, h * h * inv_mass);
@@ -158,7 +158,7 @@ bool BeginSmoothing(ThreadScratch& s, size_t nodes, float inv_mass, float shorte
   for (ptrdiff_t i = 0; i < static_cast<ptrdiff_t>(nodes); i += kStep) {
     const V stiff = hn::IfThenElseZero(In(i, nodes), hn::Div(hn::Mul(hn::Max(zero, Get(s.tension, i)), per_newton),
                                                              hn::Max(Get(s.rest, i), hn::Set(d, shortest))));
-    // Next to nothing is nothing (no denormal numbers). The last node's is of no pair: its tension is 0.
+    // Flush small values to zero (no denormal numbers). The last node has no pair: its tension is 0.
     Put(hn::IfThenElseZero(hn::Gt(stiff, hn::Set(d, 1e-9f)), stiff), s.stiff, i);
     most = hn::Max(most, stiff);
   }
@@ -174,7 +174,7 @@ bool BeginSmoothing(ThreadScratch& s, size_t nodes, float inv_mass, float shorte
     const V is_free = Get(s.is_free, i), left = Get(s.stiff, i - 1), right = Get(s.stiff, i), after = Get(s.is_free, i + 1);
     const V held_left = hn::Mul(hn::Mul(left, is_free), hn::Sub(one, Get(s.is_free, i - 1)));
     const V held_right = hn::Mul(hn::Mul(right, is_free), hn::Sub(one, after));
-    // The known motion of a held neighbor goes to the right-hand side; the matrix stays symmetric.
+    // The known motion of a held neighbor moves to the right-hand side; the matrix stays symmetric.
     const V3 rhs = Get3(s.gone_x, s.gone_y, s.gone_z, i) + Get3(s.gone_x, s.gone_y, s.gone_z, i - 1) * held_left +
                    Get3(s.gone_x, s.gone_y, s.gone_z, i + 1) * held_right;
     Put3(rhs, s.motion.right[0], s.motion.right[1], s.motion.right[2], i);
@@ -238,19 +238,19 @@ HWY_INLINE void Solve(PartitionedTridiagonal<T, kRight>& s, size_t count) {
   const size_t last = rows - 1, separator = last * kPartitions,
                end = separator - kPartitions;  // first elements of the last two rows
   const W one = hn::Set(d, T{1});
-  // Influences die away along a strand. Denormal numbers, which they would end as, cost a hundred cycles each.
+  // Influences decay along a partition. Denormal numbers at their end would take a hundred cycles each.
   auto felt = [&](W v) HWY_ATTR { return hn::IfThenElseZero(hn::Gt(hn::Abs(v), hn::Set(d, T{1e-18f})), v); };
-  // Neither must a float32 value die away: 1e-18 m is no motion. In double precision there is room.
+  // The float32 values are flushed too: 1e-18 m is negligible. Double precision has enough range.
   auto value_of = [&](W v) HWY_ATTR { return sizeof(T) == sizeof(float) ? felt(v) : v; };
   T *link = s.link.data(), *inv = s.inverse.data(), *before = s.before.data(), *after = s.after.data();
 
-  // Forward: each row without the one before it. Inside a strand the separator before is carried along as one more column.
+  // Forward: each row without the one before it. Inside a partition the separator before is carried as one more column.
   W inverse[kParts], carry[kParts], o[kParts], y[kRight][kParts];
   for (size_t p = 0; p < kParts; ++p) {
     const size_t k = p * kLanes;
     inverse[p] = hn::Div(one, hn::GatherIndex(d, s.diag.data(), lane[p]));
     o[p] = hn::GatherIndex(d, s.off.data(), lane[p]);
-    // off[-1] is 0: before the first strand there is nothing.
+    // off[-1] is 0: there is no row before the first partition.
     carry[p] = hn::GatherIndex(d, s.off.data() - 1, lane[p]);
     hn::Store(o[p], d, link + k);
     hn::Store(inverse[p], d, inv + k);
@@ -303,7 +303,7 @@ HWY_INLINE void Solve(PartitionedTridiagonal<T, kRight>& s, size_t count) {
       }
     }
   }
-  // The separators among themselves.
+  // The reduced system of the separators.
   T pivot[kPartitions], upper[kPartitions];
   alignas(64) T value[kRight][kPartitions + 1] = {};  // value[j][c + 1] of separator c; 0 before the first
   for (size_t c = 0; c < kPartitions; ++c) {
@@ -329,7 +329,7 @@ HWY_INLINE void Solve(PartitionedTridiagonal<T, kRight>& s, size_t count) {
       s.right[j][c * rows + last] = behind_it;
     }
   }
-  // The insides.
+  // The interior rows.
   for (size_t j = 0; j < kRight; ++j)
     for (size_t p = 0; p < kParts; ++p) {
       const W left = hn::LoadU(d, value[j] + p * kLanes), right = hn::LoadU(d, value[j] + p * kLanes + 1);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// solver/thread_columns: the parts of a thread's solve that do the same to every node, in SIMD; thread.cpp puts right the few
-// nodes that are something else than a particle. Reads and writes ThreadScratch only. The same bits for any width of SIMD.
+// solver/thread_columns: the uniform parts of a thread's solve, in SIMD. thread.cpp corrects the few nodes that are
+// anchored, held or in contact. Reads and writes ThreadScratch only. The same bits for any SIMD width.
 #pragma once
 #include <algorithm>
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace catgut {
 
-// A column with zeros before its first and behind its last element: kernels may look at neighbors and work in whole vectors.
+// A column with zeros before its first and behind its last element: kernels may read neighbors and work in whole vectors.
 template <typename T>
 class PaddedColumn {
  public:
@@ -30,18 +30,18 @@ class PaddedColumn {
   Column<T> all_ = Column<T>(2 * kPad);
 };
 
-// A symmetric positive definite tridiagonal system cut into eight strands of equal length, one to a lane: eliminating a row
-// waits for the row before it (some 35 cycles, mostly its division), so eight short chains side by side are several times
-// faster than one long one. The last row of every strand is a separator: the inside of a strand is eliminated with its two
-// separators as unknowns, the eight separators are solved by themselves (their matrix, a Schur complement, is positive
-// definite again), and the inside follows in parallel (Wang 1981, A parallel method for tridiagonal equations).
-// Row i of the system is row i % rows of strand i / rows. Rows behind the last are identity.
+// A symmetric positive definite tridiagonal system split into eight partitions of equal length, one per lane. Eliminating a row
+// waits for the previous row (about 35 cycles, mostly the division), so eight short chains side by side are several times
+// faster than one long one. The last row of every partition is a separator. The interior of a partition is eliminated with its
+// two separators as unknowns, and the eight separators are solved (their matrix, a Schur complement, is positive definite
+// again). The interior follows in parallel (Wang 1981, A parallel method for tridiagonal equations).
+// Row i of the system is row i % rows of partition i / rows. Rows behind the last are identity.
 constexpr size_t kPartitions = 8;
 template <typename T, size_t kRight>
 struct PartitionedTridiagonal {
   // The system in its own order: off[i] between rows i and i + 1; right-hand sides, then solutions.
   PaddedColumn<T> diag, off, right[kRight];
-  // Row by row of all strands: off, inverse pivots, influence of the separator before and of the one behind, values.
+  // Row by row of all partitions: off, inverse pivots, influence of the separator before and of the one behind, values.
   Column<T> link, inverse, before, after, value[kRight];
   void resize(size_t count) {
     for (PaddedColumn<T>* c : {&diag, &off}) c->assign(count, T{});
@@ -58,20 +58,20 @@ void solve_partitions(PartitionedTridiagonal<float, 3>& system, size_t count);
 struct ThreadScratch;
 // Directions, inverse lengths, compliances and residuals of all pairs. Returns the largest residual [m].
 float find_directions(ThreadScratch& s, size_t pairs, float alpha_per_meter);
-// What the pairs see of their nodes, as if none were held by a body.
+// Effective inverse masses of the pairs' nodes, as if no body held any.
 void find_masses(ThreadScratch& s, size_t nodes, float h);
-// The matrix and right-hand side of the stretch constraints in s.stretch. A pair that is cut has no row of its own.
+// The matrix and right-hand side of the stretch constraints in s.stretch. A pair that is cut has an identity row.
 void find_matrix(ThreadScratch& s, size_t pairs, double regularization);
-// Moves the loose nodes by the impulses in s.step, none further than `limit` [m], and adds them to the multipliers.
+// Moves the free nodes by the impulses in s.step, each by at most `limit` [m], and adds them to the multipliers.
 void move_loose_nodes(ThreadScratch& s, size_t nodes, float limit);
-// Marks in s.unfit the pairs that a distance sweep would change.
+// Marks in s.violated the pairs that a distance sweep would change.
 void mark_violated_segments(ThreadScratch& s, size_t pairs, float alpha_per_meter);
-// Lets the inertia and the weight that carried the nodes here meet the thread's tension. `fall` [m] is what weight does in a
-// substep. Returns false, with nothing done, where nothing is taut.
+// Applies the thread's geometric stiffness to the predicted motion. `fall` [m]: displacement by weight in a substep. Returns
+// false, without a change, where nothing is taut.
 bool smooth_motion(ThreadScratch& s, size_t nodes, float inv_mass, float shortest, Vec3 fall, float h);
 
-// A distance constraint is right to a tenth of a micrometer, as the direct solve leaves most pairs: that spares its root and
-// its division. `compliant`: compliance times multiplier [m].
+// A distance constraint within 0.1 um counts as satisfied, like most pairs after the direct solve: this saves its square root
+// and division. `compliant`: compliance times multiplier [m].
 constexpr float kFitLength = 2e-7f, kFitCompliant = 1e-7f;
 
 }  // namespace catgut

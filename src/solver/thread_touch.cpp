@@ -11,26 +11,26 @@
 namespace catgut {
 namespace {
 
-constexpr float kTouching = 2e-5f;   // [m] nearer than this is touching
-constexpr float kConcerned = 0.25f;  // a segment touched this far along it concerns its other node
-constexpr float kRecovery = 0.1f;    // [m/s] at which overlap from before the substep is undone: it must not throw the thread
-// [m/s] of sliding at which friction reaches its limit; below, it falls with the speed. A rigid grip would turn micrometers
-// into newtons (segments of thread are as stiff as that), and nodes that stick and slip by turns would pluck the thread.
+constexpr float kTouching = 2e-5f;   // [m] below this distance the two touch
+constexpr float kConcerned = 0.25f;  // a segment touched beyond this fraction of its length also involves its other node
+constexpr float kRecovery = 0.1f;    // [m/s] at which earlier overlap is resolved, slowly enough not to eject the thread
+// [m/s] of sliding at which friction reaches its limit; below, it is proportional to the speed. Rigid stiction would turn
+// micrometers into newtons (thread segments are that stiff), and alternating stick and slip would excite the thread.
 constexpr float kCreep = 0.005f;
 
-// W p of a loose node: geometric stiffness as find_masses has it.
+// W p of a free node, with the geometric stiffness of find_masses.
 Vec3 move_of(const ThreadScratch& s, size_t i, Vec3 p) {
   const Vec3 t = way_before(s, i) + way_after(s, i);
   return (p * s.side[i] + t * (s.tilt[i] * dot(p, t))) * s.w[i];
 }
-// The same for one that touches: along the normal only with the tool, along the tool as far as friction lets it.
+// The same for a node in contact: along the normal only with the tool, along the tool as far as friction allows.
 Vec3 move_of(const ThreadScratch& s, const NodeContact& c, Vec3 p) {
   const Vec3 free = move_of(s, c.node, p);
   return (free - c.reply * (dot(free, c.n) / c.own_inv_mass)) * c.slides + c.n * (c.tool_inv_mass * dot(p, c.n));
 }
 // A segment x0-x1 against a capsule with axis p-q.
 struct Meeting {
-  float gap = 1, part = 0;  // [m]; how far along the segment
+  float gap = 1, part = 0;  // [m]; fraction of the segment's length
   Vec3 n, on;               // out of the tool; on its axis [m]
 };
 Meeting meet(Vec3 x0, Vec3 x1, Vec3 p, Vec3 q, float reach) {
@@ -40,21 +40,21 @@ Meeting meet(Vec3 x0, Vec3 x1, Vec3 p, Vec3 q, float reach) {
   m.on = lerp(p, q, t);
   const Vec3 d = lerp(x0, x1, s) - m.on;
   const float l = length(d);
-  if (l < 1e-8f) return m;  // axis on axis: no direction to push in
+  if (l < 1e-8f) return m;  // axis on axis: the direction is undefined
   m.n = d / l;
   m.gap = l - reach;
   return m;
 }
 
-// Where a node was at the start of the substep.
+// Position of a node at the start of the substep.
 Vec3 came_from(const ThreadScratch& s, size_t i) { return {s.from_x[i], s.from_y[i], s.from_z[i]}; }
-// Where the tool has carried a node since the start of the substep.
+// Position to which the tool has carried a node since the start of the substep.
 Vec3 carried(const ThreadScratch& s, const NodeContact& c, const RigidBody& b) {
   return transform(b.pose(), to_local(Pose{b.prev_x, b.prev_q}, came_from(s, c.node)));
 }
 
 // Coulomb friction as an implicit drag of mu N / v, with the normal force N of the last substep's tensions and the speed v of
-// the last substep's sliding: while a thread slides evenly that is mu N, and capstan's law follows, node by node.
+// the last substep's sliding. In steady sliding that equals mu N, and the capstan equation follows node by node.
 void feel_friction(ThreadScratch& s, NodeContact& c, const RigidBody& b, float h) {
   const size_t i = c.node;
   const Vec3 n0 = i > 0 ? normalized(node(s, i) - node(s, i - 1)) : Vec3{}, n1 = normalized(node(s, i + 1) - node(s, i));
@@ -63,7 +63,7 @@ void feel_friction(ThreadScratch& s, NodeContact& c, const RigidBody& b, float h
   Vec3 slid = at - stays;
   slid -= c.n * dot(slid, c.n);
   const float limit = s.touch_friction * std::max(0.0f, -dot(load, c.n)) * h * h;
-  Vec3 speed = c.start - stays;  // [m] a substep
+  Vec3 speed = c.start - stays;  // [m] per substep
   speed -= c.n * dot(speed, c.n);
   const float grip = std::max(length(speed), kCreep * h) / std::max(limit, 1e-20f);  // [1/kg]
   c.slides = grip / (grip + s.w[i]);
@@ -86,7 +86,7 @@ bool update_contacts(const StrandModel& model, ThreadScratch& s, const std::vect
     if (m.gap > kTouching) continue;
     const float part[2] = {1 - m.part, m.part};
     if (m.gap < 0) {
-      // Two milligrams of thread are simply put outside. What that stretches, the solve after it turns into tension and the
+      // A thread node of 2 mg is placed outside directly. The solve after it turns the resulting stretch into tension, and the
       // tension into force on the tool.
       const RigidBody& b = body[touch.body];
       const Pose then{b.prev_x, b.prev_q};
@@ -121,8 +121,8 @@ bool update_contacts(const StrandModel& model, ThreadScratch& s, const std::vect
 }
 
 void compute_effective_masses(ThreadScratch& s, const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body) {
-  // A tool gives way to all that push it. A node reckons with the whole push along its own normal, as the tensions have it,
-  // over its own share.
+  // A tool moves by the sum of all impulses on it. A node therefore uses the total along its own normal, as given by the
+  // tensions, divided by its own share.
   s.load.assign(body.size(), {});
   auto load_of = [&](const NodeContact& c) {
     return way_after(s, c.node) * s.tension[c.node] - way_before(s, c.node) * (c.node > 0 ? s.tension[c.node - 1] : 0);
@@ -136,7 +136,7 @@ void compute_effective_masses(ThreadScratch& s, const std::vector<RigidModel>& b
     const RigidBody& b = body[c.body];
     const size_t i = c.node;
     const Vec3 n0 = way_before(s, i), n1 = way_after(s, i), t = n0 + n1;
-    // Across the thread: a normal that leaned along it would take tension from one side of the node.
+    // Perpendicular to the thread: a tilted normal would take tension from one side of the node.
     const Vec3 across = c.n - t * (dot(c.n, t) / std::max(length2(t), 1e-6f));
     if (length2(across) > 0.01f) c.n = normalized(across);
     c.reply = move_of(s, i, c.n);
@@ -177,7 +177,7 @@ bool move_contacts(ThreadScratch& s, float limit, const std::vector<RigidModel>&
     if (reach > limit) step = step * (limit / reach);
     put_node(s, c.node, c.from + step);
     c.pushed += push_out;
-    // The tool takes the normal part, and what friction holds of the rest.
+    // The tool receives the normal part and the part that friction transmits.
     const Vec3 along = p - c.n * dot(p, c.n);
     push_tool(s, c, c.n * -push_out + along * (1 - c.slides), body_model, body);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // solver/tissue_pairs: reads positions, writes boxes and pairs. Compiled once per instruction set (Highway) and chosen at run
-// time. Comparisons only decide what is worth a closer look, so every instruction set finds every pair that touches.
+// time. Comparisons only select candidates, so every instruction set finds every pair that touches.
 #include "solver/tissue_pairs.h"
 
 #include <cmath>
@@ -19,7 +19,7 @@ using D = hn::CappedTag<float, 16>;
 using V = hn::Vec<D>;
 constexpr size_t kLanes = HWY_MIN(16, HWY_MAX_BYTES / sizeof(float));
 
-// Bit k of the result: test(k) of lanes k. Sixteen at a time, whatever the registers hold.
+// Bit k of the result: test(k) of lanes k. Sixteen at a time, for any register width.
 template <class Test>
 HWY_INLINE uint32_t Sixteen(const Test& test) {
   const D d;
@@ -69,7 +69,7 @@ float FurthestMove(const Vec4* x, const Vec4* from, size_t n) {
   const D d;
   const float *at = &x->x, *was = &from->x;
   const size_t count = 4 * n;
-  V most[2] = {hn::Zero(d), hn::Zero(d)};  // two, so that neither waits for the other
+  V most[2] = {hn::Zero(d), hn::Zero(d)};  // two, for instruction-level parallelism
   size_t i = 0;
   for (; i + 2 * kLanes <= count; i += 2 * kLanes)
     for (size_t k = 0; k < 2; ++k)
@@ -82,8 +82,8 @@ float FurthestMove(const Vec4* x, const Vec4* from, size_t n) {
   return std::sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
 }
 
-// Which blocks of group g have moved by more than `limit` along an axis since their pairs were found, or are not numbers; bit
-// k: its block k. They are looked for from where they are now on.
+// Which blocks of group g have moved by more than `limit` along an axis since their pairs were found, or are NaN; bit k: its
+// block k. The present positions become their origins.
 uint32_t MovedBlocks(const Vec4* x, Column<Vec4>& origin, PairSearch& search, uint32_t g, float limit) {
   const D d;
   const uint32_t particles = static_cast<uint32_t>(origin.size());
@@ -106,8 +106,8 @@ uint32_t MovedBlocks(const Vec4* x, Column<Vec4>& origin, PairSearch& search, ui
   return moved;
 }
 
-// Pairs whose first particle is in a block of group g, if that block or one near it has moved. Blocks are near that were near
-// before or are now, by a little more than the reach, so that the test of the pairs themselves alone decides what is listed.
+// Pairs whose first particle is in a block of group g, if that block or one near it has moved. Near blocks: those near before
+// or now, with slightly more than the reach, so that the test of the pairs alone decides what is listed.
 void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g) {
   const D d;
   PairSearch::Part& part = search.part[g];
@@ -137,10 +137,10 @@ void PairsOfGroup(const TissueCollision& tissue, PairSearch& search, uint32_t g)
         }
       }
     }
-    if (!anew) continue;  // itself is among them
+    if (!anew) continue;  // the block itself is among them
     std::vector<PairCandidate>& pair = search.of_block[ba];
     pair.clear();
-    // Their boxes side by side: most of a near block's particles are out of a particle's reach, and one test reports for
+    // Their boxes side by side: most of a near block's particles are out of a particle's reach, and one test covers
     // sixteen.
     Boxes& near_box = part.near_box;
     if (near_box.lower[0].size() < part.near.size()) near_box.resize(part.near.size());
@@ -203,7 +203,7 @@ HWY_EXPORT(PairsOfGroup);
 
 namespace {
 
-// Which particles of neighboring blocks are too near each other at rest ever to collide.
+// Particles of neighboring blocks that are too close at rest ever to collide.
 void find_kin(TissueCollision& t, std::span<const Vec4> rest) {
   BlockBoxes boxes;
   Jobs alone;
@@ -243,7 +243,7 @@ TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<cons
   t.rest_reach.assign(rest_reach.begin(), rest_reach.end());
   t.surface = std::move(surface);
   for (float r : radius) t.largest_radius = std::max(t.largest_radius, r);
-  // Wide enough to be kept for long, but not so wide that the wall's own particles, a little pressed together, fill the list.
+  // Wide enough to last long, but not so wide that slightly compressed particles of the wall itself fill the list.
   const float nearest = rest_reach.empty() ? 1.0f : *std::min_element(rest_reach.begin(), rest_reach.end());
   t.pair_margin = std::clamp(0.5f * (nearest - 2 * t.largest_radius), 0.0002f, 0.002f);
   std::vector<uint32_t> count(t.particles + 1, 0);
@@ -285,7 +285,7 @@ bool pairs_are_stale(const TissueCollision& tissue, const PairSearch& search) {
 
 namespace {
 
-// Widens the boxes of group g, and its own, by those of `by`.
+// Expands the boxes of group g, and its own, by those of `by`.
 void join_boxes(const BlockBoxes& by, BlockBoxes& boxes, uint32_t g) {
   auto join = [](const Boxes& other, Boxes& box, size_t k) {
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -330,7 +330,7 @@ void find_tissue_pairs(const TissueCollision& tissue, const Vec4* x, Column<Vec4
     search.filled = false;
   }
   if (!search.filled) return list_tissue_pairs(tissue, origin, search, jobs);
-  // What has moved by less than half of what makes pairs stale may keep its origin: it is often most of the tissue.
+  // Particles that have moved by less than half the staleness limit may keep their origin: often most of the tissue.
   const float limit = 0.25f * tissue.pair_margin / std::sqrt(3.0f);
   search.swept = search.built;
   jobs.each(search.built.groups, 1, [&](size_t at, size_t) {

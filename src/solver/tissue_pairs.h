@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// solver/tissue_pairs: which particles of the tissue may touch each other. Candidates are found with a margin and kept until
-// something has moved by more than half of it, so most substeps only check the distance moved, and then only blocks that have
-// moved are searched again. A pair that touches when its contacts are solved is always listed; a pair that comes to touch while
-// they are solved may not be. The list is therefore part of the result, and it is a pure function of the positions at which
-// each particle was last searched (`origin`), which are state: all pairs within margin there, sorted. Neither the number of
-// workers nor a save and load in between changes it.
+// solver/tissue_pairs: broad phase of tissue against tissue. Candidates are found with a margin and kept until something has
+// moved by more than half of it. Most substeps only check the distance moved, and only blocks that have moved are searched
+// again. A pair that touches when its contacts are solved is always listed; a pair that comes into contact during that solve
+// may not be. The list is therefore part of the result. It is a pure function of the positions at which each particle was last
+// searched (`origin`), which are state: all pairs within the margin there, sorted. It does not depend on the number of
+// workers, nor on a save and load.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -21,8 +21,8 @@ namespace catgut {
 constexpr uint32_t kBlock = 16;  // particles in a block, and blocks in a group
 constexpr float kNowhere = std::numeric_limits<float>::quiet_NaN();
 
-// What of the tissue collides. Consecutive particles must be neighbors in space, which bodies promise: the search goes by
-// boxes round 16 of them and round 16 such boxes.
+// Collision data of the tissue. Consecutive particles must be neighbors in space, which bodies guarantee: the search uses
+// boxes of 16 particles and boxes of 16 such boxes.
 struct TissueCollision {
   uint32_t particles = 0;
   std::vector<float> radius;      // [m] per particle, against other tissue
@@ -31,17 +31,17 @@ struct TissueCollision {
   std::vector<Triangle> surface;
   std::vector<uint32_t> ring_first;  // per particle: first of its triangles in ring, size particles + 1
   std::vector<uint32_t> ring;        // triangles around each particle
-  // Blocks with particles that never collide with some of a block's own: neighbors in the wall. First of a block's in kin,
-  // size blocks + 1, ascending, the block itself the first of them.
+  // Blocks with particles that never collide with some of a block's own: neighbors in the wall. First entry of each block in
+  // `exclusion`, size blocks + 1, ascending; the block itself is the first.
   struct ExclusionMask {
     uint32_t block;
-    std::array<uint16_t, kBlock> allowed;  // bit j of may[i]: particle i of the one and j of the other may touch, i < j
+    std::array<uint16_t, kBlock> allowed;  // bit j of allowed[i]: particle i of the one and j of the other may touch, i < j
   };
   std::vector<uint32_t> exclusion_first;
   std::vector<ExclusionMask> exclusion;
   float tool_radius = 0.0006f;  // [m] of a particle against tools
   float largest_radius = 0;
-  float pair_margin = 0.002f;  // [m] pairs this much further apart than touching are candidates
+  float pair_margin = 0.002f;  // [m] pairs with a gap below this are candidates
 };
 TissueCollision make_tissue_collision(std::span<const Vec4> rest, std::span<const float> radius, std::span<const uint32_t> body,
                                       std::span<const float> rest_reach, std::vector<Triangle> surface);
@@ -50,7 +50,7 @@ struct PairCandidate {
   uint32_t a, b;
 };  // tissue particles, a < b
 
-// Boxes by components; padded to whole groups of 16 with boxes of no numbers, which nothing meets.
+// Boxes by components; padded to whole groups of 16 with NaN boxes, which overlap nothing.
 struct Boxes {
   std::array<Column<float>, 3> lower, upper;  // [m]
   void resize(size_t count);
@@ -60,44 +60,44 @@ struct BlockBoxes {
   Boxes block, group;
 };
 
-// Working memory: never saved. All but `boxes` and `moved` is derived from the origins and made from them when `filled` is not
-// set. A block that has hardly moved keeps its origins when others are searched again.
+// Working memory: never saved. All but `boxes` and `moved` is derived from the origins, and rebuilt from them when `filled` is
+// not set. A block that has hardly moved keeps its origins when others are searched again.
 struct PairSearch {
   std::vector<PairCandidate> pair;
-  bool filled = false;       // what follows is that of the origins
+  bool filled = false;       // the members below match the origins
   BlockBoxes boxes;          // as of the last call of make_boxes
-  std::vector<float> moved;  // [m] distance of particles from their origins (furthest_move): one for each part of the tissue
+  std::vector<float> moved;  // [m] distance of particles from their origins (furthest_move): one per part of the tissue
   BlockBoxes built;          // around the origins
-  BlockBoxes swept;          // around the origins before and after the search that is continuing
-  // The origins by components, padded to whole blocks with places that are not numbers: near nothing, however far away a
-  // damaged state may have put its particles.
+  BlockBoxes swept;          // around the origins before and after the current search
+  // The origins by components, padded to whole blocks with NaN positions: these are near nothing, however large the
+  // coordinates in a damaged state.
   std::array<Column<float>, 3> at;
   Column<float> radius;
   std::vector<std::vector<PairCandidate>> of_block;  // pairs whose first particle is in it
   struct Near {
     uint32_t block;
-    const uint16_t* allowed;  // as in Kin; null: every pair
+    const uint16_t* allowed;  // as in ExclusionMask; null: every pair
   };
   struct Part {              // for a group of blocks
-    uint32_t moved = 0;      // bit k: its block k is looked for again
-    std::vector<Near> near;  // blocks near the one that is looked at, and their boxes
+    uint32_t moved = 0;      // bit k: its block k is searched again
+    std::vector<Near> near;  // blocks near the current one, and their boxes
     Boxes near_box;
   };
   std::vector<Part> part;
 };
 
 void make_boxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes, Jobs& jobs);
-// [m] no less than the furthest that any of n particles has moved, and not much more where neighbors move alike: the length of
-// the furthest moves along each axis.
+// [m] upper bound of the displacement of n particles, tight where neighbors move alike: the length of the vector of the largest
+// displacements along each axis.
 float furthest_move(const Vec4* x, const Vec4* from, size_t n);
 // Whether search.pair may lack a pair that touches, given search.moved.
 bool pairs_are_stale(const TissueCollision& tissue, const PairSearch& search);
 // Lists the pairs of the origins as they are.
 void list_tissue_pairs(const TissueCollision& tissue, const Column<Vec4>& origin, PairSearch& search, Jobs& jobs);
-// Moves the origins of what has moved to x [m], per tissue particle, and lists their pairs.
+// Sets the origins of what has moved to x [m], per tissue particle, and lists their pairs.
 void find_tissue_pairs(const TissueCollision& tissue, const Vec4* x, Column<Vec4>& origin, PairSearch& search, Jobs& jobs);
 
-// Calls with(block) for every block whose box meets the box from..to, in ascending order.
+// Calls with(block) for every block whose box overlaps the box from..to, in ascending order.
 template <class With>
 void for_blocks_near(const BlockBoxes& b, Vec3 from, Vec3 to, With&& with) {
   auto meets = [&](const Boxes& box, size_t k) {

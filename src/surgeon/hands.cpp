@@ -11,7 +11,7 @@ bool move_toward(ScriptedHand& hand, const Pose& goal, float speed, float dt) {
   const Vec3 way = goal.p - hand.pose.p;
   const Vec3 turn = rotation_vector(goal.q * conjugate(hand.pose.q));
   const float far = length(way), angle = length(turn);
-  // Speed up and slow down like a hand: by at most 1.5 m/s^2, and never faster than can be stopped in time.
+  // Accelerates and decelerates like a hand: at most 1.5 m/s^2, and never faster than it can stop in time.
   constexpr float kAcceleration = 1.5f;
   const float allowed =
       std::min({speed, std::sqrt(2 * kAcceleration * far) + 0.002f, length(hand.velocity) + kAcceleration * dt});
@@ -19,7 +19,7 @@ bool move_toward(ScriptedHand& hand, const Pose& goal, float speed, float dt) {
   const Vec3 moved = far > 0 ? way * (step / far) : Vec3{};
   hand.velocity = moved / dt;
   hand.pose.p += moved;
-  // The turn is spread over the whole way, so that tool and needle arrive turned.
+  // The rotation is spread over the whole path, so that tool and needle arrive aligned.
   const float share = far > 1e-6f ? std::max(step / far, std::min(1.0f, kTurnRate * dt / std::max(angle, 1e-6f)) * 0.5f) : 1.0f;
   const float most = std::min(1.0f, kTurnRate * dt / std::max(angle, 1e-6f));
   hand.pose.q = nlerp(hand.pose.q, goal.q, std::min(share, most));
@@ -33,7 +33,7 @@ bool move_jaw(ScriptedHand& hand, float goal, float dt) {
 }
 
 void tremble(ScriptedHand& hand, float deviation, Random& random, float dt) {
-  // Ornstein-Uhlenbeck: keeps its variance whatever the tick rate.
+  // Ornstein-Uhlenbeck: its variance is independent of the tick rate.
   const float keep = portable::exp(-2 * kPi * 8 * dt), kick = deviation * std::sqrt(1 - keep * keep);
   hand.tremor = hand.tremor * keep + Vec3{random.normal(), random.normal(), random.normal()} * kick;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// surgeon/plan: the four techniques of paper 2.5 as a surgeon does them. Reads the picture at rest; see plan.h.
+// surgeon/plan: the four techniques of paper 2.5 as lists of tasks. Reads the picture at rest; see plan.h.
 #include "surgeon/plan.h"
 
 #include <cmath>
@@ -12,13 +12,13 @@ namespace catgut {
 namespace {
 
 constexpr int kBitesPerThread = 10;
-constexpr float kRow = 0.004f;         // [m] between one row of bites and the next
-constexpr float kFreeDepth = 0.0045f;  // [m] below the rims that a sweep through two layers reaches
+constexpr float kRow = 0.004f;         // [m] between two rows of bites
+constexpr float kFreeDepth = 0.0045f;  // [m] depth below the rims of a sweep through two layers
 
 // Depth of the needle's circle below a surface of radius `curved` [m] whose chord is `length`.
 float depth_of(float length, float needle, float curved) { return length * length / 8 * (1 / needle + 1 / curved); }
 
-// The serosa vertex nearest to a place `edge` below the rim point `on_rim`.
+// The serosa vertex nearest to the point at distance `edge` below the rim point `on_rim`.
 void settle_on_serosa(const VisibleMesh& mesh, Vec3 on_rim, Vec3 axis, Vec3 sideways, float edge, BitePlace& place) {
   float best = std::numeric_limits<float>::max();
   uint32_t found = 0;
@@ -33,7 +33,7 @@ void settle_on_serosa(const VisibleMesh& mesh, Vec3 on_rim, Vec3 axis, Vec3 side
   place.out = mesh.normal[found];
 }
 
-// `bites` bites round an opening, `edge` from the rim, even in length along it, not in angle: an organ's rim is no circle.
+// `bites` bites round an opening, `edge` from the rim, evenly spaced in length, not in angle: an organ's rim is not circular.
 void places_round(const PictureModel& picture, const SurgeonSkill& skill, int bites, float edge, Plan& plan) {
   const OpeningShape o = opening_shape(picture, 0);
   const std::vector<uint32_t>& rim = picture.rim[0];
@@ -47,7 +47,7 @@ void places_round(const PictureModel& picture, const SurgeonSkill& skill, int bi
     if (std::abs(angle_of(rest[rim[i]])) < std::abs(angle_of(rest[rim[start]]))) start = i;
     turn += dot(cross(rest[rim[i]] - o.center, rest[rim[(i + 1) % n]] - o.center), o.axis);
   }
-  const bool counter = turn > 0;  // go clockwise seen from above: the way a right hand's needle turns
+  const bool counter = turn > 0;  // clockwise seen from above: the direction in which a right hand turns the needle
   auto rim_at = [&](size_t i) { return rest[rim[(start + (counter ? n - i % n : i % n)) % n]]; };
   std::vector<float> run{0};
   for (size_t i = 0; i < n; ++i) run.push_back(run.back() + distance(rim_at(i), rim_at(i + 1)));
@@ -67,7 +67,7 @@ void places_round(const PictureModel& picture, const SurgeonSkill& skill, int bi
   }
 }
 
-// A place on the upper side of bowel end `wall`, `angle` round from the top and `edge` from the rim.
+// A position on the upper side of bowel end `wall`, `angle` from the top and `edge` from the rim.
 BitePlace on_top(const PictureModel& picture, uint32_t wall, float angle, float edge) {
   const OpeningShape o = opening_shape(picture, wall);
   const Vec3 top = normalized(Vec3{0, 1, 0} - o.axis * o.axis.y, any_perpendicular(o.axis)), side = cross(top, Vec3{1, 0, 0});
@@ -95,7 +95,7 @@ Plan purse_string_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
-// Running bites in one bowel end, row under row, a fresh thread for every row: how much one body bears (paper 3.5).
+// Running bites in one bowel end, row by row, with a new suture for every row: measures many sutures in one body (paper 3.5).
 Plan running_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.lift = 0.012f;
@@ -119,8 +119,8 @@ Plan running_plan(const PictureModel& picture, const SurgeonSkill& skill) {
 }
 
 // 2.5.2: sweeps along the edge, each outside in and inside out again on one bowel, then straight across to the other. The first
-// crossing is tied like a stay suture, so that the thread has something to pull against; the last throw locks the running
-// thread. More bites than one thread holds continue in a second row, with a fresh thread.
+// crossing is tied like a stay suture, so that the thread is held against pull. The last throw locks the running thread. More
+// bites than one thread allows continue in a second row, with a new suture.
 Plan connell_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;
@@ -162,7 +162,7 @@ Plan connell_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
-// 2.5.3: one bite through each bowel end, across the gap; pulled even, tied, the needle taken off, both ends held.
+// 2.5.3: one bite through each bowel end, across the gap; equalized, tied, the needle cut off, both ends held.
 Plan stay_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;
@@ -188,13 +188,13 @@ Plan stay_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
-// 2.5.4: single stitches through outer and inner layer round the ring, each tied and cut, with a fresh needle for the next.
+// 2.5.4: single stitches through outer and inner layer round the ring, each tied and cut, with a new suture for the next.
 Plan lembert_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;
   const OpeningShape outer = opening_shape(picture, 0), inner = opening_shape(picture, 1);
   const Vec3 u = normalized(Vec3{0, 0, 1} - outer.axis * outer.axis.z, any_perpendicular(outer.axis)), v = cross(outer.axis, u);
-  // The wall's thickness shows at the cut edge: from the outer rim inward by as much as the mucosa lies inside it.
+  // The cut edge exposes the wall's thickness: from the outer rim inward to the mucosa.
   const float wall = skill.wall;
   for (int b = 0; b < skill.bites; ++b) {
     const float angle = 2 * kPi * static_cast<float>(b) / static_cast<float>(skill.bites);
@@ -203,7 +203,7 @@ Plan lembert_plan(const PictureModel& picture, const SurgeonSkill& skill) {
     const float middle = 0.5f * (outer.radius + inner.radius - wall);
     p.at = outer.center + radial * middle;
     p.out = outer.axis;
-    p.up = cross(-radial, outer.axis);  // so that cross(out, up) leads inward
+    p.up = cross(-radial, outer.axis);  // so that cross(out, up) points inward
     p.length = outer.radius - inner.radius + wall;
     p.depth = kFreeDepth;
     p.walls = 2;
@@ -229,7 +229,7 @@ BiteFrame bite_frame(const PictureModel& picture, const Snapshot& seen, const Bi
   Quat turned;
   f.at = live_place(picture, seen, b.at, b.wall, &turned);
   if (b.walls > 1 && picture.rim.size() > 1 && picture.body.size() == 1) {
-    // Between two layers: the middle of where the place would be on either.
+    // Between two layers: the mean of the positions on either.
     f.at = 0.5f * (f.at + live_place(picture, seen, b.at, 1, nullptr));
     f.out = b.out;
   } else {

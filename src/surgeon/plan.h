@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// surgeon/plan: what a technique asks of two hands, as a list of tasks with the places of its bites. The engine
-// (surgeon/scripted) carries the tasks out one after the other; each looks at what really happened before the next begins.
+// surgeon/plan: a technique as a list of tasks for two hands, with the positions of its bites. The engine (surgeon/scripted)
+// carries out the tasks in order; each checks the actual state before the next begins.
 #pragma once
 #include <string>
 #include <vector>
@@ -11,40 +11,40 @@
 
 namespace catgut {
 
-// Where the needle's circle cuts the tissue, at rest. The needle turns about `up`: its tip comes in along `along`, which is
+// Where the needle's circle cuts the tissue, at rest. The needle turns about `up`: its tip enters along `along`, which is
 // cross(out, up), and is deepest at `at - out * depth`.
 struct BitePlace {
-  Vec3 at, out, up;    // [m], unit, unit; at: on the surface, or in the middle between two layers
-  float length = 0;    // [m] chord from where the tip goes in to where it comes out
+  Vec3 at, out, up;    // [m], unit, unit; at: on the surface, or midway between two layers
+  float length = 0;    // [m] chord from entry to exit
   float depth = 0;     // [m]
-  uint32_t wall = 0;   // whose tissue carries the place
-  bool level = false;  // hands keep the circle nearly square to `up` where the tissue leans
+  uint32_t wall = 0;   // whose tissue carries it
+  bool level = false;  // hands keep the circle nearly square to `up` where the tissue is inclined
   int walls = 1;       // passages through a wall that the sweep makes
 };
 
-// Where a bite is made, in the world as it is now: a place, outward, the path of the needle, the axis about which it turns.
+// The current frame of a bite in the world: position, outward direction, direction of the needle, axis of its rotation.
 struct BiteFrame {
   Vec3 at, out, along, up;
 };
 BiteFrame bite_frame(const PictureModel& picture, const Snapshot& seen, const BitePlace& place);
 
 enum class TaskKind {
-  pick_up,        // the driver takes the needle from the drape
-  bite,           // one sweep of the needle at place[which]; the forceps brings it out
-  pull_tail,      // the forceps pulls thread through until the tail is as long as wanted
-  pull_slack,     // until the way before the last bite has no slack
-  pull_together,  // until the last midpoint has come together
-  hand_back,      // the driver takes the needle from the forceps
-  regrip,         // the forceps takes the needle near its back end, to tie
-  draw,           // the driver takes the tail; both hands pull until everything that the technique closes is closed
-  throw_,         // one throw of a knot: `which` wraps round the driver, `way` +1 or -1; then the tail is pulled through
-  lock_strand,    // the same, pulling the needle's own strand through: the end of a running suture
-  cut_long,       // scissors cut the needle's strand a little way from the knot
+  pick_up,        // the needle holder takes the needle from the drape
+  bite,           // one sweep of the needle at place[which]; the forceps pulls it out
+  pull_tail,      // the forceps pulls thread through until the tail has the planned length
+  pull_slack,     // until the span before the last bite has no slack
+  pull_together,  // until the last midpoint is closed
+  hand_back,      // the needle holder takes the needle from the forceps
+  regrip,         // the forceps grasps the needle near its back end, to tie
+  draw,           // the needle holder takes the tail; both hands pull until the technique's closure is complete
+  throw_,         // one throw of a knot: `which` wraps on the needle holder, `way` +1 or -1; then the tail is pulled through
+  lock_strand,    // the same with the needle's own strand: the end of a running suture
+  cut_long,       // scissors cut the needle's strand a short distance from the knot
   cut_tail,       // and the tail
   cut_needle,     // at the needle
-  take_both,      // the driver takes both strands of the knot between its jaws
-  fresh,          // a fresh needle and thread
-  rest            // hands off; what was let go settles
+  take_both,      // the needle holder takes both strands of the knot between its jaws
+  fresh,          // a new suture
+  rest            // hands off; the tissue settles
 };
 
 struct Task {
@@ -56,13 +56,13 @@ struct Task {
 struct Plan {
   std::vector<BitePlace> place;
   std::vector<Task> task;
-  // How the tools stand about the work: which side of the needle's plane (+1: its `up`) each comes from, and how far above it
-  // the hands keep.
+  // Tool orientation at the work: the side of the needle's plane (+1: its `up`) from which each tool comes, and the height of
+  // the hands.
   float driver_side = 1, forceps_side = 1;
-  float lift = 0;  // [m] along `up`, when the needle is brought to a bite
+  float lift = 0;  // [m] along `up`, on approach to a bite
 };
 
-// technique: purse_string, connell, stay, lembert, or running (bites in one bowel end, row under row).
+// technique: purse_string, connell, stay, lembert, or running (bites in one bowel end, row by row).
 // Throws std::invalid_argument for a technique without a plan, or a picture that does not fit it.
 Plan make_plan(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
 

@@ -9,8 +9,8 @@ namespace catgut {
 namespace {
 
 constexpr float kCounterHold = 0.8f;                    // [N]
-constexpr float kSecure = 0.985f;                       // of a closure that counts as closed
-constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f;  // places on the needle's arc: two thirds from the tip, behind the tip
+constexpr float kSecure = 0.985f;                       // fraction of a closure that counts as closed
+constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f;  // positions on the needle's arc: a third from the swage, behind the tip
 
 }  // namespace
 
@@ -31,7 +31,7 @@ void Scripted::take_over_for(const std::vector<size_t>& tasks) {
     if (t >= plan_.task.size()) throw std::invalid_argument("the plan has no such task");
     kept.push_back(plan_.task[t]);
   }
-  // The bite that was made last before.
+  // The last completed bite.
   for (size_t t = 0; !tasks.empty() && t < tasks.front(); ++t)
     if (plan_.task[t].kind == TaskKind::bite) place_ = static_cast<size_t>(plan_.task[t].which);
   plan_.task = kept;
@@ -68,7 +68,7 @@ TickInput Scripted::operate(const Snapshot& seen, float dt) {
     out.hand[k] = as_input(hand_[k], before[k], dt, sequence_);
     out.hand[k].buttons = buttons_[k];
   }
-  // Hands of an assistant, where the scene gives them an instrument, wait open beyond the field.
+  // Assistant hands with an instrument in the scene wait open beyond the field.
   for (size_t k = 2; k < kMaxHands; ++k) {
     if (seen.tool[k].instrument < 0) continue;
     ScriptedHand& hand = assistant_[k - 2];
@@ -117,7 +117,7 @@ BiteFrame Scripted::frame(const Snapshot& seen, size_t place) const {
 Pose Scripted::needle_at(const BiteFrame& f, float psi) const {
   const Vec3 center = f.at + f.out * (picture_.suture[0].needle_radius - bite().depth + depth_error_ + depth_fix_);
   const Vec3 x = f.out * portable::cos(psi) - f.along * portable::sin(psi);
-  // The tip is at the end of the arc: for other arcs than a half circle turn back by what is missing.
+  // The tip is at the end of the arc: for arcs other than a half circle, rotate back by the difference.
   const Pose half{center, from_axes(x, cross(f.up, x), f.up)};
   return half * Pose{{}, axis_angle({0, 0, 1}, kPi - picture_.suture[0].needle_arc)};
 }
@@ -183,7 +183,7 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
       return fresh(seen);
     case TaskKind::rest:
       doing_ = "hold";
-      // Without pulling: a suture is judged as it lies.
+      // Without pulling: a suture is measured at rest.
       if (needle_tension(seen) > 0.05f) move(kForceps, {stitch(seen), hand_[kForceps].pose.q}, 0.3f * skill_.speed);
       return waited_ > 1.5f;
   }
@@ -220,7 +220,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
   const Pose& needle = seen.active().needle.pose;
   if (stage_ == hover && waited_ <= dt_) aim();
   switch (stage_) {
-    case hover: {  // to a place beside the bite, clear of the organ
+    case hover: {  // to a position beside the bite, clear of the organ
       doing_ = name_of_bite() + "approach";
       rest_aside(seen, kForceps);
       BiteFrame f = frame(seen, place_);
@@ -252,21 +252,21 @@ bool Scripted::make_bite(const Snapshot& seen) {
       if (out && psi_ > psi_bite + 0.72f) {
         go(over);
       } else if (psi_ > psi_bite + 1.1f) {
-        // The tip is not where it should be: it never went in or not deep enough, or it went too deep to come out.
+        // The tip is misplaced: it did not enter, is not deep enough, or is too deep to exit.
         const bool passed = seen.active().bite.size() > bites_before_ && seen.active().bite.back().has_exit;
-        // Through the first wall and not into the second: that gave way, as soft walls do, by millimeters.
+        // Through the first wall but not the second, which was pushed away by millimeters, as soft walls are.
         const bool gave_way = passed && seen.active().bite.size() < bites_before_ + static_cast<size_t>(bite().walls);
         depth_fix_ += gave_way ? -0.0008f : passed || !seen.active().needle.in_tissue ? -0.0003f : 0.0003f;
         go(withdraw);
       }
       return false;
     }
-    case withdraw: {  // back the way it came, then the same bite again
+    case withdraw: {  // back along the same arc, then the same bite again
       doing_ = name_of_bite() + "withdraw and retry";
       rest_aside(seen, kForceps);
       psi_ = std::max(psi_ - 2 * skill_.drive_speed / picture_.suture[0].needle_radius * dt_, -psi_bite - 0.7f);
       BiteFrame f = frame_;
-      if (!patience(1.5f)) f.at += f.out * std::min(0.01f, 0.01f * (waited_ - 1.5f));  // it sticks: away from the wall
+      if (!patience(1.5f)) f.at += f.out * std::min(0.01f, 0.01f * (waited_ - 1.5f));  // stuck: move away from the wall
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(f, psi_)), 2 * speed);
       if (psi_ <= -psi_bite - 0.7f && !seen.active().needle.in_tissue) {
         if (++attempts_ > kAttempts) gave_up_ = true;
@@ -302,7 +302,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       rest_aside(seen, kNeedleHolder);
       psi_ = std::min(psi_ + 2 * skill_.drive_speed / picture_.suture[0].needle_radius * dt_, psi_bite + kPi + 0.5f);
       BiteFrame f = frame_;
-      if (!patience(3))  // it sticks: a pull outward frees the back end
+      if (!patience(3))  // stuck: an outward pull frees the back end
         f.at += (f.out + (plan_.lift > 0 ? 0.4f : 0.0f) * f.up) * std::min(0.02f, 0.01f * (waited_ - 3));
       move(kForceps, holding(kForceps, needle_at(f, psi_)), 2 * speed);
       if (seen.active().bite.size() > bites_before_ && !seen.active().needle.in_tissue && seen.active().bite.back().complete) {
@@ -325,7 +325,7 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   if (kind == TaskKind::pull_tail) {
     slack = length_between(seen, 0, first_point_node(seen)) - skill_.tail;
   } else if (kind == TaskKind::pull_slack) {
-    // In the last way from one bite to the next, or from one bowel end to the other: thread there against the straight way.
+    // In the last span from one bite to the next, or from one bowel end to the other: length of thread minus distance.
     for (size_t k = n - 1; k-- > 0;) {
       const SuturePointView &a = seen.active().suture_point[k], &b = seen.active().suture_point[k + 1];
       if (a.bite == b.bite || (plan_.lift == 0 && a.wall == b.wall)) continue;
@@ -336,9 +336,9 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   } else if (kind == TaskKind::pull_together) {
     slack = open_seam(seen);
   }
-  // Thread that cannot be drawn further is left: the last pull takes up the slack.
+  // Thread that cannot be pulled further is left: the last pull takes up the slack.
   if (slack <= 0 || distance(hand_[kForceps].pose.p, pull_from_.p) > 0.29f || !patience(12)) return true;
-  // Slow down before the thread runs tight, and when it pulls back: a jerk would tear.
+  // Decelerate before the thread is taut, and when it pulls back: a jerk would tear tissue.
   const float gently = std::clamp(2.0f - length(seen.tool[kForceps].force), 0.02f, 1.0f);
   move(kForceps, {pull_from_.p + way * 0.3f, hand_[kForceps].pose.q}, gently * std::min(skill_.speed, 0.015f + 5 * slack));
   return false;
@@ -355,14 +355,14 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
   enum { bring, over, down, close, give, clear };
   switch (stage_) {
     case bring: {
-      // It is taken from the driver's side: there he waits, or he would have to go past the forceps.
+      // It is taken from the needle holder's side: the holder waits there, or its path would cross the forceps.
       if (present) rest_aside(seen, kNeedleHolder);
       else
         move(kNeedleHolder, {stitch(seen) + Vec3{0.09f * plan_.driver_side, 0.09f, 0}, tying_pose(kNeedleHolder, {}).q},
              skill_.speed);
       const size_t next = std::min(place_ + 1, plan_.place.size() - 1);
-      // Before a bite the needle is brought beside its place; before a knot high above the stitch, its tip up and out of the
-      // way.
+      // Before a bite the needle is moved beside its target; before a knot high above the stitch, with its tip up and out of
+      // reach.
       BiteFrame f = present ? frame(seen, next) : BiteFrame{stitch(seen), {0, 1, 0}, {0, 0, -1}, {1, 0, 0}};
       f.at += f.out * (present ? 0.03f : 0.045f) + f.up * (present ? 1.7f * plan_.lift : 0.0f);
       if (move(kForceps, holding(kForceps, needle_at(f, present ? -half_bite_angle() - 0.7f : -2.2f)), skill_.speed)) go(over);
@@ -385,7 +385,7 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
     case give:
       if (jaw(kForceps, 1)) go(clear);
       return false;
-    default:  // back out along its own shaft first: the tools stand close to each other, and steel is hard
+    default:  // back out along its own shaft first: the tools are close to each other, and rigid
       return move(kForceps, raised(hand_[kForceps].pose, 0.01f), skill_.speed) || waited_ > 0.2f;
   }
 }
@@ -398,7 +398,7 @@ bool Scripted::draw(const Snapshot& seen) {
     case over:
     case down:
     case close: {
-      // A place on the tail a little way from the first bite, seen from outside; after a miss another.
+      // A position on the tail a short distance from the first bite, seen from outside; after a miss a different one.
       const float away = 0.019f + 0.005f * static_cast<float>(misses_ % 4);
       const Vec3 thread = node_at(seen, node_along(seen, first, std::min(away, 0.6f * length_between(seen, 0, first)), -1));
       const Vec3 z = plan_.lift > 0 ? normalized(f.out * 0.6f + f.up) : normalized(f.out + Vec3{0.6f, 0, 0.2f});
@@ -418,7 +418,7 @@ bool Scripted::draw(const Snapshot& seen) {
       return false;
     }
     case tighten: {
-      // A surgeon feels the thread: the harder it pulls back, the slower the hand.
+      // Force feedback: the hand slows in proportion to the thread's tension.
       auto gently = [&](size_t hand) {
         return 0.25f * skill_.speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.02f, 1.0f);
       };
@@ -436,8 +436,8 @@ bool Scripted::draw(const Snapshot& seen) {
         right = normalized(across * -0.8f + f.out * 0.6f);
       }
       move(kForceps, {picture_.focus + left * 0.35f, hand_[kForceps].pose.q}, gently(kForceps));
-      // The tail hand gives a counter-hold: it moves out only as far as keeps its own side tight. Where both sides are drawn
-      // hard the thread sticks in its holes and the tissue follows the hands instead, so it gives way first.
+      // The tail hand applies counter-traction: it moves out only as far as keeps its own side taut. When both sides are pulled
+      // hard, the thread sticks in its holes and the tissue follows the hands instead, so the tail hand relaxes first.
       const size_t held = node_of(seen, seen.tool[kNeedleHolder].held_slot);
       const float tail = held < seen.active().thread_tension.size() ? seen.active().thread_tension[held] : 0;
       if (plan_.lift == 0 && !patience(5) && tail > kCounterHold)

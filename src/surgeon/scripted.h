@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// surgeon/scripted: carries out a plan's tasks with two hands. The needle driver (right) drives a bite by turning the needle
-// about its own circle; the forceps (left) takes the tip, brings it through and pulls the thread; knots are tied with the
-// instrument. Reads Snapshots only; each step looks at what really happened before the next begins. What goes wrong is tried
-// again: a bite whose tip did not come out is withdrawn and driven a little shallower or deeper, a missed grasp is approached
-// again, a throw whose loop did not hold is wound again. Bites are in scripted.cpp, knots and scissors in tying.cpp.
+// surgeon/scripted: carries out a plan's tasks with two hands. The needle holder (right) drives a bite by turning the needle
+// about its own circle; the forceps (left) grasps the tip, brings it through and pulls the thread; knots are instrument ties.
+// Reads Snapshots only; each step checks the actual state before the next begins. Failed steps are repeated: a bite whose tip
+// did not exit is withdrawn and driven slightly shallower or deeper, a missed grasp is approached again, a throw whose loop
+// did not hold is wound again. Bites are in scripted.cpp, knots and scissors in tying.cpp.
 #pragma once
 #include <array>
 #include <string>
@@ -17,13 +17,13 @@
 namespace catgut {
 
 constexpr size_t kNeedleHolder = 0, kForceps = 1;
-constexpr int kAttempts = 8;  // at one bite, at one grasp, at one throw
+constexpr int kAttempts = 8;  // per bite, per grasp, per throw
 
 class Scripted final : public Surgeon {
  public:
   Scripted(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
 
-  // Only these tasks of the plan, with the tools as someone else left them.
+  // Only these tasks of the plan, with the tools in their present state.
   void take_over_for(const std::vector<size_t>& tasks);
 
   bool done() const override { return gave_up_ || task_ >= plan_.task.size(); }
@@ -55,7 +55,7 @@ class Scripted final : public Surgeon {
 
   void take_over(const Snapshot& seen);
 
-  // The hand that is not needed waits out of the way, on its own side of the field.
+  // An idle hand waits clear of the work, on its own side of the field.
   void rest_aside(const Snapshot& seen, size_t hand);
 
   // --- bites ------------------------------------------------------------------------------------------------------------
@@ -65,16 +65,16 @@ class Scripted final : public Surgeon {
     return portable::asin(std::min(0.9f, 0.5f * bite().length / picture_.suture[0].needle_radius));
   }
 
-  // The needle with its tip `psi` past the deepest place of a bite at frame f.
+  // The needle with its tip `psi` past the deepest point of a bite at frame f.
   Pose needle_at(const BiteFrame& f, float psi) const;
 
-  // A tool frame that grips the needle (at `needle`) at place s of its arc: the shaft leaves the needle's plane on `side` and
-  // leans by `lean` toward what is outward of the tissue when the tip is `psi` past the deepest place.
+  // A tool frame that grips the needle (at `needle`) at fraction s of its arc: the shaft leaves the needle's plane on `side`,
+  // leans by `lean` toward the outside of the tissue when the tip is `psi` past the deepest point.
   Pose grip_at(const Pose& needle, float s, float side, float lean, float psi) const;
   Pose driver_grip(const Pose& needle) const;
   Pose forceps_grip(const Pose& needle) const;
 
-  // Draws the errors of the next bite.
+  // Samples the errors of the next bite.
   void aim();
 
   // --- tasks ------------------------------------------------------------------------------------------------------------
@@ -89,39 +89,39 @@ class Scripted final : public Surgeon {
 
   bool pull(TaskKind kind, const Snapshot& seen);
 
-  // [m] by which the midpoints are still apart, the slowest of them; 0 once all count as closed.
+  // [m] maximum remaining distance of the midpoints; 0 once all count as closed.
   static float open_seam(const Snapshot& seen);
 
-  // The driver takes the needle from the forceps; with `present` the forceps first brings it beside the next bite.
+  // The needle holder takes the needle from the forceps; with `present` the forceps first moves it beside the next bite.
   bool take_back(const Snapshot& seen, bool present);
 
   // --- tying ------------------------------------------------------------------------------------------------------------
-  // How the hands stand to tie: the driver lies across the wound from the right, the forceps comes from the left.
+  // Orientation of the hands to tie: the needle holder lies across the wound from the right, the forceps comes from the left.
   static Pose tying_pose(size_t hand, Vec3 at);
 
   bool regrip(const Snapshot& seen);
 
-  // Where the stitch is tied: at its knot, else in the middle between the ends of its thread in the tissue.
+  // Where the stitch is tied: at its knot, else midway between the ends of its thread in the tissue.
   Vec3 stitch(const Snapshot& seen) const { return stitch_place(picture_, seen); }
   Vec3 swage(const Snapshot& seen) const { return needle_swage(picture_, seen); }
-  // Moves the forceps so that the needle's swage, which it holds, comes to `goal`.
+  // Moves the forceps so that the needle's swage, which it holds, reaches `goal`.
   bool carry_swage(const Snapshot& seen, Vec3 goal, float speed);
 
-  // The driver, which holds the tail, brings it to where the next throw finds it: in front, clear of the needle's strand.
+  // The needle holder moves the tail where the next throw finds it: in front, clear of the needle's strand.
   bool lay_tail(const Snapshot& seen);
 
-  // Where on the tail, and from which side, the driver is best to take it; not where it just missed.
+  // Best position and side for the needle holder to grasp the tail; not those of the last miss.
   void choose_grasp(const Snapshot& seen);
 
-  // An instrument tie. The needle's strand is held up, the driver is laid beside it, the forceps carries the strand round the
-  // driver; then the driver, the loop on it, takes the tail and the hands pull apart.
+  // An instrument tie. The needle's strand is held up, the needle holder is laid beside it, the forceps winds the strand round
+  // it. The needle holder, with the loop on it, then grasps the tail, and the hands pull apart.
   bool tie(const Task& task, const Snapshot& seen);
 
-  // The needle's own strand is laid between the driver's jaws, past the loop.
+  // The needle's own strand is laid between the needle holder's jaws, past the loop.
   bool take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again);
 
   // --- both hands on the thread -----------------------------------------------------------------------------------------
-  // The driver takes the tail, then both pull until everything is closed.
+  // The needle holder grasps the tail, then both pull until everything is closed.
   bool draw(const Snapshot& seen);
 
   // --- scissors ---------------------------------------------------------------------------------------------------------
@@ -130,7 +130,7 @@ class Scripted final : public Surgeon {
 
   bool fresh(const Snapshot& seen);
 
-  // The needle's strand is laid along the tail; the driver closes on both.
+  // The needle's strand is laid along the tail; the needle holder closes on both.
   bool take_both(const Snapshot& seen);
 
   PictureModel picture_;
@@ -151,10 +151,10 @@ class Scripted final : public Surgeon {
   size_t place_ = 0, bites_before_ = 0;
   BiteFrame frame_;
   float psi_ = 0, aim_along_ = 0, aim_up_ = 0, depth_error_ = 0;
-  float depth_fix_ = 0;  // [m] what the failed attempts at this bite taught; positive: shallower
+  float depth_fix_ = 0;  // [m] correction from failed attempts at this bite; positive: shallower
   Pose pull_from_;
   // A throw.
-  Winding winding_;  // reckoned by exchange/tying, as the help for hands without hardware does it
+  Winding winding_;  // computed by exchange/tying, as for assisted hands
   size_t cuts_before_ = 0, settled_before_ = 0;
   uint32_t throws_before_ = 0, take_slot_ = 0;
   Quat take_turn_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// surgeon/sight: what a surgeon can see of the field, from the Snapshot alone: where a place of the tissue is now. How long a
-// piece of thread is and which strand lies where: exchange/strand.h.
+// surgeon/sight: the surgeon's view of the field, from the Snapshot alone: the current position of a point of tissue. Length
+// and arrangement of strands: exchange/strand.h.
 #pragma once
 #include <vector>
 
@@ -10,11 +10,11 @@
 
 namespace catgut {
 
-// Where the place that was at `rest` [m] is now, by the nearest particles of wall `wall`; turned (may be null): how the tissue
-// there has turned.
+// Current position of the point that was at `rest` [m], from the nearest particles of wall `wall`; turned (may be null):
+// rotation of the tissue there.
 Vec3 live_place(const PictureModel& picture, const Snapshot& seen, Vec3 rest, uint32_t wall, Quat* turned);
 
-// An opening at rest: center, the way out of it, mean radius, length round.
+// An opening at rest: center, outward axis, mean radius, perimeter.
 struct OpeningShape {
   Vec3 center, axis;
   float radius = 0, round = 0;  // [m]

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// surgeon/tying: instrument ties, scissors, a fresh needle; see scripted.h.
+// surgeon/tying: instrument ties, scissors, a new suture; see scripted.h.
 #include <cmath>
 
 #include "surgeon/scripted.h"
@@ -7,14 +7,14 @@
 namespace catgut {
 namespace {
 
-constexpr float kHalfOpen = 0.7f;             // a jaw that lets go without shaking off a loop
+constexpr float kHalfOpen = 0.7f;             // a jaw that releases without shaking off a loop
 constexpr float kStump = 0.007f;              // [m] of thread left on a knot
-constexpr float kLeastFreeForOwn = 0.038f;    // the same where the strand is then led along the driver to its jaws
+constexpr float kLeastFreeForOwn = 0.038f;    // the same where the strand is then led along the needle holder to its jaws
 constexpr float kWindOwnAt = 0.022f;          // [m] behind the tip, where such a strand is wound
 constexpr float kTailAside = 0.030f;          // [m] from the stitch, where the tail is laid down
-constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the middle of the field, where a used needle is let go
-constexpr float kTieCrossing = 0.3f;          // of the way that crossed hands take, forward and backward
-constexpr float kTyingAt = 0.12f;             // place on the needle's arc: behind the swage
+constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the center of the field, where a used needle is put down
+constexpr float kTieCrossing = 0.3f;          // fraction of the path of crossed hands, forward and backward
+constexpr float kTyingAt = 0.12f;             // position on the needle's arc: behind the swage
 
 }  // namespace
 
@@ -115,9 +115,9 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       return false;
     case wind: {
       const float want = static_cast<float>(task.which) * 2 * kPi + 0.6f;
-      // The needle is not hurried on while it lags behind: the strand would go slack, or cut the corner.
+      // The needle waits while it lags behind: otherwise the strand would be slack, or cut the corner.
       const float turn = 2.2f * dt_ * std::clamp(1.5f - behind / 0.006f, 0.0f, 1.0f);
-      // Wound and no loop yet: its ends lie too far apart along the driver, and are led together.
+      // Wound but not a loop yet: its ends are too far apart along the needle holder, and are moved together.
       if (winding_.wound + turn < want + 0.9f)
         winding_.wound += turn, winding_.free = std::max(0.006f, winding_.free - kTieWound * turn);
       else winding_.lean = std::max(-2 * kTieLean, winding_.lean - kTieLean * dt_);
@@ -135,7 +135,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       const size_t first = first_point_node(seen);
       if (stage_ == over && waited_ <= dt_) choose_grasp(seen);
       const Pose goal{node_at(seen, node_of(seen, take_slot_)), take_turn_};
-      // The forceps goes along above, its strand loose; neither hand hurries when that runs taut.
+      // The forceps follows above, with its strand slack; both hands slow down when it becomes taut.
       if (stage_ == over && waited_ <= dt_)
         winding_.free = kTieLoose * length_between(seen, node_of(seen, driver.loop_last), last);
       if (tension > kTieTooTaut) winding_.free = std::max(0.002f, feel_strand(winding_.free, tension, dt_));
@@ -149,7 +149,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       } else if (stage_ == down) {
         if (move(kNeedleHolder, goal, careful() * calm)) go(close);
         else if (!patience(4)) miss(over);
-      } else if (driver.held == Held::nothing && !move(kNeedleHolder, goal, careful() * calm)) {  // it has moved: after it
+      } else if (driver.held == Held::nothing && !move(kNeedleHolder, goal, careful() * calm)) {  // it has moved: follow it
         jaw(kNeedleHolder, kHalfOpen);
         if (!patience(4)) miss(over);
       } else if (jaw(kNeedleHolder, 0) && waited_ > 0.35f) {
@@ -164,11 +164,11 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     }
     case tighten: {
       const bool locked = locked_throws(seen) > throws_before_;
-      // The strands are drawn apart, low and even.
+      // The strands are pulled apart, low and evenly.
       auto gently = [&](size_t hand) {
         return 0.6f * skill_.speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.03f, 1.0f);
       };
-      // Where the hands cross, the driver, which has the tail, passes in front.
+      // Where the hands cross, the needle holder, which has the tail, passes in front.
       const float front = side < 0 ? kTieCrossing : 0;
       const Vec3 right = normalized(Vec3{side, 0.35f, 0.1f + front}), left = normalized(Vec3{-side, 0.35f, 0.1f - front});
       move(kNeedleHolder, {pull_from_.p + right * 0.08f, hand_[kNeedleHolder].pose.q}, gently(kNeedleHolder));
@@ -184,8 +184,8 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
     case open:
       jaw(kNeedleHolder, kHalfOpen);
       return move(kNeedleHolder, raised(hand_[kNeedleHolder].pose, 0.02f), skill_.speed) || waited_ > 0.8f;
-    default:  // unwind: shake the loop off and begin again
-      // Not before the jaws are open, and not against a taut strand: it would draw the tail out of the tissue.
+    default:  // unwind: shake the loop off and start again
+      // Not before the jaws are open, and not against a taut strand: it would pull the tail out of the tissue.
       if (!jaw(kNeedleHolder, 1)) return false;
       winding_.wound = std::max(kTieBefore, winding_.wound - 4 * dt_);
       carry_swage(seen, swage_at(winding_.wound), skill_.speed);
@@ -199,7 +199,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
 bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again) {
   const Vec3 z = rotate(lying.q, {0, 0, 1});
   const ToolView& driver = seen.tool[kNeedleHolder];
-  // Straight on from the turns, along the driver and between its jaws; drawn out until it is felt to be taut.
+  // In line with the turns, along the needle holder and between its jaws; pulled until taut.
   const float left = length_between(seen, node_of(seen, driver.loop_last), seen.active().thread_order.size() - 1);
   if (stage_ != close && waited_ <= dt_) winding_.free = 0.9f * left;
   const float tension = needle_tension(seen);
@@ -239,7 +239,7 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
     return false;
   }
   const bool tail = kind == TaskKind::cut_tail;
-  // Not too near to the knot, where the scissors cannot meet the stitch itself; after a miss further out, where they have room.
+  // Not too near to the knot, where the scissors could cut the stitch itself; after a miss further out, with more room.
   const size_t first = first_point_node(seen), end = last_point_node(seen);
   size_t at = last;
   float clearest = 0;

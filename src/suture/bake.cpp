@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// suture/bake: a fresh needle and thread (kButtonNewSuture). Reads the thread and its knots; what is tied becomes a settled
-// stitch, everything else of the old suture goes. Cost stays flat however many stitches a procedure has (paper 3.4): a settled
-// stitch is a curve that the tissue carries and a few pins between the points that its thread held together.
+// suture/bake: a new suture (kButtonNewSuture). Reads the thread and its knots; tied thread becomes a baked suture, the rest of
+// the old suture is removed. Cost stays flat for any number of stitches in a procedure (paper 3.4): a baked suture is a curve
+// that the tissue carries, and a few tethers between the points that its thread held together.
 #include <algorithm>
 
 #include "suture/suture.h"
@@ -9,12 +9,12 @@
 namespace catgut {
 namespace {
 
-constexpr float kLongestTail = 0.03f;  // [m] of a strand that was left uncut: an assistant trims it here
-constexpr uint32_t kCarriers = 6;      // particles that a pin's end hangs on
-constexpr float kSamePlace = 0.003f;   // [m] less than stitches are apart: a second pin there would only fight with the first
-constexpr float kCarries = 0.1f;       // [N] less than this in a passage through a wall, and the wall holds itself
+constexpr float kLongestTail = 0.03f;  // [m] of a strand left uncut: trimmed here, as an assistant would
+constexpr uint32_t kCarriers = 6;      // particles that carry a tether's end
+constexpr float kSamePlace = 0.003f;   // [m] less than the distance of stitches: a second tether there would oppose the first
+constexpr float kCarries = 0.1f;       // [N] in a passage through a wall; below this the wall needs no tether
 
-// Whether anchors a and b are where the thread goes into and comes out of one bite.
+// Whether anchors a and b are the entry and the exit of one bite.
 bool same_bite(const Suture& state, int a, int b) {
   const auto point_at = [&](int anchor) {
     return std::find_if(state.point.begin(), state.point.end(),
@@ -24,8 +24,8 @@ bool same_bite(const Suture& state, int a, int b) {
   return in != state.point.end() && out != state.point.end() && in->bite == out->bite;
 }
 
-// Whether one of the first `pins` pins holds the places of `pin` together at least as closely: one of the technique's closure,
-// or of a stitch beside this one.
+// Whether one of the first `pins` tethers holds the points of `pin` together at least as closely: one of the technique's
+// closure, or of an adjacent stitch.
 bool held_already(const SolverState& solver, size_t pins, const Tether& pin) {
   const Vec4* x = solver.x.data();
   const Vec3 a = position_of(pin.a, x), b = position_of(pin.b, x);
@@ -36,7 +36,7 @@ bool held_already(const SolverState& solver, size_t pins, const Tether& pin) {
   });
 }
 
-// A place bound to the nearest tissue particle, in the frame of that particle's cluster.
+// A position bound to the nearest tissue particle, in the frame of that particle's cluster.
 BakedNode bind(const SolverModel& model, const SolverState& solver, Vec3 at) {
   BakedNode n;
   float best = 1e30f;
@@ -50,16 +50,16 @@ BakedNode bind(const SolverModel& model, const SolverState& solver, Vec3 at) {
   return n;
 }
 
-// Thread between two anchors: what a pin may have to do.
+// Thread between two anchors: a candidate for a tether.
 struct Span {
   int a, b;
-  float length = 0, tension = 0;  // [m], [N] the most in it
-  bool passage = false;           // from where it goes into a wall to where it comes out of it
+  float length = 0, tension = 0;  // [m], [N] maximum along it
+  bool passage = false;           // from entry to exit of a wall
 };
 
-// The spans of the anchored part of a piece, from node `lowest` to node `highest`. A knot is no place in the tissue: it lies
-// where its two strands draw it. So where both ends of a stitch meet in one, they are one span, through the knot; and of two
-// spans between the same anchors the shorter is the one that holds.
+// The spans of the anchored part of a piece, from node `lowest` to node `highest`. A knot is not a point of tissue: it lies
+// where its two strands pull it. If both ends of a stitch meet in one knot, they form one span through it. Of two spans
+// between the same anchors, the shorter one carries the load.
 std::vector<Span> spans_of(const Strand& t, size_t lowest, size_t highest, const Suture& state,
                            const std::vector<uint32_t>& knots) {
   std::vector<Span> spans;
@@ -92,7 +92,7 @@ std::vector<Span> spans_of(const Strand& t, size_t lowest, size_t highest, const
   return spans;
 }
 
-// The piece of thread from node `first` to node `last`, tied by `knots`, as a settled stitch and the pins that do what it did.
+// The thread from node `first` to node `last`, tied by `knots`, as a baked suture and the tethers that replace it.
 void settle_piece(OneSuture& one, size_t first, size_t last, const std::vector<uint32_t>& knots) {
   const SolverModel& model = one.all.model;
   SolverState& solver = one.all.solver;
@@ -102,14 +102,14 @@ void settle_piece(OneSuture& one, size_t first, size_t last, const std::vector<u
   size_t lowest = last, highest = first;
   for (size_t i = first; i <= last; ++i)
     if (anchor_of(t, t.order[i]) >= 0) lowest = std::min(lowest, i), highest = std::max(highest, i);
-  const size_t pins = solver.pin.size();  // without its own
+  const size_t pins = solver.pin.size();  // without the ones made here
   for (const Span& span : spans_of(t, lowest, highest, one.own, knots)) {
-    // A passage through a wall holds nothing together but the wall: if it carries nothing, no pin is needed.
+    // A passage through a wall holds only the wall together: without load, no tether is needed.
     if (span.passage && span.tension < kCarries) continue;
     Tether pin;
     const EmbeddedPoint &a = t.anchor[static_cast<size_t>(span.a)].point, &b = t.anchor[static_cast<size_t>(span.b)].point;
-    // What a tied stitch pulls is little, and its pins are looked at in every substep from now on. In deformed tissue fewer
-    // particles say a little else: nothing may move because of that.
+    // Forces of a tied stitch are small, and its tethers are solved in every substep from now on. In deformed tissue, fewer
+    // particles give a slightly different position; this must not move anything.
     pin.a = carried_by(model.shape.rest.data(), a, kCarriers);
     pin.b = carried_by(model.shape.rest.data(), b, kCarriers);
     const Vec4* x = solver.x.data();
@@ -150,13 +150,13 @@ void fresh_suture(const SolverModel& model, SolverState& solver, size_t suture, 
   needle = {};
   needle.x = needle.prev_x = needle_start.p;
   needle.q = needle.prev_q = needle_start.q;
-  // The thread's last particle is the needle's: swaged on.
+  // The thread's last particle is the swage of the needle.
   t.hold.push_back({t.order.back(), static_cast<int>(body), model.needle_arc[suture].point(0), HoldKind::swage});
 }
 
 namespace {
 
-// What is tied settles, piece by piece between the cuts; thread that was sutured in and never tied is pulled out.
+// Tied thread is baked, piece by piece between the cuts; sutured thread without a knot is pulled out.
 void settle_thread(OneSuture& s, uint8_t who) {
   SutureContext& c = s.all;
   const Strand& t = s.strand;
@@ -190,7 +190,7 @@ void settle_thread(OneSuture& s, uint8_t who) {
   }
 }
 
-// Whatever holds needle or thread of the suture lets go.
+// Releases everything that holds the needle or thread of the suture.
 void let_go_of(OneSuture& s) {
   SutureContext& c = s.all;
   const int needle = static_cast<int>(s.needle);
@@ -233,7 +233,7 @@ bool new_suture(SutureContext& c, std::span<const Vec3> start, std::span<const P
     return false;
   }
   undo_throws(s);
-  // Passages that drew their wall in until later stitches took the load off them: a pin that stays is paid for in every
+  // Passages that drew their wall in until later stitches took over their load: a remaining tether costs time in every
   // substep.
   const float least = kCarries * c.model.h * c.model.h;
   std::erase_if(c.solver.pin, [&](const Tether& p) { return p.owner == TetherOwner::passage && -p.lambda < least; });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // suture/closure: carries out a technique's ClosurePlan (paper 2.5: points are pulled together over time, all arriving at
-// once). Reads the plan; keeps one world attachment per pulled point and one pin per pair.
+// once). Reads the plan; keeps one world attachment per pulled point and one tether per pair.
 #include "suture/suture.h"
 
 namespace catgut {

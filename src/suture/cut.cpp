@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// suture/cut: scissors. Reads buttons and tools; marks the pair that was cut (Strand::cut), or takes the thread off its needle.
-// To loops, knots, pulls and the solver a cut is an end of the thread. What a wrong cut opens stays open.
+// suture/cut: scissors. Reads buttons and tools; marks the cut pair (Strand::cut), or removes the thread from its needle.
+// To loops, knots, pulls and the solver a cut is an end of the thread. A stitch opened by a wrong cut stays open.
 #include <algorithm>
 
 #include "suture/suture.h"
@@ -8,9 +8,9 @@
 namespace catgut {
 namespace {
 
-constexpr float kOtherStrand = 0.015f;  // [m] along the thread: nearer than this it is the same strand
+constexpr float kOtherStrand = 0.015f;  // [m] along the thread: below this distance it is the same strand
 
-// Thread [m] from node i to the nearest suture point or knot that way, and its slot; negative: there is none before the end.
+// Thread [m] from node i to the nearest suture point or knot in that direction, and its slot; negative: none before the end.
 struct Way {
   float length = -1;
   uint32_t slot = 0;
@@ -38,7 +38,7 @@ std::array<uint32_t, kMaxHands> pressed_buttons(SutureState& state, const HandIn
 
 namespace {
 
-// Where the scissors cut: on which suture's thread, which pair, how far along it.
+// Where the scissors cut: which suture's thread, which pair, and the fraction along it.
 struct Place {
   uint32_t suture = 0;
   size_t pair = 0;
@@ -47,7 +47,7 @@ struct Place {
 };
 Place where_cut(const SutureContext& c, uint32_t who) {
   Place place;
-  // A hand that holds the needle has the thread cut off it, wherever on the arc it holds.
+  // A hand that holds the needle has the thread cut at the needle, at any place on the arc.
   const InstrumentState& hand = c.state.instrument[who];
   if (hand.held == Held::needle && !c.solver.strand[hand.suture].cut.back())
     return {hand.suture, c.solver.strand[hand.suture].cut.size() - 1, 1, true};
@@ -65,7 +65,7 @@ Place where_cut(const SutureContext& c, uint32_t who) {
   return place;
 }
 
-// The end of a knot was cut: it will get no more throws. root: slot of the knot's particle that it led to.
+// The end of a knot was cut: it gets no more throws. root: slot of the knot's particle at which the end began.
 void judge_cut_knot(OneSuture& s, uint8_t by, uint32_t root, Vec3 where) {
   for (uint32_t k = 0; k < s.own.knot.size(); ++k) {
     Knot& knot = s.own.knot[k];
@@ -92,7 +92,7 @@ void cut_at(OneSuture& s, uint8_t by, size_t i, float along) {
     t.hold.erase(swage);
   } else {
     cut_pair(t, i);
-    // Turns that are cut through hold nothing.
+    // Turns that are cut hold nothing.
     for (uint32_t tool = 0; tool < c.state.loop.size(); ++tool) {
       const int body = static_cast<int>(tool);
       if (!is_held_by(t, slot, body, HoldKind::loop) || !is_held_by(t, t.order[i + 1], body, HoldKind::loop)) continue;
@@ -139,7 +139,7 @@ bool is_same_strand(const Strand& t, size_t node, int body) {
 }  // namespace
 
 void hold_other_strands(SutureContext& c, uint32_t who) {
-  // Jaws with a loop round them draw one end through it; the loop's own strands lie near and are not meant.
+  // Jaws with a loop round them pull one end through it; the loop's own nearby strands are excluded.
   if (c.state.loop[who].wraps > 0) return;
   const RigidBody& tool = c.solver.body[who];
   const int body = static_cast<int>(who);

@@ -25,7 +25,7 @@ bool take_needle(SutureContext& c, uint32_t who) {
   Weld w;
   w.a = static_cast<int>(s.needle);
   w.b = static_cast<int>(who);
-  // Held where and as it was caught: the same world frame seen from both bodies.
+  // Held at the grasped position and angle: the same world frame in both bodies' coordinates.
   w.local_a = inverse(s.body().pose()) * tool.pose();
   w.compliance = c.suture.grasp_compliance;
   w.angular_compliance = c.suture.grasp_angular_compliance;
@@ -37,7 +37,7 @@ bool take_needle(SutureContext& c, uint32_t who) {
   return true;
 }
 
-// The thread particle nearest to the jaws, of any suture, within reach, that nothing holds.
+// The thread particle nearest to the jaws, of any suture, within reach and not held.
 bool take_thread(SutureContext& c, uint32_t who) {
   InstrumentState& hand = c.state.instrument[who];
   const RigidBody& tool = c.solver.body[who];
@@ -63,7 +63,7 @@ bool take_thread(SutureContext& c, uint32_t who) {
   return true;
 }
 
-// The jaws close on the wall: its place nearest to them, with the neighborhood that moves with it, is held where it is.
+// The jaws close on the wall: its nearest point, embedded in its neighborhood, is held where it is.
 void take_tissue(SutureContext& c, uint32_t who) {
   InstrumentState& hand = c.state.instrument[who];
   const RigidBody& tool = c.solver.body[who];

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// suture/knot: a loop becomes a throw, the throw goes down to the tissue and locks there (paper 2.4). Reads loops, hands and
-// the thread's order; writes knots, their anchors and, once a knot is locked, what was slack under it.
+// suture/knot: a loop becomes a throw, the throw moves to the tissue and locks there (paper 2.4). Reads loops, hands and
+// the thread's order; writes knots, their anchors and, once a knot is locked, the slack under it.
 //
-// A tool with a loop round it takes thread beyond the loop: the other end of the stitch, as a rule, which is thereby drawn
+// A tool with a loop round it grasps thread beyond the loop, usually the other end of the stitch, which is thereby pulled
 // through the loop. From then on the loop is a throw: it leaves the tool and hangs on the two ends of its own thread between
-// tool and tissue. The further the tool goes away, the nearer it comes. Until it is there it can be undone by letting go.
+// tool and tissue. As the tool moves away, the throw approaches the tissue. Until it locks, releasing the thread undoes it.
 #include <algorithm>
 #include <cmath>
 
@@ -13,11 +13,11 @@
 namespace catgut {
 namespace {
 
-constexpr float kTaut = 0.3f;      // [N] of a strand that draws its throw down
-constexpr float kFastest = 0.25f;  // [m/s] at which it does
+constexpr float kTaut = 0.3f;      // [N] tension of a strand that pulls its throw down
+constexpr float kFastest = 0.25f;  // [m/s] maximum speed of that
 
-constexpr float kDrawSpeed = 0.25f;  // [m/s] thread drawn through a locked knot, and particles drawn into it
-constexpr float kSnug = 0.00005f;    // [m] of slack that a snug stitch keeps
+constexpr float kDrawSpeed = 0.25f;  // [m/s] thread pulled through a locked knot, and particles pulled into it
+constexpr float kSnug = 0.00005f;    // [m] of slack that remains in a tight stitch
 constexpr int kNone = kNoAnchor;
 
 bool is_suture_point(const Suture& state, int anchor) {
@@ -25,8 +25,8 @@ bool is_suture_point(const Suture& state, int anchor) {
                      [&](const SuturePoint& p) { return p.anchor == static_cast<uint32_t>(anchor); });
 }
 
-// The next anchor from node i along the thread: toward the needle (way +1) or the free end. An end of the thread, cut or not,
-// is the end. Loops on their way are none: they are thread. `points`: suture points only, not the particles of knots.
+// The next anchor from node i along the thread: toward the needle (direction +1) or the free end. It stops at an end of the
+// thread, cut or not. Loops of throws under way count as thread. `points`: suture points only, not the particles of knots.
 int next_anchor(const Strand& t, const Suture& state, size_t i, int way, bool points) {
   while (continues(t, i, way)) {
     i = way > 0 ? i + 1 : i - 1;
@@ -36,12 +36,12 @@ int next_anchor(const Strand& t, const Suture& state, size_t i, int way, bool po
   return kNone;
 }
 
-// Where on its thread a place is: on the strand that leads to the free end, on the one that leads to the needle, on a bight
-// between two points of tissue, or on a piece that is tied to nothing.
+// Location on the thread: on the strand to the free end, on the strand to the needle, on a bight between two points of
+// tissue, or on a piece without a knot.
 enum class Side { free_end, needle, bight, loose };
 struct Ends {
   Side strand = Side::loose;
-  int inward = kNone;  // anchor of the stitch or the knot that it comes out of
+  int inward = kNone;  // anchor of the stitch or the knot that it comes from
 };
 Ends ends_of(const Strand& t, const Suture& state, size_t first, size_t last) {
   const int down = next_anchor(t, state, first, -1, false), up = next_anchor(t, state, last, 1, false);
@@ -51,7 +51,7 @@ Ends ends_of(const Strand& t, const Suture& state, size_t first, size_t last) {
   return {};
 }
 
-// The suture point nearest along the thread to a strand that comes out of anchor k, that anchor included.
+// The suture point nearest along the thread to a strand that leaves anchor k, that anchor included.
 int nearest_point(const Strand& t, const Suture& state, int k, Side strand) {
   if (k == kNone || is_suture_point(state, k)) return k;
   return next_anchor(t, state, node_of(t, t.anchor[static_cast<size_t>(k)].slot), strand == Side::free_end ? 1 : -1, true);
@@ -61,7 +61,7 @@ bool pulls(const OneSuture& s, const Knot& knot) {
   const InstrumentState& hand = s.all.state.instrument[knot.hand];
   return hand.held == Held::thread && hand.suture == s.index && hand.slot == knot.strand;
 }
-// Whether the throw in hand still hangs on one thread: its loop, and the strand that was taken, with the stitch.
+// Whether the current throw is still on one thread: its loop, and the grasped strand, with the stitch.
 bool is_whole(const OneSuture& s, const Knot& knot) {
   const Strand& t = s.strand;
   const size_t first = node_of(t, knot.end[0]), last = node_of(t, knot.end[1]), held = node_of(t, knot.strand);
@@ -75,7 +75,7 @@ void release_end(OneSuture& s, uint32_t slot) {
 }
 
 // "If the user decides they do not want to proceed ... they can release the free end of the thread. After letting go, the loop
-// will be released, and the knot object will be destroyed." Nothing but positions reports that there was a throw.
+// will be released, and the knot object will be destroyed." The event throw_undone reports it; only positions change.
 void cancel(OneSuture& s, uint32_t which) {
   Knot& knot = s.own.knot[which];
   const Vec3 where = position_of(knot.target, s.x()) + normalized(knot.from) * knot.left;
@@ -90,8 +90,8 @@ void cancel(OneSuture& s, uint32_t which) {
   }
 }
 
-// The locked knot that a further throw belongs to: the one out of which both strands come, or out of which the wrapped one
-// comes when it is thrown round a bight or round itself.
+// The locked knot that a further throw belongs to: the one from which both strands come, or the wrapped one if it is thrown
+// round a bight or round itself.
 int knot_under(const Strand& t, const Suture& state, const Ends& loop, const Ends& taken, bool one_strand) {
   const auto holds = [&](const Knot& k, int anchor) {
     if (anchor == kNone) return false;
@@ -106,12 +106,12 @@ int knot_under(const Strand& t, const Suture& state, const Ends& loop, const End
   return kNone;
 }
 
-// Where a first throw goes. "The knot object moves towards the suture point. ... If more than one suture point has been
+// Target of a first throw. "The knot object moves towards the suture point. ... If more than one suture point has been
 // created, the knot object will move toward the midpoint of the last two created suture points." The paper's stitch is one such
-// pair; ours may have many points before it is tied (a purse-string), and what is tied together then is its two ends: the
-// suture point nearest to the strand that was taken and the one nearest to the loop. For a stitch of two points both are the
-// same. Where a running suture is tied to itself (the end of a Connell: the taken strand is a bight, or the needle's own) there
-// is no other end, and the paper's rule holds as it stands.
+// pair. A stitch here may have many points before it is tied (a purse-string), and the knot joins its two ends: the suture
+// point nearest to the grasped strand and the one nearest to the loop. For a stitch of two points both rules agree. A running
+// suture tied to itself (the end of a Connell: the grasped strand is a bight, or the needle's own) has no other end;
+// there the paper's rule applies unchanged.
 EmbeddedPoint where_to(const OneSuture& s, const Ends& loop, const Ends& taken, bool one_strand) {
   const Strand& t = s.strand;
   const Suture& state = s.own;
@@ -193,8 +193,8 @@ void begin(SutureContext& c, uint32_t who) {
   c.report_tool(s.index, EventKind::throw_started, who, which, static_cast<float>(made.wraps), place);
 }
 
-// The particle of the taken strand that the knot will hold: of those between the stitch and the jaw, the one nearest to it.
-// -1: there is none.
+// The particle of the grasped strand that the knot will hold: the one nearest to it between stitch and jaw. -1: there is
+// none.
 int64_t particle_for(const OneSuture& s, const Knot& knot) {
   const Strand& t = s.strand;
   const size_t held = node_of(t, knot.strand);
@@ -213,7 +213,7 @@ int64_t particle_for(const OneSuture& s, const Knot& knot) {
   return found;
 }
 
-// The first throw of a knot, at the tissue: it holds a particle of each strand from now on.
+// The first throw of a knot, at the tissue: from now on it holds a particle of each strand.
 void hold_strands(OneSuture& s, Knot& knot, Vec3 where) {
   Strand& t = s.strand;
   const size_t first = node_of(t, knot.end[0]), last = node_of(t, knot.end[1]), held = node_of(t, knot.strand);
@@ -246,7 +246,7 @@ void hold_strands(OneSuture& s, Knot& knot, Vec3 where) {
 
 // "When the knot object reaches the suture point or midpoint between the two previous suture points, it is locked in place, and
 // the attached particles are released." From here on the knot holds the stitch: a particle of the wrapped strand, which is the
-// loop's inner end, and one of the taken strand.
+// loop's inner end, and one of the grasped strand.
 void lock(OneSuture& s, uint32_t which) {
   Knot& knot = s.own.knot[which];
   KnotThrow& made = knot.thrown[knot.throws - 1];
@@ -266,8 +266,8 @@ void lock(OneSuture& s, uint32_t which) {
   s.all.report_tool(s.index, EventKind::throw_locked, knot.hand, which, made.tension, where);
 }
 
-// A knot that has just been locked draws its two strands in: what is slack between the stitch and it goes to the outer side, as
-// if the hands drew on both ends, and no faster than they could.
+// A newly locked knot pulls its two strands in: slack between the stitch and the knot moves to the outer side, as if the
+// hands pulled both ends, at a limited speed.
 void draw_snug(OneSuture& s, Knot& knot) {
   Strand& t = s.strand;
   const float step = kDrawSpeed * s.all.model.h;
@@ -279,7 +279,7 @@ void draw_snug(OneSuture& s, Knot& knot) {
     const float off = length(a.offset);
     a.offset = off > step ? a.offset * (1 - step / off) : Vec3{};
     busy = busy || off > step;
-    // Inward is where the stitch is: for the needle's particle toward the free end, for the free end's toward the needle.
+    // Inward points to the stitch: for the needle's particle toward the free end, for the free end's toward the needle.
     const size_t node = node_of(t, a.slot);
     int way = knot.slots == 2 && i == 0 ? 1 : -1;
     if (knot.slots == 1 && next_anchor(t, s.own, node, -1, true) == kNone) way = 1;
@@ -294,12 +294,12 @@ void draw_snug(OneSuture& s, Knot& knot) {
   if (!busy) knot.slack_removed = 1;
 }
 
-// "As the tool moves away from its original position, the knot object moves towards the suture point." It never goes back up
-// again when the tool does. True: it is there.
+// "As the tool moves away from its original position, the knot object moves towards the suture point." It never reverses when
+// the tool does. True: it has arrived.
 bool bring_down(OneSuture& s, Knot& knot) {
   const float gone = distance(s.all.solver.body[knot.hand].x, knot.hand_from);
   float left = std::max(0.0f, length(knot.from) - gone);
-  // A strand that is drawn taut brings the throw down however short the path of the hand.
+  // A taut strand pulls the throw down even if the hand moves little.
   if (tension_at(s.strand, node_of(s.strand, knot.strand)) > kTaut)
     left = std::max(0.0f, std::min(left, knot.left - kFastest * s.all.model.h));
   if (left < knot.left) {
@@ -336,7 +336,7 @@ void tighten(SutureContext& c) {
       Knot& knot = s.own.knot[i];
       if (knot.phase == KnotPhase::locked) {
         if (!knot.slack_removed) draw_snug(s, knot);
-      } else if (pulls(s, knot) && bring_down(s, knot)) {  // one that no hand pulls is undone at the next tick
+      } else if (pulls(s, knot) && bring_down(s, knot)) {  // a throw that no hand pulls is undone at the next tick
         lock(s, i);
       }
     }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // suture/loop: reads thread and tools; freezes loops on them (paper 2.4, figure 10).
 //
-// A surgeon lays the thread round the needle driver before it takes the other end. Whether it lies round it is asked of the
-// picture that the thread makes on the plane across the tool, where the tool is a single point, the place of its tip: does the
-// thread cross itself there, and is the tip inside what it encloses? Two more questions keep out what looks like a loop in
-// that picture and is none: does it lie on the tool at all, and are its ends beside each other or is it a stretched spiral?
+// A surgeon wraps the thread round the needle holder before grasping the other end. Detection uses the projection of the thread
+// onto the plane across the tool, in which the tool is a point, its tip. Does the thread cross itself there, and does it
+// enclose the tip? Two more tests reject false positives of the projection: does the thread touch the tool, and are its ends
+// side by side or is it a stretched spiral?
 #include "suture/loop.h"
 
 #include <algorithm>
@@ -14,26 +14,25 @@
 namespace catgut {
 namespace {
 
-constexpr size_t kMostCorners = 512;   // of the thread on one tool: a longer run is a heap, and only its beginning is looked at
-constexpr size_t kFewest = 3;          // particles of a loop: thread between two of them is straight
-constexpr float kOwnStrands = 0.012f;  // [m] of thread on either side that belong to a loop: jaws do not take them by mistake
-constexpr float kWide = 0.95f;         // a jaw opened this far drops the loop round it
-constexpr size_t kSeveral = 6;         // particles that must touch, and
-constexpr float kMostOfATurn =
-    1.5f * kPi;                      // [rad] how far thread must go round a tool, before a loop that is none is spoken of
-constexpr double kParallel = 1e-12;  // [m^2] thread that runs along the tool is a point in the picture and crosses nothing
+constexpr size_t kMostCorners = 512;        // of the thread on one tool: a longer run is a tangle; only its beginning is tested
+constexpr size_t kFewest = 3;               // minimum particles of a loop: thread between two is straight
+constexpr float kOwnStrands = 0.012f;       // [m] of thread on either side that belong to a loop: jaws do not grasp them
+constexpr float kWide = 0.95f;              // a jaw opened this far drops the loop round it
+constexpr size_t kSeveral = 6;              // particles that must touch before a rejection is reported,
+constexpr float kMostOfATurn = 1.5f * kPi;  // [rad] and the angle round the tool that they must reach
+constexpr double kParallel = 1e-12;  // [m^2] thread parallel to the tool is a point in the projection and crosses nothing
 
-// A corner of the thread's picture on the plane across the tool.
+// A corner of the thread's projection onto the plane across the tool.
 struct Corner {
   double x = 0, y = 0;                 // [m] the tool is at 0, 0
-  double depth_in = 0, depth_out = 0;  // [m] along the tool, of the thread that comes to this corner and that leaves it
+  double depth_in = 0, depth_out = 0;  // [m] along the tool, of the thread before and after this corner
   size_t node = 0;                     // of the thread at this corner, or the last one before it
-  int closed = 0;                      // turns that were closed before it
+  int closed = 0;                      // turns closed before it
 };
 
-// Touching. A loop is a polygon with corners a spacing apart, and thread is stiff: even a tight one stands off the tool by
-// half a millimeter at its corners, a slack one by two. So touching means within `reach` of the surface. Beyond the tip there
-// is no tool: what lies there slips off, however near it is.
+// Touching. A loop is a polygon with corners one spacing apart, and thread is stiff: even a tight one stands off the tool by
+// 0.5 mm at its corners, a slack one by 2 mm. So touching means within `reach` of the surface. Beyond the tip there is
+// no tool: thread there slips off, at any distance.
 bool touches(const LoopTool& tool, Vec3 p, float reach) {
   if (p.z < 0) return false;
   for (const Capsule& c : tool.capsule) {
@@ -43,7 +42,7 @@ bool touches(const LoopTool& tool, Vec3 p, float reach) {
   return false;
 }
 
-// Where the segment p-q crosses the segment a-b: at s of a-b and t of p-q, each of which owns its beginning and not its end, so
+// Where segment p-q crosses segment a-b: at s of a-b and t of p-q. Each segment includes its beginning but not its end, so
 // that a crossing at a corner counts once.
 bool cross(const Corner& a, const Corner& b, const Corner& p, const Corner& q, double& s, double& t) {
   const double ux = b.x - a.x, uy = b.y - a.y, vx = q.x - p.x, vy = q.y - p.y, wx = p.x - a.x, wy = p.y - a.y;
@@ -68,25 +67,25 @@ bool tip_inside(std::span<const Corner> polygon, double& twice_area) {
   return inside;
 }
 
-// Of two answers about the same thread the one that came further: no loop because of its depth is nearer to one than no
+// The verdict of the later test: a loop rejected by depth is closer to a loop than a run without a
 // crossing.
 bool better(const LoopVerdict& a, const LoopVerdict& b) {
   if (a.wraps != b.wraps) return a.wraps > b.wraps;
   return a.wraps == 0 && a.reason > b.reason;
 }
 
-// One run of consecutive particles that touch the tool, walked pair by pair in order. Every pair is tested against all pairs
-// before it. Where it crosses one, the thread between the crossing pairs is a closed polygon in the picture. The loop is
-// judged, then cut out, and the walk continues from the crossing: so every polygon is simple, for which the even-odd rule is
-// exact (a double turn judged as one polygon would count as outside), turns add up to the winding number, and a loop that comes
-// later is found like the first.
+// One run of consecutive particles that touch the tool, traversed pair by pair in order. Every pair is tested against all pairs
+// before it. At a crossing, the thread between the crossing pairs is a closed polygon in the projection. The loop is evaluated,
+// then removed, and traversal continues from the crossing. Every polygon is therefore simple, and the even-odd rule is exact (a
+// double turn as one polygon would count as outside). Turns add up to the winding number, and a later loop is found like
+// the first.
 void judge_run(const LoopTool& tool, const Vec4* x, std::span<const uint32_t> order, size_t begin, size_t end, float pair,
                LoopVerdict& best) {
-  // One particle more on each side: the crossing itself may lie in a pair that is just leaving the tool.
+  // One more particle on each side: the crossing itself may lie in a pair that is partly off the tool.
   const size_t from = begin > 0 ? begin - 1 : begin, to = std::min(order.size(), end + 1);
   std::array<Corner, kMostCorners> path;
   size_t corners = 0;
-  LoopVerdict turns;  // turns the same way, one after the other, are one loop
+  LoopVerdict turns;  // consecutive turns of equal sense are one loop
   int closed = 0;
   double angle = 0;
   for (size_t i = from; i < to && corners + 2 < kMostCorners; ++i) {
@@ -97,7 +96,7 @@ void judge_run(const LoopTool& tool, const Vec4* x, std::span<const uint32_t> or
       angle += portable::atan2(was.x * next.y - was.y * next.x, was.x * next.x + was.y * next.y);
     }
     best.round = std::max(best.round, static_cast<float>(std::abs(angle)));
-    // The pair may cross several: the nearest crossing first.
+    // The pair may cross several: nearest crossing first.
     while (corners >= 3) {
       double at = 2, along = 0;
       size_t crossed = 0;
@@ -118,11 +117,11 @@ void judge_run(const LoopTool& tool, const Vec4* x, std::span<const uint32_t> or
       path[corners] = crossing;
       double twice_area = 0;
       const bool inside = tip_inside({path.data() + crossed + 1, corners - crossed}, twice_area);
-      // First check: the loop encircles the tool, seen from the tip. Second check: its ends, one above the other where they
-      // cross, are no further apart along the tool than one pair of particles for each turn between them. Further apart it is
-      // a spiral, which no knot is tied with: pulled on, it runs along the tool and closes on nothing. Measured at the
-      // crossing and not at the particles next to it, the answer does not depend on where along the thread its particles
-      // happen to be.
+      // First check: the loop encircles the tool, seen from the tip. Second check: at the crossing, its ends are within one
+      // pair of particles along the tool for each turn between them. Beyond that it is a spiral, which does not form a knot:
+      // when pulled, it runs along the tool and closes on nothing. The distance is measured at the crossing, not at the
+      // particles next to it. The answer therefore does not depend on where along the thread the particles
+      // lie.
       const double depth = std::abs(crossing.depth_out - crossing.depth_in);
       if (!inside || last < first + kFewest - 1) {
         LoopVerdict v;
@@ -172,7 +171,7 @@ LoopVerdict find_loop(const Vec4* x, std::span<const uint32_t> order, const Loop
 
 namespace {
 
-// Locked by something else than the loop round that tool.
+// Locked by something other than the loop round that tool.
 bool is_held_elsewhere(const Strand& t, uint32_t slot, int body) {
   return is_anchored(t, slot) || std::any_of(t.hold.begin(), t.hold.end(), [&](const ThreadHold& h) {
            return h.slot == slot && !(h.body == body && h.kind == HoldKind::loop);
@@ -185,8 +184,8 @@ struct Found {
   uint32_t suture = 0;
 };
 
-// Figure 10 on every stretch of free thread of a strand. A suture point, a jaw and a cut end a stretch: thread beyond them is
-// not drawn through a loop. Adds to what was found before.
+// Figure 10 on every stretch of free thread of a strand. A suture point, a jaw and a cut end a stretch: thread beyond them
+// cannot be pulled through a loop. Adds to previous results.
 void look(const SutureContext& c, uint32_t suture, uint32_t who, Found& best) {
   const Strand& t = c.solver.strand[suture];
   const LoopTool tool{c.solver.body[who].pose(), c.model.body[who].capsule};
@@ -204,10 +203,10 @@ void look(const SutureContext& c, uint32_t suture, uint32_t who, Found& best) {
   }
 }
 
-// Handedness. What counts is the half knot that the loop becomes. Its two strands come out of the tissue, and the one that the
-// tool takes is drawn through the loop along the tool, from tip to hand; so the sign of the half knot is the way in which the
-// other, walked outward too, turns about that direction. It does not matter which end was wrapped or which way the tool points:
-// two throws with the same sign are a granny, with opposite signs a reef knot. The list runs from the free end to the needle:
+// Chirality: that of the half knot which the loop becomes. Its two strands leave the tissue, and the one that the tool grasps
+// is pulled through the loop along the tool, from tip to hand. The sign of the half knot is the sense in which the other one,
+// traversed outward too, turns about that direction. It is independent of which end was wrapped and of the tool's direction:
+// two throws with equal signs are a granny knot, with opposite signs a square knot. The list runs from free end to needle:
 // outward on the needle's side of the stitch, inward on the free end's.
 int32_t handedness(const Strand& t, const LoopVerdict& v) {
   for (size_t i = 0; i < v.first; ++i)
@@ -242,7 +241,7 @@ void freeze(OneSuture& s, uint32_t who, const LoopVerdict& v, int32_t chirality)
   s.all.report_tool(s.index, EventKind::loop_formed, who, loop.wraps, static_cast<float>(chirality), middle(s, v));
 }
 
-// One tool. A loop that it has already grows by what lies on it now; only its own thread counts then.
+// One tool. An existing loop on it grows by newly wrapped thread, of the same suture only.
 void find_loops_on(SutureContext& c, uint32_t who) {
   ToolLoop& loop = c.state.loop[who];
   const InstrumentState& hand = c.state.instrument[who];
@@ -261,8 +260,8 @@ void find_loops_on(SutureContext& c, uint32_t who) {
       return;
     }
   }
-  // A tool that holds something is at work with it. Thread that happens to lie round a needle driver while it drives the
-  // needle is no loop, and round jaws that hold the very thread there is nothing to draw through.
+  // A tool that holds something cannot have a loop. Thread round a needle holder that drives the needle is not a
+  // loop, and jaws that hold this thread have no other end to pull through.
   const bool free = hand.held == Held::nothing;
   if (!c.solver.body_collides[who] || !(free || (closes && hand.held == Held::thread))) return;
   Found found;
@@ -272,7 +271,7 @@ void find_loops_on(SutureContext& c, uint32_t who) {
   if (v.touching == 0) loop.reported = LoopReason::none;
   if (v.wraps == 0) {
     loop.ignored_until_clear = 0;
-    // Thread that is still being laid has not crossed itself yet: nothing is missing before the jaws close on the other end.
+    // Thread still being wrapped has not crossed itself yet: no rejection is reported before the jaws close on the other end.
     if (loop.wraps == 0 && v.touching >= kSeveral && v.reason != loop.reported &&
         (v.reason != LoopReason::no_crossing || (closes && v.round > kMostOfATurn))) {
       loop.reported = v.reason;
@@ -284,7 +283,7 @@ void find_loops_on(SutureContext& c, uint32_t who) {
   const int32_t chirality = handedness(s.strand, v);
   if (!free || loop.ignored_until_clear) return;
   if (loop.wraps > 0) {
-    // The frozen turns are seen again, with those that have been laid since.
+    // The frozen turns are detected again, with turns added since.
     const bool same =
         chirality == loop.chirality && v.first <= node_of(s.strand, loop.last) && node_of(s.strand, loop.first) <= v.last;
     if (!same || v.wraps <= loop.wraps) return;

@@ -21,8 +21,8 @@ RigidModel needle_body(const NeedleShape& shape) {
   }
   RigidModel m;
   m.inv_mass = 1 / shape.mass;
-  // Products of inertia vanish for a half circle; for other arcs they are small and left out. The floor keeps the thin
-  // direction from spinning faster than a substep can follow.
+  // Products of inertia vanish for a half circle; for other arcs they are small and omitted. The lower bound keeps the thin
+  // direction from spinning faster than a substep can resolve.
   const float least = 0.15f * shape.radius * shape.radius;
   m.inv_inertia = {1 / (shape.mass * std::max(least, static_cast<float>(yy))),
                    1 / (shape.mass * std::max(least, static_cast<float>(xx))), 1 / (shape.mass * static_cast<float>(xx + yy))};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// suture/needle: the curved swaged needle as a rigid body, and where it is.
+// suture/needle: the curved swaged needle as a rigid body, and its pose.
 // Frame: the body's origin is the center of mass of the arc; the circle lies in the body's xy plane (see NeedleArc).
 #pragma once
 #include "solver/attach.h"
@@ -14,7 +14,7 @@ struct NeedleShape {
 };
 
 NeedleArc needle_arc(const NeedleShape& shape);
-// Inertia of a thin arc of wire; capsules along the shaft but for the last fifth before the tip, which must be free to enter.
+// Inertia of a thin arc of wire; capsules along the shaft except the last fifth before the tip, which must be free to enter.
 RigidModel needle_body(const NeedleShape& shape);
 inline Vec3 needle_point(const NeedleArc& arc, const RigidBody& needle, float phi) {
   return transform(needle.pose(), arc.point(phi));

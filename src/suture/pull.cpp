@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // suture/pull: thread through suture points (paper 2.3, figures 7 to 9). Reads tensions and rest lengths; edits the order list,
-// never a slot. Thread slides at an anchor inside the solver (see solver/thread); here, when the pair on one side of an anchor
-// is used up, its particle passes: it takes its new place in the order and stands at the midpoint of the pair it splits (figure
-// 7c). Slack is resolved in the paper's order (figure 9) because tension is: a span with slack has none, so the anchor next to
-// the pull slides first, and the one behind it only when the span between them is taut.
+// never a slot. Thread slides at an anchor inside the solver (see solver/thread). When the pair on one side of an anchor is
+// used up, its particle passes here: it moves to its new place in the order, at the midpoint of the pair it splits (figure 7c).
+// Slack is resolved in the paper's order (figure 9) by tension: a slack span has none, so the anchor next to the pull slides
+// first, and the one behind it only when the span between them is taut.
 #include <algorithm>
 #include <array>
 
@@ -12,9 +12,9 @@
 namespace catgut {
 namespace {
 
-constexpr float kUsedUp = 0.1f;  // of the spacing: the pair beside an anchor is so short that its particle's turn has come
+constexpr float kUsedUp = 0.1f;  // of the spacing: below this length of the pair beside an anchor, its particle passes
 
-// Whether the particle beside the locked node i may pass it: there is one, it is free, and thread continues behind it.
+// Whether the particle beside the locked node i may pass it: it exists, it is free, and thread continues behind it.
 bool can_give_free(const Strand& t, size_t i) {
   return i >= 2 && i + 1 < t.order.size() && !is_locked(t, t.order[i - 1]) && !t.cut[i - 1] && !t.cut[i - 2] && !t.cut[i];
 }
@@ -22,7 +22,7 @@ bool can_give_needle(const Strand& t, size_t i) {
   return i >= 1 && i + 2 < t.order.size() && !is_locked(t, t.order[i + 1]) && !t.cut[i] && !t.cut[i + 1] && !t.cut[i - 1];
 }
 
-// Figure 7c: the particle beside the locked node i takes its place on the other side, at the midpoint of the pair it splits.
+// Figure 7c: the particle beside the locked node i moves to the other side, at the midpoint of the pair it splits.
 void pass(OneSuture& s, size_t i, bool toward_needle) {
   Strand& t = s.strand;
   SolverState& solver = s.all.solver;
@@ -35,7 +35,7 @@ void pass(OneSuture& s, size_t i, bool toward_needle) {
 }
 
 // "With a knot created, the suture pulling will perform the same slack check from the needle end but will stop checking when
-// the knot is found." Between the two particles of a knot the stitch is closed: no pull from outside gets there.
+// the knot is found." Between the two particles of a knot the stitch is closed: pulls from outside do not reach it.
 struct TiedNodes {
   static constexpr size_t kMost = 64;
   std::array<size_t, kMost> node;  // of locked knots' particles
@@ -59,7 +59,7 @@ bool is_tied(const Strand& t, const TiedNodes& knots, size_t i) {
 
 }  // namespace
 
-// Whether jaws draw thread that passes at node i that way: they hold it there, with no other suture point in between.
+// Whether jaws pull the thread that passes at node i in that direction: they hold it there, without a suture point between.
 static int drawing_instrument(const Strand& t, size_t i, int way) {
   for (size_t k = i; continues(t, k, way);) {
     k = way > 0 ? k + 1 : k - 1;
@@ -71,8 +71,8 @@ static int drawing_instrument(const Strand& t, size_t i, int way) {
   return -1;
 }
 
-// "Pulling" before the bite is done. The needle draws thread through holes too, and should; jaws on the thread should not. One
-// particle may have been about to pass when they took hold; with the second, thread as long as the way between two has come.
+// "Pulling" before the bite is complete. The needle pulls thread through holes by itself; jaws on the thread are an error. One
+// particle may pass at the moment of the grasp; at the second, thread of one spacing has been pulled.
 static void judge_drawing(OneSuture& s, const ThreadAnchor& a, bool toward_needle) {
   if (s.own.open.empty()) return;
   OpenBite& open = s.own.open.back();
@@ -83,7 +83,7 @@ static void judge_drawing(OneSuture& s, const ThreadAnchor& a, bool toward_needl
                      position_of(a, s.x()));
 }
 
-// A cut thread holds nothing together: as long as all of it, whatever is drawn.
+// A cut thread holds nothing together: return its whole length.
 static float length_between(const Strand& t, size_t a, size_t b) {
   return is_whole(t, a, b) ? rest_between(t, a, b) : rest_length(t);
 }
@@ -108,7 +108,7 @@ void spans(const Strand& t, const Suture& state, const Vec4* x, std::vector<floa
     for (const ThreadAnchor& knot : t.anchor) {
       const size_t node = knot.knotted ? node_of(t, knot.slot) : 0;
       if (node <= std::min(a, b) || node >= std::max(a, b)) continue;
-      const float beyond = rest_between(t, node, b);  // from the knot on; what lies before it cannot be drawn
+      const float beyond = rest_between(t, node, b);  // from the knot on; thread before it cannot be pulled
       span[k] = std::min(span[k], std::max(0.0f, beyond - distance(position_of(knot, x), position_of(here, x))));
     }
   }
@@ -120,8 +120,8 @@ void erase_anchor(Strand& strand, Suture& state, uint32_t anchor) {
     if (p.anchor > anchor) --p.anchor;
 }
 
-// Two holes may lie closer together than two particles of the thread, and the one before has just taken the last of them: the
-// next free particle behind passes the suture points up to the needle before its turn (figure 7c). False: there is none.
+// Two holes may be closer than two particles of the thread, and the previous hole has taken the last particle between. The
+// next free particle then passes the suture points up to the needle early (figure 7c). False: there is none.
 static bool bring_particle(OneSuture& s) {
   Strand& t = s.strand;
   SolverState& solver = s.all.solver;
@@ -147,7 +147,7 @@ bool place_suture_point(OneSuture& s, uint32_t bite, bool exit) {
   SolverState& solver = s.all.solver;
   if (t.order.size() < 3) return false;
   const size_t node = t.order.size() - 2;  // the last is the needle's
-  // A needle off which the thread was cut, or with a stump too short to follow it, leaves none in the hole.
+  // A needle without thread, or with a stump too short to follow it, leaves none in the hole.
   if (!is_swaged(t) || t.cut[node] || t.cut[node - 1]) return true;
   if (is_locked(t, t.order[node]) && !bring_particle(s)) return false;
   const uint32_t slot = t.order[node];
@@ -157,7 +157,7 @@ bool place_suture_point(OneSuture& s, uint32_t bite, bool exit) {
   a.point = end.point;
   a.friction = s.all.suture.pass_tension;
   a.capstan_friction = s.all.suture.capstan_friction;
-  // The particle steps forward to the hole. Rest length goes with it, so neither side is stretched or squeezed by that.
+  // The particle moves forward to the hole, with its rest length, so neither side is stretched or compressed.
   const Vec3 at = position_of(end.point, s.x());
   const float sum = t.rest[node - 1] + t.rest[node];
   const float to_needle = std::clamp(distance(at, s.at(t.order[node + 1])), 0.15f * s.thread.spacing, 0.9f * sum);
@@ -174,15 +174,15 @@ bool place_suture_point(OneSuture& s, uint32_t bite, bool exit) {
 void remove_last_suture_point(OneSuture& s) {
   Suture& own = s.own;
   if (own.point.empty() || own.open.empty() || own.point.back().bite != own.open.front().bite)
-    return;  // the needle was drawn through without thread
+    return;  // the needle was pulled through without thread
   const uint32_t anchor = own.point.back().anchor;
   own.point.pop_back();
   erase_anchor(s.strand, own, anchor);
 }
 
-// Two holes may follow each other with no particle between them. When the short pair between them is used up, the nearer hole
-// would hold the thread fast however hard it is pulled; so a little thread is drawn through the further one (or several of
-// them) as soon as the pull is more than the friction of all.
+// Two holes may be adjacent without a particle between them. When the short pair between them is used up, the nearer hole
+// would block the thread under any force. So a little thread is moved through the further one (or several of them) as soon as
+// the pull exceeds the friction of all.
 static void feed(Strand& t, const ThreadAnchor& a, size_t i, float used_up, float step) {
   if (a.knotted) return;
   auto hole = [&](size_t node) {
@@ -191,7 +191,7 @@ static void feed(Strand& t, const ThreadAnchor& a, size_t i, float used_up, floa
   };
   for (const int way : {1, -1}) {
     float resist = a.threshold();
-    const size_t nearest = way > 0 ? i - 1 : i;  // the pair on the side from which thread comes
+    const size_t nearest = way > 0 ? i - 1 : i;  // the pair on the side that supplies thread
     size_t pair = nearest;
     while (t.rest[pair] <= 2 * used_up) {
       const size_t node = way > 0 ? pair : pair + 1;  // its far end
@@ -210,7 +210,7 @@ static void feed(Strand& t, const ThreadAnchor& a, size_t i, float used_up, floa
   }
 }
 
-// What may pass at one anchor. `point`: the suture point that the anchor is, or -1 for the end of a loop on its way to the
+// What may pass at one anchor. `point`: the suture point of the anchor, or -1 for the end of a loop that moves to the
 // tissue.
 static void pass_at(OneSuture& s, const TiedNodes& knots, ThreadAnchor& a, int64_t point) {
   Strand& t = s.strand;
@@ -221,13 +221,13 @@ static void pass_at(OneSuture& s, const TiedNodes& knots, ThreadAnchor& a, int64
   feed(t, a, i, used_up, 0.25f * s.thread.spacing);
   const bool tied = is_tied(t, knots, i);
   const bool from_free = !tied && can_give_free(t, i), from_needle = !tied && can_give_needle(t, i);
-  // A cut end has no length to give, however much of the cut pair is written in the list.
+  // A cut end has no length to give, whatever the rest length of the cut pair.
   a.blocked_needle = tied || t.cut[i - 1] || t.cut[i] || (!from_free && t.rest[i - 1] <= used_up);
   a.blocked_free = tied || t.cut[i - 1] || t.cut[i] || (!from_needle && t.rest[i] <= used_up);
   if (point >= 0 && a.blocked_needle && !was_blocked && !tied && (i == 1 || t.cut[i - 1] || t.cut[i - 2]))
     s.report(EventKind::thread_exhausted, static_cast<uint32_t>(point), 0, position_of(a.point, s.x()));
 
-  // Toward the needle: the particle on the free side splits the pair on the needle side; the other way round for a pull on the
+  // Toward the needle: the particle on the free side splits the pair on the needle side; vice versa for a pull on the
   // tail.
   const bool forward = from_free && t.rest[i - 1] <= used_up;
   const bool backward = !forward && from_needle && t.rest[i] <= used_up;
@@ -242,7 +242,7 @@ void pull(SutureContext& c) {
   for (size_t k = 0; k < c.state.suture.size(); ++k) {
     OneSuture s(c, k);
     if (s.strand.anchor.empty()) continue;
-    const TiedNodes knots = tied_nodes(s.strand);  // no particle passes a knot, so they stay true while others pass
+    const TiedNodes knots = tied_nodes(s.strand);  // no particle passes a knot, so they stay valid while others pass
     for (size_t p = s.own.point.size(); p-- > 0;)
       pass_at(s, knots, s.strand.anchor[s.own.point[p].anchor], static_cast<int64_t>(p));
     for (const Knot& knot : s.own.knot)

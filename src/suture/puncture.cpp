@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // suture/puncture: the needle's two triggers (paper 2.2, figures 4 and 5). Reads the needle and the tissue's surface; writes
-// bites, the attachment of the nearest particle, the channel in which the shaft runs, and asks for suture points. The tip is
-// tracked against the surface itself, so a bite keeps where it went in and out to a fraction of a millimeter; the nearest
-// particle is what drags the tissue along, as in the paper.
+// bites, the attachment of the nearest particle, the needle track of the shaft, and requests suture points. The tip is tracked
+// against the surface itself, so entry and exit of a bite are accurate to a fraction of a millimeter. The nearest
+// particle drags the tissue along, as in the paper.
 #include <algorithm>
 #include <cmath>
 
@@ -11,12 +11,12 @@
 namespace catgut {
 namespace {
 
-constexpr float kReach = 0.008f;         // [m] the tip looks this far for the surface
+constexpr float kReach = 0.008f;         // [m] search distance of the tip for the surface
 constexpr float kEndReached = 0.0008f;   // [m] along the shaft: an end of the needle is at the hole
-constexpr float kNewWall = 0.0015f;      // [m] of shaft beyond the last exit: the tip goes in again, it was not withdrawn
-constexpr float kHysteresis = 0.00002f;  // [m] so that a tip resting on the surface does not chatter
-constexpr float kBackOut = 0.002f;       // [m] of shaft outside the entry again: the thread is no longer in the hole
-constexpr float kOnShaft = 0.0015f;      // [m] a hole this near to the shaft has the shaft in it
+constexpr float kNewWall = 0.0015f;      // [m] of shaft beyond the last exit: a new entry rather than a withdrawal
+constexpr float kHysteresis = 0.00002f;  // [m] so that a tip resting on the surface does not toggle
+constexpr float kBackOut = 0.002f;       // [m] of shaft outside the entry again: the thread has left the hole
+constexpr float kOnShaft = 0.0015f;      // [m] a hole within this distance of the shaft contains the shaft
 
 uint32_t hole_of(uint32_t bite, bool exit) { return 2 * bite + exit; }
 
@@ -40,7 +40,7 @@ void drop_attachment(OneSuture& s) {
   s.own.attached = false;
 }
 
-// The newest bite is out again the way it came. Its record stays, marked; everything that held needle or tissue there goes.
+// The newest bite was withdrawn. Its record stays, marked; everything that held needle or tissue there is removed.
 void cancel_bite(OneSuture& s, Vec3 tip) {
   const uint32_t which = s.own.open.back().bite;
   Bite& bite = s.own.bite[which];
@@ -53,7 +53,7 @@ void cancel_bite(OneSuture& s, Vec3 tip) {
   s.report(EventKind::bite_withdrawn, which, bite.depth, tip);
 }
 
-// Where a needle's tip is in a substep.
+// State of a needle's tip in a substep.
 struct Tip {
   Vec3 at;
   SurfaceHit hit;  // valid if near
@@ -67,7 +67,7 @@ float along(const OneSuture& s, const BiteEnd& end) {
 }
 float tip_along(const OneSuture& s) { return s.arc.radius * s.arc.arc; }
 
-// Figure 5: a particle that is dragged beyond the threshold is let go and the tissue relaxes.
+// Figure 5: a particle dragged beyond the threshold is released and the tissue relaxes.
 void release_dragged(OneSuture& s, const Bite& bite) {
   if (!s.own.attached) return;
   const float dragged = distance(s.at(bite.nearest), s.own.attached_from);
@@ -79,7 +79,7 @@ void release_dragged(OneSuture& s, const Bite& bite) {
   s.report(EventKind::particle_released, bite.nearest, dragged, s.at(bite.nearest));
 }
 
-// NeedlePhase::tip_in, of the newest wall: the tip goes deeper, or comes out on the far side, or the way it came.
+// NeedlePhase::tip_in, of the newest wall: the tip moves deeper, exits on the far side, or is withdrawn.
 void in_wall(OneSuture& s, const Tip& tip) {
   const uint32_t which = s.own.open.back().bite;
   Bite& bite = s.own.bite[which];
@@ -109,13 +109,13 @@ bool drawn_back(OneSuture& s, const Tip& tip) {
     bite.has_exit = false;
     close_hole(s, which, true);
     s.own.open.back().phase = NeedlePhase::tip_in;
-  } else {  // torn back through both holes between two substeps: the tip was never seen in the wall
+  } else {  // pulled back through both holes between two substeps: the tip was never inside the wall
     cancel_bite(s, tip.at);
   }
   return true;
 }
 
-// The tip has come to a wall, and the newest one lies far enough behind it: a new bite.
+// The tip has reached a wall, and the newest one lies far enough behind it: a new bite.
 void enter(OneSuture& s, const Tip& tip) {
   const SolverModel& model = s.all.model;
   const uint32_t which = static_cast<uint32_t>(s.own.bite.size());
@@ -161,7 +161,7 @@ void move_back_end(OneSuture& s) {
   const Vec3 entry = position_of(bite.entry.point, s.x());
   if (entry_at > kBackOut && entry_at < 0.5f * tip_along(s) &&
       distance(entry, needle_point(s.arc, s.body(), entry_at / s.arc.radius)) < kOnShaft) {
-    // The back end came out of the entry again: the thread has left the hole, the shaft is in it.
+    // The back end has left the entry again: the thread is out of the hole, the shaft is in it.
     remove_last_suture_point(s);
     open_hole(s, which, false);
     oldest.phase = NeedlePhase::through;
@@ -181,7 +181,7 @@ void puncture(OneSuture& s) {
   tip.near = nearest_surface(c.model, c.scratch.candidates, s.x(), tip.at, kReach, tip.hit);
   tip.was_inside = s.own.tip_inside;
   tip.inside = tip.near && tip.hit.distance < (tip.was_inside ? kHysteresis : -kHysteresis);
-  // A needle that lies about pierces nothing: it weighs a few millinewtons.
+  // A needle at rest punctures nothing: its weight is a few millinewtons.
   tip.held =
       std::any_of(c.solver.weld.begin(), c.solver.weld.end(), [&](const Weld& w) { return w.a == static_cast<int>(s.needle); });
   s.own.tip_inside = tip.inside && (tip.held || !s.own.open.empty());
@@ -195,7 +195,7 @@ void puncture(OneSuture& s) {
     if (tip.held && tip.inside && !tip.was_inside && beyond) enter(s, tip);
   }
   if (!s.own.open.empty() && s.own.open.front().phase >= NeedlePhase::through) move_back_end(s);
-  // In the tissue the shaft is held by its channel, not by the surface.
+  // In tissue, the needle track holds the shaft, not the surface.
   c.solver.body_collides[s.needle] = s.own.open.empty();
 }
 
@@ -212,7 +212,7 @@ void spread(const SolverModel& model, BiteEnd& end) {
   }
   const uint32_t* member = model.shape.member.data() + size_t{model.shape.cluster_of[t[nearest]]} * model.shape.cluster_stride;
   uint32_t count = 0;
-  while (count < model.shape.cluster_stride && member[count] < model.tissue) ++count;  // the pad names no particle
+  while (count < model.shape.cluster_stride && member[count] < model.tissue) ++count;  // padding is not a particle
   end.point = spread_point({member, count}, rest, at);
 }
 
@@ -237,7 +237,7 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
       hit.end.triangle = f;
       hit.end.weight = on.weight;
     } else if (d <= best * 1.0001f + 1e-14f) {
-      normal += n;  // on a shared edge or corner: the mean of the faces decides inside or outside
+      normal += n;  // on a shared edge or corner: the mean normal decides inside or outside
     }
   };
   std::array<uint32_t, 96> seen;

@@ -12,9 +12,9 @@
 namespace catgut {
 namespace {
 
-constexpr float kSameAngle = 0.005f;  // [rad] a tenth of a millimeter on the rim
+constexpr float kSameAngle = 0.005f;  // [rad] 0.1 mm on the rim
 
-// From u to v about the unit vector axis, -pi..pi.
+// Signed angle from u to v about the unit vector axis, -pi..pi.
 float signed_angle(Vec3 u, Vec3 v, Vec3 axis) {
   u -= axis * dot(u, axis);
   v -= axis * dot(v, axis);
@@ -25,7 +25,7 @@ struct Ring {
   Vec3 center, axis;
 };
 
-// cp of 2.5.4, and the way that the ring faces.
+// cp of 2.5.4, and the direction that the ring faces.
 Ring ring_of(const LembertModel& model, const Vec4* x) {
   Ring ring;
   for (const auto* group : {&model.outer, &model.inner})
@@ -38,7 +38,7 @@ Ring ring_of(const LembertModel& model, const Vec4* x) {
   return ring;
 }
 
-// The place nearest to p on the line through a group's particles, the nearer of its two particles first.
+// The nearest point to p on the line through a group's particles, the nearer of its two particles first.
 EmbeddedPoint on_ring(std::span<const uint32_t> group, const Vec4* x, Vec3 p) {
   const size_t n = group.size();
   float best = std::numeric_limits<float>::max(), at = 0;
@@ -93,8 +93,8 @@ void pair_between(const LembertModel& model, LembertState& state, const Techniqu
 
 // "The closest particle in pg_i and pg_o is found and they are pulled to their midpoint when a knot is tied. When a subsequent
 // suture point is placed, particles in pg_i and pg_o between the two suture points are pulled together." On the inner side we
-// take the place between two particles, and where the outer particle is drawn already, the stitch holds that pair: stitches
-// closer to each other than particles would draw one particle to several places.
+// take the point between two particles. Where the outer particle is already pulled, the stitch uses that pair: stitches
+// closer than the particle spacing would otherwise pull one particle to several targets.
 void tie(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan) {
   Vec3 at{};
   for (const StitchPoint& p : view.point) at += p.at;
@@ -106,7 +106,7 @@ void tie(const LembertModel& model, LembertState& state, const TechniqueView& vi
   state.stitch.push_back({static_cast<uint32_t>(drawn - plan.pair.begin()), view.suture_index, 1});
   if (drawn != plan.pair.end()) drawn->midpoint = 1;
   else add_pair(model, state, view.x, particle_point(nearest), on_ring(model.inner, view.x, at), {stitch, stitch, 0}, 1, plan);
-  // The nearest stitch each way round.
+  // The nearest stitch in each direction.
   for (const float way : {1.0f, -1.0f}) {
     float least = model.widest;
     int neighbor = -1;
@@ -132,7 +132,7 @@ bool is_between(Vec3 v1, Vec3 v2, Vec3 vp, Vec3 axis) {
 void lembert(const LembertModel& model, LembertState& state, const TechniqueView& view, ClosurePlan& plan, EventList& events) {
   if (model.outer.size() < 3 || model.inner.size() < 3) return;
   merge_reported(events, state.reported);
-  // Whatever ends a suture: too few throws hold nothing.
+  // However a suture ends: too few throws hold nothing.
   const auto end_suture = [&] {
     if (state.throws == 0 || state.throws >= static_cast<uint32_t>(model.throws)) return;
     const Vec3 where = view.point.empty() ? Vec3{} : view.point.back().at;
@@ -151,7 +151,7 @@ void lembert(const LembertModel& model, LembertState& state, const TechniqueView
   if (!view.knot.empty()) state.knot = static_cast<uint32_t>(view.knot.size()) - 1;
   if (first && state.throws > 0 && !view.point.empty()) {
     if (one_wall(walls_taken(view.point))) {
-      // Tied to itself: it draws no layer to the other.
+      // Tied to itself: it joins no layers.
       report_fault(Fault::one_wall_only, view.point.back().bite, view.point.back().at, state.reported, events);
     } else {
       tie(model, state, view, plan);
@@ -181,7 +181,7 @@ const TechniqueRow kLembert{
     .interrupted = true,
     .begin =
         [](const TechniqueSetup& s, TechniqueModel& model) {
-          // The sides that face each other: what is drawn together meets there, with no wall in between.
+          // The sides that face each other: closed points meet there, without a wall between.
           LembertModel& m = model.lembert;
           m.outer = s.rim[0].inner, m.inner = s.rim[1].outer;
           m.gap = s.gap, m.compliance = s.compliance, m.throws = s.throws;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// technique/purse_string: reads suture points and thread length, answers with a ClosurePlan. Paper 2.5.1, figure 11.
+// technique/purse_string: reads suture points and thread length, returns a ClosurePlan. Paper 2.5.1, figure 11.
 #include "technique/purse_string.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace catgut {
 namespace {
 
-constexpr float kRoom = 1.3f;  // length of thread round the closed edge, over the bare way round it
+constexpr float kRoom = 1.3f;  // length of thread in the closed edge, relative to the path round it
 
 Vec3 center_of(std::span<const uint32_t> rim, const Vec4* x) {
   Vec3 c{};
@@ -25,7 +25,7 @@ Vec3 newell(std::span<const uint32_t> rim, const Vec4* x) {
   return n;
 }
 
-// How far round the opening the suture points go, as a signed angle [rad] about the axis.
+// Angle that the suture points cover round the opening, signed [rad] about the axis.
 float turned(std::span<const Vec3> sp, Vec3 center, Vec3 axis) {
   float sum = 0;
   for (size_t i = 0; i + 1 < sp.size(); ++i) {
@@ -43,7 +43,7 @@ float opening_area(std::span<const uint32_t> rim, const Vec4* x) { return 0.5f *
 
 int first_out_of_order(std::span<const Vec3> sp, size_t from) {
   const size_t n = sp.size();
-  if (n < 4) return -1;  // fewer than three others to choose from: nothing to tell
+  if (n < 4) return -1;  // fewer than three others to choose from: undecided
   for (size_t i = from; i < n; ++i) {
     std::array<size_t, 3> next{};
     for (size_t k = 0; k < 3; ++k) next[k] = i + 3 < n ? i + 1 + k : (i + 1 + k) % n;
@@ -64,12 +64,12 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
   if (state.area_start == 0) state.area_start = opening_area(model.rim_inner, x);
   state.checked = std::min(state.checked, static_cast<uint32_t>(sp.size()));
   if (state.finished) return;
-  if (sp.empty()) {  // settled as far as it was drawn, or taken away: no thread leads it
+  if (sp.empty()) {  // baked in its present state, or removed: no thread controls the closure
     state.ring_complete = state.ring_complete && state.closing;
     return;
   }
 
-  // The way round from point to point, and whether those that were not looked at yet lie in order, now that all are known.
+  // The path from point to point, and whether points not checked yet lie in order, now that all are known.
   const auto measure_ring = [&] {
     state.path_start = 0;
     for (size_t i = 0; i + 1 < sp.size(); ++i) state.path_start += distance(sp[i], sp[i + 1]);
@@ -79,14 +79,14 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
                     sp[(state.checked + 1) % sp.size()]});
   };
   if (!state.ring_complete) {
-    // While the ring grows, a point can be checked once three more follow it.
+    // While the ring is incomplete, a point can be checked once three more follow it.
     for (; state.checked + 3 < sp.size(); ++state.checked)
       if (first_out_of_order(std::span(sp).subspan(state.checked, 4)) == 0)
         events.add({EventKind::bite_out_of_order, 0, state.checked + 1, 0, sp[state.checked + 1]});
     const Vec3 center = center_of(model.rim_outer, x), axis = normalized(newell(model.rim_outer, x));
-    if (sp.size() < 2 * static_cast<size_t>(model.min_bites) || sp.size() % 2 != 0) return;  // even: no bite half done
+    if (sp.size() < 2 * static_cast<size_t>(model.min_bites) || sp.size() % 2 != 0) return;  // even: no incomplete bite
     const float angle = std::abs(turned(sp, center, axis));
-    // The way back from the last to the first is at most one and a half of the largest steps so far.
+    // The distance from the last point to the first is at most 1.5 of the largest step so far.
     float step = 0;
     for (size_t i = 0; i + 1 < sp.size(); ++i) step = std::max(step, distance(sp[i], sp[i + 1]));
     if (angle < kPi || distance(sp.back(), sp.front()) > 1.5f * step) return;
@@ -97,9 +97,9 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
   }
 
   if (!state.closing) {
-    // One more bite than the ring needs: its thread is part of the way round.
+    // One more bite than the ring needs: its thread adds to the path.
     if (state.checked < sp.size() && sp.size() % 2 == 0) measure_ring();
-    // Closing begins when the thread in the ring is as short as the way round it: the slack is out.
+    // Closing starts when the thread in the ring is as short as the path: the slack is out.
     if (loop > 0.995f * state.path_start) return;
     state.closing = true;
     const Vec3 center = center_of(model.rim_outer, x), axis = normalized(newell(model.rim_outer, x));
@@ -108,7 +108,7 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
       Vec3 out = from - anvil;
       const float height = dot(out, axis);
       out -= axis * height;
-      // Gathered tissue keeps a little of its height, so that the edge does not fold into a single plane.
+      // Gathered tissue keeps a little of its height, so that the edge does not collapse into a plane.
       return anvil + normalized(out) * radius + axis * (0.5f * height);
     };
     auto add_pull = [&](const EmbeddedPoint& p, float radius) {
@@ -123,8 +123,8 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
     state.path_end = 0;
     const size_t first = plan.pull.size() - view.point.size();
     for (size_t i = first; i + 1 < plan.pull.size(); ++i) state.path_end += distance(plan.pull[i].to, plan.pull[i + 1].to);
-    // Gathered tissue takes up room on the thread: closing is led by the thread, but the edge arrives before the loop is as
-    // short as the bare way round. What is left then is drawn up against the tissue itself.
+    // Gathered tissue takes up length on the thread. The thread controls closing, but the edge arrives before the loop is as
+    // short as the bare path. The remaining thread is pulled against the tissue itself.
     state.path_end *= kRoom;
     events.add({EventKind::closure_started, 0, 0, opening_area(model.rim_inner, x), anvil});
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// technique/reflect: the members of the techniques' state, for archives (core/reflect.h). Their rows are those of the plan:
+// technique/reflect: the members of the techniques' state, for archives (core/reflect.h). Their rows correspond to the plan's:
 // load_state checks that.
 #pragma once
 #include "suture/reflect.h"

@@ -11,10 +11,10 @@
 namespace catgut {
 namespace {
 
-// Thread that is left between two points when they count as drawn together, beyond the gap: it bends round two edges.
+// Extra thread between two points that count as closed, beyond the gap: it bends round two edges.
 constexpr float kRoom = 0.001f;  // [m]
 
-// The bites that are done, in the order in which the thread runs through them.
+// Completed bites, in their order along the thread.
 void find_passes(const TechniqueView& view, size_t points, std::vector<Pass>& pass) {
   pass.clear();
   for (size_t i = 0; i < points; ++i) {
@@ -36,7 +36,7 @@ void pair_in_between(const SeamModel& model, SeamState& state, const Vec4* x, Ve
     const bool used = std::any_of(plan.pair.begin(), plan.pair.end(), [&](const ClosurePlan::Pair& p) {
       return !p.midpoint && (p.a.particle[0] == a || p.b.particle[0] == b);
     });
-    if (used) continue;  // the line is cut finer than the rim: its neighbor has this particle
+    if (used) continue;  // the line is sampled finer than the rim: its neighbor has this particle
     const float apart = distance(xyz(x[a]), xyz(x[b]));
     plan.pair.push_back({particle_point(a), particle_point(b), apart, std::min(apart, model.gap), 0, 0});
     SeamRow row;
@@ -58,7 +58,7 @@ void add_midpoint(const SeamModel& model, SeamState& state, const TechniqueView&
   SeamRow row;
   row.leader = static_cast<uint32_t>(plan.pair.size()) - 1;
   row.point = static_cast<uint32_t>(k);
-  row.from = std::min(a.span, apart);  // slack is pulled out first: nothing moves before the thread is straight
+  row.from = std::min(a.span, apart);  // slack is pulled out first: closing starts when the thread is straight
   state.row.push_back(row);
   if (last < 0) return;
   const ClosurePlan::Pair& before = plan.pair[static_cast<size_t>(last)];
@@ -69,7 +69,7 @@ void add_midpoint(const SeamModel& model, SeamState& state, const TechniqueView&
 }  // namespace
 
 // A A B B A A ...: each first pass from outside in, each second from inside out. After a fault the pattern continues from the
-// bite that broke it, so that one mistake is one fault.
+// faulty bite, so that one mistake is one fault.
 Fault judge_connell(std::span<const Pass> pass) {
   uint32_t wall = 0, in_run = 0;
   Fault fault = Fault::none;
@@ -102,7 +102,7 @@ Fault judge_stay(std::span<const Pass> pass) {
 void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, ClosurePlan& plan, EventList& events) {
   merge_reported(events, state.reported);
   if (view.suture_index != state.suture_index) {
-    // A fresh suture: what no knot holds has lost its thread.
+    // A new suture: rows without a knot have lost their thread.
     for (size_t r = state.first_row; r < state.row.size(); ++r)
       if (state.row[r].hold == SeamHold::thread) state.row[r].hold = SeamHold::nothing;
     state.suture_index = view.suture_index;
@@ -124,7 +124,7 @@ void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, C
     for (; state.passes < pass.size(); ++state.passes) {
       const std::span<const Pass> so_far(pass.data(), state.passes + 1);
       const Fault fault = model.connell ? judge_connell(so_far) : judge_stay(so_far);
-      uint32_t fresh = 0;  // every bite that is out of order is reported, once
+      uint32_t fresh = 0;  // every bite out of order is reported, once
       if (fault != Fault::none) report_fault(fault, pass[state.passes].bite, view.point[points - 1].at, fresh, events);
     }
     // "If the two most recent suture points are on the same soft body, the thread is simply pulled through without closing the
@@ -135,7 +135,7 @@ void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, C
     state.points = static_cast<uint32_t>(points);
   }
 
-  // A throw that locked in this tick holds everything that was made before it.
+  // A throw locked in this tick holds all earlier rows.
   const uint32_t throws = locked_throws(view.knot);
   if (throws > state.throws) {
     for (size_t r = state.first_row; r < state.row.size(); ++r)
@@ -143,7 +143,7 @@ void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, C
   }
   state.throws = throws;
 
-  // Leaders first, then those they lead: a leader stands before its rows.
+  // Leaders first, then their followers: a leader stands before its rows.
   for (uint32_t r = 0; r < state.row.size(); ++r) {
     SeamRow& row = state.row[r];
     ClosurePlan::Pair& pair = plan.pair[r];

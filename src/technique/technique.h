@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// technique: which points close with which, and when (paper 2.5). A technique reads what happened in the tick (bites, suture
-// points, knots, events) and answers with a ClosurePlan and with events that say what was wrong. It moves nothing itself.
-// A technique is one row of `techniques()` and one file, which ends in its row. Its name is compared nowhere else.
+// technique: which points close with which, and when (paper 2.5). A technique reads the events and geometry of the tick (bites,
+// suture points, knots) and returns a ClosurePlan and fault events. It moves nothing itself.
+// A technique is one row of `techniques()` and one file, which ends in its row. No other code compares its name.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -32,39 +32,39 @@ struct TechniqueState {
   LembertState lembert;
 };
 
-// What a scene gives its technique.
+// Inputs of a technique from the scene.
 struct TechniqueSetup {
-  std::span<const Rim> rim;  // of the walls, in their order
+  std::span<const Rim> rim;  // of the walls, in order
   float wall = 0;            // [m] thickness
   Vec3 anvil;                // [m] relative to the rim's center
   float anvil_radius = 0;    // [m]
-  float compliance = 0;      // [m/N] of the closing pull
-  float gap = 0, step = 0;   // [m] left between two points, between two pairs
+  float compliance = 0;      // [m/N] of the closing constraint
+  float gap = 0, step = 0;   // [m] gap of closed points, distance of interpolated pairs
   int min_bites = 0, throws = 0;
 };
 
 struct TechniqueRow {
   const char* name;
-  size_t walls;                  // open rims that it needs
-  const char *missing, *remedy;  // what is wrong, and what to do, where a scene has fewer
+  size_t walls;                  // number of open rims that it needs
+  const char *missing, *remedy;  // message for a scene with fewer, and its remedy
   bool interrupted;              // every stitch is a suture of its own
   void (*begin)(const TechniqueSetup& setup, TechniqueModel& model);
-  // Once a tick, after its substeps. events: those of the tick so far; the technique adds its own.
+  // Once per tick, after its substeps. events: those of the tick so far; the technique adds its own.
   void (*tick)(const TechniqueModel& model, TechniqueState& state, const TechniqueView& view, ClosurePlan& plan,
                EventList& events);
-  // Whether a state that was read belongs to a plan of so many rows and so many suture points.
+  // Whether a loaded state is consistent with a plan of so many rows and so many suture points.
   bool (*fits)(const TechniqueState& state, size_t rows, size_t points);
 };
 extern const TechniqueRow kPurseString, kConnell, kStay, kLembert;  // each at the end of its file
 
 std::span<const TechniqueRow* const> techniques();
-const TechniqueRow* find_technique(std::string_view name);  // null: there is none of that name
-// "purse_string|connell|...|none": what a scene may say.
+const TechniqueRow* find_technique(std::string_view name);  // null: unknown name
+// "purse_string|connell|...|none": the valid values of a scene's key.
 const char* technique_choices();
 
 void technique(const TechniqueModel& model, TechniqueState& state, const TechniqueView& view, ClosurePlan& plan,
                EventList& events);
-// Rows of a technique that is not the scene's are empty.
+// Rows of a technique other than the scene's are empty.
 bool technique_fits(const TechniqueModel& model, const TechniqueState& state, size_t rows, size_t points);
 
 }  // namespace catgut

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// technique/view: what a technique may see of the tick. Plain spans into the simulation's state, valid during the call.
+// technique/view: a technique's read-only view of the tick. Plain spans into the simulation's state, valid during the call.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -9,9 +9,9 @@
 
 namespace catgut {
 
-// One end of a bite as the techniques see it.
+// One end of a bite, for the techniques.
 struct StitchPoint {
-  Vec3 at;              // [m] now
+  Vec3 at;              // [m] current position
   EmbeddedPoint point;  // the same, carried by the tissue
   uint32_t bite = 0;    // index in `bite`
   uint32_t wall = 0;    // bowel end (connell, stay) or layer (lembert: 0 outer, 1 inner)
@@ -21,13 +21,13 @@ struct StitchPoint {
 };
 
 struct TechniqueView {
-  std::span<const StitchPoint> point;  // the suture points in the order in which they were made
+  std::span<const StitchPoint> point;  // the suture points in order of creation
   std::span<const Bite> bite;
   std::span<const Knot> knot;
   const Vec4* x = nullptr;  // particle positions [m]
   float loop = 0;           // [m] rest length of thread from the first suture point to the last
   bool needle_in_tissue = false;
-  uint32_t suture_index = 0;  // fresh sutures so far: points and knots before that are settled and no longer listed
+  uint32_t suture_index = 0;  // baked sutures so far: their points and knots are no longer listed
   float dt = 0;               // [s] length of a tick
 };
 
