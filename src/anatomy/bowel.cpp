@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// anatomy/bowel: builds the tube ring by ring and hands the sheet to the wall. Reads a BowelShape.
+// anatomy/bowel: builds the tube ring by ring and passes the sheet to anatomy/wall. Reads a BowelShape.
 #include "anatomy/bowel.h"
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kTwoPi = 6.283185307179586;
 constexpr int kFewest = 120, kMost = 200000;
-constexpr float kLeastGap = 0.001f;  // [m] between the two walls of a folded bowel: they must not touch at rest
+constexpr float kLeastGap = 0.001f;  // [m] between the two walls of a folded bowel: no contact at rest
 constexpr int kPictureVertices = 18000;
 
 void check(const BowelShape& b) {
@@ -74,7 +74,7 @@ struct Ring {
   uint32_t first;  // sheet vertex
 };
 
-// How many vertices each of `rings` evenly spaced rings gets when a full ring has `full`: fewer where a dome narrows.
+// Number of vertices of each of `rings` evenly spaced rings when a full ring has `full`: fewer where a dome narrows.
 std::vector<int> ring_counts(const BowelShape& shape, const BowelSurface& surface, int rings, int full) {
   std::vector<int> count(rings);
   for (int i = 0; i < rings; ++i) {
@@ -91,8 +91,8 @@ int sum(const std::vector<int>& count) {
   return total;
 }
 
-// Rings whose vertices sum to exactly n with triangles as near equilateral as rings allow. What is left over after equal
-// rings goes one each to the rings of the far end, where the surroundings hold the bowel and an odd ring hurts least.
+// Rings whose vertices sum to exactly n, with triangles as near equilateral as rings allow. The remainder after equal rings
+// goes one each to the rings of the far end, where the bowel is fixed and an odd ring matters least.
 std::vector<Ring> lay_rings(const BowelShape& shape, const BowelSurface& surface, int n) {
   std::vector<int> best;
   double best_fault = 1e30;
@@ -126,12 +126,12 @@ std::vector<Ring> lay_rings(const BowelShape& shape, const BowelSurface& surface
     ring.push_back(
         {surface.profile_length() * static_cast<double>(i) / static_cast<double>(best.size() - 1), phase, best[i], first});
     first += static_cast<uint32_t>(best[i]);
-    phase += (i % 2 == 0 ? 0.5 : -0.5) * kTwoPi / best[i];  // half a step on, half a step back: no spiral
+    phase += (i % 2 == 0 ? 0.5 : -0.5) * kTwoPi / best[i];  // half a step forward, half a step back: no spiral
   }
   return ring;
 }
 
-// Fills the strip between two rings, always taking the shorter of the two possible next edges.
+// Fills the strip between two rings, always with the shorter of the two possible next edges.
 void zip(const Ring& a, const Ring& b, std::vector<Triangle>& triangle) {
   const double da = kTwoPi / a.count, db = kTwoPi / b.count;
   const long start = b.count > 1 ? std::lround((a.phase - b.phase) / db) : 0;  // the vertex of b nearest to a's first
@@ -147,7 +147,7 @@ void zip(const Ring& a, const Ring& b, std::vector<Triangle>& triangle) {
   }
 }
 
-// One tube. vertices: of its picture, rim edges on top; everted: turned inside out, mucosa on its outer side.
+// One tube. vertices: of its visible mesh, rim edges in addition; everted: turned inside out, mucosa on its outer side.
 BodyRest make_tube(const BowelShape& shape, int vertices, bool everted) {
   const BowelSurface surface(shape);
   const std::vector<Ring> rings = lay_rings(shape, surface, shape.particles / 2);
@@ -187,7 +187,7 @@ BodyRest make_tube(const BowelShape& shape, int vertices, bool everted) {
   return body;
 }
 
-// Adds `more` as the next wall: its particles follow, nothing of it is tied to what is there already.
+// Adds `more` as the next wall: its particles follow, unconnected to the existing ones.
 void join(BodyRest& body, BodyRest&& more) {
   const uint32_t first = static_cast<uint32_t>(body.position.size()),
                  vertex = static_cast<uint32_t>(body.visible.position.size());
@@ -229,9 +229,9 @@ BodyRest make_bowel(const BowelShape& shape) {
   BowelShape outer = shape, inner = shape;
   outer.inner_radius = inner.inner_radius = 0;
   inner.radius = shape.inner_radius;
-  outer.taeniae = 0;  // a rectum has none; the folds that remain are the rings that a prolapse shows
+  outer.taeniae = 0;  // a rectum has none; the remaining folds are the rings of a prolapse
   const float part = shape.radius / (shape.radius + shape.inner_radius);
-  // An even number, so that the odd particle, if there is one, is the inner tube's and outer sides keep even indices.
+  // An even number, so that an odd particle, if any, is the inner tube's and outer sides keep even indices.
   outer.particles = 2 * static_cast<int>(std::lround(0.5f * part * static_cast<float>(shape.particles)));
   inner.particles = shape.particles - outer.particles;
   const int vertices = static_cast<int>(part * kPictureVertices);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // anatomy/bowel: makes a piece of large bowel at rest: a tube with a wall, sacculations (haustra) between longitudinal bands
-// (taeniae), serosa outside and mucosa inside, open or closed ends. No mesh from outside is needed.
+// (taeniae), serosa outside and mucosa inside, open or closed ends. Needs no external mesh.
 #pragma once
 #include <string>
 
@@ -19,20 +19,20 @@ struct BowelShape {
   float haustra = 0.0008f;       // [m] depth of folds and bands; fades out toward both ends, so that a rim is a true circle
   int taeniae = 3;               // longitudinal bands, 0..12
   Vec3 position;                 // [m] center of the near end's rim (closed: the top of its dome)
-  Vec3 axis{0, 1, 0};            // the way the near end faces; need not be of unit length
+  Vec3 axis{0, 1, 0};            // direction that the near end faces; any length
   float density = 1050;          // [kg/m^3]
-  float pinned_length = 0.008f;  // [m] of the far end that the surroundings hold; 0 holds nothing
+  float pinned_length = 0.008f;  // [m] length of the far end that is fixed; 0: none
   float inner_radius = 0;        // [m] outer radius of a second tube inside the first; 0: none
 };
 
-// Particles run ring by ring from the near end; a place on the sheet is two neighboring particles, outer (even index) then
-// inner (odd index). rim[0] is the near end, rim[1] the far end, as far as they are open; a rim runs counter-clockwise seen
+// Particles run ring by ring from the near end; a sheet vertex is two neighboring particles, outer (even index) then
+// inner (odd index). rim[0] is the near end, rim[1] the far end, if open; a rim runs counter-clockwise seen
 // from outside its opening. visible: about 20,000 vertices whose outer side passes through the outer particles.
 //
-// inner_radius > 0: what is left when a prolapsed rectum was cut off (paper 2.5.4). A prolapse is bowel that has slid out
-// through itself: the outer tube is rectum turned inside out, so its mucosa is seen from outside; the inner tube is the colon
-// that followed, the right way out; between the two, serosa faces serosa. The cut leaves both ends open, their rims level. The
-// outer tube is wall 0, with exactly as many particles more as it has more surface, then comes wall 1; far ends are held as
+// inner_radius > 0: the remainder after a prolapsed rectum was cut off (paper 2.5.4). A prolapse is bowel that has slid out
+// through itself. The outer tube is rectum turned inside out, so its mucosa is visible from outside. The inner tube is the
+// colon that followed, not everted; between the two, serosa faces serosa. The cut leaves both ends open, their rims level. The
+// outer tube is wall 0, with more particles in proportion to its surface, followed by wall 1; far ends are fixed as
 // above. Rims: near end of wall 0, of wall 1, far end of wall 0, of wall 1. A rim's `outer` is always the side away from the
 // axis.
 //

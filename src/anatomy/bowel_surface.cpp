@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// anatomy/bowel_surface: the smooth parametric surface of a bowel that particles and picture share.
+// anatomy/bowel_surface: the smooth parametric surface of a bowel, shared by particles and visible mesh.
 #include "anatomy/bowel_surface.h"
 
 #include <algorithm>
@@ -23,7 +23,7 @@ BowelSurface::BowelSurface(const BowelShape& shape) : shape_(shape) {
   axis_ = normalized(shape.axis);
   e1_ = any_perpendicular(axis_);
   e2_ = cross(axis_, e1_);
-  // A dome is half an ellipsoid: as high as the radius where there is room for it.
+  // A dome is half an ellipsoid: as high as the radius where space allows.
   dome_height_ = std::min<double>(shape.radius, 0.4 * shape.length);
   dome_arc_.assign(kDomeSteps + 1, 0);
   for (int i = 0; i < kDomeSteps; ++i) {
@@ -39,7 +39,7 @@ BowelSurface::BowelSurface(const BowelShape& shape) : shape_(shape) {
   total_ = near_dome_ + straight + far_dome_;
 }
 
-// The curve that turns round the axis: z along the axis (0 at the near end, negative inward), r from it, and its unit normal.
+// Profile curve rotated about the axis: z along the axis (0 at the near end, negative inward), r from it, its unit normal.
 void BowelSurface::profile(double s, double& z, double& r, double& nz, double& nr) const {
   const auto dome = [&](double arc) {
     const auto at = std::upper_bound(dome_arc_.begin(), dome_arc_.end(), arc);
@@ -75,7 +75,7 @@ double BowelSurface::depth(double s) const {
   return -z;
 }
 
-// Folds cross the tube every 22 mm or so, bands run along it; where neither is, the wall bulges to the full radius.
+// Folds cross the tube about every 22 mm, bands run along it; elsewhere the wall bulges to the full radius.
 double BowelSurface::relief(double s, double angle) const {
   const double fade_over = std::min(0.015, 0.3 * total_);
   const double fade = smooth_step(s / fade_over) * smooth_step((total_ - s) / fade_over);
@@ -125,7 +125,7 @@ namespace {
 
 struct Grid {
   VisibleMesh& mesh;
-  int columns;  // quads round; a row has one vertex more, so that the texture can close
+  int columns;  // quads per row; a row has one vertex more, so that the texture can close
 
   void vertex(Vec3 p, Vec3 n, float u, float v, TissueLayer layer) {
     mesh.position.push_back(p);
@@ -144,7 +144,7 @@ struct Grid {
       }
     }
   }
-  // At the top of a dome a quad is a triangle: its other half has no area and is left out.
+  // At the top of a dome a quad is a triangle: its other half has zero area and is omitted.
   void triangle(uint32_t a, uint32_t b, uint32_t c, bool reversed) {
     const Vec3 n = cross(mesh.position[b] - mesh.position[a], mesh.position[c] - mesh.position[a]);
     if (length(n) < 1e-12f) return;
@@ -162,7 +162,7 @@ VisibleMesh bowel_picture(const BowelShape& shape, const BowelSurface& surface, 
   const int rows = std::max(4, static_cast<int>(std::lround(along / step)) + 1);
   const auto s_of = [&](int i) { return along * i / (rows - 1); };
   const auto angle_of = [&](int j) { return kTwoPi * (j % columns) / columns; };
-  // A whole number of texture tiles round the organ, so that the seam does not show.
+  // A whole number of texture tiles round the organ, so that there is no visible seam.
   const double tiles = std::max(1.0, std::round(round / 0.01));
   const auto v_of = [&](int j) { return static_cast<float>(tiles * j / columns); };
 
@@ -180,7 +180,7 @@ VisibleMesh bowel_picture(const BowelShape& shape, const BowelSurface& surface, 
     }
     grid.quads(first, rows, inside);
   }
-  // A rim edge swells out a little from the wall's two corners, as cut bowel does.
+  // A rim edge bulges slightly from the wall's two corners, as cut bowel does.
   constexpr int steps = 6;
   const Vec3 axis = normalized(shape.axis);
   for (const bool far : {false, true}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// anatomy/bowel_surface: the smooth outer surface of the generated bowel as a function of two numbers: s, the way along the
-// profile from the near end [m], and the angle round the axis [rad]. Particles and picture are both sampled from it.
+// anatomy/bowel_surface: the smooth outer surface of the generated bowel as a function of two numbers: s, the distance along
+// the profile from the near end [m], and the angle round the axis [rad]. Particles and visible mesh are both sampled from it.
 #pragma once
 #include <vector>
 
@@ -34,8 +34,8 @@ class BowelSurface {
   std::vector<double> dome_arc_;  // arc length of a dome's quarter ellipse from its top, over equal steps of its angle
 };
 
-// The picture of it: outside and inside with about `vertices` vertices, rounded rim edges on top, not yet bound to particles.
-// everted: the mucosa is outside.
+// Its visible mesh: outside and inside with about `vertices` vertices, rounded rim edges in addition, not yet bound to
+// particles. everted: the mucosa is outside.
 VisibleMesh bowel_picture(const BowelShape& shape, const BowelSurface& surface, int vertices, bool everted);
 
 }  // namespace catgut

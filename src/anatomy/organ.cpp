@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// anatomy/organ: reads an organ's surface from a file and makes a soft body of it. See the header for the steps.
+// anatomy/organ: reads an organ's surface from a file and makes a soft body from it. See the header for the steps.
 #include "anatomy/organ.h"
 
 #include <fmt/format.h>
@@ -58,7 +58,7 @@ Quat turn_onto(Vec3 from, Vec3 to) {
   return normalized(Quat{a.x, a.y, a.z, 1 + c});
 }
 
-// Moves the surface into place; returns where the chosen rim is (a vertex position on it), or nothing for a closed surface.
+// Moves the surface into place; returns a vertex position on the chosen rim, or nothing for a closed surface.
 std::vector<Vec3> place(TriangleMesh& mesh, const OrganImport& o) {
   const std::vector<Loop> rims = rims_by_length(mesh);
   const int wanted = std::max(o.rim, 0);
@@ -107,7 +107,7 @@ Loop find_rim(const TriangleMesh& sheet, const std::vector<Vec3>& chosen) {
   return best;
 }
 
-// Renumbers ring by ring outward from `start`: the solver reads neighbors from neighboring memory.
+// Renumbers ring by ring outward from `start`, so that the solver reads neighbors from adjacent memory.
 TriangleMesh in_rings(const TriangleMesh& sheet, const Loop& start) {
   const auto next = vertex_neighbors(sheet.triangle, sheet.position.size());
   std::vector<uint32_t> order = start, number(sheet.position.size(), ~0u);
@@ -122,7 +122,7 @@ TriangleMesh in_rings(const TriangleMesh& sheet, const Loop& start) {
   TriangleMesh out;
   for (uint32_t v : order) out.position.push_back(sheet.position[v]);
   for (const Triangle& t : sheet.triangle) out.triangle.push_back({number[t[0]], number[t[1]], number[t[2]]});
-  // Each triangle begins with its lowest vertex and they run in that order too.
+  // Each triangle starts with its lowest vertex; triangles are sorted too.
   for (Triangle& t : out.triangle) std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
   std::sort(out.triangle.begin(), out.triangle.end());
   return out;
@@ -147,8 +147,8 @@ std::vector<float> way_from(const TriangleMesh& sheet, const Loop& start) {
   return way;
 }
 
-// The way along the organ for the picture: with several openings the distance is eased until each is reached all round at
-// once (a harmonic function), so that cross sections follow the organ and end flush at its rims.
+// Distance along the organ for textures. With several openings it is relaxed so that all points of a rim have the same value
+// (a harmonic function): cross sections then follow the organ and end flush at its rims.
 std::vector<float> ease_along(const TriangleMesh& sheet, std::vector<float> along, const std::vector<Loop>& rims) {
   if (rims.size() < 2) return along;
   std::vector<uint8_t> fixed(along.size(), 0);
@@ -170,7 +170,7 @@ std::vector<float> ease_along(const TriangleMesh& sheet, std::vector<float> alon
   return along;
 }
 
-// For each sheet vertex, how far it is from what the surroundings hold [m].
+// Distance of each sheet vertex from the fixed region [m].
 std::vector<float> from_hold(const TriangleMesh& sheet, const std::vector<float>& along, const std::vector<Loop>& rims) {
   std::vector<float> far(sheet.position.size(), 3e38f);
   if (rims.size() > 1) {
@@ -200,17 +200,17 @@ BodyRest import_organ(const OrganImport& import) {
   TriangleMesh sheet = remesh(surface, static_cast<size_t>(import.particles / 2), import.mesh);
 
   Loop start = find_rim(sheet, chosen);
-  if (start.empty()) {  // closed: begin at the top
+  if (start.empty()) {  // closed: start at the top
     const auto lower = [](Vec3 a, Vec3 b) { return a.y < b.y; };
     start = {
         static_cast<uint32_t>(std::max_element(sheet.position.begin(), sheet.position.end(), lower) - sheet.position.begin())};
   }
   sheet = in_rings(sheet, start);
-  const std::vector<Loop> rims = boundary_loops(sheet.triangle);  // the first begins with vertex 0: the chosen one
+  const std::vector<Loop> rims = boundary_loops(sheet.triangle);  // the first starts with vertex 0: the chosen one
   for (uint32_t i = 0; i < start.size(); ++i) start[i] = i;
   const std::vector<float> along = way_from(sheet, start), hold = from_hold(sheet, along, rims);
 
-  // The odd particle goes where the surroundings hold the organ.
+  // The odd particle lies in the fixed region.
   WallSpec wall{import.name, import.wall, import.density, import.particles % 2 == 1, 0};
   float nearest = 3e38f;
   for (uint32_t t = 0; t < sheet.triangle.size(); ++t) {

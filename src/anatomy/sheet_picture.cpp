@@ -13,17 +13,17 @@ namespace catgut {
 
 namespace {
 
-// A place on the sheet: weights over three of its vertices.
+// A point on the sheet: weights over three of its vertices.
 struct Sample {
   Triangle corner;
   float weight[3];
 };
 
-// Every triangle of the sheet cut into parts * parts, with shared places shared.
+// Every triangle of the sheet split into parts * parts, sharing common points.
 struct Subdivision {
   std::vector<Sample> sample;
   std::vector<Triangle> triangle;
-  std::map<std::pair<uint64_t, int>, uint32_t> on_edge;  // k-th place from the edge's smaller vertex
+  std::map<std::pair<uint64_t, int>, uint32_t> on_edge;  // k-th point from the edge's smaller vertex
   int parts;
 
   Subdivision(const TriangleMesh& sheet, int p) : parts(p) {
@@ -68,8 +68,8 @@ Vec3 blend(const Sample& s, std::span<const Vec3> value) {
   return value[s.corner[0]] * s.weight[0] + value[s.corner[1]] * s.weight[1] + value[s.corner[2]] * s.weight[2];
 }
 
-// Phong tessellation (Boubekeur and Alexa 2008): the flat place pulled toward the tangent planes of its corners. It passes
-// through the corners, and along an edge depends only on that edge, so neighbors meet.
+// Phong tessellation (Boubekeur and Alexa 2008): the flat point is moved toward the tangent planes of its corners. It passes
+// through the corners, and along an edge depends only on that edge, so neighbors match.
 Vec3 curved(const Sample& s, std::span<const Vec3> position, std::span<const Vec3> normal) {
   const Vec3 flat = blend(s, position);
   Vec3 pull;
@@ -80,7 +80,7 @@ Vec3 curved(const Sample& s, std::span<const Vec3> position, std::span<const Vec
   return flat + pull * 0.75f;
 }
 
-// The organ's middle line and a frame carried along it without twist, for texture coordinates.
+// The organ's center line and a frame transported along it without twist, for texture coordinates.
 class MiddleLine {
  public:
   MiddleLine(const TriangleMesh& sheet, std::span<const float> along) {
@@ -131,7 +131,7 @@ struct Builder {
     mesh.uv.push_back(uv);
     mesh.layer.push_back(layer);
   }
-  // Where the texture closes round the organ, triangles get corners of their own one lap further on.
+  // Where the texture closes round the organ, triangles get separate corners, one lap further.
   void open_seam(float tiles) {
     std::map<uint32_t, uint32_t> lap;
     for (Triangle& t : mesh.triangle) {

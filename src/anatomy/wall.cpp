@@ -17,7 +17,7 @@ constexpr size_t kClusterMembers = 16;
 uint32_t outer(uint32_t v) { return 2 * v; }
 uint32_t inner(uint32_t v) { return 2 * v + 1; }
 
-// Members by distance from the center: the farthest are the ones to do without.
+// Members by distance from the center: the farthest are dropped first.
 void keep_nearest(std::vector<uint32_t>& member, std::span<const Vec3> position) {
   if (member.size() <= kClusterMembers) return;
   const Vec3 c = position[member[0]];
@@ -45,8 +45,8 @@ void add_clusters(BodyRest& body, const TriangleMesh& sheet) {
   }
 }
 
-// A prism between the two sides falls into three tetrahedra. Each of its square faces is cut from the inner particle of the
-// lower sheet vertex to the outer particle of the higher one: the neighbor, which sees the same two vertices, cuts it alike.
+// A prism between the two sides splits into three tetrahedra. Each of its square faces is cut from the inner particle of the
+// lower sheet vertex to the outer particle of the higher one. The neighbor, with the same two vertices, makes the same cut.
 void add_prism(std::vector<Tet>& tet, Triangle t) {
   // Rotating the smallest to the front keeps the orientation; then at most the last two are out of order.
   std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
@@ -67,7 +67,7 @@ void add_surface(BodyRest& body, const TriangleMesh& sheet) {
   for (const auto& loop : boundary_loops(sheet.triangle)) {
     Rim rim;
     for (size_t i = 0; i < loop.size(); ++i) {
-      // boundary_loops runs against the sheet's own half-edges, which is just the way the strip must run along the outer side.
+      // boundary_loops runs against the sheet's own half-edges, which is the direction of the strip along the outer side.
       const uint32_t a = loop[i], b = loop[(i + 1) % loop.size()];
       body.surface.push_back({outer(a), outer(b), inner(b)});
       body.surface.push_back({outer(a), inner(b), inner(a)});
@@ -78,7 +78,7 @@ void add_surface(BodyRest& body, const TriangleMesh& sheet) {
   }
 }
 
-// The odd particle floats in the middle of one prism, tied to its six corners and the rest of the ring round it.
+// The odd particle lies in the middle of one prism, connected to its six corners and the rest of the surrounding ring.
 void add_extra(BodyRest& body, const Triangle& host) {
   const uint32_t extra = static_cast<uint32_t>(body.position.size());
   std::vector<uint32_t> member{extra};
@@ -91,7 +91,7 @@ void add_extra(BodyRest& body, const Triangle& host) {
   body.position.push_back(sum / 6.0f);
   body.layer.push_back(TissueLayer::mucosa);
   body.cluster.push_back(std::move(member));
-  // Its mean share comes out of everybody's, so that the organ weighs what it should.
+  // Its mean share is taken from all others, so that the organ has the correct mass.
   double total = 0;
   for (float m : body.mass) total += m;
   for (float& m : body.mass) m *= static_cast<float>(extra) / static_cast<float>(extra + 1);
@@ -124,7 +124,7 @@ std::vector<Vec3> wall_directions(const TriangleMesh& sheet, float thickness) {
     std::vector<uint8_t> folded(sheet.position.size(), 0);
     bool any = false;
     for (const Tet& t : tet) {
-      // A margin over merely positive: slivers make a poor solid.
+      // A margin above zero: slivers make a poor solid.
       const Vec3 o = position[t[0]];
       const float flat = length(cross(position[t[1]] - o, position[t[2]] - o)) * thickness / 6;
       if (tet_volume(position, t) > 0.1 * flat) continue;
@@ -145,8 +145,8 @@ std::vector<Vec3> wall_directions(const TriangleMesh& sheet, float thickness) {
 
 namespace {
 
-// Where a wall of full thickness would fold over itself, as in the hollow of a sharp bend, it is thinner, down to a tenth, and
-// grows back over the neighbors. Returns how many tetrahedra stay inside out, also where half of the wall would be thinner.
+// Where a wall of full thickness would fold over itself, as inside a sharp bend, it is thinner, down to a tenth, with a
+// transition over the neighbors. Returns the number of inverted tetrahedra, also if half of the wall would be thinner.
 size_t thin_where_folded(BodyRest& body, const TriangleMesh& sheet, std::span<const Vec3> normal, float thickness) {
   constexpr float kThinnest = 0.1f, kThinner = 0.75f, kGrowth = 1.4f;
   std::vector<float> share;
@@ -160,7 +160,7 @@ size_t thin_where_folded(BodyRest& body, const TriangleMesh& sheet, std::span<co
       for (uint32_t p : t) folded[p / 2] = 1;
     }
     if (inverted == 0 || round == 30) return inverted;
-    // A wall that is thinner nearly everywhere is not the wall that was asked for.
+    // A wall that is thinner almost everywhere is not the requested one.
     if (2 * std::count_if(share.begin(), share.end(), [](float f) { return f < 0.99f; }) > static_cast<long>(share.size()))
       return inverted;
     if (share.empty()) share.assign(sheet.position.size(), 1), next = vertex_neighbors(sheet.triangle, sheet.position.size());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// core/archive: archives that write, read and hash whatever has a reflect (core/reflect.h). Little endian, no padding: what
-// they write is the same on every machine, and the hash of a value is the hash of its bytes.
+// core/archive: archives that write, read and hash every type with a reflect (core/reflect.h). Little endian, no padding: the
+// output is the same on every machine, and the hash of a value is the hash of its bytes.
 #pragma once
 #include <bit>
 #include <cstddef>
@@ -48,7 +48,7 @@ struct ByteSink {
   }
 };
 
-// Reads what Writer wrote. Throws InputError, with `name` as the place, where the bytes end too early or are no value.
+// Reads the output of Writer. Throws InputError, with `name` as the place, where the bytes end too early or are invalid.
 struct Reader : Archive<Reader> {
   const std::vector<std::byte>& in;
   const char* name;
@@ -64,7 +64,7 @@ struct Reader : Archive<Reader> {
   void operator()(T& v) {
     if constexpr (kPacked<T>) {
       bytes(&v, sizeof v);
-    } else if constexpr (std::is_same_v<T, bool>) {  // a byte that is neither 0 nor 1 is no bool
+    } else if constexpr (std::is_same_v<T, bool>) {  // a byte other than 0 or 1 is not a bool
       uint8_t byte = 0;
       bytes(&byte, 1);
       if (byte > 1) throw InputError(name, "a flag is neither on nor off", "the file is damaged");
@@ -83,7 +83,7 @@ struct Reader : Archive<Reader> {
       if (n > 0) bytes(v.data(), n * sizeof(T));
     } else {
       if (n > in.size() - at) throw InputError(name, "an array has an impossible length", "the file is damaged");
-      v.clear();  // grows with what is read: a damaged length cannot ask for more memory than the file fills
+      v.clear();  // grows with the bytes read: a damaged length cannot allocate more memory than the file fills
       for (uint64_t i = 0; i < n; ++i) (*this)(v.emplace_back());
     }
   }

@@ -16,7 +16,7 @@ std::string environment(const char* name, const std::string& otherwise = "") {
   return value && *value ? value : otherwise;
 }
 
-// Every folder that is called share and may hold data, in the order of the search.
+// Every folder named share that may hold data, in search order.
 std::vector<fs::path> share_folders() {
   std::vector<fs::path> found;
   std::error_code error;

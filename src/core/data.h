@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// core/data: where the files lie that come with Catgut. They are found at run time, so that program and library can be moved.
+// core/data: finds Catgut's data files at run time, so that program and library can be moved.
 #pragma once
 #include <string>
 
@@ -12,7 +12,7 @@ namespace catgut {
 //   share/catgut/name in the prefix for which the library was configured.
 std::string data_path(const std::string& name);
 
-// The path of `name` ("fonts/truetype/...") among the files that programs share: the same folders, without "catgut/".
+// The path of `name` ("fonts/truetype/...") among files that programs share: the same folders, without "catgut/".
 std::string shared_path(const std::string& name);
 
 }  // namespace catgut

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // core/elementary: sin, cos, atan2, asin, acos, exp, log, pow with the same bits everywhere. The C library's differ between
-// versions, architectures and even processors (glibc chooses code with fused operations where there are any), and one bit is
-// enough to part two runs. These use only operations that IEEE 754 defines exactly, in double precision. Everything that leads
-// to a State or to the hands of the scripted surgeon calls them; tests/layers refuses std::sin and the like there.
+// versions, architectures and processors (glibc selects code with fused operations where available), and one bit is enough to
+// make two runs diverge. These use only operations that IEEE 754 defines exactly, in double precision. All code that affects
+// a State or the hands of the scripted surgeon uses them; tests/layers refuses std::sin and the like there.
 //
 // Errors: at most two units in the last place of a double for arguments below 1e5, more for pow (the error of y log x); a float
-// result is the nearest float but for one in millions. Method: argument reduction by constants in several parts (Cody and Waite
+// result is correctly rounded except for a few in a million. Method: argument reduction by constants in several parts (Cody and
 // 1980), then Taylor series.
 #pragma once
 #include <cmath>

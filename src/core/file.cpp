@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// core/file: see file.h. POSIX calls, because a stream reports a full disk only by chance.
+// core/file: see file.h. POSIX calls, because a stream does not reliably report a full disk.
 #include "core/file.h"
 
 #include <fcntl.h>
@@ -47,7 +47,7 @@ int write_and_close(int fd, std::string_view bytes, bool flush) {
     if (n >= 0) bytes.remove_prefix(static_cast<size_t>(n));
     else if (errno != EINTR) error = errno;
   }
-  // Some file systems report a full disk only here.
+  // Some file systems report a full disk only at fsync.
   if (error == 0 && flush && ::fsync(fd) != 0 && errno != EINVAL) error = errno;
   if (::close(fd) != 0 && error == 0) error = errno;
   return error;
@@ -65,7 +65,7 @@ void write_file(const std::string& path, std::string_view bytes) {
     if (const int error = write_and_close(fd, bytes, false)) fail(path, error);
     return;
   }
-  // A link is followed, so that the file that it names is replaced and not the link.
+  // A link is followed, so that the file it points to is replaced, not the link.
   std::error_code ignored;
   const std::filesystem::path real = exists ? std::filesystem::canonical(path, ignored) : std::filesystem::path(path);
   const std::string target = real.empty() ? path : real.string(), part = target + ".part" + std::to_string(::getpid());

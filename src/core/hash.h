@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// core/hash: the 64-bit hash (XXH3) that stamps a state, a chunk of a recording or a cache key. Same bits on every machine.
+// core/hash: the 64-bit hash (XXH3) of a state, a chunk of a recording or a cache key. Same bits on every machine.
 #pragma once
-// By memcpy: the other ways read through a pointer of another type, and inlined into code that wrote floats GCC may then read
-// too early.
+// By memcpy: other methods read through a pointer of another type; when inlined into code that wrote floats, GCC may reorder
+// the read.
 #define XXH_FORCE_MEMORY_ACCESS 0
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -18,7 +18,7 @@ inline uint64_t hash_bytes(const void* data, size_t bytes, uint64_t seed = 0) {
   return XXH3_64bits_withSeed(data, bytes, seed);
 }
 
-// The same of bytes that come in pieces, however they are cut.
+// The same for bytes in pieces of any size.
 class Hasher {
  public:
   Hasher() { XXH3_64bits_reset(&state_); }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// core/id: typed handles to rows of a table. A row that is reused gets the next generation, so that a handle to what was there
-// before no longer matches.
+// core/id: typed handles to rows of a table. A row that is reused gets the next generation, so that an old handle no longer
+// matches.
 #pragma once
 #include <cstdint>
 #include <type_traits>
 
 namespace catgut {
 
-// Four bytes without padding: an id is saved, hashed and sent as it lies in memory. Default constructed it refers to nothing.
+// Four bytes without padding: an id is saved, hashed and sent as its bytes. A default constructed id is empty.
 template <typename Tag>
 struct Id {
   static constexpr uint16_t kNone = 0xffff;

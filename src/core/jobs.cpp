@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// core/jobs: the workers behind Jobs::each. Reads the published job; writes nothing but what the job's own blocks write.
-// Every worker has a desk: one cache line with the job and a ticket (generation, first, last): blocks of its own share that
-// no one has begun. It takes them from the front, and a caller that has waited for it too long takes them from the back. A
-// claim names the generation, so a worker that wakes late finds nothing to claim and never touches a job that is over.
+// core/jobs: the workers behind Jobs::each. Reads the published job; the job's own blocks write all results.
+// Every worker has a queue: one cache line with the job and a ticket (generation, first, last) of its blocks not yet started.
+// It takes them from the front; a caller that has waited too long takes them from the back. A claim names the generation, so a
+// worker that wakes late has nothing to claim and never touches a finished job.
 #include "core/jobs.h"
 
 #include <algorithm>
@@ -27,14 +27,14 @@ inline void relax() {
 }
 
 constexpr int kSpins = 2000;   // 20 to 100 us: longer than the gaps between the stages of a substep
-constexpr int kYields = 64;    // then give the core to others, then sleep until the next tick
-constexpr int kPatience = 40;  // 1 to 2 us: the others are nearly done; their blocks are in their caches, so leave them
-// A worker whose core is taken by another program holds everybody up for a scheduler's slice. After one such wait the caller
-// does without workers for a while.
+constexpr int kYields = 64;    // then yield the core to others, then sleep until the next tick
+constexpr int kPatience = 40;  // 1 to 2 us: the others are nearly done, with their blocks in their caches, so wait
+// A worker preempted by another program delays all others by a scheduler's time slice. After one such wait the caller works
+// without workers for a while.
 constexpr auto kLate = std::chrono::milliseconds(1);
 constexpr auto kAlone = std::chrono::milliseconds(50);
 
-// A ticket: generation (32 bits), first and last block not yet begun (16 bits each).
+// A ticket: generation (32 bits), first and last block not yet started (16 bits each).
 constexpr uint64_t make_ticket(uint64_t generation, uint64_t first, uint64_t last) {
   return generation << 32 | first << 16 | last;
 }
@@ -66,7 +66,7 @@ struct Jobs::Pool {
 
   explicit Pool(int workers) : queue(static_cast<size_t>(workers)) {}
 
-  // Runs what is left at a desk, from the front if it is one's own; returns how many blocks that were.
+  // Runs the remaining blocks of a queue, from the front if it is the worker's own; returns their number.
   static size_t drain(WorkQueue& d, bool own) {
     size_t n = 0;
     uint64_t t = d.ticket.load(std::memory_order_acquire);
@@ -102,7 +102,7 @@ struct Jobs::Pool {
     }
   }
 
-  // The caller, done with its own share: waits for the others, and does for them what they are too late for.
+  // The caller, after its own share: waits for the others, and takes over blocks of late workers.
   void finish(size_t blocks, size_t finished) {
     int spins = 0;
     std::chrono::steady_clock::time_point waiting{};
@@ -155,7 +155,7 @@ void Jobs::run(size_t blocks, Call call, void* work, size_t count, size_t block)
   Pool& p = *pool_;
   p.done.store(0, std::memory_order_relaxed);
   ++p.generation;
-  // Block b of any job of as many blocks goes to the same worker: what it wrote in one stage is in its cache in the next.
+  // Block b of any job with the same number of blocks goes to the same worker: its data of the previous stage is cached.
   const size_t workers = p.queue.size();
   for (size_t k = workers; k-- > 0;) {
     Pool::WorkQueue& d = p.queue[k];
@@ -163,7 +163,7 @@ void Jobs::run(size_t blocks, Call call, void* work, size_t count, size_t block)
     d.ticket.store(make_ticket(p.generation, blocks * k / workers, blocks * (k + 1) / workers));
   }
   if (p.asleep.load() > 0) {
-    // Taking the mutex orders this against a worker that is just about to sleep.
+    // Taking the mutex orders this against a worker that is about to sleep.
     { std::lock_guard<std::mutex> lock(p.mutex); }
     p.wake.notify_all();
   }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // core/jobs: fork-join over fixed blocks. A tick has hundreds of stages of 5..50 us, so waiting is a bounded spin, then yield
-// (a futex round trip alone costs 3 us). The blocks depend only on the amount of work, never on the number of workers, and a
-// block is computed by one worker from start to end: the same bits for any worker count. Each worker has the same part of the
-// blocks in every stage, so that most of what it reads is still in its own cache.
+// (a futex round trip alone takes 3 us). The blocks depend only on the amount of work, never on the number of workers, and one
+// worker computes a block from start to end: the same bits for any worker count. Each worker has the same part of the blocks in
+// every stage, so that most of its data is still in its cache.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace catgut {
 
 class Jobs {
  public:
-  // threads: the caller's included, 1..64. With 1 nothing is started.
+  // threads: including the caller's, 1..64. With 1 no thread is started.
   explicit Jobs(int threads = 1);
   ~Jobs();
   Jobs(const Jobs&) = delete;
@@ -21,8 +21,8 @@ class Jobs {
   int threads() const { return threads_; }
 
   // Calls work(first, last) for consecutive blocks of at most `block` items that cover [0, count); returns when all are done.
-  // When another program takes a worker's core, the caller does that worker's blocks, and continues alone for 50 ms if it had
-  // to wait for one that was begun.
+  // When another program takes a worker's core, the caller runs that worker's blocks. It works alone for 50 ms if it had
+  // to wait for a started block.
   template <typename Work>
   void each(size_t count, size_t block, Work&& work) {
     run((count + block - 1) / block,

@@ -35,7 +35,7 @@ inline Vec3 normalized(Vec3 a, Vec3 otherwise = {0, 0, 0}) {
 }
 constexpr Vec3 lerp(Vec3 a, Vec3 b, float t) { return a + (b - a) * t; }
 inline bool is_finite(Vec3 a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
-// Some unit vector at right angles to the unit vector n, continuous but for one direction.
+// A unit vector orthogonal to the unit vector n, continuous except at one direction.
 inline Vec3 any_perpendicular(Vec3 n) {
   return normalized(std::abs(n.x) < 0.6f ? cross(n, Vec3{1, 0, 0}) : cross(n, Vec3{0, 1, 0}));
 }

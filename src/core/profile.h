@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// core/profile: where a tick's time goes. Fixed stages, one accumulator each; times never reach the state, only the report.
+// core/profile: time per stage of a tick. Fixed stages, one accumulator each; times never affect the state, only reports.
 #pragma once
 #include <array>
 #include <chrono>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // core/random: a small counter-free generator (PCG32, O'Neill 2014) whose whole state is one integer, so that it can be saved,
-// hashed and replayed. Not for anything secret.
+// hashed and replayed. Not cryptographic.
 #pragma once
 #include <cstdint>
 
@@ -17,7 +17,7 @@ struct Random {
   }
   // Uniform in [0, 1).
   float uniform() { return static_cast<float>(next() >> 8) * (1.0f / 16777216.0f); }
-  // Near-normal, mean 0, standard deviation 1 (sum of twelve uniforms: bounded by 6, which a hand's tremor should be).
+  // Near-normal, mean 0, standard deviation 1 (sum of twelve uniforms: bounded by 6, as a hand's tremor should be).
   float normal() {
     float s = -6;
     for (int i = 0; i < 12; ++i) s += uniform();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // core/reflect: one description of the members of a type, used by every archive: writer, reader, hasher and validator of a
-// state. The description stands beside the type's header (solver/reflect.h, suture/reflect.h, ...) and lists every member once:
+// state. The description is in a reflect header of the room (solver/reflect.h, suture/reflect.h, ...). It lists members once:
 //
 //   constexpr void reflect(auto& a, Like<Bite> auto& b) {
 //     a(b.entry), a(b.depth);                 // any value
@@ -9,7 +9,7 @@
 //     a.cache(b.where);                       // working memory: not part of the state
 //   }
 //
-// Who adds a member adds it there; tests/sim/reflect_test finds members that were forgotten.
+// A new member is added there; tests/sim/reflect_test finds forgotten members.
 #pragma once
 #include <array>
 #include <concepts>
@@ -87,7 +87,7 @@ constexpr bool kIsVector = false;
 template <typename T, typename Alloc>
 constexpr bool kIsVector<std::vector<T, Alloc>> = true;
 
-// Calls a(element) or reflect(a, value), whatever the value has.
+// Calls a(element) or reflect(a, value), whichever the value has.
 constexpr void visit(auto& a, auto& v) {
   if constexpr (kIsArray<std::remove_cvref_t<decltype(v)>>) {
     for (auto& element : v) a(element);
@@ -99,7 +99,7 @@ constexpr void visit(auto& a, auto& v) {
 // Adds up the members that a reflect names.
 struct CountBytes : Archive<CountBytes> {
   size_t bytes = 0;
-  bool copyable = true;  // every bit pattern of every member is a value
+  bool copyable = true;  // every bit pattern of every member is valid
   template <typename T>
   constexpr void operator()(T& v) {
     if constexpr (std::is_same_v<T, bool>) copyable = false;
@@ -108,7 +108,7 @@ struct CountBytes : Archive<CountBytes> {
   }
 };
 
-// A type without padding whose reflect names every byte in it can be copied as it lies in memory.
+// A type without padding whose reflect lists every byte can be copied as raw bytes.
 template <typename T>
 constexpr bool is_packed() {
   if constexpr (std::is_same_v<T, bool>) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// core/sym3: symmetric 3x3 matrices (stiffness, damping, projections) and their eigenvalues, for code that may neither allocate
-// nor loop without a bound: the servo of a haptic arm.
+// core/sym3: symmetric 3x3 matrices (stiffness, damping, projections) and their eigenvalues, without allocation and with
+// bounded loops: for the servo of a haptic device.
 #pragma once
 #include <array>
 
@@ -26,7 +26,7 @@ constexpr Sym3 outer(Vec3 v, float s) {
 }
 inline bool is_finite(const Sym3& a) { return is_finite(Vec3{a.xx, a.yy, a.zz}) && is_finite(Vec3{a.xy, a.xz, a.yz}); }
 
-// Eigenvalues and unit eigenvectors, by a fixed number of cyclic Jacobi rotations: always the same work, exact to rounding.
+// Eigenvalues and unit eigenvectors, by a fixed number of cyclic Jacobi rotations: constant work, exact to rounding.
 struct Eigen3 {
   std::array<float, 3> value{};
   std::array<Vec3, 3> vector{};
@@ -39,7 +39,7 @@ inline void diagonalize(T (&a)[3][3], T (&v)[3][3]) {
       for (int q = p + 1; q < 3; ++q) {
         if (a[p][q] == 0) continue;
         const T theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-        // For a huge theta the square overflows; then the rotation is none.
+        // For a huge theta the square overflows; the rotation is then the identity.
         const T t =
             std::abs(theta) > T(1e9) ? 0 : (theta < 0 ? T(-1) : T(1)) / (std::abs(theta) + std::sqrt(theta * theta + 1));
         const T c = 1 / std::sqrt(t * t + 1), d = t * c;
@@ -64,7 +64,7 @@ inline Eigen3 eigen(const Sym3& s) {
   return {{a[0][0], a[1][1], a[2][2]},
           {Vec3{v[0][0], v[1][0], v[2][0]}, Vec3{v[0][1], v[1][1], v[2][1]}, Vec3{v[0][2], v[1][2], v[2][2]}}};
 }
-// The same matrix with its eigenvalues held between least and most.
+// The same matrix with its eigenvalues clamped to [least, most].
 inline Sym3 clamp_eigenvalues(const Sym3& s, float least, float most) {
   const Eigen3 e = eigen(s);
   Sym3 out;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// exchange/command: what a hand, or the person beside it, orders in a tick. Commands travel in TickInput and are recorded with
-// it, so that a replay repeats them; a command that cannot be carried out changes nothing and is reported (instrument_refused).
+// exchange/command: commands of a hand, or of an assistant, in a tick. Commands travel in TickInput and are recorded with
+// it, so that a replay repeats them. A command that cannot be carried out changes nothing and is reported (instrument_refused).
 #pragma once
 #include <array>
 #include <cstddef>
@@ -11,10 +11,10 @@ namespace catgut {
 enum class CommandKind : uint8_t {
   none,
   take,        // the empty hand takes instrument `argument` from the tray, or takes up a parked one
-  swap,        // lays down what the hand has and takes instrument `argument` from the tray
-  lay_down,    // lets go of what is held and puts the instrument on its place on the tray
+  swap,        // lays down the instrument in the hand and takes instrument `argument` from the tray
+  lay_down,    // releases what is held and puts the instrument in its place on the tray
   park,        // leaves the clamp closed on what it holds; the hand is empty then
-  unpark,      // the empty hand takes up the parked instrument `argument`, as it lies
+  unpark,      // the empty hand takes the parked instrument `argument` in its present pose
   new_suture,  // a new needle and thread
   cut,         // cuts the thread between the jaws
   count_
@@ -22,11 +22,11 @@ enum class CommandKind : uint8_t {
 
 struct Command {
   CommandKind kind = CommandKind::none;
-  uint8_t hand = 0;       // that carries it out
+  uint8_t hand = 0;       // the hand that carries it out
   uint16_t argument = 0;  // see CommandKind
 };
 
-// Commands of one tick, in the order in which they are carried out.
+// Commands of one tick, in the order of execution.
 struct CommandList {
   static constexpr size_t kCapacity = 16;
   uint32_t count = 0;

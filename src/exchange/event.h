@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// exchange: what happened in a tick, in an order that is the same on every run. No one calls upward: rooms below tell rooms
-// above through these.
+// exchange: events of a tick, in an order that is the same in every run. They are the only way in which lower rooms notify
+// higher ones.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -11,61 +11,61 @@
 namespace catgut {
 
 enum class EventKind : uint8_t {
-  needle_grasped,     // who: hand, value: place on the arc from the swage [0..1]
+  needle_grasped,     // who: hand, value: fraction of the arc from the swage [0..1]
   needle_released,    // who: hand, value: 0 or the force at which it slipped out [N]
   thread_grasped,     // who: hand, which: particle slot
   thread_released,    // who: hand, which: particle slot, value: as above
   tip_entered,        // which: bite, value: angle to the surface normal [rad]
   particle_attached,  // which: particle (paper 2.2, fig. 4), value: its distance to the tip [m]
-  particle_released,  // which: particle, value: how far it was dragged [m] (fig. 5b)
+  particle_released,  // which: particle, value: its displacement [m] (fig. 5b)
   tip_exited,         // which: bite
   bite_withdrawn,     // the needle was withdrawn; which: bite
   suture_point,       // which: suture point, value: index of the bite
   bite_completed,     // which: bite, value: length from entry to exit [m]
   particle_passed,    // which: suture point, value: +1 toward the needle, -1 toward the free end (figs. 7, 8)
-  bite_out_of_order,  // which: suture point that is not next to the one before (2.5.1)
+  bite_out_of_order,  // which: suture point that is not adjacent to the previous one (2.5.1)
   ring_complete,      // which: number of suture points
   closure_started,    // value: opening area [m^2]
   closure_finished,   // value: opening area [m^2]
   thread_exhausted,   // which: suture point; the free end reached it and holds
   tissue_grasped,     // who: hand, which: particle
   tissue_released,    // who: hand, which: particle, value: 0 or the force at which it slipped out [N]
-  loop_formed,        // who: hand with the tool that it lies round, which: wraps, value: +1 or -1, its handedness
-  loop_rejected,      // who: hand, reason; reported once until the reason changes (2.4)
+  loop_formed,        // who: hand with the tool inside it, which: wraps, value: +1 or -1, its chirality
+  loop_rejected,      // who: hand, reason; reported again only when the reason changes (2.4)
   loop_released,      // who: hand; the loop came off without a knot
   throw_started,      // who: hand that pulls, which: knot, value: wraps
   throw_locked,       // which: knot, value: tension when it was set [N]
-  throw_undone,       // which: knot; the free end was let go before it reached the tissue
+  throw_undone,       // which: knot; the free end was released before it reached the tissue
   thread_cut,     // who: hand, which: slot toward the free end, value: thread to the nearest suture point or knot [m], -1: none
-  suture_loaded,  // which: how many were taken before; a fresh needle and thread lie ready
-  suture_baked,   // which: settled stitch; its thread is no longer simulated (3.4)
-  seam_closed,    // which: row of SutureView::seam, value: what is left of its gap [m]
+  suture_loaded,  // which: number of sutures loaded before; a new needle and thread are ready
+  suture_baked,   // which: baked suture; its thread is no longer simulated (3.4)
+  seam_closed,    // which: row of SutureView::seam, value: remaining gap [m]
   instrument_taken,      // who: hand, which: instrument
   instrument_laid_down,  // who: hand, which: instrument
   instrument_parked,     // who: hand, which: instrument; it stays on what it holds
-  instrument_refused,    // who: hand, which: instrument; a command that could not be carried out
-  technique_fault,       // fault, which: bite, knot or suture (see Fault); nothing is repaired
+  instrument_refused,    // who: hand, which: instrument; the command could not be carried out
+  technique_fault,       // fault, which: bite, knot or suture (see Fault); nothing is corrected
   count_
 };
 
-// What was wrong, of a technique_fault event.
+// The fault of a technique_fault event.
 enum class Fault : uint8_t {
   none,
-  wrong_body,         // which: bite; the technique wanted the other side, or the other layer
-  wrong_layer,        // which: bite; it goes from outside in where it should go from inside out, or the other way round
+  wrong_body,         // which: bite; it should lie in the other wall, or the other layer
+  wrong_layer,        // which: bite; it goes from outside in instead of from inside out, or vice versa
   one_wall_only,      // which: bite; a stitch that should join two walls was tied through one
-  knot_without_bite,  // which: knot; it was begun before there was a suture point, or with the bites incomplete
-  needle_in_tissue,   // which: bite; thread was pulled tight or a knot begun with the needle still in the tissue
+  knot_without_bite,  // which: knot; it was started before there was a suture point, or with the bites incomplete
+  needle_in_tissue,   // which: bite; thread was tightened or a knot started with the needle still in the tissue
   cut_in_stitch,      // which: slot; the thread was cut between suture points or knots: the stitch is open
-  cut_before_knot,    // which: slot; the thread was cut before anything was tied
-  too_few_throws,     // which: knot; it was cut or left with fewer throws than hold
+  cut_before_knot,    // which: slot; the thread was cut before a knot was tied
+  too_few_throws,     // which: knot; it was cut or left with too few throws to hold
   count_
 };
 const char* fault_name(Fault fault);
 
-// Why a loop round a tool is none (2.4, figure 10), of a loop_rejected event.
+// Why thread round a tool is not a loop (2.4, figure 10), of a loop_rejected event.
 enum class LoopReason : uint8_t {
-  none,         // it is one
+  none,         // it is a loop
   no_crossing,  // the thread touches the tool but does not cross itself in the plane across it
   tip_outside,  // it crosses itself beside the tool: the tip is not inside
   too_deep,     // a helix: its ends are further apart along the tool than one pair of particles
@@ -76,17 +76,17 @@ const char* event_name(EventKind kind);
 
 struct Event {
   EventKind kind{};
-  uint8_t who = 0;     // hand, where there is one; kNoHand (255): a parked instrument
+  uint8_t who = 0;     // hand, if any; kNoHand (255): a parked instrument
   uint32_t which = 0;  // see EventKind
   float value = 0;     // see EventKind
   Vec3 where;          // [m]
   Fault fault = Fault::none;
   LoopReason reason = LoopReason::none;
-  uint16_t suture = 0;  // index of the suture it is about, where there is one
+  uint16_t suture = 0;  // index of its suture, if any
   uint64_t tick = 0;
 };
 
-// The events of a tick, in order. Who adds one says what happened; the list knows when.
+// The events of a tick, in order. Stages add them without a time; the list adds the tick.
 struct EventList {
   uint64_t tick = 0;
   std::vector<Event> list;

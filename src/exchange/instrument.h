@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// exchange/instrument: what rooms on both sides of the simulation know of an instrument: what it can do, where it is, what it
-// looks like in outline. The models themselves (mass, jaws, grip limits) are in src/instrument.
+// exchange/instrument: data of an instrument shared by rooms on both sides of the simulation: its capabilities, its location
+// and its outline. The models themselves (mass, jaws, grip limits) are in src/instrument.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -21,20 +21,20 @@ enum Capability : uint32_t {
   kCauterize = 1u << 6,
   kRetract = 1u << 7,
 };
-// "hold_needle", ...; "" for anything that is not exactly one capability.
+// "hold_needle", ...; "" unless it is exactly one capability.
 const char* capability_name(uint32_t capability);
 
 enum class InstrumentPlace : uint32_t {
-  tray,    // not in use: drawn on its tray, touches nothing
+  tray,    // not in use: drawn on its tray, no contact
   hand,    // follows a hand
-  parked,  // closed on what it holds, no hand on it: hangs there by its weight, or pulls with the force the scene gives
+  parked,  // closed on tissue without a hand: loaded by its weight, or by the force given in the scene
 };
 
 enum class Held : uint8_t { nothing, needle, thread, tissue };
 
 constexpr uint8_t kNoHand = 0xff;
 
-// What a picture needs to draw an instrument and a tray list needs to name it. Constant during a run.
+// Data to draw an instrument and to name it in a tray list. Constant during a run.
 struct InstrumentPicture {
   struct Rod {
     Vec3 a, b;         // [m] ends of the axis, tool frame
@@ -44,7 +44,7 @@ struct InstrumentPicture {
   std::string kind;   // the model's name: "allis"
   std::string title;  // for people: "Allis clamp"
   uint32_t capabilities = 0;
-  std::vector<Rod> outline;  // what it collides with; drawn for a kind that the renderer has no shape for
+  std::vector<Rod> outline;  // collision capsules; drawn for a kind without a shape in the renderer
   bool can(uint32_t capability) const { return (capabilities & capability) == capability; }
 };
 

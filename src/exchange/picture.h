@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// exchange: what a picture of the scene needs and that never changes during a run. Built once from the model, then only
-// Snapshots flow to the renderer.
+// exchange: constant data for rendering a scene. Built once from the model; after that only
+// Snapshots go to the renderer.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -27,7 +27,7 @@ struct VisibleMesh {
   std::vector<std::array<float, 4>> skin_weight;       // sum 1
 };
 
-// A needle and its thread, as they are drawn and held.
+// A needle and its thread, for rendering and grasping.
 struct SuturePicture {
   uint32_t thread_first = 0;  // slot of the first thread particle in Snapshot::particle
   uint32_t thread_count = 0;
@@ -46,7 +46,7 @@ struct PictureModel {
   std::vector<InstrumentPicture> instrument;                          // as Snapshot::instrument
   Vec3 focus;                                                         // [m] center of the operating field
   float field = 0.1f;                                                 // [m] its radius
-  float drape = -0.035f;  // [m] height of the sterile drape (horizontal), which the organ stands up through
+  float drape = -0.035f;  // [m] height of the sterile drape (horizontal), through which the organ protrudes
   // One per wall that the procedure works on: tissue particles round its near opening, in order, on its outer side. Walls are
   // numbered: one per bowel end, and two (outer, inner) for a bowel folded into itself.
   std::vector<std::vector<uint32_t>> rim;

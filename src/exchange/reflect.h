@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// exchange/reflect: the members of what crosses rooms, for archives (core/reflect.h).
+// exchange/reflect: the members of types shared between rooms, for archives (core/reflect.h).
 #pragma once
 #include "core/reflect.h"
 #include "core/sym3.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// exchange: a queue of fixed size between one writer and one reader that never wait for each other. Nothing is lost on the way:
-// when it is full push() says so and the writer decides. For commands and events; poses go through exchange/latest.
+// exchange: a wait-free queue of fixed size between one writer and one reader. It never drops an element:
+// when it is full, push() returns false and the writer decides. For commands and events; poses use exchange/latest.
 #pragma once
 #include <array>
 #include <atomic>
@@ -14,7 +14,7 @@ class Ring {
   static_assert(kSize > 0 && (kSize & (kSize - 1)) == 0, "a power of two");
 
  public:
-  // Writer only. False: it is full, and the value is not in it.
+  // Writer only. False: the queue is full and the value was not added.
   bool push(const T& value) {
     const uint64_t put = put_.load(std::memory_order_relaxed);
     if (put - taken_.load(std::memory_order_acquire) == kSize) return false;
@@ -23,7 +23,7 @@ class Ring {
     return true;
   }
 
-  // Reader only. False: it is empty.
+  // Reader only. False: the queue is empty.
   bool pop(T& value) {
     const uint64_t taken = taken_.load(std::memory_order_relaxed);
     if (taken == put_.load(std::memory_order_acquire)) return false;
@@ -34,8 +34,8 @@ class Ring {
 
  private:
   std::array<T, kSize> slot_{};
-  alignas(64) std::atomic<uint64_t> put_{0};    // written by the writer alone
-  alignas(64) std::atomic<uint64_t> taken_{0};  // written by the reader alone
+  alignas(64) std::atomic<uint64_t> put_{0};    // written by the writer only
+  alignas(64) std::atomic<uint64_t> taken_{0};  // written by the reader only
 };
 
 }  // namespace catgut

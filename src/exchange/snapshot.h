@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// exchange: the state of the operating field after a tick, for the picture, the surgeon, the host and (later) assessment.
+// exchange: the state of the operating field after a tick, for rendering, surgeon, host and (later) assessment.
 // Self-contained: plain values, no pointers into the simulation.
 #pragma once
 #include <array>
@@ -14,32 +14,32 @@
 
 namespace catgut {
 
-// A hand and the instrument that it has. An empty hand: `pose` is the hand's, nothing is held.
+// A hand and its instrument. An empty hand: `pose` is the hand's, nothing is held.
 struct ToolView {
   int instrument = -1;  // of Snapshot::instrument; -1: the hand is empty
-  Pose pose;            // where the simulated tool is (tissue and thread may hold it back from the hand)
-  Pose hand;            // where the hand is
+  Pose pose;            // pose of the simulated tool (tissue and thread may hold it back from the hand)
+  Pose hand;            // pose of the hand
   float jaw = 1;        // 0 closed .. 1 open
   Held held = Held::nothing;
-  float held_at = 0;          // needle: place on the arc, 0 swage .. 1 tip
+  float held_at = 0;          // needle: fraction of the arc, 0 swage .. 1 tip
   uint32_t held_slot = 0;     // thread: particle slot; tissue: particle
-  uint32_t held_suture = 0;   // needle, thread: whose
+  uint32_t held_suture = 0;   // needle, thread: index of its suture
   uint32_t held_strands = 0;  // strands of thread between the jaws
-  uint32_t loop_wraps = 0;    // turns of thread frozen round it, 0: none
-  // Walked away from the tissue, the thread turns round the tool +1: counter-clockwise, -1: clockwise as seen from its hand.
+  uint32_t loop_wraps = 0;    // turns of thread frozen on it, 0: none
+  // Traversed away from the tissue, the thread turns round the tool +1: counter-clockwise, -1: clockwise as seen from its hand.
   int loop_handed = 0;
-  uint32_t loop_suture = 0;                // whose thread it is
+  uint32_t loop_suture = 0;                // index of its suture
   uint32_t loop_first = 0, loop_last = 0;  // slots of the loop's ends, free-end side first; valid with a loop
   Vec3 force;                              // [N] on the hand
   Vec3 torque;                             // [N m] on the hand, about the tool's origin
 };
 
-// Every instrument of the scene, whether a hand has it or not.
+// Every instrument of the scene, with or without a hand.
 struct InstrumentView {
   Pose pose;
   float jaw = 1;  // 0 closed .. 1 open
   InstrumentPlace place = InstrumentPlace::tray;
-  uint8_t hand = kNoHand;  // that has it
+  uint8_t hand = kNoHand;  // that holds it
   Held held = Held::nothing;
   uint32_t held_slot = 0;  // as ToolView::held_slot
   Vec3 pull;               // [N] on the tissue that it holds
@@ -57,16 +57,16 @@ struct SuturePointView {
   bool exit = false;                           // the exit end of its bite, else the entry
   uint32_t anchored = 0;                       // slot of the thread particle locked to it
   float tension_needle = 0, tension_free = 0;  // [N] on its two sides
-  uint32_t wall = 0;                           // of PictureModel::rim: the bowel end, or the layer, that it is in
+  uint32_t wall = 0;                           // of PictureModel::rim: the bowel end, or the layer, that contains it
 };
 
-// One throw of a knot, for the picture and for who judges it (square, granny, 2-1-1, air knot).
+// One throw of a knot, for rendering and scoring (square, granny, 2-1-1, air knot).
 struct KnotThrow {
   uint32_t wraps = 1;
-  int32_t chirality = 1;   // of the loop, +1 or -1 (ToolView::loop_handed): a reef knot's two differ, a granny's do not
+  int32_t chirality = 1;   // of the loop, +1 or -1 (ToolView): the two of a square knot differ, those of a granny knot do not
   int32_t needle_end = 1;  // 1: the end with the needle was wrapped, 0: the free end
-  float tension = 0;       // [N] of the pulled strand when it was set
-  float gap = 0;           // [m] to the tissue, or to the throw before it, when it was set
+  float tension = 0;       // [N] of the pulled strand when it locked
+  float gap = 0;           // [m] to the tissue, or to the throw below it, when it locked
 };
 
 enum class KnotPhase : uint32_t { tightening, locked };
@@ -75,28 +75,28 @@ struct KnotView {
   static constexpr size_t kMaxThrows = 8;
   KnotPhase phase = KnotPhase::tightening;
   Vec3 position;  // [m]
-  Vec3 way;       // unit: along the stitch it ties, from its free-end side to its needle side
+  Vec3 way;       // unit: along its stitch, from the free-end side to the needle side
   uint32_t throws = 0;
   std::array<KnotThrow, kMaxThrows> thrown;
 };
 
-// A tied stitch that is no longer simulated: its thread as a curve that the tissue carries, tails included.
+// A baked suture: its thread as a curve that the tissue carries, tails included.
 struct SettledView {
   std::vector<Vec3> node;
   std::vector<Vec3> knot;
 };
 
-// Two edges that a technique draws together, at one place of the line: a midpoint of 2.5.2, a pair of figure 13 or 15.
+// Two points that a technique closes, at one position of the line: a midpoint of 2.5.2, a pair of figure 13 or 15.
 struct SeamView {
   Vec3 a, b;              // [m] the two points of tissue
   float start = 0;        // [m] their distance when the pair was made
   float progress = 0;     // 0..1
-  bool midpoint = false;  // between suture points; else one of the pairs in between
+  bool midpoint = false;  // between suture points; else an interpolated pair
 };
 
 struct BiteView {
-  Vec3 entry, exit;  // [m] where they are now, carried by the tissue
-  float depth = 0;   // [m] deepest the tip went below the surface
+  Vec3 entry, exit;  // [m] current positions, carried by the tissue
+  float depth = 0;   // [m] maximum depth of the tip below the surface
   bool has_exit = false, complete = false;
   uint32_t wall = 0;                               // as in SuturePointView
   bool entry_inside = false, exit_inside = false;  // that end lies on the mucosa
@@ -124,14 +124,14 @@ struct Snapshot {
   std::array<ToolView, kMaxHands> tool;  // per hand
   std::vector<InstrumentView> instrument;
   std::vector<SutureView> suture = std::vector<SutureView>(1);  // at least one
-  uint32_t active_suture = 0;                                   // whose needle was grasped last
+  uint32_t active_suture = 0;                                   // the one grasped last
   std::vector<SettledView> settled;
   float opening_area = 0;                   // [m^2] of the rim that is being closed
   float closure = 0;                        // 0 open .. 1 at the anvil
   std::vector<Event> event;                 // of this tick
-  std::array<ForcePatch, kMaxHands> patch;  // what each hand may feel until the next tick
+  std::array<ForcePatch, kMaxHands> patch;  // force patch of each hand until the next tick
 
-  // The suture in hand.
+  // The active suture.
   const SutureView& active() const { return suture[active_suture]; }
   SutureView& active() { return suture[active_suture]; }
 };

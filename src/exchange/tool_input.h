@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// exchange: the only way into a tick. A device (or the scripted surgeon, or a recording) publishes one whole ToolInput per
-// hand; the host adds commands; together they are the TickInput.
+// exchange: the only input of a tick. A device (or the scripted surgeon, or a recording) publishes one complete ToolInput per
+// hand; the host adds commands. Together they are the TickInput.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -12,12 +12,12 @@ namespace catgut {
 
 constexpr size_t kMaxHands = 4;  // of a scene
 
-// Bits of ToolInput::buttons. Each acts once, when it goes down.
-constexpr uint32_t kButtonCut = 1u << 0;  // scissors cut the thread where this tool's jaws are
+// Bits of ToolInput::buttons. Each acts once, on the press.
+constexpr uint32_t kButtonCut = 1u << 0;  // scissors cut the thread at this tool's jaws
 constexpr uint32_t kButtonNewSuture =
-    1u << 1;  // a fresh needle and thread, please: what is tied settles, the rest is taken away
+    1u << 1;  // a new needle and thread are loaded: tied thread is baked, the rest of the old one is removed
 
-// Tool frame: origin at the grasp point between the jaw tips, -z the way the tool points (the shaft runs along +z toward the
+// Tool frame: origin at the grasp point between the jaw tips, -z the pointing direction (the shaft runs along +z toward the
 // hand), x the direction in which the jaws open.
 struct ToolInput {
   Pose pose;              // of the hand's tool frame, in world [m]
@@ -25,12 +25,12 @@ struct ToolInput {
   Vec3 angular_velocity;  // [rad/s]
   float jaw = 1;          // 0 closed .. 1 open
   uint32_t buttons = 0;   // bit per button
-  uint64_t time_ns = 0;   // device clock, for latency tables only: never read by the physics
+  uint64_t time_ns = 0;   // device clock, only for latency tables: never read by the physics
   uint32_t sequence = 0;
-  uint32_t connected = 1;  // 0: no device; the tool stays where it is and touches nothing
+  uint32_t connected = 1;  // 0: no device; the tool stays where it is, without contact
 };
 
-// A hand that is not there.
+// A hand that is not connected.
 inline ToolInput no_hand() {
   ToolInput input;
   input.connected = 0;

@@ -11,11 +11,11 @@ namespace catgut {
 namespace {
 
 constexpr float kWindRadius = 0.0028f;  // [m] of a wrap's middle line
-constexpr float kApart = 0.010f;        // [m] along the tool, by which the strand's two ends stand apart
+constexpr float kApart = 0.010f;        // [m] along the tool, between the strand's two ends
 constexpr float kLeadBack = 0.004f;     // [m] toward the hand: a slack strand would slide off the tip
 constexpr float kShaft = 0.0035f;       // [m] a shaft's radius and the tissue's
 constexpr float kNeedleBelow = 0.007f;  // [m] that the needle hangs below its swage
-constexpr float kNear = 0.035f;         // [m] round a stitch: tissue that hands go over
+constexpr float kNear = 0.035f;         // [m] round a stitch: tissue below the hands
 
 float highest_near(const PictureModel& picture, const Snapshot& seen, Vec3 p) {
   float y = p.y - kNear;
@@ -54,10 +54,10 @@ float feel_strand(float strand, float tension, float dt) {
 void begin_winding(Winding& w, const PictureModel& picture, const Snapshot& seen, float least_free, bool past_knot) {
   const bool from_point = !seen.active().suture_point.empty() && (past_knot || seen.active().knot.empty());
   w.start = from_point ? seen.active().suture_point.back().position : stitch_place(picture, seen);
-  // What the knot holds already is no longer in the hand.
+  // Thread in the knot is no longer available to the hand.
   const float spent = seen.active().suture_point.empty() ? 0 : distance(seen.active().suture_point.back().position, w.start);
   w.reach = std::max(0.03f, length_between(seen, last_point_node(seen), seen.active().thread_order.size() - 1) - spent);
-  // So high that the needle, going round below on a taut strand, keeps clear of the tissue, as far as a short strand allows.
+  // High enough that the needle, moving round below on a taut strand, clears the tissue, as far as a short strand allows.
   const float crest = highest_near(picture, seen, w.start), rise = crest - w.start.y;
   w.ground = crest + kNeedleBelow;
   w.height = std::clamp(0.5f * (w.reach + rise + kNeedleBelow), 0.025f, std::max(0.025f, w.reach - least_free));
@@ -66,7 +66,7 @@ void begin_winding(Winding& w, const PictureModel& picture, const Snapshot& seen
 }
 
 Vec3 winding_axis(const Winding& w, const AcrossTool& across) {
-  // The strand comes up on the hand's side of the turn and leaves on the tip's: the two never meet.
+  // The strand rises on the hand's side of the turn and leaves on the tip's: the two never meet.
   return w.start + across.e1 * w.height - across.e2 * (w.way * kWindRadius) - across.z * kApart;
 }
 
@@ -84,7 +84,7 @@ Vec3 winding_swage(const Winding& w, const AcrossTool& across, float wound, floa
 void feel_winding(Winding& w, const Snapshot& seen, const AcrossTool& across, float behind, float room, float dt) {
   const float tension = needle_tension(seen);
   if (!((behind < 0.005f && room > w.free) || tension > kTieTooTaut)) return;
-  // Before the first throw nothing but friction holds the thread in its holes: no more is requested than there is.
+  // Before the first throw only friction holds the thread in its holes: use no more than is available.
   const float there_is = w.reach - distance(w.start, winding_axis(w, across)) - kTieWound * std::max(0.0f, w.wound) + 0.002f;
   const float most = seen.active().knot.empty() ? std::max(0.006f, there_is) : w.reach;
   w.free = std::clamp(feel_strand(w.free, tension, dt), 0.006f, most);
@@ -102,7 +102,7 @@ bool best_tail_grip(const PictureModel& picture, const Snapshot& seen, size_t wh
   const Vec3 knot = stitch_place(picture, seen);
   const size_t point = first_point_node(seen), root = node_along(seen, point, distance(node_at(seen, point), knot), -1);
   const float tail = length_between(seen, 0, root);
-  // What lies between tissue and turns is all there is: the jaws come no further.
+  // The distance between tissue and turns is the limit of the jaws.
   const bool loop = seen.tool[who].loop_wraps > 0;
   const float leash = loop ? 0.9f * (length_between(seen, last_point_node(seen), node_of(seen, seen.tool[who].loop_first)) -
                                      distance(node_at(seen, last_point_node(seen)), knot))
@@ -125,9 +125,9 @@ bool best_tail_grip(const PictureModel& picture, const Snapshot& seen, size_t wh
         const float along = dot(d, z);
         if (along > 0.003f && along < 0.06f && length2(d - z * along) < kShaft * kShaft) good -= 0.1f;
       }
-      // Where the tail has slipped down between the edges it is taken up there: below, hands and needle would meet tissue.
+      // A tail that has slipped down between the edges is grasped only near the top: below, hands and needle touch tissue.
       good -= depth.worse * std::max(0.0f, knot.y - depth.easy - tip.y);
-      // Near the knot little else lies about. Where it was tried in vain it is not tried again.
+      // Near the knot there are few obstacles. A position that failed before is skipped.
       good -= 12 * distance(tip, knot) + (tried && distance(tip, *tried) < 0.004f ? 0.5f : 0.0f);
       if (good > best) best = good, out = {seen.active().thread_order[i], {tip, from_tool_axis(z)}, tail};
     }

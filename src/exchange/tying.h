@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// exchange: the geometry of an instrument tie, read off a Snapshot: where the strand is wound, where the needle goes meanwhile,
-// where the tail is best taken. For a caller that ties: the scripted surgeon, the help that hands without hardware get. Why it
-// is done so: docs/rooms/surgeon.md, "An instrument tie".
+// exchange: the geometry of an instrument tie, from a Snapshot: where to wind the strand, where to move the needle meanwhile,
+// where to grasp the tail. For the scripted surgeon and for assisted hands. Background: docs/rooms/surgeon.md, "An instrument
+// tie".
 //
 // One hand holds the needle, the other lays its tool across the strand. A throw:
 //
 //   Winding w;
-//   w.way = 1;                                          // or -1: the other way round makes the next throw a reef knot
+//   w.way = 1;                                          // or -1: the opposite sense makes the next throw square
 //   begin_winding(w, picture, seen);
 //   const AcrossTool across(tying_axis(1));             // a tool that comes from the right
 //   w.free = kTieTaut * (w.reach - distance(w.start, winding_axis(w, across)));
@@ -29,69 +29,69 @@ namespace catgut {
 
 constexpr float kTieWindAt = 0.024f;     // [m] behind the tool's tip, where thread is wound round it
 constexpr float kTieBefore = -0.25f;     // [rad] where the strand stands before it is wound
-constexpr float kTieWound = 0.0022f;     // [m] of thread that a radian takes
-constexpr float kTieLean = 0.3f;         // of the strand that leaves, along the tool
-constexpr float kTieTaut = 0.975f;       // of the strand's length, between tool and needle: just not taut
+constexpr float kTieWound = 0.0022f;     // [m] of thread per radian
+constexpr float kTieLean = 0.3f;         // slope of the strand that leaves, along the tool
+constexpr float kTieTaut = 0.975f;       // of the strand's length, between tool and needle: just below taut
 constexpr float kTieTooTaut = 0.3f;      // [N]
 constexpr float kTieLoose = 0.7f;        // of the strand between the turns and the needle, on the way to the tail
-constexpr float kTieClear = 0.006f;      // [m] between jaws that take the tail and the other strand
-constexpr float kTieLeastFree = 0.032f;  // [m] of strand that must be left to go round
+constexpr float kTieClear = 0.006f;      // [m] between jaws that grasp the tail and the other strand
+constexpr float kTieLeastFree = 0.032f;  // [m] minimum free strand for winding
 
-// The direction, from tip to handle, of a tool that lies ready for a throw; side: +1 comes from the right, -1
+// The direction, from tip to handle, of a tool that is ready for a throw; side: +1 comes from the right, -1
 // from the left.
 Vec3 tying_axis(float side);
-// A tool along z, the open side of its jaws up.
+// A tool along z, its jaws opening upward.
 Quat from_tool_axis(Vec3 z);
 
-// What is reckoned along and across a tool that lies along z: e1 away from the tissue, e2 to its side.
+// Coordinates across a tool that lies along z: e1 away from the tissue, e2 to its side.
 struct AcrossTool {
   Vec3 z, e1, e2;
   explicit AcrossTool(Vec3 along);
 };
 
-// [m] Where the stitch in hand is: its knot, else the middle of its points, else the middle of the field.
+// [m] Position of the current stitch: its knot, else the mean of its points, else the center of the field.
 Vec3 stitch_place(const PictureModel& picture, const Snapshot& seen);
 Vec3 needle_swage(const PictureModel& picture, const Snapshot& seen);
 
-// How much strand is left between two hands is felt: a little is given while it is taut and taken while it is slack.
+// Estimate of the free strand between two hands: it decreases while the strand is taut and increases while it is slack.
 float feel_strand(float strand, float tension, float dt);
 
 // A strand that is wound round a tool lying across it.
 struct Winding {
   Vec3 start;                               // [m] where the strand leaves the stitch
-  float reach = 0, height = 0, ground = 0;  // [m] of strand; of the tool over the stitch; below it the needle would meet tissue
-  float way = 0;                            // +1, -1: which way round
+  float reach = 0, height = 0, ground = 0;  // [m] length of strand; height of the tool; height of tissue
+  float way = 0;                            // +1, -1: sense of winding
   float wound = 0;                          // [rad] so far
-  float lean = 0;                           // of the strand that leaves, along the tool
-  float free = 0;                           // [m] of strand between tool and needle, as it is felt
+  float lean = 0;                           // slope of the strand that leaves, along the tool
+  float free = 0;                           // [m] of strand between tool and needle, estimated
 };
 
-// From the last suture point or the knot that is already on the strand; past_knot: from the suture point all the same. Leaves
-// `way` and `free` to the caller. least_free: [m] of strand that must be left to go round.
+// From the last suture point or the knot that is already on the strand; past_knot: always from the suture point. The caller
+// sets `way` and `free`. least_free: [m] minimum free strand for winding.
 void begin_winding(Winding& w, const PictureModel& picture, const Snapshot& seen, float least_free = kTieLeastFree,
                    bool past_knot = false);
-// [m] Where the tool lies.
+// [m] Position of the tool.
 Vec3 winding_axis(const Winding& w, const AcrossTool& across);
-// [m] The needle's swage when the strand leaves the tool after `wound` [rad] about it. room: [m] of strand that there is room
-// for below; less than w.free: the strand goes slack there and is drawn taut again behind.
+// [m] The needle's swage when the strand leaves the tool after `wound` [rad] about it. room: [m] of strand that fits below;
+// if less than w.free, the strand is slack there and is tightened afterward.
 Vec3 winding_swage(const Winding& w, const AcrossTool& across, float wound, float& room);
-// w.free by feel, while the strand is wound; behind: [m] of the needle, from where winding_swage wants it.
+// Updates w.free while the strand is wound; behind: [m] distance of the needle from its target winding_swage.
 void feel_winding(Winding& w, const Snapshot& seen, const AcrossTool& across, float behind, float room, float dt);
-// [m] Where the needle goes along above the turns, at `turns`, on the way to the tail.
+// [m] Position of the needle above the turns, at `turns`, on the way to the tail.
 Vec3 strand_above(const Winding& w, const AcrossTool& across, Vec3 turns);
 
-// A tail that has slipped down between the edges: easy to take as far as `easy` [m] below the knot, then worse by `worse` a
+// A tail that has slipped down between the edges: no penalty down to `easy` [m] below the knot, then `worse` per
 // meter.
 struct TailDepth {
   float easy, worse;
 };
-// The script comes down as carefully as it likes. A user at a mouse or a gamepad, seeing few pictures a second, does not
-// finish a stitch with the script's figures (tests/hands).
+// The script can descend slowly. A user at a mouse or a gamepad, at a low frame rate, does not
+// finish a stitch with the script's values (tests/hands).
 constexpr TailDepth kTailByScript{0.010f, 50}, kTailByHand{0.006f, 30};
 
-// Where tool `who`, coming from `side`, best takes the tail of the thread: clear of the other strand, no tissue in the way of
-// its shaft, near the knot, not deep below it, within what a loop on the tool leaves; `tried` (may be null): [m] where it was
-// tried in vain. False: there is no tail.
+// Best position for tool `who`, coming from `side`, to grasp the tail: clear of the other strand, no tissue in the path of
+// its shaft, near the knot, not deep below it, within the range of a loop on the tool; `tried` (may be null): [m] the last
+// failed position. False: there is no tail.
 struct TailGrip {
   uint32_t slot = 0;  // of the thread
   Pose pose;

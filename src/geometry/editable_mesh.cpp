@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// geometry/editable_mesh: the collapse, split and flip of edges that remeshing is made of.
+// geometry/editable_mesh: collapse, split and flip of edges, the operations of remeshing.
 #include "geometry/editable_mesh.h"
 
 #include <algorithm>
@@ -148,10 +148,10 @@ bool EditableMesh::flip(uint32_t a, uint32_t b) {
   const auto nc = neighbors(c[0]);
   if (std::binary_search(nc.begin(), nc.end(), c[1])) return false;
   if (neighbors(a).size() <= 3 || neighbors(b).size() <= 3) return false;
-  // Triangles a b c0 and b a c1 become c0 c1 b and c1 c0 a... written so that each keeps facing the same way.
+  // Triangles a b c0 and b a c1 become c0 c1 b and c1 c0 a, with unchanged orientation.
   const Triangle old0{a, b, c[0]}, old1{b, a, c[1]}, new0{c[0], a, c[1]}, new1{c[1], b, c[0]};
   const Vec3 up = area_vector(old0) + area_vector(old1);
-  if (dot(normalized(area_vector(old0)), normalized(area_vector(old1))) < 0.6f) return false;  // a crease must stay where it is
+  if (dot(normalized(area_vector(old0)), normalized(area_vector(old1))) < 0.6f) return false;  // a crease must be preserved
   for (const Triangle& t : {new0, new1}) {
     if (dot(normalized(area_vector(t)), normalized(up)) < 0.6f) return false;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // geometry/editable_mesh: a manifold surface whose edges can be split, collapsed and flipped one at a time. Used by remesh.
-// Vertices and triangles keep their numbers for life; dead ones stay as gaps until `finish`.
+// Vertices and triangles keep their numbers permanently; dead ones remain as gaps until `finish`.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -28,12 +28,12 @@ class EditableMesh {
 
   // Puts a new vertex at p on the edge and returns its number.
   uint32_t split(uint32_t a, uint32_t b, Vec3 p);
-  // Merges b into a, moved to p; false and nothing done when that would change the kind of surface, turn a triangle over or
+  // Merges b into a, moved to p; false, without a change, if that would change the topology, flip a triangle or
   // leave a rim with fewer than five vertices (rim_left: vertices on the rim of the edge).
   bool collapse(uint32_t a, uint32_t b, Vec3 p, size_t rim_left);
-  // Turns the edge to join its opposite vertices; false and nothing done where that is not allowed or not flat enough.
+  // Flips the edge to join its opposite vertices; false, without a change, where that is invalid or not flat enough.
   bool flip(uint32_t a, uint32_t b);
-  // Whether moving v to p turns no triangle over.
+  // Whether moving v to p flips no triangle.
   bool can_move(uint32_t v, Vec3 p) const;
 
   // Vertices and triangles without gaps; number[v] is the new index of slot v.

@@ -25,7 +25,7 @@ constexpr int kDeepest = 64, kDeepestNode = 256;
 constexpr size_t kMostNodes = 100000, kMostValues = 1000000;
 const char* const kAgain = "open it in a mesh viewer and export the surface again";
 
-// As much of JSON as the check needs: strings stay as they are written, escapes included.
+// The subset of JSON that the check needs: strings stay raw, escapes included.
 struct Json {
   enum class Kind : uint8_t { nothing, number, text, list, object } kind = Kind::nothing;
   double number = 0;
@@ -160,7 +160,7 @@ class Check {
         if (seen[*i]++ || has_parent[*i]) refuse("its nodes do not form a tree: a scene lists one twice");
       }
     }
-    // With one parent each, levels below the tops are a forest; what is left is a ring.
+    // With one parent each, levels below the roots are a forest; the remainder are cycles.
     std::vector<size_t> level;
     for (size_t i = 0; i < node.size(); ++i)
       if (!has_parent[i]) level.push_back(i);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// geometry/gltf_check: looks through a glTF or GLB file before assimp reads it. A kilobyte can ask assimp for gigabytes: nodes
-// that share children double at every level, sparse accessors claim any length, and deeply nested JSON overruns its stack.
+// geometry/gltf_check: checks a glTF or GLB file before assimp reads it. A kilobyte can make assimp allocate gigabytes: nodes
+// that share children double at every level, sparse accessors declare any length, and deeply nested JSON overflows its stack.
 #pragma once
 #include <string>
 
 namespace catgut {
 
 // Throws InputError where the file is not JSON, nests deeper than 64, is not glTF 2, has nodes that do not form a tree, or a
-// tree deeper than 256, or describes more geometry than `kMostGltfValues`. What passes takes less than 512 MB and two seconds
-// to read, compressed meshes (KHR_draco_mesh_compression) excepted, whose size only their decoder knows.
+// tree deeper than 256, or describes more geometry than `kMostGltfValues`. A file that passes takes less than 512 MB and two
+// seconds to read, except compressed meshes (KHR_draco_mesh_compression), whose size only their decoder knows.
 void check_gltf(const std::string& path);
 
 constexpr double kMostGltfValues = 6e6;  // vertices of all attributes, and indices, over all primitives

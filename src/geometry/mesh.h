@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// geometry/mesh: an indexed triangle mesh, the common coin of importers, generators and the picture.
+// geometry/mesh: an indexed triangle mesh, used by importers, generators and rendering.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// geometry/mesh_clean: welds, orients and checks what a file gave. Says plainly what cannot be used.
+// geometry/mesh_clean: welds, orients and checks a mesh from a file, and reports what is unusable.
 #include "geometry/mesh_clean.h"
 
 #include <fmt/format.h>
@@ -51,7 +51,7 @@ void check_edges(const TriangleMesh& mesh, const std::vector<HalfEdge>& edge, co
                    "clean it in a mesh editor (Blender: Merge by Distance, then Select Non Manifold), or choose a single node");
 }
 
-// Turns triangles until neighbors agree; returns the piece each triangle belongs to (pieces join along edges).
+// Flips triangles until neighbors agree; returns the piece of each triangle (pieces are connected along edges).
 std::vector<uint32_t> orient_pieces(TriangleMesh& mesh, const std::vector<HalfEdge>& edge, uint32_t& pieces,
                                     const std::string& where) {
   struct Link {
@@ -95,7 +95,7 @@ std::vector<uint32_t> orient_pieces(TriangleMesh& mesh, const std::vector<HalfEd
   return piece;
 }
 
-// The surface with each opening closed, as one closes it in thought, by a fan about its middle.
+// The surface with each opening closed by a fan about its center.
 TriangleMesh capped(const TriangleMesh& mesh) {
   TriangleMesh closed = mesh;
   for (const auto& loop : boundary_loops(mesh.triangle)) {
@@ -108,7 +108,7 @@ TriangleMesh capped(const TriangleMesh& mesh) {
   return closed;
 }
 
-// How often the closed surface winds round p: about 1 (or -1) inside, 0 outside (Van Oosterom and Strackee 1983).
+// Winding number of the closed surface round p: about 1 (or -1) inside, 0 outside (Van Oosterom and Strackee 1983).
 double winding(const TriangleMesh& closed, Vec3 p) {
   double sum = 0;
   for (const Triangle& t : closed.triangle) {
@@ -121,15 +121,15 @@ double winding(const TriangleMesh& closed, Vec3 p) {
 }
 
 bool lies_inside(const TriangleMesh& inner, const TriangleMesh& outer_closed) {
-  const size_t step = inner.triangle.size() / 200 + 1;  // some 200 places tell as much as all
+  const size_t step = inner.triangle.size() / 200 + 1;  // a sample of about 200 points is sufficient
   size_t inside = 0, asked = 0;
   for (size_t t = 0; t < inner.triangle.size(); t += step, ++asked) {
     inside += std::abs(winding(outer_closed, inner.position[inner.triangle[t][0]])) > 0.5;
   }
-  return 10 * inside >= 8 * asked;  // near its opening it may stand out a little
+  return 10 * inside >= 8 * asked;  // near its opening it may protrude a little
 }
 
-// Organ files often draw the wall twice, outside and lumen: the outer surface is taken, the wall is ours to build. Specks go.
+// Organ files often contain the wall twice, outside and lumen: keeps the outer surface and drops specks.
 void keep_outer_piece(TriangleMesh& mesh, const std::vector<uint32_t>& piece, uint32_t pieces, const std::string& where) {
   if (pieces == 1) return;
   std::vector<TriangleMesh> part(pieces, TriangleMesh{mesh.position, {}});
@@ -157,7 +157,7 @@ void keep_outer_piece(TriangleMesh& mesh, const std::vector<uint32_t>& piece, ui
   mesh.triangle = std::move(part[best].triangle);
 }
 
-// Where two fans of triangles touch only in a vertex each fan gets its own: otherwise the vertex has no ring round it.
+// Two fans of triangles that touch only in a vertex each get their own: otherwise the vertex has no ring of neighbors.
 void split_touching_fans(TriangleMesh& mesh) {
   std::vector<std::vector<uint32_t>> around(mesh.position.size());
   for (uint32_t t = 0; t < mesh.triangle.size(); ++t) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// geometry/mesh_clean: makes a manifold, evenly oriented surface of a triangle soup, or says why it cannot.
+// geometry/mesh_clean: makes a manifold, consistently oriented surface from a triangle soup, or reports why it cannot.
 #pragma once
 #include <string>
 
@@ -14,8 +14,8 @@ float diagonal(const TriangleMesh& mesh);
 TriangleMesh weld(const TriangleMesh& mesh, float tolerance);
 
 // weld (tolerance 5e-6 of the size: 1e-6 m for an organ of 0.2 m), then: every edge in at most two triangles, all triangles
-// turned the same way and outward (openings thought closed), vertices that join two fans split, specks (below 1 % of the
-// area) dropped. Where the file draws both sides of a wall, the outer surface is kept and those inside it are dropped.
+// oriented consistently and outward (openings assumed closed), vertices that join two fans split, specks (below 1 % of the
+// area) dropped. Where the file contains both sides of a wall, the outer surface is kept and those inside it are dropped.
 // where: the file, for messages. Throws InputError: no triangles, no area, edges shared by more than two triangles, a surface
 // with one side only, several surfaces side by side.
 TriangleMesh clean_mesh(const TriangleMesh& mesh, const std::string& where);

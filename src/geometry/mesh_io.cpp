@@ -21,7 +21,7 @@ namespace catgut {
 
 namespace {
 
-constexpr uintmax_t kLargestMeshFile = 64u << 20;  // [byte]: what is read of it fits into 512 MB
+constexpr uintmax_t kLargestMeshFile = 64u << 20;  // [byte]: a file of this size can be read within 512 MB
 
 struct Found {
   const aiNode* node;
@@ -69,8 +69,8 @@ void append(const aiScene& scene, const Found& found, TriangleMesh& mesh) {
   }
 }
 
-// A mesh file may name others (buffers, materials). Only regular files of its own folder are opened: no device or pipe that
-// never ends, nothing of another folder.
+// A mesh file may refer to others (buffers, materials). Only regular files of its own folder are opened: no device or endless
+// pipe, nothing of another folder.
 class OwnFolder : public Assimp::DefaultIOSystem {
  public:
   explicit OwnFolder(const std::string& mesh) : folder_(folder(mesh)) {}
@@ -151,7 +151,7 @@ TriangleMesh read_mesh(const std::string& path, const std::string& node) {
       throw InputError(path, fmt::format("no node \"{}\"", node),
                        "choose one of: " + (list.empty() ? "(none has triangles)" : list));
     }
-    // list_nodes goes depth first, so the node and all below it are neighbors in the list.
+    // list_nodes is depth first, so a node and its subtree are contiguous in the list.
     for (auto f = match; f != nodes.end(); ++f) {
       const aiNode* up = f->node;
       while (up && up != match->node) up = up->mParent;

@@ -8,13 +8,13 @@
 
 namespace catgut {
 
-// [m^2] area of the loop projected on its own best plane (half the length of Newell's vector). 0 for fewer than three points.
+// [m^2] area of the loop projected on its best-fit plane (half the length of Newell's vector). 0 for fewer than three points.
 float loop_area(std::span<const Vec3> loop);
 // Unit normal of that plane: the loop runs counter-clockwise about it. {0,0,0} for a loop without area.
 Vec3 loop_normal(std::span<const Vec3> loop);
-// [m] round the loop.
+// [m] perimeter of the loop.
 float loop_length(std::span<const Vec3> loop);
-// [m] center of the loop as a curve (each edge weighted by its length: uneven spacing does not pull it aside).
+// [m] center of the loop as a curve (each edge weighted by its length: uneven spacing does not bias it).
 Vec3 loop_center(std::span<const Vec3> loop);
 
 }  // namespace catgut

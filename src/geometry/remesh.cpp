@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// geometry/remesh: brings a surface to an exact number of evenly spread vertices.
+// geometry/remesh: resamples a surface to an exact number of evenly spaced vertices.
 #include "geometry/remesh.h"
 
 #include <fmt/format.h>
@@ -29,7 +29,7 @@ class RimCurve {
   }
   double length() const { return arc_.back(); }
   double arc(size_t i) const { return arc_[i]; }
-  // The way from u to v along the curve, -length/2 .. length/2.
+  // The distance from u to v along the curve, -length/2 .. length/2.
   double way(double u, double v) const { return std::remainder(v - u, length()); }
   double wrapped(double u) const { return u - std::floor(u / length()) * length(); }
   Vec3 at(double u) const {
@@ -135,7 +135,7 @@ class Remesher {
   bool collapse(Edge e) {
     auto [a, b] = e;
     if (edit_.on_rim(b) && !edit_.on_rim(a)) std::swap(a, b);
-    Vec3 p = edit_.position[a];  // on a rim that stays where it is
+    Vec3 p = edit_.position[a];  // on a fixed rim
     double at = at_[a];
     size_t left = 0;
     if (edit_.on_rim(a) && edit_.on_rim(b)) {
@@ -160,7 +160,7 @@ class Remesher {
     return true;
   }
 
-  // Collapses the shortest edge that may be, or splits the longest, until the count is right.
+  // Collapses the shortest possible edge, or splits the longest, until the count is right.
   void reach_target() {
     while (edit_.vertices() < target_) split(queue_.rbegin()->second);
     while (edit_.vertices() > target_) {
@@ -174,7 +174,7 @@ class Remesher {
 
   bool collapse_shortest(float below) {
     bool done = false;
-    // The few that refuse are passed over; their turn may come when their surroundings have changed.
+    // Edges that refuse are skipped; they may succeed later when their surroundings have changed.
     for (auto it = queue_.begin(); !done && it != queue_.end() && it->first < below;) {
       const auto entry = *it;
       done = collapse(entry.second);
@@ -184,7 +184,7 @@ class Remesher {
   }
 
   void even_out() {
-    // No more than a tenth of the vertices in a round: the smoothing between rounds reports which are really too far apart.
+    // At most a tenth of the vertices per round: the smoothing between rounds shows which edges are really too long.
     const size_t most = target_ / 10 + 1;
     for (size_t i = 0; i < most && !queue_.empty() && queue_.rbegin()->first > 1.4f * edge_; ++i)
       split(queue_.rbegin()->second);
@@ -198,7 +198,7 @@ class Remesher {
       bool any = false;
       for (const auto& [a, b] : edit_.edges()) {
         uint32_t c[2];
-        if (edit_.opposite(a, b, c) != 2) continue;  // on a rim, or gone by an earlier flip
+        if (edit_.opposite(a, b, c) != 2) continue;  // on a rim, or removed by an earlier flip
         if (delaunay ? cot_sum(a, b, c) >= -1e-4 : !fewer_odd(a, b, c)) continue;
         any = edit_.flip(a, b) || any;
       }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// geometry/remesh: the same surface with another number of vertices, evenly spread: particles want equal distances, organ files
-// rarely have them.
+// geometry/remesh: resamples a surface to another number of vertices, evenly spaced: particles require equal distances, which
+// organ files rarely have.
 #pragma once
 #include <string>
 
@@ -9,10 +9,10 @@
 namespace catgut {
 
 // A manifold surface with exactly `vertices` vertices on `mesh` (manifold, one piece, as clean_mesh leaves it) and triangles as
-// near equilateral as its shape allows. Edges are split and collapsed one at a time (link condition: the surface keeps its
-// kind), flipped toward six neighbors, and vertices slide along the surface. Vertices on a rim slide along the rim only and
-// end evenly spaced on it. The same input gives the same bits. where: the file, for messages. Throws InputError when so few
-// vertices cannot carry the surface.
+// near equilateral as its shape allows. Edges are split and collapsed one at a time (link condition: preserves the topology),
+// flipped toward six neighbors, and vertices slide along the surface. Vertices on a rim slide along the rim only and end evenly
+// spaced on it. The same input gives the same bits. where: the file, for messages. Throws InputError when the number of
+// vertices is too small for the surface.
 TriangleMesh remesh(const TriangleMesh& mesh, size_t vertices, const std::string& where);
 
 // The smallest and the mean smallest angle over all triangles [degrees], and edge lengths [m].

@@ -24,7 +24,7 @@ class PointGrid {
       high_ = {std::max(high_.x, p.x), std::max(high_.y, p.y), std::max(high_.z, p.z)};
     }
     const Vec3 size = high_ - low_;
-    // No more than about a hundred cells a side: a stray particle far away must not cost memory.
+    // At most about a hundred cells per side: a stray particle far away must not use much memory.
     cell_ = std::max({cell, size.x / 100, size.y / 100, size.z / 100, 1e-9f});
     for (int k = 0; k < 3; ++k) cells_[k] = static_cast<int>(size[k] / cell_) + 1;
     start_.assign(static_cast<size_t>(cells_[0]) * cells_[1] * cells_[2] + 1, 0);
@@ -106,7 +106,7 @@ void bind_skin(VisibleMesh& mesh, std::span<const Vec3> particle_rest, float inf
     }
     auto& slot = mesh.skin_particle[v];
     slot.fill(found[0].second);
-    if (!(sum > 1e-6f)) continue;  // none in reach: the nearest alone
+    if (!(sum > 1e-6f)) continue;  // none in reach: the nearest only
     for (int k = 0; k < std::min(count, 4); ++k) {
       mesh.skin_weight[v][k] = weight[k] / sum;
       if (weight[k] > 0) slot[k] = found[k].second;
@@ -118,11 +118,11 @@ void skin(const VisibleMesh& mesh, std::span<const Vec3> particle_rest, std::spa
           std::span<const Quat> rotation, std::span<Vec3> position, std::span<Vec3> normal) {
   CATGUT_CHECK(position.size() == mesh.position.size() && normal.size() == mesh.position.size());
   CATGUT_CHECK(particle.size() >= particle_rest.size() && rotation.size() >= particle_rest.size());
-  // Each particle's motion as an affine map (matrix columns and shift), so that a vertex only blends twelve numbers.
+  // Each particle's motion as an affine map (matrix columns and translation), so that a vertex blends only twelve numbers.
   struct Motion {
     float m[12];
   };
-  thread_local std::vector<Motion> motion;  // kept between frames: no allocation while running
+  thread_local std::vector<Motion> motion;  // kept between frames: no allocation during a run
   motion.resize(particle_rest.size());
   for (size_t i = 0; i < particle_rest.size(); ++i) {
     const Quat q = rotation[i];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// geometry/topology: who is whose neighbor in a triangle mesh; boundary loops, normals, area and volume.
+// geometry/topology: adjacency in a triangle mesh; boundary loops, normals, area and volume.
 #include "geometry/topology.h"
 
 #include <algorithm>
@@ -36,8 +36,8 @@ std::vector<std::vector<uint32_t>> boundary_loops(std::span<const Triangle> tria
     twin[by_edge[i].second] = by_edge[i + 1].second;
     twin[by_edge[i + 1].second] = by_edge[i].second;
   }
-  // Seen from outside, a boundary half-edge has the organ on its left and so runs clockwise round the opening: walk backward.
-  // The boundary half-edge that ends where h starts is found by turning round that vertex through the fan.
+  // Seen from outside, a boundary half-edge has the organ on its left, so it runs clockwise round the opening: traverse
+  // backward. The boundary half-edge that ends where h starts is found by rotating about that vertex through the fan.
   std::vector<uint8_t> done(count, 0);
   std::vector<std::vector<uint32_t>> loops;
   for (uint32_t start = 0; start < count; ++start) {
@@ -82,7 +82,7 @@ double surface_area(const TriangleMesh& mesh) {
 }
 
 double enclosed_volume(const TriangleMesh& mesh) {
-  // Measured from a vertex: far from the origin the signed sum would lose its digits.
+  // Measured from a vertex: far from the origin the signed sum would lose precision.
   double volume = 0;
   if (mesh.position.empty()) return volume;
   const Vec3 o = mesh.position[0];

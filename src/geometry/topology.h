@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// geometry/topology: who is next to whom in a triangle mesh. Plain functions over index lists; results depend only on the
-// mesh, in ascending or walking order, never on hashing.
+// geometry/topology: adjacency in a triangle mesh. Plain functions over index lists; results depend only on the
+// mesh, in ascending or traversal order, never on hashing.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -13,9 +13,9 @@ namespace catgut {
 // For each of `vertices` vertices, those that share an edge with it, ascending.
 std::vector<std::vector<uint32_t>> vertex_neighbors(std::span<const Triangle> triangle, size_t vertices);
 
-// The openings of a manifold surface: each loop in walking order, counter-clockwise seen from outside the opening (its
-// loop_normal points out of the organ when triangles are counter-clockwise seen from outside). Loops come by ascending
-// smallest vertex, each beginning with it. Where two openings touch in one vertex they are reported apart by the triangle fan.
+// The openings of a manifold surface: each loop in traversal order, counter-clockwise seen from outside the opening (its
+// loop_normal points out of the organ when triangles are counter-clockwise seen from outside). Loops are ordered by their
+// smallest vertex and start with it. Openings that touch in one vertex are separated by the triangle fan.
 std::vector<std::vector<uint32_t>> boundary_loops(std::span<const Triangle> triangle);
 
 // Unit normals, each triangle's weighted by its angle at the vertex; {0,0,0} for a vertex without area.

@@ -13,7 +13,7 @@ bool unit_or_zero(Vec3& v) {
   return was;
 }
 
-// [N] that presses the tool against the tissue: what surface friction is a part of.
+// [N] that presses the tool against the tissue: the normal load of surface friction.
 float pressing(const ForcePatch& p, Vec3 x) {
   return length2(p.normal) > 0 ? std::max(0.0f, dot(linear_force(p, x, {}), p.normal)) : 0;
 }
@@ -42,7 +42,7 @@ bool make_safe(ForcePatch& p, float force, float stiffness, float damping) {
   good &= unit_or_zero(p.along);
   good &= unit_or_zero(p.pierce);
   unit_or_zero(p.thread_direction);
-  // A stiffness beyond the arm's is no fault of the simulation (steel is stiff), one below zero is.
+  // A stiffness above the device's limit is valid (steel is stiff), a negative one is not.
   const Eigen3 e = eigen(p.stiffness);
   for (const float value : e.value) good &= value > -1e-3f * stiffness;
   p.stiffness = clamp_eigenvalues(p.stiffness, 0, stiffness);
@@ -63,21 +63,21 @@ Vec3 linear_force(const ForcePatch& p, Vec3 x, Vec3 v) {
   const bool surface = length2(p.normal) > 0;
   if (surface && dot(p.normal, x - p.point) >= p.gap) return {};
   Vec3 f = p.force + p.stiffness * (p.point - x);
-  if (surface) f = p.normal * std::max(0.0f, dot(f, p.normal));  // tissue pushes; only friction, below, acts sideways
+  if (surface) f = p.normal * std::max(0.0f, dot(f, p.normal));  // tissue only pushes; only friction, below, acts sideways
   const Vec3 damped = f - p.damping * v;
-  // Damping makes a contact softer to leave, it never makes it stick.
+  // Damping makes a contact softer on leaving, never sticky.
   return surface ? p.normal * std::max(0.0f, dot(damped, p.normal)) : damped;
 }
 
 namespace {
 
 constexpr float kStickTime = 0.005f;   // [s]
-constexpr float kFrictionPart = 0.1f;  // of the arm's stiffness that friction has at least
+constexpr float kFrictionPart = 0.1f;  // minimum stiffness of friction, relative to the device's stiffness
 
-// Every force of a patch but friction and what is left of a wall that gave way.
+// Every force of a patch except friction and the decaying part of a punctured wall.
 Vec3 smooth_force(const ForceModel& m, Vec3 x, Vec3 v) { return linear_force(m.now, x, v) + m.change; }
 
-// [N/m] that friction may add to the patch's own stiffness along the directions it acts in.
+// [N/m] that friction may add to the patch's own stiffness along its directions.
 float room_for_friction(const ForcePatch& p, float budget) {
   const Sym3& k = p.stiffness;
   const Vec3 d = length2(p.along) > 0 ? p.along : p.normal;
@@ -91,9 +91,9 @@ void receive(ForceModel& m, const ForcePatch& patch, const ForceModelOptions& op
   const bool fresh = !m.any || patch.epoch != m.now.epoch || patch.discontinuity_id != m.now.discontinuity_id;
   const Vec3 before = smooth_force(m, m.last, m.velocity);
   m.now = patch;
-  if (length2(patch.along) > 0 && patch.drag > 0)  // rubbed along the direction that the patch is stiff in, too
+  if (length2(patch.along) > 0 && patch.drag > 0)  // friction along a direction in which the patch itself is stiff
     m.now.stiffness = clamp_eigenvalues(patch.stiffness, 0, (1 - kFrictionPart) * options.stiffness);
-  // The patch's own damping, and what its stiffness needs.
+  // The patch's own damping, plus what its stiffness needs.
   const Sym3 least = m.now.stiffness * options.damping_time;
   m.now.damping = clamp_eigenvalues(m.now.damping + least, 0, options.damping);
   m.change = fresh ? Vec3{} : before - linear_force(m.now, m.last, m.velocity);
@@ -114,14 +114,14 @@ Vec3 evaluate(ForceModel& m, Vec3 x, Vec3 v, float dt, const ForceModelOptions& 
   m.change *= std::exp(-dt / std::max(1e-4f, m.fade));
   Vec3 f = smooth_force(m, x, v);
 
-  // Piercing happens between two ticks, and is felt when it happens. Of the force only the wall's own gives way: not what a
-  // thread pulls, not damping.
+  // Puncture happens between two ticks and is rendered at once. Only the wall's own force drops: not thread tension, not
+  // damping.
   if (p.pierce_force > 0) {
     const float wall = -dot(linear_force(p, x, {}) + m.change - p.thread_direction * p.thread_tension, p.pierce);
     if (!m.pierced && wall > p.pierce_force) m.pierced = true, m.pierced_at = wall, m.pierced_for = 0;
     if (m.pierced) {
       m.pierced_for += dt;
-      // The physics did not let the tip in after all (the hand drew back): the wall is there again.
+      // The physics did not puncture after all (the hand withdrew): the wall is restored.
       if (m.pierced_for > options.unconfirmed + 2 * p.period) m.dropped += (1 - p.pierce_keep) * dt / options.wall_back;
       else m.dropped = std::max(p.pierce_keep, m.dropped - (1 - p.pierce_keep) * dt / options.drop_time);
       const float left = std::min(wall, m.pierced_at * m.dropped);
@@ -131,20 +131,20 @@ Vec3 evaluate(ForceModel& m, Vec3 x, Vec3 v, float dt, const ForceModelOptions& 
   }
 
   // Friction: elastic up to the limit, then it slips (Hayward and Armstrong 2000; the elastic range of the elasto-plastic model
-  // of Dupont, Hayward, Armstrong and Altpeter 2002). Below the limit nothing creeps, however much an encoder dithers. The
-  // spring never adds more than the arm can render beside the patch's own stiffness, and grows stiffer or softer without a step
-  // up.
+  // of Dupont, Hayward, Armstrong and Altpeter 2002). Below the limit nothing creeps, for any encoder noise. The spring adds at
+  // most what the device can render beyond the patch's own stiffness, and changes its stiffness without a step
+  // in force.
   const float limit = p.drag + (p.coefficient > 0 ? p.coefficient * pressing(p, x) : 0);
   m.rubbed = {};
   if (limit > 0) {
     const float room = room_for_friction(p, options.stiffness);
     const float rub = std::min(room, std::max(m.rub, limit / p.presliding));
-    if (m.rub > rub) m.bristle *= rub / m.rub;  // a softer spring at the same stretch: it gives energy away, it makes none
+    if (m.rub > rub) m.bristle *= rub / m.rub;  // a softer spring at the same stretch: it releases energy, never adds any
     m.rub = rub;
     m.bristle = allowed_slide(p, m.bristle + allowed_slide(p, moved) * rub);
     const float l = length(m.bristle);
     if (l > limit) m.bristle *= limit / l;
-    // Damped while it stretches (LuGre's sigma 1); where it slips, that would only be more friction.
+    // Damped while it stretches (LuGre's sigma 1); where it slips, this would only increase friction.
     m.sticks += ((l > limit ? 0.0f : 1.0f) - m.sticks) * std::min(1.0f, dt / kStickTime);
     m.rubbed = -m.bristle - allowed_slide(p, v) * (p.viscous + m.sticks * rub * options.damping_time);
     f += m.rubbed;

@@ -31,7 +31,7 @@ Vec3 limit(Limiter& s, const LimiterInput& in, float raw_dt, const LimiterOption
   const float dt = safe_dt(s, raw_dt, o), slew_dt = std::min(dt, o.slew_time);
   Vec3 f = in.wanted;
 
-  // Finite. What is not a number is no force, and a caller that made it is not believed until things are quiet again.
+  // Finite. A non-finite input gives zero force, and its source is ignored until the force is low again.
   if (!is_finite(f) || !std::isfinite(in.speed) || !std::isfinite(in.warmth) || !std::isfinite(in.cap)) {
     s.faults |= kNotFinite;
     f = {};
@@ -44,13 +44,13 @@ Vec3 limit(Limiter& s, const LimiterInput& in, float raw_dt, const LimiterOption
   }
   if (!in.ready) f = {}, disengage(s);
   if (in.speed > o.top_speed) {
-    // A hand that moves freely loses nothing: only a force that was being felt has to engage again.
+    // A hand that moves freely loses nothing: only a rendered force has to engage again.
     f = {};
     s.recovering = true;
     if (length2(s.out) > o.free_force * o.free_force) s.faults |= kTooFast, disengage(s);
   }
 
-  // Age. Young: believed. Expired: the last force that was, fading, whatever the hand does; then off. No patch yet: nothing.
+  // Age. Young: used. Expired: the last force, fading, whatever the hand does; then off. No patch yet: zero.
   if (in.age < 0) {
     f = {};
     disengage(s);
@@ -81,13 +81,13 @@ Vec3 limit(Limiter& s, const LimiterInput& in, float raw_dt, const LimiterOption
     f = {};
   }
 
-  // Slew. On the way up after a fault, slowly; on the way down never slower than usual.
+  // Slew. Slow while force returns after a fault; never slower than usual on the way down.
   const bool growing = length2(f) > length2(s.soft);
   const float slew = s.recovering && growing ? o.slew_recovery : o.slew;
   s.soft = toward(s.soft, f, slew * slew_dt);
   if (s.recovering && s.engaged == Engaged::yes && length2(f - s.soft) < 1e-8f) s.recovering = false;
 
-  // Heat: the cap closes from the peak to the continuous force as the mean comes near it, and to nothing as the motors get hot.
+  // Heat: the cap decreases from the peak to the continuous force as the mean approaches it, and to zero as the motors get hot.
   const float continuous = std::min(o.margin * o.continuous, o.force);
   const float full = s.heat / (continuous * continuous);
   float most = o.force;
@@ -101,7 +101,7 @@ Vec3 limit(Limiter& s, const LimiterInput& in, float raw_dt, const LimiterOption
     if (s.ramp >= 1) s.engaged = Engaged::yes;
     out *= s.ramp;
   }
-  // Whatever the reason of a change, the motors see no step.
+  // The motors never receive a step, whatever the cause of a change.
   s.out = toward(s.out, out, o.slew * slew_dt);
   s.heat += (length2(s.out) - s.heat) * std::min(1.0f, dt / o.heat_time);
   return s.out;

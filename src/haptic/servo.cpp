@@ -17,7 +17,7 @@ ForcePatch to_arm(const ServoOptions& o, const ForcePatch& world) {
   const float gain = o.gain > 0 ? o.gain : w.scale;
   const Quat turn = conjugate(w.turn);
   const auto way = [&turn](Vec3 v) { return rotate(turn, v); };
-  // S -> R S R^T, a column at a time.
+  // S -> R S R^T, column by column.
   const auto tensor = [&](const Sym3& s, float factor) {
     const Vec3 x = way(s * rotate(w.turn, {1, 0, 0})), y = way(s * rotate(w.turn, {0, 1, 0})),
                z = way(s * rotate(w.turn, {0, 0, 1}));
@@ -43,9 +43,9 @@ ForcePatch to_arm(const ServoOptions& o, const ForcePatch& world) {
 namespace {
 
 constexpr float kFastTime = 0.05f;  // [s] over which ServoHand::fast fades
-constexpr float kFarthest = 10;     // [m] no arm reaches this far: such a position is garbage
+constexpr float kFarthest = 10;     // [m] beyond the range of any device: such a position is invalid
 
-// How far the hand is from where the patch was computed [m]. Outward of a surface nothing is felt and any distance is right.
+// Distance of the hand from the point of the patch [m]. Outside a surface the force is zero and any distance is valid.
 float off_patch(const ForcePatch& p, Vec3 x) {
   Vec3 d = x - p.point;
   if (length2(p.normal) > 0) d -= p.normal * std::max(0.0f, dot(d, p.normal));
@@ -60,7 +60,7 @@ void fit_to_arm(ServoOptions& o, const ArmLimits& limits) {
   o.limits.continuous = known(limits.continuous, o.limits.continuous);
   o.limits.stiffness = known(limits.stiffness, o.limits.stiffness);
   o.limits.damping = known(limits.damping, o.limits.damping);
-  // The soft map begins at the same part of the peak for every arm.
+  // The soft map starts at the same fraction of the peak for every device.
   o.limiter.knee *= o.limits.force / o.limiter.force;
   o.limiter.force = o.limits.force;
   o.limiter.continuous = std::min(o.limits.continuous, o.limits.force);
@@ -79,7 +79,7 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
     dt = safe_dt(h.limiter, now_ns >= h.last_ns ? 1e-9f * static_cast<float>(now_ns - h.last_ns) : -1.0f, o.limiter);
   h.last_ns = now_ns;
 
-  // Where the hand is. A lost arm leaves the hand where it was; a found one starts from rest.
+  // Position of the hand. A lost device keeps the last position; a reconnected one starts at rest.
   if (ready) {
     if (!h.any) h.at = sample.pose.p, h.velocity = {};
     const float keep = std::exp(-2 * kPi * o.velocity_filter * dt);
@@ -109,7 +109,7 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
     if (ready && !(h.buttons & 2)) h.clutched = false;
   }
   h.fast = std::max(h.fast * std::exp(-dt / kFastTime), length(velocity));
-  // What the motors render is gain * scale times what is stiff in the field.
+  // The rendered stiffness is gain * scale times the stiffness in the field.
   const float most = 1 / std::max(1e-6f, gain * o.place.scale);
   ForceModelOptions model = o.model;
   model.stiffness = o.limits.stiffness * most;
@@ -135,7 +135,7 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
     const uint64_t made = h.model.now.time_ns;
     if (made > now_ns + 5000000) h.limiter.faults |= kTimeBack;
     in.age = made < now_ns ? 1e-9f * static_cast<float>(now_ns - made) : 0;
-    // Nothing is to be felt (cap 0: someone else moves the tool), or the patch belongs to another place.
+    // No force to render (cap 0: something else moves the tool), or the patch belongs to another position.
     if (h.model.now.cap <= 0) disengage(h.limiter);
     const ForcePatch& p = h.model.now;
     if (p.cap > 0 && ready && off_patch(p, world.p) > o.reach + h.fast * (in.age + p.period)) {
@@ -152,8 +152,8 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
   const Vec3 allowed = limit(h.limiter, in, dt, o.limiter);
   out.wanted = in.wanted, out.allowed = allowed;
   PassivityOptions brake = o.passivity;
-  if (h.limiter.engaged == Engaged::no || h.limiter.engaged == Engaged::waiting) brake.damping = 0;  // off is off
-  // Softened, capped or on its ramp, the spring that the hand feels is softer than the patch's by as much.
+  if (h.limiter.engaged == Engaged::no || h.limiter.engaged == Engaged::waiting) brake.damping = 0;  // off stays off
+  // When softened, capped or ramped, the rendered spring is softer than the patch's by the same factor.
   const float wanted = length(in.wanted), part = wanted > 0 ? std::min(1.0f, length(allowed) / wanted) : 1;
   net.x = h.at, net.v = h.velocity, net.dt = dt;
   net.force = allowed, net.rubbed *= part, net.most = o.limiter.force;
@@ -167,7 +167,7 @@ ServoOut servo_step(ServoHand& h, const ServoOptions& o, const ArmSample& sample
   else if (ready) h.closed = (sample.buttons & 1) != 0;
   out.hand.pose = world;
   out.hand.velocity = velocity;
-  // A gripper's jaw follows the fingers; a button closes and opens.
+  // A gripper's jaw follows the fingers; a button closes and opens it.
   out.hand.jaw = sample.jaw >= 0 ? std::min(1.0f, sample.jaw) : h.closed ? 0.0f : 1.0f;
   out.hand.buttons = h.cuts ? kButtonCut : 0;
   out.hand.time_ns = now_ns;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kStep = 0.001f, kClamp = 3.3f;
 
-// The hand's path: 5 mm above the wall, 8 mm behind it, back. Smooth (minimum jerk), as hands move.
+// The hand's path: 5 mm above the wall, 8 mm behind it, back. Smooth (minimum jerk), like hands.
 float hand_path(float t) {
   const auto rise = [](float s) {
     s = std::clamp(s, 0.0f, 1.0f);
@@ -20,7 +20,7 @@ float hand_path(float t) {
 }
 constexpr float kHoldFrom = 0.8f, kHoldTo = 1.6f, kEnd = 2.2f;
 
-// Tissue behind a coupling, at rest: device at x, the wall at 0, tissue below. Returns force on the device and its slope.
+// Tissue behind a coupling, in equilibrium: device at x, the wall at 0, tissue below. Returns force on device and slope.
 struct Wall {
   float force = 0, slope = 0, tool = 0;
 };
@@ -57,7 +57,7 @@ StudyRow run_study(const StudyCase& c) {
   StudyRow row;
   float x = 0.005f, v = 0;
   const float period = 1 / c.rate;
-  // The physics samples the device at a frame's start and is heard one frame later.
+  // The physics samples the device at the start of a frame; its result arrives one frame later.
   Wall heard, thinking = press(c, x), before = heard;
   float heard_at = x, thinking_at = x, next = 0, heard_since = 0;
   ForceModel model;
@@ -80,7 +80,7 @@ StudyRow run_study(const StudyCase& c) {
         p.force = {heard.force, 0, 0};
         p.stiffness = outer({1, 0, 0}, heard.slope);
         p.gap = heard.force / heard.slope;
-      } else {  // not there yet: the wall, and how it would be
+      } else {  // no contact yet: the wall ahead and its stiffness
         p.stiffness = outer({1, 0, 0}, press(c, -1e-6f).slope);
       }
       make_safe(p, kClamp, c.coupling, 4);
@@ -119,7 +119,7 @@ StudyRow run_study(const StudyCase& c) {
     square += error * error;
     ++n;
     row.largest_step = std::max(row.largest_step, std::abs(f - last));
-    // Arm, finger and hand, in twenty parts of the millisecond over which the motors hold their force.
+    // Device, finger and hand, in twenty parts of the millisecond for which the motors hold their force.
     const float from = x;
     constexpr int kParts = 20;
     for (int k = 0; k < kParts; ++k) {

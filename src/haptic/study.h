@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// haptic: the multi-rate comparison of docs/rooms/haptic.md, with the code that drives the arms. One dimension: a hand presses
-// a wall of tissue, holds, and lets go, on an arm, while a slow simulation computes the tissue. Who renders what in between
-// decides whether the hand feels tissue or a machine gun. `catgut bench haptics` prints it, tests/haptic holds it to its
+// haptic: the multi-rate comparison of docs/rooms/haptic.md, with the production servo code. One dimension: a hand presses
+// a wall of tissue, holds, and releases, on a device, while a slow simulation computes the tissue. The method of rendering in
+// between decides whether the hand feels tissue or vibration. `catgut bench haptics` prints it, tests/haptic checks its
 // claims.
 #pragma once
 #include <string>
@@ -12,11 +12,11 @@
 namespace catgut {
 
 enum class Rendering : uint8_t {
-  reference,       // tissue and coupling worked out at 1 kHz, no delay
-  held_force,      // the force of the last frame, held (what the paper's system does)
+  reference,       // tissue and coupling computed at 1 kHz, no delay
+  held_force,      // the force of the last frame, held (the paper's method)
   held_and_net,    // the same with the energy controller
-  coupling,        // a spring at 1 kHz to the tool's place in the last frame
-  coupling_blend,  // to its place blended between the last two frames
+  coupling,        // a spring at 1 kHz to the tool's position in the last frame
+  coupling_blend,  // to its position interpolated between the last two frames
   local_model,     // ForcePatch
 };
 const char* rendering_name(Rendering r);
@@ -26,14 +26,14 @@ struct StudyCase {
   float tissue = 1100, coupling = 400;  // [N/m]
   float rate = 60;                      // [1/s] of the physics
   float hardening = 0;                  // [N/m^2] a2 of f = a1 z + a2 z^2; 0: linear tissue
-  float mass = 0.1f, viscous = 0.5f;    // [kg], [N s/m] arm and finger
+  float mass = 0.1f, viscous = 0.5f;    // [kg], [N s/m] device and finger
   float grip = 150, grip_damping = 2;   // [N/m], [N s/m] hand
 };
 struct StudyRow {
-  float force_error = 0;   // [N] RMS against the reference moving the same way
-  float hold_swing = 0;    // [m] peak to peak while the hand means to hold still
-  float largest_step = 0;  // [N] from one millisecond to the next
-  float energy = 0;        // [J] the largest energy given to the hand
+  float force_error = 0;   // [N] RMS against the reference with the same motion
+  float hold_swing = 0;    // [m] peak to peak while the hand tries to hold still
+  float largest_step = 0;  // [N] maximum change within one millisecond
+  float energy = 0;        // [J] maximum energy given to the hand
 };
 StudyRow run_study(const StudyCase& c);
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// instrument: surgical instruments as data. A model says what an instrument is made of and what it can do; the stages in suture
-// ask for capabilities and limits, never for a name. The table of models is instrument/table.cpp; docs/add_an_instrument.md
-// shows how to add one, in the table or from a program of one's own.
+// instrument: surgical instruments as data. A model states geometry, mass and capabilities of an instrument; the stages in
+// suture query capabilities and limits, never a name. The table of models is instrument/table.cpp; docs/add_an_instrument.md
+// shows how to add one, in the table or from your own program.
 //
-// Tool frame of every instrument, as of ToolInput: origin at the grasp point between the jaw tips, -z the direction in which
-// the instrument points, +z along the shaft toward the hand, x the direction in which the jaws open. SI units.
+// Tool frame of every instrument, as in ToolInput: origin at the grasp point between the jaw tips, -z the pointing direction,
+// +z along the shaft toward the hand, x the direction in which the jaws open. SI units.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -18,35 +18,35 @@ namespace catgut {
 
 struct Jaw {
   float length = 0;      // [m] from the pivot to the tips; 0: the instrument has no jaws
-  float closed = 0.35f;  // of ToolInput::jaw (0 shut, 1 open): below this the jaws have closed on what lies between them,
-  float open = 0.5f;     // above this they let go. Apart, so that tremor at the threshold drops nothing
+  float closed = 0.35f;  // of ToolInput::jaw (0 shut, 1 open): below this the jaws grasp,
+  float open = 0.5f;     // above this they release. Two thresholds, so that tremor does not release anything
 };
 
 struct InstrumentModel {
   std::string name;   // of the model: "needle_holder"
-  std::string title;  // for people: "Needle holder"
+  std::string title;  // for display: "Needle holder"
   uint32_t capabilities = 0;
   RigidModel body;  // mass, inertia, and the capsules it collides with
   Jaw jaw;
-  // [N] of pull at which the jaws let slip what they hold.
+  // [N] of pull at which the jaws slip.
   float needle_grip = 0, thread_grip = 0, tissue_grip = 0;
   bool can(uint32_t capability) const { return (capabilities & capability) == capability; }
 };
 
-// One instrument of a scene, as it is now. Written by sim/hands (place, hand) and suture/grasp (the rest).
+// State of one instrument of a scene. Written by sim/hands (pose, hand) and suture/grasp (the rest).
 struct InstrumentState {
   Held held = Held::nothing;
   uint32_t slot = 0;  // held thread particle, or tissue particle nearest to the jaws
-  float at = 0;       // held needle: place on its arc, 0 swage .. 1 tip
+  float at = 0;       // held needle: fraction of its arc, 0 swage .. 1 tip
   float jaw = 1;      // of the last tick
   InstrumentPlace place = InstrumentPlace::tray;
-  uint8_t hand = kNoHand;  // that has it
-  uint32_t suture = 0;     // whose needle or thread is held
+  uint8_t hand = kNoHand;  // that holds it
+  uint32_t suture = 0;     // index of the held needle's or thread's suture
 };
 
-// All models of the table, in its order.
+// All models of the table, in order.
 const std::vector<InstrumentModel>& instrument_table();
-// The model of that name, looked for in `own` first; null: there is none.
+// The model of that name, first in `own`, then in the table; null: unknown.
 const InstrumentModel* find_instrument(const std::string& name, std::span<const InstrumentModel> own = {});
 
 }  // namespace catgut

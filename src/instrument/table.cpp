@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// instrument: the table of models, one row each. A new instrument is a row here; everything else reads it.
+// instrument: the table of models, one row each. A new instrument is a new row; all other code reads it.
 #include <algorithm>
 
 #include "instrument/instrument.h"
@@ -7,15 +7,15 @@
 namespace catgut {
 namespace {
 
-// A steel instrument `length` long: jaws of half width `jaw_radius`, then the shaft. The jaws' capsule begins 1.5 mm behind the
-// grasp point, so that what is held is not pushed out by the jaws that hold it. The shaft begins 2 mm
-// behind the jaws: their capsules are round at their ends.
+// A steel instrument `length` long: jaws of half width `jaw_radius`, then the shaft. The jaws' capsule starts 1.5 mm behind the
+// grasp point, so that the jaws do not push out what they hold. The shaft starts 2 mm behind the
+// jaws: their capsules have round ends.
 RigidModel steel(float mass, float jaw_end, float jaw_radius, float shaft_from, float length, float shaft_radius) {
   RigidModel m;
   m.inv_mass = 1 / mass;
-  // Chosen: principal moments of 5e-5 and 2.5e-5 kg m^2 for 50 g, a third of a uniform rod's of 180 mm (m L^2 / 12). The
-  // coupling to the hand (Weld) must turn an instrument within a substep; a heavier one lags behind the wrist. In proportion to
-  // the mass.
+  // Chosen: principal moments of 5e-5 and 2.5e-5 kg m^2 for 50 g, a third of a uniform rod of 180 mm (m L^2 / 12). The
+  // coupling to the hand (Weld) must rotate an instrument within a substep; a heavier one lags behind the wrist. Proportional
+  // to the mass.
   const float light = 0.05f / mass;
   m.inv_inertia = {2e4f * light, 2e4f * light, 4e4f * light};
   m.capsule.push_back({{0, 0, 0.0015f}, {0, 0, jaw_end}, jaw_radius});
@@ -23,14 +23,14 @@ RigidModel steel(float mass, float jaw_end, float jaw_radius, float shaft_from, 
   return m;
 }
 
-// Masses and lengths are chosen, of the size of catalog instruments; none is measured. Grip limits are chosen as well:
-//   needle 40 N: no hand exceeds it, a locked needle holder does not let the needle turn;
-//   thread 15 N: above the knot-pull strength of 3-0 braided silk (about 13 N, USP <881>), the thread gives before the jaws;
+// Masses and lengths are chosen at the size of catalog instruments; none is measured. Grip limits are chosen as well:
+//   needle 40 N: above the force of any hand; a locked needle holder does not let the needle turn;
+//   thread 15 N: above the knot-pull strength of 3-0 braided silk (about 13 N, USP <881>); the thread fails before the jaws;
 //   tissue  6 N for forceps; 12 N for an Allis, whose teeth interlock and whose ratchet keeps them shut.
 std::vector<InstrumentModel> make_table() {
   std::vector<InstrumentModel> t;
-  // Holding thread and tissue with it is bad technique, and possible. It cuts thread as an Olsen-Hegar does, whose blades lie
-  // behind its jaws: the four techniques of the paper cut without a change of instrument.
+  // Holding thread and tissue with it is poor technique, and possible. It cuts thread like an Olsen-Hegar, whose blades lie
+  // behind its jaws: the paper's four techniques cut without a change of instrument.
   t.push_back({"needle_holder",
                "Needle holder",
                kHoldNeedle | kHoldThread | kHoldTissue | kClamp | kCutThread,
@@ -39,7 +39,7 @@ std::vector<InstrumentModel> make_table() {
                40,
                15,
                6});
-  // Toothed tissue forceps. cut_thread: a stand-in for the assistant's scissors, which a scene of two hands does not have.
+  // Toothed tissue forceps. cut_thread: replaces the assistant's scissors, which a scene of two hands does not have.
   t.push_back({"forceps",
                "Toothed forceps",
                kHoldNeedle | kHoldThread | kHoldTissue | kCutThread,

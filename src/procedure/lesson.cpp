@@ -20,7 +20,7 @@ bool happens(std::span<const Event> happened, EventKind kind) {
   return std::any_of(happened.begin(), happened.end(), [&](const Event& e) { return e.kind == kind; });
 }
 
-// Goals that stay met, and that no one meets without having done what comes before.
+// Goals that stay met, and that cannot be met without the steps before.
 bool lasts(LessonGoal goal) { return goal == LessonGoal::bites || goal == LessonGoal::closed || goal == LessonGoal::throws; }
 
 }  // namespace

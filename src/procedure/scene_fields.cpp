@@ -14,7 +14,7 @@
 namespace catgut {
 namespace {
 
-constexpr double kAny = 1e30;  // no bound worth stating
+constexpr double kAny = 1e30;  // no meaningful bound
 #define TOP(member) [](SceneSpec& s, size_t) -> FieldRef { return &s.member; }
 #define BODY(member) [](SceneSpec& s, size_t i) -> FieldRef { return &s.body[i].member; }
 #define INSTRUMENT(member) [](SceneSpec& s, size_t i) -> FieldRef { return &s.instrument[i].member; }
@@ -158,11 +158,11 @@ std::string quoted(const std::string& text) {
 }
 
 // A scene file's number is read as a double and then rounded to float. The shortest decimal of a float almost always survives
-// that; where it would not, the nine digits of max_digits10 do.
+// that; otherwise the nine digits of max_digits10 do.
 std::string float_text(float value) {
   std::string text = fmt::format("{}", value);
   if (static_cast<float>(std::strtod(text.c_str(), nullptr)) != value) text = fmt::format("{:.9g}", value);
-  return text == "-0" ? "-0.0" : text;  // TOML's -0 is a whole number, and those have no sign of zero
+  return text == "-0" ? "-0.0" : text;  // TOML's -0 is an integer, and integers have no signed zero
 }
 
 }  // namespace
@@ -307,7 +307,7 @@ std::string nearest_word(std::string_view word, const std::vector<std::string>& 
       best = c;
     }
   }
-  // A word with a third of its letters wrong is another word.
+  // With a third of its letters different it is another word.
   return best_distance <= std::max<size_t>(2, word.size() / 3) ? best : std::string();
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// procedure: the one table of everything a scene file can say. The reader, the writer, --set, `catgut describe`,
-// docs/scene_reference.md and the tests all walk it, so a key added here is complete everywhere at once.
+// procedure: the table of all scene keys. The reader, the writer, --set, `catgut describe`,
+// docs/scene_reference.md and the tests all use it, so a key added here is complete everywhere.
 // Default values are not repeated in the table: they are read from a default-constructed SceneSpec.
 #pragma once
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace catgut {
 
-// Where a value lives; its alternative is also the key's type.
+// Location of a value; its alternative is also the key's type.
 using FieldRef = std::variant<std::string*, int*, uint64_t*, float*, bool*, Vec3*>;
 
 struct Field {
@@ -22,7 +22,7 @@ struct Field {
   const char* key;
   const char* unit;     // SI; "" when the value has none
   double min, max;      // inclusive, per component of a vector; ignored for text and flags
-  const char* choices;  // text: the allowed words separated by '|'; nullptr: any text
+  const char* choices;  // text: the valid words separated by '|'; nullptr: any text
   const char* meaning;
   FieldRef (*at)(SceneSpec& scene, size_t row);  // row: of a list section, else unused
 };
@@ -30,7 +30,7 @@ struct Field {
 std::span<const Field> scene_fields();
 const std::vector<std::string>& scene_sections();       // "body", "thread", ... in file order, "" left out
 const char* section_meaning(std::string_view section);  // one line for the reference
-// A list of tables, [[body]] or [[instrument]], has as many rows as the file gives it; any other section has one.
+// A list of tables, [[body]] or [[instrument]], has any number of rows; any other section has one.
 bool is_list(std::string_view section);
 size_t rows_of(const SceneSpec& scene, std::string_view section);
 void add_row(SceneSpec& scene, std::string_view section);
@@ -39,20 +39,20 @@ const Field* find_field(std::string_view section, std::string_view key);  // nul
 std::string full_key(const Field& field);                                 // "solver.substeps", "body[].radius", "title"
 
 std::string type_name(const Field& field);     // "text", "whole number", "number", "flag", "vector"
-std::string range_text(const Field& field);    // "1..64", "purse_string or none", "" when anything goes
+std::string range_text(const Field& field);    // "1..64", "purse_string or none", "" when unrestricted
 std::string default_text(const Field& field);  // as it would be written in a scene file
 
-// A value as TOML, in the fewest digits that read back to the same bits.
+// A value as TOML, in the shortest form that reads back to the same bits.
 std::string value_text(FieldRef value);
 std::string number_text(double value);
 
-// The results a run reports and [expect] may bound: runtime/session fills them all.
+// The results of a run that [expect] may bound: runtime/session fills them.
 struct ResultName {
   std::string name, unit, meaning;
 };
 const std::vector<ResultName>& result_names();
 
-// The candidate that differs least from a misspelt word; "" when none is near enough to be a likely meaning.
+// The most similar candidate to a misspelled word; "" if none is similar enough.
 std::string nearest_word(std::string_view word, const std::vector<std::string>& candidates);
 
 }  // namespace catgut

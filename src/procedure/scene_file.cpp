@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// procedure: reads and writes scene files. Walks the table in scene_fields; knows no key of its own but `expect`.
+// procedure: reads and writes scene files. Uses the table in scene_fields; its only own key is `expect`.
 #include "procedure/scene_file.h"
 
 #include <fmt/format.h>
@@ -34,7 +34,7 @@ std::vector<std::string> keys_of(std::string_view section) {
 
 [[noreturn]] void unknown_key(const std::string& where, std::string_view section, std::string_view key) {
   std::string nearest = nearest_word(key, keys_of(section));
-  // A key written in the wrong section is a likelier slip than a far-fetched misspelling.
+  // A key written in the wrong section is more likely than a distant misspelling.
   for (const Field& f : scene_fields())
     if (nearest.empty() && key == f.key) nearest = full_key(f);
   const std::string what = fmt::format("{} has no key \"{}\"", section.empty() ? "a scene" : section, key);
@@ -72,7 +72,7 @@ std::string found_text(const toml::node& node) {
   return out.str();
 }
 
-// Writes one value where the table says it lives, or says why it cannot.
+// Writes one value to its location in the table, or reports why it cannot.
 struct Assign {
   const Field& field;
   const toml::node& node;
@@ -139,7 +139,7 @@ void assign(SceneSpec& scene, const Field& field, size_t body, const toml::node&
 }
 
 void read_section(SceneSpec& scene, const char* section, size_t body, const toml::table& table, const std::string& file) {
-  // The preset is the ground on which the other keys stand, wherever in the section it is written.
+  // The preset is applied before the other keys, at any position in the section.
   if (std::strcmp(section, "solver") == 0)
     if (const toml::node* preset = table.get("preset"))
       assign(scene, *find_field("solver", "preset"), 0, *preset, at_line(file, preset->source()));
@@ -200,7 +200,7 @@ bool is_toml_text(const std::string& text) {
 SceneSpec scene_of_table(const toml::table& root, const std::string& file) {
   SceneSpec scene;
   scene.name = fs::path(file).stem().string();
-  if (!is_toml_text(scene.name)) scene.name = "scene";  // a file's name may be any bytes; a scene's is text
+  if (!is_toml_text(scene.name)) scene.name = "scene";  // a file's name may have any bytes; a scene's is text
   for (const auto& [key, node] : root) {
     const std::string section(key.str());
     const std::string where = at_line(file, key.source());
@@ -223,7 +223,7 @@ SceneSpec scene_of_table(const toml::table& root, const std::string& file) {
         read_section(scene, section.c_str(), 0, *table, file);
         continue;
       }
-      // In the order of the file, not of the alphabet: reports read like the scene.
+      // In file order, not alphabetical: reports follow the scene.
       std::vector<std::pair<toml::source_position, std::string>> order;
       for (const auto& [name, bound] : *table) order.push_back({name.source().begin, std::string(name.str())});
       std::sort(order.begin(), order.end());
@@ -250,7 +250,7 @@ std::string read_text(const fs::path& path, const std::string& where) {
   return text.str();
 }
 
-// A mesh written relative to the scene file stays valid wherever the program is started.
+// A mesh path relative to the scene file stays valid for any working directory.
 void seek_meshes_beside(SceneSpec& scene, const fs::path& folder) {
   for (BodySpec& body : scene.body) {
     const std::string file = body.mesh.substr(0, body.mesh.find('#'));
@@ -304,7 +304,7 @@ SceneSpec parse_scene(const std::string& text, const std::string& filename) {
 }
 
 std::string write_scene(const SceneSpec& scene) {
-  SceneSpec s = scene;  // the table hands out pointers to what may be changed; nothing here does
+  SceneSpec s = scene;  // the table has non-const pointers; nothing is changed here
   std::string out;
   const auto write_keys = [&](const std::string& section, size_t body) {
     for (const Field& f : scene_fields())
@@ -381,7 +381,7 @@ void set_value(SceneSpec& scene, const std::string& key_equals_value, const std:
   const Field* field = section == "expect" ? nullptr : find_field(section, key);
   if (!field && section != "expect") unknown_key(here, section, key);
 
-  // On a command line text needs no quotes of its own.
+  // On a command line text needs no quotes.
   const bool is_text = field && type_name(*field) == "text";
   toml::table parsed;
   if (is_text && (value.empty() || (value[0] != '"' && value[0] != '\''))) {
@@ -405,7 +405,7 @@ void set_value(SceneSpec& scene, const std::string& key_equals_value, const std:
   }
 }
 
-// By value: the text may be the very one that apply_preset writes over.
+// By value: the text may be overwritten by apply_preset.
 void use_preset(SceneSpec& scene, std::string preset, const std::string& where) {
   if (!apply_preset(scene.solver, preset))
     throw InputError(where, fmt::format("there is no preset \"{}\"", preset),

@@ -44,7 +44,7 @@ std::string section_text(const std::string& section) {
   return out;
 }
 
-// Tables in Markdown split at bars.
+// Tables in Markdown split at vertical bars.
 std::string cell(const std::string& text) {
   std::string out;
   for (const char c : text) {

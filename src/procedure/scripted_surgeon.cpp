@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// procedure: from a scene's tables to its surgeon; see scripted_surgeon.h.
+// procedure: makes the surgeon from a scene's tables; see scripted_surgeon.h.
 #include "procedure/scripted_surgeon.h"
 
 #include <stdexcept>

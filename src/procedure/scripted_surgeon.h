@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// procedure: the scripted surgeon that a scene asks for: its [surgeon] and [technique] tables as skill and plan.
+// procedure: the scripted surgeon of a scene: its [surgeon] and [technique] tables as skill and plan.
 #pragma once
 #include <memory>
 
@@ -11,7 +11,7 @@ namespace catgut {
 
 SurgeonSkill skill_of(const SceneSpec& scene);
 
-// Throws InputError when the scene has no technique, or none that the surgeon knows.
+// Throws InputError when the scene has no technique, or one without a script.
 std::unique_ptr<Surgeon> scripted_surgeon(const SceneSpec& scene, const PictureModel& picture);
 
 }  // namespace catgut

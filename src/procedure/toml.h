@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// procedure: toml++ with one fault mended. A caller that reads TOML includes this and never toml++ itself: two versions of its
-// tables in one program would be one too many.
+// procedure: toml++ with one bug worked around. All code that reads TOML includes this file and never toml++ itself: two
+// versions of its tables in one program would violate the one-definition rule.
 #pragma once
 // clang-format off
-// toml++ 3.3 reports blanks and letters by tables that call most of what they do not hold unreachable, which is undefined behavior
-// on text that anybody may write. Here what is not in the table is simply not of that kind.
+// toml++ 3.3 classifies blanks and letters by tables that mark most other characters as unreachable: undefined behavior
+// for untrusted text. Here characters outside the table are simply not of that class.
 #include <toml++/impl/preprocessor.h>
 #undef TOML_UNREACHABLE
 #define TOML_UNREACHABLE return false

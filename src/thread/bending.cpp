@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// thread/bending: elastic bending of a stated stiffness B, as a force evaluated at the beginning of the substep. Energy of node
-// i: B / (2 l) |e_i / l_i - e_i-1 / l_i-1|^2 with l the mean length of its two segments (Bergou et al.
-// 2008, 10.1145/1360612.1360662, without twist, small angles between segments). Reads edges; adds to the forces. No constraint:
-// a rod at rest is then a fixed point of the step whatever the solver does, and B is the B that was asked for. The price is a
-// smallest mass (bending_density).
+// thread/bending: elastic bending of a stated stiffness B, as a force evaluated at the start of the substep. Energy of node i:
+// B / (2 l) |e_i / l_i - e_i-1 / l_i-1|^2 with l the mean length of its two segments (Bergou et al.
+// 2008, 10.1145/1360612.1360662, without twist, small angles between segments). Reads edges; adds to the forces. Not a
+// constraint: a rod at rest is a fixed point of the step for any solver settings, and B is exactly the given value. It requires
+// a minimum mass (bending_density).
 #include <tuple>
 
 #include "thread/internal.h"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// thread/contact: the thread against itself, tools and a plane: no passing, Coulomb friction that sticks. Reads the pair list
-// and the predicted motion; writes motion, impulses and the memory of each crossing.
-//   A crossing's normal is carried on: a strand that was pressed to the wrong side is pushed back the way it came. Impulses of
+// thread/contact: contact of the thread with itself, tools and a plane, without passing through, with friction that sticks.
+// Reads the pair list and the predicted motion; writes motion, impulses and the memory of each crossing.
+//   A crossing's normal is transported: a strand pressed to the wrong side is pushed back to its own side. Impulses of
 //   the
 // last substep are applied first and then corrected, so a held load does not depend on the number of sweeps. Sticking remembers
-// the tangential motion that it could not undo (drift) and takes a fifth of it back per substep: without that a held knot
+// the tangential motion that it could not undo (drift) and undoes a fifth of it per substep: without that a held knot
 // creeps. Method: projected Gauss-Seidel in XPBD (Macklin et al. 2019, 10.1145/3309486.3340247), with warm start.
 #include <algorithm>
 #include <cmath>
@@ -60,7 +60,7 @@ void add_active(const Settings& settings, Scratch& s, Active c, float gap, Vec3 
   s.active.push_back(c);
 }
 
-// Geometry of one pair at the predicted positions. Returns the motion that the pair may spend before it has to be looked at
+// Geometry of one pair at the predicted positions. Returns the motion after which the pair must be evaluated
 // again.
 float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& around, float time, size_t k) {
   const uint32_t key = state.key[k], i = segment_of(key), other = partner_of(key);
@@ -88,7 +88,7 @@ float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& 
     c.touch = Touch::apart;
   } else if (far > 1e-9f) {
     Vec3 n = apart / far;
-    // Nearer than a diameter a normal cannot turn round in one substep: the strands have passed into each other.
+    // At a distance below one diameter a normal cannot reverse within one substep: the strands have passed into each other.
     if (other < kTool && far < d && dot(n, c.normal) < -0.3f) n = -n, far = -far;
     c.normal = n;
   }
@@ -130,7 +130,7 @@ void begin_plane(const Settings& settings, State& state, Scratch& s, const Plane
   }
 }
 
-// The state of friction after a substep: what drifted while sticking.
+// Friction memory after a substep: the drift while sticking.
 Vec3 new_drift(const Settings& settings, const Active& c, Vec3 drift, Vec3 moved) {
   if (c.slipped || c.ln <= 0) return {};
   const Vec3 d = tangential(drift + moved, three(c.normal));

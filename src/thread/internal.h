@@ -43,12 +43,12 @@ inline float dot(Four a, Four b) {
   return (p[0] + p[1]) + p[2];
 }
 
-// A contact that is solved in this substep, with all that a sweep needs.
+// A contact solved in this substep, with all inputs of a sweep.
 struct Active {
   Four normal{}, lt{};
   Four partner{};    // [m] motion of the tool's contact point in this substep
-  Four pull_back{};  // share of the drift that is undone
-  // Barycentric weights, those of the second segment negative; the same times the inverse masses.
+  Four pull_back{};  // fraction of the drift that is undone
+  // Barycentric weights, negative for the second segment; the same times the inverse masses.
   float wi0 = 0, wi1 = 0, wj0 = 0, wj1 = 0, mi0 = 0, mi1 = 0, mj0 = 0, mj1 = 0;
   uint32_t i = 0, j = 0;  // first nodes of both segments; j = i for a tool or the plane (its weights are 0)
   float inverse = 0;      // 1 / effective inverse mass
@@ -65,7 +65,7 @@ struct Scratch {
   Padded3 u;                   // [m] motion since the substep began
   Padded3 force;               // [N] bending, pulls
   Padded mass, w;              // [kg], [1/kg]; w = 0: held
-  Padded move;                 // [m] length of the last substep's motion
+  Padded move;                 // [m] displacement in the last substep
   Padded least_density, span;  // [kg/m], [m] of thread per node; of the step
   // Per segment.
   Padded3 e;       // [m] edge vectors at the beginning of the substep
@@ -109,7 +109,7 @@ void solve_stretch(Scratch& s, size_t segments);
 void add_bending(const Settings& settings, Scratch& s, size_t nodes);
 
 // contact.cpp
-// Finds what touches at the predicted positions and applies the impulses that it had before.
+// Finds contacts at the predicted positions and applies their impulses of the last substep.
 void begin_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around, float time);
 void sweep_contacts(Scratch& s, bool backward);
 void end_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// thread/material: suture materials as data. Reads and writes nothing. Every number names its source or says that it is an
+// thread/material: suture materials as data. Every number names its source or is marked as an
 // estimate.
 #pragma once
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace catgut::thread {
 enum class Material : uint8_t { silk, polyglactin_910, polydioxanone, polypropylene };
 enum class Size : uint8_t { usp_4_0, usp_3_0, usp_2_0, usp_0 };
 
-// What the mechanics need to know of a suture. Bending stiffness is a number of its own: a braid bends far more easily than a
+// Mechanical properties of a suture. Bending stiffness is an independent number: a braid bends far more easily than a
 // solid rod of the same tensile stiffness.
 struct Properties {
   Material material{};
@@ -22,7 +22,7 @@ struct Properties {
   float axial_stiffness = 0;    // EA [N]
   float bending_stiffness = 0;  // B [N.m2]
   float friction = 0;           // thread on thread, Coulomb
-  float knot_strength = 0;      // knot-pull strength [N]: where a contact bends it, it breaks at this tension
+  float knot_strength = 0;      // knot-pull strength [N]: a thread bent by a contact breaks at this tension
   float straight_strength = 0;  // [N]
   bool braided = false;
 };

@@ -9,8 +9,8 @@
 namespace catgut::thread {
 namespace {
 
-constexpr float kNear = 0.4f;     // of the diameter: crossings that count
-constexpr float kCrossed = 0.5f;  // sine of the angle between the strands: flatter ones run side by side
+constexpr float kNear = 0.4f;     // of the diameter: maximum gap of a crossing that counts
+constexpr float kCrossed = 0.5f;  // sine of the angle between the strands: smaller ones run side by side
 constexpr float kApart = 4.0f;    // diameters of loop length between one throw and the next
 constexpr float kBand = 3.0f;     // diameters of loop length beyond a throw's crossings that still turn with it
 constexpr float kAir = 1e-3f;     // [m]
@@ -52,13 +52,13 @@ SeenThrow look_at(const Settings& settings, const State& state, const std::vecto
     t.loop += seen[k].loop / static_cast<float>(end - first);
   }
   t.hand = sign > 0 ? 1 : -1;
-  // The strands' turning about each other: a little beyond the crossings, where they come together and part.
+  // Turns of the strands about each other, including a short distance beyond the crossings, where they meet and part.
   const uint32_t more = static_cast<uint32_t>(std::lround(2.5f * settings.material.diameter / state.rest[a0])),
                  last = static_cast<uint32_t>(state.segments()) - 1;
   const uint32_t middle = (a1 + b0) / 2;
   a0 = a0 > more ? a0 - more : 0, a1 = std::min(a1 + more, middle);
   b0 = b0 > middle + more ? b0 - more : middle + 1, b1 = std::min(b1 + more, last - 1);
-  // Only pairs whose loop belongs to this throw: those of its neighbors would count against an alternating one.
+  // Only pairs whose loop belongs to this throw: pairs of neighboring throws would cancel in an alternating knot.
   const float low = seen[first].loop - kBand * settings.material.diameter,
               high = seen[end - 1].loop + kBand * settings.material.diameter;
   float link = 0;
@@ -72,7 +72,7 @@ SeenThrow look_at(const Settings& settings, const State& state, const std::vecto
   t.half_turns = static_cast<uint32_t>(std::max(0.0f, 2 * std::round(0.5f * (turns - 1)))) + 1;
   const float ta = turning(state, a0, a1), tb = turning(state, b0, b1);
   t.sliding = std::abs(ta - tb) / std::max(1e-3f, ta + tb);
-  const float off = std::abs(turns - static_cast<float>(t.half_turns));  // 0: right in the middle, 1: as near to the next
+  const float off = std::abs(turns - static_cast<float>(t.half_turns));  // 0: centered, 1: halfway to the next
   t.confidence = std::max(0.0f, 1 - off * off) * std::abs(sign) / std::max(1e-6f, all);
   return t;
 }
@@ -121,7 +121,7 @@ SeenKnot observe(const Settings& settings, const State& state, float tight_loop)
   for (size_t first = 0, k = 1; k <= seen.size() && knot.throws < kMaxThrows; ++k) {
     if (k < seen.size() && seen[k].loop - seen[k - 1].loop < kApart * d) continue;
     SeenThrow t = look_at(settings, state, seen, along, first, k);
-    // Half of the loop's growth is each strand's; a snug throw takes up about five diameters of each.
+    // Each strand takes half of the loop's growth; a tight throw takes up about five diameters of each.
     if (below > 0) t.gap = std::max(0.0f, 0.5f * (seen[first].loop - below) - (knot.throws > 0 ? 5 * d : 0.0f));
     first = k;
     if (t.half_turns < 3) continue;  // strands that only cross

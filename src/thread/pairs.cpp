@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// thread/pairs: which segments may touch each other or a tool. The list is kept until something has moved half its margin; what
-// a pair remembers is carried over by key, so a refresh changes nothing but who is looked at. Reads positions; writes the
+// thread/pairs: broad phase of segments against each other and tools. The list is kept until a move of half its margin.
+// The memory of a pair is carried over by key, so a refresh only changes which pairs are evaluated. Reads positions; writes the
 // crossings.
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ CATGUT_CLONES void middles(size_t segments, const float* __restrict x, float* __
   for (size_t i = 0; i < segments; ++i) middle[i] = 0.5f * (x[i] + x[i + 1]);
 }
 
-// Bit k: segment first + k has its middle within reach of p.
+// Bit k: segment first + k has its midpoint within reach of p.
 CATGUT_CLONES void near_middles(const float* __restrict x, const float* __restrict y, const float* __restrict z,
                                 const float* __restrict half, Vec3 p, float reach, int* __restrict near) {
   for (size_t k = 0; k < kBlock; ++k) {
@@ -40,7 +40,7 @@ void closest_points(Vec3 r, Vec3 a, Vec3 b, float& s, float& t) {
 }
 
 uint32_t skipped_neighbors(const Settings& settings, const State& state) {
-  // A strand that turns back on itself as tightly as it can (its own radius) needs this much length in between.
+  // A strand that turns back at its minimum radius (its own) needs this much length in between.
   const float shortest = *std::min_element(state.rest.begin(), state.rest.end());
   return std::max(2u, static_cast<uint32_t>(std::ceil(1.6f * settings.material.diameter / shortest)));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// thread/step: one step of a thread, as a list of what happens. Reads Settings and Surroundings; writes State and the forces on
+// thread/step: one step of a thread, as a list of stages. Reads Settings and Surroundings; writes State and the forces on
 // holds, tools and plane. Small steps with few iterations: Macklin et al. 2019, 10.1145/3309486.3340247.
 #include <algorithm>
 #include <cmath>
@@ -26,7 +26,7 @@ CATGUT_CLONES void move(size_t nodes, float keep, const float* __restrict u, flo
   }
 }
 
-// Neighbors share a part of their velocity difference: damps what is shorter than the thread's waves, conserves momentum.
+// Neighbors exchange a part of their velocity difference: damps waves shorter than resolved, conserves momentum.
 CATGUT_CLONES void calm(size_t nodes, float share, const float* __restrict mass, const float* __restrict w,
                         const float* __restrict keep, float* __restrict flow, float* __restrict v) {
   for (size_t i = 0; i + 1 < nodes; ++i)
@@ -34,10 +34,10 @@ CATGUT_CLONES void calm(size_t nodes, float share, const float* __restrict mass,
   for (size_t k = 0; k < nodes; ++k) v[k] += w[k] * (flow[k] - flow[static_cast<ptrdiff_t>(k) - 1]);
 }
 
-// The longest way [m] of a node since the pairs were listed.
+// The maximum displacement [m] of a node since the pairs were listed.
 CATGUT_CLONES float farthest_of(size_t nodes, const float* __restrict x, const float* __restrict y, const float* __restrict z,
                                 const float* __restrict fx, const float* __restrict fy, const float* __restrict fz) {
-  // Lanes by hand: a maximum is the same in any order, but compilers do not reorder floats.
+  // Lanes by hand: a maximum does not depend on the order, but compilers do not reorder floats.
   float most[16] = {};
   size_t i = 0;
   for (; i + 16 <= nodes; i += 16)
@@ -65,7 +65,7 @@ void limit_motion(Scratch& s, size_t nodes, float limit) {
   }
 }
 
-// What stays the same during a step.
+// Constants during a step.
 void begin_step(const Settings& settings, const State& state, Scratch& s) {
   const size_t m = state.segments();
   const float h = settings.substep;
@@ -77,7 +77,7 @@ void begin_step(const Settings& settings, const State& state, Scratch& s) {
     s.tension_sum[i] = 0;
   }
   for (Padded* c : {&s.rest, &s.inverse_rest, &s.keep, &s.alpha}) (*c)[m] = 0;
-  // What bending and tension need of a segment; a node takes the larger need of its two segments.
+  // Line density that bending and tension require of a segment; a node uses the larger one of its two segments.
   auto need = [&](size_t i) {
     const float l = state.rest[i], loaded = h * h * std::abs(state.tension[i]) / (l * l * settings.load_limit);
     return std::max(bending_density(settings, l), loaded);
@@ -168,8 +168,8 @@ void warm_masses(const Settings& settings, State& state, Scratch& s) {
   }
 }
 
-// A mean tension above its strength breaks a segment: the one that bears most of its own. Contact bends it and lowers the
-// strength to that of a knot.
+// A mean tension above its strength breaks a segment: the one with the largest load relative to its strength. Contact bends it
+// and lowers the strength to that of a knot.
 void break_overloaded(const Settings& settings, State& state) {
   float worst = 1;
   size_t where = state.segments();
@@ -195,7 +195,7 @@ State make_state(std::span<const Vec3> path, size_t crossings) {
   for (size_t i = 0; i + 1 < n; ++i) s.rest.push_back(distance(path[i], path[i + 1]));
   s.tension.assign(n - 1, 0), s.broken.assign(n - 1, 0);
   s.key.reserve(crossings), s.budget.reserve(crossings), s.crossing.reserve(crossings);
-  s.travel = 1e9f;  // nothing is listed yet
+  s.travel = 1e9f;  // the list is empty
   return s;
 }
 
@@ -275,7 +275,7 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
     warm_masses(settings, state, s);
     ++state.substeps_done;
   }
-  // The budgets of the last substep's motion: nothing of a step is left in the work space.
+  // The budgets after the last substep's motion: nothing of a step remains in the work space.
   for (size_t k = 0; k < state.key.size(); ++k) {
     const uint32_t other = partner_of(state.key[k]);
     state.budget[k] -= s.segment_move[segment_of(state.key[k])] + (other < kTool ? s.segment_move[other] : 0.0f);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// thread/stretch: the whole thread's stretch at once. One Newton step on all lengths together is a tridiagonal system; solved
-// directly, a pull reaches the far end within the substep whatever the number of segments. Reads positions and motion of a
+// thread/stretch: solves the stretch of the whole thread at once. One Newton step on all lengths is tridiagonal; solved
+// directly, a pull reaches the far end within the substep for any number of segments. Reads positions and motion of a
 // substep; writes the motion and the multipliers. XPBD: Macklin et al. 2016, 10.1145/2994258.2994272.
 #include <cmath>
 
@@ -64,7 +64,7 @@ void find_edges(const State& state, Scratch& s) {
   edges(m, state.x.z.data(), state.fine.z.data(), s.e.z.data());
 }
 
-// L D L^T from both ends toward the middle: two chains of dependent operations instead of one twice as long.
+// L D L^T from both ends toward the middle: two dependency chains instead of one of twice the length.
 void prepare_stretch(const Settings&, const State& state, Scratch& s) {
   const size_t m = state.segments(), k = m / 2;
   directions(m, s.e.x.data(), s.e.y.data(), s.e.z.data(), s.u.x.data(), s.u.y.data(), s.u.z.data(), s.n.x.data(), s.n.y.data(),

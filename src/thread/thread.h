@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// thread/thread: a suture thread whose knots are nothing but contact, friction, stretch and bending. Reads Settings and what
-// surrounds the thread (holds, tools, a plane); writes State. Section 4 of the paper asks for it; docs/thread.md explains it.
+// thread/thread: a suture thread whose knots emerge from contact, friction, stretch and bending. Reads Settings, Surroundings
+// (holds, tools, a plane); writes State. Future work of the paper (section 4); docs/thread.md explains the method.
 //
-// Units: SI, float32. Frame: any inertial frame; positions keep 48 bits (a float and the remainder below its resolution), so
+// Units: SI, float32. Frame: any inertial frame; positions have 48 bits (a float and the remainder below its resolution), so
 // that a thread may lie a meter from the origin. One thread, one worker: the bits never depend on the number of workers. A step
-// makes no allocation: every list has the capacity that `make_state` gave it. Where a list is full, `overflow` counts.
+// does not allocate: every list has the capacity given by `make_state`. When a list is full, `overflow` counts.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -35,30 +35,30 @@ struct Settings {
   int substeps = 20;       // per step(): 1 ms
   int iterations = 4;      // stretch solve and contact sweep, per substep
   // Simulated line mass [kg/m]. The real one (1e-4 kg/m) would need shorter substeps: h^2 T / (l^2 rho) must stay below
-  // `load_limit`, and the mass follows the tension where it is not. A part that touches something loaded is heavier, and gets
+  // `load_limit`, and elsewhere the mass follows the tension. A part in contact with something loaded is heavier, and becomes
   // light again within `mass_decay` [s].
   float free_density = 0.05f, touch_density = 0.4f, mass_decay = 0.02f, load_limit = 0.2f;
   float damping = 5;            // drag [1/s]
   float inner_damping = 0.02f;  // of velocity differences between neighbors, per substep; conserves momentum
-  float anchor = 0.2f;          // share of the remembered tangential drift that a sticking contact undoes per substep
+  float anchor = 0.2f;          // fraction of the stored tangential drift that a sticking contact undoes per substep
   float list_margin = 0.6e-3f;  // pairs nearer than d + margin are listed [m]
   float max_move = 0.125f;      // of the diameter, per substep
   Vec3 gravity{};               // [m/s2]
   bool breaks = true;
 };
 
-// Who the second partner of a crossing is: a segment, or kTool + index of a capsule.
+// The second partner of a crossing: a segment, or kTool + index of a capsule.
 constexpr uint32_t kTool = 0x8000;
 constexpr uint32_t segment_of(uint32_t key) { return key >> 16; }
 constexpr uint32_t partner_of(uint32_t key) { return key & 0xffff; }
 
 enum class Touch : uint8_t { unknown, apart, stick, slip };
 
-// A pair of segments that may touch, or a segment and a tool's capsule. Its memory is the thread's topology: it lives as long
-// as the two are near each other, whatever happens to the list.
+// A candidate pair of segments, or a segment and a tool's capsule. Its memory is the thread's topology: it persists as long
+// as the two are near each other, independently of the list.
 struct Crossing {
   float s = 0, t = 0;  // closest points, 0..1 along the first and along the second
-  Vec3 normal;         // unit, from the second to the first. Continuous: its side is never derived from positions again
+  Vec3 normal;         // unit, from the second to the first. Continuous: its side is never recomputed from positions
   float gap = 0;       // [m] along the normal, surface to surface; below -d the pair is on its wrong side and is pushed back
   float normal_impulse = 0;  // force times h^2 [N.s2], carried over to the next substep
   Vec3 friction_impulse;     // on the first, likewise
@@ -71,22 +71,22 @@ struct State {
   // Per node.
   Columns3 x, fine;  // position [m] = x + fine; written by the substep
   Columns3 v;        // [m/s]
-  Column warm;       // 0 free .. 1 touches something loaded
+  Column warm;       // 0 free .. 1 in contact with something loaded
   // Per segment: segment i joins nodes i and i + 1.
   Column rest;                  // [m]
   Column tension;               // [N] mean over the last step; negative: pushed
   std::vector<uint8_t> broken;  // 1: no longer a segment
-  // Crossings, sorted by key. The columns are separate because most pairs only spend their budget.
+  // Crossings, sorted by key. Separate columns, because most pairs only use up their budget.
   std::vector<uint32_t> key;  // first segment << 16 | partner
-  Column budget;              // [m] of motion left before the pair must be looked at again
+  Column budget;              // [m] of motion before the pair must be evaluated again
   std::vector<Crossing> crossing;
   // Contact with the plane, per node.
   Column plane_normal;  // [N.s2]
   Columns3 plane_friction, plane_drift;
-  Columns3 listed;             // [m] where the nodes were when the pairs were listed
-  float travel = 0;            // [m] how far the tools went since then; huge: the list is out of date
+  Columns3 listed;             // [m] positions of the nodes when the pairs were listed
+  float travel = 0;            // [m] motion of the tools since then; huge: the list is outdated
   uint32_t substeps_done = 0;  // parity decides the order of a sweep
-  uint32_t overflow = 0;       // pairs that found no room
+  uint32_t overflow = 0;       // pairs dropped because the list was full
   uint32_t refreshes = 0;
 
   size_t nodes() const { return x.x.size(); }
@@ -108,12 +108,12 @@ void reflect(Archive& archive, AnyState& s) {
 }
 uint64_t hash_state(const State& state);
 
-// A node that something else moves or pulls. The target moves evenly from `from` to `to` during a step.
+// A node that is moved or pulled from outside. The target moves linearly from `from` to `to` during a step.
 struct Hold {
   uint32_t node = 0;
   Vec3 from, to;        // [m]
   float stiffness = 0;  // [N/m]; 0: rigid
-  float limit = 0;      // [N] a spring pulls no harder; 0: no limit
+  float limit = 0;      // [N] maximum force of the spring; 0: no limit
   Vec3 force;           // [N] of the hold on the thread, mean over the last step; written by step
 };
 // A constant force on a node.
@@ -121,7 +121,7 @@ struct Pull {
   uint32_t node = 0;
   Vec3 force;  // [N]
 };
-// A tool's part: capsule about the segment a b. The points move evenly during a step.
+// Part of a tool: capsule about the segment a b. The points move linearly during a step.
 struct ToolCapsule {
   Vec3 a, b;        // [m] at the beginning of the step
   Vec3 to_a, to_b;  // at its end
@@ -144,7 +144,7 @@ struct Surroundings {
 
 struct Scratch;  // work space of a step; nothing in it outlives the step
 
-// Straight segments through `path` at the rest lengths that they have there, at rest. capacity: of crossings.
+// Straight segments through `path`, with its segment lengths as rest lengths. capacity: of crossings.
 State make_state(std::span<const Vec3> path, size_t crossings = 4096);
 
 class Stepper {
@@ -160,7 +160,7 @@ class Stepper {
   std::unique_ptr<Scratch> scratch_;
 };
 
-// Smallest line mass [kg/m] with which explicit bending is stable between segments of this length [m]; the step uses no less.
+// Minimum line mass [kg/m] for stable explicit bending with segments of this length [m]; the step uses no less.
 float bending_density(const Settings& settings, float segment_length);
 
 }  // namespace catgut::thread

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// thread/topology: which knot a curve is, from its shape alone: for tests and for judging, never for the mechanics.
+// thread/topology: the knot type of a curve from its shape alone: for tests and scoring, never for the mechanics.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -23,7 +23,7 @@ uint64_t knot_determinant(std::span<const Vec3> closed);
 // Sum of the signs over a few views: +3 right-handed, -3 left-handed for an overhand knot drawn tight; near 0 for a square
 // knot.
 double mean_writhe(std::span<const Vec3> closed);
-// A thread whose ends are led away along the given directions and joined far below (-y).
+// A thread whose ends are extended in the given directions and joined far below (-y).
 std::vector<Vec3> close_curve(std::span<const Vec3> thread, Vec3 first_away, Vec3 last_away);
 
 }  // namespace catgut::thread

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// validation: what the checks share: where lines go, and small worlds to run the kernels in.
+// validation: shared by the checks: where lines go, and small worlds to run the kernels in.
 #pragma once
 #include <functional>
 #include <span>
@@ -19,8 +19,8 @@ struct Lines {
            const std::string& source);
 };
 
-// A thread whose first node, and last if wanted, is held by the world: only the thread's kernels and the time step around them.
-// Without the substep's limit on speed, so that published cases of meters and kilograms can run as they are.
+// A thread whose first node, and optionally its last, is held by the world: only the thread's kernels and the time step.
+// Without the substep's speed limit, so that published cases of meters and kilograms can run unchanged.
 struct ThreadRig {
   StrandModel model;
   Strand thread;
@@ -48,7 +48,7 @@ struct TissueWorld {
 struct Block {
   std::vector<Vec3> position;
   std::vector<Tet> tet;
-  std::vector<std::vector<uint32_t>> cluster;  // one, of everything
+  std::vector<std::vector<uint32_t>> cluster;  // a single one with all particles
   int n = 0;
   uint32_t at(int i, int j, int k) const { return static_cast<uint32_t>((k * n + j) * n + i); }
 };
@@ -64,7 +64,7 @@ void check_momentum(Lines& out);
 void check_rotation(Lines& out);
 void check_volume(Lines& out);
 void check_wall(Lines& out);
-// src/thread. nightly: the whole range of each; otherwise what a few seconds allow.
+// src/thread. nightly: the whole range of each; otherwise a range that takes a few seconds.
 void check_capstan(Lines& out, bool nightly);
 void check_overhand(Lines& out, bool nightly);
 void check_holding(Lines& out, bool nightly);

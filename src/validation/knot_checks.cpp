@@ -21,10 +21,10 @@ using thread::Surroundings;
 using thread::ToolCapsule;
 
 // Thread over a fixed cylinder of radius 4.5 mm (40 segments a turn), drawn at 20 mm/s against a constant force at its other
-// end, or let go at that speed. `load` [N] is the larger of the two tensions. Returns ln(T2 / T1) / (mu angle).
+// end, or released at that speed. `load` [N] is the larger of the two tensions. Returns ln(T2 / T1) / (mu angle).
 double capstan_exponent(float degrees, float mu, float load, bool drawn) {
   Settings settings = knot_settings(mu);
-  settings.material.bending_stiffness = 1e-9f;  // limp: bending carries part of a load without friction
+  settings.material.bending_stiffness = 1e-9f;  // limp: bending stiffness would carry part of a load without friction
   settings.damping = 0;
   const float angle = degrees * kPi / 180, radius = 4.5e-3f, r = radius + 0.5f * settings.material.diameter, l = 0.7e-3f;
   const float pitch = degrees > 300 ? 0.6e-3f : 0;  // a helix beyond one turn
@@ -88,12 +88,12 @@ double overhand_force(int n, double r, double shortening, double mu, double stif
 }
 
 struct Overhand {
-  double worst = 1;         // ratio of measured to expected force that is farthest from 1
+  double worst = 1;         // ratio of measured to expected force that differs most from 1
   double from = 0, to = 0;  // [m] range of the shortening
 };
 
-// An overhand knot of n turns around a loop of 200 mm, tightened at 50 mm/s; ratios every 5 mm of shortening, once it moves
-// evenly.
+// An overhand knot of n turns around a loop of 200 mm, tightened at 50 mm/s; ratios every 5 mm of shortening, in steady
+// motion.
 Overhand tighten_overhand(int n, float mu, double end) {
   Settings settings = knot_settings(mu);
   settings.material.bending_stiffness = 1e-5f;
@@ -144,7 +144,7 @@ Overhand tighten_overhand(int n, float mu, double end) {
     const double shortening = total - double{hold[1].to.x - hold[0].to.x};
     const double ratio = sum / 100 / overhand_force(n, 0.5 * double{d}, shortening, double{mu}, 1e-5);
     sum = 0;
-    if (i < 800) continue;  // the laid braid first finds its shape
+    if (i < 800) continue;  // the laid braid settles first
     if (result.from == 0) result.from = shortening;
     result.to = shortening;
     const double off = std::max(ratio, 1 / ratio);
@@ -198,7 +198,7 @@ void check_overhand(Lines& out, bool nightly) {
 }
 
 void check_holding(Lines& out, bool nightly) {
-  // Below the friction that locks them, with tails that nothing holds: what holds is the knot alone.
+  // Below the friction at which they lock, with free tails: only the knot holds.
   const float mu = 0.2f;
   const Settings settings = knot_settings(mu);
   const float single = hold_knot(single_throw(), settings, 0).peak, two_granny = hold_knot(granny(), settings, 0).peak;
@@ -211,7 +211,7 @@ void check_holding(Lines& out, bool nightly) {
   below("granny below square", two_granny, two);
   below("two square throws below three", two, three);
 
-  // Halving the substep: force while it slides, with 0.2 N on the tails (free tails make it a knife's edge).
+  // Halving the substep: force while it slides, with 0.2 N on the tails (free tails make the result bistable).
   for (const Kind& kind : {Kind{"granny", granny()}, Kind{"square", square()}}) {
     if (!nightly && kind.throws[1].hand < 0) continue;
     for (float m : {0.1f, 0.2f}) {
@@ -261,7 +261,7 @@ void check_shaking(Lines& out, bool nightly) {
   }
 }
 
-// At which friction each knot begins to hold 8 N: a record, with the band in which two neighbors in friction can change their
+// Friction at which each knot starts to hold 8 N: a record, with the band in which two adjacent friction values can change
 // order.
 void check_locking(Lines& out) {
   struct Expected {

@@ -44,7 +44,7 @@ Throws three_throws() { return {{3, 1}, {3, -1}, {3, 1}}; }
 Throws surgeons_211() { return {{5, 1}, {3, -1}, {3, 1}}; }
 
 LaidKnot lay_knot(std::span<const Throw> throws, float d, float segment, float load, float tail, float drop) {
-  // Strand A from its load end up; B is A turned by half a turn about z, because every throw is symmetric under that turn.
+  // Strand A from its load end up; B is A rotated by half a turn about z, because every throw is symmetric under that rotation.
   std::vector<Vec3> a;
   const float r = 0.75f * d, bend = 1.5f * d;
   auto line = [&](Vec3 to) {
@@ -58,7 +58,7 @@ LaidKnot lay_knot(std::span<const Throw> throws, float d, float segment, float l
   for (size_t k = 0; k < throws.size(); ++k) {
     const float turns = static_cast<float>(throws[k].half_turns * throws[k].hand) * kPi;
     const float half = 0.5f * 2.2f * d * static_cast<float>(throws[k].half_turns);
-    // The strand from the left begins below: sin of its first angle is -1.
+    // The strand from the left starts below: sin of its first angle is -1.
     const float phase = std::sin(-0.5f * turns) < 0 ? 0 : kPi;
     line({side * half, 0, z - r});
     const int n = throws[k].half_turns * 60;
@@ -187,11 +187,11 @@ std::vector<Vec3> closed_curve(const LaidKnot& k) {
 }
 
 Shaken shake(const Settings& settings, Tightened& t, int cycles, float speed, float load) {
-  constexpr float kReach = 5e-3f;  // [m] to either side
+  constexpr float kReach = 5e-3f;  // [m] to each side
   const LaidKnot& k = t.knot;
   Shaken result;
   result.before = thread::knot_determinant(closed_curve(k));
-  // No end is free: what changes the knot then has passed through a strand, and has not gone round an end.
+  // No end is free: a change of the knot means that a strand has passed through another, not round an end.
   Hold hold[4];
   hold[0].node = k.load_b, hold[1].node = k.tail_a(), hold[2].node = k.tail_b(), hold[3].node = k.load_a;
   for (Hold& h : hold) h.from = h.to = k.state.position(h.node);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// validation: knots laid by formula, and what is done to them: tightened, pulled, shaken, left under load. For checks, tests,
+// validation: knots laid by formula, then tightened, pulled, shaken, or left under load. For checks, tests,
 // benchmarks and pictures of src/thread.
 #pragma once
 #include <span>
@@ -50,18 +50,18 @@ struct Tightened {
   thread::Stepper stepper;
   Tightened(LaidKnot k) : knot(std::move(k)), stepper(knot.state.nodes()) {}
 };
-// How the tails are drawn. Flat: to the sides on which they leave. Uncrossed: each to the other side, as with hands that should
-// have crossed. Under tension: strand A is kept tight all the time, strand B is wound on it.
+// How the tails are pulled. Flat: to the sides on which they leave. Uncrossed: each to the other side, as if the hands had not
+// crossed. Under tension: strand A is kept taut all the time, strand B is wound on it.
 enum class Drawing { flat, uncrossed, under_tension };
-// Pulls the tails with `tails` [N] while springs of 500 N/m (tissue) hold the load ends, then lets the tails go within 50 ms,
+// Pulls the tails with `tails` [N] while springs of 500 N/m (tissue) hold the load ends, then releases the tails within 50 ms,
 // unless they are to be kept pulled.
 void tighten(const thread::Settings& settings, Tightened& t, float tails, Drawing drawing = Drawing::flat, float seconds = 0.3f,
              bool let_go = true);
 
 struct Holding {
   float peak = 0;     // [N] largest force on the load ends, smoothed over 5 ms
-  float mean = 0;     // [N] over the last three quarters of the way, or `limit`
-  float slip = 0;     // [m] by which the loads moved apart in total
+  float mean = 0;     // [N] over the last three quarters of the distance, or `limit`
+  float slip = 0;     // [m] increase of the distance of the loads
   bool held = false;  // reached `limit`
 };
 // Pulls the load ends apart at `speed` [m/s] to `limit` [N] or `distance` [m], with `tails` [N] on each tail.
@@ -75,7 +75,7 @@ struct Shaken {
   float nearest = 1;               // smallest distance between touching strands, in diameters
   float peak = 0;                  // [N] largest tension
 };
-// Shakes one load end to and fro by 10 mm at up to `speed` [m/s], across and along the strands in turn, while the other is
+// Shakes one load end by +-10 mm at up to `speed` [m/s], across and along the strands in turn, while the other is
 // pulled.
 Shaken shake(const thread::Settings& settings, Tightened& t, int cycles, float speed, float load);
 

@@ -94,7 +94,7 @@ std::vector<double> newton_chain(Vec3 step, double h, int frames) {
         const Eigen::Vector2d d = at - before;
         const double l = d.norm();
         const Eigen::Vector2d g = d / l;
-        // The first iterations leave the geometric term out: without it Newton finds its way from the prediction.
+        // The first iterations omit the geometric term: without it Newton converges from the prediction.
         const Eigen::Matrix2d s = (iteration > 2 ? lambda[k] / l : 0.0) * (Eigen::Matrix2d::Identity() - g * g.transpose());
         a.block<2, 2>(2 * k, 2 * k) -= s;
         a.block<2, 1>(2 * k, 2 * n + k) -= g;
@@ -201,11 +201,11 @@ void check_hanging_chain(Lines& out) {
   const int frames = 100, fallen = 10;
   const Vec3 level{1, 0, 0};
   const std::vector<double> want = newton_chain(level, kFrame, frames);
-  // The paper gives 20 particles of 1 kg, compliance 1e-8 m/N and 100 frames; it was not at hand to say how the chain starts.
-  // Assumed: 1 m spacing, released level, frames of 1/60 s without substeps, g 9.8; the first ten frames, in which the force
-  // rises from nothing and a relative error means little, are left out. A thousand sweeps are run in double precision, with the
-  // same step of the same constraint: float32, which the thread is in, is 2 % there whatever the chain's size
-  // (docs/solver.md), and nothing in the product sweeps so often.
+  // The paper gives 20 particles of 1 kg, compliance 1e-8 m/N and 100 frames, but not the start of the chain.
+  // Assumed: 1 m spacing, released level, frames of 1/60 s without substeps, g 9.8. The first ten frames are omitted: the
+  // force rises from zero and a relative error means little. A thousand sweeps are run in double precision, with the same step
+  // of the same constraint: in float32, which the thread uses, the error is 2 % there for any chain length
+  // (docs/solver.md), and the product never uses that many sweeps.
   const std::string source = "XPBD 2016 sec. 6.2; assumed: released level, 1 m spacing, frames 10 to 100";
   struct Published {
     int sweeps;
@@ -216,8 +216,8 @@ void check_hanging_chain(Lines& out) {
             chain_error(level, kFrame, false, p.sweeps, fallen, want), p.tolerance, "1", source);
   out.add("chain force error, 1000 sweeps in double", 0.005, chain_error_in_double(kFrame, 1000, fallen, want), 0.3, "1",
           source);
-  // Falling, at the scenes' own substep. (At 1/60 s the whip of the chain turns its segments by a third of a radian a step, and
-  // the geometric stiffness, which is what keeps fast taut thread calm, damps it: 5 % there.)
+  // Falling, at the scenes' own substep. (At 1/60 s the whip of the chain rotates its segments by a third of a radian per step,
+  // and the geometric stiffness, which stabilizes fast taut thread, damps it: 5 % there.)
   const double substep = kFrame / 8;
   out.add("chain force error, direct, falling", 0,
           chain_error(level, substep, true, 1, 8 * fallen, newton_chain(level, substep, 8 * frames)), 0.05, "1",
@@ -235,7 +235,7 @@ void check_catenary(Lines& out) {
     int bend_sweeps;
     double span;
   };
-  // A heavy meter, and the suture of the scenes at its own substep: light, finely divided, with bending.
+  // A heavy chain of a meter, and the suture of the scenes at its own substep: light, finely divided, with bending.
   const Case chain{"1 m chain", 201, 0.005f, 0.001f, 0, 1.0f / 480, 0, 0},
       suture{"suture", 175, 0.0016f, 2e-6f, 1e-6f, 1.0f / 960, 1, 0};
   std::vector<Case> all;
@@ -277,7 +277,7 @@ void check_catenary(Lines& out) {
 }
 
 void check_bending(Lines& out) {
-  // Gradient. A compliance so large that the multiplier does not depend on the gradient: the point moves by w lambda times it.
+  // Gradient. With a compliance so large that the multiplier does not depend on it, the point moves by w lambda times it.
   double worst = 0;
   for (const double degrees : {25.0, 60.0, 90.0, 133.0, 165.0})
     for (int which = 0; which < 3; ++which) {
@@ -310,7 +310,7 @@ void check_bending(Lines& out) {
     }
   out.add("bending gradient", 0, worst, 1e-3, "1", "central differences at 25, 60, 90, 133, 165 degrees");
 
-  // Released without speed: the bending energy and that of motion together never grow, at any start, the singular ones too.
+  // Released at rest: bending energy plus kinetic energy never grows, from any start, singular ones included.
   const float h = 1.0f / 960, mass = 2e-6f, segment = 0.0016f;
   for (const float compliance : {0.0f, 2e4f})
     for (const double degrees : {0.0, 0.5, 90.0, 180.0}) {

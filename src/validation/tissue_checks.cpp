@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// validation: soft tissue: stiffness that does not depend on the solver's settings, momentum, rotation, volume.
+// validation: soft tissue: stiffness independent of the solver's settings, momentum, rotation, volume.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,7 +13,7 @@
 namespace catgut::validation {
 namespace {
 
-constexpr float kReference = 1.0f / 480;  // [s] the substep that a stiffness is given for
+constexpr float kReference = 1.0f / 480;  // [s] the substep for which a stiffness is given
 constexpr std::array<int, 3> kSubsteps{8, 16, 32};
 
 struct Percentiles {
@@ -59,8 +59,8 @@ double hung_chain(bool direct, int sweeps, float h, float mass, float compliance
   return -double{rig.x[5].y} - 0.1;
 }
 
-// Block of 3 x 3 x 3 particles in one cluster, its top layer pinned (or, with one_free, all but one pinned); how far the rest
-// hangs down [m] under `gravity`. With `volume` its tetrahedra resist too.
+// Block of 3 x 3 x 3 particles in one cluster, its top layer pinned (or, with one_free, all but one pinned); returns the sag
+// [m] of the rest under `gravity`. With `volume`, its tetrahedra resist too.
 struct HungBlock {
   float stiffness = 0.5f;  // at kReference
   float gravity = 9.81f;
@@ -132,7 +132,7 @@ struct Drift {
   double angular = 0;       // change of angular momentum over itself
   double acceleration = 0;  // [m/s^2] of the center of mass
 };
-// Spinning and squeezed by a tenth, thrown with `speed`: what changes in a second without any outer force.
+// Spinning and compressed by a tenth, thrown with `speed`: changes within a second without external force.
 Drift drift(TissueWorld& world, std::span<const Vec3> rest, Vec3 speed) {
   world.model.h = 1.0f / 960;
   world.model.shape_stiffness = stiffness_at(0.9f, kReference, world.model.h);
@@ -161,7 +161,7 @@ void check_stiffness(Lines& out) {
   const std::string grid = "sweeps 1, 4, 16 x substeps 8, 16, 32";
   Percentiles attachment, soft_chain, direct_chain, soft_shape, stiff_shape, volume;
   Jobs one(1);
-  // Soft means compliance well above h^2 / m: then one sweep has converged, and any dependence left is a fault of the
+  // Soft means compliance well above h^2 / m: one sweep then converges, and any remaining dependence is an error of the
   // multipliers.
   HungBlock soft;
   soft.stiffness = 0.05f;
@@ -195,7 +195,7 @@ void check_stiffness(Lines& out) {
   out.add("static stretch, thread, direct", 15 * weight * 0.01, direct_chain.middle(), 0.01, "m",
           "sum of m g alpha; alpha 0.01 m/N");
   out.add("  its spread", 0, direct_chain.relative(), 0.01, "1", grid);
-  // A particle of a cluster of 27 whose others are pinned: its goal follows it by 1/27 of its way.
+  // A particle of a cluster of 27 whose others are pinned: its goal moves by 1/27 of its displacement.
   auto hang = [](double s, double g) { return g * double{kReference} * double{kReference} * (1 - s) / s / (1 - 1.0 / 27); };
   out.add("static sag, shape matching, soft", hang(0.05, 1), soft_shape.middle(), 0.01, "m",
           "g h0^2 (1 - s) / s / (1 - 1/27), s = 0.05");
@@ -204,7 +204,7 @@ void check_stiffness(Lines& out) {
   out.add("  its spread", 0, stiff_shape.relative(), 0.01, "1",
           "sweeps 4, 16 x substeps 8, 16, 32 (one sweep has not converged)");
   out.add("static sag, volume and shape, spread", 0, volume.relative(), 0.01, "1", grid);
-  // Workers: the same bits, on a block of several jobs' worth of particles.
+  // Workers: identical bits, on a block with enough particles for several jobs.
   HungBlock big = tets;
   big.side = 9;
   big.sweeps = 1;
@@ -235,19 +235,19 @@ void check_momentum(Lines& out) {
         bowel ? "no outer force; 600 overlapping clusters" : "no outer force; one cluster, unequal masses";
     TissueWorld spinning = make(), thrown = make();
     const Drift d = drift(spinning, rest, {});
-    // A particle moves by the mean over its clusters, and particles near a rim are in fewer: actio and reactio then differ a
-    // little, as for the angular momentum below.
+    // A particle moves by the mean over its clusters, and particles near a rim are in fewer. Action and reaction then differ
+    // slightly, as for the angular momentum below.
     out.add(what + ", linear momentum lost in 1 s", 0, d.linear, bowel ? 5e-3 : 1e-3, "1", cluster);
     out.add(what + ", angular momentum lost in 1 s", 0, d.angular, bowel ? 0.05 : 0.01, "1",
             bowel ? "no outer moment; averaging over clusters keeps it only nearly" : "no outer moment");
-    // Float32 rounds a position 0.1 m from the origin by 4e-9 m, which looks like h^-2 times that of acceleration.
+    // Float32 rounds a position 0.1 m from the origin by 4e-9 m, which appears as h^-2 times that in acceleration.
     out.add(what + ", thrown: acceleration from nothing", 0, drift(thrown, rest, {0.1f, 0.05f, -0.08f}).acceleration / 9.81,
             1e-3, "g", "no outer force; float32 positions up to 0.15 m from the origin");
   }
 }
 
 void check_rotation(Lines& out) {
-  // Unequal sides, so that no rotation is special; the axis is no axis of the block.
+  // Unequal sides, so that no rotation is special; the rotation axis is not an axis of the block.
   Block block = make_block(3, 0.01f);
   for (Vec3& p : block.position) p = {p.x, p.y * 1.4f, p.z * 0.6f};
   const std::vector<float> mass(block.position.size(), 0.001f);
@@ -270,7 +270,7 @@ void check_rotation(Lines& out) {
     char name[64];
     std::snprintf(name, sizeof name, "rotation found after %.0f degrees", degrees);
     out.add(name, 0, angle_between(found(w), q), 1e-4, "rad", "known rotation; from no rotation, 40 steps");
-    // A dent in one particle goes: positions return to the turned shape.
+    // A dent in one particle disappears: positions return to the rotated shape.
     add(w.state.x[0], {0.002f, 0.001f, -0.001f});
     w.state.v.assign(w.state.v.size(), {});
     w.model.shape_stiffness = 0.9f;
@@ -278,7 +278,7 @@ void check_rotation(Lines& out) {
     Jobs jobs(1);
     w.run(1, jobs);
     double worst = 0;
-    // The dent's momentum-free mean is kept; compare shapes, not places.
+    // The dent's mean displacement is kept; compare shapes, not positions.
     Vec3 mean{};
     for (const Vec4& p : w.state.x) mean += xyz(p) / static_cast<float>(turned.size());
     const Quat end = found(w);

@@ -17,14 +17,14 @@ using thread::Surroundings;
 using thread::ToolCapsule;
 
 // x along the pull, y up from the tissue, z toward the viewer. The needle holder comes from the side of the long strand and
-// lies along the pull, leaning; the forceps lie parallel to it, so that the shafts never cross. From throw to throw the sides
-// change.
-constexpr float kCircle = 13e-3f;  // radius of the winding hand's way
+// lies along the pull, tilted; the forceps lie parallel to it, so that the shafts never cross. The sides alternate from throw
+// to throw.
+constexpr float kCircle = 13e-3f;  // radius of the winding hand's path
 constexpr float kBehind =
-    6e-3f;  // the hand winds this far behind the tip: between it and where the strand comes from the wound
+    6e-3f;  // the hand winds this far behind the tip: between the tip and where the strand leaves the wound
 constexpr float kInFront = 1.6e-3f;  // a strand is held this far in front of the tip
 Vec3 shaft_from(float side) { return {side * 0.85f, 0.527f, 0}; }
-// Where the tip of the needle holder is while the strand is wound round it: beyond the wound, which lies under the shaft.
+// Position of the needle holder's tip while the strand is wound round it: beyond the wound, which lies under the shaft.
 Vec3 work_place(float side) { return {side * -16e-3f, 18e-3f, 0}; }
 
 struct Hands {
@@ -75,8 +75,8 @@ class Tying {
     for (ToolCapsule& t : tool_) t.a = t.to_a, t.b = t.to_b;
   }
 
-  // The hand takes the long strand where enough is left for so many windings, and no more: slack falls off the jaws. `now` [m]:
-  // how much of it lies between the wound and the node that the hand holds.
+  // The hand takes the long strand where exactly enough is left for these windings: slack falls off the jaws. `now` [m]:
+  // length between the wound and the node that the hand holds.
   void take_strand(float now, int wraps) {
     const float want = how_.long_strand + 8e-3f * static_cast<float>(wraps - 1);
     const int shift = static_cast<int>(std::lround((want - now) / how_.segment)),
@@ -90,7 +90,7 @@ class Tying {
     take_strand(strand_, wraps);
     const Vec3 shaft = shaft_from(side), work = work_place(side);
     const float start = sense > 0 ? 0 : kPi, turns = 2 * kPi * static_cast<float>(wraps) * sense;
-    // The needle holder comes from the other hand; it is far from the thread at this moment.
+    // The needle holder comes from the other hand; at this moment it is far from the thread.
     holder_shaft_ = shaft;
     hands_.holder = work + shaft * 50e-3f;
     place_tools();
@@ -112,7 +112,7 @@ class Tying {
     strand_ = distance(knot_.state.position(hold_[3].node), knot_.state.position(knot_.bite_b));  // taut
     tail_ = distance(knot_.state.position(0), knot_.state.position(knot_.bite_a));
     tension_ = 0.5f * (length(hold_[2].force) + length(hold_[3].force));
-    // Where a hand's grip gave way, the hand is now where the strand is.
+    // Where a hand's grip slipped, the hand is now at the strand.
     for (size_t k : {size_t{2}, size_t{3}}) hold_[k].from = hold_[k].to = knot_.state.position(hold_[k].node);
     hands_ = {hold_[2].to + shaft * kInFront, hold_[3].to};
     place_tools();
@@ -140,7 +140,7 @@ class Tying {
     if (how_.seed == 0) return {};
     return Vec3{random_.uniform() - 0.5f, random_.uniform() - 0.5f, random_.uniform() - 0.5f} * 2e-3f;
   }
-  // The tail is laid nearly straight: what sags gets into the path of the winding hand.
+  // The tail is laid nearly straight: sagging thread would obstruct the winding hand.
   Vec3 laid_tail(float side) const { return {side * -0.88f * tail_, 8e-3f, 0}; }
   // The winding hand at an angle about the needle holder's shaft; 0: toward the viewer, pi/2: above.
   static Vec3 work_hand(float side, float angle) {
@@ -174,7 +174,7 @@ class Tying {
     for (int i = 0; i < static_cast<int>(1000 * seconds); ++i) tick(phase);
   }
 
-  // Both hands to their places in the time that the farther one needs; the free tail is laid to `tail` when that is given.
+  // Moves both hands in the time that the longer path needs; the free tail is laid to `tail` if given.
   void move(const std::string& phase, Vec3 holder, Vec3 forceps, Vec3 tail = {}, float speed = 0) {
     const Hands from = hands_;
     const Vec3 tail_from = tail_at_, shaft_was = forceps_shaft_;

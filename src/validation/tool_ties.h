@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// validation: scripted hands that tie throws with instruments, as a surgeon does: wind the long strand round the needle holder,
-// take the tail with its jaws, draw it through, pull the ends apart. The tools are capsules that the thread cannot pass.
+// validation: scripted hands that tie throws with instruments: wind the long strand round the needle holder,
+// grasp the tail with its jaws, pull it through, pull the ends apart. The tools are capsules that the thread cannot pass.
 #pragma once
 #include <functional>
 #include <memory>
@@ -22,8 +22,8 @@ struct TiedThrow {
 using Tie = std::vector<TiedThrow>;
 
 struct TieSettings {
-  float speed = 0.3f;                         // [m/s] highest of the hands
-  float pull = 2.5f;                          // [N] at which the hands pull a throw tight: their grip gives way beyond
+  float speed = 0.3f;                         // [m/s] maximum of the hands
+  float pull = 2.5f;                          // [N] at which the hands pull a throw tight: their grip slips above
   float segment = 0.7e-3f;                    // [m]
   float long_strand = 52e-3f, tail = 42e-3f;  // [m]
   uint64_t seed = 0;                          // of the tremor of the way points, 1 mm; 0: none
@@ -39,7 +39,7 @@ struct TiedKnot {
   float tension = 0;   // [N] of the hands at the end, mean
 };
 
-// `each_tick`, when given, sees every state and the tools (for pictures).
+// `each_tick`, if given, receives every state and the tools (for pictures).
 using TieWatcher =
     std::function<void(const thread::State&, std::span<const thread::ToolCapsule>, double time, const std::string& phase)>;
 TiedKnot tie_with_tools(const thread::Settings& settings, const Tie& tie, const TieSettings& how,

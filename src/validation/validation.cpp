@@ -59,7 +59,7 @@ TissueWorld::TissueWorld(std::span<const Vec3> rest, std::span<const float> mass
   model.tissue = model.count = static_cast<uint32_t>(rest.size());
   for (float m : mass) model.inv_mass.push_back(1 / m);
   model.shape = make_shape_model(rest, mass, cluster);
-  model.body.resize(3);  // the two tools and the needle, fixed and far from anything: nothing is a candidate for contact
+  model.body.resize(3);  // the two tools and the needle, fixed and far away: never candidates for contact
   model.gravity = model.tissue_gravity = {};
   model.shape_relaxation = 1;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// validation: the wall with a modulus (src/wall) beside the material's constants and closed forms. Every line measures a body
+// validation: the wall with a modulus (src/wall) compared with material constants and closed forms. Every line measures a body
 // at rest from outside: forces that the check applies, and lengths.
 #include <algorithm>
 #include <array>
@@ -22,7 +22,7 @@ using wall::Wall;
 constexpr double kPi2 = 6.283185307179586;
 constexpr float kTick = 1.0f / 60;
 
-// Steps under external forces for `seconds`; they grow over the first third. force: 2 per column.
+// Steps under external forces for `seconds`; they ramp up over the first third. force: 2 per column.
 void settle(Wall& w, const std::vector<Vec3>& force, double seconds) {
   Jobs jobs(1);
   const int steps = static_cast<int>(std::lround(seconds / w.model.step));
@@ -153,7 +153,7 @@ void check_generated(Lines& out) {
   add_modulus(out, "around/bowel generator, 1228 particles", 6e5, modulus_around(w, t, 500, 1.2));
 }
 
-// Every quad of the tube cut into two prisms, the diagonal by turns: what an organ's mesh has where triangles find no partner.
+// Every quad of the tube split into two prisms, along alternating diagonals, like unpaired triangles of an organ's mesh.
 void check_prisms(Lines& out) {
   wall::Spec s = tube_spec(32, 19, 0.001f, {});
   const auto quads = s.mesh.face;
@@ -217,7 +217,7 @@ void check_ring(Lines& out) {
   }
 }
 
-// A small pad leads points of the outer face inward to 5 mm; the force it needs.
+// A small pad pushes points of the outer face inward by 5 mm; returns the force.
 struct Led {
   Wall wall;
   wall::Hold hold;
@@ -248,7 +248,7 @@ Led lead_inward(Wall w, const std::vector<wall::Point>& points, float depth, dou
   return out;
 }
 
-// Places of the outer face within a disc of 5 mm about the middle of the tube's flank.
+// Points of the outer face within a disc of 5 mm about the middle of the tube's flank.
 std::vector<wall::Point> pad(const Wall& w) {
   std::vector<wall::Point> out{wall::nearest_point(w.model, w.state, {0.020f, 0, -0.035f}, 1)};
   for (int k = 0; k < 6; ++k) {
@@ -266,7 +266,7 @@ void check_held(Lines& out) {
     const Led led = lead_inward(w, pad(w), 0.005f, 1.2);
     force[k++] = led.force;
     if (substeps != 16) continue;
-    // The same forces in the static solution lead the same points as deep.
+    // The same forces in the static solution push the same points to the same depth.
     StaticWall still(w);
     std::vector<StaticLoad> load;
     for (size_t i = 0; i < led.hold.point.size(); ++i) {
@@ -283,7 +283,7 @@ void check_held(Lines& out) {
   }
   out.add("modulus/held/force of the pad, spread over 8 to 64 substeps", 0,
           *std::max_element(force, force + 4) / *std::min_element(force, force + 4) - 1, 1e-3, "", "a force at rest");
-  // A force spread over a disc of 5 mm, and how deep it moves the disc's points on the average.
+  // A force spread over a disc of 5 mm; mean displacement of the disc's points.
   double depth[2];
   for (const bool fine : {false, true}) {
     Wall w = wall::build_wall(fine ? tube_spec(64, 38, 0.001f, {}) : tube_spec(32, 19, 0.001f, {}));
@@ -313,7 +313,7 @@ void check_held(Lines& out) {
           "the same tissue");
 }
 
-// A pulled tube at rest: what changes in a second.
+// A pulled tube at rest: changes within a second.
 void check_drift(Lines& out) {
   Wall w = wall::build_wall(tube_spec(32, 19, 0.001f, {}));
   std::vector<Vec3> f(w.state.motion.x.size());
@@ -381,7 +381,7 @@ void check_inertia_and_cut(Lines& out) {
   }
 }
 
-// A capsule pressed onto the flank: what it feels is what the held end gives back, at any step.
+// A capsule pressed onto the flank: its force equals the reaction of the held end, at any step.
 void check_contact(Lines& out) {
   double force[4], balance = 0;
   int k = 0;
@@ -415,7 +415,7 @@ void check_contact(Lines& out) {
   out.add("modulus/held/force of the capsule, 4864 nodes against 1216", force[1], force[3], 0.07, "N", "the same tissue");
   out.add("contact/wall/what the capsule feels less what the held end bears", 0, balance, 0.01, "", "Newton's third law");
 
-  // A pad on a slope: it sticks below the angle of friction and slides as a block above it.
+  // A pad on a slope: it sticks below the angle of friction and slides like a block above it.
   for (const double degrees : {10.0, 25.0}) {
     wall::Spec s;
     wall::SheetShape shape;
@@ -544,7 +544,7 @@ void check_string(Lines& out) {
   }
 }
 
-// A string through twelve holes round a rim, drawn in by a tenth: the start of a purse-string.
+// A string through twelve holes round a rim, shortened by a tenth: the start of a purse-string.
 void check_purse(Lines& out) {
   wall::TubeShape shape;
   shape.around = 24, shape.rings = 8, shape.length = 0.025f;
@@ -562,7 +562,7 @@ void check_purse(Lines& out) {
   const double from = still.length(string), drawn = 0.1 * from;
   string.length = from - drawn;
   const Drawn got = draw_string(w, hole, drawn, 3.0, 5e-5f);
-  // The rim puckers, and there are many ways to: the static solution starts from the one that came about.
+  // The rim puckers, in one of many possible shapes: the static solution starts from the simulated one.
   still.start_from(w.state);
   still.solve({}, {string}, string.length, 1);
   out.add("closure/string/twelve holes round a rim drawn in by a tenth, tension", still.tension(string), got.tension, 0.005,

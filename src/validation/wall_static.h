@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// validation: a static solution of the wall to hold the simulation against: the same elements and loads, no time, Newton's
+// validation: a static reference solution of the wall: the same elements and loads, no time, Newton's
 // method in double precision with a numeric Jacobian. It shares the element's formula with the simulation, so it tests the
 // step, the coupling and single precision, not the element; tests/wall/reference_test.cpp tests that against other elements.
 #pragma once
@@ -19,13 +19,13 @@ struct StaticLoad {
 struct StaticString {
   std::vector<wall::Weights> through;
   double length = 0;       // [m] unloaded
-  double stiffness = 1e7;  // [N/m]: next to inextensible
+  double stiffness = 1e7;  // [N/m]: nearly inextensible
 };
 
 class StaticWall {
  public:
   explicit StaticWall(const wall::Wall& wall);
-  // Newton's method then starts from where the simulation settled: of several solutions (folds) it looks at that one.
+  // Newton's method then starts from the simulated equilibrium: of several solutions (folds) it finds that one.
   void start_from(const wall::State& state);
   // Loads grow in `steps` equal steps, strings shorten from `string_from` [m]. Returns the residual relative to the loads.
   double solve(const std::vector<StaticLoad>& load, const std::vector<StaticString>& string, double string_from, int steps);

@@ -65,7 +65,7 @@ void find_capsule(const Model& m, const State& s, const Obstacle& o, uint32_t in
     const uint32_t lane = m.lane_of_face[f], block = lane / kLanesOfBlock, in = lane % kLanesOfBlock;
     const auto& corner = s.topology.corners[block].column;
     const bool quad = s.topology.corners[block].quads != 0;
-    // A sphere round the face first.
+    // Bounding sphere of the face first.
     const Vec3 c0 = vec3(s.motion.x[2 * corner[0][in]]), c2 = vec3(s.motion.x[2 * corner[2][in]]);
     const Vec3 c1 = vec3(s.motion.x[2 * corner[1][in]]), c3 = vec3(s.motion.x[2 * corner[3][in]]);
     const Vec3 middle = (c0 + c2) * 0.5f;
@@ -93,7 +93,7 @@ void find_capsule(const Model& m, const State& s, const Obstacle& o, uint32_t in
     const Vec3 facing = normalized(cross(side.along_xi(eta), side.along_eta(xi)), {0, 0, 1}) * zeta;
     const Vec3 off = axis - at;
     const float far = length(off), front = dot(off, facing);
-    // An axis below the skin, between the two faces, comes out along the face's normal. Seen past the rim of a face it is
+    // An axis below the skin, between the two faces, is pushed out along the face's normal. Seen past the rim of a face, it is
     // another face's contact.
     const bool below = front < 0 || far < 1e-6f;
     if (below && (quad ? std::max(std::abs(xi), std::abs(eta)) > 0.999f : std::min({xi, eta, 2 - xi - eta}) < 0.001f)) continue;
@@ -127,7 +127,7 @@ void warm_start(const Model& m, Scratch& scratch, ContactSolver& solver) {
   for (Contact& c : solver.contact) {
     while (k < solver.last.size() && solver.last[k].key < c.key) ++k;
     if (k == solver.last.size() || solver.last[k].key != c.key) continue;
-    // What was pressed is pressed along the new normal; friction keeps its part across it.
+    // The normal impulse is turned to the new normal; friction keeps its tangential part.
     const Vec3 old = solver.last[k].impulse;
     const float pressed = std::max(0.0f, dot(old, solver.last[k].normal));
     Vec3 across = old - solver.last[k].normal * dot(old, solver.last[k].normal);
@@ -195,7 +195,7 @@ void solve_contacts(const Model& m, State& s, Scratch& scratch, std::span<const 
       largest2 = std::max(largest2, length2(solver.contact[i].impulse));
     }
     if (++solver.swept >= solver.sweeps || changed2 <= solver.accuracy * solver.accuracy * largest2) break;
-    // The next sweep starts further on in the direction of the last ones; what it overdoes, the sweep projects back.
+    // The next sweep starts from an extrapolation of the last ones; sweeps project any overshoot back.
     const float beta = last2 > 0 ? sum2 / last2 : 0;
     last2 = sum2;
     for (size_t i = 0; i < n; ++i) {

@@ -2,7 +2,7 @@
 // wall/contact: contact with friction by impulses. All contacts of a step are solved together on the full compliance W = J A^-1
 // J^T (projected Gauss-Seidel, Moreau's time stepping; Jourdan, Alart, Jean 1998, Comput. Methods Appl.
 // Mech. Eng. 155, 31-47): a W cut
-// to neighbors or to its diagonal gave forces that flickered or were eight times wrong. The last step's impulses are given to
+// to neighbors or to its diagonal gave forces that flickered or were eight times too large. The last step's impulses enter
 // the wall's main solve, so that a resting contact is exact and only changes are iterated.
 #pragma once
 #include <cstdint>
@@ -23,12 +23,12 @@ struct Obstacle {
 };
 
 struct Contact {
-  uint64_t key = 0;  // obstacle, face or column, side: finds the impulses of the last step
+  uint64_t key = 0;  // obstacle, face or column, side: key of the impulses of the last step
   Weights point;     // of the wall
   Weights other;     // of the wall too, where `self`; it takes the opposite impulse
   bool self = false;
   uint32_t obstacle = 0;
-  float along = 0;  // capsule: where on its axis, 0 at a
+  float along = 0;  // capsule: position on its axis, 0 at a
   Vec3 normal;      // out of the obstacle (self: out of the other side), unit
   float gap = 0;    // [m] at the start of the step
   Vec3 speed;       // [m/s] of the obstacle there
@@ -37,13 +37,13 @@ struct Contact {
 };
 
 struct ContactSolver {
-  float reach = 0.0003f;  // [m] gaps up to this, and what two steps of the relative motion close, are looked at
-  float push_out = 0.2f;  // [m/s] fastest undoing of an overlap
-  // Contacts close to each other move almost as one, so plain sweeps converge slowly: they are driven on as nonsmooth nonlinear
-  // conjugate gradients (Silcowitz, Niebe, Erleben 2010, doi 10.1007/s00371-010-0502-6). At rest the warm start leaves little.
-  int sweeps = 100;                    // at most
-  float accuracy = 1e-4f;              // of the largest impulse: a sweep that changes less is the last one
-  int swept = 0;                       // in the last step
+  float reach = 0.0003f;  // [m] margin: gaps up to this plus two steps of relative motion are candidates
+  float push_out = 0.2f;  // [m/s] maximum speed at which overlap is resolved
+  // Adjacent contacts are strongly coupled, so plain sweeps converge slowly. They are accelerated as nonsmooth nonlinear
+  // conjugate gradients (Silcowitz, Niebe, Erleben 2010, doi 10.1007/s00371-010-0502-6). At rest the warm start suffices.
+  int sweeps = 100;                    // maximum
+  float accuracy = 1e-4f;              // relative to the largest impulse: iteration stops when a sweep changes less
+  int swept = 0;                       // sweeps of the last step
   std::vector<Contact> contact, last;  // of this step and of the last one, in the order of their keys
   std::vector<Vec3> force, torque;     // per obstacle: [N] and [N m] about the scene's origin, of the wall on it
   Inverse inverse{512};
@@ -53,11 +53,11 @@ struct ContactSolver {
   std::vector<Weights> points;
 };
 
-// Before begin_step: finds what may touch and gives last step's impulses to the wall (scratch.external). Self contacts may then
-// be added to `contact` by a caller that knows of them, with keys above all others.
+// Before begin_step: finds candidates and applies last step's impulses to the wall (scratch.external). The caller may then add
+// self contacts to `contact`, with keys above all others.
 void find_contacts(const Model& model, const State& state, std::span<const Obstacle> obstacle, ContactSolver& solver);
 void warm_start(const Model& model, Scratch& scratch, ContactSolver& solver);
-// After begin_step: corrections, and the velocities that follow from them.
+// After begin_step: solves the corrections and applies them to the velocities.
 void solve_contacts(const Model& model, State& state, Scratch& scratch, std::span<const Obstacle> obstacle,
                     ContactSolver& solver);
 

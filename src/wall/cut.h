@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// wall/cut: the wall divides along edges of its faces. Columns on the cut are copied and corners remapped; shapes at rest,
-// frames and velocities are carried over. Cutting only removes links, so the old factor stays a valid bound of the stiffness:
-// copies share its row, plus a diagonal part for motion against each other. A new factor is made when asked for.
+// wall/cut: divides the wall along edges of its faces. Columns on the cut are copied and corners remapped; rest shapes,
+// frames and velocities are kept. Cutting only removes links, so the old factor remains a valid bound of the stiffness:
+// copies share its row, plus a diagonal part for their relative motion. A new factor is made on request.
 #pragma once
 #include <array>
 #include <span>
@@ -10,12 +10,12 @@
 
 namespace catgut::wall {
 
-// Cuts the given edges (pairs of columns of the present topology). Returns the columns that were added; the scratch grows with
-// them. A column is divided only where the cut separates its faces: the inner end of a slit stays whole.
+// Cuts the given edges (pairs of columns of the present topology). Returns the added columns; the scratch grows with
+// them. A column is divided only where the cut separates its faces: the inner end of a slit stays connected.
 uint32_t cut(const Model& model, State& state, Scratch& scratch, std::span<const std::array<uint32_t, 2>> edge);
 
-// The factor of the present topology. Independent of the motion: it may be made elsewhere from a copy of the topology and put
-// in place between two steps.
+// The factor of the present topology. Independent of the motion: it may be computed elsewhere from a copy of the topology and
+// installed between two steps.
 void refactor(const Model& model, State& state, Scratch& scratch);
 
 // The pieces of the wall: per column, the smallest column of its piece.

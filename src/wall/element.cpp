@@ -78,7 +78,7 @@ ElementRest element_rest(std::span<const Vec3> mid, std::span<const Vec3> dir, V
   for (int k = 0; k < 4; ++k)
     for (int i = 0; i < 3; ++i) c[kH1x + 3 * k + i] = h[k][i];
 
-  // The laminate as thick as the element is here: membrane in proportion, bending with the cube.
+  // The laminate scaled to the thickness of the element: membrane proportionally, bending with the cube.
   const double t = 2 * d0.z(), s = t / laminate.thickness, zeta = t / 2;
   const Matrix3d a = eigen(laminate.a) * s, b = eigen(laminate.b) * (s * s / zeta),
                  e = eigen(laminate.d) * (s * s * s / (zeta * zeta));
@@ -97,7 +97,7 @@ ElementRest element_rest(std::span<const Vec3> mid, std::span<const Vec3> dir, V
   const double thick = laminate.thick * s;
   c[kThick] = thick * out.area, c[kContract1] = laminate.contraction[0], c[kContract2] = laminate.contraction[1];
 
-  // Shear energy less in elements that are wide beside their thickness.
+  // Reduced shear energy in elements that are wide relative to their thickness.
   const double width2 = std::max((2 * w1).squaredNorm(), (2 * w2).squaredNorm());
   const double factor = t * t / (t * t + 0.1 * width2);
   const Vector2d shear(laminate.shear[0] * s * factor, laminate.shear[1] * s * factor);
@@ -109,7 +109,7 @@ ElementRest element_rest(std::span<const Vec3> mid, std::span<const Vec3> dir, V
     c[kInPlane11] = plane(0, 0), c[kInPlane12] = plane(0, 1), c[kInPlane22] = plane(1, 1);
     c[kTwist11] = twist(0, 0), c[kTwist12] = twist(0, 1), c[kTwist22] = twist(1, 1);
     c[kEdge11] = edge(0, 0) / 3, c[kEdge22] = edge(1, 1) / 3;
-  } else {  // directors that turn against each other about the normal: the one mode that nothing else resists
+  } else {  // relative rotation of directors about the normal: the only mode without other stiffness
     const double k = edge.trace() / 12;
     c[kEdge11] = k, c[kEdge22] = k, c[kEdge12] = -k;
   }

@@ -117,9 +117,9 @@ inline Vec3Of<S> polar_solve(const Vec3Of<S>& s1, const Vec3Of<S>& s2, const Vec
           (c13 * v.x + c23 * v.y + c33 * v.z) * inv + v.z * damped};
 }
 
-// Force of an element on its modes, and its stored energy [J] if wanted. `q` is turned `steps` Newton steps toward the rotation
-// of the mean deformation (analytic polar decomposition, Kugelstadt et al. 2018, doi 10.1111/cgf.13520): one is enough in a
-// simulation, whose frames are warm.
+// Force of an element on its modes, and optionally its stored energy [J]. `q` is turned `steps` Newton steps to the rotation
+// of the mean deformation (analytic polar decomposition, Kugelstadt et al. 2018, doi 10.1111/cgf.13520). One step suffices in a
+// simulation, whose frames are warm-started.
 template <class S, class Get>
 inline Modes<S> element_force(const Get& c, const Modes<S>& m, Turn<S>& q, int steps, S* energy = nullptr) {
   const S half(0.5f), one(1.0f);
@@ -135,7 +135,7 @@ inline Modes<S> element_force(const Get& c, const Modes<S>& m, Turn<S>& q, int s
     s1 = to_local(r, f1), s2 = to_local(r, f2), s3 = to_local(r, f3);
     const Vec3Of<S> skew{s2.z - s3.y, s3.x - s1.z, s1.y - s2.x};
     const Vec3Of<S> w = polar_solve(s1, s2, s3, skew, safe);
-    // At most about 0.7 rad a step.
+    // At most about 0.7 rad per step.
     const S shrink = half / square_root(one + dot(w, w));
     const S x = w.x * shrink, y = w.y * shrink, z = w.z * shrink;
     const Turn<S> t{q.x + q.w * x + q.y * z - q.z * y, q.y + q.w * y + q.z * x - q.x * z, q.z + q.w * z + q.x * y - q.y * x,
@@ -156,12 +156,12 @@ inline Modes<S> element_force(const Get& c, const Modes<S>& m, Turn<S>& q, int s
   const S e12 = s2.x + s1.y, e13 = s3.x + s1.z, e23 = s3.y + s2.z;
   const S k1 = q2.x * g11 + q3.x * g21, k2 = q2.y * g12 + q3.y * g22;
   const S k12 = q2.x * g12 + q3.x * g22 + q2.y * g11 + q3.y * g21;
-  // Contraction saturates, so that no stretch turns the cross-section inside out.
+  // Contraction saturates, so that no stretch inverts the cross-section.
   const S u1 = one / square_root(one + e1 * e1), u2 = one / square_root(one + e2 * e2);
   const S p1 = e1 * u1, p2 = e2 * u2, d1 = u1 * u1 * u1, d2 = u2 * u2 * u2;
 
-  // Straightened fibers: their own stretch, not the frame's strain, which a leaning director would lower. Measured along the
-  // frame, a wall stretched to 40 % gave way by leaning.
+  // Straightened fibers: their own stretch, not the frame's strain, which a tilted director would reduce. Measured along the
+  // frame, a wall stretched to 40 % softened by tilting.
   const S long1 = square_root(dot(s1, s1) + S(1e-12f)), long2 = square_root(dot(s2, s2) + S(1e-12f));
   const S over1 = larger(long1 - one - c(kKnee1), S(0.0f)), over2 = larger(long2 - one - c(kKnee2), S(0.0f));
   const S thick = c(kThick) * (e3 + c(kContract1) * p1 + c(kContract2) * p2);
@@ -201,7 +201,7 @@ inline Modes<S> element_force(const Get& c, const Modes<S>& m, Turn<S>& q, int s
               half * (c(kThick2) * q2.z * q2.z + c(kThick3) * q3.z * q3.z + c(kThick4) * q4.z * q4.z);
   }
 
-  // Local gradient with respect to the columns of F at a fixed frame, then what the turning of the frame adds.
+  // Local gradient with respect to the columns of F at a fixed frame, then the contribution of the frame's rotation.
   const Vec3Of<S> sig1 = Vec3Of<S>{n1, n12, n13} + s1 * (c(kStiff1) * over1 / long1);
   const Vec3Of<S> sig2 = Vec3Of<S>{n12, n2, n23} + s2 * (c(kStiff2) * over2 / long2);
   const Vec3Of<S> sig3{n13, n23, thick};

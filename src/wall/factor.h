@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// wall/factor: a sparse Cholesky factor in panels, and the solve that a step makes with it: three right-hand sides at once, in
+// wall/factor: a sparse Cholesky factor in panels, and the solve of a step: three right-hand sides at once, in
 // single precision, without allocation. The order is approximate minimum degree (Amestoy, Davis, Duff 1996, doi
 // 10.1137/S0895479894278952), post-ordered, so that neighboring columns of the factor share their pattern.
 #pragma once

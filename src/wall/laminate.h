@@ -39,7 +39,7 @@ struct Laminate {
 };
 
 // `layer` from the inner face (mucosa) to the outer one (serosa). Throws InputError naming `where` for moduli, ratios or
-// thicknesses that no material has.
+// thicknesses outside the physical range.
 Laminate laminate(std::span<const Layer> layer, const std::string& where = "wall");
 
 // The four layers of a bowel wall from mucosa to serosa with the given total thickness and mean moduli. Shares of thickness

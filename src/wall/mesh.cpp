@@ -14,7 +14,7 @@ namespace {
 
 size_t corners(const std::array<uint32_t, 4>& face) { return face[3] == kNone ? 3 : 4; }
 
-// Of the least favorable corner: 1 for a rectangle, 0 for a corner of 0 or 180 degrees; below 0 where the quad is not convex.
+// At the worst corner: 1 for a rectangle, 0 for a corner of 0 or 180 degrees; below 0 for a non-convex quad.
 float quad_quality(const Vec3 (&p)[4]) {
   const Vec3 normal = normalized(cross(p[2] - p[0], p[3] - p[1]));
   float worst = 1;
@@ -122,7 +122,7 @@ Mesh from_triangles(std::span<const Vec3> outer, std::span<const Vec3> inner, st
       half[{triangle[t][k], triangle[t][(k + 1) % 3]}] = {t, k};
     }
   struct Join {
-    int rank;  // quality in twentieths, so that nearly equal quads are taken in order
+    int rank;  // quality in steps of 0.05, so that nearly equal quads are taken in order
     uint32_t a, b;
     std::array<uint32_t, 4> face;
   };
@@ -136,7 +136,7 @@ Mesh from_triangles(std::span<const Vec3> outer, std::span<const Vec3> inner, st
       const uint32_t far = triangle[other->second.triangle][(other->second.corner + 2) % 3];
       const std::array<uint32_t, 4> face{i, far, j, triangle[t][(k + 2) % 3]};
       const Vec3 p[4] = {mid(face[0]), mid(face[1]), mid(face[2]), mid(face[3])};
-      // Edges that run around the organ stay edges: rings of the mesh then stay rings.
+      // Edges around the organ are kept, so that rings of the mesh are preserved.
       const float across = std::abs(dot(normalized(p[2] - p[0]), axis));
       const float quality = quad_quality(p) + 0.3f * std::min(across, 0.5f);
       if (quad_quality(p) > 0.4f) join.push_back({static_cast<int>(-20 * quality), t, other->second.triangle, face});

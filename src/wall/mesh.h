@@ -19,7 +19,7 @@ struct Mesh {
   std::vector<Vec3> outer, inner;             // [m] one pair per column
   std::vector<std::array<uint32_t, 4>> face;  // columns, counter-clockwise seen from outside; [3] is kNone for a triangle
   std::vector<Vec3> along;                    // per face: the direction "along" of the laminate
-  std::vector<uint8_t> held;                  // per column: 1 where the surroundings hold it for good
+  std::vector<uint8_t> held;                  // per column: 1 where it is fixed
 };
 
 // Columns in order round each opening, counter-clockwise seen from outside the wall's outer side; the longest rim first.
@@ -45,8 +45,8 @@ struct SheetShape {
 };
 Mesh sheet(const SheetShape& shape);
 
-// Columns and triangles as the bowel generator and the organ import make them; triangles are joined to quads where that gives a
-// well-shaped one. along: the organ's long axis. Throws InputError for lists that do not fit each other.
+// Columns and triangles as the bowel generator and the organ import make them; triangles are joined to well-shaped quads where
+// possible. along: the organ's long axis. Throws InputError for inconsistent lists.
 Mesh from_triangles(std::span<const Vec3> outer, std::span<const Vec3> inner, std::span<const std::array<uint32_t, 3>> triangle,
                     Vec3 along, const std::string& name);
 

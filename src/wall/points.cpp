@@ -54,7 +54,7 @@ Point nearest_point(const Model& m, const State& s, Vec3 p, float zeta) {
     const bool quad = s.topology.corners[block].quads;
     Vec3 c[4];
     for (int k = 0; k < 4; ++k) c[k] = place(at_column(s.topology.corners[block].column[k][in], zeta), s.motion);
-    // Gauss-Newton on the bilinear patch; a few steps suffice for faces that are nearly flat.
+    // Gauss-Newton on the bilinear patch; a few steps suffice for nearly flat faces.
     float xi = quad ? 0 : 0.6f, eta = xi;
     for (int step = 0; step < 6; ++step) {
       const Weights w = weights(m, s.topology, {f, xi, eta, zeta});
@@ -88,7 +88,7 @@ void Inverse::need(const Topology& t, std::span<const Weights> points) {
   }
   ++round_;
   uint32_t missing[4], count = 0;
-  const auto compute = [&] {  // up to four at once, one a lane
+  const auto compute = [&] {  // up to four at once, one per lane
     std::fill(solve_.begin(), solve_.end(), Float4{});
     for (uint32_t i = 0; i < count; ++i) (&solve_[missing[i]].x)[i] = 1;
     solve(t.factor, solve_.data());
@@ -98,7 +98,7 @@ void Inverse::need(const Topology& t, std::span<const Weights> points) {
     }
     count = 0;
   };
-  // Marks first, so that a new column never takes the place of one that is needed now.
+  // Marks first, so that a new column never replaces one that is needed now.
   for (const Weights& w : points)
     for (int k = 0; k < 4; ++k) {
       const uint32_t s = w.weight[k] != 0 ? t.slot[w.column[k]] : kNone;
@@ -187,7 +187,7 @@ void apply_hold(const Model& m, State& s, Scratch& k, Hold& hold) {
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j <= i; ++j)
       a[i * n + j] = static_cast<double>(hold.inverse.compliance(s.topology, hold.point[i], hold.point[j]));
-    // h W p + softness p / h = what is missing; a trace of softness keeps points that move as one from being singular.
+    // h W p + softness p / h = error; a small softness keeps points that move together from being singular.
     a[i * n + i] = a[i * n + i] * (1 + 1e-6) + static_cast<double>(hold.softness) / (static_cast<double>(m.step) * m.step);
     const Vec3 missing = (hold.target[i] - place(hold.point[i], s.motion)) / m.step - velocity(hold.point[i], s.motion);
     for (size_t d = 0; d < 3; ++d) x[3 * i + d] = static_cast<double>(missing[static_cast<int>(d)]);

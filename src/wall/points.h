@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// wall/points: everything acts on the wall through material points and impulses. A point moves as J x; an impulse p on it
+// wall/points: all interaction with the wall through material points and impulses. A point moves as J x; an impulse p on it
 // changes all velocities by A^-1 J^T p. A is a scalar matrix times the unit matrix, so the compliance W = J A^-1 J^T of two
-// points is one number, the same in every direction. A does not turn with the tissue: columns of A^-1 stay valid until the
+// points is one number, independent of direction. A does not rotate with the tissue: columns of A^-1 stay valid until the
 // topology changes.
 #pragma once
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace catgut::wall {
 
-// A place in the material; a cut does not move it. Quad: xi, eta in -1..1 (corner 0 at -1, -1). Triangle: corner 0 at (0, 0),
+// A material point; a cut does not move it. Quad: xi, eta in -1..1 (corner 0 at -1, -1). Triangle: corner 0 at (0, 0),
 // 1 at (2, 0), 2 at (0, 2). zeta: -1 inner face, 0 mid-surface, 1 outer face.
 struct Point {
   uint32_t face = 0;
@@ -37,30 +37,30 @@ Point nearest_point(const Model& model, const State& state, Vec3 p, float zeta);
 // Adds an impulse or force on a point to lists of 2 per column.
 void add_to(Column<Float4>& list, const Weights& w, Vec3 amount);
 
-// Columns of A^-1 for mid-surface points, computed when first asked for and kept. What is kept never changes a result.
+// Columns of A^-1 for mid-surface points, computed on first use and cached. The cache never changes a result.
 class Inverse {
  public:
-  // capacity: columns that can be kept; at least as many as one call of `need` asks for. A small wall keeps all of them.
+  // capacity: cached columns; at least the number requested by one call of `need`. A small wall caches all of them.
   explicit Inverse(uint32_t capacity = 512) : capacity_(capacity) {}
-  // Makes sure that the columns of these points are there; empties everything when the topology has changed.
+  // Computes missing columns of these points; clears the cache when the topology has changed.
   void need(const Topology& topology, std::span<const Weights> points);
-  // [1/kg] between two points whose columns were asked for.
+  // [1/kg] between two points whose columns have been requested.
   float compliance(const Topology& topology, const Weights& a, const Weights& b) const;
-  // The column of a place of the factor, which was asked for.
+  // The column of a slot of the factor, which has been requested.
   const float* column(uint32_t slot) const { return value_.data() + size_t{entry_[slot]} * rows_; }
   uint32_t kept() const { return static_cast<uint32_t>(slot_.size()); }
 
  private:
   uint32_t capacity_, version_ = 0, rows_ = 0, next_ = 0, round_ = 0;
-  std::vector<uint32_t> entry_;        // per slot; kNone: not kept
-  std::vector<uint32_t> slot_, used_;  // per entry: its slot, and the last call that asked for it
+  std::vector<uint32_t> entry_;        // per slot; kNone: not cached
+  std::vector<uint32_t> slot_, used_;  // per entry: its slot, and the last call that requested it
   Column<float> value_;
   Column<Float4> solve_;
 };
 
-// Points that something with smaller steps acts on, such as a thread stepped at 50 us on a wall stepped at 1 ms ("consistent
-// multi-rate"). The wall's step ends at x + h (v + A^-1 J^T sum p): so a point travels through the step at its velocity, and
-// every impulse displaces it as if it acted for the whole step. At the end a point is where the wall arrives.
+// Points of contact with something at smaller steps, such as a thread stepped at 50 us on a wall stepped at 1 ms ("consistent
+// multi-rate"). The wall's step ends at x + h (v + A^-1 J^T sum p): a point therefore moves through the step at its velocity,
+// and every impulse displaces it as if it acted for the whole step. At the end, a point is at the wall's final position.
 //
 //   begin_step(...)                      velocities without the impulses
 //   coupling.begin(...)
@@ -95,7 +95,7 @@ struct Coupling {
   std::vector<Point> material_;
 };
 
-// Points that are led to given places within the step, such as a grip. softness [m/N]: 0 is rigid. Returns forces [N] on the
+// Points with prescribed positions within the step, such as a grip. softness [m/N]: 0 is rigid. Returns forces [N] on the
 // wall in `force`. After begin_step (and Coupling::end), before finish_step.
 struct Hold {
   std::vector<Weights> point;

@@ -20,7 +20,7 @@ constexpr void reflect(auto& a, Like<Topology> auto& t) {
 }
 constexpr void reflect(auto& a, Like<State> auto& s) { a(s.topology), a(s.motion); }
 
-// Contacts last from step to step: their impulses start the next solve.
+// Contacts persist between steps: their impulses start the next solve.
 constexpr void reflect(auto& a, Like<Weights> auto& w) { a(w.column), a(w.weight), a(w.zeta); }
 constexpr void reflect(auto& a, Like<Contact> auto& c) {
   a(c.key), a(c.point), a(c.other), a(c.self), a(c.obstacle), a(c.along), a(c.normal), a(c.gap), a(c.speed), a(c.friction);

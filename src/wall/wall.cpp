@@ -12,7 +12,7 @@ namespace catgut::wall {
 namespace {
 
 constexpr uint32_t kEdge[6][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 2}, {1, 3}};
-// Of h^2 A^-1 K when built. A cut's free edges raise it to about 1.2; the step is stable below 4 / (1 + 2 tau / h) = 2.67.
+// Of h^2 A^-1 K when built. A cut's free edges increase it to about 1.2; the step is stable below 4 / (1 + 2 tau / h) = 2.67.
 constexpr float kLargest = 1.05f;
 
 // Stiffness bound of one element: a graph Laplacian on its corners for mid-surface points, a diagonal for directors.
@@ -91,7 +91,7 @@ void factor_again(const Model& m, Topology& t) {
     if (row[c] != kNone) t.slot[c] = t.factor.place[row[c]];
 }
 
-// Of a short push on one column, relative to its own mass: the median over the columns that move.
+// Response to a short push on one column, relative to its own mass: the median over the columns that move.
 float apparent_mass(const Topology& t) {
   std::vector<float> ratio;
   Column<Float4> x(t.factor.size);
@@ -123,7 +123,7 @@ void respond(const Topology& t, const Float4* p, float scale, Column<Float4>& rh
     store(to[2 * c], load(to[2 * c]) + load(rhs[t.slot[c]]));
     store(to[2 * c + 1], load(to[2 * c + 1]) + load(p[2 * c + 1]) * splat(scale * t.inv_dir[c]));
   }
-  // Copies of a cut column move apart by their own, diagonal part.
+  // Relative motion of the copies of a cut column, through their diagonal part.
   for (size_t g = 0; g + 1 < t.group_first.size(); ++g) {
     Lanes sum = splat(0), mean = splat(0);
     for (uint32_t k = t.group_first[g]; k < t.group_first[g + 1]; ++k)
@@ -309,7 +309,7 @@ void begin_step(const Model& m, State& s, Scratch& k, Jobs& jobs) {
     block_forces(m.block.data(), t.corners.data(), k.y.data(), motion.turn.data(), k.block_force.data(),
                  static_cast<uint32_t>(first), static_cast<uint32_t>(last));
   });
-  // Damped before forces are added: a held force would otherwise carry the damping's factor.
+  // Damped before forces are added: otherwise a held force would be scaled by the damping factor.
   const Lanes keep = splat(std::exp(-m.drag * m.step));
   const Lanes gravity = load(float4(m.gravity));
   jobs.each(columns(s), 256, [&](size_t first, size_t last) {
@@ -334,7 +334,7 @@ void finish_step(const Model& m, State& s, Jobs& jobs) {
   const Lanes h = splat(m.step);
   const float limit2 = m.max_speed * m.max_speed;
   uint64_t clamped = 0;
-  // Counting clamped columns needs an order only if it were not a whole number.
+  // Integer count of clamped columns: independent of the order.
   for (uint32_t c = 0; c < columns(s); ++c) {
     const Vec3 vm = vec3(motion.v[2 * c]), vd = vec3(motion.v[2 * c + 1]);
     const float fastest2 = length2(vm) + length2(vd) + 2 * std::abs(dot(vm, vd));

@@ -8,8 +8,8 @@
 //   impulses of everything else: v += A^-1 J^T p
 //   x = x + h v
 //
-// A resting state has zero force whatever A is, so neither step nor mesh changes the stiffness. L does not act on rigid
-// translation: mass and linear momentum are true. c is chosen at build time so that the largest eigenvalue of h^2 A^-1 K is at
+// A resting state has zero force for any A, so neither step nor mesh changes the stiffness. L does not act on rigid
+// translation: mass and linear momentum are exact. c is chosen at build time so that the largest eigenvalue of h^2 A^-1 K is at
 // most 1.05, and stays below about 1.2 when the wall is cut (the step is stable below 2.67). Frames: positions in the scene's
 // frame, meters, seconds, newtons.
 #pragma once
@@ -28,11 +28,11 @@ struct Spec {
   std::vector<Layer> layer{Layer{}};
   float density = 1050;   // [kg/m^3]
   float step = 0.001f;    // [s]
-  float drag = 5;         // [1/s] of all motion, beside the damping of strain
+  float drag = 5;         // [1/s] of all motion, in addition to the damping of strain
   Vec3 gravity{0, 0, 0};  // [m/s^2]
 };
 
-// What the solver chose, for reports.
+// Parameters chosen by the solver, for reports.
 struct InertiaReport {
   float scale = 0;          // c
   float largest = 0;        // eigenvalue of h^2 A^-1 K
@@ -65,7 +65,7 @@ struct Model {
 struct Motion {
   Column<Float4> x, v;  // [m], [m/s]: mid-surface point and director of each column in turn
   std::vector<BlockTurn> turn;
-  uint64_t clamped = 0;  // columns that met the speed limit, over all steps
+  uint64_t clamped = 0;  // columns at the speed limit, over all steps
 };
 
 // Changes when the wall is cut or factored again. A column that was cut is a group of copies that share a row of the factor.
@@ -88,7 +88,7 @@ struct State {
   Motion motion;
 };
 
-// Workspace: nothing in it lasts from step to step.
+// Workspace: nothing in it persists between steps.
 struct Scratch {
   Column<Float4> y, force, external, answer;
   Column<Float4> rhs;
@@ -109,7 +109,7 @@ inline uint32_t columns(const State& s) { return static_cast<uint32_t>(s.topolog
 inline Vec3 outer(const State& s, uint32_t c) { return vec3(s.motion.x[2 * c]) + vec3(s.motion.x[2 * c + 1]); }
 inline Vec3 inner(const State& s, uint32_t c) { return vec3(s.motion.x[2 * c]) - vec3(s.motion.x[2 * c + 1]); }
 
-// The first half of a step: forces, and velocities that would follow without impulses. scratch.external (2 per column: on
+// The first half of a step: forces, and velocities before impulses. scratch.external (2 per column: on
 // mid-surface point and director, newtons) is added and then cleared.
 void begin_step(const Model& model, State& state, Scratch& scratch, Jobs& jobs);
 // The second half: the speed limit, and positions.
@@ -125,7 +125,7 @@ void elastic_forces(const Model& model, State& state, Scratch& scratch, int turn
 float largest_eigenvalue(const Model& model, const State& state, Scratch& scratch, bool stiff, int iterations = 60);
 
 // Masses, director inertia and gather lists from the corners; then, with `again`, a new factor in which every column has a row
-// of its own. The motion continues undisturbed.
+// of its own. The motion is continuous.
 void renew_topology(const Model& model, Topology& topology, bool again);
 
 }  // namespace catgut::wall
