@@ -11,7 +11,7 @@ float half_bite(const PictureModel& picture, const BiteGuide& g) {
 Pose needle_on(const PictureModel& picture, const BiteGuide& g, float psi, float away) {
   const Vec3 center = g.at + g.out * (picture.suture[0].needle_radius - g.depth + away), up = cross(g.along, g.out);
   const Vec3 x = g.out * std::cos(psi) - g.along * std::sin(psi);
-  // The tip is at the end of the arc: other arcs than a half circle are turned back by what is missing.
+  // The tip is at the end of the arc: arcs other than a half circle are rotated back by the difference.
   return Pose{center, from_axes(x, cross(up, x), up)} * Pose{{}, axis_angle({0, 0, 1}, kPi - picture.suture[0].needle_arc)};
 }
 

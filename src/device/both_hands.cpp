@@ -10,15 +10,15 @@
 namespace catgut {
 namespace {
 
-constexpr float kTautInTissue = 0.9f;  // where nothing but friction holds the thread, and one jerk draws it all through
-constexpr float kLeastLoose = 0.4f;    // the needle is not drawn down into the wound with it
-constexpr float kWindRate = 2.2f;      // [rad/s] no faster, or the strand goes slack or cuts the corner
+constexpr float kTautInTissue = 0.9f;  // where only friction holds the thread, and one jerk would pull it all through
+constexpr float kLeastLoose = 0.4f;    // the needle is not pulled down into the wound with it
+constexpr float kWindRate = 2.2f;      // [rad/s] maximum, or the strand becomes slack or cuts the corner
 constexpr float kOver = 1.5f;          // [rad] beyond whole turns: thread that crosses itself
 constexpr float kGoesOn = 0.012f;      // [m]
 constexpr float kSpeed = 0.15f, kLift = 0.1f, kCareful = 0.06f, kTurn = 4.0f;  // [m/s], [m/s], [rad/s]
-constexpr float kDrawPerRad = 0.012f;                          // [m] that a radian of the gesture draws the hands apart
-constexpr float kGiveInTissue = 0.010f, kGiveAtKnot = 0.002f;  // [m] that a hand may draw at a taut strand
-constexpr float kCounterHold = 0.8f;                           // [N] drawn harder the thread sticks in its holes
+constexpr float kDrawPerRad = 0.012f;                          // [m] per radian of the gesture by which the hands move apart
+constexpr float kGiveInTissue = 0.010f, kGiveAtKnot = 0.002f;  // [m] that a hand may pull a taut strand
+constexpr float kCounterHold = 0.8f;                           // [N] above this the thread sticks in its holes
 
 enum { lift, lay, beside, wind };  // stages of winding
 
@@ -30,7 +30,7 @@ size_t whole_pairs(const Snapshot& seen) {
          static_cast<size_t>(std::count(seen.active().thread_cut.begin(), seen.active().thread_cut.end(), uint8_t{1}));
 }
 
-// The tool that holds the needle by `grip`, when the needle's swage is at a place: its tip up and out of the way, the shaft on
+// The tool that holds the needle by `grip`, given the position of the needle's swage: its tip up and out of reach, the shaft on
 // `side`.
 Pose carrying(const PictureModel& picture, const Pose& grip, Vec3 swage_at, float side) {
   const float u = rotate(grip.q, {0, 0, 1}).z * side >= 0 ? 1.0f : -1.0f;
@@ -41,7 +41,7 @@ Pose carrying(const PictureModel& picture, const Pose& grip, Vec3 swage_at, floa
 
 void go(BothHands& b, int stage) { b.stage = stage, b.held_for = 0; }
 
-// The same way round as before, if there was one.
+// The same sense as before, if any.
 void begin(BothHands& b, const PictureModel& picture, const Snapshot& seen) {
   begin_winding(b.winding, picture, seen);
   b.winding.free = -1;
@@ -82,9 +82,9 @@ void wind_on(BothHands& b, size_t winder, std::array<Pose, 2>& hand, const Pose&
       return;
     default: {
       glide(hand[lying], rest, kCareful, kTurn, dt);
-      // The needle is not hurried on while it lags behind.
+      // The needle waits while it lags behind.
       const float keep_up = std::clamp(1.5f - behind / 0.006f, 0.0f, 1.0f);
-      // Not farther than the next loop: a spiral that continues is none.
+      // No further than the next loop: a continued spiral is not a loop.
       const float next = static_cast<float>(seen.tool[lying].loop_wraps + 1) * 2 * kPi;
       const float most_turn = std::max(next + kOver, w.wound), before = w.wound;
       const float turn = std::clamp(b.wish, -2 * kWindRate * dt, kWindRate * dt * keep_up);
@@ -92,10 +92,10 @@ void wind_on(BothHands& b, size_t winder, std::array<Pose, 2>& hand, const Pose&
       const float turned = w.wound - before;
       b.wish = std::clamp(b.wish - turn, -1.5f * kPi, 1.5f * kPi);
       w.free = std::max(0.006f, w.free - kTieWound * turned);
-      // Wound and no loop yet: its ends lie too far apart along the tool, and are led together.
+      // Wound but not a loop yet: its ends are too far apart along the tool, and are moved together.
       if (w.wound > next + kOver - 0.1f) w.lean = std::max(-2 * kTieLean, w.lean - kTieLean * dt);
       carry(1.2f * kSpeed);
-      // Wound back: what was tried is forgotten, and the tool is laid to the strand again.
+      // Wound back: the attempt is discarded, and the tool is laid to the strand again.
       if (before >= 0 && w.wound < 0) begin(b, picture, seen);
       return;
     }
@@ -107,11 +107,11 @@ void draw_on(const BothHands& b, float amount, size_t needle, std::array<Pose, 2
   const size_t tail = 1 - needle;
   const Vec3 knot = stitch_place(picture, seen);
   Vec3 way[2];
-  if (b.winding.way != 0) {  // a throw: the hands go low and even, each to the side that makes it lie flat
+  if (b.winding.way != 0) {  // a throw: the hands move low and evenly, each to the side that makes it lie flat
     const float x = b.winding.way * side_of(hand[tail]);
     way[tail] = normalized(Vec3{x, 0.35f, 0.1f});
     way[needle] = normalized(Vec3{-x, 0.35f, 0.1f});
-  } else {  // nothing is tied: along the stitch, each end from its own hole
+  } else {  // no knot: along the stitch, each end from its own hole
     Vec3 across{1, 0, 0};
     if (!seen.active().suture_point.empty())
       across = normalized(seen.active().suture_point.back().position - seen.active().suture_point.front().position, across);
@@ -120,11 +120,11 @@ void draw_on(const BothHands& b, float amount, size_t needle, std::array<Pose, 2
   }
   const float most = 0.6f * kSpeed * dt, far = std::clamp(amount * kDrawPerRad, -most, most);
   for (const size_t k : {needle, tail}) {
-    // The harder it pulls back, the slower the hand.
+    // The hand slows in proportion to the tension.
     const float gently = amount > 0 ? std::clamp(1.5f - length(seen.tool[k].force), 0.03f, 1.0f) : 1.0f;
     hand[k].p = on_leash(picture, seen, k, hand[k].p + way[k] * (far * gently));
   }
-  // Before a knot the tail's hand only gives a counter-hold: where both sides are drawn hard the tissue follows instead.
+  // Before a knot, the tail's hand only applies counter-traction: if both sides are pulled hard, the tissue follows instead.
   const size_t held = node_of(seen, seen.tool[tail].held_slot);
   const float pull = held < seen.active().thread_tension.size() ? seen.active().thread_tension[held] : 0;
   if (b.winding.way == 0 && pull > kCounterHold) hand[tail].p += normalized(knot - hand[tail].p) * (0.3f * kSpeed * dt);
@@ -137,7 +137,7 @@ Vec3 on_leash(const PictureModel& picture, const Snapshot& seen, size_t who, Vec
   if (seen.active().suture_point.empty() || seen.active().thread_tension.empty()) return p;
   const size_t first = first_point_node(seen), last = last_point_node(seen);
   size_t held = seen.active().thread_order.size() - 1;
-  Vec3 end = tool.pose.p;  // what the hand holds the thread by
+  Vec3 end = tool.pose.p;  // where the hand holds the thread
   if (tool.held == Held::needle && !seen.active().needle.in_tissue && seen.active().needle_on_thread)
     end = needle_swage(picture, seen);
   else if (tool.held == Held::thread) held = node_of(seen, tool.held_slot);
@@ -145,7 +145,7 @@ Vec3 on_leash(const PictureModel& picture, const Snapshot& seen, size_t who, Vec
   if (held >= first && held <= last) return p;
   size_t from = held < first ? first : last;
   Vec3 anchor = node_at(seen, from);
-  if (!seen.active().knot.empty()) {  // a knot holds it: there is what leaves the knot, and nothing slides
+  if (!seen.active().knot.empty()) {  // a knot holds it: the strands that leave the knot cannot slide
     const Vec3 knot = seen.active().knot.back().position;
     const size_t begin = held < first ? held : last, end_node = held < first ? first : held;
     for (size_t i = begin; i <= end_node; ++i)
@@ -182,7 +182,7 @@ BothDo both_hands(BothHands& b, float amount, std::array<Pose, 2>& hand, const P
     draw_on(b, amount, needle, hand, picture, seen, dt);
     return b.doing;
   }
-  // Taken up again where it was left, unless the tool has gone elsewhere meanwhile.
+  // Resumed where it was left, unless the tool has moved elsewhere meanwhile.
   const bool goes_on = b.doing == BothDo::wind && distance(hand[other].p, b.lain) < kGoesOn;
   if (!goes_on) {
     b.doing = BothDo::wind;
@@ -190,7 +190,7 @@ BothDo both_hands(BothHands& b, float amount, std::array<Pose, 2>& hand, const P
     begin(b, picture, seen);
     b.lain = hand[other].p;
   }
-  // The first motion chooses the way round; until then the hands stand ready for either.
+  // The first motion selects the sense; until then the hands are ready for either.
   if (b.winding.way == 0) {
     if (amount == 0) return b.doing;
     b.winding.way = amount > 0 ? 1.0f : -1.0f;

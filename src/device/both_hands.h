@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// device: what takes two hands at once, for people who can move only one of them: laying the needle's strand round the other
-// tool, and drawing both ends apart. One motion says how far; where the hands go follows from what is seen and felt. Pure, like
-// device/steer, which calls it. An instrument tie as docs/rooms/surgeon.md describes it.
+// device: two-handed actions for users who can move only one hand at a time: winding the needle's strand round the other
+// tool, and pulling both ends apart. One gesture gives the amount; the paths of the hands follow from the Snapshot. Pure, like
+// device/steer, which calls it. An instrument tie as described in docs/rooms/surgeon.md.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -14,36 +14,36 @@ namespace catgut {
 
 enum class BothDo : uint8_t { nothing, wind, draw };
 
-// What the two hands are about, kept from one call to the next.
+// State of a two-handed action, kept between calls.
 struct BothHands {
   BothDo doing = BothDo::nothing;
   int stage = 0;         // of winding: see both_hands.cpp
-  float wish = 0;        // [rad] still asked for
-  Winding winding;       // way 0: nothing was wound yet
+  float wish = 0;        // [rad] remaining of the gesture
+  Winding winding;       // way 0: not started
   float held_for = 0;    // [s] in this stage
-  Vec3 lain;             // [m] where winding last left the tool that is wound round
-  bool follows = false;  // the needle's hand goes along with the tool that carries the loop
+  Vec3 lain;             // [m] last position of the tool that is wound round
+  bool follows = false;  // the needle's hand follows the tool that carries the loop
 };
 
-// hand: tool poses as the hands have them, moved here by what dt allows. grip: of the hand that holds the needle, tool in the
-// needle's frame. amount: [rad] of the gesture, more or less; the sign chooses the way when winding begins. Says what was done:
-// nothing, when the hands do not hold what it takes.
+// hand: tool poses of the hands, moved here within the limits of dt. grip: of the hand that holds the needle, tool in the
+// needle's frame. amount: [rad] of the gesture; its sign selects the sense when winding starts. Returns what was done:
+// nothing, if the hands do not hold what is needed.
 BothDo both_hands(BothHands& b, float amount, std::array<Pose, 2>& hand, const Pose& grip, const PictureModel& picture,
                   const Snapshot& seen, float dt);
 
-// While tool `who` carries a loop: the other hand, with the needle, goes along above it, its strand loose.
+// While tool `who` carries a loop: the other hand, with the needle, follows above it, its strand slack.
 void go_along(BothHands& b, size_t who, std::array<Pose, 2>& hand, const Pose& grip, const PictureModel& picture,
               const Snapshot& seen, float dt);
 
-// Where hand `who` best takes the tail of the thread: clear of the other strand, no tissue in the way of its shaft, near the
-// knot, within what the loop on it leaves. False: there is no tail.
+// Best position for hand `who` to grasp the tail of the thread: clear of the other strand, no tissue in the path of its shaft,
+// near the knot, within the range of the loop on it. False: there is no tail.
 bool tail_grip(const PictureModel& picture, const Snapshot& seen, size_t who, TailGrip& out);
 
-// A hand that feels nothing would tear a stitch with one jerk: what holds an end of the thread comes no more than a little
-// farther from the tissue than that end is long. p: where hand `who` would be.
+// Without force feedback a jerk would tear a stitch: a hand that holds an end of the thread is limited to slightly more than
+// that end's length from the tissue. p: target of hand `who`.
 Vec3 on_leash(const PictureModel& picture, const Snapshot& seen, size_t who, Vec3 p);
 
-// Toward `goal` by at most speed [m/s] and turn [rad/s]; true when it is there.
+// Toward `goal` by at most speed [m/s] and turn [rad/s]; true on arrival.
 bool glide(Pose& pose, const Pose& goal, float speed, float turn, float dt);
 
 }  // namespace catgut

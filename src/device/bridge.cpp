@@ -45,7 +45,7 @@ int bridge_socket(const std::string& where, bool bind_it, std::string& why, bool
     return -1;
   }
   int fd = -1;
-  // Of a name that has addresses of both kinds the older one: on it `catgut bridge` listens unless an address is given.
+  // Of a name with both kinds of addresses, IPv4: `catgut bridge` listens on it by default.
   std::vector<const addrinfo*> order;
   for (const addrinfo* a = found; a; a = a->ai_next) order.insert(a->ai_family == AF_INET ? order.begin() : order.end(), a);
   for (const addrinfo* a : order) {
@@ -60,7 +60,7 @@ int bridge_socket(const std::string& where, bool bind_it, std::string& why, bool
     }
   }
   freeaddrinfo(found);
-  if (fd >= 0 && local) {  // of the address that is listened on, or sent to
+  if (fd >= 0 && local) {  // of the address listened on, or sent to
     sockaddr_storage at{};
     socklen_t bytes = sizeof at;
     if (bind_it) getsockname(fd, reinterpret_cast<sockaddr*>(&at), &bytes);
@@ -74,7 +74,7 @@ int bridge_socket(const std::string& where, bool bind_it, std::string& why, bool
 namespace {
 
 constexpr uint64_t kHandshakeTime = 1000000000;  // [ns]
-constexpr uint64_t kAskEvery = 50000000;         // [ns] an ask says that the simulator is there, whatever its physics does
+constexpr uint64_t kAskEvery = 50000000;         // [ns] an ask reports that the simulator is alive, whatever its physics does
 enum PortError : uint32_t { kSilent = 1, kTheirs = 2, kRefused = 3 };
 
 uint64_t now_ns() {
@@ -84,15 +84,15 @@ uint64_t now_ns() {
 
 struct End {
   Latest<ForcePatch> patch;  // physics -> thread
-  // The thread's.
+  // Owned by the thread.
   uint64_t heard_ns = 0, stepped_ns = 0;
-  uint32_t count = 0;  // of samples given to the callback
+  uint32_t count = 0;  // of samples passed to the callback
   bool fresh = false;
   ArmSample sample;
-  // For any thread.
+  // Readable from any thread.
   std::atomic<bool> ready{false};
   std::atomic<uint32_t> error{0}, errors{0}, faults{0};
-  std::atomic<float> force{0};  // [N] that the arm's end wrote last
+  std::atomic<float> force{0};  // [N] last written by the device server
   std::atomic<uint64_t> steps{0};
 };
 
@@ -104,7 +104,7 @@ struct Bridge {
   ArmCallback callback;
   std::thread thread;
   std::atomic<bool> stopping{false};
-  // The thread's, and while opening the opener's.
+  // Owned by the thread; while opening, by the opener.
   BridgeCaller caller;
   BridgeKey in{}, out{};
   bool opened = false, has_cookie = false;
@@ -115,11 +115,11 @@ struct Bridge {
   uint32_t refused = 0;
   uint16_t their_version = 0;
   BridgeCounts count;
-  // For any thread: the above, copied once per round.
+  // Readable from any thread: the above, copied once per round.
   std::atomic<uint64_t> accepted{0}, garbage{0}, version{0}, forged{0}, invalid{0}, unknown_peer{0}, old{0};
 };
 
-// Lost packets are the other end's watchdog's business: nothing is waited for, only the handshake is repeated.
+// The server's watchdog handles lost packets: nothing blocks here, only the handshake is repeated.
 void post(const Bridge& b, const BridgeBytes& packet) {
   [[maybe_unused]] const ssize_t n = ::send(b.fd, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
 }
@@ -210,10 +210,10 @@ void take_one(Bridge& b, const uint8_t* data, size_t size) {
 }
 
 void take(Bridge& b) {
-  uint8_t data[kBridgeBytes + 1];  // one more: what is too long is seen to be
-  for (int k = 0; k < 64; ++k) {   // a flood must not keep the hands from their millisecond
+  uint8_t data[kBridgeBytes + 1];  // one byte more, to detect oversized packets
+  for (int k = 0; k < 64; ++k) {   // a flood must not delay the hands
     const ssize_t n = recv(b.fd, data, sizeof data, MSG_DONTWAIT);
-    if (n < 0 && errno != ECONNREFUSED) return;  // nothing more; a refusal by the system is only silence
+    if (n < 0 && errno != ECONNREFUSED) return;  // no packet; an error from the system counts as silence
     if (n >= 0) take_one(b, data, static_cast<size_t>(n));
   }
 }
@@ -229,11 +229,11 @@ bool silent(const Bridge& b, const End& e, uint64_t now) {
 
 void serve(Bridge& b, size_t k, uint64_t now) {
   End& e = b.end[k];
-  // While it is silent the servo still gets its millisecond, and sees that there is no arm.
+  // Without samples the servo still runs every millisecond, and receives an absent device.
   if (e.fresh || (silent(b, e, now) && now >= e.stepped_ns + 1000000)) {
     if (!e.fresh) e.sample = {};
     e.sample.sequence = ++e.count;
-    b.callback.step(b.callback.user, k, e.sample);  // the force is the arm's end's to compute
+    b.callback.step(b.callback.user, k, e.sample);  // the device server computes the force
     if (e.fresh && e.sample.state == ArmState::ready) e.ready.store(true, std::memory_order_relaxed);
     else fail(e, e.fresh ? kTheirs : kSilent);
     e.fresh = false;
@@ -264,7 +264,7 @@ void run(Bridge& b) {
     b.invalid = b.count.invalid, b.unknown_peer = b.count.unknown_peer, b.old = b.count.old;
     if (b.opened && now > b.said_ns + kAskEvery) send_sealed(b, BridgeKind::ask, 0, {});
     if (!all_silent || now < b.called_ns + static_cast<uint64_t>(1e9 * double{b.options.again_after})) continue;
-    // A handshake takes two round trips: it is begun again only when it has had the time for them.
+    // A handshake takes two round trips: it is repeated only after that time.
     if (b.opened && now < b.opened_ns + kHandshakeTime) send_sealed(b, BridgeKind::ask, 0, {}), b.called_ns = now;
     else call(b, b.opened || now > b.begun_ns + kHandshakeTime);
   }
@@ -279,7 +279,7 @@ bool start_bridge(void* self, const ArmCallback& callback, std::string&) {
   return true;
 }
 
-// The arm's end takes the force off through its own slew when it hears bye, or nothing more.
+// The device server reduces the force through its own slew after bye, or after silence.
 void stop_bridge(void* self) {
   Bridge& b = *static_cast<Bridge*>(self);
   if (b.thread.joinable()) {

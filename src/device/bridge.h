@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// device: an arm that hangs on another machine, or is driven by a program in another language, over UDP. Here is the
-// simulator's end; the packets and their cryptography are in device/bridge_packet, the arm's end is runtime/arm_server
-// (`catgut bridge`), or whatever speaks that layout, as samples/bridge_arm.py does.
+// device: a device on another machine, or driven by a program in another language, over UDP. This is the simulator's
+// side; the packets and their cryptography are in device/bridge_packet, the device server is runtime/arm_server
+// (`catgut bridge`), or any program with that packet layout, such as samples/bridge_arm.py.
 //
-// The arm's end owns the millisecond: it sends a sample of each arm, and evaluates the newest ForcePatch at 1 kHz where the
-// motors are. No force crosses the network, so its delay makes the tissue older, not the spring livelier. What is not renewed
-// within 30 ms by the arm's clock fades there; the simulator may crash at any moment.
+// The device server runs the 1 kHz loop: it sends a sample of each device, and evaluates the newest ForcePatch next to the
+// motors. No force crosses the network, so delay makes the tissue older, not the spring unstable. A patch that is not renewed
+// within 30 ms by the server's clock fades there; the simulator may crash at any moment.
 #pragma once
 #include <string>
 #include <vector>
@@ -15,19 +15,19 @@
 
 namespace catgut {
 
-// An UDP socket of "HOST[:PORT]" ("[::1]:PORT" for numbers of IPv6), bound to it or connected to it; -1, and why. local: both
+// A UDP socket for "HOST[:PORT]" ("[::1]:PORT" for IPv6 addresses), bound or connected to it; -1, and the reason. local: both
 // ends are on this machine's loopback.
 int bridge_socket(const std::string& where, bool bind_it, std::string& why, bool* local = nullptr);
 
 struct BridgeOptions {
   std::string where;         // "HOST[:PORT]"; empty: CATGUT_BRIDGE when it is set, else this machine
-  std::string key;           // file with the key that both ends share; empty: CATGUT_BRIDGE_KEY; loopback needs none
+  std::string key;           // file with the shared key; empty: CATGUT_BRIDGE_KEY; loopback needs none
   float patience = 0.25f;    // [s] for an answer
-  float forget = 0.02f;      // [s] without a sample: the arm is lost
-  float again_after = 0.1f;  // [s] between hellos while it is
+  float forget = 0.02f;      // [s] without a sample: the device is lost
+  float again_after = 0.1f;  // [s] between hellos while it is lost
 };
-// The simulator's end. `reported` gets a line when no one answers, or not as hoped. Its peer is asked for its arms
-// again whenever they fall silent, so that it may be restarted.
+// The simulator's side. `reported` receives a line when there is no answer, or an unexpected one. The peer is asked for its
+// devices again whenever it falls silent, so that it may be restarted.
 ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& messages);
 BridgeCounts bridge_counts(const ArmPort& port);  // of a port that open_bridge made
 

@@ -26,7 +26,7 @@ static_assert(crypto_aead_xchacha20poly1305_ietf_ABYTES == kTag && crypto_scalar
 
 [[maybe_unused]] const int kSodium = sodium_init();
 
-// Byte by byte, so that it is little endian wherever this runs.
+// Byte by byte: little endian on every machine.
 template <typename T>
 void put(uint8_t* at, T value) {
   for (size_t k = 0; k < sizeof(T); ++k) at[k] = static_cast<uint8_t>(value >> (8 * k));
@@ -59,7 +59,7 @@ std::string get_text(const uint8_t* at) {
   return s;
 }
 
-// Finite, and within what squares without overflow.
+// Finite, and within a range that squares without overflow.
 bool floats_are_sane(const BridgePayload& p, size_t from, size_t count) {
   for (size_t k = 0; k < count; ++k)
     if (!(std::abs(get_float(&p[from + 4 * k])) <= 1e6f)) return false;
@@ -203,7 +203,7 @@ BridgeBytes opened_packet(const BridgeDoor& d, const uint8_t* open, BridgeKey& i
   BridgeKey own;
   crypto_scalarmult_base(own.data(), secret.data());
   if (!session_keys(d.shared, secret, open + 16, open + 16, own.data(), open + 48, in, out))
-    in = random_key(), out = random_key();  // no one has these: such a session stays silent
+    in = random_key(), out = random_key();  // unknown to everyone: such a session stays silent
   return handshake(d.shared, BridgeKind::opened, open + 16, own.data());
 }
 
@@ -262,7 +262,7 @@ bool read_info(const BridgePayload& p, ArmInfo& a) {
 void write_sample(const ArmSample& s, Vec3 force, uint32_t faults, BridgePayload& p) {
   p.fill(0);
   put(&p[0], s.time_ns);
-  // A sample with a number that is none travels as what it is worth: an absent arm.
+  // A sample with an invalid number is sent as an absent device.
   const bool ready = s.state == ArmState::ready && is_finite(s.pose.p) && is_finite(s.velocity) && std::isfinite(s.warmth) &&
                      std::isfinite(s.pose.q.x + s.pose.q.y + s.pose.q.z + s.pose.q.w);
   put(&p[8], uint32_t{ready} | (s.forced_off ? 2u : 0u));

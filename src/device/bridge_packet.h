@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// device: the packets of the bridge, version 2, and the cryptography around them (libsodium). No socket, no clock, no state but
-// what is handed in. The layout is a promise to programs in other languages; samples/bridge_arm.py is one.
+// device: the packets of the bridge, version 2, and the cryptography around them (libsodium). No socket, no clock, no state
+// except the arguments. The layout is a contract with programs in other languages; samples/bridge_arm.py is one.
 //
 // Every packet has 256 bytes, little endian, unused bytes zero:
 //     0 u32 magic 0x42474143 ("CAGB")   4 u16 version 2   6 u8 kind   7 u8 arm: 0 right, 1 left   8 u64 counter
@@ -9,17 +9,17 @@
 // Both ends share a key of 32 bytes (32 zero bytes on the loopback, where none is needed). Handshake packets travel in clear;
 // their tag is BLAKE2b-128, keyed with the shared key, of the 240 bytes before it:
 //   hello (1), simulator: 16 its X25519 public key of this session, S
-//   cookie (2), arm: 16 S; 48 cookie, 32 bytes, that only the sender's address makes valid; the arm keeps nothing of it
+//   cookie (2), arm: 16 S; 48 cookie, 32 bytes, valid only for the sender's address; the server stores nothing
 //   open (3), simulator: 16 S; 48 the cookie
 //   opened (4), arm: 16 S; 48 the arm's X25519 public key A
-//   refused (5), arm: 16 u32 1 another version is spoken here (see the head), 2 another simulator has the arms
+//   refused (5), arm: 16 u32 1 the server uses another version (see the head), 2 another simulator has the devices
 // Until here no end sends more bytes than it has received. Keys of the session: BLAKE2b-256, keyed with the shared key, of
 // X25519(S, A) || S || A || cookie || direction (1 to the arm, 2 to the simulator).
 //
 // All others are sealed: XChaCha20-Poly1305 with the direction's key, the nonce is 16 zero bytes and the counter, the head is
-// authenticated with the payload. A sender's counter grows with every packet; a receiver takes a packet of a kind and arm only
-// when its counter is larger than that of the last one, so what is repeated, or overtaken, is dropped.
-//   ask (6), simulator: answered by an info for each arm; also says that the simulator is there
+// authenticated with the payload. A sender's counter grows with every packet; a receiver accepts a packet of a kind and device
+// only if its counter is larger than that of the last one. Repeated or overtaken packets are dropped.
+//   ask (6), simulator: answered by an info for each device; also reports that the simulator is alive
 //   info (7), arm: 0 u32 present; f32: 4 force, 8 continuous, 12 stiffness, 16 damping, 20 least x3, 32 most x3 [m];
 //       char x40, ending in zero: 44 name, 84 model, 124 serial, 164 driver
 //   sample (8), arm: 0 u64 time [ns] on the arm's clock; 8 u32 1 ready + 2 forced off; 12 u32 buttons; f32: 16 position x3 [m],
@@ -29,7 +29,7 @@
 //       16 u32 epoch, 20 u32 topology; f32: 24 period, 28 expiry, 32 point x3, 44 force x3, 56 stiffness and 80 damping (xx yy
 //       zz xy xz yz), 104 normal x3, 116 gap, 120 coefficient, 124 drag, 128 presliding, 132 viscous, 136 along x3, 148 pierce
 //       x3, 160 pierce_force, 164 pierce_keep, 168 cap
-//   bye (10), either end: force off, the arms are free
+//   bye (10), either end: force off, the devices are free
 #pragma once
 #include <array>
 #include <cstdint>
@@ -57,24 +57,24 @@ struct BridgeHead {
   uint64_t counter = 0;
 };
 
-// What came in since the beginning, by what was done with it.
+// Received packets since the start, by result.
 struct BridgeCounts {
   uint64_t accepted = 0;
   uint64_t garbage = 0;       // wrong size or magic
   uint64_t version = 0;       // another version's
   uint64_t forged = 0;        // the tag is not that of the key
-  uint64_t invalid = 0;       // rightly sealed, but a number that no arm has, or a kind that this end does not take
+  uint64_t invalid = 0;       // authentic, but with an invalid number, or of a kind that this side does not accept
   uint64_t unknown_peer = 0;  // another sender's
-  uint64_t old = 0;           // repeated, overtaken, or too old to be believed
+  uint64_t old = 0;           // repeated, overtaken, or expired
   uint64_t dropped() const { return garbage + version + forged + invalid + unknown_peer + old; }
 };
 
 enum class BridgeFault : uint8_t { none, garbage, version, invalid };
-// Whether `size` bytes have the form of a packet; `head` is filled when the fault is none or version. Any bytes may be given.
+// Whether `size` bytes have the form of a packet; `head` is filled when the fault is none or version. Accepts any bytes.
 BridgeFault read_head(const uint8_t* data, size_t size, BridgeHead& head);
 inline bool is_handshake(BridgeKind k) { return k <= BridgeKind::refused; }
 
-// --- sealed packets: neither allocates; any thread ---
+// --- sealed packets: no allocation; callable from any thread ---
 void seal(const BridgeKey& key, const BridgeHead& head, const BridgePayload& payload, BridgeBytes& out);
 bool unseal(const BridgeKey& key, const uint8_t* packet, BridgePayload& payload);  // false: forged
 
@@ -103,11 +103,11 @@ bool cookie_is_right(const BridgeDoor& d, const uint8_t* open, const void* addre
 BridgeKey caller_key(const uint8_t* packet);  // S
 BridgeBytes opened_packet(const BridgeDoor& d, const uint8_t* open, BridgeKey& in, BridgeKey& out);
 
-// The key of a file: 32 bytes, or 64 hexadecimal digits; readable by its owner alone. Throws InputError.
+// The key of a file: 32 bytes, or 64 hexadecimal digits; readable by its owner only. Throws InputError.
 BridgeKey read_bridge_key(const std::string& file);
-void write_bridge_key(const std::string& file);  // a new one, mode 600; never over an old one
+void write_bridge_key(const std::string& file);  // a new one, mode 600; never overwrites
 
-// --- payloads; `false`: a number that no arm has ---
+// --- payloads; `false`: an invalid number ---
 void write_info(const ArmInfo& info, BridgePayload& out);
 bool read_info(const BridgePayload& in, ArmInfo& info);
 void write_sample(const ArmSample& sample, Vec3 force, uint32_t faults, BridgePayload& out);

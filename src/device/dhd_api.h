@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// device: the part of Force Dimension's library (libdhd) that we call: our own declarations of its names, types and numbers, so
-// that neither its headers nor its license are needed to build. docs/references.md (DHD) says where each comes from.
+// device: the part of Force Dimension's library (libdhd) that is used: own declarations of its names, types and numbers, so
+// that building needs neither its headers nor its license. docs/references.md (DHD) states the source of each.
 //
-// Traps: ids are a plain `char`, and what answers yes or no is one byte (bool), whose upper three are rubbish in a register;
-// the status array grew from 13 to more than 16 entries over the versions, and the library fills its own idea of it; a result
-// of 1 (time guard) is no error; a rotation is [row][column]; its base frame is x toward the user, y right, z up.
+// Pitfalls: ids are a plain `char`, and boolean results are one byte, whose upper three are undefined in a register;
+// the status array grew from 13 to more than 16 entries over the versions, and the library fills as many as it knows; a result
+// of 1 (time guard) is not an error; a rotation is [row][column]; its base frame is x toward the user, y right, z up.
 #pragma once
 #include <array>
 #include <cstddef>

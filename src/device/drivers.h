@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// device: the drivers of haptic arms there are. The one list: the command line, `catgut devices` and the help read it.
+// device: the list of backends for haptic devices. The command line, `catgut devices` and the help read it.
 #pragma once
 #include <span>
 
@@ -8,10 +8,10 @@
 namespace catgut {
 
 struct ArmDriver {
-  const char* word;   // as people choose it
-  const char* arms;   // what it drives, for people
-  const char* where;  // what may follow the word after a colon, for people; "": the driver takes nothing
-  // `reported` gets a line for whatever is missing; the port has no arms when there is nothing to work with.
+  const char* word;   // on the command line
+  const char* arms;   // supported devices, for display
+  const char* where;  // optional part after a colon, for display; "": none
+  // `reported` receives a line for each missing prerequisite; the port then has no devices.
   ArmPort (*open)(const std::string& where, std::vector<std::string>& messages);
 };
 std::span<const ArmDriver> arm_drivers();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// device/force_dimension: see the header. Below, Arm's members say which thread may use them.
+// device/force_dimension: see the header. Comments below state which thread may use Arm's members.
 #include "device/force_dimension.h"
 
 #include <dlfcn.h>
@@ -19,15 +19,15 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr float kStopStep = 0.5f;                   // [N] per millisecond on the way down (the limiter's slew rate)
-constexpr uint32_t kStatusEvery = 20;               // [ms] between looks at whether the firmware has cut the force
-constexpr uint32_t kEnableEvery = 250;              // [ms] between tries to switch it on again
-constexpr auto kReopenEvery = 500ms;                // of a lost arm
-constexpr auto kHangsAfter = 300ms;                 // a thread that does not end by then is left behind
-constexpr double kShut = 0.004, kOpen = 0.018;      // [m] gap between which the jaw follows the fingers
-constexpr double kClosed = 0.007, kOpened = 0.011;  // [m] gap of a gripper that counts as pressed, and as let go again
+constexpr float kStopStep = 0.5f;                   // [N] per millisecond while stopping (the limiter's slew rate)
+constexpr uint32_t kStatusEvery = 20;               // [ms] between checks whether the firmware has cut the force
+constexpr uint32_t kEnableEvery = 250;              // [ms] between attempts to switch it on again
+constexpr auto kReopenEvery = 500ms;                // of a lost device
+constexpr auto kHangsAfter = 300ms;                 // a thread that does not end by then is abandoned
+constexpr double kShut = 0.004, kOpen = 0.018;      // [m] gap range over which the jaw follows the fingers
+constexpr double kClosed = 0.007, kOpened = 0.011;  // [m] gap of a gripper that counts as pressed, and as released
 
-// Their axes (x toward the user, y right, z up) in ours (x right, y up, z toward the user), and back.
+// Their axes (x toward the user, y right, z up) to ours (x right, y up, z toward the user), and back.
 Vec3 ours(double x, double y, double z) { return {static_cast<float>(y), static_cast<float>(z), static_cast<float>(x)}; }
 
 struct Arm {
@@ -35,21 +35,21 @@ struct Arm {
   int index = 0;     // among the library's devices; constant
   size_t hand = 0;
   bool paced = true, gripper = false;
-  // The thread's, and before it runs the opener's.
+  // Owned by the thread; before it runs, by the opener.
   dhd::Id id = -1;
   ArmCallback callback;
   uint32_t sequence = 0, cut_for = 0;
   bool forced_off = false, closed = false;
   Vec3 force;  // [N] last written, our frame
   std::chrono::steady_clock::time_point reopen_at;
-  // For any thread.
+  // Readable from any thread.
   std::atomic<bool> ready{false}, stopping{false}, stopped{true};
-  std::atomic<bool> calling{false}, left{false};  // left: the port is gone, the callback with it
+  std::atomic<bool> calling{false}, left{false};  // left: the port was destroyed, and its callback
   std::atomic<uint32_t> error{0}, errors{0};
   std::atomic<uint64_t> steps{0};
 };
 
-// The thread holds its arm, too: one that hangs in the library outlives the port.
+// The thread shares ownership of its Arm: one that hangs in the library outlives the port.
 struct ForceDimension {
   dhd::Library dhd;
   std::array<std::shared_ptr<Arm>, 2> arm;
@@ -58,7 +58,7 @@ struct ForceDimension {
 
 std::string text(const char* s) { return s ? s : ""; }
 
-// Ready for use, or why not. Called again when an arm comes back.
+// Checks that the device is ready, or reports why not. Called again when a device returns.
 bool prepare(Arm& a, std::string& why) {
   int status[dhd::kStatusRoom] = {};
   if (a.dhd.dhdGetStatus(status, a.id) == dhd::kError) {
@@ -69,7 +69,7 @@ bool prepare(Arm& a, std::string& why) {
     why = "not calibrated: run HapticInit of the SDK, or calibrate as in its manual, and try again";
     return false;
   }
-  // Expert mode is needed for the watchdog alone and is left at once: it would also let wrong calls through.
+  // Expert mode is needed only for the watchdog and is left at once: it would also allow invalid calls.
   const bool watched =
       a.dhd.dhdEnableExpertMode() != dhd::kError && a.dhd.dhdSetWatchdog(dhd::kWatchdogMost, a.id) != dhd::kError;
   a.dhd.dhdDisableExpertMode();
@@ -90,11 +90,11 @@ bool read(Arm& a, ArmSample& s) {
   double p[3] = {}, v[3] = {}, m[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   if (a.dhd.dhdGetPosition(&p[0], &p[1], &p[2], a.id) == dhd::kError) return false;
   if (a.dhd.dhdGetOrientationFrame(m, a.id) == dhd::kError) return false;
-  // Right after opening the velocity has no history and is an error: none, then.
+  // Directly after opening the velocity has no history and returns an error: use zero.
   if (a.dhd.dhdGetLinearVelocity(&v[0], &v[1], &v[2], a.id) == dhd::kError) v[0] = v[1] = v[2] = 0;
   s.pose.p = ours(p[0], p[1], p[2]);
   s.velocity = ours(v[0], v[1], v[2]);
-  // The columns are the tool's axes in the base frame. The tool's own axes are named as the base's are: its y is our tool's x.
+  // The columns are the tool's axes in the base frame. The tool's own axes are named like the base's: its y is our tool's x.
   const auto column = [&m](int k) { return ours(m[0][k], m[1][k], m[2][k]); };
   s.pose.q = from_axes(normalized(column(1), {1, 0, 0}), normalized(column(2), {0, 1, 0}), normalized(column(0), {0, 0, 1}));
   for (int k = 0; k < 2; ++k)
@@ -111,8 +111,8 @@ bool read(Arm& a, ArmSample& s) {
     const int cause = status[dhd::kStatusForceOffCause];
     a.forced_off = !status[dhd::kStatusForce];
     a.cut_for = a.forced_off ? a.cut_for + kStatusEvery : 0;
-    // What the firmware cut because we were late or the hand was fast comes back (and then through the servo's ramp); what
-    // a user switched off at the arm stays off until he switches it on.
+    // A force cut by the firmware (late calls, a fast hand) is switched on again, through the servo's ramp. A force that the
+    // user switched off at the device stays off until it is switched on there.
     if (a.cut_for >= kEnableEvery && (cause == dhd::kCauseWatchdog || cause == dhd::kCauseVelocity))
       a.dhd.dhdEnableForce(dhd::kOn, a.id), a.cut_for = 0;
   }
@@ -135,7 +135,7 @@ void lose(Arm& a) {
   a.reopen_at = std::chrono::steady_clock::now() + kReopenEvery;
 }
 
-// A lost arm may have been unplugged: its number is void, and it has to be opened again.
+// A lost device may have been unplugged: its id is invalid, and it has to be opened again.
 void find_again(Arm& a) {
   if (std::chrono::steady_clock::now() < a.reopen_at) return;
   a.reopen_at = std::chrono::steady_clock::now() + kReopenEvery;
@@ -148,7 +148,7 @@ void find_again(Arm& a) {
   a.id = -1;
 }
 
-// One millisecond of one arm.
+// One millisecond of one device.
 void serve(Arm& a) {
   ArmSample s;
   s.sequence = ++a.sequence;
@@ -156,7 +156,7 @@ void serve(Arm& a) {
   const bool here = a.id >= 0;
   bool fine = here && read(a, s);
   if (!fine) s = {}, s.sequence = a.sequence;
-  // Between these two marks the callback's owner is not destroyed (see stop).
+  // The callback's owner is not destroyed between these two marks (see stop).
   a.calling = true;
   Vec3 force;
   if (!a.left) force = a.callback.step(a.callback.user, a.hand, s);
@@ -208,7 +208,7 @@ void stop(void* self) {
       f.thread[k].join();
       continue;
     }
-    // It hangs in the library; the arm's watchdog has taken the force off long ago. It will find no one to call.
+    // It hangs in the library; the device's watchdog has switched the force off. Its callback is disabled.
     a.left = true;
     while (a.calling) std::this_thread::yield();
     f.thread[k].detach();
@@ -302,7 +302,7 @@ ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<s
     unsigned short serial = 0;
     if (dhd.dhdGetSerialNumber(&serial, a->id) != dhd::kError) info.serial = "fd-" + std::to_string(serial);
     info.driver = std::to_string(version[0]) + "." + std::to_string(version[1]) + "." + std::to_string(version[2]);
-    // The library does not report its devices' limits; these are those of CHAI3D's CDeltaDevices.cpp (docs/references.md).
+    // The library does not report its devices' limits; these are from CHAI3D's CDeltaDevices.cpp (docs/references.md).
     const int type = dhd.dhdGetSystemType(a->id);
     const bool falcon = type == dhd::kTypeFalcon, delta = type == dhd::kTypeDelta3 || type == dhd::kTypeOldDelta3;
     info.limits = limits_of(falcon ? "falcon" : delta ? "delta" : info.model, {falcon ? 8.0f : delta ? 20.0f : 12.0f, 0, 0, 0});

@@ -7,12 +7,12 @@
 namespace catgut {
 namespace {
 
-constexpr float kDead = 0.15f;      // of a stick's way: worn sticks do not settle at zero
-constexpr float kSpeed = 0.08f;     // [m/s] with the stick all the way
+constexpr float kDead = 0.15f;      // fraction of a stick's range: worn sticks do not settle at zero
+constexpr float kSpeed = 0.08f;     // [m/s] at full deflection
 constexpr float kTurnSpeed = 2.0f;  // [rad/s]
 constexpr float kBothSpeed = 4.0f;  // [rad/s]
 
-// Nothing inside the dead zone, then from zero up; squared, so that small motions are fine ones.
+// Zero inside the dead zone, then rising from zero; squared, for fine control.
 float eased(float x) {
   const float far = std::clamp((std::abs(x) - kDead) / (1 - kDead), 0.0f, 1.0f);
   return std::copysign(far * far, x);
@@ -41,7 +41,7 @@ std::array<HandMotion, 2> gamepad_motion(GamepadHand& pad, Steering& steering, c
       m.up = -y * far;
     }
     SteeredHand& hand = steering.hand[k];
-    // Only a trigger that moves says something: a mouse may have the jaws meanwhile.
+    // Only a trigger that moves counts: a mouse may control the jaws meanwhile.
     const float pulled = side.trigger > kDead ? side.trigger : 0.0f;
     if (pulled != pad.trigger[k]) {
       hand.opening = 1 - pulled;

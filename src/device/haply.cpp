@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// device/haply: see the header. Everything of the line belongs to the thread, and before it runs to the opener.
+// device/haply: see the header. All members of the connection are owned by the thread; before it runs, by the opener.
 #include "device/haply.h"
 
 #include <atomic>
@@ -27,18 +27,18 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr float kStopStep = 0.5f;  // [N] per millisecond on the way down (the limiter's slew rate)
-constexpr int kMostStops = 100;    // messages after which a stop is not waited for any longer
+constexpr float kStopStep = 0.5f;  // [N] per millisecond while stopping (the limiter's slew rate)
+constexpr int kMostStops = 100;    // messages after which a stop no longer waits
 constexpr auto kReconnectEvery = 500ms;
-constexpr size_t kMostBytes = 1 << 18;  // of a message; the state of two arms has a few kilobytes
+constexpr size_t kMostBytes = 1 << 18;  // of a message; the state of two devices has a few kilobytes
 
 enum HaplyError : uint32_t { kSilent = 1, kGone = 2, kNonsense = 3, kNoLine = 4 };
 
-// Their axes (x right, y forward, z up) in ours (x right, y up, z toward the user), and back.
+// Their axes (x right, y forward, z up) to ours (x right, y up, z toward the user), and back.
 Vec3 ours(Vec3 v) { return {v.x, v.z, -v.y}; }
 Vec3 theirs(Vec3 v) { return {v.x, -v.z, v.y}; }
 
-// Members of what may be anything.
+// Reads of untrusted JSON.
 const json& member(const json& j, const char* name) {
   static const json kNothing;
   if (!j.is_object()) return kNothing;
@@ -49,7 +49,7 @@ bool number(const json& j, const char* name, float& out) {
   const json& n = member(j, name);
   if (!n.is_number()) return false;
   out = n.get<float>();
-  return std::abs(out) < 1e3f;  // no number, and none that an arm has: false
+  return std::abs(out) < 1e3f;  // false: not a number, or outside any device's range
 }
 bool vector(const json& j, Vec3& out) { return number(j, "x", out.x) && number(j, "y", out.y) && number(j, "z", out.z); }
 std::string word(const json& j, const char* name) {
@@ -65,16 +65,16 @@ bool yes(const json& j, const char* name) {
 }
 
 struct Arm {
-  std::string id;  // as the service names it
-  // The grip that was bound to this arm, by its own id; and what it said last: a grip that is missing from a message has
-  // neither turned nor been let go.
+  std::string id;  // as named by the service
+  // The grip bound to this device, by its own id, and its last state: a grip that is missing from a message keeps its rotation
+  // and buttons.
   std::string grip;
   Quat held;
   uint32_t pressed = 0;
   uint32_t sequence = 0;
   ArmSample sample;
   Vec3 force;  // [N] to be sent, our frame
-  // For any thread.
+  // Readable from any thread.
   std::atomic<bool> ready{false};
   std::atomic<uint32_t> error{0}, errors{0};
   std::atomic<uint64_t> steps{0};
@@ -87,7 +87,7 @@ struct Haply {
   ArmCallback callback;
   std::thread thread;
   std::atomic<bool> stopping{false};
-  // The line. What its handlers find when a newer line was begun is not theirs any more: `turn`.
+  // The connection. Handlers of an older connection detect a newer one by `turn`.
   asio::io_context io;
   std::optional<beast::websocket::stream<asio::ip::tcp::socket>> line;
   std::optional<asio::ip::tcp::endpoint> to;
@@ -96,7 +96,7 @@ struct Haply {
   uint64_t turn = 0;
   bool got = false, reading = false, writing = false, up = false, done = false;
   bool vectors = true;  // the form of commands
-  // Of this line: the service has said what it has, which is no answer to anything; our first message was sent.
+  // Of this connection: the service has sent its inventory (unsolicited); our first message was sent.
   bool greeted = false, introduced = false;
   error_code failure;
   Quat no_grip = axis_angle({1, 0, 0}, -0.25f * kPi);
@@ -113,7 +113,7 @@ void drop(Haply& h) {
   h.got = h.reading = h.writing = h.up = h.greeted = h.introduced = false;
 }
 
-// Runs the line until `done`, or the time. What calls this never waits for the service longer than it wants to.
+// Runs the connection until `done`, or the time limit. The caller never waits longer than that for the service.
 template <typename F>
 bool until(Haply& h, Clock::time_point when, const F& done) {
   h.io.restart();
@@ -135,19 +135,19 @@ void read_next(Haply& h) {
   });
 }
 
-// Begins a line; h.up says when it is there, h.done that it came to an end, well or not.
+// Starts a connection; h.up: it is established, h.done: it has ended, with or without an error.
 void connect(Haply& h) {
   drop(h);
   h.done = false, h.failure = {};
   h.line.emplace(h.io);
   h.line->read_message_max(kMostBytes);
   const auto fail = [&h](error_code e) { h.failure = e, h.done = true; };
-  if (!h.to) {  // looked up once, by the opener: the thread must not wait for a name server
+  if (!h.to) {  // resolved once, by the opener: the thread must not wait for a name server
     error_code e;
     asio::ip::tcp::resolver resolver(h.io);
     const auto found = resolver.resolve(h.host, h.port, e);
     if (e || found.empty()) return fail(e);
-    h.to = *found.begin();  // an IPv4 address where there is one: there the service listens
+    h.to = *found.begin();  // IPv4 if available: the service listens there
     for (const auto& f : found)
       if (f.endpoint().address().is_v4()) h.to = f.endpoint();
   }
@@ -155,7 +155,7 @@ void connect(Haply& h) {
     if (turn != h.turn) return;
     if (error) return fail(error);
     error_code ignored;
-    h.line->next_layer().set_option(asio::ip::tcp::no_delay(true), ignored);  // a force that waits for company is late
+    h.line->next_layer().set_option(asio::ip::tcp::no_delay(true), ignored);  // delayed sending would make the force late
     h.line->async_handshake(h.host + ":" + h.port, "/", [&h, fail, turn](error_code shaken) {
       if (turn != h.turn) return;
       if (shaken) return fail(shaken);
@@ -210,8 +210,8 @@ json take_message(Haply& h) {
 
 constexpr const char* kGrips[] = {"wireless_verse_grip", "verse_grip", "custom_verse_grip"};
 
-// Grips that no arm has yet, in the service's order (wireless ones first), go to the arms that have none, in the order of the
-// inventory. Once bound, a grip is known by its id: which arms or grips are missing from a later message does not matter.
+// Unbound grips, in the service's order (wireless ones first), are assigned to devices without one, in the order of the
+// inventory. Once bound, a grip is known by its id, whatever is missing from a later message.
 void bind_grips(const json& message, Haply& h, const std::vector<size_t>& order) {
   for (const char* kind : kGrips) {
     const json& all = member(message, kind);
@@ -252,7 +252,7 @@ void read_grip(const json& message, Arm& a) {
   s.buttons = a.pressed;
 }
 
-// The arms' states out of one message; an arm that is not in it is absent.
+// The devices' states in one message; a device that is not in it is absent.
 bool read_states(const json& message, Haply& h) {
   const json& all = member(message, "inverse3");
   if (!all.is_array()) return false;
@@ -304,7 +304,7 @@ void run(Haply& h) {
   const auto patience = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<float>(h.options.forget));
   Clock::time_point heard = Clock::now(), again = heard + kReconnectEvery;
   int stops = 0;
-  bool waits = false;  // for an answer: the next message is sent when it has come, or is not believed in any more
+  bool waits = false;  // for an answer: the next message is sent when it has arrived or timed out
   while (!h.stopping || ((length2(h.arm[0].force) > 0 || length2(h.arm[1].force) > 0) && ++stops < kMostStops)) {
     if (h.up && h.greeted && !waits) send(h), waits = true;
     const bool was_up = h.up;
@@ -318,12 +318,12 @@ void run(Haply& h) {
       if (read_states(message, h)) heard = now;
       else error = kNonsense;
     } else if (now < heard + patience) {
-      continue;  // late, but not yet lost: no new sample, no new force
+      continue;  // late, but not lost yet: no new sample, no new force
     } else {
       error = h.up ? kSilent : kNoLine;
     }
     serve(h, error);
-    // A line that is dead, or says nothing, is begun again.
+    // A dead or silent connection is restarted.
     if (error && now > again && now > heard + kReconnectEvery) {
       connect(h);
       again = now + kReconnectEvery;
@@ -419,7 +419,7 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& messag
     const json& device = all[place];
     const json& config = member(device, "config");
     const std::string id = word(device, "device_id");
-    // It goes back to the service inside quotes.
+    // It is sent back to the service inside quotes.
     if (id.empty() || id.find_first_of("\"\\?") != std::string::npos) continue;
     const json& calibrated = member(member(device, "status"), "calibrated");
     if (calibrated.is_boolean() && !calibrated.get<bool>()) {
@@ -427,7 +427,7 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& messag
                          " is not calibrated: put its grip into the inkwell until its light is steady, and try again");
       continue;
     }
-    // What 3.5 brought, in the state it first sends.
+    // Introduced in 3.5, in the first state message.
     if (place == 0)
       h->vectors = member(inventory, "session_id").is_number() || member(member(device, "state"), "control_mode").is_string();
     size_t k = word(config, "handedness") == "left" ? 1 : 0;
@@ -441,9 +441,9 @@ ArmPort open_haply(const HaplyOptions& options, std::vector<std::string>& messag
     info.model = word(config, "type");
     info.name = id, info.serial = "haply-" + id;
     info.driver = h->vectors ? "service 3.5" : "service 3.1 to 3.4";
-    info.limits = limits_of(info.model, {0, 0, 0, 0});  // the service does not say
+    info.limits = limits_of(info.model, {0, 0, 0, 0});  // the service does not report them
     const float reach = info.model == "minverse" ? 0.04f : 0.1f;
-    // About where the cursor is in the middle of its reach (the maker's examples), until `--calibrate` says better.
+    // Approximately the cursor's position at the center of its range (the maker's examples), until `--calibrate` measures it.
     const Vec3 middle = ours({0, -0.12f, 0.15f}), box{reach, reach, reach};
     info.least = middle - box, info.most = middle + box;
   }

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// device: the part of OpenHaptics' device library (libHD) that we call: our own declarations of its names, types and numbers,
-// so that neither its headers nor its license are needed to build. docs/references.md (OpenHaptics headers) says where each
-// comes from.
+// device: the part of OpenHaptics' device library (libHD) that is used: own declarations of its names, types and numbers, so
+// that building needs neither its headers nor its license. docs/references.md (OpenHaptics headers) states the source of
+// each.
 //
-// Three traps that other bindings fell into, each held by a static_assert below or by tests/device: the error record has three
-// members and comes back by value (12 bytes); HDlong and the scheduler's handle are C longs; HDboolean is one byte.
+// Three pitfalls of other bindings, each covered by a static_assert below or by tests/device: the error record has three
+// members and is returned by value (12 bytes); HDlong and the scheduler's handle are C longs; HDboolean is one byte.
 #pragma once
 #include <cstddef>
 #include <cstdint>
 
 #if defined(_WIN32)
-#define CATGUT_HD_CALL __stdcall  // matters on 32-bit Windows alone
+#define CATGUT_HD_CALL __stdcall  // matters only on 32-bit Windows
 #else
 #define CATGUT_HD_CALL
 #endif

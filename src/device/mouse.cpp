@@ -7,11 +7,11 @@
 namespace catgut {
 namespace {
 
-constexpr float kTurnPerPixel = 0.006f;  // [rad] half a turn is the width of a small window
-constexpr float kNotch = 0.002f;         // [m] into the picture
+constexpr float kTurnPerPixel = 0.006f;  // [rad] half a turn is about the width of a small window
+constexpr float kNotch = 0.002f;         // [m] along the view axis
 constexpr float kRollRate = 1.5f;        // [rad/s]
 constexpr float kRollNotch = 0.08f;      // [rad]
-constexpr float kBothPerPixel = 0.015f;  // [rad] once round is two thirds of a small window
+constexpr float kBothPerPixel = 0.015f;  // [rad] a full turn is two thirds of a small window
 
 }  // namespace
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// device: the millisecond of drivers whose maker's library has no scheduler of its own.
+// device: a 1 kHz timer for backends whose library has no scheduler of its own.
 #pragma once
 #include <pthread.h>
 
@@ -8,7 +8,7 @@
 
 namespace catgut {
 
-// Of the calling thread: ahead of ordinary work, where the system lets it. No fault where not.
+// Real-time priority for the calling thread, if permitted. Not an error otherwise.
 inline void go_first() {
   sched_param first{};
   first.sched_priority = 50;
@@ -17,7 +17,7 @@ inline void go_first() {
 
 struct Beat {
   std::chrono::steady_clock::time_point next = std::chrono::steady_clock::now();
-  // Until the next millisecond. One that was missed is not made up for: a hand has no use for ten samples at once.
+  // Until the next millisecond. Missed ones are skipped: a hand cannot use ten samples at once.
   void wait() {
     next += std::chrono::milliseconds(1);
     const auto now = std::chrono::steady_clock::now();

@@ -10,7 +10,7 @@
 namespace catgut {
 namespace {
 
-// The first whose word is part of the name. Peak [N], continuous [N], stiffness [N/m], damping [N s/m].
+// The first one whose word is part of the name. Peak [N], continuous [N], stiffness [N/m], damping [N s/m].
 constexpr std::array<ArmProfile, 12> kProfiles{{
     {"touch x", {7.9f, 1.75f, 1000, 5}, "CHAI3D (PHANTOM Desktop); continuous: data sheet, from memory"},
     {"desktop", {7.9f, 1.75f, 1000, 5}, "CHAI3D; continuous: data sheet, from memory"},

@@ -9,21 +9,21 @@
 namespace catgut {
 namespace {
 
-constexpr float kDriveAt = 0.35f, kTipAt = 0.93f;  // places on the needle's arc: two thirds from the tip, behind the tip
-constexpr float kBeside = 0.3f;                    // of the arc: two jaws nearer than this would meet
-constexpr float kCatch = 0.009f;     // [m] across the view: nearer than this to the good place, the help takes the tool
-constexpr float kLetGo = 0.014f;     // and farther than this it lets go
-constexpr float kCatchDeep = 0.12f;  // [m] along the view, where no one can judge distances on a flat screen
+constexpr float kDriveAt = 0.35f, kTipAt = 0.93f;  // positions on the needle's arc: a third from the swage, behind the tip
+constexpr float kBeside = 0.3f;                    // of the arc: closer jaws would collide
+constexpr float kCatch = 0.009f;     // [m] in the view plane: within this distance of the best grasp, the assist moves the tool
+constexpr float kLetGo = 0.014f;     // and beyond this it releases it
+constexpr float kCatchDeep = 0.12f;  // [m] along the view axis, where distances are hard to judge on a flat screen
 constexpr float kThere = 0.0015f;    // [m] the tool is at the needle
-constexpr float kPatience = 0.6f;    // [s] a closing jaw waits for that
-constexpr float kBiteCatch = 0.012f, kBiteLetGo = 0.02f;  // [m] across the view, of the needle from the place of a bite
+constexpr float kPatience = 0.6f;    // [s] that a closing jaw waits for that
+constexpr float kBiteCatch = 0.012f, kBiteLetGo = 0.02f;  // [m] in the view plane, from the needle to the position of a bite
 constexpr float kBefore = 0.45f;                          // [rad] of the needle's tip before the tissue
-constexpr float kBesideTissue = 0.022f;                   // [m] where it comes to first
-constexpr float kHelpSpeed = 0.2f, kHelpTurn = 5.0f;      // [m/s], [rad/s] of a tool that carries a needle there
+constexpr float kBesideTissue = 0.022f;                   // [m] where it arrives first
+constexpr float kHelpSpeed = 0.2f, kHelpTurn = 5.0f;      // [m/s], [rad/s] of a tool that moves a needle there
 constexpr float kAboveTail = 0.012f;                      // [m]
 constexpr float kLoopSpeed = 0.1f;                        // [m/s] of a tool that carries a loop
-constexpr float kKeepsLoop = 0.7f;                        // opening of a jaw that lets go without shaking off a loop
-constexpr float kReach = 0.35f;                           // [m] from the field's center: no hand gets lost
+constexpr float kKeepsLoop = 0.7f;                        // opening of a jaw that releases without shaking off a loop
+constexpr float kReach = 0.35f;                           // [m] from the field's center: limit of the hands
 
 Vec3 shaft_of(const Pose& tool) { return rotate(tool.q, {0, 0, 1}); }
 
@@ -37,11 +37,11 @@ void drive_needle(SteeredHand& hand, float angle) {
   hand.pose = needle * Pose{{}, axis_angle({0, 0, 1}, angle)} * hand.grip;
 }
 
-// force: [N] on the hand, zero where no one is to feel it.
+// force: [N] on the hand, zero if it is not rendered.
 void move(SteeredHand& hand, const HandMotion& m, const ViewFrame& view, const PictureModel& picture, Vec3 force) {
-  // Into the picture is along the line of sight: the tool stays under the pointer.
+  // Motion along the view axis: the tool stays under the pointer.
   Vec3 way = view.right * m.right + view.up * m.up + normalized(hand.pose.p - view.eye, view.ahead) * m.ahead;
-  // Hands that feel nothing would tear what they pull at: against a force they go slower.
+  // Without force feedback a hand would tear what it pulls: it slows against a force.
   if (dot(way, force) < 0) way = way * std::clamp(1.5f - length(force), 0.05f, 1.0f);
   hand.pose.p += way;
   turn_about(hand.pose, view.up, m.yaw);
@@ -57,8 +57,8 @@ void move(SteeredHand& hand, const HandMotion& m, const ViewFrame& view, const P
   if (length(away) > kReach) hand.pose.p = picture.focus + normalized(away) * kReach;
 }
 
-// On a flat screen nearness counts across the view far more than along it. there: the hand, as it is seen, at the place's
-// depth.
+// On a flat screen, distance in the view plane counts far more than along it. there: the hand in the view plane, at the
+// target's depth.
 bool near_on_screen(const ViewFrame& view, Vec3 hand, Vec3 place, float reach, Vec3& there) {
   const Vec3 a = hand - view.eye, b = place - view.eye;
   const float deep_a = std::max(dot(a, view.ahead), 0.01f), deep_b = dot(b, view.ahead);
@@ -66,11 +66,11 @@ bool near_on_screen(const ViewFrame& view, Vec3 hand, Vec3 place, float reach, V
   return distance(there, place) < reach && std::abs(deep_b - deep_a) < kCatchDeep;
 }
 
-// A held needle near the place of the next bite stands up there, its tip before the tissue: first beside it, then at it.
+// A held needle near the planned bite is raised there, its tip in front of the tissue: first beside it, then at it.
 void help_to_bite(Steering& steering, size_t who, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen) {
   SteeredHand& hand = steering.hand[who];
   const bool was = hand.snapped && hand.at == HelpAt::bite;
-  // A needle is driven with what holds it locked: a needle holder, not forceps.
+  // A needle is driven with a tool that locks it: a needle holder, not forceps.
   const int tool = seen.tool[who].instrument;
   const bool drives = tool >= 0 && picture.instrument[static_cast<size_t>(tool)].can(kHoldNeedle | kClamp) &&
                       seen.tool[1 - who].held != Held::needle;
@@ -90,7 +90,7 @@ void help_to_bite(Steering& steering, size_t who, const ViewFrame& view, const P
   const Vec3 tip = on_needle(picture, needle, 1), middle = on_needle(picture, needle, 0.5f);
   Vec3 there, other;
   const float reach = was ? kBiteLetGo : kBiteCatch;
-  // Whichever a user takes for the pointer: the needle's tip, or the tool.
+  // The reference point for the pointer: the needle's tip, or the tool.
   hand.snapped = hand.driven > 0 || near_on_screen(view, tip, entry_of(g), reach, there) ||
                  near_on_screen(view, hand.pose.p, entry_of(g), reach, other) ||
                  near_on_screen(view, middle, g.at, reach, other);
@@ -106,7 +106,7 @@ void help_to_bite(Steering& steering, size_t who, const ViewFrame& view, const P
   hand.help = hand.hovered ? needle_on(picture, g, psi + hand.driven) * hand.grip : beside;
 }
 
-// Whether the help has the tool now.
+// Whether the assist moves the tool now.
 void help(Steering& steering, size_t who, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen) {
   SteeredHand& hand = steering.hand[who];
   if (steering.assist && seen.tool[who].held == Held::needle) return help_to_bite(steering, who, view, picture, seen);
@@ -118,17 +118,17 @@ void help(Steering& steering, size_t who, const ViewFrame& view, const PictureMo
   if (hand.snapped && hand.at == HelpAt::bite) hand.snapped = false;
   const bool was = hand.snapped;
   const auto reach = [&](HelpAt at) { return was && hand.at == at ? kLetGo : kCatch; };
-  // The tail is what is wanted while the other hand has the needle; a tool with thread round it wants nothing else.
+  // The target is the tail while the other hand has the needle; a tool with thread round it has no other target.
   const bool loop = seen.tool[who].loop_wraps > 0, other_has = seen.tool[1 - who].held == Held::needle;
   Vec3 there, best;
   float nearest = 1;
   hand.snapped = false;
   TailGrip tail;
   if (other_has && !seen.active().needle.in_tissue && tail_grip(picture, seen, who, tail)) {
-    // Once found it stays with its particle, though another place may be better by a hair.
+    // Hysteresis: it stays with its particle even if another one is slightly better.
     if (was && hand.at == HelpAt::tail) tail.slot = hand.tail_slot, tail.pose.p = seen.particle[tail.slot];
     if (near_on_screen(view, hand.pose.p, tail.pose.p, reach(HelpAt::tail), there)) {
-      // Along the shaft, from above: what lies beside the tail is not pushed aside.
+      // Along the shaft, from above: objects beside the tail are not pushed aside.
       const Pose above{tail.pose.p + rotate(tail.pose.q, {0, 0, kAboveTail}), tail.pose.q};
       if (!was || hand.at != HelpAt::tail) hand.hovered = false;
       hand.hovered = hand.hovered || distance(hand.sent.pose.p, above.p) < 0.003f;
@@ -140,11 +140,11 @@ void help(Steering& steering, size_t who, const ViewFrame& view, const PictureMo
   const Pose grip = good_grip(picture, seen, who, shaft_of(hand.pose), hand.pose.p);
   if (!loop && near_on_screen(view, hand.pose.p, grip.p, reach(HelpAt::needle), there) && distance(there, grip.p) < nearest)
     hand.snapped = true, hand.at = HelpAt::needle, hand.help = grip, best = there;
-  // The depth that the help found is the hand's from now on, or the tool would jump back when it is let go.
+  // The hand keeps the depth of the assist, or the tool would jump back on release.
   if (hand.snapped) hand.pose.p = best;
 }
 
-// What both hands do at once, and the hand that goes along with the other.
+// Two-handed actions, and the hand that follows the other.
 void both(Steering& steering, const std::array<HandMotion, 2>& motion, const PictureModel& picture, const Snapshot& seen,
           float dt) {
   if (!steering.assist) return;
@@ -207,14 +207,14 @@ Pose good_grip(const PictureModel& picture, const Snapshot& seen, size_t who, Ve
   };
   const auto free = [&](float s) { return other.held != Held::needle || std::abs(other.held_at - s) > kBeside; };
   bool tip = !free(kDriveAt);
-  // Stuck in tissue with no one holding it: whichever end the hand is at.
+  // Stuck in tissue and not held: the end nearer to the hand.
   if (seen.active().needle.in_tissue && free(kDriveAt) && free(kTipAt))
     tip = distance(at(kTipAt), near) < distance(at(kDriveAt), near);
   const float s = tip ? kTipAt : kDriveAt;
   const Vec3 radial =
       rotate(needle.q, {std::cos(s * picture.suture[0].needle_arc), std::sin(s * picture.suture[0].needle_arc), 0});
-  // The shaft leaves the needle's plane on the side that it is on already; at the tip it leans back, away from the tissue that
-  // the needle comes out of.
+  // The shaft leaves the needle's plane on its present side; at the tip it tilts back, away from the tissue that the needle
+  // exits.
   const float side = dot(rotate(needle.q, {0, 0, 1}), shaft) >= 0 ? 1.0f : -1.0f;
   const Vec3 lean = rotate(needle.q, {std::cos(2.6f), -std::sin(2.6f), 0});
   const Vec3 z = normalized(rotate(needle.q, {0, 0, side}) + lean * (tip ? 0.3f : 0.0f));
@@ -229,12 +229,12 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
     SteeredHand& hand = steering.hand[k];
     const bool holds = seen.tool[k].held == Held::needle;
     if (holds && !hand.holds) {
-      if (hand.snapped) hand.pose = hand.help;  // it was grasped where the help had it
+      if (hand.snapped) hand.pose = hand.help;  // it was grasped at the assisted pose
       hand.grip = inverse(seen.active().needle.pose) * seen.tool[k].pose;
       hand.snapped = false;
     }
     hand.holds = holds;
-    // While two tools held it they bent each other's hold a little: what counts is how it lies in this one alone.
+    // Two tools that hold it displace each other slightly: use the grip of this one only.
     if (holds && !seen.active().needle.in_tissue && seen.tool[1 - k].held != Held::needle)
       hand.grip = inverse(seen.active().needle.pose) * seen.tool[k].pose;
   }
@@ -253,7 +253,7 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
     in.pose = hand.snapped ? hand.help : hand.pose;
     const bool loop = steering.assist && seen.tool[k].loop_wraps > 0;
     if (hand.sent.connected && steering.sequence > 0) {
-      // Neither a needle on its way to a bite nor a tool with a loop on it is hurried.
+      // Slow for a needle on its way to a bite and for a tool with a loop.
       Pose from = hand.sent.pose;
       if (hand.snapped && hand.at == HelpAt::bite) {
         glide(from, in.pose, kHelpSpeed, kHelpTurn, dt);
@@ -265,7 +265,7 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
       }
     }
     in.jaw = hand.closed ? 0.0f : hand.opening;
-    // A jaw that is reported to close on the way to the needle closes when it is there.
+    // A jaw closed on the way to the needle closes on arrival.
     const bool at_jaw = hand.snapped && hand.at != HelpAt::bite;
     const bool coming = at_jaw && hand.closed &&
                         (distance(seen.tool[k].pose.p, hand.help.p) > kThere || (hand.at == HelpAt::tail && !hand.hovered));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// device/touch: see the header. Below, Touch's members say which thread may use them.
+// device/touch: see the header. Comments below state which thread may use Touch's members.
 #include "device/touch.h"
 
 #include <dlfcn.h>
@@ -31,10 +31,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr float kStopStep = 0.5f;      // [N] per millisecond on the way down (the limiter's slew rate)
-constexpr uint32_t kProbeEvery = 250;  // [ms] how often a lost arm is asked whether it is back
+constexpr float kStopStep = 0.5f;      // [N] per millisecond while stopping (the limiter's slew rate)
+constexpr uint32_t kProbeEvery = 250;  // [ms] between checks whether a lost device has returned
 constexpr uint32_t kWarmthEvery = 50;  // [ms] motors warm slowly
-constexpr int kMostErrors = 8;         // fetched per arm and millisecond: the stack may be deep, the callback may not
+constexpr int kMostErrors = 8;         // per device and millisecond: the error stack may be deep, the callback must be short
 
 bool is_lost(hd::Enum error) { return error >= hd::kDeviceFault && error <= hd::kTimerError && error != hd::kAlreadyOpen; }
 bool cuts_force(hd::Enum error) { return error >= hd::kWarmMotors && error <= hd::kForceError; }
@@ -49,15 +49,15 @@ Quat rotation_of(const double* m) {
 
 struct Arm {
   hd::Handle handle = hd::kNoDevice;  // set before the scheduler starts, constant after
-  // The callback's.
+  // Owned by the callback.
   uint32_t sequence = 0, lost_for = 0;
   bool lost = false;
-  // Latched until a sample has reported them: the library raises errors at the end of a frame too, after the sample was used,
-  // and those of one arm may be found in the other's frame.
+  // Latched until a sample has reported them: the library also raises errors at the end of a frame, after the sample was used,
+  // and errors of one device may appear in the other's frame.
   bool cut = false, broken = false;
   float warmth = 0;
   Vec3 force;  // [N] last written
-  // For any thread.
+  // Readable from any thread.
   std::atomic<bool> ready{false}, at_rest{true};
   std::atomic<uint32_t> error{0}, errors{0};
   std::atomic<uint64_t> steps{0};
@@ -72,8 +72,8 @@ struct Touch {
   std::atomic<bool> stopping{false}, stopped{false};
 };
 
-// Fetches the errors since the last call and latches them at the arm that each names; one that names none is the current
-// arm's. The library hands out the newest first; the worst of them becomes the arm's error, of equals the newest.
+// Fetches the errors since the last call and latches them at the device that each names; unnamed ones belong to the current
+// device. The library returns the newest first; the most severe one becomes the device's error, of equals the newest.
 void note_errors(Touch& t, size_t current) {
   std::array<int, 2> worst{-1, -1};
   for (int k = 0; k < kMostErrors; ++k) {
@@ -91,13 +91,13 @@ void note_errors(Touch& t, size_t current) {
   }
 }
 
-// One arm, one millisecond, to completion: make current, begin, read, work out, write, end.
+// One device, one millisecond, in order: make current, begin, read, compute, write, end.
 void serve(Touch& t, size_t which) {
   Arm& a = t.arm[which];
   if (a.handle == hd::kNoDevice) return;
   ArmSample s;
   s.sequence = ++a.sequence;
-  if (std::exchange(a.broken, false)) a.lost = true, a.lost_for = 0;  // found in the other arm's frame
+  if (std::exchange(a.broken, false)) a.lost = true, a.lost_for = 0;  // found in the other device's frame
   if (a.lost && ++a.lost_for % kProbeEvery != 0) {
     t.callback.step(t.callback.user, which, s);
     a.steps.fetch_add(1, std::memory_order_relaxed);
@@ -157,7 +157,7 @@ hd::Code CATGUT_HD_CALL serve_both(void* self) {
   Touch& t = *static_cast<Touch*>(self);
   for (size_t k = 0; k < t.arm.size(); ++k) serve(t, k);
   if (!t.stopping.load(std::memory_order_relaxed) || !t.arm[0].at_rest || !t.arm[1].at_rest) return hd::kCallbackContinue;
-  switch_off(t);  // here, where no one else makes another arm current meanwhile
+  switch_off(t);  // here, where no other code makes another device current
   t.stopped.store(true, std::memory_order_release);
   return hd::kCallbackDone;
 }
@@ -174,7 +174,7 @@ bool load(const TouchOptions& options, hd::Library& hd, std::vector<std::string>
   void* library = nullptr;
   std::string why;
   for (const std::string& name : names) {
-    // Never closed: the driver does not survive being loaded a second time.
+    // Never closed: the library fails when loaded a second time.
     library = dlopen(name.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library) break;
     if (why.empty()) why = dlerror();
@@ -197,8 +197,8 @@ bool load(const TouchOptions& options, hd::Library& hd, std::vector<std::string>
 
 std::string text(const char* s) { return s ? s : ""; }
 
-// Opens the arm `name` (null: the default one); `ours`: the arm that is open already. Returns kNoDevice, with the reason in
-// `why`.
+// Opens the device `name` (null: the default one); `ours`: the device that is open already. Returns kNoDevice, with the reason
+// in `why`.
 hd::Handle open_arm(const hd::Library& hd, const char* name, hd::Handle ours, int retries, std::string& why) {
   for (int attempt = 0;; ++attempt) {
     drain(hd);
@@ -206,7 +206,7 @@ hd::Handle open_arm(const hd::Library& hd, const char* name, hd::Handle ours, in
     const hd::ErrorInfo e = hd.hdGetError();
     if (handle != hd::kNoDevice && e.code == hd::kSuccess) return handle;
     if (e.code == hd::kAlreadyOpen && attempt < retries) {
-      // What a crashed program left open is closed first (SOFA's driver does the same), unless it is an arm of ours.
+      // A device left open by a crashed program is closed first (as in SOFA's plugin), unless it is one of ours.
       if (handle != hd::kNoDevice && handle != ours) hd.hdDisableDevice(handle);
       std::this_thread::sleep_for(20ms);
       continue;
@@ -225,7 +225,7 @@ double number(const hd::Library& hd, hd::Enum what) {
   return hd.hdGetError().code == hd::kSuccess && std::isfinite(value) && value > 0 ? value : 0;
 }
 
-// Reads what the arm is and switches its force on; false, with the reason, when it is not fit for use.
+// Reads the device's properties and switches its force on; false, with the reason, if it is unusable.
 bool prepare(const hd::Library& hd, hd::Handle handle, ArmInfo& info, std::string& why) {
   hd.hdMakeCurrentDevice(handle);
   info.model = text(hd.hdGetString(hd::kModel));
@@ -267,7 +267,7 @@ bool start(void* self, const ArmCallback& callback, std::string& why) {
   t.stopping = false, t.stopped = false;
   drain(t.hd);
   t.hd.hdSetSchedulerRate(1000);
-  drain(t.hd);  // a rate that is refused is no reason to go without: the servo measures its own periods
+  drain(t.hd);  // a refused rate is not an error: the servo measures its own periods
   t.scheduled = t.hd.hdScheduleAsynchronous(serve_both, self, hd::kPriority);
   t.hd.hdStartScheduler();
   const hd::ErrorInfo e = t.hd.hdGetError();
@@ -285,7 +285,7 @@ void stop(void* self) {
   Touch& t = *static_cast<Touch*>(self);
   if (!t.running) return;
   t.stopping = true;
-  // Ten milliseconds bring 3.3 N down; a driver that no longer calls back is not waited for.
+  // Ten milliseconds reduce 3.3 N to zero; do not wait for a library that no longer calls back.
   for (int k = 0; k < 50 && !t.stopped.load(std::memory_order_acquire); ++k) std::this_thread::sleep_for(1ms);
   if (!t.stopped) switch_off(t);
   t.hd.hdStopScheduler();

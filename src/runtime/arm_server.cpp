@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime/arm_server: see the header. Below, comments say which thread may touch what.
+// runtime/arm_server: see the header. Comments below state which thread may use which members.
 #include "runtime/arm_server.h"
 
 #include <arpa/inet.h>
@@ -24,13 +24,13 @@
 namespace catgut {
 namespace {
 
-constexpr float kExpiry = 0.03f;         // [s] of silence from which a patch is no longer believed, whatever it says
-constexpr uint64_t kOldest = 150000000;  // [ns] of age of the sample that a patch was computed for
-constexpr uint64_t kFaultsFor = 256;     // [steps] for which a fault is reported to the simulator: packets get lost
+constexpr float kExpiry = 0.03f;         // [s] of silence after which a patch expires, whatever its own expiry
+constexpr uint64_t kOldest = 150000000;  // [ns] maximum age of the sample that a patch was computed for
+constexpr uint64_t kFaultsFor = 256;     // [steps] for which a fault is sent to the simulator: packets get lost
 
 struct Peer {
   sockaddr_storage address{};
-  socklen_t bytes = 0;   // 0: no one
+  socklen_t bytes = 0;   // 0: none
   uint64_t session = 0;  // counts them
   BridgeKey caller{}, in{}, out{};
 };
@@ -40,16 +40,16 @@ struct ForceCommand {
 };
 
 struct Side {
-  Latest<ForceCommand> force_command;  // receiver -> driver
-  Latest<Peer> peer;                   // receiver -> driver
-  // The driver's.
-  ServoOptions options;  // constant once it runs
+  Latest<ForceCommand> force_command;  // receiver -> device thread
+  Latest<Peer> peer;                   // receiver -> device thread
+  // Owned by the device thread.
+  ServoOptions options;  // constant during a run
   ServoHand servo;
   uint64_t session = 0;
   uint32_t recent = 0;  // faults
-  // For any thread.
+  // Readable from any thread.
   std::atomic<uint32_t> faults{0};
-  // Of a caller that asks for news.
+  // Owned by the thread that polls for news.
   uint32_t messages = 0;
   bool was_ready = true;
 };
@@ -81,21 +81,21 @@ struct ArmServer::Work {
   int fd = -1;
   uint16_t listens = 0;
   std::array<Side, 2> side;
-  std::atomic<uint64_t> counter{0};  // of all that is sealed, whatever the session
+  std::atomic<uint64_t> counter{0};  // of all sealed packets, of any session
   EnergyPool pool;                   // of the servos
   std::thread receiver;
   std::atomic<bool> quit{false};
   std::atomic<uint64_t> accepted{0}, garbage{0}, version{0}, forged{0}, invalid{0}, unknown_peer{0}, old{0};
   std::atomic<uint64_t> heard_ns{0}, bytes_out{0};
-  // The receiver's.
+  // Owned by the receiver.
   BridgeDoor door;
   Peer peer;
   uint64_t sessions = 0;
   std::array<std::array<uint64_t, 2>, kBridgeKinds> last{};  // counters of this session
-  std::array<BridgeKey, 64> used{};  // keys of callers that had a session: what they said once opens nothing again
+  std::array<BridgeKey, 64> used{};  // keys of callers that had a session: replayed handshakes are refused
   size_t openings = 0;
-  BridgeBytes opened{};  // the answer that began this session
-  // Between the receiver, which rarely changes hands, and a caller that asks for news; never the driver's.
+  BridgeBytes opened{};  // the answer that started this session
+  // Between the receiver, which rarely changes clients, and the thread that polls for news; never the device thread.
   std::mutex lock;
   std::vector<std::string> news;
   bool was_silent = true;
@@ -103,7 +103,7 @@ struct ArmServer::Work {
 
   void say(std::string line) {
     const std::lock_guard<std::mutex> hold(lock);
-    if (news.size() < 100) news.push_back(std::move(line));  // a flood does not fill the memory
+    if (news.size() < 100) news.push_back(std::move(line));  // bounded memory under a flood
   }
   void post(const Peer& to, const BridgeBytes& packet) {
     const ssize_t n = sendto(fd, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
@@ -133,7 +133,7 @@ struct ArmServer::Work {
   void stop();
 };
 
-// One arm, one millisecond, in the driver's thread.
+// One device, one millisecond, in the device thread.
 Vec3 ArmServer::Work::step(void* user, size_t arm, const ArmSample& sample) {
   Work& w = *static_cast<Work*>(user);
   Side& s = w.side[arm];
@@ -142,7 +142,7 @@ Vec3 ArmServer::Work::step(void* user, size_t arm, const ArmSample& sample) {
   const bool fresh = s.force_command.update();
   const Peer& peer = s.peer.seen();
   const ForceCommand& force_command = s.force_command.seen();
-  if (peer.session != s.session) {  // what the last one wanted is void
+  if (peer.session != s.session) {  // the state of the previous session is void
     s.session = peer.session;
     s.servo.has_patch = false;
     disengage(s.servo.limiter);
@@ -164,7 +164,7 @@ Vec3 ArmServer::Work::step(void* user, size_t arm, const ArmSample& sample) {
   return force;
 }
 
-// Hello and open: nothing is kept of who has not proved that he has the key and hears at the address he writes from.
+// Hello and open: stateless until the sender has proved that it has the key and receives at its address.
 std::atomic<uint64_t>* ArmServer::Work::shake_hands(const uint8_t* data, const BridgeHead& h, const Peer& from) {
   if (h.kind != BridgeKind::hello && h.kind != BridgeKind::open) return &invalid;
   if (!mac_is_right(door.shared, data)) return &forged;
@@ -196,18 +196,18 @@ std::atomic<uint64_t>* ArmServer::Work::shake_hands(const uint8_t* data, const B
   opened = opened_packet(door, data, next.in, next.out);
   assign_client(next);
   post(from, opened);
-  heard_ns = 0;  // samples begin with the first packet that is sealed with this session's key
+  heard_ns = 0;  // samples start with the first packet that is sealed with this session's key
   if (!known) say("connected to the simulator at " + name_of(from));
   return &accepted;
 }
 
-// Returns the count that the packet belongs to.
+// Returns the counter that the packet belongs to.
 std::atomic<uint64_t>* ArmServer::Work::handle_packet(const uint8_t* data, size_t size, const Peer& from) {
   BridgeHead h;
   const BridgeFault fault = read_head(data, size, h);
   if (fault == BridgeFault::garbage) return &garbage;
   if (fault == BridgeFault::version) {
-    post(from, refused_packet(door.shared, kOtherVersion));  // its head says which one is spoken here
+    post(from, refused_packet(door.shared, kOtherVersion));  // its head states the supported version
     return &version;
   }
   if (fault == BridgeFault::invalid) return &invalid;
@@ -223,7 +223,7 @@ std::atomic<uint64_t>* ArmServer::Work::handle_packet(const uint8_t* data, size_
     say("released by the simulator at " + name_of(peer));
     assign_client({});
   } else if (h.kind == BridgeKind::ask) {
-    heard_ns = now;  // before the answer: a caller that has it may count on samples
+    heard_ns = now;  // before the answer: a caller that has it may rely on samples
     for (size_t k = 0; k < 2; ++k) {
       write_info(port.arm[k], payload);
       send_sealed(peer, BridgeKind::info, k, payload);
@@ -242,7 +242,7 @@ std::atomic<uint64_t>* ArmServer::Work::handle_packet(const uint8_t* data, size_
 }
 
 void ArmServer::Work::receive() {
-  uint8_t data[kBridgeBytes + 1];  // one more: what is too long is seen to be
+  uint8_t data[kBridgeBytes + 1];  // one byte more, to detect oversized packets
   while (!quit) {
     pollfd wait{fd, POLLIN, 0};
     if (poll(&wait, 1, 20) <= 0) continue;
@@ -274,8 +274,8 @@ ArmServer::ArmServer(ArmPort port, const ArmServerOptions& options) : work_(std:
   if (!options.key.empty()) w.door.shared = read_bridge_key(options.key);
   for (size_t k = 0; k < 2; ++k) {
     fit_to_arm(w.side[k].options, w.port.arm[k].limits);
-    w.side[k].options.clutch = false;  // the simulator's end does that
-    w.side[k].options.gain = 1;        // patches come in the arm's own frame, with the gain in them
+    w.side[k].options.clutch = false;  // the simulator's side does that
+    w.side[k].options.gain = 1;        // patches arrive in the device's own frame, with the gain applied
   }
   std::string why;
   bool local = false;

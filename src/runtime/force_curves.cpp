@@ -18,7 +18,7 @@ Vec3 tip_of(const Snapshot& seen, const PictureModel& picture) {
   return transform(seen.active().needle.pose, Vec3{r * std::cos(a), r * std::sin(a), 0});
 }
 
-// [m] by which the thread is longer than at rest; 0 when it is slack.
+// [m] extension of the thread; 0 when it is slack.
 float stretch_of(const Snapshot& seen) {
   float length = 0;
   for (size_t i = 0; i + 1 < seen.active().thread_order.size(); ++i)
@@ -73,13 +73,13 @@ FeltCurves feel_a_stitch(SceneSpec scene, bool knot, const std::atomic<bool>& st
   bool in_bite = false, bitten = false, in_knot = false;
   size_t puller = 0;
   for (int i = 0; i < last && !stop.load(std::memory_order_relaxed); ++i) {
-    const std::array<ForcePatch, kMaxHands> heard = seen.patch;  // a tick late, as arms hear it
+    const std::array<ForcePatch, kMaxHands> heard = seen.patch;  // one tick late, as in a run with devices
     if (i >= settle) input = hands.surgeon->operate(seen, dt);
     step(*model, *state, input, jobs);
     publish(*model, *state, seen);
     follow(paper, seen, picture);
     std::array<float, 2> force{}, most{};
-    constexpr int kParts = 4;  // milliseconds in a tick
+    constexpr int kParts = 4;  // milliseconds per tick
     for (size_t k = 0; k < 2; ++k) {
       ForcePatch patch = heard[k];
       if (!make_safe(patch, 10, 400, 4)) patch = {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime/haptics: see the header. Below, Side's members say which of the threads may touch them.
+// runtime/haptics: see the header. Comments below state which thread may use Side's members.
 #include "runtime/haptics.h"
 
 #include <algorithm>
@@ -60,7 +60,7 @@ struct LogRow {
 
 struct Hand {
   ToolInput input;
-  uint64_t sampled_ns = 0;  // on the clock by which the arm's patches age
+  uint64_t sampled_ns = 0;  // on the clock by which the device's patches age
   Vec3 clutch;              // [m] world, see ServoHand
   bool clutched = false;
 };
@@ -69,20 +69,20 @@ struct Side {
   Latest<ForcePatch> patch;         // physics -> servo
   Latest<Hand> hand;                // servo -> physics
   std::atomic<uint32_t> faults{0};  // servo -> physics
-  // servo -> a caller that shows it: what was written, the engagement, the faults of the last second
+  // servo -> display: written force, engagement, faults of the last second
   std::atomic<float> force{0};
   std::atomic<Engaged> engaged{Engaged::no};
   std::atomic<uint32_t> recent{0};
-  std::unique_ptr<Ring<LogRow, 4096>> log;  // servo -> physics; null: no one keeps it
-  // The servo's.
+  std::unique_ptr<Ring<LogRow, 4096>> log;  // servo -> physics; null: not logged
+  // Owned by the servo.
   ServoHand servo;
-  ServoOptions options;  // constant once it runs
+  ServoOptions options;  // constant during a run
   ServoTimes times;
   uint64_t last_ns = 0;
   uint32_t lately = 0;
-  // The physics'.
+  // Owned by the physics.
   uint32_t messages = 0, told_errors = 0;
-  uint64_t taken_ns = 0;  // when the pose was sampled that the physics took last
+  uint64_t taken_ns = 0;  // sample time of the pose that the physics took last
   bool was_ready = true;
 };
 
@@ -98,7 +98,7 @@ struct Haptics::Work {
 
   void send(size_t k, const ForcePatch& patch) {
     Side& s = side[k];
-    if (port.send_patch) {  // the arm's end does not know of clutching
+    if (port.send_patch) {  // the device server does not know of clutching
       const Hand& hand = s.hand.seen();
       ForcePatch p = patch;
       p.point -= hand.clutch;
@@ -108,7 +108,7 @@ struct Haptics::Work {
     s.patch.draft() = patch;
     s.patch.publish();
   }
-  std::FILE* log = nullptr;  // the physics'
+  std::FILE* log = nullptr;  // owned by the physics
   void write_log(size_t k) {
     LogRow r;
     while (side[k].log && side[k].log->pop(r))
@@ -175,7 +175,7 @@ Workspace workspace_of(const ArmInfo& arm, size_t k, Vec3 focus, const std::map<
   Workspace w;
   w.scale = place.scale;
   w.turn = axis_angle({0, 1, 0}, place.turn * kPi / 180);
-  // The hands side by side, a little above the field.
+  // The hands side by side, slightly above the field.
   w.offset = focus + Vec3{k == 0 ? 0.015f : -0.015f, 0.02f, 0.01f} - rotate(w.turn, place.middle) * w.scale;
   return w;
 }
@@ -219,7 +219,7 @@ void Haptics::publish(size_t k, const ForcePatch& patch, uint32_t epoch, float s
   Side& s = work_->side[k];
   if (work_->log) work_->write_log(k);
   ForcePatch p = patch;
-  // A patch is as old as the pose it was computed for, not as the moment at which a slow tick was done with it.
+  // A patch is as old as the pose that it was computed for, not as the end of a slow tick.
   p.time_ns = s.taken_ns > 0 ? s.taken_ns : work_->clock();
   p.epoch = epoch;
   p.period = patch.period / speed;
@@ -229,7 +229,7 @@ void Haptics::publish(size_t k, const ForcePatch& patch, uint32_t epoch, float s
 
 void Haptics::rest(size_t k, uint32_t epoch) {
   if (work_->log) work_->write_log(k);
-  hand(k);  // of now: nothing else asks for it while someone else moves the tool
+  hand(k);  // the current pose: nothing else reads it while another source moves the tool
   ForcePatch p;
   p.cap = 0;
   p.time_ns = work_->side[k].taken_ns;
@@ -303,7 +303,7 @@ std::vector<std::string> new_faults(uint32_t faults, uint32_t& messages) {
   return lines;
 }
 
-// Whether "HOST:PORT" has a port that is none. Numbers of IPv6 have colons of their own: "[::1]:PORT".
+// Whether "HOST:PORT" has an invalid port. IPv6 addresses contain colons: "[::1]:PORT".
 static bool bad_port(const std::string& where) {
   const size_t colon = where.rfind(':'), bracket = where.rfind(']');
   if (colon == std::string::npos) return false;
