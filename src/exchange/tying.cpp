@@ -44,7 +44,7 @@ Vec3 stitch_place(const PictureModel& picture, const Snapshot& seen) {
 }
 
 Vec3 needle_swage(const PictureModel& picture, const Snapshot& seen) {
-  return transform(seen.active().needle.pose, {picture.suture[0].needle_radius, 0, 0});
+  return transform(seen.active().needle.pose, {picture.suture[seen.active_suture].needle_radius, 0, 0});
 }
 
 float feel_strand(float strand, float tension, float dt) {

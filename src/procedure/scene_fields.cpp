@@ -9,15 +9,27 @@
 #include <limits>
 
 #include "exchange/event.h"
+#include "surgeon/plan.h"
 #include "technique/technique.h"
 
 namespace catgut {
 namespace {
 
+// "|purse_string|...|running"
+const char* plan_choices() {
+  static const std::string choices = [] {
+    std::string all;
+    for (const char* name : plan_names()) all += std::string("|") + name;
+    return all;
+  }();
+  return choices.c_str();
+}
+
 constexpr double kAny = 1e30;  // no meaningful bound
 #define TOP(member) [](SceneSpec& s, size_t) -> FieldRef { return &s.member; }
 #define BODY(member) [](SceneSpec& s, size_t i) -> FieldRef { return &s.body[i].member; }
 #define INSTRUMENT(member) [](SceneSpec& s, size_t i) -> FieldRef { return &s.instrument[i].member; }
+#define SUTURE(member) [](SceneSpec& s, size_t i) -> FieldRef { return &s.suture[i].member; }
 
 // clang-format off
 const Field kField[] = {
@@ -60,6 +72,16 @@ const Field kField[] = {
     {"needle", "wire_radius", "m", 0.00001, 0.01, nullptr, "radius of the wire", TOP(needle.wire_radius)},
     {"needle", "mass", "kg", 1e-7, 0.1, nullptr, "needle mass", TOP(needle.mass)},
 
+    {"suture", "thread.particles", "", 2, 10000, nullptr, "thread particles from the free end to the needle", SUTURE(thread.particles)},
+    {"suture", "thread.spacing", "m", 0.0001, 0.1, nullptr, "rest distance of neighboring particles", SUTURE(thread.spacing)},
+    {"suture", "thread.radius", "m", 0.00001, 0.01, nullptr, "thread radius", SUTURE(thread.radius)},
+    {"suture", "thread.mass", "kg", 1e-9, 0.01, nullptr, "per particle", SUTURE(thread.mass)},
+    {"suture", "thread.stretch_compliance", "m/N", 0, 1, nullptr, "per segment; 0: inextensible", SUTURE(thread.stretch_compliance)},
+    {"suture", "needle.radius", "m", 0.0005, 0.1, nullptr, "radius of the needle's circle", SUTURE(needle.radius)},
+    {"suture", "needle.arc", "rad", 0.1, 6.2, nullptr, "angle from swage to tip", SUTURE(needle.arc)},
+    {"suture", "needle.wire_radius", "m", 0.00001, 0.01, nullptr, "radius of the wire", SUTURE(needle.wire_radius)},
+    {"suture", "needle.mass", "kg", 1e-7, 0.1, nullptr, "needle mass", SUTURE(needle.mass)},
+
     {"solver", "preset", "", 0, 0, "default|paper", "sets all other keys of [solver]; keys in the same section override it. paper: section 2.1 of the paper", TOP(solver.preset)},
     {"solver", "tick_rate", "1/s", 1, 10000, nullptr, "ticks per second", TOP(solver.tick_rate)},
     {"solver", "substeps", "", 1, 1000, nullptr, "per tick", TOP(solver.substeps)},
@@ -84,14 +106,14 @@ const Field kField[] = {
     {"solver", "hand_stiffness", "N/m", 1, 100000, nullptr, "stiffness of the coupling between hand and instrument; a haptic device renders about 300", TOP(solver.hand_stiffness)},
     {"solver", "tool_force", "N", 0, 1000, nullptr, "maximum contact force between two instruments; above it they pass each other (mouse: at most 1.5)", TOP(solver.tool_force)},
 
-    {"suture", "attach_threshold", "m", 0, 0.1, nullptr, "maximum distance of an attached particle from the needle tip (X of figure 4)", TOP(suture.attach_threshold)},
-    {"suture", "release_distance", "m", 0, 0.1, nullptr, "drag distance at which the attached particle is released (figure 5)", TOP(suture.release_distance)},
-    {"suture", "attach_compliance", "m/N", 0, 1000, nullptr, "compliance of that attachment", TOP(suture.attach_compliance)},
-    {"suture", "track_compliance", "m/N", 0, 1000, nullptr, "lateral compliance of the needle track", TOP(suture.track_compliance)},
-    {"suture", "pass_tension", "N", 0, 1000, nullptr, "tension difference above which thread slides through a suture point", TOP(suture.pass_tension)},
-    {"suture", "capstan_friction", "", 0, 10, nullptr, "capstan friction: increase of pass_tension per newton of tension, friction coefficient times bending angle", TOP(suture.capstan_friction)},
-    {"suture", "collision_off", "", 0, 100, nullptr, "thread particles without collision on each side of a locked one", TOP(suture.collision_off)},
-    {"suture", "grasp_reach", "m", 0, 0.1, nullptr, "maximum distance at which a closing jaw grasps needle or thread", TOP(suture.grasp_reach)},
+    {"mechanics", "attach_threshold", "m", 0, 0.1, nullptr, "maximum distance of an attached particle from the needle tip (X of figure 4)", TOP(mechanics.attach_threshold)},
+    {"mechanics", "release_distance", "m", 0, 0.1, nullptr, "drag distance at which the attached particle is released (figure 5)", TOP(mechanics.release_distance)},
+    {"mechanics", "attach_compliance", "m/N", 0, 1000, nullptr, "compliance of that attachment", TOP(mechanics.attach_compliance)},
+    {"mechanics", "track_compliance", "m/N", 0, 1000, nullptr, "lateral compliance of the needle track", TOP(mechanics.track_compliance)},
+    {"mechanics", "pass_tension", "N", 0, 1000, nullptr, "tension difference above which thread slides through a suture point", TOP(mechanics.pass_tension)},
+    {"mechanics", "capstan_friction", "", 0, 10, nullptr, "capstan friction: increase of pass_tension per newton of tension, friction coefficient times bending angle", TOP(mechanics.capstan_friction)},
+    {"mechanics", "collision_off", "", 0, 100, nullptr, "thread particles without collision on each side of a locked one", TOP(mechanics.collision_off)},
+    {"mechanics", "grasp_reach", "m", 0, 0.1, nullptr, "maximum distance at which a closing jaw grasps needle or thread", TOP(mechanics.grasp_reach)},
 
     {"technique", "name", "", 0, 0, technique_choices(), "suturing technique", TOP(technique.name)},
     {"technique", "anvil", "m", -1, 1, nullptr, "focal point of the closure, relative to the center of the rim", TOP(technique.anvil)},
@@ -102,7 +124,7 @@ const Field kField[] = {
     {"technique", "step", "m", 0.0001, 0.1, nullptr, "spacing of the pairs between two midpoints (dist_threshold of section 2.5.2)", TOP(technique.step)},
     {"technique", "throws", "", 1, 8, nullptr, "minimum throws of a secure knot", TOP(technique.throws)},
 
-    {"surgeon", "plan", "", 0, 0, "|purse_string|connell|stay|lembert|running", "plan of the scripted surgeon; empty: the technique. running: rows of bites in one bowel", TOP(surgeon.plan)},
+    {"surgeon", "plan", "", 0, 0, plan_choices(), "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel", TOP(surgeon.plan)},
     {"surgeon", "bites", "", 0, 1000, nullptr, "number of bites", TOP(surgeon.bites)},
     {"surgeon", "edge_distance", "m", 0, 0.1, nullptr, "distance of the bites from the rim", TOP(surgeon.edge_distance)},
     {"surgeon", "bite_length", "m", 0, 0.1, nullptr, "bite length along the rim", TOP(surgeon.bite_length)},
@@ -116,6 +138,7 @@ const Field kField[] = {
 #undef TOP
 #undef BODY
 #undef INSTRUMENT
+#undef SUTURE
 
 struct Section {
   const char* name;
@@ -127,8 +150,10 @@ constexpr Section kSection[] = {
     {"instrument", "Instrument; one `[[instrument]]` each. Default: needle holder right, forceps left"},
     {"thread", "Suture thread"},
     {"needle", "Needle, a circular arc"},
+    {"suture",
+     "Needle with its thread; one `[[suture]]` each. Omitted keys are those of `[thread]` and `[needle]`. Default: one"},
     {"solver", "Solver parameters"},
-    {"suture", "Guided suturing (sections 2.2 and 2.3 of the paper)"},
+    {"mechanics", "Guided suturing (sections 2.2 and 2.3 of the paper)"},
     {"technique", "Technique"},
     {"surgeon", "Scripted surgeon"},
     {"expect", "Expected results at the end of a run"},
@@ -139,6 +164,7 @@ SceneSpec& defaults() {
     SceneSpec s;
     s.body.resize(1);
     s.instrument.resize(1);
+    s.suture.resize(1);
     return s;
   }();
   return scene;
@@ -185,15 +211,18 @@ const char* section_meaning(std::string_view section) {
   return "";
 }
 
-bool is_list(std::string_view section) { return section == "body" || section == "instrument"; }
+bool is_list(std::string_view section) { return section == "body" || section == "instrument" || section == "suture"; }
 
 size_t rows_of(const SceneSpec& scene, std::string_view section) {
-  return section == "body" ? scene.body.size() : section == "instrument" ? scene.instrument.size() : 1;
+  if (section == "body") return scene.body.size();
+  if (section == "instrument") return scene.instrument.size();
+  return section == "suture" ? scene.suture.size() : 1;
 }
 
 void add_row(SceneSpec& scene, std::string_view section) {
   if (section == "body") scene.body.emplace_back();
   if (section == "instrument") scene.instrument.emplace_back();
+  if (section == "suture") scene.suture.push_back({scene.thread, scene.needle});
 }
 
 const Field* find_field(std::string_view section, std::string_view key) {

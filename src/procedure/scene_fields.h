@@ -30,7 +30,8 @@ struct Field {
 std::span<const Field> scene_fields();
 const std::vector<std::string>& scene_sections();       // "body", "thread", ... in file order, "" left out
 const char* section_meaning(std::string_view section);  // one line for the reference
-// A list of tables, [[body]] or [[instrument]], has any number of rows; any other section has one.
+// A list of tables ([[body]], [[instrument]], [[suture]]) has any number of rows; any other section has one. A new row of
+// [[suture]] begins as the scene's [thread] and [needle].
 bool is_list(std::string_view section);
 size_t rows_of(const SceneSpec& scene, std::string_view section);
 void add_row(SceneSpec& scene, std::string_view section);

@@ -34,6 +34,9 @@ std::vector<std::string> keys_of(std::string_view section) {
 
 [[noreturn]] void unknown_key(const std::string& where, std::string_view section, std::string_view key) {
   std::string nearest = nearest_word(key, keys_of(section));
+  // A key of a table within the section, without that table's name.
+  for (const Field& f : scene_fields())
+    if (nearest.empty() && section == f.section && std::string_view(f.key).ends_with("." + std::string(key))) nearest = f.key;
   // A key written in the wrong section is more likely than a distant misspelling.
   for (const Field& f : scene_fields())
     if (nearest.empty() && key == f.key) nearest = full_key(f);
@@ -131,6 +134,11 @@ struct Assign {
   }
 };
 
+bool has_keys_within(std::string_view section, const std::string& table) {
+  return std::any_of(scene_fields().begin(), scene_fields().end(),
+                     [&](const Field& f) { return section == f.section && std::string_view(f.key).starts_with(table); });
+}
+
 bool is_preset(const Field& f) { return std::strcmp(f.section, "solver") == 0 && std::strcmp(f.key, "preset") == 0; }
 
 void assign(SceneSpec& scene, const Field& field, size_t body, const toml::node& node, const std::string& where) {
@@ -138,14 +146,22 @@ void assign(SceneSpec& scene, const Field& field, size_t body, const toml::node&
   if (is_preset(field)) use_preset(scene, scene.solver.preset, where);
 }
 
-void read_section(SceneSpec& scene, const char* section, size_t body, const toml::table& table, const std::string& file) {
+// within: "" or "thread.", a table inside the section.
+void read_section(SceneSpec& scene, const char* section, size_t body, const toml::table& table, const std::string& file,
+                  const std::string& within = "") {
   // The preset is applied before the other keys, at any position in the section.
   if (std::strcmp(section, "solver") == 0)
     if (const toml::node* preset = table.get("preset"))
       assign(scene, *find_field("solver", "preset"), 0, *preset, at_line(file, preset->source()));
-  for (const auto& [key, node] : table) {
-    const Field* field = find_field(section, key.str());
-    if (!field) unknown_key(at_line(file, key.source()), section, key.str());
+  for (const auto& [name, node] : table) {
+    const std::string key = within + std::string(name.str());
+    const Field* field = find_field(section, key);
+    const toml::table* inner = node.as_table();
+    if (!field && inner && has_keys_within(section, key + ".")) {
+      read_section(scene, section, body, *inner, file, key + ".");
+      continue;
+    }
+    if (!field) unknown_key(at_line(file, name.source()), section, key);
     if (!is_preset(*field)) assign(scene, *field, body, node, at_line(file, node.source()));
   }
 }
@@ -197,6 +213,19 @@ bool is_toml_text(const std::string& text) {
   } catch (const toml::parse_error&) { return false; }
 }
 
+void read_list(SceneSpec& scene, const std::string& section, const toml::node& node, const std::string& where,
+               const std::string& file) {
+  const toml::array* list = node.as_array();
+  if (!list || !list->is_homogeneous(toml::node_type::table))
+    throw InputError(where, section + " cannot be " + found_text(node),
+                     fmt::format("write [[{}]] in double brackets for every {}{}", section, section,
+                                 section == "suture" ? "; its mechanics are in [mechanics]" : ""));
+  for (const toml::node& row : *list) {
+    add_row(scene, section);
+    read_section(scene, section.c_str(), rows_of(scene, section) - 1, *row.as_table(), file);
+  }
+}
+
 SceneSpec scene_of_table(const toml::table& root, const std::string& file) {
   SceneSpec scene;
   scene.name = fs::path(file).stem().string();
@@ -209,15 +238,10 @@ SceneSpec scene_of_table(const toml::table& root, const std::string& file) {
       const Field* field = find_field("", section);
       if (!field) unknown_key(where, "", section);
       assign(scene, *field, 0, node, at_line(file, node.source()));
+    } else if (section == "suture") {
+      // Below: it inherits [thread] and [needle], wherever in the file they are.
     } else if (is_list(section)) {
-      const toml::array* list = node.as_array();
-      if (!list || !list->is_homogeneous(toml::node_type::table))
-        throw InputError(where, section + " cannot be " + found_text(node),
-                         fmt::format("write [[{}]] in double brackets for every {}", section, section));
-      for (const toml::node& row : *list) {
-        add_row(scene, section);
-        read_section(scene, section.c_str(), rows_of(scene, section) - 1, *row.as_table(), file);
-      }
+      read_list(scene, section, node, where, file);
     } else if (const toml::table* table = node.as_table()) {
       if (section != "expect") {
         read_section(scene, section.c_str(), 0, *table, file);
@@ -234,6 +258,8 @@ SceneSpec scene_of_table(const toml::table& root, const std::string& file) {
                        fmt::format("it is a table: write [{}]", section));
     }
   }
+  if (const auto sutures = root.find("suture"); sutures != root.end())
+    read_list(scene, "suture", sutures->second, at_line(file, sutures->first.source()), file);
   return scene;
 }
 
@@ -356,9 +382,7 @@ void set_value(SceneSpec& scene, const std::string& key_equals_value, const std:
   if (is_list(list) && (bracket == std::string::npos || section.back() == ']')) {
     const std::string number = bracket == std::string::npos ? "" : section.substr(bracket + 1, section.size() - bracket - 2);
     last = rows_of(scene, list);
-    if (number.empty()) {
-      if (last == 0) throw InputError(here, fmt::format("the scene has no {}", list), "add one to the scene file");
-    } else {
+    if (!number.empty()) {
       const bool digits = number.size() < 7 && number.find_first_not_of("0123456789") == std::string::npos;
       first = digits ? std::stoul(number) : last;
       if (first >= last)
@@ -380,6 +404,7 @@ void set_value(SceneSpec& scene, const std::string& key_equals_value, const std:
   }
   const Field* field = section == "expect" ? nullptr : find_field(section, key);
   if (!field && section != "expect") unknown_key(here, section, key);
+  if (first == last) throw InputError(here, fmt::format("the scene has no {}", section), "add one to the scene file");
 
   // On a command line text needs no quotes.
   const bool is_text = field && type_name(*field) == "text";
@@ -402,6 +427,9 @@ void set_value(SceneSpec& scene, const std::string& key_equals_value, const std:
     read_expectation(scene, key, node, here);
   } else {
     for (size_t b = first; b < last; ++b) assign(scene, *field, b, node, here);
+    // [thread] and [needle] are those of every suture.
+    if (const Field* inherited = find_field("suture", section + "." + key))
+      for (size_t b = 0; b < scene.suture.size(); ++b) assign(scene, *inherited, b, node, here);
   }
 }
 
@@ -414,7 +442,8 @@ void use_preset(SceneSpec& scene, std::string preset, const std::string& where) 
 }
 
 bool same_scene(const SceneSpec& a, const SceneSpec& b) {
-  if (a.body.size() != b.body.size() || a.instrument.size() != b.instrument.size() || a.expect.size() != b.expect.size())
+  if (a.body.size() != b.body.size() || a.instrument.size() != b.instrument.size() || a.suture.size() != b.suture.size() ||
+      a.expect.size() != b.expect.size())
     return false;
   SceneSpec x = a, y = b;
   for (const Field& f : scene_fields())

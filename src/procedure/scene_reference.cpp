@@ -15,11 +15,14 @@ std::string heading(const std::string& section) {
   return is_list(section) ? fmt::format("[[{}]]", section) : fmt::format("[{}]", section);
 }
 
+// A [[suture]] inherits what it does not state.
+std::string shown_default(const Field& f) { return std::string_view(f.section) == "suture" ? f.key : default_text(f); }
+
 std::string one_key(const Field& f) {
   const std::string unit = f.unit, range = range_text(f);
   std::string out = fmt::format("{}\n  {}\n  type     {}\n", full_key(f), f.meaning, type_name(f));
   if (!unit.empty()) out += fmt::format("  unit     {}\n", unit);
-  out += fmt::format("  default  {}\n", default_text(f));
+  out += fmt::format("  default  {}\n", shown_default(f));
   if (!range.empty()) out += fmt::format("  range    {}\n", range);
   return out;
 }
@@ -39,7 +42,7 @@ std::string section_text(const std::string& section) {
     if (section != f.section) continue;
     const std::string unit = f.unit;
     out += fmt::format("  {:<20} {:<13} {:<9} {:<18} {}\n", f.key, type_name(f), unit.empty() ? "" : fmt::format("[{}]", unit),
-                       default_text(f), f.meaning);
+                       shown_default(f), f.meaning);
   }
   return out;
 }
@@ -99,7 +102,7 @@ std::string reference_markdown() {
     out += "| key | type | unit | default | range | meaning |\n|---|---|---|---|---|---|\n";
     for (const Field& f : scene_fields())
       if (section == f.section)
-        out += fmt::format("| `{}` | {} | {} | `{}` | {} | {} |\n", f.key, type_name(f), f.unit, default_text(f),
+        out += fmt::format("| `{}` | {} | {} | `{}` | {} | {} |\n", f.key, type_name(f), f.unit, shown_default(f),
                            cell(range_text(f)), cell(f.meaning));
   };
   table("");

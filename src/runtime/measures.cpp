@@ -53,9 +53,9 @@ const std::array<LiveParameter, kLiveParameters>& live_parameters() {
       {"solver.thread_damping", 0, 60, [](const SceneSpec& s) { return s.solver.thread_damping; }},
       {"solver.friction_tissue", 0, 1, [](const SceneSpec& s) { return s.solver.friction_tissue; }},
       {"solver.friction_thread", 0, 1, [](const SceneSpec& s) { return s.solver.friction_thread; }},
-      {"suture.pass_tension", 0.001f, 0.5f, [](const SceneSpec& s) { return s.suture.pass_tension; }},
-      {"suture.capstan_friction", 0, 0.5f, [](const SceneSpec& s) { return s.suture.capstan_friction; }},
-      {"suture.release_distance", 0.0005f, 0.008f, [](const SceneSpec& s) { return s.suture.release_distance; }},
+      {"mechanics.pass_tension", 0.001f, 0.5f, [](const SceneSpec& s) { return s.mechanics.pass_tension; }},
+      {"mechanics.capstan_friction", 0, 0.5f, [](const SceneSpec& s) { return s.mechanics.capstan_friction; }},
+      {"mechanics.release_distance", 0.0005f, 0.008f, [](const SceneSpec& s) { return s.mechanics.release_distance; }},
       {"technique.closure_compliance", 0.000002f, 0.002f, [](const SceneSpec& s) { return s.technique.closure_compliance; }},
   }};
   return kList;

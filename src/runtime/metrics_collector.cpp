@@ -26,11 +26,13 @@ bool RunResult::expectations_hold() const {
 namespace {
 
 // |free end - needle end| / sum of the thread outside the first and the last suture point, as it lies. 0 without both.
-double tail_asymmetry(const Snapshot& seen) {
-  if (seen.active().suture_point.empty() || seen.active().thread_order.size() < 2) return 0;
-  const auto begin = seen.active().thread_order.begin(), end = seen.active().thread_order.end();
+double tail_asymmetry(const Snapshot& seen, size_t which) {
+  if (which >= seen.suture.size()) return 0;
+  const SutureView& suture = seen.suture[which];
+  if (suture.suture_point.empty() || suture.thread_order.size() < 2) return 0;
+  const auto begin = suture.thread_order.begin(), end = suture.thread_order.end();
   std::ptrdiff_t first = end - begin, last = 0;
-  for (const SuturePointView& p : seen.active().suture_point) {
+  for (const SuturePointView& p : suture.suture_point) {
     const auto at = std::find(begin, end, p.anchored) - begin;
     first = std::min(first, at), last = std::max(last, at);
   }
@@ -47,7 +49,7 @@ double tail_asymmetry(const Snapshot& seen) {
 }  // namespace
 
 MetricsCollector::MetricsCollector(const SceneSpec& scene, const PictureModel& picture)
-    : scene_(scene), suture_(picture.suture) {}
+    : scene_(scene), suture_(picture.suture), tail_asymmetry_(picture.suture.size(), -1) {}
 
 void MetricsCollector::open() { opening_wanted_ = true; }
 
@@ -58,7 +60,9 @@ void MetricsCollector::tick(const Snapshot& seen) {
   for (const Event& e : seen.event) {
     count(counts_, e);
     passing = passing || e.kind == EventKind::particle_passed;
-    if (e.kind == EventKind::throw_started && tail_asymmetry_ < 0) tail_asymmetry_ = tail_asymmetry(seen);
+    if (e.kind != EventKind::throw_started || e.suture >= tail_asymmetry_.size()) continue;
+    double& of_suture = tail_asymmetry_[e.suture];
+    if (of_suture < 0) of_suture = tail_asymmetry(seen, e.suture);
   }
   const float error = thread_length_error(seen);
   if (!std::isfinite(error)) valid_ = false;
@@ -157,8 +161,10 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   v["sutures"] = static_cast<double>(last.settled.size() + counts_.tied());
   measure_seam(last, v);
   v["needle_detached"] = static_cast<double>(off);
-  v["held_ends"] = std::max(last.tool[0].held_strands, last.tool[1].held_strands);
-  v["tail_asymmetry"] = std::max(0.0, tail_asymmetry_);
+  double& held = v["held_ends"] = 0;
+  for (const ToolView& tool : last.tool) held = std::max(held, static_cast<double>(tool.held_strands));
+  double& uneven = v["tail_asymmetry"] = 0;
+  for (const double of_suture : tail_asymmetry_) uneven = std::max(uneven, of_suture);
   for (size_t k = 1; k < counts_.faults.size(); ++k) {
     const std::string name = fault_name(static_cast<Fault>(k));
     if (counts_.faults[k]) result.faults[name] = counts_.faults[k];

@@ -77,8 +77,8 @@ class MetricsCollector {
   bool opening_wanted_ = true, valid_ = true;
   float opening_at_start_ = 0, length_error_ = 0, length_error_passing_ = 0;
   uint32_t order_errors_ = 0, contacts_ = 0;
-  Counts counts_;               // a Snapshot lists no settled knots
-  double tail_asymmetry_ = -1;  // -1: no knot was begun yet
+  Counts counts_;                       // a Snapshot lists no settled knots
+  std::vector<double> tail_asymmetry_;  // per suture, when its first knot was begun; -1: none yet
   std::vector<float> solver_ms_, tick_ms_;
   std::array<std::vector<float>, kStages> stage_ms_;
   double spent_ms_ = 0, longest_ms_ = 0;

@@ -1,10 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: see practice.h.
+// runtime: see session_metrics.h.
 #include "runtime/session_metrics.h"
 
 #include <algorithm>
 
 namespace catgut {
+
+namespace {
+
+void forget_throws(Counts& c, size_t suture) {
+  if (suture < c.throws_of.size()) c.throws_of[suture].fill(0);
+}
+
+}  // namespace
+
+uint32_t Counts::tied() const {
+  return static_cast<uint32_t>(
+      std::count_if(throws_of.begin(), throws_of.end(), [](const ThrowsOfKnots& t) { return t != ThrowsOfKnots{}; }));
+}
 
 void count(Counts& c, const Event& e) {
   if (e.kind < EventKind::count_) ++c.events[static_cast<size_t>(e.kind)];
@@ -16,7 +29,9 @@ void count(Counts& c, const Event& e) {
       ++c.bites_withdrawn;
       break;
     case EventKind::throw_locked: {  // one more throw
-      uint8_t& throws = c.throws_of_knot[std::min<size_t>(e.which, c.throws_of_knot.size() - 1)];
+      if (e.suture >= c.throws_of.size()) c.throws_of.resize(e.suture + 1u);
+      Counts::ThrowsOfKnots& suture = c.throws_of[e.suture];
+      uint8_t& throws = suture[std::min<size_t>(e.which, suture.size() - 1)];
       c.knots += throws == 0;
       throws = static_cast<uint8_t>(std::min(throws + 1, 255));
       c.last_knot_throws = throws;
@@ -24,11 +39,11 @@ void count(Counts& c, const Event& e) {
       break;
     }
     case EventKind::suture_loaded:
-      c.throws_of_knot.fill(0);
+      forget_throws(c, e.suture);
       break;
     case EventKind::suture_baked:
       ++c.sutures_baked;
-      c.throws_of_knot.fill(0);
+      forget_throws(c, e.suture);
       break;
     case EventKind::thread_cut:
       ++c.cuts;

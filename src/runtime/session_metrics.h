@@ -4,6 +4,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "exchange/snapshot.h"
 
@@ -22,9 +23,11 @@ struct Counts {
   uint32_t last_knot_throws = 0;  // of the knot that was tied last
   uint32_t cuts = 0;
   uint32_t sutures_baked = 0;
-  uint32_t needle_slips = 0;                 // the needle was torn out of a jaw
-  std::array<uint8_t, 32> throws_of_knot{};  // of the suture in hand; knots are numbered from 0 in every suture
-  bool tied() const { return throws_of_knot != decltype(throws_of_knot){}; }  // the suture in hand has a knot
+  uint32_t needle_slips = 0;  // the needle was torn out of a jaw
+  // Locked throws of every suture that is not baked; knots are numbered from 0 in each. A suture without a throw: no row.
+  using ThrowsOfKnots = std::array<uint8_t, 32>;
+  std::vector<ThrowsOfKnots> throws_of;
+  uint32_t tied() const;  // sutures with a knot among them
 };
 void count(Counts& counts, const Event& event);
 

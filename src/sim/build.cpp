@@ -18,10 +18,10 @@
 namespace catgut {
 namespace {
 
-constexpr float kPaperSubstep = 1.0f / 480;  // [s] substep for which the paper's deformation resistance is defined
-constexpr float kDrapeBelowRim = 0.035f;     // [m] below the rim, where a body stands up through the drape
-constexpr float kDrapeBelowBody = 0.010f;    // [m] below the body, where it lies on the drape
-constexpr float kSutureApart = 0.095f;       // [m] between sutures on the drape: one turn of thread and room for a hand
+constexpr float kPaperSubstep = 1.0f / 480;    // [s] substep for which the paper's deformation resistance is defined
+constexpr float kDrapeBelowRim = 0.035f;       // [m] below the rim, where a body stands up through the drape
+constexpr float kDrapeBelowBody = 0.010f;      // [m] below the body, where it lies on the drape
+constexpr float kRow = 0.07f, kTurn = 0.005f;  // [m] of a thread on the drape: length of a row, radius of its turns
 
 BodyRest make_body(const BodySpec& spec) {
   if (!spec.mesh.empty()) {
@@ -59,7 +59,6 @@ bool lies(const BodySpec& body) { return std::abs(body.axis.y) < 0.7f * length(b
 
 // The thread lies on the drape in parallel rows. It begins at `start` and leads away along +x.
 std::vector<Vec3> lay_thread(const ThreadSpec& spec, Vec3 start) {
-  constexpr float kRow = 0.07f, kTurn = 0.005f;  // [m] length of a row, radius of its turns
   const float turn = kPi * kTurn;
   std::vector<Vec3> p;
   for (int i = 0; i < spec.particles; ++i) {
@@ -152,24 +151,30 @@ StrandModel make_strand(const SceneSpec& scene, const ThreadSpec& spec, uint32_t
   t.bend_sweeps = scene.solver.bend_sweeps;
   t.distance_sweeps = scene.solver.distance_sweeps;
   t.direct = scene.solver.thread_direct;
-  t.collision_off = scene.suture.collision_off;
+  t.collision_off = scene.mechanics.collision_off;
   t.gravity = gravity;
   return t;
 }
 
-// Needles and threads lie on the drape to the right of the organ, one behind the other. Each needle's circle lies flat and its
-// thread leads away from its swage. Two bowel ends lie along x, with the needles in front of them.
-void lay_out_sutures(Model& m, const std::vector<NeedleAndThread>& sutures, Vec3 rim, bool two, float tube) {
+// [m] along x that a suture takes on the drape, with room for a hand's jaws beside the needle.
+float room_for(const SutureSpec& suture) {
+  const float length = static_cast<float>(suture.thread.particles) * suture.thread.spacing;
+  return 2 * kTurn * std::ceil(length / (kRow + kPi * kTurn)) + 3 * suture.needle.radius;
+}
+
+// Needles and threads lie on the drape side by side, to the right of the organ. Each needle's circle lies flat and its thread
+// leads away from its swage. Two bowel ends lie along x, with the needles in front of them, from right to left.
+void lay_out_sutures(Model& m, const std::vector<SutureSpec>& sutures, Vec3 rim, bool two, float tube) {
   const Pose flat{{}, axis_angle({1, 0, 0}, -0.5f * kPi)};  // body z up: the circle lies in the plane of the drape
   Vec3 beside = two ? Vec3{0.02f, 0, tube + 0.03f} : Vec3{tube + 0.03f, 0, 0.01f};
   for (size_t k = 0; k < sutures.size(); ++k) {
     const NeedleSpec& needle = sutures[k].needle;
+    if (k > 0) beside.x += two ? -room_for(sutures[k]) : room_for(sutures[k - 1]);
     const float wire = m.solver.ground + needle.wire_radius + 0.0002f;
     const Pose start{Vec3{rim.x + beside.x, wire, rim.z + beside.z}, flat.q};
     m.needle_start.push_back(start);
     const std::vector<Vec3> thread = lay_thread(sutures[k].thread, transform(start, m.solver.needle_arc[k].point(0)));
     for (size_t i = thread.size(); i-- > 0;) m.start.push_back(thread[i]);  // free end first
-    beside.z += kSutureApart;
   }
 }
 
@@ -263,8 +268,8 @@ void add_instruments(Model& m, const SceneSpec& scene, Vec3 rim, const std::stri
 
 }  // namespace
 
-std::vector<NeedleAndThread> sutures_of(const SceneSpec& scene) {
-  return scene.sutures.empty() ? std::vector{NeedleAndThread{scene.thread, scene.needle}} : scene.sutures;
+std::vector<SutureSpec> sutures_of(const SceneSpec& scene) {
+  return scene.suture.empty() ? std::vector{SutureSpec{scene.thread, scene.needle}} : scene.suture;
 }
 
 bool apply_preset(SolverSpec& s, const std::string& preset) {
@@ -296,8 +301,8 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   m.scene = scene;
   const std::string where = scene.name.empty() ? "scene" : scene.name;
   if (scene.body.empty()) throw InputError(where, "it has no [[body]]", "add at least one soft body");
-  const std::vector<NeedleAndThread> sutures = sutures_of(scene);
-  for (const NeedleAndThread& u : sutures)
+  const std::vector<SutureSpec> sutures = sutures_of(scene);
+  for (const SutureSpec& u : sutures)
     if (u.thread.particles < 8) throw InputError(where, "thread.particles is below 8", "a thread needs at least 8 particles");
   m.dt = 1.0f / scene.solver.tick_rate;
   m.substeps = scene.solver.substeps;
@@ -357,7 +362,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   }
   s.tissue = static_cast<uint32_t>(rest.size());
   s.count = s.tissue;
-  for (const NeedleAndThread& u : sutures) {
+  for (const SutureSpec& u : sutures) {
     s.strand.push_back(make_strand(scene, u.thread, s.count, scene.solver.gravity));
     s.count += s.strand.back().count;
     s.inv_mass.resize(s.count, s.strand.back().inv_mass);
@@ -387,7 +392,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
     m.suture.instrument.push_back(*kind);
     s.body.push_back(kind->body);
   }
-  for (const NeedleAndThread& u : sutures) {
+  for (const SutureSpec& u : sutures) {
     const NeedleShape needle{u.needle.radius, u.needle.arc, u.needle.wire_radius, u.needle.mass};
     s.needle_arc.push_back(needle_arc(needle));
     s.body.push_back(needle_body(needle));
@@ -395,13 +400,13 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   s.ground = drape;
 
   SutureModel& u = m.suture;
-  u.attach_threshold = scene.suture.attach_threshold;
-  u.release_distance = scene.suture.release_distance;
-  u.attach_compliance = scene.suture.attach_compliance;
-  u.track_compliance = scene.suture.track_compliance;
-  u.pass_tension = scene.suture.pass_tension;
-  u.capstan_friction = scene.suture.capstan_friction;
-  u.grasp_reach = scene.suture.grasp_reach;
+  u.attach_threshold = scene.mechanics.attach_threshold;
+  u.release_distance = scene.mechanics.release_distance;
+  u.attach_compliance = scene.mechanics.attach_compliance;
+  u.track_compliance = scene.mechanics.track_compliance;
+  u.pass_tension = scene.mechanics.pass_tension;
+  u.capstan_friction = scene.mechanics.capstan_friction;
+  u.grasp_reach = scene.mechanics.grasp_reach;
   u.min_throws = scene.technique.throws;
 
   m.technique = make_technique(scene, working_rim, wall, where);

@@ -54,8 +54,8 @@ struct NeedleSpec {
   float mass = 0.005f;           // [kg] inertia; larger than the steel's 0.07 g, to match the scaled inertia of the tissue
 };
 
-// One of several sutures: a needle and the thread swaged to it.
-struct NeedleAndThread {
+// A suture: a needle and the thread swaged to it.
+struct SutureSpec {
   ThreadSpec thread;
   NeedleSpec needle;
 };
@@ -88,7 +88,7 @@ struct SolverSpec {
 };
 
 // Guided mechanics (paper 2.2, 2.3).
-struct SutureSpec {
+struct MechanicsSpec {
   float attach_threshold = 0.006f;     // [m] X of figure 4: maximum distance from the tip to the nearest particle
   float release_distance = 0.0022f;    // [m] drag beyond which the attached particle is released (figure 5)
   float attach_compliance = 0.00091f;  // [m/N] of that attachment: 1 / 1100 N/m, the paper's spring
@@ -141,16 +141,16 @@ struct SceneSpec {
   std::vector<InstrumentSpec> instrument;
   ThreadSpec thread;
   NeedleSpec needle;
-  std::vector<NeedleAndThread> sutures;  // ready at the start; empty: one, of `thread` and `needle`
+  std::vector<SutureSpec> suture;  // ready at the start; empty: one, of `thread` and `needle`
   SolverSpec solver;
-  SutureSpec suture;
+  MechanicsSpec mechanics;
   TechniqueSpec technique;
   SurgeonSpec surgeon;
   std::vector<Expectation> expect;
 };
 
 // The needles and threads of a scene: at least one.
-std::vector<NeedleAndThread> sutures_of(const SceneSpec& scene);
+std::vector<SutureSpec> sutures_of(const SceneSpec& scene);
 // Sets all solver parameters to the named preset ("paper" or "default"); false if there is no such preset.
 bool apply_preset(SolverSpec& solver, const std::string& preset);
 

@@ -2,6 +2,8 @@
 // surgeon/plan: the four techniques of paper 2.5 as lists of tasks. Reads the picture at rest; see plan.h.
 #include "surgeon/plan.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -13,6 +15,7 @@ namespace {
 
 constexpr int kBitesPerThread = 10;
 constexpr float kRow = 0.004f;         // [m] between two rows of bites
+constexpr float kStaysApart = 0.012f;  // [m] round the bowel, between stay sutures
 constexpr float kFreeDepth = 0.0045f;  // [m] depth below the rims of a sweep through two layers
 
 // Depth of the needle's circle below a surface of radius `curved` [m] whose chord is `length`.
@@ -162,26 +165,37 @@ Plan connell_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
-// 2.5.3: one bite through each bowel end, across the gap; equalized, tied, the needle cut off, both ends held.
+// 2.5.3: one bite through each bowel end, across the gap; equalized, tied, the needle cut off, both ends held. With several
+// needles: one stay suture with each, side by side from the far side to the near one; all but the last are cut short.
 Plan stay_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;
-  for (uint32_t wall = 0; wall < 2; ++wall) {
-    BitePlace p = on_top(picture, wall, 0, skill.edge_distance + 0.5f * skill.bite_length);
-    p.up = {0, 0, 1};
-    p.length = skill.bite_length;
-    p.depth = depth_of(p.length, picture.suture[0].needle_radius, 1e9f);
-    plan.place.push_back(p);
+  const int sutures = static_cast<int>(picture.suture.size());
+  const float turn = kStaysApart / opening_shape(picture, 0).radius;
+  for (int s = 0; s < sutures; ++s) {
+    const float angle = turn * (static_cast<float>(s) - 0.5f * static_cast<float>(sutures - 1));
+    for (uint32_t wall = 0; wall < 2; ++wall) {
+      BitePlace p = on_top(picture, wall, angle, skill.edge_distance + 0.5f * skill.bite_length);
+      p.up = {0, 0.0f - portable::sin(angle), portable::cos(angle)};
+      p.length = skill.bite_length;
+      p.suture = static_cast<uint32_t>(s);
+      p.depth = depth_of(p.length, picture.suture[p.suture].needle_radius, 1e9f);
+      plan.place.push_back(p);
+    }
+    add(plan, TaskKind::pick_up, s);
+    add(plan, TaskKind::bite, 2 * s);
+    add(plan, TaskKind::hand_back);
+    add(plan, TaskKind::bite, 2 * s + 1);
+    add(plan, TaskKind::pull_tail);
+    add(plan, TaskKind::draw);
+    add(plan, TaskKind::regrip);
+    add(plan, TaskKind::throw_, 1, 1);
+    add(plan, TaskKind::throw_, 1, -1);
+    if (s + 1 == sutures) break;
+    add(plan, TaskKind::cut_long);
+    add(plan, TaskKind::cut_tail);
+    add(plan, TaskKind::discard);
   }
-  add(plan, TaskKind::pick_up);
-  add(plan, TaskKind::bite, 0);
-  add(plan, TaskKind::hand_back);
-  add(plan, TaskKind::bite, 1);
-  add(plan, TaskKind::pull_tail);
-  add(plan, TaskKind::draw);
-  add(plan, TaskKind::regrip);
-  add(plan, TaskKind::throw_, 1, 1);
-  add(plan, TaskKind::throw_, 1, -1);
   add(plan, TaskKind::take_both);
   add(plan, TaskKind::cut_needle);
   add(plan, TaskKind::rest);
@@ -241,17 +255,37 @@ BiteFrame bite_frame(const PictureModel& picture, const Snapshot& seen, const Bi
   return f;
 }
 
-Plan make_plan(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill) {
-  const size_t walls = technique == "purse_string" || technique == "running" ? 1 : 2;
-  for (size_t w = 0; w < walls; ++w)
+namespace {
+
+struct PlanRow {
+  const char* name;
+  size_t walls;  // open rims that it needs
+  Plan (*make)(const PictureModel&, const SurgeonSkill&);
+};
+constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
+                             {"connell", 2, connell_plan},
+                             {"stay", 2, stay_plan},
+                             {"lembert", 2, lembert_plan},
+                             {"running", 1, running_plan}};
+
+}  // namespace
+
+std::span<const char* const> plan_names() {
+  static constexpr auto kName = [] {
+    std::array<const char*, std::size(kPlan)> names{};
+    for (size_t i = 0; i < names.size(); ++i) names[i] = kPlan[i].name;
+    return names;
+  }();
+  return kName;
+}
+
+Plan make_plan(const std::string& name, const PictureModel& picture, const SurgeonSkill& skill) {
+  const auto row = std::find_if(std::begin(kPlan), std::end(kPlan), [&](const PlanRow& r) { return r.name == name; });
+  if (row == std::end(kPlan)) throw std::invalid_argument("there is no scripted surgeon for \"" + name + "\"");
+  for (size_t w = 0; w < row->walls; ++w)
     if (picture.body.empty() || w >= picture.rim.size() || picture.rim[w].empty())
-      throw std::invalid_argument("the scene does not have the openings that the technique \"" + technique + "\" works on");
-  if (technique == "purse_string") return purse_string_plan(picture, skill);
-  if (technique == "running") return running_plan(picture, skill);
-  if (technique == "connell") return connell_plan(picture, skill);
-  if (technique == "stay") return stay_plan(picture, skill);
-  if (technique == "lembert") return lembert_plan(picture, skill);
-  throw std::invalid_argument("there is no scripted surgeon for technique \"" + technique + "\"");
+      throw std::invalid_argument("the scene does not have the openings that \"" + name + "\" works on");
+  return row->make(picture, skill);
 }
 
 }  // namespace catgut

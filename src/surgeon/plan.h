@@ -2,6 +2,7 @@
 // surgeon/plan: a technique as a list of tasks for two hands, with the positions of its bites. The engine (surgeon/scripted)
 // carries out the tasks in order; each checks the actual state before the next begins.
 #pragma once
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,12 +15,13 @@ namespace catgut {
 // Where the needle's circle cuts the tissue, at rest. The needle turns about `up`: its tip enters along `along`, which is
 // cross(out, up), and is deepest at `at - out * depth`.
 struct BitePlace {
-  Vec3 at, out, up;    // [m], unit, unit; at: on the surface, or midway between two layers
-  float length = 0;    // [m] chord from entry to exit
-  float depth = 0;     // [m]
-  uint32_t wall = 0;   // whose tissue carries it
-  bool level = false;  // hands keep the circle nearly square to `up` where the tissue is inclined
-  int walls = 1;       // passages through a wall that the sweep makes
+  Vec3 at, out, up;     // [m], unit, unit; at: on the surface, or midway between two layers
+  float length = 0;     // [m] chord from entry to exit
+  float depth = 0;      // [m]
+  uint32_t wall = 0;    // whose tissue carries it
+  bool level = false;   // hands keep the circle nearly square to `up` where the tissue is inclined
+  int walls = 1;        // passages through a wall that the sweep makes
+  uint32_t suture = 0;  // that makes it
 };
 
 // The current frame of a bite in the world: position, outward direction, direction of the needle, axis of its rotation.
@@ -29,7 +31,7 @@ struct BiteFrame {
 BiteFrame bite_frame(const PictureModel& picture, const Snapshot& seen, const BitePlace& place);
 
 enum class TaskKind {
-  pick_up,        // the needle holder takes the needle from the drape
+  pick_up,        // the needle holder takes the needle of suture `which` from the drape
   bite,           // one sweep of the needle at place[which]; the forceps pulls it out
   pull_tail,      // the forceps pulls thread through until the tail has the planned length
   pull_slack,     // until the span before the last bite has no slack
@@ -43,6 +45,7 @@ enum class TaskKind {
   cut_tail,       // and the tail
   cut_needle,     // at the needle
   take_both,      // the needle holder takes both strands of the knot between its jaws
+  discard,        // the forceps lays a needle that was cut off beside the field
   fresh,          // a new suture
   rest            // hands off; the tissue settles
 };
@@ -62,8 +65,8 @@ struct Plan {
   float lift = 0;  // [m] along `up`, on approach to a bite
 };
 
-// technique: purse_string, connell, stay, lembert, or running (bites in one bowel end, row by row).
-// Throws std::invalid_argument for a technique without a plan, or a picture that does not fit it.
-Plan make_plan(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
+// A plan is a row of one table. Throws std::invalid_argument for a name that is not in it, or a picture that does not fit.
+Plan make_plan(const std::string& name, const PictureModel& picture, const SurgeonSkill& skill);
+std::span<const char* const> plan_names();
 
 }  // namespace catgut

@@ -2,6 +2,7 @@
 // surgeon/scripted: tasks, bites and pulling thread; see scripted.h.
 #include "surgeon/scripted.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -14,8 +15,8 @@ constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f;  // positions on the need
 
 }  // namespace
 
-Scripted::Scripted(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill)
-    : picture_(picture), skill_(skill), plan_(make_plan(technique, picture, skill)), random_(skill.seed) {
+Scripted::Scripted(const std::string& plan, const PictureModel& picture, const SurgeonSkill& skill)
+    : picture_(picture), skill_(skill), plan_(make_plan(plan, picture, skill)), random_(skill.seed) {
   hand_[kNeedleHolder].pose = {picture.focus + Vec3{0.06f, 0.08f, 0.05f}, {}};
   hand_[kForceps].pose = {picture.focus + Vec3{-0.08f, 0.08f, 0.06f}, {}};
 }
@@ -45,6 +46,7 @@ void Scripted::take_over(const Snapshot& seen) {
     hand_[k].jaw = seen.tool[k].jaw;
     if (holds_needle(seen, k)) remember_grip(seen, k);
   }
+  suture_ = seen.active_suture;
   frame_ = frame(seen, place_);
   bites_before_ = seen.active().bite.size();
   pull_from_ = hand_[kForceps].pose;
@@ -114,21 +116,27 @@ BiteFrame Scripted::frame(const Snapshot& seen, size_t place) const {
   return bite_frame(picture_, seen, plan_.place[std::min(place, plan_.place.size() - 1)]);
 }
 
+size_t Scripted::first_place() const {
+  const auto mine = [&](const BitePlace& p) { return p.suture == suture_; };
+  const auto first = std::find_if(plan_.place.begin(), plan_.place.end(), mine);
+  return static_cast<size_t>(first - plan_.place.begin());
+}
+
 Pose Scripted::needle_at(const BiteFrame& f, float psi) const {
-  const Vec3 center = f.at + f.out * (picture_.suture[0].needle_radius - bite().depth + depth_error_ + depth_fix_);
+  const Vec3 center = f.at + f.out * (shape().needle_radius - bite().depth + depth_error_ + depth_fix_);
   const Vec3 x = f.out * portable::cos(psi) - f.along * portable::sin(psi);
   // The tip is at the end of the arc: for arcs other than a half circle, rotate back by the difference.
   const Pose half{center, from_axes(x, cross(f.up, x), f.up)};
-  return half * Pose{{}, axis_angle({0, 0, 1}, kPi - picture_.suture[0].needle_arc)};
+  return half * Pose{{}, axis_angle({0, 0, 1}, kPi - shape().needle_arc)};
 }
 
 Pose Scripted::grip_at(const Pose& needle, float s, float side, float lean, float psi) const {
-  const float phi = s * picture_.suture[0].needle_arc;
+  const float phi = s * shape().needle_arc;
   const Vec3 radial = rotate(needle.q, {portable::cos(phi), portable::sin(phi), 0});
   const Vec3 outward = rotate(needle.q, {portable::cos(psi), -portable::sin(psi), 0});
   const Vec3 z = normalized(rotate(needle.q, {0, 0, side}) + outward * lean);
   const Vec3 y = normalized(cross(z, radial), any_perpendicular(z)), x = cross(y, z);
-  return {needle.p + radial * picture_.suture[0].needle_radius, from_axes(x, y, z)};
+  return {needle.p + radial * shape().needle_radius, from_axes(x, y, z)};
 }
 
 Pose Scripted::driver_grip(const Pose& needle) const {
@@ -149,6 +157,7 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
   switch (task.kind) {
     case TaskKind::pick_up:
       doing_ = "pick up the needle";
+      suture_ = static_cast<size_t>(task.which);
       return pick_up(seen);
     case TaskKind::bite:
       place_ = static_cast<size_t>(task.which);
@@ -178,6 +187,9 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
     case TaskKind::take_both:
       doing_ = "grasp both ends";
       return take_both(seen);
+    case TaskKind::discard:
+      doing_ = "discard the needle";
+      return discard(seen);
     case TaskKind::fresh:
       doing_ = "load a new suture";
       return fresh(seen);
@@ -196,7 +208,7 @@ std::string Scripted::name_of_bite() const {
 
 bool Scripted::pick_up(const Snapshot& seen) {
   enum { over, down, close };
-  const Pose grip = driver_grip(seen.active().needle.pose);
+  const Pose grip = driver_grip(seen.suture[suture_].needle.pose);
   if (stage_ != over || seen.tick > 0) rest_aside(seen, kForceps);
   switch (stage_) {
     case over:
@@ -245,7 +257,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
     case drive: {
       doing_ = name_of_bite() + "drive the needle";
       rest_aside(seen, kForceps);
-      psi_ += skill_.drive_speed / picture_.suture[0].needle_radius * dt_;
+      psi_ += skill_.drive_speed / shape().needle_radius * dt_;
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
       const bool out =
           seen.active().bite.size() >= bites_before_ + static_cast<size_t>(bite().walls) && seen.active().bite.back().has_exit;
@@ -264,7 +276,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
     case withdraw: {  // back along the same arc, then the same bite again
       doing_ = name_of_bite() + "withdraw and retry";
       rest_aside(seen, kForceps);
-      psi_ = std::max(psi_ - 2 * skill_.drive_speed / picture_.suture[0].needle_radius * dt_, -psi_bite - 0.7f);
+      psi_ = std::max(psi_ - 2 * skill_.drive_speed / shape().needle_radius * dt_, -psi_bite - 0.7f);
       BiteFrame f = frame_;
       if (!patience(1.5f)) f.at += f.out * std::min(0.01f, 0.01f * (waited_ - 1.5f));  // stuck: move away from the wall
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(f, psi_)), 2 * speed);
@@ -300,7 +312,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
     default: {
       doing_ = name_of_bite() + "pull the needle through";
       rest_aside(seen, kNeedleHolder);
-      psi_ = std::min(psi_ + 2 * skill_.drive_speed / picture_.suture[0].needle_radius * dt_, psi_bite + kPi + 0.5f);
+      psi_ = std::min(psi_ + 2 * skill_.drive_speed / shape().needle_radius * dt_, psi_bite + kPi + 0.5f);
       BiteFrame f = frame_;
       if (!patience(3))  // stuck: an outward pull frees the back end
         f.at += (f.out + (plan_.lift > 0 ? 0.4f : 0.0f) * f.up) * std::min(0.02f, 0.01f * (waited_ - 3));
@@ -393,7 +405,7 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
 bool Scripted::draw(const Snapshot& seen) {
   enum { over, down, close, tighten, lay, open };
   const size_t first = first_point_node(seen);
-  const BiteFrame f = frame(seen, 0);
+  const BiteFrame f = frame(seen, first_place());
   switch (stage_) {
     case over:
     case down:
@@ -456,15 +468,15 @@ bool Scripted::draw(const Snapshot& seen) {
   }
 }
 
-std::unique_ptr<Surgeon> make_demonstrator(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill,
+std::unique_ptr<Surgeon> make_demonstrator(const std::string& plan, const PictureModel& picture, const SurgeonSkill& skill,
                                            const std::vector<size_t>& tasks) {
-  auto surgeon = std::make_unique<Scripted>(technique, picture, skill);
+  auto surgeon = std::make_unique<Scripted>(plan, picture, skill);
   surgeon->take_over_for(tasks);
   return surgeon;
 }
 
-std::unique_ptr<Surgeon> make_surgeon(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill) {
-  return std::make_unique<Scripted>(technique, picture, skill);
+std::unique_ptr<Surgeon> make_surgeon(const std::string& plan, const PictureModel& picture, const SurgeonSkill& skill) {
+  return std::make_unique<Scripted>(plan, picture, skill);
 }
 
 }  // namespace catgut

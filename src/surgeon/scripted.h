@@ -21,7 +21,7 @@ constexpr int kAttempts = 8;  // per bite, per grasp, per throw
 
 class Scripted final : public Surgeon {
  public:
-  Scripted(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
+  Scripted(const std::string& plan, const PictureModel& picture, const SurgeonSkill& skill);
 
   // Only these tasks of the plan, with the tools in their present state.
   void take_over_for(const std::vector<size_t>& tasks);
@@ -61,9 +61,9 @@ class Scripted final : public Surgeon {
   // --- bites ------------------------------------------------------------------------------------------------------------
   BiteFrame frame(const Snapshot& seen, size_t place) const;
   const BitePlace& bite() const { return plan_.place[place_]; }
-  float half_bite_angle() const {
-    return portable::asin(std::min(0.9f, 0.5f * bite().length / picture_.suture[0].needle_radius));
-  }
+  size_t first_place() const;  // of the suture in hand
+  const SuturePicture& shape() const { return picture_.suture[suture_]; }
+  float half_bite_angle() const { return portable::asin(std::min(0.9f, 0.5f * bite().length / shape().needle_radius)); }
 
   // The needle with its tip `psi` past the deepest point of a bite at frame f.
   Pose needle_at(const BiteFrame& f, float psi) const;
@@ -128,6 +128,7 @@ class Scripted final : public Surgeon {
   bool cut(TaskKind kind, const Snapshot& seen);
   static size_t count_cuts(const Snapshot& seen);
 
+  bool discard(const Snapshot& seen);
   bool fresh(const Snapshot& seen);
 
   // The needle's strand is laid along the tail; the needle holder closes on both.
@@ -141,8 +142,9 @@ class Scripted final : public Surgeon {
   std::array<ScriptedHand, kMaxHands - 2> assistant_;
   std::array<uint32_t, 2> buttons_{};
   size_t task_ = 0;
-  int stage_ = 0;     // within the task
-  float waited_ = 0;  // [s] in this stage
+  size_t suture_ = 0;  // in hand
+  int stage_ = 0;      // within the task
+  float waited_ = 0;   // [s] in this stage
   float dt_ = 1.0f / 60;
   int misses_ = 0, attempts_ = 0;
   bool gave_up_ = false, takes_over_ = false;

@@ -37,11 +37,10 @@ class Surgeon {
 
 // Demonstrates part of the work: tasks of the plan, by number and in this order, taking over the tools from the caller at their
 // poses and with what they hold. Throws as make_surgeon, or where the plan has no such task.
-std::unique_ptr<Surgeon> make_demonstrator(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill,
+std::unique_ptr<Surgeon> make_demonstrator(const std::string& plan, const PictureModel& picture, const SurgeonSkill& skill,
                                            const std::vector<size_t>& tasks);
 
-// The techniques of paper 2.5: purse_string, connell, stay, lembert. Throws std::invalid_argument for a technique without a
-// script.
-std::unique_ptr<Surgeon> make_surgeon(const std::string& technique, const PictureModel& picture, const SurgeonSkill& skill);
+// plan: a name of plan_names() (surgeon/plan.h), else std::invalid_argument.
+std::unique_ptr<Surgeon> make_surgeon(const std::string& plan, const PictureModel& picture, const SurgeonSkill& skill);
 
 }  // namespace catgut

@@ -31,9 +31,9 @@ bool Scripted::regrip(const Snapshot& seen) {
     go(over);
     return false;
   }
-  const float phi = kTyingAt * picture_.suture[0].needle_arc;
+  const float phi = kTyingAt * shape().needle_arc;
   const Vec3 place =
-      transform(seen.active().needle.pose, picture_.suture[0].needle_radius * Vec3{portable::cos(phi), portable::sin(phi), 0});
+      transform(seen.active().needle.pose, shape().needle_radius * Vec3{portable::cos(phi), portable::sin(phi), 0});
   const Pose grip = tying_pose(kForceps, place);
   switch (stage_) {
     case over:
@@ -276,6 +276,17 @@ size_t Scripted::count_cuts(const Snapshot& seen) {
   size_t n = 0;
   for (const uint8_t c : seen.active().thread_cut) n += c;
   return n;
+}
+
+bool Scripted::discard(const Snapshot& seen) {
+  enum { aside, let_go };
+  rest_aside(seen, kNeedleHolder);
+  if (stage_ == aside) {
+    if (move(kForceps, {picture_.focus + kAside, hand_[kForceps].pose.q}, skill_.speed) || !patience(2)) go(let_go);
+    return false;
+  }
+  rest_aside(seen, kForceps);
+  return waited_ > 0.6f && !holds_needle(seen, kForceps);
 }
 
 bool Scripted::fresh(const Snapshot& seen) {

@@ -36,11 +36,17 @@ struct Case {
   double seconds;  // [s] simulated, at most
 };
 // The whole procedure of each technique, and ten seconds of what repeats it.
-constexpr Case kCase[] = {
-    {"purse_string", "default", 200}, {"connell", "default", 200},        {"stay", "default", 200},
-    {"lembert", "default", 200},      {"stress_one_body", "default", 10}, {"stress_two_bodies", "default", 10},
-    {"purse_string", "paper", 10},    {"connell", "paper", 10},           {"stay", "paper", 10},
-    {"lembert", "paper", 10}};
+constexpr Case kCase[] = {{"purse_string", "default", 200},
+                          {"connell", "default", 200},
+                          {"stay", "default", 200},
+                          {"lembert", "default", 200},
+                          {"two_sutures", "default", 200},
+                          {"stress_one_body", "default", 10},
+                          {"stress_two_bodies", "default", 10},
+                          {"purse_string", "paper", 10},
+                          {"connell", "paper", 10},
+                          {"stay", "paper", 10},
+                          {"lembert", "paper", 10}};
 
 // A hash of numbers that are handed in one after the other.
 class Hash {

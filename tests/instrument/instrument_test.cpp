@@ -272,8 +272,8 @@ TEST(Instrument, three_hands_hold_three_instruments) {
 }
 
 // The scenes of this repository with more instruments and more hands run, and their recordings replay.
-TEST(Instrument, scenes_with_clamps_and_with_three_hands_record_and_replay) {
-  for (const char* name : {"clamps", "three_hands"}) {
+TEST(Instrument, scenes_with_clamps_three_hands_and_two_sutures_record_and_replay) {
+  for (const char* name : {"clamps", "three_hands", "two_sutures"}) {
     const SceneSpec scene = read_scene(name);
     SessionOptions options;
     options.surgeon = "scripted";

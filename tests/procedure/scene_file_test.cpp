@@ -56,6 +56,7 @@ TEST(SceneFile, every_key_survives_writing_and_reading) {
     SceneSpec scene;
     scene.body.resize(seed % 4);
     scene.instrument.resize(seed % 3);
+    scene.suture.resize(seed % 3);
     for (const Field& f : scene_fields()) {
       if (std::string(f.key) == "preset") continue;
       for (size_t b = 0; b < rows_of(scene, f.section); ++b) randomise(f, f.at(scene, b), random);
@@ -86,6 +87,7 @@ TEST(SceneFile, every_default_lies_in_its_range) {
   SceneSpec scene;
   scene.body.resize(1);
   scene.instrument.resize(1);
+  scene.suture.resize(1);
   for (const Field& f : scene_fields()) {
     const std::string text = default_text(f);
     std::string key = full_key(f);
@@ -130,6 +132,53 @@ TEST(SceneFile, faults_name_file_line_and_the_nearest_key) {
   EXPECT_NE(fault("[expect]\nbites = {mi = 3}").find("lembert.toml:2: expect.bites has no key \"mi\""), std::string::npos);
   EXPECT_NE(fault("[expect]\nbites = {min = 3, max = 1}").find("min is above max"), std::string::npos);
   EXPECT_NE(fault("[expect]\nbites = 'ten'").find("cannot be the text \"ten\""), std::string::npos);
+}
+
+// Two needles with threads: a [[suture]] states where it differs from [thread] and [needle], in any order in the file.
+TEST(SceneFile, a_suture_inherits_the_thread_and_the_needle) {
+  const SceneSpec one = parse_scene("[thread]\nparticles = 50\n", "s.toml");
+  ASSERT_EQ(sutures_of(one).size(), 1u);
+  EXPECT_EQ(sutures_of(one)[0].thread.particles, 50);
+
+  SceneSpec two = parse_scene(
+      "[[suture]]\nthread.particles = 60\n[suture.needle]\nradius = 0.01\n[[suture]]\n"
+      "[thread]\nparticles = 50\nspacing = 0.002\n[needle]\narc = 2.0\n",
+      "s.toml");
+  ASSERT_EQ(two.suture.size(), 2u);
+  EXPECT_EQ(two.suture[0].thread.particles, 60);
+  EXPECT_EQ(two.suture[1].thread.particles, 50);
+  EXPECT_EQ(two.suture[0].needle.radius, 0.01f);
+  EXPECT_EQ(two.suture[1].needle.radius, NeedleSpec{}.radius);
+  for (const SutureSpec& s : two.suture) {
+    EXPECT_EQ(s.thread.spacing, 0.002f);
+    EXPECT_EQ(s.needle.arc, 2.0f);
+  }
+  // --set: of one, or of all.
+  set_value(two, "suture[1].thread.spacing=0.003");
+  EXPECT_EQ(two.suture[0].thread.spacing, 0.002f);
+  EXPECT_EQ(two.suture[1].thread.spacing, 0.003f);
+  set_value(two, "thread.spacing=0.001");
+  for (const SutureSpec& s : sutures_of(two)) EXPECT_EQ(s.thread.spacing, 0.001f);
+}
+
+TEST(SceneFile, faults_of_a_suture_name_the_key) {
+  EXPECT_EQ(fault("[suture]\ngrasp_reach = 0.003\n"),
+            "lembert.toml:1: suture cannot be a table; write [[suture]] in double brackets for every suture; its mechanics are "
+            "in [mechanics]");
+  EXPECT_EQ(fault("[[suture]]\ngrasp_reach = 0.003\n"),
+            "lembert.toml:2: suture has no key \"grasp_reach\"; did you mean \"mechanics.grasp_reach\"?");
+  EXPECT_EQ(fault("[[suture]]\nthread.particels = 50\n"),
+            "lembert.toml:2: suture has no key \"thread.particels\"; did you mean \"thread.particles\"?");
+  EXPECT_EQ(fault("[[suture]]\nparticles = 50\n"),
+            "lembert.toml:2: suture has no key \"particles\"; did you mean \"thread.particles\"?");
+  EXPECT_EQ(fault("[[suture]]\nthread = 3\n").rfind("lembert.toml:2: suture has no key \"thread\"", 0), 0u);
+  EXPECT_EQ(fault("[[suture]]\n[suture.thred]\nparticles = 50\n").rfind("lembert.toml:2: suture has no key \"thred\"", 0), 0u);
+  EXPECT_EQ(fault("[[suture]]\n[suture.thread]\nspacing = -1\n"),
+            "lembert.toml:3: suture[].thread.spacing = -1 is out of range; it is a number, 0.0001..0.1 [m]");
+  EXPECT_EQ(set_fault("suture.grasp_reach=0.003"),
+            "--set suture.grasp_reach: suture has no key \"grasp_reach\"; did you mean \"mechanics.grasp_reach\"?");
+  EXPECT_NE(set_fault("suture.thread.particles=50").find("the scene has no suture"), std::string::npos);
+  EXPECT_NE(set_fault("suture[2].thread.particles=50").find("the scene has 0 of [[suture]]"), std::string::npos);
 }
 
 TEST(SceneFile, toml_faults_name_line_and_column) {
@@ -184,7 +233,8 @@ TEST(SceneFile, every_scene_is_built_with_exactly_the_particles_it_expects) {
     SCOPED_TRACE(name);
     const SceneSpec scene = read_scene(name);
     const size_t built = particle_count(*build_model(scene));
-    size_t asked = static_cast<size_t>(scene.thread.particles);
+    size_t asked = 0;
+    for (const SutureSpec& s : sutures_of(scene)) asked += static_cast<size_t>(s.thread.particles);
     for (const BodySpec& b : scene.body) asked += static_cast<size_t>(b.particles);
     EXPECT_EQ(built, asked);
     const auto want = std::find_if(scene.expect.begin(), scene.expect.end(), [](auto& e) { return e.name == "particles"; });

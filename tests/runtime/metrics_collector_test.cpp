@@ -62,6 +62,31 @@ TEST(MetricsCollector, knots_and_throws_are_counted_through_settling) {
   EXPECT_EQ(r.value["sutures"], 5) << "four settled, one in hand";
 }
 
+// Knots are numbered from 0 in every suture: the first of one is not a throw more on the first of another.
+TEST(MetricsCollector, knots_of_two_sutures_are_counted_apart) {
+  Judged j;
+  j.seen.suture.resize(2);
+  j.picture.suture.resize(2);
+  j.picture.suture[1].thread_count = 0;
+  j.tally = std::make_unique<MetricsCollector>(j.scene, j.picture);
+  const auto tell = [&](EventKind kind, uint16_t suture) {
+    j.tell(kind, 0);
+    j.seen.event.back().suture = suture;
+    j.tick();
+  };
+  tell(EventKind::throw_locked, 0), tell(EventKind::throw_locked, 1), tell(EventKind::throw_locked, 1);
+  EXPECT_EQ(j.result().value["knots"], 2);
+  EXPECT_EQ(j.result().value["throws"], 3);
+  EXPECT_EQ(j.result().value["last_knot_throws"], 2);
+  EXPECT_EQ(j.result().value["sutures"], 2);
+  // One is baked: the throws of the other stay its own.
+  j.seen.settled.emplace_back();
+  tell(EventKind::suture_baked, 1), tell(EventKind::suture_loaded, 1), tell(EventKind::throw_locked, 0);
+  EXPECT_EQ(j.result().value["knots"], 2);
+  EXPECT_EQ(j.result().value["last_knot_throws"], 2);
+  EXPECT_EQ(j.result().value["sutures"], 2) << "one baked, one tied";
+}
+
 TEST(MetricsCollector, gaps_are_the_widest_at_the_end_and_the_narrowest_at_the_start) {
   Judged j;
   EXPECT_EQ(j.result().value["seam_gap_start"], 0);
@@ -95,7 +120,7 @@ TEST(MetricsCollector, faults_by_name_ends_in_hand_and_the_needle) {
   j.tell(Fault::too_few_throws, 0);
   j.tell(static_cast<Fault>(77), 0);  // none that we know
   j.tick();
-  j.seen.tool[1].held_strands = 2;
+  j.seen.tool[3].held_strands = 2;  // any hand's
   j.seen.active().needle_on_thread = false;
   RunResult r = j.result();
   EXPECT_EQ(r.value["fault_wrong_body"], 2);

@@ -79,7 +79,8 @@ TEST_P(EveryScene, saved_and_loaded_at_every_seventh_tick_goes_on_as_if_nothing_
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
-                         testing::Values("purse_string", "connell", "stay", "lembert", "stress_one_body", "stress_two_bodies"),
+                         testing::Values("purse_string", "connell", "stay", "lembert", "stress_one_body", "stress_two_bodies",
+                                         "two_sutures"),
                          [](const auto& scene) { return std::string(scene.param); });
 
 // A jaw closes in the very tick after a load: what is near it must be known by then.

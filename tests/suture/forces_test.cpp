@@ -7,7 +7,7 @@
 namespace catgut {
 namespace {
 
-constexpr float kRelease = 0.0022f;  // [m] default of suture.release_distance
+constexpr float kRelease = 0.0022f;  // [m] default of mechanics.release_distance
 
 TEST(NeedleForces, the_wall_hardens_up_to_the_entry_peak) {
   float last = 0, slope = 0;

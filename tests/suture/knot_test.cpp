@@ -421,7 +421,7 @@ void draw(Rig& rig, const Place& p, float meters) {
 // suture points, and if none is found, it will pull from the free end."
 TEST(PullWithKnot, without_one_thread_comes_from_the_free_end_once_the_slack_is_out) {
   SceneSpec scene = weightless(60);
-  scene.suture.pass_tension = 0.005f;  // single particles of tissue lean far before more slides
+  scene.mechanics.pass_tension = 0.005f;  // single particles of tissue lean far before more slides
   Rig rig(scene);
   Place p;
   running_suture(rig, false, p);

@@ -67,7 +67,7 @@ TEST(Figure7, a_suture_point_locks_the_next_free_particle_behind_the_needle) {
 // passes.
 TEST(Figure7, tension_below_the_threshold_passes_nothing_above_it_thread_passes) {
   SceneSpec scene = weightless(40);
-  scene.suture.pass_tension = 0.013f;  // one particle of tissue gives way by a millimeter for each 1.4 mN
+  scene.mechanics.pass_tension = 0.013f;  // one particle of tissue gives way by a millimeter for each 1.4 mN
   Rig rig(scene);
   Place p;
   one_point(rig, 34, p);
@@ -86,8 +86,8 @@ TEST(Figure7, tension_below_the_threshold_passes_nothing_above_it_thread_passes)
     ASSERT_EQ(rig.count(EventKind::particle_passed), 0u);
   }
   ASSERT_TRUE(slid) << "tension never reached the threshold: " << largest;
-  EXPECT_GT(largest, 0.3f * scene.suture.pass_tension) << "tension must build before thread slides";
-  EXPECT_LT(largest, 1.2f * scene.suture.pass_tension);
+  EXPECT_GT(largest, 0.3f * scene.mechanics.pass_tension) << "tension must build before thread slides";
+  EXPECT_LT(largest, 1.2f * scene.mechanics.pass_tension);
   draw_out(rig, p, 0.008f, 0.01f);
   EXPECT_GE(rig.count(EventKind::particle_passed), 1u);
 }

@@ -86,7 +86,7 @@ TEST(Figure4, a_needle_that_nobody_holds_pierces_nothing) {
 // Figure 4: "The green square represents the threshold range for the closest particle." Outside it nothing is attached.
 TEST(Figure4, no_particle_within_x_attaches_none) {
   SceneSpec scene = plain_scene();
-  scene.suture.attach_threshold = 1e-5f;
+  scene.mechanics.attach_threshold = 1e-5f;
   Rig rig(scene);
   rig.wait(0.2f);
   const Place p = rig.place(0.4f);
