@@ -15,19 +15,19 @@ namespace catgut {
 namespace {
 
 constexpr std::array<const char*, 3> kAxis{"right", "up", "toward you"};
-constexpr float kMoved = 0.0005f;  // [m] that half a newton moves any hand
+constexpr float kMoved = 0.0005f;  // [m] minimum displacement of any hand under half a newton
 
 struct Side {
-  // The servo's.
+  // Owned by the servo.
   Limiter limiter;
   LimiterOptions limits;
   Vec3 from, last;
   size_t axis = 3;
   uint64_t last_ns = 0;
-  // Written by one, read by the other.
+  // Written by one thread, read by the other.
   std::atomic<int> wanted{3};  // axis, 3: none
   std::atomic<bool> off{false}, lost{false};
-  std::array<std::atomic<float>, 3> along{};  // [m] furthest along the push (signed)
+  std::array<std::atomic<float>, 3> along{};  // [m] maximum displacement along the push (signed)
   std::atomic<float> felt{0};                 // [N] of the last axis
 };
 

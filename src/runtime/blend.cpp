@@ -7,7 +7,7 @@ namespace {
 
 Pose between(const Pose& a, const Pose& b, float part) { return {lerp(a.p, b.p, part), nlerp(a.q, b.q, part)}; }
 
-// The same rows in the same order, as far as a picture can tell: rows are only ever added behind, or the list begins again.
+// Whether two lists have the same rows in the same order: rows are only ever appended, or the list starts again.
 template <typename Row, typename Move>
 void each_row(const std::vector<Row>& before, std::vector<Row>& out, Move&& move) {
   if (before.size() != out.size()) return;
@@ -29,17 +29,17 @@ void blend(const Snapshot& before, const Snapshot& now, float part, Snapshot& ou
     const ToolView& from = before.tool[k];
     ToolView& tool = out.tool[k];
     tool.jaw = from.jaw + (tool.jaw - from.jaw) * part;
-    // A hand that has just appeared did not fly there.
+    // A hand that has just connected did not move there.
     if (distance(from.pose.p, tool.pose.p) > 0.05f) continue;
     tool.pose = between(from.pose, tool.pose, part);
     tool.hand = between(from.hand, tool.hand, part);
   }
   each_row(before.instrument, out.instrument, [&](const InstrumentView& a, InstrumentView& o) {
     o.jaw = a.jaw + (o.jaw - a.jaw) * part;
-    if (distance(a.pose.p, o.pose.p) < 0.05f) o.pose = between(a.pose, o.pose, part);  // one that was taken did not fly either
+    if (distance(a.pose.p, o.pose.p) < 0.05f) o.pose = between(a.pose, o.pose, part);  // nor one that was taken
   });
   each_row(before.suture, out.suture, [&](const SutureView& from, SutureView& suture) {
-    if (distance(from.needle.pose.p, suture.needle.pose.p) < 0.05f)  // nor does a fresh needle
+    if (distance(from.needle.pose.p, suture.needle.pose.p) < 0.05f)  // nor a new needle
       suture.needle.pose = between(from.needle.pose, suture.needle.pose, part);
     each_row(from.suture_point, suture.suture_point,
              [&](auto& a, auto& o) { o.position = lerp(a.position, o.position, part); });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: where the next bite of a technique should go, for people: the places are those of the surgeon's plan, where the
-// tissue has carried them by now.
+// runtime: planned position of the next bite, for display: the positions of the surgeon's plan, carried by the
+// tissue.
 #pragma once
 #include <optional>
 #include <vector>
@@ -16,7 +16,7 @@ struct BitePlaces {
 };
 BitePlaces bite_places(const SceneSpec& scene, const PictureModel& picture);
 
-// The first place that has no bite yet, counted along the plan; none when all are made.
+// The first position without a bite, in the order of the plan; none when all are made.
 std::optional<BiteGuide> next_bite(const BitePlaces& places, const PictureModel& picture, const Snapshot& seen);
 
 }  // namespace catgut

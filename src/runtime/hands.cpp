@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: makes the hands of a run; see hands.h.
+// runtime: creates the hands of a run; see hands.h.
 #include "runtime/hands.h"
 
 #include <algorithm>
@@ -14,8 +14,8 @@
 namespace catgut {
 namespace {
 
-// Plays what some hands once did, by time, so that a recording also serves a scene with another tick rate. It does not look:
-// in a scene that differs it will do the wrong thing, as a film of hands would.
+// Plays recorded hands by time, so that a recording can also drive a scene with another tick rate. It does not react: in a
+// different scene the recorded motion will miss its targets.
 class RecordedHands : public Surgeon {
  public:
   RecordedHands(Recording recording, float tick_rate) : recording_(std::move(recording)), tick_rate_(tick_rate) {}
@@ -28,7 +28,7 @@ class RecordedHands : public Surgeon {
     if (recording_.tick.empty()) return out;
     const size_t last = recording_.tick.size() - 1;
     out.hand = recording_.tick[std::min(next_, last)].input.hand;
-    // Each command once, whatever the tick rate.
+    // Each command once, at any tick rate.
     for (size_t t = begun_ ? before + 1 : 0; t <= std::min(next_, last); ++t)
       for (const Command& c : recording_.tick[t].input.commands) out.commands.push(c);
     begun_ = true;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: who holds the tools in a run: the scripted surgeon, no one, or the hands of a recording.
+// runtime: the source of hands in a run: the scripted surgeon, none, or a recording.
 #pragma once
 #include <memory>
 #include <string>
@@ -13,11 +13,11 @@ namespace catgut {
 
 struct Hands {
   std::unique_ptr<Surgeon> surgeon;  // null: no hands
-  bool settles = true;               // false: a recording brings its own settling time along
+  bool settles = true;               // false: a recording includes its own settling time
 };
 
-// Physics under hands at a mouse or gamepad. They do not feel where their tools touch and push on: from this on tools slip past
-// each other, instead of being pushed aside from where their hands want them.
+// Physics for hands with mouse or gamepad. Without force feedback they push on after contact, so tools slip past each other
+// instead of being displaced from the hands.
 constexpr float kUnfeltToolForce = 1.5f;  // [N]
 void prepare_for_mouse(SceneSpec& scene);
 

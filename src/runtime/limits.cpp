@@ -15,9 +15,9 @@ namespace catgut {
 namespace {
 
 constexpr double kRealTimeFps = 24;     // the paper's limit of real time
-constexpr uint32_t kPaperLost = 26;     // suture of two bodies at which the paper's simulation fell below it
-constexpr double kPaperOneBody = 76.2;  // [1/s] with 50 sutures in one body, drawing included
-constexpr size_t kPasses = 5;           // of the first and the last suture in turns
+constexpr uint32_t kPaperLost = 26;     // sutures in two bodies at which the paper's simulation fell below real time
+constexpr double kPaperOneBody = 76.2;  // [1/s] with 50 sutures in one body, rendering included
+constexpr size_t kPasses = 5;           // of the first and the last suture, alternating
 
 class SutureWatch {
  public:
@@ -53,7 +53,7 @@ class SutureWatch {
   }
 
  private:
-  // Single sutures are done with the last throw of their knot, a running one with every bite.
+  // A single suture is complete with the last throw of its knot, a running one with every bite.
   size_t completed_in(const Snapshot& seen) {
     const TechniqueRow* technique = find_technique(scene_.technique.name);
     const bool single = technique && technique->interrupted;
@@ -69,12 +69,12 @@ class SutureWatch {
   LimitsResult& result_;
   const SceneSpec& scene_;
   const std::function<void(const SutureCost&)>& on_row_;
-  int throws_ = 0;  // of the suture in hand
+  int throws_ = 0;  // of the current suture
   std::vector<float> solver_ms_, tick_ms_;
   uint32_t contacts_ = 0;
 };
 
-// One suture as it was sutured: the state before it and the hands of its ticks.
+// One recorded suture: the state before it and the inputs of its ticks.
 struct Stretch {
   std::vector<std::byte> start;
   std::vector<TickInput> input;
@@ -195,7 +195,7 @@ Image limits_plot(const LimitsResult& result, size_t bodies, double tick_rate) {
     p99.point.push_back({x, r.solver_ms.p99});
   }
   plot.curve = {p99, median};
-  // The text of 3.5 gives two numbers of figure 21.
+  // The text of 3.5 gives two values of figure 21.
   if (bodies > 1) plot.curve.push_back({"paper, two bodies", {200, 120, 30, 255}, {{13, 10}, {kPaperLost, 20}}, false});
   plot.level = {{"24 FPS", 1000 / kRealTimeFps},
                 {fmt::format("real time at {:g} ticks a second", tick_rate), 1000 / tick_rate}};

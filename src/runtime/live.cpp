@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: physics on a thread of its own; see live.h. Below, Work's members say which of the two threads may touch them.
+// runtime: physics on its own thread; see live.h. Comments below state which of the two threads may use Work's members.
 #include "runtime/live.h"
 
 #include <atomic>
@@ -26,18 +26,18 @@ namespace catgut {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr int kCatchUp = 4;              // late ticks made up for at once; what is later than that is given up
+constexpr int kCatchUp = 4;              // overdue ticks computed at once; further ones are dropped
 constexpr size_t kMostTakenBack = 32;    // bites kept, some 200 kB each
-constexpr double kBeforeBite = 0.25;     // [s] at least between the moment that is gone back to and the tip going in
+constexpr double kBeforeBite = 0.25;     // [s] minimum between the restored moment and the entry of the tip
 constexpr uint64_t kValidityTicks = 16;  // as in runtime/session
-constexpr uint64_t kNewsTicks = 64;      // how often arms are asked what went wrong
-constexpr double kFactorTime = 0.5;      // [s] over which `lately` looks back
-constexpr float kArmSpeed = 1.0f;        // [m/s] at which a tool comes to an arm that was found elsewhere than it was lost
-constexpr auto kNap = std::chrono::milliseconds(2);  // how soon a command is heard while nothing is due
+constexpr uint64_t kNewsTicks = 64;      // interval of polling the devices for faults
+constexpr double kFactorTime = 0.5;      // [s] window of `lately`
+constexpr float kArmSpeed = 1.0f;        // [m/s] at which a tool moves to a device that reconnects at another position
+constexpr auto kNap = std::chrono::milliseconds(2);  // maximum delay of a command while no tick is due
 
 double seconds_of(Clock::duration d) { return std::chrono::duration<double>(d).count(); }
 
-// Everything needed to continue from a moment as if nothing had happened since.
+// Everything needed to continue from a moment with identical results.
 struct Moment {
   std::vector<std::byte> state;
   HandInputs hand;
@@ -49,7 +49,7 @@ struct BiteMoment {
   Moment before;
 };
 
-// Tasks of the surgeon's plan, in a box that commands fit into.
+// Tasks of the surgeon's plan, in a fixed-size box for the command queue.
 struct Demonstration {
   std::array<uint8_t, 6> task{};
   uint8_t tasks = 0;
@@ -64,13 +64,13 @@ struct Request {
 
 struct HandMessage {
   ToolInput input = no_hand();
-  uint32_t epoch = 0;  // that a caller that sent it had seen
+  uint32_t epoch = 0;  // epoch known to the sender
 };
 
 struct LiveView {
   Snapshot before, now;
   Clock::time_point at;    // when `now` was ready
-  double tick_wall_s = 1;  // from one tick to the next, at this speed
+  double tick_wall_s = 1;  // between two ticks, at this speed
   LiveStatus status;
   bool any = false;
 };
@@ -86,16 +86,16 @@ std::string part_name(const std::string& path, size_t part) {
 }  // namespace
 
 struct Live::Work {
-  // --- set up before the thread starts, constant after -------------------------------------------------------------------
+  // --- set before the thread starts, constant after ----------------------------------------------------------------------
   LiveOptions options;
   PictureModel picture;
   double dt = 0;
 
-  // --- between the threads -----------------------------------------------------------------------------------------------
+  // --- shared by the threads ---------------------------------------------------------------------------------------------
   std::array<Latest<HandMessage>, kMaxHands> hand_box;     // window -> physics
-  std::array<std::atomic<uint32_t>, kMaxHands> pressed{};  // both: buttons that went down since the last tick
+  std::array<std::atomic<uint32_t>, kMaxHands> pressed{};  // both: buttons pressed since the last tick
   Ring<Request, 64> requests;                              // window -> physics
-  Ring<Command, 64> orders;                                // window -> physics: of the hands
+  Ring<Command, 64> orders;                                // window -> physics: commands of the hands
   Ring<std::string, 16> changes;                           // window -> physics
   std::atomic<bool> quit{false};                           // window -> physics
   std::atomic<bool> watched{false};                        // window -> physics
@@ -103,26 +103,26 @@ struct Live::Work {
   Ring<Event, 1024> events;                                // physics -> window
   std::thread thread;
 
-  // --- the window's ------------------------------------------------------------------------------------------------------
+  // --- owned by the window -----------------------------------------------------------------------------------------------
   LiveStatus status;
   std::array<uint32_t, kMaxHands> buttons{};
 
-  // --- the physics thread's ----------------------------------------------------------------------------------------------
+  // --- owned by the physics thread ---------------------------------------------------------------------------------------
   SceneSpec scene;
   std::shared_ptr<const Model> model;
   StatePtr state;
   std::unique_ptr<Jobs> jobs;
   Hands surgeon;
   std::unique_ptr<Recorder> recorder;
-  std::unique_ptr<Haptics> haptics;  // null: no arms
-  bool as_paper = false;             // they feel the paper's spring
-  bool arms_drove = false;           // in the last patch, and
-  uint32_t handovers = 0;            // how often that changed
+  std::unique_ptr<Haptics> haptics;  // null: no devices
+  bool as_paper = false;             // devices use the paper's spring
+  bool arms_drove = false;           // state in the last patch, and
+  uint32_t handovers = 0;            // number of its changes
   PaperSpring paper;
   LiveResult result;
   TickInput input;
-  std::array<int, kMaxHands> unheard{};                  // [ticks] since hands were last heard of, and
-  std::array<float, kMaxHands> heard_every{1, 1, 1, 1};  // [ticks] how often they are, lately
+  std::array<int, kMaxHands> unheard{};                  // [ticks] since the last message of a hand, and
+  std::array<float, kMaxHands> heard_every{1, 1, 1, 1};  // [ticks] recent interval of its messages
   Snapshot before, now;
   LiveStatus published;
   StitchMap map, learner_map;
@@ -130,11 +130,11 @@ struct Live::Work {
   Hands demonstrator;
   bool marked = false;
   std::deque<BiteMoment> bites;
-  std::array<std::optional<Moment>, 2> checkpoint;                    // the newest and the one before it
+  std::array<std::optional<Moment>, 2> checkpoint;                    // the newest and the previous one
   uint64_t checkpoint_every = 1;                                      // [ticks]
   size_t speed = 0;                                                   // of kLiveSpeeds
-  int steps = 0;                                                      // single steps asked for
-  double wall_s = 0, simulated_s = 0, spent_s = 0, ticks_weight = 0;  // lately, each weighed down by age
+  int steps = 0;                                                      // requested single steps
+  double wall_s = 0, simulated_s = 0, spent_s = 0, ticks_weight = 0;  // recent, with exponential weights
 
   void begin();
   void run();
@@ -151,7 +151,7 @@ struct Live::Work {
   void end_demonstration();
   void record_from_here();
   void forget_pace() { wall_s = simulated_s = 0; }
-  // The arm that moves a hand, -1: none.
+  // The device that moves a hand, -1: none.
   int arm_of(size_t hand) const {
     for (size_t arm = 0; haptics && arm < 2; ++arm)
       if (haptics->present(arm) && options.arm_hand[arm] == hand) return static_cast<int>(arm);
@@ -207,7 +207,7 @@ void Live::Work::record_from_here() {
 void Live::Work::tick(bool let_in) {
   const Clock::time_point start = Clock::now();
   const uint64_t began_ns = wall_ns();
-  uint64_t fresh = 0;  // time_ns of the newest motion that this tick is the first to have
+  uint64_t fresh = 0;  // time_ns of the newest motion first used in this tick
   if (let_in && published.tick % checkpoint_every == 0) {
     std::swap(checkpoint[0], checkpoint[1]);
     checkpoint[0] = moment();
@@ -239,7 +239,7 @@ void Live::Work::tick(bool let_in) {
         hand.buttons |= down;
         continue;
       }
-      // Mail from before a jump in time is about tools that were elsewhere: until newer comes the hand stays.
+      // A message from before a jump in time refers to other tool poses: the hand stays until a newer one arrives.
       if (mail.epoch != published.epoch) continue;
       hand = hand_toward(hand, mail.input, options.hand_speed, options.hand_turn, static_cast<float>(dt),
                          hand_share(heard_every[k]));
@@ -265,7 +265,7 @@ void Live::Work::tick(bool let_in) {
   }
   for (const Event& e : now.event) {
     published.events_lost += !events.push(e);
-    if (published.demonstrating) continue;  // no one undoes what was only shown
+    if (published.demonstrating) continue;  // demonstrations cannot be undone
     if (e.kind == EventKind::tip_entered && checkpoint[0]) {
       bites.push_back({e.which, checkpoint[1] ? *checkpoint[1] : *checkpoint[0]});
       if (bites.size() > kMostTakenBack) bites.pop_front();
@@ -283,7 +283,7 @@ void Live::Work::tick(bool let_in) {
   if (watch) {
     measure(*model, *state, published.measures);
     published.measures.contacts = times.contacts;
-    for (size_t k = 0; k < times.ms.size(); ++k) {  // smoothed: a number that flickers cannot be read
+    for (size_t k = 0; k < times.ms.size(); ++k) {  // smoothed for display
       float& ms = published.measures.stage_ms[k];
       ms += 0.05f * (static_cast<float>(times.ms[k]) - ms);
     }
@@ -294,7 +294,7 @@ void Live::Work::tick(bool let_in) {
   published.tick_ms = static_cast<float>(1000 * spent_s / ticks_weight);
 }
 
-// Whether the arms move the tools, at the hands' own speed. If not, what acts on the tools is not the arms' to feel.
+// Whether the devices move the tools at real-time speed. Otherwise their forces are not rendered.
 bool Live::Work::arms_drive() const {
   return !published.demonstrating && !surgeon.surgeon && !published.paused && speed == 0 && !published.arms_off;
 }
@@ -353,7 +353,7 @@ void Live::Work::go_back(const Moment& to) {
   forget_pace();
 }
 
-// The simulated past stays. The recording's next file has the scene, the state and the hands, which decide every later bit.
+// Simulated time so far is kept. The recording's next file has the scene, the state and the inputs, which determine all later
 void Live::Work::change_scene(const std::string& key_equals_value) {
   try {
     SceneSpec changed = scene;
@@ -376,7 +376,7 @@ void Live::Work::demonstrate(const Demonstration& what) {
   try {
     demonstrator.surgeon =
         make_demonstrator(plan, picture, skill_of(scene), {what.task.begin(), what.task.begin() + what.tasks});
-  } catch (const std::invalid_argument&) { return; }  // a scene that no one can show
+  } catch (const std::invalid_argument&) { return; }  // a scene without a demonstrator
   learner = moment();
   learner_map = map;
   if (what.from_mark && marked) go_back(mark);
@@ -491,7 +491,7 @@ void Live::Work::main_loop() {
 void Live::Work::run() {
   bool was_settled = false;
   while (!quit.load(std::memory_order_relaxed)) try {
-      if (!was_settled) {  // as fast as it goes: no one is let in yet
+      if (!was_settled) {  // settling: as fast as possible, hands not connected
         publish_view();
         const auto ticks = static_cast<uint64_t>(std::llround(static_cast<double>(scene.settle) / dt));
         while (result.ticks < ticks && !quit.load(std::memory_order_relaxed)) tick(false);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: a scene that people work in. Physics runs on a thread of its own at the scene's fixed tick; a caller that holds the
-// window publishes hands and commands and looks at pictures, and neither waits for the other. Ticks that come late are caught
-// up, a few at a time; a machine that cannot keep up makes time itself go slower, and says by how much. What is simulated
-// depends on the hands and the tick alone, as in runtime/session: with `record` every tick can be replayed bit for bit.
+// runtime: interactive run of a scene. Physics runs on its own thread at the scene's fixed tick; the window publishes hands and
+// commands and reads pictures, and neither waits for the other. Overdue ticks are computed later, a few at a time; a machine
+// that cannot keep up runs slower than real time, and the factor is reported. The simulation depends only on inputs and tick,
+// as in runtime/session: with `record` every tick can be replayed bit for bit.
 //
-// One thread at a time calls a Live's functions (the window's); they never block, except finish() and the destructor.
+// Only one thread (the window's) may call a Live's functions; they never block, except finish() and the destructor.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -29,12 +29,12 @@ enum class LiveCommand : uint8_t {
   resume,
   single_step,  // one tick, then pause
   restart,      // back to the settled scene
-  take_back,    // back to a moment before the last bite began; nothing when there is none
+  take_back,    // back to a moment before the last bite started; no effect if there is none
   slower,       // the next of kLiveSpeeds
   faster,
-  arms_off,           // no force to the arms, they still move the tools; again: back, through its ramp
-  mark,               // this moment is where a demonstration may begin: Live::demonstrate(..., true)
-  end_demonstration,  // back to where the learner was
+  arms_off,           // switches device forces off, they still move the tools; again: on, through the ramp
+  mark,               // a demonstration may start at this moment: Live::demonstrate(..., true)
+  end_demonstration,  // back to the learner's state
 };
 constexpr std::array<float, 4> kLiveSpeeds{1.0f, 0.5f, 0.25f, 0.1f};  // of real time
 
@@ -43,50 +43,50 @@ struct LiveOptions {
   std::string record;       // recording to write; empty: none. See LiveStatus::recorded
   std::string surgeon;      // as `catgut run --surgeon`; empty: the hands of hand()
   float hand_speed = 0.6f;  // [m/s] and
-  float hand_turn = 12.0f;  // [rad/s] at most for a tool: a device that jumps (a mouse under a slow picture) tears nothing
+  float hand_turn = 12.0f;  // [rad/s] maximum of a tool: a jumping input (a mouse at a low frame rate) then tears nothing
   bool start_paused = false;
-  // Haptic arms, as read_arm_choice (runtime/haptics) reads them; empty or "off": none. What is missing is reported and the
-  // scene opens without. A hand without an arm stays the window's.
+  // Haptic devices, as read_arm_choice (runtime/haptics) reads them; empty or "off": none. Problems are reported and the scene
+  // opens without. The window controls hands without a device.
   std::string haptics;
   std::string haptics_log;                      // as HapticsOptions::log
-  std::array<uint8_t, 2> arm_hand{0, 1};        // the hand that each of the two arms moves
-  std::function<void(const std::string&)> say;  // a line about the arms, from any thread; empty: lines are dropped
+  std::array<uint8_t, 2> arm_hand{0, 1};        // hand that each of the two devices moves
+  std::function<void(const std::string&)> say;  // receives lines about the devices, from any thread; empty: lines are dropped
 };
 
 struct LiveStatus {
   uint64_t tick = 0;
   double time_s = 0;      // [s] simulated
-  float speed = 1;        // of real time, as asked for
-  float time_factor = 0;  // simulated over wall time, lately; less than `speed`: this machine is too slow for the scene
-  float tick_ms = 0;      // that a tick takes to compute, lately
-  uint64_t late = 0;      // ticks' worth of time that was given up because it could not be caught up
+  float speed = 1;        // requested fraction of real time
+  float time_factor = 0;  // real-time factor, recent; below `speed`: this machine is too slow for the scene
+  float tick_ms = 0;      // computation time of a tick, recent
+  uint64_t late = 0;      // dropped ticks
   bool paused = false;
-  bool settling = true;       // the scene settles; hands are not let in yet
-  uint32_t epoch = 0;         // counts restarts and bites undone: hands continue from where the tools are then
+  bool settling = true;       // the scene settles; hands are not connected yet
+  uint32_t epoch = 0;         // counts restarts and undone bites: hands then continue from the present tool poses
   uint32_t to_take_back = 0;  // bites that take_back can undo
-  uint32_t events_lost = 0;   // no one fetched them in time
+  uint32_t events_lost = 0;   // not fetched in time
   std::array<uint64_t, kMaxHands> input_time_ns{};  // ToolInput::time_ns of the hands in the newest tick, for latencies
-  // Of the newest tick that was the first to have a motion, on wall_ns(), for latencies: when the motion was read (where the
-  // device uses that clock), when the tick began, and when its snapshot was ready to be looked at.
+  // Of the newest tick that first used a motion, on wall_ns(), for latencies: when the motion was read (if the device uses that
+  // clock), when the tick started, and when its snapshot was available.
   uint64_t moved_ns = 0, began_ns = 0, ready_ns = 0;
-  std::array<bool, kMaxHands> arm{};  // a haptic arm moves that hand
-  std::array<ArmView, 2> arm_view{};  // of each arm
+  std::array<bool, kMaxHands> arm{};  // a haptic device moves that hand
+  std::array<ArmView, 2> arm_view{};  // of each device
   bool arms_off = false;
   SessionMetrics metrics;
   Measures measures;           // filled while watched, see watch()
-  std::string doing;           // of the surgeon, when one works
-  bool demonstrating = false;  // the surgeon shows something; what was before comes back
-  bool shown = false;          // and is through with it, or gave up
-  std::string refused;         // the last change() that could not be made, and why
+  std::string doing;           // of the surgeon, if active
+  bool demonstrating = false;  // the surgeon demonstrates; the previous state is restored afterward
+  bool shown = false;          // the demonstration has ended, or was abandoned
+  std::string refused;         // the last failed change(), and why
   std::string fault;           // not empty: the run has stopped, and why
 };
 
 struct LiveResult {
   SessionMetrics metrics;
   StitchMap map;
-  uint64_t ticks = 0;  // all that were computed, those undone included
+  uint64_t ticks = 0;  // all computed ticks, undone ones included
   uint64_t state_hash = 0;
-  std::vector<std::string> recorded;  // files written: a restart or a bite undone begins the next one (NAME.2.cgrec ...)
+  std::vector<std::string> recorded;  // files written: a restart or an undone bite starts the next one (NAME.2.cgrec ...)
   std::string fault;
 };
 
@@ -100,28 +100,28 @@ class Live {
 
   const PictureModel& picture() const;
 
-  // The newest pose of hand `who`, below kMaxHands. A button that goes down is not lost when it comes up again before the next
+  // The newest pose of hand `who`, below kMaxHands. A press is not lost when the button is released before the next
   // tick.
   void hand(size_t who, const ToolInput& input);
-  // Take, swap, lay down, park or take up an instrument in the next tick. False: as below.
+  // Take, swap, lay down, park or unpark an instrument in the next tick. False: as below.
   bool instrument(const Command& command);
-  // False: too many are waiting; try again.
+  // False: the queue is full; try again.
   bool command(LiveCommand command);
 
-  // For developers: "solver.damping=6" from the next tick on, as in --set; sizes and numbers of things cannot change. The model
-  // is built again, which may cost some ticks' time. The recording continues in another file, whose scene says so. False: as
+  // For developers: "solver.damping=6" from the next tick on, as in --set; sizes and counts cannot change. The model
+  // is rebuilt, which may take several ticks' time. The recording continues in another file with the new scene. False: as
   // above.
   bool change(const std::string& key_equals_value);
-  void watch(bool on);  // measures are wanted; they cost some microseconds a tick
-  // The scripted surgeon takes the tools and shows tasks of its plan (make_demonstrator): from here, or from the moment that
-  // was last marked. Until end_demonstration, which brings everything back as it is now.
+  void watch(bool on);  // computes measures, some microseconds per tick
+  // The scripted surgeon takes the tools and demonstrates tasks of its plan (make_demonstrator): from now, or from the last
+  // mark. Until end_demonstration, which restores the present state.
   bool demonstrate(const std::vector<size_t>& tasks, bool from_mark);
 
-  // The field as it is now: the last two ticks blended by the time that has passed, so that it shows one tick late and moves
-  // evenly whatever the rate of pictures. False before there is any.
+  // The current picture: the last two ticks interpolated by the elapsed time, so that it is one tick late and moves evenly at
+  // any frame rate. False before the first tick.
   bool look(Snapshot& out);
   const LiveStatus& status() const;  // as of the last look()
-  bool event(Event& out);            // the next thing that happened; false: none for now
+  bool event(Event& out);            // the next event; false: none for now
 
   LiveResult finish();  // stops and closes the recording
 
@@ -130,13 +130,13 @@ class Live {
   std::unique_ptr<Work> work_;
 };
 
-// Toward `to` as far as a hand gets in dt [s] at no more than `speed` [m/s] and `turn` [rad/s]; the jaw at ten strokes a
-// second. share: of the way, per call: below 1 where hands are heard of less often than this is called, so that a tool moves
-// evenly and does not stop between two pictures (a needle that stops springs back out of the tissue).
+// Toward `to` as far as a hand moves in dt [s] at no more than `speed` [m/s] and `turn` [rad/s]; the jaw at ten strokes per
+// second. share: fraction of the path per call: below 1 if hand messages arrive less often than calls, so that a tool moves
+// evenly and does not stop between two frames (a needle that stops springs back out of the tissue).
 ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt, float share = 1);
-float hand_share(float every);  // for hands that are heard of every so many calls
+float hand_share(float every);  // for hands with a message every so many calls
 
-// [s] on a clock that never goes back, for whatever is paced outside the physics: pictures, key repeats, latencies.
+// [s] on a monotonic clock, for timing outside the physics: frames, key repeats, latencies.
 double wall_seconds();
 uint64_t wall_ns();
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: gathers a run's results; see tally.h for what each means.
+// runtime: collects a run's results; see metrics_collector.h for their definitions.
 #include "runtime/metrics_collector.h"
 
 #include <algorithm>
@@ -25,7 +25,7 @@ bool RunResult::expectations_hold() const {
 
 namespace {
 
-// |free end - needle end| / sum of the thread outside the first and the last suture point, as it lies. 0 without both.
+// |free end - needle end| / sum of the thread outside the first and the last suture point, along the thread. 0 without both.
 double tail_asymmetry(const Snapshot& seen, size_t which) {
   if (which >= seen.suture.size()) return 0;
   const SutureView& suture = seen.suture[which];
@@ -117,7 +117,7 @@ float MetricsCollector::thread_length_error(const Snapshot& seen) const {
       }
       if (a < seen.particle.size() && b < seen.particle.size()) length += distance(seen.particle[a], seen.particle[b]);
     }
-    // As long as it is whole, the thread is measured against the scene; its pieces against what they say they are.
+    // Uncut, the thread is compared with the scene; cut, its pieces with their reported lengths.
     const double rest = whole ? static_cast<double>(order.size() - 1) * suture_[k].thread_spacing : suture.thread_rest;
     const float error = rest > 0 ? static_cast<float>(std::abs(length - rest) / rest) : 0;
     worst = std::isfinite(error) ? std::max(worst, error) : error;
@@ -146,7 +146,7 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
     if (counts_.events[k]) result.events[name] = counts_.events[k];
     result.value[name] = static_cast<double>(counts_.events[k]);
   }
-  result.value.erase(event_name(EventKind::suture_point));  // the result suture_points says it
+  result.value.erase(event_name(EventKind::suture_point));  // the result suture_points has this count
   std::map<std::string, double>& v = result.value;
   size_t bites = 0, off = 0;
   for (const SutureView& suture : last.suture) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: what a run is judged by, gathered from the published snapshots tick by tick. Reads Snapshot and StageTimes; writes
-// RunResult. It sees only what a picture or a host would see, so it cannot flatter the engine.
+// runtime: the results of a run, collected from the published snapshots tick by tick. Reads Snapshot and StageTimes; writes
+// RunResult. It has no access to the state, so the results are measured from outside.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -38,16 +38,16 @@ struct RunResult {
   double real_time_factor = 0;                   // simulated time over the time spent in step, publish and the surgeon's plan
   Percentiles solver_ms, tick_ms;                // per tick
   std::array<Percentiles, kStages> stage_ms;     // per tick
-  StageTimes longest;                            // of the tick that took longest
-  uint64_t longest_tick = 0, overrun_ticks = 0;  // its number; ticks that took longer than they simulate
-  uint32_t contacts = 0;                         // the most in a substep
-  std::map<std::string, uint64_t> events;        // by kind, only those that happened
-  std::map<std::string, uint64_t> faults;        // technique_fault events by name, only those that happened
+  StageTimes longest;                            // of the longest tick
+  uint64_t longest_tick = 0, overrun_ticks = 0;  // its number; ticks longer than the time that they simulate
+  uint32_t contacts = 0;                         // maximum in a substep
+  std::map<std::string, uint64_t> events;        // by kind, only those that occurred
+  std::map<std::string, uint64_t> faults;        // technique_fault events by name, only those that occurred
   std::map<std::string, double> value;           // every name of result_names
   std::vector<ExpectationResult> expect;
   uint64_t state_hash = 0;
   bool interrupted = false;
-  std::string ended;  // why, in words
+  std::string ended;  // why, as text
 
   bool expectations_hold() const;
 };
@@ -56,14 +56,14 @@ class MetricsCollector {
  public:
   MetricsCollector(const SceneSpec& scene, const PictureModel& picture);
 
-  void open();                      // the hands are let in now: the next snapshot's opening is the whole opening
+  void open();                      // the hands connect now: the next snapshot's opening is the initial opening
   void tick(const Snapshot& seen);  // after every tick
   void time(const StageTimes& times, double tick_ms);
   void invalidate() { valid_ = false; }
   bool sane() const { return valid_; }
   double spent_ms() const { return spent_ms_; }
 
-  // Fills values, events, spreads and expectations; the rest of `result` must be there already.
+  // Fills values, events, percentiles and expectations; the caller sets the rest of `result` before.
   void finish(const Snapshot& last, RunResult& result) const;
 
  private:
@@ -77,7 +77,7 @@ class MetricsCollector {
   bool opening_wanted_ = true, valid_ = true;
   float opening_at_start_ = 0, length_error_ = 0, length_error_passing_ = 0;
   uint32_t order_errors_ = 0, contacts_ = 0;
-  Counts counts_;                       // a Snapshot lists no settled knots
+  Counts counts_;                       // a Snapshot does not list baked knots
   std::vector<double> tail_asymmetry_;  // per suture, when its first knot was begun; -1: none yet
   std::vector<float> solver_ms_, tick_ms_;
   std::array<std::vector<float>, kStages> stage_ms_;

@@ -11,7 +11,7 @@
 namespace catgut {
 namespace {
 
-constexpr uint64_t kPictureEvery = 4;  // [ticks] between measured pictures: they cost more than the tick
+constexpr uint64_t kPictureEvery = 4;  // [ticks] between measured pictures: they take longer than a tick
 
 struct PaperFigure {
   const char *technique, *phase;
@@ -44,7 +44,7 @@ constexpr PaperFigure kPaper[] = {
     {"lembert", "After completion", 53.2, 18.8, 11.45},
 };
 
-// What one execution's ticks of a phase cost.
+// Times of one execution's ticks of a phase.
 struct Ticks {
   std::string phase;
   std::vector<float> solver_ms, tick_ms, picture_ms;

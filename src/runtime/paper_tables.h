@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: the paper's tables 1 to 4 with our figures beside its own: what a technique costs at rest, while it is sutured,
-// while its knots are made, and when it is done (sections 3.1 to 3.4). The scripted surgeon sews it a few times, each with
-// hands of his own (another seed).
+// runtime: the paper's tables 1 to 4 with Catgut's figures beside its own: time per tick at rest, while suturing, while tying
+// knots, and after completion (sections 3.1 to 3.4). The scripted surgeon performs the technique a few times, each with
+// another seed.
 #pragma once
 #include <functional>
 #include <span>
@@ -12,13 +12,13 @@
 
 namespace catgut {
 
-// Which of the paper's phases a tick belongs to, in the paper's words: "Start" until the hands are let in, "During suturing",
+// The paper's phase of a tick, in the paper's terms: "Start" until the hands connect, "During suturing",
 // "During looping" from the first loop round a tool to the end of its knot (the next bite or needle, or the end of the work),
-// "After completion" when the surgeon is done. With `numbered` (Lembert) every suture is its own: "Suture #2", "Loop #2".
+// "After completion" when the surgeon is done. With `numbered` (Lembert) every suture has its own: "Suture #2", "Loop #2".
 class PaperPhase {
  public:
   explicit PaperPhase(bool numbered) : numbered_(numbered) {}
-  // events: of the tick. settled: the hands are in. done: the surgeon has finished.
+  // events: of the tick. settled: the hands are connected. done: the surgeon has finished.
   std::string operator()(std::span<const Event> events, bool settled, bool done);
 
  private:
@@ -28,7 +28,7 @@ class PaperPhase {
 
 struct PhaseCost {
   std::string phase;
-  // One for each execution: medians over the ticks of the phase [ms]. frame: surgeon, tick and picture, one after another.
+  // One per execution: medians over the ticks of the phase [ms]. frame: surgeon, tick and picture in sequence.
   std::vector<double> solver_ms, frame_ms;
 };
 
@@ -38,14 +38,14 @@ struct PaperTable {
   int threads = 1, substeps = 0;
   double tick_rate = 0;  // [1/s]
   int executions = 0;    // that were run to their end
-  int sewn = 0;          // of these, with everything the scene expects
+  int sewn = 0;          // of these, with all expected results
   bool pictures = false;
   bool interrupted = false;
-  std::vector<PhaseCost> phase;  // in the order in which they came
+  std::vector<PhaseCost> phase;  // in order of appearance
 };
 
-// picture_ms: makes, at the start of an execution, what measures the picture of a snapshot [ms], asked in every fourth tick; it
-// may be empty, and frames are then without. Throws InputError (a scene that the scripted surgeon cannot sew).
+// picture_ms: called at the start of an execution, returns a function that renders a snapshot and returns the time [ms], called
+// every fourth tick. If empty, frames are not measured. Throws InputError (a scene without a script for its technique).
 using PictureCost = std::function<double(const Snapshot&)>;
 PaperTable measure_paper(SceneSpec scene, int executions, int threads,
                          const std::function<PictureCost(const PictureModel&)>& picture_ms, const SessionHooks& hooks = {});

@@ -20,8 +20,8 @@ namespace catgut {
 namespace {
 
 constexpr size_t kSheetCells = 12, kSheetColumns = 4;
-constexpr double kMomentsApart = 0.6;  // [s] simulated: what happens together is one picture
-constexpr size_t kMostMoments = 48;    // pictures kept in memory; beyond it every other one is let go
+constexpr double kMomentsApart = 0.6;  // [s] simulated: simultaneous events share one picture
+constexpr size_t kMostMoments = 48;    // pictures kept in memory; beyond it every other one is dropped
 
 bool is_moment(const Snapshot& seen) {
   return std::any_of(seen.event.begin(), seen.event.end(), [](const Event& e) {
@@ -30,7 +30,7 @@ bool is_moment(const Snapshot& seen) {
   });
 }
 
-// The render room speaks in std::runtime_error; the user hears one line like any other fault.
+// The render room throws std::runtime_error; the user sees one line like for any other fault.
 template <typename Work>
 auto guarded(const std::string& where, Work&& work) {
   try {
@@ -68,7 +68,7 @@ struct Pictures::Studio {
   }
 
   Image take(const Snapshot& seen, const std::string& caption) {
-    // The camera eases in the film's time: what the viewer sees should glide at any time-lapse factor.
+    // The camera eases in film time: its motion is smooth at any time-lapse factor.
     const double dt = last_s < 0 ? 0 : (seen.time_s - last_s) / options.speed;
     last_s = seen.time_s;
     camera = follow.update(seen, static_cast<float>(dt));
@@ -84,7 +84,7 @@ struct Pictures::Studio {
     moment.resize((moment.size() + 1) / 2);
   }
 
-  // From where the work is seen best at that moment, whatever the film's camera does.
+  // From the best viewpoint at that moment, independent of the film's camera.
   void take_still(const Snapshot& seen) {
     if (!still_renderer) still_renderer = make_renderer(model, options.still_width, options.still_height, Quality::high);
     write_png(still_renderer->render(seen, FollowCamera(model).update(seen, 0)), options.still.back().second);
@@ -101,7 +101,7 @@ struct Pictures::Studio {
       Image picture = take(seen, frame_due ? caption : std::string());
       if (frame_due) {
         next_s += options.speed / options.rate;
-        next_s = std::max(next_s, seen.time_s);  // slower than the film's rate: no frames to catch up with
+        next_s = std::max(next_s, seen.time_s);  // slower than the film's rate: frames are skipped
         if (film) film->add(picture);
         if (!options.frames.empty()) write_png(picture, fmt::format("{}/frame_{:05}.png", options.frames, frame++));
       }

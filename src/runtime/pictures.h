@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: the pictures of a run: single frames, a time-lapse film, a contact sheet of its moments. Reads snapshots as the run
-// goes; writes files. The only file above the render room that knows the renderer.
+// runtime: the pictures of a run: single frames, a time-lapse film, a contact sheet. Reads snapshots during the run;
+// writes files. The only file above the render room that uses the renderer.
 #pragma once
 #include <memory>
 #include <string>
@@ -16,7 +16,7 @@ struct PictureOptions {
   std::string frames;         // folder for one PNG per picture; empty: none
   std::string video;          // MP4; empty: none
   std::string contact_sheet;  // PNG of up to twelve moments; empty: none
-  // Single moments, large and in the best quality: simulated time [s] and PNG. In any order.
+  // Stills at full quality: simulated time [s] and PNG. In any order.
   std::vector<std::pair<double, std::string>> still;
   double speed = 4;  // simulated seconds per second of film
   double rate = 30;  // pictures per second of film
@@ -27,14 +27,14 @@ struct PictureOptions {
 
 class Pictures {
  public:
-  // Throws InputError when this machine cannot draw, encode or write there: before the run, not after it.
+  // Throws InputError if this machine cannot render, encode or write there: before the run, not after it.
   Pictures(const PictureOptions& options, const PictureModel& model);
   ~Pictures();
   Pictures(const Pictures&) = delete;
   Pictures& operator=(const Pictures&) = delete;
 
   void tick(const Snapshot& seen, const std::string& caption);
-  void finish();  // writes the film's end and the contact sheet; throws InputError
+  void finish();  // completes the film and the contact sheet; throws InputError
 
  private:
   struct Studio;

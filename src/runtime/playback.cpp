@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: see playback.h. Below, Work's members say which of the two threads may touch them.
+// runtime: see playback.h. Comments below state which of the two threads may use Work's members.
 #include "runtime/playback.h"
 
 #include <atomic>
@@ -20,10 +20,10 @@ namespace catgut {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr double kKeepEvery = 1.0;  // [s] between kept states; a step back costs at most that much simulation
-constexpr size_t kMostKept = 600;   // some 200 kB each; with more every other one is dropped
-constexpr int kTogether = 8;        // ticks scanned before wishes are heard again
-constexpr int kGatherEvery = 30;    // ticks between two tellings of what was gathered
+constexpr double kKeepEvery = 1.0;  // [s] between keyframes; a step back simulates at most this time
+constexpr size_t kMostKept = 600;   // about 200 kB each; with more, every other one is dropped
+constexpr int kTogether = 8;        // ticks scanned between polls for requests
+constexpr int kGatherEvery = 30;    // ticks between two updates of the gathered results
 constexpr auto kNap = std::chrono::milliseconds(2);
 
 double seconds_of(Clock::duration d) { return std::chrono::duration<double>(d).count(); }
@@ -32,7 +32,7 @@ struct Request {
   bool playing = false;
   float speed = 1;
   uint64_t go_to = 0;
-  uint64_t times = 0;  // counts every go_to
+  uint64_t times = 0;  // counts calls of go_to
 };
 
 struct PlayView {
@@ -51,7 +51,7 @@ struct Keyframe {
 }  // namespace
 
 struct Playback::Work {
-  // --- set up before the thread starts, constant after -------------------------------------------------------------------
+  // --- set before the thread starts, constant after ----------------------------------------------------------------------
   Recording recording;
   std::string name;
   std::shared_ptr<const Model> model;
@@ -59,20 +59,20 @@ struct Playback::Work {
   double dt = 1.0 / 60;
   uint64_t settle = 0;  // ticks
 
-  // --- between the threads -----------------------------------------------------------------------------------------------
-  mutable std::mutex mutex;  // of the next two; held for copies only
+  // --- shared by the threads ---------------------------------------------------------------------------------------------
+  mutable std::mutex mutex;  // for the next two; held only while copying
   Request request;
   LiveResult gathered;
   Latest<PlayView> view_box;
   std::atomic<bool> quit{false};
   std::thread thread;
 
-  // --- the window's ------------------------------------------------------------------------------------------------------
+  // --- owned by the window -----------------------------------------------------------------------------------------------
   PlaybackStatus status;
 
-  // --- the playing thread's ----------------------------------------------------------------------------------------------
+  // --- owned by the playing thread ---------------------------------------------------------------------------------------
   Jobs jobs{1};
-  StatePtr ahead, shown;  // scanned; in the picture
+  StatePtr ahead, shown;  // scanned; shown
   uint64_t at = 0;        // ticks that `shown` has played
   LiveResult so_far;
   std::vector<Keyframe> keyframe;
@@ -115,7 +115,7 @@ void Playback::Work::begin() {
   thread = std::thread([this] { run(); });
 }
 
-// Some ticks further into the recording, with all that is to be known about them.
+// Scans the recording for several ticks and gathers all results.
 void Playback::Work::look_ahead() {
   for (int i = 0; i < kTogether && published.known < published.ticks; ++i) {
     const RecordedTick& t = recording.tick[published.known];
@@ -153,7 +153,7 @@ void Playback::Work::step_shown() {
   const RecordedTick& t = recording.tick[at];
   step(*model, *shown, t.input, jobs);
   ++at;
-  // Kept states and what follows them must be the recorded ones too, not only the pass that made them.
+  // Keyframes and their continuation are compared with the recording too, not only the pass that made them.
   if (hash_state(*model, *shown) != t.hash && (!published.differs_at || *published.differs_at > at)) published.differs_at = at;
 }
 
@@ -165,7 +165,7 @@ void Playback::Work::move_to(uint64_t to) {
     load_state(*model, *shown, from->state);
     at = from->at;
   }
-  // The last tick is published with the one before it, so that what is held looks as it does while playing.
+  // The last tick is published with the previous one, so that a paused picture equals a playing one.
   while (at < to && !quit.load(std::memory_order_relaxed)) {
     if (at + 1 == to) publish(*model, *shown, before);
     step_shown();
@@ -185,7 +185,7 @@ void Playback::Work::publish_view() {
   view_box.publish();
 }
 
-// True: there is somewhere else to go.
+// True: there is another request.
 bool Playback::Work::poll_request(Request& out) {
   const std::lock_guard lock(mutex);
   out = request;
@@ -195,7 +195,7 @@ bool Playback::Work::poll_request(Request& out) {
 void Playback::Work::run() {
   Clock::time_point due = Clock::now(), shown_at = due;
   publish_view();
-  bool whole = true;  // looking ahead continues
+  bool whole = true;  // scanning continues
   Request w;
   uint64_t to = 0;
   bool going = false;
@@ -221,7 +221,7 @@ void Playback::Work::run() {
         publish(*model, *shown, now);
         due += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(period));
         if (seconds_of(Clock::now() - due) > 4 * period) due = Clock::now();
-        // At high speeds not every tick is worth a copy: no display shows more.
+        // At high speeds not every tick is copied: no display shows more.
         if (at == published.known || seconds_of(Clock::now() - shown_at) > 0.008) publish_view(), shown_at = Clock::now();
         continue;
       }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: a recording to look at: played, held, and gone through in both directions, at any speed. On a thread of its own, as
-// runtime/live is. It first looks through the whole recording as fast as it goes, in between what is shown: states are kept on
-// the way, so that going back is quick, every tick's hash is compared with the recorded one, and what was sutured is gathered.
+// runtime: plays a recording: play, pause, seek in both directions, at any speed. On its own thread, like
+// runtime/live. It first scans the whole recording as fast as possible, between displayed ticks: it stores keyframes for fast
+// seeking, compares every tick's hash with the recorded one, and gathers the results.
 //
-// One thread at a time calls a Playback's functions (the window's); none of them waits for the simulation, except the
+// Only one thread (the window's) may call a Playback's functions; none waits for the simulation, except the
 // constructor and the destructor.
 #pragma once
 #include <cstdint>
@@ -20,15 +20,15 @@ namespace catgut {
 
 struct PlaybackStatus {
   uint64_t ticks = 0;  // recorded
-  uint64_t known = 0;  // ticks scanned so far; nothing later can be shown yet
-  uint64_t at = 0;     // ticks played until what is shown
-  uint64_t first = 0;  // tick of the start state: a recording may begin in the middle of the work
+  uint64_t known = 0;  // ticks scanned so far; later ones cannot be shown yet
+  uint64_t at = 0;     // ticks played up to the shown one
+  uint64_t first = 0;  // tick of the start state: a recording may start in the middle of a procedure
   double tick_s = 1.0 / 60;
   bool playing = false;
   float speed = 1;
-  std::optional<uint64_t> differs_at;  // the first tick, from 1, after which the state was not the recorded one
-  std::string fault;                   // not empty: the replay went no further, and why
-  uint64_t gathered = 0;               // counts up when result() has more to say
+  std::optional<uint64_t> differs_at;  // the first tick, from 1, whose state differs from the recording
+  std::string fault;                   // not empty: the replay has stopped, and why
+  uint64_t gathered = 0;               // counts updates of result()
 };
 
 class Playback {
@@ -44,10 +44,10 @@ class Playback {
 
   void play(bool on);
   void speed(float of_real_time);        // 0.05 .. 16
-  void go_to(uint64_t tick);             // 0 .. ticks, also while playing
-  bool look(Snapshot& out);              // as Live::look
+  void go_to(uint64_t tick);             // 0 .. ticks, also during play
+  bool look(Snapshot& out);              // like Live::look
   const PlaybackStatus& status() const;  // as of the last look()
-  LiveResult result() const;             // of what is known so far; its `recorded` is the recording's name
+  LiveResult result() const;             // of the scanned part; its `recorded` is the recording's name
 
  private:
   struct Work;

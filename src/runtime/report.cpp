@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: writes results; see report.h. Numbers that are not finite become null, as JSON wants.
+// runtime: writes results; see report.h. Non-finite numbers become null, as JSON requires.
 #include "runtime/report.h"
 
 #include <fmt/format.h>
@@ -92,7 +92,7 @@ Json json_of(const RunResult& r) {
   return j;
 }
 
-// Names come from files and may hold anything: what is not UTF-8 is replaced, not thrown at the user.
+// Names come from files and may have any bytes: invalid UTF-8 is replaced, not an error.
 std::string text(const Json& j) { return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
 
 }  // namespace
@@ -194,7 +194,7 @@ std::string run_summary(const RunResult& r, bool judged) {
   out += fmt::format("  solver per tick {:.3f} ms (median), {:.3f} ms (99th percentile), {:.3f} ms (maximum)\n",
                      r.solver_ms.median, r.solver_ms.p99, r.solver_ms.max);
   if (r.overrun_ticks > 0) {
-    // Where the time went in the worst of them.
+    // Time per stage in the longest ones.
     out += fmt::format("  {} ticks exceeded the real-time budget; longest: tick {}, {:.1f} ms:", r.overrun_ticks,
                        r.longest_tick, r.tick_ms.max);
     for (size_t s = 0; s < kStages; ++s)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: the run loop. Per tick: the hands see the last snapshot, step, publish, measure, tell. See session.h.
+// runtime: the run loop. Per tick: the hands read the last snapshot, step, publish, measure, report. See session.h.
 #include "runtime/session.h"
 
 #include <algorithm>
@@ -16,12 +16,12 @@ namespace catgut {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr double kAfterDone = 0.5;       // [s] simulated: what was let go settles
-constexpr uint64_t kValidityTicks = 16;  // a state that has gone wrong is noticed within a moment, at no measurable cost
+constexpr double kAfterDone = 0.5;       // [s] simulated: the tissue settles
+constexpr uint64_t kValidityTicks = 16;  // interval of the validity check: early detection at no measurable cost
 
 double ms_since(Clock::time_point start) { return std::chrono::duration<double, std::milli>(Clock::now() - start).count(); }
 
-// The state of one run and what is done around each of its ticks, whether the hands live or are replayed.
+// The state of one run and the work around each of its ticks, for live and replayed hands.
 class Run {
  public:
   Run(const SceneSpec& scene, int threads, const SessionHooks& hooks)
@@ -37,7 +37,7 @@ class Run {
     reported_at_ = Clock::now();
   }
 
-  // hands: asked for the input of the tick. False when the run has to end: stopped, or no longer sane.
+  // hands: return the input of the tick. False when the run has to end: stopped, or state invalid.
   template <typename HandsOf>
   bool tick(HandsOf&& hands, const std::string& doing, double until_s) {
     const Clock::time_point start = Clock::now();
@@ -113,7 +113,7 @@ uint64_t ticks_in(double seconds, double dt) { return static_cast<uint64_t>(std:
 
 const char* catgut_version() { return CATGUT_VERSION; }
 
-// More than four workers wait for each other longer than they help: the stages are tens of microseconds long.
+// More than four workers wait for each other longer than they save: the stages are tens of microseconds long.
 int default_threads() { return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 4); }
 
 RunResult run_session(const SceneSpec& scene, const SessionOptions& options, const SessionHooks& hooks) {
@@ -127,7 +127,7 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
   const double until_s = options.seconds > 0 ? options.seconds : static_cast<double>(scene.duration);
   const uint64_t last = std::max<uint64_t>(1, ticks_in(until_s, run.dt_));
   const uint64_t settle = hands.settles ? std::min(last, ticks_in(scene.settle, run.dt_)) : 0;
-  const uint64_t after_done = hands.settles ? ticks_in(kAfterDone, run.dt_) : 0;  // a recording holds that time too
+  const uint64_t after_done = hands.settles ? ticks_in(kAfterDone, run.dt_) : 0;  // a recording includes that time
   const auto one_tick = [&](auto&& of, const std::string& doing) {
     const bool go_on = run.tick(of, doing, until_s);
     if (recorder) recorder->tick(run.input_, hash_state(*run.model_, *run.state_));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: runs a scene from its first tick to its last, in lock step: as fast as it goes, on the caller's thread. The only
-// room that reads a clock; times go into reports, never into the physics, so a run's bits depend on its inputs alone.
+// runtime: runs a scene from its first tick to its last, in lock step: as fast as possible, on the caller's thread. Measured
+// times go into reports, never into the physics, so a run's bits depend only on its inputs.
 #pragma once
 #include <atomic>
 #include <functional>
@@ -24,48 +24,47 @@ struct State;
 const char* catgut_version();
 
 struct Progress {
-  double simulated_s = 0, until_s = 0;  // until_s: at most
+  double simulated_s = 0, until_s = 0;  // until_s: maximum
   double real_time_factor = 0;
   std::string doing;
 };
 
-// What a run reports while it goes. Each may be empty.
+// Callbacks of a run. Each may be empty.
 struct SessionHooks {
   std::function<void(const PictureModel&)> on_start;
   std::function<void(const Snapshot&, const std::string& doing)> on_tick;
-  // What the tick made of the hands' input; before on_cost.
+  // The result of the tick; before on_cost.
   std::function<void(const Model&, const State&, const TickInput&)> on_step;
-  // What the tick cost, stage by stage and as a whole [ms]; false: enough was seen, the run ends.
+  // Time of the tick, per stage and total [ms]; false: ends the run.
   std::function<bool(const Snapshot&, const StageTimes&, double tick_ms)> on_cost;
-  std::function<void(const Progress&)> on_progress;  // about once a second of wall time
-  const std::atomic<bool>* stop = nullptr;           // set: the run ends after the tick in hand
+  std::function<void(const Progress&)> on_progress;  // about once per second of wall time
+  const std::atomic<bool>* stop = nullptr;           // set: the run ends after the current tick
 };
 
 struct SessionOptions {
-  std::string surgeon = "scripted";  // "scripted", "none", or the path of a recording whose hands are played
+  std::string surgeon = "scripted";  // "scripted", "none", or the path of a recording whose inputs are played
   double seconds = 0;                // [s] simulated, settling included; 0: the scene's duration
   int threads = 1;                   // workers of the solver, 1..64
   std::string record;                // path of the recording to write; empty: none
 };
 
-// Settles the scene with no hands, then lets the surgeon work until half a second after he is done, or until the time is over.
+// Settles the scene without hands, then lets the surgeon work until half a second after it is done, or until the time limit.
 // Throws InputError (scene, surgeon, recording).
 RunResult run_session(const SceneSpec& scene, const SessionOptions& options, const SessionHooks& hooks = {});
 
-// Throws InputError when the recording comes from a program whose state had another layout.
+// Throws InputError when the recording comes from a program with another layout of the state.
 void check_replayable(const Recording& recording, const std::string& name);
 
 struct ReplayResult {
   RunResult run;
-  std::optional<uint64_t>
-      differs_at;  // number of the first tick, from 1, after which the state's hash was not the recorded one
+  std::optional<uint64_t> differs_at;  // number of the first tick, from 1, with a different hash
 };
-// Plays a recording. check: compare the hash after every tick and stop at the first that differs. Throws InputError when the
-// recording comes from a program whose state had another layout.
+// Plays a recording. check: compare the hash after every tick and stop at the first difference. Throws InputError when the
+// recording comes from a program with another layout of the state.
 ReplayResult replay_session(const Recording& recording, const std::string& name, bool check, int threads,
                             const SessionHooks& hooks = {});
 
-// As many workers as help on this machine.
+// Number of workers that is fastest on this machine.
 int default_threads();
 
 }  // namespace catgut

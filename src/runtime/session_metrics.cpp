@@ -63,7 +63,7 @@ void update(SessionMetrics& p, const Snapshot& seen, float dt) {
   if (!p.begun) p.opening_start = seen.opening_area;
   for (size_t k = 0; k < 2; ++k) {
     const float way = distance(seen.tool[k].pose.p, p.tip[k]);
-    if (p.begun && way < 0.05f) p.path[k] += way;  // a hand that appears somewhere has not gone there
+    if (p.begun && way < 0.05f) p.path[k] += way;  // a hand that connects has not moved there
     p.tip[k] = seen.tool[k].pose.p;
     p.peak_force[k] = std::max(p.peak_force[k], length(seen.tool[k].force));
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: what a user at the instruments has done so far, gathered from the published snapshots tick by tick. Plain values,
-// so that undoing a bite undoes what it counted too.
+// runtime: metrics of an interactive session so far, collected from the published snapshots tick by tick. Plain values,
+// so that undoing a bite restores its metrics too.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -10,20 +10,20 @@
 
 namespace catgut {
 
-// What the events of a run add up to; results of runs (runtime/metrics_collector) and of practice are counted here and nowhere
-// else.
+// Event counts of a run. Results of runs (runtime/metrics_collector) and of interactive sessions are both counted
+// here.
 struct Counts {
   std::array<uint32_t, static_cast<size_t>(EventKind::count_)> events{};  // of each kind
   std::array<uint32_t, static_cast<size_t>(Fault::count_)> faults{};
   uint32_t faults_in_all = 0;
   uint32_t bites = 0;            // completed
   uint32_t bites_withdrawn = 0;  // the needle was withdrawn
-  uint32_t knots = 0;            // with at least one locked throw, settled ones included
+  uint32_t knots = 0;            // with at least one locked throw, baked ones included
   uint32_t throws = 0;
-  uint32_t last_knot_throws = 0;  // of the knot that was tied last
+  uint32_t last_knot_throws = 0;  // of the most recent knot
   uint32_t cuts = 0;
   uint32_t sutures_baked = 0;
-  uint32_t needle_slips = 0;  // the needle was torn out of a jaw
+  uint32_t needle_slips = 0;  // the needle slipped out of a jaw
   // Locked throws of every suture that is not baked; knots are numbered from 0 in each. A suture without a throw: no row.
   using ThrowsOfKnots = std::array<uint8_t, 32>;
   std::vector<ThrowsOfKnots> throws_of;
@@ -32,14 +32,14 @@ struct Counts {
 void count(Counts& counts, const Event& event);
 
 struct SessionMetrics : Counts {
-  double time_s = 0;             // [s] simulated, since the hands were let in
+  double time_s = 0;             // [s] simulated, since the hands connected
   float path[2] = {0, 0};        // [m] of each tool's tip
   float peak_force[2] = {0, 0};  // [N] on each hand
-  float opening_start = 0;       // [m^2] when the hands were let in; 0: nothing to close
-  float opening = 0;             // [m^2] now
+  float opening_start = 0;       // [m^2] when the hands connected; 0: nothing to close
+  float opening = 0;             // [m^2] current
   float closure = 0;             // 0 open .. 1
-  uint32_t undos = 0;            // bites that were undone; survives the undoing
-  std::array<Vec3, 2> tip{};     // [m] where the tools were, for the path
+  uint32_t undos = 0;            // undone bites; not reset by an undo
+  std::array<Vec3, 2> tip{};     // [m] previous tool positions, for the path
   bool begun = false;
 };
 

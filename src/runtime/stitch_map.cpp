@@ -9,7 +9,7 @@ namespace catgut {
 namespace {
 
 constexpr double kSampleTime = 0.1;      // [s]
-constexpr size_t kMostEvents = 20000;    // some hours of work
+constexpr size_t kMostEvents = 20000;    // some hours of procedure
 constexpr size_t kMostSamples = 216000;  // six hours
 
 bool particle_by_particle(EventKind kind) {
@@ -30,7 +30,7 @@ size_t nearest_point(const StitchEdge& edge, Vec3 p) {
   return best;
 }
 
-// From the place opposite to the start of `first`, and the same way round: what faces each other has the same place along.
+// From the point opposite to the start of `first`, in the same direction: opposite points have the same coordinate.
 void run_beside(StitchEdge& edge, const StitchEdge& first) {
   const size_t n = edge.point.size();
   if (n < 3 || first.point.size() < 3) return;
@@ -160,7 +160,7 @@ OnEdge nearest_on(const StitchEdge& edge, Vec3 p) {
 float between(float edge_length, float a0, float a1, float b0, float b1) {
   if (edge_length <= 0) return 0;
   const auto round = [&](float s) { return s - edge_length * std::floor(s / edge_length); };
-  // As start and width, the short way round.
+  // As start and width, in the shorter direction.
   const auto stretch = [&](float s0, float s1) {
     const float w = round(s1 - s0);
     return w <= edge_length / 2 ? std::array<float, 2>{round(s0), w} : std::array<float, 2>{round(s1), edge_length - w};
