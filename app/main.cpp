@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: the program `catgut`. Reads the command line, runs one command, and turns every fault into one line on standard error.
+// app: the program `catgut`. Reads the command line, runs one command, and turns every error into one line on standard error.
 #include <algorithm>
 #include <cstdio>
 #include <exception>
@@ -17,7 +17,7 @@ int report(std::string what) {
   return 2;
 }
 
-// CLI11 only says that an argument was not expected; the nearest command or option is more use.
+// CLI11 only reports that an argument was not expected; the most similar command or option is more helpful.
 std::string parse_fault(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
   std::vector<std::string> commands;
   const CLI::App* used = &app;

@@ -32,7 +32,7 @@ int bench_stages(const BenchOptions& o) {
   session.threads = o.threads;
   session.seconds = o.seconds;
   session.surgeon = scene.technique.name == "none" ? "none" : "scripted";
-  // Every repetition computes the same bits; the fastest is the one least disturbed by other programs.
+  // Every repetition computes the same bits; the fastest is the least disturbed by other programs.
   RunResult best;
   for (int i = 0; i < o.repeat; ++i) {
     RunResult r = run_session(scene, session, hooks);

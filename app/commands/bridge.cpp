@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: `catgut bridge`: serves the haptic arms of this machine to a simulator on another one (or in another process here).
+// app: `catgut bridge`: serves the haptic devices of this machine to a simulator on another one (or in another process here).
 #include <cstdio>
 #include <memory>
 #include <thread>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: the commands of the program, one file each. A command adds itself to the command line and, when it was chosen, sets the
+// app: the commands of the program, one file each. A command adds itself to the command line and, if selected, sets the
 // exit code: 0 done, 1 the expectation or check failed, 2 bad input, 130 interrupted.
 #pragma once
 #include <CLI/CLI.hpp>
@@ -23,7 +23,7 @@ void add_devices(CLI::App& app, int& exit_code);
 void add_bridge(CLI::App& app, int& exit_code);
 void add_describe(CLI::App& app, int& exit_code);
 
-// `catgut bench limits` (app/commands/limits.cpp). Code 1 when not all sutures that were asked for could be made.
+// `catgut bench limits` (app/commands/limits.cpp). Code 1 when not all requested sutures could be made.
 struct LimitsOptions {
   std::vector<std::string> scene, set;
   std::string out;  // folder
@@ -31,7 +31,7 @@ struct LimitsOptions {
 };
 int bench_limits(const LimitsOptions& options);
 
-// `catgut bench paper` (app/commands/paper.cpp). Code 1 when an execution did not sew what its scene expects.
+// `catgut bench paper` (app/commands/paper.cpp). Code 1 when an execution lacks an expected result of its scene.
 struct PaperOptions {
   std::vector<std::string> scene, set;
   std::string out;  // folder; empty: none
@@ -48,7 +48,7 @@ struct ScaleOptions {
   double seconds = 0;
 };
 int bench_scale(const ScaleOptions& options);
-// The processor and how many of its cores there are, in words.
+// Name of the processor and its number of cores, as text.
 std::string this_machine();
 
 // `catgut bench frame` (app/commands/frame.cpp).
@@ -58,38 +58,38 @@ struct FrameOptions {
   double seconds = 0;  // [s] simulated
 };
 int bench_frame(const FrameOptions& options);
-// What a headset's picture of each snapshot costs, `every_s` [s] simulated apart, nothing rasterized. Throws std::runtime_error
+// Time of a headset's frame for snapshots `every_s` [s] simulated apart, without rasterization. Throws std::runtime_error
 // in a build without pictures.
 using StereoPictures = std::function<FrameCost::Times(const Snapshot&)>;
 StereoPictures stereo_pictures(const PictureModel& model, float every_s);
 
-// `catgut bench haptics` (app/commands/haptics.cpp). folder: empty: the table alone.
+// `catgut bench haptics` (app/commands/haptics.cpp). folder: empty: only the table.
 int bench_haptics(const std::string& folder, const std::string& scene);
 int plot_haptics_log(const std::string& file);  // to FILE.png
 
 int play_without_arguments();  // the window's start screen
 
-// What several commands share (app/commands/common.cpp).
+// Shared by several commands (app/commands/common.cpp).
 
-// A number from least to most; unlike CLI::Range it lets no NaN through.
+// A number from least to most; unlike CLI::Range it refuses NaN.
 CLI::Validator within(double least, double most);
-// Refuses file names whose suffix does not say what they hold.
+// Refuses file names whose suffix does not match their format.
 void check_picture_files(const PictureOptions& options);
 // --video, --frames, --contact-sheet, --video-speed.
 void add_picture_options(CLI::App& command, PictureOptions& options);
 void add_threads_option(CLI::App& command, int& threads);
 
-// Set by the first Ctrl-C (the tick in hand is finished, files are closed); a second one kills at once.
+// Set by the first Ctrl-C (the current tick is finished, files are closed); a second one ends the program at once.
 const std::atomic<bool>& stop_on_interrupt();
 
-// A line a second on a terminal, else one every five seconds, on standard error.
+// A line per second on a terminal, else one every five seconds, on standard error.
 std::function<void(const Progress&)> progress_line();
 void end_progress_line();
 
-// Makes the folder of an output file and checks that the file can be written; before the work, not after it. "" and "-" pass.
+// Creates the folder of an output file and checks that the file can be written, before the work starts. "" and "-" pass.
 void prepare_output(const std::string& path);
-// The same where no folder may be made: a caller that sits down at a window has not asked for one, and a slip of the pen would
-// send the recording of an hour's work to a place where no one looks for it.
+// The same, but never creates a folder: the path of an interactive session's recording may have a typing
+// error, and a new folder would hide the file from the user.
 void check_output(const std::string& path);
 // path "-": standard output.
 void write_output(const std::string& path, const std::string& text);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: what the commands share; see commands.h.
+// app: shared by the commands; see commands.h.
 #include <fmt/format.h>
 #include <signal.h>
 #include <unistd.h>
@@ -22,7 +22,7 @@ static_assert(std::atomic<bool>::is_always_lock_free, "set in a signal handler")
 
 void on_interrupt(int) { stop_wanted = true; }
 
-bool line_open = false;  // a progress line stands on the terminal
+bool line_open = false;  // the terminal shows a progress line
 
 }  // namespace
 
@@ -108,7 +108,7 @@ void prepare_output(const std::string& path) {
   const bool was_there = std::filesystem::exists(path, error);
   if (std::filesystem::is_directory(path, error) || !std::ofstream(path, std::ios::app))
     throw InputError(path, "cannot be written", "choose another path");
-  if (!was_there) std::filesystem::remove(path, error);  // a run that fails early leaves no empty file behind
+  if (!was_there) std::filesystem::remove(path, error);  // a run that fails early leaves no empty file
 }
 
 void check_output(const std::string& path) {

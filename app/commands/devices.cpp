@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: `catgut devices`: which haptic arms are connected and what they can do, driver by driver; with --test, a slow small push
-// of each.
+// app: `catgut devices`: lists connected haptic devices and their capabilities, backend by backend; with --test, a slow small
+// push of each.
 #include <algorithm>
 #include <cstdio>
 #include <memory>
@@ -61,7 +61,7 @@ void print(const ArmPort& port) {
   }
 }
 
-// One driver after the other, so that no two of them hold the same arm.
+// One backend after the other, so that no two of them hold the same device.
 int devices(const Options& o) {
   int code = 0;
   bool any = false;
@@ -78,7 +78,7 @@ int devices(const Options& o) {
     else if (o.test) code = std::max(code, test(std::move(port)));
     else std::printf("  catgut devices %s --test applies small forces; catgut play --haptics %s uses them\n", d.word, d.word);
   }
-  if (any && !o.test && !o.calibrate) read_arm_places(arm_places_file());  // says here what a scene would stumble over
+  if (any && !o.test && !o.calibrate) read_arm_places(arm_places_file());  // reports errors that would occur when a scene opens
   if (any) return code;
   if (o.test || o.calibrate)
     throw InputError(o.test ? "devices --test" : "devices --calibrate", "no haptic device", "see above for what is missing");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: `catgut bench frame`: what a headset's frame costs the processor, without a rasterizer, while a scene is worked on.
+// app: `catgut bench frame`: processor time of a headset's frame, without a rasterizer, while a scene runs.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace catgut {
 namespace {
 
-constexpr double kFrameEvery = 1.0 / 30;            // [s] simulated: of a run's frames, enough to know them
+constexpr double kFrameEvery = 1.0 / 30;            // [s] simulated: a sufficient sample of a run's frames
 constexpr int kEyeWidth = 1440, kEyeHeight = 1584;  // [pixels] a usual headset's
 
 double at_part(std::vector<double>& values, double part) {
@@ -64,7 +64,7 @@ int bench_frame(const FrameOptions& o) {
     throw InputError("bench frame", error.what(), "build with -DCATGUT_RENDER=ON");
   }
   end_progress_line();
-  if (caller.size() > 30) {  // the first second compiles materials and fills memory
+  if (caller.size() > 30) {  // the first second compiles materials and fills caches
     caller.erase(caller.begin(), caller.begin() + 30);
     all.erase(all.begin(), all.begin() + 30);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: `catgut bench haptics`: the comparison of rendering methods and, with --out, what a bite and a knot feel
-// like.
+// app: `catgut bench haptics`: the comparison of rendering methods and, with --out, the force curves of a bite and a
+// knot.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -34,7 +34,7 @@ Plot force_plot(const std::string& title, const std::string& x_name, const std::
   return plot;
 }
 
-// The purse-string's bite runs along the wall and comes out again; the stay suture's is through and through, and has the knot.
+// The purse-string's bite runs along the wall and exits again; the stay suture's is full thickness, and has the knot.
 void write_felt(const std::string& folder, const std::string& scene) {
   prepare_output(folder + "/forces.png");
   FeltCurves c = feel_a_stitch(read_scene(scene), false, stop_on_interrupt());
@@ -93,7 +93,7 @@ int plot_haptics_log(const std::string& file) {
   if (!in || !std::getline(in, line) || line != kHapticsLogHead)
     throw InputError("--log " + file, "not a haptics log",
                      "write one with catgut play SCENE --haptics DRIVER --haptics-log FILE");
-  // From each millisecond the three lengths; a pixel shows the largest of those that fall on it.
+  // Three force magnitudes per millisecond; a pixel shows the maximum over its interval.
   constexpr size_t kColumns = 26;
   struct Row {
     double t;

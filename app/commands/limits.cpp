@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: `catgut bench limits`: how many sutures one body and two bodies bear (paper 3.5).
+// app: `catgut bench limits`: maximum number of sutures in one body and in two (paper 3.5).
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -25,7 +25,7 @@ int bench_limits(const LimitsOptions& o) {
   bool all_reached = true;
   for (const SceneSpec& scene : scenes) {
     const std::string stem = o.out + "/" + scene.name;
-    // Each row goes to the disk when it is there: what was measured outlives whatever ends the run.
+    // Each row is written when it is complete: measurements survive an early end of the run.
     std::ofstream csv(stem + ".csv", std::ios::binary);
     csv << limits_csv_header();
     hooks.on_progress = progress_line();

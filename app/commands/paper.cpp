@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: `catgut bench paper`: tables 1 to 4 of the paper, our figures beside its own.
+// app: `catgut bench paper`: tables 1 to 4 of the paper, Catgut's figures beside its own.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -13,7 +13,7 @@
 namespace catgut {
 namespace {
 
-// Empty in a build without pictures.
+// Empty in a build without rendering.
 std::function<PictureCost(const PictureModel&)> picture_cost() {
   try {
     stereo_pictures({}, 0.1f);

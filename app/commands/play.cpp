@@ -24,7 +24,7 @@ void read_size(const std::string& text, PlayOptions& o) {
   o.width = width, o.height = height;
 }
 
-// Of both commands that open the window.
+// For both commands that open the window.
 struct WindowCommand {
   PlayOptions play;
   std::string quality, size = "1280x720";
@@ -70,7 +70,7 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_option("--surgeon", o->play.live.surgeon, "watch the scripted surgeon, or the hands of a recording")
       ->type_name("scripted|FILE");
   command->add_flag("--teach", o->play.teach, "tutorial: first stitch, step by step");
-  // One by default: a tick is short, and workers that wait for the next one take time from the picture.
+  // One by default: a tick is short, and waiting workers take processor time from rendering.
   command->add_option("--threads", o->play.live.threads, "solver threads")->check(CLI::Range(1, 64))->capture_default_str();
   std::string drivers;
   for (const ArmDriver& d : arm_drivers()) drivers += std::string(d.word) + "[:WHERE]|";
@@ -88,12 +88,12 @@ void add_play(CLI::App& app, int& exit_code) {
   add_window_options(*command, *o);
   command->callback([o, &exit_code] {
     read_window_options(*o);
-    read_arm_choice(o->play.live.haptics);  // its faults are reported before a window opens
+    read_arm_choice(o->play.live.haptics);  // reports errors before a window opens
     if (o->play.teach && o->play.scene.empty()) o->play.scene = first_stitch().scene;
     if (o->play.teach && (o->play.scene != first_stitch().scene || !o->play.live.surgeon.empty()))
       throw InputError("--teach", "the tutorial needs the scene \"" + first_stitch().scene + "\" and manual control",
                        "write catgut play " + first_stitch().scene + " --teach");
-    if (!o->play.scene.empty()) read_scene(o->play.scene);  // its faults are reported before a window opens
+    if (!o->play.scene.empty()) read_scene(o->play.scene);  // reports errors before a window opens
     o->play.live.say = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
     check_suffix(o->play.live.record, ".cgrec", "--record");
     check_suffix(o->play.json, ".json", "--json");

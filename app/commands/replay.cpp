@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: `catgut replay FILE`: plays a recording; with --check, proves that today's program gives the recorded bits.
+// app: `catgut replay FILE`: plays a recording; with --check, compares its hash after every tick.
 #include <cstdio>
 #include <memory>
 
@@ -47,7 +47,7 @@ int replay(const ReplayOptions& o) {
     std::printf("%s: %llu ticks replayed%s, state %016llx\n", o.file.c_str(), static_cast<unsigned long long>(result.run.ticks),
                 o.check ? ", all hashes verified" : "", static_cast<unsigned long long>(result.run.state_hash));
   if (result.run.interrupted) return 130;
-  // What could be replayed has been; that it is not the whole run is still the file's fault.
+  // The readable part was replayed; a truncated file is still an error of the file.
   if (recording.truncated)
     throw InputError(o.file, "truncated recording: " + recording.fault, "the ticks it holds were replayed");
   return 0;

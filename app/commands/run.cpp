@@ -68,7 +68,7 @@ int run(const RunOptions& o) {
   end_progress_line();
   if (!o.json.empty()) write_output(o.json, run_json(result));
   if (o.json != "-") std::fputs(run_summary(result, !o.no_expect).c_str(), stdout);
-  if (pictures) pictures->finish();  // last: a picture that fails takes no results with it
+  if (pictures) pictures->finish();  // last: an error in a picture does not lose results
   if (result.interrupted) return 130;
   return o.no_expect || result.expectations_hold() ? 0 : 1;
 }

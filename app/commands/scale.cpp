@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // app: `catgut bench scale`: scaling with particle count (1, 4, 16 times) and thread count. The paper's
-// substeps and sweeps unless --set says otherwise; every rule is on, and the scripted surgeon begins to work.
+// substeps and sweeps unless --set says otherwise; every feature is on, and the scripted surgeon starts to work.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -70,7 +70,7 @@ int bench_scale(const ScaleOptions& o) {
     std::vector<Measured> row;
     for (const int t : threads) row.push_back({times, t, {}});
     for (int i = 0; i < o.repeat && !hooks.stop->load(); ++i)
-      for (Measured& m : row) {  // in turns, so that a busy minute meets both
+      for (Measured& m : row) {  // alternating, so that interference affects both
         RunResult run = run_once(larger, m.threads, o.seconds, hooks);
         if (!run.interrupted && (m.run.ticks == 0 || run.solver_ms.median < m.run.solver_ms.median)) m.run = std::move(run);
       }

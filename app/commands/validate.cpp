@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: `catgut validate`: what the solver computes beside closed forms and published numbers.
+// app: `catgut validate`: compares the solver with closed forms and published numbers.
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>

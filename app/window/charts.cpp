@@ -14,9 +14,9 @@
 namespace catgut {
 namespace {
 
-// Where the scales end [mm]; what is beyond has the last color, and its number says so.
+// Limits of the color scales [mm]; values beyond have the last color, and their number is printed.
 constexpr float kMostSpacing = 8, kMostDepth = 2, kMostEdge = 8;
-constexpr size_t kMostNumbered = 26;  // bites; with more the numbers would lie over each other
+constexpr size_t kMostNumbered = 26;  // bites; with more the numbers would overlap
 // Recommended bite spacing and edge distance in bowel [mm] (EAGLE module 5, docs/references.md).
 constexpr float kGoodFrom = 3, kGoodTo = 5;
 
@@ -34,7 +34,7 @@ float bite_value_mm(const StitchBite& b, BiteColor by) {
   return 1000 * (by == BiteColor::spacing ? b.spacing : by == BiteColor::depth ? b.depth : far);
 }
 
-// A distance between grid lines that gives some four to eight of them.
+// A distance between grid lines that gives about four to eight of them.
 double grid_step(double range) {
   double step = std::pow(10.0, std::floor(std::log10(std::max(range, 1e-9) / 4)));
   for (const double m : {2.0, 2.5, 2.0})
@@ -54,7 +54,7 @@ ImU32 scale_color(float part, float alpha) {
                                                                  {0.725f, 0.669f, 0.425f},
                                                                  {0.859f, 0.776f, 0.352f},
                                                                  {1.000f, 0.910f, 0.270f}}};
-  // The darkest eighth would not be seen on a dark panel.
+  // The darkest eighth would be invisible on a dark panel.
   const float at = (0.14f + 0.86f * std::clamp(part, 0.0f, 1.0f)) * 8;
   const size_t k = std::min<size_t>(static_cast<size_t>(at), 7);
   const float t = at - static_cast<float>(k);
@@ -79,7 +79,7 @@ void scale_legend(BiteColor by, float width) {
     const float a = static_cast<float>(i) / kSteps, b = static_cast<float>(i + 1) / kSteps;
     list.AddRectFilled({at.x + a * width, at.y}, {at.x + b * width + 1, at.y + high}, scale_color((a + b) / 2));
   }
-  if (by != BiteColor::depth) {  // a bracket round what is requested
+  if (by != BiteColor::depth) {  // a bracket round the recommended range
     const float a = at.x + width * kGoodFrom / most(by), b = at.x + width * kGoodTo / most(by);
     list.AddRect({a, at.y - 2}, {b, at.y + high + 2}, color(kAccent), 2, 0, std::max(1.5f, 0.1f * em()));
   }
@@ -95,7 +95,7 @@ void stitch_map_chart(const StitchMap& map, BiteColor by, ImVec2 size) {
   ImGui::Dummy(size);
   list.AddRectFilled(at, {at.x + size.x, at.y + size.y}, color({0, 0, 0, 0.35f}), 4);
   size_t walls = 0;
-  float deepest = 0.006f, spread = 0;  // [m] of tissue that is shown
+  float deepest = 0.006f, spread = 0;  // [m] of tissue shown
   for (const StitchEdge& e : map.edge) walls += e.length() > 0;
   for (const StitchBite& b : map.bite) {
     deepest = std::max({deepest, 1.45f * b.entry_edge, 1.45f * b.exit_edge});
@@ -105,11 +105,11 @@ void stitch_map_chart(const StitchMap& map, BiteColor by, ImVec2 size) {
     label(list, {at.x + size.x / 2, at.y + size.y / 2}, color(kQuiet), "No edge data", 0.5f, 0.5f);
     return;
   }
-  // One wall below the edge line; of two the first below and the second above, as they lie when they are sutured together.
+  // One wall below the edge line; of two the first below and the second above, in their arrangement during suturing.
   const float left = at.x + 3.2f * em(), right = at.x + size.x - 1.2f * em(), top = at.y + 0.7f * em(),
               bottom = at.y + size.y - 1.7f * em();
   const float middle = walls > 1 ? (top + bottom) / 2 : top + 0.7f * em();
-  const float pixels = (bottom - middle - 0.4f * em()) / deepest;  // per meter away from the edge
+  const float pixels = (bottom - middle - 0.4f * em()) / deepest;  // per meter from the edge
   const auto x_of = [&](float along, const StitchEdge& e) { return left + (right - left) * along / e.length(); };
   const float thin = std::max(1.0f, 0.06f * em());
   for (size_t w = 0; w < std::min<size_t>(map.edge.size(), 2); ++w) {
@@ -133,7 +133,7 @@ void stitch_map_chart(const StitchMap& map, BiteColor by, ImVec2 size) {
   const float step = static_cast<float>(grid_step(1000.0 * static_cast<double>(first.length())));
   for (float mm = 0; mm <= 1000 * first.length(); mm += step) {
     const float x = x_of(mm / 1000, first);
-    if (x > right - 10 * em()) break;  // the unit stands there
+    if (x > right - 10 * em()) break;  // the unit label is there
     list.AddLine({x, bottom - 0.2f * em()}, {x, bottom}, color(kQuiet), thin);
     label(list, {x, bottom + 0.1f * em()}, color(kQuiet), fmt::format("{:.0f}", mm), 0.5f, 0, 0.85f);
   }
@@ -150,7 +150,7 @@ void stitch_map_chart(const StitchMap& map, BiteColor by, ImVec2 size) {
     const float part = bite_part(b, by, known);
     const ImU32 c = known ? scale_color(part) : color(kText);
     const float thick = std::max(3.0f, 0.24f * em()), dot = std::max(3.5f, 0.28f * em());
-    const bool across = std::abs(out.x - in.x) > (right - left) / 2;  // over the place where the edge was cut open
+    const bool across = std::abs(out.x - in.x) > (right - left) / 2;  // across the point where the edge was cut open
     if (across) {
       const float whole = right - left, there = out.x < in.x ? out.x + whole : out.x - whole;
       list.PushClipRect({left, at.y}, {right, at.y + size.y}, true);
@@ -202,7 +202,7 @@ void tension_chart(const StitchMap& map, uint64_t from, uint64_t to, double now,
             0.85f);
     }
   }
-  // As many points as there are pixels: of what falls on one the most.
+  // One point per pixel: the maximum of its interval.
   const auto draw = [&](float TensionSample::*what, ImU32 c, float thick) {
     std::vector<ImVec2> line;
     for (const TensionSample& t : map.tension) {

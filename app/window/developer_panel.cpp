@@ -38,7 +38,7 @@ Choice developer_panel(const WorkView& v, bool can_touch) {
       text(fmt::format("{:<16}{:8.3f} N  of {}", force_name(static_cast<ForceKind>(k)), m.peak_n[k], m.constraints[k]));
     gap(0.3f);
     text(kQuiet, can_touch ? "parameters" : "parameters (Esc to edit)");
-    // A slider that is being moved keeps its own value until it is let go: every change builds the model again.
+    // A slider that is being dragged keeps its own value until release: every change rebuilds the model.
     static std::array<float, kLiveParameters> moved{};
     static int active = -1;
     for (size_t k = 0; k < kLiveParameters; ++k) {

@@ -32,7 +32,7 @@ std::array<ToolInput, 2> WindowHands::move(const WindowInput& in, const Settings
            m.pitch + n.pitch, m.roll + n.roll, m.together || n.together, m.both + n.both};
     }
   } else {
-    pad.trigger = {};  // one that comes back has nothing to say until its triggers move: what was held is held
+    pad.trigger = {};  // after reconnection, triggers are ignored until they move: held objects stay held
   }
   if (in.moved_ns) moved_ns = in.moved_ns;
   return steer(steering, motion, view, picture, seen, dt, moved_ns);

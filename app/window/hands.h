@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: from what was read since the last picture to the hands that are published: mouse and gamepad together.
+// app/window: combines mouse and gamepad input since the last frame into the published hands.
 #pragma once
 #include <array>
 
@@ -16,10 +16,10 @@ struct WindowHands {
   MouseHand mouse;
   GamepadHand pad;
   size_t speed = 1;       // of kMouseSpeeds
-  uint64_t moved_ns = 0;  // when the newest motion was read
+  uint64_t moved_ns = 0;  // time of the newest motion
 
   void begin(const PictureModel& picture, const Settings& settings);
-  // After a restart or a bite undone the hands continue from where the tools are.
+  // After a restart or an undone bite the hands continue from the present tool poses.
   void jumped(const PictureModel& picture, const Snapshot& seen, const Settings& settings, bool at_start);
   std::array<ToolInput, 2> move(const WindowInput& in, const Settings& settings, const ViewFrame& view,
                                 const PictureModel& picture, const Snapshot& seen, float dt);

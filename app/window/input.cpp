@@ -23,7 +23,7 @@ WindowEvents::~WindowEvents() {
 
 void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
   const bool down = e.type == SDL_KEYDOWN;
-  // By place on the keyboard where hands rest on keys, by letter where the letter stands for a word.
+  // By position on the keyboard where hands rest on keys, by letter where the letter abbreviates a word.
   switch (e.keysym.scancode) {
     case SDL_SCANCODE_Q:
       roll_left_ = down;
@@ -131,7 +131,7 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
         break;
       case SDL_WINDOWEVENT:
         in.resized = in.resized || e.window.event == SDL_WINDOWEVENT_SIZE_CHANGED;
-        // Keys that were down when the window lost the keyboard never come up here.
+        // Keys that were pressed when the window lost the focus get no release event.
         if (e.window.event == SDL_WINDOWEVENT_FOCUS_LOST || e.window.event == SDL_WINDOWEVENT_MINIMIZED ||
             e.window.event == SDL_WINDOWEVENT_HIDDEN) {
           in.left = true;
@@ -216,7 +216,7 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
   int x = 0, y = 0;
   SDL_GetMouseState(&x, &y);
   io.MousePos = working ? ImVec2(-1, -1) : ImVec2(static_cast<float>(x), static_cast<float>(y));
-  // A click that came and went between two pictures is still one for the panels.
+  // A click that started and ended between two frames is still one for the panels.
   io.MouseDown[0] = !working && (left_ || clicked_);
   return in;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: what the window's events say, as plain data: for the hands, for the camera, for the panels, for the screens. The
-// only file beside window.cpp that knows SDL.
+// app/window: the window's events as plain data: for the hands, for the camera, for the panels, for the screens. The
+// only file beside window.cpp that uses SDL.
 #pragma once
 #include <SDL.h>
 
@@ -14,7 +14,7 @@
 
 namespace catgut {
 
-// Keys that are reported once when they go down.
+// Keys that are reported once per press.
 enum class Key {
   none,
   escape,
@@ -29,7 +29,7 @@ enum class Key {
   hints,
   help_at_needle,
   next_instrument,  // from the tray into the active hand
-  park,             // the active hand's clamp, or take one up
+  park,             // parks the active hand's clamp, or takes one
   arms_off,
   finish,
   digit,
@@ -50,13 +50,13 @@ struct WindowInput {
   float orbit_right = 0, orbit_up = 0, closer = 0;  // of the camera, see turn_orbit
   bool camera_home = false;
   int speed = -1;       // of kMouseSpeeds, when a speed key was pressed
-  Key key = Key::none;  // one at a time: two that went down between two pictures come one after the other
+  Key key = Key::none;  // one per call: two presses between two frames are reported in sequence
   int digit = 0;
   int arrow_presses = 0;  // right minus left, repeats included
   bool quit = false, resized = false;
-  bool left = false;      // the keyboard went to another window, or this one is hidden
-  bool pad_gone = false;  // the gamepad that was used was unplugged
-  uint64_t moved_ns = 0;  // on the clock of runtime/live: when the newest motion was read
+  bool left = false;      // the window lost the focus, or was hidden
+  bool pad_gone = false;  // the used gamepad was unplugged
+  uint64_t moved_ns = 0;  // on the clock of runtime/live: time of the newest motion
 };
 
 class WindowEvents {
@@ -66,10 +66,10 @@ class WindowEvents {
   WindowEvents(const WindowEvents&) = delete;
   WindowEvents& operator=(const WindowEvents&) = delete;
 
-  // Everything since the last call. working: the mouse belongs to the hands, else to the panels (ImGui's context is fed), and
-  // with look_round where no panel wants it to the camera.
+  // Everything since the last call. working: the mouse controls the hands, else the panels (ImGui's context is fed), and
+  // with look_round the camera, where no panel is below it.
   WindowInput read(bool working, float dt, bool look_round = false);
-  void panels_drawn() { clicked_ = false; }  // they have seen the clicks
+  void panels_drawn() { clicked_ = false; }  // clicks were processed
   const std::string& pad_name() const { return pad_name_; }
 
  private:
@@ -79,7 +79,7 @@ class WindowEvents {
   std::deque<std::pair<Key, int>> keys_;  // with the digit, not reported yet
   SDL_GameController* pad_ = nullptr;
   std::string pad_name_;
-  bool clicked_ = false;  // the left button went down since the panels were last drawn
+  bool clicked_ = false;  // the left button was pressed since the panels were last drawn
   bool left_ = false, right_ = false, middle_ = false, space_ = false, cut_ = false, fresh_ = false;
   bool roll_left_ = false, roll_right_ = false, both_ = false;
   int arrow_x_ = 0, arrow_y_ = 0, zoom_ = 0;

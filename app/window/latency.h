@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: how long it takes from a hand's motion to what came of it.
+// app/window: latency from a hand's motion to its image.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -9,9 +9,9 @@
 namespace catgut {
 
 struct Latency {
-  // After a picture of `status` has been handed to the driver.
+  // After a frame of `status` has been submitted to the driver.
   void picture(const LiveStatus& status);
-  // A table on standard error: motion read -> tick that has it begins -> its snapshot is ready -> its picture is handed over.
+  // A table on standard error: motion read -> start of the tick that has it -> its snapshot ready -> its frame submitted.
   void report(int pictures, double seconds) const;
 
  private:

@@ -13,9 +13,9 @@
 namespace catgut {
 namespace {
 
-constexpr double kLinger = 1.2;                  // [s] that what was shown stays in sight
-constexpr float kAside = 0.0015f, kDeep = 0.4f;  // [m] from the place, part of the wanted depth: still as it should be
-// Distinguished by people who do not see red and green alike.
+constexpr double kLinger = 1.2;                  // [s] that a demonstration's result stays visible
+constexpr float kAside = 0.0015f, kDeep = 0.4f;  // [m] from the target, fraction of the wanted depth: within tolerance
+// Distinguishable with red-green color blindness.
 const ImVec4 kBlue{0.45f, 0.75f, 1.0f, 1}, kOrange{1.0f, 0.66f, 0.25f, 1}, kQuiet{0.78f, 0.84f, 0.83f, 1}, kWhite{1, 1, 1, 1};
 
 void line(const ImVec4& color, const std::string& text) {
@@ -34,7 +34,7 @@ bool LessonRun::look(Live& live, const Snapshot& seen, double wall_s) {
   const bool first = !std::exchange(begun_, true);
   if (showing_) {
     if (status.demonstrating) started_ = true;
-    if (started_ && !status.demonstrating) {  // it has ended, and everything is as it was
+    if (started_ && !status.demonstrating) {  // it has ended, and the previous state is restored
       showing_ = false;
       epoch_ = status.epoch;
       return false;
@@ -47,14 +47,14 @@ bool LessonRun::look(Live& live, const Snapshot& seen, double wall_s) {
     if (shown_at_ >= 0 && wall_s - shown_at_ > kLinger && live.command(LiveCommand::end_demonstration)) shown_at_ = 1e300;
     return false;
   }
-  if (status.epoch != epoch_) {  // a bite was undone, or it was begun again
+  if (status.epoch != epoch_) {  // a bite was undone, or the scene restarted
     epoch_ = status.epoch;
     step_ = step_from(*lesson_, seen);
   } else {
     step_ = next_step(*lesson_, step_, seen, happened);
   }
   if (step_ != was) gave_up_ = false;
-  // Where a demonstration of this step may begin.
+  // A demonstration of this step may start here.
   const auto begins_here = [&](size_t k) { return k < lesson_->step.size() && lesson_->step[k].shown_from == k; };
   if ((first || step_ != was) && begins_here(step_)) live.command(LiveCommand::mark);
   return first || step_ != was;
@@ -114,7 +114,7 @@ void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel
     const float scale = 1 / (view.pixel * deep);
     return ImVec2(0.5f * width + dot(d, view.right) * scale, 0.5f * height - dot(d, view.up) * scale);
   };
-  // The path of the tip: dashed above the tissue and below it alike, so that it is seen through.
+  // Path of the tip: dashed above the tissue and below it, drawn over the tissue.
   const float half = half_bite(picture, g), from = -half - 0.5f, to = half + 0.6f;
   constexpr int kDashes = 24;
   for (int i = 0; i < kDashes; ++i) {
@@ -132,7 +132,7 @@ void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel
     draw->AddCircle(*p, 7, good ? IM_COL32(115, 190, 255, 255) : IM_COL32(255, 168, 64, 255), 20, 2);
   if (const auto p = at(exit_of(g))) draw->AddCircleFilled(*p, 3, IM_COL32(115, 190, 255, 255));
   if (!inside) return;
-  // Toward the edge the needle goes, or from it: how far from the wanted place, in millimeters, as text.
+  // Direction of the error: toward the edge or from it, by how much, in millimeters, as text.
   const float depth = seen.active().bite.back().depth;
   const bool deep_enough = std::abs(depth - g.depth) < kDeep * g.depth + 0.0003f;
   ImGui::SetNextWindowPos({width - 8, 0.5f * height}, ImGuiCond_Always, {1, 0.5f});

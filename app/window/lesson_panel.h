@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: a lesson at the window: which step a user is at, what to do, and the surgeon who shows it on request. Time and
-// state are runtime/live's, the steps and how they are recognized procedure/lesson's.
+// app/window: a lesson in the window: the current step, its instruction, and its demonstration on request. Time and
+// state are runtime/live's; the steps and their goals are procedure/lesson's.
 #pragma once
 #include <vector>
 
@@ -22,10 +22,10 @@ class LessonRun {
   bool gave_up() const { return gave_up_; }
 
   void note_event(const Event& event) { happened_.push_back(event); }
-  // After every look at the field and its events: recognizes steps, ends a demonstration that has shown what it should. True:
-  // another step than before.
+  // After every update of the picture and its events: detects completed steps, ends a completed demonstration. True: the step
+  // has changed.
   bool look(Live& live, const Snapshot& seen, double wall_s);
-  // The key: the surgeon shows the step, or stops showing.
+  // The key: starts or stops the demonstration.
   void show(Live& live);
 
  private:
@@ -37,11 +37,11 @@ class LessonRun {
   std::vector<Event> happened_;
 };
 
-// Below the field: the step, how, progress. hints: with how it is done.
+// Below the field: the step, instruction, progress. hints: with details.
 void lesson_panel(const LessonRun& run, bool hints);
 
-// Where the next bite goes and how near the needle is to it, over the picture: the circle that its tip should follow, and,
-// while it is in the tissue, bite distance and depth in words and colors (blue: as it should be, orange: not). size: of the
+// The planned bite and the distance of the needle from it, over the image: the circle that its tip should follow, and,
+// while it is in tissue, bite distance and depth as text and color (blue: within tolerance, orange: outside). size: of the
 // window.
 void guide_overlay(const BiteGuide& guide, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen,
                    float width, float height);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: what a build without pictures (CATGUT_RENDER=OFF) answers.
+// app/window: stubs of a build without rendering (CATGUT_RENDER=OFF).
 #include "core/check.h"
 #include "window/window.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: see panels.h. Start, settings, work and pause; the others have files of their own.
+// app/window: see panels.h. Start, settings, work and pause; the others have their own files.
 #include "window/panels.h"
 
 #include <fmt/format.h>
@@ -149,7 +149,7 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& m
     quality_choice(s);
     row("text size");
     ImGui::SetNextItemWidth(16 * em());
-    // Only when it is let go: a panel that grows under the pointer runs away from it.
+    // Only on release: a panel that grows under the pointer would move away from it.
     static float wanted = 0;
     if (wanted == 0) wanted = s.text_size;
     ImGui::SliderFloat("##text", &wanted, 0.7f, 2, "%.2f x", ImGuiSliderFlags_AlwaysClamp);
@@ -200,7 +200,7 @@ void work_panel(const WorkView& v, const Settings& settings) {
   }
   for (size_t k = 0; k < 2; ++k) {
     const ArmView& arm = s.arm_view[k];
-    if (arm.most <= 0) continue;  // no such arm
+    if (arm.most <= 0) continue;  // no such device
     const size_t bars = arm.most > 0 ? static_cast<size_t>(std::clamp(20 * arm.force / arm.most, 0.0f, 20.0f)) : 0;
     state.push_back({*arm.off ? kBad : kQuiet, fmt::format("{} arm {:.1f} N {:<20}{}{}", k == 0 ? "right" : "left", arm.force,
                                                            std::string(bars, '|'), *arm.off ? "  no force: " : "", arm.off)});

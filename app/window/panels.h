@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: the panels over the picture, drawn with Dear ImGui. They show what they are given and say what was chosen;
-// nothing happens here.
+// app/window: the panels over the image, drawn with Dear ImGui. They show their arguments and return the user's choice;
+// they change nothing themselves.
 #pragma once
 #include <deque>
 #include <string>
@@ -23,9 +23,9 @@ struct SceneChoice {
 struct StartView {
   const std::vector<SceneChoice>* scenes = nullptr;
   const std::vector<std::string>* recordings = nullptr;  // paths, newest first
-  std::string message;                                   // what went wrong, one line
+  std::string message;                                   // error, one line
   std::string pad;                                       // name of the gamepad; empty: none
-  bool watch_only = false;                               // the command line has chosen who works
+  bool watch_only = false;                               // the command line has selected the surgeon
 };
 
 struct LogLine {
@@ -34,7 +34,7 @@ struct LogLine {
   bool bad = false;
 };
 
-// What is drawn over the field while a user works.
+// Contents of the panels over the field during a session.
 struct WorkView {
   const SceneSpec* scene = nullptr;
   const LiveStatus* status = nullptr;
@@ -44,18 +44,18 @@ struct WorkView {
   const std::deque<LogLine>* log = nullptr;
   size_t speed = 1;       // of kMouseSpeeds
   std::string pad;        // name of the gamepad; empty: none
-  bool watching = false;  // a surgeon works
-  bool inside = false;    // the developers' panel takes the lower part of the window
+  bool watching = false;  // the scripted surgeon works
+  bool inside = false;    // the developers' panel uses the lower part of the window
   double pictures_per_s = 0;
 };
 
 struct ResultView {
   const SceneSpec* scene = nullptr;
   const LiveResult* result = nullptr;
-  std::vector<LogLine> log;     // all that happened, in words
+  std::vector<LogLine> log;     // all events, as text
   std::string saved;            // name of the JSON file, or why there is none
-  bool from_recording = false;  // it was looked at, not sutured just now
-  float known = 1;              // part of the recording that was scanned: what is shown is of that part
+  bool from_recording = false;  // from a recording, not from a session
+  float known = 1;              // scanned fraction of the recording: the results cover that part
 };
 
 std::vector<LogLine> event_log(const StitchMap& map);
@@ -63,17 +63,17 @@ std::vector<LogLine> event_log(const StitchMap& map);
 struct PlayedView {
   const SceneSpec* scene = nullptr;
   const PlaybackStatus* status = nullptr;
-  const LiveResult* result = nullptr;  // of what is known
+  const LiveResult* result = nullptr;  // of the scanned part
   const Snapshot* seen = nullptr;
-  std::string file, version, cut;  // cut: where and how a truncated recording ends
+  std::string file, version, cut;  // cut: position and cause of a truncated recording
 };
 
-// Each may change the settings; `watch`: the scripted surgeon is to work.
+// Each may change the settings; `watch`: the scripted surgeon works.
 Choice start_panel(const StartView& view, Settings& settings, bool& watch);
 Choice settings_panel(Settings& settings, const std::string& file, const std::string& message, bool working);
 void work_panel(const WorkView& view, const Settings& settings);
 Choice pause_panel(const WorkView& view);
-// can_touch: the mouse is a pointer now and sliders can be moved.
+// can_touch: the mouse is a pointer and sliders can be moved.
 Choice developer_panel(const WorkView& view, bool can_touch);
 Choice result_panel(const ResultView& view, BiteColor& by);
 Choice view_panel(const PlayedView& view, const Settings& settings);

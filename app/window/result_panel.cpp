@@ -12,7 +12,7 @@ namespace {
 
 std::string millimeters(float meters) { return meters < 0 ? "-" : fmt::format("{:.1f}", 1000 * meters); }
 
-// A number with the color that its bite has in the map.
+// A number with the color of its bite in the map.
 void swatch(const StitchBite& b, BiteColor by, const std::string& number) {
   bool known = false;
   const float part = bite_part(b, by, known);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: which screens there are, what can be chosen on them, and what a key chooses. Pure: plain data in and out; a
-// caller that owns the window carries the choices out.
+// app/window: the screens, their choices, and the meaning of keys on them. Pure: plain data in and out; the
+// owner of the window carries the choices out.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -17,7 +17,7 @@ enum class Chosen {
   nothing,
   scene,  // which: of the list
   teach,
-  show_me,    // the surgeon shows the step of the lesson
+  show_me,    // demonstration of the lesson's step
   recording,  // text: its path
   settings,
   leave_settings,
@@ -43,7 +43,7 @@ enum class Chosen {
   help_at_needle,
   next_instrument,
   park,
-  arms_off,  // no force to haptic arms, or again
+  arms_off,  // switches force of haptic devices off, or on
   developer,
   picture,
   quit,
@@ -57,12 +57,12 @@ struct Choice {
   float of = 1;
 };
 
-// What a key's meaning depends on.
+// Context of a key's meaning.
 struct ScreenFacts {
   Screen screen = Screen::start;
   bool fault = false;           // the simulation has stopped
-  size_t scenes = 0;            // that can be chosen
-  bool from_recording = false;  // results are of one
+  size_t scenes = 0;            // number of scenes in the list
+  bool from_recording = false;  // results are from a recording
   int64_t second = 60;          // ticks of the recording
 };
 Choice choice_of_key(const WindowInput& in, const ScreenFacts& facts);

@@ -20,7 +20,7 @@ void close(SDL_Window* window) {
 }  // namespace
 
 SdlWindow::SdlWindow(int width, int height) {
-  // Pictures go through EGL on X11; on a Wayland desktop its X server serves.
+  // Rendering uses EGL on X11; a Wayland desktop provides it through XWayland.
   SDL_SetHintWithPriority(SDL_HINT_VIDEODRIVER, "x11", SDL_HINT_DEFAULT);
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
   if (SDL_Init(SDL_INIT_VIDEO | SDL_INIT_GAMECONTROLLER) != 0)

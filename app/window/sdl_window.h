@@ -9,7 +9,7 @@ namespace catgut {
 
 constexpr const char* kHeadless = "run without it: catgut run purse_string --surgeon scripted --headless";
 
-// Open while this lives. Throws InputError where there is no display.
+// Open while this object exists. Throws InputError without a display.
 struct SdlWindow {
   SDL_Window* window = nullptr;
   uint64_t number = 0;  // of the X server

@@ -27,7 +27,7 @@ constexpr size_t kMostBytes = 64 * 1024;  // far above any valid file
 constexpr const char* kQualities[] = {"low", "medium", "high"};
 constexpr const char* kGuidances[] = {"learn", "practice", "exam"};
 
-// One row per key: how it is read (false: the value will not do) and written. Reader, writer and messages go through this list.
+// One row per key: how it is read (false: invalid value) and written. Reader, writer and messages use this list.
 struct Key {
   const char* name;
   const char* wants;
@@ -102,7 +102,7 @@ std::string read_small_file(const std::string& path) {
   return text;
 }
 
-// Whole on the disk before its name is, so that no crash leaves half of it.
+// Content is flushed before the rename, so that no crash leaves a partial file.
 void write_whole(const std::string& path, const std::string& text) {
   const std::string beside = path + ".new";
   const int file = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
@@ -181,7 +181,7 @@ void save_settings(const Settings& settings, const std::string& path) {
 std::string settings_path() {
   const auto of = [](const char* name) -> fs::path {
     const char* value = std::getenv(name);
-    return value && value[0] == '/' ? value : "";  // the specification wants whole paths, and others ignored
+    return value && value[0] == '/' ? value : "";  // the specification requires absolute paths, and ignores others
   };
   fs::path folder = of("XDG_CONFIG_HOME");
   if (folder.empty() && !of("HOME").empty()) folder = of("HOME") / ".config";

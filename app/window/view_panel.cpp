@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: the replay viewer's panels: what is shown, and a line of time to go along.
+// app/window: the replay viewer's panels: status, and a time line.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -46,7 +46,7 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
       about.push_back({kText, line});
   lines_at("recording", 0, 0, 0.66f, about);
 
-  // What has just happened, up to the moment that is shown.
+  // Recent events, up to the shown moment.
   std::vector<Line> happened;
   const std::vector<Event>& events = v.result->map.event;
   auto e =
@@ -68,7 +68,7 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
   if (settings.hints) lines_at("keys", 0, 1, 0.5f, {{kQuiet, kViewKeys}}, high + margin);
 
   begin_box("time", {margin, screen.y - high - margin}, {screen.x - 2 * margin, high}, 0.85f, ImGuiWindowFlags_NoScrollbar);
-  // The line: tension behind, marks on it, what is not known yet darker. Press or drag to go there.
+  // The time line: tension behind, marks on it, the part not scanned yet darker. Click or drag to seek.
   const ImVec2 at = ImGui::GetCursorScreenPos(), size{ImGui::GetContentRegionAvail().x, 2.6f * em()};
   const double all = std::max<double>(1, static_cast<double>(s.ticks));
   ImGui::InvisibleButton("line", size);

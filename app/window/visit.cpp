@@ -82,7 +82,7 @@ std::vector<std::string> recordings_in(const std::string& folder, const std::vec
     found.push_back({fs::last_write_time(path, error), path.string()});
   };
   for (const std::string& path : also) add(path);
-  // A folder of photographs must not make the start screen wait.
+  // A folder with many files must not delay the start screen.
   int looked_at = 0;
   for (fs::directory_iterator i(folder, fs::directory_options::skip_permission_denied, error), end; !error && i != end;
        i.increment(error)) {

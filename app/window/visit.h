@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: a scene from its opening to its end, and a recording that is looked at: what runs, and what of it the screens
-// show.
+// app/window: a scene from opening to closing, and a recording in the viewer: the running simulation and its data for the
+// screens.
 #pragma once
 #include <cstdio>
 #include <deque>
@@ -13,22 +13,22 @@
 
 namespace catgut {
 
-// A user works, or a surgeon is watched.
+// A user works, or the scripted surgeon is watched.
 struct Visit {
-  // events: everything that happens is written there, a JSON object a line; null: nowhere. reported: hears it too, or is empty.
+  // events: receives all events, one JSON object per line; null: none. reported: receives them too, or is empty.
   // Throws InputError.
   Visit(const SceneSpec& scene, const LiveOptions& options, std::FILE* events, std::function<void(const Event&)> on_event);
 
-  void look();  // at the newest picture and what has happened
+  void look();  // Fetches the newest picture and events.
   LiveResult finish();
 
-  SceneSpec scene;  // with the parameters that were changed since
+  SceneSpec scene;  // with the parameters changed since
   Live live;
-  bool watching;  // the hands are not the user's
+  bool watching;  // the user does not control the hands
   Snapshot seen;
   bool have = false;  // there is a picture
   std::deque<LogLine> log;
-  uint32_t epoch = 0;  // as last looked at
+  uint32_t epoch = 0;  // at the last update
 
  private:
   void take_events();
@@ -49,11 +49,11 @@ struct Viewing {
   Playback playback;
   Snapshot seen;
   bool have = false;
-  LiveResult result;  // of what is known so far
+  LiveResult result;  // of the scanned part
   uint64_t gathered = 0;
 };
 
-// Recordings in the folder, and those of `also` that are elsewhere; newest first.
+// Recordings in the folder, and those of `also` elsewhere; newest first.
 std::vector<std::string> recordings_in(const std::string& folder, const std::vector<std::string>& also);
 
 }  // namespace catgut

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: the loop of the window: events, hands, one picture; and the carrying out of what was chosen. Physics has its own
+// app/window: the main loop: events, hands, one frame; and the execution of choices. Physics has its own
 // thread (runtime/live, runtime/playback) and never waits for this one.
 #include "window/window.h"
 
@@ -38,11 +38,11 @@ namespace {
 
 constexpr const char* kFont = "fonts/truetype/dejavu/DejaVuSansMono.ttf";  // in a share folder
 constexpr double kMostPictures = 150;                                      // [1/s]
-constexpr double kSlowPicture = 0.07;                                      // [s] a picture that takes longer is drawn coarser
+constexpr double kSlowPicture = 0.07;                                      // [s] a slower frame reduces the resolution
 constexpr double kStallEvery = 2;                                          // [s] of --stall-ms
 
 std::vector<SceneChoice> scene_choices() {
-  // What people practice first, from the simplest; then what is there besides.
+  // Scenes for practice, simplest first; then all others.
   std::vector<std::string> names = scene_names();
   const auto rank = [](const std::string& name) {
     const std::vector<std::string> kFirst{"purse_string", "stay", "connell", "lembert"};
@@ -60,7 +60,7 @@ std::vector<SceneChoice> scene_choices() {
   return out;
 }
 
-// NAME.EXT, NAME_visit2.EXT, ...: every visit has its own files.
+// NAME.EXT, NAME_visit2.EXT, ...: every session has its own files.
 std::string of_visit(const std::string& path, int visit) {
   if (path.empty() || visit < 2) return path;
   const std::filesystem::path p(path);
@@ -73,14 +73,14 @@ std::string free_name(const char* pattern) {
   return name;
 }
 
-// A path as people write it.
+// Expands a path from the user.
 std::string short_name(const std::string& path) {
   const char* home = std::getenv("HOME");
   const std::string start = home && home[0] ? std::string(home) + "/" : "";
   return !start.empty() && path.rfind(start, 0) == 0 ? "~/" + path.substr(start.size()) : path;
 }
 
-// How well this machine draws, on a scene as people see it first.
+// Measures rendering speed on the default scene.
 Quality measured_quality(int width, int height) {
   std::fprintf(stderr, "catgut: first start: measuring graphics speed, a few seconds\n");
   const auto model = build_model(read_scene("purse_string"));
@@ -145,11 +145,11 @@ class Window {
         picture_count_ = picture_count_ * keep + 1;
         drawn_at = drawn;
         coarser_if_slow();
-        // Where the display does not set the pace something must, or the picture would take the processor from the physics.
+        // Without vertical synchronization a limit is needed, or rendering would take the processor from the physics.
         const double left = 1.0 / kMostPictures - (drawn - now);
         if (left > 0) SDL_Delay(static_cast<uint32_t>(1000 * left));
       } else {
-        SDL_Delay(1);  // the driver is behind: hands continue, and the processor is left to it
+        SDL_Delay(1);  // the driver is behind: hands continue, and the processor is free for it
       }
       if (photographed_) break;
     }
@@ -200,7 +200,7 @@ class Window {
     have_last_ = false;
   }
 
-  // Whatever is open is brought to its end.
+  // Closes the open scene or recording.
   void leave() {
     if (visit_) finish();
     if (results_.from_recording) results_ = {};
@@ -224,7 +224,7 @@ class Window {
   }
 
   void go(Screen screen) {
-    // While a user works the mouse is a hand and not a pointer; what it did before the change is no one's.
+    // During a session the mouse is a hand, not a pointer; motion before the change is discarded.
     SDL_SetRelativeMouseMode(screen == Screen::practice && visit_ && !visit_->watching ? SDL_TRUE : SDL_FALSE);
     if (visit_) visit_->live.command(screen == Screen::practice ? LiveCommand::resume : LiveCommand::pause);
     SDL_PumpEvents();
@@ -245,7 +245,7 @@ class Window {
   void keep_settings() {
     if (settings_ == at_start_) return;
     at_start_ = settings_;
-    Settings s = settings_;  // what the command line asked for was meant for this time
+    Settings s = settings_;  // options of the command line apply only to this run
     if (options_.quality_given && s.quality == options_.quality) s.quality = kept_.quality;
     if (options_.left_handed && s.left_handed) s.left_handed = kept_.left_handed;
     try {
@@ -257,7 +257,7 @@ class Window {
   void carry_out(const Choice& choice) {
     try {
       do_it(choice);
-    } catch (const InputError& error) {  // reported where the next thing can be chosen
+    } catch (const InputError& error) {  // shown on the next screen
       message_ = error.what();
       if (!visit_ && !viewing_) show_start();
     }
@@ -311,7 +311,7 @@ class Window {
         }
         break;
       case Chosen::finish:
-        finish();  // the field stays in the picture, as it was left
+        finish();  // the field stays visible as it was left
         go(Screen::results);
         break;
       case Chosen::slower:
@@ -323,7 +323,7 @@ class Window {
         show_start();
         break;
       case Chosen::save_json:
-        if (results_.known < 1) {  // half of it in a file would look like all of it
+        if (results_.known < 1) {  // a file with partial results would look complete
           results_.saved = "Not saved: analysis not finished";
           break;
         }
@@ -466,7 +466,7 @@ class Window {
     if (command.kind != CommandKind::none) visit_->live.instrument(command);
   }
 
-  // Hands in, the field out.
+  // Publishes the hands, fetches the picture.
   void field(const WindowInput& in, float dt) {
     Visit& v = *visit_;
     v.live.watch(developer_);
@@ -496,7 +496,7 @@ class Window {
       std::fprintf(events_, "{\"shows\":\"%s\"}\n", lesson_.lesson().step[lesson_.step()].name.c_str());
   }
 
-  // What is shown of how it should be done, as far as a user wants it.
+  // Guidance shown, as far as the user wants it.
   void guidance() {
     const Guidance level = settings_.guidance;
     if (lesson_.on()) lesson_panel(lesson_, level != Guidance::exam);
@@ -508,7 +508,7 @@ class Window {
     }
   }
 
-  // A caller that follows the events also wants to know when hands are let in.
+  // Event listeners are also notified when the hands connect.
   void tell_screen() {
     if (!events_ || !tell_screen_) return;
     if (screen_ == Screen::practice && (!visit_->have || visit_->live.status().settling)) return;
@@ -517,7 +517,7 @@ class Window {
     std::fflush(events_);
   }
 
-  // For --screenshot: to the screen and the moment that were asked for. Pictures are counted from there.
+  // For --screenshot: goes to the requested screen and moment. Frames are counted from there.
   void pose_for_picture() {
     if (options_.screenshot.empty() || posed_) return;
     const std::string& wanted = options_.screen;
@@ -582,8 +582,8 @@ class Window {
     style_panels(scale);
   }
 
-  // A machine without a graphics card: fewer points rather than fewer pictures, as long as the low quality was asked for. A
-  // picture that is kept may take its time.
+  // Without a graphics card: lower resolution instead of a lower frame rate, if the low quality was selected. A
+  // saved screenshot may take longer.
   void coarser_if_slow() {
     const float least = std::clamp(180.0f / static_cast<float>(height_), 0.25f, 1.0f);
     if (!(visit_ || viewing_) || settings_.quality != Quality::low || coarse_ <= least || !options_.screenshot.empty()) return;
@@ -599,18 +599,18 @@ class Window {
   int width_, height_;
   std::unique_ptr<WindowRenderer> renderer_;
   WindowEvents events_in_;
-  Settings settings_, kept_, at_start_;  // as they are; as the file has them; when they were last looked at
+  Settings settings_, kept_, at_start_;  // current; stored in the file; at the last check
   float style_text_ = 1;
   std::vector<SceneChoice> scenes_;
-  std::vector<std::string> recordings_, made_;  // listed; made since the program began
+  std::vector<std::string> recordings_, made_;  // listed; made since the start of the program
   std::string message_, json_fault_;
   Screen screen_ = Screen::start, settings_from_ = Screen::start;
   bool tell_screen_ = true, picture_wanted_ = false, quit_ = false, developer_ = false, watch_ = false;
   bool posed_ = false, photographed_ = false;
-  int posed_for_ = 0;  // pictures
+  int posed_for_ = 0;  // frames
   std::unique_ptr<Visit> visit_;
   std::unique_ptr<Viewing> viewing_;
-  std::string source_;  // of the visit: a scene's name or path
+  std::string source_;  // of the session: a scene's name or path
   int opened_ = 0;
   SceneSpec scene_;  // of the results
   LiveResult result_;
@@ -622,11 +622,11 @@ class Window {
   BitePlaces places_;
   LessonRun lesson_;
   Orbit orbit_;
-  bool orbit_set_ = false;  // false: chosen again with the next snapshot
+  bool orbit_set_ = false;  // false: set again with the next snapshot
   Latency latency_;
-  double picture_s_ = 0, picture_count_ = 0;  // lately
-  float coarse_ = 1;                          // of the window's pixels each way
-  int pictures_so_ = 0;                       // since that was last changed
+  double picture_s_ = 0, picture_count_ = 0;  // recent
+  float coarse_ = 1;                          // fraction of the window's resolution in each direction
+  int pictures_so_ = 0;                       // since the last change
   int pictures_ = 0;
   std::FILE* events_ = nullptr;
 };

@@ -81,7 +81,7 @@ std::string words_for(const Event& e, bool& bad) {
       return fmt::format("tissue grasped by {}", tool);
     case EventKind::tissue_released:
       return released("tissue");
-    case EventKind::tip_entered:  // a tip that tissue moved over enters backward: the line counts, not its sense
+    case EventKind::tip_entered:  // a tip entered by moving tissue enters backward: use the line, not its sense
       return fmt::format("needle entered, {:.0f}\u00b0 from surface normal", std::min(e.value, kPi - e.value) * 180 / kPi);
     case EventKind::tip_exited:
       return "needle tip exited";

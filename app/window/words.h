@@ -10,7 +10,7 @@
 
 namespace catgut {
 
-// "1:07.5": minutes, seconds, tenths; the one form of time on every screen.
+// "1:07.5": minutes, seconds, tenths; the only time format of the screens.
 std::string clock_text(double seconds);
 
 // One line for the event log; empty: the event is not shown. bad: an error.

@@ -7,7 +7,7 @@
 namespace catgut {
 namespace {
 
-// Of the field: how far off a hand still counts, and the largest half height of the picture.
+// Limits: distance of a hand from the field that still counts, and the largest half height of the image.
 constexpr float kFarthest = 1.8f, kWidest = 1.0f;
 
 Camera look_at_from(Vec3 target, float azimuth, float elevation, float half_height, float fov_deg) {
@@ -18,11 +18,11 @@ Camera look_at_from(Vec3 target, float azimuth, float elevation, float half_heig
 
 float wrap_angle(float a) { return a - 2 * kPi * std::round(a / (2 * kPi)); }
 
-// Places to look from: round from the needle's side, in units of `beside`, and up from `elevation` [rad].
+// Viewpoints: round from the needle's side, in units of `beside`, and up from `elevation` [rad].
 constexpr float kRound[] = {0.4f, -0.4f, 1, -1, 1.7f, -1.7f, 0}, kUp[] = {0, 0.22f, -0.16f};
 constexpr size_t kRounds = std::size(kRound), kUps = std::size(kUp);
 
-// How much the tools' shafts hide of the needle and of the picture's middle, seen from the unit direction `away`.
+// How much the tools' shafts occlude the needle and the center of the image, seen from the unit direction `away`.
 float hidden(const Snapshot& snapshot, Vec3 away, Vec3 target, float half) {
   constexpr int points = 10;
   float sum = 0;
@@ -55,10 +55,10 @@ FollowCamera::FollowCamera(const PictureModel& model)
       front_(model.body.size() > 1) {}
 
 Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
-  // Part of the way from the organ's middle to the needle: the work stays in view together with what it is done to.
+  // Between the organ's center and the needle: both stay in view.
   Vec3 offset = snapshot.active().needle.pose.p - focus_;
   if (!is_finite(offset)) offset = {};
-  // Hands that tie or draw thread are farther away: the picture opens up for them, from the tissue to the needle and the tools'
+  // For hands that tie or pull thread the view widens, to include tissue, needle and the tools'
   // tips.
   const float away = length(offset), reach = 0.35f * field_;
   float half_wanted = std::clamp(0.55f * away, half_height, 0.62f * field_);
@@ -77,10 +77,10 @@ Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
     half_wanted = std::clamp(0.55f * length(high - low), half_height, kWidest * field_);
   }
 
-  // Round from the needle's side of the organ, and up: to where the tools' shafts hide least of the needle and of the work.
+  // Round from the needle's side of the organ, and up: to where the tools' shafts occlude least.
   const float from_axis = std::hypot(offset.x, offset.z);
   float side = azimuth_;
-  // Near the axis the needle's direction means nothing; the camera keeps to where it is.
+  // Near the axis the needle's direction is undefined; the camera keeps its position.
   if (from_axis > 0.06f * field_) {
     const float middle = std::atan2(offset.x, offset.z);
     const auto azimuth_of = [&](size_t i) {
@@ -94,7 +94,7 @@ Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
              3 * raised * raised;
     };
     size_t best = choice_;
-    float least = cost(choice_) - (started_ ? 0.5f : 0);  // it goes elsewhere only for a good reason, or it would sway
+    float least = cost(choice_) - (started_ ? 0.5f : 0);  // hysteresis, or it would oscillate
     for (size_t i = 0; i < kRounds * kUps; ++i)
       if (const float c = cost(i); c < least) least = c, best = i;
     choice_ = best;
@@ -113,7 +113,7 @@ Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
     target_ = lerp(target_, wanted, part);
     half_ += (half_wanted - half_) * part;
     const float want_speed = std::clamp(wrap_angle(side - azimuth_) / settle_time, -turn_speed, turn_speed);
-    // The speed itself eases, or the camera would start and stop with a jerk.
+    // The angular velocity is smoothed too, or the camera would start and stop with a jerk.
     speed_ += (want_speed - speed_) * (1 - std::exp(-4 * dt / settle_time));
     azimuth_ = wrap_angle(azimuth_ + std::clamp(speed_ * dt, -0.5f, 0.5f));
     lift_ += (lift_wanted - lift_) * (1 - std::exp(-1.5f * dt / settle_time));

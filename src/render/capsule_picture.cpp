@@ -17,7 +17,7 @@ Image draw_capsules(std::span<const DrawnCapsule> capsules, const CapsuleView& v
     return Vec3{0.5f * static_cast<float>(width) + scale * dot(d, u), 0.5f * static_cast<float>(height) - scale * dot(d, v),
                 scale * dot(d, w)};
   };
-  const Vec3 light = normalized(Vec3{-0.5f, -0.7f, 0.8f});  // in the picture: x right, y down, z to the viewer
+  const Vec3 light = normalized(Vec3{-0.5f, -0.7f, 0.8f});  // in the image: x right, y down, z to the viewer
   std::vector<float> depth(static_cast<size_t>(width) * static_cast<size_t>(height), -1e30f);
   for (const DrawnCapsule& c : capsules) {
     const Vec3 a = placed(c.a), b = placed(c.b), d = b - a;

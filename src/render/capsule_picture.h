@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/capsule_picture: a picture of capsules (threads, tools) without a graphics card: parallel projection, one light from
+// render/capsule_picture: an image of capsules (threads, tools) without a graphics card: parallel projection, one light from
 // the viewer's upper left, depth and shade per pixel. For close-ups in documents, reports and tests.
 #pragma once
 #include <span>
@@ -15,8 +15,8 @@ struct DrawnCapsule {
   Color color{255, 255, 255, 255};
 };
 struct CapsuleView {
-  Vec3 center;                           // [m] in the middle of the picture
-  Vec3 toward{0, 0.3f, 1}, up{0, 1, 0};  // from the center to the viewer; what is up
+  Vec3 center;                           // [m] at the center of the image
+  Vec3 toward{0, 0.3f, 1}, up{0, 1, 0};  // from the center to the viewer; up direction
   float width = 0.01f;                   // [m] from the left edge to the right
 };
 

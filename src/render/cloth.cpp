@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/shapes: drape, wound and gauze; see shapes.h. Height fields, worked out once.
+// render/shapes: drape, wound and gauze; see shapes.h. Height fields, computed once.
 #include <functional>
 
 #include "render/shapes.h"
@@ -18,7 +18,7 @@ float cloth_height(float x, float z) {
   return h;
 }
 
-// Folds of a cloth that was pulled about: long creases with a round back and a sharp foot. 0 or less.
+// Folds of a pulled cloth: long creases with a round back and a sharp foot. 0 or less.
 float folds(float x, float z) {
   const auto crease = [](float t) { return std::pow(std::sin(t) * std::sin(t) + 0.05f, 0.25f) - 1; };
   const float bend = 0.35f * std::sin(29 * x + 13 * z), sway = 0.4f * std::sin(17 * z - 23 * x + 1);
@@ -89,7 +89,7 @@ Shape drape_shape(Vec3 center, float hole, float size) {
   const auto place = [&](float s, float t) {
     const float a = 2 * kPi * t, edge = hole > 0 ? hole_radius(hole, a) : 0, r = edge + (size - edge) * s * (0.04f + 0.96f * s);
     const float x = r * std::cos(a), z = -r * std::sin(a), in = r - edge;
-    // Folds only go down: what lies on the drape in the physics lies on its highest level. The edge is a soft roll round the
+    // Folds only go down: objects on the drape in the physics lie on its highest level. The edge is a soft roll round the
     // hole.
     const float roll = hole > 0 ? 2.6f * mm * std::exp(-in * in / (0.004f * 0.004f)) : 0;
     const float out = hole > 0 ? std::clamp((in - 0.004f) / 0.03f, 0.0f, 1.0f) : 1;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // render/font: a 5 x 7 bitmap font for captions, ASCII 32..126. Each letter is five columns from the left, bit 0 on top.
-// Built in so that a caption needs no font file on the machine that makes the picture.
+// Built in, so that a caption needs no font file.
 #pragma once
 #include <cstdint>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/frame_cost: what a frame costs the processor before anything is rasterized: moving the meshes, handing them over and
-// recording the draws for every eye, on Filament's backend that draws nothing. What is left of a headset's 11 ms is the
-// graphics card's and the simulation's.
+// render/frame_cost: processor time of a frame before rasterization: moving the meshes, submitting them and
+// recording the draws for every eye, on Filament's backend that renders nothing. The remainder of a headset's 11 ms is
+// available to the graphics card and the simulation.
 #pragma once
 #include <memory>
 #include <span>
@@ -17,7 +17,7 @@ class FrameCost {
  public:
   struct Times {
     double caller_ms = 0;  // [ms] of processor time on the calling thread
-    double all_ms = 0;     // [ms] of processor time of the whole program meanwhile, the driver's thread included
+    double all_ms = 0;     // [ms] of processor time of the whole program in that time, the driver's thread included
   };
   virtual ~FrameCost() = default;
   virtual Times frame(const Snapshot& snapshot, std::span<const Camera> eyes) = 0;

@@ -79,7 +79,7 @@ Image contact_sheet(std::span<const SheetCell> cells, int columns) {
   for (int i = 0; i < int(cells.size()); ++i) {
     const int x = gap + i % columns * (w + gap), y = gap + i / columns * (h + caption + gap);
     paste(sheet, cells[size_t(i)].picture, x, y);
-    // A caption longer than its picture would run into the next cell's.
+    // A caption wider than its image would overlap the next cell's.
     const std::string_view text = cells[size_t(i)].caption;
     draw_text(sheet, x + 2, y + h + 5, text.substr(0, size_t(w / kLetterWidth)), {235, 238, 232, 255});
   }

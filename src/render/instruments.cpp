@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/shapes: needle, needle driver and forceps; see shapes.h. Sizes follow the instruments on a surgeon's table:
+// render/shapes: needle, needle holder and forceps; see shapes.h. Sizes follow common surgical instruments:
 // a 180 mm needle holder with gold rings, 150 mm tissue forceps.
 #include <vector>
 
@@ -44,7 +44,7 @@ ToolShape needle_driver() {
   tool.half.hatched.resize(tool.half.position.size(), 0);
   add_loft(tool.half, insert, carbide, 8);
   tool.half.hatched.resize(tool.half.position.size(), 1);
-  // The shank of the other side belongs to this jaw in life; drawn on its own side, the crossing hides in the box joint.
+  // In reality the shank of the other side belongs to this jaw; drawn on its own side, the crossing is hidden in the box joint.
   const Vec3 shank[] = {{1.9f * mm, 0, 30 * mm},
                         {3.4f * mm, 0, 50 * mm},
                         {5.2f * mm, 0, 90 * mm},
@@ -91,7 +91,7 @@ ToolShape forceps() {
   return tool;
 }
 
-// Long, slim, no teeth: two parallel rows of fine ridges at flat tips.
+// Long, slim, without teeth: two parallel rows of fine ridges at flat tips.
 ToolShape debakey() {
   const Vec3 steel = srgb(206, 210, 218), grip = srgb(120, 126, 136);
   ToolShape tool;
@@ -111,7 +111,7 @@ ToolShape debakey() {
   return tool;
 }
 
-// The two shanks with finger rings that clamps and scissors share; `ratchet`: the catch between them.
+// The two shanks with finger rings of clamps and scissors; `ratchet`: the catch between them.
 void add_ring_handles(ToolShape& tool, float joint, float length, Vec3 steel, Vec3 ring, bool ratchet) {
   const Vec3 shank[] = {{1.6f * mm, 0, joint + 4 * mm},
                         {3.0f * mm, 0, joint + 0.3f * (length - joint)},
@@ -207,7 +207,7 @@ Shape needle_shape(const SuturePicture& model) {
   for (int i = 0; i <= n; ++i) {
     const float s = float(i) / n, phi = s * model.needle_arc;
     center.push_back({r * std::cos(phi), r * std::sin(phi), 0});
-    // The swage is drilled and a little thicker than the thread it holds; the last fifth tapers to the point.
+    // The swage is drilled and slightly thicker than its thread; the last fifth tapers to the point.
     const float to_tip = (1 - s) / 0.2f;
     radius.push_back(wire * (to_tip < 1  ? 0.04f + 0.96f * std::sqrt(to_tip) * (1.5f - 0.5f * to_tip)
                              : s < 0.06f ? 1.08f

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render: what a build without pictures (CATGUT_RENDER=OFF) answers. Physics, recordings and tests of them need no graphics.
+// render: stubs of a build without rendering (CATGUT_RENDER=OFF). Physics, recordings and their tests need no graphics.
 #include <stdexcept>
 
 #include "render/frame_cost.h"

@@ -8,11 +8,11 @@ namespace catgut {
 
 Orbit start_orbit(const PictureModel& picture, Vec3 needle) {
   Orbit o;
-  // Between the two, nearer to the organ: that is where the work will be.
+  // Between the two, nearer to the organ: the expected site of work.
   const Vec3 off = is_finite(needle) ? needle - picture.focus : Vec3{};
   o.target = picture.focus + off * (0.35f * std::min(1.0f, 1.2f * picture.field / std::max(length(off), 1e-6f)));
   o.half_height = 0.7f * picture.field;
-  // Back until the needle's whole circle is in the picture, not at its very edge.
+  // Back until the needle's whole circle is in the image, with a margin.
   for (int i = 0; i < 12; ++i) {
     const Camera c = camera_of(o);
     const Vec3 ahead = normalized(c.target - c.eye), right = normalized(cross(ahead, c.up)), d = needle - c.eye;

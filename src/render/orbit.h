@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/orbit: a camera that goes round the operating field and stays where it was left: hands that are moved as they are seen
-// need a picture that does not move under them.
+// render/orbit: an orbit camera that stays where the user left it: hands moved in the view frame
+// need a camera that does not move on its own.
 #pragma once
 #include "render/camera.h"
 
@@ -8,11 +8,11 @@ namespace catgut {
 
 struct Orbit {
   float azimuth = 0.35f, elevation = 0.8f;  // [rad]
-  float half_height = 0.05f;                // [m] of the picture at the target
+  float half_height = 0.05f;                // [m] of the image at the target
   Vec3 target;                              // [m]
 };
 
-// Organ and needle are in the picture. needle: [m] where it lies.
+// Organ and needle are in the image. needle: [m] its position.
 Orbit start_orbit(const PictureModel& picture, Vec3 needle);
 void turn_orbit(Orbit& orbit, float right, float up, float closer);  // [rad], [rad], factor's logarithm
 Camera camera_of(const Orbit& orbit);

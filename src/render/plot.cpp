@@ -17,7 +17,7 @@ void dot(Image& image, int x, int y, Color c) {
   std::copy(c.begin(), c.end(), image.rgba.begin() + (std::ptrdiff_t{y} * image.width + x) * 4);
 }
 
-// dash: so many pixels drawn, so many not; 0: all of them.
+// dash: number of pixels drawn, then not drawn; 0: solid.
 void line(Image& image, int x0, int y0, int x1, int y1, Color c, int thick = 1, int dash = 0) {
   const int steps = std::max({std::abs(x1 - x0), std::abs(y1 - y0), 1});
   for (int i = 0; i <= steps; ++i) {
@@ -30,7 +30,7 @@ void line(Image& image, int x0, int y0, int x1, int y1, Color c, int thick = 1, 
   }
 }
 
-// 1, 2 or 5 times a power of ten, so that at most `most` of them fit.
+// 1, 2 or 5 times a power of ten, giving `most` steps at most.
 double step_of(double range, int most) {
   double step = std::pow(10.0, std::floor(std::log10(range / most)));
   for (int k = 0; range / step > most; ++k) step *= k % 3 == 1 ? 2.5 : 2;
@@ -96,7 +96,7 @@ Image draw_plot(const Plot& plot, int width, int height) {
     for (int decade = low; decade <= high; ++decade)
       for (int k = 1; k < (decade == high ? 2 : 10); ++k) rule(k * std::pow(10.0, decade), k == 1 || k == 2 || k == 5);
   }
-  const double step = std::max(1.0, step_of(x_most, 12));  // no halves of what is counted
+  const double step = std::max(1.0, step_of(x_most, 12));  // whole numbers for counts
   for (double x = 0; x <= x_most; x += step) {
     line(image, at_x(x), top, at_x(x), bottom, kFaint);
     const std::string text = number(x);

@@ -13,15 +13,15 @@ namespace catgut {
 struct PlotCurve {
   std::string name;
   Color color{};
-  std::vector<std::array<double, 2>> point;  // on a logarithmic axis y above 0, others are left out
-  bool joined = true;                        // false: points alone, as crosses
-  bool dots = true;                          // on a joined curve: where its points are
+  std::vector<std::array<double, 2>> point;  // on a logarithmic axis only values above 0, others are omitted
+  bool joined = true;                        // false: points only, as crosses
+  bool dots = true;                          // on a joined curve: marks its points
 };
 struct PlotLevel {
   std::string name;
   double y = 0;
 };
-// What is expected between `from` and `to`, behind the curves: from `low` to `high` at either end. Its name stands in the key.
+// The expected range between `from` and `to`, behind the curves: from `low` to `high` at either end. Its name is in the key.
 struct PlotBand {
   std::string name;
   Color color{};
@@ -35,11 +35,11 @@ struct Plot {
   std::vector<PlotLevel> level;
   std::vector<PlotBand> band;
   PlotAxis y_axis = PlotAxis::logarithmic;
-  // Where the axes end; 0: where everything fits. Beyond x_most nothing is drawn, beyond y_most along the edge.
+  // Limits of the axes; 0: automatic. Beyond x_most nothing is drawn, beyond y_most along the edge.
   double x_most = 0, y_most = 0;
 };
 
-// The x axis begins at 0, and so does a linear y axis; a logarithmic one has whole decades, whatever y_most is.
+// The x axis starts at 0, and so does a linear y axis; a logarithmic one has whole decades, for any y_most.
 Image draw_plot(const Plot& plot, int width = 720, int height = 420);
 
 }  // namespace catgut

@@ -19,7 +19,7 @@ double median_frame(Renderer& renderer, const Snapshot& snapshot, const Camera& 
     const auto start = std::chrono::steady_clock::now();
     renderer.draw(snapshot, camera);
     took.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
-    // Clear enough: a person waits.
+    // Clear enough: the user is waiting.
     if (*std::min_element(took.begin(), took.end()) > 2 * budget_ms) break;
   }
   std::sort(took.begin(), took.end());
@@ -40,7 +40,7 @@ QualityChoice choose_quality(const PictureModel& model, const Snapshot& snapshot
   const Camera camera = overview(model);
   width = std::clamp(width, 16, 8192), height = std::clamp(height, 16, 8192);
   try {
-    // Without a graphics card a whole picture takes a second: a small one reports as much in less.
+    // Without a graphics card a full image takes a second: a small one is sufficient.
     {
       const auto small = make_renderer(model, std::max(16, width / 4), std::max(16, height / 4), Quality::low);
       const double least = median_frame(*small, snapshot, camera, budget_ms);
@@ -51,7 +51,7 @@ QualityChoice choose_quality(const PictureModel& model, const Snapshot& snapshot
       choice.trials.push_back({quality, median_frame(*renderer, snapshot, camera, budget_ms)});
       if (choice.trials.back().frame_ms > budget_ms) break;
     }
-  } catch (const std::runtime_error&) {}  // a caller that makes the window's renderer hears of it there
+  } catch (const std::runtime_error&) {}  // the window's renderer reports the same error to its caller
   choice.quality = best_quality(choice.trials, budget_ms);
   return choice;
 }

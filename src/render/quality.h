@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/quality: which of the three levels of quality a machine bears, by a short measurement at its first start.
+// render/quality: selects one of the three quality levels for a machine, by a short measurement at its first start.
 #pragma once
 #include <span>
 #include <vector>
@@ -12,24 +12,24 @@ namespace catgut {
 
 struct QualityTrial {
   Quality quality = Quality::low;
-  double frame_ms = 0;  // [ms] the median of some frames, until the last pixel was there; of frames a quarter of the size each
-                        // way where even those were too slow
+  double frame_ms = 0;  // [ms] median of several frames, until the last pixel was complete; of frames of a quarter in each
+                        // direction where even those were too slow
 };
 
-// The best level whose frames took at most `budget_ms`; draft when none did.
+// The best level whose frames took at most `budget_ms`; low if none did.
 Quality best_quality(std::span<const QualityTrial> trials, double budget_ms);
 
-// [ms] of a frame at 60 Hz that the picture may take, when the simulation and the panels want their share.
+// [ms] of a frame at 60 Hz available for rendering; the simulation and the panels need the rest.
 constexpr double kFrameBudget = 12;
 
 struct QualityChoice {
   Quality quality = Quality::low;
-  std::vector<QualityTrial> trials;  // from draft up; what comes after one that is too slow is not tried
+  std::vector<QualityTrial> trials;  // from low up; levels after a slow one are not measured
 };
 
-// Draws some frames of the scene, unseen, at the window's size. Takes a second or so with a graphics card and a few without
-// one. Call it before the window's own renderer is made, on the thread that will make it. Never throws: without a driver it
-// answers draft, and no trials.
+// Renders several frames of the scene, hidden, at the window's size. Takes about a second with a graphics card and a few
+// without one. Call it before the window's own renderer is created, on the thread that will create it. Never throws: without a
+// driver it returns low, and no trials.
 QualityChoice choose_quality(const PictureModel& model, const Snapshot& snapshot, int width, int height,
                              double budget_ms = kFrameBudget);
 

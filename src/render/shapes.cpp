@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/shapes: the building blocks; see shapes.h. Tools and needle are in instruments.cpp, what lies about them in cloth.cpp.
+// render/shapes: the building blocks; see shapes.h. Tools and needle are in instruments.cpp, drape and gauze in cloth.cpp.
 #include "render/shapes.h"
 
 namespace catgut {
@@ -26,7 +26,7 @@ void add_vertex(Shape& shape, Vec3 p, Vec3 n, Vec3 t, float u, float v, Vec3 col
   shape.color.push_back(color);
 }
 
-// Two triangles a step between the rings of `sides` corners that start at a and b (b further along the axis).
+// Two triangles per step between the rings of `sides` corners that start at a and b (b further along the axis).
 void join_rings(Shape& shape, uint32_t a, uint32_t b, int sides, int stride) {
   for (int k = 0; k < sides; ++k) {
     const uint32_t i = uint32_t(k), j = uint32_t(stride == sides ? (k + 1) % sides : k + 1);
@@ -82,7 +82,7 @@ void add_loft(Shape& shape, std::span<const Section> sections, Vec3 color, float
   constexpr int sides = 20;
   const uint32_t first = uint32_t(shape.position.size());
   const size_t first_triangle = shape.triangle.size();
-  // Sections may come in either direction along z; the corners' order follows so that the faces look outward.
+  // Sections may be in either order along z; the corners' order follows so that the faces look outward.
   const float turn = sections.back().center.z > sections.front().center.z ? 1.0f : -1.0f;
   const auto ring = [&](const Section& s, float u) {
     for (int k = 0; k < sides; ++k) {
@@ -101,7 +101,7 @@ void add_loft(Shape& shape, std::span<const Section> sections, Vec3 color, float
     }
   }
   smooth_normals(shape, first, first_triangle);
-  // The ends have their own corners: shared ones would round the shading over the edge.
+  // The ends have separate corners: shared ones would round the shading over the edge.
   for (const bool end : {false, true}) {
     const Section& s = end ? sections.back() : sections.front();
     const uint32_t from = uint32_t(shape.position.size());

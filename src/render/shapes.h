@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/shapes: triangle meshes made from a few numbers: tubes, lofts, tools, needle, drape. Plain geometry, no graphics
+// render/shapes: triangle meshes from a few numbers: tubes, lofts, tools, needle, drape. Plain geometry, no graphics
 // library; [m] throughout, counter-clockwise seen from outside.
 #pragma once
 #include <array>
@@ -15,14 +15,14 @@ struct Shape {
   std::vector<Vec3> position, normal, tangent;  // tangent: along the u of uv
   std::vector<std::array<float, 2>> uv;
   std::vector<Vec3> color;     // linear
-  std::vector<float> hatched;  // 1 on gripping faces of tools; may be shorter than the rest, which is then smooth
+  std::vector<float> hatched;  // 1 on gripping faces of tools; may be shorter than the others, then smooth
   std::vector<std::array<uint32_t, 3>> triangle;
 };
 
 Vec3 srgb(int r, int g, int b);  // linear color of 8-bit sRGB values
 
 // A round tube along `center` with a radius per point, `sides` corners and closed ends. u runs along it [m], v round it 0..1.
-// The frame is carried along the curve without turning about it, so a pattern on the tube does not twist.
+// The frame is transported along the curve without twist, so a pattern on the tube does not twist.
 void add_tube(Shape& shape, std::span<const Vec3> center, std::span<const float> radius, int sides, Vec3 color);
 
 // Cross-sections in the xy plane with rounded corners, joined along their order.
@@ -42,14 +42,14 @@ void smooth_curve(std::span<const Vec3> through, int per_span, std::vector<Vec3>
 
 Shape needle_shape(const SuturePicture& model);  // in the needle's frame
 
-// A tool in its frame (origin between the jaw tips, shaft along +z): what stands still, and the half that opens toward +x.
-// The other half is the mirror image. The halves turn about the y axis at z = pivot by up to `opening` radians each.
+// A tool in its frame (origin between the jaw tips, shaft along +z): the fixed part, and the half that opens toward +x.
+// The other half is the mirror image. The halves rotate about the y axis at z = pivot by up to `opening` radians each.
 struct ToolShape {
   Shape body, half;
   float pivot = 0;    // [m]
   float opening = 0;  // [rad]
 };
-// By kind; an instrument of a kind that has no shape here is drawn as its outline.
+// By kind; an instrument of an unknown kind is drawn as its outline.
 ToolShape tool_shape(const InstrumentPicture& instrument);
 
 // The sterile drape: a cloth with folds at height center.y, with a hole along an ellipse about (center.x, center.z) that is
@@ -59,8 +59,8 @@ Shape drape_shape(Vec3 center, float hole, float size);
 Shape wound_bed_shape(Vec3 center, float radius);
 float hole_radius(float hole, float angle);  // [m] of the ellipse
 
-// A damp gauze swab laid over the end of an organ that lies on the drape. `body`: its surface; `away`: unit, level, from the
-// work to that end. It hangs down to height `ground` on all sides but the one toward the work.
+// A damp gauze swab over the end of an organ that lies on the drape. `body`: its surface; `away`: unit, horizontal, from the
+// work to that end. It hangs down to height `ground` on all sides except the one toward the work.
 Shape swab_shape(std::span<const Vec3> body, Vec3 away, float ground);
 // A roll of gauze under it, from `from` to `to` [m] along `away` from `middle`.
 Shape cushion_shape(Vec3 middle, Vec3 away, float from, float to, float top, float ground);

@@ -6,8 +6,8 @@ namespace catgut {
 
 namespace {
 
-constexpr float kStill = 3e-6f;        // [m] a twentieth of a pixel from near by
-constexpr float kStillTurn = 0.0005f;  // of a quaternion: 1 mrad, which moves a vertex by as much
+constexpr float kStill = 3e-6f;        // [m] a twentieth of a pixel in a close view
+constexpr float kStillTurn = 0.0005f;  // of a quaternion: 1 mrad, with a similar displacement of a vertex
 
 bool still(Quat a, Quat b) {
   return std::abs(a.x - b.x) + std::abs(a.y - b.y) + std::abs(a.z - b.z) + std::abs(a.w - b.w) < kStillTurn;
@@ -37,7 +37,7 @@ Skinned follow(const SkinnedVertex& v, std::span<const Motion> motion) {
   float b[12];
   for (int j = 0; j < 12; ++j)
     b[j] = v.weight[0] * m[0]->m[j] + v.weight[1] * m[1]->m[j] + v.weight[2] * m[2]->m[j] + v.weight[3] * m[3]->m[j];
-  // q and -q turn alike: all four on the side of the first, or they would cancel.
+  // q and -q are the same rotation: all four on the side of the first, or they would cancel.
   const Quat a = m[0]->q;
   Quat q{a.x * v.weight[0], a.y * v.weight[0], a.z * v.weight[0], a.w * v.weight[0]};
   for (int k = 1; k < 4; ++k) {

@@ -21,8 +21,8 @@ extern char** environ;
 namespace catgut {
 namespace {
 
-// A write to a pipe whose reader died raises SIGPIPE, which would end the simulator. Blocked for this thread during the write,
-// and any that came of it is taken away, so that a host's own handling of the signal stays as it was.
+// A write to a pipe whose reader has exited raises SIGPIPE, which would end the simulator. Blocked for this thread during the
+// write; a pending signal is consumed, so that a host's own handling of the signal is unaffected.
 bool write_all(int fd, const uint8_t* data, size_t size) {
   sigset_t pipe_signal, before, pending;
   sigemptyset(&pipe_signal);
@@ -89,7 +89,7 @@ VideoWriter::VideoWriter(const std::string& path, int width, int height, double 
   if (::pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error(path + ": cannot open a pipe: " + std::strerror(errno));
   const std::string size = std::to_string(width) + "x" + std::to_string(height);
   const std::string rate = std::to_string(frames_per_second);
-  // A path that starts with '-' would be read as an option.
+  // A path that starts with '-' would be parsed as an option.
   const std::string target = path.starts_with('-') ? "./" + path : path;
   std::vector<std::string> words{"ffmpeg",   "-hide_banner", "-loglevel", "error",   "-nostdin",  "-y",         "-f",
                                  "rawvideo", "-pix_fmt",     "rgba",      "-s",      size,        "-r",         rate,

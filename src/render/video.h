@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/video: pictures piped to the `ffmpeg` program as they are made. The program and not the library, so that Catgut links
+// render/video: frames piped to the `ffmpeg` program. The program and not the library, so that Catgut links
 // no encoder. Writes the file at `path` (H.264, yuv420p, so that every player shows it).
 #pragma once
 #include <memory>
@@ -15,11 +15,11 @@ class VideoWriter {
  public:
   // Throws std::runtime_error when ffmpeg is missing or cannot be started. Width and height must be even (yuv420p).
   VideoWriter(const std::string& path, int width, int height, double frames_per_second);
-  ~VideoWriter();  // finishes the file; errors are swallowed, call finish() to hear them
+  ~VideoWriter();  // finishes the file; errors are ignored, call finish() to receive them
   VideoWriter(const VideoWriter&) = delete;
   VideoWriter& operator=(const VideoWriter&) = delete;
 
-  void add(const Image& frame);  // throws when ffmpeg has gone away; the program itself lives on
+  void add(const Image& frame);  // throws when ffmpeg has exited; the program continues
   void finish();                 // closes the file; throws when ffmpeg reports a failure
 
  private:

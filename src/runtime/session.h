@@ -57,7 +57,8 @@ void check_replayable(const Recording& recording, const std::string& name);
 
 struct ReplayResult {
   RunResult run;
-  std::optional<uint64_t> differs_at;  // number of the first tick, from 1, with a different hash
+  std::optional<uint64_t>
+      differs_at;  // number of the first tick, from 1, after which the hash of the state is not the recorded one
 };
 // Plays a recording. check: compare the hash after every tick and stop at the first difference. Throws InputError when the
 // recording comes from a program with another layout of the state.

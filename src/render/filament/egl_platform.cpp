@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // render/filament/egl_platform: see egl_platform.h.
 //
-// The one file that leans on a private interface. Filament 1.9.25's own platform on Linux needs an X server; its base class
+// The only file that uses a private interface. Filament 1.9.25's own platform on Linux needs an X server; its base class
 // for others, backend::OpenGLPlatform, is exported by the library but its header is not installed, so it is declared again
 // here. The order of the virtual functions is that of the library's own vtable and must not change; room.cmake accepts no other
 // version. Newer Filament has a public header and a headless EGL platform of its own.
@@ -18,7 +18,7 @@
 #include <string_view>
 #include <vector>
 
-// Xlib's names for small numbers are words of ours and of Filament's.
+// Xlib's macro names collide with ours and with Filament's.
 #undef None
 #undef Status
 #undef Success
@@ -80,7 +80,7 @@ bool usable(EGLDisplay display) {
   return display != EGL_NO_DISPLAY && eglInitialize(display, nullptr, nullptr) && eglBindAPI(EGL_OPENGL_API);
 }
 
-// Mesa's surfaceless platform first (it works without a card), then the first card that answers.
+// Mesa's surfaceless platform first (it works without a card), then the first card that responds.
 EGLDisplay open_display() {
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
   // eglGetPlatformDisplayEXT and not the core function: libepoxy aborts on that one while no display is current.
@@ -111,7 +111,7 @@ EGLDisplay open_x11(Display* connection) {
   throw std::runtime_error("no window: no EGL driver for this X server (Debian: apt install libgl1-mesa-dri libegl1)");
 }
 
-// 8-bit color with depth; for a window of the visual that it was made with, or drawing on it fails on some drivers.
+// 8-bit color with depth; for a window, of the visual it was created with, or rendering to it fails on some drivers.
 EGLConfig choose_config(EGLDisplay display, EGLint surface, EGLint visual) {
   const EGLint wanted[] = {
       EGL_SURFACE_TYPE, surface, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_RED_SIZE,   8,  EGL_GREEN_SIZE, 8,
@@ -130,7 +130,7 @@ EGLConfig choose_config(EGLDisplay display, EGLint surface, EGLint visual) {
 
 class EglPlatform final : public OpenGLPlatform {
  public:
-  // Everything that can fail happens here, on the caller's thread, where it can be reported.
+  // All steps that can fail are here, on the caller's thread, where errors can be reported.
   EglPlatform() : display_(open_display()), config_(choose_config(display_, EGL_PBUFFER_BIT, 0)) { make_context(); }
   explicit EglPlatform(Window window) : connection_(XOpenDisplay(nullptr)) {
     XWindowAttributes attributes;
@@ -148,7 +148,7 @@ class EglPlatform final : public OpenGLPlatform {
       throw;
     }
   }
-  // Without a window the display is one for the whole process and stays open: another renderer may be using it.
+  // Without a window, one display for the whole process stays open: another renderer may be using it.
   ~EglPlatform() noexcept override {
     if (idle_ != EGL_NO_SURFACE) eglDestroySurface(display_, idle_);
     eglDestroyContext(display_, context_);
@@ -159,7 +159,7 @@ class EglPlatform final : public OpenGLPlatform {
   int getOSVersion() const noexcept override { return 0; }
 
   Driver* createDriver(void* shared) noexcept override {
-    eglBindAPI(EGL_OPENGL_API);  // per thread, and this is Filament's
+    eglBindAPI(EGL_OPENGL_API);  // per thread; this is Filament's thread
     if (!eglMakeCurrent(display_, idle_, idle_, context_)) return nullptr;
     return createDefaultDriver(this, shared);
   }
@@ -184,7 +184,7 @@ class EglPlatform final : public OpenGLPlatform {
     eglMakeCurrent(display_, reinterpret_cast<EGLSurface>(draw), reinterpret_cast<EGLSurface>(read), context_);
     if (connection_) eglSwapInterval(display_, 1);
   }
-  // Without a window nothing is shown; the pixels are read back before.
+  // Without a window nothing is shown; the pixels have been read back before.
   void commit(SwapChain* chain) noexcept override {
     if (connection_) eglSwapBuffers(display_, reinterpret_cast<EGLSurface>(chain));
   }
@@ -218,7 +218,7 @@ class EglPlatform final : public OpenGLPlatform {
     const EGLint size[] = {EGL_WIDTH, width, EGL_HEIGHT, height, EGL_NONE};
     return eglCreatePbufferSurface(display_, config_, size);
   }
-  Display* connection_ = nullptr;  // of a window
+  Display* connection_ = nullptr;  // for a window
   EGLDisplay display_ = EGL_NO_DISPLAY;
   EGLConfig config_ = nullptr;
   EGLContext context_ = EGL_NO_CONTEXT;

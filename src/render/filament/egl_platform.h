@@ -8,11 +8,11 @@
 
 namespace catgut {
 
-// Throws std::runtime_error when no EGL driver gives an OpenGL 4.1 core context here.
+// Throws std::runtime_error if no EGL driver provides an OpenGL 4.1 core context here.
 std::unique_ptr<filament::backend::Platform> make_egl_platform();
 
-// For the X11 window `window` of the display that the environment names, on a connection of its own: a caller that made the
-// window reads its events on another thread. A swap chain is made of the window's number. Throws std::runtime_error.
+// For the X11 window `window` of the display named by the environment, on a separate connection: the window's creator reads its
+// events on another thread. The swap chain is created from the window's number. Throws std::runtime_error.
 std::unique_ptr<filament::backend::Platform> make_egl_platform(uint64_t window);
 
 }  // namespace catgut

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/filament/environment: a theatre lamp, a ring of dimmer lamps, pale walls and a green floor. What wet tissue and steel
-// mirror decides whether they look wet and like steel.
+// render/filament/environment: a theatre lamp, a ring of dimmer lamps, pale walls and a green floor. Reflections make wet
+// tissue look wet and steel look like steel.
 #include "render/filament/environment.h"
 
 #include <array>
@@ -24,8 +24,8 @@ float smooth_step(float a, float b, float x) {
   return t * t * (3 - 2 * t);
 }
 
-// The main lamp's cluster of round heads, and a satellite. full, fade: cosines of the angles to where a head is bright and
-// where it ends.
+// The main lamp's cluster of round heads, and a satellite. full, fade: cosines of the angles of full brightness and of the
+// end of a head.
 struct Head {
   Vec3 middle, light;
   float full, fade;
@@ -52,7 +52,7 @@ const std::vector<Head>& heads() {
 Vec3 radiance(Vec3 d) {
   // Walls: pale above the horizon, the drape's green from below.
   const Vec3 ceiling{0.70f, 0.74f, 0.78f}, wall{0.62f, 0.66f, 0.68f}, floor{0.30f, 0.36f, 0.35f};
-  // Gowned people stand about the table: a dim band with gaps, at the height that instruments mirror.
+  // Gowned people round the table: a dim band with gaps, at the height that instruments reflect.
   const float people = smooth_step(-0.15f, 0.05f, d.y) * (1 - smooth_step(0.25f, 0.45f, d.y)) *
                        smooth_step(-0.2f, 0.5f, std::sin(5 * std::atan2(d.x, d.z) + 0.6f));
   Vec3 c = d.y > 0 ? lerp(wall, ceiling, d.y) : lerp(wall * 0.75f, floor, smooth_step(0, 0.45f, -d.y));
@@ -95,7 +95,7 @@ float radical_inverse(uint32_t i) {
   return float(i) * 2.3283064e-10f;
 }
 
-// What a surface of that roughness mirrors toward n: the environment weighed by GGX (the usual split-sum prefilter).
+// Reflected radiance of a surface of that roughness toward n: the environment weighted by GGX (split-sum prefilter).
 Vec3 blurred(Vec3 n, float roughness, uint32_t samples) {
   const Vec3 side = any_perpendicular(n), up = cross(n, side);
   const float a2 = roughness * roughness;
@@ -152,13 +152,13 @@ Environment make_environment(filament::Engine& engine, float intensity) {
                                 .sampler(Texture::Sampler::SAMPLER_CUBEMAP)
                                 .format(Texture::InternalFormat::R11F_G11F_B10F)
                                 .build(engine);
-  static const Mirrored mirrored = mirror_environment();  // the same for every renderer of the program
+  static const Mirrored mirrored = mirror_environment();  // shared by all renderers of the program
   for (int level = 0; level < levels; ++level)
     environment.reflections->setImage(engine, size_t(level), floats(mirrored[size_t(level)]),
                                       Texture::FaceOffsets(size_t((base >> level) * (base >> level) * 12)));
 
-  // Diffuse light: the first nine spherical harmonics of the radiance. The lamps are left to the lamp that casts shadows, by
-  // cutting what is brighter than the walls.
+  // Diffuse light: the first nine spherical harmonics of the radiance. The lamps are excluded, because a shadow-casting lamp
+  // represents them: radiance brighter than the walls is cut off.
   filament::math::float3 sh[9] = {};
   constexpr int n = 64;
   for (int i = 0; i < n; ++i)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/filament/environment: the light of the operating theatre, computed here so that no picture file is needed.
+// render/filament/environment: the light of the operating theatre, computed here so that no image file is needed.
 #pragma once
 #include <filament/Engine.h>
 #include <filament/IndirectLight.h>
@@ -13,7 +13,7 @@ struct Environment {
 };
 Environment make_environment(filament::Engine& engine, float intensity);
 
-// Tileable patterns for tissue. pattern: r mottling, g vessels, b blood in the wall, a which
+// Tileable patterns for tissue. pattern: r mottling, g vessels, b blood in the wall, a: which
 // vessels are veins. bumps: rg serosa's slope, ba mucosa's.
 struct TissueTextures {
   filament::Texture* pattern = nullptr;

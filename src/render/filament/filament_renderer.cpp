@@ -47,7 +47,7 @@ class FilamentRenderer final : public Renderer {
   void draw_into(const Snapshot& snapshot, const Camera& camera, bool suture_points, int read_width, int read_height,
                  Image& image) {
     theatre_->show(snapshot, camera, width_, height_, suture_points);
-    // Filament may ask to skip a frame when it thinks the driver is behind; a picture that was asked for is always made.
+    // Filament may request to skip a frame when the driver is behind; a requested image is always rendered.
     bool begun = false;
     for (int i = 0; i < 20 && !begun; ++i)
       if (!(begun = renderer_->beginFrame(chain_))) engine_->flushAndWait();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/filament: frames on the backend that draws nothing; see render/frame_cost.h.
+// render/filament: frames on the backend that renders nothing; see render/frame_cost.h.
 #include "render/frame_cost.h"
 
 #include <time.h>

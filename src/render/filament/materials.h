@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/filament/materials: the compiled materials, embedded so that a build has no files to find at run time.
+// render/filament/materials: the compiled materials, embedded so that no files are needed at run time.
 #pragma once
 #include <cstdint>
 #include <span>

@@ -25,8 +25,8 @@ using filament::math::mat4f;
 
 float3 f3(Vec3 v) { return {v.x, v.y, v.z}; }
 
-// Buffers are read on Filament's own thread some time later, so each upload is a copy of its own. Copies of a size that was
-// used before are used again.
+// Filament's own thread reads buffers later, so each upload is a separate copy. Copies of a size used before are
+// reused.
 class Copies {
  public:
   void* take(size_t bytes) {
@@ -40,7 +40,7 @@ class Copies {
   void give_back(void* p, size_t bytes) {
     const std::lock_guard lock(mutex_);
     std::vector<void*>& free = free_[bytes];
-    // More than this are in flight only while something loads.
+    // More than this are in flight only during loading.
     if (free.size() < 8) free.push_back(p);
     else std::free(p);
   }
@@ -67,7 +67,7 @@ VertexBuffer::BufferDescriptor copy_of(std::span<const T> data) {
 }
 
 filament::Box to_box(Box3 b) {
-  // Filament's box is center and half extent. Never flat: a plane would drop out of its culling.
+  // Filament's box is center and half extent. Never flat: culling would drop a plane.
   const Vec3 half = 0.5f * (b.high - b.low) + Vec3{1e-4f, 1e-4f, 1e-4f};
   return {f3(0.5f * (b.low + b.high)), f3(half)};
 }
@@ -78,7 +78,7 @@ Box3 bounds(std::span<const Vec3> points) {
   Box3 b{{1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}};
   bool any = false;
   for (const Vec3 p : points) {
-    if (!is_finite(p)) continue;  // one particle gone astray must not take the whole mesh out of the picture
+    if (!is_finite(p)) continue;  // one invalid particle must not remove the whole mesh from the image
     any = true;
     b.low = {std::min(b.low.x, p.x), std::min(b.low.y, p.y), std::min(b.low.z, p.z)};
     b.high = {std::max(b.high.x, p.x), std::max(b.high.y, p.y), std::max(b.high.z, p.z)};
@@ -146,7 +146,7 @@ void destroy_mesh(filament::Engine& engine, filament::Scene& scene, GpuMesh& mes
 }
 
 PackedFrame pack_frame(Quat q, bool mirrored) {
-  // The sign of w says which way the texture runs, so w must never round to 0.
+  // The sign of w states the direction of the texture, so w must never round to 0.
   constexpr float least = 1.0f / 32767;
   float s = q.w < 0 ? -1.0f : 1.0f;
   float w = s * q.w;
@@ -155,7 +155,7 @@ PackedFrame pack_frame(Quat q, bool mirrored) {
     s *= std::sqrt(1 - least * least);
   }
   if (mirrored) s = -s, w = -w;
-  // Rounded by hand: lround is a call.
+  // Rounded manually: lround is a function call.
   const auto pack = [](float x) { return static_cast<int16_t>(static_cast<int>(x * 32767.0f + 32768.5f) - 32768); };
   return {pack(s * q.x), pack(s * q.y), pack(s * q.z), pack(w)};
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/filament/mesh: one drawable: buffers on the graphics side, refilled from plain vectors when its shape changes.
+// render/filament/mesh: one drawable: buffers of the graphics library, refilled from plain vectors when its shape changes.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -18,15 +18,15 @@
 
 namespace catgut {
 
-// What of a vertex never moves. Eight floats, uploaded once.
+// Constant attributes of a vertex. Eight floats, uploaded once.
 struct VertexLook {
   float color[4];  // linear
   float uv0[2];
   float uv1[2];
 };
 
-// What of a vertex changes slowly while people work, each 0..255: how far tension has pressed the blood out of it, how much
-// blood lies on it. Meshes that have it are made with `live`.
+// Slowly changing attributes of a vertex, each 0..255: ischemia by tension, and blood on
+// it. Meshes with these are created with `live`.
 struct VertexLive {
   uint8_t blanched = 0, bloody = 0, spare[2] = {};
 };
@@ -43,23 +43,23 @@ struct Box3 {
 };
 Box3 bounds(std::span<const Vec3> points);
 
-// Room for look.size() vertices; the triangles are fixed, positions come with upload_surface.
+// Capacity look.size() vertices; the triangles are fixed, positions come with upload_surface.
 GpuMesh make_mesh(filament::Engine& engine, filament::Scene& scene, std::span<const VertexLook> look,
                   std::span<const std::array<uint32_t, 3>> triangle, filament::MaterialInstance* material, bool casts_shadow,
                   bool live = false);
-// A mesh whose surface is that of `shape`.
+// A mesh with the surface of `shape`.
 GpuMesh make_mesh(filament::Engine& engine, filament::Scene& scene, const Shape& shape, filament::MaterialInstance* material,
                   bool casts_shadow, bool live = false);
 void destroy_mesh(filament::Engine& engine, filament::Scene& scene, GpuMesh& mesh);
 
-// The rotation that takes x to the tangent and z to the normal, in the form the graphics side wants it.
+// The rotation that takes x to the tangent and z to the normal, in the format of the shaders.
 using PackedFrame = std::array<int16_t, 4>;
 // mirrored: the texture runs clockwise there.
 PackedFrame pack_frame(Quat frame, bool mirrored = false);
-Quat frame_of(Vec3 normal, Vec3 tangent);  // tangent need not be at right angles to normal
+Quat frame_of(Vec3 normal, Vec3 tangent);  // tangent need not be orthogonal to normal
 
-// A part of a mesh's next surface, to be written in place: what is uploaded every frame comes from memory that is used again,
-// so that a running picture allocates nothing. Each one must be handed to upload_surface, once.
+// A part of a mesh's next surface, written in place: per-frame uploads reuse their memory, so that rendering does not
+// allocate. Each one must be passed to upload_surface once.
 struct Surface {
   std::span<Vec3> position;
   std::span<PackedFrame> frame;
@@ -70,10 +70,10 @@ void upload_surface(filament::Engine& engine, const GpuMesh& mesh, const Surface
 // Uploads the surface of shapes that seldom change.
 void set_surface(filament::Engine& engine, const GpuMesh& mesh, std::span<const Vec3> position, std::span<const Vec3> normal,
                  std::span<const Vec3> tangent);
-// The first vertices of a mesh that was made with at least as many.
+// The first vertices of a mesh created with at least as many.
 void set_look(filament::Engine& engine, const GpuMesh& mesh, std::span<const VertexLook> look);
 void set_live(filament::Engine& engine, const GpuMesh& mesh, std::span<const VertexLive> live);
-// Draws `triangles` of its triangles from the first.
+// Draws the first `triangles` of its triangles.
 void set_drawn(filament::Engine& engine, const GpuMesh& mesh, uint32_t triangles);
 void set_pose(filament::Engine& engine, const GpuMesh& mesh, const Pose& pose);
 

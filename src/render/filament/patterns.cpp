@@ -16,7 +16,7 @@ constexpr int kSize = 1024;
 
 size_t at(int x, int y) { return size_t(y & (kSize - 1)) * kSize + size_t(x & (kSize - 1)); }
 
-// A small generator of its own: the pictures' patterns must not move when the simulation's random numbers do.
+// A separate random generator: textures must not change with the simulation's random numbers.
 struct Dice {
   uint32_t state;
   float operator()() {
@@ -31,7 +31,7 @@ std::vector<float> noise(int cells, uint32_t seed) {
   std::vector<float> corner(size_t(cells * cells));
   for (float& c : corner) c = dice();
   std::vector<float> out(size_t(kSize) * kSize);
-  // Across first, for one row of cells at a time: everything else is two multiplications a point.
+  // Across first, one row of cells at a time: the rest is two multiplications per point.
   const auto smooth = [cells](int at, int& cell) {
     const float f = float(at) * float(cells) / kSize, t = f - std::floor(f);
     cell = int(f);
@@ -68,7 +68,7 @@ std::vector<float> octaves(int cells, int count, float falloff, uint32_t seed) {
   return sum;
 }
 
-// One vessel: a wandering stroke that thins and throws off branches. `vein`: darker and bluer, drawn into its own channel.
+// One vessel: a meandering stroke that tapers and branches. `vein`: darker and bluer, drawn into its own channel.
 struct Vessels {
   std::vector<float> there = std::vector<float>(size_t(kSize) * kSize), vein = std::vector<float>(size_t(kSize) * kSize);
 };
@@ -78,7 +78,7 @@ void draw_vessel(Vessels& map, Dice& dice, float x, float y, float heading, floa
   for (float done = 0; done < reach; done += 1) {
     const float w = std::max(0.55f, width * (1 - 0.8f * done / reach));
     const int r = int(1.8f * w) + 2;
-    // What is thinner than a texel is fainter instead.
+    // Features thinner than a texel are fainter instead.
     const float strength = std::min(1.0f, 0.10f + 0.40f * w) * std::min(1.0f, 4 * (1 - done / reach));
     for (int j = -r; j <= r; ++j)
       for (int i = -r; i <= r; ++i) {
@@ -169,7 +169,7 @@ Patterns make_patterns() {
 }  // namespace
 
 TissueTextures make_tissue_textures(filament::Engine& engine) {
-  static const Patterns made = make_patterns();  // the same for every renderer of the program
+  static const Patterns made = make_patterns();  // shared by all renderers of the program
   return {upload(engine, made.pattern), upload(engine, made.bumps)};
 }
 

@@ -12,13 +12,13 @@
 namespace catgut {
 namespace {
 
-// What Filament says on every machine when all is well.
+// Filament's normal messages.
 bool is_greeting(const std::string& line) {
   return line.empty() || line.find("FEngine ") == 0 || line.find("WARNING: Using soft CircularBuffer") == 0;
 }
 
-// Keeps standard output aside while the engine starts, then passes on what was said. Another thread's output in that moment
-// would go the same way.
+// Redirects standard output while the engine starts, then passes the messages on. Output of another thread at that moment
+// is redirected too.
 class QuietStart {
  public:
   QuietStart() {

@@ -6,9 +6,9 @@
 
 namespace catgut {
 
-// Throws std::runtime_error when the driver refuses. Filament greets on standard output while it starts, where a program's own
-// results go: its greetings are left out, and whatever else it says goes to standard error.
+// Throws std::runtime_error if the driver refuses. Filament prints a greeting on standard output at its start, where results of
+// the program go: the greeting is removed, and other messages go to standard error.
 filament::Engine* start_engine(filament::backend::Platform& platform);
-filament::Engine* start_engine_without_driver();  // one that takes everything and draws nothing
+filament::Engine* start_engine_without_driver();  // one that accepts everything and renders nothing
 
 }  // namespace catgut

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/filament: what is in a picture, however it is shown. See theatre.h.
+// render/filament: the contents of an image, for any output. See theatre.h.
 #include "render/filament/theatre.h"
 
 #include <algorithm>
@@ -86,7 +86,7 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
     eye_[i].camera->lookAt({camera.eye.x, camera.eye.y, camera.eye.z}, {camera.target.x, camera.target.y, camera.target.z},
                            {camera.up.x, camera.up.y, camera.up.z});
   }
-  // Shadows no farther than a little behind the work: the map's points are where they are looked at.
+  // Shadows only a little beyond the work: the map's resolution is used where it is visible.
   filament::LightManager& lights = engine_.getLightManager();
   shadow_.shadowFar = 3.2f * std::max(0.05f, distance(cameras[0].eye, cameras[0].target));
   lights.setShadowOptions(lights.getInstance(lamp_), shadow_);
@@ -126,8 +126,8 @@ void Theatre::set_quality(filament::View& view, Quality quality) {
   ao.quality = filament::View::QualityLevel::MEDIUM;
   view.setAmbientOcclusionOptions(ao);
   filament::View::BloomOptions bloom;
-  // Never off: without it Filament grades the colors inside the main pass by framebuffer fetch, which Mesa's software
-  // rasterizer gets wrong (the picture turns into colored tiles). A tiny one costs nothing.
+  // Never off: without it Filament does color grading inside the main pass by framebuffer fetch, which Mesa's software
+  // rasterizer gets wrong (the image turns into colored tiles). A tiny one takes no measurable time.
   bloom.enabled = true;
   bloom.strength = good ? 0.06f : 0.02f;
   bloom.resolution = good ? 360 : 16;
@@ -141,7 +141,7 @@ void Theatre::set_light(Quality quality) {
   scene_->setIndirectLight(environment_.light);
   skybox_ = filament::Skybox::Builder().color({0.012f, 0.03f, 0.028f, 1}).build(engine_);
   scene_->setSkybox(skybox_);
-  // Shadows at the scale of a thread: the library's own bias of a millimeter would swallow the thread's and needle's.
+  // Shadows at the scale of a thread: the library's default bias of a millimeter would suppress thread and needle shadows.
   filament::LightManager::ShadowOptions& shadow = shadow_;
   shadow.mapSize = quality == Quality::low ? 1024 : quality == Quality::medium ? 2048 : 4096;
   shadow.constantBias = 0.0002f;
@@ -188,8 +188,8 @@ void Theatre::make_stage() {
     tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_));
     all.insert(all.end(), mesh.position.begin(), mesh.position.end());
   }
-  // The drape lies where the model says. What stands up through it has a hole there, which it clears by a centimeter; what lies
-  // on it is held by gauze at its far end, as a surgeon's assistant would.
+  // The drape's height is the model's. An organ that protrudes has a hole with a clearance of a centimeter; one that lies on it
+  // is held by gauze at its far end.
   Vec3 ground{model_.focus.x, model_.drape, model_.focus.z};
   std::vector<Vec3> through, sample;
   for (const Vec3 p : all)
@@ -226,7 +226,7 @@ void Theatre::make_stage() {
   }
 }
 
-// A cloth's share of lamp and room light, once (see drape.mat): the room is darker low down beside tissue.
+// A cloth's share of lamp and room light, computed once (see drape.mat): the room is darker low down beside tissue.
 void Theatre::add_cloth(const Shape& cloth, float threads_per_cm, std::span<const Vec3> tissue, bool casts_shadow) {
   std::vector<VertexLook> look(cloth.position.size());
   for (size_t i = 0; i < look.size(); ++i) {
@@ -241,7 +241,7 @@ void Theatre::add_cloth(const Shape& cloth, float threads_per_cm, std::span<cons
   set_look(engine_, cloth_.back(), look);
   Shape over = cloth;
   for (size_t i = 0; i < look.size(); ++i)
-    over.position[i] += cloth.normal[i] * 0.0001f;  // never level with the cloth, or the two would fight for pixels
+    over.position[i] += cloth.normal[i] * 0.0001f;  // never coplanar with the cloth, to avoid z-fighting
   cloth_.push_back(make_mesh(engine_, *scene_, over, shadow_material_, false));
   set_look(engine_, cloth_.back(), look);
 }
@@ -249,14 +249,14 @@ void Theatre::add_cloth(const Shape& cloth, float threads_per_cm, std::span<cons
 void Theatre::move_tool(const ToolView3d& view, const InstrumentView& tool) {
   catgut::set_pose(engine_, view.part[0], tool.pose);
   for (const float side : {1.0f, -1.0f}) {
-    // The jaws lie on the -z side of the hinge: turning about +y moves what is at -z toward -x.
+    // The jaws lie on the -z side of the hinge: rotation about +y moves points at -z toward -x.
     const Quat turn = axis_angle({0, 1, 0}, -side * view.shape.opening * std::clamp(tool.jaw, 0.0f, 1.0f));
     const Pose hinge{Vec3{0, 0, view.shape.pivot} - rotate(turn, {0, 0, view.shape.pivot}), turn};
     catgut::set_pose(engine_, view.part[side > 0 ? 1 : 2], tool.pose * hinge);
   }
 }
 
-// Markers come and go with the suture points; they are few, so each is a drawable of its own that is parked when unused.
+// Markers follow the suture points; they are few, so each is a separate drawable, hidden when unused.
 void Theatre::show_markers(const Snapshot& snapshot, bool wanted) {
   const size_t count = wanted ? suture_point_count(snapshot) : 0;
   while (marker_.size() < 2 * count) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/filament: what is in a picture, however it is shown: theatre light, tissue, thread, needle, tools and drape. Reads the
-// PictureModel once and a Snapshot per picture; writes a view of the engine that it was made for.
+// render/filament: the contents of an image, for any output: theatre light, tissue, thread, needle, tools and drape. Reads the
+// PictureModel once and a Snapshot per frame; writes a view of the engine passed to it.
 #pragma once
 #include <array>
 #include <span>
@@ -30,19 +30,19 @@ struct ToolView3d {
 
 class Theatre {
  public:
-  // eyes: how many views of the same field there are, two for a headset.
+  // eyes: number of views of the same field, two for a headset.
   Theatre(filament::Engine& engine, const PictureModel& model, Quality quality, int eyes = 1);
   ~Theatre();
   Theatre(const Theatre&) = delete;
   Theatre& operator=(const Theatre&) = delete;
 
-  // Moves everything to where the snapshot has it, once for all eyes; the next frame that renders view() shows it. One camera
+  // Moves everything to the snapshot's state, once for all eyes; the next frame that renders view() shows it. One camera
   // per eye.
   void show(const Snapshot& snapshot, std::span<const Camera> camera, int width, int height, bool suture_points);
   void show(const Snapshot& snapshot, const Camera& camera, int width, int height, bool suture_points) {
     show(snapshot, std::span(&camera, 1), width, height, suture_points);
   }
-  // Draws the field with `part` of the picture's points each way and stretches it: for windows on machines without a graphics
+  // Renders the field at `part` of the resolution in each direction and upscales it: for windows on machines without a graphics
   // card.
   void set_resolution_scale(float part);
   filament::View* view(int eye = 0) const { return eye_[size_t(eye)].view; }
@@ -63,7 +63,7 @@ class Theatre {
   void show_markers(const Snapshot& snapshot, bool wanted);
 
   float coarse_ = 1;
-  const PictureModel model_;  // a copy: the theatre outlives whatever built it
+  const PictureModel model_;  // a copy: the theatre outlives its source
   filament::Engine& engine_;
   filament::Scene* scene_ = nullptr;
   std::vector<Eye> eye_;
@@ -77,11 +77,11 @@ class Theatre {
   filament::MaterialInstance *tissue_material_ = nullptr, *thread_material_ = nullptr, *needle_material_ = nullptr,
                              *tool_material_ = nullptr, *drape_material_ = nullptr, *shadow_material_ = nullptr,
                              *marker_material_ = nullptr, *mark_material_ = nullptr;
-  Motions motion_;  // of every particle, in the picture that is being made
+  Motions motion_;  // of every particle, in the current frame
   std::vector<TissueView> tissue_;
   ThreadView thread_;
   MarkView mark_;
-  std::vector<ToolView3d> tool_;  // as PictureModel::instrument
+  std::vector<ToolView3d> tool_;  // like PictureModel::instrument
   std::vector<GpuMesh> needle_;   // per suture
   GpuMesh bed_;
   std::vector<GpuMesh> cloth_;  // each with the shadows on it

@@ -11,12 +11,12 @@ namespace {
 
 constexpr int kSides = 8, kPerSpan = 4, kPerTurn = 14;
 constexpr uint32_t kRing = kSides + 1;
-constexpr float kKnotReach = 0.006f;     // [m] to the tissue that a knot lies on
-constexpr uint32_t kRoomForTied = 4000;  // points of the curve for knots and settled stitches; what is beyond is not drawn
+constexpr float kKnotReach = 0.006f;     // [m] maximum distance of a knot from its tissue
+constexpr uint32_t kRoomForTied = 4000;  // points of the curve for knots and baked sutures; further ones are not drawn
 const Vec3 kViolet = srgb(98, 62, 178), kGuide = srgb(176, 150, 238);
 
-// Adds one more piece to the curve. It begins and ends with a point of no width, which closes its ends and hides the way to the
-// next piece.
+// Adds one more piece to the curve. It begins and ends with a point of zero width, which closes its ends and hides the link to
+// the next piece.
 void add_piece(ThreadView& view, std::span<const Vec3> points, float width, bool guide = false) {
   if (points.size() < 2 || view.curve.size() + points.size() + 2 > view.capacity) return;
   const auto add = [&](Vec3 p, float r) {
@@ -40,7 +40,7 @@ Vec3 normal_at(Nearest at, std::span<const TissueView> tissue, const Motions& mo
   return rotate(follow(tissue[size_t(at.body)].vertex[at.vertex], motion.of).frame, {0, 0, 1});
 }
 
-// Looks for the nearest tissue only when what was found last time is no longer near: it is a walk over every vertex.
+// Searches for the nearest tissue only when the last result is no longer near: it visits every vertex.
 Nearest tissue_at(std::vector<Nearest>& known, size_t i, Vec3 point, float reach, std::span<const TissueView> tissue) {
   if (known.size() <= i) known.resize(i + 1);
   Nearest& n = known[i];
@@ -49,8 +49,8 @@ Nearest tissue_at(std::vector<Nearest>& known, size_t i, Vec3 point, float reach
   return n;
 }
 
-// One throw: its two strands lie turned about each other along the stitch, one wrap more than they cross, and dip toward the
-// tissue at both ends. `above`: how far the throw lies from the knot's place along `out`.
+// One throw: its two strands are wound about each other along the stitch, one wrap more than they cross, and dip toward the
+// tissue at both ends. `above`: distance of the throw from the knot's position along `out`.
 void add_throw(ThreadView& view, Vec3 at, Vec3 way, Vec3 out, float above, uint32_t wraps, int chirality, float width) {
   way = normalized(way - out * dot(way, out), any_perpendicular(out));
   const Vec3 side = cross(way, out);
@@ -69,8 +69,8 @@ void add_throw(ThreadView& view, Vec3 at, Vec3 way, Vec3 out, float above, uint3
   }
 }
 
-// The ring of vertices round each point of the curve. The ring's frame is carried along the curve without turning about it, so
-// that the braid does not twist; each corner's own frame is that one turned about the curve.
+// The ring of vertices round each point of the curve. Its frame is transported along the curve without twist, so that
+// the braid does not twist; each corner's own frame is rotated about the curve.
 void write_tube(ThreadView& view, const Surface& surface) {
   struct Corner {
     float c, s;
@@ -112,7 +112,7 @@ void add_suture(ThreadView& view, const SuturePicture& model, const SutureView& 
   add_strand(view, width);
   const Pose& needle = suture.needle.pose;
   if (!suture.needle.in_tissue || suture.needle.bite >= suture.bite.size() || !is_finite(needle.p)) return;
-  // It follows the needle's own arc as far as the needle goes, so that it shows the way the thread will take.
+  // It follows the needle's own arc as far as the needle extends, which is the path that the thread will take.
   const Vec3 entry = suture.bite[suture.needle.bite].entry, swage = transform(needle, {model.needle_radius, 0, 0});
   const Vec3 middle = 0.5f * (entry + swage), bow = normalized(middle - needle.p, {0, 1, 0});
   view.through = {entry, middle + bow * (0.12f * distance(entry, swage)), swage};
@@ -150,7 +150,7 @@ void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel&
   if (view.capacity == 0) return;
   view.curve.clear(), view.radius.clear(), view.guide.clear(), view.through.clear();
   const Vec3 ahead = normalized(camera.target - camera.eye);
-  const float seen = 0.75f * pixel * std::max(0.0f, dot(camera.target - camera.eye, ahead));  // [m] that can be seen
+  const float seen = 0.75f * pixel * std::max(0.0f, dot(camera.target - camera.eye, ahead));  // [m] minimum visible width
   size_t tied = 0;
   for (size_t i = 0; i < std::min(model.suture.size(), snapshot.suture.size()); ++i) {
     const float width = std::max(model.suture[i].thread_radius, seen);
@@ -225,11 +225,11 @@ void move_marks(filament::Engine& engine, MarkView& view, const Snapshot& snapsh
     const Nearest at = tissue_at(view.on_tissue, m, point.position, 0.003f, tissue);
     const Vec3 out = normal_at(at, tissue, motion);
     Vec3 center = point.position;
-    // On the drawn surface, which may lie a little off the particles'.
+    // On the drawn surface, which may differ slightly from the particles'.
     if (at.body >= 0) center -= out * dot(center - tissue[size_t(at.body)].position[at.vertex], out);
     center += out * 0.00012f;
     const Vec3 x = any_perpendicular(out), y = cross(out, x);
-    // A pulled thread draws its puncture open.
+    // Tension pulls the puncture open.
     const float pulled = std::max(point.tension_needle, point.tension_free),
                 inner = 0.00017f + 0.00010f * std::min(2.0f, pulled);
     for (uint32_t i = 0; i < kMarkCorners; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/filament/thread_view: suture threads as smooth tubes through their particles, in as many pieces as they were cut into;
-// knots as the two strands of every throw turned about each other; settled stitches; the visual guide from a bite's entry to
+// render/filament/thread_view: suture threads as smooth tubes through their particles, one per piece after cuts;
+// knots as the two strands of every throw wound about each other; baked sutures; the visual guide from a bite's entry to
 // the needle (paper 2.2). All of it is one mesh.
 #pragma once
 #include <vector>
@@ -14,22 +14,22 @@
 namespace catgut {
 
 struct ThreadView {
-  uint32_t capacity = 0;  // points of the drawn curve at most
+  uint32_t capacity = 0;  // maximum number of points of the drawn curve
   std::vector<Vec3> through, piece, curve;
   std::vector<float> radius;
   std::vector<uint8_t> guide;      // per point of the curve: 1 where it belongs to the visual guide
-  std::vector<Nearest> on_tissue;  // per knot, then per knot of settled stitches: the tissue that it lies on
+  std::vector<Nearest> on_tissue;  // per knot, then per knot of baked sutures: the tissue below it
   std::vector<VertexLook> look;
   GpuMesh gpu;
 };
 
 ThreadView make_thread_view(filament::Engine& engine, filament::Scene& scene, const PictureModel& model,
                             filament::MaterialInstance* material);
-// pixel: [m] that one pixel covers at 1 m from the camera; the thread is drawn wide enough to be seen.
+// pixel: [m] that one pixel covers at 1 m from the camera; sets the minimum width of the thread.
 void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel& model, const Snapshot& snapshot,
                  std::span<const TissueView> tissue, const Motions& motion, const Camera& camera, float pixel);
 
-// The punctures: where the thread goes into the wall and comes out of it.
+// The punctures: where the thread enters and leaves the wall.
 struct MarkView {
   std::vector<Nearest> on_tissue;  // per suture point
   GpuMesh gpu;

@@ -12,8 +12,8 @@ constexpr float kTile = 6.3f;  // [cm] one repeat of the tissue patterns
 
 using Uv = std::array<float, 2>;
 
-// The texture coordinate jumps back where the organ's circumference closes. A triangle across the jump would squeeze the whole
-// texture into itself, so its far corners are drawn again one period further on.
+// The texture coordinate jumps back where the organ's circumference closes. A triangle across the jump would compress the whole
+// texture into itself, so its far corners are duplicated one period further on.
 struct Unwrapped {
   std::vector<uint32_t> source;
   std::vector<Uv> uv;  // in tiles
@@ -46,7 +46,7 @@ Unwrapped unwrap(const VisibleMesh& mesh) {
     float stretch = 1 / kTile;
     if (jumps > 0) {
       const float period = float(period_sum / double(jumps));
-      // A whole number of repeats, so that the pattern meets itself.
+      // A whole number of repeats, so that the pattern is continuous.
       stretch = std::max(1.0f, std::round(period / kTile)) / period;
       std::unordered_map<uint32_t, uint32_t> twin;
       for (auto& t : out.triangle) {
@@ -70,8 +70,8 @@ Unwrapped unwrap(const VisibleMesh& mesh) {
   return out;
 }
 
-// How much of the sky each vertex sees at rest: rays through a coarse grid of cells that hold vertices. The deformed organ
-// keeps it; what matters is that the inside is darker than the rim, in every quality.
+// Ambient visibility of each vertex at rest: rays through a coarse grid of occupied cells. The deformed organ
+// keeps it; its purpose is an inside darker than the rim, at every quality.
 std::vector<float> baked_sky(const VisibleMesh& mesh) {
   std::vector<float> sky(mesh.position.size(), 1);
   if (mesh.position.empty()) return sky;
@@ -106,14 +106,14 @@ std::vector<float> baked_sky(const VisibleMesh& mesh) {
       for (ptrdiff_t i; open && (i = index(p)) >= 0; p += d * (0.8f * cell)) open = !filled[size_t(i)];
       seen += open ? weight : 0;
     }
-    // What faces the ground entirely still gets what the drape throws back.
+    // Surfaces that face the ground still receive light reflected by the drape.
     sky[v] = all > 0 ? 0.15f + 0.85f * seen / all : 0.3f;
   }
   return sky;
 }
 
-// Where a vertex of the cut lies between the organ's outside (0) and its inside (1): what decides which layer of the wall
-// shows.
+// Position of a vertex of the cut between the organ's outside (0) and its inside (1), which selects the visible
+// layer of the wall.
 std::vector<float> baked_depth(const VisibleMesh& mesh) {
   std::vector<float> depth(mesh.position.size(), 0);
   std::vector<Vec3> outside, inside;
@@ -122,7 +122,7 @@ std::vector<float> baked_depth(const VisibleMesh& mesh) {
     if (mesh.layer[v] == TissueLayer::mucosa) depth[v] = 1;
     if (mesh.layer[v] == TissueLayer::cut_edge) cut.push_back(v);
   }
-  // Only what lies about a cut can be nearest to it.
+  // Only vertices near a cut can be nearest to it.
   constexpr float far = 0.006f;
   std::vector<Vec3> sample;
   for (size_t i = 0; i < cut.size(); i += 16) sample.push_back(mesh.position[cut[i]]);
@@ -144,13 +144,13 @@ std::vector<float> baked_depth(const VisibleMesh& mesh) {
   return depth;
 }
 
-// Broad patches with more or less blood, that no repeat of the texture can show. 0..1
+// Broad patches with more or less blood, larger than a repeat of the texture. 0..1
 float flush(Vec3 p) {
   return 0.5f + 0.25f * std::sin(173 * p.x + 67 * p.y + 1.3f) * std::sin(91 * p.z - 139 * p.y + 0.4f) +
          0.25f * std::sin(59 * p.x - 83 * p.z + 2.1f) * std::sin(71 * p.y + 113 * p.x);
 }
 
-// Fat lies in lobules along the mesentery's side, from where the vessels come: behind an organ that stands, below one that
+// Fat lies in lobules along the mesentery's side, where the vessels come from: behind an upright organ, below one that
 // lies.
 constexpr Vec3 kMesentery{0, -0.55f, -0.835f};
 
@@ -164,7 +164,7 @@ VertexLook look_of(const VisibleMesh& mesh, uint32_t v, Uv uv, float sky, float 
     case TissueLayer::serosa: {
       const float toward = dot(mesh.normal[v], kMesentery);
       c = lerp(srgb(244, 194, 182), srgb(236, 154, 148), red);
-      // In drops and streaks along the organ, closing up toward the mesentery itself.
+      // In drops and streaks along the organ, denser toward the mesentery itself.
       const float lobule = std::sin(1150 * p.x + 420 * p.y) * std::sin(930 * p.y - 610 * p.z + 380 * p.x) +
                            0.6f * std::sin(2300 * p.z + 700 * p.y) * std::sin(1900 * p.x - 1700 * p.y);
       const float fat = std::clamp((toward - 0.86f + 0.09f * lobule + 0.2f * (red - 0.5f)) / 0.10f, 0.0f, 1.0f);
@@ -182,9 +182,9 @@ VertexLook look_of(const VisibleMesh& mesh, uint32_t v, Uv uv, float sky, float 
   return {{c.x, c.y, c.z, vessels}, {uv[0], uv[1]}, {sky, depth}};
 }
 
-constexpr float kReach = 0.0055f;  // [m] round a suture point that its tension whitens
+constexpr float kReach = 0.0055f;  // [m] round a suture point: range of whitening by tension
 
-// How white tissue is pressed: a gentle pull shows a little, a newton a lot.
+// Degree of whitening: little for a gentle pull, strong for a newton.
 float whiteness(float tension) { return 1 - std::exp(-1.6f * std::max(0.0f, tension - 0.05f)); }
 
 void reach_from(TissueView& view, Vec3 point, std::vector<Reached>& out) {
@@ -193,19 +193,19 @@ void reach_from(TissueView& view, Vec3 point, std::vector<Reached>& out) {
     if (d2 > kReach * kReach) continue;
     const float near = 1 - std::sqrt(d2) / kReach;
     out.push_back({v, near * near * (3 - 2 * near)});
-    // A puncture bleeds a little and stains what is about it.
+    // A puncture bleeds a little and stains its surroundings.
     const float stain = near * near * near;
     view.live[v].bloody = std::max(view.live[v].bloody, uint8_t(120 * stain * stain));
   }
 }
 
-// Tension whitens the tissue round every suture point; it comes and goes over some pictures, as blood does.
+// Tension whitens the tissue round every suture point, gradually over several frames, like blood flow.
 void blanch(filament::Engine& engine, TissueView& view, const Snapshot& snapshot) {
   bool changed = false;
   const bool first = !view.shown;
   view.shown = true;
   view.reached.resize(snapshot.suture.size());
-  bool fewer = false;  // a bite was undone, or a new suture begun
+  bool fewer = false;  // a bite was undone, or a new suture started
   for (size_t s = 0; s < view.reached.size(); ++s)
     fewer = fewer || view.reached[s].size() > snapshot.suture[s].suture_point.size();
   if (fewer) {
@@ -256,7 +256,7 @@ TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, co
   const Unwrapped flat = unwrap(mesh);
   const size_t n = flat.source.size();
   view.mirrored.assign(n, 0);
-  // The texture's direction at a vertex: of the edge there that runs most nearly along it.
+  // The texture's direction at a vertex: of the edge there that is closest to it.
   std::vector<float> best(n, -1);
   std::vector<Vec3> tangent(n, Vec3{1, 0, 0});
   for (const auto& t : flat.triangle) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // render/filament/tissue_view: one soft body's visible surface, moved by geometry/skin.
-// Reads the model's VisibleMesh once and a snapshot per picture; writes its own buffers.
+// Reads the model's VisibleMesh once and a snapshot per frame; writes its own buffers.
 #pragma once
 #include <span>
 #include <vector>
@@ -12,7 +12,7 @@
 
 namespace catgut {
 
-// A vertex that tension presses the blood out of, and how much.
+// A vertex whitened by tension, and its degree.
 struct Reached {
   uint32_t vertex;
   float weight;
@@ -22,14 +22,14 @@ struct TissueView {
   const VisibleMesh* mesh = nullptr;  // the model's
   std::vector<SkinnedVertex> vertex;  // as drawn; vertices on a texture seam are drawn twice
   std::vector<uint8_t> mirrored;      // whether the texture runs clockwise there
-  std::vector<Vec3> position;         // as drawn, of the last picture
+  std::vector<Vec3> position;         // as drawn, of the last frame
   std::vector<PackedFrame> frame;
   std::vector<VertexLive> live;
-  std::vector<float> press;  // per vertex, of this picture
-  // Where thread goes through the wall, found when it is first seen: by suture and number of the suture point.
+  std::vector<float> press;  // per vertex, of this frame
+  // Where thread passes through the wall, found on first use: by suture and number of the suture point.
   std::vector<std::vector<std::vector<Reached>>> reached;  // per suture
-  std::vector<uint32_t> pressed;                           // vertices with anything in `press`
-  bool shown = false;                                      // in a picture before
+  std::vector<uint32_t> pressed;                           // vertices with a nonzero `press`
+  bool shown = false;                                      // in a previous frame
   GpuMesh gpu;
 };
 

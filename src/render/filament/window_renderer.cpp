@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render: the Filament renderer in a window; see render/window.h. The panels are a view of their own, drawn last.
+// render: the Filament renderer in a window; see render/window.h. The panels are a separate view, drawn last.
 #include "render/window.h"
 
 #include <algorithm>
@@ -23,7 +23,7 @@
 namespace catgut {
 namespace {
 
-// [pixels] for which letters are drawn; others are made of the nearest. 720 lines have 16, 1080: 24, 1440: 32, 2160: 48.
+// [pixels] text heights with their own glyphs; others scale the nearest. 720 lines have 16, 1080: 24, 1440: 32, 2160: 48.
 constexpr std::array<float, 11> kTextHeights{11, 13, 16, 19, 22, 24, 28, 32, 40, 48, 64};
 
 class FilamentWindow final : public WindowRenderer {
@@ -37,7 +37,7 @@ class FilamentWindow final : public WindowRenderer {
     panel_view_->setPostProcessingEnabled(false);
     panel_view_->setShadowingEnabled(false);
     panels_ = std::make_unique<filagui::ImGuiHelper>(engine_, panel_view_, utils::Path());
-    // All heights at once: the panels' materials keep the first letters they are given.
+    // All heights at once: the panels' materials keep the first glyphs that they receive.
     ImFontAtlas& letters = *ImGui::GetIO().Fonts;
     letters.Clear();
     const bool there = !font.empty() && std::filesystem::exists(font);
@@ -86,7 +86,7 @@ class FilamentWindow final : public WindowRenderer {
   }
 
   bool draw(const Frame& frame) override {
-    // First of all whether there will be a frame: what is uploaded for none would pile up before a driver that is behind.
+    // First check whether there will be a frame: uploads without one would accumulate while the driver is behind.
     bool begun = renderer_->beginFrame(chain_);
     for (int i = 0; frame.copy && !begun && i < 20; ++i) {
       engine_->flushAndWait();
@@ -95,7 +95,7 @@ class FilamentWindow final : public WindowRenderer {
     if (!begun) return false;
     const bool field = theatre_ && frame.snapshot;
     if (field) theatre_->show(*frame.snapshot, frame.camera, width_, height_, frame.suture_points);
-    // Alone, the panels' view clears what was there before.
+    // Without a field, the panels' view clears the previous image.
     panel_view_->setBlendMode(field ? filament::View::BlendMode::TRANSLUCENT : filament::View::BlendMode::OPAQUE);
     panels_->render(frame.dt, [&](filament::Engine*, filament::View*) {
       if (frame.panels) frame.panels();
