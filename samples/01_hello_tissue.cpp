@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A piece of bowel, and one hand that presses on its rim: the tissue gives way, pushes back, and recovers.
-// Shows: a scene made in code, the tick, what is published, the force on a hand.
+// A piece of bowel, and one hand that presses on its rim: the tissue deforms, pushes back, and recovers.
+// Shows: a scene in code, the tick, the published data, the force on a hand.
 #include <algorithm>
 #include <cstdio>
 
@@ -31,7 +31,7 @@ int main() {
   };
   run(0.5, above, above);
   const std::vector<Vec3> rest = seen.particle;
-  const auto moved = [&] {  // [m] of the tissue particle that has moved furthest
+  const auto moved = [&] {  // [m] maximum displacement of a tissue particle
     float most = 0;
     for (size_t i = 0; i < picture.particle_rest.size(); ++i) most = std::max(most, distance(seen.particle[i], rest[i]));
     return most;

@@ -23,14 +23,14 @@ int main() {
   Strand thread;
   Column<Vec4> x, v(kCount), before;
   const std::vector<float> inv_mass(kCount, 1 / kMass);
-  for (uint32_t i = 0; i < kCount; ++i) x.push_back(point({kSpacing * static_cast<float>(i), 0, 0}));  // level: it has to fall
+  for (uint32_t i = 0; i < kCount; ++i) x.push_back(point({kSpacing * static_cast<float>(i), 0, 0}));  // horizontal: it falls
   reset(model, thread);
-  thread.hold.push_back({0, 0, {}});  // node 0 on body 0, the hook, which nothing can move
+  thread.hold.push_back({0, 0, {}});  // node 0 on body 0, the fixed hook
   const std::vector<RigidModel> hook_model(1);
   std::vector<RigidBody> hook(1);
   ThreadScratch scratch;
   scratch.resize(kCount);
-  for (int step = 0; step < 960 * 5; ++step) {  // five seconds, with the air's resistance
+  for (int step = 0; step < 960 * 5; ++step) {  // five seconds, with air drag
     std::fill(scratch.lambda.begin(), scratch.lambda.end(), 0.0f);
     before = x;
     for (uint32_t i = 1; i < kCount; ++i) add(x[i], (xyz(v[i]) + model.gravity * kH) * kH);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One bite through the rim of a colon: a scene file, a pair of hands, and what the simulator reports about the stitch.
-// Shows: scenes by name, hands that look at the last snapshot before they move, events in the order in which they happen.
+// One bite through the rim of a colon: a scene file, a pair of hands, and the simulator's report of the stitch.
+// Shows: scenes by name, hands that read the last snapshot before they move, events in order.
 #include <cstdio>
 #include <vector>
 

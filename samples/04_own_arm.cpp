@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sample: a haptic arm of your own. Fill an ArmPort with the functions of your driver; everything that makes force safe is done
-// by a caller that calls it. Here the "driver" is a thread whose stylus drops slowly onto the bowel's wall; a real one calls
-// `step` from its own callback, a thousand times a second, with what its encoders say, and gives the motors what comes back.
+// Sample: a haptic device of your own. Fill an ArmPort with the functions of your backend; its caller makes the force safe.
+// Here the backend is a thread whose stylus descends slowly onto the bowel's wall. A real one calls `step` from its own
+// callback, a thousand times per second, with the state of its encoders, and sends the result to the motors.
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -18,7 +18,7 @@ using namespace catgut;
 struct MyArm {
   std::atomic<bool> quit{false};
   std::atomic<uint64_t> steps{0};
-  std::atomic<float> most{0};  // [N] felt so far
+  std::atomic<float> most{0};  // [N] maximum so far
   std::thread servo;
 };
 
@@ -30,7 +30,7 @@ bool start(void* self, const ArmCallback& callback, std::string&) {
       s.state = ArmState::ready;
       const float t = 0.001f * static_cast<float>(arm.steps);
       s.pose.p = {0.0037f, t < 2.5f ? 0.0f : -0.012f * (t - 2.5f), -0.010f};  // [m] waits until force is let in, then goes down
-      s.pose.q = axis_angle({1, 0, 0}, -0.5f * kPi);                          // -z, the way it points, is down
+      s.pose.q = axis_angle({1, 0, 0}, -0.5f * kPi);                          // -z, its pointing direction, is down
       arm.most = std::max(arm.most.load(), length(callback.step(callback.user, 0, s)));
       ++arm.steps;
       std::this_thread::sleep_until(next);
@@ -38,7 +38,7 @@ bool start(void* self, const ArmCallback& callback, std::string&) {
   });
   return true;
 }
-// A real one first lets the motors' force down, by at most 0.5 N a millisecond, and then switches them off.
+// A real one first reduces the motors' force, by at most 0.5 N per millisecond, and then switches them off.
 void stop(void* self) {
   MyArm& arm = *static_cast<MyArm*>(self);
   arm.quit = true;
@@ -81,6 +81,6 @@ int main() {
   }
   haptics.stop();
   std::printf("%llu samples, %.2f N at most\n", static_cast<unsigned long long>(arm.steps), static_cast<double>(arm.most));
-  // What was felt in time depends on the machine; what there was to feel does not.
+  // The force felt in time depends on the machine; the published force does not.
   return arm.steps > 1000 && arm.most < 3.31f && length(seen.patch[0].force) > 0.02f ? 0 : 1;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sample: an instrument of your own, without a change to Catgut. A bulldog clamp, which is in no table, is parked on the rim of
-// a bowel end and pulls it sideways with the force that the scene states. Shows: an InstrumentModel, a scene with instruments,
-// what the Snapshot says of them.
+// Sample: an instrument of your own, without a change to Catgut. A bulldog clamp, which is not in the table, is parked on the
+// rim of a bowel end and pulls it sideways with the force given in the scene. Shows: an InstrumentModel, a scene with
+// instruments, their data in the Snapshot.
 #include <cmath>
 #include <cstdio>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The numbers of docs/one_tick.md: runs the purse-string as `catgut run purse_string --seed 1` does, up to the tick in which
-// the tip of the first bite goes in, and prints what went into that tick and what came out. tools/update_docs.sh copies the
-// printed blocks into the page. Reads the State itself (sim/state.h), which a program of yours has no need to do.
+// The numbers of docs/one_tick.md: runs the purse-string like `catgut run purse_string --seed 1`, up to the tick in which
+// the tip of the first bite enters, and prints input and output of that tick. tools/update_docs.sh copies the
+// printed blocks into the page. Reads the State itself (sim/state.h), which other programs do not need.
 #include <cmath>
 #include <cstdio>
 
@@ -110,8 +110,8 @@ int main() {
               seen.active().needle.in_tissue ? "yes" : "no", 1e6 * seen.opening_area);
   std::printf("state: %zu bytes, hash %016llx\n", save_state(m, s).size(), static_cast<unsigned long long>(hash_state(m, s)));
 
-  // What the page claims, whatever the numbers are: the tip went in here, and the same input from the same state gives the same
-  // bits.
+  // Claims of the page that are independent of the numbers: the tip entered here, and the same input from the same state gives
+  // the same bits.
   const uint64_t hash = hash_state(m, s);
   const bool first_event = !seen.event.empty() && seen.event[0].kind == EventKind::tip_entered;
   const bool inside = bite.depth >= 0 && phase_of(s.suture.suture[0]) == NeedlePhase::tip_in && s.solver.channel.size() == 1;

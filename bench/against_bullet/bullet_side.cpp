@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench/against_bullet: see bullet_side.h. Lengths are centimeters here: Bullet adds fixed small numbers (1e-4 in the moments
-// of a cluster) that are nothing beside lengths near 1 and too much beside millimeters in meters.
+// bench/against_bullet: see bullet_side.h. Lengths are centimeters here: Bullet adds small constants (1e-4 in the moments of a
+// cluster) that are negligible for lengths near 1, but too large for millimeters in meters.
 #include "bullet_side.h"
 
 #include <BulletSoftBody/btSoftBody.h>
@@ -40,7 +40,7 @@ struct BulletSide::World {
   btDbvtBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;
   btSoftRigidDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
-  btSoftBodyWorldInfo tissue_info, thread_info;  // each with a gravity of its own
+  btSoftBodyWorldInfo tissue_info, thread_info;  // each with its own gravity
   std::vector<std::unique_ptr<btCollisionShape>> shape;
   std::vector<std::unique_ptr<btRigidBody>> rigid;  // the tool's capsules first
   size_t capsules = 0;
@@ -70,7 +70,7 @@ struct BulletSide::World {
     shape.push_back(std::make_unique<btBoxShape>(btVector3(100, 1, 100)));
     add_rigid(btTransform(btQuaternion::getIdentity(), btVector3(0, m.ground * kCentimeters - 1, 0)), kDrape, kThread);
 
-    // What is not connected makes soft bodies of its own: Bullet's tree of faces never ends for a body in two parts.
+    // Disconnected parts become separate soft bodies: Bullet's tree of faces does not terminate for a body in two parts.
     node_of.assign(m.tissue, -1);
     for (const std::vector<uint32_t>& body : work.body) add_tissue(body, way);
     add_thread(way);
@@ -102,7 +102,7 @@ struct BulletSide::World {
     btSoftBody& body = *soft.back();
     body.getCollisionShape()->setMargin(margin * kCentimeters);
     body.m_cfg.piterations = 3;
-    body.m_cfg.kKHR = 1;  // a tool that is moved does not sink in
+    body.m_cfg.kKHR = 1;  // a moving tool does not sink in
     body.m_cfg.collisions = btSoftBody::fCollision::SDF_RS;
     body.m_materials[0]->m_kLST = 1;
     body.setActivationState(DISABLE_DEACTIVATION);
@@ -138,12 +138,12 @@ struct BulletSide::World {
     world.addSoftBody(&body, kTissue, way == BulletWay::links ? kTool | kTissue | kThread : kTool);
   }
 
-  // Its own generator makes disjoint clusters; overlapping ones can be filled in.
+  // Its own generator makes disjoint clusters; overlapping ones can be set.
   void add_cluster(btSoftBody& body, const uint32_t* member, uint32_t stride, const std::vector<uint8_t>& here) {
     bool all_pinned = true;
     auto* c = new (btAlignedAlloc(sizeof(btSoftBody::Cluster), 16)) btSoftBody::Cluster();
     for (uint32_t k = 0; k < stride; ++k)
-      if (member[k] < here.size() && here[member[k]]) {  // the pad is beyond the last particle
+      if (member[k] < here.size() && here[member[k]]) {  // padding is beyond the last particle
         btSoftBody::Node& n = body.m_nodes[node_of[member[k]]];
         c->m_nodes.push_back(&n);
         all_pinned = all_pinned && n.m_im == 0;
@@ -168,7 +168,7 @@ struct BulletSide::World {
     btSoftBody& body = add_soft(thread_info, particle, m.thread.radius);
     body.m_cfg.kDP = m.thread_damping * m.h;
     for (int i = 0; i + 1 < body.m_nodes.size(); ++i) body.appendLink(i, i + 1);
-    body.setMass(body.m_nodes.size() - 1, 0);  // where the needle has it
+    body.setMass(body.m_nodes.size() - 1, 0);  // held by the needle
     if (way == BulletWay::links) body.m_cfg.collisions |= btSoftBody::fCollision::VF_SS;
     world.addSoftBody(&body, kThread, way == BulletWay::links ? kTool | kDrape | kTissue : kTool | kDrape);
   }

@@ -8,20 +8,20 @@
 namespace catgut {
 
 enum class BulletWay {
-  clusters,        // shape matching of one cluster a particle: itself and its neighbors
-  fewer_clusters,  // the same without clusters that have the same members as another, which Catgut leaves out too
+  clusters,        // shape matching with one cluster per particle: itself and its neighbors
+  fewer_clusters,  // the same without clusters with equal members, which Catgut merges too
   links            // links along the edges, and contact of vertices with faces between soft bodies
 };
 
-extern const bool kBulletIsSingle;  // precision of the library that was linked
+extern const bool kBulletIsSingle;  // precision of the linked library
 
 class BulletSide {
  public:
   BulletSide(const Workload& work, BulletWay way);
   ~BulletSide();
   void tick(float time);   // 1/60 s, which ends at `time` [s]
-  void put_back_pinned();  // its clusters carry pinned particles a little with them
-  // Of the tissue that is not pinned: how far it is from where it began [m], on average; NaN once something is.
+  void put_back_pinned();  // its clusters displace pinned particles slightly
+  // Of tissue that is not pinned: mean distance from its start [m]; NaN if any is.
   double carried_off() const;
   size_t contacts() const;  // in the last substep
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench/against_bullet: Catgut and Bullet's soft bodies given the same tissue, thread, pins, gravity, tool and substeps, in one
-// program and tick by tick in turns, so that a processor that changes its clock or is shared does it to all alike.
-// docs/benchmarks.md says what each side really simulates.
+// bench/against_bullet: Catgut and Bullet's soft bodies with the same tissue, thread, pins, gravity, tool and substeps, in one
+// program and alternating tick by tick, so that interference affects both alike.
+// docs/benchmarks.md describes what each side simulates.
 #include <time.h>
 
 #include <CLI/CLI.hpp>
@@ -27,11 +27,11 @@ using namespace catgut;
 struct Contender {
   std::string name;
   std::vector<double> ms;
-  size_t contacts = 0;     // the most in the last substep of a tick
+  size_t contacts = 0;     // maximum in the last substep of a tick
   double carried_off = 0;  // [m] at the end
 };
 
-// On one thread its own time on its processor, so that what other programs take does not count; on more the wall's clock.
+// On one thread: its own processor time, so that other programs do not count; on more: wall time.
 double seconds(bool one_thread) {
   timespec t;
   clock_gettime(one_thread ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC, &t);
@@ -144,7 +144,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::Success& done) { return app.exit(done); } catch (const CLI::ParseError& error) {
     return std::fprintf(stderr, "against_bullet: %s; --help explains\n", error.what()), 2;
   }
-  // Tried before the work, not after it; what it holds from an earlier run stays until there is something to take its place.
+  // Tried before the work; an existing file stays until the new content is complete.
   if (!json.empty() && !std::ofstream(json, std::ios::app)) throw InputError(json, "cannot be written", "choose another place");
 
   std::printf(

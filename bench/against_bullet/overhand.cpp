@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench/against_bullet: the same overhand knot in Bullet: a chain of rigid capsules, joined end to end, friction on, drawn
-// tight by its ends; beside it the thread of src/thread from the same start. What each becomes: knot determinant (3: an
-// overhand knot, 1: none), nearest distance of strands, force at the ends, milliseconds per simulated millisecond.
+// bench/against_bullet: the same overhand knot in Bullet: a chain of rigid capsules, joined end to end, with friction, pulled
+// tight by its ends; beside it the thread of src/thread from the same start. Results: knot determinant (3: an
+// overhand knot, 1: none), minimum distance of strands, force at the ends, milliseconds per simulated millisecond.
 //   against_bullet_overhand [SUBSTEPS_PER_MS] [ITERATIONS]     of Bullet; 20 and 10
 #include <btBulletDynamicsCommon.h>
 
@@ -109,7 +109,7 @@ void bullet(const std::vector<Vec3>& path, int substeps, int iterations) {
   shape.setMargin(0.5f * kDiameter * kScale);
   std::vector<std::unique_ptr<btRigidBody>> body;
   std::vector<std::unique_ptr<btTypedConstraint>> joint;
-  const btScalar mass = 0.05f * kSegment;  // the same line mass as ours [kg]
+  const btScalar mass = 0.05f * kSegment;  // the same line mass as Catgut's [kg]
   btVector3 inertia;
   shape.calculateLocalInertia(mass, inertia);
   for (size_t i = 0; i + 1 < path.size(); ++i) {

@@ -15,7 +15,7 @@ Workload make_workload(const std::string& scene, int times) {
   work.name = times == 1 ? scene : scene + " x" + std::to_string(times);
   SceneSpec spec = read_scene(scene);
   apply_preset(spec.solver, "paper");
-  // More of the same wall, with particles as far apart: twice as long and wide is four times as many.
+  // More of the same wall, with the same particle spacing: twice the length and width has four times as many.
   const float larger = std::sqrt(static_cast<float>(times));
   for (BodySpec& b : spec.body) {
     b.particles *= times;
@@ -24,8 +24,8 @@ Workload make_workload(const std::string& scene, int times) {
   spec.thread.particles *= times;
   work.model = build_model(spec);
 
-  // Catgut has no edges of its own: those of the wall's tetrahedra (which only the volume constraints keep) and of its surface.
-  // A particle over in an odd count is part of neither, and is tied to its cluster.
+  // Catgut has no edges of its own: uses those of the wall's tetrahedra (which only the volume constraints need) and of its
+  // surface. The odd particle of an odd count is part of neither, and is linked to its cluster.
   spec.solver.volume = true;
   const auto with_volume = build_model(spec);
   const SolverModel& m = work.model->solver;
@@ -64,7 +64,7 @@ Workload make_workload(const std::string& scene, int times) {
     work.body[number[root_of(i)]].push_back(i);
   }
 
-  // The outermost place toward +z, 5 to 10 mm from an edge at which the procedure works.
+  // The outermost point toward +z, 5 to 10 mm from an edge at which the procedure works.
   work.pressed.z = -1e9f;
   for (uint32_t i = 0; i < m.tissue; ++i) {
     const Vec3 p = work.model->start[i];
@@ -78,7 +78,7 @@ Workload make_workload(const std::string& scene, int times) {
 }
 
 Pose tool_pose(const Workload& work, float time) {
-  // From 3 mm off the wall to 5 mm into it. The tool points along -z.
+  // From 3 mm outside the wall to 5 mm inside it. The tool points along -z.
   const float in = 0.008f * 0.5f * (1 - std::cos(2 * kPi * time));
   return {work.pressed + Vec3{0, 0, 0.003f - in}, {}};
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench/kernels: the solver's kernels one by one, on states from the middle of the work of a small scene and of a large one.
-// Time per item (a cluster, a particle, a pair ...) is what to compare; a kernel that changes its input gets the same input
+// bench/kernels: the solver's kernels one by one, on states from the middle of a small scene and of a large one.
+// Compare the time per item (a cluster, a particle, a pair ...); a kernel that changes its input gets the same input
 // every time.
 //   bench_kernels --benchmark_filter=Shape --benchmark_repetitions=5
 #include <benchmark/benchmark.h>
@@ -20,11 +20,11 @@
 namespace {
 using namespace catgut;
 
-// A scene in the middle of a suture: the state just after a needle's tip has entered.
+// A scene in the middle of a suture: the state directly after entry of a needle's tip.
 struct Sewn {
   std::shared_ptr<const Model> model;
   StatePtr state;
-  Column<Vec4> predicted;  // where the particles' velocities carry them in the next substep
+  Column<Vec4> predicted;  // predicted positions of the next substep
 };
 
 // bite: which one, counted from 1.
@@ -47,7 +47,7 @@ Sewn sew(const std::string& name, int bite) {
   Sewn s{build_model(scene), nullptr, {}};
   s.state = initial_state(*s.model);
   load_state(*s.model, *s.state, bytes);
-  // One substep, so that candidates and everything else that stages leave behind are there.
+  // One substep, so that candidates and other data of earlier stages exist.
   Jobs jobs(1);
   find_boxes(s.model->solver, s.state->solver, s.state->scratch, jobs, nullptr);
   find_candidates(s.model->solver, s.state->solver, s.state->scratch, 0.008f, nullptr);
@@ -58,7 +58,7 @@ Sewn sew(const std::string& name, int bite) {
   return s;
 }
 
-// 0: the purse-string in its sixth bite; 1: Lembert, in the bite of the third suture, with settled stitches behind it.
+// 0: the purse-string in its sixth bite; 1: Lembert, in the bite of the third suture, with baked sutures behind it.
 const char* const kName[] = {"purse_string", "lembert"};
 Sewn& scene(int64_t which) {
   static std::map<int64_t, Sewn> all;
@@ -67,14 +67,14 @@ Sewn& scene(int64_t which) {
   return all.emplace(which, sew(kName[which], which == 0 ? 6 : 5)).first->second;
 }
 
-// Of this thread on its processor: what other programs take from it does not count. Asking takes a third of a microsecond.
+// Processor time of this thread: other programs do not count. The call takes a third of a microsecond.
 double thread_seconds() {
   timespec t;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-// Runs `work` after `again` has restored its input; only `work` is timed. items: that one run handles.
+// Runs `work` after `again` has restored its input; only `work` is timed. items: per call.
 void measure(benchmark::State& bench, size_t items, const char* scene_name, const std::function<void()>& again,
              const std::function<void()>& work) {
   if (items == 0) {
@@ -122,12 +122,12 @@ void ShapeParticles(benchmark::State& bench) {
   measure(
       bench, m.tissue, kName[bench.range(0)], [&] { s.state->solver.x = s.predicted; },
       [&] {
-        for (uint32_t first = 0; first < m.shape.groups; first += 32)  // as the substep does, whose blocks are as long
+        for (uint32_t first = 0; first < m.shape.groups; first += 32)  // like the substep, with blocks of the same length
           solve_shape_particles(m.shape, s.state->solver.x.data(), m.inv_mass.data(), m.shape_stiffness, m.shape_relaxation,
                                 s.state->scratch.shape, first, std::min(first + 32, m.shape.groups), true);
       });
 }
-// What has no function of its own outside the substep is timed by the substep itself, on the wall's clock.
+// Stages without a function of their own are timed by the substep itself, in wall time.
 void StageOf(benchmark::State& bench, Stage stage) {
   Sewn& s = scene(bench.range(0));
   Jobs jobs(1);
@@ -178,7 +178,7 @@ void TissuePairsFound(benchmark::State& bench) {
                           s.state->scratch.candidates.tissue, jobs);
       });
 }
-// Whether they have to be found again.
+// Whether they have to be searched again.
 void TissueMovesLookedAt(benchmark::State& bench) {
   Sewn& s = scene(bench.range(0));
   const SolverModel& m = s.model->solver;
@@ -242,7 +242,7 @@ void WholeSubstep(benchmark::State& bench) {
   s.state->solver = before;
 }
 
-// An empty stage of four blocks: its cost to share one out and to wait for it. Workers on a busy machine wait long.
+// An empty stage of four blocks: the time to distribute it and to wait for it. On a busy machine workers wait long.
 void ForkJoin(benchmark::State& bench) {
   Jobs jobs(static_cast<int>(bench.range(0)));
   for (auto _ : bench) jobs.each(4, 1, [](size_t first, size_t) { benchmark::DoNotOptimize(first); });

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench/scenes: ticks whose instructions are counted. On a shared machine times swing by tens of per cent; instructions do not.
-//   count_ticks write DIR   sews every scene as far as is needed, at full speed, and keeps some ticks of each moment below as a
-//                           small recording: the state before them and the hands
-//   count_ticks run DIR     does those ticks again; under callgrind each moment's ticks, and nothing else, become one dump
+// bench/scenes: ticks whose instructions are counted. On a shared machine times vary by tens of percent; instructions do not.
+//   count_ticks write DIR   runs every scene as far as needed, at full speed, and stores some ticks of each moment below as a
+//                           small recording: the state before them and the inputs
+//   count_ticks run DIR     runs those ticks again; under callgrind the ticks of each moment, and nothing else, become one dump
 // tools/count_instructions.sh runs both and compares with bench/instructions.txt.
 #include <valgrind/callgrind.h>
 
@@ -23,14 +23,14 @@
 namespace {
 using namespace catgut;
 
-constexpr uint64_t kTicks = 12;  // of each moment: a fifth of a second, with some searches for pairs in it
+constexpr uint64_t kTicks = 12;  // of each moment: a fifth of a second, including some searches for pairs
 
-// Moments are named by events, not by times: a surgeon who becomes faster is no slower code.
+// Moments are identified by events, not by times: a faster surgeon is not slower code.
 struct Moment {
   const char* name;
   EventKind begins;  // with the tick after the nth of these ...
   int nth;           // 0: from the start of the run
-  uint64_t ticks;    // ... and so many ticks
+  uint64_t ticks;    // ... and this many ticks
 };
 struct Scene {
   const char* name;
@@ -47,7 +47,7 @@ std::string file_of(const std::string& folder, const Scene& scene, const Moment&
   return folder + "/" + scene.name + "." + moment.name + ".cgrec";
 }
 
-// Follows a run and keeps the ticks of one moment.
+// Follows a run and stores the ticks of one moment.
 class Keeper {
  public:
   Keeper(const Moment& moment, std::string path, std::string scene)
@@ -149,9 +149,9 @@ int run(const std::string& folder) {
       CALLGRIND_TOGGLE_COLLECT;
       for (const RecordedTick& t : recording.tick) step(*model, *state, t.input, jobs);
       CALLGRIND_TOGGLE_COLLECT;
-      CALLGRIND_DUMP_STATS;  // dumps are numbered as the lines that are printed below
+      CALLGRIND_DUMP_STATS;  // dumps are numbered like the lines that are printed below
       CALLGRIND_STOP_INSTRUMENTATION;
-      // The same ticks as were kept, to the last bit, whatever the instruction set here: else something else was counted.
+      // The same ticks as stored, to the last bit, for any instruction set: otherwise something else was counted.
       if (recording.tick.size() != kTicks || hash_state(*model, *state) != recording.tick.back().hash) {
         std::fprintf(stderr, "count_ticks: %s: these are not the ticks that were kept\n", path.c_str());
         return 1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench/thread: what a millisecond of the physical thread costs: 300 segments with a 2-1-1 knot, drawn tight and under 3 N.
+// bench/thread: time per millisecond of the physical thread: 300 segments with a 2-1-1 knot, pulled tight and under 3 N.
 //   bench_thread             milliseconds per simulated millisecond, one core: median and best of 200
 //   bench_thread count       ten steps between callgrind's marks, for tools/count_instructions.sh
 #include <algorithm>

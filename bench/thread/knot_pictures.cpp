@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench/thread: close-ups of knots as the mechanics leave them: single throw, granny, square, surgeon's 2-1-1; wound, snug (0.3
-// N on the tails), finished (2 N). Under each what src/thread/observe calls it.
+// bench/thread: close-ups of knots from the physical model: single throw, granny, square, surgeon's 2-1-1; wound, tight (0.3
+// N on the tails), finished (2 N). Under each, the name from src/thread/observe.
 //   knot_pictures FILE.png
 #include <cmath>
 #include <cstdio>
@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
                         {"square", validation::square()},
                         {"surgeon's 2-1-1", validation::surgeons_211()}};
   for (const Kind& kind : kinds) {
-    // A single throw needs the pull of its bite from below; in line it would only straighten.
+    // A single throw needs the pull of its bite from below; a pull in line would straighten it.
     const bool single = kind.throws.size() == 1, doubled = kind.throws[0].half_turns > 3;
     validation::Tightened t(validation::lay_knot(kind.throws, settings.material.diameter, 1.43f * settings.material.diameter,
                                                  15e-3f, 12e-3f, single ? 1.1f : 0.0f));
@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
         if (!s.broken[i])
           capsules.push_back(
               {s.position(i), s.position(i + 1), r, i < t.knot.load_a ? Color{70, 120, 215, 255} : Color{214, 160, 60, 255}});
-      // In the middle of what touches.
+      // Midpoint of the contacts.
       Vec3 middle{};
       float count = 0;
       for (size_t k = 0; k < s.key.size(); ++k) {
@@ -64,7 +64,7 @@ int main(int argc, char** argv) {
     thread::Surroundings nothing;
     t.stepper.step(settings, t.knot.state, nothing);
     picture("wound", 9e-3f);
-    // The double throw is drawn by the loads before the throws above lock it.
+    // The loads tighten the double throw before the throws above lock it.
     auto draw = [&](float tails, float loads, int ticks) {
       if (!doubled)
         return validation::tighten(settings, t, tails, validation::Drawing::flat, 1e-3f * static_cast<float>(ticks), false);

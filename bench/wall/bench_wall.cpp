@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench/wall: what a step of the wall takes on one core, and what is done with it beside: points, contact, a cut, a new factor.
+// bench/wall: time per step of the wall on one core, and of its other operations: points, contact, a cut, a new factor.
 // Microseconds of the thread's own processor time, median and 99th percentile; other programs' time does not count.
 //   bench_wall            the wall of the purse-string's size (1216 nodes) and four times as many
 #include <time.h>

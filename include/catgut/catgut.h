@@ -41,7 +41,7 @@
 // Threads. A Model is constant and may be shared. A State belongs to one caller at a time. Different states may be stepped by
 // different threads, each with its own Jobs.
 //
-// Errors. InputError (core/check.h) for what a file or a scene gets wrong: one line that says where, what, and what to do next.
+// Errors. InputError (core/check.h) for errors in a file or a scene: one line with place, error and remedy.
 // A broken invariant of the library itself prints its place and aborts.
 //
 // Files. Scenes are found by name in the data folder, see core/data.h; CATGUT_DATA_DIR in the environment names another.
@@ -59,11 +59,11 @@
 #include "core/math.h"                   // Vec3, Quat, Pose
 #include "exchange/event.h"              // what happened in a tick
 #include "exchange/force_patch.h"        // a local model of the forces on a hand, for a 1 kHz loop
-#include "exchange/picture.h"            // what does not change: surfaces, skinning, rest positions
-#include "exchange/snapshot.h"           // what does: positions, instruments, sutures, knots, events
-#include "exchange/tool_input.h"         // the only way into a tick
+#include "exchange/picture.h"            // constant data: surfaces, skinning, rest positions
+#include "exchange/snapshot.h"           // changing data: positions, instruments, sutures, knots, events
+#include "exchange/tool_input.h"         // the only input of a tick
 #include "procedure/scene_file.h"        // scenes from TOML and back
-#include "procedure/scripted_surgeon.h"  // a pair of hands that sews
+#include "procedure/scripted_surgeon.h"  // a scripted pair of hands
 #include "sim/recording.h"               // recordings: inputs and a hash per tick
 #include "sim/scene.h"                   // SceneSpec: a scene in code
 #include "sim/simulation.h"              // build, step, publish, save, load, hash
