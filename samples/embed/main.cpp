@@ -6,7 +6,7 @@
 int main() {
   const catgut::SceneSpec scene = catgut::read_scene("stay");  // a name or the path of a .toml file
   const auto model = catgut::build_model(scene);               // constant
-  const auto state = catgut::initial_state(*model);            // everything that changes
+  const auto state = catgut::initial_state(*model);            // all that changes
   const auto surgeon = catgut::scripted_surgeon(scene, catgut::picture_model(*model));
   catgut::Jobs jobs(2);   // two threads; the bits do not depend on their number
   catgut::Snapshot seen;  // particles, instruments, forces, events

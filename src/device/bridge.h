@@ -26,7 +26,7 @@ struct BridgeOptions {
   float forget = 0.02f;      // [s] without a sample: the device is lost
   float again_after = 0.1f;  // [s] between hellos while it is lost
 };
-// The simulator's side. `reported` receives a line when there is no answer, or an unexpected one. The peer is asked for its
+// The simulator's side. `reported` receives a line when there is no answer, or an unexpected one. It requests the peer's
 // devices again whenever it falls silent, so that it may be restarted.
 ArmPort open_bridge(const BridgeOptions& options, std::vector<std::string>& messages);
 BridgeCounts bridge_counts(const ArmPort& port);  // of a port that open_bridge made

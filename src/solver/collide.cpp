@@ -168,7 +168,7 @@ void find_thread_on_thread(const CollideView& v, uint32_t a, uint32_t b, Candida
   const Strand &sa = v.strand[a], &sb = v.strand[b];
   const StrandModel &ma = v.strand_model[a], &mb = v.strand_model[b];
   const float grow = ma.radius + mb.radius + 0.002f;
-  // Two segments are no nearer than their midpoints minus half of both; a segment may be stretched to twice its spacing.
+  // Distance of two segments >= that of their midpoints - half of both; a segment may be stretched to twice its spacing.
   const float far = grow + (ma.spacing + mb.spacing);
   const Vec3* const middle_a = c.middle.data() + (ma.first_slot - first_slot(v));
   const Vec3* const middle_b = c.middle.data() + (mb.first_slot - first_slot(v));

@@ -71,7 +71,7 @@ static int drawing_instrument(const Strand& t, size_t i, int way) {
   return -1;
 }
 
-// "Pulling" before the bite is complete. The needle pulls thread through holes by itself; jaws on the thread are an error. One
+// "Pulling" before the bite is complete. The needle pulls thread through holes; jaws on the thread are an error. One
 // particle may pass at the moment of the grasp; at the second, thread of one spacing has been pulled.
 static void judge_drawing(OneSuture& s, const ThreadAnchor& a, bool toward_needle) {
   if (s.own.open.empty()) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every body must fulfil, a caller that made it.
+// Requirements of every body, whatever made it.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -88,7 +88,7 @@ inline void expect_sound(const BodyRest& body, size_t particles) {
     }
     ASSERT_NEAR(sum, 1, 1e-5);
   }
-  // Triangles agree with their normals, but for the odd sliver.
+  // Triangles agree with their normals, except for a few slivers.
   size_t against = 0;
   for (const Triangle& t : mesh.triangle) {
     const Vec3 a = mesh.position[t[0]];

@@ -150,7 +150,7 @@ TEST(Bowel, SameShapeSameBits) {
   EXPECT_EQ(a.visible.skin_weight, b.visible.skin_weight);
 }
 
-// --- what is left after a prolapse was cut off (paper 2.5.4): one tube inside another --------------------------------------
+// --- the remainder of a resected prolapse (paper 2.5.4): one tube inside another ---------------------------------------------
 
 BowelShape folded(int particles) {
   BowelShape shape = shape_with(particles);
@@ -205,7 +205,7 @@ TEST(FoldedBowel, NothingTiesOneWallToTheOther) {
     for (uint32_t i : cluster) ASSERT_EQ(body.wall[i], body.wall[cluster[0]]);
   for (const Tet& t : body.tet)
     for (uint32_t i : t) ASSERT_EQ(body.wall[i], body.wall[t[0]]);
-  // The picture's two tubes are known by their distance from the axis; each follows its own particles.
+  // The visible mesh's two tubes differ in their distance from the axis; each follows its own particles.
   for (size_t v = 0; v < body.visible.position.size(); ++v) {
     const Vec3 p = body.visible.position[v];
     const int wall = std::hypot(p.x, p.z) > 0.015f ? 0 : 1;

@@ -153,8 +153,8 @@ TEST(Organ, RealColon) {
   }
 }
 
-// A V with a wall of 2.5 mm on its hollow side: the wall is thin in the bend, full a few millimeters away, and never inside
-// out.
+// A V with a wall of 2.5 mm on its concave side: the wall is thin in the bend, full a few millimeters away, and never
+// inverted.
 TEST(Wall, ThinsInASharpBendInsteadOfRefusing) {
   TriangleMesh sheet;
   constexpr int kAcross = 31, kRows = 12;

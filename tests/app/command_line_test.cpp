@@ -45,7 +45,7 @@ class CommandLine : public testing::Test {
     if (!fs::exists(CATGUT_APP)) GTEST_SKIP() << "the program is not built here";
     folder_ = fs::path(testing::TempDir()) / ("catgut_app_" + std::to_string(getpid()));
     fs::create_directories(folder_);
-    // Half a second and no surgeon: what is tested here is the command line.
+    // Half a second without a surgeon: the subject is the command line.
     std::ofstream(folder_ / "small.toml") << R"(title = "small"
 duration = 0.5
 settle = 0.05
@@ -67,7 +67,7 @@ particles = 1403
     const int status = std::system(line.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out), read_file(err)};
   }
-  // Bad input: code 2, nothing on standard output, one line on standard error that holds `part`.
+  // Bad input: code 2, nothing on standard output, one line on standard error that contains `part`.
   void expect_refused(const std::string& arguments, const std::string& part) {
     const Outcome o = run_catgut(arguments);
     EXPECT_EQ(o.code, 2) << arguments << "\n" << o.err;
@@ -129,7 +129,7 @@ TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
   expect_refused("play stay --haptics haply:host:70000", "is not a valid HOST[:PORT]");
 }
 
-// Arms come and go with a library that is loaded at run time; here it is the simulated one.
+// The haptic library is loaded at run time; here it is the simulated one.
 TEST_F(CommandLine, devices_are_listed_and_pushed) {
   const Outcome none = run_catgut("devices");
   EXPECT_EQ(none.code, 0);
@@ -145,7 +145,7 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   const auto kept = catgut::read_arm_places(places);
   ASSERT_EQ(kept.size(), 2u);
   EXPECT_EQ(kept.at("right-0001").scale, 0.5f);
-  // What was held becomes the middle; the arm's x points into the picture once it is turned by 90 degrees.
+  // The held position becomes the center; the device's x points along the view axis after a rotation by 90 degrees.
   using catgut::Vec3;
   catgut::ArmInfo arm;
   arm.serial = "right-0001";
@@ -154,7 +154,7 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   EXPECT_LT(catgut::distance(catgut::rotate(w.turn, Vec3{1, 0, 0}), {0, 0, -1}), 1e-6f);
   std::ofstream(places) << "[right-0001]\nscale = 50\n";
   expect_refused("devices --calibrate", "arms.toml:2: scale must be a number between");
-  // What is wrong with the file is said by a caller that reads it, and no one writes over it.
+  // Any command that reads the file reports its error, and none overwrites it.
   for (const auto& [text, wrong] :
        std::map<std::string, std::string>{{"[right-0001\nscale = 1\n", "arms.toml:1: "},
                                           {"[right-0001]\nturn = nan\n", "arms.toml:2: turn must be"},
@@ -182,7 +182,7 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   unsetenv("CATGUT_LIBHD");
 }
 
-// One process serves its arms, another finds them; no one there, or no arm to lend, is a line.
+// One process serves its devices, another finds them; a missing peer, or one without devices, is one line.
 TEST_F(CommandLine, arms_are_lent_over_the_bridge) {
   expect_refused("bridge --arms spoon", "unknown device");
   expect_refused("play --haptics paper:spoon", "unknown device");
@@ -294,7 +294,7 @@ TEST_F(CommandLine, a_failed_expectation_is_code_1) {
   EXPECT_NE(unchecked.out.find("differs bites = 0, expected 3"), std::string::npos) << unchecked.out;
 }
 
-// The README's line: a thread of another length is no fault of the run.
+// The README's line: a run with a thread of another length is not an error.
 TEST_F(CommandLine, another_particle_count_does_not_fail_the_scenes_own) {
   EXPECT_EQ(run_catgut("run small.toml --surgeon none --set thread.particles=200").code, 0);
   EXPECT_EQ(run_catgut("run small.toml --surgeon none --set thread.particles=200 --set expect.particles=1403").code, 1);
@@ -343,7 +343,7 @@ TEST_F(CommandLine, a_cut_recording_is_named_as_such) {
   expect_refused("replay other.cgrec", "the recording has format 99");
 }
 
-// A picture of a moment the run never has: refused before the work where that is known, and else after everything is written.
+// A picture of a moment beyond the run: refused before the work where that is known, else after everything is written.
 TEST_F(CommandLine, a_picture_of_a_moment_that_never_comes_takes_no_results_with_it) {
   expect_refused("run small.toml --surgeon none --headless --seconds 1 --still 2:late.png", "the run ends after 1 s");
   expect_refused("bench haptics --out /proc/nowhere", "cannot be written");
@@ -467,7 +467,7 @@ TEST_F(CommandLine, an_interrupted_run_closes_its_files) {
   EXPECT_EQ(run_catgut("replay i.cgrec --check").code, 0) << "an interrupted recording is whole";
 }
 
-// kill -9, a power cut: what was on the disk is what there is, and it replays.
+// kill -9, a power cut: the file on the disk is readable and replays.
 TEST_F(CommandLine, a_killed_run_leaves_what_it_had_recorded) {
   const std::string record_path = folder_ / "k.cgrec", scene = folder_ / "small.toml";
   const pid_t child = fork();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/app: what SDL says becomes what hands and panels are reported. Events are pushed into SDL's own queue, and the gamepad
+// tests/app: from SDL events to the input of hands and panels. Events are pushed into SDL's own queue, and the gamepad
 // is one of SDL's virtual ones: no display is needed.
 #ifdef CATGUT_TESTS_WINDOW
 #include <SDL.h>
@@ -160,7 +160,7 @@ TEST_F(WindowEventsTest, a_gamepad_comes_works_and_goes) {
   SDL_JoystickSetVirtualButton(stick, SDL_CONTROLLER_BUTTON_RIGHTSHOULDER, SDL_PRESSED);
   SDL_JoystickSetVirtualButton(stick, SDL_CONTROLLER_BUTTON_START, SDL_PRESSED);
   SDL_JoystickSetVirtualButton(stick, SDL_CONTROLLER_BUTTON_B, SDL_PRESSED);
-  read();  // SDL hears of a virtual stick when it is requested events
+  read();  // SDL updates a virtual stick when events are polled
   in = read();
   EXPECT_NEAR(in.pad.left.x, 1, 1e-3f);
   EXPECT_NEAR(in.pad.right.y, -1, 1e-3f);

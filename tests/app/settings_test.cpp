@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/app: the settings file: what is written is read, what is wrong is reported in a line, and no file is lost. And what
-// keys choose on which screen.
+// tests/app: the settings file: values survive writing and reading, errors are one line, and no file is lost. And the meaning
+// of keys on each screen.
 #ifdef CATGUT_TESTS_WINDOW
 #include "window/settings.h"
 
@@ -103,7 +103,7 @@ TEST_F(SettingsFile, a_file_that_was_not_understood_is_kept) {
 
 TEST_F(SettingsFile, a_place_that_cannot_be_written_says_so_and_the_old_file_stays) {
   save_settings(all_changed(), path_);
-  fs::create_directory(path_ + ".new");  // where the new one would be written
+  fs::create_directory(path_ + ".new");  // where the new file would be written
   EXPECT_THROW(save_settings(Settings{}, path_), InputError);
   EXPECT_EQ(load_settings(path_).settings, all_changed());
   EXPECT_THROW(save_settings(Settings{}, "/proc/nowhere/settings.toml"), InputError);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/app: a user sits down at the window. A real X server (Xvfb), real mouse and keyboard events (xdotool); what is
-// checked is what happened in the simulation and what was recorded, not pixels. Skips where one of the two is missing.
+// tests/app: a simulated user of the window. A real X server (Xvfb), real mouse and keyboard events (xdotool); the test checks
+// the simulation and the recording, not pixels. Skips where one of the two programs is missing.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -62,8 +62,8 @@ class Window : public testing::Test {
     setenv("DISPLAY", x_->display.c_str(), 1);
     setenv("SDL_VIDEODRIVER", "x11", 1);
     setenv("XDG_RUNTIME_DIR", folder_.c_str(), 1);
-    setenv("XDG_CONFIG_HOME", folder_.c_str(), 1);  // a caller that runs the tests keeps their own settings
-    if (chdir(folder_.c_str()) != 0) _exit(97);     // what the program writes beside it goes with the folder
+    setenv("XDG_CONFIG_HOME", folder_.c_str(), 1);  // the settings of the user who runs the tests stay untouched
+    if (chdir(folder_.c_str()) != 0) _exit(97);     // files written to the working directory are removed with the folder
     if (!std::freopen((folder_ / "stderr").c_str(), "w", stderr)) _exit(98);
     std::vector<char*> argv{const_cast<char*>("catgut")};
     for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
@@ -74,7 +74,7 @@ class Window : public testing::Test {
   void xdo(const std::string& what) {
     EXPECT_EQ(std::system(("DISPLAY=" + x_->display + " xdotool " + what + " >/dev/null 2>&1").c_str()), 0) << what;
   }
-  // Small steps with pauses, as a hand moves; the server must not take them for one jump.
+  // Small steps with pauses, like a hand; the server must not merge them.
   void drag(float right, float down, int steps = 10) {
     float x = 0, y = 0;
     for (int i = 1; i <= steps; ++i) {
@@ -92,7 +92,7 @@ class Window : public testing::Test {
     for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++n;
     return n;
   }
-  // Until it stands in the events, for the n-th time.
+  // Until it appears in the events, for the n-th time.
   bool happens(const std::string& what, size_t n = 1, int seconds = 40) const {
     for (int i = 0; i < seconds * 20; ++i) {
       if (count("\"" + what + "\"") >= n) return true;
@@ -118,7 +118,7 @@ class Window : public testing::Test {
   pid_t app_ = -1;
 };
 
-// Where the pointer has to go, reckoned from what the program is known to begin with.
+// Target of the pointer, computed from the program's initial state.
 std::array<float, 2> from_tool_to_needle() {
   const auto model = build_model(read_scene("purse_string"));
   const auto state = initial_state(*model);
@@ -147,7 +147,7 @@ TEST_F(Window, somebody_takes_the_needle_and_everything_is_recorded) {
   pause(500);
   const auto way = from_tool_to_needle();
   drag(way[0], way[1], 20);
-  pause(1500);  // a slow picture later the help has the tool at the needle
+  pause(1500);  // after one slow frame the assist has moved the tool to the needle
   xdo("click 1");
   ASSERT_TRUE(happens("needle_grasped")) << said();
   xdo("mousedown 3");
@@ -177,7 +177,7 @@ TEST_F(Window, somebody_takes_the_needle_and_everything_is_recorded) {
   xdo("key Escape");
   EXPECT_EQ(exit_code(), 0) << said();
 
-  // What was recorded is what was done, and it replays.
+  // The recording contains the session, and it replays.
   const Recording r = read_recording(recording.string());
   EXPECT_FALSE(r.truncated) << r.fault;
   ASSERT_GT(r.tick.size(), 60u);
@@ -195,7 +195,7 @@ TEST_F(Window, somebody_takes_the_needle_and_everything_is_recorded) {
   EXPECT_EQ(std::system(("'" CATGUT_APP "' replay '" + recording.string() + "' --check >/dev/null").c_str()), 0);
 }
 
-// Another size, out of sight, back again, and ended by the system in the middle of it.
+// Resized, hidden, shown again, and terminated by the system.
 TEST_F(Window, whatever_happens_to_the_window_nothing_is_lost) {
   const fs::path events = folder_ / "events", recording = folder_ / "r.cgrec", json = folder_ / "r.json";
   start({"play", "stay", "--size", "640x360", "--quality", "low", "--events", events.string(), "--record", recording.string(),
@@ -236,7 +236,7 @@ TEST_F(Window, a_killed_program_leaves_what_it_had_recorded) {
   EXPECT_GT(r.tick.size(), 40u);
 }
 
-// The picture stands still for half a second every two; the physics is the headless run's, bit for bit.
+// Rendering stalls for half a second every two; the physics equals the headless run bit for bit.
 TEST_F(Window, a_stalled_picture_changes_no_hash) {
   const fs::path alone = folder_ / "alone.cgrec", stalled = folder_ / "stalled.cgrec";
   ASSERT_EQ(std::system(("'" CATGUT_APP "' run stay --surgeon scripted --headless --no-expect --seconds 5 --record '" +
@@ -276,7 +276,7 @@ TEST_F(Window, a_recording_is_looked_at_and_what_was_sewn_is_shown) {
   EXPECT_LT(red(sewn), red(field) / 2) << "the panel covers it";
 }
 
-// A setting that is changed in the window is there the next time, and a file that is not understood stops no one.
+// A setting changed in the window persists, and an invalid file does not prevent the start.
 TEST_F(Window, settings_are_kept) {
   const fs::path file = folder_ / "catgut" / "settings.toml", events = folder_ / "events";
   fs::create_directories(file.parent_path());
@@ -284,7 +284,7 @@ TEST_F(Window, settings_are_kept) {
   start({"play", "stay", "--size", "640x360", "--events", events.string(), "--seconds", "120"});
   ASSERT_TRUE(happens("practice", 1, 60)) << said();
   EXPECT_NE(said().find("settings.toml:1"), std::string::npos) << said();
-  xdo("key h");  // help at the needle: off
+  xdo("key h");  // assist at the needle: off
   pause(500);
   xdo("key F2");
   EXPECT_TRUE(happens("settings")) << said();

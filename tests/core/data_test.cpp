@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// core/data: the order of the search. The test program itself lies in a build folder.
+// core/data: the search order. The test program itself is in a build folder.
 #include "core/data.h"
 
 #include <gtest/gtest.h>

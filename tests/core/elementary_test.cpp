@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// core/elementary: beside the C library's long double functions, which are good to more than a double's last place.
+// core/elementary: compared with the C library's long double functions, which are accurate beyond a double's last place.
 #include "core/elementary.h"
 
 #include <gtest/gtest.h>
@@ -63,7 +63,7 @@ TEST(Elementary, edges) {
   EXPECT_EQ(portable::log(0.0), -inf);
   EXPECT_EQ(portable::pow(0.0, 2.0), 0);
   EXPECT_EQ(portable::pow(2.0, 0.0), 1);
-  EXPECT_NEAR(portable::sin(1e9), std::sin(1e9), 1e-6);  // beyond what a simulation asks for: finite, and near
+  EXPECT_NEAR(portable::sin(1e9), std::sin(1e9), 1e-6);  // beyond the range of a simulation: finite, and near
 }
 
 TEST(Elementary, floats_are_the_nearest) {

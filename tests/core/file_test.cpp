@@ -54,7 +54,7 @@ TEST_F(File, follows_a_link) {
   EXPECT_EQ(content(path), "new");
 }
 
-// The disk is full after 4096 bytes: the old file survives, nothing else stays behind. In a child process, since the limit
+// The disk is full after 4096 bytes: the old file survives, no other file remains. In a child process, since the limit
 // cannot be undone.
 TEST_F(File, survives_a_full_disk) {
   const fs::path path = folder_ / "a.json";

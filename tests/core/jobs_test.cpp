@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/core: the fork-join, the hash and the random numbers that everything reproducible stands on.
+// tests/core: the fork-join, the hash and the random numbers on which reproducibility depends.
 #include "core/jobs.h"
 
 #include <gtest/gtest.h>
@@ -75,7 +75,7 @@ TEST(Jobs, workers_that_fell_asleep_wake_for_the_next_job) {
 }
 
 TEST(Hash, is_the_published_function) {
-  EXPECT_EQ(hash_bytes("", 0), 0x2d06800538d394c2ull);  // XXH3_64bits of nothing
+  EXPECT_EQ(hash_bytes("", 0), 0x2d06800538d394c2ull);  // XXH3_64bits of an empty input
   EXPECT_NE(hash_bytes("catgut", 6), hash_bytes("catguu", 6));
   EXPECT_NE(hash_bytes("catgut", 6, 1), hash_bytes("catgut", 6, 2));
   EXPECT_EQ(hash_bytes("catgut", 6, 7), hash_bytes("catgut", 6, 7));

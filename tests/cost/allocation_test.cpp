@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/cost: a tick asks for no memory. An allocation is fast nearly always, and now and then takes the milliseconds that a
-// hand feels. Every allocation of this program is counted (malloc itself, on which new stands), but only inside `step`: what
-// the surgeon plans, what is published and what is recorded are not the tick. Scenes are sutured by the scripted surgeon; with
+// tests/cost: a tick does not allocate. An allocation is usually fast, but occasionally takes milliseconds that a
+// hand feels. Every allocation of this program is counted (malloc itself, which new uses), but only inside `step`: planning of
+// the surgeon, publishing and recording are excluded. The scripted surgeon runs the scenes; with
 // CATGUT_LONG to their end.
 #include <execinfo.h>
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ namespace {
 constexpr size_t kSites = 8, kDepth = 12;
 std::atomic<bool> counting{false};
 std::atomic<uint64_t> allocations{0};
-// Where the first of a tick came from, for addr2line.
+// Stack of the first one in a tick, for addr2line.
 std::array<std::array<void*, kDepth>, kSites> site;
 std::array<int, kSites> depth;
 
@@ -59,7 +59,7 @@ int posix_memalign(void** p, size_t align, size_t n) noexcept { return counted()
 namespace catgut {
 namespace {
 
-// The allocations of what `work` does.
+// The allocations made by `work`.
 template <typename Work>
 uint64_t allocations_of(Work&& work) {
   allocations = 0;
@@ -101,7 +101,7 @@ TEST_P(TickAllocation, none_from_when_the_hands_are_let_in) {
   const Hands hands = make_hands("scripted", scene, picture_model(*model));
   const uint64_t settle = static_cast<uint64_t>(scene.settle / model->dt);
   const uint64_t last = std::getenv("CATGUT_LONG") ? 100000 : settle + static_cast<uint64_t>(40 / model->dt);
-  // Ticks without an event; ticks with one; ticks in which a suture settles, which is given lists of its own.
+  // Ticks without an event; ticks with one; ticks in which a suture is baked, which allocates its own lists.
   Counts quiet, eventful, settling;
   std::string first;
   publish(*model, *state, seen);
@@ -137,7 +137,7 @@ TEST_P(TickAllocation, none_from_when_the_hands_are_let_in) {
 INSTANTIATE_TEST_SUITE_P(Scenes, TickAllocation, testing::Values("purse_string", "connell", "stay", "lembert"),
                          [](const auto& scene) { return std::string(scene.param); });
 
-// Sharing a stage out among workers takes no memory either. Few ticks: on a busy machine workers wait for each other.
+// Distributing a stage to workers does not allocate either. Few ticks: on a busy machine workers wait for each other.
 TEST(WorkerAllocation, none) {
 #ifndef CATGUT_COUNTS_ALLOCATIONS
   GTEST_SKIP() << "allocations can be counted with glibc alone, and not under a sanitizer";
@@ -151,7 +151,7 @@ TEST(WorkerAllocation, none) {
   }
 }
 
-// The counting itself: what allocates is seen, whichever way it asks.
+// The counter itself: it sees all ways to allocate.
 TEST(AllocationCount, sees_new_aligned_new_and_malloc) {
 #ifndef CATGUT_COUNTS_ALLOCATIONS
   GTEST_SKIP() << "allocations can be counted with glibc alone, and not under a sanitizer";
@@ -168,7 +168,7 @@ TEST(AllocationCount, sees_new_aligned_new_and_malloc) {
   std::free(raw);
 }
 
-// The physical thread, while a knot is drawn tight on it and the pair list is refreshed.
+// The physical thread, while a knot is tightened and the pair list is refreshed.
 TEST(Allocation, a_thread_that_is_knotted_asks_for_none) {
 #ifndef CATGUT_COUNTS_ALLOCATIONS
   GTEST_SKIP() << "allocations are not counted here";

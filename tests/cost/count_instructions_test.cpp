@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/cost: the alarm of tools/count_instructions.sh goes off when it should. Counting itself takes valgrind and half a
-// minute, and is a step of CI of its own.
+// tests/cost: tools/count_instructions.sh fails when it should. Counting itself takes valgrind and half a
+// minute, and is a separate step of CI.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -77,7 +77,7 @@ TEST_F(CountInstructions, what_is_missing_or_damaged_is_a_fault) {
   EXPECT_EQ(compare("stay bite 1000000\nlembert knot 2000000\n", "stay bite 0\nlembert knot 1\n").code, 1);  // no record
 }
 
-// The record that CI compares with is there and has every scene.
+// The record for the comparison in CI exists and has every scene.
 TEST_F(CountInstructions, the_record_has_every_technique) {
   std::ifstream in(std::string(CATGUT_SOURCE_DIR) + "/bench/instructions.txt");
   const std::string record((std::istreambuf_iterator<char>(in)), {});

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/determinism: the golden hashes. Runs a scene with the scripted surgeon and hashes what can be seen of every tick. The
+// tests/determinism: the golden hashes. Runs a scene with the scripted surgeon and hashes the published data of every tick. The
 // hashes must equal those in golden.txt, for any compiler, instruction set and number of workers.
 //   golden check FILE SCENE PRESET       compares the run with the file's rows; exit code 1 at the first difference
 //   golden print [SCENE PRESET]          prints the rows, with a last column for the bytes of the whole state
 //   golden update FILE                   runs everything and writes the file
-// Options after these: --seconds S (at most that much simulated time), --threads N, --simd NAME (avx3, avx2, sse4, neon: the
-// kernels' instruction set, instead of the best that the processor has).
+// Options after these: --seconds S (maximum simulated time), --threads N, --simd NAME (avx3, avx2, sse4, neon: the
+// kernels' instruction set, instead of the best one of the processor).
 //
 // The hashes cover physical quantities of the Snapshot, not the bytes of `State`: a new layout of the state keeps them. Three
-// columns tell what changed: motion (positions and orientations), force (tensions and forces), events (tick, name, place).
-// A row holds the hash of all ticks up to its time, so the first row that differs names the second in which it began.
+// columns show what changed: motion (positions and orientations), force (tensions and forces), events (tick, name, place).
+// A row holds the hash of all ticks up to its time, so the first row that differs gives the second of the first difference.
 #include <hwy/targets.h>
 
 #include <cctype>
@@ -33,9 +33,9 @@ using namespace catgut;
 
 struct Case {
   const char *scene, *preset;
-  double seconds;  // [s] simulated, at most
+  double seconds;  // [s] simulated, maximum
 };
-// The whole procedure of each technique, and ten seconds of what repeats it.
+// The whole procedure of each technique, and ten seconds of repetitive scenes.
 constexpr Case kCase[] = {{"purse_string", "default", 200},
                           {"connell", "default", 200},
                           {"stay", "default", 200},
@@ -48,7 +48,7 @@ constexpr Case kCase[] = {{"purse_string", "default", 200},
                           {"stay", "paper", 10},
                           {"lembert", "paper", 10}};
 
-// A hash of numbers that are handed in one after the other.
+// A hash of a sequence of numbers.
 class Hash {
  public:
   void add(const void* data, size_t bytes) { value_ = hash_bytes(data, bytes, value_); }
@@ -177,7 +177,7 @@ int check(const char* path, const Case& c, double seconds, int threads) {
   }
   for (const Row& r : got) {
     const auto w = want.find(r.second);
-    // A run that was cut short by --seconds ends between two rows of the file.
+    // A run shortened by --seconds ends between two rows of the file.
     if (w == want.end() && &r == &got.back() && seconds < c.seconds) break;
     std::string differs;
     if (w == want.end()) differs = " the length of the run";
@@ -201,7 +201,7 @@ int check(const char* path, const Case& c, double seconds, int threads) {
 }
 
 int update(const char* path, int threads) {
-  std::vector<std::vector<Row>> rows;  // all of them first: a run that fails leaves the file as it was
+  std::vector<std::vector<Row>> rows;  // all of them first: a failing run leaves the file unchanged
   for (const Case& c : kCase) rows.push_back(run(c, c.seconds, threads));
   FILE* out = std::fopen(path, "w");
   if (!out) throw InputError(path, "it cannot be written", "choose another file");

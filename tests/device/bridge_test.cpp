@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/device: the bridge. The arm's end (runtime/arm_server) serves the simulated arms of fake_hd, a millisecond at a time,
-// to a simulator that is a few lines of this test; the simulator's end (device/bridge) is tested against that arm's end, and
-// against an arm written in Python. Every port is one that the system gives.
+// tests/device: the bridge. The device server (runtime/arm_server) serves the simulated devices of fake_hd, a millisecond at a
+// time, to a minimal simulator in this test; the simulator's side (device/bridge) is tested with that device server, and
+// with one written in Python. The system assigns every port.
 #include "device/bridge.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ bool wait_for(const std::function<bool()>& done) {
   return false;
 }
 
-// A simulator, as far as the arm's end can tell.
+// A simulator, as seen by the device server.
 struct Simulator {
   int fd = -1;
   BridgeCaller caller;
@@ -55,7 +55,7 @@ struct Simulator {
   bool cookie = false, opened = false;
   uint32_t refused = 0;
   uint16_t refused_version = 0;
-  BridgeBytes hello{}, open{};  // as they were sent
+  BridgeBytes hello{}, open{};  // as sent
 
   explicit Simulator(uint16_t port, const BridgeKey& shared = {}) {
     std::string why;
@@ -114,15 +114,15 @@ struct Simulator {
   }
 };
 
-// The simulated arms, lent. What is measured is measured in their own milliseconds.
+// The simulated devices, served. Measurements are in their own milliseconds.
 struct Lent {
   FakeHd fake{true};
   std::vector<std::string> messages;
   std::unique_ptr<ArmServer> server;
   std::unique_ptr<Simulator> simulator;
-  std::array<Vec3, 2> force{};              // the simulator's patches ask for
+  std::array<Vec3, 2> force{};              // in the simulator's patches
   std::array<bool, 2> answers{true, true};  // and whether it sends them
-  uint64_t heard_ns = 0;                    // when it sent something last
+  uint64_t heard_ns = 0;                    // time of its last packet
 
   explicit Lent(float forget = 1) {
     ArmServerOptions o;
@@ -158,7 +158,7 @@ struct Lent {
   void run(int count) {
     run(count, [](int) {});
   }
-  // Lets force in, as a hand that touches nothing for a moment does, and then holds these.
+  // Engages the force, with a hand in free air at first, then renders these.
   void engage(Vec3 right, Vec3 left, int settle = 1500) {
     connect();
     run(2100);
@@ -169,7 +169,7 @@ struct Lent {
   }
 };
 
-// The layout is a promise to programs in other languages: byte for byte.
+// The layout is a contract with programs in other languages: byte for byte.
 TEST(Bridge, a_packet_is_what_it_says) {
   ForcePatch f;
   f.time_ns = 11, f.tick = 12, f.epoch = 13, f.discontinuity_id = 14, f.period = 0.5f;
@@ -237,7 +237,7 @@ TEST(Bridge, a_packet_is_what_it_says) {
   EXPECT_EQ(back.serial, "s??[2J") << "shown on terminals";
 }
 
-// Any bytes at all: dropped, and neither end falls over or moves an arm.
+// Arbitrary bytes: dropped; neither side crashes or moves a device.
 TEST(Bridge, whatever_bytes_come) {
   Lent t;
   t.engage({0.8f, 0, 0}, {0, 0.6f, 0});
@@ -260,9 +260,9 @@ TEST(Bridge, whatever_bytes_come) {
       } else {
         bad.resize(any(256));
       }
-      // From the simulator's own address and from a stranger's.
+      // From the simulator's own address and from an unknown one.
       (any(2) ? *t.simulator : unknown_peer).send(bad.data(), bad.size());
-      if (any(4) == 0) unknown_peer.send(good), ++sent;  // rightly sealed, but from another address
+      if (any(4) == 0) unknown_peer.send(good), ++sent;  // authentic, but from another address
     }
     t.ms();
     ASSERT_TRUE(t.fake.force(0) == held[0] && t.fake.force(1) == held[1]) << "nothing of it reaches the motors";
@@ -273,7 +273,7 @@ TEST(Bridge, whatever_bytes_come) {
   EXPECT_GT(t.server->counts().unknown_peer, 100u);
 }
 
-// Each for itself: what is dropped is dropped for the reason that is counted.
+// One by one: each packet is dropped for the counted reason.
 TEST(Bridge, what_is_dropped_and_why) {
   Lent t;
   t.engage({0.8f, 0, 0}, {});
@@ -318,7 +318,7 @@ TEST(Bridge, what_is_dropped_and_why) {
   s.send(second);
   drops("overtaken", &BridgeCounts::old, [&] { s.send(first); });
   drops("repeated", &BridgeCounts::old, [&] { s.send(second); });
-  drops("a repeated open", &BridgeCounts::forged, [&] {  // of another address: its cookie is not for that
+  drops("a repeated open", &BridgeCounts::forged, [&] {  // from another address: its cookie is not valid there
     Simulator other(t.server->port());
     other.send(s.open);
   });
@@ -327,7 +327,7 @@ TEST(Bridge, what_is_dropped_and_why) {
     EXPECT_FALSE(other.connect());
     EXPECT_EQ(other.refused, kArmsTaken);
   });
-  // Rightly sealed, rightly sent, and still not what the motors get: the limits are here, too.
+  // Authentic and from the right address, but not written to the motors unchanged: the limits apply here, too.
   t.force[0] = {20, 0, 0};
   float most = 0;
   t.run(300, [&](int) { most = std::max(most, length(t.fake.force(0))); });
@@ -336,7 +336,7 @@ TEST(Bridge, what_is_dropped_and_why) {
   EXPECT_LE(t.fake.at(0).step_most, 0.5 + 1e-4);
 }
 
-// S6: who has not authenticated gets at most as many bytes as he sent, and nothing for what he only repeats or makes up.
+// S6: an unauthenticated sender gets at most as many bytes as it sent, and nothing for replayed or forged packets.
 TEST(Bridge, S6_no_amplification) {
   Lent t;
   t.connect();
@@ -369,7 +369,7 @@ TEST(Bridge, S6_no_amplification) {
     for (int k = 0; k < 20; ++k) s.send(a.packet), t.ms();
     ASSERT_TRUE(wait_for(
         [&] { return t.server->counts().accepted + t.server->counts().dropped() >= before.accepted + before.dropped() + 20; }));
-    for (int k = 0; k < 500; ++k) t.ms();  // whatever would still come
+    for (int k = 0; k < 500; ++k) t.ms();  // remaining packets
     const uint64_t answered = t.server->sent_bytes() - sent_before;
     std::printf("S6: %-24s %5llu bytes in, %5llu out\n", a.what, static_cast<unsigned long long>(s.bytes_out),
                 static_cast<unsigned long long>(answered));
@@ -378,7 +378,7 @@ TEST(Bridge, S6_no_amplification) {
   }
 }
 
-// S6: a simulator that falls silent is streamed to for 200 ms, and no longer.
+// S6: samples to a silent simulator stop after 200 ms.
 TEST(Bridge, S6_the_stream_stops) {
   Lent t;
   t.connect();
@@ -392,14 +392,14 @@ TEST(Bridge, S6_the_stream_stops) {
   EXPECT_EQ(t.server->sent_bytes(), sent);
   t.simulator->take();
   EXPECT_LE(t.simulator->sampled[0], at + 200000000);
-  // It comes back with a valid packet of the same session.
+  // They resume with a valid packet of the same session.
   t.simulator->send(t.simulator->sealed(BridgeKind::ask, 0, {}));
   t.heard_ns = test_ns;
   ASSERT_TRUE(wait_for([&] { return t.simulator->take(), t.simulator->infos >= 4; }));
   t.run(5);
 }
 
-// S6: anything but the loopback needs a key, in a file that its owner alone can read; who has another one, or none, gets
+// S6: any address but loopback requires a key, in a file readable by its owner only; another key, or none, gets
 // nothing.
 TEST(Bridge, S6_keys) {
   const std::string file = testing::TempDir() + "bridge.key", open_file = testing::TempDir() + "open.key";
@@ -426,7 +426,7 @@ TEST(Bridge, S6_keys) {
   EXPECT_TRUE(wait_for([&] { return server.counts().forged >= 2; }));
   none.take(), wrong.take();
   EXPECT_EQ(none.bytes_in + wrong.bytes_in, 0u);
-  // The simulator's end, the same way round: another machine without a key is not even asked.
+  // The simulator's side, likewise: another machine without a key is not contacted.
   BridgeOptions to;
   to.where = "192.0.2.1";
   EXPECT_FALSE(open_bridge(to, messages).any());
@@ -467,7 +467,7 @@ TEST(Bridge, the_simulator_dies) {
   bool messages = false;
   for (const std::string& line : t.server->news()) messages |= line.find("silent") != std::string::npos;
   EXPECT_TRUE(messages);
-  // It comes back with the force it had wanted: nothing is let in until little is wanted, and then over two seconds.
+  // Force returns as wanted: it engages only at a small wanted force, and then over two seconds.
   t.answers = {true, true};
   t.simulator->send(t.simulator->sealed(BridgeKind::ask, 0, {}));
   ASSERT_TRUE(wait_for([&] { return t.simulator->take(), t.simulator->infos >= 4; }));
@@ -482,7 +482,7 @@ TEST(Bridge, the_simulator_dies) {
   EXPECT_LT(length(t.fake.force(0)), 0.2f);
 }
 
-// The same where only one arm's orders stop, or one arm is lost at this end: the other's force continues to the bit.
+// The same when patches of only one device stop, or one device is lost here: the other's force is unchanged to the bit.
 TEST(Bridge, the_other_hand_never_notices) {
   for (const bool lost : {false, true}) {
     SCOPED_TRACE(lost);
@@ -506,8 +506,8 @@ TEST(Bridge, the_other_hand_never_notices) {
   }
 }
 
-// A patch is judged by the age of the sample it was computed for, by the arm's clock: a queue that stands still and then comes
-// in all at once does not look fresh.
+// The age of a patch is that of its sample, by the server's clock: a queue that stalls and then arrives at once does not
+// look fresh.
 TEST(Bridge, late_is_late) {
   Lent t;
   t.engage({0.9f, 0, 0}, {});
@@ -540,7 +540,7 @@ TEST(Bridge, arms_are_given_back_and_lent_again) {
   EXPECT_LE(t.fake.at(0).step_most, 0.5 + 1e-4);
   t.connect();  // another one, at once
   t.run(5);
-  // One that crashed is forgotten after a second.
+  // A crashed one is forgotten after a second.
   t.simulator.reset();
   test_ns += 1500000000;
   t.connect();
@@ -549,14 +549,14 @@ TEST(Bridge, arms_are_given_back_and_lent_again) {
   EXPECT_TRUE(wait_for([&] { return t.simulator->take(), t.simulator->byes == 1; }));
 }
 
-// Both ends: the simulated arms, lent in lock step to device/bridge.
+// Both sides: the simulated devices, served in lock step to device/bridge.
 struct Both : Lent {
   ArmPort port;
   std::array<std::atomic<float>, 2> pull{};  // [N] along x
   std::array<std::atomic<bool>, 2> there{};
   std::array<std::atomic<float>, 2> at{};    // [m] along x
-  std::atomic<bool> physics_is_dead{false};  // no more patches; the rest lives
-  std::atomic<bool> hangs{false};            // the whole simulator, as one that was killed without a word
+  std::atomic<bool> physics_is_dead{false};  // no more patches; the rest runs
+  std::atomic<bool> hangs{false};            // the whole simulator, like a killed process
   static Vec3 step(void* user, size_t k, const ArmSample& s) {
     Both& t = *static_cast<Both*>(user);
     while (t.hangs) std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -566,7 +566,7 @@ struct Both : Lent {
     p.force = {t.pull[k], 0, 0};
     if (!t.physics_is_dead) t.port.send_patch(t.port.self, k, p);
     t.there[k] = s.state == ArmState::ready, t.at[k] = s.pose.p.x;
-    return {9, 9, 9};  // whatever is returned here goes nowhere
+    return {9, 9, 9};  // the return value is unused
   }
   explicit Both(BridgeOptions o = {}) {
     o.where = "127.0.0.1:" + std::to_string(server->port());
@@ -577,7 +577,7 @@ struct Both : Lent {
     EXPECT_TRUE(port.any() && port.start(port.self, {step, this}, why));
   }
   ~Both() { port.reset(); }
-  // Milliseconds of the arms, and the simulator's answers to them.
+  // Milliseconds of the devices, and the simulator's answers.
   void both(int count, const std::function<void(int)>& each = {}) {
     for (int k = 0; k < count; ++k) {
       const uint64_t before = server->counts().accepted;
@@ -608,7 +608,7 @@ TEST(Bridge, both_ends) {
   EXPECT_NEAR(t.port.status(t.port.self, 0).force, 0.8f, 0.02f) << "what is felt is told";
   t.fake.zero(0), t.fake.zero(1);
 
-  // The device: its left arm's line breaks.
+  // The device: its left connection breaks.
   const Vec3 right = t.fake.force(0);
   t.fake.fault(1, kFakeCommError, 1);
   t.both(50, [&](int) { EXPECT_TRUE(t.fake.force(0) == right); });
@@ -616,7 +616,7 @@ TEST(Bridge, both_ends) {
   EXPECT_TRUE(t.there[0]);
   EXPECT_NE(t.port.error_text(t.port.self, t.port.status(t.port.self, 1).error).find("lost the device"), std::string::npos);
 
-  // The bridge peer: the whole simulator stops, without a word.
+  // The bridge peer: the whole simulator stops silently.
   t.hangs = true;
   int zero = 0;
   for (int k = 1; k <= 150; ++k) {
@@ -632,7 +632,7 @@ TEST(Bridge, both_ends) {
   t.hangs = false;
 }
 
-// The physics dies, everything else lives: as without a bridge.
+// The physics stops, the rest runs: same result as without a bridge.
 TEST(Bridge, the_physics_dies) {
   Both t;
   t.both(2200);
@@ -651,7 +651,7 @@ TEST(Bridge, the_physics_dies) {
   EXPECT_LE(t.fake.at(0).step_most, 0.5 + 1e-4);
 }
 
-// The arm's end dies and is started again at the same place: both hands are lost, and come back by themselves.
+// The device server exits and restarts at the same address: both hands are lost, and reconnect automatically.
 TEST(Bridge, the_arms_end_is_restarted) {
   Both t;
   t.both(20);
@@ -673,7 +673,7 @@ TEST(Bridge, the_arms_end_is_restarted) {
   EXPECT_TRUE(wait_for([&] { return t.port.status(t.port.self, 1).ready; }));
 }
 
-// An arm's end in a few lines, for what a right one never sends.
+// A minimal device server, for packets that a correct one never sends.
 struct ArmEnd {
   int fd = -1;
   BridgeDoor door;
@@ -703,7 +703,7 @@ struct ArmEnd {
     seal(out, {kind, arm, kBridgeVersion, ++counter}, p, b);
     return b;
   }
-  // Answers one packet as an arm does, or a hello with `instead`; the kind that it was.
+  // Answers one packet like a device server, or a hello with `instead`; returns the kind of the packet.
   BridgeKind answer(const BridgeBytes* instead = nullptr) {
     uint8_t data[300];
     pollfd wait{fd, POLLIN, 0};
@@ -725,7 +725,7 @@ struct ArmEnd {
   }
 };
 
-// What the simulator's end makes of garbage that comes from the very address it is connected to.
+// Garbage from the address that the simulator is connected to.
 TEST(Bridge, garbage_from_the_arms_end) {
   ArmEnd end;
   std::atomic<bool> quit{false};
@@ -791,12 +791,12 @@ TEST(Bridge, nothing_to_work_with_is_one_line) {
     EXPECT_NE(messages[0].find(needle), std::string::npos) << messages[0];
     EXPECT_EQ(messages[0].find('\n'), std::string::npos);
   };
-  ArmEnd end;  // at first no one who answers
+  ArmEnd end;  // at first silent
   line(end.where(), "start `catgut bridge` on the device's computer");
   line("127.0.0.1:99999", "is not HOST:PORT");
   line("127.0.0.1:x", "is not HOST:PORT");
   line(":5", "is not HOST:PORT");
-  // Another version, one that has lent its arms, one that has none, one with another key.
+  // Another version, one whose devices are in use, one without devices, one with another key.
   for (const int kind : {0, 1, 2, 3}) {
     std::atomic<bool> quit{false};
     end.info.present = false;
@@ -821,7 +821,7 @@ TEST(Bridge, nothing_to_work_with_is_one_line) {
   }
 }
 
-// The sample in another language is an arm: it answers, moves, and feels the force.
+// The sample in another language is a device: it answers, moves, and receives the force.
 TEST(Bridge, an_arm_in_python) {
   if (std::system("python3 -c 'import ctypes' >/dev/null 2>&1") != 0) GTEST_SKIP() << "python3 is not installed";
   int out[2];
@@ -853,14 +853,14 @@ TEST(Bridge, an_arm_in_python) {
     const auto step = [](void*, size_t k, const ArmSample& s) {
       if (s.state == ArmState::ready) at = s.pose.p.x;
       ForcePatch p;
-      // It engages where nothing is felt; again and again, since a busy machine may let it expire in between.
+      // It engages where the force is zero; repeatedly, since on a busy machine it may expire in between.
       p.point = s.pose.p, p.force = {++steps % 2000 > 300 ? 0.4f : 0, 0, 0}, p.period = 0.001f, p.time_ns = s.time_ns;
       to->send_patch(to->self, k, p);
       return Vec3{};
     };
     EXPECT_TRUE(port.start(port.self, {step, nullptr}, why));
     EXPECT_TRUE(wait_for([] { return at > 0.025f; })) << "0.1 N on 20 N/m are 5 mm from where it was: " << at;
-    // Killed: the arm is lost, nothing hangs.
+    // Killed: the device is lost, nothing hangs.
     kill(child, SIGKILL);
     EXPECT_TRUE(wait_for([&] { return !port.status(port.self, 0).ready; }));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/device: the driver of Force Dimension's arms against a simulated libdhd, through the same dlopen and the same symbols
+// tests/device: the backend of Force Dimension's devices with a simulated libdhd, through the same dlopen and symbols
 // as the real one; the servo in between is the real one. In the double the first device is the left hand's.
 #include "device/force_dimension.h"
 
@@ -68,7 +68,7 @@ struct Two {
   std::array<ToolInput, 2> input;
   std::array<ArmSample, 2> sample;
   std::array<uint64_t, 2> now_ns{1000000000, 1000000000};  // each thread its own
-  std::array<uint64_t, 2> physics_ns{};                    // 0: the physics lives
+  std::array<uint64_t, 2> physics_ns{};                    // 0: the physics runs
 
   static Vec3 step(void* user, size_t k, const ArmSample& s) {
     Two& t = *static_cast<Two*>(user);
@@ -110,7 +110,7 @@ struct Two {
     fake.hand(FakeDhd::device(h), at, rows, button, gap);
   }
   ~Two() {
-    fake.run();  // the driver gets the milliseconds it needs to take its force off
+    fake.run();  // the backend gets the milliseconds that it needs to reduce its force
     port.reset();
   }
 };
@@ -130,7 +130,7 @@ TEST(ForceDimension, tells_what_it_found) {
   EXPECT_EQ(t.fake.at(0).watchdog, 255);
 }
 
-// S8: a gripper is a jaw, not a switch: it follows the fingers, and a pinch toggles nothing.
+// S8: a gripper is a continuous jaw, not a switch: it follows the fingers, and a pinch toggles nothing.
 TEST(ForceDimension, S8_the_jaw_follows_the_fingers) {
   Two t;
   t.open();
@@ -179,7 +179,7 @@ TEST(ForceDimension, H9_forces_are_never_swapped) {
   EXPECT_GT(t.fake.at(0).position[1], 0.001) << "pushed to the right, it went to the right";
 }
 
-// The physics dies: force is zero within 100 ms, without a step.
+// The physics stops: force is zero within 100 ms, without a step.
 TEST(ForceDimension, the_physics_dies) {
   Two t;
   t.open();
@@ -196,8 +196,8 @@ TEST(ForceDimension, the_physics_dies) {
   EXPECT_LE(t.fake.at(0).step_most, 0.5 + 1e-4);
 }
 
-// An arm is unplugged and plugged in again: its force is gone, the other hand's continues to the bit, and it comes back through
-// the ramp.
+// A device is unplugged and plugged in again: its force drops to zero, the other hand's is unchanged to the bit, and it
+// returns through the ramp.
 TEST(ForceDimension, H7_an_arm_is_unplugged) {
   Two t;
   t.open();
@@ -225,7 +225,7 @@ TEST(ForceDimension, H7_an_arm_is_unplugged) {
   EXPECT_TRUE(t.fake.force(1) == left);
 }
 
-// A call that never comes back: the arm's own watchdog takes the force off, the other hand does not notice, and leaving does
+// A call that never returns: the device's own watchdog switches the force off, the other hand is unaffected, and closing does
 // not wait for it.
 TEST(ForceDimension, an_arm_hangs) {
   Two t;
@@ -246,12 +246,12 @@ TEST(ForceDimension, an_arm_hangs) {
   t.port.reset();
   EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(5));
   EXPECT_EQ(t.fake.at(1).output, 0) << "the other one was left as it should be";
-  t.fake.fault(FakeDhd::device(0), kDhdHang, 0);  // the thread that was left behind finds no one, and ends
+  t.fake.fault(FakeDhd::device(0), kDhdHang, 0);  // the abandoned thread finds no callback, and ends
   t.fake.fault(FakeDhd::device(0), kDhdUnplugged, 1);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
 }
 
-// The firmware cut the force because the hand was fast: the tool still moves, force comes back through the ramp.
+// The firmware cuts the force because the hand was fast: the tool still moves, force returns through the ramp.
 TEST(ForceDimension, the_firmware_cuts_the_force) {
   Two t;
   t.open();

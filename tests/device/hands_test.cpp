@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/device: motions do what they look like, the help goes where the needle is best held, and a mouse alone can make a bite.
+// tests/device: motions match the view, assists move to the best grasp of the needle, and a mouse alone can make a bite.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -32,7 +32,7 @@ struct WorkQueue {
     picture.instrument[0].capabilities = kHoldNeedle | kHoldThread | kHoldTissue | kClamp | kCutThread;  // a needle holder
     picture.instrument[1].capabilities = kHoldNeedle | kHoldThread | kHoldTissue;                        // forceps
     seen.tool[0].instrument = 0, seen.tool[1].instrument = 1;
-    seen.active().needle.pose.p = {0.3f, 0, 0};  // out of the help's reach
+    seen.active().needle.pose.p = {0.3f, 0, 0};  // out of the assist's reach
     steering = start_steering(picture, false);
     turn({});
   }
@@ -41,7 +41,7 @@ struct WorkQueue {
   }
 };
 
-// Pixels from the middle of the picture, right and down.
+// Pixels from the center of the image, right and down.
 std::array<float, 2> on_screen(const ViewFrame& v, Vec3 p) {
   const Vec3 d = p - v.eye;
   const float scale = 1 / (v.pixel * dot(d, v.ahead));
@@ -208,7 +208,7 @@ TEST(Help, takes_an_open_jaw_to_the_good_place_and_lets_go_of_a_moving_hand) {
   const float phi = 0.35f * d.picture.suture[0].needle_arc;
   const Vec3 place =
       transform(d.seen.active().needle.pose, Vec3{std::cos(phi), std::sin(phi), 0} * d.picture.suture[0].needle_radius);
-  // To the pointer's place over the needle, 40 mm in front of it.
+  // Moves the pointer over the needle, 40 mm in front of it.
   const auto to = on_screen(d.view, place), from = on_screen(d.view, d.out[0].pose.p);
   d.turn(moved(to[0] - from[0], to[1] - from[1]));
   EXPECT_LT(distance(d.out[0].pose.p, place), 1e-5f);
@@ -308,7 +308,7 @@ TEST(Help, a_held_needle_comes_to_the_bite_and_is_driven_from_there) {
   const auto to = on_screen(d.view, entry_of(*d.steering.guide)), from = on_screen(d.view, d.steering.hand[0].pose.p);
   d.turn(moved(to[0] - from[0], to[1] - from[1]));
   ASSERT_TRUE(d.steering.hand[0].snapped);
-  for (int i = 0; i < 240; ++i) {  // the tool and the needle in it go where they are sent
+  for (int i = 0; i < 240; ++i) {  // the tool and the needle in it follow their target
     d.seen.active().needle.pose = d.out[0].pose * inverse(d.steering.hand[0].grip);
     d.seen.tool[0].pose = d.out[0].pose;
     d.turn({});
@@ -380,10 +380,10 @@ TEST(Gamepad, triggers_close_the_jaws_and_leave_a_mouses_alone) {
   EXPECT_EQ(d.out[0].buttons, kButtonCut);
 }
 
-// A user who looks at the picture and has nothing but a mouse: every step below is pixels, notches and buttons.
+// A simulated user with only a mouse: every step below is pixels, notches and buttons.
 class MousePerson {
  public:
-  // ticks: of the simulation between two pictures; hands get there as they do in runtime/live.
+  // ticks: of the simulation per frame; hands move as in runtime/live.
   explicit MousePerson(const std::string& scene, int ticks = 1)
       : ticks_(ticks),
         dt_(kDt * static_cast<float>(ticks)),
@@ -419,7 +419,7 @@ class MousePerson {
     press.hand_changes = 1;
     tick(press);
   }
-  // The pointer goes over a place of the scene; with `deep` the wheel brings the tool to its depth too.
+  // Moves the pointer over a point of the scene; with `deep` the wheel moves the tool to its depth too.
   bool point_at(const std::function<Vec3()>& place, bool deep, int ticks) {
     for (int i = 0; i < ticks; ++i) {
       const auto from = on_screen(view_, steering_.hand[mouse_.active].pose.p), to = on_screen(view_, place());
@@ -436,7 +436,7 @@ class MousePerson {
     const SteeredHand& hand = steering_.hand[mouse_.active];
     return hand.pose * inverse(hand.grip);
   }
-  // Turns (Control and the right button; Q and E) and moves until the held needle is where it is wanted.
+  // Turns (Control and the right button; Q and E) and moves until the held needle reaches its target.
   bool bring_needle(const Pose& wanted, int ticks) {
     for (int i = 0; i < ticks; ++i) {
       const Pose now = commanded_needle();
@@ -487,14 +487,14 @@ class MousePerson {
   std::vector<Event> events_;
 };
 
-// ticks 1: a picture every tick; 6: ten pictures a second, what a machine without a graphics card gives.
+// ticks 1: a frame every tick; 6: ten frames per second, as on a machine without a graphics card.
 class WholeBite : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Pictures, WholeBite, testing::Values(1, 6));
 
 TEST_P(WholeBite, by_mouse_alone) {
   MousePerson me("purse_string", GetParam());
   me.wait(30);
-  // The pointer over the needle; the help sees to the rest.
+  // The pointer over the needle; the assist does the rest.
   ASSERT_TRUE(me.point_at([&] { return me.on_needle(0.35f); }, false, 400));
   EXPECT_TRUE(me.steering_.hand[0].snapped);
   me.click();
@@ -502,7 +502,7 @@ TEST_P(WholeBite, by_mouse_alone) {
   ASSERT_EQ(me.seen_.tool[0].held, Held::needle);
   EXPECT_NEAR(me.seen_.tool[0].held_at, 0.35f, 0.05f);
 
-  // The needle beside the place of a bite, its circle level with the rim, as the scripted surgeon would hold it.
+  // The needle beside the planned bite, its circle level with the rim, as the scripted surgeon holds it.
   const Plan plan = make_plan("purse_string", me.picture_, SurgeonSkill{});
   const BitePlace& bite = plan.place[0];
   const Vec3 out = normalized(bite.out - bite.up * dot(bite.out, bite.up)), along = cross(out, bite.up);
@@ -520,7 +520,7 @@ TEST_P(WholeBite, by_mouse_alone) {
   ASSERT_TRUE(me.happened(EventKind::tip_exited));
   me.drive(0.8f, 150, [] { return false; });
 
-  // The other hand takes the tip, the first one lets go, and the needle is turned out of the tissue.
+  // The other hand grasps the tip, the first one releases, and the needle is turned out of the tissue.
   me.tab();
   ASSERT_TRUE(me.point_at([&] { return me.on_needle(0.93f); }, false, 600));
   EXPECT_TRUE(me.steering_.hand[1].snapped);
@@ -536,7 +536,7 @@ TEST_P(WholeBite, by_mouse_alone) {
   EXPECT_TRUE(me.happened(EventKind::bite_completed));
 }
 
-// One key goes round the tray; what is parked or in the other hand is left alone.
+// One key cycles through the tray; parked instruments and those of the other hand are skipped.
 TEST(Tray, the_key_goes_round_what_lies_there) {
   Snapshot seen;
   seen.instrument.resize(4);

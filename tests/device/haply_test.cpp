@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/device: the driver of Haply's arms against a service of the same shape, over a WebSocket as with the real one; the
-// servo in between is the real one. Messages are counted: one is a millisecond of the arms. The first device is the left
+// tests/device: the backend of Haply's devices with a service of the same protocol, over a WebSocket like the real one; the
+// servo in between is the real one. One message is one millisecond of the devices. The first device is the left
 // hand's.
 #include "device/haply.h"
 
@@ -39,7 +39,7 @@ struct Two {
   std::array<ServoOptions, 2> options;
   std::array<std::atomic<float>, 2> pull{};  // [N] along x right, y up
   std::array<std::atomic<uint64_t>, 2> physics_ns{};
-  std::array<ArmSample, 2> sample;  // of a driver that stands still
+  std::array<ArmSample, 2> sample;  // of a backend that is stopped
   std::array<std::atomic<bool>, 2> there{};
   std::array<std::atomic<float>, 2> turned{};      // [rad] of the grip
   std::array<std::atomic<uint32_t>, 2> buttons{};  // of the grip
@@ -95,7 +95,7 @@ TEST(Haply, both_forms_of_the_service) {
     EXPECT_EQ(t.port.arm[1].serial, "haply-04BA") << "as the service says which hand's it is";
     EXPECT_EQ(t.options[0].limiter.force, 2) << "S8: an Inverse3's";
     t.engage(0.5f, 0.4f);
-    // H9: two arms, two forces, and both arrive in the form the service reads.
+    // H9: two devices, two forces, both in the form that the service reads.
     EXPECT_LT(distance(t.force(0), {0.5f, 0, 0}), 1e-3f);
     EXPECT_LT(distance(t.force(1), {0, 0.4f, 0}), 1e-3f);
     EXPECT_EQ(t.fake.last().find("session") != std::string::npos, false) << "said once";
@@ -109,7 +109,7 @@ TEST(Haply, poses_come_whole) {
   t.fake.hold(false);
   t.port.stop(t.port.self);  // from here on the samples stand still
   EXPECT_LT(distance(t.sample[1].pose.p, {0, 0.15f, 0.12f}), 1e-6f);
-  // Their z is our y. A grip that is not turned points along their y: our -z, as a tool that is not turned does.
+  // Their z is our y. A grip without rotation points along their y: our -z, like an unrotated tool.
   EXPECT_LT(length(rotation_vector(t.sample[1].pose.q * conjugate(axis_angle({0, 1, 0}, 0.5f * kPi)))), 1e-5f);
   EXPECT_LT(length(rotation_vector(t.sample[0].pose.q)), 1e-5f);
   EXPECT_EQ(t.sample[1].buttons, 1u);
@@ -131,7 +131,7 @@ TEST(Haply, the_physics_dies) {
   EXPECT_LE(t.fake.at(1).step_most, 0.5 + 1e-4);
 }
 
-// One arm is lost and comes back; the other's force continues to the bit.
+// One device is lost and returns; the other's force is unchanged to the bit.
 TEST(Haply, H7_an_arm_is_lost) {
   Two t;
   t.engage(0.9f, 0.6f);
@@ -178,7 +178,7 @@ TEST(Haply, grips_belong_to_their_arms) {
   }
 }
 
-// Whatever the service says, nothing falls over and no force leaps.
+// For any message of the service: no crash, and no step in the force.
 TEST(Haply, answers_that_are_none) {
   Two t;
   t.engage(0.9f, 0.6f);
@@ -196,7 +196,7 @@ TEST(Haply, answers_that_are_none) {
   EXPECT_TRUE(t.there[0] && t.there[1]);
 }
 
-// In real time: the service stops answering, then its line is cut, then it is back. Both arms are lost, and come back.
+// In real time: the service stops answering, its connection is cut, then it returns. Both devices are lost, and return.
 TEST(Haply, the_service_stands_still) {
   FakeHaply fake;
   HaplyOptions o;
@@ -223,7 +223,7 @@ TEST(Haply, the_service_stands_still) {
   EXPECT_TRUE(wait_for([&] { return length(force_of(fake.at(0))) == 0; }));
   fake.hold(false);
   EXPECT_TRUE(ready(true));
-  fake.say("\xff\xfe");  // no text at all: the line is given up
+  fake.say("\xff\xfe");  // not text: the connection is closed
   EXPECT_TRUE(ready(false));
   EXPECT_TRUE(ready(true)) << "a new line";
   fake.hang_up();

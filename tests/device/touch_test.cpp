@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/device: the driver of the Touch against a simulated libHD, through the same dlopen and the same symbols as the real
+// tests/device: the backend of the Touch with a simulated libHD, through the same dlopen and symbols as the real
 // one. Criteria H1, H7 and H9 of docs/rooms/haptic.md; the servo in between is the real one.
 #include "device/touch.h"
 
@@ -15,7 +15,7 @@
 namespace catgut {
 namespace {
 
-// Both arms on servos of their own, fed with a patch each.
+// Both devices on separate servos, with a patch each.
 struct Two {
   FakeHd fake{true};
   std::vector<std::string> messages;
@@ -70,7 +70,7 @@ ForcePatch constant(Vec3 force) {
   return p;
 }
 
-// Arms that have engaged without force, then feel a spring that holds them with `force` newtons.
+// Devices that have engaged without force, then render a spring that holds them with `force` newtons.
 void engage(Two& t, Vec3 right, Vec3 left) {
   t.patch = {constant({}), constant({})};
   t.run(2200);
@@ -142,7 +142,7 @@ TEST(Touch, poses_come_whole) {
   EXPECT_EQ(t.input[0].buttons, 0u) << "one press of the other button cuts nothing";
 }
 
-// S8: every model has limits of its own; what the library says may lower them, never raise them; the unknown is a Touch.
+// S8: every model has its own limits; values of the library may lower them, never raise them; an unknown one is a Touch.
 TEST(Haptics, S8_limits_are_the_models) {
   const auto force = [](const char* model) { return limits_of(model, {0, 0, 0, 0}).force; };
   EXPECT_EQ(force("Touch"), 3.3f);
@@ -178,8 +178,8 @@ TEST(Haptics, H9_forces_are_never_swapped) {
   EXPECT_EQ(bad, 0);
 }
 
-// H7: an arm is lost at any moment and comes back. Its force is gone and returns through the ramp; the other hand's continues
-// as if nothing had happened, to the bit.
+// H7: a device is lost at any moment and returns. Its force drops to zero and returns through the ramp; the other hand's is
+// unchanged, to the bit.
 TEST(Haptics, H7_an_arm_is_lost_and_comes_back) {
   for (const int lost : {0, 1}) {
     SCOPED_TRACE(lost);
@@ -213,7 +213,7 @@ TEST(Haptics, H7_an_arm_is_lost_and_comes_back) {
       if (faulty) {
         EXPECT_EQ(t.input[static_cast<size_t>(lost)].connected, 1u);
         EXPECT_LT(length(t.fake.force(lost)), 1e-4f) << "what is wanted is not small: it must not engage";
-        // The hand lets go for a moment; then force comes in over two seconds.
+        // The hand releases for a moment; then force rises over two seconds.
         t.patch[static_cast<size_t>(lost)] = constant({});
         t.run(100, see);
         t.patch[static_cast<size_t>(lost)] = constant(lost == 0 ? right : left);
@@ -232,7 +232,7 @@ TEST(Haptics, H7_an_arm_is_lost_and_comes_back) {
   }
 }
 
-// Warm motors and a hand that is too fast are no disconnection: the tool still moves, force is off and comes back.
+// Warm motors and a fast hand are not a disconnection: the tool still moves, force is off and returns.
 TEST(Touch, warm_motors) {
   Two t;
   t.open();
@@ -246,7 +246,7 @@ TEST(Touch, warm_motors) {
 }
 
 // S2: an error that cuts the force is reported with the next sample wherever the library raises it: at a frame's begin, at its
-// end (where it sends the force), or in between. Without that, the servo pushes on at full force when the cut ends.
+// end (where it sends the force), or in between. Without that, the servo would write full force when the cut ends.
 TEST(Touch, force_errors_are_reported_wherever_they_are_raised) {
   for (const int where : {0, 1, 2})
     for (const unsigned code : {0x0200u, 0x0201u, 0x0202u, 0x0203u, 0x0204u}) {
@@ -268,7 +268,7 @@ TEST(Touch, force_errors_are_reported_wherever_they_are_raised) {
     }
 }
 
-// An error belongs to the arm that its record names, in a caller that's frame it is found; the worst of several is the one
+// An error belongs to the device named in its record, in any device's frame; the most severe of several is
 // shown.
 TEST(Touch, errors_go_to_the_arm_they_name) {
   Two t;
@@ -281,7 +281,7 @@ TEST(Touch, errors_go_to_the_arm_they_name) {
   EXPECT_EQ(t.port.status(t.port.self, 0).errors, 0u);
   EXPECT_EQ(t.port.status(t.port.self, 1).error, 0x0200u);
   t.run(5);
-  // The line of the left arm breaks, found in the right one's frame; something harmless comes after it.
+  // The left device's connection breaks, detected in the right one's frame; a harmless error follows.
   t.fake.raise(0, 1, 0x0302, 1, 1);
   t.fake.raise(0, 1, 0x0100, 1, 1);
   t.run(2);
@@ -304,7 +304,7 @@ TEST(Touch, positions_that_are_no_numbers) {
   EXPECT_NEAR(length(t.fake.force(1)), 0.5f, 1e-3f);
 }
 
-// A motor wired the wrong way round makes a spring into its opposite: the net notices that energy comes out and the force stays
+// A motor with reversed sign makes a spring unstable: the passivity controller detects the energy and the force stays
 // within its cap.
 TEST(Touch, a_flipped_axis) {
   Two t;
@@ -319,8 +319,8 @@ TEST(Touch, a_flipped_axis) {
   EXPECT_LE(t.fake.at(0).step_most, 0.5 + 1e-4);
 }
 
-// The scheduler itself stops: nothing can be written any more. What the arm does then is its maker's watchdog's; ours is that
-// the steps stop, which a caller that feeds the simulation sees.
+// The scheduler itself stops: no more force can be written. The maker's watchdog handles the device; the simulation detects
+// that the steps stop.
 TEST(Touch, the_scheduler_stalls) {
   Two t;
   t.open();
@@ -334,7 +334,7 @@ TEST(Touch, the_scheduler_stalls) {
   EXPECT_EQ(t.port.status(t.port.self, 0).steps, before + 50);
 }
 
-// Faults by environment, as a person would try them by hand.
+// Faults by environment, as in a manual test.
 TEST(Touch, faults_by_environment) {
   Two t;
   setenv("FAKE_HD_FAULT", "comm_error:left:100:200,warm_motors:right:300:400", 1);
@@ -395,7 +395,7 @@ TEST(Touch, an_arm_left_open_by_a_crash_is_taken_over) {
   EXPECT_TRUE(t.port.arm[0].present && t.port.arm[1].present);
 }
 
-// Leaving takes the force off by the slew, then switches the motors off.
+// Closing reduces the force at the slew rate, then switches the motors off.
 TEST(Touch, leaving) {
   FakeHd fake(false);  // with its own thread, as stop() waits for it
   std::vector<std::string> messages;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/docs: what the pages say about the repository is so: the README's program is the sample that is built and run, links
-// lead somewhere, files that are named exist.
+// tests/docs: statements of the pages about the repository are true: the README's program is the tested sample, links
+// resolve, and named files exist.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -29,7 +29,7 @@ std::vector<fs::path> pages() {
   return out;
 }
 
-// The sample without the line of its licence.
+// The sample without its license line.
 std::string program() {
   const std::string text = read_file(kRoot / "samples/embed/main.cpp");
   return text.rfind("// SPDX", 0) == 0 ? text.substr(text.find('\n') + 1) : text;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/docs: the checker of our language. Pure: text in, findings out, so that a test can show that it finds what it should.
+// tests/docs: the language checker. Pure: text in, findings out, so that tests can verify its findings.
 #pragma once
 #include <algorithm>
 #include <cctype>
@@ -58,7 +58,7 @@ inline std::vector<std::string> words_in(const std::string& text, const std::vec
       out.push_back(word);
       break;
     }
-  // "X is no Y" instead of "X is not a Y"; "there is no Y" is English.
+  // The pattern "X is no Y" instead of "X is not a Y"; "there is no Y" is accepted.
   static const std::regex kIsNo(R"((^|[^a-z])(?!there )([a-z]+) (is|are|was|were) no ([a-z]+))");
   for (std::sregex_iterator m(plain.begin(), plain.end(), kIsNo), none; m != none; ++m)
     if ((*m)[2] != "there" && (*m)[4] != "longer") out.push_back("is no " + (*m)[4].str());
@@ -101,7 +101,7 @@ inline size_t count_words(const std::string& sentence) {
   return n;
 }
 
-// Sentences of more than `most` words. Tables and headings are no sentences. A paragraph or list item ends at a blank line, a
+// Sentences of more than `most` words. Tables and headings do not count. A paragraph or list item ends at a blank line, a
 // heading, a table or the next item; a sentence at '.', '!' or '?' before a blank, and at ':' or ';' that ends a line's item.
 inline std::vector<Finding> long_sentences(const std::string& markdown, size_t most) {
   std::vector<Finding> out;

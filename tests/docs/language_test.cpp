@@ -112,6 +112,17 @@ TEST(Language, texts_of_the_program_use_no_refused_word) {
         ADD_FAILURE() << where(file, text.line) << ": \"" << word << "\": " << text.what;
 }
 
+// Quoted code, names with underscores and the product name "Dear ImGui" are exempt, and so are the examples of these tests.
+TEST(Language, comments_use_no_refused_word) {
+  static const std::regex kExempt(R"(`[^`]*`|\b\w*_\w*\b|\bDear ImGui\b)");
+  for (const fs::path& file : files({"app", "bench", "include", "samples", "src", "tests"}, {".cpp", ".h"})) {
+    if (file.parent_path() == kRoot / "tests/docs") continue;
+    for (const Finding& comment : comments_of(read_file(file)))
+      for (const std::string& word : words_in(std::regex_replace(comment.what, kExempt, "Code"), refused()))
+        ADD_FAILURE() << where(file, comment.line) << ": \"" << word << "\": " << comment.what;
+  }
+}
+
 TEST(Language, scenes_use_no_refused_word) {
   for (const fs::path& file : files({"scenes"}, {".toml"})) {
     const std::vector<std::string> lines = lines_of(read_file(file));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/exchange: the boxes between threads: newest wins and never torn, nothing lost and in order, no memory asked for.
+// tests/exchange: the queues between threads: newest value wins and is never torn; nothing lost, in order, no allocation.
 // Meaningful under the thread sanitizer: payloads are plain data, so a missing order between the threads would show as a race.
 #include <gtest/gtest.h>
 
@@ -64,7 +64,7 @@ TEST(Latest, a_snapshot_keeps_its_memory) {
   }
 }
 
-// One thread writes, one reads, as fast as they can: every value read is whole, and none is older than the one before.
+// One thread writes, one reads, at full speed: every value read is consistent, and none is older than the previous one.
 TEST(Latest, no_value_is_ever_torn) {
   struct Payload {
     ToolInput hand;
@@ -80,7 +80,7 @@ TEST(Latest, no_value_is_ever_torn) {
       p.word.fill(i);
       p.more.assign(100, i);
       box.publish();
-      if (i % 64 == 0) std::this_thread::yield();  // or a machine with one core would never read in between
+      if (i % 64 == 0) std::this_thread::yield();  // otherwise a machine with one core would never read in between
     }
   });
   uint64_t last = 0, torn = 0, older = 0, read = 0;

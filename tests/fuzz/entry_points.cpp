@@ -46,7 +46,7 @@ void put(std::string& out, Int value) {
   for (size_t i = 0; i < sizeof(Int); ++i) out += static_cast<char>(static_cast<uint64_t>(value) >> (8 * i) & 0xff);
 }
 
-// A small world with everything in it that a state can hold.
+// A small scene with every kind of state.
 const Model& small_model() {
   static const std::shared_ptr<const Model> model = [] {
     SceneSpec scene;
@@ -90,7 +90,7 @@ bool recording(const uint8_t* data, size_t size) {
   if (data[0] == 'r') {
     file = text_of(data + 1, size - 1);
   } else {
-    // Magic and format, then chunks of {kind u8, size u16, payload}: what a hostile writer could make, hashes included.
+    // Magic and format, then chunks of {kind u8, size u16, payload}: within the power of a hostile writer, hashes included.
     file = std::string("CATGUT\x1a\n", 8);
     put(file, kRecordingFormat);
     for (size_t at = 1; at + 3 <= size;) {
@@ -131,7 +131,7 @@ bool state(const uint8_t* data, size_t size) {
   const StatePtr state = initial_state(model);
   if (!guarded([&] { load_state(model, *state, bytes); })) return false;
   if (save_state(model, *state) != bytes) fault("a state changed in loading and saving");
-  // What was accepted must be safe to continue from, however odd.
+  // An accepted state must be safe to continue from.
   Jobs jobs(1);
   TickInput input;
   Snapshot seen;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/fuzz: every door through which bytes from outside come in. Each entry point takes any bytes and returns when they were
-// read or refused with an InputError of one line; whatever else happens (another exception, a crash, no end) is a fault.
+// tests/fuzz: all entry points for external bytes. Each takes any bytes and returns when they were
+// read or refused with an InputError of one line; any other outcome (another exception, a crash, a hang) is a fault.
 // Driven by libFuzzer (tests/fuzz/libfuzzer, -DCATGUT_FUZZ=ON with clang) and by fuzz_test.cpp in every build.
 #pragma once
 #include <cstddef>
@@ -10,13 +10,13 @@
 
 namespace catgut::fuzz {
 
-// true: the bytes were good; false: they were refused as they should be. Aborts with a message on anything else.
+// true: accepted; false: refused properly. Aborts with a message on anything else.
 using EntryPoint = bool (*)(const uint8_t* data, size_t size);
 
-bool scene(const uint8_t* data, size_t size);      // scene text; what is accepted must survive writing and reading
+bool scene(const uint8_t* data, size_t size);      // scene text; accepted text must survive writing and reading
 bool setting(const uint8_t* data, size_t size);    // the text of one --set
-bool recording(const uint8_t* data, size_t size);  // 'r': the file as it is; else: chunk kinds and payloads, hashed rightly
-bool state(const uint8_t* data, size_t size);      // 'r': the bytes as they are; else: changes to a good state, 5 bytes each
+bool recording(const uint8_t* data, size_t size);  // 'r': the raw file; else: chunk kinds and payloads, with valid hashes
+bool state(const uint8_t* data, size_t size);      // 'r': the raw bytes; else: changes to a valid state, 5 bytes each
 bool mesh(const uint8_t* data, size_t size);       // 'o', 's', 'g' or 'j' (obj, stl, glb, gltf), then the file
 
 struct Entry {

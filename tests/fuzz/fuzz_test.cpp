@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/fuzz: the fuzzing that every build does: each file of the corpus as it is, and two thousand seeded mutations of them.
-// The same seeds every time: a failure here is the same failure everywhere. For longer hunts see docs/fuzzing.md.
+// tests/fuzz: the fuzzing in every build: each file of the corpus unchanged, and two thousand seeded mutations of them.
+// The seeds are constant: a failure is reproducible. For longer runs see docs/fuzzing.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -33,7 +33,7 @@ std::vector<std::string> corpus(const std::string& entry) {
   return out;
 }
 
-// What tends to break readers: numbers at the edges, cut files, repeated and swapped pieces, flipped bits, another file's
+// Mutations that often break readers: boundary numbers, cut files, repeated and swapped pieces, flipped bits, another file's
 // middle.
 void mutate(std::string& s, const std::vector<std::string>& all, Random& random) {
   static const char* const kWord[] = {"-1",

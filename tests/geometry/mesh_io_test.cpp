@@ -21,7 +21,7 @@ std::string file(const std::string& name, const std::string& text) {
   return path;
 }
 
-// An open tube along y as OBJ text, `scale` meters to the decimeter or so.
+// An open tube along y as OBJ text, `scale` meters to about a decimeter.
 std::string tube(double scale, const std::string& name = "tube", int first = 1, double shift = 0) {
   std::string text = "o " + name + "\n";
   for (int i = 0; i < 6; ++i) {
@@ -68,7 +68,7 @@ TEST(MeshIo, ReadsAnObjTubeFacingOutward) {
 
 TEST(MeshIo, WeldsAnStl) {
   const double p[4][3] = {{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}};
-  const int f[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 3, 0}};  // the last one is turned the wrong way
+  const int f[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 3, 0}};  // the last one has the wrong orientation
   std::string text = "solid corner\n";
   for (const auto& t : f) {
     text += "facet normal 0 0 0\nouter loop\n";
@@ -105,7 +105,7 @@ TEST(MeshIo, SaysWhatItCannotUse) {
               "2 separate surfaces side by side");
 }
 
-// A kilobyte that asks for gigabytes is refused before anything is requested.
+// A kilobyte that declares gigabytes is refused before any allocation.
 TEST(MeshIo, RefusesHostileGltfAtOnce) {
   const auto gltf = [&](const std::string& more) {
     return refusal(file("hostile.gltf", "{\"asset\":{\"version\":\"2.0\"}," + more + "}"));

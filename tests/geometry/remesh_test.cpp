@@ -129,7 +129,7 @@ TEST(Closest, AgreesWithTryingEverything) {
 TEST(Remesh, RealOrgan) {
   const std::string path = std::string(CATGUT_SOURCE_DIR) + "/../shared/organs/large_intestine_female.glb";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no organ file at " << path;
-  // The file draws outside and lumen as two shells; the outer one is taken. The rectum is a blind pouch, the sigmoid a tube.
+  // The file contains outside and lumen as two shells; the outer one is used. The rectum is a blind pouch, the sigmoid a tube.
   const auto rims = [](const TriangleMesh& mesh) {
     std::vector<float> mm;
     for (const auto& loop : boundary_loops(mesh.triangle)) mm.push_back(1e3f * loop_length(points(mesh, loop)));

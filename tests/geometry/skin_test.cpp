@@ -82,7 +82,7 @@ TEST(Skin, RigidMotionStaysRigid) {
   }
 }
 
-// A stretch by 20 % along and a shear, rotations left at rest: the picture must follow within a fraction of the particle
+// A stretch by 20 % along and a shear, rotations left at rest: the mesh must follow within a fraction of the particle
 // spacing and without steps between neighboring vertices.
 TEST(Skin, StretchIsFollowedSmoothly) {
   const int fine = 140;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/hands: the lesson: every step is recognized when a user does it, not before; and the scripted surgeon can show each
-// from where a learner is, with the needle as a learner holds it.
+// tests/hands: the lesson: every step is recognized when completed, not before; and the scripted surgeon can demonstrate each
+// from the learner's present state, with the needle in the learner's grasp.
 #include <gtest/gtest.h>
 
 #include "lock_step.h"
@@ -51,8 +51,8 @@ TEST(LessonData, what_was_done_at_once_is_behind) {
   EXPECT_EQ(next_step(lesson, 7, seen, begun), 8u) << "shorter than a picture";
 }
 
-// A user goes through the lesson with the mouse. Before every step the surgeon shows it, from where they are; then what was
-// shown is undone, as the window does it.
+// A user completes the lesson with the mouse. Before every step the surgeon demonstrates it from the present state; then the
+// demonstration is undone, as in the window.
 TEST(Lessons, each_step_is_shown_undone_and_done_by_mouse) {
   AtTheMouse desk(1);
   const Lesson& lesson = first_stitch();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/hands: a desk without a window: device rooms and the simulation alone, in lock step.
+// tests/hands: a workstation without a window: device rooms and the simulation alone, in lock step.
 #pragma once
 #include "device/gamepad.h"
 #include "person.h"
@@ -19,7 +19,7 @@ inline SceneSpec at_the_mouse(const std::string& name) {
   return scene;
 }
 
-// ticks: of the simulation between two pictures; hands get there as they do in runtime/live.
+// ticks: of the simulation per frame; hands move as in runtime/live.
 class LockStep : public WorkQueue {
  public:
   explicit LockStep(int ticks)
@@ -62,7 +62,7 @@ class LockStep : public WorkQueue {
     publish(*model_, *state_, look_.seen);
     for (size_t k = 0; k < 2; ++k) in_.hand[k].pose = look_.seen.tool[k].hand, in_.hand[k].jaw = look_.seen.tool[k].jaw;
   }
-  // The scripted surgeon has the tools until `done`; false: it gave up, or was through without.
+  // The scripted surgeon has the tools until `done`; false: it gave up, or finished without.
   bool show(const std::vector<size_t>& tasks, const std::function<bool(const Snapshot&)>& done) {
     const auto surgeon = make_demonstrator(scene_.technique.name, picture_, skill_of(scene_), tasks);
     Snapshot seen = look_.seen;

@@ -36,7 +36,7 @@ MouseInput by_mouse(const Act& act, const Look& look, float speed) {
 
 GamepadInput by_pad(const Act& act, const Look& look, GamepadInput& pad) {
   const HandMotion& m = act.motion;
-  // How far a stick goes for that much of its full speed: the inverse of what the device does with it.
+  // Deflection of a stick for that fraction of its full speed: the inverse of the device's mapping.
   const auto stick = [&](float amount, float full) {
     const float part = std::min(1.0f, std::abs(amount) / (full * look.dt));
     return part < 0.003f ? 0.0f : std::copysign(0.15f + 0.85f * std::sqrt(part), amount);
@@ -90,7 +90,7 @@ bool Person::point(size_t k, const std::function<Vec3()>& place, const std::func
 bool Person::take(size_t k, Held what, HelpAt at, const std::function<Vec3()>& place) {
   for (int attempt = 0; attempt < 8; ++attempt) {
     if (!point(k, place, [&] { return hand(k).snapped && hand(k).at == at; })) return false;
-    // The tool comes to where the help wants it, then the jaw closes.
+    // The tool follows the assist to its target, then the jaw closes.
     const bool tail = at == HelpAt::tail;
     wait(3, [&] { return (!tail || hand(k).hovered) && distance(seen().tool[k].pose.p, hand(k).help.p) < 0.0015f; },
          {k, {}, false});
@@ -102,14 +102,14 @@ bool Person::take(size_t k, Held what, HelpAt at, const std::function<Vec3()>& p
 
 bool Person::let_go(size_t k) {
   const auto open = [&] { return seen().tool[k].held == Held::nothing && !hand(k).closed; };
-  // Twice: a trigger that was not held down when its gamepad came has to be pulled before it can be let go.
+  // Twice: a trigger that was not pressed when its gamepad connected has to be pulled before it can be released.
   for (int i = 0; i < 2; ++i)
     if (wait(1, open, {k, {}, !open()})) return true;
   return false;
 }
 
 void Person::aside(size_t k) {
-  // Out along its own shaft first, or it takes thread along.
+  // Out along its own shaft first, or it drags thread along.
   const Vec3 out = hand(k).pose.p + rotate(hand(k).pose.q, {0, 0, 0.03f}), place = desk_.picture().focus + aside_of(k);
   point(
       k, [=] { return out; }, [&] { return distance(hand(k).pose.p, out) < 0.006f; }, true, 3);
@@ -122,7 +122,7 @@ bool Person::drive(size_t k, const std::function<bool()>& done) {
   act.hand = k;
   const double until = seen().time_s + static_cast<double>(kPatience);
   while (!done()) {
-    act.motion.drive = std::min(0.1f, 3.0f * desk_.look().dt);  // looks between the steps
+    act.motion.drive = std::min(0.1f, 3.0f * desk_.look().dt);  // observes between the steps
     if (seen().time_s > until || !desk_.act(act)) return done();
   }
   return true;
@@ -148,7 +148,7 @@ bool Person::bite() {
   doing_ = "bring the needle to the bite";
   const size_t before = seen().active().bite.size(), completed = desk_.count(EventKind::bite_completed);
   if (!desk_.look().steering.guide) return false;
-  // Where it was when it was last seen: with the needle's last step the guide is that of the next bite.
+  // The last seen position: with the needle's last step the guide is that of the next bite.
   BiteGuide last;
   const auto guide = [&] { return last = desk_.look().steering.guide.value_or(last); };
   if (!point(
@@ -158,7 +158,7 @@ bool Person::bite() {
   doing_ = "drive the needle";
   const bool out = drive(0, [&] {
     if (seen().active().bite.size() <= before || !seen().active().bite.back().has_exit) return false;
-    // The hand is ahead of the picture.
+    // The hand is ahead of the image.
     const Pose meant = hand(0).pose * inverse(hand(0).grip);
     const Vec3 exit = seen().active().bite.back().exit;
     return distance(on_needle(desk_.picture(), seen().active().needle.pose, 1), exit) > 0.0062f ||
@@ -209,7 +209,7 @@ bool Person::lay_tail() {
   const Vec3 place = at + 0.034f * normalized(Vec3{0.9f, 0.3f, 0.5f});
   point(
       0, [=] { return place; }, [&] { return distance(hand(0).pose.p, place) < 0.006f; }, true, 2.5f);
-  wait(0.5f, [] { return false; });  // it settles before it is let go
+  wait(0.5f, [] { return false; });  // it settles before it is released
   if (!let_go(0)) return false;
   aside(0);
   return true;
@@ -221,7 +221,7 @@ bool Person::draw_together() {
       if (s.midpoint && s.progress < 0.985f) return false;
     return !seen().active().seam.empty();
   };
-  // Where it sticks, or the tail slips: let go and take it again.
+  // If it sticks, or the tail slips: release and grasp again.
   for (int attempt = 0; attempt < 3; ++attempt) {
     doing_ = "take the tail";
     if (!take_tail()) return false;
@@ -256,7 +256,7 @@ bool Person::set_throw() {
 }
 
 bool Person::tie(int way) {
-  // What goes wrong is done again, as one does.
+  // Failed actions are repeated.
   for (int attempt = 0; attempt < 8; ++attempt) {
     if (!wind(way)) continue;
     doing_ = "take the tail through the loop";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/hands: a user who sees the picture and has one device, and what they do to make a stitch. A WorkQueue is where they
-// sit: it turns what a hand is meant to do into the device's own events and gives the next picture. What is asked of a hand is
-// what is seen: point there, click, drag; the person never says where a tool is in space.
+// tests/hands: a simulated user with one device who sees the image, and the actions of a stitch. A workstation converts an
+// intended action to the device's own events and returns the next frame. Actions are in the view frame: point there, click,
+// drag; the user never states where a tool is in space.
 #pragma once
 #include <array>
 #include <functional>
@@ -31,9 +31,9 @@ class WorkQueue {
   virtual ~WorkQueue() = default;
   virtual const PictureModel& picture() const = 0;
   virtual const Look& look() const = 0;
-  // Does it, and waits for a picture that shows it. False: the simulation has ended.
+  // Performs it, and waits for a frame that shows it. False: the simulation has ended.
   virtual bool act(const Act& act) = 0;
-  virtual size_t count(EventKind kind) const = 0;  // that happened so far
+  virtual size_t count(EventKind kind) const = 0;  // so far
 };
 
 class Person {
@@ -41,11 +41,11 @@ class Person {
   explicit Person(WorkQueue& desk) : desk_(desk) {}
 
   bool take_needle();
-  bool bite();       // the driver holds the needle; afterwards the forceps has brought it through
-  bool hand_back();  // the driver takes it from the forceps
+  bool bite();       // the needle holder holds the needle; afterwards the forceps has pulled it through
+  bool hand_back();  // the needle holder takes it from the forceps
   bool pull_tail(float tail);
-  bool draw_together();  // tail and needle end, until the tissue has come together
-  bool tie(int way);     // one throw: the three below, done again when they fail, and the tail laid down
+  bool draw_together();  // tail and needle end, until the edges are approximated
+  bool tie(int way);     // one throw: the three actions below, repeated on failure, and the tail laid down
   bool wind(int way);
   bool take_tail();
   bool set_throw();
@@ -68,10 +68,10 @@ class Person {
   std::string doing_;
 };
 
-// The events of the mouse that make this motion, in whole pixels and notches.
+// The events of the mouse for this motion, in whole pixels and notches.
 MouseInput by_mouse(const Act& act, const Look& look, float speed);
 
-// The sticks and buttons that make it; `pad` holds what is pressed meanwhile (a closed jaw is a trigger held down).
+// The sticks and buttons for it; `pad` holds what is pressed meanwhile (a closed jaw is a pressed trigger).
 GamepadInput by_pad(const Act& act, const Look& look, GamepadInput& pad);
 
 }  // namespace catgut

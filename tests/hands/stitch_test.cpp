@@ -28,7 +28,7 @@ void make_a_stitch(WorkQueue& desk) {
   EXPECT_NE(knot.thrown[0].chirality, knot.thrown[1].chirality) << "a reef knot, no granny";
 }
 
-// A picture every tick, and ten pictures a second, which is what a machine without a graphics card gives.
+// A frame every tick, and ten frames per second, as on a machine without a graphics card.
 class Stitch : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Pictures, Stitch, testing::Values(1, 6));
 

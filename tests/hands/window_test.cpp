@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/hands: the same stitch at the window itself. The program's own loop, physics on its thread, pictures drawn; an X server
-// of our own, and the mouse and keyboard events that the server makes for us (XTest), or a gamepad that SDL finds. What is
-// checked is what happened, never a pixel. Everything waits for what it sees, so a slow machine only takes longer.
+// tests/hands: the same stitch in the window itself. The program's own loop, physics on its thread, rendering; a private X
+// server, and its mouse and keyboard events (XTest), or a virtual gamepad of SDL. Checks
+// events, never pixels. All waits are for observed states, so a slow machine only takes longer.
 #ifdef CATGUT_TESTS_WINDOW
 #include <SDL.h>
 #include <gtest/gtest.h>
@@ -28,8 +28,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A user's eyes and, in what derives from it, their device. The window runs on the thread that called sit(); the person on
-// one of their own.
+// The image as seen by a user and, in derived classes, the device. The window runs on the thread that called sit(); the
+// simulated user on another.
 class AtTheWindow : public WorkQueue {
  public:
   explicit AtTheWindow(int seconds) : until_(Clock::now() + std::chrono::seconds(seconds)) {
@@ -43,14 +43,14 @@ class AtTheWindow : public WorkQueue {
     return see(2);
   }
   size_t lesson_step() const { return lesson_step_; }
-  const std::vector<size_t>& lesson_went() const { return lesson_went_; }  // its steps as they were shown; after sit()
-  // Until the surgeon has begun to show something, or has stopped.
+  const std::vector<size_t>& lesson_went() const { return lesson_went_; }  // its steps as displayed; after sit()
+  // Until the surgeon's demonstration has started, or ended.
   bool until_showing(bool wanted) {
     for (int i = 0; i < 2000 && showing_ != wanted; ++i)
       if (!see(1)) return false;
     return showing_ == wanted && see(3);
   }
-  // A user who has made a mess of it begins again.
+  // A user who has failed restarts.
   virtual void begin_again() = 0;
   bool restarted() {
     for (int i = 0; i < 200 && (epoch_ == begun_ || !see(1)); ++i)
@@ -60,7 +60,7 @@ class AtTheWindow : public WorkQueue {
     return see(3);
   }
 
-  // Opens the window and lets `work` be done at it; true when it was done before the time was up.
+  // Opens the window and performs `work`; true when it was completed within the time limit.
   bool sit(const std::function<void()>& work, bool teach = false) {
     std::thread person([&] {
       if (see(3)) work();
@@ -99,7 +99,7 @@ class AtTheWindow : public WorkQueue {
 
  protected:
   virtual void do_it(const Act& act) = 0;
-  // Until so many pictures have been drawn since: what was done before the call is in the last of them.
+  // Until so many frames have been drawn since: the last of them includes everything before the call.
   bool see(size_t pictures) {
     std::unique_lock lock(mutex_);
     const size_t from = pictures_;
@@ -112,7 +112,7 @@ class AtTheWindow : public WorkQueue {
     return !closed_;
   }
 
-  // No work is seen any more: the window shows another screen.
+  // The field is hidden: the window shows another screen.
   bool stands_still() {
     std::unique_lock lock(mutex_);
     for (int i = 0; i < 20 && !closed_; ++i) {
@@ -160,10 +160,10 @@ class XMouse : public AtTheWindow {
       if (!see(1)) return;
     }
     const MouseInput in = by_mouse(act, look_, 1);
-    if (turn_ != in.turn) x_.button(3, turn_ = in.turn), see(2);  // before the mouse moves: it means another thing now
+    if (turn_ != in.turn) x_.button(3, turn_ = in.turn), see(2);  // before the mouse moves: its meaning changes
     if (both_ != in.both) x_.key("w", both_ = in.both), see(2);
     for (float right = in.right, down = in.down; right != 0 || down != 0;) {
-      // The pointer is held in the middle: no step may be so long that it meets the edge of the screen.
+      // The pointer is recentered: no step may be so long that it reaches the edge of the screen.
       const float x = std::clamp(right, -50.0f, 50.0f), y = std::clamp(down, -50.0f, 50.0f);
       x_.motion(static_cast<int>(x), static_cast<int>(y));
       right -= x, down -= y;
@@ -178,7 +178,7 @@ class XMouse : public AtTheWindow {
   bool turn_ = false, both_ = false;
 };
 
-// A gamepad of SDL's own making: it comes, is opened and read like one of plastic.
+// A virtual gamepad of SDL: it connects, is opened and read like a real one.
 class SdlPad : public AtTheWindow {
  public:
   using AtTheWindow::AtTheWindow;
@@ -253,8 +253,8 @@ class StitchAtTheWindow : public testing::Test {
   std::unique_ptr<XServer> x_;
 };
 
-// Takes the needle, sews both bowel ends, pulls the thread through, draws them together, ties a throw. Three tries: hands that
-// depend on when pictures come do not do the same thing twice.
+// Grasps the needle, sutures both bowel ends, pulls the thread through, approximates, ties a throw. Three attempts: hands that
+// depend on frame timing are not deterministic.
 void sew_and_tie(AtTheWindow& desk, std::string& stopped_at, int throws) {
   for (int attempt = 0; attempt < 3; ++attempt) {
     Person me(desk);
@@ -280,7 +280,7 @@ void expect_a_stitch(AtTheWindow& desk, const std::string& stopped_at) {
   EXPECT_GE(desk.count(EventKind::throw_locked), 1u);
 }
 
-// With the lesson open, which reports what to do: it follows to its end.
+// With the lesson open: follows its instructions to its end.
 TEST_F(StitchAtTheWindow, by_mouse_and_keyboard) {
   XMouse desk(x_->display, 480);
   if (!desk.ready()) GTEST_SKIP() << "no XTest here";
@@ -294,7 +294,7 @@ TEST_F(StitchAtTheWindow, by_mouse_and_keyboard) {
   EXPECT_GE(went.size(), 6u) << "step by step; some are done in one movement";
 }
 
-// "Show me", then the learner's turn: nothing of what was shown is left, and what the learner does is recognized.
+// "Show me", then the learner's turn: the demonstration is undone, and the learner's actions are recognized.
 TEST_F(StitchAtTheWindow, a_lesson_shows_a_step_and_sees_it_done) {
   XMouse desk(x_->display, 180);
   if (!desk.ready()) GTEST_SKIP() << "no XTest here";
@@ -332,8 +332,8 @@ TEST_F(StitchAtTheWindow, by_gamepad) {
   expect_a_stitch(desk, stopped_at);
 }
 
-// The plug comes out while the needle is held: the hands stay, the needle is not dropped, and plugged in again the
-// bite is finished.
+// The gamepad is unplugged while the needle is held: the hands stay, the needle is not dropped; after plugging it in again
+// the bite is completed.
 TEST_F(StitchAtTheWindow, a_gamepad_that_is_unplugged_loses_nothing) {
   SdlPad desk(180);
   Person me(desk);

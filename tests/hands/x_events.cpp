@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/hands: see x_events.h. XTest's library comes with xdotool; its headers do not, so it is requested by name.
+// tests/hands: see x_events.h. XTest's library comes with xdotool; its headers do not, so it is loaded by name.
 #ifdef CATGUT_TESTS_WINDOW
 #include "x_events.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/hands: mouse and keyboard events made by the X server (XTest), on a connection of our own: to the program they come
-// from outside, like anybody's.
+// tests/hands: mouse and keyboard events made by the X server (XTest), on a separate connection: the program receives them
+// like any external event.
 #pragma once
 #include <memory>
 #include <string>
@@ -12,7 +12,7 @@ class XEvents {
   explicit XEvents(const std::string& display);
   ~XEvents();
   bool ready() const;
-  void key(const std::string& name, bool down);  // as X calls it: "Tab", "w"
+  void key(const std::string& name, bool down);  // X's key name: "Tab", "w"
   void button(unsigned which, bool down);        // 1 left, 3 right, 4 and 5 the wheel
   void motion(int right, int down);              // [pixels]
 

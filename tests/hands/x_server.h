@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests: an X server (Xvfb) of our own, for a caller that sits down at the window: on a machine with a desktop a test must not
+// tests: a private X server (Xvfb) for a simulated user of the window: on a machine with a desktop a test must not
 // take the mouse away.
 #pragma once
 #include <signal.h>
@@ -31,7 +31,7 @@ struct XServer {
     }
     close(out[1]);
     std::string number;
-    for (char c; read(out[0], &c, 1) == 1 && c != '\n';) number += c;  // Xvfb says which display it has, or ends
+    for (char c; read(out[0], &c, 1) == 1 && c != '\n';) number += c;  // Xvfb reports its display, or ends
     close(out[0]);
     if (!number.empty()) display = ":" + number;
   }

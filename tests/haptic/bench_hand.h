@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/haptic: a hand, an arm and a piece of tissue in lock step, around the real servo. The arm has mass and friction, the
-// hand is a spring to where it means to be, the tissue is a wall that a needle can go through, worked out at any rate and heard
-// one frame late, as a simulation is. Unkind arms read their position in steps, move late and are called late or not at all.
+// tests/haptic: a hand, a device and a piece of tissue in lock step, around the real servo. The device has mass and friction,
+// the hand is a spring to its target, the tissue is a wall that a needle can puncture, computed at any rate and delayed by one
+// frame, like a simulation. Realistic devices quantize their position, have delays, and lose calls or make them late.
 #pragma once
 #include <cmath>
 #include <deque>
@@ -18,13 +18,13 @@ struct BenchTissue {
   float a1 = 600, a2 = 1.5e5f;  // [N/m], [N/m^2] before the tip goes in: f = a1 z + a2 z^2
   float coupling = 300;         // [N/m]
   float friction = 0.3f;
-  float pierce_force = 0;  // [N] 0: a wall that nothing pierces
+  float pierce_force = 0;  // [N] 0: a wall without puncture
   float cutting = 0.2f;    // [N] while the tip is in
   float drag = 40;         // [N/m] shaft friction per meter of needle in the tissue
-  bool held = false;       // the tool holds tissue: a spring both ways, and nothing slides
+  bool held = false;       // the tool holds tissue: a bilateral spring without sliding
 };
 
-// What a real arm does and an ideal one does not.
+// Imperfections of a real device.
 struct Unkind {
   float encoder = 0;    // [m] step of the position (Touch: 0.055 mm)
   float transport = 0;  // [s] from the call that computes a force to the motors
@@ -40,15 +40,15 @@ inline Unkind touch_like(float transport = 0.002f) { return {5.5e-5f, transport,
 struct Bench {
   BenchTissue tissue;
   float rate = 60;        // [1/s] of the physics
-  bool late = true;       // heard one frame later
+  bool late = true;       // delayed by one frame
   float mass = 0.1f;      // [kg] arm and finger
   float viscous = 0.5f;   // [N s/m]
   float coulomb = 0.05f;  // [N] of the arm
   float grip = 150, grip_damping = 2;
   Unkind unkind;
   EnergyPool* pool = nullptr;       // shared with the other hand, and
-  size_t hand = 0;                  // which of the two this is
-  std::function<Vec3(float)> path;  // [m] where the hand means to be
+  size_t hand = 0;                  // index of this hand
+  std::function<Vec3(float)> path;  // [m] target of the hand
 
   ServoHand servo;
   ServoOptions options;
@@ -57,7 +57,7 @@ struct Bench {
   uint32_t discontinuity_id = 0;
   uint64_t ticks = 0;
   double energy = 0, energy_most = 0;    // [J] out of the motors
-  double to_hand = 0, to_hand_most = 0;  // [J] of that, what the arm's own damping leaves for the hand
+  double to_hand = 0, to_hand_most = 0;  // [J] of that, what remains for the hand after the device's own damping
   float step_most = 0;                   // [N] from one call to the next
   float force_most = 0;
   float gap_most = 0;  // [s] between two calls
@@ -68,15 +68,15 @@ struct Bench {
   float next = 0;
   ForcePatch thinking;
   bool thought = false;
-  std::function<void(ForcePatch&)> spoil;    // what a bad simulation sends
+  std::function<void(ForcePatch&)> spoil;    // faults of a simulation
   std::function<bool(float)> physics_works;  // false: it is stalled
-  // Of unkind arms: what is under way, with the time at which it arrives [tenths of a millisecond since the beginning].
+  // Of realistic devices: data in flight, with the time of arrival [tenths of a millisecond since the start].
   Random chance{11};
   uint64_t part = 0, next_call = 0;
   std::deque<std::pair<uint64_t, Vec3>> to_motors;
   std::vector<std::pair<uint64_t, ForcePatch>> patches;
   std::deque<std::pair<uint64_t, Vec3>> samples;  // on their way to the physics
-  Vec3 seen{0, 0.005f, 0};                        // the newest that arrived there
+  Vec3 seen{0, 0.005f, 0};                        // the newest one that arrived there
   uint64_t seen_ns = 0;
   ForcePatch arrived;
   bool any_arrived = false;
@@ -159,9 +159,9 @@ struct Bench {
   }
   bool chance_of(float p) { return p > 0 && chance.uniform() < p; }
 
-  // The servo's call, and when the next one comes.
+  // The servo's call, and the time of the next one.
   void call() {
-    // Of what has arrived the newest: what was overtaken on its way is dropped, as the bridge does.
+    // The newest arrived one: overtaken ones are dropped, as the bridge does.
     const ForcePatch* newest = nullptr;
     for (auto at = patches.begin(); at != patches.end();) {
       if (at->first > part) {
@@ -212,7 +212,7 @@ struct Bench {
       const float at = time + h * static_cast<float>(part % 10);
       const Vec3 wish = path(at), speed = (path(at + h) - wish) / h;
       v += (motors + (wish - x) * grip + (speed - v) * grip_damping - v * viscous) * (h / mass);
-      // Dry friction takes speed away and never turns it round.
+      // Dry friction reduces speed and never reverses it.
       const float slow = coulomb * h / mass, l = length(v);
       v = l > slow ? v * (1 - slow / l) : Vec3{};
       x += v * h;
@@ -224,7 +224,7 @@ struct Bench {
       if (++part % 10 == 0) time += 0.001f;
     }
   }
-  // Until the arm is engaged and at full force: the hand waits above the tissue.
+  // Until the device is engaged and at full force: the hand waits above the tissue.
   void warm_up(Vec3 at) {
     const auto wanted = path;
     seen = at;

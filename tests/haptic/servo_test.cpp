@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/haptic: the criteria of docs/rooms/haptic.md that need no driver, by name, in lock step: H3 passivity, H5 stall, H6
+// tests/haptic: the criteria of docs/rooms/haptic.md without a backend, by name, in lock step: H3 passivity, H5 stall, H6
 // garbage, H8 heat, H10 determinism; and the multi-rate comparison.
 #include "haptic/servo.h"
 
@@ -23,7 +23,7 @@ struct Gesture {
   float seconds;
   BenchTissue tissue;
   Vec3 (*path)(float);
-  float still_from = 0, still_to = 0;  // [s] the hand means to hold still
+  float still_from = 0, still_to = 0;  // [s] interval in which the hand tries to hold still
 };
 
 std::vector<Gesture> gestures() {
@@ -31,7 +31,7 @@ std::vector<Gesture> gestures() {
   needle.pierce_force = 0.9f;
   held.held = true;
   return {
-      // A heavy hand that hardly grips rings down on its own, at full rate too: what swings a second later is the rendering's.
+      // A heavy hand with a loose grip oscillates on its own, at full rate too: oscillation a second later is the rendering's.
       {"press", 3.2f, wall,
        [](float t) {
          return Vec3{0, 0.005f - 0.012f * (smooth((t - 0.1f) / 0.4f) - smooth((t - 2.6f) / 0.4f)), 0};
@@ -73,7 +73,7 @@ struct Felt {
 };
 Felt feel(const Gesture& g, float rate, bool late, float mass, float grip, bool held_force = false) {
   Bench b;
-  b.coulomb = 0;  // nothing but the rendering keeps the hand still
+  b.coulomb = 0;  // only the rendering holds the hand
   if (held_force) b.options.passivity.damping = 0;
   if (held_force) b.spoil = [](ForcePatch& p) { p.stiffness = {}, p.normal = {}, p.coefficient = 0; };
   b.tissue = g.tissue;
@@ -89,8 +89,8 @@ Felt feel(const Gesture& g, float rate, bool late, float mass, float grip, bool 
   return {b.energy_most, high > low ? high - low : 0, b.step_most};
 }
 
-// H3: E_max <= 0.5 mJ + 2 x the full-rate reference's, no swing beyond 0.2 mm while the hand means to hold still; grips of 50
-// to 800 N/m, hands of 0.05 to 0.3 kg; and without any of it the same gesture does give energy, so the test can fail.
+// H3: E_max <= 0.5 mJ + 2 x the full-rate reference's, no swing beyond 0.2 mm while the hand tries to hold still; grips of 50
+// to 800 N/m, hands of 0.05 to 0.3 kg. Without the protection the same gesture generates energy, so the test can fail.
 TEST(Haptics, H3_passive_under_every_hand) {
   double worst_energy = 0;
   float worst_swing = 0, worst_step = 0;
@@ -106,7 +106,7 @@ TEST(Haptics, H3_passive_under_every_hand) {
         worst_swing = std::max(worst_swing, ours.swing);
         worst_step = std::max(worst_step, ours.step);
       }
-  // The same chain fed with bare forces and without its net: it shakes.
+  // The same chain with held forces and without the passivity controller: it oscillates.
   const Felt bare = feel(gestures()[0], 60, true, 0.1f, 150, true);
   EXPECT_GT(bare.swing, 0.2e-3f);
   EXPECT_GT(bare.energy, 0.5e-3);
@@ -115,8 +115,8 @@ TEST(Haptics, H3_passive_under_every_hand) {
               static_cast<double>(worst_swing) * 1e3, static_cast<double>(worst_step));
 }
 
-// H3 on arms as they are: position in steps of 0.055 mm, 1 to 3 ms to the motors, periods that vary, calls that are late or
-// lost. No reference of our own making: absolute bounds on the energy given, the swing along every axis, the step of a call.
+// H3 on realistic devices: position in steps of 0.055 mm, 1 to 3 ms to the motors, varying periods, late or lost
+// calls. Without a reference: absolute bounds on the energy, the swing along every axis, the step of a call.
 TEST(Haptics, H3_on_unkind_arms) {
   std::vector<Gesture> all = gestures();
   BenchTissue needle;
@@ -147,7 +147,7 @@ TEST(Haptics, H3_on_unkind_arms) {
           const float moved = high.x >= low.x ? length(high - low) : 0;
           SCOPED_TRACE(testing::Message() << g.name << " mass " << mass << " kg grip " << grip << " N/m, " << 1e3f * transport
                                           << " ms");
-          // A contact of its own for each tap: half a millijoule each.
+          // A separate contact for each tap: half a millijoule each.
           EXPECT_LE(b.to_hand_most, std::string(g.name) == "tap 5 Hz" ? 5e-3 : 1e-3);
           EXPECT_LE(moved, 0.4e-3f);
           EXPECT_LE(b.step_most, 0.5f + 1e-4f);
@@ -161,8 +161,8 @@ TEST(Haptics, H3_on_unkind_arms) {
   }
 }
 
-// Two hands on one thread, each on an arm as they are: drawn tight, held, and let go. Neither is braked while they draw, what
-// they get back is never more than they gave, and they hold still.
+// Two hands on one thread, each on a realistic device: tightened, held, and released. Neither is braked while pulling, the
+// returned energy never exceeds the given one, and they hold still.
 TEST(Haptics, H3_two_hands_on_one_thread) {
   double worst = 0;
   float swing = 0;
@@ -228,8 +228,8 @@ TEST(Haptics, H3_two_hands_on_one_thread) {
       1e3 * worst, 1e3 * double{swing}, braked_most);
 }
 
-// A bridge between: patches and samples take 0 to 50 ms each way, spread, and one in ten is lost. What is felt gives no energy,
-// and where the network is too slow nothing is felt at all.
+// A bridge in between: patches and samples take 0 to 50 ms each way, with jitter, and one in ten is lost. The force generates
+// no energy, and on a network that is too slow the force is zero.
 TEST(Haptics, H3_over_a_network) {
   for (const float link : {0.0f, 0.001f, 0.005f, 0.015f, 0.03f, 0.05f})
     for (const bool rough : {false, true}) {
@@ -265,7 +265,7 @@ TEST(Haptics, H3_over_a_network) {
     }
 }
 
-// A linear tissue looks to the local model as it does at full rate; a held force swings by centimeters.
+// With the local model a linear tissue behaves as at full rate; a held force swings by centimeters.
 TEST(Haptics, the_multi_rate_comparison) {
   for (const StudyPublished& p : published_study()) {
     const StudyRow r = run_study(p.c);
@@ -288,14 +288,14 @@ TEST(Haptics, the_multi_rate_comparison) {
   }
 }
 
-// H5: physics stalls while the hand is pressed upon with 2 N. The force goes down and never up, is below 0.05 N within 100 ms
-// of expiry, never steps, and comes back through the ramp.
+// H5: physics stalls while the hand presses with 2 N. The force only decreases, is below 0.05 N within 100 ms
+// of expiry, never steps, and returns through the ramp.
 TEST(Haptics, H5_physics_stalls) {
   for (const float stall : {0.05f, 0.2f, 2.0f}) {
     SCOPED_TRACE(testing::Message() << "stalled for " << stall << " s");
     Bench b;
     b.tissue.held = true;
-    b.options.limiter.continuous = 3.3f;  // two newtons for seconds would rightly be turned down: not what is asked here
+    b.options.limiter.continuous = 3.3f;  // two newtons for seconds would correctly be reduced: not the subject here
     b.path = [](float t) { return Vec3{0, 0.018f * smooth(t / 0.8f), 0}; };
     b.warm_up({});
     b.grip = 400;
@@ -311,7 +311,7 @@ TEST(Haptics, H5_physics_stalls) {
       const float f = length(b.force), since = b.time - start;
       const float age = 1e-9f * static_cast<float>(b.now_ns - b.servo.model.now.time_ns);
       if (expired_at < 0 && age > b.servo.model.now.expiry) expired_at = since;
-      // While it is off there is no way up but by the ramp; the force in it is never more than its part.
+      // While it is off the ramp is the only way up; the force in it never exceeds its fraction.
       if (expired_at >= 0 && since < stall) { EXPECT_LE(f, last + 1e-4f) << "at " << since; }
       if (expired_at >= 0 && below_at < 0 && f < 0.05f) below_at = since - expired_at;
       if (since > stall + 0.04f) highest_after = std::max(highest_after, f);
@@ -321,11 +321,11 @@ TEST(Haptics, H5_physics_stalls) {
     if (stall > 0.15f) {
       EXPECT_GE(below_at, 0);
       EXPECT_LE(below_at, 0.1f);
-      // The hand still pulls: nothing engages until it has let go, however long the physics has been back.
+      // The hand still pulls: nothing engages until it releases, for any time after the physics has returned.
       EXPECT_LT(highest_after, 0.05f);
       std::printf("H5: stall %.2f s: below 0.05 N %.0f ms after expiry, largest step %.3f N/ms\n", double{stall},
                   double{below_at} * 1e3, double{b.step_most});
-      // Let go, then pull again: the ramp takes two seconds.
+      // Release, then pull again: the ramp takes two seconds.
       b.path = [](float) { return Vec3{}; };
       b.run(0.5f);
       EXPECT_TRUE(b.servo.limiter.engaged == Engaged::rising);
@@ -341,7 +341,7 @@ TEST(Haptics, H5_physics_stalls) {
   }
 }
 
-// H6: whatever the simulation, the arm or the clock say, what goes out is finite and within the cap, and says so once.
+// H6: for any input of simulation, device or clock, the output is finite and within the cap, and the fault is reported once.
 TEST(Haptics, H6_garbage) {
   const float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity();
   const std::vector<std::pair<uint32_t, std::function<void(ForcePatch&)>>> bad{
@@ -384,7 +384,7 @@ TEST(Haptics, H6_garbage) {
     EXPECT_LE(b.step_most, 0.5f + 1e-4f);
     EXPECT_EQ(b.servo.limiter.faults & bad[k].first, bad[k].first);
   }
-  // The arm: positions that are none, clocks that run backwards, hands that fly.
+  // The device: invalid positions, clocks that run backward, implausible speeds.
   ServoHand hand;
   ServoOptions options;
   Random random(3);
@@ -411,8 +411,8 @@ TEST(Haptics, H6_garbage) {
   EXPECT_TRUE(hand.limiter.faults & kTimeBack);
 }
 
-// S3: whatever the gap between two calls, the motors see at most the step of one millisecond; a gap over 5 ms is a fault, and
-// force comes back slowly. The hand meets something hard while the servo is late.
+// S3: for any gap between two calls, the motors receive at most the step of one millisecond; a gap over 5 ms is a fault, and
+// force returns slowly. The hand touches something stiff while the servo is late.
 TEST(Haptics, S3_late_servo) {
   for (const int gap : {2, 3, 7, 15, 19, 60}) {
     SCOPED_TRACE(gap);
@@ -428,7 +428,7 @@ TEST(Haptics, S3_late_servo) {
       const bool late = i >= 2500 && i % 20 == 0;
       now += 1000000ull * static_cast<uint64_t>(late ? gap : 1);
       p.time_ns = now;
-      p.force = i < 2500 ? Vec3{} : Vec3{i / 20 % 2 ? 0.5f : 3.0f, 0, 0};  // what is felt changes just then
+      p.force = i < 2500 ? Vec3{} : Vec3{i / 20 % 2 ? 0.5f : 3.0f, 0, 0};  // the force changes in that gap
       const Vec3 f = servo_step(hand, o, s, &p, now).force;
       largest = std::max(largest, length(f - last));
       if (late) rises = std::max(rises, length(f) - length(last));
@@ -441,8 +441,8 @@ TEST(Haptics, S3_late_servo) {
   }
 }
 
-// S1: a patch that was computed for another place than the hand's is not felt, whatever it says; near, and as far as a hand
-// can have moved since, it is.
+// S1: a patch computed for a position other than the hand's is not rendered, whatever its content; near, and within the
+// possible motion since, it is.
 TEST(Haptics, S1_a_patch_of_another_place_is_refused) {
   const auto felt = [](Vec3 offset, float speed, uint32_t& faults) {
     ServoHand hand;
@@ -474,7 +474,7 @@ TEST(Haptics, S1_a_patch_of_another_place_is_refused) {
   EXPECT_NEAR(felt({-0.010f, 0, 0}, 0.4f, faults), 0.8f, 0.01f) << "the hand was there a tick ago";
 }
 
-// S12: one sample that lies outside of any arm's reach is garbage, and leaves nothing behind.
+// S12: one sample outside of any device's range is discarded without consequences.
 TEST(Haptics, S12_one_absurd_sample) {
   ServoHand hand;
   ServoOptions o;
@@ -494,7 +494,7 @@ TEST(Haptics, S12_one_absurd_sample) {
   EXPECT_FALSE(hand.limiter.faults & kNotFinite);
 }
 
-// S12: a hand that flies through free air faster than any contact allows feels the next contact at once, gently.
+// S12: a hand that moves through free air faster than any contact allows feels the next contact at once, gently.
 TEST(Haptics, S12_a_fast_free_hand) {
   ServoHand hand;
   ServoOptions o;
@@ -528,8 +528,8 @@ std::function<void(ForcePatch&)> rubs(float drag, float stiffness = 0) {
   };
 }
 
-// S4: a needle that is held by 0.7 N, and a relaxed hand that leans on it with less, for as long as one likes: it stands still,
-// on an arm that reads its position in steps and moves late. And each of those steps is felt as less than 0.03 N.
+// S4: a needle held by 0.7 N of friction, and a relaxed hand that leans on it with less, for any time: it does not creep,
+// on a device with quantized and delayed positions. Each encoder step changes the force by less than 0.03 N.
 TEST(Haptics, S4_a_held_needle_does_not_creep) {
   for (const float transport : {0.0f, 0.001f, 0.003f})
     for (const float lean : {0.3f, 0.5f, 0.6f}) {
@@ -561,7 +561,7 @@ TEST(Haptics, S4_a_held_needle_does_not_creep) {
     }
 }
 
-// S4: whatever the patch, friction and spring together are never stiffer than the arm can render.
+// S4: for any patch, friction and spring together are never stiffer than the device's limit.
 TEST(Haptics, S4_friction_stays_in_the_stiffness_budget) {
   Random random(5);
   float most = 0;
@@ -591,8 +591,8 @@ TEST(Haptics, S4_friction_stays_in_the_stiffness_budget) {
   EXPECT_LE(most, 401);
 }
 
-// S5: friction for five seconds is no credit: a force that pushes the hand is braked as soon as it has given more than a spring
-// of its strength can hold.
+// S5: dissipation over five seconds gives no credit: a force that pushes the hand is braked once it has given more energy than
+// a spring of its strength can hold.
 TEST(Haptics, S5_rubbing_pays_for_nothing) {
   Passivity p;
   PassivityInput in;
@@ -605,7 +605,7 @@ TEST(Haptics, S5_rubbing_pays_for_nothing) {
     in.v = {rubbing ? 0.025f * std::cos(2 * kPi * t) : 0.02f, 0, 0};
     in.x += in.v * 0.001f;
     const Vec3 friction = in.v * (rubbing ? -0.6f / std::max(1e-6f, length(in.v)) : 0.0f);
-    // Then a force along the motion, whatever the hand does: nothing that is touched does that.
+    // Then a force along the motion, whatever the hand does: no passive contact does that.
     in.force = rubbing ? friction : Vec3{0.5f, 0, 0};
     in.rubbed = friction;
     in.stiffness = 300;
@@ -624,7 +624,7 @@ TEST(Haptics, S5_rubbing_pays_for_nothing) {
   EXPECT_LT(given, legitimate + 0.005 * 0.5 * 0.02);
 }
 
-// S5: what one hand gives to a thread comes out at the other, and is not braked; without the other's giving it is.
+// S5: energy from one hand through a thread to the other is not braked; without the first hand's input it is.
 TEST(Haptics, S5_energy_of_two_hands) {
   for (const bool given : {true, false}) {
     EnergyPool pool;
@@ -638,7 +638,7 @@ TEST(Haptics, S5_energy_of_two_hands) {
       const bool pulls = ms >= 2500;
       for (size_t k = 0; k < 2; ++k) {
         s[k].state = ArmState::ready;
-        // The right hand draws the thread to the right, the left one is drawn along.
+        // The right hand pulls the thread to the right, the left one is pulled along.
         if (pulls && (k == 1 || given)) s[k].pose.p.x += 0.05f * 0.001f;
         ForcePatch p;
         p.point = s[k].pose.p, p.time_ns = now, p.period = 0.001f;
@@ -660,7 +660,7 @@ TEST(Haptics, S5_energy_of_two_hands) {
       EXPECT_GT(braked, 50);
     }
   }
-  // No force, no brake, whatever is in the account.
+  // Without force no braking, for any balance of the account.
   Passivity p;
   PassivityInput in;
   PassivityOptions off;
@@ -670,8 +670,8 @@ TEST(Haptics, S5_energy_of_two_hands) {
   EXPECT_FALSE(p.braking);
 }
 
-// S11: a patch that says something else than the last one is taken over in several steps, at every rate; what the hand's own
-// motion changes is felt at once.
+// S11: a patch that differs from the last one is blended in over several steps, at every rate; changes due to the hand's own
+// motion are rendered at once.
 TEST(Haptics, S11_patches_blend) {
   ForceModel m;
   ForcePatch p;
@@ -693,8 +693,8 @@ TEST(Haptics, S11_patches_blend) {
   EXPECT_NEAR(evaluate(m, {0.001f, 0, 0}, {}, 0.001f).x, 0.1f - 0.3f, 1e-3f);
 }
 
-// S11: the tip seemed to go through and did not (the hand drew back before the physics let it in): the wall is there again, and
-// was not taken for pierced by a thread that pulls.
+// S11: the tip seemed to puncture and did not (the hand withdrew before the physics confirmed it): the wall is restored, and
+// a thread that pulls does not count as a puncture.
 TEST(Haptics, S11_a_wall_that_was_not_pierced) {
   ForceModel m;
   ForcePatch p;
@@ -707,7 +707,7 @@ TEST(Haptics, S11_a_wall_that_was_not_pierced) {
   };
   EXPECT_NEAR(at(0.0029f, 20), 0.87f, 0.01f);
   EXPECT_LT(at(0.0031f, 20), 0.5f) << "through";
-  at(0.001f, 200);  // and back, before the physics agreed
+  at(0.001f, 200);  // and back, before the physics confirmed it
   EXPECT_NEAR(at(0.0028f, 20), 0.84f, 0.02f) << "a whole wall";
   ForceModel pulled;
   m = pulled;
@@ -715,8 +715,8 @@ TEST(Haptics, S11_a_wall_that_was_not_pierced) {
   EXPECT_NEAR(at(0, 50), 1.2f, 0.01f) << "a thread pierces nothing";
 }
 
-// S9: the button beside the jaw's clutches while it is held: the tool stays where it is, nothing is felt, and continues from
-// there when it is let go. It cuts only when it is pressed twice, soon.
+// S9: the button beside the jaw's clutches while it is pressed: the tool stays where it is, without force, and continues from
+// there on release. It cuts only when it is pressed twice in a short time.
 TEST(Haptics, S9_clutch_and_cut) {
   ServoHand hand;
   ServoOptions o;
@@ -756,7 +756,7 @@ TEST(Haptics, S9_clutch_and_cut) {
   EXPECT_EQ(run(100, 2, {}), kButtonCut) << "two";
 }
 
-// H8: three newtons asked for during ten minutes: the mean that goes out is one the motors can bear for ever.
+// H8: three newtons requested for ten minutes: the mean output is one that the motors can sustain.
 TEST(Haptics, H8_heat) {
   Limiter limiter;
   double square = 0;
@@ -774,7 +774,7 @@ TEST(Haptics, H8_heat) {
   EXPECT_GT(most, 2.0f);
   EXPECT_LE(rms, 0.88);
   EXPECT_GT(rms, 0.7);
-  // Hot motors: nothing at all is left.
+  // Hot motors: zero force.
   LimiterInput hot;
   hot.wanted = {0, 1, 0};
   hot.warmth = 1;
@@ -782,8 +782,8 @@ TEST(Haptics, H8_heat) {
   EXPECT_LT(length(limiter.out), 1e-4f);
 }
 
-// H4, the puncture: what is left of the force when the tip goes through is felt at most 8 ms after the physics lets it through,
-// although the physics is heard a frame late. The servo knows the force at which a wall gives way, and does not wait.
+// H4, the puncture: the force drops at most 8 ms after the puncture in the physics,
+// although the physics is a frame late. The servo knows the puncture force, and does not wait.
 TEST(Haptics, H4_puncture_drop) {
   for (const float rate : {60.0f, 240.0f, 480.0f, 960.0f}) {
     SCOPED_TRACE(rate);
@@ -831,7 +831,7 @@ TEST(Haptics, H10_determinism) {
   EXPECT_NE(play(0), play(0.001f));
 }
 
-// A force that a patch holds beyond the arm's stiffness is cut down to it, along every direction.
+// A patch stiffness beyond the device's limit is reduced to it, along every direction.
 TEST(Haptics, stiffness_is_what_the_arm_can_render) {
   ForcePatch p;
   p.stiffness = {900, 300, 250, 300, -20, 10};
@@ -841,13 +841,13 @@ TEST(Haptics, stiffness_is_what_the_arm_can_render) {
     EXPECT_LE(value, 400.1f);
     EXPECT_GE(value, -1e-3f);
   }
-  // Two springs in series, as closed form has it.
+  // Two springs in series, compared with the closed form.
   const Sym3 s = in_series(outer({0, 1, 0}, 1100), 400);
   EXPECT_NEAR(s.yy, 1100.0f * 400 / 1500, 0.01f);
   EXPECT_NEAR(s.xx, 0, 1e-4f);
 }
 
-// The arm's place in the field: there and back, and force and motion keep their product.
+// The device's workspace in the field: there and back; the product of force and motion is preserved.
 TEST(Haptics, workspace_makes_no_energy) {
   Workspace w;
   w.scale = 0.5f;

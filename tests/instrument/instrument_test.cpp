@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/instrument: instruments change hands by commands, a parked clamp holds and pulls, and all of it is replayed to the bit.
+// tests/instrument: commands exchange instruments, a parked clamp holds and pulls, and everything replays to the bit.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 namespace catgut {
 namespace {
 
-// A bowel end with its rim at the origin, and instruments as the text says.
+// A bowel end with its rim at the origin, and instruments given as text.
 SceneSpec scene_with(const std::string& instruments) {
   return parse_scene(R"(title = "instruments"
 settle = 0.05
@@ -172,7 +172,7 @@ TEST(Instrument, a_clamp_is_parked_holds_on_and_is_taken_up_again) {
   f.order(CommandKind::park, 0);
   EXPECT_EQ(f.place(2), InstrumentPlace::parked);
   EXPECT_EQ(f.seen.tool[0].instrument, -1);
-  f.input.hand[0].jaw = 1;  // an open hand that has let go of the clamp does not open it
+  f.input.hand[0].jaw = 1;  // an open hand that has left the clamp does not open it
   f.run(120);
   EXPECT_EQ(f.seen.instrument[2].held, Held::tissue);
   EXPECT_EQ(f.count(EventKind::tissue_released), 0u);
@@ -182,7 +182,7 @@ TEST(Instrument, a_clamp_is_parked_holds_on_and_is_taken_up_again) {
   f.order(CommandKind::unpark, 0, 2);
   EXPECT_EQ(f.seen.tool[0].instrument, 2);
   EXPECT_EQ(f.seen.tool[0].held, Held::tissue);
-  // Taken up it follows the hand again, tissue and all; the open jaws let go.
+  // Taken again it follows the hand, with the tissue; the open jaws release.
   f.input.hand[0].jaw = 1;
   f.run(3);
   EXPECT_EQ(f.seen.tool[0].held, Held::nothing);
@@ -190,7 +190,7 @@ TEST(Instrument, a_clamp_is_parked_holds_on_and_is_taken_up_again) {
   EXPECT_EQ(f.count(EventKind::instrument_refused), 0u);
 }
 
-// At rest the tissue carries the stated force, and gives way in proportion to it.
+// At equilibrium the tissue carries the stated force, and deforms in proportion to it.
 TEST(Instrument, a_parked_clamp_pulls_with_the_stated_force) {
   Field bare(scene_with(""));
   bare.run(240);
@@ -211,7 +211,7 @@ TEST(Instrument, a_parked_clamp_pulls_with_the_stated_force) {
   EXPECT_NEAR(moved[1] / moved[0], 2, 0.4);
 }
 
-// Without a stated force: the weight, downward, unless the clamp lies on the drape.
+// Without a stated force: its weight, downward, unless the clamp lies on the drape.
 TEST(Instrument, a_parked_clamp_pulls_with_its_weight) {
   Field f(scene_with("[[instrument]]\nkind = \"allis\"\nwhere = \"parked\"\nat = [0.02, 0.0, 0.0]\n"));
   f.run(240);
@@ -221,7 +221,7 @@ TEST(Instrument, a_parked_clamp_pulls_with_its_weight) {
   EXPECT_LT(length(f.seen.instrument[0].pull), 1.2f * weight) << "it cannot pull harder than it weighs";
 }
 
-// Harder than an Allis grips: it slips off, as an event of no one's hand.
+// Above an Allis's grip force: it slips off, as an event without a hand.
 TEST(Instrument, a_clamp_that_is_pulled_too_hard_slips) {
   Field f(scene_with("[[instrument]]\nkind = \"allis\"\nwhere = \"parked\"\nat = [0.02, 0.0, 0.0]\npull = [20.0, 0.0, 0.0]\n"));
   f.run(240);
@@ -233,7 +233,7 @@ TEST(Instrument, a_clamp_that_is_pulled_too_hard_slips) {
   EXPECT_EQ(f.seen.instrument[0].held, Held::nothing);
 }
 
-// Clamp, park, take up: replayed from the start and from a state that was saved on the way, whatever the workers.
+// Clamp, park, take: replayed from the start and from a saved state, for any number of workers.
 TEST(Instrument, commands_replay_to_the_bit) {
   Field f(scene_with(kFour));
   clamp_the_rim(f);
@@ -254,7 +254,7 @@ TEST(Instrument, commands_replay_to_the_bit) {
   }
 }
 
-// Three hands: each moves its own instrument; a hand that the scene gives nothing takes one from the tray.
+// Three hands: each moves its own instrument; a hand without one in the scene takes one from the tray.
 TEST(Instrument, three_hands_hold_three_instruments) {
   Field f(scene_with(std::string(kFour) + "[[instrument]]\nkind = \"retractor\"\nwhere = \"assistant_right\"\n"));
   f.connect(0, {0.08f, 0.06f, 0.03f});

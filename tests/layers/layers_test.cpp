@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/layers: the arrows between rooms. Reads build/rooms.txt (written by catgut_room in CMake) and every source file; an
-// #include that runs up or sideways fails here with its file and line.
+// tests/layers: the dependencies of rooms. Reads build/rooms.txt (written by catgut_room in CMake) and every source file; an
+// #include upward or sideways fails here with its file and line.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,7 +43,7 @@ std::vector<fs::path> sources_under(const fs::path& folder) {
 
 const fs::path kSource = fs::path(CATGUT_SOURCE_DIR) / "src";
 
-// "" when the line is fine, else what is wrong with it.
+// "" for a valid line, else the error.
 std::string fault_of(const Rooms& rooms, const std::string& room, const std::string& line) {
   static const std::regex kInclude(R"re(^\s*#\s*include\s*"([^"]+)")re");
   std::smatch match;
@@ -51,7 +51,7 @@ std::string fault_of(const Rooms& rooms, const std::string& room, const std::str
   const std::string path = match[1];
   const std::string target = path.substr(0, path.find('/'));
   if (path.find('/') == std::string::npos) {
-    // A file that the build writes (a compiled material) has no room; a header has.
+    // A generated source file (a compiled material) has no room; a header has.
     return path.size() > 2 && path.substr(path.size() - 2) == ".h" ? "name the room: \"" + room + "/" + path + "\"" : "";
   }
   if (path.find("..") != std::string::npos) return "\"" + path + "\" climbs out of its room";
@@ -90,7 +90,7 @@ TEST(Layers, every_file_opens_with_its_room) {
   }
 }
 
-// What the bits of a run depend on calls functions that have the same bits everywhere.
+// All code that determines the bits of a run calls functions with the same bits everywhere.
 TEST(Layers, no_function_of_the_c_library_that_differs_between_machines) {
   static const std::regex kDiffers(
       R"re(std::(a?sinh?|a?cosh?|a?tanh?|atan2|exp2?|expm1|log2?|log10|log1p|pow|cbrt|hypot|fma|tgamma|lgamma|erfc?)\()re");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/procedure: every key of the table goes through the reader, the writer and --set, and every fault names its place.
+// tests/procedure: every key of the table passes through the reader, the writer and --set, and every error names its place.
 #include "procedure/scene_file.h"
 
 #include <gtest/gtest.h>

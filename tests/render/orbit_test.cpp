@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/render: the camera of people who work: everything they need is in the picture from the start.
+// tests/render: the camera of interactive sessions: organ and needle are in the image from the start.
 #include "render/orbit.h"
 
 #include <gtest/gtest.h>

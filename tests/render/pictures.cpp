@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/render: pictures show what the snapshot says; files of them can be written and read. Needs an EGL driver, else skips.
+// tests/render: images show the snapshot; image files can be written and read. Needs an EGL driver, else skips.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -38,7 +38,7 @@ std::string temporary(const std::string& name) {
   return (folder / name).string();
 }
 
-// Where a point of the scene lands in the picture.
+// Position of a scene point in the image.
 std::array<int, 2> project(const Camera& camera, Vec3 point) {
   const Vec3 ahead = normalized(camera.target - camera.eye), right = normalized(cross(ahead, camera.up));
   const Vec3 up = cross(right, ahead), d = point - camera.eye;
@@ -95,7 +95,7 @@ TEST(Pictures, TheThreadShowsInItsColor) {
 TEST(Pictures, MovingAParticleMovesThePicture) {
   NEEDS_RENDERER();
   Stage& s = stage();
-  EXPECT_EQ(difference(s.picture, s.renderer->render(s.field.snapshot, s.camera)), 0);  // and nothing else does
+  EXPECT_EQ(difference(s.picture, s.renderer->render(s.field.snapshot, s.camera)), 0);  // and everything else is equal
   Snapshot pushed = s.field.snapshot;
   for (uint32_t i = 0; i < 16; ++i) pushed.particle[i].y += 0.004f;
   EXPECT_GT(difference(s.picture, s.renderer->render(pushed, s.camera)), 200);
@@ -195,7 +195,7 @@ TEST(FollowCameras, NeverJump) {
   const float dt = 1.0f / 30;
   Camera last = follow.update(s, dt);
   for (int i = 0; i < 600; ++i) {
-    // The needle goes round, and every two seconds is somewhere else altogether.
+    // The needle orbits, and jumps every two seconds.
     const float a = 0.01f * float(i) + 2.3f * float(i / 60);
     s.active().needle.pose.p = Vec3{0.02f * std::cos(a), 0.01f, 0.02f * std::sin(a)};
     if (i % 97 == 0) s.active().needle.pose.p = {NAN, 0, 0};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/render: where a plot puts what it is given. Plain pixels: no driver, no file.
+// tests/render: positions in a plot. Plain pixels: no driver, no file.
 #include "render/plot.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@ namespace {
 
 constexpr Color kBlue{0, 0, 255, 255}, kRed{255, 0, 0, 255}, kGreen{0, 160, 0, 255};
 
-// Where the axes are, as plot.cpp lays them out: room for numbers at the left and below, a line of the key for every band.
+// Position of the axes in plot.cpp: room for numbers at the left and below, a line of the key for every band.
 struct Box {
   int left = 52, right = 0, top = 34, bottom = 0;
 };

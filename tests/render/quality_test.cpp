@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/render: which level of quality a machine gets, and that a frame's own cost can be measured anywhere.
+// tests/render: the quality level of a machine, and that a frame's own time can be measured anywhere.
 #include "render/quality.h"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ TEST(FrameCosts, AStereoFrameIsMadeWithoutADriver) {
     EXPECT_GT(t.caller_ms, 0);
     least = std::min(least, t.caller_ms);
   }
-  EXPECT_LT(least, 5);  // the bound that people feel is measured by catgut bench frame; this one holds on a busy machine
+  EXPECT_LT(least, 5);  // catgut bench frame measures the perceptible bound; this one holds on a busy machine
 }
 
 }  // namespace

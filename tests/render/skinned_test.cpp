@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/render: the drawn surface follows the particles as geometry/skin says it does.
+// tests/render: the drawn surface follows the particles like geometry/skin.
 #include "render/skinned.h"
 
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ TEST(Skinned, WhatRestsIsNotMovedAgainUntilItCanBeSeen) {
   find_motion(rest, particle, rotation, motion);
   find_motion(rest, particle, rotation, motion);
   EXPECT_FALSE(motion.moved[0] || motion.moved[1]);
-  // Creeping adds up: what was not drawn is not forgotten.
+  // Slow motion accumulates: motion that was not drawn is not lost.
   bool moved = false;
   for (int i = 0; i < 4; ++i) {
     particle[1].y += 1e-6f;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/runtime: two simulated arms, the real driver, the real servo and the real physics together: in lock step, where every
-// millisecond is counted, and as people run it, each in its own thread. Criteria of docs/rooms/haptic.md: H2, H3, H5 and H7
+// tests/runtime: two simulated devices, the real backend, the real servo and the real physics together: in lock step with every
+// millisecond counted, and in separate threads as in use. Criteria of docs/rooms/haptic.md: H2, H3, H5 and H7
 // while physics runs the Lembert scene.
 #include "runtime/haptics.h"
 
@@ -57,7 +57,7 @@ struct LockStep {
   std::unique_ptr<Haptics> haptics;
   double ms_owed = 0;
   bool physics_works = true;
-  std::array<float, 2> low{1e9f, 1e9f}, high{-1e9f, -1e9f};  // [m] along x, of what hands do
+  std::array<float, 2> low{1e9f, 1e9f}, high{-1e9f, -1e9f};  // [m] along x, of the hands
 
   explicit LockStep(const char* name, const std::string& log = "") : scene(scene_named(name)) {
     prepare_for_arms(scene);
@@ -75,13 +75,13 @@ struct LockStep {
     haptics = std::make_unique<Haptics>(open_touch({}, messages), picture_model(*model), o);
     EXPECT_TRUE(messages.empty());
   }
-  // Where the hand must be, on its arm, for its tool to be at `world`.
+  // Position of the hand, on its device, that puts its tool at `world`.
   void wish(size_t k, const Pose& world, float jaw) {
     const Pose arm = to_arm(haptics->servo(k).place, world);
     fake.wish(static_cast<int>(k), arm.p, arm.q, jaw < 0.5f ? 1 : 0);
   }
   void put(size_t k, const Pose& world) { fake.put(static_cast<int>(k), to_arm(haptics->servo(k).place, world).p); }
-  // One tick of physics and the milliseconds of the arms that belong to it. each: after every millisecond.
+  // One tick of physics and the milliseconds of the devices in it. each: after every millisecond.
   template <typename F>
   void tick(const F& each) {
     ms_owed += 1000 / double{scene.solver.tick_rate};
@@ -113,7 +113,7 @@ struct LockStep {
 
 const Quat kDown = axis_angle({1, 0, 0}, -0.5f * kPi);
 
-// Both hands beside the wall, then pressing upon it from both sides.
+// Both hands beside the wall, then pressing on it from both sides.
 void press(LockStep& s, float depth) {
   const Vec3 rim = s.scene.body[0].position;
   const float r = s.scene.body[0].radius;
@@ -130,8 +130,8 @@ void approach(LockStep& s) {
   for (int k = 0; k < 2; ++k) s.fake.zero(k);
 }
 
-// H3 on the Lembert scene: pressed, held and let go by hands of every grip, the wall gives no more energy than it may and a
-// hand that means to be still is.
+// H3 on the Lembert scene: pressed, held and released by hands of every grip, the wall generates no more than the allowed
+// energy, and a hand that tries to hold still does.
 TEST(Haptics, H3_on_the_lembert_scene) {
   for (const double grip : {0.05, 0.15, 0.8}) {
     SCOPED_TRACE(grip);
@@ -159,15 +159,15 @@ TEST(Haptics, H3_on_the_lembert_scene) {
                   1e3 * grip, k == 0 ? "right (50 g)" : "left (300 g)", 1e3 * a.energy_most,
                   1e3 * double{high[static_cast<size_t>(k)] - low[static_cast<size_t>(k)]}, a.step_most, a.force_most);
       EXPECT_LE(a.energy_most,
-                0.5e-3 + 2 * 0.16e-3);  // the reference of criterion H3, as this scene has none of its own at 1 kHz
+                0.5e-3 + 2 * 0.16e-3);  // the reference of criterion H3, as this scene has no 1 kHz reference of its own
       EXPECT_LE(high[static_cast<size_t>(k)] - low[static_cast<size_t>(k)], 0.2e-3f);
       EXPECT_LE(a.step_most, 0.5 + 1e-4);
     }
   }
 }
 
-// One tool against the other: what pushes either hand is the other hand, through two springs and a tick of delay. They feel the
-// same force, it stays within H3's bounds for every grip, and it is gone when they part.
+// One tool against the other: each hand feels the other one, through two springs and a tick of delay. They feel equal
+// forces, within H3's bounds for every grip, that are zero when they part.
 TEST(Haptics, H3_tool_on_tool) {
   for (const double grip : {0.05, 0.15, 0.8}) {
     SCOPED_TRACE(grip);
@@ -175,7 +175,7 @@ TEST(Haptics, H3_tool_on_tool) {
     for (int k = 0; k < 2; ++k) s.fake.grip(k, grip, 0.002, k == 0 ? 0.05 : 0.3, 0.0);
     const Vec3 over = s.scene.body[0].position + Vec3{0, 0.04f, 0};
     const Quat level = axis_angle({0, 1, 0}, 0.5f * kPi);
-    // The left shaft lies along x, the right one stands beside it; in: how far the hands mean to be in each other.
+    // The left shaft lies along x, the right one stands beside it; in: overlap of the hands' targets.
     const auto meet = [&](float in) {
       s.wish(0, {over + Vec3{0, 0, 0.008f - 0.5f * in}, kDown}, 1);
       s.wish(1, {over + Vec3{-0.03f, 0.03f, 0.5f * in}, level}, 1);
@@ -221,8 +221,8 @@ TEST(Haptics, H3_tool_on_tool) {
   }
 }
 
-// H5 and H7 on the Lembert scene: the physics dies under pressing hands; then it lives and one arm dies. Force is gone within
-// 100 ms, without a step, and the other hand never notices.
+// H5 and H7 on the Lembert scene: the physics stops under pressing hands; later one device stops. Force is zero within
+// 100 ms, without a step, and the other hand is unaffected.
 TEST(Haptics, killing_physics_or_an_arm) {
   LockStep s("lembert");
   approach(s);
@@ -232,7 +232,7 @@ TEST(Haptics, killing_physics_or_an_arm) {
   ASSERT_GT(before[0], 0.15f);
   ASSERT_GT(before[1], 0.15f);
 
-  // The left arm's line breaks: its force is gone at once (the driver's doing), the right one holds what it held.
+  // The left device's connection breaks: its force is zero at once (the backend's doing), the right one keeps its force.
   s.fake.zero(0);
   s.fake.fault(1, kFakeCommError, 1);
   float off = 0;
@@ -243,7 +243,7 @@ TEST(Haptics, killing_physics_or_an_arm) {
   EXPECT_LE(s.fake.at(0).step_most, 0.05);
   s.fake.fault(1, kFakeCommError, 0);
 
-  // The physics' thread is gone.
+  // The physics' thread has ended.
   s.fake.zero(0);
   s.physics_works = false;
   int ms = 0, below = -1, zero = -1;
@@ -270,9 +270,9 @@ TEST(Haptics, killing_physics_or_an_arm) {
   EXPECT_TRUE(s.haptics->news().empty()) << "once";
 }
 
-// Soak: hands press and let go of the Lembert scene on both arms while a fault is injected every few seconds, at random. No
+// Soak: hands press and release the Lembert scene on both devices while a fault is injected every few seconds, at random. No
 // step beyond the slew, nothing over the cap, and each fault that cuts the force leaves none within 100 ms. Some seconds in
-// every build; CATGUT_SOAK=3600: an hour of the arms' time.
+// every build; CATGUT_SOAK=3600: an hour of the devices' time.
 TEST(Haptics, soak_with_faults) {
   const char* set = std::getenv("CATGUT_SOAK");
   const float seconds = set ? std::strtof(set, nullptr) : 8;
@@ -291,7 +291,7 @@ TEST(Haptics, soak_with_faults) {
   const auto motion = [&](float for_s) {
     for (int i = 0; i < static_cast<int>(for_s * s.scene.solver.tick_rate); ++i) {
       const float t = 1e-3f * static_cast<float>(ms);
-      // Half of every four seconds the hands touch nothing, so that force can come back.
+      // Half of every four seconds the hands touch nothing, so that force can return.
       press(s, 0.008f * std::max(0.0f, std::sin(2 * kPi * t / 6)));
       s.tick(each);
     }
@@ -307,7 +307,7 @@ TEST(Haptics, soak_with_faults) {
     }
     const int lasts = 120 + static_cast<int>(300 * random.uniform());  // [ms]
     const auto for_ms = [&](int count) { motion(1e-3f * static_cast<float>(count)); };
-    // What the driver cuts on its own is a step of its own: measured again after it.
+    // A cut by the library is a step of its own: measured again after it.
     switch (kind) {
       case 0:
       case 1:
@@ -328,7 +328,7 @@ TEST(Haptics, soak_with_faults) {
         left = std::max(left, length(s.fake.force(arm)));
         s.fake.fault(arm, kFakeNan, 0);
         break;
-      case 4: {  // the whole scheduler stands still: nothing can be written meanwhile
+      case 4: {  // the whole scheduler stops: nothing can be written meanwhile
         s.fake.fault(arm, kFakeStall, 1);
         for_ms(8 + lasts % 40);
         s.fake.fault(arm, kFakeStall, 0);
@@ -363,7 +363,7 @@ TEST(Haptics, soak_with_faults) {
   EXPECT_GT(felt, ms / 20) << "nothing was felt: it tests nothing";
 }
 
-// The log has every millisecond of both arms, whole.
+// The log has every millisecond of both devices.
 TEST(Haptics, the_log_has_every_millisecond) {
   const std::string file = testing::TempDir() + "arms.csv";
   uint64_t steps = 0;
@@ -396,7 +396,7 @@ TEST(Haptics, the_log_has_every_millisecond) {
   EXPECT_GT(most, 0.05) << "the written force";
 }
 
-// The scripted surgeon's hands on the arms: he means, the hands move styluses, the arms' forces push back. A bite in every
+// The scripted surgeon's hands on the devices: its targets move styluses, the devices' forces push back. A bite in every
 // build, the whole purse-string with CATGUT_LONG=1.
 TEST(Haptics, the_scripted_surgeon_sews_through_the_arms) {
   LockStep s("purse_string");
@@ -436,7 +436,7 @@ TEST(Haptics, the_scripted_surgeon_sews_through_the_arms) {
   if (long_run()) { EXPECT_TRUE(hands.surgeon->done() && !hands.surgeon->gave_up()) << hands.surgeon->doing(); }
 }
 
-// H2, what of it does not depend on the machine: the servo's millisecond allocates nothing. It is driven here through a port of
+// H2, the part independent of the machine: the servo's millisecond does not allocate. It is called here through a port of
 // the test's own, on this thread, whose allocations are counted.
 TEST(Haptics, H2_no_allocation) {
   static ArmCallback callback;
@@ -469,8 +469,8 @@ TEST(Haptics, H2_no_allocation) {
   EXPECT_EQ(haptics.times(0).steps, 20000u);
 }
 
-// As people run it: physics, servo and a caller that looks each in their own thread. The tool goes where the stylus goes. The
-// times of H2 are printed, and held to only with CATGUT_LONG=1: this machine may be busy.
+// As in use: physics, servo and an observer each in their own thread. The tool follows the stylus. The
+// times of H2 are printed, and checked only with CATGUT_LONG=1: this machine may be busy.
 TEST(Haptics, H2_a_live_scene_with_arms) {
   FakeHd fake(false);
   LiveOptions options;
@@ -504,8 +504,8 @@ TEST(Haptics, H2_a_live_scene_with_arms) {
   for (const std::string& line : said) std::printf("said: %s\n", line.c_str());
 }
 
-// S1: while the surgeon shows something, while time stands still, and while it runs slower than the hand, the arms' hands are
-// no one's to push: what acts on the tools then is not theirs. And none of it is reported as a fault.
+// S1: during a demonstration, while time is paused, and while it runs slower than the hand, the devices render no force: the
+// forces on the tools then are not caused by their hands. None of it is reported as a fault.
 TEST(Haptics, S1_a_demonstration_leaves_the_learners_hands_alone) {
   FakeHd fake(false);
   LiveOptions options;

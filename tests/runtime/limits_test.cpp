@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/runtime: what `catgut bench limits` makes of its measurements; that it measures is tested in tests/app.
+// tests/runtime: evaluation in `catgut bench limits`; its measurement is tested in tests/app.
 #include <gtest/gtest.h>
 
 #include "procedure/scene_file.h"
@@ -19,7 +19,7 @@ std::vector<SutureCost> rows(size_t n, double first_ms, double last_ms) {
   return row;
 }
 
-// The sutures that are re-run in turns are the first and the last, tick by tick as they were.
+// The sutures that are re-run alternately are the first and the last, tick by tick as recorded.
 TEST(Limits, growth_is_measured_on_the_first_and_the_last_suture_sewn_again) {
   const LimitsResult result = measure_limits(read_scene("stress_one_body"), 3, 1, {});
   ASSERT_EQ(result.row.size(), 3u);
@@ -48,7 +48,7 @@ TEST(Limits, the_table_says_where_it_fell_below_the_limit_and_where_it_did_not) 
   EXPECT_NE(limits_table(result, 2).find("0 of 20 sutures, 0 s simulated (surgeon: gave up)"), std::string::npos);
 }
 
-// The curve stands where its numbers say: twice the value is the same way up everywhere on a logarithmic axis.
+// The curve is at its values: a factor of two is the same distance everywhere on a logarithmic axis.
 TEST(Limits, the_plot_shows_the_numbers) {
   LimitsResult result;
   const auto height_of = [&](double ms) {

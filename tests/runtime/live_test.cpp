@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/runtime: the live loop: its pace, its commands, and that what it records is what happened. Loose bounds on time: the
+// tests/runtime: the live loop: its pace, its commands, and that its recording is correct. Loose bounds on time: the
 // machine that runs this may be busy. Meaningful under the thread sanitizer.
 #include "runtime/live.h"
 
@@ -69,7 +69,7 @@ TEST(Live, a_scene_too_heavy_for_the_machine_says_so) {
   SceneSpec scene = small_scene();
   scene.body[0].particles = 1228;
   scene.solver.substeps = 16;
-  scene.solver.tick_rate = 20000;  // no machine keeps up with this
+  scene.solver.tick_rate = 20000;  // faster than any machine
   scene.settle = 0.001f;
   Live live(scene, {});
   ASSERT_TRUE(wait_for(live, 20, is_working));
@@ -189,8 +189,8 @@ TEST(Live, the_recording_replays) {
   EXPECT_EQ(hash, result.state_hash);
 }
 
-// A picture that takes half a second, again and again: the hashes of the recording, which is all of the physics, stay what they
-// are with a smooth picture, tick for tick, and no time is lost. The hands are a recording's: they depend on nothing but time.
+// Frames that take half a second, repeatedly: the hashes of the recording, which is all of the physics, equal
+// those with smooth frames, tick for tick, and no time is lost. The hands are a recording's: they depend only on time.
 TEST(Live, a_picture_that_stalls_changes_no_bit_and_loses_no_tick) {
   const std::string folder = testing::TempDir(), id = std::to_string(::getpid());
   const std::string hands = folder + "catgut_hands_" + id + ".cgrec";
@@ -282,7 +282,7 @@ TEST(Live, a_parameter_changed_in_between_is_in_the_recording) {
   }
 }
 
-// What tools press each other with at most depends on who holds them; the recording says what it was.
+// The maximum force between tools depends on the source of the hands; the recording states it.
 TEST(Live, hands_that_feel_nothing_press_their_tools_softly) {
   const auto recorded = [](float force, const std::string& surgeon) {
     LiveOptions options;
@@ -323,7 +323,7 @@ TEST(Live, what_cannot_be_recorded_is_refused_before_it_starts) {
   EXPECT_THROW(Live(small_scene(), options), InputError);
 }
 
-// A whole bite by hands that come through the box as any device's would; then it is undone.
+// A whole bite by hands that publish like any device; then it is undone.
 TEST(Live, a_bite_can_be_taken_back) {
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
   GTEST_SKIP() << "a bite in real time is out of reach under a sanitizer";
@@ -366,7 +366,7 @@ TEST(Live, a_bite_can_be_taken_back) {
   EXPECT_EQ(live.status().metrics.bites, 0u);
   EXPECT_EQ(live.status().metrics.undos, 1u);
   EXPECT_EQ(live.status().to_take_back, 0u);
-  // The hands that were sent before are not followed: the tool stays until newer ones come.
+  // The hands that were sent before are not followed: the tool stays until newer ones arrive.
   const Vec3 hand = seen.tool[0].hand.p;
   for (int i = 0; i < 3; ++i) live.command(LiveCommand::single_step);
   const uint64_t at = seen.tick;

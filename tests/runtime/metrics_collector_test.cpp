@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/runtime: what a run is judged by, from snapshots made by hand.
+// tests/runtime: the results of a run, from synthetic snapshots.
 #include "runtime/metrics_collector.h"
 
 #include <gtest/gtest.h>
@@ -118,7 +118,7 @@ TEST(MetricsCollector, faults_by_name_ends_in_hand_and_the_needle) {
   j.tell(Fault::wrong_body, 2);
   j.tell(Fault::wrong_body, 3);
   j.tell(Fault::too_few_throws, 0);
-  j.tell(static_cast<Fault>(77), 0);  // none that we know
+  j.tell(static_cast<Fault>(77), 0);  // an unknown one
   j.tick();
   j.seen.tool[3].held_strands = 2;  // any hand's
   j.seen.active().needle_on_thread = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/runtime: the paper's tables: which phase a tick belongs to, and that the figures stand where they belong.
+// tests/runtime: the paper's tables: the phase of a tick, and the positions of the figures.
 #include <gtest/gtest.h>
 
 #include "procedure/scene_file.h"
@@ -54,7 +54,7 @@ TEST(PaperTables, a_row_holds_ours_and_theirs) {
   EXPECT_NE(paper_csv(table).find("A phase of our own,2,1000.0,0.0,1.000,0.000,1.000,0.000,,,\n"), std::string::npos);
 }
 
-// Every tick is counted once, every fourth picture asked for, and a run that was cut short is not called sutured.
+// Every tick is counted once, every fourth picture is rendered, and an interrupted run does not count as sutured.
 TEST(PaperTables, executions_are_measured_phase_by_phase) {
   SceneSpec scene = read_scene("purse_string");
   set_value(scene, "duration=1");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/runtime: a recording that is looked at: any place of it shows what was there, in whatever order one comes to it.
+// tests/runtime: the viewer of recordings: every position shows its state, in any order of seeking.
 #include "runtime/playback.h"
 
 #include <gtest/gtest.h>
@@ -54,7 +54,7 @@ bool wait_for(Playback& p, Snapshot& seen, const std::function<bool(const Playba
   return false;
 }
 
-// What really was there.
+// The recorded truth.
 std::vector<Vec3> particles_after(uint64_t ticks) {
   const Recording& r = poked();
   const auto model = build_model(parse_scene(r.header.scene, "small"));

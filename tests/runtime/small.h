@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/runtime: a scene that is built and settled in no time: a little tissue, a short thread, no technique.
+// tests/runtime: a scene that is built and settled quickly: a little tissue, a short thread, no technique.
 #pragma once
 #include "procedure/scene_file.h"
 

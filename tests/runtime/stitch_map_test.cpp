@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/runtime: where stitches lie, from tissue made by hand and from a surgeon's first bites.
+// tests/runtime: positions of stitches, from synthetic tissue and from a surgeon's first bites.
 #include "runtime/stitch_map.h"
 
 #include <gtest/gtest.h>

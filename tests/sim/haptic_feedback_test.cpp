@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/sim: what is published for the hands. The patch is made of the solver's own multipliers; it changes nothing; and a hand
-// that feels it between two ticks at 60 Hz feels what a simulation at 960 Hz would have reported it (criterion H4,
+// tests/sim: the published force patches. The patch is made from the solver's own multipliers and changes nothing. A hand
+// that evaluates it between two ticks at 60 Hz feels the force of a simulation at 960 Hz (criterion H4,
 // docs/rooms/haptic.md).
 #include "sim/haptic_feedback.h"
 
@@ -65,7 +65,7 @@ float smooth(float s) {
   return s * s * s * (10 + s * (6 * s - 15));
 }
 
-// The forces that balance on a tool at rest, from different multipliers of the solver: what presses on it and what holds it.
+// The forces that balance on a tool at rest, from different multipliers of the solver: contact forces and the hand's.
 TEST(HapticFeedback, the_patch_is_what_the_coupling_carries) {
   for (const char* scene : {"purse_string", "lembert"}) {
     SCOPED_TRACE(scene);
@@ -75,7 +75,7 @@ TEST(HapticFeedback, the_patch_is_what_the_coupling_carries) {
     const ForcePatch& p = f.seen.patch[0];
     const Vec3 carried = f.seen.tool[0].force;
     EXPECT_GT(length(p.force), 0.1f);
-    // The patch leaves friction to the servo: a tenth of the pressing (friction_tool).
+    // The patch leaves friction to the servo: a tenth of the normal force (friction_tool).
     EXPECT_LT(distance(p.force, carried), 0.15f * length(carried)) << length(p.force) << " " << length(carried);
     EXPECT_GT(p.normal.x, 0.9f);
     EXPECT_GT(p.gap, 0);
@@ -93,7 +93,7 @@ TEST(HapticFeedback, a_free_tool_feels_nothing_however_it_moves) {
   }
 }
 
-// Right above the left hand's shaft, which lies along x; `gap` [m] between them, less than nothing: asked of the hands.
+// Directly above the left hand's shaft, which lies along x; `gap` [m] between them, negative: overlap of the hands' targets.
 const Quat kLevel = axis_angle({0, 1, 0}, 0.5f * kPi);
 ToolInput left_level(const Field& f) {
   ToolInput h;
@@ -103,7 +103,7 @@ ToolInput left_level(const Field& f) {
 }
 Vec3 beside_left(const Field& f, float gap) { return f.rim + Vec3{0, 0.05f, 0.005f + gap}; }
 
-// Each hand feels the other tool: the same force, the other way; where it is before it is met; nothing when it is gone.
+// Each hand feels the other tool: the same force, in the opposite direction; before contact its position; zero afterward.
 TEST(HapticFeedback, the_other_tool) {
   Field f("purse_string");
   f.input.hand[1] = left_level(f);
@@ -132,7 +132,7 @@ TEST(HapticFeedback, the_other_tool) {
   EXPECT_LT(length(right.thread_direction) + length(left.thread_direction), 1e-6f) << "rubbing steel is no thread";
   for (int i = 0; i < 30; ++i) f.tick(hand(beside_left(f, 0.02f), 1));
   for (size_t k = 0; k < 2; ++k) EXPECT_LT(length(f.seen.patch[k].force), 1e-4f);
-  // The left hand leaves: its tool stays in the air and touches nothing.
+  // The left hand disconnects: its tool stays in the air without contact.
   f.input.hand[1].connected = 0;
   for (int i = 0; i < 30; ++i) f.tick(hand(beside_left(f, -0.005f), 1));
   EXPECT_LT(length(f.seen.patch[0].force), 1e-4f);
@@ -155,7 +155,7 @@ struct Compared {
   int over;  // [ms] in a row that the error was beyond half a newton
 };
 
-// The same motion of the hand, felt through patches at 60 Hz times `parts`, a tick late as they are, and at 960 Hz.
+// The same motion of the hand, with patches at 60 Hz times `parts`, a tick late as in use, and at 960 Hz.
 Compared compare(const char* scene, int parts, const std::function<ToolInput(const Field&, float)>& motion, float seconds,
                  bool left) {
   Field slow(scene, parts), full(scene, 16);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/sim: a recording survives what happens to files: cut anywhere, a flipped bit, another version.
+// tests/sim: a recording survives damaged files: cut anywhere, a flipped bit, another version.
 #include "sim/recording.h"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/sim: State is all that changes. A run that is saved, loaded into a fresh state and continued cannot be reported from
-// the run that continued: same hash, same events, same Snapshot with all that hands feel. And reflect names every member.
+// tests/sim: State is all that changes. A run that is saved, loaded into a fresh state and continued is identical to
+// the run that continued: same hash, same events, same Snapshot with all force patches. And reflect names every member.
 #include <gtest/gtest-spi.h>
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ std::vector<std::byte> bytes_of(const T& value) {
   return out;
 }
 
-// Saves `state`, loads it elsewhere, steps both and compares all that can be seen from outside.
+// Saves `state`, loads it elsewhere, steps both and compares everything observable.
 void step_both(const Model& model, State& state, const TickInput& input, Jobs& jobs, Jobs& other_jobs, StatePtr& other) {
   const std::vector<std::byte> saved = save_state(model, state);
   load_state(model, *other, saved);
@@ -61,7 +61,7 @@ TEST_P(EveryScene, saved_and_loaded_at_every_seventh_tick_goes_on_as_if_nothing_
       for (ToolInput& h : input.hand) h.connected = 0;
     else input.hand = hands.surgeon->operate(seen, model->dt).hand;
     if (input.tick % 7 == 0) {
-      // A caller that continued with one worker is compared with two, and the other way round.
+      // A run with one worker is compared with one with two, and vice versa.
       Jobs &mine = compared % 2 ? one : two, &others = compared % 2 ? two : one;
       ASSERT_NO_FATAL_FAILURE(step_both(*model, *state, input, mine, others, other));
       ++compared;
@@ -83,7 +83,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                                          "two_sutures"),
                          [](const auto& scene) { return std::string(scene.param); });
 
-// A jaw closes in the very tick after a load: what is near it must be known by then.
+// A jaw closes in the tick directly after a load: nearby objects must be found by then.
 TEST(SaveLoad, jaws_that_close_on_tissue_right_after_a_load_hold_it) {
   const std::shared_ptr<const Model> model = build_model(read_scene("purse_string"));
   StatePtr state = initial_state(*model), other = initial_state(*model);
@@ -114,7 +114,7 @@ TEST(SaveLoad, the_hash_of_a_state_is_that_of_its_bytes) {
 
 // --- reflect names every member ---------------------------------------------------------------------------------------------
 
-// Where the members lie that reflect names. What is between two of them must be padding: less than the next one's alignment.
+// Ranges of the members that reflect names. A gap between two of them must be padding: less than the next one's alignment.
 struct Members : Archive<Members> {
   struct Member {
     std::ptrdiff_t at, size, align;

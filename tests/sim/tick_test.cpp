@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/sim: the promises of the tick: same inputs, same bits, whatever the workers; a saved state continues as if nothing had
-// happened; publishing changes nothing; hands flung about at random break nothing.
+// tests/sim: the guarantees of the tick: same inputs, same bits, for any number of workers; a saved state continues
+// identically; publishing changes nothing; random hand motion breaks nothing.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -105,7 +105,7 @@ TEST_F(Scripted, saved_in_the_middle_of_a_bite_and_loaded_it_goes_on_bit_for_bit
   EXPECT_EQ(hash_state(*model_, *other), run_->hash[run_->mid_bite - 1]);
   EXPECT_EQ(save_state(*model_, *other), bytes);
   play(*other, run_->mid_bite, std::min(kTicks, run_->mid_bite + 400), 1);
-  // Undo: a state that has gone on is set back.
+  // Undo: a state that has advanced is set back.
   load_state(*model_, *other, bytes);
   play(*other, run_->mid_bite, run_->mid_bite + 60, 2);
 }
@@ -130,7 +130,7 @@ TEST_F(Scripted, publishing_changes_nothing_and_says_the_same_twice) {
 
 // The whole procedure, saved and loaded while the opening closes.
 TEST(WholeRun, saved_in_the_middle_of_the_closure_and_loaded_it_goes_on_bit_for_bit) {
-  // Hands need not finish the ring to close it: the state is brought to a closure by shortening what counts as one.
+  // Hands need not finish the ring to close it: shortening the loop of the state starts a closure.
   SceneSpec scene = short_scene();
   const auto model = build_model(scene);
   StatePtr state = initial_state(*model);
@@ -182,7 +182,7 @@ TEST(Load, bytes_of_another_scene_are_refused) {
   EXPECT_EQ(save_state(*model, *state), before) << "a refused load changes nothing";
 }
 
-// A damaged state is refused or is a state of this scene: a tick on it is defined behavior, whatever the numbers say.
+// A damaged state is refused or is a valid state of this scene: a tick on it is defined behavior, for any numbers.
 TEST(Load, damaged_bytes_never_crash) {
   const auto model = build_model(short_scene());
   StatePtr state = initial_state(*model);
@@ -191,7 +191,7 @@ TEST(Load, damaged_bytes_never_crash) {
   for (ToolInput& h : idle.hand) h.connected = 0;
   step(*model, *state, idle, jobs);
   const std::vector<std::byte> good = save_state(*model, *state);
-  // The columns of positions, velocities and origins are any numbers; what follows them has the structure.
+  // The columns of positions, velocities and origins are any numbers; the structure follows them.
   const size_t columns = 8 + 2 * (8 + 16 * particle_count(*model)) + 8 + 16 * model->solver.tissue;
   Random random(3);
   int refused = 0;
@@ -233,7 +233,7 @@ TEST(Sane, says_when_a_number_is_not_one_or_something_is_gone) {
   EXPECT_FALSE(state_is_valid(*model, *state));
 }
 
-// --- hands flung about ---------------------------------------------------------------------------------------------------
+// --- random motion -------------------------------------------------------------------------------------------------------
 
 struct Fling {
   double largest_energy = 0;  // [J]
@@ -310,13 +310,13 @@ void fling(uint64_t seed, float seconds, Fling& out) {
     }
     ASSERT_NEAR(rest, double{model->solver.strand[0].spacing} * static_cast<double>(order.size() - 1), 1e-4)
         << "seed " << seed << ", tick " << i;
-    // Nothing dangles: rows of a bite exist only during one.
+    // No dangling rows: rows of a bite exist only during one.
     if (phase_of(state->suture.suture[0]) == NeedlePhase::outside) {
       ASSERT_TRUE(state->solver.channel.empty() && !state->suture.suture[0].attached);
     }
     ASSERT_LE(state->solver.weld.size(), 4u);
   }
-  // The hands leave: everything settles.
+  // The hands disconnect: everything settles.
   TickInput none;
   for (ToolInput& h : none.hand) h.connected = 0;
   for (int i = 0; i < 180; ++i) step(*model, *state, none, jobs);

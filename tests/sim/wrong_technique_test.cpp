@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/sim: what is done wrong is reported, once, and nothing else happens: whole ticks with hands and needle on real tissue,
-// one test per mistake, and some seconds after each in which the state stays sane (the rig asserts it every tick).
+// tests/sim: faults of technique are reported, once, without other consequences: whole ticks with hands and needle on real
+// tissue, one test per fault, and some seconds after each in which the state stays valid (the rig asserts it every tick).
 #include <gtest/gtest.h>
 
 #include "../suture/tie.h"
@@ -17,7 +17,7 @@ std::vector<Event> faults(const Rig& r) {
     if (e.kind == EventKind::technique_fault) found.push_back(e);
   return found;
 }
-// Told once so far, and not again in the seconds that follow.
+// Reported once so far, and not again in the following seconds.
 void expect_told_once(Rig& r, Fault fault, uint32_t which) {
   for (const bool later : {false, true}) {
     if (later) r.wait(kAfterwards);
@@ -131,7 +131,7 @@ TEST(WrongTechnique, a_knot_before_any_bite_is_said) {
 
 // --- pulling with the needle in the tissue -------------------------------------------------------------------------------
 
-// A bite that is done, and the needle in the tissue again for a second one.
+// A complete bite, and the needle in the tissue again for a second one.
 struct HalfBite : Rig {
   Place first, second;
   HalfBite() {
@@ -145,7 +145,7 @@ struct HalfBite : Rig {
     approach(second);
     drive(second, -1.0f, 1.2f);
   }
-  // Hand 1 takes the thread `nodes` beyond the first bite: toward the needle (positive), or on the tail.
+  // Hand 1 grasps the thread `nodes` beyond the first bite: toward the needle (positive), or on the tail.
   void take(int nodes) {
     const size_t node =
         nodes > 0 ? node_of_point(1) + static_cast<size_t>(nodes) : node_of_point(0) - static_cast<size_t>(-nodes);
@@ -153,7 +153,7 @@ struct HalfBite : Rig {
     hand.connected = 1;
     hand.pose = {xyz(x()[thread().order[node]]), axis_angle({1, 0, 0}, -0.5f * kPi)};
     hand.jaw = 0.7f;
-    // The tool is put there, not flown: what lies in the way is not meant.
+    // The tool is placed there directly: obstacles on the path are not the subject.
     RigidBody& tool = solver().body[1];
     tool = {};
     tool.x = tool.prev_x = hand.pose.p, tool.q = tool.prev_q = hand.pose.q;
@@ -186,7 +186,7 @@ TEST(WrongTechnique, pulling_the_tail_with_the_needle_in_the_tissue_is_said_once
   expect_told_once(r, Fault::needle_in_tissue, 1);
   EXPECT_EQ(faults(r)[0].who, 1);
 
-  // Drawn back and driven again, it is another bite, and the same mistake is another fault.
+  // Withdrawn and driven again, it is another bite, and the same mistake is another fault.
   r.let_thread_go();
   r.drive(r.second, 1.2f, -1.3f);
   ASSERT_EQ(r.count(EventKind::bite_withdrawn), 1u);
@@ -209,7 +209,7 @@ TEST(WrongTechnique, holding_still_and_pulling_with_the_needle_out_are_no_mistak
   r.take(-8);
   r.wait(0.5f);
   r.let_thread_go();
-  // The bite is finished: the needle draws thread through both holes and through the bite before, which a needle may.
+  // The bite is finished: the needle pulls thread through both holes and through the previous bite, which is allowed.
   r.drive(r.second, 1.2f, 4.3f);
   ASSERT_EQ(r.count(EventKind::bite_completed), 2u);
   r.draw(r.second, 0.05f, 0.8f);
@@ -255,7 +255,7 @@ TEST(WrongTechnique, cutting_a_knot_of_one_throw_is_one_fault_for_all_who_see_it
   r.take();
   r.pull_tight();
   ASSERT_EQ(r.count(EventKind::throw_locked), 1u);
-  const size_t before = faults(r).size();  // both points lie in one layer, which is said when it locks
+  const size_t before = faults(r).size();  // both points lie in one layer, which is reported when it locks
   r.open(0);
   snip(r, between(r, r.node_of(r.sewn().knot[0].slot[0]) - 6));
   ASSERT_EQ(r.count(EventKind::thread_cut), 1u);

@@ -51,7 +51,7 @@ TEST(Bend, a_triplet_that_spans_a_cut_does_not_bend) {
   }
   for (size_t i : {3u, 4u}) scratch.whole[i % 3][i / 3] = 0;  // pair 3 is cut
   solve_bends(scratch, 9, 1e4f, 1.0f / 480, 3);
-  // What is done to one side does not depend on the other.
+  // The two sides are independent.
   BendScratch half;
   half.resize(4);
   for (size_t i = 0; i < 4; ++i) half.set(i % 3, i / 3, start[i], 5e5f);

@@ -235,19 +235,19 @@ TEST(Pin, never_pushes) {
   solve_tether(p.pin, p.x.data(), p.w.data(), p.h);
   EXPECT_EQ(p.apart(), 0.02f);
   EXPECT_EQ(p.pin.lambda, 0);
-  // Pushed together from outside, they come as near as they are pushed: the free fall of both.
+  // Pushed together from outside, they approach as far as they are pushed: both in free fall.
   for (int i = 0; i < 96; ++i) {
     p.step({-0.01f, 0, 0}, 0);
     EXPECT_EQ(p.pin.lambda, 0);
   }
   EXPECT_NEAR(p.apart(), 0.02 - 0.5 * 0.01 * 70 * 0.01, 5e-5);
-  // And drawn apart again the rope gets taut at its length, with not one sweep of push in between.
+  // And when pulled apart again, the tether becomes taut at its length, without a sweep that pushes.
   for (int i = 0; i < 2000; ++i) {
     p.step({0.05f, 0, 0}, 5);
     EXPECT_LE(p.pin.lambda, 0);
   }
   EXPECT_NEAR(p.apart(), 0.03, 1e-5);
-  // Sweeps too many and too far: what pulled may be given back, never more.
+  // Too many sweeps of too large steps: accumulated pull may be undone, never more.
   p.pin.lambda = -1e-9f;
   set(p.x[1], xyz(p.x[0]) + Vec3{0.01f, 0, 0});
   solve_tether(p.pin, p.x.data(), p.w.data(), p.h);
@@ -255,7 +255,7 @@ TEST(Pin, never_pushes) {
   EXPECT_NEAR(p.apart(), 0.01, 1e-6);
 }
 
-// A web of ropes over a cloud of particles, from slack to much too short, that share particles with each other.
+// A graph of tethers over a cloud of particles, from slack to much too short, that share particles with each other.
 struct RopeWeb {
   Column<Vec4> x{60};
   std::vector<float> w{std::vector<float>(60)};
@@ -273,7 +273,7 @@ struct RopeWeb {
         for (uint32_t k = 0; k < 1 + random.next() % 10; ++k) group.push_back(first + k);
         *end = spread_point(group, x.data(), xyz(x[first]) + around(0.002f));
       }
-      // Slack by anything from nothing to a centimeter, or taut by a millimeter at most.
+      // Slack by zero to a centimeter, or taut by a millimeter at most.
       const float apart = distance(position_of(p.a, x.data()), position_of(p.b, x.data())), u = random.uniform();
       p.length =
           std::max(0.0f, apart + (u < 0.3f ? -0.001f * random.uniform() : 0.01f * std::pow(10.0f, -5 * random.uniform())));
@@ -286,8 +286,8 @@ void pulled_before(std::vector<Tether>& pin) {
   for (Tether& p : pin) p.lambda = -1e-9f;
 }
 
-// Pins that see each other through the web do what pins that see each other's particles do, and then those that are not in it,
-// but for what single precision rounds off in four sweeps of places up to 5 cm and pulls up to 0.01 N s^2.
+// Tethers coupled through the graph give the same result as tethers coupled through particles, followed by the slack ones,
+// except for rounding in single precision over four sweeps of positions up to 5 cm and pulls up to 0.01 N s^2.
 TEST(Pin, many_at_once_are_each_of_them_in_turn) {
   Random random(11);
   size_t pulling = 0, slack = 0, caught = 0;
@@ -296,7 +296,7 @@ TEST(Pin, many_at_once_are_each_of_them_in_turn) {
   const float h = 1.0f / 960;
   for (int round = 0; round < 200; ++round) {
     const RopeWeb start(random);
-    for (int draw = 0; draw < 2; ++draw) {  // of those that pulled before: the same pins, another web
+    for (int draw = 0; draw < 2; ++draw) {  // of those that pulled before: the same tethers, another graph
       RopeWeb one = start, all = start;
       std::vector<Tether*> rope, slack_before;
       for (size_t i = 0; i < all.pin.size(); ++i) {
@@ -304,7 +304,7 @@ TEST(Pin, many_at_once_are_each_of_them_in_turn) {
         if (pulls) all.pin[i].lambda = -1e-9f;
         (pulls ? rope : slack_before).push_back(&one.pin[i]);
       }
-      build_graph(all.pin, all.w.data(), static_cast<uint32_t>(all.x.size()), web);  // the last web's memory is still in it
+      build_graph(all.pin, all.w.data(), static_cast<uint32_t>(all.x.size()), web);  // the last graph is still in its memory
       for (int sweep = 0; sweep < 4; ++sweep)
         for (Tether* p : rope) solve_tether(*p, one.x.data(), one.w.data(), h);
       for (Tether* p : slack_before) {
@@ -327,7 +327,7 @@ TEST(Pin, many_at_once_are_each_of_them_in_turn) {
   EXPECT_GT(caught, 500u);
 }
 
-// Two free particles of 10 mg on the x axis and a rope between them.
+// Two free particles of 10 mg on the x axis and a tether between them.
 struct OneRope {
   std::vector<Vec4> x;
   std::vector<float> w{1 / 1e-5f, 1 / 1e-5f};
@@ -346,7 +346,7 @@ struct OneRope {
   }
 };
 
-// A slack one that gets taut holds in the same substep, and from the next tick on with the others; slack again, it leaves them.
+// A slack one that becomes taut holds in the same substep, and from the next tick on with the others; slack again, it leaves.
 TEST(Pin, taut_ones_are_in_the_web) {
   OneRope r(0.002f, 0.003f);
   const auto tick = [&](float pulled_to) {
@@ -367,7 +367,7 @@ TEST(Pin, taut_ones_are_in_the_web) {
   EXPECT_EQ(r.web.slack.size(), 1u);
 }
 
-// With a tolerance some are left alone, and when all are no rope is further off than that.
+// With a tolerance some are skipped, and when all are skipped, each tether is within it.
 TEST(Pin, a_tolerance_is_what_a_rope_may_be_too_long_by) {
   Random random(12);
   std::vector<TetherSpan> work;
@@ -392,8 +392,8 @@ TEST(Pin, a_tolerance_is_what_a_rope_may_be_too_long_by) {
   EXPECT_GT(still, 150u);
 }
 
-// A steady pull apart, far less than the tolerance in a substep, is answered in each of them: a rope that waited until it was
-// too long by the tolerance would twitch.
+// A steady pull apart, far below the tolerance in a substep, is answered in each substep: a tether that waited until the
+// tolerance was exceeded would jitter.
 TEST(Pin, a_tolerance_makes_no_rope_twitch) {
   OneRope r(0.002f, 0.002f);
   pulled_before(r.pin);
@@ -404,7 +404,7 @@ TEST(Pin, a_tolerance_makes_no_rope_twitch) {
   }
 }
 
-// A small bowel, a thread lying on it and a tool that presses into it; 200 substeps.
+// A small bowel, a thread on it and a tool that presses into it; 200 substeps.
 uint64_t pressed_bowel(int workers, double* deepest) {
   BowelShape shape;
   shape.particles = 900;
@@ -446,7 +446,7 @@ uint64_t pressed_bowel(int workers, double* deepest) {
   hand.compliance = 1.0f / 3000;
   hand.angular_compliance = 0.05f;
   s.weld.push_back(hand);
-  // One end of the thread is drawn up by the other hand, through a point of the tissue.
+  // The other hand pulls one end of the thread up, through a point of the tissue.
   s.body[1].x = start.back();
   s.strand[0].hold.push_back({tissue + thread - 1, 1, {}});
   ThreadAnchor bite;

@@ -55,7 +55,7 @@ struct Cluster {
     for (size_t i = 0; i < at.size(); ++i) a += mass[i] * (eigen(at[i]) - c) * (eigen(rest[i]) - q0).transpose();
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
     Eigen::Vector3d sign(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-    // How well the rotation is determined: the least of the sums of two singular values, over the largest.
+    // Conditioning of the rotation: the minimum of the sums of two singular values, over the maximum.
     if (gap) *gap = (svd.singularValues()[1] + sign[2] * svd.singularValues()[2]) / svd.singularValues()[0];
     return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
   }
@@ -94,7 +94,7 @@ TEST(Polar, from_a_warm_start_one_step_is_enough) {
     std::vector<Vec3> at, next;
     for (const Vec3& p : c.rest) at.push_back(rotate(q, p));
     c.settle(at, 60);
-    // As far as tissue turns within a substep: a hundredth of a radian.
+    // The rotation of tissue within a substep: a hundredth of a radian.
     const Quat more = axis_angle(normalized(Vec3{r.normal(), r.normal(), r.normal()}), 0.01f);
     for (const Vec3& p : at) next.push_back(rotate(more, p));
     c.settle(next, 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests of solver/thread_columns: the system in strands against a dense solve.
+// tests of solver/thread_columns: the partitioned system against a dense solve.
 #include "solver/thread_columns.h"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ TEST(PartitionedTridiagonal, agree_with_a_dense_solve) {
   PartitionedTridiagonal<double, 1> stretch;
   PartitionedTridiagonal<float, 3> motion;
   stretch.resize(500), motion.resize(500);
-  // Longer and shorter in turn: what a longer system left behind must not reach a shorter one.
+  // Longer and shorter alternately: data of a longer system must not affect a shorter one.
   for (const size_t count : {500u, 1u, 2u, 3u, 7u, 8u, 9u, 15u, 16u, 17u, 64u, 101u, 174u, 175u, 500u, 23u}) {
     EXPECT_LT(worst_error(count, 1, 1e-3, stretch), 1e-10) << count;
     EXPECT_LT(worst_error(count, 1, 1e-6, stretch), 1e-8) << count << ", the softest mode of a straight thread";

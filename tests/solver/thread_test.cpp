@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/solver: the thread slides through an anchor against friction, keeps its length, and weighs what it weighs.
+// tests/solver: the thread slides through an anchor against friction, keeps its length, and has the correct weight.
 #include "solver/thread.h"
 
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ struct Line {
     solve_thread(model, thread, scratch, x.data(), prev.data(), inv_mass.data(), body_model, body, h);
     for (size_t i = 0; i < x.size(); ++i) set(v[i], (xyz(x[i]) - xyz(prev[i])) / (h * (1 + damping * h)));
   }
-  // The needle end goes by `by` [m] in `seconds`, and waits as long again.
+  // The needle end moves by `by` [m] in `seconds`, and waits as long again.
   void pull(float by, float seconds) {
     const int steps = static_cast<int>(seconds / h);
     for (int i = 0; i < steps; ++i) body[1].x.x += by / static_cast<float>(steps), step();
@@ -184,7 +184,7 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
             35);
 }
 
-// Weight against geometric stiffness: a taut, light thread between two hands hangs as a catenary and no tighter.
+// Weight against geometric stiffness: a taut, light thread between two hands hangs as a catenary, without extra tension.
 TEST(ThreadWeight, a_taut_light_thread_does_not_pull_by_itself) {
   for (const float h : {1.0f / 480, 1.0f / 960}) {
     Line line(175, 0.0016f, 2e-6f, 1e-6f, 0);
@@ -203,7 +203,7 @@ TEST(ThreadWeight, a_taut_light_thread_does_not_pull_by_itself) {
   }
 }
 
-// A hanging thread is cut through in its middle: what is below falls freely, what is above hangs on.
+// A hanging thread is cut in its middle: the lower part falls freely, the upper part stays.
 TEST(ThreadCut, the_lower_half_falls_the_upper_half_stays) {
   constexpr uint32_t kNodes = 61, kCut = 30;  // nodes 0 .. 30 stay
   Line line(kNodes, 0.0016f, 2e-6f, 1e-6f, 45);
@@ -243,7 +243,7 @@ TEST(ThreadCut, the_lower_half_falls_the_upper_half_stays) {
   EXPECT_NEAR(line.thread.tension[0], 30 * 2e-6 * 9.81, 0.1 * 30 * 2e-6 * 9.81);
 }
 
-// Beside an anchor: no thread can pass to or from what is cut off, whatever pulls.
+// Beside an anchor: no thread can pass to or from a cut-off part, for any pull.
 TEST(ThreadCut, nothing_slides_through_an_anchor_beside_a_cut) {
   Line line = soft_line();
   line.pull(0.014f, 0.5f);  // it slides

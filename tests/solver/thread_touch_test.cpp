@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests of solver/thread_touch: a taut thread round a tool stays round it, and the tool feels it.
+// tests of solver/thread_touch: a taut thread round a tool stays round it, and loads the tool.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -129,7 +129,7 @@ TEST(ThreadOnTool, a_taut_thread_over_a_tool_stays_outside_and_the_tool_feels_it
     EXPECT_LT(w.deepest_middle, 4e-4) << h;
     EXPECT_LT(std::abs(w.stretch()), 0.01) << h;
     EXPECT_NEAR(w.tension(0), 1, 0.1) << h;
-    // Without friction the tension is the same all along, and the tool carries both ends.
+    // Without friction the tension is uniform, and the tool carries both ends.
     const double first = w.tension(0), last = w.tension(w.state.strand[0].tension.size() - 1);
     EXPECT_NEAR(first, last, 0.01) << h;
     EXPECT_NEAR(w.force_on_tool().y, -(first + last), 0.1 * (first + last)) << h;
@@ -166,7 +166,7 @@ TEST(ThreadOnTool, lifted_off_nothing_sticks) {
   EXPECT_LT(w.depth(w.at(middle)), -0.002);
 }
 
-// A tool that a hand holds by a spring gives way until the spring carries the thread's force, and settles.
+// A tool held by a spring moves until the spring carries the thread's force, and settles.
 TEST(ThreadOnTool, a_tool_in_a_hand_gives_way_and_rests) {
   for (const float h : {1.0f / 480, 1.0f / 960}) {
     Wrap w(0.5f, 0, 0, h);
@@ -188,7 +188,7 @@ TEST(ThreadOnTool, a_tool_in_a_hand_gives_way_and_rests) {
   }
 }
 
-// Capstan (Euler): drawn over half a turn against friction, the tensions are in the ratio exp(pi mu). Friction is an implicit
+// Capstan (Euler): pulled over half a turn against friction, the tensions have the ratio exp(pi mu). Friction is an implicit
 // drag by the last substep's speed and tension: it comes out too small rather than too large, more so in long substeps.
 TEST(ThreadOnTool, friction_makes_a_capstan) {
   const float mu = 0.2f;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/solver: the search for pairs of tissue against looking at every pair.
+// tests/solver: the broad phase of tissue compared with testing every pair.
 #include "solver/tissue_pairs.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 namespace catgut {
 namespace {
 
-// Two crumpled sheets of 40 x 23 particles, row by row, in one another's way.
+// Two crumpled sheets of 40 x 23 particles, row by row, interpenetrating.
 struct Sheets {
   std::vector<Vec4> rest, x;
   TissueCollision tissue;
@@ -28,7 +28,7 @@ Sheets make_sheets(uint64_t seed) {
       for (int column = 0; column < 23; ++column) {
         const float u = 0.002f * static_cast<float>(column), v = 0.002f * static_cast<float>(row);
         s.rest.push_back({u, 0.01f * static_cast<float>(sheet), v, 1});
-        // Rolled up, so that a sheet meets itself too.
+        // Rolled up, so that a sheet also touches itself.
         const float turn = v / 0.008f, r = 0.006f + 0.0005f * turn + 0.0004f * static_cast<float>(random.uniform() - 0.5);
         s.x.push_back({u + 0.001f * static_cast<float>(sheet), r * std::cos(turn), r * std::sin(turn), 1});
         radius.push_back(0.0008f + 0.0004f * static_cast<float>(random.uniform()));
@@ -67,7 +67,7 @@ TEST(TissuePairs, finds_what_looking_at_every_pair_finds) {
       find_tissue_pairs(s.tissue, s.x.data(), origin, search, jobs);
       const auto found = listed(search);
       EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
-      // At the very edge of the margin rounding decides; a micrometer inside of it nothing may be missing.
+      // At the edge of the margin rounding decides; a micrometer inside it nothing may be missing.
       const auto wanted = every_pair_within(s, s.tissue.pair_margin - 1e-6f),
                  most = every_pair_within(s, s.tissue.pair_margin + 1e-6f);
       EXPECT_GT(wanted.size(), 1000u);
@@ -77,7 +77,7 @@ TEST(TissuePairs, finds_what_looking_at_every_pair_finds) {
   }
 }
 
-// A state that was damaged on its way may hold anything; what is not a place is near nothing, and nothing else is read or
+// A damaged state may have any values; an invalid position is near nothing, and no other memory is read or
 // written.
 TEST(TissuePairs, particles_that_are_nowhere_are_near_nothing) {
   for (const float far : {1e19f, 1e25f, 3e38f, HUGE_VALF, -HUGE_VALF, std::nanf("")}) {
@@ -115,7 +115,7 @@ TEST(TissuePairs, kept_pairs_hold_all_that_touch_until_they_are_called_stale) {
   EXPECT_LT(kept, 100) << "the sheets went far, and nobody noticed";
 }
 
-// What a hand does: it moves a part of the tissue and then another.
+// Like a hand: it moves a part of the tissue and then another.
 TEST(TissuePairs, only_what_moved_is_looked_for_anew_and_nothing_that_touches_is_missed) {
   Sheets s = make_sheets(7);
   Jobs jobs(2);
@@ -141,7 +141,7 @@ TEST(TissuePairs, only_what_moved_is_looked_for_anew_and_nothing_that_touches_is
       find_tissue_pairs(s.tissue, s.x.data(), origin, search, jobs);
       ++searches;
       for (const PairSearch::Part& part : search.part) blocks += static_cast<size_t>(std::popcount(part.moved));
-      // What a save and load in between would list.
+      // The list after an intermediate save and load.
       PairSearch again;
       list_tissue_pairs(s.tissue, origin, again, jobs);
       ASSERT_EQ(listed(again), listed(search)) << step;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests of solver/contact, tools on tools: what two hands push against each other with, in closed form; nothing passes through;
-// Coulomb; momentum; and tools that are apart are as if there were no such contact.
+// tests of solver/contact, tools on tools: the force between two hands, in closed form; no pass-through;
+// Coulomb; momentum; and separate tools have no contact.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -19,7 +19,7 @@ constexpr float kHand = 1.0f / 3000, kHandTurning = 0.05f;  // [m/N], [rad/(N m)
 const Quat kLevel = axis_angle({0, 1, 0}, 0.5f * kPi);      // a tool that lies along x
 const Quat kAcross{};                                       // and one along z
 
-// Two tools as scenes have them, each on the spring of a hand, and nothing else that matters.
+// Two tools as in the scenes, each on the spring of a hand.
 struct Pair {
   SolverModel model;
   SolverState state;
@@ -52,7 +52,7 @@ struct Pair {
       m.capsule.push_back({{0, 0, 0.018f}, {0, 0, 0.12f}, kShaft});
     }
     model.body[model.needle_body(0)].inv_mass = 1 / 3e-4f, model.body[model.needle_body(0)].inv_inertia = {1e8f, 1e8f, 1e8f};
-    model.body[model.needle_body(0)].gravity = true;  // a needle, whose weight no one carries
+    model.body[model.needle_body(0)].gravity = true;  // a needle, without a hand
     model.body[model.needle_body(0)].capsule.push_back({{}, {0, 0, 0.002f}, 0.0003f});
     const std::vector<float> mass{1.0f};
     model.shape = make_shape_model(std::span(start).first(1), mass, std::vector<std::vector<uint32_t>>{{0}});
@@ -111,8 +111,8 @@ void expect_near(Vec3 a, Vec3 b, float within) {
   EXPECT_LT(distance(a, b), within) << a.x << " " << a.y << " " << a.z << " and " << b.x << " " << b.y << " " << b.z;
 }
 
-// Crossing shafts, one hand lower than the other tool lets it: each spring carries the same, all that the hands ask for is in
-// the springs. The lever of the crossing on the wrist's spring counts too.
+// Crossing shafts, one hand lower than the other tool allows: both springs carry the same force, all of it in the
+// springs. The lever of the crossing on the wrist's spring counts too.
 TEST(ToolsOnTools, two_hands_balance_in_closed_form) {
   for (const float lever : {0.02f, 0.06f, 0.1f}) {
     SCOPED_TRACE(lever);
@@ -140,8 +140,8 @@ TEST(ToolsOnTools, two_hands_balance_in_closed_form) {
   }
 }
 
-// A hand that drives its shaft across the other, as fast as hands go and far beyond it: it stays on its side, whatever meets,
-// as long as nothing bounds the force.
+// A hand that drives its shaft across the other, at hand speed and far beyond: it stays on its side, for any contact
+// without a force limit.
 TEST(ToolsOnTools, nothing_passes_through) {
   for (const float speed : {0.05f, 0.2f, 0.5f, 1.5f})
     for (const float along : {0.008f, 0.03f, 0.09f})
@@ -151,7 +151,7 @@ TEST(ToolsOnTools, nothing_passes_through) {
         p.model.tool_force = 1000;
         const float far = 0.03f, travel = 0.02f + far;
         p.run(travel / speed + 0.1f, [&](float t) { p.state.weld[1].target.p.y = 0.02f - std::min(travel, speed * t); });
-        // Where both pass: how far apart the axes are at the crossing, with the sign of the side.
+        // At the crossing: distance of the axes, with the sign of the side.
         const Pose a = p.state.body[0].pose(), b = p.state.body[1].pose();
         const Vec3 ends[4] = {transform(a, {0, 0, 0}), transform(a, {0, 0, 0.12f}), transform(b, {0, 0, 0}),
                               transform(b, {0, 0, 0.12f})};
@@ -163,8 +163,8 @@ TEST(ToolsOnTools, nothing_passes_through) {
       }
 }
 
-// A hand that feels nothing continues: it never presses harder than the bound, and the tools slip past each other in the end
-// instead of staying locked behind each other.
+// A hand without force feedback continues: the force never exceeds the limit, and the tools finally slip past each other
+// instead of interlocking.
 TEST(ToolsOnTools, beyond_the_bound_they_slip_past_each_other) {
   for (const float speed : {0.05f, 0.2f, 0.5f}) {
     SCOPED_TRACE(speed);
@@ -182,7 +182,7 @@ TEST(ToolsOnTools, beyond_the_bound_they_slip_past_each_other) {
   }
 }
 
-// No one holds them, nothing slows them: what one loses the other has, in turning too.
+// Free bodies without damping: momentum and angular momentum are conserved.
 TEST(ToolsOnTools, free_tools_keep_momentum) {
   for (const float friction : {0.0f, 0.3f}) {
     Pair p({{-0.03f, 0, 0}, kLevel}, {{0, 0.008f, -0.05f}, kAcross}, friction, false);
@@ -205,12 +205,12 @@ TEST(ToolsOnTools, free_tools_keep_momentum) {
     const auto after = momentum();
     EXPECT_GT(length(p.state.body[0].v), 0.02f) << "they were to meet";
     expect_near(after[0], before[0], 1e-4f * length(before[0]));
-    // Free bodies are integrated without their gyroscopic torque, contact or no contact: 2 %.
+    // Free bodies are integrated without their gyroscopic torque, with or without contact: 2 %.
     expect_near(after[1], before[1], 0.02f * length(before[1]));
   }
 }
 
-// The upper tool is drawn along the lower one under load: the hand feels friction times what presses, no more, against the way.
+// The upper tool slides along the lower one under load: the hand feels friction times the normal force, against the motion.
 TEST(ToolsOnTools, sliding_obeys_coulomb) {
   for (const float friction : {0.1f, 0.3f}) {
     Pair p({{-0.06f, 0, 0}, kLevel}, {{0, 2 * kShaft, -0.06f}, kAcross}, friction);
@@ -218,7 +218,7 @@ TEST(ToolsOnTools, sliding_obeys_coulomb) {
     const auto pressed = [&] { return p.on(1).pressed / (p.model.h * p.model.h); };
     const auto rubbed = [&] { return length(p.on(1).rubbing) / (p.model.h * p.model.h); };
     EXPECT_LT(rubbed(), 1.001f * friction * pressed());
-    // Slowly aside, by far less than friction holds: they stick.
+    // A slow lateral pull, far below the friction limit: they stick.
     const auto apart = [&] { return p.state.body[1].x.x - p.state.body[0].x.x; };
     const float before = apart();
     p.run(0.1, [&](float t) { p.state.weld[1].target.p.x = 0.0001f * std::min(1.0f, 20 * t); });
@@ -233,8 +233,8 @@ TEST(ToolsOnTools, sliding_obeys_coulomb) {
   }
 }
 
-// Shafts side by side, pressed together along their whole length: they stay parallel but for what the wrists yield, none rolls
-// or shakes, and each hand feels the other's push.
+// Parallel shafts, pressed together along their whole length: they stay parallel except for the wrists' compliance, without
+// rolling or jitter, and each hand feels the other's push.
 TEST(ToolsOnTools, parallel_shafts_lie_still) {
   for (const float shift : {0.0f, 0.03f, -0.05f}) {
     SCOPED_TRACE(shift);
@@ -258,7 +258,7 @@ TEST(ToolsOnTools, parallel_shafts_lie_still) {
   }
 }
 
-// Hands that appear with their tools within each other, the axes even the same: out of it in some ticks, without a blow.
+// Hands that connect with overlapping tools, even on the same axis: separated in some ticks, without a jerk.
 TEST(ToolsOnTools, deep_overlap_is_undone_gently) {
   const std::array<Pose, 4> other{Pose{{}, kAcross}, Pose{{0, 0.001f, 0.02f}, kAcross}, Pose{{-0.05f, 0, 0.05f}, kLevel},
                                   Pose{{-0.05f, -0.001f, 0.05f}, kLevel}};
@@ -272,7 +272,7 @@ TEST(ToolsOnTools, deep_overlap_is_undone_gently) {
   }
 }
 
-// Tools that do not touch: the same bits as with no contact at all, near or far; and a hand that is not there, or the needle,
+// Tools that do not touch: the same bits as without contact, near or far; a disconnected hand, or the needle,
 // touches none.
 TEST(ToolsOnTools, apart_is_as_if_there_were_none) {
   const auto wander = [](Pair& p, bool contact) {

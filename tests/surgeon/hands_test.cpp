@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/surgeon: scripted hands move like hands, and only through ToolInput. The surgeon's room cannot include the simulation
-// (tests/layers reads its arrows), so it sees Snapshots alone; here two surgeons who see the same do the same.
+// (tests/layers checks the dependencies), so it reads only Snapshots; here two surgeons with equal input act equally.
 #include "surgeon/hands.h"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ TEST(Hands, jaw_closes_at_five_strokes_a_second) {
   EXPECT_NEAR(hand.jaw, 0, 1e-4f);
 }
 
-// The tremor's deviation is the one asked for, whatever the tick rate.
+// The tremor's deviation is the requested one, at any tick rate.
 TEST(Hands, tremor_has_the_asked_deviation) {
   for (const float rate : {60.0f, 240.0f, 1000.0f})
     for (const float deviation : {0.0001f, 0.0005f}) {
@@ -107,7 +107,7 @@ TEST(Surgeon, same_seed_same_hands_another_seed_other_hands) {
   EXPECT_TRUE(differ);
 }
 
-// Over a whole bite: hands keep to the speeds of the skill, tremor aside.
+// Over a whole bite: hands keep the speed limits of the skill, tremor excluded.
 TEST(Surgeon, keeps_to_the_speed_of_its_skill) {
   Scene scene;
   SurgeonSkill skill;
@@ -128,11 +128,11 @@ TEST(Surgeon, keeps_to_the_speed_of_its_skill) {
     step(*scene.model, *scene.state, in, scene.jobs);
     publish(*scene.model, *scene.state, scene.seen);
   }
-  EXPECT_LE(fastest, 2 * skill.speed * 1.01f);  // following the needle's circle it may catch up at twice the speed
+  EXPECT_LE(fastest, 2 * skill.speed * 1.01f);  // following the needle's circle it may move at twice the speed
   EXPECT_GT(fastest, 0.5f * skill.speed);
 }
 
-// The surgeon touches nothing but the Snapshot: no file of its room names a room below or beside.
+// The surgeon reads nothing but the Snapshot: no file of its room names a room below or beside.
 TEST(Surgeon, sees_the_snapshot_alone) {
   for (const char* name : {"surgeon.h", "hands.h", "hands.cpp", "plan.h", "plan.cpp", "sight.h", "sight.cpp", "scripted.h",
                            "scripted.cpp", "tying.cpp"}) {

@@ -51,7 +51,7 @@ TEST(Procedure, twenty_seeds_close_the_opening) {
   }
 }
 
-// Half a millimeter of tremor, a millimeter of aim: the first attempts fail, and the surgeon tries again instead of giving up.
+// Half a millimeter of tremor, a millimeter of aim error: the first attempts fail, and the surgeon repeats them.
 TEST(Procedure, shaky_hands_try_again) {
   for (uint64_t seed : {3, 6}) {
     SceneSpec scene = read_scene("purse_string");
@@ -67,7 +67,7 @@ TEST(Procedure, shaky_hands_try_again) {
   }
 }
 
-// Every scene says what it expects of its suture; all of it must hold, whatever the hands' tremor.
+// Every scene states its expected results; all of them must hold, for any tremor of the hands.
 void sew(const std::string& name, uint64_t seeds) {
   for (uint64_t seed = 1; seed <= seeds; ++seed) {
     SceneSpec scene = read_scene(name);

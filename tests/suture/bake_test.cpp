@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/suture: a fresh needle and thread: what is tied settles, the rest goes, and nothing grows but what it leaves behind.
+// tests/suture: a new needle and thread: tied thread is baked, the rest removed, and nothing else grows.
 #include <gtest/gtest.h>
 
 #include "tie.h"
@@ -44,7 +44,7 @@ std::array<float, 3> lengths(Tie& r) {
     for (size_t i = at[p]; i < at[p + 1]; ++i) length[p] += r.thread().rest[i];
   return length;
 }
-// Of the two ways from the one point to the other.
+// The two thread paths from one point to the other.
 float shorter_way(Tie& r) {
   const std::array<float, 3> length = lengths(r);
   return std::min(length[1], length[0] + length[2]);
@@ -87,7 +87,7 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   EventList events;
   SutureContext sewing = r.context(events);
   ASSERT_TRUE(new_suture(sewing, r.model->start, r.model->needle_start, {kButtonNewSuture}));
-  // The curve: every particle of the piece, where it was; tails included, what was cut off gone.
+  // The curve: every particle of the piece, at its position; tails included, cut-off thread removed.
   ASSERT_EQ(r.suture().settled.size(), 1u);
   Snapshot seen;
   publish(*r.model, *r.state, seen);
@@ -96,7 +96,7 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   for (size_t i = 0; i < where.size(); ++i) EXPECT_LT(distance(seen.settled[0].node[i], where[i]), 1e-4f) << i;
   ASSERT_EQ(seen.settled[0].knot.size(), 1u);
   EXPECT_LT(distance(seen.settled[0].knot[0], knot), 1e-5f);
-  // Both ways between the points are thread that holds them; the shorter is the one that does.
+  // Both paths between the points are thread that holds them; the shorter one carries the load.
   ASSERT_EQ(r.solver().pin.size(), 1u);
   const Tether& pin = r.solver().pin[0];
   EXPECT_EQ(pin.owner, TetherOwner::stitch);
@@ -115,7 +115,7 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   EXPECT_EQ(r.needle().x, r.model->needle_start[0].p);
 }
 
-// Thread holds two points from both sides; the pin is as long as the shorter way.
+// Thread holds two points from both sides; the tether has the length of the shorter path.
 TEST(Settle, of_two_ways_between_the_same_points_the_shorter_holds) {
   for (const float inside : {0.3f, 3.0f}) {
     TieSetup setup;
@@ -133,7 +133,7 @@ TEST(Settle, of_two_ways_between_the_same_points_the_shorter_holds) {
   }
 }
 
-// A tied stitch of two bites: in and out, in and out. Its points in their order along the thread, and the slack thread in it.
+// A tied stitch of two bites: in and out, in and out. Its points in order along the thread, and the slack thread in it.
 struct TwoBites : Tie {
   std::array<uint32_t, 4> slot{};
   static TieSetup long_enough() {
@@ -166,7 +166,7 @@ struct TwoBites : Tie {
   }
 };
 
-// A knot is no place in the tissue: what it does is to hold the two ends of its stitch together.
+// A knot is not a point of the tissue: its effect is to hold the two ends of its stitch together.
 TEST(Settle, both_ends_of_a_stitch_are_held_through_its_knot) {
   TwoBites r;
   if (HasFatalFailure()) return;
@@ -185,8 +185,8 @@ TEST(Settle, both_ends_of_a_stitch_are_held_through_its_knot) {
   EXPECT_LT(distance(position_of(inner.b, r.x()), at[2]), 1e-4f);
 }
 
-// Two suture points of one bite are a way through a wall, which holds itself: a pin there would be looked at in every substep
-// from now on, for nothing.
+// Two suture points of one bite are a passage through a wall, which holds itself: a tether there would be solved in every
+// substep from now on, without effect.
 TEST(Settle, a_wall_that_carries_nothing_gets_no_pin) {
   struct Case {
     const char* what;
@@ -212,7 +212,7 @@ TEST(Settle, a_wall_that_carries_nothing_gets_no_pin) {
   }
 }
 
-// Later stitches take the load off a passage, or the tissue settles: then its pin goes, when the next suture is taken.
+// Later stitches take the load of a passage, or the tissue settles: its tether is removed when the next suture is loaded.
 TEST(Settle, a_passage_is_pinned_as_long_as_it_carries_something) {
   for (const float pull : {0.11f, 0.09f}) {
     TwoBites r;
@@ -227,11 +227,11 @@ TEST(Settle, a_passage_is_pinned_as_long_as_it_carries_something) {
   }
 }
 
-// The technique's closure holds the walls together pair by pair; a stitch that lies on such a pair would only fight with it.
+// The technique's closure holds the walls together pair by pair; a stitch on such a pair would only oppose it.
 TEST(Settle, places_that_a_pin_holds_already_get_no_second) {
   struct Case {
     const char* what;
-    float aside;   // [m] of the pin that is there
+    float aside;   // [m] of the existing tether
     float longer;  // [m] than the thread between the points
     size_t pins;
   };
@@ -255,21 +255,21 @@ TEST(Settle, places_that_a_pin_holds_already_get_no_second) {
     there.b = particle_near(r.point_at(1) + Vec3{0, 0, c.aside});
     ASSERT_EQ(distance(position_of(there.a, r.x()), r.point_at(0)) < 0.003f, c.aside < 0.01f);
     there.length = length + c.longer;
-    there.owner = TetherOwner::stitch;  // a plan's pins are made again every tick
+    there.owner = TetherOwner::stitch;  // a plan's tethers are rebuilt every tick
     r.solver().pin.push_back(there);
     settle(r);
     EXPECT_EQ(r.solver().pin.size(), c.pins);
   }
 }
 
-// Few particles carry it on, and nothing moves because of that, not even in tissue that is out of shape.
+// Fewer particles carry the tether, and nothing moves because of that, not even in deformed tissue.
 TEST(Settle, a_pin_hangs_on_six_particles_at_most) {
   TieSetup setup;
   setup.particles = 110;
   Tie r(setup);
   tie_and_cut(r);
   if (HasFatalFailure()) return;
-  // The first point hangs on as many particles as there can be.
+  // The first point uses the maximum number of particles.
   EmbeddedPoint& point = r.thread().anchor[r.sewn().point[0].anchor].point;
   const Vec3 at = r.point_at(0);
   std::vector<uint32_t> near(r.model->solver.tissue);
@@ -279,7 +279,7 @@ TEST(Settle, a_pin_hangs_on_six_particles_at_most) {
   point.count = EmbeddedPoint::kMaxParticles;
   for (uint32_t i = 0; i < point.count; ++i)
     point.particle[i] = near[i], point.weight[i] = 1.0f / static_cast<float>(EmbeddedPoint::kMaxParticles);
-  // The outermost of them, which the pin will do without, have been moved.
+  // The outermost of them, which the tether will omit, have been moved.
   for (uint32_t i = EmbeddedPoint::kMaxParticles - 4; i < EmbeddedPoint::kMaxParticles; ++i)
     set(r.solver().x[near[i]], xyz(r.x()[near[i]]) + Vec3{0, 0.003f, 0});
   const EmbeddedPoint a = point, b = r.thread().anchor[r.sewn().point[1].anchor].point;
@@ -301,7 +301,7 @@ TEST(Settle, a_pin_hangs_on_six_particles_at_most) {
   EXPECT_NEAR(now, before, 1e-6f) << "and draws as the thread drew";
 }
 
-// What the thread held together stays together when the tissue is pulled at.
+// Tissue held together by thread stays together when it is pulled.
 TEST(Settle, the_pins_hold_what_the_thread_held) {
   float apart[2];
   for (const bool held : {true, false}) {
@@ -381,7 +381,7 @@ TEST(Settle, a_knot_that_does_not_hold_is_said_and_long_ends_are_trimmed) {
   EXPECT_GT(r.suture().settled[0].node.size(), 2 * 10u);
 }
 
-// "Cost and counts": nothing that a tick works on grows.
+// "Cost and counts": no input of a tick grows.
 TEST(Settle, ten_stitches_leave_nothing_but_themselves) {
   TieSetup setup;
   setup.particles = 100;
@@ -418,11 +418,11 @@ TEST(Settle, ten_stitches_leave_nothing_but_themselves) {
     EXPECT_EQ(hash_state(*r.model, *again), hash_state(*r.model, *r.state));
   }
   EXPECT_EQ(r.sewn().suture_index, 10u);
-  // Each leaves its curve, its pins and its bites: the same for every stitch, but for how long its tails are.
+  // Each leaves its curve, its tethers and its bites: the same for every stitch, except for the length of its tails.
   for (size_t k = 1; k < bytes.size(); ++k) EXPECT_LT(bytes[k] - bytes[k - 1], 3000u);
 }
 
-// The same buttons, the same bits: by inputs alone.
+// The same buttons, the same bits: only through inputs.
 TEST(Settle, replays_the_same) {
   std::vector<uint64_t> hash[2];
   for (int run = 0; run < 2; ++run) {

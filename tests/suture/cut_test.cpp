@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/suture: scissors: a cut is an end of the thread to everything, and a wrong one is said and stays.
+// tests/suture: scissors: every stage treats a cut as an end of the thread; a wrong one is reported and stays.
 #include <gtest/gtest.h>
 
 #include "tie.h"
@@ -21,7 +21,7 @@ TEST(Cut, the_nearest_pair_within_reach_once_a_press) {
   EXPECT_EQ(r.last(EventKind::thread_cut)->which, r.thread().order[12]);
   EXPECT_EQ(r.last(EventKind::thread_cut)->value, -1.0f) << "no stitch to measure to";
   EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::cut_before_knot);
-  // Held down the button cuts no more, whatever comes between the blades.
+  // Held down, the button cuts no further, whatever moves between the blades.
   r.input.hand[1].buttons = kButtonCut;
   r.tick();
   for (int i = 0; i < 10; ++i) {
@@ -38,7 +38,7 @@ TEST(Cut, nothing_acts_across_it) {
   ASSERT_EQ(r.thread().cut[20], 1);
   r.wait(0.3f);
   const auto x = r.solver().x;
-  // The needle goes away with its piece; the other one does not stir.
+  // The needle moves away with its piece; the other one stays.
   r.hold_needle();
   Pose to = r.circle();
   to.p += Vec3{0.05f, 0.03f, 0.02f};
@@ -102,7 +102,7 @@ TEST(Cut, tells_how_long_the_tail_is_and_that_the_throws_are_too_few) {
   snip(r, between(r, r.node_of(k.slot[0]) - 5));
   EXPECT_EQ(r.count(EventKind::thread_cut), 2u);
   EXPECT_EQ(r.count(EventKind::technique_fault), 1u) << "of one knot it is said once";
-  // The knot holds what it held.
+  // The knot still holds.
   EXPECT_EQ(r.sewn().knot[0].slots, 2u);
   EXPECT_EQ(r.thread().anchor.size(), 4u);
 }
@@ -163,7 +163,7 @@ TEST(Cut, off_the_stitch_takes_a_throw_back) {
   Tie r(setup);
   r.take();
   ASSERT_EQ(r.sewn().knot.size(), 1u);
-  r.thread().cut[r.node_of_point(0) - 3] = 1;  // the taken end, between jaw and stitch
+  r.thread().cut[r.node_of_point(0) - 3] = 1;  // the grasped end, between jaw and stitch
   r.tick();
   EXPECT_EQ(r.count(EventKind::throw_undone), 1u);
   EXPECT_TRUE(r.sewn().knot.empty());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/suture: the law of pushing a needle through bowel, at the places where its numbers come from.
+// tests/suture: the force law of a needle through bowel, at the published values.
 #include "suture/forces.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ TEST(NeedleForces, the_wall_hardens_up_to_the_entry_peak) {
   EXPECT_FLOAT_EQ(end.pierce, 0.9f);
 }
 
-// The spring's slope is the slope of its force: the servo goes along it between two ticks.
+// The spring's slope is the derivative of its force: the servo follows it between two ticks.
 TEST(NeedleForces, stiffness_is_the_slope) {
   for (const float z : {0.0004f, 0.0011f, 0.002f}) {
     const float d = 1e-5f;
@@ -43,20 +43,20 @@ TEST(NeedleForces, stiffness_is_the_slope) {
 }
 
 TEST(NeedleForces, drops_and_drags) {
-  // Through the first surface: what is left is below half of the peak, as cutting and a little shaft.
+  // Through the first surface: the remainder is below half of the peak, from cutting and a little shaft friction.
   const NeedleResistance in = needle_resistance(-1, kRelease, -1, 0.003f, true, 0);
   EXPECT_EQ(in.spring, 0);
   EXPECT_LT(in.drag, 0.45f * kEntryPeak);
   EXPECT_GT(in.drag, 0.15f);
-  // A bite of 10 mm drags with 0.3 to 0.6 N, a longer one no more; none without needle in it.
+  // A bite of 10 mm has 0.3 to 0.6 N of friction, a longer one no more; zero without a needle in it.
   const NeedleResistance through = needle_resistance(-1, kRelease, -1, 0.010f, false, 0);
   EXPECT_GE(through.drag, 0.3f);
   EXPECT_LE(through.drag, 0.6f);
   EXPECT_LE(needle_resistance(-1, kRelease, -1, 0.026f, false, 0).drag, kShaftMost);
   EXPECT_EQ(needle_resistance(-1, kRelease, -1, 0, false, 0).drag, 0);
-  // Out: 0.6 of the way in.
+  // Exit: 0.6 of the entry.
   EXPECT_NEAR(needle_resistance(-1, kRelease, 0, 0.005f, true, 0).spring, 0.6f * kEntryPeak, 1e-4f);
-  // Tissue held with one newton resists by three tenths more.
+  // Tissue held with one newton has 30 % more resistance.
   EXPECT_NEAR(needle_resistance(kRelease, kRelease, -1, 0, true, 1).spring, 1.3f * kEntryPeak, 1e-4f);
 }
 

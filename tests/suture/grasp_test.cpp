@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/suture: jaws that hold needle or thread, where and at the angle they caught it.
+// tests/suture: jaws that hold needle or thread, at the grasped position and angle.
 #include <gtest/gtest.h>
 
 #include "rig.h"
@@ -68,7 +68,7 @@ TEST(Grasp, opening_drops_the_needle) {
   EXPECT_EQ(r.count(EventKind::needle_released), 1u);
   EXPECT_EQ(r.suture().instrument[0].held, Held::nothing);
   EXPECT_EQ(r.solver().weld.size(), 2u) << "only the two hands' own";
-  // The jaw leaves and the needle falls back to the drape.
+  // The jaw opens and the needle falls back to the drape.
   for (int i = 1; i <= 20; ++i) r.input.hand[0].pose.p.z += 0.002f, r.tick();
   r.wait(1.0f);
   EXPECT_LT(r.needle().x.y, up - 0.02f);
@@ -83,7 +83,7 @@ TEST(Grasp, a_jaw_out_of_reach_catches_nothing) {
   r.show(0, pose, 1);
   r.close(0);
   EXPECT_EQ(r.suture().instrument[0].held, Held::nothing);
-  // A jaw that is already closed catches nothing by being moved onto the needle.
+  // A closed jaw grasps nothing when moved onto the needle.
   r.input.hand[0].pose.p.y -= 0.006f;
   r.wait(0.2f);
   EXPECT_EQ(r.suture().instrument[0].held, Held::nothing);
@@ -142,7 +142,7 @@ TEST(Grasp, holds_and_releases_the_nearest_thread) {
   EXPECT_EQ(r.count(EventKind::thread_released), 1u);
   EXPECT_EQ(r.thread().hold.size(), 1u);
   EXPECT_EQ(r.collides()[held - r.model->solver.strand[0].first_slot], 1);
-  // The jaw leaves; thread is light and air is thick to it, but it sinks.
+  // The jaw opens; thread is light and heavily damped, but it sinks.
   const float high = xyz(r.solver().x[held]).y;
   for (int i = 0; i < 20; ++i) r.input.hand[1].pose.p.z += 0.002f, r.tick();
   r.wait(1.0f);
@@ -164,7 +164,7 @@ TEST(Grasp, pulling_the_tail_passes_thread_toward_the_free_end) {
   ASSERT_EQ(r.suture().instrument[0].held, Held::thread);
   const size_t before = r.node_of_point(0);
   const Vec3 way = normalized(p.out + 0.5f * p.up - 0.5f * p.along);
-  // The needle's end gives way by as much as the tail is drawn.
+  // The needle's end moves by as much as the tail is pulled.
   Pose needle = r.circle();
   for (int i = 0; i < 120; ++i) {
     r.input.hand[0].pose.p += way * 0.0003f;
@@ -198,7 +198,7 @@ TEST(Grasp, a_jaw_that_closes_on_the_wall_holds_the_tissue_and_draws_it_along) {
   for (int i = 1; i <= 60; ++i) r.input.hand[1].pose.p = start.p + out * (0.0001f * static_cast<float>(i)), r.tick();
   r.wait(0.3f);
   EXPECT_GT(dot(xyz(r.x()[particle]) - before, out), 0.003f) << "the wall follows a pull of 6 mm";
-  // Two-way: the hand is held back by the tissue, on the line of the pull.
+  // Two-way: the tissue holds the hand back, on the line of the pull.
   EXPECT_LT(dot(r.solver().body[1].x - r.input.hand[1].pose.p, out), -1e-5f);
   r.open(1);
   EXPECT_EQ(r.count(EventKind::tissue_released), 1u);

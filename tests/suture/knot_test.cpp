@@ -82,7 +82,7 @@ TEST(Knot, comes_down_as_far_as_the_tool_goes_away_and_does_not_go_back_up) {
 }
 
 // "When the knot object reaches the suture point or midpoint between the two previous suture points, it is locked in place, and
-// the attached particles are released." And ours: it then holds a particle of both strands, at one point of the tissue.
+// the attached particles are released." Beyond the paper, it then holds a particle of both strands, at one point of the tissue.
 TEST(Knot, locks_at_the_midpoint_and_holds_both_strands_there) {
   Tie r;
   const double length = r.rest_length();
@@ -111,7 +111,7 @@ TEST(Knot, locks_at_the_midpoint_and_holds_both_strands_there) {
   EXPECT_EQ(k.thrown[0].chirality, 1);
   EXPECT_EQ(k.thrown[0].tension, r.last(EventKind::throw_locked)->value);
   EXPECT_LT(k.thrown[0].gap, 0.003f);
-  // Snug: no more thread between knot and suture points than the way there is long.
+  // Tight: the thread between knot and suture points equals the path.
   EXPECT_EQ(k.slack_removed, 1u);
   EXPECT_NEAR(rest_between(r, r.node_of(k.slot[0]), r.node_of_point(0)), distance(target_of(r), r.point_at(0)), 0.0003);
   EXPECT_NEAR(rest_between(r, r.node_of(k.slot[1]), r.node_of_point(1)), distance(target_of(r), r.point_at(1)), 0.0003);
@@ -123,7 +123,7 @@ TEST(Knot, locks_at_the_midpoint_and_holds_both_strands_there) {
 // "... the knot object moves towards the suture point", if there is one.
 TEST(Knot, goes_to_the_suture_point_if_there_is_one) {
   Tie r;
-  // The older point goes; its thread is free end from there on.
+  // The older point is removed; its thread is free end from there on.
   r.sewn().point[0] = r.sewn().point[1];
   r.sewn().point.pop_back();
   r.thread().anchor.erase(r.thread().anchor.begin());
@@ -138,7 +138,7 @@ TEST(Knot, goes_to_the_suture_point_if_there_is_one) {
   EXPECT_EQ(r.sewn().knot[0].slots, 2u);
 }
 
-// More points than two: what is tied together is the two ends of the stitch.
+// With more than two points, the knot joins the two ends of the stitch.
 TEST(Knot, of_a_long_stitch_goes_between_its_two_ends) {
   TieSetup setup;
   setup.older = 25, setup.newer = 40;
@@ -204,7 +204,7 @@ TEST(Knot, begun_with_the_needle_still_in_the_tissue_is_said_and_goes_on) {
   EXPECT_EQ(r.count(EventKind::throw_started), 1u);
 }
 
-// Jaws that close right at the loop mean the other end, however near the loop's own strands are.
+// Jaws that close directly at the loop grasp the other end, however near the loop's own strands are.
 TEST(Knot, the_jaws_take_the_other_end_and_not_the_loops_own_strand) {
   TieSetup setup;
   setup.depth = 0.0016f;
@@ -220,7 +220,7 @@ TEST(Knot, the_jaws_take_the_other_end_and_not_the_loops_own_strand) {
   EXPECT_EQ(r.count(EventKind::throw_started), 1u);
 }
 
-// What a state says apart from positions and from what follows from them.
+// The data of a state without positions and their derivatives.
 struct Written {
   std::vector<uint32_t> order, anchored, held;
   std::vector<float> rest;
@@ -243,9 +243,9 @@ Written written(Tie& r) {
 // "If the user decides they do not want to proceed with finalizing or tightening the knot, they can release the free end of the
 // thread. After letting go, the loop will be released, and the knot object will be destroyed."
 TEST(Knot, letting_go_takes_it_back_and_nothing_is_left_of_it) {
-  // The twin takes the end and lets it go without a loop.
+  // The twin grasps the end and releases it without a loop.
   Tie tied, twin;
-  // Tissue and thread give a little whatever is done: friction that holds all of it makes the two comparable.
+  // Tissue and thread always move slightly: full friction makes the two comparable.
   for (Tie* r : {&tied, &twin})
     for (ThreadAnchor& a : r->thread().anchor) a.friction = 100, a.slipping = 0;
   for (float jaw : {1.0f, 0.7f}) twin.input.hand[0].jaw = jaw, twin.tick();
@@ -341,7 +341,7 @@ TEST(PullWithKnot, no_particle_passes_a_locked_knot) {
   const std::vector<float> rest(r.thread().rest.begin() + static_cast<long>(nodes[0]),
                                 r.thread().rest.begin() + static_cast<long>(nodes[3]));
   const size_t passed = r.count(EventKind::particle_passed);
-  // The needle draws its strand taut and 8 mm beyond; the hand does the same with the tail.
+  // The needle pulls its strand taut and 8 mm beyond; the hand does the same with the tail.
   for (int side = 0; side < 2; ++side) {
     const Vec3 knot = target_of(r);
     if (side == 0) {
@@ -421,7 +421,7 @@ void draw(Rig& rig, const Place& p, float meters) {
 // suture points, and if none is found, it will pull from the free end."
 TEST(PullWithKnot, without_one_thread_comes_from_the_free_end_once_the_slack_is_out) {
   SceneSpec scene = weightless(60);
-  scene.mechanics.pass_tension = 0.005f;  // single particles of tissue lean far before more slides
+  scene.mechanics.pass_tension = 0.005f;  // single particles of tissue move far before more slides
   Rig rig(scene);
   Place p;
   running_suture(rig, false, p);
@@ -517,8 +517,8 @@ TEST(Midway, is_the_middle_at_rest_and_under_every_affine_motion) {
   EXPECT_LT(distance(position_of(c, bent.data()), 0.5f * (position_of(a, bent.data()) + position_of(b, bent.data()))), 1e-5f);
 }
 
-// A state that is saved with a loop, with a throw on its way, with a knot that is being drawn snug or with a locked one
-// continues as if nothing had happened.
+// A saved state with a loop, with a throw under way, with a knot being tightened or with a locked one
+// continues identically.
 TEST(KnotState, is_saved_whole) {
   Tie r;
   std::vector<std::vector<std::byte>> saved;
@@ -555,8 +555,8 @@ TEST(KnotState, is_saved_whole) {
   }
 }
 
-// Hands that do anything at any time: wind, take, let go, cut, ask for a fresh suture, save and load. Nothing breaks, and every
-// index leads somewhere (load_state checks).
+// Random hands: wind, grasp, release, cut, request a new suture, save and load. Nothing breaks, and every
+// index is valid (load_state checks).
 TEST(KnotState, survives_hands_that_do_anything) {
   const bool long_run = std::getenv("CATGUT_LONG") != nullptr;
   Random random(7);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/suture: loops of thread round a tool (paper 2.4, figure 10). A zoo of shapes, each made by code and named for what it
-// is; then loops that hands lay in a whole scene.
+// tests/suture: loops of thread round a tool (paper 2.4, figure 10). A collection of shapes, each generated and named;
+// then loops wound by hands in a whole scene.
 #include "suture/loop.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ Curve line(Vec3 a, Vec3 b) {
   for (int i = 0; i <= n; ++i) c.push_back(lerp(a, b, static_cast<float>(i) / static_cast<float>(n)));
   return c;
 }
-// An arc round the tool's axis (or round `center`) from angle a by `angle`, its radii and its depth changing evenly.
+// An arc round the tool's axis (or round `center`) from angle a by `angle`, with linear radii and depth.
 struct Arc {
   float from = 0, angle = kTurn;
   float radius = kOn, radius_end = 0;     // [m] 0: as at the start
@@ -55,7 +55,7 @@ Curve with_leads(const Curve& c, float length = 0.03f, float rise = 0) {
   return line(c.front() - in * length - Vec3{0, 0, rise}, c.front()) + c +
          line(c.back(), c.back() + out * length + Vec3{0, 0, rise});
 }
-// Leads straight away from the tool's axis: the thread never comes back over itself.
+// Leads straight away from the tool's axis: the thread does not cross itself again.
 Curve with_radial_leads(const Curve& c, float length = 0.03f) {
   const Vec3 a{c.front().x, c.front().y, 0}, b{c.back().x, c.back().y, 0};
   return line(c.front() + normalized(a) * length, c.front()) + c + line(c.back(), c.back() + normalized(b) * length);
@@ -277,7 +277,7 @@ TEST(Loop, its_particles_are_frozen_on_the_tool_and_go_where_it_goes) {
   }
 }
 
-// A reef knot's throws are wrapped in opposite ways with the same end, or the same way with the other end.
+// A square knot's throws are wrapped in opposite senses with the same end, or in the same sense with the other end.
 TEST(Loop, handedness_is_that_of_the_half_knot_whichever_end_was_wrapped) {
   for (const bool tail : {false, true})
     for (const int way : {1, -1}) {
@@ -379,7 +379,7 @@ TEST(Loop, a_rejection_is_told_once_and_brushing_thread_is_not_spoken_of) {
   EXPECT_EQ(r.last(EventKind::loop_rejected)->reason, LoopReason::too_deep);
 }
 
-// Nothing placed by hand: the forceps carry the thread round the needle driver, and the physics lays it.
+// Nothing is placed directly: the forceps winds the thread round the needle holder, and the physics lays it.
 TEST(Loop, a_hand_that_carries_the_thread_round_the_tool_lays_loops) {
   for (const int way : {1, -1})
     for (const float turns : {1.3f, 2.3f}) {
@@ -389,7 +389,7 @@ TEST(Loop, a_hand_that_carries_the_thread_round_the_tool_lays_loops) {
       setup.above = 0.06f;  // room for a hand between tool and tissue
       Tie r(setup);
       const float side = static_cast<float>(way);
-      // The needle's strand stands straight out beside the tool; the forceps take it 24 mm beyond.
+      // The needle's strand stands straight out beside the tool; the forceps grasps it 24 mm beyond.
       const Vec3 beside = transform(r.frame, Vec3{side * 0.0016f, 0, 0.006f});
       std::vector<Vec3> c{r.point_at(1)};
       Tie::line(c, r.point_at(1), beside);
@@ -404,7 +404,7 @@ TEST(Loop, a_hand_that_carries_the_thread_round_the_tool_lays_loops) {
       const Quat turned = r.frame.q * axis_angle({1, 0, 0}, kPi);  // the hand comes from the other side
       r.show(1, {at, turned}, 0.3f);
       ASSERT_EQ(r.suture().instrument[1].held, Held::thread);
-      // Nearly taut, as a surgeon keeps it: what is wound up is no longer between hand and tool. And past the strand that comes
+      // Nearly taut, like a surgeon's: wound thread is no longer between hand and tool. And past the strand that comes
       // from the tissue, not through it.
       const float wound = 0.0015f, loose = 0.0018f, free = to_local(r.frame, at).y;
       const int ticks = static_cast<int>(turns * 60);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/suture: the order list (paper 2.3, figure 8), against the paper's own procedure on a list of pairs.
+// tests/suture: the order list (paper 2.3, figure 8), compared with the paper's own procedure on a list of pairs.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -14,8 +14,8 @@ struct Pair {
   uint32_t first, second;
 };
 
-// Figure 8 and its text, to the letter: pp_m is the pair whose first particle is to move, pp_t the one after whose first
-// particle it goes.
+// Figure 8 and its text, literally: pp_m is the pair whose first particle is to move, pp_t the one after whose first
+// particle it moves.
 std::vector<Pair> recalculate(std::vector<Pair> pp, uint32_t moved, uint32_t after) {
   auto at = [&](uint32_t first) {
     return static_cast<size_t>(std::find_if(pp.begin(), pp.end(), [&](const Pair& p) { return p.first == first; }) -
@@ -74,7 +74,7 @@ TEST(Figure8, order_is_the_papers_for_every_move) {
         ASSERT_EQ(t.order[i], want[i].first) << "move " << from << " after " << after;
         ASSERT_EQ(t.order[i + 1], want[i].second) << "move " << from << " after " << after;
       }
-      // Lengths: the two pairs it left are one, the pair it split is two halves, no other changed, the sum is what it was.
+      // Lengths: the two pairs that it left are one, the pair that it split is two halves, no other changed, same sum.
       EXPECT_NEAR(std::accumulate(t.rest.begin(), t.rest.end(), 0.0), length, 1e-7);
       auto pair_of = [&](uint32_t a, uint32_t b) {
         for (size_t i = 0; i + 1 < kNodes; ++i)

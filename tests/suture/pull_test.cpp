@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/suture: thread through suture points (paper 2.3, figures 7 and 9). Weightless and laid by hand, so that every length is
-// known (see rig.h).
+// tests/suture: thread through suture points (paper 2.3, figures 7 and 9). Weightless and placed directly, so that every length
+// is known (see rig.h).
 #include <gtest/gtest.h>
 
 #include "rig.h"
@@ -49,7 +49,7 @@ TEST(Figure7, a_suture_point_locks_the_next_free_particle_behind_the_needle) {
   EXPECT_LT(distance(xyz(rig.x()[next_free]), position_of(bite.entry.point, rig.x())), 1e-7f);
   EXPECT_NEAR(rig.rest_length(), length, 1e-7);
   EXPECT_TRUE(rig.order_is_whole());
-  // A second hole right behind the first: the particle behind passes the first suture point before its turn (figure 7c).
+  // A second hole directly behind the first: the particle behind passes the first suture point early (figure 7c).
   const uint32_t behind = rig.thread().order[n - 3];
   bite.exit.point = bite.entry.point;
   rig.sewn().bite[0] = bite;
@@ -67,13 +67,13 @@ TEST(Figure7, a_suture_point_locks_the_next_free_particle_behind_the_needle) {
 // passes.
 TEST(Figure7, tension_below_the_threshold_passes_nothing_above_it_thread_passes) {
   SceneSpec scene = weightless(40);
-  scene.mechanics.pass_tension = 0.013f;  // one particle of tissue gives way by a millimeter for each 1.4 mN
+  scene.mechanics.pass_tension = 0.013f;  // one particle of tissue moves by a millimeter per 1.4 mN
   Rig rig(scene);
   Place p;
   one_point(rig, 34, p);
   const std::vector<uint32_t> order = rig.thread().order;
   const std::vector<float> rest = rig.thread().rest;
-  // Tissue answers slowly and thread at once, so the needle creeps: 0.6 mm/s.
+  // Tissue responds slowly and thread at once, so the needle creeps: 0.6 mm/s.
   float largest = 0;
   bool slid = false;
   for (int i = 0; i < 1200 && !slid; ++i) {
@@ -93,7 +93,7 @@ TEST(Figure7, tension_below_the_threshold_passes_nothing_above_it_thread_passes)
 }
 
 // Figure 7c: "The particle on the free end of the suture point moves to the midpoint of the needle end particle and the suture
-// point." The stage on its own, on a state whose turn it is: exactly one particle, exactly the midpoint, nothing else moves.
+// point." The stage alone, on a state that is due: exactly one particle, exactly the midpoint, nothing else moves.
 TEST(Figure7, exactly_one_particle_passes_to_the_midpoint) {
   Rig rig(weightless(40));
   Place p;
@@ -119,13 +119,13 @@ TEST(Figure7, exactly_one_particle_passes_to_the_midpoint) {
   for (uint32_t i = 0; i < rig.model->solver.count; ++i)
     if (i != passed) { ASSERT_EQ(xyz(rig.x()[i]), xyz(x[i])) << i; }
   EXPECT_NEAR(rig.rest_length(), length, 1e-7);
-  // Its turn is over: called again, nothing passes.
+  // Called again, nothing passes.
   events.clear();
   pull(sewing);
   EXPECT_TRUE(events.empty());
 }
 
-// Ours beyond the paper: passing a particle is bookkeeping. Thread that lies straight is straight afterwards and nothing jumps,
+// Beyond the paper: passing a particle is bookkeeping. Straight thread stays straight and nothing jumps,
 // because the midpoint lies on it.
 TEST(Figure7, passing_makes_no_jump) {
   Rig rig(weightless(40));
@@ -150,8 +150,8 @@ TEST(Figure7, passing_makes_no_jump) {
   EXPECT_LT(longest_passing, longest + 0.0002f);
 }
 
-// Figure 7d: "Tension is resolved after particle movement." Once the needle stops, the difference is no more than the friction
-// holds.
+// Figure 7d: "Tension is resolved after particle movement." When the needle stops, the difference is at most the friction
+// limit.
 TEST(Figure7, tension_resolves_after_passing) {
   Rig rig(weightless(40));
   Place p;
@@ -165,7 +165,7 @@ TEST(Figure7, tension_resolves_after_passing) {
   const size_t passed = rig.count(EventKind::particle_passed);
   rig.wait(0.5f);
   EXPECT_EQ(rig.count(EventKind::particle_passed), passed) << "a resting thread passes nothing";
-  // As much thread came through as the needle took, less what the tissue, held by friction, still leans after it: to one
+  // As much thread came through as the needle pulled, minus the tissue's displacement, held by friction: to one
   // particle.
   const float leans = dot(rig.point_at(0) - at_rest, p.out), spacing = rig.model->solver.strand[0].spacing;
   EXPECT_NEAR(static_cast<float>(passed) * spacing + leans, 0.012f, 1.1f * spacing);
@@ -194,7 +194,7 @@ TEST(Collisions, are_off_for_the_locked_particle_and_three_neighbors_a_side_and_
     if (HasFatalFailure()) return;
   }
   EXPECT_GE(rig.count(EventKind::particle_passed), 10u);
-  // More particles were off at some time than are off now: those that left collide again.
+  // More particles had collisions off at some time than now: those that left collide again.
   EXPECT_GE(std::count(ever_off.begin(), ever_off.end(), 1), 15);
 }
 
@@ -247,7 +247,7 @@ TEST(Figure9, slack_is_resolved_first_then_the_pull_comes_from_behind_the_older_
       if (rig.node_of_point(0) < from_older || rig.thread().anchor[0].slipping > 0) {
         taut = true;
         span_when_taut = span_rest();
-        // The first thread to leave the older point leaves it when the span is taut.
+        // The first thread to leave the older point does so when the span is taut.
         EXPECT_LT(span_rest(), 1.08 * way + 0.0002);
       } else {
         EXPECT_EQ(rig.node_of_point(0), behind_at_start) << "slack first";
@@ -282,7 +282,7 @@ TEST(Figure9, suture_points_are_checked_from_the_needle_end) {
   EXPECT_TRUE(rig.order_is_whole());
 }
 
-// The tail's end comes to the first suture point and stays: said, never lost.
+// The tail's end reaches the first suture point and stays: reported, never lost.
 TEST(RanOut, the_free_end_holds_at_the_first_suture_point) {
   Rig rig(weightless(40));
   Place p;
@@ -299,13 +299,13 @@ TEST(RanOut, the_free_end_holds_at_the_first_suture_point) {
   EXPECT_LE(rig.count(EventKind::thread_exhausted), 3u) << "said, not shouted";
   EXPECT_NEAR(rig.rest_length(), length, 1e-6);
   for (float r : rig.thread().rest) EXPECT_GT(r, 0.0f);
-  // The needle comes back: the tissue relaxes, everything is still there.
+  // The needle returns: the tissue relaxes, everything is still in place.
   draw_out(rig, p, -0.01f, -0.02f);
   rig.wait(0.5f);
   EXPECT_TRUE(rig.order_is_whole());
 }
 
-// The same with several points in a row, all of whose spans run taut.
+// The same with several points in a row, all of whose spans become taut.
 TEST(RanOut, with_two_points_the_older_one_holds) {
   Rig rig(weightless(40));
   Place p;

@@ -24,7 +24,7 @@ TEST(Figure4, nearest_particle_within_x_is_attached_when_the_tip_enters) {
   const Event& e = *rig.last(EventKind::particle_attached);
   EXPECT_LE(e.value, rig.model->suture.attach_threshold);
   EXPECT_EQ(rig.sewn().bite[0].nearest, e.which);
-  // No particle was nearer to the tip. A few substeps have passed since: tip and tissue have moved by less than half a
+  // No particle was nearer to the tip. In the few substeps since then, tip and tissue have moved by less than half a
   // millimeter.
   float nearest = std::numeric_limits<float>::max();
   for (uint32_t i = 0; i < rig.model->solver.tissue; ++i)
@@ -32,7 +32,7 @@ TEST(Figure4, nearest_particle_within_x_is_attached_when_the_tip_enters) {
   EXPECT_NEAR(e.value, nearest, 0.0005f);
 }
 
-// The same figure, exactly: one call of the stage on a tip placed by hand, so that nothing has moved between the trigger and
+// The same figure, exactly: one call of the stage on a tip placed directly, so that nothing has moved between the trigger and
 // the search.
 TEST(Figure4, the_nearest_is_the_nearest_of_all) {
   Rig rig;
@@ -57,7 +57,7 @@ TEST(Figure4, the_nearest_is_the_nearest_of_all) {
     for (uint32_t i = 0; i < rig.model->solver.tissue; ++i)
       if (distance(xyz(solver.x[i]), tip) < distance(xyz(solver.x[best]), tip)) best = i;
     EXPECT_FLOAT_EQ(distance(xyz(solver.x[suture.bite[0].nearest]), tip), distance(xyz(solver.x[best]), tip)) << k;
-    // "Once the closest particle is found, it is constrained to move with the needle tip": from where it is, without a jerk.
+    // "Once the closest particle is found, it is constrained to move with the needle tip": from its position, without a jerk.
     const Attachment& a = solver.attach.back();
     EXPECT_EQ(a.body, static_cast<int>(rig.needle_body()));
     EXPECT_EQ(a.point.particle[0], best);
@@ -66,7 +66,7 @@ TEST(Figure4, the_nearest_is_the_nearest_of_all) {
   }
 }
 
-// It weighs a few millinewtons. Once a hand takes it where it lies, with its tip in the wall, it is in.
+// It weighs a few millinewtons. When a hand grasps it in place, with its tip in the wall, it is in.
 TEST(Figure4, a_needle_that_nobody_holds_pierces_nothing) {
   Rig rig;
   rig.wait(0.1f);
@@ -107,7 +107,7 @@ TEST(Figure5, dragged_beyond_the_threshold_it_is_released_and_the_tissue_relaxes
   const std::vector<Vec4> before(rig.solver().x.begin(), rig.solver().x.begin() + rig.model->solver.tissue);
   const Place p = rig.place(0.4f);
   rig.approach(p);
-  // Into the tissue, and then the tip is dragged along the wall without turning on.
+  // Into the tissue, and then the tip is dragged along the wall without rotation.
   rig.drive(p, -1.0f, -0.15f);
   ASSERT_EQ(rig.count(EventKind::particle_attached), 1u);
   const uint32_t dragged = rig.last(EventKind::particle_attached)->which;
@@ -120,7 +120,7 @@ TEST(Figure5, dragged_beyond_the_threshold_it_is_released_and_the_tissue_relaxes
   EXPECT_EQ(rig.last(EventKind::particle_released)->which, dragged);
   EXPECT_FALSE(rig.sewn().attached);
   EXPECT_TRUE(rig.solver().attach.empty());
-  // The needle goes away; after two seconds every particle is where it was, to 0.3 mm (the wall is 2.5 mm thick).
+  // The needle is removed; after two seconds every particle is where it was, to 0.3 mm (the wall is 2.5 mm thick).
   const float psi = -0.15f;
   rig.needle_to(rig.circle_at(p, psi), 0.2f);
   rig.drive(p, psi, -1.2f);
@@ -168,7 +168,7 @@ void expect_like_never_begun(Rig& rig) {
   EXPECT_TRUE(rig.sewn().bite[0].canceled);
   EXPECT_FALSE(rig.sewn().bite[0].complete);
   EXPECT_FALSE(rig.sewn().bite[0].has_exit);
-  // Collisions are as they were: off only for the swaged end and its neighbors.
+  // Collisions are restored: off only for the swaged end and its neighbors.
   const size_t n = rig.thread().order.size();
   for (size_t i = 0; i < n; ++i) EXPECT_EQ(rig.collides()[i], i + 4 < n ? 1 : 0) << i;
 }
@@ -198,7 +198,7 @@ TEST(Bite, drawn_back_after_the_tip_came_out_leaves_nothing_behind) {
   expect_like_never_begun(rig);
 }
 
-// Torn back faster than a substep sees: the tip is never met inside the wall.
+// Pulled back faster than a substep: no substep sees the tip inside the wall.
 TEST(Bite, torn_back_in_one_tick_leaves_nothing_behind) {
   Rig rig;
   rig.wait(0.2f);
@@ -212,7 +212,7 @@ TEST(Bite, torn_back_in_one_tick_leaves_nothing_behind) {
   expect_like_never_begun(rig);
 }
 
-// Even when the back end had gone in and the thread was locked to the entry: the thread comes out with it.
+// Even when the back end has entered and the thread is locked to the entry: the thread comes out with it.
 TEST(Bite, drawn_back_after_the_back_end_went_in_frees_the_thread) {
   Rig rig;
   rig.wait(0.2f);
@@ -232,13 +232,13 @@ TEST(Bite, drawn_back_after_the_back_end_went_in_frees_the_thread) {
   EXPECT_EQ(rig.count(EventKind::bite_withdrawn), 1u);
   EXPECT_TRUE(rig.order_is_whole());
   EXPECT_NEAR(rig.rest_length(), length, 1e-6);
-  // And the next bite works as the first would have.
+  // And the next bite works like the first.
   rig.let_go();
   rig.whole_bite(p);
   EXPECT_EQ(rig.count(EventKind::bite_completed), 1u);
 }
 
-// Ours beyond the paper: a bite keeps where the tip crossed the surface, not the nearest particle.
+// Beyond the paper: a bite stores where the tip crossed the surface, not the nearest particle.
 TEST(Bite, keeps_where_the_tip_crossed_the_surface) {
   for (const float angle : {0.3f, 1.9f, 4.0f}) {
     Rig rig;
@@ -269,7 +269,7 @@ TEST(Bite, keeps_where_the_tip_crossed_the_surface) {
     const auto out = crossing(psi, EventKind::tip_exited, 1.6f);
     ASSERT_EQ(rig.count(EventKind::tip_exited), 1u) << angle;
     EXPECT_LT(off_segment(rig.last(EventKind::tip_exited)->where, out), 0.0002f) << angle;
-    // Triangle and weights name the same place as the spread point, to the spread's own error under strain.
+    // Triangle and weights name the same point as the embedded point, within the embedding's own error under strain.
     for (const BiteEnd* end : {&rig.sewn().bite[0].entry, &rig.sewn().bite[0].exit}) {
       const Triangle& t = rig.model->solver.collision.surface[end->triangle];
       Vec3 on{};
@@ -277,7 +277,7 @@ TEST(Bite, keeps_where_the_tip_crossed_the_surface) {
       EXPECT_LT(distance(on, position_of(end->point, rig.model->solver.shape.rest.data())), 1e-6f);
       EXPECT_NEAR(end->weight[0] + end->weight[1] + end->weight[2], 1.0f, 1e-5f);
     }
-    // Asked for 1.1 mm below the surface; the wall gives way a little.
+    // Requested 1.1 mm below the surface; the wall deforms a little.
     EXPECT_GT(rig.sewn().bite[0].depth, 0.0003f);
     EXPECT_LT(rig.sewn().bite[0].depth, 0.0016f);
   }
@@ -351,7 +351,7 @@ TEST(TwoWalls, one_sweep_through_the_lumen_makes_two_bites) {
   EXPECT_TRUE(inside(rig.sewn().bite[0].exit));
   EXPECT_TRUE(inside(rig.sewn().bite[1].entry));
   EXPECT_FALSE(inside(rig.sewn().bite[1].exit));
-  // The suture points follow each other along the thread, from the free end to the needle.
+  // The suture points are in order along the thread, from the free end to the needle.
   for (size_t k = 0; k + 1 < 4; ++k) EXPECT_LT(rig.node_of_point(k), rig.node_of_point(k + 1)) << k;
   EXPECT_TRUE(rig.order_is_whole());
   EXPECT_TRUE(rig.nothing_left_of_a_bite());

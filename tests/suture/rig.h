@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/suture: a whole scene in which a ghost drives the needle. The ghost is one more weld of the needle to a place in the
-// world, so that a test says exactly where the needle goes; jaws, hands and mechanics are the real ones.
+// tests/suture: a whole scene in which a ghost drives the needle. The ghost is one more weld of the needle to a pose in the
+// world, so that a test prescribes the needle's motion; jaws, hands and mechanics are the real ones.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ inline SceneSpec plain_scene() {
   return s;
 }
 
-// A place on the serosa, its outward normal, the way along the rim in which needles are driven, the way to the rim.
+// A point on the serosa, its outward normal, the bite direction along the rim, the direction to the rim.
 struct Place {
   Vec3 at, out, along, up;
 };
@@ -90,7 +90,7 @@ struct Rig {
     std::erase_if(solver().weld, [&](const Weld& w) { return w.a == static_cast<int>(needle_body()) && w.b < 0; });
     ghost = -1;
   }
-  // Moves the ghost evenly to `goal` (frame at the needle's circle's center).
+  // Moves the ghost linearly to `goal` (frame at the needle's circle's center).
   void needle_to(const Pose& circle, float seconds) {
     if (ghost < 0) hold_needle();
     const Pose goal{circle.p - rotate(circle.q, model->solver.needle_arc[0].center), circle.q};
@@ -114,7 +114,7 @@ struct Rig {
     const Vec3 out = normalized(Vec3{hit.normal.x, 0, hit.normal.z}), up{0, 1, 0};
     return {hit.point, out, cross(out, up), up};
   }
-  // The needle's circle with the tip `psi` past the deepest place of a bite at `p`; the circle reaches `deep` below the
+  // The needle's circle with the tip `psi` past the deepest point of a bite at `p`; the circle reaches `deep` below the
   // surface.
   Pose circle_at(const Place& p, float psi, float deep = 0.0011f) const {
     const Vec3 axis_x = p.out * std::cos(psi) - p.along * std::sin(psi);
@@ -140,7 +140,7 @@ struct Rig {
     approach(p, deep);
     drive(p, -1.0f, 4.3f, deep);
   }
-  // Draws the needle away from the tissue, `meters` outward over `seconds`.
+  // Pulls the needle away from the tissue, `meters` outward over `seconds`.
   void draw(const Place& p, float meters, float seconds) {
     Pose to = circle();
     to.p += normalized(p.out + 0.4f * p.up) * meters;
@@ -168,7 +168,7 @@ struct Rig {
   }
 };
 
-// --- laid by hand, weightless: every length is known ---
+// --- placed directly, weightless: every length is known ---
 inline SceneSpec weightless(int particles) {
   SceneSpec s = plain_scene();
   s.solver.gravity = {};
@@ -196,7 +196,7 @@ inline void lock(Rig& rig, size_t node, Vec3 at) {
   rig.thread().anchor.push_back(a);
 }
 
-// Lays nodes first..last (inclusive) evenly along `way` from `from`, one spacing apart, starting `skip` spacings away.
+// Lays nodes first..last (inclusive) at even spacing along `way` from `from`, starting `skip` spacings away.
 inline void lay(Rig& rig, size_t first, size_t last, Vec3 from, Vec3 way, int direction) {
   const float spacing = rig.model->solver.strand[0].spacing;
   for (size_t i = first; i <= last; ++i) {

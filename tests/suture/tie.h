@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/suture: a stitch of two suture points, and a tool above it with one of the two strands laid round it. Everything is
-// placed by hand, so that every length is known; from there on hands and mechanics are the real ones.
+// tests/suture: a stitch of two suture points, and a tool above it with one of the two strands wound round it. Everything is
+// placed directly, so that every length is known; after that hands and mechanics are the real ones.
 #pragma once
 #include "rig.h"
 
@@ -8,8 +8,8 @@ namespace catgut {
 
 struct TieSetup {
   float turns = 1.25f;            // of thread round the tool; 0: none
-  int way = 1;                    // +1: walked away from the tissue it turns counter-clockwise as seen from the hand
-  bool wrap_tail = false;         // the free end is laid round the tool, and the needle's strand led to its tip
+  int way = 1;                    // +1: traversed away from the tissue it turns counter-clockwise as seen from the hand
+  bool wrap_tail = false;         // the free end is wound round the tool, and the needle's strand led to its tip
   float above = 0.015f;           // [m] the tool above the tissue
   float depth = 0.006f;           // [m] from the tool's tip to the thread round it
   size_t older = 25, newer = 30;  // nodes of the two suture points
@@ -38,7 +38,7 @@ struct Tie : Rig {
     lay_stitch();
     lay_strands(setup.turns, setup.way, setup.wrap_tail);
   }
-  // Puts the tool where a new stitch wants it, jaws open: no way is flown.
+  // Places the tool for a new stitch, jaws open, without a path.
   void put_tool() {
     RigidBody& b = solver().body[setup.tool];
     b = {};
@@ -75,7 +75,7 @@ struct Tie : Rig {
     }
   }
 
-  // Places the nodes from `node` on, one after the other in direction `step`, along the curve, each pair as long as it rests.
+  // Places the nodes from `node` on, in direction `step`, along the curve, each pair at its rest length.
   void lay_along(size_t node, int step, const std::vector<Vec3>& curve, size_t last) {
     size_t at = 0;
     Vec3 here = curve[0];
@@ -83,7 +83,7 @@ struct Tie : Rig {
     for (size_t i = node;; i = step > 0 ? i + 1 : i - 1) {
       const size_t slot = thread().order[i];
       const float rest = thread().rest[step > 0 ? i - 1 : i];
-      // The first place on the curve that is `rest` away.
+      // The first point on the curve at distance `rest`.
       const Vec3 from = here;
       while (at + 1 < curve.size()) {
         const Vec3 p = lerp(curve[at], curve[at + 1], s);
@@ -138,7 +138,7 @@ struct Tie : Rig {
     line(c, from, from + normalized(tip - from) * 0.3f);
     return c;
   }
-  // The nodes out of which the two strands come: those of the last locked knot, or of the outermost suture points.
+  // The nodes from which the two strands come: those of the last locked knot, or of the outermost suture points.
   std::array<size_t, 2> roots() {
     if (!sewn().knot.empty() && sewn().knot.back().slots == 2)
       return {node_of(sewn().knot.back().slot[0]), node_of(sewn().knot.back().slot[1])};
@@ -157,7 +157,7 @@ struct Tie : Rig {
     if (ghost >= 0) let_go();
     put_needle(*this, xyz(solver().x[thread().order.back()]));
   }
-  // The tool lets go, comes back over the stitch, and has thread laid round it again.
+  // The tool releases, returns over the stitch, and thread is wound round it again.
   void wrap(int way, float turns = 1.25f) {
     open(setup.tool);
     stand(setup.above);
@@ -166,7 +166,7 @@ struct Tie : Rig {
     lay_strands(turns, way, setup.wrap_tail);
     tick();
   }
-  // Moves the tool away until the throw in hand has been set, and waits until the stitch is snug.
+  // Moves the tool away until the current throw has locked, and waits until the stitch is tight.
   void pull_tight(float most = 0.024f) {
     constexpr float kStep = 0.001f;
     const auto set = [&] {
@@ -176,8 +176,8 @@ struct Tie : Rig {
       move(setup.tool, rotate(frame.q, Vec3{0, 0.7f, 0.7f}) * kStep, kStep / 0.06f);
     wait(0.4f);
   }
-  // Lays the strand that is not wrapped past the tip of the tool and has the jaws close on it before it can move. Thread is
-  // light and stiff: left alone it springs away within a tick.
+  // Lays the strand that is not wrapped past the tip of the tool and closes the jaws on it before it can move. Thread is
+  // light and stiff: otherwise it springs away within a tick.
   void take(size_t hand = 0) {
     frame = solver().body[setup.tool].pose();
     if (setup.wrap_tail) {

@@ -31,7 +31,7 @@ struct TwoRings : StitchRig {
     pass(0, particle(on_ring(0.020f, degrees) + down), kIn, particle(on_ring(0.0178f, degrees) + down), kOut);
     pass(1, particle(on_ring(0.0125f, degrees) + down), kOut, particle(on_ring(0.0103f, degrees) + down), kIn);
   }
-  // Stitched, tied with `throws` throws, cut, and the next one taken.
+  // Stitched, tied with `throws` throws, cut, and the next one loaded.
   void suture(float degrees, int throws = 2) {
     stitch(degrees);
     tick();
@@ -143,7 +143,7 @@ TEST(Lembert, nothing_closes_before_the_knot_locks) {
   EXPECT_EQ(t.count(EventKind::seam_closed), 1u);
 }
 
-// Stitches closer together than particles: none draws a particle to a second place, and each is held where it is.
+// Stitches closer together than particles: none pulls a particle to a second target, and each holds its place.
 TEST(Lembert, stitches_closer_than_particles_share_their_pairs) {
   TwoRings t;
   for (int k = 0; k < 8; ++k) t.suture(40 + 2.5f * static_cast<float>(k));
@@ -155,7 +155,7 @@ TEST(Lembert, stitches_closer_than_particles_share_their_pairs) {
     EXPECT_NEAR(t.degrees_of(t.plan.pair[t.state.stitch[k].row].a), at, 3.3f);
     EXPECT_NEAR(t.degrees_of(t.plan.pair[t.state.stitch[k].row].b), at, 6.5f);
   }
-  // A shared pair opens when the last of its stitches lets go, not before.
+  // A shared pair opens when the last of its stitches releases, not before.
   const uint32_t row = t.state.stitch[1].row;
   ASSERT_EQ(t.state.stitch[2].row, row);
   t.tick(100);
@@ -199,7 +199,7 @@ TEST(Lembert, stitches_far_apart_are_no_neighbors) {
   EXPECT_EQ(t.plan.pair.size(), 2u);
 }
 
-// Five sutures, as in section 3.4, close the whole ring, in whatever order they are made.
+// Five sutures, as in section 3.4, close the whole ring, in any order.
 TEST(Lembert, five_close_the_ring) {
   for (const auto& order : {std::array{0, 1, 2, 3, 4}, std::array{0, 2, 4, 1, 3}}) {
     TwoRings t;
@@ -249,7 +249,7 @@ TEST(Lembert, too_few_throws_do_not_hold) {
     EXPECT_EQ(t.faults(Fault::too_few_throws).size(), 1u) << "told once";
     EXPECT_FLOAT_EQ(t.plan.pair[0].progress, 1) << "the good one holds";
     for (size_t row = 1; row < t.plan.pair.size(); ++row) EXPECT_EQ(t.plan.pair[row].progress, 0) << row;
-    // What does not hold is no one's neighbor.
+    // A stitch that does not hold has no neighbors.
     const size_t rows = t.plan.pair.size();
     t.suture(120);
     for (size_t row = rows; row < t.plan.pair.size(); ++row) EXPECT_EQ(t.state.row[row].other == 1, false);

@@ -28,7 +28,7 @@ TEST(Adjacency, holds_for_a_ring_of_twenty_four) {
 TEST(Adjacency, fails_where_a_chord_crosses_the_opening) {
   for (size_t at = 3; at < 20; ++at) {
     std::vector<Vec3> sp = ring(12);
-    sp[at] = {-sp[at].x, sp[at].y, -sp[at].z};  // put on the other side of the opening
+    sp[at] = {-sp[at].x, sp[at].y, -sp[at].z};  // moved to the other side of the opening
     const int found = first_out_of_order(sp);
     ASSERT_NE(found, -1) << at;
     EXPECT_LE(std::abs(found - static_cast<int>(at)), 1) << at;
@@ -120,7 +120,7 @@ TEST(RingOfBites, is_not_complete_while_it_does_not_go_all_the_way_round) {
   Ring r(14);
   r.tick(1, 1.0f / 60, 20);  // ten bites of fourteen
   EXPECT_FALSE(r.state.ring_complete);
-  r.tick(1, 1.0f / 60, 27);  // thirteen and a half: a bite is half done
+  r.tick(1, 1.0f / 60, 27);  // thirteen and a half: an incomplete bite
   EXPECT_FALSE(r.state.ring_complete);
   r.tick(1);
   EXPECT_TRUE(r.state.ring_complete);
@@ -153,7 +153,7 @@ TEST(Closure, begins_when_the_slack_is_out) {
   EXPECT_EQ(r.plan.pull.size(), 48u + 48u + 24u);
 }
 
-// A ring may be complete before the last bite of a plan: that bite's thread is then part of the way round, and the ring closes.
+// A ring may be complete before the last bite of a plan: that bite's thread then adds to the path, and the ring closes.
 TEST(Closure, begins_after_one_bite_more_than_the_ring_needed) {
   Ring r(12);
   for (const float part : {1.0f / 3, 2.0f / 3}) {  // the thirteenth, between the last and the first
@@ -181,7 +181,7 @@ TEST(Closure, all_points_arrive_together) {
     loop -= 0.0001f;
     r.tick(loop);
     r.follow();
-    // At every moment every particle has gone the same part of its way: linear in one progress.
+    // At every moment every particle has covered the same fraction of its path: linear in one progress.
     for (const ClosurePlan::Pull& p : r.plan.pull) {
       const float whole = distance(p.from, p.to), gone = distance(p.from, xyz(r.x[p.point.particle[0]]));
       ASSERT_NEAR(gone, r.plan.progress * whole, 1e-6f + 1e-4f * whole);

@@ -115,10 +115,10 @@ TEST(Midpoint, follows_the_thread_both_ways_and_never_faster_than_tissue) {
     EXPECT_NEAR(now, (0.009f - span) / 0.0075f, 1e-3f);
     before = now;
   }
-  span = 0.0015f;  // what goes round the two edges
+  span = 0.0015f;  // the part round the two edges
   t.tick(60);
   EXPECT_FLOAT_EQ(t.plan.pair[0].progress, 1);
-  span = 0.005f;  // the thread is let out again
+  span = 0.005f;  // the thread is loosened again
   t.tick(60);
   EXPECT_NEAR(t.plan.pair[0].progress, 0.004f / 0.0075f, 1e-3f);
   span = 0.0005f;
@@ -163,7 +163,7 @@ TEST(InBetween, figure_13_pairs_p2_with_p10_and_p3_with_p11) {
 TEST(InBetween, pairs_close_together_with_the_later_midpoint) {
   TwoEdges t;
   t.figure_13();
-  t.point[3].span = 0.0005f;  // the first crossing is drawn up
+  t.point[3].span = 0.0005f;  // the first crossing is tightened
   t.ticks_following(120);
   EXPECT_FLOAT_EQ(t.plan.pair[0].progress, 1);
   for (size_t row : {1u, 2u, 3u}) EXPECT_EQ(t.plan.pair[row].progress, 0) << row;
@@ -202,7 +202,7 @@ TEST(Knotted, holds_what_was_made_before_it) {
   t.point[3].span = 0.1f;
   t.tick(120);
   EXPECT_FLOAT_EQ(t.plan.pair[0].progress, 1);
-  // The seam continues after a first crossing that was tied.
+  // The seam continues after a tied first crossing.
   t.pass(1, t.p[14], kIn, t.p[12], kOut);
   t.pass(0, t.p[4], kOut, t.p[8], kIn);
   t.tick();
@@ -227,7 +227,7 @@ TEST(Knotted, stays_closed_when_the_next_suture_is_taken_and_opens_untied) {
     t.fresh_suture();
     t.tick(120);
     for (const ClosurePlan::Pair& p : t.plan.pair) EXPECT_EQ(p.progress, tied ? 1 : 0);
-    // The next suture's first midpoint stands alone: there is no line to another suture's.
+    // The next suture's first midpoint has no predecessor: there is no line to another suture's.
     t.pass(0, t.p[5], kOut, t.p[2], kOut);
     t.pass(1, t.p[10], kOut, t.p[14], kIn);
     t.tick();
@@ -299,7 +299,7 @@ TEST(ConnellOrder, is_told_with_the_bite_and_stops_nothing) {
   t.tick();
   t.pass(1, t.p[9], kOut, t.p[14], kIn);
   t.tick(5);
-  t.pass(1, t.p[14], kOut, t.p[12], kIn);  // outside in where it should come out
+  t.pass(1, t.p[14], kOut, t.p[12], kIn);  // outside in instead of inside out
   t.tick(5);
   EXPECT_EQ(t.faults(Fault::wrong_body), Bites{1});
   EXPECT_EQ(t.faults(Fault::wrong_layer), Bites{2});
@@ -331,7 +331,7 @@ TEST(BegunKnot, wants_bites_in_two_walls_and_the_needle_out) {
   EXPECT_EQ(t.faults(Fault::knot_without_bite).size(), 2u) << "a new suture, a new mistake";
 }
 
-// The suture room reports it to a caller that sews without a technique too.
+// The suture room reports it in scenes without a technique too.
 TEST(Stay, what_was_told_in_the_tick_is_not_told_again) {
   TwoEdges t(false);
   t.pass(0, t.p[5], kOut, t.p[2], kOut);
@@ -343,7 +343,7 @@ TEST(Stay, what_was_told_in_the_tick_is_not_told_again) {
   EXPECT_EQ(t.faults(Fault::needle_in_tissue), Bites{1});
 }
 
-// Figure 14: one bite through each, drawn together, tied.
+// Figure 14: one bite through each, approximated, tied.
 TEST(Stay, a_good_one_has_no_fault) {
   TwoEdges t(false);
   t.pass(0, t.p[5], kOut, t.p[2], kOut);

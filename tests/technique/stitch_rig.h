@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/technique: a view made by hand: particles anywhere, bites through them, thread of any length, knots as wanted.
+// tests/technique: a synthetic view: particles anywhere, bites through them, any length of thread, any knots.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ struct StitchRig {
     x.push_back(catgut::point(p));
     return static_cast<uint32_t>(x.size()) - 1;
   }
-  // A bite is done: in at `entry`, out at `exit`. `slack` [m] of thread lies before it.
+  // A complete bite: in at `entry`, out at `exit`. `slack` [m] of thread lies before it.
   void pass(uint32_t wall, uint32_t entry, bool entry_inside, uint32_t exit, bool exit_inside, float slack = 0.1f) {
     if (!point.empty()) point.back().span = slack;
     Bite b;
@@ -63,7 +63,7 @@ struct StitchRig {
     events.insert(events.end(), now.begin(), now.end());
     now.clear();
   }
-  // Tissue that follows the plan at once: each pair moves toward its own middle.
+  // Tissue that follows the plan at once: each pair moves toward its midpoint.
   void follow() {
     for (const ClosurePlan::Pair& p : plan.pair) {
       const Vec3 apart = position_of(p.b, x.data()) - position_of(p.a, x.data());
@@ -77,7 +77,7 @@ struct StitchRig {
   size_t count(EventKind kind) const {
     return static_cast<size_t>(std::count_if(events.begin(), events.end(), [&](const Event& e) { return e.kind == kind; }));
   }
-  // Bites, knots named by the faults of this kind.
+  // Bites and knots named by the faults of this kind.
   std::vector<uint32_t> faults(Fault fault) const {
     std::vector<uint32_t> which;
     for (const Event& e : events)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/technique: what the techniques ask for, asked of real tissue: the bodies of the scenes, pins instead of thread, no
-// hands. That a plan closes is the plan's part; that tissue follows it to half a millimeter and stays calm is tested here.
+// tests/technique: the techniques' plans on real tissue: the bodies of the scenes, tethers instead of thread, no
+// hands. That a plan closes is the plan's part; that tissue follows it to half a millimeter and stays at rest is tested here.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -13,7 +13,7 @@
 namespace catgut {
 namespace {
 
-// A scene in which the test itself says what was stitched.
+// A scene in which the test itself provides the stitches.
 class Field {
  public:
   explicit Field(const char* scene) : model_(build_model(read_scene(scene))), state_(initial_state(*model_)), jobs_(1) {
@@ -23,7 +23,7 @@ class Field {
   State& state() { return *state_; }
   Vec3 at(uint32_t i) const { return xyz(state_->solver.x[i]); }
 
-  // A bite through `wall` where it is nearest to two places.
+  // A bite through `wall` at the points nearest to two positions.
   void pass(uint32_t wall, Vec3 entry, Vec3 exit) {
     Bite b;
     b.complete = b.has_exit = true;
@@ -94,7 +94,7 @@ class Field {
   StatePtr state_;
   Jobs jobs_;
   TickInput in_;
-  TechniqueState technique_;  // the scene's own has nothing to see
+  TechniqueState technique_;  // the scene's own has no input
   std::vector<StitchPoint> point_;
   std::vector<Bite> bite_;
   std::vector<Knot> knot_;
@@ -140,7 +140,7 @@ TEST(Tissue, connell_edges_come_together_and_turn_inward) {
   EXPECT_LT(f.gap(false), 0.001f);
   EXPECT_LT(f.gap(true), 0.001f);
   EXPECT_LT(kinetic_energy(f.model(), f.state()), 1e-8);
-  // The cut edges lie below the places that the thread joined.
+  // The cut edges lie below the points that the thread joined.
   Vec3 joined{};
   size_t midpoints = 0;
   for (const ClosurePlan::Pair& p : f.state().plan[0].pair)
@@ -152,7 +152,7 @@ TEST(Tissue, connell_edges_come_together_and_turn_inward) {
       if (std::abs(f.at(i).z - joined.z) < 0.003f && f.at(i).y > 0) { EXPECT_LT(f.at(i).y, joined.y) << i; }
 }
 
-// Five stitches (3.4) close the ring all the way round (2.5.4).
+// Five stitches (3.4) close the ring completely (2.5.4).
 TEST(Tissue, lembert_ring_closes) {
   Field f("lembert");
   f.ticks(30);
@@ -170,7 +170,7 @@ TEST(Tissue, lembert_ring_closes) {
   EXPECT_TRUE(state_is_valid(f.model(), f.state()));
   EXPECT_LT(f.gap(true), 0.001f);
   EXPECT_LT(kinetic_energy(f.model(), f.state()), 1e-8);
-  // No place of the two facing edges was left out.
+  // No point of the two facing edges was left out.
   for (const auto* group : {&f.model().technique.lembert.outer, &f.model().technique.lembert.inner})
     for (uint32_t i : *group) {
       const auto& pair = f.state().plan[0].pair;

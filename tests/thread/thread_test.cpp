@@ -75,7 +75,7 @@ TEST(Thread, a_clamped_end_bends_as_the_elastica_of_its_stiffness) {
     Surroundings around;
     around.holds = hold, around.pulls = {&pull, 1};
     for (int i = 0; i < 2500; ++i) stepper.step(settings, state, around);
-    // The discrete rod bends at its nodes, the clamp's node included: it is half a segment longer than it looks.
+    // The discrete rod bends at its nodes, the clamp's node included: it is effectively half a segment longer.
     const float tolerance = 0.01f + 1.5f * segment / length;
     EXPECT_NEAR(-state.position(n - 1).y / length, 0.30172f, tolerance * 0.30172f) << segment;
     EXPECT_NEAR(1 - state.position(n - 1).x / length, 0.05643f, 2 * tolerance * 0.05643f) << segment;
@@ -93,7 +93,7 @@ TEST(Thread, keeps_its_momentum_when_it_hits_itself) {
   State state = make_state(path);
   for (size_t i = 0; i < state.nodes(); ++i) state.v.set(i, i < 45 ? Vec3{0, 0.4f, 0.02f} : Vec3{0, -0.2f, 0});
   state.warm.assign(state.nodes(), 1);
-  settings.mass_decay = 1e6f;  // constant masses: changing them is not mechanics
+  settings.mass_decay = 1e6f;  // constant masses: changing them would not conserve
   settings.touch_density = settings.free_density;
   Stepper stepper(state.nodes());
   auto momentum = [&] {
@@ -174,7 +174,7 @@ TEST(Thread, breaks_at_its_strength_and_not_below) {
   }
 }
 
-// The bits of a run that is saved, loaded into a fresh state and continued are those of the run that was not.
+// The bits of a run that is saved, loaded into a fresh state and continued are those of the uninterrupted run.
 TEST(Thread, continues_from_a_copy_to_the_bit) {
   const Settings settings = validation::knot_settings(0.3f);
   validation::Tightened run(validation::lay_knot(validation::square(), settings.material.diameter, 0.5e-3f));
@@ -191,7 +191,7 @@ TEST(Thread, continues_from_a_copy_to_the_bit) {
   EXPECT_NE(hash_state(run.knot.state), hash_state(copy));
 }
 
-// A knot a meter away holds as one at the origin: positions keep more than a float.
+// A knot a meter away behaves like one at the origin: positions have more than 32 bits.
 TEST(Thread, holds_a_meter_from_the_origin) {
   const Settings settings = validation::knot_settings(0.4f);
   validation::LaidKnot laid = validation::lay_knot(validation::square(), settings.material.diameter, 0.5e-3f);
@@ -262,7 +262,7 @@ TEST(Observe, sees_a_single_throw_and_nothing_where_there_is_none) {
     const SeenKnot seen = observe(settings, t.knot.state);
     EXPECT_EQ(seen.name, wraps ? KnotName::single_throw : KnotName::none);
     EXPECT_EQ(seen.wraps, wraps);
-    EXPECT_EQ(hash_state(t.knot.state), before);  // it watches
+    EXPECT_EQ(hash_state(t.knot.state), before);  // it only observes
   }
 }
 

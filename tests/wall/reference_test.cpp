@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/wall: the wall beside finite elements that share nothing with it: three-dimensional Lagrange hexahedra with full Gauss
+// tests/wall: the wall compared with independent finite elements: three-dimensional Lagrange hexahedra with full Gauss
 // integration on the true cylinder, linear, in double precision. Quadratic ones, refined, are the reference; trilinear ones on
-// the wall's own mesh are what a researcher would use instead. Small loads: poke on the flank and at the rim, pull, pinch.
+// the wall's own mesh are a common choice in research. Small loads: poke on the flank and at the rim, pull, pinch.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -213,7 +213,7 @@ double stiffness(Wall w, const Load& l, double seconds) {
   for (const auto& [at, f] : load) before.push_back(place(at, w.state.motion));
   Jobs jobs(1);
   Column<Float4> each(w.state.motion.x.size());
-  const float larger = 20;  // single precision wants deflections of some tens of micrometers; still linear
+  const float larger = 20;  // single precision needs deflections of some tens of micrometers; still linear
   for (const auto& [at, f] : load) add_to(each, at, f * larger);
   for (int i = 0; i < static_cast<int>(seconds * 1000); ++i) {
     w.scratch.external = each;

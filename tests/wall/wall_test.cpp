@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/wall: the step, impulses, contact and cuts of a whole wall, seen from outside. Moduli and forces against closed forms
-// are in `catgut validate` (modulus/, contact/, closure/).
+// tests/wall: the step, impulses, contact and cuts of a whole wall, measured from outside. Moduli and forces against closed
+// forms are in `catgut validate` (modulus/, contact/, closure/).
 #include "wall/wall.h"
 
 #include <gtest/gtest.h>
@@ -138,7 +138,7 @@ TEST(Wall, keeps_its_momentum_when_nothing_holds_it) {
   std::fill(s.mesh.held.begin(), s.mesh.held.end(), 0);
   s.drag = 0;
   Wall w = build_wall(s);
-  w.model.tau = 0;  // the damping of strain is not of Hamilton's kind
+  w.model.tau = 0;  // damping of strain is not energy-conserving
   Jobs jobs(1);
   const Topology& t = w.state.topology;
   // A spin, a drift and a squeeze.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/device/fake_dhd: a libdhd.so with two arms behind the very functions and types of the real one: positions that follow a
-// hand, calls that wait for the device, a firmware watchdog. Written from the published description of that library alone and
+// tests/device/fake_dhd: a libdhd.so with two devices and the functions and types of the real one: positions that follow a
+// hand, calls that wait for the device, a firmware watchdog. Written only from the published description of that library and
 // deliberately without our own declarations of it, so that the two can disagree.
 #include "fake_dhd.h"
 
@@ -59,7 +59,7 @@ Arm* find(Fake& f, char id) {
   return &a;
 }
 
-// The arm's own millisecond, whatever the driver does.
+// The device's own millisecond, independent of the backend.
 void pass(Arm& a) {
   ++a.silent;
   if (a.watchdog > 0 && a.output && a.silent * 8 > a.watchdog && (a.force[0] != 0 || a.force[1] != 0 || a.force[2] != 0))
@@ -103,7 +103,7 @@ int dhdGetSystemType(char) { return 33; }
 const char* dhdGetSystemName(char) { return "simulated omega.3"; }
 int dhdGetSerialNumber(ushort* sn, char id) { return *sn = static_cast<ushort>(1000 + id), 0; }
 void dhdGetSDKVersion(int* a, int* b, int* c, int* d) { *a = 3, *b = 17, *c = 5, *d = 0; }
-bool dhdIsLeftHanded(char id) { return id == 0; }  // the first one is the left hand's: order is not what counts
+bool dhdIsLeftHanded(char id) { return id == 0; }  // the first one is the left hand's: the order does not matter
 bool dhdHasGripper(char id) { return id == 1; }
 int dhdGetStatus(int* status, char id) {
   HOLD;
@@ -173,7 +173,7 @@ int dhdGetLinearVelocity(double* x, double* y, double* z, char id) {
   Arm* a = find(f, id);
   if (!a) return -1;
   *x = a->v[0], *y = a->v[1], *z = a->v[2];
-  return 1;  // the time guard's answer, which is none of an error
+  return 1;  // the result of the time guard, which is not an error
 }
 int dhdGetButton(int index, char id) {
   HOLD;

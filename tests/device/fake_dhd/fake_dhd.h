@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/device/fake_dhd: what the simulated libdhd.so has beyond the real one, for tests. SI units, its maker's axes (x toward
+// tests/device/fake_dhd: additions of the simulated libdhd.so for tests. SI units, its maker's axes (x toward
 // the user, y right, z up). Environment, read by fakeDhdReset and at loading: FAKE_DHD_COUNT (2), FAKE_DHD_MANUAL (1: an arm's
-// millisecond passes when the test says so), FAKE_DHD_UNCALIBRATED, FAKE_DHD_LOCKED (1: opening fails).
+// millisecond passes on the test's command), FAKE_DHD_UNCALIBRATED, FAKE_DHD_LOCKED (1: opening fails).
 #pragma once
 
 enum FakeDhdFault { kDhdUnplugged = 1, kDhdNan = 2, kDhdHang = 3 };
@@ -15,9 +15,9 @@ struct FakeDhdArm {
 
 extern "C" {
 void fakeDhdReset(void);
-// Milliseconds for both arms; waits until a driver that serves an arm has done so. False: it did not within five seconds.
+// Milliseconds for both devices; waits until the backend's thread has served them. False: not within five seconds.
 bool fakeDhdStep(int milliseconds);
-void fakeDhdRun(void);  // from now on time passes on its own
+void fakeDhdRun(void);  // from now on time runs on its own
 void fakeDhdFault(int arm, int fault, int on);
 void fakeDhdHand(int arm, const double* position, const double* rotation_rows, int button, double gap);
 void fakeDhdFast(int arm);  // the firmware cuts the force: too fast

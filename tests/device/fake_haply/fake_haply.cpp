@@ -67,7 +67,7 @@ struct FakeHaply::Work {
     for (const json& d : message.value("inverse3", json::array())) {
       const size_t k = d.value("device_id", "") == "04BA" ? 0 : 1;
       const json command = d.value("commands", json::object()).value("set_cursor_force", json::object());
-      // The other form is not an error here as it is none there: there is simply no force in it.
+      // As in the real service the other form is not an error: it simply contains no force.
       const json f = command.value(form == HaplyForm::v35 ? "vector" : "values", json::object());
       const std::array<double, 3> to{f.value("x", 0.0), f.value("y", 0.0), f.value("z", 0.0)};
       double step = 0;
@@ -155,7 +155,7 @@ FakeHaply::~FakeHaply() {
   asio::io_context io;
   asio::ip::tcp::socket last(io);
   beast::error_code e;
-  last.connect(port, e);  // wakes the one who waits for a line
+  last.connect(port, e);  // wakes the thread that waits for a connection
   work->thread.join();
 }
 std::string FakeHaply::where() const { return "127.0.0.1:" + std::to_string(work->acceptor.local_endpoint().port()); }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/device/fake_haply: a service of the shape of Haply's: a WebSocket on a port that the system gives, one state for each
-// message, forces that last as long as messages come. Its own axes: x right, y forward, z up; meters and newtons.
+// tests/device/fake_haply: a service like Haply's: a WebSocket on a port assigned by the system, one state per
+// message, forces that last while messages arrive. Its own axes: x right, y forward, z up; meters and newtons.
 #pragma once
 #include <array>
 #include <atomic>
@@ -23,14 +23,14 @@ struct FakeHaply {
   std::string where() const;  // "127.0.0.1:PORT"
   Arm at(size_t device) const;
   void zero(size_t device);
-  void there(size_t device, bool is);       // false: it is no longer in what the service says
-  void grip(size_t device, bool is);        // false: that device's grip is gone from what the service says
-  void hold(bool on);                       // true: messages are kept without an answer until false, or step
-  void say(const std::string& text);        // the answer to the next message, whatever it is; "": as it should be
-  void inventory(const std::string& text);  // what is said first, to the next who connects
-  void hang_up();                           // cuts the line; who connects again is served
+  void there(size_t device, bool is);       // false: it is removed from the service's messages
+  void grip(size_t device, bool is);        // false: that device's grip is removed from the service's messages
+  void hold(bool on);                       // true: messages are not answered until false, or step
+  void say(const std::string& text);        // the answer to the next message; "": the normal one
+  void inventory(const std::string& text);  // the first message to the next client
+  void hang_up();                           // cuts the connection; reconnecting works
   unsigned long answered() const;
-  void step(unsigned long messages);  // lets so many be answered while held; waits for them
+  void step(unsigned long messages);  // answers this many messages while held; waits for them
   std::string last() const;           // message that came
 
   struct Work;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/device/fake_hd: a libHD.so that simulates two arms, each with mass, friction and a human hand, behind the very
-// functions, types and error codes of the real one. Written from the published description of that library alone and
+// functions, types and error codes of the real one. Written only from the published description of that library and
 // deliberately without our own declarations of it, so that the two can disagree.
 #include "fake_hd.h"
 
@@ -124,7 +124,7 @@ void read_environment(Fake& f) {
 }
 Fake::Fake() { read_environment(*this); }
 
-// What a test has asked to be raised at this place (0 begin, 1 end of a frame, 2 any read) of the current arm.
+// Errors requested by a test for this point (0 begin, 1 end of a frame, 2 any read) of the current device.
 void raise_planned(Fake& f, int where) {
   for (Raised& r : f.raised)
     if (r.times > 0 && r.where == where && static_cast<HHD>(r.frame_of) == f.current) --r.times, f.error.push_back(r.error);
@@ -153,7 +153,7 @@ void move(Fake& f, Arm& a, int which) {
   const double h = 1e-3 / kParts;
   double from[3] = {a.x[0], a.x[1], a.x[2]};
   for (int part = 0; part < kParts; ++part) {
-    // The hand itself is no faster than hands are.
+    // The hand is limited to the speed of human hands.
     double way[3], far = 0;
     for (int k = 0; k < 3; ++k) way[k] = a.wish[k] - a.wish_now[k], far += way[k] * way[k];
     far = std::sqrt(far);
@@ -190,7 +190,7 @@ void tick(Fake& f) {
 
 void scheduler() {
   Fake& f = fake();
-  // As the real one's: ahead of ordinary work, where the system lets it.
+  // Like the real one's: real-time priority, if permitted.
   sched_param first{};
   first.sched_priority = 50;
   pthread_setschedparam(pthread_self(), SCHED_FIFO, &first);
@@ -258,7 +258,7 @@ void hdEndFrame(HHD h) {
   if (h >= 2 || !f.arm[h].in_frame) return raise(f, 0x0401);
   f.arm[h].in_frame = false;
   if (has(f, static_cast<int>(h), kFakeCommError)) raise(f, 0x0302);
-  // The end of a frame sends the force, and there the library finds that it may not.
+  // The end of a frame sends the force, and there the library may detect that it is not allowed.
   if (has(f, static_cast<int>(h), kFakeWarmMotors)) raise(f, 0x0200);
   if (has(f, static_cast<int>(h), kFakeTooFast)) raise(f, 0x0203);
   raise_planned(f, 1);
@@ -393,7 +393,7 @@ void hdGetDoublev(HDenum what, HDdouble* out) {
 void hdGetLongv(HDenum what, HDlong* out) {
   HOLD;
   if (what != 0x2010) return raise(f, 0x0103);
-  for (int k = 0; k < 6; ++k) out[k] = (1L << 40) + k;  // wider than 32 bits: a binding that takes them for int shows
+  for (int k = 0; k < 6; ++k) out[k] = (1L << 40) + k;  // wider than 32 bits: detects a binding that uses int
 }
 HDstring hdGetString(HDenum what) {
   switch (what) {
