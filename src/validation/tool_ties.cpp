@@ -16,20 +16,54 @@ using thread::Settings;
 using thread::Surroundings;
 using thread::ToolCapsule;
 
-// x along the pull, y up from the tissue, z toward the viewer. The needle holder comes from the side of the long strand and
-// lies along the pull, tilted; the forceps lie parallel to it, so that the shafts never cross. The sides alternate from throw
-// to throw.
-constexpr float kCircle = 13e-3f;  // radius of the winding hand's path
-constexpr float kBehind =
-    6e-3f;  // the hand winds this far behind the tip: between the tip and where the strand leaves the wound
-constexpr float kInFront = 1.6e-3f;  // a strand is held this far in front of the tip
-Vec3 shaft_from(float side) { return {side * 0.85f, 0.527f, 0}; }
-// Position of the needle holder's tip while the strand is wound round it: beyond the wound, which lies under the shaft.
-Vec3 work_place(float side) { return {side * -16e-3f, 18e-3f, 0}; }
+// x along the pull, y up from the tissue, z toward the viewer; the bite is at the origin. The needle holder comes from the side
+// of the long strand, the forceps from the side of the tail: they face each other, so that the forceps never sweeps through the
+// strand between wound and holder. The sides alternate from throw to throw.
+constexpr float kTick = 1e-3f;       // [s]
+constexpr float kStrandAt = 14e-3f;  // [m] of the shaft, from the tip: above the wound
+constexpr float kWindAt = 9e-3f;     // [m] of the shaft: plane of the winding hand, nearer the tip than the strand
+constexpr float kHeld = 1.6e-3f;     // [m] a strand leaves the forceps this far in front of its tip
+constexpr float kGrip = 1.5e-3f;     // [m] and lies this far behind the tips of the needle holder
+constexpr float kOpen = 0.10f;       // [rad] each jaw, to take the tail
+constexpr float kNearest = 11e-3f;   // [m] of the winding hand from the shaft
+constexpr float kWinding = 0.10f;    // [N] tension of the strand while it is wound: felt, and held by the hand
+constexpr float kDrawing = 0.04f;    // [N] while the turns slide off the jaws
+constexpr float kLying = 0.02f;      // [N] that keeps the free tail where it was laid (wet tissue)
 
-struct Hands {
-  Vec3 holder, forceps;  // tips
-};
+Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
+// Unit, across the shaft; 0: toward the viewer, pi/2: above.
+Vec3 around(float side, float angle) {
+  const Vec3 shaft = shaft_from(side), up{-shaft.y * side, shaft.x * side, 0};
+  return Vec3{0, 0, 1} * std::cos(angle) + up * std::sin(angle);
+}
+// Length of strand between wound and hand that a throw needs: to the tail, round the jaws, to the hand.
+float strand_for(int wraps) { return 43e-3f + 14e-3f * static_cast<float>(wraps); }
+// The shaft's height above the wound while the strand is wound: the hand must pass between it and the tail.
+float height_for(int wraps) { return 0.5f * strand_for(wraps) + 5e-3f; }
+// Tip of the needle holder meanwhile: beyond the wound.
+Vec3 work_place(float side, int wraps) { return around(side, 0.5f * kPi) * height_for(wraps) - shaft_from(side) * kStrandAt; }
+
+// A needle holder as src/render draws it (instruments.cpp): each jaw is two rods that diverge toward the box joint, so that
+// their outline is the drawn one (3.2 x 1.8 mm at the tip, 8.8 x 5 mm at the joint); then the joint and two shanks. The jaws
+// open in the plane across the pull (z).
+constexpr size_t kHolderParts = 9;
+void place_holder(Vec3 tip, Vec3 shaft, float opening, std::span<ToolCapsule> part) {
+  constexpr float mm = 1e-3f;
+  const Vec3 across{0, 0, 1}, up = cross(shaft, across);
+  auto at = [&](float x, float y, float z, float angle) {  // the origin of the drawn tool lies 2.5 mm behind the tip
+    const float arm = z - 26, c = std::cos(angle), s = std::sin(angle);
+    const float turned_x = c * x - s * arm, turned_z = 26 + s * x + c * arm;
+    return tip + across * (mm * turned_x) + up * (mm * y) + shaft * (mm * (turned_z + 2.5f));
+  };
+  size_t k = 0;
+  auto add = [&](Vec3 a, Vec3 b, float radius) { part[k].to_a = a, part[k].to_b = b, part[k++].radius = radius * mm; };
+  for (const float x : {1.0f, -1.0f})
+    for (const float y : {1.0f, -1.0f})
+      add(at(0.8f * x, 0.1f * y, -1.7f, x * opening), at(3.5f * x, 1.7f * y, 21, x * opening), 0.8f);
+  add(at(0, 0, 7, 0), at(0, 0, 22, 0), 1);
+  for (const float x : {1.4f, -1.4f}) add(at(x, 0, 22, 0), at(x, 0, 34, 0), 3);
+  for (const float x : {1.0f, -1.0f}) add(at(1.9f * x, 0, 30, 0), at(5.2f * x, 0, 100, 0), 2.1f);
+}
 
 class Tying {
  public:
@@ -39,88 +73,76 @@ class Tying {
     const float l = how.segment;
     const Vec3 left{-1.5e-3f, 0, 0}, right{1.5e-3f, 0, 0};
     tail_ = how.tail;
-    const Vec3 tail_way = normalized(laid_tail(1) - left);
-    forceps_shaft_ = holder_shaft_ = shaft_from(1);
-    const Vec3 long_way = normalized(work_hand(1, 0) - right);
+    const Vec3 tail_direction = normalized(laid_tail(1) - left), long_direction = normalized(Vec3{0.35f, 0.3f, 1});
     std::vector<Vec3> fine;
     auto line = [&](Vec3 from, Vec3 to) {
       for (int i = 0; i < 1000; ++i) fine.push_back(lerp(from, to, static_cast<float>(i) / 1000));
     };
-    line(left + tail_way * how.tail, left);
+    line(left + tail_direction * how.tail, left);
     for (int i = 0; i < 200; ++i) fine.push_back({-1.5e-3f * std::cos(kPi * i / 200), -1.5e-3f * std::sin(kPi * i / 200), 0});
     int wraps = 1;
     for (const TiedThrow& t : tie) wraps = std::max(wraps, t.wraps);
-    const float longest = how.long_strand + 8e-3f * static_cast<float>(wraps - 1) + 6e-3f * static_cast<float>(tie.size() - 1);
-    line(right, right + long_way * longest);
+    line(right, right + long_direction * (strand_for(wraps) + 6e-3f * static_cast<float>(tie.size())));
     const std::vector<Vec3> path = resample(fine, l);
     knot_.state = thread::make_state(path);
     knot_.bite_a = static_cast<uint32_t>(std::lround(how.tail / l));
     knot_.bite_b = knot_.bite_a + static_cast<uint32_t>(std::lround(1.5e-3f * kPi / l));
     stepper_ = std::make_unique<thread::Stepper>(path.size());
-    const uint32_t nodes[] = {knot_.bite_a, knot_.bite_b, 0,
-                              knot_.bite_b + static_cast<uint32_t>(std::lround(how.long_strand / l))};
-    for (size_t k = 0; k < 4; ++k) {
-      hold_[k].node = nodes[k];
-      hold_[k].from = hold_[k].to = knot_.state.position(nodes[k]);
+    const uint32_t nodes[] = {knot_.bite_a, knot_.bite_b, 3,
+                              knot_.bite_b + static_cast<uint32_t>(std::lround(strand_for(wraps) / l)),
+                              static_cast<uint32_t>(path.size()) - 1};
+    for (size_t k = 0; k < 5; ++k) {
+      hold_[k].node = std::min(nodes[k], static_cast<uint32_t>(path.size()) - 1);
+      hold_[k].from = hold_[k].to = knot_.state.position(hold_[k].node);
       hold_[k].stiffness = k < 2 ? 500.0f : 2000.0f;
-      hold_[k].limit = k < 2 ? 0.0f : how.pull;
+      hold_[k].limit = k < 2 ? 0.0f : 2 * how.pull;
     }
-    tail_at_ = hold_[2].to;
-    strand_ = how.long_strand;
-    hands_.holder = work_place(1) + holder_shaft_ * 50e-3f;
-    const float radius[] = {0.9e-3f, 1.75e-3f, 1.0e-3f};
-    for (size_t k = 0; k < 3; ++k) tool_[k].radius = radius[k];
-    hands_.forceps = hold_[3].to;
+    hold_[4].stiffness = 20;
+    lay_down();
+    strand_ = how.segment * static_cast<float>(hold_[3].node - knot_.bite_b);
+    shaft_ = shaft_from(1);
+    tip_ = work_place(1, 1) + shaft_ * 60e-3f;
+    hand_ = hold_[3].to;
+    forceps_angle_ = kPi - 0.15f;
+    for (ToolCapsule& t : tool_) t.radius = 1.0e-3f;
     place_tools();
     for (ToolCapsule& t : tool_) t.a = t.to_a, t.b = t.to_b;
-  }
-
-  // The hand takes the long strand where exactly enough is left for these windings: slack falls off the jaws. `now` [m]:
-  // length between the wound and the node that the hand holds.
-  void take_strand(float now, int wraps) {
-    const float want = how_.long_strand + 8e-3f * static_cast<float>(wraps - 1);
-    const int shift = static_cast<int>(std::lround((want - now) / how_.segment)),
-              last = static_cast<int>(knot_.state.nodes()) - 1;
-    hold_[3].node = static_cast<uint32_t>(std::min(last, static_cast<int>(hold_[3].node) + shift));
-    hands_.forceps = hold_[3].from = hold_[3].to = knot_.state.position(hold_[3].node);
   }
 
   // side: +1 the long strand is on the right. sense: +1 over the top from the viewer's side.
   void make_throw(float side, float sense, int wraps) {
-    take_strand(strand_, wraps);
-    const Vec3 shaft = shaft_from(side), work = work_place(side);
+    take_strand(strand_for(wraps));
+    side_ = side;
+    const Vec3 shaft = shaft_from(side), work = work_place(side, wraps) + tremor();
     const float start = sense > 0 ? 0 : kPi, turns = 2 * kPi * static_cast<float>(wraps) * sense;
     // The needle holder comes from the other hand; at this moment it is far from the thread.
-    holder_shaft_ = shaft;
-    hands_.holder = work + shaft * 50e-3f;
+    shaft_ = shaft;
+    tip_ = work + shaft * 60e-3f;
     place_tools();
-    for (ToolCapsule* t : {&tool_[0], &tool_[1]}) t->a = t->to_a, t->b = t->to_b;
-    turn_forceps_ = shaft;
-    move("to work", work + shaft * 40e-3f, work_hand(side, start) + tremor(), laid_tail(side) + tremor());
-    move("to work", work + tremor(), hands_.forceps);
-    circle("wind", side, start, start + turns);
-    // The jaws go forward to the tail; the wound strand stays where it is and slides along the shaft.
-    move("fetch", tail_at_ + shaft * kInFront, hands_.forceps);
-    gripped_ = true;
-    move("draw through", work + shaft * 28e-3f + tremor(), hands_.forceps);
-    // The winding hand continues over the top to the other side: that completes the throw.
-    circle("cross", side, start + turns, start + turns + sense * kPi / 2);
+    for (size_t k = 0; k < kHolderParts; ++k) tool_[k].a = tool_[k].to_a, tool_[k].b = tool_[k].to_b;
+    // The strand is held out in front of the shaft (behind it, for the other sense), nearly taut.
+    wind_at_ = kWindAt + tremor().x;
+    const float drop = kStrandAt - wind_at_, taut = 0.98f * strand_for(wraps), height = height_for(wraps);
+    radius_ = std::sqrt(taut * taut - height * height - drop * drop);
+    angle_ = start;
+    const float forceps = side > 0 ? kPi - 0.15f : 0.15f;
+    const Vec3 out = work + shaft * wind_at_ + around(side, start) * radius_;
+    move("to work", tip_, out, 0, 0.5f * (forceps_angle_ + forceps));
+    move("to work", work, hand_, 0, forceps);
+    wind("wind", start + turns);
+    fetch();
+    draw(work, sense);
     move("cross", {side * 30e-3f, 12e-3f, 0}, Vec3{-side * 24e-3f, 16e-3f, 0} + tremor());
     move("pull", {side * 40e-3f, 3e-3f, 0}, {-side * 40e-3f, 3e-3f, 0});
-    move("pull", {side * 60e-3f, 2e-3f, 0}, {-side * 65e-3f, 2e-3f, 0}, {}, 0.1f);
-    rest("pull", 0.1);
+    pull(side);
     strand_ = distance(knot_.state.position(hold_[3].node), knot_.state.position(knot_.bite_b));  // taut
     tail_ = distance(knot_.state.position(0), knot_.state.position(knot_.bite_a));
     tension_ = 0.5f * (length(hold_[2].force) + length(hold_[3].force));
-    // Where a hand's grip slipped, the hand is now at the strand.
-    for (size_t k : {size_t{2}, size_t{3}}) hold_[k].from = hold_[k].to = knot_.state.position(hold_[k].node);
-    hands_ = {hold_[2].to + shaft * kInFront, hold_[3].to};
-    place_tools();
-    for (ToolCapsule& t : tool_) t.a = t.to_a, t.b = t.to_b;
-    move("ease", hands_.holder + Vec3{-side * 4e-3f, 0, 0}, hands_.forceps + Vec3{side * 4e-3f, 2e-3f, 0});
-    gripped_ = false;
-    tail_at_ = hold_[2].to;
-    move("let go", hands_.holder + shaft * 30e-3f, hands_.forceps);
+    move("lay", laid_tail(-side) - shaft_ * kGrip, hand_ + Vec3{side * 4e-3f, 2e-3f, 0});
+    lay_down();
+    open("let go", kOpen);
+    move("let go", tip_ + shaft * 60e-3f, hand_);
+    opening_ = 0;
   }
 
   TiedKnot finish() {
@@ -140,30 +162,46 @@ class Tying {
     if (how_.seed == 0) return {};
     return Vec3{random_.uniform() - 0.5f, random_.uniform() - 0.5f, random_.uniform() - 0.5f} * 2e-3f;
   }
-  // The tail is laid nearly straight: sagging thread would obstruct the winding hand.
-  Vec3 laid_tail(float side) const { return {side * -0.88f * tail_, 8e-3f, 0}; }
-  // The winding hand at an angle about the needle holder's shaft; 0: toward the viewer, pi/2: above.
-  static Vec3 work_hand(float side, float angle) {
-    return work_place(side) + shaft_from(side) * kBehind + Vec3{0, std::sin(angle), std::cos(angle)} * kCircle;
+  // Where the tail's end lies: low, nearly straight, on the side away from the long strand.
+  Vec3 laid_tail(float side) const { return {side * -0.9f * tail_, 4e-3f, 0}; }
+  // The hand takes the long strand where enough is left for the windings, and no more.
+  void take_strand(float want) {
+    const int shift = static_cast<int>(std::lround((want - strand_) / how_.segment)),
+              last = static_cast<int>(knot_.state.nodes()) - 1;
+    hold_[3].node = static_cast<uint32_t>(std::min(last, static_cast<int>(hold_[3].node) + shift));
+    hand_ = hold_[3].from = hold_[3].to = knot_.state.position(hold_[3].node);
+  }
+  void lay_down() {
+    gripped_ = false;
+    hold_[2].limit = kLying, hold_[2].stiffness = 50;
+    tail_at_ = knot_.state.position(hold_[2].node);
   }
 
+  Vec3 forceps() const { return {std::cos(forceps_angle_), std::sin(forceps_angle_), 0}; }
   void place_tools() {
-    const Vec3 jaw = hands_.holder, joint = jaw + holder_shaft_ * 15e-3f;
-    tool_[0].to_a = jaw, tool_[0].to_b = joint;
-    tool_[1].to_a = joint, tool_[1].to_b = joint + holder_shaft_ * 80e-3f;
-    tool_[2].to_a = hands_.forceps + forceps_shaft_ * kInFront, tool_[2].to_b = tool_[2].to_a + forceps_shaft_ * 80e-3f;
+    place_holder(tip_, shaft_, opening_, tool_);
+    tool_[kHolderParts].to_a = hand_ + forceps() * kHeld, tool_[kHolderParts].to_b = hand_ + forceps() * 80e-3f;
   }
 
   void tick(const std::string& phase) {
     for (ToolCapsule& t : tool_) t.a = t.to_a, t.b = t.to_b;
+    // Turning and yielding together must not make the hand faster than it is.
+    const float way = distance(hold_[3].to, hand_);
+    if (way > how_.speed * kTick) hand_ = lerp(hold_[3].to, hand_, how_.speed * kTick / way);
     place_tools();
     hold_[2].from = hold_[2].to, hold_[3].from = hold_[3].to;
-    hold_[2].to = gripped_ ? hands_.holder - holder_shaft_ * kInFront : tail_at_;
-    hold_[3].to = hands_.forceps;
+    hold_[2].to = gripped_ ? tip_ + shaft_ * kGrip : tail_at_;
+    hold_[3].to = hand_;
+    // The rest of the strand lies in the palm.
+    hold_[4].from = hold_[4].to;
+    hold_[4].to = hand_ + forceps() * (how_.segment * static_cast<float>(hold_[4].node - hold_[3].node));
     Surroundings around;
     around.holds = hold_, around.tools = tool_;
     stepper_->step(settings_, knot_.state, around);
     ++ticks_;
+    felt_ += 0.2f * (length(hold_[3].force) - felt_);
+    for (const Hold* h : {&hold_[3], gripped_ ? &hold_[2] : &hold_[3]})
+      knot_.fastest = std::max(knot_.fastest, distance(h->from, h->to) / kTick);
     for (size_t k = 0; k < knot_.state.key.size(); ++k)
       if (knot_.state.crossing[k].normal_impulse > 0 && thread::partner_of(knot_.state.key[k]) < thread::kTool)
         knot_.nearest = std::min(knot_.nearest, 1 + knot_.state.crossing[k].gap / settings_.material.diameter);
@@ -174,34 +212,107 @@ class Tying {
     for (int i = 0; i < static_cast<int>(1000 * seconds); ++i) tick(phase);
   }
 
-  // Moves both hands in the time that the longer path needs; the free tail is laid to `tail` if given.
-  void move(const std::string& phase, Vec3 holder, Vec3 forceps, Vec3 tail = {}, float speed = 0) {
-    const Hands from = hands_;
-    const Vec3 tail_from = tail_at_, shaft_was = forceps_shaft_;
+  // Both hands to their places in the time that the farther one needs.
+  void move(const std::string& phase, Vec3 tip, Vec3 hand, float speed = 0, float forceps = -1) {
+    const Vec3 tip_from = tip_, hand_from = hand_;
+    const float forceps_from = forceps_angle_;
     if (speed == 0) speed = how_.speed;
-    const bool lay = !gripped_ && length2(tail) > 0;
     const float far =
-        std::max({distance(from.holder, holder), distance(from.forceps, forceps), lay ? distance(tail_from, tail) : 0.0f});
+        std::max({distance(tip_, tip), distance(hand_, hand), forceps >= 0 ? 20e-3f * std::abs(forceps - forceps_from) : 0.0f});
     const int ticks = std::max(1, static_cast<int>(std::ceil(1000 * 1.5f * far / speed)));
     for (int i = 1; i <= ticks; ++i) {
       const float s = static_cast<float>(i) / static_cast<float>(ticks), e = s * s * (3 - 2 * s);
-      hands_.holder = lerp(from.holder, holder, e), hands_.forceps = lerp(from.forceps, forceps, e);
-      if (lay) tail_at_ = lerp(tail_from, tail, e);
-      if (length2(turn_forceps_) > 0) forceps_shaft_ = normalized(lerp(shaft_was, turn_forceps_, e), {0, 1, 0});
+      tip_ = lerp(tip_from, tip, e), hand_ = lerp(hand_from, hand, e);
+      if (forceps >= 0) forceps_angle_ = forceps_from + e * (forceps - forceps_from);
       tick(phase);
     }
-    turn_forceps_ = {};
   }
 
-  // The winding hand about the needle holder from one angle to another.
-  void circle(const std::string& phase, float side, float from, float to) {
-    const Vec3 off = hands_.forceps - work_hand(side, from);
-    const float far = std::abs(to - from) * kCircle;
-    const int ticks = std::max(1, static_cast<int>(std::ceil(1000 * 1.5f * far / how_.speed)));
+  void open(const std::string& phase, float opening) {
+    const float from = opening_;
+    for (int i = 1; i <= 120; ++i) {
+      opening_ = from + (opening - from) * static_cast<float>(i) / 120;
+      tick(phase);
+    }
+  }
+
+  // The winding hand keeps the strand at the wanted tension by its distance from the shaft.
+  void feel(float tension) {
+    radius_ += kTick * std::clamp(0.5f * (tension - felt_), -how_.speed, how_.speed);
+    radius_ = std::max(radius_, kNearest);
+    // Too short a strand slips through the fingers.
+    if (felt_ > 4 * tension && hold_[3].node + 1 < knot_.state.nodes()) {
+      ++hold_[3].node;
+      felt_ = tension;
+    }
+  }
+  void place_hand() { hand_ = tip_ + shaft_ * wind_at_ + around(side_, angle_) * radius_; }
+
+  void wind(const std::string& phase, float to) {
+    const float from = angle_, direction = to > from ? 1.0f : -1.0f;
+    float speed = 0;
+    for (int guard = 0; std::abs(to - angle_) > 1e-3f && guard < 60000; ++guard) {
+      feel(kWinding);
+      // Slower near the end, and while the strand is slack or tight.
+      const float left = std::abs(to - angle_) * radius_, off = std::abs(felt_ - kWinding) / kWinding;
+      const float want = std::min(how_.speed, 0.02f + 10 * left) * std::clamp(1.6f - 0.6f * off, 0.25f, 1.0f);
+      speed += std::clamp(want - speed, -10 * kTick, 5 * kTick);
+      angle_ += direction * std::min(speed * kTick, left) / radius_;
+      place_hand();
+      tick(phase);
+    }
+  }
+
+  // The jaws open, go forward to the tail and close on it; the winding hand goes with them and keeps the turns on the jaws.
+  void fetch() {
+    open("open", kOpen);
+    const Vec3 off = tremor() * 0.3f;
+    float speed = 0;
+    for (int guard = 0; guard < 20000; ++guard) {
+      const Vec3 goal = knot_.state.position(hold_[2].node) - shaft_ * kGrip + off, way = goal - tip_;
+      const float left = length(way);
+      if (left < 0.4e-3f) break;
+      speed += std::clamp(std::min(how_.speed, 0.01f + 12 * left) - speed, -20 * kTick, 5 * kTick);
+      tip_ += way * (std::min(speed * kTick, left) / left);
+      feel(kWinding);
+      place_hand();
+      tick("fetch");
+    }
+    open("close", 0.006f);
+    gripped_ = distance(knot_.state.position(hold_[2].node), tip_ + shaft_ * kGrip) < 2e-3f;
+    knot_.missed += !gripped_;
+    hold_[2].limit = 2 * how_.pull, hold_[2].stiffness = 2000;
+    hold_[2].to = tip_ + shaft_ * kGrip;
+  }
+
+  // Both hands go apart until each feels the wanted tension, and keep it for a moment.
+  void pull(float side) {
+    float tail = 0;
+    for (int i = 0, steady = 0; i < 4000 && steady < 150; ++i) {
+      tail += 0.2f * (length(hold_[2].force) - tail);
+      const auto pace = [&](float felt) {
+        return kTick * std::clamp(0.1f * (how_.pull - felt), -0.05f, std::min(0.1f, how_.speed));
+      };
+      tip_.x += side * pace(tail), hand_.x -= side * pace(felt_);
+      tick("pull");
+      steady = std::min(tail, felt_) > 0.9f * how_.pull ? steady + 1 : 0;
+    }
+  }
+
+  // The needle holder goes back with the tail. The other hand keeps the strand and goes on over the top, past the tip: the
+  // turns slide off the jaws and along the tail.
+  void draw(Vec3 work, float sense) {
+    const Vec3 from = tip_, to = work + shaft_ * 34e-3f + tremor();
+    const Vec3 middle = tip_ + shaft_ * wind_at_, past = middle - shaft_ * 14e-3f + Vec3{0, 8e-3f, 0};
+    const float angle_from = angle_, turn = sense * 0.5f * kPi;
+    const int ticks = static_cast<int>(std::ceil(1000 * 1.5f * distance(from, to) / how_.speed));
     for (int i = 1; i <= ticks; ++i) {
       const float s = static_cast<float>(i) / static_cast<float>(ticks), e = s * s * (3 - 2 * s);
-      hands_.forceps = work_hand(side, from + (to - from) * e) + off;
-      tick(phase);
+      tip_ = lerp(from, to, e);
+      angle_ = angle_from + turn * e;
+      feel(kDrawing);
+      hand_ = lerp(middle, past, e) + around(side_, angle_) * radius_;
+      tick("draw through");
     }
   }
 
@@ -211,11 +322,14 @@ class Tying {
   Random random_;
   TiedKnot knot_;
   std::unique_ptr<thread::Stepper> stepper_;
-  Hold hold_[4];         // bite, bite, tail, long end
-  ToolCapsule tool_[3];  // jaws and shaft of the needle holder, forceps
-  Hands hands_;
-  Vec3 tail_at_, holder_shaft_, forceps_shaft_, turn_forceps_;
-  float tension_ = 0, strand_ = 0, tail_ = 0;  // the free lengths of both strands [m]
+  Hold hold_[5];                        // bite, bite, tail, long strand, its end
+  ToolCapsule tool_[kHolderParts + 1];  // needle holder, forceps
+  Vec3 tip_, shaft_, hand_, tail_at_;   // of the needle holder; where the forceps holds the strand; where the tail was laid
+  float opening_ = 0;                   // [rad] of each jaw
+  float forceps_angle_ = 0;             // [rad] in the plane of pull and height
+  float side_ = 1, angle_ = 0, radius_ = 0, wind_at_ = kWindAt;  // of the winding hand about the shaft
+  float felt_ = 0;                                               // [N] tension of the strand, smoothed over 5 ms
+  float tension_ = 0, strand_ = 0, tail_ = 0;                    // the free lengths of both strands [m]
   bool gripped_ = false;
   long ticks_ = 0;
 };

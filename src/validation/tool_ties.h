@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // validation: scripted hands that tie throws with instruments: wind the long strand round the needle holder,
-// grasp the tail with its jaws, pull it through, pull the ends apart. The tools are capsules that the thread cannot pass.
+// grasp the tail with its jaws, pull it through, pull the ends apart. The tools are capsules that the thread cannot pass; their
+// outline is the one that src/render draws. The hands act on what a surgeon sees and feels: the tension of the strand and the
+// place of the tail. There are no retries: what goes wrong shows in the knot.
 #pragma once
 #include <functional>
 #include <memory>
@@ -22,11 +24,11 @@ struct TiedThrow {
 using Tie = std::vector<TiedThrow>;
 
 struct TieSettings {
-  float speed = 0.3f;                         // [m/s] maximum of the hands
-  float pull = 2.5f;                          // [N] at which the hands pull a throw tight: their grip slips above
-  float segment = 0.7e-3f;                    // [m]
-  float long_strand = 52e-3f, tail = 42e-3f;  // [m]
-  uint64_t seed = 0;                          // of the tremor of the way points, 1 mm; 0: none
+  float speed = 0.3f;       // [m/s] maximum of the hands
+  float pull = 2.5f;        // [N] at which the hands pull a throw tight; their grip slips at twice this
+  float segment = 0.7e-3f;  // [m]
+  float tail = 42e-3f;      // [m]
+  uint64_t seed = 0;        // of the tremor of the way points, 1 mm; 0: none
 };
 
 struct TiedKnot {
@@ -37,6 +39,8 @@ struct TiedKnot {
   float nearest = 1;   // smallest distance between strands that touch, in diameters
   double seconds = 0;  // simulated
   float tension = 0;   // [N] of the hands at the end, mean
+  float fastest = 0;   // [m/s] of either hand
+  int missed = 0;      // throws whose tail was not between the jaws when they closed
 };
 
 // `each_tick`, if given, receives every state and the tools (for pictures).
