@@ -60,9 +60,9 @@ int main() {
   std::printf("tick %llu, %.2f s: \"%s\"\n", static_cast<unsigned long long>(input.tick - 1),
               static_cast<double>(input.tick - 1) / scene.solver.tick_rate, hands.surgeon->doing().c_str());
   print("right hand", input.hand[0].pose.p);
-  print("  a tick before", hand_before[0].pose.p);
-  std::printf("%-32s %8.1f mm/s\n", "  its speed, without tremor", 1e3 * length(input.hand[0].velocity));
-  std::printf("%-32s %8.2f closed 0 .. 1 open\n", "  its jaw", input.hand[0].jaw);
+  print("  one tick before", hand_before[0].pose.p);
+  std::printf("%-32s %8.1f mm/s\n", "  speed, without tremor", 1e3 * length(input.hand[0].velocity));
+  std::printf("%-32s %8.2f closed 0 .. 1 open\n", "  jaw", input.hand[0].jaw);
   print("left hand, waiting", input.hand[1].pose.p);
 
   std::printf("[step]\n");
@@ -73,7 +73,7 @@ int main() {
               1e3 * distance(s.solver.body[0].x, tool_before));
   print("needle tip before", tip_before);
   print("needle tip after", tip);
-  std::printf("%-32s %8.3f mm\n", "  it moved by", 1e3 * distance(tip, tip_before));
+  std::printf("%-32s %8.3f mm\n", "  displacement", 1e3 * distance(tip, tip_before));
 
   std::printf("[puncture]\n");
   for (const Event& e : seen.event)
@@ -86,12 +86,12 @@ int main() {
               1e3 * bite.depth);
   if (s.suture.suture[0].attached) {
     const Attachment& a = s.solver.attach[0];
-    std::printf("%-32s %u, dragged %.3f mm so far, let go beyond %.1f mm\n", "attached particle", bite.nearest,
+    std::printf("%-32s %u, displaced by %.3f mm, released at %.1f mm\n", "attached particle", bite.nearest,
                 1e3 * distance(xyz(s.solver.x[bite.nearest]), s.suture.suture[0].attached_from),
                 1e3 * m.suture.release_distance);
-    std::printf("%-32s %8.4f N\n", "  its spring pulls with", length(a.lambda) / (m.solver.h * m.solver.h));
+    std::printf("%-32s %8.4f N\n", "  force of its spring", length(a.lambda) / (m.solver.h * m.solver.h));
   }
-  std::printf("%-32s %zu; suture points: %zu\n", "rows of the needle's channel", s.solver.channel.size(),
+  std::printf("%-32s %zu; suture points: %zu\n", "needle-track constraints", s.solver.channel.size(),
               s.suture.suture[0].point.size());
 
   std::printf("[forces]\n");
@@ -99,16 +99,15 @@ int main() {
   print_force("on the left hand", seen.tool[1].force);
   float most = 0;
   for (float t : s.solver.strand[0].tension) most = std::max(most, t);
-  std::printf("%-32s %8.5f N at the needle, %.5f N at most\n", "thread tension", s.solver.strand[0].tension.back(), most);
+  std::printf("%-32s %8.5f N at the needle, %.5f N maximum\n", "thread tension", s.solver.strand[0].tension.back(), most);
   for (const NeedleTrackConstraint& c : s.solver.channel)
-    std::printf("%-32s %8.4f N sideways, %.4f N along\n", "channel at the entry", length(c.lambda) / (m.solver.h * m.solver.h),
-                c.drag_lambda / (m.solver.h * m.solver.h));
+    std::printf("%-32s %8.4f N lateral, %.4f N along\n", "needle track at the entry",
+                length(c.lambda) / (m.solver.h * m.solver.h), c.drag_lambda / (m.solver.h * m.solver.h));
 
   std::printf("[publish]\n");
   std::printf("snapshot of tick %llu: %zu particles, %zu bites, needle in tissue: %s, opening %.1f mm^2\n",
               static_cast<unsigned long long>(seen.tick), seen.particle.size(), seen.active().bite.size(),
               seen.active().needle.in_tissue ? "yes" : "no", 1e6 * seen.opening_area);
-  std::printf("state: %zu bytes, hash %016llx\n", save_state(m, s).size(), static_cast<unsigned long long>(hash_state(m, s)));
 
   // Claims of the page that are independent of the numbers: the tip entered here, and the same input from the same state gives
   // the same bits.

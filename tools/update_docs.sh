@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Writes anew what the pages copy from the program: docs/scene_reference.md, and the numbers in docs/one_tick.md (each block that
+# Updates the parts of pages that the program prints: docs/scene_reference.md, and the numbers in docs/one_tick.md (each block that
 # opens with ```text NAME takes the lines after [NAME] of the sample one_tick). Run it after a change of keys or of physics.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

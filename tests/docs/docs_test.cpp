@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <regex>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -80,6 +81,50 @@ TEST(Docs, every_room_has_a_page) {
     if (room.is_directory()) {
       EXPECT_TRUE(fs::exists(kRoot / "docs/rooms" / (room.path().filename().string() + ".md"))) << room.path().filename();
     }
+}
+
+// Statements of step() in their order, and the rows of the page's stage tables.
+TEST(Docs, one_tick_lists_every_stage) {
+  const std::string code = read_file(kRoot / "src/sim/step.cpp"), page = read_file(kRoot / "docs/one_tick.md");
+  const std::string step = code.substr(code.find("\nvoid step("));
+  static const std::regex kCall(R"re(\n +([a-z_]+)\()re"), kRow(R"re(\n\| `([a-z_]+)` \|)re");
+  const auto names = [](const std::string& text, const std::regex& pattern) {
+    std::vector<std::string> out;
+    for (std::sregex_iterator m(text.begin(), text.end(), pattern), none; m != none; ++m) out.push_back((*m)[1]);
+    return out;
+  };
+  EXPECT_EQ(names(step, kCall), names(page, kRow)) << "src/sim/step.cpp and docs/one_tick.md";
+}
+
+// The first column of each page's table of files: every name is a file, and every file of a room of src is named.
+TEST(Docs, room_pages_list_their_files) {
+  static const std::regex kName(R"re(`([^`]+)`)re");
+  for (const auto& page : fs::directory_iterator(kRoot / "docs/rooms")) {
+    const std::string room = page.path().stem();
+    const fs::path folder = kRoot / "src" / room;
+    if (!fs::is_directory(folder)) continue;
+    std::set<std::string> named;
+    std::istringstream lines(read_file(page.path()));
+    bool in_table = false;
+    for (std::string line; std::getline(lines, line);) {
+      if (line.rfind("| file", 0) == 0) in_table = true;
+      if (line.empty() || line[0] != '|') in_table = false;
+      if (!in_table) continue;
+      const std::string cell = line.substr(2, line.find_first_of("|(", 2) - 2);
+      for (std::sregex_iterator m(cell.begin(), cell.end(), kName), none; m != none; ++m) {
+        const std::string name = (*m)[1];
+        named.insert(fs::path(name).stem());
+        const bool there = fs::exists(kRoot / name) || fs::exists(folder / name) || fs::exists(folder / (name + ".h")) ||
+                           fs::exists(folder / (name + ".cpp"));
+        EXPECT_TRUE(there) << "docs/rooms/" << room << ".md: " << name;
+      }
+    }
+    for (const auto& file : fs::directory_iterator(folder)) {
+      const std::string stem = file.path().stem(), extension = file.path().extension();
+      if ((extension != ".h" && extension != ".cpp") || stem == "reflect") continue;
+      EXPECT_TRUE(named.count(stem)) << "docs/rooms/" << room << ".md does not list " << file.path().filename();
+    }
+  }
 }
 
 }  // namespace
