@@ -299,7 +299,7 @@ class Tying {
     }
   }
 
-  // The needle holder goes back with the tail. The other hand keeps the strand and goes on over the top, past the tip: the
+  // The needle holder goes back with the tail. The other hand keeps the strand and continues over the top, past the tip: the
   // turns slide off the jaws and along the tail.
   void draw(Vec3 work, float sense) {
     const Vec3 from = tip_, to = work + shaft_ * 34e-3f + tremor();
