@@ -108,7 +108,7 @@ void add_bench(CLI::App& app, int& exit_code) {
   command
       ->add_option("--out", o->out,
                    "output folder. limits: CSV and PNG per scene (default out/limits); paper: tables.md, tables.csv; haptics: "
-                   "forces.csv, forces.png")
+                   "force curves, Z-width and transparency (CSV, PNG)")
       ->type_name("DIR");
   command->add_option("--log", o->log, "haptics: plot a log of play --haptics-log to FILE.png instead")->type_name("FILE");
   command->add_option("--set", o->set, "override a scene key: key=value; repeatable")->take_all()->allow_extra_args(false);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// app: `catgut bench haptics`: the comparison of rendering methods and, with --out, the force curves of a bite and a
-// knot.
+// app: `catgut bench haptics`: the comparison of rendering methods, transparency and, with --out, Z-width and what a bite and
+// a knot feel like.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +10,7 @@
 #include "commands/commands.h"
 #include "core/check.h"
 #include "haptic/study.h"
+#include "haptic/z_width.h"
 #include "procedure/scene_file.h"
 #include "render/plot.h"
 #include "runtime/force_curves.h"
@@ -83,6 +84,102 @@ void write_felt(const std::string& folder, const std::string& scene) {
       "\nbite: entry peak %.2f N (0.9 +- 0.3), the paper's spring %.2f N; tip out after %.1f mm\nthrow: %.2f N at most\n",
       entry, theirs, c.exit_mm, most);
   std::printf("%s/forces.png\n%s/forces.csv\n", folder.c_str(), folder.c_str());
+}
+
+constexpr std::array<Color, 3> kMethod{Color{200, 70, 50, 255}, Color{90, 150, 90, 255}, Color{30, 90, 170, 255}};
+
+// A panel for each rate of the physics and delay to the motors; in it the boundary of passive walls for each method.
+void write_z_width(const std::string& folder) {
+  constexpr std::array<float, 3> kRates{60, 240, 960};
+  constexpr std::array<float, 4> kDelays{0, 0.001f, 0.002f, 0.004f};
+  constexpr std::array<float, 9> kDampings{0, 0.5f, 1, 1.5f, 2, 3, 4, 6, 8};
+  constexpr std::array<WallMethod, 3> kMethods{WallMethod::coupling, WallMethod::patch, WallMethod::chain};
+  constexpr float kStep = 50, kMost = 2000;
+  constexpr int kPanelWide = 430, kPanelHigh = 320;
+  Image all = make_image(kPanelWide * static_cast<int>(kDelays.size()), kPanelHigh * static_cast<int>(kRates.size()), {});
+  std::string csv = "rate_Hz,delay_ms,method,damping_Ns_m,largest_passive_stiffness_N_m\n";
+  std::printf("\nZ-width: largest stiffness [N/m] up to %.0f below which every wall is passive under every hand\n",
+              double{kMost});
+  std::printf("%-8s %-6s %-18s damping", "physics", "delay", "");
+  for (const float b : kDampings) std::printf(" %5.1f", double{b});
+  std::printf(" N s/m\n");
+  for (size_t row = 0; row < kRates.size(); ++row)
+    for (size_t column = 0; column < kDelays.size(); ++column) {
+      Plot plot;
+      char text[96];
+      std::snprintf(text, sizeof text, "physics %.0f Hz, motors %.0f ms late", double{kRates[row]},
+                    1e3 * double{kDelays[column]});
+      plot.title = text, plot.x_name = "damping [N s/m]", plot.y_name = "N/m";
+      plot.y_axis = PlotAxis::linear;
+      plot.x_most = 8, plot.y_most = 1.05 * double{kMost};
+      plot.level = {{"a Touch: 400", 400}};
+      for (size_t m = 0; m < kMethods.size(); ++m) {
+        if (stop_on_interrupt().load()) return;
+        PlotCurve curve{wall_method_name(kMethods[m]), kMethod[m], {}, true, true};
+        std::printf("%4.0f Hz  %.0f ms   %-18s        ", double{kRates[row]}, 1e3 * double{kDelays[column]},
+                    curve.name.c_str());
+        for (const float b : kDampings) {
+          WallCase c;
+          c.method = kMethods[m], c.rate = kRates[row], c.delay = kDelays[column], c.damping = b;
+          const double k = double{z_width(c, kStep, kMost)};
+          curve.point.push_back({double{b}, k});
+          std::snprintf(text, sizeof text, "%.0f,%.0f,%s,%.1f,%.0f\n", double{c.rate}, 1e3 * double{c.delay},
+                        curve.name.c_str(), double{b}, k);
+          csv += text;
+          std::printf(" %5.0f", k), std::fflush(stdout);
+        }
+        std::printf("\n");
+        plot.curve.push_back(curve);
+      }
+      paste(all, draw_plot(plot, kPanelWide, kPanelHigh), static_cast<int>(column) * kPanelWide,
+            static_cast<int>(row) * kPanelHigh);
+    }
+  write_png(all, folder + "/z_width.png");
+  write_output(folder + "/z_width.csv", csv);
+  std::printf("%s/z_width.png\n%s/z_width.csv\n", folder.c_str(), folder.c_str());
+}
+
+// Rendered impedance over that of the environment, 0.5 to 30 Hz. folder: empty: the table alone.
+void write_transparency(const std::string& folder) {
+  const std::vector<float> hz{0.5f, 1, 2, 3, 4, 6, 8, 10, 12, 15, 20, 25, 30};
+  std::string csv = "environment,rate_Hz,frequency_Hz,gain,phase_degrees,rms_error_N,rms_force_N\n";
+  std::printf(
+      "\ntransparency: rendered impedance over the environment's (1: perfect), a hand moving by 1 mm, motors 2 ms late\n");
+  std::printf("%-8s %-8s", "", "physics");
+  for (const float f : hz) std::printf(" %5.1f", double{f});
+  std::printf(" Hz\n");
+  Plot gain, error;
+  gain.title = "Transparency: rendered impedance over the environment's; hand +- 1 mm, motors 2 ms late, physics 60 Hz";
+  gain.y_name = "gain", gain.level = {{"perfect", 1}}, gain.y_most = 1.5;
+  error.title = "Error of the force at the same instant, RMS";
+  error.y_name = "N", error.y_most = 0.2;
+  for (Plot* p : {&gain, &error}) p->x_name = "Hz", p->y_axis = PlotAxis::linear, p->x_most = 30;
+  for (const Environment e : {Environment::wall, Environment::needle, Environment::thread})
+    for (const float rate : {60.0f, 960.0f}) {
+      SweepCase c;
+      c.environment = e, c.rate = rate;
+      const std::vector<SweepPoint> points = sweep(c, hz);
+      const Color color = kMethod[static_cast<size_t>(e)];
+      PlotCurve g{environment_name(e), color, {}, true, true}, n = g;
+      std::printf("%-8s %4.0f Hz ", environment_name(e), double{rate});
+      char row[160];
+      for (const SweepPoint& p : points) {
+        std::printf(" %5.2f", double{p.gain});
+        std::snprintf(row, sizeof row, "%s,%.0f,%.1f,%.4f,%.1f,%.4f,%.4f\n", environment_name(e), double{rate}, double{p.hz},
+                      double{p.gain}, double{p.phase} * 180 / double{kPi}, double{p.rms_error}, double{p.rms});
+        csv += row;
+        g.point.push_back({double{p.hz}, double{p.gain}}), n.point.push_back({double{p.hz}, double{p.rms_error}});
+      }
+      std::printf("\n");
+      if (rate < 100) gain.curve.push_back(g), error.curve.push_back(n);
+    }
+  if (folder.empty()) return;
+  Image both = make_image(kWide, 2 * kHigh, {});
+  paste(both, draw_plot(gain, kWide, kHigh), 0, 0);
+  paste(both, draw_plot(error, kWide, kHigh), 0, kHigh);
+  write_png(both, folder + "/transparency.png");
+  write_output(folder + "/transparency.csv", csv);
+  std::printf("%s/transparency.png\n%s/transparency.csv\n", folder.c_str(), folder.c_str());
 }
 
 }  // namespace
@@ -159,7 +256,9 @@ int plot_haptics_log(const std::string& file) {
 
 int bench_haptics(const std::string& folder, const std::string& scene) {
   if (!folder.empty())
-    for (const char* name : {"/forces.csv", "/forces.png"}) prepare_output(folder + name);
+    for (const char* name :
+         {"/forces.csv", "/forces.png", "/z_width.csv", "/z_width.png", "/transparency.csv", "/transparency.png"})
+      prepare_output(folder + name);
   std::printf("a hand presses, holds and releases a wall of tissue; in brackets the figure of an earlier prototype\n");
   std::printf("%-10s %5s  %-26s %19s %19s %19s %19s\n", "tissue/", "rate", "rendering", "force error [N]", "swing, held [mm]",
               "step [N/ms]", "energy [mJ]");
@@ -178,8 +277,9 @@ int bench_haptics(const std::string& folder, const std::string& scene) {
     cell(double{r.energy} * 1e3, double{p.prototype.energy} * 1e3);
     std::printf("\n");
   }
-  if (!folder.empty()) write_felt(folder, scene);
-  return 0;
+  write_transparency(folder);
+  if (!folder.empty()) write_z_width(folder), write_felt(folder, scene);
+  return stop_on_interrupt().load() ? 130 : 0;
 }
 
 }  // namespace catgut

@@ -98,7 +98,8 @@ void serve(Touch& t, size_t which) {
   ArmSample s;
   s.sequence = ++a.sequence;
   if (std::exchange(a.broken, false)) a.lost = true, a.lost_for = 0;  // found in the other device's frame
-  if (a.lost && ++a.lost_for % kProbeEvery != 0) {
+  // A lost device is asked now and then; before that its force goes down without a step, in case it still hears the driver.
+  if (a.lost && length2(a.force) == 0 && ++a.lost_for % kProbeEvery != 0) {
     t.callback.step(t.callback.user, which, s);
     a.steps.fetch_add(1, std::memory_order_relaxed);
     return;
@@ -131,11 +132,11 @@ void serve(Touch& t, size_t which) {
     s.forced_off = std::exchange(a.cut, false);
   }
   Vec3 force = t.callback.step(t.callback.user, which, s);
-  if (t.stopping.load(std::memory_order_relaxed)) {
+  if (t.stopping.load(std::memory_order_relaxed) || lost) {
     const float l = length(a.force);
     force = l > kStopStep ? a.force * ((l - kStopStep) / l) : Vec3{};
   }
-  if (!is_finite(force) || lost) force = {};
+  if (!is_finite(force)) force = {};
   const double newton[3] = {double{force.x}, double{force.y}, double{force.z}};
   t.hd.hdSetDoublev(hd::kCurrentForce, newton);
   t.hd.hdEndFrame(a.handle);

@@ -12,6 +12,7 @@
 #include "core/hash.h"
 #include "core/random.h"
 #include "haptic/study.h"
+#include "haptic/z_width.h"
 
 namespace catgut {
 namespace {
@@ -115,8 +116,23 @@ TEST(Haptics, H3_passive_under_every_hand) {
               static_cast<double>(worst_swing) * 1e3, static_cast<double>(worst_step));
 }
 
-// H3 on realistic devices: position in steps of 0.055 mm, 1 to 3 ms to the motors, varying periods, late or lost
-// calls. Without a reference: absolute bounds on the energy, the swing along every axis, the step of a call.
+// Swings from still_from to still_to [m], all axes.
+float run_gesture(Bench& b, const Gesture& g) {
+  b.path = g.path;
+  b.warm_up(g.path(0));
+  Vec3 low{1e9f, 1e9f, 1e9f}, high = -1 * low;
+  while (b.time < g.seconds) {
+    b.run(0.001f);
+    if (b.time <= g.still_from || b.time >= g.still_to) continue;
+    low = {std::min(low.x, b.x.x), std::min(low.y, b.x.y), std::min(low.z, b.x.z)};
+    high = {std::max(high.x, b.x.x), std::max(high.y, b.x.y), std::max(high.z, b.x.z)};
+  }
+  return high.x >= low.x ? length(high - low) : 0;
+}
+
+// H3 on arms as they are: position in steps of 0.055 mm, 1 to 3 ms to the motors, periods that vary, calls that are late or
+// lost. Absolute bounds: 0.5 mJ to the hand, 0.2 mm along all axes while it holds still, 0.5 N a call. A trembling hand near
+// its resonance swings farther without any force: there force may only reduce it.
 TEST(Haptics, H3_on_unkind_arms) {
   std::vector<Gesture> all = gestures();
   BenchTissue needle;
@@ -134,29 +150,29 @@ TEST(Haptics, H3_on_unkind_arms) {
         for (const float grip : {50.0f, 150.0f, 400.0f, 800.0f}) {
           Bench b;
           b.tissue = g.tissue;
-          b.mass = mass, b.grip = grip, b.path = g.path, b.coulomb = 0.01f;
+          b.mass = mass, b.grip = grip, b.coulomb = 0.01f;
           b.unkind = touch_like(transport);
-          b.warm_up(g.path(0));
-          Vec3 low{1e9f, 1e9f, 1e9f}, high = -1 * low;
-          while (b.time < g.seconds) {
-            b.run(0.001f);
-            if (b.time <= g.still_from || b.time >= g.still_to) continue;
-            low = {std::min(low.x, b.x.x), std::min(low.y, b.x.y), std::min(low.z, b.x.z)};
-            high = {std::max(high.x, b.x.x), std::max(high.y, b.x.y), std::max(high.z, b.x.z)};
-          }
-          const float moved = high.x >= low.x ? length(high - low) : 0;
+          const float moved = run_gesture(b, g);
           SCOPED_TRACE(testing::Message() << g.name << " mass " << mass << " kg grip " << grip << " N/m, " << 1e3f * transport
                                           << " ms");
-          // A separate contact for each tap: half a millijoule each.
-          EXPECT_LE(b.to_hand_most, std::string(g.name) == "tap 5 Hz" ? 5e-3 : 1e-3);
-          EXPECT_LE(moved, 0.4e-3f);
+          EXPECT_LE(b.to_hand_most, 0.5e-3);
           EXPECT_LE(b.step_most, 0.5f + 1e-4f);
-          energy = std::max(energy, b.energy_most), hand = std::max(hand, b.to_hand_most), swing = std::max(swing, moved);
+          if (moved > 0.2e-3f) {
+            Bench alone;
+            alone.mass = mass, alone.grip = grip, alone.coulomb = 0.01f, alone.options.force = false;
+            const float own = run_gesture(alone, g);
+            std::printf("H3: %s, %.1f kg, %.0f N/m: %.3f mm, without force %.3f mm\n", g.name, double{mass}, double{grip},
+                        1e3 * double{moved}, 1e3 * double{own});
+            EXPECT_LE(moved, own);
+          } else {
+            swing = std::max(swing, moved);
+          }
+          energy = std::max(energy, b.energy_most), hand = std::max(hand, b.to_hand_most);
           step = std::max(step, b.step_most), gap = std::max(gap, b.gap_most);
         }
     std::printf(
-        "H3: unkind arms, %.0f ms late: energy of the motors %.3f mJ, to the hand %.3f mJ, swing %.3f mm, step %.3f N, longest "
-        "gap %.1f ms\n",
+        "H3: unkind arms, %.0f ms late: energy of the motors %.3f mJ, to the hand %.3f mJ, other swing %.3f mm, step %.3f N, "
+        "longest gap %.1f ms\n",
         1e3 * double{transport}, 1e3 * energy, 1e3 * hand, 1e3 * double{swing}, double{step}, 1e3 * double{gap});
   }
 }
@@ -204,7 +220,7 @@ TEST(Haptics, H3_two_hands_on_one_thread) {
         both(2.4f);
         for (size_t k = 0; k < 2; ++k) {
           b[k].path = [p = path[k], from = b[k].time](float t) { return p(t - from); };
-          b[k].energy = b[k].energy_most = 0, b[k].step_most = 0;
+          b[k].energy = b[k].energy_most = b[k].to_hand = b[k].to_hand_most = 0, b[k].step_most = 0;
         }
         int braked = 0;
         double given = 0;
@@ -216,8 +232,10 @@ TEST(Haptics, H3_two_hands_on_one_thread) {
           low = {std::min(low.x, b[0].x.x), std::min(low.y, b[0].x.y), std::min(low.z, b[0].x.z)};
           high = {std::max(high.x, b[0].x.x), std::max(high.y, b[0].x.y), std::max(high.z, b[0].x.z)};
         }
-        EXPECT_LE(given, 2e-3);
-        EXPECT_LE(length(high - low), 0.4e-3f);
+        // 0.5 mJ to each hand as for one hand alone; at the rate of the physics under arms, less for both together.
+        for (const Bench& one : b) { EXPECT_LE(one.to_hand_most, 0.5e-3); }
+        if (rate > 900) { EXPECT_LE(given, 0.2e-3); }
+        EXPECT_LE(length(high - low), 0.2e-3f);
         for (const Bench& one : b) { EXPECT_LE(one.step_most, 0.5f + 1e-4f); }
         worst = std::max(worst, given), swing = std::max(swing, length(high - low));
         braked_most = std::max(braked_most, braked);
@@ -254,14 +272,14 @@ TEST(Haptics, H3_over_a_network) {
             }
             SCOPED_TRACE(testing::Message() << g.name << " mass " << mass << " kg grip " << grip << " N/m, " << 1e3f * link
                                             << " ms each way" << (rough ? ", rough" : ""));
-            EXPECT_LE(b.energy_most, 2e-3);
+            EXPECT_LE(b.energy_most, 0.5e-3);
             EXPECT_LE(b.step_most, 0.5f + 1e-4f);
             energy = std::max(energy, b.energy_most), force = std::max(force, b.force_most), step = std::max(step, b.step_most);
             if (high.x >= low.x) swing = std::max(swing, length(high - low));
           }
       std::printf("H3: network %2.0f ms each way%s: energy %.3f mJ, swing %.3f mm, force %.2f N, step %.3f N\n",
-                  1e3 * double{link}, rough ? ", 20 %% spread, 10 %% lost" : "", 1e3 * energy, 1e3 * double{swing},
-                  double{force}, double{step});
+                  1e3 * double{link}, rough ? ", 20 % spread, 10 % lost" : "", 1e3 * energy, 1e3 * double{swing}, double{force},
+                  double{step});
     }
 }
 
@@ -291,54 +309,56 @@ TEST(Haptics, the_multi_rate_comparison) {
 // H5: physics stalls while the hand presses with 2 N. The force only decreases, is below 0.05 N within 100 ms
 // of expiry, never steps, and returns through the ramp.
 TEST(Haptics, H5_physics_stalls) {
-  for (const float stall : {0.05f, 0.2f, 2.0f}) {
-    SCOPED_TRACE(testing::Message() << "stalled for " << stall << " s");
-    Bench b;
-    b.tissue.held = true;
-    b.options.limiter.continuous = 3.3f;  // two newtons for seconds would correctly be reduced: not the subject here
-    b.path = [](float t) { return Vec3{0, 0.018f * smooth(t / 0.8f), 0}; };
-    b.warm_up({});
-    b.grip = 400;
-    b.run(1.2f);
-    const float before = length(b.force);
-    ASSERT_GT(before, 1.6f);
-    const float start = b.time;
-    b.physics_works = [start, stall](float t) { return t < start || t > start + stall; };
-    b.step_most = 0;
-    float last = before, below_at = -1, expired_at = -1, highest_after = 0;
-    for (int i = 0; i < 6000; ++i) {
-      b.run(0.001f);
-      const float f = length(b.force), since = b.time - start;
-      const float age = 1e-9f * static_cast<float>(b.now_ns - b.servo.model.now.time_ns);
-      if (expired_at < 0 && age > b.servo.model.now.expiry) expired_at = since;
-      // While it is off the ramp is the only way up; the force in it never exceeds its fraction.
-      if (expired_at >= 0 && since < stall) { EXPECT_LE(f, last + 1e-4f) << "at " << since; }
-      if (expired_at >= 0 && below_at < 0 && f < 0.05f) below_at = since - expired_at;
-      if (since > stall + 0.04f) highest_after = std::max(highest_after, f);
-      last = f;
+  for (const bool unkind : {false, true})
+    for (const float stall : {0.05f, 0.2f, 2.0f}) {
+      SCOPED_TRACE(testing::Message() << "stalled for " << stall << " s" << (unkind ? ", unkind arm" : ""));
+      Bench b;
+      if (unkind) b.unkind = touch_like();
+      b.tissue.held = true;
+      b.options.limiter.continuous = 3.3f;  // two newtons for seconds would rightly be turned down: not what is asked here
+      b.path = [](float t) { return Vec3{0, 0.018f * smooth(t / 0.8f), 0}; };
+      b.warm_up({});
+      b.grip = 400;
+      b.run(1.2f);
+      const float before = length(b.force);
+      ASSERT_GT(before, 1.6f);
+      const float start = b.time;
+      b.physics_works = [start, stall](float t) { return t < start || t > start + stall; };
+      b.step_most = 0;
+      float last = before, below_at = -1, expired_at = -1, highest_after = 0;
+      for (int i = 0; i < 6000; ++i) {
+        b.run(0.001f);
+        const float f = length(b.force), since = b.time - start;
+        const float age = 1e-9f * static_cast<float>(b.now_ns - b.servo.model.now.time_ns);
+        if (expired_at < 0 && age > b.servo.model.now.expiry) expired_at = since;
+        // While it is off there is no way up but by the ramp; the force in it is never more than its part.
+        if (expired_at >= 0 && since < stall) { EXPECT_LE(f, last + 1e-4f) << "at " << since; }
+        if (expired_at >= 0 && below_at < 0 && f < 0.05f) below_at = since - expired_at;
+        if (since > stall + 0.04f) highest_after = std::max(highest_after, f);
+        last = f;
+      }
+      EXPECT_LE(b.step_most, 0.5f + 1e-4f);
+      if (stall > 0.15f) {
+        EXPECT_GE(below_at, 0);
+        EXPECT_LE(below_at, 0.1f);
+        // The hand still pulls: nothing engages until it has let go, however long the physics has been back.
+        EXPECT_LT(highest_after, 0.05f);
+        std::printf("H5: stall %.2f s: below 0.05 N %.0f ms after expiry, largest step %.3f N/ms\n", double{stall},
+                    double{below_at} * 1e3, double{b.step_most});
+        // Let go, then pull again: the ramp takes two seconds.
+        b.path = [](float) { return Vec3{}; };
+        b.run(0.5f);
+        EXPECT_TRUE(b.servo.limiter.engaged == Engaged::rising);
+        const float pull_from = b.time;
+        b.path = [pull_from](float t) { return Vec3{0, 0.018f * smooth((t - pull_from) / 0.3f), 0}; };
+        b.run(0.4f);
+        EXPECT_LT(length(b.force), 0.5f * before);
+        b.run(2.0f);
+        EXPECT_NEAR(length(b.force), before, 0.1f * before);
+      } else {
+        EXPECT_NEAR(last, before, 0.1f * before) << "a short stall ends by itself";
+      }
     }
-    EXPECT_LE(b.step_most, 0.5f + 1e-4f);
-    if (stall > 0.15f) {
-      EXPECT_GE(below_at, 0);
-      EXPECT_LE(below_at, 0.1f);
-      // The hand still pulls: nothing engages until it releases, for any time after the physics has returned.
-      EXPECT_LT(highest_after, 0.05f);
-      std::printf("H5: stall %.2f s: below 0.05 N %.0f ms after expiry, largest step %.3f N/ms\n", double{stall},
-                  double{below_at} * 1e3, double{b.step_most});
-      // Release, then pull again: the ramp takes two seconds.
-      b.path = [](float) { return Vec3{}; };
-      b.run(0.5f);
-      EXPECT_TRUE(b.servo.limiter.engaged == Engaged::rising);
-      const float pull_from = b.time;
-      b.path = [pull_from](float t) { return Vec3{0, 0.018f * smooth((t - pull_from) / 0.3f), 0}; };
-      b.run(0.4f);
-      EXPECT_LT(length(b.force), 0.5f * before);
-      b.run(2.0f);
-      EXPECT_NEAR(length(b.force), before, 0.1f * before);
-    } else {
-      EXPECT_NEAR(last, before, 0.1f * before) << "a short stall ends by itself";
-    }
-  }
 }
 
 // H6: for any input of simulation, device or clock, the output is finite and within the cap, and the fault is reported once.
@@ -364,9 +384,11 @@ TEST(Haptics, H6_garbage) {
       {kTimeBack, [](ForcePatch& p) { p.time_ns += 1000000000; }},
       {0, [](ForcePatch& p) { p.cap = 1e9f; }},
   };
-  for (size_t k = 0; k < bad.size(); ++k) {
+  for (size_t k = 0; k < 2 * bad.size(); ++k) {
     SCOPED_TRACE(k);
     Bench b;
+    if (k >= bad.size()) b.unkind = touch_like(), b.unkind.late = 0.02f;
+    const auto& [fault, spoil] = bad[k % bad.size()];
     b.path = [](float t) { return Vec3{0, 0.005f - 0.012f * smooth(t / 0.4f), 0}; };
     b.warm_up({0, 0.005f, 0});
     b.run(0.6f);
@@ -374,7 +396,7 @@ TEST(Haptics, H6_garbage) {
     b.step_most = b.force_most = 0;
     int n = 0;
     b.spoil = [&](ForcePatch& p) {
-      if (++n % 3 == 0) bad[k].second(p);
+      if (++n % 3 == 0) spoil(p);
     };
     for (int i = 0; i < 1000; ++i) {
       b.run(0.001f);
@@ -382,7 +404,8 @@ TEST(Haptics, H6_garbage) {
       ASSERT_LE(length(b.force), 3.3f + 1e-4f);
     }
     EXPECT_LE(b.step_most, 0.5f + 1e-4f);
-    EXPECT_EQ(b.servo.limiter.faults & bad[k].first, bad[k].first);
+    EXPECT_EQ(b.servo.limiter.faults & fault, fault);
+    if (k >= bad.size()) { EXPECT_TRUE(b.servo.limiter.faults & kLate); }
   }
   // The device: invalid positions, clocks that run backward, implausible speeds.
   ServoHand hand;
@@ -785,28 +808,70 @@ TEST(Haptics, H8_heat) {
 // H4, the puncture: the force drops at most 8 ms after the puncture in the physics,
 // although the physics is a frame late. The servo knows the puncture force, and does not wait.
 TEST(Haptics, H4_puncture_drop) {
-  for (const float rate : {60.0f, 240.0f, 480.0f, 960.0f}) {
-    SCOPED_TRACE(rate);
-    Bench b;
-    b.rate = rate;
-    b.tissue.pierce_force = 0.9f;
-    b.path = [](float t) { return Vec3{0, 0.004f - 0.03f * t, 0}; };
-    b.warm_up({0, 0.004f, 0});
-    float peak = 0;
-    int through = -1, dropped = -1;  // [ms]
-    for (int ms = 0; ms < 600 && (dropped < 0 || through < 0); ++ms) {
-      b.run(0.001f);
-      peak = std::max(peak, length(b.force));
-      if (through < 0 && b.pierced) through = ms;
-      if (dropped < 0 && peak > 0.7f && length(b.force) < 0.5f * peak) dropped = ms;
+  for (const bool unkind : {false, true})
+    for (const float rate : {60.0f, 240.0f, 480.0f, 960.0f}) {
+      SCOPED_TRACE(testing::Message() << rate << " Hz" << (unkind ? ", unkind arm" : ""));
+      Bench b;
+      b.rate = rate;
+      if (unkind) b.unkind = touch_like();
+      b.tissue.pierce_force = 0.9f;
+      b.path = [](float t) { return Vec3{0, 0.004f - 0.03f * t, 0}; };
+      b.warm_up({0, 0.004f, 0});
+      float peak = 0;
+      int through = -1, dropped = -1;  // [ms]
+      for (int ms = 0; ms < 600 && (dropped < 0 || through < 0); ++ms) {
+        b.run(0.001f);
+        peak = std::max(peak, length(b.force));
+        if (through < 0 && b.pierced) through = ms;
+        if (dropped < 0 && peak > 0.7f && length(b.force) < 0.5f * peak) dropped = ms;
+      }
+      std::printf("H4: %3.0f Hz%s: peak %.2f N, half of it %+d ms after the physics let the tip in\n", double{rate},
+                  unkind ? ", unkind arm" : "", double{peak}, dropped - through);
+      ASSERT_GE(through, 0);
+      ASSERT_GE(dropped, 0);
+      EXPECT_LE(dropped - through, 8);
+      EXPECT_GT(dropped - through, -20) << "no sooner than the wall would give way";
+      EXPECT_GT(peak, 0.75f);
     }
-    std::printf("H4: %3.0f Hz: peak %.2f N, half of it %+d ms after the physics let the tip in\n", double{rate}, double{peak},
-                dropped - through);
-    ASSERT_GE(through, 0);
-    ASSERT_GE(dropped, 0);
-    EXPECT_LE(dropped - through, 8);
-    EXPECT_GT(dropped - through, -20) << "no sooner than the wall would give way";
-    EXPECT_GT(peak, 0.75f);
+}
+
+// H4, transparency: up to 30 Hz a hand that moves by a millimeter feels wall, needle and thread at the same instant within 0.1
+// N RMS; up to 8 Hz the impedance of wall and thread is right within 5 %, at 60 Hz as at 960 Hz. A needle's friction is as
+// stiff as an arm of 400 N/m can render of 500 N/m.
+TEST(Haptics, H4_transparency) {
+  for (const Environment e : {Environment::wall, Environment::needle, Environment::thread})
+    for (const float rate : {60.0f, 960.0f}) {
+      SweepCase c;
+      c.environment = e, c.rate = rate;
+      for (const SweepPoint& p : sweep(c, {0.5f, 1, 2, 4, 8, 15, 30})) {
+        SCOPED_TRACE(testing::Message() << environment_name(e) << " " << rate << " Hz at " << p.hz << " Hz");
+        EXPECT_GT(p.rms, 0.1f);
+        EXPECT_LE(p.rms_error, 0.1f);
+        const float right = e == Environment::needle ? 0.8f : 1.0f;
+        if (p.hz <= 8) { EXPECT_NEAR(p.gain, right, 0.05f); }
+        EXPECT_LT(std::abs(p.phase), 0.3f);
+      }
+    }
+}
+
+// The patch alone ends where theory says that a delayed spring and damper do: K = (b + B) / (T/2 + t) (Gil et al. 2009), b the
+// arm's own damping. The whole chain goes beyond it, and at 60 Hz far beyond a virtual coupling.
+TEST(Haptics, z_width) {
+  for (const float delay : {0.001f, 0.002f, 0.004f}) {
+    WallCase c;
+    c.rate = 60, c.delay = delay, c.damping = 1;
+    c.method = WallMethod::patch;
+    const float patch = z_width(c, 50, 2000), theory = (0.5f + 1) / (0.0005f + delay);
+    c.method = WallMethod::chain;
+    const float chain = z_width(c, 50, 2000);
+    c.method = WallMethod::coupling;
+    const float coupling = z_width(c, 50, 2000);
+    std::printf("Z-width, 60 Hz, %.0f ms late, 1 N s/m: virtual coupling %.0f, patch %.0f (theory %.0f), chain %.0f N/m\n",
+                1e3 * double{delay}, double{coupling}, double{patch}, double{theory}, double{chain});
+    EXPECT_NEAR(patch, theory, 0.2f * theory);
+    EXPECT_GT(chain, patch);
+    EXPECT_GT(chain, 3 * coupling);
+    EXPECT_GE(chain, 400) << "what a Touch renders";
   }
 }
 

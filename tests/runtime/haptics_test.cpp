@@ -43,7 +43,11 @@ bool long_run() {
 
 SceneSpec scene_named(const char* name) { return read_scene(std::string(CATGUT_SOURCE_DIR) + "/scenes/" + name + ".toml"); }
 
-uint64_t lock_step_ns = 1000000000;
+unsigned long (*lock_step_now)() = nullptr;  // [ns] of the simulated arms
+
+// A Touch on a busy computer: position in steps, 2 ms to the motors, periods that vary, calls that are late or lost, and motors
+// that warm.
+constexpr FakeHdUnkind kUnkind{0.055, 2, 0.05, 0.002, 0.002, 1, 1};
 
 // A scene, two simulated arms and their hands, a millisecond at a time.
 struct LockStep {
@@ -59,7 +63,9 @@ struct LockStep {
   bool physics_works = true;
   std::array<float, 2> low{1e9f, 1e9f}, high{-1e9f, -1e9f};  // [m] along x, of the hands
 
-  explicit LockStep(const char* name, const std::string& log = "") : scene(scene_named(name)) {
+  explicit LockStep(const char* name, const FakeHdUnkind& unkind = {}, const std::string& log = "") : scene(scene_named(name)) {
+    fake.unkind(&unkind);
+    lock_step_now = fake.now;
     prepare_for_arms(scene);
     model = build_model(scene);
     state = initial_state(*model);
@@ -69,16 +75,16 @@ struct LockStep {
     catgut::publish(*model, *state, seen);
     std::vector<std::string> messages;
     HapticsOptions o;
-    o.clock = [] { return lock_step_ns; };
+    o.clock = [] { return uint64_t{lock_step_now()}; };
     o.ratchet = false;
     o.log = log;
     haptics = std::make_unique<Haptics>(open_touch({}, messages), picture_model(*model), o);
     EXPECT_TRUE(messages.empty());
   }
-  // Position of the hand, on its device, that puts its tool at `world`.
-  void wish(size_t k, const Pose& world, float jaw) {
+  // Where the hand must be, on its arm, for its tool to be at `world`.
+  void wish(size_t k, const Pose& world, float jaw, bool second_button = false) {
     const Pose arm = to_arm(haptics->servo(k).place, world);
-    fake.wish(static_cast<int>(k), arm.p, arm.q, jaw < 0.5f ? 1 : 0);
+    fake.wish(static_cast<int>(k), arm.p, arm.q, (jaw < 0.5f ? 1 : 0) | (second_button ? 2 : 0));
   }
   void put(size_t k, const Pose& world) { fake.put(static_cast<int>(k), to_arm(haptics->servo(k).place, world).p); }
   // One tick of physics and the milliseconds of the devices in it. each: after every millisecond.
@@ -86,7 +92,6 @@ struct LockStep {
   void tick(const F& each) {
     ms_owed += 1000 / double{scene.solver.tick_rate};
     for (; ms_owed >= 1; --ms_owed) {
-      lock_step_ns += 1000000;
       fake.step(1);
       each();
     }
@@ -97,6 +102,7 @@ struct LockStep {
       input.hand[k].connected = now.connected;
       if (now.connected) input.hand[k] = hand_toward(input.hand[k], now, 1.0f, 200, 1 / scene.solver.tick_rate);
       input.hand[k].jaw = now.jaw;
+      input.hand[k].buttons = now.buttons;
     }
     step(*model, *state, input, jobs);
     catgut::publish(*model, *state, seen);
@@ -133,92 +139,96 @@ void approach(LockStep& s) {
 // H3 on the Lembert scene: pressed, held and released by hands of every grip, the wall generates no more than the allowed
 // energy, and a hand that tries to hold still does.
 TEST(Haptics, H3_on_the_lembert_scene) {
-  for (const double grip : {0.05, 0.15, 0.8}) {
-    SCOPED_TRACE(grip);
-    LockStep s("lembert");
-    for (int k = 0; k < 2; ++k) s.fake.grip(k, grip, 0.002, k == 0 ? 0.05 : 0.3, 0.0);
-    approach(s);
-    for (int i = 0; i <= 20; ++i) press(s, 0.012f * static_cast<float>(i) / 20), s.run(0.03f);
-    s.run(1.2f);
-    std::array<float, 2> low{1e9f, 1e9f}, high{-1e9f, -1e9f};
-    float force = 0;
-    s.run(0.6f, [&] {
+  for (const bool unkind : {false, true})
+    for (const double grip : {0.05, 0.15, 0.8}) {
+      SCOPED_TRACE(testing::Message() << grip << " N/mm, " << (unkind ? "unkind arms" : "ideal arms"));
+      LockStep s("lembert", unkind ? kUnkind : FakeHdUnkind{});
+      for (int k = 0; k < 2; ++k) s.fake.grip(k, grip, 0.002, k == 0 ? 0.05 : 0.3, 0.0);
+      approach(s);
+      for (int i = 0; i <= 20; ++i) press(s, 0.012f * static_cast<float>(i) / 20), s.run(0.03f);
+      s.run(1.2f);
+      std::array<float, 2> low{1e9f, 1e9f}, high{-1e9f, -1e9f};
+      float force = 0;
+      s.run(0.6f, [&] {
+        for (int k = 0; k < 2; ++k) {
+          const float x = s.fake.position(k).x;
+          low[static_cast<size_t>(k)] = std::min(low[static_cast<size_t>(k)], x);
+          high[static_cast<size_t>(k)] = std::max(high[static_cast<size_t>(k)], x);
+          force = std::max(force, length(s.fake.force(k)));
+        }
+      });
+      for (int i = 20; i >= 0; --i) press(s, 0.012f * static_cast<float>(i) / 20), s.run(0.03f);
+      s.run(0.5f);
+      EXPECT_GT(force, 0.1f);
       for (int k = 0; k < 2; ++k) {
-        const float x = s.fake.position(k).x;
-        low[static_cast<size_t>(k)] = std::min(low[static_cast<size_t>(k)], x);
-        high[static_cast<size_t>(k)] = std::max(high[static_cast<size_t>(k)], x);
-        force = std::max(force, length(s.fake.force(k)));
+        const FakeHdArm a = s.fake.at(k);
+        std::printf(
+            "H3: Lembert, %s, grip %.0f N/m, %s hand: energy %.3f mJ at most, swing %.3f mm, step %.3f N/ms, force %.2f N\n",
+            unkind ? "unkind" : "ideal", 1e3 * grip, k == 0 ? "right (50 g)" : "left (300 g)", 1e3 * a.to_hand_most,
+            1e3 * double{high[static_cast<size_t>(k)] - low[static_cast<size_t>(k)]}, a.step_most, a.force_most);
+        EXPECT_LE(a.to_hand_most,
+                  0.5e-3 + 2 * 0.16e-3);  // the reference of criterion H3, as this scene has none of its own at 1 kHz
+        EXPECT_LE(high[static_cast<size_t>(k)] - low[static_cast<size_t>(k)], 0.2e-3f);
+        EXPECT_LE(a.step_most, 0.5 + 1e-4);
       }
-    });
-    for (int i = 20; i >= 0; --i) press(s, 0.012f * static_cast<float>(i) / 20), s.run(0.03f);
-    s.run(0.5f);
-    EXPECT_GT(force, 0.1f);
-    for (int k = 0; k < 2; ++k) {
-      const FakeHdArm a = s.fake.at(k);
-      std::printf("H3: Lembert, grip %.0f N/m, %s hand: energy %.3f mJ at most, swing %.3f mm, step %.3f N/ms, force %.2f N\n",
-                  1e3 * grip, k == 0 ? "right (50 g)" : "left (300 g)", 1e3 * a.energy_most,
-                  1e3 * double{high[static_cast<size_t>(k)] - low[static_cast<size_t>(k)]}, a.step_most, a.force_most);
-      EXPECT_LE(a.energy_most,
-                0.5e-3 + 2 * 0.16e-3);  // the reference of criterion H3, as this scene has no 1 kHz reference of its own
-      EXPECT_LE(high[static_cast<size_t>(k)] - low[static_cast<size_t>(k)], 0.2e-3f);
-      EXPECT_LE(a.step_most, 0.5 + 1e-4);
     }
-  }
 }
 
 // One tool against the other: each hand feels the other one, through two springs and a tick of delay. They feel equal
 // forces, within H3's bounds for every grip, that are zero when they part.
 TEST(Haptics, H3_tool_on_tool) {
-  for (const double grip : {0.05, 0.15, 0.8}) {
-    SCOPED_TRACE(grip);
-    LockStep s("lembert");
-    for (int k = 0; k < 2; ++k) s.fake.grip(k, grip, 0.002, k == 0 ? 0.05 : 0.3, 0.0);
-    const Vec3 over = s.scene.body[0].position + Vec3{0, 0.04f, 0};
-    const Quat level = axis_angle({0, 1, 0}, 0.5f * kPi);
-    // The left shaft lies along x, the right one stands beside it; in: overlap of the hands' targets.
-    const auto meet = [&](float in) {
-      s.wish(0, {over + Vec3{0, 0, 0.008f - 0.5f * in}, kDown}, 1);
-      s.wish(1, {over + Vec3{-0.03f, 0.03f, 0.5f * in}, level}, 1);
-    };
-    s.put(0, {over + Vec3{0, 0, 0.008f}, kDown});
-    s.put(1, {over + Vec3{-0.03f, 0.03f, 0}, level});
-    meet(0);
-    s.run(2.4f);  // engage
-    for (int k = 0; k < 2; ++k) s.fake.zero(k);
-    EXPECT_LT(length(s.fake.force(0)), 0.01f);
-    const float deep = grip < 0.1 ? 0.03f : 0.013f;
-    for (int i = 0; i <= 20; ++i) meet(deep * static_cast<float>(i) / 20), s.run(0.03f);
-    s.run(1.2f);
-    std::array<Vec3, 2> low, high, force{};
-    low.fill({1e9f, 1e9f, 1e9f}), high.fill({-1e9f, -1e9f, -1e9f});
-    int n = 0;
-    s.run(0.6f, [&] {
+  for (const bool unkind : {false, true})
+    for (const double grip : {0.05, 0.15, 0.8}) {
+      SCOPED_TRACE(testing::Message() << grip << " N/mm, " << (unkind ? "unkind arms" : "ideal arms"));
+      LockStep s("lembert", unkind ? kUnkind : FakeHdUnkind{});
+      for (int k = 0; k < 2; ++k) s.fake.grip(k, grip, 0.002, k == 0 ? 0.05 : 0.3, 0.0);
+      const Vec3 over = s.scene.body[0].position + Vec3{0, 0.04f, 0};
+      const Quat level = axis_angle({0, 1, 0}, 0.5f * kPi);
+      // The left shaft lies along x, the right one stands beside it; in: how far the hands mean to be in each other.
+      const auto meet = [&](float in) {
+        s.wish(0, {over + Vec3{0, 0, 0.008f - 0.5f * in}, kDown}, 1);
+        s.wish(1, {over + Vec3{-0.03f, 0.03f, 0.5f * in}, level}, 1);
+      };
+      s.put(0, {over + Vec3{0, 0, 0.008f}, kDown});
+      s.put(1, {over + Vec3{-0.03f, 0.03f, 0}, level});
+      meet(0);
+      s.run(2.4f);  // engage
+      for (int k = 0; k < 2; ++k) s.fake.zero(k);
+      EXPECT_LT(length(s.fake.force(0)), 0.01f);
+      const float deep = grip < 0.1 ? 0.03f : 0.013f;
+      for (int i = 0; i <= 20; ++i) meet(deep * static_cast<float>(i) / 20), s.run(0.03f);
+      s.run(1.2f);
+      std::array<Vec3, 2> low, high, force{};
+      low.fill({1e9f, 1e9f, 1e9f}), high.fill({-1e9f, -1e9f, -1e9f});
+      int n = 0;
+      s.run(0.6f, [&] {
+        for (size_t k = 0; k < 2; ++k) {
+          const Vec3 p = s.fake.position(static_cast<int>(k));
+          low[k] = {std::min(low[k].x, p.x), std::min(low[k].y, p.y), std::min(low[k].z, p.z)};
+          high[k] = {std::max(high[k].x, p.x), std::max(high[k].y, p.y), std::max(high[k].z, p.z)};
+          force[k] += s.fake.force(static_cast<int>(k));
+        }
+        ++n;
+      });
+      const float right = length(force[0]) / static_cast<float>(n), left = length(force[1]) / static_cast<float>(n);
+      EXPECT_GT(right, 0.2f);
+      EXPECT_NEAR(left, right, 0.1f * right);
+      EXPECT_GT(s.seen.patch[0].normal.z, 0.9f);
+      EXPECT_LT(s.seen.patch[1].normal.z, -0.9f);
+      for (int i = 20; i >= 0; --i) meet(deep * static_cast<float>(i) / 20), s.run(0.03f);
+      s.run(0.5f);
       for (size_t k = 0; k < 2; ++k) {
-        const Vec3 p = s.fake.position(static_cast<int>(k));
-        low[k] = {std::min(low[k].x, p.x), std::min(low[k].y, p.y), std::min(low[k].z, p.z)};
-        high[k] = {std::max(high[k].x, p.x), std::max(high[k].y, p.y), std::max(high[k].z, p.z)};
-        force[k] += s.fake.force(static_cast<int>(k));
+        const FakeHdArm a = s.fake.at(static_cast<int>(k));
+        std::printf(
+            "H3: tool on tool, %s, grip %.0f N/m, %s hand: %.2f N, energy %.3f mJ at most, swing %.3f mm, step %.3f N/ms\n",
+            unkind ? "unkind" : "ideal", 1e3 * grip, k == 0 ? "right (50 g)" : "left (300 g)", double{k == 0 ? right : left},
+            1e3 * a.to_hand_most, 1e3 * double{length(high[k] - low[k])}, a.step_most);
+        EXPECT_LE(a.to_hand_most, 0.5e-3 + 2 * 0.16e-3);
+        EXPECT_LE(length(high[k] - low[k]), 0.2e-3f);
+        EXPECT_LE(a.step_most, 0.5 + 1e-4);
+        EXPECT_LT(length(s.fake.force(static_cast<int>(k))), 0.01f);
       }
-      ++n;
-    });
-    const float right = length(force[0]) / static_cast<float>(n), left = length(force[1]) / static_cast<float>(n);
-    EXPECT_GT(right, 0.2f);
-    EXPECT_NEAR(left, right, 0.1f * right);
-    EXPECT_GT(s.seen.patch[0].normal.z, 0.9f);
-    EXPECT_LT(s.seen.patch[1].normal.z, -0.9f);
-    for (int i = 20; i >= 0; --i) meet(deep * static_cast<float>(i) / 20), s.run(0.03f);
-    s.run(0.5f);
-    for (size_t k = 0; k < 2; ++k) {
-      const FakeHdArm a = s.fake.at(static_cast<int>(k));
-      std::printf("H3: tool on tool, grip %.0f N/m, %s hand: %.2f N, energy %.3f mJ at most, swing %.3f mm, step %.3f N/ms\n",
-                  1e3 * grip, k == 0 ? "right (50 g)" : "left (300 g)", double{k == 0 ? right : left}, 1e3 * a.energy_most,
-                  1e3 * double{length(high[k] - low[k])}, a.step_most);
-      EXPECT_LE(a.energy_most, 0.5e-3 + 2 * 0.16e-3);
-      EXPECT_LE(length(high[k] - low[k]), 0.2e-3f);
-      EXPECT_LE(a.step_most, 0.5 + 1e-4);
-      EXPECT_LT(length(s.fake.force(static_cast<int>(k))), 0.01f);
     }
-  }
 }
 
 // H5 and H7 on the Lembert scene: the physics stops under pressing hands; later one device stops. Force is zero within
@@ -270,54 +280,80 @@ TEST(Haptics, killing_physics_or_an_arm) {
   EXPECT_TRUE(s.haptics->news().empty()) << "once";
 }
 
-// Soak: hands press and release the Lembert scene on both devices while a fault is injected every few seconds, at random. No
-// step beyond the slew, nothing over the cap, and each fault that cuts the force leaves none within 100 ms. Some seconds in
-// every build; CATGUT_SOAK=3600: an hour of the devices' time.
+// Soak: both hands press the wall of the Lembert scene and each other's tool, on unkind arms, while a fault is injected every
+// few seconds, at random. No step beyond the slew, nothing over the cap, and each fault that cuts the force leaves none within
+// 100 ms. Some seconds in every build; CATGUT_SOAK=3600: an hour of the arms' time.
 TEST(Haptics, soak_with_faults) {
   const char* set = std::getenv("CATGUT_SOAK");
   const float seconds = set ? std::strtof(set, nullptr) : 8;
-  LockStep s("lembert");
+  LockStep s("lembert", kUnkind);
   for (int k = 0; k < 2; ++k) s.fake.grip(k, 0.2, 0.002, 0.1, 0.01);
+  const Vec3 rim = s.scene.body[0].position, over = rim + Vec3{0, 0.04f, 0};
+  const float r = s.scene.body[0].radius;
+  const Quat level = axis_angle({0, 1, 0}, 0.5f * kPi);
+  // Pressing the wall from both sides by `depth`, or the right tool against the left one's shaft above it.
+  const auto wish = [&](bool tools, float depth) {
+    if (tools) {
+      s.wish(0, {over + Vec3{0, 0, 0.008f - 1.5f * depth}, kDown}, 1);
+      s.wish(1, {over + Vec3{-0.03f, 0.03f, 1.5f * depth}, level}, 1);
+    } else {
+      s.wish(0, {rim + Vec3{r + 0.006f - depth, -0.006f, 0}, kDown}, 1);
+      s.wish(1, {rim + Vec3{-r - 0.006f + depth, -0.006f, 0}, kDown}, 1);
+    }
+  };
   approach(s);
   Random random(set ? 29 : 7);
-  std::array<uint64_t, 9> injected{};
+  constexpr const char* kKinds[] = {"line broken",
+                                    "warm motors",
+                                    "too fast",
+                                    "NaN",
+                                    "scheduler stalls",
+                                    "physics stalls",
+                                    "error in the other arm's frame",
+                                    "a row of errors",
+                                    "frame blocks",
+                                    "errors at any call"};
+  std::array<uint64_t, std::size(kKinds)> injected{};
   double most = 0, step = 0;
   float left = 0;  // [N] 100 ms after a fault that cuts the force
-  uint64_t ms = 0, felt = 0;
+  uint64_t ms = 0, felt = 0, strong = 0;
   const auto each = [&] {
     ++ms;
-    for (int k = 0; k < 2; ++k) felt += length(s.fake.force(k)) > 0.05f;
+    for (int k = 0; k < 2; ++k) {
+      const float f = length(s.fake.force(k));
+      felt += f > 0.05f, strong += f > 0.5f;
+    }
   };
   const auto motion = [&](float for_s) {
     for (int i = 0; i < static_cast<int>(for_s * s.scene.solver.tick_rate); ++i) {
       const float t = 1e-3f * static_cast<float>(ms);
-      // Half of every four seconds the hands touch nothing, so that force can return.
-      press(s, 0.008f * std::max(0.0f, std::sin(2 * kPi * t / 6)));
+      // Half of every period the hands touch nothing, so that force can come back; then the wall and the tools in turn.
+      wish(static_cast<int>(t / 12) % 2 == 1, 0.008f * std::max(0.0f, std::sin(2 * kPi * t / 6)));
       s.tick(each);
     }
   };
-  while (1e-3f * static_cast<float>(ms) < seconds) {
-    motion(1.5f + 4 * random.uniform());
-    const int arm = random.uniform() < 0.5f ? 0 : 1;
-    const int kind = static_cast<int>(8 * random.uniform());
-    ++injected[static_cast<size_t>(kind)];
+  const auto measure = [&] {
     for (int k = 0; k < 2; ++k) {
       const FakeHdArm a = s.fake.at(k);
       most = std::max(most, a.force_most), step = std::max(step, a.step_most);
     }
+  };
+  while (1e-3f * static_cast<float>(ms) < seconds) {
+    motion(1.5f + 4 * random.uniform());
+    const size_t kind = std::min<size_t>(std::size(kKinds) - 1, static_cast<size_t>(std::size(kKinds) * random.uniform()));
+    const int arm = random.uniform() < 0.5f ? 0 : 1;
+    ++injected[kind];
+    measure();
     const int lasts = 120 + static_cast<int>(300 * random.uniform());  // [ms]
     const auto for_ms = [&](int count) { motion(1e-3f * static_cast<float>(count)); };
-    // A cut by the library is a step of its own: measured again after it.
     switch (kind) {
       case 0:
       case 1:
       case 2: {
         const int fault = kind == 0 ? kFakeCommError : kind == 1 ? kFakeWarmMotors : kFakeTooFast;
         s.fake.fault(arm, fault, 1);
-        for_ms(2);
-        s.fake.zero(arm);
-        for_ms(98);
-        left = std::max(left, length(s.fake.force(arm)));
+        for_ms(100);
+        left = std::max(left, length(s.fake.asked(arm)));  // what the driver would write, not what the library cut
         for_ms(lasts);
         s.fake.fault(arm, fault, 0);
         break;
@@ -328,12 +364,11 @@ TEST(Haptics, soak_with_faults) {
         left = std::max(left, length(s.fake.force(arm)));
         s.fake.fault(arm, kFakeNan, 0);
         break;
-      case 4: {  // the whole scheduler stops: nothing can be written meanwhile
+      case 4:  // the whole scheduler stands still: nothing can be written meanwhile
         s.fake.fault(arm, kFakeStall, 1);
         for_ms(8 + lasts % 40);
         s.fake.fault(arm, kFakeStall, 0);
         break;
-      }
       case 5:
         s.physics_works = false;
         for_ms(135);
@@ -344,23 +379,47 @@ TEST(Haptics, soak_with_faults) {
         s.fake.raise(arm, 1 - arm, 0x0203, 1, 20);
         for_ms(100);
         break;
-      default:
+      case 7:
         for (int k = 0; k < 20; ++k) s.fake.raise(arm, arm, 0x0100 + static_cast<unsigned>(k), k % 3, 1);
         for_ms(50);
+        break;
+      case 8:
+        s.fake.block(arm, static_cast<unsigned>(lasts / 10));
+        for_ms(100);
+        break;
+      default:
+        s.fake.storm(0.002);
+        for_ms(lasts);
+        s.fake.storm(0);
     }
   }
-  for (int k = 0; k < 2; ++k) {
-    const FakeHdArm a = s.fake.at(k);
-    most = std::max(most, a.force_most), step = std::max(step, a.step_most);
+  measure();
+  std::printf("soak: %.0f s;", 1e-3 * static_cast<double>(ms));
+  for (size_t k = 0; k < injected.size(); ++k)
+    std::printf("%s %s %llu", k > 0 ? "," : "", kKinds[k], static_cast<unsigned long long>(injected[k]));
+  std::printf(
+      "\nsoak: force above 0.05 N %.0f %% of the time, above 0.5 N %.0f %%; %.2f N at most, step %.3f N, %.3f N left 100 ms "
+      "after a fault\n",
+      50.0 * static_cast<double>(felt) / static_cast<double>(ms), 50.0 * static_cast<double>(strong) / static_cast<double>(ms),
+      most, step, double{left});
+  s.haptics->stop();
+  for (size_t k = 0; k < 2; ++k) {
+    const ServoTimes t = s.haptics->times(k);
+    constexpr std::array<size_t, 9> kEdge{0, 80, 95, 105, 120, 200, 300, 500, 512};  // [10 us]
+    std::printf("soak: %s servo, periods", k == 0 ? "right" : "left");
+    for (size_t e = 0; e + 1 < kEdge.size(); ++e) {
+      uint64_t n = 0;
+      for (size_t i = kEdge[e]; i < std::min(kEdge[e + 1], t.period.size()); ++i) n += t.period[i];
+      std::printf("  %.2f.. ms %llu", 0.01 * static_cast<double>(kEdge[e]), static_cast<unsigned long long>(n));
+    }
+    std::printf("\n");
+    EXPECT_GT(t.steps, ms * 9 / 10 - 1000);
   }
-  std::printf("soak: %.0f s, faults by kind", 1e-3 * static_cast<double>(ms));
-  for (size_t k = 0; k < 8; ++k) std::printf(" %llu", static_cast<unsigned long long>(injected[k]));
-  std::printf("; force felt %.0f %% of the time, %.2f N at most, step %.3f N/ms, %.3f N left 100 ms after a fault\n",
-              50.0 * static_cast<double>(felt) / static_cast<double>(ms), most, step, double{left});
   EXPECT_LE(most, 3.3 + 1e-4);
   EXPECT_LE(step, 0.5 + 1e-4);
   EXPECT_EQ(left, 0);
   EXPECT_GT(felt, ms / 20) << "nothing was felt: it tests nothing";
+  if (set) { EXPECT_GT(strong, ms / 50) << "nothing strong was felt"; }
 }
 
 // The log has every millisecond of both devices.
@@ -368,7 +427,7 @@ TEST(Haptics, the_log_has_every_millisecond) {
   const std::string file = testing::TempDir() + "arms.csv";
   uint64_t steps = 0;
   {
-    LockStep s("lembert", file);
+    LockStep s("lembert", {}, file);
     approach(s);
     press(s, 0.006f);
     s.run(0.5f);
@@ -396,44 +455,83 @@ TEST(Haptics, the_log_has_every_millisecond) {
   EXPECT_GT(most, 0.05) << "the written force";
 }
 
-// The scripted surgeon's hands on the devices: its targets move styluses, the devices' forces push back. A bite in every
-// build, the whole purse-string with CATGUT_LONG=1.
-TEST(Haptics, the_scripted_surgeon_sews_through_the_arms) {
-  LockStep s("purse_string");
+// The scripted surgeon's hands on unkind arms: the surgeon plans, hands move styluses, the arms' forces push back. Ends when
+// the surgeon has finished, at `until` [s], or after that many bites.
+struct Sewn {
+  size_t bites = 0, faults = 0, throws = 0;
+  bool done = false;
+  std::string doing;
+};
+Sewn sew_through_the_arms(const char* scene, unsigned seed, float until, size_t bites) {
+  FakeHdUnkind unkind = kUnkind;
+  unkind.seed = seed;
+  LockStep s(scene, unkind);
   for (int k = 0; k < 2; ++k) s.fake.grip(k, 0.8, 0.008, 0.12, 0.05);  // a firm hand
   const PictureModel picture = picture_model(*s.model);
   Hands hands = make_hands("scripted", s.scene, picture);
   const float dt = 1 / s.scene.solver.tick_rate;
-  size_t bites = 0, faults = 0;
-  bool first = true;
-  const double until = long_run() ? 240 : 25;
+  // A person who is drawn aside sees it, and corrects within half a second.
+  constexpr float kCorrection = 0.2f, kReach = 0.02f;  // [s], [m]
+  Sewn sewn;
   float most = 0;
+  std::array<Vec3, 2> corrected{};  // [m]
+  std::array<float, 2> cutting{};   // [s]
   HandInputs want = hands.surgeon->operate(s.seen, dt).hand;
   for (size_t k = 0; k < 2; ++k) s.put(k, want[k].pose), s.wish(k, want[k].pose, want[k].jaw);
   s.run(2.4f);
-  while (s.seen.time_s < until && !hands.surgeon->done()) {
+  for (int k = 0; k < 2; ++k) s.fake.zero(k);
+  while (s.seen.time_s < until && !hands.surgeon->done() && sewn.bites < bites) {
     want = hands.surgeon->operate(s.seen, dt).hand;
-    for (size_t k = 0; k < 2; ++k) s.wish(k, want[k].pose, want[k].jaw);
+    for (size_t k = 0; k < 2; ++k) {
+      corrected[k] += (want[k].pose.p - s.seen.tool[k].pose.p) * (dt / kCorrection);
+      if (length(corrected[k]) > kReach) corrected[k] *= kReach / length(corrected[k]);
+      // A cut is two presses of the second button.
+      if ((want[k].buttons & kButtonCut) != 0 || cutting[k] > 0) cutting[k] = cutting[k] < 0.25f ? cutting[k] + dt : 0;
+      s.wish(k, {want[k].pose.p + corrected[k], want[k].pose.q}, want[k].jaw,
+             cutting[k] > 0 && std::fmod(cutting[k], 0.1f) < 0.05f);
+    }
     s.tick([&] {
       for (int k = 0; k < 2; ++k) most = std::max(most, length(s.fake.force(k)));
     });
     for (const Event& e : s.seen.event) {
-      bites += e.kind == EventKind::bite_completed;
-      faults += e.kind == EventKind::technique_fault;
+      sewn.bites += e.kind == EventKind::bite_completed;
+      sewn.faults += e.kind == EventKind::technique_fault;
+      sewn.throws += e.kind == EventKind::throw_locked;
     }
-    if (first && s.seen.time_s > 1) first = false;
-    if (bites > 0 && !long_run()) break;
   }
+  sewn.done = hands.surgeon->done() && !hands.surgeon->gave_up();
+  sewn.doing = hands.surgeon->doing();
+  std::printf("%s through unkind arms, seed %u: %s after %.1f s, %zu bites, %zu throws locked, %zu faults of technique\n",
+              scene, seed, sewn.done ? "done" : sewn.doing.c_str(), double{s.seen.time_s}, sewn.bites, sewn.throws,
+              sewn.faults);
   for (int k = 0; k < 2; ++k) {
     const FakeHdArm a = s.fake.at(k);
-    std::printf("purse-string through the arms: %zu bites, %zu faults, %.1f s; %s arm: force %.2f N, step %.3f N/ms at most\n",
-                bites, faults, s.seen.time_s, k == 0 ? "right" : "left", a.force_most, a.step_most);
+    std::printf("  %s arm: %.2f N at most, step %.3f N, %.3f mJ to the hand, cut off by the driver %u times\n",
+                k == 0 ? "right" : "left", a.force_most, a.step_most, 1e3 * a.to_hand_most, a.cuts);
     EXPECT_LE(a.step_most, 0.5 + 1e-4);
     EXPECT_LE(a.force_most, 3.3 + 1e-4);
+    EXPECT_LE(a.to_hand_most, 2e-3);
+    EXPECT_EQ(a.cuts, 0u) << "the motors were too warm";
   }
   EXPECT_GT(most, 0.05f);
-  EXPECT_GE(bites, long_run() ? 10u : 1u);
-  if (long_run()) { EXPECT_TRUE(hands.surgeon->done() && !hands.surgeon->gave_up()) << hands.surgeon->doing(); }
+  return sewn;
+}
+
+// A bite in every build. With CATGUT_LONG=1 a stay suture with its knot, three times, and a purse-string.
+TEST(Haptics, the_scripted_surgeon_sews_through_the_arms) {
+  if (!long_run()) {
+    EXPECT_GE(sew_through_the_arms("purse_string", 1, 25, 1).bites, 1u);
+    return;
+  }
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    const Sewn stay = sew_through_the_arms("stay", seed, 240, 100);
+    EXPECT_TRUE(stay.done) << stay.doing;
+    EXPECT_GE(stay.bites, 2u);
+    EXPECT_GE(stay.throws, 2u) << "no knot";
+  }
+  const Sewn purse = sew_through_the_arms("purse_string", 1, 300, 1000);
+  EXPECT_TRUE(purse.done) << purse.doing;
+  EXPECT_GE(purse.bites, 10u);
 }
 
 // H2, the part independent of the machine: the servo's millisecond does not allocate. It is called here through a port of

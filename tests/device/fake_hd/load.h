@@ -20,6 +20,10 @@ struct FakeHd {
   decltype(&fakeHdStep) step = nullptr;
   decltype(&fakeHdFault) fault = nullptr;
   decltype(&fakeHdRaise) raise = nullptr;
+  decltype(&fakeHdUnkind) unkind = nullptr;
+  decltype(&fakeHdBlock) block = nullptr;
+  decltype(&fakeHdStorm) storm = nullptr;
+  decltype(&fakeHdNow) now = nullptr;
   decltype(&fakeHdHand) hand = nullptr;
   decltype(&fakeHdGrip) grip = nullptr;
   decltype(&fakeHdPlace) place = nullptr;
@@ -28,13 +32,15 @@ struct FakeHd {
 
   // manual: the test runs the scheduler by step(); else it has a thread of its own.
   explicit FakeHd(bool manual) {
-    for (const char* name : {"FAKE_HD_MISSING", "FAKE_HD_UNCALIBRATED", "FAKE_HD_BUSY", "FAKE_HD_FAULT"}) unsetenv(name);
+    for (const char* name : {"FAKE_HD_MISSING", "FAKE_HD_UNCALIBRATED", "FAKE_HD_BUSY", "FAKE_HD_FAULT", "FAKE_HD_SWAPPED"})
+      unsetenv(name);
     setenv("FAKE_HD_MANUAL", manual ? "1" : "0", 1);
     setenv("CATGUT_LIBHD", CATGUT_FAKE_LIBHD, 1);
     library = dlopen(CATGUT_FAKE_LIBHD, RTLD_NOW | RTLD_LOCAL);
     if (!library) ADD_FAILURE() << dlerror();
     find(reset, "fakeHdReset"), find(step, "fakeHdStep"), find(fault, "fakeHdFault"), find(raise, "fakeHdRaise"),
         find(hand, "fakeHdHand");
+    find(unkind, "fakeHdUnkind"), find(block, "fakeHdBlock"), find(storm, "fakeHdStorm"), find(now, "fakeHdNow");
     find(grip, "fakeHdGrip"), find(place, "fakeHdPlace"), find(read, "fakeHdRead"), find(zero, "fakeHdZero");
     reset();
   }
@@ -51,6 +57,10 @@ struct FakeHd {
   Vec3 force(int arm) const {
     const FakeHdArm a = at(arm);
     return {static_cast<float>(a.force[0]), static_cast<float>(a.force[1]), static_cast<float>(a.force[2])};
+  }
+  Vec3 asked(int arm) const {
+    const FakeHdArm a = at(arm);
+    return {static_cast<float>(a.asked[0]), static_cast<float>(a.asked[1]), static_cast<float>(a.asked[2])};
   }
   // [m]
   Vec3 position(int arm) const {
