@@ -300,6 +300,7 @@ const std::vector<ResultName>& result_names() {
         {"state_valid", "", "1 if the state is finite and within 1 m of the origin, else 0"},
         {"simulated_s", "s", "simulated time including settling"},
         {"ticks", "", "ticks including settling"},
+        {"surgeon_retries", "", "bites, grasps, throws and cuts that the surgeon tried again"},
         {"surgeon_done", "", "1 if the surgeon finished in time and did not give up"},
     };
     for (int k = 0; k < static_cast<int>(EventKind::count_); ++k) {

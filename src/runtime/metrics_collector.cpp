@@ -179,6 +179,7 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   v["state_valid"] = valid_ ? 1 : 0;
   v["simulated_s"] = result.simulated_s;
   v["ticks"] = static_cast<double>(result.ticks);
+  v.try_emplace("surgeon_retries", 0);
   v.try_emplace("surgeon_done", 0);
 
   result.solver_ms = percentiles_of(solver_ms_);

@@ -79,6 +79,7 @@ Json json_of(const RunResult& r) {
                            "thread_length_error_passing",
                            "order_errors",
                            "state_valid",
+                           "surgeon_retries",
                            "surgeon_done"})
     j[name] = number_json(value(r, name));
   j["events"] = r.events.empty() ? Json::object() : Json(r.events);
@@ -209,7 +210,9 @@ std::string run_summary(const RunResult& r, bool judged) {
   else out += fmt::format(", opening {:.1f} %", 100 * value(r, "opening_ratio"));
   out += "\n";
   for (const auto& [name, count] : r.faults) out += fmt::format("  fault: {} ({} x)\n", name, count);
-  out += fmt::format("  end: {}; state {:016x}\n", r.ended, r.state_hash);
+  const double retries = value(r, "surgeon_retries");
+  out += fmt::format("  end: {}{}; state {:016x}\n", r.ended,
+                     retries > 0 ? fmt::format(", {} {}", retries, retries == 1 ? "retry" : "retries") : "", r.state_hash);
   for (const ExpectationResult& e : r.expect)
     out += fmt::format("  {} {} = {:.6g}, expected {}\n",
                        e.ok     ? "ok     "

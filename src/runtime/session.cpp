@@ -148,6 +148,7 @@ RunResult run_session(const SceneSpec& scene, const SessionOptions& options, con
       go_on = one_tick([&](const Snapshot& seen) { return hands.surgeon->operate(seen, dt); }, hands.surgeon->doing());
     else go_on = one_tick([](const Snapshot&) { return nobody(); }, "no hands");
   }
+  if (hands.surgeon) result.value["surgeon_retries"] = hands.surgeon->retries();
   if (hands.surgeon && hands.surgeon->done()) {
     result.value["surgeon_done"] = hands.surgeon->gave_up() ? 0 : 1;
     result.ended = "surgeon: " + hands.surgeon->doing();

@@ -9,8 +9,9 @@
 namespace catgut {
 namespace {
 
-constexpr float kCounterHold = 0.8f;                    // [N]
-constexpr float kSecure = 0.985f;                       // fraction of a closure that counts as closed
+constexpr float kCounterHold = 0.8f;  // [N]
+constexpr float kTighten = 0.15f;     // of the free speed: the thread runs through two dozen holes, and tissue follows it late
+constexpr float kSecure = 0.985f;     // fraction of a closure that counts as closed
 constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f;  // positions on the needle's arc: a third from the swage, behind the tip
 
 }  // namespace
@@ -99,6 +100,7 @@ void Scripted::go(int stage) {
 }
 
 void Scripted::miss(int back_to) {
+  ++retries_;
   if (++misses_ > kAttempts) gave_up_ = true;
   go(back_to);
 }
@@ -226,6 +228,13 @@ bool Scripted::pick_up(const Snapshot& seen) {
   }
 }
 
+int Scripted::passages(const Snapshot& seen, bool complete) const {
+  int count = 0;
+  for (size_t b = bites_before_; b < seen.active().bite.size(); ++b)
+    count += complete ? seen.active().bite[b].complete : seen.active().bite[b].has_exit;
+  return count;
+}
+
 bool Scripted::make_bite(const Snapshot& seen) {
   enum { hover, approach, drive, withdraw, over, down, close, release, retreat, bring };
   const float speed = skill_.speed, psi_bite = half_bite_angle();
@@ -259,16 +268,14 @@ bool Scripted::make_bite(const Snapshot& seen) {
       rest_aside(seen, kForceps);
       psi_ += skill_.drive_speed / shape().needle_radius * dt_;
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
-      const bool out =
-          seen.active().bite.size() >= bites_before_ + static_cast<size_t>(bite().walls) && seen.active().bite.back().has_exit;
-      if (out && psi_ > psi_bite + 0.72f) {
+      const int passed = passages(seen, false);
+      if (passed >= bite().walls && psi_ > psi_bite + 0.72f) {
         go(over);
       } else if (psi_ > psi_bite + 1.1f) {
         // The tip is misplaced: it did not enter, is not deep enough, or is too deep to exit.
-        const bool passed = seen.active().bite.size() > bites_before_ && seen.active().bite.back().has_exit;
         // Through the first wall but not the second, which was pushed away by millimeters, as soft walls are.
-        const bool gave_way = passed && seen.active().bite.size() < bites_before_ + static_cast<size_t>(bite().walls);
-        depth_fix_ += gave_way ? -0.0008f : passed || !seen.active().needle.in_tissue ? -0.0003f : 0.0003f;
+        const bool gave_way = passed > 0 && passed < bite().walls;
+        depth_fix_ += gave_way ? -0.0008f : passed > 0 || !seen.active().needle.in_tissue ? -0.0003f : 0.0003f;
         go(withdraw);
       }
       return false;
@@ -281,6 +288,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       if (!patience(1.5f)) f.at += f.out * std::min(0.01f, 0.01f * (waited_ - 1.5f));  // stuck: move away from the wall
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(f, psi_)), 2 * speed);
       if (psi_ <= -psi_bite - 0.7f && !seen.active().needle.in_tissue) {
+        ++retries_;
         if (++attempts_ > kAttempts) gave_up_ = true;
         go(hover);
       } else if (!patience(8)) {
@@ -317,7 +325,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       if (!patience(3))  // stuck: an outward pull frees the back end
         f.at += (f.out + (plan_.lift > 0 ? 0.4f : 0.0f) * f.up) * std::min(0.02f, 0.01f * (waited_ - 3));
       move(kForceps, holding(kForceps, needle_at(f, psi_)), 2 * speed);
-      if (seen.active().bite.size() > bites_before_ && !seen.active().needle.in_tissue && seen.active().bite.back().complete) {
+      if (!seen.active().needle.in_tissue && passages(seen, true) >= bite().walls) {
         pull_from_ = hand_[kForceps].pose;
         return true;
       }
@@ -432,7 +440,7 @@ bool Scripted::draw(const Snapshot& seen) {
     case tighten: {
       // Force feedback: the hand slows in proportion to the thread's tension.
       auto gently = [&](size_t hand) {
-        return 0.25f * skill_.speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.02f, 1.0f);
+        return kTighten * skill_.speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.02f, 1.0f);
       };
       const bool closed = plan_.lift > 0 ? seen.closure >= kSecure : open_seam(seen) <= 0;
       if (closed) return go(plan_.lift > 0 ? open : lay), false;

@@ -28,6 +28,7 @@ class Scripted final : public Surgeon {
 
   bool done() const override { return gave_up_ || task_ >= plan_.task.size(); }
   bool gave_up() const override { return gave_up_; }
+  int retries() const override { return retries_; }
 
   std::string doing() const override;
 
@@ -86,6 +87,9 @@ class Scripted final : public Surgeon {
   bool pick_up(const Snapshot& seen);
 
   bool make_bite(const Snapshot& seen);
+  // Walls that the needle has passed since this bite began; complete: with its back end too. A withdrawn bite stays listed
+  // and counts for nothing.
+  int passages(const Snapshot& seen, bool complete) const;
 
   bool pull(TaskKind kind, const Snapshot& seen);
 
@@ -146,7 +150,7 @@ class Scripted final : public Surgeon {
   int stage_ = 0;      // within the task
   float waited_ = 0;   // [s] in this stage
   float dt_ = 1.0f / 60;
-  int misses_ = 0, attempts_ = 0;
+  int misses_ = 0, attempts_ = 0, retries_ = 0;
   bool gave_up_ = false, takes_over_ = false;
   std::string doing_ = "pick up the needle";
   // A bite.

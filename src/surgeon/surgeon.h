@@ -32,7 +32,8 @@ class Surgeon {
   virtual TickInput operate(const Snapshot& seen, float dt) = 0;
   virtual bool done() const = 0;  // the plan is finished (or abandoned)
   virtual bool gave_up() const { return false; }
-  virtual std::string doing() const = 0;  // "bite 3 of 12: drive the needle", for progress lines
+  virtual int retries() const { return 0; }  // bites, grasps, throws and cuts tried again so far
+  virtual std::string doing() const = 0;     // "bite 3 of 12: drive the needle", for progress lines
 };
 
 // Demonstrates part of the work: tasks of the plan, by number and in this order, taking over the tools from the caller at their

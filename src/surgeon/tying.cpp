@@ -14,6 +14,7 @@ constexpr float kWindOwnAt = 0.022f;          // [m] behind the tip, where such 
 constexpr float kTailAside = 0.030f;          // [m] from the stitch, where the tail is laid down
 constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the center of the field, where a used needle is put down
 constexpr float kTieCrossing = 0.3f;          // fraction of the path of crossed hands, forward and backward
+constexpr float kThrowComesDown = 3;          // [s] in which a throw reaches the tissue; most take less than one
 constexpr float kTyingAt = 0.12f;             // position on the needle's arc: behind the swage
 
 }  // namespace
@@ -170,7 +171,9 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       };
       // Where the hands cross, the needle holder, which has the tail, passes in front.
       const float front = side < 0 ? kTieCrossing : 0;
-      const Vec3 right = normalized(Vec3{side, 0.35f, 0.1f + front}), left = normalized(Vec3{-side, 0.35f, 0.1f - front});
+      // A throw that does not come down in time hangs on a tail that lies under an edge: the tail is raised out of there.
+      const float rise = patience(kThrowComesDown) ? 0.35f : 2.0f;
+      const Vec3 right = normalized(Vec3{side, rise, 0.1f + front}), left = normalized(Vec3{-side, 0.35f, 0.1f - front});
       move(kNeedleHolder, {pull_from_.p + right * 0.08f, hand_[kNeedleHolder].pose.q}, gently(kNeedleHolder));
       carry_swage(seen, winding_.start + (own_strand ? Vec3{0, 1, 0} : left) * (0.9f * winding_.reach), gently(kForceps));
       if (locked && (waited_ > 0.5f || driver.held != Held::thread)) go(driver.held == Held::thread ? lay_down : open);
