@@ -17,6 +17,7 @@
 #include <cstdio>
 #include <cstring>
 #include <functional>
+#include <map>
 #include <random>
 #include <thread>
 
@@ -47,7 +48,7 @@ struct Simulator {
   BridgeKey in{}, out{};
   uint64_t counter = 0;
   uint64_t bytes_in = 0, bytes_out = 0;
-  std::array<uint64_t, 2> sampled{};  // times of the newest samples
+  std::array<uint64_t, 2> sampled{}, newest{};  // times and counters of the newest samples
   std::array<ArmSample, 2> sample;
   std::array<Vec3, 2> felt;
   std::array<ArmInfo, 2> info;
@@ -88,19 +89,23 @@ struct Simulator {
     uint8_t data[300];
     for (ssize_t n; (n = recv(fd, data, sizeof data, MSG_DONTWAIT)) > 0;) {
       bytes_in += static_cast<uint64_t>(n);
-      BridgeHead h;
-      ASSERT_TRUE(read_head(data, static_cast<size_t>(n), h) == BridgeFault::none);
-      BridgePayload p;
-      uint32_t faults = 0;
-      if (h.kind == BridgeKind::refused) refused = refused_why(data), refused_version = h.version;
-      else if (h.kind == BridgeKind::cookie) cookie |= take_cookie(caller, data);
-      else if (h.kind == BridgeKind::opened) opened |= take_opened(caller, data, in, out);
-      else if (!unseal(in, data, p)) ++forged;
-      else if (h.kind == BridgeKind::bye) ++byes;
-      else if (h.kind == BridgeKind::info) infos += read_info(p, info[h.arm]);
-      else if (h.kind == BridgeKind::sample)
-        samples += read_sample(p, sample[h.arm], felt[h.arm], faults), sampled[h.arm] = sample[h.arm].time_ns;
+      process(data, static_cast<size_t>(n));
     }
+  }
+  void process(const uint8_t* data, size_t n) {
+    BridgeHead h;
+    ASSERT_TRUE(read_head(data, n, h) == BridgeFault::none);
+    BridgePayload p;
+    uint32_t faults = 0;
+    if (h.kind == BridgeKind::refused) refused = refused_why(data), refused_version = h.version;
+    else if (h.kind == BridgeKind::cookie) cookie |= take_cookie(caller, data);
+    else if (h.kind == BridgeKind::opened) opened |= take_opened(caller, data, in, out);
+    else if (!unseal(in, data, p)) ++forged;
+    else if (h.kind == BridgeKind::bye) ++byes;
+    else if (h.kind == BridgeKind::info) infos += read_info(p, info[h.arm]);
+    else if (h.kind == BridgeKind::sample && h.counter > newest[h.arm])
+      newest[h.arm] = h.counter, samples += read_sample(p, sample[h.arm], felt[h.arm], faults),
+      sampled[h.arm] = sample[h.arm].time_ns;
   }
   // Each step repeated until it is answered; false: it never was.
   bool connect() {
@@ -376,6 +381,140 @@ TEST(Bridge, S6_no_amplification) {
     EXPECT_LE(answered, s.bytes_out) << a.what;
     EXPECT_EQ(answered > 0, a.answered) << a.what;
   }
+}
+
+// A network between simulator and server: each packet takes `delay` and up to `spread` more, so that they overtake each other;
+// some are lost, some repeated later, some are forged on the way or by a stranger.
+struct Network {
+  double delay = 0, spread = 0;  // [ms]
+  double lost = 0, replayed = 0, forged = 0;
+  using Packet = std::vector<uint8_t>;
+  std::multimap<uint64_t, Packet> to_server, to_simulator;  // by the time of their arrival [ns]
+  std::vector<Packet> overheard;
+  std::mt19937 draw{5};
+  uint64_t lost_count = 0, replayed_count = 0, forged_count = 0, overtaken = 0, last = 0;
+
+  double uniform() { return std::uniform_real_distribution<double>(0, 1)(draw); }
+  void send(std::multimap<uint64_t, Packet>& way, const uint8_t* data, size_t size) {
+    if (uniform() < lost) {
+      ++lost_count;
+      return;
+    }
+    const uint64_t at = test_ns + static_cast<uint64_t>(1e6 * (delay + spread * uniform()));
+    way.emplace(at, Packet(data, data + size));
+    if (&way != &to_server) return;
+    if (at < last) ++overtaken;
+    last = at;
+    overheard.emplace_back(data, data + size);
+    if (overheard.size() > 500) overheard.erase(overheard.begin());
+    if (uniform() < replayed) ++replayed_count, way.emplace(at, overheard[draw() % overheard.size()]);
+    if (uniform() < forged) {
+      ++forged_count;
+      Packet bad(data, data + size);
+      bad[draw() % bad.size()] ^= static_cast<uint8_t>(1 + draw() % 255);
+      way.emplace(at, bad);
+    }
+  }
+  template <typename F>
+  static void arrive(std::multimap<uint64_t, Packet>& way, const F& each) {
+    while (!way.empty() && way.begin()->first <= test_ns) each(way.begin()->second), way.erase(way.begin());
+  }
+};
+
+// H3 over both real ends' packets: a hand on an imperfect device presses a wall that the simulator computes at the far end of a
+// network. In every case the hand gets no energy, the motors get no step, and strangers get at most the bytes that they sent.
+TEST(Bridge, S6_a_bad_network_gives_no_energy) {
+  struct Case {
+    double delay;
+    bool rough;
+  };
+  for (const Case c :
+       {Case{0, false}, Case{0, true}, Case{5, true}, Case{15, true}, Case{30, true}, Case{50, false}, Case{50, true}})
+    for (const double grip : {0.05, 0.8}) {
+      SCOPED_TRACE(testing::Message() << c.delay << " ms each way" << (c.rough ? ", rough" : "") << ", grip " << grip
+                                      << " N/mm");
+      Lent t;
+      const FakeHdUnkind unkind{0.055, 2, 0.05, 0.002, 0.002, 0, 9};
+      t.connect();
+      Simulator& s = *t.simulator;
+      t.fake.unkind(&unkind);
+      for (int k = 0; k < 2; ++k) t.fake.grip(k, grip, grip < 0.1 ? 0.001 : 0.004, 0.1, 0.01);
+      Network net;
+      net.delay = c.delay;
+      if (c.rough) net.spread = 2 + 0.4 * c.delay, net.lost = 0.1, net.replayed = 0.1, net.forged = 0.1;
+      Simulator stranger(t.server->port());
+      uint64_t stranger_bytes = 0;
+      const BridgeCounts before = t.server->counts();
+      uint64_t sent = 0;
+      float felt = 0, low = 1e9f, high = -1e9f;
+      const double deep = 0.004 + 0.004 + 0.0008 / grip;  // 0.8 N, however soft the hand
+      const auto rise = [](double x) { return x = std::clamp(x, 0.0, 1.0), x * x * x * (10 + x * (6 * x - 15)); };
+      for (int ms = 0; ms < 5500 && !HasFatalFailure(); ++ms) {
+        const double at = 1e-3 * ms - 2.4;
+        t.fake.wish(0, {0, static_cast<float>(0.004 - deep * (rise(at / 0.4) - rise((at - 2.4) / 0.4))), 0});
+        if (ms == 2390) t.fake.zero(0);
+        test_ns += 1000000;
+        t.fake.step(1);
+        uint8_t data[300];
+        for (ssize_t n; (n = recv(s.fd, data, sizeof data, MSG_DONTWAIT)) > 0;)
+          net.send(net.to_simulator, data, static_cast<size_t>(n));
+        Network::arrive(net.to_simulator, [&](const Network::Packet& p) { s.process(p.data(), p.size()); });
+        // A wall at y = 0 that hardens (600 z + 1.5e5 z^2 behind 300 N/m) and rubs, as at 1 kHz.
+        const Vec3 seen = s.sample[0].pose.p;
+        const float depth = std::max(0.0f, -seen.y), z = (-900 + std::sqrt(810000 + 1.8e8f * depth)) / 3e5f,
+                    tangent = 600 + 3e5f * z, force = 600 * z + 1.5e5f * z * z, slope = 300 * tangent / (300 + tangent);
+        ForcePatch wall;
+        wall.period = 0.001f, wall.time_ns = s.sampled[0];
+        wall.normal = {0, 1, 0}, wall.stiffness = outer({0, 1, 0}, slope), wall.coefficient = 0.3f;
+        wall.point = {seen.x, std::min(0.0f, seen.y), seen.z};
+        wall.force = {0, force, 0}, wall.gap = force / slope;
+        BridgePayload payload;
+        write_patch(wall, payload);
+        const BridgeBytes order = s.sealed(BridgeKind::patch, 0, payload);
+        net.send(net.to_server, order.data(), order.size());
+        Network::arrive(net.to_server, [&](const Network::Packet& p) { s.send(p.data(), p.size()), ++sent; });
+        if (c.rough && ms % 10 == 0 && !net.overheard.empty()) {  // repeated by a stranger from another address
+          const Network::Packet& p = net.overheard[static_cast<size_t>(ms) % net.overheard.size()];
+          stranger.send(p.data(), p.size()), ++sent;
+        }
+        ASSERT_TRUE(wait_for([&] {
+          const BridgeCounts now = t.server->counts();
+          return now.accepted + now.dropped() >= before.accepted + before.dropped() + sent;
+        }));
+        if (at < 0) continue;
+        felt = std::max(felt, length(t.fake.force(0)));
+        if (at > 1.4 && at < 2.3) low = std::min(low, t.fake.position(0).y), high = std::max(high, t.fake.position(0).y);
+      }
+      uint8_t data[300];
+      for (ssize_t n; (n = recv(stranger.fd, data, sizeof data, MSG_DONTWAIT)) > 0;) stranger_bytes += static_cast<uint64_t>(n);
+      const FakeHdArm a = t.fake.at(0);
+      const BridgeCounts now = t.server->counts();
+      std::printf(
+          "bridge, %2.0f ms each way%s, hand %3.0f N/m: energy of the motors %6.3f mJ, to the hand %.3f mJ; %.2f N, "
+          "step %.3f N, swing %.3f mm\n",
+          c.delay, c.rough ? ", rough" : "", 1e3 * grip, 1e3 * a.energy_most, 1e3 * a.to_hand_most, double{felt}, a.step_most,
+          1e3 * double{high - low});
+      if (c.rough)
+        std::printf(
+            "  of %llu packets lost %llu, overtaken %llu, replayed %llu, forged %llu; dropped as old %llu, forged %llu; "
+            "a stranger got %llu bytes for %llu\n",
+            static_cast<unsigned long long>(sent), static_cast<unsigned long long>(net.lost_count),
+            static_cast<unsigned long long>(net.overtaken), static_cast<unsigned long long>(net.replayed_count),
+            static_cast<unsigned long long>(net.forged_count), static_cast<unsigned long long>(now.old),
+            static_cast<unsigned long long>(now.forged), static_cast<unsigned long long>(stranger_bytes),
+            static_cast<unsigned long long>(stranger.bytes_out));
+      EXPECT_LE(a.to_hand_most, 0.5e-3);
+      EXPECT_LE(high - low, 0.2e-3f);
+      EXPECT_LE(a.step_most, 0.5 + 1e-4);
+      EXPECT_LE(a.force_most, 3.3 + 1e-4);
+      EXPECT_GT(felt, 0.3f) << "nothing was felt";
+      EXPECT_LE(stranger_bytes, stranger.bytes_out);
+      if (c.rough) {
+        EXPECT_GT(net.overtaken, 100u);
+        EXPECT_GT(now.old, net.replayed_count * 8 / 10);
+        EXPECT_GT(now.forged, net.forged_count * 8 / 10);
+      }
+    }
 }
 
 // S6: samples to a silent simulator stop after 200 ms.
