@@ -21,7 +21,9 @@ constexpr float kBlunt = 100, kTissue = 600;
 constexpr float kTimeConstant = 0.06f;   // [s] time constant of exponential forgetting
 constexpr float kPriorWeight = 0.0001f;  // [m] of motion that weighs as much as the prior
 constexpr float kMinForce = 0.005f;      // [N] smaller forces are ignored
-constexpr float kLook = 0.008f;          // [m] search distance for the next contact; margin of the broad phase
+// [N] between which a load that comes from nothing is let in: of a needle outside of its track, of a thread.
+constexpr float kNeedleFrom = 0.02f, kNeedleWhole = 0.1f, kThreadFrom = 0.005f, kThreadWhole = 0.04f;
+constexpr float kLook = 0.008f;  // [m] search distance for the next contact; margin of the broad phase
 
 Vec3 thread_on_tool(const SolverState& s, const Strand& strand, const ThreadHold& hold) {
   const size_t i = node_of(strand, hold.slot);
@@ -42,6 +44,9 @@ Vec3 along_shaft(const Model& model, const SolverState& s, const NeedleTrackCons
 
 Sym3 across(Vec3 n, float k) { return identity(k) + outer(n, -k); }
 constexpr float series(float a, float b) { return a * b / (a + b); }
+
+// 0 below `from`, 1 from `whole` on, linear between: a force that passes a threshold makes no step in the hand.
+float onset(float force, float from, float whole) { return std::clamp((force - from) / (whole - from), 0.0f, 1.0f); }
 
 // Force of the wall on the needle tip of a suture that passes through it (suture/forces).
 NeedleResistance resistance_now(const Model& model, const State& state, size_t which, float tension) {
@@ -207,6 +212,7 @@ ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
   // Stiffness at the tool: the response of each load path per meter [N/m].
   Sym3 stiff;
   bool both_ways = false;
+  float by_needle = 0;
   if (hand.held == Held::tissue) {
     stiff += identity(series(kTissue, 1 / model.suture.tissue_compliance));
     both_ways = true;
@@ -214,35 +220,38 @@ ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
   const bool in_channel =
       std::any_of(s.channel.begin(), s.channel.end(), [&](const NeedleTrackConstraint& c) { return c.suture == hand.suture; });
   const Suture& suture = state.suture.suture[hand.suture];
-  if (hand.held == Held::needle && (in_channel || length(needle) > 20 * kMinForce)) {
+  if (hand.held == Held::needle) by_needle = in_channel ? 1 : onset(length(needle), kNeedleFrom, kNeedleWhole);
+  if (by_needle > 0) {
     for (const NeedleTrackConstraint& c : s.channel)
       if (c.suture == hand.suture)
         stiff += across(along_shaft(model, s, c), series(kTissue, 1 / std::max(1e-6f, c.compliance)));
-    if (suture.attached) stiff += identity(series(kTissue, 1 / std::max(1e-6f, model.suture.attach_compliance)));
-    if (!in_channel) stiff += outer(normalized(needle), kTissue);  // the shaft lies against tissue
+    if (suture.attached) stiff += identity(by_needle * series(kTissue, 1 / std::max(1e-6f, model.suture.attach_compliance)));
+    if (!in_channel) stiff += outer(normalized(needle), by_needle * kTissue);  // the shaft lies against tissue
     both_ways = true;
     const NeedleArc& arc = m.needle_arc[hand.suture];
     p.along = rotate(s.body[m.needle_body(hand.suture)].q, arc.tangent(hand.at * arc.arc));
   }
-  if (length(thread) > 4 * kMinForce) {
+  const float by_thread = onset(length(thread), kThreadFrom, kThreadWhole);
+  if (by_thread > 0) {
     // Taut thread is as stiff as the tissue that it is attached to, along its direction, unless it slides there.
     bool slides = false;
     for (size_t i = 0; i < s.strand.size(); ++i)
       for (const ThreadAnchor& a : s.strand[i].anchor)
         if (hand.held != Held::thread || hand.suture == i) slides = slides || a.slipping != 0;
-    if (!slides) stiff += outer(normalized(thread), kTissue);
+    if (!slides) stiff += outer(normalized(thread), by_thread * kTissue);
     both_ways = true;
   }
 
   // Rigid against rigid: the stiffness is that of the hand coupling.
   const float behind = 2 * sum.by_tool > sum.pressed ? coupling : kBlunt;
-  p.force = pressing + thread + held + needle;
+  p.force = pressing + thread * by_thread + held + needle * by_needle;
   const StiffnessEstimate& felt = state.haptics.stiffness[k];
   if (both_ways) {
     if (length(pressing) > kMinForce) stiff += outer(normalized(pressing), behind);
     p.stiffness = in_series(stiff, coupling);
     // Directions come from the constraints that load the tool, stiffness from the online estimate.
-    const float guess = (p.stiffness.xx + p.stiffness.yy + p.stiffness.zz) / 3;
+    const std::array<float, 3> stiffest = eigen(p.stiffness).value;
+    const float guess = std::max({stiffest[0], stiffest[1], stiffest[2]});
     if (guess > 1) p.stiffness = clamp_eigenvalues(p.stiffness * (learned(felt, guess, coupling) / guess), 0, coupling);
     if (hand.held == Held::needle && !suture.open.empty()) {
       // Across the shaft and in rotation: the solver's reaction. Along the shaft: the wall's force law, no less than

@@ -103,6 +103,41 @@ ToolInput left_level(const Field& f) {
 }
 Vec3 beside_left(const Field& f, float gap) { return f.rim + Vec3{0, 0.05f, 0.005f + gap}; }
 
+// S11: the load of a thread, or of a needle that is pressed against tissue, grows from nothing to 0.3 N and back: the force on
+// the hand follows without a step, alone and beside a contact, and reaches the load.
+TEST(HapticFeedback, S11_loads_begin_without_a_step) {
+  Field f("purse_string");
+  for (int i = 0; i < 10; ++i) f.tick(hand(f.rim + Vec3{0.08f, 0.05f, 0}, 1));
+  State& state = *f.state;
+  InstrumentState& tool = state.suture.instrument[static_cast<size_t>(state.hand[0].instrument)];
+  for (const bool by_needle : {false, true})
+    for (const bool contact : {false, true}) {
+      SCOPED_TRACE(testing::Message() << (by_needle ? "needle" : "thread") << (contact ? " and contact" : ""));
+      tool.held = by_needle ? Held::needle : Held::nothing;
+      Vec3 last;
+      float largest = 0, reached = 0;
+      constexpr int kSteps = 300;
+      for (int i = 0; i <= 2 * kSteps; ++i) {
+        const float load = 0.001f * static_cast<float>(i <= kSteps ? i : 2 * kSteps - i);
+        ToolReaction t;
+        t.substeps = 1, t.at = state.hand[0].pose.p;
+        (by_needle ? t.needle : t.thread) = {load, 0, 0};
+        if (contact) t.pressing = {0, 0.2f, 0}, t.pressed = 0.2f;
+        state.haptics.tool[0] = t;
+        state.event.clear();
+        finish_haptics(*f.model, state);
+        const Vec3 force = state.haptics.patch[0].force;
+        if (i > 0) largest = std::max(largest, distance(force, last));
+        if (i == kSteps) reached = force.x;
+        last = force;
+      }
+      std::printf("S11: %s%s: largest change for 1 mN of load %.1f mN\n", by_needle ? "needle" : "thread",
+                  contact ? " beside a contact" : "", 1e3 * double{largest});
+      EXPECT_LE(largest, 0.003f);
+      EXPECT_NEAR(reached, 0.3f, 1e-4f);
+    }
+}
+
 // Each hand feels the other tool: the same force, in the opposite direction; before contact its position; zero afterward.
 TEST(HapticFeedback, the_other_tool) {
   Field f("purse_string");
