@@ -6,6 +6,7 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "core/file.h"
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
 
@@ -24,6 +25,7 @@ int bench_stages(const BenchOptions& o) {
   const std::string name = o.scene.empty() ? "purse_string" : o.scene[0];
   SceneSpec scene = read_scene(name);
   for (const std::string& setting : o.set) set_value(scene, setting);
+  check_suffix(o.json, ".json", "--json");
   prepare_output(o.json);
   SessionHooks hooks;
   hooks.stop = &stop_on_interrupt();

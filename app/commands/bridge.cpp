@@ -29,6 +29,7 @@ int bridge(const Options& o) {
   const ArmChoice choice = read_arm_choice(o.arms);
   if (choice.as_paper || choice.driver.empty())
     throw InputError("--arms " + o.arms, "unknown device backend", "see catgut devices --help");
+  check_listen(o.listen, o.key);
   std::vector<std::string> messages;
   ArmPort port = open_arms(choice, messages);
   for (const std::string& line : messages) std::printf("%s\n", line.c_str());

@@ -9,6 +9,7 @@
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "core/file.h"
 #include "procedure/scene_file.h"
 
 namespace catgut {
@@ -40,6 +41,7 @@ StereoPictures stereo_pictures(const PictureModel& model, float every_s) {
 int bench_frame(const FrameOptions& o) {
   SceneSpec scene = read_scene(o.scene);
   for (const std::string& setting : o.set) set_value(scene, setting);
+  check_suffix(o.json, ".json", "--json");
   prepare_output(o.json);
   StereoPictures picture;
   std::vector<double> caller, all;

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands/commands.h"
+#include "core/file.h"
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
 
@@ -57,6 +58,7 @@ int bench_scale(const ScaleOptions& o) {
   SceneSpec scene = read_scene(o.scene);
   set_value(scene, "solver.preset=paper");
   for (const std::string& setting : o.set) set_value(scene, setting);
+  check_suffix(o.json, ".json", "--json");
   prepare_output(o.json);
   SessionHooks hooks;
   hooks.stop = &stop_on_interrupt();

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands/commands.h"
+#include "core/file.h"
 #include "validation/validation.h"
 
 namespace catgut {
@@ -31,6 +32,7 @@ void print_line(const ValidationLine& l) {
 }
 
 int validate(const std::string& json, bool nightly) {
+  check_suffix(json, ".json", "--json");
   prepare_output(json);
   const bool table = json != "-";
   if (table)

@@ -88,14 +88,13 @@ void lesson_panel(const LessonRun& run, bool hints) {
   ImGui::ProgressBar(static_cast<float>(run.step()) / static_cast<float>(n), {-1, 0.35f * font}, "");
   if (run.all_done()) {
     line(kBlue, lesson.title + ": complete");
-    line(kQuiet, "The knot is locked. Continue, or press Esc.");
+    line(kQuiet, "Knot locked. Continue, or press Esc.");
   } else {
     const LessonStep& s = lesson.step[run.step()];
     line(kBlue, fmt::format("{} of {}  {}", run.step() + 1, n, s.title));
     line(kWhite, s.text);
     if (run.showing()) line(kOrange, "Demonstration: watch, then repeat (S stops)");
-    else if (run.gave_up())
-      line(kOrange, "Demonstration not possible from here. Grasp the needle, or undo the bite (Backspace).");
+    else if (run.gave_up()) line(kOrange, "No demonstration from here. Grasp the needle, or undo the bite (Backspace).");
     else {
       if (hints) line(kQuiet, s.hint);
       line(kQuiet, "S  demonstration");

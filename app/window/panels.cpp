@@ -38,9 +38,9 @@ void quality_choice(Settings& s) {
 }
 
 void guidance_choice(Settings& s) {
-  const std::pair<Guidance, const char*> kLevels[] = {{Guidance::learn, "learn: needle path shown"},
+  const std::pair<Guidance, const char*> kLevels[] = {{Guidance::learn, "learn: needle path"},
                                                       {Guidance::practice, "practice: event messages"},
-                                                      {Guidance::exam, "exam: no feedback until results"}};
+                                                      {Guidance::exam, "exam: results only"}};
   for (const auto& [level, words] : kLevels)
     if (radio(words, s.guidance == level)) s.guidance = level;
 }
@@ -87,7 +87,7 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   gap();
   heading("Hands");
   if (v.watch_only) {
-    text(kQuiet, "set on the command line");
+    text(kQuiet, "set by command line");
   } else {
     if (radio("manual", !watch)) watch = false;
     ImGui::SameLine();
@@ -95,14 +95,19 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   }
   hand_choice(settings);
   ImGui::PushStyleColor(ImGuiCol_Text, kQuiet);
-  ImGui::TextWrapped("%s", v.pad.empty() ? "mouse and keyboard; gamepad optional" : ("mouse, keyboard, " + v.pad).c_str());
+  ImGui::TextWrapped("%s", v.pad.empty() ? "mouse, keyboard or gamepad" : ("mouse, keyboard, " + v.pad).c_str());
   ImGui::PopStyleColor();
   gap();
   heading("Graphics quality");
   quality_choice(settings);
   gap();
   heading("Recordings");
-  if (v.recordings->empty()) text(kQuiet, "none; record with catgut play --record FILE.cgrec");
+  if (v.recordings->empty()) {
+    text(kQuiet, "none yet");
+    ImGui::PushStyleColor(ImGuiCol_Text, kQuiet);
+    ImGui::TextWrapped("catgut play --record FILE.cgrec");
+    ImGui::PopStyleColor();
+  }
   ImGui::BeginChild("files", {0, 0});
   for (const std::string& file : *v.recordings) {
     ImGui::PushStyleVar(ImGuiStyleVar_ButtonTextAlign, {0, 0.5f});
@@ -164,15 +169,15 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& m
     row("jaws");
     ImGui::Checkbox("hold button to close", &s.hold_to_close);
     row("grasp assist");
-    ImGui::Checkbox("snap to needle, tail and bite (H)", &s.assist);
+    ImGui::Checkbox("snap to target (H)", &s.assist);
     row("show");
     ImGui::Checkbox("suture points (M)", &s.suture_points);
     ImGui::SameLine();
     ImGui::Checkbox("keys (F1)", &s.hints);
     ImGui::EndTable();
   }
-  if (working) text(kQuiet, "graphics and hands apply to the next scene");
-  text(kQuiet, file.empty() ? "Settings not saved: no config directory" : "Saved in " + file);
+  if (working) text(kQuiet, "graphics and hands: from next scene");
+  text(kQuiet, file.empty() ? "not saved: no config directory" : "Saved in " + file);
   ImGui::Separator();
   if (wide_button("Done (Esc)", 11)) choice.what = Chosen::leave_settings;
   ImGui::SameLine();

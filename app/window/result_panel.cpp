@@ -68,7 +68,9 @@ void event_list(const std::vector<LogLine>& log) {
 
 std::vector<LogLine> event_log(const StitchMap& map) {
   std::vector<LogLine> out;
-  for (const Event& e : map.event) {
+  for (size_t i = 0; i < map.event.size(); ++i) {
+    if (repeated_exit(map.event, i)) continue;
+    const Event& e = map.event[i];
     LogLine line;
     line.time_s = static_cast<double>(e.tick) * map.tick_s;
     line.text = words_for(e, line.bad);
@@ -86,7 +88,7 @@ Choice result_panel(const ResultView& v, BiteColor& by) {
   begin_box("results", {margin, margin}, size, 0.93f);
   text(kAccent, v.scene->title);
   ImGui::SameLine();
-  text(kQuiet, v.from_recording ? "Results of the recording" : "Results");
+  text(kQuiet, v.from_recording ? "Recording results" : "Results");
   if (v.known < 1) {
     ImGui::SameLine();
     text(kBad, fmt::format("! Analyzing: {:.0f} %", 100 * v.known));
@@ -97,7 +99,7 @@ Choice result_panel(const ResultView& v, BiteColor& by) {
   const float foot = 2.8f * em();
   ImGui::BeginChild("numbers", {0.36f * size.x, -foot});
   if (ImGui::BeginTable("rows", 2)) {
-    ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 10 * em());
+    ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 13 * em());
     ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch);
     for (const ResultRow& row : result_rows(*v.scene, r.metrics)) {
       ImGui::TableNextRow();
@@ -121,7 +123,7 @@ Choice result_panel(const ResultView& v, BiteColor& by) {
   const std::pair<BiteColor, const char*> kBy[] = {
       {BiteColor::spacing, "spacing"}, {BiteColor::depth, "depth"}, {BiteColor::edge, "edge distance"}};
   ImGui::AlignTextToFramePadding();
-  text(kAccent, "Bites, colored by");
+  text(kAccent, "Bite color");
   for (const auto& [what, name] : kBy) {
     ImGui::SameLine();
     if (radio(name, by == what)) by = what;
@@ -130,12 +132,12 @@ Choice result_panel(const ResultView& v, BiteColor& by) {
   scale_legend(by, std::max(4 * em(), ImGui::GetContentRegionAvail().x - 3.2f * em()));
   ImGui::SameLine(0, 0.6f * em());
   text(kQuiet, "mm");
-  text(kQuiet, "filled: entry, ring: exit; value in mm below the number");
+  text(kQuiet, "filled: entry; ring: exit; value in mm");
   stitch_map_chart(r.map, by, {space.x, 0.35f * space.y});
   gap(0.1f);
   text(kAccent, "Thread tension");
   ImGui::SameLine();
-  text(kQuiet, "blue: maximum along thread; gray: at the needle");
+  text(kQuiet, "blue: maximum; gray: at needle");
   const uint64_t first = r.map.tension.empty() ? 0 : r.map.tension.front().tick,
                  last = r.map.tension.empty() ? 1 : r.map.tension.back().tick;
   tension_chart(r.map, first, last, -1, {space.x, 0.23f * space.y}, true);

@@ -34,7 +34,7 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
   if (!s.fault.empty()) about.push_back({kBad, "! " + s.fault});
   if (s.differs_at) {
     about.push_back({kBad, fmt::format("! diverges at tick {}", *s.differs_at)});
-    about.push_back({kBad, "  (other program version or damaged file)"});
+    about.push_back({kBad, "  other version or damaged file"});
   } else if (s.known < s.ticks) {
     const double part = static_cast<double>(s.known) / std::max<double>(1, static_cast<double>(s.ticks));
     about.push_back({kQuiet, fmt::format("verifying hashes: {:.0f} %", 100 * part)});
@@ -53,6 +53,7 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
       std::upper_bound(events.begin(), events.end(), s.first + s.at, [](uint64_t at, const Event& o) { return at < o.tick; });
   while (e != events.begin() && happened.size() < kWordsShown) {
     --e;
+    if (repeated_exit(events, static_cast<size_t>(e - events.begin()))) continue;
     bool bad = false;
     const std::string words = words_for(*e, bad);
     if (words.empty()) continue;

@@ -11,6 +11,7 @@ namespace {
 
 constexpr size_t kLogLines = 8;
 constexpr size_t kMostListed = 40;
+constexpr size_t kMostTips = 16;
 
 }  // namespace
 
@@ -26,6 +27,11 @@ void Visit::take_events() {
   for (Event e; live.event(e);) {
     if (events_) std::fprintf(events_, "%s\n", event_json(e).c_str());
     if (on_event_) on_event_(e);
+    if (e.kind == EventKind::tip_entered || e.kind == EventKind::tip_exited) {
+      tip_.push_back(e);
+      if (repeated_exit(tip_, tip_.size() - 1)) continue;
+      if (tip_.size() > kMostTips) tip_.erase(tip_.begin());
+    }
     LogLine line;
     line.text = words_for(e, line.bad);
     line.time_s = static_cast<double>(e.tick) / static_cast<double>(scene.solver.tick_rate);

@@ -32,6 +32,7 @@ struct Visit {
 
  private:
   void take_events();
+  std::vector<Event> tip_;  // recent entries and exits
   std::FILE* events_;
   std::function<void(const Event&)> on_event_;
 };

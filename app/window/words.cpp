@@ -20,19 +20,19 @@ std::string counted(int n, const char* one) { return fmt::format("{} {}{}", n, o
 std::string fault_words(Fault fault) {
   switch (fault) {
     case Fault::wrong_body:
-      return "bite on the wrong side";
+      return "wrong side";
     case Fault::wrong_layer:
-      return "bite through the wall in the wrong direction";
+      return "wrong bite direction";
     case Fault::one_wall_only:
-      return "tied through one wall only";
+      return "only one wall tied";
     case Fault::knot_without_bite:
-      return "throw before the bites were complete";
+      return "throw before bites";
     case Fault::needle_in_tissue:
-      return "thread pulled with the needle in tissue";
+      return "needle still in tissue";
     case Fault::cut_in_stitch:
-      return "cut inside the stitch";
+      return "stitch cut";
     case Fault::cut_before_knot:
-      return "cut before a knot";
+      return "cut before knot";
     case Fault::too_few_throws:
       return "too few throws";
     default:
@@ -43,11 +43,11 @@ std::string fault_words(Fault fault) {
 std::string loop_words(LoopReason reason) {
   switch (reason) {
     case LoopReason::no_crossing:
-      return "no loop: thread does not cross itself";
+      return "no loop: no crossing";
     case LoopReason::tip_outside:
       return "no loop: tip outside";
     case LoopReason::too_deep:
-      return "no loop: turns too far apart";
+      return "no loop: turns apart";
     default:
       return "no loop";
   }
@@ -70,7 +70,7 @@ std::string words_for(const Event& e, bool& bad) {
   };
   switch (e.kind) {
     case EventKind::needle_grasped:
-      return fmt::format("needle grasped by {}, {:.0f} % from swage", tool, 100 * e.value);
+      return fmt::format("needle grasped by {}, at {:.0f} %", tool, 100 * e.value);
     case EventKind::needle_released:
       return released("needle");
     case EventKind::thread_grasped:
@@ -137,6 +137,18 @@ std::string words_for(const Event& e, bool& bad) {
   }
 }
 
+bool repeated_exit(const std::vector<Event>& events, size_t i) {
+  const Event& e = events[i];
+  if (e.kind != EventKind::tip_exited) return false;
+  while (i-- > 0) {
+    const Event& o = events[i];
+    if (o.suture != e.suture) continue;
+    if (o.kind == EventKind::tip_entered) return false;
+    if (o.kind == EventKind::tip_exited) return o.which == e.which;
+  }
+  return false;
+}
+
 std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot& seen, const SessionMetrics& metrics) {
   std::vector<std::string> lines;
   const std::string& name = scene.technique.name;
@@ -169,9 +181,6 @@ std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot&
 std::vector<ResultRow> result_rows(const SceneSpec& scene, const SessionMetrics& p) {
   std::vector<ResultRow> rows;
   const bool purse_string = scene.technique.name == "purse_string";
-  const auto both = [](const char* unit, double holder, double forceps, int digits) {
-    return fmt::format("needle holder {:.{}f} {}, forceps {:.{}f} {}", holder, digits, unit, forceps, digits, unit);
-  };
   rows.push_back({"time", clock_text(p.time_s)});
   rows.push_back({"bites", purse_string ? fmt::format("{} (minimum {})", p.bites, scene.technique.min_bites)
                                         : fmt::format("{}", p.bites)});
@@ -182,8 +191,10 @@ std::vector<ResultRow> result_rows(const SceneSpec& scene, const SessionMetrics&
   rows.push_back({"cuts", fmt::format("{}", p.cuts)});
   rows.push_back({"finished sutures", fmt::format("{}", p.sutures_baked)});
   rows.push_back({"needle slips", fmt::format("{}", p.needle_slips)});
-  rows.push_back({"path length", both("m", static_cast<double>(p.path[0]), static_cast<double>(p.path[1]), 2)});
-  rows.push_back({"peak force", both("N", static_cast<double>(p.peak_force[0]), static_cast<double>(p.peak_force[1]), 1)});
+  for (uint8_t hand = 0; hand < 2; ++hand) {
+    rows.push_back({fmt::format("{} path", tool_name(hand)), fmt::format("{:.2f} m", p.path[hand])});
+    rows.push_back({fmt::format("{} peak force", tool_name(hand)), fmt::format("{:.1f} N", p.peak_force[hand])});
+  }
   rows.push_back({"undos", fmt::format("{}", p.undos)});
   for (size_t f = 1; f < p.faults.size(); ++f)
     if (p.faults[f] > 0) rows.push_back({"fault", fmt::format("{} x {}", p.faults[f], fault_words(static_cast<Fault>(f)))});

@@ -16,6 +16,9 @@ std::string clock_text(double seconds);
 // One line for the event log; empty: the event is not shown. bad: an error.
 std::string words_for(const Event& event, bool& bad);
 
+// Whether event i is another exit of a tip that has not entered since: moving tissue covered it for a moment. Not shown.
+bool repeated_exit(const std::vector<Event>& events, size_t i);
+
 // Progress of the technique, a few short lines.
 std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot& seen, const SessionMetrics& metrics);
 

@@ -266,6 +266,26 @@ void ArmServer::Work::stop() {
   fd = -1;
 }
 
+namespace {
+
+int listening_socket(const std::string& listen, const std::string& key) {
+  std::string why;
+  bool local = false;
+  const int fd = bridge_socket(listen, true, why, &local);
+  if (fd < 0) throw InputError("--listen " + listen, why, "use a local address and a free port");
+  if (local || !key.empty()) return fd;
+  ::close(fd);
+  throw InputError("--listen " + listen, "anyone who reaches this address could apply forces",
+                   "create a key with --new-key FILE, copy it to the simulator's machine, and listen with --key FILE");
+}
+
+}  // namespace
+
+void check_listen(const std::string& listen, const std::string& key) {
+  if (!key.empty()) read_bridge_key(key);
+  ::close(listening_socket(listen, key));
+}
+
 ArmServer::ArmServer(ArmPort port, const ArmServerOptions& options) : work_(std::make_unique<Work>()) {
   Work& w = *work_;
   w.port = std::move(port);
@@ -277,21 +297,13 @@ ArmServer::ArmServer(ArmPort port, const ArmServerOptions& options) : work_(std:
     w.side[k].options.clutch = false;  // the simulator's side does that
     w.side[k].options.gain = 1;        // patches arrive in the device's own frame, with the gain applied
   }
-  std::string why;
-  bool local = false;
-  w.fd = bridge_socket(options.listen, true, why, &local);
-  if (w.fd < 0) throw InputError("--listen " + options.listen, why, "use a local address and a free port");
-  if (!local && options.key.empty()) {
-    ::close(w.fd);
-    w.fd = -1;
-    throw InputError("--listen " + options.listen, "anyone who reaches this address could apply forces",
-                     "create a key with --new-key FILE, copy it to the simulator's machine, and listen with --key FILE");
-  }
+  w.fd = listening_socket(options.listen, options.key);
   sockaddr_storage own{};
   socklen_t bytes = sizeof own;
   getsockname(w.fd, reinterpret_cast<sockaddr*>(&own), &bytes);
   w.listens = ntohs(own.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6*>(&own)->sin6_port
                                               : reinterpret_cast<sockaddr_in*>(&own)->sin_port);
+  std::string why;
   if (!w.port.start(w.port.self, {Work::step, &w}, why)) {
     ::close(w.fd);
     w.fd = -1;

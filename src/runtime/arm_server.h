@@ -32,6 +32,9 @@ struct ArmServerOptions {
 // moved. False: expired.
 bool accept_patch(ForcePatch& patch, uint64_t now_ns);
 
+// Checks address and key file of ArmServerOptions before any device is opened. Throws InputError.
+void check_listen(const std::string& listen, const std::string& key);
+
 class ArmServer {
  public:
   // Takes ownership of the port, starts it, and serves its devices. Throws InputError if it cannot listen, lacks a required

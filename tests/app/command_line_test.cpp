@@ -87,6 +87,8 @@ TEST_F(CommandLine, a_file_name_says_what_it_holds) {
   expect_refused("run small.toml --surgeon none --contact-sheet x.pdf", "does not end in .png");
   expect_refused("run small.toml --surgeon none --record x.json", "does not end in .cgrec");
   expect_refused("run small.toml --surgeon none --json x.cgrec", "does not end in .json");
+  expect_refused("validate --json x.png", "does not end in .json");
+  expect_refused("bench stages --scene small.toml --json x.png", "does not end in .json");
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 3) << "the scene and the two outputs: nothing was written";
 }
 
@@ -191,6 +193,7 @@ TEST_F(CommandLine, arms_are_lent_over_the_bridge) {
   EXPECT_NE(nothing.err.find("no haptic device to serve"), std::string::npos) << nothing.err;
   setenv("CATGUT_LIBHD", CATGUT_FAKE_LIBHD, 1);
   expect_refused("bridge --listen 203.0.113.7:0", "use a local address");
+  expect_refused("bridge --listen 0.0.0.0:0 --arms touch:/nowhere/libHD.so", "could apply forces");
   FILE* lender = popen("echo $$; exec '" CATGUT_APP "' bridge --listen 127.0.0.1:0 --seconds 60", "r");
   unsetenv("CATGUT_LIBHD");
   ASSERT_NE(lender, nullptr);

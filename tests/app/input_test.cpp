@@ -196,6 +196,20 @@ TEST(Words, every_event_is_told_or_left_out_on_purpose) {
   EXPECT_TRUE(bad);
 }
 
+TEST(Words, an_exit_of_the_same_bite_is_shown_once) {
+  const auto event = [](EventKind kind, uint32_t bite, uint16_t suture) {
+    Event e;
+    e.kind = kind, e.which = bite, e.suture = suture;
+    return e;
+  };
+  const EventKind in = EventKind::tip_entered, out = EventKind::tip_exited;
+  const std::vector<Event> events{event(in, 3, 0), event(out, 3, 0), event(out, 0, 1), event(out, 3, 0),
+                                  event(in, 4, 0), event(out, 4, 0), event(in, 3, 0),  event(out, 3, 0)};
+  std::vector<bool> repeated;
+  for (size_t i = 0; i < events.size(); ++i) repeated.push_back(repeated_exit(events, i));
+  EXPECT_EQ(repeated, (std::vector<bool>{false, false, false, true, false, false, false, false}));
+}
+
 }  // namespace
 }  // namespace catgut
 #endif
