@@ -15,8 +15,8 @@ enum class CommandKind : uint8_t {
   lay_down,    // releases what is held and puts the instrument in its place on the tray
   park,        // leaves the clamp closed on what it holds; the hand is empty then
   unpark,      // the empty hand takes the parked instrument `argument` in its present pose
-  new_suture,  // a new needle and thread
-  cut,         // cuts the thread between the jaws
+  new_suture,  // replaces suture `argument` by a new needle and thread
+  cut,         // cuts the thread of suture `argument` at the jaws
   count_
 };
 

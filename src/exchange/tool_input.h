@@ -12,10 +12,9 @@ namespace catgut {
 
 constexpr size_t kMaxHands = 4;  // of a scene
 
-// Bits of ToolInput::buttons. Each acts once, on the press.
-constexpr uint32_t kButtonCut = 1u << 0;  // scissors cut the thread at this tool's jaws
-constexpr uint32_t kButtonNewSuture =
-    1u << 1;  // a new needle and thread are loaded: tied thread is baked, the rest of the old one is removed
+// Bits of ToolInput::buttons, as devices report them. The physics does not read them: exchange/buttons makes commands of them.
+constexpr uint32_t kButtonCut = 1u << 0;        // CommandKind::cut
+constexpr uint32_t kButtonNewSuture = 1u << 1;  // CommandKind::new_suture
 
 // Tool frame: origin at the grasp point between the jaw tips, -z the pointing direction (the shaft runs along +z toward the
 // hand), x the direction in which the jaws open.
@@ -24,7 +23,7 @@ struct ToolInput {
   Vec3 velocity;          // [m/s]
   Vec3 angular_velocity;  // [rad/s]
   float jaw = 1;          // 0 closed .. 1 open
-  uint32_t buttons = 0;   // bit per button
+  uint32_t buttons = 0;   // bit per button: never read by the physics
   uint64_t time_ns = 0;   // device clock, only for latency tables: never read by the physics
   uint32_t sequence = 0;
   uint32_t connected = 1;  // 0: no device; the tool stays where it is, without contact

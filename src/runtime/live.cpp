@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/check.h"
+#include "exchange/buttons.h"
 #include "exchange/latest.h"
 #include "exchange/ring.h"
 #include "procedure/scene_file.h"
@@ -121,6 +122,7 @@ struct Live::Work {
   PaperSpring paper;
   LiveResult result;
   TickInput input;
+  std::array<uint32_t, kMaxHands> arm_buttons{};         // down in the last tick
   std::array<int, kMaxHands> unheard{};                  // [ticks] since the last message of a hand, and
   std::array<float, kMaxHands> heard_every{1, 1, 1, 1};  // [ticks] recent interval of its messages
   Snapshot before, now;
@@ -232,18 +234,17 @@ void Live::Work::tick(bool let_in) {
       const HandMessage& mail = hand_box[k].seen();
       const uint32_t down = pressed[k].exchange(0, std::memory_order_relaxed);
       ToolInput& hand = input.hand[k];
-      hand.buttons = 0;
       if (const int arm = arm_of(k); arm >= 0) {
-        hand = hand_toward(hand, haptics->hand(static_cast<size_t>(arm)), kArmSpeed, 10 * options.hand_turn,
-                           static_cast<float>(dt));
-        hand.buttons |= down;
+        const ToolInput wanted = haptics->hand(static_cast<size_t>(arm));
+        add_commands(input.commands, k, down | (wanted.buttons & ~std::exchange(arm_buttons[k], wanted.buttons)), now);
+        hand = hand_toward(hand, wanted, kArmSpeed, 10 * options.hand_turn, static_cast<float>(dt));
         continue;
       }
       // A message from before a jump in time refers to other tool poses: the hand stays until a newer one arrives.
       if (mail.epoch != published.epoch) continue;
+      add_commands(input.commands, k, down, now);
       hand = hand_toward(hand, mail.input, options.hand_speed, options.hand_turn, static_cast<float>(dt),
                          hand_share(heard_every[k]));
-      hand.buttons |= down;
       fresh = std::max(fresh, mail.input.time_ns > published.input_time_ns[k] ? mail.input.time_ns : 0);
       published.input_time_ns[k] = mail.input.time_ns;
     }
@@ -543,7 +544,6 @@ bool Live::change(const std::string& key_equals_value) { return work_->changes.p
 void Live::watch(bool on) { work_->watched = on; }
 
 bool Live::command(LiveCommand command) { return work_->requests.push({command, false, {}}); }
-
 bool Live::instrument(const Command& command) { return work_->orders.push(command); }
 
 bool Live::demonstrate(const std::vector<size_t>& tasks, bool from_mark) {

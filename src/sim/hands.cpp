@@ -76,6 +76,7 @@ void lay_down(const Model& model, State& state, size_t hand) {
 }
 
 bool carry_out(const Model& model, State& state, const TickInput& input, const Command& c) {
+  if (c.kind == CommandKind::cut || c.kind == CommandKind::new_suture) return true;  // stages of their own
   const size_t hand = c.hand, i = c.argument;
   if (hand >= kMaxHands || !input.hand[hand].connected) return false;
   HandState& h = state.hand[hand];
@@ -119,7 +120,7 @@ bool carry_out(const Model& model, State& state, const TickInput& input, const C
       return true;
     }
     default:
-      return true;  // handled by another stage
+      return c.kind == CommandKind::none;  // handled by another stage
   }
 }
 

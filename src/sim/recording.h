@@ -17,7 +17,7 @@
 
 namespace catgut {
 
-constexpr uint32_t kRecordingFormat = 2;
+constexpr uint32_t kRecordingFormat = 3;
 
 struct RecordingHeader {
   std::string catgut_version;  // of the recording program

@@ -68,15 +68,14 @@ void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, 
   find_boxes(solver, state.solver, state.scratch, jobs, times);
   meet_hands(state, input);
   handle_instruments(model, state, input);
-  const std::array<uint32_t, kMaxHands> pressed = pressed_buttons(state.suture, input.hand);
   SutureContext sewing{solver, state.solver, state.scratch, model.suture, state.suture, state.event};
   grasp(sewing, input.hand);
   {
     StageTimer timer(times, Stage::loop);
     find_loops(sewing);
     tie(sewing);
-    cut(sewing, pressed);
-    new_suture(sewing, model.start, model.needle_start, pressed);
+    cut(sewing, input);
+    new_suture(sewing, model.start, model.needle_start, input);
   }
   // Margin: the distance that thread and tools can approach in a tick at 0.5 m/s, but at least the jump of a knot's thread
   // when it slips.

@@ -56,7 +56,7 @@ void Scripted::take_over(const Snapshot& seen) {
 TickInput Scripted::operate(const Snapshot& seen, float dt) {
   if (takes_over_) take_over(seen);
   const std::array<Pose, 2> before{hand_[0].pose, hand_[1].pose};
-  buttons_ = {};
+  commands_.clear();
   if (!done()) {
     waited_ += dt;
     dt_ = dt;
@@ -66,10 +66,10 @@ TickInput Scripted::operate(const Snapshot& seen, float dt) {
     }
   }
   TickInput out;
+  out.commands = commands_;
   for (size_t k = 0; k < 2; ++k) {
     tremble(hand_[k], skill_.tremor, random_, dt);
     out.hand[k] = as_input(hand_[k], before[k], dt, sequence_);
-    out.hand[k].buttons = buttons_[k];
   }
   // Assistant hands with an instrument in the scene wait open beyond the field.
   for (size_t k = 2; k < kMaxHands; ++k) {

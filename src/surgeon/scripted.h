@@ -55,6 +55,10 @@ class Scripted final : public Surgeon {
   static Pose raised(const Pose& tool, float by) { return {tool.p + rotate(tool.q, {0, 0, by}), tool.q}; }
 
   void take_over(const Snapshot& seen);
+  // About the suture in hand.
+  void order(CommandKind kind, size_t hand) {
+    commands_.push({kind, static_cast<uint8_t>(hand), static_cast<uint16_t>(suture_)});
+  }
 
   // An idle hand waits clear of the work, on its own side of the field.
   void rest_aside(const Snapshot& seen, size_t hand);
@@ -144,7 +148,7 @@ class Scripted final : public Surgeon {
   Random random_;
   std::array<ScriptedHand, 2> hand_;
   std::array<ScriptedHand, kMaxHands - 2> assistant_;
-  std::array<uint32_t, 2> buttons_{};
+  CommandList commands_;  // of this tick
   size_t task_ = 0;
   size_t suture_ = 0;  // in hand
   int stage_ = 0;      // within the task

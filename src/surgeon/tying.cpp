@@ -232,7 +232,7 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
   const size_t last = seen.active().thread_order.size() - 1;
   if (kind == TaskKind::cut_needle) {  // the forceps holds the needle by its end: cut right there
     if (stage_ == over) {
-      buttons_[kForceps] = kButtonCut;
+      order(CommandKind::cut, kForceps);
       go(away);
     } else if (!seen.active().needle_on_thread || !patience(0.5f)) {
       if (seen.active().needle_on_thread) return miss(over), false;
@@ -264,7 +264,7 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
       if (move(kNeedleHolder, goal, careful()) || !patience(3)) go(snip);
       return false;
     case snip:
-      buttons_[kNeedleHolder] = kButtonCut;
+      order(CommandKind::cut, kNeedleHolder);
       go(away);
       return false;
     default:
@@ -304,7 +304,7 @@ bool Scripted::fresh(const Snapshot& seen) {
       if (waited_ > 0.6f) go(ask);
       return false;
     case ask:
-      buttons_[kNeedleHolder] = kButtonNewSuture;
+      order(CommandKind::new_suture, kNeedleHolder);
       settled_before_ = seen.settled.size();
       go(wait);
       return false;

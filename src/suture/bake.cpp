@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// suture/bake: a new suture (kButtonNewSuture). Reads the thread and its knots; tied thread becomes a baked suture, the rest of
-// the old suture is removed. Cost stays flat for any number of stitches in a procedure (paper 3.4): a baked suture is a curve
-// that the tissue carries, and a few tethers between the points that its thread held together.
+// suture/bake: a new suture (CommandKind::new_suture). Reads the thread and its knots; tied thread becomes a baked suture, the
+// rest of the old suture is removed. Cost stays flat for any number of stitches in a procedure (paper 3.4): a baked suture is a
+// curve that the tissue carries, and a few tethers between the points that its thread held together.
 #include <algorithm>
 
 #include "suture/suture.h"
@@ -219,15 +219,11 @@ void let_go_of(OneSuture& s) {
 
 }  // namespace
 
-bool new_suture(SutureContext& c, std::span<const Vec3> start, std::span<const Pose> needle_start,
-                const std::array<uint32_t, kMaxHands>& pressed) {
-  uint8_t who = 0;
-  while (who < kMaxHands && !(pressed[who] & kButtonNewSuture)) ++who;
-  if (who == kMaxHands) return false;
-  uint32_t which = c.state.active;
-  for (const InstrumentState& tool : c.state.instrument)
-    if (tool.hand == who && (tool.held == Held::needle || tool.held == Held::thread)) which = tool.suture;
-  OneSuture s(c, which);
+namespace {
+
+bool replace(SutureContext& c, const Command& command, std::span<const Vec3> start, std::span<const Pose> needle_start) {
+  const uint8_t who = command.hand;
+  OneSuture s(c, command.argument);
   if (!s.own.open.empty()) {
     c.report_fault(s.index, Fault::needle_in_tissue, who, s.own.open.back().bite, s.body().x);
     return false;
@@ -245,6 +241,19 @@ bool new_suture(SutureContext& c, std::span<const Vec3> start, std::span<const P
   fresh_suture(c.model, c.solver, s.index, start, needle_start[s.index]);
   c.report(s.index, EventKind::suture_loaded, who, s.own.suture_index++, 0, s.body().x);
   return true;
+}
+
+}  // namespace
+
+bool new_suture(SutureContext& c, std::span<const Vec3> start, std::span<const Pose> needle_start, const TickInput& input) {
+  bool any = false;
+  for (const Command& command : input.commands) {
+    if (command.kind != CommandKind::new_suture) continue;
+    const bool ready = command.hand < kMaxHands && input.hand[command.hand].connected;
+    if (ready && command.argument < c.state.suture.size()) any = replace(c, command, start, needle_start) || any;
+    else c.refuse(command);
+  }
+  return any;
 }
 
 }  // namespace catgut

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// suture/cut: scissors. Reads buttons and tools; marks the cut pair (Strand::cut), or removes the thread from its needle.
+// suture/cut: scissors. Reads commands and tools; marks the cut pair (Strand::cut), or removes the thread from its needle.
 // To loops, knots, pulls and the solver a cut is an end of the thread. A stitch opened by a wrong cut stays open.
 #include <algorithm>
 
@@ -24,43 +24,25 @@ Way to_stitch(const Strand& t, size_t i, int way) {
   }
 }
 
-}  // namespace
-
-std::array<uint32_t, kMaxHands> pressed_buttons(SutureState& state, const HandInputs& hand) {
-  std::array<uint32_t, kMaxHands> pressed{};
-  for (size_t who = 0; who < kMaxHands; ++who) {
-    const uint32_t now = hand[who].connected ? hand[who].buttons : 0;
-    pressed[who] = now & ~state.buttons[who];
-    state.buttons[who] = now;
-  }
-  return pressed;
-}
-
-namespace {
-
-// Where the scissors cut: which suture's thread, which pair, and the fraction along it.
+// Where the scissors cut a suture's thread: which pair, and the fraction along it.
 struct Place {
-  uint32_t suture = 0;
   size_t pair = 0;
   float along = 0;
   bool found = false;
 };
-Place where_cut(const SutureContext& c, uint32_t who) {
-  Place place;
+Place where_cut(const SutureContext& c, uint32_t who, uint32_t suture) {
+  const Strand& t = c.solver.strand[suture];
   // A hand that holds the needle has the thread cut at the needle, at any place on the arc.
   const InstrumentState& hand = c.state.instrument[who];
-  if (hand.held == Held::needle && !c.solver.strand[hand.suture].cut.back())
-    return {hand.suture, c.solver.strand[hand.suture].cut.size() - 1, 1, true};
+  if (hand.held == Held::needle && hand.suture == suture && !t.cut.back()) return {t.cut.size() - 1, 1, true};
+  Place place;
   const Vec3 at = c.solver.body[who].x;
   float best = c.suture.cut_reach;
-  for (uint32_t k = 0; k < c.solver.strand.size(); ++k) {
-    const Strand& t = c.solver.strand[k];
-    for (size_t i = 0; i + 1 < t.order.size(); ++i) {
-      if (t.cut[i]) continue;
-      const Vec3 a = xyz(c.solver.x[t.order[i]]), b = xyz(c.solver.x[t.order[i + 1]]);
-      const float s = closest_on_segment(at, a, b), far = distance(a + (b - a) * s, at);
-      if (far < best) best = far, place = {k, i, s, true};
-    }
+  for (size_t i = 0; i + 1 < t.order.size(); ++i) {
+    if (t.cut[i]) continue;
+    const Vec3 a = xyz(c.solver.x[t.order[i]]), b = xyz(c.solver.x[t.order[i + 1]]);
+    const float s = closest_on_segment(at, a, b), far = distance(a + (b - a) * s, at);
+    if (far < best) best = far, place = {i, s, true};
   }
   return place;
 }
@@ -109,13 +91,20 @@ void cut_at(OneSuture& s, uint8_t by, size_t i, float along) {
 
 }  // namespace
 
-void cut(SutureContext& c, const std::array<uint32_t, kMaxHands>& pressed) {
-  for (uint32_t who = 0; who < c.state.instrument.size(); ++who) {
-    const uint8_t by = hand_of(c.state, who);
-    if (by == kNoHand || !(pressed[by] & kButtonCut) || !c.suture.instrument[who].can(kCutThread)) continue;
-    const Place place = where_cut(c, who);
+void cut(SutureContext& c, const TickInput& input) {
+  for (const Command& command : input.commands) {
+    if (command.kind != CommandKind::cut) continue;
+    const uint8_t by = command.hand;
+    uint32_t who = 0;
+    while (who < c.state.instrument.size() && hand_of(c.state, who) != by) ++who;
+    const bool has = by < kMaxHands && input.hand[by].connected && who < c.state.instrument.size();
+    if (!has || !c.suture.instrument[who].can(kCutThread) || command.argument >= c.state.suture.size()) {
+      c.refuse(command);
+      continue;
+    }
+    const Place place = where_cut(c, who, command.argument);
     if (!place.found) continue;
-    OneSuture s(c, place.suture);
+    OneSuture s(c, command.argument);
     cut_at(s, by, place.pair, place.along);
   }
 }

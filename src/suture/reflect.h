@@ -51,7 +51,7 @@ constexpr void reflect(auto& a, Like<Suture> auto& s) {
 }
 constexpr void reflect(auto& a, Like<SutureState> auto& s) {
   a.column(s.suture, IndexOf::strand), a.column(s.instrument, IndexOf::instrument), a.column(s.loop, IndexOf::instrument);
-  a(s.settled), a(s.buttons), a.index(s.active, IndexOf::strand);
+  a(s.settled), a.index(s.active, IndexOf::strand);
 }
 
 constexpr void reflect(auto& a, Like<ClosurePlan::Pull> auto& p) { a(p.point), a(p.from), a(p.to); }

@@ -135,11 +135,10 @@ struct Suture {
 
 struct SutureState {
   std::vector<Suture> suture;
-  std::vector<InstrumentState> instrument;    // like SutureModel::instrument
-  std::vector<ToolLoop> loop;                 // on each instrument
-  std::vector<BakedSuture> settled;           // in order of baking
-  std::array<uint32_t, kMaxHands> buttons{};  // of each hand in the last tick
-  uint32_t active = 0;                        // the suture whose needle was grasped last: the one that a new suture replaces
+  std::vector<InstrumentState> instrument;  // like SutureModel::instrument
+  std::vector<ToolLoop> loop;               // on each instrument
+  std::vector<BakedSuture> settled;         // in order of baking
+  uint32_t active = 0;                      // the suture whose needle was grasped last: the one that a new suture replaces
 };
 
 // The hand that has the instrument, for events; kNoHand if there is none.
@@ -165,6 +164,10 @@ struct SutureContext {
   void report_tool(uint32_t of, EventKind kind, uint32_t tool, uint32_t which, float value, Vec3 where,
                    Fault fault = Fault::none, LoopReason reason = LoopReason::none) {
     report(of, kind, hand_of(state, tool), which, value, where, fault, reason);
+  }
+  // The command changes nothing, and is reported.
+  void refuse(const Command& command) {
+    report(0, EventKind::instrument_refused, static_cast<uint8_t>(command.hand % kMaxHands), command.argument, 0, {});
   }
   void report_fault(uint32_t of, Fault fault, uint8_t hand, uint32_t which, Vec3 where) {
     report(of, EventKind::technique_fault, hand, which, 0, where, fault);
@@ -227,21 +230,17 @@ void tighten(SutureContext& c);
 void undo_throws(OneSuture& s);
 
 // --- cut.cpp -----------------------------------------------------------------------------------------------------------
-// Buttons pressed since the last tick, by hand; stores the current ones.
-std::array<uint32_t, kMaxHands> pressed_buttons(SutureState& state, const HandInputs& hand);
-// Once per tick. kButtonCut cuts the thread nearest to the tool's jaws; a cut of the last pair separates the needle. A cut in
-// a wrong place is reported and stays.
-void cut(SutureContext& c, const std::array<uint32_t, kMaxHands>& pressed);
+// Once per tick. A command `cut` cuts the thread of its suture that is nearest to the jaws, within cut_reach; a cut of the last
+// pair separates the needle. A cut in a wrong place is reported and stays. Refused without scissors or without that suture.
+void cut(SutureContext& c, const TickInput& input);
 // A jaw that has just closed on thread also holds the other strands between its tips: the two ends of a stay suture.
 void hold_other_strands(SutureContext& c, uint32_t who);
 
 // --- bake.cpp ----------------------------------------------------------------------------------------------------------
-// Once per tick. kButtonNewSuture of a hand replaces the suture whose needle or thread that hand holds, else the active one.
-// Tied thread is baked, tails included, and tethers take over its tension; the rest is removed. A new needle and thread appear
-// on the drape. Bites stay listed. Refused while the needle is in tissue. True: done. start: positions of all
-// particles at the start [m]; needle_start: of every suture's needle.
-bool new_suture(SutureContext& c, std::span<const Vec3> start, std::span<const Pose> needle_start,
-                const std::array<uint32_t, kMaxHands>& pressed);
+// Once per tick. A command `new_suture` replaces its suture. Tied thread is baked, tails included, and tethers take over its
+// tension; the rest is removed. A new needle and thread appear on the drape. Bites stay listed. Refused while the needle is in
+// tissue. True: at least one was replaced. start: positions of all particles at the start [m]; needle_start: of every needle.
+bool new_suture(SutureContext& c, std::span<const Vec3> start, std::span<const Pose> needle_start, const TickInput& input);
 // Needle and thread as at the start, held by nothing but the swage.
 void fresh_suture(const SolverModel& model, SolverState& solver, size_t suture, std::span<const Vec3> start,
                   const Pose& needle_start);

@@ -186,7 +186,7 @@ TEST_F(Window, somebody_takes_the_needle_and_everything_is_recorded) {
   bool pressed = false, closed = false;
   for (const RecordedTick& t : r.tick) {
     if (t.input.hand[1].connected) farthest = std::max(farthest, distance(t.input.hand[1].pose.p, first.p));
-    pressed = pressed || (t.input.hand[1].buttons & kButtonNewSuture);
+    for (const Command& c : t.input.commands) pressed = pressed || (c.kind == CommandKind::new_suture && c.hand == 1);
     closed = closed || t.input.hand[0].jaw == 0;
   }
   EXPECT_GT(farthest, 0.005f) << "Tab gave the mouse to the other hand";

@@ -67,8 +67,7 @@ class LockStep : public WorkQueue {
     const auto surgeon = make_demonstrator(scene_.technique.name, picture_, skill_of(scene_), tasks);
     Snapshot seen = look_.seen;
     for (int i = 0; i < 3600 && !surgeon->done(); ++i) {
-      TickInput in;
-      in.hand = surgeon->operate(seen, kTick).hand;
+      const TickInput in = surgeon->operate(seen, kTick);
       step(*model_, *state_, in, jobs_);
       publish(*model_, *state_, seen);
       if (done(seen)) return true;

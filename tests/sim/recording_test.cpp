@@ -131,5 +131,37 @@ TEST(Recording, says_what_it_is_not) {
   EXPECT_THROW(Recorder("/nowhere/at/all.cgrec", {}, {}), InputError);
 }
 
+// The header that release 0.1 wrote, byte by byte: magic, format 1, and a chunk of its kind.
+TEST(Recording, of_release_0_1_is_refused_in_one_line) {
+  const std::string old("CATGUT\x1a\n\x01\0\0\0\x01\0\0\0", 16);
+  try {
+    parse_recording(old + std::string(200, 'x'), "session.cgrec");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(),
+                 "session.cgrec: the recording has format 1, this version reads format 3; replay it with the version that "
+                 "recorded it");
+  }
+}
+
+TEST(Recording, commands_come_back_with_their_hand_and_suture) {
+  const std::string path = testing::TempDir() + "catgut_commands_" + std::to_string(::getpid()) + ".cgrec";
+  {
+    Recorder recorder(path, {"0.2.0", 1, ""}, {});
+    TickInput in;
+    in.commands.push({CommandKind::cut, 2, 1});
+    in.commands.push({CommandKind::new_suture, 0, 300});
+    recorder.tick(in, 0);
+    recorder.finish(false);
+  }
+  const Recording r = read_recording(path);
+  std::filesystem::remove(path);
+  ASSERT_EQ(r.tick.size(), 1u);
+  const CommandList& c = r.tick[0].input.commands;
+  ASSERT_EQ(c.count, 2u);
+  EXPECT_TRUE(c.row[0].kind == CommandKind::cut && c.row[0].hand == 2 && c.row[0].argument == 1);
+  EXPECT_TRUE(c.row[1].kind == CommandKind::new_suture && c.row[1].hand == 0 && c.row[1].argument == 300);
+}
+
 }  // namespace
 }  // namespace catgut

@@ -7,10 +7,12 @@
 namespace catgut {
 namespace {
 
-void press(Rig& r, size_t hand = 0) {
-  r.input.hand[hand].buttons = kButtonNewSuture;
-  r.tick();
-  r.input.hand[hand].buttons = 0;
+void press(Rig& r, size_t hand = 0) { r.order(CommandKind::new_suture, hand); }
+
+TickInput new_suture_by_hand_0() {
+  TickInput input;
+  input.commands.push({CommandKind::new_suture, 0, 0});
+  return input;
 }
 
 // Ties two throws, or one, and cuts both ends.
@@ -31,7 +33,7 @@ void tie_and_cut(Tie& r, int throws = 2) {
 std::vector<Event> settle(Tie& r) {
   EventList events;
   SutureContext sewing = r.context(events);
-  EXPECT_TRUE(new_suture(sewing, r.model->start, r.model->needle_start, {kButtonNewSuture}));
+  EXPECT_TRUE(new_suture(sewing, r.model->start, r.model->needle_start, new_suture_by_hand_0()));
   return events.list;
 }
 
@@ -86,7 +88,7 @@ TEST(Settle, a_tied_stitch_becomes_a_curve_and_pins) {
   for (size_t i = cut0 + 1; i <= cut1; ++i) where.push_back(xyz(r.x()[order[i]]));
   EventList events;
   SutureContext sewing = r.context(events);
-  ASSERT_TRUE(new_suture(sewing, r.model->start, r.model->needle_start, {kButtonNewSuture}));
+  ASSERT_TRUE(new_suture(sewing, r.model->start, r.model->needle_start, new_suture_by_hand_0()));
   // The curve: every particle of the piece, at its position; tails included, cut-off thread removed.
   ASSERT_EQ(r.suture().settled.size(), 1u);
   Snapshot seen;
@@ -422,7 +424,7 @@ TEST(Settle, ten_stitches_leave_nothing_but_themselves) {
   for (size_t k = 1; k < bytes.size(); ++k) EXPECT_LT(bytes[k] - bytes[k - 1], 3000u);
 }
 
-// The same buttons, the same bits: only through inputs.
+// The same commands, the same bits: by inputs alone.
 TEST(Settle, replays_the_same) {
   std::vector<uint64_t> hash[2];
   for (int run = 0; run < 2; ++run) {
@@ -432,7 +434,9 @@ TEST(Settle, replays_the_same) {
       ToolInput& hand = r.input.hand[1];
       hand.connected = i > 5;
       hand.pose = {{0.06f - 0.0002f * static_cast<float>(i), -0.034f, 0.01f}, {}};
-      hand.buttons = (i == 30 || i == 60 ? kButtonNewSuture : 0u) | (i == 40 || i == 50 ? kButtonCut : 0u);
+      r.input.commands.clear();
+      if (i == 30 || i == 60) r.input.commands.push({CommandKind::new_suture, 1, 0});
+      if (i == 40 || i == 50) r.input.commands.push({CommandKind::cut, 1, 0});
       r.input.tick = r.state->tick;
       step(*r.model, *r.state, r.input, jobs);
       hash[run].push_back(hash_state(*r.model, *r.state));

@@ -9,7 +9,7 @@ namespace {
 
 size_t cuts(Rig& r) { return static_cast<size_t>(std::count(r.thread().cut.begin(), r.thread().cut.end(), 1)); }
 
-TEST(Cut, the_nearest_pair_within_reach_once_a_press) {
+TEST(Cut, the_nearest_pair_within_reach_once_a_command) {
   Rig r(weightless(40));
   r.wait(0.1f);
   snip(r, between(r, 12) + Vec3{0, 0.006f, 0});
@@ -21,8 +21,8 @@ TEST(Cut, the_nearest_pair_within_reach_once_a_press) {
   EXPECT_EQ(r.last(EventKind::thread_cut)->which, r.thread().order[12]);
   EXPECT_EQ(r.last(EventKind::thread_cut)->value, -1.0f) << "no stitch to measure to";
   EXPECT_EQ(r.last(EventKind::technique_fault)->fault, Fault::cut_before_knot);
-  // Held down, the button cuts no further, whatever moves between the blades.
-  r.input.hand[1].buttons = kButtonCut;
+  // Without another command nothing is cut, whatever comes between the blades and whatever button is down.
+  r.input.hand[1].buttons = kButtonCut | kButtonNewSuture;
   r.tick();
   for (int i = 0; i < 10; ++i) {
     r.input.hand[1].pose.p = between(r, 20), r.solver().body[1].x = between(r, 20);
@@ -197,6 +197,48 @@ TEST(Cut, both_ends_are_held_by_one_tool) {
   }
   for (float jaw : {0.4f, 0.7f}) hand.jaw = jaw, r.tick();
   for (const ThreadHold& h : r.thread().hold) EXPECT_NE(h.kind, HoldKind::jaw) << "opening drops both";
+}
+
+// Two threads lie across each other under the same scissors: the command says which of them is meant.
+TEST(Cut, the_command_names_the_suture) {
+  for (const uint16_t which : {uint16_t{0}, uint16_t{1}}) {
+    SceneSpec scene = weightless(40);
+    scene.suture.assign(2, {scene.thread, scene.needle});
+    Rig r(scene);
+    r.wait(0.1f);
+    std::vector<Strand>& strand = r.solver().strand;
+    // The second thread beside the first, 1 mm above it.
+    for (size_t i = 0; i < strand[1].order.size(); ++i) {
+      const Vec3 beside = xyz(r.x()[strand[0].order[i]]) + Vec3{0, 0.001f, 0};
+      r.solver().x[strand[1].order[i]] = point(beside);
+    }
+    snip(r, between(r, 12), 1, which);
+    ASSERT_EQ(r.count(EventKind::thread_cut), 1u);
+    EXPECT_EQ(r.last(EventKind::thread_cut)->suture, which);
+    for (uint16_t k = 0; k < 2; ++k)
+      EXPECT_EQ(std::count(strand[k].cut.begin(), strand[k].cut.end(), 1), k == which) << "thread " << k;
+    r.order(CommandKind::new_suture, 1, which);
+    EXPECT_EQ(r.suture().suture[which].suture_index, 1u);
+    EXPECT_EQ(r.suture().suture[1 - which].suture_index, 0u) << "the other lies as it was";
+  }
+}
+
+TEST(Cut, commands_that_cannot_be_carried_out_change_nothing_and_are_reported) {
+  Rig r(weightless(40));
+  r.wait(0.1f);
+  const auto refused = [&](CommandKind kind, size_t hand, uint16_t argument) {
+    const size_t before = r.count(EventKind::instrument_refused);
+    r.order(kind, hand, argument);
+    return r.count(EventKind::instrument_refused) == before + 1;
+  };
+  r.input.hand[1].connected = 1;
+  for (const CommandKind kind : {CommandKind::cut, CommandKind::new_suture}) {
+    EXPECT_TRUE(refused(kind, 1, 1)) << "there is one suture";
+    EXPECT_TRUE(refused(kind, 3, 0)) << "a hand that is not connected";
+    EXPECT_TRUE(refused(kind, 200, 0)) << "no such hand";
+  }
+  EXPECT_EQ(r.count(EventKind::thread_cut), 0u);
+  EXPECT_EQ(r.sewn().suture_index, 0u);
 }
 
 }  // namespace

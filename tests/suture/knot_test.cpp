@@ -592,10 +592,8 @@ TEST(KnotState, survives_hands_that_do_anything) {
           break;
         case 6:
           if (random.next() % 3) break;
-          r.input.hand[0].buttons = kButtonNewSuture;
           if (r.ghost >= 0) r.let_go();
-          r.tick();
-          r.input.hand[0].buttons = 0;
+          r.order(CommandKind::new_suture, 0);
           break;
         case 7:
           r.input.hand[1] = r.input.hand[0], r.input.hand[1].pose.p += Vec3{0.002f, 0, 0}, r.tick();

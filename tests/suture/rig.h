@@ -64,6 +64,12 @@ struct Rig {
     seen.insert(seen.end(), state->event.begin(), state->event.end());
     ASSERT_TRUE(state_is_valid(*model, *state)) << "at tick " << state->tick;
   }
+  // One tick in which a hand has a command.
+  void order(CommandKind kind, size_t hand, uint16_t argument = 0) {
+    input.commands.push({kind, static_cast<uint8_t>(hand), argument});
+    tick();
+    input.commands.clear();
+  }
   void wait(float seconds) {
     for (int i = static_cast<int>(std::lround(seconds / model->dt)); i > 0 && !testing::Test::HasFatalFailure(); --i) tick();
   }
@@ -218,7 +224,7 @@ inline void put_needle(Rig& rig, Vec3 swage) {
 
 // --- scissors ---
 // Hand 1, free of everything, cuts at `at`.
-inline void snip(Rig& r, Vec3 at, size_t hand = 1) {
+inline void snip(Rig& r, Vec3 at, size_t hand = 1, uint16_t suture = 0) {
   r.input.hand[hand].connected = 1;
   r.input.hand[hand].pose = {at, axis_angle({1, 0, 0}, -0.5f * kPi)};
   RigidBody& b = r.solver().body[hand];
@@ -226,9 +232,7 @@ inline void snip(Rig& r, Vec3 at, size_t hand = 1) {
   b.x = b.prev_x = at, b.q = b.prev_q = r.input.hand[hand].pose.q;
   r.state->hand[hand].pose = r.input.hand[hand].pose;
   r.state->hand[hand].known = 1;
-  r.input.hand[hand].buttons = kButtonCut;
-  r.tick();
-  r.input.hand[hand].buttons = 0;
+  r.order(CommandKind::cut, hand, suture);
   r.input.hand[hand].pose.p += Vec3{0, 0.1f, 0};
   b.x = b.prev_x = r.input.hand[hand].pose.p;
   r.state->hand[hand].pose = r.input.hand[hand].pose;
