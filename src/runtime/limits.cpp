@@ -80,8 +80,8 @@ struct Stretch {
   std::vector<TickInput> input;
 };
 
-SutureGrowth sew_in_turns(const SceneSpec& scene, int threads, const Stretch& first, const Stretch& last,
-                          const std::atomic<bool>* stop) {
+SutureGrowth rerun_alternating(const SceneSpec& scene, int threads, const Stretch& first, const Stretch& last,
+                               const std::atomic<bool>* stop) {
   const std::shared_ptr<const Model> model = build_model(scene);
   const StatePtr a = initial_state(*model), b = initial_state(*model);
   Jobs jobs(threads);
@@ -135,7 +135,7 @@ LimitsResult measure_limits(SceneSpec scene, int sutures, int threads, const std
     else now.input.push_back(input);
   };
   result.run = run_session(scene, options, own);
-  if (result.row.size() > 1) result.growth = sew_in_turns(scene, threads, first, last, hooks.stop);
+  if (result.row.size() > 1) result.growth = rerun_alternating(scene, threads, first, last, hooks.stop);
   return result;
 }
 

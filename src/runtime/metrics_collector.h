@@ -60,7 +60,7 @@ class MetricsCollector {
   void tick(const Snapshot& seen);  // after every tick
   void time(const StageTimes& times, double tick_ms);
   void invalidate() { valid_ = false; }
-  bool sane() const { return valid_; }
+  bool valid() const { return valid_; }
   double spent_ms() const { return spent_ms_; }
 
   // Fills values, events, percentiles and expectations; the caller sets the rest of `result` before.

@@ -84,7 +84,7 @@ struct Playback::Work {
   void begin();
   void run();
   void look_ahead();
-  void tell();
+  void publish_result();
   void move_to(uint64_t to);
   void step_shown();
   void publish_view();
@@ -137,13 +137,13 @@ void Playback::Work::look_ahead() {
         keep_every *= 2;
       }
     }
-    if (published.known % kGatherEvery == 0 || published.known == published.ticks) tell();
+    if (published.known % kGatherEvery == 0 || published.known == published.ticks) publish_result();
     if (!state_is_valid(*model, *ahead))
       throw SimulationUnstable(name + ": the simulation became unstable here; earlier ticks can be viewed");
   }
 }
 
-void Playback::Work::tell() {
+void Playback::Work::publish_result() {
   const std::lock_guard lock(mutex);
   gathered = so_far;
   ++published.gathered;
@@ -236,7 +236,7 @@ void Playback::Work::run() {
     } catch (const std::exception& error) {
       published.fault = error.what();
       whole = going = false;
-      tell();
+      publish_result();
       publish_view();
       continue;
     }

@@ -61,7 +61,7 @@ class Run {
       reported_at_ = Clock::now();
       hooks_.on_progress({simulated_s(), until_s, simulated_s() * 1000 / metrics_.spent_ms(), doing});
     }
-    return !stopped() && !enough_ && metrics_.sane();
+    return !stopped() && !enough_ && metrics_.valid();
   }
 
   bool stopped() const { return hooks_.stop && hooks_.stop->load(std::memory_order_relaxed); }
@@ -81,7 +81,7 @@ class Run {
     result.interrupted = stopped();
     if (enough_) result.ended = "stopped by callback";
     if (result.interrupted) result.ended = "interrupted";
-    if (!metrics_.sane()) result.ended = "invalid state";
+    if (!metrics_.valid()) result.ended = "invalid state";
     metrics_.finish(seen_, result);
   }
 

@@ -12,7 +12,7 @@ namespace catgut {
 // peak, where the paper's rule releases the tissue (release_distance, 2.2 mm). a1 leaves 0.62 N/mm there, within the 0.5
 // to 1.2 N/mm of a point load in the wall (docs/references.md).
 constexpr float kEntryStart = 200;  // [N/m] a1
-constexpr float kEntryPeak = 0.9f;  // [N] 0.9 +- 0.3; skin, same needles: 0.5 to 1.0 (Maloney); colon 1.6 to 1.8 a blunt spike
+constexpr float kEntryPeak = 0.9f;  // [N] 0.9 +- 0.3; rabbit cartilage: 0.61 to 0.90 (Maloney); colon, blunt spike: 1.6 to 1.8
 constexpr float kExitPeak = 0.54f;  // [N] 0.6 of the entry's; two peaks, in and out (Frick et al. 2001)
 constexpr float kExitReach = 0.0008f;  // [m] of wall before the tip, over which it rises (assumption)
 constexpr float kPunctureKeep = 0.4f;  // fraction of the peak after the drop, in 3 to 5 ms

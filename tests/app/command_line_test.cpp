@@ -194,22 +194,22 @@ TEST_F(CommandLine, arms_are_lent_over_the_bridge) {
   setenv("CATGUT_LIBHD", CATGUT_FAKE_LIBHD, 1);
   expect_refused("bridge --listen 203.0.113.7:0", "use a local address");
   expect_refused("bridge --listen 0.0.0.0:0 --arms touch:/nowhere/libHD.so", "could apply forces");
-  FILE* lender = popen("echo $$; exec '" CATGUT_APP "' bridge --listen 127.0.0.1:0 --seconds 60", "r");
+  FILE* server = popen("echo $$; exec '" CATGUT_APP "' bridge --listen 127.0.0.1:0 --seconds 60", "r");
   unsetenv("CATGUT_LIBHD");
-  ASSERT_NE(lender, nullptr);
+  ASSERT_NE(server, nullptr);
   char line[256];
-  ASSERT_NE(fgets(line, sizeof line, lender), nullptr);
+  ASSERT_NE(fgets(line, sizeof line, server), nullptr);
   const pid_t pid = std::atoi(line);
   std::string port;
-  while (port.empty() && fgets(line, sizeof line, lender))
+  while (port.empty() && fgets(line, sizeof line, server))
     if (const char* at = std::strstr(line, ", port ")) port = std::to_string(std::atoi(at + 7));
   const Outcome lent = run_catgut("devices bridge:127.0.0.1:" + port);
   EXPECT_NE(lent.out.find("bridge: left device"), std::string::npos) << lent.out;
   EXPECT_NE(lent.out.find("right-0001"), std::string::npos) << lent.out;
   EXPECT_EQ(lent.out.find("touch"), std::string::npos) << "of the driver that was asked for alone";
   kill(pid, SIGTERM);
-  while (fgets(line, sizeof line, lender)) {}
-  EXPECT_EQ(pclose(lender), 0) << "a clean end";
+  while (fgets(line, sizeof line, server)) {}
+  EXPECT_EQ(pclose(server), 0) << "a clean end";
   const Outcome gone = run_catgut("devices bridge:127.0.0.1:" + port);
   EXPECT_NE(gone.out.find("bridge: no answer"), std::string::npos) << gone.out;
 }

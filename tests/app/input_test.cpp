@@ -109,7 +109,7 @@ TEST_F(WindowEventsTest, keys) {
   EXPECT_EQ(read().key, Key::take_back);
 }
 
-TEST_F(WindowEventsTest, two_keys_between_two_slow_pictures_are_both_told) {
+TEST_F(WindowEventsTest, two_keys_between_two_slow_frames_are_both_reported) {
   key(SDLK_h, SDL_SCANCODE_H, true), key(SDLK_h, SDL_SCANCODE_H, false), key(SDLK_F2, SDL_SCANCODE_F2, true);
   EXPECT_EQ(read().key, Key::help_at_needle);
   EXPECT_EQ(read().key, Key::settings);
@@ -171,12 +171,12 @@ TEST_F(WindowEventsTest, a_gamepad_comes_works_and_goes) {
   SDL_JoystickDetachVirtual(index);
   const bool gone = read().pad_gone;
   in = read();
-  EXPECT_TRUE(gone || in.pad_gone) << "whoever worked with it gets a pause";
+  EXPECT_TRUE(gone || in.pad_gone) << "the session pauses";
   EXPECT_FALSE(in.has_pad);
   EXPECT_TRUE(events_->pad_name().empty());
 }
 
-TEST(Words, every_event_is_told_or_left_out_on_purpose) {
+TEST(Words, every_event_has_a_text_or_is_left_out_on_purpose) {
   size_t messages = 0;
   for (size_t k = 0; k < static_cast<size_t>(EventKind::count_); ++k) {
     Event e;

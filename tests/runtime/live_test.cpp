@@ -50,7 +50,7 @@ TEST(Live, keeps_the_scenes_time) {
   wait_for(live, 1.0, [](auto&) { return false; });
   const double passed = wall_seconds() - start, ticks = static_cast<double>(live.status().tick - before);
   EXPECT_LT(ticks, passed * 60 * 1.2 + 3) << "never faster than real time, but for what is caught up";
-  EXPECT_NEAR(ticks + static_cast<double>(live.status().late), passed * 60, passed * 60 * 0.5) << "what is missing is told";
+  EXPECT_NEAR(ticks + static_cast<double>(live.status().late), passed * 60, passed * 60 * 0.5) << "missing ticks are counted";
   EXPECT_TRUE(live.status().fault.empty());
 }
 

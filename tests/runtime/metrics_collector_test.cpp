@@ -13,7 +13,7 @@ struct Judged {
   SceneSpec scene;
   PictureModel picture;
   Snapshot seen;
-  std::unique_ptr<MetricsCollector> tally;
+  std::unique_ptr<MetricsCollector> collector;
 
   Judged() {
     scene.thread.particles = 11;
@@ -24,17 +24,17 @@ struct Judged {
       seen.particle.push_back({0.01f * static_cast<float>(i), 0, 0});
       seen.active().thread_order.push_back(i);
     }
-    tally = std::make_unique<MetricsCollector>(scene, picture);
+    collector = std::make_unique<MetricsCollector>(scene, picture);
   }
-  void tell(EventKind kind, uint32_t which = 0, float value = 0) { seen.event.push_back({kind, 0, which, value, {}}); }
-  void tell(Fault fault, uint32_t which) { seen.event.push_back({EventKind::technique_fault, 0, which, 0, {}, fault}); }
+  void add(EventKind kind, uint32_t which = 0, float value = 0) { seen.event.push_back({kind, 0, which, value, {}}); }
+  void add(Fault fault, uint32_t which) { seen.event.push_back({EventKind::technique_fault, 0, which, 0, {}, fault}); }
   void tick() {
-    tally->tick(seen);
+    collector->tick(seen);
     seen.event.clear();
   }
   RunResult result() const {
     RunResult r;
-    tally->finish(seen, r);
+    collector->finish(seen, r);
     return r;
   }
 };
@@ -47,13 +47,13 @@ TEST(MetricsCollector, every_result_has_a_value) {
 TEST(MetricsCollector, knots_and_throws_are_counted_through_settling) {
   Judged j;
   for (uint32_t suture = 0; suture < 5; ++suture) {
-    j.tell(EventKind::throw_locked, 0), j.tick();
-    j.tell(EventKind::throw_locked, 0);
-    if (suture == 2) j.tell(EventKind::throw_locked, 1);  // a second knot on the same thread
+    j.add(EventKind::throw_locked, 0), j.tick();
+    j.add(EventKind::throw_locked, 0);
+    if (suture == 2) j.add(EventKind::throw_locked, 1);  // a second knot on the same thread
     j.tick();
     if (suture == 4) break;
     j.seen.settled.emplace_back();
-    j.tell(EventKind::suture_baked, suture), j.tell(EventKind::suture_loaded, suture), j.tick();
+    j.add(EventKind::suture_baked, suture), j.add(EventKind::suture_loaded, suture), j.tick();
   }
   RunResult r = j.result();
   EXPECT_EQ(r.value["knots"], 6);
@@ -68,20 +68,20 @@ TEST(MetricsCollector, knots_of_two_sutures_are_counted_apart) {
   j.seen.suture.resize(2);
   j.picture.suture.resize(2);
   j.picture.suture[1].thread_count = 0;
-  j.tally = std::make_unique<MetricsCollector>(j.scene, j.picture);
-  const auto tell = [&](EventKind kind, uint16_t suture) {
-    j.tell(kind, 0);
+  j.collector = std::make_unique<MetricsCollector>(j.scene, j.picture);
+  const auto add = [&](EventKind kind, uint16_t suture) {
+    j.add(kind, 0);
     j.seen.event.back().suture = suture;
     j.tick();
   };
-  tell(EventKind::throw_locked, 0), tell(EventKind::throw_locked, 1), tell(EventKind::throw_locked, 1);
+  add(EventKind::throw_locked, 0), add(EventKind::throw_locked, 1), add(EventKind::throw_locked, 1);
   EXPECT_EQ(j.result().value["knots"], 2);
   EXPECT_EQ(j.result().value["throws"], 3);
   EXPECT_EQ(j.result().value["last_knot_throws"], 2);
   EXPECT_EQ(j.result().value["sutures"], 2);
   // One is baked: the throws of the other stay its own.
   j.seen.settled.emplace_back();
-  tell(EventKind::suture_baked, 1), tell(EventKind::suture_loaded, 1), tell(EventKind::throw_locked, 0);
+  add(EventKind::suture_baked, 1), add(EventKind::suture_loaded, 1), add(EventKind::throw_locked, 0);
   EXPECT_EQ(j.result().value["knots"], 2);
   EXPECT_EQ(j.result().value["last_knot_throws"], 2);
   EXPECT_EQ(j.result().value["sutures"], 2) << "one baked, one tied";
@@ -106,19 +106,19 @@ TEST(MetricsCollector, uneven_ends_are_those_of_the_first_knot) {
   j.seen.active().suture_point.resize(2);
   j.seen.active().suture_point[0].anchored = 3;  // 30 mm of free end
   j.seen.active().suture_point[1].anchored = 4;  // 60 mm on the needle's side
-  j.tell(EventKind::throw_started), j.tick();
+  j.add(EventKind::throw_started), j.tick();
   j.seen.active().suture_point[1].anchored = 9;
-  j.tell(EventKind::throw_started), j.tick();
+  j.add(EventKind::throw_started), j.tick();
   EXPECT_NEAR(j.result().value["tail_asymmetry"], 1.0 / 3, 1e-6);
   EXPECT_EQ(Judged().result().value["tail_asymmetry"], 0) << "no knot";
 }
 
 TEST(MetricsCollector, faults_by_name_ends_in_hand_and_the_needle) {
   Judged j;
-  j.tell(Fault::wrong_body, 2);
-  j.tell(Fault::wrong_body, 3);
-  j.tell(Fault::too_few_throws, 0);
-  j.tell(static_cast<Fault>(77), 0);  // an unknown one
+  j.add(Fault::wrong_body, 2);
+  j.add(Fault::wrong_body, 3);
+  j.add(Fault::too_few_throws, 0);
+  j.add(static_cast<Fault>(77), 0);  // an unknown one
   j.tick();
   j.seen.tool[3].held_strands = 2;  // any hand's
   j.seen.active().needle_on_thread = false;

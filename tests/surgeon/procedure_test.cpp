@@ -68,7 +68,7 @@ TEST(Procedure, shaky_hands_try_again) {
 }
 
 // Every scene states its expected results; all of them must hold, for any tremor of the hands.
-void sew(const std::string& name, uint64_t seeds) {
+void run_scene(const std::string& name, uint64_t seeds) {
   for (uint64_t seed = 1; seed <= seeds; ++seed) {
     SceneSpec scene = read_scene(name);
     scene.seed = seed;
@@ -81,19 +81,19 @@ void sew(const std::string& name, uint64_t seeds) {
   }
 }
 
-TEST(Procedure, a_stay_suture_is_tied_and_held) { sew("stay", 1); }
+TEST(Procedure, a_stay_suture_is_tied_and_held) { run_scene("stay", 1); }
 
 TEST(Procedure, twenty_seeds_of_stay) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
-  sew("stay", 20);
+  run_scene("stay", 20);
 }
 TEST(Procedure, twenty_seeds_of_connell) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
-  sew("connell", 20);
+  run_scene("connell", 20);
 }
 TEST(Procedure, twenty_seeds_of_lembert) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
-  sew("lembert", 20);
+  run_scene("lembert", 20);
 }
 
 }  // namespace

@@ -272,7 +272,7 @@ TEST(Loop, its_particles_are_frozen_on_the_tool_and_go_where_it_goes) {
     r.move(0, Vec3{0, 0.004f, 0} + r.first.out * 0.004f, 0.4f);
     for (size_t i = first; i <= last; ++i)
       EXPECT_LT(distance(to_local(r.solver().body[0].pose(), xyz(r.x()[r.thread().order[i]])), where[i - first]), 1e-6f);
-    EXPECT_EQ(r.count(EventKind::loop_formed), 1u) << "a loop is told once";
+    EXPECT_EQ(r.count(EventKind::loop_formed), 1u) << "a loop is reported once";
     EXPECT_EQ(r.count(EventKind::loop_rejected), 0u);
   }
 }
@@ -329,7 +329,7 @@ TEST(Loop, opening_wide_lets_it_go_once_and_it_does_not_come_back_by_itself) {
   EXPECT_EQ(r.holds(HoldKind::loop), 0u);
   EXPECT_EQ(r.count(EventKind::loop_released), 1u);
   r.wait(0.2f);
-  EXPECT_EQ(r.count(EventKind::loop_formed), 1u) << "what was let go is no loop until it has been taken off";
+  EXPECT_EQ(r.count(EventKind::loop_formed), 1u) << "a released loop counts again only after it has been off the tool";
 }
 
 TEST(Loop, a_pull_harder_than_a_grip_strips_it_off) {

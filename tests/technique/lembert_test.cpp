@@ -246,7 +246,7 @@ TEST(Lembert, too_few_throws_do_not_hold) {
     EXPECT_EQ(t.faults(Fault::too_few_throws), Bites{0});
     if (cut) t.fresh_suture();
     t.tick(5);
-    EXPECT_EQ(t.faults(Fault::too_few_throws).size(), 1u) << "told once";
+    EXPECT_EQ(t.faults(Fault::too_few_throws).size(), 1u) << "reported once";
     EXPECT_FLOAT_EQ(t.plan.pair[0].progress, 1) << "the good one holds";
     for (size_t row = 1; row < t.plan.pair.size(); ++row) EXPECT_EQ(t.plan.pair[row].progress, 0) << row;
     // A stitch that does not hold has no neighbors.

@@ -174,7 +174,7 @@ TEST(InBetween, pairs_close_together_with_the_later_midpoint) {
   t.point[7].span = 0.0005f;
   t.ticks_following(120);
   for (size_t row = 0; row < 4; ++row) EXPECT_NEAR(t.gap(row), t.model.gap, 1e-6f) << row;
-  EXPECT_EQ(t.count(EventKind::seam_closed), 4u) << "each told once";
+  EXPECT_EQ(t.count(EventKind::seam_closed), 4u) << "each reported once";
 }
 
 TEST(InBetween, no_particle_is_in_two_pairs) {
@@ -317,7 +317,7 @@ TEST(BegunKnot, wants_bites_in_two_walls_and_the_needle_out) {
   EXPECT_EQ(t.faults(Fault::one_wall_only), Bites{0});
   t.begin_knot();
   t.tick();
-  EXPECT_EQ(t.faults(Fault::one_wall_only), Bites{0}) << "told once";
+  EXPECT_EQ(t.faults(Fault::one_wall_only), Bites{0}) << "reported once";
   t.pass(1, t.p[10], kOut, t.p[14], kOut);
   t.needle_in_tissue = true;
   t.begin_knot();

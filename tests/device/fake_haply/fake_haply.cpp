@@ -63,7 +63,7 @@ struct FakeHaply::Work {
           {{"device_id", "61548"}, {"state", {{"orientation", {{"x", 0}, {"y", 0}, {"z", 0}, {"w", 1}}}, {"button", false}}}});
     return m;
   }
-  void obey(const json& message) {
+  void apply(const json& message) {
     for (const json& d : message.value("inverse3", json::array())) {
       const size_t k = d.value("device_id", "") == "04BA" ? 0 : 1;
       const json command = d.value("commands", json::object()).value("set_cursor_force", json::object());
@@ -113,7 +113,7 @@ struct FakeHaply::Work {
         if (quit) break;
         if (allowed > 0) --allowed;
         last = message.dump();
-        obey(message);
+        apply(message);
         text = next.empty() ? state(false).dump() : next;
         next.clear();
         ++answered;
