@@ -28,13 +28,16 @@ CATGUT_CLONES void forces(size_t nodes, const float* __restrict moment, const fl
 
 }  // namespace
 
-void add_bending(const Settings& settings, Scratch& s, size_t nodes) {
+void add_bending(const Settings& settings, const State& state, Scratch& s) {
+  const size_t nodes = state.nodes();
   const float b = settings.material.bending_stiffness;
   const float *rest = s.rest.data(), *inverse = s.inverse_rest.data(), *keep = s.keep.data();
   for (auto [e, moment, f] : {std::tuple{&s.e.x, &s.moment.x, &s.force.x}, std::tuple{&s.e.y, &s.moment.y, &s.force.y},
                               std::tuple{&s.e.z, &s.moment.z, &s.force.z}}) {
     moment->operator[](nodes - 1) = moment->operator[](nodes) = 0;
     moments(nodes, b, e->data(), rest, inverse, keep, moment->data());
+    // The corner in a hole is a hinge: bending spread over the nodes beside it would hold the thread wherever a node lies well.
+    for (const Eyelet& eyelet : state.eyelet) moment->operator[](eyelet.segment) = moment->operator[](eyelet.segment + 1) = 0;
     forces(nodes, moment->data(), inverse, f->data());
   }
 }

@@ -86,6 +86,28 @@ struct Scratch {
   std::vector<Vec3> block_middle;
   Column block_radius;
   std::vector<Vec3> tool_move;  // per substep, of both ends of every tool
+  // Soft points: motion since the step began, and what is used of SoftPoints. Four numbers a point: one register.
+  std::vector<Four> soft_moved, soft_before;
+  float soft_answer = 0;  // [s/s] step / substep: displacement per multiplier and compliance
+  // Corners in holes, one per State::eyelet: directions of the thread before and behind the corner (toward it, away from it).
+  struct Corner {
+    Vec3 in, out;
+    float length_in = 0, length_out = 0;                               // [m]
+    float pass = 1;                                                    // tension behind over tension before
+    float sub = 0, sup = 0, sub_before = 0, sup_before = 0, diag = 0;  // of its row in the stretch system
+    bool near_in = false, near_out = false;  // the node on that side is too near to the hole to give a direction
+  };
+  std::vector<Corner> corner;
+  Padded spike_right, spike_left;     // answers of the spans between corners to the corner behind and before them
+  std::vector<float> reduced, right;  // the system of the corners alone, factored
+  struct SoftActive {
+    Four normal{}, lt{}, pull_back{};
+    uint32_t node = 0, point = 0;
+    float inverse = 0, mu = 0, level = 0, ln = 0;
+    bool slipped = false;
+    uint32_t contact = 0;
+  };
+  std::vector<SoftActive> soft_active;
 };
 
 inline Vec3 between(const State& s, size_t i, size_t j) {  // node i - node j, to full resolution
@@ -101,12 +123,33 @@ void closest_points(Vec3 r, Vec3 a, Vec3 b, float& s, float& t);
 
 // stretch.cpp
 void find_edges(const State& state, Scratch& s);
-void prepare_stretch(const Settings& settings, const State& state,
-                     Scratch& s);  // directions and factor at the predicted positions
-void solve_stretch(Scratch& s, size_t segments);
+// Directions and factor at the predicted positions.
+void prepare_stretch(const Settings& settings, const State& state, Scratch& s, const SoftPoints* soft);
+void solve_stretch(const Settings& settings, const State& state, Scratch& s, SoftPoints* soft);
+
+// The tridiagonal system that prepare_stretch factored, for the given right-hand side: two chains of operations.
+void factor_tridiagonal(Scratch& s, size_t segments);
+void solve_tridiagonal(const Scratch& s, size_t segments, float* right_hand_side, float* x);
+
+// eyelet.cpp
+void begin_eyelets(const Settings& settings, State& state, Scratch& s, Surroundings& around);  // of a step
+void advance_soft(const Settings& settings, Scratch& s, const SoftPoints& soft);               // of a substep
+// Hands corners on that a node has come to; finds slip and friction.
+void turn_corners(const Settings& settings, State& state, Scratch& s, Surroundings& around);
+void find_corners(const State& state, Scratch& s, const SoftPoints& soft);
+void prepare_corners(const State& state, Scratch& s, const SoftPoints& soft);
+void take_corner_residuals(const State& state, Scratch& s, const SoftPoints& soft);
+void solve_corners(const State& state, Scratch& s);
+void apply_corners(const State& state, Scratch& s, SoftPoints& soft, float substep);
+void push_soft(Scratch& s, SoftPoints& soft, uint32_t point, Vec3 multiplier, float substep);
+
+// soft_contact.cpp
+void begin_soft_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around);
+void sweep_soft_contacts(Scratch& s, SoftPoints& soft, float substep, bool backward);
+void end_soft_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around);
 
 // bending.cpp
-void add_bending(const Settings& settings, Scratch& s, size_t nodes);
+void add_bending(const Settings& settings, const State& state, Scratch& s);
 
 // contact.cpp
 // Finds contacts at the predicted positions and applies their impulses of the last substep.

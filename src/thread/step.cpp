@@ -194,6 +194,7 @@ State make_state(std::span<const Vec3> path, size_t crossings) {
   for (size_t i = 0; i < n; ++i) s.x.set(i, path[i]);
   for (size_t i = 0; i + 1 < n; ++i) s.rest.push_back(distance(path[i], path[i + 1]));
   s.tension.assign(n - 1, 0), s.broken.assign(n - 1, 0);
+  s.eyelet.reserve(kMaxEyelets);
   s.key.reserve(crossings), s.budget.reserve(crossings), s.crossing.reserve(crossings);
   s.travel = 1e9f;  // the list is empty
   return s;
@@ -218,6 +219,9 @@ Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_un
   s.new_key.reserve(max_crossings), s.new_budget.reserve(max_crossings), s.new_crossing.reserve(max_crossings);
   s.block_middle.resize(max_nodes / 8 + 2), s.block_radius.resize(max_nodes / 8 + 2);
   s.tool_move.resize(2 * 64);
+  s.spike_right.resize(max_nodes), s.spike_left.resize(max_nodes);
+  s.soft_moved.reserve(kMaxSoftPoints), s.soft_before.reserve(kMaxSoftPoints), s.soft_active.reserve(kMaxSoftPoints);
+  s.corner.reserve(kMaxEyelets), s.reduced.resize(kMaxEyelets * kMaxEyelets), s.right.resize(kMaxEyelets);
 }
 Stepper::~Stepper() = default;
 Stepper::Stepper(Stepper&&) noexcept = default;
@@ -233,16 +237,21 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
   for (ToolCapsule& tool : around.tools) tool.force_a = tool.force_b = {};
   if (around.plane) around.plane->force = {};
   begin_step(settings, state, s);
+  begin_eyelets(settings, state, s, around);
 
   std::fill_n(s.segment_move.data(), m, 0.0f);
   for (int sub = 0; sub < settings.substeps; ++sub) {
     if (state.travel + farthest(state) > 0.5f * settings.list_margin)
       refresh_pairs(settings, state, s, around.tools, static_cast<float>(sub) * part);
     const float time = static_cast<float>(sub + 1) * part;
-    find_edges(state, s);
     find_masses(settings, state, s, around.holds);
+    if (around.soft) {
+      turn_corners(settings, state, s, around);
+      advance_soft(settings, s, *around.soft);
+    }
+    find_edges(state, s);
     for (Padded* f : {&s.force.x, &s.force.y, &s.force.z}) std::fill_n(f->data(), n, 0.0f);
-    add_bending(settings, s, n);
+    add_bending(settings, state, s);
     for (const Pull& pull : around.pulls) s.force.add(pull.node, pull.force);
     predict(n, h, settings.gravity.x, state.v.x.data(), s.force.x.data(), s.w.data(), s.u.x.data());
     predict(n, h, settings.gravity.y, state.v.y.data(), s.force.y.data(), s.w.data(), s.u.y.data());
@@ -250,13 +259,17 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
     move_holds(settings, state, s, around.holds, sub);
 
     begin_contacts(settings, state, s, around, time);
-    prepare_stretch(settings, state, s);
+    begin_soft_contacts(settings, state, s, around);
+    prepare_stretch(settings, state, s, around.soft);
     std::fill_n(s.lambda.data(), m, 0.0f);
     for (int it = 0; it < settings.iterations; ++it) {
-      solve_stretch(s, m);
-      sweep_contacts(s, (static_cast<uint32_t>(it) + state.substeps_done) & 1);
+      const bool backward = (static_cast<uint32_t>(it) + state.substeps_done) & 1;
+      solve_stretch(settings, state, s, around.soft);
+      if (!s.soft_active.empty()) sweep_soft_contacts(s, *around.soft, settings.substep, backward);
+      sweep_contacts(s, backward);
     }
     end_contacts(settings, state, s, around);
+    end_soft_contacts(settings, state, s, around);
 
     limit_motion(s, n, limit);
     record_hold_forces(settings, state, s, around.holds, sub);

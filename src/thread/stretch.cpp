@@ -65,11 +65,8 @@ void find_edges(const State& state, Scratch& s) {
 }
 
 // L D L^T from both ends toward the middle: two dependency chains instead of one of twice the length.
-void prepare_stretch(const Settings&, const State& state, Scratch& s) {
-  const size_t m = state.segments(), k = m / 2;
-  directions(m, s.e.x.data(), s.e.y.data(), s.e.z.data(), s.u.x.data(), s.u.y.data(), s.u.z.data(), s.n.x.data(), s.n.y.data(),
-             s.n.z.data());
-  matrix(m, s.n.x.data(), s.n.y.data(), s.n.z.data(), s.w.data(), s.keep.data(), s.alpha.data(), s.diag.data(), s.off.data());
+void factor_tridiagonal(Scratch& s, size_t m) {
+  const size_t k = m / 2;
   const float *diag = s.diag.data(), *off = s.off.data();
   float *down = s.down.data(), *up = s.up.data(), *inverse = s.inverse_diag.data();
   inverse[0] = 1 / diag[0];
@@ -90,10 +87,7 @@ void prepare_stretch(const Settings&, const State& state, Scratch& s) {
   inverse[k] = 1 / middle;
 }
 
-void solve_stretch(Scratch& s, size_t m) {
-  residuals(m, s.e.x.data(), s.e.y.data(), s.e.z.data(), s.u.x.data(), s.u.y.data(), s.u.z.data(), s.rest.data(), s.keep.data(),
-            s.alpha.data(), s.lambda.data(), s.residual.data());
-  float *y = s.residual.data(), *x = s.step.data();
+void solve_tridiagonal(const Scratch& s, size_t m, float* y, float* x) {
   const float *down = s.down.data(), *up = s.up.data(), *inverse = s.inverse_diag.data();
   const size_t k = m / 2, upper = m - 1 - k;  // k rows below the middle one, `upper` above; upper is k or k - 1
   float below = y[0], above = y[m - 1];
@@ -116,10 +110,32 @@ void solve_stretch(Scratch& s, size_t m) {
   }
   for (size_t c = both + 1; c <= k; ++c) x[k - c] = left = y[k - c] * inverse[k - c] - down[k - c + 1] * left;
   x[m] = 0;
+}
+
+void prepare_stretch(const Settings&, const State& state, Scratch& s, const SoftPoints* soft) {
+  const size_t m = state.segments();
+  directions(m, s.e.x.data(), s.e.y.data(), s.e.z.data(), s.u.x.data(), s.u.y.data(), s.u.z.data(), s.n.x.data(), s.n.y.data(),
+             s.n.z.data());
+  if (!state.eyelet.empty()) find_corners(state, s, *soft);
+  matrix(m, s.n.x.data(), s.n.y.data(), s.n.z.data(), s.w.data(), s.keep.data(), s.alpha.data(), s.diag.data(), s.off.data());
+  if (state.eyelet.empty()) factor_tridiagonal(s, m);
+  else prepare_corners(state, s, *soft);
+}
+
+void solve_stretch(const Settings& settings, const State& state, Scratch& s, SoftPoints* soft) {
+  const size_t m = state.segments();
+  const bool corners = !state.eyelet.empty();
+  residuals(m, s.e.x.data(), s.e.y.data(), s.e.z.data(), s.u.x.data(), s.u.y.data(), s.u.z.data(), s.rest.data(), s.keep.data(),
+            s.alpha.data(), s.lambda.data(), s.residual.data());
+  float* x = s.step.data();
+  if (corners) take_corner_residuals(state, s, *soft);
+  solve_tridiagonal(s, m, s.residual.data(), x);
+  if (corners) solve_corners(state, s);
   accumulate(m, x, s.lambda.data());
   apply(m + 1, s.n.x.data(), x, s.w.data(), s.u.x.data());
   apply(m + 1, s.n.y.data(), x, s.w.data(), s.u.y.data());
   apply(m + 1, s.n.z.data(), x, s.w.data(), s.u.z.data());
+  if (corners) apply_corners(state, s, *soft, settings.substep);
 }
 
 }  // namespace catgut::thread

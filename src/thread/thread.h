@@ -67,6 +67,19 @@ struct Crossing {
   std::array<uint8_t, 3> pad{};
 };
 
+// A hole in something soft through which the thread slides: it turns a corner there. The corner lies within one segment, whose
+// length is measured round it. When a node has come to the hole, the corner is handed to the neighboring segment.
+struct Eyelet {
+  uint32_t point = 0;    // in SoftPoints
+  uint32_t segment = 0;  // in which the corner lies
+  float friction = 0;    // Coulomb; the tensions on both sides differ by at most a factor exp(friction * turning angle)
+  float slip = 0;        // [m] of thread that passed from the first side to the second since it stuck; at most kBristle
+  float before = 0;      // [m] of thread between the segment's first node and the hole, at the end of the last substep
+  float angle = 0;       // [rad] by which the thread turns there, likewise
+};
+constexpr size_t kMaxEyelets = 128, kMaxSoftPoints = 512;  // of one step
+constexpr float kBristle = 50e-6f;                         // [m] of slip within which friction builds up
+
 struct State {
   // Per node.
   Columns3 x, fine;  // position [m] = x + fine; written by the substep
@@ -83,6 +96,7 @@ struct State {
   // Contact with the plane, per node.
   Column plane_normal;  // [N.s2]
   Columns3 plane_friction, plane_drift;
+  std::vector<Eyelet> eyelet;  // by segment; at most one in a segment
   Columns3 listed;             // [m] positions of the nodes when the pairs were listed
   float travel = 0;            // [m] motion of the tools since then; huge: the list is outdated
   uint32_t substeps_done = 0;  // parity decides the order of a sweep
@@ -103,6 +117,7 @@ void reflect(Archive& archive, AnyState& s) {
   archive("warm", s.warm), archive("rest", s.rest), archive("tension", s.tension), archive("broken", s.broken);
   archive("key", s.key), archive("budget", s.budget), archive("crossing", s.crossing);
   archive("plane_normal", s.plane_normal);
+  archive("eyelet", s.eyelet);
   archive("travel", s.travel), archive("substeps_done", s.substeps_done), archive("overflow", s.overflow);
   archive("refreshes", s.refreshes);
 }
@@ -135,17 +150,51 @@ struct Plane {
   float friction = 0.2f;
   Vec3 force;  // [N] of the thread on the plane, mean over the last step; written by step
 };
+// Points of something soft that is stepped once while the thread does all its substeps, such as a wall. They travel at `speed`,
+// and an impulse p on point i displaces every point j as if it acted for the whole step: by step * (w_ij p + tilt_ij Q_j Q_i p)
+// with Q = 1 - axis axis'. wall::Coupling fills it; "consistent multi-rate" in docs/physical.md.
+struct SoftPoints {
+  // What an impulse on a point does through the tilt of an axis that both points share.
+  struct Tilt {
+    uint32_t other = 0;
+    float value = 0;  // [1/kg]
+  };
+  float step = 1e-3f;                    // [s] of one Stepper::step
+  std::span<const Vec3> at, speed;       // [m] at the beginning of the step, [m/s] without what the thread does
+  std::span<const Vec3> axis;            // unit
+  std::span<const float> w;              // [1/kg] n x n
+  std::span<const uint32_t> tilt_first;  // n + 1, into tilt
+  std::span<const Tilt> tilt;
+  std::span<Vec3> impulse;  // [N s] of the thread on each point; written by step
+};
+// A node near the surface of something soft, for one step: it stays on its side of the plane that moves with the point.
+struct SoftContact {
+  uint32_t node = 0, point = 0;
+  Vec3 offset;         // [m] from the point to the foot on the surface; neighbors may share a point
+  uint32_t patch = 0;  // of the caller, to find what it remembers from the last step
+  Vec3 normal;         // unit, out of the surface
+  float friction = 0.1f;
+  float normal_impulse = 0;  // memory, as in Crossing; written by step
+  Vec3 friction_impulse, drift;
+  float gap = 0;  // [m] at the end of the step; written by step
+};
 struct Surroundings {
   std::span<Hold> holds;
   std::span<const Pull> pulls;
   std::span<ToolCapsule> tools;  // the same ones in the same order at every step: contacts remember the index
   Plane* plane = nullptr;
+  SoftPoints* soft = nullptr;  // of State::eyelet and of the contacts
+  std::span<SoftContact> soft_contacts;
 };
 
 struct Scratch;  // work space of a step; nothing in it outlives the step
 
 // Straight segments through `path`, with its segment lengths as rest lengths. capacity: of crossings.
 State make_state(std::span<const Vec3> path, size_t crossings = 4096);
+
+// Lays a thread through points: `path` are nodes and holes in order; hole[k] >= 0 makes path[k] a corner at that soft point
+// instead of a node. Lengths at rest are those of the path. Two holes need a node between them.
+State make_laced_state(std::span<const Vec3> path, std::span<const int32_t> hole, float hole_friction, size_t crossings = 4096);
 
 class Stepper {
  public:

@@ -522,7 +522,7 @@ void check_string(Lines& out) {
     hole.push_back(wall::nearest_point(w.model, w.state, {0.01865f, y, z}, 0));
   const auto gap = [&](const auto& a, const auto& b) { return static_cast<double>(a - b); };
   StaticWall still(w);
-  StaticString string{weights_of(w, hole)};
+  StaticString string{weights_of(w, hole), {}};
   const double from = still.length(string);
   string.length = from - drawn;
   still.solve({}, {string}, from, 7);
@@ -558,7 +558,7 @@ void check_purse(Lines& out) {
     hole.push_back(wall::nearest_point(w.model, w.state, {0.0187f * std::cos(a), 0.0187f * std::sin(a), -0.004f}, 0));
   }
   StaticWall still(w);
-  StaticString string{weights_of(w, hole)};
+  StaticString string{weights_of(w, hole), {}};
   const double from = still.length(string), drawn = 0.1 * from;
   string.length = from - drawn;
   const Drawn got = draw_string(w, hole, drawn, 3.0, 5e-5f);

@@ -82,9 +82,18 @@ void StaticWall::start_from(const wall::State& s) {
 }
 
 Vector3d StaticWall::at(const wall::Weights& w) const { return point_of(w, x_); }
+std::vector<std::array<long, 2>> StaticWall::links(const StaticString& s) {
+  const long n = static_cast<long>(s.through.size());
+  std::vector<std::array<long, 2>> out;
+  for (long i = 0; i + 1 < n; ++i) out.push_back({i, i + 1});
+  if (s.end.empty()) out.push_back({n - 1, 0});
+  else out.push_back({-1, 0}), out.push_back({n - 1, -2});
+  return out;
+}
 double StaticWall::length(const StaticString& s) const {
+  const auto where = [&](long i) { return i < 0 ? s.end[static_cast<size_t>(-1 - i)] : at(s.through[static_cast<size_t>(i)]); };
   double sum = 0;
-  for (size_t i = 0; i < s.through.size(); ++i) sum += (at(s.through[(i + 1) % s.through.size()]) - at(s.through[i])).norm();
+  for (const auto& [i, j] : links(s)) sum += (where(j) - where(i)).norm();
   return sum;
 }
 double StaticWall::tension(const StaticString& s) const { return s.stiffness * std::max(0.0, length(s) - s.length); }
@@ -109,17 +118,18 @@ double StaticWall::energy_and_force(const VectorXd& x, VectorXd* force, bool kee
     if (force) add_force(l.at, l.force, *force);
   }
   for (const StaticString& s : string_) {
-    const size_t n = s.through.size();
-    std::vector<Vector3d> p(n);
-    for (size_t i = 0; i < n; ++i) p[i] = point_of(s.through[i], x);
+    const auto where = [&](long i) {
+      return i < 0 ? s.end[static_cast<size_t>(-1 - i)] : point_of(s.through[static_cast<size_t>(i)], x);
+    };
     double length = 0;
-    for (size_t i = 0; i < n; ++i) length += (p[(i + 1) % n] - p[i]).norm();
+    for (const auto& [i, j] : links(s)) length += (where(j) - where(i)).norm();
     const double over = std::max(0.0, length - s.length);
     sum += 0.5 * s.stiffness * over * over;
     if (force)
-      for (size_t i = 0; i < n; ++i) {
-        const Vector3d u = (p[(i + 1) % n] - p[i]).normalized() * (s.stiffness * over);
-        add_force(s.through[i], u, *force), add_force(s.through[(i + 1) % n], -u, *force);
+      for (const auto& [i, j] : links(s)) {
+        const Vector3d u = (where(j) - where(i)).normalized() * (s.stiffness * over);
+        if (i >= 0) add_force(s.through[static_cast<size_t>(i)], u, *force);
+        if (j >= 0) add_force(s.through[static_cast<size_t>(j)], -u, *force);
       }
   }
   if (force)
@@ -172,19 +182,23 @@ double StaticWall::solve(const std::vector<StaticLoad>& load, const std::vector<
         VectorXd g = VectorXd::Zero(3 * n);
         double length = 0;
         for (int pass = 0; pass < 2; ++pass)
-          for (long i = 0; i < n; ++i) {
-            const long j = (i + 1) % n;
-            const Vector3d d =
-                point_of(s.through[static_cast<size_t>(j)], x_) - point_of(s.through[static_cast<size_t>(i)], x_);
+          for (const auto& [i, j] : links(s)) {
+            const auto where = [&](long k) {
+              return k < 0 ? s.end[static_cast<size_t>(-1 - k)] : point_of(s.through[static_cast<size_t>(k)], x_);
+            };
+            const Vector3d d = where(j) - where(i);
             const double l = d.norm();
             if (pass == 0) {
-              length += l, g.segment<3>(3 * j) += d / l, g.segment<3>(3 * i) -= d / l;
+              length += l;
+              if (j >= 0) g.segment<3>(3 * j) += d / l;
+              if (i >= 0) g.segment<3>(3 * i) -= d / l;
               continue;
             }
             const double t = s.stiffness * std::max(0.0, length - s.length);
             const Eigen::Matrix3d m = t / l * (Eigen::Matrix3d::Identity() - d * d.transpose() / (l * l));
-            h.block<3, 3>(3 * i, 3 * i) += m, h.block<3, 3>(3 * j, 3 * j) += m;
-            h.block<3, 3>(3 * i, 3 * j) -= m, h.block<3, 3>(3 * j, 3 * i) -= m;
+            if (i >= 0) h.block<3, 3>(3 * i, 3 * i) += m;
+            if (j >= 0) h.block<3, 3>(3 * j, 3 * j) += m;
+            if (i >= 0 && j >= 0) h.block<3, 3>(3 * i, 3 * j) -= m, h.block<3, 3>(3 * j, 3 * i) -= m;
           }
         if (length > s.length) h += s.stiffness * g * g.transpose();
         else h.setZero();

@@ -4,6 +4,7 @@
 // step, the coupling and single precision, not the element; tests/wall/reference_test.cpp tests that against other elements.
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "wall/points.h"
@@ -15,11 +16,12 @@ struct StaticLoad {
   Eigen::Vector3d force;  // [N]
 };
 
-// A frictionless string through points of the wall, closed to a loop.
+// A frictionless string through points of the wall, closed to a loop, or open from one fixed end to the other.
 struct StaticString {
   std::vector<wall::Weights> through;
-  double length = 0;       // [m] unloaded
-  double stiffness = 1e7;  // [N/m]: nearly inextensible
+  std::vector<Eigen::Vector3d> end{};  // none, or two
+  double length = 0;                   // [m] unloaded
+  double stiffness = 1e7;              // [N/m]: nearly inextensible
 };
 
 class StaticWall {
@@ -34,6 +36,8 @@ class StaticWall {
   double length(const StaticString& s) const;   // [m]
 
  private:
+  // Pairs that a string joins: indices in `through`, or -1 and -2 for its fixed ends.
+  static std::vector<std::array<long, 2>> links(const StaticString& s);
   double energy_and_force(const Eigen::VectorXd& x, Eigen::VectorXd* force, bool keep_turns);
   const wall::Wall& wall_;
   std::vector<wall::ElementRest> rest_;

@@ -148,12 +148,32 @@ float Inverse::compliance(const Topology& t, const Weights& a, const Weights& b)
   return sum;
 }
 
-void Coupling::set_points(const Model& m, const Topology& t, std::span<const Point> points) {
+namespace {
+// Sum over the columns of a point: directors (1) or mid-surface points (0).
+Vec3 sum_of(const Weights& w, const Column<Float4>& of, uint32_t which) {
+  Vec3 out{};
+  for (int k = 0; k < 4; ++k)
+    if (w.weight[k] != 0) out += vec3(of[2 * w.column[k] + which]) * w.weight[k];
+  return out;
+}
+}  // namespace
+
+void Coupling::set_points(const Model& m, const Topology& t, std::span<const Point> points, std::span<const float> offsets) {
   material_.assign(points.begin(), points.end());
   const size_t n = points.size();
   point.resize(n), at.assign(n, {}), speed.assign(n, {}), impulse.assign(n, {}), w.assign(n * n, 0);
-  for (size_t i = 0; i < n; ++i) point[i] = weights(m, t, material_[i]);
+  offset.assign(n, 0), axis.assign(n, {}), lever_.assign(n, 0), tilt_first.assign(n + 1, 0), tilt.clear();
+  for (size_t i = 0; i < n; ++i) {
+    if (!offsets.empty()) offset[i] = offsets[i];
+    if (offset[i] != 0) material_[i].zeta = 0;
+    point[i] = weights(m, t, material_[i]);
+  }
   version = t.version - 1;  // W is made in `begin`
+}
+
+void Coupling::reserve(size_t n) {
+  material_.reserve(n), point.reserve(n), at.reserve(n), speed.reserve(n), impulse.reserve(n), w.reserve(n * n);
+  offset.reserve(n), axis.reserve(n), lever_.reserve(n), tilt_first.reserve(n + 1), tilt.reserve(16 * n);
 }
 
 void Coupling::begin(const Model& m, const State& s) {
@@ -166,12 +186,43 @@ void Coupling::begin(const Model& m, const State& s) {
     for (size_t i = 0; i < n; ++i)
       for (size_t j = 0; j <= i; ++j) w[i * n + j] = w[j * n + i] = inverse.compliance(s.topology, point[i], point[j]);
   }
-  for (size_t i = 0; i < n; ++i) at[i] = place(point[i], s.motion), speed[i] = velocity(point[i], s.motion), impulse[i] = {};
+  for (size_t i = 0; i < n; ++i) {
+    at[i] = place(point[i], s.motion), speed[i] = velocity(point[i], s.motion), impulse[i] = {};
+    if (offset[i] == 0) continue;
+    const Vec3 director = sum_of(point[i], s.motion.x, 1), turn = sum_of(point[i], s.motion.v, 1);
+    const float size = std::max(length(director), 1e-9f);
+    axis[i] = director / size, lever_[i] = offset[i] / size;
+    at[i] += axis[i] * offset[i];
+    speed[i] += (turn - axis[i] * dot(turn, axis[i])) * lever_[i];
+  }
+  tilt.clear();
+  for (size_t i = 0; i < n; ++i) {
+    tilt_first[i] = static_cast<uint32_t>(tilt.size());
+    for (size_t j = 0; offset[i] != 0 && j < n; ++j) {
+      if (offset[j] == 0) continue;
+      float sum = 0;
+      for (int a = 0; a < 4; ++a)
+        for (int b = 0; b < 4; ++b)
+          if (point[i].column[a] == point[j].column[b])
+            sum += point[i].weight[a] * point[j].weight[b] * s.topology.inv_dir[point[i].column[a]];
+      if (sum != 0) tilt.push_back({static_cast<uint32_t>(j), sum * lever_[i] * lever_[j]});
+    }
+  }
+  tilt_first[n] = static_cast<uint32_t>(tilt.size());
 }
 
 void Coupling::end(State& s, Scratch& k) {
   std::fill(k.external.begin(), k.external.end(), Float4{});
-  for (size_t i = 0; i < point.size(); ++i) add_to(k.external, point[i], impulse[i]);
+  for (size_t i = 0; i < point.size(); ++i) {
+    add_to(k.external, point[i], impulse[i]);
+    if (offset[i] == 0) continue;
+    const Vec3 tilting = (impulse[i] - axis[i] * dot(impulse[i], axis[i])) * lever_[i];
+    for (int c = 0; c < 4; ++c) {
+      if (point[i].weight[c] == 0) continue;
+      Float4& dir = k.external[2 * point[i].column[c] + 1];
+      dir = float4(vec3(dir) + tilting * point[i].weight[c]);
+    }
+  }
   apply_impulses(s, k, k.external);
   std::fill(k.external.begin(), k.external.end(), Float4{});
 }

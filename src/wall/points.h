@@ -69,16 +69,32 @@ class Inverse {
 //     ... coupling.push(i, impulse)      at[all] answer; compliance of a force held over dt: (h / dt) W
 //   coupling.end(...)                    impulses become velocities
 //   finish_step(...)
+//
+// A point may stand off the mid-surface by `offset` along the unit director. An impulse on it then moves and tilts the column,
+// but never squeezes its thickness: a thread round both faces of a thin wall would draw them together, by an amount that
+// depends on the mesh.
 struct Coupling {
-  std::vector<Weights> point;
+  // What an impulse on a point does through the tilt of columns that both share: tilt Q_j Q_i p, Q = 1 - axis axis'.
+  struct Tilt {
+    uint32_t other = 0;
+    float value = 0;  // [1/kg]
+  };
+  std::vector<Weights> point;   // on the mid-surface where there is an offset
+  std::vector<float> offset;    // [m]
+  std::vector<Vec3> axis;       // unit director, of this step
   std::vector<Vec3> at, speed;  // [m], [m/s]
   std::vector<Vec3> impulse;    // [N s] in this step so far
   std::vector<float> w;         // [1/kg] n x n
+  std::vector<uint32_t> tilt_first;
+  std::vector<Tilt> tilt;
   Inverse inverse{512};
   float step = 0;        // [s]
   uint32_t version = 0;  // of the topology that w belongs to
 
-  void set_points(const Model& model, const Topology& topology, std::span<const Point> points);
+  // offsets: none, or one for each point. Allocates nothing once it has had as many points.
+  void set_points(const Model& model, const Topology& topology, std::span<const Point> points,
+                  std::span<const float> offsets = {});
+  void reserve(size_t points);
   // After the wall's begin_step. The points given to set_points are looked up again when the topology has changed.
   void begin(const Model& model, const State& state);
   void advance(float dt) {
@@ -88,11 +104,17 @@ struct Coupling {
     impulse[i] += p;
     const float* row = w.data() + i * at.size();
     for (size_t j = 0; j < at.size(); ++j) at[j] += p * (step * row[j]);
+    const Vec3 q = p - axis[i] * dot(p, axis[i]);
+    for (uint32_t t = tilt_first[i]; t < tilt_first[i + 1]; ++t) {
+      const Vec3 n = axis[tilt[t].other];
+      at[tilt[t].other] += (q - n * dot(q, n)) * (step * tilt[t].value);
+    }
   }
   void end(State& state, Scratch& scratch);
 
  private:
   std::vector<Point> material_;
+  std::vector<float> lever_;  // offset over the length of the director, of this step
 };
 
 // Points with prescribed positions within the step, such as a grip. softness [m/N]: 0 is rigid. Returns forces [N] on the

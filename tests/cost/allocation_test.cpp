@@ -19,6 +19,7 @@
 #include "sim/model.h"
 #include "sim/state.h"
 #include "validation/knot_scenes.h"
+#include "validation/suture_scenes.h"
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define CATGUT_COUNTS_ALLOCATIONS 1
@@ -185,6 +186,27 @@ TEST(Allocation, a_thread_that_is_knotted_asks_for_none) {
     for (int i = 0; i < 60; ++i) t.stepper.step(settings, state, around);
   });
   EXPECT_GT(state.refreshes, 5u);
+  EXPECT_EQ(count, 0u) << sites();
+}
+
+// Thread and wall together: a stitch is drawn until its lips touch.
+TEST(Allocation, a_stitch_that_is_drawn_asks_for_none) {
+#ifndef CATGUT_COUNTS_ALLOCATIONS
+  GTEST_SKIP() << "allocations are not counted here";
+#endif
+  validation::Stitch near;
+  near.gap = 0.5e-3f;
+  validation::Sewn s = validation::interrupted(near);
+  s.run(0.002f);  // columns of the inverse get their room in the first step
+  const physical::Hands hands{s.hold, {}, {}};
+  const uint64_t count = allocations_of([&] {
+    for (int i = 0; i < 150; ++i) {
+      for (thread::Hold& h : s.hold) h.from = h.to, h.to = h.to + Vec3{1.2e-4f, 0, 0};
+      physical::step(s.model, s.state, *s.scratch, hands, *s.jobs);
+    }
+  });
+  EXPECT_GT(s.state.lip.size(), 0u);
+  EXPECT_GT(s.state.contact.size(), 0u);
   EXPECT_EQ(count, 0u) << sites();
 }
 

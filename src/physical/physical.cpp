@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical: see the header. The order of a step is that of docs/physical.md.
+#include "physical/physical.h"
+
+#include <algorithm>
+
+#include "core/hash.h"
+
+namespace catgut::physical {
+
+Model make_model(const wall::Wall& wall, const thread::Settings& settings) {
+  Model m;
+  m.wall = wall.model, m.thread = settings;
+  m.surface = make_surface(wall.model, wall.state);
+  return m;
+}
+
+float mouth_offset(const Model& m, const Hole& hole) {
+  const float half = 0.5f * m.wall.laminate.thickness, r = 0.5f * m.thread.material.diameter;
+  const float out = hole.place.zeta >= 0.999f ? r : hole.place.zeta <= -0.999f ? -r : 0.0f;
+  return hole.place.zeta * half + out;
+}
+
+Vec3 mouth(const Model& m, const State& s, const Hole& hole) {
+  wall::Point mid = hole.place;
+  mid.zeta = 0;
+  const wall::Weights w = wall::weights(m.wall, s.wall.topology, mid);
+  wall::Weights up = w;
+  up.zeta = 1;
+  const Vec3 at = wall::place(w, s.wall.motion);
+  return at + normalized(wall::place(up, s.wall.motion) - at) * mouth_offset(m, hole);
+}
+
+Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wall, s.wall)), thread(s.thread.nodes()) {
+  coupling.inverse = wall::Inverse(wall::columns(s.wall));
+  lips.inverse = wall::Inverse(wall::columns(s.wall));
+  for (wall::Inverse* inverse : {&coupling.inverse, &lips.inverse}) inverse->need(s.wall.topology, {});  // takes its room
+  const size_t n = thread::kMaxSoftPoints, columns = wall::columns(s.wall);
+  contact.reserve(n), foot.reserve(n), tilt.reserve(16 * n);
+  coupling.reserve(n);
+  lips.contact.reserve(3 * columns), lips.last.reserve(3 * columns), lips.points.reserve(6 * columns);
+  for (auto* list : {&lips.speed, &lips.change, &lips.before, &lips.onward}) list->reserve(3 * columns);
+  lips.w.reserve(9 * columns * columns);
+  search.reserve(m.wall, s.wall, s.thread.nodes());
+  point.reserve(thread::kMaxSoftPoints), offset.reserve(thread::kMaxSoftPoints);
+}
+
+uint64_t hash_state(const State& s) {
+  uint64_t h = thread::hash_state(s.thread);
+  h = hash_bytes(s.wall.motion.x.data(), s.wall.motion.x.size() * sizeof s.wall.motion.x[0], h);
+  h = hash_bytes(s.wall.motion.v.data(), s.wall.motion.v.size() * sizeof s.wall.motion.v[0], h);
+  for (const thread::SoftContact& c : s.contact) h = hash_bytes(&c.normal_impulse, sizeof c.normal_impulse, h);
+  for (const wall::Contact& c : s.lip) h = hash_bytes(&c.impulse, sizeof c.impulse, h);
+  return h;
+}
+
+namespace {
+
+// Nodes near the surface: each gets the nearest point of the wall, on the side where it was. Neighbors share a point of the
+// coupling, because every point answers every other.
+void find_contacts(const Model& m, const State& s, Scratch& k) {
+  const float d = m.thread.material.diameter, r = 0.5f * d, h = m.wall.step;
+  size_t eyelet = 0, old = 0;
+  uint32_t last_node = 0;
+  size_t shared = 0;  // how many contacts use the last point
+  k.foot.clear();
+  for (uint32_t i = 0; i < s.thread.nodes(); ++i) {
+    while (eyelet < s.thread.eyelet.size() && s.thread.eyelet[eyelet].segment < i) ++eyelet;
+    // Between the mouths of a channel; also where the end of the thread has already left the first of them, or the last.
+    const uint32_t behind = eyelet < s.thread.eyelet.size() ? s.thread.eyelet[eyelet].point : 0;
+    if ((eyelet > 0 && s.hole[s.thread.eyelet[eyelet - 1].point].within) || (behind > 0 && s.hole[behind - 1].within)) continue;
+    if (k.search.node_first[i] == k.search.node_first[i + 1]) continue;
+    while (old < s.contact.size() && s.contact[old].node < i) ++old;
+    const thread::SoftContact* memory = old < s.contact.size() && s.contact[old].node == i ? &s.contact[old] : nullptr;
+    const Vec3 p = s.thread.position(i);
+    Foot best;
+    best.gap = 1e9f;
+    float facing = -1;
+    for (uint32_t f = k.search.node_first[i]; f < k.search.node_first[i + 1]; ++f) {
+      const uint32_t face = k.search.node_face[f];
+      for (uint32_t q = m.surface.first_of_face[face]; q < m.surface.first_of_face[face + 1]; ++q) {
+        const Foot foot = nearest_on_patch(m.wall, s.wall, m.surface, q, p);
+        // A node that was pressed to one side is never looked at from the other.
+        if (memory && memory->normal_impulse > 0 && dot(foot.facing, memory->normal) < -0.2f) continue;
+        const float far = std::abs(foot.gap), front = dot(normalized(p - foot.at), foot.facing);
+        if (far > std::abs(best.gap) + 1e-7f || (far > std::abs(best.gap) - 1e-7f && front < facing)) continue;
+        best = foot, facing = front;
+      }
+    }
+    const wall::Weights w = best.gap < 1e8f ? wall::weights(m.wall, s.wall.topology, best.point) : wall::Weights{};
+    if (best.gap > 1e8f || (!memory && best.gap < -d)) continue;  // what starts deep inside is no contact
+    const float closing = -dot(s.thread.v.at(i) - wall::velocity(w, s.wall.motion), best.normal);
+    if (best.gap - r > 0.5f * d + 1.5f * h * std::max(0.0f, closing)) continue;
+    thread::SoftContact c;
+    c.node = i, c.patch = best.patch, c.normal = best.normal, c.friction = m.surface_friction;
+    if (memory) {
+      c.normal_impulse = memory->normal_impulse;
+      c.friction_impulse = memory->friction_impulse, c.drift = memory->drift;
+    }
+    const bool share = !k.contact.empty() && shared < 3 && last_node + 1 == i &&
+                       dot(k.contact[k.contact.size() - shared].normal, c.normal) > 0.95f;
+    if (!share) {
+      if (k.point.size() >= thread::kMaxSoftPoints) break;
+      wall::Weights up = w;
+      up.zeta = 1;
+      wall::Weights middle = w;
+      middle.zeta = 0;
+      const float half = distance(wall::place(up, s.wall.motion), wall::place(middle, s.wall.motion));
+      k.point.push_back(best.point), k.offset.push_back(best.point.zeta * half);
+      shared = 0;
+    }
+    ++shared, last_node = i;
+    c.point = static_cast<uint32_t>(k.point.size()) - 1;
+    k.contact.push_back(c), k.foot.push_back(best);
+  }
+}
+
+}  // namespace
+
+void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) {
+  s.contact.reserve(thread::kMaxSoftPoints), s.lip.reserve(3 * wall::columns(s.wall));
+  for (const Hands::WallPull& pull : hands.wall_pulls) wall::add_to(k.wall.external, pull.at, pull.force);
+  if (m.surface_contact || m.lip_contact) find_near(m.wall, s.wall, m.surface, s.thread, k.search);
+  if (m.lip_contact) {
+    k.lips.contact.assign(s.lip.begin(), s.lip.end());
+    wall::find_contacts(m.wall, s.wall, {}, k.lips);
+    find_lips(m.wall, s.wall, m.surface, k.search, m.lip_friction, k.lips);
+    wall::warm_start(m.wall, k.wall, k.lips);
+  }
+  wall::begin_step(m.wall, s.wall, k.wall, jobs);
+
+  // The thread in its holes and on the surface, on points that travel with the wall.
+  k.point.clear(), k.offset.clear(), k.contact.clear();
+  for (const Hole& hole : s.hole) k.point.push_back(hole.place), k.offset.push_back(mouth_offset(m, hole));
+  if (m.surface_contact) find_contacts(m, s, k);
+  k.coupling.set_points(m.wall, s.wall.topology, k.point, k.offset);
+  k.coupling.begin(m.wall, s.wall);
+  for (size_t i = 0; i < k.contact.size(); ++i) k.contact[i].offset = k.foot[i].at - k.coupling.at[k.contact[i].point];
+  k.tilt.clear();
+  for (const wall::Coupling::Tilt& t : k.coupling.tilt) k.tilt.push_back({t.other, t.value});
+  thread::SoftPoints soft;
+  soft.step = m.wall.step;
+  soft.at = k.coupling.at, soft.speed = k.coupling.speed, soft.axis = k.coupling.axis, soft.w = k.coupling.w;
+  soft.tilt_first = k.coupling.tilt_first, soft.tilt = k.tilt, soft.impulse = k.coupling.impulse;
+  thread::Surroundings around;
+  around.holds = hands.holds, around.pulls = hands.pulls, around.soft = &soft, around.soft_contacts = k.contact;
+  k.thread.step(m.thread, s.thread, around);
+  k.coupling.end(s.wall, k.wall);
+  s.contact.assign(k.contact.begin(), k.contact.end());
+
+  if (m.lip_contact) {
+    wall::solve_contacts(m.wall, s.wall, k.wall, {}, k.lips);
+    s.lip.assign(k.lips.contact.begin(), k.lips.contact.end());
+  }
+  wall::finish_step(m.wall, s.wall, jobs);
+}
+
+}  // namespace catgut::physical

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical: a physical thread (src/thread) sewn through a physical wall (src/wall). Reads what hands do; writes State. Nothing in
+// it knows a technique: wounds are closed by the thread's tension in holes of the wall, held by friction. docs/physical.md.
+//
+// Units: SI, float32. Frame: the scene's. One step is the wall's step (1 ms), in which the thread does its substeps on the
+// moving holes ("consistent multi-rate", wall/points.h). Several organs are pieces of one wall; several threads are strands of
+// one thread::State, separated by broken segments. A step allocates nothing; its bits do not depend on the number of workers.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "physical/surface.h"
+#include "thread/thread.h"
+#include "wall/contact.h"
+#include "wall/points.h"
+
+namespace catgut::physical {
+
+// A hole in the wall. Its mouth stands off the surface by the thread's radius, so that the thread beside it can lie flat.
+struct Hole {
+  wall::Point place;    // zeta: -1 inner face .. 1 outer face
+  bool within = false;  // from here to the next hole along the thread it runs within the wall
+};
+
+struct Model {
+  wall::Model wall;
+  thread::Settings thread;
+  float surface_friction = 0.1f;  // thread on wall
+  float lip_friction = 0.3f;      // wall on wall
+  bool surface_contact = true;    // thread against the wall's surface
+  bool lip_contact = true;        // wall against wall
+  Surface surface;                // from make_surface
+};
+
+struct State {
+  wall::State wall;
+  thread::State thread;
+  std::vector<Hole> hole;                     // Eyelet::point is an index of these
+  std::vector<thread::SoftContact> contact;   // memory of thread on wall; `point` is meaningless between steps
+  std::vector<wall::Contact> lip;             // memory of wall on wall
+};
+
+// What hands do in a step.
+struct Hands {
+  std::span<thread::Hold> holds;        // of thread nodes
+  std::span<const thread::Pull> pulls;  // on thread nodes
+  // A force on a point of the wall, such as forceps that hold an edge [N].
+  struct WallPull {
+    wall::Weights at;
+    Vec3 force;
+  };
+  std::span<const WallPull> wall_pulls;
+};
+
+// Workspace: nothing in it lasts from step to step but what never changes a result.
+struct Scratch {
+  wall::Scratch wall;
+  thread::Stepper thread;
+  wall::Coupling coupling;
+  wall::ContactSolver lips;
+  SurfaceSearch search;
+  std::vector<wall::Point> point;
+  std::vector<float> offset;
+  std::vector<thread::SoftContact> contact;
+  std::vector<Foot> foot;  // per contact
+  std::vector<thread::SoftPoints::Tilt> tilt;
+  explicit Scratch(const Model& model, const State& state);
+};
+
+// The model and state of a wall with a thread laid through its holes.
+Model make_model(const wall::Wall& wall, const thread::Settings& settings);
+// Where a hole's mouth is [m].
+Vec3 mouth(const Model& model, const State& state, const Hole& hole);
+float mouth_offset(const Model& model, const Hole& hole);  // [m] from the mid-surface along the director
+
+// Of everything that changes.
+uint64_t hash_state(const State& state);
+
+void step(const Model& model, State& state, Scratch& scratch, const Hands& hands, Jobs& jobs);
+
+}  // namespace catgut::physical

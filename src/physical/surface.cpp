@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical/surface: see the header.
+#include "physical/surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "wall/cut.h"
+
+namespace catgut::physical {
+namespace {
+
+struct Corners {
+  std::array<uint32_t, 4> column{};
+  bool quad = true;
+  uint32_t count() const { return quad ? 4 : 3; }
+};
+Corners corners_of(const wall::Model& m, const wall::Topology& t, uint32_t face) {
+  const uint32_t lane = m.lane_of_face[face], block = lane / wall::kLanesOfBlock, in = lane % wall::kLanesOfBlock;
+  Corners c;
+  for (size_t k = 0; k < 4; ++k) c.column[k] = t.corners[block].column[k][in];
+  c.quad = t.corners[block].quads != 0;
+  return c;
+}
+
+Vec3 mid(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column]); }
+Vec3 director(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column + 1]); }
+
+// Nearest point of a bilinear patch or a triangle, in its own coordinates (those of wall::Point).
+struct Bilinear {
+  Vec3 p[4];
+  bool quad = true;
+  Vec3 at(float xi, float eta) const {
+    if (!quad) return p[0] * (1 - 0.5f * (xi + eta)) + p[1] * (0.5f * xi) + p[2] * (0.5f * eta);
+    const float a = 1 - xi, b = 1 + xi, c = 1 - eta, d = 1 + eta;
+    return (p[0] * (a * c) + p[1] * (b * c) + p[2] * (b * d) + p[3] * (a * d)) * 0.25f;
+  }
+  Vec3 along_xi(float eta) const {
+    return quad ? ((p[1] - p[0]) * (1 - eta) + (p[2] - p[3]) * (1 + eta)) * 0.25f : (p[1] - p[0]) * 0.5f;
+  }
+  Vec3 along_eta(float xi) const {
+    return quad ? ((p[3] - p[0]) * (1 - xi) + (p[2] - p[1]) * (1 + xi)) * 0.25f : (p[2] - p[0]) * 0.5f;
+  }
+  void nearest(Vec3 target, float& xi, float& eta) const {
+    xi = eta = quad ? 0.0f : 0.6f;
+    for (int i = 0; i < 5; ++i) {
+      const Vec3 a = along_xi(eta), b = along_eta(xi), r = target - at(xi, eta);
+      const float aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), det = aa * bb - ab * ab;
+      if (!(det > 1e-12f * aa * bb)) return;
+      const float low = quad ? -1.0f : 0.0f, high = quad ? 1.0f : 2.0f, x0 = xi, y0 = eta;
+      xi = std::clamp(xi + (bb * dot(r, a) - ab * dot(r, b)) / det, low, high);
+      eta = std::clamp(eta + (dot(r, b) - ab * (xi - x0)) / bb, low, high);
+      if (!quad) eta = std::min(eta, 2 - xi);
+      xi = std::clamp(x0 + (dot(r, a) - ab * (eta - y0)) / aa, low, quad ? high : 2 - eta);
+      if (std::abs(xi - x0) + std::abs(eta - y0) < 1e-4f) return;
+    }
+  }
+};
+
+}  // namespace
+
+Surface make_surface(const wall::Model& m, const wall::State& s) {
+  const wall::Topology& t = s.topology;
+  Surface out;
+  out.piece = wall::pieces(s);
+  const uint32_t faces = static_cast<uint32_t>(m.lane_of_face.size());
+  std::map<std::pair<uint32_t, uint32_t>, int> uses;
+  for (uint32_t f = 0; f < faces; ++f) {
+    const Corners c = corners_of(m, t, f);
+    for (uint32_t k = 0; k < c.count(); ++k) ++uses[std::minmax(c.column[k], c.column[(k + 1) % c.count()])];
+  }
+  out.at_rim.assign(t.source.size(), 0);
+  for (uint32_t f = 0; f < faces; ++f) {
+    const Corners c = corners_of(m, t, f);
+    out.first_of_face.push_back(static_cast<uint32_t>(out.patch.size()));
+    out.patch.push_back({f, 1, 0}), out.patch.push_back({f, -1, 0});
+    for (uint32_t k = 0; k < c.count(); ++k) {
+      const uint32_t a = c.column[k], b = c.column[(k + 1) % c.count()];
+      if (uses[std::minmax(a, b)] != 1) continue;
+      out.patch.push_back({f, 0, k});
+      out.at_rim[a] = out.at_rim[b] = 1;
+    }
+    Vec3 center{};
+    const auto place = [&](uint32_t column) {
+      const uint32_t source = t.source[column];
+      return (m.mesh.outer[source] + m.mesh.inner[source]) * 0.5f;
+    };
+    for (uint32_t k = 0; k < c.count(); ++k) center += place(c.column[k]) / static_cast<float>(c.count());
+    float radius = 0;
+    for (uint32_t k = 0; k < c.count(); ++k) radius = std::max(radius, distance(center, place(c.column[k])));
+    out.face_radius.push_back(radius + 0.5f * m.laminate.thickness);
+  }
+  out.first_of_face.push_back(static_cast<uint32_t>(out.patch.size()));
+  return out;
+}
+
+Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface& surface, uint32_t index, Vec3 p) {
+  const Patch& patch = surface.patch[index];
+  const Corners c = corners_of(m, s.topology, patch.face);
+  Foot foot;
+  foot.patch = index;
+  Bilinear b;
+  float xi = 0, eta = 0;
+  if (patch.side != 0) {
+    b.quad = c.quad;
+    for (uint32_t k = 0; k < c.count(); ++k)
+      b.p[k] = mid(s, c.column[k]) + director(s, c.column[k]) * static_cast<float>(patch.side);
+    b.nearest(p, xi, eta);
+    foot.point = {patch.face, xi, eta, static_cast<float>(patch.side)};
+    foot.facing = cross(b.along_xi(eta), b.along_eta(xi)) * static_cast<float>(patch.side);
+    foot.on_edge = c.quad ? std::max(std::abs(xi), std::abs(eta)) > 0.9999f : std::min({xi, eta, 2 - xi - eta}) < 1e-4f;
+  } else {
+    const uint32_t from = c.column[patch.edge], to = c.column[(patch.edge + 1) % c.count()];
+    b.p[0] = mid(s, from) - director(s, from), b.p[1] = mid(s, to) - director(s, to);
+    b.p[2] = mid(s, to) + director(s, to), b.p[3] = mid(s, from) + director(s, from);
+    b.nearest(p, xi, eta);
+    foot.facing = cross(b.along_xi(eta), b.along_eta(xi));
+    foot.on_edge = std::max(std::abs(xi), std::abs(eta)) > 0.9999f;
+    const float q = xi;
+    const float quads[4][2] = {{q, -1}, {1, q}, {-q, 1}, {-1, -q}}, prisms[3][2] = {{1 + q, 0}, {1 - q, 1 + q}, {0, 1 - q}};
+    const float* at = c.quad ? quads[patch.edge] : prisms[patch.edge];
+    foot.point = {patch.face, at[0], at[1], eta};
+  }
+  foot.facing = normalized(foot.facing, {0, 0, 1});
+  foot.at = b.at(xi, eta);
+  const Vec3 r = p - foot.at;
+  const float far = length(r), front = dot(r, foot.facing);
+  foot.normal = foot.facing;
+  foot.gap = front;
+  if (foot.on_edge) {
+    foot.gap = front >= 0 ? far : -far;
+    if (front >= 0 && far > 1e-6f) foot.normal = r / far;
+  }
+  return foot;
+}
+
+void SurfaceSearch::reserve(const wall::Model& m, const wall::State& s, size_t nodes) {
+  const size_t faces = m.lane_of_face.size(), columns = wall::columns(s);
+  node_listed.reserve(nodes), wall_listed.reserve(2 * columns), center.reserve(faces), radius.reserve(faces);
+  node_first.reserve(nodes + 1), node_face.reserve(64 * nodes);
+  column_first.reserve(2 * columns + 1), column_face.reserve(64 * columns);
+}
+
+void find_near(const wall::Model& m, const wall::State& s, const Surface& surface, const thread::State& thread,
+               SurfaceSearch& k) {
+  const size_t nodes = thread.nodes(), columns = wall::columns(s), faces = m.lane_of_face.size();
+  bool stale = k.node_listed.size() != nodes || k.wall_listed.size() != columns || k.version != s.topology.version;
+  const float limit2 = 0.25f * k.margin * k.margin * 0.25f;  // both may move: a quarter of the margin each
+  for (size_t i = 0; i < nodes && !stale; ++i) stale = length2(thread.x.at(i) - k.node_listed[i]) > limit2;
+  for (uint32_t c = 0; c < columns && !stale; ++c) stale = length2(mid(s, c) - k.wall_listed[c]) > limit2;
+  if (!stale) return;
+  k.version = s.topology.version;
+  k.node_listed.resize(nodes), k.wall_listed.resize(columns), k.center.resize(faces), k.radius.resize(faces);
+  for (size_t i = 0; i < nodes; ++i) k.node_listed[i] = thread.x.at(i);
+  for (uint32_t c = 0; c < columns; ++c) k.wall_listed[c] = mid(s, c);
+  for (uint32_t f = 0; f < faces; ++f) {
+    const Corners c = corners_of(m, s.topology, f);
+    Vec3 center{};
+    for (uint32_t i = 0; i < c.count(); ++i) center += mid(s, c.column[i]) / static_cast<float>(c.count());
+    float radius = 0;
+    for (uint32_t i = 0; i < c.count(); ++i)
+      radius = std::max(radius, distance(center, mid(s, c.column[i])) + length(director(s, c.column[i])));
+    k.center[f] = center, k.radius[f] = radius;
+  }
+  // Blocks of eight nodes share a sphere.
+  k.node_first.clear(), k.node_face.clear();
+  constexpr size_t kBlock = 8;
+  std::array<uint32_t, 256> near{};
+  for (size_t b = 0; b < nodes; b += kBlock) {
+    const size_t end = std::min(nodes, b + kBlock);
+    Vec3 center{};
+    for (size_t i = b; i < end; ++i) center += thread.x.at(i) / static_cast<float>(end - b);
+    float radius = 0;
+    for (size_t i = b; i < end; ++i) radius = std::max(radius, distance(center, thread.x.at(i)));
+    size_t count = 0;
+    for (uint32_t f = 0; f < faces; ++f) {
+      const float reach = radius + k.radius[f] + k.margin;
+      if (length2(k.center[f] - center) < reach * reach && count < near.size()) near[count++] = f;
+    }
+    for (size_t i = b; i < end; ++i) {
+      k.node_first.push_back(static_cast<uint32_t>(k.node_face.size()));
+      for (size_t j = 0; j < count; ++j) {
+        const float reach = k.radius[near[j]] + k.margin;
+        if (length2(k.center[near[j]] - thread.x.at(i)) < reach * reach) k.node_face.push_back(near[j]);
+      }
+    }
+  }
+  k.node_first.push_back(static_cast<uint32_t>(k.node_face.size()));
+  k.column_first.clear(), k.column_face.clear();
+  const auto rest = [&](uint32_t column) {
+    const uint32_t source = s.topology.source[column];
+    return (m.mesh.outer[source] + m.mesh.inner[source]) * 0.5f;
+  };
+  for (uint32_t c = 0; c < columns; ++c) {
+    k.column_first.push_back(static_cast<uint32_t>(k.column_face.size()));
+    if (s.topology.slot[c] == wall::kNone) continue;
+    const Vec3 at = mid(s, c), at_rest = rest(c);
+    const float half = length(director(s, c));
+    for (uint32_t f = 0; f < faces; ++f) {
+      const float reach = k.radius[f] + half + k.margin;
+      if (length2(k.center[f] - at) > reach * reach) continue;
+      const Corners corner = corners_of(m, s.topology, f);
+      // What was side by side at rest in one part of the wall cannot be pressed together by a fold.
+      bool beside = false;
+      for (uint32_t i = 0; i < corner.count(); ++i)
+        beside |= surface.piece[corner.column[i]] == surface.piece[c] &&
+                  (corner.column[i] == c || distance(rest(corner.column[i]), at_rest) < 1.2f * surface.face_radius[f]);
+      if (!beside) k.column_face.push_back(f);
+    }
+  }
+  k.column_first.push_back(static_cast<uint32_t>(k.column_face.size()));
+}
+
+void find_lips(const wall::Model& m, const wall::State& s, const Surface& surface, const SurfaceSearch& search, float friction,
+               wall::ContactSolver& solver) {
+  const uint32_t columns = wall::columns(s);
+  for (uint32_t c = 0; c < columns; ++c) {
+    if (search.column_first[c] == search.column_first[c + 1]) continue;
+    for (const float zeta : {-1.0f, 0.0f, 1.0f}) {
+      if (zeta == 0 && !surface.at_rim[c]) continue;
+      const wall::Weights w = wall::at_column(c, zeta);
+      const Vec3 p = wall::place(w, s.motion);
+      const Vec3 up = director(s, c);
+      Foot best;
+      best.gap = 1e9f;
+      for (uint32_t i = search.column_first[c]; i < search.column_first[c + 1]; ++i) {
+        const uint32_t face = search.column_face[i];
+        for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
+          const Foot foot = nearest_on_patch(m, s, surface, q, p);
+          if (foot.gap < -1e-3f || std::abs(foot.gap) > std::abs(best.gap)) continue;
+          if (foot.gap < 0 && foot.on_edge) continue;
+          // The point's own wall lies behind it, outside of the other: its inner side for a point of a face.
+          if (!surface.at_rim[c] && dot(foot.normal, up) * zeta > -0.3f * length(up)) continue;
+          best = foot;
+        }
+      }
+      if (best.gap > 1e8f) continue;
+      wall::Contact k;
+      k.self = true;
+      k.point = w;
+      k.other = wall::weights(m, s.topology, best.point);
+      if (best.gap > solver.reach &&
+          best.gap > solver.reach + 2 * m.step * length(wall::velocity(w, s.motion) - wall::velocity(k.other, s.motion)))
+        continue;
+      k.key = (uint64_t{1} << 62) | (uint64_t{c} << 2) | static_cast<uint64_t>(zeta + 1);
+      k.normal = best.normal, k.gap = best.gap, k.friction = friction;
+      solver.contact.push_back(k);
+    }
+  }
+}
+
+}  // namespace catgut::physical

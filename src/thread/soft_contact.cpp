@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// thread/soft_contact: nodes against the surface of something soft. Whoever knows the surface says once per step where a node's
+// nearest point and plane are; in every substep the node stays on its side of that plane, which moves with the point, and the
+// soft thing takes the opposite impulse. Friction, warm start and drift as in thread/contact.
+#include <algorithm>
+#include <cmath>
+
+#include "thread/internal.h"
+
+namespace catgut::thread {
+namespace {
+
+constexpr float kDriftLimit = 0.2f;  // of the diameter
+constexpr float kPushOut = 0.2f;     // [m/s]
+
+Four motion(const Scratch& s, const Scratch::SoftActive& c) {
+  return Four{s.u.x[c.node], s.u.y[c.node], s.u.z[c.node], 0} - (s.soft_moved[c.point] - s.soft_before[c.point]);
+}
+void apply(Scratch& s, SoftPoints& soft, const Scratch::SoftActive& c, Four impulse, float substep) {
+  s.u.add(c.node, three(impulse) * s.w[c.node]);
+  push_soft(s, soft, c.point, three(impulse) * -1.0f, substep);
+}
+Vec3 tangential(Vec3 v, Vec3 n) { return v - n * dot(v, n); }
+
+}  // namespace
+
+void begin_soft_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around) {
+  s.soft_active.clear();
+  if (!around.soft) return;
+  const SoftPoints& soft = *around.soft;
+  const size_t n = s.soft_moved.size();
+  for (uint32_t k = 0; k < around.soft_contacts.size(); ++k) {
+    SoftContact& c = around.soft_contacts[k];
+    const Vec3 from = ((state.x.at(c.node) - soft.at[c.point]) - c.offset + state.fine.at(c.node)) +
+                      (s.u.at(c.node) - three(s.soft_moved[c.point]));
+    const float gap = dot(c.normal, from) - 0.5f * settings.material.diameter;
+    if (gap > kReady * settings.material.diameter || c.normal == Vec3{}) {
+      c.normal_impulse = 0, c.friction_impulse = {}, c.drift = {}, c.gap = gap;
+      continue;
+    }
+    Scratch::SoftActive a;
+    float w = soft.w[size_t{c.point} * n + c.point];
+    for (uint32_t t = soft.tilt_first[c.point]; t < soft.tilt_first[c.point + 1]; ++t)
+      if (soft.tilt[t].other == c.point) w += soft.tilt[t].value;
+    a.inverse = 1 / (s.w[c.node] + s.soft_answer * w);
+    a.normal = four(c.normal), a.mu = c.friction, a.node = c.node, a.point = c.point, a.contact = k;
+    a.pull_back = four(settings.anchor * c.drift);
+    // A node that starts inside comes out at a limited speed.
+    a.level = std::max(gap, -kPushOut * settings.substep) - dot(a.normal, motion(s, a));
+    a.ln = c.normal_impulse, a.lt = four(tangential(c.friction_impulse, c.normal));
+    s.soft_active.push_back(a);
+  }
+  for (const Scratch::SoftActive& a : s.soft_active) apply(s, *around.soft, a, a.normal * a.ln + a.lt, settings.substep);
+}
+
+void sweep_soft_contacts(Scratch& s, SoftPoints& soft, float substep, bool backward) {
+  const size_t count = s.soft_active.size();
+  for (size_t k = 0; k < count; ++k) {
+    Scratch::SoftActive& c = s.soft_active[backward ? count - 1 - k : k];
+    const Four moved = motion(s, c);
+    const float along = dot(c.normal, moved);
+    const float ln = std::max(0.0f, c.ln - (c.level + along) * c.inverse);
+    Four lt = c.lt - (moved - c.normal * along + c.pull_back) * c.inverse;
+    const float limit = c.mu * ln, size2 = dot(lt, lt);
+    c.slipped = size2 > limit * limit;
+    if (c.slipped) lt = lt * (limit / std::sqrt(size2));
+    const Four change = c.normal * (ln - c.ln) + (lt - c.lt);
+    if (change[0] == 0 && change[1] == 0 && change[2] == 0) continue;
+    c.ln = ln, c.lt = lt;
+    apply(s, soft, c, change, substep);
+  }
+}
+
+void end_soft_contacts(const Settings& settings, State&, Scratch& s, Surroundings& around) {
+  for (const Scratch::SoftActive& a : s.soft_active) {
+    SoftContact& c = around.soft_contacts[a.contact];
+    const Vec3 went = three(motion(s, a)), moved = tangential(went, c.normal);
+    if (a.ln > 0) s.touched[a.node] = 1;
+    c.gap = a.level + dot(c.normal, went);
+    c.normal_impulse = a.ln, c.friction_impulse = three(a.lt);
+    if (a.slipped || a.ln <= 0) {
+      c.drift = {};
+      continue;
+    }
+    const Vec3 d = tangential(c.drift + moved, c.normal);
+    const float size = length(d), limit = kDriftLimit * settings.material.diameter;
+    c.drift = size > limit ? d * (limit / size) : d;
+  }
+}
+
+}  // namespace catgut::thread

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// tests/physical: thread and wall together, from outside: momentum, replay, what comes out of a hole. Closing force, friction
+// and whole sutures: tests/validation, rows closure/.
+#include "physical/physical.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "validation/suture_scenes.h"
+
+namespace catgut::physical {
+namespace {
+
+using validation::Sewn;
+using validation::Stop;
+
+// A sheet, free or held at its short sides, with a straight thread through its middle, and a bight along its lower side.
+Sewn sheet_with_thread(float hole_friction, bool held = false) {
+  wall::SheetShape shape;
+  shape.width = 0.03f, shape.height = 0.02f, shape.columns = 13, shape.rows = 9;
+  wall::Spec spec;
+  spec.mesh = wall::sheet(shape);
+  spec.drag = 0;
+  for (size_t c = 0; held && c < spec.mesh.held.size(); ++c) spec.mesh.held[c] = std::abs(spec.mesh.outer[c].x - 0.015f) > 0.0149f;
+  const wall::Wall w = wall::build_wall(spec);
+  Sewn s;
+  s.model = make_model(w, validation::knot_settings(0.3f));
+  s.model.thread.damping = 0, s.model.thread.touch_density = s.model.thread.free_density, s.model.thread.load_limit = 1e9f;
+  s.state.wall = w.state;
+  std::vector<Stop> course{{}};
+  for (const auto& [x, zeta] : {std::pair{0.011f, 1.0f}, {0.011f, -1.0f}, {0.019f, -1.0f}, {0.019f, 1.0f}}) {
+    Hole hole = validation::hole_at(w, {x, 0.0103f, 0.00125f * zeta}, zeta);
+    hole.within = (x < 0.015f) == (zeta > 0);
+    course.push_back({mouth(s.model, s.state, hole), static_cast<int32_t>(s.state.hole.size())});
+    s.state.hole.push_back(hole);
+  }
+  course[0].at = course[1].at + Vec3{-0.005f, 0, 0.02f};
+  course.push_back({course[4].at + Vec3{0.005f, 0, 0.02f}});
+  s.state.thread = validation::lay_course(course, 0.5e-3f, hole_friction);
+  s.start();
+  return s;
+}
+
+Vec3 momentum(const Sewn& s) {
+  Vec3 p{};
+  const thread::State& t = s.state.thread;
+  for (size_t i = 0; i < t.nodes(); ++i) {
+    const float length = 0.5f * ((i > 0 ? t.rest[i - 1] : 0) + (i < t.segments() ? t.rest[i] : 0));
+    p += t.v.at(i) * (length * s.model.thread.free_density);
+  }
+  for (uint32_t c = 0; c < wall::columns(s.state.wall); ++c)
+    p += wall::vec3(s.state.wall.motion.v[2 * c]) * s.state.wall.topology.mass[c];
+  return p;
+}
+
+TEST(Physical, what_the_thread_does_to_the_wall_the_wall_does_to_the_thread) {
+  Sewn s = sheet_with_thread(0.3f);
+  s.model.lip_contact = false;
+  const float pull = 0.02f;  // little: the limit on a node's motion takes momentum away
+  s.hold.clear();
+  s.pull = {{0, {-0.4f * pull, 0, 0.9f * pull}}, {static_cast<uint32_t>(s.state.thread.nodes()) - 1, {0.4f * pull, 0, 0.9f * pull}}};
+  for (int i = 1; i <= 30; ++i) {
+    s.run(0.001f);
+    const float given = 2 * 0.9f * pull * 1e-3f * static_cast<float>(i);
+    EXPECT_NEAR(momentum(s).z, given, 2e-3f * given) << i;
+    EXPECT_NEAR(momentum(s).x, 0, 2e-3f * given) << i;
+  }
+}
+
+TEST(Physical, the_same_bits_for_any_number_of_workers_and_from_a_copy) {
+  Sewn a = validation::interrupted({});
+  a.hold[0].to = a.hold[0].to + Vec3{0.01f, 0, 0}, a.hold[1].to = a.hold[1].to + Vec3{0.01f, 0, 0};
+  a.run(0.05f);
+  Sewn b = validation::interrupted({});
+  b.state = a.state, b.jobs = std::make_unique<Jobs>(3), b.hold = a.hold;
+  b.scratch = std::make_unique<Scratch>(b.model, b.state);
+  a.run(0.05f), b.run(0.05f);
+  EXPECT_EQ(hash_state(a.state), hash_state(b.state));
+}
+
+TEST(Physical, an_end_that_is_drawn_through_leaves_the_hole) {
+  Sewn s = sheet_with_thread(0.1f, true);
+  s.pull = {{static_cast<uint32_t>(s.state.thread.nodes()) - 1, {0.1f, 0, 0.3f}}};
+  s.hold.clear();
+  size_t before = s.state.thread.eyelet.size();
+  for (int i = 0; i < 400 && !s.state.thread.eyelet.empty(); ++i) {
+    s.run(0.002f);
+    EXPECT_LE(s.state.thread.eyelet.size(), before);
+    before = s.state.thread.eyelet.size();
+  }
+  EXPECT_TRUE(s.state.thread.eyelet.empty()) << before;
+  for (size_t i = 0; i < s.state.thread.nodes(); ++i) EXPECT_TRUE(std::isfinite(s.state.thread.position(i).x));
+}
+
+}  // namespace
+}  // namespace catgut::physical
