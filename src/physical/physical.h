@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// physical: a physical thread (src/thread) sewn through a physical wall (src/wall). Reads what hands do; writes State. Nothing in
-// it knows a technique: wounds are closed by the thread's tension in holes of the wall, held by friction. docs/physical.md.
+// physical: a physical thread (src/thread) sewn through a physical wall (src/wall). Reads what hands do; writes State. Nothing
+// in it knows a technique: wounds are closed by the thread's tension in holes of the wall, held by friction. docs/physical.md.
 //
 // Units: SI, float32. Frame: the scene's. One step is the wall's step (1 ms), in which the thread does its substeps on the
 // moving holes ("consistent multi-rate", wall/points.h). Several organs are pieces of one wall; several threads are strands of
@@ -36,9 +36,9 @@ struct Model {
 struct State {
   wall::State wall;
   thread::State thread;
-  std::vector<Hole> hole;                     // Eyelet::point is an index of these
-  std::vector<thread::SoftContact> contact;   // memory of thread on wall; `point` is meaningless between steps
-  std::vector<wall::Contact> lip;             // memory of wall on wall
+  std::vector<Hole> hole;                    // Eyelet::point is an index of these
+  std::vector<thread::SoftContact> contact;  // memory of thread on wall; `point` is meaningless between steps
+  std::vector<wall::Contact> lip;            // memory of wall on wall
 };
 
 // What hands do in a step.

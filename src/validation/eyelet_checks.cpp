@@ -36,14 +36,16 @@ void check_closing(Lines& out, float drawn, float wall_step, float substep) {
   sewn.state.thread = lay_course(course, 0.5e-3f, 0);
   sewn.start();
   const Vec3 end[2] = {sewn.hold[0].to, sewn.hold[1].to};
-  const Vec3 drawn_to[2] = {end[0] + normalized(end[0] - course[1].at) * drawn, end[1] + normalized(end[1] - course[4].at) * drawn};
+  const Vec3 drawn_to[2] = {end[0] + normalized(end[0] - course[1].at) * drawn,
+                            end[1] + normalized(end[1] - course[4].at) * drawn};
 
   StaticWall still(w);
   StaticString string{through, {}};
   for (const float rest : sewn.state.thread.rest) string.length += wide(rest);
   string.stiffness = wide(sewn.model.thread.material.axial_stiffness) / string.length;
   for (int i = 1; i <= 7; ++i) {
-    string.end = {wide(lerp(end[0], drawn_to[0], static_cast<float>(i) / 7)), wide(lerp(end[1], drawn_to[1], static_cast<float>(i) / 7))};
+    string.end = {wide(lerp(end[0], drawn_to[0], static_cast<float>(i) / 7)),
+                  wide(lerp(end[1], drawn_to[1], static_cast<float>(i) / 7))};
     still.solve({}, {string}, string.length, 1);
   }
   const double tension = still.tension(string), closed = 0.016 - (still.at(through[0]).z() - still.at(through[3]).z());

@@ -100,7 +100,8 @@ void tie_throw(Sewn& s, Tying& t, Throw one) {
     line(place({-half, 0, -r}));
     const int parts = one.half_turns * 60;
     for (int i = 1; i <= parts; ++i) {
-      const float along = half * (2 * static_cast<float>(i) / static_cast<float>(parts) - 1), angle = phase + 0.5f * turns * along / half;
+      const float along = half * (2 * static_cast<float>(i) / static_cast<float>(parts) - 1),
+                  angle = phase + 0.5f * turns * along / half;
       curve.push_back(place({along, r * std::cos(angle), r * std::sin(angle)}));
     }
     line(curve.back() + x * (first ? 0.1f : -0.1f) + z * 0.01f);

@@ -40,16 +40,16 @@ wall::Wall two_tubes(float gap, int around = 24, int rings = 8, float step = 0.0
 // A hole where the wall comes nearest to p, on the side zeta.
 physical::Hole hole_at(const wall::Wall& wall, Vec3 p, float zeta);
 
-// A knot over a wound. `up` leads away from the tissue, `across` from where end 1 leaves the tissue to where end 0 does. A throw
-// is laid by construction: the free tails, from where they leave what is tied so far, wind about each other by its half turns
-// and go on to both sides. Then the two ends are drawn apart, low, with `tension` each; forceps hold the throw below until the
-// new one has come down. Nothing else is moved.
+// A knot over a wound. `up` leads away from the tissue, `across` from where end 1 leaves the tissue to where end 0 does. A
+// throw is laid by construction: the free tails, from where they leave what is tied so far, wind about each other by its half
+// turns and go on to both sides. Then the two ends are drawn apart, low, with `tension` each; forceps hold the throw below
+// until the new one has come down. Nothing else is moved.
 struct Tying {
   Vec3 center, up{1, 0, 0}, across{0, 0, 1};
-  float tension = 2;  // [N] on each end while a throw is drawn
-  float lift = 3e-3f; // [m] by which a throw is laid above what is below it
-  float side = 1;     // where end 0 is: +1 across, -1 the other side
-  int throws = 0;     // so far
+  float tension = 2;   // [N] on each end while a throw is drawn
+  float lift = 3e-3f;  // [m] by which a throw is laid above what is below it
+  float side = 1;      // where end 0 is: +1 across, -1 the other side
+  int throws = 0;      // so far
 };
 void tie_throw(Sewn& sewn, Tying& tying, Throw one);
 void pull_apart(Sewn& sewn, const Tying& tying, float tension, float seconds);

@@ -23,7 +23,8 @@ Sewn sheet_with_thread(float hole_friction, bool held = false) {
   wall::Spec spec;
   spec.mesh = wall::sheet(shape);
   spec.drag = 0;
-  for (size_t c = 0; held && c < spec.mesh.held.size(); ++c) spec.mesh.held[c] = std::abs(spec.mesh.outer[c].x - 0.015f) > 0.0149f;
+  for (size_t c = 0; held && c < spec.mesh.held.size(); ++c)
+    spec.mesh.held[c] = std::abs(spec.mesh.outer[c].x - 0.015f) > 0.0149f;
   const wall::Wall w = wall::build_wall(spec);
   Sewn s;
   s.model = make_model(w, validation::knot_settings(0.3f));
@@ -60,7 +61,8 @@ TEST(Physical, what_the_thread_does_to_the_wall_the_wall_does_to_the_thread) {
   s.model.lip_contact = false;
   const float pull = 0.02f;  // little: the limit on a node's motion takes momentum away
   s.hold.clear();
-  s.pull = {{0, {-0.4f * pull, 0, 0.9f * pull}}, {static_cast<uint32_t>(s.state.thread.nodes()) - 1, {0.4f * pull, 0, 0.9f * pull}}};
+  s.pull = {{0, {-0.4f * pull, 0, 0.9f * pull}},
+            {static_cast<uint32_t>(s.state.thread.nodes()) - 1, {0.4f * pull, 0, 0.9f * pull}}};
   for (int i = 1; i <= 30; ++i) {
     s.run(0.001f);
     const float given = 2 * 0.9f * pull * 1e-3f * static_cast<float>(i);
