@@ -88,7 +88,7 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       }
     }
     const wall::Weights w = best.gap < 1e8f ? wall::weights(m.wall, s.wall.topology, best.point) : wall::Weights{};
-    if (best.gap > 1e8f || (!memory && best.gap < -d)) continue;  // what starts deep inside is no contact
+    if (best.gap > 1e8f || (!memory && best.gap < -d)) continue;  // a node deep inside was never outside
     const float closing = -dot(s.thread.v.at(i) - wall::velocity(w, s.wall.motion), best.normal);
     if (best.gap - r > 0.5f * d + 1.5f * h * std::max(0.0f, closing)) continue;
     thread::SoftContact c;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// physical: a physical thread (src/thread) sewn through a physical wall (src/wall). Reads what hands do; writes State. Nothing
+// physical: a physical thread (src/thread) through a physical wall (src/wall). Reads what hands do; writes State. Nothing
 // in it knows a technique: wounds are closed by the thread's tension in holes of the wall, held by friction. docs/physical.md.
 //
 // Units: SI, float32. Frame: the scene's. One step is the wall's step (1 ms), in which the thread does its substeps on the
