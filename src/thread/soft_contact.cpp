@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// thread/soft_contact: nodes against the surface of something soft. Whoever knows the surface says once per step where a node's
+// thread/soft_contact: nodes against the surface of something soft. The caller reports once per step where a node's
 // nearest point and plane are; in every substep the node stays on its side of that plane, which moves with the point, and the
 // soft thing takes the opposite impulse. Friction, warm start and drift as in thread/contact.
 #include <algorithm>

@@ -76,7 +76,7 @@ uint32_t exit_node(const thread::State& t, float diameter, bool first) {
 }
 }  // namespace
 
-// The free tails are laid anew: from where they leave the knot into the throw, and on to both sides.
+// The free tails are laid again: from their exits from the knot into the throw, then to both sides.
 void tie_throw(Sewn& s, Tying& t, Throw one) {
   thread::State& thread = s.state.thread;
   const float d = s.model.thread.material.diameter, r = 0.75f * d, half = 1.1f * d * static_cast<float>(one.half_turns);

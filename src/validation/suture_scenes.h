@@ -42,7 +42,7 @@ physical::Hole hole_at(const wall::Wall& wall, Vec3 p, float zeta);
 
 // A knot over a wound. `up` leads away from the tissue, `across` from where end 1 leaves the tissue to where end 0 does. A
 // throw is laid by construction: the free tails, from where they leave what is tied so far, wind about each other by its half
-// turns and go on to both sides. Then the two ends are drawn apart, low, with `tension` each; forceps hold the throw below
+// turns, then lead to both sides. Then the two ends are drawn apart, low, with `tension` each; forceps hold the throw below
 // until the new one has come down. Nothing else is moved.
 struct Tying {
   Vec3 center, up{1, 0, 0}, across{0, 0, 1};
