@@ -56,7 +56,7 @@ void hand_choice(Settings& s) {
 Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   Choice choice;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  const float wide = std::min(screen.x - em(), 58 * em()), high = std::min(screen.y - em(), 36 * em());
+  const float wide = std::min(screen.x - em(), 58 * em()), high = std::min(screen.y - em(), 44 * em());
   begin_box("start", {(screen.x - wide) / 2, (screen.y - high) / 2}, {wide, high}, 0.92f);
   text(kAccent, "Catgut");
   ImGui::SameLine();

@@ -12,7 +12,7 @@
 namespace catgut {
 
 const char* force_name(ForceKind kind) {
-  static constexpr const char* kName[] = {"thread", "tool and needle", "attachment", "needle channel", "seam"};
+  static constexpr const char* kName[] = {"thread", "tool and needle", "attachment", "needle track", "seam"};
   static_assert(sizeof(kName) / sizeof(kName[0]) == static_cast<size_t>(ForceKind::count_));
   return kind < ForceKind::count_ ? kName[static_cast<size_t>(kind)] : "unknown";
 }
