@@ -17,7 +17,7 @@ namespace {
 struct Options {
   std::string which;
   bool test = false, calibrate = false;
-  double scale = 1, turn = 0;
+  double scale = 1, turn = 0, countdown = 5;  // countdown [s]
 };
 
 int calibrate(ArmPort port, const Options& o) {
@@ -26,7 +26,7 @@ int calibrate(ArmPort port, const Options& o) {
   const std::array<ArmInfo, 2> arm = port.arm;
   std::array<bool, 2> known{};
   const auto say = [](const std::string& line) { std::printf("%s\n", line.c_str()), std::fflush(stdout); };
-  const std::array<Vec3, 2> at = held_places(std::move(port), 5, say, stop_on_interrupt(), known);
+  const std::array<Vec3, 2> at = held_places(std::move(port), static_cast<float>(o.countdown), say, stop_on_interrupt(), known);
   for (size_t k = 0; k < 2; ++k) {
     if (!known[k]) continue;
     places[arm[k].serial] = {static_cast<float>(o.scale), static_cast<float>(o.turn), at[k]};
@@ -39,9 +39,11 @@ int calibrate(ArmPort port, const Options& o) {
   return 0;
 }
 
-int test(ArmPort port) {
+int test(ArmPort port, const Options& o) {
+  ArmTestOptions options;
+  options.countdown = static_cast<float>(o.countdown);
   const auto say = [](const std::string& line) { std::printf("%s\n", line.c_str()), std::fflush(stdout); };
-  const ArmTestResult result = test_arms(std::move(port), {}, say, stop_on_interrupt());
+  const ArmTestResult result = test_arms(std::move(port), options, say, stop_on_interrupt());
   for (const std::string& line : result.line) say(line);
   return result.ok ? 0 : 1;
 }
@@ -75,7 +77,7 @@ int devices(const Options& o) {
     if (!port.any()) continue;
     any = true;
     if (o.calibrate) code = std::max(code, calibrate(std::move(port), o));
-    else if (o.test) code = std::max(code, test(std::move(port)));
+    else if (o.test) code = std::max(code, test(std::move(port), o));
     else std::printf("  catgut devices %s --test applies small forces; catgut play --haptics %s uses them\n", d.word, d.word);
   }
   if (any && !o.test && !o.calibrate) read_arm_places(arm_places_file());  // reports errors that would occur when a scene opens
@@ -105,6 +107,9 @@ void add_devices(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--turn", o->turn, "calibrate: rotation about the vertical [degrees]")
       ->check(within(-180.0, 180.0))
+      ->capture_default_str();
+  command->add_option("--countdown", o->countdown, "test, calibrate: time to take hold of the stylus [s]")
+      ->check(within(0.0, 60.0))
       ->capture_default_str();
   command->callback([o, &exit_code] { exit_code = devices(*o); });
 }

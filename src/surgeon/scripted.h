@@ -115,7 +115,8 @@ class Scripted final : public Surgeon {
   // Moves the forceps so that the needle's swage, which it holds, reaches `goal`.
   bool carry_swage(const Snapshot& seen, Vec3 goal, float speed);
 
-  // The needle holder moves the tail where the next throw finds it: in front, clear of the needle's strand.
+  // The needle holder moves the tail where the next throw finds it: in front, clear of the needle's strand; between two bowel
+  // ends on the tail's own side, because over the gap it would fall inside.
   bool lay_tail(const Snapshot& seen);
 
   // Best position and side for the needle holder to grasp the tail; not those of the last miss.

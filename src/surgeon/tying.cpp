@@ -11,6 +11,7 @@ constexpr float kHalfOpen = 0.7f;             // a jaw that releases without sha
 constexpr float kStump = 0.007f;              // [m] of thread left on a knot
 constexpr float kLeastFreeForOwn = 0.038f;    // the same where the strand is then led along the needle holder to its jaws
 constexpr float kWindOwnAt = 0.022f;          // [m] behind the tip, where such a strand is wound
+constexpr float kOwnSide = 1.0f;              // part of the direction in which a tail is laid apart, against one to the front
 constexpr float kTailAside = 0.030f;          // [m] from the stitch, where the tail is laid down
 constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the center of the field, where a used needle is put down
 constexpr float kTieCrossing = 0.3f;          // fraction of the path of crossed hands, forward and backward
@@ -64,7 +65,13 @@ bool Scripted::carry_swage(const Snapshot& seen, Vec3 goal, float speed) {
 
 bool Scripted::lay_tail(const Snapshot& seen) {
   const float tail = length_between(seen, first_point_node(seen), node_of(seen, seen.tool[kNeedleHolder].held_slot));
-  const Vec3 place = stitch(seen) + std::min(kTailAside, 0.8f * tail) * normalized(Vec3{-0.2f, 0.2f, 1.0f});
+  Vec3 from = stitch(seen), way{-0.2f, 0.2f, 1.0f};
+  if (picture_.body.size() > 1 && !seen.active().suture_point.empty()) {
+    const Vec3 exit = seen.active().suture_point.front().position;
+    way += kOwnSide * normalized(exit - from);
+    if (seen.active().knot.empty()) from = exit;
+  }
+  const Vec3 place = from + std::min(kTailAside, 0.8f * tail) * normalized(way);
   return move(kNeedleHolder, {place, hand_[kNeedleHolder].pose.q}, skill_.speed);
 }
 

@@ -142,7 +142,7 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   EXPECT_NE(both.out.find("left-0002"), std::string::npos) << both.out;
   const std::string places = (folder_ / "arms.toml").string();
   setenv("CATGUT_ARMS", places.c_str(), 1);
-  const Outcome laid = run_catgut("devices --calibrate --scale 0.5 --turn 90");
+  const Outcome laid = run_catgut("devices --calibrate --scale 0.5 --turn 90 --countdown 0.2");
   EXPECT_EQ(laid.code, 0) << laid.err;
   const auto kept = catgut::read_arm_places(places);
   ASSERT_EQ(kept.size(), 2u);
@@ -176,7 +176,7 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   for (const char* command : {"devices", "devices --calibrate"}) expect_refused(command, "/proc/self/mem: cannot be read; ");
   unsetenv("CATGUT_ARMS");
   setenv("FAKE_HD_FAULT", "flip_x:right:0", 1);
-  const Outcome flipped = run_catgut("devices --test");
+  const Outcome flipped = run_catgut("devices --test --countdown 0");
   EXPECT_EQ(flipped.code, 1);
   EXPECT_NE(flipped.out.find("WRONG WAY when pushed right"), std::string::npos) << flipped.out;
   EXPECT_NE(flipped.out.find("left device: "), std::string::npos) << flipped.out;

@@ -239,11 +239,11 @@ TEST_F(Window, a_killed_program_leaves_what_it_had_recorded) {
 // Rendering stalls for half a second every two; the physics equals the headless run bit for bit.
 TEST_F(Window, a_stalled_picture_changes_no_hash) {
   const fs::path alone = folder_ / "alone.cgrec", stalled = folder_ / "stalled.cgrec";
-  ASSERT_EQ(std::system(("'" CATGUT_APP "' run stay --surgeon scripted --headless --no-expect --seconds 5 --record '" +
+  ASSERT_EQ(std::system(("'" CATGUT_APP "' run stay --surgeon scripted --headless --no-expect --seconds 3 --record '" +
                          alone.string() + "' >/dev/null 2>&1")
                             .c_str()),
             0);
-  start({"play", "stay", "--surgeon", "scripted", "--size", "320x180", "--stall-ms", "500", "--seconds", "7", "--record",
+  start({"play", "stay", "--surgeon", "scripted", "--size", "320x180", "--stall-ms", "500", "--seconds", "4", "--record",
          stalled.string()});
   ASSERT_EQ(exit_code(90), 0) << said();
   const Recording a = read_recording(alone.string()), b = read_recording(stalled.string());

@@ -323,7 +323,10 @@ TEST_F(StitchAtTheWindow, a_lesson_shows_a_step_and_sees_it_done) {
   EXPECT_EQ(after, 1u);
 }
 
+// Half a minute, so for the nightly tests. Every time: by_mouse_and_keyboard through the same window, a bite by a virtual
+// gamepad below, and the whole stitch by gamepad without a window (stitch_test).
 TEST_F(StitchAtTheWindow, by_gamepad) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
   SdlPad desk(480);
   std::string stopped_at = "no virtual joysticks in this SDL";
   desk.sit([&] {
