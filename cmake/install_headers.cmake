@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 cmake_policy(VERSION 3.25)
 # Runs at install time. Installs the headers that include/catgut/catgut.h reaches, all of them under include/catgut/: in an
-# embedder's path, "core/math.h" could be anybody's. What is reached is public, nothing else is.
+# embedder's path, "core/math.h" could collide with others. Only reached headers are public.
 set(todo "catgut.h")
 set(done "")
 while(todo)
@@ -20,7 +20,7 @@ while(todo)
       list(APPEND todo ${name})
     endif()
   endforeach()
-  # A public header that includes a library's would make that library everybody's.
+  # A public header must not include those of another library, or every user would need it.
   string(REGEX MATCH "\n#include <[^>]*[/.][^>]*>" foreign "\n${text}")
   if(foreign)
     string(STRIP "${foreign}" foreign)

@@ -18,7 +18,7 @@ find_package(assimp REQUIRED)
 find_package(hwy CONFIG REQUIRED)
 target_link_libraries(catgut PRIVATE fmt::fmt assimp::assimp hwy::hwy)
 
-# Programs in the build folder find the scenes as installed programs do: in share/catgut of a folder above them.
+# Programs in the build folder find the scenes like installed programs: in share/catgut of a folder above them.
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/share/catgut)
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/scenes ${CMAKE_BINARY_DIR}/share/catgut/scenes SYMBOLIC)
 

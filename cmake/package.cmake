@@ -7,7 +7,7 @@ if(CATGUT_APP)
   install(FILES packaging/catgut.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps COMPONENT program)
 endif()
 
-# A package has to carry its license where Debian looks for it.
+# A package must contain its license at the path defined by Debian.
 set(package_program catgut)
 set(package_data catgut-data)
 set(package_library libcatgut-dev)
@@ -26,7 +26,7 @@ set(CPACK_GENERATOR DEB)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_PACKAGE_NAME catgut)
 set(CPACK_PACKAGE_VENDOR "The Catgut authors")
-# Who builds a package answers for it: Debian's own variables name that person.
+# The builder of a package is its contact, named by Debian's own variables.
 set(CATGUT_PACKAGE_CONTACT "" CACHE STRING "contact of packages; empty: DEBFULLNAME <DEBEMAIL> of the environment, else local")
 if(CATGUT_PACKAGE_CONTACT)
   set(CPACK_PACKAGE_CONTACT "${CATGUT_PACKAGE_CONTACT}")
@@ -44,13 +44,13 @@ set(CPACK_DEBIAN_LIBRARY_DESCRIPTION "C++ library: soft tissue, needle and threa
 set(CPACK_DEBIAN_PROGRAM_DESCRIPTION "Simulates suturing of soft tissue in real time, with mouse, gamepad or haptic devices.")
 set(CPACK_DEBIAN_DATA_DESCRIPTION "Scenes that program and library find by name.")
 
-# What the program links is read off its binary; what it opens by name while it runs is not.
+# Linked libraries are derived from the binary; files opened by name at run time are not.
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "catgut-data (= ${PROJECT_VERSION}), fonts-dejavu-core, libegl1, libgl1-mesa-dri")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "ffmpeg")
 set(CPACK_DEBIAN_DATA_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_DATA_PACKAGE_DEPENDS "")
-# What the static library needs to be linked: the packages that own the files found here, at least in these versions.
+# Requirements for linking the static library: the packages that own the files found here, with minimum versions.
 set(library_depends "")
 find_program(DPKG_QUERY dpkg-query)
 if(DPKG_QUERY)
@@ -61,7 +61,7 @@ if(DPKG_QUERY)
     if(owner MATCHES "^([^:, ]+)")
       set(owner ${CMAKE_MATCH_1})
       execute_process(COMMAND ${DPKG_QUERY} -W -f "\${source:Upstream-Version}\n" ${owner} OUTPUT_VARIABLE version ERROR_QUIET)
-      string(REGEX REPLACE "\n.*" "" version "${version}")  # one line for each architecture
+      string(REGEX REPLACE "\n.*" "" version "${version}")  # one line per architecture
       list(APPEND library_depends "${owner} (>= ${version})")
     endif()
   endforeach()

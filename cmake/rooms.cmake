@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # catgut_room(NAME BELOW room... USES library...): src/NAME/*.cpp becomes the library catgut_NAME.
-# BELOW lists every room NAME may include from; tests/layers reads the same lists through rooms.txt.
+# BELOW lists all rooms that NAME may include from; tests/layers reads the same lists through rooms.txt.
 file(WRITE ${PROJECT_BINARY_DIR}/rooms.txt "")
 function(catgut_room name)
   cmake_parse_arguments(ROOM "" "" "BELOW;USES" ${ARGN})

@@ -29,7 +29,7 @@ def unseal(key, packet):
                                                               ctypes.c_ulonglong(16), nonce(counter), key)
     return None if wrong else out.raw
 
-class Session:  # begun by an open whose cookie is right
+class Session:  # started by an open with a valid cookie
     def __init__(self, peer, caller, cookie):
         secret, own, shared = os.urandom(32), ctypes.create_string_buffer(32), ctypes.create_string_buffer(32)
         sodium.crypto_scalarmult_base(own, secret)
@@ -49,17 +49,17 @@ class Force:  # on the right hand, along x, at 1 kHz
             point, force, stiff, normal, gap, cap = self.patch
             wanted = force + stiff * (point - x)
             if normal and normal * (x - point) >= gap: wanted = 0.0     # the tool has left the tissue
-            elif normal: wanted = normal * max(0.0, wanted * normal)    # tissue pushes, it never pulls
+            elif normal: wanted = normal * max(0.0, wanted * normal)    # tissue only pushes
             wanted = max(-cap, min(cap, wanted))
-            if abs(x - point) > 0.02: wanted, self.part = 0.0, 0.0      # it belongs to another place
-            if age > EXPIRY: wanted *= 2.718 ** -((age - EXPIRY) / 0.02)  # nobody renews it: it fades
+            if abs(x - point) > 0.02: wanted, self.part = 0.0, 0.0      # the patch belongs to another position
+            if age > EXPIRY: wanted *= 2.718 ** -((age - EXPIRY) / 0.02)  # not renewed: it fades
         else: self.part = 0.0
-        if self.part == 0.0:  # engage only where nothing is felt; then over two seconds
+        if self.part == 0.0:  # engage only at zero force; then over two seconds
             self.quiet = self.quiet + 1 if self.patch and abs(wanted) < 0.2 and age < EXPIRY else 0
             if self.quiet > 3: self.part = 0.001 / RAMP
         elif self.part < 1.0: self.part = min(1.0, self.part + 0.001 / RAMP)
         wanted = max(-CAP, min(CAP, wanted)) * self.part
-        self.out += max(-SLEW, min(SLEW, wanted - self.out))  # per call: a late call gets no larger step
+        self.out += max(-SLEW, min(SLEW, wanted - self.out))  # per call: a late call does not get a larger step
         return self.out
 
 sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -82,7 +82,7 @@ while True:
                 caller = packet[16:48]
                 if kind == HELLO: sock.sendto(shake(COOKIE, caller, cookie(caller, sender)), sender)
                 if kind == OPEN and packet[48:80] == cookie(caller, sender):
-                    # One simulator at a time; and a repeated open begins no second session (a new cookie secret voids it).
+                    # One simulator at a time. A repeated open does not start a second session (a new cookie secret voids it).
                     if session and now < session.heard + 1 and sender != session.peer: continue
                     session, felt.patch, secret = Session(sender, caller, packet[48:80]), None, os.urandom(32)
                     sock.sendto(shake(OPENED, caller, session.own), sender)
@@ -95,7 +95,7 @@ while True:
                 names = b"".join(text.ljust(40, b"\0") for text in (b"Python's arm", b"spring", b"py-1", b"bridge_arm.py"))
                 session.send(INFO, 0, struct.pack("<I10f", 1, 3.3, 0.88, 400, 4, -.1, -.1, -.1, .1, .1, .1) + names)
                 session.send(INFO, 1, b"")  # there is no left arm
-            elif kind == PATCH and arm == 0:  # what acts along x of it; an arm in space uses all three directions
+            elif kind == PATCH and arm == 0:  # only its x component; a real device uses all three directions
                 f = struct.unpack_from("<37f", payload, 24)
                 age = now - 1e-9 * struct.unpack_from("<Q", payload, 0)[0]
                 if 0 <= age < 0.15: felt.patch, felt.got = (f[2], f[5], min(400, f[8]), f[20], f[23], f[36]), now
@@ -104,7 +104,7 @@ while True:
     force = felt.render(place, now)
     speed += 0.001 * (force + 20 * (0.02 - place) - speed) / 0.1
     place += 0.001 * speed
-    if session and now < session.heard + 0.2:  # not for longer: whoever fell silent is not streamed to
+    if session and now < session.heard + 0.2:  # a silent simulator gets no further samples
         session.send(SAMPLE, 0, struct.pack("<QII14fIf", int(now * 1e9), 1, 0, place, 0, 0, 0, 0, 0, 1, speed, 0, 0, 0,
                                             force, 0, 0, 0, -1))
     time.sleep(0.001)

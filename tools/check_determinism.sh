@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # The golden hashes for every compiler and architecture: GCC and Clang on x86-64, each with the kernels for AVX-512, AVX2 and
 # SSE4 (the last is all that the rest of the code uses), and AArch64, cross-built and run by qemu-user. Compares the bytes of the whole
-# state too, between the builds. Builds the library alone, in build/determinism. What is missing is installed (Debian 12).
-#   tools/check_determinism.sh [gcc] [clang] [aarch64]     everything when nothing is named
+# state too, between the builds. Builds only the library, in build/determinism. Installs missing packages (Debian 12).
+#   tools/check_determinism.sh [gcc] [clang] [aarch64]     default: all
 # CATGUT_GOLDEN_SECONDS (10): simulated seconds of each case on x86-64. CATGUT_GOLDEN_SECONDS_ARM (10): on AArch64, which the
 # emulator slows down about thirtyfold.
 # Exit code 1 when anything differs.
@@ -43,7 +43,7 @@ cases() { awk '!/^#/ { print $1, $2 }' "$root/tests/determinism/golden.txt" | un
 check() {  # check NAME SECONDS COMMAND...: every case against golden.txt, and the whole state against the first build's
   local name="$1" limit="$2" start=$SECONDS bad=0
   shift 2
-  # Two cases at a time; what each says is printed in order.
+  # Two cases at a time; their output is printed in order.
   cases | xargs -P 2 -L 1 bash -c '
     log="$1/$2.$(printf %s_%s "${@: -2}")"
     "${@:4:$#-5}" check "$0/tests/determinism/golden.txt" "${@: -2}" --seconds "$3" >"$log" 2>&1 || { cat "$log"; exit 1; }' \

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# What strangers do with Catgut, done from outside: installs the library and builds a program against it, without SDL, Filament,
+# Checks Catgut from outside: installs the library and builds a program against it, without SDL, Filament,
 # Boost or GoogleTest; writes the Debian packages, unpacks them, runs the program from there and builds against the unpacked library.
 # Needs a built program in build/ (./catgut --version, or ninja -C build) and Debian's dpkg-dev.
 set -euo pipefail
@@ -50,7 +50,7 @@ for deb in "$root"/build/*.deb; do
   echo "$(basename "$deb"), $(($(stat -c %s "$deb") / 1024)) KiB, depends: $(dpkg-deb -f "$deb" Depends)"
   dpkg-deb -x "$deb" "$work/tree"
 done
-# A scene that exists nowhere else: what is found, is found in the unpacked tree.
+# A scene that exists only in the unpacked tree.
 cp "$work/tree/usr/share/catgut/scenes/stay.toml" "$work/tree/usr/share/catgut/scenes/only_here.toml"
 (cd / && env -u CATGUT_SCENES -u CATGUT_DATA_DIR "$work/tree/usr/bin/catgut" run only_here --headless --seconds 2 --no-expect) || die "the packaged program failed"
 (cd / && env -u CATGUT_SCENES -u CATGUT_DATA_DIR "$work/tree/usr/bin/catgut" run stay --headless --seconds 2 --no-expect --json "$work/run.json" >/dev/null) && [ -s "$work/run.json" ] || die "no results"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Instructions that a tick of every technique's scene takes, at rest and in the middle of the work, compared with those on record
-# in bench/instructions.txt. Times on shared machines swing by tens of per cent, counts by nothing, so a tenth more is news.
+# Instructions per tick of every technique's scene, at rest and during the procedure, compared with the record in
+# bench/instructions.txt. Times on shared machines vary by tens of percent, counts do not.
 #   tools/count_instructions.sh            counts and compares; exit code 1 when a count is more than 10 % above its record
 #   tools/count_instructions.sh --update   counts and writes the record
 #   tools/count_instructions.sh --compare NOW RECORD   only compares two lists
@@ -55,7 +55,7 @@ count() {  # count FILE: writes "scene moment instructions-a-tick"
       die "valgrind is missing: apt-get install valgrind"
   fi
   [ -f "$root/build/CMakeCache.txt" ] || die "nothing is built yet: ./catgut test, or cmake --preset release"
-  # Configured anew, because the target is there only once valgrind is.
+  # Configured again, because the target exists only if valgrind is installed.
   { cmake -S "$root" -B "$root/build" && cmake --build "$root/build" --target count_ticks bench_thread; } >"$work/build.log" 2>&1 ||
     { tail -n 30 "$work/build.log" >&2; die "count_ticks cannot be built"; }
   local program="$root/build/bench/count_ticks"

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Makes the pictures of the README anew: docs/media/purse_string.webp (the first bites at eight times real time, then the closure
-# at four times) and docs/media/contact_sheet.jpg; and of the other three sutures docs/media/NAME.webp and NAME_sheet.jpg, whole,
-# faster than real time. Runs the scenes, which takes some ten minutes.
-#   tools/make_media.sh [FOLDER]     where films and sheets are, or go: NAME.mp4 and NAME.png; made when they are missing
+# Makes the pictures of the README: docs/media/purse_string.webp (the first bites at eight times real time, then the closure
+# at four times) and docs/media/contact_sheet.jpg; and of the other three sutures docs/media/NAME.webp and NAME_sheet.jpg, complete
+# and faster than real time. Runs the scenes, about ten minutes.
+#   tools/make_media.sh [FOLDER]     folder of films and sheets, NAME.mp4 and NAME.png; missing ones are made
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 folder="${1:-out/media}"

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Makes the pictures of the window anew: docs/media/screen_NAME.jpg for every screen at 1280x720, screen_results_4k.jpg at
-# 3840x2160, and window.jpg, which the README shows. Needs Xvfb; draws with whatever driver is there, which takes some minutes
-# without a graphics card.
+# Makes the pictures of the window: docs/media/screen_NAME.jpg for every screen at 1280x720, screen_results_4k.jpg at
+# 3840x2160, and window.jpg for the README. Needs Xvfb; takes some minutes without a graphics
+# card.
 #   tools/make_screens.sh [NAME ...]     only these: start settings practice lesson pause developer results results_4k view window
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -11,7 +11,7 @@ root="$PWD"
 folder="$root/out/screens"
 mkdir -p "$folder" docs/media
 cd "$folder"
-# Nobody's own settings, and a home whose path is nobody's.
+# Default settings, and a neutral home folder.
 export HOME="$folder/home" SDL_VIDEODRIVER=x11
 unset XDG_CONFIG_HOME
 rm -rf "$HOME" && mkdir -p "$HOME"

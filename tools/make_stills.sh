@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Makes docs/media/NAME.jpg anew: one moment of each technique in progress, in the best quality. Runs the scenes up to that
-# moment, which takes a minute or two.
-#   tools/make_stills.sh [FOLDER]     where the PNGs are, or go: NAME_still.png; made when they are missing
+# Makes docs/media/NAME.jpg: one moment of each technique, at the best quality. Runs the scenes up to that moment, one or two
+# minutes.
+#   tools/make_stills.sh [FOLDER]     folder of the PNGs, NAME_still.png; missing ones are made
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 folder="${1:-out/stills}"
@@ -12,7 +12,7 @@ mkdir -p "$folder" docs/media
 for shot in purse_string:80.5 connell:63 stay:12 lembert:64; do
   name="${shot%%:*}" moment="${shot##*:}" png="$folder/${shot%%:*}_still.png"
   [ -f "$png" ] || ./catgut run "$name" --seed 1 --headless --no-expect --seconds "$(awk -v m="$moment" 'BEGIN { print m + 0.1 }')" --still "$moment:$png"
-  for quality in 3 4 5 6 8 10; do  # as good as fits into 250 kB
+  for quality in 3 4 5 6 8 10; do  # best quality within 250 kB
     ffmpeg -v error -y -i "$png" -frames:v 1 -q:v "$quality" "docs/media/$name.jpg"
     [ "$(stat -c %s "docs/media/$name.jpg")" -gt 250000 ] || break
   done

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# How long it takes from a motion of the mouse to the picture that shows it: opens the window on an X server of its own, moves the
-# mouse for some seconds, and prints the program's table. On a desktop `./catgut play SCENE --seconds 20` prints it for your own hands.
+# Latency from a motion of the mouse to its frame: opens the window on a private X server, moves the mouse for some seconds, and
+# prints the program's table. On a desktop, `./catgut play SCENE --seconds 20` prints it for your own hands.
 #   tools/measure_latency.sh [SCENE] [WxH] [QUALITY] [SECONDS]
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

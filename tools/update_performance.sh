@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Writes docs/performance.md and its pictures from measurements on this machine, which should have nothing else to do.
-#   tools/update_performance.sh                all of it (half an hour on two cores)
+# Writes docs/performance.md and its pictures from measurements on this machine, which should be idle.
+#   tools/update_performance.sh                all parts (half an hour on two cores)
 #   tools/update_performance.sh scale stages   only these parts; the others keep their last measurement
 #   tools/update_performance.sh --page         only the page, from the last measurements
-# Parts: paper limits limits_200 scale stages kilohertz bullet. What was measured is kept in out/performance.
+# Parts: paper limits limits_200 scale stages kilohertz bullet. Measurements are stored in out/performance.
 set -euo pipefail
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
@@ -51,7 +51,7 @@ fi
 for part in "${wanted[@]}"; do
   [[ " ${all[*]} " = *" $part "* ]] || { echo "update_performance: no part $part; parts: ${all[*]}" >&2; exit 2; }
 done
-./catgut --version >/dev/null  # builds what has changed before anything is timed
+./catgut --version >/dev/null  # builds before anything is timed
 for part in "${wanted[@]}"; do
   echo "update_performance: $part" >&2
   measure "$part" >"$out/$part.part"

@@ -1,3 +1,3 @@
 # SPDX-License-Identifier: Apache-2.0
-# The words of its messages.
+# For the text of messages.
 target_link_libraries(catgut_anatomy ${kind} fmt::fmt)

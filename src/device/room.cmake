@@ -15,6 +15,6 @@ find_path(SODIUM_INCLUDE sodium.h REQUIRED)
 find_library(SODIUM_LIBRARY sodium REQUIRED)
 target_include_directories(catgut_device PRIVATE ${SODIUM_INCLUDE})
 target_link_libraries(catgut_device PRIVATE ${SODIUM_LIBRARY})
-# Quick to build matters more than quick to run. Asio has fences that GCC's thread sanitizer warns of; one thread runs it here.
+# Build time matters more than run time. GCC's thread sanitizer warns of fences in Asio; only one thread uses it here.
 set_source_files_properties(${PROJECT_SOURCE_DIR}/src/device/haply.cpp PROPERTIES
   COMPILE_OPTIONS "-O1;$<$<CXX_COMPILER_ID:GNU>:-Wno-tsan>")

@@ -35,7 +35,7 @@ if(CATGUT_RENDER)
   target_include_directories(catgut_render SYSTEM PRIVATE ${filament_include})
   target_include_directories(catgut_render PRIVATE ${material_folder})
   target_link_libraries(catgut_render PRIVATE filament::filament filament::backend filament::utils ${EPOXY_LIBRARY} ${X11_LIBRARY})
-  # Panels: filagui brings a whole Dear ImGui along. Whoever draws panels links it, and not the distribution's second copy.
+  # Panels: filagui contains a complete Dear ImGui. Code that draws panels links it, not the distribution's second copy.
   get_target_property(FILAGUI_LIBRARY filament::filagui IMPORTED_LOCATION_NONE)
   add_library(catgut_panels INTERFACE)
   target_include_directories(catgut_panels SYSTEM INTERFACE ${IMGUI_INCLUDE})

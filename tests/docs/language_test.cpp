@@ -123,6 +123,23 @@ TEST(Language, comments_use_no_refused_word) {
   }
 }
 
+// Comments of scripts and build files begin with '#'.
+TEST(Language, comments_of_scripts_use_no_refused_word) {
+  static const std::regex kComment(R"((^|\s)#\s+(.*)$)"), kExempt(R"(`[^`]*`|\b\w*_\w*\b|\bDear ImGui\b)");
+  std::vector<fs::path> scripts = files({"cmake", "samples", "src", "tools"}, {".cmake", ".py", ".sh"});
+  for (const char* name : {"catgut", "CMakeLists.txt", "app/CMakeLists.txt", "bench/CMakeLists.txt", "tests/CMakeLists.txt"})
+    scripts.push_back(kRoot / name);
+  for (const fs::path& file : scripts) {
+    const std::vector<std::string> lines = lines_of(read_file(file));
+    for (size_t i = 0; i < lines.size(); ++i) {
+      std::smatch found;
+      if (!std::regex_search(lines[i], found, kComment)) continue;
+      for (const std::string& word : words_in(std::regex_replace(found[2].str(), kExempt, "Code"), refused()))
+        ADD_FAILURE() << where(file, i + 1) << ": \"" << word << "\"";
+    }
+  }
+}
+
 TEST(Language, scenes_use_no_refused_word) {
   for (const fs::path& file : files({"scenes"}, {".toml"})) {
     const std::vector<std::string> lines = lines_of(read_file(file));
