@@ -9,6 +9,7 @@
 #include "core/file.h"
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
+#include "technique/technique.h"
 
 namespace catgut {
 namespace {
@@ -33,7 +34,7 @@ int bench_stages(const BenchOptions& o) {
   SessionOptions session;
   session.threads = o.threads;
   session.seconds = o.seconds;
-  session.surgeon = scene.technique.name == "none" ? "none" : "scripted";
+  session.surgeon = scene.technique.name == kNoTechnique ? "none" : "scripted";
   // Every repetition computes the same bits; the fastest is the least disturbed by other programs.
   RunResult best;
   for (int i = 0; i < o.repeat; ++i) {

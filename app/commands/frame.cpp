@@ -11,6 +11,7 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "procedure/scene_file.h"
+#include "technique/technique.h"
 
 namespace catgut {
 namespace {
@@ -58,7 +59,7 @@ int bench_frame(const FrameOptions& o) {
   };
   SessionOptions session;
   session.seconds = o.seconds;
-  session.surgeon = scene.technique.name == "none" ? "none" : "scripted";
+  session.surgeon = scene.technique.name == kNoTechnique ? "none" : "scripted";
   RunResult run;
   try {
     run = run_session(scene, session, hooks);

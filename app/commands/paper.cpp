@@ -9,6 +9,7 @@
 #include "core/check.h"
 #include "procedure/scene_file.h"
 #include "runtime/paper_tables.h"
+#include "technique/technique.h"
 
 namespace catgut {
 namespace {
@@ -30,7 +31,7 @@ int bench_paper(const PaperOptions& o) {
   for (const std::string& name : o.scene) {
     scenes.push_back(read_scene(name));
     for (const std::string& setting : o.set) set_value(scenes.back(), setting);
-    if (scenes.back().technique.name == "none")
+    if (scenes.back().technique.name == kNoTechnique)
       throw InputError(name, "it has no technique for the scripted surgeon", "name purse_string, connell, stay or lembert");
   }
   if (!o.out.empty())

@@ -11,6 +11,7 @@
 #include "core/file.h"
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
+#include "technique/technique.h"
 
 namespace catgut {
 namespace {
@@ -24,7 +25,7 @@ RunResult run_once(const SceneSpec& scene, int threads, double seconds, const Se
   SessionOptions session;
   session.threads = threads;
   session.seconds = seconds;
-  session.surgeon = scene.technique.name == "none" ? "none" : "scripted";
+  session.surgeon = scene.technique.name == kNoTechnique ? "none" : "scripted";
   return run_session(scene, session, hooks);
 }
 

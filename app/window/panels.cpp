@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "technique/technique.h"
 #include "window/widgets.h"
 
 namespace catgut {
@@ -22,6 +23,7 @@ const char* kHints =
     "W                both hands: wrap, pull apart\n"
     "Tab              other hand\n"
     "C  N             cut thread, new suture\n"
+    "I  K             next instrument, park clamp\n"
     "1 2 3            fine, normal, fast\n"
     "middle, arrows   orbit; Ctrl+wheel: zoom\n"
     "- +              slow motion\n"
@@ -51,6 +53,11 @@ void hand_choice(Settings& s) {
   if (radio("left-handed", s.left_handed)) s.left_handed = true;
 }
 
+std::string instrument_in_hand(const WorkView& v, size_t hand) {
+  const int i = v.seen->tool[hand].instrument;
+  return i < 0 ? "empty" : v.picture->instrument[static_cast<size_t>(i)].title;
+}
+
 }  // namespace
 
 Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
@@ -75,7 +82,7 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
       choice = {Chosen::scene, i};
     ImGui::PopStyleVar();
     ImGui::Indent(1.6f * em());
-    text(kQuiet, fmt::format("{}; {}", s.technique == "none" ? "free practice" : "technique: " + s.technique, s.body));
+    text(kQuiet, fmt::format("{}; {}", s.technique.empty() ? "free practice" : "technique: " + s.technique, s.body));
     ImGui::Unindent(1.6f * em());
     gap(0.15f);
   }
@@ -202,6 +209,8 @@ void work_panel(const WorkView& v, const Settings& settings) {
     else
       for (const std::string& line : technique_lines(*v.scene, *v.seen, s.metrics)) state.push_back({kText, line});
     if (!s.doing.empty()) state.push_back({kQuiet, "surgeon: " + s.doing});
+    const TechniqueRow* technique = find_technique(v.scene->technique.name);
+    if (technique && settings.guidance == Guidance::learn && !v.watching) state.push_back({kAccent, technique->hint});
   }
   for (size_t k = 0; k < 2; ++k) {
     const ArmView& arm = s.arm_view[k];
@@ -216,8 +225,9 @@ void work_panel(const WorkView& v, const Settings& settings) {
   if (!v.watching && !s.settling && !v.inside) {
     const size_t k = v.mouse->active;
     const char* speed = v.speed < 1 ? "  fine" : v.speed > 1 ? "  fast" : "";
-    std::vector<Line> hand{{kText, fmt::format("{} ({} hand){}", k == 0 ? "needle holder" : "forceps",
+    std::vector<Line> hand{{kText, fmt::format("{} ({} hand){}", instrument_in_hand(v, k),
                                                (k == 0) != settings.left_handed ? "right" : "left", speed)}};
+    for (const std::string& line : tray_lines(*v.seen, *v.picture, k)) hand.push_back({kQuiet, line});
     if (v.steering->hand[k].snapped) {
       const HelpAt at = v.steering->hand[k].at;
       hand.push_back({kAccent, at == HelpAt::needle ? "needle: close jaws"

@@ -39,6 +39,7 @@ struct WorkView {
   const SceneSpec* scene = nullptr;
   const LiveStatus* status = nullptr;
   const Snapshot* seen = nullptr;
+  const PictureModel* picture = nullptr;
   const Steering* steering = nullptr;
   const MouseHand* mouse = nullptr;
   const std::deque<LogLine>* log = nullptr;

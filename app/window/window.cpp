@@ -25,6 +25,7 @@
 #include "runtime/guide.h"
 #include "runtime/report.h"
 #include "sim/simulation.h"
+#include "technique/technique.h"
 #include "window/hands.h"
 #include "window/input.h"
 #include "window/latency.h"
@@ -42,20 +43,20 @@ constexpr double kSlowPicture = 0.07;                                      // [s
 constexpr double kStallEvery = 2;                                          // [s] of --stall-ms
 
 std::vector<SceneChoice> scene_choices() {
-  // Scenes for practice, simplest first; then all others.
+  // The scene of each technique, simplest first; then all others.
   std::vector<std::string> names = scene_names();
   const auto rank = [](const std::string& name) {
-    const std::vector<std::string> kFirst{"purse_string", "stay", "connell", "lembert"};
-    return std::find(kFirst.begin(), kFirst.end(), name) - kFirst.begin();
+    const auto all = techniques();
+    return std::find(all.begin(), all.end(), find_technique(name)) - all.begin();
   };
   std::stable_sort(names.begin(), names.end(), [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
   std::vector<SceneChoice> out;
   for (const std::string& name : names) {
     const SceneSpec scene = read_scene(name);
-    std::string technique = scene.technique.name, body;
-    std::replace(technique.begin(), technique.end(), '_', '-');
+    const TechniqueRow* technique = find_technique(scene.technique.name);
+    std::string body;
     for (const BodySpec& b : scene.body) body += (body.empty() ? "" : " and ") + b.name;
-    out.push_back({name, scene.title, technique, body});
+    out.push_back({name, scene.title, technique ? technique->title : "", body});
   }
   return out;
 }
@@ -555,6 +556,7 @@ class Window {
     view.scene = &visit_->scene;
     view.status = &visit_->live.status();
     view.seen = &visit_->seen;
+    view.picture = &visit_->live.picture();
     view.steering = &hands_.steering;
     view.mouse = &hands_.mouse;
     view.log = &visit_->log;

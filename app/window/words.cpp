@@ -7,12 +7,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "device/tray.h"
+#include "technique/technique.h"
+
 namespace catgut {
 namespace {
 
 const char* tool_name(uint8_t hand) {
   constexpr const char* kName[kMaxHands] = {"needle holder", "forceps", "assistant right", "assistant left"};
   return hand < kMaxHands ? kName[hand] : "parked clamp";
+}
+
+bool closes_opening(const SceneSpec& scene) {
+  const TechniqueRow* row = find_technique(scene.technique.name);
+  return row && row->closes_opening;
 }
 
 std::string counted(int n, const char* one) { return fmt::format("{} {}{}", n, one, n == 1 ? "" : "s"); }
@@ -151,8 +159,7 @@ bool repeated_exit(const std::vector<Event>& events, size_t i) {
 
 std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot& seen, const SessionMetrics& metrics) {
   std::vector<std::string> lines;
-  const std::string& name = scene.technique.name;
-  if (name == "purse_string") {
+  if (closes_opening(scene)) {
     lines.push_back(fmt::format("bites {} of {}", metrics.bites, scene.technique.min_bites));
     if (metrics.opening_start > 0)
       lines.push_back(fmt::format("opening {:.0f} %", 100 * metrics.opening / metrics.opening_start));
@@ -178,14 +185,27 @@ std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot&
   return lines;
 }
 
+std::vector<std::string> tray_lines(const Snapshot& seen, const PictureModel& picture, size_t hand) {
+  std::vector<std::string> lines;
+  const Command next = next_from_tray(seen, hand), park = park_or_take_up(seen, hand);
+  const auto title = [&](size_t i) { return picture.instrument[i].title; };
+  if (next.kind != CommandKind::none) lines = {"tray", "I  " + title(next.argument)};
+  for (size_t i = 0; i < seen.instrument.size(); ++i)
+    if (seen.instrument[i].place == InstrumentPlace::tray && i != next.argument) lines.push_back("   " + title(i));
+  const bool clamps = park.kind == CommandKind::park && picture.instrument[park.argument].can(kClamp);
+  if (park.kind == CommandKind::unpark) lines.push_back("K  take up " + title(park.argument));
+  if (clamps && seen.tool[hand].held != Held::nothing) lines.push_back("K  park " + title(park.argument));
+  return lines;
+}
+
 std::vector<ResultRow> result_rows(const SceneSpec& scene, const SessionMetrics& p) {
   std::vector<ResultRow> rows;
-  const bool purse_string = scene.technique.name == "purse_string";
+  const bool opening = closes_opening(scene);
   rows.push_back({"time", clock_text(p.time_s)});
-  rows.push_back({"bites", purse_string ? fmt::format("{} (minimum {})", p.bites, scene.technique.min_bites)
-                                        : fmt::format("{}", p.bites)});
+  rows.push_back(
+      {"bites", opening ? fmt::format("{} (minimum {})", p.bites, scene.technique.min_bites) : fmt::format("{}", p.bites)});
   rows.push_back({"needle withdrawals", fmt::format("{}", p.bites_withdrawn)});
-  if (p.opening_start > 0 && purse_string)
+  if (p.opening_start > 0 && opening)
     rows.push_back({"residual opening", fmt::format("{:.0f} %", 100 * p.opening / p.opening_start)});
   rows.push_back({"knots, throws", fmt::format("{}, {}", p.knots, p.throws)});
   rows.push_back({"cuts", fmt::format("{}", p.cuts)});

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "runtime/session_metrics.h"
 #include "sim/scene.h"
@@ -21,6 +22,9 @@ bool repeated_exit(const std::vector<Event>& events, size_t i);
 
 // Progress of the technique, a few short lines.
 std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot& seen, const SessionMetrics& metrics);
+
+// What lies on the tray, and what the keys I and K do for this hand.
+std::vector<std::string> tray_lines(const Snapshot& seen, const PictureModel& picture, size_t hand);
 
 struct ResultRow {
   std::string name, value;

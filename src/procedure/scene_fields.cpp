@@ -16,13 +16,10 @@ namespace catgut {
 namespace {
 
 // "|purse_string|...|running"
-const char* plan_choices() {
-  static const std::string choices = [] {
-    std::string all;
-    for (const char* name : plan_names()) all += std::string("|") + name;
-    return all;
-  }();
-  return choices.c_str();
+std::string plan_choices() {
+  std::string all;
+  for (const char* name : plan_names()) all += std::string("|") + name;
+  return all;
 }
 
 constexpr double kAny = 1e30;  // no meaningful bound
@@ -115,7 +112,7 @@ const Field kField[] = {
     {"mechanics", "collision_off", "", 0, 100, nullptr, "thread particles without collision on each side of a locked one", TOP(mechanics.collision_off)},
     {"mechanics", "grasp_reach", "m", 0, 0.1, nullptr, "maximum distance at which a closing jaw grasps needle or thread", TOP(mechanics.grasp_reach)},
 
-    {"technique", "name", "", 0, 0, technique_choices(), "suturing technique", TOP(technique.name)},
+    {"technique", "name", "", 0, 0, &technique_choices, "suturing technique", TOP(technique.name)},
     {"technique", "anvil", "m", -1, 1, nullptr, "focal point of the closure, relative to the center of the rim", TOP(technique.anvil)},
     {"technique", "anvil_radius", "m", 0, 0.1, nullptr, "radius of the closed rim", TOP(technique.anvil_radius)},
     {"technique", "closure_compliance", "m/N", 0, 1000, nullptr, "compliance of the closing pull toward the anvil", TOP(technique.closure_compliance)},
@@ -124,7 +121,7 @@ const Field kField[] = {
     {"technique", "step", "m", 0.0001, 0.1, nullptr, "spacing of the pairs between two midpoints (dist_threshold of section 2.5.2)", TOP(technique.step)},
     {"technique", "throws", "", 1, 8, nullptr, "minimum throws of a secure knot", TOP(technique.throws)},
 
-    {"surgeon", "plan", "", 0, 0, plan_choices(), "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel", TOP(surgeon.plan)},
+    {"surgeon", "plan", "", 0, 0, &plan_choices, "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel", TOP(surgeon.plan)},
     {"surgeon", "bites", "", 0, 1000, nullptr, "number of bites", TOP(surgeon.bites)},
     {"surgeon", "edge_distance", "m", 0, 0.1, nullptr, "distance of the bites from the rim", TOP(surgeon.edge_distance)},
     {"surgeon", "bite_length", "m", 0, 0.1, nullptr, "bite length along the rim", TOP(surgeon.bite_length)},
@@ -247,7 +244,7 @@ std::string range_text(const Field& field) {
   if (std::holds_alternative<bool*>(ref)) return "true or false";
   if (std::holds_alternative<std::string*>(ref)) {
     if (!field.choices) return "";
-    std::string out = field.choices;
+    std::string out = field.choices.text();
     for (size_t bar; (bar = out.find('|')) != std::string::npos;) out.replace(bar, 1, " or ");
     return out;
   }

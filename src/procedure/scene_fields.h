@@ -3,6 +3,7 @@
 // docs/scene_reference.md and the tests all use it, so a key added here is complete everywhere.
 // Default values are not repeated in the table: they are read from a default-constructed SceneSpec.
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -17,12 +18,23 @@ namespace catgut {
 // Location of a value; its alternative is also the key's type.
 using FieldRef = std::variant<std::string*, int*, uint64_t*, float*, bool*, Vec3*>;
 
+// The allowed words of a text, separated by '|': fixed, or known when they are asked for. Neither: any text.
+struct Choices {
+  const char* fixed = nullptr;
+  std::string (*now)() = nullptr;
+  constexpr Choices(std::nullptr_t) {}
+  constexpr Choices(const char* words) : fixed(words) {}
+  constexpr Choices(std::string (*words)()) : now(words) {}
+  explicit operator bool() const { return fixed || now; }
+  std::string text() const { return now ? now() : fixed ? fixed : ""; }
+};
+
 struct Field {
   const char* section;  // "" for keys at the top of the file; see is_list
   const char* key;
-  const char* unit;     // SI; "" when the value has none
-  double min, max;      // inclusive, per component of a vector; ignored for text and flags
-  const char* choices;  // text: the valid words separated by '|'; nullptr: any text
+  const char* unit;  // SI; "" when the value has none
+  double min, max;   // inclusive, per component of a vector; ignored for text and flags
+  Choices choices;   // text: the allowed words
   const char* meaning;
   FieldRef (*at)(SceneSpec& scene, size_t row);  // row: of a list section, else unused
 };

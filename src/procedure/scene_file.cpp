@@ -128,7 +128,7 @@ struct Assign {
   }
   std::vector<std::string> choices() const {
     std::vector<std::string> words;
-    std::istringstream in(field.choices);
+    std::istringstream in(field.choices.text());
     for (std::string w; std::getline(in, w, '|');) words.push_back(w);
     return words;
   }

@@ -6,9 +6,12 @@
 
 #include "core/check.h"
 #include "procedure/scene_fields.h"
+#include "technique/technique.h"
 
 namespace catgut {
 namespace {
+
+bool is_technique(const Field& f) { return &f == find_field("technique", "name"); }
 
 std::string heading(const std::string& section) {
   if (section.empty()) return "";
@@ -24,6 +27,8 @@ std::string one_key(const Field& f) {
   if (!unit.empty()) out += fmt::format("  unit     {}\n", unit);
   out += fmt::format("  default  {}\n", shown_default(f));
   if (!range.empty()) out += fmt::format("  range    {}\n", range);
+  for (const TechniqueRow* t : techniques())
+    if (is_technique(f)) out += fmt::format("  {:<14} {}\n", t->name, t->description);
   return out;
 }
 
@@ -106,8 +111,12 @@ std::string reference_markdown() {
                            cell(range_text(f)), cell(f.meaning));
   };
   table("");
-  for (const std::string& section : scene_sections())
+  for (const std::string& section : scene_sections()) {
     if (section != "expect") table(section);
+    if (section != "technique") continue;
+    out += "\n| technique | description |\n|---|---|\n";
+    for (const TechniqueRow* t : techniques()) out += fmt::format("| `{}` | {} |\n", t->name, cell(t->description));
+  }
   out += fmt::format("\n## `[expect]` {}\n\n", section_meaning("expect"));
   out +=
       "`name = 12` requires equality, `name = {min = 10, max = 14}` a range with one or both bounds. A run that misses a\n"

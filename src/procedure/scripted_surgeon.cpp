@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "core/check.h"
+#include "technique/technique.h"
 
 namespace catgut {
 
@@ -24,9 +25,15 @@ SurgeonSkill skill_of(const SceneSpec& scene) {
   return k;
 }
 
+std::string plan_of(const SceneSpec& scene) {
+  if (!scene.surgeon.plan.empty()) return scene.surgeon.plan;
+  const TechniqueRow* row = find_technique(scene.technique.name);
+  return row ? row->plan : "";
+}
+
 std::unique_ptr<Surgeon> scripted_surgeon(const SceneSpec& scene, const PictureModel& picture) {
-  const std::string plan = scene.surgeon.plan.empty() ? scene.technique.name : scene.surgeon.plan;
-  if (plan == "none")
+  const std::string plan = plan_of(scene);
+  if (plan.empty())
     throw InputError("--surgeon scripted", "the scene has no technique to carry out", "use --surgeon none, or a recording");
   try {
     return make_surgeon(plan, picture, skill_of(scene));

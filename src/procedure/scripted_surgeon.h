@@ -10,6 +10,7 @@
 namespace catgut {
 
 SurgeonSkill skill_of(const SceneSpec& scene);
+std::string plan_of(const SceneSpec& scene);  // surgeon.plan, else that of the technique; "": none
 
 // Throws InputError when the scene has no technique, or one without a script.
 std::unique_ptr<Surgeon> scripted_surgeon(const SceneSpec& scene, const PictureModel& picture);

@@ -10,9 +10,8 @@
 namespace catgut {
 
 BitePlaces bite_places(const SceneSpec& scene, const PictureModel& picture) {
-  const std::string plan = scene.surgeon.plan.empty() ? scene.technique.name : scene.surgeon.plan;
   try {
-    return {make_plan(plan, picture, skill_of(scene)).place};
+    return {make_plan(plan_of(scene), picture, skill_of(scene)).place};
   } catch (const std::invalid_argument&) { return {}; }
 }
 

@@ -373,10 +373,9 @@ void Live::Work::change_scene(const std::string& key_equals_value) {
 
 void Live::Work::demonstrate(const Demonstration& what) {
   if (surgeon.surgeon || published.demonstrating || published.settling || !published.fault.empty()) return;
-  const std::string plan = scene.surgeon.plan.empty() ? scene.technique.name : scene.surgeon.plan;
   try {
     demonstrator.surgeon =
-        make_demonstrator(plan, picture, skill_of(scene), {what.task.begin(), what.task.begin() + what.tasks});
+        make_demonstrator(plan_of(scene), picture, skill_of(scene), {what.task.begin(), what.task.begin() + what.tasks});
   } catch (const std::invalid_argument&) { return; }  // a scene without a demonstrator
   learner = moment();
   learner_map = map;

@@ -8,40 +8,43 @@
 #include <cmath>
 #include <optional>
 
+#include "technique/technique.h"
+
 namespace catgut {
 namespace {
 
 constexpr uint64_t kPictureEvery = 4;  // [ticks] between measured pictures: they take longer than a tick
 
 struct PaperFigure {
-  const char *technique, *phase;
+  const TechniqueRow* technique;
+  const char* phase;
   double fps, render_ms, solver_ms;
 };
 // Tables 1 to 4, measured there with a headset and two arms on an i7-13700KF and an RTX 4070 Ti.
-constexpr PaperFigure kPaper[] = {
-    {"purse_string", "Start", 82.1, 12.1, 5.42},
-    {"purse_string", "During suturing", 81.38, 12.21, 5.61},
-    {"purse_string", "After completion", 82.2, 12.1, 5.08},
-    {"connell", "Start", 72.3, 13.8, 6.70},
-    {"connell", "During suturing", 70.1, 14.2, 6.78},
-    {"connell", "During looping", 65.7, 15.7, 7.99},
-    {"connell", "After completion", 70.2, 14.3, 7.35},
-    {"stay", "Start", 76.5, 12.9, 5.9},
-    {"stay", "During suturing", 72.1, 13.8, 6.33},
-    {"stay", "During looping", 72.6, 13.82, 6.78},
-    {"stay", "After completion", 73.1, 13.6, 6.41},
-    {"lembert", "Start", 52.2, 19.0, 11.47},
-    {"lembert", "Suture #1", 51.3, 19.2, 11.80},
-    {"lembert", "Loop #1", 52.0, 19.3, 11.85},
-    {"lembert", "Suture #2", 52.5, 19.2, 11.60},
-    {"lembert", "Loop #2", 53.1, 18.8, 11.68},
-    {"lembert", "Suture #3", 50.8, 19.54, 11.69},
-    {"lembert", "Loop #3", 53.2, 18.6, 11.65},
-    {"lembert", "Suture #4", 50.65, 19.73, 11.95},
-    {"lembert", "Loop #4", 52.8, 18.95, 11.93},
-    {"lembert", "Suture #5", 50.62, 19.48, 11.84},
-    {"lembert", "Loop #5", 52.81, 18.62, 11.74},
-    {"lembert", "After completion", 53.2, 18.8, 11.45},
+const PaperFigure kPaper[] = {
+    {&kPurseString, "Start", 82.1, 12.1, 5.42},
+    {&kPurseString, "During suturing", 81.38, 12.21, 5.61},
+    {&kPurseString, "After completion", 82.2, 12.1, 5.08},
+    {&kConnell, "Start", 72.3, 13.8, 6.70},
+    {&kConnell, "During suturing", 70.1, 14.2, 6.78},
+    {&kConnell, "During looping", 65.7, 15.7, 7.99},
+    {&kConnell, "After completion", 70.2, 14.3, 7.35},
+    {&kStay, "Start", 76.5, 12.9, 5.9},
+    {&kStay, "During suturing", 72.1, 13.8, 6.33},
+    {&kStay, "During looping", 72.6, 13.82, 6.78},
+    {&kStay, "After completion", 73.1, 13.6, 6.41},
+    {&kLembert, "Start", 52.2, 19.0, 11.47},
+    {&kLembert, "Suture #1", 51.3, 19.2, 11.80},
+    {&kLembert, "Loop #1", 52.0, 19.3, 11.85},
+    {&kLembert, "Suture #2", 52.5, 19.2, 11.60},
+    {&kLembert, "Loop #2", 53.1, 18.8, 11.68},
+    {&kLembert, "Suture #3", 50.8, 19.54, 11.69},
+    {&kLembert, "Loop #3", 53.2, 18.6, 11.65},
+    {&kLembert, "Suture #4", 50.65, 19.73, 11.95},
+    {&kLembert, "Loop #4", 52.8, 18.95, 11.93},
+    {&kLembert, "Suture #5", 50.62, 19.48, 11.84},
+    {&kLembert, "Loop #5", 52.81, 18.62, 11.74},
+    {&kLembert, "After completion", 53.2, 18.8, 11.45},
 };
 
 // Times of one execution's ticks of a phase.
@@ -70,8 +73,9 @@ std::vector<double> rates(std::span<const double> ms) {
 }
 
 const PaperFigure* paper_figure(const std::string& technique, const std::string& phase) {
+  const TechniqueRow* row = find_technique(technique);
   for (const PaperFigure& f : kPaper)
-    if (technique == f.technique && phase == f.phase) return &f;
+    if (row == f.technique && phase == f.phase) return &f;
   return nullptr;
 }
 
@@ -109,7 +113,7 @@ PaperTable measure_paper(SceneSpec scene, int executions, int threads,
   const uint64_t first_seed = scene.seed;
   for (int i = 0; i < executions; ++i) {
     scene.seed = first_seed + static_cast<uint64_t>(i);
-    PaperPhase phase_of(scene.technique.name == "lembert");
+    PaperPhase phase_of(paper_figure(table.technique, "Suture #1") != nullptr);
     std::vector<Ticks> ticks;
     PictureCost picture;
     bool done = false;

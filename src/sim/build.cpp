@@ -84,8 +84,8 @@ TechniqueModel make_technique(const SceneSpec& scene, const std::vector<Rim>& ri
   TechniqueModel t;
   const TechniqueSpec& spec = scene.technique;
   t.row = find_technique(spec.name);
-  if (!t.row && spec.name != "none")
-    throw InputError(where, "technique.name \"" + spec.name + "\" is not known", std::string("use ") + technique_choices());
+  if (!t.row && spec.name != kNoTechnique)
+    throw InputError(where, "technique.name \"" + spec.name + "\" is not known", "use " + technique_choices());
   if (!t.row) return t;
   for (size_t w = 0; w < t.row->walls; ++w)
     if (w >= rim.size() || rim[w].outer.empty()) throw InputError(where, t.row->missing, t.row->remedy);

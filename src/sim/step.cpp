@@ -38,6 +38,9 @@ TechniqueView look(const Model& model, State& state, size_t which) {
   view.needle_in_tissue = !suture.open.empty();
   view.suture_index = suture.suture_index;
   view.dt = model.dt;
+  view.suture = static_cast<uint32_t>(which);
+  view.plan_of = state.plan;
+  view.state_of = state.technique;
   return view;
 }
 

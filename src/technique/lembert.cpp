@@ -68,27 +68,42 @@ void add_pair(const LembertModel& model, LembertState& state, const Vec4* x, con
   state.row.push_back(row);
 }
 
+// A tied stitch that holds, of any suture.
+struct Neighbor {
+  uint32_t suture = 0, stitch = 0;
+  Vec3 at;  // [m] where its two edges meet
+};
+
+Vec3 middle_of(const ClosurePlan::Pair& p, const Vec4* x) { return 0.5f * (position_of(p.a, x) + position_of(p.b, x)); }
+
+// Calls `each(suture, state, plan)` for this suture and then for all others.
+template <typename Each>
+void for_every_suture(const LembertState& state, const TechniqueView& view, const ClosurePlan& plan, Each&& each) {
+  each(view.suture, state, plan);
+  for (uint32_t k = 0; k < view.state_of.size(); ++k)
+    if (k != view.suture) each(k, view.state_of[k].lembert, view.plan_of[k]);
+}
+
 // Figure 15: particles of both groups between two stitches, each with the closest of the opposite group.
 void pair_between(const LembertModel& model, LembertState& state, const TechniqueView& view, const Ring& ring, uint32_t one,
-                  uint32_t other, ClosurePlan& plan) {
+                  const Neighbor& other, ClosurePlan& plan) {
   const Vec4* x = view.x;
-  const auto from_center = [&](uint32_t stitch) {
-    const ClosurePlan::Pair& p = plan.pair[state.stitch[stitch].row];
-    return 0.5f * (position_of(p.a, x) + position_of(p.b, x)) - ring.center;
-  };
-  const Vec3 v1 = from_center(one), v2 = from_center(other);
+  const Vec3 v1 = middle_of(plan.pair[state.stitch[one].row], x) - ring.center, v2 = other.at - ring.center;
   const auto taken = [&](uint32_t i) {
-    return std::any_of(plan.pair.begin(), plan.pair.end(),
-                       [&](const ClosurePlan::Pair& p) { return p.a.particle[0] == i || p.b.particle[0] == i; });
+    bool found = false;
+    for_every_suture(state, view, plan, [&](uint32_t, const LembertState&, const ClosurePlan& of) {
+      found = found || std::any_of(of.pair.begin(), of.pair.end(),
+                                   [&](const ClosurePlan::Pair& p) { return p.a.particle[0] == i || p.b.particle[0] == i; });
+    });
+    return found;
   };
+  const LembertRow row{one, other.stitch, other.suture, 0};
   for (uint32_t i : model.outer)
     if (is_between(v1, v2, xyz(x[i]) - ring.center, ring.axis) && !taken(i))
-      add_pair(model, state, x, particle_point(i), particle_point(nearest_of(model.inner, x, xyz(x[i]))), {one, other, 0}, 0,
-               plan);
+      add_pair(model, state, x, particle_point(i), particle_point(nearest_of(model.inner, x, xyz(x[i]))), row, 0, plan);
   for (uint32_t i : model.inner)
     if (is_between(v1, v2, xyz(x[i]) - ring.center, ring.axis) && !taken(i))
-      add_pair(model, state, x, particle_point(nearest_of(model.outer, x, xyz(x[i]))), particle_point(i), {one, other, 0}, 0,
-               plan);
+      add_pair(model, state, x, particle_point(nearest_of(model.outer, x, xyz(x[i]))), particle_point(i), row, 0, plan);
 }
 
 // "The closest particle in pg_i and pg_o is found and they are pulled to their midpoint when a knot is tied. When a subsequent
@@ -105,19 +120,23 @@ void tie(const LembertModel& model, LembertState& state, const TechniqueView& vi
       std::find_if(plan.pair.begin(), plan.pair.end(), [&](const ClosurePlan::Pair& p) { return p.a.particle[0] == nearest; });
   state.stitch.push_back({static_cast<uint32_t>(drawn - plan.pair.begin()), view.suture_index, 1});
   if (drawn != plan.pair.end()) drawn->midpoint = 1;
-  else add_pair(model, state, view.x, particle_point(nearest), on_ring(model.inner, view.x, at), {stitch, stitch, 0}, 1, plan);
-  // The nearest stitch in each direction.
+  else
+    add_pair(model, state, view.x, particle_point(nearest), on_ring(model.inner, view.x, at), {stitch, stitch, view.suture, 0},
+             1, plan);
+  // The nearest stitch in each direction, of any suture.
   for (const float way : {1.0f, -1.0f}) {
     float least = model.widest;
-    int neighbor = -1;
-    for (uint32_t s = 0; s < stitch; ++s) {
-      if (!state.stitch[s].holds) continue;
-      const ClosurePlan::Pair& p = plan.pair[state.stitch[s].row];
-      const Vec3 there = 0.5f * (position_of(p.a, view.x) + position_of(p.b, view.x));
-      const float angle = way * signed_angle(at - ring.center, there - ring.center, ring.axis);
-      if (angle > 0 && angle < least) least = angle, neighbor = static_cast<int>(s);
-    }
-    if (neighbor >= 0) pair_between(model, state, view, ring, stitch, static_cast<uint32_t>(neighbor), plan);
+    Neighbor neighbor;
+    bool found = false;
+    for_every_suture(state, view, plan, [&](uint32_t suture, const LembertState& of, const ClosurePlan& pairs) {
+      for (uint32_t s = 0; s < of.stitch.size(); ++s) {
+        if (!of.stitch[s].holds || (suture == view.suture && s == stitch)) continue;
+        const Vec3 there = middle_of(pairs.pair[of.stitch[s].row], view.x);
+        const float angle = way * signed_angle(at - ring.center, there - ring.center, ring.axis);
+        if (angle > 0 && angle < least) least = angle, neighbor = {suture, s, there}, found = true;
+      }
+    });
+    if (found) pair_between(model, state, view, ring, stitch, neighbor, plan);
   }
 }
 
@@ -163,10 +182,15 @@ void lembert(const LembertModel& model, LembertState& state, const TechniqueView
     if (events[i].kind == EventKind::thread_cut) end_suture();
   if (state.tied && cut_in_stitch(events)) state.stitch.back().holds = 0;
 
+  const auto other_holds = [&](const LembertRow& row) {
+    const bool own = row.other_suture == view.suture || row.other_suture >= view.state_of.size();
+    const LembertState& of = own ? state : view.state_of[row.other_suture].lembert;
+    return row.other < of.stitch.size() && of.stitch[row.other].holds;
+  };
   for (uint32_t r = 0; r < state.row.size(); ++r) {
     LembertRow& row = state.row[r];
     const bool holds =
-        (state.stitch[row.one].holds && state.stitch[row.other].holds) ||
+        (state.stitch[row.one].holds && other_holds(row)) ||
         std::any_of(state.stitch.begin(), state.stitch.end(), [&](const LembertStitch& s) { return s.row == r && s.holds; });
     advance(plan.pair[r].progress, holds ? 1.0f : 0.0f, model.fastest, view.dt);
     tell_closed(r, plan.pair[r], view.x, row.reported, events);
@@ -175,10 +199,15 @@ void lembert(const LembertModel& model, LembertState& state, const TechniqueView
 
 const TechniqueRow kLembert{
     .name = "lembert",
+    .title = "Lembert",
+    .description = "single stitches through both layers of a cut bowel, each tied (section 2.5.4)",
+    .hint = "bite outer and inner layer, tie two throws, cut",
+    .plan = "lembert",
     .walls = 2,
     .missing = "it joins two layers and the scene's body has one",
     .remedy = "give the body an inner_radius",
     .interrupted = true,
+    .closes_opening = false,
     .begin =
         [](const TechniqueSetup& s, TechniqueModel& model) {
           // The sides that face each other: closed points meet there, without a wall between.
@@ -192,8 +221,8 @@ const TechniqueRow kLembert{
         [](const TechniqueState& s, size_t rows, size_t) {
           const LembertState& l = s.lembert;
           return l.row.size() == rows && !(l.tied && l.stitch.empty()) &&
-                 std::all_of(l.row.begin(), l.row.end(),
-                             [&](const LembertRow& r) { return r.one < l.stitch.size() && r.other < l.stitch.size(); });
+                 std::all_of(l.row.begin(), l.row.end(), [&](const LembertRow& r) { return r.one < l.stitch.size(); }) &&
+                 std::all_of(l.stitch.begin(), l.stitch.end(), [&](const LembertStitch& t) { return t.row < rows; });
         },
 };
 

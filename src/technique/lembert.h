@@ -28,8 +28,9 @@ struct LembertStitch {
 };
 // The technique's own data for a row of ClosurePlan::pair.
 struct LembertRow {
-  uint32_t one = 0, other = 0;  // the stitches on its two sides: closed while both hold; or one, for its own pair
-  uint32_t reported = 0;        // 1: seam_closed was reported
+  // The stitches between which it lies, the second one of any suture: it is closed while both hold, or one whose pair it is.
+  uint32_t one = 0, other = 0, other_suture = 0;
+  uint32_t reported = 0;  // 1: seam_closed was reported
 };
 
 struct LembertState {

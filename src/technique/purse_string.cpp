@@ -140,10 +140,15 @@ void purse_string(const PurseStringModel& model, PurseStringState& state, const 
 
 const TechniqueRow kPurseString{
     .name = "purse_string",
+    .title = "purse-string",
+    .description = "a running suture round an opening; both ends are pulled and it closes (section 2.5.1)",
+    .hint = "bite round the rim, then pull both ends",
+    .plan = "purse_string",
     .walls = 1,
     .missing = "a purse-string needs an opening and no body has one",
     .remedy = "leave one end of the body open",
     .interrupted = false,
+    .closes_opening = true,
     .begin =
         [](const TechniqueSetup& s, TechniqueModel& model) {
           PurseStringModel& m = model.purse_string;

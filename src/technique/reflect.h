@@ -21,11 +21,15 @@ constexpr void reflect(auto& a, Like<SeamState> auto& s) {
 }
 
 constexpr void reflect(auto& a, Like<LembertStitch> auto& s) { a(s.row), a(s.suture), a(s.holds); }
-constexpr void reflect(auto& a, Like<LembertRow> auto& r) { a(r.one), a(r.other), a(r.reported); }
+constexpr void reflect(auto& a, Like<LembertRow> auto& r) {
+  a(r.one), a(r.other), a.index(r.other_suture, IndexOf::strand), a(r.reported);
+}
 constexpr void reflect(auto& a, Like<LembertState> auto& l) {
   a(l.stitch), a(l.row), a(l.suture_index), a(l.throws), a(l.knot), a.at_most(l.tied, 1u), a(l.reported);
 }
 
-constexpr void reflect(auto& a, Like<TechniqueState> auto& t) { a(t.purse_string), a(t.seam), a(t.lembert); }
+constexpr void reflect(auto& a, Like<OwnTechniqueState> auto& o) { a(o.index), a(o.value); }
+
+constexpr void reflect(auto& a, Like<TechniqueState> auto& t) { a(t.purse_string), a(t.seam), a(t.lembert), a(t.own); }
 
 }  // namespace catgut

@@ -192,7 +192,36 @@ constexpr char kNoEnds[] = "it joins two open bowel ends and the scene does not 
 
 }  // namespace
 
-const TechniqueRow kConnell{"connell", 2, kNoEnds, kAddEnd, false, begin_seam<true>, tick_seam, seam_fits};
-const TechniqueRow kStay{"stay", 2, kNoEnds, kAddEnd, true, begin_seam<false>, tick_seam, seam_fits};
+const TechniqueRow kConnell{
+    .name = "connell",
+    .title = "Connell",
+    .description = "one running suture that joins two bowel ends and inverts their edges (section 2.5.2)",
+    .hint = "in and out on one end, straight across, in and out on the other",
+    .plan = "connell",
+    .walls = 2,
+    .missing = kNoEnds,
+    .remedy = kAddEnd,
+    .interrupted = false,
+    .closes_opening = false,
+    .begin = begin_seam<true>,
+    .tick = tick_seam,
+    .fits = seam_fits,
+};
+
+const TechniqueRow kStay{
+    .name = "stay",
+    .title = "stay suture",
+    .description = "one bite through each of two bowel ends, tied; both ends are held (section 2.5.3)",
+    .hint = "one bite through each end, pull even, tie two throws",
+    .plan = "stay",
+    .walls = 2,
+    .missing = kNoEnds,
+    .remedy = kAddEnd,
+    .interrupted = true,
+    .closes_opening = false,
+    .begin = begin_seam<false>,
+    .tick = tick_seam,
+    .fits = seam_fits,
+};
 
 }  // namespace catgut

@@ -3,30 +3,44 @@
 #include "technique/technique.h"
 
 #include <algorithm>
-#include <array>
-#include <string>
+#include <stdexcept>
 
 namespace catgut {
 namespace {
 
-constexpr std::array<const TechniqueRow*, 4> kTechnique{&kPurseString, &kConnell, &kStay, &kLembert};
+const TechniqueRow* const kBuiltIn[] = {&kPurseString, &kStay, &kConnell, &kLembert};
+
+std::vector<const TechniqueRow*>& table() {
+  static std::vector<const TechniqueRow*> rows(std::begin(kBuiltIn), std::end(kBuiltIn));
+  return rows;
+}
+
+bool is_built_in(const TechniqueRow* row) {
+  return std::find(std::begin(kBuiltIn), std::end(kBuiltIn), row) != std::end(kBuiltIn);
+}
 
 }  // namespace
 
-std::span<const TechniqueRow* const> techniques() { return kTechnique; }
-
-const TechniqueRow* find_technique(std::string_view name) {
-  const auto at = std::find_if(kTechnique.begin(), kTechnique.end(), [&](const TechniqueRow* r) { return r->name == name; });
-  return at != kTechnique.end() ? *at : nullptr;
+void register_technique(const TechniqueRow& row) {
+  const auto refuse = [&](const std::string& why) {
+    throw std::invalid_argument("technique \"" + std::string(row.name) + "\" " + why);
+  };
+  if (row.name == kNoTechnique || find_technique(row.name)) refuse("is there already");
+  if (!row.begin || !row.tick || !row.fits) refuse("lacks begin, tick or fits");
+  table().push_back(&row);
 }
 
-const char* technique_choices() {
-  static const std::string choices = [] {
-    std::string all;
-    for (const TechniqueRow* r : kTechnique) all += std::string(r->name) + "|";
-    return all + "none";
-  }();
-  return choices.c_str();
+std::span<const TechniqueRow* const> techniques() { return table(); }
+
+const TechniqueRow* find_technique(std::string_view name) {
+  const auto at = std::find_if(table().begin(), table().end(), [&](const TechniqueRow* r) { return r->name == name; });
+  return at != table().end() ? *at : nullptr;
+}
+
+std::string technique_choices() {
+  std::string all;
+  for (const TechniqueRow* r : techniques()) all += std::string(r->name) + "|";
+  return all.append(kNoTechnique);
 }
 
 void technique(const TechniqueModel& model, TechniqueState& state, const TechniqueView& view, ClosurePlan& plan,
@@ -35,10 +49,12 @@ void technique(const TechniqueModel& model, TechniqueState& state, const Techniq
 }
 
 bool technique_fits(const TechniqueModel& model, const TechniqueState& state, size_t rows, size_t points) {
-  return std::all_of(kTechnique.begin(), kTechnique.end(), [&](const TechniqueRow* r) {
+  const bool others_empty = std::all_of(std::begin(kBuiltIn), std::end(kBuiltIn), [&](const TechniqueRow* r) {
     const bool own = model.row && r->fits == model.row->fits;  // connell and stay share their state
     return r->fits(state, own ? rows : 0, points);
   });
+  if (model.row && !is_built_in(model.row)) return others_empty && model.row->fits(state, rows, points);
+  return others_empty && state.own.index.empty() && state.own.value.empty();
 }
 
 }  // namespace catgut

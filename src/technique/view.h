@@ -20,6 +20,8 @@ struct StitchPoint {
   float span = 0;       // [m] rest length of thread from this point to the next toward the needle; 0 for the last
 };
 
+struct TechniqueState;
+
 struct TechniqueView {
   std::span<const StitchPoint> point;  // the suture points in order of creation
   std::span<const Bite> bite;
@@ -29,6 +31,10 @@ struct TechniqueView {
   bool needle_in_tissue = false;
   uint32_t suture_index = 0;  // baked sutures so far: their points and knots are no longer listed
   float dt = 0;               // [s] length of a tick
+  // Of every suture of the scene, for rules that see neighbors; `suture` is the index of this one.
+  uint32_t suture = 0;
+  std::span<const ClosurePlan> plan_of;
+  std::span<const TechniqueState> state_of;
 };
 
 }  // namespace catgut

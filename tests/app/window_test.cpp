@@ -224,6 +224,33 @@ TEST_F(Window, whatever_happens_to_the_window_nothing_is_lost) {
   EXPECT_NE(read_file(json).find("\"technique\": \"stay\""), std::string::npos) << "what was sewn is kept too";
 }
 
+// The I key: the hand lays its instrument down and takes the next one from the tray, and again. Recorded, and it replays.
+TEST_F(Window, a_hand_swaps_its_instrument_by_key) {
+  const fs::path events = folder_ / "events", recording = folder_ / "r.cgrec";
+  start({"play", "three_hands", "--size", "640x360", "--quality", "low", "--events", events.string(), "--record",
+         recording.string(), "--seconds", "120"});
+  ASSERT_TRUE(happens("practice", 1, 60)) << said();
+  pause(500);
+  xdo("key i");
+  ASSERT_TRUE(happens("instrument_taken")) << said();
+  EXPECT_TRUE(happens("instrument_laid_down")) << said();
+  xdo("key i");
+  EXPECT_TRUE(happens("instrument_taken", 2)) << said();
+  xdo("key F10");
+  EXPECT_TRUE(happens("results")) << said();
+  kill(app_, SIGTERM);
+  EXPECT_EQ(exit_code(), 130) << said();
+
+  std::vector<std::string> taken;
+  const std::vector<InstrumentSpec> instruments = read_scene("three_hands").instrument;
+  const Recording r = read_recording(recording.string());
+  for (const RecordedTick& t : r.tick)
+    for (const Command& c : t.input.commands)
+      if (c.kind == CommandKind::swap && c.hand == 0) taken.push_back(instruments[c.argument].kind);
+  EXPECT_EQ(taken, (std::vector<std::string>{"scissors", "needle_holder"}));
+  EXPECT_EQ(std::system(("'" CATGUT_APP "' replay '" + recording.string() + "' --check >/dev/null").c_str()), 0);
+}
+
 TEST_F(Window, a_killed_program_leaves_what_it_had_recorded) {
   const fs::path events = folder_ / "events", recording = folder_ / "r.cgrec";
   start({"play", "stay", "--size", "320x180", "--events", events.string(), "--record", recording.string(), "--seconds", "180"});

@@ -64,7 +64,7 @@ class LockStep : public WorkQueue {
   }
   // The scripted surgeon has the tools until `done`; false: it gave up, or finished without.
   bool show(const std::vector<size_t>& tasks, const std::function<bool(const Snapshot&)>& done) {
-    const auto surgeon = make_demonstrator(scene_.technique.name, picture_, skill_of(scene_), tasks);
+    const auto surgeon = make_demonstrator(plan_of(scene_), picture_, skill_of(scene_), tasks);
     Snapshot seen = look_.seen;
     for (int i = 0; i < 3600 && !surgeon->done(); ++i) {
       const TickInput in = surgeon->operate(seen, kTick);

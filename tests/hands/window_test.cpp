@@ -32,8 +32,9 @@ using Clock = std::chrono::steady_clock;
 // simulated user on another.
 class AtTheWindow : public WorkQueue {
  public:
-  explicit AtTheWindow(int seconds) : until_(Clock::now() + std::chrono::seconds(seconds)) {
-    picture_ = picture_model(*build_model(read_scene("stay")));
+  explicit AtTheWindow(int seconds, const char* scene = "stay")
+      : scene_(scene), until_(Clock::now() + std::chrono::seconds(seconds)) {
+    picture_ = picture_model(*build_model(read_scene(scene)));
   }
   const PictureModel& picture() const override { return picture_; }
   const Look& look() const override { return look_; }
@@ -67,7 +68,7 @@ class AtTheWindow : public WorkQueue {
       gone_ = true;
     });
     PlayOptions options;
-    options.scene = "stay";
+    options.scene = scene_;
     options.teach = teach;
     options.width = 320, options.height = 200;
     options.seconds = std::max(1.0, std::chrono::duration<double>(until_ - Clock::now()).count());
@@ -132,6 +133,7 @@ class AtTheWindow : public WorkQueue {
   std::atomic<bool> showing_{false};
 
  private:
+  const char* scene_;
   Clock::time_point until_, seen_at_ = Clock::now();
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -190,6 +192,14 @@ class SdlPad : public AtTheWindow {
     if (stick_) send(pad_);
     SDL_UnlockJoysticks();
     return stick_ && see(3);
+  }
+  void tap(SDL_GameControllerButton which) {
+    for (const bool down : {true, false}) {
+      SDL_LockJoysticks();
+      SDL_JoystickSetVirtualButton(stick_, which, down);
+      SDL_UnlockJoysticks();
+      see(3);
+    }
   }
   // The window pauses; true when it did.
   bool pull_out() {
@@ -358,6 +368,27 @@ TEST_F(StitchAtTheWindow, a_gamepad_that_is_unplugged_loses_nothing) {
   EXPECT_TRUE(held) << me.doing();
   EXPECT_TRUE(kept);
   EXPECT_TRUE(finished) << me.doing();
+}
+
+// D-pad up: the next instrument of the tray into the hand, and what was in it onto the tray; again, and they are back.
+TEST_F(StitchAtTheWindow, a_hand_swaps_its_instrument_by_gamepad) {
+  SdlPad desk(120, "three_hands");
+  std::vector<std::string> had;
+  const auto in_hand = [&] {
+    const int i = desk.look().seen.tool[0].instrument;
+    return i < 0 ? std::string("nothing") : desk.picture().instrument[static_cast<size_t>(i)].kind;
+  };
+  desk.sit([&] {
+    if (!desk.plug_in()) return;
+    had.push_back(in_hand());
+    for (int swap = 0; swap < 2; ++swap) {
+      desk.tap(SDL_CONTROLLER_BUTTON_DPAD_UP);
+      for (int i = 0; i < 200 && in_hand() == had.back() && desk.act({}); ++i) continue;
+      had.push_back(in_hand());
+    }
+  });
+  EXPECT_EQ(had, (std::vector<std::string>{"needle_holder", "scissors", "needle_holder"}));
+  EXPECT_EQ(desk.count(EventKind::instrument_taken), 2u);
 }
 
 }  // namespace

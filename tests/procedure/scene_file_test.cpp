@@ -41,7 +41,7 @@ void randomise(const Field& f, FieldRef ref, Random& random) {
   const double low = f.min, high = std::min(f.max, 1e6);
   const auto number = [&] { return static_cast<float>(low + (high - low) * (0.001 + 0.998 * random.uniform())); };
   if (auto* v = std::get_if<std::string*>(&ref))
-    **v = f.choices ? std::string(f.choices).substr(0, std::string(f.choices).find('|'))
+    **v = f.choices ? f.choices.text().substr(0, f.choices.text().find('|'))
                     : "a \"b\" \\ \n\t\x01 é " + std::to_string(random.next());
   if (auto* v = std::get_if<int*>(&ref)) **v = static_cast<int>(std::ceil(number()));
   if (auto* v = std::get_if<uint64_t*>(&ref)) **v = static_cast<uint64_t>(random.next()) << 30;

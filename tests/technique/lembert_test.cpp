@@ -42,6 +42,14 @@ struct TwoRings : StitchRig {
     fresh_suture();
     tick();
   }
+  // This is suture 1 of two, on the same rings; the other one is as it stands.
+  void suture_of_two(const TwoRings& other) {
+    own_suture = 1;
+    x = other.x;
+    plan_of = {other.plan, {}};
+    state_of.resize(2);
+    state_of[0].lembert = other.state;
+  }
   float degrees_of(uint32_t i) const { return std::atan2(-x[i].z, x[i].x) / kDegree; }
   float degrees_of(const EmbeddedPoint& p) const {
     const Vec3 at = position_of(p, x.data());
@@ -190,6 +198,28 @@ TEST(Lembert, all_particles_between_two_neighbors_are_covered) {
     EXPECT_TRUE(seen.insert({p.a.particle[0], p.b.particle[0]}).second);
     EXPECT_LT(std::abs(t.degrees_of(p.a.particle[0]) - t.degrees_of(p.b.particle[0])), 5.2f);
   }
+}
+
+// The same two stitches, each with a needle and thread of its own: what lies between them is closed all the same, once, and
+// opens when the stitch of the other suture no longer holds.
+TEST(Lembert, neighbors_are_those_of_every_suture) {
+  TwoRings one;
+  one.suture(10), one.suture(82);
+  TwoRings a, b;
+  a.suture(10);
+  b.suture_of_two(a);
+  b.suture(82);
+  EXPECT_EQ(a.plan.pair.size() + b.plan.pair.size(), one.plan.pair.size());
+  std::set<std::pair<uint32_t, uint32_t>> want, got;
+  for (const ClosurePlan::Pair& p : one.plan.pair) want.insert({p.a.particle[0], p.b.particle[0]});
+  for (const auto* plan : {&a.plan, &b.plan})
+    for (const ClosurePlan::Pair& p : plan->pair) got.insert({p.a.particle[0], p.b.particle[0]});
+  EXPECT_EQ(got, want);
+  for (const ClosurePlan::Pair& p : b.plan.pair) EXPECT_FLOAT_EQ(p.progress, 1);
+  b.state_of[0].lembert.stitch[0].holds = 0;
+  b.tick(200);
+  for (size_t r = 0; r < b.plan.pair.size(); ++r)
+    EXPECT_FLOAT_EQ(b.plan.pair[r].progress, b.plan.pair[r].midpoint ? 1.0f : 0.0f) << r;
 }
 
 TEST(Lembert, stitches_far_apart_are_no_neighbors) {

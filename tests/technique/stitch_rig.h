@@ -20,6 +20,9 @@ struct StitchRig {
   ClosurePlan plan;
   uint32_t taken = 0;
   bool needle_in_tissue = false;
+  uint32_t own_suture = 0;  // of several, with
+  std::vector<ClosurePlan> plan_of;
+  std::vector<TechniqueState> state_of;
 
   uint32_t particle(Vec3 p) {
     x.push_back(catgut::point(p));
@@ -59,6 +62,7 @@ struct StitchRig {
     TechniqueView view;
     view.point = point, view.bite = bite, view.knot = knot, view.x = x.data();
     view.needle_in_tissue = needle_in_tissue, view.suture_index = taken, view.dt = kTick;
+    view.suture = own_suture, view.plan_of = plan_of, view.state_of = state_of;
     technique(model, state, view, plan, now);
     events.insert(events.end(), now.begin(), now.end());
     now.clear();
