@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// physical: a physical thread (src/thread) through a physical wall (src/wall). Reads what hands do; writes State. Nothing
-// in it knows a technique: wounds are closed by the thread's tension in holes of the wall, held by friction. docs/physical.md.
+// physical: a physical thread (src/thread) through a physical wall (src/wall). Reads Hands; writes State. It contains no
+// technique: the thread's tension in holes of the wall closes wounds, and friction holds them. docs/physical.md.
 //
 // Units: SI, float32. Frame: the scene's. One step is the wall's step (1 ms), in which the thread does its substeps on the
 // moving holes ("consistent multi-rate", wall/points.h). Several organs are pieces of one wall; several threads are strands of
-// one thread::State, separated by broken segments. A step allocates nothing; its bits do not depend on the number of workers.
+// one thread::State, separated by broken segments. A step allocates nothing. Its bits do not depend on the number of workers.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -41,7 +41,7 @@ struct State {
   std::vector<wall::Contact> lip;            // memory of wall on wall
 };
 
-// What hands do in a step.
+// Loads and motions imposed in a step.
 struct Hands {
   std::span<thread::Hold> holds;        // of thread nodes
   std::span<const thread::Pull> pulls;  // on thread nodes
@@ -53,7 +53,7 @@ struct Hands {
   std::span<const WallPull> wall_pulls;
 };
 
-// Workspace: nothing in it lasts from step to step but what never changes a result.
+// Workspace: its contents never affect the result of a later step.
 struct Scratch {
   wall::Scratch wall;
   thread::Stepper thread;
@@ -70,11 +70,11 @@ struct Scratch {
 
 // The model and state of a wall with a thread laid through its holes.
 Model make_model(const wall::Wall& wall, const thread::Settings& settings);
-// Where a hole's mouth is [m].
+// Position of a hole's mouth [m].
 Vec3 mouth(const Model& model, const State& state, const Hole& hole);
 float mouth_offset(const Model& model, const Hole& hole);  // [m] from the mid-surface along the director
 
-// Of everything that changes.
+// Of all state.
 uint64_t hash_state(const State& state);
 
 void step(const Model& model, State& state, Scratch& scratch, const Hands& hands, Jobs& jobs);

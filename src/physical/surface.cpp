@@ -29,7 +29,7 @@ Corners corners_of(const wall::Model& m, const wall::Topology& t, uint32_t face)
 Vec3 mid(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column]); }
 Vec3 director(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column + 1]); }
 
-// Nearest point of a bilinear patch or a triangle, in its own coordinates (those of wall::Point).
+// Nearest point of a bilinear patch or a triangle, in the patch's coordinates (those of wall::Point).
 struct Bilinear {
   Vec3 p[4];
   bool quad = true;
@@ -203,7 +203,7 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
       const float reach = k.radius[f] + half + k.margin;
       if (length2(k.center[f] - at) > reach * reach) continue;
       const Corners corner = corners_of(m, s.topology, f);
-      // What was side by side at rest in one part of the wall cannot be pressed together by a fold.
+      // Columns of one part of the wall that are adjacent at rest are not paired.
       bool beside = false;
       for (uint32_t i = 0; i < corner.count(); ++i)
         beside |= surface.piece[corner.column[i]] == surface.piece[c] &&
@@ -232,7 +232,7 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
           const Foot foot = nearest_on_patch(m, s, surface, q, p);
           if (foot.gap < -1e-3f || std::abs(foot.gap) > std::abs(best.gap)) continue;
           if (foot.gap < 0 && foot.on_edge) continue;
-          // The point's own wall lies behind it, outside of the other: its inner side for a point of a face.
+          // The wall of the point itself lies behind it, outside the other part: the inner side for a point of a face.
           if (!surface.at_rim[c] && dot(foot.normal, up) * zeta > -0.3f * length(up)) continue;
           best = foot;
         }

@@ -31,7 +31,7 @@ struct Foot {
   uint32_t patch = 0;
   wall::Point point;
   Vec3 at, facing;       // [m]; unit normal of the patch there, outward
-  Vec3 normal;           // unit: outside from the foot to the place that was asked for, inside `facing`
+  Vec3 normal;           // unit: outside, from the foot to the query point; inside, `facing`
   float gap = 0;         // [m] negative inside
   bool on_edge = false;  // the foot lies on the patch's border
 };
