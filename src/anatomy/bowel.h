@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// anatomy/bowel: makes a piece of large bowel at rest: a tube with a wall, sacculations (haustra) between longitudinal bands
+// anatomy/bowel: makes a piece of large bowel at rest. A tube with a wall, sacculations (haustra) between longitudinal bands
 // (taeniae), serosa outside and mucosa inside, open or closed ends. Needs no external mesh.
 #pragma once
 #include <string>
@@ -25,8 +25,8 @@ struct BowelShape {
   float inner_radius = 0;        // [m] outer radius of a second tube inside the first; 0: none
 };
 
-// Particles run ring by ring from the near end; a sheet vertex is two neighboring particles, outer (even index) then
-// inner (odd index). rim[0] is the near end, rim[1] the far end, if open; a rim runs counter-clockwise seen
+// Particles run ring by ring from the near end. A sheet vertex is two neighboring particles, outer (even index) then
+// inner (odd index). rim[0] is the near end, rim[1] the far end, if open. A rim runs counter-clockwise seen
 // from outside its opening. visible: about 20,000 vertices whose outer side passes through the outer particles.
 //
 // inner_radius > 0: the remainder after a prolapsed rectum was cut off (paper 2.5.4). A prolapse is bowel that has slid out

@@ -148,7 +148,7 @@ std::vector<float> way_from(const TriangleMesh& sheet, const Loop& start) {
 }
 
 // Distance along the organ for textures. With several openings it is relaxed so that all points of a rim have the same value
-// (a harmonic function): cross sections then follow the organ and end flush at its rims.
+// (a harmonic function). Cross sections then follow the organ and end flush at its rims.
 std::vector<float> ease_along(const TriangleMesh& sheet, std::vector<float> along, const std::vector<Loop>& rims) {
   if (rims.size() < 2) return along;
   std::vector<uint8_t> fixed(along.size(), 0);

@@ -20,9 +20,9 @@ struct OrganImport {
 };
 
 // The surface (geometry/mesh_io) is moved into place, brought to particles / 2 evenly spaced vertices (geometry/remesh) and
-// thickened inward (anatomy/wall). rim[0] is the chosen opening, the others follow; a closed surface has none. Particles run
-// outward in rings from rim[0], outer and inner side alternating. Fixed: everything within pinned_length of any other opening;
-// with one opening, what is farthest from it along the surface; with none, the lowest part.
+// thickened inward (anatomy/wall). rim[0] is the chosen opening, the others follow. A closed surface has none. Particles run
+// outward in rings from rim[0], outer and inner side alternating. Fixed: everything within pinned_length of any other opening.
+// With one opening, what is farthest from it along the surface; with none, the lowest part.
 // visible: about 20,000 vertices (up to some 2500 particles a side; more beyond), smooth through the particles.
 // Throws InputError for parameters out of range, everything read_mesh and remesh refuse, and a wall too thick for the surface.
 BodyRest import_organ(const OrganImport& import);

@@ -19,7 +19,7 @@ struct WallSpec {
 };
 
 // Thickens `sheet` inward. Sheet vertex v becomes particle 2 v (serosa, on the sheet) and 2 v + 1 (mucosa, `thickness` inward
-// along normal[v], unit, outward); the extra particle is last. Fills everything of BodyRest but name, visible and the pinned
+// along normal[v], unit, outward). The extra particle is last. Fills everything of BodyRest but name, visible and the pinned
 // flags (all 0). Rims are in the order and sense of boundary_loops. Clusters: a particle, its neighbors on its side, its
 // partner across the wall and the partner's neighbors; beyond 16 the farthest are left out.
 // Where the sheet bends too sharply for the wall, the wall is thinner, down to a tenth. Throws InputError if that is still

@@ -4,7 +4,7 @@
 // make two runs diverge. These use only operations that IEEE 754 defines exactly, in double precision. All code that affects
 // a State or the hands of the scripted surgeon uses them; tests/layers refuses std::sin and the like there.
 //
-// Errors: at most two units in the last place of a double for arguments below 1e5, more for pow (the error of y log x); a float
+// Errors: at most two units in the last place of a double for arguments below 1e5, more for pow (the error of y log x). A float
 // result is correctly rounded except for a few in a million. Method: argument reduction by constants in several parts (Cody and
 // 1980), then Taylor series.
 #pragma once

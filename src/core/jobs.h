@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // core/jobs: fork-join over fixed blocks. A tick has hundreds of stages of 5..50 us, so waiting is a bounded spin, then yield
 // (a futex round trip alone takes 3 us). The blocks depend only on the amount of work, never on the number of workers, and one
-// worker computes a block from start to end: the same bits for any worker count. Each worker has the same part of the blocks in
+// worker computes a block from start to end. The same bits for any worker count. Each worker has the same part of the blocks in
 // every stage, so that most of its data is still in its cache.
 #pragma once
 #include <cstddef>

@@ -50,7 +50,7 @@ struct ArmPort {
   std::string (*error_text)(void* self, uint32_t error) = nullptr;
   void (*close)(void* self) = nullptr;  // stops too
   // Set if a device server evaluates patches (the bridge): called from the physics thread with patches in the device's own
-  // frame; the callback's return value is unused. Null: the callback's force goes to the motors.
+  // frame. The callback's return value is unused. Null: the callback's force goes to the motors.
   void (*send_patch)(void* self, size_t arm, const ForcePatch& patch) = nullptr;
 
   ArmPort() = default;

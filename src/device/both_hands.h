@@ -26,7 +26,7 @@ struct BothHands {
 };
 
 // hand: tool poses of the hands, moved here within the limits of dt. grip: of the hand that holds the needle, tool in the
-// needle's frame. amount: [rad] of the gesture; its sign selects the sense when winding starts. Returns what was done:
+// needle's frame. amount: [rad] of the gesture. Its sign selects the sense when winding starts. Returns what was done:
 // nothing, if the hands do not hold what is needed.
 BothDo both_hands(BothHands& b, float amount, std::array<Pose, 2>& hand, const Pose& grip, const PictureModel& picture,
                   const Snapshot& seen, float dt);
@@ -39,7 +39,7 @@ void go_along(BothHands& b, size_t who, std::array<Pose, 2>& hand, const Pose& g
 // near the knot, within the range of the loop on it. False: there is no tail.
 bool tail_grip(const PictureModel& picture, const Snapshot& seen, size_t who, TailGrip& out);
 
-// Without force feedback a jerk would tear a stitch: a hand that holds an end of the thread is limited to slightly more than
+// Without force feedback a jerk would tear a stitch. A hand that holds an end of the thread is limited to slightly more than
 // that end's length from the tissue. p: target of hand `who`.
 Vec3 on_leash(const PictureModel& picture, const Snapshot& seen, size_t who, Vec3 p);
 

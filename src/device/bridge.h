@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // device: a device on another machine, or driven by a program in another language, over UDP. This is the simulator's
-// side; the packets and their cryptography are in device/bridge_packet, the device server is runtime/arm_server
+// side. The packets and their cryptography are in device/bridge_packet, the device server is runtime/arm_server
 // (`catgut bridge`), or any program with that packet layout, such as samples/bridge_arm.py.
 //
 // The device server runs the 1 kHz loop: it sends a sample of each device, and evaluates the newest ForcePatch next to the

@@ -2,9 +2,9 @@
 // device: the part of Force Dimension's library (libdhd) that is used: own declarations of its names, types and numbers, so
 // that building needs neither its headers nor its license. docs/references.md (DHD) states the source of each.
 //
-// Pitfalls: ids are a plain `char`, and boolean results are one byte, whose upper three are undefined in a register;
-// the status array grew from 13 to more than 16 entries over the versions, and the library fills as many as it knows; a result
-// of 1 (time guard) is not an error; a rotation is [row][column]; its base frame is x toward the user, y right, z up.
+// Pitfalls: ids are a plain `char`, and boolean results are one byte, whose upper three are undefined in a register.
+// The status array grew from 13 to more than 16 entries over the versions, and the library fills as many as it knows. A result
+// of 1 (time guard) is not an error; a rotation is [row][column]. Its base frame is x toward the user, y right, z up.
 #pragma once
 #include <array>
 #include <cstddef>

@@ -66,7 +66,7 @@ bool yes(const json& j, const char* name) {
 
 struct Arm {
   std::string id;  // as named by the service
-  // The grip bound to this device, by its own id, and its last state: a grip that is missing from a message keeps its rotation
+  // The grip bound to this device, by its own id, and its last state. A grip that is missing from a message keeps its rotation
   // and buttons.
   std::string grip;
   Quat held;

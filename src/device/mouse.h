@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // device: hands by mouse and keyboard. The mouse moves the active tool in the view plane; wheel, or Shift and the mouse, along
-// the view axis; the right button turns, the left one closes. Pure: input since the last frame in,
+// the view axis. The right button turns, the left one closes. Pure: input since the last frame in,
 // motions out; the owner of the window fills a MouseInput.
 #pragma once
 #include <array>

@@ -52,7 +52,7 @@ struct Arm {
   // Owned by the callback.
   uint32_t sequence = 0, lost_for = 0;
   bool lost = false;
-  // Latched until a sample has reported them: the library also raises errors at the end of a frame, after the sample was used,
+  // Latched until a sample has reported them. The library also raises errors at the end of a frame, after the sample was used,
   // and errors of one device may appear in the other's frame.
   bool cut = false, broken = false;
   float warmth = 0;

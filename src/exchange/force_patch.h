@@ -38,7 +38,7 @@ struct ForcePatch {
   float viscous = 0;          // [N s/m] while it slides
   Vec3 along;                 // unit or zero
 
-  // The tip is about to puncture: when the force against `pierce` exceeds pierce_force, the servo immediately reduces it to
+  // The tip is about to puncture. When the force against `pierce` exceeds pierce_force, the servo immediately reduces it to
   // pierce_keep of that, and the physics follows. pierce_force 0: no puncture possible.
   Vec3 pierce;               // unit, direction of the tip's motion
   float pierce_force = 0;    // [N]

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// exchange: a wait-free triple buffer for the newest value, between one writer and one reader: the writer fills one slot, the
+// exchange: a wait-free triple buffer for the newest value, between one writer and one reader. The writer fills one slot, the
 // reader reads another, and the third has the newest complete value. Values that the reader did not fetch in time are
 // overwritten. (Data that must not be lost goes through exchange/ring.)
 //

@@ -14,7 +14,7 @@ size_t node_of(const Snapshot& seen, uint32_t slot);
 Vec3 node_at(const Snapshot& seen, size_t node);
 // [m] path length along the thread between two nodes (in any order).
 float length_between(const Snapshot& seen, size_t a, size_t b);
-// The node `far` [m] along the thread from node `from`, toward the needle (way = 1) or the free end (way = -1); stops at an end
+// The node `far` [m] along the thread from node `from`, toward the needle (way = 1) or the free end (way = -1). Stops at an end
 // or at a cut.
 size_t node_along(const Snapshot& seen, size_t from, float far, int way);
 // Suture points of all sutures, one suture after the other.

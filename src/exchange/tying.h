@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// exchange: the geometry of an instrument tie, from a Snapshot: where to wind the strand, where to move the needle meanwhile,
+// exchange: the geometry of an instrument tie, from a Snapshot. Where to wind the strand, where to move the needle meanwhile,
 // where to grasp the tail. For the scripted surgeon and for assisted hands. Background: docs/rooms/surgeon.md, "An instrument
 // tie".
 //

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// geometry/gltf_check: checks a glTF or GLB file before assimp reads it. A kilobyte can make assimp allocate gigabytes: nodes
+// geometry/gltf_check: checks a glTF or GLB file before assimp reads it. A kilobyte can make assimp allocate gigabytes. Nodes
 // that share children double at every level, sparse accessors declare any length, and deeply nested JSON overflows its stack.
 #pragma once
 #include <string>

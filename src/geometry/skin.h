@@ -9,7 +9,7 @@
 namespace catgut {
 
 // Fills skin_particle and skin_weight of `mesh`: each vertex follows its (up to four) nearest particles within `influence` [m],
-// weight (1 - d / reach)^falloff normalized, where reach = the smaller of `influence` and the distance of the fifth nearest: a
+// weight (1 - d / reach)^falloff normalized, where reach = the smaller of `influence` and the distance of the fifth nearest. A
 // particle's weight reaches zero where another replaces it among the four, so the image has no seams.
 // A vertex with none in reach follows its nearest only. particle_rest must not be empty.
 void bind_skin(VisibleMesh& mesh, std::span<const Vec3> particle_rest, float influence, float falloff);

@@ -13,7 +13,7 @@ namespace catgut {
 // For each of `vertices` vertices, those that share an edge with it, ascending.
 std::vector<std::vector<uint32_t>> vertex_neighbors(std::span<const Triangle> triangle, size_t vertices);
 
-// The openings of a manifold surface: each loop in traversal order, counter-clockwise seen from outside the opening (its
+// The openings of a manifold surface. Each loop in traversal order, counter-clockwise seen from outside the opening (its
 // loop_normal points out of the organ when triangles are counter-clockwise seen from outside). Loops are ordered by their
 // smallest vertex and start with it. Openings that touch in one vertex are separated by the triangle fan.
 std::vector<std::vector<uint32_t>> boundary_loops(std::span<const Triangle> triangle);

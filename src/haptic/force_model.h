@@ -6,7 +6,7 @@
 
 namespace catgut {
 
-// Makes a patch safe: everything finite, directions unit or zero, stiffness positive semidefinite and at most `stiffness`
+// Makes a patch safe. Everything finite, directions unit or zero, stiffness positive semidefinite and at most `stiffness`
 // [N/m], damping at most `damping` [N s/m], the cap no more than `force` [N]. False if something was discarded (then the patch
 // renders nothing) or the stiffness was not valid.
 bool make_safe(ForcePatch& patch, float force, float stiffness, float damping);
@@ -38,7 +38,7 @@ struct ForceModelOptions {
   float drop_time = 0.004f;  // [s] from the peak to the remaining force at puncture: 3 to 5 ms
   // [s] within which the physics must confirm the puncture; after that the wall returns over `wall_back`.
   float unconfirmed = 0.04f, wall_back = 0.05f;
-  // [s] damping of every stiffness, at least this times the stiffness: stabilizes a spring on a device with some milliseconds
+  // [s] damping of every stiffness, at least this times the stiffness. Stabilizes a spring on a device with some milliseconds
   // of delay (Gil et al. 2009: stiffness < damping / (half a period + delay)).
   float damping_time = 0.0025f;
   float damping = 4;      // [N s/m] at most

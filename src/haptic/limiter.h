@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // haptic: the chain between the computed force and the motors, in this order: finite, age of
-// the model, soft map, clamp, slew, heat, ramp-in; the energy controller (haptic/passivity) follows it. Reads a wanted
+// the model, soft map, clamp, slew, heat, ramp-in. The energy controller (haptic/passivity) follows it. Reads a wanted
 // force, writes an allowed one; both in the device's frame [N]. Pure: the caller passes the time.
 #pragma once
 #include <cstdint>

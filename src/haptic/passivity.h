@@ -25,11 +25,11 @@ struct PassivityOptions {
   float slew_time = 0.001f;   // [s] of a step that the slew may use, as in LimiterOptions
   float small_force = 0.02f;  // [N] below this,
   float quiet_time = 0.05f;   // [s] for this time, the account is closed
-  // [s] after which a third of a surplus remains: a spring on an encoder releases stiffness * step^2 for each tremor over one
+  // [s] after which a third of a surplus remains. A spring on an encoder releases stiffness * step^2 for each tremor over one
   // of its steps (some microwatts), which the device's own friction absorbs. Generating faults give milliwatts.
   float forget = 1;
   // [N/m] a force independent of the hand's motion counts as a spring of at least this stiffness. The credit is force^2 /
-  // stiffness, twice the energy of a linear spring: a spring that hardens as a power of its depth stores at most that.
+  // stiffness, twice the energy of a linear spring. A spring that hardens as a power of its depth stores at most that.
   float least_stiffness = 100;
 };
 

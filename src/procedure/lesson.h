@@ -42,7 +42,7 @@ const Lesson& first_stitch();
 // Whether a step is done, given the events since the last picture: shorter actions are detected by their events.
 bool step_done(const LessonStep& step, const Snapshot& seen, std::span<const Event> happened);
 
-// The current step of a user who was at `now`. Steps whose goals are met are done; so are all before one that is met
+// The current step of a user who was at `now`. Steps whose goals are met are done. So are all before one that is met
 // and cannot be met by chance (a bite, a throw). lesson.step.size(): all done.
 size_t next_step(const Lesson& lesson, size_t now, const Snapshot& seen, std::span<const Event> happened);
 

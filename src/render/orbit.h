@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/orbit: an orbit camera that stays where the user left it: hands moved in the view frame
+// render/orbit: an orbit camera that stays where the user left it. Hands moved in the view frame
 // need a camera that does not move on its own.
 #pragma once
 #include "render/camera.h"

@@ -28,7 +28,7 @@ struct ArmServerOptions {
 };
 
 // Validity of a patch received over a network at `now_ns`. Its age counts from its arrival (the server's clock, which detects a
-// silent simulator at once), its period from the sample that it was computed for: the time in which the hand may have
+// silent simulator at once), its period from the sample that it was computed for. The time in which the hand may have
 // moved. False: expired.
 bool accept_patch(ForcePatch& patch, uint64_t now_ns);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: `catgut devices --calibrate`, and `--test`: a slow, small push of each device along each axis, through the limits
+// runtime: `catgut devices --calibrate`, and `--test`. A slow, small push of each device along each axis, through the limits
 // of a scene, and the resulting motion of the stylus.
 #pragma once
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: force of a bite and of a knot on the hand, as curves: Catgut's beside the paper's spring, which `catgut play
+// runtime: force of a bite and of a knot on the hand, as curves. Catgut's beside the paper's spring, which `catgut play
 // --haptics paper` renders too. `catgut bench haptics --out DIR` draws them.
 #pragma once
 #include <atomic>

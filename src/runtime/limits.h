@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // runtime: scaling with the number of sutures (paper 3.5, figures 20 to 23): time per tick while each further one is made.
-// Runs the scene with the scripted surgeon in lock step; one row per suture: a bite of a running thread, which is a pair of
+// Runs the scene with the scripted surgeon in lock step. One row per suture: a bite of a running thread, which is a pair of
 // suture points, or a single suture (techniques stay and lembert) with its knot.
 #pragma once
 #include <functional>

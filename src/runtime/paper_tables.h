@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: the paper's tables 1 to 4 with Catgut's figures beside its own: time per tick at rest, while suturing, while tying
+// runtime: the paper's tables 1 to 4 with Catgut's figures beside its own. Time per tick at rest, while suturing, while tying
 // knots, and after completion (sections 3.1 to 3.4). The scripted surgeon performs the technique a few times, each with
 // another seed.
 #pragma once

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // runtime: plays a recording: play, pause, seek in both directions, at any speed. On its own thread, like
-// runtime/live. It first scans the whole recording as fast as possible, between displayed ticks: it stores keyframes for fast
+// runtime/live. It first scans the whole recording as fast as possible, between displayed ticks. It stores keyframes for fast
 // seeking, compares every tick's hash with the recorded one, and gathers the results.
 //
 // Only one thread (the window's) may call a Playback's functions; none waits for the simulation, except the

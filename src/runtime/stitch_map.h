@@ -2,7 +2,7 @@
 // runtime: map of the stitches and tension over time, for the review of a session. Collected
 // from the published snapshots tick by tick, like runtime/session_metrics. Reads PictureModel and Snapshot.
 //
-// Lengths are measured on the tissue at rest, because bites are fixed there: while the needle is in tissue, or an opening is
+// Lengths are measured on the tissue at rest, because bites are fixed there. While the needle is in tissue, or an opening is
 // closed, the same two points may be much nearer or further apart. Rows are only ever appended, in the order of
 // time, so that undoing a bite removes the later ones.
 #pragma once
@@ -32,7 +32,7 @@ struct StitchBite {
   float length = 0;                       // [m] from entry to exit
   float depth = 0;                        // [m] maximum depth of the tip below the surface (BiteView)
   float entry_angle = -1;                 // [rad] from the surface normal at entry; -1: not observed
-  // [m] of edge between this bite and the nearest end of the previous one on the same wall: the unsutured stretch.
+  // [m] of edge between this bite and the nearest end of the previous one on the same wall. The unsutured stretch.
   // -1: it is the first there.
   float spacing = -1;
   bool entry_inside = false, exit_inside = false;  // on the mucosa

@@ -14,7 +14,7 @@ void lay_out_instruments(const Model& model, State& state);
 // Once per tick, before everything else. When a hand connects, its instrument is placed at the hand's pose; it is not
 // dragged there through the tissue.
 void meet_hands(State& state, const TickInput& input);
-// Once per tick: processes take, swap, lay_down, park and unpark in order. Each emits an event; a command that is invalid
+// Once per tick: processes take, swap, lay_down, park and unpark in order. Each emits an event. A command that is invalid
 // (hand not empty or not connected, instrument in use or out of reach, not a clamp, nothing held) emits instrument_refused.
 void handle_instruments(const Model& model, State& state, const TickInput& input);
 // Before every substep: an instrument follows its hand through a spring. `part` (0..1) is the fraction of the tick; the hand

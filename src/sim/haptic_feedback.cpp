@@ -14,8 +14,8 @@ namespace {
 
 // The last quarter of a tick's substeps: recent, and long enough to average contacts that alternate between two substeps.
 constexpr int kLastPart = 4;
-// [N/m] before any estimate: the response of the generated bowel to a blunt tool is 60 to 120 (tests/sim/haptic_feedback_test);
-// tissue held in its plane responds with 800 to 1400 under a point load (docs/references.md), about half of that near a
+// [N/m] before any estimate: the response of the generated bowel to a blunt tool is 60 to 120 (tests/sim/haptic_feedback_test).
+// Tissue held in its plane responds with 800 to 1400 under a point load (docs/references.md), about half of that near a
 // free edge.
 constexpr float kBlunt = 100, kTissue = 600;
 constexpr float kTimeConstant = 0.06f;   // [s] time constant of exponential forgetting

@@ -4,7 +4,7 @@
 //
 // The file: 8 bytes of magic, format version (u32), then chunks {kind u32, size u64, hash u64, payload}. Little endian, packed
 // field by field, independent of padding and compiler. The hash covers kind, size and payload. Chunks are written and flushed
-// as a unit: if the program is killed at any byte, the file is readable up to its last complete chunk.
+// as a unit. If the program is killed at any byte, the file is readable up to its last complete chunk.
 #pragma once
 #include <cstddef>
 #include <cstdint>

@@ -22,7 +22,7 @@ EmbeddedPoint spread_point(std::span<const uint32_t> particle, const Vec4* rest,
     for (size_t i = 0; i < 3; ++i)
       for (size_t j = 0; j < 3; ++j) spread[i][j] += (rest_of(k)[i] - mean[i]) * (rest_of(k)[j] - mean[j]);
   diagonalize(spread, axis);
-  // b_k = 1/n + (q_k - mean)^T S^-1 (at - mean); the pseudo-inverse ignores directions in which the particles do not
+  // b_k = 1/n + (q_k - mean)^T S^-1 (at - mean). The pseudo-inverse ignores directions in which the particles do not
   // spread: flat to 1 part in 100,000, squared here.
   constexpr double kFlat = 1e-10;
   const double largest = std::max({spread[0][0], spread[1][1], spread[2][2]});

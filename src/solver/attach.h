@@ -12,7 +12,7 @@
 
 namespace catgut {
 
-// A material point: sum of weight * particle. Spread over a neighborhood, it also has the neighborhood's inertia: a thread that
+// A material point: sum of weight * particle. Spread over a neighborhood, it also has the neighborhood's inertia. A thread that
 // pulled on three particles alone would displace them by millimeters in a substep, before their neighbors could react.
 struct EmbeddedPoint {
   static constexpr uint32_t kMaxParticles = 16;
@@ -27,7 +27,7 @@ inline EmbeddedPoint particle_point(uint32_t i) {
   t.weight[0] = 1;
   return t;
 }
-// The smoothest weights over `particle` (at rest positions `rest`) whose weighted sum is `at`: least squares with linear
+// The smoothest weights over `particle` (at rest positions `rest`) whose weighted sum is `at`. Least squares with linear
 // precision, so that the point follows every affine motion of its neighborhood exactly. Uses at most kMaxParticles particles.
 EmbeddedPoint spread_point(std::span<const uint32_t> particle, const Vec4* rest, Vec3 at);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// solver/contact: unilateral contact with Coulomb friction in positions: tissue on tissue, tools on tissue and on each other,
+// solver/contact: unilateral contact with Coulomb friction in positions. Tissue on tissue, tools on tissue and on each other,
 // thread (as capsules) on tools, on itself and on the tissue's surface, and the drape under everything. Normal part: C = gap >=
 // 0, resolved at once (contacts are hard). Friction undoes the slip since the start of the substep, at most friction times the
 // normal correction.
@@ -46,7 +46,7 @@ uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tiss
 // Tools on each other, rigid. Overlap from this substep is resolved in it, whichever side the axes are on now. Earlier overlap
 // (hands that connect inside each other) is resolved at 0.1 mm per substep, to avoid a jerk. Impulses accumulate over the
 // sweeps of a substep and may decrease in a later sweep, so that sweeps alternating with the hand welds converge to the
-// balance of both. most_press [kg m]: maximum impulse of a pair; above it the tools slip past each other. Without force
+// balance of both. most_press [kg m]: maximum impulse of a pair. Above it the tools slip past each other. Without force
 // feedback nothing stops a hand, and interlocked tools would tear what they hold.
 uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list, float friction, float most_press);
 // Only segments that lie on the drape at height `ground` [m], if the strand's own solve handles the others.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // solver/rigid: six-degree-of-freedom bodies (needle and tools) inside the XPBD substep (Mueller et al. 2020, Detailed rigid
-// body simulation with extended position based dynamics): one solver, two-way coupling, one force.
+// body simulation with extended position based dynamics). One solver, two-way coupling, one force.
 #pragma once
 #include <vector>
 

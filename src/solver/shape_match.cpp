@@ -233,7 +233,7 @@ HWY_INLINE void MatchClusters(const ShapeModel& model, ClusterRotations& rotatio
   Wide3<N> q{LoadWide<N>(rotation.x.data() + at), LoadWide<N>(rotation.y.data() + at), LoadWide<N>(rotation.z.data() + at)};
   Wide<N> w = LoadWide<N>(rotation.w.data() + at);
   Columns(q, w, r);
-  // B = R^T A in the cluster's own frame. At the optimum B is symmetric; the axial vector g of its antisymmetric part is
+  // B = R^T A in the cluster's own frame. At the optimum B is symmetric. The axial vector g of its antisymmetric part is
   // the gradient and H = tr(B) 1 - sym(B) the Hessian of the rotation (Kugelstadt et al. 2018, analytic polar).
   const Wide<N> b00 = Dot(r[0], a[0]), b01 = Dot(r[0], a[1]), b02 = Dot(r[0], a[2]);
   const Wide<N> b10 = Dot(r[1], a[0]), b11 = Dot(r[1], a[1]), b12 = Dot(r[1], a[2]);

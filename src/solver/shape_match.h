@@ -16,7 +16,7 @@ struct alignas(64) Row {
   float f[16] = {};
 };
 
-// Consecutive particles that belong to the same clusters (like the two sides of a wall) form a group: they share one row, the
+// Consecutive particles that belong to the same clusters (like the two sides of a wall) form a group. They share one row, the
 // sum of theirs, and one sum of transforms. Same arithmetic at half the loads.
 //
 // Constant part. Lists are padded to a fixed stride with the index of a zero row, so that the sums need no branches.
@@ -58,7 +58,7 @@ struct ShapeScratch {
 };
 
 // Sweep, pass 1 over clusters [first, last): moments from rows, rotation by one warm Newton step of the polar decomposition
-// (error below 1e-5 rad; it falls back to the damped step of Mueller et al. 2016 where Newton's matrix is singular).
+// (error below 1e-5 rad. It falls back to the damped step of Mueller et al. 2016 where Newton's matrix is singular).
 // first must be a multiple of 16.
 void solve_shape_clusters(const ShapeModel& model, ClusterRotations& rotation, ShapeScratch& scratch, uint32_t first,
                           uint32_t last);

@@ -8,7 +8,7 @@
 //   anchored  locked to a point of the tissue: a suture point (its position and inverse mass are the tissue's), or
 //   held      locked to a place on a rigid body: the needle's swage, a tool's jaw.
 //
-// Collision flags are not state: they follow from order, anchors and holds (collision_flags), and the broad phase derives
+// Collision flags are not state. They follow from order, anchors and holds (collision_flags), and the broad phase derives
 // them once per tick, so an edit cannot leave them stale.
 //
 // A second thread model may implement the same queries: it may order, space and move nodes freely, and sets `tension`.

@@ -13,7 +13,7 @@ namespace {
 
 constexpr float kNoLength = 1e-9f;  // [m] a span shorter than this has no direction
 
-// A tether as one sum over all the particles of its two points: their difference is sum(share * x), and a unit pull along it
+// A tether as one sum over all the particles of its two points. Their difference is sum(share * x), and a unit pull along it
 // moves particle k by move[k]. The count is even, so that two sums run side by side.
 struct TetherRow {
   uint32_t count = 0;

@@ -66,7 +66,7 @@ struct TetherSpan {
 // From the second sweep on, tethers within `tolerance` [m] of their length are skipped; skipping in the first causes jitter.
 // Gauss-Seidel on multipliers (Catto, "Iterative Dynamics with Temporal Coherence", 2005, for contacts): impulses reach the
 // particles at the end. The cost per sweep is proportional to couplings between active tethers, not to
-// their particles. web: result of build_graph for these tethers; another number of tethers is a programming error and
+// their particles. web: result of build_graph for these tethers. Another number of tethers is a programming error and
 // aborts.
 void solve_tethers(std::span<Tether> pin, const TetherGraph& web, Vec4* x, float h, int sweeps, float tolerance,
                    std::vector<TetherSpan>& work);

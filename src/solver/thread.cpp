@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // solver/thread: reads the order, anchors and holds; moves particles, tissue and bodies; writes tensions and slides.
-// The direct solve is a Newton step on all stretch constraints at once; their matrix J M^-1 J^T is tridiagonal in the order of
-// the thread. Bare Newton is singular where a slack thread folds, so it is regularized and its step limited; the sweeps
+// The direct solve is a Newton step on all stretch constraints at once. Their matrix J M^-1 J^T is tridiagonal in the order of
+// the thread. Bare Newton is singular where a slack thread folds, so it is regularized and its step limited. The sweeps
 // after it remove the residual. Rest-length slide at an anchor is one more coordinate s with inverse mass w of a particle:
 // rest[needle side] += s, rest[free side] -= s. It only adds to the two pairs beside the anchor and their coupling.
 #include "solver/thread.h"
@@ -95,11 +95,11 @@ void gather_nodes(const StrandModel& model, const Strand& thread, ThreadScratch&
 // The tridiagonal matrix J M^-1 J^T of all stretch constraints, as coefficients of every pair's two nodes, and its right-hand
 // side, at the current positions.
 //
-// Geometric stiffness. A taut thread resists lateral motion with tension / length, which the bare linearization omits: it
+// Geometric stiffness. A taut thread resists lateral motion with tension / length, which the bare linearization omits. It
 // would shorten a taut zigzag by moving its light nodes sideways, and never converge. Laterally, a free node therefore
 // has the inertia m + h^2 T (1/l0 + 1/l1) (Tournier et al. 2015, Stable constrained dynamics); side[i] is the ratio of
-// the inverse masses. With the tangent t = n0 + n1 of unit pair directions, t.t = 2 (1 + c) and n0.t = n1.t = 1 + c, c = n0.n1:
-// this needs no square root. Returns the largest residual [m].
+// the inverse masses. With the tangent t = n0 + n1 of unit pair directions, t.t = 2 (1 + c) and n0.t = n1.t = 1 + c, c = n0.n1.
+// This needs no square root. Returns the largest residual [m].
 float assemble(const Strand& t, ThreadScratch& s, size_t nodes, float alpha_per_meter, float h,
                const std::vector<RigidModel>& body_model, const std::vector<RigidBody>& body) {
   std::copy(t.rest.begin(), t.rest.end(), s.rest.begin());
@@ -117,8 +117,8 @@ float assemble(const Strand& t, ThreadScratch& s, size_t nodes, float alpha_per_
   return worst;
 }
 
-// Solves the tridiagonal system for the change of the multipliers (into s.step), together with the slides at slipping anchors:
-// one more unknown each, coupled to the two pairs beside it. A slide is fixed at a bound if it would run backward (friction
+// Solves the tridiagonal system for the change of the multipliers (into s.step), together with the slides at slipping anchors.
+// One more unknown each, coupled to the two pairs beside it. A slide is fixed at a bound if it would run backward (friction
 // never drives) or beyond what the pair on its side has left. The system is then solved again: an active set that
 // shrinks every round.
 void solve_with_slides(const StrandModel& model, const Strand& thread, ThreadScratch& s, size_t pairs, float h) {
@@ -338,7 +338,7 @@ void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& s, Ve
         for (SlideState& k : s.slide) k.step *= part;
       }
 
-      // A bent stretch of light thread between heavy ends: the impulse that moves the ends would move the light nodes far
+      // A bent stretch of light thread between heavy ends. The impulse that moves the ends would move the light nodes far
       // sideways, because the linearization does not include that they settle on the straight line. Light nodes therefore
       // take a bounded step, heavy ones a full step; the next step uses the new directions.
       for (const uint32_t i : s.constrained) push_node(s, thread, i, impulse_on(s, i), body_model, body);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// solver/thread: the suture thread as an XPBD chain (paper 2.1, 2.3): distance constraints between neighbors, cosine bending
+// solver/thread: the suture thread as an XPBD chain (paper 2.1, 2.3). Distance constraints between neighbors, cosine bending
 // on triplets, and a direct tridiagonal solve along the whole thread. A Gauss-Seidel chain of 175 particles at the paper's
 // three sweeps stretches by 18 %.
 //
-// At an anchor the thread can slide: rest length moves from the pair on one side to the pair on the other, until the tensions
+// At an anchor the thread can slide. Rest length moves from the pair on one side to the pair on the other, until the tensions
 // differ by no more than the friction. Sliding is solved inside the tridiagonal system, so the total rest length is constant
 // and the motion continuous.
 #pragma once
@@ -77,7 +77,7 @@ inline Vec3 impulse_on(const ThreadScratch& s, size_t i) {
 }
 
 // One substep's solve: bending sweeps, direct solve, distance sweeps. Expects cleared multipliers in scratch. Moves thread
-// particles, the tissue under anchors and the bodies that hold it; writes tensions and the slide of every anchor. x: predicted
+// particles, the tissue under anchors and the bodies that hold it. Writes tensions and the slide of every anchor. x: predicted
 // positions; before: those at the start of the substep; h [s].
 void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& scratch, Vec4* x, const Vec4* before,
                   const float* inv_mass, const std::vector<RigidModel>& body_model, std::vector<RigidBody>& body, float h);

@@ -143,7 +143,7 @@ void FindUnfitPairs(ThreadScratch& s, size_t pairs, float alpha_per_meter) {
   }
 }
 
-// The inertia and the weight in the prediction must see the same geometric stiffness as the constraints: implicit Euler is
+// The inertia and the weight in the prediction must see the same geometric stiffness as the constraints. Implicit Euler is
 // (M + h^2 K) dx = h M v + h^2 f, with K the tension's Laplacian. Without it, a taut thread swings laterally as freely as
 // a slack one, while its tension hardly restores it. It would gain energy, or settle
 // stretched.

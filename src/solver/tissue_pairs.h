@@ -87,7 +87,7 @@ struct PairSearch {
 };
 
 void make_boxes(const TissueCollision& tissue, const Vec4* x, BlockBoxes& boxes, Jobs& jobs);
-// [m] upper bound of the displacement of n particles, tight where neighbors move alike: the length of the vector of the largest
+// [m] upper bound of the displacement of n particles, tight where neighbors move alike. The length of the vector of the largest
 // displacements along each axis.
 float furthest_move(const Vec4* x, const Vec4* from, size_t n);
 // Whether search.pair may lack a pair that touches, given search.moved.

@@ -166,7 +166,7 @@ Plan connell_plan(const PictureModel& picture, const SurgeonSkill& skill) {
 }
 
 // 2.5.3: one bite through each bowel end, across the gap; equalized, tied, the needle cut off, both ends held. With several
-// needles: one stay suture with each, side by side from the far side to the near one; all but the last are cut short.
+// needles: one stay suture with each, side by side from the far side to the near one. All but the last are cut short.
 Plan stay_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;

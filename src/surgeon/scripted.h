@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // surgeon/scripted: carries out a plan's tasks with two hands. The needle holder (right) drives a bite by turning the needle
-// about its own circle; the forceps (left) grasps the tip, brings it through and pulls the thread; knots are instrument ties.
-// Reads Snapshots only; each step checks the actual state before the next begins. Failed steps are repeated: a bite whose tip
+// about its own circle. The forceps (left) grasps the tip, brings it through and pulls the thread; knots are instrument ties.
+// Reads Snapshots only; each step checks the actual state before the next begins. Failed steps are repeated. A bite whose tip
 // did not exit is withdrawn and driven slightly shallower or deeper, a missed grasp is approached again, a throw whose loop
 // did not hold is wound again. Bites are in scripted.cpp, knots and scissors in tying.cpp.
 #pragma once
@@ -115,7 +115,7 @@ class Scripted final : public Surgeon {
   // Moves the forceps so that the needle's swage, which it holds, reaches `goal`.
   bool carry_swage(const Snapshot& seen, Vec3 goal, float speed);
 
-  // The needle holder moves the tail where the next throw finds it: in front, clear of the needle's strand; between two bowel
+  // The needle holder moves the tail where the next throw finds it: in front, clear of the needle's strand. Between two bowel
   // ends on the tail's own side, because over the gap it would fall inside.
   bool lay_tail(const Snapshot& seen);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // suture/bake: a new suture (CommandKind::new_suture). Reads the thread and its knots; tied thread becomes a baked suture, the
-// rest of the old suture is removed. Cost stays flat for any number of stitches in a procedure (paper 3.4): a baked suture is a
+// rest of the old suture is removed. Cost stays flat for any number of stitches in a procedure (paper 3.4). A baked suture is a
 // curve that the tissue carries, and a few tethers between the points that its thread held together.
 #include <algorithm>
 

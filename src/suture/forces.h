@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // suture: forces of a needle through bowel, as named numbers with their sources, and as a function of the needle's position.
-// They act on the hand, not on the tissue: the simulated tissue responds to the tip with the paper's spring (2.2), which has
+// They act on the hand, not on the tissue. The simulated tissue responds to the tip with the paper's spring (2.2), which has
 // neither wall stiffening before puncture nor friction along the shaft. Sources: docs/references.md;
 // initial values for bowel and a 3-0 needle, to be calibrated with surgeons.
 #pragma once

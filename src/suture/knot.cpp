@@ -3,7 +3,7 @@
 // the thread's order; writes knots, their anchors and, once a knot is locked, the slack under it.
 //
 // A tool with a loop round it grasps thread beyond the loop, usually the other end of the stitch, which is thereby pulled
-// through the loop. From then on the loop is a throw: it leaves the tool and hangs on the two ends of its own thread between
+// through the loop. From then on the loop is a throw. It leaves the tool and hangs on the two ends of its own thread between
 // tool and tissue. As the tool moves away, the throw approaches the tissue. Until it locks, releasing the thread undoes it.
 #include <algorithm>
 #include <cmath>
@@ -110,8 +110,8 @@ int knot_under(const Strand& t, const Suture& state, const Ends& loop, const End
 // created, the knot object will move toward the midpoint of the last two created suture points." The paper's stitch is one such
 // pair. A stitch here may have many points before it is tied (a purse-string), and the knot joins its two ends: the suture
 // point nearest to the grasped strand and the one nearest to the loop. For a stitch of two points both rules agree. A running
-// suture tied to itself (the end of a Connell: the grasped strand is a bight, or the needle's own) has no other end;
-// there the paper's rule applies unchanged.
+// suture tied to itself (the end of a Connell: the grasped strand is a bight, or the needle's own) has no other end.
+// There the paper's rule applies unchanged.
 EmbeddedPoint where_to(const OneSuture& s, const Ends& loop, const Ends& taken, bool one_strand) {
   const Strand& t = s.strand;
   const Suture& state = s.own;
@@ -266,7 +266,7 @@ void lock(OneSuture& s, uint32_t which) {
   s.all.report_tool(s.index, EventKind::throw_locked, knot.hand, which, made.tension, where);
 }
 
-// A newly locked knot pulls its two strands in: slack between the stitch and the knot moves to the outer side, as if the
+// A newly locked knot pulls its two strands in. Slack between the stitch and the knot moves to the outer side, as if the
 // hands pulled both ends, at a limited speed.
 void draw_snug(OneSuture& s, Knot& knot) {
   Strand& t = s.strand;

@@ -30,7 +30,7 @@ struct Corner {
   int closed = 0;                      // turns closed before it
 };
 
-// Touching. A loop is a polygon with corners one spacing apart, and thread is stiff: even a tight one stands off the tool by
+// Touching. A loop is a polygon with corners one spacing apart, and thread is stiff. Even a tight one stands off the tool by
 // 0.5 mm at its corners, a slack one by 2 mm. So touching means within `reach` of the surface. Beyond the tip there is
 // no tool: thread there slips off, at any distance.
 bool touches(const LoopTool& tool, Vec3 p, float reach) {
@@ -205,8 +205,8 @@ void look(const SutureContext& c, uint32_t suture, uint32_t who, Found& best) {
 
 // Chirality: that of the half knot which the loop becomes. Its two strands leave the tissue, and the one that the tool grasps
 // is pulled through the loop along the tool, from tip to hand. The sign of the half knot is the sense in which the other one,
-// traversed outward too, turns about that direction. It is independent of which end was wrapped and of the tool's direction:
-// two throws with equal signs are a granny knot, with opposite signs a square knot. The list runs from free end to needle:
+// traversed outward too, turns about that direction. It is independent of which end was wrapped and of the tool's direction.
+// Two throws with equal signs are a granny knot, with opposite signs a square knot. The list runs from free end to needle:
 // outward on the needle's side of the stitch, inward on the free end's.
 int32_t handedness(const Strand& t, const LoopVerdict& v) {
   for (size_t i = 0; i < v.first; ++i)

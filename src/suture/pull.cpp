@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // suture/pull: thread through suture points (paper 2.3, figures 7 to 9). Reads tensions and rest lengths; edits the order list,
 // never a slot. Thread slides at an anchor inside the solver (see solver/thread). When the pair on one side of an anchor is
-// used up, its particle passes here: it moves to its new place in the order, at the midpoint of the pair it splits (figure 7c).
-// Slack is resolved in the paper's order (figure 9) by tension: a slack span has none, so the anchor next to the pull slides
+// used up, its particle passes here. It moves to its new place in the order, at the midpoint of the pair it splits (figure 7c).
+// Slack is resolved in the paper's order (figure 9) by tension. A slack span has none, so the anchor next to the pull slides
 // first, and the one behind it only when the span between them is taut.
 #include <algorithm>
 #include <array>
@@ -35,7 +35,7 @@ void pass(OneSuture& s, size_t i, bool toward_needle) {
 }
 
 // "With a knot created, the suture pulling will perform the same slack check from the needle end but will stop checking when
-// the knot is found." Between the two particles of a knot the stitch is closed: pulls from outside do not reach it.
+// the knot is found." Between the two particles of a knot the stitch is closed. Pulls from outside do not reach it.
 struct TiedNodes {
   static constexpr size_t kMost = 64;
   std::array<size_t, kMost> node;  // of locked knots' particles

@@ -43,7 +43,7 @@ enum class NeedlePhase : uint8_t {
   back_in,  // the back end has entered: the thread follows
 };
 
-// A wall that the needle is in. Its arc is longer than a wall is thick: it can be in several at once, as in one sweep in and
+// A wall that the needle is in. Its arc is longer than a wall is thick. It can be in several at once, as in one sweep in and
 // out again (Connell) or through two layers (Lembert).
 struct OpenBite {
   uint32_t bite = 0;
@@ -219,18 +219,18 @@ bool beside_loop(const Strand& thread, const ToolLoop& loop, uint32_t slot);
 void release_loop(SutureContext& c, uint32_t who);
 
 // --- knot.cpp ----------------------------------------------------------------------------------------------------------
-// Once per tick. A tool with a loop round it whose jaws have closed on thread beyond the loop starts a throw; releasing that
+// Once per tick. A tool with a loop round it whose jaws have closed on thread beyond the loop starts a throw. Releasing that
 // thread before the throw is locked undoes it. A thread is tied only to itself: jaws that grasp another suture's thread remove
 // the loop.
 void tie(SutureContext& c);
-// After every substep: throws move to the tissue as far as the pulling tool moves away, and lock there; a newly locked knot
+// After every substep: throws move to the tissue as far as the pulling tool moves away, and lock there. A newly locked knot
 // pulls the remaining slack under it through.
 void tighten(SutureContext& c);
 // Undoes every throw of a suture that is not locked, whatever pulls on it.
 void undo_throws(OneSuture& s);
 
 // --- cut.cpp -----------------------------------------------------------------------------------------------------------
-// Once per tick. A command `cut` cuts the thread of its suture that is nearest to the jaws, within cut_reach; a cut of the last
+// Once per tick. A command `cut` cuts the thread of its suture that is nearest to the jaws, within cut_reach. A cut of the last
 // pair separates the needle. A cut in a wrong place is reported and stays. Refused without scissors or without that suture.
 void cut(SutureContext& c, const TickInput& input);
 // A jaw that has just closed on thread also holds the other strands between its tips: the two ends of a stay suture.
@@ -264,8 +264,8 @@ bool nearest_surface(const SolverModel& model, const Candidates& candidates, con
 // After every substep: particles that are due pass their suture point (figures 7 to 9), from the needle end to the free end.
 // A hand that pulls thread through the tissue while the needle is still in it is reported, once per bite; the thread moves.
 void pull(SutureContext& c);
-// Moves up to `length` [m] of thread past the locked particle `slot`, toward the needle (direction +1) or the free end (-1);
-// the sum of rest lengths stays. Returns the moved length: particles that are locked or at an end of the thread do not pass.
+// Moves up to `length` [m] of thread past the locked particle `slot`, toward the needle (direction +1) or the free end (-1).
+// The sum of rest lengths stays. Returns the moved length: particles that are locked or at an end of the thread do not pass.
 float draw_through(OneSuture& s, uint32_t slot, int direction, float length);
 // Locks the next free particle behind the needle to an end of a bite and makes it a suture point (figure 7a). False: no free
 // particle there yet. A needle without thread passes (true) and makes none.

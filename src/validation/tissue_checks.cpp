@@ -59,7 +59,7 @@ double hung_chain(bool direct, int sweeps, float h, float mass, float compliance
   return -double{rig.x[5].y} - 0.1;
 }
 
-// Block of 3 x 3 x 3 particles in one cluster, its top layer pinned (or, with one_free, all but one pinned); returns the sag
+// Block of 3 x 3 x 3 particles in one cluster, its top layer pinned (or, with one_free, all but one pinned). Returns the sag
 // [m] of the rest under `gravity`. With `volume`, its tetrahedra resist too.
 struct HungBlock {
   float stiffness = 0.5f;  // at kReference

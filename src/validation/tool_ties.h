@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// validation: scripted hands that tie throws with instruments: wind the long strand round the needle holder,
+// validation: scripted hands that tie throws with instruments. Wind the long strand round the needle holder,
 // grasp the tail with its jaws, pull it through, pull the ends apart. The tools are capsules that the thread cannot pass; their
 // outline is the one that src/render draws. The hands act on what a surgeon sees and feels: the tension of the strand and the
 // place of the tail. There are no retries: what goes wrong shows in the knot.

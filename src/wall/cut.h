@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // wall/cut: divides the wall along edges of its faces. Columns on the cut are copied and corners remapped; rest shapes,
-// frames and velocities are kept. Cutting only removes links, so the old factor remains a valid bound of the stiffness:
-// copies share its row, plus a diagonal part for their relative motion. A new factor is made on request.
+// frames and velocities are kept. Cutting only removes links, so the old factor remains a valid bound of the stiffness.
+// Copies share its row, plus a diagonal part for their relative motion. A new factor is made on request.
 #pragma once
 #include <array>
 #include <span>

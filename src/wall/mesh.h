@@ -45,7 +45,7 @@ struct SheetShape {
 };
 Mesh sheet(const SheetShape& shape);
 
-// Columns and triangles as the bowel generator and the organ import make them; triangles are joined to well-shaped quads where
+// Columns and triangles as the bowel generator and the organ import make them. Triangles are joined to well-shaped quads where
 // possible. along: the organ's long axis. Throws InputError for inconsistent lists.
 Mesh from_triangles(std::span<const Vec3> outer, std::span<const Vec3> inner, std::span<const std::array<uint32_t, 3>> triangle,
                     Vec3 along, const std::string& name);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/device: the bridge. The device server (runtime/arm_server) serves the simulated devices of fake_hd, a millisecond at a
-// time, to a minimal simulator in this test; the simulator's side (device/bridge) is tested with that device server, and
+// time, to a minimal simulator in this test. The simulator's side (device/bridge) is tested with that device server, and
 // with one written in Python. The system assigns every port.
 #include "device/bridge.h"
 
@@ -383,8 +383,8 @@ TEST(Bridge, S6_no_amplification) {
   }
 }
 
-// A network between simulator and server: each packet takes `delay` and up to `spread` more, so that they overtake each other;
-// some are lost, some repeated later, some are forged on the way or by a stranger.
+// A network between simulator and server: each packet takes `delay` and up to `spread` more, so that they overtake each other.
+// Some are lost, some repeated later, some are forged on the way or by a stranger.
 struct Network {
   double delay = 0, spread = 0;  // [ms]
   double lost = 0, replayed = 0, forged = 0;
@@ -645,7 +645,7 @@ TEST(Bridge, the_other_hand_never_notices) {
   }
 }
 
-// The age of a patch is that of its sample, by the server's clock: a queue that stalls and then arrives at once does not
+// The age of a patch is that of its sample, by the server's clock. A queue that stalls and then arrives at once does not
 // look fresh.
 TEST(Bridge, late_is_late) {
   Lent t;

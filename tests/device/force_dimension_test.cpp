@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/device: the backend of Force Dimension's devices with a simulated libdhd, through the same dlopen and symbols
-// as the real one; the servo in between is the real one. In the double the first device is the left hand's.
+// as the real one. The servo in between is the real one. In the double the first device is the left hand's.
 #include "device/force_dimension.h"
 
 #include <dlfcn.h>

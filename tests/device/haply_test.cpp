@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/device: the backend of Haply's devices with a service of the same protocol, over a WebSocket like the real one; the
+// tests/device: the backend of Haply's devices with a service of the same protocol, over a WebSocket like the real one. The
 // servo in between is the real one. One message is one millisecond of the devices. The first device is the left
 // hand's.
 #include "device/haply.h"

@@ -309,7 +309,7 @@ TEST(Touch, errors_at_any_call_in_any_order) {
     }
 }
 
-// H8: three newtons asked for during ten minutes along the axis whose motor bears half of what the others do: the driver reads
+// H8: three newtons asked for during ten minutes along the axis whose motor bears half of what the others do. The driver reads
 // each joint's temperature, and none becomes so warm that the library cuts the force.
 TEST(Haptics, H8_no_joint_becomes_too_warm) {
   Two t;

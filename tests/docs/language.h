@@ -102,7 +102,7 @@ inline size_t count_words(const std::string& sentence) {
 }
 
 // Sentences of more than `most` words. Tables and headings do not count. A paragraph or list item ends at a blank line, a
-// heading, a table or the next item; a sentence at '.', '!' or '?' before a blank, and at ':' or ';' that ends a line's item.
+// heading, a table or the next item. A sentence at '.', '!' or '?' before a blank, and at ':' or ';' that ends a line's item.
 inline std::vector<Finding> long_sentences(const std::string& markdown, size_t most) {
   std::vector<Finding> out;
   std::string block;

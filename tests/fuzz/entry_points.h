@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/fuzz: all entry points for external bytes. Each takes any bytes and returns when they were
-// read or refused with an InputError of one line; any other outcome (another exception, a crash, a hang) is a fault.
+// read or refused with an InputError of one line. Any other outcome (another exception, a crash, a hang) is a fault.
 // Driven by libFuzzer (tests/fuzz/libfuzzer, -DCATGUT_FUZZ=ON with clang) and by fuzz_test.cpp in every build.
 #pragma once
 #include <cstddef>

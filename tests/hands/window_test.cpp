@@ -345,7 +345,7 @@ TEST_F(StitchAtTheWindow, by_gamepad) {
   expect_a_stitch(desk, stopped_at);
 }
 
-// The gamepad is unplugged while the needle is held: the hands stay, the needle is not dropped; after plugging it in again
+// The gamepad is unplugged while the needle is held. The hands stay, the needle is not dropped; after plugging it in again
 // the bite is completed.
 TEST_F(StitchAtTheWindow, a_gamepad_that_is_unplugged_loses_nothing) {
   SdlPad desk(180);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests: a private X server (Xvfb) for a simulated user of the window: on a machine with a desktop a test must not
+// tests: a private X server (Xvfb) for a simulated user of the window. On a machine with a desktop a test must not
 // take the mouse away.
 #pragma once
 #include <signal.h>

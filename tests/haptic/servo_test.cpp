@@ -90,7 +90,7 @@ Felt feel(const Gesture& g, float rate, bool late, float mass, float grip, bool 
   return {b.energy_most, high > low ? high - low : 0, b.step_most};
 }
 
-// H3: E_max <= 0.5 mJ + 2 x the full-rate reference's, no swing beyond 0.2 mm while the hand tries to hold still; grips of 50
+// H3: E_max <= 0.5 mJ + 2 x the full-rate reference's, no swing beyond 0.2 mm while the hand tries to hold still. Grips of 50
 // to 800 N/m, hands of 0.05 to 0.3 kg. Without the protection the same gesture generates energy, so the test can fail.
 TEST(Haptics, H3_passive_under_every_hand) {
   double worst_energy = 0;
@@ -434,7 +434,7 @@ TEST(Haptics, H6_garbage) {
   EXPECT_TRUE(hand.limiter.faults & kTimeBack);
 }
 
-// S3: for any gap between two calls, the motors receive at most the step of one millisecond; a gap over 5 ms is a fault, and
+// S3: for any gap between two calls, the motors receive at most the step of one millisecond. A gap over 5 ms is a fault, and
 // force returns slowly. The hand touches something stiff while the servo is late.
 TEST(Haptics, S3_late_servo) {
   for (const int gap : {2, 3, 7, 15, 19, 60}) {
@@ -614,7 +614,7 @@ TEST(Haptics, S4_friction_stays_in_the_stiffness_budget) {
   EXPECT_LE(most, 401);
 }
 
-// S5: dissipation over five seconds gives no credit: a force that pushes the hand is braked once it has given more energy than
+// S5: dissipation over five seconds gives no credit. A force that pushes the hand is braked once it has given more energy than
 // a spring of its strength can hold.
 TEST(Haptics, S5_rubbing_pays_for_nothing) {
   Passivity p;
@@ -693,7 +693,7 @@ TEST(Haptics, S5_energy_of_two_hands) {
   EXPECT_FALSE(p.braking);
 }
 
-// S11: a patch that differs from the last one is blended in over several steps, at every rate; changes due to the hand's own
+// S11: a patch that differs from the last one is blended in over several steps, at every rate. Changes due to the hand's own
 // motion are rendered at once.
 TEST(Haptics, S11_patches_blend) {
   ForceModel m;
@@ -716,7 +716,7 @@ TEST(Haptics, S11_patches_blend) {
   EXPECT_NEAR(evaluate(m, {0.001f, 0, 0}, {}, 0.001f).x, 0.1f - 0.3f, 1e-3f);
 }
 
-// S11: the tip seemed to puncture and did not (the hand withdrew before the physics confirmed it): the wall is restored, and
+// S11: the tip seemed to puncture and did not (the hand withdrew before the physics confirmed it). The wall is restored, and
 // a thread that pulls does not count as a puncture.
 TEST(Haptics, S11_a_wall_that_was_not_pierced) {
   ForceModel m;
@@ -836,7 +836,7 @@ TEST(Haptics, H4_puncture_drop) {
 }
 
 // H4, transparency: up to 30 Hz a hand that moves by a millimeter feels wall, needle and thread at the same instant within 0.1
-// N RMS; up to 8 Hz the impedance of wall and thread is right within 5 %, at 60 Hz as at 960 Hz. A needle's friction is as
+// N RMS. Up to 8 Hz the impedance of wall and thread is right within 5 %, at 60 Hz as at 960 Hz. A needle's friction is as
 // stiff as an arm of 400 N/m can render of 500 N/m.
 TEST(Haptics, H4_transparency) {
   for (const Environment e : {Environment::wall, Environment::needle, Environment::thread})

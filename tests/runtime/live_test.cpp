@@ -189,7 +189,7 @@ TEST(Live, the_recording_replays) {
   EXPECT_EQ(hash, result.state_hash);
 }
 
-// Frames that take half a second, repeatedly: the hashes of the recording, which is all of the physics, equal
+// Frames that take half a second, repeatedly. The hashes of the recording, which is all of the physics, equal
 // those with smooth frames, tick for tick, and no time is lost. The hands are a recording's: they depend only on time.
 TEST(Live, a_picture_that_stalls_changes_no_bit_and_loses_no_tick) {
   const std::string folder = testing::TempDir(), id = std::to_string(::getpid());

@@ -103,7 +103,7 @@ ToolInput left_level(const Field& f) {
 }
 Vec3 beside_left(const Field& f, float gap) { return f.rim + Vec3{0, 0.05f, 0.005f + gap}; }
 
-// S11: the load of a thread, or of a needle that is pressed against tissue, grows from nothing to 0.3 N and back: the force on
+// S11: the load of a thread, or of a needle that is pressed against tissue, grows from nothing to 0.3 N and back. The force on
 // the hand follows without a step, alone and beside a contact, and reaches the load.
 TEST(HapticFeedback, S11_loads_begin_without_a_step) {
   Field f("purse_string");
@@ -232,8 +232,8 @@ Compared compare(const char* scene, int parts, const std::function<ToolInput(con
 }
 
 // Arms run the scene at 960 ticks a second, one substep in each; here it is half of that. At its own 60 the figures are for
-// comparison. H4: RMS error against the full-rate reference at most the larger of 0.1 N and a tenth of the largest force;
-// beyond 0.5 N for at most 5 ms.
+// comparison. H4: RMS error against the full-rate reference at most the larger of 0.1 N and a tenth of the largest force.
+// Beyond 0.5 N for at most 5 ms.
 TEST(Haptics, H4_as_at_full_rate) {
   struct Motion {
     const char* name;

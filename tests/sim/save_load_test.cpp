@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/sim: State is all that changes. A run that is saved, loaded into a fresh state and continued is identical to
-// the run that continued: same hash, same events, same Snapshot with all force patches. And reflect names every member.
+// the run that continued. Same hash, same events, same Snapshot with all force patches. And reflect names every member.
 #include <gtest/gtest-spi.h>
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/sim: the guarantees of the tick: same inputs, same bits, for any number of workers; a saved state continues
-// identically; publishing changes nothing; random hand motion breaks nothing.
+// tests/sim: the guarantees of the tick: same inputs, same bits, for any number of workers. A saved state continues
+// identically; publishing changes nothing. Random hand motion breaks nothing.
 #include <gtest/gtest.h>
 
 #include <algorithm>

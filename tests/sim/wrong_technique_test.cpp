@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/sim: faults of technique are reported, once, without other consequences: whole ticks with hands and needle on real
+// tests/sim: faults of technique are reported, once, without other consequences. Whole ticks with hands and needle on real
 // tissue, one test per fault, and some seconds after each in which the state stays valid (the rig asserts it every tick).
 #include <gtest/gtest.h>
 

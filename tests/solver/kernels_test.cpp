@@ -392,7 +392,7 @@ TEST(Pin, a_tolerance_is_what_a_rope_may_be_too_long_by) {
   EXPECT_GT(still, 150u);
 }
 
-// A steady pull apart, far below the tolerance in a substep, is answered in each substep: a tether that waited until the
+// A steady pull apart, far below the tolerance in a substep, is answered in each substep. A tether that waited until the
 // tolerance was exceeded would jitter.
 TEST(Pin, a_tolerance_makes_no_rope_twitch) {
   OneRope r(0.002f, 0.002f);

@@ -166,7 +166,7 @@ TEST(ThreadSlide, a_steady_pull_does_not_stretch_the_thread) {
     SutureContext sewing{model, state, scratch, suture, stitches, events};
     pull(sewing);
     // Stretch between the anchor and the hand. A stuck anchor lets go at the end of the substep in which the pull exceeds its
-    // friction; this hand starts at full speed, so the first substeps are not a steady pull.
+    // friction. This hand starts at full speed, so the first substeps are not a steady pull.
     if (i < 10) continue;
     const auto& order = state.strand[0].order;
     const size_t node = static_cast<size_t>(std::find(order.begin(), order.end(), a.slot) - order.begin());

@@ -11,7 +11,7 @@ namespace {
 
 constexpr float kRadius = 0.0025f, kThread = 0.00015f, kSpacing = 0.0016f;
 
-// A thread laid round a capsule along z (body 0); its ends are held by small bodies (1 and 2, 10 g), each on a
+// A thread laid round a capsule along z (body 0). Its ends are held by small bodies (1 and 2, 10 g), each on a
 // spring of 100 N/m whose other end a hand moves.
 struct Wrap {
   SolverModel model;
@@ -189,7 +189,7 @@ TEST(ThreadOnTool, a_tool_in_a_hand_gives_way_and_rests) {
 }
 
 // Capstan (Euler): pulled over half a turn against friction, the tensions have the ratio exp(pi mu). Friction is an implicit
-// drag by the last substep's speed and tension: it comes out too small rather than too large, more so in long substeps.
+// drag by the last substep's speed and tension. It comes out too small rather than too large, more so in long substeps.
 TEST(ThreadOnTool, friction_makes_a_capstan) {
   const float mu = 0.2f;
   for (const float h : {1.0f / 480, 1.0f / 960}) {

@@ -187,7 +187,7 @@ TEST(Settle, both_ends_of_a_stitch_are_held_through_its_knot) {
   EXPECT_LT(distance(position_of(inner.b, r.x()), at[2]), 1e-4f);
 }
 
-// Two suture points of one bite are a passage through a wall, which holds itself: a tether there would be solved in every
+// Two suture points of one bite are a passage through a wall, which holds itself. A tether there would be solved in every
 // substep from now on, without effect.
 TEST(Settle, a_wall_that_carries_nothing_gets_no_pin) {
   struct Case {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/suture: a whole scene in which a ghost drives the needle. The ghost is one more weld of the needle to a pose in the
-// world, so that a test prescribes the needle's motion; jaws, hands and mechanics are the real ones.
+// world, so that a test prescribes the needle's motion. Jaws, hands and mechanics are the real ones.
 #pragma once
 #include <gtest/gtest.h>
 

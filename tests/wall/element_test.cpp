@@ -138,7 +138,7 @@ TEST_P(AnElement, has_six_rigid_motions_and_no_other_motion_without_stiffness) {
 }
 
 // Patch test: a plate of irregular elements under an affine map in its plane has the force of the laminate on its edges, and
-// none inside; here one element against the laminate's own stress.
+// none inside. Here one element against the laminate's own stress.
 TEST_P(AnElement, stores_the_laminate_s_energy_under_an_affine_map) {
   Shape flat = shape;
   for (size_t i = 0; i < flat.mid.size(); ++i) flat.mid[i].z = 0, flat.dir[i] = {0, 0, 0.00125f};

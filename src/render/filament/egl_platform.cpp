@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // render/filament/egl_platform: see egl_platform.h.
 //
-// The only file that uses a private interface. Filament 1.9.25's own platform on Linux needs an X server; its base class
+// The only file that uses a private interface. Filament 1.9.25's own platform on Linux needs an X server. Its base class
 // for others, backend::OpenGLPlatform, is exported by the library but its header is not installed, so it is declared again
 // here. The order of the virtual functions is that of the library's own vtable and must not change; room.cmake accepts no other
 // version. Newer Filament has a public header and a headless EGL platform of its own.

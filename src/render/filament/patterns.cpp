@@ -133,7 +133,7 @@ Patterns make_patterns() {
   Vessels vessel;
   Dice dice{5};
   // Straight vessels run round the organ (texture v) from both sides, an artery and its vein together, as they come from the
-  // mesentery; fine ones everywhere between them.
+  // mesentery. Fine ones everywhere between them.
   for (int i = 0; i < 7; ++i) {
     const float x = (float(i) + 0.7f * dice()) * kSize / 7, y = kSize * dice(), way = i % 2 ? 1.57f : -1.57f;
     const float width = 1.9f + 1.6f * dice(), reach = kSize * (0.45f + 0.35f * dice());

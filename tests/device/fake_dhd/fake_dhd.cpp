@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/device/fake_dhd: a libdhd.so with two devices and the functions and types of the real one: positions that follow a
+// tests/device/fake_dhd: a libdhd.so with two devices and the functions and types of the real one. Positions that follow a
 // hand, calls that wait for the device, a firmware watchdog. Written only from the published description of that library and
 // deliberately without our own declarations of it, so that the two can disagree.
 #include "fake_dhd.h"

@@ -36,7 +36,7 @@ struct FakeHdUnkind {
   unsigned seed;
 };
 
-// Everything as after loading; the environment is read again:
+// Everything as after loading. The environment is read again:
 //   FAKE_HD_MANUAL=1        no thread: fakeHdStep runs the scheduler
 //   FAKE_HD_MISSING=left    that arm cannot be opened (right, left, or all)
 //   FAKE_HD_SWAPPED=1       the right arm is the second in the library's list
