@@ -117,11 +117,13 @@ void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel
   const float half = half_bite(picture, g), from = -half - 0.5f, to = half + 0.6f;
   constexpr int kDashes = 24;
   for (int i = 0; i < kDashes; ++i) {
-    const auto tip = [&](float part) { return at(on_needle(picture, needle_on(picture, g, from + (to - from) * part), 1)); };
+    const auto tip = [&](float part) {
+      return at(on_needle(picture, needle_on(picture, g, from + (to - from) * part), 1, g.suture));
+    };
     const auto a = tip(static_cast<float>(i) / kDashes), b = tip((static_cast<float>(i) + 0.6f) / kDashes);
     if (a && b) draw->AddLine(*a, *b, IM_COL32(115, 190, 255, 200), 2);
   }
-  const Vec3 tip = on_needle(picture, seen.active().needle.pose, 1);
+  const Vec3 tip = on_needle(picture, seen.active().needle.pose, 1, seen.active_suture);
   const bool inside = seen.active().needle.in_tissue && !seen.active().bite.empty();
   const Vec3 in = inside ? seen.active().bite.back().entry : tip;
   const Vec3 off = in - entry_of(g);

@@ -11,6 +11,7 @@ namespace catgut {
 struct BiteGuide {
   Vec3 at, out, along;          // [m] on the current surface, unit, unit
   float length = 0, depth = 0;  // [m] from entry to exit; below the surface
+  uint32_t suture = 0;          // whose needle makes it
 };
 
 // [rad] of the needle from where its tip meets the surface to where it is deepest.
@@ -20,6 +21,6 @@ Pose needle_on(const PictureModel& picture, const BiteGuide& guide, float psi, f
 inline Vec3 entry_of(const BiteGuide& g) { return g.at - g.along * (0.5f * g.length); }
 inline Vec3 exit_of(const BiteGuide& g) { return g.at + g.along * (0.5f * g.length); }
 // Fraction s of the needle's arc, 0 swage .. 1 tip.
-Vec3 on_needle(const PictureModel& picture, const Pose& needle, float s);
+Vec3 on_needle(const PictureModel& picture, const Pose& needle, float s, size_t suture = 0);
 
 }  // namespace catgut

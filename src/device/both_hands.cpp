@@ -32,11 +32,11 @@ size_t whole_pairs(const Snapshot& seen) {
 
 // The tool that holds the needle by `grip`, given the position of the needle's swage: its tip up and out of reach, the shaft on
 // `side`.
-Pose carrying(const PictureModel& picture, const Pose& grip, Vec3 swage_at, float side) {
+Pose carrying(const SuturePicture& suture, const Pose& grip, Vec3 swage_at, float side) {
   const float u = rotate(grip.q, {0, 0, 1}).z * side >= 0 ? 1.0f : -1.0f;
   const Vec3 up{u, 0, 0}, along{0, 0, -u}, x = Vec3{0, std::cos(-2.2f), 0} - along * std::sin(-2.2f);
   const Quat q = from_axes(x, cross(up, x), up);
-  return Pose{swage_at - rotate(q, {picture.suture[0].needle_radius, 0, 0}), q} * grip;
+  return Pose{swage_at - rotate(q, {suture.needle_radius, 0, 0}), q} * grip;
 }
 
 void go(BothHands& b, int stage) { b.stage = stage, b.held_for = 0; }
@@ -64,7 +64,7 @@ void wind_on(BothHands& b, size_t winder, std::array<Pose, 2>& hand, const Pose&
   const float behind = distance(needle_swage(picture, seen), swage_at(w.wound));
   if (b.stage >= beside) feel_winding(w, seen, across, behind, room, dt);
   const auto carry = [&](float speed) {
-    return glide(hand[winder], carrying(picture, grip, swage_at(w.wound), -side), speed, kTurn, dt);
+    return glide(hand[winder], carrying(picture.suture[seen.active_suture], grip, swage_at(w.wound), -side), speed, kTurn, dt);
   };
   b.held_for += dt;
   switch (b.stage) {
@@ -212,7 +212,7 @@ void go_along(BothHands& b, size_t who, std::array<Pose, 2>& hand, const Pose& g
   if (tension > kTieTooTaut) b.winding.free = std::max(kLeastLoose * strand, feel_strand(b.winding.free, tension, dt));
   const Vec3 turns = tool.p + rotate(tool.q, {0, 0, kTieWindAt});
   const Vec3 above = strand_above(b.winding, AcrossTool(tying_axis(side)), turns);
-  glide(hand[needle], carrying(picture, grip, above, -side), 2 * kSpeed, kTurn, dt);
+  glide(hand[needle], carrying(picture.suture[seen.active_suture], grip, above, -side), 2 * kSpeed, kTurn, dt);
 }
 
 bool tail_grip(const PictureModel& picture, const Snapshot& seen, size_t who, TailGrip& out) {

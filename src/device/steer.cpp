@@ -74,11 +74,13 @@ void help_to_bite(Steering& steering, size_t who, const ViewFrame& view, const P
   const int tool = seen.tool[who].instrument;
   const bool drives = tool >= 0 && picture.instrument[static_cast<size_t>(tool)].can(kHoldNeedle | kClamp) &&
                       seen.tool[1 - who].held != Held::needle;
-  if (!steering.guide || !drives || (seen.active().needle.in_tissue && !was)) {
+  const uint32_t suture = seen.tool[who].held_suture;
+  const bool in_tissue = seen.suture[suture].needle.in_tissue;
+  if (!steering.guide || steering.guide->suture != suture || !drives || (in_tissue && !was)) {
     hand.snapped = false;
     return;
   }
-  if (seen.active().needle.in_tissue) {  // from here on the hand drives it
+  if (in_tissue) {  // from here on the hand drives it
     hand.snapped = false;
     hand.pose = hand.sent.pose;
     return;
@@ -87,7 +89,7 @@ void help_to_bite(Steering& steering, size_t who, const ViewFrame& view, const P
   if (hand.driven <= 0) hand.bite = *steering.guide;
   const BiteGuide& g = hand.bite;
   const Pose needle = hand.pose * inverse(hand.grip);
-  const Vec3 tip = on_needle(picture, needle, 1), middle = on_needle(picture, needle, 0.5f);
+  const Vec3 tip = on_needle(picture, needle, 1, suture), middle = on_needle(picture, needle, 0.5f, suture);
   Vec3 there, other;
   const float reach = was ? kBiteLetGo : kBiteCatch;
   // The reference point for the pointer: the needle's tip, or the tool.
@@ -137,9 +139,14 @@ void help(Steering& steering, size_t who, const ViewFrame& view, const PictureMo
       best = there, nearest = distance(there, tail.pose.p);
     }
   }
-  const Pose grip = good_grip(picture, seen, who, shaft_of(hand.pose), hand.pose.p);
-  if (!loop && near_on_screen(view, hand.pose.p, grip.p, reach(HelpAt::needle), there) && distance(there, grip.p) < nearest)
+  // Any needle may be taken; the nearest on the screen is meant.
+  for (size_t k = 0; k < seen.suture.size() && !loop; ++k) {
+    const Pose grip = good_grip(picture, seen, who, shaft_of(hand.pose), hand.pose.p, static_cast<int>(k));
+    if (!near_on_screen(view, hand.pose.p, grip.p, reach(HelpAt::needle), there) || distance(there, grip.p) >= nearest)
+      continue;
+    nearest = distance(there, grip.p);
     hand.snapped = true, hand.at = HelpAt::needle, hand.help = grip, best = there;
+  }
   // The hand keeps the depth of the assist, or the tool would jump back on release.
   if (hand.snapped) hand.pose.p = best;
 }
@@ -198,28 +205,31 @@ void resume_steering(Steering& steering, const Snapshot& seen) {
   }
 }
 
-Pose good_grip(const PictureModel& picture, const Snapshot& seen, size_t who, Vec3 shaft, Vec3 near) {
+Pose good_grip(const PictureModel& picture, const Snapshot& seen, size_t who, Vec3 shaft, Vec3 near, int suture) {
+  const size_t which = suture < 0 ? seen.active_suture : static_cast<size_t>(suture);
+  const SuturePicture& shape = picture.suture[which];
+  const NeedleView& view = seen.suture[which].needle;
   const ToolView& other = seen.tool[1 - who];
-  const Pose& needle = seen.active().needle.pose;
+  const Pose& needle = view.pose;
   const auto at = [&](float s) {
-    const float phi = s * picture.suture[0].needle_arc;
-    return needle.p + rotate(needle.q, {std::cos(phi), std::sin(phi), 0}) * picture.suture[0].needle_radius;
+    const float phi = s * shape.needle_arc;
+    return needle.p + rotate(needle.q, {std::cos(phi), std::sin(phi), 0}) * shape.needle_radius;
   };
-  const auto free = [&](float s) { return other.held != Held::needle || std::abs(other.held_at - s) > kBeside; };
+  const auto free = [&](float s) {
+    return other.held != Held::needle || other.held_suture != which || std::abs(other.held_at - s) > kBeside;
+  };
   bool tip = !free(kDriveAt);
   // Stuck in tissue and not held: the end nearer to the hand.
-  if (seen.active().needle.in_tissue && free(kDriveAt) && free(kTipAt))
-    tip = distance(at(kTipAt), near) < distance(at(kDriveAt), near);
+  if (view.in_tissue && free(kDriveAt) && free(kTipAt)) tip = distance(at(kTipAt), near) < distance(at(kDriveAt), near);
   const float s = tip ? kTipAt : kDriveAt;
-  const Vec3 radial =
-      rotate(needle.q, {std::cos(s * picture.suture[0].needle_arc), std::sin(s * picture.suture[0].needle_arc), 0});
+  const Vec3 radial = rotate(needle.q, {std::cos(s * shape.needle_arc), std::sin(s * shape.needle_arc), 0});
   // The shaft leaves the needle's plane on its present side; at the tip it tilts back, away from the tissue that the needle
   // exits.
   const float side = dot(rotate(needle.q, {0, 0, 1}), shaft) >= 0 ? 1.0f : -1.0f;
   const Vec3 lean = rotate(needle.q, {std::cos(2.6f), -std::sin(2.6f), 0});
   const Vec3 z = normalized(rotate(needle.q, {0, 0, side}) + lean * (tip ? 0.3f : 0.0f));
   const Vec3 y = normalized(cross(z, radial), any_perpendicular(z));
-  return {needle.p + radial * picture.suture[0].needle_radius, from_axes(cross(y, z), y, z)};
+  return {needle.p + radial * shape.needle_radius, from_axes(cross(y, z), y, z)};
 }
 
 std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 2>& motion, const ViewFrame& view,
@@ -228,15 +238,16 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
   for (size_t k = 0; k < 2; ++k) {
     SteeredHand& hand = steering.hand[k];
     const bool holds = seen.tool[k].held == Held::needle;
+    const NeedleView& needle = seen.suture[holds ? seen.tool[k].held_suture : seen.active_suture].needle;
     if (holds && !hand.holds) {
       if (hand.snapped) hand.pose = hand.help;  // it was grasped at the assisted pose
-      hand.grip = inverse(seen.active().needle.pose) * seen.tool[k].pose;
+      hand.grip = inverse(needle.pose) * seen.tool[k].pose;
       hand.snapped = false;
     }
     hand.holds = holds;
     // Two tools that hold it displace each other slightly: use the grip of this one only.
-    if (holds && !seen.active().needle.in_tissue && seen.tool[1 - k].held != Held::needle)
-      hand.grip = inverse(seen.active().needle.pose) * seen.tool[k].pose;
+    if (holds && !needle.in_tissue && seen.tool[1 - k].held != Held::needle)
+      hand.grip = inverse(needle.pose) * seen.tool[k].pose;
   }
   both(steering, motion, picture, seen, dt);
   for (size_t k = 0; k < 2; ++k) {

@@ -78,6 +78,7 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
 
 // Best grasp of the needle for hand `who`: perpendicular to it, a third from the swage, or
 // behind the tip if the other tool is there or the needle is in tissue. shaft: unit, direction of the hand's shaft.
-Pose good_grip(const PictureModel& picture, const Snapshot& seen, size_t who, Vec3 shaft, Vec3 near);
+Pose good_grip(const PictureModel& picture, const Snapshot& seen, size_t who, Vec3 shaft, Vec3 near,
+               int suture = -1);  // -1: the active one
 
 }  // namespace catgut

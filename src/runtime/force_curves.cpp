@@ -14,7 +14,8 @@ namespace catgut {
 namespace {
 
 Vec3 tip_of(const Snapshot& seen, const PictureModel& picture) {
-  const float r = picture.suture[0].needle_radius, a = picture.suture[0].needle_arc;
+  const SuturePicture& needle = picture.suture[seen.active_suture];
+  const float r = needle.needle_radius, a = needle.needle_arc;
   return transform(seen.active().needle.pose, Vec3{r * std::cos(a), r * std::sin(a), 0});
 }
 

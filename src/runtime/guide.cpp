@@ -18,10 +18,11 @@ BitePlaces bite_places(const SceneSpec& scene, const PictureModel& picture) {
 std::optional<BiteGuide> next_bite(const BitePlaces& places, const PictureModel& picture, const Snapshot& seen) {
   auto made = std::count_if(seen.active().bite.begin(), seen.active().bite.end(), [](const BiteView& b) { return b.complete; });
   for (const BitePlace& p : places.place) {
+    if (p.suture != seen.active_suture) continue;
     made -= p.walls;
     if (made >= 0) continue;
     const BiteFrame f = bite_frame(picture, seen, p);
-    return BiteGuide{f.at, f.out, f.along, p.length, p.depth};
+    return BiteGuide{f.at, f.out, f.along, p.length, p.depth, p.suture};
   }
   return {};
 }

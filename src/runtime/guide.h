@@ -16,7 +16,7 @@ struct BitePlaces {
 };
 BitePlaces bite_places(const SceneSpec& scene, const PictureModel& picture);
 
-// The first position without a bite, in the order of the plan; none when all are made.
+// The first place of the active suture without a bite, in the order of the plan; none when all are complete.
 std::optional<BiteGuide> next_bite(const BitePlaces& places, const PictureModel& picture, const Snapshot& seen);
 
 }  // namespace catgut

@@ -325,6 +325,30 @@ TEST(Help, a_held_needle_comes_to_the_bite_and_is_driven_from_there) {
   EXPECT_GT(after.x, before.x);
 }
 
+TEST(Help, the_needle_under_the_pointer_is_meant_whichever_suture_it_is_of) {
+  WorkQueue d;
+  d.seen.suture.resize(2), d.picture.suture.resize(2);
+  d.picture.suture[1].needle_radius = 0.012f;
+  d.seen.suture[0].needle.pose = {{-0.03f, 0, 0}, {}};
+  d.seen.suture[1].needle.pose = {{0.03f, 0, 0}, {}};
+  for (const int k : {1, 0, 1}) {
+    const Pose grip = good_grip(d.picture, d.seen, 0, {0, 0, 1}, {}, k);
+    const auto to = on_screen(d.view, grip.p), from = on_screen(d.view, d.steering.hand[0].pose.p);
+    d.turn(moved(to[0] - from[0], to[1] - from[1]));
+    ASSERT_TRUE(d.steering.hand[0].snapped) << k;
+    const auto which = static_cast<size_t>(k);
+    EXPECT_NEAR(distance(d.steering.hand[0].help.p, d.seen.suture[which].needle.pose.p), d.picture.suture[which].needle_radius,
+                1e-5f);
+  }
+  // In the jaws: it is this needle that turns with the tool, though the other one was active.
+  const NeedleView& held = d.seen.suture[1].needle;
+  d.seen.tool[0].held = Held::needle, d.seen.tool[0].held_suture = 1;
+  d.seen.tool[0].pose = d.steering.hand[0].help;
+  d.turn({});
+  const Pose same = d.steering.hand[0].pose * inverse(d.steering.hand[0].grip);
+  EXPECT_LT(distance(same.p, held.pose.p), 1e-4f);
+}
+
 TEST(Help, the_second_hand_takes_the_other_place) {
   WorkQueue d;
   d.seen.active().needle.pose = {};
