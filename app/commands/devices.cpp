@@ -10,13 +10,14 @@
 #include "device/drivers.h"
 #include "runtime/arm_test.h"
 #include "runtime/haptics.h"
+#include "runtime/registration.h"
 
 namespace catgut {
 namespace {
 
 struct Options {
   std::string which;
-  bool test = false, calibrate = false;
+  bool test = false, calibrate = false, register_arms = false;
   double scale = 1, turn = 0, countdown = 5;  // countdown [s]
 };
 
@@ -29,7 +30,9 @@ int calibrate(ArmPort port, const Options& o) {
   const std::array<Vec3, 2> at = held_places(std::move(port), static_cast<float>(o.countdown), say, stop_on_interrupt(), known);
   for (size_t k = 0; k < 2; ++k) {
     if (!known[k]) continue;
-    places[arm[k].serial] = {static_cast<float>(o.scale), static_cast<float>(o.turn), at[k]};
+    ArmPlace& place = places[arm_key(arm[k], k)];
+    place.scale = static_cast<float>(o.scale), place.turn = static_cast<float>(o.turn), place.middle = at[k];
+    place.residual = -1;  // this rotation replaces a registered one
     std::printf("%s device: center at %.0f, %.0f, %.0f mm, scale %g, rotation %g degrees\n", k == 0 ? "right" : "left",
                 1e3 * double{at[k].x}, 1e3 * double{at[k].y}, 1e3 * double{at[k].z}, o.scale, o.turn);
   }
@@ -37,6 +40,40 @@ int calibrate(ArmPort port, const Options& o) {
   write_arm_places(file, places);
   std::printf("%s\n", file.c_str());
   return 0;
+}
+
+int register_devices(ArmPort port, const Options& o) {
+  const std::string file = arm_places_file();
+  std::map<std::string, ArmPlace> places = read_arm_places(file);
+  const std::array<ArmInfo, 2> arm = port.arm;
+  const auto say = [](const std::string& line) { std::printf("%s\n", line.c_str()), std::fflush(stdout); };
+  const RegistrationResult r = register_arms(std::move(port), {}, say, stop_on_interrupt());
+  int code = 0;
+  bool any = false;
+  for (size_t k = 0; k < 2; ++k) {
+    if (!arm[k].present) continue;
+    const char* hand = r.hand[k] == 0 ? "right" : "left";
+    const Registration& fit = r.fit[k];
+    if (!r.done[k]) {
+      std::printf("%s device: not registered\n", hand), code = 1;
+      continue;
+    }
+    std::printf("%s device: residual %.1f mm RMS, %.1f mm at most; rotated by %.1f degrees; distances %.3f of the card's\n",
+                hand, 1e3 * double{fit.rms}, 1e3 * double{fit.worst},
+                double{length(rotation_vector(fit.turn))} * 180 / double{kPi}, 1 / double{fit.scale});
+    if (!is_plausible(fit)) {
+      std::printf("  not saved: more than 3 mm or 5 %%; touch the marks in the given order, or calibrate the device\n");
+      code = 1;
+      continue;
+    }
+    ArmPlace& place = places[arm_key(arm[k], k)];
+    place.scale = static_cast<float>(o.scale), place.turn = 0, place.middle = fit.center;
+    place.rotation = fit.turn, place.residual = fit.rms;
+    if (arm[0].present && arm[1].present) place.hand = static_cast<int>(r.hand[k]);
+    any = true;
+  }
+  if (any) write_arm_places(file, places), std::printf("%s\n", file.c_str());
+  return code;
 }
 
 int test(ArmPort port, const Options& o) {
@@ -76,14 +113,19 @@ int devices(const Options& o) {
     print(port);
     if (!port.any()) continue;
     any = true;
-    if (o.calibrate) code = std::max(code, calibrate(std::move(port), o));
+    if (o.register_arms) code = std::max(code, register_devices(std::move(port), o));
+    else if (o.calibrate) code = std::max(code, calibrate(std::move(port), o));
     else if (o.test) code = std::max(code, test(std::move(port), o));
     else std::printf("  catgut devices %s --test applies small forces; catgut play --haptics %s uses them\n", d.word, d.word);
   }
-  if (any && !o.test && !o.calibrate) read_arm_places(arm_places_file());  // reports errors that would occur when a scene opens
+  if (any && !o.test && !o.calibrate && !o.register_arms)
+    read_arm_places(arm_places_file());  // reports errors that would occur when a scene opens
   if (any) return code;
-  if (o.test || o.calibrate)
-    throw InputError(o.test ? "devices --test" : "devices --calibrate", "no haptic device", "see above for what is missing");
+  if (o.test || o.calibrate || o.register_arms)
+    throw InputError(o.test        ? "devices --test"
+                     : o.calibrate ? "devices --calibrate"
+                                   : "devices --register",
+                     "no haptic device", "see above for what is missing");
   std::printf(
       "Mouse, keyboard and gamepad are hands in the window: catgut play\n"
       "The scripted surgeon needs none: catgut run purse_string --surgeon scripted --headless\n");
@@ -102,7 +144,14 @@ void add_devices(CLI::App& app, int& exit_code) {
   CLI::Option* test = command->add_flag("--test", o->test, "push each device slowly along each axis after a countdown");
   command->add_flag("--calibrate", o->calibrate, "map the workspaces into the field; saved per user and device")
       ->excludes(test);
-  command->add_option("--scale", o->scale, "calibrate: field meters per meter of the stylus")
+  command
+      ->add_flag(
+          "--register", o->register_arms,
+          "left and right, and rotation: touch five marks (center, 5 cm right, left, far, near) with each stylus; saved per "
+          "user and device")
+      ->excludes("--calibrate")
+      ->excludes(test);
+  command->add_option("--scale", o->scale, "calibrate, register: field meters per meter of the stylus")
       ->check(within(0.1, 3.0))
       ->capture_default_str();
   command->add_option("--turn", o->turn, "calibrate: rotation about the vertical [degrees]")

@@ -216,8 +216,9 @@ void work_panel(const WorkView& v, const Settings& settings) {
     const ArmView& arm = s.arm_view[k];
     if (arm.most <= 0) continue;  // no such device
     const size_t bars = arm.most > 0 ? static_cast<size_t>(std::clamp(20 * arm.force / arm.most, 0.0f, 20.0f)) : 0;
-    state.push_back({*arm.off ? kBad : kQuiet, fmt::format("{} arm {:.1f} N {:<20}{}{}", k == 0 ? "right" : "left", arm.force,
-                                                           std::string(bars, '|'), *arm.off ? "  no force: " : "", arm.off)});
+    state.push_back(
+        {*arm.off ? kBad : kQuiet, fmt::format("{} arm {:.1f} N {:<20}{}{}", arm.side == 0 ? "right" : "left", arm.force,
+                                               std::string(bars, '|'), *arm.off ? "  no force: " : "", arm.off)});
   }
   if (!s.fault.empty()) state.push_back({kBad, "! " + s.fault});
   lines_at("state", 0, 0, 0.62f, state);

@@ -169,6 +169,7 @@ class Window {
   void open(const std::string& name, bool teach = false) {
     const SceneSpec scene = read_scene(name);
     LiveOptions live = options_.live;
+    if (settings_.left_handed) live.arm_hand = {1, 0};
     live.record = of_visit(live.record, ++opened_);
     if (live.surgeon.empty() && watch_ && !teach) live.surgeon = "scripted";
     leave();

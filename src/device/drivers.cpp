@@ -12,10 +12,12 @@ namespace {
 
 constexpr ArmDriver kDrivers[] = {
 #ifdef CATGUT_WITH_HAPTICS
-    {"touch", "3D Systems Touch", "path of libHD.so",
+    {"touch", "3D Systems Touch", "path of libHD.so, or device names RIGHT,LEFT",
      [](const std::string& where, std::vector<std::string>& messages) {
        TouchOptions o;
-       o.library = where;
+       if (const size_t comma = where.find(','); comma != std::string::npos)
+         o.name = {where.substr(0, comma), where.substr(comma + 1)};
+       else o.library = where;
        return open_touch(o, messages);
      }},
     {"force-dimension", "Force Dimension omega, delta, lambda, sigma; Novint Falcon", "path of libdhd.so",

@@ -20,7 +20,7 @@
 namespace catgut {
 namespace {
 
-constexpr std::string_view kKeys[] = {"scale", "turn", "x", "y", "z"};
+constexpr std::string_view kKeys[] = {"scale", "turn", "x", "y", "z", "qx", "qy", "qz", "qw", "residual_mm", "hand"};
 constexpr const char* kNext = "correct or remove the file, then run catgut devices --calibrate";
 
 float number(const toml::table& t, const char* key, float otherwise, float least, float most, const std::string& where) {
@@ -70,13 +70,23 @@ std::map<std::string, ArmPlace> read_arm_places(const std::string& path) {
     if (!t) refuse(node, std::string(serial.str()) + " must be a table [SERIAL NUMBER]");
     for (const auto& [key, value] : *t)
       if (std::find(std::begin(kKeys), std::end(kKeys), key.str()) == std::end(kKeys))
-        refuse(value, std::string(key.str()) + " is unknown; a device has scale, turn, x, y and z");
+        refuse(value,
+               std::string(key.str()) + " is unknown; a device has scale, turn, x, y, z, qx, qy, qz, qw, residual_mm and hand");
     ArmPlace p;
     p.scale = number(*t, "scale", p.scale, 0.1f, 3, path);
     p.turn = number(*t, "turn", p.turn, -180, 180, path);
     p.middle.x = number(*t, "x", 0, -0.5f, 0.5f, path);
     p.middle.y = number(*t, "y", 0, -0.5f, 0.5f, path);
     p.middle.z = number(*t, "z", 0, -0.5f, 0.5f, path);
+    p.rotation = {number(*t, "qx", 0, -1, 1, path), number(*t, "qy", 0, -1, 1, path), number(*t, "qz", 0, -1, 1, path),
+                  number(*t, "qw", 1, -1, 1, path)};
+    p.rotation = normalized(p.rotation);
+    if (t->contains("residual_mm")) p.residual = 1e-3f * number(*t, "residual_mm", 0, 0, 100, path);
+    if (const toml::node* hand = t->get("hand")) {
+      const std::string word = hand->value_or(std::string());
+      if (word != "right" && word != "left") refuse(*hand, "hand must be \"right\" or \"left\"");
+      p.hand = word == "left" ? 1 : 0;
+    }
     places[std::string(serial.str())] = p;
   }
   return places;
@@ -86,13 +96,22 @@ void write_arm_places(const std::string& path, const std::map<std::string, ArmPl
   std::error_code error;
   std::filesystem::create_directories(std::filesystem::path(path).parent_path(), error);
   toml::table file;
-  for (const auto& [serial, p] : places)
-    file.insert_or_assign(
-        serial, toml::table{{"scale", p.scale}, {"turn", p.turn}, {"x", p.middle.x}, {"y", p.middle.y}, {"z", p.middle.z}});
+  for (const auto& [serial, p] : places) {
+    toml::table t{{"scale", p.scale}, {"turn", p.turn}, {"x", p.middle.x}, {"y", p.middle.y}, {"z", p.middle.z}};
+    if (p.residual >= 0) {
+      t.insert_or_assign("qx", p.rotation.x), t.insert_or_assign("qy", p.rotation.y);
+      t.insert_or_assign("qz", p.rotation.z), t.insert_or_assign("qw", p.rotation.w);
+      t.insert_or_assign("residual_mm", 1e3f * p.residual);
+    }
+    if (p.hand >= 0) t.insert_or_assign("hand", p.hand == 1 ? "left" : "right");
+    file.insert_or_assign(serial, t);
+  }
   std::ostringstream out;
   out << "# Workspace mapping of haptic devices by serial number, written by catgut devices --calibrate.\n"
          "# scale: field meters per meter of the stylus; turn [degrees]; x, y, z [m]: device position at the center of "
          "the field.\n"
+         "# qx, qy, qz, qw: rotation by catgut devices --register, instead of turn; residual_mm of its fit; hand: right or "
+         "left.\n"
       << file << "\n";
   write_file(path, out.str());
 }

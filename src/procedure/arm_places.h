@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // procedure: the pose of each haptic device's workspace in the field, stored per user (the file) and per device (its serial
-// number). Written by `catgut devices --calibrate`, read when a scene opens.
+// number). Written by `catgut devices --calibrate` and `--register`, read when a scene opens.
 #pragma once
 #include <map>
 #include <string>
@@ -13,6 +13,10 @@ struct ArmPlace {
   float scale = 1;  // meters in the field per meter of the stylus
   float turn = 0;   // [degrees] rotation of the device about the vertical, counter-clockwise from above
   Vec3 middle;      // [m] device frame: maps to the center of the hand's side of the field
+  // Of `--register`: the device's axes in the user's, in place of `turn`; its residual [m], negative: not registered.
+  Quat rotation;
+  float residual = -1;
+  int hand = -1;  // in which hand the device is: 0 right, 1 left; negative: as its driver lists it
 };
 
 // CATGUT_ARMS, else catgut/arms.toml in XDG_CONFIG_HOME or ~/.config.

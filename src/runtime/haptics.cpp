@@ -93,6 +93,7 @@ void count(std::array<uint64_t, 512>& counts, uint64_t ns) { ++counts[std::min<u
 struct Haptics::Work {
   ArmPort port;
   std::array<Side, 2> side;
+  std::array<size_t, 2> side_of{0, 1};  // hand in which each device is
   uint64_t (*clock)() = wall_ns;
   EnergyPool pool;  // of the servos
 
@@ -168,15 +169,30 @@ double quantile_us(const std::array<uint64_t, 512>& counts, double part) {
   return 0;
 }
 
-Workspace workspace_of(const ArmInfo& arm, size_t k, Vec3 focus, const std::map<std::string, ArmPlace>& places) {
+std::string arm_key(const ArmInfo& arm, size_t k) {
+  return !arm.serial.empty() ? arm.serial : k == 0 ? "first device" : "second device";
+}
+
+std::array<size_t, 2> sides_of(const std::array<ArmInfo, 2>& arm, const std::map<std::string, ArmPlace>& places) {
+  std::array<int, 2> hand{-1, -1};
+  for (size_t k = 0; k < 2; ++k)
+    if (const auto found = places.find(arm_key(arm[k], k)); arm[k].present && found != places.end())
+      hand[k] = found->second.hand;
+  // Two devices in one hand: the file is of other pairs.
+  if (hand[0] >= 0 && hand[0] == hand[1]) return {0, 1};
+  const bool swapped = hand[0] == 1 || hand[1] == 0;
+  return {swapped ? size_t{1} : size_t{0}, swapped ? size_t{0} : size_t{1}};
+}
+
+Workspace workspace_of(const ArmInfo& arm, size_t k, size_t side, Vec3 focus, const std::map<std::string, ArmPlace>& places) {
   ArmPlace place;
   place.middle = 0.5f * (arm.least + arm.most);
-  if (const auto found = places.find(arm.serial); found != places.end()) place = found->second;
+  if (const auto found = places.find(arm_key(arm, k)); found != places.end()) place = found->second;
   Workspace w;
   w.scale = place.scale;
-  w.turn = axis_angle({0, 1, 0}, place.turn * kPi / 180);
+  w.turn = place.residual >= 0 ? place.rotation : axis_angle({0, 1, 0}, place.turn * kPi / 180);
   // The hands side by side, slightly above the field.
-  w.offset = focus + Vec3{k == 0 ? 0.015f : -0.015f, 0.02f, 0.01f} - rotate(w.turn, place.middle) * w.scale;
+  w.offset = focus + Vec3{side == 0 ? 0.015f : -0.015f, 0.02f, 0.01f} - rotate(w.turn, place.middle) * w.scale;
   return w;
 }
 
@@ -190,13 +206,14 @@ Haptics::Haptics(ArmPort port, const PictureModel& picture, const HapticsOptions
     for (Side& s : work_->side) s.log = std::make_unique<Ring<LogRow, 4096>>();
   }
   if (options.clock) work_->clock = options.clock;
+  work_->side_of = sides_of(work_->port.arm, options.place);
   for (size_t k = 0; k < 2; ++k) {
     ServoOptions& o = work_->side[k].options;
     const ArmInfo& arm = work_->port.arm[k];
     fit_to_arm(o, arm.limits);
     o.ratchet = options.ratchet;
     o.force = options.force;
-    o.place = workspace_of(arm, k, picture.focus, options.place);
+    o.place = workspace_of(arm, k, work_->side_of[k], picture.focus, options.place);
     work_->side[k].hand.draft().input.connected = 0;
     work_->side[k].hand.publish();
   }
@@ -212,6 +229,7 @@ Haptics::~Haptics() {
   std::fclose(work_->log);
 }
 
+size_t Haptics::side(size_t k) const { return work_->side_of[k]; }
 bool Haptics::present(size_t k) const { return work_->port.arm[k].present; }
 const ServoOptions& Haptics::servo(size_t k) const { return work_->side[k].options; }
 
@@ -252,7 +270,7 @@ std::vector<std::string> Haptics::news() {
   for (size_t k = 0; k < 2; ++k) {
     if (!present(k)) continue;
     Side& s = work_->side[k];
-    const std::string who = std::string(k == 0 ? "right device: " : "left device: ");
+    const std::string who = std::string(work_->side_of[k] == 0 ? "right device: " : "left device: ");
     const ArmStatus status = work_->port.status(work_->port.self, k);
     for (const std::string& line : new_faults(s.faults.exchange(0, std::memory_order_relaxed) | status.faults, s.messages))
       lines.push_back(who + line);
@@ -272,6 +290,7 @@ std::vector<std::string> Haptics::news() {
 ArmView Haptics::view(size_t k, const char* off) const {
   const Side& s = work_->side[k];
   ArmView v;
+  v.side = work_->side_of[k];
   if (!present(k)) return v;
   const ArmStatus status = work_->port.status(work_->port.self, k);
   const bool remote = work_->port.send_patch != nullptr;

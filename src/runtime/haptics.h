@@ -33,10 +33,15 @@ struct HapticsOptions {
   bool ratchet = true;            // the stylus' first button toggles the jaw; false: the jaw is closed while it is pressed
   bool force = true;              // false: devices move tools without force
   std::string log;                // file to which every millisecond is written (CSV, see kHapticsLogHead); empty: none
-  std::map<std::string, ArmPlace> place;  // by serial number; a device that is not in it: the center of its workspace, 1:1
+  std::map<std::string, ArmPlace> place;  // by arm_key; a device that is not in it: the center of its workspace, 1:1
 };
-// The workspace of device k in a scene whose field has its center at `focus` [m].
-Workspace workspace_of(const ArmInfo& arm, size_t k, Vec3 focus, const std::map<std::string, ArmPlace>& places);
+// Serial number of device k; of one that reports none, its place in the driver's list.
+std::string arm_key(const ArmInfo& arm, size_t k);
+// In which hand each device is, 0 right, 1 left: as saved by `catgut devices --register`, else as the driver lists them.
+std::array<size_t, 2> sides_of(const std::array<ArmInfo, 2>& arm, const std::map<std::string, ArmPlace>& places);
+// The workspace of device k, which is in the right hand or in the left (side 1), in a scene whose field has its center at
+// `focus` [m].
+Workspace workspace_of(const ArmInfo& arm, size_t k, size_t side, Vec3 focus, const std::map<std::string, ArmPlace>& places);
 
 // Timing of one device's servo, in [us]: counts per 10 us, the last one for all longer periods.
 struct ServoTimes {
@@ -56,6 +61,7 @@ constexpr const char* kHapticsLogHead =
 
 // Status of a device for display.
 struct ArmView {
+  size_t side = 0;            // 0 right, 1 left
   bool here = false;          // samples arrive
   bool felt = false;          // force is enabled
   float force = 0, most = 0;  // [N] written now; limit of the device
@@ -71,6 +77,7 @@ class Haptics {
   Haptics& operator=(const Haptics&) = delete;
 
   bool present(size_t k) const;
+  size_t side(size_t k) const;  // in which hand the device is: 0 right, 1 left
   const ServoOptions& servo(size_t k) const;
 
   // Owned by the physics thread.

@@ -153,10 +153,11 @@ struct Live::Work {
   void end_demonstration();
   void record_from_here();
   void forget_pace() { wall_s = simulated_s = 0; }
+  size_t hand_of(size_t arm) const { return options.arm_hand[haptics->side(arm)]; }
   // The device that moves a hand, -1: none.
   int arm_of(size_t hand) const {
     for (size_t arm = 0; haptics && arm < 2; ++arm)
-      if (haptics->present(arm) && options.arm_hand[arm] == hand) return static_cast<int>(arm);
+      if (haptics->present(arm) && hand_of(arm) == hand) return static_cast<int>(arm);
     return -1;
   }
   Moment moment() const { return {save_state(*model, *state), input.hand, published.metrics}; }
@@ -180,7 +181,7 @@ void Live::Work::begin() {
     how.log = options.haptics_log;
     haptics = std::make_unique<Haptics>(std::move(arms), picture, how);
     for (size_t arm = 0; arm < 2; ++arm)
-      if (haptics->present(arm)) published.arm[options.arm_hand[arm]] = true;
+      if (haptics->present(arm)) published.arm[hand_of(arm)] = true;
   }
   dt = 1.0 / static_cast<double>(scene.solver.tick_rate);
   checkpoint_every = std::max<uint64_t>(1, static_cast<uint64_t>(std::llround(kBeforeBite / dt)));
@@ -311,7 +312,7 @@ void Live::Work::feel() {
   else rest_arms();
   if (as_paper) follow(paper, now, picture);
   for (size_t arm = 0; arm < 2 && drive; ++arm) {
-    const size_t k = options.arm_hand[arm];
+    const size_t k = hand_of(arm);
     haptics->publish(arm, as_paper ? paper_patch(paper, now, picture, k) : now.patch[k], published.epoch + handovers,
                      kLiveSpeeds[speed]);
   }

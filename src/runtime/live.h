@@ -49,7 +49,7 @@ struct LiveOptions {
   // opens without. The window controls hands without a device.
   std::string haptics;
   std::string haptics_log;                      // as HapticsOptions::log
-  std::array<uint8_t, 2> arm_hand{0, 1};        // hand that each of the two devices moves
+  std::array<uint8_t, 2> arm_hand{0, 1};        // tool moved by the device in the right hand, in the left; {1, 0}: left-handed
   std::function<void(const std::string&)> say;  // receives lines about the devices, from any thread; empty: lines are dropped
 };
 

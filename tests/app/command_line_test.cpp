@@ -151,9 +151,13 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
   using catgut::Vec3;
   catgut::ArmInfo arm;
   arm.serial = "right-0001";
-  const catgut::Workspace w = catgut::workspace_of(arm, 0, {0, 0.1f, 0}, kept);
+  const catgut::Workspace w = catgut::workspace_of(arm, 0, 0, {0, 0.1f, 0}, kept);
   EXPECT_LT(catgut::distance(catgut::to_world(w, {kept.at("right-0001").middle, {}}).p, {0.015f, 0.12f, 0.01f}), 1e-6f);
   EXPECT_LT(catgut::distance(catgut::rotate(w.turn, Vec3{1, 0, 0}), {0, 0, -1}), 1e-6f);
+  // The names under which the library knows its devices.
+  const Outcome named = run_catgut("devices \"touch:Left Device,Nobody\"");
+  EXPECT_NE(named.out.find("right device \"Left Device\""), std::string::npos) << named.out;
+  EXPECT_NE(named.out.find("no left device (\"Nobody\")"), std::string::npos) << named.out;
   std::ofstream(places) << "[right-0001]\nscale = 50\n";
   expect_refused("devices --calibrate", "arms.toml:2: scale must be a number between");
   // Any command that reads the file reports its error, and none overwrites it.
@@ -162,6 +166,7 @@ TEST_F(CommandLine, devices_are_listed_and_pushed) {
                                           {"[right-0001]\nturn = nan\n", "arms.toml:2: turn must be"},
                                           {"[right-0001]\nx = \"far\"\n", "arms.toml:2: x must be"},
                                           {"[left-0002]\nscael = 2\n", "arms.toml:2: scael is unknown"},
+                                          {"[left-0002]\nhand = \"both\"\n", "arms.toml:2: hand must be"},
                                           {"\nright-0001 = 3\n", "arms.toml:2: right-0001 must be"},
                                           {std::string("\0\xff[", 3), "arms.toml:1: "}}) {
     std::ofstream(places, std::ios::binary) << text;
