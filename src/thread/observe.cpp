@@ -4,135 +4,224 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <vector>
+
+#include "thread/topology.h"
 
 namespace catgut::thread {
 namespace {
 
-constexpr float kNear = 0.4f;     // of the diameter: maximum gap of a crossing that counts
-constexpr float kCrossed = 0.5f;  // sine of the angle between the strands: smaller ones run side by side
-constexpr float kApart = 4.0f;    // diameters of loop length between one throw and the next
-constexpr float kBand = 3.0f;     // diameters of loop length beyond a throw's crossings that still turn with it
-constexpr float kAir = 1e-3f;     // [m]
+constexpr float kAir = 1e-3f;  // [m]
 constexpr float kSliding = 0.45f;
+constexpr float kOwn = 7;  // diameters of each strand that a snug single throw takes up; half as much more per wrap
+constexpr size_t kMaxOrders = 5000;
 
-struct Seen {
-  float loop, sign;
-  uint32_t a, b;  // segments
+// Fixed and spread over the sphere: where the open ends are led to before they are joined.
+constexpr Vec3 kAway[] = {{0.36f, 0.48f, 0.8f},   {-0.8f, 0.36f, 0.48f},  {0.48f, -0.8f, 0.36f}, {-0.36f, -0.48f, 0.8f},
+                          {0.8f, -0.36f, -0.48f}, {-0.48f, 0.8f, -0.36f}, {0.36f, 0.48f, -0.8f}, {-0.64f, -0.6f, -0.48f}};
+
+struct Vote {
+  KnotType type;
+  float share = 0;  // of the closures
 };
 
-// Gauss linking integral of two segments, exact: Klenin and Langowski
-// 2000, 10.1002/1097-0282(20001015)54:5<307::AID-BIP20>3.0.CO;2-Y.
-float gauss(Vec3 a0, Vec3 a1, Vec3 b0, Vec3 b1) {
-  const Vec3 r13 = b0 - a0, r14 = b1 - a0, r23 = b0 - a1, r24 = b1 - a1;
-  const Vec3 n1 = normalized(cross(r13, r14)), n2 = normalized(cross(r14, r24)), n3 = normalized(cross(r24, r23)),
-             n4 = normalized(cross(r23, r13));
-  auto arc = [](Vec3 p, Vec3 q) { return std::asin(std::clamp(dot(p, q), -1.0f, 1.0f)); };
-  const float area = arc(n1, n2) + arc(n2, n3) + arc(n3, n4) + arc(n4, n1);
-  return (dot(cross(b1 - b0, a1 - a0), r13) > 0 ? 1.0f : -1.0f) * area / (4 * kPi);
-}
-
-float turning(const State& s, uint32_t from, uint32_t to) {
-  float sum = 0;
-  for (uint32_t i = from + 1; i <= to; ++i) {
-    const Vec3 p = normalized(s.position(i) - s.position(i - 1)), q = normalized(s.position(i + 1) - s.position(i));
-    sum += std::atan2(length(cross(p, q)), dot(p, q));
-  }
-  return sum;
-}
-
-SeenThrow look_at(const Settings& settings, const State& state, const std::vector<Seen>& seen, const std::vector<float>& along,
-                  size_t first, size_t end) {
-  SeenThrow t;
-  float sign = 0, all = 0;
-  uint32_t a0 = seen[first].a, a1 = a0, b0 = seen[first].b, b1 = b0;
-  for (size_t k = first; k < end; ++k) {
-    sign += seen[k].sign, all += std::abs(seen[k].sign);
-    a0 = std::min(a0, seen[k].a), a1 = std::max(a1, seen[k].a), b0 = std::min(b0, seen[k].b), b1 = std::max(b1, seen[k].b);
-    t.loop += seen[k].loop / static_cast<float>(end - first);
-  }
-  t.hand = sign > 0 ? 1 : -1;
-  // Turns of the strands about each other, including a short distance beyond the crossings, where they meet and part.
-  const uint32_t more = static_cast<uint32_t>(std::lround(2.5f * settings.material.diameter / state.rest[a0])),
-                 last = static_cast<uint32_t>(state.segments()) - 1;
-  const uint32_t middle = (a1 + b0) / 2;
-  a0 = a0 > more ? a0 - more : 0, a1 = std::min(a1 + more, middle);
-  b0 = b0 > middle + more ? b0 - more : middle + 1, b1 = std::min(b1 + more, last - 1);
-  // Only pairs whose loop belongs to this throw: pairs of neighboring throws would cancel in an alternating knot.
-  const float low = seen[first].loop - kBand * settings.material.diameter,
-              high = seen[end - 1].loop + kBand * settings.material.diameter;
-  float link = 0;
-  for (uint32_t i = a0; i <= a1; ++i)
-    for (uint32_t j = b0; j <= b1; ++j) {
-      const float loop = 0.5f * (along[j] + along[j + 1] - along[i] - along[i + 1]);
-      if (loop > low && loop < high)
-        link += gauss(state.position(i), state.position(i + 1), state.position(j), state.position(j + 1));
+class Looker {
+ public:
+  explicit Looker(const State& state) : state_(state) {
+    const size_t n = state.nodes();
+    Vec3 low = state.position(0), high = low, ends = low + state.position(n - 1), cuts{};
+    size_t broken = 0;
+    for (size_t i = 0; i < n; ++i) {
+      const Vec3 p = state.position(i);
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+      if (i + 1 < n && state.broken[i]) cuts += p + state.position(i + 1), ++broken;
     }
-  const float turns = 2 * std::abs(link);
-  t.half_turns = static_cast<uint32_t>(std::max(0.0f, 2 * std::round(0.5f * (turns - 1)))) + 1;
-  const float ta = turning(state, a0, a1), tb = turning(state, b0, b1);
-  t.sliding = std::abs(ta - tb) / std::max(1e-3f, ta + tb);
-  const float off = std::abs(turns - static_cast<float>(t.half_turns));  // 0: centered, 1: halfway to the next
-  t.confidence = std::max(0.0f, 1 - off * off) * std::abs(sign) / std::max(1e-6f, all);
-  return t;
+    far_ = 10 * length(high - low);
+    if (broken > 0) below_ = normalized(cuts / static_cast<float>(2 * broken) - ends * 0.5f, {0, -1, 0}) * far_;
+  }
+
+  // The knot in nodes i..j: what most closures make of it.
+  Vote vote(size_t i, size_t j, bool quick) {
+    std::vector<KnotType> seen;
+    Vote best;
+    size_t most = 0, total = 0;
+    for (const Vec3& away : kAway) {
+      seen.push_back(type(i, j, away * far_));
+      ++total;
+      const size_t count = static_cast<size_t>(std::count(seen.begin(), seen.end(), seen.back()));
+      if (count > most) most = count, best.type = seen.back();
+      if (quick && total == 3 && most == 3) break;
+    }
+    best.share = static_cast<float>(most) / static_cast<float>(total);
+    return best;
+  }
+
+  float length_of(size_t i, size_t j) const {
+    float sum = 0;
+    for (size_t k = i; k < j; ++k) sum += state_.broken[k] ? 0.0f : state_.rest[k];
+    return sum;
+  }
+  float turning(size_t i, size_t j) const {
+    float sum = 0;
+    for (size_t k = std::max<size_t>(i, 1); k < j; ++k) {
+      if (state_.broken[k - 1] || state_.broken[k]) continue;
+      const Vec3 p = state_.position(k) - state_.position(k - 1), q = state_.position(k + 1) - state_.position(k);
+      sum += std::atan2(length(cross(p, q)), dot(p, q));
+    }
+    return sum;
+  }
+
+ private:
+  KnotType type(size_t i, size_t j, Vec3 away) {
+    curve_.clear();
+    for (size_t k = i; k <= j; ++k) {
+      curve_.push_back(state_.position(k));
+      if (k < j && state_.broken[k]) {  // two threads: joined below, where the tails do not go
+        curve_.push_back(state_.position(k) + below_);
+        curve_.push_back(state_.position(k + 1) + below_);
+      }
+    }
+    curve_.push_back(state_.position(j) + away);
+    curve_.push_back(state_.position(i) + away);
+    return knot_type(curve_);
+  }
+
+  const State& state_;
+  Vec3 below_;     // [m]
+  float far_ = 1;  // [m]
+  std::vector<Vec3> curve_;
+};
+
+bool before(const KnotFactor& a, const KnotFactor& b) { return a.wraps != b.wraps ? a.wraps > b.wraps : a.hand > b.hand; }
+
+// The first `count` throws of an order, as a type; of the last of them only `wraps` if that is above 0.
+std::vector<KnotFactor> inner(const std::vector<KnotFactor>& order, size_t count, int wraps = 0) {
+  std::vector<KnotFactor> f(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count));
+  if (wraps > 0) f.back().wraps = static_cast<uint8_t>(wraps);
+  std::sort(f.begin(), f.end(), before);
+  return f;
+}
+// Does a part of the thread about the bite show this, when the throws lie in this order?
+bool explains(const std::vector<KnotFactor>& order, const KnotType& type) {
+  if (!type.known) return false;
+  if (type.factors.empty()) return true;
+  for (size_t k = 1; k <= order.size(); ++k) {
+    if (type.factors == inner(order, k)) return true;
+    for (int wraps = 1; wraps < order[k - 1].wraps; ++wraps)
+      if (type.factors == inner(order, k, wraps)) return true;
+  }
+  return false;
 }
 
-KnotName find_name(const SeenKnot& k) {
-  if (k.throws == 0) return KnotName::none;
-  if (k.throws == 1) return KnotName::single_throw;
-  float sliding = 0;
+KnotName name_of_order(const std::vector<KnotFactor>& order) {
+  if (order.empty()) return KnotName::none;
+  if (order.size() == 1) return KnotName::single_throw;
   bool alternating = true, alike = true;
-  for (uint32_t i = 0; i < k.throws; ++i) {
-    sliding += k.item[i].sliding / static_cast<float>(k.throws);
-    if (i == 0) continue;
-    (k.item[i].hand == k.item[i - 1].hand ? alternating : alike) = false;
-  }
-  if (sliding > kSliding) return KnotName::sliding;
-  if (alternating) return k.item[0].half_turns >= 5 ? KnotName::surgeons : KnotName::square;
+  for (size_t i = 1; i < order.size(); ++i) (order[i].hand == order[i - 1].hand ? alternating : alike) = false;
+  if (alternating) return order[0].wraps >= 2 ? KnotName::surgeons : KnotName::square;
   return alike ? KnotName::granny : KnotName::mixed;
 }
 
 }  // namespace
 
 std::string_view name_of(KnotName name) {
-  constexpr std::string_view names[] = {"none", "single throw", "granny", "square", "surgeon's", "sliding", "mixed"};
+  constexpr std::string_view names[] = {"none", "single throw", "granny", "square", "surgeon's", "mixed", "other"};
   return names[static_cast<size_t>(name)];
 }
 
 SeenKnot observe(const Settings& settings, const State& state, float tight_loop) {
-  const float d = settings.material.diameter;
-  std::vector<float> along(state.nodes(), 0.0f);
-  for (size_t i = 0; i < state.segments(); ++i) along[i + 1] = along[i] + state.rest[i];
-  std::vector<Seen> seen;
-  for (size_t k = 0; k < state.key.size(); ++k) {
-    const uint32_t i = segment_of(state.key[k]), j = partner_of(state.key[k]);
-    const Crossing& c = state.crossing[k];
-    if (j >= kTool || c.touch == Touch::unknown || c.gap > kNear * d) continue;
-    const Vec3 p = normalized(state.position(i + 1) - state.position(i)),
-               q = normalized(state.position(j + 1) - state.position(j));
-    const float sign = dot(cross(p, q), c.normal);
-    if (std::abs(sign) < kCrossed) continue;
-    seen.push_back({along[j] + c.t * state.rest[j] - along[i] - c.s * state.rest[i], sign, i, j});
-  }
-  std::sort(seen.begin(), seen.end(),
-            [](const Seen& x, const Seen& y) { return x.loop != y.loop ? x.loop < y.loop : x.a < y.a; });
   SeenKnot knot;
-  float below = tight_loop;
-  for (size_t first = 0, k = 1; k <= seen.size() && knot.throws < kMaxThrows; ++k) {
-    if (k < seen.size() && seen[k].loop - seen[k - 1].loop < kApart * d) continue;
-    SeenThrow t = look_at(settings, state, seen, along, first, k);
-    // Each strand takes half of the loop's growth; a tight throw takes up about five diameters of each.
-    if (below > 0) t.gap = std::max(0.0f, 0.5f * (seen[first].loop - below) - (knot.throws > 0 ? 5 * d : 0.0f));
-    first = k;
-    if (t.half_turns < 3) continue;  // strands that only cross
-    below = seen[k - 1].loop;
-    knot.wraps += (t.half_turns - 1) / 2;
-    knot.air |= t.gap > kAir;
-    knot.item[knot.throws++] = t;
+  const size_t n = state.nodes();
+  Looker look(state);
+  const Vote whole = look.vote(0, n - 1, false);
+  knot.confidence = whole.share;
+  if (!whole.type.known || whole.type.factors.size() > kMaxThrows) {
+    knot.name = KnotName::other;
+    return knot;
   }
-  knot.name = find_name(knot);
-  knot.confidence = 1;
-  for (uint32_t i = 0; i < knot.throws; ++i) knot.confidence = std::min(knot.confidence, knot.item[i].confidence);
+  if (whole.type.factors.empty()) return knot;
+
+  // Where the knot begins on either side: without anything farther out it is still whole; and where it ends, toward the bite:
+  // without anything before that nothing is left of it.
+  auto last_true = [](size_t low, size_t high, auto&& holds) {  // holds(low), not holds(high)
+    while (high - low > 1) {
+      const size_t middle = (low + high) / 2;
+      (holds(middle) ? low : high) = middle;
+    }
+    return low;
+  };
+  const size_t first = last_true(0, n - 1, [&](size_t i) { return look.vote(i, n - 1, true).type == whole.type; });
+  const size_t last = n - 1 - last_true(0, n - 1, [&](size_t i) { return look.vote(0, n - 1 - i, true).type == whole.type; });
+  auto knotted = [](const Vote& v) { return !v.type.known || !v.type.factors.empty(); };
+  const size_t first_in = last_true(first, n - 1, [&](size_t i) { return knotted(look.vote(i, n - 1, true)); });
+  const size_t last_in =
+      n - 1 - last_true(n - 1 - last, n - 1, [&](size_t i) { return knotted(look.vote(0, n - 1 - i, true)); });
+
+  // Shortened from one end only, node by node, one throw after the other comes undone, from the outermost to the bite's.
+  struct Step {
+    size_t node;
+    Vote vote;
+  };
+  std::vector<Step> path[2];
+  for (size_t i = first; i <= first_in; ++i) path[0].push_back({i, look.vote(i, n - 1, true)});
+  for (size_t j = last; j >= last_in && j > 0; --j) path[1].push_back({j, look.vote(0, j, true)});
+
+  // The order of throws that explains most of what was seen on the way.
+  std::vector<KnotFactor> order = whole.type.factors, best = order;
+  float most = -1, most_named = -1, rival = -1;  // of any, of the best's name, of the best with another name
+  size_t tried = 0;
+  std::vector<std::pair<KnotName, float>> by_name;
+  do {
+    float score = 0;
+    for (const std::vector<Step>& side : path)
+      for (const Step& s : side)
+        if (explains(order, s.vote.type)) score += s.vote.share;
+    const KnotName name = name_of_order(order);
+    auto at = std::find_if(by_name.begin(), by_name.end(), [&](const auto& x) { return x.first == name; });
+    if (at == by_name.end()) by_name.emplace_back(name, score);
+    else at->second = std::max(at->second, score);
+    if (score > most) most = score, best = order;
+  } while (std::next_permutation(order.begin(), order.end(), before) && ++tried < kMaxOrders);
+  knot.name = name_of_order(best);
+  for (const auto& [name, score] : by_name)
+    (name == knot.name ? most_named : rival) = std::max(name == knot.name ? most_named : rival, score);
+  if (rival >= 0) knot.confidence *= 0.5f + 0.5f * std::min(1.0f, (most_named - rival) / 2);
+
+  // Each throw: the least thread about the bite that holds it and all below.
+  const float d = settings.material.diameter;
+  float below = tight_loop, sliding = 0;
+  size_t i_below = first_in, j_below = last_in;
+  for (size_t k = 0; k < best.size(); ++k) {
+    SeenThrow& t = knot.item[knot.throws++];
+    t.half_turns = 2u * best[k].wraps + 1;
+    t.hand = best[k].hand;
+    t.confidence = whole.share;
+    knot.wraps += best[k].wraps;
+    const std::vector<KnotFactor> here = inner(best, k + 1);
+    auto innermost = [&](const std::vector<Step>& side) {
+      const auto at = std::find_if(side.rbegin(), side.rend(),
+                                   [&](const Step& s) { return s.vote.type.known && s.vote.type.factors == here; });
+      return at == side.rend() ? nullptr : &*at;
+    };
+    const Step *a = innermost(path[0]), *b = innermost(path[1]);
+    if (!a || !b || a->node >= b->node) {
+      t.confidence *= 0.5f;
+      continue;
+    }
+    const size_t i = a->node, j = b->node;
+    t.loop = look.length_of(i, j);
+    const float own = kOwn * d * (0.5f + 0.5f * static_cast<float>(best[k].wraps));
+    if (below > 0) t.gap = std::max(0.0f, 0.5f * (t.loop - below) - own);
+    const float ta = look.turning(i, i_below), tb = look.turning(j_below, j);
+    t.sliding = std::abs(ta - tb) / std::max(1e-3f, ta + tb);
+    knot.air |= t.gap > kAir;
+    below = t.loop;
+    i_below = i, j_below = j;
+  }
+  for (uint32_t i = 0; i < knot.throws; ++i) sliding += knot.item[i].sliding / static_cast<float>(knot.throws);
+  knot.sliding = knot.throws > 1 && sliding > kSliding;
   return knot;
 }
 

@@ -23,6 +23,23 @@ uint64_t knot_determinant(std::span<const Vec3> closed);
 // Sum of the signs over a few views: +3 right-handed, -3 left-handed for an overhand knot drawn tight; near 0 for a square
 // knot.
 double mean_writhe(std::span<const Vec3> closed);
+
+// A throw of `wraps` turns as a knot: the torus knot T(2, 2 wraps + 1), a trefoil for 1.
+struct KnotFactor {
+  uint8_t wraps = 0;
+  int8_t hand = 0;  // +1 right-handed, -1 left-handed
+  friend bool operator==(const KnotFactor&, const KnotFactor&) = default;
+};
+// What a closed curve is composed of, whatever its shape. Reidemeister moves I and II, Jones polynomial of the rest (Jones
+// 1985, 10.1090/S0273-0979-1985-15304-2; Kauffman's bracket, 1987, 10.1016/0040-9383(87)90009-7), which is multiplicative under
+// composition and differs between mirror images, divided by those of torus knots.
+struct KnotType {
+  bool known = false;               // composed of throws alone; false: another knot, or more crossings than it can handle
+  std::vector<KnotFactor> factors;  // sorted: most wraps first, right before left; empty and known: no knot
+  friend bool operator==(const KnotType&, const KnotType&) = default;
+};
+KnotType knot_type(std::span<const Vec3> closed);
+
 // A thread whose ends are extended in the given directions and joined far below (-y).
 std::vector<Vec3> close_curve(std::span<const Vec3> thread, Vec3 first_away, Vec3 last_away);
 

@@ -70,6 +70,7 @@ void check_overhand(Lines& out, bool nightly);
 void check_holding(Lines& out, bool nightly);
 void check_shaking(Lines& out, bool nightly);
 void check_locking(Lines& out);
+void check_names(Lines& out, bool nightly);
 void check_ties(Lines& out, bool nightly);
 // src/physical.
 void check_eyelets(Lines& out, bool nightly);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "thread/observe.h"
 #include "validation/checks.h"
 #include "validation/knot_scenes.h"
 #include "validation/tool_ties.h"
@@ -276,6 +277,68 @@ void check_locking(Lines& out) {
     out.add(std::string("knot/") + e.kind.name + ", friction at which it holds 8 N (segments of 1.43 diameters)", e.friction,
             lock, 0.25, "", "on record: docs/thread.md");
   }
+
+  // Throws of a square knot that hold 5 N in each material of 3-0, laid, tightened at 2 N, free tails; 7: none up to six.
+  struct Held {
+    thread::Material material;
+    double throws;
+  };
+  for (const Held& e : {Held{thread::Material::silk, 2}, Held{thread::Material::polyglactin_910, 4},
+                        Held{thread::Material::polypropylene, 5}, Held{thread::Material::polydioxanone, 7}}) {
+    Settings settings;
+    settings.material = thread::properties(e.material, thread::Size::usp_3_0);
+    settings.breaks = false;
+    Throws throws = single_throw();
+    bool held = false;
+    while (!held && throws.size() < 7) {
+      throws.push_back({3, -throws.back().hand});
+      held = throws.size() < 7 && hold_knot(throws, settings, 0, Drawing::flat, 5).held;
+    }
+    out.add("knot/throws of " + std::string(settings.material.name) + " that hold 5 N (7: more than six)", e.throws,
+            static_cast<double>(throws.size()), 0.25, "", "on record: docs/thread.md");
+  }
+}
+
+// Laid knots of all kinds, right and left, wound, snug and finished: named by `observe`.
+void check_names(Lines& out, bool nightly) {
+  struct Case {
+    Throws throws;
+    thread::KnotName name;
+  };
+  using thread::KnotName;
+  const Case cases[] = {{single_throw(), KnotName::single_throw},
+                        {{{5, 1}}, KnotName::single_throw},
+                        {granny(), KnotName::granny},
+                        {square(), KnotName::square},
+                        {surgeons(), KnotName::surgeons},
+                        {{{3, 1}, {5, -1}}, KnotName::square},
+                        {three_throws(), KnotName::square},
+                        {{{3, 1}, {3, 1}, {3, 1}}, KnotName::granny},
+                        {{{3, 1}, {3, 1}, {3, -1}}, KnotName::mixed},
+                        {{{3, 1}, {3, -1}, {3, -1}}, KnotName::mixed},
+                        {surgeons_211(), KnotName::surgeons},
+                        {{{3, 1}, {3, -1}, {3, 1}, {3, -1}}, KnotName::square}};
+  const Settings settings = knot_settings(0.3f);
+  int named = 0, all = 0;
+  for (const Case& c : cases)
+    for (const int mirror : {1, -1}) {
+      if (!nightly && (mirror < 0 || c.throws.size() < 3)) continue;
+      Throws throws = c.throws;
+      for (Throw& t : throws) t.hand *= mirror;
+      Tightened t(lay_knot(throws, settings.material.diameter, 1.43f * settings.material.diameter));
+      for (const float tails : {0.0f, 0.3f, 2.0f}) {
+        // Drawn straight, a single throw slips off its ends and is gone.
+        if (throws.size() == 1 && tails > 0) continue;
+        if (tails > 0) tighten(settings, t, tails, Drawing::flat, 0.2f, false);
+        const thread::SeenKnot seen = thread::observe(settings, t.knot.state);
+        bool right = seen.name == c.name && seen.throws == throws.size();
+        for (uint32_t k = 0; right && k < seen.throws; ++k)
+          right = static_cast<int>(seen.item[k].half_turns) == throws[k].half_turns && seen.item[k].hand == throws[k].hand;
+        named += right, ++all;
+      }
+    }
+  out.add("knot/named right of " + number(all) + " laid knots, every throw with its wraps and hand", all, named, 0, "",
+          "as laid");
 }
 
 void check_ties(Lines& out, bool nightly) {
@@ -283,17 +346,19 @@ void check_ties(Lines& out, bool nightly) {
     const char* name;
     Tie tie;
     uint64_t determinant;
+    thread::KnotName seen;
   };
-  const Case cases[] = {{"single throw", {{1}}, 3},
-                        {"double throw", {{2}}, 5},
-                        {"square knot", {{1}, {1}}, 9},
-                        {"granny", {{1}, {1, false}}, 9},
-                        {"surgeon's 2-1", {{2}, {1}}, 15},
-                        {"three throws", {{1}, {1}, {1}}, 27},
-                        {"surgeon's 2-1-1", {{2}, {1}, {1}}, 45}};
+  const Case cases[] = {{"single throw", {{1}}, 3, thread::KnotName::single_throw},
+                        {"double throw", {{2}}, 5, thread::KnotName::single_throw},
+                        {"square knot", {{1}, {1}}, 9, thread::KnotName::square},
+                        {"granny", {{1}, {1, false}}, 9, thread::KnotName::granny},
+                        {"surgeon's 2-1", {{2}, {1}}, 15, thread::KnotName::surgeons},
+                        {"three throws", {{1}, {1}, {1}}, 27, thread::KnotName::square},
+                        {"surgeon's 2-1-1", {{2}, {1}, {1}}, 45, thread::KnotName::surgeons}};
   const std::string source = "determinant of the knot that the hands' paths make; Burde et al. 2014, 10.1515/9783110270785";
   const Settings settings = knot_settings(0.25f);
   double nearest = 1, missed = 0;
+  int named = 0, sliding = 0, ties = 0;
   // Every seed counts, none is repeated.
   auto row = [&](const Case& c, int speed, int first, int count) {
     int right = 0;
@@ -305,6 +370,12 @@ void check_ties(Lines& out, bool nightly) {
       nearest = std::min(nearest, double{knot.nearest});
       missed += knot.missed;
       right += knot.determinant == c.determinant;
+      const thread::SeenKnot seen = thread::observe(settings, knot.state);
+      uint32_t wraps = 0;
+      for (const TiedThrow& tied : c.tie) wraps += static_cast<uint32_t>(tied.wraps);
+      named += seen.name == c.seen && seen.throws == c.tie.size() && seen.wraps == wraps;
+      sliding += seen.sliding;
+      ++ties;
     }
     out.add("knot/right of " + number(count) + " ties with tools at " + number(0.1 * speed) + " m/s: " + c.name, count, right,
             0, "", source);
@@ -317,6 +388,9 @@ void check_ties(Lines& out, bool nightly) {
     for (const Case& c : cases)
       for (int speed = 1; speed <= 5; ++speed) row(c, speed, kTies * speed, kTies);
   }
+  out.add("knot/named right of " + number(ties) + " ties with tools, of which " + number(sliding) +
+              " seen to have capsized into half hitches",
+          ties, named, 0, "", "throws and wraps that the hands made");
   out.add("knot/jaws closed beside the tail, in all ties", 0, missed, 0, "",
           "the needle holder takes what lies between its jaws");
   out.add("knot/smallest distance of strands in all ties, missing from a diameter", 0, 1 - nearest, 0.2, "diameters",

@@ -18,16 +18,19 @@ using thread::ToolCapsule;
 
 // x along the pull, y up from the tissue, z toward the viewer; the bite is at the origin. The needle holder comes from the side
 // of the long strand, the forceps from the side of the tail: they face each other, so that the forceps never sweeps through the
-// strand between wound and holder. The sides alternate from throw to throw.
+// strand between wound and holder. The tissue is a rod along z that the thread lies around, as on a bench for knots. The sides
+// alternate from throw to throw.
 constexpr float kTick = 1e-3f;       // [s]
-constexpr float kStrandAt = 14e-3f;  // [m] of the shaft, from the tip: above the wound
-constexpr float kWindAt = 9e-3f;     // [m] of the shaft: plane of the winding hand, nearer the tip than the strand
+constexpr float kStrandAt = 20e-3f;  // [m] of the shaft, from the tip: above the wound
+constexpr float kWindAt = 10e-3f;    // [m] of the shaft: plane of the winding hand, nearer the tip than the strand
 constexpr float kHeld = 1.6e-3f;     // [m] a strand leaves the forceps this far in front of its tip
 constexpr float kGrip = 1.5e-3f;     // [m] and lies this far behind the tips of the needle holder
 constexpr float kOpen = 0.10f;       // [rad] each jaw, to take the tail
+constexpr float kClosed = -0.015f;   // [rad] on a thread, which lies between the two rods of each jaw
 constexpr float kNearest = 11e-3f;   // [m] of the winding hand from the shaft
 constexpr float kWinding = 0.10f;    // [N] tension of the strand while it is wound: felt, and held by the hand
 constexpr float kDrawing = 0.04f;    // [N] while the turns slide off the jaws
+constexpr float kTissue = 2e-3f;     // [m] radius of what the thread lies around, and its depth
 constexpr float kLying = 0.02f;      // [N] that keeps the free tail where it was laid (wet tissue)
 
 Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
@@ -37,9 +40,9 @@ Vec3 around(float side, float angle) {
   return Vec3{0, 0, 1} * std::cos(angle) + up * std::sin(angle);
 }
 // Length of strand between wound and hand that a throw needs: to the tail, round the jaws, to the hand.
-float strand_for(int wraps) { return 43e-3f + 14e-3f * static_cast<float>(wraps); }
+float strand_for(int wraps) { return 42e-3f + 15e-3f * static_cast<float>(wraps); }
 // The shaft's height above the wound while the strand is wound: the hand must pass between it and the tail.
-float height_for(int wraps) { return 0.5f * strand_for(wraps) + 5e-3f; }
+float height_for(int wraps) { return 0.5f * strand_for(wraps) + 9e-3f; }
 // Tip of the needle holder meanwhile: beyond the wound.
 Vec3 work_place(float side, int wraps) { return around(side, 0.5f * kPi) * height_for(wraps) - shaft_from(side) * kStrandAt; }
 
@@ -59,7 +62,7 @@ void place_holder(Vec3 tip, Vec3 shaft, float opening, std::span<ToolCapsule> pa
   auto add = [&](Vec3 a, Vec3 b, float radius) { part[k].to_a = a, part[k].to_b = b, part[k++].radius = radius * mm; };
   for (const float x : {1.0f, -1.0f})
     for (const float y : {1.0f, -1.0f})
-      add(at(0.8f * x, 0.1f * y, -1.7f, x * opening), at(3.5f * x, 1.7f * y, 21, x * opening), 0.8f);
+      add(at(1.05f * x, 0.4f * y, -1.9f, x * opening), at(3.7f * x, 1.9f * y, 21, x * opening), 0.55f);
   add(at(0, 0, 7, 0), at(0, 0, 22, 0), 1);
   for (const float x : {1.4f, -1.4f}) add(at(x, 0, 22, 0), at(x, 0, 34, 0), 3);
   for (const float x : {1.0f, -1.0f}) add(at(1.9f * x, 0, 30, 0), at(5.2f * x, 0, 100, 0), 2.1f);
@@ -71,7 +74,8 @@ class Tying {
       : settings_(settings), how_(how), watcher_(watcher), random_(how.seed) {
     // Tail from its end to the bite, the bite, the long strand.
     const float l = how.segment;
-    const Vec3 left{-1.5e-3f, 0, 0}, right{1.5e-3f, 0, 0};
+    const float bend = kTissue + 0.5f * settings.material.diameter + 0.05e-3f;
+    const Vec3 left{-bend, -kTissue, 0}, right{bend, -kTissue, 0};
     tail_ = how.tail;
     const Vec3 tail_direction = normalized(laid_tail(1) - left), long_direction = normalized(Vec3{0.35f, 0.3f, 1});
     std::vector<Vec3> fine;
@@ -79,22 +83,23 @@ class Tying {
       for (int i = 0; i < 1000; ++i) fine.push_back(lerp(from, to, static_cast<float>(i) / 1000));
     };
     line(left + tail_direction * how.tail, left);
-    for (int i = 0; i < 200; ++i) fine.push_back({-1.5e-3f * std::cos(kPi * i / 200), -1.5e-3f * std::sin(kPi * i / 200), 0});
+    for (int i = 0; i < 200; ++i)
+      fine.push_back({-bend * std::cos(kPi * i / 200), -kTissue - bend * std::sin(kPi * i / 200), 0});
     int wraps = 1;
     for (const TiedThrow& t : tie) wraps = std::max(wraps, t.wraps);
-    line(right, right + long_direction * (strand_for(wraps) + 6e-3f * static_cast<float>(tie.size())));
+    line(right, right + long_direction * (strand_for(wraps) + 25e-3f + 6e-3f * static_cast<float>(tie.size())));
     const std::vector<Vec3> path = resample(fine, l);
     knot_.state = thread::make_state(path);
     knot_.bite_a = static_cast<uint32_t>(std::lround(how.tail / l));
-    knot_.bite_b = knot_.bite_a + static_cast<uint32_t>(std::lround(1.5e-3f * kPi / l));
+    knot_.bite_b = knot_.bite_a + static_cast<uint32_t>(std::lround(bend * kPi / l));
     stepper_ = std::make_unique<thread::Stepper>(path.size());
-    const uint32_t nodes[] = {knot_.bite_a, knot_.bite_b, 3,
-                              knot_.bite_b + static_cast<uint32_t>(std::lround(strand_for(wraps) / l)),
+    const uint32_t middle = (knot_.bite_a + knot_.bite_b) / 2;
+    const uint32_t nodes[] = {middle, middle + 1, 3, knot_.bite_b + static_cast<uint32_t>(std::lround(strand_for(wraps) / l)),
                               static_cast<uint32_t>(path.size()) - 1};
     for (size_t k = 0; k < 5; ++k) {
       hold_[k].node = std::min(nodes[k], static_cast<uint32_t>(path.size()) - 1);
       hold_[k].from = hold_[k].to = knot_.state.position(hold_[k].node);
-      hold_[k].stiffness = k < 2 ? 500.0f : 2000.0f;
+      hold_[k].stiffness = 2000;
       hold_[k].limit = k < 2 ? 0.0f : 2 * how.pull;
     }
     hold_[4].stiffness = 20;
@@ -104,7 +109,10 @@ class Tying {
     tip_ = work_place(1, 1) + shaft_ * 60e-3f;
     hand_ = hold_[3].to;
     forceps_angle_ = kPi - 0.15f;
-    for (ToolCapsule& t : tool_) t.radius = 1.0e-3f;
+    tool_[kHolderParts].radius = 1.0e-3f;
+    ToolCapsule& tissue = tool_[kHolderParts + 1];
+    tissue.to_a = {0, -kTissue, -0.1f}, tissue.to_b = {0, -kTissue, 0.1f};
+    tissue.radius = kTissue, tissue.friction = 0.3f;
     place_tools();
     for (ToolCapsule& t : tool_) t.a = t.to_a, t.b = t.to_b;
   }
@@ -132,8 +140,9 @@ class Tying {
     wind("wind", start + turns);
     fetch();
     draw(work, sense);
-    move("cross", {side * 30e-3f, 12e-3f, 0}, Vec3{-side * 24e-3f, 16e-3f, 0} + tremor());
-    move("pull", {side * 40e-3f, 3e-3f, 0}, {-side * 40e-3f, 3e-3f, 0});
+    // Low and level, each end to its own side, before either is pulled.
+    move("cross", {side * 0.6f * tail_, 8e-3f, 0}, Vec3{-side * 24e-3f, 12e-3f, 0} + tremor());
+    move("cross", {side * 0.75f * tail_, 2e-3f, 0}, {-side * 36e-3f, 2e-3f, 0});
     pull(side);
     strand_ = distance(knot_.state.position(hold_[3].node), knot_.state.position(knot_.bite_b));  // taut
     tail_ = distance(knot_.state.position(0), knot_.state.position(knot_.bite_a));
@@ -200,6 +209,7 @@ class Tying {
     stepper_->step(settings_, knot_.state, around);
     ++ticks_;
     felt_ += 0.2f * (length(hold_[3].force) - felt_);
+    tail_felt_ += 0.2f * ((gripped_ ? length(hold_[2].force) : 0.0f) - tail_felt_);
     for (const Hold* h : {&hold_[3], gripped_ ? &hold_[2] : &hold_[3]})
       knot_.fastest = std::max(knot_.fastest, distance(h->from, h->to) / kTick);
     for (size_t k = 0; k < knot_.state.key.size(); ++k)
@@ -241,12 +251,16 @@ class Tying {
     radius_ += kTick * std::clamp(0.5f * (tension - felt_), -how_.speed, how_.speed);
     radius_ = std::max(radius_, kNearest);
     // Too short a strand slips through the fingers.
-    if (felt_ > 4 * tension && hold_[3].node + 1 < knot_.state.nodes()) {
+    if (felt_ > 4 * kWinding && hold_[3].node + 1 < knot_.state.nodes()) {
       ++hold_[3].node;
-      felt_ = tension;
+      felt_ = kWinding;
     }
   }
-  void place_hand() { hand_ = tip_ + shaft_ * wind_at_ + around(side_, angle_) * radius_; }
+  // Under the shaft the hand passes on the tip's side of the strand that comes up from the wound.
+  void place_hand() {
+    const float at = wind_at_ - 3e-3f * std::max(0.0f, -std::sin(angle_));
+    hand_ = tip_ + shaft_ * at + around(side_, angle_) * radius_;
+  }
 
   void wind(const std::string& phase, float to) {
     const float from = angle_, direction = to > from ? 1.0f : -1.0f;
@@ -278,24 +292,31 @@ class Tying {
       place_hand();
       tick("fetch");
     }
-    open("close", 0.006f);
+    // They keep to the tail while they close: it swings.
+    for (int i = 1; i <= 120; ++i) {
+      opening_ = kOpen + (kClosed - kOpen) * static_cast<float>(i) / 120;
+      const Vec3 way = knot_.state.position(hold_[2].node) - shaft_ * kGrip - tip_;
+      tip_ += way * std::min(0.02f, 0.5f * how_.speed * kTick / std::max(1e-6f, length(way)));
+      place_hand();
+      tick("close");
+    }
     gripped_ = distance(knot_.state.position(hold_[2].node), tip_ + shaft_ * kGrip) < 2e-3f;
     knot_.missed += !gripped_;
     hold_[2].limit = 2 * how_.pull, hold_[2].stiffness = 2000;
     hold_[2].to = tip_ + shaft_ * kGrip;
   }
 
-  // Both hands go apart until each feels the wanted tension, and keep it for a moment.
+  // Both hands go apart, neither pulling harder than the other, until each feels the wanted tension, and keep it for a moment.
+  // A strand that is tight while the other is slack becomes a post, and the throw two half hitches round it.
   void pull(float side) {
-    float tail = 0;
-    for (int i = 0, steady = 0; i < 4000 && steady < 150; ++i) {
-      tail += 0.2f * (length(hold_[2].force) - tail);
-      const auto pace = [&](float felt) {
-        return kTick * std::clamp(0.1f * (how_.pull - felt), -0.05f, std::min(0.1f, how_.speed));
+    for (int i = 0, steady = 0; i < 6000 && steady < 150; ++i) {
+      const auto pace = [&](float felt, float other) {
+        const float want = std::min(how_.pull, other + 0.1f);
+        return kTick * std::clamp(0.2f * (want - felt), -0.05f, std::min(0.1f, how_.speed));
       };
-      tip_.x += side * pace(tail), hand_.x -= side * pace(felt_);
+      tip_.x += side * pace(tail_felt_, felt_), hand_.x -= side * pace(felt_, tail_felt_);
       tick("pull");
-      steady = std::min(tail, felt_) > 0.9f * how_.pull ? steady + 1 : 0;
+      steady = std::min(tail_felt_, felt_) > 0.9f * how_.pull ? steady + 1 : 0;
     }
   }
 
@@ -305,9 +326,15 @@ class Tying {
     const Vec3 from = tip_, to = work + shaft_ * 34e-3f + tremor();
     const Vec3 middle = tip_ + shaft_ * wind_at_, past = middle - shaft_ * 14e-3f + Vec3{0, 8e-3f, 0};
     const float angle_from = angle_, turn = sense * 0.5f * kPi;
-    const int ticks = static_cast<int>(std::ceil(1000 * 1.5f * distance(from, to) / how_.speed));
-    for (int i = 1; i <= ticks; ++i) {
-      const float s = static_cast<float>(i) / static_cast<float>(ticks), e = s * s * (3 - 2 * s);
+    const float far = distance(from, to);
+    float done = 0, speed = 0;
+    for (int guard = 0; done < far && guard < 20000; ++guard) {
+      // No farther than the tail lets it: a tight tail would open the throws below.
+      if (tail_felt_ > 2 * kWinding && done > 0.5f * far) break;
+      const float want = std::min(how_.speed, 0.02f + 10 * (far - done)) * std::clamp(1.5f - tail_felt_ / kDrawing, 0.1f, 1.0f);
+      speed += std::clamp(want - speed, -20 * kTick, 5 * kTick);
+      done += speed * kTick;
+      const float e = std::min(1.0f, done / far);
       tip_ = lerp(from, to, e);
       angle_ = angle_from + turn * e;
       feel(kDrawing);
@@ -322,13 +349,13 @@ class Tying {
   Random random_;
   TiedKnot knot_;
   std::unique_ptr<thread::Stepper> stepper_;
-  Hold hold_[5];                        // bite, bite, tail, long strand, its end
-  ToolCapsule tool_[kHolderParts + 1];  // needle holder, forceps
+  Hold hold_[5];                        // two nodes of the bite, tail, long strand, its end
+  ToolCapsule tool_[kHolderParts + 2];  // needle holder, forceps, tissue
   Vec3 tip_, shaft_, hand_, tail_at_;   // of the needle holder; where the forceps holds the strand; where the tail was laid
   float opening_ = 0;                   // [rad] of each jaw
   float forceps_angle_ = 0;             // [rad] in the plane of pull and height
   float side_ = 1, angle_ = 0, radius_ = 0, wind_at_ = kWindAt;  // of the winding hand about the shaft
-  float felt_ = 0;                                               // [N] tension of the strand, smoothed over 5 ms
+  float felt_ = 0, tail_felt_ = 0;                               // [N] tension of strand and tail, smoothed over 5 ms
   float tension_ = 0, strand_ = 0, tail_ = 0;                    // the free lengths of both strands [m]
   bool gripped_ = false;
   long ticks_ = 0;

@@ -119,6 +119,7 @@ std::vector<ValidationLine> run_validation(const std::function<void(const Valida
   validation::check_holding(lines, nightly);
   validation::check_shaking(lines, nightly);
   if (nightly) validation::check_locking(lines);
+  validation::check_names(lines, nightly);
   validation::check_ties(lines, nightly);
   validation::check_eyelets(lines, nightly);
   return lines.line;

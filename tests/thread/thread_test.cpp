@@ -222,6 +222,42 @@ TEST(Topology, writhe_tells_granny_from_square) {
   EXPECT_GT(std::abs(mean_writhe(closed(validation::granny()))), 4);
 }
 
+KnotType composed(std::vector<KnotFactor> factors) { return {true, std::move(factors)}; }
+
+TEST(Topology, knot_type_finds_every_throw_and_its_hand) {
+  EXPECT_EQ(knot_type(closed({{1, 1}})), composed({}));
+  EXPECT_EQ(knot_type(closed({{3, 1}})), composed({{1, 1}}));
+  EXPECT_EQ(knot_type(closed({{3, -1}})), composed({{1, -1}}));
+  EXPECT_EQ(knot_type(closed({{7, -1}})), composed({{3, -1}}));
+  EXPECT_EQ(knot_type(closed(validation::square())), composed({{1, 1}, {1, -1}}));
+  EXPECT_EQ(knot_type(closed(validation::granny())), composed({{1, 1}, {1, 1}}));
+  EXPECT_EQ(knot_type(closed({{3, -1}, {5, 1}})), composed({{2, 1}, {1, -1}}));
+  EXPECT_EQ(knot_type(closed({{5, 1}, {5, -1}, {5, 1}, {3, 1}})), composed({{2, 1}, {2, 1}, {2, -1}, {1, 1}}));
+}
+
+// The figure-eight knot has the determinant of a double throw and is none.
+TEST(Topology, knot_type_does_not_know_other_knots) {
+  std::vector<Vec3> eight;
+  for (int i = 0; i < 200; ++i) {
+    const float t = 2 * kPi * static_cast<float>(i) / 200;
+    eight.push_back({(2 + std::cos(2 * t)) * std::cos(3 * t), (2 + std::cos(2 * t)) * std::sin(3 * t), std::sin(4 * t)});
+  }
+  EXPECT_EQ(knot_determinant(eight), 5u);
+  EXPECT_FALSE(knot_type(eight).known);
+}
+
+// A space curve bent by a smooth one-to-one map stays the knot that it is; its picture gets many more crossings.
+TEST(Topology, knot_type_does_not_depend_on_shape) {
+  std::vector<Vec3> coarse = closed(validation::surgeons_211()), curve;
+  coarse.resize(coarse.size() - 4);  // without the far ends
+  for (size_t i = 0; i + 1 < coarse.size(); ++i)
+    for (int k = 0, n = 1 + static_cast<int>(distance(coarse[i], coarse[i + 1]) / 0.2e-3f); k < n; ++k)
+      curve.push_back(lerp(coarse[i], coarse[i + 1], static_cast<float>(k) / static_cast<float>(n)) * 1000.0f);  // [mm]
+  for (Vec3& p : curve) p.y += 3 * std::sin(0.8f * p.x), p.z += 2 * std::sin(0.9f * p.y), p.x += 2 * std::sin(0.7f * p.z);
+  EXPECT_GT(project(curve, {0.3f, 0.5f, 0.8f}).size(), 20u);
+  EXPECT_EQ(knot_type(close_curve(curve, {-300, 0, 50}, {300, 0, 50})), composed({{2, 1}, {1, 1}, {1, -1}}));
+}
+
 struct Named {
   validation::Throws throws;
   KnotName name;
@@ -229,16 +265,15 @@ struct Named {
 };
 
 TEST(Observe, names_what_was_wound_and_what_is_tight) {
-  const Named all[] = {{validation::granny(), KnotName::granny, 2, 2},
-                       {validation::square(), KnotName::square, 2, 2},
-                       {{{3, -1}, {3, 1}}, KnotName::square, 2, 2},
-                       {{{3, -1}, {3, -1}}, KnotName::granny, 2, 2},
-                       {validation::surgeons(), KnotName::surgeons, 2, 3}};
+  const Named all[] = {
+      {validation::granny(), KnotName::granny, 2, 2},        {validation::square(), KnotName::square, 2, 2},
+      {{{3, -1}, {3, 1}}, KnotName::square, 2, 2},           {{{3, -1}, {3, -1}}, KnotName::granny, 2, 2},
+      {validation::surgeons(), KnotName::surgeons, 2, 3},    {{{3, 1}, {5, -1}}, KnotName::square, 2, 3},
+      {validation::three_throws(), KnotName::square, 3, 3},  {{{3, 1}, {3, 1}, {3, -1}}, KnotName::mixed, 3, 3},
+      {validation::surgeons_211(), KnotName::surgeons, 3, 4}};
   const Settings settings = validation::knot_settings(0.3f);
   for (const Named& n : all) {
     validation::Tightened t(validation::lay_knot(n.throws, settings.material.diameter, 0.5e-3f));
-    Surroundings nothing;
-    t.stepper.step(settings, t.knot.state, nothing);
     for (const bool tight : {false, true}) {
       if (tight) validation::tighten(settings, t, 2);
       const SeenKnot seen = observe(settings, t.knot.state);
@@ -246,8 +281,22 @@ TEST(Observe, names_what_was_wound_and_what_is_tight) {
       EXPECT_EQ(seen.throws, n.count);
       EXPECT_EQ(seen.wraps, n.wraps);
       EXPECT_GT(seen.confidence, 0.5f);
-      EXPECT_EQ(seen.item[0].hand, n.throws[0].hand);
+      EXPECT_FALSE(seen.sliding);
+      for (uint32_t k = 0; k < n.count; ++k) {
+        EXPECT_EQ(seen.item[k].half_turns, static_cast<uint32_t>(n.throws[k].half_turns)) << k;
+        EXPECT_EQ(seen.item[k].hand, n.throws[k].hand) << k;
+      }
     }
+  }
+}
+
+// One strand kept tight, the other wound on it: half hitches, whatever the hands of the throws.
+TEST(Observe, tells_half_hitches_from_flat_throws) {
+  const Settings settings = validation::knot_settings(0.3f);
+  for (const validation::Throws& throws : {validation::three_throws(), validation::surgeons_211()}) {
+    validation::Tightened t(validation::lay_knot(throws, settings.material.diameter, 0.5e-3f));
+    validation::tighten(settings, t, 2, validation::Drawing::under_tension);
+    EXPECT_TRUE(observe(settings, t.knot.state).sliding);
   }
 }
 
