@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sample: a haptic device of your own. Fill an ArmPort with the functions of your backend; its caller makes the force safe.
 // Here the backend is a thread whose stylus descends slowly onto the bowel's wall. A real one calls `step` from its own
-// callback, a thousand times per second, with the state of its encoders, and sends the result to the motors.
+// callback, 1000 times per second, with its encoders' state. It sends the result to the motors.
 #include <atomic>
 #include <chrono>
 #include <cstdio>

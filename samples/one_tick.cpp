@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The numbers of docs/one_tick.md: runs the purse-string like `catgut run purse_string --seed 1`, up to the tick in which
-// the tip of the first bite enters, and prints input and output of that tick. tools/update_docs.sh copies the
+// The numbers of docs/one_tick.md. Runs the purse-string like `catgut run purse_string --seed 1` until the tip of the first
+// bite enters. Prints input and output of that tick. tools/update_docs.sh copies the
 // printed blocks into the page. Reads the State itself (sim/state.h), which other programs do not need.
 #include <cmath>
 #include <cstdio>

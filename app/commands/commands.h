@@ -88,7 +88,7 @@ void end_progress_line();
 
 // Creates the folder of an output file and checks that the file can be written, before the work starts. "" and "-" pass.
 void prepare_output(const std::string& path);
-// The same, but never creates a folder: the path of an interactive session's recording may have a typing
+// The same, but never creates a folder. The path of an interactive session's recording may have a typing
 // error, and a new folder would hide the file from the user.
 void check_output(const std::string& path);
 // path "-": standard output.

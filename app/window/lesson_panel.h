@@ -40,8 +40,8 @@ class LessonRun {
 // Below the field: the step, instruction, progress. hints: with details.
 void lesson_panel(const LessonRun& run, bool hints);
 
-// The planned bite and the distance of the needle from it, over the image: the circle that its tip should follow, and,
-// while it is in tissue, bite distance and depth as text and color (blue: within tolerance, orange: outside). size: of the
+// The planned bite and the distance of the needle from it, over the image: the circle that its tip should follow.
+// While it is in tissue, bite distance and depth as text and color (blue: within tolerance, orange: outside). size: of the
 // window.
 void guide_overlay(const BiteGuide& guide, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen,
                    float width, float height);

@@ -91,8 +91,8 @@ int sum(const std::vector<int>& count) {
   return total;
 }
 
-// Rings whose vertices sum to exactly n, with triangles as near equilateral as rings allow. The remainder after equal rings
-// goes one each to the rings of the far end, where the bowel is fixed and an odd ring matters least.
+// Rings whose vertices sum to exactly n, with triangles as near equilateral as rings allow. The rings of the far end get one
+// vertex each of the remainder: the bowel is fixed there, and an odd ring matters least.
 std::vector<Ring> lay_rings(const BowelShape& shape, const BowelSurface& surface, int n) {
   std::vector<int> best;
   double best_fault = 1e30;

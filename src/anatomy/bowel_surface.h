@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// anatomy/bowel_surface: the smooth outer surface of the generated bowel as a function of two numbers: s, the distance along
-// the profile from the near end [m], and the angle round the axis [rad]. Particles and visible mesh are both sampled from it.
+// anatomy/bowel_surface: the smooth outer surface of the generated bowel as a function of s and angle. s: distance along
+// the profile from the near end [m]. angle: about the axis [rad]. Particles and visible mesh are both sampled from it.
 #pragma once
 #include <vector>
 

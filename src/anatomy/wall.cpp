@@ -145,7 +145,7 @@ std::vector<Vec3> wall_directions(const TriangleMesh& sheet, float thickness) {
 
 namespace {
 
-// Where a wall of full thickness would fold over itself, as inside a sharp bend, it is thinner, down to a tenth, with a
+// A wall of full thickness would fold over itself inside a sharp bend. It is thinner there, down to a tenth, with a
 // transition over the neighbors. Returns the number of inverted tetrahedra, also if half of the wall would be thinner.
 size_t thin_where_folded(BodyRest& body, const TriangleMesh& sheet, std::span<const Vec3> normal, float thickness) {
   constexpr float kThinnest = 0.1f, kThinner = 0.75f, kGrowth = 1.4f;

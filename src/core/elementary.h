@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // core/elementary: sin, cos, atan2, asin, acos, exp, log, pow with the same bits everywhere. The C library's differ between
-// versions, architectures and processors (glibc selects code with fused operations where available), and one bit is enough to
+// versions, architectures and processors (glibc selects code with fused operations where available). One bit is enough to
 // make two runs diverge. These use only operations that IEEE 754 defines exactly, in double precision. All code that affects
 // a State or the hands of the scripted surgeon uses them; tests/layers refuses std::sin and the like there.
 //

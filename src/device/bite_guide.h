@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// device: the planned position of the next bite, as a circle for the needle: for the assist that moves a held needle there, for
-// the displayed ghost needle, and for the distance shown to the user. Plain data and arithmetic.
+// device: the planned position of the next bite, as a circle for the needle. Used by the assist that moves a held needle there,
+// by the displayed ghost needle, and for the distance shown to the user. Plain data and arithmetic.
 #pragma once
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// device: two-handed actions for users who can move only one hand at a time: winding the needle's strand round the other
-// tool, and pulling both ends apart. One gesture gives the amount; the paths of the hands follow from the Snapshot. Pure, like
+// device: two-handed actions for users who can move one hand at a time. They wind the needle's strand round the other
+// tool, and pull both ends apart. One gesture gives the amount; the paths of the hands follow from the Snapshot. Pure, like
 // device/steer, which calls it. An instrument tie as described in docs/rooms/surgeon.md.
 #pragma once
 #include <array>

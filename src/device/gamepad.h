@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// device: both hands by one gamepad. Each stick moves its hand in the view plane, its trigger closes the jaw in proportion,
-// and with the shoulder button above it the stick drives the needle (sideways) and moves along the view axis (up and
+// device: both hands by one gamepad. Each stick moves its hand in the view plane; its trigger closes the jaw in proportion.
+// With the shoulder button above it, the stick drives the needle (sideways) and moves along the view axis (up and
 // down). Pure, like device/mouse.
 #pragma once
 #include <array>

@@ -5,8 +5,8 @@
 // Motions are in the view frame: right, up and along the view axis. Driving is not: it turns the held needle about its own
 // circle, which passes through tissue without tearing it.
 //
-// Assists compensate for the flat screen and for one hand at a time (Steering::assist switches them off): an open jaw snaps to
-// the best grasp of needle or tail, a held needle to the start of the next bite, and a two-handed action is one gesture
+// Assists compensate for the flat screen and for one hand at a time (Steering::assist switches them off). An open jaw snaps to
+// the best grasp of needle or tail, a held needle to the start of the next bite. A two-handed action is one gesture
 // (device/both_hands).
 #pragma once
 #include <array>

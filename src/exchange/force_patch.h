@@ -31,7 +31,7 @@ struct ForcePatch {
   float gap = 0;  // [m]
 
   // Friction, computed in the servo because a slow loop cannot: at most
-  // drag + coefficient * (force along normal), along `along`, or in the contact plane if that is zero.
+  // drag + coefficient * (force along normal), along `along`; in the contact plane if that is zero.
   float coefficient = 0;
   float drag = 0;             // [N]
   float presliding = 0.001f;  // [m] presliding length

@@ -72,8 +72,8 @@ void begin_winding(Winding& w, const PictureModel& picture, const Snapshot& seen
                    bool past_knot = false);
 // [m] Position of the tool.
 Vec3 winding_axis(const Winding& w, const AcrossTool& across);
-// [m] The needle's swage when the strand leaves the tool after `wound` [rad] about it. room: [m] of strand that fits below;
-// if less than w.free, the strand is slack there and is tightened afterward.
+// [m] The needle's swage when the strand leaves the tool after `wound` [rad] about it. room: [m] of strand that fits below.
+// If less than w.free, the strand is slack there and is tightened afterward.
 Vec3 winding_swage(const Winding& w, const AcrossTool& across, float wound, float& room);
 // Updates w.free while the strand is wound; behind: [m] distance of the needle from its target winding_swage.
 void feel_winding(Winding& w, const Snapshot& seen, const AcrossTool& across, float behind, float room, float dt);

@@ -28,7 +28,7 @@ class EditableMesh {
 
   // Puts a new vertex at p on the edge and returns its number.
   uint32_t split(uint32_t a, uint32_t b, Vec3 p);
-  // Merges b into a, moved to p. False, without a change, if that would change the topology, flip a triangle or
+  // Merges b into a, moved to p. False, without a change, if that would change the topology or flip a triangle, or
   // leave a rim with fewer than five vertices (rim_left: vertices on the rim of the edge).
   bool collapse(uint32_t a, uint32_t b, Vec3 p, size_t rim_left);
   // Flips the edge to join its opposite vertices; false, without a change, where that is invalid or not flat enough.

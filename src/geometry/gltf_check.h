@@ -6,8 +6,8 @@
 
 namespace catgut {
 
-// Throws InputError where the file is not JSON, nests deeper than 64, is not glTF 2, has nodes that do not form a tree, or a
-// tree deeper than 256, or describes more geometry than `kMostGltfValues`. A file that passes takes less than 512 MB and two
+// Throws InputError where the file is not JSON, nests deeper than 64, or is not glTF 2. Nodes must form a tree of depth 256 or
+// less, with at most `kMostGltfValues` of geometry. A file that passes takes less than 512 MB and two
 // seconds to read, except compressed meshes (KHR_draco_mesh_compression), whose size only their decoder knows.
 void check_gltf(const std::string& path);
 

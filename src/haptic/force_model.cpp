@@ -130,8 +130,8 @@ Vec3 evaluate(ForceModel& m, Vec3 x, Vec3 v, float dt, const ForceModelOptions& 
     }
   }
 
-  // Friction: elastic up to the limit, then it slips (Hayward and Armstrong 2000; the elastic range of the elasto-plastic model
-  // of Dupont, Hayward, Armstrong and Altpeter 2002). Below the limit nothing creeps, for any encoder noise. The spring adds at
+  // Friction: elastic up to the limit, then it slips (Hayward and Armstrong 2000). The elastic range is that of the model
+  // of Dupont, Hayward, Armstrong and Altpeter 2002. Below the limit nothing creeps, for any encoder noise. The spring adds at
   // most what the device can render beyond the patch's own stiffness, and changes its stiffness without a step
   // in force.
   const float limit = p.drag + (p.coefficient > 0 ? p.coefficient * pressing(p, x) : 0);

@@ -32,8 +32,8 @@ struct ForceModel {
 };
 
 struct ForceModelOptions {
-  // Time constant of blending from one patch to the next: this fraction of a physics period, at least `blend_least` [s], so
-  // that patches blend over several servo steps at any rate. Changes due to the hand's own motion are rendered at once.
+  // Time constant of blending from one patch to the next: this fraction of a physics period, at least `blend_least` [s].
+  // Patches then blend over several servo steps at any rate. Changes due to the hand's own motion are rendered at once.
   float blend = 0.3f, blend_least = 0.003f;
   float drop_time = 0.004f;  // [s] from the peak to the remaining force at puncture: 3 to 5 ms
   // [s] within which the physics must confirm the puncture; after that the wall returns over `wall_back`.

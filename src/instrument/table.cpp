@@ -24,8 +24,8 @@ RigidModel steel(float mass, float jaw_end, float jaw_radius, float shaft_from, 
 }
 
 // Masses and lengths are chosen at the size of catalog instruments; none is measured. Grip limits are chosen as well:
-//   needle 40 N: above the force of any hand; a locked needle holder does not let the needle turn;
-//   thread 15 N: above the knot-pull strength of 3-0 braided silk (about 13 N, USP <881>); the thread fails before the jaws;
+//   needle 40 N: above the force of any hand. A locked needle holder does not let the needle turn.
+//   thread 15 N: above the knot-pull strength of 3-0 braided silk (about 13 N, USP <881>). The thread fails before the jaws.
 //   tissue  6 N for forceps; 12 N for an Allis, whose teeth interlock and whose ratchet keeps them shut.
 std::vector<InstrumentModel> make_table() {
   std::vector<InstrumentModel> t;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/frame_cost: processor time of a frame before rasterization: moving the meshes, submitting them and
-// recording the draws for every eye, on Filament's backend that renders nothing. The remainder of a headset's 11 ms is
+// render/frame_cost: processor time of a frame before rasterization. It moves the meshes, submits them and
+// records the draws for every eye, on Filament's backend that renders nothing. The remainder of a headset's 11 ms is
 // available to the graphics card and the simulation.
 #pragma once
 #include <memory>

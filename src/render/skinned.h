@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/skinned: a mesh that follows particles, with several surface frames at once: geometry/skin plus the texture direction
-// beside the normal, in the order and format of the draw call. Once per frame, for any number of
+// render/skinned: a mesh that follows particles, with several surface frames at once. It is geometry/skin plus the texture
+// direction beside the normal, in the order and format of the draw call. Once per frame, for any number of
 // eyes.
 #pragma once
 #include <array>

@@ -27,9 +27,9 @@ struct ArmServerOptions {
   float stream = 0.2f;               // [s] after the last valid packet for which samples are still sent
 };
 
-// Validity of a patch received over a network at `now_ns`. Its age counts from its arrival (the server's clock, which detects a
-// silent simulator at once), its period from the sample that it was computed for. The time in which the hand may have
-// moved. False: expired.
+// Validity of a patch received over a network at `now_ns`. Its age counts from its arrival (server clock; this detects a
+// silent simulator at once). Its period, in which the hand may have moved, counts from the sample it was computed for.
+// False: expired.
 bool accept_patch(ForcePatch& patch, uint64_t now_ns);
 
 // Checks address and key file of ArmServerOptions before any device is opened. Throws InputError.

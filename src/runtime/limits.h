@@ -28,7 +28,7 @@ struct SutureCost {
 };
 
 // The first and the last suture re-run from the same states with the same inputs, alternating tick by tick. A processor that
-// changes its clock or is shared then affects both alike, so that their ratio is reliable where the times of the rows are not.
+// changes its clock or is shared affects both alike. So their ratio is reliable where the times of the rows are not.
 // Repeated several times.
 struct SutureGrowth {
   struct Pass {

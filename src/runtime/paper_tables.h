@@ -12,8 +12,8 @@
 
 namespace catgut {
 
-// The paper's phase of a tick, in the paper's terms: "Start" until the hands connect, "During suturing",
-// "During looping" from the first loop round a tool to the end of its knot (the next bite or needle, or the end of the work),
+// The paper's phase of a tick. "Start" ends when the hands connect. Then "During suturing", and
+// "During looping" from the first loop round a tool to the end of its knot (the next bite or needle, or the end of the work).
 // "After completion" when the surgeon is done. With `numbered` (Lembert) every suture has its own: "Suture #2", "Loop #2".
 class PaperPhase {
  public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim: recordings (.cgrec). Start state, inputs and one hash per tick: enough to replay a run bit for bit, to check that a
+// sim: recordings (.cgrec). Start state, inputs and one hash per tick. They suffice to replay a run bit for bit, to verify that
 // change did not alter the physics, and to reproduce a bug elsewhere.
 //
 // The file: 8 bytes of magic, format version (u32), then chunks {kind u32, size u64, hash u64, payload}. Little endian, packed

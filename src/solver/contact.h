@@ -45,7 +45,7 @@ uint32_t solve_tools_on_tissue(const ContactView& v, const TissueCollision& tiss
                                float friction);
 // Tools on each other, rigid. Overlap from this substep is resolved in it, whichever side the axes are on now. Earlier overlap
 // (hands that connect inside each other) is resolved at 0.1 mm per substep, to avoid a jerk. Impulses accumulate over the
-// sweeps of a substep and may decrease in a later sweep, so that sweeps alternating with the hand welds converge to the
+// sweeps of a substep and may decrease in a later sweep. Sweeps that alternate with the hand welds then converge to the
 // balance of both. most_press [kg m]: maximum impulse of a pair. Above it the tools slip past each other. Without force
 // feedback nothing stops a hand, and interlocked tools would tear what they hold.
 uint32_t solve_tools_on_tools(const ContactView& v, std::vector<ToolPair>& list, float friction, float most_press);

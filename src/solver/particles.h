@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // solver/particles: the columns that kernels work on. Float32, SI units.
-// A position is (x, y, z, 1). With the trailing 1 the outer product of a position with its rest position carries the moments,
+// A position is (x, y, z, 1). The outer product of a position with its rest position then carries the moments,
 // the centroid and the count of a cluster in one 64-byte row (see shape_match).
 #pragma once
 #include <cstddef>

@@ -64,8 +64,8 @@ void solve_shape_clusters(const ShapeModel& model, ClusterRotations& rotation, S
                           uint32_t last);
 // Rows of groups [first, last) from the positions of their particles.
 void make_shape_rows(const ShapeModel& model, const Vec4* x, ShapeScratch& scratch, uint32_t first, uint32_t last);
-// Sweep, pass 2 over groups [first, last), for each particle: dx = relaxation * (s (g - x) - (1 - s) moved), with s = w /
-// (w + alpha / h^2) per particle: the XPBD update of a constraint with compliance alpha and multiplier moved / w. Also makes
+// Sweep, pass 2 over groups [first, last), for each particle: dx = relaxation * (s (g - x) - (1 - s) moved) with s = w /
+// (w + alpha / h^2). This is the XPBD update of a constraint with compliance alpha and multiplier moved / w. Also makes
 // the rows of the next sweep, if there is one. Particles with inv_mass 0 stay.
 void solve_shape_particles(const ShapeModel& model, Vec4* x, const float* inv_mass, float stiffness, float relaxation,
                            ShapeScratch& scratch, uint32_t first, uint32_t last, bool more = true);

@@ -67,8 +67,8 @@ struct SolverState {
   Column<Vec4> pair_origin;                    // [m] per tissue particle: where its contact pairs were last searched
 };
 
-// Working memory and caches: never saved, never hashed. All of it is made in the same tick before it is read, or is a
-// function of the state and is rebuilt after a load.
+// Working memory and caches: never saved, never hashed. All of it is written in the same tick before it is read, or
+// rebuilt from the state after a load.
 struct SolverScratch {
   Column<Vec4> prev;
   ShapeScratch shape;

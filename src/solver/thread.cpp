@@ -339,7 +339,7 @@ void solve_thread(const StrandModel& model, Strand& thread, ThreadScratch& s, Ve
       }
 
       // A bent stretch of light thread between heavy ends. The impulse that moves the ends would move the light nodes far
-      // sideways, because the linearization does not include that they settle on the straight line. Light nodes therefore
+      // sideways: the linearization does not include that they settle on the straight line. Light nodes therefore
       // take a bounded step, heavy ones a full step; the next step uses the new directions.
       for (const uint32_t i : s.constrained) push_node(s, thread, i, impulse_on(s, i), body_model, body);
       push_anchors(s, thread, x, inv_mass);

@@ -31,9 +31,9 @@ class PaddedColumn {
 };
 
 // A symmetric positive definite tridiagonal system split into eight partitions of equal length, one per lane. Eliminating a row
-// waits for the previous row (about 35 cycles, mostly the division), so eight short chains side by side are several times
+// waits for the previous row (about 35 cycles, mostly the division). Eight short chains side by side are several times
 // faster than one long one. The last row of every partition is a separator. The interior of a partition is eliminated with its
-// two separators as unknowns, and the eight separators are solved (their matrix, a Schur complement, is positive definite
+// two separators as unknowns. Then the eight separators are solved (their matrix, a Schur complement, is positive definite
 // again). The interior follows in parallel (Wang 1981, A parallel method for tridiagonal equations).
 // Row i of the system is row i % rows of partition i / rows. Rows behind the last are identity.
 constexpr size_t kPartitions = 8;

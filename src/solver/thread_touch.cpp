@@ -53,7 +53,7 @@ Vec3 carried(const ThreadScratch& s, const NodeContact& c, const RigidBody& b) {
   return transform(b.pose(), to_local(Pose{b.prev_x, b.prev_q}, came_from(s, c.node)));
 }
 
-// Coulomb friction as an implicit drag of mu N / v, with the normal force N of the last substep's tensions and the speed v of
+// Coulomb friction as an implicit drag of mu N / v. N is the normal force of the last substep's tensions, v the speed of
 // the last substep's sliding. In steady sliding that equals mu N, and the capstan equation follows node by node.
 void feel_friction(ThreadScratch& s, NodeContact& c, const RigidBody& b, float h) {
   const size_t i = c.node;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // solver/tissue_pairs: broad phase of tissue against tissue. Candidates are found with a margin and kept until something has
 // moved by more than half of it. Most substeps only check the distance moved, and only blocks that have moved are searched
-// again. A pair that touches when its contacts are solved is always listed; a pair that comes into contact during that solve
+// again. A pair that touches when its contacts are solved is always listed. A pair that comes into contact during that solve
 // may not be. The list is therefore part of the result. It is a pure function of the positions at which each particle was last
 // searched (`origin`), which are state: all pairs within the margin there, sorted. It does not depend on the number of
 // workers, nor on a save and load.

@@ -24,7 +24,7 @@ bool same_bite(const Suture& state, int a, int b) {
   return in != state.point.end() && out != state.point.end() && in->bite == out->bite;
 }
 
-// Whether one of the first `pins` tethers holds the points of `pin` together at least as closely: one of the technique's
+// Whether one of the first `pins` tethers holds the points of `pin` together at least as closely. Either of the technique's
 // closure, or of an adjacent stitch.
 bool held_already(const SolverState& solver, size_t pins, const Tether& pin) {
   const Vec4* x = solver.x.data();

@@ -8,7 +8,7 @@
 
 namespace catgut {
 
-// Before puncture the wall is a hardening spring, f = a1 z + a2 z^2 (Okamura, Simone & O'Leary 2004), which ends at the entry
+// Before puncture the wall is a hardening spring, f = a1 z + a2 z^2 (Okamura, Simone & O'Leary 2004). It ends at the entry
 // peak, where the paper's rule releases the tissue (release_distance, 2.2 mm). a1 leaves 0.62 N/mm there, within the 0.5
 // to 1.2 N/mm of a point load in the wall (docs/references.md).
 constexpr float kEntryStart = 200;  // [N/m] a1

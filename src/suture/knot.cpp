@@ -2,7 +2,7 @@
 // suture/knot: a loop becomes a throw, the throw moves to the tissue and locks there (paper 2.4). Reads loops, hands and
 // the thread's order; writes knots, their anchors and, once a knot is locked, the slack under it.
 //
-// A tool with a loop round it grasps thread beyond the loop, usually the other end of the stitch, which is thereby pulled
+// A tool with a loop round it grasps thread beyond the loop, usually the other end of the stitch. That end is thereby pulled
 // through the loop. From then on the loop is a throw. It leaves the tool and hangs on the two ends of its own thread between
 // tool and tissue. As the tool moves away, the throw approaches the tissue. Until it locks, releasing the thread undoes it.
 #include <algorithm>
@@ -108,7 +108,7 @@ int knot_under(const Strand& t, const Suture& state, const Ends& loop, const End
 
 // Target of a first throw. "The knot object moves towards the suture point. ... If more than one suture point has been
 // created, the knot object will move toward the midpoint of the last two created suture points." The paper's stitch is one such
-// pair. A stitch here may have many points before it is tied (a purse-string), and the knot joins its two ends: the suture
+// pair. A stitch here may have many points before it is tied (a purse-string). The knot joins its two ends: the suture
 // point nearest to the grasped strand and the one nearest to the loop. For a stitch of two points both rules agree. A running
 // suture tied to itself (the end of a Connell: the grasped strand is a bight, or the needle's own) has no other end.
 // There the paper's rule applies unchanged.

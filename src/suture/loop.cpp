@@ -3,8 +3,8 @@
 //
 // A surgeon wraps the thread round the needle holder before grasping the other end. Detection uses the projection of the thread
 // onto the plane across the tool, in which the tool is a point, its tip. Does the thread cross itself there, and does it
-// enclose the tip? Two more tests reject false positives of the projection: does the thread touch the tool, and are its ends
-// side by side or is it a stretched spiral?
+// enclose the tip? Two more tests reject false positives of the projection. Does the thread touch the tool? Are its ends
+// side by side, or is it a stretched spiral?
 #include "suture/loop.h"
 
 #include <algorithm>
@@ -53,7 +53,7 @@ bool cross(const Corner& a, const Corner& b, const Corner& p, const Corner& q, d
   return s >= 0 && s < 1 && t >= 0 && t < 1;
 }
 
-// Even-odd rule (Shimrat 1962): a ray from the tip crosses the polygon's sides an odd number of times if the tip is inside.
+// Even-odd rule (Shimrat 1962). A ray from the tip crosses the polygon's sides an odd number of times if the tip is inside.
 // twice_area: positive for a polygon that runs counter-clockwise as seen from the hand.
 bool tip_inside(std::span<const Corner> polygon, double& twice_area) {
   bool inside = false;
@@ -261,7 +261,7 @@ void find_loops_on(SutureContext& c, uint32_t who) {
     }
   }
   // A tool that holds something cannot have a loop. Thread round a needle holder that drives the needle is not a
-  // loop, and jaws that hold this thread have no other end to pull through.
+  // loop. Jaws that hold this thread have no other end to pull through.
   const bool free = hand.held == Held::nothing;
   if (!c.solver.body_collides[who] || !(free || (closes && hand.held == Held::thread))) return;
   Found found;

@@ -72,7 +72,7 @@ struct ToolLoop {
 };
 
 // A knot: throws on top of each other, made from loops. While a throw tightens, the ends of its loop are anchored to it with an
-// offset from the tissue that shrinks, and thread may slide through it as through a suture point. Locked, the knot holds a
+// offset from the tissue that shrinks. Thread may slide through it as through a suture point. Locked, the knot holds a
 // particle of each of the two strands at one point of the tissue, and nothing slides there again (ThreadAnchor::knotted).
 struct Knot {
   KnotPhase phase = KnotPhase::tightening;  // of the current throw
@@ -200,7 +200,7 @@ struct OneSuture {
 
 // --- grasp.cpp ---------------------------------------------------------------------------------------------------------
 // Once per tick, for every instrument in a hand. A jaw that closes within reach of a needle, else of a thread, else of the
-// tissue's surface holds it at that position and angle; opening releases it.
+// tissue's surface holds it at that position and angle. Opening releases it.
 void grasp(SutureContext& c, const HandInputs& hand);
 
 // After every substep: a jaw loaded beyond its grip force (InstrumentModel) lets what it holds slip, so that forces stay

@@ -2,7 +2,7 @@
 // thread/bending: elastic bending of a stated stiffness B, as a force evaluated at the start of the substep. Energy of node i:
 // B / (2 l) |e_i / l_i - e_i-1 / l_i-1|^2 with l the mean length of its two segments (Bergou et al.
 // 2008, 10.1145/1360612.1360662, without twist, small angles between segments). Reads edges; adds to the forces. Not a
-// constraint: a rod at rest is a fixed point of the step for any solver settings, and B is exactly the given value. It requires
+// constraint. A rod at rest is a fixed point of the step for any solver settings, and B is exactly the given value. It requires
 // a minimum mass (bending_density).
 #include <tuple>
 

@@ -53,7 +53,7 @@ struct Tightened {
 // How the tails are pulled. Flat: to the sides on which they leave. Uncrossed: each to the other side, as if the hands had not
 // crossed. Under tension: strand A is kept taut all the time, strand B is wound on it.
 enum class Drawing { flat, uncrossed, under_tension };
-// Pulls the tails with `tails` [N] while springs of 500 N/m (tissue) hold the load ends, then releases the tails within 50 ms,
+// Pulls the tails with `tails` [N] while springs of 500 N/m (tissue) hold the load ends. Releases the tails within 50 ms,
 // unless they are to be kept pulled.
 void tighten(const thread::Settings& settings, Tightened& t, float tails, Drawing drawing = Drawing::flat, float seconds = 0.3f,
              bool let_go = true);

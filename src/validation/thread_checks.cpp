@@ -204,8 +204,8 @@ void check_hanging_chain(Lines& out) {
   // The paper gives 20 particles of 1 kg, compliance 1e-8 m/N and 100 frames, but not the start of the chain.
   // Assumed: 1 m spacing, released level, frames of 1/60 s without substeps, g 9.8. The first ten frames are omitted: the
   // force rises from zero and a relative error means little. A thousand sweeps are run in double precision, with the same step
-  // of the same constraint: in float32, which the thread uses, the error is 2 % there for any chain length
-  // (docs/solver.md), and the product never uses that many sweeps.
+  // of the same constraint. In float32, which the thread uses, the error is 2 % there for any chain length
+  // (docs/solver.md). The product never uses that many sweeps.
   const std::string source = "XPBD 2016 sec. 6.2; assumed: released level, 1 m spacing, frames 10 to 100";
   struct Published {
     int sweeps;
@@ -216,8 +216,8 @@ void check_hanging_chain(Lines& out) {
             chain_error(level, kFrame, false, p.sweeps, fallen, want), p.tolerance, "1", source);
   out.add("chain force error, 1000 sweeps in double", 0.005, chain_error_in_double(kFrame, 1000, fallen, want), 0.3, "1",
           source);
-  // Falling, at the scenes' own substep. (At 1/60 s the whip of the chain rotates its segments by a third of a radian per step,
-  // and the geometric stiffness, which stabilizes fast taut thread, damps it: 5 % there.)
+  // Falling, at the scenes' own substep. (At 1/60 s the whip of the chain rotates its segments by a third of a radian per step.
+  // The geometric stiffness, which stabilizes fast taut thread, damps it: 5 % there.)
   const double substep = kFrame / 8;
   out.add("chain force error, direct, falling", 0,
           chain_error(level, substep, true, 1, 8 * fallen, newton_chain(level, substep, 8 * frames)), 0.05, "1",

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // validation: a static reference solution of the wall: the same elements and loads, no time, Newton's
-// method in double precision with a numeric Jacobian. It shares the element's formula with the simulation, so it tests the
-// step, the coupling and single precision, not the element; tests/wall/reference_test.cpp tests that against other elements.
+// method in double precision with a numeric Jacobian. It shares the element's formula with the simulation. So it tests the
+// step, the coupling and single precision. tests/wall/reference_test.cpp tests the element against other elements.
 #pragma once
 #include <Eigen/Core>
 #include <array>

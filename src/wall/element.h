@@ -7,7 +7,7 @@
 // keep a coarse mesh from locking: in-plane bending after Pian and Sumihara 1984 (doi 10.1002/nme.1620200911), transverse shear
 // sampled on the edges after Dvorkin and Bathe 1984 (doi 10.1108/eb023562) with the mesh-dependent factor of Lyly, Stenberg and
 // Vihinen 1993 (doi 10.1016/0045-7825(93)90214-I), thickness strain as a penalty about plane stress. The frame is the polar
-// decomposition of the mean deformation, and forces are the exact gradient of the energy, including the rotation of the frame.
+// decomposition of the mean deformation. Forces are the exact gradient of the energy, including the rotation of the frame.
 // Without it, unequal moduli have no potential, and an element exerts a torque on itself.
 #pragma once
 #include <array>

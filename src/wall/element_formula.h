@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // wall/element_formula: the element's energy and force, written once for any number type. This file has no include guard. It is
-// included inside a namespace that defines above, absolute, larger and square_root for the number type, once for doubles
+// included inside a namespace that defines above, absolute, larger and square_root for the number type: once for doubles
 // (element.h) and once for each instruction set (force.cpp). Formulas and sources: element.h.
 
 template <class S>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// wall/laminate: the layers of an organ's wall as one plate: membrane (A), coupling (B) and bending (D) stiffness of classical
-// laminate theory (Jones, Mechanics of Composite Materials, 1999, chapter 4), thickness and transverse shear, and the stiff
+// wall/laminate: the layers of an organ's wall as one plate. Membrane (A), coupling (B) and bending (D) stiffness of classical
+// laminate theory (Jones, Mechanics of Composite Materials, 1999, chapter 4). Thickness, transverse shear, and the stiff
 // branch of a J-shaped stress-strain curve (Terry et al. 2014: toe and stiff moduli of bowel along and around).
 #pragma once
 #include <array>

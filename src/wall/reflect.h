@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // wall/reflect: the members of a wall's state, for writing, reading and hashing it (core/reflect.h). Motion changes in every
-// step, Topology only with a cut or a new factor: a hash of each tick needs the first and the topology's version alone.
+// step, Topology only with a cut or a new factor. A hash of each tick needs the first and the topology's version alone.
 #pragma once
 #include "core/reflect.h"
 #include "wall/contact.h"

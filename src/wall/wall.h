@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // wall: a soft organ wall whose stiffness is the material's. Solid-shell elements (wall/element) on columns of an outer and an
-// inner node, moved by a symplectic step whose mass matrix is enlarged for relative motion only ("selective mass scaling",
+// inner node. The mass matrix of the symplectic step is enlarged for relative motion only ("selective mass scaling",
 // Olovsson, Simonsson, Unosson 2005, doi 10.1002/nme.1293; inertia as a factored stiffness bound):
 //
 //   f = forces at x + tau v                      tau = h / 4: damping that vanishes at rest
@@ -10,7 +10,7 @@
 //
 // A resting state has zero force for any A, so neither step nor mesh changes the stiffness. L does not act on rigid
 // translation: mass and linear momentum are exact. c is chosen at build time so that the largest eigenvalue of h^2 A^-1 K is at
-// most 1.05, and stays below about 1.2 when the wall is cut (the step is stable below 2.67). Frames: positions in the scene's
+// most 1.05. It stays below about 1.2 when the wall is cut (the step is stable below 2.67). Frames: positions in the scene's
 // frame, meters, seconds, newtons.
 #pragma once
 #include <string>

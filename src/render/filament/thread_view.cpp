@@ -49,7 +49,7 @@ Nearest tissue_at(std::vector<Nearest>& known, size_t i, Vec3 point, float reach
   return n;
 }
 
-// One throw: its two strands are wound about each other along the stitch, one wrap more than they cross, and dip toward the
+// One throw: its two strands are wound about each other along the stitch, one wrap more than they cross. They dip toward the
 // tissue at both ends. `above`: distance of the throw from the knot's position along `out`.
 void add_throw(ThreadView& view, Vec3 at, Vec3 way, Vec3 out, float above, uint32_t wraps, int chirality, float width) {
   way = normalized(way - out * dot(way, out), any_perpendicular(out));

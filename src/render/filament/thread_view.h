@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/filament/thread_view: suture threads as smooth tubes through their particles, one per piece after cuts;
-// knots as the two strands of every throw wound about each other; baked sutures; the visual guide from a bite's entry to
-// the needle (paper 2.2). All of it is one mesh.
+// render/filament/thread_view: suture threads as smooth tubes through their particles, one per piece after cuts.
+// Also knots as the two strands of every throw wound about each other, baked sutures, and the visual guide from a bite's entry
+// to the needle (paper 2.2). All of it is one mesh.
 #pragma once
 #include <vector>
 
