@@ -27,7 +27,7 @@ struct BodyRest {
       layer;         // serosa: outer side of the wall, mucosa: inner side; the other way round where the wall is everted
   float radius = 0;  // [m] contact radius of a particle
   std::vector<std::vector<uint32_t>> cluster;  // cluster c is centered on particle c; first member is c; at most 16 members
-  std::vector<Tet> tet;                        // the wall's volume
+  std::vector<Tet> tet;                        // the wall's volume: three to a prism, prism after prism
   std::vector<Triangle> surface;               // watertight, particle indices, counter-clockwise seen from outside the tissue
   std::vector<Rim> rim;                        // openings; rim[w] with w < walls is the working rim of wall w
   int walls = 1;                               // 2: a bowel folded into itself; wall 0 is the outer tube, 1 the inner one

@@ -41,7 +41,9 @@ struct SuturePicture {
 struct PictureModel {
   std::string title;
   std::vector<VisibleMesh> body;
-  std::vector<Vec3> particle_rest;                                    // [m] rest position of every tissue particle
+  // [m] rest position of every tissue particle. Of a tissue that was divided (TopologyView): of every particle, those of
+  // threads being zero.
+  std::vector<Vec3> particle_rest;
   std::vector<SuturePicture> suture = std::vector<SuturePicture>(1);  // as Snapshot::suture
   std::vector<InstrumentPicture> instrument;                          // as Snapshot::instrument
   Vec3 focus;                                                         // [m] center of the operating field
@@ -50,7 +52,7 @@ struct PictureModel {
   // One per wall that the procedure works on: tissue particles round its near opening, in order, on its outer side. Walls are
   // numbered: one per bowel end, and two (outer, inner) for a bowel folded into itself.
   std::vector<std::vector<uint32_t>> rim;
-  std::vector<uint8_t> wall;  // per tissue particle
+  std::vector<uint8_t> wall;  // as particle_rest
 };
 
 }  // namespace catgut

@@ -49,9 +49,10 @@ constexpr void reflect(auto& a, Like<SutureView> auto& s) {
   a(s.needle), a(s.thread_order), a(s.thread_tension), a(s.thread_cut), a(s.thread_rest), a(s.needle_on_thread);
   a(s.suture_point), a(s.knot), a(s.bite), a(s.seam);
 }
+constexpr void reflect(auto& a, Like<TopologyView> auto& t) { a(t.version), a(t.pieces), a.cache(t.picture); }
 constexpr void reflect(auto& a, Like<Snapshot> auto& s) {
-  a(s.tick), a(s.time_s), a(s.particle), a(s.rotation), a(s.tool), a(s.instrument), a(s.suture), a(s.active_suture),
-      a(s.settled);
+  a(s.tick), a(s.time_s), a(s.topology), a(s.particle), a(s.rotation), a(s.tool), a(s.instrument), a(s.suture),
+      a(s.active_suture), a(s.settled);
   a(s.opening_area), a(s.closure), a(s.event), a(s.patch);
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/math.h"
@@ -116,11 +117,22 @@ struct SutureView {
   std::vector<SeamView> seam;
 };
 
+struct PictureModel;
+
+// What cuts have made of the tissue.
+struct TopologyView {
+  uint32_t version = 0;  // counts changes; 0: as built
+  uint32_t pieces = 0;   // connected ones
+  // Of the tissue as it is, instead of the scene's: the same numbers, more of them. Constant; null: as built.
+  std::shared_ptr<const PictureModel> picture;
+};
+
 struct Snapshot {
   uint64_t tick = 0;
   double time_s = 0;
-  std::vector<Vec3> particle;            // [m] tissue particles of every body, then thread slots
-  std::vector<Quat> rotation;            // per tissue particle: rotation of the cluster centered on it
+  TopologyView topology;
+  std::vector<Vec3> particle;  // [m] tissue particles of every body, thread slots, copies of tissue particles
+  std::vector<Quat> rotation;  // per particle as above, threads only with copies: rotation of the cluster centered on it
   std::array<ToolView, kMaxHands> tool;  // per hand
   std::vector<InstrumentView> instrument;
   std::vector<SutureView> suture = std::vector<SutureView>(1);  // at least one

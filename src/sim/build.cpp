@@ -10,9 +10,11 @@
 #include "anatomy/organ.h"
 #include "core/check.h"
 #include "geometry/closest.h"
+#include "sim/cell_graph.h"
 #include "sim/hands.h"
 #include "sim/model.h"
 #include "sim/state.h"
+#include "sim/topology.h"
 #include "suture/needle.h"
 
 namespace catgut {
@@ -22,6 +24,8 @@ constexpr float kPaperSubstep = 1.0f / 480;    // [s] substep for which the pape
 constexpr float kDrapeBelowRim = 0.035f;       // [m] below the rim, where a body stands up through the drape
 constexpr float kDrapeBelowBody = 0.010f;      // [m] below the body, where it lies on the drape
 constexpr float kRow = 0.07f, kTurn = 0.005f;  // [m] of a thread on the drape: length of a row, radius of its turns
+
+std::string name_of(const SceneSpec& scene) { return scene.name.empty() ? "scene" : scene.name; }
 
 BodyRest make_body(const BodySpec& spec) {
   if (!spec.mesh.empty()) {
@@ -79,8 +83,10 @@ std::vector<Vec3> lay_thread(const ThreadSpec& spec, Vec3 start) {
   return p;
 }
 
-// The walls' rims, in the order of the walls.
-TechniqueModel make_technique(const SceneSpec& scene, const std::vector<Rim>& rim, float wall, const std::string& where) {
+}  // namespace
+
+TechniqueModel make_technique(const SceneSpec& scene, std::span<const Rim> rim) {
+  const std::string where = name_of(scene);
   TechniqueModel t;
   const TechniqueSpec& spec = scene.technique;
   t.row = find_technique(spec.name);
@@ -91,7 +97,7 @@ TechniqueModel make_technique(const SceneSpec& scene, const std::vector<Rim>& ri
     if (w >= rim.size() || rim[w].outer.empty()) throw InputError(where, t.row->missing, t.row->remedy);
   TechniqueSetup setup;
   setup.rim = rim;
-  setup.wall = wall;
+  setup.wall = scene.body[0].wall;
   setup.anvil = spec.anvil;
   setup.anvil_radius = spec.anvil_radius;
   setup.compliance = spec.closure_compliance;
@@ -102,6 +108,8 @@ TechniqueModel make_technique(const SceneSpec& scene, const std::vector<Rim>& ri
   t.row->begin(setup, t);
   return t;
 }
+
+namespace {
 
 // Reserves memory for what a procedure adds to the state, so that event ticks do not allocate either: four times a long
 // procedure. Only baking a suture allocates, for its node list.
@@ -302,7 +310,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   auto model = std::make_shared<Model>();
   Model& m = *model;
   m.scene = scene;
-  const std::string where = scene.name.empty() ? "scene" : scene.name;
+  const std::string where = name_of(scene);
   if (scene.body.empty()) throw InputError(where, "it has no [[body]]", "add at least one soft body");
   const std::vector<SutureSpec> sutures = sutures_of(scene);
   for (const SutureSpec& u : sutures)
@@ -315,15 +323,12 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   std::vector<Vec3> rest;
   std::vector<float> mass, radius, apart;
   std::vector<uint32_t> body;
-  std::vector<Rim> working_rim;  // per wall
   std::vector<std::vector<uint32_t>> cluster;
-  std::vector<Tet> tet;
   std::vector<Triangle> surface;
-  float wall = 0.0025f, drape = std::numeric_limits<float>::max();
+  float drape = std::numeric_limits<float>::max();
   for (size_t b = 0; b < scene.body.size(); ++b) {
     BodyRest r = make_body(scene.body[b]);
     const uint32_t first = static_cast<uint32_t>(rest.size());
-    if (b == 0) wall = scene.body[b].wall;
     float bottom = scene.body[b].position.y - kDrapeBelowRim;
     if (lies(scene.body[b])) {
       for (const Vec3& p : r.position) bottom = std::min(bottom, p.y - kDrapeBelowBody);
@@ -341,7 +346,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
       radius.push_back(r.radius);
       // Shape matching keeps neighbors in the wall apart, contact does not, at any particle size.
       apart.push_back(static_cast<float>(std::max(2.2 * spacing, 2 * r.radius + spacing)));
-      const size_t wall_here = working_rim.size() + (r.wall.empty() ? 0 : r.wall[i]);
+      const size_t wall_here = m.rim.size() + (r.wall.empty() ? 0 : r.wall[i]);
       body.push_back(static_cast<uint32_t>(wall_here));  // two layers of one body collide like two bodies
       m.wall.push_back(static_cast<uint8_t>(wall_here));
       m.layer.push_back(static_cast<uint8_t>(r.layer[i]));
@@ -350,14 +355,14 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
       for (uint32_t& i : c) i += first;
       cluster.push_back(std::move(c));
     }
-    for (Tet t : r.tet) tet.push_back({t[0] + first, t[1] + first, t[2] + first, t[3] + first});
+    for (Tet t : r.tet) m.cell.push_back({t[0] + first, t[1] + first, t[2] + first, t[3] + first});
     for (Triangle t : r.surface) surface.push_back({t[0] + first, t[1] + first, t[2] + first});
     for (size_t w = 0; w < static_cast<size_t>(r.walls); ++w) {
       Rim rim = w < r.rim.size() ? r.rim[w] : Rim{};
       for (uint32_t& i : rim.outer) i += first;
       for (uint32_t& i : rim.inner) i += first;
       m.picture.rim.push_back(rim.outer);
-      working_rim.push_back(std::move(rim));
+      m.rim.push_back(std::move(rim));
     }
     for (auto& k : r.visible.skin_particle)
       for (uint32_t& i : k) i += first;
@@ -373,7 +378,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   s.shape = make_shape_model(rest, mass, cluster);
   s.use_volume = scene.solver.volume;
   s.volume_compliance = scene.solver.volume_compliance;
-  if (s.use_volume) s.volume = make_volume_model(rest, tet);
+  if (s.use_volume) s.volume = make_volume_model(rest, m.cell);
   s.collision = make_tissue_collision(s.shape.rest, radius, body, apart, surface);
 
   s.h = m.dt / static_cast<float>(m.substeps);
@@ -412,7 +417,9 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   u.grasp_reach = scene.mechanics.grasp_reach;
   u.min_throws = scene.technique.throws;
 
-  m.technique = make_technique(scene, working_rim, wall, where);
+  m.technique = make_technique(scene, m.rim);
+  m.loose = find_loose(m);
+  find_pieces(m);
 
   m.start = rest;
   const bool two = scene.body.size() > 1 && lies(scene.body[0]);

@@ -2,6 +2,7 @@
 // sim/model: everything about a scene that is constant during a run. Written by sim/build, read by every stage.
 #pragma once
 #include <array>
+#include <span>
 #include <vector>
 
 #include "anatomy/body.h"
@@ -21,6 +22,12 @@ struct ParkedStart {
   uint32_t particle = 0;  // nearest to the jaws
 };
 
+// A tissue particle outside all cells (the odd one in mid-wall), and the cell that it follows.
+struct LooseParticle {
+  uint32_t particle = 0, cell = 0;
+};
+
+// As built, or, with copies of particles, what sim/topology derives from it for a tissue that was divided.
 struct Model {
   SceneSpec scene;
   SolverModel solver;
@@ -28,7 +35,13 @@ struct Model {
   TechniqueModel technique;
   std::vector<uint8_t> wall;   // per tissue particle: which bowel end, or which layer, it belongs to
   std::vector<uint8_t> layer;  // per tissue particle: TissueLayer, serosa outside, mucosa inside
-  float dt = 1.0f / 60;        // [s] tick
+  std::vector<Tet> cell;       // the volume of the tissue: three cells to each prism of its wall, one prism after the other
+  std::vector<LooseParticle> loose;
+  std::vector<Rim> rim;          // per wall: the opening that the procedure works on
+  std::vector<uint32_t> source;  // per copy, the last of the tissue particles: what it is a copy of
+  std::vector<uint32_t> piece;   // per tissue particle: the smallest particle of its connected piece
+  uint32_t pieces = 0;
+  float dt = 1.0f / 60;  // [s] tick
   int substeps = 8;
   std::vector<Vec3> start;                       // [m] of every particle
   std::vector<Pose> tray;                        // per instrument: its pose on the tray
@@ -40,5 +53,8 @@ struct Model {
   float hand_compliance = 1.0f / 3000, hand_angular_compliance = 0.05f;  // [m/N], [rad/(N m)] coupling of tool and hand
   PictureModel picture;
 };
+
+// The technique that the scene names, at these rims, which are those of its walls in their order.
+TechniqueModel make_technique(const SceneSpec& scene, std::span<const Rim> rim);
 
 }  // namespace catgut

@@ -133,15 +133,34 @@ void publish_settled(const Model& model, const State& state, Snapshot& out) {
   }
 }
 
+// From the solver's numbers of particles to those that nothing ever changes (public_index).
+void use_public_numbers(const Model& built, const Model& model, Snapshot& out) {
+  const auto renumber = [&](uint32_t& i) { i = public_index(built, model, i); };
+  const auto tissue = static_cast<std::ptrdiff_t>(built.solver.tissue);
+  std::rotate(out.particle.begin() + tissue, out.particle.begin() + model.solver.tissue, out.particle.end());
+  out.rotation.insert(out.rotation.begin() + tissue, built.solver.count - built.solver.tissue, Quat{});
+  for (InstrumentView& v : out.instrument) renumber(v.held_slot);
+  for (ToolView& t : out.tool) renumber(t.held_slot), renumber(t.loop_first), renumber(t.loop_last);
+  for (SutureView& u : out.suture) {
+    for (uint32_t& slot : u.thread_order) renumber(slot);
+    for (SuturePointView& p : u.suture_point) renumber(p.anchored);
+  }
+  for (Event& e : out.event)
+    if (names_particle(e)) renumber(e.which);
+}
+
 }  // namespace
 
 PictureModel picture_model(const Model& model) { return model.picture; }
 
-void publish(const Model& model, const State& state, Snapshot& out) {
+void publish(const Model& built, const State& state, Snapshot& out) {
+  const Model& model = current_model(built, state);
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
   out.tick = state.tick;
   out.time_s = static_cast<double>(state.tick) / model.scene.solver.tick_rate;
+  out.topology = {state.topology.version, model.pieces, nullptr};
+  if (state.divided) out.topology.picture = {state.divided, &state.divided->picture};
   out.particle.resize(m.count);
   for (uint32_t i = 0; i < m.count; ++i) out.particle[i] = xyz(s.x[i]);
   out.rotation.resize(m.tissue);
@@ -159,6 +178,7 @@ void publish(const Model& model, const State& state, Snapshot& out) {
   out.closure = 0;
   for (const ClosurePlan& plan : state.plan) out.closure = std::max(out.closure, plan.progress);
   out.event = state.event.list;
+  if (!model.source.empty()) use_public_numbers(built, model, out);
 }
 
 }  // namespace catgut

@@ -153,7 +153,11 @@ void load_state(const Model& model, State& state, const std::vector<std::byte>& 
   StatePtr fresh = initial_state(model);
   Reader read(bytes, "saved state");
   read(*fresh);
-  if (read.at != bytes.size() || !fits(model, *fresh))
+  if (const std::string error = topology_error(model, fresh->topology); !error.empty())
+    throw InputError("saved state", "its topology does not fit this scene: " + error,
+                     "use the scene and the version it was saved with");
+  if (fresh->topology.version > 0) apply_topology(model, *fresh);
+  if (read.at != bytes.size() || !fits(current_model(model, *fresh), *fresh))
     throw InputError("saved state", "it does not fit this scene", "use the scene and the version it was saved with");
   state = std::move(*fresh);
 }
@@ -165,7 +169,8 @@ uint64_t hash_state(const Model&, const State& state) {
   return hasher.digest();
 }
 
-bool state_is_valid(const Model& model, const State& state, float limit) {
+bool state_is_valid(const Model& built, const State& state, float limit) {
+  const Model& model = current_model(built, state);
   auto ok = [limit](Vec3 p) { return is_finite(p) && length2(p) <= limit * limit; };
   for (uint32_t i = 0; i < model.solver.count; ++i)
     if (!ok(xyz(state.solver.x[i])) || !is_finite(xyz(state.solver.v[i]))) return false;
@@ -174,7 +179,8 @@ bool state_is_valid(const Model& model, const State& state, float limit) {
   return true;
 }
 
-double kinetic_energy(const Model& model, const State& state) {
+double kinetic_energy(const Model& built, const State& state) {
+  const Model& model = current_model(built, state);
   double e = 0;
   for (uint32_t i = 0; i < model.solver.count; ++i)
     if (model.solver.inv_mass[i] > 0) e += 0.5 * double{length2(xyz(state.solver.v[i]))} / model.solver.inv_mass[i];

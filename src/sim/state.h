@@ -3,11 +3,13 @@
 // and published. The others are working memory of a tick.
 #pragma once
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "exchange/event.h"
 #include "exchange/tool_input.h"
 #include "sim/haptic_feedback.h"
+#include "sim/topology.h"
 #include "solver/substep.h"
 #include "suture/reflect.h"
 #include "technique/reflect.h"
@@ -27,6 +29,7 @@ constexpr void reflect(auto& a, Like<HandState> auto& h) {
 
 struct State {
   uint64_t tick = 0;
+  Topology topology;                      // written by sim/topology_divide, between ticks
   SolverState solver;                     // written by solver/substep, suture/*
   SutureState suture;                     // written by suture
   std::vector<TechniqueState> technique;  // one per suture; written by technique
@@ -34,6 +37,7 @@ struct State {
   std::array<HandState, kMaxHands> hand;  // written by sim/hands
   HapticFeedback haptics;                 // written by sim/haptic_feedback, read by publish
   EventList event;                        // of the last tick
+  std::shared_ptr<const Model> divided;   // what sim/topology derives from `topology`; null: as built
   // Working memory.
   EventList suture_event;  // of one suture, for its technique
   std::vector<StitchPoint> stitch;
@@ -42,9 +46,9 @@ struct State {
 };
 
 constexpr void reflect(auto& a, Like<State> auto& s) {
-  a(s.tick), a(s.solver), a(s.suture), a.column(s.plan, IndexOf::strand), a.column(s.technique, IndexOf::strand);
+  a(s.tick), a(s.topology), a(s.solver), a(s.suture), a.column(s.plan, IndexOf::strand), a.column(s.technique, IndexOf::strand);
   a(s.hand), a(s.haptics), a(s.event);
-  a.cache(s.suture_event), a.cache(s.stitch), a.cache(s.stitch_span), a.cache(s.scratch);
+  a.cache(s.divided), a.cache(s.suture_event), a.cache(s.stitch), a.cache(s.stitch_span), a.cache(s.scratch);
 }
 
 }  // namespace catgut

@@ -65,7 +65,8 @@ void follow_technique(const Model& model, State& state) {
 
 }  // namespace
 
-void step(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times) {
+void step(const Model& built, State& state, const TickInput& input, Jobs& jobs, StageTimes* times) {
+  const Model& model = current_model(built, state);
   const SolverModel& solver = model.solver;
   state.event.start(state.tick);
   find_boxes(solver, state.solver, state.scratch, jobs, times);

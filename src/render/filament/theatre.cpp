@@ -92,7 +92,8 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
   lights.setShadowOptions(lights.getInstance(lamp_), shadow_);
   const float pixel = 2 * std::tan(0.5f * cameras[0].fov_deg * kPi / 180) / (coarse_ * float(height));
 
-  find_motion(model_.particle_rest, snapshot.particle, snapshot.rotation, motion_);
+  follow_topology(snapshot.topology);
+  find_motion((divided_ ? *divided_ : model_).particle_rest, snapshot.particle, snapshot.rotation, motion_);
   for (TissueView& t : tissue_) move_tissue(engine_, t, motion_, snapshot);
   move_thread(engine_, thread_, model_, snapshot, tissue_, motion_, cameras[0], pixel);
   move_marks(engine_, mark_, snapshot, tissue_, motion_);
@@ -100,6 +101,19 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
     catgut::set_pose(engine_, needle_[i], snapshot.suture[i].needle.pose);
   for (size_t i = 0; i < std::min(tool_.size(), snapshot.instrument.size()); ++i) move_tool(tool_[i], snapshot.instrument[i]);
   show_markers(snapshot, suture_points);
+}
+
+void Theatre::follow_topology(const TopologyView& topology) {
+  if (topology.picture == divided_) return;
+  divided_ = topology.picture;
+  for (TissueView& t : tissue_) destroy_mesh(engine_, *scene_, t.gpu);
+  tissue_.clear();
+  for (const VisibleMesh& mesh : (divided_ ? *divided_ : model_).body)
+    tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_));
+  // What they remember are vertices of the surface that was.
+  thread_.on_tissue.clear();
+  mark_.on_tissue.clear();
+  motion_ = {};
 }
 
 void Theatre::set_resolution_scale(float part) {

@@ -3,6 +3,7 @@
 // PictureModel once and a Snapshot per frame; writes a view of the engine passed to it.
 #pragma once
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -58,12 +59,15 @@ class Theatre {
   filament::MaterialInstance* instance_of(std::span<const uint8_t> package);
   void make_materials();
   void make_stage();
+  // Rebuilds the tissue's surface after a cut has changed it.
+  void follow_topology(const TopologyView& topology);
   void add_cloth(const Shape& cloth, float threads_per_cm, std::span<const Vec3> tissue, bool casts_shadow);
   void move_tool(const ToolView3d& view, const InstrumentView& tool);
   void show_markers(const Snapshot& snapshot, bool wanted);
 
   float coarse_ = 1;
-  const PictureModel model_;  // a copy: the theatre outlives its source
+  const PictureModel model_;                     // a copy: the theatre outlives its source
+  std::shared_ptr<const PictureModel> divided_;  // of the snapshot that was shown last; null: model_
   filament::Engine& engine_;
   filament::Scene* scene_ = nullptr;
   std::vector<Eye> eye_;
