@@ -12,9 +12,11 @@
 #include <string>
 
 #include "core/archive.h"
+#include "core/random.h"
 #include "exchange/reflect.h"
 #include "procedure/scene_file.h"
 #include "runtime/hands.h"
+#include "sim/cell_graph.h"
 #include "sim/model.h"
 #include "sim/state.h"
 #include "sim/topology.h"
@@ -452,6 +454,93 @@ TEST(Topology, a_slit_leaves_one_piece) {
   for (int i = 0; i < 60; ++i) step(*model, *state, nobody, jobs), step(*model, *other, nobody, jobs);
   EXPECT_TRUE(state_is_valid(*model, *state));
   EXPECT_EQ(hash_state(*model, *state), hash_state(*model, *other));
+}
+
+// At any moment of a procedure: needle in the wall, forceps on it, thread on its way through.
+TEST(Topology, tissue_is_divided_at_any_moment) {
+  Sewing run("purse_string");
+  Random random(7);
+  StatePtr other = initial_state(*run.model), again = initial_state(*run.model);
+  Jobs one(1), two(2);
+  size_t divided = 0, in_tissue = 0;
+  float furthest = 0;
+  for (int i = 0; i < 1200; ++i) {
+    run.tick();
+    if (i % 61 != 60) continue;
+    load_state(*run.model, *other, save_state(*run.model, *run.state));
+    // Through a place near the rim, in any direction.
+    const std::vector<uint32_t>& rim = run.model->rim[0].outer;
+    const Vec3 at = run.seen.particle[rim[random.next() % rim.size()]] - Vec3{0, 0.01f * random.uniform(), 0};
+    const Vec3 normal{random.uniform() - 0.5f, random.uniform() - 0.5f, random.uniform() - 0.5f};
+    const std::vector<Place> before = places(run.seen);
+    const uint32_t copies = divide_by_plane(*run.model, *other, 0, at, normal);
+    Snapshot seen;
+    publish(*run.model, *other, seen);
+    const std::vector<Place> after = places(seen);
+    ASSERT_EQ(before.size(), after.size());
+    for (size_t k = 0; k < before.size(); ++k) {
+      furthest = std::max(furthest, distance(before[k].at, after[k].at));
+      EXPECT_LT(distance(before[k].at, after[k].at), 1e-6f) << before[k].what << ", tick " << run.state->tick;
+    }
+    divided += copies > 0, in_tissue += run.seen.active().needle.in_tissue;
+    load_state(*run.model, *again, save_state(*run.model, *other));
+    TickInput input = run.input;
+    for (int k = 0; k < 30; ++k) {
+      input.tick = other->tick;
+      step(*run.model, *other, input, one), step(*run.model, *again, input, two);
+      ASSERT_TRUE(state_is_valid(*run.model, *other)) << "divided at tick " << run.state->tick << ", " << k << " ticks later";
+    }
+    ASSERT_EQ(hash_state(*run.model, *other), hash_state(*run.model, *again)) << "divided at tick " << run.state->tick;
+  }
+  std::printf("%zu divisions, %zu of them with the needle in the tissue; places moved by at most %.1e m\n", divided, in_tissue,
+              double{furthest});
+  EXPECT_GT(divided, 12u);
+  EXPECT_GT(in_tissue, 3u);
+}
+
+// Cuts that begin and end anywhere and cross each other. Nothing is lost, and every state can be saved and continued.
+TEST(Topology, slits_that_cross_each_other_leave_a_sound_body) {
+  const std::shared_ptr<const Model> model = build_model(read_scene("purse_string"));
+  StatePtr state = initial_state(*model), other = initial_state(*model);
+  Random random(11);
+  Jobs one(1), two(2);
+  TickInput nobody;
+  for (ToolInput& h : nobody.hand) h.connected = 0;
+  size_t slits = 0;
+  for (int i = 0; i < 25; ++i) {
+    const Model& now = current_model(*model, *state);
+    // The faces of a plane within a distance of a point of the wall.
+    const uint32_t center = random.next() % now.solver.tissue;
+    const Vec3 at = xyz(state->solver.x[center]);
+    const Vec3 normal = normalized(Vec3{random.uniform() - 0.5f, random.uniform() - 0.5f, random.uniform() - 0.5f});
+    const float reach = 0.005f + 0.02f * random.uniform();
+    std::vector<Topology::Face> face;
+    const CellGraph graph(now);
+    const auto place = [&](uint32_t prism) {
+      Vec3 sum;
+      for (uint32_t c = 3 * prism; c < 3 * prism + 3; ++c)
+        for (uint32_t k : now.cell[c]) sum += xyz(state->solver.x[k]) / 12.0f;
+      return sum;
+    };
+    for (uint32_t c = 0; c < now.cell.size(); ++c)
+      for (uint32_t f = 0; f < 4; ++f) {
+        const uint32_t beyond = graph.across(c, f);
+        if (beyond == kNoCell || beyond / 3 == c / 3 || distance(place(c / 3), at) > reach) continue;
+        if (dot(place(c / 3) - at, normal) <= 0 && dot(place(beyond / 3) - at, normal) > 0) face.push_back({c, f});
+      }
+    slits += divide(*model, *state, face) > 0;
+    const Model& then = current_model(*model, *state);
+    ASSERT_EQ(topology_error(*model, state->topology), "") << "slit " << i;
+    ASSERT_NEAR(mass(then) / mass(*model), 1, 1e-6);
+    ASSERT_EQ(count(pieces_by_clusters(then.solver)), then.pieces);
+    load_state(*model, *other, save_state(*model, *state));
+    for (int k = 0; k < 10; ++k) step(*model, *state, nobody, one), step(*model, *other, nobody, two);
+    ASSERT_TRUE(state_is_valid(*model, *state)) << "slit " << i;
+    ASSERT_EQ(hash_state(*model, *state), hash_state(*model, *other)) << "slit " << i;
+  }
+  const Model& now = current_model(*model, *state);
+  std::printf("%zu slits: %zu copies, %u pieces\n", slits, now.source.size(), now.pieces);
+  EXPECT_GT(slits, 15u);
 }
 
 // --- states that were damaged
