@@ -36,7 +36,7 @@ Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wal
   lips.inverse = wall::Inverse(wall::columns(s.wall));
   for (wall::Inverse* inverse : {&coupling.inverse, &lips.inverse}) inverse->need(s.wall.topology, {});  // takes its room
   const size_t n = thread::kMaxSoftPoints, columns = wall::columns(s.wall);
-  contact.reserve(n), foot.reserve(n), tilt.reserve(16 * n);
+  contact.reserve(n), foot.reserve(n), moved.reserve(n), tilt.reserve(16 * n);
   coupling.reserve(n);
   lips.contact.reserve(3 * columns), lips.last.reserve(3 * columns), lips.points.reserve(6 * columns);
   for (auto* list : {&lips.speed, &lips.change, &lips.before, &lips.onward}) list->reserve(3 * columns);
@@ -60,6 +60,7 @@ namespace {
 // coupling, because every point answers every other.
 void find_contacts(const Model& m, const State& s, Scratch& k) {
   const float d = m.thread.material.diameter, r = 0.5f * d, h = m.wall.step;
+  const float far_move = m.thread.max_move * d * static_cast<float>(m.thread.substeps);
   size_t eyelet = 0, old = 0;
   uint32_t last_node = 0;
   size_t shared = 0;  // how many contacts use the last point
@@ -89,8 +90,9 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
     }
     const wall::Weights w = best.gap < 1e8f ? wall::weights(m.wall, s.wall.topology, best.point) : wall::Weights{};
     if (best.gap > 1e8f || (!memory && best.gap < -d)) continue;  // a node deep inside was never outside
-    const float closing = -dot(s.thread.v.at(i) - wall::velocity(w, s.wall.motion), best.normal);
-    if (best.gap - r > 0.5f * d + 1.5f * h * std::max(0.0f, closing)) continue;
+    const float closing = dot(wall::velocity(w, s.wall.motion), best.normal);
+    // A node can reach its limit of speed within a substep.
+    if (best.gap - r > far_move + 1.5f * h * std::max(0.0f, closing)) continue;
     thread::SoftContact c;
     c.node = i, c.patch = best.patch, c.normal = best.normal, c.friction = m.surface_friction;
     if (memory) {
@@ -142,6 +144,8 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
   soft.step = m.wall.step;
   soft.at = k.coupling.at, soft.speed = k.coupling.speed, soft.axis = k.coupling.axis, soft.w = k.coupling.w;
   soft.tilt_first = k.coupling.tilt_first, soft.tilt = k.tilt, soft.impulse = k.coupling.impulse;
+  k.moved.resize(k.point.size());
+  soft.moved = k.moved;
   thread::Surroundings around;
   around.holds = hands.holds, around.pulls = hands.pulls, around.soft = &soft, around.soft_contacts = k.contact;
   k.thread.step(m.thread, s.thread, around);
@@ -153,6 +157,9 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
     s.lip.assign(k.lips.contact.begin(), k.lips.contact.end());
   }
   wall::finish_step(m.wall, s.wall, jobs);
+  k.landing = 0;
+  for (size_t i = 0; i < k.point.size(); ++i)
+    k.landing = std::max(k.landing, distance(k.coupling.now(i, s.wall), k.coupling.at[i] + k.moved[i]));
 }
 
 }  // namespace catgut::physical

@@ -64,6 +64,8 @@ struct Scratch {
   std::vector<float> offset;
   std::vector<thread::SoftContact> contact;
   std::vector<Foot> foot;  // per contact
+  std::vector<Vec3> moved;
+  float landing = 0;  // [m] largest distance, in the last step, from where the thread left a point to where the wall arrived
   std::vector<thread::SoftPoints::Tilt> tilt;
   explicit Scratch(const Model& model, const State& state);
 };

@@ -13,6 +13,7 @@
 namespace catgut::thread {
 namespace {
 
+constexpr float kMeet = 0.5f;  // of a segment: holes so near to each other are drawn together no further
 constexpr float kNear = 0.3f;  // of a segment: a node so near to the hole is measured along its span, not to the hole
 
 Vec3 hole_from(const State& state, const Scratch& s, const SoftPoints& soft, uint32_t point, size_t node) {
@@ -35,7 +36,8 @@ Vec3 from_before(const State& state, const Scratch& s, const SoftPoints& soft, s
   const Eyelet& eyelet = state.eyelet[e];
   if (e > 0 && state.eyelet[e - 1].segment + 1 == eyelet.segment) {
     const Vec3 here = hole_from(state, s, soft, eyelet.point, eyelet.segment);
-    return here - hole_from(state, s, soft, state.eyelet[e - 1].point, eyelet.segment);
+    const Vec3 between = here - hole_from(state, s, soft, state.eyelet[e - 1].point, eyelet.segment);
+    return length(between) < kMeet * state.rest[eyelet.segment] ? Vec3{} : between;
   }
   return hole_from(state, s, soft, eyelet.point, eyelet.segment - 1);
 }
@@ -43,7 +45,8 @@ Vec3 to_behind(const State& state, const Scratch& s, const SoftPoints& soft, siz
   const Eyelet& eyelet = state.eyelet[e];
   if (e + 1 < state.eyelet.size() && state.eyelet[e + 1].segment == eyelet.segment + 1) {
     const Vec3 here = hole_from(state, s, soft, eyelet.point, eyelet.segment);
-    return hole_from(state, s, soft, state.eyelet[e + 1].point, eyelet.segment) - here;
+    const Vec3 between = hole_from(state, s, soft, state.eyelet[e + 1].point, eyelet.segment) - here;
+    return length(between) < kMeet * state.rest[eyelet.segment] ? Vec3{} : between;
   }
   return hole_from(state, s, soft, eyelet.point, eyelet.segment + 2) * -1.0f;
 }

@@ -103,7 +103,7 @@ struct Scratch {
   struct SoftActive {
     Four normal{}, lt{}, pull_back{};
     uint32_t node = 0, point = 0;
-    float inverse = 0, mu = 0, level = 0, ln = 0;
+    float inverse = 0, mu = 0, level = 0, before = 0, ln = 0;
     bool slipped = false;
     uint32_t contact = 0;
   };

@@ -45,8 +45,9 @@ void begin_soft_contacts(const Settings& settings, State& state, Scratch& s, Sur
     a.inverse = 1 / (s.w[c.node] + s.soft_answer * w);
     a.normal = four(c.normal), a.mu = c.friction, a.node = c.node, a.point = c.point, a.contact = k;
     a.pull_back = four(settings.anchor * c.drift);
-    // A node that starts inside comes out at a limited speed.
-    a.level = std::max(gap, -kPushOut * settings.substep) - dot(a.normal, motion(s, a));
+    // A node that was inside before the substep comes out at a limited speed.
+    const float before = gap - dot(a.normal, motion(s, a)), target = std::min(0.0f, before + kPushOut * settings.substep);
+    a.level = before - target, a.before = before;
     a.ln = c.normal_impulse, a.lt = four(tangential(c.friction_impulse, c.normal));
     s.soft_active.push_back(a);
   }
@@ -76,7 +77,7 @@ void end_soft_contacts(const Settings& settings, State&, Scratch& s, Surrounding
     SoftContact& c = around.soft_contacts[a.contact];
     const Vec3 went = three(motion(s, a)), moved = tangential(went, c.normal);
     if (a.ln > 0) s.touched[a.node] = 1;
-    c.gap = a.level + dot(c.normal, went);
+    c.gap = dot(c.normal, went) + a.before;
     c.normal_impulse = a.ln, c.friction_impulse = three(a.lt);
     if (a.slipped || a.ln <= 0) {
       c.drift = {};

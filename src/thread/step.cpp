@@ -293,6 +293,8 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
     const uint32_t other = partner_of(state.key[k]);
     state.budget[k] -= s.segment_move[segment_of(state.key[k])] + (other < kTool ? s.segment_move[other] : 0.0f);
   }
+  if (around.soft)
+    for (size_t i = 0; i < s.soft_moved.size(); ++i) around.soft->moved[i] = three(s.soft_moved[i]);
   for (size_t i = 0; i < m; ++i) state.tension[i] = s.tension_sum[i] * part / (h * h);
   if (settings.breaks) break_overloaded(settings, state);
 }

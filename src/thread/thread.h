@@ -166,6 +166,7 @@ struct SoftPoints {
   std::span<const uint32_t> tilt_first;  // n + 1, into tilt
   std::span<const Tilt> tilt;
   std::span<Vec3> impulse;  // [N s] of the thread on each point; written by step
+  std::span<Vec3> moved;    // [m] where the thread left each point, from `at`; written by step
 };
 // A node near the surface of something soft, for one step: it stays on its side of the plane that moves with the point.
 struct SoftContact {

@@ -74,5 +74,6 @@ void check_names(Lines& out, bool nightly);
 void check_ties(Lines& out, bool nightly);
 // src/physical.
 void check_eyelets(Lines& out, bool nightly);
+void check_sutures(Lines& out, bool nightly);
 
 }  // namespace catgut::validation

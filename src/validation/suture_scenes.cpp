@@ -53,7 +53,7 @@ void Sewn::move_holds(std::span<const Vec3> to, float seconds) {
 void Sewn::run(float seconds) { move_holds({}, seconds); }
 
 namespace {
-constexpr float kApart = 0.09f;  // [m] the hands' way to either side: farther than the thread is long
+constexpr float kApart = 0.25f;  // [m] the hands' way to either side: farther than the thread is long
 void soften(Sewn& s, float limit) {
   for (size_t i = 0; i < 2; ++i) s.hold[i].stiffness = 200, s.hold[i].limit = limit;
 }
@@ -104,7 +104,7 @@ void tie_throw(Sewn& s, Tying& t, Throw one) {
                   angle = phase + 0.5f * turns * along / half;
       curve.push_back(place({along, r * std::cos(angle), r * std::sin(angle)}));
     }
-    line(curve.back() + x * (first ? 0.1f : -0.1f) + z * 0.01f);
+    line(curve.back() + x * (first ? 0.6f : -0.6f) + z * 0.06f);
     // Nodes along the curve, a segment's length at rest apart.
     size_t at = 1;
     Vec3 p = curve[0];
@@ -127,18 +127,18 @@ void tie_throw(Sewn& s, Tying& t, Throw one) {
   }
   thread.key.resize(kept), thread.budget.resize(kept), thread.crossing.resize(kept);
   thread.travel = 1e9f;
-  // Forceps hold the throw below meanwhile.
+  // Forceps hold the throw below meanwhile, or strands that are drawn tight.
   s.hold.resize(2);
   s.hold[0].from = s.hold[0].to = thread.position(0), s.hold[1].from = s.hold[1].to = thread.position(n - 1);
-  const bool below = t.throws > 0;
+  const bool below = t.throws > 0 || thread.tension[thread.eyelet.front().segment] > 0.1f;
   if (below)
     for (const uint32_t i : {a, b, thread.eyelet.front().segment - 1, thread.eyelet.back().segment + 2}) {
       thread::Hold forceps;
-      forceps.node = i, forceps.from = forceps.to = thread.position(i), forceps.stiffness = 2000;
+      forceps.node = i, forceps.from = forceps.to = thread.position(i), forceps.stiffness = 1e4f;
       s.hold.push_back(forceps);
     }
   if (one.half_turns % 2 == 1) t.side = -t.side;
-  pull_apart(s, t, below ? 0.5f * t.tension : t.tension, 0.6f);
+  pull_apart(s, t, t.tension, 0.6f);
   s.hold.resize(2);
   pull_apart(s, t, t.tension, 0.3f);
   ++t.throws;
@@ -213,6 +213,15 @@ Sewn purse_string(const Stitch& q, int passages) {
   s.state.thread = lay_course(course, q.segment, q.hole_friction);
   s.start();
   return s;
+}
+
+void draw_purse(Sewn& s, float tension, float seconds) {
+  const Vec3 to[2] = {{0.3f, 0.03f, -0.004f}, {0.3f, -0.03f, -0.004f}};
+  for (int i = 1; i <= 12; ++i) {
+    soften(s, tension * std::min(1.0f, static_cast<float>(i) / 8));
+    if (i == 1) s.move_holds(to, seconds / 12);
+    else s.run(seconds / 12);
+  }
 }
 
 std::vector<float> gaps(const Sewn& s) {

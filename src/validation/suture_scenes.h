@@ -65,6 +65,9 @@ Sewn interrupted(const Stitch& stitch);
 // A running suture round the rim of one tube: `holes` passages through the wall (an even number), both ends outside.
 Sewn purse_string(const Stitch& stitch, int passages);
 
+// Both ends drawn away from the rim, the force growing to `tension` [N].
+void draw_purse(Sewn& sewn, float tension, float seconds);
+
 // Distances [m] between facing columns of two tubes' rims (mid-surface), round the ring.
 std::vector<float> gaps(const Sewn& sewn);
 // Area [m2] that the inner edge of a rim encloses, in the plane across its axis z.

@@ -122,6 +122,7 @@ std::vector<ValidationLine> run_validation(const std::function<void(const Valida
   validation::check_names(lines, nightly);
   validation::check_ties(lines, nightly);
   validation::check_eyelets(lines, nightly);
+  validation::check_sutures(lines, nightly);
   return lines.line;
 }
 

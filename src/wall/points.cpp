@@ -211,6 +211,11 @@ void Coupling::begin(const Model& m, const State& s) {
   tilt_first[n] = static_cast<uint32_t>(tilt.size());
 }
 
+Vec3 Coupling::now(size_t i, const State& s) const {
+  const Vec3 at_i = place(point[i], s.motion);
+  return offset[i] == 0 ? at_i : at_i + normalized(sum_of(point[i], s.motion.x, 1)) * offset[i];
+}
+
 void Coupling::end(State& s, Scratch& k) {
   std::fill(k.external.begin(), k.external.end(), Float4{});
   for (size_t i = 0; i < point.size(); ++i) {

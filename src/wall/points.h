@@ -111,6 +111,7 @@ struct Coupling {
     }
   }
   void end(State& state, Scratch& scratch);
+  Vec3 now(size_t i, const State& state) const;  // where point i is [m]
 
  private:
   std::vector<Point> material_;
