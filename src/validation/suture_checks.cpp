@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// validation: whole sutures. The thread is laid through the wall, drawn and tied; then the hands are gone for four seconds. What
-// is measured is seen from outside: gaps and openings, before and after, with the thread and without it.
+// validation: whole sutures. The thread is laid through the wall, drawn and tied; then the hands are gone for four seconds.
+// What is measured is seen from outside: gaps and openings, before and after, with the thread and without it.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -79,7 +79,8 @@ void check_purse_string(Lines& out) {
     s.run(3.9f);
     const double away = opening(s) / whole;
     if (!tied) {
-      out.add("closure/purse-string/ten passages, drawn with 2 N: opening that is left", 0, drawn, 0.5, "", "gathers: below half");
+      out.add("closure/purse-string/ten passages, drawn with 2 N: opening that is left", 0, drawn, 0.5, "",
+              "gathers: below half");
       out.add("closure/purse-string/untied, hands gone 4 s: opening", 1, away, 0.05, "", "opens again");
     } else {
       out.add("closure/purse-string/tied with three throws, hands gone 4 s: opening", 0, away, 0.5, "", "stays below half");
