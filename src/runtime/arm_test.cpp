@@ -90,7 +90,8 @@ ArmTestResult test_arms(ArmPort port, const ArmTestOptions& options, const std::
     say("hold each stylus lightly, like a pen: " + std::to_string(left));
     wait(1);
   }
-  if (options.countdown < 1) wait(double{options.countdown});
+  // The limiter engages at zero force only, so a pause precedes the first push even without a countdown.
+  wait(std::max(0.1, double{options.countdown} - std::floor(double{options.countdown})));
   const ArmStatus first = port.status(port.self, port.arm[0].present ? 0 : 1);
   const double start = wall_seconds();
   for (int axis = 0; axis < 3 && !stop; ++axis) {
