@@ -119,11 +119,11 @@ struct SutureView {
 
 struct PictureModel;
 
-// What cuts have made of the tissue.
+// Effect of cuts on the tissue.
 struct TopologyView {
   uint32_t version = 0;  // counts changes; 0: as built
   uint32_t pieces = 0;   // connected ones
-  // Of the tissue as it is, instead of the scene's: the same numbers, more of them. Constant; null: as built.
+  // Replaces the scene's model after a division: the same indices, then copies. Constant; null: as built.
   std::shared_ptr<const PictureModel> picture;
 };
 

@@ -101,7 +101,7 @@ std::span<const uint32_t> cluster_members(const SolverModel& model, uint32_t par
   const ShapeModel& shape = model.shape;
   const uint32_t* member = shape.member.data() + size_t{shape.cluster_of[particle]} * shape.cluster_stride;
   uint32_t count = 0;
-  while (count < shape.cluster_stride && member[count] < model.tissue) ++count;  // the pad names no particle
+  while (count < shape.cluster_stride && member[count] < model.tissue) ++count;  // padding names no particle
   return {member, count};
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/cell_graph: which tissue particles hang together through cells. Reads a model's cells; for building and cutting, never
-// for a tick.
+// sim/cell_graph: connectivity of tissue particles through cells. Reads a model's cells. For building and cutting; ticks do
+// not use it.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -16,19 +16,19 @@ class CellGraph {
  public:
   explicit CellGraph(const Model& model);
 
-  // Cells with that corner, ascending. A loose particle has its host cell.
+  // Cells with that corner, ascending. For a loose particle: its host cell.
   std::span<const uint32_t> cells_around(uint32_t particle) const {
     return {cell_.data() + first_[particle], first_[particle + 1] - first_[particle]};
   }
-  // The cell beyond a face, or kNoCell: the face is surface.
+  // The cell on the other side of a face; kNoCell: a surface face.
   uint32_t across(uint32_t cell, uint32_t face) const;
-  // The cell of a triangle of the surface, or one of its prism; kNoCell: there is none.
+  // The cell of a surface triangle, or a cell of its prism; kNoCell: none.
   uint32_t owner(const Triangle& triangle) const;
-  // Of the cells around `particle`s, the one in which `rest` [m] lies at rest, or which is nearest to it; kNoCell: none.
+  // Among the cells around `particle`s: the cell that contains `rest` [m] at rest, or the nearest; kNoCell: none.
   uint32_t locate(std::span<const uint32_t> particle, Vec3 rest) const;
 
-  // Everything that is connected to `start` by cells, on paths over particles whose source (source_of) is in `region`: what a
-  // place of the tissue can see of its neighborhood. The result is ascending and holds until the next call.
+  // All particles connected to `start` by cells, on paths over particles whose source (source_of) is in `region`. This set is
+  // the visible neighborhood of a point. The result is ascending and valid until the next call.
   const std::vector<uint32_t>& connected(std::span<const uint32_t> start, std::span<const uint32_t> region);
   bool was_connected(uint32_t particle) const { return seen_[particle] == stamp_; }
 
@@ -39,18 +39,18 @@ class CellGraph {
   uint32_t stamp_ = 0;
 };
 
-// The particle of the scene's model that a tissue particle is, or is a copy of.
+// The particle of the scene's model: the particle itself, or the source of a copy.
 inline uint32_t source_of(const Model& model, uint32_t particle) {
   const uint32_t built = model.solver.tissue - static_cast<uint32_t>(model.source.size());
   return particle < built ? particle : model.source[particle - built];
 }
-// Members of the cluster that is centered on a tissue particle.
+// Members of the cluster centered on a tissue particle.
 std::span<const uint32_t> cluster_members(const SolverModel& model, uint32_t particle);
 
-// Particles in no cell, each with the first cell whose corners are in its cluster: it goes where that cell goes.
+// Particles in no cell, each with the first cell whose corners are in its cluster. The particle stays with that cell.
 std::vector<LooseParticle> find_loose(const Model& model);
 
-// Model::piece and pieces, by flood fill.
+// Computes Model::piece and pieces by flood fill.
 void find_pieces(Model& model);
 
 }  // namespace catgut

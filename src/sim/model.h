@@ -22,12 +22,12 @@ struct ParkedStart {
   uint32_t particle = 0;  // nearest to the jaws
 };
 
-// A tissue particle outside all cells (the odd one in mid-wall), and the cell that it follows.
+// A tissue particle outside all cells (the unpaired one in mid-wall), and the cell that it follows.
 struct LooseParticle {
   uint32_t particle = 0, cell = 0;
 };
 
-// As built, or, with copies of particles, what sim/topology derives from it for a tissue that was divided.
+// The scene's model as built, or the model that sim/topology derives for divided tissue (with copies of particles).
 struct Model {
   SceneSpec scene;
   SolverModel solver;
@@ -54,7 +54,7 @@ struct Model {
   PictureModel picture;
 };
 
-// The technique that the scene names, at these rims, which are those of its walls in their order.
+// The scene's technique at these rims, which are in the order of the walls.
 TechniqueModel make_technique(const SceneSpec& scene, std::span<const Rim> rim);
 
 }  // namespace catgut

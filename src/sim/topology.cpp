@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/topology: the model of a divided tissue, and what of a topology that was read is wrong. See the header.
+// sim/topology: the model of a divided tissue, and validation of a loaded topology. See the header.
 #include "sim/topology.h"
 
 #include <algorithm>
@@ -19,13 +19,13 @@ Triangle sorted(Triangle t) {
   return t;
 }
 
-// Appends to a column of the built tissue the value of each copy's source.
+// Extends a column of the built tissue by the value of each copy's source.
 template <typename Column>
 void extend(Column& column, const std::vector<uint32_t>& source) {
   for (uint32_t i : source) column.push_back(column[i]);
 }
 
-// Inserts them between tissue and threads, which are in the same column.
+// Inserts the copies' values between tissue and threads, which share the column.
 template <typename Column>
 void extend_before_threads(Column& column, uint32_t tissue, const std::vector<uint32_t>& source) {
   Column copies;
@@ -34,7 +34,7 @@ void extend_before_threads(Column& column, uint32_t tissue, const std::vector<ui
 }
 
 // A particle's mass is a quarter of that of its cells (anatomy/wall). Copies share it as they share the cells: every piece has
-// the mass of its volume, and the sum stays.
+// the mass of its volume, and the sum is conserved.
 std::vector<double> shares_of_mass(const Model& m) {
   std::vector<double> volume(m.solver.tissue, 0), all(built_tissue(m), 0);
   const Vec4* x = m.solver.shape.rest.data();
@@ -51,7 +51,7 @@ std::vector<double> shares_of_mass(const Model& m) {
   return share;
 }
 
-// Every particle's cluster holds what the particle can still see of the one that it had.
+// Each particle's cluster keeps the members that the particle can still reach.
 std::vector<std::vector<uint32_t>> split_clusters(const Model& built, const Model& m, CellGraph& graph) {
   std::vector<uint8_t> copied(built.solver.tissue, 0);
   for (uint32_t i : m.source) copied[i] = 1;
@@ -62,7 +62,7 @@ std::vector<std::vector<uint32_t>> split_clusters(const Model& built, const Mode
       cluster[i] = {whole.begin(), whole.end()};
     else cluster[i] = graph.connected({&i, 1}, whole);
     if (cluster[i].size() <= EmbeddedPoint::kMaxParticles) continue;
-    // At the inner end of a slit, where it sees both sides: the particle itself and the first of the others.
+    // At the inner end of a slit, both sides are reachable. Keep the particle itself and the first of the others.
     std::erase(cluster[i], i);
     cluster[i].insert(cluster[i].begin(), i);
     cluster[i].resize(EmbeddedPoint::kMaxParticles);
@@ -70,7 +70,7 @@ std::vector<std::vector<uint32_t>> split_clusters(const Model& built, const Mode
   return cluster;
 }
 
-// What corner `particle` of a cell, or of another cell of its prism, is now.
+// Current index of corner `particle` of a cell, or of another cell of its prism.
 uint32_t corner_in_prism(const Model& built, const Model& m, uint32_t cell, uint32_t particle) {
   const uint32_t first = cell / 3 * 3;
   for (uint32_t c : {cell, first, first + 1, first + 2})
@@ -97,7 +97,7 @@ std::vector<Triangle> divide_surface(const Model& built, const Model& m, const T
 // A rim continues across a cut: its two ends there are neighbors in the list. Partners keep their common index.
 void divide_rims(const Model& built, Model& m) {
   const std::vector<Triangle>&was = built.solver.collision.surface, &now = m.solver.collision.surface;
-  // The present corner of a triangle of the strip between outer and inner rim that has all of `corners`.
+  // The current index of a corner of the strip triangle (outer to inner rim) that has all of `corners`.
   const auto corner_now = [&](Triangle corners, uint32_t corner) {
     const TissueCollision& c = built.solver.collision;
     for (uint32_t r = c.ring_first[corner]; r < c.ring_first[corner + 1]; ++r) {
@@ -204,7 +204,7 @@ std::string topology_error(const Model& model, const Topology& t) {
       if (!used[i]) return "a particle in no cell";
   for (size_t k = 0; k < t.source.size(); ++k)
     if (!used[tissue + k]) return "a copy in no cell";
-  // What is open is surface, and nothing else is.
+  // Exposed faces and surface must be the same set.
   const CellGraph graph(model);
   std::set<std::array<uint32_t, 2>> open;
   for (const Topology::Corner& c : t.corner)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/topology_divide: divides tissue between two ticks. Reads the cells; writes State::topology and carries everything over
-// that is embedded in the tissue. Not for hot paths: it allocates, and derives the model again.
+// sim/topology_divide: divides tissue between two ticks. Reads the cells; writes State::topology and updates all data embedded
+// in the tissue. Not for hot paths: it allocates, and derives the model again.
 #include <algorithm>
 #include <array>
 
@@ -16,8 +16,8 @@ bool same(const EmbeddedPoint& a, const EmbeddedPoint& b) {
   return a.count == b.count && a.particle == b.particle && a.weight == b.weight;
 }
 
-// Changes the weights of `t` as little as possible so that the sum of weight * x is `at` [m] and the sum of weights is 1: least
-// squares, in units of the distance between the particles.
+// Changes the weights of `t` as little as possible (least squares in units of the particle distance). Afterward the sum of
+// weight * x is `at` [m], and the sum of weights is 1.
 void move_to(EmbeddedPoint& t, const Vec4* x, Vec3 at) {
   double unit = 0;
   for (uint32_t k = 0; k < t.count; ++k) unit = std::max(unit, double{distance(xyz(x[t.particle[k]]), at)});
@@ -37,7 +37,7 @@ void move_to(EmbeddedPoint& t, const Vec4* x, Vec3 at) {
     size_t pivot = i;
     for (size_t j = i + 1; j < 4; ++j)
       if (std::abs(m[j][i]) > std::abs(m[pivot][i])) pivot = j;
-    if (std::abs(m[pivot][i]) < 1e-9) return;  // flat: what it has follows from its place at rest
+    if (std::abs(m[pivot][i]) < 1e-9) return;  // flat: keep the rest weights
     std::swap(m[i], m[pivot]);
     for (size_t j = 0; j < 4; ++j) {
       if (j == i) continue;
@@ -52,8 +52,8 @@ void move_to(EmbeddedPoint& t, const Vec4* x, Vec3 at) {
   }
 }
 
-// Carries what is embedded in the tissue from one topology to the next. A point lies in a cell; its particles beyond the cut
-// go, their share goes to those that its cell can still see, and the point stays where it is.
+// Moves embedded data from one topology to the next. A point lies in a cell. Its particles beyond the cut are removed, and
+// their share goes to particles reachable from its cell. Its position does not change.
 class Carry : public Archive<Carry> {
  public:
   Carry(const Model& built, const Model& before, const Model& now, const Vec4* x)
@@ -64,7 +64,7 @@ class Carry : public Archive<Carry> {
     for (size_t k = before.source.size(); k < now.source.size(); ++k) fresh_[now.source[k]] = 1;
   }
 
-  // --- as an archive over the state: embedded points, and slots, which move.
+  // --- as an archive over the state: visits embedded points, and slots, which move.
   template <typename T>
   void operator()(T& v) {
     if constexpr (std::is_same_v<T, EmbeddedPoint>) carry(v);
@@ -85,13 +85,13 @@ class Carry : public Archive<Carry> {
     if (slot >= before_.solver.tissue) slot += now_.solver.tissue - before_.solver.tissue;
   }
 
-  // The point of a bite: its triangle says in which cell it lies.
+  // The point of a bite: its triangle determines the cell.
   void carry(BiteEnd& end) {
     const EmbeddedPoint was = end.point;
     const Triangle& t = now_.solver.collision.surface[end.triangle];
     end.point = carried(was, graph_.owner(t));
     known_.push_back({was, end.point});
-    known_.push_back({end.point, end.point});  // the archive comes here too
+    known_.push_back({end.point, end.point});  // the archive visits it as well
   }
   void carry(EmbeddedPoint& t) {
     for (const auto& [was, is] : known_)
@@ -101,14 +101,14 @@ class Carry : public Archive<Carry> {
       }
     t = carried(t, kNoCell);
   }
-  // A particle that goes with what the cell of `end` can see.
+  // The copy of a particle that the cell of `end` can reach.
   uint32_t carried(uint32_t particle, const BiteEnd& end) {
     const uint32_t source = source_of(now_, particle), cell = graph_.owner(now_.solver.collision.surface[end.triangle]);
     if (!fresh_[source] || cell == kNoCell) return particle;
     see(cell, std::span(&source, 1));
     return seen_of(particle, particle);
   }
-  // Of a place that is fixed to a particle, at `rest` [m].
+  // For a position fixed to a particle, at `rest` [m].
   uint32_t carried(uint32_t particle, Vec3 rest) {
     const uint32_t source = source_of(now_, particle);
     if (!fresh_[source]) return particle;
@@ -120,7 +120,7 @@ class Carry : public Archive<Carry> {
   bool is_of(uint32_t particle, uint32_t other) const { return source_of(now_, particle) == source_of(now_, other); }
 
  private:
-  // Finds what a cell sees of the clusters of `source`s.
+  // Finds the particles of the clusters of `source`s that a cell can reach.
   void see(uint32_t cell, std::span<const uint32_t> source) {
     region_.clear();
     for (uint32_t i : source) {
@@ -130,7 +130,7 @@ class Carry : public Archive<Carry> {
     for (uint32_t i : now_.cell[cell]) region_.push_back(source_of(now_, i));
     graph_.connected(now_.cell[cell], region_);
   }
-  // The particle itself or its copy that the last `see` reached; else `none`.
+  // The particle or its copy that the last `see` reached; else `none`.
   uint32_t seen_of(uint32_t particle, uint32_t none) const {
     if (graph_.was_connected(particle)) return particle;
     for (uint32_t i : family_[source_of(now_, particle)])
@@ -144,10 +144,10 @@ class Carry : public Archive<Carry> {
     return false;
   }
 
-  // cell: in which it lies, or kNoCell.
+  // cell: the cell that contains the point, or kNoCell.
   EmbeddedPoint carried(const EmbeddedPoint& t, uint32_t cell) {
-    if (t.count < 2 || !near_cut(t)) return t;  // a particle keeps its number, and the part of the tissue that has it
-    // A point midway between two pieces of tissue is carried piece by piece.
+    if (t.count < 2 || !near_cut(t)) return t;  // a single particle keeps its number
+    // A point midway between two pieces of tissue is processed piece by piece.
     std::vector<uint32_t> piece;
     for (uint32_t k = 0; k < t.count; ++k)
       if (const uint32_t p = before_.piece[t.particle[k]]; std::find(piece.begin(), piece.end(), p) == piece.end())
@@ -192,7 +192,7 @@ class Carry : public Archive<Carry> {
       kept.weight[kept.count++] = t.weight[k];
     }
     if (kept.count == t.count) return kept;
-    // The corners of its cell are among its particles: they can carry it alone, wherever it is.
+    // The list contains the corners of the point's cell. They alone can represent any position.
     std::vector<uint32_t> list(kept.particle.begin(), kept.particle.begin() + kept.count);
     const Tet& corner = now_.cell[cell];
     std::erase_if(list, [&](uint32_t i) { return std::find(corner.begin(), corner.end(), i) != corner.end(); });
@@ -209,13 +209,13 @@ class Carry : public Archive<Carry> {
   const Model &built_, &before_, &now_;
   CellGraph graph_;
   const Vec4* x_;
-  std::vector<std::vector<uint32_t>> family_;  // per particle of the scene's model: itself and its copies
-  std::vector<uint8_t> fresh_;                 // per particle of the scene's model: it has a copy that is new
+  std::vector<std::vector<uint32_t>> family_;  // per particle of the scene's model: the particle and its copies
+  std::vector<uint8_t> fresh_;                 // per particle of the scene's model: has a new copy
   std::vector<uint32_t> region_;
   std::vector<std::pair<EmbeddedPoint, EmbeddedPoint>> known_;
 };
 
-// Columns get their copies' rows; clusters keep the rotation of the one that they were part of.
+// Extends columns by the copies' rows. Clusters keep the rotation of their former cluster.
 void carry_columns(const Model& before, const Model& now, std::span<const uint32_t> parent, SolverState& s) {
   const uint32_t tissue = before.solver.tissue;
   for (Column<Vec4>* column : {&s.x, &s.v, &s.pair_origin}) {
@@ -225,7 +225,7 @@ void carry_columns(const Model& before, const Model& now, std::span<const uint32
   }
   const ClusterRotations was = s.rotation;
   s.rotation.reset(now.solver.shape.clusters);
-  for (uint32_t i = now.solver.tissue; i-- > 0;) {  // the first particle of a cluster decides
+  for (uint32_t i = now.solver.tissue; i-- > 0;) {  // the first particle of a cluster wins
     const uint32_t from = before.solver.shape.cluster_of[i < tissue ? i : parent[i - tissue]];
     const uint32_t to = now.solver.shape.cluster_of[i];
     s.rotation.x[to] = was.x[from], s.rotation.y[to] = was.y[from];
@@ -240,7 +240,7 @@ void carry_sutures(const Model& now, Carry& carry, State& state) {
     for (Bite& b : u.bite) {
       const uint32_t was = b.nearest;
       b.nearest = carry.carried(was, b.entry);
-      // The spring of figure 4 is on that particle.
+      // The spring of figure 4 is attached to that particle.
       if (u.attached && !u.open.empty() && &b == &u.bite[u.open.back().bite])
         for (Attachment& a : state.solver.attach)
           if (a.body == static_cast<int>(now.solver.needle_body(k)) && a.point.count == 1) a.point = particle_point(b.nearest);
@@ -257,7 +257,7 @@ void carry_sutures(const Model& now, Carry& carry, State& state) {
     for (std::vector<BakedNode>* list : {&baked.node, &baked.knot})
       for (BakedNode& n : *list) n.particle = carry.carried(n.particle, xyz(shape.rest[n.particle]) + n.offset);
   for (InstrumentState& i : state.suture.instrument)
-    if (i.held == Held::nothing || i.held == Held::needle) carry.carry_number(i.slot);  // of what it held before
+    if (i.held == Held::nothing || i.held == Held::needle) carry.carry_number(i.slot);  // of the last held object
   for (ToolLoop& l : state.suture.loop)
     if (l.wraps == 0) carry.carry_number(l.first), carry.carry_number(l.last);
   for (Event& e : state.event.list)
@@ -279,7 +279,7 @@ void carry_state(const Model& built, const Model& before, std::span<const uint32
   }
 }
 
-// Cells with corner `particle`, by what hangs together there across faces that are not cut: the first holds the lowest cell.
+// Cells with corner `particle`, grouped by connectivity across uncut faces. The first group contains the lowest cell.
 std::vector<std::vector<uint32_t>> fans(const Model& m, const CellGraph& graph, const std::vector<uint8_t>& cut,
                                         uint32_t particle) {
   std::vector<std::vector<uint32_t>> fan;
@@ -295,7 +295,7 @@ std::vector<std::vector<uint32_t>> fans(const Model& m, const CellGraph& graph, 
     for (size_t head = 0; head < open.size(); ++head)
       for (uint32_t f = 0; f < 4; ++f) {
         const uint32_t c = open[head];
-        if (m.cell[c][f] == particle || cut[4 * c + f]) continue;  // the face opposite to it does not have it
+        if (m.cell[c][f] == particle || cut[4 * c + f]) continue;  // its opposite face excludes it
         const uint32_t other = graph.across(c, f);
         if (other == kNoCell || done[place(other)]) continue;
         done[place(other)] = 1;
@@ -329,7 +329,7 @@ uint32_t divide(const Model& model, State& state, std::span<const Topology::Face
 
   Topology next = state.topology;
   std::vector<Tet> cell = before.cell;
-  std::vector<uint32_t> parent;  // per new copy: the particle that it leaves
+  std::vector<uint32_t> parent;  // per new copy: its parent particle
   for (uint32_t i : touched) {
     const std::vector<std::vector<uint32_t>> fan = fans(before, graph, cut, i);
     for (size_t k = 1; k < fan.size(); ++k) {
@@ -344,7 +344,7 @@ uint32_t divide(const Model& model, State& state, std::span<const Topology::Face
     }
   }
   if (parent.empty()) return 0;
-  // Of two entries for a corner that was copied before, the later one counts.
+  // Of two entries for a corner copied before, the later one is valid.
   const auto place = [](const Topology::Corner& c) { return uint64_t{c.cell} * 4 + c.corner; };
   std::stable_sort(next.corner.begin(), next.corner.end(), [&](const auto& a, const auto& b) { return place(a) < place(b); });
   std::vector<Topology::Corner> corner;
@@ -376,7 +376,7 @@ uint32_t divide_by_plane(const Model& model, State& state, uint32_t wall, Vec3 p
   const Model& m = current_model(model, state);
   const Vec4* x = state.solver.x.data();
   const CellGraph graph(m);
-  // Prisms are cut as a whole, so that the new edge goes straight through the wall.
+  // Prisms are cut as a whole, so that the new edge crosses the wall straight.
   const size_t prisms = m.cell.size() / 3;
   std::vector<uint8_t> beyond(prisms, 0);
   for (size_t p = 0; p < prisms; ++p) {
@@ -390,7 +390,7 @@ uint32_t divide_by_plane(const Model& model, State& state, uint32_t wall, Vec3 p
       for (uint32_t f = 0; f < 4; ++f)
         if (const uint32_t other = graph.across(c, f); other != kNoCell && other / 3 != p) with(c, f, other / 3);
   };
-  // One that would be left without a neighbor on its side goes over to the other: no crumbs.
+  // A prism without a neighbor on its side is moved to the other side: no single-prism fragments.
   for (bool again = true; again;) {
     again = false;
     for (size_t p = 0; p < prisms; ++p) {

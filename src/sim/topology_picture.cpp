@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/topology_picture: the visible surface of a tissue that was divided. Reads the scene's surface and the cells; see the
+// sim/topology_picture: the visible surface of divided tissue. Reads the scene's surface and the cells; see the
 // header of sim/topology.
 #include <algorithm>
 #include <map>
@@ -36,8 +36,8 @@ class Divider {
     };
     for (uint32_t v = 0; v < vertices; ++v)
       if (near[v]) bind(whole, v, cell_of(v), mesh, v);
-    // A triangle across the cut goes with the side on which most of it lies; its other corners are drawn twice.
-    std::map<std::pair<uint32_t, uint32_t>, uint32_t> twin;  // vertex, cell that it goes with
+    // A triangle across the cut belongs to the side of most of its corners. Its other corners are duplicated.
+    std::map<std::pair<uint32_t, uint32_t>, uint32_t> twin;  // vertex, cell of the duplicate
     for (std::array<uint32_t, 3>& t : mesh.triangle) {
       if (!near[t[0]] && !near[t[1]] && !near[t[2]]) continue;
       const uint32_t in[3] = {cell_of(t[0]), cell_of(t[1]), cell_of(t[2])};
@@ -60,7 +60,7 @@ class Divider {
     }
   }
 
-  // Texture coordinates of cut edges: those of the vertex that follows a particle most.
+  // Texture coordinates of cut edges: those of the vertex with the largest weight on a particle.
   void find_nearest(const VisibleMesh& whole) {
     nearest_.assign(built_.solver.tissue, 0);
     std::vector<float> best(built_.solver.tissue, 0);
@@ -91,7 +91,7 @@ class Divider {
     for (uint32_t i : whole.skin_particle[v]) around.insert(around.end(), family_[i].begin(), family_[i].end());
     return graph_.locate(around, whole.position[v]);
   }
-  // Marks what a cell sees of its neighborhood.
+  // Marks the neighborhood that a cell can reach.
   void see(uint32_t cell, std::span<const uint32_t> source) {
     region_.clear();
     const auto add = [&](uint32_t i) {
@@ -112,7 +112,7 @@ class Divider {
     at->second = std::all_of(t.begin(), t.end(), [&](uint32_t i) { return graph_.was_connected(i); });
     return at->second;
   }
-  // Vertex `to` of `mesh` follows those particles of vertex `from` that its cell sees.
+  // Binds vertex `to` of `mesh` to the particles of vertex `from` that its cell can reach.
   void bind(const VisibleMesh& whole, uint32_t from, uint32_t cell, VisibleMesh& mesh, uint32_t to) {
     see(cell, whole.skin_particle[from]);
     std::array<uint32_t, 4> particle{};
@@ -127,7 +127,7 @@ class Divider {
         break;
       }
     }
-    if (sum < 0.05f) {  // all of them are beyond the cut
+    if (sum < 0.05f) {  // all are beyond the cut
       sum = 4;
       for (size_t k = 0; k < 4; ++k) particle[k] = m_.cell[cell][k], weight[k] = 1;
     }
@@ -142,8 +142,8 @@ class Divider {
 
   const Model &built_, &m_;
   CellGraph graph_;
-  std::vector<std::vector<uint32_t>> family_;  // per particle of the scene's model: itself and its copies
-  std::vector<uint8_t> near_;                  // per particle of the scene's model: one of its cluster has copies
+  std::vector<std::vector<uint32_t>> family_;  // per particle of the scene's model: the particle and its copies
+  std::vector<uint8_t> near_;                  // per particle of the scene's model: its cluster has copies
   std::vector<uint32_t> region_, nearest_;
   std::map<std::pair<uint32_t, uint32_t>, bool> together_;
 };

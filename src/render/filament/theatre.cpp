@@ -110,7 +110,7 @@ void Theatre::follow_topology(const TopologyView& topology) {
   tissue_.clear();
   for (const VisibleMesh& mesh : (divided_ ? *divided_ : model_).body)
     tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_));
-  // What they remember are vertices of the surface that was.
+  // They refer to vertices of the old surface.
   thread_.on_tissue.clear();
   mark_.on_tissue.clear();
   motion_ = {};
