@@ -18,6 +18,7 @@
 #include "procedure/scene_file.h"
 #include "sim/recording.h"
 #include "sim/simulation.h"
+#include "sim/topology.h"
 
 namespace catgut::fuzz {
 namespace {
@@ -113,7 +114,12 @@ bool state(const uint8_t* data, size_t size) {
   const Model& model = small_model();
   static const std::vector<std::byte> good = save_state(model, *initial_state(model));
   if (size == 0) return false;
-  std::vector<std::byte> bytes = good;
+  static const std::vector<std::byte> divided = [&] {
+    const StatePtr state = initial_state(model);
+    if (divide_by_plane(model, *state, 0, {0, 0, 0}, {1, 0, 0.1f}) == 0) fault("nothing was divided");
+    return save_state(model, *state);
+  }();
+  std::vector<std::byte> bytes = data[0] == 'd' ? divided : good;
   if (data[0] == 'r') {
     bytes.assign(reinterpret_cast<const std::byte*>(data) + 1, reinterpret_cast<const std::byte*>(data) + size);
   } else {
