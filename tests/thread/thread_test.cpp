@@ -12,6 +12,7 @@
 #include "thread/observe.h"
 #include "thread/topology.h"
 #include "validation/knot_scenes.h"
+#include "validation/tool_ties.h"
 
 namespace catgut::thread {
 namespace {
@@ -324,6 +325,22 @@ TEST(Observe, calls_a_gap_between_throws_an_air_knot) {
   EXPECT_TRUE(observe(settings, t.knot.state).air);
   validation::tighten(settings, t, 2);
   EXPECT_FALSE(observe(settings, t.knot.state).air);
+}
+
+// Hands that feel decide by the state of the thread; the same state must give the same tie.
+TEST(ToolTies, are_the_same_to_the_bit_every_time) {
+  const Settings settings = validation::knot_settings(0.25f);
+  validation::TieSettings how;
+  how.seed = 5;
+  const validation::TiedKnot first = validation::tie_with_tools(settings, {{1}}, how),
+                             second = validation::tie_with_tools(settings, {{1}}, how);
+  EXPECT_EQ(hash_state(first.state), hash_state(second.state));
+  EXPECT_EQ(first.determinant, 3u);
+  EXPECT_EQ(first.missed, 0);
+  EXPECT_LE(first.fastest, 1.01f * how.speed);
+  const SeenKnot seen = observe(settings, first.state);
+  EXPECT_EQ(seen.name, KnotName::single_throw);
+  EXPECT_EQ(seen.wraps, 1u);
 }
 
 }  // namespace
