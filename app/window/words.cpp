@@ -174,7 +174,7 @@ std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot&
   if (metrics.throws > 0) lines.push_back(fmt::format("knots {}, throws {}", metrics.knots, metrics.throws));
   if (metrics.faults_in_all > 0) lines.push_back(fmt::format("faults {}", metrics.faults_in_all));
   if (seen.active().needle.in_tissue) lines.push_back(fmt::format("bite {}: needle in tissue", metrics.bites + 1));
-  for (size_t k = 0; k < 2; ++k) {
+  for (size_t k = 0; k < kMaxHands; ++k) {
     static constexpr const char* kHeld[] = {"", "needle", "thread", "tissue"};
     const ToolView& tool = seen.tool[k];
     if (tool.held == Held::nothing && tool.loop_wraps == 0) continue;
@@ -211,7 +211,8 @@ std::vector<ResultRow> result_rows(const SceneSpec& scene, const SessionMetrics&
   rows.push_back({"cuts", fmt::format("{}", p.cuts)});
   rows.push_back({"finished sutures", fmt::format("{}", p.sutures_baked)});
   rows.push_back({"needle slips", fmt::format("{}", p.needle_slips)});
-  for (uint8_t hand = 0; hand < 2; ++hand) {
+  for (uint8_t hand = 0; hand < kMaxHands; ++hand) {
+    if (hand > 1 && p.path[hand] == 0) continue;  // an assistant who did nothing
     rows.push_back({fmt::format("{} path", tool_name(hand)), fmt::format("{:.2f} m", p.path[hand])});
     rows.push_back({fmt::format("{} peak force", tool_name(hand)), fmt::format("{:.1f} N", p.peak_force[hand])});
   }

@@ -150,8 +150,11 @@ std::string session_json(const SceneSpec& scene, const LiveResult& r) {
   j["cuts"] = p.cuts;
   j["sutures_baked"] = p.sutures_baked;
   j["needle_slips"] = p.needle_slips;
-  j["path_m"] = {p.path[0], p.path[1]};
-  j["peak_force_n"] = {newtons(p.peak_force[0]), newtons(p.peak_force[1])};
+  for (size_t k = 0; k < kMaxHands; ++k) {
+    if (k > 1 && p.path[k] == 0) continue;  // an assistant who did nothing
+    j["path_m"].push_back(p.path[k]);
+    j["peak_force_n"].push_back(newtons(p.peak_force[k]));
+  }
   j["opening_ratio"] = p.opening_start > 0 ? Json(p.opening / p.opening_start) : Json();
   j["faults"] = Json::object();
   for (size_t f = 1; f < p.faults.size(); ++f)

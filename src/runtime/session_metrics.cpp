@@ -61,7 +61,7 @@ void count(Counts& c, const Event& e) {
 
 void update(SessionMetrics& p, const Snapshot& seen, float dt) {
   if (!p.begun) p.opening_start = seen.opening_area;
-  for (size_t k = 0; k < 2; ++k) {
+  for (size_t k = 0; k < kMaxHands; ++k) {
     const float way = distance(seen.tool[k].pose.p, p.tip[k]);
     if (p.begun && way < 0.05f) p.path[k] += way;  // a hand that connects has not moved there
     p.tip[k] = seen.tool[k].pose.p;

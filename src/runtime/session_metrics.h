@@ -32,14 +32,14 @@ struct Counts {
 void count(Counts& counts, const Event& event);
 
 struct SessionMetrics : Counts {
-  double time_s = 0;             // [s] simulated, since the hands connected
-  float path[2] = {0, 0};        // [m] of each tool's tip
-  float peak_force[2] = {0, 0};  // [N] on each hand
-  float opening_start = 0;       // [m^2] when the hands connected; 0: nothing to close
-  float opening = 0;             // [m^2] current
-  float closure = 0;             // 0 open .. 1
-  uint32_t undos = 0;            // undone bites; not reset by an undo
-  std::array<Vec3, 2> tip{};     // [m] previous tool positions, for the path
+  double time_s = 0;                          // [s] simulated, since the hands connected
+  std::array<float, kMaxHands> path{};        // [m] of the tip of each hand's tool
+  std::array<float, kMaxHands> peak_force{};  // [N] on each hand
+  float opening_start = 0;                    // [m^2] when the hands connected; 0: nothing to close
+  float opening = 0;                          // [m^2] current
+  float closure = 0;                          // 0 open .. 1
+  uint32_t undos = 0;                         // undone bites; not reset by an undo
+  std::array<Vec3, kMaxHands> tip{};          // [m] previous tool positions, for the path
   bool begun = false;
 };
 

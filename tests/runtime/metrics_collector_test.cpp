@@ -132,5 +132,21 @@ TEST(MetricsCollector, faults_by_name_ends_in_hand_and_the_needle) {
   EXPECT_EQ(r.value["needle_detached"], 1);
 }
 
+TEST(SessionMetrics, the_path_and_force_of_every_hand_count) {
+  SessionMetrics m;
+  Snapshot seen;
+  for (int i = 0; i < 11; ++i) {
+    for (size_t k = 0; k < kMaxHands; ++k) {
+      seen.tool[k].pose.p.x = 0.001f * static_cast<float>(k) * static_cast<float>(i);
+      seen.tool[k].force.y = i == 5 ? static_cast<float>(k) : 0;
+    }
+    update(m, seen, 0.01f);
+  }
+  for (size_t k = 0; k < kMaxHands; ++k) {
+    EXPECT_NEAR(m.path[k], 0.01f * static_cast<float>(k), 1e-6f) << k;
+    EXPECT_FLOAT_EQ(m.peak_force[k], static_cast<float>(k));
+  }
+}
+
 }  // namespace
 }  // namespace catgut
