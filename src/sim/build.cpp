@@ -306,6 +306,126 @@ bool apply_preset(SolverSpec& s, const std::string& preset) {
   return true;
 }
 
+namespace {
+
+// All bodies one after the other, as the solver's columns hold them.
+struct Tissue {
+  std::vector<Vec3> rest;
+  std::vector<float> mass, radius, apart;
+  std::vector<uint32_t> body;
+  std::vector<std::vector<uint32_t>> cluster;
+  std::vector<Triangle> surface;
+  float drape = std::numeric_limits<float>::max();  // [m] height
+};
+
+void add_body(Model& m, const BodySpec& spec, Tissue& all) {
+  BodyRest r = make_body(spec);
+  const uint32_t first = static_cast<uint32_t>(all.rest.size());
+  float bottom = spec.position.y - kDrapeBelowRim;
+  if (lies(spec)) {
+    for (const Vec3& p : r.position) bottom = std::min(bottom, p.y - kDrapeBelowBody);
+  }
+  all.drape = std::min(all.drape, bottom);
+  double spacing = 0;
+  size_t edges = 0;
+  for (const Triangle& t : r.surface)
+    for (size_t k = 0; k < 3; ++k) spacing += distance(r.position[t[k]], r.position[t[(k + 1) % 3]]), ++edges;
+  spacing /= static_cast<double>(edges);
+  for (size_t i = 0; i < r.position.size(); ++i) {
+    all.rest.push_back(r.position[i]);
+    all.mass.push_back(r.mass[i]);
+    m.solver.inv_mass.push_back(r.pinned[i] ? 0.0f : 1.0f / (r.mass[i] * m.scene.solver.mass_scale));
+    all.radius.push_back(r.radius);
+    // Shape matching keeps neighbors in the wall apart, contact does not, at any particle size.
+    all.apart.push_back(static_cast<float>(std::max(2.2 * spacing, 2 * r.radius + spacing)));
+    const size_t wall_here = m.rim.size() + (r.wall.empty() ? 0 : r.wall[i]);
+    all.body.push_back(static_cast<uint32_t>(wall_here));  // two layers of one body collide like two bodies
+    m.wall.push_back(static_cast<uint8_t>(wall_here));
+    m.layer.push_back(static_cast<uint8_t>(r.layer[i]));
+  }
+  for (auto& c : r.cluster) {
+    for (uint32_t& i : c) i += first;
+    all.cluster.push_back(std::move(c));
+  }
+  for (Tet t : r.tet) m.cell.push_back({t[0] + first, t[1] + first, t[2] + first, t[3] + first});
+  for (Triangle t : r.surface) all.surface.push_back({t[0] + first, t[1] + first, t[2] + first});
+  for (size_t w = 0; w < static_cast<size_t>(r.walls); ++w) {
+    Rim rim = w < r.rim.size() ? r.rim[w] : Rim{};
+    for (uint32_t& i : rim.outer) i += first;
+    for (uint32_t& i : rim.inner) i += first;
+    m.picture.rim.push_back(rim.outer);
+    m.rim.push_back(std::move(rim));
+  }
+  for (auto& k : r.visible.skin_particle)
+    for (uint32_t& i : k) i += first;
+  m.picture.body.push_back(std::move(r.visible));
+}
+
+void set_solver_parameters(Model& m) {
+  const SceneSpec& scene = m.scene;
+  SolverModel& s = m.solver;
+  s.h = m.dt / static_cast<float>(m.substeps);
+  s.gravity = scene.solver.gravity;
+  s.tissue_gravity = scene.solver.gravity / scene.solver.mass_scale;
+  s.shape_sweeps = scene.solver.shape_sweeps;
+  s.shape_stiffness = stiffness_at(scene.solver.shape_stiffness, kPaperSubstep, s.h);
+  s.shape_relaxation = scene.solver.shape_relaxation;
+  s.self_sweeps = scene.solver.self_contact_sweeps;
+  s.contact_sweeps = scene.solver.contact_sweeps;
+  s.damping = scene.solver.damping;
+  s.thread_damping = scene.solver.thread_damping;
+  m.hand_compliance = 1 / scene.solver.hand_stiffness;
+  s.tool_force = scene.solver.tool_force;
+  s.friction = {scene.solver.friction_tissue, scene.solver.friction_tool, scene.solver.friction_thread};
+}
+
+void add_instruments_and_needles(Model& m, const std::vector<SutureSpec>& sutures, std::span<const InstrumentModel> own,
+                                 const std::string& where) {
+  const SceneSpec& scene = m.scene;
+  SolverModel& s = m.solver;
+  for (const InstrumentSpec& spec : instruments_of(scene)) {
+    const InstrumentModel* kind = find_instrument(spec.kind, own);
+    if (!kind) throw InputError(where, "instrument.kind \"" + spec.kind + "\" is not known", known_instruments(own));
+    m.suture.instrument.push_back(*kind);
+    s.body.push_back(kind->body);
+  }
+  for (const SutureSpec& u : sutures) {
+    const NeedleShape needle{u.needle.radius, u.needle.arc, u.needle.wire_radius, u.needle.mass};
+    s.needle_arc.push_back(needle_arc(needle));
+    s.body.push_back(needle_body(needle));
+  }
+}
+
+void set_mechanics(SutureModel& u, const SceneSpec& scene) {
+  u.attach_threshold = scene.mechanics.attach_threshold;
+  u.release_distance = scene.mechanics.release_distance;
+  u.attach_compliance = scene.mechanics.attach_compliance;
+  u.track_compliance = scene.mechanics.track_compliance;
+  u.pass_tension = scene.mechanics.pass_tension;
+  u.capstan_friction = scene.mechanics.capstan_friction;
+  u.grasp_reach = scene.mechanics.grasp_reach;
+  u.min_throws = scene.technique.throws;
+}
+
+// focus: the center of the field; tube: [m] radius of the first body.
+void describe_picture(Model& m, const std::vector<SutureSpec>& sutures, Vec3 focus, float tube) {
+  PictureModel& p = m.picture;
+  p.title = m.scene.title;
+  p.particle_rest.assign(m.start.begin(), m.start.begin() + static_cast<std::ptrdiff_t>(m.solver.tissue));
+  p.wall = m.wall;
+  p.suture.clear();
+  for (size_t k = 0; k < sutures.size(); ++k) {
+    const NeedleSpec& needle = sutures[k].needle;
+    const StrandModel& t = m.solver.strand[k];
+    p.suture.push_back({t.first_slot, t.count, t.radius, t.spacing, needle.radius, needle.arc, needle.wire_radius});
+  }
+  p.focus = focus;
+  p.field = 3 * tube;
+  p.drape = m.solver.ground;
+}
+
+}  // namespace
+
 std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const InstrumentModel> own) {
   auto model = std::make_shared<Model>();
   Model& m = *model;
@@ -320,127 +440,36 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
 
   // Soft bodies one after the other in the columns, followed by the thread.
   SolverModel& s = m.solver;
-  std::vector<Vec3> rest;
-  std::vector<float> mass, radius, apart;
-  std::vector<uint32_t> body;
-  std::vector<std::vector<uint32_t>> cluster;
-  std::vector<Triangle> surface;
-  float drape = std::numeric_limits<float>::max();
-  for (size_t b = 0; b < scene.body.size(); ++b) {
-    BodyRest r = make_body(scene.body[b]);
-    const uint32_t first = static_cast<uint32_t>(rest.size());
-    float bottom = scene.body[b].position.y - kDrapeBelowRim;
-    if (lies(scene.body[b])) {
-      for (const Vec3& p : r.position) bottom = std::min(bottom, p.y - kDrapeBelowBody);
-    }
-    drape = std::min(drape, bottom);
-    double spacing = 0;
-    size_t edges = 0;
-    for (const Triangle& t : r.surface)
-      for (size_t k = 0; k < 3; ++k) spacing += distance(r.position[t[k]], r.position[t[(k + 1) % 3]]), ++edges;
-    spacing /= static_cast<double>(edges);
-    for (size_t i = 0; i < r.position.size(); ++i) {
-      rest.push_back(r.position[i]);
-      mass.push_back(r.mass[i]);
-      s.inv_mass.push_back(r.pinned[i] ? 0.0f : 1.0f / (r.mass[i] * scene.solver.mass_scale));
-      radius.push_back(r.radius);
-      // Shape matching keeps neighbors in the wall apart, contact does not, at any particle size.
-      apart.push_back(static_cast<float>(std::max(2.2 * spacing, 2 * r.radius + spacing)));
-      const size_t wall_here = m.rim.size() + (r.wall.empty() ? 0 : r.wall[i]);
-      body.push_back(static_cast<uint32_t>(wall_here));  // two layers of one body collide like two bodies
-      m.wall.push_back(static_cast<uint8_t>(wall_here));
-      m.layer.push_back(static_cast<uint8_t>(r.layer[i]));
-    }
-    for (auto& c : r.cluster) {
-      for (uint32_t& i : c) i += first;
-      cluster.push_back(std::move(c));
-    }
-    for (Tet t : r.tet) m.cell.push_back({t[0] + first, t[1] + first, t[2] + first, t[3] + first});
-    for (Triangle t : r.surface) surface.push_back({t[0] + first, t[1] + first, t[2] + first});
-    for (size_t w = 0; w < static_cast<size_t>(r.walls); ++w) {
-      Rim rim = w < r.rim.size() ? r.rim[w] : Rim{};
-      for (uint32_t& i : rim.outer) i += first;
-      for (uint32_t& i : rim.inner) i += first;
-      m.picture.rim.push_back(rim.outer);
-      m.rim.push_back(std::move(rim));
-    }
-    for (auto& k : r.visible.skin_particle)
-      for (uint32_t& i : k) i += first;
-    m.picture.body.push_back(std::move(r.visible));
-  }
-  s.tissue = static_cast<uint32_t>(rest.size());
+  Tissue tissue;
+  for (const BodySpec& body : scene.body) add_body(m, body, tissue);
+  s.tissue = static_cast<uint32_t>(tissue.rest.size());
   s.count = s.tissue;
   for (const SutureSpec& u : sutures) {
     s.strand.push_back(make_strand(scene, u.thread, s.count, scene.solver.gravity));
     s.count += s.strand.back().count;
     s.inv_mass.resize(s.count, s.strand.back().inv_mass);
   }
-  s.shape = make_shape_model(rest, mass, cluster);
+  s.shape = make_shape_model(tissue.rest, tissue.mass, tissue.cluster);
   s.use_volume = scene.solver.volume;
   s.volume_compliance = scene.solver.volume_compliance;
-  if (s.use_volume) s.volume = make_volume_model(rest, m.cell);
-  s.collision = make_tissue_collision(s.shape.rest, radius, body, apart, surface);
-
-  s.h = m.dt / static_cast<float>(m.substeps);
-  s.gravity = scene.solver.gravity;
-  s.tissue_gravity = scene.solver.gravity / scene.solver.mass_scale;
-  s.shape_sweeps = scene.solver.shape_sweeps;
-  s.shape_stiffness = stiffness_at(scene.solver.shape_stiffness, kPaperSubstep, s.h);
-  s.shape_relaxation = scene.solver.shape_relaxation;
-  s.self_sweeps = scene.solver.self_contact_sweeps;
-  s.contact_sweeps = scene.solver.contact_sweeps;
-  s.damping = scene.solver.damping;
-  s.thread_damping = scene.solver.thread_damping;
-  m.hand_compliance = 1 / scene.solver.hand_stiffness;
-  s.tool_force = scene.solver.tool_force;
-  s.friction = {scene.solver.friction_tissue, scene.solver.friction_tool, scene.solver.friction_thread};
-  for (const InstrumentSpec& spec : instruments_of(scene)) {
-    const InstrumentModel* kind = find_instrument(spec.kind, own);
-    if (!kind) throw InputError(where, "instrument.kind \"" + spec.kind + "\" is not known", known_instruments(own));
-    m.suture.instrument.push_back(*kind);
-    s.body.push_back(kind->body);
-  }
-  for (const SutureSpec& u : sutures) {
-    const NeedleShape needle{u.needle.radius, u.needle.arc, u.needle.wire_radius, u.needle.mass};
-    s.needle_arc.push_back(needle_arc(needle));
-    s.body.push_back(needle_body(needle));
-  }
-  s.ground = drape;
-
-  SutureModel& u = m.suture;
-  u.attach_threshold = scene.mechanics.attach_threshold;
-  u.release_distance = scene.mechanics.release_distance;
-  u.attach_compliance = scene.mechanics.attach_compliance;
-  u.track_compliance = scene.mechanics.track_compliance;
-  u.pass_tension = scene.mechanics.pass_tension;
-  u.capstan_friction = scene.mechanics.capstan_friction;
-  u.grasp_reach = scene.mechanics.grasp_reach;
-  u.min_throws = scene.technique.throws;
-
+  if (s.use_volume) s.volume = make_volume_model(tissue.rest, m.cell);
+  s.collision = make_tissue_collision(s.shape.rest, tissue.radius, tissue.body, tissue.apart, tissue.surface);
+  s.ground = tissue.drape;
+  set_solver_parameters(m);
+  add_instruments_and_needles(m, sutures, own, where);
+  set_mechanics(m.suture, scene);
   m.technique = make_technique(scene, m.rim);
   m.loose = find_loose(m);
   find_pieces(m);
 
-  m.start = rest;
+  m.start = tissue.rest;
   const bool two = scene.body.size() > 1 && lies(scene.body[0]);
   const float tube = scene.body[0].radius;
   const Vec3 rim = two ? 0.5f * (scene.body[0].position + scene.body[1].position) : scene.body[0].position;
   lay_out_sutures(m, sutures, rim, two, tube);
   add_instruments(m, scene, rim, where);
-
-  PictureModel& p = m.picture;
-  p.title = scene.title;
-  p.particle_rest = rest;
-  p.wall = m.wall;
-  p.suture.clear();
-  for (size_t k = 0; k < sutures.size(); ++k) {
-    const NeedleSpec& needle = sutures[k].needle;
-    const StrandModel& t = s.strand[k];
-    p.suture.push_back({t.first_slot, t.count, t.radius, t.spacing, needle.radius, needle.arc, needle.wire_radius});
-  }
-  p.focus = two ? rim + Vec3{0, tube, 0} : rim;  // two ends are joined on top, where their rims face each other
-  p.field = 3 * tube;
-  p.drape = s.ground;
+  // Two ends are joined on top, where their rims face each other.
+  describe_picture(m, sutures, two ? rim + Vec3{0, tube, 0} : rim, tube);
   return model;
 }
 
