@@ -45,10 +45,13 @@ struct PictureModel {
   // threads being zero.
   std::vector<Vec3> particle_rest;
   std::vector<SuturePicture> suture = std::vector<SuturePicture>(1);  // as Snapshot::suture
-  std::vector<InstrumentPicture> instrument;                          // as Snapshot::instrument
-  Vec3 focus;                                                         // [m] center of the operating field
-  float field = 0.1f;                                                 // [m] its radius
-  float drape = -0.035f;  // [m] height of the sterile drape (horizontal), through which the organ protrudes
+  // Draws a strand from the entry of an open bite to the needle (paper 2.2), where the paper has no thread. Preset "paper"
+  // only.
+  bool visual_guide = false;
+  std::vector<InstrumentPicture> instrument;  // as Snapshot::instrument
+  Vec3 focus;                                 // [m] center of the operating field
+  float field = 0.1f;                         // [m] its radius
+  float drape = -0.035f;                      // [m] height of the sterile drape (horizontal), through which the organ protrudes
   // One per wall that the procedure works on: tissue particles round its near opening, in order, on its outer side. Walls are
   // numbered: one per bowel end, and two (outer, inner) for a bowel folded into itself.
   std::vector<std::vector<uint32_t>> rim;

@@ -413,6 +413,7 @@ void describe_picture(Model& m, const std::vector<SutureSpec>& sutures, Vec3 foc
   p.title = m.scene.title;
   p.particle_rest.assign(m.start.begin(), m.start.begin() + static_cast<std::ptrdiff_t>(m.solver.tissue));
   p.wall = m.wall;
+  p.visual_guide = m.scene.solver.preset == "paper";
   p.suture.clear();
   for (size_t k = 0; k < sutures.size(); ++k) {
     const NeedleSpec& needle = sutures[k].needle;

@@ -103,7 +103,7 @@ void write_tube(ThreadView& view, const Surface& surface) {
 
 // A suture's thread in its pieces, and the guide to its needle.
 void add_suture(ThreadView& view, const SuturePicture& model, const SutureView& suture, std::span<const Vec3> particle,
-                float width) {
+                float width, bool guide) {
   for (size_t i = 0; i < suture.thread_order.size(); ++i) {
     const uint32_t slot = suture.thread_order[i];
     if (slot < particle.size() && is_finite(particle[slot])) view.through.push_back(particle[slot]);
@@ -111,7 +111,7 @@ void add_suture(ThreadView& view, const SuturePicture& model, const SutureView& 
   }
   add_strand(view, width);
   const Pose& needle = suture.needle.pose;
-  if (!suture.needle.in_tissue || suture.needle.bite >= suture.bite.size() || !is_finite(needle.p)) return;
+  if (!guide || !suture.needle.in_tissue || suture.needle.bite >= suture.bite.size() || !is_finite(needle.p)) return;
   // It follows the needle's own arc as far as the needle extends, which is the path that the thread will take.
   const Vec3 entry = suture.bite[suture.needle.bite].entry, swage = transform(needle, {model.needle_radius, 0, 0});
   const Vec3 middle = 0.5f * (entry + swage), bow = normalized(middle - needle.p, {0, 1, 0});
@@ -154,7 +154,7 @@ void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel&
   size_t tied = 0;
   for (size_t i = 0; i < std::min(model.suture.size(), snapshot.suture.size()); ++i) {
     const float width = std::max(model.suture[i].thread_radius, seen);
-    add_suture(view, model.suture[i], snapshot.suture[i], snapshot.particle, width);
+    add_suture(view, model.suture[i], snapshot.suture[i], snapshot.particle, width, model.visual_guide);
     for (const KnotView& knot : snapshot.suture[i].knot) {
       const Vec3 out = normal_at(tissue_at(view.on_tissue, tied++, knot.position, kKnotReach, tissue), tissue, motion);
       for (uint32_t k = 0; k < std::min<uint32_t>(knot.throws, KnotView::kMaxThrows); ++k)
