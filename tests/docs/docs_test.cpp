@@ -44,6 +44,13 @@ TEST(Docs, the_readme_program_is_the_sample) {
   EXPECT_EQ(readme.substr(start, end - start), program());
 }
 
+// .ci/run reads the command of the tests from here, so that it is the one that a reader copies.
+TEST(Docs, the_readme_has_the_two_commands_on_lines_of_their_own) {
+  const std::string readme = read_file(kRoot / "README.md");
+  for (const char* command : {"\n./catgut demo", "\n./catgut test"})
+    EXPECT_NE(readme.find(command), std::string::npos) << command;
+}
+
 TEST(Docs, the_manual_of_the_library_holds_the_sample) {
   std::istringstream lines(program());
   std::string comment;
