@@ -107,9 +107,12 @@ TEST_P(TickAllocation, none_from_when_the_hands_are_let_in) {
   std::string first;
   publish(*model, *state, seen);
   for (TickInput input; input.tick < last && !hands.surgeon->done(); ++input.tick) {
-    if (input.tick < settle)
+    if (input.tick < settle) {
       for (ToolInput& h : input.hand) h.connected = 0;
-    else input.hand = hands.surgeon->operate(seen, model->dt).hand;
+    } else {
+      const TickInput wanted = hands.surgeon->operate(seen, model->dt);
+      input.hand = wanted.hand, input.commands = wanted.commands;
+    }
     const uint64_t n = allocations_of([&] { step(*model, *state, input, jobs); });
     if (input.tick >= settle) {
       const bool settles = std::any_of(state->event.begin(), state->event.end(),

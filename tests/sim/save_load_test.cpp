@@ -57,9 +57,12 @@ TEST_P(EveryScene, saved_and_loaded_at_every_seventh_tick_goes_on_as_if_nothing_
   const uint64_t last = whole ? 1000000 : settle + static_cast<uint64_t>(9 / model->dt);
   size_t compared = 0, in_tissue = 0, events = 0;
   for (TickInput input; input.tick < last && !hands.surgeon->done(); ++input.tick) {
-    if (input.tick < settle)
+    if (input.tick < settle) {
       for (ToolInput& h : input.hand) h.connected = 0;
-    else input.hand = hands.surgeon->operate(seen, model->dt).hand;
+    } else {
+      const TickInput wanted = hands.surgeon->operate(seen, model->dt);
+      input.hand = wanted.hand, input.commands = wanted.commands;
+    }
     if (input.tick % 7 == 0) {
       // A run with one worker is compared with one with two, and vice versa.
       Jobs &mine = compared % 2 ? one : two, &others = compared % 2 ? two : one;
@@ -76,11 +79,12 @@ TEST_P(EveryScene, saved_and_loaded_at_every_seventh_tick_goes_on_as_if_nothing_
               in_tissue, events);
   EXPECT_GT(compared, 70u);
   EXPECT_GT(in_tissue, 5u);
+  EXPECT_FALSE(hands.surgeon->gave_up()) << "the procedure was not whole";
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                          testing::Values("purse_string", "connell", "stay", "lembert", "stress_one_body", "stress_two_bodies",
-                                         "two_sutures"),
+                                         "two_sutures", "clamps", "three_hands"),
                          [](const auto& scene) { return std::string(scene.param); });
 
 // A jaw closes in the tick directly after a load: nearby objects must be found by then.

@@ -51,9 +51,12 @@ Played scripted_run(const Model& model, size_t ticks) {
   for (size_t i = 0; i < ticks; ++i) {
     TickInput in;
     in.tick = i;
-    if (i < 30)
+    if (i < 30) {
       for (ToolInput& h : in.hand) h.connected = 0;
-    else in.hand = surgeon->operate(seen, model.dt).hand;
+    } else {
+      in = surgeon->operate(seen, model.dt);
+      in.tick = i;
+    }
     step(model, *state, in, jobs);
     publish(model, *state, seen);
     run.input.push_back(in);

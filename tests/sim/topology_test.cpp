@@ -71,9 +71,12 @@ struct Sewing {
   const Model& now() const { return current_model(*model, *state); }
   const TickInput& next_input() {
     input.tick = state->tick;
-    if (static_cast<float>(state->tick) * model->dt < scene.settle)
+    if (static_cast<float>(state->tick) * model->dt < scene.settle) {
       for (ToolInput& h : input.hand) h.connected = 0;
-    else input.hand = hands.surgeon->operate(seen, model->dt).hand;
+    } else {
+      input = hands.surgeon->operate(seen, model->dt);
+      input.tick = state->tick;
+    }
     return input;
   }
   void tick() {
