@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "wall/cut.h"
+#include "wall/patch.h"
 
 namespace catgut::physical {
 namespace {
@@ -29,36 +30,21 @@ Corners corners_of(const wall::Model& m, const wall::Topology& t, uint32_t face)
 Vec3 mid(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column]); }
 Vec3 director(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column + 1]); }
 
-// Nearest point of a bilinear patch or a triangle, in the patch's coordinates (those of wall::Point).
-struct Bilinear {
-  Vec3 p[4];
-  bool quad = true;
-  Vec3 at(float xi, float eta) const {
-    if (!quad) return p[0] * (1 - 0.5f * (xi + eta)) + p[1] * (0.5f * xi) + p[2] * (0.5f * eta);
-    const float a = 1 - xi, b = 1 + xi, c = 1 - eta, d = 1 + eta;
-    return (p[0] * (a * c) + p[1] * (b * c) + p[2] * (b * d) + p[3] * (a * d)) * 0.25f;
+// Nearest point of a patch, in its coordinates.
+void nearest(const wall::Patch& patch, Vec3 target, float& xi, float& eta) {
+  xi = eta = patch.quad ? 0.0f : 0.6f;
+  for (int i = 0; i < 5; ++i) {
+    const Vec3 a = patch.along_xi(eta), b = patch.along_eta(xi), r = target - patch.at(xi, eta);
+    const float aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), det = aa * bb - ab * ab;
+    if (!(det > 1e-12f * aa * bb)) return;
+    const float low = patch.quad ? -1.0f : 0.0f, high = patch.quad ? 1.0f : 2.0f, x0 = xi, y0 = eta;
+    xi = std::clamp(xi + (bb * dot(r, a) - ab * dot(r, b)) / det, low, high);
+    eta = std::clamp(eta + (dot(r, b) - ab * (xi - x0)) / bb, low, high);
+    if (!patch.quad) eta = std::min(eta, 2 - xi);
+    xi = std::clamp(x0 + (dot(r, a) - ab * (eta - y0)) / aa, low, patch.quad ? high : 2 - eta);
+    if (std::abs(xi - x0) + std::abs(eta - y0) < 1e-4f) return;
   }
-  Vec3 along_xi(float eta) const {
-    return quad ? ((p[1] - p[0]) * (1 - eta) + (p[2] - p[3]) * (1 + eta)) * 0.25f : (p[1] - p[0]) * 0.5f;
-  }
-  Vec3 along_eta(float xi) const {
-    return quad ? ((p[3] - p[0]) * (1 - xi) + (p[2] - p[1]) * (1 + xi)) * 0.25f : (p[2] - p[0]) * 0.5f;
-  }
-  void nearest(Vec3 target, float& xi, float& eta) const {
-    xi = eta = quad ? 0.0f : 0.6f;
-    for (int i = 0; i < 5; ++i) {
-      const Vec3 a = along_xi(eta), b = along_eta(xi), r = target - at(xi, eta);
-      const float aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), det = aa * bb - ab * ab;
-      if (!(det > 1e-12f * aa * bb)) return;
-      const float low = quad ? -1.0f : 0.0f, high = quad ? 1.0f : 2.0f, x0 = xi, y0 = eta;
-      xi = std::clamp(xi + (bb * dot(r, a) - ab * dot(r, b)) / det, low, high);
-      eta = std::clamp(eta + (dot(r, b) - ab * (xi - x0)) / bb, low, high);
-      if (!quad) eta = std::min(eta, 2 - xi);
-      xi = std::clamp(x0 + (dot(r, a) - ab * (eta - y0)) / aa, low, quad ? high : 2 - eta);
-      if (std::abs(xi - x0) + std::abs(eta - y0) < 1e-4f) return;
-    }
-  }
-};
+}
 
 }  // namespace
 
@@ -102,13 +88,13 @@ Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface&
   const Corners c = corners_of(m, s.topology, patch.face);
   Foot foot;
   foot.patch = index;
-  Bilinear b;
+  wall::Patch b;
   float xi = 0, eta = 0;
   if (patch.side != 0) {
     b.quad = c.quad;
     for (uint32_t k = 0; k < c.count(); ++k)
       b.p[k] = mid(s, c.column[k]) + director(s, c.column[k]) * static_cast<float>(patch.side);
-    b.nearest(p, xi, eta);
+    nearest(b, p, xi, eta);
     foot.point = {patch.face, xi, eta, static_cast<float>(patch.side)};
     foot.facing = cross(b.along_xi(eta), b.along_eta(xi)) * static_cast<float>(patch.side);
     foot.on_edge = c.quad ? std::max(std::abs(xi), std::abs(eta)) > 0.9999f : std::min({xi, eta, 2 - xi - eta}) < 1e-4f;
@@ -116,7 +102,7 @@ Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface&
     const uint32_t from = c.column[patch.edge], to = c.column[(patch.edge + 1) % c.count()];
     b.p[0] = mid(s, from) - director(s, from), b.p[1] = mid(s, to) - director(s, to);
     b.p[2] = mid(s, to) + director(s, to), b.p[3] = mid(s, from) + director(s, from);
-    b.nearest(p, xi, eta);
+    nearest(b, p, xi, eta);
     foot.facing = cross(b.along_xi(eta), b.along_eta(xi));
     foot.on_edge = std::max(std::abs(xi), std::abs(eta)) > 0.9999f;
     const float q = xi;

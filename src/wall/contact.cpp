@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wall/patch.h"
+
 namespace catgut::wall {
 
 namespace {
@@ -15,32 +17,17 @@ float nearest_on_segment(Vec3 a, Vec3 b, Vec3 p) {
   return d2 > 0 ? std::clamp(dot(p - a, d) / d2, 0.0f, 1.0f) : 0.0f;
 }
 
-// The columns of a face, on the side zeta.
-struct Patch {
-  Vec3 p[4];
-  bool quad;
-  Vec3 at(float xi, float eta) const {
-    if (!quad) return p[0] * (1 - 0.5f * (xi + eta)) + p[1] * (0.5f * xi) + p[2] * (0.5f * eta);
-    const float a = 1 - xi, b = 1 + xi, c = 1 - eta, d = 1 + eta;
-    return (p[0] * (a * c) + p[1] * (b * c) + p[2] * (b * d) + p[3] * (a * d)) * 0.25f;
-  }
-  Vec3 along_xi(float eta) const {
-    return quad ? ((p[1] - p[0]) * (1 - eta) + (p[2] - p[3]) * (1 + eta)) * 0.25f : (p[1] - p[0]) * 0.5f;
-  }
-  Vec3 along_eta(float xi) const {
-    return quad ? ((p[3] - p[0]) * (1 - xi) + (p[2] - p[1]) * (1 + xi)) * 0.25f : (p[2] - p[0]) * 0.5f;
-  }
-  void step_toward(Vec3 target, float& xi, float& eta) const {
-    const Vec3 a = along_xi(eta), b = along_eta(xi), r = target - at(xi, eta);
-    const float aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), det = aa * bb - ab * ab;
-    if (!(det > 0)) return;
-    const float low = quad ? -1.0f : 0.0f, high = quad ? 1.0f : 2.0f;
-    const float next = std::clamp(xi + (bb * dot(r, a) - ab * dot(r, b)) / det, low, high);
-    eta = std::clamp(eta + (dot(r, b) - ab * (next - xi)) / bb, low, high);
-    if (!quad) eta = std::min(eta, 2 - next);
-    xi = next;
-  }
-};
+// One step toward the point nearest to target.
+void step_toward(const Patch& patch, Vec3 target, float& xi, float& eta) {
+  const Vec3 a = patch.along_xi(eta), b = patch.along_eta(xi), r = target - patch.at(xi, eta);
+  const float aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), det = aa * bb - ab * ab;
+  if (!(det > 0)) return;
+  const float low = patch.quad ? -1.0f : 0.0f, high = patch.quad ? 1.0f : 2.0f;
+  const float next = std::clamp(xi + (bb * dot(r, a) - ab * dot(r, b)) / det, low, high);
+  eta = std::clamp(eta + (dot(r, b) - ab * (next - xi)) / bb, low, high);
+  if (!patch.quad) eta = std::min(eta, 2 - next);
+  xi = next;
+}
 
 void find_plane(const State& s, float step, const Obstacle& o, uint32_t index, ContactSolver& solver) {
   for (uint32_t c = 0; c < columns(s); ++c)
@@ -77,7 +64,7 @@ void find_capsule(const Model& m, const State& s, const Obstacle& o, uint32_t in
     Patch mid{{c0, c1, c2, c3}, quad};
     float xi = quad ? 0 : 0.6f, eta = xi, t = t0;
     for (int i = 0; i < 4; ++i) {
-      mid.step_toward(lerp(o.a, o.b, t), xi, eta);
+      step_toward(mid, lerp(o.a, o.b, t), xi, eta);
       t = nearest_on_segment(o.a, o.b, mid.at(xi, eta));
     }
     // The side of the mid-surface on which the capsule's axis lies.
@@ -87,7 +74,7 @@ void find_capsule(const Model& m, const State& s, const Obstacle& o, uint32_t in
     for (int k = 0; k < 4; ++k) side.p[k] += vec3(s.motion.x[2 * corner[k][in] + 1]) * zeta;
     for (int i = 0; i < 4; ++i) {
       t = nearest_on_segment(o.a, o.b, side.at(xi, eta));
-      side.step_toward(lerp(o.a, o.b, t), xi, eta);
+      step_toward(side, lerp(o.a, o.b, t), xi, eta);
     }
     const Vec3 at = side.at(xi, eta), axis = lerp(o.a, o.b, t);
     const Vec3 facing = normalized(cross(side.along_xi(eta), side.along_eta(xi)), {0, 0, 1}) * zeta;
