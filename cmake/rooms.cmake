@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 # catgut_room(NAME BELOW room... USES library...): src/NAME/*.cpp becomes the library catgut_NAME.
+# IF OPTION: the room is built only with that option; its dependencies are checked all the same.
 # BELOW lists all rooms that NAME may include from; tests/layers reads the same lists through rooms.txt.
 file(WRITE ${PROJECT_BINARY_DIR}/rooms.txt "")
 function(catgut_room name)
-  cmake_parse_arguments(ROOM "" "" "BELOW;USES" ${ARGN})
+  cmake_parse_arguments(ROOM "" "IF" "BELOW;USES" ${ARGN})
   string(REPLACE ";" " " below "${ROOM_BELOW}")
   file(APPEND ${PROJECT_BINARY_DIR}/rooms.txt "${name}: ${below}\n")
+  if(ROOM_IF AND NOT ${ROOM_IF})
+    return()
+  endif()
   set_property(GLOBAL PROPERTY CATGUT_BELOW_${name} ${ROOM_BELOW})
   file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/${name}/*.cpp)
   if(sources)
