@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "procedure/manager.h"
 #include "render/frame_cost.h"
 #include "runtime/pictures.h"
 #include "runtime/session.h"
@@ -77,6 +78,17 @@ CLI::Validator within(double least, double most);
 void check_picture_files(const PictureOptions& options);
 // --video, --frames, --contact-sheet, --video-speed.
 void add_picture_options(CLI::App& command, PictureOptions& options);
+// A procedure that is observed during a run or a replay. It begins when the scene has settled. Throws InputError.
+struct ProcedureWatch {
+  explicit ProcedureWatch(const std::string& name);
+  void start(const SceneSpec& scene, const PictureModel& picture);
+  void tick(const Snapshot& seen);
+  Procedure procedure;
+  ProcedureRun run;
+
+ private:
+  double tick_s_ = 1.0 / 60, settle_s_ = 0;  // [s]
+};
 void add_threads_option(CLI::App& command, int& threads);
 
 // Set by the first Ctrl-C (the current tick is finished, files are closed); a second one ends the program at once.

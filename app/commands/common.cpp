@@ -13,6 +13,7 @@
 #include "commands/commands.h"
 #include "core/check.h"
 #include "core/file.h"
+#include "procedure/procedure_file.h"
 
 namespace catgut {
 namespace {
@@ -66,6 +67,19 @@ void check_picture_files(const PictureOptions& options) {
   check_suffix(options.video, ".mp4", "--video");
   check_suffix(options.contact_sheet, ".png", "--contact-sheet");
   for (const auto& [at_s, path] : options.still) check_suffix(path, ".png", "--still");
+}
+
+ProcedureWatch::ProcedureWatch(const std::string& name) : procedure(read_procedure(name)) {}
+
+void ProcedureWatch::start(const SceneSpec& scene, const PictureModel& picture) {
+  tick_s_ = 1 / static_cast<double>(scene.solver.tick_rate);
+  settle_s_ = static_cast<double>(scene.settle);
+  for (size_t k = 0; k < procedure.stage.size(); ++k) demo_tasks(procedure, k, scene, picture);  // reports errors early
+}
+
+void ProcedureWatch::tick(const Snapshot& seen) {
+  if (run.begun) update_run(run, procedure, seen);
+  else if (seen.time_s > settle_s_ - 0.5 * tick_s_) begin_run(run, procedure, seen, tick_s_);
 }
 
 void add_threads_option(CLI::App& command, int& threads) {

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "commands/commands.h"
+#include "procedure/measures.h"
 #include "procedure/scene_reference.h"
 
 namespace catgut {
@@ -15,10 +16,10 @@ void add_describe(CLI::App& app, int& exit_code) {
   };
   auto o = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("describe", "explain the keys of scene files");
-  command->add_option("key", o->key, "a key or a section; all when left out")->type_name("KEY");
+  command->add_option("key", o->key, "a key or a section, or procedure; all when left out")->type_name("KEY");
   command->add_flag("--markdown", o->markdown, "the whole reference page (docs/scene_reference.md)");
   command->callback([o, &exit_code] {
-    write_output("-", o->markdown ? reference_markdown() : describe(o->key));
+    write_output("-", o->markdown ? reference_markdown() : o->key == "procedure" ? measures_text() : describe(o->key));
     exit_code = 0;
   });
 }

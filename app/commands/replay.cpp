@@ -6,13 +6,14 @@
 #include "commands/commands.h"
 #include "core/check.h"
 #include "core/file.h"
+#include "procedure/scene_file.h"
 #include "runtime/report.h"
 
 namespace catgut {
 namespace {
 
 struct ReplayOptions {
-  std::string file, json;
+  std::string file, json, procedure;
   bool check = false;
   int threads = 1;
   PictureOptions pictures;
@@ -24,17 +25,25 @@ int replay(const ReplayOptions& o) {
   check_suffix(o.json, ".json", "--json");
   for (const std::string& path : {o.json, o.pictures.video, o.pictures.contact_sheet}) prepare_output(path);
   std::unique_ptr<Pictures> pictures;
+  std::optional<ProcedureWatch> procedure;
+  if (!o.procedure.empty()) procedure.emplace(o.procedure);
   SessionHooks hooks;
   hooks.stop = &stop_on_interrupt();
   hooks.on_progress = progress_line();
-  if (o.pictures.any()) {
-    hooks.on_start = [&](const PictureModel& model) { pictures = std::make_unique<Pictures>(o.pictures, model); };
-    hooks.on_tick = [&](const Snapshot& seen, const std::string& doing) { pictures->tick(seen, doing); };
-  }
+  hooks.on_start = [&](const PictureModel& model) {
+    if (procedure) procedure->start(parse_scene(recording.header.scene, o.file), model);
+    if (o.pictures.any()) pictures = std::make_unique<Pictures>(o.pictures, model);
+  };
+  hooks.on_tick = [&](const Snapshot& seen, const std::string& doing) {
+    if (procedure) procedure->tick(seen);
+    if (pictures) pictures->tick(seen, doing);
+  };
   const ReplayResult result = replay_session(recording, o.file, o.check, o.threads, hooks);
   end_progress_line();
   if (pictures) pictures->finish();
-  if (!o.json.empty()) write_output(o.json, replay_json(result, recording));
+  if (!o.json.empty())
+    write_output(o.json, procedure ? with_procedure(replay_json(result, recording), procedure->procedure, procedure->run)
+                                   : replay_json(result, recording));
 
   if (result.differs_at) {
     std::fprintf(stderr,
@@ -46,6 +55,7 @@ int replay(const ReplayOptions& o) {
   if (o.json != "-")
     std::printf("%s: %llu ticks replayed%s, state %016llx\n", o.file.c_str(), static_cast<unsigned long long>(result.run.ticks),
                 o.check ? ", all hashes verified" : "", static_cast<unsigned long long>(result.run.state_hash));
+  if (procedure && o.json != "-") std::fputs(run_table(procedure->run, procedure->procedure).c_str(), stdout);
   if (result.run.interrupted) return 130;
   // The readable part was replayed; a truncated file is still an error of the file.
   if (recording.truncated)
@@ -62,6 +72,7 @@ void add_replay(CLI::App& app, int& exit_code) {
   command->add_flag("--check", o->check, "compare every state hash with the recorded one");
   add_threads_option(*command, o->threads);
   command->add_option("--json", o->json, "results as JSON; -: standard output")->type_name("FILE|-");
+  command->add_option("--procedure", o->procedure, "report the stages and errors of a procedure")->type_name("NAME");
   add_picture_options(*command, o->pictures);
   command->callback([o, &exit_code] { exit_code = replay(*o); });
 }

@@ -9,6 +9,7 @@
 #include "commands/commands.h"
 #include "core/check.h"
 #include "core/file.h"
+#include "procedure/procedure_file.h"
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
 
@@ -16,7 +17,7 @@ namespace catgut {
 namespace {
 
 struct RunOptions {
-  std::string scene, preset, mesh, json;
+  std::string scene, procedure, preset, mesh, json;
   std::vector<std::string> set;
   uint64_t seed = 0;
   bool seed_given = false, headless = false, no_expect = false;
@@ -24,8 +25,8 @@ struct RunOptions {
   PictureOptions pictures;
 };
 
-SceneSpec scene_for(const RunOptions& o) {
-  SceneSpec scene = read_scene(o.scene);
+SceneSpec scene_for(const RunOptions& o, const Procedure* procedure) {
+  SceneSpec scene = procedure ? scene_of(*procedure) : read_scene(o.scene);
   if (!o.preset.empty()) use_preset(scene, o.preset);
   if (o.seed_given) set_value(scene, "seed=" + std::to_string(o.seed), "--seed");
   if (!o.mesh.empty()) {
@@ -43,7 +44,11 @@ SceneSpec scene_for(const RunOptions& o) {
 }
 
 int run(const RunOptions& o) {
-  const SceneSpec scene = scene_for(o);
+  std::optional<ProcedureWatch> procedure;
+  if (!o.procedure.empty()) procedure.emplace(o.procedure);
+  if (o.scene.empty() == !procedure)
+    throw InputError("run", "it needs either a scene or --procedure", "write catgut run SCENE, or catgut run --procedure NAME");
+  const SceneSpec scene = scene_for(o, procedure ? &procedure->procedure : nullptr);
   check_picture_files(o.pictures);
   check_suffix(o.session.record, ".cgrec", "--record");
   check_suffix(o.json, ".json", "--json");
@@ -60,17 +65,24 @@ int run(const RunOptions& o) {
   SessionHooks hooks;
   hooks.stop = &stop_on_interrupt();
   hooks.on_progress = progress_line();
-  if (o.pictures.any()) {
-    hooks.on_start = [&](const PictureModel& model) { pictures = std::make_unique<Pictures>(o.pictures, model); };
-    hooks.on_tick = [&](const Snapshot& seen, const std::string& doing) { pictures->tick(seen, doing); };
-  }
+  hooks.on_start = [&](const PictureModel& model) {
+    if (procedure) procedure->start(scene, model);
+    if (o.pictures.any()) pictures = std::make_unique<Pictures>(o.pictures, model);
+  };
+  hooks.on_tick = [&](const Snapshot& seen, const std::string& doing) {
+    if (procedure) procedure->tick(seen);
+    if (pictures) pictures->tick(seen, doing);
+  };
   const RunResult result = run_session(scene, o.session, hooks);
   end_progress_line();
-  if (!o.json.empty()) write_output(o.json, run_json(result));
+  if (!o.json.empty())
+    write_output(o.json, procedure ? with_procedure(run_json(result), procedure->procedure, procedure->run) : run_json(result));
   if (o.json != "-") std::fputs(run_summary(result, !o.no_expect).c_str(), stdout);
+  if (procedure && o.json != "-") std::fputs(run_table(procedure->run, procedure->procedure).c_str(), stdout);
   if (pictures) pictures->finish();  // last: an error in a picture does not lose results
   if (result.interrupted) return 130;
-  return o.no_expect || result.expectations_hold() ? 0 : 1;
+  if (o.no_expect) return 0;
+  return result.expectations_hold() && (!procedure || faultless(procedure->run, procedure->procedure)) ? 0 : 1;
 }
 
 }  // namespace
@@ -78,7 +90,11 @@ int run(const RunOptions& o) {
 void add_run(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<RunOptions>();
   CLI::App* command = app.add_subcommand("run", "simulate a scene");
-  command->add_option("scene", o->scene, "name from scenes/ or path of a .toml file")->required()->type_name("SCENE");
+  command->add_option("scene", o->scene, "name from scenes/ or path of a .toml file")->type_name("SCENE");
+  command
+      ->add_option("--procedure", o->procedure,
+                   "in place of a scene: report its stages and errors; code 1 unless all are done without")
+      ->type_name("NAME");
   command->add_option("--surgeon", o->session.surgeon, "scripted, none, or a recording whose hands are replayed")
       ->type_name("scripted|none|FILE")
       ->capture_default_str();

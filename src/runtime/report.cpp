@@ -100,6 +100,35 @@ std::string text(const Json& j) { return j.dump(2, ' ', false, Json::error_handl
 
 std::string run_json(const RunResult& result) { return text(json_of(result)); }
 
+std::string with_procedure(const std::string& json, const Procedure& procedure, const ProcedureRun& run) {
+  static constexpr const char* kState[] = {"waiting", "active", "done", "met", "skipped"};
+  Json j = Json::parse(json), p;
+  p["name"] = procedure.name;
+  p["title"] = procedure.title;
+  p["finished"] = finished(run, procedure);
+  p["faultless"] = faultless(run, procedure);
+  p["stages"] = Json::array();
+  for (size_t k = 0; k < run.record.size(); ++k) {
+    const StageRecord& r = run.record[k];
+    const bool over = r.state != StageState::waiting && r.state != StageState::active;
+    Json stage{{"name", procedure.stage[k].name}, {"state", kState[static_cast<size_t>(r.state)]}, {"errors", r.errors}};
+    stage["time_s"] = over ? Json(static_cast<double>(r.to - r.from) * run.tick_s) : Json();
+    stage["demonstrated"] = r.assisted;
+    p["stages"].push_back(stage);
+  }
+  p["errors"] = Json::array();
+  for (const ErrorNote& n : run.error)
+    p["errors"].push_back({{"time_s", static_cast<double>(n.tick) * run.tick_s},
+                           {"stage", procedure.stage[n.stage].name},
+                           {"error", n.error < procedure.error.size() ? procedure.error[n.error].name : "skipped"},
+                           {"text", error_text(procedure, n)}});
+  p["feedback"] = Json::array();
+  for (const Feedback& f : feedback(run, procedure))
+    p["feedback"].push_back({{"stage", procedure.stage[f.stage].name}, {"well", f.well}, {"text", f.text}});
+  j["procedure"] = p;
+  return text(j);
+}
+
 std::string replay_json(const ReplayResult& result, const Recording& recording) {
   Json j = json_of(result.run);
   j["recorded_by"] = recording.header.catgut_version;

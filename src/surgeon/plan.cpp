@@ -279,6 +279,14 @@ std::span<const char* const> plan_names() {
   return kName;
 }
 
+std::span<const char* const> task_names() {
+  static constexpr const char* kName[] = {"pick_up",    "bite",      "pull_tail", "pull_slack",  "pull_together", "hand_back",
+                                          "regrip",     "draw",      "throw",     "lock_strand", "cut_long",      "cut_tail",
+                                          "cut_needle", "take_both", "discard",   "fresh",       "rest"};
+  static_assert(std::size(kName) == static_cast<size_t>(TaskKind::rest) + 1);
+  return kName;
+}
+
 Plan make_plan(const std::string& name, const PictureModel& picture, const SurgeonSkill& skill) {
   const auto row = std::find_if(std::begin(kPlan), std::end(kPlan), [&](const PlanRow& r) { return r.name == name; });
   if (row == std::end(kPlan)) throw std::invalid_argument("there is no scripted surgeon for \"" + name + "\"");

@@ -68,5 +68,6 @@ struct Plan {
 // A plan is a row of one table. Throws std::invalid_argument for a name that is not in it, or a picture that does not fit.
 Plan make_plan(const std::string& name, const PictureModel& picture, const SurgeonSkill& skill);
 std::span<const char* const> plan_names();
+std::span<const char* const> task_names();  // of TaskKind, in order; in procedure files
 
 }  // namespace catgut
