@@ -4,7 +4,10 @@
 
 #include <algorithm>
 
+#include "core/archive.h"
 #include "core/hash.h"
+#include "physical/lacing.h"
+#include "physical/reflect.h"
 
 namespace catgut::physical {
 
@@ -42,6 +45,8 @@ Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wal
   for (auto* list : {&lips.speed, &lips.change, &lips.before, &lips.onward}) list->reserve(3 * columns);
   lips.w.reserve(9 * columns * columns);
   search.reserve(m.wall, s.wall, s.thread.nodes());
+  bodies.reserve(m.wall, s.wall);
+  holds.reserve(256);
   point.reserve(thread::kMaxSoftPoints), offset.reserve(thread::kMaxSoftPoints);
 }
 
@@ -51,6 +56,13 @@ uint64_t hash_state(const State& s) {
   h = hash_bytes(s.wall.motion.v.data(), s.wall.motion.v.size() * sizeof s.wall.motion.v[0], h);
   for (const thread::SoftContact& c : s.contact) h = hash_bytes(&c.normal_impulse, sizeof c.normal_impulse, h);
   for (const wall::Contact& c : s.lip) h = hash_bytes(&c.impulse, sizeof c.impulse, h);
+  if (!s.bodies.body.empty()) {
+    Hasher hasher;
+    Writer<Hasher> write(hasher);
+    write(s.bodies), write(s.needle);
+    const uint64_t more = hasher.digest();
+    h = hash_bytes(&more, sizeof more, h);
+  }
   return h;
 }
 
@@ -117,6 +129,23 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
   }
 }
 
+void begin_bodies(const Model& m, State& s, Scratch& k, const Hands& hands) {
+  const float h = m.wall.step;
+  s.bodies.memory.reserve(kMaxRows), s.hole.reserve(thread::kMaxEyelets);
+  predict_bodies(m.bodies, s.bodies, hands.targets, h, k.bodies);
+  skip_channels(m.needles, m.wall, s.wall, s.needle, s.bodies);
+  find_body_contacts(m.bodies, m.wall, s.wall, m.surface, s.bodies, h, k.bodies);
+  find_grips(m.bodies, m.wall, s.wall, m.surface, s.thread, m.thread.material.diameter, s.bodies, hands.targets, h, k.bodies);
+  find_needle_rows(m.needles, m.bodies, m.wall, s.wall, m.surface, s.thread, s.bodies, s.needle, h, k.bodies);
+  warm_bodies(m.bodies, s.bodies, hands.targets, k.wall, h, k.bodies);
+}
+
+void end_bodies(const Model& m, State& s, Scratch& k) {
+  settle_grips(m.bodies, m.wall, s.wall, s.thread, s.bodies, k.bodies);
+  advance_needles(m.needles, m.wall, s.wall, m.surface, s.bodies, s.needle, m.wall.step, k.bodies);
+  lace_threads(m, s);
+}
+
 }  // namespace
 
 void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) {
@@ -129,6 +158,8 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
     find_lips(m.wall, s.wall, m.surface, k.search, m.lip_friction, k.lips);
     wall::warm_start(m.wall, k.wall, k.lips);
   }
+  const bool bodies = !s.bodies.body.empty();
+  if (bodies) begin_bodies(m, s, k, hands);
   wall::begin_step(m.wall, s.wall, k.wall, jobs);
 
   // The thread in its holes and on the surface, on points that travel with the wall.
@@ -147,8 +178,17 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
   k.moved.resize(k.point.size());
   soft.moved = k.moved;
   thread::Surroundings around;
-  around.holds = hands.holds, around.pulls = hands.pulls, around.soft = &soft, around.soft_contacts = k.contact;
+  k.holds.assign(hands.holds.begin(), hands.holds.end());
+  if (bodies) {
+    show_bodies(m.bodies, s.bodies, m.wall.step, k.bodies);
+    k.holds.insert(k.holds.end(), k.bodies.hold.begin(), k.bodies.hold.end());
+    around.tools = k.bodies.tool;
+  }
+  around.holds = k.holds, around.pulls = hands.pulls, around.soft = &soft, around.soft_contacts = k.contact;
   k.thread.step(m.thread, s.thread, around);
+  for (size_t i = 0; i < k.holds.size(); ++i)
+    (i < hands.holds.size() ? hands.holds[i] : k.bodies.hold[i - hands.holds.size()]).force = k.holds[i].force;
+  if (bodies) take_thread_forces(m.bodies, s.bodies, k.bodies);
   k.coupling.end(s.wall, k.wall);
   s.contact.assign(k.contact.begin(), k.contact.end());
 
@@ -156,7 +196,9 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
     wall::solve_contacts(m.wall, s.wall, k.wall, {}, k.lips);
     s.lip.assign(k.lips.contact.begin(), k.lips.contact.end());
   }
+  if (bodies) solve_bodies(m.bodies, m.wall, s.wall, k.wall, s.bodies, hands.targets, k.bodies);
   wall::finish_step(m.wall, s.wall, jobs);
+  if (bodies) end_bodies(m, s, k);
   k.landing = 0;
   for (size_t i = 0; i < k.point.size(); ++i)
     k.landing = std::max(k.landing, distance(k.coupling.now(i, s.wall), k.coupling.at[i] + k.moved[i]));

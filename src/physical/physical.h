@@ -10,6 +10,8 @@
 #include <span>
 #include <vector>
 
+#include "physical/body.h"
+#include "physical/needle.h"
 #include "physical/surface.h"
 #include "thread/thread.h"
 #include "wall/contact.h"
@@ -31,6 +33,8 @@ struct Model {
   bool surface_contact = true;    // thread against the wall's surface
   bool lip_contact = true;        // wall against wall
   Surface surface;                // from make_surface
+  BodiesModel bodies;             // rigid tools and needles
+  NeedlesModel needles;
 };
 
 struct State {
@@ -39,6 +43,8 @@ struct State {
   std::vector<Hole> hole;                    // Eyelet::point is an index of these
   std::vector<thread::SoftContact> contact;  // memory of thread on wall; `point` is meaningless between steps
   std::vector<wall::Contact> lip;            // memory of wall on wall
+  Bodies bodies;
+  std::vector<Needle> needle;
 };
 
 // Loads and motions imposed in a step.
@@ -51,6 +57,7 @@ struct Hands {
     Vec3 force;
   };
   std::span<const WallPull> wall_pulls;
+  std::span<const HandTarget> targets;  // of State::bodies, in their order
 };
 
 // Workspace: its contents never affect the result of a later step.
@@ -67,6 +74,8 @@ struct Scratch {
   std::vector<Vec3> moved;
   float landing = 0;  // [m] largest distance, in the last step, from where the thread left a point to where the wall arrived
   std::vector<thread::SoftPoints::Tilt> tilt;
+  BodiesScratch bodies;
+  std::vector<thread::Hold> holds;  // those of the hands, then those of the bodies
   explicit Scratch(const Model& model, const State& state);
 };
 

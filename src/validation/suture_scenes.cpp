@@ -44,7 +44,8 @@ void Sewn::move_holds(std::span<const Vec3> to, float seconds) {
       hold[k].from = hold[k].to;
       if (k < to.size()) hold[k].to = lerp(from[k], to[k], static_cast<float>(i) / static_cast<float>(steps));
     }
-    physical::Hands hands{hold, pull, wall_pull};
+    physical::Hands hands;
+    hands.holds = hold, hands.pulls = pull, hands.wall_pulls = wall_pull;
     physical::step(model, state, *scratch, hands, *jobs);
   }
   for (thread::Hold& h : hold) h.from = h.to;

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical/body: see the header.
+#include "physical/body.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "physical/body_internal.h"
+
+namespace catgut::physical {
+namespace {
+
+// Columns of a face at their present places.
+struct Corners {
+  std::array<uint32_t, 4> column{};
+  uint32_t count = 4;
+};
+Corners corners_of(const wall::Model& m, const wall::Topology& t, uint32_t face) {
+  const uint32_t lane = m.lane_of_face[face], block = lane / wall::kLanesOfBlock, in = lane % wall::kLanesOfBlock;
+  Corners c;
+  for (size_t k = 0; k < 4; ++k) c.column[k] = t.corners[block].column[k][in];
+  c.count = t.corners[block].quads ? 4 : 3;
+  return c;
+}
+
+// Closest points of two segments, as fractions.
+void nearest_of_segments(Vec3 a, Vec3 b, Vec3 c, Vec3 d, float& s, float& t) {
+  const Vec3 u = b - a, v = d - c, r = a - c;
+  const float uu = dot(u, u), vv = dot(v, v), uv = dot(u, v), det = uu * vv - uv * uv;
+  s = det > 1e-6f * uu * vv ? std::clamp((uv * dot(v, r) - vv * dot(u, r)) / det, 0.0f, 1.0f) : 0.5f;
+  t = vv > 0 ? std::clamp((uv * s + dot(v, r)) / vv, 0.0f, 1.0f) : 0.0f;
+  s = uu > 0 ? std::clamp((uv * t - dot(u, r)) / uu, 0.0f, 1.0f) : 0.0f;
+}
+
+}  // namespace
+
+void add_capsule(BodyModel& m, Vec3 a, Vec3 b, float ra, float rb, int8_t jaw, float spacing) {
+  const int parts = std::max(1, static_cast<int>(std::ceil(distance(a, b) / spacing)));
+  const uint32_t first = static_cast<uint32_t>(m.sphere.size());
+  for (int i = 0; i <= parts; ++i) {
+    const float t = static_cast<float>(i) / static_cast<float>(parts);
+    m.sphere.push_back({lerp(a, b, t), ra + (rb - ra) * t, jaw});
+    if (i > 0) m.capsule.push_back({first + static_cast<uint32_t>(i) - 1, first + static_cast<uint32_t>(i)});
+  }
+  m.thread_capsule.push_back({first, first + static_cast<uint32_t>(parts)});
+}
+
+wall::Weights load_point(wall::Weights w, const wall::Motion& motion, Vec3 direction) {
+  wall::Weights up = w, mid = w;
+  up.zeta = 1, mid.zeta = 0;
+  const float along = dot(normalized(wall::place(up, motion) - wall::place(mid, motion)), direction);
+  w.zeta *= std::max(0.0f, 1 - along * along);
+  return w;
+}
+
+BodyModel make_tool(const ToolShape& t) {
+  BodyModel m;
+  m.hinge_z = t.jaw_reach, m.mass = t.mass;
+  m.inertia = t.mass * 0.02f * 0.02f;
+  const float tip = -0.5f * m.jaw_length;
+  for (const int8_t jaw : {int8_t{-1}, int8_t{1}}) {
+    const float side = static_cast<float>(jaw);
+    add_capsule(m, {side * t.tip_radius, 0, tip}, {side * t.hinge_radius, 0, t.jaw_reach}, t.tip_radius, t.hinge_radius, jaw,
+                1.8e-3f);
+  }
+  add_capsule(m, {0, 0, t.jaw_reach}, {0, 0, t.length}, t.shaft_radius, t.shaft_radius, 0, 3e-3f);
+  m.center = {0, 0, 0.06f};
+  return m;
+}
+
+Vec3 local(const BodyModel& m, const BodySphere& s, float opening) {
+  if (s.jaw == 0 || opening == 0) return s.at;
+  const float angle = -static_cast<float>(s.jaw) * opening, c = portable::cos(angle), d = portable::sin(angle);
+  const float z = s.at.z - m.hinge_z;
+  return {c * s.at.x + d * z, s.at.y, m.hinge_z - d * s.at.x + c * z};
+}
+
+void place_body(const BodyModel& m, Body& b, const Pose& pose, float opening) {
+  b = {};
+  b.pose = b.shown = pose, b.opening = b.shown_opening = opening;
+  b.target_place = transform(pose, m.center), b.target_turn = pose.q;
+}
+
+void BodiesScratch::reserve(const wall::Model& wm, const wall::State& ws) {
+  const size_t faces = wm.lane_of_face.size();
+  inverse = wall::Inverse(wall::columns(ws));
+  inverse.need(ws.topology, {});
+  row.reserve(kMaxRows), points.reserve(kMaxRows), wall_row.reserve(kMaxRows), w.reserve(kMaxRows * kMaxRows);
+  for (auto* list : {&speed, &change, &before, &onward}) list->reserve(kMaxRows);
+  face_center.reserve(faces), face_radius.reserve(faces), near.reserve(faces);
+  moving.reserve(64), tool.reserve(kMaxThreadCapsules), tool_body.reserve(kMaxThreadCapsules);
+  hold.reserve(64), hold_body.reserve(64), hold_at.reserve(64);
+}
+
+void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
+                        const Bodies& bodies, float h, BodiesScratch& k) {
+  const uint32_t faces = static_cast<uint32_t>(wm.lane_of_face.size());
+  k.face_center.resize(faces), k.face_radius.resize(faces);
+  for (uint32_t f = 0; f < faces; ++f) {
+    const Corners c = corners_of(wm, ws.topology, f);
+    Vec3 center{};
+    for (uint32_t i = 0; i < c.count; ++i) center += wall::vec3(ws.motion.x[2 * c.column[i]]) / static_cast<float>(c.count);
+    float radius2 = 0;
+    for (uint32_t i = 0; i < c.count; ++i)
+      radius2 = std::max(radius2, length2(wall::vec3(ws.motion.x[2 * c.column[i]]) - center));
+    k.face_center[f] = center;
+    k.face_radius[f] = std::sqrt(radius2) + length(wall::vec3(ws.motion.x[2 * c.column[0] + 1])) * 1.2f;
+  }
+  const float wall_speed = 1.0f;  // [m/s] of the wall, for the search alone
+  for (uint32_t b = 0; b < bodies.body.size(); ++b) {
+    const BodyModel& m = model.body[b];
+    const Body& body = bodies.body[b];
+    const BodiesScratch::Moving& moving = k.moving[b];
+    // The box of the body, then the faces in it.
+    Vec3 low{1e9f, 1e9f, 1e9f}, high = -low;
+    for (const BodySphere& s : m.sphere) {
+      const Vec3 p = transform(body.pose, local(m, s, body.opening));
+      low = {std::min(low.x, p.x - s.radius), std::min(low.y, p.y - s.radius), std::min(low.z, p.z - s.radius)};
+      high = {std::max(high.x, p.x + s.radius), std::max(high.y, p.y + s.radius), std::max(high.z, p.z + s.radius)};
+    }
+    const float fast = std::max(length(moving.v), length(body.velocity));
+    const float margin = model.reach + 2 * h * (fast + wall_speed);
+    k.near.clear();
+    for (uint32_t f = 0; f < faces; ++f) {
+      const Vec3 c = k.face_center[f];
+      const float r = k.face_radius[f] + margin;
+      if (c.x > low.x - r && c.y > low.y - r && c.z > low.z - r && c.x < high.x + r && c.y < high.y + r && c.z < high.z + r)
+        k.near.push_back(f);
+    }
+    if (k.near.empty()) continue;
+    const Grip& grip = body.grip;
+    const bool holds_tissue = grip.what == Gripped::tissue;
+    const Vec3 jaws = body.pose.p;
+    const auto skipped = [&](uint32_t sphere) { return sphere < 64 && (body.skip >> sphere & 1) != 0; };
+    const auto add = [&](uint32_t part, const Foot& foot, Vec3 on_axis, float radius, Vec3 jaw_speed, uint64_t kind) {
+      const float gap = foot.gap - radius;
+      const uint64_t key = key_of(kind, b, part, foot.patch);
+      const RowMemory* memory = remembered(bodies, key);
+      const bool pressed = memory && dot(memory->impulse, memory->axis) > 0 && dot(memory->axis, foot.normal) > 0.3f;
+      // An axis deep below a face belongs to the other face, unless it was pressed there.
+      if (foot.gap < (pressed ? -0.9f : -0.35f) * wm.laminate.thickness) return;
+      const wall::Weights w = load_point(wall::weights(wm, ws.topology, foot.point), ws.motion, foot.normal);
+      const Vec3 r = on_axis - foot.normal * radius - moving.center;
+      const Vec3 u = wall::velocity(w, ws.motion);
+      const float bound =
+          model.reach +
+          2 * h * std::max(length(point_speed(moving, r) + jaw_speed - u), length(body.velocity + cross(body.spin, r) - u));
+      if (gap > bound) return;
+      // The same plane from two patches that meet there is one contact.
+      for (size_t i = k.row.size(); i-- > 0 && k.row[i].a == b && (k.row[i].key >> 36) == (key >> 36);)
+        if (dot(k.row[i].axis, foot.normal) > 0.985f && std::abs(k.row[i].gap - gap) < 0.05e-3f) return;
+      if (k.row.size() >= kMaxRows - 40) return;
+      Row row;
+      row.key = key, row.a = b, row.on_wall = true, row.point = w;
+      row.ra = r, row.axis = foot.normal, row.gap = gap, row.speed = jaw_speed, row.friction = m.wall_friction;
+      if (memory) {
+        const float press = std::max(0.0f, dot(memory->impulse, memory->axis));
+        row.impulse = foot.normal * press + across(across(memory->impulse, memory->axis), foot.normal);
+      }
+      k.row.push_back(row);
+    };
+    for (uint32_t i = 0; i < m.sphere.size(); ++i) {
+      const BodySphere& s = m.sphere[i];
+      if (s.radius <= 0 || skipped(i)) continue;
+      const Vec3 in_body = local(m, s, body.opening);
+      const Vec3 p = transform(body.pose, in_body);
+      if (holds_tissue && s.jaw != 0 && distance(p, jaws) < 6e-3f) continue;
+      const Vec3 jaw_speed = s.jaw == 0 ? Vec3{} : rotate(body.pose.q, (local(m, s, moving.opening) - in_body) * (1 / h));
+      const float reach = s.radius + margin;
+      for (const uint32_t f : k.near) {
+        const float r = k.face_radius[f] + reach;
+        if (length2(k.face_center[f] - p) > r * r) continue;
+        for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
+          const Foot foot = nearest_on_patch(wm, ws, surface, q, p);
+          if (foot.gap - s.radius > margin || (foot.on_edge && foot.gap < 0)) continue;
+          add(i, foot, p, s.radius, jaw_speed, 1);
+        }
+      }
+    }
+    // A sharp edge of the wall between two spheres.
+    for (uint32_t i = 0; i < m.capsule.size(); ++i) {
+      const BodySphere &sa = m.sphere[m.capsule[i].a], &sb = m.sphere[m.capsule[i].b];
+      if (sa.radius <= 0 || sb.radius <= 0 || skipped(m.capsule[i].a) || skipped(m.capsule[i].b)) continue;
+      const Vec3 la = local(m, sa, body.opening), lb = local(m, sb, body.opening);
+      const Vec3 pa = transform(body.pose, la), pb = transform(body.pose, lb);
+      if (holds_tissue && sa.jaw != 0 && distance((pa + pb) * 0.5f, jaws) < 6e-3f) continue;
+      const Vec3 middle = (pa + pb) * 0.5f;
+      const float reach = 0.5f * distance(pa, pb) + std::max(sa.radius, sb.radius) + margin;
+      for (const uint32_t f : k.near) {
+        const uint32_t last = surface.first_of_face[f + 1], strip = surface.first_of_face[f] + 2;
+        if (strip >= last) continue;
+        const float r = k.face_radius[f] + reach;
+        if (length2(k.face_center[f] - middle) > r * r) continue;
+        const Corners c = corners_of(wm, ws.topology, f);
+        for (uint32_t q = strip; q < last; ++q)
+          for (const float zeta : {-1.0f, 1.0f}) {
+            const uint32_t e = surface.patch[q].edge, from = c.column[e], to = c.column[(e + 1) % c.count];
+            const Vec3 ea = wall::place(wall::at_column(from, zeta), ws.motion);
+            const Vec3 eb = wall::place(wall::at_column(to, zeta), ws.motion);
+            float t = 0, u = 0;
+            nearest_of_segments(pa, pb, ea, eb, t, u);
+            if (t < 0.05f || t > 0.95f) continue;
+            const Vec3 on = lerp(pa, pb, t), at = lerp(ea, eb, u), off = on - at;
+            const float far = length(off), radius = sa.radius + (sb.radius - sa.radius) * t;
+            if (far - radius > margin || far < 1e-6f) continue;
+            Foot foot = nearest_on_patch(wm, ws, surface, q, at);
+            const Vec3 up = wall::vec3(ws.motion.x[2 * from + 1]) * zeta;
+            if (dot(off, foot.facing) < -0.1f * far || dot(off, up) < -0.1f * far * length(up)) continue;
+            foot.normal = off / far, foot.gap = far;
+            const Vec3 jaw_speed =
+                sa.jaw == 0 ? Vec3{}
+                            : rotate(body.pose.q,
+                                     lerp(local(m, sa, moving.opening) - la, local(m, sb, moving.opening) - lb, t) * (1 / h));
+            foot.patch = 2 * q + (zeta > 0 ? 1 : 0);
+            add(i, foot, on, radius, jaw_speed, 2);
+          }
+      }
+    }
+  }
+}
+
+}  // namespace catgut::physical

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical/body_internal: small functions shared by body, grip and body_solve.
+#pragma once
+#include <algorithm>
+#include <cmath>
+
+#include "physical/body.h"
+
+namespace catgut::physical {
+
+constexpr float kMaxSpeed = 3, kMaxSpin = 150;  // [m/s], [rad/s]
+constexpr float kCorrect = 0.2f;                // fraction of an error that a bilateral row undoes per step
+constexpr float kBristle = 0.1e-3f;             // [m] elastic give of a grip before it slips
+constexpr float kThreadGripGive = 0.2e-3f;      // [m] the same for thread
+
+inline Vec3 across(Vec3 v, Vec3 axis) { return v - axis * dot(v, axis); }
+inline Vec3 clamped(Vec3 v, float limit) {
+  const float size = length(v);
+  return size > limit ? v * (limit / size) : v;
+}
+inline Quat turned(Quat q, Vec3 rotation) {  // after a rotation by a vector, world frame
+  const float angle = length(rotation);
+  return angle < 1e-12f ? q : normalized(axis_angle(rotation / angle, angle) * q);
+}
+inline Vec3 point_speed(const BodiesScratch::Moving& m, Vec3 r) { return m.v + cross(m.w, r); }
+
+inline float nearest_along(Vec3 a, Vec3 b, Vec3 p) {
+  const Vec3 d = b - a;
+  const float d2 = length2(d);
+  return d2 > 0 ? std::clamp(dot(p - a, d) / d2, 0.0f, 1.0f) : 0.0f;
+}
+
+constexpr uint64_t key_of(uint64_t kind, uint64_t body, uint64_t part, uint64_t patch) {
+  return kind << 60 | body << 52 | part << 36 | patch;
+}
+
+inline const RowMemory* remembered(const Bodies& bodies, uint64_t key) {
+  const auto at = std::lower_bound(bodies.memory.begin(), bodies.memory.end(), key,
+                                   [](const RowMemory& m, uint64_t k) { return m.key < k; });
+  return at != bodies.memory.end() && at->key == key ? &*at : nullptr;
+}
+
+}  // namespace catgut::physical

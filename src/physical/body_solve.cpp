@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical/body_solve: motion of the bodies under hands, thread and the solved rows. Declared in physical/body.h.
+#include <algorithm>
+#include <cmath>
+
+#include "physical/body_internal.h"
+
+namespace catgut::physical {
+namespace {
+
+// Velocity of the hand's target, from the target of the last step.
+struct Wish {
+  Vec3 away, speed, turn, spin;  // [m], [m/s], [rad], [rad/s]
+};
+Wish wish_of(const BodyModel& m, const Body& b, const HandTarget& t, float h) {
+  Wish w;
+  const Vec3 to = transform(t.pose, m.center);
+  w.away = to - center_of(m, b), w.turn = rotation_vector(normalized(t.pose.q * conjugate(b.pose.q)));
+  if (b.held) {
+    w.speed = clamped((to - b.target_place) / h, kMaxSpeed);
+    w.spin = clamped(rotation_vector(normalized(t.pose.q * conjugate(b.target_turn))) / h, kMaxSpin);
+  }
+  return w;
+}
+
+// Velocity after the hand's spring, other forces and impulses; inverse inertia for further impulses.
+void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, const HandTarget* t, float h, Vec3 push,
+                  Vec3 twist, BodiesScratch::Moving& out) {
+  push += b.thread_force * h, twist += b.thread_torque * h;
+  out.center = center_of(m, b), out.held = t && t->connected;
+  if (!out.held) {
+    if (m.falls) push += model.gravity * (m.mass * h);
+    const float keep = m.falls ? 1 - 2 * h : 1 - 50 * h;
+    out.inv_mass = 1 / m.mass, out.inv_inertia = 1 / m.inertia;
+    out.v = b.velocity * keep + push * out.inv_mass, out.w = b.spin * keep + twist * out.inv_inertia;
+    return;
+  }
+  const Wish w = wish_of(m, b, *t, h);
+  const float mass = m.mass + h * m.damping + h * h * m.stiffness;
+  out.inv_mass = 1 / mass;
+  out.v = (b.velocity * m.mass + (w.away * m.stiffness + w.speed * m.damping) * h + push) / mass;
+  const Vec3 force = (w.away - out.v * h) * m.stiffness + (w.speed - out.v) * m.damping;
+  if (length2(force) > m.max_force * m.max_force) {
+    // A hand at its strongest: constant force, no stiffness; it still damps the motion.
+    out.inv_mass = 1 / (m.mass + h * m.damping);
+    out.v = (b.velocity * (m.mass + h * m.damping) + normalized(force) * (m.max_force * h) + push) * out.inv_mass;
+  }
+  const float inertia = m.inertia + h * m.turn_damping + h * h * m.turn_stiffness;
+  out.inv_inertia = 1 / inertia;
+  out.w = (b.spin * m.inertia + (w.turn * m.turn_stiffness + w.spin * m.turn_damping) * h + twist) / inertia;
+  const Vec3 torque = (w.turn - out.w * h) * m.turn_stiffness + (w.spin - out.w) * m.turn_damping;
+  if (length2(torque) > m.max_torque * m.max_torque) {
+    out.inv_inertia = 1 / (m.inertia + h * m.turn_damping);
+    out.w = (b.spin * (m.inertia + h * m.turn_damping) + normalized(torque) * (m.max_torque * h) + twist) * out.inv_inertia;
+  }
+}
+
+}  // namespace
+
+void predict_bodies(const BodiesModel& model, const Bodies& bodies, std::span<const HandTarget> target, float h,
+                    BodiesScratch& k) {
+  k.moving.resize(bodies.body.size());
+  for (size_t i = 0; i < bodies.body.size(); ++i) {
+    start_motion(model, model.body[i], bodies.body[i], i < target.size() ? &target[i] : nullptr, h, {}, {}, k.moving[i]);
+    const Body& b = bodies.body[i];
+    const BodyModel& m = model.body[i];
+    float opening = i < target.size() && target[i].connected ? target[i].opening : b.opening;
+    opening = std::clamp(opening, b.opening - m.jaw_speed * h, b.opening + m.jaw_speed * h);
+    k.moving[i].opening = opening;
+  }
+  k.row.clear(), k.hold.clear(), k.hold_body.clear(), k.hold_at.clear();
+}
+
+void warm_bodies(const BodiesModel& model, const Bodies& bodies, std::span<const HandTarget> target, wall::Scratch& ws, float h,
+                 BodiesScratch& k) {
+  std::array<Vec3, kMaxBodies> push{}, twist{};
+  for (const Row& row : k.row) {
+    push[row.a] += row.impulse, twist[row.a] += cross(row.ra, row.impulse);
+    if (row.b != wall::kNone) push[row.b] -= row.impulse, twist[row.b] -= cross(row.rb, row.impulse);
+    if (row.on_wall) wall::add_to(ws.external, row.point, row.impulse / -h);
+  }
+  for (size_t i = 0; i < bodies.body.size(); ++i) {
+    const float opening = k.moving[i].opening;
+    start_motion(model, model.body[i], bodies.body[i], i < target.size() ? &target[i] : nullptr, h, push[i], twist[i],
+                 k.moving[i]);
+    k.moving[i].opening = opening;
+  }
+}
+
+void show_bodies(const BodiesModel& model, Bodies& bodies, float h, BodiesScratch& k) {
+  k.tool.clear(), k.tool_body.clear();
+  for (uint32_t b = 0; b < bodies.body.size(); ++b) {
+    const BodyModel& m = model.body[b];
+    Body& body = bodies.body[b];
+    const BodiesScratch::Moving& moving = k.moving[b];
+    Pose next;
+    next.q = turned(body.pose.q, clamped(moving.w, kMaxSpin) * h);
+    next.p = moving.center + clamped(moving.v, kMaxSpeed) * h - rotate(next.q, m.center);
+    for (const BodyCapsule& c : m.thread_capsule) {
+      if (k.tool.size() >= kMaxThreadCapsules) break;
+      const BodySphere &a = m.sphere[c.a], &z = m.sphere[c.b];
+      thread::ToolCapsule t;
+      t.a = transform(body.shown, local(m, a, body.shown_opening)),
+      t.b = transform(body.shown, local(m, z, body.shown_opening));
+      t.to_a = transform(next, local(m, a, moving.opening)), t.to_b = transform(next, local(m, z, moving.opening));
+      t.radius = std::max(std::abs(a.radius), std::abs(z.radius)), t.friction = m.thread_friction;
+      k.tool.push_back(t), k.tool_body.push_back(b);
+    }
+    for (size_t i = 0; i < k.hold.size(); ++i)
+      if (k.hold_body[i] == b) k.hold[i].to = transform(next, k.hold_at[i]);
+    body.shown = next, body.shown_opening = moving.opening;
+  }
+}
+
+void take_thread_forces(const BodiesModel& model, Bodies& bodies, BodiesScratch& k) {
+  for (Body& b : bodies.body) b.thread_force = b.thread_torque = {};
+  for (size_t i = 0; i < k.tool.size(); ++i) {
+    Body& b = bodies.body[k.tool_body[i]];
+    const Vec3 c = k.moving[k.tool_body[i]].center;
+    const thread::ToolCapsule& t = k.tool[i];
+    b.thread_force += t.force_a + t.force_b;
+    b.thread_torque += cross(t.a - c, t.force_a) + cross(t.b - c, t.force_b);
+  }
+  for (size_t i = 0; i < k.hold.size(); ++i) {
+    const uint32_t index = k.hold_body[i];
+    Body& b = bodies.body[index];
+    if (model.body[index].hinge_z <= 0) continue;  // a swage: its force enters through its row
+    const Vec3 at = transform(b.pose, k.hold_at[i]) - k.moving[index].center;
+    b.thread_force -= k.hold[i].force, b.thread_torque -= cross(at, k.hold[i].force);
+  }
+}
+
+void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& ws, wall::Scratch& wscratch, Bodies& bodies,
+                  std::span<const HandTarget> target, BodiesScratch& k) {
+  const float h = wm.step;
+  const size_t n = k.row.size();
+  k.points.clear(), k.wall_row.clear();
+  for (uint32_t i = 0; i < n; ++i)
+    if (k.row[i].on_wall)
+      k.row[i].place = static_cast<uint32_t>(k.points.size()), k.points.push_back(k.row[i].point), k.wall_row.push_back(i);
+  const size_t walls = k.points.size();
+  k.inverse.need(ws.topology, k.points);
+  k.w.resize(walls * walls), k.speed.resize(walls), k.change.assign(walls, {});
+  for (size_t i = 0; i < walls; ++i) {
+    for (size_t j = 0; j <= i; ++j)
+      k.w[i * walls + j] = k.w[j * walls + i] = k.inverse.compliance(ws.topology, k.points[i], k.points[j]);
+    k.speed[i] = wall::velocity(k.points[i], ws.motion);
+  }
+  for (Row& row : k.row) {
+    const auto inertia = [&](uint32_t body, Vec3 r) {
+      const BodiesScratch::Moving& m = k.moving[body];
+      row.diagonal_along += m.inv_mass + length2(cross(r, row.axis)) * m.inv_inertia;
+      row.diagonal_across += m.inv_mass + length2(r) * m.inv_inertia;
+    };
+    row.diagonal_along = row.diagonal_across = row.on_wall ? k.w[row.place * walls + row.place] : 0;
+    inertia(row.a, row.ra);
+    if (row.b != wall::kNone) inertia(row.b, row.rb);
+  }
+  const auto speed_of = [&](const Row& row) {
+    Vec3 u = point_speed(k.moving[row.a], row.ra) + row.speed;
+    if (row.b != wall::kNone) u = u - point_speed(k.moving[row.b], row.rb);
+    if (row.on_wall) u = u - k.speed[row.place];
+    return u;
+  };
+  const auto give = [&](Row& row, Vec3 d) {
+    BodiesScratch::Moving& a = k.moving[row.a];
+    a.v += d * a.inv_mass, a.w += cross(row.ra, d) * a.inv_inertia;
+    if (row.b != wall::kNone) {
+      BodiesScratch::Moving& b = k.moving[row.b];
+      b.v -= d * b.inv_mass, b.w -= cross(row.rb, d) * b.inv_inertia;
+    }
+    if (row.on_wall) {
+      k.change[row.place] -= d;
+      const float* w = k.w.data() + size_t{row.place} * walls;
+      for (size_t j = 0; j < walls; ++j) k.speed[j] -= d * w[j];
+    }
+  };
+  const auto project = [&](Row& row) {
+    const Vec3 u = speed_of(row);
+    const float un = dot(u, row.axis), pn = dot(row.impulse, row.axis);
+    const Vec3 ut = u - row.axis * un, pt = row.impulse - row.axis * pn;
+    switch (row.kind) {
+      case Row::Kind::contact: {
+        const float wanted = row.gap >= 0 ? -row.gap / h : std::min(-row.gap / h, model.push_out);
+        float press = std::max(0.0f, pn - (un - wanted) / row.diagonal_along);
+        row.at_limit = row.along_limit > 0 && press >= row.along_limit;
+        if (row.at_limit) press = row.along_limit;
+        return row.axis * press + clamped(pt - ut / row.diagonal_across, row.friction * press);
+      }
+      case Row::Kind::channel: {  // free along the needle but for friction; held across it
+        const float slide = std::clamp(pn - un / row.diagonal_along, -row.along_limit, row.friction * row.along_limit);
+        const Vec3 wanted = across(row.wanted, row.axis);
+        const Vec3 side = pt - (ut - wanted + pt * row.soft) / (row.diagonal_across + row.soft);
+        return row.axis * slide + clamped(side, row.across_limit);
+      }
+      case Row::Kind::grip: {
+        const float wn = dot(row.wanted, row.axis);
+        const float hold =
+            std::clamp(pn - (un - wn + pn * row.soft) / (row.diagonal_along + row.soft), -row.along_limit, row.along_limit);
+        const Vec3 wanted = across(row.wanted, row.axis);
+        const Vec3 side = pt - (ut - wanted + pt * row.soft) / (row.diagonal_across + row.soft);
+        row.at_limit = length2(side) > row.across_limit * row.across_limit;
+        return row.axis * hold + clamped(side, row.across_limit);
+      }
+      default:  // spring
+        return row.impulse - (u - row.wanted + row.impulse * row.soft) / (row.diagonal_across + row.soft);
+    }
+  };
+  k.before.resize(n), k.onward.assign(n, {});
+  float last2 = 0;
+  for (k.swept = 0; n > 0;) {
+    for (size_t i = 0; i < n; ++i) k.before[i] = k.row[i].impulse;
+    for (size_t i = 0; i < n; ++i) {
+      const Vec3 to = project(k.row[i]), d = to - k.row[i].impulse;
+      if (d == Vec3{}) continue;
+      k.row[i].impulse = to;
+      give(k.row[i], d);
+    }
+    float changed2 = 0, largest2 = 0, sum2 = 0;
+    for (size_t i = 0; i < n; ++i) {
+      const float d2 = length2(k.row[i].impulse - k.before[i]);
+      changed2 = std::max(changed2, d2), sum2 += d2, largest2 = std::max(largest2, length2(k.row[i].impulse));
+    }
+    if (++k.swept >= model.sweeps || changed2 <= model.accuracy * model.accuracy * largest2) break;
+    // Accelerated as in wall/contact: the next sweep starts from an extrapolation, and projects any overshoot back.
+    const float beta = last2 > 0 ? sum2 / last2 : 0;
+    last2 = sum2;
+    for (size_t i = 0; i < n; ++i) {
+      const Vec3 d = k.row[i].impulse - k.before[i];
+      if (beta >= 1 || beta == 0) {
+        k.onward[i] = beta == 0 ? d : Vec3{};
+        continue;
+      }
+      const Vec3 more = k.onward[i] * beta;
+      k.onward[i] = more + d;
+      if (more == Vec3{}) continue;
+      k.row[i].impulse += more;
+      give(k.row[i], more);
+    }
+  }
+  std::fill(wscratch.external.begin(), wscratch.external.end(), wall::Float4{});
+  for (size_t i = 0; i < walls; ++i) wall::add_to(wscratch.external, k.points[i], k.change[i]);
+  if (walls > 0) wall::apply_impulses(ws, wscratch, wscratch.external);
+  std::fill(wscratch.external.begin(), wscratch.external.end(), wall::Float4{});
+
+  for (uint32_t b = 0; b < bodies.body.size(); ++b) {
+    const BodyModel& m = model.body[b];
+    Body& body = bodies.body[b];
+    BodiesScratch::Moving& moving = k.moving[b];
+    Vec3 force{}, torque{};
+    for (const Row& row : k.row) {
+      if (row.a == b) force += row.impulse / h, torque += cross(row.ra, row.impulse) / h;
+      if (row.b == b) force -= row.impulse / h, torque -= cross(row.rb, row.impulse) / h;
+    }
+    body.force = force + body.thread_force, body.torque = torque + body.thread_torque;
+    moving.v = clamped(moving.v, kMaxSpeed), moving.w = clamped(moving.w, kMaxSpin);
+    body.hand_force = body.hand_torque = {};
+    if (moving.held) {
+      const Wish w = wish_of(m, body, target[b], h);
+      body.hand_force = clamped((w.away - moving.v * h) * m.stiffness + (w.speed - moving.v) * m.damping, m.max_force);
+      body.hand_torque =
+          clamped((w.turn - moving.w * h) * m.turn_stiffness + (w.spin - moving.w) * m.turn_damping, m.max_torque);
+      body.target_place = transform(target[b].pose, m.center), body.target_turn = target[b].pose.q;
+    }
+    body.held = moving.held;
+    body.velocity = moving.v, body.spin = moving.w, body.opening = moving.opening;
+    body.pose.q = turned(body.pose.q, moving.w * h);
+    body.pose.p = moving.center + moving.v * h - rotate(body.pose.q, m.center);
+  }
+  bodies.memory.clear();
+  for (const Row& row : k.row)
+    if (row.kind != Row::Kind::grip && !(row.impulse == Vec3{})) bodies.memory.push_back({row.key, row.axis, row.impulse});
+  std::sort(bodies.memory.begin(), bodies.memory.end(), [](const RowMemory& x, const RowMemory& y) { return x.key < y.key; });
+}
+
+}  // namespace catgut::physical

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical/grip: jaws that hold needle, thread and tissue by a normal force and Coulomb friction. Declared in physical/body.h.
+// A held point is fixed to the jaws by a row of the common solve; beyond friction it slides, and at the end of the jaws it
+// falls out.
+#include <algorithm>
+#include <cmath>
+
+#include "physical/body_internal.h"
+
+namespace catgut::physical {
+namespace {
+
+// The nearest point of the wall's surface to p among all faces.
+Foot nearest_surface(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
+                     float within) {
+  Foot best;
+  best.gap = 1e9f;
+  for (uint32_t f = 0; f < k.face_center.size(); ++f) {
+    const float r = k.face_radius[f] + within;
+    if (length2(k.face_center[f] - p) > r * r) continue;
+    for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
+      const Foot foot = nearest_on_patch(wm, ws, surface, q, p);
+      if (distance(foot.at, p) < best.gap) best = foot, best.gap = distance(foot.at, p);
+    }
+  }
+  return best;
+}
+
+void grip_needle(const BodiesModel& model, const Bodies& bodies, uint32_t tool, uint32_t needle, Vec3 at, Vec3 tangent,
+                 Grip& grip) {
+  const BodyModel& m = model.body[tool];
+  const Body &t = bodies.body[tool], &n = bodies.body[needle];
+  const Vec3 x = rotate(t.pose.q, {1, 0, 0}), along = normalized(across(tangent, x), rotate(t.pose.q, {0, 1, 0}));
+  const Vec3 side = cross(x, along);
+  grip.what = Gripped::needle, grip.body = needle, grip.count = 4;
+  for (uint32_t i = 0; i < 4; ++i) {
+    const Vec3 off = i < 2 ? along * (i == 0 ? m.jaw_width : -m.jaw_width) : side * (i == 2 ? 0.5e-3f : -0.5e-3f);
+    const Vec3 p = at + off;
+    grip.point[i] = {to_local(t.pose, p), to_local(n.pose, p), {}, {}};
+  }
+}
+
+}  // namespace
+
+void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
+                const thread::State& thread, float thread_diameter, Bodies& bodies, std::span<const HandTarget> target, float h,
+                BodiesScratch& k) {
+  for (uint32_t b = 0; b < bodies.body.size(); ++b) {
+    const BodyModel& m = model.body[b];
+    Body& body = bodies.body[b];
+    Grip& grip = body.grip;
+    if (m.hinge_z <= 0) continue;
+    const bool closing = b < target.size() && target[b].connected && target[b].grip > 0;
+    if (!closing && b < target.size() && target[b].connected) grip = {};
+    const auto gap_at = [&](float z) { return 2 * (m.hinge_z - z) * portable::sin(body.opening); };
+    if (closing && grip.what == Gripped::nothing && target[b].opening <= body.opening + 1e-4f) {
+      const auto in_jaws = [&](Vec3 p, float size) {
+        return std::abs(p.y) < m.jaw_width + 0.5f * size && std::abs(p.z) < 0.5f * m.jaw_length + 0.5f * size &&
+               std::abs(p.x) < 0.5f * gap_at(p.z) + 0.5f * size + 0.3e-3f;
+      };
+      const auto closed_on = [&](float z, float size) { return gap_at(z) <= size + 0.3e-3f; };
+      // Needle first, then thread, then tissue.
+      float best = 1e9f;
+      for (uint32_t n = 0; n < bodies.body.size() && (target[b].may_hold & 1); ++n) {
+        const BodyModel& nm = model.body[n];
+        if (nm.hinge_z > 0 || n == b) continue;
+        for (const BodyCapsule& c : nm.capsule) {
+          const Vec3 pa = transform(bodies.body[n].pose, nm.sphere[c.a].at),
+                     pb = transform(bodies.body[n].pose, nm.sphere[c.b].at);
+          const Vec3 on = lerp(pa, pb, nearest_along(pa, pb, body.pose.p)), in = to_local(body.pose, on);
+          const float size = 2 * std::abs(nm.sphere[c.a].radius), far = distance(on, body.pose.p);
+          if (far > best || !in_jaws(in, size) || !closed_on(in.z, size)) continue;
+          best = far;
+          grip = {};
+          grip_needle(model, bodies, b, n, on, normalized(pb - pa), grip);
+          grip.size = size;
+        }
+      }
+      if (grip.what == Gripped::nothing && (target[b].may_hold & 2)) {
+        const float size = thread_diameter;
+        for (uint32_t i = 0; i < thread.nodes(); ++i) {
+          const Vec3 p = thread.position(i), in = to_local(body.pose, p);
+          if (length2(in) > 25e-6f || length(in) > best || !in_jaws(in, size) || !closed_on(in.z, size)) continue;
+          best = length(in);
+          grip = {};
+          grip.what = Gripped::thread, grip.count = 1, grip.node = i, grip.size = size;
+          grip.point[0].in_tool = in;
+        }
+      }
+      if (grip.what == Gripped::nothing && (target[b].may_hold & 4) && closed_on(0, wm.laminate.thickness)) {
+        const Foot foot = nearest_surface(wm, ws, surface, k, body.pose.p, 3e-3f);
+        if (foot.gap < 1.2e-3f || (foot.gap < 1e8f && dot(body.pose.p - foot.at, foot.facing) < 0 && foot.gap < 2e-3f)) {
+          grip = {};
+          grip.what = Gripped::tissue, grip.count = 3, grip.size = 0.7f * wm.laminate.thickness;
+          const Vec3 u = any_perpendicular(foot.facing), v = cross(foot.facing, u);
+          for (uint32_t i = 0; i < 3; ++i) {
+            const Vec3 off = i == 0 ? u * 0.8e-3f : i == 1 ? v * 0.7e-3f - u * 0.4e-3f : -v * 0.7e-3f - u * 0.4e-3f;
+            Foot at;
+            at.gap = 1e9f;
+            for (uint32_t q = surface.first_of_face[surface.patch[foot.patch].face];
+                 q < surface.first_of_face[surface.patch[foot.patch].face + 1]; ++q) {
+              if (surface.patch[q].side != surface.patch[foot.patch].side) continue;
+              const Foot here = nearest_on_patch(wm, ws, surface, q, foot.at + off);
+              if (distance(here.at, foot.at + off) < std::abs(at.gap)) at = here, at.gap = distance(here.at, foot.at + off);
+            }
+            grip.point[i].tissue = at.point;
+            grip.point[i].in_tool = to_local(body.pose, at.at);
+          }
+        }
+      }
+    }
+    if (grip.what == Gripped::nothing) continue;
+    if (closing) grip.force = target[b].grip;
+    // The jaws cannot close beyond what they hold.
+    const float stop = std::min(0.5f, 0.5f * grip.size / m.hinge_z);
+    k.moving[b].opening = std::max(k.moving[b].opening, stop);
+    const float pinch = grip.force, part = 1.0f / static_cast<float>(grip.count);
+    const Vec3 x = rotate(body.pose.q, {1, 0, 0}), center = k.moving[b].center;
+    if (grip.what == Gripped::thread) {
+      thread::Hold hold;
+      hold.node = grip.node;
+      hold.from = transform(body.shown, grip.point[0].in_tool);
+      hold.limit = std::max(1e-3f, 2 * m.grip_friction * pinch);
+      hold.stiffness = hold.limit / kThreadGripGive;
+      k.hold.push_back(hold), k.hold_body.push_back(b), k.hold_at.push_back(grip.point[0].in_tool);
+      continue;
+    }
+    for (uint32_t i = 0; i < grip.count && k.row.size() < kMaxRows; ++i) {
+      GripPoint& g = grip.point[i];
+      Row row;
+      row.kind = Row::Kind::grip, row.key = key_of(4, b, i, 0), row.a = b, row.axis = x;
+      const Vec3 mine = transform(body.pose, g.in_tool);
+      Vec3 other;
+      row.ra = mine - center;
+      if (grip.what == Gripped::needle) {
+        row.b = grip.body;
+        other = transform(bodies.body[grip.body].pose, g.in_needle);
+        row.rb = other - k.moving[grip.body].center;
+      } else {
+        row.on_wall = true, row.point = wall::weights(wm, ws.topology, g.tissue);
+        other = wall::place(row.point, ws.motion);
+        row.point.zeta = 0;
+        row.soft = 0.1e-3f / (h * h);  // the tissue between the jaws: 10 N/mm
+      }
+      row.wanted = clamped((other - mine) * (kCorrect / h), model.push_out);
+      row.along_limit = std::max(pinch, 2.0f) * part * h * 4;  // the jaws' own strength, far above their friction
+      row.across_limit = 2 * m.grip_friction * pinch * part * h;
+      row.impulse = g.impulse;
+      k.row.push_back(row);
+    }
+  }
+}
+
+namespace {
+
+void slip_thread(const BodyModel& m, Body& b, const thread::Hold& hold, const thread::State& t) {
+  Grip& grip = b.grip;
+  GripPoint& g = grip.point[0];
+  const Vec3 node = t.position(hold.node), give = hold.to - node;
+  const float size = length(give);
+  if (size > kThreadGripGive) {
+    const Vec3 slip = give * (1 - kThreadGripGive / size);
+    grip.slid += length(slip);
+    g.in_tool = g.in_tool - rotate(conjugate(b.shown.q), slip);
+  }
+  // The neighbor that is nearer to the middle of the jaws takes over, with the same give.
+  const Vec3 middle{0, 0, std::clamp(g.in_tool.z, -0.5f * m.jaw_length, 0.5f * m.jaw_length)};
+  float best = distance(to_local(b.shown, node), middle);
+  for (const int d : {-1, 1}) {
+    const int64_t i = static_cast<int64_t>(hold.node) + d;
+    if (i < 0 || i >= static_cast<int64_t>(t.nodes()) || t.broken[static_cast<size_t>(std::min<int64_t>(i, hold.node))])
+      continue;
+    const Vec3 other = t.position(static_cast<size_t>(i));
+    const float far = distance(to_local(b.shown, other), middle);
+    if (far > best - 0.02e-3f) continue;
+    best = far, grip.node = static_cast<uint32_t>(i);
+    g.in_tool = to_local(b.shown, other + clamped(give, kThreadGripGive));
+  }
+  // The thread's end has left the jaws, or they were torn off.
+  const bool end = grip.node == 0 || grip.node + 1 == t.nodes() || t.broken[grip.node - 1] || t.broken[grip.node];
+  if (best > (end ? 0.6f : 2.0f) * m.jaw_length) grip = {};
+}
+
+}  // namespace
+
+void settle_grips(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const thread::State& t,
+                  Bodies& bodies, BodiesScratch& k) {
+  for (size_t i = 0; i < k.hold.size(); ++i) {
+    const uint32_t b = k.hold_body[i];
+    if (model.body[b].hinge_z > 0 && bodies.body[b].grip.what == Gripped::thread)
+      slip_thread(model.body[b], bodies.body[b], k.hold[i], t);
+  }
+  for (const Row& row : k.row) {
+    if (row.kind != Row::Kind::grip) continue;
+    Body& body = bodies.body[row.a];
+    Grip& grip = body.grip;
+    const uint32_t i = static_cast<uint32_t>(row.key >> 36) & 0xffff;
+    GripPoint& g = grip.point[i];
+    g.impulse = row.impulse;
+    // Beyond the bristle the held point has slid to another place of the jaws.
+    const Vec3 mine = transform(body.pose, g.in_tool);
+    const Vec3 other = grip.what == Gripped::needle ? transform(bodies.body[grip.body].pose, g.in_needle)
+                                                    : wall::place(wall::weights(wm, ws.topology, g.tissue), ws.motion);
+    const Vec3 error = other - mine, tangential = across(error, row.axis);
+    const float size = length(tangential);
+    if (row.at_limit && size > kBristle) {
+      const Vec3 slip = tangential * (1 - kBristle / size);
+      grip.slid += length(slip) / static_cast<float>(grip.count);
+      if (grip.what == Gripped::needle) g.in_needle = g.in_needle - rotate(conjugate(bodies.body[grip.body].pose.q), slip);
+      else g.in_tool = g.in_tool + rotate(conjugate(body.pose.q), slip);
+    }
+  }
+  for (uint32_t b = 0; b < bodies.body.size(); ++b) {
+    const BodyModel& m = model.body[b];
+    Grip& grip = bodies.body[b].grip;
+    if (grip.what == Gripped::tissue) {
+      Vec3 middle{};
+      for (uint32_t i = 0; i < grip.count; ++i) middle += grip.point[i].in_tool / static_cast<float>(grip.count);
+      if (length(middle) > 0.5f * m.jaw_length + 1.5e-3f) grip = {};
+    } else if (grip.what == Gripped::needle) {
+      // What lies between the jaws now: the needle may have slid to its end.
+      const BodyModel& nm = model.body[grip.body];
+      Vec3 middle{};
+      for (uint32_t i = 0; i < grip.count; ++i) middle += grip.point[i].in_needle / static_cast<float>(grip.count);
+      float best = 1e9f;
+      for (const BodyCapsule& c : nm.capsule) {
+        const Vec3 pa = nm.sphere[c.a].at, pb = nm.sphere[c.b].at;
+        best = std::min(best, distance(lerp(pa, pb, nearest_along(pa, pb, middle)), middle));
+      }
+      if (best > grip.size + 0.3e-3f) grip = {};
+    }
+  }
+}
+
+}  // namespace catgut::physical

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical/lacing: see the header.
+#include "physical/lacing.h"
+
+#include <algorithm>
+
+namespace catgut::physical {
+namespace {
+
+constexpr float kBehind = 0.2e-3f;  // [m] the thread's end is this far past a hole when it gets its Eyelet
+constexpr float kDone = 1.2e-3f;    // [m] and this far when the bite is complete
+
+bool has_eyelet(const thread::State& t, uint32_t hole) {
+  return std::any_of(t.eyelet.begin(), t.eyelet.end(), [&](const thread::Eyelet& e) { return e.point == hole; });
+}
+
+// A hole, unless it exists, and an Eyelet in the thread's last segment.
+bool lace(const Model& m, State& s, const Needle& n, const wall::Point& place, bool within, uint32_t& index) {
+  thread::State& t = s.thread;
+  const uint32_t segment = n.thread_node - 1;
+  if (t.eyelet.size() >= thread::kMaxEyelets || s.hole.size() >= thread::kMaxEyelets || t.broken[segment]) return false;
+  for (const thread::Eyelet& e : t.eyelet)
+    if (e.segment == segment) return false;  // two holes need a segment between them
+  Hole hole;
+  hole.place = place, hole.within = within;
+  if (index == wall::kNone) {
+    index = static_cast<uint32_t>(s.hole.size());
+    s.hole.push_back(hole);
+  }
+  const Vec3 at = mouth(m, s, hole);
+  const float in = distance(t.position(segment), at), out = distance(at, t.position(n.thread_node));
+  thread::Eyelet e;
+  e.point = index, e.segment = segment, e.friction = m.needles.thread_friction;
+  e.before = t.rest[segment] * in / std::max(in + out, 1e-9f);
+  const auto after = std::lower_bound(t.eyelet.begin(), t.eyelet.end(), segment,
+                                      [](const thread::Eyelet& x, uint32_t k) { return x.segment < k; });
+  t.eyelet.insert(after, e);
+  return true;
+}
+
+void unlace(State& s, uint32_t& index) {
+  std::erase_if(s.thread.eyelet, [&](const thread::Eyelet& e) { return e.point == index; });
+  if (index + 1 == s.hole.size()) s.hole.pop_back();
+  index = wall::kNone;
+}
+
+}  // namespace
+
+void lace_threads(const Model& m, State& s) {
+  for (size_t i = 0; i < s.needle.size(); ++i) {
+    Needle& n = s.needle[i];
+    if (n.channels == 0) continue;
+    const NeedleModel& nm = m.needles.needle[i];
+    const Pose& pose = s.bodies.body[nm.body].pose;
+    const bool threaded = n.thread_node != wall::kNone && n.thread_node > 0;
+    const Vec3 end = threaded ? s.thread.position(n.thread_node) : swage_of(nm, pose), ahead = arc_tangent(nm, pose, 0);
+    // [m] by which the end of the thread has passed a point; negative far from it, on the other side of the circle.
+    const auto past = [&](const wall::Point& p) {
+      const Vec3 at = wall::place(wall::weights(m.wall, s.wall.topology, p), s.wall.motion);
+      return distance(at, end) < nm.shape.radius ? dot(end - at, ahead) : -1.0f;
+    };
+    Channel& c = n.channel[0];
+    const bool open = n.inside && n.channels == 1;
+    const float entry = past(c.point[0]), exit = open ? -1.0f : past(c.point[c.count - 1]);
+    if (threaded) {
+      const bool in = c.entry_hole != wall::kNone, out = c.exit_hole != wall::kNone;
+      if (!in && entry > kBehind && lace(m, s, n, c.point[0], true, c.entry_hole)) n.events |= kThreadIn;
+      else if (in && !out && entry > -kDone && entry < 0) unlace(s, c.entry_hole);
+      else if (in && entry > kBehind && !has_eyelet(s.thread, c.entry_hole)) lace(m, s, n, c.point[0], true, c.entry_hole);
+      else if (in && exit > kBehind && (!out || !has_eyelet(s.thread, c.exit_hole)))
+        lace(m, s, n, c.point[c.count - 1], false, c.exit_hole);
+      if (c.exit_hole == wall::kNone || !has_eyelet(s.thread, c.exit_hole)) continue;
+    }
+    if (exit < kDone) continue;
+    n.events |= kThreadOut;
+    for (uint32_t k = 0; k + 1 < n.channels; ++k) n.channel[k] = n.channel[k + 1];
+    --n.channels;
+  }
+}
+
+}  // namespace catgut::physical

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical/needle: a swaged curved needle through the wall. Its tip makes a hole where it presses on a face with the puncture
+// force, cuts a channel within the wall, and leaves through the other face or the same one. In its channel the shaft is free
+// along its curve, but for friction and the cutting force at the tip; across it carries load. The law is the same for a hand, a
+// scripted surgeon and a falling needle. Reads the wall and the bodies' motion; writes channels, and rows for physical/body.
+//
+// Frame of the needle: origin at the center of mass of its arc, the circle in the xy plane; angle 0 at the swage, `arc` at the
+// tip. The thread hangs on the swage by its last node: holes then follow the thread's order, entry before exit.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "physical/body.h"
+
+namespace catgut::physical {
+
+struct NeedleShape {
+  float radius = 8.28e-3f;       // [m] of the circle
+  float arc = kPi;               // [rad]
+  float wire_radius = 0.33e-3f;  // [m]
+  float taper = 2e-3f;           // [m] of the arc at the tip
+  float mass = 2e-3f;            // [kg] simulated; a real one has about 0.1 g
+};
+
+// Forces between needle and tissue. The values for bowel are starting values; docs/references.md has the sources.
+struct PunctureLaw {
+  float puncture = 0.9f;         // [N] on the tip, for a wire of 0.66 mm; proportional to the diameter (Maloney et al.)
+  float exit_share = 0.6f;       // of it, for a tip that leaves the tissue (Frick et al.: two peaks)
+  float cutting = 0.2f;          // [N] at the tip within the tissue
+  float friction = 45;           // [N/m] along the shaft in its channel
+  float side_stiffness = 2000;   // [N/m] of a point of the channel against the tissue around it
+  float tear = 6;                // [N] largest load of a point of the channel across the needle
+  float least_slope = 0.25f;     // cosine between needle and inward normal below which the tip slides off
+  float tip_friction = 0.5f;     // of a tip that has not entered
+  float swage_stiffness = 8000;  // [N/m] between swage and thread
+  float same_face = 1.5e-3f;     // [m] from the entry at which the tip can leave through the same face
+};
+
+struct NeedleModel {
+  uint32_t body = 0;
+  NeedleShape shape;
+  Vec3 circle;  // [m] its center, needle frame
+};
+struct NeedlesModel {
+  std::vector<NeedleModel> needle;
+  PunctureLaw law;
+  float thread_friction = 0.15f;  // of the thread in the holes
+};
+
+constexpr size_t kMaxPath = 24, kMaxChannels = 4;
+constexpr float kPathStep = 0.8e-3f;  // [m] between points of a channel
+
+// The path of the needle through tissue: material points from entry to exit, or to the tip.
+struct Channel {
+  std::array<wall::Point, kMaxPath> point;
+  uint32_t count = 0;
+  float entry_side = 1, exit_side = 0;                         // face: zeta +1 outer, -1 inner; exit 0: none yet
+  uint32_t entry_hole = wall::kNone, exit_hole = wall::kNone;  // of State::hole, once thread runs through
+};
+
+// What happened in the last step, as bits.
+enum NeedleEvent : uint32_t {
+  kEntered = 1,    // the tip made a hole
+  kLeft = 2,       // and another where it came out
+  kWithdrawn = 4,  // the tip went back out: nothing remains
+  kThreadIn = 8,   // the swage has passed the entry: an Eyelet
+  kThreadOut = 16  // and the exit: the bite is complete
+};
+
+struct Needle {
+  uint32_t thread_node = wall::kNone;         // the last node of its strand; none: no thread
+  std::array<Channel, kMaxChannels> channel;  // from the swage to the tip
+  uint32_t channels = 0;
+  bool inside = false;                  // the tip lies within tissue, at the end of the last channel
+  wall::Point tip;                      // its material point while inside
+  float entry_peak = 0, exit_peak = 0;  // [N] at the tip when it went in and out last
+  uint32_t events = 0;
+  // Of the step: rows at the tip.
+  uint32_t tip_row = wall::kNone;
+  uint32_t exit_row[2] = {wall::kNone, wall::kNone};
+  wall::Point tip_on, exit_on[2];  // where they act
+};
+
+// A body and a needle of this shape. `body`: its index in BodiesModel.
+BodyModel make_needle_body(const NeedleShape& shape);
+NeedleModel make_needle(const NeedleShape& shape, uint32_t body);
+Vec3 arc_point(const NeedleModel& needle, const Pose& pose, float angle);    // [m]
+Vec3 arc_tangent(const NeedleModel& needle, const Pose& pose, float angle);  // toward the tip
+inline Vec3 tip_of(const NeedleModel& n, const Pose& pose) { return arc_point(n, pose, n.shape.arc); }
+inline Vec3 swage_of(const NeedleModel& n, const Pose& pose) { return arc_point(n, pose, 0); }
+float puncture_force(const PunctureLaw& law, const NeedleShape& shape);  // [N]
+
+// Stages of physical::step, in this order.
+void skip_channels(const NeedlesModel& model, const wall::Model& wm, const wall::State& ws, std::span<const Needle> needle,
+                   Bodies& bodies);
+void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wall::Model& wm, const wall::State& ws,
+                      const Surface& surface, const thread::State& thread, const Bodies& bodies, std::span<Needle> needle,
+                      float h, BodiesScratch& k);
+// At the end of the step: punctures, and the channel follows the tip.
+void advance_needles(const NeedlesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
+                     const Bodies& bodies, std::span<Needle> needle, float h, BodiesScratch& k);
+
+}  // namespace catgut::physical
