@@ -34,7 +34,7 @@ std::atomic<uint64_t> allocations{0};
 std::array<std::array<void*, kDepth>, kSites> site;
 std::array<int, kSites> depth;
 
-void counted() {
+[[maybe_unused]] void counted() {  // sanitizers have their own allocator
   if (!counting.load(std::memory_order_relaxed)) return;
   const uint64_t n = allocations.fetch_add(1);
   if (n < kSites) depth[n] = backtrace(site[n].data(), kDepth);
