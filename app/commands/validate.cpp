@@ -31,7 +31,7 @@ void print_line(const ValidationLine& l) {
   std::fflush(stdout);
 }
 
-int validate(const std::string& json, bool nightly) {
+int validate(const std::string& json, bool nightly, const std::string& only) {
   check_suffix(json, ".json", "--json");
   prepare_output(json);
   const bool table = json != "-";
@@ -39,7 +39,7 @@ int validate(const std::string& json, bool nightly) {
     std::printf("%-4s  %-46s %11s %11s  %-9s %9s %9s  %s\n", "", "check", "expected", "got", "unit", "error", "tolerance",
                 "source");
   const std::vector<ValidationLine> lines =
-      run_validation(table ? print_line : std::function<void(const ValidationLine&)>{}, nightly);
+      run_validation(table ? print_line : std::function<void(const ValidationLine&)>{}, nightly, only);
   if (!json.empty()) write_output(json, json_of(lines));
   size_t failed = 0;
   for (const ValidationLine& l : lines) failed += !l.ok;
@@ -55,7 +55,10 @@ void add_validate(CLI::App& app, int& exit_code) {
   command->add_option("--json", *json, "the same lines as JSON; - for standard output")->type_name("FILE|-");
   auto nightly = std::make_shared<bool>(false);
   command->add_flag("--nightly", *nightly, "whole ranges of the checks that are shortened otherwise; many minutes");
-  command->callback([json, nightly, &exit_code] { exit_code = validate(*json, *nightly); });
+  auto only = std::make_shared<std::string>();
+  command->add_option("--only", *only, "the groups of checks whose names begin so, e.g. closure, knot/ties, wall")
+      ->type_name("GROUP");
+  command->callback([json, nightly, only, &exit_code] { exit_code = validate(*json, *nightly, *only); });
 }
 
 }  // namespace catgut

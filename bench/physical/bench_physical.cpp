@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // bench/physical: processor time of a millisecond of wall and thread together, on one core: median and 99th percentile of 300.
 //   bench_physical             a stitch that is drawn, the same tied, a purse-string that is drawn
+//   bench_physical purse       the purse-string alone
 #include <time.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <string_view>
 #include <vector>
 
 #include "validation/suture_scenes.h"
@@ -33,16 +35,18 @@ void report(const char* what, Sewn& s) {
 }
 }  // namespace
 
-int main() {
-  Sewn stitch = interrupted({});
-  Tying t;
-  t.center = {0.0203f, 0, 0}, t.tension = 3;
-  tie_throw(stitch, t, {3, 1});
-  report("stitch, one throw drawn", stitch);
-  tie_throw(stitch, t, {3, -1});
-  let_go(stitch);
-  stitch.run(0.5f);
-  report("stitch, tied, hands away", stitch);
+int main(int argc, char** argv) {
+  if (argc < 2 || std::string_view(argv[1]) != "purse") {
+    Sewn stitch = interrupted({});
+    Tying t;
+    t.center = {0.0203f, 0, 0}, t.tension = 3;
+    tie_throw(stitch, t, {3, 1});
+    report("stitch, one throw drawn", stitch);
+    tie_throw(stitch, t, {3, -1});
+    let_go(stitch);
+    stitch.run(0.5f);
+    report("stitch, tied, hands away", stitch);
+  }
   Stitch q;
   q.hole_friction = 0.1f, q.tail = 0.12f;
   Sewn purse = purse_string(q, 10);

@@ -82,6 +82,10 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
     // Between the mouths of a channel; also where the end of the thread has already left the first of them, or the last.
     const uint32_t behind = eyelet < s.thread.eyelet.size() ? s.thread.eyelet[eyelet].point : 0;
     if ((eyelet > 0 && s.hole[s.thread.eyelet[eyelet - 1].point].within) || (behind > 0 && s.hole[behind - 1].within)) continue;
+    // Beside a hole its mouth keeps the thread off the wall. A contact there would stop the node like a bead before the hole.
+    if ((eyelet > 0 && s.thread.eyelet[eyelet - 1].segment + 1 == i) ||
+        (eyelet < s.thread.eyelet.size() && s.thread.eyelet[eyelet].segment == i))
+      continue;
     if (k.search.node_first[i] == k.search.node_first[i + 1]) continue;
     while (old < s.contact.size() && s.contact[old].node < i) ++old;
     const thread::SoftContact* memory = old < s.contact.size() && s.contact[old].node == i ? &s.contact[old] : nullptr;
@@ -89,16 +93,25 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
     Foot best;
     best.gap = 1e9f;
     float facing = -1;
+    const auto look = [&](uint32_t patch) {
+      const Foot foot = nearest_on_patch(m.wall, s.wall, m.surface, patch, p);
+      // A node that was pressed to one side is never looked at from the other.
+      if (memory && memory->normal_impulse > 0 && dot(foot.facing, memory->normal) < -0.2f) return;
+      const float far = std::abs(foot.gap), front = dot(normalized(p - foot.at), foot.facing);
+      if (far > std::abs(best.gap) + 1e-7f || (far > std::abs(best.gap) - 1e-7f && front < facing)) return;
+      best = foot, facing = front;
+    };
+    const uint32_t known = memory ? memory->patch : wall::kNone;
+    if (memory) look(known);  // most likely still the nearest: the others need not be searched
     for (uint32_t f = k.search.node_first[i]; f < k.search.node_first[i + 1]; ++f) {
       const uint32_t face = k.search.node_face[f];
-      for (uint32_t q = m.surface.first_of_face[face]; q < m.surface.first_of_face[face + 1]; ++q) {
-        const Foot foot = nearest_on_patch(m.wall, s.wall, m.surface, q, p);
-        // A node that was pressed to one side is never looked at from the other.
-        if (memory && memory->normal_impulse > 0 && dot(foot.facing, memory->normal) < -0.2f) continue;
-        const float far = std::abs(foot.gap), front = dot(normalized(p - foot.at), foot.facing);
-        if (far > std::abs(best.gap) + 1e-7f || (far > std::abs(best.gap) - 1e-7f && front < facing)) continue;
-        best = foot, facing = front;
-      }
+      const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
+      // A node with a memory may be deep inside; another one counts only where it can touch within the step.
+      const float reach = memory ? 2 * k.search.margin : r + far_move + 1.5f * h * box.speed;
+      if (least_distance(box, p, 0) > std::min(reach, std::abs(best.gap) + 1e-6f)) continue;
+      for (uint32_t q = m.surface.first_of_face[face]; q < m.surface.first_of_face[face + 1]; ++q)
+        if (q != known && least_distance(box, p, m.surface.patch[q].side) <= std::min(reach, std::abs(best.gap) + 1e-6f))
+          look(q);
     }
     const wall::Weights w = best.gap < 1e8f ? wall::weights(m.wall, s.wall.topology, best.point) : wall::Weights{};
     if (best.gap > 1e8f || (!memory && best.gap < -d)) continue;  // a node deep inside was never outside
@@ -166,7 +179,8 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
   k.point.clear(), k.offset.clear(), k.contact.clear();
   for (const Hole& hole : s.hole) k.point.push_back(hole.place), k.offset.push_back(mouth_offset(m, hole));
   if (m.surface_contact) find_contacts(m, s, k);
-  k.coupling.set_points(m.wall, s.wall.topology, k.point, k.offset);
+  // Friction on the surface acts at the mid-surface: its small moment would couple every contact to every other.
+  k.coupling.set_points(m.wall, s.wall.topology, k.point, k.offset, s.hole.size());
   k.coupling.begin(m.wall, s.wall);
   for (size_t i = 0; i < k.contact.size(); ++i) k.contact[i].offset = k.foot[i].at - k.coupling.at[k.contact[i].point];
   k.tilt.clear();

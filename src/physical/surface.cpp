@@ -30,7 +30,7 @@ Corners corners_of(const wall::Model& m, const wall::Topology& t, uint32_t face)
 Vec3 mid(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column]); }
 Vec3 director(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column + 1]); }
 
-// Nearest point of a patch, in its coordinates.
+// Nearest point of a patch, in its coordinates. Begins with the foot on a parallelogram.
 void nearest(const wall::Patch& patch, Vec3 target, float& xi, float& eta) {
   xi = eta = patch.quad ? 0.0f : 0.6f;
   for (int i = 0; i < 5; ++i) {
@@ -128,11 +128,53 @@ void SurfaceSearch::reserve(const wall::Model& m, const wall::State& s, size_t n
   node_listed.reserve(nodes), wall_listed.reserve(2 * columns), center.reserve(faces), radius.reserve(faces);
   node_first.reserve(nodes + 1), node_face.reserve(64 * nodes);
   column_first.reserve(2 * columns + 1), column_face.reserve(64 * columns);
+  box.resize(faces);
+}
+
+const FaceBox& box_of(const wall::Model& m, const wall::State& s, SurfaceSearch& k, uint32_t face) {
+  FaceBox& box = k.box[face];
+  if (box.step == k.step) return box;
+  box.step = k.step;
+  const Corners c = corners_of(m, s.topology, face);
+  Vec3 center{}, up{};
+  for (uint32_t i = 0; i < c.count(); ++i)
+    center += mid(s, c.column[i]) / static_cast<float>(c.count()), up += director(s, c.column[i]);
+  box.center = center, box.n = normalized(up, {0, 0, 1});
+  const Vec3 along = mid(s, c.column[1]) - mid(s, c.column[0]);
+  box.a = normalized(along - box.n * dot(along, box.n), any_perpendicular(box.n));
+  box.b = cross(box.n, box.a);
+  box.half_a = box.half_b = box.speed = 0;
+  for (const int side : {0, 1}) {
+    box.low[side] = 1e9f, box.high[side] = -1e9f;
+    for (uint32_t i = 0; i < c.count(); ++i) {
+      const Vec3 d = director(s, c.column[i]), q = mid(s, c.column[i]) + (side == 1 ? d : -d) - center;
+      box.half_a = std::max(box.half_a, std::abs(dot(q, box.a))), box.half_b = std::max(box.half_b, std::abs(dot(q, box.b)));
+      const float h = dot(q, box.n);
+      box.low[side] = std::min(box.low[side], h), box.high[side] = std::max(box.high[side], h);
+    }
+  }
+  for (uint32_t i = 0; i < c.count(); ++i) {
+    const uint32_t column = 2 * c.column[i];
+    box.speed = std::max(box.speed, length(wall::vec3(s.motion.v[column])) + length(wall::vec3(s.motion.v[column + 1])));
+  }
+  return box;
+}
+
+float least_distance(const FaceBox& box, Vec3 p, int side) {
+  const Vec3 q = p - box.center;
+  const float h = dot(q, box.n), da = std::max(0.0f, std::abs(dot(q, box.a)) - box.half_a),
+              db = std::max(0.0f, std::abs(dot(q, box.b)) - box.half_b);
+  const float low = side > 0 ? box.low[1] : side < 0 ? box.low[0] : std::min(box.low[0], box.low[1]);
+  const float high = side > 0 ? box.high[1] : side < 0 ? box.high[0] : std::max(box.high[0], box.high[1]);
+  const float dn = std::max(0.0f, std::max(low - h, h - high));
+  return std::sqrt(da * da + db * db + dn * dn) * 0.9999f;
 }
 
 void find_near(const wall::Model& m, const wall::State& s, const Surface& surface, const thread::State& thread,
                SurfaceSearch& k) {
   const size_t nodes = thread.nodes(), columns = wall::columns(s), faces = m.lane_of_face.size();
+  ++k.step;
+  k.box.resize(faces);
   bool stale = k.node_listed.size() != nodes || k.wall_listed.size() != columns || k.version != s.topology.version;
   const float limit2 = 0.25f * k.margin * k.margin * 0.25f;  // both may move: a quarter of the margin each
   for (size_t i = 0; i < nodes && !stale; ++i) stale = length2(thread.x.at(i) - k.node_listed[i]) > limit2;
@@ -200,8 +242,9 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
   k.column_first.push_back(static_cast<uint32_t>(k.column_face.size()));
 }
 
-void find_lips(const wall::Model& m, const wall::State& s, const Surface& surface, const SurfaceSearch& search, float friction,
+void find_lips(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search, float friction,
                wall::ContactSolver& solver) {
+  constexpr float kDeep = 1e-3f;  // [m] a point so far inside was never outside
   const uint32_t columns = wall::columns(s);
   for (uint32_t c = 0; c < columns; ++c) {
     if (search.column_first[c] == search.column_first[c + 1]) continue;
@@ -210,13 +253,19 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       const wall::Weights w = wall::at_column(c, zeta);
       const Vec3 p = wall::place(w, s.motion);
       const Vec3 up = director(s, c);
+      const float speed = length(wall::velocity(w, s.motion));
       Foot best;
       best.gap = 1e9f;
       for (uint32_t i = search.column_first[c]; i < search.column_first[c + 1]; ++i) {
         const uint32_t face = search.column_face[i];
+        const FaceBox& box = box_of(m, s, search, face);
+        const float reach =
+            std::min(std::abs(best.gap), std::max(kDeep, solver.reach + 2 * m.step * (box.speed + speed))) + 1e-6f;
+        if (least_distance(box, p, 0) > reach) continue;
         for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
+          if (least_distance(box, p, surface.patch[q].side) > reach) continue;
           const Foot foot = nearest_on_patch(m, s, surface, q, p);
-          if (foot.gap < -1e-3f || std::abs(foot.gap) > std::abs(best.gap)) continue;
+          if (foot.gap < -kDeep || std::abs(foot.gap) > std::abs(best.gap)) continue;
           if (foot.gap < 0 && foot.on_edge) continue;
           // The wall of the point itself lies behind it, outside the other part: the inner side for a point of a face.
           if (!surface.at_rim[c] && dot(foot.normal, up) * zeta > -0.3f * length(up)) continue;

@@ -37,6 +37,15 @@ struct Foot {
 };
 Foot nearest_on_patch(const wall::Model& model, const wall::State& state, const Surface& surface, uint32_t patch, Vec3 p);
 
+// A box about one face of the wall in the present step. A lower bound of a distance saves most exact searches.
+struct FaceBox {
+  uint32_t step = 0;             // SurfaceSearch::step in which it was made
+  Vec3 center, a, b, n;          // [m]; unit axes, n along the mean director
+  float half_a = 0, half_b = 0;  // [m]
+  float low[2]{}, high[2]{};     // [m] along n: of the inner and of the outer face
+  float speed = 0;               // [m/s] maximum of its corners
+};
+
 // Which faces are near which nodes and columns. Lists are kept until something has moved half their margin.
 struct SurfaceSearch {
   float margin = 2e-3f;  // [m]
@@ -46,13 +55,20 @@ struct SurfaceSearch {
   std::vector<Vec3> center;                         // [m] per face
   std::vector<float> radius;
   uint32_t version = 0;
+  uint32_t step = 0;         // counts steps, for the boxes
+  std::vector<FaceBox> box;  // per face, made on first use in a step
   void reserve(const wall::Model& model, const wall::State& state, size_t nodes);
 };
+const FaceBox& box_of(const wall::Model& model, const wall::State& state, SurfaceSearch& search, uint32_t face);
+// At most the distance [m] from p to the face's patches of one side: -1 inner, 1 outer, 0 any.
+float least_distance(const FaceBox& box, Vec3 p, int side);
+
+// Once per step, before the searches of that step.
 void find_near(const wall::Model& model, const wall::State& state, const Surface& surface, const thread::State& thread,
                SurfaceSearch& search);
 
 // Contacts of wall with wall, in front of the solver's contacts of this step.
-void find_lips(const wall::Model& model, const wall::State& state, const Surface& surface, const SurfaceSearch& search,
+void find_lips(const wall::Model& model, const wall::State& state, const Surface& surface, SurfaceSearch& search,
                float friction, wall::ContactSolver& solver);
 
 }  // namespace catgut::physical

@@ -17,7 +17,7 @@ constexpr float kMeet = 0.5f;  // of a segment: holes so near to each other are 
 constexpr float kNear = 0.3f;  // of a segment: a node so near to the hole is measured along its span, not to the hole
 
 Vec3 hole_from(const State& state, const Scratch& s, const SoftPoints& soft, uint32_t point, size_t node) {
-  return ((soft.at[point] - state.x.at(node)) - state.fine.at(node)) + (three(s.soft_moved[point]) - s.u.at(node));
+  return ((soft.at[point] - state.x.at(node)) - state.fine.at(node)) + (s.soft_moved.at(point) - s.u.at(node));
 }
 Vec3 across(Vec3 v, Vec3 axis) { return v - axis * dot(v, axis); }
 
@@ -27,6 +27,34 @@ Vec3 turned(Vec3 v, Vec3 a, Vec3 b) {
   if (c < -0.999f) return v * -1.0f;
   const Vec3 axis = cross(a, b);
   return v * c + cross(axis, v) + axis * (dot(axis, v) / (1 + c));
+}
+
+// All points answer an impulse on one of them.
+CATGUT_CLONES void answer(size_t points, Vec3 p, const float* __restrict w, float* __restrict x, float* __restrict y,
+                          float* __restrict z) {
+  for (size_t j = 0; j < points; ++j) x[j] += p.x * w[j], y[j] += p.y * w[j], z[j] += p.z * w[j];
+}
+
+// L U in place, by columns; the diagonal is inverted.
+CATGUT_CLONES void factor_columns(size_t n, float* a) {
+  for (size_t p = 0; p < n; ++p) {
+    const float inverse = a[p * n + p] = 1 / a[p * n + p];
+    float* __restrict l = a + p * n;
+    for (size_t i = p + 1; i < n; ++i) l[i] *= inverse;
+    for (size_t j = p + 1; j < n; ++j) {
+      float* __restrict column = a + j * n;
+      const float f = column[p];
+      for (size_t i = p + 1; i < n; ++i) column[i] -= l[i] * f;
+    }
+  }
+}
+CATGUT_CLONES void solve_columns(size_t n, const float* __restrict a, float* __restrict y) {
+  for (size_t j = 0; j < n; ++j)
+    for (size_t i = j + 1; i < n; ++i) y[i] -= a[j * n + i] * y[j];
+  for (size_t j = n; j-- > 0;) {
+    y[j] *= a[j * n + j];
+    for (size_t i = 0; i < j; ++i) y[i] -= a[j * n + i] * y[j];
+  }
 }
 
 bool joined(const State& state, size_t segment) { return segment < state.segments() && !state.broken[segment]; }
@@ -77,7 +105,7 @@ void measure(const State& state, const Scratch& s, const SoftPoints& soft, size_
 
 // A node has come through the hole: its overshoot and its motion turn into the other span, and the hole takes the kick.
 void pass_node(State& state, Scratch& s, SoftPoints& soft, uint32_t point, size_t node, Vec3 from, Vec3 to, float substep) {
-  const Vec3 hole = soft.at[point], away = ((state.x.at(node) - hole) + state.fine.at(node)) - three(s.soft_moved[point]);
+  const Vec3 hole = soft.at[point], away = ((state.x.at(node) - hole) + state.fine.at(node)) - s.soft_moved.at(point);
   const Vec3 moved = turned(away, from, to) - away;
   state.fine.add(node, moved);
   const Vec3 v = state.v.at(node) - soft.speed[point], change = turned(v, from, to) - v;
@@ -93,35 +121,35 @@ void begin_eyelets(const Settings& settings, State& state, Scratch& s, Surroundi
     return;
   }
   const size_t n = around.soft->at.size();
-  CATGUT_CHECK(n <= s.soft_moved.capacity() && state.eyelet.size() <= s.corner.capacity());
-  s.soft_moved.assign(n, Four{}), s.soft_before.assign(n, Four{});
+  CATGUT_CHECK(n <= kMaxSoftPoints && state.eyelet.size() <= s.corner.capacity());
+  s.soft_points = n;
+  for (Padded* c : {&s.soft_moved.x, &s.soft_moved.y, &s.soft_moved.z}) std::fill_n(c->data(), n, 0.0f);
   s.soft_answer = around.soft->step / settings.substep;
   for (Vec3& p : around.soft->impulse) p = {};
 }
 
 void advance_soft(const Settings& settings, Scratch& s, const SoftPoints& soft) {
-  for (size_t i = 0; i < s.soft_moved.size(); ++i) {
-    s.soft_before[i] = s.soft_moved[i];
-    s.soft_moved[i] += four(soft.speed[i]) * settings.substep;
+  for (size_t i = 0; i < s.soft_points; ++i) {
+    s.soft_before.set(i, s.soft_moved.at(i));
+    s.soft_moved.add(i, soft.speed[i] * settings.substep);
   }
 }
 
 void push_soft(Scratch& s, SoftPoints& soft, uint32_t i, Vec3 multiplier, float substep) {
   soft.impulse[i] += multiplier / substep;
-  const size_t n = s.soft_moved.size();
-  const float* row = soft.w.data() + size_t{i} * n;
-  const Four p = four(multiplier) * s.soft_answer;
-  for (size_t j = 0; j < n; ++j) s.soft_moved[j] += p * row[j];
-  const Vec3 q = across(three(p), soft.axis[i]);
+  const size_t n = s.soft_points;
+  const Vec3 p = multiplier * s.soft_answer;
+  answer(n, p, soft.w.data() + size_t{i} * n, s.soft_moved.x.data(), s.soft_moved.y.data(), s.soft_moved.z.data());
+  const Vec3 q = across(p, soft.axis[i]);
   for (uint32_t t = soft.tilt_first[i]; t < soft.tilt_first[i + 1]; ++t) {
     const uint32_t j = soft.tilt[t].other;
-    s.soft_moved[j] += four(across(q, soft.axis[j]) * soft.tilt[t].value);
+    s.soft_moved.add(j, across(q, soft.axis[j]) * soft.tilt[t].value);
   }
 }
 
 void turn_corners(const Settings& settings, State& state, Scratch& s, Surroundings& around) {
   SoftPoints& soft = *around.soft;
-  // A node that passes has left the surface that it touched.
+  // A node that passes, and the next one, which is beside the hole now, have left the surface that they touched.
   const auto leave = [&](size_t node) {
     for (SoftContact& c : around.soft_contacts)
       if (c.node == node) c.normal = {};
@@ -147,12 +175,12 @@ void turn_corners(const Settings& settings, State& state, Scratch& s, Surroundin
     const bool free_before = kept == 0 || state.eyelet[kept - 1].segment + 1 != k;
     if (c.near_out && c.length_out < 0 && free_behind) {
       pass_node(state, s, soft, eyelet.point, k + 1, c.out, c.in, settings.substep);
-      leave(k + 1);
+      leave(k + 1), leave(k + 2);
       eyelet.before -= state.rest[k];
       ++eyelet.segment;
     } else if (c.near_in && c.length_in < 0 && free_before) {
       pass_node(state, s, soft, eyelet.point, k, c.in, c.out, settings.substep);
-      leave(k);
+      leave(k), leave(k - 1);  // k > 0: near_in
       --eyelet.segment;
       eyelet.before += state.rest[eyelet.segment];
     }
@@ -207,35 +235,28 @@ void prepare_corners(const State& state, Scratch& s, const SoftPoints& soft) {
     const uint32_t point = state.eyelet[e].point;
     const size_t k = state.eyelet[e].segment;
     const Vec3 g = c.in - c.out;
-    const float* row = soft.w.data() + size_t{point} * s.soft_moved.size();
+    const float* row = soft.w.data() + size_t{point} * s.soft_points;
     for (size_t b = 0; b < n; ++b) {
       const Scratch::Corner& d = s.corner[b];
-      a[e * n + b] = s.soft_answer * row[state.eyelet[b].point] * dot(g, d.in - d.out * d.pass);
+      a[b * n + e] = s.soft_answer * row[state.eyelet[b].point] * dot(g, d.in - d.out * d.pass);
     }
     const Vec3 tilting = across(g, soft.axis[point]);
     for (uint32_t t = soft.tilt_first[point]; t < soft.tilt_first[point + 1]; ++t)
       for (size_t b = 0; b < n; ++b)
         if (state.eyelet[b].point == soft.tilt[t].other) {
           const Scratch::Corner& d = s.corner[b];
-          a[e * n + b] += s.soft_answer * soft.tilt[t].value *
+          a[b * n + e] += s.soft_answer * soft.tilt[t].value *
                           dot(tilting, across(d.in - d.out * d.pass, soft.axis[state.eyelet[b].point]));
         }
     a[e * n + e] += c.diag;
     if (k > 0) {
       a[e * n + e] += c.sub_before * right[k - 1];
-      if (e > 0) a[e * n + e - 1] += state.eyelet[e - 1].segment + 1 == k ? c.sub_before : c.sub_before * left[k - 1];
+      if (e > 0) a[(e - 1) * n + e] += state.eyelet[e - 1].segment + 1 == k ? c.sub_before : c.sub_before * left[k - 1];
     }
     a[e * n + e] += c.sup * left[k + 1];
-    if (e + 1 < n) a[e * n + e + 1] += state.eyelet[e + 1].segment == k + 1 ? c.sup : c.sup * right[k + 1];
+    if (e + 1 < n) a[(e + 1) * n + e] += state.eyelet[e + 1].segment == k + 1 ? c.sup : c.sup * right[k + 1];
   }
-  for (size_t p = 0; p < n; ++p) {  // L U in place; the diagonal is inverted
-    a[p * n + p] = 1 / a[p * n + p];
-    for (size_t i = p + 1; i < n; ++i) {
-      const float f = a[i * n + p] *= a[p * n + p];
-      if (f == 0) continue;
-      for (size_t j = p + 1; j < n; ++j) a[i * n + j] -= f * a[p * n + j];
-    }
-  }
+  factor_columns(n, a);
 }
 
 // After the spans' own solution in s.step, with 0 in the rows of the corners, whose residuals are in `right`.
@@ -248,12 +269,7 @@ void solve_corners(const State& state, Scratch& s) {
     y[e] -= s.corner[e].sup * x[k + 1];
     if (k > 0) y[e] -= s.corner[e].sub_before * x[k - 1];
   }
-  for (size_t i = 0; i < n; ++i)
-    for (size_t j = 0; j < i; ++j) y[i] -= a[i * n + j] * y[j];
-  for (size_t i = n; i-- > 0;) {
-    for (size_t j = i + 1; j < n; ++j) y[i] -= a[i * n + j] * y[j];
-    y[i] *= a[i * n + i];
-  }
+  solve_columns(n, a, y);
   const float *right = s.spike_right.data(), *left = s.spike_left.data();
   size_t i = 0;
   for (size_t e = 0; e <= n; ++e) {

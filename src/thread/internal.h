@@ -43,6 +43,18 @@ inline float dot(Four a, Four b) {
   return (p[0] + p[1]) + p[2];
 }
 
+// The factored tridiagonal system of the stretch solve; see stretch.cpp. Element a of lane c is at a * kLanes + c.
+struct LaneSystem {
+  static constexpr size_t kLanes = 8;
+  // Multiplier of the row before, inverse pivot; a unit of the row before the lane: eliminated, and solved.
+  std::vector<float> down, inverse, first, left;
+  std::vector<float> swept;  // right-hand side under way
+  float off_end[kLanes]{}, between_down[kLanes]{}, between_inverse[kLanes]{};
+  void resize(size_t n) {
+    for (std::vector<float>* c : {&down, &inverse, &first, &left, &swept}) c->assign(n + 2 * kLanes, 0.0f);
+  }
+};
+
 // A contact solved in this substep, with all inputs of a sweep.
 struct Active {
   Four normal{}, lt{};
@@ -71,7 +83,8 @@ struct Scratch {
   Padded3 e;       // [m] edge vectors at the beginning of the substep
   Padded3 n;       // unit directions, of the stretch solve
   Padded3 moment;  // per node: B times curvature over length [N]
-  Padded rest, inverse_rest, keep, alpha, lambda, step, residual, diag, off, down, up, inverse_diag, tension_sum, segment_move;
+  Padded rest, inverse_rest, keep, alpha, lambda, step, residual, diag, off, tension_sum, segment_move;
+  LaneSystem lanes;
   std::vector<Active> active;
   std::vector<Four> contact_u;         // u of the nodes below, node by node
   std::vector<uint32_t> contact_node;  // nodes of active contacts, each once
@@ -86,8 +99,9 @@ struct Scratch {
   std::vector<Vec3> block_middle;
   Column block_radius;
   std::vector<Vec3> tool_move;  // per substep, of both ends of every tool
-  // Soft points: motion since the step began, and what is used of SoftPoints. Four numbers a point: one register.
-  std::vector<Four> soft_moved, soft_before;
+  // Soft points: motion since the step began, now and at the beginning of the substep.
+  Padded3 soft_moved, soft_before;
+  size_t soft_points = 0;
   float soft_answer = 0;  // [s/s] step / substep: displacement per multiplier and compliance
   // Corners in holes, one per State::eyelet: directions of the thread before and behind the corner (toward it, away from it).
   struct Corner {
@@ -127,9 +141,9 @@ void find_edges(const State& state, Scratch& s);
 void prepare_stretch(const Settings& settings, const State& state, Scratch& s, const SoftPoints* soft);
 void solve_stretch(const Settings& settings, const State& state, Scratch& s, SoftPoints* soft);
 
-// The tridiagonal system that prepare_stretch factored, for the given right-hand side: two chains of operations.
+// The tridiagonal system that prepare_stretch factored, for the given right-hand side, which may be x.
 void factor_tridiagonal(Scratch& s, size_t segments);
-void solve_tridiagonal(const Scratch& s, size_t segments, float* right_hand_side, float* x);
+void solve_tridiagonal(Scratch& s, size_t segments, float* right_hand_side, float* x);
 
 // eyelet.cpp
 void begin_eyelets(const Settings& settings, State& state, Scratch& s, Surroundings& around);  // of a step

@@ -14,7 +14,7 @@ constexpr float kDriftLimit = 0.2f;  // of the diameter
 constexpr float kPushOut = 0.2f;     // [m/s]
 
 Four motion(const Scratch& s, const Scratch::SoftActive& c) {
-  return Four{s.u.x[c.node], s.u.y[c.node], s.u.z[c.node], 0} - (s.soft_moved[c.point] - s.soft_before[c.point]);
+  return Four{s.u.x[c.node], s.u.y[c.node], s.u.z[c.node], 0} - four(s.soft_moved.at(c.point) - s.soft_before.at(c.point));
 }
 void apply(Scratch& s, SoftPoints& soft, const Scratch::SoftActive& c, Four impulse, float substep) {
   s.u.add(c.node, three(impulse) * s.w[c.node]);
@@ -28,11 +28,11 @@ void begin_soft_contacts(const Settings& settings, State& state, Scratch& s, Sur
   s.soft_active.clear();
   if (!around.soft) return;
   const SoftPoints& soft = *around.soft;
-  const size_t n = s.soft_moved.size();
+  const size_t n = s.soft_points;
   for (uint32_t k = 0; k < around.soft_contacts.size(); ++k) {
     SoftContact& c = around.soft_contacts[k];
     const Vec3 from = ((state.x.at(c.node) - soft.at[c.point]) - c.offset + state.fine.at(c.node)) +
-                      (s.u.at(c.node) - three(s.soft_moved[c.point]));
+                      (s.u.at(c.node) - s.soft_moved.at(c.point));
     const float gap = dot(c.normal, from) - 0.5f * settings.material.diameter;
     if (gap > kReady * settings.material.diameter || c.normal == Vec3{}) {
       c.normal_impulse = 0, c.friction_impulse = {}, c.drift = {}, c.gap = gap;

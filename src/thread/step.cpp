@@ -57,11 +57,30 @@ float farthest(const State& s) {
                      s.listed.z.data());
 }
 
-void limit_motion(Scratch& s, size_t nodes, float limit) {
+CATGUT_CLONES void limit_motion(size_t nodes, float limit, float* __restrict ux, float* __restrict uy, float* __restrict uz,
+                                float* __restrict moved) {
   for (size_t i = 0; i < nodes; ++i) {
-    const float size2 = length2(s.u.at(i));
-    if (size2 > limit * limit) s.u.set(i, s.u.at(i) * (limit / std::sqrt(size2)));
-    s.move[i] = std::sqrt(std::min(size2, limit * limit));
+    const float size = std::sqrt(ux[i] * ux[i] + uy[i] * uy[i] + uz[i] * uz[i]);
+    const float part = size > limit ? limit / size : 1.0f;
+    ux[i] *= part, uy[i] *= part, uz[i] *= part;
+    moved[i] = size > limit ? limit : size;
+  }
+}
+
+CATGUT_CLONES void masses(size_t nodes, float free, float added, const float* __restrict least, const float* __restrict span,
+                          const float* __restrict warm, float* __restrict mass, float* __restrict w) {
+  for (size_t i = 0; i < nodes; ++i) {
+    const float density = free + added * warm[i];
+    mass[i] = (least[i] > density ? least[i] : density) * span[i];
+    w[i] = 1 / mass[i];
+  }
+}
+
+CATGUT_CLONES void record(size_t segments, const float* __restrict lambda, const float* __restrict move,
+                          float* __restrict tension_sum, float* __restrict segment_move) {
+  for (size_t i = 0; i < segments; ++i) {
+    tension_sum[i] -= lambda[i];
+    segment_move[i] = move[i] > move[i + 1] ? move[i] : move[i + 1];
   }
 }
 
@@ -92,13 +111,8 @@ void begin_step(const Settings& settings, const State& state, Scratch& s) {
 }
 
 void find_masses(const Settings& settings, const State& state, Scratch& s, std::span<const Hold> holds) {
-  const size_t n = state.nodes();
-  const float added = settings.touch_density - settings.free_density;
-  for (size_t i = 0; i < n; ++i) {
-    const float density = std::max(s.least_density[i], settings.free_density + added * state.warm[i]);
-    s.mass[i] = density * s.span[i];
-    s.w[i] = 1 / s.mass[i];
-  }
+  masses(state.nodes(), settings.free_density, settings.touch_density - settings.free_density, s.least_density.data(),
+         s.span.data(), state.warm.data(), s.mass.data(), s.w.data());
   for (const Hold& hold : holds)
     if (hold.stiffness <= 0) s.w[hold.node] = 0;
 }
@@ -210,17 +224,17 @@ Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_un
   Scratch& s = *scratch_;
   s.max_nodes = max_nodes, s.max_crossings = max_crossings;
   for (Padded3* c : {&s.u, &s.force, &s.e, &s.n, &s.moment, &s.middle}) c->resize(max_nodes);
-  for (Padded* c : {&s.mass,         &s.w,           &s.move,         &s.rest, &s.inverse_rest,  &s.keep, &s.alpha,
-                    &s.lambda,       &s.step,        &s.residual,     &s.diag, &s.off,           &s.down, &s.up,
-                    &s.inverse_diag, &s.tension_sum, &s.segment_move, &s.half, &s.least_density, &s.span})
+  for (Padded* c : {&s.mass, &s.w, &s.move, &s.rest, &s.inverse_rest, &s.keep, &s.alpha, &s.lambda, &s.step, &s.residual,
+                    &s.diag, &s.off, &s.tension_sum, &s.segment_move, &s.half, &s.least_density, &s.span})
     c->resize(max_nodes);
+  s.lanes.resize(max_nodes);
   s.contact_u.resize(max_nodes + 1), s.contact_node.reserve(max_nodes + 1);
   s.active.reserve(max_crossings + max_nodes), s.plane_node.reserve(max_nodes), s.touched.assign(max_nodes + 1, 0);
   s.new_key.reserve(max_crossings), s.new_budget.reserve(max_crossings), s.new_crossing.reserve(max_crossings);
   s.block_middle.resize(max_nodes / 8 + 2), s.block_radius.resize(max_nodes / 8 + 2);
   s.tool_move.resize(2 * 64);
   s.spike_right.resize(max_nodes), s.spike_left.resize(max_nodes);
-  s.soft_moved.reserve(kMaxSoftPoints), s.soft_before.reserve(kMaxSoftPoints), s.soft_active.reserve(kMaxSoftPoints);
+  s.soft_moved.resize(kMaxSoftPoints), s.soft_before.resize(kMaxSoftPoints), s.soft_active.reserve(kMaxSoftPoints);
   s.corner.reserve(kMaxEyelets), s.reduced.resize(kMaxEyelets * kMaxEyelets), s.right.resize(kMaxEyelets);
 }
 Stepper::~Stepper() = default;
@@ -271,20 +285,20 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
     end_contacts(settings, state, s, around);
     end_soft_contacts(settings, state, s, around);
 
-    limit_motion(s, n, limit);
+    limit_motion(n, limit, s.u.x.data(), s.u.y.data(), s.u.z.data(), s.move.data());
     record_hold_forces(settings, state, s, around.holds, sub);
-    for (size_t i = 0; i < m; ++i) {
-      s.tension_sum[i] -= s.lambda[i];
-      s.segment_move[i] = std::max(s.move[i], s.move[i + 1]);
-    }
+    record(m, s.lambda.data(), s.move.data(), s.tension_sum.data(), s.segment_move.data());
     float tools_move = 0;
     for (size_t k = 0; k < 2 * around.tools.size(); ++k) tools_move = std::max(tools_move, length(s.tool_move[k]));
     state.travel += tools_move;
     move(n, keep, s.u.x.data(), state.x.x.data(), state.fine.x.data(), state.v.x.data());
     move(n, keep, s.u.y.data(), state.x.y.data(), state.fine.y.data(), state.v.y.data());
     move(n, keep, s.u.z.data(), state.x.z.data(), state.fine.z.data(), state.v.z.data());
+    // Across the corner in a hole the directions differ: an exchange would brake the thread that slides through.
+    for (const Eyelet& e : state.eyelet) s.keep[e.segment] = 0;
     for (Column* v : {&state.v.x, &state.v.y, &state.v.z})
       calm(n, settings.inner_damping, s.mass.data(), s.w.data(), s.keep.data(), s.step.data(), v->data());
+    for (const Eyelet& e : state.eyelet) s.keep[e.segment] = state.broken[e.segment] ? 0.0f : 1.0f;
     warm_masses(settings, state, s);
     ++state.substeps_done;
   }
@@ -294,7 +308,7 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
     state.budget[k] -= s.segment_move[segment_of(state.key[k])] + (other < kTool ? s.segment_move[other] : 0.0f);
   }
   if (around.soft)
-    for (size_t i = 0; i < s.soft_moved.size(); ++i) around.soft->moved[i] = three(s.soft_moved[i]);
+    for (size_t i = 0; i < s.soft_points; ++i) around.soft->moved[i] = s.soft_moved.at(i);
   for (size_t i = 0; i < m; ++i) state.tension[i] = s.tension_sum[i] * part / (h * h);
   if (settings.breaks) break_overloaded(settings, state);
 }

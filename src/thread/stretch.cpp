@@ -64,52 +64,109 @@ void find_edges(const State& state, Scratch& s) {
   edges(m, state.x.z.data(), state.fine.z.data(), s.e.z.data());
 }
 
-// L D L^T from both ends toward the middle: two dependency chains instead of one of twice the length.
-void factor_tridiagonal(Scratch& s, size_t m) {
-  const size_t k = m / 2;
-  const float *diag = s.diag.data(), *off = s.off.data();
-  float *down = s.down.data(), *up = s.up.data(), *inverse = s.inverse_diag.data();
-  inverse[0] = 1 / diag[0];
-  inverse[m - 1] = 1 / diag[m - 1];
-  for (size_t a = 1, b = m - 2; a < k || b > k; ++a, --b) {
-    if (a < k) {
-      down[a] = off[a - 1] * inverse[a - 1];
-      inverse[a] = 1 / (diag[a] - down[a] * off[a - 1]);
-    }
-    if (b > k) {
-      up[b] = off[b] * inverse[b + 1];
-      inverse[b] = 1 / (diag[b] - up[b] * off[b]);
-    }
+namespace {
+
+// The rows are divided into kLanes runs of equal length with one row between neighbors ("substructuring"). The runs are
+// eliminated side by side, one per lane: one chain of dependent operations of an eighth of the length. The rows between them
+// form a small tridiagonal system of their own. Rows behind the last one are those of the unit matrix.
+constexpr size_t kLanes = LaneSystem::kLanes;
+size_t rows_of_lane(size_t m) { return m < kLanes ? 1 : m / kLanes; }
+
+CATGUT_CLONES void eliminate(size_t rows, const float* __restrict diag, const float* __restrict off, float* __restrict down,
+                             float* __restrict inverse, float* __restrict first, float* __restrict left) {
+  const size_t stride = rows + 1;
+  float spike[kLanes], inv[kLanes];
+  for (size_t c = 0; c < kLanes; ++c) {
+    spike[c] = c == 0 ? 0.0f : off[static_cast<ptrdiff_t>(c * stride) - 1];
+    inverse[c] = inv[c] = 1 / diag[c * stride];
+    first[c] = spike[c];
   }
-  float middle = diag[k];
-  if (k > 0) down[k] = off[k - 1] * inverse[k - 1], middle -= down[k] * off[k - 1];
-  if (k + 1 < m) up[k] = off[k] * inverse[k + 1], middle -= up[k] * off[k];
-  inverse[k] = 1 / middle;
+  for (size_t a = 1; a < rows; ++a)
+    for (size_t c = 0; c < kLanes; ++c) {
+      const float o = off[c * stride + a - 1], d = o * inv[c];
+      inv[c] = 1 / (diag[c * stride + a] - d * o);
+      spike[c] = -d * spike[c];
+      down[a * kLanes + c] = d, inverse[a * kLanes + c] = inv[c], first[a * kLanes + c] = spike[c];
+    }
+  for (size_t c = 0; c < kLanes; ++c) left[(rows - 1) * kLanes + c] = spike[c] = spike[c] * inv[c];
+  for (size_t a = rows - 1; a-- > 0;)
+    for (size_t c = 0; c < kLanes; ++c)
+      left[a * kLanes + c] = spike[c] = first[a * kLanes + c] * inverse[a * kLanes + c] - down[(a + 1) * kLanes + c] * spike[c];
 }
 
-void solve_tridiagonal(const Scratch& s, size_t m, float* y, float* x) {
-  const float *down = s.down.data(), *up = s.up.data(), *inverse = s.inverse_diag.data();
-  const size_t k = m / 2, upper = m - 1 - k;  // k rows below the middle one, `upper` above; upper is k or k - 1
-  float below = y[0], above = y[m - 1];
-  const size_t both = upper < k ? upper : k;
-  for (size_t a = 1; a < both; ++a) {
-    const size_t b = m - 1 - a;
-    y[a] = below = y[a] - down[a] * below;
-    y[b] = above = y[b] - up[b] * above;
+CATGUT_CLONES void forward(size_t rows, const float* __restrict down, const float* __restrict left, const float* __restrict y,
+                           float* __restrict swept, float* __restrict begin, float* __restrict end) {
+  const size_t stride = rows + 1;
+  float run[kLanes], sum[kLanes];
+  for (size_t c = 0; c < kLanes; ++c) {
+    swept[c] = run[c] = y[c * stride];
+    sum[c] = left[c] * run[c];
   }
-  for (size_t a = both < 1 ? 1 : both; a < k; ++a) y[a] = below = y[a] - down[a] * below;
-  float center = y[k];
-  if (k > 0) center -= down[k] * below;
-  if (upper > 0) center -= up[k] * above;
-  x[k] = center * inverse[k];
-  float left = x[k], right = x[k];
-  for (size_t c = 1; c <= both; ++c) {
-    const size_t a = k - c, b = k + c;
-    x[a] = left = y[a] * inverse[a] - down[a + 1] * left;
-    x[b] = right = y[b] * inverse[b] - up[b - 1] * right;
+  for (size_t a = 1; a < rows; ++a)
+    for (size_t c = 0; c < kLanes; ++c) {
+      const float v = y[c * stride + a];
+      sum[c] += left[a * kLanes + c] * v;
+      swept[a * kLanes + c] = run[c] = v - down[a * kLanes + c] * run[c];
+    }
+  for (size_t c = 0; c < kLanes; ++c) begin[c] = sum[c], end[c] = run[c];
+}
+
+CATGUT_CLONES void backward(size_t rows, const float* __restrict down, const float* __restrict inverse,
+                            const float* __restrict first, const float* __restrict swept, const float* __restrict before,
+                            const float* __restrict behind, float* __restrict x) {
+  const size_t stride = rows + 1, last = (rows - 1) * kLanes;
+  float run[kLanes];
+  for (size_t c = 0; c < kLanes; ++c)
+    x[c * stride + rows - 1] = run[c] = (swept[last + c] - first[last + c] * before[c] - behind[c]) * inverse[last + c];
+  for (size_t a = rows - 1; a-- > 0;)
+    for (size_t c = 0; c < kLanes; ++c)
+      x[c * stride + a] = run[c] = (swept[a * kLanes + c] - first[a * kLanes + c] * before[c]) * inverse[a * kLanes + c] -
+                                   down[(a + 1) * kLanes + c] * run[c];
+}
+
+}  // namespace
+
+void factor_tridiagonal(Scratch& s, size_t m) {
+  LaneSystem& t = s.lanes;
+  const size_t rows = rows_of_lane(m), stride = rows + 1;
+  float *diag = s.diag.data(), *off = s.off.data();
+  if (m > 0) off[m - 1] = 0;
+  for (size_t i = m; i < kLanes * stride; ++i) diag[i] = 1, off[i] = 0;
+  eliminate(rows, diag, off, t.down.data(), t.inverse.data(), t.first.data(), t.left.data());
+  const float *inverse = t.inverse.data() + (rows - 1) * kLanes, *left = t.left.data(), *far = left + (rows - 1) * kLanes;
+  for (size_t c = 0; c < kLanes; ++c) t.off_end[c] = c + 1 < kLanes ? off[c * stride + rows - 1] : 0.0f;
+  // Between the lanes: L D L^T.
+  float inv = 0;
+  for (size_t c = 0; c + 1 < kLanes; ++c) {
+    const size_t row = c * stride + rows;
+    float d = diag[row] - t.off_end[c] * t.off_end[c] * inverse[c] - off[row] * left[c + 1];
+    t.between_down[c] = c > 0 ? -t.off_end[c] * far[c] * inv : 0.0f;
+    if (c > 0) d += t.between_down[c] * t.off_end[c] * far[c];
+    t.between_inverse[c] = inv = 1 / d;
   }
-  for (size_t c = both + 1; c <= k; ++c) x[k - c] = left = y[k - c] * inverse[k - c] - down[k - c + 1] * left;
-  x[m] = 0;
+}
+
+void solve_tridiagonal(Scratch& s, size_t m, float* y, float* x) {
+  LaneSystem& t = s.lanes;
+  const size_t rows = rows_of_lane(m), stride = rows + 1;
+  for (size_t i = m; i < kLanes * stride; ++i) y[i] = 0;
+  float begin[kLanes], end[kLanes], between[kLanes + 1];
+  forward(rows, t.down.data(), t.left.data(), y, t.swept.data(), begin, end);
+  const float* inverse = t.inverse.data() + (rows - 1) * kLanes;
+  for (size_t c = 0; c + 1 < kLanes; ++c) {
+    const float v = y[c * stride + rows] - t.off_end[c] * (end[c] * inverse[c]) - begin[c + 1];
+    between[c + 1] = v - (c > 0 ? t.between_down[c] * between[c] : 0.0f);
+  }
+  between[0] = 0;
+  float behind[kLanes];
+  behind[kLanes - 1] = 0;
+  for (size_t c = kLanes - 1; c-- > 0;) {
+    between[c + 1] = between[c + 1] * t.between_inverse[c] - (c + 2 < kLanes ? t.between_down[c + 1] * between[c + 2] : 0.0f);
+    behind[c] = t.off_end[c] * between[c + 1];
+  }
+  backward(rows, t.down.data(), t.inverse.data(), t.first.data(), t.swept.data(), between, behind, x);
+  for (size_t c = 0; c + 1 < kLanes; ++c) x[c * stride + rows] = between[c + 1];
+  for (size_t i = m; i < kLanes * stride; ++i) x[i] = 0;
 }
 
 void prepare_stretch(const Settings&, const State& state, Scratch& s, const SoftPoints* soft) {

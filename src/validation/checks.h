@@ -74,6 +74,8 @@ void check_names(Lines& out, bool nightly);
 void check_ties(Lines& out, bool nightly);
 // src/physical.
 void check_eyelets(Lines& out, bool nightly);
-void check_sutures(Lines& out, bool nightly);
+void check_lying(Lines& out, bool nightly);
+void check_interrupted(Lines& out, bool nightly);
+void check_purse_string(Lines& out);
 
 }  // namespace catgut::validation

@@ -93,20 +93,20 @@ void check_friction(Lines& out, int holes, float mu, float tension) {
   sewn.hold.resize(1);
   const Vec3 start = sewn.hold[0].to;
   const auto measure = [&](Vec3 to, float seconds) {
-    // Mean of log(drawn / pulled) and of the turning while it slides.
+    // Log of the ratio of the mean tensions, and the mean turning, while it slides.
     const int parts = 200;
-    double log_ratio = 0, angle = 0;
+    double near = 0, far = 0, angle = 0;
     const Vec3 from = sewn.hold[0].to;
     for (int i = 1; i <= parts; ++i) {
       const Vec3 there = lerp(from, to, static_cast<float>(i) / parts);
       sewn.move_holds({&there, 1}, seconds / parts);
       if (i <= parts / 2) continue;  // slip and the wall have settled
       const thread::State& t = sewn.state.thread;
-      log_ratio += std::log(wide(t.tension[5]) / wide(t.tension[t.segments() - 6]));
+      near += wide(t.tension[5]), far += wide(t.tension[t.segments() - 6]);
       for (const thread::Eyelet& e : t.eyelet) angle += wide(e.angle);
     }
     const double n = parts - parts / 2;
-    return std::pair{log_ratio / n, angle / n};
+    return std::pair{std::log(near / far), angle / n};
   };
   sewn.run(0.3f);
   const auto [drawn, angle] = measure(start + out_way * 12e-3f, 1.2f);

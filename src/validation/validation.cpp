@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
+#include "core/check.h"
 #include "validation/checks.h"
 
 namespace catgut {
@@ -102,27 +104,44 @@ Block make_block(int n, float spacing) {
 
 }  // namespace validation
 
-std::vector<ValidationLine> run_validation(const std::function<void(const ValidationLine&)>& on_line, bool nightly) {
-  validation::Lines lines;
+std::vector<ValidationLine> run_validation(const std::function<void(const ValidationLine&)>& on_line, bool nightly,
+                                           const std::string& only) {
+  namespace v = validation;
+  struct Group {
+    const char* name;
+    void (*run)(v::Lines& out, bool nightly);
+  };
+  const Group groups[] = {
+      {"solver/thread",
+       [](v::Lines& out, bool) { v::check_oscillator(out), v::check_hanging_chain(out), v::check_catenary(out); }},
+      {"solver/tissue",
+       [](v::Lines& out, bool) {
+         v::check_bending(out), v::check_stiffness(out), v::check_momentum(out), v::check_rotation(out), v::check_volume(out);
+       }},
+      {"wall", [](v::Lines& out, bool) { v::check_wall(out); }},
+      {"capstan", v::check_capstan},
+      {"knot/overhand", v::check_overhand},
+      {"knot/holding", v::check_holding},
+      {"knot/shaking", v::check_shaking},
+      {"knot/locking", [](v::Lines& out, bool all) { all ? v::check_locking(out) : void(); }},
+      {"knot/names", v::check_names},
+      {"knot/ties", v::check_ties},
+      {"closure/eyelet", v::check_eyelets},
+      {"closure/surface", v::check_lying},
+      {"closure/interrupted", v::check_interrupted},
+      {"closure/purse-string", [](v::Lines& out, bool all) { all ? v::check_purse_string(out) : void(); }},
+  };
+  v::Lines lines;
   lines.on_line = on_line;
-  validation::check_oscillator(lines);
-  validation::check_hanging_chain(lines);
-  validation::check_catenary(lines);
-  validation::check_bending(lines);
-  validation::check_stiffness(lines);
-  validation::check_momentum(lines);
-  validation::check_rotation(lines);
-  validation::check_volume(lines);
-  validation::check_wall(lines);
-  validation::check_capstan(lines, nightly);
-  validation::check_overhand(lines, nightly);
-  validation::check_holding(lines, nightly);
-  validation::check_shaking(lines, nightly);
-  if (nightly) validation::check_locking(lines);
-  validation::check_names(lines, nightly);
-  validation::check_ties(lines, nightly);
-  validation::check_eyelets(lines, nightly);
-  validation::check_sutures(lines, nightly);
+  bool any = false;
+  std::string names;
+  for (const Group& g : groups) {
+    names += std::string(names.empty() ? "" : ", ") + g.name;
+    if (std::string_view(g.name).substr(0, only.size()) != only) continue;
+    any = true;
+    g.run(lines, nightly);
+  }
+  if (!any) throw InputError("--only " + only, "no group of checks begins so", "give one of: " + names);
   return lines.line;
 }
 

@@ -158,7 +158,9 @@ Vec3 sum_of(const Weights& w, const Column<Float4>& of, uint32_t which) {
 }
 }  // namespace
 
-void Coupling::set_points(const Model& m, const Topology& t, std::span<const Point> points, std::span<const float> offsets) {
+void Coupling::set_points(const Model& m, const Topology& t, std::span<const Point> points, std::span<const float> offsets,
+                          size_t tilting_points) {
+  tilting = std::min(tilting_points, points.size());
   material_.assign(points.begin(), points.end());
   const size_t n = points.size();
   point.resize(n), at.assign(n, {}), speed.assign(n, {}), impulse.assign(n, {}), w.assign(n * n, 0);
@@ -198,7 +200,7 @@ void Coupling::begin(const Model& m, const State& s) {
   tilt.clear();
   for (size_t i = 0; i < n; ++i) {
     tilt_first[i] = static_cast<uint32_t>(tilt.size());
-    for (size_t j = 0; offset[i] != 0 && j < n; ++j) {
+    for (size_t j = 0; i < tilting && offset[i] != 0 && j < n; ++j) {
       if (offset[j] == 0) continue;
       float sum = 0;
       for (int a = 0; a < 4; ++a)
@@ -220,12 +222,12 @@ void Coupling::end(State& s, Scratch& k) {
   std::fill(k.external.begin(), k.external.end(), Float4{});
   for (size_t i = 0; i < point.size(); ++i) {
     add_to(k.external, point[i], impulse[i]);
-    if (offset[i] == 0) continue;
-    const Vec3 tilting = (impulse[i] - axis[i] * dot(impulse[i], axis[i])) * lever_[i];
+    if (offset[i] == 0 || i >= tilting) continue;
+    const Vec3 moment = (impulse[i] - axis[i] * dot(impulse[i], axis[i])) * lever_[i];
     for (int c = 0; c < 4; ++c) {
       if (point[i].weight[c] == 0) continue;
       Float4& dir = k.external[2 * point[i].column[c] + 1];
-      dir = float4(vec3(dir) + tilting * point[i].weight[c]);
+      dir = float4(vec3(dir) + moment * point[i].weight[c]);
     }
   }
   apply_impulses(s, k, k.external);
