@@ -201,7 +201,8 @@ TEST(Allocation, a_stitch_that_is_drawn_asks_for_none) {
   near.gap = 0.5e-3f;
   validation::Sewn s = validation::interrupted(near);
   s.run(0.002f);  // columns of the inverse get their room in the first step
-  const physical::Hands hands{s.hold, {}, {}};
+  physical::Hands hands;
+  hands.holds = s.hold;
   const uint64_t count = allocations_of([&] {
     for (int i = 0; i < 150; ++i) {
       for (thread::Hold& h : s.hold) h.from = h.to, h.to = h.to + Vec3{1.2e-4f, 0, 0};
