@@ -191,7 +191,7 @@ int plot_haptics_log(const std::string& file) {
     throw InputError("--log " + file, "not a haptics log",
                      "write one with catgut play SCENE --haptics DRIVER --haptics-log FILE");
   // Three force magnitudes per millisecond; a pixel shows the maximum over its interval.
-  constexpr size_t kColumns = 26;
+  constexpr size_t kColumns = 36;
   struct Row {
     double t;
     std::array<double, 3> force;

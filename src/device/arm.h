@@ -16,11 +16,24 @@
 namespace catgut {
 
 // Called from the backend's thread, about 1000 times per second for each device: must not wait, allocate, log or throw. Returns
-// the force [N] for the motors.
+// the command for the motors.
 struct ArmCallback {
-  Vec3 (*step)(void* user, size_t arm, const ArmSample& sample) = nullptr;
+  ArmForce (*step)(void* user, size_t arm, const ArmSample& sample) = nullptr;
   void* user = nullptr;
 };
+
+// While a backend stops: the last command, smaller by `step` [N], and torque and grip in proportion to their peaks.
+inline ArmForce fade(const ArmForce& last, const ArmLimits& limits, float step) {
+  const auto shorter = [](Vec3 v, float by) {
+    const float l = length(v);
+    return l > by ? v * ((l - by) / l) : Vec3{};
+  };
+  const float part = step / std::max(1e-3f, limits.force);
+  return {shorter(last.force, step), shorter(last.torque, part * limits.torque),
+          shorter({last.grip, 0, 0}, part * limits.grip).x};
+}
+inline bool is_finite(const ArmForce& f) { return is_finite(f.force) && is_finite(f.torque) && std::isfinite(f.grip); }
+inline bool is_zero(const ArmForce& f) { return length2(f.force) == 0 && length2(f.torque) == 0 && f.grip == 0; }
 
 struct ArmInfo {
   bool present = false;

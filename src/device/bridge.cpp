@@ -195,14 +195,14 @@ void take_one(Bridge& b, const uint8_t* data, size_t size) {
   } else if (h.kind == BridgeKind::sample) {
     End& e = b.end[h.arm];
     ArmSample s;
-    Vec3 felt;
+    ArmForce felt;
     uint32_t faults = 0;
     fine = read_sample(payload, s, felt, faults);
     if (fine) {
       e.sample = s;
       e.heard_ns = now_ns();
       e.fresh = true;
-      e.force.store(length(felt), std::memory_order_relaxed);
+      e.force.store(length(felt.force), std::memory_order_relaxed);
       e.faults.store(faults, std::memory_order_relaxed);
     }
   }

@@ -248,18 +248,23 @@ void write_info(const ArmInfo& a, BridgePayload& p) {
   put_float(&p[12], a.limits.stiffness), put_float(&p[16], a.limits.damping);
   put_vec(&p[20], a.least), put_vec(&p[32], a.most);
   put_text(&p[44], a.name), put_text(&p[84], a.model), put_text(&p[124], a.serial), put_text(&p[164], a.driver);
+  put_float(&p[204], a.limits.torque), put_float(&p[208], a.limits.turn_stiffness), put_float(&p[212], a.limits.turn_damping);
+  put_float(&p[216], a.limits.grip), put_float(&p[220], a.limits.grip_stiffness);
 }
 bool read_info(const BridgePayload& p, ArmInfo& a) {
-  if (!floats_are_sane(p, 4, 10)) return false;
+  if (!floats_are_sane(p, 4, 10) || !floats_are_sane(p, 204, 5)) return false;
   a.present = get<uint32_t>(&p[0]) != 0;
   a.limits.force = get_float(&p[4]), a.limits.continuous = get_float(&p[8]);
   a.limits.stiffness = get_float(&p[12]), a.limits.damping = get_float(&p[16]);
   a.least = get_vec(&p[20]), a.most = get_vec(&p[32]);
   a.name = get_text(&p[44]), a.model = get_text(&p[84]), a.serial = get_text(&p[124]), a.driver = get_text(&p[164]);
+  a.limits.torque = get_float(&p[204]), a.limits.turn_stiffness = get_float(&p[208]);
+  a.limits.turn_damping = get_float(&p[212]);
+  a.limits.grip = get_float(&p[216]), a.limits.grip_stiffness = get_float(&p[220]);
   return true;
 }
 
-void write_sample(const ArmSample& s, Vec3 force, uint32_t faults, BridgePayload& p) {
+void write_sample(const ArmSample& s, const ArmForce& force, uint32_t faults, BridgePayload& p) {
   p.fill(0);
   put(&p[0], s.time_ns);
   // A sample with an invalid number is sent as an absent device.
@@ -273,12 +278,12 @@ void write_sample(const ArmSample& s, Vec3 force, uint32_t faults, BridgePayload
     put_vec(&p[44], s.velocity);
     put_float(&p[56], s.warmth);
   }
-  if (is_finite(force)) put_vec(&p[60], force);
+  if (is_finite(force)) put_vec(&p[60], force.force), put_vec(&p[80], force.torque), put_float(&p[92], force.grip);
   put(&p[72], faults);
   put_float(&p[76], ready && s.jaw >= 0 && s.jaw <= 1 ? s.jaw : -1.0f);
 }
-bool read_sample(const BridgePayload& p, ArmSample& s, Vec3& force, uint32_t& faults) {
-  if (!floats_are_sane(p, 16, 14) || !floats_are_sane(p, 76, 1)) return false;
+bool read_sample(const BridgePayload& p, ArmSample& s, ArmForce& force, uint32_t& faults) {
+  if (!floats_are_sane(p, 16, 14) || !floats_are_sane(p, 76, 5)) return false;
   const uint32_t flags = get<uint32_t>(&p[8]);
   s = {};
   s.time_ns = get<uint64_t>(&p[0]);
@@ -289,7 +294,7 @@ bool read_sample(const BridgePayload& p, ArmSample& s, Vec3& force, uint32_t& fa
   s.pose.q = normalized(Quat{get_float(&p[28]), get_float(&p[32]), get_float(&p[36]), get_float(&p[40])});
   s.velocity = get_vec(&p[44]);
   s.warmth = get_float(&p[56]);
-  force = get_vec(&p[60]);
+  force = {get_vec(&p[60]), get_vec(&p[80]), get_float(&p[92])};
   faults = get<uint32_t>(&p[72]);
   s.jaw = get_float(&p[76]);
   return true;
@@ -305,9 +310,12 @@ void write_patch(const ForcePatch& f, BridgePayload& p) {
       put_float(&p[132], f.viscous);
   put_vec(&p[136], f.along), put_vec(&p[148], f.pierce), put_float(&p[160], f.pierce_force), put_float(&p[164], f.pierce_keep);
   put_float(&p[168], f.cap);
+  put_float(&p[172], f.turn.x), put_float(&p[176], f.turn.y), put_float(&p[180], f.turn.z), put_float(&p[184], f.turn.w);
+  put_vec(&p[188], f.lever), put_vec(&p[200], f.couple), put_float(&p[212], f.couple_stiffness);
+  put_float(&p[216], f.grip_from), put_float(&p[220], f.grip_stiffness);
 }
 bool read_patch(const BridgePayload& p, ForcePatch& f) {
-  if (!floats_are_sane(p, 24, 37)) return false;
+  if (!floats_are_sane(p, 24, 50)) return false;
   f = {};
   f.time_ns = get<uint64_t>(&p[0]), f.tick = get<uint64_t>(&p[8]);
   f.epoch = get<uint32_t>(&p[16]), f.discontinuity_id = get<uint32_t>(&p[20]);
@@ -319,6 +327,9 @@ bool read_patch(const BridgePayload& p, ForcePatch& f) {
   f.along = get_vec(&p[136]), f.pierce = get_vec(&p[148]);
   f.pierce_force = get_float(&p[160]), f.pierce_keep = get_float(&p[164]);
   f.cap = get_float(&p[168]);
+  f.turn = normalized(Quat{get_float(&p[172]), get_float(&p[176]), get_float(&p[180]), get_float(&p[184])});
+  f.lever = get_vec(&p[188]), f.couple = get_vec(&p[200]), f.couple_stiffness = get_float(&p[212]);
+  f.grip_from = get_float(&p[216]), f.grip_stiffness = get_float(&p[220]);
   return true;
 }
 

@@ -21,14 +21,17 @@
 // only if its counter is larger than that of the last one. Repeated or overtaken packets are dropped.
 //   ask (6), simulator: answered by an info for each device; also reports that the simulator is alive
 //   info (7), arm: 0 u32 present; f32: 4 force, 8 continuous, 12 stiffness, 16 damping, 20 least x3, 32 most x3 [m];
-//       char x40, ending in zero: 44 name, 84 model, 124 serial, 164 driver
+//       char x40, ending in zero: 44 name, 84 model, 124 serial, 164 driver; f32, 0 where there are no such motors: 204 torque
+//       [N m], 208 stiffness [N m/rad] and 212 damping [N m s/rad] of rotation, 216 force [N] and 220 stiffness [N/m] of a
+//       gripper
 //   sample (8), arm: 0 u64 time [ns] on the arm's clock; 8 u32 1 ready + 2 forced off; 12 u32 buttons; f32: 16 position x3 [m],
 //       28 quaternion xyzw, 44 velocity x3 [m/s], 56 warmth, 60 force on the motors x3 [N]; 72 u32 faults (haptic/limiter); 76
-//       f32 jaw of a gripper, 0 closed to 1 open, -1 none
+//       f32 jaw of a gripper, 0 closed to 1 open, -1 none; 80 torque on the motors x3 [N m], 92 grip [N]
 //   patch (9), simulator: ForcePatch in the arm's frame: 0 u64 time of the sample that it was computed for, 8 u64 tick,
 //       16 u32 epoch, 20 u32 topology; f32: 24 period, 28 expiry, 32 point x3, 44 force x3, 56 stiffness and 80 damping (xx yy
 //       zz xy xz yz), 104 normal x3, 116 gap, 120 coefficient, 124 drag, 128 presliding, 132 viscous, 136 along x3, 148 pierce
-//       x3, 160 pierce_force, 164 pierce_keep, 168 cap
+//       x3, 160 pierce_force, 164 pierce_keep, 168 cap, 172 turn xyzw, 188 lever x3, 200 couple x3, 212 couple_stiffness,
+//       216 grip_from, 220 grip_stiffness
 //   bye (10), either end: force off, the devices are free
 #pragma once
 #include <array>
@@ -110,8 +113,8 @@ void write_bridge_key(const std::string& file);  // a new one, mode 600; never o
 // --- payloads; `false`: an invalid number ---
 void write_info(const ArmInfo& info, BridgePayload& out);
 bool read_info(const BridgePayload& in, ArmInfo& info);
-void write_sample(const ArmSample& sample, Vec3 force, uint32_t faults, BridgePayload& out);
-bool read_sample(const BridgePayload& in, ArmSample& sample, Vec3& force, uint32_t& faults);
+void write_sample(const ArmSample& sample, const ArmForce& force, uint32_t faults, BridgePayload& out);
+bool read_sample(const BridgePayload& in, ArmSample& sample, ArmForce& force, uint32_t& faults);
 void write_patch(const ForcePatch& patch, BridgePayload& out);
 bool read_patch(const BridgePayload& in, ForcePatch& patch);
 

@@ -4,7 +4,8 @@
 //
 // Pitfalls: ids are a plain `char`, and boolean results are one byte, whose upper three are undefined in a register.
 // The status array grew from 13 to more than 16 entries over the versions, and the library fills as many as it knows. A result
-// of 1 (time guard) is not an error; a rotation is [row][column]. Its base frame is x toward the user, y right, z up.
+// of 1 (time guard) is not an error; a rotation is [row][column]. A positive grip force opens the fingers, and the library
+// clamps it at 1 N unless dhdSetMaxGripperForce says otherwise. Its base frame is x toward the user, y right, z up.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -39,6 +40,11 @@ constexpr int kTypeDelta3 = 63, kTypeOldDelta3 = 31, kTypeFalcon = 60;
   X(dhdGetSDKVersion, void, (int*, int*, int*, int*))                                                       \
   X(dhdIsLeftHanded, bool, (Id))                                                                            \
   X(dhdHasGripper, bool, (Id))                                                                              \
+  X(dhdHasActiveGripper, bool, (Id))                                                                        \
+  X(dhdHasActiveWrist, bool, (Id))                                                                          \
+  X(dhdSetMaxForce, int, (double, Id))                                                                      \
+  X(dhdSetMaxTorque, int, (double, Id))                                                                     \
+  X(dhdSetMaxGripperForce, int, (double, Id))                                                               \
   X(dhdGetStatus, int, (int*, Id))                                                                          \
   X(dhdEnableForce, int, (Flag, Id))                                                                        \
   X(dhdSetGravityCompensation, int, (int, Id))                                                              \

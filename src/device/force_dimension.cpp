@@ -22,25 +22,29 @@ using namespace std::chrono_literals;
 constexpr float kStopStep = 0.5f;                   // [N] per millisecond while stopping (the limiter's slew rate)
 constexpr uint32_t kStatusEvery = 20;               // [ms] between checks whether the firmware has cut the force
 constexpr uint32_t kEnableEvery = 250;              // [ms] between attempts to switch it on again
+constexpr uint32_t kMostFailures = 20;              // milliseconds in a row with a failed call, after which a device is lost
 constexpr auto kReopenEvery = 500ms;                // of a lost device
 constexpr auto kHangsAfter = 300ms;                 // a thread that does not end by then is abandoned
-constexpr double kShut = 0.004, kOpen = 0.018;      // [m] gap range over which the jaw follows the fingers
+constexpr double kShut = 0.004;                     // [m] gap from which on the jaw follows the fingers, over kGripTravel
 constexpr double kClosed = 0.007, kOpened = 0.011;  // [m] gap of a gripper that counts as pressed, and as released
 
 // Their axes (x toward the user, y right, z up) to ours (x right, y up, z toward the user), and back.
 Vec3 ours(double x, double y, double z) { return {static_cast<float>(y), static_cast<float>(z), static_cast<float>(x)}; }
+std::array<double, 3> theirs(Vec3 v) { return {double{v.z}, double{v.x}, double{v.y}}; }
 
 struct Arm {
   dhd::Library dhd;  // constant
   int index = 0;     // among the library's devices; constant
   size_t hand = 0;
   bool paced = true, gripper = false;
+  ArmLimits limits;  // constant
   // Owned by the thread; before it runs, by the opener.
   dhd::Id id = -1;
   ArmCallback callback;
-  uint32_t sequence = 0, cut_for = 0;
+  uint32_t sequence = 0, cut_for = 0, failures = 0;
+  float jaw = -1;
   bool forced_off = false, closed = false;
-  Vec3 force;  // [N] last written, our frame
+  ArmForce force;  // last written, our frame
   std::chrono::steady_clock::time_point reopen_at;
   // Readable from any thread.
   std::atomic<bool> ready{false}, stopping{false}, stopped{true};
@@ -83,6 +87,10 @@ bool prepare(Arm& a, std::string& why) {
     return false;
   }
   a.gripper = a.dhd.dhdHasGripper(a.id);
+  // A second clamp, in the library: behind all of ours.
+  a.dhd.dhdSetMaxForce(double{a.limits.force}, a.id);
+  if (a.limits.torque > 0) a.dhd.dhdSetMaxTorque(double{a.limits.torque}, a.id);
+  if (a.limits.grip > 0) a.dhd.dhdSetMaxGripperForce(double{a.limits.grip}, a.id);
   return true;
 }
 
@@ -102,9 +110,10 @@ bool read(Arm& a, ArmSample& s) {
   double gap = 0;
   if (a.gripper && a.dhd.dhdGetGripperGap(&gap, a.id) != dhd::kError) {
     a.closed = gap < (a.closed ? kOpened : kClosed);
-    if (a.closed) s.buttons |= 1;
-    s.jaw = static_cast<float>(std::clamp((gap - kShut) / (kOpen - kShut), 0.0, 1.0));
+    a.jaw = static_cast<float>(std::clamp((gap - kShut) / double{kGripTravel}, 0.0, 1.0));
   }
+  if (a.closed) s.buttons |= 1;
+  s.jaw = a.jaw;  // a gap that could not be read must not open the jaws
   if (a.sequence % kStatusEvery == 1) {
     int status[dhd::kStatusRoom] = {};
     if (a.dhd.dhdGetStatus(status, a.id) == dhd::kError) return false;
@@ -121,15 +130,21 @@ bool read(Arm& a, ArmSample& s) {
   return true;
 }
 
-bool write(Arm& a, Vec3 f) {
-  return a.dhd.dhdSetForceAndTorqueAndGripperForce(double{f.z}, double{f.x}, double{f.y}, 0, 0, 0, 0, a.id) != dhd::kError;
+bool write(Arm& a, const ArmForce& f) {
+  const auto force = theirs(f.force), torque = theirs(a.limits.torque > 0 ? f.torque : Vec3{});
+  const double grip = a.limits.grip > 0 ? double{f.grip} : 0;
+  return a.dhd.dhdSetForceAndTorqueAndGripperForce(force[0], force[1], force[2], torque[0], torque[1], torque[2], grip, a.id) !=
+         dhd::kError;
+}
+
+void note_error(Arm& a) {
+  a.error.store(static_cast<uint32_t>(a.dhd.dhdErrorGetLast()), std::memory_order_relaxed);
+  a.errors.fetch_add(1, std::memory_order_relaxed);
 }
 
 void lose(Arm& a) {
-  a.error.store(static_cast<uint32_t>(a.dhd.dhdErrorGetLast()), std::memory_order_relaxed);
-  a.errors.fetch_add(1, std::memory_order_relaxed);
   a.ready.store(false, std::memory_order_relaxed);
-  a.force = {};
+  a.force = {}, a.failures = 0;
   a.dhd.dhdClose(a.id);
   a.id = -1;
   a.reopen_at = std::chrono::steady_clock::now() + kReopenEvery;
@@ -158,17 +173,23 @@ void serve(Arm& a) {
   if (!fine) s = {}, s.sequence = a.sequence;
   // The callback's owner is not destroyed between these two marks (see stop).
   a.calling = true;
-  Vec3 force;
+  ArmForce force;
   if (!a.left) force = a.callback.step(a.callback.user, a.hand, s);
   a.calling = false;
-  if (a.stopping) {
-    const float l = length(a.force);
-    force = l > kStopStep ? a.force * ((l - kStopStep) / l) : Vec3{};
-  }
+  if (a.stopping || !fine) force = fade(a.force, a.limits, kStopStep);
   if (!is_finite(force)) force = {};
-  fine = fine && write(a, force);
-  if (fine) a.force = force, a.ready.store(true, std::memory_order_relaxed);
-  else if (here) lose(a);
+  const bool written = here && write(a, force);
+  if (written) a.force = force;
+  if (fine && written) {
+    a.failures = 0;
+    a.ready.store(true, std::memory_order_relaxed);
+  } else if (here) {
+    // A single failed call loses no device. While it cannot be read but still takes commands, its force goes down without a
+    // step; meanwhile its own watchdog is as strict.
+    a.ready.store(false, std::memory_order_relaxed);
+    note_error(a);
+    if (++a.failures > kMostFailures) lose(a);
+  }
   a.steps.fetch_add(1, std::memory_order_relaxed);
 }
 
@@ -176,7 +197,7 @@ void run(const std::shared_ptr<Arm>& arm) {
   Arm& a = *arm;
   go_first();
   Beat beat;
-  while (!a.left && (!a.stopping || length2(a.force) > 0)) {
+  while (!a.left && (!a.stopping || !is_zero(a.force))) {
     serve(a);
     if (a.paced || a.id < 0) beat.wait();
   }
@@ -287,6 +308,18 @@ ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<s
     }
     auto a = std::make_shared<Arm>();
     a->dhd = dhd, a->index = index, a->id = static_cast<dhd::Id>(id), a->paced = options.paced;
+    // The library does not report its devices' limits; these are from CHAI3D's CDeltaDevices.cpp (docs/references.md).
+    const int type = dhd.dhdGetSystemType(a->id);
+    const bool falcon = type == dhd::kTypeFalcon, delta = type == dhd::kTypeDelta3 || type == dhd::kTypeOldDelta3;
+    a->limits = limits_of(falcon  ? "falcon"
+                          : delta ? "delta"
+                                  : text(dhd.dhdGetSystemName(a->id)),
+                          {falcon  ? 8.0f
+                           : delta ? 20.0f
+                                   : 12.0f,
+                           0, 0, 0});
+    if (!dhd.dhdHasActiveWrist(a->id)) a->limits.torque = 0;
+    if (!dhd.dhdHasActiveGripper(a->id)) a->limits.grip = 0;
     std::string why;
     if (!prepare(*a, why)) {
       messages.push_back(who + " cannot be used: " + why);
@@ -302,10 +335,7 @@ ArmPort open_force_dimension(const ForceDimensionOptions& options, std::vector<s
     unsigned short serial = 0;
     if (dhd.dhdGetSerialNumber(&serial, a->id) != dhd::kError) info.serial = "fd-" + std::to_string(serial);
     info.driver = std::to_string(version[0]) + "." + std::to_string(version[1]) + "." + std::to_string(version[2]);
-    // The library does not report its devices' limits; these are from CHAI3D's CDeltaDevices.cpp (docs/references.md).
-    const int type = dhd.dhdGetSystemType(a->id);
-    const bool falcon = type == dhd::kTypeFalcon, delta = type == dhd::kTypeDelta3 || type == dhd::kTypeOldDelta3;
-    info.limits = limits_of(falcon ? "falcon" : delta ? "delta" : info.model, {falcon ? 8.0f : delta ? 20.0f : 12.0f, 0, 0, 0});
+    info.limits = a->limits;
     const float reach = falcon ? 0.04f : delta ? 0.15f : 0.075f;
     info.least = Vec3{-reach, -reach, -reach}, info.most = Vec3{reach, reach, reach};
     f->arm[a->hand] = std::move(a);

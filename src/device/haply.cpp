@@ -282,7 +282,7 @@ void serve(Haply& h, uint32_t error) {
     if (a.id.empty()) continue;
     if (error) a.sample = {};
     a.sample.sequence = ++a.sequence;
-    Vec3 force = h.callback.step(h.callback.user, k, a.sample);
+    Vec3 force = h.callback.step(h.callback.user, k, a.sample).force;  // its arms have no other motors
     const bool ready = a.sample.state == ArmState::ready;
     if (h.stopping) {
       const float l = length(a.force);

@@ -44,10 +44,10 @@ constexpr Enum kSuccess = 0x0000, kWarmMotors = 0x0200, kForceError = 0x0204, kD
                kCommError = 0x0302, kCommConfig = 0x0303, kTimerError = 0x0304, kInvalidLicense = 0x0600;
 constexpr Enum kButtons = 0x2000, kPosition = 0x2050, kVelocity = 0x2051, kTransform = 0x2052;
 constexpr Enum kVersion = 0x2500, kModel = 0x2501, kDriverVersion = 0x2502, kVendor = 0x2503, kSerial = 0x2504,
-               kUsableWorkspace = 0x2551;
+               kUsableWorkspace = 0x2551, kOutputDof = 0x2554;
 constexpr Enum kUpdateRate = 0x2600, kMaxStiffness = 0x2602, kMaxForce = 0x2603, kMaxContinuousForce = 0x2604,
                kMotorTemperature = 0x2605, kMaxDamping = 0x2609;
-constexpr Enum kCurrentForce = 0x2700, kLastForce = 0x2800;
+constexpr Enum kCurrentForce = 0x2700, kCurrentTorque = 0x2701, kLastForce = 0x2800;
 constexpr Enum kForceOutput = 0x4000, kForceClamping = 0x4001, kForceRamping = 0x4002, kForceLimit = 0x4003;
 constexpr Enum kCalibrationOk = 0x5000, kCalibrationNeedsUpdate = 0x5001, kCalibrationNeedsHand = 0x5002;
 constexpr Code kCallbackDone = 0, kCallbackContinue = 1;

@@ -10,17 +10,21 @@
 namespace catgut {
 namespace {
 
-// The first one whose word is part of the name. Peak [N], continuous [N], stiffness [N/m], damping [N s/m].
-constexpr std::array<ArmProfile, 12> kProfiles{{
+// The first one whose word is part of the name. Peak [N], continuous [N], stiffness [N/m], damping [N s/m]; torque [N m],
+// stiffness [N m/rad] and damping [N m s/rad] of rotation; peak [N] and stiffness [N/m] of the gripper.
+constexpr std::array<ArmProfile, 15> kProfiles{{
     {"touch x", {7.9f, 1.75f, 1000, 5}, "CHAI3D (PHANTOM Desktop); continuous: data sheet, from memory"},
     {"desktop", {7.9f, 1.75f, 1000, 5}, "CHAI3D; continuous: data sheet, from memory"},
-    {"premium", {8.5f, 1.4f, 800, 5}, "CHAI3D (Premium 1.5); continuous: data sheet, from memory"},
+    {"premium", {8.5f, 1.4f, 800, 5, 0.188f, 0.3f, 0.004f}, "CHAI3D (Premium 1.5 6DOF); continuous: data sheet, from memory"},
     {"touch", {3.3f, 0.88f, 400, 4}, "CHAI3D; continuous: data sheet, from memory"},
     {"omni", {3.3f, 0.88f, 400, 4}, "CHAI3D has 700 N/m; as the Touch, which is the same mechanism"},
+    {"omega.7", {12, 12, 5000, 30, 0, 0, 0, 8, 2000}, "CHAI3D; the maker gives 12 N without a time limit"},
     {"omega", {12, 12, 5000, 30}, "CHAI3D; the maker gives 12 N without a time limit"},
+    {"delta.6", {20, 20, 5000, 30, 0.2f, 1, 0.07f}, "CHAI3D; damping of rotation: as the sigma"},
     {"delta", {20, 20, 5000, 30}, "CHAI3D"},
-    {"sigma", {12, 12, 4000, 30}, "CHAI3D, the lower of its 4000 to 8000 N/m"},
-    {"lambda", {12, 12, 4000, 30}, "CHAI3D, the lower of its 4000 to 8000 N/m"},
+    {"sigma.6", {12, 12, 4000, 30, 0.2f, 1, 0.07f}, "CHAI3D"},
+    {"sigma", {12, 12, 4000, 30, 0.2f, 1, 0.07f, 8, 2000}, "CHAI3D"},
+    {"lambda", {12, 12, 4000, 30, 0.2f, 1, 0.07f, 8, 2000}, "as the sigma.7, whose values CHAI3D has"},
     {"falcon", {8, 8, 3000, 20}, "CHAI3D"},
     {"inverse3", {2, 2, 400, 4}, "Isaac Lab clips at 2 N; stiffness unpublished: a Touch's"},
     {"minverse", {2, 2, 400, 4}, "as the Inverse3; unpublished"},
@@ -41,8 +45,9 @@ ArmLimits limits_of(const std::string& model, const ArmLimits& says) {
       break;
     }
   const auto less = [](float known, float said) { return said > 0 && std::isfinite(said) ? std::min(known, said) : known; };
-  return {less(out.force, says.force), less(out.continuous, says.continuous), less(out.stiffness, says.stiffness),
-          less(out.damping, says.damping)};
+  out.force = less(out.force, says.force), out.continuous = less(out.continuous, says.continuous);
+  out.stiffness = less(out.stiffness, says.stiffness), out.damping = less(out.damping, says.damping);
+  return out;
 }
 
 }  // namespace catgut

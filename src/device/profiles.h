@@ -15,7 +15,7 @@ struct ArmProfile {
   const char* source;
 };
 std::span<const ArmProfile> arm_profiles();
-// says: the values known to the backend; 0: unknown.
+// says: the values known to the backend; 0: unknown. Torque and grip are the model's; the backend clears what a device lacks.
 ArmLimits limits_of(const std::string& model, const ArmLimits& says);
 
 }  // namespace catgut

@@ -56,7 +56,8 @@ struct Arm {
   // and errors of one device may appear in the other's frame.
   bool cut = false, broken = false;
   float warmth = 0;
-  Vec3 force;  // [N] last written
+  ArmForce force;    // last written
+  ArmLimits limits;  // constant
   // Readable from any thread.
   std::atomic<bool> ready{false}, at_rest{true};
   std::atomic<uint32_t> error{0}, errors{0};
@@ -99,7 +100,7 @@ void serve(Touch& t, size_t which) {
   s.sequence = ++a.sequence;
   if (std::exchange(a.broken, false)) a.lost = true, a.lost_for = 0;  // found in the other device's frame
   // A lost device is asked now and then; before that its force goes down without a step, in case it still hears the driver.
-  if (a.lost && length2(a.force) == 0 && ++a.lost_for % kProbeEvery != 0) {
+  if (a.lost && is_zero(a.force) && ++a.lost_for % kProbeEvery != 0) {
     t.callback.step(t.callback.user, which, s);
     a.steps.fetch_add(1, std::memory_order_relaxed);
     return;
@@ -131,20 +132,21 @@ void serve(Touch& t, size_t which) {
     s.warmth = a.warmth;
     s.forced_off = std::exchange(a.cut, false);
   }
-  Vec3 force = t.callback.step(t.callback.user, which, s);
-  if (t.stopping.load(std::memory_order_relaxed) || lost) {
-    const float l = length(a.force);
-    force = l > kStopStep ? a.force * ((l - kStopStep) / l) : Vec3{};
-  }
+  ArmForce force = t.callback.step(t.callback.user, which, s);
+  if (t.stopping.load(std::memory_order_relaxed) || lost) force = fade(a.force, a.limits, kStopStep);
   if (!is_finite(force)) force = {};
-  const double newton[3] = {double{force.x}, double{force.y}, double{force.z}};
+  const double newton[3] = {double{force.force.x}, double{force.force.y}, double{force.force.z}};
   t.hd.hdSetDoublev(hd::kCurrentForce, newton);
+  if (a.limits.torque > 0) {
+    const double milli[3] = {1e3 * double{force.torque.x}, 1e3 * double{force.torque.y}, 1e3 * double{force.torque.z}};
+    t.hd.hdSetDoublev(hd::kCurrentTorque, milli);  // [N mm]
+  }
   t.hd.hdEndFrame(a.handle);
   note_errors(t, which);
   a.lost = std::exchange(a.broken, false) || lost;
   if (!a.lost) a.lost_for = 0;
   a.force = force;
-  a.at_rest.store(length2(force) == 0, std::memory_order_relaxed);
+  a.at_rest.store(is_zero(force), std::memory_order_relaxed);
   a.ready.store(!a.lost, std::memory_order_relaxed);
   a.steps.fetch_add(1, std::memory_order_relaxed);
 }
@@ -247,7 +249,11 @@ bool prepare(const hd::Library& hd, hd::Handle handle, ArmInfo& info, std::strin
   info.limits.continuous = static_cast<float>(number(hd, hd::kMaxContinuousForce));
   info.limits.stiffness = 1e3f * static_cast<float>(number(hd, hd::kMaxStiffness));  // N/mm
   info.limits.damping = 1e3f * static_cast<float>(number(hd, hd::kMaxDamping));
+  // Phantom Premium 6DOF. The library's Cartesian torque is deprecated there, in favor of torques of its joints.
+  hd::Int motors = 0;
+  hd.hdGetIntegerv(hd::kOutputDof, &motors);
   info.limits = limits_of(info.model, info.limits);
+  if (motors != 6) info.limits.torque = 0;
   double box[6] = {};
   hd.hdGetDoublev(hd::kUsableWorkspace, box);
   info.least = Vec3{static_cast<float>(box[0]), static_cast<float>(box[1]), static_cast<float>(box[2])} * 1e-3f;
@@ -343,6 +349,7 @@ ArmPort open_touch(const TouchOptions& options, std::vector<std::string>& messag
       continue;
     }
     info.present = true;
+    touch->arm[k].limits = info.limits;
   }
   if (!port.arm[0].present && !port.arm[1].present) return port;
   port.self = touch.release();

@@ -10,6 +10,8 @@
 
 namespace catgut {
 
+constexpr float kNoCap = 1000;  // [N] above the force of any device
+
 struct ForcePatch {
   uint64_t tick = 0;
   uint32_t epoch = 0;  // counts jumps in time (restart, undo): earlier patches are void
@@ -48,7 +50,20 @@ struct ForcePatch {
   Vec3 thread_direction;     // unit, direction of the pull on the hand; zero: no thread
   float thread_tension = 0;  // [N]
 
-  float cap = 3.3f;  // [N] maximum force
+  float cap = kNoCap;  // [N] maximum force, besides the limits of the device; 0: no force, torque or grip at all
+
+  // For devices with motors for rotation. The force above acts at point + lever, rigidly attached to the hand: its torque about
+  // the hand is lever x force, and a rotation of the hand moves the place where the force acts. `couple` is the torque besides,
+  // with a spring about its own axis. Recomputed in each tick; not part of the state.
+  Quat turn;                   // orientation of the hand
+  Vec3 lever;                  // [m] from the hand, at that orientation
+  Vec3 couple;                 // [N m]
+  float couple_stiffness = 0;  // [N m/rad] about `couple`
+
+  // For grippers: what the jaws hold pushes the fingers apart, from jaw `grip_from` (ToolInput::jaw) down. 0: the jaws are
+  // empty.
+  float grip_from = 0;
+  float grip_stiffness = 0;  // [N] per unit of jaw
 };
 
 }  // namespace catgut

@@ -26,6 +26,8 @@ constexpr void reflect(auto& a, Like<ForcePatch> auto& p) {
   a(p.point), a(p.force), a(p.stiffness), a(p.damping), a(p.normal), a(p.gap);
   a(p.coefficient), a(p.drag), a(p.presliding), a(p.viscous), a(p.along);
   a(p.pierce), a(p.pierce_force), a(p.pierce_keep), a(p.thread_direction), a(p.thread_tension), a(p.cap);
+  a.cache(p.turn), a.cache(p.lever), a.cache(p.couple), a.cache(p.couple_stiffness), a.cache(p.grip_from);
+  a.cache(p.grip_stiffness);
 }
 
 constexpr void reflect(auto& a, Like<ToolView> auto& t) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // haptic: the chain between the computed force and the motors, in this order: finite, age of
 // the model, soft map, clamp, slew, heat, ramp-in. The energy controller (haptic/passivity) follows it. Reads a wanted
-// force, writes an allowed one; both in the device's frame [N]. Pure: the caller passes the time.
+// force, writes an allowed one; both in the device's frame [N]. Torque and grip pass the same chain: a fault of one is a fault
+// of all. Pure: the caller passes the time.
 #pragma once
+#include <array>
 #include <cstdint>
 
 #include "core/math.h"
@@ -30,6 +32,9 @@ struct LimiterOptions {
   float ramp = 2;             // [s] from zero to full force
   float top_speed = 1.0f;     // [m/s] of the hand; above: force off (the device's own limit is 1.2 m/s)
   float free_force = 0.05f;   // [N] a fast hand with less force than this stays engaged
+  // Peaks of torque and grip; 0: no such motors. Their other limits are those of the force, in proportion to the peaks.
+  float torque = 0;  // [N m]
+  float grip = 0;    // [N]
 };
 
 enum LimiterFault : uint32_t {
@@ -47,30 +52,35 @@ enum LimiterFault : uint32_t {
 
 enum class Engaged : uint8_t { no, waiting, rising, yes };
 
+// Of force, torque or grip; torque and grip in units of peak / LimiterOptions::force, so that one chain serves all.
+struct LimiterMotors {
+  Vec3 soft;       // [N] after slew, before heat and ramp
+  Vec3 trusted;    // [N] the last wanted force while the model was young
+  float heat = 0;  // [N^2] leaky mean square of the output
+  Vec3 out;        // [N] the last force
+};
+
 struct Limiter {
   Engaged engaged = Engaged::waiting;
-  int quiet = 0;            // steps in which the wanted force was small
-  float ramp = 0;           // 0..1
-  Vec3 soft;                // [N] after slew, before heat and ramp
-  Vec3 trusted;             // [N] the last wanted force while the model was young
-  bool recovering = false;  // slew_recovery holds until force has caught up
-  float heat = 0;           // [N^2] leaky mean square of the output
-  Vec3 out;                 // [N] the last force
-  uint32_t faults = 0;      // LimiterFault bits so far; a caller that may log does so once for each
+  int quiet = 0;                       // steps in which the wanted force was small
+  float ramp = 0;                      // 0..1
+  bool recovering = false;             // slew_recovery holds until force has caught up
+  std::array<LimiterMotors, 3> motor;  // force, torque, grip (along x)
+  uint32_t faults = 0;                 // LimiterFault bits so far; a caller that may log does so once for each
 };
 
 struct LimiterInput {
-  Vec3 wanted;           // [N]
+  ArmForce wanted;
   float age = 0;         // [s] of the patch; negative: there is none
   float expiry = 0.03f;  // [s] maximum valid age
-  float cap = 3.3f;      // [N] of the patch
+  float cap = 3.3f;      // [N] of the patch; 0 for torque and grip, too
   float speed = 0;       // [m/s] of the hand
   float warmth = 0;      // ArmSample::warmth
   bool ready = true;     // the arm takes force
 };
 
 // dt [s]: since the last call; values outside 0 to 20 ms count as 1 ms and as a fault.
-Vec3 limit(Limiter& limiter, const LimiterInput& in, float dt, const LimiterOptions& options = {});
+ArmForce limit(Limiter& limiter, const LimiterInput& in, float dt, const LimiterOptions& options = {});
 // The force is switched off (through the slew) and has to engage again.
 void disengage(Limiter& limiter);
 // dt, or 1 ms if it is implausible (kTimeBack); a gap longer than `late` is a fault (kLate) and starts a recovery.

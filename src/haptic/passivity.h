@@ -7,6 +7,8 @@
 // Credit is bounded: energy from the hand counts only up to what the present spring can store. Energy dissipated a minute ago
 // must not allow a force that pushes the hand.
 //
+// Force, torque and grip have one account: what a hand stores in a contact by pushing may come back by turning.
+//
 // Two hands are one system: energy that one gives to a thread or to tissue may return to the other. EnergyPool keeps the recent
 // energy of each hand, without its friction, and the other hand's account may draw on it.
 #pragma once
@@ -14,6 +16,7 @@
 #include <atomic>
 
 #include "core/math.h"
+#include "exchange/arm.h"
 
 namespace catgut {
 
@@ -31,6 +34,9 @@ struct PassivityOptions {
   // [N/m] a force independent of the hand's motion counts as a spring of at least this stiffness. The credit is force^2 /
   // stiffness, twice the energy of a linear spring. A spring that hardens as a power of its depth stores at most that.
   float least_stiffness = 100;
+  // Of devices with motors for rotation and grip; 0: none. Damping at most, and peaks.
+  float turn_damping = 0, torque = 0;  // [N m s/rad], [N m]
+  float grip_damping = 0, grip = 0;    // [N s/m], [N]
 };
 
 struct PassivityInput {
@@ -41,6 +47,12 @@ struct PassivityInput {
   float most = 3.3f;    // [N]
   float lent = 0;       // [J] available from the other hand
   float dt = 0.001f;    // [s]
+  // Rotation and grip.
+  Vec3 turned, spin;            // [rad] since the last call, [rad/s]
+  Vec3 torque, rubbed_torque;   // [N m] about to be written; its friction part
+  float gap = 0, gap_rate = 0;  // [m], [m/s] of the fingers
+  float grip = 0;               // [N] about to be written
+  float stored = 0;             // [J] that the springs of couple and grip can hold, besides the one of the force
 };
 
 struct Passivity {
@@ -48,8 +60,9 @@ struct Passivity {
   double most = 0;    // [J] maximum so far
   double total = 0;   // [J] given to the hand since the start, unbounded
   Vec3 last;          // [m]
-  Vec3 force;         // [N] held since then
-  Vec3 rubbed;        // [N]
+  float gap = 0;      // [m]
+  ArmForce held;      // since then
+  ArmForce rubbed;    // its friction
   float gave = 0;     // [J] in the last step, to tissue or thread: not to friction; negative: received
   float used = 0;     // [J] used from the other hand
   float quiet = 0;    // [s]
@@ -58,7 +71,7 @@ struct Passivity {
 };
 
 // Returns the force to write, at most `most` [N] long and within the slew limit of the last.
-Vec3 keep_passive(Passivity& p, const PassivityInput& in, const PassivityOptions& options = {});
+ArmForce keep_passive(Passivity& p, const PassivityInput& in, const PassivityOptions& options = {});
 
 // Recent energy of each hand [J]. Callable from any servo thread; no lock.
 struct EnergyPool {

@@ -43,8 +43,10 @@ struct ServoOptions {
   bool ratchet = true;  // the button nearest to the tip toggles the jaw; false: the jaw is closed while it is pressed
   bool force = true;    // false: the device moves the tool without force
 };
+// The user's own gain of the force in a hand. It never raises a limit of the device: peak, stiffness and damping hold after it.
+constexpr float kLeastStrength = 0.2f, kMostStrength = 2;
 // The same patch in the device's own frame and newtons, for a device server that evaluates it (no workspace, gain 1).
-ForcePatch to_arm(const ServoOptions& options, const ForcePatch& world);
+ForcePatch to_arm(const ServoOptions& options, const ForcePatch& world, float strength = 1);
 // Limits of the chain from those of the device (device/profiles); zero values stay unchanged.
 void fit_to_arm(ServoOptions& options, const ArmLimits& limits);
 
@@ -52,9 +54,13 @@ struct ServoHand {
   ForceModel model;
   Limiter limiter;
   Passivity passivity;
-  Vec3 at, velocity;     // [m], [m/s] arm frame, filtered
-  float fast = 0;        // [m/s] world: maximum speed of the last tenth of a second, fading
-  uint64_t last_ns = 0;  // of the last step
+  Vec3 at, velocity;                        // [m], [m/s] arm frame, filtered
+  Quat turned;                              // arm frame
+  Vec3 spin;                                // [rad/s] filtered
+  float jaw = 1, jaw_rate = 0;              // of a gripper, [1/s] filtered
+  float strength = 1, strength_wanted = 1;  // see kLeastStrength; the first follows the second without a step
+  float fast = 0;                           // [m/s] world: maximum speed of the last tenth of a second, fading
+  uint64_t last_ns = 0;                     // of the last step
   uint32_t epoch = 0;
   bool any = false;  // there was a sample
   bool has_patch = false;
@@ -67,10 +73,9 @@ struct ServoHand {
   uint64_t steps = 0;
 };
 
-struct ServoOut {
-  Vec3 force;            // [N] device frame: the written force
-  Vec3 wanted, allowed;  // [N] device frame: of the patch; after the limiter, before the energy account
-  ToolInput hand;        // world; connected 0 while the device is lost
+struct ServoOut : ArmForce {  // as written, device frame
+  ArmForce wanted, allowed;   // device frame: of the patch; after the limiter, before the energy account
+  ToolInput hand;             // world; connected 0 while the device is lost
 };
 
 // fresh: null if the physics has published nothing since. now_ns: the clock that stamps ForcePatch::time_ns.

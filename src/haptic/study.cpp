@@ -83,7 +83,7 @@ StudyRow run_study(const StudyCase& c) {
       } else {  // no contact yet: the wall ahead and its stiffness
         p.stiffness = outer({1, 0, 0}, press(c, -1e-6f).slope);
       }
-      make_safe(p, kClamp, c.coupling, 4);
+      make_safe(p, {kClamp, kClamp, c.coupling, 4});
       receive(model, p);
     }
     float f = 0;
@@ -113,7 +113,7 @@ StudyRow run_study(const StudyCase& c) {
       PassivityInput in;
       in.x = {x, 0, 0}, in.v = {v, 0, 0}, in.force = {f, 0, 0};
       in.most = kClamp, in.dt = kStep;
-      f = keep_passive(net, in, o).x;
+      f = keep_passive(net, in, o).force.x;
     }
     const double error = double{f} - double{std::min(kClamp, press(c, x).force)};
     square += error * error;

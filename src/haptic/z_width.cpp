@@ -94,7 +94,7 @@ WallResult press_with(const WallCase& c, const HandCase& hand) {
       case WallMethod::patch:
         if (fresh) {
           ForcePatch p = wall_patch(c, heard);
-          make_safe(p, kForce, kAnyStiffness, kAnyDamping);
+          make_safe(p, {kForce, kForce, kAnyStiffness, kAnyDamping});
           receive(model, p, bare);
         }
         any = any || fresh;

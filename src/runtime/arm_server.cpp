@@ -126,7 +126,7 @@ struct ArmServer::Work {
     }
   }
 
-  static Vec3 step(void* user, size_t arm, const ArmSample& sample);
+  static ArmForce step(void* user, size_t arm, const ArmSample& sample);
   std::atomic<uint64_t>* handle_packet(const uint8_t* data, size_t size, const Peer& from);
   std::atomic<uint64_t>* shake_hands(const uint8_t* data, const BridgeHead& head, const Peer& from);
   void receive();
@@ -134,7 +134,7 @@ struct ArmServer::Work {
 };
 
 // One device, one millisecond, in the device thread.
-Vec3 ArmServer::Work::step(void* user, size_t arm, const ArmSample& sample) {
+ArmForce ArmServer::Work::step(void* user, size_t arm, const ArmSample& sample) {
   Work& w = *static_cast<Work*>(user);
   Side& s = w.side[arm];
   const uint64_t now = w.options.clock();
@@ -148,7 +148,7 @@ Vec3 ArmServer::Work::step(void* user, size_t arm, const ArmSample& sample) {
     disengage(s.servo.limiter);
   }
   const bool ordered = fresh && peer.bytes > 0 && force_command.session == peer.session;
-  const Vec3 force = servo_step(s.servo, s.options, sample, ordered ? &force_command.patch : nullptr, now, &w.pool, arm).force;
+  const ArmForce force = servo_step(s.servo, s.options, sample, ordered ? &force_command.patch : nullptr, now, &w.pool, arm);
   s.faults.fetch_or(s.servo.limiter.faults, std::memory_order_relaxed);
   if (s.servo.steps % kFaultsFor == 0) s.recent = 0;
   s.recent |= s.servo.limiter.faults;

@@ -35,7 +35,7 @@ struct Test {
   std::array<Side, 2> side;
   ArmTestOptions options;
 
-  static Vec3 step(void* user, size_t arm, const ArmSample& s) {
+  static ArmForce step(void* user, size_t arm, const ArmSample& s) {
     Test& t = *static_cast<Test*>(user);
     Side& side = t.side[arm];
     const uint64_t now = wall_ns();
@@ -55,10 +55,10 @@ struct Test {
       const float along = dot(moved, way);
       if (std::abs(along) > std::abs(side.along[axis].load())) side.along[axis] = along;
       if (length(moved) > t.options.far) side.off = true;
-      if (!side.off) in.wanted = way * t.options.force;
+      if (!side.off) in.wanted.force = way * t.options.force;
     }
-    const Vec3 out = limit(side.limiter, in, dt, side.limits);
-    side.felt.store(length(out), std::memory_order_relaxed);
+    const ArmForce out = limit(side.limiter, in, dt, side.limits);
+    side.felt.store(length(out.force), std::memory_order_relaxed);
     return out;
   }
 };
@@ -138,7 +138,7 @@ std::array<Vec3, 2> held_places(ArmPort port, float countdown, const std::functi
                                 const std::atomic<bool>& stop, std::array<bool, 2>& known) {
   struct Watch {
     std::array<Latest<ArmSample>, 2> box;
-    static Vec3 step(void* user, size_t arm, const ArmSample& s) {
+    static ArmForce step(void* user, size_t arm, const ArmSample& s) {
       Latest<ArmSample>& box = static_cast<Watch*>(user)->box[arm];
       box.draft() = s;
       box.publish();

@@ -83,7 +83,7 @@ FeltCurves feel_a_stitch(SceneSpec scene, bool knot, const std::atomic<bool>& st
     constexpr int kParts = 4;  // milliseconds per tick
     for (size_t k = 0; k < 2; ++k) {
       ForcePatch patch = heard[k];
-      if (!make_safe(patch, 10, 400, 4)) patch = {};
+      if (!make_safe(patch, {10, 10, 400, 4})) patch = {};
       receive(felt[k], patch);
       const Vec3 to = input.hand[k].pose.p, v = (to - at[k]) / dt;
       for (int part = 1; part <= kParts; ++part) {

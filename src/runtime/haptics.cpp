@@ -52,11 +52,28 @@ const char* word_of(uint32_t fault) {
 struct LogRow {
   uint64_t now_ns = 0;
   Pose pose;
+  float jaw = -1;
   uint64_t tick = 0;
   float age = 0, stiffness = 0;
-  Vec3 patch, wanted, allowed, written;
+  Vec3 patch;
+  ArmForce wanted, allowed, written;
   uint32_t faults = 0, engaged = 0;
+  float strength = 1;
 };
+
+void write_row(std::FILE* log, size_t k, const LogRow& r) {
+  const auto number = [log](float f, const char* how = ",%.5g") { std::fprintf(log, how, double{f}); };
+  const auto vector = [&number](Vec3 v) { number(v.x), number(v.y), number(v.z); };
+  std::fprintf(log, "%.6f,%zu", 1e-9 * static_cast<double>(r.now_ns), k);
+  for (const float f : {r.pose.p.x, r.pose.p.y, r.pose.p.z}) number(f, ",%.7g");
+  for (const float f : {r.pose.q.x, r.pose.q.y, r.pose.q.z, r.pose.q.w}) number(f, ",%.6g");
+  std::fprintf(log, ",%llu,%.6f", static_cast<unsigned long long>(r.tick), double{r.age});
+  vector(r.patch), number(r.stiffness), vector(r.wanted.force), vector(r.allowed.force), vector(r.written.force);
+  std::fprintf(log, ",%u,%u", r.faults, r.engaged);
+  vector(r.wanted.torque), vector(r.written.torque);
+  for (const float f : {r.wanted.grip, r.written.grip, r.jaw, r.strength}) number(f);
+  std::fputc('\n', log);
+}
 
 struct Hand {
   ToolInput input;
@@ -69,6 +86,7 @@ struct Side {
   Latest<ForcePatch> patch;         // physics -> servo
   Latest<Hand> hand;                // servo -> physics
   std::atomic<uint32_t> faults{0};  // servo -> physics
+  std::atomic<float> strength{1};   // user -> servo
   // servo -> display: written force, engagement, faults of the last second
   std::atomic<float> force{0};
   std::atomic<Engaged> engaged{Engaged::no};
@@ -104,7 +122,7 @@ struct Haptics::Work {
       ForcePatch p = patch;
       p.point -= hand.clutch;
       if (hand.clutched) p.cap = 0;
-      return port.send_patch(port.self, k, to_arm(s.options, p));
+      return port.send_patch(port.self, k, to_arm(s.options, p, s.strength.load(std::memory_order_relaxed)));
     }
     s.patch.draft() = patch;
     s.patch.publish();
@@ -112,22 +130,14 @@ struct Haptics::Work {
   std::FILE* log = nullptr;  // owned by the physics
   void write_log(size_t k) {
     LogRow r;
-    while (side[k].log && side[k].log->pop(r))
-      std::fprintf(log,
-                   "%.6f,%zu,%.7g,%.7g,%.7g,%.6g,%.6g,%.6g,%.6g,%llu,%.6f,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g,%."
-                   "5g,%.5g,%.5g,%u,%u\n",
-                   1e-9 * static_cast<double>(r.now_ns), k, double{r.pose.p.x}, double{r.pose.p.y}, double{r.pose.p.z},
-                   double{r.pose.q.x}, double{r.pose.q.y}, double{r.pose.q.z}, double{r.pose.q.w},
-                   static_cast<unsigned long long>(r.tick), double{r.age}, double{r.patch.x}, double{r.patch.y},
-                   double{r.patch.z}, double{r.stiffness}, double{r.wanted.x}, double{r.wanted.y}, double{r.wanted.z},
-                   double{r.allowed.x}, double{r.allowed.y}, double{r.allowed.z}, double{r.written.x}, double{r.written.y},
-                   double{r.written.z}, r.faults, r.engaged);
+    while (side[k].log && side[k].log->pop(r)) write_row(log, k, r);
   }
-  static Vec3 step(void* user, size_t arm, const ArmSample& sample) {
+  static ArmForce step(void* user, size_t arm, const ArmSample& sample) {
     Work& w = *static_cast<Work*>(user);
     Side& s = w.side[arm];
     const uint64_t now = w.clock();
     const bool fresh = s.patch.update();
+    s.servo.strength_wanted = s.strength.load(std::memory_order_relaxed);
     const ServoOut out = servo_step(s.servo, s.options, sample, fresh ? &s.patch.seen() : nullptr, now, &w.pool, arm);
     s.hand.draft() = {out.hand, sample.time_ns > 0 ? sample.time_ns : now, s.servo.clutch, s.servo.clutched};
     s.hand.publish();
@@ -139,16 +149,16 @@ struct Haptics::Work {
     s.engaged.store(s.servo.limiter.engaged, std::memory_order_relaxed);
     if (s.log) {
       const ForcePatch& p = s.servo.model.now;
-      s.log->push({now, sample.pose, p.tick, p.time_ns < now ? 1e-9f * static_cast<float>(now - p.time_ns) : 0,
-                   p.stiffness.xx + p.stiffness.yy + p.stiffness.zz, p.force, out.wanted, out.allowed, out.force,
-                   s.servo.limiter.faults, static_cast<uint32_t>(s.servo.limiter.engaged)});
+      s.log->push({now, sample.pose, sample.jaw, p.tick, p.time_ns < now ? 1e-9f * static_cast<float>(now - p.time_ns) : 0,
+                   p.stiffness.xx + p.stiffness.yy + p.stiffness.zz, p.force, out.wanted, out.allowed, out,
+                   s.servo.limiter.faults, static_cast<uint32_t>(s.servo.limiter.engaged), s.servo.strength});
     }
     s.servo.limiter.faults = 0;
     if (s.last_ns > 0) count(s.times.period, now - s.last_ns);
     s.last_ns = now;
     count(s.times.work, w.clock() - now);
     ++s.times.steps;
-    return out.force;
+    return out;
   }
 };
 
@@ -214,6 +224,8 @@ Haptics::Haptics(ArmPort port, const PictureModel& picture, const HapticsOptions
     o.ratchet = options.ratchet;
     o.force = options.force;
     o.place = workspace_of(arm, k, work_->side_of[k], picture.focus, options.place);
+    set_strength(k, options.strength[work_->side_of[k]]);
+    work_->side[k].servo.strength = work_->side[k].strength;
     work_->side[k].hand.draft().input.connected = 0;
     work_->side[k].hand.publish();
   }
@@ -229,6 +241,10 @@ Haptics::~Haptics() {
   std::fclose(work_->log);
 }
 
+void Haptics::set_strength(size_t k, float strength) {
+  work_->side[k].strength.store(strength >= kLeastStrength ? std::min(strength, kMostStrength) : kLeastStrength,
+                                std::memory_order_relaxed);
+}
 size_t Haptics::side(size_t k) const { return work_->side_of[k]; }
 bool Haptics::present(size_t k) const { return work_->port.arm[k].present; }
 const ServoOptions& Haptics::servo(size_t k) const { return work_->side[k].options; }
@@ -298,6 +314,7 @@ ArmView Haptics::view(size_t k, const char* off) const {
   const uint32_t faults = remote ? status.faults : s.recent.load(std::memory_order_relaxed);
   v.here = status.ready;
   v.most = s.options.limiter.force;
+  v.strength = s.strength.load(std::memory_order_relaxed);
   v.force = remote ? status.force : s.force.load(std::memory_order_relaxed);
   v.felt = remote ? v.here : engaged == Engaged::yes || engaged == Engaged::rising;
   if (!v.here) v.off = "lost";

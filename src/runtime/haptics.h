@@ -32,7 +32,8 @@ struct HapticsOptions {
   uint64_t (*clock)() = nullptr;  // null: wall_ns(); tests pass their own
   bool ratchet = true;            // the stylus' first button toggles the jaw; false: the jaw is closed while it is pressed
   bool force = true;              // false: devices move tools without force
-  std::string log;                // file to which every millisecond is written (CSV, see kHapticsLogHead); empty: none
+  std::array<float, 2> strength{1, 1};  // gain of the force in the right hand and in the left (kLeastStrength .. kMostStrength)
+  std::string log;                      // file to which every millisecond is written (CSV, see kHapticsLogHead); empty: none
   std::map<std::string, ArmPlace> place;  // by arm_key; a device that is not in it: the center of its workspace, 1:1
 };
 // Serial number of device k; of one that reports none, its place in the driver's list.
@@ -54,10 +55,12 @@ double quantile_us(const std::array<uint64_t, 512>& counts, double part);
 // Columns of the log: seconds on the servo's clock, arm (0 right, 1 left), position [m] and rotation (xyzw) of the stylus in
 // the device's frame, tick and age [s] of the patch, its force [N] and the trace of its stiffness [N/m] (world), then three
 // forces in the device's frame [N]: wanted by the patch, allowed by the limits, written to the motors; faults (haptic/limiter,
-// as a number) and the state of engagement (0 off, 1 waiting, 2 rising, 3 on).
+// as a number) and the state of engagement (0 off, 1 waiting, 2 rising, 3 on). Then torque [N m] and grip [N], wanted and
+// written, the jaw (0 closed to 1 open, -1 none) and the user's gain.
 constexpr const char* kHapticsLogHead =
     "t_s,arm,x,y,z,qx,qy,qz,qw,patch_tick,patch_age_s,patch_fx,patch_fy,patch_fz,stiffness_trace,wanted_x,wanted_y,wanted_z,"
-    "allowed_x,allowed_y,allowed_z,written_x,written_y,written_z,faults,engaged";
+    "allowed_x,allowed_y,allowed_z,written_x,written_y,written_z,faults,engaged,wanted_tx,wanted_ty,wanted_tz,written_tx,"
+    "written_ty,written_tz,wanted_grip,written_grip,jaw,gain";
 
 // Status of a device for display.
 struct ArmView {
@@ -65,6 +68,7 @@ struct ArmView {
   bool here = false;          // samples arrive
   bool felt = false;          // force is enabled
   float force = 0, most = 0;  // [N] written now; limit of the device
+  float strength = 1;         // the user's gain
   const char* off = "";       // why the force is off; empty: it is on
 };
 
@@ -79,6 +83,8 @@ class Haptics {
   bool present(size_t k) const;
   size_t side(size_t k) const;  // in which hand the device is: 0 right, 1 left
   const ServoOptions& servo(size_t k) const;
+
+  void set_strength(size_t k, float strength);  // of device k; clamped; callable from any thread
 
   // Owned by the physics thread.
   void publish(size_t k, const ForcePatch& patch, uint32_t epoch, float speed);  // speed: of real time

@@ -96,7 +96,7 @@ namespace {
 struct Watch {
   std::array<Latest<ArmSample>, 2> box;
   std::array<bool, 2> present{};
-  static Vec3 step(void* user, size_t arm, const ArmSample& s) {
+  static ArmForce step(void* user, size_t arm, const ArmSample& s) {
     Latest<ArmSample>& box = static_cast<Watch*>(user)->box[arm];
     box.draft() = s;
     box.publish();

@@ -23,6 +23,10 @@ constexpr float kPriorWeight = 0.0001f;  // [m] of motion that weighs as much as
 constexpr float kMinForce = 0.005f;      // [N] smaller forces are ignored
 // [N] between which a load that comes from nothing is let in: of a needle outside of its track, of a thread.
 constexpr float kNeedleFrom = 0.02f, kNeedleWhole = 0.1f, kThreadFrom = 0.005f, kThreadWhole = 0.04f;
+constexpr float kLongest = 0.15f, kBluntLever = 0.01f;  // [m] of an instrument; of its jaws
+// [N] on the fingers when they shut on it, from where the jaws grasp (a third of their travel): 4 N for a needle or a thread,
+// 1.4 N for the wall. Chosen: within 8 N of a gripper, and 860 N/m of its 2000 N/m.
+constexpr float kGripSteel = 12, kGripTissue = 4;
 constexpr float kLook = 0.008f;  // [m] search distance for the next contact; margin of the broad phase
 
 Vec3 thread_on_tool(const SolverState& s, const Strand& strand, const ThreadHold& hold) {
@@ -105,20 +109,32 @@ void accumulate_haptics(const Model& model, State& state, int i) {
     t.pressed += on.pressed * inv_h2;
     t.by_tool += on.by_tool * inv_h2;
     t.thread += (on.linear - on.pressing - on.rubbing) * inv_h2;
+    t.all += on.linear * inv_h2;
+    t.torque += on.angular * inv_h2;
+    const Quat turned = s.body[static_cast<size_t>(body)].q;
+    // A force on the tool at a point of its own frame.
+    const auto add = [&t, &turned](Vec3& path, Vec3 force, Vec3 local) {
+      path += force, t.all += force;
+      t.torque += cross(rotate(turned, local), force);
+    };
     for (const Strand& strand : s.strand)
       for (const ThreadHold& h : strand.hold)
-        if (h.body == body) t.thread += thread_on_tool(s, strand, h);
+        if (h.body == body) add(t.thread, thread_on_tool(s, strand, h), h.local);
     for (const Attachment& a : s.attach)
-      if (a.body == body) t.held += a.lambda * -inv_h2;
+      if (a.body == body) add(t.held, a.lambda * -inv_h2, a.target);
     const InstrumentState& hand = state.suture.instrument[static_cast<size_t>(body)];
     if (hand.held == Held::needle) {
       const int needle = static_cast<int>(m.needle_body(hand.suture));
       for (const Weld& w : s.weld)
-        if (w.a == needle && w.b == body) t.needle += w.lambda * -inv_h2;
+        if (w.a == needle && w.b == body) {
+          add(t.needle, w.lambda * -inv_h2, w.local_b.p);
+          t.torque += w.angular_lambda * -inv_h2;
+        }
       for (const NeedleTrackConstraint& c : s.channel)  // the track's push on the tissue, negated: on the needle
         if (c.suture == hand.suture) t.drag += along_shaft(model, s, c) * (-c.drag_lambda * inv_h2);
     }
     t.hand += weld.lambda * -inv_h2;
+    t.wrist += weld.angular_lambda * -inv_h2;
     t.at += weld.target.p;
     t.substeps += 1;
   }
@@ -151,6 +167,40 @@ void update_stiffness_estimate(StiffnessEstimate& f, const ToolReaction& t, uint
 // [N/m] as rendered to the hand; `before`: prior value, before contact.
 float learned(const StiffnessEstimate& f, float before, float coupling) {
   return std::clamp((f.work + before * kPriorWeight * kPriorWeight) / (f.travel + kPriorWeight * kPriorWeight), 0.0f, coupling);
+}
+
+// Where the forces on a tool act together: the lever of a single force with their torque. The torque along the force, and that
+// of a lever longer than an instrument, is a couple.
+void add_rotation(const Model& model, const State& state, size_t k, ForcePatch& p) {
+  const SolverState& s = state.solver;
+  const ToolReaction& sum = state.haptics.tool[k];
+  const size_t tool = static_cast<size_t>(state.hand[k].instrument);
+  p.turn = state.hand[k].pose.q;
+  if (sum.substeps == 0) return;
+  const Vec3 force = sum.all / sum.substeps, torque = sum.torque / sum.substeps;
+  const float size2 = length2(force);
+  if (size2 < kMinForce * kMinForce) return;
+  p.lever = cross(force, torque) / size2;
+  if (const float l = length(p.lever); l > kLongest) p.lever *= kLongest / l;
+  // What is felt of the force is felt of the couple: loads begin without a step.
+  p.couple = (torque - cross(p.lever, force)) * std::min(1.0f, length(p.force) / std::sqrt(size2));
+  const Vec3 axis = normalized(p.couple);
+  const InstrumentState& hand = state.suture.instrument[tool];
+  float spring = kBlunt * kBluntLever * kBluntLever;  // [N m/rad] of tissue on both sides of the jaws
+  if (hand.held == Held::needle)
+    for (const NeedleTrackConstraint& c : s.channel)
+      if (c.suture == hand.suture) {
+        const Vec3 moves = cross(axis, position_of(c.point, s.x.data()) - s.body[tool].x);
+        spring += dot(moves, across(along_shaft(model, s, c), series(kTissue, 1 / std::max(1e-6f, c.compliance))) * moves);
+      }
+  p.couple_stiffness = series(spring, 1 / model.hand_angular_compliance);
+}
+
+// What the jaws hold pushes them apart. They closed on it where they grasp.
+void add_grip(const Model& model, const InstrumentState& hand, uint32_t tool, ForcePatch& p) {
+  if (hand.held == Held::nothing) return;
+  p.grip_from = model.suture.instrument[tool].jaw.closed;
+  p.grip_stiffness = hand.held == Held::tissue ? kGripTissue : kGripSteel;
 }
 
 void count_changes(State& state) {
@@ -188,8 +238,8 @@ void count_changes(State& state) {
   }
 }
 
-// The force patch of hand k.
-ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
+// The force patch of hand k, without rotation and grip.
+ForcePatch linear_patch(const Model& model, const State& state, size_t k) {
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
   const ToolReaction& sum = state.haptics.tool[k];
@@ -292,6 +342,7 @@ ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
   // No contact: the plane where contact would begin. The tool is at the hand's pose.
   p.force = {};
   float nearest = kLook;
+  Vec3 meets;  // the tool's nearest point
   for (const ToolCandidate& c : state.scratch.candidates.tool) {
     if (c.body != tool) continue;
     const Capsule& capsule = m.body[c.body].capsule[c.capsule];
@@ -299,7 +350,7 @@ ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
     const Vec3 a = transform(pose, capsule.a), b = transform(pose, capsule.b), at = xyz(s.x[c.particle]);
     const Vec3 away = a + (b - a) * closest_on_segment(at, a, b) - at;
     const float gap = length(away) - capsule.radius - m.collision.tool_radius;
-    if (gap < nearest) nearest = gap, p.normal = normalized(away);
+    if (gap < nearest) nearest = gap, p.normal = normalized(away), meets = at + away - p.normal * capsule.radius;
   }
   float stands = kBlunt;
   for (const ToolPair& c : state.scratch.candidates.tool_pair) {
@@ -314,13 +365,26 @@ ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
     const auto [at, on] = closest_on_segments(a0, a1, b0, b1);
     const Vec3 away = lerp(a0, a1, at) - lerp(b0, b1, on);
     const float gap = length(away) - mine.radius - other.radius;
-    if (gap < nearest) nearest = gap, stands = coupling, p.normal = normalized(away);
+    if (gap < nearest) {
+      nearest = gap, stands = coupling, p.normal = normalized(away);
+      meets = lerp(a0, a1, at) - p.normal * mine.radius;
+    }
   }
   if (nearest < kLook) {
+    p.lever = meets - s.body[tool].x;
     p.point = state.hand[k].pose.p - p.normal * std::max(0.0f, nearest);
     p.stiffness = outer(p.normal, series(stands, coupling));
     p.coefficient = m.friction.tool;
   }
+  return p;
+}
+
+ForcePatch haptic_patch(const Model& model, const State& state, size_t k) {
+  ForcePatch p = linear_patch(model, state, k);
+  const int tool = state.hand[k].instrument;
+  if (tool < 0 || !state.solver.body_collides[static_cast<size_t>(tool)]) return p;
+  add_rotation(model, state, k, p);
+  add_grip(model, state.suture.instrument[static_cast<size_t>(tool)], static_cast<uint32_t>(tool), p);
   return p;
 }
 

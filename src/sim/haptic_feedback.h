@@ -25,7 +25,8 @@ struct ToolReaction {
   Vec3 held;               // tissue in the jaws
   Vec3 needle;             // the needle in the jaws, without friction along its shaft
   Vec3 drag;               // friction along the needle's shaft
-  Vec3 hand;               // weld between tool and hand: balances the sum of the others in static equilibrium
+  Vec3 all, torque;        // sum of all of them, with friction; their torque [N m] about the tool's grasp point
+  Vec3 hand, wrist;        // force and torque of the weld between tool and hand: balance these in static equilibrium
   float substeps = 0;      // number of substeps in the sum
   Vec3 at;                 // [m] hand positions, summed too
 };

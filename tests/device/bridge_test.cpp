@@ -50,7 +50,7 @@ struct Simulator {
   uint64_t bytes_in = 0, bytes_out = 0;
   std::array<uint64_t, 2> sampled{}, newest{};  // times and counters of the newest samples
   std::array<ArmSample, 2> sample;
-  std::array<Vec3, 2> felt;
+  std::array<ArmForce, 2> felt;
   std::array<ArmInfo, 2> info;
   int infos = 0, byes = 0, samples = 0, forged = 0;
   bool cookie = false, opened = false;
@@ -218,14 +218,17 @@ TEST(Bridge, a_packet_is_what_it_says) {
   s.pose = {{0.01f, -0.02f, 0.03f}, axis_angle(normalized(Vec3{1, 2, 3}), 1)};
   s.velocity = {0.1f, 0, -0.1f};
   s.buttons = 3, s.warmth = 0.25f, s.forced_off = true;
-  write_sample(s, {0, 1, 0}, 5, p);
-  Vec3 felt;
+  s.jaw = 0.5f;
+  write_sample(s, {{0, 1, 0}, {0.01f, 0, -0.02f}, 1.5f}, 5, p);
+  ArmForce felt;
   ArmSample t;
   uint32_t faults = 0;
   ASSERT_TRUE(read_sample(p, t, felt, faults));
   EXPECT_TRUE(t.state == ArmState::ready && t.pose.p == s.pose.p && t.velocity == s.velocity && t.forced_off);
   EXPECT_LT(length(rotation_vector(t.pose.q * conjugate(s.pose.q))), 1e-5f);
-  EXPECT_TRUE(t.buttons == 3 && t.warmth == 0.25f && felt == (Vec3{0, 1, 0}) && faults == 5 && t.time_ns == 9);
+  EXPECT_TRUE(t.buttons == 3 && t.warmth == 0.25f && t.jaw == 0.5f && felt.force == (Vec3{0, 1, 0}) && faults == 5 &&
+              t.time_ns == 9);
+  EXPECT_TRUE(felt.torque == (Vec3{0.01f, 0, -0.02f}) && felt.grip == 1.5f);
   s.pose.p.y = std::nanf("");
   write_sample(s, {}, 0, p);
   ASSERT_TRUE(read_sample(p, t, felt, faults));
@@ -234,12 +237,23 @@ TEST(Bridge, a_packet_is_what_it_says) {
   ArmInfo info, back;
   info.present = true;
   info.name = std::string(100, 'n'), info.serial = "s\n\x1b[2J";
-  info.limits.force = 2;
+  info.limits = {2, 1, 300, 4, 0.2f, 1, 0.07f, 8, 2000};
   info.most = {1, 2, 3};
   write_info(info, p);
   ASSERT_TRUE(read_info(p, back));
   EXPECT_TRUE(back.present && back.name == std::string(39, 'n') && back.limits.force == 2 && back.most == info.most);
+  EXPECT_TRUE(back.limits.torque == 0.2f && back.limits.turn_stiffness == 1 && back.limits.turn_damping == 0.07f);
+  EXPECT_TRUE(back.limits.grip == 8 && back.limits.grip_stiffness == 2000);
   EXPECT_EQ(back.serial, "s??[2J") << "shown on terminals";
+
+  ForcePatch patch, same;
+  patch.turn = axis_angle({0, 0, 1}, 0.5f), patch.lever = {0.01f, 0.02f, 0.03f}, patch.couple = {0, 0.004f, 0};
+  patch.couple_stiffness = 0.1f, patch.grip_from = 0.35f, patch.grip_stiffness = 12, patch.cap = 2;
+  write_patch(patch, p);
+  ASSERT_TRUE(read_patch(p, same));
+  EXPECT_TRUE(same.lever == patch.lever && same.couple == patch.couple && same.couple_stiffness == patch.couple_stiffness);
+  EXPECT_TRUE(same.grip_from == patch.grip_from && same.grip_stiffness == patch.grip_stiffness && same.cap == 2);
+  EXPECT_LT(length(rotation_vector(same.turn * conjugate(patch.turn))), 1e-6f);
 }
 
 // Arbitrary bytes: dropped; neither side crashes or moves a device.
@@ -696,7 +710,7 @@ struct Both : Lent {
   std::array<std::atomic<float>, 2> at{};    // [m] along x
   std::atomic<bool> physics_is_dead{false};  // no more patches; the rest runs
   std::atomic<bool> hangs{false};            // the whole simulator, like a killed process
-  static Vec3 step(void* user, size_t k, const ArmSample& s) {
+  static ArmForce step(void* user, size_t k, const ArmSample& s) {
     Both& t = *static_cast<Both*>(user);
     while (t.hangs) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     ForcePatch p;
@@ -705,7 +719,7 @@ struct Both : Lent {
     p.force = {t.pull[k], 0, 0};
     if (!t.physics_is_dead) t.port.send_patch(t.port.self, k, p);
     t.there[k] = s.state == ArmState::ready, t.at[k] = s.pose.p.x;
-    return {9, 9, 9};  // the return value is unused
+    return {{9, 9, 9}, {}, 0};  // the return value is unused
   }
   explicit Both(BridgeOptions o = {}) {
     o.where = "127.0.0.1:" + std::to_string(server->port());
@@ -905,7 +919,7 @@ TEST(Bridge, garbage_from_the_arms_end) {
     const auto step = [](void*, size_t k, const ArmSample& s) {
       ready += s.state == ArmState::ready;
       to->send_patch(to->self, k, {});
-      return Vec3{std::nanf(""), 0, 0};
+      return ArmForce{{std::nanf(""), 0, 0}, {}, 0};
     };
     std::string why;
     EXPECT_TRUE(port.start(port.self, {step, nullptr}, why));
@@ -995,7 +1009,7 @@ TEST(Bridge, an_arm_in_python) {
       // It engages where the force is zero; repeatedly, since on a busy machine it may expire in between.
       p.point = s.pose.p, p.force = {++steps % 2000 > 300 ? 0.4f : 0, 0, 0}, p.period = 0.001f, p.time_ns = s.time_ns;
       to->send_patch(to->self, k, p);
-      return Vec3{};
+      return ArmForce{};
     };
     EXPECT_TRUE(port.start(port.self, {step, nullptr}, why));
     EXPECT_TRUE(wait_for([] { return at > 0.025f; })) << "0.1 N on 20 N/m are 5 mm from where it was: " << at;

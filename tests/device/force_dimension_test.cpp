@@ -14,12 +14,19 @@
 #include "device/dhd_api.h"
 #include "fake_dhd/fake_dhd.h"
 #include "haptic/servo.h"
+#include "plain_hand.h"
 
 namespace catgut {
 namespace {
 
+enum class Kind { ideal, unkind, swapped };
+constexpr Kind kKinds[] = {Kind::ideal, Kind::unkind, Kind::swapped};
+// An encoder of 0.02 mm, 2 ms to the motors, periods that vary, calls that are late or lost.
+constexpr UnkindDevice kUnkind{2e-5, 2, 0.2, 0.002, 0.002, 0};
+
 struct FakeDhd {
   void* library = nullptr;
+  bool swapped = false;
   decltype(&fakeDhdReset) reset = nullptr;
   decltype(&fakeDhdStep) step = nullptr;
   decltype(&fakeDhdRun) run = nullptr;
@@ -28,16 +35,25 @@ struct FakeDhd {
   decltype(&fakeDhdFast) fast = nullptr;
   decltype(&fakeDhdRead) read = nullptr;
   decltype(&fakeDhdZero) zero = nullptr;
-  explicit FakeDhd(bool manual) {
+  decltype(&fakeDhdUnkind) unkind = nullptr;
+  decltype(&fakeDhdGrip) grip = nullptr;
+  decltype(&fakeDhdErrors) errors = nullptr;
+  decltype(&fakeDhdNow) now = nullptr;
+  explicit FakeDhd(bool manual, Kind kind = Kind::ideal, const char* model = "") {
     for (const char* name : {"FAKE_DHD_COUNT", "FAKE_DHD_UNCALIBRATED", "FAKE_DHD_LOCKED"}) unsetenv(name);
+    swapped = kind == Kind::swapped;
+    setenv("FAKE_DHD_SWAPPED", swapped ? "1" : "0", 1);
+    setenv("FAKE_DHD_NAME", model, 1);
     setenv("FAKE_DHD_MANUAL", manual ? "1" : "0", 1);
     setenv("CATGUT_LIBDHD", CATGUT_FAKE_LIBDHD, 1);
     library = dlopen(CATGUT_FAKE_LIBDHD, RTLD_NOW | RTLD_LOCAL);
     if (!library) ADD_FAILURE() << dlerror();
     find(reset, "fakeDhdReset"), find(step, "fakeDhdStep"), find(fault, "fakeDhdFault"), find(hand, "fakeDhdHand");
     find(fast, "fakeDhdFast"), find(read, "fakeDhdRead"), find(zero, "fakeDhdZero");
-    find(run, "fakeDhdRun");
+    find(run, "fakeDhdRun"), find(unkind, "fakeDhdUnkind"), find(grip, "fakeDhdGrip"), find(errors, "fakeDhdErrors");
+    find(now, "fakeDhdNow");
     reset();
+    if (kind == Kind::unkind) unkind(&kUnkind);
   }
   template <typename F>
   void find(F& f, const char* name) {
@@ -45,21 +61,24 @@ struct FakeDhd {
     if (!f) ADD_FAILURE() << name;
   }
   // hand: 0 right, 1 left.
-  static int device(size_t h) { return h == 0 ? 1 : 0; }
+  int device(size_t h) const { return (h == 0) != swapped ? 1 : 0; }
   FakeDhdArm at(size_t h) const {
     FakeDhdArm a{};
     read(device(h), &a);
     return a;
   }
-  Vec3 force(size_t h) const {  // in our axes
-    const FakeDhdArm a = at(h);
-    return {static_cast<float>(a.force[1]), static_cast<float>(a.force[2]), static_cast<float>(a.force[0])};
+  static Vec3 ours(const double (&v)[3]) {
+    return {static_cast<float>(v[1]), static_cast<float>(v[2]), static_cast<float>(v[0])};
   }
+  Vec3 force(size_t h) const { return ours(at(h).force); }  // in our axes
+  Vec3 torque(size_t h) const { return ours(at(h).torque); }
 };
 
 // Both arms on servos, a millisecond at a time.
 struct Two {
-  FakeDhd fake{true};
+  FakeDhd fake;
+  float wall = 0;                  // [N/m] of a wall at the height 0, for the right hand
+  std::array<ArmForce, 2> more{};  // torque and grip at jaw 0.1, besides
   std::vector<std::string> messages;
   ArmPort port;
   std::array<ServoHand, 2> hand;
@@ -67,19 +86,28 @@ struct Two {
   std::array<Vec3, 2> pull{};
   std::array<ToolInput, 2> input;
   std::array<ArmSample, 2> sample;
-  std::array<uint64_t, 2> now_ns{1000000000, 1000000000};  // each thread its own
-  std::array<uint64_t, 2> physics_ns{};                    // 0: the physics runs
+  std::array<uint64_t, 2> now_ns{};      // each thread its own
+  std::array<uint64_t, 2> physics_ns{};  // 0: the physics runs
 
-  static Vec3 step(void* user, size_t k, const ArmSample& s) {
+  explicit Two(Kind kind = Kind::ideal, const char* model = "") : fake(true, kind, model) {}
+
+  static ArmForce step(void* user, size_t k, const ArmSample& s) {
     Two& t = *static_cast<Two*>(user);
-    t.now_ns[k] += 1000000;
+    t.now_ns[k] = t.fake.now(t.fake.device(k));
     t.sample[k] = s;
     ForcePatch p;
     p.point = s.pose.p;
     p.period = 0.016f, p.force = t.pull[k], p.time_ns = t.physics_ns[k] ? t.physics_ns[k] : t.now_ns[k];
+    p.turn = s.pose.q, p.couple = t.more[k].torque, p.couple_stiffness = 0.1f;
+    if (t.more[k].grip > 0) p.grip_from = 0.35f, p.grip_stiffness = t.more[k].grip / 0.25f;
+    if (t.wall > 0 && k == 0) {
+      p.normal = {0, 1, 0}, p.stiffness = outer({0, 1, 0}, t.wall);
+      p.gap = std::max(0.0f, -s.pose.p.y), p.force = {0, t.wall * p.gap, 0};
+      if (s.pose.p.y > 0) p.point.y = 0;
+    }
     const ServoOut out = servo_step(t.hand[k], t.options[k], s, &p, t.now_ns[k]);
     t.input[k] = out.hand;
-    return out.force;
+    return out;
   }
   void open() {
     ForceDimensionOptions o;
@@ -107,7 +135,7 @@ struct Two {
   }
   void put(size_t h, Vec3 p, const double* rows, int button = 0, double gap = 0.02) {
     const double at[3] = {double{p.z}, double{p.x}, double{p.y}};
-    fake.hand(FakeDhd::device(h), at, rows, button, gap);
+    fake.hand(fake.device(h), at, rows, button, gap);
   }
   ~Two() {
     fake.run();  // the backend gets the milliseconds that it needs to reduce its force
@@ -170,59 +198,70 @@ TEST(ForceDimension, poses_come_whole) {
 }
 
 TEST(ForceDimension, H9_forces_are_never_swapped) {
-  Two t;
-  t.open();
-  const Vec3 right{0.3f, 0.1f, 0}, left{0, -0.2f, 0.6f};
-  t.engage(right, left);
-  EXPECT_LT(distance(t.fake.force(0), right), 1e-3f);
-  EXPECT_LT(distance(t.fake.force(1), left), 1e-3f);
-  EXPECT_GT(t.fake.at(0).position[1], 0.001) << "pushed to the right, it went to the right";
+  for (const Kind kind : kKinds) {
+    SCOPED_TRACE(static_cast<int>(kind));
+    Two t(kind);
+    t.open();
+    const Vec3 right{0.3f, 0.1f, 0}, left{0, -0.2f, 0.6f};
+    t.engage(right, left);
+    EXPECT_LT(distance(t.fake.force(0), right), 1e-3f);
+    EXPECT_LT(distance(t.fake.force(1), left), 1e-3f);
+    EXPECT_GT(t.fake.at(0).position[1], 0.001) << "pushed to the right, it went to the right";
+  }
 }
 
 // The physics stops: force is zero within 100 ms, without a step.
 TEST(ForceDimension, the_physics_dies) {
-  Two t;
-  t.open();
-  t.engage({0.9f, 0, 0}, {0, 0.6f, 0});
-  const Vec3 left = t.fake.force(1);
-  t.physics_ns[0] = t.now_ns[0];
-  int zero = 0;
-  t.run(150, [&](int k) {
-    if (length(t.fake.force(0)) == 0 && zero == 0) zero = k + 1;
-    ASSERT_TRUE(t.fake.force(1) == left);
-  });
-  EXPECT_GT(zero, 30);
-  EXPECT_LE(zero, 100);
-  EXPECT_LE(t.fake.at(0).step_most, 0.5 + 1e-4);
+  for (const Kind kind : kKinds) {
+    SCOPED_TRACE(static_cast<int>(kind));
+    Two t(kind);
+    t.open();
+    t.engage({0.9f, 0, 0}, {0, 0.6f, 0});
+    const Vec3 left = t.fake.force(1);
+    t.physics_ns[0] = t.now_ns[0];
+    int zero = 0;
+    t.run(150, [&](int k) {
+      if (length(t.fake.force(0)) == 0 && zero == 0) zero = k + 1;
+      ASSERT_TRUE(t.fake.force(1) == left);
+    });
+    EXPECT_GT(zero, 30);
+    EXPECT_LE(zero, 100);
+    EXPECT_LE(t.fake.at(0).step_most, 0.5 + 1e-4);
+  }
 }
 
 // A device is unplugged and plugged in again: its force drops to zero, the other hand's is unchanged to the bit, and it
 // returns through the ramp.
 TEST(ForceDimension, H7_an_arm_is_unplugged) {
-  Two t;
-  t.open();
-  t.engage({0.9f, 0, 0}, {0, 0.6f, 0});
-  const Vec3 left = t.fake.force(1);
-  t.fake.fault(FakeDhd::device(0), kDhdUnplugged, 1);
-  t.run(200, [&](int) {
-    ASSERT_TRUE(t.fake.force(1) == left);
-    ASSERT_EQ(length(t.fake.force(0)), 0);
-  });
-  for (int k = 0; k < 2000 && t.port.status(t.port.self, 0).ready; ++k)
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  EXPECT_FALSE(t.port.status(t.port.self, 0).ready);
-  EXPECT_TRUE(t.port.status(t.port.self, 1).ready);
-  EXPECT_EQ(t.port.error_text(t.port.self, t.port.status(t.port.self, 0).error), "communication error");
-  t.fake.fault(FakeDhd::device(0), kDhdUnplugged, 0);
-  for (int k = 0; k < 5000 && !t.port.status(t.port.self, 0).ready; ++k) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    ASSERT_TRUE(t.fake.step(1));
+  for (const Kind kind : kKinds) {
+    SCOPED_TRACE(static_cast<int>(kind));
+    Two t(kind);
+    t.open();
+    t.engage({0.9f, 0, 0}, {0, 0.6f, 0});
+    const Vec3 left = t.fake.force(1);
+    // To the bit; with encoder steps the account damps a pull that no contact explains.
+    const auto unmoved = [&] { return distance(t.fake.force(1), left) <= (kind == Kind::unkind ? 0.02f : 0); };
+    t.fake.fault(t.fake.device(0), kDhdUnplugged, 1);
+    t.run(200, [&](int) {
+      ASSERT_TRUE(unmoved());
+      ASSERT_EQ(length(t.fake.force(0)), 0);
+    });
+    for (int k = 0; k < 2000 && t.port.status(t.port.self, 0).ready; ++k)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    EXPECT_FALSE(t.port.status(t.port.self, 0).ready);
+    EXPECT_TRUE(t.port.status(t.port.self, 1).ready);
+    EXPECT_EQ(t.port.error_text(t.port.self, t.port.status(t.port.self, 0).error), "communication error");
+    t.fake.fault(t.fake.device(0), kDhdUnplugged, 0);
+    for (int k = 0; k < 5000 && !t.port.status(t.port.self, 0).ready; ++k) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      ASSERT_TRUE(t.fake.step(1));
+    }
+    EXPECT_TRUE(t.port.status(t.port.self, 0).ready);
+    EXPECT_EQ(t.fake.at(0).watchdog, 255);
+    t.run(100);
+    EXPECT_EQ(length(t.fake.force(0)), 0) << "what is wanted is not small: it must not engage";
+    EXPECT_TRUE(unmoved());
   }
-  EXPECT_TRUE(t.port.status(t.port.self, 0).ready);
-  EXPECT_EQ(t.fake.at(0).watchdog, 255);
-  t.run(100);
-  EXPECT_EQ(length(t.fake.force(0)), 0) << "what is wanted is not small: it must not engage";
-  EXPECT_TRUE(t.fake.force(1) == left);
 }
 
 // A call that never returns: the device's own watchdog switches the force off, the other hand is unaffected, and closing does
@@ -232,7 +271,7 @@ TEST(ForceDimension, an_arm_hangs) {
   t.open();
   t.engage({0.9f, 0, 0}, {0, 0.6f, 0});
   const Vec3 left = t.fake.force(1);
-  t.fake.fault(FakeDhd::device(0), kDhdHang, 1);
+  t.fake.fault(t.fake.device(0), kDhdHang, 1);
   int zero = 0;
   t.run(100, [&](int k) {
     if (length(t.fake.force(0)) == 0 && zero == 0) zero = k + 1;
@@ -246,9 +285,122 @@ TEST(ForceDimension, an_arm_hangs) {
   t.port.reset();
   EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(5));
   EXPECT_EQ(t.fake.at(1).output, 0) << "the other one was left as it should be";
-  t.fake.fault(FakeDhd::device(0), kDhdHang, 0);  // the abandoned thread finds no callback, and ends
-  t.fake.fault(FakeDhd::device(0), kDhdUnplugged, 1);
+  t.fake.fault(t.fake.device(0), kDhdHang, 0);  // the abandoned thread finds no callback, and ends
+  t.fake.fault(t.fake.device(0), kDhdUnplugged, 1);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
+}
+
+// S8: torque and grip of a device that has motors for them arrive there, in its axes, behind clamps of the library that are the
+// model's; leaving takes them away without a step. Other devices get none.
+TEST(ForceDimension, S8_torque_and_grip_reach_the_motors) {
+  for (const char* model : {"simulated sigma.7", "simulated omega.7", "simulated omega.3"})
+    for (const Kind kind : kKinds) {
+      SCOPED_TRACE(testing::Message() << model << " " << static_cast<int>(kind));
+      const bool turns = std::string(model).find("sigma") != std::string::npos,
+                 grips = model[std::string(model).size() - 1] == '7';
+      Two t(kind, model);
+      t.open();
+      EXPECT_EQ(t.port.arm[0].limits.torque, turns ? 0.2f : 0);
+      EXPECT_EQ(t.port.arm[0].limits.grip, grips ? 8 : 0);
+      EXPECT_EQ(t.fake.at(0).max_force, 12);
+      if (turns) { EXPECT_NEAR(t.fake.at(0).max_torque, 0.2, 1e-6); }
+      if (grips) { EXPECT_EQ(t.fake.at(0).max_gripper, 8) << "not the library's 1 N"; }
+      t.put(0, {}, kStraight, 0, 0.004 + 0.1 * double{kGripTravel});
+      t.engage({0.4f, 0, 0}, {});
+      t.more[0] = {{}, {0.01f, -0.02f, 0.03f}, 3}, t.more[1] = {{}, {0, 0.005f, 0}, 0};
+      t.run(600);
+      EXPECT_LT(distance(t.fake.torque(0), turns ? t.more[0].torque : Vec3{}), 1e-4f);
+      EXPECT_LT(distance(t.fake.torque(1), turns ? t.more[1].torque : Vec3{}), 1e-4f);
+      EXPECT_NEAR(t.fake.at(0).grip, grips ? 3 : 0, 0.01);
+      EXPECT_EQ(t.fake.at(1).grip, 0) << "its jaws are empty";
+      EXPECT_LE(t.fake.at(0).torque_step, 0.5 * 0.2 / 12 + 1e-6);
+      EXPECT_LE(t.fake.at(0).grip_step, 0.5 * 8 / 12 + 1e-6);
+      t.fake.zero(0), t.fake.zero(1);
+      t.fake.run();
+      t.port.stop(t.port.self);
+      for (const size_t k : {size_t{0}, size_t{1}}) {
+        EXPECT_LE(t.fake.at(k).step_most, 0.5 + 1e-6);
+        EXPECT_LE(t.fake.at(k).torque_step, 0.5 * 0.2 / 12 + 1e-6);
+        EXPECT_LE(t.fake.at(k).grip_step, 0.5 * 8 / 12 + 1e-6);
+        EXPECT_EQ(length(t.fake.torque(k)), 0);
+        EXPECT_EQ(t.fake.at(k).grip, 0);
+      }
+    }
+}
+
+// H3: hands of every grip press a wall of 300 N/m and hold still, on ideal and on imperfect devices.
+TEST(ForceDimension, H3_a_wall_is_passive) {
+  for (const Kind kind : {Kind::ideal, Kind::unkind})
+    for (const double grip : {50.0, 150.0, 800.0}) {
+      Two t(kind);
+      t.open();
+      t.wall = 300;
+      t.fake.grip(t.fake.device(0), grip, 4, 0.1);
+      t.put(0, {0, 0.004f, 0}, kStraight);
+      t.run(2400);
+      t.fake.zero(0);
+      const float deep = 0.004f + 1.0f / static_cast<float>(grip);
+      for (int i = 0; i <= 40; ++i) t.put(0, {0, 0.004f - deep * static_cast<float>(i) / 40, 0}, kStraight), t.run(10);
+      t.run(600);
+      double low = 1e9, high = -1e9;
+      t.run(600, [&](int) {
+        const double y = t.fake.at(0).position[2];
+        low = std::min(low, y), high = std::max(high, y);
+      });
+      const float felt = length(t.fake.force(0));
+      for (int i = 40; i >= 0; --i) t.put(0, {0, 0.004f - deep * static_cast<float>(i) / 40, 0}, kStraight), t.run(10);
+      t.run(300);
+      const FakeDhdArm a = t.fake.at(0);
+      std::printf("H3: Force Dimension, %s, grip %.0f N/m: %.2f N, %.3f mJ to the hand, swing %.3f mm, step %.3f N\n",
+                  kind == Kind::ideal ? "ideal" : "unkind", grip, double{felt}, 1e3 * a.to_hand_most, 1e3 * (high - low),
+                  a.step_most);
+      EXPECT_GT(felt, 0.2f);
+      EXPECT_LE(a.to_hand_most, 0.5e-3);
+      EXPECT_LE(high - low, 0.2e-3);
+      EXPECT_LE(a.step_most, 0.5 + 1e-4);
+    }
+}
+
+// Errors at any call in any order, on both devices, with imperfect timing: no step at the motors beyond the slew, nothing over
+// what is wanted, the jaw that holds a needle never opens by itself, and both devices are there again at the end.
+TEST(ForceDimension, errors_at_any_call_in_any_order) {
+  Two t(Kind::unkind, "simulated sigma.7");
+  t.open();
+  t.put(0, {}, kStraight, 0, 0.004);
+  for (ServoOptions& o : t.options) o.limiter.ramp = 0.05f;
+  t.engage({}, {});
+  UnkindDevice storm = kUnkind;
+  storm.storm = 0.002;
+  t.fake.unkind(&storm);
+  t.fake.zero(0), t.fake.zero(1);
+  uint64_t opened = 0, absent = 0;
+  t.run(3000, [&](int k) {
+    // What is wanted comes and goes, so that the force can engage again.
+    const float now = std::max(0.0f, std::sin(2 * kPi * 0.005f * static_cast<float>(k)));
+    t.pull = {Vec3{0.5f * now, 0, 0}, Vec3{0, 0.4f * now, 0}};
+    t.more[0] = {{}, {0, 0.01f * now, 0}, 2};
+    absent += !t.input[0].connected;
+    opened += t.input[0].connected && t.input[0].jaw > 0.05f;
+  });
+  const unsigned long errors = t.fake.errors();
+  t.fake.unkind(&kUnkind);
+  for (int k = 0; k < 3000 && !(t.port.status(t.port.self, 0).ready && t.port.status(t.port.self, 1).ready); ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    t.run(1);
+  }
+  std::printf("storm: %lu errors, right device absent in %llu of 3000 ms, step %.3f N and %.2f mN m, at most %.2f N\n", errors,
+              static_cast<unsigned long long>(absent), t.fake.at(0).step_most, 1e3 * t.fake.at(0).torque_step,
+              t.fake.at(0).force_most);
+  EXPECT_GT(errors, 20u);
+  EXPECT_GT(absent, 5u);
+  EXPECT_EQ(opened, 0u);
+  for (const size_t k : {size_t{0}, size_t{1}}) {
+    EXPECT_TRUE(t.port.status(t.port.self, k).ready);
+    EXPECT_LE(t.fake.at(k).step_most, 0.5 + 1e-4);
+    EXPECT_LE(t.fake.at(k).torque_step, 0.5 * 0.2 / 12 + 1e-6);
+    EXPECT_GT(t.fake.at(k).force_most, 0.2);
+    EXPECT_LE(t.fake.at(k).force_most, 0.51);
+  }
 }
 
 // The firmware cuts the force because the hand was fast: the tool still moves, force returns through the ramp.
@@ -256,7 +408,7 @@ TEST(ForceDimension, the_firmware_cuts_the_force) {
   Two t;
   t.open();
   t.engage({0.9f, 0, 0}, {});
-  t.fake.fast(FakeDhd::device(0));
+  t.fake.fast(t.fake.device(0));
   t.run(60);
   EXPECT_EQ(t.input[0].connected, 1u);
   EXPECT_TRUE(t.sample[0].forced_off);
@@ -270,7 +422,7 @@ TEST(ForceDimension, positions_that_are_no_numbers) {
   Two t;
   t.open();
   t.engage({0.9f, 0, 0}, {0, 0.6f, 0});
-  t.fake.fault(FakeDhd::device(0), kDhdNan, 1);
+  t.fake.fault(t.fake.device(0), kDhdNan, 1);
   t.run(100, [&](int) { ASSERT_TRUE(is_finite(t.fake.force(0))); });
   EXPECT_EQ(length(t.fake.force(0)), 0);
   EXPECT_NEAR(length(t.fake.force(1)), 0.6f, 0.01f);
@@ -316,7 +468,7 @@ TEST(ForceDimension, leaving) {
   std::vector<std::string> messages;
   ArmPort port = open_force_dimension({}, messages);
   ASSERT_TRUE(port.any());
-  const auto hold = [](void*, size_t, const ArmSample&) { return Vec3{0, 2, 0}; };
+  const auto hold = [](void*, size_t, const ArmSample&) { return ArmForce{{0, 2, 0}, {}, 0}; };
   std::string why;
   ASSERT_TRUE(port.start(port.self, {hold, nullptr}, why)) << why;
   for (int k = 0; k < 5000 && (length(fake.force(0)) < 1 || length(fake.force(1)) < 1); ++k)

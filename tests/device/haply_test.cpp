@@ -45,7 +45,7 @@ struct Two {
   std::array<std::atomic<uint32_t>, 2> buttons{};  // of the grip
   std::array<std::atomic<uint64_t>, 2> now_ns{};
 
-  static Vec3 step(void* user, size_t k, const ArmSample& s) {
+  static ArmForce step(void* user, size_t k, const ArmSample& s) {
     Two& t = *static_cast<Two*>(user);
     const uint64_t now = t.now_ns[k] += 1000000;
     t.sample[k] = s;
@@ -56,7 +56,7 @@ struct Two {
     const ServoOut out = servo_step(t.hand[k], t.options[k], s, &p, now);
     t.there[k] = out.hand.connected;
     if (s.state == ArmState::ready) t.turned[k] = length(rotation_vector(s.pose.q)), t.buttons[k] = s.buttons;
-    return out.force;
+    return out;
   }
   explicit Two(HaplyForm form = HaplyForm::v35, int arms = 2) : fake(form, arms) {
     for (auto& n : now_ns) n = 1000000000;
@@ -209,7 +209,7 @@ TEST(Haply, the_service_stands_still) {
   lost = 0;
   const auto step = [](void*, size_t, const ArmSample& s) {
     lost += s.state == ArmState::absent;
-    return Vec3{0, 0.3f, 0};
+    return ArmForce{{0, 0.3f, 0}, {}, 0};
   };
   std::string why;
   ASSERT_TRUE(port.start(port.self, {step, nullptr}, why));

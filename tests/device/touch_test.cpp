@@ -48,7 +48,7 @@ struct Two {
     if (kind == Kind::unkind) fake.unkind(&kUnkind);
   }
 
-  static Vec3 step(void* user, size_t arm, const ArmSample& s) {
+  static ArmForce step(void* user, size_t arm, const ArmSample& s) {
     Two& t = *static_cast<Two*>(user);
     t.sample[arm] = s;
     ++t.calls[arm];
@@ -59,7 +59,7 @@ struct Two {
     const ServoOut out = servo_step(t.hand[arm], t.options[arm], s, fresh ? &t.patch[arm] : nullptr, now);
     t.input[arm] = out.hand;
     if (t.record && arm == 0) t.record->push_back({s, fresh, t.patch[arm], now, out.force});
-    return out.force;
+    return out;
   }
   void open() {
     port = open_touch({}, messages);
@@ -540,7 +540,7 @@ TEST(Touch, leaving) {
   ASSERT_TRUE(port.any());
   std::string why;
   struct Hold {
-    static Vec3 step(void*, size_t, const ArmSample&) { return {0, 2, 0}; }
+    static ArmForce step(void*, size_t, const ArmSample&) { return {{0, 2, 0}, {}, 0}; }
   };
   ASSERT_TRUE(port.start(port.self, {Hold::step, nullptr}, why)) << why;
   for (int k = 0; k < 2000 && length(fake.force(1)) < 1; ++k) {

@@ -596,7 +596,7 @@ TEST(Haptics, S4_friction_stays_in_the_stiffness_budget) {
     if (n % 3 == 0)
       p.along = {}, p.normal = {0, 1, 0}, p.coefficient = 0.3f, p.force = {0, 1, 0}, p.gap = 1,
       p.stiffness = outer({0, 1, 0}, 300);
-    make_safe(p, 3.3f, 400, 4);
+    make_safe(p, {});
     ForceModel m;
     ForceModelOptions o;
     receive(m, p, o);
@@ -633,7 +633,7 @@ TEST(Haptics, S5_rubbing_pays_for_nothing) {
     in.rubbed = friction;
     in.stiffness = 300;
     const double total = p.total;
-    const Vec3 out = keep_passive(p, in);
+    const Vec3 out = keep_passive(p, in).force;
     if (rubbing) before = p.total;
     else given += p.total - total;
     if (!rubbing && p.braking && length(out) < 0.49f) braked_after = ms - 5500;
@@ -787,8 +787,8 @@ TEST(Haptics, H8_heat) {
   float most = 0;
   for (int i = 0; i < kSteps; ++i) {
     LimiterInput in;
-    in.wanted = i < 10 ? Vec3{} : Vec3{0, 3, 0};
-    const float f = length(limit(limiter, in, 0.001f));
+    in.wanted.force = i < 10 ? Vec3{} : Vec3{0, 3, 0};
+    const float f = length(limit(limiter, in, 0.001f).force);
     square += double{f} * double{f};
     most = std::max(most, f);
   }
@@ -799,10 +799,10 @@ TEST(Haptics, H8_heat) {
   EXPECT_GT(rms, 0.7);
   // Hot motors: zero force.
   LimiterInput hot;
-  hot.wanted = {0, 1, 0};
+  hot.wanted.force = {0, 1, 0};
   hot.warmth = 1;
   for (int i = 0; i < 1000; ++i) limit(limiter, hot, 0.001f);
-  EXPECT_LT(length(limiter.out), 1e-4f);
+  EXPECT_LT(length(limiter.motor[0].out), 1e-4f);
 }
 
 // H4, the puncture: the force drops at most 8 ms after the puncture in the physics,
@@ -900,7 +900,7 @@ TEST(Haptics, H10_determinism) {
 TEST(Haptics, stiffness_is_what_the_arm_can_render) {
   ForcePatch p;
   p.stiffness = {900, 300, 250, 300, -20, 10};
-  EXPECT_TRUE(make_safe(p, 3.3f, 400, 4));
+  EXPECT_TRUE(make_safe(p, {}));
   const Eigen3 e = eigen(p.stiffness);
   for (const float value : e.value) {
     EXPECT_LE(value, 400.1f);

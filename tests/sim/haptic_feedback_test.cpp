@@ -174,6 +174,102 @@ TEST(HapticFeedback, the_other_tool) {
   EXPECT_EQ(length(f.seen.patch[0].normal), 0);
 }
 
+// S8: a tool that is pressed beside its grasp point turns the hand: torque r x F. The other tool presses 30 mm along the shaft
+// of each. The torque of the patch is that of the contacts; the wrist's coupling, which is another constraint, carries the
+// same.
+TEST(HapticFeedback, S8_torque_is_lever_times_force) {
+  Field f("purse_string");
+  f.input.hand[1] = left_level(f);
+  for (int i = 0; i < 60; ++i) f.tick(hand(beside_left(f, 0.003f), 1));
+  const Vec3 before = f.seen.patch[0].lever;
+  EXPECT_NEAR(before.y, 0.03f, 0.002f) << "known before the tools touch";
+  for (int i = 0; i < 90; ++i) f.tick(hand(beside_left(f, 0.003f - 0.013f * smooth(f.model->dt * static_cast<float>(i))), 1));
+  const std::array<Vec3, 2> r{Vec3{0, 0.03f, 0}, Vec3{0.03f, 0, 0}};
+  for (size_t k = 0; k < 2; ++k) {
+    const ForcePatch& p = f.seen.patch[k];
+    const Vec3 want = cross(r[k], p.force), torque = cross(p.lever, p.force) + p.couple;
+    std::printf("S8: %s hand: %.2f mN m of the patch, %.2f of the coupling, r x F = %.2f\n", k == 0 ? "right" : "left",
+                1e3 * double{length(torque)}, 1e3 * double{length(f.seen.tool[k].torque)}, 1e3 * double{length(want)});
+    EXPECT_GT(length(want), 0.02f);
+    EXPECT_LT(distance(torque, want), 0.04f * length(want));
+    EXPECT_LT(distance(torque, f.seen.tool[k].torque), 0.04f * length(want));
+    EXPECT_LT(distance(p.lever, r[k]), 0.004f);
+    EXPECT_EQ(p.grip_stiffness, 0) << "the jaws are empty";
+  }
+  for (int i = 0; i < 30; ++i) f.tick(hand(beside_left(f, 0.02f), 1));
+  for (size_t k = 0; k < 2; ++k) EXPECT_LT(length(f.seen.patch[k].couple), 1e-6f);
+}
+
+// S8: the physics limits no arm. A tool loaded with 8 N is felt with what an omega can, more than a Touch's 3.3 N.
+TEST(HapticFeedback, S8_strong_arms_get_strong_forces) {
+  Field f("purse_string");
+  f.tick(hand(f.rim + Vec3{0.08f, 0.05f, 0}, 1));
+  ToolReaction load;
+  load.substeps = 1, load.at = f.state->hand[0].pose.p;
+  for (const bool omega : {true, false}) {
+    ServoOptions o;
+    fit_to_arm(o, omega ? ArmLimits{12, 12, 5000, 30} : ArmLimits{});
+    ServoHand servo;
+    ArmSample s;
+    s.state = ArmState::ready;
+    s.pose.p = load.at;
+    uint64_t now = 1000000000;
+    Vec3 force;
+    for (int ms = 0; ms < 2600; ++ms, now += 1000000) {
+      load.thread = {ms < 2200 ? 0.0f : 8.0f, 0, 0};
+      f.state->haptics.tool[0] = load;
+      finish_haptics(*f.model, *f.state);
+      ForcePatch p = f.state->haptics.patch[0];
+      p.time_ns = now, p.point = s.pose.p;
+      force = servo_step(servo, o, s, &p, now).force;
+    }
+    std::printf("S8: 8 N of thread on %s: %.2f N\n", omega ? "an omega" : "a Touch", double{length(force)});
+    if (omega) EXPECT_GT(length(force), 6);
+    else EXPECT_LE(length(force), 3.3f + 1e-5f);
+  }
+}
+
+// A free tool has no torque, however fast it turns: its inertia is the solver's, not the hand's.
+TEST(HapticFeedback, S8_a_free_tool_has_no_torque) {
+  Field f("purse_string");
+  ToolInput h = hand(f.rim + Vec3{0.08f, 0.05f, 0}, 1);
+  for (int i = 0; i < 60; ++i) {
+    h.pose.q = axis_angle({0, 0, 1}, 0.5f * std::sin(0.6f * static_cast<float>(i))) * kDown;
+    f.tick(h);
+    EXPECT_EQ(length(f.seen.patch[0].couple), 0);
+    EXPECT_EQ(length(f.seen.patch[0].force), 0);
+  }
+}
+
+// S8: the fingers of a gripper feel what the jaws hold: nothing on air, a spring on the needle or the wall until they let go.
+TEST(HapticFeedback, S8_jaws_feel_what_they_hold) {
+  Field f("purse_string");
+  const auto close_at = [&f](Vec3 p, bool& held) {
+    float most = 0;
+    held = false;
+    for (int i = 0; i <= 30; ++i) {
+      f.tick(hand(p, 1 - static_cast<float>(i) / 30));
+      const ForcePatch& patch = f.seen.patch[0];
+      most = std::max(most, patch.grip_stiffness * std::max(0.0f, patch.grip_from - f.input.hand[0].jaw));
+      held = held || f.seen.tool[0].held != Held::nothing;
+    }
+    return most;
+  };
+  bool held = false;
+  EXPECT_EQ(close_at(f.rim + Vec3{0.08f, 0.05f, 0}, held), 0) << "air";
+  EXPECT_FALSE(held);
+  f.tick(hand(f.rim + Vec3{0.08f, 0.05f, 0}, 1));
+  const SolverModel& m = f.model->solver;
+  const RigidBody& needle = f.state->solver.body[m.needle_body(0)];
+  const Vec3 middle = needle_point(m.needle_arc[0], needle, 0.5f * m.needle_arc[0].arc);
+  for (int i = 0; i < 60; ++i) f.tick(hand(lerp(f.rim + Vec3{0.08f, 0.05f, 0}, middle, static_cast<float>(i) / 59), 1));
+  const float felt = close_at(middle, held);
+  EXPECT_TRUE(held) << "the needle";
+  EXPECT_NEAR(felt, 4.2f, 0.01f);
+  f.tick(hand(middle, 1));
+  EXPECT_EQ(f.seen.patch[0].grip_stiffness, 0) << "let go";
+}
+
 TEST(HapticFeedback, the_next_contact_is_told_before_it_comes) {
   Field f("purse_string");
   const Vec3 near = f.rim + Vec3{f.radius + 0.004f, -0.006f, 0};
@@ -207,13 +303,13 @@ Compared compare(const char* scene, int parts, const std::function<ToolInput(con
     const float t = static_cast<float>(i) * h;
     full.tick(motion(full, t));
     ForcePatch now = full.seen.patch[0];
-    make_safe(now, 10, 400, 4);
+    make_safe(now, {10, 10, 400, 4});
     receive(reference, now);
     if (t >= static_cast<float>(ticks) * slow.model->dt - 1e-6f) {
       if (any) receive(felt, waiting);
       slow.tick(motion(slow, t));
       waiting = slow.seen.patch[0];
-      make_safe(waiting, 10, 400, 4);
+      make_safe(waiting, {10, 10, 400, 4});
       any = true;
       ++ticks;
     }

@@ -4,6 +4,8 @@
 // deliberately without our own declarations of it, so that the two can disagree.
 #include "fake_dhd.h"
 
+#include "../plain_hand.h"
+
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -20,17 +22,27 @@ typedef unsigned short ushort;
 namespace {
 
 struct Arm {
-  bool open = false, output = false, reset_done = true;
+  bool open = false, output = false;
   int cause = 0, watchdog = 0, button = 0;
   double gap = 0.02;
-  double x[3] = {0, 0, 0}, v[3] = {0, 0, 0}, wish[3] = {0, 0, 0};
+  PlainHand hand;
   double rows[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  double force[3] = {0, 0, 0};
-  double step_most = 0;
+  double asked[3] = {0, 0, 0};                                // [N] last written
+  double torque[3] = {0, 0, 0}, grip = 0;                     // [N m], [N] at the motors
+  double max_force = 100, max_torque = 100, max_gripper = 1;  // the library's clamps; 1 N is its default for grippers
+  double step_most = 0, torque_step = 0, grip_step = 0;
   unsigned long writes = 0, granted = 0, done = 0;
-  int silent = 0, waiting = 0;
+  int silent = 0, waiting = 0, next_call = 1;
+  long now_ns = 1000000000, part_ns = 0;
   bool owes = false;  // a millisecond was begun by a read, and is finished by a write
   bool fault[4] = {};
+
+  bool at_rest() const { return asked[0] == 0 && asked[1] == 0 && asked[2] == 0; }
+  void cut() {
+    hand.cut();
+    for (int k = 0; k < 3; ++k) asked[k] = torque[k] = 0;
+    grip = 0;
+  }
 };
 
 struct Fake {
@@ -38,7 +50,11 @@ struct Fake {
   std::condition_variable change;
   std::array<Arm, 2> arm;
   int count = 2;
-  bool manual = false, expert = false, uncalibrated = false, locked = false;
+  bool manual = false, expert = false, uncalibrated = false, locked = false, swapped = false;
+  std::string name = "simulated omega.3";
+  UnkindDevice unkind;
+  UnkindPeriods periods;
+  unsigned long errors = 0;  // of the storm
 };
 Fake& fake() {
   static Fake f;
@@ -56,20 +72,21 @@ Arm* find(Fake& f, char id) {
   if (k >= f.count || k > 1 || !f.arm[static_cast<size_t>(k)].open) return last_error = 5, nullptr;
   Arm& a = f.arm[static_cast<size_t>(k)];
   if (a.fault[kDhdUnplugged]) return last_error = 2, nullptr;
+  if (f.unkind.storm > 0 && f.periods.uniform() < f.unkind.storm) {
+    ++f.errors;
+    last_error = static_cast<int>(1 + 20 * f.periods.uniform());
+    return nullptr;
+  }
   return &a;
 }
 
 // The device's own millisecond, independent of the backend.
 void pass(Arm& a) {
   ++a.silent;
-  if (a.watchdog > 0 && a.output && a.silent * 8 > a.watchdog && (a.force[0] != 0 || a.force[1] != 0 || a.force[2] != 0))
-    a.output = false, a.cause = 3;
-  if (!a.output || a.fault[kDhdUnplugged]) a.force[0] = a.force[1] = a.force[2] = 0;
-  for (int k = 0; k < 3; ++k) {  // a hand of 150 N/m, well damped
-    const double to = a.wish[k] + a.force[k] / 150, before = a.x[k];
-    a.x[k] += 0.05 * (to - a.x[k]);
-    a.v[k] = (a.x[k] - before) * 1e3;
-  }
+  if (a.watchdog > 0 && a.output && a.silent * 8 > a.watchdog && !a.at_rest()) a.output = false, a.cause = 3;
+  if (!a.output || a.fault[kDhdUnplugged]) a.cut();
+  a.hand.pass(a.output);
+  a.now_ns += 1000000;
 }
 
 #define HOLD        \
@@ -79,6 +96,8 @@ void pass(Arm& a) {
 }  // namespace
 
 extern "C" {
+
+bool dhdHasActiveGripper(char id);
 
 int dhdGetDeviceCount() {
   HOLD;
@@ -96,15 +115,34 @@ int dhdClose(char id) {
   if (id < 0 || id > 1) return -1;
   Arm& a = f.arm[static_cast<size_t>(id)];
   a.open = a.output = false;
-  a.force[0] = a.force[1] = a.force[2] = 0;
+  a.cut();
+  f.change.notify_all();
   return 0;
 }
 int dhdGetSystemType(char) { return 33; }
-const char* dhdGetSystemName(char) { return "simulated omega.3"; }
+const char* dhdGetSystemName(char) { return fake().name.c_str(); }
 int dhdGetSerialNumber(ushort* sn, char id) { return *sn = static_cast<ushort>(1000 + id), 0; }
 void dhdGetSDKVersion(int* a, int* b, int* c, int* d) { *a = 3, *b = 17, *c = 5, *d = 0; }
-bool dhdIsLeftHanded(char id) { return id == 0; }  // the first one is the left hand's: the order does not matter
-bool dhdHasGripper(char id) { return id == 1; }
+// The first one is the left hand's, unless swapped: the order does not matter.
+bool dhdIsLeftHanded(char id) { return id == (fake().swapped ? 1 : 0); }
+bool dhdHasGripper(char id) { return !dhdIsLeftHanded(id) || dhdHasActiveGripper(id); }
+bool dhdHasActiveGripper(char) { return fake().name.find(".7") != std::string::npos; }
+bool dhdHasActiveWrist(char) { return fake().name.find("sigma") != std::string::npos; }
+int dhdSetMaxForce(double limit, char id) {
+  HOLD;
+  Arm* a = find(f, id);
+  return a ? (a->max_force = limit, 0) : -1;
+}
+int dhdSetMaxTorque(double limit, char id) {
+  HOLD;
+  Arm* a = find(f, id);
+  return a ? (a->max_torque = limit, 0) : -1;
+}
+int dhdSetMaxGripperForce(double limit, char id) {
+  HOLD;
+  Arm* a = find(f, id);
+  return a ? (a->max_gripper = limit, 0) : -1;
+}
 int dhdGetStatus(int* status, char id) {
   HOLD;
   Arm* a = find(f, id);
@@ -121,7 +159,7 @@ int dhdEnableForce(uchar on, char id) {
   Arm* a = find(f, id);
   if (!a) return -1;
   a->output = on == 1, a->cause = on == 1 ? 0 : 4, a->silent = 0;
-  if (!a->output) a->force[0] = a->force[1] = a->force[2] = 0;
+  if (!a->output) a->cut();
   return 0;
 }
 int dhdSetGravityCompensation(int, char) { return 0; }
@@ -156,9 +194,11 @@ int dhdGetPosition(double* x, double* y, double* z, char id) {
     a->owes = f.manual;
   }
   if (!f.manual) pass(*a);
+  a->part_ns = f.periods.deviation_ns(f.unkind);
   const bool nan = a->fault[kDhdNan];
-  *x = nan ? std::numeric_limits<double>::quiet_NaN() : a->x[0];
-  *y = a->x[1], *z = a->x[2];
+  const PlainHand::V seen = a->hand.seen(f.unkind.encoder);
+  *x = nan ? std::numeric_limits<double>::quiet_NaN() : seen[0];
+  *y = seen[1], *z = seen[2];
   return 0;
 }
 int dhdGetOrientationFrame(double m[3][3], char id) {
@@ -172,7 +212,7 @@ int dhdGetLinearVelocity(double* x, double* y, double* z, char id) {
   HOLD;
   Arm* a = find(f, id);
   if (!a) return -1;
-  *x = a->v[0], *y = a->v[1], *z = a->v[2];
+  *x = a->hand.v[0], *y = a->hand.v[1], *z = a->hand.v[2];
   return 1;  // the result of the time guard, which is not an error
 }
 int dhdGetButton(int index, char id) {
@@ -186,16 +226,22 @@ int dhdGetGripperGap(double* gap, char id) {
   if (!a) return -1;
   return *gap = a->gap, 0;
 }
-int dhdSetForceAndTorqueAndGripperForce(double x, double y, double z, double, double, double, double, char id) {
+int dhdSetForceAndTorqueAndGripperForce(double x, double y, double z, double tx, double ty, double tz, double fg, char id) {
   HOLD;
   Arm* a = find(f, id);
   if (!a) return -1;
-  const double to[3] = {x, y, z};
-  double step = 0;
-  for (int k = 0; k < 3; ++k) step += (to[k] - a->force[k]) * (to[k] - a->force[k]);
+  const auto length = [](double p, double q, double r) { return std::sqrt(p * p + q * q + r * r); };
+  const double to[3] = {x, y, z}, turn[3] = {tx, ty, tz};
   if (a->output) {
-    a->step_most = std::fmax(a->step_most, std::sqrt(step));
-    std::memcpy(a->force, to, sizeof to);
+    a->step_most = std::fmax(a->step_most, length(x - a->asked[0], y - a->asked[1], z - a->asked[2]));
+    a->torque_step = std::fmax(a->torque_step, length(tx - a->torque[0], ty - a->torque[1], tz - a->torque[2]));
+    a->grip_step = std::fmax(a->grip_step, std::fabs(fg - a->grip));
+    std::memcpy(a->asked, to, sizeof to);
+    const double part = std::fmin(1, a->max_force / std::fmax(1e-9, length(x, y, z))),
+                 turned = std::fmin(1, a->max_torque / std::fmax(1e-9, length(tx, ty, tz)));
+    a->hand.command({part * x, part * y, part * z}, f.unkind.transport);
+    for (int k = 0; k < 3; ++k) a->torque[k] = dhdHasActiveWrist(id) ? turned * turn[k] : 0;
+    a->grip = dhdHasActiveGripper(id) ? std::fmax(-a->max_gripper, std::fmin(a->max_gripper, fg)) : 0;
   }
   a->silent = 0;
   ++a->writes;
@@ -214,6 +260,11 @@ void fakeDhdReset(void) {
   f.manual = number("FAKE_DHD_MANUAL", 0) == 1;
   f.uncalibrated = number("FAKE_DHD_UNCALIBRATED", 0) == 1;
   f.locked = number("FAKE_DHD_LOCKED", 0) == 1;
+  f.swapped = number("FAKE_DHD_SWAPPED", 0) == 1;
+  const char* name = std::getenv("FAKE_DHD_NAME");
+  f.name = name && *name ? name : "simulated omega.3";
+  f.unkind = {};
+  f.errors = 0;
   for (Arm& a : f.arm) {
     const int waiting = a.waiting;
     a = Arm{};
@@ -226,6 +277,8 @@ bool fakeDhdStep(int milliseconds) {
   for (int ms = 0; ms < milliseconds; ++ms) {
     for (Arm& a : f.arm) {
       pass(a);
+      if (--a.next_call > 0) continue;
+      a.next_call = f.periods.next(f.unkind);
       if (a.open && !a.fault[kDhdHang] && !a.fault[kDhdUnplugged]) ++a.granted;
     }
     f.change.notify_all();
@@ -251,7 +304,7 @@ void fakeDhdFault(int arm, int fault, int on) {
 void fakeDhdHand(int arm, const double* position, const double* rows, int button, double gap) {
   HOLD;
   Arm& a = f.arm[static_cast<size_t>(arm)];
-  std::memcpy(a.wish, position, sizeof a.wish);
+  for (size_t k = 0; k < 3; ++k) a.hand.wish[k] = position[k];
   std::memcpy(a.rows, rows, sizeof a.rows);
   a.button = button, a.gap = gap;
 }
@@ -263,13 +316,37 @@ void fakeDhdFast(int arm) {
 void fakeDhdRead(int arm, FakeDhdArm* out) {
   HOLD;
   const Arm& a = f.arm[static_cast<size_t>(arm)];
-  std::memcpy(out->position, a.x, sizeof a.x);
-  std::memcpy(out->force, a.force, sizeof a.force);
+  for (size_t k = 0; k < 3; ++k) {
+    out->position[k] = a.hand.x[k], out->force[k] = a.hand.acting[k], out->asked[k] = a.asked[k], out->torque[k] = a.torque[k];
+  }
+  out->grip = a.grip, out->torque_step = a.torque_step, out->grip_step = a.grip_step;
+  out->to_hand_most = a.hand.to_hand_most, out->force_most = a.hand.force_most;
+  out->max_force = a.max_force, out->max_torque = a.max_torque, out->max_gripper = a.max_gripper;
   out->step_most = a.step_most;
   out->open = a.open, out->output = a.output, out->cause = a.cause, out->watchdog = a.watchdog, out->writes = a.writes;
 }
 void fakeDhdZero(int arm) {
   HOLD;
-  f.arm[static_cast<size_t>(arm)].step_most = 0;
+  Arm& a = f.arm[static_cast<size_t>(arm)];
+  a.step_most = a.torque_step = a.grip_step = 0;
+  a.hand.zero();
+}
+void fakeDhdUnkind(const UnkindDevice* unkind) {
+  HOLD;
+  f.unkind = *unkind;
+}
+void fakeDhdGrip(int arm, double stiffness, double damping, double mass) {
+  HOLD;
+  PlainHand& h = f.arm[static_cast<size_t>(arm)].hand;
+  h.grip = stiffness, h.damping = damping, h.mass = mass;
+}
+unsigned long fakeDhdErrors(void) {
+  HOLD;
+  return f.errors;
+}
+unsigned long fakeDhdNow(int arm) {
+  HOLD;
+  const Arm& a = f.arm[static_cast<size_t>(arm)];
+  return static_cast<unsigned long>(a.now_ns + a.part_ns);
 }
 }
