@@ -362,7 +362,7 @@ TEST(ForceDimension, H3_a_wall_is_passive) {
 }
 
 // Errors at any call in any order, on both devices, with imperfect timing: no step at the motors beyond the slew, nothing over
-// what is wanted, the jaw that holds a needle never opens by itself, and both devices are there again at the end.
+// what is wanted, the jaw that holds a needle never opens unasked, and both devices are there again at the end.
 TEST(ForceDimension, errors_at_any_call_in_any_order) {
   Two t(Kind::unkind, "simulated sigma.7");
   t.open();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/device: a hand on a simulated device: a mass on a spring to where the hand means to be, in any axes. SI units. Shared by
-// the doubles; it knows nothing of the programs under test.
+// tests/device: a hand on a simulated device: a mass on a spring to where the hand means to be, in any axes. SI units. Shared
+// by the doubles; it knows nothing of the programs under test.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -22,8 +22,8 @@ struct PlainHand {
   using V = std::array<double, 3>;
   V x{}, v{}, wish{};
   double grip = 150, damping = 7.5, mass = 0.1, viscous = 0.25;  // of the hand; `viscous` of that is the device's own
-  double to_hand = 0, to_hand_most = 0;                           // [J] out of the motors, less what the device's damping takes
-  double force_most = 0, step_most = 0;                           // [N] at the motors
+  double to_hand = 0, to_hand_most = 0;                          // [J] out of the motors, less what the device's damping takes
+  double force_most = 0, step_most = 0;                          // [N] at the motors
   V acting{};
   std::deque<std::pair<long, V>> on_the_way;
   long ms = 0;

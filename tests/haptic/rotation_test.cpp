@@ -165,7 +165,10 @@ TEST(Haptics, S8_faults_take_torque_and_grip_away) {
       {"grip NaN", [](Held&) {}, true, [](ForcePatch& p) { p.grip_stiffness = std::numeric_limits<float>::quiet_NaN(); }},
       {"orientation NaN", [](Held& h) { h.sample.pose.q.y = std::numeric_limits<float>::quiet_NaN(); }, true, nothing},
       {"cap 0", [](Held&) {}, true, [](ForcePatch& p) { p.cap = 0; }},
-      {"a patch of another orientation", [](Held&) {}, true, [](ForcePatch& p) { p.turn = axis_angle({0, 0, 1}, 0.5f); }},
+      {"a patch of another orientation", [](Held&) {}, true,
+       [](ForcePatch& p) {
+         p.turn = axis_angle({0, 0, 1}, 0.5f);
+       }},
   };
   for (const Fault& f : faults) {
     SCOPED_TRACE(f.name);
@@ -194,8 +197,8 @@ TEST(Haptics, S8_faults_take_torque_and_grip_away) {
   }
 }
 
-// A hand with a gripper on a device with six degrees of freedom, in lock step: the hand turns, moves and pinches toward where it
-// means to be. The tip of a needle, `kTip` from the hand, meets a wall of 600 N/m behind a coupling of 300 N/m.
+// A hand with a gripper on a device with six degrees of freedom, in lock step: the hand turns, moves and pinches toward where
+// it means to be. The tip of a needle, `kTip` from the hand, meets a wall of 600 N/m behind a coupling of 300 N/m.
 constexpr Vec3 kTip{0.04f, 0, 0};
 constexpr float kWall = 200;  // [N/m] in series
 
@@ -211,10 +214,10 @@ struct Sixth {
   ForcePatch thinking;
   float next = 0;
   int ms = 0;
-  Vec3 (*wish)(float) = nullptr;       // [m]
+  Vec3 (*wish)(float) = nullptr;         // [m]
   float (*wish_angle)(float) = nullptr;  // [rad]
   float (*wish_gap)(float) = nullptr;    // [m]
-  bool holds = false, bare = false;  // bare: force and torque held from frame to frame, without the account
+  bool holds = false, bare = false;      // bare: force and torque held from frame to frame, without the account
 
   static float stepped(float f, float step) { return std::round(f / step) * step; }
   ForcePatch think(const ArmSample& s) const {
@@ -296,8 +299,8 @@ TEST(Haptics, S8_rotation_is_passive) {
          return Vec3{0, 0.004f - 0.012f * (ramp(t, 2.5f, 2.9f) - ramp(t, 4.4f, 4.8f)), 0};
        },
        [](float t) { return t > 2.9f && t < 3.6f ? 0.1f * std::sin(2 * kPi * 3 * (t - 2.9f)) : 0.0f; }, open, false},
-      {"tapped by turning at 5 Hz", over, [](float t) { return t > 2.5f && t < 4.3f ? -0.13f - 0.13f * std::sin(2 * kPi * 5 * t) : 0.0f; },
-       open, false},
+      {"tapped by turning at 5 Hz", over,
+       [](float t) { return t > 2.5f && t < 4.3f ? -0.13f - 0.13f * std::sin(2 * kPi * 5 * t) : 0.0f; }, open, false},
       {"a needle pinched", over, [](float) { return 0.0f; },
        [](float t) { return 0.02f - 0.022f * (ramp(t, 2.5f, 2.9f) - ramp(t, 4.4f, 4.8f)); }, true},
   };
@@ -390,7 +393,8 @@ TEST(Haptics, S9_force_gain) {
   touch.hand.strength = touch.hand.strength_wanted = 2;
   touch.engage();
   float most = 0;
-  for (int i = 0; i < 200; ++i) touch.call([](ForcePatch& p) { p.force = {0, 5, 0}; }), most = std::max(most, length(touch.out.force));
+  for (int i = 0; i < 200; ++i)
+    touch.call([](ForcePatch& p) { p.force = {0, 5, 0}; }), most = std::max(most, length(touch.out.force));
   EXPECT_GT(most, 2.5f);
   EXPECT_LE(most, 3.3f + 1e-5f);
   touch.run(20, nothing);
