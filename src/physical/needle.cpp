@@ -200,10 +200,14 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
     for (uint32_t c = 0; c < n.channels; ++c) {
       const Channel& channel = n.channel[c];
       const bool open = n.inside && c + 1 == n.channels;
+      std::array<Vec3, kMaxPath + 1> way;
+      for (uint32_t p = 0; p < channel.count; ++p) way[p] = place_of(wm, ws, channel.point[p]);
+      if (open) way[channel.count] = place_of(wm, ws, n.tip);
+      const uint32_t ends = channel.count + (open ? 1 : 0);
       for (uint32_t p = 0; p < channel.count; ++p) {
         Row row;
         row.point = wall::weights(wm, ws.topology, channel.point[p]);
-        const Vec3 there = wall::place(row.point, ws.motion);
+        const Vec3 there = way[p];
         const float angle = angle_of(m, body.pose, there);
         if (angle < 0 || angle > m.shape.arc) continue;
         const Vec3 at = arc_point(m, body.pose, angle);
@@ -213,7 +217,9 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
         row.wanted = (there - at) * (0.2f / h);
         if (length(row.wanted) > bm.push_out) row.wanted = normalized(row.wanted) * bm.push_out;
         row.soft = 1 / (law.side_stiffness * h * h);
-        row.along_limit = law.friction * kPathStep * h, row.friction = 1, row.across_limit = law.tear * h;
+        // Friction of the shaft that this point stands for.
+        const float before = p > 0 ? distance(there, way[p - 1]) : 0, after = p + 1 < ends ? distance(there, way[p + 1]) : 0;
+        row.along_limit = law.friction * 0.5f * (before + after) * h, row.friction = 1, row.across_limit = law.tear * h;
         add(row, at);
       }
       if (!open) continue;

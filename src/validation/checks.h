@@ -73,6 +73,8 @@ void check_locking(Lines& out);
 void check_names(Lines& out, bool nightly);
 void check_ties(Lines& out, bool nightly);
 // src/physical.
+void check_contacts(Lines& out, bool nightly);
+void check_puncture(Lines& out, bool nightly);
 void check_eyelets(Lines& out, bool nightly);
 void check_lying(Lines& out, bool nightly);
 void check_interrupted(Lines& out, bool nightly);

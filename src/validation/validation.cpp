@@ -126,6 +126,8 @@ std::vector<ValidationLine> run_validation(const std::function<void(const Valida
       {"knot/locking", [](v::Lines& out, bool all) { all ? v::check_locking(out) : void(); }},
       {"knot/names", v::check_names},
       {"knot/ties", v::check_ties},
+      {"contact", v::check_contacts},
+      {"tear/puncture", v::check_puncture},
       {"closure/eyelet", v::check_eyelets},
       {"closure/surface", v::check_lying},
       {"closure/interrupted", v::check_interrupted},

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// validation: a tube of bowel, open at one end, with a tool in a hand, a free needle and a thread across it. Random events.
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "core/random.h"
+#include "physical/physical.h"
+#include "validation/knot_scenes.h"
+
+namespace catgut::validation {
+
+struct ContactBench {
+  physical::Model model;
+  physical::State state, rest;
+  std::unique_ptr<physical::Scratch> scratch;
+  Jobs jobs{1};
+  std::vector<physical::HandTarget> target;  // tool, needle
+  std::vector<thread::Pull> pull;
+  Random random;
+  uint64_t seed = 0;
+  int events = 0;
+  // Of the last event, per tool, needle and thread: overlap [m]; crossings of the wall's middle, at every fourth step.
+  float deepest[3] = {};
+  int passed[3] = {};
+  float fastest = 0, strongest = 0;  // [m/s] of a body, [N] on a body, over all events
+  explicit ContactBench(uint64_t s);
+  // 80 ms: the tool pushes and perhaps drags, the needle falls or is thrown, the thread's ends are pulled.
+  void event(float max_force, float max_speed);
+
+ private:
+  Vec3 direction();
+  void step();
+  void look();
+  std::vector<Vec3> center;  // [m] per face
+  std::vector<float> radius;
+};
+
+}  // namespace catgut::validation
