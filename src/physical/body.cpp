@@ -53,6 +53,24 @@ wall::Weights load_point(wall::Weights w, const wall::Motion& motion, Vec3 direc
   return w;
 }
 
+Foot outer_foot(const wall::Model& wm, const wall::State& ws, const Surface& surface, uint32_t patch, Vec3 p) {
+  Foot foot = nearest_on_patch(wm, ws, surface, patch, p);
+  const int side = surface.patch[patch].side;
+  if (side == 0) return foot;
+  wall::Weights w = wall::weights(wm, ws.topology, foot.point), mid = w;
+  w.zeta = static_cast<float>(side), mid.zeta = 0;
+  if (dot(wall::place(w, ws.motion) - wall::place(mid, ws.motion), foot.facing) >= 0) return foot;
+  foot.facing = -foot.facing;
+  const Vec3 off = p - foot.at;
+  const float far = length(off), front = dot(off, foot.facing);
+  foot.normal = foot.facing, foot.gap = front;
+  if (foot.on_edge) {
+    foot.gap = front >= 0 ? far : -far;
+    if (front >= 0 && far > 1e-6f) foot.normal = off / far;
+  }
+  return foot;
+}
+
 BodyModel make_tool(const ToolShape& t) {
   BodyModel m;
   m.hinge_z = t.jaw_reach, m.mass = t.mass;
@@ -142,14 +160,23 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       const wall::Weights w = load_point(wall::weights(wm, ws.topology, foot.point), ws.motion, foot.normal);
       const Vec3 r = on_axis - foot.normal * radius - moving.center;
       const Vec3 u = wall::velocity(w, ws.motion);
-      const float bound =
-          model.reach +
-          2 * h * std::max(length(point_speed(moving, r) + jaw_speed - u), length(body.velocity + cross(body.spin, r) - u));
-      if (gap > bound) return;
-      // The same plane from two patches that meet there is one contact.
-      for (size_t i = k.row.size(); i-- > 0 && k.row[i].a == b && (k.row[i].key >> 36) == (key >> 36);)
+      // As far as it may come near in this step, however it turns.
+      const auto nearing = [&](Vec3 v) { return 1.5f * std::max(0.0f, -dot(v, foot.normal)) + 0.3f * length(v); };
+      if (gap > model.reach + h * std::max(nearing(point_speed(moving, r) + jaw_speed - u),
+                                           nearing(body.velocity + cross(body.spin, r) + jaw_speed - u)))
+        return;
+      // The same plane from two patches that meet there is one contact; and no more than the nearest four of a sphere.
+      size_t same = 0, farthest = k.row.size();
+      for (size_t i = k.row.size(); i-- > 0 && k.row[i].a == b && (k.row[i].key >> 36) == (key >> 36); ++same) {
         if (dot(k.row[i].axis, foot.normal) > 0.985f && std::abs(k.row[i].gap - gap) < 0.05e-3f) return;
-      if (k.row.size() >= kMaxRows - 40) return;
+        if (farthest == k.row.size() || k.row[i].gap > k.row[farthest].gap) farthest = i;
+      }
+      const bool replaces = same >= 4;
+      if (replaces && k.row[farthest].gap <= gap) return;
+      if (!replaces && k.row.size() >= kMaxRows - 40 - 24 * std::min<size_t>(bodies.body.size() - 1 - b, 3)) {
+        ++k.overflow;
+        return;
+      }
       Row row;
       row.key = key, row.a = b, row.on_wall = true, row.point = w;
       row.ra = r, row.axis = foot.normal, row.gap = gap, row.speed = jaw_speed, row.friction = m.wall_friction;
@@ -157,7 +184,8 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
         const float press = std::max(0.0f, dot(memory->impulse, memory->axis));
         row.impulse = foot.normal * press + across(across(memory->impulse, memory->axis), foot.normal);
       }
-      k.row.push_back(row);
+      if (replaces) k.row[farthest] = row;
+      else k.row.push_back(row);
     };
     for (uint32_t i = 0; i < m.sphere.size(); ++i) {
       const BodySphere& s = m.sphere[i];
@@ -171,7 +199,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
         const float r = k.face_radius[f] + reach;
         if (length2(k.face_center[f] - p) > r * r) continue;
         for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
-          const Foot foot = nearest_on_patch(wm, ws, surface, q, p);
+          const Foot foot = outer_foot(wm, ws, surface, q, p);
           if (foot.gap - s.radius > margin || (foot.on_edge && foot.gap < 0)) continue;
           add(i, foot, p, s.radius, jaw_speed, 1);
         }

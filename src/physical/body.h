@@ -172,12 +172,16 @@ struct BodiesScratch {
   std::vector<uint32_t> hold_body;
   std::vector<Vec3> hold_at;  // [m] where its force acts on the body
   int swept = 0;
+  uint32_t overflow = 0;  // contacts of the step that found no room
   void reserve(const wall::Model& model, const wall::State& state);
 };
 
 // Where a load in `direction` (unit) acts on the wall at w. A load along the director moves the column as a whole: the
 // thickness has a penalty in place of a law, and 4 N on one face of a column turned it inside out.
 wall::Weights load_point(wall::Weights w, const wall::Motion& motion, Vec3 direction);
+// As nearest_on_patch, for a sphere outside the wall: where a face is folded so sharply that its corners turn over, the
+// directors say which side is out.
+Foot outer_foot(const wall::Model& model, const wall::State& state, const Surface& surface, uint32_t patch, Vec3 p);
 // Positions.
 Vec3 local(const BodyModel& model, const BodySphere& sphere, float opening);  // [m] body frame
 inline Vec3 center_of(const BodyModel& model, const Body& body) { return transform(body.pose, model.center); }

@@ -68,6 +68,7 @@ void predict_bodies(const BodiesModel& model, const Bodies& bodies, std::span<co
     opening = std::clamp(opening, b.opening - m.jaw_speed * h, b.opening + m.jaw_speed * h);
     k.moving[i].opening = opening;
   }
+  k.overflow = 0;
   k.row.clear(), k.hold.clear(), k.hold_body.clear(), k.hold_at.clear();
 }
 
@@ -127,6 +128,12 @@ void take_thread_forces(const BodiesModel& model, Bodies& bodies, BodiesScratch&
     if (model.body[index].hinge_z <= 0) continue;  // a swage: its force enters through its row
     const Vec3 at = transform(b.pose, k.hold_at[i]) - k.moving[index].center;
     b.thread_force -= k.hold[i].force, b.thread_torque -= cross(at, k.hold[i].force);
+  }
+  // More than any thread bears: a tool was put on a thread from one step to the next.
+  constexpr float kMost = 60;  // [N]
+  for (Body& b : bodies.body) {
+    const float size = length(b.thread_force);
+    if (size > kMost) b.thread_force = b.thread_force * (kMost / size), b.thread_torque = b.thread_torque * (kMost / size);
   }
 }
 
@@ -267,6 +274,7 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
     body.pose.q = turned(body.pose.q, moving.w * h);
     body.pose.p = moving.center + moving.v * h - rotate(body.pose.q, m.center);
   }
+  bodies.overflow += k.overflow;
   bodies.memory.clear();
   for (const Row& row : k.row)
     if (row.kind != Row::Kind::grip && !(row.impulse == Vec3{})) bodies.memory.push_back({row.key, row.axis, row.impulse});

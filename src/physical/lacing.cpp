@@ -46,6 +46,26 @@ void unlace(State& s, uint32_t& index) {
 
 }  // namespace
 
+void move_body(const Model& m, State& s, uint32_t body, const Pose& pose, float opening) {
+  place_body(m.bodies.body[body], s.bodies.body[body], pose, opening);
+  std::erase_if(s.bodies.memory, [&](const RowMemory& r) {
+    return r.key >> 63 == 0 && (r.key >> 52 & 0xff) == body;  // rows of needles have keys of their own: they die by distance
+  });
+  uint32_t first = thread::kTool;
+  for (uint32_t b = 0; b < body; ++b) first += static_cast<uint32_t>(m.bodies.body[b].thread_capsule.size());
+  const uint32_t last = first + static_cast<uint32_t>(m.bodies.body[body].thread_capsule.size());
+  thread::State& t = s.thread;
+  size_t kept = 0;
+  for (size_t i = 0; i < t.key.size(); ++i) {
+    const uint32_t other = thread::partner_of(t.key[i]);
+    if (other >= first && other < last) continue;
+    t.key[kept] = t.key[i], t.budget[kept] = t.budget[i], t.crossing[kept] = t.crossing[i];
+    ++kept;
+  }
+  t.key.resize(kept), t.budget.resize(kept), t.crossing.resize(kept);
+  t.travel = 1e9f;  // listed again
+}
+
 void lace_threads(const Model& m, State& s) {
   for (size_t i = 0; i < s.needle.size(); ++i) {
     Needle& n = s.needle[i];

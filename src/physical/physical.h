@@ -85,6 +85,9 @@ Model make_model(const wall::Wall& wall, const thread::Settings& settings);
 Vec3 mouth(const Model& model, const State& state, const Hole& hole);
 float mouth_offset(const Model& model, const Hole& hole);  // [m] from the mid-surface along the director
 
+// Puts a body somewhere else, at rest: it forgets its contacts, and the thread forgets on which side of it it was.
+void move_body(const Model& model, State& state, uint32_t body, const Pose& pose, float opening);
+
 // Of all state.
 uint64_t hash_state(const State& state);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// validation: tools, needles and thread pushed, dragged, dropped and pulled at random against the wall of a tube, from outside and
-// through its opening. Seen from outside: no axis of a capsule and no segment of thread crosses the middle of the wall, and no
-// sphere lies deeper in the wall than the bound.
+// validation: tools, needles and thread pushed, dragged, dropped and pulled at random against the wall of a tube, from outside
+// and through its opening. Seen from outside: no axis of a capsule and no segment of thread crosses the middle of the wall, and
+// no sphere lies deeper in the wall than the bound.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -81,8 +81,7 @@ void ContactBench::look() {
   const uint32_t faces = static_cast<uint32_t>(wm.lane_of_face.size());
   const auto corner = [&](uint32_t f, size_t k) {
     const uint32_t lane = wm.lane_of_face[f];
-    return wall::vec3(
-        ws.motion.x[2 * ws.topology.corners[lane / wall::kLanesOfBlock].column[k][lane % wall::kLanesOfBlock]]);
+    return wall::vec3(ws.motion.x[2 * ws.topology.corners[lane / wall::kLanesOfBlock].column[k][lane % wall::kLanesOfBlock]]);
   };
   center.resize(faces), radius.resize(faces);
   for (uint32_t f = 0; f < faces; ++f) {
@@ -107,7 +106,7 @@ void ContactBench::look() {
       const float reach = radius[f] + 4e-3f;
       if (length2(center[f] - p) > reach * reach) continue;
       for (uint32_t q = model.surface.first_of_face[f]; q < model.surface.first_of_face[f + 1]; ++q) {
-        const Foot foot = nearest_on_patch(wm, ws, model.surface, q, p);
+        const Foot foot = outer_foot(wm, ws, model.surface, q, p);
         const float d = distance(foot.at, p);
         const bool clearer = d < far + 1e-7f && dot(p - foot.at, foot.facing) > dot(p - best.at, best.facing);
         if (d < far - 1e-7f || clearer) best = foot, far = std::min(far, d);
@@ -153,15 +152,14 @@ void ContactBench::event(float max_force, float max_speed) {
   BodyModel& tool = model.bodies.body[0];
   tool.max_force = max_force * (0.25f + 0.75f * random.uniform());
   const float opening = random.uniform() < 0.5f ? 0.0f : 0.2f * random.uniform();
-  physical::place_body(tool, state.bodies.body[0], pose, opening);
+  physical::move_body(model, state, 0, pose, opening);
   // The needle falls on the tube, or is thrown at it.
   if (events % 5 == 1 || random.uniform() < 0.3f) {
     const Vec3 d = direction();
     Pose needle{Vec3{0.016f * d.x, 0.034f, -0.02f + 0.016f * d.z}, normalized(Quat{d.x, d.y, d.z, random.uniform()})};
-    physical::place_body(model.bodies.body[1], state.bodies.body[1], needle, 0);
+    physical::move_body(model, state, 1, needle, 0);
     state.bodies.body[1].velocity = Vec3{0, -max_speed * random.uniform(), 0};
     state.bodies.body[1].spin = direction() * (20 * random.uniform());
-    state.bodies.memory.clear();
   }
   const float speed = max_speed * (0.02f + 0.98f * random.uniform() * random.uniform());
   const Vec3 drag = normalized(cross(aim, direction())) * (random.uniform() < 0.5f ? speed : 0.0f);
@@ -177,6 +175,7 @@ void ContactBench::event(float max_force, float max_speed) {
     target[0] = {pose, true, opening, 0};
     step();
     if (i % 4 == 3) look();
+    if (watch) watch();
   }
 }
 

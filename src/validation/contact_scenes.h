@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // validation: a tube of bowel, open at one end, with a tool in a hand, a free needle and a thread across it. Random events.
 #pragma once
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct ContactBench {
   Jobs jobs{1};
   std::vector<physical::HandTarget> target;  // tool, needle
   std::vector<thread::Pull> pull;
+  std::function<void()> watch;  // called after each step
   Random random;
   uint64_t seed = 0;
   int events = 0;

@@ -47,7 +47,8 @@ Punctured puncture(float speed, float stiffness, int columns, float wire_radius)
   const float middle = 0.5f * needle.arc;
   const Vec3 tangent = arc_tangent(n, {}, middle);
   const Vec3 z = -tangent, x = {0, 0, 1};
-  const Quat turn = from_axes(Vec3{0, 1, 0}, cross(Vec3{0, 0, 1}, Vec3{0, 1, 0}), {0, 0, 1}), own = from_axes(x, cross(z, x), z);
+  const Quat turn = from_axes(Vec3{0, 1, 0}, cross(Vec3{0, 0, 1}, Vec3{0, 1, 0}), {0, 0, 1}),
+             own = from_axes(x, cross(z, x), z);
   pose.q = normalized(turn * conjugate(own));
   pose.p = Vec3{0.0158f, 0.0107f, 0.0025f} - rotate(pose.q, physical::tip_of(n, {}));
   physical::place_body(model.bodies.body[0], state.bodies.body[0], pose, 0);
@@ -97,7 +98,8 @@ void check_puncture(Lines& out, bool nightly) {
   }
   out.add(who + "entry within 0.48-1.8 N, 1 for yes", 1, slow.entry > 0.48f && slow.entry < 1.8f ? 1 : 0, 0, "",
           "Maloney et al.: 0.48-1.00 N in skin; colon 1.6-1.8 N a spike, doi 10.1007/s11548-021-02371-8");
-  out.add(who + "second peak, where it leaves", leave, wide(slow.exit), 0.05, "N", "two peaks: Frick et al. 2001; share assumed");
+  out.add(who + "second peak, where it leaves", leave, wide(slow.exit), 0.05, "N",
+          "two peaks: Frick et al. 2001; share assumed");
   out.add(who + "wire 0.40 mm: entry", entry * 0.40 / 0.66, wide(thin.entry), 0.05, "N", "proportional to the diameter");
   out.add(who + "force on the hand while the shaft slides through 2.5 mm", wide(law.friction) * 2.5e-3, wide(slow.drawn), 0.15,
           "N", "friction per length of the law");
