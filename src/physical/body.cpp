@@ -42,7 +42,11 @@ void add_capsule(BodyModel& m, Vec3 a, Vec3 b, float ra, float rb, int8_t jaw, f
     m.sphere.push_back({lerp(a, b, t), ra + (rb - ra) * t, jaw});
     if (i > 0) m.capsule.push_back({first + static_cast<uint32_t>(i) - 1, first + static_cast<uint32_t>(i)});
   }
-  m.thread_capsule.push_back({first, first + static_cast<uint32_t>(parts)});
+  // A cone as up to four cylinders within it: closed jaws leave the plane between them free.
+  const int chunks = ra == rb ? 1 : std::min(4, parts);
+  for (int i = 0; i < chunks; ++i)
+    m.thread_capsule.push_back(
+        {first + static_cast<uint32_t>(parts * i / chunks), first + static_cast<uint32_t>(parts * (i + 1) / chunks)});
 }
 
 wall::Weights load_point(wall::Weights w, const wall::Motion& motion, Vec3 direction) {

@@ -104,7 +104,7 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, float h, BodiesScratc
       t.a = transform(body.shown, local(m, a, body.shown_opening)),
       t.b = transform(body.shown, local(m, z, body.shown_opening));
       t.to_a = transform(next, local(m, a, moving.opening)), t.to_b = transform(next, local(m, z, moving.opening));
-      t.radius = std::max(std::abs(a.radius), std::abs(z.radius)), t.friction = m.thread_friction;
+      t.radius = std::min(std::abs(a.radius), std::abs(z.radius)), t.friction = m.thread_friction;
       k.tool.push_back(t), k.tool_body.push_back(b);
     }
     for (size_t i = 0; i < k.hold.size(); ++i)

@@ -18,6 +18,7 @@
 #include "runtime/hands.h"
 #include "sim/model.h"
 #include "sim/state.h"
+#include "validation/contact_scenes.h"
 #include "validation/knot_scenes.h"
 #include "validation/suture_scenes.h"
 
@@ -211,6 +212,29 @@ TEST(Allocation, a_stitch_that_is_drawn_asks_for_none) {
   });
   EXPECT_GT(s.state.lip.size(), 0u);
   EXPECT_GT(s.state.contact.size(), 0u);
+  EXPECT_EQ(count, 0u) << sites();
+}
+
+// Tool and needle on the wall, and a thread across the tool's way.
+TEST(Allocation, tools_and_a_needle_on_the_wall_ask_for_none) {
+#ifndef CATGUT_COUNTS_ALLOCATIONS
+  GTEST_SKIP() << "allocations are not counted here";
+#endif
+  validation::ContactBench b(11);
+  const auto step = [&](float y) {
+    const Vec3 z{0, 1, 0}, x{1, 0, 0};
+    b.target[0] = {{{0, y, -0.02f}, from_axes(x, cross(z, x), z)}, true, 0, 0};
+    physical::Hands hands;
+    hands.targets = b.target;
+    physical::step(b.model, b.state, *b.scratch, hands, b.jobs);
+  };
+  physical::move_body(b.model, b.state, 0, {{0, 0.026f, -0.02f}, axis_angle({1, 0, 0}, -0.5f * kPi)}, 0);
+  physical::move_body(b.model, b.state, 1, {{0.004f, 0.024f, -0.03f}, {}}, 0);
+  step(0.026f);
+  const uint64_t count = allocations_of([&] {
+    for (int i = 0; i < 150; ++i) step(0.026f - 6e-5f * static_cast<float>(i));
+  });
+  EXPECT_GT(b.scratch->bodies.row.size(), 0u);
   EXPECT_EQ(count, 0u) << sites();
 }
 

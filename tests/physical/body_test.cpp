@@ -236,6 +236,90 @@ TEST(Needle, jaws_hold_it_by_friction) {
   }
 }
 
+// A straight thread along x at height z over the middle of the sheet.
+void lay_thread(Bench& bench, float z) {
+  std::vector<Vec3> path;
+  for (int i = 0; i < 121; ++i) path.push_back({-0.015f + 0.5e-3f * static_cast<float>(i), 0.01f, z});
+  bench.state.thread = thread::make_state(path);
+}
+
+TEST(Tool, a_thread_over_its_shaft_pulls_with_both_ends) {
+  Bench bench;
+  lay_thread(bench, 0.03f);
+  // The shaft lies above the thread's middle, along y.
+  const Pose pose{{0.015f, -0.04f, 0.0335f}, Quat{-0.70710678f, 0, 0, 0.70710678f}};
+  const uint32_t t = bench.add(make_tool({}), pose);
+  bench.start();
+  const float pull = 0.5f, c = 0.6f, s = 0.8f;  // both ends upward
+  const thread::Pull ends[2] = {{0, Vec3{-c, 0, s} * pull}, {120, Vec3{c, 0, s} * pull}};
+  Vec3 mean{}, hand{};
+  for (int i = 0; i < 500; ++i) {
+    bench.target[t] = {pose, true};
+    Hands hands;
+    hands.targets = bench.target, hands.pulls = ends;
+    physical::step(bench.model, bench.state, *bench.scratch, hands, *bench.jobs);
+    if (i >= 400) mean += bench.body(t).force * 0.01f, hand += bench.body(t).hand_force * 0.01f;
+  }
+  EXPECT_NEAR(mean.z, 2 * s * pull, 0.02f);
+  EXPECT_NEAR(hand.z, -mean.z, 0.02f);
+}
+
+TEST(Tool, jaws_hold_a_thread_up_to_twice_friction_times_force) {
+  // Two jaws of friction 0.35 at 4 N: 2.8 N.
+  for (const float pull : {2.0f, 3.6f}) {
+    Bench bench;
+    lay_thread(bench, 0.03f);
+    const Pose pose{{0.015f, 0.01f, 0.03f}, axis_angle({0, 0, 1}, 0.5f * kPi)};  // jaws open along y
+    const uint32_t t = bench.add(make_tool({}), pose, 0.06f);
+    bench.start();
+    for (int i = 0; i < 60; ++i) bench.target[t] = {pose, true, 0, 4}, bench.step();
+    ASSERT_EQ(bench.body(t).grip.what, Gripped::thread);
+    Vec3 felt{};
+    for (int i = 0; i < 400; ++i) {
+      const thread::Pull end{120, {pull * std::min(1.0f, static_cast<float>(i) / 200), 0, 0}};
+      Hands hands;
+      hands.targets = bench.target, hands.pulls = {&end, 1};
+      physical::step(bench.model, bench.state, *bench.scratch, hands, *bench.jobs);
+      if (i >= 300) felt += bench.body(t).force * 0.01f;
+    }
+    if (pull < 2.8f) {
+      EXPECT_EQ(bench.body(t).grip.what, Gripped::thread);
+      EXPECT_LT(bench.body(t).grip.slid, 0.3e-3f);
+      EXPECT_NEAR(felt.x, pull, 0.1f);
+    } else {
+      EXPECT_TRUE(bench.body(t).grip.what == Gripped::nothing || bench.body(t).grip.slid > 3e-3f);
+    }
+  }
+}
+
+TEST(Tool, jaws_lift_the_wall_and_slide_off_above_their_friction) {
+  for (const float grip : {20.0f, 2.0f}) {  // 14 N, 1.4 N
+    Bench bench;
+    const uint32_t t = bench.add(make_tool({}), {{0.0158f, 0.0107f, 0.0022f}, {}}, 0.09f);
+    bench.start();
+    float z = 0.0022f;
+    for (int i = 0; i < 150; ++i) bench.target[t] = {{{0.0158f, 0.0107f, z}, {}}, true, 0, grip}, bench.step();
+    ASSERT_EQ(bench.body(t).grip.what, Gripped::tissue);
+    float most = 0;
+    for (int i = 0; i < 400; ++i) {
+      z = std::min(0.0072f, z + 2e-5f);
+      bench.target[t] = {{{0.0158f, 0.0107f, z}, {}}, true, 0, grip};
+      bench.step();
+      most = std::max(most, -bench.body(t).force.z);
+    }
+    float top = 0;
+    for (uint32_t c = 0; c < wall::columns(bench.state.wall); ++c) top = std::max(top, wall::outer(bench.state.wall, c).z);
+    if (grip > 10) {
+      EXPECT_EQ(bench.body(t).grip.what, Gripped::tissue);
+      EXPECT_GT(top, 4e-3f);
+      EXPECT_GT(most, 1.5f);
+      EXPECT_NEAR(bench.body(t).hand_force.z, -bench.body(t).force.z, 0.05f);
+    } else {
+      EXPECT_LT(most, 1.5f);
+    }
+  }
+}
+
 TEST(Bodies, a_copy_and_a_saved_state_continue_to_the_bit) {
   Bench a;
   const uint32_t n = a.add_needle({}, {});
