@@ -173,6 +173,12 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& m
                        ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
     row("hands");
     hand_choice(s);
+    row("arm force");
+    ImGui::SetNextItemWidth(14 * em());
+    ImGui::SliderFloat("##right", &s.force_right, 0.2f, 2, "right %.2f x", ImGuiSliderFlags_AlwaysClamp);
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(14 * em());
+    ImGui::SliderFloat("##left", &s.force_left, 0.2f, 2, "left %.2f x", ImGuiSliderFlags_AlwaysClamp);
     row("jaws");
     ImGui::Checkbox("hold button to close", &s.hold_to_close);
     row("grasp assist");
@@ -217,8 +223,9 @@ void work_panel(const WorkView& v, const Settings& settings) {
     if (arm.most <= 0) continue;  // no such device
     const size_t bars = arm.most > 0 ? static_cast<size_t>(std::clamp(20 * arm.force / arm.most, 0.0f, 20.0f)) : 0;
     state.push_back(
-        {*arm.off ? kBad : kQuiet, fmt::format("{} arm {:.1f} N {:<20}{}{}", arm.side == 0 ? "right" : "left", arm.force,
-                                               std::string(bars, '|'), *arm.off ? "  no force: " : "", arm.off)});
+        {*arm.off ? kBad : kQuiet,
+         fmt::format("{} arm {:.1f} N {:<20}{}{}{}", arm.side == 0 ? "right" : "left", arm.force, std::string(bars, '|'),
+                     arm.strength == 1 ? "" : fmt::format(" x{:.2g}", arm.strength), *arm.off ? "  no force: " : "", arm.off)});
   }
   if (!s.fault.empty()) state.push_back({kBad, "! " + s.fault});
   lines_at("state", 0, 0, 0.62f, state);

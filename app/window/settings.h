@@ -21,9 +21,10 @@ struct Settings {
   bool hold_to_close = false;  // the jaw closes only while the button is pressed
   bool assist = true;          // an open jaw snaps to the needle
   bool suture_points = false;
-  bool hints = true;      // the list of keys
-  float mouse_speed = 1;  // 0.2 .. 4, of tool to mouse
-  float text_size = 1;    // 0.7 .. 2, limited by the window
+  bool hints = true;                      // the list of keys
+  float mouse_speed = 1;                  // 0.2 .. 4, of tool to mouse
+  float text_size = 1;                    // 0.7 .. 2, limited by the window
+  float force_right = 1, force_left = 1;  // 0.2 .. 2, gain of the haptic force in each hand; the device's limits hold after it
   bool operator==(const Settings&) const = default;
 };
 const char* quality_name(Quality quality);     // "low", "medium", "high"

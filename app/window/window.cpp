@@ -170,6 +170,7 @@ class Window {
     const SceneSpec scene = read_scene(name);
     LiveOptions live = options_.live;
     if (settings_.left_handed) live.arm_hand = {1, 0};
+    live.arm_strength = {settings_.force_right, settings_.force_left};
     live.record = of_visit(live.record, ++opened_);
     if (live.surgeon.empty() && watch_ && !teach) live.surgeon = "scripted";
     leave();
@@ -486,6 +487,7 @@ class Window {
     hands_.steering.guide = next_bite(places_, v.live.picture(), v.seen);
     const Camera camera = camera_of(orbit_);
     const ViewFrame view = view_frame(camera.eye, camera.target, camera.up, camera.fov_deg, static_cast<float>(height_));
+    v.live.arm_strength(0, settings_.force_right), v.live.arm_strength(1, settings_.force_left);
     const auto hands = hands_.move(in, settings_, view, v.live.picture(), v.seen, dt);
     for (size_t k = 0; k < 2; ++k) v.live.hand(k, hands[k]);
     if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, lesson_})) quit_ = true;

@@ -224,7 +224,7 @@ Haptics::Haptics(ArmPort port, const PictureModel& picture, const HapticsOptions
     o.ratchet = options.ratchet;
     o.force = options.force;
     o.place = workspace_of(arm, k, work_->side_of[k], picture.focus, options.place);
-    set_strength(k, options.strength[work_->side_of[k]]);
+    set_strength(work_->side_of[k], options.strength[work_->side_of[k]]);
     work_->side[k].servo.strength = work_->side[k].strength;
     work_->side[k].hand.draft().input.connected = 0;
     work_->side[k].hand.publish();
@@ -241,9 +241,10 @@ Haptics::~Haptics() {
   std::fclose(work_->log);
 }
 
-void Haptics::set_strength(size_t k, float strength) {
-  work_->side[k].strength.store(strength >= kLeastStrength ? std::min(strength, kMostStrength) : kLeastStrength,
-                                std::memory_order_relaxed);
+void Haptics::set_strength(size_t side, float strength) {
+  const float gain = strength >= kLeastStrength ? std::min(strength, kMostStrength) : kLeastStrength;
+  for (size_t k = 0; k < 2; ++k)
+    if (work_->side_of[k] == side) work_->side[k].strength.store(gain, std::memory_order_relaxed);
 }
 size_t Haptics::side(size_t k) const { return work_->side_of[k]; }
 bool Haptics::present(size_t k) const { return work_->port.arm[k].present; }

@@ -84,7 +84,7 @@ class Haptics {
   size_t side(size_t k) const;  // in which hand the device is: 0 right, 1 left
   const ServoOptions& servo(size_t k) const;
 
-  void set_strength(size_t k, float strength);  // of device k; clamped; callable from any thread
+  void set_strength(size_t side, float strength);  // of the device in that hand; clamped; callable from any thread
 
   // Owned by the physics thread.
   void publish(size_t k, const ForcePatch& patch, uint32_t epoch, float speed);  // speed: of real time

@@ -164,13 +164,11 @@ struct Live::Work {
 };
 
 void Live::Work::begin() {
-  ArmPort arms;
   const ArmChoice choice = read_arm_choice(options.haptics);
   as_paper = choice.as_paper;
   std::vector<std::string> lines;
-  arms = open_arms(choice, lines);
-  for (const std::string& line : lines)
-    if (options.say) options.say(line);
+  ArmPort arms = open_arms(choice, lines);
+  for (size_t k = 0; options.say && k < lines.size(); ++k) options.say(lines[k]);
   if (arms.any()) prepare_for_arms(scene);
   else if (options.surgeon.empty()) prepare_for_mouse(scene);
   model = build_model(scene);
@@ -178,10 +176,9 @@ void Live::Work::begin() {
   if (arms.any()) {
     HapticsOptions how;
     how.place = read_arm_places(arm_places_file());
-    how.log = options.haptics_log;
+    how.log = options.haptics_log, how.strength = options.arm_strength;
     haptics = std::make_unique<Haptics>(std::move(arms), picture, how);
-    for (size_t arm = 0; arm < 2; ++arm)
-      if (haptics->present(arm)) published.arm[hand_of(arm)] = true;
+    for (size_t arm = 0; arm < 2; ++arm) published.arm[hand_of(arm)] |= haptics->present(arm);
   }
   dt = 1.0 / static_cast<double>(scene.solver.tick_rate);
   checkpoint_every = std::max<uint64_t>(1, static_cast<uint64_t>(std::llround(kBeforeBite / dt)));
@@ -543,6 +540,9 @@ void Live::hand(size_t who, const ToolInput& input) {
 bool Live::change(const std::string& key_equals_value) { return work_->changes.push(key_equals_value); }
 void Live::watch(bool on) { work_->watched = on; }
 
+void Live::arm_strength(size_t side, float gain) {
+  if (work_->haptics) work_->haptics->set_strength(side, gain);
+}
 bool Live::command(LiveCommand command) { return work_->requests.push({command, false, {}}); }
 bool Live::instrument(const Command& command) { return work_->orders.push(command); }
 

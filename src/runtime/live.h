@@ -48,8 +48,9 @@ struct LiveOptions {
   // Haptic devices, as read_arm_choice (runtime/haptics) reads them; empty or "off": none. Problems are reported and the scene
   // opens without. The window controls hands without a device.
   std::string haptics;
-  std::string haptics_log;                      // as HapticsOptions::log
-  std::array<uint8_t, 2> arm_hand{0, 1};        // tool moved by the device in the right hand, in the left; {1, 0}: left-handed
+  std::string haptics_log;                  // as HapticsOptions::log
+  std::array<uint8_t, 2> arm_hand{0, 1};    // tool moved by the device in the right hand, in the left; {1, 0}: left-handed
+  std::array<float, 2> arm_strength{1, 1};  // gain of the force in the right hand and in the left, as HapticsOptions::strength
   std::function<void(const std::string&)> say;  // receives lines about the devices, from any thread; empty: lines are dropped
 };
 
@@ -107,6 +108,7 @@ class Live {
   bool instrument(const Command& command);
   // False: the queue is full; try again.
   bool command(LiveCommand command);
+  void arm_strength(size_t side, float gain);  // of the device in the right hand (0) or the left; it changes without a step
 
   // For developers: "solver.damping=6" from the next tick on, as in --set; sizes and counts cannot change. The model
   // is rebuilt, which may take several ticks' time. The recording continues in another file with the new scene. False: as

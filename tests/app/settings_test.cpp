@@ -50,6 +50,7 @@ Settings all_changed() {
   s.assist = s.hints = false;
   s.mouse_speed = 0.37f;
   s.text_size = 1.5f;
+  s.force_right = 0.5f, s.force_left = 1.25f;
   return s;
 }
 
@@ -78,6 +79,7 @@ TEST_F(SettingsFile, what_is_wrong_is_one_line_that_names_the_file) {
       {"hints = 1\n", "write true or false"},
       {"text_size = 20\n", "write a number from 0.7 to 2"},
       {"text_size = nan\n", "write a number"},
+      {"force_left = 3\n", "write a number from 0.2 to 2"},
       {"mouse_speed = \"fast\"\n", "write a number from 0.2 to 4"},
       {"[window]\nsize = 3\n", "there is no setting \"window\""},
       {"quality = \"low\n", "settings.toml:1"},

@@ -673,6 +673,7 @@ TEST(Haptics, S10_force_off_on_one_key_and_what_the_panel_shows) {
   FakeHd fake(false);
   LiveOptions options;
   options.haptics = "touch";
+  options.arm_strength = {1, 0.5f};
   options.arm_hand = {1, 0};  // left-handed: the device in the right hand moves the forceps
   options.say = [](const std::string&) {};
   Snapshot seen;
@@ -691,6 +692,12 @@ TEST(Haptics, S10_force_off_on_one_key_and_what_the_panel_shows) {
   EXPECT_STREQ(view(0).off, "");
   EXPECT_NEAR(view(0).most, 3.3f, 1e-4f);
   EXPECT_TRUE(view(0).side == 0 && view(1).side == 1);
+  // S9: the user's gain, by the hand that holds the device.
+  EXPECT_EQ(view(0).strength, 1);
+  EXPECT_EQ(view(1).strength, 0.5f);
+  live.arm_strength(0, 0.01f), live.arm_strength(1, 1.5f);
+  ASSERT_TRUE(wait(5, [&] { return view(1).strength == 1.5f; }));
+  EXPECT_EQ(view(0).strength, kLeastStrength);
   live.command(LiveCommand::arms_off);
   ASSERT_TRUE(wait(20, [&] { return std::string(view(0).off).find("F9") != std::string::npos; }));
   EXPECT_TRUE(live.status().arms_off);

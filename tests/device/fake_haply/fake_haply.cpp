@@ -13,6 +13,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
+#include <utility>
 
 namespace catgut {
 namespace {
@@ -30,6 +31,10 @@ struct FakeHaply::Work {
   mutable std::mutex lock;
   std::condition_variable change;
   std::array<Arm, 2> arm;
+  std::array<PlainHand, 2> hand;
+  UnkindDevice how;
+  UnkindPeriods periods;
+  unsigned long now_ns = 1000000000, strange = 0;
   std::array<bool, 2> grips{true, true};
   bool held = false, quit = false, stepped = false;
   std::string next, first, last;
@@ -47,7 +52,7 @@ struct FakeHaply::Work {
       if (!arm[k].there) continue;
       json d{{"device_id", k == 0 ? "04BA" : "049D"}};
       if (whole) d["config"] = {{"type", "inverse3"}, {"handedness", k == 0 ? "left" : "right"}};
-      d["state"] = {{"cursor_position", xyz(arm[k].position)}, {"cursor_velocity", xyz({0, 0, 0})}};
+      d["state"] = {{"cursor_position", xyz(hand[k].seen(how.encoder))}, {"cursor_velocity", xyz({0, 0, 0})}};
       d["state"][form == HaplyForm::v35 ? "control_mode" : "mode"] = "idle";
       d["status"] = {{"calibrated", true}, {"ready", true}, {"power_supply", true}};
       m["inverse3"].push_back(d);
@@ -74,11 +79,40 @@ struct FakeHaply::Work {
       for (size_t i = 0; i < 3; ++i) step += (to[i] - arm[k].force[i]) * (to[i] - arm[k].force[i]);
       arm[k].step_most = std::max(arm[k].step_most, std::sqrt(step));
       arm[k].force = to;
+      hand[k].command(to, how.transport);
       ++arm[k].messages;
     }
   }
   void idle() {
     for (Arm& a : arm) a.force = {0, 0, 0};
+    for (PlainHand& h : hand) h.cut();
+  }
+  // A message's time.
+  void pass() {
+    const int ms = periods.next(how);
+    for (int i = 0; i < ms; ++i)
+      for (PlainHand& h : hand) h.pass(true);
+    now_ns += static_cast<unsigned long>(1000000L * ms + periods.deviation_ns(how));
+  }
+  std::string answer() {
+    if (!next.empty()) return std::exchange(next, "");
+    if (how.storm <= 0 || periods.uniform() >= how.storm) return state(false).dump();
+    ++strange;
+    static constexpr const char* kNone[] = {"{",
+                                            "[]",
+                                            "null",
+                                            "{\"inverse3\":7}",
+                                            "{\"inverse3\":[7,null,[]]}",
+                                            "{\"inverse3\":[{\"device_id\":\"049D\",\"state\":null}]}",
+                                            "{\"inverse3\":[]}"};
+    const size_t which = periods.chance() % (std::size(kNone) + 2);
+    if (which < std::size(kNone)) return kNone[which];
+    const size_t k = periods.chance() % 2;  // one device, or one grip, is missing this time
+    bool& gone = which == std::size(kNone) ? arm[k].there : grips[k];
+    const bool was = std::exchange(gone, false);
+    const std::string text = state(false).dump();
+    gone = was;
+    return text;
   }
   void serve(asio::ip::tcp::socket socket) {
     {
@@ -114,8 +148,8 @@ struct FakeHaply::Work {
         if (allowed > 0) --allowed;
         last = message.dump();
         apply(message);
-        text = next.empty() ? state(false).dump() : next;
-        next.clear();
+        pass();
+        text = answer();
         ++answered;
         change.notify_all();
       }
@@ -141,6 +175,7 @@ struct FakeHaply::Work {
 
 FakeHaply::FakeHaply(HaplyForm form, int arms) : work(std::make_unique<Work>()) {
   work->form = form;
+  for (PlainHand& h : work->hand) h.x = h.wish = {0, -0.12, 0.15};
   work->arms = static_cast<size_t>(arms);
   work->thread = std::thread([w = work.get()] { w->run(); });
 }
@@ -163,11 +198,34 @@ std::string FakeHaply::where() const { return "127.0.0.1:" + std::to_string(work
 #define HOLD const std::lock_guard<std::mutex> hold_lock(work->lock)
 FakeHaply::Arm FakeHaply::at(size_t k) const {
   HOLD;
-  return work->arm[k];
+  Arm a = work->arm[k];
+  a.position = work->hand[k].x, a.motors = work->hand[k].acting, a.to_hand_most = work->hand[k].to_hand_most;
+  return a;
 }
 void FakeHaply::zero(size_t k) {
   HOLD;
   work->arm[k].step_most = 0;
+  work->hand[k].zero();
+}
+void FakeHaply::unkind(const UnkindDevice& how) {
+  HOLD;
+  work->how = how;
+}
+void FakeHaply::wish(size_t k, const std::array<double, 3>& position) {
+  HOLD;
+  work->hand[k].wish = position;
+}
+void FakeHaply::hold_with(size_t k, double stiffness, double damping, double mass) {
+  HOLD;
+  work->hand[k].grip = stiffness, work->hand[k].damping = damping, work->hand[k].mass = mass;
+}
+unsigned long FakeHaply::now() const {
+  HOLD;
+  return work->now_ns;
+}
+unsigned long FakeHaply::nonsense() const {
+  HOLD;
+  return work->strange;
 }
 void FakeHaply::there(size_t k, bool is) {
   HOLD;
