@@ -53,6 +53,8 @@ int main(int argc, char** argv) {
   catgut::add_view(app, exit_code);
   catgut::add_run(app, exit_code);
   catgut::add_replay(app, exit_code);
+  catgut::add_assess(app, exit_code);
+  catgut::add_study(app, exit_code);
   catgut::add_bench(app, exit_code);
   catgut::add_validate(app, exit_code);
   catgut::add_devices(app, exit_code);

@@ -18,6 +18,8 @@ void add_play(CLI::App& app, int& exit_code);
 void add_view(CLI::App& app, int& exit_code);
 void add_run(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
+void add_assess(CLI::App& app, int& exit_code);
+void add_study(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
 void add_validate(CLI::App& app, int& exit_code);
 void add_devices(CLI::App& app, int& exit_code);

@@ -9,6 +9,7 @@
 #include "commands/commands.h"
 #include "core/check.h"
 #include "core/file.h"
+#include "procedure/ability.h"
 #include "procedure/procedure_file.h"
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
@@ -25,10 +26,11 @@ struct RunOptions {
   PictureOptions pictures;
 };
 
-SceneSpec scene_for(const RunOptions& o, const Procedure* procedure) {
+SceneSpec scene_for(RunOptions& o, const Procedure* procedure) {
   SceneSpec scene = procedure ? scene_of(*procedure) : read_scene(o.scene);
   if (!o.preset.empty()) use_preset(scene, o.preset);
   if (o.seed_given) set_value(scene, "seed=" + std::to_string(o.seed), "--seed");
+  o.session.surgeon = apply_ability(scene, o.session.surgeon);
   if (!o.mesh.empty()) {
     if (scene.body.empty()) throw InputError("--mesh", "the scene has no body to replace", "add a [[body]]");
     scene.body[0].mesh = o.mesh;
@@ -43,7 +45,7 @@ SceneSpec scene_for(const RunOptions& o, const Procedure* procedure) {
   return scene;
 }
 
-int run(const RunOptions& o) {
+int run(RunOptions& o) {
   std::optional<ProcedureWatch> procedure;
   if (!o.procedure.empty()) procedure.emplace(o.procedure);
   if (o.scene.empty() == !procedure)
@@ -95,8 +97,10 @@ void add_run(CLI::App& app, int& exit_code) {
       ->add_option("--procedure", o->procedure,
                    "in place of a scene: report its stages and errors; code 1 unless all are done without")
       ->type_name("NAME");
-  command->add_option("--surgeon", o->session.surgeon, "scripted, none, or a recording whose hands are replayed")
-      ->type_name("scripted|none|FILE")
+  command
+      ->add_option("--surgeon", o->session.surgeon,
+                   "scripted (scripted:novice, intermediate or expert), none, or a recording whose hands are replayed")
+      ->type_name("scripted[:LEVEL]|none|FILE")
       ->capture_default_str();
   command->add_flag("--headless", o->headless, "no window (always so; catgut play opens one)");
   command->add_option("--seconds", o->session.seconds, "simulated time including settling; default: the scene's duration")

@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "runtime/stitch_map.h"
+#include "assess/stitch_map.h"
 
 namespace catgut {
 

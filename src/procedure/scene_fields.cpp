@@ -130,6 +130,11 @@ const Field kField[] = {
     {"surgeon", "drive_speed", "m/s", 0.0001, 10, nullptr, "speed of the needle in tissue", TOP(surgeon.drive_speed)},
     {"surgeon", "tremor", "m", 0, 0.05, nullptr, "standard deviation of hand tremor", TOP(surgeon.tremor)},
     {"surgeon", "aim_error", "m", 0, 0.05, nullptr, "standard deviation of the aim", TOP(surgeon.aim_error)},
+    {"surgeon", "angle_error", "rad", 0, 1, nullptr, "standard deviation of the needle's direction at a bite", TOP(surgeon.angle_error)},
+    {"surgeon", "pause", "s", 0, 60, nullptr, "mean time of thought before a task", TOP(surgeon.pause)},
+    {"surgeon", "tension_error", "", 0, 2, nullptr, "relative standard deviation of the force of a pull", TOP(surgeon.tension_error)},
+    {"surgeon", "grasp_error", "", 0, 0.9, nullptr, "probability that a grasp misses", TOP(surgeon.grasp_error)},
+    {"surgeon", "order_error", "", 0, 1, nullptr, "probability of a throw in the wrong direction, or of two bites exchanged (purse-string)", TOP(surgeon.order_error)},
 };
 // clang-format on
 #undef TOP

@@ -20,6 +20,11 @@ SurgeonSkill skill_of(const SceneSpec& scene) {
   k.drive_speed = s.drive_speed;
   k.tremor = s.tremor;
   k.aim_error = s.aim_error;
+  k.angle_error = s.angle_error;
+  k.pause = s.pause;
+  k.tension_error = s.tension_error;
+  k.grasp_error = s.grasp_error;
+  k.order_error = s.order_error;
   k.wall = scene.body[0].wall;
   k.seed = scene.seed;
   return k;

@@ -53,6 +53,8 @@ void prepare_for_mouse(SceneSpec& scene) { scene.solver.tool_force = std::min(sc
 Hands make_hands(const std::string& who, const SceneSpec& scene, const PictureModel& picture) {
   if (who == "none") return {};
   if (who == "scripted") return {scripted_surgeon(scene, picture), true};
+  if (who.rfind("scripted:", 0) == 0)
+    throw InputError("--surgeon " + who, "levels are for `catgut run` and `catgut study`", "use scripted");
   if (!std::filesystem::exists(who))
     throw InputError("--surgeon " + who, "unknown surgeon, and no such file",
                      "use scripted, none or the path of a .cgrec recording");

@@ -13,13 +13,13 @@
 #include <string>
 #include <vector>
 
+#include "assess/stitch_map.h"
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "exchange/tool_input.h"
 #include "runtime/haptics.h"
 #include "runtime/measures.h"
 #include "runtime/session_metrics.h"
-#include "runtime/stitch_map.h"
 #include "sim/scene.h"
 
 namespace catgut {

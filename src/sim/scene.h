@@ -123,6 +123,12 @@ struct SurgeonSpec {
   float drive_speed = 0.03f;     // [m/s] of the needle in tissue
   float tremor = 0.0001f;        // [m] standard deviation
   float aim_error = 0.0003f;     // [m] standard deviation
+  // Abilities; 0: without that error (procedure/ability draws them for novices, intermediates and experts).
+  float angle_error = 0;    // [rad] standard deviation of the needle's direction
+  float pause = 0;          // [s] mean time of thought before a task
+  float tension_error = 0;  // relative standard deviation of the force of a pull
+  float grasp_error = 0;    // probability that a grasp misses
+  float order_error = 0;    // probability of a throw in the wrong direction, or of two bites exchanged
 };
 
 // Expected results at the end: every scene is a test. min/max of a named result (see docs/scene_reference).

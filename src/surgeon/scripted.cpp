@@ -12,12 +12,14 @@ namespace {
 constexpr float kCounterHold = 0.8f;  // [N]
 constexpr float kTighten = 0.15f;     // of the free speed: the thread runs through two dozen holes, and tissue follows it late
 constexpr float kSecure = 0.985f;     // fraction of a closure that counts as closed
+constexpr float kMissBy = 0.008f;     // [m] along the shaft
 constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f;  // positions on the needle's arc: a third from the swage, behind the tip
 
 }  // namespace
 
 Scripted::Scripted(const std::string& plan, const PictureModel& picture, const SurgeonSkill& skill)
-    : picture_(picture), skill_(skill), plan_(make_plan(plan, picture, skill)), random_(skill.seed) {
+    : picture_(picture), skill_(skill), plan_(make_plan(plan, picture, skill)), random_(skill.seed), ability_(~skill.seed) {
+  misorder();
   hand_[kNeedleHolder].pose = {picture.focus + Vec3{0.06f, 0.08f, 0.05f}, {}};
   hand_[kForceps].pose = {picture.focus + Vec3{-0.08f, 0.08f, 0.06f}, {}};
 }
@@ -57,7 +59,9 @@ TickInput Scripted::operate(const Snapshot& seen, float dt) {
   if (takes_over_) take_over(seen);
   const std::array<Pose, 2> before{hand_[0].pose, hand_[1].pose};
   commands_.clear();
-  if (!done()) {
+  if (!done() && pause_left_ > 0) {
+    pause_left_ -= dt;
+  } else if (!done()) {
     waited_ += dt;
     dt_ = dt;
     if (act(plan_.task[task_], seen)) {
@@ -92,6 +96,31 @@ void Scripted::begin() {
   misses_ = 0;
   attempts_ = 0;
   depth_fix_ = 0;
+  // Exponentially distributed, without the long tail.
+  if (skill_.pause > 0) pause_left_ = skill_.pause * std::min(4.0f, -portable::log(std::max(1e-6f, 1 - ability_.uniform())));
+  if (skill_.tension_error > 0) strength_ = portable::exp(skill_.tension_error * ability_.normal());
+}
+
+void Scripted::misorder() {
+  if (skill_.order_error <= 0) return;
+  for (size_t t = 1; t < plan_.task.size(); ++t) {
+    Task &task = plan_.task[t], &before = plan_.task[t - 1];
+    if (task.kind == TaskKind::throw_ && before.kind == TaskKind::throw_ && ability_.uniform() < skill_.order_error)
+      task.way = before.way;
+    if (plan_.lift == 0 || task.kind != TaskKind::bite || task.which == 0) continue;
+    // The bite before it, if the two are not yet exchanged.
+    for (size_t b = t; b-- > 0;)
+      if (plan_.task[b].kind == TaskKind::bite) {
+        if (plan_.task[b].which == task.which - 1 && ability_.uniform() < skill_.order_error)
+          std::swap(plan_.task[b].which, task.which);
+        break;
+      }
+  }
+}
+
+void Scripted::go_down(int stage) {
+  miss_by_ = skill_.grasp_error > 0 && ability_.uniform() < skill_.grasp_error ? kMissBy : 0;
+  go(stage);
 }
 
 void Scripted::go(int stage) {
@@ -153,6 +182,7 @@ void Scripted::aim() {
   aim_along_ = skill_.aim_error * random_.normal();
   aim_up_ = skill_.aim_error * random_.normal();
   depth_error_ = 0.4f * skill_.aim_error * random_.normal();
+  if (skill_.angle_error > 0) aim_turn_ = skill_.angle_error * ability_.normal();
 }
 
 bool Scripted::act(const Task& task, const Snapshot& seen) {
@@ -215,10 +245,10 @@ bool Scripted::pick_up(const Snapshot& seen) {
   switch (stage_) {
     case over:
       jaw(kNeedleHolder, 1);
-      if (move(kNeedleHolder, raised(grip, 0.03f), skill_.speed)) go(down);
+      if (move(kNeedleHolder, raised(grip, 0.03f), skill_.speed)) go_down(down);
       return false;
     case down:
-      if (move(kNeedleHolder, grip, careful())) go(close);
+      if (move(kNeedleHolder, short_of(grip), careful())) go(close);
       return false;
     default:
       if (!jaw(kNeedleHolder, 0) || waited_ < 0.35f) return false;
@@ -254,6 +284,10 @@ bool Scripted::make_bite(const Snapshot& seen) {
       rest_aside(seen, kForceps);
       frame_ = frame(seen, place_);
       frame_.at += frame_.along * aim_along_ + frame_.up * aim_up_;
+      if (aim_turn_ != 0) {
+        const Quat turn = axis_angle(frame_.out, aim_turn_);
+        frame_.along = rotate(turn, frame_.along), frame_.up = rotate(turn, frame_.up);
+      }
       psi_ = -psi_bite - 0.45f;
       if (move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), careful())) {
         bites_before_ = seen.active().bite.size();
@@ -299,10 +333,10 @@ bool Scripted::make_bite(const Snapshot& seen) {
     case over:
       doing_ = name_of_bite() + "grasp the tip";
       jaw(kForceps, 1);
-      if (move(kForceps, raised(forceps_grip(needle), 0.025f), speed)) go(down);
+      if (move(kForceps, raised(forceps_grip(needle), 0.025f), speed)) go_down(down);
       return false;
     case down:
-      if (move(kForceps, forceps_grip(needle), careful())) go(close);
+      if (move(kForceps, short_of(forceps_grip(needle)), careful())) go(close);
       return false;
     case close:
       if (!jaw(kForceps, 0) || waited_ < 0.3f) return false;
@@ -359,7 +393,7 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   // Thread that cannot be pulled further is left: the last pull takes up the slack.
   if (slack <= 0 || distance(hand_[kForceps].pose.p, pull_from_.p) > 0.29f || !patience(12)) return true;
   // Decelerate before the thread is taut, and when it pulls back: a jerk would tear tissue.
-  const float gently = std::clamp(2.0f - length(seen.tool[kForceps].force), 0.02f, 1.0f);
+  const float gently = std::clamp(2.0f * strength_ - length(seen.tool[kForceps].force), 0.02f, 1.0f);
   move(kForceps, {pull_from_.p + way * 0.3f, hand_[kForceps].pose.q}, gently * std::min(skill_.speed, 0.015f + 5 * slack));
   return false;
 }
@@ -391,10 +425,10 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
     }
     case over:
       jaw(kNeedleHolder, 1);
-      if (move(kNeedleHolder, raised(driver_grip(seen.active().needle.pose), 0.025f), skill_.speed)) go(down);
+      if (move(kNeedleHolder, raised(driver_grip(seen.active().needle.pose), 0.025f), skill_.speed)) go_down(down);
       return false;
     case down:
-      if (move(kNeedleHolder, driver_grip(seen.active().needle.pose), careful())) go(close);
+      if (move(kNeedleHolder, short_of(driver_grip(seen.active().needle.pose)), careful())) go(close);
       return false;
     case close:
       if (!jaw(kNeedleHolder, 0) || waited_ < 0.3f) return false;
@@ -440,7 +474,7 @@ bool Scripted::draw(const Snapshot& seen) {
     case tighten: {
       // Force feedback: the hand slows in proportion to the thread's tension.
       auto gently = [&](size_t hand) {
-        return kTighten * skill_.speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.02f, 1.0f);
+        return kTighten * skill_.speed * std::clamp(1.5f * strength_ - length(seen.tool[hand].force), 0.02f, 1.0f);
       };
       const bool closed = plan_.lift > 0 ? seen.closure >= kSecure : open_seam(seen) <= 0;
       if (closed) return go(plan_.lift > 0 ? open : lay), false;

@@ -81,6 +81,12 @@ class Scripted final : public Surgeon {
 
   // Samples the errors of the next bite.
   void aim();
+  // Exchanges tasks and reverses throws of the plan: errors of order.
+  void misorder();
+  // To the stage in which a tool approaches its target; samples whether it misses.
+  void go_down(int stage);
+  // The goal of that approach: short of the target where the grasp misses.
+  Pose short_of(const Pose& goal) const { return miss_by_ > 0 ? raised(goal, miss_by_) : goal; }
 
   // --- tasks ------------------------------------------------------------------------------------------------------------
   // Each returns true when it is finished.
@@ -146,7 +152,7 @@ class Scripted final : public Surgeon {
   PictureModel picture_;
   SurgeonSkill skill_;
   Plan plan_;
-  Random random_;
+  Random random_, ability_;  // ability_: of the errors that are 0 by default, so that a run without them keeps its bits
   std::array<ScriptedHand, 2> hand_;
   std::array<ScriptedHand, kMaxHands - 2> assistant_;
   CommandList commands_;  // of this tick
@@ -161,8 +167,11 @@ class Scripted final : public Surgeon {
   // A bite.
   size_t place_ = 0, bites_before_ = 0;
   BiteFrame frame_;
-  float psi_ = 0, aim_along_ = 0, aim_up_ = 0, depth_error_ = 0;
-  float depth_fix_ = 0;  // [m] correction from failed attempts at this bite; positive: shallower
+  float psi_ = 0, aim_along_ = 0, aim_up_ = 0, depth_error_ = 0, aim_turn_ = 0;
+  float pause_left_ = 0;  // [s] of thought before this task
+  float strength_ = 1;    // of the pulls of this task, relative
+  float miss_by_ = 0;     // [m] distance by which this grasp misses
+  float depth_fix_ = 0;   // [m] correction from failed attempts at this bite; positive: shallower
   Pose pull_from_;
   // A throw.
   Winding winding_;  // computed by exchange/tying, as for assisted hands

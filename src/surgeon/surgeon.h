@@ -20,7 +20,13 @@ struct SurgeonSkill {
   float tail = 0.045f;                                 // [m] free end left
   float speed = 0.15f, drive_speed = 0.03f;            // [m/s]
   float tremor = 0.0001f, aim_error = 0.0003f;         // [m] standard deviations
-  float wall = 0.0025f;                                // [m] thickness of the wall, visible at a cut edge
+  // Abilities; 0: without that error.
+  float angle_error = 0;    // [rad] standard deviation of the needle's direction
+  float pause = 0;          // [s] mean time of thought before a task
+  float tension_error = 0;  // relative standard deviation of the force of a pull
+  float grasp_error = 0;    // probability that a grasp misses
+  float order_error = 0;    // probability of a throw in the wrong direction, or of two bites exchanged
+  float wall = 0.0025f;     // [m] thickness of the wall, visible at a cut edge
   uint64_t seed = 1;
 };
 

@@ -174,7 +174,7 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       const bool locked = locked_throws(seen) > throws_before_;
       // The strands are pulled apart, low and evenly.
       auto gently = [&](size_t hand) {
-        return 0.6f * skill_.speed * std::clamp(1.5f - length(seen.tool[hand].force), 0.03f, 1.0f);
+        return 0.6f * skill_.speed * std::clamp(1.5f * strength_ - length(seen.tool[hand].force), 0.03f, 1.0f);
       };
       // Where the hands cross, the needle holder, which has the tail, passes in front.
       const float front = side < 0 ? kTieCrossing : 0;

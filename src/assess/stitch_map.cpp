@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: see stitch_map.h.
-#include "runtime/stitch_map.h"
+// assess: see stitch_map.h.
+#include "assess/stitch_map.h"
 
 #include <algorithm>
 #include <cmath>
@@ -121,7 +121,7 @@ void rewind(StitchMap& map, uint64_t tick) {
   map.in_now = 0;
 }
 
-Vec3 at_rest(const PictureModel& picture, const Snapshot& seen, uint32_t wall, Vec3 now) {
+Vec3 at_rest(const PictureModel& picture, const Snapshot& seen, uint32_t wall, Vec3 now, Quat* turned) {
   constexpr size_t kNear = 4;
   std::array<uint32_t, kNear> near{};
   std::array<float, kNear> far;
@@ -142,6 +142,7 @@ Vec3 at_rest(const PictureModel& picture, const Snapshot& seen, uint32_t wall, V
     sum += w * (picture.particle_rest[i] + rotate(conjugate(seen.rotation[i]), now - seen.particle[i]));
     weight += w;
   }
+  if (turned && weight > 0) *turned = seen.rotation[near[0]];
   return weight > 0 ? sum / weight : now;
 }
 

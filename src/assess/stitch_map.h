@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: map of the stitches and tension over time, for the review of a session. Collected
-// from the published snapshots tick by tick, like runtime/session_metrics. Reads PictureModel and Snapshot.
+// assess: map of the stitches and tension over time, for the review of a session. Collected
+// from the published snapshots tick by tick, as runtime/session_metrics does. Reads PictureModel and Snapshot.
 //
 // Lengths are measured on the tissue at rest, because bites are fixed there. While the needle is in tissue, or an opening is
 // closed, the same two points may be much nearer or further apart. Rows are only ever appended, in the order of
@@ -64,7 +64,8 @@ void note(StitchMap& map, const PictureModel& picture, const Snapshot& seen);
 void rewind(StitchMap& map, uint64_t tick);
 
 // Rest position of a current point of the tissue: transformed back by the four nearest particles of its wall.
-Vec3 at_rest(const PictureModel& picture, const Snapshot& seen, uint32_t wall, Vec3 now);
+// turned (may be null): rotation of the tissue there.
+Vec3 at_rest(const PictureModel& picture, const Snapshot& seen, uint32_t wall, Vec3 now, Quat* turned = nullptr);
 // The nearest point of an edge: its coordinate along it, and the distance from it [m].
 struct OnEdge {
   float along = 0, distance = -1;

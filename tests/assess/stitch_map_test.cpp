@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/runtime: positions of stitches, from synthetic tissue and from a surgeon's first bites.
-#include "runtime/stitch_map.h"
+// tests/assess: positions of stitches, from synthetic tissue and from a surgeon's first bites.
+#include "assess/stitch_map.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// assess: what was observed in a session, tick by tick, live or from a replay: bites, knots, forces, hands. Reads PictureModel,
+// Snapshots and the hands' input; writes Facts, from which assess/metrics computes the Result at any moment.
+//
+//   Facts facts = begin_facts(picture, setup);
+//   for every tick: note(facts, picture, seen, input);
+//   Result result = measure(facts, picture, seen);   // assess/metrics.h
+//
+// Facts are copied as they are: a copy is kept with a saved state, and an undone bite restores it.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "assess/result.h"
+#include "assess/stitch_map.h"
+#include "assess/surface.h"
+#include "exchange/picture.h"
+#include "exchange/snapshot.h"
+#include "exchange/tool_input.h"
+
+namespace catgut::assess {
+
+// Force at which a suture tears out of human small bowel: one standard deviation below the mean, 4.62 - 1.40 N (Gong et al.
+// 2023, 10.1115/1.4063951).
+constexpr float kTearForce = 3.22f;  // [N]
+
+struct Setup {
+  double tick_s = 1.0 / 60;
+  double wall = 2.5;      // [mm] thickness
+  std::string technique;  // of the scene
+};
+
+// A bite in progress.
+struct OpenBite {
+  uint32_t suture = 0, number = 0;
+  uint64_t entered = 0;
+  float depth = 0;  // [m]
+  double entry_angle = kNotObserved, exit_angle = kNotObserved, grasp_at = kNotObserved, grasp_angle = kNotObserved;
+  std::array<double, 3> sum{};  // of the needle's center
+  double squares = 0;
+  uint32_t ticks = 0;
+  bool out = false;  // the tip has left
+};
+
+struct HandFacts {
+  std::vector<Vec3> position;  // [m] of the hand, one per `stride` ticks
+  float peak = 0;              // [N] largest force on the tissue held
+  uint64_t peak_tick = 0;
+  Vec3 peak_where;
+  double impulse = 0;   // [N s] on the tissue held
+  float strain = 0;     // [N] largest force on the hand
+  uint64_t strain_tick = 0;
+  Vec3 strain_where;
+  // To find grasps of nothing.
+  bool was_open = false;
+  double closed_for = 0;  // [s]
+  bool judged = true;
+};
+
+struct SutureFacts {
+  uint32_t load = 0;       // how often it was replaced
+  uint32_t entries = 0;    // of the tip since the last completed bite
+  uint32_t grasps = 0;     // of the needle since the last completed bite
+  uint64_t throw_began = 0;
+  bool tied = false;
+  float peak = 0;       // [N] largest tension at a suture point
+  uint64_t peak_tick = 0;
+  Vec3 peak_where;
+  double impulse = 0;   // [N s]
+  bool overloaded = false;
+};
+
+struct Facts {
+  Setup setup;
+  std::vector<StitchEdge> edge;   // of each wall, at rest
+  std::vector<RestSurface> rest;  // one
+  bool begun = false;             // a hand has connected
+  uint64_t first = 0, last = 0;   // ticks with hands
+  uint32_t stride = 1;            // ticks between two samples of the hands
+  std::vector<double> lumen;      // [m^2] area of each rim when the hands connected
+  float opening = 0;              // [m^2] likewise
+  std::vector<Bite> bite;
+  std::vector<Knot> knot;
+  std::vector<OpenBite> open;
+  std::array<HandFacts, 2> hand;  // right, left
+  std::vector<SutureFacts> suture;
+  // Happenings, each with its place and moment.
+  std::vector<Sample> missed_grasp, needle_slip, tissue_slip, withdrawn, undone_throw, rejected_loop, order_error, fault, tail,
+      overload, tissue_grasp;
+};
+
+Facts begin_facts(const PictureModel& picture, const Setup& setup);
+void note(Facts& facts, const PictureModel& picture, const Snapshot& seen, const TickInput& input);
+
+double rim_area(const PictureModel& picture, const std::vector<Vec3>& particle, size_t wall);  // [m^2]
+// The knot's kind from the chirality of its throws and their strands; the first throw is the one at the tissue.
+KnotKind kind_of(const std::vector<Throw>& thrown);
+
+}  // namespace catgut::assess

@@ -1,0 +1,415 @@
+// SPDX-License-Identifier: Apache-2.0
+// assess: see metrics.h. One function per group fills the samples of its metrics; the table below names them.
+#include "assess/metrics.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "assess/motion.h"
+#include "core/elementary.h"
+
+namespace catgut::assess {
+namespace {
+
+constexpr double kMm = 1000, kDegrees = 180 / 3.14159265358979323846;
+using enum Better;
+using enum Summary;
+
+constexpr const char* kBowelBite = "EAGLE safe-anastomosis module 5: 3 to 5 mm, submucosa in every bite";
+constexpr const char* kEase = "sub-skills of suturing: EASE, PMC10923136";
+constexpr const char* kSeki = "suture tracks: Seki 1993, 10.1007/BF00311623";
+constexpr const char* kErrors = "observed suturing errors: Van Sickle, PMC7709379";
+constexpr const char* kSmooth = "Balasubramanian 2015, 10.1186/s12984-015-0090-9";
+constexpr const char* kMotion = "hand motion: Sensors 2023 23:3146 and Singh 2021, 10.3389/frobt.2021.625003";
+constexpr const char* kStay = "hand-sutured anastomosis: Sankaranarayanan 2023, 10.1007/s00464-022-09584-1";
+constexpr const char* kOwn = "Catgut";
+
+// clang-format off
+constexpr MetricRow kRow[] = {
+    {"edge_in", "entry from the edge", "bite", "mm", target, mean, "distance of the entry from the cut edge, on the tissue at rest", kBowelBite},
+    {"edge_out", "exit from the edge", "bite", "mm", target, mean, "distance of the exit from the cut edge, on the tissue at rest", kBowelBite},
+    {"edge_near", "near end of a bite", "bite", "mm", target, mean, "smaller of the edge distances of entry and exit", "Lembert: in 8, out 4 mm from the edge (veterinary); EAGLE module 5"},
+    {"edge_far", "far end of a bite", "bite", "mm", target, mean, "larger of the edge distances of entry and exit", "Lembert: in 8, out 4 mm from the edge (veterinary); EAGLE module 5"},
+    {"edge_spread", "evenness of the edge distance", "bite", "mm", lower, spread, "mean distance of entry and exit of a bite from the edge", kOwn},
+    {"edge_symmetry", "symmetry of a bite along the edge", "bite", "mm", lower, mean, "difference of the edge distances of entry and exit; bites at less than 45 degrees to the edge", kEase},
+    {"mirror_edge", "symmetry of the two sides", "bite", "mm", lower, mean, "difference of the mean edge distances of two successive bites in opposite walls", kEase},
+    {"mirror_offset", "offset of the two sides", "bite", "mm", lower, mean, "distance along the edge between two successive bites in opposite walls", kEase},
+    {"bite_length", "bite length", "bite", "mm", target, mean, "distance from entry to exit on the tissue at rest", kOwn},
+    {"spacing", "spacing", "bite", "mm", target, mean, "along the edge, from a bite to the nearest end of the bite before it in the same wall", kBowelBite},
+    {"spacing_spread", "evenness of the spacing", "bite", "mm", lower, spread, "as spacing", kEase},
+    {"depth", "depth as a part of the wall", "bite", "", target, mean, "greatest distance of the needle's tip below the serosa, over the wall's thickness; 1 or more: the lumen was entered", kBowelBite},
+    {"depth_spread", "evenness of the depth", "bite", "", lower, spread, "as depth", kOwn},
+    {"layers", "layers crossed", "bite", "", target, mean, "1 serosa, 2 and muscularis, 3 and submucosa, 4 and mucosa", kBowelBite},
+    {"entry_angle", "entry angle", "bite", "deg", target, mean, "angle of the needle to the surface where it enters; 90: perpendicular", kEase},
+    {"exit_angle", "exit angle", "bite", "deg", target, mean, "angle of the needle to the surface where it exits", kEase},
+    {"edge_angle", "bite to edge angle", "bite", "deg", target, mean, "angle of the line from entry to exit to the edge; 0 along it, 90 across", kOwn},
+    {"edge_angle_spread", "evenness of the direction", "bite", "deg", lower, spread, "as edge_angle", kOwn},
+
+    {"drive_time", "time of a bite", "needle", "s", lower, mean, "from the tip's entry until the needle has left the wall", kMotion},
+    {"needle_wander", "needle off its curve", "needle", "mm", lower, mean, "root mean square distance of the needle circle's center from its mean while the tip is in tissue", kSeki},
+    {"attempts", "attempts per bite", "needle", "", lower, mean, "entries of the tip until the bite is complete", kErrors},
+    {"withdrawn", "withdrawn bites", "needle", "", lower, count, "the needle was withdrawn from an unfinished bite", kErrors},
+    {"needle_grasps", "grasps of the needle per bite", "needle", "", lower, mean, "times that a jaw closed on the needle since the bite before", kErrors},
+    {"grasp_at", "position of the grasp", "needle", "", target, mean, "of the jaws on the needle at entry: 0 swage, 1 tip", kEase},
+    {"grasp_angle", "angle of the grasp", "needle", "deg", target, mean, "between shaft and needle at the jaws at entry; 90: perpendicular", kEase},
+    {"slips", "slips of needle and thread", "needle", "", lower, count, "the jaws lost needle or thread under load", kErrors},
+
+    {"throws", "throws of a knot", "knot", "", target, mean, "locked throws of each knot", "instrument tie, at least 2-1-1: ATLAS task 6"},
+    {"first_wraps", "wraps of the first throw", "knot", "", target, mean, "turns of thread around the instrument", "instrument tie, at least 2-1-1: ATLAS task 6"},
+    {"square", "square throws", "knot", "", higher, mean, "share of a knot's throws, from the second, whose chirality differs from the one below; 0: granny", "ATLAS task 6; 10.1073/pnas.1205918109"},
+    {"knot_tension", "tension at the lock", "knot", "N", target, mean, "tension of the pulled strand when a throw locks", "force in thread: Horeman 2013, 10.1371/journal.pone.0084466"},
+    {"knot_tension_spread", "evenness of the knot tension", "knot", "N", lower, spread, "as knot_tension", kOwn},
+    {"knot_gap", "gap to the tissue", "knot", "mm", lower, maximum, "distance of the first throw of a knot to the tissue when it locks: air knot", "ATLAS task 6"},
+    {"throw_gap", "gap between throws", "knot", "mm", lower, maximum, "distance of a throw to the one below when it locks", "ATLAS task 6"},
+    {"tail", "length of tails", "knot", "mm", target, mean, "thread from a cut to the nearest suture point or knot of a tied suture", "3 to 5 mm on bowel: unpublished convention"},
+    {"throw_time", "time of a throw", "knot", "s", lower, mean, "from the pull through the loop to the lock", kMotion},
+    {"undone_throws", "lost loops and throws", "knot", "", lower, count, "a loop came off, or a throw was released before its lock", kErrors},
+    {"rejected_loops", "failed loops", "knot", "", lower, count, "thread around an instrument that did not make a loop", kErrors},
+
+    {"gap", "apposition gap", "line", "mm", lower, maximum, "distance of two points that the technique closes, at the end", "ATLAS task 6"},
+    {"gap_mean", "mean apposition gap", "line", "mm", lower, mean, "as gap", "ATLAS task 6"},
+    {"eversion", "everted edge", "line", "", lower, mean, "share of a wall's edge that leans outward by more than 30 degrees, at the end", kOwn},
+    {"inversion", "inversion of the edge", "line", "deg", target, mean, "mean angle by which a wall's edge leans inward, at the end", kOwn},
+    {"lumen", "lumen that is left", "line", "", target, mean, "area of a wall's edge at the end over its area at the start", kOwn},
+    {"closure", "closure of the opening", "line", "", target, only, "0 open to 1 at the anvil", kOwn},
+    {"slack", "slack of the thread", "line", "mm", lower, maximum, "thread between two successive bites beyond their distance, at the end", kOwn},
+    {"bites", "completed bites", "line", "", target, count, "bites with entry and exit", kOwn},
+    {"order_errors", "errors of order", "line", "", lower, count, "a bite out of the technique's order, in the wrong wall or layer, or a stitch through one wall only", kErrors},
+    {"faults", "other faults", "line", "", lower, count, "knot without a bite, needle in tissue, thread cut in a stitch or before a knot, too few throws", kErrors},
+    {"tension_spread", "evenness of the line's tension", "line", "N", lower, spread, "larger tension at each suture point at the end", "force in thread: Horeman 2013, 10.1371/journal.pone.0084466"},
+
+    {"thread_force", "peak force at a bite", "tissue", "N", lower, maximum, "largest tension of a suture's thread at a suture point", "tear-out: Gong 2023, 10.1115/1.4063951"},
+    {"thread_impulse", "integrated force at bites", "tissue", "N s", lower, sum, "integral over time of a suture's largest tension at a suture point", "force metrics: 10.3389/fmed.2022.897219"},
+    {"overloads", "overloads of a bite", "tissue", "", lower, count, "tension at a suture point above 3.22 N, where human small bowel begins to tear", "tear-out: Gong 2023, 10.1115/1.4063951"},
+    {"grasp_force", "peak force of a grasp", "tissue", "N", lower, maximum, "of a hand's instrument on the tissue that it holds", kStay},
+    {"grasp_impulse", "integrated force of grasps", "tissue", "N s", lower, sum, "integral over time of that force", "force metrics: 10.3389/fmed.2022.897219"},
+    {"tissue_grasps", "grasps of tissue", "tissue", "", lower, count, "times that a jaw closed on tissue", kErrors},
+    {"tissue_slips", "tissue torn from a grasp", "tissue", "", lower, count, "tissue slipped out of the jaws under load", kErrors},
+    {"missed_grasps", "missed grasps", "tissue", "", lower, count, "jaws closed for 0.25 s on nothing", kErrors},
+    {"hand_force", "peak force on a hand", "tissue", "N", lower, maximum, "computed, not the force that a device renders", "force metrics: 10.3389/fmed.2022.897219"},
+
+    {"time", "time", "hands", "s", lower, only, "from the first tick with hands to the last", kStay},
+    {"path", "path of both hands", "hands", "m", lower, sum, "length of a hand's filtered path", "Azari 2018, scholars.duke.edu/display/pub1534663"},
+    {"path_per_bite", "path per bite", "hands", "mm", lower, only, "path of both hands over completed bites", "Azari 2018, scholars.duke.edu/display/pub1534663"},
+    {"idle", "idle hands", "hands", "", lower, mean, "share of the time in which a hand is slower than 5 mm/s", kMotion},
+    {"pause", "both hands idle", "hands", "", lower, only, "share of the time in which both hands are slower than 5 mm/s", kMotion},
+    {"ldlj", "log dimensionless jerk", "hands", "", higher, mean, "of each movement: faster than 5 mm/s for at least 0.3 s", kSmooth},
+    {"sparc", "spectral arc length", "hands", "", higher, mean, "of each movement's speed, to 10 Hz, threshold 0.05", kSmooth},
+    {"submovements", "speed peaks", "hands", "1/s", lower, mean, "local maxima of a hand's speed in its movements, over their time", kSmooth},
+    {"tremor", "tremor", "hands", "mm", lower, mean, "root mean square of a hand's position less its path below 5 Hz, while it is idle", "Riviere 1997, kilthub.cmu.edu/articles/6621335"},
+    {"bimanual", "bimanual coordination", "hands", "", higher, only, "Pearson's correlation of the speeds of both hands", kMotion},
+    {"together", "both hands moving", "hands", "", higher, only, "time in which both hands move over the time in which any moves", kMotion},
+};
+// clang-format on
+
+class Sheet {
+ public:
+  Sheet() {
+    for (const MetricRow& r : kRow) metric_.push_back({r.key, kNotObserved, {}});
+  }
+  Metric& operator[](std::string_view key) {
+    for (Metric& m : metric_)
+      if (m.key == key) return m;
+    throw std::logic_error("no metric " + std::string(key));
+  }
+  void add(std::string_view key, double value, uint64_t tick, Vec3 where, std::string of = {}) {
+    if (std::isfinite(value)) (*this)[key].sample.push_back({value, tick, where, std::move(of)});
+  }
+  void add_all(std::string_view key, const std::vector<Sample>& samples) {
+    auto& s = (*this)[key].sample;
+    s.insert(s.end(), samples.begin(), samples.end());
+  }
+  std::vector<Metric> take();
+
+ private:
+  std::vector<Metric> metric_;
+};
+
+double summarize(Summary how, const std::vector<Sample>& s) {
+  if (how == count) return static_cast<double>(s.size());
+  if (s.empty()) return kNotObserved;
+  double total = 0, most = s[0].value;
+  for (const Sample& x : s) total += x.value, most = std::max(most, x.value);
+  const double n = static_cast<double>(s.size()), average = total / n;
+  if (how == sum) return total;
+  if (how == maximum) return most;
+  if (how != spread) return average;
+  if (s.size() < 2) return kNotObserved;
+  double squares = 0;
+  for (const Sample& x : s) squares += (x.value - average) * (x.value - average);
+  return std::sqrt(squares / (n - 1));
+}
+
+std::vector<Metric> Sheet::take() {
+  for (size_t i = 0; i < metric_.size(); ++i) metric_[i].value = summarize(kRow[i].summary, metric_[i].sample);
+  return std::move(metric_);
+}
+
+std::string bite_name(const Bite& b) { return fmt::format("bite {}", b.number + 1); }
+
+void measure_bites(const Facts& f, Sheet& sheet) {
+  for (size_t i = 0; i < f.bite.size(); ++i) {
+    const Bite& b = f.bite[i];
+    const std::string of = f.suture.size() > 1 || b.load > 0 ? fmt::format("suture {} bite {}", b.suture + b.load + 1, b.number + 1)
+                                                             : bite_name(b);
+    const auto add = [&](std::string_view key, double value) { sheet.add(key, value, b.tick, b.where, of); };
+    add("edge_in", b.edge_in);
+    add("edge_out", b.edge_out);
+    add("edge_near", std::min(b.edge_in, b.edge_out));
+    add("edge_far", std::max(b.edge_in, b.edge_out));
+    add("edge_spread", 0.5 * (b.edge_in + b.edge_out));
+    if (b.edge_angle < 45) add("edge_symmetry", std::abs(b.edge_in - b.edge_out));
+    add("bite_length", b.length);
+    add("spacing", b.spacing);
+    add("spacing_spread", b.spacing);
+    add("depth", b.depth_fraction);
+    add("depth_spread", b.depth_fraction);
+    add("layers", b.layers);
+    add("entry_angle", b.entry_angle);
+    add("exit_angle", b.exit_angle);
+    add("edge_angle", b.edge_angle);
+    add("edge_angle_spread", b.edge_angle);
+    add("drive_time", b.seconds);
+    add("needle_wander", b.wander);
+    add("attempts", b.attempts);
+    add("needle_grasps", b.grasps);
+    add("grasp_at", b.grasp_at);
+    add("grasp_angle", b.grasp_angle);
+    add("bites", 1);
+    if (i == 0) continue;
+    const Bite& a = f.bite[i - 1];
+    if (a.suture != b.suture || a.load != b.load || a.wall == b.wall) continue;
+    add("mirror_edge", std::abs(0.5 * (a.edge_in + a.edge_out) - 0.5 * (b.edge_in + b.edge_out)));
+    if (a.wall >= f.edge.size() || b.wall >= f.edge.size()) continue;
+    // Opposite points of two edges have the same coordinate in parts of their edges.
+    const double la = static_cast<double>(f.edge[a.wall].length()) * kMm, lb = static_cast<double>(f.edge[b.wall].length()) * kMm;
+    if (!(la > 0 && lb > 0)) continue;
+    const auto middle = [](const Bite& x, double all) {  // of the shorter stretch
+      double d = x.along_out - x.along_in;
+      d -= all * std::floor(d / all + 0.5);
+      return (x.along_in + 0.5 * d) / all;
+    };
+    double apart = middle(b, lb) - middle(a, la);
+    apart -= std::floor(apart + 0.5);
+    add("mirror_offset", std::abs(apart) * 0.5 * (la + lb));
+  }
+}
+
+void measure_knots(const Facts& f, Sheet& sheet) {
+  for (const Knot& k : f.knot) {
+    const std::string of = fmt::format("knot {} ({})", k.suture + k.load + k.number + 1, knot_kind_name(k.kind));
+    sheet.add("throws", static_cast<double>(k.thrown.size()), k.tick, k.where, of);
+    size_t opposite = 0;
+    for (size_t t = 0; t < k.thrown.size(); ++t) {
+      const Throw& row = k.thrown[t];
+      const std::string one = fmt::format("{}, throw {}", of, t + 1);
+      if (t == 0) sheet.add("first_wraps", row.wraps, row.tick, k.where, one);
+      sheet.add(t == 0 ? "knot_gap" : "throw_gap", row.gap, row.tick, k.where, one);
+      sheet.add("knot_tension", row.tension, row.tick, k.where, one);
+      sheet.add("knot_tension_spread", row.tension, row.tick, k.where, one);
+      if (row.seconds > 0) sheet.add("throw_time", row.seconds, row.tick, k.where, one);
+      if (t > 0) opposite += row.hand != k.thrown[t - 1].hand && !row.sliding;
+    }
+    if (k.thrown.size() > 1)
+      sheet.add("square", static_cast<double>(opposite) / static_cast<double>(k.thrown.size() - 1), k.tick, k.where, of);
+  }
+  sheet.add_all("tail", f.tail);
+  sheet.add_all("undone_throws", f.undone_throw);
+  sheet.add_all("rejected_loops", f.rejected_loop);
+}
+
+// Thread between two nodes, along its order [m].
+double thread_between(const Snapshot& seen, const SutureView& s, uint32_t a, uint32_t b) {
+  const auto at = [&](uint32_t slot) {
+    return static_cast<size_t>(std::find(s.thread_order.begin(), s.thread_order.end(), slot) - s.thread_order.begin());
+  };
+  size_t i = at(a), j = at(b);
+  if (i > j) std::swap(i, j);
+  if (j >= s.thread_order.size()) return kNotObserved;
+  double sum_of = 0;
+  for (; i < j; ++i) {
+    if (i < s.thread_cut.size() && s.thread_cut[i]) return kNotObserved;
+    sum_of += static_cast<double>(distance(seen.particle[s.thread_order[i]], seen.particle[s.thread_order[i + 1]]));
+  }
+  return sum_of;
+}
+
+void measure_line(const Facts& f, const PictureModel& picture, const Snapshot& seen, Sheet& sheet) {
+  const uint64_t tick = seen.tick;
+  for (const SutureView& s : seen.suture) {
+    size_t pair = 0;
+    for (const SeamView& p : s.seam) {
+      const double gap = static_cast<double>(distance(p.a, p.b)) * kMm;
+      const std::string of = fmt::format("pair {}", ++pair);
+      sheet.add("gap", gap, tick, 0.5f * (p.a + p.b), of);
+      sheet.add("gap_mean", gap, tick, 0.5f * (p.a + p.b), of);
+    }
+    for (size_t i = 0; i < s.suture_point.size(); ++i) {
+      const SuturePointView& p = s.suture_point[i];
+      sheet.add("tension_spread", static_cast<double>(std::max(p.tension_needle, p.tension_free)), tick, p.position,
+                fmt::format("suture point {}", i + 1));
+      if (i == 0 || s.suture_point[i - 1].bite == p.bite) continue;
+      const SuturePointView& before = s.suture_point[i - 1];
+      const double thread = thread_between(seen, s, before.anchored, p.anchored);
+      sheet.add("slack", std::max(0.0, (thread - static_cast<double>(distance(before.position, p.position))) * kMm), tick,
+                p.position, fmt::format("span {} to {}", i, i + 1));
+    }
+  }
+  for (size_t w = 0; w < picture.rim.size(); ++w) {
+    const std::vector<uint32_t>& rim = picture.rim[w];
+    if (rim.size() < 3 || w >= f.lumen.size()) continue;
+    const std::string of = fmt::format("edge {}", w + 1);
+    Vec3 center{}, axis{}, body{};
+    size_t counted = 0;
+    for (const uint32_t i : rim) center += picture.particle_rest[i] / static_cast<float>(rim.size());
+    for (size_t i = 0; i < rim.size(); ++i)
+      axis += cross(picture.particle_rest[rim[i]] - center, picture.particle_rest[rim[(i + 1) % rim.size()]] - center);
+    for (size_t i = 0; i < picture.particle_rest.size(); ++i)
+      if (i >= picture.wall.size() || picture.wall[i] == w) body += picture.particle_rest[i], ++counted;
+    axis = normalized(axis);
+    if (counted > 0 && dot(axis, center - body / static_cast<float>(counted)) < 0) axis = -axis;  // out of the opening
+    size_t everted = 0;
+    double lean = 0;
+    for (const uint32_t i : rim) {
+      if (i >= seen.rotation.size()) continue;
+      const Vec3 from = picture.particle_rest[i] - center, out = normalized(from - axis * dot(from, axis));
+      const double outward = static_cast<double>(dot(rotate(seen.rotation[i], axis), out));
+      everted += outward > 0.5;
+      lean -= portable::asin(std::clamp(outward, -1.0, 1.0)) * kDegrees;
+    }
+    const double n = static_cast<double>(rim.size());
+    sheet.add("eversion", static_cast<double>(everted) / n, tick, center, of);
+    sheet.add("inversion", lean / n, tick, center, of);
+    if (f.lumen[w] > 0) sheet.add("lumen", rim_area(picture, seen.particle, w) / f.lumen[w], tick, center, of);
+  }
+  sheet.add("closure", static_cast<double>(seen.closure), tick, picture.focus);
+  sheet.add_all("order_errors", f.order_error);
+  sheet.add_all("faults", f.fault);
+}
+
+void measure_tissue(const Facts& f, Sheet& sheet) {
+  for (size_t k = 0; k < f.suture.size(); ++k) {
+    const SutureFacts& s = f.suture[k];
+    const std::string of = f.suture.size() > 1 ? fmt::format("suture {}", k + 1) : "";
+    sheet.add("thread_force", static_cast<double>(s.peak), s.peak_tick, s.peak_where, of);
+    sheet.add("thread_impulse", s.impulse, s.peak_tick, s.peak_where, of);
+  }
+  for (size_t k = 0; k < f.hand.size(); ++k) {
+    const HandFacts& h = f.hand[k];
+    const std::string of = k == 0 ? "right hand" : "left hand";
+    sheet.add("grasp_force", static_cast<double>(h.peak), h.peak_tick, h.peak_where, of);
+    sheet.add("grasp_impulse", h.impulse, h.peak_tick, h.peak_where, of);
+    sheet.add("hand_force", static_cast<double>(h.strain), h.strain_tick, h.strain_where, of);
+  }
+  sheet.add_all("overloads", f.overload);
+  sheet.add_all("tissue_grasps", f.tissue_grasp);
+  sheet.add_all("tissue_slips", f.tissue_slip);
+  sheet.add_all("missed_grasps", f.missed_grasp);
+  sheet.add_all("withdrawn", f.withdrawn);
+  sheet.add_all("slips", f.needle_slip);
+}
+
+void measure_hands(const Facts& f, Sheet& sheet) {
+  if (!f.begun) return;
+  const double rate = 1 / (f.setup.tick_s * f.stride);
+  const auto tick_of = [&](size_t i) { return f.first + static_cast<uint64_t>(i) * f.stride; };
+  sheet.add("time", static_cast<double>(f.last - f.first) * f.setup.tick_s, f.last, {});
+  std::array<std::vector<double>, 2> speed;
+  double path = 0;
+  for (size_t k = 0; k < 2; ++k) {
+    const std::vector<Vec3>& raw = f.hand[k].position;
+    if (raw.size() < 5) continue;
+    const std::string of = k == 0 ? "right hand" : "left hand";
+    const std::vector<Vec3> smooth = low_pass(raw, kMotionCutoff, rate), slow = low_pass(raw, 5, rate);
+    speed[k] = speed_of(smooth, rate);
+    double own = 0, shake = 0;
+    size_t idle = 0, still = 0, peaks = 0, moving = 0;
+    const std::vector<double> slow_speed = speed_of(slow, rate);
+    for (size_t i = 0; i < raw.size(); ++i) {
+      if (i > 0) own += static_cast<double>(distance(smooth[i], smooth[i - 1]));
+      idle += speed[k][i] < kIdleSpeed;
+      if (slow_speed[i] < kIdleSpeed) shake += static_cast<double>(length2(raw[i] - slow[i])), ++still;
+    }
+    path += own;
+    const uint64_t end = tick_of(raw.size() - 1);
+    sheet.add("path", own, end, raw.back(), of);
+    sheet.add("idle", static_cast<double>(idle) / static_cast<double>(raw.size()), end, raw.back(), of);
+    if (still > 0) sheet.add("tremor", std::sqrt(shake / static_cast<double>(still)) * kMm, end, raw.back(), of);
+    for (const Stretch& m : movements(speed[k], rate)) {
+      const size_t n = m.end - m.first;
+      sheet.add("ldlj", ldlj(std::span(smooth).subspan(m.first, n), rate), tick_of(m.first), smooth[m.first], of);
+      sheet.add("sparc", sparc(std::span(speed[k]).subspan(m.first, n), rate), tick_of(m.first), smooth[m.first], of);
+      for (size_t i = m.first + 1; i + 1 < m.end; ++i)
+        peaks += speed[k][i] > speed[k][i - 1] && speed[k][i] >= speed[k][i + 1];
+      moving += n;
+    }
+    if (moving > 0)
+      sheet.add("submovements", static_cast<double>(peaks) * rate / static_cast<double>(moving), end, raw.back(), of);
+  }
+  if (!f.bite.empty()) sheet.add("path_per_bite", path * kMm / static_cast<double>(f.bite.size()), f.last, {});
+  const size_t n = std::min(speed[0].size(), speed[1].size());
+  size_t none = 0, any = 0, both = 0;
+  for (size_t i = 0; i < n; ++i) {
+    const bool r = speed[0][i] >= kIdleSpeed, l = speed[1][i] >= kIdleSpeed;
+    none += !r && !l, any += r || l, both += r && l;
+  }
+  if (n > 0) sheet.add("pause", static_cast<double>(none) / static_cast<double>(n), f.last, {});
+  if (any > 0) sheet.add("together", static_cast<double>(both) / static_cast<double>(any), f.last, {});
+  sheet.add("bimanual", correlation(speed[0], speed[1]), f.last, {});
+}
+
+}  // namespace
+
+const char* better_name(Better better) {
+  constexpr const char* name[] = {"higher", "lower", "a band"};
+  return name[static_cast<size_t>(better)];
+}
+const char* summary_name(Summary summary) {
+  constexpr const char* name[] = {"mean", "standard deviation", "maximum", "sum", "count", "value"};
+  return name[static_cast<size_t>(summary)];
+}
+
+std::span<const MetricRow> metric_rows() { return kRow; }
+
+const MetricRow* find_metric(std::string_view key) {
+  for (const MetricRow& r : kRow)
+    if (key == r.key) return &r;
+  return nullptr;
+}
+
+Result measure(const Facts& f, const PictureModel& picture, const Snapshot& seen) {
+  Result r;
+  r.technique = f.setup.technique;
+  r.tick_s = f.setup.tick_s;
+  r.first_tick = f.first;
+  r.ticks = seen.tick;
+  r.time_s = f.begun ? static_cast<double>(f.last - f.first) * f.setup.tick_s : 0;
+  r.filter = fmt::format("Butterworth, order 2, both ways, {} Hz", kMotionCutoff);
+  r.bite = f.bite;
+  r.knot = f.knot;
+  Sheet sheet;
+  measure_bites(f, sheet);
+  measure_knots(f, sheet);
+  measure_line(f, picture, seen, sheet);
+  measure_tissue(f, sheet);
+  measure_hands(f, sheet);
+  r.metric = sheet.take();
+  for (Metric& m : r.metric)
+    std::stable_sort(m.sample.begin(), m.sample.end(), [](const Sample& a, const Sample& b) { return a.tick < b.tick; });
+  return r;
+}
+
+std::string metrics_markdown() {
+  std::string out = "| key | metric | unit | summary | better | definition of a sample | source |\n|---|---|---|---|---|---|---|\n";
+  const char* group = "";
+  for (const MetricRow& r : kRow) {
+    if (std::string_view(group) != r.group) out += fmt::format("| **{}** | | | | | | |\n", group = r.group);
+    out += fmt::format("| `{}` | {} | {} | {} | {} | {} | {} |\n", r.key, r.name, r.unit, summary_name(r.summary),
+                       better_name(r.better), r.definition, r.source);
+  }
+  return out;
+}
+
+}  // namespace catgut::assess

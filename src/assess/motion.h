@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// assess: measures of hand motion. Pure functions of sampled positions or speeds; all bits are the same on every machine.
+//
+// Smoothness: Balasubramanian et al. 2012 (10.1109/TBME.2011.2179545) and 2015 (10.1186/s12984-015-0090-9).
+#pragma once
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "core/math.h"
+
+namespace catgut::assess {
+
+// Filter of all measured motion: second-order Butterworth, forward and backward, without delay.
+constexpr double kMotionCutoff = 10;    // [Hz]
+constexpr double kIdleSpeed = 0.005;    // [m/s] below it a hand is idle
+constexpr double kShortest = 0.3;       // [s] shorter stretches of motion are not judged
+
+std::vector<double> low_pass(std::span<const double> value, double cutoff, double rate);
+std::vector<Vec3> low_pass(std::span<const Vec3> value, double cutoff, double rate);
+std::vector<double> speed_of(std::span<const Vec3> position, double rate);  // [m/s] central differences
+
+// Log dimensionless jerk of one movement, -ln(T^3 / vpeak^2 * integral |jerk|^2 dt); nearer to zero is smoother. Not a number
+// for fewer than 5 samples or without motion. A minimum-jerk movement has -ln(204.8).
+double ldlj(std::span<const Vec3> position, double rate);
+
+// Spectral arc length of a speed profile up to `cutoff` [Hz], from where the normalized spectrum last exceeds `threshold`; the
+// spectrum is interpolated sixteen-fold by zeros. Nearer to zero is smoother.
+double sparc(std::span<const double> speed, double rate, double cutoff = 10, double threshold = 0.05);
+
+// Stretches [first, end) in which the speed stays above kIdleSpeed for at least kShortest.
+struct Stretch {
+  size_t first = 0, end = 0;
+};
+std::vector<Stretch> movements(std::span<const double> speed, double rate);
+
+double correlation(std::span<const double> a, std::span<const double> b);  // Pearson's; not a number without variation
+
+}  // namespace catgut::assess
