@@ -26,7 +26,8 @@ int assess_command(const AssessOptions& o) {
   if (o.file.empty()) {
     if (o.rubric.empty()) throw InputError("assess", "no recording was given", "give a .cgrec file, or --metrics");
     const assess::Rubric rubric = assess::read_rubric(o.rubric);  // checks it
-    std::printf("%s, version %s: %zu items, no fault found\n", rubric.title.c_str(), rubric.version.c_str(), rubric.item.size());
+    std::printf("%s, version %s: %zu items, no fault found\n", rubric.title.c_str(), rubric.version.c_str(),
+                rubric.item.size());
     return 0;
   }
   check_suffix(o.json, ".json", "--json");
@@ -74,7 +75,8 @@ void add_assess(CLI::App& app, int& exit_code) {
       ->type_name("NAME|FILE");
   command->add_option("--json", o->json, "metrics, score and reasons as JSON; -: standard output")->type_name("FILE|-");
   command->add_option("--csv", o->csv, "metrics as CSV; -: standard output")->type_name("FILE|-");
-  command->add_option("--repeat", o->repeat, "assess this often and compare the results to the bit")->check(CLI::Range(1, 1000));
+  command->add_option("--repeat", o->repeat, "assess this often and compare the results to the bit")
+      ->check(CLI::Range(1, 1000));
   command->add_flag("--metrics", o->metrics, "print the table of all metrics");
   add_threads_option(*command, o->threads);
   command->callback([o, &exit_code] { exit_code = assess_command(*o); });

@@ -25,7 +25,8 @@ int study(const StudyCommand& c) {
     std::printf("%zu\n", runs_of(plan).size());
     return 0;
   }
-  if (c.index >= c.of) throw InputError("--index", "it must be below --of", "Slurm: --array=0-39, --index $SLURM_ARRAY_TASK_ID --of 40");
+  if (c.index >= c.of)
+    throw InputError("--index", "it must be below --of", "Slurm: --array=0-39, --index $SLURM_ARRAY_TASK_ID --of 40");
   check_suffix(c.out, ".csv", "--out");
   check_suffix(c.report, ".md", "--report");
   StudyOptions o;
@@ -57,11 +58,13 @@ void add_study(CLI::App& app, int& exit_code) {
   auto c = std::make_shared<StudyCommand>();
   CLI::App* command = app.add_subcommand("study", "many surgeons, seeds, scenes and settings; one table out");
   command->add_option("plan", c->plan, "the study")->required()->type_name("FILE.toml");
-  command->add_option("--runs", c->folder, "folder of the finished runs; the same folder resumes; default: NAME.runs")->type_name("DIR");
+  command->add_option("--runs", c->folder, "folder of the finished runs; the same folder resumes; default: NAME.runs")
+      ->type_name("DIR");
   command->add_option("--out", c->out, "table of all finished runs; -: standard output")->type_name("FILE.csv|-");
   command->add_option("--report", c->report, "AUC and medians of all metrics; -: standard output")->type_name("FILE.md|-");
   command->add_option("--jobs", c->jobs, "runs at a time, one thread each")->check(CLI::Range(1, 1024))->capture_default_str();
-  command->add_option("--index", c->index, "this process does every run whose number modulo --of is this")->capture_default_str();
+  command->add_option("--index", c->index, "this process does every run whose number modulo --of is this")
+      ->capture_default_str();
   command->add_option("--of", c->of, "number of processes")->check(CLI::Range(1, 1000000))->capture_default_str();
   command->add_flag("--count", c->count, "print the number of runs");
   command->callback([c, &exit_code] { exit_code = study(*c); });

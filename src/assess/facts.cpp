@@ -13,7 +13,7 @@ namespace catgut::assess {
 namespace {
 
 constexpr double kMm = 1000, kDegrees = 180 / 3.14159265358979323846;
-constexpr double kSampleRate = 60;   // [1/s] of the hands, at least
+constexpr double kSampleRate = 60;  // [1/s] of the hands, at least
 constexpr float kOpenJaw = 0.5f, kClosedJaw = 0.15f;
 constexpr double kGraspTime = 0.25;  // [s] closed on nothing
 
@@ -81,8 +81,8 @@ void follow_bites(Facts& f, const PictureModel& picture, const Snapshot& seen) {
       open.sum[static_cast<size_t>(axis)] += x, open.squares += x * x;
     }
     ++open.ticks;
-    const Vec3 tip = transform(view.needle.pose, shape.needle_radius * Vec3{portable::cos(shape.needle_arc),
-                                                                           portable::sin(shape.needle_arc), 0});
+    const Vec3 tip = transform(view.needle.pose,
+                               shape.needle_radius * Vec3{portable::cos(shape.needle_arc), portable::sin(shape.needle_arc), 0});
     const uint32_t wall = view.bite[open.number].wall;
     const SurfacePoint s = f.rest[0].serosa(wall, at_rest(picture, seen, wall, tip));
     if (s.valid) open.depth = std::max(open.depth, s.below);
@@ -157,9 +157,8 @@ void note_throw(Facts& f, const Snapshot& seen, const Event& e) {
   SutureFacts& suture = suture_of(f, e.suture);
   if (e.suture >= seen.suture.size() || e.which >= seen.suture[e.suture].knot.size()) return;
   const KnotView& view = seen.suture[e.suture].knot[e.which];
-  auto knot = std::find_if(f.knot.begin(), f.knot.end(), [&](const Knot& k) {
-    return k.suture == e.suture && k.load == suture.load && k.number == e.which;
-  });
+  auto knot = std::find_if(f.knot.begin(), f.knot.end(),
+                           [&](const Knot& k) { return k.suture == e.suture && k.load == suture.load && k.number == e.which; });
   if (knot == f.knot.end()) knot = f.knot.insert(f.knot.end(), Knot{0, e.suture, suture.load, e.which, {}, {}, {}});
   knot->tick = e.tick;
   knot->where = view.position;
@@ -208,8 +207,7 @@ void note_event(Facts& f, const PictureModel& picture, const Snapshot& seen, con
       f.rejected_loop.push_back(happening(e, loop_reason_name(e.reason)));
       return;
     case EventKind::thread_cut:
-      if (e.value >= 0 && suture_of(f, e.suture).tied)
-        f.tail.push_back(happening(e, {}, static_cast<double>(e.value) * kMm));
+      if (e.value >= 0 && suture_of(f, e.suture).tied) f.tail.push_back(happening(e, {}, static_cast<double>(e.value) * kMm));
       return;
     case EventKind::suture_loaded: {
       SutureFacts& s = suture_of(f, e.suture);
@@ -264,7 +262,7 @@ void note_hand(Facts& f, size_t k, const PictureModel& picture, const Snapshot& 
     if (pull > hand.peak) hand.peak = pull, hand.peak_tick = seen.tick, hand.peak_where = tool.pose.p;
   }
   const uint32_t can = which < picture.instrument.size() ? picture.instrument[which].capabilities : 0;
-  if ((can & (kHoldNeedle | kHoldThread | kHoldTissue)) == 0 || (can & kCutThread)) return;
+  if ((can & (kHoldNeedle | kHoldThread | kHoldTissue)) == 0) return;
   if (tool.jaw > kOpenJaw) hand.was_open = true, hand.judged = false;
   if (tool.jaw > kClosedJaw) hand.closed_for = 0;
   else if (tool.held != Held::nothing || tool.loop_wraps > 0) hand.judged = true;  // a loop is closed over on purpose
@@ -286,8 +284,7 @@ void note_tension(Facts& f, const Snapshot& seen) {
     }
     suture.impulse += static_cast<double>(most) * f.setup.tick_s;
     if (most > suture.peak) suture.peak = most, suture.peak_tick = seen.tick, suture.peak_where = where;
-    if (most > kTearForce && !suture.overloaded)
-      f.overload.push_back({static_cast<double>(most), seen.tick, where, "thread"});
+    if (most > kTearForce && !suture.overloaded) f.overload.push_back({static_cast<double>(most), seen.tick, where, "thread"});
     if (most > kTearForce) suture.overloaded = true;
     else if (most < 0.8f * kTearForce) suture.overloaded = false;
   }
@@ -314,8 +311,7 @@ double rim_area(const PictureModel& picture, const std::vector<Vec3>& particle, 
   const std::vector<uint32_t>& rim = picture.rim[wall];
   Vec3 center{}, sum{};
   for (const uint32_t i : rim) center += particle[i] / static_cast<float>(rim.size());
-  for (size_t i = 0; i < rim.size(); ++i)
-    sum += cross(particle[rim[i]] - center, particle[rim[(i + 1) % rim.size()]] - center);
+  for (size_t i = 0; i < rim.size(); ++i) sum += cross(particle[rim[i]] - center, particle[rim[(i + 1) % rim.size()]] - center);
   return 0.5 * static_cast<double>(length(sum));
 }
 

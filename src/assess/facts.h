@@ -49,8 +49,8 @@ struct HandFacts {
   float peak = 0;              // [N] largest force on the tissue held
   uint64_t peak_tick = 0;
   Vec3 peak_where;
-  double impulse = 0;   // [N s] on the tissue held
-  float strain = 0;     // [N] largest force on the hand
+  double impulse = 0;  // [N s] on the tissue held
+  float strain = 0;    // [N] largest force on the hand
   uint64_t strain_tick = 0;
   Vec3 strain_where;
   // To find grasps of nothing.
@@ -60,15 +60,15 @@ struct HandFacts {
 };
 
 struct SutureFacts {
-  uint32_t load = 0;       // how often it was replaced
-  uint32_t entries = 0;    // of the tip since the last completed bite
-  uint32_t grasps = 0;     // of the needle since the last completed bite
+  uint32_t load = 0;     // how often it was replaced
+  uint32_t entries = 0;  // of the tip since the last completed bite
+  uint32_t grasps = 0;   // of the needle since the last completed bite
   uint64_t throw_began = 0;
   bool tied = false;
-  float peak = 0;       // [N] largest tension at a suture point
+  float peak = 0;  // [N] largest tension at a suture point
   uint64_t peak_tick = 0;
   Vec3 peak_where;
-  double impulse = 0;   // [N s]
+  double impulse = 0;  // [N s]
   bool overloaded = false;
 };
 

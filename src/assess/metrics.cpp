@@ -35,7 +35,7 @@ constexpr MetricRow kRow[] = {
     {"edge_spread", "evenness of the edge distance", "bite", "mm", lower, spread, "mean distance of entry and exit of a bite from the edge", kOwn},
     {"edge_symmetry", "symmetry of a bite along the edge", "bite", "mm", lower, mean, "difference of the edge distances of entry and exit; bites at less than 45 degrees to the edge", kEase},
     {"mirror_edge", "symmetry of the two sides", "bite", "mm", lower, mean, "difference of the mean edge distances of two successive bites in opposite walls", kEase},
-    {"mirror_offset", "offset of the two sides", "bite", "mm", lower, mean, "distance along the edge between two successive bites in opposite walls", kEase},
+    {"mirror_offset", "offset of the two sides", "bite", "mm", lower, mean, "distance along the edge between the exit of a bite and the entry of the next in the opposite wall", kEase},
     {"bite_length", "bite length", "bite", "mm", target, mean, "distance from entry to exit on the tissue at rest", kOwn},
     {"spacing", "spacing", "bite", "mm", target, mean, "along the edge, from a bite to the nearest end of the bite before it in the same wall", kBowelBite},
     {"spacing_spread", "evenness of the spacing", "bite", "mm", lower, spread, "as spacing", kEase},
@@ -93,13 +93,13 @@ constexpr MetricRow kRow[] = {
     {"time", "time", "hands", "s", lower, only, "from the first tick with hands to the last", kStay},
     {"path", "path of both hands", "hands", "m", lower, sum, "length of a hand's filtered path", "Azari 2018, scholars.duke.edu/display/pub1534663"},
     {"path_per_bite", "path per bite", "hands", "mm", lower, only, "path of both hands over completed bites", "Azari 2018, scholars.duke.edu/display/pub1534663"},
-    {"idle", "idle hands", "hands", "", lower, mean, "share of the time in which a hand is slower than 5 mm/s", kMotion},
-    {"pause", "both hands idle", "hands", "", lower, only, "share of the time in which both hands are slower than 5 mm/s", kMotion},
-    {"ldlj", "log dimensionless jerk", "hands", "", higher, mean, "of each movement: faster than 5 mm/s for at least 0.3 s", kSmooth},
+    {"idle", "idle hands", "hands", "", lower, mean, "share of the time in which the voluntary motion of a hand, below 2 Hz, is slower than 5 mm/s", kMotion},
+    {"pause", "both hands idle", "hands", "", lower, only, "share of the time in which both hands are idle", kMotion},
+    {"ldlj", "log dimensionless jerk", "hands", "", higher, mean, "of each movement: a hand not idle for at least 0.3 s", kSmooth},
     {"sparc", "spectral arc length", "hands", "", higher, mean, "of each movement's speed, to 10 Hz, threshold 0.05", kSmooth},
     {"submovements", "speed peaks", "hands", "1/s", lower, mean, "local maxima of a hand's speed in its movements, over their time", kSmooth},
-    {"tremor", "tremor", "hands", "mm", lower, mean, "root mean square of a hand's position less its path below 5 Hz, while it is idle", "Riviere 1997, kilthub.cmu.edu/articles/6621335"},
-    {"bimanual", "bimanual coordination", "hands", "", higher, only, "Pearson's correlation of the speeds of both hands", kMotion},
+    {"tremor", "tremor", "hands", "mm", lower, mean, "root mean square of an idle hand's position less its path below 5 Hz", "Riviere 1997, kilthub.cmu.edu/articles/6621335"},
+    {"bimanual", "bimanual coordination", "hands", "", higher, only, "Pearson's correlation of the speeds of voluntary motion of both hands", kMotion},
     {"together", "both hands moving", "hands", "", higher, only, "time in which both hands move over the time in which any moves", kMotion},
 };
 // clang-format on
@@ -152,8 +152,9 @@ std::string bite_name(const Bite& b) { return fmt::format("bite {}", b.number + 
 void measure_bites(const Facts& f, Sheet& sheet) {
   for (size_t i = 0; i < f.bite.size(); ++i) {
     const Bite& b = f.bite[i];
-    const std::string of = f.suture.size() > 1 || b.load > 0 ? fmt::format("suture {} bite {}", b.suture + b.load + 1, b.number + 1)
-                                                             : bite_name(b);
+    const std::string of = f.suture.size() > 1 || b.load > 0
+                               ? fmt::format("suture {} bite {}", b.suture + b.load + 1, b.number + 1)
+                               : bite_name(b);
     const auto add = [&](std::string_view key, double value) { sheet.add(key, value, b.tick, b.where, of); };
     add("edge_in", b.edge_in);
     add("edge_out", b.edge_out);
@@ -180,20 +181,19 @@ void measure_bites(const Facts& f, Sheet& sheet) {
     add("bites", 1);
     if (i == 0) continue;
     const Bite& a = f.bite[i - 1];
-    if (a.suture != b.suture || a.load != b.load || a.wall == b.wall) continue;
+    const bool tied = std::any_of(f.knot.begin(), f.knot.end(), [&](const Knot& k) {
+      return k.suture == b.suture && k.tick > a.tick && k.tick <= b.entered;
+    });
+    if (a.suture != b.suture || a.load != b.load || a.wall == b.wall || tied) continue;
     add("mirror_edge", std::abs(0.5 * (a.edge_in + a.edge_out) - 0.5 * (b.edge_in + b.edge_out)));
-    if (a.wall >= f.edge.size() || b.wall >= f.edge.size()) continue;
-    // Opposite points of two edges have the same coordinate in parts of their edges.
-    const double la = static_cast<double>(f.edge[a.wall].length()) * kMm, lb = static_cast<double>(f.edge[b.wall].length()) * kMm;
-    if (!(la > 0 && lb > 0)) continue;
-    const auto middle = [](const Bite& x, double all) {  // of the shorter stretch
-      double d = x.along_out - x.along_in;
-      d -= all * std::floor(d / all + 0.5);
-      return (x.along_in + 0.5 * d) / all;
-    };
-    double apart = middle(b, lb) - middle(a, la);
+    if (a.wall >= f.edge.size()) continue;
+    // Both ends of the crossing, seen from the edge of the first wall.
+    const StitchEdge& edge = f.edge[a.wall];
+    const double all = static_cast<double>(edge.length());
+    if (!(all > 0)) continue;
+    double apart = static_cast<double>(nearest_on(edge, b.entry).along - nearest_on(edge, a.exit).along) / all;
     apart -= std::floor(apart + 0.5);
-    add("mirror_offset", std::abs(apart) * 0.5 * (la + lb));
+    add("mirror_offset", std::abs(apart) * all * kMm);
   }
 }
 
@@ -316,7 +316,7 @@ void measure_hands(const Facts& f, Sheet& sheet) {
   const double rate = 1 / (f.setup.tick_s * f.stride);
   const auto tick_of = [&](size_t i) { return f.first + static_cast<uint64_t>(i) * f.stride; };
   sheet.add("time", static_cast<double>(f.last - f.first) * f.setup.tick_s, f.last, {});
-  std::array<std::vector<double>, 2> speed;
+  std::array<std::vector<double>, 2> speed, voluntary;
   double path = 0;
   for (size_t k = 0; k < 2; ++k) {
     const std::vector<Vec3>& raw = f.hand[k].position;
@@ -324,25 +324,24 @@ void measure_hands(const Facts& f, Sheet& sheet) {
     const std::string of = k == 0 ? "right hand" : "left hand";
     const std::vector<Vec3> smooth = low_pass(raw, kMotionCutoff, rate), slow = low_pass(raw, 5, rate);
     speed[k] = speed_of(smooth, rate);
+    voluntary[k] = speed_of(low_pass(raw, kVoluntaryCutoff, rate), rate);
     double own = 0, shake = 0;
     size_t idle = 0, still = 0, peaks = 0, moving = 0;
-    const std::vector<double> slow_speed = speed_of(slow, rate);
     for (size_t i = 0; i < raw.size(); ++i) {
       if (i > 0) own += static_cast<double>(distance(smooth[i], smooth[i - 1]));
-      idle += speed[k][i] < kIdleSpeed;
-      if (slow_speed[i] < kIdleSpeed) shake += static_cast<double>(length2(raw[i] - slow[i])), ++still;
+      idle += voluntary[k][i] < kIdleSpeed;
+      if (voluntary[k][i] < kIdleSpeed) shake += static_cast<double>(length2(raw[i] - slow[i])), ++still;
     }
     path += own;
     const uint64_t end = tick_of(raw.size() - 1);
     sheet.add("path", own, end, raw.back(), of);
     sheet.add("idle", static_cast<double>(idle) / static_cast<double>(raw.size()), end, raw.back(), of);
     if (still > 0) sheet.add("tremor", std::sqrt(shake / static_cast<double>(still)) * kMm, end, raw.back(), of);
-    for (const Stretch& m : movements(speed[k], rate)) {
+    for (const Stretch& m : movements(voluntary[k], rate)) {
       const size_t n = m.end - m.first;
       sheet.add("ldlj", ldlj(std::span(smooth).subspan(m.first, n), rate), tick_of(m.first), smooth[m.first], of);
       sheet.add("sparc", sparc(std::span(speed[k]).subspan(m.first, n), rate), tick_of(m.first), smooth[m.first], of);
-      for (size_t i = m.first + 1; i + 1 < m.end; ++i)
-        peaks += speed[k][i] > speed[k][i - 1] && speed[k][i] >= speed[k][i + 1];
+      for (size_t i = m.first + 1; i + 1 < m.end; ++i) peaks += speed[k][i] > speed[k][i - 1] && speed[k][i] >= speed[k][i + 1];
       moving += n;
     }
     if (moving > 0)
@@ -352,12 +351,12 @@ void measure_hands(const Facts& f, Sheet& sheet) {
   const size_t n = std::min(speed[0].size(), speed[1].size());
   size_t none = 0, any = 0, both = 0;
   for (size_t i = 0; i < n; ++i) {
-    const bool r = speed[0][i] >= kIdleSpeed, l = speed[1][i] >= kIdleSpeed;
+    const bool r = voluntary[0][i] >= kIdleSpeed, l = voluntary[1][i] >= kIdleSpeed;
     none += !r && !l, any += r || l, both += r && l;
   }
   if (n > 0) sheet.add("pause", static_cast<double>(none) / static_cast<double>(n), f.last, {});
   if (any > 0) sheet.add("together", static_cast<double>(both) / static_cast<double>(any), f.last, {});
-  sheet.add("bimanual", correlation(speed[0], speed[1]), f.last, {});
+  sheet.add("bimanual", correlation(voluntary[0], voluntary[1]), f.last, {});
 }
 
 }  // namespace
@@ -402,7 +401,8 @@ Result measure(const Facts& f, const PictureModel& picture, const Snapshot& seen
 }
 
 std::string metrics_markdown() {
-  std::string out = "| key | metric | unit | summary | better | definition of a sample | source |\n|---|---|---|---|---|---|---|\n";
+  std::string out =
+      "| key | metric | unit | summary | better | definition of a sample | source |\n|---|---|---|---|---|---|---|\n";
   const char* group = "";
   for (const MetricRow& r : kRow) {
     if (std::string_view(group) != r.group) out += fmt::format("| **{}** | | | | | | |\n", group = r.group);

@@ -11,7 +11,7 @@
 
 namespace catgut::assess {
 
-enum class Better { higher, lower, target };        // target: a band of the rubric
+enum class Better { higher, lower, target };                     // target: a band of the rubric
 enum class Summary { mean, spread, maximum, sum, count, only };  // of the samples; spread: standard deviation; only: one value
 const char* better_name(Better better);
 const char* summary_name(Summary summary);

@@ -81,14 +81,13 @@ double ldlj(std::span<const Vec3> p, double rate) {
   if (!(peak > 0)) return kNone;
   const auto at = [&](size_t i, int axis) { return static_cast<double>(p[i][axis]); };
   double sum = 0;
-  for (size_t i = 2; i + 2 < n; ++i)
+  for (size_t i = 0; i + 3 < n; ++i)
     for (int axis = 0; axis < 3; ++axis) {
-      const double jerk =
-          (at(i + 2, axis) - 2 * at(i + 1, axis) + 2 * at(i - 1, axis) - at(i - 2, axis)) * 0.5 * rate * rate * rate;
-      sum += jerk * jerk / rate;
+      const double jerk = (at(i + 3, axis) - 3 * at(i + 2, axis) + 3 * at(i + 1, axis) - at(i, axis)) * rate * rate * rate;
+      // Each difference stands for the interval in its middle; the first and the last also for the ones at the ends.
+      const double intervals = 1 + static_cast<double>(i == 0) + static_cast<double>(i + 4 == n);
+      sum += jerk * jerk * intervals / rate;
     }
-  // The differences leave out two samples at each end: the mean holds for the whole movement.
-  sum *= static_cast<double>(n - 1) / static_cast<double>(n - 4);
   const double t = static_cast<double>(n - 1) / rate, jerkiness = t * t * t / (peak * peak) * sum;
   return jerkiness > 0 ? -portable::log(jerkiness) : kNone;
 }

@@ -12,8 +12,10 @@
 namespace catgut::assess {
 
 // Filter of all measured motion: second-order Butterworth, forward and backward, without delay.
-constexpr double kMotionCutoff = 10;    // [Hz]
-constexpr double kIdleSpeed = 0.005;    // [m/s] below it a hand is idle
+constexpr double kMotionCutoff = 10;  // [Hz]
+// Voluntary motion: 98.9 % of its power lies below 2 Hz (Riviere et al. 1997). Tremor does not make an idle hand busy.
+constexpr double kVoluntaryCutoff = 2;  // [Hz]
+constexpr double kIdleSpeed = 0.005;    // [m/s] of voluntary motion; below it a hand is idle
 constexpr double kShortest = 0.3;       // [s] shorter stretches of motion are not judged
 
 std::vector<double> low_pass(std::span<const double> value, double cutoff, double rate);
@@ -21,7 +23,8 @@ std::vector<Vec3> low_pass(std::span<const Vec3> value, double cutoff, double ra
 std::vector<double> speed_of(std::span<const Vec3> position, double rate);  // [m/s] central differences
 
 // Log dimensionless jerk of one movement, -ln(T^3 / vpeak^2 * integral |jerk|^2 dt); nearer to zero is smoother. Not a number
-// for fewer than 5 samples or without motion. A minimum-jerk movement has -ln(204.8).
+// for fewer than 5 samples or without motion. A minimum-jerk movement has -ln(204.8). Positions are single precision: at rates
+// far above 100 Hz their rounding dominates the jerk.
 double ldlj(std::span<const Vec3> position, double rate);
 
 // Spectral arc length of a speed profile up to `cutoff` [Hz], from where the normalized spectrum last exceeds `threshold`; the

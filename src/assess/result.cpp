@@ -57,12 +57,8 @@ Json knot_json(const Knot& k) {
                       {"tension_n", t.tension},
                       {"gap_mm", t.gap},
                       {"seconds", t.seconds}});
-  return {{"tick", k.tick},
-          {"suture", k.suture},
-          {"load", k.load},
-          {"number", k.number},
-          {"where_m", place(k.where)},
-          {"kind", knot_kind_name(k.kind)},
+  return {{"tick", k.tick},     {"suture", k.suture},        {"load", k.load},
+          {"number", k.number}, {"where_m", place(k.where)}, {"kind", knot_kind_name(k.kind)},
           {"throws", throws}};
 }
 

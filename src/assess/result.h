@@ -30,27 +30,27 @@ struct Metric {
 
 // One completed bite. Lengths in millimeters on the tissue at rest, angles in degrees; kNotObserved where there is none.
 struct Bite {
-  uint64_t entered = 0, tick = 0;         // of the tip's entry, of completion
-  uint32_t suture = 0, load = 0;          // index of its suture; how often that suture was replaced before
-  uint32_t number = 0;                    // in that suture, as in events
-  uint32_t wall = 0;                      // of PictureModel::rim
-  Vec3 entry, exit;                       // [m] at rest
-  Vec3 where;                             // [m] in the field at completion
-  double along_in = 0, along_out = 0;     // along the edge, from its first point
+  uint64_t entered = 0, tick = 0;                          // of the tip's entry, of completion
+  uint32_t suture = 0, load = 0;                           // index of its suture; how often that suture was replaced before
+  uint32_t number = 0;                                     // in that suture, as in events
+  uint32_t wall = 0;                                       // of PictureModel::rim
+  Vec3 entry, exit;                                        // [m] at rest
+  Vec3 where;                                              // [m] in the field at completion
+  double along_in = 0, along_out = 0;                      // along the edge, from its first point
   double edge_in = kNotObserved, edge_out = kNotObserved;  // distance of entry and exit from the cut edge
-  double length = 0;                      // from entry to exit
-  double spacing = kNotObserved;          // along the edge to the nearest end of the bite before it in the same wall
-  double depth = 0;                       // greatest distance of the tip below the serosa
-  double depth_fraction = 0;              // of the wall's thickness; 1 or more: the needle entered the lumen
-  int layers = 0;                         // 1 serosa, 2 and muscularis, 3 and submucosa, 4 and mucosa
+  double length = 0;                                       // from entry to exit
+  double spacing = kNotObserved;  // along the edge to the nearest end of the bite before it in the same wall
+  double depth = 0;               // greatest distance of the tip below the serosa
+  double depth_fraction = 0;      // of the wall's thickness; 1 or more: the needle entered the lumen
+  int layers = 0;                 // 1 serosa, 2 and muscularis, 3 and submucosa, 4 and mucosa
   double entry_angle = kNotObserved, exit_angle = kNotObserved;  // of the needle to the surface, 0..90
-  double edge_angle = kNotObserved;       // of the bite to the edge, 0 along it .. 90 across
-  double wander = 0;                      // root mean square distance of the needle's center from its mean, in tissue
-  double seconds = 0;                     // [s] from the tip's entry to completion
-  double grasp_at = kNotObserved;         // position of the jaws on the needle at entry, 0 swage .. 1 tip
-  double grasp_angle = kNotObserved;      // of the shaft to the needle there
-  uint32_t attempts = 1;                  // entries of the tip since the bite before
-  uint32_t grasps = 0;                    // of the needle since the bite before
+  double edge_angle = kNotObserved;                              // of the bite to the edge, 0 along it .. 90 across
+  double wander = 0;                               // root mean square distance of the needle's center from its mean, in tissue
+  double seconds = 0;                              // [s] from the tip's entry to completion
+  double grasp_at = kNotObserved;                  // position of the jaws on the needle at entry, 0 swage .. 1 tip
+  double grasp_angle = kNotObserved;               // of the shaft to the needle there
+  uint32_t attempts = 1;                           // entries of the tip since the bite before
+  uint32_t grasps = 0;                             // of the needle since the bite before
   bool entry_inside = false, exit_inside = false;  // on the mucosa
 };
 
@@ -58,34 +58,34 @@ enum class KnotKind : uint8_t { none, single_throw, granny, square, surgeons, mi
 std::string_view knot_kind_name(KnotKind kind);  // "granny", "surgeon's", ...
 
 struct Throw {
-  uint64_t tick = 0;       // when it locked
+  uint64_t tick = 0;  // when it locked
   uint32_t wraps = 1;
-  int hand = 1;            // chirality, +1 or -1: equal hands in turn make a granny
-  bool sliding = false;    // one strand is straight and the other wound on it
-  double tension = 0;      // [N] of the pulled strand when it locked
-  double gap = 0;          // [mm] to the tissue, or to the throw below
-  double seconds = 0;      // [s] from its start to its lock
+  int hand = 1;          // chirality, +1 or -1: equal hands in turn make a granny
+  bool sliding = false;  // one strand is straight and the other wound on it
+  double tension = 0;    // [N] of the pulled strand when it locked
+  double gap = 0;        // [mm] to the tissue, or to the throw below
+  double seconds = 0;    // [s] from its start to its lock
 };
 
 struct Knot {
-  uint64_t tick = 0;             // of the last throw
+  uint64_t tick = 0;              // of the last throw
   uint32_t suture = 0, load = 0;  // as in Bite
-  uint32_t number = 0;           // in that suture
-  Vec3 where;                    // [m] in the field
+  uint32_t number = 0;            // in that suture
+  Vec3 where;                     // [m] in the field
   KnotKind kind = KnotKind::none;
   std::vector<Throw> thrown;
 };
 
 // A lost point, with its reason: a click plays the recording from `tick`.
 struct LostPoint {
-  std::string item;          // key of the rubric's item
-  std::string why;           // a sentence with the number and the band
-  std::string of;            // as in Sample
-  double value = 0;          // in the unit of the metric
-  double points = 0;         // lost
+  std::string item;   // key of the rubric's item
+  std::string why;    // a sentence with the number and the band
+  std::string of;     // as in Sample
+  double value = 0;   // in the unit of the metric
+  double points = 0;  // lost
   uint64_t tick = 0;
-  double time_s = 0;         // [s] of that tick
-  Vec3 where;                // [m]
+  double time_s = 0;  // [s] of that tick
+  Vec3 where;         // [m]
   bool critical = false;
 };
 
@@ -99,14 +99,14 @@ struct ItemScore {
 };
 
 struct Score {
-  std::string rubric, title, version;  // name of the rubric's file without .toml; its title; its version
-  uint64_t rubric_hash = 0;            // of the file's text
+  std::string rubric, title, version;                // name of the rubric's file without .toml; its title; its version
+  uint64_t rubric_hash = 0;                          // of the file's text
   double points = 0, of = 0, percent = 0, pass = 0;  // pass: [%] required
-  bool every_item = false;             // every item must pass
+  bool every_item = false;                           // every item must pass
   bool passed = false;
-  std::string verdict;                 // one sentence
+  std::string verdict;  // one sentence
   std::vector<ItemScore> item;
-  std::vector<LostPoint> lost;         // in the order of time
+  std::vector<LostPoint> lost;  // in the order of time
 };
 
 struct Result {
@@ -115,9 +115,9 @@ struct Result {
   uint64_t seed = 0;
   uint64_t ticks = 0, first_tick = 0;  // of the recording; the first with connected hands
   double tick_s = 1.0 / 60, time_s = 0;
-  uint64_t state_hash = 0;   // after the last tick
-  bool truncated = false;    // the recording ends early
-  std::string filter;        // of the hands' motion, as text
+  uint64_t state_hash = 0;  // after the last tick
+  bool truncated = false;   // the recording ends early
+  std::string filter;       // of the hands' motion, as text
   std::vector<Bite> bite;
   std::vector<Knot> knot;
   std::vector<Metric> metric;  // one per row of metric_rows(), in their order

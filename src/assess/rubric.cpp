@@ -60,7 +60,8 @@ struct Reader {
     if (!n) return otherwise;
     const double v = number(*n, key);
     if (!(v >= low && v <= high))
-      throw InputError(at(*n), fmt::format("{} = {} is out of range", key, v), fmt::format("it is a number, {}..{}", low, high));
+      throw InputError(at(*n), fmt::format("{} = {} is out of range", key, v),
+                       fmt::format("it is a number, {}..{}", low, high));
     return v;
   }
   bool band(const toml::table& t, const char* key, Band& out) const {
@@ -113,7 +114,8 @@ RubricItem read_item(const Reader& in, const toml::table& t) {
   if (!in.band(t, "half", item.half)) item.half = item.full;
   item.has_critical = in.band(t, "critical", item.critical);
   if (!full && !item.has_critical)
-    throw InputError(where, fmt::format("the item {} has no band", item.key), "add full = [low, high], or critical = [low, high]");
+    throw InputError(where, fmt::format("the item {} has no band", item.key),
+                     "add full = [low, high], or critical = [low, high]");
   if (item.half.low > item.full.low || item.half.high < item.full.high)
     throw InputError(in.at(*t.get("half")), fmt::format("half does not contain full in the item {}", item.key),
                      "half is the wider band");
@@ -151,8 +153,9 @@ Rubric read_rubric(const std::string& name_or_path) {
   if (!in || !fs::is_regular_file(path)) {
     const std::string nearest = nearest_word(name_or_path, rubric_names());
     throw InputError(name_or_path, "there is no such rubric",
-                     nearest.empty() ? fmt::format("there are {}, or give the path of a .toml file", fmt::join(rubric_names(), ", "))
-                                     : fmt::format("did you mean \"{}\"?", nearest));
+                     nearest.empty()
+                         ? fmt::format("there are {}, or give the path of a .toml file", fmt::join(rubric_names(), ", "))
+                         : fmt::format("did you mean \"{}\"?", nearest));
   }
   std::ostringstream text;
   text << in.rdbuf();
@@ -180,7 +183,8 @@ Rubric parse_rubric(const std::string& text, const std::string& filename) {
   r.title = in.text(table, "title", r.name);
   r.technique = in.text(table, "technique", "");
   r.version = in.text(table, "version", "");
-  if (r.version.empty()) throw InputError(filename, "the rubric has no version", "add version = \"1\", and raise it with every change");
+  if (r.version.empty())
+    throw InputError(filename, "the rubric has no version", "add version = \"1\", and raise it with every change");
   r.pass = in.number(table, "pass", 70, 0, 100);
   r.every_item = in.flag(table, "every_item", false);
   const toml::node* items = table.get("item");
@@ -192,7 +196,8 @@ Rubric parse_rubric(const std::string& text, const std::string& filename) {
     r.item.push_back(read_item(in, *t));
     for (size_t i = 0; i + 1 < r.item.size(); ++i)
       if (r.item[i].key == r.item.back().key)
-        throw InputError(in.at(node), fmt::format("there are two items \"{}\"", r.item[i].key), "give one of them another `key`");
+        throw InputError(in.at(node), fmt::format("there are two items \"{}\"", r.item[i].key),
+                         "give one of them another `key`");
   }
   return r;
 }
@@ -261,18 +266,18 @@ Score mark(const Rubric& rubric, const Result& result) {
   s.percent = s.of > 0 ? 100 * s.points / s.of : 0;
   s.passed = s.percent >= s.pass && critical == 0 && (!s.every_item || failed == 0);
   const bool unproven = std::any_of(s.item.begin(), s.item.end(), [](const ItemScore& i) { return !i.validated; });
-  s.verdict = critical > 0        ? fmt::format("failed: {} critical {}", critical, critical == 1 ? "error" : "errors")
+  s.verdict = critical > 0         ? fmt::format("failed: {} critical {}", critical, critical == 1 ? "error" : "errors")
               : s.percent < s.pass ? fmt::format("failed: {:.1f} % of the points, {} % required", s.percent, s.pass)
-              : !s.passed          ? fmt::format("failed: {} of {} items below their limit, every item must pass", failed, s.item.size())
-                                   : fmt::format("passed: {:.1f} % of the points", s.percent);
+              : !s.passed ? fmt::format("failed: {} of {} items below their limit, every item must pass", failed, s.item.size())
+                          : fmt::format("passed: {:.1f} % of the points", s.percent);
   if (unproven) s.verdict += "; for practice only: no study with people has validated all bands";
   std::stable_sort(s.lost.begin(), s.lost.end(), [](const LostPoint& a, const LostPoint& b) { return a.tick < b.tick; });
   return s;
 }
 
 std::string score_text(const Score& s) {
-  std::string out = fmt::format("{} (rubric {}, version {})\n{}\n{:.1f} of {} points\n\n", s.title, s.rubric, s.version, s.verdict,
-                                s.points, s.of);
+  std::string out = fmt::format("{} (rubric {}, version {})\n{}\n{:.1f} of {} points\n\n", s.title, s.rubric, s.version,
+                                s.verdict, s.points, s.of);
   for (const ItemScore& i : s.item)
     out += fmt::format("  {:<34} {:>10} {:<4} {:>6.2f} of {:<5} {}{}\n", i.title,
                        std::isfinite(i.value) ? short_number(i.value) : "-", i.unit, i.points, i.of,
@@ -280,7 +285,8 @@ std::string score_text(const Score& s) {
   out += "  * no study with people has validated this band\n";
   if (!s.lost.empty()) out += "\nLost points\n";
   for (const LostPoint& l : s.lost)
-    out += fmt::format("  {:>7.2f} s  tick {:<6} {}{:.2f}  {}\n", l.time_s, l.tick, l.critical ? "CRITICAL -" : "-", l.points, l.why);
+    out += fmt::format("  {:>7.2f} s  tick {:<6} {}{:.2f}  {}\n", l.time_s, l.tick, l.critical ? "CRITICAL -" : "-", l.points,
+                       l.why);
   return out;
 }
 

@@ -16,22 +16,22 @@ struct Band {
 
 struct RubricItem {
   std::string key, title, metric;
-  double weight = 1;      // points
-  Band full, half;        // all, or half of the points; beyond: none. half contains full
+  double weight = 1;  // points
+  Band full, half;    // all, or half of the points; beyond: none. half contains full
   bool has_critical = false;
-  Band critical;          // outside it the session fails
-  bool each = true;       // every sample is judged, and has its share of the points; else the summary
-  double pass = 0.5;      // part of the points that the item needs, where every item must pass
-  bool required = true;   // without an observation the points are lost; else the item does not count
-  bool validated = false; // a study with people supports the band
+  Band critical;           // outside it the session fails
+  bool each = true;        // every sample is judged, and has its share of the points; else the summary
+  double pass = 0.5;       // part of the points that the item needs, where every item must pass
+  bool required = true;    // without an observation the points are lost; else the item does not count
+  bool validated = false;  // a study with people supports the band
   std::string source;
-  std::string why;        // for the learner: what is wrong with a value outside the band
+  std::string why;  // for the learner: what is wrong with a value outside the band
 };
 
 struct Rubric {
   std::string name, title, technique, version;
-  uint64_t hash = 0;       // of the file
-  double pass = 70;        // [%] of the points
+  uint64_t hash = 0;  // of the file
+  double pass = 70;   // [%] of the points
   bool every_item = false;
   std::vector<RubricItem> item;
 };

@@ -18,8 +18,8 @@
 #include "core/file.h"
 #include "core/hash.h"
 #include "procedure/ability.h"
-#include "procedure/scene_file.h"
 #include "procedure/scene_fields.h"
+#include "procedure/scene_file.h"
 #include "procedure/toml.h"
 #include "runtime/assessment.h"
 
@@ -41,7 +41,8 @@ std::vector<std::string> words(const std::string& file, const toml::table& t, co
   const toml::array* a = n->as_array();
   if (!a) throw InputError(at(file, *n), fmt::format("{} is not a list", key), fmt::format("write {} = [\"...\"]", key));
   for (const toml::node& w : *a) {
-    if (!w.is_string()) throw InputError(at(file, w), fmt::format("{} holds something that is not a text", key), "write it in quotes");
+    if (!w.is_string())
+      throw InputError(at(file, w), fmt::format("{} holds something that is not a text", key), "write it in quotes");
     out.push_back(*w.value<std::string>());
   }
   return out;
@@ -178,7 +179,8 @@ StudyPlan parse_study(const std::string& text, const std::string& file) {
   if (p.setting.empty()) p.setting.push_back({"default", {}});
   const double runs = static_cast<double>(p.scene.size() * p.surgeon.size() * p.setting.size()) *
                       (static_cast<double>(p.last_seed - p.first_seed) + 1);
-  if (runs > kMostRuns) throw InputError(file, fmt::format("the study has {:.0f} runs", runs), fmt::format("at most {}", kMostRuns));
+  if (runs > kMostRuns)
+    throw InputError(file, fmt::format("the study has {:.0f} runs", runs), fmt::format("at most {}", kMostRuns));
   // Errors of scenes, surgeons and settings show before the first run.
   StudyRun probe;
   for (probe.scene = p.scene[0]; const std::string& scene : p.scene)
@@ -297,7 +299,9 @@ std::string study_report(const StudyPlan& plan, const std::string& folder) {
     for (const auto& r : of) v.push_back(number_of(r[k]));
     return v;
   };
-  const auto short_name = [](const std::string& who) { return who.substr(who.find(':') == std::string::npos ? 0 : who.find(':') + 1); };
+  const auto short_name = [](const std::string& who) {
+    return who.substr(who.find(':') == std::string::npos ? 0 : who.find(':') + 1);
+  };
   std::string out;
   for (const std::string& scene : plan.scene) {
     auto& of = rows[scene];

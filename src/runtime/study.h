@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: studies: many surgeons, seeds, scenes and settings; one table out. Every finished run is a file of its own, so that a
-// study is resumed where it stopped, and is divided over machines by a number (a Slurm array, a Dask map) without a scheduler.
+// runtime: studies: many surgeons, seeds, scenes and settings; one table out. Every finished run is a file of its own, so that
+// a study is resumed where it stopped, and is divided over machines by a number (a Slurm array, a Dask map) without a
+// scheduler.
 #pragma once
 #include <atomic>
 #include <functional>
@@ -36,9 +37,9 @@ struct StudyRun {
 std::vector<StudyRun> runs_of(const StudyPlan& plan);
 
 struct StudyOptions {
-  std::string folder;          // of the runs' files
-  size_t index = 0, of = 1;    // this process does runs with number % of == index
-  int jobs = 1;                // runs at a time, one thread each
+  std::string folder;        // of the runs' files
+  size_t index = 0, of = 1;  // this process does runs with number % of == index
+  int jobs = 1;              // runs at a time, one thread each
   const std::atomic<bool>* stop = nullptr;
   std::function<void(const StudyRun&, size_t done, size_t all, const std::string& what)> on_run;
 };

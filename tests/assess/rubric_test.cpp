@@ -50,7 +50,8 @@ TEST(Rubric, bad_ones_are_one_line_with_place_and_remedy) {
             "my.toml:3: there is no metric \"spaceing\"; did you mean \"spacing\"?");
   EXPECT_EQ(fault_of(rubric("[[item]]\nmetric = \"spacing\"\nful = [3, 5]\n")),
             "my.toml:4: an item has no key \"ful\"; did you mean \"full\"?");
-  EXPECT_EQ(fault_of(rubric(item, "version = \"1\"\npas = 3\n")), "my.toml:2: a rubric has no key \"pas\"; did you mean \"pass\"?");
+  EXPECT_EQ(fault_of(rubric(item, "version = \"1\"\npas = 3\n")),
+            "my.toml:2: a rubric has no key \"pas\"; did you mean \"pass\"?");
   EXPECT_NE(fault_of(rubric("[[item]]\nmetric = \"spacing\"\nfull = [5, 3]\n")).find("is empty"), std::string::npos);
   EXPECT_NE(fault_of(rubric("[[item]]\nmetric = \"spacing\"\nfull = [3, 5, 7]\n")).find("write it as [low, high]"),
             std::string::npos);
@@ -68,15 +69,17 @@ TEST(Rubric, bad_ones_are_one_line_with_place_and_remedy) {
   try {
     read_rubric("purse_strng");
     ADD_FAILURE();
-  } catch (const InputError& e) { EXPECT_STREQ(e.what(), "purse_strng: there is no such rubric; did you mean \"purse_string\"?"); }
+  } catch (const InputError& e) {
+    EXPECT_STREQ(e.what(), "purse_strng: there is no such rubric; did you mean \"purse_string\"?");
+  }
 }
 
 TEST(Rubric, points_bands_and_reasons) {
-  const Rubric r = parse_rubric(rubric("[[item]]\nmetric = \"spacing\"\nweight = 10\nfull = [3, 5]\nhalf = [2, 7]\nwhy = \"leaks\"\n"),
-                                "my.toml");
-  const Score s = mark(r, with("spacing", {{4, 10, {}, "bite 1"}, {6, 70, {1, 2, 3}, "bite 2"}, {9, 130, {}, "bite 3"},
-                                           {3, 190, {}, "bite 4"}},
-                               5.5));
+  const Rubric r = parse_rubric(
+      rubric("[[item]]\nmetric = \"spacing\"\nweight = 10\nfull = [3, 5]\nhalf = [2, 7]\nwhy = \"leaks\"\n"), "my.toml");
+  const Score s =
+      mark(r, with("spacing",
+                   {{4, 10, {}, "bite 1"}, {6, 70, {1, 2, 3}, "bite 2"}, {9, 130, {}, "bite 3"}, {3, 190, {}, "bite 4"}}, 5.5));
   EXPECT_DOUBLE_EQ(s.points, 2.5 + 1.25 + 0 + 2.5);
   ASSERT_EQ(s.lost.size(), 2u);
   EXPECT_EQ(s.lost[0].of, "bite 2");

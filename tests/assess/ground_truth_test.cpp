@@ -1,0 +1,490 @@
+// SPDX-License-Identifier: Apache-2.0
+// tests/assess: a stitched session made by construction: every distance, depth, angle and spacing is known, and 29 kinds of
+// errors are put in one by one. The tissue is the generated bowel of the scene `stay`; it is moved rigidly, so that positions in
+// the field and at rest differ.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <set>
+
+#include "assess/metrics.h"
+#include "assess/rubric.h"
+#include "procedure/scene_file.h"
+#include "sim/simulation.h"
+
+namespace catgut::assess {
+namespace {
+
+constexpr float kRadius = 0.020f, kWall = 0.0018f, kEnd = 0.0045f;  // [m] of the scene
+constexpr double kDt = 1.0 / 60;
+
+struct World {
+  SceneSpec scene = read_scene("stay");
+  PictureModel picture;
+  Snapshot start;
+  World() {
+    // A cylinder: its positions and directions are known.
+    for (const char* set : {"body.haustra=0", "body.taeniae=0"}) set_value(scene, set);
+    const auto model = build_model(scene);
+    picture = picture_model(*model);
+    const StatePtr state = initial_state(*model);
+    publish(*model, *state, start);
+  }
+};
+const World& world() {
+  static const World w;
+  return w;
+}
+
+// A bite across or along the edge, given on the outer surface at rest: `edge` [mm] distance of entry and exit from the rim,
+// `angle` [deg] about the axis from the top.
+struct Plan {
+  uint32_t wall = 0;
+  double edge_in = 8, edge_out = 4;  // [mm]
+  double angle_in = 0, angle_out = 0;  // [deg] about the axis
+  double tip_depth = 1.1;  // [mm] below the serosa
+  double tilt = 90;        // [deg] of the needle to the surface at entry and exit
+  int attempts = 1, grasps = 2;
+  bool through = false;    // exits on the mucosa
+  double wander = 0;       // [mm] of the needle's center
+  double grasp_at = 0.35, grasp_angle = 90;
+};
+
+// One session, built tick by tick from happenings.
+class Session {
+ public:
+  Session() : turn_(axis_angle({0.3f, 1, 0.2f}, 0.4f)), away_{0.03f, -0.02f, 0.05f}, seen_(world().start) {
+    for (size_t i = 0; i < world().picture.particle_rest.size(); ++i) {
+      seen_.particle[i] = moved(world().picture.particle_rest[i]);
+      seen_.rotation[i] = turn_;
+    }
+    Setup setup;
+    setup.tick_s = kDt, setup.wall = static_cast<double>(kWall) * 1000, setup.technique = "stay";
+    facts_ = begin_facts(world().picture, setup);
+    for (size_t k = 0; k < 2; ++k) input_.hand[k].pose.p = {k == 0 ? 0.1f : -0.1f, 0.1f, 0};
+    seen_.tick = 0;
+    tick();
+  }
+
+  Vec3 moved(Vec3 p) const { return rotate(turn_, p) + away_; }
+  Vec3 turned(Vec3 d) const { return rotate(turn_, d); }
+
+  // Hands move with minimum-jerk strokes while time passes, both at once.
+  void tick(int n = 1) {
+    for (int i = 0; i < n; ++i) {
+      ++seen_.tick;
+      for (Event& e : seen_.event) e.tick = seen_.tick;
+      const double phase = std::fmod(static_cast<double>(seen_.tick), 90) / 90, t = phase < 0.5 ? 2 * phase : 2 - 2 * phase;
+      const double x = 0.08 * t * t * t * (10 - 15 * t + 6 * t * t);
+      for (size_t k = 0; k < 2; ++k) {
+        Vec3 p{k == 0 ? 0.1f : -0.1f, 0.1f + static_cast<float>(k == 1 && left_idle ? 0 : x), 0};
+        if (all_idle) p = {k == 0 ? 0.1f : -0.1f, 0.1f, 0};
+        // 8 Hz, 0.5 mm
+        p.z += shake * static_cast<float>(std::sin(6.2831853 * 8 * static_cast<double>(seen_.tick) * kDt));
+        input_.hand[k].pose.p = p;
+      }
+      note(facts_, world().picture, seen_, input_);
+      seen_.event.clear();
+    }
+  }
+  void happen(EventKind kind, uint32_t which = 0, float value = 0, Fault fault = Fault::none) {
+    seen_.event.push_back({.kind = kind, .which = which, .value = value, .where = away_, .fault = fault, .tick = seen_.tick});
+  }
+
+  static Vec3 on_serosa(uint32_t wall, double edge_mm, double angle_deg, double below_mm = 0) {
+    const double a = angle_deg / 180 * 3.14159265358979, r = static_cast<double>(kRadius) - below_mm * 1e-3;
+    const double x = static_cast<double>(kEnd) + edge_mm * 1e-3;
+    return {static_cast<float>(wall == 0 ? -x : x), static_cast<float>(r * std::cos(a)), static_cast<float>(r * std::sin(a))};
+  }
+
+  void bite(const Plan& p) {
+    SutureView& s = seen_.active();
+    const SuturePicture& shape = world().picture.suture[0];
+    const Vec3 in = on_serosa(p.wall, p.edge_in, p.angle_in);
+    const Vec3 out = on_serosa(p.wall, p.edge_out, p.angle_out, p.through ? static_cast<double>(kWall) * 1000 : 0);
+    for (int g = 0; g < p.grasps; ++g) happen(EventKind::needle_grasped);
+    tick(5);
+    for (int a = 1; a < p.attempts; ++a) {
+      begin_bite(p, in, out);
+      tick(10);
+      happen(EventKind::bite_withdrawn, static_cast<uint32_t>(s.bite.size() - 1));
+      s.needle.in_tissue = false;
+      tick(5);
+    }
+    begin_bite(p, in, out);
+    const auto number = static_cast<uint32_t>(s.bite.size() - 1);
+    s.needle.pose = needle_through(in, p.angle_in, in - out, p.tilt, true);
+    for (ToolView& t : seen_.tool) t.held = Held::nothing;
+    ToolView& holder = seen_.tool[0];
+    holder.held = Held::needle, holder.held_at = static_cast<float>(p.grasp_at), holder.held_suture = 0;
+    {  // the shaft at `grasp_angle` to the needle
+      const float phi = holder.held_at * shape.needle_arc;
+      const Vec3 along = rotate(s.needle.pose.q, {-std::sin(phi), std::cos(phi), 0});
+      const Vec3 up = rotate(s.needle.pose.q, {0, 0, 1});
+      const float a = static_cast<float>(p.grasp_angle / 180 * 3.14159265358979);
+      const Vec3 z = along * std::cos(a) + up * std::sin(a), x = any_perpendicular(z);
+      holder.pose.q = from_axes(x, cross(z, x), z);
+    }
+    tick();
+    // The tip waits at the entry, and once it is at its greatest depth.
+    const double middle = 0.5 * (p.angle_in + p.angle_out), edge = 0.5 * (p.edge_in + p.edge_out);
+    const Vec3 tip = moved(on_serosa(p.wall, edge, middle, p.tip_depth));
+    const Pose entered = s.needle.pose;
+    for (int k = 0; k < 400; ++k) {
+      s.needle.pose = k == 200 ? tip_at(tip, entered.q) : entered;
+      if (k != 200) s.needle.pose.p += turned({static_cast<float>((k % 2 ? 1 : -1) * p.wander * 1e-3), 0, 0});
+      tick();
+    }
+    s.needle.pose = needle_through(out, p.angle_out, in - out, p.tilt, false);
+    s.bite[number].has_exit = true;
+    s.bite[number].depth = 0;
+    happen(EventKind::tip_exited, number);
+    tick(20);
+    s.bite[number].complete = true;
+    s.needle.in_tissue = false;
+    happen(EventKind::bite_completed, number, distance(in, out));
+    tick(5);
+  }
+
+  // Throws of a knot, from the tissue.
+  void knot(const std::vector<KnotThrow>& thrown) {
+    SutureView& s = seen_.active();
+    const auto number = static_cast<uint32_t>(s.knot.size());
+    s.knot.emplace_back();
+    s.knot.back().position = moved(on_serosa(0, 0, 0));
+    for (const KnotThrow& t : thrown) {
+      happen(EventKind::throw_started, number, static_cast<float>(t.wraps));
+      tick(30);
+      KnotView& k = s.knot.back();
+      k.thrown[k.throws++] = t;
+      k.phase = KnotPhase::locked;
+      happen(EventKind::throw_locked, number, t.tension);
+      tick();
+    }
+  }
+  void pair(double gap_mm) {
+    const Vec3 a = moved(on_serosa(0, 0, 0));
+    seen_.active().seam.push_back({a, a + turned({static_cast<float>(gap_mm * 1e-3), 0, 0}), 0.009f, 1, true});
+  }
+  void tension(float newton) {
+    SuturePointView p;
+    p.position = moved(on_serosa(0, 4, 0)), p.tension_needle = newton;
+    seen_.active().suture_point.push_back(p);
+    tick();
+    seen_.active().suture_point.pop_back();
+    tick();
+  }
+  // Closes the jaws of a hand on nothing for half a second.
+  void grasp_nothing() {
+    seen_.tool[1].held = Held::nothing;
+    seen_.tool[1].jaw = 1;
+    tick();
+    seen_.tool[1].jaw = 0;
+    tick(30);
+  }
+  // Leans the edge's tissue of wall 0 by `degrees` outward.
+  void lean(double degrees) {
+    const PictureModel& p = world().picture;
+    for (const uint32_t i : p.rim[0]) {
+      const Vec3 radial = normalized(Vec3{0, p.particle_rest[i].y, p.particle_rest[i].z});
+      const Vec3 hinge = cross({1, 0, 0}, radial);  // turns the axis of the opening toward the outside
+      seen_.rotation[i] = axis_angle(hinge, static_cast<float>(degrees / 180 * 3.14159265358979));
+    }
+  }
+  void narrow(float factor) {
+    for (const uint32_t i : world().picture.rim[0]) {
+      const Vec3 r = world().picture.particle_rest[i];
+      seen_.particle[i] = moved({r.x, r.y * factor, r.z * factor});
+    }
+  }
+  void pull_tissue(float newton) {
+    seen_.tool[1].held = Held::tissue;
+    seen_.instrument[1].pull = {newton, 0, 0};
+    happen(EventKind::tissue_grasped);
+    tick(30);
+    seen_.tool[1].held = Held::nothing;
+  }
+
+  Result result() {
+    Result r = measure(facts_, world().picture, seen_);
+    r.ticks = seen_.tick;
+    return r;
+  }
+  Snapshot& seen() { return seen_; }
+  bool all_idle = false, left_idle = false;
+  float shake = 0;  // [m]
+
+ private:
+  void begin_bite(const Plan& p, Vec3 in, Vec3 out) {
+    SutureView& s = seen_.active();
+    BiteView b;
+    b.wall = p.wall, b.entry = moved(in), b.exit = moved(out);
+    b.exit_inside = p.through;
+    s.bite.push_back(b);
+    s.needle.in_tissue = true;
+    s.needle.pose = needle_through(in, p.angle_in, in - out, p.tilt, true);
+    happen(EventKind::tip_entered, static_cast<uint32_t>(s.bite.size() - 1));
+  }
+  // A needle whose circle passes `at` (on the serosa) at `tilt` to the surface, in the plane of `way` and the outward normal.
+  Pose needle_through(Vec3 at, double angle_deg, Vec3 way, double tilt, bool inward) const {
+    const float radius = world().picture.suture[0].needle_radius;
+    const double a = angle_deg / 180 * 3.14159265358979, t = tilt / 180 * 3.14159265358979;
+    const Vec3 out{0, static_cast<float>(std::cos(a)), static_cast<float>(std::sin(a))};
+    const Vec3 along = normalized(way - out * dot(way, out), {1, 0, 0});
+    const Vec3 tangent = normalized(along * static_cast<float>(std::cos(t)) +
+                                    out * static_cast<float>(inward ? -std::sin(t) : std::sin(t)));
+    const Vec3 normal = normalized(cross(out, along)), radial = cross(tangent, normal);
+    const Vec3 center = at - radial * radius;
+    // The tip, at the end of the arc, is there.
+    const Quat tip_first = axis_angle({0, 0, 1}, -world().picture.suture[0].needle_arc);
+    return {moved(center), turn_ * from_axes(radial, tangent, normal) * tip_first};
+  }
+  Pose tip_at(Vec3 tip, Quat q) const {
+    const SuturePicture& s = world().picture.suture[0];
+    return {tip - rotate(q, s.needle_radius * Vec3{std::cos(s.needle_arc), std::sin(s.needle_arc), 0}), q};
+  }
+
+  Quat turn_;
+  Vec3 away_;
+  Snapshot seen_;
+  TickInput input_;
+  Facts facts_;
+};
+
+const std::vector<KnotThrow> kSquare{{2, 1, 1, 1.0f, 0.0002f}, {1, -1, 1, 1.0f, 0.0001f}, {1, 1, 1, 1.0f, 0.0001f}};
+
+// Two good stitches of two bites each: far in, near out; near in, far out. 4 mm apart.
+struct Script {
+  std::vector<Plan> bite;
+  std::vector<KnotThrow> knot = kSquare;
+  std::function<void(Session&)> before = [](Session&) {}, after = [](Session&) {};
+  double gap = 0.2;
+  float tail = 0.005f;
+  Script() {
+    for (int s = 0; s < 2; ++s) {
+      const double angle = 4.0 * s / static_cast<double>(kRadius * 1000) * 57.29577951308232;
+      Plan left, right;
+      left.wall = 0, left.edge_in = 8, left.edge_out = 4, left.angle_in = left.angle_out = angle;
+      right.wall = 1, right.edge_in = 4, right.edge_out = 8, right.angle_in = right.angle_out = angle;
+      bite.push_back(left), bite.push_back(right);
+    }
+  }
+  Result run() const {
+    Session session;
+    before(session);
+    for (size_t i = 0; i < bite.size(); ++i) {
+      if (i == 2) session.happen(EventKind::suture_loaded);  // each stitch has its own thread
+      session.bite(bite[i]);
+    }
+    session.knot(knot);
+    session.pair(gap);
+    session.happen(EventKind::thread_cut, 0, tail);
+    session.tick();
+    after(session);
+    session.tick();
+    return session.result();
+  }
+};
+
+TEST(GroundTruth, bites_within_a_tenth_of_a_millimeter_and_one_degree) {
+  size_t checked = 0;
+  for (const double near : {1.5, 3.0, 5.0})
+    for (const double length : {3.0, 7.0})
+      for (const double tilt : {90.0, 60.0, 35.0})
+        for (const double depth : {0.4, 0.9, 1.5})
+          for (const double angle : {-30.0, 11.0, 140.0}) {
+            Session s;
+            Plan p;
+            p.wall = static_cast<uint32_t>(checked++ % 2);
+            p.edge_in = near + length, p.edge_out = near, p.angle_in = p.angle_out = angle;
+            p.tilt = tilt, p.tip_depth = depth;
+            s.bite(p);
+            const Result r = s.result();
+            ASSERT_EQ(r.bite.size(), 1u);
+            const Bite& b = r.bite[0];
+            EXPECT_NEAR(b.edge_in, near + length, 0.1);
+            EXPECT_NEAR(b.edge_out, near, 0.1);
+            EXPECT_NEAR(b.length, length, 0.1);
+            EXPECT_NEAR(b.entry_angle, tilt, 1) << "angle " << angle;
+            EXPECT_NEAR(b.exit_angle, tilt, 1) << "angle " << angle;
+            EXPECT_NEAR(b.edge_angle, 90, 1);
+            EXPECT_NEAR(b.depth, depth, 0.1) << near << ' ' << length << ' ' << tilt << ' ' << angle;
+          }
+  EXPECT_EQ(checked, 162u);
+}
+
+TEST(GroundTruth, spacing_and_direction_along_the_edge) {
+  for (const double apart : {3.0, 5.0, 9.0})
+    for (const double oblique : {0.0, 2.0, 4.0}) {  // [mm] along the edge within a bite
+      Session s;
+      const double per_mm = 1 / static_cast<double>(kRadius * 1000) * 57.29577951308232;
+      Plan p;
+      p.edge_in = 8, p.edge_out = 4;
+      p.angle_in = 0, p.angle_out = oblique * per_mm;
+      s.bite(p);
+      p.angle_in = (oblique + apart) * per_mm, p.angle_out = (2 * oblique + apart) * per_mm;
+      s.bite(p);
+      const Result r = s.result();
+      EXPECT_NEAR(r.bite[1].spacing, apart, 0.1);
+      EXPECT_NEAR(r.bite[0].edge_angle, std::atan2(4.0, oblique) * 57.29577951308232, 1);
+    }
+}
+
+TEST(GroundTruth, both_sides_of_a_stitch) {
+  for (const double offset : {0.0, 1.0, 3.0})
+    for (const double more : {0.0, 1.0, 2.5}) {
+      Session s;
+      Plan left, right;
+      left.edge_in = 8, left.edge_out = 4;
+      right.wall = 1, right.edge_in = 4 + more, right.edge_out = 8 + more;
+      right.angle_in = right.angle_out = offset / static_cast<double>(kRadius * 1000) * 57.29577951308232;
+      s.bite(left), s.bite(right);
+      const Result r = s.result();
+      EXPECT_NEAR(r.value("mirror_edge"), more, 0.1);
+      EXPECT_NEAR(r.value("mirror_offset"), offset, 0.1);
+    }
+}
+
+TEST(GroundTruth, what_a_hand_holds) {
+  for (const double at : {0.2, 0.5})
+    for (const double angle : {90.0, 70.0, 45.0}) {
+      Session s;
+      Plan p;
+      p.grasp_at = at, p.grasp_angle = angle;
+      s.bite(p);
+      EXPECT_NEAR(s.result().bite[0].grasp_at, at, 1e-6);
+      EXPECT_NEAR(s.result().bite[0].grasp_angle, angle, 1);
+    }
+}
+
+// --- injected errors ---------------------------------------------------------------------------------------------------
+
+struct Injected {
+  const char* name;
+  const char* item;  // of the rubric, that must lose points
+  std::function<void(Script&)> put;
+};
+
+Script changed(const std::function<void(Script&)>& put) {
+  Script s;
+  put(s);
+  return s;
+}
+
+const std::vector<Injected>& injected() {
+  static const std::vector<Injected> all{
+      {"entry too near", "edge_near", [](Script& s) { s.bite[1].edge_in = 0.6; }},
+      {"exit too near", "edge_near", [](Script& s) { s.bite[0].edge_out = 0.6; }},
+      {"entry too far", "edge_far", [](Script& s) { s.bite[0].edge_in = 13; }},
+      {"exit too far", "edge_far", [](Script& s) { s.bite[1].edge_out = 13; }},
+      {"too wide a spacing", "spacing",
+       [](Script& s) {
+         for (size_t i : {2u, 3u}) s.bite[i].angle_in += 17, s.bite[i].angle_out += 17;
+       }},
+      {"too narrow a spacing", "spacing",
+       [](Script& s) {
+         for (size_t i : {2u, 3u}) s.bite[i].angle_in -= 8, s.bite[i].angle_out -= 8;
+       }},
+      {"too shallow", "layers", [](Script& s) { s.bite[2].tip_depth = 0.12; }},
+      {"full thickness where it must not be", "full", [](Script& s) { s.bite[0].through = true; }},
+      {"oblique entry", "entry_angle", [](Script& s) { s.bite[1].tilt = 40; }},
+      {"oblique to the edge", "edge_angle", [](Script& s) { s.bite[0].angle_out += 9; }},
+      {"unequal sides", "mirror_edge", [](Script& s) { s.bite[1].edge_in += 2.5, s.bite[1].edge_out += 2.5; }},
+      {"offset sides", "mirror_offset", [](Script& s) { s.bite[1].angle_in += 9, s.bite[1].angle_out += 9; }},
+      {"repeated bite", "attempts", [](Script& s) { s.bite[2].attempts = 3; }},
+      {"needle off its curve", "needle_wander", [](Script& s) { s.bite[3].wander = 3; }},
+      {"needle held at its tip", "grasp_at", [](Script& s) { s.bite[0].grasp_at = 0.9; }},
+      {"needle held askew", "grasp_angle", [](Script& s) { s.bite[0].grasp_angle = 50; }},
+      {"needle grasped again and again", "needle_grasps", [](Script& s) { s.bite[0].grasps = 6; }},
+      {"granny knot", "square", [](Script& s) { s.knot[1].chirality = s.knot[2].chirality = 1; }},
+      {"too few throws", "throws", [](Script& s) { s.knot.resize(1); }},
+      {"one wrap in the first throw", "first_wraps", [](Script& s) { s.knot[0].wraps = 1; }},
+      {"air knot", "knot_gap", [](Script& s) { s.knot[0].gap = 0.004f; }},
+      {"air between throws", "throw_gap", [](Script& s) { s.knot[1].gap = 0.004f; }},
+      {"loose knot", "knot_tension", [](Script& s) { s.knot[0].tension = 0.02f; }},
+      {"knot pulled too hard", "knot_tension", [](Script& s) { s.knot[0].tension = 6; }},
+      {"tail too short", "tail", [](Script& s) { s.tail = 0.0005f; }},
+      {"tail too long", "tail", [](Script& s) { s.tail = 0.03f; }},
+      {"gap left", "gap", [](Script& s) { s.gap = 3.5; }},
+      {"lost loop", "undone_throws", [](Script& s) { s.after = [](Session& x) { x.happen(EventKind::loop_released); }; }},
+      {"wrong order", "order_errors",
+       [](Script& s) { s.after = [](Session& x) { x.happen(EventKind::bite_out_of_order, 1); }; }},
+      {"wrong wall", "order_errors",
+       [](Script& s) { s.after = [](Session& x) { x.happen(EventKind::technique_fault, 1, 0, Fault::wrong_body); }; }},
+      {"cut before the knot", "faults",
+       [](Script& s) { s.after = [](Session& x) { x.happen(EventKind::technique_fault, 1, 0, Fault::cut_before_knot); }; }},
+      {"needle slipped", "slips", [](Script& s) { s.after = [](Session& x) { x.happen(EventKind::needle_released, 0, 5); }; }},
+      {"missed grasp", "missed_grasps", [](Script& s) { s.after = [](Session& x) { x.grasp_nothing(); }; }},
+      {"thread pulled too hard", "overloads", [](Script& s) { s.after = [](Session& x) { x.tension(5); }; }},
+      {"tissue torn from a grasp", "tissue_slips",
+       [](Script& s) { s.after = [](Session& x) { x.happen(EventKind::tissue_released, 0, 4); }; }},
+      {"tissue pulled too hard", "grasp_force", [](Script& s) { s.after = [](Session& x) { x.pull_tissue(9); }; }},
+      {"everted edge", "eversion", [](Script& s) { s.after = [](Session& x) { x.lean(60); }; }},
+      {"narrowed lumen", "lumen", [](Script& s) { s.after = [](Session& x) { x.narrow(0.6f); }; }},
+      {"tremor", "tremor", [](Script& s) { s.before = [](Session& x) { x.shake = 0.0005f; }; }},
+      {"both hands wait", "pause", [](Script& s) { s.before = [](Session& x) { x.all_idle = true; }; }},
+  };
+  return all;
+}
+
+// The shipped rubric of an interrupted stitch, with one more item for sero-muscular bites.
+const Rubric& interrupted() {
+  static const Rubric r = [] {
+    Rubric made = read_rubric("interrupted_tie");
+    RubricItem full;
+    full.key = "full", full.title = "never through the wall", full.metric = "depth";
+    full.full = full.half = {0, 0.99};
+    made.item.push_back(full);
+    return made;
+  }();
+  return r;
+}
+
+std::string list(const Score& s) {
+  std::string out;
+  for (const LostPoint& l : s.lost) out += "  " + l.item + ": " + l.why + "\n";
+  return out;
+}
+
+TEST(InjectedErrors, none_is_found_in_clean_runs) {
+  // Clean variants: everything within the bands.
+  for (int k = 0; k < 20; ++k) {
+    Script s;
+    const double d = k / 20.0;
+    for (Plan& p : s.bite) p.tip_depth = 1.1 + 0.4 * d, p.tilt = 90 - 15 * d;
+    for (KnotThrow& t : s.knot) t.tension = static_cast<float>(0.5 + d);
+    const Result r = s.run();
+    Score score = mark(interrupted(), r);
+    // The stitch takes 4 to 8 mm, as a Lembert does: entry and exit each from the edge are not judged here.
+    std::erase_if(score.lost, [](const LostPoint& l) { return l.item == "edge_in" || l.item == "edge_out"; });
+    EXPECT_TRUE(score.lost.empty()) << "variant " << k << "\n" << list(score);
+  }
+}
+
+TEST(InjectedErrors, each_is_found) {
+  EXPECT_GE(injected().size(), 25u);
+  Rubric rubric = interrupted();
+  std::erase_if(rubric.item, [](const RubricItem& i) { return i.key == "edge_in" || i.key == "edge_out"; });
+  RubricItem near, far;
+  near.key = near.metric = "edge_near", near.title = "near end", near.full = near.half = {2, 5};
+  far.key = far.metric = "edge_far", far.title = "far end", far.full = far.half = {6, 10};
+  rubric.item.push_back(near), rubric.item.push_back(far);
+  for (const Injected& e : injected()) {
+    const Score score = mark(rubric, changed(e.put).run());
+    const auto found = std::find_if(score.lost.begin(), score.lost.end(), [&](const LostPoint& l) { return l.item == e.item; });
+    ASSERT_NE(found, score.lost.end()) << e.name << " is not found\n" << list(score);
+    EXPECT_GT(found->points, 0) << e.name;
+    EXPECT_GT(found->tick, 0u) << e.name;
+    EXPECT_NE(found->why.find("required"), std::string::npos) << e.name;
+  }
+}
+
+TEST(Result, equal_sessions_give_equal_bytes) {
+  const Script s;
+  EXPECT_EQ(result_json(s.run()), result_json(s.run()));
+  EXPECT_EQ(result_csv(s.run()), result_csv(s.run()));
+}
+
+}  // namespace
+}  // namespace catgut::assess
