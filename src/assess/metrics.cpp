@@ -98,7 +98,7 @@ constexpr MetricRow kRow[] = {
     {"ldlj", "log dimensionless jerk", "hands", "", higher, mean, "of each movement: a hand not idle for at least 0.3 s", kSmooth},
     {"sparc", "spectral arc length", "hands", "", higher, mean, "of each movement's speed, to 10 Hz, threshold 0.05", kSmooth},
     {"submovements", "speed peaks", "hands", "1/s", lower, mean, "local maxima of a hand's speed in its movements, over their time", kSmooth},
-    {"tremor", "tremor", "hands", "mm", lower, mean, "root mean square of an idle hand's position less its path below 5 Hz", "Riviere 1997, kilthub.cmu.edu/articles/6621335"},
+    {"tremor", "tremor", "hands", "mm", lower, mean, "root mean square of a hand's position less its path below 5 Hz, where the hand is idle for 0.1 s before and after", "Riviere 1997, kilthub.cmu.edu/articles/6621335"},
     {"bimanual", "bimanual coordination", "hands", "", higher, only, "Pearson's correlation of the speeds of voluntary motion of both hands", kMotion},
     {"together", "both hands moving", "hands", "", higher, only, "time in which both hands move over the time in which any moves", kMotion},
 };
@@ -326,11 +326,14 @@ void measure_hands(const Facts& f, Sheet& sheet) {
     speed[k] = speed_of(smooth, rate);
     voluntary[k] = speed_of(low_pass(raw, kVoluntaryCutoff, rate), rate);
     double own = 0, shake = 0;
-    size_t idle = 0, still = 0, peaks = 0, moving = 0;
+    size_t idle = 0, idle_for = 0, still = 0, peaks = 0, moving = 0;
+    const auto margin = static_cast<size_t>(kSettled * rate);
     for (size_t i = 0; i < raw.size(); ++i) {
       if (i > 0) own += static_cast<double>(distance(smooth[i], smooth[i - 1]));
       idle += voluntary[k][i] < kIdleSpeed;
-      if (voluntary[k][i] < kIdleSpeed) shake += static_cast<double>(length2(raw[i] - slow[i])), ++still;
+      idle_for = voluntary[k][i] < kIdleSpeed ? idle_for + 1 : 0;
+      if (idle_for <= 2 * margin) continue;
+      shake += static_cast<double>(length2(raw[i - margin] - slow[i - margin])), ++still;
     }
     path += own;
     const uint64_t end = tick_of(raw.size() - 1);

@@ -16,6 +16,7 @@ constexpr double kMotionCutoff = 10;  // [Hz]
 // Voluntary motion: 98.9 % of its power lies below 2 Hz (Riviere et al. 1997). Tremor does not make an idle hand busy.
 constexpr double kVoluntaryCutoff = 2;  // [Hz]
 constexpr double kIdleSpeed = 0.005;    // [m/s] of voluntary motion; below it a hand is idle
+constexpr double kSettled = 0.1;        // [s] a hand is at rest when it is idle so long before and after
 constexpr double kShortest = 0.3;       // [s] shorter stretches of motion are not judged
 
 std::vector<double> low_pass(std::span<const double> value, double cutoff, double rate);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/assess: a stitched session made by construction: every distance, depth, angle and spacing is known, and 29 kinds of
-// errors are put in one by one. The tissue is the generated bowel of the scene `stay`; it is moved rigidly, so that positions in
-// the field and at rest differ.
+// errors are put in one by one. The tissue is the generated bowel of the scene `stay`; it is moved rigidly, so that positions
+// in the field and at rest differ.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -41,13 +41,13 @@ const World& world() {
 // `angle` [deg] about the axis from the top.
 struct Plan {
   uint32_t wall = 0;
-  double edge_in = 8, edge_out = 4;  // [mm]
+  double edge_in = 8, edge_out = 4;    // [mm]
   double angle_in = 0, angle_out = 0;  // [deg] about the axis
-  double tip_depth = 1.1;  // [mm] below the serosa
-  double tilt = 90;        // [deg] of the needle to the surface at entry and exit
+  double tip_depth = 1.1;              // [mm] below the serosa
+  double tilt = 90;                    // [deg] of the needle to the surface at entry and exit
   int attempts = 1, grasps = 2;
-  bool through = false;    // exits on the mucosa
-  double wander = 0;       // [mm] of the needle's center
+  bool through = false;  // exits on the mucosa
+  double wander = 0;     // [mm] of the needle's center
   double grasp_at = 0.35, grasp_angle = 90;
 };
 
@@ -70,15 +70,15 @@ class Session {
   Vec3 moved(Vec3 p) const { return rotate(turn_, p) + away_; }
   Vec3 turned(Vec3 d) const { return rotate(turn_, d); }
 
-  // Hands move with minimum-jerk strokes while time passes, both at once.
+  // Hands move with minimum-jerk strokes while time passes, one after the other.
   void tick(int n = 1) {
     for (int i = 0; i < n; ++i) {
       ++seen_.tick;
       for (Event& e : seen_.event) e.tick = seen_.tick;
-      const double phase = std::fmod(static_cast<double>(seen_.tick), 90) / 90, t = phase < 0.5 ? 2 * phase : 2 - 2 * phase;
-      const double x = 0.08 * t * t * t * (10 - 15 * t + 6 * t * t);
       for (size_t k = 0; k < 2; ++k) {
-        Vec3 p{k == 0 ? 0.1f : -0.1f, 0.1f + static_cast<float>(k == 1 && left_idle ? 0 : x), 0};
+        const double c = static_cast<double>((seen_.tick + 40 * k) % 160) / 40;  // out, rest, back, rest
+        const double t = c < 1 ? c : c < 2 ? 1 : c < 3 ? 3 - c : 0, x = 0.08 * t * t * t * (10 - 15 * t + 6 * t * t);
+        Vec3 p{k == 0 ? 0.1f : -0.1f, 0.1f + static_cast<float>(x), 0};
         if (all_idle) p = {k == 0 ? 0.1f : -0.1f, 0.1f, 0};
         // 8 Hz, 0.5 mm
         p.z += shake * static_cast<float>(std::sin(6.2831853 * 8 * static_cast<double>(seen_.tick) * kDt));
@@ -212,7 +212,7 @@ class Session {
     return r;
   }
   Snapshot& seen() { return seen_; }
-  bool all_idle = false, left_idle = false;
+  bool all_idle = false;
   float shake = 0;  // [m]
 
  private:
@@ -232,8 +232,8 @@ class Session {
     const double a = angle_deg / 180 * 3.14159265358979, t = tilt / 180 * 3.14159265358979;
     const Vec3 out{0, static_cast<float>(std::cos(a)), static_cast<float>(std::sin(a))};
     const Vec3 along = normalized(way - out * dot(way, out), {1, 0, 0});
-    const Vec3 tangent = normalized(along * static_cast<float>(std::cos(t)) +
-                                    out * static_cast<float>(inward ? -std::sin(t) : std::sin(t)));
+    const Vec3 tangent =
+        normalized(along * static_cast<float>(std::cos(t)) + out * static_cast<float>(inward ? -std::sin(t) : std::sin(t)));
     const Vec3 normal = normalized(cross(out, along)), radial = cross(tangent, normal);
     const Vec3 center = at - radial * radius;
     // The tip, at the end of the arc, is there.
