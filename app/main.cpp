@@ -60,6 +60,10 @@ int main(int argc, char** argv) {
   catgut::add_devices(app, exit_code);
   catgut::add_bridge(app, exit_code);
   catgut::add_describe(app, exit_code);
+#ifdef CATGUT_WITH_STORE
+  catgut::add_records(app, exit_code);
+  catgut::add_serve(app, exit_code);
+#endif
   try {
     if (argc == 1) return catgut::play_without_arguments();
     app.parse(argc, argv);

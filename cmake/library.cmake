@@ -21,6 +21,7 @@ target_link_libraries(catgut PRIVATE fmt::fmt assimp::assimp hwy::hwy)
 # Programs in the build folder find the scenes like installed programs: in share/catgut of a folder above them.
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/share/catgut)
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/scenes ${CMAKE_BINARY_DIR}/share/catgut/scenes SYMBOLIC)
+file(CREATE_LINK ${PROJECT_SOURCE_DIR}/surveys ${CMAKE_BINARY_DIR}/share/catgut/surveys SYMBOLIC)
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/procedures ${CMAKE_BINARY_DIR}/share/catgut/procedures SYMBOLIC)
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/rubrics ${CMAKE_BINARY_DIR}/share/catgut/rubrics SYMBOLIC)
 
@@ -43,4 +44,4 @@ install(CODE "set(catgut_source \"${PROJECT_SOURCE_DIR}\")
 set(catgut_binary \"${PROJECT_BINARY_DIR}\")
 set(catgut_include \"${CMAKE_INSTALL_INCLUDEDIR}\")" COMPONENT library)
 install(SCRIPT cmake/install_headers.cmake COMPONENT library)
-install(DIRECTORY scenes procedures rubrics DESTINATION ${CMAKE_INSTALL_DATADIR}/catgut COMPONENT data FILES_MATCHING PATTERN "*.toml")
+install(DIRECTORY scenes procedures rubrics surveys DESTINATION ${CMAKE_INSTALL_DATADIR}/catgut COMPONENT data FILES_MATCHING PATTERN "*.toml")

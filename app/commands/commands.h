@@ -25,6 +25,8 @@ void add_validate(CLI::App& app, int& exit_code);
 void add_devices(CLI::App& app, int& exit_code);
 void add_bridge(CLI::App& app, int& exit_code);
 void add_describe(CLI::App& app, int& exit_code);
+void add_serve(CLI::App& app, int& exit_code);    // after add_records
+void add_records(CLI::App& app, int& exit_code);  // store, report, survey; in a program built with CATGUT_STORE
 
 // `catgut bench limits` (app/commands/limits.cpp). Code 1 when not all requested sutures could be made.
 struct LimitsOptions {

@@ -120,6 +120,41 @@ void insert_rows(soci::session& sql, const Session& s, long long id) {
   }
 }
 
+int64_t insert(soci::session& sql, Session s, const std::string& created, std::vector<std::string>* notes) {
+  const auto note = [&](const std::string& text) {
+    if (notes) notes->push_back(text);
+  };
+  long long id = 0;
+  if (s.uid.empty()) s.uid = random_uid();
+  sql << "SELECT id FROM session WHERE uid = :u", use(s.uid), into(id);
+  if (sql.got_data()) {
+    note("session " + s.uid + " is in the store already");
+    return id;
+  }
+  sql << "INSERT INTO person (pseudonym, role, level, created) VALUES (:p, 'trainee', '', :c) ON CONFLICT (pseudonym) DO "
+         "NOTHING",
+      use(s.trainee), use(created);
+  long long person = 0;
+  sql << "SELECT id FROM person WHERE pseudonym = :p", use(s.trainee), into(person);
+  std::string last;
+  soci::indicator has_last = soci::i_null;
+  sql << "SELECT max(started) FROM session WHERE person_id = :p", use(person), into(last, has_last);
+  if (has_last == soci::i_ok && s.started < last)
+    note(
+        fmt::format("the session of {} starts at {}, before the last one stored ({}): check the clock of this machine. "
+                    "Sessions keep the order in which they were stored",
+                    s.trainee, s.started, last));
+  Nullable score(s.score), most(s.score_max);
+  const int passed = s.passed < 0 ? -1 : s.passed > 0;
+  sql << "INSERT INTO session (uid, person_id, task, started, duration_s, score, score_max, passed, rubric, settings, program,"
+         " station, recording, details) VALUES (:u, :p, :t, :a, :d, :s, :m, :ok, :r, :e, :g, :n, :c, :x) RETURNING id",
+      use(s.uid), use(person), use(s.task), use(s.started), use(s.duration_s), use(score.value, score.is),
+      use(most.value, most.is), use(passed), use(s.rubric), use(s.settings), use(s.program), use(s.station), use(s.recording),
+      use(s.details), into(id);
+  insert_rows(sql, s, id);
+  return id;
+}
+
 // The condition of a filter, for a query over session s, person p and cohort c. Each value is named once, by a
 // query of constants, so that it can be bound by name everywhere.
 const char* const kFiltered =
@@ -130,43 +165,19 @@ const char* const kFiltered =
 }  // namespace
 
 int64_t Store::add(const Session& given, std::string* note) {
-  check_session(given);
-  if (note) note->clear();
-  long long id = 0;
-  work_->write([&] {
-    soci::session& sql = work_->sql;
-    Session s = given;
-    if (s.uid.empty()) s.uid = random_uid();
-    sql << "SELECT id FROM session WHERE uid = :u", use(s.uid), into(id);
-    if (sql.got_data()) {
-      if (note) *note = "session " + s.uid + " is in the store already";
-      return;
-    }
-    const std::string created = work_->options.now();
-    sql << "INSERT INTO person (pseudonym, role, level, created) VALUES (:p, 'trainee', '', :c) ON CONFLICT (pseudonym) DO "
-           "NOTHING",
-        use(s.trainee), use(created);
-    long long person = 0;
-    sql << "SELECT id FROM person WHERE pseudonym = :p", use(s.trainee), into(person);
-    std::string last;
-    soci::indicator has_last = soci::i_null;
-    sql << "SELECT max(started) FROM session WHERE person_id = :p", use(person), into(last, has_last);
-    if (note && has_last == soci::i_ok && s.started < last)
-      *note = fmt::format(
-          "the session of {} starts at {}, before the last one stored ({}): check the clock of this machine. "
-          "Sessions keep the order in which they were stored",
-          s.trainee, s.started, last);
-    Nullable score(s.score), most(s.score_max);
-    const int passed = s.passed < 0 ? -1 : s.passed > 0;
-    sql << "INSERT INTO session (uid, person_id, task, started, duration_s, score, score_max, passed, rubric, settings, "
-           "program,"
-           " station, recording, details) VALUES (:u, :p, :t, :a, :d, :s, :m, :ok, :r, :e, :g, :n, :c, :x) RETURNING id",
-        use(s.uid), use(person), use(s.task), use(s.started), use(s.duration_s), use(score.value, score.is),
-        use(most.value, most.is), use(passed), use(s.rubric), use(s.settings), use(s.program), use(s.station), use(s.recording),
-        use(s.details), into(id);
-    insert_rows(sql, s, id);
-  });
+  std::vector<std::string> notes;
+  const int64_t id = add_all({given}, &notes)[0];
+  if (note) *note = notes.empty() ? "" : notes[0];
   return id;
+}
+
+std::vector<int64_t> Store::add_all(const std::vector<Session>& sessions, std::vector<std::string>* notes) {
+  for (const Session& s : sessions) check_session(s);
+  std::vector<int64_t> ids;
+  work_->write([&] {
+    for (const Session& s : sessions) ids.push_back(insert(work_->sql, s, work_->options.now(), notes));
+  });
+  return ids;
 }
 
 std::vector<Session> Store::sessions(const SessionFilter& f) const {

@@ -123,6 +123,8 @@ class Store {
   // Returns the id. note: receives a remark for the user (the clock was set back, ...); may be null. Throws InputError for
   // texts that are not UTF-8, numbers that are not finite, an empty pseudonym or task.
   int64_t add(const Session& session, std::string* note = nullptr);
+  // The same for many sessions: all of them, or none.
+  std::vector<int64_t> add_all(const std::vector<Session>& sessions, std::vector<std::string>* notes = nullptr);
   Session session(int64_t id) const;  // throws InputError
   // In the order of storing, which a clock that was set back does not change. Without metrics, events, lost points, details.
   std::vector<Session> sessions(const SessionFilter& filter = {}) const;
