@@ -25,7 +25,7 @@
         parts.push(section("By group", chart(order, "Ratings by group"), table("Ratings by group", [
           {title: "question", value: (r) => r.key}, {title: "group", value: (r) => r.group}, {title: "n", value: (r) => r.n, number: true}, {title: "median", value: (r) => r.median, number: true},
           {title: `rated ${d.favorable} or more`, value: (r) => r.favorable / r.n, cell: share, number: true}], order),
-          el("ul", {class: "quiet"}, Object.entries(d.p).filter(([, p]) => known(p)).map(([key, p]) => el("li", {}, `${key}: difference of the first two groups p = ${p.toFixed(3)} (exact Mann-Whitney test)`)))));
+          el("ul", {class: "quiet"}, Object.entries(d.p).filter(([, p]) => known(p)).map(([key, p]) => el("li", {}, `${key}: difference of the first two groups p ${p < 0.001 ? "< 0.001" : "= " + p.toFixed(3)} (exact Mann-Whitney test)`)))));
       }
     }
     for (const [key, list] of Object.entries(d.text)) parts.push(section(text[key] || key, el("ul", {}, list.map((t) => el("li", {}, t)))));

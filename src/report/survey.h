@@ -33,7 +33,7 @@ std::vector<std::string> questionnaire_names();
 // Throws InputError for a rating outside the scale, or a question that is not in the questionnaire.
 void check_answers(const Questionnaire& q, const std::vector<SurveyAnswer>& answers);
 
-// CSV with one row per respondent: respondent, group, and a column for every question; a missing cell is no answer.
+// CSV with one row per respondent: respondent, group, and a column for every question; an empty cell: not answered.
 std::vector<SurveyAnswer> answers_of_csv(const Questionnaire& q, const std::string& csv, const std::string& where,
                                          const std::string& now);
 std::string answers_csv(const Questionnaire& q, const std::vector<SurveyAnswer>& answers);

@@ -80,6 +80,15 @@ struct PageServer::Work {
 
   bool tls() const { return !options.certificate.empty(); }
 
+  // cpp-httplib compresses what set_content is given with Brotli's slowest setting, 1.5 s for the overview. A provider is sent
+  // as it is.
+  static void send_text(Response& response, std::string text, const char* type) {
+    auto kept = std::make_shared<std::string>(std::move(text));
+    response.set_content_provider(kept->size(), type, [kept](size_t offset, size_t length, httplib::DataSink& sink) {
+      return sink.write(kept->data() + offset, length);
+    });
+  }
+
   void send_page(Response& response, const std::string& kind, const std::string& title, const std::string& data,
                  int status = 200) {
     const std::string nonce = random_token();
@@ -89,7 +98,7 @@ struct PageServer::Work {
         fmt::format("default-src 'none'; script-src 'nonce-{0}'; style-src 'nonce-{0}'; img-src 'self' data:; "
                     "media-src 'self'; connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'",
                     nonce));
-    response.set_content(html_page(kind, title, data, nonce), "text/html; charset=utf-8");
+    send_text(response, html_page(kind, title, data, nonce), "text/html; charset=utf-8");
   }
 
   void send_message(Response& response, int status, const std::string& title, const std::string& text) {
@@ -213,8 +222,8 @@ void PageServer::Work::routes() {
   });
   get("/api/metric", [this](const Request& request, Response& response, const Visitor& who, const auto&) {
     only_educators(who);
-    response.set_content(with_store([&](Store& s) { return metric_data(s, parameter(request, "name"), filter_of(request)); }),
-                         "application/json");
+    send_text(response, with_store([&](Store& s) { return metric_data(s, parameter(request, "name"), filter_of(request)); }),
+              "application/json");
   });
   get("/export\\.(csv|json|xapi)", [this](const Request& request, Response& response, const Visitor& who, const auto& part) {
     only_educators(who);
@@ -227,7 +236,7 @@ void PageServer::Work::routes() {
     });
     response.set_header("Content-Disposition",
                         fmt::format("attachment; filename=\"sessions.{}\"", part[0] == "xapi" ? "xapi.json" : part[0]));
-    response.set_content(text, part[0] == "csv" ? "text/csv; charset=utf-8" : "application/json");
+    send_text(response, text, part[0] == "csv" ? "text/csv; charset=utf-8" : "application/json");
   });
   get("/recording/([0-9]+)", [this](const Request&, Response& response, const Visitor& who, const auto& part) {
     const fs::path file = kept_file(session_for(who, part[0]), ".cgrec");
@@ -359,6 +368,11 @@ PageServer::PageServer(const ServeOptions& options) : work_(std::make_unique<Wor
   if (!w.server->is_valid())
     throw InputError(options.certificate, "certificate or key cannot be used", "check that both are PEM files of each other");
   w.server->new_task_queue = [] { return new httplib::ThreadPool(4); };
+  // The default lets a second program listen on the same port and receive some of the visitors.
+  w.server->set_socket_options([](socket_t socket) {
+    const int yes = 1;
+    setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  });
   w.server->set_payload_max_length(1u << 20);
   w.server->set_read_timeout(10);
   w.server->set_write_timeout(30);
@@ -377,7 +391,8 @@ PageServer::PageServer(const ServeOptions& options) : work_(std::make_unique<Wor
     return httplib::Server::HandlerResponse::Unhandled;
   });
   w.server->set_error_handler([&w](const Request&, Response& response) {
-    if (response.body.empty()) w.send_message(response, response.status, "Not found", "There is no such page.");
+    if (response.body.empty() && !response.has_header("Content-Security-Policy"))
+      w.send_message(response, response.status, "Not found", "There is no such page.");
   });
   w.routes();
   w.survey_routes();
