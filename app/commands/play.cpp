@@ -6,7 +6,7 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "device/drivers.h"
-#include "procedure/lesson.h"
+#include "procedure/procedure_file.h"
 #include "procedure/scene_file.h"
 #include "runtime/haptics.h"
 #include "window/window.h"
@@ -69,7 +69,14 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_flag("--left-handed", o->play.left_handed, "needle holder in the left hand");
   command->add_option("--surgeon", o->play.live.surgeon, "watch the scripted surgeon, or the hands of a recording")
       ->type_name("scripted|FILE");
-  command->add_flag("--teach", o->play.teach, "tutorial: first stitch, step by step");
+  auto mode = std::make_shared<std::string>("practice");
+  auto teach = std::make_shared<bool>(false);
+  command->add_option("--procedure", o->play.procedure, "show the stages and errors of a procedure")->type_name("NAME");
+  command->add_option("--stage", o->play.stage, "start with this stage, by name or number")->type_name("STAGE");
+  command->add_option("--mode", *mode, "tutorial: time stands still at a new stage, with demonstrations; exam: no feedback")
+      ->check(CLI::IsMember({"tutorial", "practice", "exam"}))
+      ->type_name("tutorial|practice|exam");
+  command->add_flag("--teach", *teach, "tutorial: first stitch, step by step (--procedure first_stitch --mode tutorial)");
   // One by default: a tick is short, and waiting workers take processor time from rendering.
   command->add_option("--threads", o->play.live.threads, "solver threads")->check(CLI::Range(1, 64))->capture_default_str();
   std::string drivers;
@@ -86,13 +93,24 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_option("--events", o->play.events, "event stream, one JSON object per line; -: standard output")
       ->type_name("FILE|-");
   add_window_options(*command, *o);
-  command->callback([o, &exit_code] {
+  command->callback([o, mode, teach, &exit_code] {
     read_window_options(*o);
     read_arm_choice(o->play.live.haptics);  // reports errors before a window opens
-    if (o->play.teach && o->play.scene.empty()) o->play.scene = first_stitch().scene;
-    if (o->play.teach && (o->play.scene != first_stitch().scene || !o->play.live.surgeon.empty()))
-      throw InputError("--teach", "the tutorial needs the scene \"" + first_stitch().scene + "\" and manual control",
-                       "write catgut play " + first_stitch().scene + " --teach");
+    if (*teach && o->play.procedure.empty()) o->play.procedure = "first_stitch", *mode = "tutorial";
+    o->play.tutorial = *mode == "tutorial";
+    o->play.exam = *mode == "exam";
+    if (o->play.procedure.empty() && (!o->play.stage.empty() || *mode != "practice"))
+      throw InputError("play", "--stage and --mode need a procedure", "add --procedure NAME");
+    if (!o->play.procedure.empty()) {  // reports errors before a window opens
+      const Procedure procedure = read_procedure(o->play.procedure);
+      if (!o->play.stage.empty()) find_stage(procedure, o->play.stage, "--stage");
+      if (!o->play.scene.empty() && o->play.scene != procedure.scene)
+        throw InputError("--procedure " + o->play.procedure,
+                         "its scene is \"" + procedure.scene + "\", not \"" + o->play.scene + "\"", "leave the scene out");
+      if (o->play.tutorial && !o->play.live.surgeon.empty())
+        throw InputError("--mode tutorial", "a tutorial needs manual control", "leave --surgeon out");
+      o->play.scene.clear();
+    }
     if (!o->play.scene.empty()) read_scene(o->play.scene);  // reports errors before a window opens
     o->play.live.say = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
     check_suffix(o->play.live.record, ".cgrec", "--record");

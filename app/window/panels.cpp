@@ -8,29 +8,10 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "technique/technique.h"
 #include "window/widgets.h"
 
 namespace catgut {
 namespace {
-
-const char* kHints =
-    "mouse            move instrument\n"
-    "wheel, Shift     depth\n"
-    "left, space      close or open jaws\n"
-    "right            drive needle, roll instrument\n"
-    "Ctrl+right, Q E  arcball rotation\n"
-    "W                both hands: wrap, pull apart\n"
-    "Tab              other hand\n"
-    "C  N             cut thread, new suture\n"
-    "I  K             next instrument, park clamp\n"
-    "1 2 3            fine, normal, fast\n"
-    "middle, arrows   orbit; Ctrl+wheel: zoom\n"
-    "- +              slow motion\n"
-    "Backspace        undo bite\n"
-    "F2  F3  F12      settings, profiler, screenshot\n"
-    "F9               haptic force on or off\n"
-    "Esc              pause     F1 hide keys";
 
 void quality_choice(Settings& s) {
   for (const Quality q : {Quality::low, Quality::medium, Quality::high}) {
@@ -51,11 +32,6 @@ void hand_choice(Settings& s) {
   if (radio("right-handed", !s.left_handed)) s.left_handed = false;
   ImGui::SameLine();
   if (radio("left-handed", s.left_handed)) s.left_handed = true;
-}
-
-std::string instrument_in_hand(const WorkView& v, size_t hand) {
-  const int i = v.seen->tool[hand].instrument;
-  return i < 0 ? "empty" : v.picture->instrument[static_cast<size_t>(i)].title;
 }
 
 }  // namespace
@@ -199,63 +175,20 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& m
   return choice;
 }
 
-void work_panel(const WorkView& v, const Settings& settings) {
-  const LiveStatus& s = *v.status;
-  const bool silent = settings.guidance == Guidance::exam && !v.watching;
-  std::vector<Line> state{{kText, v.scene->title}};
-  if (s.settling) {
-    state.push_back({kQuiet, "Settling..."});
-  } else {
-    const bool slow = s.time_factor > 0 && s.time_factor < 0.93f * s.speed && !s.paused;
-    state.push_back({kQuiet, fmt::format("{}   real-time factor {:.2f}{}", clock_text(s.metrics.time_s),
-                                         s.paused ? 0.0f : s.time_factor, s.speed < 1 && !slow ? "  slow motion" : "")});
-    if (slow) state.push_back({kBad, "! below real time"});
-    state.push_back({kQuiet, fmt::format("tick {:.1f} ms, {:.1f} fps", s.tick_ms, v.pictures_per_s)});
-    if (silent) state.push_back({kQuiet, "exam: no feedback"});
-    else
-      for (const std::string& line : technique_lines(*v.scene, *v.seen, s.metrics)) state.push_back({kText, line});
-    if (!s.doing.empty()) state.push_back({kQuiet, "surgeon: " + s.doing});
-    const TechniqueRow* technique = find_technique(v.scene->technique.name);
-    if (technique && settings.guidance == Guidance::learn && !v.watching) state.push_back({kAccent, technique->hint});
+void draw_panels(std::span<const PlacedPanel> panels) {
+  static const ImVec4 kTone[] = {kText, kQuiet, kAccent, kBad};
+  for (const PlacedPanel& p : panels) {
+    begin_box(p.name.c_str(), {p.rect.x, p.rect.y}, {p.rect.w, p.rect.h}, p.alpha, kOverlay | ImGuiWindowFlags_NoScrollbar);
+    if (p.progress >= 0) ImGui::ProgressBar(p.progress, {-1, 0.35f * em()}, "");
+    for (const PanelLine& line : p.line) text(kTone[static_cast<size_t>(line.tone)], line.text);
+    ImGui::End();
   }
-  for (size_t k = 0; k < 2; ++k) {
-    const ArmView& arm = s.arm_view[k];
-    if (arm.most <= 0) continue;  // no such device
-    const size_t bars = arm.most > 0 ? static_cast<size_t>(std::clamp(20 * arm.force / arm.most, 0.0f, 20.0f)) : 0;
-    state.push_back(
-        {*arm.off ? kBad : kQuiet,
-         fmt::format("{} arm {:.1f} N {:<20}{}{}{}", arm.side == 0 ? "right" : "left", arm.force, std::string(bars, '|'),
-                     arm.strength == 1 ? "" : fmt::format(" x{:.2g}", arm.strength), *arm.off ? "  no force: " : "", arm.off)});
-  }
-  if (!s.fault.empty()) state.push_back({kBad, "! " + s.fault});
-  lines_at("state", 0, 0, 0.62f, state);
+}
 
-  if (!v.watching && !s.settling && !v.inside) {
-    const size_t k = v.mouse->active;
-    const char* speed = v.speed < 1 ? "  fine" : v.speed > 1 ? "  fast" : "";
-    std::vector<Line> hand{{kText, fmt::format("{} ({} hand){}", instrument_in_hand(v, k),
-                                               (k == 0) != settings.left_handed ? "right" : "left", speed)}};
-    for (const std::string& line : tray_lines(*v.seen, *v.picture, k)) hand.push_back({kQuiet, line});
-    if (v.steering->hand[k].snapped) {
-      const HelpAt at = v.steering->hand[k].at;
-      hand.push_back({kAccent, at == HelpAt::needle ? "needle: close jaws"
-                               : at == HelpAt::tail ? "tail: close jaws"
-                                                    : "bite: drive needle"});
-    }
-    if (!v.pad.empty()) hand.push_back({kQuiet, v.pad});
-    lines_at("hand", 1, 1, 0.62f, hand);
-  }
-
-  if ((settings.hints || settings.guidance == Guidance::learn) && !v.watching && !v.inside)
-    lines_at("keys", 0, 1, 0.5f, {{kQuiet, kHints}});
-
-  if (!v.log->empty() && !silent) {
-    std::vector<Line> log;
-    for (const LogLine& line : *v.log)
-      log.push_back(
-          {line.bad ? kBad : kQuiet, fmt::format("{:>7} {} {}", clock_text(line.time_s), line.bad ? '!' : ' ', line.text)});
-    lines_at("log", 1, 0, 0.5f, log);
-  }
+TextSize panel_text_size() {
+  const ImGuiStyle& style = ImGui::GetStyle();
+  return {ImGui::CalcTextSize("0000000000").x / 10, ImGui::GetTextLineHeight() + style.ItemSpacing.y, style.WindowPadding.x,
+          style.WindowPadding.y};
 }
 
 Choice pause_panel(const WorkView& view) {

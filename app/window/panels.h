@@ -3,13 +3,16 @@
 // they change nothing themselves.
 #pragma once
 #include <deque>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "device/mouse.h"
+#include "procedure/procedure.h"
 #include "runtime/live.h"
 #include "runtime/playback.h"
 #include "window/charts.h"
+#include "window/layout.h"
 #include "window/screens.h"
 #include "window/settings.h"
 #include "window/words.h"
@@ -53,10 +56,11 @@ struct WorkView {
 struct ResultView {
   const SceneSpec* scene = nullptr;
   const LiveResult* result = nullptr;
-  std::vector<LogLine> log;     // all events, as text
-  std::string saved;            // name of the JSON file, or why there is none
-  bool from_recording = false;  // from a recording, not from a session
-  float known = 1;              // scanned fraction of the recording: the results cover that part
+  std::vector<LogLine> log;              // all events, as text
+  const Procedure* procedure = nullptr;  // of the session; null: none
+  std::string saved;                     // name of the JSON file, or why there is none
+  bool from_recording = false;           // from a recording, not from a session
+  float known = 1;                       // scanned fraction of the recording: the results cover that part
 };
 
 std::vector<LogLine> event_log(const StitchMap& map);
@@ -72,7 +76,8 @@ struct PlayedView {
 // Each may change the settings; `watch`: the scripted surgeon works.
 Choice start_panel(const StartView& view, Settings& settings, bool& watch);
 Choice settings_panel(Settings& settings, const std::string& file, const std::string& message, bool working);
-void work_panel(const WorkView& view, const Settings& settings);
+void draw_panels(std::span<const PlacedPanel> panels);
+TextSize panel_text_size();  // of the present font and style
 Choice pause_panel(const WorkView& view);
 // can_touch: the mouse is a pointer and sliders can be moved.
 Choice developer_panel(const WorkView& view, bool can_touch);

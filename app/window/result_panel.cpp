@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "procedure/manager.h"
 #include "window/panels.h"
 #include "window/widgets.h"
 
@@ -109,6 +110,15 @@ Choice result_panel(const ResultView& v, BiteColor& by) {
       ImGui::TextWrapped("%s", row.value.c_str());
     }
     ImGui::EndTable();
+  }
+  if (v.procedure && r.procedure.begun) {
+    gap();
+    heading(v.procedure->title);
+    for (const Feedback& f : feedback(r.procedure, *v.procedure)) {
+      ImGui::PushStyleColor(ImGuiCol_Text, f.well ? kAccent : kBad);
+      ImGui::TextWrapped("%s", ((f.well ? "+ " : "! repeat: ") + f.text).c_str());
+      ImGui::PopStyleColor();
+    }
   }
   gap();
   heading("Events");

@@ -26,6 +26,7 @@ Choice choice_of_key(const WindowInput& in, const ScreenFacts& f) {
       if (view) return {Chosen::play_or_hold};
       return practice ? Choice{Chosen::pause} : when(pause && !f.fault, Chosen::resume);
     case Key::enter:
+      if (practice) return when(f.reading, Chosen::begin_stage);
       if (results) return {f.from_recording ? Chosen::leave_results : Chosen::restart};
       if (view) return {Chosen::sewn};
       return when(start && f.scenes > 0, Chosen::scene);

@@ -17,8 +17,9 @@ enum class Chosen {
   nothing,
   scene,  // which: of the list
   teach,
-  show_me,    // demonstration of the lesson's step
-  recording,  // text: its path
+  begin_stage,  // the new stage of a tutorial was read
+  show_me,      // demonstration of the stage, or its end
+  recording,    // text: its path
   settings,
   leave_settings,
   resume,
@@ -61,6 +62,7 @@ struct Choice {
 struct ScreenFacts {
   Screen screen = Screen::start;
   bool fault = false;           // the simulation has stopped
+  bool reading = false;         // time stands still at a new stage
   size_t scenes = 0;            // number of scenes in the list
   bool from_recording = false;  // results are from a recording
   int64_t second = 60;          // ticks of the recording

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <set>
+#include <utility>
 
 namespace catgut {
 namespace {
@@ -24,6 +25,11 @@ void Visit::look() {
 }
 
 void Visit::take_events() {
+  // What was undone leaves the log, as it leaves the results.
+  if (const LiveStatus& now = live.status(); std::exchange(log_epoch_, now.epoch) != now.epoch) {
+    std::erase_if(log, [&](const LogLine& l) { return l.time_s > now.time_s + 1e-9; });
+    std::erase_if(tip_, [&](const Event& e) { return e.tick > now.tick; });
+  }
   for (Event e; live.event(e);) {
     if (events_) std::fprintf(events_, "%s\n", event_json(e).c_str());
     if (on_event_) on_event_(e);

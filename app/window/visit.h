@@ -33,6 +33,7 @@ struct Visit {
  private:
   void take_events();
   std::vector<Event> tip_;  // recent entries and exits
+  uint32_t log_epoch_ = 0;
   std::FILE* events_;
   std::function<void(const Event&)> on_event_;
 };

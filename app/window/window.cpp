@@ -12,12 +12,14 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "commands/commands.h"
 #include "core/check.h"
 #include "core/data.h"
 #include "device/tray.h"
+#include "procedure/procedure_file.h"
 #include "procedure/scene_file.h"
 #include "render/orbit.h"
 #include "render/quality.h"
@@ -26,6 +28,7 @@
 #include "runtime/report.h"
 #include "sim/simulation.h"
 #include "technique/technique.h"
+#include "window/guide_overlay.h"
 #include "window/hands.h"
 #include "window/input.h"
 #include "window/latency.h"
@@ -33,6 +36,7 @@
 #include "window/sdl_window.h"
 #include "window/visit.h"
 #include "window/widgets.h"
+#include "window/work_text.h"
 
 namespace catgut {
 namespace {
@@ -40,6 +44,7 @@ namespace {
 constexpr const char* kFont = "fonts/truetype/dejavu/DejaVuSansMono.ttf";  // in a share folder
 constexpr double kMostPictures = 150;                                      // [1/s]
 constexpr double kSlowPicture = 0.07;                                      // [s] a slower frame reduces the resolution
+constexpr const char* kFirstLesson = "first_stitch";                       // of procedures/
 constexpr double kStallEvery = 2;                                          // [s] of --stall-ms
 
 std::vector<SceneChoice> scene_choices() {
@@ -109,6 +114,7 @@ class Window {
     kept_ = settings_ = loaded.settings;
     if (options.quality_given) settings_.quality = options.quality;
     if (options.left_handed) settings_.left_handed = true;
+    if (options.exam) settings_.guidance = Guidance::exam;
     at_start_ = settings_;
     scenes_ = scene_choices();
     recordings_ = recordings_in(".", {});
@@ -125,7 +131,8 @@ class Window {
   Window& operator=(const Window&) = delete;
 
   int loop() {
-    if (!options_.scene.empty()) open(options_.scene, options_.teach);
+    if (!options_.procedure.empty()) open(options_.scene, options_.procedure, options_.stage, options_.tutorial);
+    else if (!options_.scene.empty()) open(options_.scene);
     if (!options_.view.empty()) view(options_.view);
     const double start = wall_seconds();
     double last = start, drawn_at = start, stalled = start;
@@ -166,24 +173,30 @@ class Window {
  private:
   // --- scenes and recordings
   // -----------------------------------------------------------------------------------------------------------------
-  void open(const std::string& name, bool teach = false) {
-    const SceneSpec scene = read_scene(name);
+  void open(const std::string& name, const std::string& procedure = "", const std::string& stage = "", bool tutorial = false) {
     LiveOptions live = options_.live;
+    std::shared_ptr<const Procedure> wanted;
+    if (!procedure.empty()) wanted = std::make_shared<const Procedure>(read_procedure(procedure));
+    const SceneSpec scene = wanted ? scene_of(*wanted) : read_scene(name);
+    live.procedure = wanted;
+    if (!stage.empty()) live.stage = find_stage(*wanted, stage, "--stage");
     if (settings_.left_handed) live.arm_hand = {1, 0};
     live.arm_strength = {settings_.force_right, settings_.force_left};
     live.record = of_visit(live.record, ++opened_);
-    if (live.surgeon.empty() && watch_ && !teach) live.surgeon = "scripted";
+    if (live.surgeon.empty() && watch_ && !tutorial) live.surgeon = "scripted";
+    live.tutorial = tutorial && live.surgeon.empty();
     leave();
     visit_ = std::make_unique<Visit>(scene, live, events_, [this](const Event& e) {
       if (options_.on_event) options_.on_event(e);
-      if (lesson_.on()) lesson_.note_event(e);
     });
-    source_ = name;
+    procedure_ = wanted;
+    tutorial_ = live.tutorial;
+    source_ = {name, procedure, stage, tutorial};
     places_ = bite_places(scene, visit_->live.picture());
-    if (teach) lesson_.begin(first_stitch());
-    else lesson_.end();
+    shown_stage_ = 0;
+    used_keys_ = {};
     hands_.begin(visit_->live.picture(), settings_);
-    stage(visit_->live.picture());
+    stage_picture(visit_->live.picture());
     go(Screen::practice);
   }
 
@@ -192,11 +205,11 @@ class Window {
     leave();
     viewing_ = std::move(next);
     viewing_->playback.play(options_.screen.empty());
-    stage(viewing_->playback.picture());
+    stage_picture(viewing_->playback.picture());
     go(Screen::view);
   }
 
-  void stage(const PictureModel& picture) {
+  void stage_picture(const PictureModel& picture) {
     renderer_->stage(&picture, settings_.quality);
     if (coarse_ < 1) renderer_->set_resolution_scale(coarse_);
     orbit_set_ = false;
@@ -215,11 +228,12 @@ class Window {
     LiveResult result = visit_->finish();
     made_.insert(made_.end(), result.recorded.begin(), result.recorded.end());
     if (!options_.json.empty()) try {
-        write_output(of_visit(options_.json, opened_), session_json(visit_->scene, result));
+        const std::string json = session_json(visit_->scene, result);
+        write_output(of_visit(options_.json, opened_), procedure_ ? with_procedure(json, *procedure_, result.procedure) : json);
       } catch (const InputError& error) { message_ = json_fault_ = error.what(); }
     scene_ = visit_->scene;
     result_ = result;
-    results_ = {&scene_, &result_, event_log(result.map), "", false, 1};
+    results_ = {&scene_, &result_, event_log(result.map), procedure_.get(), "", false, 1};
     std::swap(last_, visit_->seen);
     have_last_ = have;
     visit_.reset();
@@ -251,6 +265,7 @@ class Window {
     Settings s = settings_;  // options of the command line apply only to this run
     if (options_.quality_given && s.quality == options_.quality) s.quality = kept_.quality;
     if (options_.left_handed && s.left_handed) s.left_handed = kept_.left_handed;
+    if (options_.exam && s.guidance == Guidance::exam) s.guidance = kept_.guidance;
     try {
       save_settings(s, settings_path());
       message_.clear();
@@ -276,11 +291,15 @@ class Window {
         message_.clear();
         break;
       case Chosen::teach:
-        open(first_stitch().scene, true);
+        open("", kFirstLesson, "", true);
         message_.clear();
         break;
       case Chosen::show_me:
-        if (live && lesson_.on()) show_me();
+        if (live && tutorial_)
+          live->command(live->status().demonstrating ? LiveCommand::end_demonstration : LiveCommand::show_stage);
+        break;
+      case Chosen::begin_stage:
+        if (live) live->command(LiveCommand::begin_stage);
         break;
       case Chosen::recording:
         view(choice.text);
@@ -310,7 +329,7 @@ class Window {
           live->command(LiveCommand::restart);
           go(Screen::practice);
         } else {
-          open(source_, lesson_.on());
+          open(source_.scene, source_.procedure, source_.stage, source_.tutorial);
         }
         break;
       case Chosen::finish:
@@ -359,7 +378,7 @@ class Window {
         if (!viewing_) break;
         viewing_->playback.play(false);
         scene_ = viewing_->playback.scene();
-        results_ = {&scene_, &viewing_->result, event_log(viewing_->result.map), "", true, 0};
+        results_ = {&scene_, &viewing_->result, event_log(viewing_->result.map), nullptr, "", true, 0};
         go(Screen::results);
         break;
       case Chosen::leave_results:
@@ -406,6 +425,7 @@ class Window {
     ScreenFacts facts;
     facts.screen = screen_;
     facts.fault = visit_ && !visit_->live.status().fault.empty();
+    facts.reading = reading();
     facts.scenes = scenes_.size();
     facts.from_recording = results_.from_recording;
     if (viewing_) facts.second = std::max<int64_t>(1, std::llround(1 / viewing_->playback.status().tick_s));
@@ -477,39 +497,49 @@ class Window {
     const LiveStatus& status = v.live.status();
     if (status.epoch != v.epoch) {
       v.epoch = status.epoch;
-      hands_.jumped(v.live.picture(), v.seen, settings_, status.metrics.time_s == 0);
+      hands_.jumped(v.live.picture(), v.seen, settings_, status.metrics.time_s == 0 && !status.prepared);
     }
     if (!status.fault.empty() && screen_ == Screen::practice) go(Screen::pause);
-    if (lesson_.on() && lesson_.look(v.live, v.seen, wall_seconds()) && events_)
-      std::fprintf(events_, "{\"lesson\":\"%s\"}\n",
-                   lesson_.all_done() ? "done" : lesson_.lesson().step[lesson_.step()].name.c_str());
+    report_stage(status);
     if (screen_ != Screen::practice || status.settling || !v.have || v.watching) return;
-    hands_.steering.guide = next_bite(places_, v.live.picture(), v.seen);
     const Camera camera = camera_of(orbit_);
     const ViewFrame view = view_frame(camera.eye, camera.target, camera.up, camera.fov_deg, static_cast<float>(height_));
     v.live.arm_strength(0, settings_.force_right), v.live.arm_strength(1, settings_.force_left);
+    if (reading()) {  // nothing moves while the user reads; a click begins
+      if (in.mouse.jaw_presses > 0 || (in.has_pad && in.pad.both)) v.live.command(LiveCommand::begin_stage);
+      if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_})) quit_ = true;
+      return;
+    }
+    used_keys_.note(in);
+    hands_.steering.guide = next_bite(places_, v.live.picture(), v.seen);
     const auto hands = hands_.move(in, settings_, view, v.live.picture(), v.seen, dt);
     for (size_t k = 0; k < 2; ++k) v.live.hand(k, hands[k]);
-    if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, lesson_})) quit_ = true;
+    if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_})) quit_ = true;
   }
 
-  void show_me() {
-    const bool was = lesson_.showing();
-    lesson_.show(visit_->live);
-    if (events_ && !was && lesson_.showing())
-      std::fprintf(events_, "{\"shows\":\"%s\"}\n", lesson_.lesson().step[lesson_.step()].name.c_str());
+  bool reading() const { return visit_ && visit_->live.status().reading && !visit_->live.status().demonstrating; }
+
+  // Event listeners: every new stage, and every demonstration.
+  void report_stage(const LiveStatus& status) {
+    if (!procedure_ || !status.procedure.begun || !events_) return;
+    const auto name = [&](size_t k) { return k < procedure_->stage.size() ? procedure_->stage[k].name : std::string("done"); };
+    if (std::exchange(shown_stage_, status.procedure.stage + 1) != status.procedure.stage + 1)
+      std::fprintf(events_, "{\"stage\":\"%s\"}\n", name(status.procedure.stage).c_str());
+    if (status.demonstrating && !std::exchange(demonstrating_, true))
+      std::fprintf(events_, "{\"shows\":\"%s\"}\n", name(status.procedure.stage).c_str());
+    demonstrating_ = status.demonstrating;
   }
 
-  // Guidance shown, as far as the user wants it.
-  void guidance() {
+  ViewFrame view() const {
+    const Camera c = camera_of(orbit_);
+    return view_frame(c.eye, c.target, c.up, c.fov_deg, static_cast<float>(height_));
+  }
+
+  // The planned bite, as far as the user wants guidance.
+  std::optional<BiteGuide> guide() const {
     const Guidance level = settings_.guidance;
-    if (lesson_.on()) lesson_panel(lesson_, level != Guidance::exam);
-    if ((level != Guidance::learn && !lesson_.on()) || level == Guidance::exam || visit_->watching) return;
-    if (const auto guide = next_bite(places_, visit_->live.picture(), visit_->seen)) {
-      const Camera c = camera_of(orbit_);
-      const float w = static_cast<float>(width_), h = static_cast<float>(height_);
-      guide_overlay(*guide, view_frame(c.eye, c.target, c.up, c.fov_deg, h), visit_->live.picture(), visit_->seen, w, h);
-    }
+    if ((level != Guidance::learn && !tutorial_) || (level == Guidance::exam && !tutorial_) || visit_->watching) return {};
+    return next_bite(places_, visit_->live.picture(), visit_->seen);
   }
 
   // Event listeners are also notified when the hands connect.
@@ -527,7 +557,7 @@ class Window {
     const std::string& wanted = options_.screen;
     if (visit_) {
       const LiveStatus& s = visit_->live.status();
-      if (!visit_->have || s.settling || s.metrics.time_s < options_.at) return;
+      if (!visit_->have || s.settling || (!s.reading && s.metrics.time_s < options_.at)) return;
       if (wanted == "pause") go(Screen::pause);
       if (wanted == "results") carry_out({Chosen::finish});
       developer_ = wanted == "developer";
@@ -549,7 +579,7 @@ class Window {
     if (screen_ == Screen::settings) return settings_panel(settings_, short_name(settings_path()), message_, visit_ != nullptr);
     if (screen_ == Screen::results) { return result_panel(results_, colored_by_); }
     Settings shown = settings_;
-    if (height_ < 480) shown.hints = false, shown.guidance = std::max(shown.guidance, Guidance::practice);
+    if (height_ < 480) shown.hints = false;
     if (viewing_ && viewing_->have) {
       const Viewing& v = *viewing_;
       return view_panel({&v.playback.scene(), &v.playback.status(), &v.result, &v.seen, v.file, v.version, v.cut}, shown);
@@ -568,8 +598,15 @@ class Window {
     view.watching = visit_->watching;
     view.inside = developer_;
     view.pictures_per_s = picture_count_ / std::max(picture_s_, 1e-3);
-    work_panel(view, shown);
-    if (!visit_->live.status().settling) guidance();
+    WorkText work{&view, procedure_.get(), tutorial_, {}, used_keys_};
+    if (!visit_->live.status().settling) work.guide = guide();
+    const float w = static_cast<float>(width_), h = static_cast<float>(height_);
+    const ViewFrame frame = this->view();
+    if (work.guide) guide_overlay(*work.guide, frame, *view.picture, *view.seen, w, h);
+    const BiteGuide* planned = work.guide ? &*work.guide : nullptr;
+    placed_ = place_panels(work_panels(work, shown), w, h, panel_text_size(),
+                           work_points(*view.seen, *view.picture, frame, w, h, planned), placed_);
+    draw_panels(placed_);
     Choice choice;
     if (developer_) choice = developer_panel(view, screen_ == Screen::pause);
     if (screen_ == Screen::pause)
@@ -615,7 +652,15 @@ class Window {
   int posed_for_ = 0;  // frames
   std::unique_ptr<Visit> visit_;
   std::unique_ptr<Viewing> viewing_;
-  std::string source_;  // of the session: a scene's name or path
+  struct {
+    std::string scene, procedure, stage;
+    bool tutorial = false;
+  } source_;                                    // of the session
+  std::shared_ptr<const Procedure> procedure_;  // null: none
+  bool tutorial_ = false, demonstrating_ = false;
+  uint32_t shown_stage_ = 0;  // reported last, from 1
+  UsedKeys used_keys_;
+  std::vector<PlacedPanel> placed_;
   int opened_ = 0;
   SceneSpec scene_;  // of the results
   LiveResult result_;
@@ -625,7 +670,6 @@ class Window {
   bool have_last_ = false;
   WindowHands hands_;
   BitePlaces places_;
-  LessonRun lesson_;
   Orbit orbit_;
   bool orbit_set_ = false;  // false: set again with the next snapshot
   Latency latency_;

@@ -8,7 +8,7 @@
 #include "device/mouse.h"
 #include "render/renderer.h"
 #include "runtime/live.h"
-#include "window/lesson_panel.h"
+#include "window/layout.h"
 
 namespace catgut {
 
@@ -19,7 +19,7 @@ struct WindowLook {
   const Steering& steering;
   const MouseHand& mouse;
   const LiveStatus& status;
-  const LessonRun& lesson;
+  const std::vector<PlacedPanel>& panels;  // as drawn last
 };
 
 struct PlayOptions {
@@ -30,7 +30,10 @@ struct PlayOptions {
   bool quality_given = false;
   int width = 1280, height = 720;
   bool left_handed = false;
-  bool teach = false;      // the lesson of the first stitch, in its scene
+  std::string procedure;   // its stages are shown; empty: none
+  std::string stage;       // the first one; empty: the first of the file
+  bool exam = false;       // no feedback before the results, whatever the settings
+  bool tutorial = false;   // time stands still at every new stage; demonstrations
   std::string events;      // file that receives events immediately, one JSON object per line; "-"
   std::string screenshot;  // PNG of the window, then quit
   int after = 60;          // frames before it

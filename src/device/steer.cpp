@@ -13,7 +13,7 @@ constexpr float kDriveAt = 0.35f, kTipAt = 0.93f;  // positions on the needle's 
 constexpr float kBeside = 0.3f;                    // of the arc: closer jaws would collide
 constexpr float kCatch = 0.009f;     // [m] in the view plane: within this distance of the best grasp, the assist moves the tool
 constexpr float kLetGo = 0.014f;     // and beyond this it releases it
-constexpr float kCatchDeep = 0.12f;  // [m] along the view axis, where distances are hard to judge on a flat screen
+constexpr float kCatchDeep = 0.16f;  // [m] along the view axis, where distances are hard to judge on a flat screen
 constexpr float kThere = 0.0015f;    // [m] the tool is at the needle
 constexpr float kPatience = 0.6f;    // [s] that a closing jaw waits for that
 constexpr float kBiteCatch = 0.012f, kBiteLetGo = 0.02f;  // [m] in the view plane, from the needle to the position of a bite

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: physics on its own thread; see live.h. Comments below state which of the two threads may use Work's members.
+// runtime: physics on its own thread; see live.h and live_work.h.
 #include "runtime/live.h"
 
 #include <atomic>
@@ -19,6 +19,7 @@
 #include "runtime/force_curves.h"
 #include "runtime/hands.h"
 #include "runtime/haptics.h"
+#include "runtime/live_work.h"
 #include "runtime/session.h"
 #include "sim/recording.h"
 #include "sim/simulation.h"
@@ -26,7 +27,6 @@
 namespace catgut {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr int kCatchUp = 4;              // overdue ticks computed at once; further ones are dropped
 constexpr size_t kMostTakenBack = 32;    // bites kept, some 200 kB each
 constexpr double kBeforeBite = 0.25;     // [s] minimum between the restored moment and the entry of the tip
@@ -34,47 +34,10 @@ constexpr uint64_t kValidityTicks = 16;  // as in runtime/session
 constexpr uint64_t kNewsTicks = 64;      // interval of polling the devices for faults
 constexpr double kFactorTime = 0.5;      // [s] window of `lately`
 constexpr float kArmSpeed = 1.0f;        // [m/s] at which a tool moves to a device that reconnects at another position
+constexpr double kLinger = 1.2;          // [s] that the result of a demonstration stays visible
 constexpr auto kNap = std::chrono::milliseconds(2);  // maximum delay of a command while no tick is due
 
 double seconds_of(Clock::duration d) { return std::chrono::duration<double>(d).count(); }
-
-// Everything needed to continue from a moment with identical results.
-struct Moment {
-  std::vector<std::byte> state;
-  HandInputs hand;
-  SessionMetrics metrics;
-};
-
-struct BiteMoment {
-  uint32_t bite = 0;
-  Moment before;
-};
-
-// Tasks of the surgeon's plan, in a fixed-size box for the command queue.
-struct Demonstration {
-  std::array<uint8_t, 6> task{};
-  uint8_t tasks = 0;
-  bool from_mark = false;
-};
-
-struct Request {
-  LiveCommand what{};
-  bool demonstrate = false;
-  Demonstration of;
-};
-
-struct HandMessage {
-  ToolInput input = no_hand();
-  uint32_t epoch = 0;  // epoch known to the sender
-};
-
-struct LiveView {
-  Snapshot before, now;
-  Clock::time_point at;    // when `now` was ready
-  double tick_wall_s = 1;  // between two ticks, at this speed
-  LiveStatus status;
-  bool any = false;
-};
 
 // NAME.cgrec, NAME.2.cgrec, ...
 std::string part_name(const std::string& path, size_t part) {
@@ -85,83 +48,6 @@ std::string part_name(const std::string& path, size_t part) {
 }
 
 }  // namespace
-
-struct Live::Work {
-  // --- set before the thread starts, constant after ----------------------------------------------------------------------
-  LiveOptions options;
-  PictureModel picture;
-  double dt = 0;
-
-  // --- shared by the threads ---------------------------------------------------------------------------------------------
-  std::array<Latest<HandMessage>, kMaxHands> hand_box;     // window -> physics
-  std::array<std::atomic<uint32_t>, kMaxHands> pressed{};  // both: buttons pressed since the last tick
-  Ring<Request, 64> requests;                              // window -> physics
-  Ring<Command, 64> orders;                                // window -> physics: commands of the hands
-  Ring<std::string, 16> changes;                           // window -> physics
-  std::atomic<bool> quit{false};                           // window -> physics
-  std::atomic<bool> watched{false};                        // window -> physics
-  Latest<LiveView> view_box;                               // physics -> window
-  Ring<Event, 1024> events;                                // physics -> window
-  std::thread thread;
-
-  // --- owned by the window -----------------------------------------------------------------------------------------------
-  LiveStatus status;
-  std::array<uint32_t, kMaxHands> buttons{};
-
-  // --- owned by the physics thread ---------------------------------------------------------------------------------------
-  SceneSpec scene;
-  std::shared_ptr<const Model> model;
-  StatePtr state;
-  std::unique_ptr<Jobs> jobs;
-  Hands surgeon;
-  std::unique_ptr<Recorder> recorder;
-  std::unique_ptr<Haptics> haptics;  // null: no devices
-  bool as_paper = false;             // devices use the paper's spring
-  bool arms_drove = false;           // state in the last patch, and
-  uint32_t handovers = 0;            // number of its changes
-  PaperSpring paper;
-  LiveResult result;
-  TickInput input;
-  std::array<uint32_t, kMaxHands> arm_buttons{};         // down in the last tick
-  std::array<int, kMaxHands> unheard{};                  // [ticks] since the last message of a hand, and
-  std::array<float, kMaxHands> heard_every{1, 1, 1, 1};  // [ticks] recent interval of its messages
-  Snapshot before, now;
-  LiveStatus published;
-  StitchMap map, learner_map;
-  Moment settled, mark, learner;
-  Hands demonstrator;
-  bool marked = false;
-  std::deque<BiteMoment> bites;
-  std::array<std::optional<Moment>, 2> checkpoint;                    // the newest and the previous one
-  uint64_t checkpoint_every = 1;                                      // [ticks]
-  size_t speed = 0;                                                   // of kLiveSpeeds
-  int steps = 0;                                                      // requested single steps
-  double wall_s = 0, simulated_s = 0, spent_s = 0, ticks_weight = 0;  // recent, with exponential weights
-
-  void begin();
-  void run();
-  void main_loop();
-  void process_commands();
-  void tick(bool let_in);
-  void feel();
-  bool arms_drive() const;
-  void rest_arms();
-  void publish_view();
-  void go_back(const Moment& to);
-  void change_scene(const std::string& key_equals_value);
-  void demonstrate(const Demonstration& what);
-  void end_demonstration();
-  void record_from_here();
-  void forget_pace() { wall_s = simulated_s = 0; }
-  size_t hand_of(size_t arm) const { return options.arm_hand[haptics->side(arm)]; }
-  // The device that moves a hand, -1: none.
-  int arm_of(size_t hand) const {
-    for (size_t arm = 0; haptics && arm < 2; ++arm)
-      if (haptics->present(arm) && hand_of(arm) == hand) return static_cast<int>(arm);
-    return -1;
-  }
-  Moment moment() const { return {save_state(*model, *state), input.hand, published.metrics}; }
-};
 
 void Live::Work::begin() {
   const ArmChoice choice = read_arm_choice(options.haptics);
@@ -214,13 +100,13 @@ void Live::Work::tick(bool let_in) {
   }
   input.tick = result.ticks;
   input.commands.clear();
-  if (let_in && (surgeon.surgeon || published.demonstrating)) {
-    Surgeon& hands = published.demonstrating ? *demonstrator.surgeon : *surgeon.surgeon;
+  if (published.preparing || (let_in && (surgeon.surgeon || published.demonstrating))) {
+    Surgeon& hands = surgeon.surgeon && !published.preparing ? *surgeon.surgeon : *demonstrator.surgeon;
     const TickInput wanted = hands.operate(now, static_cast<float>(dt));
     input.hand = wanted.hand;
     input.commands = wanted.commands;
     published.doing = hands.doing();
-    published.shown = published.demonstrating && hands.done();
+    published.shown = published.shown || (published.demonstrating && hands.done());
   } else if (let_in) {
     for (Command c; input.commands.count < CommandList::kCapacity && orders.pop(c);) input.commands.push(c);
     for (size_t k = 0; k < kMaxHands; ++k) {
@@ -261,10 +147,11 @@ void Live::Work::tick(bool let_in) {
   if (let_in) {
     update(published.metrics, now, static_cast<float>(dt));
     note(map, picture, now);
+    observe();
   }
   for (const Event& e : now.event) {
+    if (published.demonstrating || published.preparing) continue;  // not the user's, and they cannot be undone
     published.events_lost += !events.push(e);
-    if (published.demonstrating) continue;  // demonstrations cannot be undone
     if (e.kind == EventKind::tip_entered && checkpoint[0]) {
       bites.push_back({e.which, checkpoint[1] ? *checkpoint[1] : *checkpoint[0]});
       if (bites.size() > kMostTakenBack) bites.pop_front();
@@ -339,6 +226,8 @@ void Live::Work::go_back(const Moment& to) {
   rewind(map, now.tick);
   input.hand = to.hand;
   const uint32_t undos = published.metrics.undos;
+  published.reading = published.reading || (options.tutorial && to.procedure.stage != published.procedure.stage);
+  published.procedure = to.procedure;
   published.metrics = to.metrics;
   published.metrics.undos = undos;
   published.fault.clear();
@@ -369,27 +258,6 @@ void Live::Work::change_scene(const std::string& key_equals_value) {
   forget_pace();
 }
 
-void Live::Work::demonstrate(const Demonstration& what) {
-  if (surgeon.surgeon || published.demonstrating || published.settling || !published.fault.empty()) return;
-  try {
-    demonstrator.surgeon =
-        make_demonstrator(plan_of(scene), picture, skill_of(scene), {what.task.begin(), what.task.begin() + what.tasks});
-  } catch (const std::invalid_argument&) { return; }  // a scene without a demonstrator
-  learner = moment();
-  learner_map = map;
-  if (what.from_mark && marked) go_back(mark);
-  published.demonstrating = true;
-  published.shown = false;
-}
-
-void Live::Work::end_demonstration() {
-  if (!published.demonstrating) return;
-  published.demonstrating = published.shown = false;
-  published.doing.clear();
-  go_back(learner);
-  map = learner_map;
-}
-
 void Live::Work::process_commands() {
   bool any = false;
   for (std::string c; changes.pop(c); any = true) change_scene(c);
@@ -412,10 +280,11 @@ void Live::Work::process_commands() {
       case LiveCommand::arms_off:
         published.arms_off = !published.arms_off;
         break;
-      case LiveCommand::mark:
-        if (published.demonstrating) break;
-        mark = moment();
-        marked = true;
+      case LiveCommand::begin_stage:
+        published.reading = false;
+        break;
+      case LiveCommand::show_stage:
+        show_stage();
         break;
       case LiveCommand::end_demonstration:
         end_demonstration();
@@ -425,6 +294,7 @@ void Live::Work::process_commands() {
         bites.clear();
         published.metrics.undos = 0;
         go_back(settled);
+        published.reading = false;
         if (!options.surgeon.empty()) surgeon = make_hands(options.surgeon, scene, picture);
         break;
       case LiveCommand::take_back: {
@@ -455,7 +325,7 @@ void Live::Work::main_loop() {
     process_commands();
     const Clock::time_point at = Clock::now();
     const bool stepping = steps > 0;
-    if (published.paused && !stepping) {
+    if ((published.paused || (published.reading && !published.demonstrating)) && !stepping) {
       if (haptics) rest_arms();
       std::this_thread::sleep_for(kNap);
       due = last = Clock::now();
@@ -467,6 +337,10 @@ void Live::Work::main_loop() {
     }
     steps -= stepping;
     tick(true);
+    if (published.demonstrating && published.shown) {  // its result stays visible for a moment
+      shown_for += dt / static_cast<double>(kLiveSpeeds[speed]);
+      if (shown_for > kLinger) end_demonstration();
+    }
     const Clock::time_point done = Clock::now();
     const double passed = seconds_of(done - last), keep = std::exp(-passed / kFactorTime);
     last = done;
@@ -493,7 +367,9 @@ void Live::Work::run() {
         publish_view();
         const auto ticks = static_cast<uint64_t>(std::llround(static_cast<double>(scene.settle) / dt));
         while (result.ticks < ticks && !quit.load(std::memory_order_relaxed)) tick(false);
+        prepare();
         settled = moment();
+        settled_tick = now.tick;
         published.settling = false;
         was_settled = true;
         publish_view();
@@ -510,6 +386,7 @@ void Live::Work::run() {
   if (haptics) haptics->stop();
   published.fault.swap(result.fault);
   result.metrics = published.metrics;
+  result.procedure = published.procedure;
   result.map = std::move(map);
   result.state_hash = hash_state(*model, *state);
   try {
@@ -546,10 +423,10 @@ void Live::arm_strength(size_t side, float gain) {
 bool Live::command(LiveCommand command) { return work_->requests.push({command, false, {}}); }
 bool Live::instrument(const Command& command) { return work_->orders.push(command); }
 
-bool Live::demonstrate(const std::vector<size_t>& tasks, bool from_mark) {
+bool Live::demonstrate(const std::vector<size_t>& tasks, bool slowly) {
   Request c;
   c.demonstrate = true;
-  c.of.from_mark = from_mark;
+  c.of.slowly = slowly;
   for (const size_t t : tasks)
     if (c.of.tasks < c.of.task.size()) c.of.task[c.of.tasks++] = static_cast<uint8_t>(t);
   return work_->requests.push(c);
@@ -561,7 +438,8 @@ bool Live::look(Snapshot& out) {
   if (!view.any) return false;
   work_->status = view.status;
   const double passed = seconds_of(Clock::now() - view.at);
-  blend(view.before, view.now, view.status.paused ? 1.0f : static_cast<float>(passed / view.tick_wall_s), out);
+  blend(view.before, view.now, view.status.paused || view.status.reading ? 1.0f : static_cast<float>(passed / view.tick_wall_s),
+        out);
   return true;
 }
 
@@ -572,29 +450,6 @@ LiveResult Live::finish() {
   work_->quit = true;
   if (work_->thread.joinable()) work_->thread.join();
   return work_->result;
-}
-
-float hand_share(float every) { return 1 - std::exp(-2 / std::clamp(every, 0.3f, 8.0f)); }
-
-ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt, float share) {
-  if (!from.connected || !to.connected) return to;
-  ToolInput out = to;
-  const Vec3 way = to.pose.p - from.pose.p, about = rotation_vector(to.pose.q * conjugate(from.pose.q));
-  const float far = length(way), angle = length(about);
-  if (far * share > speed * dt) share = std::min(share, speed * dt / far);
-  float turned = share;
-  if (angle * turned > turn * dt) turned = turn * dt / angle;
-  if (share < 1) out.pose.p = from.pose.p + way * share;
-  if (turned < 1) out.pose.q = nlerp(from.pose.q, to.pose.q, turned);
-  out.jaw = from.jaw + std::clamp(to.jaw - from.jaw, -10 * dt, 10 * dt);
-  out.velocity = (out.pose.p - from.pose.p) / dt;
-  out.angular_velocity = rotation_vector(out.pose.q * conjugate(from.pose.q)) / dt;
-  return out;
-}
-
-double wall_seconds() { return seconds_of(Clock::now().time_since_epoch()); }
-uint64_t wall_ns() {
-  return static_cast<uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count());
 }
 
 }  // namespace catgut

@@ -17,6 +17,7 @@
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "exchange/tool_input.h"
+#include "procedure/manager.h"
 #include "runtime/haptics.h"
 #include "runtime/measures.h"
 #include "runtime/session_metrics.h"
@@ -33,7 +34,8 @@ enum class LiveCommand : uint8_t {
   slower,       // the next of kLiveSpeeds
   faster,
   arms_off,           // switches device forces off, they still move the tools; again: on, through the ramp
-  mark,               // a demonstration may start at this moment: Live::demonstrate(..., true)
+  begin_stage,        // the user has read the new stage of a tutorial: time continues
+  show_stage,         // demonstration of the procedure's active stage
   end_demonstration,  // back to the learner's state
 };
 constexpr std::array<float, 4> kLiveSpeeds{1.0f, 0.5f, 0.25f, 0.1f};  // of real time
@@ -45,6 +47,9 @@ struct LiveOptions {
   float hand_speed = 0.6f;  // [m/s] and
   float hand_turn = 12.0f;  // [rad/s] maximum of a tool: a jumping input (a mouse at a low frame rate) then tears nothing
   bool start_paused = false;
+  std::shared_ptr<const Procedure> procedure;  // observed tick by tick; null: none
+  size_t stage = 0;       // the first one: from its saved state, or after the surgeon has done those before
+  bool tutorial = false;  // time stands still at a new stage until begin_stage
   // Haptic devices, as read_arm_choice (runtime/haptics) reads them; empty or "off": none. Problems are reported and the scene
   // opens without. The window controls hands without a device.
   std::string haptics;
@@ -78,6 +83,11 @@ struct LiveStatus {
   std::string doing;           // of the surgeon, if active
   bool demonstrating = false;  // the surgeon demonstrates; the previous state is restored afterward
   bool shown = false;          // the demonstration has ended, or was abandoned
+  bool not_shown = false;      // the last demonstration did not reach the stage's goal from here
+  bool reading = false;        // a new stage of a tutorial: nothing moves until begin_stage
+  bool preparing = false;      // the surgeon carries out the stages before the first one
+  bool prepared = false;       // it did: hands start where it left the tools
+  ProcedureRun procedure;      // not begun: none
   std::string refused;         // the last failed change(), and why
   std::string fault;           // not empty: the run has stopped, and why
 };
@@ -85,7 +95,8 @@ struct LiveStatus {
 struct LiveResult {
   SessionMetrics metrics;
   StitchMap map;
-  uint64_t ticks = 0;  // all computed ticks, undone ones included
+  ProcedureRun procedure;  // not begun: none
+  uint64_t ticks = 0;      // all computed ticks, undone ones included
   uint64_t state_hash = 0;
   std::vector<std::string> recorded;  // files written: a restart or an undone bite starts the next one (NAME.2.cgrec ...)
   std::string fault;
@@ -115,9 +126,9 @@ class Live {
   // above.
   bool change(const std::string& key_equals_value);
   void watch(bool on);  // computes measures, some microseconds per tick
-  // The scripted surgeon takes the tools and demonstrates tasks of its plan (make_demonstrator): from now, or from the last
-  // mark. Until end_demonstration, which restores the present state.
-  bool demonstrate(const std::vector<size_t>& tasks, bool from_mark);
+  // The scripted surgeon takes the tools and demonstrates tasks of its plan (make_demonstrator). Until end_demonstration, which
+  // restores the present state. Its events are not reported. slowly: at half speed.
+  bool demonstrate(const std::vector<size_t>& tasks, bool slowly);
 
   // The current picture: the last two ticks interpolated by the elapsed time, so that it is one tick late and moves evenly at
   // any frame rate. False before the first tick.

@@ -2,6 +2,7 @@
 // tests/hands: a workstation without a window: device rooms and the simulation alone, in lock step.
 #pragma once
 #include "device/gamepad.h"
+#include "exchange/buttons.h"
 #include "person.h"
 #include "procedure/scene_file.h"
 #include "runtime/guide.h"
@@ -37,6 +38,7 @@ class LockStep : public WorkQueue {
     publish(*model_, *state_, look_.seen);
   }
   const PictureModel& picture() const override { return picture_; }
+  const SceneSpec& scene() const { return scene_; }
   const Look& look() const override { return look_; }
   size_t count(EventKind kind) const override { return happened_[static_cast<size_t>(kind)]; }
   bool act(const Act& act) override {
@@ -47,6 +49,9 @@ class LockStep : public WorkQueue {
         in_.hand[k] =
             started_ ? hand_toward(in_.hand[k], hand[k], 0.6f, 12, kTick, hand_share(static_cast<float>(ticks_))) : hand[k];
       started_ = true;
+      in_.commands.clear();
+      for (size_t k = 0; k < 2; ++k)
+        add_commands(in_.commands, k, hand[k].buttons & ~std::exchange(buttons_[k], hand[k].buttons), look_.seen);
       step(*model_, *state_, in_, jobs_);
       publish(*model_, *state_, look_.seen);
       for (const Event& e : look_.seen.event) ++happened_[static_cast<size_t>(e.kind)];
@@ -91,6 +96,7 @@ class LockStep : public WorkQueue {
   Look look_;
   TickInput in_;
   bool started_ = false;
+  std::array<uint32_t, 2> buttons_{};
   Jobs jobs_{1};
   std::array<size_t, static_cast<size_t>(EventKind::count_)> happened_{};
 };

@@ -31,6 +31,7 @@ MouseInput by_mouse(const Act& act, const Look& look, float speed) {
     in.wheel = std::round(m.ahead / (0.002f * speed));
   }
   in.jaw_presses = act.click;
+  in.cut = act.cut;
   return in;
 }
 
@@ -253,6 +254,15 @@ bool Person::set_throw() {
   if (!both(4, [&] { return set() || seen().tool[0].held == Held::nothing; }) || !set()) return false;
   doing_ = "lay the tail down";
   return lay_tail();
+}
+
+bool Person::cut_needle() {
+  doing_ = "cut the needle off";
+  Act act;
+  act.hand = 1;
+  act.cut = true;
+  if (!desk_.act(act)) return false;
+  return wait(3, [&] { return !seen().active().needle_on_thread; }, {1, {}, false});
 }
 
 bool Person::tie(int way) {

@@ -24,6 +24,7 @@ struct Act {
   size_t hand = 0;
   HandMotion motion;
   bool click = false;  // close the jaw, or open it
+  bool cut = false;    // the thread
 };
 
 class WorkQueue {
@@ -49,6 +50,7 @@ class Person {
   bool wind(int way);
   bool take_tail();
   bool set_throw();
+  bool cut_needle();  // off the thread, by the hand that holds it
   std::string doing() const { return doing_; }
 
  private:

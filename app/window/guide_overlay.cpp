@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// app/window: see guide_overlay.h.
+#include "window/guide_overlay.h"
+
+#include <imgui.h>
+
+#include <optional>
+
+namespace catgut {
+namespace {
+
+constexpr float kAside = 0.0015f;  // [m] from the target: within tolerance
+
+}  // namespace
+
+void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen, float width,
+                   float height) {
+  ImDrawList* draw = ImGui::GetBackgroundDrawList();
+  const auto at = [&](Vec3 p) -> std::optional<ImVec2> {
+    const Vec3 d = p - view.eye;
+    const float deep = dot(d, view.ahead);
+    if (deep < 0.01f) return {};
+    const float scale = 1 / (view.pixel * deep);
+    return ImVec2(0.5f * width + dot(d, view.right) * scale, 0.5f * height - dot(d, view.up) * scale);
+  };
+  // Path of the tip: dashed above the tissue and below it, drawn over the tissue.
+  const float half = half_bite(picture, g), from = -half - 0.5f, to = half + 0.6f;
+  constexpr int kDashes = 24;
+  for (int i = 0; i < kDashes; ++i) {
+    const auto tip = [&](float part) {
+      return at(on_needle(picture, needle_on(picture, g, from + (to - from) * part), 1, g.suture));
+    };
+    const auto a = tip(static_cast<float>(i) / kDashes), b = tip((static_cast<float>(i) + 0.6f) / kDashes);
+    if (a && b) draw->AddLine(*a, *b, IM_COL32(115, 190, 255, 200), 2);
+  }
+  const Vec3 tip = on_needle(picture, seen.active().needle.pose, 1, seen.active_suture);
+  const bool inside = seen.active().needle.in_tissue && !seen.active().bite.empty();
+  const Vec3 in = inside ? seen.active().bite.back().entry : tip;
+  const Vec3 off = in - entry_of(g);
+  const float aside = length(off - g.out * dot(off, g.out));
+  const bool good = aside < kAside;
+  if (const auto p = at(entry_of(g)))
+    draw->AddCircle(*p, 7, good ? IM_COL32(115, 190, 255, 255) : IM_COL32(255, 168, 64, 255), 20, 2);
+  if (const auto p = at(exit_of(g))) draw->AddCircleFilled(*p, 3, IM_COL32(115, 190, 255, 255));
+}
+
+}  // namespace catgut
