@@ -25,6 +25,7 @@ struct ContactBench {
   // Of the last event, per tool, needle and thread: overlap [m]; crossings of the wall's middle, at every fourth step.
   float deepest[3] = {};
   int passed[3] = {};
+  int folded = 0;                    // spheres on faces that are folded upon themselves
   float fastest = 0, strongest = 0;  // [m/s] of a body, [N] on a body, over all events
   explicit ContactBench(uint64_t s);
   // 80 ms: the tool pushes and perhaps drags, the needle falls or is thrown, the thread's ends are pulled.
