@@ -87,7 +87,7 @@ constexpr MetricRow kRow[] = {
     {"grasp_impulse", "integrated force of grasps", "tissue", "N s", lower, sum, "integral over time of that force", "force metrics: 10.3389/fmed.2022.897219"},
     {"tissue_grasps", "grasps of tissue", "tissue", "", lower, count, "times that a jaw closed on tissue", kErrors},
     {"tissue_slips", "tissue torn from a grasp", "tissue", "", lower, count, "tissue slipped out of the jaws under load", kErrors},
-    {"missed_grasps", "missed grasps", "tissue", "", lower, count, "jaws closed for 0.25 s on nothing", kErrors},
+    {"missed_grasps", "missed grasps", "tissue", "", lower, count, "jaws closed for 0.1 s on nothing", kErrors},
     {"hand_force", "peak force on a hand", "tissue", "N", lower, maximum, "computed, not the force that a device renders", "force metrics: 10.3389/fmed.2022.897219"},
 
     {"time", "time", "hands", "s", lower, only, "from the first tick with hands to the last", kStay},
