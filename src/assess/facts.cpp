@@ -15,7 +15,7 @@ namespace {
 constexpr double kMm = 1000, kDegrees = 180 / 3.14159265358979323846;
 constexpr double kSampleRate = 60;  // [1/s] of the hands, at least
 constexpr float kOpenJaw = 0.5f, kClosedJaw = 0.15f;
-constexpr double kGraspTime = 0.1;   // [s] closed on nothing; a surgeon who sees it opens the jaws at once
+constexpr double kGraspTime = 0.1;  // [s] closed on nothing; a surgeon who sees it opens the jaws at once
 
 double degrees_to_surface(Vec3 direction, Vec3 normal) {
   return portable::asin(std::min(1.0, std::abs(static_cast<double>(dot(direction, normal))))) * kDegrees;

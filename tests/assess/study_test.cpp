@@ -39,9 +39,11 @@ const char* const kShort =
 TEST(Study, bad_plans_are_one_line) {
   EXPECT_EQ(fault_of(kShort), "");
   EXPECT_EQ(fault_of("surgeons = [\"none\"]\n"), "my.toml: the study has no scenes; add scenes = [\"stay\"]");
-  EXPECT_EQ(fault_of(std::string(kShort) + "seed = [1, 2]\n"), "my.toml:5: a study has no key \"seed\"; did you mean \"seeds\"?");
+  EXPECT_EQ(fault_of(std::string(kShort) + "seed = [1, 2]\n"),
+            "my.toml:5: a study has no key \"seed\"; did you mean \"seeds\"?");
   EXPECT_NE(fault_of("scenes = [\"stai\"]\nsurgeons = [\"none\"]\n").find("stai"), std::string::npos);
-  EXPECT_NE(fault_of("scenes = [\"stay\"]\nsurgeons = [\"scripted:expart\"]\n").find("did you mean \"expert\"?"), std::string::npos);
+  EXPECT_NE(fault_of("scenes = [\"stay\"]\nsurgeons = [\"scripted:expart\"]\n").find("did you mean \"expert\"?"),
+            std::string::npos);
   EXPECT_NE(fault_of("scenes = [\"stay\"]\nsurgeons = [\"none\"]\nseeds = [4, 2]\n").find("my.toml:3"), std::string::npos);
   EXPECT_NE(fault_of("scenes = [\"stay\"]\nsurgeons = [\"none\"]\n[[setting]]\nset = [\"solver.substep=3\"]\n").find("substep"),
             std::string::npos);
