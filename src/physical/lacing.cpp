@@ -89,6 +89,11 @@ void lace_threads(const Model& m, State& s) {
       else if (in && entry > kBehind && !has_eyelet(s.thread, c.entry_hole)) lace(m, s, n, c.point[0], true, c.entry_hole);
       else if (in && exit > kBehind && (!out || !has_eyelet(s.thread, c.exit_hole)))
         lace(m, s, n, c.point[c.count - 1], false, c.exit_hole);
+      if (c.entry_hole != wall::kNone) {
+        float& deepest = s.hole[c.entry_hole].deepest = c.point[0].zeta;
+        for (uint32_t k = 1; k < c.count; ++k)
+          if (std::abs(c.point[k].zeta - c.point[0].zeta) > std::abs(deepest - c.point[0].zeta)) deepest = c.point[k].zeta;
+      }
       if (c.exit_hole == wall::kNone || !has_eyelet(s.thread, c.exit_hole)) continue;
     }
     if (exit < kDone) continue;

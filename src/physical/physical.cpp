@@ -15,6 +15,7 @@ Model make_model(const wall::Wall& wall, const thread::Settings& settings) {
   Model m;
   m.wall = wall.model, m.thread = settings;
   m.surface = make_surface(wall.model, wall.state);
+  m.tear = make_tear(wall.model.layer);
   return m;
 }
 
@@ -39,7 +40,7 @@ Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wal
   lips.inverse = wall::Inverse(wall::columns(s.wall));
   for (wall::Inverse* inverse : {&coupling.inverse, &lips.inverse}) inverse->need(s.wall.topology, {});  // takes its room
   const size_t n = thread::kMaxSoftPoints, columns = wall::columns(s.wall);
-  contact.reserve(n), foot.reserve(n), moved.reserve(n), tilt.reserve(16 * n);
+  contact.reserve(2 * n), foot.reserve(2 * n), moved.reserve(n), tilt.reserve(16 * n);
   coupling.reserve(n);
   lips.contact.reserve(3 * columns), lips.last.reserve(3 * columns), lips.points.reserve(6 * columns);
   for (auto* list : {&lips.speed, &lips.change, &lips.before, &lips.onward}) list->reserve(3 * columns);
@@ -54,6 +55,10 @@ uint64_t hash_state(const State& s) {
   uint64_t h = thread::hash_state(s.thread);
   h = hash_bytes(s.wall.motion.x.data(), s.wall.motion.x.size() * sizeof s.wall.motion.x[0], h);
   h = hash_bytes(s.wall.motion.v.data(), s.wall.motion.v.size() * sizeof s.wall.motion.v[0], h);
+  for (const Hole& o : s.hole) {
+    for (const float v : {o.place.xi, o.place.eta, o.torn, o.load.x, o.load.y, o.load.z}) h = hash_bytes(&v, sizeof v, h);
+    h = hash_bytes(&o.place.face, sizeof o.place.face, h);
+  }
   for (const thread::SoftContact& c : s.contact) h = hash_bytes(&c.normal_impulse, sizeof c.normal_impulse, h);
   for (const wall::Contact& c : s.lip) h = hash_bytes(&c.impulse, sizeof c.impulse, h);
   if (!s.bodies.body.empty()) {
@@ -74,9 +79,32 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
   const float d = m.thread.material.diameter, r = 0.5f * d, h = m.wall.step;
   const float far_move = m.thread.max_move * d * static_cast<float>(m.thread.substeps);
   size_t eyelet = 0, old = 0;
+  // Contacts that share a point: the first of them, how many, the node of the last one.
+  size_t group = 0, shared = 0;
   uint32_t last_node = 0;
-  size_t shared = 0;  // how many contacts use the last point
   k.foot.clear();
+  const auto add = [&](uint32_t node, const Foot& foot, const thread::SoftContact* memory, bool may_share) {
+    thread::SoftContact c;
+    c.node = node, c.patch = foot.patch, c.normal = foot.normal, c.friction = m.surface_friction;
+    if (memory) {
+      c.normal_impulse = memory->normal_impulse;
+      c.friction_impulse = memory->friction_impulse, c.drift = memory->drift;
+    }
+    if (may_share && shared > 0 && shared < 3 && last_node + 1 == node && dot(k.contact[group].normal, c.normal) > 0.95f) {
+      c.point = k.contact[group].point;
+      ++shared;
+    } else {
+      if (k.point.size() >= thread::kMaxSoftPoints) return;
+      wall::Weights up = wall::weights(m.wall, s.wall.topology, foot.point), middle = up;
+      up.zeta = 1, middle.zeta = 0;
+      const float half = distance(wall::place(up, s.wall.motion), wall::place(middle, s.wall.motion));
+      c.point = static_cast<uint32_t>(k.point.size());
+      k.point.push_back(foot.point), k.offset.push_back(foot.point.zeta * half);
+      if (may_share) group = k.contact.size(), shared = 1;
+    }
+    if (may_share) last_node = node;
+    k.contact.push_back(c), k.foot.push_back(foot);
+  };
   for (uint32_t i = 0; i < s.thread.nodes(); ++i) {
     while (eyelet < s.thread.eyelet.size() && s.thread.eyelet[eyelet].segment < i) ++eyelet;
     // Between the mouths of a channel; also where the end of the thread has already left the first of them, or the last.
@@ -89,6 +117,8 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
     if (k.search.node_first[i] == k.search.node_first[i + 1]) continue;
     while (old < s.contact.size() && s.contact[old].node < i) ++old;
     const thread::SoftContact* memory = old < s.contact.size() && s.contact[old].node == i ? &s.contact[old] : nullptr;
+    const bool two = memory && old + 1 < s.contact.size() && s.contact[old + 1].node == i;
+    if (two && s.contact[old + 1].normal_impulse > memory->normal_impulse) ++memory;  // the one that presses
     const Vec3 p = s.thread.position(i);
     Foot best;
     best.gap = 1e9f;
@@ -101,8 +131,8 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       if (far > std::abs(best.gap) + 1e-7f || (far > std::abs(best.gap) - 1e-7f && front < facing)) return;
       best = foot, facing = front;
     };
-    const uint32_t known = memory ? memory->patch : wall::kNone;
-    if (memory) look(known);  // most likely still the nearest: the others need not be searched
+    const uint32_t known = memory && memory->patch < m.surface.patch.size() ? memory->patch : wall::kNone;
+    if (known != wall::kNone) look(known);  // most likely still the nearest: the others need not be searched
     for (uint32_t f = k.search.node_first[i]; f < k.search.node_first[i + 1]; ++f) {
       const uint32_t face = k.search.node_face[f];
       const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
@@ -118,27 +148,31 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
     const float closing = dot(wall::velocity(w, s.wall.motion), best.normal);
     // A node can reach its limit of speed within a substep.
     if (best.gap - r > far_move + 1.5f * h * std::max(0.0f, closing)) continue;
-    thread::SoftContact c;
-    c.node = i, c.patch = best.patch, c.normal = best.normal, c.friction = m.surface_friction;
-    if (memory) {
-      c.normal_impulse = memory->normal_impulse;
-      c.friction_impulse = memory->friction_impulse, c.drift = memory->drift;
+    const auto memory_of = [&](Vec3 normal) -> const thread::SoftContact* {
+      const thread::SoftContact* found = nullptr;
+      float most = 0.5f;
+      for (size_t q = old; q < s.contact.size() && s.contact[q].node == i; ++q)
+        if (const float like = dot(s.contact[q].normal, normal); like > most) most = like, found = &s.contact[q];
+      return found;
+    };
+    add(i, best, memory_of(best.normal), true);
+    // In a fold the node may touch a second face, in front of which it is, with another normal.
+    Foot second;
+    second.gap = r + far_move;
+    for (uint32_t f = k.search.node_first[i]; f < k.search.node_first[i + 1]; ++f) {
+      const uint32_t face = k.search.node_face[f];
+      const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
+      if (least_distance(box, p, 0) > second.gap) continue;
+      for (uint32_t q = m.surface.first_of_face[face]; q < m.surface.first_of_face[face + 1]; ++q) {
+        const int side = m.surface.patch[q].side;
+        if (q == best.patch || (side != 0 && dot(box.n, best.normal) * static_cast<float>(side) > 0.97f) ||
+            least_distance(box, p, side) > second.gap)
+          continue;
+        const Foot foot = nearest_on_patch(m.wall, s.wall, m.surface, q, p);
+        if (!foot.on_edge && foot.gap > 0 && foot.gap < second.gap && dot(foot.facing, best.normal) < 0.95f) second = foot;
+      }
     }
-    const bool share = !k.contact.empty() && shared < 3 && last_node + 1 == i &&
-                       dot(k.contact[k.contact.size() - shared].normal, c.normal) > 0.95f;
-    if (!share) {
-      if (k.point.size() >= thread::kMaxSoftPoints) break;
-      wall::Weights up = w;
-      up.zeta = 1;
-      wall::Weights middle = w;
-      middle.zeta = 0;
-      const float half = distance(wall::place(up, s.wall.motion), wall::place(middle, s.wall.motion));
-      k.point.push_back(best.point), k.offset.push_back(best.point.zeta * half);
-      shared = 0;
-    }
-    ++shared, last_node = i;
-    c.point = static_cast<uint32_t>(k.point.size()) - 1;
-    k.contact.push_back(c), k.foot.push_back(best);
+    if (second.gap < r + far_move) add(i, second, memory_of(second.normal), false);
   }
 }
 
@@ -162,7 +196,7 @@ void end_bodies(const Model& m, State& s, Scratch& k) {
 }  // namespace
 
 void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) {
-  s.contact.reserve(thread::kMaxSoftPoints), s.lip.reserve(3 * wall::columns(s.wall));
+  s.contact.reserve(2 * thread::kMaxSoftPoints), s.lip.reserve(3 * wall::columns(s.wall));
   for (const Hands::WallPull& pull : hands.wall_pulls) wall::add_to(k.wall.external, pull.at, pull.force);
   if (m.surface_contact || m.lip_contact) find_near(m.wall, s.wall, m.surface, s.thread, k.search);
   if (m.lip_contact) {
@@ -204,6 +238,7 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
     (i < hands.holds.size() ? hands.holds[i] : k.bodies.hold[i - hands.holds.size()]).force = k.holds[i].force;
   if (bodies) take_thread_forces(m.bodies, s.bodies, k.bodies);
   k.coupling.end(s.wall, k.wall);
+  if (m.tear.on && m.surface_contact) tear_bites(m, s, {k.coupling.impulse.data(), s.hole.size()}, k.search);
   s.contact.assign(k.contact.begin(), k.contact.end());
 
   if (m.lip_contact) {

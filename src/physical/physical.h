@@ -13,6 +13,7 @@
 #include "physical/body.h"
 #include "physical/needle.h"
 #include "physical/surface.h"
+#include "physical/tear.h"
 #include "thread/thread.h"
 #include "wall/contact.h"
 #include "wall/points.h"
@@ -23,6 +24,12 @@ namespace catgut::physical {
 struct Hole {
   wall::Point place;    // zeta: -1 inner face .. 1 outer face
   bool within = false;  // from here to the next hole along the thread it runs within the wall
+  float deepest = -2;   // zeta of the deepest point of a bite that begins here; -2: not known
+  // Tearing (physical/tear). `place` moves with the tear; the slit leads from `made` to it.
+  wall::Point made{};  // meaningful where torn > 0
+  float torn = 0;      // [m]
+  bool out = false;    // the bite has come out at the edge; the thread is no longer in it
+  Vec3 load{};         // [N] on the bite that begins here, smoothed
 };
 
 struct Model {
@@ -35,6 +42,7 @@ struct Model {
   Surface surface;                // from make_surface
   BodiesModel bodies;             // rigid tools and needles
   NeedlesModel needles;
+  TearModel tear;
 };
 
 struct State {

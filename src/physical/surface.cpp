@@ -54,6 +54,11 @@ Surface make_surface(const wall::Model& m, const wall::State& s) {
   out.piece = wall::pieces(s);
   const uint32_t faces = static_cast<uint32_t>(m.lane_of_face.size());
   std::map<std::pair<uint32_t, uint32_t>, int> uses;
+  std::vector<std::pair<uint32_t, uint32_t>> edges;
+  const auto place = [&](uint32_t column) {
+    const uint32_t source = t.source[column];
+    return (m.mesh.outer[source] + m.mesh.inner[source]) * 0.5f;
+  };
   for (uint32_t f = 0; f < faces; ++f) {
     const Corners c = corners_of(m, t, f);
     for (uint32_t k = 0; k < c.count(); ++k) ++uses[std::minmax(c.column[k], c.column[(k + 1) % c.count()])];
@@ -68,19 +73,30 @@ Surface make_surface(const wall::Model& m, const wall::State& s) {
       if (uses[std::minmax(a, b)] != 1) continue;
       out.patch.push_back({f, 0, k});
       out.at_rim[a] = out.at_rim[b] = 1;
+      edges.push_back({a, b});
     }
     Vec3 center{};
-    const auto place = [&](uint32_t column) {
-      const uint32_t source = t.source[column];
-      return (m.mesh.outer[source] + m.mesh.inner[source]) * 0.5f;
-    };
     for (uint32_t k = 0; k < c.count(); ++k) center += place(c.column[k]) / static_cast<float>(c.count());
     float radius = 0;
     for (uint32_t k = 0; k < c.count(); ++k) radius = std::max(radius, distance(center, place(c.column[k])));
     out.face_radius.push_back(radius + 0.5f * m.laminate.thickness);
   }
   out.first_of_face.push_back(static_cast<uint32_t>(out.patch.size()));
+  for (uint32_t column = 0; column < t.source.size(); ++column) {
+    float nearest = 1e3f;
+    for (const auto& [a, b] : edges) {
+      if (out.piece[a] != out.piece[column]) continue;
+      const Vec3 from = place(a), along = place(b) - from, p = place(column) - from;
+      const float at = std::clamp(dot(p, along) / std::max(length2(along), 1e-20f), 0.0f, 1.0f);
+      nearest = std::min(nearest, length(p - along * at));
+    }
+    out.edge_distance.push_back(nearest);
+  }
   return out;
+}
+
+uint32_t column_of(const wall::Model& m, const wall::State& s, uint32_t face) {
+  return corners_of(m, s.topology, face).column[0];
 }
 
 Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface& surface, uint32_t index, Vec3 p) {

@@ -23,9 +23,13 @@ struct Surface {
   std::vector<uint32_t> first_of_face;  // patches of a face: both sides, then its strips; one more than faces
   std::vector<uint8_t> at_rim;          // per column
   std::vector<uint32_t> piece;          // per column: its connected part of the wall
+  std::vector<float> edge_distance;     // [m] per column: to the nearest edge of its part of the wall, at rest
   std::vector<float> face_radius;       // [m] at rest, about the middle of its corners, thickness included
 };
 Surface make_surface(const wall::Model& model, const wall::State& state);
+
+// A column of a face.
+uint32_t column_of(const wall::Model& model, const wall::State& state, uint32_t face);
 
 struct Foot {
   uint32_t patch = 0;

@@ -234,7 +234,7 @@ Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_un
   s.block_middle.resize(max_nodes / 8 + 2), s.block_radius.resize(max_nodes / 8 + 2);
   s.tool_move.resize(2 * 64);
   s.spike_right.resize(max_nodes), s.spike_left.resize(max_nodes);
-  s.soft_moved.resize(kMaxSoftPoints), s.soft_before.resize(kMaxSoftPoints), s.soft_active.reserve(kMaxSoftPoints);
+  s.soft_moved.resize(kMaxSoftPoints), s.soft_before.resize(kMaxSoftPoints), s.soft_active.reserve(2 * kMaxSoftPoints);
   s.corner.reserve(kMaxEyelets), s.reduced.resize(kMaxEyelets * kMaxEyelets), s.right.resize(kMaxEyelets);
 }
 Stepper::~Stepper() = default;

@@ -79,5 +79,6 @@ void check_eyelets(Lines& out, bool nightly);
 void check_lying(Lines& out, bool nightly);
 void check_interrupted(Lines& out, bool nightly);
 void check_purse_string(Lines& out);
+void check_tear(Lines& out, bool nightly);
 
 }  // namespace catgut::validation

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <tuple>
 
+#include "core/check.h"
+
 namespace catgut::validation {
 
 thread::State lay_course(std::span<const Stop> course, float spacing, float hole_friction) {
@@ -81,6 +83,7 @@ uint32_t exit_node(const thread::State& t, float diameter, bool first) {
 void tie_throw(Sewn& s, Tying& t, Throw one) {
   thread::State& thread = s.state.thread;
   const float d = s.model.thread.material.diameter, r = 0.75f * d, half = 1.1f * d * static_cast<float>(one.half_turns);
+  CATGUT_CHECK(!thread.eyelet.empty());  // every bite has torn out
   const uint32_t n = static_cast<uint32_t>(thread.nodes());
   const uint32_t a = exit_node(thread, d, true), b = exit_node(thread, d, false);
   const Vec3 from_a = thread.position(a), from_b = thread.position(b);

@@ -132,6 +132,7 @@ std::vector<ValidationLine> run_validation(const std::function<void(const Valida
       {"closure/surface", v::check_lying},
       {"closure/interrupted", v::check_interrupted},
       {"closure/purse-string", [](v::Lines& out, bool all) { all ? v::check_purse_string(out) : void(); }},
+      {"tear", v::check_tear},
   };
   v::Lines lines;
   lines.on_line = on_line;

@@ -218,6 +218,7 @@ Wall build_wall(const Spec& spec) {
   Wall w;
   Model& m = w.model;
   m.mesh = spec.mesh;
+  m.layer = spec.layer;
   m.laminate = laminate(spec.layer, spec.mesh.name);
   m.step = spec.step, m.drag = spec.drag, m.tau = spec.step / 4, m.gravity = spec.gravity;
   const uint32_t n = static_cast<uint32_t>(m.mesh.outer.size());

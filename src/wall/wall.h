@@ -44,6 +44,7 @@ struct InertiaReport {
 // Constant after build_wall.
 struct Model {
   Mesh mesh;  // at rest
+  std::vector<Layer> layer;
   Laminate laminate;
   float step = 0, drag = 0, tau = 0;  // [s], [1/s], [s]
   float max_speed = 3;                // [m/s]

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical/tear: see the header.
+#include "physical/tear.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "physical/physical.h"
+
+namespace catgut::physical {
+namespace {
+
+constexpr float kOut = 0.3e-3f;   // [m] a bite so near to the edge is out
+constexpr float kMost = 0.2e-3f;  // [m] by which a bite tears in one step
+
+// Moves a mouth along its face of the wall.
+void drag(const Model& m, const State& s, SurfaceSearch& search, wall::Point& place, Vec3 move) {
+  const wall::Weights w = wall::weights(m.wall, s.wall.topology, place);
+  const Vec3 target = wall::place(w, s.wall.motion) + move;
+  const int side = place.zeta < 0 ? -1 : 1;
+  Foot best;
+  best.gap = 1e9f;
+  for (uint32_t face = 0; face + 1 < m.surface.first_of_face.size(); ++face) {
+    // A part of the wall that only touches this one is not torn into.
+    if (m.surface.piece[w.column[0]] != m.surface.piece[column_of(m.wall, s.wall, face)]) continue;
+    if (least_distance(box_of(m.wall, s.wall, search, face), target, side) > std::min(4 * kMost, std::abs(best.gap))) continue;
+    const uint32_t first = m.surface.first_of_face[face];  // outer, inner
+    const Foot foot = nearest_on_patch(m.wall, s.wall, m.surface, side > 0 ? first : first + 1, target);
+    if (std::abs(foot.gap) < std::abs(best.gap)) best = foot;
+  }
+  if (best.gap < 1e8f) place = best.point;
+}
+
+}  // namespace
+
+TearModel make_tear(std::span<const wall::Layer> layer) {
+  TearModel t;
+  if (layer.empty()) return t;
+  t.layer.clear();
+  float thickness = 0, stiffness = 0, top = 0;
+  const auto stiff = [](const wall::Layer& l) { return std::sqrt(l.e_along * l.e_around) * l.thickness; };
+  for (const wall::Layer& l : layer) thickness += l.thickness, stiffness += stiff(l);
+  for (const wall::Layer& l : layer) {
+    top += l.thickness;
+    t.layer.push_back({2 * top / thickness - 1, stiff(l) / stiffness});
+  }
+  return t;
+}
+
+float strength_share(const TearModel& t, float low, float high) {
+  float bottom = -1, sum = 0;
+  for (const TearModel::LayerShare& l : t.layer) {
+    const float part = std::min(high, l.top) - std::max(low, bottom);
+    if (part > 0) sum += l.share * part / (l.top - bottom);
+    bottom = l.top;
+  }
+  return sum;
+}
+
+float edge_distance(const Model& m, const State& s, const wall::Point& point) {
+  const wall::Weights w = wall::weights(m.wall, s.wall.topology, point);
+  float sum = 0;
+  for (size_t k = 0; k < 4; ++k)
+    if (w.weight[k] != 0) sum += w.weight[k] * m.surface.edge_distance[w.column[k]];
+  return sum;
+}
+
+float bite_strength(const Model& m, const State& s, uint32_t entry, uint32_t exit) {
+  const Hole &a = s.hole[entry], &b = s.hole[exit];
+  // Both mouths on one face: through the deepest point; where that is not known, to the middle of the wall.
+  const float deep = a.deepest >= -1 ? a.deepest : a.place.zeta * b.place.zeta > 0 ? 0.0f : b.place.zeta;
+  const float low = std::min({a.place.zeta, b.place.zeta, deep}), high = std::max({a.place.zeta, b.place.zeta, deep});
+  const float edge = 0.5f * (edge_distance(m, s, a.place) + edge_distance(m, s, b.place));
+  return m.tear.strength * strength_share(m.tear, low, high) * std::min(1.0f, edge / m.tear.full_bite);
+}
+
+bool tear_bites(const Model& m, State& s, std::span<const Vec3> impulse, SurfaceSearch& search) {
+  const float h = m.wall.step, part = std::min(1.0f, h / m.tear.smoothing);
+  thread::State& t = s.thread;
+  bool out = false;
+  for (size_t e = 0; e + 1 < t.eyelet.size(); ++e) {
+    const uint32_t entry = t.eyelet[e].point, exit = t.eyelet[e + 1].point;
+    Hole &a = s.hole[entry], &b = s.hole[exit];
+    if (!a.within || std::max(entry, exit) >= impulse.size()) continue;
+    const wall::Weights w = wall::weights(m.wall, s.wall.topology, a.place);
+    wall::Weights up = w, middle = w;
+    up.zeta = 1, middle.zeta = 0;
+    const Vec3 n = normalized(wall::place(up, s.wall.motion) - wall::place(middle, s.wall.motion));
+    const Vec3 force = (impulse[entry] + impulse[exit]) / h;
+    a.load += (force - a.load) * part;
+    const float load = length(a.load), excess = load - bite_strength(m, s, entry, exit);
+    if (excess <= 0) continue;
+    if (a.torn == 0) a.made = a.place, b.made = b.place;
+    const float by = std::min(kMost, excess / m.tear.viscosity * h);
+    const Vec3 move = normalized(a.load - n * dot(a.load, n)) * by;
+    drag(m, s, search, a.place, move), drag(m, s, search, b.place, move);
+    a.torn += by, b.torn += by;
+    if (edge_distance(m, s, a.place) > kOut && edge_distance(m, s, b.place) > kOut) continue;
+    a.out = b.out = out = true;
+    t.eyelet.erase(t.eyelet.begin() + static_cast<std::ptrdiff_t>(e), t.eyelet.begin() + static_cast<std::ptrdiff_t>(e) + 2);
+    --e;
+  }
+  return out;
+}
+
+}  // namespace catgut::physical
