@@ -20,6 +20,34 @@
     ], metrics, true);
   }
 
+  // Details come from files: a part that has another shape than expected does not take the rest of the page with it.
+  function attempt(draw) {
+    try {
+      return draw();
+    } catch (e) {
+      return el("p", {class: "quiet"}, "This part of the session's data has an unknown form and is not shown.");
+    }
+  }
+  // The items of the rubric, as catgut assess scored them.
+  function items(score) {
+    return table(`Items of the rubric ${score.title || ""}, version ${score.version || ""}`, [
+      {title: "item", value: (i) => i.title || words(i.item)},
+      {title: "measured", value: (i) => i.value, cell: (i) => (i.observed === false ? "not observed" : number(i.value, 3) + unit(i.unit)), number: true},
+      {title: "points", value: (i) => i.points, cell: (i) => `${number(i.points, 3)} of ${number(i.of, 3)}`, number: true},
+      {title: "result", value: (i) => (i.passed ? 1 : 0), cell: (i) => (i.observed === false ? "–" : i.passed ? el("span", {class: "good"}, "✓ passed") : el("span", {class: "bad"}, "✗ not passed"))},
+      {title: "band", value: (i) => (i.validated ? "from a study with people" : "not validated")}], score.items, true);
+  }
+
+  function tensionChart(t) {
+    if (!t || t.time_s.length < 2) return null;
+    const points = t.time_s.map((at, i) => [at, (t.peak_n || t.needle_n)[i]]).filter((p) => known(p[0]) && known(p[1]));
+    const peak = d3.max(points, (p) => p[1]);
+    return lineChart({series: [{name: "tension", points}], levels: peak > 1.5 ? [{y: 3.22, name: "3.22 N: human small bowel begins to tear"}] : [],
+      yDomain: [0, Math.max(1, 1.1 * peak, peak > 1.5 ? 3.5 : 0)], xLabel: "time [s]", yLabel: "tension [N]",
+      description: `Tension of the thread over ${number(d3.max(points, (p) => p[0]), 3)} seconds, peak ${number(peak, 3)} N`,
+      caption: `Largest tension along the thread, ten values per second. Peak ${number(peak, 3)} N. Tear-out of human small bowel 4.62 ± 1.40 N (Gong 2023).`});
+  }
+
   function session() {
     const s = d.session, [text, kind] = verdict(s.passed);
     const film = served && s.recording ? el("p", {class: "screen"}, el("a", {href: `/recording/${s.id}`}, "Download the recording"), " · ",
@@ -38,18 +66,16 @@
         el("strong", {}, words(l.item)), l.critical ? el("strong", {class: "bad"}, " (critical error)") : null, `: ${l.reason}`,
         l.place ? ` (${l.place})` : "", ` – ${number(l.points)} points.`, known(l.at_s) ? replay(l.at_s) || el("span", {class: "quiet"}, ` At ${time(l.at_s)}.`) : null)))));
     } else if (known(s.score)) parts.push(section("What to improve", el("p", {}, "No points were lost.")));
-    const map = stitchMap(d.details.bites || [], d.details.lines);
+    const map = attempt(() => stitchMap(d.details.bites || [], d.details.lines));
     if (map) parts.push(section("Stitch map", map));
-    const t = d.details.tension;
-    if (t && t.time_s && t.time_s.length > 1) {
-      const points = t.time_s.map((at, i) => [at, (t.peak_n || t.needle_n)[i]]).filter((p) => known(p[1]));
-      const peak = d3.max(points, (p) => p[1]);
-      parts.push(section("Tension of the thread", lineChart({series: [{name: "tension", points}],
-        levels: peak > 1.5 ? [{y: 3.22, name: "3.22 N: human small bowel begins to tear"}] : [],
-        yDomain: [0, Math.max(1, 1.1 * peak, peak > 1.5 ? 3.5 : 0)], xLabel: "time [s]", yLabel: "tension [N]", description: `Tension of the thread over ${number(d3.max(points, (p) => p[0]), 3)} seconds, peak ${number(peak, 3)} N`,
-        caption: `Largest tension along the thread, ten values per second. Peak ${number(peak, 3)} N. Tear-out of human small bowel 4.62 ± 1.40 N (Gong 2023).`})));
-    }
-    if (d.metrics.length) parts.push(section("Scorecard", metricRows(d.metrics), el("p", {class: "quiet"}, "Percentile: share of the other trainees' newest sessions with a smaller value; shown from three others on.")));
+    const tension = attempt(() => tensionChart(d.details.tension));
+    if (tension) parts.push(section("Tension of the thread", tension));
+    const rubric = attempt(() => {
+      const score = (d.details.scores || [])[0];
+      return score && score.items.length ? items(score) : null;
+    });
+    if (rubric) parts.push(section("Scorecard", rubric, el("p", {class: "quiet"}, "Not validated: no study with people supports the limits of this item.")));
+    if (d.metrics.length) parts.push(section("Metrics", metricRows(d.metrics), el("p", {class: "quiet"}, "Percentile: share of the other trainees' newest sessions with a smaller value; shown from three others on.")));
     const curve = learningCurve(d.task), sum = cusumChart(d.task.cusum, words(s.task));
     if (curve) parts.push(section("Learning curve", curve));
     if (sum) parts.push(section("Proficiency (CUSUM)", sum));

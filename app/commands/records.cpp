@@ -7,15 +7,19 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "commands/commands.h"
 #include "core/check.h"
 #include "core/file.h"
+#include "procedure/scene_file.h"
 #include "report/csv.h"
 #include "report/data.h"
 #include "report/session_file.h"
 #include "report/survey.h"
+#include "runtime/assessment.h"
+#include "runtime/report.h"
 #include "store/store.h"
 
 namespace catgut {
@@ -59,7 +63,7 @@ void add_filter_options(CLI::App& command, SessionFilter& filter) {
 }
 
 struct StoreCommand {
-  std::string store, trainee, task, started, recording, cohort, level, role, mapping, out, json, csv, xapi,
+  std::string store, trainee, task, started, recording, rubric, cohort, level, role, mapping, out, json, csv, xapi,
       home = "https://catgut.invalid";
   std::vector<std::string> file;
   std::string name;
@@ -82,10 +86,48 @@ std::string keep_recording(const Store& store, const std::string& path, const st
   return kept;
 }
 
-int store_add(const StoreCommand& o) {
+// Replays and scores a recording; the tension of the thread is kept for the report.
+Session assessed(const std::string& file, const std::string& rubric) {
+  const Recording recording = read_recording(file);
+  check_replayable(recording, file);
+  const SceneSpec scene = parse_scene(recording.header.scene, file);
+  SessionHooks hooks;
+  hooks.stop = &stop_on_interrupt();
+  hooks.on_progress = progress_line();
+  PictureModel picture;
+  StitchMap map;
+  hooks.on_start = [&](const PictureModel& model) {
+    picture = model;
+    map = start_map(picture, 1 / static_cast<double>(scene.solver.tick_rate));
+  };
+  hooks.on_tick = [&](const Snapshot& seen, const std::string&) { note(map, picture, seen); };
+  const assess::Result result = assess_recording(recording, file, default_threads(), rubrics_for(rubric, scene), hooks);
+  end_progress_line();
+  if (stop_on_interrupt()) throw InputError(file, "the assessment was interrupted", "nothing was stored");
+  Session s;
+  read_session_json(assess::result_json(result), file, s);
+  nlohmann::ordered_json details = nlohmann::ordered_json::parse(s.details);
+  for (const StitchEdge& edge : map.edge) details["lines"].push_back({{"length_mm", 1e3 * static_cast<double>(edge.length())}});
+  auto& tension =
+      details["tension"] = {{"time_s", nlohmann::ordered_json::array()}, {"peak_n", nlohmann::ordered_json::array()}};
+  for (const TensionSample& t : map.tension) {
+    if (t.tick < result.first_tick) continue;
+    tension["time_s"].push_back(static_cast<double>(t.tick) * map.tick_s);
+    tension["peak_n"].push_back(t.peak);
+  }
+  s.details = details.dump();
+  return s;
+}
+
+int store_add(const StoreCommand& given) {
+  StoreCommand o = given;
   Store store = open_store(o.store);
   std::vector<Session> all;
-  if (o.file.size() == 1 && o.recording.empty()) {
+  if (o.file.size() == 1 && o.file[0].ends_with(".cgrec")) {
+    if (o.trainee.empty()) throw InputError("--trainee", "is missing", "give the pseudonym of the trainee");
+    all.push_back(assessed(o.file[0], o.rubric));
+    if (o.recording.empty()) o.recording = o.file[0];
+  } else if (o.file.size() == 1 && o.recording.empty()) {
     all = read_sessions_json(read_whole(o.file[0]), o.file[0]);
   } else {  // several files of one session
     Session one;
@@ -231,9 +273,10 @@ void add_store(CLI::App& app, int& exit_code) {
   sub("info", "name, contents and integrity of the store; makes one when missing", store_info);
   CLI::App* add = sub("add", "store a session, or all sessions of an export", store_add);
   add->add_option("file", o->file,
-                  "written by catgut assess --json, saved by the window, or exported; several files of one session")
+                  "a recording, which is scored and kept; or what catgut assess --json, the window or an export wrote")
       ->required()
-      ->type_name("FILE.json");
+      ->type_name("FILE.cgrec|FILE.json");
+  add->add_option("--rubric", o->rubric, "for a recording; default: that of the technique")->type_name("NAME|FILE");
   add->add_option("--trainee", o->trainee, "pseudonym; not a person's name")->type_name("NAME");
   add->add_option("--task", o->task, "default: the scene")->type_name("NAME");
   add->add_option("--started", o->started, "UTC; default: now")->type_name("2026-11-22T21:05:00Z");
