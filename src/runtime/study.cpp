@@ -338,7 +338,8 @@ std::string study_report(const StudyPlan& plan, const std::string& folder) {
       out += fmt::format(" {} {} ({} finished the task);", of[who].size(), short_name(who),
                          std::count(done.begin(), done.end(), 1.0));
     }
-    out += fmt::format(" metrics with an AUC of 0.95 or more: {} of {}.\n\n", good, lines.size() - 1);
+    out.back() = '.';
+    out += fmt::format(" Metrics with an AUC of 0.95 or more: {} of {}.\n\n", good, lines.size() - 1);
   }
   return out;
 }
