@@ -87,11 +87,14 @@ struct ProcedureWatch {
   explicit ProcedureWatch(const std::string& name);
   void start(const SceneSpec& scene, const PictureModel& picture);
   void tick(const Snapshot& seen);
+  // FOLDER/NAME_STAGE.cgrec, a recording without ticks, when a stage has begun.
+  void save_stage(const std::string& folder, const SceneSpec& scene, const Model& model, const State& state);
   Procedure procedure;
   ProcedureRun run;
 
  private:
   double tick_s_ = 1.0 / 60, settle_s_ = 0;  // [s]
+  size_t saved_ = 0;                         // stages
 };
 void add_threads_option(CLI::App& command, int& threads);
 

@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -14,6 +15,9 @@
 #include "core/check.h"
 #include "core/file.h"
 #include "procedure/procedure_file.h"
+#include "procedure/scene_file.h"
+#include "sim/recording.h"
+#include "sim/simulation.h"
 
 namespace catgut {
 namespace {
@@ -80,6 +84,16 @@ void ProcedureWatch::start(const SceneSpec& scene, const PictureModel& picture) 
 void ProcedureWatch::tick(const Snapshot& seen) {
   if (run.begun) update_run(run, procedure, seen);
   else if (seen.time_s > settle_s_ - 0.5 * tick_s_) begin_run(run, procedure, seen, tick_s_);
+}
+
+void ProcedureWatch::save_stage(const std::string& folder, const SceneSpec& scene, const Model& model, const State& state) {
+  if (!run.begun || run.stage < saved_ || finished(run, procedure)) return;
+  saved_ = run.stage + 1;
+  std::string name = procedure.name + "_" + procedure.stage[run.stage].name + ".cgrec";
+  std::replace(name.begin(), name.end(), ' ', '_');
+  const std::string path = (std::filesystem::path(folder) / name).string();
+  prepare_output(path);
+  Recorder(path, RecordingHeader{catgut_version(), kStateVersion, write_scene(scene)}, save_state(model, state)).finish(false);
 }
 
 void add_threads_option(CLI::App& command, int& threads) {

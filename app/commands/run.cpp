@@ -18,7 +18,7 @@ namespace catgut {
 namespace {
 
 struct RunOptions {
-  std::string scene, procedure, preset, mesh, json;
+  std::string scene, procedure, states, preset, mesh, json;
   std::vector<std::string> set;
   uint64_t seed = 0;
   bool seed_given = false, headless = false, no_expect = false;
@@ -50,6 +50,7 @@ int run(RunOptions& o) {
   if (!o.procedure.empty()) procedure.emplace(o.procedure);
   if (o.scene.empty() == !procedure)
     throw InputError("run", "it needs either a scene or --procedure", "write catgut run SCENE, or catgut run --procedure NAME");
+  if (!procedure && !o.states.empty()) throw InputError("--states", "it needs a procedure", "add --procedure NAME");
   const SceneSpec scene = scene_for(o, procedure ? &procedure->procedure : nullptr);
   check_picture_files(o.pictures);
   check_suffix(o.session.record, ".cgrec", "--record");
@@ -75,6 +76,10 @@ int run(RunOptions& o) {
     if (procedure) procedure->tick(seen);
     if (pictures) pictures->tick(seen, doing);
   };
+  if (procedure && !o.states.empty())
+    hooks.on_step = [&](const Model& model, const State& state, const TickInput&) {
+      procedure->save_stage(o.states, scene, model, state);
+    };
   const RunResult result = run_session(scene, o.session, hooks);
   end_progress_line();
   if (!o.json.empty())

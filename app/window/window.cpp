@@ -95,6 +95,12 @@ Quality measured_quality(int width, int height) {
   return choose_quality(picture_model(*model), seen, width, height).quality;
 }
 
+// The procedure of a scene in the list: the one of its name; empty: none.
+std::string procedure_for(const std::string& scene) {
+  const std::vector<std::string> names = procedure_names();
+  return std::find(names.begin(), names.end(), scene) != names.end() && read_procedure(scene).scene == scene ? scene : "";
+}
+
 class Window {
  public:
   explicit Window(const PlayOptions& options)
@@ -287,7 +293,7 @@ class Window {
       case Chosen::nothing:
         break;
       case Chosen::scene:
-        open(scenes_[choice.which].name);
+        open(scenes_[choice.which].name, procedure_for(scenes_[choice.which].name));
         message_.clear();
         break;
       case Chosen::teach:
