@@ -14,8 +14,6 @@
 namespace catgut::thread {
 namespace {
 
-constexpr float kDriftLimit = 0.2f;  // of the diameter
-
 Four motion(const Scratch& s, const Active& c) {
   const Four* u = s.contact_u.data();
   return (u[c.i] * c.wi0 + u[c.i + 1] * c.wi1) + (u[c.j] * c.wj0 + u[c.j + 1] * c.wj1) - c.partner;
@@ -44,8 +42,6 @@ void use_node(Scratch& s, uint32_t i) {
   s.contact_node.push_back(i);
   s.contact_u[i] = Four{s.u.x[i], s.u.y[i], s.u.z[i], 0};
 }
-
-Vec3 tangential(Vec3 v, Vec3 n) { return v - n * dot(v, n); }
 
 void add_active(const Settings& settings, Scratch& s, Active c, float gap, Vec3 drift, float ln, Vec3 lt) {
   c.mi0 = c.wi0 * s.w[c.i], c.mi1 = c.wi1 * s.w[c.i + 1], c.mj0 = c.wj0 * s.w[c.j], c.mj1 = c.wj1 * s.w[c.j + 1];
@@ -130,14 +126,6 @@ void begin_plane(const Settings& settings, State& state, Scratch& s, const Plane
   }
 }
 
-// Friction memory after a substep: the drift while sticking.
-Vec3 new_drift(const Settings& settings, const Active& c, Vec3 drift, Vec3 moved) {
-  if (c.slipped || c.ln <= 0) return {};
-  const Vec3 d = tangential(drift + moved, three(c.normal));
-  const float size = length(d), limit = kDriftLimit * settings.material.diameter;
-  return size > limit ? d * (limit / size) : d;
-}
-
 }  // namespace
 
 void begin_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around, float time) {
@@ -170,16 +158,7 @@ void sweep_contacts(Scratch& s, bool backward) {
   const size_t count = s.active.size();
   for (size_t k = 0; k < count; ++k) {
     Active& c = s.active[backward ? count - 1 - k : k];
-    const Four moved = motion(s, c);
-    const float along = dot(c.normal, moved);
-    const float ln = std::max(0.0f, c.ln - (c.level + along) * c.inverse);
-    Four lt = c.lt - (moved - c.normal * along + c.pull_back) * c.inverse;
-    const float limit = c.mu * ln, size2 = dot(lt, lt);
-    c.slipped = size2 > limit * limit;
-    if (c.slipped) lt = lt * (limit / std::sqrt(size2));
-    const Four change = c.normal * (ln - c.ln) + (lt - c.lt);
-    c.ln = ln, c.lt = lt;
-    apply(s, c, change);
+    apply(s, c, correct(c, motion(s, c)));
   }
   store_motion(s);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // thread/internal: the work space of a step and its parts, in the order in which a substep calls them. Not for other rooms.
 #pragma once
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "thread/thread.h"
@@ -70,6 +72,30 @@ struct Active {
   uint32_t crossing = 0;  // index in State
   bool slipped = false;
 };
+
+// What a sweep does with any contact, of the thread or of something soft: Coulomb's law for its motion in this substep. Returns
+// the change of its impulse.
+template <typename AnyActive>
+inline Four correct(AnyActive& c, Four moved) {
+  const float along = dot(c.normal, moved);
+  const float ln = std::max(0.0f, c.ln - (c.level + along) * c.inverse);
+  Four lt = c.lt - (moved - c.normal * along + c.pull_back) * c.inverse;
+  const float limit = c.mu * ln, size2 = dot(lt, lt);
+  c.slipped = size2 > limit * limit;
+  if (c.slipped) lt = lt * (limit / std::sqrt(size2));
+  const Four change = c.normal * (ln - c.ln) + (lt - c.lt);
+  c.ln = ln, c.lt = lt;
+  return change;
+}
+inline Vec3 tangential(Vec3 v, Vec3 n) { return v - n * dot(v, n); }
+// Friction memory after a substep: the drift while sticking.
+template <typename AnyActive>
+inline Vec3 new_drift(const Settings& settings, const AnyActive& c, Vec3 drift, Vec3 moved) {
+  if (c.slipped || c.ln <= 0) return {};
+  const Vec3 d = tangential(drift + moved, three(c.normal));
+  const float size = length(d), limit = 0.2f * settings.material.diameter;
+  return size > limit ? d * (limit / size) : d;
+}
 
 struct Scratch {
   size_t max_nodes = 0, max_crossings = 0;

@@ -10,8 +10,7 @@
 namespace catgut::thread {
 namespace {
 
-constexpr float kDriftLimit = 0.2f;  // of the diameter
-constexpr float kPushOut = 0.2f;     // [m/s]
+constexpr float kPushOut = 0.2f;  // [m/s]
 
 Four motion(const Scratch& s, const Scratch::SoftActive& c) {
   return Four{s.u.x[c.node], s.u.y[c.node], s.u.z[c.node], 0} - four(s.soft_moved.at(c.point) - s.soft_before.at(c.point));
@@ -20,7 +19,6 @@ void apply(Scratch& s, SoftPoints& soft, const Scratch::SoftActive& c, Four impu
   s.u.add(c.node, three(impulse) * s.w[c.node]);
   push_soft(s, soft, c.point, three(impulse) * -1.0f, substep);
 }
-Vec3 tangential(Vec3 v, Vec3 n) { return v - n * dot(v, n); }
 
 }  // namespace
 
@@ -58,16 +56,8 @@ void sweep_soft_contacts(Scratch& s, SoftPoints& soft, float substep, bool backw
   const size_t count = s.soft_active.size();
   for (size_t k = 0; k < count; ++k) {
     Scratch::SoftActive& c = s.soft_active[backward ? count - 1 - k : k];
-    const Four moved = motion(s, c);
-    const float along = dot(c.normal, moved);
-    const float ln = std::max(0.0f, c.ln - (c.level + along) * c.inverse);
-    Four lt = c.lt - (moved - c.normal * along + c.pull_back) * c.inverse;
-    const float limit = c.mu * ln, size2 = dot(lt, lt);
-    c.slipped = size2 > limit * limit;
-    if (c.slipped) lt = lt * (limit / std::sqrt(size2));
-    const Four change = c.normal * (ln - c.ln) + (lt - c.lt);
+    const Four change = correct(c, motion(s, c));
     if (change[0] == 0 && change[1] == 0 && change[2] == 0) continue;
-    c.ln = ln, c.lt = lt;
     apply(s, soft, c, change, substep);
   }
 }
@@ -79,13 +69,7 @@ void end_soft_contacts(const Settings& settings, State&, Scratch& s, Surrounding
     if (a.ln > 0) s.touched[a.node] = 1;
     c.gap = dot(c.normal, went) + a.before;
     c.normal_impulse = a.ln, c.friction_impulse = three(a.lt);
-    if (a.slipped || a.ln <= 0) {
-      c.drift = {};
-      continue;
-    }
-    const Vec3 d = tangential(c.drift + moved, c.normal);
-    const float size = length(d), limit = kDriftLimit * settings.material.diameter;
-    c.drift = size > limit ? d * (limit / size) : d;
+    c.drift = new_drift(settings, a, c.drift, moved);
   }
 }
 
