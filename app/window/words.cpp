@@ -215,6 +215,7 @@ std::vector<ResultRow> result_rows(const SceneSpec& scene, const SessionMetrics&
     if (hand > 1 && p.path[hand] == 0) continue;  // an assistant who did nothing
     rows.push_back({fmt::format("{} path", tool_name(hand)), fmt::format("{:.2f} m", p.path[hand])});
     rows.push_back({fmt::format("{} peak force", tool_name(hand)), fmt::format("{:.1f} N", p.peak_force[hand])});
+    if (p.peak_rendered[hand] >= 0) rows.back().value += fmt::format(", rendered {:.1f} N", p.peak_rendered[hand]);
   }
   rows.push_back({"undos", fmt::format("{}", p.undos)});
   for (size_t f = 1; f < p.faults.size(); ++f)

@@ -88,7 +88,7 @@ struct Side {
   std::atomic<uint32_t> faults{0};  // servo -> physics
   std::atomic<float> strength{1};   // user -> servo
   // servo -> display: written force, engagement, faults of the last second
-  std::atomic<float> force{0};
+  std::atomic<float> force{0}, peak{0};
   std::atomic<Engaged> engaged{Engaged::no};
   std::atomic<uint32_t> recent{0};
   std::unique_ptr<Ring<LogRow, 4096>> log;  // servo -> physics; null: not logged
@@ -145,7 +145,9 @@ struct Haptics::Work {
     if (s.times.steps % kRecently == 0) s.lately = 0;
     s.lately |= s.servo.limiter.faults;
     s.recent.store(s.lately, std::memory_order_relaxed);
-    s.force.store(length(out.force), std::memory_order_relaxed);
+    const float size = length(out.force);
+    s.force.store(size, std::memory_order_relaxed);
+    s.peak.store(std::max(size, s.peak.load(std::memory_order_relaxed)), std::memory_order_relaxed);
     s.engaged.store(s.servo.limiter.engaged, std::memory_order_relaxed);
     if (s.log) {
       const ForcePatch& p = s.servo.model.now;
@@ -317,6 +319,7 @@ ArmView Haptics::view(size_t k, const char* off) const {
   v.most = s.options.limiter.force;
   v.strength = s.strength.load(std::memory_order_relaxed);
   v.force = remote ? status.force : s.force.load(std::memory_order_relaxed);
+  v.peak = std::max(v.force, s.peak.load(std::memory_order_relaxed));
   v.felt = remote ? v.here : engaged == Engaged::yes || engaged == Engaged::rising;
   if (!v.here) v.off = "lost";
   else if (*off) v.off = off;

@@ -68,6 +68,7 @@ struct ArmView {
   bool here = false;          // samples arrive
   bool felt = false;          // force is enabled
   float force = 0, most = 0;  // [N] written now; limit of the device
+  float peak = -1;            // [N] largest written since the start; negative: there is no such device
   float strength = 1;         // the user's gain
   const char* off = "";       // why the force is off; empty: it is on
 };

@@ -206,13 +206,13 @@ void Live::Work::feel() {
 
 void Live::Work::publish_view() {
   LiveView& view = view_box.draft();
-  view.before = before;
-  view.now = now;
+  view.before = before, view.now = now;
   view.at = Clock::now();
   view.tick_wall_s = dt / static_cast<double>(kLiveSpeeds[speed]);
   published.speed = kLiveSpeeds[speed];
   const char* off = published.arms_off ? "switched off (F9)" : arms_drive() ? "" : "off while it does not move the instrument";
-  for (size_t k = 0; haptics && k < 2; ++k) published.arm_view[k] = haptics->view(k, off);
+  for (size_t k = 0; haptics && k < 2; ++k)
+    published.metrics.peak_rendered[hand_of(k)] = (published.arm_view[k] = haptics->view(k, off)).peak;
   if (published.ready_ns == 0 && published.moved_ns > 0) published.ready_ns = wall_ns();
   view.status = published;
   view.any = true;

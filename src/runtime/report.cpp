@@ -183,6 +183,7 @@ std::string session_json(const SceneSpec& scene, const LiveResult& r) {
     if (k > 1 && p.path[k] == 0) continue;  // an assistant who did nothing
     j["path_m"].push_back(p.path[k]);
     j["peak_force_n"].push_back(newtons(p.peak_force[k]));
+    j["peak_force_rendered_n"].push_back(p.peak_rendered[k] < 0 ? Json() : Json(newtons(p.peak_rendered[k])));
   }
   j["opening_ratio"] = p.opening_start > 0 ? Json(p.opening / p.opening_start) : Json();
   j["faults"] = Json::object();

@@ -34,12 +34,14 @@ void count(Counts& counts, const Event& event);
 struct SessionMetrics : Counts {
   double time_s = 0;                          // [s] simulated, since the hands connected
   std::array<float, kMaxHands> path{};        // [m] of the tip of each hand's tool
-  std::array<float, kMaxHands> peak_force{};  // [N] on each hand
-  float opening_start = 0;                    // [m^2] when the hands connected; 0: nothing to close
-  float opening = 0;                          // [m^2] current
-  float closure = 0;                          // 0 open .. 1
-  uint32_t undos = 0;                         // undone bites; not reset by an undo
-  std::array<Vec3, kMaxHands> tip{};          // [m] previous tool positions, for the path
+  std::array<float, kMaxHands> peak_force{};  // [N] on each hand, in the physics
+  // [N] written to the motors of the haptic device that moves the hand, since the scene opened; negative: no device.
+  std::array<float, kMaxHands> peak_rendered{-1, -1, -1, -1};
+  float opening_start = 0;            // [m^2] when the hands connected; 0: nothing to close
+  float opening = 0;                  // [m^2] current
+  float closure = 0;                  // 0 open .. 1
+  uint32_t undos = 0;                 // undone bites; not reset by an undo
+  std::array<Vec3, kMaxHands> tip{};  // [m] previous tool positions, for the path
   bool begun = false;
 };
 

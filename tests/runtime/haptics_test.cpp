@@ -19,6 +19,7 @@
 #include "procedure/scene_file.h"
 #include "runtime/hands.h"
 #include "runtime/live.h"
+#include "runtime/report.h"
 #include "runtime/session.h"
 #include "sim/simulation.h"
 
@@ -718,7 +719,14 @@ TEST(Haptics, S10_force_off_on_one_key_and_what_the_panel_shows) {
   ASSERT_TRUE(wait(20, [&] { return view(1).here; }));
   EXPECT_FALSE(view(1).felt) << "warm motors";
   EXPECT_GT(std::string(view(1).off).size(), 3u) << "a reason is given";
-  live.finish();
+  // The report has both forces of each hand: of the physics, and as rendered by the device that moves it.
+  const LiveResult result = live.finish();
+  EXPECT_NEAR(result.metrics.peak_rendered[1], fake.at(0).force_most, 0.05) << "the right device has tool 1";
+  EXPECT_NEAR(result.metrics.peak_rendered[0], fake.at(1).force_most, 0.05);
+  EXPECT_LT(result.metrics.peak_rendered[2], 0) << "no device";
+  const std::string report = session_json(scene_named("stay"), result);
+  EXPECT_NE(report.find("\"peak_force_n\""), std::string::npos);
+  EXPECT_NE(report.find("\"peak_force_rendered_n\""), std::string::npos);
 }
 
 // The servo's times on this machine, with the Lembert scene's physics beside it.

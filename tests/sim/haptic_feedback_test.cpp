@@ -11,6 +11,8 @@
 
 #include "haptic/servo.h"
 #include "procedure/scene_file.h"
+#include "runtime/hands.h"
+#include "runtime/haptics.h"
 #include "sim/model.h"
 #include "sim/state.h"
 
@@ -372,6 +374,78 @@ TEST(Haptics, H4_as_at_full_rate) {
       if (parts == 1) continue;
       EXPECT_LE(c.rms, std::max(0.1f, 0.1f * c.most));
       EXPECT_LE(c.over, 5);
+    }
+  }
+}
+
+// H4 on the simulated needle and thread: the scripted surgeon takes a stitch at 960 Hz. One hand evaluates every patch at once;
+// others get only every nth, a tick late, as in use (n = 1) or from slower physics.
+TEST(Haptics, H4_simulated_needle_and_thread) {
+  SceneSpec scene = read_scene(std::string(CATGUT_SOURCE_DIR) + "/scenes/stay.toml");
+  prepare_for_arms(scene);
+  const auto model = build_model(scene);
+  StatePtr state = initial_state(*model);
+  const Hands hands = make_hands("scripted", scene, picture_model(*model));
+  Jobs jobs(1);
+  TickInput input;
+  for (ToolInput& h : input.hand) h.connected = 0;
+  Snapshot seen;
+  struct Late {
+    int every;
+    std::array<ForceModel, 2> model{};
+    std::array<ForcePatch, 2> waiting{};
+    std::array<double, 2> square{};  // on the needle, on the thread
+    std::array<float, 2> peak{};
+  };
+  std::array<Late, 3> late{Late{1}, Late{2}, Late{16}};
+  std::array<ForceModel, 2> exact;
+  std::array<int, 2> count{};
+  std::array<double, 2> force{};
+  std::array<float, 2> largest{};
+  std::array<Vec3, 2> at;
+  const float dt = model->dt;
+  const int settle = static_cast<int>(scene.settle / dt);
+  bool pulled = false;
+  for (int i = 0; i < settle + static_cast<int>(45 / dt) && !(pulled && count[1] > 3000); ++i) {
+    if (i >= settle) input = hands.surgeon->operate(seen, dt);
+    step(*model, *state, input, jobs);
+    publish(*model, *state, seen);
+    if (i < settle) continue;
+    for (size_t k = 0; k < 2; ++k) {
+      const Vec3 x = input.hand[k].pose.p, v = count[0] + count[1] > 0 ? (x - at[k]) / dt : Vec3{};
+      at[k] = x;
+      ForcePatch patch = seen.patch[k];
+      make_safe(patch, {});
+      for (Late& l : late) {
+        if (i % l.every == 0) receive(l.model[k], l.waiting[k]), l.waiting[k] = patch;
+      }
+      receive(exact[k], patch);
+      const Vec3 want = evaluate(exact[k], x, v, dt);
+      const bool needle = seen.tool[k].held == Held::needle && seen.active().needle.in_tissue;
+      const bool thread = !needle && patch.thread_tension > 0.05f;
+      const size_t what = needle ? 0 : 1;
+      for (Late& l : late) {
+        const float error = distance(evaluate(l.model[k], x, v, dt), want);
+        if (!needle && !thread) continue;
+        l.square[what] += double{error} * double{error};
+        l.peak[what] = std::max(l.peak[what], error);
+      }
+      if (!needle && !thread) continue;
+      ++count[what];
+      force[what] += double{length2(want)};
+      largest[what] = std::max(largest[what], length(want));
+      pulled = pulled || thread;
+    }
+  }
+  for (size_t what = 0; what < 2; ++what) {
+    ASSERT_GT(count[what], 500) << what;
+    for (const Late& l : late) {
+      const double rms = std::sqrt(l.square[what] / count[what]);
+      std::printf(
+          "H4: simulated %s, %.1f s at %3.0f Hz: RMS error %.3f N of %.3f N, largest force %.2f N, largest error %.2f N\n",
+          what == 0 ? "needle" : "thread", double{dt} * count[what], 1 / double{dt} / l.every, rms,
+          std::sqrt(force[what] / count[what]), double{largest[what]}, double{l.peak[what]});
+      if (l.every <= 2) { EXPECT_LE(rms, std::max(0.1, 0.1 * double{largest[what]})); }
     }
   }
 }
