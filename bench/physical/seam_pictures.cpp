@@ -63,7 +63,9 @@ int main(int argc, char** argv) {
   }
   const CapsuleView outside{{0.0215f, 0, 0}, {1, -0.45f, 0.35f}, {0, 0, 1}, 0.02f};
   const CapsuleView along{{0.0205f, 0, 0}, {0.1f, -1, 0}, {1, 0, 0}, 0.02f};
-  Sewn s = interrupted({});
+  Stitch stitch;
+  stitch.friction = 0.25f;
+  Sewn s = interrupted(stitch);
   Tying t;
   t.center = {0.0203f, 0, 0}, t.tension = 3;
   const Throws throws = three_throws();
@@ -78,8 +80,8 @@ int main(int argc, char** argv) {
   Sewn purse = purse_string(q, 10);
   const CapsuleView front{{0, 0, -0.003f}, {0.25f, 0.2f, 1}, {0, 1, 0}, 0.055f};
   picture(purse, "purse-string, laid", front);
-  draw_purse(purse, 2, 2);
-  picture(purse, "purse-string, drawn with 2 N", front);
+  draw_purse(purse, 3, 2);
+  picture(purse, "purse-string, drawn with 3 N", front);
   write_png(contact_sheet(cells, 2), argv[1]);
   return 0;
 }
