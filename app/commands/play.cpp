@@ -69,6 +69,12 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_flag("--left-handed", o->play.left_handed, "needle holder in the left hand");
   command->add_option("--surgeon", o->play.live.surgeon, "watch the scripted surgeon, or the hands of a recording")
       ->type_name("scripted|FILE");
+  command->add_flag("--headset", o->play.headset, "draw for a headset (OpenXR) too; its controllers are the hands");
+  command->add_option("--room", o->play.room, "headset: name of the room whose table height and registration apply")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command->add_flag("--register-arms", o->play.register_arms,
+                    "headset: the cut button notes a point where a controller touches a stylus; three to five points");
   auto mode = std::make_shared<std::string>("practice");
   auto teach = std::make_shared<bool>(false);
   command->add_option("--procedure", o->play.procedure, "show the stages and errors of a procedure")->type_name("NAME");
@@ -112,6 +118,8 @@ void add_play(CLI::App& app, int& exit_code) {
       o->play.scene.clear();
     }
     if (!o->play.scene.empty()) read_scene(o->play.scene);  // reports errors before a window opens
+    if (o->play.register_arms && (!o->play.headset || o->play.live.haptics.empty()))
+      throw InputError("--register-arms", "a headset and haptic arms are needed", "add --headset and --haptics");
     o->play.live.say = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
     check_suffix(o->play.live.record, ".cgrec", "--record");
     check_suffix(o->play.json, ".json", "--json");

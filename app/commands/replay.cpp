@@ -14,13 +14,16 @@ namespace {
 
 struct ReplayOptions {
   std::string file, json, procedure;
-  bool check = false;
+  bool check = false, from_head = false;
   int threads = 1;
   PictureOptions pictures;
 };
 
 int replay(const ReplayOptions& o) {
   const Recording recording = read_recording(o.file);
+  if (o.from_head && recording.head.empty())
+    throw InputError(o.file, "the recording holds no head of a headset's wearer",
+                     "leave out --from-head, or record with catgut play --headset");
   check_picture_files(o.pictures);
   check_suffix(o.json, ".json", "--json");
   for (const std::string& path : {o.json, o.pictures.video, o.pictures.contact_sheet}) prepare_output(path);
@@ -34,8 +37,11 @@ int replay(const ReplayOptions& o) {
     if (procedure) procedure->start(parse_scene(recording.header.scene, o.file), model);
     if (o.pictures.any()) pictures = std::make_unique<Pictures>(o.pictures, model);
   };
-  hooks.on_tick = [&](const Snapshot& seen, const std::string& doing) {
+  hooks.on_tick = [&, ticks = uint64_t{0}, head = size_t{0}](const Snapshot& seen, const std::string& doing) mutable {
     if (procedure) procedure->tick(seen);
+    for (; o.from_head && pictures && head < recording.head.size() && recording.head[head].tick <= ticks; ++head)
+      pictures->look_from(recording.head[head].pose);
+    ++ticks;
     if (pictures) pictures->tick(seen, doing);
   };
   const ReplayResult result = replay_session(recording, o.file, o.check, o.threads, hooks);
@@ -74,6 +80,7 @@ void add_replay(CLI::App& app, int& exit_code) {
   command->add_option("--json", o->json, "results as JSON; -: standard output")->type_name("FILE|-");
   command->add_option("--procedure", o->procedure, "report the stages and errors of a procedure")->type_name("NAME");
   add_picture_options(*command, o->pictures);
+  command->add_flag("--from-head", o->from_head, "pictures from the eyes of the headset's wearer");
   command->callback([o, &exit_code] { exit_code = replay(*o); });
 }
 

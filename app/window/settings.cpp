@@ -85,6 +85,8 @@ const std::vector<Key>& keys() {
       flag("suture_points", &Settings::suture_points),
       flag("hints", &Settings::hints),
       number("mouse_speed", "write a number from 0.2 to 4", &Settings::mouse_speed, 0.2, 4),
+      flag("steady_hands", &Settings::steady_hands),
+      number("hand_scale", "write a number from 0.2 to 1", &Settings::hand_scale, 0.2, 1),
       number("text_size", "write a number from 0.7 to 2", &Settings::text_size, 0.7, 2),
       number("force_right", "write a number from 0.2 to 2", &Settings::force_right, 0.2, 2),
       number("force_left", "write a number from 0.2 to 2", &Settings::force_left, 0.2, 2),

@@ -23,6 +23,8 @@ struct Settings {
   bool suture_points = false;
   bool hints = true;                      // the list of keys
   float mouse_speed = 1;                  // 0.2 .. 4, of tool to mouse
+  bool steady_hands = true;               // headset: removes the tremor of the wearer's hands
+  float hand_scale = 1;                   // headset: 0.2 .. 1, of tool to hand
   float text_size = 1;                    // 0.7 .. 2, limited by the window
   float force_right = 1, force_left = 1;  // 0.2 .. 2, gain of the haptic force in each hand; the device's limits hold after it
   bool operator==(const Settings&) const = default;

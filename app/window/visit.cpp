@@ -19,8 +19,8 @@ constexpr size_t kMostTips = 16;
 Visit::Visit(const SceneSpec& s, const LiveOptions& options, std::FILE* events, std::function<void(const Event&)> on_event)
     : scene(s), live(s, options), watching(!options.surgeon.empty()), events_(events), on_event_(std::move(on_event)) {}
 
-void Visit::look() {
-  have = live.look(seen);
+void Visit::look(double at_s) {
+  have = live.look(seen, at_s);
   take_events();
 }
 

@@ -19,7 +19,7 @@ struct Visit {
   // Throws InputError.
   Visit(const SceneSpec& scene, const LiveOptions& options, std::FILE* events, std::function<void(const Event&)> on_event);
 
-  void look();  // Fetches the newest picture and events.
+  void look(double at_s = wall_seconds());  // Fetches the newest picture, as of that moment, and events.
   LiveResult finish();
 
   SceneSpec scene;  // with the parameters changed since

@@ -37,6 +37,7 @@
 #include "window/visit.h"
 #include "window/widgets.h"
 #include "window/work_text.h"
+#include "xr/wearer.h"
 
 namespace catgut {
 namespace {
@@ -45,7 +46,9 @@ constexpr const char* kFont = "fonts/truetype/dejavu/DejaVuSansMono.ttf";  // in
 constexpr double kMostPictures = 150;                                      // [1/s]
 constexpr double kSlowPicture = 0.07;                                      // [s] a slower frame reduces the resolution
 constexpr const char* kFirstLesson = "first_stitch";                       // of procedures/
-constexpr double kStallEvery = 2;                                          // [s] of --stall-ms
+constexpr double kMirrorEvery = 1.0 / 20;                                  // [s] of the window's picture beside a headset
+constexpr double kSlowMirror = 0.5;  // [s] where the headset's frames take their whole period
+constexpr double kStallEvery = 2;    // [s] of --stall-ms
 
 std::vector<SceneChoice> scene_choices() {
   // The scene of each technique, simplest first; then all others.
@@ -129,6 +132,18 @@ class Window {
       if (!events_) throw InputError(options.events, "cannot be written", "choose another place");
     }
     resized();
+    if (options.headset) {
+      xr::WearerOptions wear;
+      wear.font = shared_path(kFont);
+      wear.hands = space_hands();
+      if (const std::string path = settings_path(); !path.empty())
+        wear.room_file = (std::filesystem::path(path).parent_path() / "rooms.toml").string();
+      wear.whole_resolution = options.eye_pictures;
+      wear.room = options.room;
+      wear.register_arms = options.register_arms;
+      wear.report = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
+      wearer_ = std::make_unique<xr::Wearer>(wear);
+    }
   }
   ~Window() {
     if (events_ && events_ != stdout) std::fclose(events_);
@@ -161,9 +176,9 @@ class Window {
         coarser_if_slow();
         // Without vertical synchronization a limit is needed, or rendering would take the processor from the physics.
         const double left = 1.0 / kMostPictures - (drawn - now);
-        if (left > 0) SDL_Delay(static_cast<uint32_t>(1000 * left));
-      } else {
-        SDL_Delay(1);  // the driver is behind: hands continue, and the processor is free for it
+        if (left > 0 && !worn_) SDL_Delay(static_cast<uint32_t>(1000 * left));
+      } else if (!worn_) {  // a headset's runtime sets the pace
+        SDL_Delay(1);       // the driver is behind: hands continue, and the processor is free for it
       }
       if (photographed_) break;
     }
@@ -171,6 +186,7 @@ class Window {
     if (visit_) result = finish();
     keep_settings();
     if (options_.seconds > 0 || !options_.screenshot.empty()) latency_.report(pictures_, wall_seconds() - start);
+    if (wearer_ && options_.seconds > 0) wearer_->report_budget();
     if (!json_fault_.empty()) throw InputError(options_.json, json_fault_, "choose another place");
     if (!result.fault.empty()) throw InputError("simulation", result.fault, "the recording holds what went before");
     return stop ? 130 : 0;
@@ -194,6 +210,7 @@ class Window {
     leave();
     visit_ = std::make_unique<Visit>(scene, live, events_, [this](const Event& e) {
       if (options_.on_event) options_.on_event(e);
+      if (wearer_) wearer_->feel(e);
     });
     procedure_ = wanted;
     tutorial_ = live.tutorial;
@@ -217,6 +234,7 @@ class Window {
 
   void stage_picture(const PictureModel& picture) {
     renderer_->stage(&picture, settings_.quality);
+    if (wearer_) wearer_->stage(&picture, settings_.quality);
     if (coarse_ < 1) renderer_->set_resolution_scale(coarse_);
     orbit_set_ = false;
     have_last_ = false;
@@ -261,6 +279,7 @@ class Window {
   void show_start() {
     leave();
     renderer_->stage(nullptr, settings_.quality);
+    if (wearer_) wearer_->stage(nullptr, settings_.quality);
     have_last_ = false;
     go(Screen::start);
   }
@@ -424,6 +443,7 @@ class Window {
   // --- a picture
   // ----------------------------------------------------------------------------------------------------------------
   bool frame(float dt) {
+    worn_ = wearer_ && wearer_->begin();
     const bool working = screen_ == Screen::practice;
     const WindowInput in = events_in_.read(working, dt, screen_ == Screen::view || (working && visit_ && visit_->watching));
     quit_ = quit_ || in.quit;
@@ -436,7 +456,11 @@ class Window {
     facts.from_recording = results_.from_recording;
     if (viewing_) facts.second = std::max<int64_t>(1, std::llround(1 / viewing_->playback.status().tick_s));
     carry_out(choice_of_key(in, facts));
-    if ((in.left || in.pad_gone) && screen_ == Screen::practice && visit_ && !visit_->watching) go(Screen::pause);
+    if (wearer_) wishes();
+    // The wearer of a headset does not need the window's focus.
+    if (((in.left && !(wearer_ && wearer_->in_use())) || in.pad_gone) && screen_ == Screen::practice && visit_ &&
+        !visit_->watching)
+      go(Screen::pause);
     if (visit_) field(in, dt);
     if (viewing_) {
       const uint64_t known = viewing_->gathered;
@@ -463,7 +487,22 @@ class Window {
     frame.panels = [&] { choice = panels(); };
     const bool last = !options_.screenshot.empty() && posed_ && posed_for_ + 1 >= options_.after;
     if (last || picture_wanted_) frame.copy = &copy;
-    const bool drawn = renderer_->draw(frame);
+    if (worn_) {
+      Choice pointed;
+      draw_eyes(seen, pointed);
+      if (pointed.what != Chosen::nothing) choice = pointed;
+    }
+    // The window mirrors what the wearer sees, at a lower rate: its picture must not delay the headset's.
+    const double now = wall_seconds();
+    const double every = worn_ && wearer_->busy() ? kSlowMirror : kMirrorEvery;
+    const bool skip = worn_ && !frame.copy && now - mirrored_ < every;
+    if (worn_ && !skip) {
+      mirrored_ = now;
+      if (const auto camera = wearer_->mirror(); camera && seen) frame.camera = *camera;
+    }
+    const Choice by_ray = choice;
+    const bool drawn = skip ? false : renderer_->draw(frame);
+    if (choice.what == Chosen::nothing) choice = by_ray;
     if (drawn) events_in_.panels_drawn(), posed_for_ += posed_;
     if (drawn && last) write_png(copy, options_.screenshot), photographed_ = true;
     if (drawn && std::exchange(picture_wanted_, false)) save_picture(copy);
@@ -472,6 +511,35 @@ class Window {
     carry_out(choice);
     if (text_size != style_text_) resized();
     return drawn;
+  }
+
+  // Buttons of the headset's wearer.
+  void wishes() {
+    const xr::WearerWish wish = wearer_->wish();
+    const bool fault = visit_ && !visit_->live.status().fault.empty();
+    if (wish.pause && screen_ == Screen::practice && reading()) visit_->live.command(LiveCommand::begin_stage);
+    else if (wish.pause && screen_ == Screen::practice) go(Screen::pause);
+    else if (wish.pause && screen_ == Screen::pause && !fault) go(Screen::practice);
+    for (size_t k = 0; k < 2 && screen_ == Screen::practice && visit_ && visit_->have; ++k)
+      if (wish.swap[k]) instrument(next_from_tray(visit_->seen, k));
+  }
+
+  xr::SpaceHandOptions space_hands() const { return {settings_.left_handed, settings_.steady_hands, settings_.hand_scale}; }
+
+  void draw_eyes(const Snapshot* seen, Choice& pointed) {
+    xr::Wearer::Picture eyes;
+    eyes.snapshot = seen;
+    eyes.working = screen_ == Screen::practice;
+    eyes.suture_points = settings_.suture_points || (visit_ && settings_.guidance == Guidance::learn);
+    eyes.panels = [&] {
+      if (!std::exchange(board_styled_, true)) style_panels(1.4f);
+      on_board_ = true;
+      pointed = panels();
+      on_board_ = false;
+    };
+    eyes.status = visit_ ? &visit_->live.status() : nullptr;
+    eyes.copy = options_.eye_pictures;
+    wearer_->draw(eyes);
   }
 
   const Snapshot* shown() const {
@@ -499,11 +567,13 @@ class Window {
   void field(const WindowInput& in, float dt) {
     Visit& v = *visit_;
     v.live.watch(developer_);
-    v.look();
+    if (worn_) v.look(wearer_->moment());
+    else v.look();
     const LiveStatus& status = v.live.status();
     if (status.epoch != v.epoch) {
       v.epoch = status.epoch;
       hands_.jumped(v.live.picture(), v.seen, settings_, status.metrics.time_s == 0 && !status.prepared);
+      if (wearer_) wearer_->jumped(v.seen);
     }
     if (!status.fault.empty() && screen_ == Screen::practice) go(Screen::pause);
     report_stage(status);
@@ -513,16 +583,29 @@ class Window {
     v.live.arm_strength(0, settings_.force_right), v.live.arm_strength(1, settings_.force_left);
     if (reading()) {  // nothing moves while the user reads; a click begins
       if (in.mouse.jaw_presses > 0 || (in.has_pad && in.pad.both)) v.live.command(LiveCommand::begin_stage);
-      if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_})) quit_ = true;
+      if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_, worn_look()}))
+        quit_ = true;
       return;
     }
     used_keys_.note(in);
     hands_.steering.guide = next_bite(places_, v.live.picture(), v.seen);
-    const auto hands = hands_.move(in, settings_, view, v.live.picture(), v.seen, dt);
+    std::optional<std::array<ToolInput, 2>> worn;
+    if (wearer_) {
+      worn = wearer_->hands(v.seen, space_hands(), {status.arm[0], status.arm[1]});
+      // When the headset is gone, the mouse continues from where the instruments are.
+      if (had_worn_ && !worn) hands_.jumped(v.live.picture(), v.seen, settings_, false);
+      had_worn_ = worn.has_value();
+      if (Pose head; wearer_->head(head)) v.live.head(head);
+    }
+    auto hands = hands_.move(in, settings_, view, v.live.picture(), v.seen, dt);
+    for (size_t k = 0; worn && k < 2; ++k)
+      if ((*worn)[k].connected) hands[k] = (*worn)[k];  // a hand without a controller stays with the mouse
     for (size_t k = 0; k < 2; ++k) v.live.hand(k, hands[k]);
-    if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_})) quit_ = true;
+    if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_, worn_look()}))
+      quit_ = true;
   }
 
+  const xr::WearerLook* worn_look() const { return wearer_ ? &wearer_->look() : nullptr; }
   bool reading() const { return visit_ && visit_->live.status().reading && !visit_->live.status().demonstrating; }
 
   // Event listeners: every new stage, and every demonstration.
@@ -606,6 +689,12 @@ class Window {
     view.pictures_per_s = picture_count_ / std::max(picture_s_, 1e-3);
     WorkText work{&view, procedure_.get(), tutorial_, {}, used_keys_};
     if (!visit_->live.status().settling) work.guide = guide();
+    if (on_board_) {  // beside the field: nothing to keep clear of
+      board_placed_ = place_panels(work_panels(work, shown), EyeRenderer::kBoardWidth, EyeRenderer::kBoardHeight,
+                                   panel_text_size(), {}, board_placed_);
+      draw_panels(board_placed_);
+      return screen_ == Screen::pause ? pause_panel(view) : Choice{};
+    }
     const float w = static_cast<float>(width_), h = static_cast<float>(height_);
     const ViewFrame frame = this->view();
     if (work.guide) guide_overlay(*work.guide, frame, *view.picture, *view.seen, w, h);
@@ -646,6 +735,10 @@ class Window {
   SdlWindow sdl_;
   int width_, height_;
   std::unique_ptr<WindowRenderer> renderer_;
+  std::unique_ptr<xr::Wearer> wearer_;  // null: no headset was requested
+  bool worn_ = false;                   // the headset wants this frame
+  bool had_worn_ = false, board_styled_ = false, on_board_ = false;
+  double mirrored_ = 0;  // [s]
   WindowEvents events_in_;
   Settings settings_, kept_, at_start_;  // current; stored in the file; at the last check
   float style_text_ = 1;
@@ -666,7 +759,7 @@ class Window {
   bool tutorial_ = false, demonstrating_ = false;
   uint32_t shown_stage_ = 0;  // reported last, from 1
   UsedKeys used_keys_;
-  std::vector<PlacedPanel> placed_;
+  std::vector<PlacedPanel> placed_, board_placed_;
   int opened_ = 0;
   SceneSpec scene_;  // of the results
   LiveResult result_;

@@ -9,6 +9,7 @@
 #include "render/renderer.h"
 #include "runtime/live.h"
 #include "window/layout.h"
+#include "xr/wearer.h"
 
 namespace catgut {
 
@@ -19,7 +20,8 @@ struct WindowLook {
   const Steering& steering;
   const MouseHand& mouse;
   const LiveStatus& status;
-  const std::vector<PlacedPanel>& panels;  // as drawn last
+  const std::vector<PlacedPanel>& panels;   // as drawn last
+  const xr::WearerLook* headset = nullptr;  // the frame that was submitted before this one; null: none
 };
 
 struct PlayOptions {
@@ -45,7 +47,11 @@ struct PlayOptions {
   // window; and every event.
   std::function<bool(const WindowLook&)> watch;
   std::function<void(const Event&)> on_event;
-  int stall_ms = 0;  // for tests: blocks the loop for this time, every two seconds
+  bool headset = false;        // draws for a headset too, and takes its wearer's hands
+  std::string room = "room";   // whose table height and registration apply
+  bool register_arms = false;  // registers haptic arms to the headset's space
+  bool eye_pictures = false;   // for an observer: copies of both eyes' images (slow)
+  int stall_ms = 0;            // for tests: blocks the loop for this time, every two seconds
 };
 
 // Runs until the window is closed. Throws InputError, also without a display.

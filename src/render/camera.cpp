@@ -43,6 +43,11 @@ float hidden(const Snapshot& snapshot, Vec3 away, Vec3 target, float half) {
 
 }  // namespace
 
+Camera eye_camera(const Pose& eye, const Frustum& frustum, float work) {
+  const float vertical = std::atan(frustum.up) - std::atan(frustum.down);
+  return {eye.p, eye.p + rotate(eye.q, {0, 0, -work}), rotate(eye.q, {0, 1, 0}), vertical * 180 / kPi, frustum};
+}
+
 Camera overview(const PictureModel& model) {
   return look_at_from(model.focus - Vec3{0, 0.1f * model.field, 0}, 0.5f, 0.75f, 0.42f * model.field, 30);
 }

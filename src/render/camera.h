@@ -7,10 +7,19 @@
 
 namespace catgut {
 
+// Field of view of a headset's eye: tangents of its four half angles, left and down negative. right == left: none.
+struct Frustum {
+  float left = 0, right = 0, down = 0, up = 0;
+};
+
 struct Camera {
   Vec3 eye, target, up{0, 1, 0};  // [m]
   float fov_deg = 30;             // vertical
+  Frustum frustum{};              // replaces fov_deg
 };
+
+// The camera at a headset's eye, which looks along -z. work: [m] distance of what it looks at, for near plane and shadows.
+Camera eye_camera(const Pose& eye, const Frustum& frustum, float work);
 
 // The whole operating field from the surgeon's side.
 Camera overview(const PictureModel& model);

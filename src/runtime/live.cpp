@@ -143,7 +143,10 @@ void Live::Work::tick(bool let_in) {
   }
   if (haptics && let_in) feel();
   ++result.ticks;
-  if (recorder) recorder->tick(input, hash_state(*model, *state));
+  if (recorder) {
+    recorder->tick(input, hash_state(*model, *state));
+    if (head_box.update()) recorder->head(head_box.seen());
+  }
   if (let_in) {
     update(published.metrics, now, static_cast<float>(dt));
     note(map, picture, now);
@@ -414,6 +417,11 @@ void Live::hand(size_t who, const ToolInput& input) {
   work_->hand_box[who].publish();
 }
 
+void Live::head(const Pose& pose) {
+  work_->head_box.draft() = pose;
+  work_->head_box.publish();
+}
+
 bool Live::change(const std::string& key_equals_value) { return work_->changes.push(key_equals_value); }
 void Live::watch(bool on) { work_->watched = on; }
 
@@ -432,12 +440,12 @@ bool Live::demonstrate(const std::vector<size_t>& tasks, bool slowly) {
   return work_->requests.push(c);
 }
 
-bool Live::look(Snapshot& out) {
+bool Live::look(Snapshot& out, double at_s) {
   work_->view_box.update();
   const LiveView& view = work_->view_box.seen();
   if (!view.any) return false;
   work_->status = view.status;
-  const double passed = seconds_of(Clock::now() - view.at);
+  const double passed = at_s - seconds_of(view.at.time_since_epoch());
   blend(view.before, view.now, view.status.paused || view.status.reading ? 1.0f : static_cast<float>(passed / view.tick_wall_s),
         out);
   return true;

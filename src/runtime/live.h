@@ -25,6 +25,10 @@
 
 namespace catgut {
 
+// [s] on a monotonic clock, for timing outside the physics: frames, key repeats, latencies.
+double wall_seconds();
+uint64_t wall_ns();
+
 enum class LiveCommand : uint8_t {
   pause,
   resume,
@@ -115,6 +119,8 @@ class Live {
   // The newest pose of hand `who`, below kMaxHands. A press is not lost when the button is released before the next
   // tick.
   void hand(size_t who, const ToolInput& input);
+  // The head of a headset's wearer [m, world], for the recording: the physics does not read it.
+  void head(const Pose& pose);
   // Take, swap, lay down, park or unpark an instrument in the next tick. False: as below.
   bool instrument(const Command& command);
   // False: the queue is full; try again.
@@ -132,9 +138,10 @@ class Live {
 
   // The current picture: the last two ticks interpolated by the elapsed time, so that it is one tick late and moves evenly at
   // any frame rate. False before the first tick.
-  bool look(Snapshot& out);
-  const LiveStatus& status() const;  // as of the last look()
-  bool event(Event& out);            // the next event; false: none for now
+  bool look(Snapshot& out) { return look(out, wall_seconds()); }
+  bool look(Snapshot& out, double at_s);  // as of the moment `at_s` on wall_seconds(): of a headset's display grid
+  const LiveStatus& status() const;       // as of the last look()
+  bool event(Event& out);                 // the next event; false: none for now
 
   LiveResult finish();  // stops and closes the recording
 
@@ -148,9 +155,5 @@ class Live {
 // evenly and does not stop between two frames (a needle that stops springs back out of the tissue).
 ToolInput hand_toward(const ToolInput& from, const ToolInput& to, float speed, float turn, float dt, float share = 1);
 float hand_share(float every);  // for hands with a message every so many calls
-
-// [s] on a monotonic clock, for timing outside the physics: frames, key repeats, latencies.
-double wall_seconds();
-uint64_t wall_ns();
 
 }  // namespace catgut

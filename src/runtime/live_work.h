@@ -78,6 +78,7 @@ struct Live::Work {
   Ring<std::string, 16> changes;                           // window -> physics
   std::atomic<bool> quit{false};                           // window -> physics
   std::atomic<bool> watched{false};                        // window -> physics
+  Latest<Pose> head_box;                                   // window -> physics
   Latest<LiveView> view_box;                               // physics -> window
   Ring<Event, 1024> events;                                // physics -> window
   std::thread thread;

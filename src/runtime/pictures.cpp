@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -48,6 +49,7 @@ struct Pictures::Studio {
   std::unique_ptr<VideoWriter> film;
   FollowCamera follow;
   Camera camera;
+  std::optional<Pose> head;
   double next_s = 0, last_s = -1, last_moment_s = 0;  // [s] simulated
   size_t frame = 0;
   std::vector<SheetCell> moment;
@@ -71,10 +73,16 @@ struct Pictures::Studio {
     // The camera eases in film time: its motion is smooth at any time-lapse factor.
     const double dt = last_s < 0 ? 0 : (seen.time_s - last_s) / options.speed;
     last_s = seen.time_s;
-    camera = follow.update(seen, static_cast<float>(dt));
+    camera = head ? head_camera() : follow.update(seen, static_cast<float>(dt));
     Overlay overlay;
     overlay.caption = caption;
     return renderer->render(seen, camera, overlay);
+  }
+
+  // Narrower than a headset's view: the part that the wearer looks at.
+  Camera head_camera() const {
+    const float work = std::max(0.05f, distance(head->p, model.focus));
+    return {head->p, head->p + rotate(head->q, {0, 0, -work}), rotate(head->q, {0, 1, 0}), 36, {}};
   }
 
   void keep(Image picture, const std::string& caption) {
@@ -135,6 +143,8 @@ struct Pictures::Studio {
 Pictures::Pictures(const PictureOptions& options, const PictureModel& model)
     : studio_(guarded("pictures", [&] { return std::make_unique<Studio>(options, model); })) {}
 Pictures::~Pictures() = default;
+
+void Pictures::look_from(const Pose& head) { studio_->head = head; }
 
 void Pictures::tick(const Snapshot& seen, const std::string& caption) {
   guarded("pictures", [&] { studio_->tick(seen, caption); });

@@ -33,6 +33,8 @@ class Pictures {
   Pictures(const Pictures&) = delete;
   Pictures& operator=(const Pictures&) = delete;
 
+  // Before tick(): from now on the camera is the head of a headset's wearer [world].
+  void look_from(const Pose& head);
   void tick(const Snapshot& seen, const std::string& caption);
   void finish();  // completes the film and the contact sheet; throws InputError
 

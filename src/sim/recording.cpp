@@ -16,7 +16,7 @@ namespace {
 
 constexpr char kMagic[8] = {'C', 'A', 'T', 'G', 'U', 'T', '\x1a', '\n'};  // detects transfers in text mode
 constexpr size_t kTicksPerChunk = 60;  // lost by a crash at most: one second at 60 ticks per second
-enum Kind : uint32_t { kHeader = 1, kStart = 2, kTicks = 3, kEnd = 4 };
+enum Kind : uint32_t { kHeader = 1, kStart = 2, kTicks = 3, kEnd = 4, kHeads = 5 };
 constexpr size_t kChunkHead = 4 + 8 + 8;
 
 template <typename Int>
@@ -141,6 +141,13 @@ void Recorder::tick(const TickInput& input, uint64_t hash) {
   if (++count_ % kTicksPerChunk == 0) flush_ticks();
 }
 
+void Recorder::head(const Pose& pose) {
+  if (count_ == 0 || head_at_ == count_) return;
+  head_at_ = count_;
+  put(heads_, count_ - 1), put(heads_, pose.p);
+  put(heads_, pose.q.x), put(heads_, pose.q.y), put(heads_, pose.q.z), put(heads_, pose.q.w);
+}
+
 void Recorder::finish(bool interrupted) {
   flush_ticks();
   std::string end;
@@ -152,6 +159,8 @@ void Recorder::finish(bool interrupted) {
 void Recorder::flush_ticks() {
   if (!ticks_.empty()) chunk(kTicks, ticks_);
   ticks_.clear();
+  if (!heads_.empty()) chunk(kHeads, heads_);
+  heads_.clear();
 }
 
 void Recorder::chunk(uint32_t kind, const std::string& payload) {
@@ -225,6 +234,15 @@ Recording parse_recording(const std::string& bytes, const std::string& name) {
         }
         t.hash = c.payload.integer<uint64_t>();
         if (c.payload.good()) r.tick.push_back(t);
+      }
+    } else if (c.kind == kHeads) {
+      while (c.payload.left() > 0) {
+        RecordedHead h;
+        h.tick = c.payload.integer<uint64_t>();
+        h.pose.p = c.payload.vector();
+        h.pose.q.x = c.payload.real(), h.pose.q.y = c.payload.real();
+        h.pose.q.z = c.payload.real(), h.pose.q.w = c.payload.real();
+        if (c.payload.good()) r.head.push_back(h);
       }
     } else if (c.kind == kEnd) {
       const uint64_t count = c.payload.integer<uint64_t>();

@@ -4,7 +4,8 @@
 //
 // The file: 8 bytes of magic, format version (u32), then chunks {kind u32, size u64, hash u64, payload}. Little endian, packed
 // field by field, independent of padding and compiler. The hash covers kind, size and payload. Chunks are written and flushed
-// as a unit. If the program is killed at any byte, the file is readable up to its last complete chunk.
+// as a unit. Heads are chunks of a kind of their own, which readers without headsets skip: the format did not change. If the
+// program is killed at any byte, the file is readable up to its last complete chunk.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -30,13 +31,20 @@ struct RecordedTick {
   uint64_t hash = 0;  // hash_state after the tick
 };
 
+// The head of a headset's wearer, when it was known. The physics does not read it.
+struct RecordedHead {
+  uint64_t tick = 0;  // number of the recording's tick, from 0, after which it was noted
+  Pose pose;          // [m] world; looks along -z
+};
+
 struct Recording {
   RecordingHeader header;
   std::vector<std::byte> start;  // save_state before the first tick
   std::vector<RecordedTick> tick;
-  bool truncated = false;    // no end chunk: the ticks before that are complete
-  bool interrupted = false;  // the user stopped the run
-  std::string fault;         // truncated: position and cause, as text
+  std::vector<RecordedHead> head;  // in order of time; empty without a headset
+  bool truncated = false;          // no end chunk: the ticks before that are complete
+  bool interrupted = false;        // the user stopped the run
+  std::string fault;               // truncated: position and cause, as text
 };
 
 // Writes incrementally. Throws InputError when the file cannot be created or written (disk full, ...).
@@ -48,6 +56,7 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   void tick(const TickInput& input, uint64_t hash);
+  void head(const Pose& pose);  // after the tick written last; at most one per tick is kept
   void finish(bool interrupted);
 
  private:
@@ -56,8 +65,8 @@ class Recorder {
 
   std::string path_;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
-  std::string ticks_;
-  uint64_t count_ = 0;
+  std::string ticks_, heads_;
+  uint64_t count_ = 0, head_at_ = 0;
 };
 
 // Throws InputError for a file that is missing, is not a recording, has another format version, or whose header or start state

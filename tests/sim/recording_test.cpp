@@ -144,6 +144,31 @@ TEST(Recording, of_release_0_1_is_refused_in_one_line) {
   }
 }
 
+// Heads of a headset's wearer beside the hands: between chunks of ticks, at most one per tick; they change no tick.
+TEST(Recording, heads_come_back_with_their_tick) {
+  const std::string path = testing::TempDir() + "catgut_heads_" + std::to_string(::getpid()) + ".cgrec";
+  const auto head = [](uint64_t t) { return Pose{{0.01f * static_cast<float>(t), 1.6f, 0}, axis_angle({0, 1, 0}, 0.1f)}; };
+  {
+    Recorder recorder(path, {"0.1.0", 1, "title = \"small\"\n"}, std::vector<std::byte>(37, std::byte{7}));
+    recorder.head(head(99));  // before the first tick: there is none that it belongs to
+    for (uint64_t t = 0; t < 150; ++t) {
+      recorder.tick(hands(t), t * 11 + 3);
+      if (t % 3 == 0) recorder.head(head(t)), recorder.head(head(77));
+    }
+    recorder.finish(false);
+  }
+  const Recording r = read_recording(path);
+  std::filesystem::remove(path);
+  EXPECT_FALSE(r.truncated) << r.fault;
+  ASSERT_EQ(r.tick.size(), 150u);
+  expect_prefix(r);
+  ASSERT_EQ(r.head.size(), 50u);
+  for (size_t i = 0; i < r.head.size(); ++i) {
+    EXPECT_EQ(r.head[i].tick, 3 * i);
+    EXPECT_EQ(r.head[i].pose, head(3 * i));
+  }
+}
+
 TEST(Recording, commands_come_back_with_their_hand_and_suture) {
   const std::string path = testing::TempDir() + "catgut_commands_" + std::to_string(::getpid()) + ".cgrec";
   {

@@ -9,6 +9,7 @@
 
 #include <X11/Xlib.h>
 #include <epoxy/egl.h>
+#include <epoxy/gl.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -148,6 +149,14 @@ class EglPlatform final : public OpenGLPlatform {
       throw;
     }
   }
+  EglPair pair() {
+    EglPair p;
+    p.display = display_, p.config = config_;
+    p.context = new_context(context_);
+    p.surface = pbuffer(1, 1);
+    shared_ = true;
+    return p;
+  }
   // Without a window, one display for the whole process stays open: another renderer may be using it.
   ~EglPlatform() noexcept override {
     if (idle_ != EGL_NO_SURFACE) eglDestroySurface(display_, idle_);
@@ -184,9 +193,11 @@ class EglPlatform final : public OpenGLPlatform {
     eglMakeCurrent(display_, reinterpret_cast<EGLSurface>(draw), reinterpret_cast<EGLSurface>(read), context_);
     if (connection_) eglSwapInterval(display_, 1);
   }
-  // Without a window nothing is shown; the pixels have been read back before.
+  // Without a window nothing is shown here.
   void commit(SwapChain* chain) noexcept override {
     if (connection_) eglSwapBuffers(display_, reinterpret_cast<EGLSurface>(chain));
+    // Another context reads the images next; it cannot wait for commands of this one.
+    if (shared_) glFinish();
   }
   void setPresentationTime(int64_t) noexcept override {}
   Fence* createFence() noexcept override { return nullptr; }
@@ -203,12 +214,16 @@ class EglPlatform final : public OpenGLPlatform {
 
  private:
   void make_context() {
-    const EGLint context[] = {
+    context_ = new_context(EGL_NO_CONTEXT);
+    idle_ = pbuffer(1, 1);
+  }
+  EGLContext new_context(EGLContext shared) {
+    const EGLint wanted[] = {
         EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 1, EGL_CONTEXT_OPENGL_PROFILE_MASK,
         EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
-    context_ = eglCreateContext(display_, config_, EGL_NO_CONTEXT, context);
-    if (context_ == EGL_NO_CONTEXT) throw std::runtime_error("no pictures: the EGL driver has no OpenGL 4.1 core");
-    idle_ = pbuffer(1, 1);
+    const EGLContext context = eglCreateContext(display_, config_, shared, wanted);
+    if (context == EGL_NO_CONTEXT) throw std::runtime_error("no pictures: the EGL driver has no OpenGL 4.1 core");
+    return context;
   }
   void close_connection() noexcept {
     if (connection_) XCloseDisplay(connection_);
@@ -223,6 +238,7 @@ class EglPlatform final : public OpenGLPlatform {
   EGLConfig config_ = nullptr;
   EGLContext context_ = EGL_NO_CONTEXT;
   EGLSurface idle_ = EGL_NO_SURFACE;
+  bool shared_ = false;  // with a headset's runtime
 };
 
 }  // namespace
@@ -230,6 +246,12 @@ class EglPlatform final : public OpenGLPlatform {
 std::unique_ptr<filament::backend::Platform> make_egl_platform() { return std::make_unique<EglPlatform>(); }
 std::unique_ptr<filament::backend::Platform> make_egl_platform(uint64_t window) {
   return std::make_unique<EglPlatform>(static_cast<Window>(window));
+}
+EglPair make_egl_pair() {
+  auto platform = std::make_unique<EglPlatform>();
+  EglPair pair = platform->pair();
+  pair.platform = std::move(platform);
+  return pair;
 }
 
 }  // namespace catgut

@@ -15,4 +15,13 @@ std::unique_ptr<filament::backend::Platform> make_egl_platform();
 // events on another thread. The swap chain is created from the window's number. Throws std::runtime_error.
 std::unique_ptr<filament::backend::Platform> make_egl_platform(uint64_t window);
 
+// Two contexts that share textures: the platform's own, and another one of the same display and configuration that a headset's
+// runtime uses on the caller's thread. Without a window. Throws std::runtime_error.
+struct EglPair {
+  std::unique_ptr<filament::backend::Platform> platform;
+  void *display = nullptr, *config = nullptr, *context = nullptr,
+       *surface = nullptr;  // of the runtime; the caller destroys them
+};
+EglPair make_egl_pair();
+
 }  // namespace catgut

@@ -25,6 +25,9 @@ constexpr uint8_t kMarker[] = {
 constexpr uint8_t kMark[] = {
 #include "mark.inc"
 };
+constexpr uint8_t kBoard[] = {
+#include "board.inc"
+};
 }  // namespace
 
 std::span<const uint8_t> tissue_material() { return kTissue; }
@@ -34,5 +37,6 @@ std::span<const uint8_t> drape_material() { return kDrape; }
 std::span<const uint8_t> shadow_material() { return kShadow; }
 std::span<const uint8_t> marker_material() { return kMarker; }
 std::span<const uint8_t> mark_material() { return kMark; }
+std::span<const uint8_t> board_material() { return kBoard; }
 
 }  // namespace catgut

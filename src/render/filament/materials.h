@@ -13,5 +13,6 @@ std::span<const uint8_t> drape_material();
 std::span<const uint8_t> shadow_material();
 std::span<const uint8_t> marker_material();
 std::span<const uint8_t> mark_material();
+std::span<const uint8_t> board_material();
 
 }  // namespace catgut

@@ -59,9 +59,9 @@ class QuietStart {
   int said_ = -1, saved_ = -1;
 };
 
-filament::Engine* start(filament::Engine::Backend backend, filament::backend::Platform* platform) {
+filament::Engine* start(filament::Engine::Backend backend, filament::backend::Platform* platform, void* shared = nullptr) {
   const QuietStart quiet;
-  filament::Engine* engine = filament::Engine::create(backend, platform);
+  filament::Engine* engine = filament::Engine::create(backend, platform, shared);
   if (!engine) throw std::runtime_error("no pictures: the graphics driver refused to start");
   return engine;
 }
@@ -71,6 +71,8 @@ filament::Engine* start(filament::Engine::Backend backend, filament::backend::Pl
 filament::Engine* start_engine(filament::backend::Platform& platform) {
   return start(filament::Engine::Backend::OPENGL, &platform);
 }
+
+filament::Engine* start_engine_on_glx(void* shared) { return start(filament::Engine::Backend::OPENGL, nullptr, shared); }
 
 filament::Engine* start_engine_without_driver() { return start(filament::Engine::Backend::NOOP, nullptr); }
 

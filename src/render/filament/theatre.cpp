@@ -81,8 +81,17 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
     const Camera& camera = cameras[std::min(i, cameras.size() - 1)];
     eye_[i].view->setViewport({0, 0, uint32_t(width), uint32_t(height)});
     const float distance_to_work = std::max(0.01f, distance(camera.eye, camera.target));
-    eye_[i].camera->setProjection(double(camera.fov_deg), double(width) / height, double(0.1f * distance_to_work), 3.0,
-                                  filament::Camera::Fov::VERTICAL);
+    const double near_plane = double(0.1f * distance_to_work);
+    if (const Frustum& f = camera.frustum; f.right > f.left) {
+      const double far_plane = 12;
+      eye_[i].camera->setCustomProjection(
+          filament::math::mat4::frustum(near_plane * double(f.left), near_plane * double(f.right), near_plane * double(f.down),
+                                        near_plane * double(f.up), near_plane, far_plane),
+          near_plane, far_plane);
+    } else {
+      eye_[i].camera->setProjection(double(camera.fov_deg), double(width) / height, near_plane, 3.0,
+                                    filament::Camera::Fov::VERTICAL);
+    }
     eye_[i].camera->lookAt({camera.eye.x, camera.eye.y, camera.eye.z}, {camera.target.x, camera.target.y, camera.target.z},
                            {camera.up.x, camera.up.y, camera.up.z});
   }
@@ -90,7 +99,9 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
   filament::LightManager& lights = engine_.getLightManager();
   shadow_.shadowFar = 3.2f * std::max(0.05f, distance(cameras[0].eye, cameras[0].target));
   lights.setShadowOptions(lights.getInstance(lamp_), shadow_);
-  const float pixel = 2 * std::tan(0.5f * cameras[0].fov_deg * kPi / 180) / (coarse_ * float(height));
+  const Frustum& seen = cameras[0].frustum;
+  const float tall = seen.right > seen.left ? seen.up - seen.down : 2 * std::tan(0.5f * cameras[0].fov_deg * kPi / 180);
+  const float pixel = tall / (coarse_ * float(height));
 
   follow_topology(snapshot.topology);
   find_motion((divided_ ? *divided_ : model_).particle_rest, snapshot.particle, snapshot.rotation, motion_);
@@ -124,6 +135,10 @@ void Theatre::set_resolution_scale(float part) {
   coarse.minScale = coarse.maxScale = {part, part};
   coarse.quality = filament::View::QualityLevel::LOW;
   for (const Eye& eye : eye_) eye.view->setDynamicResolutionOptions(coarse);
+}
+
+void Theatre::set_brightness(float part) {
+  for (const Eye& eye : eye_) eye.camera->setExposure(16.0f, 1.0f / 125, 100 * std::max(part, 1e-4f));
 }
 
 void Theatre::set_quality(filament::View& view, Quality quality) {

@@ -46,6 +46,8 @@ class Theatre {
   // Renders the field at `part` of the resolution in each direction and upscales it: for windows on machines without a graphics
   // card.
   void set_resolution_scale(float part);
+  void set_brightness(float part);  // 1: normal, 0: black
+  filament::Scene& scene() const { return *scene_; }
   filament::View* view(int eye = 0) const { return eye_[size_t(eye)].view; }
 
  private:

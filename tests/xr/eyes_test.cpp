@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+// tests/xr: the two pictures against geometry, without a runtime: a white board of known size and place, projected by hand
+// through each eye's four half angles.
+#ifdef CATGUT_TESTS_HEADSET
+#include <epoxy/gl.h>
+#include <gtest/gtest.h>
+#include <imgui.h>
+
+#include <optional>
+
+#include "../hands/x_server.h"
+#include "procedure/scene_file.h"
+#include "render/eyes.h"
+#include "sim/simulation.h"
+
+namespace catgut {
+namespace {
+
+constexpr int kWide = 240, kTall = 200;
+
+struct Center {
+  double x = 0, y = 0, area = 0;  // [pixels]
+};
+
+Center white(const Image& image) {
+  Center c;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      const uint8_t* p = &image.rgba[4 * (size_t(y) * size_t(image.width) + size_t(x))];
+      if (p[0] < 200 || p[1] < 200 || p[2] < 200) continue;
+      c.x += x + 0.5, c.y += y + 0.5, c.area += 1;
+    }
+  if (c.area > 0) c.x /= c.area, c.y /= c.area;
+  return c;
+}
+
+// The center of a square's picture and its area, from the pinhole equations: a sum over a fine grid of its points.
+Center expected(const Pose& eye, const Frustum& f, const Board& board) {
+  Center c;
+  constexpr int kGrid = 200;
+  const float tall = board.width * EyeRenderer::kBoardHeight / EyeRenderer::kBoardWidth;
+  double weight = 0;
+  for (int i = 0; i < kGrid; ++i)
+    for (int j = 0; j < kGrid; ++j) {
+      const Vec3 on{board.width * ((static_cast<float>(i) + 0.5f) / kGrid - 0.5f),
+                    tall * ((static_cast<float>(j) + 0.5f) / kGrid - 0.5f), 0};
+      const Vec3 p = to_local(eye, transform(board.pose, on));
+      const double tx = static_cast<double>(p.x / -p.z), ty = static_cast<double>(p.y / -p.z);
+      const double w = 1 / std::pow(static_cast<double>(-p.z), 3);  // area of a patch in the picture falls so, for one plane
+      c.x += w * kWide * (tx - static_cast<double>(f.left)) / static_cast<double>(f.right - f.left);
+      c.y += w * kTall * (static_cast<double>(f.up) - ty) / static_cast<double>(f.up - f.down);
+      weight += w;
+    }
+  c.x /= weight, c.y /= weight;
+  return c;
+}
+
+class Eyes : public testing::TestWithParam<GlBinding> {
+ protected:
+  void SetUp() override {
+    if (!renderer_available()) GTEST_SKIP() << "no EGL driver here";
+    if (GetParam() == GlBinding::xlib) {
+      if (!on_path("Xvfb")) GTEST_SKIP() << "Xvfb is missing (Debian: apt install xvfb)";
+      x_ = std::make_unique<XServer>();
+      if (x_->display.empty()) GTEST_SKIP() << "Xvfb does not start here";
+      setenv("DISPLAY", x_->display.c_str(), 1);
+    }
+    eyes_ = make_eye_renderer(GetParam(), "");
+    eyes_->make_current();
+    for (int i = 0; i < 2; ++i) {
+      glGenTextures(1, &texture_[i]);
+      glBindTexture(GL_TEXTURE_2D, texture_[i]);
+      glTexStorage2D(GL_TEXTURE_2D, 1, GL_SRGB8_ALPHA8, kWide, kTall);
+      eyes_->set_images(i, {&texture_[i], 1}, kWide, kTall);
+    }
+    glFinish();
+  }
+  void TearDown() override {
+    if (!eyes_) return;
+    eyes_->drop_images();
+    eyes_->make_current();
+    glDeleteTextures(2, texture_);
+    eyes_.reset();
+  }
+  std::unique_ptr<XServer> x_;
+  std::unique_ptr<EyeRenderer> eyes_;
+  GLuint texture_[2] = {};
+};
+
+// Field of view of a headset: more outward than toward the nose, more down than up.
+constexpr Frustum kLeft{-1.2f, 0.8f, -1.0f, 0.8f}, kRight{-0.8f, 1.2f, -1.0f, 0.8f};
+
+TEST_P(Eyes, show_a_board_where_geometry_puts_it) {
+  const auto model = build_model(read_scene("stay"));
+  const auto state = initial_state(*model);
+  Snapshot seen;
+  publish(*model, *state, seen);
+  const PictureModel picture = picture_model(*model);
+  for (const bool field : {false, true}) {
+    if (field) eyes_->stage(&picture, Quality::low);
+    const Pose head{picture.focus + Vec3{0.03f, 0.38f, 0.42f},
+                    normalized(axis_angle({0, 1, 0}, 0.1f) * axis_angle({1, 0, 0}, -0.6f) * axis_angle({0, 0, 1}, 0.05f))};
+    std::array<Pose, 2> eye{head, head};
+    eye[0].p += rotate(head.q, {-0.032f, 0, 0});
+    eye[1].p += rotate(head.q, {0.032f, 0, 0});
+    EyeRenderer::Frame frame;
+    frame.snapshot = field ? &seen : nullptr;
+    frame.camera = {eye_camera(eye[0], kLeft, 0.55f), eye_camera(eye[1], kRight, 0.55f)};
+    frame.width = kWide, frame.height = kTall;
+    Board board;
+    board.pose = {head.p + rotate(head.q, {0.04f, 0.06f, -0.35f}), normalized(head.q * axis_angle({0, 1, 0}, 0.2f))};
+    board.width = 0.12f;
+    frame.board = board;
+    frame.panels = [] { ImGui::GetBackgroundDrawList()->AddRectFilled({0, 0}, {1280, 720}, 0xffffffffu); };
+    std::array<Image, 2> image;
+    frame.copy = &image;
+    for (int i = 0; i < 3; ++i) ASSERT_TRUE(eyes_->draw(frame));
+    if (const char* folder = std::getenv("CATGUT_PICTURES"))
+      for (int i = 0; i < 2; ++i)
+        write_png(image[size_t(i)],
+                  std::string(folder) + (field ? "/board_field_" : "/board_") + (i ? "right.png" : "left.png"));
+    const Center left = white(image[0]), right = white(image[1]);
+    const Center want_left = expected(eye[0], kLeft, board), want_right = expected(eye[1], kRight, board);
+    ASSERT_GT(left.area, 500);
+    EXPECT_NEAR(left.x, want_left.x, 0.6);
+    EXPECT_NEAR(left.y, want_left.y, 0.6);
+    EXPECT_NEAR(right.x, want_right.x, 0.6);
+    EXPECT_NEAR(right.y, want_right.y, 0.6);
+    // The direction to a near object turns from right to left between the left and the right eye.
+    const auto slope = [&](double x, const Frustum& f) { return f.left + (f.right - f.left) * static_cast<float>(x) / kWide; };
+    EXPECT_GT(slope(left.x, kLeft) - slope(right.x, kRight), 0.05) << "left and right are not swapped";
+  }
+}
+
+// The board's upper left corner is the panels' upper left corner, and its text is not mirrored.
+TEST_P(Eyes, show_panels_upright) {
+  EyeRenderer::Frame frame;
+  const Frustum f{-1, 1, -0.8f, 0.8f};
+  frame.camera = {eye_camera({}, f, 0.5f), eye_camera({}, f, 0.5f)};
+  frame.width = kWide, frame.height = kTall;
+  frame.board = Board{{{0, 0, -0.5f}, {}}, 0.4f, {}, {}};
+  frame.panels = [] {
+    ImGui::GetBackgroundDrawList()->AddRectFilled({0, 0}, {1280, 720}, 0xff000000u);
+    ImGui::GetBackgroundDrawList()->AddRectFilled({0, 0}, {320, 180}, 0xffffffffu);
+  };
+  std::array<Image, 2> image;
+  frame.copy = &image;
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(eyes_->draw(frame));
+  const Center c = white(image[0]);
+  ASSERT_GT(c.area, 50);
+  EXPECT_NEAR(c.x, kWide * (0.5 - 0.2 * 0.75), 1.5) << "0.15 m left of the middle at 0.5 m";
+  EXPECT_NEAR(c.y, kTall * (0.5 - (0.1125 * 0.75 / 0.5) / 1.6), 1.5);
+}
+
+// A part of the image: dynamic resolution draws from the lower left corner.
+TEST_P(Eyes, draw_a_part_of_the_image) {
+  EyeRenderer::Frame frame;
+  const Frustum f{-1, 1, -1, 1};
+  frame.camera = {eye_camera({}, f, 0.5f), eye_camera({}, f, 0.5f)};
+  frame.width = kWide / 2, frame.height = kTall / 2;
+  frame.board = Board{{{0, 0, -0.5f}, {}}, 4, {}, {}};
+  frame.panels = [] { ImGui::GetBackgroundDrawList()->AddRectFilled({0, 0}, {1280, 720}, 0xffffffffu); };
+  std::array<Image, 2> image;
+  frame.copy = &image;
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(eyes_->draw(frame));
+  EXPECT_GT(white(image[0]).area, 0.98 * kWide / 2 * kTall / 2);
+  EXPECT_GT(white(image[1]).area, 0.98 * kWide / 2 * kTall / 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Bindings, Eyes, testing::Values(GlBinding::egl, GlBinding::xlib),
+                         [](const auto& one) { return std::string(one.param == GlBinding::egl ? "egl" : "xlib"); });
+
+}  // namespace
+}  // namespace catgut
+#endif
