@@ -29,6 +29,8 @@ bool lace(const Model& m, State& s, const Needle& n, const wall::Point& place, b
   }
   const Vec3 at = mouth(m, s, hole);
   const float in = distance(t.position(segment), at), out = distance(at, t.position(n.thread_node));
+  // The way round the mouth is longer than the segment was: with its old length it would be drawn taut at once, and break.
+  t.rest[segment] = std::max(t.rest[segment], in + out);
   thread::Eyelet e;
   e.point = index, e.segment = segment, e.friction = m.needles.thread_friction;
   e.before = t.rest[segment] * in / std::max(in + out, 1e-9f);

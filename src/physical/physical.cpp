@@ -227,6 +227,7 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
   soft.moved = k.moved;
   thread::Surroundings around;
   k.holds.assign(hands.holds.begin(), hands.holds.end());
+  around.plane = hands.plane;
   if (bodies) {
     show_bodies(m.bodies, s.bodies, m.wall.step, k.bodies);
     k.holds.insert(k.holds.end(), k.bodies.hold.begin(), k.bodies.hold.end());

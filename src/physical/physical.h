@@ -66,6 +66,7 @@ struct Hands {
   };
   std::span<const WallPull> wall_pulls;
   std::span<const HandTarget> targets;  // of State::bodies, in their order
+  thread::Plane* plane = nullptr;       // what the thread lies on
 };
 
 // Workspace: its contents never affect the result of a later step.

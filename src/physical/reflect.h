@@ -1,9 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
-// physical/reflect: the members of the state of bodies and needles (core/reflect.h), for saving, loading and hashing.
+// physical/reflect: the members of a state of wall, thread, bodies and needles, for writing, reading and hashing it
+// (core/reflect.h). The topology of the wall is left out: it follows from the model as long as nothing was cut.
 #pragma once
 #include "core/reflect.h"
-#include "physical/body.h"
-#include "physical/needle.h"
+#include "physical/physical.h"
+#include "wall/reflect.h"
+
+namespace catgut::thread {
+
+constexpr void reflect(auto& a, Like<Columns3> auto& c) { a(c.x), a(c.y), a(c.z); }
+constexpr void reflect(auto& a, Like<Crossing> auto& c) {
+  a(c.s), a(c.t), a(c.normal), a(c.gap), a(c.normal_impulse), a(c.friction_impulse), a(c.drift), a(c.touch), a(c.pad);
+}
+constexpr void reflect(auto& a, Like<Eyelet> auto& e) {
+  a(e.point), a(e.segment), a(e.friction), a(e.slip), a(e.before), a(e.angle);
+}
+constexpr void reflect(auto& a, Like<SoftContact> auto& c) {
+  a(c.node), a(c.point), a(c.offset), a(c.patch), a(c.normal), a(c.friction), a(c.normal_impulse), a(c.friction_impulse);
+  a(c.drift), a(c.gap);
+}
+constexpr void reflect(auto& a, Like<State> auto& s) {
+  a(s.x), a(s.fine), a(s.v), a(s.warm), a(s.rest), a(s.tension), a(s.broken), a(s.key), a(s.budget), a(s.crossing);
+  a(s.plane_normal), a(s.plane_friction), a(s.plane_drift), a(s.eyelet), a(s.listed), a(s.travel), a(s.substeps_done);
+  a(s.overflow), a(s.refreshes);
+}
+
+}  // namespace catgut::thread
 
 namespace catgut::wall {
 constexpr void reflect(auto& a, Like<Point> auto& p) { a(p.face), a(p.xi), a(p.eta), a(p.zeta); }
@@ -30,5 +52,11 @@ constexpr void reflect(auto& a, Like<Needle> auto& n) {
   a(n.thread_node), a(n.channel), a.at_most(n.channels, uint32_t{kMaxChannels}), a(n.inside), a(n.tip), a(n.entry_peak);
   a(n.exit_peak), a(n.events), a.cache(n.tip_row), a.cache(n.exit_row), a.cache(n.tip_on), a.cache(n.exit_on);
 }
-
+constexpr void reflect(auto& a, Like<Hole> auto& h) {
+  a(h.place), a(h.within), a(h.deepest), a(h.made), a(h.torn), a(h.out), a(h.load);
+}
+constexpr void reflect(auto& a, Like<State> auto& s) {
+  a.cache(s.wall.topology), a(s.wall.motion), a(s.thread), a(s.hole), a(s.contact), a(s.lip);
+  a(s.bodies), a(s.needle);
+}
 }  // namespace catgut::physical

@@ -11,6 +11,7 @@
 #include "exchange/event.h"
 #include "surgeon/plan.h"
 #include "technique/technique.h"
+#include "thread/material.h"
 
 namespace catgut {
 namespace {
@@ -19,6 +20,13 @@ namespace {
 std::string plan_choices() {
   std::string all;
   for (const char* name : plan_names()) all += std::string("|") + name;
+  return all;
+}
+
+// "silk 4-0|silk 3-0|..."
+std::string material_choices() {
+  std::string all;
+  for (const thread::Properties& p : thread::materials()) all += (all.empty() ? "" : "|") + std::string(p.name);
   return all;
 }
 
@@ -50,6 +58,9 @@ const Field kField[] = {
     {"body", "axis", "", -1, 1, nullptr, "direction of the near end", BODY(axis)},
     {"body", "density", "kg/m^3", 1, 20000, nullptr, "tissue density", BODY(density)},
     {"body", "pinned_length", "m", 0, 2, nullptr, "fixed length at the far end", BODY(pinned_length)},
+    {"body", "modulus_along", "Pa", 1000, 1e9, nullptr, "physical mechanics: Young's modulus of the wall along the organ", BODY(modulus_along)},
+    {"body", "modulus_around", "Pa", 1000, 1e9, nullptr, "physical mechanics: Young's modulus of the wall around the organ", BODY(modulus_around)},
+    {"body", "poisson", "", 0, 0.49, nullptr, "physical mechanics: Poisson's ratio of the wall, contraction around when stretched along", BODY(poisson)},
     {"body", "inner_radius", "m", 0, 1, nullptr, "outer radius of a second tube inside the first, as in a prolapse; 0: none", BODY(inner_radius)},
 
     {"instrument", "name", "", 0, 0, nullptr, "name in this scene; empty: that of its kind", INSTRUMENT(name)},
@@ -63,6 +74,7 @@ const Field kField[] = {
     {"thread", "radius", "m", 0.00001, 0.01, nullptr, "thread radius", TOP(thread.radius)},
     {"thread", "mass", "kg", 1e-9, 0.01, nullptr, "per particle", TOP(thread.mass)},
     {"thread", "stretch_compliance", "m/N", 0, 1, nullptr, "per segment; 0: inextensible", TOP(thread.stretch_compliance)},
+    {"thread", "material", "", 0, 0, &material_choices, "physical mechanics: suture material and size, with its diameter, stiffness, friction and strength", TOP(thread.material)},
 
     {"needle", "radius", "m", 0.0005, 0.1, nullptr, "radius of the needle's circle", TOP(needle.radius)},
     {"needle", "arc", "rad", 0.1, 6.2, nullptr, "angle from swage to tip", TOP(needle.arc)},
@@ -74,6 +86,7 @@ const Field kField[] = {
     {"suture", "thread.radius", "m", 0.00001, 0.01, nullptr, "thread radius", SUTURE(thread.radius)},
     {"suture", "thread.mass", "kg", 1e-9, 0.01, nullptr, "per particle", SUTURE(thread.mass)},
     {"suture", "thread.stretch_compliance", "m/N", 0, 1, nullptr, "per segment; 0: inextensible", SUTURE(thread.stretch_compliance)},
+    {"suture", "thread.material", "", 0, 0, &material_choices, "physical mechanics: suture material and size", SUTURE(thread.material)},
     {"suture", "needle.radius", "m", 0.0005, 0.1, nullptr, "radius of the needle's circle", SUTURE(needle.radius)},
     {"suture", "needle.arc", "rad", 0.1, 6.2, nullptr, "angle from swage to tip", SUTURE(needle.arc)},
     {"suture", "needle.wire_radius", "m", 0.00001, 0.01, nullptr, "radius of the wire", SUTURE(needle.wire_radius)},
@@ -103,6 +116,7 @@ const Field kField[] = {
     {"solver", "hand_stiffness", "N/m", 1, 100000, nullptr, "stiffness of the coupling between hand and instrument; a haptic device renders about 300", TOP(solver.hand_stiffness)},
     {"solver", "tool_force", "N", 0, 1000, nullptr, "maximum contact force between two instruments; above it they pass each other (mouse: at most 1.5)", TOP(solver.tool_force)},
 
+    {"mechanics", "kind", "", 0, 0, "guided|physical", "guided: the paper's technique closes the wound. physical: a wall with a modulus, a thread that knots itself", TOP(mechanics.kind)},
     {"mechanics", "attach_threshold", "m", 0, 0.1, nullptr, "maximum distance of an attached particle from the needle tip (X of figure 4)", TOP(mechanics.attach_threshold)},
     {"mechanics", "release_distance", "m", 0, 0.1, nullptr, "drag distance at which the attached particle is released (figure 5)", TOP(mechanics.release_distance)},
     {"mechanics", "attach_compliance", "m/N", 0, 1000, nullptr, "compliance of that attachment", TOP(mechanics.attach_compliance)},
@@ -121,7 +135,7 @@ const Field kField[] = {
     {"technique", "step", "m", 0.0001, 0.1, nullptr, "spacing of the pairs between two midpoints (dist_threshold of section 2.5.2)", TOP(technique.step)},
     {"technique", "throws", "", 1, 8, nullptr, "minimum throws of a secure knot", TOP(technique.throws)},
 
-    {"surgeon", "plan", "", 0, 0, &plan_choices, "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel", TOP(surgeon.plan)},
+    {"surgeon", "plan", "", 0, 0, &plan_choices, "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel. interrupted: one stitch over a gap, without a technique", TOP(surgeon.plan)},
     {"surgeon", "bites", "", 0, 1000, nullptr, "number of bites", TOP(surgeon.bites)},
     {"surgeon", "edge_distance", "m", 0, 0.1, nullptr, "distance of the bites from the rim", TOP(surgeon.edge_distance)},
     {"surgeon", "bite_length", "m", 0, 0.1, nullptr, "bite length along the rim", TOP(surgeon.bite_length)},
@@ -155,7 +169,9 @@ constexpr Section kSection[] = {
     {"suture",
      "Needle with its thread; one `[[suture]]` each. Omitted keys are those of `[thread]` and `[needle]`. Default: one"},
     {"solver", "Solver parameters"},
-    {"mechanics", "Guided suturing (sections 2.2 and 2.3 of the paper)"},
+    {"mechanics",
+     "Mechanics of suturing. All keys but `kind` and `grasp_reach` are of guided mechanics (sections 2.2 and 2.3 of the "
+     "paper)"},
     {"technique", "Technique"},
     {"surgeon", "Scripted surgeon"},
     {"expect", "Expected results at the end of a run"},

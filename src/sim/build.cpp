@@ -58,6 +58,8 @@ BodyRest make_body(const BodySpec& spec) {
   return make_bowel(s);
 }
 
+bool is_physical(const SceneSpec& scene) { return scene.mechanics.kind == "physical"; }
+
 // A bowel end whose axis is closer to horizontal than to vertical.
 bool lies(const BodySpec& body) { return std::abs(body.axis.y) < 0.7f * length(body.axis); }
 
@@ -152,7 +154,7 @@ StrandModel make_strand(const SceneSpec& scene, const ThreadSpec& spec, uint32_t
   t.first_slot = first_slot;
   t.count = static_cast<uint32_t>(spec.particles);
   t.spacing = spec.spacing;
-  t.radius = spec.radius;
+  t.radius = is_physical(scene) ? thread_radius(scene, spec.material) : spec.radius;
   t.inv_mass = 1.0f / spec.mass;
   t.stretch_compliance = spec.stretch_compliance;
   t.bend_compliance = scene.solver.bend_compliance;
@@ -316,10 +318,12 @@ struct Tissue {
   std::vector<std::vector<uint32_t>> cluster;
   std::vector<Triangle> surface;
   float drape = std::numeric_limits<float>::max();  // [m] height
+  wall::Mesh wall;                                  // physical mechanics: the same particles as columns
 };
 
 void add_body(Model& m, const BodySpec& spec, Tissue& all) {
   BodyRest r = make_body(spec);
+  if (is_physical(m.scene)) add_wall(m.scene, spec, r, all.wall);
   const uint32_t first = static_cast<uint32_t>(all.rest.size());
   float bottom = spec.position.y - kDrapeBelowRim;
   if (lies(spec)) {
@@ -437,7 +441,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   for (const SutureSpec& u : sutures)
     if (u.thread.particles < 8) throw InputError(where, "thread.particles is below 8", "a thread needs at least 8 particles");
   m.dt = 1.0f / scene.solver.tick_rate;
-  m.substeps = scene.solver.substeps;
+  m.substeps = is_physical(scene) ? physical_steps(m.dt) : scene.solver.substeps;
 
   // Soft bodies one after the other in the columns, followed by the thread.
   SolverModel& s = m.solver;
@@ -471,6 +475,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   add_instruments(m, scene, rim, where);
   // Two ends are joined on top, where their rims face each other.
   describe_picture(m, sutures, two ? rim + Vec3{0, tube, 0} : rim, tube);
+  if (is_physical(scene)) m.physical = make_physical(m, tissue.wall);
   return model;
 }
 
@@ -491,6 +496,7 @@ StatePtr initial_state(const Model& model) {
   lay_out_instruments(model, s);
   for (size_t k = 0; k < model.solver.strand.size(); ++k)
     fresh_suture(model.solver, s.solver, k, model.start, model.needle_start[k]);
+  if (model.physical) s.physical = start_physical(model, s.solver);
   return state;
 }
 

@@ -303,7 +303,7 @@ ForcePatch linear_patch(const Model& model, const State& state, size_t k) {
     const std::array<float, 3> stiffest = eigen(p.stiffness).value;
     const float guess = std::max({stiffest[0], stiffest[1], stiffest[2]});
     if (guess > 1) p.stiffness = clamp_eigenvalues(p.stiffness * (learned(felt, guess, coupling) / guess), 0, coupling);
-    if (hand.held == Held::needle && !suture.open.empty()) {
+    if (!model.physical && hand.held == Held::needle && !suture.open.empty()) {
       // Across the shaft and in rotation: the solver's reaction. Along the shaft: the wall's force law, no less than
       // the solver's.
       float counter = 0;  // [N] with which another hand holds the tissue

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "anatomy/body.h"
+#include "sim/physical.h"
 #include "sim/scene.h"
 #include "sim/simulation.h"
 #include "solver/substep.h"
@@ -52,6 +53,7 @@ struct Model {
   std::vector<Pose> needle_start;                // body frame, per suture
   float hand_compliance = 1.0f / 3000, hand_angular_compliance = 0.05f;  // [m/N], [rad/(N m)] coupling of tool and hand
   PictureModel picture;
+  std::shared_ptr<const PhysicalModel> physical;  // null: guided mechanics
 };
 
 // The scene's technique at these rims, which are in the order of the walls.

@@ -128,6 +128,7 @@ bool hands_fit(uint32_t instruments, const State& s) {
 }
 
 bool fits(const Model& model, const State& s) {
+  if (model.physical && !physical_fits(model, s.physical)) return false;
   Validator indices(model.solver);
   indices(s);
   if (!indices.good() || !hands_fit(model.solver.instruments(), s)) return false;

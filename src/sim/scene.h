@@ -28,6 +28,9 @@ struct BodySpec {
   float density = 1050;          // [kg/m^3]
   float pinned_length = 0.035f;  // [m] length of the far end that is fixed
   float inner_radius = 0;        // [m] outer radius of a second tube inside the first (a bowel folded into itself); 0: none
+  float modulus_along = 6e5f;    // [Pa] Young's modulus along the organ; this and the next two: physical mechanics only
+  float modulus_around = 6e5f;   // [Pa] around it
+  float poisson = 0.45f;         // contraction around when stretched along
 };
 
 // One instrument of the scene. A scene that names none has a needle holder in the right hand and forceps in the left.
@@ -45,6 +48,8 @@ struct ThreadSpec {
   float radius = 0.00015f;           // [m]
   float mass = 2e-6f;                // [kg] per particle
   float stretch_compliance = 1e-6f;  // [m/N] per segment
+  // Physical mechanics: diameter, stiffness, friction and strength are this material's, instead of radius, mass and compliance.
+  std::string material = "silk 2-0";
 };
 
 struct NeedleSpec {
@@ -87,8 +92,9 @@ struct SolverSpec {
   float tool_force = 8;         // [N] maximum force between two tools; above what a haptic device renders
 };
 
-// Guided mechanics (paper 2.2, 2.3).
+// Guided mechanics (paper 2.2, 2.3): of the other members, physical mechanics read grasp_reach alone.
 struct MechanicsSpec {
+  std::string kind = "guided";         // or physical: wall with a modulus, thread that ties its own knots (sim/physical)
   float attach_threshold = 0.006f;     // [m] X of figure 4: maximum distance from the tip to the nearest particle
   float release_distance = 0.0022f;    // [m] drag beyond which the attached particle is released (figure 5)
   float attach_compliance = 0.00091f;  // [m/N] of that attachment: 1 / 1100 N/m, the paper's spring

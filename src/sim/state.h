@@ -9,6 +9,7 @@
 #include "exchange/event.h"
 #include "exchange/tool_input.h"
 #include "sim/haptic_feedback.h"
+#include "sim/physical.h"
 #include "sim/topology.h"
 #include "solver/substep.h"
 #include "suture/reflect.h"
@@ -35,6 +36,7 @@ struct State {
   std::vector<TechniqueState> technique;  // one per suture; written by technique
   std::vector<ClosurePlan> plan;          // one per suture; written by technique, read by suture/closure
   std::array<HandState, kMaxHands> hand;  // written by sim/hands
+  PhysicalState physical;                 // written by sim/physical_step; empty with guided mechanics
   HapticFeedback haptics;                 // written by sim/haptic_feedback, read by publish
   EventList event;                        // of the last tick
   std::shared_ptr<const Model> divided;   // what sim/topology derives from `topology`; null: as built
@@ -47,7 +49,7 @@ struct State {
 
 constexpr void reflect(auto& a, Like<State> auto& s) {
   a(s.tick), a(s.topology), a(s.solver), a(s.suture), a.column(s.plan, IndexOf::strand), a.column(s.technique, IndexOf::strand);
-  a(s.hand), a(s.haptics), a(s.event);
+  a(s.hand), a(s.haptics), a(s.event), a(s.physical);
   a.cache(s.divided), a.cache(s.suture_event), a.cache(s.stitch), a.cache(s.stitch_span), a.cache(s.scratch);
 }
 

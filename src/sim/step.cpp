@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/step: THE stage list. Reads one TickInput, advances the state by one tick, leaves the tick's events in it.
+// sim/step: THE stage list; physical mechanics have theirs in sim/physical_step. Reads one TickInput, advances the state by one
+// tick, leaves the tick's events in it.
 #include <algorithm>
 
 #include "sim/hands.h"
@@ -69,6 +70,7 @@ void step(const Model& built, State& state, const TickInput& input, Jobs& jobs, 
   const Model& model = current_model(built, state);
   const SolverModel& solver = model.solver;
   state.event.start(state.tick);
+  if (model.physical) return step_physical(model, state, input, jobs, times);
   find_boxes(solver, state.solver, state.scratch, jobs, times);
   meet_hands(state, input);
   handle_instruments(model, state, input);

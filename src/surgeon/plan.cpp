@@ -202,6 +202,28 @@ Plan stay_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
+// One stitch over the gap between two bowel ends, without a technique: the needle enters `edge_distance` from the edge on one
+// side, passes through the whole wall into the gap, and comes out on the other side at the same distance.
+Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan;
+  plan.forceps_side = -1;
+  const OpeningShape left = opening_shape(picture, 0), right = opening_shape(picture, 1);
+  BitePlace p = on_top(picture, 0, 0, 0);
+  const Vec3 across = right.center - left.center;
+  p.at += across * 0.5f;
+  p.up = cross(normalized(across, {1, 0, 0}), p.out);  // so that cross(out, up) leads across
+  p.length = length(across) + 2 * skill.edge_distance;
+  const float radius = picture.suture[0].needle_radius, half = std::min(0.5f * p.length, 0.95f * radius);
+  p.depth = radius - std::sqrt(radius * radius - half * half);
+  p.walls = 2;
+  plan.place.push_back(p);
+  add(plan, TaskKind::pick_up);
+  add(plan, TaskKind::bite);
+  add(plan, TaskKind::pull_tail);
+  add(plan, TaskKind::rest);
+  return plan;
+}
+
 // 2.5.4: single stitches through outer and inner layer round the ring, each tied and cut, with a new suture for the next.
 Plan lembert_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
@@ -262,11 +284,9 @@ struct PlanRow {
   size_t walls;  // open rims that it needs
   Plan (*make)(const PictureModel&, const SurgeonSkill&);
 };
-constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
-                             {"connell", 2, connell_plan},
-                             {"stay", 2, stay_plan},
-                             {"lembert", 2, lembert_plan},
-                             {"running", 1, running_plan}};
+constexpr PlanRow kPlan[] = {
+    {"purse_string", 1, purse_string_plan}, {"connell", 2, connell_plan}, {"stay", 2, stay_plan},
+    {"lembert", 2, lembert_plan},           {"running", 1, running_plan}, {"interrupted", 2, interrupted_plan}};
 
 }  // namespace
 

@@ -68,7 +68,7 @@ class Looker {
     for (size_t k = std::max<size_t>(i, 1); k < j; ++k) {
       if (state_.broken[k - 1] || state_.broken[k]) continue;
       const Vec3 p = state_.position(k) - state_.position(k - 1), q = state_.position(k + 1) - state_.position(k);
-      sum += std::atan2(length(cross(p, q)), dot(p, q));
+      sum += portable::atan2(length(cross(p, q)), dot(p, q));
     }
     return sum;
   }

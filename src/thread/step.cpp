@@ -174,7 +174,7 @@ struct Hasher {
 };
 
 void warm_masses(const Settings& settings, State& state, Scratch& s) {
-  const float fade = std::exp(-settings.substep / settings.mass_decay);
+  const float fade = portable::exp(-settings.substep / settings.mass_decay);
   const size_t n = state.nodes();
   for (size_t i = 0; i < n; ++i) {
     state.warm[i] = s.touched[i] ? 1.0f : state.warm[i] > 1e-3f ? state.warm[i] * fade : 0.0f;

@@ -19,7 +19,7 @@ Matrix3 reduced_stiffness(const Layer& layer) {
   const double scale = 1 / (1 - nu12 * nu21);
   const double g = layer.shear > 0 ? layer.shear : std::sqrt(e1 * e2) / (2 * (1 + layer.poisson));
   const Matrix3 q{{{e1 * scale, nu12 * e2 * scale, 0}, {nu12 * e2 * scale, e2 * scale, 0}, {0, 0, g}}};
-  const double c = std::cos(layer.angle), s = std::sin(layer.angle);
+  const double c = portable::cos(layer.angle), s = portable::sin(layer.angle);
   // Strain of the layer from strain of the organ (engineering shear).
   const Matrix3 t{{{c * c, s * s, c * s}, {s * s, c * c, -c * s}, {-2 * c * s, 2 * c * s, c * c - s * s}}};
   Matrix3 out{};
@@ -73,7 +73,7 @@ Laminate laminate(std::span<const Layer> layer, const std::string& where) {
       }
     // Transverse: layers in series under one shear stress.
     const double g1 = l.e_along / (2 * (1 + l.poisson)), g2 = l.e_around / (2 * (1 + l.poisson));
-    const double c = std::cos(l.angle), s = std::sin(l.angle);
+    const double c = portable::cos(l.angle), s = portable::sin(l.angle);
     compliance1 += l.thickness / (c * c * g1 + s * s * g2);
     compliance2 += l.thickness / (s * s * g1 + c * c * g2);
     const double nu = l.poisson / (1 - l.poisson);

@@ -61,7 +61,7 @@ Mesh tube(const TubeShape& shape) {
   const double turn = 6.283185307179586 / shape.around;
   for (int i = 0; i < shape.rings; ++i)
     for (int j = 0; j < shape.around; ++j) {
-      const float c = static_cast<float>(std::cos(turn * j)), s = static_cast<float>(std::sin(turn * j));
+      const float c = static_cast<float>(portable::cos(turn * j)), s = static_cast<float>(portable::sin(turn * j));
       const Vec3 middle = shape.center - axis * (shape.length * static_cast<float>(i) / static_cast<float>(shape.rings - 1));
       const Vec3 radial = ex * c + ey * s;
       mesh.outer.push_back(middle + radial * shape.outer_radius);

@@ -311,7 +311,7 @@ void begin_step(const Model& m, State& s, Scratch& k, Jobs& jobs) {
                  static_cast<uint32_t>(first), static_cast<uint32_t>(last));
   });
   // Damped before forces are added: otherwise a held force would be scaled by the damping factor.
-  const Lanes keep = splat(std::exp(-m.drag * m.step));
+  const Lanes keep = splat(portable::exp(-m.drag * m.step));
   const Lanes gravity = load(float4(m.gravity));
   jobs.each(columns(s), 256, [&](size_t first, size_t last) {
     for (size_t c = first; c < last; ++c) {

@@ -84,7 +84,7 @@ TEST_P(EveryScene, saved_and_loaded_at_every_seventh_tick_goes_on_as_if_nothing_
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                          testing::Values("purse_string", "connell", "stay", "lembert", "stress_one_body", "stress_two_bodies",
-                                         "two_sutures", "clamps", "three_hands"),
+                                         "two_sutures", "clamps", "three_hands", "interrupted"),
                          [](const auto& scene) { return std::string(scene.param); });
 
 // A jaw closes in the tick directly after a load: nearby objects must be found by then.
@@ -167,8 +167,10 @@ void Members::look_into(T& v) {
 }
 
 TEST(Reflect, names_every_member_of_the_state_and_of_the_snapshot) {
-  const std::shared_ptr<const Model> model = build_model(read_scene("stay"));
-  expect_every_member(*initial_state(*model));
+  for (const char* scene : {"stay", "interrupted"}) {
+    const std::shared_ptr<const Model> model = build_model(read_scene(scene));
+    expect_every_member(*initial_state(*model));
+  }
   Snapshot snapshot;
   expect_every_member(snapshot);
 }

@@ -1,0 +1,402 @@
+// SPDX-License-Identifier: Apache-2.0
+// sim/physical_step: THE stage list of physical mechanics, as sim/step is of guided ones. See the header.
+#include <algorithm>
+#include <cmath>
+
+#include "sim/hands.h"
+#include "sim/model.h"
+#include "sim/physical.h"
+#include "sim/state.h"
+
+namespace catgut {
+
+// Workspace of a tick. Nothing in it outlives the tick but the workspace of physical::step.
+struct PhysicalScratch {
+  physical::Scratch world;
+  std::vector<physical::HandTarget> target;  // per body
+  std::vector<Vec3> was;                     // [m] per instrument: its place before the hands of this tick
+  // What a needle did in a step of this tick.
+  struct Puncture {
+    uint32_t needle = 0, events = 0;
+    wall::Point entry, exit;
+  };
+  std::vector<Puncture> puncture;
+  std::vector<float> depth;  // [m] per needle: largest depth of its tip in the tissue in this tick
+  thread::Plane drape;
+  PhysicalScratch(const Model& model, const PhysicalState& state) : world(model.physical->world, state.world) {
+    target.resize(state.world.bodies.body.size());
+    was.resize(model.solver.instruments());
+    puncture.reserve(64);
+    depth.resize(state.world.needle.size());
+    drape = model.physical->drape;
+  }
+};
+
+namespace {
+
+// An instrument that a hand takes, lays down or meets is somewhere else at once, with empty jaws.
+void remember_places(const Model& model, const State& state, PhysicalScratch& k) {
+  for (uint32_t i = 0; i < model.solver.instruments(); ++i) k.was[i] = state.solver.body[i].x;
+}
+void place_again(const Model& model, State& state, const PhysicalScratch& k) {
+  for (uint32_t i = 0; i < model.solver.instruments(); ++i) {
+    if (k.was[i] == state.solver.body[i].x) continue;
+    physical::move_body(model.physical->world, state.physical.world, i, state.solver.body[i].pose(), kWideOpen);
+  }
+}
+
+// Scissors mark pairs of the strand; the thread breaks there.
+void cut_thread(const Model& model, State& state) {
+  thread::State& t = state.physical.world.thread;
+  for (size_t n = 0; n < state.solver.strand.size(); ++n) {
+    const Strand& strand = state.solver.strand[n];
+    const size_t first = model.solver.strand[n].first_slot - model.solver.tissue;
+    for (size_t i = 0; i < strand.cut.size(); ++i)
+      if (strand.cut[i] && !t.broken[first + i]) t.broken[first + i] = 1, t.travel = 1e9f;
+  }
+}
+
+// --- hands -------------------------------------------------------------------------------------------------------------
+
+// [N] normal force of jaws that hold this: beyond it, times both sides' friction, the thing slides out.
+float pinch(const InstrumentModel& kind, physical::Gripped what, float friction) {
+  const float pull = what == physical::Gripped::needle   ? kind.needle_grip
+                     : what == physical::Gripped::tissue ? kind.tissue_grip
+                                                         : kind.thread_grip;
+  return pull / (2 * friction);
+}
+
+void set_targets(const Model& model, State& state, const TickInput& input, PhysicalScratch& k) {
+  const physical::BodiesModel& bodies = model.physical->world.bodies;
+  for (uint32_t i = 0; i < model.solver.instruments(); ++i) {
+    physical::HandTarget& t = k.target[i];
+    InstrumentState& tool = state.suture.instrument[i];
+    const InstrumentModel& kind = model.suture.instrument[i];
+    const Weld& weld = state.solver.weld[i];
+    t.connected = tool.place == InstrumentPlace::hand && state.solver.body_collides[i] != 0;
+    if (!t.connected) continue;
+    t.pose = weld.target * inverse(weld.local_a);
+    if (input.hand[tool.hand].connected) tool.jaw = input.hand[tool.hand].jaw;
+    const physical::Gripped what = state.physical.world.bodies.body[i].grip.what;
+    const bool grips = what != physical::Gripped::nothing ? tool.jaw < kind.jaw.open : tool.jaw <= kind.jaw.closed;
+    t.opening = grips ? 0 : tool.jaw * kWideOpen;
+    t.grip = grips ? pinch(kind, what, bodies.body[i].grip_friction) : 0;
+    t.may_hold = (kind.can(kHoldNeedle) ? 1u : 0) | (kind.can(kHoldThread) ? 2u : 0) | (kind.can(kHoldTissue) ? 4u : 0);
+  }
+}
+
+// A needle that no jaws hold and that is in no tissue falls onto the drape, and lies there.
+void lay_needles(const Model& model, State& state, PhysicalScratch& k) {
+  PhysicalState& p = state.physical;
+  for (uint32_t n = 0; n < p.world.needle.size(); ++n) {
+    const uint32_t body = model.solver.needle_body(n);
+    PhysicalSuture& own = p.suture[n];
+    const auto holds = [&](const physical::Body& b) { return b.grip.what == physical::Gripped::needle && b.grip.body == body; };
+    const bool free =
+        p.world.needle[n].channels == 0 && std::none_of(p.world.bodies.body.begin(), p.world.bodies.body.end(), holds);
+    const float above = p.world.bodies.body[body].pose.p.y - model.physical->drape.offset;
+    const bool lay = own.lies;
+    own.lies = free && (lay || above < 2 * model.physical->world.needles.needle[n].shape.wire_radius);
+    if (own.lies && !lay) own.bed = p.world.bodies.body[body].pose;
+    k.target[body].connected = own.lies, k.target[body].pose = own.bed;
+  }
+}
+
+// --- what the world did, where everything else reads it ----------------------------------------------------------------
+
+// What a needle did in this step.
+void note_punctures(const State& state, const physical::Model& m, PhysicalScratch& k) {
+  const physical::State& w = state.physical.world;
+  for (uint32_t n = 0; n < w.needle.size(); ++n) {
+    const physical::Needle& needle = w.needle[n];
+    if (needle.inside) {
+      const physical::Channel& c = needle.channel[needle.channels - 1];
+      const float depth = 0.5f * (1 - c.entry_side * needle.tip.zeta) * m.wall.laminate.thickness;
+      k.depth[n] = std::max(k.depth[n], depth);
+    }
+    if (!needle.events || k.puncture.size() == k.puncture.capacity()) continue;
+    PhysicalScratch::Puncture& p = k.puncture.emplace_back();
+    p.needle = n, p.events = needle.events;
+    if (needle.channels == 0) continue;
+    const physical::Channel& c = needle.channel[needle.channels - 1];
+    p.entry = c.point[0], p.exit = c.point[c.count - 1];
+  }
+}
+
+// Positions, velocities and tensions.
+void show(const Model& model, State& state) {
+  SolverState& s = state.solver;
+  const wall::Motion& wall = state.physical.world.wall.motion;
+  const thread::State& t = state.physical.world.thread;
+  for (uint32_t c = 0; 2 * c < model.solver.tissue; ++c) {
+    const Vec3 x = wall::vec3(wall.x[2 * c]), d = wall::vec3(wall.x[2 * c + 1]), v = wall::vec3(wall.v[2 * c]),
+               r = wall::vec3(wall.v[2 * c + 1]);
+    set(s.x[2 * c], x + d), set(s.x[2 * c + 1], x - d);
+    set(s.v[2 * c], v + r), set(s.v[2 * c + 1], v - r);
+  }
+  for (uint32_t i = 0; i < t.nodes(); ++i) {
+    set(s.x[model.solver.tissue + i], t.position(i));
+    set(s.v[model.solver.tissue + i], t.v.at(i));
+  }
+  for (size_t n = 0; n < s.strand.size(); ++n) {
+    Strand& strand = s.strand[n];
+    const size_t first = model.solver.strand[n].first_slot - model.solver.tissue;
+    for (size_t i = 0; i < strand.rest.size(); ++i) {
+      strand.rest[i] = t.rest[first + i];
+      strand.tension[i] = t.tension[first + i];
+      strand.cut[i] = t.broken[first + i];
+    }
+  }
+  for (size_t i = 0; i < s.body.size(); ++i) {
+    const physical::Body& b = state.physical.world.bodies.body[i];
+    s.body[i] = {b.pose.p, b.pose.q, b.velocity, b.spin, b.pose.p, b.pose.q};
+  }
+  // Rotations of neighborhoods, which carry points of tissue for the picture and the surgeon's eyes.
+  make_shape_rows(model.solver.shape, s.x.data(), state.scratch.shape, 0, model.solver.shape.groups);
+  solve_shape_clusters(model.solver.shape, s.rotation, state.scratch.shape, 0, model.solver.shape.clusters);
+}
+
+constexpr EventKind kTaken[] = {EventKind::count_, EventKind::needle_grasped, EventKind::thread_grasped,
+                                EventKind::tissue_grasped},
+                    kLost[] = {EventKind::count_, EventKind::needle_released, EventKind::thread_released,
+                               EventKind::tissue_released};
+constexpr Held kHeld[] = {Held::nothing, Held::needle, Held::thread, Held::tissue};
+
+// What jaws hold, with the events of taking and losing it.
+void show_grips(const Model& model, State& state, SutureContext& sewing) {
+  const physical::State& w = state.physical.world;
+  for (Strand& strand : state.solver.strand)
+    std::erase_if(strand.hold, [](const ThreadHold& h) { return h.kind == HoldKind::jaw; });
+  for (uint32_t i = 0; i < model.solver.instruments(); ++i) {
+    const physical::Body& body = w.bodies.body[i];
+    const physical::Grip& grip = body.grip;
+    InstrumentState& tool = state.suture.instrument[i];
+    const Held before = tool.held, now = kHeld[static_cast<size_t>(grip.what)];
+    if (before != Held::nothing && before != now) {
+      const bool slipped = tool.jaw <= model.suture.instrument[i].jaw.closed;
+      const size_t kind = static_cast<size_t>(std::find(std::begin(kHeld), std::end(kHeld), before) - std::begin(kHeld));
+      sewing.report_tool(before == Held::tissue ? 0 : tool.suture, kLost[kind], i, before == Held::needle ? 0 : tool.slot,
+                         slipped ? length(body.force) : 0, body.pose.p);
+    }
+    tool.held = now;
+    if (now == Held::needle) {
+      tool.suture = grip.body - model.solver.instruments();
+      const NeedleArc& arc = model.solver.needle_arc[tool.suture];
+      tool.at = arc.nearest(to_local(w.bodies.body[grip.body].pose, body.pose.p)) / arc.arc;
+      if (before != now) state.suture.active = tool.suture;
+    } else if (now == Held::thread) {
+      tool.slot = model.solver.tissue + grip.node;
+      tool.suture = model.solver.strand_of(tool.slot);
+      state.solver.strand[tool.suture].hold.push_back({tool.slot, static_cast<int>(i), grip.point[0].in_tool, HoldKind::jaw});
+    } else if (now == Held::tissue) {
+      const wall::Weights at = wall::weights(model.physical->world.wall, w.wall.topology, grip.point[0].tissue);
+      const size_t most = static_cast<size_t>(std::max_element(at.weight.begin(), at.weight.end()) - at.weight.begin());
+      tool.slot = 2 * at.column[most] + (grip.point[0].tissue.zeta < 0 ? 1 : 0);
+    }
+    if (now != Held::nothing && before != now)
+      sewing.report_tool(now == Held::tissue ? 0 : tool.suture, kTaken[static_cast<size_t>(grip.what)], i,
+                         now == Held::needle ? 0 : tool.slot, now == Held::needle ? tool.at : 0, body.pose.p);
+  }
+}
+
+// The end of a bite at a material point: a triangle of the same side of the surface, and the tissue round it.
+BiteEnd bite_end(const Model& model, const State& state, const wall::Point& point) {
+  const physical::Model& m = model.physical->world;
+  const wall::Motion& motion = state.physical.world.wall.motion;
+  const Vec3 at = wall::place(wall::weights(m.wall, state.physical.world.wall.topology, point), motion);
+  BiteEnd end;
+  SurfaceHit hit;
+  if (nearest_surface(model.solver, state.scratch.candidates, state.solver.x.data(), at, 0.008f, hit)) end = hit.end;
+  spread(model.solver, end);
+  return end;
+}
+
+// A suture point where the thread runs through a hole.
+void add_point(const Model& model, State& state, SutureContext& sewing, uint32_t n, uint32_t bite, bool exit, uint32_t hole) {
+  Suture& suture = state.suture.suture[n];
+  Strand& strand = state.solver.strand[n];
+  std::vector<uint32_t>& known = state.physical.suture[n].hole;
+  if (std::find(known.begin(), known.end(), hole) != known.end()) return;  // the swage went back and forth in it
+  ThreadAnchor anchor;
+  anchor.slot = model.solver.strand[n].first_slot + model.solver.strand[n].count - 2;
+  const BiteEnd& end = exit ? suture.bite[bite].exit : suture.bite[bite].entry;
+  anchor.point = end.point;
+  strand.anchor.push_back(anchor);
+  suture.point.push_back({bite, exit, static_cast<uint32_t>(strand.anchor.size()) - 1});
+  known.push_back(hole);
+  sewing.report(n, EventKind::suture_point, kNoHand, static_cast<uint32_t>(suture.point.size()) - 1, static_cast<float>(bite),
+                position_of(end.point, state.solver.x.data()));
+}
+
+// The hole of this strand's thread that has no suture point yet: where its needle came out.
+uint32_t new_hole(const Model& model, const State& state, uint32_t n) {
+  const StrandModel& strand = model.solver.strand[n];
+  const uint32_t first = strand.first_slot - model.solver.tissue;
+  const std::vector<uint32_t>& known = state.physical.suture[n].hole;
+  for (const thread::Eyelet& e : state.physical.world.thread.eyelet)
+    if (e.segment >= first && e.segment < first + strand.count && std::find(known.begin(), known.end(), e.point) == known.end())
+      return e.point;
+  return wall::kNone;
+}
+
+// Bites, suture points and their events, from what the needles did in this tick.
+void show_bites(const Model& model, State& state, SutureContext& sewing, const PhysicalScratch& k) {
+  const Vec4* x = state.solver.x.data();
+  for (const PhysicalScratch::Puncture& p : k.puncture) {
+    Suture& suture = state.suture.suture[p.needle];
+    const physical::Needle& needle = state.physical.world.needle[p.needle];
+    const RigidBody& body = state.solver.body[model.solver.needle_body(p.needle)];
+    const NeedleArc& arc = model.solver.needle_arc[p.needle];
+    const auto report = [&](EventKind kind, uint32_t which, float value, Vec3 where) {
+      sewing.report(p.needle, kind, kNoHand, which, value, where);
+    };
+    if (p.events & physical::kEntered) {
+      const uint32_t which = static_cast<uint32_t>(suture.bite.size());
+      Bite bite;
+      bite.entry = bite.exit = bite_end(model, state, p.entry);
+      const Triangle& t = model.solver.collision.surface[bite.entry.triangle];
+      bite.nearest = t[0];
+      const Vec3 a = xyz(x[t[0]]), normal = normalized(cross(xyz(x[t[1]]) - a, xyz(x[t[2]]) - a));
+      const Vec3 heading = rotate(body.q, arc.tangent(arc.arc));
+      suture.bite.push_back(bite);
+      suture.open.push_back({which, NeedlePhase::tip_in});
+      report(EventKind::tip_entered, which, portable::acos(std::clamp(-dot(heading, normal), -1.0f, 1.0f)),
+             position_of(bite.entry.point, x));
+    }
+    if (suture.open.empty()) continue;
+    if (p.events & physical::kLeft) {
+      OpenBite& newest = suture.open.back();
+      Bite& bite = suture.bite[newest.bite];
+      bite.exit = bite_end(model, state, p.exit);
+      bite.has_exit = true;
+      newest.phase = NeedlePhase::through;
+      report(EventKind::tip_exited, newest.bite, bite.depth, position_of(bite.exit.point, x));
+    }
+    if (p.events & physical::kWithdrawn) {
+      const uint32_t which = suture.open.back().bite;
+      suture.bite[which].canceled = true, suture.bite[which].has_exit = false;
+      suture.open.pop_back();
+      report(EventKind::bite_withdrawn, which, suture.bite[which].depth, needle_tip(arc, body));
+    }
+    if ((p.events & physical::kThreadIn) && !suture.open.empty() && needle.channels > 0 &&
+        needle.channel[0].entry_hole != wall::kNone) {
+      suture.open.front().phase = NeedlePhase::back_in;
+      add_point(model, state, sewing, p.needle, suture.open.front().bite, false, needle.channel[0].entry_hole);
+    }
+    if ((p.events & physical::kThreadOut) && !suture.open.empty()) {
+      const uint32_t which = suture.open.front().bite, hole = new_hole(model, state, p.needle);
+      Bite& bite = suture.bite[which];
+      if (hole != wall::kNone) add_point(model, state, sewing, p.needle, which, true, hole);
+      bite.complete = true;
+      suture.open.erase(suture.open.begin());
+      const Vec3 out = position_of(bite.exit.point, x);
+      report(EventKind::bite_completed, which, distance(position_of(bite.entry.point, x), out), out);
+    }
+  }
+  for (uint32_t n = 0; n < state.suture.suture.size(); ++n) {
+    Suture& suture = state.suture.suture[n];
+    const physical::Needle& needle = state.physical.world.needle[n];
+    if (!suture.open.empty() && needle.inside) {
+      OpenBite& newest = suture.open.back();
+      Bite& bite = suture.bite[newest.bite];
+      bite.depth = std::max(bite.depth, k.depth[n]);
+      if (newest.phase == NeedlePhase::through)  // back in its exit
+        newest.phase = NeedlePhase::tip_in, bite.has_exit = false;
+    }
+    suture.tip_inside = needle.inside;
+  }
+}
+
+// Where the thread runs through its holes now, and how taut it is there. A point whose hole the thread has left again is gone.
+void show_points(const Model& model, State& state) {
+  const thread::State& t = state.physical.world.thread;
+  for (uint32_t n = 0; n < state.suture.suture.size(); ++n) {
+    Suture& suture = state.suture.suture[n];
+    Strand& strand = state.solver.strand[n];
+    std::vector<uint32_t>& hole = state.physical.suture[n].hole;
+    const uint32_t first = model.solver.strand[n].first_slot, count = model.solver.strand[n].count;
+    while (!hole.empty() && hole.back() >= state.physical.world.hole.size()) {
+      erase_anchor(strand, suture, suture.point.back().anchor);
+      suture.point.pop_back(), hole.pop_back();
+      if (!suture.open.empty()) suture.open.front().phase = NeedlePhase::through;
+    }
+    for (size_t i = 0; i < hole.size(); ++i) {
+      const auto e =
+          std::find_if(t.eyelet.begin(), t.eyelet.end(), [&](const thread::Eyelet& x) { return x.point == hole[i]; });
+      if (e == t.eyelet.end()) continue;
+      ThreadAnchor& a = strand.anchor[suture.point[i].anchor];
+      const uint32_t node = e->segment - (first - model.solver.tissue);
+      a.slot = first + std::clamp(node, 1u, count - 2);
+      a.tension_free = node > 0 ? strand.tension[node - 1] : 0;
+      a.tension_needle = node + 1 < strand.tension.size() ? strand.tension[node + 1] : 0;
+    }
+  }
+}
+
+// The sums of sim/haptic_feedback, from the rows of this step.
+void sum_haptics(const Model& model, State& state, const PhysicalScratch& k, int step) {
+  const float h = model.solver.h;
+  for (size_t hand = 0; hand < kMaxHands; ++hand) {
+    if (state.hand[hand].instrument < 0) continue;
+    const uint32_t i = static_cast<uint32_t>(state.hand[hand].instrument);
+    const physical::Body& body = state.physical.world.bodies.body[i];
+    Weld& weld = state.solver.weld[i];
+    weld.lambda = body.hand_force * (h * h), weld.angular_lambda = body.hand_torque * (h * h);
+    if (step <= model.substeps - std::max(1, model.substeps / 4)) continue;
+    ToolReaction& t = state.haptics.tool[hand];
+    for (const physical::Row& row : k.world.bodies.row) {
+      if (row.a != i) continue;
+      const Vec3 force = row.impulse / h, normal = row.axis * dot(force, row.axis);
+      if (row.kind == physical::Row::Kind::contact)
+        t.pressing += normal, t.rubbing += force - normal, t.pressed += length(normal);
+      else (row.on_wall ? t.held : t.needle) += force;
+    }
+    t.thread += body.thread_force;
+    t.all += body.force;
+    t.torque += physical::torque_about(model.physical->world.bodies.body[i], body, body.pose.p);
+    t.hand -= body.hand_force;
+    t.wrist -= body.hand_torque;
+    t.at += weld.target.p;
+    t.substeps += 1;
+  }
+}
+
+}  // namespace
+
+void step_physical(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times) {
+  if (!state.physical.scratch) state.physical.scratch = std::make_shared<PhysicalScratch>(model, state.physical);
+  PhysicalScratch& k = *state.physical.scratch;
+  find_boxes(model.solver, state.solver, state.scratch, jobs, times);
+  remember_places(model, state, k);
+  meet_hands(state, input);
+  handle_instruments(model, state, input);
+  place_again(model, state, k);
+  SutureContext sewing{model.solver, state.solver, state.scratch, model.suture, state.suture, state.event};
+  cut(sewing, input);
+  for (const Command& c : input.commands)
+    if (c.kind == CommandKind::new_suture) sewing.refuse(c);  // not with physical mechanics yet
+  cut_thread(model, state);
+  find_candidates(model.solver, state.solver, state.scratch, std::clamp(0.5f * model.dt, 0.002f, 0.008f), times);
+  begin_haptics(state);
+  k.puncture.clear(), std::fill(k.depth.begin(), k.depth.end(), 0.0f);
+  physical::Hands hands;
+  hands.targets = k.target, hands.plane = &k.drape;
+  for (int i = 1; i <= model.substeps; ++i) {
+    StageTimer timer(times, Stage::thread);
+    follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));
+    set_targets(model, state, input, k);
+    lay_needles(model, state, k);
+    physical::step(model.physical->world, state.physical.world, k.world, hands, jobs);
+    note_punctures(state, model.physical->world, k);
+    sum_haptics(model, state, k, i);
+  }
+  show(model, state);
+  show_grips(model, state, sewing);
+  show_bites(model, state, sewing, k);
+  show_points(model, state);
+  remember_hands(state, input);
+  ++state.tick;
+  finish_haptics(model, state);
+}
+
+}  // namespace catgut

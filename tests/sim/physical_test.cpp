@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+// tests/sim: physical mechanics in a scene. Instruments push wall and thread by impulses and feel the reaction; what is
+// published is what the mechanics computed; a saved state continues to the bit; a guided scene has none of it.
+#include "sim/physical.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+#include "core/archive.h"
+#include "core/check.h"
+#include "procedure/scene_file.h"
+#include "procedure/scripted_surgeon.h"
+#include "sim/model.h"
+#include "sim/state.h"
+
+namespace catgut {
+namespace {
+
+const Quat kDown = axis_angle({1, 0, 0}, -0.5f * kPi);  // the instrument points down, its shaft up
+
+float smooth(float s) {
+  s = std::clamp(s, 0.0f, 1.0f);
+  return s * s * s * (10 + s * (6 * s - 15));
+}
+
+// The scene of one interrupted stitch, and its hands.
+struct Field {
+  SceneSpec scene = read_scene("interrupted");
+  std::shared_ptr<const Model> model;
+  StatePtr state;
+  Jobs jobs{1};
+  TickInput input;
+  Snapshot seen;
+  Vec3 top;  // [m] the highest point of the right bowel end, 6 mm from its rim
+
+  explicit Field(void (*change)(SceneSpec&) = nullptr) {
+    // Softer and longer than the scene's own: dents of some millimeters are within the strength of the jaws.
+    for (BodySpec& b : scene.body) b.modulus_along = b.modulus_around = 6e5f, b.pinned_length = 0.015f;
+    if (change) change(scene);
+    model = build_model(scene);
+    state = initial_state(*model);
+    for (ToolInput& h : input.hand) h.connected = 0;
+    top = scene.body[1].position + Vec3{0.006f, scene.body[1].radius, 0};
+    for (int i = 0; i < 20; ++i) tick();
+  }
+  void tick() {
+    input.tick = state->tick;
+    step(*model, *state, input, jobs);
+    publish(*model, *state, seen);
+  }
+  // The right hand, pointing down, goes to `to` in a straight line; the jaws are `jaw` open.
+  void move_right(Vec3 to, float seconds, float jaw) {
+    ToolInput& hand = input.hand[0];
+    const Vec3 from = hand.connected ? hand.pose.p : to;
+    hand.connected = 1, hand.jaw = jaw;
+    const int ticks = static_cast<int>(seconds / model->dt);
+    for (int i = 1; i <= ticks; ++i) {
+      hand.pose = {from + (to - from) * smooth(static_cast<float>(i) / static_cast<float>(ticks)), kDown};
+      tick();
+    }
+  }
+  size_t nearest_tissue(Vec3 p) const {
+    size_t best = 0;
+    for (size_t i = 0; i < model->solver.tissue; ++i)
+      if (distance(seen.particle[i], p) < distance(seen.particle[best], p)) best = i;
+    return best;
+  }
+};
+
+std::vector<std::byte> bytes_of(const auto& value) {
+  std::vector<std::byte> out;
+  ByteSink sink{out};
+  Writer write(sink);
+  write(value);
+  return out;
+}
+
+// The hand's spring and the wall carry the same force in opposite directions. Without the hand the dent goes back.
+TEST(PhysicalScene, a_tool_that_presses_the_wall_feels_its_reaction_and_leaves_no_dent) {
+  Field f;
+  const Vec3 above = f.top + Vec3{0, 0.004f, 0};
+  f.move_right(above, 0.2f, 1);
+  const size_t under = f.nearest_tissue(f.top);
+  const Vec3 before = f.seen.particle[under];
+  EXPECT_LT(length(f.seen.tool[0].force), 1e-3f) << "the instrument touches nothing yet";
+  f.move_right(f.top - Vec3{0, 0.003f, 0}, 0.5f, 1);
+  f.move_right(f.top - Vec3{0, 0.003f, 0}, 0.5f, 1);
+  const Vec3 felt = f.seen.tool[0].force, patch = f.seen.patch[0].force;
+  std::printf("pressed 3 mm: %.3f N on the hand, %.3f N in the patch, dent %.2f mm\n", static_cast<double>(felt.y),
+              static_cast<double>(patch.y), static_cast<double>(1e3f * (before.y - f.seen.particle[under].y)));
+  EXPECT_GT(felt.y, 0.05f) << "the wall pushes the hand up";
+  EXPECT_LT(felt.y, 20.0f);
+  EXPECT_LT(distance(felt, patch), 0.15f * length(felt)) << "the patch leaves friction to the servo";
+  EXPECT_GT(before.y - f.seen.particle[under].y, 0.001f);
+  f.move_right(above, 0.5f, 1);
+  f.move_right(above, 1.0f, 1);
+  EXPECT_LT(distance(before, f.seen.particle[under]), 1e-4f);
+  EXPECT_LT(length(f.seen.tool[0].force), 1e-3f);
+}
+
+// A held force is the material's: the same with steps of half the length.
+TEST(PhysicalScene, the_force_of_a_held_dent_does_not_depend_on_the_step) {
+  float force[2];
+  for (const int k : {0, 1}) {
+    Field f(k == 0 ? [](SceneSpec&) {} : [](SceneSpec& s) { s.solver.tick_rate = 990; });
+    f.move_right(f.top + Vec3{0, 0.004f, 0}, 0.2f, 1);
+    f.move_right(f.top - Vec3{0, 0.003f, 0}, 0.5f, 1);
+    f.move_right(f.top - Vec3{0, 0.003f, 0}, 1.0f, 1);
+    force[k] = f.seen.tool[0].force.y;
+  }
+  std::printf("steps of %.2f and %.2f ms: %.4f, %.4f N\n", 1000.0 / 60 / physical_steps(1.0f / 60),
+              1000.0 / 990 / physical_steps(1.0f / 990), static_cast<double>(force[0]), static_cast<double>(force[1]));
+  EXPECT_NEAR(force[1] / force[0], 1, 0.02f);
+}
+
+// Jaws on both sides of the right bowel's rim; the left bowel lies elsewhere.
+TEST(PhysicalScene, jaws_hold_an_edge_pull_it_along_and_let_it_go) {
+  Field f([](SceneSpec& s) { s.body[0].position.z = -0.08f; });
+  const BodySpec& right = f.scene.body[1];
+  const Vec3 edge = right.position + Vec3{0.002f, right.radius - 0.5f * right.wall, 0};
+  const Quat level = from_axes({0, 1, 0}, {0, 0, -1}, {-1, 0, 0});  // points along the bowel, jaws open up and down
+  ToolInput& hand = f.input.hand[0];
+  const auto hold = [&](Vec3 from, Vec3 to, float seconds, float jaw) {
+    hand.connected = 1, hand.jaw = jaw;
+    const int ticks = static_cast<int>(seconds / f.model->dt);
+    for (int i = 1; i <= ticks; ++i) {
+      hand.pose = {from + (to - from) * smooth(static_cast<float>(i) / static_cast<float>(ticks)), level};
+      f.tick();
+    }
+  };
+  const size_t held = f.nearest_tissue(edge + Vec3{-0.002f, 0.5f * right.wall, 0});
+  const Vec3 start = f.seen.particle[held], away = edge + Vec3{-0.02f, 0, 0}, pulled = edge + Vec3{0, 0.002f, 0};
+  hold(away, away, 0.2f, 1);
+  hold(away, edge, 0.3f, 1);
+  hold(edge, edge, 0.3f, 0);
+  ASSERT_EQ(f.seen.tool[0].held, Held::tissue);
+  hold(edge, pulled, 0.4f, 0);
+  hold(pulled, pulled, 0.4f, 0);
+  std::printf("edge pulled up 2 mm: %.3f N, tissue follows %.2f mm\n", static_cast<double>(f.seen.tool[0].force.y),
+              static_cast<double>(1e3f * (f.seen.particle[held].y - start.y)));
+  EXPECT_LT(f.seen.tool[0].force.y, -0.02f);
+  EXPECT_GT(f.seen.particle[held].y - start.y, 0.001f);
+  hold(pulled, pulled, 0.2f, 1);
+  hold(pulled, pulled + Vec3{-0.02f, 0, 0}, 0.3f, 1);
+  hold(pulled + Vec3{-0.02f, 0, 0}, pulled + Vec3{-0.02f, 0, 0}, 1.0f, 1);
+  EXPECT_EQ(f.seen.tool[0].held, Held::nothing);
+  EXPECT_LT(distance(f.seen.particle[held], start), 2e-4f);
+}
+
+TEST(PhysicalScene, jaws_carry_thread_and_its_length_stays) {
+  Field f;
+  const uint32_t node = f.seen.active().thread_order[100];
+  const Vec3 start = f.seen.particle[node];
+  f.move_right(start + Vec3{0, 0.03f, 0}, 0.1f, 1);
+  f.move_right(start + Vec3{0, 0.001f, 0}, 0.3f, 1);
+  f.move_right(start + Vec3{0, 0.001f, 0}, 0.1f, 0);
+  ASSERT_EQ(f.seen.tool[0].held, Held::thread);
+  f.move_right(start + Vec3{0, 0.04f, 0}, 0.8f, 0);
+  EXPECT_GT(f.seen.particle[f.seen.tool[0].held_slot].y - start.y, 0.035f);
+  const std::vector<uint32_t>& order = f.seen.active().thread_order;
+  float longest = 0;
+  for (size_t i = 0; i + 1 < order.size(); ++i)
+    longest = std::max(longest, distance(f.seen.particle[order[i]], f.seen.particle[order[i + 1]]));
+  EXPECT_LT(longest, 1.02f * f.scene.thread.spacing);
+  EXPECT_TRUE(state_is_valid(*f.model, *f.state));
+}
+
+// Save, load elsewhere and continue, with another number of workers: the same as the run itself. With an instrument that
+// presses the wall and drags thread, so that every list of contacts is in use.
+TEST(PhysicalScene, a_loaded_state_continues_to_the_bit) {
+  Field f;
+  StatePtr other = initial_state(*f.model);
+  Jobs two(2);
+  f.move_right(f.top + Vec3{0, 0.004f, 0}, 0.2f, 1);
+  f.move_right(f.top - Vec3{0, 0.002f, 0}, 0.2f, 1);
+  for (int i = 0; i < 40; ++i) {
+    f.input.hand[0].pose.p.x += 0.0003f;
+    f.input.hand[0].jaw = i < 20 ? 1.0f : 0.0f;
+    f.input.tick = f.state->tick;
+    const bool check = i % 5 == 0;
+    if (check) load_state(*f.model, *other, save_state(*f.model, *f.state));
+    step(*f.model, *f.state, f.input, f.jobs);
+    if (!check) continue;
+    step(*f.model, *other, f.input, two);
+    ASSERT_EQ(hash_state(*f.model, *f.state), hash_state(*f.model, *other)) << "tick " << i;
+    Snapshot loaded;
+    publish(*f.model, *f.state, f.seen), publish(*f.model, *other, loaded);
+    ASSERT_EQ(bytes_of(f.seen), bytes_of(loaded)) << "tick " << i;
+  }
+}
+
+// The scripted surgeon leads needle and thread through both walls, and nothing but jaws and needle helps him.
+TEST(PhysicalScene, a_needle_leads_its_thread_through_both_walls) {
+  const SceneSpec scene = read_scene("interrupted");
+  const std::shared_ptr<const Model> model = build_model(scene);
+  const StatePtr state = initial_state(*model);
+  const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*model));
+  Jobs jobs(2);
+  Snapshot seen;
+  TickInput input, nobody;
+  for (ToolInput& hand : nobody.hand) hand.connected = 0;
+  publish(*model, *state, seen);
+  for (uint64_t t = 0; t < 60 * 20 && !surgeon->done(); ++t) {
+    input = t < 30 ? nobody : surgeon->operate(seen, model->dt);
+    input.tick = t;
+    step(*model, *state, input, jobs);
+    publish(*model, *state, seen);
+    ASSERT_TRUE(state_is_valid(*model, *state)) << "tick " << t;
+  }
+  EXPECT_TRUE(surgeon->done() && !surgeon->gave_up()) << surgeon->doing();
+  EXPECT_FALSE(seen.active().needle.in_tissue);
+  size_t complete = 0;
+  for (const BiteView& bite : seen.active().bite) complete += bite.complete;
+  EXPECT_GE(complete, 2u);
+  EXPECT_GE(seen.active().suture_point.size(), 3u);  // of four holes; docs/physical.md, "What is missing for scenes"
+}
+
+TEST(PhysicalScene, a_guided_scene_has_no_physical_state) {
+  const std::shared_ptr<const Model> model = build_model(read_scene("stay"));
+  const StatePtr state = initial_state(*model);
+  EXPECT_FALSE(model->physical);
+  EXPECT_TRUE(bytes_of(state->physical).empty());
+}
+
+TEST(PhysicalScene, what_it_cannot_do_is_refused_with_one_message) {
+  const auto refused = [](auto change) {
+    SceneSpec s = read_scene("interrupted");
+    change(s);
+    EXPECT_THROW(build_model(s), InputError);
+  };
+  refused([](SceneSpec& s) { s.body[0].particles = 601; });
+  refused([](SceneSpec& s) { s.body[0].modulus_along = 1e6f; });
+  refused([](SceneSpec& s) { s.thread.material = "catgut 9-0"; });
+}
+
+}  // namespace
+}  // namespace catgut
