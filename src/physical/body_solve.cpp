@@ -210,7 +210,8 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
         return row.axis * hold + clamped(side, row.across_limit);
       }
       default:  // spring
-        return row.impulse - (u - row.wanted + row.impulse * row.soft) / (row.diagonal_across + row.soft);
+        return clamped(row.impulse - (u - row.wanted + row.impulse * row.soft) / (row.diagonal_across + row.soft),
+                       row.across_limit);
     }
   };
   k.before.resize(n), k.onward.assign(n, {});

@@ -188,10 +188,10 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
       Row row;
       row.kind = Row::Kind::spring, row.key = key(0, 0), row.axis = {1, 0, 0};
       row.wanted = (thread.position(n.thread_node) - at) / h;
-      row.soft = 1 / (law.swage_stiffness * h * h);
+      row.soft = 1 / (law.swage_stiffness * h * h), row.across_limit = law.swage_strength * h;
       add(row, at);
       thread::Hold hold;
-      hold.node = n.thread_node, hold.stiffness = law.swage_stiffness;
+      hold.node = n.thread_node, hold.stiffness = law.swage_stiffness, hold.limit = law.swage_strength;
       hold.from = swage_of(m, body.shown);
       k.hold.push_back(hold), k.hold_body.push_back(m.body), k.hold_at.push_back(swage_of(m, {}));
     }

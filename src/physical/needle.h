@@ -34,6 +34,7 @@ struct PunctureLaw {
   float least_slope = 0.25f;     // cosine between needle and inward normal below which the tip slides off
   float tip_friction = 0.5f;     // of a tip that has not entered
   float swage_stiffness = 8000;  // [N/m] between swage and thread
+  float swage_strength = 60;     // [N] no thread bears more
   float same_face = 1.5e-3f;     // [m] from the entry at which the tip can leave through the same face
 };
 
