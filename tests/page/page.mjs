@@ -57,6 +57,7 @@ run(["survey", "results", "--html", path.join(out, "survey.html")]);
 
 async function serve(args) {
   const child = spawn(program, ["serve", "--port", "0", ...args], {env: {...process.env, CATGUT_STORE: store}});
+  process.on("exit", () => child.kill());  // also when a check fails
   const url = await new Promise((good, bad) => {
     let text = "";
     child.stdout.on("data", (d) => { text += d; const m = text.match(/https?:\/\/\S+\//); if (m) good(m[0]); });
