@@ -31,7 +31,7 @@ bool start(void* self, const ArmCallback& callback, std::string&) {
       const float t = 0.001f * static_cast<float>(arm.steps);
       s.pose.p = {0.0037f, t < 2.5f ? 0.0f : -0.012f * (t - 2.5f), -0.010f};  // [m] waits until force is let in, then goes down
       s.pose.q = axis_angle({1, 0, 0}, -0.5f * kPi);                          // -z, its pointing direction, is down
-      arm.most = std::max(arm.most.load(), length(callback.step(callback.user, 0, s)));
+      arm.most = std::max(arm.most.load(), length(callback.step(callback.user, 0, s).force));
       ++arm.steps;
       std::this_thread::sleep_until(next);
     }
