@@ -204,14 +204,16 @@ TEST(Allocation, a_stitch_that_is_drawn_asks_for_none) {
   s.run(0.002f);  // columns of the inverse get their room in the first step
   physical::Hands hands;
   hands.holds = s.hold;
+  size_t most_contacts = 0;
   const uint64_t count = allocations_of([&] {
     for (int i = 0; i < 150; ++i) {
       for (thread::Hold& h : s.hold) h.from = h.to, h.to = h.to + Vec3{1.2e-4f, 0, 0};
       physical::step(s.model, s.state, *s.scratch, hands, *s.jobs);
+      most_contacts = std::max(most_contacts, s.state.contact.size());
     }
   });
   EXPECT_GT(s.state.lip.size(), 0u);
-  EXPECT_GT(s.state.contact.size(), 0u);
+  EXPECT_GT(most_contacts, 0u);
   EXPECT_EQ(count, 0u) << sites();
 }
 
