@@ -3,6 +3,7 @@
 // headset.
 #ifdef CATGUT_TESTS_HEADSET
 #include <array>
+#include <cstdlib>
 #include <vector>
 
 #include "runtime/session.h"
@@ -131,6 +132,7 @@ TEST_F(Stitch, a_headset_lost_in_the_middle_of_a_bite_loses_nothing) {
 // The hands of a recording, in a window with a headset and in one without: every tick has the same hash. Heads are noted only
 // with the headset and change nothing.
 TEST_F(Stitch, the_same_hands_give_the_same_ticks_with_and_without_a_headset) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "half a minute; CATGUT_LONG=1 runs it";
   Sewing sewing("stay");
   ASSERT_EQ(sit(options_, 90,
                 [&](const WindowLook& now) {
