@@ -26,15 +26,6 @@ namespace catgut {
 namespace {
 namespace fs = std::filesystem;
 
-std::string read_whole(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::error_code error;
-  if (!in || fs::is_directory(path, error)) throw InputError(path, "cannot be read", "check the path");
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
 Store open_store(const std::string& where, bool read_only = false) {
   StoreOptions options;
   options.where = where;
@@ -82,7 +73,7 @@ std::string keep_recording(const Store& store, const std::string& path, const st
   std::error_code error;
   fs::create_directories(folder, error);
   const std::string kept = (folder / (uid + ".cgrec")).string();
-  write_file(kept, read_whole(path));
+  write_file(kept, read_file(path));
   return kept;
 }
 
@@ -128,10 +119,10 @@ int store_add(const StoreCommand& given) {
     all.push_back(assessed(o.file[0], o.rubric));
     if (o.recording.empty()) o.recording = o.file[0];
   } else if (o.file.size() == 1 && o.recording.empty()) {
-    all = read_sessions_json(read_whole(o.file[0]), o.file[0]);
+    all = read_sessions_json(read_file(o.file[0]), o.file[0]);
   } else {  // several files of one session
     Session one;
-    for (const std::string& file : o.file) read_session_json(read_whole(file), file, one);
+    for (const std::string& file : o.file) read_session_json(read_file(file), file, one);
     all.push_back(one);
   }
   for (Session& s : all) {
@@ -166,8 +157,7 @@ int store_add(const StoreCommand& given) {
 int store_import(const StoreCommand& o) {
   Store store = open_store(o.store);
   std::vector<Person> people;
-  const std::vector<Session> all =
-      sessions_of_table(read_whole(o.file[0]), o.file[0], read_whole(o.mapping), o.mapping, &people);
+  const std::vector<Session> all = sessions_of_table(read_file(o.file[0]), o.file[0], read_file(o.mapping), o.mapping, &people);
   std::vector<std::string> notes;
   store.add_all(all, &notes);
   for (const Person& p : people) store.put_person(p);
@@ -382,7 +372,7 @@ void add_survey(CLI::App& app, int& exit_code) {
   CLI::App* import =
       sub("import", "answers from a table: respondent, group, one column per question", [](const SurveyOptions& c) {
         const Questionnaire q = read_questionnaire(c.survey);
-        const std::vector<SurveyAnswer> answers = answers_of_csv(q, read_whole(c.file), c.file, utc_now());
+        const std::vector<SurveyAnswer> answers = answers_of_csv(q, read_file(c.file), c.file, utc_now());
         Store store = open_store(c.store);
         store.add_answers(answers);
         std::printf("%zu answers stored in %s\n", answers.size(), store.name().c_str());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/xr: stub of a build without OpenXR (CATGUT_XR=OFF).
+// app/xr: the headset of a build without OpenXR (CATGUT_XR=OFF): it reports that there is none.
 #include "xr/headset.h"
 
 namespace catgut::xr {

@@ -12,6 +12,8 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 
 #include "core/check.h"
 
@@ -85,6 +87,15 @@ void check_suffix(const std::string& path, std::string_view suffix, const std::s
   if (end != suffix || path.size() == suffix.size())
     throw InputError(option + " " + path, "the file name does not end in " + std::string(suffix),
                      "name it, for example, " + std::filesystem::path(path).stem().string() + std::string(suffix));
+}
+
+std::string read_file(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::error_code error;
+  if (!in || std::filesystem::is_directory(path, error)) throw InputError(path, "cannot be read", "check the path");
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
 }
 
 }  // namespace catgut

@@ -13,21 +13,13 @@
 
 #include "core/check.h"
 #include "core/data.h"
+#include "core/file.h"
 #include "procedure/toml.h"
 #include "report/csv.h"
 
 namespace catgut {
 namespace {
 namespace fs = std::filesystem;
-
-std::string read_text(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::error_code error;
-  if (!in || fs::is_directory(path, error)) throw InputError(path, "cannot be read", "check the path");
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
 
 [[noreturn]] void fault(const std::string& where, const toml::source_region& at, const std::string& what,
                         const std::string& next) {
@@ -137,7 +129,7 @@ Questionnaire read_questionnaire(const std::string& name_or_path) {
       throw InputError("survey " + name_or_path, "is unknown", "use a path, or one of: " + all);
     }
   }
-  return parse_questionnaire(read_text(path), path, fs::path(path).stem());
+  return parse_questionnaire(read_file(path), path, fs::path(path).stem());
 }
 
 void check_answers(const Questionnaire& q, const std::vector<SurveyAnswer>& answers) {
