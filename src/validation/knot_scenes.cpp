@@ -15,7 +15,10 @@ using thread::Pull;
 using thread::Settings;
 using thread::Surroundings;
 
+constexpr float kRodRadius = 2.5e-3f;  // [m]
+
 Vec3 turned(Vec3 p) { return {-p.x, -p.y, p.z}; }
+float half_length(const Throw& t, float d) { return 0.5f * 2.2f * d * static_cast<float>(t.half_turns); }
 
 }  // namespace
 
@@ -43,21 +46,22 @@ Throws surgeons() { return {{5, 1}, {3, -1}}; }
 Throws three_throws() { return {{3, 1}, {3, -1}, {3, 1}}; }
 Throws surgeons_211() { return {{5, 1}, {3, -1}, {3, 1}}; }
 
-LaidKnot lay_knot(std::span<const Throw> throws, float d, float segment, float load, float tail, float drop) {
-  // Strand A from its load end up; B is A rotated by half a turn about z, because every throw is symmetric under that rotation.
-  std::vector<Vec3> a;
+namespace {
+
+// Strand A from its load end upward; `a` is its beginning, up to where it enters the first throw on side -x. Strand B is A
+// rotated by half a turn about z, because every throw is symmetric under that rotation. Returns the side on which the tail
+// leaves.
+float wind(std::span<const Throw> throws, float d, float tail, std::vector<Vec3>& a) {
   const float r = 0.75f * d, bend = 1.5f * d;
   auto line = [&](Vec3 to) {
     const Vec3 from = a.back();
     const int n = std::max(1, static_cast<int>(distance(from, to) / (0.05f * d)));
     for (int i = 1; i <= n; ++i) a.push_back(lerp(from, to, static_cast<float>(i) / static_cast<float>(n)));
   };
-  const float first = 0.5f * 2.2f * d * static_cast<float>(throws[0].half_turns);
-  a.push_back({-first - load * std::cos(drop), 0, -r - load * std::sin(drop)});
   float z = 0, side = -1;  // A enters from this side
   for (size_t k = 0; k < throws.size(); ++k) {
     const float turns = static_cast<float>(throws[k].half_turns * throws[k].hand) * kPi;
-    const float half = 0.5f * 2.2f * d * static_cast<float>(throws[k].half_turns);
+    const float half = half_length(throws[k], d);
     // The strand from the left starts below: sin of its first angle is -1.
     const float phase = std::sin(-0.5f * turns) < 0 ? 0 : kPi;
     line({side * half, 0, z - r});
@@ -70,7 +74,7 @@ LaidKnot lay_knot(std::span<const Throw> throws, float d, float segment, float l
     }
     side = -side;
     if (k + 1 == throws.size()) break;
-    const float next = 0.5f * 2.2f * d * static_cast<float>(throws[k + 1].half_turns), out = std::max(half, next);
+    const float out = std::max(half, half_length(throws[k + 1], d));
     line({side * out, 0, z + r});
     for (int i = 1; i <= 60; ++i) {
       const float angle = kPi * static_cast<float>(i) / 60;
@@ -79,6 +83,15 @@ LaidKnot lay_knot(std::span<const Throw> throws, float d, float segment, float l
     z += 2 * bend + 2 * r;
   }
   line(a.back() + Vec3{side * tail, 0, 0.15f * tail});
+  return side;
+}
+
+}  // namespace
+
+LaidKnot lay_knot(std::span<const Throw> throws, float d, float segment, float load, float tail, float drop) {
+  const float r = 0.75f * d;
+  std::vector<Vec3> a{{-half_length(throws[0], d) - load * std::cos(drop), 0, -r - load * std::sin(drop)}};
+  const float side = wind(throws, d, tail, a);
   const std::vector<Vec3> strand = resample(a, segment);
   std::vector<Vec3> path(strand.rbegin(), strand.rend());
   for (const Vec3& p : strand) path.push_back(turned(p));
@@ -89,6 +102,28 @@ LaidKnot lay_knot(std::span<const Throw> throws, float d, float segment, float l
   k.state.broken[k.load_a] = 1;
   k.tail_direction_a = {side, 0, 0};
   k.tail_direction_b = {-side, 0, 0};
+  return k;
+}
+
+LaidKnot lay_on_rod(std::span<const Throw> throws, float d, float segment, float tail) {
+  const float r = 0.75f * d, first = half_length(throws[0], d), round = kRodRadius + d;
+  std::vector<Vec3> a;  // from the middle of the bite, below the rod
+  for (float x = 0; x < first; x += 0.05f * d) a.push_back({-x, 0, -r - 2 * round});
+  for (int i = 0; i <= 120; ++i) {
+    const float angle = kPi * static_cast<float>(i) / 120;
+    a.push_back({-first - round * std::sin(angle), 0, -r - round * (1 + std::cos(angle))});
+  }
+  const float side = wind(throws, d, tail, a);
+  const std::vector<Vec3> strand = resample(a, segment);
+  std::vector<Vec3> path(strand.rbegin(), strand.rend());
+  for (size_t i = 1; i < strand.size(); ++i) path.push_back(turned(strand[i]));
+  LaidKnot k;
+  k.state = thread::make_state(path);
+  k.load_a = k.load_b = static_cast<uint32_t>(strand.size()) - 1;
+  k.tail_direction_a = {side, 0, 0};
+  k.tail_direction_b = {-side, 0, 0};
+  const Vec3 from{0, -10e-3f, -r - round}, to{0, 10e-3f, -r - round};
+  k.rod.push_back({from, to, from, to, kRodRadius, 0.15f, {}, {}});
   return k;
 }
 
@@ -104,10 +139,10 @@ Settings knot_settings(float friction) {
 }
 
 void tighten(const Settings& settings, Tightened& t, float tails, Drawing drawing, float seconds, bool let_go) {
-  const LaidKnot& k = t.knot;
+  LaidKnot& k = t.knot;
   std::vector<Pull> pull{{k.tail_a(), {}}, {k.tail_b(), {}}};
-  std::vector<Hold> hold(2);
-  hold[0].node = k.load_a, hold[1].node = k.load_b;
+  std::vector<Hold> hold(k.rod.empty() ? 2 : 0);
+  if (!hold.empty()) hold[0].node = k.load_a, hold[1].node = k.load_b;
   for (Hold& h : hold) h.from = h.to = k.state.position(h.node), h.stiffness = 500;
   const int ticks = static_cast<int>(std::lround(seconds * 1000)), release = let_go ? 50 : 0;
   for (int i = 0; i < ticks + release; ++i) {
@@ -119,8 +154,8 @@ void tighten(const Settings& settings, Tightened& t, float tails, Drawing drawin
     pull[0].force = k.tail_direction_a * (tense ? 2.5f * force : force);
     pull[1].force = k.tail_direction_b * (tense ? 0.05f * force : force);
     Surroundings around;
-    around.pulls = pull, around.holds = hold;
-    t.stepper.step(settings, t.knot.state, around);
+    around.pulls = pull, around.holds = hold, around.tools = k.rod;
+    t.stepper.step(settings, k.state, around);
   }
 }
 

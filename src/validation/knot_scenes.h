@@ -27,10 +27,11 @@ Throws three_throws();  // 1-1-1, square
 Throws surgeons_211();  // 2-1-1, square
 
 // Two strands with a knot between them at the origin. Strand A: nodes 0 (tail) .. load_a; strand B: load_a + 1 = load_b .. last
-// (tail). They are one thread whose bite is cut: the segment between the two load ends is broken, unless `joined`.
+// (tail). They are one thread whose bite is cut: the segment between the two load ends is broken.
 // The load ends lie at -x and +x, `drop` [rad] below the horizontal; the tails leave along x above the knot.
 struct LaidKnot {
   thread::State state;
+  std::vector<thread::ToolCapsule> rod;  // that the bite goes round; empty: the bite is cut
   uint32_t load_a = 0, load_b = 0;
   uint32_t tail_a() const { return 0; }
   uint32_t tail_b() const { return static_cast<uint32_t>(state.nodes()) - 1; }
@@ -38,6 +39,8 @@ struct LaidKnot {
 };
 LaidKnot lay_knot(std::span<const Throw> throws, float diameter, float segment, float load = 15e-3f, float tail = 12e-3f,
                   float drop = 0);
+// The bite is whole and goes round a rod of 5 mm along y, below the knot; load_a = load_b is its middle.
+LaidKnot lay_on_rod(std::span<const Throw> throws, float diameter, float segment, float tail = 12e-3f);
 
 // Both strands as one closed curve: joined below the knot, the tails led far away.
 std::vector<Vec3> closed_curve(const LaidKnot& knot);
