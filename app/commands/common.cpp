@@ -16,6 +16,7 @@
 #include "core/file.h"
 #include "procedure/procedure_file.h"
 #include "procedure/scene_file.h"
+#include "render/camera.h"
 #include "sim/recording.h"
 #include "sim/simulation.h"
 
@@ -65,6 +66,30 @@ void add_picture_options(CLI::App& command, PictureOptions& options) {
       ->type_name("S:FILE.png")
       ->take_all()
       ->allow_extra_args(false);
+  command
+      .add_option_function<std::string>(
+          "--size",
+          [&options](const std::string& text) {
+            int width = 0, height = 0, used = 0;
+            if (std::sscanf(text.c_str(), "%dx%d%n", &width, &height, &used) != 2 || size_t(used) != text.size() ||
+                width < 16 || height < 16 || width > 8192 || height > 8192)
+              throw CLI::ValidationError("--size", text + ": expected WIDTHxHEIGHT of 16 to 8192 pixels");
+            // Even sizes: the film's format requires them.
+            options.width = options.still_width = width & ~1, options.height = options.still_height = height & ~1;
+          },
+          "size of all pictures; default: stills 1920x1080, the others 640x360")
+      ->type_name("WxH");
+  command
+      .add_option("--camera", options.camera,
+                  "follow, close (the decisive thing, unobstructed), overview, front, left, right, top, or eye and target "
+                  "X,Y,Z,X,Y,Z [m]; default: films follow, stills and the film's end are close")
+      ->type_name("NAME")
+      ->check(CLI::Validator(
+          [](std::string& name) {
+            const bool known = name == "follow" || name == "close" || fixed_camera(name, PictureModel{});
+            return known ? std::string() : name + ": expected follow, close, overview, front, left, right, top or six numbers";
+          },
+          ""));
 }
 
 void check_picture_files(const PictureOptions& options) {

@@ -37,12 +37,12 @@ int replay(const ReplayOptions& o) {
     if (procedure) procedure->start(parse_scene(recording.header.scene, o.file), model);
     if (o.pictures.any()) pictures = std::make_unique<Pictures>(o.pictures, model);
   };
-  hooks.on_tick = [&, ticks = uint64_t{0}, head = size_t{0}](const Snapshot& seen, const std::string& doing) mutable {
+  hooks.on_tick = [&, ticks = uint64_t{0}, head = size_t{0}](const Snapshot& seen, const std::string&) mutable {
     if (procedure) procedure->tick(seen);
     for (; o.from_head && pictures && head < recording.head.size() && recording.head[head].tick <= ticks; ++head)
       pictures->look_from(recording.head[head].pose);
     ++ticks;
-    if (pictures) pictures->tick(seen, doing);
+    if (pictures) pictures->tick(seen, {});
   };
   const ReplayResult result = replay_session(recording, o.file, o.check, o.threads, hooks);
   end_progress_line();

@@ -2,6 +2,8 @@
 // render/camera: see camera.h.
 #include "render/camera.h"
 
+#include <array>
+#include <cstdio>
 #include <iterator>
 
 namespace catgut {
@@ -22,23 +24,100 @@ float wrap_angle(float a) { return a - 2 * kPi * std::round(a / (2 * kPi)); }
 constexpr float kRound[] = {0.4f, -0.4f, 1, -1, 1.7f, -1.7f, 0}, kUp[] = {0, 0.22f, -0.16f};
 constexpr size_t kRounds = std::size(kRound), kUps = std::size(kUp);
 
-// How much the tools' shafts occlude the needle and the center of the image, seen from the unit direction `away`.
-float hidden(const Snapshot& snapshot, Vec3 away, Vec3 target, float half) {
-  constexpr int points = 10;
-  float sum = 0;
-  for (const ToolView& tool : snapshot.tool) {
-    const Vec3 along = rotate(tool.pose.q, {0, 0, 1});
-    for (int i = 1; i <= points; ++i) {
-      const Vec3 p = tool.pose.p + along * (0.012f * static_cast<float>(i));
-      const auto before = [&](Vec3 key, float size) {
-        const Vec3 d = p - key;
-        const float toward = dot(d, away), off2 = length2(d - away * toward);
-        return toward > 0 && std::isfinite(off2) ? std::exp(-off2 / (size * size)) : 0.0f;
-      };
-      sum += 0.5f * before(snapshot.active().needle.pose.p, 0.010f) + 0.35f * before(target, 0.6f * half);
-    }
+// Weighted points of the scene that a picture must show.
+struct Interest {
+  std::array<Vec3, 12> point;
+  std::array<float, 12> weight{};
+  size_t count = 0;
+  void add(Vec3 p, float w) {
+    if (count < point.size() && is_finite(p)) point[count] = p, weight[count] = w, ++count;
   }
-  return sum;
+};
+
+// Share of the points that the tools hide from `eye`, 0..1, in perspective: a shaft that points at the camera hides much. Each
+// tool is a cone that widens from its jaws to its rings.
+float hidden(const Snapshot& snapshot, Vec3 eye, const Interest& interest) {
+  constexpr int samples = 24;
+  constexpr float step = 0.007f, slender = 0.003f, widening = 0.05f;  // [m], [m], radius per length
+  float sum = 0, whole = 1e-6f;
+  for (size_t k = 0; k < interest.count; ++k) {
+    const Vec3 p = interest.point[k], ray = normalized(eye - p, {0, 1, 0});
+    float most = 0;
+    for (const ToolView& tool : snapshot.tool) {
+      if (tool.instrument < 0 || !is_finite(tool.pose.p)) continue;
+      const Vec3 along = rotate(tool.pose.q, {0, 0, 1});
+      for (int i = 0; i < samples; ++i) {
+        const float z = step * static_cast<float>(i), radius = slender + widening * z;
+        const Vec3 d = tool.pose.p + along * z - p;
+        const float toward = dot(d, ray), off = std::sqrt(std::max(0.0f, length2(d - ray * toward))) / radius;
+        if (toward > 0) most = std::max(most, std::clamp(1.6f - 0.7f * off, 0.0f, 1.0f));
+      }
+    }
+    sum += interest.weight[k] * most, whole += interest.weight[k];
+  }
+  return sum / whole;
+}
+
+// The same for the tissue: particles between a point and the eye, those next to the point itself apart.
+float behind_tissue(const PictureModel& model, const Snapshot& snapshot, Vec3 eye, const Interest& interest) {
+  constexpr float radius = 0.0022f, apart = 0.004f;  // [m]
+  const size_t tissue = std::min<size_t>(model.particle_rest.size(), snapshot.particle.size());
+  float sum = 0, whole = 1e-6f;
+  for (size_t k = 0; k < interest.count; ++k) {
+    const Vec3 p = interest.point[k], ray = normalized(eye - p, {0, 1, 0});
+    bool covered = false;
+    for (size_t i = 0; i < tissue && !covered; ++i) {
+      const Vec3 d = snapshot.particle[i] - p;
+      const float toward = dot(d, ray);
+      covered = toward > apart && length2(d - ray * toward) < radius * radius;
+    }
+    sum += covered ? interest.weight[k] : 0, whole += interest.weight[k];
+  }
+  return sum / whole;
+}
+
+void add_needle(Interest& interest, const PictureModel& model, const Snapshot& snapshot) {
+  const SuturePicture& suture = model.suture[std::min<size_t>(snapshot.active_suture, model.suture.size() - 1)];
+  for (const float part : {0.0f, 0.35f, 0.7f, 1.0f}) {
+    const float a = part * suture.needle_arc;
+    interest.add(
+        transform(snapshot.active().needle.pose, {suture.needle_radius * std::cos(a), suture.needle_radius * std::sin(a), 0}),
+        1);
+  }
+}
+
+// The decisive thing of this moment: the needle in the wall, else the turns of thread round an instrument, else the newest knot
+// that is being tightened, else the finished repair, else the field.
+Interest decisive(const PictureModel& model, const Snapshot& snapshot) {
+  Interest interest;
+  const SutureView& active = snapshot.active();
+  if (active.needle.in_tissue) {
+    add_needle(interest, model, snapshot);
+    if (active.needle.bite < active.bite.size()) interest.add(active.bite[active.needle.bite].entry, 2);
+    return interest;
+  }
+  for (const ToolView& tool : snapshot.tool) {
+    if (tool.loop_wraps == 0) continue;
+    for (const float z : {-0.002f, 0.006f, 0.014f}) interest.add(transform(tool.pose, {0, 0, z}), 1);
+    if (!active.suture_point.empty()) interest.add(active.suture_point.back().position, 0.5f);
+    return interest;
+  }
+  if (!active.knot.empty() && active.knot.back().phase == KnotPhase::tightening) {
+    interest.add(active.knot.back().position, 1);
+    for (const SuturePointView& point : active.suture_point)
+      if (distance(point.position, active.knot.back().position) < 0.02f) interest.add(point.position, 0.5f);
+    return interest;
+  }
+  for (const SutureView& suture : snapshot.suture) {
+    for (const KnotView& knot : suture.knot) interest.add(knot.position, 1);
+    const size_t every = std::max<size_t>(1, suture.suture_point.size() / 8);
+    for (size_t i = 0; i < suture.suture_point.size(); i += every) interest.add(suture.suture_point[i].position, 0.5f);
+  }
+  if (interest.count == 0)
+    for (const SettledView& stitch : snapshot.settled)
+      for (const Vec3& knot : stitch.knot) interest.add(knot, 1);
+  if (interest.count == 0) interest.add(model.focus, 1);
+  return interest;
 }
 
 }  // namespace
@@ -52,12 +131,60 @@ Camera overview(const PictureModel& model) {
   return look_at_from(model.focus - Vec3{0, 0.1f * model.field, 0}, 0.5f, 0.75f, 0.42f * model.field, 30);
 }
 
+Camera close_up(const PictureModel& model, const Snapshot& snapshot) {
+  const Interest interest = decisive(model, snapshot);
+  Vec3 low = interest.point[0], high = low;
+  for (size_t i = 1; i < interest.count; ++i) {
+    const Vec3 p = interest.point[i];
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  constexpr float fov_deg = 30, nearest = 0.013f, margin = 0.006f;  // [m] half heights
+  const Vec3 target = 0.5f * (low + high);
+  const float half = std::clamp(0.5f * length(high - low) + margin, nearest, kWidest * model.field);
+  Camera best = look_at_from(target, 0.4f, 0.8f, half, fov_deg);
+  float least = 1e9f;
+  // From all sides of the table; without a reason, from the surgeon's.
+  constexpr int round = 16;
+  for (const float elevation : {0.5f, 0.75f, 1.0f, 1.25f})
+    for (int i = 0; i < round; ++i) {
+      const float azimuth = wrap_angle(2 * kPi * static_cast<float>(i) / round + 0.2f);
+      const Camera camera = look_at_from(target, azimuth, elevation, half, fov_deg);
+      const float cost = hidden(snapshot, camera.eye, interest) + 0.8f * behind_tissue(model, snapshot, camera.eye, interest) +
+                         0.02f * azimuth * azimuth + 0.5f * (elevation - 0.8f) * (elevation - 0.8f);
+      if (cost < least) least = cost, best = camera;
+    }
+  return best;
+}
+
+std::optional<Camera> fixed_camera(const std::string& name, const PictureModel& model) {
+  constexpr float half = 0.5f;  // of the field's radius
+  if (name == "overview") return overview(model);
+  if (name == "front") return look_at_from(model.focus, 0, 0.6f, half * model.field, 30);
+  if (name == "left") return look_at_from(model.focus, -0.5f * kPi, 0.6f, half * model.field, 30);
+  if (name == "right") return look_at_from(model.focus, 0.5f * kPi, 0.6f, half * model.field, 30);
+  if (name == "top") return look_at_from(model.focus, 0, 1.45f, half * model.field, 30);
+  Camera camera;
+  float v[6];
+  int used = 0;
+  if (std::sscanf(name.c_str(), "%f,%f,%f,%f,%f,%f%n", &v[0], &v[1], &v[2], &v[3], &v[4], &v[5], &used) != 6 ||
+      static_cast<size_t>(used) != name.size())
+    return std::nullopt;
+  camera.eye = {v[0], v[1], v[2]}, camera.target = {v[3], v[4], v[5]};
+  const Vec3 ahead = camera.target - camera.eye;
+  if (!is_finite(ahead) || length(ahead) < 0.001f || length(ahead) > 10) return std::nullopt;
+  if (std::abs(normalized(ahead).y) > 0.999f) camera.up = {0, 0, -1};
+  return camera;
+}
+
 FollowCamera::FollowCamera(const PictureModel& model)
     : half_height(0.3f * model.field),
       focus_(model.focus),
       field_(model.field),
       target_(model.focus),
-      front_(model.body.size() > 1) {}
+      front_(model.body.size() > 1),
+      needle_radius_(model.suture.front().needle_radius),
+      needle_arc_(model.suture.front().needle_arc) {}
 
 Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
   // Between the organ's center and the needle: both stay in view.
@@ -92,11 +219,17 @@ Camera FollowCamera::update(const Snapshot& snapshot, float dt) {
       const float a = wrap_angle(middle + kRound[i % kRounds] * beside);
       return front_ ? std::clamp(a, -0.75f, 0.75f) : a;
     };
+    Interest interest;
+    for (const float part : {0.15f, 0.5f, 0.85f}) {
+      const float a = part * needle_arc_;
+      interest.add(transform(snapshot.active().needle.pose, {needle_radius_ * std::cos(a), needle_radius_ * std::sin(a), 0}),
+                   1);
+    }
+    interest.add(wanted, 0.7f);
     const auto cost = [&](size_t i) {
       const float raised = kUp[i / kRounds], a = azimuth_of(i), e = elevation + raised;
-      const Vec3 seen_from{std::cos(e) * std::sin(a), std::sin(e), std::cos(e) * std::cos(a)};
-      return hidden(snapshot, seen_from, wanted, half_wanted) + 0.35f * kRound[i % kRounds] * kRound[i % kRounds] +
-             3 * raised * raised;
+      return 1.5f * hidden(snapshot, look_at_from(wanted, a, e, half_wanted, fov_deg).eye, interest) +
+             0.35f * kRound[i % kRounds] * kRound[i % kRounds] + 3 * raised * raised;
     };
     size_t best = choice_;
     float least = cost(choice_) - (started_ ? 0.5f : 0);  // hysteresis, or it would oscillate

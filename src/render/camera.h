@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // render/camera: the camera of images and films. Reads the model and snapshots; writes nothing.
 #pragma once
+#include <optional>
+#include <string>
+
 #include "core/math.h"
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
@@ -23,6 +26,14 @@ Camera eye_camera(const Pose& eye, const Frustum& frustum, float work);
 
 // The whole operating field from the surgeon's side.
 Camera overview(const PictureModel& model);
+
+// A close view of the decisive thing of a moment (the needle in the wall, the turns of a throw, a knot, the finished repair)
+// from the side where tools and tissue hide least of it. Without memory: the same snapshot gives the same view.
+Camera close_up(const PictureModel& model, const Snapshot& snapshot);
+
+// A view that does not move: "overview", "front", "left", "right", "top", or six numbers "X,Y,Z,X,Y,Z" [m], the eye and the
+// point it looks at. None for other names.
+std::optional<Camera> fixed_camera(const std::string& name, const PictureModel& model);
 
 // Looks at the work from outside the organ and slowly orbits with it. All motion is smoothed and its turning speed
 // is bounded, so that a regrasped needle or a skip in time never causes a jump.
@@ -48,6 +59,7 @@ struct FollowCamera {
   float lift_ = 0;                    // [rad] above `elevation`, current
   float half_ = 0;                    // [m] half the image's height, current
   bool front_ = false;                // stays on the surgeon's side: two bowel ends lie across the field
+  float needle_radius_, needle_arc_;  // [m], [rad] of the first suture
   bool started_ = false;
 };
 

@@ -50,6 +50,7 @@ struct Pictures::Studio {
   FollowCamera follow;
   Camera camera;
   std::optional<Pose> head;
+  std::optional<Camera> fixed;
   double next_s = 0, last_s = -1, last_moment_s = 0;  // [s] simulated
   size_t frame = 0;
   std::vector<SheetCell> moment;
@@ -60,23 +61,26 @@ struct Pictures::Studio {
 
   Studio(const PictureOptions& o, const PictureModel& m) : options(o), follow(m), camera(overview(m)), model(m) {
     std::sort(options.still.begin(), options.still.end(), std::greater<>());  // the next one last
+    fixed = fixed_camera(o.camera, m);
     renderer = make_renderer(model, o.width, o.height, Quality::low);
     if (!o.video.empty()) film = std::make_unique<VideoWriter>(o.video, o.width, o.height, o.rate);
     if (!o.frames.empty()) std::filesystem::create_directories(o.frames);
   }
 
   static std::string caption_of(const Snapshot& seen, const std::string& caption) {
-    return fmt::format("{:6.1f} s   {}", seen.time_s, caption);
+    return caption.empty() ? fmt::format("{:6.1f} s", seen.time_s) : fmt::format("{:6.1f} s   {}", seen.time_s, caption);
   }
 
-  Image take(const Snapshot& seen, const std::string& caption) {
+  // Without caption: the caller adds it where it is shown once.
+  Image take(const Snapshot& seen) {
     // The camera eases in film time: its motion is smooth at any time-lapse factor.
     const double dt = last_s < 0 ? 0 : (seen.time_s - last_s) / options.speed;
     last_s = seen.time_s;
-    camera = head ? head_camera() : follow.update(seen, static_cast<float>(dt));
-    Overlay overlay;
-    overlay.caption = caption;
-    return renderer->render(seen, camera, overlay);
+    camera = head                        ? head_camera()
+             : fixed                     ? *fixed
+             : options.camera == "close" ? close_up(model, seen)
+                                         : follow.update(seen, static_cast<float>(dt));
+    return renderer->render(seen, camera, {});
   }
 
   // Narrower than a headset's view: the part that the wearer looks at.
@@ -95,7 +99,11 @@ struct Pictures::Studio {
   // From the best viewpoint at that moment, independent of the film's camera.
   void take_still(const Snapshot& seen) {
     if (!still_renderer) still_renderer = make_renderer(model, options.still_width, options.still_height, Quality::high);
-    write_png(still_renderer->render(seen, FollowCamera(model).update(seen, 0)), options.still.back().second);
+    const Camera from = head                         ? head_camera()
+                        : fixed                      ? *fixed
+                        : options.camera == "follow" ? FollowCamera(model).update(seen, 0)
+                                                     : close_up(model, seen);
+    write_png(still_renderer->render(seen, from), options.still.back().second);
     options.still.pop_back();
   }
 
@@ -106,22 +114,36 @@ struct Pictures::Studio {
     const bool frame_due = (film || !options.frames.empty()) && seen.time_s >= next_s;
     if (sheet || frame_due) {
       const std::string caption = caption_of(seen, doing);
-      Image picture = take(seen, frame_due ? caption : std::string());
+      Image picture = take(seen);
+      if (sheet) keep(picture, caption), last_moment_s = seen.time_s;
       if (frame_due) {
         next_s += options.speed / options.rate;
         next_s = std::max(next_s, seen.time_s);  // slower than the film's rate: frames are skipped
-        if (film) film->add(picture);
-        if (!options.frames.empty()) write_png(picture, fmt::format("{}/frame_{:05}.png", options.frames, frame++));
+        add_frame(picture, caption);
       }
-      if (sheet) keep(std::move(picture), caption), last_moment_s = seen.time_s;
     }
-    if (!options.contact_sheet.empty()) {
+    if (!options.contact_sheet.empty() || film || !options.frames.empty()) {
       last = seen;
       last_caption = caption_of(seen, doing);
     }
   }
 
+  void add_frame(Image& picture, const std::string& caption) {
+    draw_caption(picture, caption);
+    if (film) film->add(picture);
+    if (!options.frames.empty()) write_png(picture, fmt::format("{}/frame_{:05}.png", options.frames, frame++));
+  }
+
+  // The state at the end, in close-up: one picture, held.
+  Image last_picture() { return renderer->render(last, head || fixed ? camera : close_up(model, last)); }
+
   void finish() {
+    if ((film || !options.frames.empty()) && last.tick > 0 && options.end_s > 0) {
+      Image picture = last_picture();
+      draw_caption(picture, last_caption);
+      const int count = static_cast<int>(options.end_s * options.rate);
+      for (int i = 0; i < count; ++i) add_frame(picture, {});
+    }
     if (film) film->finish();
     if (!options.contact_sheet.empty() && !moment.empty()) write_sheet();
     if (!options.still.empty())
@@ -132,7 +154,7 @@ struct Pictures::Studio {
   }
 
   void write_sheet() {
-    moment.push_back({take(last, {}), last_caption});
+    moment.push_back({last_picture(), last_caption});
     std::vector<SheetCell> cell;
     const size_t n = std::min(kSheetCells, moment.size());
     for (size_t i = 0; i < n; ++i) cell.push_back(moment[n == 1 ? 0 : i * (moment.size() - 1) / (n - 1)]);

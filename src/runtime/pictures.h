@@ -21,7 +21,11 @@ struct PictureOptions {
   double speed = 4;  // simulated seconds per second of film
   double rate = 30;  // pictures per second of film
   int width = 640, height = 360;
-  int still_width = 1280, still_height = 800;
+  int still_width = 1920, still_height = 1080;
+  // "follow", "close" or a name of fixed_camera (render/camera.h). Empty: films follow the work, stills and the film's end are
+  // close-ups.
+  std::string camera;
+  double end_s = 2;  // [s] of film: the last state in close-up
   bool any() const { return !frames.empty() || !video.empty() || !contact_sheet.empty() || !still.empty(); }
 };
 
@@ -35,6 +39,7 @@ class Pictures {
 
   // Before tick(): from now on the camera is the head of a headset's wearer [world].
   void look_from(const Pose& head);
+  // caption: what is being done; may be empty.
   void tick(const Snapshot& seen, const std::string& caption);
   void finish();  // completes the film and the contact sheet; throws InputError
 
