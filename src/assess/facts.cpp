@@ -21,6 +21,11 @@ double degrees_to_surface(Vec3 direction, Vec3 normal) {
   return portable::asin(std::min(1.0, std::abs(static_cast<double>(dot(direction, normal))))) * kDegrees;
 }
 
+double angle_between(Quat a, Quat b) {  // [rad]
+  const Quat d = conjugate(a) * b;
+  return 2 * portable::acos(std::min(1.0, std::abs(static_cast<double>(d.w))));
+}
+
 SutureFacts& suture_of(Facts& f, uint32_t which) {
   if (which >= f.suture.size()) f.suture.resize(which + 1);
   return f.suture[which];
@@ -56,6 +61,7 @@ void start_bite(Facts& f, const PictureModel& picture, const Snapshot& seen, con
   OpenBite open;
   open.suture = e.suture, open.number = e.which, open.entered = e.tick;
   open.entry_angle = angle_of(f, picture, seen, view.needle, bite.wall, bite.entry);
+  open.turned = view.needle.pose.q;
   for (const ToolView& tool : seen.tool)
     if (tool.held == Held::needle && tool.held_suture == e.suture && e.suture < picture.suture.size()) {
       open.grasp_at = static_cast<double>(tool.held_at);
@@ -108,6 +114,7 @@ void finish_bite(Facts& f, const PictureModel& picture, const Snapshot& seen, co
     b.entered = open->entered;
     b.entry_angle = open->entry_angle, b.exit_angle = open->exit_angle;
     b.grasp_at = open->grasp_at, b.grasp_angle = open->grasp_angle;
+    b.drive_speed = open->drive_speed;
     if (open->ticks > 0) {
       const double n = open->ticks;
       double mean2 = 0;
@@ -184,7 +191,12 @@ void note_event(Facts& f, const PictureModel& picture, const Snapshot& seen, con
         if (o.suture == e.suture && o.number == e.which && e.suture < seen.suture.size() &&
             e.which < seen.suture[e.suture].bite.size()) {
           const BiteView& bite = seen.suture[e.suture].bite[e.which];
-          o.exit_angle = angle_of(f, picture, seen, seen.suture[e.suture].needle, bite.wall, bite.exit);
+          const NeedleView& needle = seen.suture[e.suture].needle;
+          o.exit_angle = angle_of(f, picture, seen, needle, bite.wall, bite.exit);
+          if (!o.out && e.tick > o.entered && e.suture < picture.suture.size())
+            o.drive_speed = angle_between(o.turned, needle.pose.q) *
+                            static_cast<double>(picture.suture[e.suture].needle_radius) * kMm /
+                            (static_cast<double>(e.tick - o.entered) * f.setup.tick_s);
           o.out = true;
         }
       return;
@@ -250,7 +262,7 @@ void note_hand(Facts& f, size_t k, const PictureModel& picture, const Snapshot& 
   const double dt = f.setup.tick_s;
   if ((seen.tick - f.first) % f.stride == 0) {
     const bool here = input.hand[k].connected != 0;
-    hand.position.push_back(here || hand.position.empty() ? input.hand[k].pose.p : hand.position.back());
+    f.path[k].push_back(here || f.path[k].empty() ? input.hand[k].pose.p : f.path[k].back());
   }
   const float strain = length(tool.force);
   if (strain > hand.strain) hand.strain = strain, hand.strain_tick = seen.tick, hand.strain_where = tool.pose.p;
@@ -337,6 +349,12 @@ void note(Facts& f, const PictureModel& picture, const Snapshot& seen, const Tic
   follow_bites(f, picture, seen);
   for (size_t k = 0; k < f.hand.size(); ++k) note_hand(f, k, picture, seen, input);
   note_tension(f, seen);
+}
+
+void rewind(Facts& f, const Tally& then) {
+  static_cast<Tally&>(f) = then;
+  const size_t samples = then.begun ? static_cast<size_t>((then.last - then.first) / f.stride) + 1 : 0;
+  for (std::vector<Vec3>& path : f.path) path.resize(std::min(path.size(), samples));
 }
 
 }  // namespace catgut::assess

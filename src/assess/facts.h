@@ -6,7 +6,7 @@
 //   for every tick: note(facts, picture, seen, input);
 //   Result result = measure(facts, picture, seen);   // assess/metrics.h
 //
-// Facts are copied as they are: a copy is kept with a saved state, and an undone bite restores it.
+// A Tally is kept with a saved state; rewind() takes the Facts back to it, as an undone bite does.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -41,12 +41,13 @@ struct OpenBite {
   std::array<double, 3> sum{};  // of the needle's center
   double squares = 0;
   uint32_t ticks = 0;
+  Quat turned;  // the needle's orientation at entry
+  double drive_speed = kNotObserved;
   bool out = false;  // the tip has left
 };
 
 struct HandFacts {
-  std::vector<Vec3> position;  // [m] of the hand, one per `stride` ticks
-  float peak = 0;              // [N] largest force on the tissue held
+  float peak = 0;  // [N] largest force on the tissue held
   uint64_t peak_tick = 0;
   Vec3 peak_where;
   double impulse = 0;  // [N s] on the tissue held
@@ -72,15 +73,12 @@ struct SutureFacts {
   bool overloaded = false;
 };
 
-struct Facts {
-  Setup setup;
-  std::vector<StitchEdge> edge;   // of each wall, at rest
-  std::vector<RestSurface> rest;  // one
-  bool begun = false;             // a hand has connected
-  uint64_t first = 0, last = 0;   // ticks with hands
-  uint32_t stride = 1;            // ticks between two samples of the hands
-  std::vector<double> lumen;      // [m^2] area of each rim when the hands connected
-  float opening = 0;              // [m^2] likewise
+// What a session has come to, without what never changes and without the paths of the hands.
+struct Tally {
+  bool begun = false;            // a hand has connected
+  uint64_t first = 0, last = 0;  // ticks with hands
+  std::vector<double> lumen;     // [m^2] area of each rim when the hands connected
+  float opening = 0;             // [m^2] likewise
   std::vector<Bite> bite;
   std::vector<Knot> knot;
   std::vector<OpenBite> open;
@@ -91,8 +89,18 @@ struct Facts {
       overload, tissue_grasp;
 };
 
+struct Facts : Tally {
+  Setup setup;
+  std::vector<StitchEdge> edge;           // of each wall, at rest
+  std::vector<RestSurface> rest;          // one
+  uint32_t stride = 1;                    // ticks between two samples of the hands
+  std::array<std::vector<Vec3>, 2> path;  // [m] of the right hand and the left, one per `stride` ticks
+};
+
 Facts begin_facts(const PictureModel& picture, const Setup& setup);
 void note(Facts& facts, const PictureModel& picture, const Snapshot& seen, const TickInput& input);
+
+void rewind(Facts& facts, const Tally& then);
 
 double rim_area(const PictureModel& picture, const std::vector<Vec3>& particle, size_t wall);  // [m^2]
 // The knot's kind from the chirality of its throws and their strands; the first throw is the one at the tissue.

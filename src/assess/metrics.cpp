@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "assess/motion.h"
 #include "core/elementary.h"
@@ -24,6 +25,8 @@ constexpr const char* kErrors = "observed suturing errors: Van Sickle, PMC770937
 constexpr const char* kSmooth = "Balasubramanian 2015, 10.1186/s12984-015-0090-9";
 constexpr const char* kMotion = "hand motion: Sensors 2023 23:3146 and Singh 2021, 10.3389/frobt.2021.625003";
 constexpr const char* kStay = "hand-sutured anastomosis: Sankaranarayanan 2023, 10.1007/s00464-022-09584-1";
+constexpr const char* kDatta = "number of movements and time in bowel anastomosis: Datta 2001, 10.1016/s1072-7515(01)01041-9";
+constexpr const char* kTracked = "velocity, acceleration, jerk of tracked hands: PMC12953238";
 constexpr const char* kOwn = "Catgut";
 
 // clang-format off
@@ -48,6 +51,8 @@ constexpr MetricRow kRow[] = {
     {"edge_angle_spread", "evenness of the direction", "bite", "deg", lower, spread, "as edge_angle", kOwn},
 
     {"drive_time", "time of a bite", "needle", "s", lower, mean, "from the tip's entry until the needle has left the wall", kMotion},
+    {"drive_speed", "speed of the needle", "needle", "mm/s", target, mean, "turn of the needle from the tip's entry to its exit, times its radius, over the time between", kMotion},
+    {"bite_time", "time for a bite", "needle", "s", lower, mean, "from the bite or knot before, or the start, until the bite is complete", kDatta},
     {"needle_wander", "needle off its curve", "needle", "mm", lower, mean, "root mean square distance of the needle circle's center from its mean while the tip is in tissue", kSeki},
     {"attempts", "attempts per bite", "needle", "", lower, mean, "entries of the tip until the bite is complete", kErrors},
     {"withdrawn", "withdrawn bites", "needle", "", lower, count, "the needle was withdrawn from an unfinished bite", kErrors},
@@ -65,6 +70,7 @@ constexpr MetricRow kRow[] = {
     {"throw_gap", "gap between throws", "knot", "mm", lower, maximum, "distance of a throw to the one below when it locks", "ATLAS task 6"},
     {"tail", "length of tails", "knot", "mm", target, mean, "thread from a cut to the nearest suture point or knot of a tied suture", "3 to 5 mm on bowel: unpublished convention"},
     {"throw_time", "time of a throw", "knot", "s", lower, mean, "from the pull through the loop to the lock", kMotion},
+    {"knot_time", "time for a knot", "knot", "s", lower, mean, "from the last bite, or the knot before, to the lock of the last throw", kDatta},
     {"undone_throws", "lost loops and throws", "knot", "", lower, count, "a loop came off, or a throw was released before its lock", kErrors},
     {"rejected_loops", "failed loops", "knot", "", lower, count, "thread around an instrument that did not make a loop", kErrors},
 
@@ -95,11 +101,16 @@ constexpr MetricRow kRow[] = {
     {"path_per_bite", "path per bite", "hands", "mm", lower, only, "path of both hands over completed bites", "Azari 2018, scholars.duke.edu/display/pub1534663"},
     {"idle", "idle hands", "hands", "", lower, mean, "share of the time in which the voluntary motion of a hand, below 2 Hz, is slower than 5 mm/s", kMotion},
     {"pause", "both hands idle", "hands", "", lower, only, "share of the time in which both hands are idle", kMotion},
+    {"hesitations", "hesitations", "hands", "", lower, count, "both hands are idle for at least 0.5 s", "\"frequently stopped operating\": flow of operation in OSATS, Martin 1997"},
+    {"movements", "movements", "hands", "", lower, count, "a hand is not idle for at least 0.3 s", kDatta},
+    {"hand_speed", "speed of a hand", "hands", "mm/s", target, mean, "mean speed of each movement", kTracked},
+    {"acceleration", "acceleration of a hand", "hands", "m/s^2", lower, mean, "root mean square of each movement", kTracked},
+    {"jerk", "jerk of a hand", "hands", "m/s^3", lower, mean, "root mean square of each movement", kTracked},
     {"ldlj", "log dimensionless jerk", "hands", "", higher, mean, "of each movement: a hand not idle for at least 0.3 s", kSmooth},
     {"sparc", "spectral arc length", "hands", "", higher, mean, "of each movement's speed, to 10 Hz, threshold 0.05", kSmooth},
-    {"submovements", "speed peaks", "hands", "1/s", lower, mean, "local maxima of a hand's speed in its movements, over their time", kSmooth},
+    {"submovements", "speed peaks", "hands", "1/s", lower, mean, "maxima of a hand's speed in its movements that stand out by 5 % of the movement's peak, over their time", kSmooth},
     {"tremor", "tremor", "hands", "mm", lower, mean, "root mean square of a hand's position less its path below 5 Hz, where the hand is idle for 0.1 s before and after", "Riviere 1997, kilthub.cmu.edu/articles/6621335"},
-    {"bimanual", "bimanual coordination", "hands", "", higher, only, "Pearson's correlation of the speeds of voluntary motion of both hands", kMotion},
+    {"bimanual", "bimanual coordination", "hands", "", higher, only, "Pearson's correlation of the speeds of voluntary motion of both hands, while any moves", kMotion},
     {"together", "both hands moving", "hands", "", higher, only, "time in which both hands move over the time in which any moves", kMotion},
 };
 // clang-format on
@@ -173,6 +184,11 @@ void measure_bites(const Facts& f, Sheet& sheet) {
     add("edge_angle", b.edge_angle);
     add("edge_angle_spread", b.edge_angle);
     add("drive_time", b.seconds);
+    add("drive_speed", b.drive_speed);
+    uint64_t since = i > 0 ? std::max(f.first, f.bite[i - 1].tick) : f.first;
+    for (const Knot& k : f.knot)
+      if (k.tick <= b.tick) since = std::max(since, k.tick);
+    add("bite_time", static_cast<double>(b.tick - since) * f.setup.tick_s);
     add("needle_wander", b.wander);
     add("attempts", b.attempts);
     add("needle_grasps", b.grasps);
@@ -212,6 +228,12 @@ void measure_knots(const Facts& f, Sheet& sheet) {
       if (row.seconds > 0) sheet.add("throw_time", row.seconds, row.tick, k.where, one);
       if (t > 0) opposite += row.hand != k.thrown[t - 1].hand && !row.sliding;
     }
+    uint64_t since = f.first;
+    for (const Bite& b : f.bite)
+      if (b.tick <= k.tick) since = std::max(since, b.tick);
+    for (const Knot& before : f.knot)
+      if (before.tick < k.tick) since = std::max(since, before.tick);
+    sheet.add("knot_time", static_cast<double>(k.tick - since) * f.setup.tick_s, k.tick, k.where, of);
     if (k.thrown.size() > 1)
       sheet.add("square", static_cast<double>(opposite) / static_cast<double>(k.thrown.size() - 1), k.tick, k.where, of);
   }
@@ -319,7 +341,7 @@ void measure_hands(const Facts& f, Sheet& sheet) {
   std::array<std::vector<double>, 2> speed, voluntary;
   double path = 0;
   for (size_t k = 0; k < 2; ++k) {
-    const std::vector<Vec3>& raw = f.hand[k].position;
+    const std::vector<Vec3>& raw = f.path[k];
     if (raw.size() < 5) continue;
     const std::string of = k == 0 ? "right hand" : "left hand";
     const std::vector<Vec3> smooth = low_pass(raw, kMotionCutoff, rate), slow = low_pass(raw, 5, rate);
@@ -342,9 +364,14 @@ void measure_hands(const Facts& f, Sheet& sheet) {
     if (still > 0) sheet.add("tremor", std::sqrt(shake / static_cast<double>(still)) * kMm, end, raw.back(), of);
     for (const Stretch& m : movements(voluntary[k], rate)) {
       const size_t n = m.end - m.first;
+      sheet.add("movements", static_cast<double>(n) / rate, tick_of(m.first), smooth[m.first], of);
+      const Roughness rough = roughness(std::span(smooth).subspan(m.first, n), rate);
+      sheet.add("hand_speed", rough.speed * kMm, tick_of(m.first), smooth[m.first], of);
+      sheet.add("acceleration", rough.acceleration, tick_of(m.first), smooth[m.first], of);
+      sheet.add("jerk", rough.jerk, tick_of(m.first), smooth[m.first], of);
       sheet.add("ldlj", ldlj(std::span(smooth).subspan(m.first, n), rate), tick_of(m.first), smooth[m.first], of);
       sheet.add("sparc", sparc(std::span(speed[k]).subspan(m.first, n), rate), tick_of(m.first), smooth[m.first], of);
-      for (size_t i = m.first + 1; i + 1 < m.end; ++i) peaks += speed[k][i] > speed[k][i - 1] && speed[k][i] >= speed[k][i + 1];
+      peaks += peaks_of(std::span(speed[k]).subspan(m.first, n), kPeakShare);
       moving += n;
     }
     if (moving > 0)
@@ -352,14 +379,20 @@ void measure_hands(const Facts& f, Sheet& sheet) {
   }
   if (!f.bite.empty()) sheet.add("path_per_bite", path * kMm / static_cast<double>(f.bite.size()), f.last, {});
   const size_t n = std::min(speed[0].size(), speed[1].size());
-  size_t none = 0, any = 0, both = 0;
+  size_t none = 0, any = 0, both = 0, still_for = 0;
+  std::array<std::vector<double>, 2> active;  // without the pauses, in which both hands rest alike
   for (size_t i = 0; i < n; ++i) {
     const bool r = voluntary[0][i] >= kIdleSpeed, l = voluntary[1][i] >= kIdleSpeed;
     none += !r && !l, any += r || l, both += r && l;
+    if (r || l) active[0].push_back(voluntary[0][i]), active[1].push_back(voluntary[1][i]);
+    if (!r && !l && ++still_for && i + 1 < n) continue;
+    const double seconds = static_cast<double>(std::exchange(still_for, 0)) / rate;
+    if (seconds >= kHesitation)
+      sheet.add("hesitations", seconds, tick_of(i) - static_cast<uint64_t>(seconds / f.setup.tick_s), f.path[0][i]);
   }
   if (n > 0) sheet.add("pause", static_cast<double>(none) / static_cast<double>(n), f.last, {});
   if (any > 0) sheet.add("together", static_cast<double>(both) / static_cast<double>(any), f.last, {});
-  sheet.add("bimanual", correlation(voluntary[0], voluntary[1]), f.last, {});
+  sheet.add("bimanual", correlation(active[0], active[1]), f.last, {});
 }
 
 }  // namespace
@@ -400,6 +433,18 @@ Result measure(const Facts& f, const PictureModel& picture, const Snapshot& seen
   r.metric = sheet.take();
   for (Metric& m : r.metric)
     std::stable_sort(m.sample.begin(), m.sample.end(), [](const Sample& a, const Sample& b) { return a.tick < b.tick; });
+  return r;
+}
+
+Result measure_stitches(const Facts& f) {
+  Result r;
+  r.technique = f.setup.technique;
+  r.tick_s = f.setup.tick_s;
+  r.ticks = f.last;
+  Sheet sheet;
+  measure_bites(f, sheet);
+  measure_knots(f, sheet);
+  r.metric = sheet.take();
   return r;
 }
 

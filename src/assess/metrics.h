@@ -32,6 +32,9 @@ const MetricRow* find_metric(std::string_view key);  // null: none
 // Everything but the head of the Result (names, version, hash), which the caller knows. seen: the last Snapshot.
 Result measure(const Facts& facts, const PictureModel& picture, const Snapshot& seen);
 
+// Of bites and knots only, which takes microseconds: for feedback after a stitch.
+Result measure_stitches(const Facts& facts);
+
 std::string metrics_markdown();  // the table of docs/assessment.md
 
 }  // namespace catgut::assess

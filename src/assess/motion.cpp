@@ -126,6 +126,37 @@ double sparc(std::span<const double> speed, double rate, double cutoff, double t
   return -length;
 }
 
+Roughness roughness(std::span<const Vec3> p, double rate) {
+  const size_t n = p.size();
+  if (n < 5) return {kNone, kNone, kNone};
+  const std::vector<double> v = speed_of(p, rate);
+  double speed = 0, second = 0, third = 0;
+  for (const double s : v) speed += s / static_cast<double>(n);
+  for (size_t i = 0; i + 3 < n; ++i)
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto at = [&](size_t k) { return static_cast<double>(p[k][axis]); };
+      const double a = (at(i + 2) - 2 * at(i + 1) + at(i)) * rate * rate;
+      const double j = (at(i + 3) - 3 * at(i + 2) + 3 * at(i + 1) - at(i)) * rate * rate * rate;
+      second += a * a, third += j * j;
+    }
+  const double intervals = static_cast<double>(n - 3);
+  return {speed, std::sqrt(second / intervals), std::sqrt(third / intervals)};
+}
+
+size_t peaks_of(std::span<const double> speed, double share) {
+  if (speed.empty()) return 0;
+  const double least = share * *std::max_element(speed.begin(), speed.end());
+  size_t n = 0;
+  bool rising = true;
+  double high = speed[0], low = speed[0];
+  for (const double v : speed) {
+    high = std::max(high, v), low = std::min(low, v);
+    if (rising && high - v > least) ++n, rising = false, low = v;
+    if (!rising && v - low > least) rising = true, high = v;
+  }
+  return n;
+}
+
 std::vector<Stretch> movements(std::span<const double> speed, double rate) {
   std::vector<Stretch> out;
   const auto least = static_cast<size_t>(kShortest * rate + 0.5);

@@ -18,6 +18,7 @@ constexpr double kVoluntaryCutoff = 2;  // [Hz]
 constexpr double kIdleSpeed = 0.005;    // [m/s] of voluntary motion; below it a hand is idle
 constexpr double kSettled = 0.1;        // [s] a hand is at rest when it is idle so long before and after
 constexpr double kShortest = 0.3;       // [s] shorter stretches of motion are not judged
+constexpr double kHesitation = 0.5;     // [s] shorter pauses of both hands are not counted
 
 std::vector<double> low_pass(std::span<const double> value, double cutoff, double rate);
 std::vector<Vec3> low_pass(std::span<const Vec3> value, double cutoff, double rate);
@@ -31,6 +32,16 @@ double ldlj(std::span<const Vec3> position, double rate);
 // Spectral arc length of a speed profile up to `cutoff` [Hz], from where the normalized spectrum last exceeds `threshold`; the
 // spectrum is interpolated sixteen-fold by zeros. Nearer to zero is smoother.
 double sparc(std::span<const double> speed, double rate, double cutoff = 10, double threshold = 0.05);
+
+// Mean speed, and root mean square of acceleration and jerk, by finite differences; not a number for fewer than 5 samples.
+struct Roughness {
+  double speed, acceleration, jerk;  // [m/s], [m/s^2], [m/s^3]
+};
+Roughness roughness(std::span<const Vec3> position, double rate);
+
+// Maxima that rise above the minima on both sides by at least `share` of the greatest value. Noise makes none.
+constexpr double kPeakShare = 0.05;  // as the threshold of the spectral arc length
+size_t peaks_of(std::span<const double> speed, double share);
 
 // Stretches [first, end) in which the speed stays above kIdleSpeed for at least kShortest.
 struct Stretch {

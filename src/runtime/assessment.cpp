@@ -7,6 +7,14 @@
 
 namespace catgut {
 
+assess::Setup assess_setup(const SceneSpec& scene) {
+  assess::Setup setup;
+  setup.tick_s = 1 / static_cast<double>(scene.solver.tick_rate);
+  setup.wall = scene.body.empty() ? 0 : static_cast<double>(scene.body[0].wall) * 1000;
+  setup.technique = scene.technique.name;
+  return setup;
+}
+
 Assessor::Assessor(const SceneSpec& scene) : scene_(scene) {}
 
 void Assessor::attach(SessionHooks& hooks) {
@@ -14,11 +22,7 @@ void Assessor::attach(SessionHooks& hooks) {
   hooks.on_start = [this, start](const PictureModel& picture) {
     if (start) start(picture);
     picture_ = picture;
-    assess::Setup setup;
-    setup.tick_s = 1 / static_cast<double>(scene_.solver.tick_rate);
-    setup.wall = scene_.body.empty() ? 0 : static_cast<double>(scene_.body[0].wall) * 1000;
-    setup.technique = scene_.technique.name;
-    facts_ = assess::begin_facts(picture_, setup);
+    facts_ = assess::begin_facts(picture_, assess_setup(scene_));
   };
   const auto tick = hooks.on_tick;
   hooks.on_tick = [this, tick](const Snapshot& seen, const std::string& doing) {

@@ -27,6 +27,8 @@ class Assessor {
   Snapshot last_;
 };
 
+assess::Setup assess_setup(const SceneSpec& scene);
+
 // The rubric that is meant by `--rubric`: a name or path; empty: that of the technique, if there is one.
 std::vector<assess::Rubric> rubrics_for(const std::string& name, const SceneSpec& scene);
 

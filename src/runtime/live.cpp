@@ -74,6 +74,7 @@ void Live::Work::begin() {
   for (ToolInput& hand : input.hand) hand.connected = 0;
   record_from_here();
   map = start_map(picture, dt);
+  begin_assessment();
   publish(*model, *state, now);
   before = now;
   published.paused = options.start_paused;
@@ -88,6 +89,7 @@ void Live::Work::record_from_here() {
   recorder = std::make_unique<Recorder>(path, RecordingHeader{catgut_version(), kStateVersion, write_scene(scene)},
                                         save_state(*model, *state));
   result.recorded.push_back(path);
+  result.recorded_from.push_back(now.tick);
 }
 
 void Live::Work::tick(bool let_in) {
@@ -150,6 +152,7 @@ void Live::Work::tick(bool let_in) {
   if (let_in) {
     update(published.metrics, now, static_cast<float>(dt));
     note(map, picture, now);
+    assess_tick();
     observe();
   }
   for (const Event& e : now.event) {
@@ -227,6 +230,7 @@ void Live::Work::go_back(const Moment& to) {
   publish(*model, *state, now);
   before = now;
   rewind(map, now.tick);
+  assess::rewind(facts, to.tally);
   input.hand = to.hand;
   const uint32_t undos = published.metrics.undos;
   published.reading = published.reading || (options.tutorial && to.procedure.stage != published.procedure.stage);
@@ -390,6 +394,7 @@ void Live::Work::run() {
   published.fault.swap(result.fault);
   result.metrics = published.metrics;
   result.procedure = published.procedure;
+  finish_assessment();
   result.map = std::move(map);
   result.state_hash = hash_state(*model, *state);
   try {
@@ -453,6 +458,7 @@ bool Live::look(Snapshot& out, double at_s) {
 
 const LiveStatus& Live::status() const { return work_->status; }
 bool Live::event(Event& out) { return work_->events.pop(out); }
+bool Live::remark(assess::Remark& out) { return work_->remarks.pop(out); }
 
 LiveResult Live::finish() {
   work_->quit = true;

@@ -13,6 +13,9 @@
 #include <string>
 #include <vector>
 
+#include "assess/feedback.h"
+#include "assess/result.h"
+#include "assess/rubric.h"
 #include "assess/stitch_map.h"
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
@@ -54,6 +57,10 @@ struct LiveOptions {
   std::shared_ptr<const Procedure> procedure;  // observed tick by tick; null: none
   size_t stage = 0;       // the first one: from its saved state, or after the surgeon has done those before
   bool tutorial = false;  // time stands still at a new stage until begin_stage
+  // The session is measured tick by tick, and scored by these rubrics at its end. remarks: also after every stitch and throw,
+  // by the first one, see remark().
+  std::vector<assess::Rubric> rubric;
+  bool remarks = false;
   // Haptic devices, as read_arm_choice (runtime/haptics) reads them; empty or "off": none. Problems are reported and the scene
   // opens without. The window controls hands without a device.
   std::string haptics;
@@ -102,7 +109,9 @@ struct LiveResult {
   ProcedureRun procedure;  // not begun: none
   uint64_t ticks = 0;      // all computed ticks, undone ones included
   uint64_t state_hash = 0;
-  std::vector<std::string> recorded;  // files written: a restart or an undone bite starts the next one (NAME.2.cgrec ...)
+  std::vector<std::string> recorded;    // files written: a restart or an undone bite starts the next one (NAME.2.cgrec ...)
+  std::vector<uint64_t> recorded_from;  // tick of the start state of each
+  assess::Result assessment;            // of what the hands did; undone bites are left out
   std::string fault;
 };
 
@@ -142,6 +151,7 @@ class Live {
   bool look(Snapshot& out, double at_s);  // as of the moment `at_s` on wall_seconds(): of a headset's display grid
   const LiveStatus& status() const;       // as of the last look()
   bool event(Event& out);                 // the next event; false: none for now
+  bool remark(assess::Remark& out);       // the next remark on a stitch or throw; false: none for now
 
   LiveResult finish();  // stops and closes the recording
 

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "assess/facts.h"
 #include "exchange/latest.h"
 #include "exchange/ring.h"
 #include "runtime/force_curves.h"
@@ -31,6 +32,7 @@ struct Moment {
   HandInputs hand;
   SessionMetrics metrics;
   ProcedureRun procedure;
+  assess::Tally tally;
 };
 
 struct BiteMoment {
@@ -81,6 +83,7 @@ struct Live::Work {
   Latest<Pose> head_box;                                   // window -> physics
   Latest<LiveView> view_box;                               // physics -> window
   Ring<Event, 1024> events;                                // physics -> window
+  Ring<assess::Remark, 64> remarks;                        // physics -> window
   std::thread thread;
 
   // --- owned by the window -----------------------------------------------------------------------------------------------
@@ -107,6 +110,7 @@ struct Live::Work {
   Snapshot before, now;
   LiveStatus published;
   StitchMap map, learner_map;
+  assess::Facts facts;
   Moment settled, learner;
   uint64_t settled_tick = 0;
   std::vector<std::optional<Moment>> stage_begin;  // of the stages from which a later one is demonstrated
@@ -138,6 +142,9 @@ struct Live::Work {
   void end_demonstration();
   void prepare();
   void observe();
+  void begin_assessment();
+  void assess_tick();
+  void finish_assessment();
   void remember_stage();
   void record_from_here();
   void forget_pace() { wall_s = simulated_s = 0; }
@@ -148,7 +155,7 @@ struct Live::Work {
       if (haptics->present(arm) && hand_of(arm) == hand) return static_cast<int>(arm);
     return -1;
   }
-  Moment moment() const { return {save_state(*model, *state), input.hand, published.metrics, published.procedure}; }
+  Moment moment() const { return {save_state(*model, *state), input.hand, published.metrics, published.procedure, facts}; }
 };
 
 }  // namespace catgut

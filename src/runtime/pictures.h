@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // runtime: the pictures of a run: single frames, a time-lapse film, a contact sheet. Reads snapshots during the run;
-// writes files. The only file above the render room that uses the renderer.
+// writes files. With clips.h the only file above the render room that uses the renderer.
 #pragma once
 #include <memory>
 #include <string>

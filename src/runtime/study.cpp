@@ -313,23 +313,29 @@ std::string study_report(const StudyPlan& plan, const std::string& folder) {
     out += "\n";
     struct Line {
       double auc;
+      bool against;
       std::string text;
     };
     std::vector<Line> lines;
     const auto add = [&](size_t k, const std::string& name, const char* unit) {
       double auc = area_under_curve(column(of[first], k), column(of[last], k));
+      // The first level is expected to have more where less is better. A separation the other way round is shown, not counted.
+      const bool known = k >= kFirstMetric && assess::metric_rows()[k - kFirstMetric].better != assess::Better::target;
+      const bool less = known && assess::metric_rows()[k - kFirstMetric].better == assess::Better::lower;
+      const bool against = known && std::isfinite(auc) && (less ? auc > 0.5 : auc < 0.5);
       if (std::isfinite(auc)) auc = std::max(auc, 1 - auc);
-      std::string text = fmt::format("| {} | {} | {} |", name, unit, std::isfinite(auc) ? fmt::format("{:.2f}", auc) : "-");
+      std::string text = fmt::format("| {} | {} | {}{} |", name, unit, std::isfinite(auc) ? fmt::format("{:.2f}", auc) : "-",
+                                     against && auc > 0.55 ? " against" : "");
       for (const std::string& who : plan.surgeon) {
         const double m = median_of(column(of[who], k));
         text += std::isfinite(m) ? fmt::format(" {:.3g} |", m) : " - |";
       }
-      lines.push_back({std::isfinite(auc) ? auc : -1, text + "\n"});
+      lines.push_back({std::isfinite(auc) ? auc : -1, against, text + "\n"});
     };
     add(kScore, "**score**", "%");
     for (size_t k = kFirstMetric; k < columns.size(); ++k)
       add(k, fmt::format("`{}`", columns[k]), assess::metric_rows()[k - kFirstMetric].unit);
-    const auto good = std::count_if(lines.begin() + 1, lines.end(), [](const Line& l) { return l.auc >= 0.95; });
+    const auto good = std::count_if(lines.begin() + 1, lines.end(), [](const Line& l) { return l.auc >= 0.95 && !l.against; });
     std::stable_sort(lines.begin() + 1, lines.end(), [](const Line& a, const Line& b) { return a.auc > b.auc; });
     for (const Line& l : lines) out += l.text;
     out += "\nRuns:";

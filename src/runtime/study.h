@@ -59,7 +59,7 @@ std::string study_table(const StudyPlan& plan, const std::string& folder);
 double area_under_curve(const std::vector<double>& a, const std::vector<double>& b);
 
 // For each scene: the AUC of the score and of every metric between the first and the last surgeon of the plan, and medians of
-// all, as Markdown. direction-free: 0.5 useless, 1 perfect.
+// all, as Markdown. 0.5 useless, 1 perfect; "against": it separates against the metric's stated direction, and is not counted.
 std::string study_report(const StudyPlan& plan, const std::string& folder);
 
 }  // namespace catgut

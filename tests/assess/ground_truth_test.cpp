@@ -8,6 +8,7 @@
 #include <functional>
 #include <set>
 
+#include "assess/feedback.h"
 #include "assess/metrics.h"
 #include "assess/rubric.h"
 #include "procedure/scene_file.h"
@@ -212,6 +213,19 @@ class Session {
     return r;
   }
   Snapshot& seen() { return seen_; }
+  const Facts& facts() const { return facts_; }
+  // As an undone bite: state and facts of that moment, with the paths of the hands in place.
+  void go_back_to(const Session& then) {
+    rewind(facts_, then.facts_);
+    seen_ = then.seen_;
+  }
+  // Holds the needle with its tip on the serosa, at an angle to it.
+  void aim(uint32_t wall, double edge_mm, double tilt) {
+    const Vec3 in = on_serosa(wall, edge_mm, 20);
+    SutureView& s = seen_.active();
+    s.needle.pose = needle_through(in, 20, Vec3{1, 0, 0}, tilt, true);
+    seen_.tool[0].held = Held::needle, seen_.tool[0].held_at = 0.3f;
+  }
   bool all_idle = false;
   float shake = 0;  // [m]
 
@@ -478,6 +492,68 @@ TEST(InjectedErrors, each_is_found) {
     EXPECT_GT(found->tick, 0u) << e.name;
     EXPECT_NE(found->why.find("required"), std::string::npos) << e.name;
   }
+}
+
+// --- feedback while sewing -----------------------------------------------------------------------------------------------
+
+TEST(Feedback, cues_give_the_numbers_of_a_bite_that_would_begin_now) {
+  const CueSource source = cue_source(world().picture, static_cast<double>(kWall) * 1000);
+  const auto text_of = [](const std::vector<Cue>& cues, std::string_view name) {
+    for (const Cue& c : cues)
+      if (c.text.rfind(name, 0) == 0) return c;
+    return Cue{"none", false};
+  };
+  Session s;
+  s.aim(0, 4, 75);
+  const std::vector<Cue> good = cues_now(interrupted(), source, world().picture, s.seen());
+  EXPECT_EQ(text_of(good, "edge").text.substr(0, 11), "edge 4.0 mm");
+  EXPECT_TRUE(text_of(good, "edge").good);
+  EXPECT_EQ(text_of(good, "entry angle").text.substr(0, 14), "entry angle 75");
+  s.aim(1, 9, 30);
+  const std::vector<Cue> bad = cues_now(interrupted(), source, world().picture, s.seen());
+  EXPECT_EQ(text_of(bad, "edge").text.substr(0, 11), "edge 9.0 mm");
+  EXPECT_FALSE(text_of(bad, "edge").good);
+  EXPECT_FALSE(text_of(bad, "entry angle").good);
+  SuturePointView pulled;
+  pulled.tension_needle = 3;
+  s.seen().active().suture_point.push_back(pulled);
+  EXPECT_FALSE(text_of(cues_now(interrupted(), source, world().picture, s.seen()), "thread 3.0 N").good);
+  s.seen().tool[0].held = Held::nothing;
+  s.seen().active().suture_point.clear();
+  EXPECT_TRUE(cues_now(interrupted(), source, world().picture, s.seen()).empty()) << "without a needle in a hand: silence";
+}
+
+TEST(Feedback, a_remark_follows_the_stitch_that_left_its_band) {
+  Session s;
+  Plan good;
+  good.edge_in = 4, good.edge_out = 3.5, good.wall = 0;
+  s.bite(good);
+  const uint64_t first = s.seen().tick;
+  const std::vector<Remark> nothing_wrong = remarks_since(interrupted(), s.facts(), 0);
+  ASSERT_EQ(nothing_wrong.size(), 1u) << nothing_wrong[0].text;
+  EXPECT_TRUE(nothing_wrong[0].good);
+  Plan far = good;
+  far.edge_in = 13, far.angle_in = far.angle_out = 12;
+  s.bite(far);
+  const std::vector<Remark> wrong = remarks_since(interrupted(), s.facts(), first);
+  ASSERT_FALSE(wrong.empty());
+  EXPECT_NE(wrong[0].text.find("13"), std::string::npos) << wrong[0].text;
+  for (const Remark& r : wrong) EXPECT_TRUE(!r.good && r.tick > first) << r.text;
+}
+
+TEST(Feedback, facts_taken_back_and_continued_give_the_bytes_of_the_straight_way) {
+  Session straight, detour;
+  Plan a, b, c;
+  a.edge_in = 4, b.edge_in = 12, b.attempts = 3, c.edge_in = 5, c.angle_in = c.angle_out = 15;
+  straight.bite(a), detour.bite(a);
+  const Session then = detour;
+  detour.bite(b);
+  detour.tension(5);
+  EXPECT_NE(result_json(detour.result()), result_json(then.result()));
+  detour.go_back_to(then);
+  EXPECT_EQ(result_json(detour.result()), result_json(then.result()));
+  straight.bite(c), detour.bite(c);
+  EXPECT_EQ(result_json(detour.result()), result_json(straight.result()));
 }
 
 TEST(Result, equal_sessions_give_equal_bytes) {

@@ -104,6 +104,32 @@ TEST(Motion, the_filter_passes_slow_and_stops_fast_motion_without_delay) {
   for (const double v : low_pass(std::vector<double>(50, 3.0), 10, 60)) EXPECT_NEAR(v, 3, 1e-12);
 }
 
+TEST(Motion, roughness_of_a_circle_is_that_of_the_formula) {
+  // Radius 50 mm, 1 turn per second: speed 2 pi r, acceleration and jerk each times 2 pi.
+  std::vector<Vec3> p;
+  for (int i = 0; i < 600; ++i) {
+    const double a = 6.283185307179586 * i / 120;
+    p.push_back({static_cast<float>(0.05 * std::cos(a)), static_cast<float>(0.05 * std::sin(a)), 0});
+  }
+  const Roughness r = roughness(p, 120);
+  EXPECT_NEAR(r.speed, 0.05 * 6.2832, 0.002);
+  EXPECT_NEAR(r.acceleration, 0.05 * 39.478, 0.02);
+  EXPECT_NEAR(r.jerk, 0.05 * 248.05, 0.5);
+}
+
+TEST(Motion, only_peaks_that_stand_out_are_counted) {
+  std::vector<double> v;
+  for (int i = 0; i < 300; ++i) {
+    const double t = i / 100.0;
+    // Three strokes; a ripple of 2 % of the peak, as of noise.
+    v.push_back(std::abs(std::sin(3.14159265 * t)) + 0.02 * std::sin(6.2831853 * 12 * t));
+  }
+  EXPECT_EQ(peaks_of(v, 0.05), 3u);
+  for (size_t i = 0; i < v.size(); ++i) v[i] += 0.1 * std::sin(6.2831853 * 8 * static_cast<double>(i) / 100);
+  EXPECT_GT(peaks_of(v, 0.05), 15u);
+  EXPECT_EQ(peaks_of({}, 0.05), 0u);
+}
+
 TEST(Motion, movements_are_separated_by_rest) {
   std::vector<double> v(300, 0);
   for (size_t i = 30; i < 90; ++i) v[i] = 0.1;
