@@ -207,7 +207,7 @@ class Session {
     seen_.tool[1].held = Held::nothing;
   }
 
-  Result result() {
+  Result result() const {
     Result r = measure(facts_, world().picture, seen_);
     r.ticks = seen_.tick;
     return r;
