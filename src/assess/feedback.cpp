@@ -48,11 +48,13 @@ void aim(Cues& cues, const CueSource& source, const PictureModel& picture, const
   SurfacePoint best;
   uint32_t wall = 0;
   Quat turned{};
+  float nearest = kNear;
   for (uint32_t w = 0; w < picture.rim.size(); ++w) {
     Quat q{};
-    const SurfacePoint s = source.rest[0].serosa(w, at_rest(picture, seen, w, tip, &q));
-    if (s.valid && std::abs(s.below) < kNear && (!best.valid || std::abs(s.below) < std::abs(best.below)))
-      best = s, wall = w, turned = q;
+    const Vec3 rest = at_rest(picture, seen, w, tip, &q);
+    const SurfacePoint s = source.rest[0].serosa(w, rest);
+    if (const float off = s.valid ? distance(s.point, rest) : kNear; off < nearest)
+      nearest = off, best = s, wall = w, turned = q;
   }
   if (!best.valid || wall >= source.edge.size() || source.edge[wall].point.empty()) return;
   const StitchEdge& edge = source.edge[wall];
