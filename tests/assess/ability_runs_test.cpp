@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/assess: an ability that is turned on alone is found by its own metric in a simulated session. Some seconds of a session in
-// every build; CATGUT_LONG=1 (the nightly run): whole sessions, with knots.
+// tests/assess: an ability that is turned on alone is found by its own metric in a simulated session. Some seconds of a session
+// in every build; CATGUT_LONG=1 (the nightly run): whole sessions, with knots.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
