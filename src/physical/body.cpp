@@ -23,15 +23,6 @@ Corners corners_of(const wall::Model& m, const wall::Topology& t, uint32_t face)
   return c;
 }
 
-// Closest points of two segments, as fractions.
-void nearest_of_segments(Vec3 a, Vec3 b, Vec3 c, Vec3 d, float& s, float& t) {
-  const Vec3 u = b - a, v = d - c, r = a - c;
-  const float uu = dot(u, u), vv = dot(v, v), uv = dot(u, v), det = uu * vv - uv * uv;
-  s = det > 1e-6f * uu * vv ? std::clamp((uv * dot(v, r) - vv * dot(u, r)) / det, 0.0f, 1.0f) : 0.5f;
-  t = vv > 0 ? std::clamp((uv * s + dot(v, r)) / vv, 0.0f, 1.0f) : 0.0f;
-  s = uu > 0 ? std::clamp((uv * t - dot(u, r)) / uu, 0.0f, 1.0f) : 0.0f;
-}
-
 }  // namespace
 
 void add_capsule(BodyModel& m, Vec3 a, Vec3 b, float ra, float rb, int8_t jaw, float spacing) {

@@ -139,6 +139,8 @@ struct BodiesModel {
   std::vector<BodyModel> body;
   Vec3 gravity{0, -9.81f, 0};  // [m/s2] on bodies without a hand
   float reach = 0.3e-3f;       // [m] margin of candidates, in addition to two steps of relative motion
+  bool pair_contact = true;    // bodies against each other
+  float pair_friction = 0.2f;  // steel on steel, dry or wet: 0.1-0.3
   float push_out = 0.2f;       // [m/s] maximum speed at which overlap is resolved
   int sweeps = 80;             // maximum
   float accuracy = 1e-4f;      // relative change at which sweeps stop
@@ -196,6 +198,8 @@ void place_body(const BodyModel& model, Body& body, const Pose& pose, float open
 // Before wall::begin_step: velocities of the bodies without contact.
 void predict_bodies(const BodiesModel& model, const Bodies& bodies, std::span<const HandTarget> target, float h,
                     BodiesScratch& k);
+// Contacts of bodies with each other. Jaws that hold a needle have none with it.
+void find_pair_contacts(const BodiesModel& model, const Bodies& bodies, float h, BodiesScratch& k);
 // Contacts with the wall.
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
                         const Bodies& bodies, float h, BodiesScratch& k);

@@ -30,6 +30,15 @@ inline float nearest_along(Vec3 a, Vec3 b, Vec3 p) {
   return d2 > 0 ? std::clamp(dot(p - a, d) / d2, 0.0f, 1.0f) : 0.0f;
 }
 
+// Closest points of two segments, as fractions.
+inline void nearest_of_segments(Vec3 a, Vec3 b, Vec3 c, Vec3 d, float& s, float& t) {
+  const Vec3 u = b - a, v = d - c, r = a - c;
+  const float uu = dot(u, u), vv = dot(v, v), uv = dot(u, v), det = uu * vv - uv * uv;
+  s = det > 1e-6f * uu * vv ? std::clamp((uv * dot(v, r) - vv * dot(u, r)) / det, 0.0f, 1.0f) : 0.5f;
+  t = vv > 0 ? std::clamp((uv * s + dot(v, r)) / vv, 0.0f, 1.0f) : 0.0f;
+  s = uu > 0 ? std::clamp((uv * t - dot(u, r)) / uu, 0.0f, 1.0f) : 0.0f;
+}
+
 constexpr uint64_t key_of(uint64_t kind, uint64_t body, uint64_t part, uint64_t patch) {
   return kind << 60 | body << 52 | part << 36 | patch;
 }

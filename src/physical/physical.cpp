@@ -181,6 +181,7 @@ void begin_bodies(const Model& m, State& s, Scratch& k, const Hands& hands) {
   s.bodies.memory.reserve(kMaxRows), s.hole.reserve(thread::kMaxEyelets);
   predict_bodies(m.bodies, s.bodies, hands.targets, h, k.bodies);
   skip_channels(m.needles, m.wall, s.wall, s.needle, s.bodies);
+  find_pair_contacts(m.bodies, s.bodies, h, k.bodies);
   find_body_contacts(m.bodies, m.wall, s.wall, m.surface, s.bodies, h, k.bodies);
   find_grips(m.bodies, m.wall, s.wall, m.surface, s.thread, m.thread.material.diameter, s.bodies, hands.targets, h, k.bodies);
   find_needle_rows(m.needles, m.bodies, m.wall, s.wall, m.surface, s.thread, s.bodies, s.needle, h, k.bodies);

@@ -140,6 +140,23 @@ void ContactBench::look() {
   }
 }
 
+bool ContactBench::clear(const Pose& tool, float opening) const {
+  const BodyModel &m = model.bodies.body[0], &needle = model.bodies.body[1];
+  const auto hits = [&](Vec3 p, float r) {
+    return std::any_of(m.capsule.begin(), m.capsule.end(), [&](const physical::BodyCapsule& c) {
+      const Vec3 a = transform(tool, local(m, m.sphere[c.a], opening)), b = transform(tool, local(m, m.sphere[c.b], opening));
+      const float at = std::clamp(dot(p - a, b - a) / length2(b - a), 0.0f, 1.0f);
+      return distance(p, lerp(a, b, at)) < std::max(m.sphere[c.a].radius, m.sphere[c.b].radius) + r + 0.5e-3f;
+    });
+  };
+  for (const thread::State* t : {&state.thread, &rest.thread})
+    for (uint32_t i = 0; i < t->nodes(); ++i)
+      if (hits(t->position(i), 0.5f * model.thread.material.diameter)) return false;
+  return std::none_of(needle.sphere.begin(), needle.sphere.end(), [&](const physical::BodySphere& s) {
+    return hits(transform(state.bodies.body[1].pose, s.at), std::abs(s.radius));
+  });
+}
+
 void ContactBench::event(float max_force, float max_speed) {
   // Each group of five starts from rest with its own numbers, so that it can be repeated alone.
   if (events % 5 == 0) state = rest, random = Random(seed * 1000003 + static_cast<uint64_t>(events));
@@ -147,20 +164,9 @@ void ContactBench::event(float max_force, float max_speed) {
   passed[0] = passed[1] = passed[2] = folded = 0;
   std::fill(std::begin(deepest), std::end(deepest), 0.0f);
   pull.clear(), target.assign(2, {});
-  // The tool starts clear of the wall: outside, or in front of the opening.
-  const bool inside = random.uniform() < 0.25f;
-  const float angle = 2 * kPi * random.uniform();
-  const Vec3 out{std::cos(angle), std::sin(angle), 0};
-  const Vec3 mark = inside ? out * 0.02f + Vec3{0, 0, -0.005f - 0.01f * random.uniform()}
-                           : out * 0.02f + Vec3{0, 0, -0.036f * random.uniform()};
-  const Vec3 from = inside ? Vec3{0, 0, 0.012f} : out * 0.034f + Vec3{0, 0, mark.z} + direction() * 0.006f;
-  const Vec3 aim = normalized(mark + direction() * 0.004f - from);
-  const Vec3 x = any_perpendicular(aim);
-  Pose pose{from, from_axes(x, cross(-aim, x), -aim)};
   BodyModel& tool = model.bodies.body[0];
   tool.max_force = max_force * (0.25f + 0.75f * random.uniform());
   const float opening = random.uniform() < 0.5f ? 0.0f : 0.2f * random.uniform();
-  physical::move_body(model, state, 0, pose, opening);
   // The needle falls on the tube, or is thrown at it.
   if (events % 5 == 1 || random.uniform() < 0.3f) {
     const Vec3 d = direction();
@@ -169,6 +175,22 @@ void ContactBench::event(float max_force, float max_speed) {
     state.bodies.body[1].velocity = Vec3{0, -max_speed * random.uniform(), 0};
     state.bodies.body[1].spin = direction() * (20 * random.uniform());
   }
+  // The tool starts clear of everything: outside, or in front of the opening.
+  Vec3 from, mark, aim;
+  Pose pose;
+  for (bool found = false; !found;) {
+    const bool inside = random.uniform() < 0.25f;
+    const float angle = 2 * kPi * random.uniform();
+    const Vec3 out{std::cos(angle), std::sin(angle), 0};
+    mark = inside ? out * 0.02f + Vec3{0, 0, -0.005f - 0.01f * random.uniform()}
+                  : out * 0.02f + Vec3{0, 0, -0.036f * random.uniform()};
+    from = inside ? Vec3{0, 0, 0.012f} : out * 0.034f + Vec3{0, 0, mark.z} + direction() * 0.006f;
+    aim = normalized(mark + direction() * 0.004f - from);
+    const Vec3 x = any_perpendicular(aim);
+    pose = {from, from_axes(x, cross(-aim, x), -aim)};
+    found = clear(pose, opening);
+  }
+  physical::move_body(model, state, 0, pose, opening);
   // Where an earlier event has left the tube or the needle in the way, the event begins from rest.
   look();
   if (deepest[0] > 0 || passed[0] > 0 || deepest[1] > 0.1e-3f || passed[1] > 0) {

@@ -33,6 +33,8 @@ struct ContactBench {
 
  private:
   Vec3 direction();
+  // The tool at this pose touches neither the needle nor the thread, as it is and as it was at rest.
+  bool clear(const Pose& tool, float opening) const;
   void step();
   void look();
   std::vector<Vec3> center;  // [m] per face

@@ -48,8 +48,9 @@ Outcome tie_stitch(Throws throws, float friction, float tension, bool remove) {
 }  // namespace
 
 void check_interrupted(Lines& out, bool nightly) {
-  const std::string who = "closure/interrupted/three throws, square, friction 0.25, 3 N, ";
-  const Outcome square = tie_stitch(three_throws(), 0.25f, 3, true);
+  // Silk. Below 0.26 two throws of this polygon do not lock (docs/thread.md), and the stitch gives back tension.
+  const std::string who = "closure/interrupted/three throws, square, friction 0.3, 3 N, ";
+  const Outcome square = tie_stitch(three_throws(), 0.3f, 3, true);
   out.add(who + "gap at the stitch, hands gone 4 s", 0, wide(square.away), 1e-3, "m", "closed: at most 1 mm");
   out.add(who + "change of the gap since the hands let go", 0, wide(square.away - square.tied), 0.2e-3, "m", "holds: 0.2 mm");
   out.add(who + "gap with the thread removed", wide(square.laid), wide(square.removed), 0.05, "m", "as it was before");

@@ -61,6 +61,24 @@ void soften(Sewn& s, float limit) {
   for (size_t i = 0; i < 2; ++i) s.hold[i].stiffness = 200, s.hold[i].limit = limit;
 }
 
+// Both hands take their ends up, off the tissue and off the strands that lead into it: a throw begins where the tails leave the
+// knot. Laid from where they lie on the loop's own strands, it would keep that way as slack.
+void lift_tails(Sewn& s, const Tying& t) {
+  constexpr float kForce = 0.2f;  // [N]
+  s.hold.resize(2);
+  soften(s, kForce);
+  const Vec3 high = t.center + t.up * kApart, aside = t.across * (t.side * 0.3f * kApart);
+  const Vec3 to[2] = {high + aside, high - aside};
+  const thread::State& thread = s.state.thread;
+  for (const uint32_t i : {thread.eyelet.front().segment - 1, thread.eyelet.back().segment + 2}) {
+    thread::Hold forceps;
+    forceps.node = i, forceps.from = forceps.to = thread.position(i), forceps.stiffness = 1e4f;
+    s.hold.push_back(forceps);
+  }
+  s.move_holds(to, 0.1f);
+  s.run(0.1f);
+}
+
 // Where strand A (the thread's first end) leaves what is tied so far: the first node, from its end, that is near another
 // strand or a hole. For strand B from the other end.
 uint32_t exit_node(const thread::State& t, float diameter, bool first) {
@@ -84,6 +102,7 @@ void tie_throw(Sewn& s, Tying& t, Throw one) {
   thread::State& thread = s.state.thread;
   const float d = s.model.thread.material.diameter, r = 0.75f * d, half = 1.1f * d * static_cast<float>(one.half_turns);
   CATGUT_CHECK(!thread.eyelet.empty());  // every bite has torn out
+  if (t.throws > 0) lift_tails(s, t);
   const uint32_t n = static_cast<uint32_t>(thread.nodes());
   const uint32_t a = exit_node(thread, d, true), b = exit_node(thread, d, false);
   const Vec3 from_a = thread.position(a), from_b = thread.position(b);

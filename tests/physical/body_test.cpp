@@ -320,6 +320,107 @@ TEST(Tool, jaws_lift_the_wall_and_slide_off_above_their_friction) {
   }
 }
 
+// Surface to surface [m], of the drawn cones, sampled densely; negative: overlap.
+float distance_of(const Bench& bench, uint32_t a, uint32_t b) {
+  struct Ball {
+    Vec3 at;
+    float r;
+  };
+  const auto balls = [&](uint32_t i) {
+    const BodyModel& m = bench.model.bodies.body[i];
+    const Body& body = bench.state.bodies.body[i];
+    std::vector<Ball> all;
+    for (const BodyCapsule& c : m.capsule)
+      for (float t = 0; t <= 1; t += 0.25f)
+        all.push_back(
+            {transform(body.pose, lerp(local(m, m.sphere[c.a], body.opening), local(m, m.sphere[c.b], body.opening), t)),
+             std::abs(m.sphere[c.a].radius) * (1 - t) + std::abs(m.sphere[c.b].radius) * t});
+    return all;
+  };
+  float least = 1;
+  const std::vector<Ball> second = balls(b);
+  for (const Ball& p : balls(a))
+    for (const Ball& q : second) least = std::min(least, distance(p.at, q.at) - p.r - q.r);
+  return least;
+}
+
+// Two needle holders high above the sheet, pushed against each other by hands of 5 N: shafts crossing at their middles and away
+// from them, at an angle, along each other, and a jaw on a shaft; slowly and at 0.8 m/s each.
+TEST(Tool, two_of_them_pushed_against_each_other_stop_and_both_hands_feel_it) {
+  struct Case {
+    Vec3 axis;    // of the second shaft
+    float along;  // [m] of the second tool along its shaft, from where both middles meet
+    float off;    // [m] of the first tool along its own
+  };
+  const Case cases[] = {{{1, 0, 0}, 0, 0},
+                        {{1, 0, 0}, 0.03f, 0.02f},
+                        {{0.6f, 0, 0.8f}, 0.01f, 0},
+                        {{0, 0, 1}, 0, 0.01f},
+                        {{1, 0, 0}, 0, 0.0575f}};
+  for (const Case& c : cases)
+    for (const float speed : {0.05f, 0.8f}) {
+      Bench bench;
+      BodyModel holder = make_tool({});
+      holder.max_force = 5;
+      const auto pose_of = [&](Vec3 axis, Vec3 middle) {
+        const Vec3 y = normalized(cross(axis, Vec3{0.1f, -1, 0.3f}));
+        const Quat q = from_axes(cross(y, axis), y, axis);
+        return Pose{middle - rotate(q, holder.center), q};
+      };
+      const Vec3 middle{0, 0, 0.2f}, axis = normalized(c.axis);
+      float y = 0.02f;
+      const auto poses = [&](uint32_t i) {
+        return i == 0 ? pose_of({0, 0, 1}, middle + Vec3{0, -y, c.off})
+                      : pose_of(axis, middle + Vec3{0, y, 0} + axis * c.along);
+      };
+      const uint32_t a = bench.add(holder, poses(0)), b = bench.add(holder, poses(1));
+      bench.start();
+      float overlap = 0;
+      for (int i = 0; i < 700; ++i) {
+        y = std::max(-0.004f, y - speed * 1e-3f);
+        bench.target[a] = {poses(0), true}, bench.target[b] = {poses(1), true};
+        bench.step();
+        if (i % 8 == 0) overlap = std::max(overlap, -distance_of(bench, a, b));
+      }
+      const Body &first = bench.body(a), &second = bench.body(b);
+      EXPECT_LT(overlap, 0.3e-3f) << c.along << " " << speed;
+      EXPECT_GT(second.pose.p.y + rotate(second.pose.q, holder.center).y, first.pose.p.y) << "passed through";
+      EXPECT_LT(first.force.y, -1) << c.along << " " << c.off;
+      EXPECT_LE(length(first.force), 5.1f);
+      EXPECT_LT(length(first.force + second.force), 1e-3f);
+      // Actio and reactio at one place: about any point the torques cancel, too.
+      EXPECT_LT(length(torque_about(holder, first, middle) + torque_about(holder, second, middle)), 2e-3f);
+      EXPECT_LT(length(first.hand_force + first.force), 0.1f);
+      EXPECT_LT(length(second.hand_force + second.force), 0.1f);
+      if (c.along == 0 && c.off == 0) { EXPECT_NEAR(length(first.force), 5, 0.1f); }
+    }
+}
+
+// A needle let go over a shaft rests on it or falls beside it; a shaft swept through it takes it along.
+TEST(Needle, does_not_pass_through_a_tool) {
+  for (const float speed : {0.0f, 0.3f, 1.0f}) {
+    Bench bench;
+    const Vec3 axis{1, 0, 0};
+    const Quat q = from_axes({0, 1, 0}, {0, 0, 1}, axis);
+    Pose pose{{-0.05f, 0.01f, 0.2f}, q};
+    const uint32_t t = bench.add(make_tool({}), pose);
+    const NeedleModel shape = make_needle({}, 0);
+    const uint32_t n = bench.add_needle({}, on_circle(shape, {0.01f, 0.01f, speed > 0 ? 0.206f : 0.22f}, 0.4f));
+    if (speed > 0) pose.p.y -= 0.02f, bench.model.bodies.gravity = {};
+    place_body(bench.model.bodies.body[t], bench.body(t), pose, 0);
+    bench.start();
+    for (int i = 0; i < 250; ++i) {
+      pose.p.y += speed * 1e-3f;
+      bench.target[t] = {pose, true};
+      bench.step();
+      EXPECT_GT(distance_of(bench, t, n), -0.3e-3f) << speed << " at " << i;
+    }
+    if (speed > 0) {
+      EXPECT_GT(bench.body(n).pose.p.y, 0.012f);  // struck, it has flown on
+    }
+  }
+}
+
 TEST(Bodies, a_copy_and_a_saved_state_continue_to_the_bit) {
   Bench a;
   const uint32_t n = a.add_needle({}, {});
