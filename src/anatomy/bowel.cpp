@@ -47,7 +47,10 @@ void check(const BowelShape& b) {
   if (!finite(b.pinned_length) || b.pinned_length < 0 || b.pinned_length > b.length) {
     refuse(fmt::format("pinned_length {} m is out of range", b.pinned_length), "give 0 to the bowel's length");
   }
-  if (b.inner_radius == 0) return;
+  if (b.inner_radius == 0) {
+    if (b.folded) refuse("a folded bowel needs its inner tube", "give inner_radius, the outer radius of the colon inside");
+    return;
+  }
   if (!finite(b.inner_radius) || b.inner_radius < 2 * b.wall) {
     refuse(fmt::format("an inner_radius of {} m leaves no tube with a wall of {} m", b.inner_radius, b.wall),
            "give at least twice the wall, or 0 for no inner tube");
@@ -61,6 +64,9 @@ void check(const BowelShape& b) {
   }
   if (b.closed_start || b.closed_end) {
     refuse("a bowel with an inner tube cannot have closed ends", "leave out closed_start and closed_end, or inner_radius");
+  }
+  if (b.folded && b.length < b.radius) {
+    refuse(fmt::format("a fold of radius {} m needs more than {} m of length", b.radius, b.length), "give at least the radius");
   }
   if (b.particles < 2 * kFewest) {
     refuse(fmt::format("{} particles cannot make two tubes", b.particles), fmt::format("give {} to {}", 2 * kFewest, kMost));
@@ -169,6 +175,7 @@ BodyRest make_tube(const BowelShape& shape, int vertices, bool everted) {
   wall.extra_triangle = static_cast<uint32_t>(sheet.triangle.size()) - 1;  // of the last strip: the far end
   BodyRest body = thicken(sheet, normal, wall);
   body.name = shape.name;
+  // Of a folded wall both ends are far ends.
   const float held_from = shape.length - shape.pinned_length;
   for (size_t v = 0; v < depth.size(); ++v) {
     const bool held = shape.pinned_length > 0 && static_cast<float>(depth[v]) >= held_from;
@@ -226,6 +233,11 @@ void join(BodyRest& body, BodyRest&& more) {
 BodyRest make_bowel(const BowelShape& shape) {
   check(shape);
   if (shape.inner_radius == 0) return make_tube(shape, kPictureVertices, false);
+  if (shape.folded) {
+    BowelShape whole = shape;
+    whole.taeniae = 0;
+    return make_tube(whole, kPictureVertices, true);
+  }
   BowelShape outer = shape, inner = shape;
   outer.inner_radius = inner.inner_radius = 0;
   inner.radius = shape.inner_radius;

@@ -23,6 +23,7 @@ struct BowelShape {
   float density = 1050;          // [kg/m^3]
   float pinned_length = 0.008f;  // [m] length of the far end that is fixed; 0: none
   float inner_radius = 0;        // [m] outer radius of a second tube inside the first; 0: none
+  bool folded = false;           // the two tubes are one wall, folded at the near end: a prolapse before it is cut
 };
 
 // Particles run ring by ring from the near end. A sheet vertex is two neighboring particles, outer (even index) then
@@ -35,6 +36,10 @@ struct BowelShape {
 // outer tube is wall 0, with more particles in proportion to its surface, followed by wall 1; far ends are fixed as
 // above. Rims: near end of wall 0, of wall 1, far end of wall 0, of wall 1. A rim's `outer` is always the side away from the
 // axis.
+//
+// folded: the same prolapse before the cut. One wall runs up the colon inside, turns over at the tip and runs down the everted
+// rectum outside, mucosa on the side that is visible. Near end: the tip, the turn's highest circle. Both openings are at the
+// far end, that of the colon first; both are fixed. wall: one. Even particle indices are on the mucosa's side.
 //
 // The same shape gives the same bits. Throws InputError for a shape that cannot be built.
 BodyRest make_bowel(const BowelShape& shape);

@@ -32,6 +32,13 @@ BowelSurface::BowelSurface(const BowelShape& shape) : shape_(shape) {
                  dz = dome_height_ * (portable::cos(b) - portable::cos(a));
     dome_arc_[i + 1] = dome_arc_[i] + std::sqrt(dr * dr + dz * dz);
   }
+  if (shape.folded) {
+    lumen_ = static_cast<double>(shape.inner_radius) - static_cast<double>(shape.wall);
+    turn_ = 0.5 * (static_cast<double>(shape.radius) - lumen_);
+    straight_ = static_cast<double>(shape.length) - turn_;
+    total_ = 2 * straight_ + 0.5 * kTwoPi * turn_;
+    return;
+  }
   if (shape.closed_end) near_dome_ = dome_arc_.back();
   if (shape.closed_start) far_dome_ = dome_arc_.back();
   const double straight =
@@ -52,6 +59,19 @@ void BowelSurface::profile(double s, double& z, double& r, double& nz, double& n
     const double l = std::sqrt(nr * nr + nz * nz);
     nr /= l, nz /= l;
   };
+  if (shape_.folded) {  // up the colon, over the tip, down the rectum
+    const double over = s - straight_, half_turn = 0.5 * kTwoPi * turn_;
+    if (over <= 0) {
+      z = -turn_ + over, r = lumen_, nz = 0, nr = -1;
+    } else if (over < half_turn) {
+      const double a = over / turn_;
+      nr = -portable::cos(a), nz = portable::sin(a);
+      r = lumen_ + turn_ * (1 + nr), z = turn_ * (nz - 1);
+    } else {
+      z = -turn_ - (over - half_turn), r = shape_.radius, nz = 0, nr = 1;
+    }
+    return;
+  }
   if (s < near_dome_) return dome(std::max(s, 0.0));
   if (s > total_ - far_dome_) {
     dome(std::max(total_ - s, 0.0));
@@ -186,7 +206,7 @@ VisibleMesh bowel_picture(const BowelShape& shape, const BowelSurface& surface, 
   for (const bool far : {false, true}) {
     if (far ? shape.closed_start : shape.closed_end) continue;
     const double s = far ? along : 0;
-    const Vec3 out = far ? -axis : axis;
+    const Vec3 out = far || shape.folded ? -axis : axis;
     const float half = 0.5f * shape.wall, swell = 0.35f * shape.wall;
     const uint32_t first = static_cast<uint32_t>(mesh.position.size());
     for (int i = 0; i <= steps; ++i) {

@@ -31,6 +31,7 @@ class BowelSurface {
   Vec3 e1_, e2_, axis_;
   double total_ = 0, near_dome_ = 0, far_dome_ = 0;  // [m] arc lengths of profile and domes (0 where open)
   double dome_height_ = 0;
+  double straight_ = 0, turn_ = 0, lumen_ = 0;  // [m] folded: height of the straight tubes, radius of the turn, of the lumen
   std::vector<double> dome_arc_;  // arc length of a dome's quarter ellipse from its top, over equal steps of its angle
 };
 

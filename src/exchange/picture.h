@@ -27,6 +27,15 @@ struct VisibleMesh {
   std::vector<std::array<float, 4>> skin_weight;       // sum 1
 };
 
+// What surrounds the organ: a surface that does not move and that nothing touches.
+enum class SceneryKind : uint8_t { skin, anoderm, drape, steel, elastic };
+struct Scenery {
+  SceneryKind kind = SceneryKind::skin;
+  std::vector<Vec3> position, normal, color;      // [m], unit, linear
+  std::vector<std::array<float, 2>> uv;           // skin, drape: centimeters; steel, elastic: meters along, 0..1 round
+  std::vector<std::array<uint32_t, 3>> triangle;  // counter-clockwise seen from outside
+};
+
 // A needle and its thread, for rendering and grasping.
 struct SuturePicture {
   uint32_t thread_first = 0;  // slot of the first thread particle in Snapshot::particle
@@ -48,6 +57,7 @@ struct PictureModel {
   // Draws a strand from the entry of an open bite to the needle (paper 2.2), where the paper has no thread. Preset "paper"
   // only.
   bool visual_guide = false;
+  std::vector<Scenery> scenery;               // empty: drape, wound and gauze of a bowel on a table
   std::vector<InstrumentPicture> instrument;  // as Snapshot::instrument
   Vec3 focus;                                 // [m] center of the operating field
   float field = 0.1f;                         // [m] its radius

@@ -43,6 +43,7 @@ const Field kField[] = {
     {"", "seed", "", 0, 9.2e18, nullptr, "random seed of tremor and aim", TOP(seed)},
     {"", "duration", "s", 0.001, 1e5, nullptr, "maximum simulated time; a run ends earlier when the surgeon is done", TOP(duration)},
     {"", "settle", "s", 0, 1000, nullptr, "simulated time before the hands connect", TOP(settle)},
+    {"", "surroundings", "", 0, 0, "table|perineum", "what is drawn round the organ; perineum: the first body comes through the anal verge of a patient in lithotomy", TOP(surroundings)},
 
     {"body", "name", "", 0, 0, nullptr, "name of the body in messages", BODY(name)},
     {"body", "mesh", "", 0, 0, nullptr, "organ surface to import, file or file#node, relative to the scene file; empty: generated tube", BODY(mesh)},
@@ -62,6 +63,7 @@ const Field kField[] = {
     {"body", "modulus_around", "Pa", 1000, 1e9, nullptr, "physical mechanics: Young's modulus of the wall around the organ", BODY(modulus_around)},
     {"body", "poisson", "", 0, 0.49, nullptr, "physical mechanics: Poisson's ratio of the wall, contraction around when stretched along", BODY(poisson)},
     {"body", "inner_radius", "m", 0, 1, nullptr, "outer radius of a second tube inside the first, as in a prolapse; 0: none", BODY(inner_radius)},
+    {"body", "folded", "", 0, 0, nullptr, "the two tubes are one wall, folded at the near end: a prolapse before it is cut", BODY(folded)},
 
     {"instrument", "name", "", 0, 0, nullptr, "name in this scene; empty: that of its kind", INSTRUMENT(name)},
     {"instrument", "kind", "", 0, 0, nullptr, "needle_holder, forceps, debakey, allis, scissors, cautery, retractor, or a kind of the host program", INSTRUMENT(kind)},

@@ -8,6 +8,7 @@
 
 #include "anatomy/bowel.h"
 #include "anatomy/organ.h"
+#include "anatomy/perineum.h"
 #include "core/check.h"
 #include "geometry/closest.h"
 #include "sim/cell_graph.h"
@@ -55,6 +56,7 @@ BodyRest make_body(const BodySpec& spec) {
   s.density = spec.density;
   s.pinned_length = spec.pinned_length;
   s.inner_radius = spec.inner_radius;
+  s.folded = spec.folded;
   return make_bowel(s);
 }
 
@@ -427,6 +429,16 @@ void describe_picture(Model& m, const std::vector<SutureSpec>& sutures, Vec3 foc
   p.focus = focus;
   p.field = 3 * tube;
   p.drape = m.solver.ground;
+  if (m.scene.surroundings == "perineum") {
+    // The verge lies where the bowel is fixed, so that what is drawn round its base stays on it.
+    constexpr float fixed_above = 0.010f;  // [m] of fixed bowel beyond the verge: the dentate line is there
+    const BodySpec& body = m.scene.body[0];
+    PerineumShape around;
+    around.out = normalized(body.axis, {0, 1, 0});
+    around.verge = body.position - around.out * (body.length - body.pinned_length + fixed_above);
+    around.radius = body.radius;
+    p.scenery = make_perineum(around);
+  }
 }
 
 }  // namespace

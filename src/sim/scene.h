@@ -28,6 +28,7 @@ struct BodySpec {
   float density = 1050;          // [kg/m^3]
   float pinned_length = 0.035f;  // [m] length of the far end that is fixed
   float inner_radius = 0;        // [m] outer radius of a second tube inside the first (a bowel folded into itself); 0: none
+  bool folded = false;           // the two tubes are one wall, folded at the near end: a prolapse before it is cut
   float modulus_along = 6e5f;    // [Pa] Young's modulus along the organ; this and the next two: physical mechanics only
   float modulus_around = 6e5f;   // [Pa] around it
   float poisson = 0.45f;         // contraction around when stretched along
@@ -147,8 +148,9 @@ struct SceneSpec {
   std::string name;  // of the file, without .toml
   std::string title;
   uint64_t seed = 1;
-  float duration = 240;  // [s] maximum simulated time; a run ends earlier when the surgeon has finished
-  float settle = 0.5f;   // [s] of settling before the hands connect
+  float duration = 240;                // [s] maximum simulated time; a run ends earlier when the surgeon has finished
+  float settle = 0.5f;                 // [s] of settling before the hands connect
+  std::string surroundings = "table";  // or perineum: the first body comes through the anal verge of a patient in lithotomy
   std::vector<BodySpec> body;
   std::vector<InstrumentSpec> instrument;
   ThreadSpec thread;

@@ -41,7 +41,7 @@ inline double total_tet_volume(const BodyRest& body) {
   return v;
 }
 
-inline void expect_sound(const BodyRest& body, size_t particles) {
+inline void expect_sound(const BodyRest& body, size_t particles, bool folded = false) {
   ASSERT_EQ(body.position.size(), particles);
   ASSERT_EQ(body.mass.size(), particles);
   ASSERT_EQ(body.pinned.size(), particles);
@@ -64,7 +64,8 @@ inline void expect_sound(const BodyRest& body, size_t particles) {
   for (const Rim& rim : body.rim) {
     ASSERT_EQ(rim.outer.size(), rim.inner.size());
     for (size_t i = 0; i < rim.outer.size(); ++i) {
-      const bool everted = body.walls > 1 && body.wall[rim.outer[i]] == 0;  // the outer tube of a cut prolapse
+      // The outer tube of a cut prolapse; all of one that is not cut.
+      const bool everted = folded || (body.walls > 1 && body.wall[rim.outer[i]] == 0);
       EXPECT_EQ(body.layer[rim.outer[i]], everted ? TissueLayer::mucosa : TissueLayer::serosa);
       EXPECT_EQ(body.layer[rim.inner[i]], everted ? TissueLayer::serosa : TissueLayer::mucosa);
       EXPECT_EQ(rim.inner[i], rim.outer[i] + 1);

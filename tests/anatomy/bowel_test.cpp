@@ -295,5 +295,52 @@ TEST(Bowel, RefusesWhatCannotBeBuilt) {
   EXPECT_NE(message(shape).find("pinned_length"), std::string::npos);
 }
 
+TEST(FoldedBowel, IsOneWallThatTurnsOverAtTheTip) {
+  BowelShape shape;
+  shape.particles = 4054;
+  shape.radius = 0.022f, shape.inner_radius = 0.0115f, shape.length = 0.080f, shape.wall = 0.0025f, shape.haustra = 0;
+  shape.pinned_length = 0.045f;
+  shape.folded = true;
+  shape.axis = {0, 0.6f, 0.8f};
+  shape.position = {0.01f, 0.02f, 0.03f};
+  const BodyRest body = make_bowel(shape);
+  expect_sound(body, 4054, true);
+  EXPECT_EQ(body.walls, 1);
+  EXPECT_EQ(euler_characteristic(body.surface), 0);  // one tube with a wall
+  ASSERT_EQ(body.rim.size(), 2u);                    // the colon's opening and the rectum's, both at the far end
+  const float lumen = shape.inner_radius - shape.wall;
+  EXPECT_NEAR(loop_length(points(body, body.rim[0].outer)), 2 * kPi * lumen, 0.02f * 2 * kPi * lumen);
+  EXPECT_NEAR(loop_length(points(body, body.rim[1].outer)), 2 * kPi * shape.radius, 0.02f * 2 * kPi * shape.radius);
+  float top = -1;
+  for (size_t i = 0; i < body.position.size(); ++i) {
+    const Vec3 d = body.position[i] - shape.position;
+    const float along = dot(d, shape.axis), r = length(d - shape.axis * along);
+    top = std::max(top, along);
+    // In the wall of a tube or of the turn; nothing in the cavity between the two or in the lumen.
+    const float turn = 0.5f * (shape.radius - lumen), middle = lumen + turn;
+    const float from = along < -turn ? std::abs(r - middle) : std::hypot(r - middle, along + turn);
+    EXPECT_LT(from, turn + 1e-5f);
+    EXPECT_GT(from, turn - shape.wall - 1e-5f);
+    // Mucosa is what one sees.
+    EXPECT_EQ(body.layer[i] == TissueLayer::mucosa, from > turn - 0.5f * shape.wall);
+    EXPECT_EQ(body.pinned[i] != 0, along <= -(shape.length - shape.pinned_length) + 1e-5f) << along;
+  }
+  EXPECT_LE(top, 1e-5f);
+  EXPECT_GT(top, -3e-4f);  // the rings lie a step apart
+  // Volume of the two tubes and of half a torus' shell (Pappus).
+  const double w = shape.wall, turn = 0.5 * (shape.radius - lumen), middle = lumen + turn, straight = shape.length - turn;
+  const double area = kPi * (turn * turn - (turn - w) * (turn - w)) / 2;
+  const double tubes =
+      kPi * straight *
+      (shape.radius * shape.radius - (shape.radius - w) * (shape.radius - w) + (lumen + w) * (lumen + w) - lumen * lumen);
+  EXPECT_NEAR(total_tet_volume(body), tubes + 2 * kPi * middle * area, 0.03 * tubes);
+}
+
+TEST(FoldedBowel, NeedsAnInnerTube) {
+  BowelShape shape;
+  shape.folded = true;
+  EXPECT_THROW(make_bowel(shape), InputError);
+}
+
 }  // namespace
 }  // namespace catgut
