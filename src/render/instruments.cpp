@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // render/shapes: needle, needle holder and forceps; see shapes.h. Sizes follow common surgical instruments:
-// a 180 mm needle holder with gold rings, 150 mm tissue forceps.
+// a 180 mm Mayo-Hegar needle holder, 120 mm Adson and 160 mm DeBakey forceps.
+#include <cmath>
 #include <vector>
 
 #include "render/shapes.h"
@@ -28,66 +29,117 @@ void add_ring(Shape& shape, Vec3 center, float rx, float rz, float wire, Vec3 co
   add_tube(shape, points, radius, 12, color);
 }
 
+// A loft through sections that a smooth curve joins, `per_span` pieces between two.
+void add_smooth_loft(Shape& shape, std::span<const Section> through, Vec3 color, float squareness = 4, int per_span = 6) {
+  std::vector<Vec3> center, half;
+  for (const Section& s : through) center.push_back(s.center), half.push_back({s.half_x, s.half_y, 0});
+  std::vector<Vec3> at, size;
+  smooth_curve(center, per_span, at);
+  smooth_curve(half, per_span, size);
+  std::vector<Section> section(at.size());
+  for (size_t i = 0; i < at.size(); ++i) section[i] = {at[i], size[i].x, size[i].y};
+  add_loft(shape, section, color, squareness);
+}
+
+void mark_hatched(Shape& shape, float value) { shape.hatched.resize(shape.position.size(), value); }
+
+// Mayo-Hegar, 180 mm: short jaws with carbide inserts, box joint with screw, ratchet, gold rings (which mark the carbide).
 ToolShape needle_driver() {
-  const Vec3 steel = srgb(222, 224, 228), carbide = srgb(120, 122, 126), gold = srgb(212, 172, 92);
+  const Vec3 steel = srgb(214, 217, 222), carbide = srgb(112, 114, 118), gold = srgb(218, 176, 88), dark = srgb(52, 54, 58);
   ToolShape tool;
   tool.pivot = 26 * mm;
   tool.opening = 0.16f;
-  // One jaw: flat inside at x = 0, the grasp point a little behind the tip.
+  // One jaw: flat inside at x = 0, round outside, the grasp point a little behind the tip.
   const Section jaw[] = {
-      {{1.0f * mm, 0, -2.5f * mm}, 0.62f * mm, 0.9f * mm}, {{1.1f * mm, 0, -1.8f * mm}, 0.78f * mm, 1.15f * mm},
-      {{1.25f * mm, 0, 4 * mm}, 0.95f * mm, 1.4f * mm},    {{1.75f * mm, 0, 14 * mm}, 1.45f * mm, 2.0f * mm},
-      {{2.3f * mm, 0, 21 * mm}, 2.0f * mm, 2.5f * mm},     {{2.2f * mm, 0, 27 * mm}, 2.1f * mm, 2.7f * mm}};
-  add_loft(tool.half, jaw, steel);
-  const Section insert[] = {{{0.28f * mm, 0, -2.3f * mm}, 0.26f * mm, 0.82f * mm},
-                            {{0.28f * mm, 0, 13 * mm}, 0.26f * mm, 1.5f * mm}};
-  tool.half.hatched.resize(tool.half.position.size(), 0);
+      {{0.95f * mm, 0, -2.5f * mm}, 0.45f * mm, 0.75f * mm}, {{1.05f * mm, 0, -2.1f * mm}, 0.68f * mm, 1.05f * mm},
+      {{1.15f * mm, 0, -1.0f * mm}, 0.82f * mm, 1.22f * mm}, {{1.3f * mm, 0, 4 * mm}, 0.98f * mm, 1.45f * mm},
+      {{1.65f * mm, 0, 11 * mm}, 1.34f * mm, 1.85f * mm},    {{2.05f * mm, 0, 17 * mm}, 1.75f * mm, 2.25f * mm},
+      {{2.3f * mm, 0, 22 * mm}, 2.0f * mm, 2.5f * mm},       {{2.2f * mm, 0, 27 * mm}, 2.1f * mm, 2.6f * mm}};
+  add_smooth_loft(tool.half, jaw, steel, 3);
+  mark_hatched(tool.half, 0);
+  // The insert stands a hair proud of its pocket, whose edge shows as a dark line.
+  const Section pocket[] = {{{0.42f * mm, 0, -2.42f * mm}, 0.16f * mm, 0.95f * mm},
+                            {{0.42f * mm, 0, 13.6f * mm}, 0.16f * mm, 1.72f * mm}};
+  add_loft(tool.half, pocket, dark, 8);
+  mark_hatched(tool.half, 0);
+  const Section insert[] = {{{0.26f * mm, 0, -2.35f * mm}, 0.25f * mm, 0.84f * mm},
+                            {{0.26f * mm, 0, 13.3f * mm}, 0.25f * mm, 1.58f * mm}};
   add_loft(tool.half, insert, carbide, 8);
-  tool.half.hatched.resize(tool.half.position.size(), 1);
+  mark_hatched(tool.half, 1);
   // In reality the shank of the other side belongs to this jaw; drawn on its own side, the crossing is hidden in the box joint.
-  const Vec3 shank[] = {{1.9f * mm, 0, 30 * mm},
-                        {3.4f * mm, 0, 50 * mm},
-                        {5.2f * mm, 0, 90 * mm},
-                        {8.5f * mm, 0, 130 * mm},
-                        {13 * mm, 0, 152 * mm}};
-  add_line_tube(tool.half, shank, 2.3f * mm, 1.9f * mm, steel);
-  add_ring(tool.half, {16 * mm, 0, 165 * mm}, 10.5f * mm, 14 * mm, 2.0f * mm, gold);
-  const Section joint[] = {{{0, 0, 19.5f * mm}, 3.1f * mm, 2.5f * mm},
-                           {{0, 0, 21 * mm}, 4.2f * mm, 3.0f * mm},
-                           {{0, 0, 31 * mm}, 4.4f * mm, 3.1f * mm},
-                           {{0, 0, 35 * mm}, 3.6f * mm, 2.7f * mm},
-                           {{0, 0, 37 * mm}, 2.9f * mm, 2.2f * mm}};
-  add_loft(tool.body, joint, steel, 5);
+  const Section shank[] = {{{1.75f * mm, 0, 29 * mm}, 1.9f * mm, 2.3f * mm}, {{2.3f * mm, 0, 42 * mm}, 2.0f * mm, 2.2f * mm},
+                           {{3.6f * mm, 0, 65 * mm}, 1.95f * mm, 2.1f * mm}, {{5.6f * mm, 0, 95 * mm}, 1.8f * mm, 2.0f * mm},
+                           {{8.4f * mm, 0, 128 * mm}, 1.7f * mm, 1.9f * mm}, {{10.6f * mm, 0, 144 * mm}, 1.7f * mm, 1.9f * mm},
+                           {{13.2f * mm, 0, 153 * mm}, 1.9f * mm, 1.9f * mm}};
+  add_smooth_loft(tool.half, shank, steel, 2.4f);
+  mark_hatched(tool.half, 0);
+  add_ring(tool.half, {17.5f * mm, 0, 165.5f * mm}, 10.5f * mm, 14 * mm, 2.0f * mm, gold);
+  mark_hatched(tool.half, 0);
+  // The ratchet: a bar from each shank, toothed where they meet.
+  const Section bar[] = {{{5.2f * mm, 0.9f * mm, 134 * mm}, 5.4f * mm, 0.8f * mm},
+                         {{5.2f * mm, 0.9f * mm, 138.5f * mm}, 5.4f * mm, 0.8f * mm}};
+  add_loft(tool.half, bar, steel, 6);
+  mark_hatched(tool.half, 0);
+  const Section teeth[] = {{{1.8f * mm, 0, 134.4f * mm}, 2.2f * mm, 0.25f * mm},
+                           {{1.8f * mm, 0, 138.1f * mm}, 2.2f * mm, 0.25f * mm}};
+  add_loft(tool.half, teeth, steel, 8);
+  mark_hatched(tool.half, 1);
+  const Section joint[] = {{{0, 0, 17.5f * mm}, 2.6f * mm, 2.2f * mm}, {{0, 0, 19 * mm}, 3.6f * mm, 2.75f * mm},
+                           {{0, 0, 22 * mm}, 4.35f * mm, 3.0f * mm},   {{0, 0, 27 * mm}, 4.6f * mm, 3.05f * mm},
+                           {{0, 0, 32 * mm}, 4.3f * mm, 3.0f * mm},    {{0, 0, 36 * mm}, 3.6f * mm, 2.75f * mm},
+                           {{0, 0, 40 * mm}, 3.0f * mm, 2.3f * mm}};
+  add_smooth_loft(tool.body, joint, steel, 5);
   for (const float s : {-1.0f, 1.0f}) {
-    const Vec3 pin[] = {{0, s * 2.8f * mm, 26 * mm}, {0, s * 3.2f * mm, 26 * mm}, {0, s * 3.35f * mm, 26 * mm}};
-    const float r[] = {1.9f * mm, 1.9f * mm, 1.5f * mm};
-    add_tube(tool.body, pin, r, 16, srgb(160, 162, 168));
+    // The edges of the slot through which one half passes the other, the screw and the screw's slot.
+    for (const float side : {-1.0f, 1.0f}) {
+      const Section edge[] = {{{side * 2.9f * mm, s * 2.92f * mm, 20.5f * mm}, 0.07f * mm, 0.14f * mm},
+                              {{side * 1.9f * mm, s * 2.94f * mm, 34 * mm}, 0.07f * mm, 0.14f * mm}};
+      add_loft(tool.body, edge, dark, 6);
+    }
+    const Vec3 pin[] = {
+        {0, s * 2.8f * mm, 26 * mm}, {0, s * 3.12f * mm, 26 * mm}, {0, s * 3.2f * mm, 26 * mm}, {0, s * 3.22f * mm, 26 * mm}};
+    const float r[] = {2.1f * mm, 2.1f * mm, 1.9f * mm, 0.2f * mm};
+    add_tube(tool.body, pin, r, 24, srgb(186, 188, 194));
+    const Section slot[] = {{{0, s * 3.21f * mm, 24.5f * mm}, 0.2f * mm, 0.04f * mm},
+                            {{0, s * 3.21f * mm, 27.5f * mm}, 0.2f * mm, 0.04f * mm}};
+    add_loft(tool.body, slot, dark, 8);
   }
   return tool;
 }
 
+// Adson, 120 mm: a broad, ridged grip that narrows abruptly to fine tips with one tooth into two.
 ToolShape forceps() {
-  const Vec3 steel = srgb(218, 220, 225), grip = srgb(150, 153, 158);
+  const Vec3 steel = srgb(212, 215, 221), shade = srgb(150, 153, 158);
   ToolShape tool;
-  tool.pivot = 140 * mm;
-  tool.opening = 0.03f;
-  const Section arm[] = {{{0.6f * mm, 0, -1.5f * mm}, 0.5f * mm, 0.7f * mm}, {{0.75f * mm, 0, 0}, 0.7f * mm, 0.95f * mm},
-                         {{1.1f * mm, 0, 8 * mm}, 0.8f * mm, 1.2f * mm},     {{2.3f * mm, 0, 22 * mm}, 0.9f * mm, 1.9f * mm},
-                         {{4.6f * mm, 0, 42 * mm}, 0.85f * mm, 3.6f * mm},   {{6.0f * mm, 0, 65 * mm}, 0.8f * mm, 4.9f * mm},
-                         {{5.6f * mm, 0, 95 * mm}, 0.8f * mm, 5.1f * mm},    {{3.2f * mm, 0, 125 * mm}, 0.8f * mm, 4.7f * mm},
-                         {{1.0f * mm, 0, 142 * mm}, 0.9f * mm, 4.0f * mm},   {{0.9f * mm, 0, 150 * mm}, 0.9f * mm, 3.4f * mm}};
-  add_loft(tool.half, arm, steel);
+  tool.pivot = 112 * mm;
+  tool.opening = 0.036f;
+  const Section arm[] = {
+      {{0.5f * mm, 0, -1.5f * mm}, 0.35f * mm, 0.5f * mm}, {{0.65f * mm, 0, -0.4f * mm}, 0.55f * mm, 0.72f * mm},
+      {{0.95f * mm, 0, 6 * mm}, 0.62f * mm, 0.85f * mm},   {{1.7f * mm, 0, 14 * mm}, 0.68f * mm, 1.1f * mm},
+      {{2.7f * mm, 0, 22 * mm}, 0.72f * mm, 1.7f * mm},    {{3.7f * mm, 0, 29 * mm}, 0.72f * mm, 4.2f * mm},
+      {{4.5f * mm, 0, 36 * mm}, 0.72f * mm, 5.8f * mm},    {{5.4f * mm, 0, 50 * mm}, 0.72f * mm, 6.1f * mm},
+      {{5.5f * mm, 0, 68 * mm}, 0.72f * mm, 5.9f * mm},    {{4.4f * mm, 0, 88 * mm}, 0.75f * mm, 4.9f * mm},
+      {{2.4f * mm, 0, 106 * mm}, 0.85f * mm, 4.2f * mm},   {{0.9f * mm, 0, 118 * mm}, 0.9f * mm, 3.8f * mm}};
+  add_smooth_loft(tool.half, arm, steel, 4.5f);
   for (size_t i = 0; i < tool.half.position.size(); ++i)  // the tips grip with their inner faces
-    tool.half.hatched.push_back(tool.half.position[i].z < 9 * mm && tool.half.normal[i].x < -0.4f ? 1.0f : 0.0f);
-  // Ridges for the fingers.
-  for (int i = 0; i < 9; ++i) {
-    const float z = (56 + 3.2f * float(i)) * mm;
-    const Section ridge[] = {{{6.5f * mm, 0, z}, 0.45f * mm, 3.4f * mm},
-                             {{6.5f * mm, 0, z + 1.4f * mm}, 0.45f * mm, 3.4f * mm}};
-    add_loft(tool.half, ridge, grip);
+    tool.half.hatched.push_back(tool.half.position[i].z < 5 * mm && tool.half.normal[i].x < -0.4f ? 1.0f : 0.0f);
+  // Fine cross ridges for thumb and finger, raised on the grip's outer face.
+  for (int i = 0; i < 14; ++i) {
+    const float z = (38 + 2.3f * float(i)) * mm, x = (4.62f + 0.9f * std::sin(0.11f * float(i) + 0.05f)) * mm;
+    const Section ridge[] = {{{x + 0.45f * mm, 0, z}, 0.42f * mm, 4.9f * mm},
+                             {{x + 0.62f * mm, 0, z + 0.55f * mm}, 0.44f * mm, 4.9f * mm},
+                             {{x + 0.5f * mm, 0, z + 1.1f * mm}, 0.42f * mm, 4.9f * mm}};
+    add_loft(tool.half, ridge, shade, 6);
   }
-  const Section end[] = {{{0, 0, 140 * mm}, 1.6f * mm, 4.1f * mm}, {{0, 0, 151 * mm}, 1.6f * mm, 3.2f * mm}};
-  add_loft(tool.body, end, steel);
+  mark_hatched(tool.half, 0);
+  const Section tooth[] = {{{0.32f * mm, 0.32f * mm, -1.45f * mm}, 0.34f * mm, 0.10f * mm},
+                           {{0.42f * mm, 0.32f * mm, -0.5f * mm}, 0.42f * mm, 0.16f * mm}};
+  add_loft(tool.half, tooth, steel, 2);
+  mark_hatched(tool.half, 0);
+  const Section end[] = {{{0, 0, 111 * mm}, 1.5f * mm, 3.9f * mm},
+                         {{0, 0, 117 * mm}, 1.7f * mm, 3.6f * mm},
+                         {{0, 0, 121 * mm}, 1.3f * mm, 2.6f * mm}};
+  add_smooth_loft(tool.body, end, steel);
   return tool;
 }
 
@@ -101,11 +153,16 @@ ToolShape debakey() {
                          {{1.8f * mm, 0, 40 * mm}, 0.7f * mm, 1.8f * mm},    {{4.4f * mm, 0, 60 * mm}, 0.8f * mm, 3.4f * mm},
                          {{5.4f * mm, 0, 90 * mm}, 0.8f * mm, 4.4f * mm},    {{3.0f * mm, 0, 130 * mm}, 0.8f * mm, 4.2f * mm},
                          {{0.9f * mm, 0, 158 * mm}, 0.9f * mm, 3.2f * mm}};
-  add_loft(tool.half, arm, steel);
+  add_smooth_loft(tool.half, arm, steel, 4.5f);
   for (size_t i = 0; i < tool.half.position.size(); ++i)
     tool.half.hatched.push_back(tool.half.position[i].z < 18 * mm && tool.half.normal[i].x < -0.4f ? 1.0f : 0.0f);
-  const Section hold[] = {{{5.9f * mm, 0, 64 * mm}, 0.5f * mm, 3.2f * mm}, {{5.9f * mm, 0, 96 * mm}, 0.5f * mm, 3.8f * mm}};
-  add_loft(tool.half, hold, grip);
+  // Flutes along the grip.
+  for (const float y : {-2.1f, -1.05f, 0.0f, 1.05f, 2.1f}) {
+    const Section flute[] = {{{5.0f * mm, y * mm, 64 * mm}, 0.42f * mm, 0.32f * mm},
+                             {{5.9f * mm, y * mm, 80 * mm}, 0.42f * mm, 0.34f * mm},
+                             {{5.85f * mm, y * mm, 96 * mm}, 0.42f * mm, 0.34f * mm}};
+    add_smooth_loft(tool.half, flute, grip, 3);
+  }
   const Section end[] = {{{0, 0, 150 * mm}, 1.5f * mm, 3.6f * mm}, {{0, 0, 160 * mm}, 1.5f * mm, 2.8f * mm}};
   add_loft(tool.body, end, steel);
   return tool;
@@ -199,7 +256,7 @@ ToolShape retractor() {
 
 }  // namespace
 
-Shape needle_shape(const SuturePicture& model) {
+Shape needle_shape(const SuturePicture& model, float least_radius) {
   constexpr int n = 64;
   std::vector<Vec3> center;
   std::vector<float> radius;
@@ -209,9 +266,8 @@ Shape needle_shape(const SuturePicture& model) {
     center.push_back({r * std::cos(phi), r * std::sin(phi), 0});
     // The swage is drilled and slightly thicker than its thread; the last fifth tapers to the point.
     const float to_tip = (1 - s) / 0.2f;
-    radius.push_back(wire * (to_tip < 1  ? 0.04f + 0.96f * std::sqrt(to_tip) * (1.5f - 0.5f * to_tip)
-                             : s < 0.06f ? 1.08f
-                                         : 1.0f));
+    const float taper = to_tip < 1 ? 0.04f + 0.96f * std::sqrt(to_tip) * (1.5f - 0.5f * to_tip) : s < 0.06f ? 1.08f : 1.0f;
+    radius.push_back(std::max(wire * taper, least_radius * (0.5f + 0.5f * taper)));
   }
   Shape shape;
   add_tube(shape, center, radius, 12, srgb(228, 230, 234));

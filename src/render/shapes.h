@@ -40,7 +40,9 @@ Shape mirrored_x(Shape shape);
 // Points of a Catmull-Rom curve through `through`, `per_span` pieces a span, last point included. Written to `out`.
 void smooth_curve(std::span<const Vec3> through, int per_span, std::vector<Vec3>& out);
 
-Shape needle_shape(const SuturePicture& model);  // in the needle's frame
+// In the needle's frame. least_radius: [m] of the drawn wire, half of it at the point, so that it never falls between the
+// pixels.
+Shape needle_shape(const SuturePicture& model, float least_radius = 0);
 
 // A tool in its frame (origin between the jaw tips, shaft along +z): the fixed part, and the half that opens toward +x.
 // The other half is the mirror image. The halves rotate about the y axis at z = pivot by up to `opening` radians each.

@@ -92,6 +92,47 @@ TEST(Pictures, TheThreadShowsInItsColor) {
   EXPECT_LT(left, blue / 4);
 }
 
+// Physics holds the thread to within a fraction of a millimeter of the particles' surface, not of the drawn one.
+TEST(Pictures, ThreadThatSankIntoTheWallIsDrawnOnIt) {
+  NEEDS_RENDERER();
+  Stage& s = stage();
+  Snapshot sunk = s.field.snapshot;
+  sunk.tool = {};
+  for (InstrumentView& tool : sunk.instrument) tool.pose.p = {0, 5, 0};
+  sunk.active().needle.pose.p = {0, 5, 0};
+  sunk.active().suture_point.clear();
+  const float toward = std::atan2(s.camera.eye.x, s.camera.eye.z);
+  const auto count = [&](float radius) {
+    for (size_t i = 0; i < sunk.active().thread_order.size(); ++i) {
+      const float a = toward - 0.5f + float(i) / float(sunk.active().thread_order.size() - 1);
+      sunk.particle[sunk.active().thread_order[i]] = {radius * std::sin(a), -0.012f, radius * std::cos(a)};
+    }
+    const Image picture = s.renderer->render(sunk, s.camera);
+    int blue = 0;
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) blue += bluish(pixel(picture, x, y));
+    return blue;
+  };
+  const int on_it = count(0.0203f);
+  ASSERT_GT(on_it, 20);
+  EXPECT_GT(count(0.0192f), 0.8f * float(on_it));  // 0.8 mm below the surface
+}
+
+TEST(Pictures, TheNeedleIsALineFromFarAway) {
+  NEEDS_RENDERER();
+  Stage& s = stage();
+  // From 1 m at 180 lines a wire of 0.66 mm is a quarter of a pixel wide.
+  Camera far = s.camera;
+  far.eye = far.target + normalized(far.eye - far.target) * 0.5f;
+  Snapshot without = s.field.snapshot;
+  without.active().needle.pose.p = {0, 5, 0};
+  const Image bare = s.renderer->render(without, far), picture = s.renderer->render(s.field.snapshot, far);
+  // The needle's arc, 26 mm, covers as many pixels as it is long.
+  const float pixels = kHeight * s.field.model.suture[0].needle_radius * s.field.model.suture[0].needle_arc /
+                       (2 * 0.5f * std::tan(0.5f * far.fov_deg * kPi / 180));
+  EXPECT_GT(difference(bare, picture), int(0.5f * pixels));
+}
+
 TEST(Pictures, MovingAParticleMovesThePicture) {
   NEEDS_RENDERER();
   Stage& s = stage();

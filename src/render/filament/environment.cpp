@@ -51,12 +51,12 @@ const std::vector<Head>& heads() {
 // Radiance from direction d, in units of the environment's intensity.
 Vec3 radiance(Vec3 d) {
   // Walls: pale above the horizon, the drape's green from below.
-  const Vec3 ceiling{0.70f, 0.74f, 0.78f}, wall{0.62f, 0.66f, 0.68f}, floor{0.30f, 0.36f, 0.35f};
+  const Vec3 ceiling{0.92f, 0.96f, 1.00f}, wall{0.54f, 0.58f, 0.60f}, floor{0.20f, 0.26f, 0.25f};
   // Gowned people round the table: a dim band with gaps, at the height that instruments reflect.
   const float people = smooth_step(-0.15f, 0.05f, d.y) * (1 - smooth_step(0.25f, 0.45f, d.y)) *
                        smooth_step(-0.2f, 0.5f, std::sin(5 * std::atan2(d.x, d.z) + 0.6f));
   Vec3 c = d.y > 0 ? lerp(wall, ceiling, d.y) : lerp(wall * 0.75f, floor, smooth_step(0, 0.45f, -d.y));
-  c = lerp(c, {0.26f, 0.36f, 0.38f}, 0.6f * people);
+  c = lerp(c, {0.10f, 0.16f, 0.17f}, 0.8f * people);
   for (const Head& h : heads()) {
     const float near = dot(d, h.middle);
     if (near > h.fade) c += h.light * smooth_step(h.fade, h.full, near);

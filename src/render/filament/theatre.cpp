@@ -40,6 +40,8 @@ Theatre::Theatre(filament::Engine& engine, const PictureModel& model, Quality qu
   make_materials();
   make_stage();
   thread_ = make_thread_view(engine_, *scene_, model_, thread_material_);
+  set_cloth(thread_, std::move(cloth_position_), std::move(cloth_normal_));
+  for (const ToolView3d& tool : tool_) thread_.hull.push_back(tool_hull(tool.shape));
   mark_ = make_mark_view(engine_, *scene_, mark_material_);
 }
 
@@ -47,6 +49,7 @@ Theatre::~Theatre() {
   for (TissueView& t : tissue_) destroy_mesh(engine_, *scene_, t.gpu);
   for (ToolView3d& t : tool_)
     for (GpuMesh& m : t.part) destroy_mesh(engine_, *scene_, m);
+  for (GpuMesh& m : scenery_) destroy_mesh(engine_, *scene_, m);
   for (GpuMesh& m : needle_) destroy_mesh(engine_, *scene_, m);
   for (GpuMesh* m : {&bed_, &thread_.gpu, &mark_.gpu}) destroy_mesh(engine_, *scene_, *m);
   for (GpuMesh& m : cloth_) destroy_mesh(engine_, *scene_, m);
@@ -108,8 +111,12 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
   for (TissueView& t : tissue_) move_tissue(engine_, t, motion_, snapshot);
   move_thread(engine_, thread_, model_, snapshot, tissue_, motion_, cameras[0], pixel);
   move_marks(engine_, mark_, snapshot, tissue_, motion_);
-  for (size_t i = 0; i < std::min(needle_.size(), snapshot.suture.size()); ++i)
-    catgut::set_pose(engine_, needle_[i], snapshot.suture[i].needle.pose);
+  const Vec3 ahead = normalized(cameras[0].target - cameras[0].eye, {0, 0, -1});
+  for (size_t i = 0; i < std::min(needle_.size(), snapshot.suture.size()); ++i) {
+    const Pose& pose = snapshot.suture[i].needle.pose;
+    catgut::set_pose(engine_, needle_[i], pose);
+    if (is_finite(pose.p)) widen_needle(i, 0.9f * pixel * std::max(0.0f, dot(pose.p - cameras[0].eye, ahead)));
+  }
   for (size_t i = 0; i < std::min(tool_.size(), snapshot.instrument.size()); ++i) move_tool(tool_[i], snapshot.instrument[i]);
   show_markers(snapshot, suture_points);
 }
@@ -217,6 +224,11 @@ void Theatre::make_stage() {
     tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_));
     all.insert(all.end(), mesh.position.begin(), mesh.position.end());
   }
+  if (!model_.scenery.empty()) {
+    make_scenery(all);
+    make_needles_and_tools();
+    return;
+  }
   // The drape's height is the model's. An organ that protrudes has a hole with a clearance of a centimeter; one that lies on it
   // is held by gauze at its far end.
   Vec3 ground{model_.focus.x, model_.drape, model_.focus.z};
@@ -244,6 +256,38 @@ void Theatre::make_stage() {
     add_cloth(swab_shape(mesh.position, away, ground.y), 14, sample, true);
     add_cloth(cushion_shape(middle, away, -0.022f, 0.03f, box.low.y + 0.001f, ground.y), 14, sample, true);
   }
+  make_needles_and_tools();
+}
+
+void Theatre::make_scenery(std::span<const Vec3> tissue) {
+  std::vector<Vec3> sample;
+  for (size_t i = 0; i < tissue.size(); i += 12) sample.push_back(tissue[i]);
+  for (const Scenery& part : model_.scenery) {
+    Shape shape;
+    shape.position = part.position, shape.normal = part.normal, shape.color = part.color;
+    shape.uv = part.uv, shape.triangle = part.triangle;
+    for (const Vec3 n : part.normal) shape.tangent.push_back(any_perpendicular(n));
+    switch (part.kind) {
+      case SceneryKind::skin:
+        add_cloth(shape, 0, sample, false);
+        break;
+      case SceneryKind::drape:
+        add_cloth(shape, 22, sample, false);
+        break;
+      case SceneryKind::anoderm:
+        scenery_.push_back(make_mesh(engine_, *scene_, shape, tissue_material_, true, true));
+        break;
+      case SceneryKind::steel:
+        scenery_.push_back(make_mesh(engine_, *scene_, shape, tool_material_, true));
+        break;
+      case SceneryKind::elastic:
+        scenery_.push_back(make_mesh(engine_, *scene_, shape, thread_material_, true));
+        break;
+    }
+  }
+}
+
+void Theatre::make_needles_and_tools() {
   for (const SuturePicture& suture : model_.suture)
     needle_.push_back(make_mesh(engine_, *scene_, needle_shape(suture), needle_material_, true));
   tool_.resize(model_.instrument.size());
@@ -266,6 +310,8 @@ void Theatre::add_cloth(const Shape& cloth, float threads_per_cm, std::span<cons
     const float lamp = 0.86f * std::max(0.0f, dot(n, normalized(-kLampDirection))), room = 0.42f * open * (0.5f + 0.5f * n.y);
     look[i] = {{c.x, c.y, c.z, threads_per_cm}, {cloth.uv[i][0], cloth.uv[i][1]}, {lamp + room, lamp / (lamp + room)}};
   }
+  cloth_position_.insert(cloth_position_.end(), cloth.position.begin(), cloth.position.end());
+  cloth_normal_.insert(cloth_normal_.end(), cloth.normal.begin(), cloth.normal.end());
   cloth_.push_back(make_mesh(engine_, *scene_, cloth, drape_material_, casts_shadow));
   set_look(engine_, cloth_.back(), look);
   Shape over = cloth;
@@ -273,6 +319,16 @@ void Theatre::add_cloth(const Shape& cloth, float threads_per_cm, std::span<cons
     over.position[i] += cloth.normal[i] * 0.0001f;  // never coplanar with the cloth, to avoid z-fighting
   cloth_.push_back(make_mesh(engine_, *scene_, over, shadow_material_, false));
   set_look(engine_, cloth_.back(), look);
+}
+
+void Theatre::widen_needle(size_t i, float least_radius) {
+  needle_least_.resize(needle_.size(), 0);
+  const SuturePicture& suture = model_.suture[i];
+  if (least_radius <= suture.needle_wire_radius) least_radius = 0;
+  if (std::abs(least_radius - needle_least_[i]) <= 0.1f * needle_least_[i]) return;
+  needle_least_[i] = least_radius;
+  const Shape shape = needle_shape(suture, least_radius);
+  set_surface(engine_, needle_[i], shape.position, shape.normal, shape.tangent);
 }
 
 void Theatre::move_tool(const ToolView3d& view, const InstrumentView& tool) {

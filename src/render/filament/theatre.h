@@ -61,9 +61,13 @@ class Theatre {
   filament::MaterialInstance* instance_of(std::span<const uint8_t> package);
   void make_materials();
   void make_stage();
+  void make_scenery(std::span<const Vec3> tissue);
+  void make_needles_and_tools();
   // Rebuilds the tissue's surface after a cut has changed it.
   void follow_topology(const TopologyView& topology);
   void add_cloth(const Shape& cloth, float threads_per_cm, std::span<const Vec3> tissue, bool casts_shadow);
+  // Without multisampling a thin wire far away would show as dots, or not at all.
+  void widen_needle(size_t i, float least_radius);
   void move_tool(const ToolView3d& view, const InstrumentView& tool);
   void show_markers(const Snapshot& snapshot, bool wanted);
 
@@ -87,10 +91,13 @@ class Theatre {
   std::vector<TissueView> tissue_;
   ThreadView thread_;
   MarkView mark_;
-  std::vector<ToolView3d> tool_;  // like PictureModel::instrument
-  std::vector<GpuMesh> needle_;   // per suture
+  std::vector<ToolView3d> tool_;     // like PictureModel::instrument
+  std::vector<GpuMesh> needle_;      // per suture
+  std::vector<float> needle_least_;  // [m] minimum radius of each as drawn
   GpuMesh bed_;
-  std::vector<GpuMesh> cloth_;  // each with the shadows on it
+  std::vector<GpuMesh> scenery_;
+  std::vector<GpuMesh> cloth_;                       // each with the shadows on it
+  std::vector<Vec3> cloth_position_, cloth_normal_;  // of all cloth, until the thread has them
   std::vector<GpuMesh> marker_;
 };
 

@@ -2,6 +2,7 @@
 // render/filament/thread_view: see thread_view.h.
 #include "render/filament/thread_view.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "exchange/strand.h"
@@ -33,6 +34,145 @@ void add_strand(ThreadView& view, float width, bool guide = false) {
   smooth_curve(view.through, kPerSpan, view.piece);
   add_piece(view, view.piece, width, guide);
   view.through.clear();
+}
+
+// Where a point of the thread lies: free or on a surface; in one wall; between the walls that one bite joins.
+constexpr uint8_t kThroughWalls = 0, kOutside = 1, kInWall = 2;
+constexpr float kTissueReach = 0.004f, kClothReach = 0.007f;  // [m] maximum depth of a thread that is lifted out
+
+// The tissue's surface near p: position and normal. `side`: the side of the wall that the thread lies on, updated. A thread
+// between the two sides of a wall belongs to the side that it was on before.
+bool tissue_surface(const ThreadView& view, std::span<const TissueView> tissue, const Motions& motion, Vec3 p, int& side,
+                    Vec3& at, Vec3& normal) {
+  constexpr float other_side = 0.0025f;  // [m] how much farther the other side counts
+  float least = 1;
+  size_t body = 0;
+  uint32_t vertex = 0;
+  for (size_t b = 0; b < tissue.size(); ++b) {
+    const std::vector<TissueLayer>& layer = tissue[b].mesh->layer;
+    view.grid[b].near(p, [&](uint32_t v, float d2) {
+      if (v >= layer.size()) return;  // the copy of a vertex on a texture seam
+      const bool other = side >= 0 && layer[v] != TissueLayer::cut_edge && int(layer[v]) != side;
+      const float cost = d2 + (other ? other_side * other_side : 0);
+      if (cost < least) least = cost, body = b, vertex = v;
+    });
+  }
+  if (least >= kTissueReach * kTissueReach) {
+    side = -1;
+    return false;
+  }
+  if (const TissueLayer layer = tissue[body].mesh->layer[vertex]; layer != TissueLayer::cut_edge) side = int(layer);
+  const Skinned here = follow(tissue[body].vertex[vertex], motion.of);
+  at = tissue[body].drawn[vertex], normal = rotate(here.frame, {0, 0, 1});
+  return true;
+}
+
+struct Lift {
+  std::span<const TissueView> tissue;
+  const Motions* motion;
+  const Snapshot* snapshot;
+  size_t suture;
+  float width;    // [m] half the drawn thread's
+  float deepest;  // [m] what lies deeper is inside the wall
+};
+
+// Moves the curve's points that lie outside the wall (view.outside) out of tissue, cloth and instruments.
+void lift_piece(ThreadView& view, const Lift& lift) {
+  const size_t n = view.piece.size();
+  view.moved = view.piece;
+  const auto out_of_tissue = [&](std::vector<Vec3>& curve) {
+    int side = -1;
+    for (size_t i = 0; i < n; ++i) {
+      if (view.outside[i] != kOutside) continue;
+      Vec3 at, normal;
+      if (!tissue_surface(view, lift.tissue, *lift.motion, curve[i], side, at, normal)) continue;
+      const float height = dot(curve[i] - at, normal);
+      if (height < lift.width && height > -lift.deepest) curve[i] += normal * (lift.width - height);
+    }
+  };
+  out_of_tissue(view.moved);
+  // Inside a bent wall the straight way from hole to hole may come out of it.
+  constexpr float below = 0.0003f, above = 0.0015f;  // [m]
+  for (size_t i = 0; i < n; ++i) {
+    int side = -1;
+    Vec3 at, normal;
+    if (view.outside[i] != kInWall || !tissue_surface(view, lift.tissue, *lift.motion, view.moved[i], side, at, normal))
+      continue;
+    const float height = dot(view.moved[i] - at, normal);
+    if (height > -below && height < above) view.moved[i] -= normal * (height + below);
+  }
+  // Displacements of neighbors differ where the nearest vertices do: smoothed, then once more for what the smoothing sank.
+  for (int pass = 0; pass < 2; ++pass) {
+    Vec3 before = n > 0 ? view.moved[0] - view.piece[0] : Vec3{};
+    for (size_t i = 1; i + 1 < n; ++i) {
+      const Vec3 here = view.moved[i] - view.piece[i], next = view.moved[i + 1] - view.piece[i + 1];
+      if (view.outside[i] == kOutside && view.outside[i - 1] == kOutside && view.outside[i + 1] == kOutside)
+        view.moved[i] = view.piece[i] + 0.25f * before + 0.5f * here + 0.25f * next;
+      before = here;
+    }
+  }
+  out_of_tissue(view.moved);
+  for (size_t i = 0; i < n; ++i) {
+    if (view.outside[i] != kOutside) continue;
+    Vec3& p = view.moved[i];
+    float least = 1;
+    uint32_t nearest = 0;
+    view.cloth_grid.near(p, [&](uint32_t v, float d2) {
+      if (d2 < least) least = d2, nearest = v;
+    });
+    if (least < 1) {
+      const Vec3 normal = view.cloth_normal[nearest];
+      const float height = dot(p - view.cloth[nearest], normal);
+      if (height < lift.width) p += normal * (lift.width - height);
+    }
+    for (const ToolView& tool : lift.snapshot->tool) {
+      if (tool.instrument < 0 || size_t(tool.instrument) >= view.hull.size()) continue;
+      // What the jaws hold passes between them.
+      constexpr float held = 0.0035f;
+      if (tool.held != Held::nothing && tool.held != Held::tissue && tool.held_suture == lift.suture &&
+          distance(p, tool.pose.p) < held)
+        continue;
+      p = outside_tool(view.hull[size_t(tool.instrument)], tool.pose, tool.jaw, p, lift.width);
+    }
+  }
+  view.piece.swap(view.moved);
+}
+
+// A strand through view.through; view.node_outside states which of its nodes lie outside the wall.
+void add_lifted_strand(ThreadView& view, const Lift& lift) {
+  smooth_curve(view.through, kPerSpan, view.piece);
+  view.outside.assign(view.piece.size(), kThroughWalls);
+  for (size_t i = 0; i < view.piece.size(); ++i) {
+    const size_t a = i / kPerSpan, b = std::min(a + (i % kPerSpan ? 1 : 0), view.through.size() - 1);
+    if (view.node_outside[a] == view.node_outside[b]) view.outside[i] = view.node_outside[a];
+  }
+  lift_piece(view, lift);
+  add_piece(view, view.piece, lift.width);
+  view.through.clear(), view.node_outside.clear();
+}
+
+// Per node of the suture's thread: between the entry and the exit of a bite it is inside.
+void find_outside(const SutureView& suture, std::vector<uint8_t>& outside) {
+  const size_t n = suture.thread_order.size();
+  outside.assign(n, kOutside);
+  const auto node = [&](uint32_t slot) {
+    return size_t(std::find(suture.thread_order.begin(), suture.thread_order.end(), slot) - suture.thread_order.begin());
+  };
+  for (const SuturePointView& point : suture.suture_point) {
+    if (point.exit) continue;
+    const size_t from = node(point.anchored);
+    size_t to = n;  // a bite under way: as far as the needle
+    uint8_t where = kThroughWalls;
+    for (const SuturePointView& other : suture.suture_point)
+      if (other.exit && other.bite == point.bite) {
+        to = node(other.anchored);
+        if (other.wall == point.wall) where = kInWall;
+      }
+    if (from >= n) continue;
+    for (size_t i = std::min(from, to) + 1; i < std::max(from, to) && i < n; ++i) outside[i] = where;
+    // Neighbors on the thread: the span between them is inside although both ends are not.
+    if (to < n && std::max(from, to) - std::min(from, to) <= 1) outside[from] = outside[to] = where;
+  }
 }
 
 Vec3 normal_at(Nearest at, std::span<const TissueView> tissue, const Motions& motion) {
@@ -103,13 +243,16 @@ void write_tube(ThreadView& view, const Surface& surface) {
 
 // A suture's thread in its pieces, and the guide to its needle.
 void add_suture(ThreadView& view, const SuturePicture& model, const SutureView& suture, std::span<const Vec3> particle,
-                float width, bool guide) {
+                const Lift& lift, bool guide) {
+  const float width = lift.width;
+  find_outside(suture, view.thread_outside);
   for (size_t i = 0; i < suture.thread_order.size(); ++i) {
     const uint32_t slot = suture.thread_order[i];
-    if (slot < particle.size() && is_finite(particle[slot])) view.through.push_back(particle[slot]);
-    if (i < suture.thread_cut.size() && suture.thread_cut[i]) add_strand(view, width);
+    if (slot < particle.size() && is_finite(particle[slot]))
+      view.through.push_back(particle[slot]), view.node_outside.push_back(view.thread_outside[i]);
+    if (i < suture.thread_cut.size() && suture.thread_cut[i]) add_lifted_strand(view, lift);
   }
-  add_strand(view, width);
+  add_lifted_strand(view, lift);
   const Pose& needle = suture.needle.pose;
   if (!guide || !suture.needle.in_tissue || suture.needle.bite >= suture.bite.size() || !is_finite(needle.p)) return;
   // It follows the needle's own arc as far as the needle extends, which is the path that the thread will take.
@@ -137,7 +280,7 @@ ThreadView make_thread_view(filament::Engine& engine, filament::Scene& scene, co
       triangle.push_back({a, a + 1, b});
       triangle.push_back({a + 1, b + 1, b});
     }
-  for (auto* v : {&view.through, &view.piece, &view.curve}) v->reserve(view.capacity);
+  for (auto* v : {&view.through, &view.piece, &view.curve, &view.moved}) v->reserve(view.capacity);
   view.radius.reserve(view.capacity);
   view.guide.reserve(view.capacity);
   view.gpu = make_mesh(engine, scene, view.look, triangle, material, true);
@@ -151,10 +294,13 @@ void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel&
   view.curve.clear(), view.radius.clear(), view.guide.clear(), view.through.clear();
   const Vec3 ahead = normalized(camera.target - camera.eye);
   const float seen = 0.75f * pixel * std::max(0.0f, dot(camera.target - camera.eye, ahead));  // [m] minimum visible width
+  view.grid.resize(tissue.size());
+  for (size_t b = 0; b < tissue.size(); ++b) view.grid[b].build(tissue[b].drawn, kTissueReach);
   size_t tied = 0;
   for (size_t i = 0; i < std::min(model.suture.size(), snapshot.suture.size()); ++i) {
     const float width = std::max(model.suture[i].thread_radius, seen);
-    add_suture(view, model.suture[i], snapshot.suture[i], snapshot.particle, width, model.visual_guide);
+    add_suture(view, model.suture[i], snapshot.suture[i], snapshot.particle,
+               {tissue, &motion, &snapshot, i, width, kTissueReach}, model.visual_guide);
     for (const KnotView& knot : snapshot.suture[i].knot) {
       const Vec3 out = normal_at(tissue_at(view.on_tissue, tied++, knot.position, kKnotReach, tissue), tissue, motion);
       for (uint32_t k = 0; k < std::min<uint32_t>(knot.throws, KnotView::kMaxThrows); ++k)
@@ -165,8 +311,10 @@ void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel&
   const float width = std::max(model.suture.front().thread_radius, seen);
   for (const SettledView& stitch : snapshot.settled) {
     view.through.assign(stitch.node.begin(), stitch.node.end());
+    view.node_outside.assign(view.through.size(), kOutside);
     const Vec3 way = stitch.node.size() > 1 ? normalized(stitch.node.back() - stitch.node.front(), {1, 0, 0}) : Vec3{1, 0, 0};
-    add_strand(view, width);
+    // It does not say which parts are inside the wall: those that are deeper than a strand on the surface can sink.
+    add_lifted_strand(view, {tissue, &motion, &snapshot, SIZE_MAX, width, 0.0009f});
     for (const Vec3& at : stitch.knot) {
       const Vec3 out = normal_at(tissue_at(view.on_tissue, tied++, at, kKnotReach, tissue), tissue, motion);
       add_throw(view, at, way, out, 0.8f * width, 2, 1, width);
@@ -183,6 +331,11 @@ void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel&
   upload_surface(engine, view.gpu, surface, bounds(surface.position));
   set_look(engine, view.gpu, std::span(view.look).first(size_t(used) * kRing));
   set_drawn(engine, view.gpu, (used - 1) * kSides * 2);
+}
+
+void set_cloth(ThreadView& view, std::vector<Vec3> position, std::vector<Vec3> normal) {
+  view.cloth = std::move(position), view.cloth_normal = std::move(normal);
+  view.cloth_grid.build(view.cloth, kClothReach);
 }
 
 namespace {

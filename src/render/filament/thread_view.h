@@ -10,6 +10,7 @@
 #include "render/camera.h"
 #include "render/filament/mesh.h"
 #include "render/filament/tissue_view.h"
+#include "render/thread_path.h"
 
 namespace catgut {
 
@@ -21,10 +22,18 @@ struct ThreadView {
   std::vector<Nearest> on_tissue;  // per knot, then per knot of baked sutures: the tissue below it
   std::vector<VertexLook> look;
   GpuMesh gpu;
+  // What the thread is kept out of: the tissue of this frame, the cloth, the instruments (as PictureModel::instrument).
+  std::vector<PointGrid> grid;  // per body
+  std::vector<Vec3> cloth, cloth_normal;
+  PointGrid cloth_grid;
+  std::vector<ToolHull> hull;
+  std::vector<Vec3> moved;                                     // scratch of move_thread
+  std::vector<uint8_t> outside, node_outside, thread_outside;  // likewise: per point of the piece, of `through`, of the thread
 };
 
 ThreadView make_thread_view(filament::Engine& engine, filament::Scene& scene, const PictureModel& model,
                             filament::MaterialInstance* material);
+void set_cloth(ThreadView& view, std::vector<Vec3> position, std::vector<Vec3> normal);
 // pixel: [m] that one pixel covers at 1 m from the camera; sets the minimum width of the thread.
 void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel& model, const Snapshot& snapshot,
                  std::span<const TissueView> tissue, const Motions& motion, const Camera& camera, float pixel);

@@ -247,6 +247,54 @@ void blanch(filament::Engine& engine, TissueView& view, const Snapshot& snapshot
   if (changed) set_live(engine, view.gpu, view.live);
 }
 
+// The pieces of thread round the opening that a purse-string closes, in order. Empty: none is being closed.
+void find_gathers(TissueView& view, const Snapshot& snapshot) {
+  constexpr float begun = 0.02f;  // of Snapshot::closure
+  view.gather.clear();
+  if (snapshot.closure <= begun || view.round.next.empty()) return;
+  const auto angle_of = [&](Vec3 p) {
+    constexpr float reach = 0.004f;
+    float least = reach * reach, angle = -1;
+    for (size_t v = 0; v < view.round.angle.size(); ++v)
+      if (const float d = length2(view.position[v] - p); d < least) least = d, angle = view.round.angle[v];
+    return angle;
+  };
+  struct Point {
+    float angle;
+    uint32_t bite;
+  };
+  std::vector<Point> point;
+  for (const SuturePointView& p : snapshot.active().suture_point)
+    if (const float a = angle_of(p.position); a >= 0) point.push_back({a, p.bite});
+  if (point.size() < 6) return;
+  std::sort(point.begin(), point.end(), [](const Point& a, const Point& b) { return a.angle < b.angle; });
+  for (size_t i = 0; i < point.size(); ++i) {
+    const Point &a = point[i], &b = point[(i + 1) % point.size()];
+    view.gather.push_back({a.angle, b.angle + (i + 1 == point.size() ? 1.0f : 0.0f), a.bite == b.bite});
+  }
+}
+
+// Folds the drawn wall where the opening is gathered.
+void pucker(TissueView& view, const Motions& motion, const Surface& surface) {
+  if (view.gather.empty()) return;
+  for (size_t i = 0; i < view.vertex.size(); ++i) {
+    const uint32_t v = view.source[i], next = view.round.next[v];
+    if (next == RoundOrgan::kNone || view.round.step[v] <= 0) continue;
+    const Vec3 step = view.position[next] - view.position[v];
+    const Fold fold = fold_at(view.gather, view.round.angle[v], length(step) / view.round.step[v], view.round.length);
+    if (std::abs(fold.out) < 1e-5f && std::abs(fold.slope) < 0.02f) continue;
+    const Skinned here = follow(view.vertex[i], motion.of);
+    const Vec3 out = rotate(here.frame * conjugate(view.vertex[i].frame), view.round.outward[v]);
+    const Vec3 normal = rotate(here.frame, {0, 0, 1}), along = normalized(step, {1, 0, 0});
+    const Vec3 turned = normalized(normal - along * (fold.slope * dot(normal, out)), normal), axis = cross(normal, turned);
+    view.drawn[i] += out * fold.out;
+    surface.position[i] = view.drawn[i];
+    if (const float sine = length(axis); sine > 1e-4f)
+      surface.frame[i] =
+          pack_frame(axis_angle(axis / sine, std::atan2(sine, dot(normal, turned))) * here.frame, view.mirrored[i]);
+  }
+}
+
 }  // namespace
 
 TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, const VisibleMesh& mesh,
@@ -283,6 +331,9 @@ TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, co
     view.position.push_back(mesh.position[v]);
     view.frame.push_back(pack_frame(view.vertex[i].frame, view.mirrored[i]));
   }
+  view.round = round_organ(mesh);
+  view.source = flat.source;
+  view.drawn = view.position;
   view.live.resize(n);
   view.press.assign(n, 0);
   view.gpu = make_mesh(engine, scene, look, flat.triangle, material, true, true);
@@ -299,6 +350,9 @@ void move_tissue(filament::Engine& engine, TissueView& view, const Motions& moti
   const Surface surface = new_surface(uint32_t(view.vertex.size()));
   std::copy(view.position.begin(), view.position.end(), surface.position.begin());
   std::copy(view.frame.begin(), view.frame.end(), surface.frame.begin());
+  view.drawn = view.position;
+  find_gathers(view, snapshot);
+  pucker(view, motion, surface);
   // Of the particles, which are fewer: no vertex is farther from them than this.
   constexpr Vec3 margin{0.006f, 0.006f, 0.006f};
   const Box3 box = bounds(motion.seen);

@@ -8,6 +8,7 @@
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "render/filament/mesh.h"
+#include "render/pucker.h"
 #include "render/skinned.h"
 
 namespace catgut {
@@ -22,7 +23,11 @@ struct TissueView {
   const VisibleMesh* mesh = nullptr;  // the model's
   std::vector<SkinnedVertex> vertex;  // as drawn; vertices on a texture seam are drawn twice
   std::vector<uint8_t> mirrored;      // whether the texture runs clockwise there
-  std::vector<Vec3> position;         // as drawn, of the last frame
+  std::vector<Vec3> position;         // skinned, of the last frame
+  std::vector<Vec3> drawn;            // the same with the folds of a gathered opening
+  RoundOrgan round;                   // of the first vertices: those of the mesh
+  std::vector<uint32_t> source;       // per vertex: that of the mesh
+  std::vector<Gather> gather;
   std::vector<PackedFrame> frame;
   std::vector<VertexLive> live;
   std::vector<float> press;  // per vertex, of this frame

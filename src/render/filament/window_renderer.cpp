@@ -65,9 +65,11 @@ class FilamentWindow final : public WindowRenderer {
     theatre_.reset();
     if (!model) return;
     theatre_ = std::make_unique<Theatre>(*engine_, *model, quality);
+    coarse_ = 1, still_s_ = 0, sharp_ = false;
   }
 
   void set_resolution_scale(float part) override {
+    coarse_ = part;
     if (theatre_) theatre_->set_resolution_scale(part);
   }
 
@@ -94,6 +96,7 @@ class FilamentWindow final : public WindowRenderer {
     }
     if (!begun) return false;
     const bool field = theatre_ && frame.snapshot;
+    if (field) sharpen(frame);
     if (field) theatre_->show(*frame.snapshot, frame.camera, width_, height_, frame.suture_points);
     // Without a field, the panels' view clears the previous image.
     panel_view_->setBlendMode(field ? filament::View::BlendMode::TRANSLUCENT : filament::View::BlendMode::OPAQUE);
@@ -118,6 +121,22 @@ class FilamentWindow final : public WindowRenderer {
   }
 
  private:
+  // A picture in which nothing moves may take longer: it is drawn at the window's whole resolution.
+  void sharpen(const Frame& frame) {
+    const bool moved = frame.snapshot->tick != last_tick_ || distance(frame.camera.eye, last_eye_) > 1e-5f ||
+                       distance(frame.camera.target, last_target_) > 1e-5f;
+    last_tick_ = frame.snapshot->tick, last_eye_ = frame.camera.eye, last_target_ = frame.camera.target;
+    still_s_ = moved ? 0 : still_s_ + frame.dt;
+    const bool sharp = still_s_ > kStill;
+    if (sharp != sharp_ && coarse_ < 1) theatre_->set_resolution_scale(sharp ? 1 : coarse_);
+    sharp_ = sharp;
+  }
+
+  static constexpr float kStill = 0.4f;  // [s]
+  uint64_t last_tick_ = 0;
+  Vec3 last_eye_, last_target_;
+  float coarse_ = 1, still_s_ = 0;
+  bool sharp_ = false;
   std::unique_ptr<filament::backend::Platform> platform_;
   filament::Engine* engine_ = nullptr;
   filament::SwapChain* chain_ = nullptr;
