@@ -125,16 +125,35 @@ void lift_piece(ThreadView& view, const Lift& lift) {
       const float height = dot(p - view.cloth[nearest], normal);
       if (height < lift.width) p += normal * (lift.width - height);
     }
-    for (const ToolView& tool : lift.snapshot->tool) {
-      if (tool.instrument < 0 || size_t(tool.instrument) >= view.hull.size()) continue;
-      // What the jaws hold passes between them.
-      constexpr float held = 0.0035f;
-      if (tool.held != Held::nothing && tool.held != Held::tissue && tool.held_suture == lift.suture &&
-          distance(p, tool.pose.p) < held)
-        continue;
-      p = outside_tool(view.hull[size_t(tool.instrument)], tool.pose, tool.jaw, p, lift.width);
+  }
+  const auto out_of_tools = [&] {
+    for (size_t i = 0; i < n; ++i) {
+      if (view.outside[i] != kOutside) continue;
+      Vec3& p = view.moved[i];
+      for (const ToolView& tool : lift.snapshot->tool) {
+        if (tool.instrument < 0 || size_t(tool.instrument) >= view.hull.size()) continue;
+        // What the jaws hold passes between them.
+        constexpr float held = 0.0035f;
+        if (tool.held != Held::nothing && tool.held != Held::tissue && tool.held_suture == lift.suture &&
+            distance(p, tool.pose.p) < held)
+          continue;
+        p = outside_tool(view.hull[size_t(tool.instrument)], tool.pose, tool.jaw, p, lift.width);
+      }
+    }
+  };
+  out_of_tools();
+  // Where a strand enters an outline it would step aside within one point: it bends there instead.
+  for (int pass = 0; pass < 2; ++pass) {
+    Vec3 before = n > 0 ? view.moved[0] : Vec3{};
+    for (size_t i = 1; i + 1 < n; ++i) {
+      const Vec3 here = view.moved[i];
+      if (view.outside[i - 1] == kOutside && view.outside[i] == kOutside && view.outside[i + 1] == kOutside &&
+          (distance(view.moved[i], view.piece[i]) > lift.width || distance(view.moved[i + 1], view.piece[i + 1]) > lift.width))
+        view.moved[i] = 0.25f * before + 0.5f * here + 0.25f * view.moved[i + 1];
+      before = here;
     }
   }
+  out_of_tools();
   view.piece.swap(view.moved);
 }
 
