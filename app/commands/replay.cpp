@@ -39,8 +39,11 @@ int replay(const ReplayOptions& o) {
   };
   hooks.on_tick = [&, ticks = uint64_t{0}, head = size_t{0}](const Snapshot& seen, const std::string&) mutable {
     if (procedure) procedure->tick(seen);
-    for (; o.from_head && pictures && head < recording.head.size() && recording.head[head].tick <= ticks; ++head)
-      pictures->look_from(recording.head[head].pose);
+    for (; pictures && head < recording.head.size() && recording.head[head].tick <= ticks; ++head) {
+      const Pose& at = recording.head[head].pose;
+      if (o.from_head) pictures->look_from(at);
+      else pictures->mark_gaze(at);
+    }
     ++ticks;
     if (pictures) pictures->tick(seen, {});
   };

@@ -77,7 +77,12 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
     if (radio("scripted surgeon", watch)) watch = true;
   }
   hand_choice(settings);
+  if (v.headset_offered || v.headset_on) {
+    bool on = v.headset_on;
+    if (ImGui::Checkbox("headset (OpenXR)", &on)) choice.what = Chosen::headset;
+  }
   ImGui::PushStyleColor(ImGuiCol_Text, kQuiet);
+  if (!v.headset.empty()) ImGui::TextWrapped("%s", v.headset.c_str());
   ImGui::TextWrapped("%s", v.pad.empty() ? "mouse, keyboard or gamepad" : ("mouse, keyboard, " + v.pad).c_str());
   ImGui::PopStyleColor();
   gap();
@@ -155,6 +160,11 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& m
     ImGui::SameLine();
     ImGui::SetNextItemWidth(14 * em());
     ImGui::SliderFloat("##left", &s.force_left, 0.2f, 2, "left %.2f x", ImGuiSliderFlags_AlwaysClamp);
+    row("headset");
+    ImGui::Checkbox("remove tremor", &s.steady_hands);
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(14 * em());
+    ImGui::SliderFloat("##scale", &s.hand_scale, 0.2f, 1, "motion %.2f x", ImGuiSliderFlags_AlwaysClamp);
     row("jaws");
     ImGui::Checkbox("hold button to close", &s.hold_to_close);
     row("grasp assist");

@@ -2,7 +2,9 @@
 // app/window: the panels over the image, drawn with Dear ImGui. They show their arguments and return the user's choice;
 // they change nothing themselves.
 #pragma once
+#include <array>
 #include <deque>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,6 +31,8 @@ struct StartView {
   std::string message;                                   // error, one line
   std::string pad;                                       // name of the gamepad; empty: none
   bool watch_only = false;                               // the command line has selected the surgeon
+  bool headset_offered = false, headset_on = false;      // a runtime is installed; a session was asked for
+  std::string headset;                                   // its last report
 };
 
 struct LogLine {
@@ -51,6 +55,7 @@ struct WorkView {
   bool watching = false;  // the scripted surgeon works
   bool inside = false;    // the developers' panel uses the lower part of the window
   double pictures_per_s = 0;
+  std::string headset;  // its state, one line; empty: none
 };
 
 struct ResultView {
@@ -70,7 +75,8 @@ struct PlayedView {
   const PlaybackStatus* status = nullptr;
   const LiveResult* result = nullptr;  // of the scanned part
   const Snapshot* seen = nullptr;
-  std::string file, version, cut;  // cut: position and cause of a truncated recording
+  std::string file, version, cut;            // cut: position and cause of a truncated recording
+  std::optional<std::array<float, 2>> gaze;  // [pixels] the point that a headset's wearer looked at; none: not known
 };
 
 // Each may change the settings; `watch`: the scripted surgeon works.

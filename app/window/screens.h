@@ -46,6 +46,7 @@ enum class Chosen {
   park,
   arms_off,  // switches force of haptic devices off, or on
   developer,
+  headset,  // connects to one, or leaves it
   picture,
   quit,
 };

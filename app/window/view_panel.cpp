@@ -45,6 +45,12 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
     if (line.find(" N") != std::string::npos || line.find("needle in tissue") != std::string::npos)
       about.push_back({kText, line});
   lines_at("recording", 0, 0, 0.66f, about);
+  if (v.gaze) {
+    ImDrawList& over = *ImGui::GetBackgroundDrawList();
+    const ImVec2 at{(*v.gaze)[0], (*v.gaze)[1]};
+    over.AddCircle(at, 1.1f * em(), ImGui::GetColorU32(kAccent), 32, 2);
+    over.AddText({at.x + 1.3f * em(), at.y - 0.5f * em()}, ImGui::GetColorU32(kAccent), "wearer looks here");
+  }
 
   // Recent events, up to the shown moment.
   std::vector<Line> happened;

@@ -132,18 +132,8 @@ class Window {
       if (!events_) throw InputError(options.events, "cannot be written", "choose another place");
     }
     resized();
-    if (options.headset) {
-      xr::WearerOptions wear;
-      wear.font = shared_path(kFont);
-      wear.hands = space_hands();
-      if (const std::string path = settings_path(); !path.empty())
-        wear.room_file = (std::filesystem::path(path).parent_path() / "rooms.toml").string();
-      wear.whole_resolution = options.eye_pictures;
-      wear.room = options.room;
-      wear.register_arms = options.register_arms;
-      wear.report = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
-      wearer_ = std::make_unique<xr::Wearer>(wear);
-    }
+    headset_offered_ = xr::headset_offered();
+    if (options.headset) wear();
   }
   ~Window() {
     if (events_ && events_ != stdout) std::fclose(events_);
@@ -193,6 +183,26 @@ class Window {
   }
 
  private:
+  // Connects to a headset. What it reports is printed, and shown on the start screen.
+  void wear() {
+    xr::WearerOptions wear;
+    wear.font = shared_path(kFont);
+    wear.hands = space_hands();
+    if (const std::string path = settings_path(); !path.empty())
+      wear.room_file = (std::filesystem::path(path).parent_path() / "rooms.toml").string();
+    wear.whole_resolution = options_.eye_pictures;
+    wear.room = options_.room;
+    wear.register_arms = options_.register_arms;
+    wear.report = [this](const std::string& line) {
+      std::fprintf(stderr, "catgut: %s\n", line.c_str());
+      headset_line_ = line;
+    };
+    headset_line_.clear();
+    board_styled_ = false;
+    wearer_.reset();
+    wearer_ = std::make_unique<xr::Wearer>(wear);
+  }
+
   // --- scenes and recordings
   // -----------------------------------------------------------------------------------------------------------------
   void open(const std::string& name, const std::string& procedure = "", const std::string& stage = "", bool tutorial = false) {
@@ -431,6 +441,15 @@ class Window {
       case Chosen::developer:
         developer_ = !developer_;
         break;
+      case Chosen::headset:
+        if (!wearer_ || wearer_->failed()) {
+          wear();
+        } else {
+          wearer_.reset();
+          worn_ = had_worn_ = false;
+          headset_line_.clear();
+        }
+        break;
       case Chosen::picture:
         picture_wanted_ = true;
         break;
@@ -457,9 +476,9 @@ class Window {
     if (viewing_) facts.second = std::max<int64_t>(1, std::llround(1 / viewing_->playback.status().tick_s));
     carry_out(choice_of_key(in, facts));
     if (wearer_) wishes();
-    // The wearer of a headset does not need the window's focus.
-    if (((in.left && !(wearer_ && wearer_->in_use())) || in.pad_gone) && screen_ == Screen::practice && visit_ &&
-        !visit_->watching)
+    // The wearer of a headset does not need the window's focus, also while the session starts.
+    if (((in.left && !(wearer_ && wearer_->state() != xr::HeadsetState::off)) || in.pad_gone) && screen_ == Screen::practice &&
+        visit_ && !visit_->watching)
       go(Screen::pause);
     if (visit_) field(in, dt);
     if (viewing_) {
@@ -530,7 +549,11 @@ class Window {
     xr::Wearer::Picture eyes;
     eyes.snapshot = seen;
     eyes.working = screen_ == Screen::practice;
-    eyes.suture_points = settings_.suture_points || (visit_ && settings_.guidance == Guidance::learn);
+    eyes.walk = screen_ == Screen::results || screen_ == Screen::view;
+    eyes.suture_points =
+        settings_.suture_points || (visit_ && settings_.guidance == Guidance::learn) || screen_ == Screen::results;
+    for (const PlacedPanel& p : board_placed_)  // as drawn last
+      if (eyes.working && p.name == "procedure") eyes.caption = {p.rect.x, p.rect.y, p.rect.x + p.rect.w, p.rect.y + p.rect.h};
     eyes.panels = [&] {
       if (!std::exchange(board_styled_, true)) style_panels(1.4f);
       on_board_ = true;
@@ -663,15 +686,22 @@ class Window {
 
   Choice panels() {
     if (screen_ == Screen::start)
-      return start_panel({&scenes_, &recordings_, message_, events_in_.pad_name(), !options_.live.surgeon.empty()}, settings_,
-                         watch_);
+      return start_panel({&scenes_, &recordings_, message_, events_in_.pad_name(), !options_.live.surgeon.empty(),
+                          headset_offered_, wearer_ && !wearer_->failed(), headset_line_},
+                         settings_, watch_);
     if (screen_ == Screen::settings) return settings_panel(settings_, short_name(settings_path()), message_, visit_ != nullptr);
     if (screen_ == Screen::results) { return result_panel(results_, colored_by_); }
     Settings shown = settings_;
     if (height_ < 480) shown.hints = false;
     if (viewing_ && viewing_->have) {
       const Viewing& v = *viewing_;
-      return view_panel({&v.playback.scene(), &v.playback.status(), &v.result, &v.seen, v.file, v.version, v.cut}, shown);
+      PlayedView played{&v.playback.scene(), &v.playback.status(), &v.result, &v.seen, v.file, v.version, v.cut, {}};
+      ScreenPoint at;
+      if (const Pose* head = v.playback.head(); head && !on_board_ &&
+                                                on_screen(gaze_point(*head, v.playback.picture(), v.seen), this->view(),
+                                                          static_cast<float>(width_), static_cast<float>(height_), at))
+        played.gaze = at;
+      return view_panel(played, shown);
     }
     if (!visit_ || !visit_->have) return {};
     WorkView view;
@@ -687,6 +717,7 @@ class Window {
     view.watching = visit_->watching;
     view.inside = developer_;
     view.pictures_per_s = picture_count_ / std::max(picture_s_, 1e-3);
+    if (wearer_ && !wearer_->failed()) view.headset = wearer_->status_line();
     WorkText work{&view, procedure_.get(), tutorial_, {}, used_keys_};
     if (!visit_->live.status().settling) work.guide = guide();
     if (on_board_) {  // beside the field: nothing to keep clear of
@@ -737,6 +768,8 @@ class Window {
   std::unique_ptr<WindowRenderer> renderer_;
   std::unique_ptr<xr::Wearer> wearer_;  // null: no headset was requested
   bool worn_ = false;                   // the headset wants this frame
+  bool headset_offered_ = false;
+  std::string headset_line_;  // its last report
   bool had_worn_ = false, board_styled_ = false, on_board_ = false;
   double mirrored_ = 0;  // [s]
   WindowEvents events_in_;

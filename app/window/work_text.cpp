@@ -66,6 +66,7 @@ Panel state_panel(const WorkView& v, const Settings& settings, bool procedure) {
   line.push_back({Tone::quiet, clock_text(s.metrics.time_s) + "   " + pace});
   if (slow) line.push_back({Tone::bad, "! below real time"});
   if (!procedure) line.push_back({Tone::quiet, fmt::format("tick {:.1f} ms, {:.1f} fps", s.tick_ms, v.pictures_per_s)});
+  if (!v.headset.empty()) line.push_back({Tone::quiet, v.headset});
   if (silent) line.push_back({Tone::quiet, "exam: no feedback"});
   else
     for (const std::string& text : technique_lines(*v.scene, *v.seen, s.metrics)) line.push_back({Tone::normal, text});

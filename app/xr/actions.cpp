@@ -8,8 +8,6 @@
 namespace catgut::xr {
 namespace {
 
-constexpr float kPinchShut = 0.012f, kPinchOpen = 0.055f;  // [m] between the tips of thumb and index finger
-
 Vec3 vector_of(const XrVector3f& v) { return {v.x, v.y, v.z}; }
 
 XrPath path_of(XrInstance instance, const char* text) {
@@ -29,24 +27,16 @@ bool located(XrSpace space, XrSpace base, XrTime time, Pose& out) {
   return is_finite(out.p);
 }
 
-// The pinch: between thumb and index finger, -z from the knuckles ahead, x from thumb to index.
 bool pinch_of(const XrHandJointLocationEXT* joint, HandState& hand) {
   constexpr XrSpaceLocationFlags wanted = XR_SPACE_LOCATION_POSITION_VALID_BIT | XR_SPACE_LOCATION_POSITION_TRACKED_BIT;
-  for (const XrHandJointEXT j : {XR_HAND_JOINT_THUMB_TIP_EXT, XR_HAND_JOINT_INDEX_TIP_EXT, XR_HAND_JOINT_INDEX_PROXIMAL_EXT,
-                                 XR_HAND_JOINT_THUMB_PROXIMAL_EXT})
-    if ((joint[j].locationFlags & wanted) != wanted) return false;
-  const Vec3 thumb = vector_of(joint[XR_HAND_JOINT_THUMB_TIP_EXT].pose.position);
-  const Vec3 index = vector_of(joint[XR_HAND_JOINT_INDEX_TIP_EXT].pose.position);
-  const Vec3 back = 0.5f * (vector_of(joint[XR_HAND_JOINT_INDEX_PROXIMAL_EXT].pose.position) +
-                            vector_of(joint[XR_HAND_JOINT_THUMB_PROXIMAL_EXT].pose.position));
-  const Vec3 middle = 0.5f * (thumb + index);
-  // Across the knuckles and not between the tips: those touch when the pinch is closed.
-  const Vec3 across = vector_of(joint[XR_HAND_JOINT_INDEX_PROXIMAL_EXT].pose.position) -
-                      vector_of(joint[XR_HAND_JOINT_THUMB_PROXIMAL_EXT].pose.position);
-  const Vec3 z = normalized(back - middle), y = normalized(cross(z, across), any_perpendicular(z));
-  hand.tracked = hand.articulated = true;
-  hand.grip = hand.aim = {middle, from_axes(cross(y, z), y, z)};
-  hand.trigger = 1 - std::clamp((distance(thumb, index) - kPinchShut) / (kPinchOpen - kPinchShut), 0.0f, 1.0f);
+  constexpr XrHandJointEXT kJoints[] = {XR_HAND_JOINT_THUMB_TIP_EXT, XR_HAND_JOINT_INDEX_TIP_EXT,
+                                        XR_HAND_JOINT_THUMB_PROXIMAL_EXT, XR_HAND_JOINT_INDEX_PROXIMAL_EXT};
+  std::array<Vec3, 4> p;
+  for (size_t i = 0; i < 4; ++i) {
+    if ((joint[kJoints[i]].locationFlags & wanted) != wanted) return false;
+    p[i] = vector_of(joint[kJoints[i]].pose.position);
+  }
+  pinch({p[0], p[1], p[2], p[3]}, hand);
   return true;
 }
 

@@ -22,6 +22,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -36,6 +38,7 @@ namespace {
 constexpr double kRetry = 2;            // [s] between attempts to find a lost headset again
 constexpr int64_t kSrgb = 0x8C43;       // GL_SRGB8_ALPHA8
 constexpr double kImagePatience = 0.5;  // [s] for an image that the runtime still reads
+constexpr double kEnding = 1;           // [s] for the runtime to end the session
 constexpr float kRecent = 0.05f;        // share of a new value in the averages of HeadsetCounts
 
 std::string name_of(XrInstance instance, XrResult result) {
@@ -64,6 +67,23 @@ const char* headset_state_name(HeadsetState state) {
       return "focused";
   }
   return "";
+}
+
+// Search order: OpenXR loader specification, section 3 (active runtime on Linux).
+bool headset_offered() {
+  const auto value = [](const char* name, const std::string& otherwise) {
+    const char* given = std::getenv(name);
+    return given && given[0] ? std::string(given) : otherwise;
+  };
+  std::error_code error;
+  if (const std::string file = value("XR_RUNTIME_JSON", ""); !file.empty()) return std::filesystem::exists(file, error);
+  std::vector<std::string> folders{value("XDG_CONFIG_HOME", value("HOME", "") + "/.config")};
+  std::istringstream more(value("XDG_CONFIG_DIRS", "/etc/xdg") + ":/etc");
+  for (std::string one; std::getline(more, one, ':');) folders.push_back(one);
+  for (const std::string& folder : folders)
+    for (const char* name : {"active_runtime.json", "active_runtime.x86_64.json"})
+      if (std::filesystem::exists(std::filesystem::path(folder) / "openxr/1" / name, error)) return true;
+  return false;
 }
 
 struct Headset::Work {
@@ -114,6 +134,8 @@ struct Headset::Work {
   void make_instance();
   void make_session();
   void make_images();
+  void poll_events();
+  void end_session();
   void close_session();
   void close_instance();
   void handle(const XrEventDataBuffer& event);
@@ -264,6 +286,38 @@ void Headset::Work::make_images() {
     renderer->set_images(i, names, e.width, e.height);
   }
   view.fill({XR_TYPE_VIEW});
+}
+
+void Headset::Work::poll_events() {
+  for (int i = 0; i < 64 && !lost; ++i) {
+    XrEventDataBuffer event{XR_TYPE_EVENT_DATA_BUFFER};
+    const XrResult r = xrPollEvent(instance, &event);
+    if (r != XR_SUCCESS) {
+      if (XR_FAILED(r)) check(r, "xrPollEvent");
+      break;
+    }
+    handle(event);
+  }
+}
+
+// Out of a running session in the specified order: STOPPING, xrEndSession, EXITING. Frames without a picture until then: a
+// runtime may wait for them.
+void Headset::Work::end_session() {
+  options.report = {};
+  if (!session || !running || lost || XR_FAILED(xrRequestExitSession(session))) return;
+  const double until = wall_seconds() + kEnding;
+  while (!lost && wall_seconds() < until) {
+    poll_events();
+    if (!running || lost) continue;
+    renderer->make_current();
+    frame_state = {XR_TYPE_FRAME_STATE};
+    if (!check(xrWaitFrame(session, nullptr, &frame_state), "xrWaitFrame")) break;
+    if (!check(xrBeginFrame(session, nullptr), "xrBeginFrame")) break;
+    XrFrameEndInfo end{XR_TYPE_FRAME_END_INFO};
+    end.displayTime = frame_state.predictedDisplayTime;
+    end.environmentBlendMode = XR_ENVIRONMENT_BLEND_MODE_OPAQUE;
+    if (!check(xrEndFrame(session, &end), "xrEndFrame")) break;
+  }
 }
 
 void Headset::Work::close_session() {
@@ -418,6 +472,7 @@ Headset::Headset(const HeadsetOptions& options) : work_(std::make_unique<Work>()
 }
 
 Headset::~Headset() {
+  work_->end_session();
   work_->close_instance();
   work_->renderer.reset();
 }
@@ -437,15 +492,7 @@ bool Headset::poll() {
     if (w.retry_at > 0 && wall_seconds() >= w.retry_at) w.connect();
     return false;
   }
-  for (int i = 0; i < 64 && !w.lost; ++i) {
-    XrEventDataBuffer event{XR_TYPE_EVENT_DATA_BUFFER};
-    const XrResult r = xrPollEvent(w.instance, &event);
-    if (r != XR_SUCCESS) {
-      if (XR_FAILED(r)) w.check(r, "xrPollEvent");
-      break;
-    }
-    w.handle(event);
-  }
+  w.poll_events();
   return w.running && !w.lost;
 }
 

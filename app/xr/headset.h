@@ -26,6 +26,9 @@ enum class HeadsetState : uint8_t {
 };
 const char* headset_state_name(HeadsetState state);
 
+// Whether a runtime is installed and active on this machine, by the files that OpenXR's loader reads. Loads nothing.
+bool headset_offered();
+
 struct HeadsetOptions {
   std::string font;                                // of the board
   bool whole_resolution = false;                   // never less than the recommended size: for pictures

@@ -9,6 +9,7 @@ struct Headset::Work {
 };
 
 const char* headset_state_name(HeadsetState) { return "off"; }
+bool headset_offered() { return false; }
 Headset::Headset(const HeadsetOptions& options) : work_(std::make_unique<Work>()) {
   if (options.report)
     options.report("headset: this build has none (CATGUT_XR=OFF); the session continues in the window (docs/headset.md)");

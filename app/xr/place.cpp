@@ -34,6 +34,13 @@ bool move_table(Place& place, float step, const Pose& head) {
   return true;
 }
 
+void carry(Place& place, const Pose& from, const Pose& to) {
+  const Quat turned = to.q * conjugate(from.q);
+  const float angle = 2 * std::atan2(turned.y, turned.w);
+  place.at = to.p + rotate(turn(angle), place.at - from.p);
+  place.yaw -= angle;
+}
+
 bool change_loupe(Place& place, int step) {
   int now = 0;
   for (size_t i = 0; i < std::size(kLoupe); ++i)

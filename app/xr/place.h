@@ -27,6 +27,9 @@ struct Place {
 void recenter(Place& place, const Pose& head);
 // Moves the table. step: [m] up. Returns false at a limit.
 bool move_table(Place& place, float step, const Pose& head);
+// The wearer takes hold of the field and carries it: the point in the hand stays in the hand, and the field turns about the
+// vertical only. from, to: poses of the hand in the room.
+void carry(Place& place, const Pose& from, const Pose& to);
 // The next or previous magnification; the field's center stays where it is.
 bool change_loupe(Place& place, int step);
 

@@ -7,10 +7,11 @@
 namespace catgut::xr {
 namespace {
 
-constexpr float kReach = 0.11f;        // [m] from the grip's center to the jaws
-constexpr float kTilt = 0.6f;          // [rad] of the shaft below the grip's -z
-constexpr float kFingerReach = 0.05f;  // [m] from the pinch to the jaws
-constexpr float kPulled = 0.6f;        // of the trigger: it holds
+constexpr float kReach = 0.11f;                            // [m] from the grip's center to the jaws
+constexpr float kTilt = 0.6f;                              // [rad] of the shaft below the grip's -z
+constexpr float kFingerReach = 0.05f;                      // [m] from the pinch to the jaws
+constexpr float kPinchShut = 0.012f, kPinchOpen = 0.055f;  // [m] between the tips of thumb and index finger
+constexpr float kPulled = 0.6f;                            // of the trigger: it holds
 
 float low_pass_share(float cutoff, float dt) {
   const float tau = 1 / (2 * kPi * cutoff);
@@ -24,6 +25,16 @@ Pose grip_to_tool(bool articulated, float loupe) {
 }
 
 }  // namespace
+
+void pinch(const Fingers& f, HandState& hand) {
+  const Vec3 back = 0.5f * (f.index_knuckle + f.thumb_knuckle), middle = 0.5f * (f.thumb_tip + f.index_tip);
+  // Across the knuckles and not between the tips: those touch when the pinch is closed.
+  const Vec3 across = f.index_knuckle - f.thumb_knuckle;
+  const Vec3 z = normalized(back - middle), y = normalized(cross(z, across), any_perpendicular(z));
+  hand.tracked = hand.articulated = true;
+  hand.grip = hand.aim = {middle, from_axes(cross(y, z), y, z)};
+  hand.trigger = 1 - std::clamp((distance(f.thumb_tip, f.index_tip) - kPinchShut) / (kPinchOpen - kPinchShut), 0.0f, 1.0f);
+}
 
 Pose Steady::filter(const Pose& measured, float dt) {
   if (!started || dt <= 0) {

@@ -8,6 +8,7 @@
 
 #include "core/check.h"
 #include "runtime/metrics_collector.h"
+#include "xr/boards.h"
 
 namespace catgut::xr {
 namespace {
@@ -45,6 +46,7 @@ void Wearer::settle_place() {
   } else {
     recenter(place_, frame_.head);
   }
+  stand_ = place_;
   placed_ = true;
   brightness_ = 0;
 }
@@ -95,11 +97,14 @@ bool Wearer::begin() {
   if (frame_.posed && (!placed_ || frame_.recentered)) settle_place();
   brightness_ = std::min(1.0f, brightness_ + dt_ / kFade);
   buttons(dt_);
+  carry_field();
   return true;
 }
 
 void Wearer::stage(const PictureModel* model, Quality quality) {
   model_ = model;
+  if (placed_)
+    place_.at = stand_.at, place_.yaw = stand_.yaw;  // where results were carried to does not matter to the next scene
   if (model) place_.focus = model->focus;
   if (EyeRenderer* eyes = headset_.renderer()) eyes->stage(model, quality);
   hands_ = {};
@@ -129,7 +134,8 @@ void Wearer::buttons(float dt) {
     menu_held_ = 0;
     menu_used_ = false;
   }
-  if (up != 0 && frame_.posed) move_table(place_, kTableSpeed * dt * up, frame_.head);
+  if (up != 0 && frame_.posed && move_table(place_, kTableSpeed * dt * up, frame_.head))
+    stand_.at.y = place_.at.y, stand_.height = place_.height;
   if (flick != 0 && !flick_was_ && change_loupe(place_, flick > 0 ? 1 : -1)) brightness_ = 0;
   flick_was_ = flick != 0;
 }
@@ -169,17 +175,17 @@ std::optional<Camera> Wearer::mirror() const {
   return eye_camera(eye, frame_.frustum[0], std::max(0.05f, distance(eye.p, place_.focus)));
 }
 
-// Room frame to world; beside and behind the field while it is worked on, else above it.
-Board Wearer::board(bool working) const {
-  const Quat turn = axis_angle({0, 1, 0}, -place_.yaw);
-  const Vec3 offset = working ? Vec3{0.36f, 0.14f, -0.16f} : Vec3{0, 0.30f, -0.22f};
-  const Vec3 at = place_.at + rotate(turn, offset);
-  const Vec3 eyes = place_.at + rotate(turn, {0, -place_.height, kAhead});
-  const Vec3 z = normalized(eyes - at, {0, 0, 1}), x = normalized(cross({0, 1, 0}, z), {1, 0, 0});
-  Board b;
-  b.pose = place_.to_world(Pose{at, from_axes(x, cross(z, x), z)});
-  b.width = (working ? 0.34f : 0.62f) / place_.loupe;
-  return b;
+// The field turns and moves with the hand, so that a wearer can look at a result from all sides.
+void Wearer::carry_field() {
+  const bool held = carried_ && walk_ && frame_.hand[carrier_].tracked && frame_.hand[carrier_].clutch;
+  if (held) {
+    carry(place_, *carried_, frame_.hand[carrier_].grip);
+    carried_ = frame_.hand[carrier_].grip;
+    return;
+  }
+  carried_.reset();
+  for (size_t side = 0; side < 2 && walk_ && placed_; ++side)
+    if (frame_.hand[side].tracked && frame_.hand[side].clutch) carried_ = frame_.hand[carrier_ = side].grip;
 }
 
 // The ray of the hand that pulled its trigger last, as a mouse on the board.
@@ -192,8 +198,7 @@ void Wearer::point(EyeRenderer::Frame& frame, const Board& b) {
   const Vec3 from = to_local(b.pose, aim.p), along = rotate(conjugate(b.pose.q), rotate(aim.q, {0, 0, -1}));
   if (along.z >= -1e-3f || from.z <= 0) return;
   const Vec3 hit = from + along * (from.z / -along.z);
-  const float tall = b.width * EyeRenderer::kBoardHeight / EyeRenderer::kBoardWidth;
-  const float x = hit.x / b.width + 0.5f, y = 0.5f - hit.y / tall;
+  const float x = hit.x / b.width + 0.5f, y = 0.5f - hit.y / height_of(b);
   if (x < 0 || x > 1 || y < 0 || y > 1) return;
   frame.pointer = {{x * EyeRenderer::kBoardWidth, y * EyeRenderer::kBoardHeight}};
   frame.pressed = h.trigger > 0.5f;
@@ -209,7 +214,9 @@ void Wearer::draw(const Picture& picture) {
   frame.suture_points = picture.suture_points;
   frame.brightness = brightness_;
   frame.dt = dt_;
-  frame.board = board(picture.working);
+  frame.board = board_at(stand_, place_, picture.working);
+  if (picture.caption[2] > picture.caption[0]) frame.caption = caption_at(stand_, place_, picture.caption);
+  walk_ = picture.walk;
   if (!picture.working) point(frame, *frame.board);
   frame.panels = picture.panels;
   if (picture.copy) frame.copy = &picture_;
@@ -232,6 +239,16 @@ void Wearer::draw(const Picture& picture) {
   to_submit_.push_back(ms(s.ready_ns, now));
   to_photon_.push_back(ms(now, frame_.shown_ns));
   all_.push_back(ms(s.moved_ns, frame_.shown_ns));
+}
+
+std::string Wearer::status_line() const {
+  const HeadsetCounts& c = headset_.counts();
+  char text[120];
+  const double rate = frame_.period_ns > 0 ? 1e9 / static_cast<double>(frame_.period_ns) : 0;
+  std::snprintf(text, sizeof text, "headset %s, %.0f Hz, %llu of %llu late, resolution %.0f %%", headset_state_name(state()),
+                rate, static_cast<unsigned long long>(c.late), static_cast<unsigned long long>(c.frames),
+                100.0 * static_cast<double>(c.resolution));
+  return text;
 }
 
 void Wearer::report_budget() const {

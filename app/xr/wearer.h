@@ -74,32 +74,38 @@ class Wearer {
   struct Picture {
     const Snapshot* snapshot = nullptr;
     bool working = false;  // the hands hold instruments: the board stands beside the field and cannot be pointed at
+    bool walk = false;     // results or a replay: a hand with the clutch pressed takes hold of the field and carries it
     bool suture_points = false;
     std::function<void()> panels;
+    std::array<float, 4> caption{};      // [pixels] part of the board that is shown near the work; empty: none
     const LiveStatus* status = nullptr;  // for the budget; null: none
     bool copy = false;
   };
   void draw(const Picture& picture);
   const WearerLook& look() const { return look_; }
   void leave() { headset_.leave(); }
+  // One line for a panel: state, frames and late frames, resolution.
+  std::string status_line() const;
   // Motion-to-photon budget and late pictures as a table on standard error.
   void report_budget() const;
 
  private:
   void buttons(float dt);
+  void carry_field();
   void settle_place();
   void touch(const Snapshot& seen, std::array<bool, 2> arm);
   void report(const std::string& line) const {
     if (given_.report) given_.report(line);
   }
   void point(EyeRenderer::Frame& frame, const Board& board);
-  Board board(bool working) const;
 
   WearerOptions given_;
   Headset headset_;
   HeadsetFrame frame_;
-  Place place_;
-  bool placed_ = false, open_ = false, working_ = false;
+  Place place_, stand_;  // of the field; where the wearer was placed, for the boards
+  bool placed_ = false, open_ = false, walk_ = false;
+  std::optional<Pose> carried_;  // room: the hand that holds the field, in the last frame
+  size_t carrier_ = 0;
   SpaceHands hands_;
   SpaceHandOptions options_;
   RoomSettings room_;

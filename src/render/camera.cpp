@@ -2,6 +2,7 @@
 // render/camera: see camera.h.
 #include "render/camera.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <iterator>
@@ -125,6 +126,29 @@ Interest decisive(const PictureModel& model, const Snapshot& snapshot) {
 Camera eye_camera(const Pose& eye, const Frustum& frustum, float work) {
   const float vertical = std::atan(frustum.up) - std::atan(frustum.down);
   return {eye.p, eye.p + rotate(eye.q, {0, 0, -work}), rotate(eye.q, {0, 1, 0}), vertical * 180 / kPi, frustum};
+}
+
+bool project(const Camera& camera, Vec3 point, float width, float height, float& x, float& y) {
+  const Vec3 ahead = normalized(camera.target - camera.eye), right = normalized(cross(ahead, camera.up));
+  const Vec3 up = cross(right, ahead), d = point - camera.eye;
+  const float deep = dot(d, ahead), half = std::tan(0.5f * camera.fov_deg * kPi / 180);
+  if (deep <= 0) return false;
+  x = 0.5f * width + 0.5f * height * dot(d, right) / (deep * half);
+  y = 0.5f * height - 0.5f * height * dot(d, up) / (deep * half);
+  return true;
+}
+
+Vec3 gaze_point(const Pose& head, const PictureModel& picture, const Snapshot& seen) {
+  constexpr float kNear = 0.052f;  // tangent of three degrees
+  const Vec3 ahead = rotate(head.q, {0, 0, -1});
+  float least = 0;
+  const size_t count = std::min(picture.particle_rest.size(), seen.particle.size());
+  for (size_t i = 0; i < count; ++i) {
+    const Vec3 d = seen.particle[i] - head.p;
+    const float deep = dot(d, ahead);
+    if (deep > 0 && (least == 0 || deep < least) && length(d - ahead * deep) < kNear * deep) least = deep;
+  }
+  return head.p + ahead * (least > 0 ? least : distance(head.p, picture.focus));
 }
 
 Camera overview(const PictureModel& model) {

@@ -21,8 +21,15 @@ struct Camera {
   Frustum frustum{};              // replaces fov_deg
 };
 
+// Position in an image of that size [pixels], from its upper left corner. False: behind the camera. Without a frustum.
+bool project(const Camera& camera, Vec3 point, float width, float height, float& x, float& y);
+
 // The camera at a headset's eye, which looks along -z. work: [m] distance of what it looks at, for near plane and shadows.
 Camera eye_camera(const Pose& eye, const Frustum& frustum, float work);
+
+// The point that a headset's wearer looks at, by the direction of the head: no eye is tracked. The first tissue within three
+// degrees of it, else the point at the distance of the field's center.
+Vec3 gaze_point(const Pose& head, const PictureModel& picture, const Snapshot& seen);
 
 // The whole operating field from the surgeon's side.
 Camera overview(const PictureModel& model);

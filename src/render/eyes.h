@@ -37,9 +37,10 @@ struct GlHandles {
 
 // A board with panels.
 struct Board {
-  Pose pose;              // its center, in the world; it faces its +z
-  float width = 0.5f;     // [m] in the world
-  Vec3 ray_from, ray_to;  // [m] a thin rod from the pointing hand; equal: none
+  Pose pose;                              // its center, in the world; it faces its +z
+  float width = 0.5f;                     // [m] in the world
+  Vec3 ray_from, ray_to;                  // [m] a thin rod from the pointing hand; equal: none
+  std::array<float, 4> part{0, 0, 1, 1};  // of the panels' picture: left, top, right, bottom
 };
 
 // Belongs to the thread that created it.
@@ -66,9 +67,10 @@ class EyeRenderer {
     std::array<uint32_t, 2> image{};     // index of set_images
     int width = 0, height = 0;           // [pixels] the part of the image, from its lower left corner
     bool suture_points = false;
-    float brightness = 1;                         // 0 black: fades when the wearer's place changes
+    float brightness = 1;                         // rises from 0 after the wearer's place has changed; below 0.5: dark
     float dt = 1.0f / 90;                         // [s] since the last frame, for the panels
     std::optional<Board> board;                   // none: not shown
+    std::optional<Board> caption;                 // a second one with the same contents; its ray is not drawn
     std::function<void()> panels;                 // calls ImGui; empty: the board keeps its previous contents
     std::optional<std::array<float, 2>> pointer;  // [pixels] of the board, from its upper left corner
     bool pressed = false;                         // the pointer's button
@@ -77,6 +79,11 @@ class EyeRenderer {
   // Returns when the images may be given back to the runtime. False: the driver refused the frame.
   virtual bool draw(const Frame& frame) = 0;
 };
+
+// [m] in the world
+inline float height_of(const Board& b) {
+  return b.width * (b.part[3] - b.part[1]) * EyeRenderer::kBoardHeight / ((b.part[2] - b.part[0]) * EyeRenderer::kBoardWidth);
+}
 
 // font: as make_window_renderer. Throws std::runtime_error with one line.
 std::unique_ptr<EyeRenderer> make_eye_renderer(GlBinding binding, const std::string& font);

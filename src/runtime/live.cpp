@@ -214,7 +214,7 @@ void Live::Work::publish_view() {
   LiveView& view = view_box.draft();
   view.before = before, view.now = now;
   view.at = Clock::now();
-  view.tick_wall_s = dt / static_cast<double>(kLiveSpeeds[speed]);
+  view.tick_wall_s = period();
   published.speed = kLiveSpeeds[speed];
   const char* off = published.arms_off ? "switched off (F9)" : arms_drive() ? "" : "off while it does not move the instrument";
   for (size_t k = 0; haptics && k < 2; ++k)
@@ -354,13 +354,12 @@ void Live::Work::main_loop() {
     wall_s = wall_s * keep + passed;
     simulated_s = simulated_s * keep + dt;
     published.time_factor = static_cast<float>(simulated_s / std::max(wall_s, 1e-6));
-    const double period = dt / static_cast<double>(kLiveSpeeds[speed]);
-    due += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(period));
+    due += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(period()));
     const double behind = seconds_of(done - due);
     if (stepping) {
       due = done;
-    } else if (behind > kCatchUp * period) {
-      published.late += static_cast<uint64_t>(behind / period);
+    } else if (behind > kCatchUp * period()) {
+      published.late += static_cast<uint64_t>(behind / period());
       due = done;
     }
     publish_view();

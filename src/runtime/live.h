@@ -53,6 +53,7 @@ struct LiveOptions {
   std::string surgeon;      // as `catgut run --surgeon`; empty: the hands of hand()
   float hand_speed = 0.6f;  // [m/s] and
   float hand_turn = 12.0f;  // [rad/s] maximum of a tool: a jumping input (a mouse at a low frame rate) then tears nothing
+  float pace = 1;           // of real time at full speed; above 1 for tests that need not wait
   bool start_paused = false;
   std::shared_ptr<const Procedure> procedure;  // observed tick by tick; null: none
   size_t stage = 0;       // the first one: from its saved state, or after the surgeon has done those before

@@ -147,6 +147,7 @@ struct Live::Work {
   void finish_assessment();
   void remember_stage();
   void record_from_here();
+  double period() const { return dt / static_cast<double>(kLiveSpeeds[speed] * options.pace); }  // [s] wall time of a tick
   void forget_pace() { wall_s = simulated_s = 0; }
   size_t hand_of(size_t arm) const { return options.arm_hand[haptics->side(arm)]; }
   // The device that moves a hand, -1: none.

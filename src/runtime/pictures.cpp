@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -49,7 +50,7 @@ struct Pictures::Studio {
   std::unique_ptr<VideoWriter> film;
   FollowCamera follow;
   Camera camera;
-  std::optional<Pose> head;
+  std::optional<Pose> head, gaze;
   std::optional<Camera> fixed;
   double next_s = 0, last_s = -1, last_moment_s = 0;  // [s] simulated
   size_t frame = 0;
@@ -80,7 +81,23 @@ struct Pictures::Studio {
              : fixed                     ? *fixed
              : options.camera == "close" ? close_up(model, seen)
                                          : follow.update(seen, static_cast<float>(dt));
-    return renderer->render(seen, camera, {});
+    Image picture = renderer->render(seen, camera, {});
+    if (gaze) draw_gaze(picture, gaze_point(*gaze, model, seen));
+    return picture;
+  }
+
+  void draw_gaze(Image& picture, Vec3 at) const {
+    constexpr float kRing = 0.035f, kLine = 1.2f;  // of the image's height; [pixels]
+    const float w = static_cast<float>(picture.width), h = static_cast<float>(picture.height), r = kRing * h;
+    float x = 0, y = 0;
+    if (!project(camera, at, w, h, x, y)) return;
+    for (int py = std::max(0, static_cast<int>(y - r - 2)); py < std::min(picture.height, static_cast<int>(y + r + 3)); ++py)
+      for (int px = std::max(0, static_cast<int>(x - r - 2)); px < std::min(picture.width, static_cast<int>(x + r + 3)); ++px) {
+        const float off = std::abs(std::hypot(static_cast<float>(px) - x, static_cast<float>(py) - y) - r);
+        if (off > kLine) continue;
+        uint8_t* p = &picture.rgba[4 * (size_t(py) * size_t(picture.width) + size_t(px))];
+        p[0] = 60, p[1] = 220, p[2] = 235;
+      }
   }
 
   // Narrower than a headset's view: the part that the wearer looks at.
@@ -167,6 +184,7 @@ Pictures::Pictures(const PictureOptions& options, const PictureModel& model)
 Pictures::~Pictures() = default;
 
 void Pictures::look_from(const Pose& head) { studio_->head = head; }
+void Pictures::mark_gaze(const Pose& head) { studio_->gaze = head; }
 
 void Pictures::tick(const Snapshot& seen, const std::string& caption) {
   guarded("pictures", [&] { studio_->tick(seen, caption); });

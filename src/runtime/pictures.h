@@ -39,6 +39,8 @@ class Pictures {
 
   // Before tick(): from now on the camera is the head of a headset's wearer [world].
   void look_from(const Pose& head);
+  // Before tick(): a ring marks what this head looks at.
+  void mark_gaze(const Pose& head);
   // caption: what is being done; may be empty.
   void tick(const Snapshot& seen, const std::string& caption);
   void finish();  // completes the film and the contact sheet; throws InputError

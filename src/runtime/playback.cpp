@@ -2,9 +2,11 @@
 // runtime: see playback.h. Comments below state which of the two threads may use Work's members.
 #include "runtime/playback.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -286,6 +288,13 @@ bool Playback::look(Snapshot& out) {
 }
 
 const PlaybackStatus& Playback::status() const { return work_->status; }
+
+const Pose* Playback::head() const {
+  const std::vector<RecordedHead>& all = work_->recording.head;
+  const auto after = std::upper_bound(all.begin(), all.end(), work_->status.at,
+                                      [](uint64_t at, const RecordedHead& h) { return at < h.tick; });
+  return after == all.begin() ? nullptr : &std::prev(after)->pose;
+}
 
 LiveResult Playback::result() const {
   const std::lock_guard lock(work_->mutex);

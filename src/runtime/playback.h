@@ -47,7 +47,9 @@ class Playback {
   void go_to(uint64_t tick);             // 0 .. ticks, also during play
   bool look(Snapshot& out);              // like Live::look
   const PlaybackStatus& status() const;  // as of the last look()
-  LiveResult result() const;             // of the scanned part; its `recorded` is the recording's name
+  // The head of the wearer at the shown tick [m, world]; null: none was recorded.
+  const Pose* head() const;
+  LiveResult result() const;  // of the scanned part; its `recorded` is the recording's name
 
  private:
   struct Work;

@@ -9,9 +9,13 @@
 #include <optional>
 
 #include "../hands/x_server.h"
+#include "procedure/procedure_file.h"
 #include "procedure/scene_file.h"
 #include "render/eyes.h"
 #include "sim/simulation.h"
+#include "window/panels.h"
+#include "window/widgets.h"
+#include "xr/boards.h"
 
 namespace catgut {
 namespace {
@@ -59,6 +63,8 @@ class Eyes : public testing::TestWithParam<GlBinding> {
  protected:
   void SetUp() override {
     if (!renderer_available()) GTEST_SKIP() << "no EGL driver here";
+    if (GetParam() == GlBinding::xlib && !std::getenv("CATGUT_LONG"))
+      GTEST_SKIP() << "CATGUT_LONG=1 runs it; session_test.cpp draws both eyes by X11 in every build";
     if (GetParam() == GlBinding::xlib) {
       if (!on_path("Xvfb")) GTEST_SKIP() << "Xvfb is missing (Debian: apt install xvfb)";
       x_ = std::make_unique<XServer>();
@@ -82,6 +88,11 @@ class Eyes : public testing::TestWithParam<GlBinding> {
     glDeleteTextures(2, texture_);
     eyes_.reset();
   }
+  void board_is_where_geometry_puts_it();
+  void panels_are_upright();
+  void caption_shows_its_part();
+  void part_of_the_image_is_drawn();
+
   std::unique_ptr<XServer> x_;
   std::unique_ptr<EyeRenderer> eyes_;
   GLuint texture_[2] = {};
@@ -90,7 +101,7 @@ class Eyes : public testing::TestWithParam<GlBinding> {
 // Field of view of a headset: more outward than toward the nose, more down than up.
 constexpr Frustum kLeft{-1.2f, 0.8f, -1.0f, 0.8f}, kRight{-0.8f, 1.2f, -1.0f, 0.8f};
 
-TEST_P(Eyes, show_a_board_where_geometry_puts_it) {
+void Eyes::board_is_where_geometry_puts_it() {
   const auto model = build_model(read_scene("stay"));
   const auto state = initial_state(*model);
   Snapshot seen;
@@ -119,6 +130,15 @@ TEST_P(Eyes, show_a_board_where_geometry_puts_it) {
       for (int i = 0; i < 2; ++i)
         write_png(image[size_t(i)],
                   std::string(folder) + (field ? "/board_field_" : "/board_") + (i ? "right.png" : "left.png"));
+    if (field) {  // after a recenter: dark, with the board
+      std::array<Image, 2> black;
+      EyeRenderer::Frame faded = frame;
+      faded.brightness = 0, faded.copy = &black;
+      ASSERT_TRUE(eyes_->draw(faded));
+      EXPECT_GT(pixel(image[0], 20, kTall - 20)[1], 80) << "the drape";
+      EXPECT_LT(pixel(black[0], 20, kTall - 20)[1], 40);
+      EXPECT_GT(white(black[0]).area, 500);
+    }
     const Center left = white(image[0]), right = white(image[1]);
     const Center want_left = expected(eye[0], kLeft, board), want_right = expected(eye[1], kRight, board);
     ASSERT_GT(left.area, 500);
@@ -133,7 +153,7 @@ TEST_P(Eyes, show_a_board_where_geometry_puts_it) {
 }
 
 // The board's upper left corner is the panels' upper left corner, and its text is not mirrored.
-TEST_P(Eyes, show_panels_upright) {
+void Eyes::panels_are_upright() {
   EyeRenderer::Frame frame;
   const Frustum f{-1, 1, -0.8f, 0.8f};
   frame.camera = {eye_camera({}, f, 0.5f), eye_camera({}, f, 0.5f)};
@@ -153,7 +173,7 @@ TEST_P(Eyes, show_panels_upright) {
 }
 
 // A part of the image: dynamic resolution draws from the lower left corner.
-TEST_P(Eyes, draw_a_part_of_the_image) {
+void Eyes::part_of_the_image_is_drawn() {
   EyeRenderer::Frame frame;
   const Frustum f{-1, 1, -1, 1};
   frame.camera = {eye_camera({}, f, 0.5f), eye_camera({}, f, 0.5f)};
@@ -165,6 +185,92 @@ TEST_P(Eyes, draw_a_part_of_the_image) {
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(eyes_->draw(frame));
   EXPECT_GT(white(image[0]).area, 0.98 * kWide / 2 * kTall / 2);
   EXPECT_GT(white(image[1]).area, 0.98 * kWide / 2 * kTall / 2);
+}
+
+// A second board shows a part of the panels, undistorted.
+void Eyes::caption_shows_its_part() {
+  EyeRenderer::Frame frame;
+  const Frustum f{-1, 1, -0.8f, 0.8f};
+  frame.camera = {eye_camera({}, f, 0.5f), eye_camera({}, f, 0.5f)};
+  frame.width = kWide, frame.height = kTall;
+  frame.caption = Board{{{0.1f, -0.1f, -0.5f}, {}}, 0.2f, {}, {}, {0.25f, 0.5f, 0.75f, 0.75f}};
+  EXPECT_NEAR(height_of(*frame.caption), 0.2f * 0.25f * 720 / (0.5f * 1280), 1e-5f);
+  frame.panels = [] {
+    ImGui::GetBackgroundDrawList()->AddRectFilled({0, 0}, {1280, 720}, 0xff000000u);
+    ImGui::GetBackgroundDrawList()->AddRectFilled({320, 360}, {960, 540}, 0xffffffffu);
+  };
+  std::array<Image, 2> image;
+  frame.copy = &image;
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(eyes_->draw(frame));
+  const Center c = white(image[0]);
+  const double tall = static_cast<double>(height_of(*frame.caption));
+  EXPECT_NEAR(c.x, kWide * (0.5 + 0.1 / 0.5 / 2), 1.5);
+  EXPECT_NEAR(c.y, kTall * (0.5 + 0.1 / 0.5 / 1.6), 1.5);
+  EXPECT_NEAR(c.area, kWide * (0.2 / 0.5 / 2) * kTall * (tall / 0.5 / 1.6), 0.12 * c.area) << "all of it is white";
+}
+
+// One test for each binding: an engine and its shaders take longer to start than all pictures.
+TEST_P(Eyes, show_boards_where_geometry_puts_them) {
+  panels_are_upright();
+  caption_shows_its_part();
+  part_of_the_image_is_drawn();
+  board_is_where_geometry_puts_it();
+}
+
+// For a look: both eyes at the size of a headset's images, with the board and the caption of a lesson's stage.
+TEST_P(Eyes, look_at_a_lesson) {
+  const char* folder = std::getenv("CATGUT_PICTURES");
+  if (!folder) GTEST_SKIP() << "writes pictures; set CATGUT_PICTURES to a folder";
+  constexpr int kBigWide = 1100, kBigTall = 1200;
+  eyes_->drop_images();
+  eyes_->make_current();
+  glDeleteTextures(2, texture_);
+  for (int i = 0; i < 2; ++i) {
+    glGenTextures(1, &texture_[i]);
+    glBindTexture(GL_TEXTURE_2D, texture_[i]);
+    glTexStorage2D(GL_TEXTURE_2D, 1, GL_SRGB8_ALPHA8, kBigWide, kBigTall);
+    eyes_->set_images(i, {&texture_[i], 1}, kBigWide, kBigTall);
+  }
+  glFinish();
+  const Procedure lesson = read_procedure("first_stitch");
+  const auto model = build_model(scene_of(lesson));
+  const auto state = initial_state(*model);
+  Snapshot seen;
+  publish(*model, *state, seen);
+  const PictureModel picture = picture_model(*model);
+  eyes_->stage(&picture, Quality::medium);
+  xr::Place place;
+  place.focus = picture.focus;
+  const Pose head{{0, 1.6f, 0}, normalized(axis_angle({0, 1, 0}, -0.25f) * axis_angle({1, 0, 0}, -0.55f))};
+  recenter(place, {head.p, {}});
+  EyeRenderer::Frame frame;
+  frame.snapshot = &seen;
+  const Pose eyes = place.to_world(head);
+  frame.camera = {eye_camera({eyes.p + rotate(eyes.q, {-0.032f, 0, 0}), eyes.q}, kLeft, 0.55f),
+                  eye_camera({eyes.p + rotate(eyes.q, {0.032f, 0, 0}), eyes.q}, kRight, 0.55f)};
+  frame.width = kBigWide, frame.height = kBigTall;
+  frame.board = board_at(place, place, true);
+  const ProcedureStage& stage = lesson.stage[2];
+  const Panel step{"procedure", {{Tone::accent, stage.title}, {Tone::normal, stage.text}}, 2, 0.2f, 0.5f, 1, 64, 0.8f};
+  const Panel now{"state", {{Tone::normal, lesson.title}, {Tone::quiet, "0:12.5   real-time factor 1.00"}}, 2, -1, 0, 0, 0,
+                  0.6f};
+  std::vector<PlacedPanel> placed;
+  frame.panels = [&] {
+    if (placed.empty()) style_panels(1.4f);
+    placed = place_panels(std::vector<Panel>{step, now}, EyeRenderer::kBoardWidth, EyeRenderer::kBoardHeight, panel_text_size(),
+                          {}, placed);
+    draw_panels(placed);
+  };
+  std::array<Image, 2> image;
+  frame.copy = &image;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(eyes_->draw(frame));
+    for (const PlacedPanel& p : placed)
+      if (p.name == "procedure")
+        frame.caption = caption_at(place, place, {p.rect.x, p.rect.y, p.rect.x + p.rect.w, p.rect.y + p.rect.h});
+  }
+  EXPECT_TRUE(frame.caption.has_value());
+  for (size_t i = 0; i < 2; ++i) write_png(image[i], std::string(folder) + (i ? "/lesson_right.png" : "/lesson_left.png"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Bindings, Eyes, testing::Values(GlBinding::egl, GlBinding::xlib),

@@ -11,6 +11,7 @@
 #include "procedure/scene_file.h"
 #include "render/camera.h"
 #include "sim/simulation.h"
+#include "xr/boards.h"
 #include "xr/register.h"
 #include "xr/resolution.h"
 #include "xr/space_hands.h"
@@ -75,6 +76,85 @@ TEST(Place, the_table_stays_within_reach) {
   EXPECT_NEAR(place.at.y - head.p.y, kHighest, 1e-5f);
   recenter(place, head_at({0, 1.2f, 0}, 1, 0));  // seated
   EXPECT_NEAR(place.at.y - 1.2f, kHighest, 1e-5f) << "the height is kept";
+}
+
+// A result is carried around: the point in the hand stays in the hand, and the field stays level.
+TEST(Place, a_carried_field_follows_the_hand) {
+  Place place;
+  place.focus = {0.01f, 0.02f, -0.03f};
+  place.loupe = 2;
+  recenter(place, head_at({0.3f, 1.6f, -1}, 0.4f, -0.5f));
+  const Pose from{place.at + Vec3{0.05f, 0.02f, 0.1f}, axis_angle({1, 0, 0}, 0.2f)};
+  const Pose to{from.p + Vec3{-0.1f, 0.03f, 0.2f}, normalized(axis_angle({0, 1, 0}, 0.7f) * from.q)};
+  const Vec3 held = place.to_world(from.p), other = held + Vec3{0, 0.01f, 0};
+  const float before = place.yaw;
+  carry(place, from, to);
+  EXPECT_LT(distance(place.to_world(to.p), held), 1e-5f);
+  EXPECT_LT(distance(place.to_room(other) - to.p, {0, 0.02f, 0}), 1e-5f) << "up stays up";
+  EXPECT_NEAR(before - place.yaw, 0.7f, 1e-4f);
+}
+
+// Text of 0.7 degrees a line is read without leaning forward; at the lowest table it stays above half a degree. No panel comes
+// between the eyes and the field.
+TEST(Boards, are_legible_and_never_over_the_field) {
+  for (const float loupe : kLoupe)
+    for (const float height : {-kBelow, kLowest, kHighest}) {
+      Place place;
+      place.focus = {0.1f, 0.05f, 0};
+      place.height = height, place.loupe = loupe;
+      const Pose head = head_at({0.2f, 1.5f, 0.3f}, 1.1f, -0.6f);
+      recenter(place, head);
+      EXPECT_LT(distance(eyes_at(place), head.p), 1e-4f);
+      const float least = height == -kBelow ? 0.7f : 0.5f;
+      const Board beside = board_at(place, place, true), above = board_at(place, place, false);
+      const Board caption = caption_at(place, place, {250, 560, 1030, 710});
+      if (loupe == 1)
+        std::fprintf(
+            stderr, "eyes %.2f m above the table: text %.2f, %.2f and %.2f degrees; %.0f and %.0f degrees from the field\n",
+            static_cast<double>(-height), static_cast<double>(text_degrees(beside, place, place)),
+            static_cast<double>(text_degrees(above, place, place)), static_cast<double>(text_degrees(caption, place, place)),
+            static_cast<double>(degrees_from_field(beside, place, place)),
+            static_cast<double>(degrees_from_field(caption, place, place)));
+      for (const Board& b : {beside, above, caption}) EXPECT_GT(text_degrees(b, place, place), least) << height;
+      EXPECT_GT(degrees_from_field(beside, place, place), 10) << height;
+      EXPECT_GT(degrees_from_field(caption, place, place), 8) << height;
+      EXPECT_LT(degrees_from_field(caption, place, place), 25) << "near the work";
+    }
+}
+
+TEST(SpaceHands, a_pinch_lies_between_the_finger_tips_and_closes_the_jaws) {
+  // Right hand ahead of the wearer, palm to the left: thumb below the index finger.
+  const auto fingers = [](float apart) {
+    const Vec3 middle{0.2f, 1.2f, -0.4f};
+    return Fingers{middle - Vec3{0, apart / 2, 0}, middle + Vec3{0, apart / 2, 0}, middle + Vec3{0, -0.03f, 0.07f},
+                   middle + Vec3{0, 0.03f, 0.07f}};
+  };
+  HandState hand;
+  pinch(fingers(0.055f), hand);
+  EXPECT_TRUE(hand.tracked && hand.articulated);
+  EXPECT_NEAR(hand.trigger, 0, 1e-5f);
+  EXPECT_LT(distance(hand.grip.p, {0.2f, 1.2f, -0.4f}), 1e-6f);
+  EXPECT_LT(distance(rotate(hand.grip.q, {0, 0, -1}), {0, 0, -1}), 1e-5f) << "from the knuckles ahead";
+  EXPECT_LT(distance(rotate(hand.grip.q, {1, 0, 0}), {0, 1, 0}), 1e-5f) << "from thumb to index finger";
+  const Pose open = hand.grip;
+  pinch(fingers(0.0335f), hand);
+  EXPECT_NEAR(hand.trigger, 0.5f, 1e-5f);
+  pinch(fingers(0), hand);
+  EXPECT_EQ(hand.trigger, 1);
+  EXPECT_LT(length(rotation_vector(hand.grip.q * conjugate(open.q))), 1e-4f) << "closing does not turn the instrument";
+}
+
+TEST(Gaze, meets_the_first_tissue_in_the_direction_of_the_head) {
+  const Still still;
+  const Vec3 particle = still.seen.particle[0];
+  Vec3 top = particle;  // the highest point of the tissue: nothing hides it from above
+  for (size_t i = 0; i < still.picture.particle_rest.size(); ++i)
+    if (still.seen.particle[i].y > top.y) top = still.seen.particle[i];
+  const Pose head{top + Vec3{0, 0.4f, 0}, axis_angle({1, 0, 0}, -kPi / 2)};
+  EXPECT_LT(distance(gaze_point(head, still.picture, still.seen), top), 0.003f);
+  const Pose away{head.p, axis_angle({1, 0, 0}, kPi / 2)};
+  EXPECT_NEAR(gaze_point(away, still.picture, still.seen).y - head.p.y, distance(head.p, still.picture.focus), 1e-4f)
+      << "no tissue there: the distance of the field";
 }
 
 TEST(SpaceHands, the_instrument_lies_in_the_hand_at_any_magnification) {

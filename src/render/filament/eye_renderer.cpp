@@ -41,6 +41,8 @@ namespace {
 
 using filament::Texture;
 
+constexpr float kBlink = 0.5f;  // brightness below which the field is not shown: an exposure alone does not reach black
+
 // The runtime's context; Filament's engine shares its textures.
 class Context {
  public:
@@ -163,7 +165,7 @@ class FilamentEyes final : public EyeRenderer {
       const BoardContext own(imgui_);
       panels_.reset();  // destroys the ImGui context
     }
-    for (GpuMesh* mesh : {&board_, &ray_}) destroy_mesh(*engine_, *lobby_, *mesh);
+    for (GpuMesh* mesh : {&board_, &caption_, &ray_}) destroy_mesh(*engine_, *lobby_, *mesh);
     engine_->destroy(board_look_);
     engine_->destroy(ray_look_);
     for (filament::Material* m : material_) engine_->destroy(m);
@@ -237,13 +239,13 @@ class FilamentEyes final : public EyeRenderer {
     for (int i = 0; i < 20 && !begun; ++i)
       if (!(begun = renderer_->beginFrame(chain_))) engine_->flushAndWait();
     if (!begun) return false;
-    const bool field = theatre_ && frame.snapshot;
+    const bool field = theatre_ && frame.snapshot && frame.brightness >= kBlink;
     if (field) {
       theatre_->set_brightness(frame.brightness);
       theatre_->show(*frame.snapshot, frame.camera, frame.width, frame.height, frame.suture_points);
     }
     place_board(frame, field ? theatre_->scene() : *lobby_);
-    if (frame.board && frame.panels) draw_panels(frame);
+    if ((frame.board || frame.caption) && frame.panels) draw_panels(frame);
     for (size_t i = 0; i < 2; ++i) {
       filament::View* view = field ? theatre_->view(int(i)) : lobby_view_[i];
       if (!field) aim_lobby(i, frame);
@@ -338,16 +340,22 @@ class FilamentEyes final : public EyeRenderer {
     square.color.assign(4, {1, 1, 1});
     square.triangle = {{0, 1, 2}, {0, 2, 3}};
     board_ = make_mesh(*engine_, *lobby_, square, board_look_, false);
-    std::vector<VertexLook> look;
-    for (const auto& uv : square.uv) look.push_back({{1, 1, 1, 1}, {uv[0], uv[1]}, {0, 0}});
-    set_look(*engine_, board_, look);
+    caption_ = make_mesh(*engine_, *lobby_, square, board_look_, false);
+    show_part(board_, {0, 0, 1, 1});
     Shape rod;
     const Vec3 ends[] = {{0, 0, 0}, {0, 0, 1}};
     const float radius[] = {0.5f, 0.5f};
     add_tube(rod, ends, radius, 6, srgb(60, 220, 235));
     ray_ = make_mesh(*engine_, *lobby_, rod, ray_look_, false);
-    lobby_->remove(board_.entity);
-    lobby_->remove(ray_.entity);
+    for (const GpuMesh* mesh : {&board_, &caption_, &ray_}) lobby_->remove(mesh->entity);
+  }
+
+  // part: left, top, right, bottom of the panels' picture.
+  void show_part(const GpuMesh& mesh, const std::array<float, 4>& part) {
+    const float u[] = {part[0], part[2], part[2], part[0]}, v[] = {part[3], part[3], part[1], part[1]};
+    std::vector<VertexLook> look;
+    for (size_t i = 0; i < 4; ++i) look.push_back({{1, 1, 1, 1}, {u[i], v[i]}, {0, 0}});
+    set_look(*engine_, mesh, look);
   }
 
   filament::MaterialInstance* instance_of(std::span<const uint8_t> package) {
@@ -357,8 +365,7 @@ class FilamentEyes final : public EyeRenderer {
 
   void hide_board() {
     for (filament::Scene* scene : {lobby_, theatre_ ? &theatre_->scene() : lobby_}) {
-      scene->remove(board_.entity);
-      scene->remove(ray_.entity);
+      for (const GpuMesh* mesh : {&board_, &caption_, &ray_}) scene->remove(mesh->entity);
     }
   }
 
@@ -372,10 +379,15 @@ class FilamentEyes final : public EyeRenderer {
 
   void place_board(const Frame& frame, filament::Scene& scene) {
     hide_board();
+    if (frame.caption) {
+      const Board& c = *frame.caption;
+      if (c.part != caption_part_) show_part(caption_, caption_part_ = c.part);
+      place(caption_, c.pose, {c.width, height_of(c), c.width});
+      scene.addEntity(caption_.entity);
+    }
     if (!frame.board) return;
     const Board& b = *frame.board;
-    const float tall = b.width * kBoardHeight / kBoardWidth;
-    place(board_, b.pose, {b.width, tall, b.width});
+    place(board_, b.pose, {b.width, height_of(b), b.width});
     scene.addEntity(board_.entity);
     const Vec3 along = b.ray_to - b.ray_from;
     if (length(along) < 1e-4f) return;
@@ -428,7 +440,8 @@ class FilamentEyes final : public EyeRenderer {
   std::array<utils::Entity, 2> lobby_entity_;
   std::vector<filament::Material*> material_;
   filament::MaterialInstance *board_look_ = nullptr, *ray_look_ = nullptr;
-  GpuMesh board_, ray_;
+  GpuMesh board_, caption_, ray_;
+  std::array<float, 4> caption_part_{};
 };
 
 }  // namespace
