@@ -48,6 +48,26 @@
       caption: `Largest tension along the thread, ten values per second. Peak ${number(peak, 3)} N. Tear-out of human small bowel 4.62 ± 1.40 N (Gong 2023).`});
   }
 
+  // Pictures around a moment, shown one after the other on request; printed: the moment itself.
+  function clip(at) {
+    const found = known(at) && (d.clips || []).find((c) => !c.shown && Math.abs(c.at_s - at) < 0.5);
+    if (!found) return null;
+    found.shown = true;  // under the first of several points of one moment
+    const middle = Math.max(0, found.pictures.length - 3);
+    const image = el("img", {src: found.pictures[middle], width: 400, height: 260, alt: `The field ${time(found.at_s)} after the start`});
+    let timer = null;
+    const button = el("button", {type: "button", class: "screen"}, "Play the moment");
+    button.addEventListener("click", () => {
+      clearInterval(timer);
+      let k = 0;
+      timer = setInterval(() => {
+        image.src = found.pictures[k++];
+        if (k === found.pictures.length) clearInterval(timer);
+      }, 450);
+    });
+    return el("figure", {class: "clip"}, image, button);
+  }
+
   function session() {
     const s = d.session, [text, kind] = verdict(s.passed);
     const film = served && s.recording ? el("p", {class: "screen"}, el("a", {href: `/recording/${s.id}`}, "Download the recording"), " · ",
@@ -64,7 +84,7 @@
       const sorted = d.lost.slice().sort((a, b) => Number(b.critical) - Number(a.critical) || b.points - a.points);
       parts.push(section("What to improve", el("ol", {class: "lost"}, sorted.map((l) => el("li", {},
         el("strong", {}, words(l.item)), l.critical ? el("strong", {class: "bad"}, " (critical error)") : null, `: ${l.reason}`,
-        l.place ? ` (${l.place})` : "", ` – ${number(l.points)} points.`, known(l.at_s) ? replay(l.at_s) || el("span", {class: "quiet"}, ` At ${time(l.at_s)}.`) : null)))));
+        l.place ? ` (${l.place})` : "", ` – ${number(l.points)} points.`, known(l.at_s) ? replay(l.at_s) || el("span", {class: "quiet"}, ` At ${time(l.at_s)}.`) : null, attempt(() => clip(l.at_s)))))));
     } else if (known(s.score)) parts.push(section("What to improve", el("p", {}, "No points were lost.")));
     const map = attempt(() => stitchMap(d.details.bites || [], d.details.lines));
     if (map) parts.push(section("Stitch map", map));

@@ -9,6 +9,8 @@
 #include "procedure/procedure_file.h"
 #include "procedure/scene_file.h"
 #include "runtime/haptics.h"
+#include "window/keeping.h"
+#include "window/settings.h"
 #include "window/window.h"
 
 namespace catgut {
@@ -41,7 +43,7 @@ void add_window_options(CLI::App& command, WindowCommand& o) {
   command.add_option("--screenshot", o.play.screenshot, "save a PNG of the window, then exit")->type_name("FILE.png");
   command.add_option("--after", o.play.after, "frames before the screenshot")->check(CLI::Range(1, 1000000))->type_name("N");
   command.add_option("--screen", o.play.screen, "screen to show")
-      ->check(CLI::IsMember({"start", "settings", "practice", "pause", "developer", "results", "view"}))
+      ->check(CLI::IsMember({"start", "settings", "practice", "pause", "developer", "results", "survey", "view"}))
       ->type_name("NAME");
   command.add_option("--at", o.play.at, "session or recording time to show [s]")->check(within(0.0, 1e6))->type_name("S");
   command.add_option("--stall-ms", o.play.stall_ms, "for tests: stall rendering for this long every two seconds")
@@ -66,6 +68,16 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_option("--record", o->play.live.record, "write a recording; a restart or an undone bite starts another file")
       ->type_name("FILE.cgrec");
   command->add_option("--json", o->play.json, "results as JSON on leaving the scene; -: standard output")->type_name("FILE|-");
+  command->add_option("--trainee", o->play.trainee, "pseudonym: the session is scored and stored; not a person's name")
+      ->type_name("NAME");
+  command->add_option("--store", o->play.store, "where sessions are stored: file, or postgresql://USER@HOST/DATABASE")
+      ->type_name("FILE|URL");
+  command
+      ->add_option("--feedback", o->play.feedback,
+                   "on the quality of the work: none before the results, after each stitch, or live cues too")
+      ->check(CLI::IsMember({"silent", "stitch", "live"}))
+      ->type_name("silent|stitch|live");
+  command->add_option("--survey", o->play.survey, "questionnaire that is asked after the session")->type_name("NAME|FILE");
   command->add_flag("--left-handed", o->play.left_handed, "needle holder in the left hand");
   command->add_option("--surgeon", o->play.live.surgeon, "watch the scripted surgeon, or the hands of a recording")
       ->type_name("scripted|FILE");
@@ -120,6 +132,12 @@ void add_play(CLI::App& app, int& exit_code) {
     if (!o->play.scene.empty()) read_scene(o->play.scene);  // reports errors before a window opens
     if (o->play.register_arms && (!o->play.headset || o->play.live.haptics.empty()))
       throw InputError("--register-arms", "a headset and haptic arms are needed", "add --headset and --haptics");
+    if (!o->play.trainee.empty() && !is_pseudonym(o->play.trainee))
+      throw InputError("--trainee " + o->play.trainee, "this is not a pseudonym",
+                       "use letters, digits, dot, dash and underscore, at most 64");
+    if (!o->play.trainee.empty() && !can_keep())
+      throw InputError("--trainee", "this program was built without the store", "build with -DCATGUT_STORE=ON");
+    if (!o->play.survey.empty()) open_survey(o->play.survey);  // reports errors before a window opens
     o->play.live.say = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
     check_suffix(o->play.live.record, ".cgrec", "--record");
     check_suffix(o->play.json, ".json", "--json");

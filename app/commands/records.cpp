@@ -2,15 +2,15 @@
 // app: `catgut store`, `catgut report` and `catgut survey`: sessions in the store, and what people read of them.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "commands/commands.h"
+#include "commands/keep.h"
 #include "core/check.h"
 #include "core/file.h"
 #include "procedure/scene_file.h"
@@ -19,6 +19,7 @@
 #include "report/session_file.h"
 #include "report/survey.h"
 #include "runtime/assessment.h"
+#include "runtime/clips.h"
 #include "runtime/report.h"
 #include "store/store.h"
 
@@ -62,21 +63,6 @@ struct StoreCommand {
   bool yes = false;
 };
 
-// Recordings of a store in a file are kept beside it, so that one folder is all there is to keep.
-std::string keep_recording(const Store& store, const std::string& path, const std::string& uid) {
-  check_suffix(path, ".cgrec", "--recording");
-  if (!store.is_file()) {
-    if (!fs::exists(path)) throw InputError(path, "cannot be read", "check the path");
-    return fs::absolute(path).string();
-  }
-  const fs::path folder = fs::absolute(store.name()).parent_path() / "recordings";
-  std::error_code error;
-  fs::create_directories(folder, error);
-  const std::string kept = (folder / (uid + ".cgrec")).string();
-  write_file(kept, read_file(path));
-  return kept;
-}
-
 // Replays and scores a recording; the tension of the thread is kept for the report.
 Session assessed(const std::string& file, const std::string& rubric) {
   const Recording recording = read_recording(file);
@@ -95,19 +81,7 @@ Session assessed(const std::string& file, const std::string& rubric) {
   const assess::Result result = assess_recording(recording, file, default_threads(), rubrics_for(rubric, scene), hooks);
   end_progress_line();
   if (stop_on_interrupt()) throw InputError(file, "the assessment was interrupted", "nothing was stored");
-  Session s;
-  read_session_json(assess::result_json(result), file, s);
-  nlohmann::ordered_json details = nlohmann::ordered_json::parse(s.details);
-  for (const StitchEdge& edge : map.edge) details["lines"].push_back({{"length_mm", 1e3 * static_cast<double>(edge.length())}});
-  auto& tension =
-      details["tension"] = {{"time_s", nlohmann::ordered_json::array()}, {"peak_n", nlohmann::ordered_json::array()}};
-  for (const TensionSample& t : map.tension) {
-    if (t.tick < result.first_tick) continue;
-    tension["time_s"].push_back(static_cast<double>(t.tick) * map.tick_s);
-    tension["peak_n"].push_back(t.peak);
-  }
-  s.details = details.dump();
-  return s;
+  return session_of(result, map, file);
 }
 
 int store_add(const StoreCommand& given) {
@@ -134,8 +108,7 @@ int store_add(const StoreCommand& given) {
     if (s.started.empty()) s.started = utc_now();
   }
   if (!o.recording.empty()) {
-    if (all[0].uid.empty())
-      all[0].uid = fmt::format("{}-{}-{}", all[0].trainee.substr(0, 24), all[0].task.substr(0, 20), utc_now().substr(0, 19));
+    if (all[0].uid.empty()) all[0].uid = session_uid(all[0].trainee, all[0].task);
     std::erase(all[0].uid, ':');
     all[0].recording = keep_recording(store, o.recording, all[0].uid);
   }
@@ -316,7 +289,50 @@ void add_store(CLI::App& app, int& exit_code) {
 
 struct ReportOptions {
   std::string what, html, store;
+  bool clips = false;
 };
+
+std::string base64(const std::string& bytes) {
+  constexpr char kLetter[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    uint32_t three = 0;
+    for (size_t k = 0; k < 3; ++k) three = three << 8 | (i + k < bytes.size() ? static_cast<uint8_t>(bytes[i + k]) : 0u);
+    for (size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : kLetter[three >> (18 - 6 * k) & 63];
+  }
+  return out;
+}
+
+constexpr size_t kMostClips = 12;
+constexpr double kOneMoment = 0.5;  // [s] points lost so close together share a clip
+
+// Pictures of the moments in which points were lost, the most important first, into the data of the page.
+std::string with_clips(const Session& s, const std::string& data) {
+  if (s.recording.empty()) throw InputError("--clips", "no recording is kept of this session", "leave out --clips");
+  std::vector<LostPoints> lost = s.lost;
+  std::stable_sort(lost.begin(), lost.end(), [](const LostPoints& a, const LostPoints& b) {
+    return a.critical != b.critical ? a.critical : a.points > b.points;
+  });
+  std::vector<double> moments;
+  for (const LostPoints& l : lost) {
+    const bool new_moment =
+        std::none_of(moments.begin(), moments.end(), [&](double m) { return std::abs(m - l.at_s) < kOneMoment; });
+    if (std::isfinite(l.at_s) && new_moment && moments.size() < kMostClips) moments.push_back(l.at_s);
+  }
+  SessionHooks hooks;
+  hooks.stop = &stop_on_interrupt();
+  hooks.on_progress = progress_line();
+  const auto clips = make_clips(read_recording(s.recording), s.recording, moments, {}, hooks);
+  end_progress_line();
+  nlohmann::ordered_json j = nlohmann::ordered_json::parse(data);
+  j["clips"] = nlohmann::ordered_json::array();
+  for (size_t k = 0; k < moments.size(); ++k) {
+    std::vector<std::string> pictures;
+    for (const std::string& jpeg : clips[k]) pictures.push_back("data:image/jpeg;base64," + base64(jpeg));
+    if (!pictures.empty()) j["clips"].push_back({{"at_s", moments[k]}, {"pictures", pictures}});
+  }
+  return j.dump();
+}
 
 int report_page(const ReportOptions& o) {
   check_suffix(o.html, ".html", "--html");
@@ -325,7 +341,8 @@ int report_page(const ReportOptions& o) {
   std::string page;
   if (is_id) {
     const Session s = store.session(std::stoll(o.what));
-    page = html_page("session", s.task + ": " + s.trainee, session_data(store, s.id));
+    const std::string data = session_data(store, s.id);
+    page = html_page("session", s.task + ": " + s.trainee, o.clips ? with_clips(s, data) : data);
   } else {
     page = html_page("trainee", "Sessions of " + store.person(o.what).pseudonym, trainee_data(store, o.what));
   }
@@ -341,6 +358,7 @@ void add_report(CLI::App& app, int& exit_code) {
       ->required()
       ->type_name("SESSION|TRAINEE");
   command->add_option("--html", o->html, "the page; needs no network and no other file")->required()->type_name("FILE.html");
+  command->add_flag("--clips", o->clips, "of a session: pictures of the moments in which points were lost");
   add_store_option(*command, o->store);
   command->callback([o, &exit_code] { exit_code = report_page(*o); });
 }

@@ -119,6 +119,23 @@ void WindowEvents::read_pad(GamepadInput& pad) const {
   pad.slow = SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_X);
 }
 
+// Keys that edit a text field. True: one of them, and a field has them.
+bool WindowEvents::edit_text(const SDL_KeyboardEvent& e) {
+  constexpr std::pair<SDL_Keycode, ImGuiKey_> kEditing[] = {
+      {SDLK_BACKSPACE, ImGuiKey_Backspace}, {SDLK_DELETE, ImGuiKey_Delete}, {SDLK_LEFT, ImGuiKey_LeftArrow},
+      {SDLK_RIGHT, ImGuiKey_RightArrow},    {SDLK_HOME, ImGuiKey_Home},     {SDLK_END, ImGuiKey_End},
+      {SDLK_RETURN, ImGuiKey_Enter},        {SDLK_ESCAPE, ImGuiKey_Escape}};
+  ImGuiIO& io = ImGui::GetIO();
+  for (const auto& [code, name] : kEditing) {
+    io.KeyMap[name] = name;
+    if (code != e.keysym.sym) continue;
+    const bool down = e.type == SDL_KEYDOWN && io.WantTextInput;
+    io.KeysDown[name] = down;
+    return down;
+  }
+  return false;
+}
+
 WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
   WindowInput in;
   in.mouse.cut = cut_, in.mouse.fresh = fresh_;
@@ -168,9 +185,13 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
         else if (SDL_GetModState() & KMOD_CTRL) in.closer += 0.1f * e.wheel.preciseY;
         else in.mouse.wheel += e.wheel.preciseY;
         break;
+      case SDL_TEXTINPUT:
+        if (io.WantTextInput) io.AddInputCharactersUTF8(e.text.text);
+        break;
       case SDL_KEYDOWN:
       case SDL_KEYUP:
         in.moved_ns = wall_ns();
+        if (edit_text(e.key) || io.WantTextInput) break;  // in a text field, letters are not commands
         key(e.key, in);
         break;
       case SDL_CONTROLLERDEVICEADDED:

@@ -74,6 +74,7 @@ class WindowEvents {
 
  private:
   void key(const SDL_KeyboardEvent& e, WindowInput& in);
+  static bool edit_text(const SDL_KeyboardEvent& e);
   void read_pad(GamepadInput& pad) const;
 
   std::deque<std::pair<Key, int>> keys_;  // with the digit, not reported yet

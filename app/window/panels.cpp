@@ -28,6 +28,29 @@ void guidance_choice(Settings& s) {
     if (radio(words, s.guidance == level)) s.guidance = level;
 }
 
+void feedback_choice(Settings& s) {
+  const std::pair<FeedbackLevel, const char*> kLevels[] = {
+      {FeedbackLevel::silent, "none"}, {FeedbackLevel::stitch, "after each stitch"}, {FeedbackLevel::live, "live cues"}};
+  for (const auto& [level, words] : kLevels) {
+    if (level != FeedbackLevel::silent) ImGui::SameLine();
+    if (radio(words, s.feedback == level)) s.feedback = level;
+  }
+}
+
+// The pseudonym under which sessions are stored. Only valid letters can be typed.
+void trainee_field(Settings& s, float width) {
+  char typed[65]{};
+  s.trainee.copy(typed, sizeof typed - 1);
+  ImGui::SetNextItemWidth(width);
+  const auto only_plain = [](ImGuiInputTextCallbackData* data) {
+    const ImWchar c = data->EventChar;
+    return c < 128 && is_pseudonym(std::string(1, static_cast<char>(c))) ? 0 : 1;
+  };
+  if (ImGui::InputTextWithHint("##trainee", "pseudonym", typed, sizeof typed, ImGuiInputTextFlags_CallbackCharFilter,
+                               only_plain))
+    s.trainee = typed;
+}
+
 void hand_choice(Settings& s) {
   if (radio("right-handed", !s.left_handed)) s.left_handed = false;
   ImGui::SameLine();
@@ -67,6 +90,17 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   ImGui::BeginChild("rest", {0, -foot});
   heading("Guidance");
   guidance_choice(settings);
+  if (settings.guidance != Guidance::exam) {
+    text(kQuiet, "feedback on quality");
+    feedback_choice(settings);
+  }
+  if (v.can_keep) {
+    gap();
+    heading("Trainee");
+    trainee_field(settings, 14 * em());
+    ImGui::SameLine();
+    text(kQuiet, settings.trainee.empty() ? "sessions are not stored" : "sessions are stored");
+  }
   gap();
   heading("Hands");
   if (v.watch_only) {
@@ -138,6 +172,10 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& m
     };
     row("guidance");
     guidance_choice(s);
+    row("feedback");
+    feedback_choice(s);
+    row("trainee");
+    trainee_field(s, 16 * em());
     row("graphics");
     quality_choice(s);
     row("text size");
@@ -180,7 +218,11 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& m
   ImGui::Separator();
   if (wide_button("Done (Esc)", 11)) choice.what = Chosen::leave_settings;
   ImGui::SameLine();
-  if (wide_button("Defaults", 11)) s = {};
+  if (wide_button("Defaults", 11)) {
+    Settings fresh;
+    fresh.trainee = s.trainee, fresh.survey = s.survey;  // who works here is not a matter of taste
+    s = fresh;
+  }
   ImGui::End();
   return choice;
 }

@@ -14,6 +14,7 @@
 #include "runtime/live.h"
 #include "runtime/playback.h"
 #include "window/charts.h"
+#include "window/keeping.h"
 #include "window/layout.h"
 #include "window/screens.h"
 #include "window/settings.h"
@@ -33,6 +34,7 @@ struct StartView {
   bool watch_only = false;                               // the command line has selected the surgeon
   bool headset_offered = false, headset_on = false;      // a runtime is installed; a session was asked for
   std::string headset;                                   // its last report
+  bool can_keep = false;                                 // sessions of a trainee can be stored
 };
 
 struct LogLine {
@@ -50,10 +52,12 @@ struct WorkView {
   const Steering* steering = nullptr;
   const MouseHand* mouse = nullptr;
   const std::deque<LogLine>* log = nullptr;
-  size_t speed = 1;       // of kMouseSpeeds
-  std::string pad;        // name of the gamepad; empty: none
-  bool watching = false;  // the scripted surgeon works
-  bool inside = false;    // the developers' panel uses the lower part of the window
+  const std::vector<assess::Cue>* cues = nullptr;       // of this moment; null or empty: none
+  const std::deque<assess::Remark>* remarks = nullptr;  // on the last stitches
+  size_t speed = 1;                                     // of kMouseSpeeds
+  std::string pad;                                      // name of the gamepad; empty: none
+  bool watching = false;                                // the scripted surgeon works
+  bool inside = false;                                  // the developers' panel uses the lower part of the window
   double pictures_per_s = 0;
   std::string headset;  // its state, one line; empty: none
 };
@@ -66,9 +70,12 @@ struct ResultView {
   std::string saved;                     // name of the JSON file, or why there is none
   bool from_recording = false;           // from a recording, not from a session
   float known = 1;                       // scanned fraction of the recording: the results cover that part
+  KeptSession kept{};                    // what the store has
+  bool can_answer = false;               // a questionnaire is to be asked
 };
 
 std::vector<LogLine> event_log(const StitchMap& map);
+std::string recording_of(const LiveResult& result, uint64_t tick);  // file that shows this tick as it counts; empty: none
 
 struct PlayedView {
   const SceneSpec* scene = nullptr;
@@ -88,6 +95,8 @@ Choice pause_panel(const WorkView& view);
 // can_touch: the mouse is a pointer and sliders can be moved.
 Choice developer_panel(const WorkView& view, bool can_touch);
 Choice result_panel(const ResultView& view, BiteColor& by);
+// Changes the answers in the form.
+Choice survey_panel(SurveyForm& form, const std::string& message);
 Choice view_panel(const PlayedView& view, const Settings& settings);
 
 }  // namespace catgut

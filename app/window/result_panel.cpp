@@ -54,6 +54,46 @@ void bite_table(const StitchMap& map) {
   ImGui::EndTable();
 }
 
+// The score, why points were lost, and the scores before. A lost point plays its moment, where there is a recording of it.
+void score_list(const ResultView& v, Choice& choice) {
+  const assess::Result& a = v.result->assessment;
+  for (const assess::Score& s : a.score) {
+    text(s.passed ? kAccent : kBad, fmt::format("{} {:.0f} %", s.passed ? "+" : "!", s.percent));
+    ImGui::SameLine();
+    ImGui::TextWrapped("%s", s.verdict.c_str());
+    if (s.lost.empty()) continue;
+    gap(0.3f);
+    heading("Lost points");
+    std::vector<const assess::LostPoint*> lost;
+    for (const assess::LostPoint& l : s.lost) lost.push_back(&l);
+    std::stable_sort(lost.begin(), lost.end(),
+                     [](auto* l, auto* r) { return l->critical != r->critical ? l->critical : l->points > r->points; });
+    for (size_t i = 0; i < lost.size(); ++i) {
+      const assess::LostPoint& l = *lost[i];
+      const std::string file = recording_of(*v.result, l.tick);
+      const std::string name = fmt::format("{:>4.1f}  {}##{}", -l.points, clock_text(l.time_s), i);
+      ImGui::PushStyleVar(ImGuiStyleVar_ButtonTextAlign, {0, 0.5f});
+      if (file.empty() || v.from_recording) text(kQuiet, name.substr(0, name.find("##")));
+      else if (ImGui::Button(name.c_str(), {8.5f * em(), 0})) choice = {Chosen::moment, static_cast<size_t>(l.tick), file};
+      ImGui::PopStyleVar();
+      if (ImGui::IsItemHovered() && !file.empty()) ImGui::SetTooltip("play this moment");
+      ImGui::SameLine();
+      ImGui::PushStyleColor(ImGuiCol_Text, l.critical ? kBad : kText);
+      ImGui::TextWrapped("%s%s", l.critical ? "! critical: " : "", l.why.c_str());
+      ImGui::PopStyleColor();
+    }
+  }
+  if (a.score.empty()) text(kQuiet, "no rubric for this technique");
+  if (v.kept.curve.size() > 1) {
+    gap();
+    heading(fmt::format("Learning curve: {} sessions", v.kept.curve.size()));
+    std::vector<float> curve(v.kept.curve.begin(), v.kept.curve.end());
+    ImGui::PlotLines("##curve", curve.data(), static_cast<int>(curve.size()), 0, nullptr, 0, 100, {-1, 5 * em()});
+    text(kQuiet, fmt::format("0 to 100 %; first {:.0f}, best {:.0f}, this one {:.0f}", curve.front(),
+                             *std::max_element(curve.begin(), curve.end()), curve.back()));
+  }
+}
+
 // Draws visible lines only: a long session has thousands.
 void event_list(const std::vector<LogLine>& log) {
   ImGuiListClipper clipper;
@@ -66,6 +106,13 @@ void event_list(const std::vector<LogLine>& log) {
 }
 
 }  // namespace
+
+std::string recording_of(const LiveResult& result, uint64_t tick) {
+  std::string file;
+  for (size_t k = 0; k < result.recorded.size() && k < result.recorded_from.size(); ++k)
+    if (result.recorded_from[k] <= tick) file = result.recorded[k];
+  return file;
+}
 
 std::vector<LogLine> event_log(const StitchMap& map) {
   std::vector<LogLine> out;
@@ -99,32 +146,49 @@ Choice result_panel(const ResultView& v, BiteColor& by) {
 
   const float foot = 2.8f * em();
   ImGui::BeginChild("numbers", {0.36f * size.x, -foot});
-  if (ImGui::BeginTable("rows", 2)) {
-    ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 13 * em());
-    ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch);
-    for (const ResultRow& row : result_rows(*v.scene, r.metrics)) {
-      ImGui::TableNextRow();
-      ImGui::TableNextColumn();
-      text(row.name == "fault" ? kBad : kQuiet, (row.name == "fault" ? "! " : "") + row.name);
-      ImGui::TableNextColumn();
-      ImGui::TextWrapped("%s", row.value.c_str());
-    }
-    ImGui::EndTable();
+  if (!v.kept.line.empty()) {
+    ImGui::PushStyleColor(ImGuiCol_Text, v.kept.bad ? kBad : kQuiet);
+    ImGui::TextWrapped("%s%s", v.kept.bad ? "! " : "", v.kept.line.c_str());
+    ImGui::PopStyleColor();
   }
-  if (v.procedure && r.procedure.begun) {
+  const bool tabs = ImGui::BeginTabBar("tabs");
+  if (!v.from_recording && tabs && ImGui::BeginTabItem("Score")) {
+    ImGui::BeginChild("score", {0, 0});
+    score_list(v, choice);
+    ImGui::EndChild();
+    ImGui::EndTabItem();
+  }
+  const bool numbers = tabs && ImGui::BeginTabItem("Numbers");
+  if (numbers) {
+    if (ImGui::BeginTable("rows", 2)) {
+      ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 13 * em());
+      ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch);
+      for (const ResultRow& row : result_rows(*v.scene, r.metrics)) {
+        ImGui::TableNextRow();
+        ImGui::TableNextColumn();
+        text(row.name == "fault" ? kBad : kQuiet, (row.name == "fault" ? "! " : "") + row.name);
+        ImGui::TableNextColumn();
+        ImGui::TextWrapped("%s", row.value.c_str());
+      }
+      ImGui::EndTable();
+    }
+    if (v.procedure && r.procedure.begun) {
+      gap();
+      heading(v.procedure->title);
+      for (const Feedback& f : feedback(r.procedure, *v.procedure)) {
+        ImGui::PushStyleColor(ImGuiCol_Text, f.well ? kAccent : kBad);
+        ImGui::TextWrapped("%s", ((f.well ? "+ " : "! repeat: ") + f.text).c_str());
+        ImGui::PopStyleColor();
+      }
+    }
     gap();
-    heading(v.procedure->title);
-    for (const Feedback& f : feedback(r.procedure, *v.procedure)) {
-      ImGui::PushStyleColor(ImGuiCol_Text, f.well ? kAccent : kBad);
-      ImGui::TextWrapped("%s", ((f.well ? "+ " : "! repeat: ") + f.text).c_str());
-      ImGui::PopStyleColor();
-    }
+    heading("Events");
+    ImGui::BeginChild("events", {0, 0});
+    event_list(v.log);
+    ImGui::EndChild();
+    ImGui::EndTabItem();
   }
-  gap();
-  heading("Events");
-  ImGui::BeginChild("events", {0, 0});
-  event_list(v.log);
-  ImGui::EndChild();
+  if (tabs) ImGui::EndTabBar();
   ImGui::EndChild();
   ImGui::SameLine(0, em());
 
@@ -169,6 +233,8 @@ Choice result_panel(const ResultView& v, BiteColor& by) {
     }
   }
   ImGui::SameLine();
+  if (v.can_answer && wide_button("Questions", 9)) choice.what = Chosen::survey;
+  if (v.can_answer) ImGui::SameLine();
   if (wide_button("Save JSON (J)", 11)) choice.what = Chosen::save_json;
   ImGui::SameLine();
   if (wide_button("Quit", 6)) choice.what = Chosen::quit;

@@ -5,7 +5,7 @@
 namespace catgut {
 
 const char* screen_name(Screen screen) {
-  static constexpr const char* kName[] = {"start", "settings", "practice", "pause", "results", "view"};
+  static constexpr const char* kName[] = {"start", "settings", "practice", "pause", "results", "view", "survey"};
   return kName[static_cast<size_t>(screen)];
 }
 
@@ -21,6 +21,7 @@ Choice choice_of_key(const WindowInput& in, const ScreenFacts& f) {
       if (pause) return when(!f.fault, Chosen::resume);
       if (f.screen == Screen::settings) return {Chosen::leave_settings};
       if (results) return {Chosen::leave_results};
+      if (f.screen == Screen::survey) return {Chosen::leave_survey};
       return {Chosen::start_screen};
     case Key::pause:
       if (view) return {Chosen::play_or_hold};

@@ -10,7 +10,7 @@
 
 namespace catgut {
 
-enum class Screen { start, settings, practice, pause, results, view };
+enum class Screen { start, settings, practice, pause, results, view, survey };
 const char* screen_name(Screen screen);
 
 enum class Chosen {
@@ -39,6 +39,10 @@ enum class Chosen {
   speed,         // of: real time
   sewn,          // what a recording's hands have sutured
   leave_results,
+  moment,        // text: a recording, which: tick of the session to play
+  survey,        // the questionnaire is opened
+  keep_answers,  // and its answers are stored, or
+  leave_survey,  // not
   points,
   hints,
   help_at_needle,

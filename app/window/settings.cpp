@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -26,6 +27,7 @@ constexpr size_t kMostBytes = 64 * 1024;  // far above any valid file
 
 constexpr const char* kQualities[] = {"low", "medium", "high"};
 constexpr const char* kGuidances[] = {"learn", "practice", "exam"};
+constexpr const char* kFeedbacks[] = {"silent", "stitch", "live"};
 
 // One row per key: how it is read (false: invalid value) and written. Reader, writer and messages use this list.
 struct Key {
@@ -75,10 +77,29 @@ Key word(const char* name, const char* wants, Enum Settings::*member, const char
           [member, &names](const Settings& s) { return fmt::format("\"{}\"", names[static_cast<size_t>(s.*member)]); }};
 }
 
+// A text without quotes, backslashes and control characters. valid: empty texts are always.
+Key words(const char* name, const char* wants, std::string Settings::*member, bool (*valid)(const std::string&)) {
+  return {name, wants,
+          [=](const toml::node& n, Settings& s) {
+            const auto v = n.value_exact<std::string>();
+            if (!v || (!v->empty() && !valid(*v))) return false;
+            s.*member = *v;
+            return true;
+          },
+          [member](const Settings& s) { return "\"" + s.*member + "\""; }};
+}
+
+bool plain_text(const std::string& text) {
+  return text.size() <= 200 && std::all_of(text.begin(), text.end(), [](char c) {
+           return c != '"' && c != '\\' && static_cast<unsigned char>(c) >= 32 && c != 127;
+         });
+}
+
 const std::vector<Key>& keys() {
   static const std::vector<Key> kKeys{
       word("quality", "write \"low\", \"medium\" or \"high\"", &Settings::quality, kQualities),
       word("guidance", "write \"learn\", \"practice\" or \"exam\"", &Settings::guidance, kGuidances),
+      word("feedback", "write \"silent\", \"stitch\" or \"live\"", &Settings::feedback, kFeedbacks),
       flag("left_handed", &Settings::left_handed),
       flag("hold_to_close", &Settings::hold_to_close),
       flag("assist", &Settings::assist),
@@ -90,6 +111,8 @@ const std::vector<Key>& keys() {
       number("text_size", "write a number from 0.7 to 2", &Settings::text_size, 0.7, 2),
       number("force_right", "write a number from 0.2 to 2", &Settings::force_right, 0.2, 2),
       number("force_left", "write a number from 0.2 to 2", &Settings::force_left, 0.2, 2),
+      words("trainee", "write a pseudonym of letters, digits, dot, dash and underscore", &Settings::trainee, is_pseudonym),
+      words("survey", "write the name of a file in surveys/, or its path", &Settings::survey, plain_text),
   };
   return kKeys;
 }
@@ -128,6 +151,12 @@ void write_whole(const std::string& path, const std::string& text) {
 
 const char* quality_name(Quality quality) { return kQualities[static_cast<size_t>(quality)]; }
 const char* guidance_name(Guidance guidance) { return kGuidances[static_cast<size_t>(guidance)]; }
+const char* feedback_name(FeedbackLevel level) { return kFeedbacks[static_cast<size_t>(level)]; }
+
+bool is_pseudonym(const std::string& text) {
+  return !text.empty() && text.size() <= 64 &&
+         text.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-") == std::string::npos;
+}
 
 Settings parse_settings(const std::string& text, const std::string& name) {
   Settings out;

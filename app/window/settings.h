@@ -14,9 +14,17 @@ enum class Guidance {
   exam,      // no messages and no help until the end
 };
 
+// Feedback on the quality of the work during a session. An exam is always silent.
+enum class FeedbackLevel {
+  silent,  // nothing before the results
+  stitch,  // remarks after every stitch and throw
+  live,    // and the numbers of the moment with their bands
+};
+
 struct Settings {
   Quality quality = Quality::low;
   Guidance guidance = Guidance::practice;
+  FeedbackLevel feedback = FeedbackLevel::stitch;
   bool left_handed = false;    // the needle holder is in the left hand
   bool hold_to_close = false;  // the jaw closes only while the button is pressed
   bool assist = true;          // an open jaw snaps to the needle
@@ -27,10 +35,14 @@ struct Settings {
   float hand_scale = 1;                   // headset: 0.2 .. 1, of tool to hand
   float text_size = 1;                    // 0.7 .. 2, limited by the window
   float force_right = 1, force_left = 1;  // 0.2 .. 2, gain of the haptic force in each hand; the device's limits hold after it
+  std::string trainee;                    // pseudonym under which sessions are stored; empty: they are not
+  std::string survey;                     // questionnaire that is asked after a session, a name or a path; empty: none
   bool operator==(const Settings&) const = default;
 };
-const char* quality_name(Quality quality);     // "low", "medium", "high"
-const char* guidance_name(Guidance guidance);  // "learn", "practice", "exam"
+bool is_pseudonym(const std::string& text);      // letters, digits, dot, dash, underscore; 1 to 64
+const char* quality_name(Quality quality);       // "low", "medium", "high"
+const char* guidance_name(Guidance guidance);    // "learn", "practice", "exam"
+const char* feedback_name(FeedbackLevel level);  // "silent", "stitch", "live"
 
 // Throws InputError (file:line, error, remedy) for invalid TOML, unknown keys and values out of range.
 Settings parse_settings(const std::string& text, const std::string& name);

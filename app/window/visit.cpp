@@ -13,6 +13,16 @@ namespace {
 constexpr size_t kLogLines = 8;
 constexpr size_t kMostListed = 40;
 constexpr size_t kMostTips = 16;
+constexpr size_t kMostRemarks = 5;
+
+std::string json_text(const std::string& text) {  // as JSON
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += static_cast<unsigned char>(c) < 32 ? ' ' : c;
+  }
+  return out + "\"";
+}
 
 }  // namespace
 
@@ -29,6 +39,7 @@ void Visit::take_events() {
   if (const LiveStatus& now = live.status(); std::exchange(log_epoch_, now.epoch) != now.epoch) {
     std::erase_if(log, [&](const LogLine& l) { return l.time_s > now.time_s + 1e-9; });
     std::erase_if(tip_, [&](const Event& e) { return e.tick > now.tick; });
+    std::erase_if(remarks, [&](const assess::Remark& r) { return r.tick > now.tick; });
   }
   for (Event e; live.event(e);) {
     if (events_) std::fprintf(events_, "%s\n", event_json(e).c_str());
@@ -44,6 +55,15 @@ void Visit::take_events() {
     if (line.text.empty()) continue;
     log.push_back(line);
     if (log.size() > kLogLines) log.pop_front();
+  }
+  for (assess::Remark r; live.remark(r);) {
+    // Only those on the last stitch stay.
+    std::erase_if(remarks, [&](const assess::Remark& old) { return old.tick != r.tick; });
+    if (events_)
+      std::fprintf(events_, "{\"tick\":%llu,\"remark\":%s}\n", static_cast<unsigned long long>(r.tick),
+                   json_text(r.text).c_str());
+    remarks.push_back(r);
+    if (remarks.size() > kMostRemarks) remarks.pop_front();
   }
   if (events_) std::fflush(events_);
 }

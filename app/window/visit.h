@@ -28,7 +28,8 @@ struct Visit {
   Snapshot seen;
   bool have = false;  // there is a picture
   std::deque<LogLine> log;
-  uint32_t epoch = 0;  // at the last update
+  std::deque<assess::Remark> remarks;  // newest last
+  uint32_t epoch = 0;                  // at the last update
 
  private:
   void take_events();

@@ -24,6 +24,7 @@
 #include "render/orbit.h"
 #include "render/quality.h"
 #include "render/window.h"
+#include "runtime/assessment.h"
 #include "runtime/guide.h"
 #include "runtime/report.h"
 #include "sim/simulation.h"
@@ -49,6 +50,7 @@ constexpr const char* kFirstLesson = "first_stitch";                       // of
 constexpr double kMirrorEvery = 1.0 / 20;                                  // [s] of the window's picture beside a headset
 constexpr double kSlowMirror = 0.5;  // [s] where the headset's frames take their whole period
 constexpr double kStallEvery = 2;    // [s] of --stall-ms
+constexpr double kBeforeMoment = 3;  // [s] that are played before the moment of a lost point
 
 std::vector<SceneChoice> scene_choices() {
   // The scene of each technique, simplest first; then all others.
@@ -124,6 +126,10 @@ class Window {
     if (options.quality_given) settings_.quality = options.quality;
     if (options.left_handed) settings_.left_handed = true;
     if (options.exam) settings_.guidance = Guidance::exam;
+    if (!options.trainee.empty()) settings_.trainee = options.trainee;
+    if (!options.survey.empty()) settings_.survey = options.survey;
+    for (const FeedbackLevel level : {FeedbackLevel::silent, FeedbackLevel::stitch, FeedbackLevel::live})
+      if (options.feedback == feedback_name(level)) settings_.feedback = level;
     at_start_ = settings_;
     scenes_ = scene_choices();
     recordings_ = recordings_in(".", {});
@@ -217,6 +223,8 @@ class Window {
     live.record = of_visit(live.record, ++opened_);
     if (live.surgeon.empty() && watch_ && !tutorial) live.surgeon = "scripted";
     live.tutorial = tutorial && live.surgeon.empty();
+    live.rubric = rubrics_for("", scene);
+    live.remarks = true;  // they are shown as far as the settings want them
     leave();
     visit_ = std::make_unique<Visit>(scene, live, events_, [this](const Event& e) {
       if (options_.on_event) options_.on_event(e);
@@ -226,6 +234,9 @@ class Window {
     tutorial_ = live.tutorial;
     source_ = {name, procedure, stage, tutorial};
     places_ = bite_places(scene, visit_->live.picture());
+    cue_source_ = assess::cue_source(visit_->live.picture(), assess_setup(scene).wall);
+    rubric_ = live.rubric;
+    asked_ = false;
     shown_stage_ = 0;
     used_keys_ = {};
     hands_.begin(visit_->live.picture(), settings_);
@@ -261,17 +272,49 @@ class Window {
     const bool have = visit_->have;
     LiveResult result = visit_->finish();
     made_.insert(made_.end(), result.recorded.begin(), result.recorded.end());
+    // A look round is not a session: without a stitch it counts only when the user asks for the results.
+    const bool counts = !visit_->watching && (asked_for_results_ || !result.assessment.bite.empty());
+    KeepOptions keep{counts ? settings_.trainee : "", options_.store,
+                     source_.procedure.empty() ? visit_->scene.name : source_.procedure, settings_json()};
+    const KeptSession kept = keep_session(result, keep);
+    if (kept.bad) std::fprintf(stderr, "catgut: %s\n", kept.line.c_str());
     if (!options_.json.empty()) try {
         const std::string json = session_json(visit_->scene, result);
         write_output(of_visit(options_.json, opened_), procedure_ ? with_procedure(json, *procedure_, result.procedure) : json);
       } catch (const InputError& error) { message_ = json_fault_ = error.what(); }
     scene_ = visit_->scene;
     result_ = result;
-    results_ = {&scene_, &result_, event_log(result.map), procedure_.get(), "", false, 1};
+    results_ = {&scene_,
+                &result_,
+                event_log(result.map),
+                procedure_.get(),
+                "",
+                false,
+                1,
+                kept,
+                can_keep() && !settings_.survey.empty()};
     std::swap(last_, visit_->seen);
     have_last_ = have;
     visit_.reset();
     return result;
+  }
+
+  // How the session was done, for the store.
+  std::string settings_json() const {
+    const bool exam = settings_.guidance == Guidance::exam;
+    return fmt::format(R"({{"guidance":"{}","feedback":"{}","hands":"{}","assist":{},"left_handed":{}}})",
+                       guidance_name(settings_.guidance), exam ? "silent" : feedback_name(settings_.feedback),
+                       options_.headset                ? "headset"
+                       : options_.live.haptics.empty() ? "mouse"
+                                                       : options_.live.haptics,
+                       settings_.assist, settings_.left_handed);
+  }
+
+  // Of a recording of the session just finished.
+  uint64_t first_tick_of(const std::string& file) const {
+    for (size_t k = 0; k < result_.recorded.size() && k < result_.recorded_from.size(); ++k)
+      if (result_.recorded[k] == file) return result_.recorded_from[k];
+    return 0;
   }
 
   void go(Screen screen) {
@@ -301,6 +344,9 @@ class Window {
     if (options_.quality_given && s.quality == options_.quality) s.quality = kept_.quality;
     if (options_.left_handed && s.left_handed) s.left_handed = kept_.left_handed;
     if (options_.exam && s.guidance == Guidance::exam) s.guidance = kept_.guidance;
+    if (!options_.trainee.empty() && s.trainee == options_.trainee) s.trainee = kept_.trainee;
+    if (!options_.survey.empty() && s.survey == options_.survey) s.survey = kept_.survey;
+    if (options_.feedback == feedback_name(s.feedback)) s.feedback = kept_.feedback;
     try {
       save_settings(s, settings_path());
       message_.clear();
@@ -368,7 +414,9 @@ class Window {
         }
         break;
       case Chosen::finish:
+        asked_for_results_ = true;
         finish();  // the field stays visible as it was left
+        asked_for_results_ = false;
         go(Screen::results);
         break;
       case Chosen::slower:
@@ -377,6 +425,13 @@ class Window {
         else if (viewing_) viewing_->change_speed(choice.what == Chosen::faster);
         break;
       case Chosen::start_screen:
+        if (viewing_ && std::exchange(back_to_results_, false)) {  // from a lost point's moment
+          leave();
+          renderer_->stage(nullptr, settings_.quality);
+          if (wearer_) wearer_->stage(nullptr, settings_.quality);
+          go(Screen::results);
+          break;
+        }
         show_start();
         break;
       case Chosen::save_json:
@@ -412,11 +467,42 @@ class Window {
       case Chosen::sewn:
         if (!viewing_) break;
         viewing_->playback.play(false);
+        back_to_results_ = false;
         scene_ = viewing_->playback.scene();
         results_ = {&scene_, &viewing_->result, event_log(viewing_->result.map), nullptr, "", true, 0};
         go(Screen::results);
         break;
+      case Chosen::moment: {
+        view(choice.text);
+        const PlaybackStatus& s = viewing_->playback.status();
+        const auto before = static_cast<uint64_t>(std::llround(kBeforeMoment / s.tick_s));
+        const uint64_t from = first_tick_of(choice.text);
+        viewing_->playback.go_to(choice.which > from + before ? choice.which - from - before : 0);
+        viewing_->playback.play(true);
+        back_to_results_ = true;
+        break;
+      }
+      case Chosen::survey:
+        form_ = open_survey(settings_.survey);
+        message_.clear();
+        go(Screen::survey);
+        break;
+      case Chosen::keep_answers:
+        keep_answers(form_, settings_.trainee, options_.store);
+        asked_ = true;
+        results_.can_answer = false;
+        results_.saved = "The answers are stored";
+        go(Screen::results);
+        break;
+      case Chosen::leave_survey:
+        asked_ = true;
+        go(Screen::results);
+        break;
       case Chosen::leave_results:
+        if (results_.can_answer && !std::exchange(asked_, true)) {  // once, before the results are left
+          do_it({Chosen::survey});
+          break;
+        }
         if (results_.from_recording) go(Screen::view);
         else show_start();
         break;
@@ -492,6 +578,7 @@ class Window {
     const Snapshot* seen = shown();
     if (seen && !std::exchange(orbit_set_, true)) orbit_ = start_orbit(picture(), seen->active().needle.pose.p);
     pose_for_picture();
+    seen = shown();  // a screen that has just been left took its snapshot along
     tell_screen();
     turn_orbit(orbit_, screen_ == Screen::view && in.arrow_presses ? 0 : in.orbit_right, in.orbit_up, in.closer);
     if (in.camera_home && (visit_ || viewing_)) orbit_set_ = false;
@@ -681,14 +768,19 @@ class Window {
       if (wanted == "results") carry_out({Chosen::sewn});
     }
     if (wanted == "settings") carry_out({Chosen::settings});
+    if (wanted == "survey") {
+      carry_out({Chosen::finish});
+      if (!settings_.survey.empty()) carry_out({Chosen::survey});
+    }
     posed_ = true;
   }
 
   Choice panels() {
     if (screen_ == Screen::start)
       return start_panel({&scenes_, &recordings_, message_, events_in_.pad_name(), !options_.live.surgeon.empty(),
-                          headset_offered_, wearer_ && !wearer_->failed(), headset_line_},
+                          headset_offered_, wearer_ && !wearer_->failed(), headset_line_, can_keep()},
                          settings_, watch_);
+    if (screen_ == Screen::survey) return survey_panel(form_, message_);
     if (screen_ == Screen::settings) return settings_panel(settings_, short_name(settings_path()), message_, visit_ != nullptr);
     if (screen_ == Screen::results) { return result_panel(results_, colored_by_); }
     Settings shown = settings_;
@@ -712,6 +804,12 @@ class Window {
     view.steering = &hands_.steering;
     view.mouse = &hands_.mouse;
     view.log = &visit_->log;
+    const FeedbackLevel level = settings_.guidance == Guidance::exam ? FeedbackLevel::silent : settings_.feedback;
+    if (level != FeedbackLevel::silent) view.remarks = &visit_->remarks;
+    cues_.clear();
+    if (level == FeedbackLevel::live && !visit_->watching && !rubric_.empty() && !visit_->live.status().settling)
+      cues_ = assess::cues_now(rubric_[0], cue_source_, *view.picture, visit_->seen);
+    view.cues = &cues_;
     view.speed = hands_.speed;
     view.pad = events_in_.pad_name();
     view.watching = visit_->watching;
@@ -802,6 +900,13 @@ class Window {
   bool have_last_ = false;
   WindowHands hands_;
   BitePlaces places_;
+  std::vector<assess::Rubric> rubric_;  // of the session; the first one judges
+  assess::CueSource cue_source_;
+  std::vector<assess::Cue> cues_;
+  SurveyForm form_;
+  bool asked_ = false;              // the questionnaire was answered or left out
+  bool asked_for_results_ = false;  // the user has finished the session
+  bool back_to_results_ = false;    // the viewer shows a moment of the session just finished
   Orbit orbit_;
   bool orbit_set_ = false;  // false: set again with the next snapshot
   Latency latency_;

@@ -39,7 +39,8 @@ struct PlayOptions {
   std::string events;      // file that receives events immediately, one JSON object per line; "-"
   std::string screenshot;  // PNG of the window, then quit
   int after = 60;          // frames before it
-  std::string screen;  // the screen shown: start, settings, practice, pause, developer, results, view; empty: the current one
+  std::string
+      screen;  // the screen shown: start, settings, practice, pause, developer, results, survey, view; empty: the current one
   double at = 0;       // [s] of the session, or of the recording
   std::string json;    // results, written when a scene is closed; "-"
   double seconds = 0;  // [s] of wall time, then quit; 0: until the user quits
@@ -47,6 +48,10 @@ struct PlayOptions {
   // window; and every event.
   std::function<bool(const WindowLook&)> watch;
   std::function<void(const Event&)> on_event;
+  std::string trainee;         // pseudonym: sessions are stored; empty: the setting
+  std::string store;           // where; empty: the default
+  std::string feedback;        // silent, stitch or live; empty: the setting
+  std::string survey;          // asked after a session; empty: the setting
   bool headset = false;        // draws for a headset too, and takes its wearer's hands
   std::string room = "room";   // whose table height and registration apply
   bool register_arms = false;  // registers haptic arms to the headset's space

@@ -16,6 +16,7 @@ namespace {
 
 constexpr float kAside = 0.0015f, kDeep = 0.4f;  // [m] from the target, fraction of the wanted depth: within tolerance
 constexpr double kErrorShown = 10;               // [s]
+constexpr double kRemarkShown = 15;              // [s]
 
 struct KeyLine {
   const char* text;
@@ -158,6 +159,20 @@ Panel bite_panel(const BiteGuide& g, const Snapshot& seen) {
           0.7f};
 }
 
+// Numbers of the moment, and remarks on the last stitch. A mark, not only a color, distinguishes good from bad.
+Panel feedback_panel(const WorkView& v) {
+  Panel p{"feedback", {}, 2, -1, 1, 0.5f, 46, 0.7f};
+  if (v.cues)
+    for (const assess::Cue& c : *v.cues) p.line.push_back({c.good ? Tone::accent : Tone::bad, (c.good ? "+ " : "! ") + c.text});
+  if (v.remarks)
+    for (const assess::Remark& r : *v.remarks) {
+      if (v.seen->time_s - static_cast<double>(r.tick) / static_cast<double>(v.scene->solver.tick_rate) > kRemarkShown)
+        continue;
+      p.line.push_back({r.good ? Tone::accent : Tone::bad, (r.good ? "+ " : "! ") + r.text});
+    }
+  return p;
+}
+
 }  // namespace
 
 void UsedKeys::note(const WindowInput& in) {
@@ -229,6 +244,8 @@ std::vector<Panel> work_panels(const WorkText& work, const Settings& settings) {
   if (procedure) out.push_back(procedure_panel(*work.procedure, s, *v.seen, settings.guidance, work.tutorial));
   if (work.guide && v.seen->active().needle.in_tissue && !v.seen->active().bite.empty())
     out.push_back(bite_panel(*work.guide, *v.seen));
+  if (!silent)
+    if (Panel p = feedback_panel(v); !p.line.empty()) out.push_back(p);
   out.push_back(state_panel(v, settings, procedure));
   if (!v.watching && !s.settling && !v.inside) out.push_back(hand_panel(v, settings));
   if (!v.log->empty() && !silent)

@@ -15,7 +15,8 @@ namespace {
 constexpr double kMm = 1000, kDegrees = 180 / 3.14159265358979323846;
 constexpr double kSampleRate = 60;  // [1/s] of the hands, at least
 constexpr float kOpenJaw = 0.5f, kClosedJaw = 0.15f;
-constexpr double kGraspTime = 0.1;  // [s] closed on nothing; a surgeon who sees it opens the jaws at once
+constexpr double kTremorApart = 1.0 / 30;  // [s]
+constexpr double kGraspTime = 0.1;         // [s] closed on nothing; a surgeon who sees it opens the jaws at once
 
 double degrees_to_surface(Vec3 direction, Vec3 normal) {
   return portable::asin(std::min(1.0, std::abs(static_cast<double>(dot(direction, normal))))) * kDegrees;
@@ -24,6 +25,31 @@ double degrees_to_surface(Vec3 direction, Vec3 normal) {
 double angle_between(Quat a, Quat b) {  // [rad]
   const Quat d = conjugate(a) * b;
   return 2 * portable::acos(std::min(1.0, std::abs(static_cast<double>(d.w))));
+}
+
+double wander_of(const std::vector<Vec3>& center) {  // [m]
+  if (center.empty()) return 0;
+  std::array<double, 3> mean{};
+  double squares = 0;
+  const double n = static_cast<double>(center.size());
+  for (const Vec3& c : center)
+    for (size_t axis = 0; axis < 3; ++axis) mean[axis] += static_cast<double>(c[static_cast<int>(axis)]) / n;
+  for (const Vec3& c : center)
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double off = static_cast<double>(c[static_cast<int>(axis)]) - mean[axis];
+      squares += off * off;
+    }
+  return std::sqrt(squares / n);
+}
+
+// From the middle of the places before and after: steady motion, also with the tissue, counts as none; 8 Hz counts by 1.1.
+double tremor_of(const std::vector<Vec3>& center, double tick_s) {  // [m]
+  const auto apart = static_cast<size_t>(kTremorApart / tick_s + 0.5);
+  if (apart == 0 || center.size() < 2 * apart + 5) return kNotObserved;
+  double squares = 0;
+  for (size_t i = apart; i + apart < center.size(); ++i)
+    squares += static_cast<double>(length2(center[i] - 0.5f * (center[i - apart] + center[i + apart])));
+  return std::sqrt(squares / static_cast<double>(center.size() - 2 * apart));
 }
 
 SutureFacts& suture_of(Facts& f, uint32_t which) {
@@ -81,12 +107,7 @@ void follow_bites(Facts& f, const PictureModel& picture, const Snapshot& seen) {
     const SutureView& view = seen.suture[open.suture];
     if (open.number >= view.bite.size()) continue;
     const SuturePicture& shape = picture.suture[open.suture];
-    const Vec3 c = view.needle.pose.p;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double x = static_cast<double>(c[axis]);
-      open.sum[static_cast<size_t>(axis)] += x, open.squares += x * x;
-    }
-    ++open.ticks;
+    open.center.push_back(view.needle.pose.p);
     const Vec3 tip = transform(view.needle.pose,
                                shape.needle_radius * Vec3{portable::cos(shape.needle_arc), portable::sin(shape.needle_arc), 0});
     const uint32_t wall = view.bite[open.number].wall;
@@ -115,12 +136,8 @@ void finish_bite(Facts& f, const PictureModel& picture, const Snapshot& seen, co
     b.entry_angle = open->entry_angle, b.exit_angle = open->exit_angle;
     b.grasp_at = open->grasp_at, b.grasp_angle = open->grasp_angle;
     b.drive_speed = open->drive_speed;
-    if (open->ticks > 0) {
-      const double n = open->ticks;
-      double mean2 = 0;
-      for (const double s : open->sum) mean2 += s / n * (s / n);
-      b.wander = std::sqrt(std::max(0.0, open->squares / n - mean2)) * kMm;
-    }
+    b.wander = wander_of(open->center) * kMm;
+    b.tremor = tremor_of(open->center, f.setup.tick_s) * kMm;
     f.open.erase(open);
   } else {
     b.entered = e.tick;

@@ -38,10 +38,8 @@ struct OpenBite {
   uint64_t entered = 0;
   float depth = 0;  // [m]
   double entry_angle = kNotObserved, exit_angle = kNotObserved, grasp_at = kNotObserved, grasp_angle = kNotObserved;
-  std::array<double, 3> sum{};  // of the needle's center
-  double squares = 0;
-  uint32_t ticks = 0;
-  Quat turned;  // the needle's orientation at entry
+  std::vector<Vec3> center;  // [m] of the needle's circle, one per tick
+  Quat turned;               // the needle's orientation at entry
   double drive_speed = kNotObserved;
   bool out = false;  // the tip has left
 };

@@ -54,6 +54,7 @@ constexpr MetricRow kRow[] = {
     {"drive_speed", "speed of the needle", "needle", "mm/s", target, mean, "turn of the needle from the tip's entry to its exit, times its radius, over the time between", kMotion},
     {"bite_time", "time for a bite", "needle", "s", lower, mean, "from the bite or knot before, or the start, until the bite is complete", kDatta},
     {"needle_wander", "needle off its curve", "needle", "mm", lower, mean, "root mean square distance of the needle circle's center from its mean while the tip is in tissue", kSeki},
+    {"needle_tremor", "tremor of the needle", "needle", "mm", lower, mean, "root mean square distance of the needle circle's center from the middle of its places 1/30 s before and after, while the tip is in tissue", "Riviere 1997, kilthub.cmu.edu/articles/6621335"},
     {"attempts", "attempts per bite", "needle", "", lower, mean, "entries of the tip until the bite is complete", kErrors},
     {"withdrawn", "withdrawn bites", "needle", "", lower, count, "the needle was withdrawn from an unfinished bite", kErrors},
     {"needle_grasps", "grasps of the needle per bite", "needle", "", lower, mean, "times that a jaw closed on the needle since the bite before", kErrors},
@@ -190,6 +191,7 @@ void measure_bites(const Facts& f, Sheet& sheet) {
       if (k.tick <= b.tick) since = std::max(since, k.tick);
     add("bite_time", static_cast<double>(b.tick - since) * f.setup.tick_s);
     add("needle_wander", b.wander);
+    add("needle_tremor", b.tremor);
     add("attempts", b.attempts);
     add("needle_grasps", b.grasps);
     add("grasp_at", b.grasp_at);

@@ -46,6 +46,7 @@ struct Bite {
   double entry_angle = kNotObserved, exit_angle = kNotObserved;  // of the needle to the surface, 0..90
   double edge_angle = kNotObserved;                              // of the bite to the edge, 0 along it .. 90 across
   double wander = 0;                               // root mean square distance of the needle's center from its mean, in tissue
+  double tremor = kNotObserved;                    // of that center, see metric needle_tremor
   double seconds = 0;                              // [s] from the tip's entry to completion
   double drive_speed = kNotObserved;               // [mm/s] of the needle along its curve while the tip is in the wall
   double grasp_at = kNotObserved;                  // position of the jaws on the needle at entry, 0 swage .. 1 tip

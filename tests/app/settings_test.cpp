@@ -51,6 +51,8 @@ Settings all_changed() {
   s.mouse_speed = 0.37f;
   s.text_size = 1.5f;
   s.force_right = 0.5f, s.force_left = 1.25f;
+  s.feedback = FeedbackLevel::live;
+  s.trainee = "T-07.a", s.survey = "rectal_prolapse";
   return s;
 }
 
@@ -58,6 +60,8 @@ TEST_F(SettingsFile, what_is_written_is_read) {
   EXPECT_EQ(parse_settings(settings_text(all_changed()), "x"), all_changed());
   EXPECT_EQ(parse_settings(settings_text(Settings{}), "x"), Settings{});
   EXPECT_EQ(parse_settings("", "x"), Settings{});
+  for (const char* bad : {"trainee = \"a b\"", "trainee = 7", "feedback = \"loud\"", "survey = \"a\\nb\""})
+    EXPECT_THROW(parse_settings(bad, "x"), InputError) << bad;
   EXPECT_EQ(parse_settings("mouse_speed = 2", "x").mouse_speed, 2) << "a whole number will do";
   save_settings(all_changed(), path_);
   EXPECT_EQ(load_settings(path_).settings, all_changed());

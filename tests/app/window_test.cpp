@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -321,6 +322,39 @@ TEST_F(Window, settings_are_kept) {
   EXPECT_EQ(exit_code(), 130);
   EXPECT_NE(read_file(file).find("assist = false"), std::string::npos) << read_file(file);
   EXPECT_EQ(read_file(file.string() + ".bad"), "hints = maybe\n");
+}
+
+// A trainee practices: the session is in the store, its questions are asked once, and nothing is stored of a look round.
+TEST_F(Window, a_trainees_session_is_stored_and_the_survey_is_asked) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1 (the nightly run)";
+  const std::string store = (folder_ / "s.db").string(), recording = (folder_ / "r.cgrec").string();
+  const std::string list = "'" CATGUT_APP "' store list --store '" + store + "' > '" + (folder_ / "list").string() + "' 2>&1";
+  if (std::system(list.c_str()) != 0) GTEST_SKIP() << "built without the store";
+  start({"play",       "stay",    "--size",    "1280x720", "--quality", "low", "--events", (folder_ / "events").string(),
+         "--record",   recording, "--trainee", "T07",      "--store",   store, "--survey", "rectal_prolapse",
+         "--feedback", "live",    "--seconds", "120"});
+  ASSERT_TRUE(happens("practice", 1, 60)) << said();
+  drag(20, 10);
+  xdo("key F10");
+  ASSERT_TRUE(happens("results")) << said();
+  xdo("key Escape");
+  EXPECT_TRUE(happens("survey")) << said();
+  xdo("key Escape");
+  EXPECT_TRUE(happens("results", 2)) << said();
+  xdo("key Escape");
+  EXPECT_TRUE(happens("start")) << said();
+  xdo("key 1");  // another scene, left without a stitch
+  EXPECT_TRUE(happens("practice", 2, 60)) << said();
+  xdo("key F2");
+  EXPECT_TRUE(happens("settings")) << said();
+  kill(app_, SIGTERM);
+  EXPECT_EQ(exit_code(), 130) << said();
+  ASSERT_EQ(std::system(list.c_str()), 0);
+  const std::string rows = read_file(folder_ / "list");
+  EXPECT_NE(rows.find("T07"), std::string::npos) << rows;
+  EXPECT_NE(rows.find("stay"), std::string::npos) << rows;
+  EXPECT_EQ(std::count(rows.begin(), rows.end(), '\n'), 2) << "a heading and one session\n" << rows;
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "recordings"), {}), 1) << "the recording is kept beside the store";
 }
 
 TEST_F(Window, a_screenshot_shows_the_field) {

@@ -3,7 +3,10 @@
 // tools/check_page.sh.
 #include <gtest/gtest.h>
 
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
+#include <string>
 
 #include "core/check.h"
 #include "serve/login.h"
@@ -50,6 +53,38 @@ TEST(Serve, beyond_this_machine_only_with_login_and_tls) {
   EXPECT_NE(fault_of(s.options).find("certificate or key cannot be used"), std::string::npos);
   s.options.key.clear();
   EXPECT_NE(fault_of(s.options).find("a certificate needs its key"), std::string::npos);
+}
+
+std::string output_of(const std::string& command) {
+  std::string out;
+  std::FILE* pipe = popen(command.c_str(), "r");
+  for (int c; pipe && (c = std::fgetc(pipe)) != EOF;) out += static_cast<char>(c);
+  if (pipe) pclose(pipe);
+  return out;
+}
+
+// A certificate as a center makes one; the client checks it, plain HTTP gets no page, and old versions of TLS are refused.
+TEST(Serve, a_client_that_trusts_the_certificate_reads_the_page_over_tls) {
+  Scratch s;
+  const std::string cert = (s.folder / "cert.pem").string(), key = (s.folder / "key.pem").string();
+  const std::string make =
+      "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost -addext "
+      "subjectAltName=DNS:localhost,IP:127.0.0.1 -out '" +
+      cert + "' -keyout '" + key + "' 2>/dev/null";
+  if (std::system("command -v curl >/dev/null") != 0 || std::system(make.c_str()) != 0)
+    GTEST_SKIP() << "openssl or curl is missing";
+  Store store(s.options.store);
+  store.put_person({"E1", Role::educator, "", "", 0});
+  store.put_login("E1", hash_password("correct horse"));
+  s.options.certificate = cert, s.options.key = key;
+  const PageServer server(s.options);
+  const std::string url = server.url();
+  ASSERT_EQ(url.rfind("https://", 0), 0u) << url;
+  const std::string curl = "curl -s --max-time 5 --noproxy '*' -o /dev/null -w '%{http_code}' ";
+  EXPECT_EQ(output_of(curl + "--cacert '" + cert + "' '" + url + "'"), "303") << "to the login";
+  EXPECT_EQ(output_of(curl + "'" + url + "'"), "000") << "a certificate that the client does not trust";
+  EXPECT_EQ(output_of(curl + "--cacert '" + cert + "' --tls-max 1.1 '" + url + "'"), "000") << "an old version of TLS";
+  EXPECT_EQ(output_of(curl + "'http" + url.substr(5) + "'"), "000") << "clear text";
 }
 
 TEST(Serve, a_port_in_use_is_one_line) {
