@@ -128,6 +128,7 @@ struct Row {
   Vec3 wanted;                              // [m/s] relative velocity of a that undoes an error; contact: along the axis only
   float gap = 0;                            // [m] contact
   float soft = 0;                           // [1/kg] compliance over h^2, of the bilateral directions
+  float soft_across = 0;                    // [1/kg] spring: across the axis
   float friction = 0;                       // contact
   float along_limit = 0, across_limit = 0;  // [N s]; contact: along 0 is unlimited
   Vec3 impulse;                             // [N s] on a
@@ -173,6 +174,7 @@ struct BodiesScratch {
   std::vector<thread::Hold> hold;
   std::vector<uint32_t> hold_body;
   std::vector<Vec3> hold_at;  // [m] where its force acts on the body
+  float step = 0;             // [s]
   int swept = 0;
   uint32_t overflow = 0;  // contacts of the step that found no room
   void reserve(const wall::Model& model, const wall::State& state);

@@ -8,6 +8,12 @@
 namespace catgut::physical {
 namespace {
 
+// Of the thread at a swage.
+constexpr float kTaut = 0.05f;         // [N]
+constexpr float kTautMass = 5e-3f;     // [kg] sqrt(line mass * EA) h: what moves with the end of a taut thread within a step
+constexpr float kSlackMass = 0.1e-3f;  // [kg] of a few nodes
+constexpr float kLineMass = 0.05f;     // [kg/m]
+
 // Velocity of the hand's target, from the target of the last step.
 struct Wish {
   Vec3 away, speed, turn, spin;  // [m], [m/s], [rad], [rad/s]
@@ -68,7 +74,7 @@ void predict_bodies(const BodiesModel& model, const Bodies& bodies, std::span<co
     opening = std::clamp(opening, b.opening - m.jaw_speed * h, b.opening + m.jaw_speed * h);
     k.moving[i].opening = opening;
   }
-  k.overflow = 0;
+  k.overflow = 0, k.step = h;
   k.row.clear(), k.hold.clear(), k.hold_body.clear(), k.hold_at.clear();
 }
 
@@ -125,7 +131,20 @@ void take_thread_forces(const BodiesModel& model, Bodies& bodies, BodiesScratch&
   for (size_t i = 0; i < k.hold.size(); ++i) {
     const uint32_t index = k.hold_body[i];
     Body& b = bodies.body[index];
-    if (model.body[index].hinge_z <= 0) continue;  // a swage: its force enters through its row
+    if (model.body[index].hinge_z <= 0) {
+      // A swage gets the force within the same step, with what the thread would add if the needle moved otherwise than it has
+      // seen: along the thread its wave impedance times h where it is taut, across it that of the transverse wave. Needle and
+      // thread weigh about the same: with a force one step late, or springs toward each other's old place, they oscillate.
+      const float force = length(k.hold[i].force), h = k.step;
+      const float side = 0.5f * (kSlackMass + h * std::sqrt(kLineMass * force)), along = force > kTaut ? kTautMass : side;
+      for (Row& row : k.row)
+        if (row.kind == Row::Kind::spring && row.a == index) {
+          row.axis = normalized(k.hold[i].force, {1, 0, 0});
+          row.soft = 1 / along, row.soft_across = 1 / side;
+          row.wanted = point_speed(k.moving[index], row.ra) - k.hold[i].force * (h * row.soft);
+        }
+      continue;
+    }
     const Vec3 at = transform(b.pose, k.hold_at[i]) - k.moving[index].center;
     b.thread_force -= k.hold[i].force, b.thread_torque -= cross(at, k.hold[i].force);
   }
@@ -209,9 +228,13 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
         row.at_limit = length2(side) > row.across_limit * row.across_limit;
         return row.axis * hold + clamped(side, row.across_limit);
       }
-      default:  // spring
-        return clamped(row.impulse - (u - row.wanted + row.impulse * row.soft) / (row.diagonal_across + row.soft),
-                       row.across_limit);
+      default: {  // spring
+        const float wn = dot(row.wanted, row.axis);
+        const float pull = pn - (un - wn + pn * row.soft) / (row.diagonal_across + row.soft);
+        const Vec3 side =
+            pt - (ut - (row.wanted - row.axis * wn) + pt * row.soft_across) / (row.diagonal_across + row.soft_across);
+        return clamped(row.axis * pull + side, row.across_limit);
+      }
     }
   };
   k.before.resize(n), k.onward.assign(n, {});

@@ -157,8 +157,8 @@ void skip_channels(const NeedlesModel& model, const wall::Model& wm, const wall:
 }
 
 void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wall::Model& wm, const wall::State& ws,
-                      const Surface& surface, const thread::State& thread, const Bodies& bodies, std::span<Needle> needle,
-                      float h, BodiesScratch& k) {
+                      const Surface& surface, const thread::State&, const Bodies& bodies, std::span<Needle> needle, float h,
+                      BodiesScratch& k) {
   const PunctureLaw& law = model.law;
   for (uint32_t i = 0; i < needle.size(); ++i) {
     const NeedleModel& m = model.needle[i];
@@ -187,8 +187,7 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
       const Vec3 at = swage_of(m, body.pose);
       Row row;
       row.kind = Row::Kind::spring, row.key = key(0, 0), row.axis = {1, 0, 0};
-      row.wanted = (thread.position(n.thread_node) - at) / h;
-      row.soft = 1 / (law.swage_stiffness * h * h), row.across_limit = law.swage_strength * h;
+      row.across_limit = law.swage_strength * h;
       add(row, at);
       thread::Hold hold;
       hold.node = n.thread_node, hold.stiffness = law.swage_stiffness, hold.limit = law.swage_strength;

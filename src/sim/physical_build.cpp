@@ -17,6 +17,10 @@ constexpr int kThreadSubsteps = 20;
 // Of gravity on thread. The simulated line mass is some 500 times the real one (docs/thread.md); with all of it a strand that
 // hangs would pull with 0.1 N.
 constexpr float kThreadGravity = 0.03f;
+constexpr float kThreadDrag = 30;  // [1/s] on thread. At 0.1 m/s it is 0.15 N per meter
+// [N] with which tissue holds slack thread in a hole (an estimate). Without it the thread creeps into the lumen by its weight:
+// Coulomb friction needs tension.
+constexpr float kHoleGrip = 0.03f;
 constexpr float kLyingForce = 0.05f;  // [N] with which the drape holds a needle that lies on it
 
 std::string name_of(const SceneSpec& scene) { return scene.name.empty() ? "scene" : scene.name; }
@@ -61,6 +65,7 @@ thread::Settings thread_of(const SceneSpec& scene, float step) {
   s.substeps = kThreadSubsteps;
   s.substep = step / kThreadSubsteps;
   s.gravity = scene.solver.gravity * kThreadGravity;
+  s.damping = kThreadDrag, s.hole_grip = kHoleGrip;
   return s;
 }
 

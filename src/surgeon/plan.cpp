@@ -207,6 +207,8 @@ Plan stay_plan(const PictureModel& picture, const SurgeonSkill& skill) {
 Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;
+  // A deep bite: a third of the arc from the swage, the jaws would press on the tissue before the tip is out.
+  plan.driver_at = 0.22f, plan.beyond = 0.6f;
   const OpeningShape left = opening_shape(picture, 0), right = opening_shape(picture, 1);
   BitePlace p = on_top(picture, 0, 0, 0);
   const Vec3 across = right.center - left.center;
@@ -220,6 +222,7 @@ Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   add(plan, TaskKind::pick_up);
   add(plan, TaskKind::bite);
   add(plan, TaskKind::pull_tail);
+  add(plan, TaskKind::regrip);
   add(plan, TaskKind::rest);
   return plan;
 }

@@ -63,6 +63,9 @@ struct Plan {
   // the hands.
   float driver_side = 1, forceps_side = 1;
   float lift = 0;  // [m] along `up`, on approach to a bite
+  // Where the needle holder grips the needle, as a fraction of its arc from the swage; how far beyond the bite a sweep turns
+  // the needle before the forceps takes the tip [rad].
+  float driver_at = 0.35f, beyond = 0.72f;
 };
 
 // A plan is a row of one table. Throws std::invalid_argument for a name that is not in it, or a picture that does not fit.

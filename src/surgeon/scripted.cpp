@@ -13,7 +13,7 @@ constexpr float kCounterHold = 0.8f;  // [N]
 constexpr float kTighten = 0.15f;     // of the free speed: the thread runs through two dozen holes, and tissue follows it late
 constexpr float kSecure = 0.985f;     // fraction of a closure that counts as closed
 constexpr float kMissBy = 0.008f;     // [m] along the shaft
-constexpr float kDriverAt = 0.35f, kForcepsAt = 0.93f;  // positions on the needle's arc: a third from the swage, behind the tip
+constexpr float kForcepsAt = 0.93f;   // position on the needle's arc: behind the tip
 
 }  // namespace
 
@@ -171,7 +171,7 @@ Pose Scripted::grip_at(const Pose& needle, float s, float side, float lean, floa
 }
 
 Pose Scripted::driver_grip(const Pose& needle) const {
-  return grip_at(needle, kDriverAt, plan_.driver_side, plan_.lift > 0 ? 0.0f : 0.7f, 0.2f);
+  return grip_at(needle, plan_.driver_at, plan_.driver_side, plan_.lift > 0 ? 0.0f : 0.7f, 0.2f);
 }
 
 Pose Scripted::forceps_grip(const Pose& needle) const {
@@ -303,7 +303,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       psi_ += skill_.drive_speed / shape().needle_radius * dt_;
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
       const int passed = passages(seen, false);
-      if (passed >= bite().walls && psi_ > psi_bite + 0.72f) {
+      if (passed >= bite().walls && psi_ > psi_bite + plan_.beyond) {
         go(over);
       } else if (psi_ > psi_bite + 1.1f) {
         // The tip is misplaced: it did not enter, is not deep enough, or is too deep to exit.

@@ -14,6 +14,8 @@
 namespace catgut::thread {
 namespace {
 
+constexpr float kToolPress = 20;  // [N] maximum of a tool on a segment: thread wedged between two rigid tools yields
+
 Four motion(const Scratch& s, const Active& c) {
   const Four* u = s.contact_u.data();
   return (u[c.i] * c.wi0 + u[c.i + 1] * c.wi1) + (u[c.j] * c.wj0 + u[c.j + 1] * c.wj1) - c.partner;
@@ -101,35 +103,17 @@ float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& 
   } else {
     active.j = i;
     active.mu = around.tools[other - kTool].friction;
+    active.most = kToolPress * settings.substep * settings.substep;
     active.partner = four(lerp(s.tool_move[2 * (other - kTool)], s.tool_move[2 * (other - kTool) + 1], c.t));
   }
   add_active(settings, s, active, c.gap, c.drift, c.normal_impulse, c.friction_impulse);
   return 0;
 }
 
-void begin_plane(const Settings& settings, State& state, Scratch& s, const Plane& plane) {
-  const float r = 0.5f * settings.material.diameter;
-  for (uint32_t i = 0; i < state.nodes(); ++i) {
-    const float gap = dot(plane.normal, state.x.at(i)) - plane.offset - r + dot(plane.normal, s.u.at(i));
-    if (gap > kReady * settings.material.diameter) {
-      state.plane_normal[i] = 0, state.plane_friction.set(i, {}), state.plane_drift.set(i, {});
-      continue;
-    }
-    Active c;
-    const bool last = i + 1 == state.nodes();
-    c.i = c.j = last ? i - 1 : i;
-    (last ? c.wi1 : c.wi0) = 1;
-    c.normal = four(plane.normal), c.mu = plane.friction;
-    const size_t before = s.active.size();
-    add_active(settings, s, c, gap, state.plane_drift.at(i), state.plane_normal[i], state.plane_friction.at(i));
-    if (s.active.size() > before) s.plane_node.push_back(i);
-  }
-}
-
 }  // namespace
 
 void begin_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around, float time) {
-  s.active.clear(), s.plane_node.clear(), s.contact_node.clear();
+  s.active.clear(), s.contact_node.clear();
   const float* moved = s.segment_move.data();
   const size_t pairs = state.key.size();
   for (size_t k = 0; k < around.tools.size(); ++k) {
@@ -151,9 +135,11 @@ void begin_contacts(const Settings& settings, State& state, Scratch& s, Surround
   for (uint32_t i : s.contact_node) s.touched[i] = 0;
   for (const Active& c : s.active) apply(s, c, c.normal * c.ln + c.lt);
   store_motion(s);
+  if (around.plane) warm_plane(state, s, *around.plane);
 }
 
-void sweep_contacts(Scratch& s, bool backward) {
+void sweep_contacts(const Settings& settings, State& state, Scratch& s, const Surroundings& around, bool backward) {
+  if (around.plane && backward) sweep_plane(settings, state, s, *around.plane);
   load_motion(s);
   const size_t count = s.active.size();
   for (size_t k = 0; k < count; ++k) {
@@ -161,23 +147,16 @@ void sweep_contacts(Scratch& s, bool backward) {
     apply(s, c, correct(c, motion(s, c)));
   }
   store_motion(s);
+  if (around.plane && !backward) sweep_plane(settings, state, s, *around.plane);
 }
 
 void end_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around) {
   const float newtons = 1 / (settings.substep * settings.substep * static_cast<float>(settings.substeps));
-  const size_t crossings = s.active.size() - s.plane_node.size();
-  for (size_t k = 0; k < s.active.size(); ++k) {
-    const Active& c = s.active[k];
+  load_motion(s);  // with what the plane has done
+  for (const Active& c : s.active) {
     const Vec3 went = three(motion(s, c)), normal = three(c.normal), moved = tangential(went, normal);
     const Vec3 impulse = three(c.normal * c.ln + c.lt);
     if (c.ln > 0) s.touched[c.i] = s.touched[c.i + 1] = s.touched[c.j] = s.touched[c.j + 1] = 1;
-    if (k >= crossings) {
-      const uint32_t i = s.plane_node[k - crossings];
-      state.plane_drift.set(i, new_drift(settings, c, state.plane_drift.at(i), moved));
-      state.plane_normal[i] = c.ln, state.plane_friction.set(i, three(c.lt));
-      around.plane->force -= impulse * newtons;
-      continue;
-    }
     Crossing& crossing = state.crossing[c.crossing];
     crossing.drift = new_drift(settings, c, crossing.drift, moved);
     crossing.normal_impulse = c.ln, crossing.friction_impulse = three(c.lt);
@@ -190,6 +169,7 @@ void end_contacts(const Settings& settings, State& state, Scratch& s, Surroundin
       tool.force_b -= impulse * (newtons * crossing.t);
     }
   }
+  if (around.plane) end_plane(settings, state, s, *around.plane);
 }
 
 }  // namespace catgut::thread

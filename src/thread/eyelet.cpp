@@ -191,6 +191,16 @@ void turn_corners(const Settings& settings, State& state, Scratch& s, Surroundin
   state.eyelet.resize(kept), s.corner.resize(kept);
 }
 
+void grip_corners(const Settings& settings, const State& state, Scratch& s, SoftPoints& soft) {
+  for (size_t e = 0; e < state.eyelet.size(); ++e) {
+    const Scratch::Corner& c = s.corner[e];
+    const float half = 0.5f * settings.hole_grip * state.eyelet[e].slip / kBristle;
+    s.force.add(state.eyelet[e].segment, c.in * -half);
+    s.force.add(state.eyelet[e].segment + 1, c.out * -half);
+    push_soft(s, soft, state.eyelet[e].point, (c.in + c.out) * (half * settings.substep * settings.substep), settings.substep);
+  }
+}
+
 void find_corners(const State& state, Scratch& s, const SoftPoints& soft) {
   for (size_t e = 0; e < state.eyelet.size(); ++e) {
     look(state, s, soft, e, s.corner[e]);

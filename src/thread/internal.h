@@ -64,12 +64,12 @@ struct Active {
   Four pull_back{};  // fraction of the drift that is undone
   // Barycentric weights, negative for the second segment; the same times the inverse masses.
   float wi0 = 0, wi1 = 0, wj0 = 0, wj1 = 0, mi0 = 0, mi1 = 0, mj0 = 0, mj1 = 0;
-  uint32_t i = 0, j = 0;  // first nodes of both segments; j = i for a tool or the plane (its weights are 0)
+  uint32_t i = 0, j = 0;  // first nodes of both segments; j = i for a tool (its weights are 0)
   float inverse = 0;      // 1 / effective inverse mass
   float mu = 0;
-  float level = 0;  // gap - normal . motion, at the moment of the geometry
-  float ln = 0;
-  uint32_t crossing = 0;  // index in State
+  float level = 0;            // gap - normal . motion, at the moment of the geometry
+  float ln = 0, most = 1e9f;  // [N.s2] normal impulse, and its maximum
+  uint32_t crossing = 0;      // index in State
   bool slipped = false;
 };
 
@@ -78,7 +78,7 @@ struct Active {
 template <typename AnyActive>
 inline Four correct(AnyActive& c, Four moved) {
   const float along = dot(c.normal, moved);
-  const float ln = std::max(0.0f, c.ln - (c.level + along) * c.inverse);
+  const float ln = std::min(std::max(0.0f, c.ln - (c.level + along) * c.inverse), c.most);
   Four lt = c.lt - (moved - c.normal * along + c.pull_back) * c.inverse;
   const float limit = c.mu * ln, size2 = dot(lt, lt);
   c.slipped = size2 > limit * limit;
@@ -114,8 +114,10 @@ struct Scratch {
   std::vector<Active> active;
   std::vector<Four> contact_u;         // u of the nodes below, node by node
   std::vector<uint32_t> contact_node;  // nodes of active contacts, each once
-  std::vector<uint32_t> plane_node;
-  std::vector<uint8_t> touched;  // per node, in this substep
+  // Contact with the plane: nodes that may touch it, and columns over all nodes.
+  size_t plane_first = 0, plane_end = 0;
+  Padded plane_level, plane_inverse, plane_slipped;  // [m], [kg] 0: does not touch, 0 or 1
+  std::vector<uint8_t> touched;                      // per node, in this substep
   // Pair list under construction, and what finds it.
   std::vector<uint32_t> new_key;
   Column new_budget;
@@ -124,6 +126,7 @@ struct Scratch {
   Padded half;
   std::vector<Vec3> block_middle;
   Column block_radius;
+  std::vector<uint64_t> block_tools;
   std::vector<Vec3> tool_move;  // per substep, of both ends of every tool
   // Soft points: motion since the step began, now and at the beginning of the substep.
   Padded3 soft_moved, soft_before;
@@ -143,7 +146,7 @@ struct Scratch {
   struct SoftActive {
     Four normal{}, lt{}, pull_back{};
     uint32_t node = 0, point = 0;
-    float inverse = 0, mu = 0, level = 0, before = 0, ln = 0;
+    float inverse = 0, mu = 0, level = 0, before = 0, ln = 0, most = 1e9f;
     bool slipped = false;
     uint32_t contact = 0;
   };
@@ -176,6 +179,7 @@ void begin_eyelets(const Settings& settings, State& state, Scratch& s, Surroundi
 void advance_soft(const Settings& settings, Scratch& s, const SoftPoints& soft);               // of a substep
 // Hands corners on that a node has come to; finds slip and friction.
 void turn_corners(const Settings& settings, State& state, Scratch& s, Surroundings& around);
+void grip_corners(const Settings& settings, const State& state, Scratch& s, SoftPoints& soft);  // Settings::hole_grip
 void find_corners(const State& state, Scratch& s, const SoftPoints& soft);
 void prepare_corners(const State& state, Scratch& s, const SoftPoints& soft);
 void take_corner_residuals(const State& state, Scratch& s, const SoftPoints& soft);
@@ -194,7 +198,13 @@ void add_bending(const Settings& settings, const State& state, Scratch& s);
 // contact.cpp
 // Finds contacts at the predicted positions and applies their impulses of the last substep.
 void begin_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around, float time);
-void sweep_contacts(Scratch& s, bool backward);
+void sweep_contacts(const Settings& settings, State& state, Scratch& s, const Surroundings& around, bool backward);
 void end_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around);
+
+// plane.cpp: the same stages for the contacts with the plane, called by contact.cpp.
+void begin_plane(const Settings& settings, State& state, Scratch& s, const Plane& plane);
+void warm_plane(State& state, Scratch& s, const Plane& plane);
+void sweep_plane(const Settings& settings, State& state, Scratch& s, const Plane& plane);
+void end_plane(const Settings& settings, State& state, Scratch& s, Plane& plane);
 
 }  // namespace catgut::thread

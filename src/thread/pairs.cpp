@@ -3,6 +3,7 @@
 // The memory of a pair is carried over by key, so a refresh only changes which pairs are evaluated. Reads positions; writes the
 // crossings.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -75,6 +76,17 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
     s.new_budget.push_back(known ? state.budget[old] : 0.0f);
     s.new_crossing.push_back(known ? state.crossing[old] : Crossing{});
   };
+  // Tools near a block, as bits.
+  std::fill_n(s.block_tools.begin(), blocks, uint64_t{0});
+  for (size_t k = 0; k < tools.size(); ++k) {
+    const Vec3 from = lerp(tools[k].a, tools[k].to_a, time), along = lerp(tools[k].b, tools[k].to_b, time) - from;
+    const float size2 = std::max(length2(along), 1e-12f), far = tools[k].radius + reach;
+    for (size_t b = 0; b < blocks; ++b) {
+      const Vec3 off = s.block_middle[b] - from;
+      const float r = 1.001f * (far + s.block_radius[b]);
+      if (length2(off - along * clamp01(dot(off, along) / size2)) < r * r) s.block_tools[b] |= uint64_t{1} << k;
+    }
+  }
   int near[kBlock];
   for (size_t i = 0; i < m; ++i) {
     if (state.broken[i]) continue;
@@ -94,7 +106,8 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
         if (length2(p + a * u - c * v) < reach * reach) keep(static_cast<uint32_t>(i << 16 | j));
       }
     }
-    for (size_t k = 0; k < tools.size(); ++k) {
+    for (uint64_t left = s.block_tools[i / kBlock]; left != 0; left &= left - 1) {
+      const size_t k = static_cast<size_t>(std::countr_zero(left));
       const ToolCapsule& tool = tools[k];
       const Vec3 ta = lerp(tool.a, tool.to_a, time), tb = lerp(tool.b, tool.to_b, time);
       const float far = tool.radius + 0.5f * settings.material.diameter + settings.list_margin;

@@ -224,14 +224,17 @@ Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_un
   Scratch& s = *scratch_;
   s.max_nodes = max_nodes, s.max_crossings = max_crossings;
   for (Padded3* c : {&s.u, &s.force, &s.e, &s.n, &s.moment, &s.middle}) c->resize(max_nodes);
-  for (Padded* c : {&s.mass, &s.w, &s.move, &s.rest, &s.inverse_rest, &s.keep, &s.alpha, &s.lambda, &s.step, &s.residual,
-                    &s.diag, &s.off, &s.tension_sum, &s.segment_move, &s.half, &s.least_density, &s.span})
+  for (Padded* c : {&s.mass,          &s.w,     &s.move,        &s.rest,          &s.inverse_rest,
+                    &s.keep,          &s.alpha, &s.lambda,      &s.step,          &s.residual,
+                    &s.diag,          &s.off,   &s.tension_sum, &s.segment_move,  &s.half,
+                    &s.least_density, &s.span,  &s.plane_level, &s.plane_inverse, &s.plane_slipped})
     c->resize(max_nodes);
   s.lanes.resize(max_nodes);
   s.contact_u.resize(max_nodes + 1), s.contact_node.reserve(max_nodes + 1);
-  s.active.reserve(max_crossings + max_nodes), s.plane_node.reserve(max_nodes), s.touched.assign(max_nodes + 1, 0);
+  s.active.reserve(max_crossings), s.touched.assign(max_nodes + 1, 0);
   s.new_key.reserve(max_crossings), s.new_budget.reserve(max_crossings), s.new_crossing.reserve(max_crossings);
   s.block_middle.resize(max_nodes / 8 + 2), s.block_radius.resize(max_nodes / 8 + 2);
+  s.block_tools.resize(max_nodes / 8 + 2);
   s.tool_move.resize(2 * 64);
   s.spike_right.resize(max_nodes), s.spike_left.resize(max_nodes);
   s.soft_moved.resize(kMaxSoftPoints), s.soft_before.resize(kMaxSoftPoints), s.soft_active.reserve(2 * kMaxSoftPoints);
@@ -266,6 +269,7 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
     find_edges(state, s);
     for (Padded* f : {&s.force.x, &s.force.y, &s.force.z}) std::fill_n(f->data(), n, 0.0f);
     add_bending(settings, state, s);
+    if (around.soft && settings.hole_grip > 0) grip_corners(settings, state, s, *around.soft);
     for (const Pull& pull : around.pulls) s.force.add(pull.node, pull.force);
     predict(n, h, settings.gravity.x, state.v.x.data(), s.force.x.data(), s.w.data(), s.u.x.data());
     predict(n, h, settings.gravity.y, state.v.y.data(), s.force.y.data(), s.w.data(), s.u.y.data());
@@ -280,7 +284,7 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
       const bool backward = (static_cast<uint32_t>(it) + state.substeps_done) & 1;
       solve_stretch(settings, state, s, around.soft);
       if (!s.soft_active.empty()) sweep_soft_contacts(s, *around.soft, settings.substep, backward);
-      sweep_contacts(s, backward);
+      sweep_contacts(settings, state, s, around, backward);
     }
     end_contacts(settings, state, s, around);
     end_soft_contacts(settings, state, s, around);

@@ -43,6 +43,7 @@ struct Settings {
   float anchor = 0.2f;          // fraction of the stored tangential drift that a sticking contact undoes per substep
   float list_margin = 0.6e-3f;  // pairs nearer than d + margin are listed [m]
   float max_move = 0.125f;      // of the diameter, per substep
+  float hole_grip = 0;          // [N] with which a hole holds thread that is slack, too; in addition to its Coulomb friction
   Vec3 gravity{};               // [m/s2]
   bool breaks = true;
 };

@@ -213,7 +213,9 @@ TEST(PhysicalScene, a_needle_leads_its_thread_through_both_walls) {
   size_t complete = 0;
   for (const BiteView& bite : seen.active().bite) complete += bite.complete;
   EXPECT_GE(complete, 2u);
-  EXPECT_GE(seen.active().suture_point.size(), 3u);  // of four holes; docs/physical.md, "What is missing for scenes"
+  EXPECT_EQ(seen.active().suture_point.size(), 4u);
+  EXPECT_EQ(state->physical.world.thread.eyelet.size(), 4u) << "the thread runs through all holes at the end";
+  for (const uint8_t broken : seen.active().thread_cut) EXPECT_FALSE(broken);
 }
 
 TEST(PhysicalScene, a_guided_scene_has_no_physical_state) {
