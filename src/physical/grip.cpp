@@ -58,7 +58,11 @@ void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::Sta
         return std::abs(p.y) < m.jaw_width + 0.5f * size && std::abs(p.z) < 0.5f * m.jaw_length + 0.5f * size &&
                std::abs(p.x) < 0.5f * gap_at(p.z) + 0.5f * size + 0.3e-3f;
       };
-      const auto closed_on = [&](float z, float size) { return gap_at(z) <= size + 0.3e-3f; };
+      // Jaws that are shut take nothing that touches them from outside.
+      const auto closed_on = [&](float z, float size) {
+        const float gap = gap_at(z);
+        return gap <= size + 0.3e-3f && gap > 0.25f * size;
+      };
       // Needle first, then thread, then tissue.
       float best = 1e9f;
       for (uint32_t n = 0; n < bodies.body.size() && (target[b].may_hold & 1); ++n) {

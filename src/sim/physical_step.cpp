@@ -19,6 +19,7 @@ struct PhysicalScratch {
   struct Puncture {
     uint32_t needle = 0, events = 0;
     wall::Point entry, exit;
+    uint32_t entry_hole = wall::kNone;  // of the first channel: it may be gone at the end of the tick
   };
   std::vector<Puncture> puncture;
   std::vector<float> depth;  // [m] per needle: largest depth of its tip in the tissue in this tick
@@ -120,6 +121,7 @@ void note_punctures(const State& state, const physical::Model& m, PhysicalScratc
     if (needle.channels == 0) continue;
     const physical::Channel& c = needle.channel[needle.channels - 1];
     p.entry = c.point[0], p.exit = c.point[c.count - 1];
+    p.entry_hole = needle.channel[0].entry_hole;
   }
 }
 
@@ -244,7 +246,6 @@ void show_bites(const Model& model, State& state, SutureContext& sewing, const P
   const Vec4* x = state.solver.x.data();
   for (const PhysicalScratch::Puncture& p : k.puncture) {
     Suture& suture = state.suture.suture[p.needle];
-    const physical::Needle& needle = state.physical.world.needle[p.needle];
     const RigidBody& body = state.solver.body[model.solver.needle_body(p.needle)];
     const NeedleArc& arc = model.solver.needle_arc[p.needle];
     const auto report = [&](EventKind kind, uint32_t which, float value, Vec3 where) {
@@ -278,10 +279,9 @@ void show_bites(const Model& model, State& state, SutureContext& sewing, const P
       suture.open.pop_back();
       report(EventKind::bite_withdrawn, which, suture.bite[which].depth, needle_tip(arc, body));
     }
-    if ((p.events & physical::kThreadIn) && !suture.open.empty() && needle.channels > 0 &&
-        needle.channel[0].entry_hole != wall::kNone) {
+    if ((p.events & physical::kThreadIn) && !suture.open.empty() && p.entry_hole != wall::kNone) {
       suture.open.front().phase = NeedlePhase::back_in;
-      add_point(model, state, sewing, p.needle, suture.open.front().bite, false, needle.channel[0].entry_hole);
+      add_point(model, state, sewing, p.needle, suture.open.front().bite, false, p.entry_hole);
     }
     if ((p.events & physical::kThreadOut) && !suture.open.empty()) {
       const uint32_t which = suture.open.front().bite, hole = new_hole(model, state, p.needle);
