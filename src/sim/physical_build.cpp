@@ -14,9 +14,9 @@ namespace {
 
 constexpr float kStep = 1e-3f;  // [s] longest step of the wall: docs/wall.md was measured at it
 constexpr int kThreadSubsteps = 20;
-// Of gravity on thread. The simulated line mass is some 500 times the real one (docs/thread.md); with all of it a strand that
-// hangs would pull with 0.1 N.
-constexpr float kThreadGravity = 0.03f;
+// Of gravity on thread. The simulated line mass is some 500 times the real one (docs/thread.md): this gives five times the real
+// weight. With more, a tail laid on the bowel slides off it.
+constexpr float kThreadGravity = 0.01f;
 constexpr float kThreadDrag = 30;  // [1/s] on thread. At 0.1 m/s it is 0.15 N per meter
 // [N] with which tissue holds slack thread in a hole (an estimate). Without it the thread creeps into the lumen by its weight:
 // Coulomb friction needs tension.

@@ -16,6 +16,7 @@ namespace {
 constexpr int kBitesPerThread = 10;
 constexpr float kRow = 0.004f;         // [m] between two rows of bites
 constexpr float kStaysApart = 0.012f;  // [m] round the bowel, between stay sutures
+constexpr float kPull = 1.7f;          // [N] on each strand of a physical throw: below what the bites bear
 constexpr float kFreeDepth = 0.0045f;  // [m] depth below the rims of a sweep through two layers
 
 // Depth of the needle's circle below a surface of radius `curved` [m] whose chord is `length`.
@@ -208,7 +209,7 @@ Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;
   // A deep bite: a third of the arc from the swage, the jaws would press on the tissue before the tip is out.
-  plan.driver_at = 0.22f, plan.beyond = 0.6f;
+  plan.driver_at = 0.15f, plan.beyond = 0.5f;
   const OpeningShape left = opening_shape(picture, 0), right = opening_shape(picture, 1);
   BitePlace p = on_top(picture, 0, 0, 0);
   const Vec3 across = right.center - left.center;
@@ -223,6 +224,16 @@ Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   add(plan, TaskKind::bite);
   add(plan, TaskKind::pull_tail);
   add(plan, TaskKind::regrip);
+  add(plan, TaskKind::rest);
+  return plan;
+}
+
+// The same, tied with a square knot of three single throws.
+Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan = interrupted_plan(picture, skill);
+  plan.pull = kPull;
+  plan.task.pop_back();
+  for (int i = 0; i < 3; ++i) add(plan, TaskKind::throw_, 1, 1);
   add(plan, TaskKind::rest);
   return plan;
 }
@@ -287,9 +298,13 @@ struct PlanRow {
   size_t walls;  // open rims that it needs
   Plan (*make)(const PictureModel&, const SurgeonSkill&);
 };
-constexpr PlanRow kPlan[] = {
-    {"purse_string", 1, purse_string_plan}, {"connell", 2, connell_plan}, {"stay", 2, stay_plan},
-    {"lembert", 2, lembert_plan},           {"running", 1, running_plan}, {"interrupted", 2, interrupted_plan}};
+constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
+                             {"connell", 2, connell_plan},
+                             {"stay", 2, stay_plan},
+                             {"lembert", 2, lembert_plan},
+                             {"running", 1, running_plan},
+                             {"interrupted", 2, interrupted_plan},
+                             {"interrupted_tied", 2, interrupted_tied_plan}};
 
 }  // namespace
 

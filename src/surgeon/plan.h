@@ -66,6 +66,7 @@ struct Plan {
   // Where the needle holder grips the needle, as a fraction of its arc from the swage; how far beyond the bite a sweep turns
   // the needle before the forceps takes the tip [rad].
   float driver_at = 0.35f, beyond = 0.72f;
+  float pull = 0;  // [N] of each strand when a throw is pulled tight, with physical mechanics; 0: throws of guided mechanics
 };
 
 // A plan is a row of one table. Throws std::invalid_argument for a name that is not in it, or a picture that does not fit.

@@ -210,7 +210,7 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
       return draw(seen);
     case TaskKind::throw_:
     case TaskKind::lock_strand:
-      return tie(task, seen);
+      return plan_.pull > 0 ? tie_thread(task, seen) : tie(task, seen);
     case TaskKind::cut_long:
     case TaskKind::cut_tail:
     case TaskKind::cut_needle:

@@ -6,6 +6,7 @@
 // did not hold is wound again. Bites are in scripted.cpp, knots and scissors in tying.cpp.
 #pragma once
 #include <array>
+#include <optional>
 #include <string>
 
 #include "exchange/tying.h"
@@ -13,6 +14,7 @@
 #include "surgeon/plan.h"
 #include "surgeon/sight.h"
 #include "surgeon/surgeon.h"
+#include "surgeon/thread_tie.h"
 
 namespace catgut {
 
@@ -131,6 +133,8 @@ class Scripted final : public Surgeon {
   // An instrument tie. The needle's strand is held up, the needle holder is laid beside it, the forceps winds the strand round
   // it. The needle holder, with the loop on it, then grasps the tail, and the hands pull apart.
   bool tie(const Task& task, const Snapshot& seen);
+  // The same with physical mechanics.
+  bool tie_thread(const Task& task, const Snapshot& seen);
 
   // The needle's own strand is laid between the needle holder's jaws, past the loop.
   bool take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again);
@@ -179,6 +183,7 @@ class Scripted final : public Surgeon {
   uint32_t throws_before_ = 0, take_slot_ = 0;
   Quat take_turn_;
   Vec3 tried_;
+  std::optional<ThreadTie> thread_tie_;  // with physical mechanics, from the first throw on
   uint32_t sequence_ = 0;
 };
 

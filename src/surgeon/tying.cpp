@@ -206,6 +206,20 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
   }
 }
 
+bool Scripted::tie_thread(const Task& task, const Snapshot& seen) {
+  enum { start, work };
+  if (stage_ == start) {
+    const bool first = !thread_tie_;
+    if (first) thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull});
+    thread_tie_->begin(seen, task.which, task.way, first);
+    go(work);
+  }
+  const bool over = thread_tie_->operate(seen, dt_);
+  doing_ = "throw: " + thread_tie_->doing();
+  if (over && thread_tie_->failed()) gave_up_ = true;
+  return over;
+}
+
 bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again) {
   const Vec3 z = rotate(lying.q, {0, 0, 1});
   const ToolView& driver = seen.tool[kNeedleHolder];

@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0
+// surgeon/thread_tie: see the header.
+#include "surgeon/thread_tie.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "exchange/strand.h"
+#include "exchange/tying.h"
+
+namespace catgut {
+namespace {
+
+constexpr size_t kHolder = 0, kForceps = 1;
+constexpr float kStrandAt = 18e-3f;    // [m] of the shaft, from the grasp point: above the wound
+constexpr float kWindAt = 9e-3f;       // [m] of the shaft: plane of the winding hand, nearer the tip than the strand
+constexpr float kShaft = 2.2e-3f;      // [m] radius that the turns lie on
+constexpr float kNearest = 9e-3f;      // [m] of the winding hand from the shaft
+constexpr float kLoose = 0.95f;        // of the strand that is left: nearly taut
+constexpr float kWinding = 0.25f;      // [N] above which the winding hand yields
+constexpr float kTailEnd = 6e-3f;      // [m] from the tail's end, where it is taken
+constexpr float kHalfOpen = 0.8f;      // of the jaws, to take the tail
+constexpr float kLow = 4e-3f;          // [m] above the stitch, where strands are pulled
+
+Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
+// Unit, across the shaft; 0: toward the viewer, pi/2: above.
+Vec3 around(float side, float angle) {
+  const Vec3 shaft = shaft_from(side), up{-shaft.y * side, shaft.x * side, 0};
+  return Vec3{0, 0, 1} * portable::cos(angle) + up * portable::sin(angle);
+}
+// The needle holder along a shaft; its jaws open across the pull.
+Quat holder_turn(float side) {
+  const Vec3 z = shaft_from(side), x{0, 0, 1};
+  return from_axes(x, cross(z, x), z);
+}
+float smooth(float s) {
+  s = std::clamp(s, 0.0f, 1.0f);
+  return s * s * (3 - 2 * s);
+}
+
+}  // namespace
+
+ThreadTie::ThreadTie(const PictureModel& picture, std::array<ScriptedHand, 2>& hands, const ThreadTieSettings& settings)
+    : picture_(picture), hands_(hands), how_(settings) {}
+
+std::string ThreadTie::doing() const {
+  static constexpr const char* kName[] = {"reach for the tail", "take the tail", "lift the tail", "lay the tail", "let the tail go", "leave the tail", "to the strand",
+                                          "under the strand", "wind", "open the jaws", "reach for the tail", "close on the tail",
+                                          "draw the tail through", "cross the hands", "lower the hands", "pull", "lay the tail",
+                                          "let go", "leave", "done"};
+  return kName[stage_];
+}
+
+Vec3 ThreadTie::tail_node(const Snapshot& seen, float from_end) const {
+  return node_at(seen, node_along(seen, 0, from_end, 1));
+}
+
+void ThreadTie::begin(const Snapshot& seen, int wraps, int sense, bool first) {
+  wraps_ = wraps, sense_ = static_cast<float>(sense), first_ = first, failed_ = false, misses_ = 0;
+  origin_ = 0.5f * (seen.active().suture_point.front().position + seen.active().suture_point.back().position);
+  const Vec3 swage = needle_swage(picture_, seen);
+  // The long strand is on the side of its hole for the first throw; then the ends have crossed.
+  if (first) {
+    side_ = seen.active().suture_point.back().position.x > origin_.x ? 1.0f : -1.0f;
+    const ToolView& forceps = seen.tool[kForceps];
+    const Vec3 z = rotate(forceps.pose.q, {0, 0, 1});
+    forceps_angle_ = portable::atan2(z.y, z.x);
+    forceps_rest_ = axis_angle({0, 0, 1}, -forceps_angle_) * forceps.pose.q;
+    swage_in_forceps_ = to_local(forceps.pose, swage);
+    holder_turn_ = hands_[kHolder].pose.q;
+    tip_ = hands_[kHolder].pose.p, hand_ = swage;
+  } else {
+    side_ = -side_;
+  }
+  const size_t last = seen.active().thread_order.size() - 1;
+  strand_ = length_between(seen, last_point_node(seen), last) - (first ? 0.0f : 3e-3f);
+  tail_ = length_between(seen, 0, first_point_node(seen)) - (first ? 0.0f : 3e-3f);
+  height_ = (wraps > 1 ? 0.42f : 0.5f) * strand_;
+  go(seen, first ? to_tail : to_work);
+}
+
+void ThreadTie::glide_to(Vec3 tip, Vec3 hand, float speed, float angle) {
+  tip_from_ = tip_, tip_to_ = tip, hand_from_ = hand_, hand_to_ = hand;
+  holder_from_ = holder_turn_, holder_to_ = holder_turn(side_);
+  angle_from_ = forceps_angle_, angle_to_ = angle;
+  done_ = 0;
+  const float turn = length(rotation_vector(holder_to_ * conjugate(holder_from_)));
+  const float far = std::max({distance(tip_, tip), distance(hand_, hand), 0.03f * turn, 0.03f * std::abs(angle - forceps_angle_)});
+  seconds_ = std::max(0.1f, 1.5f * far / speed);
+}
+
+bool ThreadTie::glide(float dt) {
+  done_ += dt / seconds_;
+  const float e = smooth(done_);
+  tip_ = lerp(tip_from_, tip_to_, e), hand_ = lerp(hand_from_, hand_to_, e);
+  holder_turn_ = nlerp(holder_from_, holder_to_, e);
+  forceps_angle_ = angle_from_ + (angle_to_ - angle_from_) * e;
+  return done_ >= 1;
+}
+
+void ThreadTie::feel(const Snapshot& seen) {
+  const SutureView& s = seen.active();
+  const float now = s.thread_tension[s.thread_order.size() - 3];
+  felt_ += 0.5f * (std::max(0.0f, now) - felt_);
+  const ToolView& holder = seen.tool[kHolder];
+  float tail = 0;
+  if (holder.held == Held::thread) {
+    const size_t node = std::clamp<size_t>(node_of(seen, holder.held_slot) + 2, 0, s.thread_tension.size() - 1);
+    tail = std::max(0.0f, s.thread_tension[node]);
+  }
+  tail_felt_ += 0.5f * (tail - tail_felt_);
+}
+
+void ThreadTie::place() {
+  hands_[kHolder].pose = {tip_, holder_turn_};
+  const Quat turn = axis_angle({0, 0, 1}, forceps_angle_) * forceps_rest_;
+  hands_[kForceps].pose = {hand_ - rotate(turn, swage_in_forceps_), turn};
+}
+
+void ThreadTie::go(const Snapshot& seen, Stage stage) {
+  stage_ = stage, waited_ = 0;
+  const Vec3 shaft = shaft_from(side_);
+  const Vec3 work = origin_ + around(side_, 0.5f * kPi) * height_ - shaft * kStrandAt;
+  const float toward = side_ > 0 ? kPi - 0.15f : 0.15f;  // the forceps faces the needle holder
+  switch (stage) {
+    case to_tail:
+    case take_tail: {  // once, to lay the tail straight on the side away from the needle; it hangs in front
+      const Vec3 at = tail_node(seen, kTailEnd + 3e-3f * static_cast<float>(misses_));
+      const Vec3 aside = origin_ + Vec3{side_ * 0.25f, 0.45f, -0.65f} * strand_;  // behind the work
+      const Vec3 z = normalized(Vec3{0.1f * side_, 0.35f, 0.93f}), along = node_at(seen, node_along(seen, 0, kTailEnd + 6e-3f, 1)) - tail_node(seen, kTailEnd);
+      const Vec3 x = normalized(cross(z, along), {1, 0, 0});
+      glide_to(stage == to_tail ? at + z * 0.03f : at, aside, stage == to_tail ? how_.speed : 0.5f * how_.speed, forceps_angle_);
+      holder_to_ = from_axes(x, cross(z, x), z);
+      break;
+    }
+    case lift_tail:
+      glide_to(origin_ + Vec3{-side_ * 0.5f * tail_, 0.5f * tail_, 0.5f * tail_}, hand_, 0.5f * how_.speed, forceps_angle_);
+      break;
+    case lay_tail:
+      glide_to(seen.active().suture_point.front().position + Vec3{-side_ * (tail_ - kTailEnd - 2e-3f), 1e-3f, 0}, hand_, 0.4f * how_.speed, forceps_angle_);
+      break;
+    case off_tail: glide_to(tip_ + shaft * 0.03f, hand_, how_.speed, forceps_angle_); break;
+    case to_work: {
+      angle_ = sense_ > 0 ? 0 : kPi, turned_ = 0, slack_ = 1;
+      const float drop = kStrandAt - kWindAt, taut = kLoose * strand_;
+      radius_ = std::sqrt(std::max(kNearest * kNearest, taut * taut - height_ * height_ - drop * drop));
+      // The needle holder comes from far behind: nothing of it touches the strand on the way.
+      glide_to(work + shaft * 0.06f, work + shaft * kWindAt + around(side_, angle_) * radius_, how_.speed, toward);
+      break;
+    }
+    case into_work: glide_to(work, hand_, how_.speed, toward); break;
+    case open: break;
+    case draw: {
+      drawn_ = 0;
+      const Vec3 to = work + shaft * 34e-3f;
+      tip_from_ = tip_, tip_to_ = to;
+      break;
+    }
+    case cross_up:
+      glide_to(origin_ + Vec3{side_ * 0.6f * tail_, 8e-3f + kLow, 0}, origin_ + Vec3{-side_ * 24e-3f, 12e-3f + kLow, 0}, 0.6f * how_.speed,
+               forceps_angle_);
+      break;
+    case cross_down:
+      glide_to(origin_ + Vec3{side_ * 0.75f * tail_, 2e-3f + kLow, 0}, origin_ + Vec3{-side_ * 0.6f * strand_, 4e-3f + kLow, 0}, 0.6f * how_.speed,
+               forceps_angle_);
+      break;
+    case pull: steady_ = 0; break;
+    case lay:
+      pulled_ = std::min(felt_, tail_felt_);
+      glide_to(tip_ - Vec3{side_ * 2e-3f, 3e-3f, 0}, hand_, 0.2f * how_.speed, forceps_angle_);
+      break;
+    case away: glide_to(tip_ + shaft * 0.06f, hand_, how_.speed, forceps_angle_); break;
+    default: break;
+  }
+}
+
+bool ThreadTie::operate(const Snapshot& seen, float dt) {
+  if (stage_ == done) return true;
+  feel(seen);
+  waited_ += dt;
+  const Vec3 shaft = shaft_from(side_);
+  ScriptedHand& holder = hands_[kHolder];
+  const bool holds = seen.tool[kHolder].held == Held::thread;
+  switch (stage_) {
+    case to_tail:
+      move_jaw(holder, kHalfOpen, dt);
+      if (glide(dt)) go(seen, take_tail);
+      break;
+    case take_tail:
+    case close: {
+      if (stage_ == take_tail && !glide(dt)) {
+        move_jaw(holder, kHalfOpen, dt);
+        waited_ = 0;
+        break;
+      }
+      const bool shut = move_jaw(holder, 0, dt);
+      if (holds && waited_ > 0.3f) {
+        go(seen, stage_ == take_tail ? lift_tail : draw);
+      } else if (shut && waited_ > 0.5f) {
+        if (++misses_ > 6) failed_ = true, stage_ = done;
+        else go(seen, stage_ == take_tail ? to_tail : open);
+      }
+      break;
+    }
+    case lift_tail:
+      if (glide(dt)) go(seen, lay_tail);
+      break;
+    case lay_tail:
+      if (glide(dt)) go(seen, drop_tail);
+      break;
+    case drop_tail:
+      if (move_jaw(holder, kHalfOpen, dt) && waited_ > 0.2f) go(seen, off_tail);
+      break;
+    case off_tail:
+      if (glide(dt) && move_jaw(holder, 0, dt)) go(seen, to_work);
+      break;
+    case to_work:
+      move_jaw(holder, 0, dt);
+      if (glide(dt)) go(seen, into_work);
+      break;
+    case into_work:
+      if (glide(dt)) go(seen, wind);
+      break;
+    case wind: {
+      const float want = 2 * kPi * static_cast<float>(wraps_);
+      if (felt_ > kWinding) slack_ = std::max(0.7f, slack_ - 0.3f * dt);
+      const float left = strand_ - height_ - kShaft * turned_;
+      const float goal = std::max(kNearest, slack_ * kLoose * left);
+      // From the straight strand at the beginning to one that leaves the shaft.
+      const float direct = std::min(1.0f, turned_ / 1.5f);
+      const float wanted = radius_ + (goal - radius_) * direct;
+      radius_ = std::max(kNearest, radius_ + std::clamp(wanted - radius_, -0.1f * dt, 0.1f * dt));
+      const float calm = felt_ > 2 * kWinding ? 0.2f : 1.0f;
+      turned_ = std::min(want, turned_ + 0.8f * calm * how_.speed * dt / radius_);
+      angle_ = (sense_ > 0 ? 0 : kPi) + sense_ * turned_;
+      const float at = kWindAt - 3e-3f * std::max(0.0f, -portable::sin(angle_));
+      hand_ = tip_ + shaft * at + around(side_, angle_) * radius_;
+      if (turned_ >= want) go(seen, open);
+      break;
+    }
+    case open:
+      if (move_jaw(holder, kHalfOpen, dt)) go(seen, fetch);
+      break;
+    case fetch: {
+      const Vec3 goal = tail_node(seen, kTailEnd + 2e-3f * static_cast<float>(misses_)), way = goal - tip_;
+      const float left = length(way), speed = std::min(0.7f * how_.speed, 0.01f + 4 * left) * (felt_ > 2 * kWinding ? 0.3f : 1.0f);
+      tip_ += way * (std::min(speed * dt, left) / std::max(left, 1e-6f));
+      // The winding hand goes along and keeps the turns on the jaws.
+      if (felt_ > kWinding) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
+      else if (felt_ < 0.02f) radius_ = std::min(0.5f * strand_, radius_ + 0.01f * dt);
+      hand_ = tip_ + shaft * kWindAt + around(side_, angle_) * radius_;
+      if (left < 0.6e-3f) go(seen, close);
+      else if (waited_ > 6) failed_ = true, stage_ = done;
+      break;
+    }
+    case draw: {
+      const float far = distance(tip_from_, tip_to_);
+      if (tail_felt_ > 2 * kWinding && drawn_ > 0.5f * far) {
+        go(seen, cross_up);
+        break;
+      }
+      const float speed = std::min(0.7f * how_.speed, 0.02f + 4 * (far - drawn_)) * std::clamp(1.5f - tail_felt_ / 0.1f, 0.15f, 1.0f);
+      drawn_ += speed * dt;
+      const float e = std::min(1.0f, drawn_ / far);
+      tip_ = lerp(tip_from_, tip_to_, e);
+      const float turn = sense_ * 0.5f * kPi;
+      const Vec3 middle = tip_from_ + shaft * kWindAt, past = middle - shaft * 14e-3f + Vec3{0, 8e-3f, 0};
+      if (felt_ > 0.1f) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
+      else if (felt_ < 0.01f) radius_ = std::min(0.6f * strand_, radius_ + 0.02f * dt);
+      hand_ = lerp(middle, past, e) + around(side_, angle_ + turn * e) * radius_;
+      if (drawn_ >= far) go(seen, cross_up);
+      break;
+    }
+    case cross_up:
+      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f))) go(seen, cross_down);
+      break;
+    case cross_down:
+      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f)) || std::min(felt_, tail_felt_) > 0.5f) go(seen, pull);
+      break;
+    case pull: {
+      // Neither pulls harder than the other: a strand that is tight while the other is slack becomes a post.
+      const auto pace = [&](float felt, float other) {
+        const float want = std::min(how_.pull, other + 0.3f);
+        return dt * std::clamp(0.03f * (want - felt), -0.02f, 0.02f);
+      };
+      tip_.x += side_ * pace(tail_felt_, felt_), hand_.x -= side_ * pace(felt_, tail_felt_);
+      steady_ = std::min(tail_felt_, felt_) > 0.9f * how_.pull ? steady_ + dt : 0;
+      if (steady_ > 0.3f || waited_ > 8) go(seen, lay);
+      else if (!holds && waited_ > 0.2f) go(seen, lay);
+      break;
+    }
+    case lay:
+      if (glide(dt)) go(seen, let_go);
+      break;
+    case let_go:
+      if (move_jaw(holder, kHalfOpen, dt)) go(seen, away);
+      break;
+    case away:
+      if (glide(dt)) stage_ = done;
+      break;
+    default: break;
+  }
+  place();
+  return stage_ == done;
+}
+
+}  // namespace catgut

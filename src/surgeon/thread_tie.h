@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// surgeon/thread_tie: an instrument tie with physical mechanics. The forceps holds the needle near its swage and winds the strand
+// round the needle holder, which takes the tail, draws it through the turns and pulls against the forceps. Nothing watches for a
+// loop: the turns are thread on a shaft, and a throw that fails shows in the knot. Reads Snapshots; moves two scripted hands.
+//
+// x along the stitch, y up, z toward the viewer. `side` +1: the long strand is on the right, and the needle holder comes from
+// there. The sides alternate from throw to throw; winding in the same sense then makes a square knot.
+#pragma once
+#include <array>
+#include <string>
+
+#include "exchange/picture.h"
+#include "exchange/snapshot.h"
+#include "surgeon/hands.h"
+
+namespace catgut {
+
+struct ThreadTieSettings {
+  float speed = 0.15f;  // [m/s] maximum of the hands
+  float pull = 2.5f;    // [N] with which both strands are pulled tight
+};
+
+class ThreadTie {
+ public:
+  // hands: the needle holder, which is empty, and the forceps, which holds the needle.
+  ThreadTie(const PictureModel& picture, std::array<ScriptedHand, 2>& hands, const ThreadTieSettings& settings);
+
+  // A throw of `wraps` turns; sense +1: over the top. The first one also lays the tail.
+  void begin(const Snapshot& seen, int wraps, int sense, bool first);
+  // Every tick, until it returns true.
+  bool operate(const Snapshot& seen, float dt);
+  bool failed() const { return failed_; }
+  std::string doing() const;
+  float pulled() const { return pulled_; }  // [N] the smaller tension of both strands when the throw was pulled tight
+
+ private:
+  enum Stage { to_tail, take_tail, lift_tail, lay_tail, drop_tail, off_tail, to_work, into_work, wind, open, fetch, close, draw, cross_up,
+               cross_down, pull, lay, let_go, away, done };
+  void go(const Snapshot& seen, Stage stage);
+  void glide_to(Vec3 tip, Vec3 hand, float speed, float angle);
+  bool glide(float dt);
+  void feel(const Snapshot& seen);
+  void place();
+  Vec3 tail_node(const Snapshot& seen, float from_end) const;
+
+  const PictureModel& picture_;
+  std::array<ScriptedHand, 2>& hands_;
+  ThreadTieSettings how_;
+  Stage stage_ = done;
+  int wraps_ = 1, misses_ = 0;
+  float side_ = 1, sense_ = 1, waited_ = 0;
+  bool first_ = false, failed_ = false;
+  Vec3 origin_;                     // the middle of the stitch
+  Vec3 tip_, hand_;                 // where the needle holder's jaws and the needle's swage shall be
+  Quat holder_turn_;                // of the needle holder
+  Quat forceps_rest_;               // forceps at angle 0, as it held the needle
+  Vec3 swage_in_forceps_;
+  float forceps_angle_ = 0;
+  // A movement of both hands.
+  Vec3 tip_from_, tip_to_, hand_from_, hand_to_;
+  Quat holder_from_, holder_to_;
+  float angle_from_ = 0, angle_to_ = 0, done_ = 0, seconds_ = 0;
+  // Winding.
+  float strand_ = 0, tail_ = 0, height_ = 0, angle_ = 0, turned_ = 0, radius_ = 0, slack_ = 0;
+  float felt_ = 0, tail_felt_ = 0, pulled_ = 0, steady_ = 0, drawn_ = 0;
+};
+
+}  // namespace catgut
