@@ -6,17 +6,18 @@
 #include <cmath>
 
 #include "physical/body_internal.h"
+#include "wall/cut.h"
 
 namespace catgut::physical {
 namespace {
 
-// Columns of a face at their present places.
+// Columns of an element at their present places.
 struct Corners {
   std::array<uint32_t, 4> column{};
   uint32_t count = 4;
 };
 Corners corners_of(const wall::Model& m, const wall::Topology& t, uint32_t face) {
-  const uint32_t lane = m.lane_of_face[face], block = lane / wall::kLanesOfBlock, in = lane % wall::kLanesOfBlock;
+  const uint32_t lane = wall::lane_of_element(m, t, face), block = lane / wall::kLanesOfBlock, in = lane % wall::kLanesOfBlock;
   Corners c;
   for (size_t k = 0; k < 4; ++k) c.column[k] = t.corners[block].column[k][in];
   c.count = t.corners[block].quads ? 4 : 3;
@@ -95,7 +96,7 @@ void place_body(const BodyModel& m, Body& b, const Pose& pose, float opening) {
 }
 
 void BodiesScratch::reserve(const wall::Model& wm, const wall::State& ws) {
-  const size_t faces = wm.lane_of_face.size();
+  const size_t faces = wm.lane_of_face.size() + wall::max_fragments(wm);
   inverse = wall::Inverse(wall::columns(ws));
   inverse.need(ws.topology, {});
   row.reserve(kMaxRows), points.reserve(kMaxRows), wall_row.reserve(kMaxRows), w.reserve(kMaxRows * kMaxRows);
@@ -107,7 +108,7 @@ void BodiesScratch::reserve(const wall::Model& wm, const wall::State& ws) {
 
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
                         const Bodies& bodies, float h, BodiesScratch& k) {
-  const uint32_t faces = static_cast<uint32_t>(wm.lane_of_face.size());
+  const uint32_t faces = wall::elements(wm, ws.topology);
   k.face_center.resize(faces), k.face_radius.resize(faces);
   for (uint32_t f = 0; f < faces; ++f) {
     const Corners c = corners_of(wm, ws.topology, f);
@@ -210,16 +211,15 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       const Vec3 middle = (pa + pb) * 0.5f;
       const float reach = 0.5f * distance(pa, pb) + std::max(sa.radius, sb.radius) + margin;
       for (const uint32_t f : k.near) {
-        const uint32_t last = surface.first_of_face[f + 1], strip = surface.first_of_face[f] + 2;
-        if (strip >= last) continue;
+        const uint32_t last = surface.first_of_face[f + 1];
+        uint32_t strip = surface.first_of_face[f];
+        while (strip < last && surface.patch[strip].side != 0) ++strip;
+        if (strip == last) continue;
         const float r = k.face_radius[f] + reach;
         if (length2(k.face_center[f] - middle) > r * r) continue;
-        const Corners c = corners_of(wm, ws.topology, f);
         for (uint32_t q = strip; q < last; ++q)
           for (const float zeta : {-1.0f, 1.0f}) {
-            const uint32_t e = surface.patch[q].edge, from = c.column[e], to = c.column[(e + 1) % c.count];
-            const Vec3 ea = wall::place(wall::at_column(from, zeta), ws.motion);
-            const Vec3 eb = wall::place(wall::at_column(to, zeta), ws.motion);
+            const auto [ea, eb, up] = strip_ends(wm, ws, surface, q, zeta);
             float t = 0, u = 0;
             nearest_of_segments(pa, pb, ea, eb, t, u);
             if (t < 0.05f || t > 0.95f) continue;
@@ -227,7 +227,6 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
             const float far = length(off), radius = sa.radius + (sb.radius - sa.radius) * t;
             if (far - radius > margin || far < 1e-6f) continue;
             Foot foot = nearest_on_patch(wm, ws, surface, q, at);
-            const Vec3 up = wall::vec3(ws.motion.x[2 * from + 1]) * zeta;
             if (dot(off, foot.facing) < -0.1f * far || dot(off, up) < -0.1f * far * length(up)) continue;
             foot.normal = off / far, foot.gap = far;
             const Vec3 jaw_speed =

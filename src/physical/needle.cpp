@@ -33,15 +33,17 @@ wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& 
   for (uint32_t f = 0; f < k.face_center.size(); ++f) {
     const float r = k.face_radius[f] + 1e-3f;
     if (length2(k.face_center[f] - p) > r * r) continue;
-    const uint32_t q = surface.first_of_face[f];  // outer face, then inner one
-    const Foot out = nearest_on_patch(wm, ws, surface, q, p), in = nearest_on_patch(wm, ws, surface, q + 1, p);
-    const float above = dot(p - out.at, out.facing), below = dot(p - in.at, in.facing), sum = -(above + below);
-    if (!(sum > 1e-6f)) continue;
-    const float zeta = std::clamp((above - below) / sum, -1.0f, 1.0f), share = 0.5f * (1 + zeta);
-    const wall::Point at{f, in.point.xi + share * (out.point.xi - in.point.xi),
-                         in.point.eta + share * (out.point.eta - in.point.eta), zeta};
-    const float far = distance(place_of(wm, ws, at), p);
-    if (far < off) off = far, best = at;
+    // Outer face, then inner one; a fragment has several such pairs.
+    for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1] && surface.patch[q].side == 1; q += 2) {
+      const Foot out = nearest_on_patch(wm, ws, surface, q, p), in = nearest_on_patch(wm, ws, surface, q + 1, p);
+      const float above = dot(p - out.at, out.facing), below = dot(p - in.at, in.facing), sum = -(above + below);
+      if (!(sum > 1e-6f)) continue;
+      const float zeta = std::clamp((above - below) / sum, -1.0f, 1.0f), share = 0.5f * (1 + zeta);
+      const wall::Point at{out.point.face, in.point.xi + share * (out.point.xi - in.point.xi),
+                           in.point.eta + share * (out.point.eta - in.point.eta), zeta};
+      const float far = distance(place_of(wm, ws, at), p);
+      if (far < off) off = far, best = at;
+    }
   }
   return best;
 }
@@ -238,7 +240,7 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
       // A face in front of the tip gives way at the force of an exit.
       for (uint32_t side = 0; side < 2; ++side) {
         const float zeta = side == 0 ? 1.0f : -1.0f;
-        const Foot foot = nearest_on_patch(wm, ws, surface, surface.first_of_face[n.tip.face] + side, tip);
+        const Foot foot = nearest_on_patch(wm, ws, surface, patch_at(wm, ws, surface, n.tip, side == 0 ? 1 : -1), tip);
         if (dot(tangent, foot.facing) < 0.1f) continue;
         if (zeta == channel.entry_side && distance(place_of(wm, ws, channel.point[0]), foot.at) < law.same_face) continue;
         Row face;

@@ -36,8 +36,9 @@ Vec3 mouth(const Model& m, const State& s, const Hole& hole) {
 }
 
 Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wall, s.wall)), thread(s.thread.nodes()) {
-  coupling.inverse = wall::Inverse(wall::columns(s.wall));
-  lips.inverse = wall::Inverse(wall::columns(s.wall));
+  const uint32_t rows = wall::columns(s.wall) + wall::columns(s.wall) / 3 + 64;  // with those of later cuts
+  coupling.inverse = wall::Inverse(rows);
+  lips.inverse = wall::Inverse(rows);
   for (wall::Inverse* inverse : {&coupling.inverse, &lips.inverse}) inverse->need(s.wall.topology, {});  // takes its room
   const size_t n = thread::kMaxSoftPoints, columns = wall::columns(s.wall);
   contact.reserve(2 * n), foot.reserve(2 * n), moved.reserve(n), tilt.reserve(16 * n);
@@ -51,10 +52,36 @@ Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wal
   point.reserve(thread::kMaxSoftPoints), offset.reserve(thread::kMaxSoftPoints);
 }
 
+namespace {
+void cut_changed(const Model& m, State& s) {
+  s.cut_surface = std::make_shared<const Surface>(make_surface(m.wall, s.wall));
+  // Impulses that were remembered for columns that have other numbers now.
+  s.lip.clear();
+  std::erase_if(s.bodies.memory, [](const RowMemory& r) { return r.key >> 60 < 3; });
+  for (thread::SoftContact& c : s.contact) c.patch = wall::kNone;
+}
+}  // namespace
+
+wall::CutResult cut(const Model& m, State& s, Scratch& k, std::span<const wall::Mark> marks) {
+  const wall::CutResult result = wall::cut_links(m.wall, s.wall, k.wall, marks);
+  if (result.divided) cut_changed(m, s);
+  return result;
+}
+
+void restore_cuts(const Model& m, State& s) {
+  if (s.wall.topology.cut.empty()) {
+    if (s.cut_surface) wall::restore(m.wall, s.wall.topology), s.cut_surface.reset();
+    return;
+  }
+  wall::restore(m.wall, s.wall.topology);
+  s.cut_surface = std::make_shared<const Surface>(make_surface(m.wall, s.wall));
+}
+
 uint64_t hash_state(const State& s) {
   uint64_t h = thread::hash_state(s.thread);
   h = hash_bytes(s.wall.motion.x.data(), s.wall.motion.x.size() * sizeof s.wall.motion.x[0], h);
   h = hash_bytes(s.wall.motion.v.data(), s.wall.motion.v.size() * sizeof s.wall.motion.v[0], h);
+  for (const wall::FaceCut& c : s.wall.topology.cut) h = hash_bytes(c.bit.data(), sizeof c.bit, h);
   for (const Hole& o : s.hole) {
     for (const float v : {o.place.xi, o.place.eta, o.torn, o.load.x, o.load.y, o.load.z}) h = hash_bytes(&v, sizeof v, h);
     h = hash_bytes(&o.place.face, sizeof o.place.face, h);
@@ -76,6 +103,7 @@ namespace {
 // Nodes near the surface: each gets the nearest point of the wall, on the side where it was. Neighbors share a point of the
 // coupling, because every point answers every other.
 void find_contacts(const Model& m, const State& s, Scratch& k) {
+  const Surface& surface = surface_of(m, s);
   const float d = m.thread.material.diameter, r = 0.5f * d, h = m.wall.step;
   const float far_move = m.thread.max_move * d * static_cast<float>(m.thread.substeps);
   size_t eyelet = 0, old = 0;
@@ -124,14 +152,14 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
     best.gap = 1e9f;
     float facing = -1;
     const auto look = [&](uint32_t patch) {
-      const Foot foot = nearest_on_patch(m.wall, s.wall, m.surface, patch, p);
+      const Foot foot = nearest_on_patch(m.wall, s.wall, surface, patch, p);
       // A node that was pressed to one side is never looked at from the other.
       if (memory && memory->normal_impulse > 0 && dot(foot.facing, memory->normal) < -0.2f) return;
       const float far = std::abs(foot.gap), front = dot(normalized(p - foot.at), foot.facing);
       if (far > std::abs(best.gap) + 1e-7f || (far > std::abs(best.gap) - 1e-7f && front < facing)) return;
       best = foot, facing = front;
     };
-    const uint32_t known = memory && memory->patch < m.surface.patch.size() ? memory->patch : wall::kNone;
+    const uint32_t known = memory && memory->patch < surface.patch.size() ? memory->patch : wall::kNone;
     if (known != wall::kNone) look(known);  // most likely still the nearest: the others need not be searched
     for (uint32_t f = k.search.node_first[i]; f < k.search.node_first[i + 1]; ++f) {
       const uint32_t face = k.search.node_face[f];
@@ -139,9 +167,8 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       // A node with a memory may be deep inside; another one counts only where it can touch within the step.
       const float reach = memory ? 2 * k.search.margin : r + far_move + 1.5f * h * box.speed;
       if (least_distance(box, p, 0) > std::min(reach, std::abs(best.gap) + 1e-6f)) continue;
-      for (uint32_t q = m.surface.first_of_face[face]; q < m.surface.first_of_face[face + 1]; ++q)
-        if (q != known && least_distance(box, p, m.surface.patch[q].side) <= std::min(reach, std::abs(best.gap) + 1e-6f))
-          look(q);
+      for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q)
+        if (q != known && least_distance(box, p, surface.patch[q].side) <= std::min(reach, std::abs(best.gap) + 1e-6f)) look(q);
     }
     const wall::Weights w = best.gap < 1e8f ? wall::weights(m.wall, s.wall.topology, best.point) : wall::Weights{};
     if (best.gap > 1e8f || (!memory && best.gap < -d)) continue;  // a node deep inside was never outside
@@ -163,12 +190,12 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       const uint32_t face = k.search.node_face[f];
       const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
       if (least_distance(box, p, 0) > second.gap) continue;
-      for (uint32_t q = m.surface.first_of_face[face]; q < m.surface.first_of_face[face + 1]; ++q) {
-        const int side = m.surface.patch[q].side;
+      for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
+        const int side = surface.patch[q].side;
         if (q == best.patch || (side != 0 && dot(box.n, best.normal) * static_cast<float>(side) > 0.97f) ||
             least_distance(box, p, side) > second.gap)
           continue;
-        const Foot foot = nearest_on_patch(m.wall, s.wall, m.surface, q, p);
+        const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p);
         if (!foot.on_edge && foot.gap > 0 && foot.gap < second.gap && dot(foot.facing, best.normal) < 0.95f) second = foot;
       }
     }
@@ -177,33 +204,36 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
 }
 
 void begin_bodies(const Model& m, State& s, Scratch& k, const Hands& hands) {
+  const Surface& surface = surface_of(m, s);
   const float h = m.wall.step;
   s.bodies.memory.reserve(kMaxRows), s.hole.reserve(thread::kMaxEyelets);
   predict_bodies(m.bodies, s.bodies, hands.targets, h, k.bodies);
   skip_channels(m.needles, m.wall, s.wall, s.needle, s.bodies);
   find_pair_contacts(m.bodies, s.bodies, h, k.bodies);
-  find_body_contacts(m.bodies, m.wall, s.wall, m.surface, s.bodies, h, k.bodies);
-  find_grips(m.bodies, m.wall, s.wall, m.surface, s.thread, m.thread.material.diameter, s.bodies, hands.targets, h, k.bodies);
-  find_needle_rows(m.needles, m.bodies, m.wall, s.wall, m.surface, s.thread, s.bodies, s.needle, h, k.bodies);
+  find_body_contacts(m.bodies, m.wall, s.wall, surface, s.bodies, h, k.bodies);
+  find_grips(m.bodies, m.wall, s.wall, surface, s.thread, m.thread.material.diameter, s.bodies, hands.targets, h, k.bodies);
+  find_needle_rows(m.needles, m.bodies, m.wall, s.wall, surface, s.thread, s.bodies, s.needle, h, k.bodies);
   warm_bodies(m.bodies, s.bodies, hands.targets, k.wall, h, k.bodies);
 }
 
 void end_bodies(const Model& m, State& s, Scratch& k) {
+  const Surface& surface = surface_of(m, s);
   settle_grips(m.bodies, m.wall, s.wall, s.thread, s.bodies, k.bodies);
-  advance_needles(m.needles, m.wall, s.wall, m.surface, s.bodies, s.needle, m.wall.step, k.bodies);
+  advance_needles(m.needles, m.wall, s.wall, surface, s.bodies, s.needle, m.wall.step, k.bodies);
   lace_threads(m, s);
 }
 
 }  // namespace
 
 void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) {
+  const Surface& surface = surface_of(m, s);
   s.contact.reserve(2 * thread::kMaxSoftPoints), s.lip.reserve(3 * wall::columns(s.wall));
   for (const Hands::WallPull& pull : hands.wall_pulls) wall::add_to(k.wall.external, pull.at, pull.force);
-  if (m.surface_contact || m.lip_contact) find_near(m.wall, s.wall, m.surface, s.thread, k.search);
+  if (m.surface_contact || m.lip_contact) find_near(m.wall, s.wall, surface, s.thread, k.search);
   if (m.lip_contact) {
     k.lips.contact.assign(s.lip.begin(), s.lip.end());
     wall::find_contacts(m.wall, s.wall, {}, k.lips);
-    find_lips(m.wall, s.wall, m.surface, k.search, m.lip_friction, k.lips);
+    find_lips(m.wall, s.wall, surface, k.search, m.lip_friction, k.lips);
     wall::warm_start(m.wall, k.wall, k.lips);
   }
   const bool bodies = !s.bodies.body.empty();

@@ -7,6 +7,7 @@
 // one thread::State, separated by broken segments. A step allocates nothing. Its bits do not depend on the number of workers.
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "physical/tear.h"
 #include "thread/thread.h"
 #include "wall/contact.h"
+#include "wall/cut.h"
 #include "wall/points.h"
 
 namespace catgut::physical {
@@ -53,7 +55,9 @@ struct State {
   std::vector<wall::Contact> lip;            // memory of wall on wall
   Bodies bodies;
   std::vector<Needle> needle;
+  std::shared_ptr<const Surface> cut_surface;  // of a wall that was cut; follows from wall.topology.cut
 };
+inline const Surface& surface_of(const Model& m, const State& s) { return s.cut_surface ? *s.cut_surface : m.surface; }
 
 // Loads and motions imposed in a step.
 struct Hands {
@@ -93,6 +97,11 @@ Model make_model(const wall::Wall& wall, const thread::Settings& settings);
 // Position of a hole's mouth [m].
 Vec3 mouth(const Model& model, const State& state, const Hole& hole);
 float mouth_offset(const Model& model, const Hole& hole);  // [m] from the mid-surface along the director
+
+// Removes links of the wall (wall/cut) between two steps. Bites, holes, grips and needles keep their material points.
+wall::CutResult cut(const Model& model, State& state, Scratch& scratch, std::span<const wall::Mark> marks);
+// After a load: everything that follows from the links. The scratch must be made after it.
+void restore_cuts(const Model& model, State& state);
 
 // Puts a body somewhere else, at rest: it forgets its contacts, and the thread forgets on which side of it it was.
 void move_body(const Model& model, State& state, uint32_t body, const Pose& pose, float opening);

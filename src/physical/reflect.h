@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // physical/reflect: the members of a state of wall, thread, bodies and needles, for writing, reading and hashing it
-// (core/reflect.h). The topology of the wall is left out: it follows from the model as long as nothing was cut.
+// (core/reflect.h). Of the wall's topology only the links that were cut: the rest follows from them (restore_cuts
+// after a load).
 #pragma once
 #include "core/reflect.h"
 #include "physical/physical.h"
@@ -56,7 +57,8 @@ constexpr void reflect(auto& a, Like<Hole> auto& h) {
   a(h.place), a(h.within), a(h.deepest), a(h.made), a(h.torn), a(h.out), a(h.load);
 }
 constexpr void reflect(auto& a, Like<State> auto& s) {
-  a.cache(s.wall.topology), a(s.wall.motion), a(s.thread), a(s.hole), a(s.contact), a(s.lip);
+  a(s.wall.topology.cut), a(s.wall.topology.factored), a(s.wall.motion), a(s.thread), a(s.hole), a(s.contact), a(s.lip);
   a(s.bodies), a(s.needle);
+  a.cache(s.cut_surface);
 }
 }  // namespace catgut::physical

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include "wall/cut.h"
@@ -20,7 +19,7 @@ struct Corners {
   uint32_t count() const { return quad ? 4 : 3; }
 };
 Corners corners_of(const wall::Model& m, const wall::Topology& t, uint32_t face) {
-  const uint32_t lane = m.lane_of_face[face], block = lane / wall::kLanesOfBlock, in = lane % wall::kLanesOfBlock;
+  const uint32_t lane = wall::lane_of_element(m, t, face), block = lane / wall::kLanesOfBlock, in = lane % wall::kLanesOfBlock;
   Corners c;
   for (size_t k = 0; k < 4; ++k) c.column[k] = t.corners[block].column[k][in];
   c.quad = t.corners[block].quads != 0;
@@ -29,6 +28,109 @@ Corners corners_of(const wall::Model& m, const wall::Topology& t, uint32_t face)
 
 Vec3 mid(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column]); }
 Vec3 director(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column + 1]); }
+
+// A place on an element, beyond its cells too.
+Vec3 place_on(const wall::State& s, const Corners& c, std::array<float, 2> at, float zeta) {
+  const auto [xi, eta] = at;
+  float w[4] = {0.25f * (1 - xi) * (1 - eta), 0.25f * (1 + xi) * (1 - eta), 0.25f * (1 + xi) * (1 + eta),
+                0.25f * (1 - xi) * (1 + eta)};
+  if (!c.quad) w[1] = 0.5f * xi, w[2] = 0.5f * eta, w[0] = 1 - w[1] - w[2];
+  Vec3 out{};
+  for (uint32_t k = 0; k < c.count(); ++k) out += (mid(s, c.column[k]) + director(s, c.column[k]) * zeta) * w[k];
+  return out;
+}
+
+// Whether the wall ends at half link k of an edge.
+bool open_at(const wall::Model& m, const wall::Topology& t, uint32_t face, uint32_t edge, uint32_t k) {
+  const uint32_t over = m.neighbor[face][edge];
+  if (over == wall::kNone) return true;
+  if (t.cut.empty()) return false;
+  const auto quad = [&](uint32_t f) { return m.mesh.face[f][3] != wall::kNone; };
+  const bool turned = m.mesh.face[over / 4][over % 4] != m.mesh.face[face][edge];
+  return t.cut[face].has(wall::raster(quad(face)).over_edge(edge, k)) ||
+         t.cut[over / 4].has(wall::raster(quad(over / 4)).over_edge(over % 4, turned ? wall::kRaster - 1 - k : k));
+}
+
+std::array<float, 2> natural(bool quad, wall::LatticePoint p) {
+  std::array<float, 2> at{};
+  wall::to_natural(quad, p, at[0], at[1]);
+  return at;
+}
+
+// Patches of a fragment: blocks of cells on both sides, then strips wherever a cell has no neighbor any more.
+void add_fragment(const wall::Model& m, const wall::Topology& t, uint32_t element, Surface& out) {
+  const wall::Fragment& part = t.fragment[element - m.lane_of_face.size()];
+  const bool quad = m.mesh.face[part.face][3] != wall::kNone;
+  const wall::Raster& r = wall::raster(quad);
+  constexpr int32_t unit = wall::kLattice / wall::kRaster;
+  const auto has = [&](uint32_t cell) { return (part.cells >> cell & 1) != 0; };
+  const auto both_sides = [&](Patch p) {
+    p.face = element, p.part = true, p.quad = quad;
+    p.side = 1, out.patch.push_back(p);
+    p.side = -1, out.patch.push_back(p);
+  };
+  if (quad) {
+    // Runs of cells in a row, as far up as the rows above have the same run.
+    uint64_t left = part.cells;
+    while (left) {
+      const uint32_t first = static_cast<uint32_t>(__builtin_ctzll(left)), row = first / wall::kRaster,
+                     from = first % wall::kRaster;
+      uint32_t to = from;
+      while (to + 1 < wall::kRaster && left >> (row * wall::kRaster + to + 1) & 1) ++to;
+      const uint64_t run = ((uint64_t{2} << (to - from)) - 1) << from;
+      uint32_t top = row;
+      for (uint32_t j = row; j < wall::kRaster && (left >> (j * wall::kRaster) & run) == run; ++j)
+        left &= ~(run << (j * wall::kRaster)), top = j;
+      const int32_t u0 = static_cast<int32_t>(from) * unit, u1 = static_cast<int32_t>(to + 1) * unit;
+      const int32_t v0 = static_cast<int32_t>(row) * unit, v1 = static_cast<int32_t>(top + 1) * unit;
+      Patch p;
+      p.at = {natural(true, {u0, v0}), natural(true, {u1, v0}), natural(true, {u1, v1}), natural(true, {u0, v1})};
+      both_sides(p);
+    }
+  } else {
+    for (uint32_t cell = 0; cell < wall::kCells; ++cell) {
+      if (!has(cell)) continue;
+      const wall::LatticePoint c = r.center[cell];
+      const int32_t i = c.u / unit, j = c.v / unit;
+      const bool down = c.u % unit > unit / 2;
+      Patch p;
+      if (down)
+        p.at = {natural(false, {(i + 1) * unit, j * unit}),
+                natural(false, {(i + 1) * unit, (j + 1) * unit}),
+                natural(false, {i * unit, (j + 1) * unit}),
+                {}};
+      else
+        p.at = {natural(false, {i * unit, j * unit}),
+                natural(false, {(i + 1) * unit, j * unit}),
+                natural(false, {i * unit, (j + 1) * unit}),
+                {}};
+      both_sides(p);
+    }
+  }
+  const auto strip = [&](uint32_t cell, wall::LatticePoint a, wall::LatticePoint b) {
+    // The cell lies to the left of the way from a to b, as a face does of its edges.
+    const wall::LatticePoint c = r.center[cell];
+    if (int64_t{b.u - a.u} * (c.v - a.v) - int64_t{b.v - a.v} * (c.u - a.u) < 0) std::swap(a, b);
+    Patch p;
+    p.face = element, p.side = 0, p.part = true, p.quad = quad;
+    p.at = {natural(quad, a), natural(quad, b), natural(quad, c), {}};
+    out.patch.push_back(p);
+  };
+  for (uint32_t l = 0; l < r.inner; ++l) {
+    const wall::Raster::Link& link = r.link[l];
+    if (has(link.a) == has(link.b)) continue;
+    wall::LatticePoint a, b;
+    wall::border_of(quad, link, a, b);
+    strip(has(link.a) ? link.a : link.b, a, b);
+  }
+  for (uint32_t e = 0; e < r.edges; ++e)
+    for (uint32_t k = 0; k < wall::kRaster; ++k) {
+      const uint32_t cell = r.link[r.over_edge(e, k)].a;
+      if (has(cell) && open_at(m, t, part.face, e, k))
+        strip(cell, wall::on_edge(quad, e, static_cast<int32_t>(k) * unit),
+              wall::on_edge(quad, e, static_cast<int32_t>(k + 1) * unit));
+    }
+}
 
 // Nearest point of a patch, in its coordinates. Begins with the foot on a parallelogram.
 void nearest(const wall::Patch& patch, Vec3 target, float& xi, float& eta) {
@@ -52,28 +154,52 @@ Surface make_surface(const wall::Model& m, const wall::State& s) {
   const wall::Topology& t = s.topology;
   Surface out;
   out.piece = wall::pieces(s);
-  const uint32_t faces = static_cast<uint32_t>(m.lane_of_face.size());
-  std::map<std::pair<uint32_t, uint32_t>, int> uses;
-  std::vector<std::pair<uint32_t, uint32_t>> edges;
+  const uint32_t faces = static_cast<uint32_t>(m.lane_of_face.size()), elements = wall::elements(m, t);
+  struct Edge {
+    Vec3 from, to, middle;
+    float half;
+    uint32_t piece;
+  };
+  std::vector<Edge> edges;
   const auto place = [&](uint32_t column) {
     const uint32_t source = t.source[column];
     return (m.mesh.outer[source] + m.mesh.inner[source]) * 0.5f;
   };
-  for (uint32_t f = 0; f < faces; ++f) {
-    const Corners c = corners_of(m, t, f);
-    for (uint32_t k = 0; k < c.count(); ++k) ++uses[std::minmax(c.column[k], c.column[(k + 1) % c.count()])];
-  }
-  out.at_rim.assign(t.source.size(), 0);
-  for (uint32_t f = 0; f < faces; ++f) {
+  out.at_rim.assign(t.source.size(), 0), out.ghost.assign(t.source.size(), 1);
+  for (uint32_t f = 0; f < elements; ++f) {
     const Corners c = corners_of(m, t, f);
     out.first_of_face.push_back(static_cast<uint32_t>(out.patch.size()));
-    out.patch.push_back({f, 1, 0}), out.patch.push_back({f, -1, 0});
-    for (uint32_t k = 0; k < c.count(); ++k) {
-      const uint32_t a = c.column[k], b = c.column[(k + 1) % c.count()];
-      if (uses[std::minmax(a, b)] != 1) continue;
-      out.patch.push_back({f, 0, k});
-      out.at_rim[a] = out.at_rim[b] = 1;
-      edges.push_back({a, b});
+    if (f >= faces) {
+      const wall::Fragment& part = t.fragment[f - faces];
+      const wall::Raster& r = wall::raster(c.quad);
+      for (uint32_t k = 0; k < c.count(); ++k) {
+        if (!(part.cells >> r.corner_cell(k) & 1)) continue;
+        out.ghost[c.column[k]] = 0;
+        if (open_at(m, t, part.face, k, 0)) out.at_rim[c.column[k]] = 1;
+      }
+      const size_t first = out.patch.size();
+      add_fragment(m, t, f, out);
+      for (size_t q = first; q < out.patch.size(); ++q) {
+        const Patch& p = out.patch[q];
+        if (p.side != 0) continue;
+        edges.push_back({wall::rest_place(m, {part.face, p.at[0][0], p.at[0][1], 0}),
+                         wall::rest_place(m, {part.face, p.at[1][0], p.at[1][1], 0}),
+                         {},
+                         0,
+                         out.piece[c.column[0]]});
+      }
+    } else if (wall::fragments(t, f) == 0) {
+      out.patch.push_back({f, 1, 0}), out.patch.push_back({f, -1, 0});
+      for (uint32_t k = 0; k < c.count(); ++k) {
+        const uint32_t a = c.column[k], b = c.column[(k + 1) % c.count()];
+        out.ghost[a] = 0;
+        bool open = true;
+        for (uint32_t i = 0; i < wall::kRaster && open; ++i) open = open_at(m, t, f, k, i);
+        if (!open) continue;
+        out.patch.push_back({f, 0, k});
+        out.at_rim[a] = out.at_rim[b] = 1;
+        edges.push_back({place(a), place(b), {}, 0, out.piece[a]});
+      }
     }
     Vec3 center{};
     for (uint32_t k = 0; k < c.count(); ++k) center += place(c.column[k]) / static_cast<float>(c.count());
@@ -82,17 +208,56 @@ Surface make_surface(const wall::Model& m, const wall::State& s) {
     out.face_radius.push_back(radius + 0.5f * m.laminate.thickness);
   }
   out.first_of_face.push_back(static_cast<uint32_t>(out.patch.size()));
+  for (Edge& e : edges) e.middle = (e.from + e.to) * 0.5f, e.half = 0.501f * distance(e.from, e.to) + 1e-6f;
   for (uint32_t column = 0; column < t.source.size(); ++column) {
     float nearest = 1e3f;
-    for (const auto& [a, b] : edges) {
-      if (out.piece[a] != out.piece[column]) continue;
-      const Vec3 from = place(a), along = place(b) - from, p = place(column) - from;
+    const Vec3 here = place(column);
+    for (const Edge& e : edges) {
+      // Most are too far away to be the nearest.
+      const float reach = nearest + e.half;
+      if (length2(e.middle - here) > reach * reach || e.piece != out.piece[column]) continue;
+      const Vec3 along = e.to - e.from, p = here - e.from;
       const float at = std::clamp(dot(p, along) / std::max(length2(along), 1e-20f), 0.0f, 1.0f);
       nearest = std::min(nearest, length(p - along * at));
     }
     out.edge_distance.push_back(nearest);
   }
   return out;
+}
+
+StripEnds strip_ends(const wall::Model& m, const wall::State& s, const Surface& surface, uint32_t index, float zeta) {
+  const Patch& patch = surface.patch[index];
+  const Corners c = corners_of(m, s.topology, patch.face);
+  if (!patch.part) {
+    const uint32_t from = c.column[patch.edge], to = c.column[(patch.edge + 1) % c.count()];
+    return {wall::place(wall::at_column(from, zeta), s.motion), wall::place(wall::at_column(to, zeta), s.motion),
+            director(s, from) * zeta};
+  }
+  StripEnds e{place_on(s, c, patch.at[0], zeta), place_on(s, c, patch.at[1], zeta), {}};
+  e.up = e.from - place_on(s, c, patch.at[0], 0);
+  return e;
+}
+
+uint32_t patch_at(const wall::Model& m, const wall::State& s, const Surface& surface, const wall::Point& point, int side) {
+  const uint32_t parts = wall::fragments(s.topology, point.face);
+  if (parts == 0) return surface.first_of_face[point.face] + (side > 0 ? 0u : 1u);
+  const uint32_t cell = wall::cell_at(m.mesh.face[point.face][3] != wall::kNone, point.xi, point.eta);
+  uint32_t fragment = s.topology.first_fragment[point.face];
+  while (!(s.topology.fragment[fragment].cells >> cell & 1)) ++fragment;
+  const size_t element = m.lane_of_face.size() + fragment;
+  uint32_t best = surface.first_of_face[element];
+  float best_far = 1e9f;
+  for (uint32_t q = best; q < surface.first_of_face[element + 1]; ++q) {
+    const Patch& patch = surface.patch[q];
+    if (patch.side != side) continue;
+    float far = 0;
+    for (size_t k = 0; k < 2; ++k) {
+      const float at = k == 0 ? point.xi : point.eta, a = patch.at[0][k], b = patch.at[patch.quad ? 2 : k + 1][k];
+      far = std::max({far, std::min(a, b) - at, at - std::max(a, b)});
+    }
+    if (far < best_far) best_far = far, best = q;
+  }
+  return best;
 }
 
 uint32_t column_of(const wall::Model& m, const wall::State& s, uint32_t face) {
@@ -106,7 +271,39 @@ Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface&
   foot.patch = index;
   wall::Patch b;
   float xi = 0, eta = 0;
-  if (patch.side != 0) {
+  if (patch.part) {
+    // Within the patch by a hair, so that the point belongs to this fragment and not to its neighbor.
+    constexpr float kWithin = 0.998f;
+    const uint32_t face = wall::face_of_element(m, s.topology, patch.face);
+    const auto& at = patch.at;
+    if (patch.side != 0) {
+      b.quad = patch.quad;
+      for (uint32_t k = 0; k < c.count(); ++k) b.p[k] = place_on(s, c, at[k], static_cast<float>(patch.side));
+      nearest(b, p, xi, eta);
+      foot.facing = cross(b.along_xi(eta), b.along_eta(xi)) * static_cast<float>(patch.side);
+      if (b.quad) {
+        foot.on_edge = std::max(std::abs(xi), std::abs(eta)) > 0.9999f;
+        const float x = 0.5f * (1 + kWithin * xi), y = 0.5f * (1 + kWithin * eta);
+        foot.point = {face, at[0][0] + (at[1][0] - at[0][0]) * x, at[0][1] + (at[3][1] - at[0][1]) * y, 0};
+      } else {
+        foot.on_edge = std::min({xi, eta, 2 - xi - eta}) < 1e-4f;
+        const float x = 0.5f * (kWithin * xi + (1 - kWithin) * 0.66f), y = 0.5f * (kWithin * eta + (1 - kWithin) * 0.66f);
+        foot.point = {face, at[0][0] + (at[1][0] - at[0][0]) * x + (at[2][0] - at[0][0]) * y,
+                      at[0][1] + (at[1][1] - at[0][1]) * x + (at[2][1] - at[0][1]) * y, 0};
+      }
+      foot.point.zeta = static_cast<float>(patch.side);
+    } else {
+      b.p[0] = place_on(s, c, at[0], -1), b.p[1] = place_on(s, c, at[1], -1);
+      b.p[2] = place_on(s, c, at[1], 1), b.p[3] = place_on(s, c, at[0], 1);
+      nearest(b, p, xi, eta);
+      foot.facing = cross(b.along_xi(eta), b.along_eta(xi));
+      foot.on_edge = std::max(std::abs(xi), std::abs(eta)) > 0.9999f;
+      const float x = 0.5f * (1 + kWithin * xi), in = 1 - kWithin;
+      foot.point = {face, 0, 0, eta};
+      foot.point.xi = (at[0][0] + (at[1][0] - at[0][0]) * x) * (1 - in) + at[2][0] * in;
+      foot.point.eta = (at[0][1] + (at[1][1] - at[0][1]) * x) * (1 - in) + at[2][1] * in;
+    }
+  } else if (patch.side != 0) {
     b.quad = c.quad;
     for (uint32_t k = 0; k < c.count(); ++k)
       b.p[k] = mid(s, c.column[k]) + director(s, c.column[k]) * static_cast<float>(patch.side);
@@ -140,7 +337,7 @@ Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface&
 }
 
 void SurfaceSearch::reserve(const wall::Model& m, const wall::State& s, size_t nodes) {
-  const size_t faces = m.lane_of_face.size(), columns = wall::columns(s);
+  const size_t faces = wall::elements(m, s.topology), columns = wall::columns(s);
   node_listed.reserve(nodes), wall_listed.reserve(2 * columns), center.reserve(faces), radius.reserve(faces);
   node_first.reserve(nodes + 1), node_face.reserve(64 * nodes);
   column_first.reserve(2 * columns + 1), column_face.reserve(64 * columns);
@@ -188,7 +385,7 @@ float least_distance(const FaceBox& box, Vec3 p, int side) {
 
 void find_near(const wall::Model& m, const wall::State& s, const Surface& surface, const thread::State& thread,
                SurfaceSearch& k) {
-  const size_t nodes = thread.nodes(), columns = wall::columns(s), faces = m.lane_of_face.size();
+  const size_t nodes = thread.nodes(), columns = wall::columns(s), faces = wall::elements(m, s.topology);
   ++k.step;
   k.box.resize(faces);
   bool stale = k.node_listed.size() != nodes || k.wall_listed.size() != columns || k.version != s.topology.version;
@@ -240,12 +437,12 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
   };
   for (uint32_t c = 0; c < columns; ++c) {
     k.column_first.push_back(static_cast<uint32_t>(k.column_face.size()));
-    if (s.topology.slot[c] == wall::kNone) continue;
+    if (s.topology.slot[c] == wall::kNone || surface.ghost[c]) continue;
     const Vec3 at = mid(s, c), at_rest = rest(c);
     const float half = length(director(s, c));
     for (uint32_t f = 0; f < faces; ++f) {
       const float reach = k.radius[f] + half + k.margin;
-      if (length2(k.center[f] - at) > reach * reach) continue;
+      if (surface.first_of_face[f] == surface.first_of_face[f + 1] || length2(k.center[f] - at) > reach * reach) continue;
       const Corners corner = corners_of(m, s.topology, f);
       // Columns of one part of the wall that are adjacent at rest are not paired.
       bool beside = false;

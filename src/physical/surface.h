@@ -2,6 +2,7 @@
 // physical/surface: the wall as a closed surface: outer and inner faces, and the strips at its rims that join them. Finds the
 // nearest surface point of thread nodes and of other parts of the wall. Reads the wall's topology and motion.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -12,15 +13,21 @@
 
 namespace catgut::physical {
 
-// A piece of surface: side +1 the outer face, -1 the inner one, 0 the strip at an edge of the face.
+// A piece of surface: side +1 the outer face, -1 the inner one, 0 the strip at an edge of the face. Of a face that a cut has
+// divided: a block of its cells, or the strip where the cut passed between two cells.
 struct Patch {
-  uint32_t face = 0;
+  uint32_t face = 0;  // the element (wall::elements): a whole face, or a fragment
   int side = 1;
   uint32_t edge = 0;
+  bool part = false;  // of a fragment
+  bool quad = true;
+  // In the coordinates of wall::Point. side 0: the ends of the strip, and the center of the cell behind it.
+  std::array<std::array<float, 2>, 4> at{};
 };
 struct Surface {
   std::vector<Patch> patch;
-  std::vector<uint32_t> first_of_face;  // patches of a face: both sides, then its strips; one more than faces
+  std::vector<uint32_t> first_of_face;  // patches of an element: both sides, then its strips; one more than elements
+  std::vector<uint8_t> ghost;           // per column: only a corner of fragments whose cells do not reach it
   std::vector<uint8_t> at_rim;          // per column
   std::vector<uint32_t> piece;          // per column: its connected part of the wall
   std::vector<float> edge_distance;     // [m] per column: to the nearest edge of its part of the wall, at rest
@@ -28,7 +35,17 @@ struct Surface {
 };
 Surface make_surface(const wall::Model& model, const wall::State& state);
 
-// A column of a face.
+// Ends of a strip at one side of the wall, and the direction toward that side (a director, not a unit vector).
+struct StripEnds {
+  Vec3 from, to, up;
+};
+StripEnds strip_ends(const wall::Model& model, const wall::State& state, const Surface& surface, uint32_t patch, float zeta);
+
+// The patch of side +1 or -1 where a material point lies.
+uint32_t patch_at(const wall::Model& model, const wall::State& state, const Surface& surface, const wall::Point& point,
+                  int side);
+
+// A column of an element.
 uint32_t column_of(const wall::Model& model, const wall::State& state, uint32_t face);
 
 struct Foot {

@@ -20,13 +20,16 @@ void drag(const Model& m, const State& s, SurfaceSearch& search, wall::Point& pl
   const int side = place.zeta < 0 ? -1 : 1;
   Foot best;
   best.gap = 1e9f;
-  for (uint32_t face = 0; face + 1 < m.surface.first_of_face.size(); ++face) {
+  const Surface& surface = surface_of(m, s);
+  for (uint32_t face = 0; face + 1 < surface.first_of_face.size(); ++face) {
     // A part of the wall that only touches this one is not torn into.
-    if (m.surface.piece[w.column[0]] != m.surface.piece[column_of(m.wall, s.wall, face)]) continue;
+    if (surface.piece[w.column[0]] != surface.piece[column_of(m.wall, s.wall, face)]) continue;
     if (least_distance(box_of(m.wall, s.wall, search, face), target, side) > std::min(4 * kMost, std::abs(best.gap))) continue;
-    const uint32_t first = m.surface.first_of_face[face];  // outer, inner
-    const Foot foot = nearest_on_patch(m.wall, s.wall, m.surface, side > 0 ? first : first + 1, target);
-    if (std::abs(foot.gap) < std::abs(best.gap)) best = foot;
+    for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
+      if (surface.patch[q].side != side) continue;
+      const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, target);
+      if (std::abs(foot.gap) < std::abs(best.gap)) best = foot;
+    }
   }
   if (best.gap < 1e8f) place = best.point;
 }
@@ -61,7 +64,7 @@ float edge_distance(const Model& m, const State& s, const wall::Point& point) {
   const wall::Weights w = wall::weights(m.wall, s.wall.topology, point);
   float sum = 0;
   for (size_t k = 0; k < 4; ++k)
-    if (w.weight[k] != 0) sum += w.weight[k] * m.surface.edge_distance[w.column[k]];
+    if (w.weight[k] != 0) sum += w.weight[k] * surface_of(m, s).edge_distance[w.column[k]];
   return sum;
 }
 

@@ -171,14 +171,22 @@ PhysicalState start_physical(const Model& model, const SolverState& solver) {
   return s;
 }
 
+void restore_physical(const Model& model, PhysicalState& state) {
+  const wall::Topology& t = state.world.wall.topology;
+  const size_t faces = model.physical->world.wall.lane_of_face.size();
+  if (t.cut.size() == faces && t.factored.size() == faces) physical::restore_cuts(model.physical->world, state.world);
+}
+
 bool physical_fits(const Model& model, const PhysicalState& state) {
   const PhysicalModel& m = *model.physical;
   const physical::State &s = state.world, &start = m.start;
   const thread::State& t = s.thread;
-  const size_t nodes = start.thread.nodes(), segments = nodes - 1, columns = wall::columns(start.wall);
+  const size_t nodes = start.thread.nodes(), segments = nodes - 1, columns = wall::columns(s.wall);
   const size_t faces = m.world.wall.lane_of_face.size(), capsules = physical::kMaxThreadCapsules;
   if (s.wall.motion.x.size() != 2 * columns || s.wall.motion.v.size() != 2 * columns ||
-      s.wall.motion.turn.size() != start.wall.motion.turn.size())
+      s.wall.motion.turn.size() != s.wall.topology.corners.size() ||
+      (s.wall.topology.cut.empty() ? !s.wall.topology.factored.empty()
+                                   : s.wall.topology.cut.size() != faces || s.wall.topology.factored.size() != faces))
     return false;
   for (const thread::Columns3* c : {&t.x, &t.fine, &t.v, &t.plane_friction, &t.plane_drift, &t.listed})
     if (c->x.size() != nodes || c->y.size() != nodes || c->z.size() != nodes) return false;

@@ -158,6 +158,7 @@ void load_state(const Model& model, State& state, const std::vector<std::byte>& 
     throw InputError("saved state", "its topology does not fit this scene: " + error,
                      "use the scene and the version it was saved with");
   if (fresh->topology.version > 0) apply_topology(model, *fresh);
+  if (model.physical) restore_physical(model, fresh->physical);
   if (read.at != bytes.size() || !fits(current_model(model, *fresh), *fresh))
     throw InputError("saved state", "it does not fit this scene", "use the scene and the version it was saved with");
   state = std::move(*fresh);

@@ -80,5 +80,8 @@ void check_lying(Lines& out, bool nightly);
 void check_interrupted(Lines& out, bool nightly);
 void check_purse_string(Lines& out);
 void check_tear(Lines& out, bool nightly);
+// src/wall.
+void check_cuts(Lines& out, bool nightly);
+void check_pen(Lines& out);
 
 }  // namespace catgut::validation

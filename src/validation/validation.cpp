@@ -133,6 +133,8 @@ std::vector<ValidationLine> run_validation(const std::function<void(const Valida
       {"closure/interrupted", v::check_interrupted},
       {"closure/purse-string", [](v::Lines& out, bool all) { all ? v::check_purse_string(out) : void(); }},
       {"tear", v::check_tear},
+      {"cut/paths", v::check_cuts},
+      {"cut/pen", [](v::Lines& out, bool) { v::check_pen(out); }},
   };
   v::Lines lines;
   lines.on_line = on_line;

@@ -48,8 +48,13 @@ void find_plane(const State& s, float step, const Obstacle& o, uint32_t index, C
 }
 
 void find_capsule(const Model& m, const State& s, const Obstacle& o, uint32_t index, ContactSolver& solver) {
-  for (uint32_t f = 0; f < m.lane_of_face.size(); ++f) {
-    const uint32_t lane = m.lane_of_face[f], block = lane / kLanesOfBlock, in = lane % kLanesOfBlock;
+  for (uint32_t element = 0; element < m.lane_of_face.size() + s.topology.fragment.size(); ++element) {
+    // Whole faces, then the fragments of divided ones.
+    const size_t faces = m.lane_of_face.size();
+    if (element < faces && fragments(s.topology, element) > 0) continue;
+    const Fragment part =
+        element < faces ? Fragment{~uint64_t{0}, element, m.lane_of_face[element]} : s.topology.fragment[element - faces];
+    const uint32_t f = part.face, lane = part.lane, block = lane / kLanesOfBlock, in = lane % kLanesOfBlock;
     const auto& corner = s.topology.corners[block].column;
     const bool quad = s.topology.corners[block].quads != 0;
     // Bounding sphere of the face first.
@@ -86,11 +91,12 @@ void find_capsule(const Model& m, const State& s, const Obstacle& o, uint32_t in
     if (below && (quad ? std::max(std::abs(xi), std::abs(eta)) > 0.999f : std::min({xi, eta, 2 - xi - eta}) < 0.001f)) continue;
     const Vec3 normal = below ? facing * -1.0f : off * (-1 / far);
     const float gap = (below ? front : far) - o.radius;
+    if (element >= faces && !(part.cells >> cell_at(quad, xi, eta) & 1)) continue;  // another fragment lies there
     Contact k;
     k.point = weights(m, s.topology, {f, xi, eta, zeta});
     k.speed = lerp(o.speed_a, o.speed_b, t);
     if (gap > solver.reach && gap > solver.reach + 2 * m.step * length(velocity(k.point, s.motion) - k.speed)) continue;
-    k.key = (uint64_t{index} << 40) | (uint64_t{f} << 1) | (zeta > 0 ? 1u : 0u);
+    k.key = (uint64_t{index} << 40) | (uint64_t{element} << 1) | (zeta > 0 ? 1u : 0u);
     k.obstacle = index, k.along = t, k.normal = normal, k.gap = gap;
     k.friction = o.friction;
     solver.contact.push_back(k);

@@ -58,7 +58,7 @@ void BlockForces(const ElementBlock* block, const BlockCorners* corners, const F
       BlockTurn& frame = turn[b];
       Turn<Wide> q{hn::Load(d, frame.x.data() + part), hn::Load(d, frame.y.data() + part), hn::Load(d, frame.z.data() + part),
                    hn::Load(d, frame.w.data() + part)};
-      const ConstantsOf constants{block[b].constant[0] + part};
+      const ConstantsOf constants{block[b].constant[0].data() + part};
       const Wide quarter(0.25f), half(0.5f), third(1.0f / 3);
       const bool quads = corners[b].quads != 0;
       const Modes<Wide> f =

@@ -13,7 +13,7 @@ constexpr uint32_t kLanesOfBlock = 16;
 
 // Sixteen elements of one kind; lanes beyond the last element have no stiffness.
 struct alignas(64) ElementBlock {
-  float constant[kConstants][kLanesOfBlock] = {};
+  std::array<std::array<float, kLanesOfBlock>, kConstants> constant{};
 };
 struct alignas(64) BlockCorners {
   std::array<std::array<uint32_t, kLanesOfBlock>, 4> column{};

@@ -50,6 +50,23 @@ std::vector<std::vector<uint32_t>> rims(const Mesh& mesh) {
   return out;
 }
 
+std::vector<std::array<uint32_t, 4>> neighbors(const Mesh& mesh) {
+  std::map<std::pair<uint32_t, uint32_t>, uint32_t> open;
+  std::vector<std::array<uint32_t, 4>> out(mesh.face.size(), {kNone, kNone, kNone, kNone});
+  for (uint32_t f = 0; f < mesh.face.size(); ++f)
+    for (uint32_t e = 0, n = static_cast<uint32_t>(corners(mesh.face[f])); e < n; ++e) {
+      const auto key = std::minmax(mesh.face[f][e], mesh.face[f][(e + 1) % n]);
+      const auto other = open.find(key);
+      if (other == open.end()) {
+        open[key] = 4 * f + e;
+        continue;
+      }
+      out[f][e] = other->second, out[other->second / 4][other->second % 4] = 4 * f + e;
+      open.erase(other);
+    }
+  return out;
+}
+
 Mesh tube(const TubeShape& shape) {
   if (shape.around < 4 || shape.rings < 2 || !(shape.thickness > 0) || !(shape.outer_radius > shape.thickness) ||
       !(shape.length > 0))

@@ -25,6 +25,9 @@ struct Mesh {
 // Columns in order round each opening, counter-clockwise seen from outside the wall's outer side; the longest rim first.
 std::vector<std::vector<uint32_t>> rims(const Mesh& mesh);
 
+// Per face, over each edge (from corner e to e + 1): 4 * face + edge on the other side; kNone: a rim.
+std::vector<std::array<uint32_t, 4>> neighbors(const Mesh& mesh);
+
 // A straight tube about `axis` through `center` (middle of its near end), ring by ring from the near end.
 struct TubeShape {
   float outer_radius = 0.020f;  // [m]

@@ -10,7 +10,7 @@
 namespace catgut::wall {
 
 Weights weights(const Model& m, const Topology& t, const Point& p) {
-  const uint32_t lane = m.lane_of_face[p.face], block = lane / kLanesOfBlock, in = lane % kLanesOfBlock;
+  const uint32_t lane = lane_at(m, t, p.face, p.xi, p.eta), block = lane / kLanesOfBlock, in = lane % kLanesOfBlock;
   Weights w;
   w.zeta = p.zeta;
   for (int k = 0; k < 4; ++k) w.column[k] = t.corners[block].column[k][in];
@@ -49,21 +49,24 @@ void add_to(Column<Float4>& list, const Weights& w, Vec3 amount) {
 Point nearest_point(const Model& m, const State& s, Vec3 p, float zeta) {
   Point best;
   float best2 = 1e30f;
-  for (uint32_t f = 0; f < m.lane_of_face.size(); ++f) {
-    const uint32_t lane = m.lane_of_face[f], block = lane / kLanesOfBlock, in = lane % kLanesOfBlock;
+  const auto search = [&](uint32_t f, uint32_t lane, uint64_t cells) {
+    const uint32_t block = lane / kLanesOfBlock, in = lane % kLanesOfBlock;
     const bool quad = s.topology.corners[block].quads;
     Vec3 c[4];
     for (int k = 0; k < 4; ++k) c[k] = place(at_column(s.topology.corners[block].column[k][in], zeta), s.motion);
+    const auto look = [&](float xi, float eta) {
+      const Weights w = weights(m, s.topology, {f, xi, eta, zeta});
+      const Vec3 at = c[0] * w.weight[0] + c[1] * w.weight[1] + c[2] * w.weight[2] + c[3] * w.weight[3];
+      const float d2 = length2(p - at);
+      if (d2 < best2 && (cells == ~uint64_t{0} || cells >> cell_at(quad, xi, eta) & 1)) best2 = d2, best = {f, xi, eta, zeta};
+      return at;
+    };
     // Gauss-Newton on the bilinear patch; a few steps suffice for nearly flat faces.
     float xi = quad ? 0 : 0.6f, eta = xi;
     for (int step = 0; step < 6; ++step) {
-      const Weights w = weights(m, s.topology, {f, xi, eta, zeta});
-      const Vec3 at = c[0] * w.weight[0] + c[1] * w.weight[1] + c[2] * w.weight[2] + c[3] * w.weight[3];
+      const Vec3 r = p - look(xi, eta);
       const Vec3 a = quad ? ((c[1] - c[0]) * (1 - eta) + (c[2] - c[3]) * (1 + eta)) * 0.25f : (c[1] - c[0]) * 0.5f;
       const Vec3 b = quad ? ((c[3] - c[0]) * (1 - xi) + (c[2] - c[1]) * (1 + xi)) * 0.25f : (c[2] - c[0]) * 0.5f;
-      const Vec3 r = p - at;
-      const float d2 = length2(r);
-      if (d2 < best2) best2 = d2, best = {f, xi, eta, zeta};
       const float aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), det = aa * bb - ab * ab;
       if (!(det > 0)) break;
       const float low = quad ? -1.0f : 0.0f, high = quad ? 1.0f : 2.0f;
@@ -72,6 +75,20 @@ Point nearest_point(const Model& m, const State& s, Vec3 p, float zeta) {
       if (!quad) next_eta = std::min(next_eta, 2 - next_xi);
       xi = next_xi, eta = next_eta;
     }
+    if (cells == ~uint64_t{0}) return;
+    for (uint32_t cell = 0; cell < kCells; ++cell) {  // the foot may lie beyond the fragment
+      if (!(cells >> cell & 1)) continue;
+      to_natural(quad, raster(quad).center[cell], xi, eta);
+      look(xi, eta);
+    }
+  };
+  for (uint32_t f = 0; f < m.lane_of_face.size(); ++f) {
+    const uint32_t parts = fragments(s.topology, f);
+    if (parts == 0) search(f, m.lane_of_face[f], ~uint64_t{0});
+    for (uint32_t i = 0; i < parts; ++i) {
+      const Fragment& part = s.topology.fragment[s.topology.first_fragment[f] + i];
+      search(f, part.lane, part.cells);
+    }
   }
   return best;
 }
@@ -79,7 +96,7 @@ Point nearest_point(const Model& m, const State& s, Vec3 p, float zeta) {
 void Inverse::need(const Topology& t, std::span<const Weights> points) {
   if (version_ != t.version || rows_ != t.factor.size || entry_.empty()) {
     version_ = t.version, rows_ = t.factor.size, next_ = 0, round_ = 0;
-    capacity_ = std::min(capacity_, rows_);
+    capacity_ = std::min(asked_, rows_);
     entry_.assign(rows_, kNone);
     slot_.clear(), used_.clear();
     slot_.reserve(capacity_), used_.reserve(capacity_);

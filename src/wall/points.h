@@ -41,7 +41,7 @@ void add_to(Column<Float4>& list, const Weights& w, Vec3 amount);
 class Inverse {
  public:
   // capacity: cached columns; at least the number requested by one call of `need`. A small wall caches all of them.
-  explicit Inverse(uint32_t capacity = 512) : capacity_(capacity) {}
+  explicit Inverse(uint32_t capacity = 512) : asked_(capacity) {}
   // Computes missing columns of these points; clears the cache when the topology has changed.
   void need(const Topology& topology, std::span<const Weights> points);
   // [1/kg] between two points whose columns have been requested.
@@ -51,7 +51,7 @@ class Inverse {
   uint32_t kept() const { return static_cast<uint32_t>(slot_.size()); }
 
  private:
-  uint32_t capacity_, version_ = 0, rows_ = 0, next_ = 0, round_ = 0;
+  uint32_t asked_, capacity_ = 0, version_ = 0, rows_ = 0, next_ = 0, round_ = 0;
   std::vector<uint32_t> entry_;        // per slot; kNone: not cached
   std::vector<uint32_t> slot_, used_;  // per entry: its slot, and the last call that requested it
   Column<float> value_;

@@ -13,10 +13,14 @@ constexpr void reflect(auto& a, Like<Panel> auto& p) { a(p.first), a(p.width), a
 constexpr void reflect(auto& a, Like<Factor> auto& f) { a(f.size), a(f.place), a(f.panel), a(f.row), a(f.value); }
 constexpr void reflect(auto& a, Like<BlockCorners> auto& c) { a(c.column), a(c.quads), a(c.unused); }
 constexpr void reflect(auto& a, Like<BlockTurn> auto& t) { a(t.x), a(t.y), a(t.z), a(t.w); }
+constexpr void reflect(auto& a, Like<FaceCut> auto& c) { a(c.bit); }
+constexpr void reflect(auto& a, Like<Fragment> auto& f) { a(f.cells), a(f.face), a(f.lane); }
+constexpr void reflect(auto& a, Like<ElementBlock> auto& b) { a(b.constant); }
 constexpr void reflect(auto& a, Like<Motion> auto& m) { a(m.x), a(m.v), a(m.turn), a(m.clamped); }
 constexpr void reflect(auto& a, Like<Topology> auto& t) {
   a(t.version), a(t.corners), a(t.source), a(t.mass), a(t.inv_dir), a(t.slot), a(t.share), a(t.relative), a(t.spread);
   a(t.group_first), a(t.group_member), a(t.gather_first), a(t.gather_from), a(t.factor);
+  a(t.cut), a(t.factored), a(t.first_fragment), a(t.fragment), a(t.extra);
 }
 constexpr void reflect(auto& a, Like<State> auto& s) { a(s.topology), a(s.motion); }
 

@@ -62,6 +62,27 @@ void check(const Spec& spec) {
   if (std::count(used.begin(), used.end(), 0) > 0) fail("a column that belongs to no face", "leave it out");
 }
 
+// Calls visit(lane, inertia, part of the face) for every element.
+template <typename Visit>
+void each_element(const Model& m, const Topology& t, Visit&& visit) {
+  for (uint32_t lane = 0; lane < m.face_of_lane.size(); ++lane) {
+    const uint32_t face = m.face_of_lane[lane];
+    if (face != kNone && (t.first_fragment.empty() || t.first_fragment[face] == kNone)) visit(lane, m.inertia[lane], 1.0f);
+  }
+  for (const Fragment& f : t.fragment)
+    visit(f.lane, m.inertia[m.lane_of_face[f.face]],
+          static_cast<float>(__builtin_popcountll(f.cells)) / static_cast<float>(kCells));
+}
+
+// block_forces over the blocks of the model and then those of the fragments.
+void all_forces(const ElementBlock* whole, const ElementBlock* extra, uint32_t wholes, const Topology& t, const Float4* y,
+                BlockTurn* turn, BlockForce* force, uint32_t first, uint32_t last) {
+  if (first < wholes) block_forces(whole, t.corners.data(), y, turn, force, first, std::min(last, wholes));
+  if (last > wholes)
+    block_forces(extra, t.corners.data() + wholes, y, turn + wholes, force + wholes, std::max(first, wholes) - wholes,
+                 last - wholes);
+}
+
 // Rows of the factor for every column that is not held, and the factor.
 void factor_again(const Model& m, Topology& t) {
   const uint32_t n = static_cast<uint32_t>(t.source.size());
@@ -73,10 +94,9 @@ void factor_again(const Model& m, Topology& t) {
   std::vector<Entry> entry;
   for (uint32_t c = 0; c < n; ++c)
     if (row[c] != kNone) entry.push_back({row[c], row[c], t.mass[c]});
-  for (uint32_t lane = 0; lane < m.face_of_lane.size(); ++lane) {
-    if (m.face_of_lane[lane] == kNone) continue;
+  each_element(m, t, [&](uint32_t lane, const Model::LaneInertia& inertia, float part) {
     for (int e = 0; e < 6; ++e) {
-      const double w = scale * m.inertia[lane].edge[e];
+      const double w = scale * static_cast<double>(inertia.edge[e] * part);
       if (w == 0) continue;
       const auto& corner = t.corners[lane / kLanesOfBlock].column;
       const uint32_t a = corner[kEdge[e][0]][lane % kLanesOfBlock], b = corner[kEdge[e][1]][lane % kLanesOfBlock];
@@ -84,7 +104,7 @@ void factor_again(const Model& m, Topology& t) {
       if (row[b] != kNone) entry.push_back({row[b], row[b], w});
       if (row[a] != kNone && row[b] != kNone) entry.push_back({std::max(row[a], row[b]), std::min(row[a], row[b]), -w});
     }
-  }
+  });
   t.factor = factorize(rows, entry);
   t.slot.assign(n, kNone);
   for (uint32_t c = 0; c < n; ++c)
@@ -152,26 +172,31 @@ void gather_forces(const Topology& t, const std::vector<BlockForce>& force, uint
 
 }  // namespace
 
+uint32_t lane_at(const Model& m, const Topology& t, uint32_t face, uint32_t cell) {
+  if (t.first_fragment.empty() || t.first_fragment[face] == kNone) return m.lane_of_face[face];
+  uint32_t at = t.first_fragment[face];
+  while (!(t.fragment[at].cells >> cell & 1)) ++at;
+  return t.fragment[at].lane;
+}
+
 void renew_topology(const Model& m, Topology& t, bool again) {
   const uint32_t n = static_cast<uint32_t>(t.source.size());
   t.mass.assign(n, 0);
   std::vector<float> dir(n, 0), diagonal(n, 0);
   std::vector<std::vector<uint32_t>> from(n);
   const float scale = m.step * m.step * m.report.scale;
-  for (uint32_t lane = 0; lane < m.face_of_lane.size(); ++lane) {
-    if (m.face_of_lane[lane] == kNone) continue;
+  each_element(m, t, [&](uint32_t lane, const Model::LaneInertia& w, float part) {
     const uint32_t block = lane / kLanesOfBlock, in = lane % kLanesOfBlock;
     const auto& corner = t.corners[block].column;
-    const Model::LaneInertia& w = m.inertia[lane];
     for (uint32_t k = 0; k < (t.corners[block].quads ? 4u : 3u); ++k) {
       const uint32_t c = corner[k][in];
-      t.mass[c] += w.mass, dir[c] += w.dir;
+      t.mass[c] += w.mass * part, dir[c] += w.dir * part;
       from[c].push_back((block * 4 + k) * kLanesOfBlock + in);
     }
     for (int e = 0; e < 6; ++e)
       for (int side = 0; side < 2; ++side)
-        if (w.edge[e] > 0) diagonal[corner[kEdge[e][side]][in]] += w.edge[e];
-  }
+        if (w.edge[e] > 0) diagonal[corner[kEdge[e][side]][in]] += w.edge[e] * part;
+  });
   t.inv_dir.assign(n, 0);
   t.gather_first.assign(1, 0), t.gather_from.clear();
   for (uint32_t c = 0; c < n; ++c) {
@@ -203,13 +228,13 @@ void renew_topology(const Model& m, Topology& t, bool again) {
   ++t.version;
 }
 
-Scratch make_scratch(const Model& model, const State& state) {
+Scratch make_scratch(const Model&, const State& state) {
   Scratch k;
   // A cut adds at most one column a corner; room for a third more columns keeps a cut from allocating in most cases.
   const size_t n = 2 * columns(state), room = n + n / 3 + 64;
   for (Column<Float4>* c : {&k.y, &k.force, &k.external, &k.answer}) c->reserve(room), c->resize(n);
   k.rhs.resize(state.topology.factor.size);
-  k.block_force.resize(model.block.size());
+  k.block_force.resize(state.topology.corners.size());
   return k;
 }
 
@@ -261,6 +286,7 @@ Wall build_wall(const Spec& spec) {
   }
   t.source.resize(n);
   for (uint32_t c = 0; c < n; ++c) t.source[c] = c;
+  m.neighbor = neighbors(m.mesh);
   Motion& motion = w.state.motion;
   const size_t room = n + n / 3 + 32;
   motion.x.reserve(2 * room), motion.v.reserve(2 * room);
@@ -290,8 +316,8 @@ Wall build_wall(const Spec& spec) {
 
 void elastic_forces(const Model& m, State& s, Scratch& k, int turns) {
   for (int i = 0; i < turns; ++i)
-    block_forces(m.block.data(), s.topology.corners.data(), s.motion.x.data(), s.motion.turn.data(), k.block_force.data(), 0,
-                 static_cast<uint32_t>(m.block.size()));
+    all_forces(m.block.data(), s.topology.extra.data(), static_cast<uint32_t>(m.block.size()), s.topology, s.motion.x.data(),
+               s.motion.turn.data(), k.block_force.data(), 0, static_cast<uint32_t>(s.topology.corners.size()));
   for (uint32_t c = 0; c < columns(s); ++c) {
     Lanes mid, dir;
     gather_forces(s.topology, k.block_force, c, mid, dir);
@@ -306,9 +332,9 @@ void begin_step(const Model& m, State& s, Scratch& k, Jobs& jobs) {
   jobs.each(motion.x.size(), 1024, [&](size_t first, size_t last) {
     for (size_t i = first; i < last; ++i) store(k.y[i], load(motion.x[i]) + tau * load(motion.v[i]));
   });
-  jobs.each(m.block.size(), 8, [&](size_t first, size_t last) {
-    block_forces(m.block.data(), t.corners.data(), k.y.data(), motion.turn.data(), k.block_force.data(),
-                 static_cast<uint32_t>(first), static_cast<uint32_t>(last));
+  jobs.each(t.corners.size(), 8, [&](size_t first, size_t last) {
+    all_forces(m.block.data(), t.extra.data(), static_cast<uint32_t>(m.block.size()), t, k.y.data(), motion.turn.data(),
+               k.block_force.data(), static_cast<uint32_t>(first), static_cast<uint32_t>(last));
   });
   // Damped before forces are added: otherwise a held force would be scaled by the damping factor.
   const Lanes keep = splat(portable::exp(-m.drag * m.step));
@@ -352,17 +378,17 @@ void finish_step(const Model& m, State& s, Jobs& jobs) {
 }
 
 float largest_eigenvalue(const Model& m, const State& state, Scratch& k, bool stiff, int iterations) {
-  std::vector<ElementBlock> block = m.block;
-  if (stiff)
-    for (ElementBlock& b : block)
-      for (uint32_t i = 0; i < kLanesOfBlock; ++i) {
+  std::vector<ElementBlock> block = m.block, extra = state.topology.extra;
+  for (std::vector<ElementBlock>* blocks : {&block, &extra})
+    for (ElementBlock& b : *blocks)
+      for (uint32_t i = 0; stiff && i < kLanesOfBlock; ++i) {
         b.constant[kA11][i] += b.constant[kStiff1][i], b.constant[kA22][i] += b.constant[kStiff2][i];
         b.constant[kStiff1][i] = b.constant[kStiff2][i] = 0;
       }
   const Topology& t = state.topology;
   const uint32_t n = columns(state);
   Motion motion = state.motion;
-  const uint32_t blocks = static_cast<uint32_t>(block.size());
+  const uint32_t wholes = static_cast<uint32_t>(block.size()), blocks = static_cast<uint32_t>(t.corners.size());
   float smallest = 1e30f;  // [m] director: a length of the mesh
   for (uint32_t c = 0; c < n; ++c) smallest = std::min(smallest, length(vec3(motion.x[2 * c + 1])));
   Column<Float4> v(2 * n), kv(2 * n), next(2 * n);
@@ -383,7 +409,7 @@ float largest_eigenvalue(const Model& m, const State& state, Scratch& k, bool st
       for (size_t i = 0; i < v.size(); ++i) store(k.y[i], load(state.motion.x[i]) + splat(sign * eps) * load(v[i]));
       motion.turn = state.motion.turn;
       for (int turn = 0; turn < 3; ++turn)
-        block_forces(block.data(), t.corners.data(), k.y.data(), motion.turn.data(), k.block_force.data(), 0, blocks);
+        all_forces(block.data(), extra.data(), wholes, t, k.y.data(), motion.turn.data(), k.block_force.data(), 0, blocks);
       for (uint32_t c = 0; c < n; ++c) {
         if (t.slot[c] == kNone) continue;
         Lanes mid, dir;

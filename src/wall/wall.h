@@ -20,6 +20,7 @@
 #include "wall/force.h"
 #include "wall/laminate.h"
 #include "wall/mesh.h"
+#include "wall/raster.h"
 
 namespace catgut::wall {
 
@@ -59,6 +60,7 @@ struct Model {
     float dir;      // [N/m] per corner, of directors
   };
   std::vector<LaneInertia> inertia;
+  std::vector<std::array<uint32_t, 4>> neighbor;  // per face, over each edge: 4 * face + edge on the other side; kNone: a rim
   InertiaReport report;
 };
 
@@ -70,6 +72,7 @@ struct Motion {
 };
 
 // Changes when the wall is cut or factored again. A column that was cut is a group of copies that share a row of the factor.
+// All of it follows from the model, `cut` and `factored` (wall/cut: restore).
 struct Topology {
   uint32_t version = 0;               // counts changes
   std::vector<BlockCorners> corners;  // columns
@@ -82,6 +85,12 @@ struct Topology {
   std::vector<uint32_t> group_first, group_member;  // groups of two columns and more
   std::vector<uint32_t> gather_first, gather_from;  // per column: (block * 4 + corner) * 16 + lane
   Factor factor;
+  // Cuts; the lists are empty while nothing was cut. Fragments are sorted by face and lowest cell. Their lanes follow those of
+  // the model, in blocks of their own; the lane of a divided face is idle, on the columns that the face has at rest.
+  std::vector<FaceCut> cut, factored;    // per face: links cut so far, and when the factor was made
+  std::vector<uint32_t> first_fragment;  // per face; kNone: whole
+  std::vector<Fragment> fragment;
+  std::vector<ElementBlock> extra;  // constants of the fragments
 };
 
 struct State {
@@ -124,6 +133,33 @@ void elastic_forces(const Model& model, State& state, Scratch& scratch, int turn
 
 // Largest eigenvalue of h^2 A^-1 K about the present positions. stiff: as if every fiber were beyond its knee.
 float largest_eigenvalue(const Model& model, const State& state, Scratch& scratch, bool stiff, int iterations = 60);
+
+// The lane of a place on a face.
+uint32_t lane_at(const Model& model, const Topology& topology, uint32_t face, uint32_t cell);
+inline uint32_t lane_at(const Model& m, const Topology& t, uint32_t face, float xi, float eta) {
+  if (t.first_fragment.empty() || t.first_fragment[face] == kNone) return m.lane_of_face[face];
+  return lane_at(m, t, face, cell_at(m.mesh.face[face][3] != kNone, xi, eta));
+}
+// Fragments of a face: how many, 0 for a whole one.
+inline uint32_t fragments(const Topology& t, uint32_t face) {
+  if (t.first_fragment.empty() || t.first_fragment[face] == kNone) return 0;
+  uint32_t n = 1;
+  while (t.first_fragment[face] + n < t.fragment.size() && t.fragment[t.first_fragment[face] + n].face == face) ++n;
+  return n;
+}
+
+// Elements: the whole faces by their number, then the fragments. A divided face has no element of its own.
+inline uint32_t elements(const Model& m, const Topology& t) {
+  return static_cast<uint32_t>(m.lane_of_face.size() + t.fragment.size());
+}
+inline uint32_t lane_of_element(const Model& m, const Topology& t, uint32_t element) {
+  const size_t faces = m.lane_of_face.size();
+  return element < faces ? m.lane_of_face[element] : t.fragment[element - faces].lane;
+}
+inline uint32_t face_of_element(const Model& m, const Topology& t, uint32_t element) {
+  const size_t faces = m.lane_of_face.size();
+  return element < faces ? element : t.fragment[element - faces].face;
+}
 
 // Masses, director inertia and gather lists from the corners; then, with `again`, a new factor in which every column has a row
 // of its own. The motion is continuous.
