@@ -384,7 +384,7 @@ void check_ties(Lines& out, bool nightly) {
   const std::string source = "determinant of the knot that the hands' paths make; Burde et al. 2014, 10.1515/9783110270785";
   const Settings settings = knot_settings(0.25f);
   double nearest = 1, missed = 0;
-  int named = 0, sliding = 0, ties = 0;
+  int named = 0, sliding = 0, ties = 0, rewound = 0;
   // Every seed counts, none is repeated.
   auto row = [&](const Case& c, int speed, int first, int count) {
     int right = 0;
@@ -395,6 +395,7 @@ void check_ties(Lines& out, bool nightly) {
       const TiedKnot knot = tie_with_tools(settings, c.tie, how);
       nearest = std::min(nearest, double{knot.nearest});
       missed += knot.missed;
+      rewound += knot.rewound;
       right += knot.determinant == c.determinant;
       const thread::SeenKnot seen = thread::observe(settings, knot.state);
       uint32_t wraps = 0;
@@ -415,7 +416,7 @@ void check_ties(Lines& out, bool nightly) {
       for (int speed = 1; speed <= 5; ++speed) row(c, speed, kTies * speed, kTies);
   }
   out.add("knot/named right of " + number(ties) + " ties with tools, of which " + number(sliding) +
-              " seen to have capsized into half hitches",
+              " seen to have capsized into half hitches; turns wound again: " + number(rewound),
           ties, named, 0, "", "throws and wraps that the hands made");
   out.add("knot/jaws closed beside the tail, in all ties", 0, missed, 0, "",
           "the needle holder takes what lies between its jaws");

@@ -122,7 +122,7 @@ class Tying {
     take_strand(strand_for(wraps));
     side_ = side;
     const Vec3 shaft = shaft_from(side), work = work_place(side, wraps) + tremor();
-    const float start = sense > 0 ? 0 : kPi, turns = 2 * kPi * static_cast<float>(wraps) * sense;
+    const float start = sense > 0 ? 0 : kPi, turn = 2 * kPi * static_cast<float>(wraps) * sense;
     // The needle holder comes from the other hand; at this moment it is far from the thread.
     shaft_ = shaft;
     tip_ = work + shaft * 60e-3f;
@@ -137,7 +137,9 @@ class Tying {
     const Vec3 out = work + shaft * wind_at_ + around(side, start) * radius_;
     move("to work", tip_, out, 0, 0.5f * (forceps_angle_ + forceps));
     move("to work", work, hand_, 0, forceps);
-    wind("wind", start + turns);
+    const float before = turns();
+    wind("wind", start + turn);
+    wind_again(before, wraps, sense);
     fetch();
     draw(work, sense);
     // Low and level, each end to its own side, before either is pulled.
@@ -275,6 +277,25 @@ class Tying {
       place_hand();
       tick(phase);
     }
+  }
+
+  // Turns of the strand about the shaft, from the wound to the hand; counted as the hand winds: over the top is positive.
+  float turns() const {
+    const Vec3 x = around(side_, 0), y = around(side_, 0.5f * kPi);
+    float sum = 0, last = 0;
+    for (uint32_t i = knot_.bite_b; i <= hold_[3].node; ++i) {
+      const Vec3 p = knot_.state.position(i) - tip_;
+      const float angle = std::atan2(dot(p, y), dot(p, x));
+      if (i > knot_.bite_b) sum += std::remainder(angle - last, 2 * kPi);
+      last = angle;
+    }
+    return sum / (2 * kPi);
+  }
+
+  // The hand sees what lies round the jaws: a slack turn may have slid off the tip while it was wound.
+  void wind_again(float before, int wraps, float sense) {
+    for (int i = 0; i < 2 && sense * (turns() - before) < static_cast<float>(wraps) - 0.5f; ++i, ++knot_.rewound)
+      wind("wind again", angle_ + 2 * kPi * sense);
   }
 
   // The jaws open, go forward to the tail and close on it; the winding hand goes with them and keeps the turns on the jaws.
