@@ -228,12 +228,12 @@ Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
-// The same, tied with a square knot of three single throws.
+// The same, tied with a square knot of two single throws.
 Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan = interrupted_plan(picture, skill);
   plan.pull = kPull;
   plan.task.pop_back();
-  for (int i = 0; i < 3; ++i) add(plan, TaskKind::throw_, 1, 1);
+  for (int i = 0; i < 2; ++i) add(plan, TaskKind::throw_, 1, 1);
   add(plan, TaskKind::rest);
   return plan;
 }

@@ -12,15 +12,15 @@ namespace catgut {
 namespace {
 
 constexpr size_t kHolder = 0, kForceps = 1;
-constexpr float kStrandAt = 18e-3f;    // [m] of the shaft, from the grasp point: above the wound
-constexpr float kWindAt = 9e-3f;       // [m] of the shaft: plane of the winding hand, nearer the tip than the strand
-constexpr float kShaft = 2.2e-3f;      // [m] radius that the turns lie on
-constexpr float kNearest = 9e-3f;      // [m] of the winding hand from the shaft
-constexpr float kLoose = 0.95f;        // of the strand that is left: nearly taut
-constexpr float kWinding = 0.25f;      // [N] above which the winding hand yields
-constexpr float kTailEnd = 6e-3f;      // [m] from the tail's end, where it is taken
-constexpr float kHalfOpen = 0.8f;      // of the jaws, to take the tail
-constexpr float kLow = 4e-3f;          // [m] above the stitch, where strands are pulled
+constexpr float kStrandAt = 18e-3f;  // [m] of the shaft, from the grasp point: above the wound
+constexpr float kWindAt = 9e-3f;     // [m] of the shaft: plane of the winding hand, nearer the tip than the strand
+constexpr float kShaft = 2.2e-3f;    // [m] radius that the turns lie on
+constexpr float kNearest = 9e-3f;    // [m] of the winding hand from the shaft
+constexpr float kLoose = 0.95f;      // of the strand that is left: nearly taut
+constexpr float kWinding = 0.25f;    // [N] above which the winding hand yields
+constexpr float kTailEnd = 6e-3f;    // [m] from the tail's end, where it is taken
+constexpr float kHalfOpen = 0.8f;    // of the jaws, to take the tail
+constexpr float kLow = 4e-3f;        // [m] above the stitch, where strands are pulled
 
 Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
 // Unit, across the shaft; 0: toward the viewer, pi/2: above.
@@ -44,10 +44,26 @@ ThreadTie::ThreadTie(const PictureModel& picture, std::array<ScriptedHand, 2>& h
     : picture_(picture), hands_(hands), how_(settings) {}
 
 std::string ThreadTie::doing() const {
-  static constexpr const char* kName[] = {"reach for the tail", "take the tail", "lift the tail", "lay the tail", "let the tail go", "leave the tail", "to the strand",
-                                          "under the strand", "wind", "open the jaws", "reach for the tail", "close on the tail",
-                                          "draw the tail through", "cross the hands", "lower the hands", "pull", "lay the tail",
-                                          "let go", "leave", "done"};
+  static constexpr const char* kName[] = {"reach for the tail",
+                                          "take the tail",
+                                          "lift the tail",
+                                          "lay the tail",
+                                          "let the tail go",
+                                          "leave the tail",
+                                          "to the strand",
+                                          "under the strand",
+                                          "wind",
+                                          "open the jaws",
+                                          "reach for the tail",
+                                          "close on the tail",
+                                          "draw the tail through",
+                                          "cross the hands",
+                                          "lower the hands",
+                                          "pull",
+                                          "lay the tail",
+                                          "let go",
+                                          "leave",
+                                          "done"};
   return kName[stage_];
 }
 
@@ -85,7 +101,8 @@ void ThreadTie::glide_to(Vec3 tip, Vec3 hand, float speed, float angle) {
   angle_from_ = forceps_angle_, angle_to_ = angle;
   done_ = 0;
   const float turn = length(rotation_vector(holder_to_ * conjugate(holder_from_)));
-  const float far = std::max({distance(tip_, tip), distance(hand_, hand), 0.03f * turn, 0.03f * std::abs(angle - forceps_angle_)});
+  const float far =
+      std::max({distance(tip_, tip), distance(hand_, hand), 0.03f * turn, 0.03f * std::abs(angle - forceps_angle_)});
   seconds_ = std::max(0.1f, 1.5f * far / speed);
 }
 
@@ -127,9 +144,11 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
     case take_tail: {  // once, to lay the tail straight on the side away from the needle; it hangs in front
       const Vec3 at = tail_node(seen, kTailEnd + 3e-3f * static_cast<float>(misses_));
       const Vec3 aside = origin_ + Vec3{side_ * 0.25f, 0.45f, -0.65f} * strand_;  // behind the work
-      const Vec3 z = normalized(Vec3{0.1f * side_, 0.35f, 0.93f}), along = node_at(seen, node_along(seen, 0, kTailEnd + 6e-3f, 1)) - tail_node(seen, kTailEnd);
+      const Vec3 z = normalized(Vec3{0.1f * side_, 0.35f, 0.93f}),
+                 along = node_at(seen, node_along(seen, 0, kTailEnd + 6e-3f, 1)) - tail_node(seen, kTailEnd);
       const Vec3 x = normalized(cross(z, along), {1, 0, 0});
-      glide_to(stage == to_tail ? at + z * 0.03f : at, aside, stage == to_tail ? how_.speed : 0.5f * how_.speed, forceps_angle_);
+      glide_to(stage == to_tail ? at + z * 0.03f : at, aside, stage == to_tail ? how_.speed : 0.5f * how_.speed,
+               forceps_angle_);
       holder_to_ = from_axes(x, cross(z, x), z);
       break;
     }
@@ -137,9 +156,12 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       glide_to(origin_ + Vec3{-side_ * 0.5f * tail_, 0.5f * tail_, 0.5f * tail_}, hand_, 0.5f * how_.speed, forceps_angle_);
       break;
     case lay_tail:
-      glide_to(seen.active().suture_point.front().position + Vec3{-side_ * (tail_ - kTailEnd - 2e-3f), 1e-3f, 0}, hand_, 0.4f * how_.speed, forceps_angle_);
+      glide_to(seen.active().suture_point.front().position + Vec3{-side_ * (tail_ - kTailEnd - 2e-3f), 1e-3f, 0}, hand_,
+               0.4f * how_.speed, forceps_angle_);
       break;
-    case off_tail: glide_to(tip_ + shaft * 0.03f, hand_, how_.speed, forceps_angle_); break;
+    case off_tail:
+      glide_to(tip_ + shaft * 0.03f, hand_, how_.speed, forceps_angle_);
+      break;
     case to_work: {
       angle_ = sense_ > 0 ? 0 : kPi, turned_ = 0, slack_ = 1;
       const float drop = kStrandAt - kWindAt, taut = kLoose * strand_;
@@ -148,8 +170,11 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       glide_to(work + shaft * 0.06f, work + shaft * kWindAt + around(side_, angle_) * radius_, how_.speed, toward);
       break;
     }
-    case into_work: glide_to(work, hand_, how_.speed, toward); break;
-    case open: break;
+    case into_work:
+      glide_to(work, hand_, how_.speed, toward);
+      break;
+    case open:
+      break;
     case draw: {
       drawn_ = 0;
       const Vec3 to = work + shaft * 34e-3f;
@@ -157,20 +182,25 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       break;
     }
     case cross_up:
-      glide_to(origin_ + Vec3{side_ * 0.6f * tail_, 8e-3f + kLow, 0}, origin_ + Vec3{-side_ * 24e-3f, 12e-3f + kLow, 0}, 0.6f * how_.speed,
-               forceps_angle_);
+      glide_to(origin_ + Vec3{side_ * 0.6f * tail_, 8e-3f + kLow, 0}, origin_ + Vec3{-side_ * 24e-3f, 12e-3f + kLow, 0},
+               0.6f * how_.speed, forceps_angle_);
       break;
     case cross_down:
-      glide_to(origin_ + Vec3{side_ * 0.75f * tail_, 2e-3f + kLow, 0}, origin_ + Vec3{-side_ * 0.6f * strand_, 4e-3f + kLow, 0}, 0.6f * how_.speed,
-               forceps_angle_);
+      glide_to(origin_ + Vec3{side_ * 0.75f * tail_, 2e-3f + kLow, 0}, origin_ + Vec3{-side_ * 0.6f * strand_, 4e-3f + kLow, 0},
+               0.6f * how_.speed, forceps_angle_);
       break;
-    case pull: steady_ = 0; break;
+    case pull:
+      steady_ = 0;
+      break;
     case lay:
       pulled_ = std::min(felt_, tail_felt_);
       glide_to(tip_ - Vec3{side_ * 2e-3f, 3e-3f, 0}, hand_, 0.2f * how_.speed, forceps_angle_);
       break;
-    case away: glide_to(tip_ + shaft * 0.06f, hand_, how_.speed, forceps_angle_); break;
-    default: break;
+    case away:
+      glide_to(tip_ + shaft * 0.06f, hand_, how_.speed, forceps_angle_);
+      break;
+    default:
+      break;
   }
 }
 
@@ -243,7 +273,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     case fetch: {
       const Vec3 goal = tail_node(seen, kTailEnd + 2e-3f * static_cast<float>(misses_)), way = goal - tip_;
-      const float left = length(way), speed = std::min(0.7f * how_.speed, 0.01f + 4 * left) * (felt_ > 2 * kWinding ? 0.3f : 1.0f);
+      const float left = length(way),
+                  speed = std::min(0.7f * how_.speed, 0.01f + 4 * left) * (felt_ > 2 * kWinding ? 0.3f : 1.0f);
       tip_ += way * (std::min(speed * dt, left) / std::max(left, 1e-6f));
       // The winding hand goes along and keeps the turns on the jaws.
       if (felt_ > kWinding) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
@@ -259,7 +290,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
         go(seen, cross_up);
         break;
       }
-      const float speed = std::min(0.7f * how_.speed, 0.02f + 4 * (far - drawn_)) * std::clamp(1.5f - tail_felt_ / 0.1f, 0.15f, 1.0f);
+      const float speed =
+          std::min(0.7f * how_.speed, 0.02f + 4 * (far - drawn_)) * std::clamp(1.5f - tail_felt_ / 0.1f, 0.15f, 1.0f);
       drawn_ += speed * dt;
       const float e = std::min(1.0f, drawn_ / far);
       tip_ = lerp(tip_from_, tip_to_, e);
@@ -275,7 +307,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f))) go(seen, cross_down);
       break;
     case cross_down:
-      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f)) || std::min(felt_, tail_felt_) > 0.5f) go(seen, pull);
+      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f)) || std::min(felt_, tail_felt_) > 0.5f)
+        go(seen, pull);
       break;
     case pull: {
       // Neither pulls harder than the other: a strand that is tight while the other is slack becomes a post.
@@ -298,7 +331,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
     case away:
       if (glide(dt)) stage_ = done;
       break;
-    default: break;
+    default:
+      break;
   }
   place();
   return stage_ == done;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// surgeon/thread_tie: an instrument tie with physical mechanics. The forceps holds the needle near its swage and winds the strand
-// round the needle holder, which takes the tail, draws it through the turns and pulls against the forceps. Nothing watches for a
-// loop: the turns are thread on a shaft, and a throw that fails shows in the knot. Reads Snapshots; moves two scripted hands.
+// surgeon/thread_tie: an instrument tie with physical mechanics. The forceps holds the needle near its swage and winds the
+// strand round the needle holder, which takes the tail, draws it through the turns and pulls against the forceps. Nothing
+// watches for a loop: the turns are thread on a shaft, and a throw that fails shows in the knot. Reads Snapshots; moves two
+// scripted hands.
 //
 // x along the stitch, y up, z toward the viewer. `side` +1: the long strand is on the right, and the needle holder comes from
 // there. The sides alternate from throw to throw; winding in the same sense then makes a square knot.
@@ -34,8 +35,28 @@ class ThreadTie {
   float pulled() const { return pulled_; }  // [N] the smaller tension of both strands when the throw was pulled tight
 
  private:
-  enum Stage { to_tail, take_tail, lift_tail, lay_tail, drop_tail, off_tail, to_work, into_work, wind, open, fetch, close, draw, cross_up,
-               cross_down, pull, lay, let_go, away, done };
+  enum Stage {
+    to_tail,
+    take_tail,
+    lift_tail,
+    lay_tail,
+    drop_tail,
+    off_tail,
+    to_work,
+    into_work,
+    wind,
+    open,
+    fetch,
+    close,
+    draw,
+    cross_up,
+    cross_down,
+    pull,
+    lay,
+    let_go,
+    away,
+    done
+  };
   void go(const Snapshot& seen, Stage stage);
   void glide_to(Vec3 tip, Vec3 hand, float speed, float angle);
   bool glide(float dt);
@@ -50,10 +71,10 @@ class ThreadTie {
   int wraps_ = 1, misses_ = 0;
   float side_ = 1, sense_ = 1, waited_ = 0;
   bool first_ = false, failed_ = false;
-  Vec3 origin_;                     // the middle of the stitch
-  Vec3 tip_, hand_;                 // where the needle holder's jaws and the needle's swage shall be
-  Quat holder_turn_;                // of the needle holder
-  Quat forceps_rest_;               // forceps at angle 0, as it held the needle
+  Vec3 origin_;        // the middle of the stitch
+  Vec3 tip_, hand_;    // where the needle holder's jaws and the needle's swage shall be
+  Quat holder_turn_;   // of the needle holder
+  Quat forceps_rest_;  // forceps at angle 0, as it held the needle
   Vec3 swage_in_forceps_;
   float forceps_angle_ = 0;
   // A movement of both hands.
