@@ -14,16 +14,18 @@ void Live::Work::begin_assessment() { facts = assess::begin_facts(picture, asses
 // A demonstration is not the user's work: going back to the learner's state also restores the tally.
 void Live::Work::assess_tick() {
   if (published.demonstrating || published.preparing) return;
-  const auto made = [&] {
-    size_t n = facts.bite.size();
-    for (const assess::Knot& k : facts.knot) n += k.thrown.size();
-    return n;
+  // The tick of the newest bite or throw: that of its event, not of the snapshot.
+  const auto newest = [&] {
+    uint64_t t = 0;
+    for (const assess::Bite& b : facts.bite) t = std::max(t, b.tick);
+    for (const assess::Knot& k : facts.knot) t = std::max(t, k.tick);
+    return t;
   };
-  const size_t before_tick = made();
+  const uint64_t last = newest();
   assess::note(facts, picture, now, input);
-  if (!options.remarks || options.rubric.empty() || made() == before_tick) return;
+  if (!options.remarks || options.rubric.empty() || newest() == last) return;
   // A full queue drops remarks: the result has them all.
-  for (const assess::Remark& r : assess::remarks_since(options.rubric[0], facts, now.tick - 1)) remarks.push(r);
+  for (const assess::Remark& r : assess::remarks_since(options.rubric[0], facts, last)) remarks.push(r);
 }
 
 void Live::Work::finish_assessment() {
