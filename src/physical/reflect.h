@@ -57,7 +57,13 @@ constexpr void reflect(auto& a, Like<Hole> auto& h) {
   a(h.place), a(h.within), a(h.deepest), a(h.made), a(h.torn), a(h.out), a(h.load);
 }
 constexpr void reflect(auto& a, Like<State> auto& s) {
-  a(s.wall.topology.cut), a(s.wall.topology.factored), a(s.wall.motion), a(s.thread), a(s.hole), a(s.contact), a(s.lip);
+  auto& t = s.wall.topology;
+  a.cache(t.version), a.cache(t.corners), a.cache(t.source), a.cache(t.mass), a.cache(t.inv_dir), a.cache(t.slot);
+  a.cache(t.share), a.cache(t.relative), a.cache(t.spread), a.cache(t.group_first), a.cache(t.group_member);
+  a.cache(t.gather_first), a.cache(t.gather_from), a.cache(t.factor);
+  a(t.cut), a(t.factored);
+  a.cache(t.first_fragment), a.cache(t.fragment), a.cache(t.extra);
+  a(s.wall.motion), a(s.thread), a(s.hole), a(s.contact), a(s.lip);
   a(s.bodies), a(s.needle);
   a.cache(s.cut_surface);
 }
