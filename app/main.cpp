@@ -17,17 +17,27 @@ int report(std::string what) {
   return 2;
 }
 
+// For tests of command lines in the documentation: nothing is carried out.
+void parse_only(CLI::App& app) {
+  app.callback({});
+  for (CLI::App* command : app.get_subcommands({})) parse_only(*command);
+}
+
 // CLI11 only reports that an argument was not expected; the most similar command or option is more helpful.
 std::string parse_fault(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
   std::vector<std::string> commands;
   const CLI::App* used = &app;
-  for (const CLI::App* c : app.get_subcommands({})) commands.push_back(c->get_name());
-  for (const CLI::App* c : app.get_subcommands()) used = c;
+  int depth = 1;  // of the word that would be the next command
+  for (std::vector<CLI::App*> given = app.get_subcommands(); !given.empty(); given = given.back()->get_subcommands(), ++depth)
+    used = given.back();
+  for (const CLI::App* c : used->get_subcommands([](const CLI::App*) { return true; })) commands.push_back(c->get_name());
   std::string nearest;
-  if (used == &app && argc > 1 && argv[1][0] != '-' && std::find(commands.begin(), commands.end(), argv[1]) == commands.end()) {
-    nearest = catgut::nearest_word(argv[1], commands);
-    return std::string("no command \"") + argv[1] + "\"; " +
-           (nearest.empty() ? "catgut --help lists them" : "did you mean \"" + nearest + "\"?");
+  if (!commands.empty() && argc > depth && argv[depth][0] != '-' &&
+      std::find(commands.begin(), commands.end(), argv[depth]) == commands.end()) {
+    nearest = catgut::nearest_word(argv[depth], commands);
+    const std::string help = used == &app ? "catgut --help" : "catgut " + used->get_name() + " --help";
+    return (used == &app ? "no command \"" : used->get_name() + " has no command \"") + std::string(argv[depth]) + "\"; " +
+           (nearest.empty() ? help + " lists them" : "did you mean \"" + nearest + "\"?");
   }
   std::vector<std::string> options;
   for (const CLI::Option* o : used->get_options())
@@ -66,6 +76,7 @@ int main(int argc, char** argv) {
 #endif
   try {
     if (argc == 1) return catgut::play_without_arguments();
+    if (std::string(argv[1]) == "--parse-only") parse_only(app), --argc, ++argv;
     app.parse(argc, argv);
   } catch (const CLI::Success& wanted) {  // --help, --version
     return app.exit(wanted);

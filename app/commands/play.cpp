@@ -59,7 +59,11 @@ void read_window_options(WindowCommand& o) {
 
 }  // namespace
 
-int play_without_arguments() { return play({}); }
+int play_without_arguments() {
+  PlayOptions options;
+  options.keep_sessions = true;
+  return play(options);
+}
 
 void add_play(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<WindowCommand>();
@@ -78,6 +82,12 @@ void add_play(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember({"silent", "stitch", "live"}))
       ->type_name("silent|stitch|live");
   command->add_option("--survey", o->play.survey, "questionnaire that is asked after the session")->type_name("NAME|FILE");
+  command->add_option("--csv", o->play.csv, "the same as a table; -: standard output")->type_name("FILE|-");
+  auto unrecorded = std::make_shared<bool>(false);
+  command->add_flag("--no-record", *unrecorded,
+                    "keep no recording; default: every session, in the data folder of the settings");
+  command->add_flag("--kiosk", o->play.kiosk,
+                    "whole screen, for a stand: cannot be left but by Ctrl+Shift+Q; start screen after three idle minutes");
   command->add_flag("--left-handed", o->play.left_handed, "needle holder in the left hand");
   command->add_option("--surgeon", o->play.live.surgeon, "watch the scripted surgeon, or the hands of a recording")
       ->type_name("scripted|FILE");
@@ -94,7 +104,7 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_option("--mode", *mode, "tutorial: time stands still at a new stage, with demonstrations; exam: no feedback")
       ->check(CLI::IsMember({"tutorial", "practice", "exam"}))
       ->type_name("tutorial|practice|exam");
-  command->add_flag("--teach", *teach, "tutorial: first stitch, step by step (--procedure first_stitch --mode tutorial)");
+  command->add_flag("--teach", *teach, "tutorial: simple suture, step by step (--procedure simple_suture --mode tutorial)");
   // One by default: a tick is short, and waiting workers take processor time from rendering.
   command->add_option("--threads", o->play.live.threads, "solver threads")->check(CLI::Range(1, 64))->capture_default_str();
   std::string drivers;
@@ -111,10 +121,10 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_option("--events", o->play.events, "event stream, one JSON object per line; -: standard output")
       ->type_name("FILE|-");
   add_window_options(*command, *o);
-  command->callback([o, mode, teach, &exit_code] {
+  command->callback([o, mode, teach, unrecorded, &exit_code] {
     read_window_options(*o);
     read_arm_choice(o->play.live.haptics);  // reports errors before a window opens
-    if (*teach && o->play.procedure.empty()) o->play.procedure = "first_stitch", *mode = "tutorial";
+    if (*teach && o->play.procedure.empty()) o->play.procedure = "simple_suture", *mode = "tutorial";
     o->play.tutorial = *mode == "tutorial";
     o->play.exam = *mode == "exam";
     if (o->play.procedure.empty() && (!o->play.stage.empty() || *mode != "practice"))
@@ -141,8 +151,11 @@ void add_play(CLI::App& app, int& exit_code) {
     o->play.live.say = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
     check_suffix(o->play.live.record, ".cgrec", "--record");
     check_suffix(o->play.json, ".json", "--json");
+    check_suffix(o->play.csv, ".csv", "--csv");
     check_suffix(o->play.screenshot, ".png", "--screenshot");
-    for (const std::string& path : {o->play.live.record, o->play.json, o->play.events, o->play.screenshot}) check_output(path);
+    for (const std::string& path : {o->play.live.record, o->play.json, o->play.csv, o->play.events, o->play.screenshot})
+      check_output(path);
+    o->play.keep_sessions = !*unrecorded && o->play.screenshot.empty();
     exit_code = play(o->play);
   });
 }

@@ -8,12 +8,13 @@
 #include "core/file.h"
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
+#include "runtime/session_log.h"
 
 namespace catgut {
 namespace {
 
 struct ReplayOptions {
-  std::string file, json, procedure;
+  std::string file, json, csv, procedure;
   bool check = false, from_head = false;
   int threads = 1;
   PictureOptions pictures;
@@ -26,19 +27,25 @@ int replay(const ReplayOptions& o) {
                      "leave out --from-head, or record with catgut play --headset");
   check_picture_files(o.pictures);
   check_suffix(o.json, ".json", "--json");
-  for (const std::string& path : {o.json, o.pictures.video, o.pictures.contact_sheet}) prepare_output(path);
+  check_suffix(o.csv, ".csv", "--csv");
+  for (const std::string& path : {o.json, o.csv, o.pictures.video, o.pictures.contact_sheet}) prepare_output(path);
   std::unique_ptr<Pictures> pictures;
   std::optional<ProcedureWatch> procedure;
   if (!o.procedure.empty()) procedure.emplace(o.procedure);
+  SceneSpec scene;
+  SessionLog log;
   SessionHooks hooks;
   hooks.stop = &stop_on_interrupt();
   hooks.on_progress = progress_line();
   hooks.on_start = [&](const PictureModel& model) {
-    if (procedure) procedure->start(parse_scene(recording.header.scene, o.file), model);
+    scene = parse_scene(recording.header.scene, o.file);
+    if (procedure) procedure->start(scene, model);
+    log.start(scene, model);
     if (o.pictures.any()) pictures = std::make_unique<Pictures>(o.pictures, model);
   };
   hooks.on_tick = [&, ticks = uint64_t{0}, head = size_t{0}](const Snapshot& seen, const std::string&) mutable {
     if (procedure) procedure->tick(seen);
+    log.tick(seen);
     for (; pictures && head < recording.head.size() && recording.head[head].tick <= ticks; ++head) {
       const Pose& at = recording.head[head].pose;
       if (o.from_head) pictures->look_from(at);
@@ -50,9 +57,13 @@ int replay(const ReplayOptions& o) {
   const ReplayResult result = replay_session(recording, o.file, o.check, o.threads, hooks);
   end_progress_line();
   if (pictures) pictures->finish();
-  if (!o.json.empty())
-    write_output(o.json, procedure ? with_procedure(replay_json(result, recording), procedure->procedure, procedure->run)
-                                   : replay_json(result, recording));
+  const LiveResult session = log.result();
+  if (!o.json.empty()) {
+    const std::string json = with_session(replay_json(result, recording), scene, session);
+    write_output(o.json, procedure ? with_procedure(json, procedure->procedure, procedure->run) : json);
+  }
+  if (!o.csv.empty()) write_output(o.csv, session_csv(session));
+  const bool quiet = o.json == "-" || o.csv == "-";
 
   if (result.differs_at) {
     std::fprintf(stderr,
@@ -61,10 +72,10 @@ int replay(const ReplayOptions& o) {
                  catgut_version());
     return 1;
   }
-  if (o.json != "-")
+  if (!quiet)
     std::printf("%s: %llu ticks replayed%s, state %016llx\n", o.file.c_str(), static_cast<unsigned long long>(result.run.ticks),
                 o.check ? ", all hashes verified" : "", static_cast<unsigned long long>(result.run.state_hash));
-  if (procedure && o.json != "-") std::fputs(run_table(procedure->run, procedure->procedure).c_str(), stdout);
+  if (procedure && !quiet) std::fputs(run_table(procedure->run, procedure->procedure).c_str(), stdout);
   if (result.run.interrupted) return 130;
   // The readable part was replayed; a truncated file is still an error of the file.
   if (recording.truncated)
@@ -81,6 +92,8 @@ void add_replay(CLI::App& app, int& exit_code) {
   command->add_flag("--check", o->check, "compare every state hash with the recorded one");
   add_threads_option(*command, o->threads);
   command->add_option("--json", o->json, "results as JSON; -: standard output")->type_name("FILE|-");
+  command->add_option("--csv", o->csv, "stitches, forces, faults and tension over time as a table; -: standard output")
+      ->type_name("FILE|-");
   command->add_option("--procedure", o->procedure, "report the stages and errors of a procedure")->type_name("NAME");
   add_picture_options(*command, o->pictures);
   command->add_flag("--from-head", o->from_head, "pictures from the eyes of the headset's wearer");

@@ -13,12 +13,13 @@
 #include "procedure/procedure_file.h"
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
+#include "runtime/session_log.h"
 
 namespace catgut {
 namespace {
 
 struct RunOptions {
-  std::string scene, procedure, states, preset, mesh, json;
+  std::string scene, procedure, states, preset, mesh, json, csv;
   std::vector<std::string> set;
   uint64_t seed = 0;
   bool seed_given = false, headless = false, no_expect = false;
@@ -55,7 +56,9 @@ int run(RunOptions& o) {
   check_picture_files(o.pictures);
   check_suffix(o.session.record, ".cgrec", "--record");
   check_suffix(o.json, ".json", "--json");
-  for (const std::string& path : {o.json, o.session.record, o.pictures.video, o.pictures.contact_sheet}) prepare_output(path);
+  check_suffix(o.csv, ".csv", "--csv");
+  for (const std::string& path : {o.json, o.csv, o.session.record, o.pictures.video, o.pictures.contact_sheet})
+    prepare_output(path);
   const double until_s = o.session.seconds > 0 ? o.session.seconds : static_cast<double>(scene.duration);
   for (const auto& [at_s, path] : o.pictures.still) {
     if (at_s > until_s)
@@ -65,15 +68,18 @@ int run(RunOptions& o) {
   }
 
   std::unique_ptr<Pictures> pictures;
+  SessionLog log;
   SessionHooks hooks;
   hooks.stop = &stop_on_interrupt();
   hooks.on_progress = progress_line();
   hooks.on_start = [&](const PictureModel& model) {
     if (procedure) procedure->start(scene, model);
+    log.start(scene, model);
     if (o.pictures.any()) pictures = std::make_unique<Pictures>(o.pictures, model);
   };
   hooks.on_tick = [&](const Snapshot& seen, const std::string& doing) {
     if (procedure) procedure->tick(seen);
+    log.tick(seen);
     if (pictures) pictures->tick(seen, doing);
   };
   if (procedure && !o.states.empty())
@@ -82,10 +88,15 @@ int run(RunOptions& o) {
     };
   const RunResult result = run_session(scene, o.session, hooks);
   end_progress_line();
-  if (!o.json.empty())
-    write_output(o.json, procedure ? with_procedure(run_json(result), procedure->procedure, procedure->run) : run_json(result));
-  if (o.json != "-") std::fputs(run_summary(result, !o.no_expect).c_str(), stdout);
-  if (procedure && o.json != "-") std::fputs(run_table(procedure->run, procedure->procedure).c_str(), stdout);
+  const LiveResult session = log.result();
+  if (!o.json.empty()) {
+    const std::string json = with_session(run_json(result), scene, session);
+    write_output(o.json, procedure ? with_procedure(json, procedure->procedure, procedure->run) : json);
+  }
+  if (!o.csv.empty()) write_output(o.csv, session_csv(session));
+  const bool quiet = o.json == "-" || o.csv == "-";
+  if (!quiet) std::fputs(run_summary(result, !o.no_expect).c_str(), stdout);
+  if (procedure && !quiet) std::fputs(run_table(procedure->run, procedure->procedure).c_str(), stdout);
   if (pictures) pictures->finish();  // last: an error in a picture does not lose results
   if (result.interrupted) return 130;
   if (o.no_expect) return 0;
@@ -121,6 +132,8 @@ void add_run(CLI::App& app, int& exit_code) {
       ->allow_extra_args(false);
   command->add_option("--record", o->session.record, "write a recording")->type_name("FILE.cgrec");
   command->add_option("--json", o->json, "results as JSON; -: standard output")->type_name("FILE|-");
+  command->add_option("--csv", o->csv, "stitches, forces, faults and tension over time as a table; -: standard output")
+      ->type_name("FILE|-");
   command->add_option("--mesh", o->mesh, "organ surface of the first body, file or file#node")->type_name("FILE");
   command->add_flag("--no-expect", o->no_expect, "report expected results without checking them");
   add_picture_options(*command, o->pictures);

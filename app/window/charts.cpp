@@ -9,6 +9,7 @@
 #include <cmath>
 #include <string>
 
+#include "window/language.h"
 #include "window/widgets.h"
 
 namespace catgut {
@@ -102,7 +103,7 @@ void stitch_map_chart(const StitchMap& map, BiteColor by, ImVec2 size) {
     if (b.wall < map.edge.size()) spread = std::max(spread, map.edge[b.wall].length());
   }
   if (walls == 0) {
-    label(list, {at.x + size.x / 2, at.y + size.y / 2}, color(kQuiet), "No edge data", 0.5f, 0.5f);
+    label(list, {at.x + size.x / 2, at.y + size.y / 2}, color(kQuiet), tr("No edge data"), 0.5f, 0.5f);
     return;
   }
   // One wall below the edge line; of two the first below and the second above, in their arrangement during suturing.
@@ -128,7 +129,7 @@ void stitch_map_chart(const StitchMap& map, BiteColor by, ImVec2 size) {
                        color(kAccent, 0.10f));
     list.AddLine({left, line}, {right, line}, color(kText), 2 * thin);
   }
-  label(list, {left - 0.4f * em(), middle}, color(kQuiet), "edge", 1, walls > 1 ? 0.5f : 0.4f, 0.85f);
+  label(list, {left - 0.4f * em(), middle}, color(kQuiet), tr("edge"), 1, walls > 1 ? 0.5f : 0.4f, 0.85f);
   const StitchEdge& first = map.edge[0].length() > 0 ? map.edge[0] : map.edge[1];
   const float step = static_cast<float>(grid_step(1000.0 * static_cast<double>(first.length())));
   for (float mm = 0; mm <= 1000 * first.length(); mm += step) {
@@ -137,7 +138,7 @@ void stitch_map_chart(const StitchMap& map, BiteColor by, ImVec2 size) {
     list.AddLine({x, bottom - 0.2f * em()}, {x, bottom}, color(kQuiet), thin);
     label(list, {x, bottom + 0.1f * em()}, color(kQuiet), fmt::format("{:.0f}", mm), 0.5f, 0, 0.85f);
   }
-  label(list, {right, bottom + 0.1f * em()}, color(kQuiet), "mm along the edge", 1, 0, 0.85f);
+  label(list, {right, bottom + 0.1f * em()}, color(kQuiet), tr("mm along the edge"), 1, 0, 0.85f);
 
   for (size_t k = 0; k < map.bite.size(); ++k) {
     const StitchBite& b = map.bite[k];
@@ -170,7 +171,7 @@ void stitch_map_chart(const StitchMap& map, BiteColor by, ImVec2 size) {
       label(list, {x, away + way * 0.85f * em()}, color(kQuiet), fmt::format("{:.1f}", bite_value_mm(b, by)), 0.5f,
             way > 0 ? 0.0f : 1.0f, 0.85f);
   }
-  if (map.bite.empty()) label(list, {(left + right) / 2, (middle + bottom) / 2}, color(kQuiet), "No bites", 0.5f, 0.5f);
+  if (map.bite.empty()) label(list, {(left + right) / 2, (middle + bottom) / 2}, color(kQuiet), tr("No bites"), 0.5f, 0.5f);
 }
 
 void tension_chart(const StitchMap& map, uint64_t from, uint64_t to, double now, ImVec2 size, bool labels) {

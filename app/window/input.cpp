@@ -98,7 +98,8 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
                {SDLK_SPACE, Key::space},
                {SDLK_COMMA, Key::step_back},
                {SDLK_s, Key::show_me},
-               {SDLK_t, Key::teach}};
+               {SDLK_t, Key::teach},
+               {SDLK_r, Key::record}};
   for (const auto& k : kKeys)
     if (k.code == code) keys_.push_back({k.key, 0});
 }
@@ -142,6 +143,8 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
   ImGuiIO& io = ImGui::GetIO();
   look_round = look_round && !working && !io.WantCaptureMouse;
   for (SDL_Event e; SDL_PollEvent(&e);) {
+    in.any = in.any || e.type == SDL_KEYDOWN || e.type == SDL_MOUSEMOTION || e.type == SDL_MOUSEBUTTONDOWN ||
+             e.type == SDL_MOUSEWHEEL || e.type == SDL_CONTROLLERBUTTONDOWN;
     switch (e.type) {
       case SDL_QUIT:
         in.quit = true;

@@ -40,7 +40,8 @@ enum class Key {
   space,
   step_back,
   show_me,
-  teach
+  teach,
+  record
 };
 
 struct WindowInput {
@@ -53,6 +54,7 @@ struct WindowInput {
   Key key = Key::none;  // one per call: two presses between two frames are reported in sequence
   int digit = 0;
   int arrow_presses = 0;  // right minus left, repeats included
+  bool any = false;       // a key, a button, a motion
   bool quit = false, resized = false;
   bool left = false;      // the window lost the focus, or was hidden
   bool pad_gone = false;  // the used gamepad was unplugged

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "device/both_hands.h"
+#include "exchange/strand.h"
 #include "exchange/tying.h"
 
 namespace catgut {
@@ -79,6 +81,12 @@ std::vector<ScreenPoint> work_points(const Snapshot& seen, const PictureModel& p
   add(stitch_place(picture, seen));
   for (size_t k = 0; k < 2; ++k)
     for (const float back : {0.0f, 0.5f, 1.0f}) add(seen.tool[k].pose.p + rotate(seen.tool[k].pose.q, {0, 0, back * kJaw}));
+  // Where the tail is grasped, and its free end.
+  if (!suture.suture_point.empty() && !suture.thread_order.empty()) {
+    add(node_at(seen, 0));
+    TailGrip grip;
+    if (tail_grip(picture, seen, 0, grip)) add(grip.pose.p);
+  }
   if (guide) add(entry_of(*guide)), add(exit_of(*guide));
   return out;
 }

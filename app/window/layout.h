@@ -52,7 +52,8 @@ struct PlacedPanel {
   float progress = -1, alpha = 0.6f;
 };
 
-// Points of the work on the screen [pixels]: needle tip, suture points, the jaws of both tools, the stitch, the planned bite.
+// Points of the work on the screen [pixels]: needle tip, suture points, the jaws of both tools, the stitch, the tail, the
+// planned bite.
 using ScreenPoint = std::array<float, 2>;
 std::vector<ScreenPoint> work_points(const Snapshot& seen, const PictureModel& picture, const ViewFrame& view, float width,
                                      float height, const BiteGuide* guide);

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "window/language.h"
 #include "window/widgets.h"
 
 namespace catgut {
@@ -57,6 +58,15 @@ void hand_choice(Settings& s) {
   if (radio("left-handed", s.left_handed)) s.left_handed = true;
 }
 
+void language_choice(Settings& s) {
+  static const std::vector<std::string> names = language_names();
+  if (radio("of the system", s.language.empty())) s.language.clear();
+  for (const std::string& name : names) {
+    ImGui::SameLine();
+    if (radio(name.c_str(), s.language == name)) s.language = name;
+  }
+}
+
 }  // namespace
 
 Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
@@ -71,13 +81,15 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   if (!v.message.empty()) bad_text(v.message);
   const float foot = 3.0f * em();
   ImGui::BeginChild("procedures", {0.53f * wide, -foot});
-  if (ImGui::Button("T  Tutorial: first stitch", {-1.0f, 1.75f * em()})) choice.what = Chosen::teach;
+  if (ImGui::Button(tr("T  Tutorial: simple suture in skin").c_str(), {-1.0f, 1.75f * em()})) choice.what = Chosen::teach;
+  if (ImGui::Button(tr("   Tutorial: first stitch in bowel").c_str(), {-1.0f, 1.75f * em()}))
+    choice = {Chosen::teach, 0, "first_stitch"};
   gap(0.3f);
   heading("Scenes");
   for (size_t i = 0; i < v.scenes->size(); ++i) {
     const SceneChoice& s = (*v.scenes)[i];
     ImGui::PushStyleVar(ImGuiStyleVar_ButtonTextAlign, {0, 0.5f});
-    if (ImGui::Button(fmt::format("{}  {}##{}", i + 1, s.title, s.name).c_str(), {-1.0f, 1.75f * em()}))
+    if (ImGui::Button(fmt::format("{}  {}##{}", i + 1, tr(s.title), s.name).c_str(), {-1.0f, 1.75f * em()}))
       choice = {Chosen::scene, i};
     ImGui::PopStyleVar();
     ImGui::Indent(1.6f * em());
@@ -116,8 +128,8 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
     if (ImGui::Checkbox("headset (OpenXR)", &on)) choice.what = Chosen::headset;
   }
   ImGui::PushStyleColor(ImGuiCol_Text, kQuiet);
-  if (!v.headset.empty()) ImGui::TextWrapped("%s", v.headset.c_str());
-  ImGui::TextWrapped("%s", v.pad.empty() ? "mouse, keyboard or gamepad" : ("mouse, keyboard, " + v.pad).c_str());
+  if (!v.headset.empty()) ImGui::TextWrapped("%s", tr(v.headset).c_str());
+  ImGui::TextWrapped("%s", v.pad.empty() ? tr("mouse, keyboard or gamepad").c_str() : tr("mouse, keyboard, " + v.pad).c_str());
   ImGui::PopStyleColor();
   gap();
   heading("Graphics quality");
@@ -127,7 +139,7 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   if (v.recordings->empty()) {
     text(kQuiet, "none yet");
     ImGui::PushStyleColor(ImGuiCol_Text, kQuiet);
-    ImGui::TextWrapped("catgut play --record FILE.cgrec");
+    ImGui::TextWrapped("%s", tr(settings.record ? "every session is kept" : "sessions are not recorded").c_str());
     ImGui::PopStyleColor();
   }
   ImGui::BeginChild("files", {0, 0});
@@ -150,7 +162,8 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   return choice;
 }
 
-Choice settings_panel(Settings& s, const std::string& file, const std::string& message, bool working) {
+Choice settings_panel(Settings& s, const std::string& file, const std::string& folder, const std::string& message,
+                      bool working) {
   Choice choice;
   begin_at("settings", 0.5f, 0.5f, 0.94f);
   text(kAccent, "Settings");
@@ -188,29 +201,35 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& m
     if (!ImGui::IsItemActive()) wanted = s.text_size;
     row("mouse");
     ImGui::SetNextItemWidth(16 * em());
-    ImGui::SliderFloat("##mouse", &s.mouse_speed, 0.2f, 4, "%.2f x pointer",
+    ImGui::SliderFloat("##mouse", &s.mouse_speed, 0.2f, 4, tr("%.2f x pointer").c_str(),
                        ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
     row("hands");
     hand_choice(s);
     row("arm force");
     ImGui::SetNextItemWidth(14 * em());
-    ImGui::SliderFloat("##right", &s.force_right, 0.2f, 2, "right %.2f x", ImGuiSliderFlags_AlwaysClamp);
+    ImGui::SliderFloat("##right", &s.force_right, 0.2f, 2, tr("right %.2f x").c_str(), ImGuiSliderFlags_AlwaysClamp);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(14 * em());
-    ImGui::SliderFloat("##left", &s.force_left, 0.2f, 2, "left %.2f x", ImGuiSliderFlags_AlwaysClamp);
+    ImGui::SliderFloat("##left", &s.force_left, 0.2f, 2, tr("left %.2f x").c_str(), ImGuiSliderFlags_AlwaysClamp);
     row("headset");
-    ImGui::Checkbox("remove tremor", &s.steady_hands);
+    ImGui::Checkbox(tr("remove tremor").c_str(), &s.steady_hands);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(14 * em());
-    ImGui::SliderFloat("##scale", &s.hand_scale, 0.2f, 1, "motion %.2f x", ImGuiSliderFlags_AlwaysClamp);
+    ImGui::SliderFloat("##scale", &s.hand_scale, 0.2f, 1, tr("motion %.2f x").c_str(), ImGuiSliderFlags_AlwaysClamp);
     row("jaws");
-    ImGui::Checkbox("hold button to close", &s.hold_to_close);
+    ImGui::Checkbox(tr("hold button to close").c_str(), &s.hold_to_close);
     row("grasp assist");
-    ImGui::Checkbox("snap to target (H)", &s.assist);
-    row("show");
-    ImGui::Checkbox("suture points (M)", &s.suture_points);
+    ImGui::Checkbox(tr("snap to target (H)").c_str(), &s.assist);
+    row("recording");
+    ImGui::Checkbox(tr("every session").c_str(), &s.record);
     ImGui::SameLine();
-    ImGui::Checkbox("keys (F1)", &s.hints);
+    text(kQuiet, folder);
+    row("language");
+    language_choice(s);
+    row("show");
+    ImGui::Checkbox(tr("suture points (M)").c_str(), &s.suture_points);
+    ImGui::SameLine();
+    ImGui::Checkbox(tr("keys (F1)").c_str(), &s.hints);
     ImGui::EndTable();
   }
   if (working) text(kQuiet, "graphics and hands: from next scene");
@@ -259,6 +278,7 @@ Choice pause_panel(const WorkView& view) {
   const uint32_t bites = view.status->to_take_back;
   if (bites > 0 && wide_button(fmt::format("Undo bite ({})", bites).c_str(), 20)) choice.what = Chosen::take_back;
   if (wide_button("Restart (F5)", 20)) choice.what = Chosen::restart;
+  if (wide_button(view.status->recording ? "Stop recording (R)" : "Record (R)", 20)) choice.what = Chosen::record;
   if (wide_button("Finish and review (F10)", 20)) choice.what = Chosen::finish;
   gap(0.3f);
   if (wide_button("Settings (F2)", 20)) choice.what = Chosen::settings;

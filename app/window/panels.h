@@ -88,7 +88,8 @@ struct PlayedView {
 
 // Each may change the settings; `watch`: the scripted surgeon works.
 Choice start_panel(const StartView& view, Settings& settings, bool& watch);
-Choice settings_panel(Settings& settings, const std::string& file, const std::string& message, bool working);
+Choice settings_panel(Settings& settings, const std::string& file, const std::string& folder, const std::string& message,
+                      bool working);
 void draw_panels(std::span<const PlacedPanel> panels);
 TextSize panel_text_size();  // of the present font and style
 Choice pause_panel(const WorkView& view);

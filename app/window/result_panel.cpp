@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "procedure/manager.h"
+#include "window/language.h"
 #include "window/panels.h"
 #include "window/widgets.h"
 
@@ -31,7 +32,7 @@ void bite_table(const StitchMap& map) {
   constexpr ImGuiTableFlags kFlags = ImGuiTableFlags_ScrollY | ImGuiTableFlags_RowBg | ImGuiTableFlags_SizingStretchProp;
   if (!ImGui::BeginTable("bites", 7, kFlags)) return;
   ImGui::TableSetupScrollFreeze(0, 1);
-  for (const char* name : {"", "time", "wall", "spacing", "depth", "edge", "length"}) ImGui::TableSetupColumn(name);
+  for (const char* name : {"", "time", "wall", "spacing", "depth", "edge", "length"}) ImGui::TableSetupColumn(tr(name).c_str());
   ImGui::TableHeadersRow();
   for (size_t k = 0; k < map.bite.size(); ++k) {
     const StitchBite& b = map.bite[k];
@@ -101,7 +102,7 @@ void event_list(const std::vector<LogLine>& log) {
   while (clipper.Step())
     for (int i = clipper.DisplayStart; i < clipper.DisplayEnd; ++i) {
       const LogLine& line = log[static_cast<size_t>(i)];
-      text(line.bad ? kBad : kQuiet, fmt::format("{:>7} {} {}", clock_text(line.time_s), line.bad ? '!' : ' ', line.text));
+      text(line.bad ? kBad : kQuiet, fmt::format("{:>7} {} {}", clock_text(line.time_s), line.bad ? '!' : ' ', tr(line.text)));
     }
 }
 
@@ -168,7 +169,7 @@ Choice result_panel(const ResultView& v, BiteColor& by) {
         ImGui::TableNextColumn();
         text(row.name == "fault" ? kBad : kQuiet, (row.name == "fault" ? "! " : "") + row.name);
         ImGui::TableNextColumn();
-        ImGui::TextWrapped("%s", row.value.c_str());
+        ImGui::TextWrapped("%s", tr(row.value).c_str());
       }
       ImGui::EndTable();
     }
@@ -177,7 +178,7 @@ Choice result_panel(const ResultView& v, BiteColor& by) {
       heading(v.procedure->title);
       for (const Feedback& f : feedback(r.procedure, *v.procedure)) {
         ImGui::PushStyleColor(ImGuiCol_Text, f.well ? kAccent : kBad);
-        ImGui::TextWrapped("%s", ((f.well ? "+ " : "! repeat: ") + f.text).c_str());
+        ImGui::TextWrapped("%s", tr((f.well ? "+ " : "! repeat: ") + f.text).c_str());
         ImGui::PopStyleColor();
       }
     }

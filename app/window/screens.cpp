@@ -72,6 +72,8 @@ Choice choice_of_key(const WindowInput& in, const ScreenFacts& f) {
       return when(results, Chosen::save_json);
     case Key::show_me:
       return when(practice, Chosen::show_me);
+    case Key::record:
+      return when(field, Chosen::record);
     case Key::teach:
       return when(start, Chosen::teach);
     case Key::picture:

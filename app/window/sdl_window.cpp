@@ -19,14 +19,15 @@ void close(SDL_Window* window) {
 
 }  // namespace
 
-SdlWindow::SdlWindow(int width, int height) {
+SdlWindow::SdlWindow(int width, int height, bool whole_screen) {
   // Rendering uses EGL on X11; a Wayland desktop provides it through XWayland.
   SDL_SetHintWithPriority(SDL_HINT_VIDEODRIVER, "x11", SDL_HINT_DEFAULT);
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
   if (SDL_Init(SDL_INIT_VIDEO | SDL_INIT_GAMECONTROLLER) != 0)
     throw InputError("window", fmt::format("no display ({})", SDL_GetError()), kHeadless);
-  window = SDL_CreateWindow("Catgut", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
-                            SDL_WINDOW_RESIZABLE | SDL_WINDOW_SHOWN);
+  window = SDL_CreateWindow(
+      "Catgut", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
+      SDL_WINDOW_RESIZABLE | SDL_WINDOW_SHOWN | static_cast<Uint32>(whole_screen ? SDL_WINDOW_FULLSCREEN_DESKTOP : 0));
   SDL_SysWMinfo info;
   SDL_VERSION(&info.version);
   if (!window || !SDL_GetWindowWMInfo(window, &info) || info.subsystem != SDL_SYSWM_X11) {

@@ -14,7 +14,7 @@ struct SdlWindow {
   SDL_Window* window = nullptr;
   uint64_t number = 0;  // of the X server
 
-  SdlWindow(int width, int height);
+  SdlWindow(int width, int height, bool whole_screen = false);
   ~SdlWindow();
   SdlWindow(const SdlWindow&) = delete;
   SdlWindow& operator=(const SdlWindow&) = delete;

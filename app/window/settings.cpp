@@ -18,6 +18,7 @@
 #include "core/check.h"
 #include "procedure/scene_fields.h"
 #include "procedure/toml.h"
+#include "window/language.h"
 
 namespace catgut {
 namespace {
@@ -45,6 +46,29 @@ Key flag(const char* name, bool Settings::*member) {
             return v.has_value();
           },
           [member](const Settings& s) { return s.*member ? "true" : "false"; }};
+}
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+  return out + "\"";
+}
+
+Key line(const char* name, const char* wants, std::string Settings::*member, bool (*valid)(const std::string&)) {
+  return {name, wants,
+          [=](const toml::node& n, Settings& s) {
+            const auto v = n.value_exact<std::string>();
+            if (!v || v->find_first_of("\n\r\t") != std::string::npos || !valid(*v)) return false;
+            s.*member = *v;
+            return true;
+          },
+          [member](const Settings& s) { return quoted(s.*member); }};
+}
+
+bool is_folder_name(const std::string& s) { return s.empty() || s[0] == '/' || s.rfind("~/", 0) == 0; }
+bool is_language(const std::string& s) {
+  const std::vector<std::string> names = language_names();
+  return s.empty() || std::find(names.begin(), names.end(), s) != names.end();
 }
 
 Key number(const char* name, const char* wants, float Settings::*member, double low, double high) {
@@ -109,6 +133,10 @@ const std::vector<Key>& keys() {
       flag("steady_hands", &Settings::steady_hands),
       number("hand_scale", "write a number from 0.2 to 1", &Settings::hand_scale, 0.2, 1),
       number("text_size", "write a number from 0.7 to 2", &Settings::text_size, 0.7, 2),
+      flag("record", &Settings::record),
+      line("data_folder", "write a whole path, such as \"/data/catgut\" or \"~/catgut\"", &Settings::data_folder,
+           is_folder_name),
+      line("language", "write \"en\", \"de\", or the name of another file in languages/", &Settings::language, is_language),
       number("force_right", "write a number from 0.2 to 2", &Settings::force_right, 0.2, 2),
       number("force_left", "write a number from 0.2 to 2", &Settings::force_left, 0.2, 2),
       words("trainee", "write a pseudonym of letters, digits, dot, dash and underscore", &Settings::trainee, is_pseudonym),

@@ -34,6 +34,9 @@ struct Settings {
   bool steady_hands = true;               // headset: removes the tremor of the wearer's hands
   float hand_scale = 1;                   // headset: 0.2 .. 1, of tool to hand
   float text_size = 1;                    // 0.7 .. 2, limited by the window
+  bool record = true;                     // every session, into the data folder
+  std::string data_folder;                // empty: of the user, see window/data_folder.h
+  std::string language;                   // of languages/; empty: of the environment
   float force_right = 1, force_left = 1;  // 0.2 .. 2, gain of the haptic force in each hand; the device's limits hold after it
   std::string trainee;                    // pseudonym under which sessions are stored; empty: they are not
   std::string survey;                     // questionnaire that is asked after a session, a name or a path; empty: none

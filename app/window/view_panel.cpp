@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "window/language.h"
 #include "window/panels.h"
 #include "window/widgets.h"
 
@@ -64,8 +65,8 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
     const std::string words = words_for(*e, bad);
     if (words.empty()) continue;
     happened.insert(happened.begin(),
-                    {bad ? kBad : kQuiet,
-                     fmt::format("{:>7} {} {}", clock_text(static_cast<double>(e->tick) * s.tick_s), bad ? '!' : ' ', words)});
+                    {bad ? kBad : kQuiet, fmt::format("{:>7} {} {}", clock_text(static_cast<double>(e->tick) * s.tick_s),
+                                                      bad ? '!' : ' ', tr(words))});
   }
   if (happened.empty()) happened.push_back({kQuiet, "no events yet"});
   lines_at("happened", 1, 0, 0.55f, happened);
@@ -94,7 +95,8 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
   ImGui::SameLine(0, 1.2f * em());
   text(kQuiet, "blue: thread tension");
   gap(0.05f);
-  if (ImGui::Button(s.playing ? "Pause (space)" : "Play (space)", {9 * em(), 0})) choice.what = Chosen::play_or_hold;
+  if (ImGui::Button(tr(s.playing ? "Pause (space)" : "Play (space)").c_str(), {9 * em(), 0}))
+    choice.what = Chosen::play_or_hold;
   ImGui::SameLine();
   if (ImGui::Button("<< 5 s", {4.5f * em(), 0})) choice = {Chosen::go_by, 0, "", -static_cast<int64_t>(5 / s.tick_s)};
   ImGui::SameLine();
@@ -111,9 +113,9 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
     ImGui::SameLine(0, 0.3f * em());
   }
   ImGui::SameLine(0, em());
-  if (ImGui::Button("Results (Enter)")) choice.what = Chosen::sewn;
+  if (ImGui::Button(tr("Results (Enter)").c_str())) choice.what = Chosen::sewn;
   ImGui::SameLine();
-  if (ImGui::Button("Back (Esc)")) choice.what = Chosen::start_screen;
+  if (ImGui::Button(tr("Back (Esc)").c_str())) choice.what = Chosen::start_screen;
   ImGui::End();
   return choice;
 }

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "window/language.h"
+
 namespace catgut {
 namespace {
 
@@ -45,7 +47,7 @@ void style_panels(float scale) {
   ImGui::GetIO().IniFilename = nullptr;
 }
 
-void text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
+void text(const std::string& line) { ImGui::TextUnformatted(tr(line).c_str()); }
 
 void text(const ImVec4& color, const std::string& line) {
   ImGui::PushStyleColor(ImGuiCol_Text, color);
@@ -55,7 +57,7 @@ void text(const ImVec4& color, const std::string& line) {
 
 void bad_text(const std::string& line) {
   ImGui::PushStyleColor(ImGuiCol_Text, kBad);
-  ImGui::TextWrapped("! %s", line.c_str());
+  ImGui::TextWrapped("! %s", tr(line).c_str());
   ImGui::PopStyleColor();
 }
 
@@ -88,7 +90,7 @@ void lines_at(const char* name, float x, float y, float alpha, const std::vector
   const ImGuiStyle& style = ImGui::GetStyle();
   ImVec2 size{0, -style.ItemSpacing.y};
   for (const Line& line : lines) {
-    const ImVec2 one = ImGui::CalcTextSize(line.second.c_str());
+    const ImVec2 one = ImGui::CalcTextSize(tr(line.second).c_str());
     size.x = std::max(size.x, one.x);
     size.y += one.y + style.ItemSpacing.y;
   }
@@ -101,8 +103,8 @@ void lines_at(const char* name, float x, float y, float alpha, const std::vector
   ImGui::End();
 }
 
-bool wide_button(const char* label, float ems) { return ImGui::Button(label, {ems * em(), 0}); }
+bool wide_button(const char* label, float ems) { return ImGui::Button(tr(label).c_str(), {ems * em(), 0}); }
 
-bool radio(const char* label, bool on) { return ImGui::RadioButton(label, on); }
+bool radio(const char* label, bool on) { return ImGui::RadioButton(tr(label).c_str(), on); }
 
 }  // namespace catgut

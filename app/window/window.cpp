@@ -27,11 +27,14 @@
 #include "runtime/assessment.h"
 #include "runtime/guide.h"
 #include "runtime/report.h"
+#include "runtime/session_log.h"
 #include "sim/simulation.h"
 #include "technique/technique.h"
+#include "window/data_folder.h"
 #include "window/guide_overlay.h"
 #include "window/hands.h"
 #include "window/input.h"
+#include "window/language.h"
 #include "window/latency.h"
 #include "window/panels.h"
 #include "window/sdl_window.h"
@@ -46,11 +49,12 @@ namespace {
 constexpr const char* kFont = "fonts/truetype/dejavu/DejaVuSansMono.ttf";  // in a share folder
 constexpr double kMostPictures = 150;                                      // [1/s]
 constexpr double kSlowPicture = 0.07;                                      // [s] a slower frame reduces the resolution
-constexpr const char* kFirstLesson = "first_stitch";                       // of procedures/
+constexpr const char* kFirstLesson = "simple_suture";                      // of procedures/
 constexpr double kMirrorEvery = 1.0 / 20;                                  // [s] of the window's picture beside a headset
 constexpr double kSlowMirror = 0.5;  // [s] where the headset's frames take their whole period
 constexpr double kStallEvery = 2;    // [s] of --stall-ms
 constexpr double kBeforeMoment = 3;  // [s] that are played before the moment of a lost point
+constexpr double kIdle = 180;        // [s] without input, until a kiosk shows its start screen
 
 std::vector<SceneChoice> scene_choices() {
   // The scene of each technique, simplest first; then all others.
@@ -109,7 +113,7 @@ std::string procedure_for(const std::string& scene) {
 class Window {
  public:
   explicit Window(const PlayOptions& options)
-      : options_(options), sdl_(options.width, options.height), width_(options.width), height_(options.height) {
+      : options_(options), sdl_(options.width, options.height, options.kiosk), width_(options.width), height_(options.height) {
     LoadedSettings loaded = load_settings(settings_path());
     if (loaded.first && !options.quality_given && options.scene.empty() && options.view.empty() && options.screenshot.empty()) {
       loaded.settings.quality = measured_quality(width_, height_);
@@ -132,7 +136,8 @@ class Window {
       if (options.feedback == feedback_name(level)) settings_.feedback = level;
     at_start_ = settings_;
     scenes_ = scene_choices();
-    recordings_ = recordings_in(".", {});
+    use_language(settings_.language);
+    list_recordings();
     if (!options.events.empty()) {
       events_ = options.events == "-" ? stdout : std::fopen(options.events.c_str(), "w");
       if (!events_) throw InputError(options.events, "cannot be written", "choose another place");
@@ -221,6 +226,12 @@ class Window {
     if (settings_.left_handed) live.arm_hand = {1, 0};
     live.arm_strength = {settings_.force_right, settings_.force_left};
     live.record = of_visit(live.record, ++opened_);
+    kept_session_.clear();
+    const bool watched = !live.surgeon.empty() || (watch_ && !tutorial);
+    if (live.record.empty() && options_.keep_sessions && !watched) try {
+        live.record = kept_session_ = session_file(data_folder(settings_), scene.name);
+        live.record_at_once = settings_.record, live.record_or_stop = false;
+      } catch (const InputError& error) { message_ = error.what(); }
     if (live.surgeon.empty() && watch_ && !tutorial) live.surgeon = "scripted";
     live.tutorial = tutorial && live.surgeon.empty();
     live.rubric = rubrics_for("", scene);
@@ -282,6 +293,13 @@ class Window {
         const std::string json = session_json(visit_->scene, result);
         write_output(of_visit(options_.json, opened_), procedure_ ? with_procedure(json, *procedure_, result.procedure) : json);
       } catch (const InputError& error) { message_ = json_fault_ = error.what(); }
+    if (!options_.csv.empty()) try {
+        write_output(of_visit(options_.csv, opened_), session_csv(result));
+      } catch (const InputError& error) { message_ = json_fault_ = error.what(); }
+    if (!kept_session_.empty() && !result.recorded.empty()) try {
+        const std::string json = session_json(visit_->scene, result);
+        keep_session(kept_session_, result, procedure_ ? with_procedure(json, *procedure_, result.procedure) : json);
+      } catch (const InputError& error) { message_ = error.what(); }
     scene_ = visit_->scene;
     result_ = result;
     results_ = {&scene_,
@@ -323,10 +341,15 @@ class Window {
     if (visit_) visit_->live.command(screen == Screen::practice ? LiveCommand::resume : LiveCommand::pause);
     SDL_PumpEvents();
     SDL_FlushEvent(SDL_MOUSEMOTION);
-    if (screen == Screen::start) recordings_ = recordings_in(".", made_);
+    if (screen == Screen::start) list_recordings();
     keep_settings();
     screen_ = screen;
     tell_screen_ = true;
+  }
+
+  void list_recordings() {
+    recordings_ = recordings_in(".", made_);
+    if (options_.keep_sessions) recordings_ = recordings_in(data_folder(settings_), recordings_);
   }
 
   void show_start() {
@@ -340,6 +363,7 @@ class Window {
   void keep_settings() {
     if (settings_ == at_start_) return;
     at_start_ = settings_;
+    use_language(settings_.language);
     Settings s = settings_;  // options of the command line apply only to this run
     if (options_.quality_given && s.quality == options_.quality) s.quality = kept_.quality;
     if (options_.left_handed && s.left_handed) s.left_handed = kept_.left_handed;
@@ -372,7 +396,7 @@ class Window {
         message_.clear();
         break;
       case Chosen::teach:
-        open("", kFirstLesson, "", true);
+        open("", choice.text.empty() ? kFirstLesson : choice.text, "", true);
         message_.clear();
         break;
       case Chosen::show_me:
@@ -387,6 +411,7 @@ class Window {
         message_.clear();
         break;
       case Chosen::settings:
+        if (options_.kiosk) break;
         settings_from_ = screen_ == Screen::practice ? Screen::pause : screen_;
         go(Screen::settings);
         break;
@@ -521,6 +546,9 @@ class Window {
       case Chosen::park:
         instrument(park_or_take_up(visit_->seen, hands_.mouse.active));
         break;
+      case Chosen::record:
+        if (live) live->command(LiveCommand::record);
+        break;
       case Chosen::arms_off:
         if (live) live->command(LiveCommand::arms_off);
         break;
@@ -540,7 +568,8 @@ class Window {
         picture_wanted_ = true;
         break;
       case Chosen::quit:
-        quit_ = true;
+        if (options_.kiosk) show_start();
+        else quit_ = true;
         break;
     }
   }
@@ -551,7 +580,9 @@ class Window {
     worn_ = wearer_ && wearer_->begin();
     const bool working = screen_ == Screen::practice;
     const WindowInput in = events_in_.read(working, dt, screen_ == Screen::view || (working && visit_ && visit_->watching));
-    quit_ = quit_ || in.quit;
+    quit_ = quit_ || (options_.kiosk ? leaves_kiosk() : in.quit);
+    if (in.any) active_s_ = wall_seconds();
+    if (options_.kiosk && screen_ != Screen::start && wall_seconds() - active_s_ > kIdle) show_start();
     if (in.resized) resized();
     ScreenFacts facts;
     facts.screen = screen_;
@@ -617,6 +648,11 @@ class Window {
     carry_out(choice);
     if (text_size != style_text_) resized();
     return drawn;
+  }
+
+  static bool leaves_kiosk() {
+    const SDL_Keymod held = SDL_GetModState();
+    return (held & KMOD_CTRL) && (held & KMOD_SHIFT) && SDL_GetKeyboardState(nullptr)[SDL_SCANCODE_Q];
   }
 
   // Buttons of the headset's wearer.
@@ -781,7 +817,9 @@ class Window {
                           headset_offered_, wearer_ && !wearer_->failed(), headset_line_, can_keep()},
                          settings_, watch_);
     if (screen_ == Screen::survey) return survey_panel(form_, message_);
-    if (screen_ == Screen::settings) return settings_panel(settings_, short_name(settings_path()), message_, visit_ != nullptr);
+    if (screen_ == Screen::settings)
+      return settings_panel(settings_, short_name(settings_path()), short_name(data_folder(settings_)), message_,
+                            visit_ != nullptr);
     if (screen_ == Screen::results) { return result_panel(results_, colored_by_); }
     Settings shown = settings_;
     if (height_ < 480) shown.hints = false;
@@ -876,6 +914,7 @@ class Window {
   std::vector<SceneChoice> scenes_;
   std::vector<std::string> recordings_, made_;  // listed; made since the start of the program
   std::string message_, json_fault_;
+  std::string kept_session_;  // recorded by default; empty: none
   Screen screen_ = Screen::start, settings_from_ = Screen::start;
   bool tell_screen_ = true, picture_wanted_ = false, quit_ = false, developer_ = false, watch_ = false;
   bool posed_ = false, photographed_ = false;
@@ -914,6 +953,7 @@ class Window {
   float coarse_ = 1;                          // fraction of the window's resolution in each direction
   int pictures_so_ = 0;                       // since the last change
   int pictures_ = 0;
+  double active_s_ = wall_seconds();  // last input
   std::FILE* events_ = nullptr;
 };
 

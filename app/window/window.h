@@ -41,9 +41,12 @@ struct PlayOptions {
   int after = 60;          // frames before it
   std::string
       screen;  // the screen shown: start, settings, practice, pause, developer, results, survey, view; empty: the current one
-  double at = 0;       // [s] of the session, or of the recording
-  std::string json;    // results, written when a scene is closed; "-"
-  double seconds = 0;  // [s] of wall time, then quit; 0: until the user quits
+  double at = 0;               // [s] of the session, or of the recording
+  std::string json;            // results, written when a scene is closed; "-"
+  std::string csv;             // the same as a table
+  bool keep_sessions = false;  // records every session into the data folder, as the settings want
+  bool kiosk = false;          // whole screen, cannot be left; back to the start screen after a time without input
+  double seconds = 0;          // [s] of wall time, then quit; 0: until the user quits
   // For an observer within the program (a test that simulates a user): every such frame, false closes the
   // window; and every event.
   std::function<bool(const WindowLook&)> watch;

@@ -172,7 +172,8 @@ std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot&
     lines.push_back(fmt::format("approximation {:.0f} %", 100 * worst));
   }
   if (metrics.throws > 0) lines.push_back(fmt::format("knots {}, throws {}", metrics.knots, metrics.throws));
-  if (metrics.faults_in_all > 0) lines.push_back(fmt::format("faults {}", metrics.faults_in_all));
+  if (const uint32_t faults = metrics.faults_in_all + metrics.overloads; faults > 0)
+    lines.push_back(fmt::format("faults {}", faults));
   if (seen.active().needle.in_tissue) lines.push_back(fmt::format("bite {}: needle in tissue", metrics.bites + 1));
   for (size_t k = 0; k < kMaxHands; ++k) {
     static constexpr const char* kHeld[] = {"", "needle", "thread", "tissue"};
@@ -211,6 +212,9 @@ std::vector<ResultRow> result_rows(const SceneSpec& scene, const SessionMetrics&
   rows.push_back({"cuts", fmt::format("{}", p.cuts)});
   rows.push_back({"finished sutures", fmt::format("{}", p.sutures_baked)});
   rows.push_back({"needle slips", fmt::format("{}", p.needle_slips)});
+  if (p.thread_slips + p.tissue_slips > 0)
+    rows.push_back({"thread, tissue slips", fmt::format("{}, {}", p.thread_slips, p.tissue_slips)});
+  rows.push_back({"peak thread tension", fmt::format("{:.1f} N", p.peak_tension)});
   for (uint8_t hand = 0; hand < kMaxHands; ++hand) {
     if (hand > 1 && p.path[hand] == 0) continue;  // an assistant who did nothing
     rows.push_back({fmt::format("{} path", tool_name(hand)), fmt::format("{:.2f} m", p.path[hand])});
@@ -220,6 +224,7 @@ std::vector<ResultRow> result_rows(const SceneSpec& scene, const SessionMetrics&
   rows.push_back({"undos", fmt::format("{}", p.undos)});
   for (size_t f = 1; f < p.faults.size(); ++f)
     if (p.faults[f] > 0) rows.push_back({"fault", fmt::format("{} x {}", p.faults[f], fault_words(static_cast<Fault>(f)))});
+  if (p.overloads > 0) rows.push_back({"fault", fmt::format("{} x pull above what bowel bears (3.2 N)", p.overloads)});
   return rows;
 }
 

@@ -10,6 +10,7 @@
 #include "exchange/strand.h"
 #include "procedure/manager.h"
 #include "technique/technique.h"
+#include "window/language.h"
 
 namespace catgut {
 namespace {
@@ -43,6 +44,7 @@ constexpr KeyLine kKeys[] = {
     {"Backspace        undo bite", [](const WindowInput& in) { return in.key == Key::take_back; }},
     {"F2  F3  F12      settings, profiler, screenshot",
      [](const WindowInput& in) { return in.key == Key::settings || in.key == Key::developer || in.key == Key::picture; }},
+    {"R                record, stop recording", [](const WindowInput& in) { return in.key == Key::record; }},
     {"F9               haptic force on or off", [](const WindowInput& in) { return in.key == Key::arms_off; }},
     {"Esc              pause     F1 hide keys", [](const WindowInput&) { return false; }},
 };
@@ -50,6 +52,16 @@ constexpr KeyLine kKeys[] = {
 std::string instrument_in_hand(const WorkView& v, size_t hand) {
   const int i = v.seen->tool[hand].instrument;
   return i < 0 ? "empty" : v.picture->instrument[static_cast<size_t>(i)].title;
+}
+
+// A procedure that starts at a later stage: what was there before counts as present.
+SessionMetrics with_stages_before(const LiveStatus& s) {
+  SessionMetrics out = s.metrics;
+  if (!s.procedure.begun) return out;
+  out.bites = std::max(out.bites, s.procedure.bites);
+  out.throws = std::max(out.throws, s.procedure.throws);
+  out.knots = std::max(out.knots, out.throws > 0 ? 1u : 0u);
+  return out;
 }
 
 Panel state_panel(const WorkView& v, const Settings& settings, bool procedure) {
@@ -64,13 +76,14 @@ Panel state_panel(const WorkView& v, const Settings& settings, bool procedure) {
   const bool still = s.paused || s.reading, slow = s.time_factor > 0 && s.time_factor < 0.93f * s.speed && !still;
   const std::string pace =
       still ? "paused" : fmt::format("real-time factor {:.2f}{}", s.time_factor, s.speed < 1 && !slow ? "  slow motion" : "");
-  line.push_back({Tone::quiet, clock_text(s.metrics.time_s) + "   " + pace});
+  line.push_back({Tone::quiet, clock_text(s.metrics.time_s) + "   " + pace + (s.recording ? "   REC" : "")});
   if (slow) line.push_back({Tone::bad, "! below real time"});
   if (!procedure) line.push_back({Tone::quiet, fmt::format("tick {:.1f} ms, {:.1f} fps", s.tick_ms, v.pictures_per_s)});
   if (!v.headset.empty()) line.push_back({Tone::quiet, v.headset});
   if (silent) line.push_back({Tone::quiet, "exam: no feedback"});
   else
-    for (const std::string& text : technique_lines(*v.scene, *v.seen, s.metrics)) line.push_back({Tone::normal, text});
+    for (const std::string& text : technique_lines(*v.scene, *v.seen, with_stages_before(s)))
+      line.push_back({Tone::normal, text});
   if (!s.doing.empty()) line.push_back({Tone::quiet, "surgeon: " + s.doing});
   const TechniqueRow* technique = find_technique(v.scene->technique.name);
   if (technique && settings.guidance == Guidance::learn && !v.watching && !procedure)
@@ -123,7 +136,7 @@ Panel log_panel(const WorkView& v) {
   Panel p{"log", {}, 0, -1, 1, 0, 0, 0.5f};
   for (const LogLine& l : *v.log)
     p.line.push_back(
-        {l.bad ? Tone::bad : Tone::quiet, fmt::format("{:>7} {} {}", clock_text(l.time_s), l.bad ? '!' : ' ', l.text)});
+        {l.bad ? Tone::bad : Tone::quiet, fmt::format("{:>7} {} {}", clock_text(l.time_s), l.bad ? '!' : ' ', tr(l.text))});
   return p;
 }
 
@@ -252,6 +265,8 @@ std::vector<Panel> work_panels(const WorkText& work, const Settings& settings) {
     for (Panel& p : shorter_logs(log_panel(v))) out.push_back(p);  // the first that fits
   // A lesson names the keys that it needs.
   if (settings.hints && !v.watching && !v.inside && !s.settling && !work.tutorial) out.push_back(keys_panel(work.used));
+  for (Panel& p : out)
+    for (PanelLine& l : p.line) l.text = tr(l.text);
   return out;
 }
 

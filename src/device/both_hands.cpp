@@ -16,6 +16,7 @@ constexpr float kWindRate = 2.2f;      // [rad/s] maximum, or the strand becomes
 constexpr float kOver = 1.5f;          // [rad] beyond whole turns: thread that crosses itself
 constexpr float kGoesOn = 0.012f;      // [m]
 constexpr float kSpeed = 0.15f, kLift = 0.1f, kCareful = 0.06f, kTurn = 4.0f;  // [m/s], [m/s], [rad/s]
+constexpr float kLongestDraw = 0.05f;                                          // [s] of motion in one frame of drawing
 constexpr float kDrawPerRad = 0.012f;                          // [m] per radian of the gesture by which the hands move apart
 constexpr float kGiveInTissue = 0.010f, kGiveAtKnot = 0.002f;  // [m] that a hand may pull a taut strand
 constexpr float kCounterHold = 0.8f;                           // [N] above this the thread sticks in its holes
@@ -118,7 +119,9 @@ void draw_on(const BothHands& b, float amount, size_t needle, std::array<Pose, 2
     way[needle] = normalized(across * 0.8f + Vec3{0, 0.6f, 0});
     way[tail] = normalized(across * -0.8f + Vec3{0, 0.6f, 0});
   }
-  const float most = 0.6f * kSpeed * dt, far = std::clamp(amount * kDrawPerRad, -most, most);
+  // The force that slows the hand is that of the last frame: at few frames per second a whole step at full speed would jerk the
+  // tail out.
+  const float most = 0.6f * kSpeed * std::min(dt, kLongestDraw), far = std::clamp(amount * kDrawPerRad, -most, most);
   for (const size_t k : {needle, tail}) {
     // The hand slows in proportion to the tension.
     const float gently = amount > 0 ? std::clamp(1.5f - length(seen.tool[k].force), 0.03f, 1.0f) : 1.0f;

@@ -83,6 +83,12 @@ void observe(ProcedureRun& run, const Snapshot& seen) {
     for (const float t : s.thread_tension) run.peak_tension = std::max(run.peak_tension, t);
 }
 
+bool is_off_tray(const Procedure& procedure, uint32_t stage, uint32_t instrument) {
+  const std::vector<std::string>& tray = procedure.stage[stage].tray;
+  return !tray.empty() && instrument < procedure.instrument.size() &&
+         std::find(tray.begin(), tray.end(), procedure.instrument[instrument]) == tray.end();
+}
+
 void find_errors(ProcedureRun& run, const Procedure& procedure, const Snapshot& seen) {
   for (size_t i = 0; i < procedure.error.size(); ++i) {
     const StageError& error = procedure.error[i];
@@ -90,7 +96,7 @@ void find_errors(ProcedureRun& run, const Procedure& procedure, const Snapshot& 
     if (error.on != EventKind::count_) {
       for (const Event& e : seen.event)
         if (e.kind == error.on && (error.fault == Fault::none || e.fault == error.fault) &&
-            static_cast<double>(e.value) >= error.value_min)
+            static_cast<double>(e.value) >= error.value_min && (!error.off_tray || is_off_tray(procedure, run.stage, e.which)))
           note_error(run, seen, i);
     } else {
       const bool now = hold(error.when, seen, run);

@@ -55,6 +55,7 @@ struct StageError {
   EventKind on = EventKind::count_;                             // every such event, of
   Fault fault = Fault::none;                                    // this fault, if any, with
   double value_min = -std::numeric_limits<double>::infinity();  // a value of at least this
+  bool off_tray = false;                                        // and an instrument that the stage's tray does not name
   Conditions when;                                              // or: every time that these become true
   std::vector<uint8_t> in;                                      // per stage: whether it counts there
 };
@@ -63,7 +64,8 @@ struct Procedure {
   std::string name, title, text, scene, technique;
   std::vector<ProcedureStage> stage;
   std::vector<StageError> error;
-  std::string where;  // file:line of its demonstrations, for messages about the scene
+  std::vector<std::string> instrument;  // kinds of the scene's instruments, by index
+  std::string where;                    // file:line of its demonstrations, for messages about the scene
 };
 
 }  // namespace catgut

@@ -382,6 +382,17 @@ Procedure procedure_of_table(const toml::table& root, const std::string& file) {
       if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end())
         throw InputError(file, fmt::format("stage \"{}\": the scene \"{}\" has no instrument \"{}\"", s.name, p.scene, kind),
                          meant(kind, kinds, listed(kinds)));
+  p.instrument = kinds;
+  // Every procedure that names its trays has this error.
+  if (std::any_of(p.stage.begin(), p.stage.end(), [](const ProcedureStage& s) { return !s.tray.empty(); })) {
+    StageError error;
+    error.name = "tray";
+    error.text = "An instrument was taken that this stage does not need.";
+    error.on = EventKind::instrument_taken;
+    error.off_tray = true;
+    error.in.assign(p.stage.size(), 1);
+    p.error.push_back(error);
+  }
   return p;
 }
 

@@ -46,6 +46,7 @@ const Field kField[] = {
     {"", "surroundings", "", 0, 0, "table|perineum", "what is drawn round the organ; perineum: the first body comes through the anal verge of a patient in lithotomy", TOP(surroundings)},
 
     {"body", "name", "", 0, 0, nullptr, "name of the body in messages", BODY(name)},
+    {"body", "kind", "", 0, 0, "tube|pad", "tube: a piece of bowel. pad: one lip of a slit in flat skin, its edge 2 x radius long", BODY(kind)},
     {"body", "mesh", "", 0, 0, nullptr, "organ surface to import, file or file#node, relative to the scene file; empty: generated tube", BODY(mesh)},
     {"body", "particles", "", 1, 200000, nullptr, "exact number of particles", BODY(particles)},
     {"body", "radius", "m", 0.001, 1, nullptr, "outer radius of the tube", BODY(radius)},
@@ -137,7 +138,7 @@ const Field kField[] = {
     {"technique", "step", "m", 0.0001, 0.1, nullptr, "spacing of the pairs between two midpoints (dist_threshold of section 2.5.2)", TOP(technique.step)},
     {"technique", "throws", "", 1, 8, nullptr, "minimum throws of a secure knot", TOP(technique.throws)},
 
-    {"surgeon", "plan", "", 0, 0, &plan_choices, "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel. interrupted: one stitch over a gap, without a technique", TOP(surgeon.plan)},
+    {"surgeon", "plan", "", 0, 0, &plan_choices, "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel. interrupted: one stitch over a gap, without a technique. simple: the same, tied and cut", TOP(surgeon.plan)},
     {"surgeon", "bites", "", 0, 1000, nullptr, "number of bites", TOP(surgeon.bites)},
     {"surgeon", "edge_distance", "m", 0, 0.1, nullptr, "distance of the bites from the rim", TOP(surgeon.edge_distance)},
     {"surgeon", "bite_length", "m", 0, 0.1, nullptr, "bite length along the rim", TOP(surgeon.bite_length)},

@@ -72,6 +72,7 @@ void Live::Work::begin() {
   jobs = std::make_unique<Jobs>(options.threads);
   if (!options.surgeon.empty()) surgeon = make_hands(options.surgeon, scene, picture);
   for (ToolInput& hand : input.hand) hand.connected = 0;
+  published.recording = options.record_at_once && !options.record.empty();
   record_from_here();
   map = start_map(picture, dt);
   begin_assessment();
@@ -82,7 +83,7 @@ void Live::Work::begin() {
 }
 
 void Live::Work::record_from_here() {
-  if (options.record.empty()) return;
+  if (!published.recording) return;
   if (recorder) recorder->finish(true);
   recorder.reset();
   const std::string path = part_name(options.record, result.recorded.size() + 1);
@@ -145,10 +146,15 @@ void Live::Work::tick(bool let_in) {
   }
   if (haptics && let_in) feel();
   ++result.ticks;
-  if (recorder) {
-    recorder->tick(input, hash_state(*model, *state));
-    if (head_box.update()) recorder->head(head_box.seen());
-  }
+  if (recorder) try {
+      recorder->tick(input, hash_state(*model, *state));
+      if (head_box.update()) recorder->head(head_box.seen());
+    } catch (const InputError& error) {
+      if (options.record_or_stop) throw;
+      recorder.reset();
+      published.recording = false;
+      published.refused = error.what();
+    }
   if (let_in) {
     update(published.metrics, now, static_cast<float>(dt));
     note(map, picture, now);
@@ -284,6 +290,12 @@ void Live::Work::process_commands() {
         published.paused = true;
         steps += published.fault.empty();
         break;
+      case LiveCommand::record:
+        if (options.record.empty()) break;
+        published.recording = !published.recording;
+        if (!published.recording && recorder) recorder->finish(true), recorder.reset();
+        record_from_here();
+        break;
       case LiveCommand::arms_off:
         published.arms_off = !published.arms_off;
         break;
@@ -387,6 +399,7 @@ void Live::Work::run() {
       steps = 0;
       if (!was_settled) settled = moment(), was_settled = true, published.settling = false;
       if (recorder) recorder.reset();
+      published.recording = false;
       publish_view();
     }
   if (haptics) haptics->stop();

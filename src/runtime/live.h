@@ -44,16 +44,19 @@ enum class LiveCommand : uint8_t {
   begin_stage,        // the user has read the new stage of a tutorial: time continues
   show_stage,         // demonstration of the procedure's active stage
   end_demonstration,  // back to the learner's state
+  record,             // stops recording; again: the next file begins
 };
 constexpr std::array<float, 4> kLiveSpeeds{1.0f, 0.5f, 0.25f, 0.1f};  // of real time
 
 struct LiveOptions {
-  int threads = 1;          // of the solver
-  std::string record;       // recording to write; empty: none. See LiveStatus::recorded
-  std::string surgeon;      // as `catgut run --surgeon`; empty: the hands of hand()
-  float hand_speed = 0.6f;  // [m/s] and
-  float hand_turn = 12.0f;  // [rad/s] maximum of a tool: a jumping input (a mouse at a low frame rate) then tears nothing
-  float pace = 1;           // of real time at full speed; above 1 for tests that need not wait
+  int threads = 1;             // of the solver
+  std::string record;          // recording to write; empty: none. See LiveResult::recorded
+  bool record_at_once = true;  // false: with the first LiveCommand::record
+  bool record_or_stop = true;  // false: a recording that cannot be written ends without stopping the session
+  std::string surgeon;         // as `catgut run --surgeon`; empty: the hands of hand()
+  float hand_speed = 0.6f;     // [m/s] and
+  float hand_turn = 12.0f;     // [rad/s] maximum of a tool: a jumping input (a mouse at a low frame rate) then tears nothing
+  float pace = 1;              // of real time at full speed; above 1 for tests that need not wait
   bool start_paused = false;
   std::shared_ptr<const Procedure> procedure;  // observed tick by tick; null: none
   size_t stage = 0;       // the first one: from its saved state, or after the surgeon has done those before
@@ -83,6 +86,7 @@ struct LiveStatus {
   uint32_t epoch = 0;         // counts restarts and undone bites: hands then continue from the present tool poses
   uint32_t to_take_back = 0;  // bites that take_back can undo
   uint32_t events_lost = 0;   // not fetched in time
+  bool recording = false;
   std::array<uint64_t, kMaxHands> input_time_ns{};  // ToolInput::time_ns of the hands in the newest tick, for latencies
   // Of the newest tick that first used a motion, on wall_ns(), for latencies: when the motion was read (if the device uses that
   // clock), when the tick started, and when its snapshot was available.

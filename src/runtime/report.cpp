@@ -179,6 +179,10 @@ std::string session_json(const SceneSpec& scene, const LiveResult& r) {
   j["cuts"] = p.cuts;
   j["sutures_baked"] = p.sutures_baked;
   j["needle_slips"] = p.needle_slips;
+  j["thread_slips"] = p.thread_slips;
+  j["tissue_slips"] = p.tissue_slips;
+  j["overloads"] = p.overloads;
+  j["peak_tension_n"] = newtons(p.peak_tension);
   for (size_t k = 0; k < kMaxHands; ++k) {
     if (k > 1 && p.path[k] == 0) continue;  // an assistant who did nothing
     j["path_m"].push_back(p.path[k]);
@@ -189,6 +193,7 @@ std::string session_json(const SceneSpec& scene, const LiveResult& r) {
   j["faults"] = Json::object();
   for (size_t f = 1; f < p.faults.size(); ++f)
     if (p.faults[f]) j["faults"][fault_name(static_cast<Fault>(f))] = p.faults[f];
+  if (p.overloads > 0) j["faults"]["overload"] = p.overloads;
   j["edges"] = Json::array();
   for (const StitchEdge& e : r.map.edge) {
     Json points = Json::array();

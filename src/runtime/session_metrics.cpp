@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "assess/facts.h"
+
 namespace catgut {
 
 namespace {
@@ -51,6 +53,12 @@ void count(Counts& c, const Event& e) {
     case EventKind::needle_released:
       c.needle_slips += e.value > 0;
       break;
+    case EventKind::thread_released:
+      c.thread_slips += e.value > 0;
+      break;
+    case EventKind::tissue_released:
+      c.tissue_slips += e.value > 0;
+      break;
     case EventKind::technique_fault:
       if (e.fault < Fault::count_) ++c.faults[static_cast<size_t>(e.fault)], ++c.faults_in_all;
       break;
@@ -67,6 +75,13 @@ void update(SessionMetrics& p, const Snapshot& seen, float dt) {
     p.tip[k] = seen.tool[k].pose.p;
     p.peak_force[k] = std::max(p.peak_force[k], length(seen.tool[k].force));
   }
+  float pull = 0;
+  for (const SutureView& s : seen.suture)
+    for (const SuturePointView& point : s.suture_point) pull = std::max({pull, point.tension_needle, point.tension_free});
+  p.peak_tension = std::max(p.peak_tension, pull);
+  p.overloads += pull > assess::kTearForce && !p.overloaded;
+  if (pull > assess::kTearForce) p.overloaded = true;
+  else if (pull < 0.8f * assess::kTearForce) p.overloaded = false;  // as assess/facts counts
   p.begun = true;
   p.time_s += static_cast<double>(dt);
   p.opening = seen.opening_area;

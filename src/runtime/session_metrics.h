@@ -23,7 +23,8 @@ struct Counts {
   uint32_t last_knot_throws = 0;  // of the most recent knot
   uint32_t cuts = 0;
   uint32_t sutures_baked = 0;
-  uint32_t needle_slips = 0;  // the needle slipped out of a jaw
+  // Drops: needle, thread or tissue slipped out of a jaw.
+  uint32_t needle_slips = 0, thread_slips = 0, tissue_slips = 0;
   // Locked throws of every suture that is not baked; knots are numbered from 0 in each. A suture without a throw: no row.
   using ThrowsOfKnots = std::array<uint8_t, 32>;
   std::vector<ThrowsOfKnots> throws_of;
@@ -37,6 +38,9 @@ struct SessionMetrics : Counts {
   std::array<float, kMaxHands> peak_force{};  // [N] on each hand, in the physics
   // [N] written to the motors of the haptic device that moves the hand, since the scene opened; negative: no device.
   std::array<float, kMaxHands> peak_rendered{-1, -1, -1, -1};
+  float peak_tension = 0;             // [N] of the threads, at a suture point
+  uint32_t overloads = 0;             // pulls on a suture point above what bowel bears (assess::kTearForce)
+  bool overloaded = false;            // one lasts
   float opening_start = 0;            // [m^2] when the hands connected; 0: nothing to close
   float opening = 0;                  // [m^2] current
   float closure = 0;                  // 0 open .. 1

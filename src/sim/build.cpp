@@ -8,6 +8,7 @@
 
 #include "anatomy/bowel.h"
 #include "anatomy/organ.h"
+#include "anatomy/pad.h"
 #include "anatomy/perineum.h"
 #include "core/check.h"
 #include "geometry/closest.h"
@@ -40,6 +41,19 @@ BodyRest make_body(const BodySpec& spec) {
     o.density = spec.density;
     o.pinned_length = spec.pinned_length;
     return import_organ(o);
+  }
+  if (spec.kind == "pad") {
+    PadShape p;
+    p.name = spec.name;
+    p.particles = spec.particles;
+    p.length = spec.length;
+    p.width = 2 * spec.radius;
+    p.thickness = spec.wall;
+    p.position = spec.position;
+    p.axis = spec.axis;
+    p.density = spec.density;
+    p.pinned_length = spec.pinned_length;
+    return make_pad(p);
   }
   BowelShape s;
   s.name = spec.name;

@@ -14,7 +14,8 @@ namespace catgut {
 // One soft body: made by the bowel generator (anatomy/bowel) or read from a mesh file (anatomy/organ).
 struct BodySpec {
   std::string name = "bowel";
-  std::string mesh;              // path[#node] of an organ surface; empty: generate a tube
+  std::string kind = "tube";     // or pad: one lip of a slit in flat skin, `length` wide and twice `radius` long
+  std::string mesh;              // path[#node] of an organ surface; empty: generate what `kind` says
   int particles = 1228;          // exact
   float radius = 0.020f;         // [m] outer radius of the tube
   float length = 0.070f;         // [m]

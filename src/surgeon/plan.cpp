@@ -77,7 +77,9 @@ BitePlace on_top(const PictureModel& picture, uint32_t wall, float angle, float 
   const Vec3 top = normalized(Vec3{0, 1, 0} - o.axis * o.axis.y, any_perpendicular(o.axis)), side = cross(top, Vec3{1, 0, 0});
   BitePlace p;
   p.out = top * portable::cos(angle) - side * portable::sin(angle);
-  p.at = o.center + p.out * o.radius - o.axis * edge;
+  float reach = 0;  // [m] of the rim from its center: less than the radius where the opening is a slit
+  for (const uint32_t i : picture.rim[wall]) reach = std::max(reach, dot(picture.particle_rest[i] - o.center, p.out));
+  p.at = o.center + p.out * (reach < 0.6f * o.radius ? reach : o.radius) - o.axis * edge;
   p.wall = wall;
   return p;
 }
@@ -238,6 +240,20 @@ Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skil
   return plan;
 }
 
+// A simple interrupted suture over a slit: one sweep through both edges, tied with two throws, both ends cut.
+Plan simple_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan = interrupted_plan(picture, skill);
+  plan.task.pop_back();  // rest
+  add(plan, TaskKind::draw);
+  add(plan, TaskKind::regrip);
+  add(plan, TaskKind::throw_, 1, 1);
+  add(plan, TaskKind::throw_, 1, -1);
+  add(plan, TaskKind::cut_long);
+  add(plan, TaskKind::cut_tail);
+  add(plan, TaskKind::rest);
+  return plan;
+}
+
 // 2.5.4: single stitches through outer and inner layer round the ring, each tied and cut, with a new suture for the next.
 Plan lembert_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
@@ -304,7 +320,8 @@ constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
                              {"lembert", 2, lembert_plan},
                              {"running", 1, running_plan},
                              {"interrupted", 2, interrupted_plan},
-                             {"interrupted_tied", 2, interrupted_tied_plan}};
+                             {"interrupted_tied", 2, interrupted_tied_plan},
+                             {"simple", 2, simple_plan}};
 
 }  // namespace
 

@@ -9,6 +9,7 @@
 namespace catgut {
 namespace {
 
+constexpr float kMostLoad = 2.8f;     // [N] at a suture point; human small bowel begins to tear at 3.2 N
 constexpr float kCounterHold = 0.8f;  // [N]
 constexpr float kTighten = 0.15f;     // of the free speed: the thread runs through two dozen holes, and tissue follows it late
 constexpr float kSecure = 0.985f;     // fraction of a closure that counts as closed
@@ -390,8 +391,11 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   } else if (kind == TaskKind::pull_together) {
     slack = open_seam(seen);
   }
-  // Thread that cannot be pulled further is left: the last pull takes up the slack.
-  if (slack <= 0 || distance(hand_[kForceps].pose.p, pull_from_.p) > 0.29f || !patience(12)) return true;
+  // Thread that cannot be pulled further is left: the last pull takes up the slack. So is one that would tear its bites.
+  float load = 0;  // [N]
+  for (const SuturePointView& p : seen.active().suture_point) load = std::max({load, p.tension_needle, p.tension_free});
+  if (slack <= 0 || load > kMostLoad * strength_ || distance(hand_[kForceps].pose.p, pull_from_.p) > 0.29f || !patience(12))
+    return true;
   // Decelerate before the thread is taut, and when it pulls back: a jerk would tear tissue.
   const float gently = std::clamp(2.0f * strength_ - length(seen.tool[kForceps].force), 0.02f, 1.0f);
   move(kForceps, {pull_from_.p + way * 0.3f, hand_[kForceps].pose.q}, gently * std::min(skill_.speed, 0.015f + 5 * slack));

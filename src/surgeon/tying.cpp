@@ -12,6 +12,7 @@ constexpr float kStump = 0.007f;              // [m] of thread left on a knot
 constexpr float kLeastFreeForOwn = 0.038f;    // the same where the strand is then led along the needle holder to its jaws
 constexpr float kWindOwnAt = 0.022f;          // [m] behind the tip, where such a strand is wound
 constexpr float kOwnSide = 1.0f;              // part of the direction in which a tail is laid apart, against one to the front
+constexpr float kTautTail = 1.5f;             // [N] on the hand that lays it down
 constexpr float kTailAside = 0.030f;          // [m] from the stitch, where the tail is laid down
 constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the center of the field, where a used needle is put down
 constexpr float kTieCrossing = 0.3f;          // fraction of the path of crossed hands, forward and backward
@@ -72,7 +73,10 @@ bool Scripted::lay_tail(const Snapshot& seen) {
     if (seen.active().knot.empty()) from = exit;
   }
   const Vec3 place = from + std::min(kTailAside, 0.8f * tail) * normalized(way);
-  return move(kNeedleHolder, {place, hand_[kNeedleHolder].pose.q}, skill_.speed);
+  // The tail of a locked throw gives nothing: where it is taut, it is laid down there.
+  const float pull = length(seen.tool[kNeedleHolder].force);
+  if (pull > 2 * kTautTail && !seen.active().knot.empty()) return true;
+  return move(kNeedleHolder, {place, hand_[kNeedleHolder].pose.q}, skill_.speed * std::clamp(1.5f - pull, 0.1f, 1.0f));
 }
 
 void Scripted::choose_grasp(const Snapshot& seen) {
@@ -181,8 +185,12 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       // A throw that does not come down in time hangs on a tail that lies under an edge: the tail is raised out of there.
       const float rise = patience(kThrowComesDown) ? 0.35f : 2.0f;
       const Vec3 right = normalized(Vec3{side, rise, 0.1f + front}), left = normalized(Vec3{-side, 0.35f, 0.1f - front});
-      move(kNeedleHolder, {pull_from_.p + right * 0.08f, hand_[kNeedleHolder].pose.q}, gently(kNeedleHolder));
-      carry_swage(seen, winding_.start + (own_strand ? Vec3{0, 1, 0} : left) * (0.9f * winding_.reach), gently(kForceps));
+      if (locked && length(driver.force) > kTautTail) {  // a locked throw gives no more thread: the hand gives way
+        move(kNeedleHolder, {stitch(seen), hand_[kNeedleHolder].pose.q}, 0.5f * skill_.speed);
+      } else if (!locked) {
+        move(kNeedleHolder, {pull_from_.p + right * 0.08f, hand_[kNeedleHolder].pose.q}, gently(kNeedleHolder));
+        carry_swage(seen, winding_.start + (own_strand ? Vec3{0, 1, 0} : left) * (0.9f * winding_.reach), gently(kForceps));
+      }
       if (locked && (waited_ > 0.5f || driver.held != Held::thread)) go(driver.held == Held::thread ? lay_down : open);
       else if (driver.held != Held::thread) miss(lift);
       else if (!patience(8)) miss(unwind);

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/app: panels never hide the work. The scripted surgeon carries out the first lesson; at every step, in every size of
-// window and text, needle tip, suture points and both jaws are compared with the rectangles of the panels.
+// window and text, needle tip, suture points, both jaws and the end of the tail are compared with the rectangles of the panels.
 #ifdef CATGUT_TESTS_WINDOW
 #include <gtest/gtest.h>
 
 #include <map>
 #include <set>
 
+#include "exchange/strand.h"
 #include "procedure/manager.h"
 #include "procedure/procedure_file.h"
 #include "procedure/scripted_surgeon.h"
@@ -83,6 +84,7 @@ TEST(Layout, needle_points_and_jaws_are_uncovered_at_every_step_in_every_size) {
                                                        {"needle holder", seen.tool[0].pose.p},
                                                        {"forceps", seen.tool[1].pose.p}};
       for (const SuturePointView& p : seen.active().suture_point) points.push_back({"suture point", p.position});
+      if (!seen.active().suture_point.empty()) points.push_back({"end of the tail", node_at(seen, 0)});
       for (const auto& [name, p] : points) {
         const Vec3 d = p - c.eye, ahead = normalized(c.target - c.eye), right = normalized(cross(ahead, c.up)),
                    up = cross(right, ahead);
@@ -179,6 +181,30 @@ TEST(Layout, keys_fade_once_used) {
   EXPECT_NE(keys({}).find("Tab"), std::string::npos);
   EXPECT_EQ(keys(used).find("Tab"), std::string::npos);
   EXPECT_NE(keys(used).find("wheel"), std::string::npos);
+}
+
+// With --stage the surgeon has made the bites before it; the status names them.
+TEST(Layout, a_later_stage_counts_the_bites_before_it) {
+  const Procedure p = read_procedure("first_stitch");
+  const SceneSpec scene = scene_of(p);
+  Snapshot seen;
+  seen.suture.resize(1);
+  seen.suture[0].bite.resize(2);
+  for (BiteView& b : seen.suture[0].bite) b.complete = true;
+  LiveStatus status;
+  status.settling = false;
+  begin_run(status.procedure, p, seen, 1.0 / 60, 7);
+  const PictureModel picture;
+  Steering steering;
+  MouseHand mouse;
+  std::deque<LogLine> log;
+  WorkView view;
+  view.scene = &scene, view.status = &status, view.seen = &seen, view.picture = &picture;
+  view.steering = &steering, view.mouse = &mouse, view.log = &log;
+  std::string all;
+  for (const Panel& panel : work_panels({&view, &p, true, {}, {}}, {}))
+    for (const PanelLine& l : panel.line) all += l.text + "\n";
+  EXPECT_NE(all.find("bites 2"), std::string::npos) << all;
 }
 
 // What a panel of a stage says.

@@ -48,6 +48,9 @@ Settings all_changed() {
   s.guidance = Guidance::exam;
   s.left_handed = s.hold_to_close = s.suture_points = true;
   s.assist = s.hints = false;
+  s.record = false;
+  s.data_folder = "~/my \"sessions\\";
+  s.language = "de";
   s.mouse_speed = 0.37f;
   s.text_size = 1.5f;
   s.force_right = 0.5f, s.force_left = 1.25f;

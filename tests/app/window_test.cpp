@@ -63,8 +63,9 @@ class Window : public testing::Test {
     setenv("DISPLAY", x_->display.c_str(), 1);
     setenv("SDL_VIDEODRIVER", "x11", 1);
     setenv("XDG_RUNTIME_DIR", folder_.c_str(), 1);
-    setenv("XDG_CONFIG_HOME", folder_.c_str(), 1);  // the settings of the user who runs the tests stay untouched
-    if (chdir(folder_.c_str()) != 0) _exit(97);     // files written to the working directory are removed with the folder
+    setenv("XDG_CONFIG_HOME", folder_.c_str(), 1);           // the settings of the user who runs the tests stay untouched,
+    setenv("XDG_DATA_HOME", (folder_ / "data").c_str(), 1);  // and so do the sessions
+    if (chdir(folder_.c_str()) != 0) _exit(97);  // files written to the working directory are removed with the folder
     if (!std::freopen((folder_ / "stderr").c_str(), "w", stderr)) _exit(98);
     std::vector<char*> argv{const_cast<char*>("catgut")};
     for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
@@ -226,10 +227,10 @@ TEST_F(Window, whatever_happens_to_the_window_nothing_is_lost) {
 }
 
 // The I key: the hand lays its instrument down and takes the next one from the tray, and again. Recorded, and it replays.
-TEST_F(Window, a_hand_swaps_its_instrument_by_key) {
-  const fs::path events = folder_ / "events", recording = folder_ / "r.cgrec";
-  start({"play", "three_hands", "--size", "640x360", "--quality", "low", "--events", events.string(), "--record",
-         recording.string(), "--seconds", "120"});
+// And the session is kept in the data folder without being asked for; R ends its recording and begins the next.
+TEST_F(Window, a_hand_swaps_its_instrument_by_key_and_the_session_is_kept) {
+  const fs::path events = folder_ / "events", sessions = folder_ / "data/catgut/sessions";
+  start({"play", "three_hands", "--size", "640x360", "--quality", "low", "--events", events.string(), "--seconds", "120"});
   ASSERT_TRUE(happens("practice", 1, 60)) << said();
   pause(500);
   xdo("key i");
@@ -237,10 +238,25 @@ TEST_F(Window, a_hand_swaps_its_instrument_by_key) {
   EXPECT_TRUE(happens("instrument_laid_down")) << said();
   xdo("key i");
   EXPECT_TRUE(happens("instrument_taken", 2)) << said();
+  xdo("key r");
+  xdo("key r");
+  pause(300);
   xdo("key F10");
   EXPECT_TRUE(happens("results")) << said();
   kill(app_, SIGTERM);
   EXPECT_EQ(exit_code(), 130) << said();
+
+  std::vector<fs::path> kept;
+  for (const auto& entry : fs::directory_iterator(sessions)) kept.push_back(entry.path());
+  std::sort(kept.begin(), kept.end());
+  ASSERT_EQ(kept.size(), 4u) << "two recordings, and the results as JSON and CSV";
+  const auto of = [&](const std::string& end) {
+    return std::find_if(kept.begin(), kept.end(), [&](const fs::path& p) { return p.string().ends_with(end); });
+  };
+  ASSERT_NE(of(".2.cgrec"), kept.end());
+  ASSERT_NE(of(".csv"), kept.end());
+  EXPECT_EQ(read_file(*of(".csv")).rfind("kind,number,time_s,name,value,unit\nresult,", 0), 0u);
+  const fs::path recording = fs::path(of(".csv")->string()).replace_extension(".cgrec");
 
   std::vector<std::string> taken;
   const std::vector<InstrumentSpec> instruments = read_scene("three_hands").instrument;

@@ -23,9 +23,9 @@ inline SceneSpec at_the_mouse(const std::string& name) {
 // ticks: of the simulation per frame; hands move as in runtime/live.
 class LockStep : public WorkQueue {
  public:
-  explicit LockStep(int ticks)
+  explicit LockStep(int ticks, const std::string& scene = "stay")
       : ticks_(ticks),
-        scene_(at_the_mouse("stay")),
+        scene_(at_the_mouse(scene)),
         model_(build_model(scene_)),
         state_(initial_state(*model_)),
         picture_(picture_model(*model_)) {

@@ -90,6 +90,7 @@ bool Person::point(size_t k, const std::function<Vec3()>& place, const std::func
 
 bool Person::take(size_t k, Held what, HelpAt at, const std::function<Vec3()>& place) {
   for (int attempt = 0; attempt < 8; ++attempt) {
+    if (attempt > 0) repeated_.push_back(doing_);
     if (!point(k, place, [&] { return hand(k).snapped && hand(k).at == at; })) return false;
     // The tool follows the assist to its target, then the jaw closes.
     const bool tail = at == HelpAt::tail;
@@ -224,6 +225,7 @@ bool Person::draw_together() {
   };
   // If it sticks, or the tail slips: release and grasp again.
   for (int attempt = 0; attempt < 3; ++attempt) {
+    if (attempt > 0) repeated_.push_back(doing_);
     doing_ = "take the tail";
     if (!take_tail()) return false;
     doing_ = "draw the ends apart";
@@ -256,6 +258,22 @@ bool Person::set_throw() {
   return lay_tail();
 }
 
+bool Person::cut_tail() {
+  doing_ = "cut the tail";
+  const size_t cuts = desk_.count(EventKind::thread_cut);
+  const auto place = [&] { return node_at(seen(), node_along(seen(), first_point_node(seen()), 0.009f, -1)); };
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    if (attempt > 0) repeated_.push_back(doing_);
+    point(
+        0, place, [&] { return distance(seen().tool[0].pose.p, place()) < 0.002f; }, true, 12);
+    Act act;
+    act.cut = true;
+    if (!desk_.act(act)) return false;
+    if (wait(1, [&] { return desk_.count(EventKind::thread_cut) > cuts; })) return true;
+  }
+  return false;
+}
+
 bool Person::cut_needle() {
   doing_ = "cut the needle off";
   Act act;
@@ -268,6 +286,7 @@ bool Person::cut_needle() {
 bool Person::tie(int way) {
   // Failed actions are repeated.
   for (int attempt = 0; attempt < 8; ++attempt) {
+    if (attempt > 0) repeated_.push_back(doing_);
     if (!wind(way)) continue;
     doing_ = "take the tail through the loop";
     if (take_tail() && set_throw()) return true;

@@ -6,6 +6,7 @@
 #include <array>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "device/gamepad.h"
 #include "device/mouse.h"
@@ -50,8 +51,10 @@ class Person {
   bool wind(int way);
   bool take_tail();
   bool set_throw();
+  bool cut_tail();    // some millimeters from the knot, by the needle holder
   bool cut_needle();  // off the thread, by the hand that holds it
   std::string doing() const { return doing_; }
+  const std::vector<std::string>& repeated() const { return repeated_; }  // actions that failed and were tried again
 
  private:
   const Snapshot& seen() const { return desk_.look().seen; }
@@ -68,6 +71,7 @@ class Person {
 
   WorkQueue& desk_;
   std::string doing_;
+  std::vector<std::string> repeated_;
 };
 
 // The events of the mouse for this motion, in whole pixels and notches.

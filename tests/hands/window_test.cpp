@@ -1,291 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/hands: the same stitch in the window itself. The program's own loop, physics on its thread, rendering; a private X
-// server, and its mouse and keyboard events (XTest), or a virtual gamepad of SDL. Checks
-// events, never pixels. All waits are for observed states, so a slow machine only takes longer.
+// tests/hands: the same stitch in the window itself, by events of the X server or of a virtual gamepad (at_the_window.h).
+// Checks events, never pixels.
 #ifdef CATGUT_TESTS_WINDOW
-#include <SDL.h>
 #include <gtest/gtest.h>
-#include <signal.h>
 
-#include <atomic>
-#include <chrono>
-#include <condition_variable>
 #include <cstdlib>
-#include <mutex>
-#include <thread>
 
-#include "person.h"
+#include "at_the_window.h"
 #include "procedure/procedure_file.h"
-#include "procedure/scene_file.h"
-#include "render/renderer.h"
-#include "sim/simulation.h"
-#include "window/window.h"
-#include "x_events.h"
-#include "x_server.h"
 
 namespace catgut {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-// The image as seen by a user and, in derived classes, the device. The window runs on the thread that called sit(); the
-// simulated user on another.
-class AtTheWindow : public WorkQueue {
- public:
-  explicit AtTheWindow(int seconds, const char* scene = "stay")
-      : scene_(scene), until_(Clock::now() + std::chrono::seconds(seconds)) {
-    picture_ = picture_model(*build_model(read_scene(scene)));
-  }
-  const PictureModel& picture() const override { return picture_; }
-  const Look& look() const override { return look_; }
-  size_t count(EventKind kind) const override { return happened_[static_cast<size_t>(kind)]; }
-  bool act(const Act& act) override {
-    do_it(act);
-    return see(2);
-  }
-  size_t lesson_step() const { return lesson_step_; }
-  const std::vector<size_t>& lesson_went() const { return lesson_went_; }  // its steps as displayed; after sit()
-  // Until the lesson waits for the user.
-  bool until_reading() {
-    for (int i = 0; i < 30000 && !reading_; ++i)
-      if (!see(1)) return false;
-    return reading_;
-  }
-  // Until the surgeon's demonstration has started, or ended.
-  bool until_showing(bool wanted) {
-    for (int i = 0; i < 30000 && showing_ != wanted; ++i)  // frames that are not drawn count too
-      if (!see(1)) return false;
-    return showing_ == wanted && see(3);
-  }
-  // A user who has failed restarts.
-  virtual void begin_again() = 0;
-  bool restarted() {
-    for (int i = 0; i < 200 && (epoch_ == begun_ || !see(1)); ++i)
-      if (!see(1)) return false;
-    begun_ = epoch_;
-    for (auto& n : happened_) n = 0;
-    return see(3);
-  }
-
-  // Opens the window and performs `work`; true when it was completed within the time limit.
-  bool sit(const std::function<void()>& work, bool teach = false) {
-    std::thread person([&] {
-      if (see(3)) work();
-      gone_ = true;
-    });
-    PlayOptions options;
-    if (teach) options.procedure = "first_stitch", options.tutorial = true;
-    else options.scene = scene_;
-    options.width = 320, options.height = 200;
-    options.seconds = std::max(1.0, std::chrono::duration<double>(until_ - Clock::now()).count());
-    options.watch = [&](const WindowLook& now) {
-      const std::lock_guard lock(mutex_);
-      newest_.seen = now.seen;
-      newest_.view = now.view;
-      newest_.steering = now.steering;
-      active_ = now.mouse.active;
-      epoch_ = now.status.epoch;
-      lesson_step_ = now.status.procedure.stage;
-      if (now.status.procedure.begun && (lesson_went_.empty() || lesson_went_.back() != lesson_step_))
-        lesson_went_.push_back(lesson_step_);
-      showing_ = now.status.demonstrating;
-      reading_ = now.status.reading && !now.status.demonstrating;
-      bites_ = now.status.metrics.bites;
-      ++pictures_;
-      changed_.notify_all();
-      return !gone_ && Clock::now() < until_;
-    };
-    options.on_event = [&](const Event& e) { ++happened_[static_cast<size_t>(e.kind)]; };
-    const int code = play(options);
-    {
-      const std::lock_guard lock(mutex_);
-      closed_ = true;
-      changed_.notify_all();
-    }
-    person.join();
-    return code == 0;
-  }
-
- protected:
-  virtual void do_it(const Act& act) = 0;
-  // Until so many frames have been drawn since: the last of them includes everything before the call.
-  bool see(size_t pictures) {
-    std::unique_lock lock(mutex_);
-    const size_t from = pictures_;
-    changed_.wait(lock, [&] { return closed_ || pictures_ >= from + pictures; });
-    const auto now = Clock::now();
-    const float passed = std::chrono::duration<float>(now - seen_at_).count();
-    seen_at_ = now;
-    look_ = newest_;
-    look_.dt = std::clamp(passed, 0.02f, 0.25f);
-    return !closed_;
-  }
-
-  // The field is hidden: the window shows another screen.
-  bool stands_still() {
-    std::unique_lock lock(mutex_);
-    for (int i = 0; i < 20 && !closed_; ++i) {
-      const size_t from = pictures_;
-      if (!changed_.wait_for(lock, std::chrono::seconds(3), [&] { return closed_ || pictures_ > from; })) return true;
-    }
-    return false;
-  }
-
-  PictureModel picture_;
-  Look look_;
-  std::atomic<size_t> active_{0};
-  std::atomic<uint32_t> epoch_{0};
-  uint32_t begun_ = 0;
-  std::atomic<size_t> lesson_step_{0};
-  std::vector<size_t> lesson_went_;
-  std::atomic<bool> showing_{false}, reading_{false};
-  std::atomic<uint32_t> bites_{0};
-
- private:
-  const char* scene_;
-  Clock::time_point until_, seen_at_ = Clock::now();
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  Look newest_;
-  size_t pictures_ = 0;
-  bool closed_ = false;
-  std::atomic<bool> gone_{false};
-  std::array<std::atomic<size_t>, static_cast<size_t>(EventKind::count_)> happened_{};
-};
-
-class XMouse : public AtTheWindow {
- public:
-  XMouse(const std::string& display, int seconds) : AtTheWindow(seconds), x_(display) {}
-  bool ready() const { return x_.ready(); }
-  void press(const std::string& key) { x_.key(key, true), x_.key(key, false); }
-  void begin_again() override {
-    if (turn_) x_.button(3, turn_ = false);
-    if (both_) x_.key("w", both_ = false);
-    press("F5");
-  }
-
- private:
-  void do_it(const Act& act) override {
-    for (int i = 0; reading_ && i < 40; ++i) {  // a new stage
-      if (i % 8 == 0) press("Return");
-      if (!see(1)) return;
-    }
-    for (int i = 0; act.hand != active_ && i < 40; ++i) {
-      if (i % 8 == 0) x_.key("Tab", true), x_.key("Tab", false);
-      if (!see(1)) return;
-    }
-    const MouseInput in = by_mouse(act, look_, 1);
-    if (turn_ != in.turn) x_.button(3, turn_ = in.turn), see(2);  // before the mouse moves: its meaning changes
-    if (both_ != in.both) x_.key("w", both_ = in.both), see(2);
-    for (float right = in.right, down = in.down; right != 0 || down != 0;) {
-      // The pointer is recentered: no step may be so long that it reaches the edge of the screen.
-      const float x = std::clamp(right, -50.0f, 50.0f), y = std::clamp(down, -50.0f, 50.0f);
-      x_.motion(static_cast<int>(x), static_cast<int>(y));
-      right -= x, down -= y;
-    }
-    const int notches = std::clamp(static_cast<int>(in.wheel), -12, 12);
-    for (int i = 0; i < std::abs(notches); ++i) click(notches > 0 ? 4 : 5);
-    if (in.jaw_presses) click(1);
-    if (in.cut) press("c");
-  }
-  void click(unsigned which) { x_.button(which, true), x_.button(which, false); }
-
-  XEvents x_;
-  bool turn_ = false, both_ = false;
-};
-
-// A virtual gamepad of SDL: it connects, is opened and read like a real one.
-class SdlPad : public AtTheWindow {
- public:
-  using AtTheWindow::AtTheWindow;
-  bool plug_in() {
-    SDL_LockJoysticks();
-    index_ = SDL_JoystickAttachVirtual(SDL_JOYSTICK_TYPE_GAMECONTROLLER, SDL_CONTROLLER_AXIS_MAX, SDL_CONTROLLER_BUTTON_MAX, 1);
-    stick_ = index_ < 0 ? nullptr : SDL_JoystickOpen(index_);
-    pad_ = {};
-    if (stick_) send(pad_);
-    SDL_UnlockJoysticks();
-    return stick_ && see(3);
-  }
-  void tap(SDL_GameControllerButton which) {
-    for (const bool down : {true, false}) {
-      SDL_LockJoysticks();
-      SDL_JoystickSetVirtualButton(stick_, which, down);
-      SDL_UnlockJoysticks();
-      see(3);
-    }
-  }
-  // The window pauses; true when it did.
-  bool pull_out() {
-    SDL_LockJoysticks();
-    SDL_JoystickClose(stick_);
-    SDL_JoystickDetachVirtual(index_);
-    SDL_UnlockJoysticks();
-    stick_ = nullptr;
-    const bool paused = stands_still();
-    press(SDLK_ESCAPE);
-    return see(3) && paused;
-  }
-  void begin_again() override {
-    pad_ = {};
-    send(pad_);
-    see(3);
-    press(SDLK_F5);  // there is no button for it
-  }
-
- private:
-  static void press(SDL_Keycode key) {
-    SDL_Event e{};
-    e.type = SDL_KEYDOWN;
-    e.key.keysym.sym = key;
-    SDL_PushEvent(&e);
-  }
-  void do_it(const Act& act) override {
-    if (stick_) send(by_pad(act, look_, pad_));
-  }
-  void send(const GamepadInput& pad) {
-    const auto axis = [&](int which, float value) {
-      SDL_JoystickSetVirtualAxis(stick_, which, static_cast<Sint16>(std::clamp(value, -1.0f, 1.0f) * 32767));
-    };
-    const auto button = [&](int which, bool down) { SDL_JoystickSetVirtualButton(stick_, which, down); };
-    axis(SDL_CONTROLLER_AXIS_LEFTX, pad.left.x), axis(SDL_CONTROLLER_AXIS_LEFTY, pad.left.y);
-    axis(SDL_CONTROLLER_AXIS_RIGHTX, pad.right.x), axis(SDL_CONTROLLER_AXIS_RIGHTY, pad.right.y);
-    // A trigger rests at the low end of its axis.
-    axis(SDL_CONTROLLER_AXIS_TRIGGERLEFT, 2 * pad.left.trigger - 1);
-    axis(SDL_CONTROLLER_AXIS_TRIGGERRIGHT, 2 * pad.right.trigger - 1);
-    button(SDL_CONTROLLER_BUTTON_LEFTSHOULDER, pad.left.shoulder);
-    button(SDL_CONTROLLER_BUTTON_RIGHTSHOULDER, pad.right.shoulder);
-    button(SDL_CONTROLLER_BUTTON_B, pad.both);
-  }
-  GamepadInput pad_;
-  int index_ = -1;
-  SDL_Joystick* stick_ = nullptr;
-};
-
-class StitchAtTheWindow : public testing::Test {
- protected:
-  void SetUp() override {
-    if (!renderer_available()) GTEST_SKIP() << "no EGL driver here";
-    for (const char* program : {"Xvfb", "xdotool"})
-      if (!on_path(program)) GTEST_SKIP() << program << " is missing (Debian: apt install xvfb xdotool)";
-    x_ = std::make_unique<XServer>();
-    if (x_->display.empty()) GTEST_SKIP() << "Xvfb does not start here";
-    setenv("DISPLAY", x_->display.c_str(), 1);
-    setenv("SDL_VIDEODRIVER", "x11", 1);
-    signal(SIGPIPE, SIG_IGN);
-  }
-  std::unique_ptr<XServer> x_;
-};
-
-// Grasps the needle, sutures both bowel ends, pulls the thread through, approximates, ties a throw. Three attempts: hands that
-// depend on frame timing are not deterministic.
+// Three attempts: hands that depend on frame timing are not deterministic. lesson_runs_test counts first tries.
 void sew_and_tie(AtTheWindow& desk, std::string& stopped_at, int throws, bool cut = false) {
   for (int attempt = 0; attempt < 3; ++attempt) {
     Person me(desk);
-    const auto sewn = [&] { return desk.count(EventKind::bite_completed) >= 2; };
-    if (me.take_needle() && me.bite() && (sewn() || (me.hand_back() && me.bite())) && me.pull_tail(0.1f) &&
-        me.draw_together() && me.tie(1) && (throws < 2 || me.tie(-1)) && (!cut || me.cut_needle()))
-      return stopped_at.clear();
+    if (sew_and_tie_once(desk, me, throws, cut)) return stopped_at.clear();
     stopped_at = me.doing();
     std::fprintf(stderr, "again: %s\n", me.doing().c_str());
     desk.begin_again();
@@ -304,9 +35,10 @@ void expect_a_stitch(AtTheWindow& desk, const std::string& stopped_at) {
   EXPECT_GE(desk.count(EventKind::throw_locked), 1u);
 }
 
-// With the lesson open: follows its instructions to its end.
+// With the lesson open: follows its instructions to its end. Four times as fast as real time, so that it is over in some ten
+// seconds; the nightly tests (lesson_runs_test) do it in real time, in two sizes of the window.
 TEST_F(StitchAtTheWindow, by_mouse_and_keyboard) {
-  XMouse desk(x_->display, 480);
+  XMouse desk(x_->display, 480, 4);
   if (!desk.ready()) GTEST_SKIP() << "no XTest here";
   std::string stopped_at = "nothing was done";
   desk.sit([&] { sew_and_tie(desk, stopped_at, 2, true); }, true);

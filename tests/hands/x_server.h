@@ -26,7 +26,7 @@ struct XServer {
     if (pid == 0) {
       dup2(out[1], 3);
       if (!std::freopen("/dev/null", "w", stderr)) _exit(98);
-      execlp("Xvfb", "Xvfb", "-displayfd", "3", "-screen", "0", "800x600x24", "-noreset", "-nolisten", "tcp", nullptr);
+      execlp("Xvfb", "Xvfb", "-displayfd", "3", "-screen", "0", "1280x800x24", "-noreset", "-nolisten", "tcp", nullptr);
       _exit(99);
     }
     close(out[1]);

@@ -284,6 +284,48 @@ TEST(Manager, errors_count_once_per_event_and_once_per_rise) {
   EXPECT_EQ(h.run.record[1].errors, 3u);
 }
 
+// The scene of clamps has more instruments than the first stage needs.
+TEST(Manager, an_instrument_off_the_stages_tray_is_an_error) {
+  const Procedure p = parse_procedure(R"(title = "t"
+scene = "three_hands"
+tray = ["needle_holder", "forceps"]
+[[stage]]
+name = "a"
+title = "A"
+text = "a"
+goal = {needle_in_holder = 1}
+[[stage]]
+name = "b"
+title = "B"
+text = "b"
+tray = ["scissors"]
+goal = {thread_cut = {min = 1}}
+)",
+                                      "tray.toml");
+  const auto index = [&](const std::string& kind) {
+    return static_cast<uint32_t>(std::find(p.instrument.begin(), p.instrument.end(), kind) - p.instrument.begin());
+  };
+  ASSERT_LT(index("scissors"), p.instrument.size());
+  Snapshot seen;
+  ProcedureRun run;
+  begin_run(run, p, seen, 0.01);
+  const auto take = [&](const std::string& kind) {
+    ++seen.tick;
+    seen.event = {{EventKind::instrument_taken, 0, index(kind), 0, {}}};
+    update_run(run, p, seen);
+  };
+  take("forceps");
+  EXPECT_TRUE(run.error.empty());
+  take("scissors");
+  ASSERT_EQ(run.error.size(), 1u);
+  EXPECT_EQ(p.error[run.error[0].error].name, "tray");
+  seen.tool[0].held = Held::needle;
+  take("scissors");  // the stage ends in the same tick; the event belonged to it
+  EXPECT_EQ(run.stage, 1u);
+  take("scissors");
+  EXPECT_EQ(run.error.size(), 2u) << "on the tray of the second stage";
+}
+
 TEST(Manager, no_stage_is_left_without_a_word) {
   Hand h;
   h.seen.tool[0].held = Held::needle;
