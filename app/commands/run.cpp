@@ -132,6 +132,7 @@ void add_run(CLI::App& app, int& exit_code) {
       ->allow_extra_args(false);
   command->add_option("--record", o->session.record, "write a recording")->type_name("FILE.cgrec");
   command->add_option("--json", o->json, "results as JSON; -: standard output")->type_name("FILE|-");
+  command->add_option("--states", o->states, "with --procedure: saves the state in which each stage begins")->type_name("DIR");
   command->add_option("--csv", o->csv, "stitches, forces, faults and tension over time as a table; -: standard output")
       ->type_name("FILE|-");
   command->add_option("--mesh", o->mesh, "organ surface of the first body, file or file#node")->type_name("FILE");

@@ -15,8 +15,8 @@ const char* screen_name(Screen screen);
 
 enum class Chosen {
   nothing,
-  scene,        // which: of the list
-  teach,        // text: the procedure; empty: the first lesson
+  scene,  // which: of the list
+  teach,
   begin_stage,  // the new stage of a tutorial was read
   record,       // starts or stops it
   show_me,      // demonstration of the stage, or its end

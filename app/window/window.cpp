@@ -49,7 +49,7 @@ namespace {
 constexpr const char* kFont = "fonts/truetype/dejavu/DejaVuSansMono.ttf";  // in a share folder
 constexpr double kMostPictures = 150;                                      // [1/s]
 constexpr double kSlowPicture = 0.07;                                      // [s] a slower frame reduces the resolution
-constexpr const char* kFirstLesson = "simple_suture";                      // of procedures/
+constexpr const char* kFirstLesson = "first_stitch";                       // of procedures/
 constexpr double kMirrorEvery = 1.0 / 20;                                  // [s] of the window's picture beside a headset
 constexpr double kSlowMirror = 0.5;  // [s] where the headset's frames take their whole period
 constexpr double kStallEvery = 2;    // [s] of --stall-ms
@@ -396,7 +396,7 @@ class Window {
         message_.clear();
         break;
       case Chosen::teach:
-        open("", choice.text.empty() ? kFirstLesson : choice.text, "", true);
+        open("", kFirstLesson, "", true);
         message_.clear();
         break;
       case Chosen::show_me:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/app: on a full disk every writer says so in one line with exit code 2, and leaves no empty file. The limit of the file
-// size (ulimit -f 0) makes each write fail like a full disk does.
+// tests/app: on a full disk every writer says so in one line with exit code 2, and leaves no empty results or pictures. The
+// limit of the file size (ulimit -f 0) makes each write fail like a full disk does.
 #include <gtest/gtest.h>
 
 #include "command_line.h"
@@ -34,7 +34,10 @@ class FullDisk : public CommandLine {
     EXPECT_EQ(o.code, 2) << arguments << "\n" << o.err;
     EXPECT_NE(o.err.find(file), std::string::npos) << arguments << ": the file is named\n" << o.err;
     EXPECT_NE(o.err.find("catgut: "), std::string::npos) << o.err;
-    if (fs::is_regular_file(folder_ / file)) { EXPECT_GT(fs::file_size(folder_ / file), 0u) << file << " was left empty"; }
+    // A recording keeps what it holds, and ffmpeg its file.
+    if (fs::is_regular_file(folder_ / file) && !file.ends_with(".cgrec") && !file.ends_with(".mp4")) {
+      EXPECT_GT(fs::file_size(folder_ / file), 0u) << file << " was left empty";
+    }
   }
 };
 

@@ -77,23 +77,5 @@ TEST(Lessons, each_stage_is_done_by_mouse_and_shown) {
   }
 }
 
-// The first exercise: a sweep through both lips of a slit in skin, a square knot, both ends cut.
-TEST(Lessons, a_simple_suture_in_skin_is_sutured_by_mouse) {
-  for (const int ticks : {1, 6}) {  // of the simulation per picture
-    AtTheMouse desk(ticks, "skin");
-    const Procedure lesson = read_procedure("simple_suture");
-    ProcedureRun run;
-    begin_run(run, lesson, desk.look().seen, 1.0 / 60);
-    desk.after_tick = [&](const Snapshot& seen) { update_run(run, lesson, seen); };
-    Person me(desk);
-    ASSERT_TRUE(me.take_needle() && me.bite() && me.pull_tail(0.05f)) << me.doing();
-    if (run.stage < 4) { ASSERT_TRUE(me.draw_together()) << me.doing() << "\n" << run_table(run, lesson); }
-    ASSERT_TRUE(me.tie(1) && me.tie(-1)) << me.doing() << "\n" << run_table(run, lesson);
-    ASSERT_TRUE(me.cut_needle() && me.cut_tail()) << me.doing() << "\n" << run_table(run, lesson);
-    EXPECT_TRUE(finished(run, lesson)) << run_table(run, lesson);
-    EXPECT_TRUE(run.error.empty()) << run_table(run, lesson);
-  }
-}
-
 }  // namespace
 }  // namespace catgut

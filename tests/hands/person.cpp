@@ -258,22 +258,6 @@ bool Person::set_throw() {
   return lay_tail();
 }
 
-bool Person::cut_tail() {
-  doing_ = "cut the tail";
-  const size_t cuts = desk_.count(EventKind::thread_cut);
-  const auto place = [&] { return node_at(seen(), node_along(seen(), first_point_node(seen()), 0.009f, -1)); };
-  for (int attempt = 0; attempt < 3; ++attempt) {
-    if (attempt > 0) repeated_.push_back(doing_);
-    point(
-        0, place, [&] { return distance(seen().tool[0].pose.p, place()) < 0.002f; }, true, 12);
-    Act act;
-    act.cut = true;
-    if (!desk_.act(act)) return false;
-    if (wait(1, [&] { return desk_.count(EventKind::thread_cut) > cuts; })) return true;
-  }
-  return false;
-}
-
 bool Person::cut_needle() {
   doing_ = "cut the needle off";
   Act act;

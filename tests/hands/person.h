@@ -51,7 +51,6 @@ class Person {
   bool wind(int way);
   bool take_tail();
   bool set_throw();
-  bool cut_tail();    // some millimeters from the knot, by the needle holder
   bool cut_needle();  // off the thread, by the hand that holds it
   std::string doing() const { return doing_; }
   const std::vector<std::string>& repeated() const { return repeated_; }  // actions that failed and were tried again
