@@ -170,27 +170,47 @@ void add_lifted_strand(ThreadView& view, const Lift& lift) {
   view.through.clear(), view.node_outside.clear();
 }
 
-// Per node of the suture's thread: between the entry and the exit of a bite it is inside.
+// Per node of the suture's thread: where it lies. Between entry and exit of a bite it is inside the wall. From a hole in the
+// mucosa on it is in the lumen, where it is drawn as physics has it: near the wall's inner side it would else be taken for a
+// thread that sank into the outer one.
 void find_outside(const SutureView& suture, std::vector<uint8_t>& outside) {
   const size_t n = suture.thread_order.size();
   outside.assign(n, kOutside);
-  const auto node = [&](uint32_t slot) {
-    return size_t(std::find(suture.thread_order.begin(), suture.thread_order.end(), slot) - suture.thread_order.begin());
+  struct Hole {
+    size_t node;
+    uint32_t bite, wall;
+    bool exit, mucosa;
   };
+  std::vector<Hole> hole;
   for (const SuturePointView& point : suture.suture_point) {
-    if (point.exit) continue;
-    const size_t from = node(point.anchored);
-    size_t to = n;  // a bite under way: as far as the needle
-    uint8_t where = kThroughWalls;
-    for (const SuturePointView& other : suture.suture_point)
-      if (other.exit && other.bite == point.bite) {
-        to = node(other.anchored);
-        if (other.wall == point.wall) where = kInWall;
-      }
-    if (from >= n) continue;
-    for (size_t i = std::min(from, to) + 1; i < std::max(from, to) && i < n; ++i) outside[i] = where;
-    // Neighbors on the thread: the span between them is inside although both ends are not.
-    if (to < n && std::max(from, to) - std::min(from, to) <= 1) outside[from] = outside[to] = where;
+    const auto at = std::find(suture.thread_order.begin(), suture.thread_order.end(), point.anchored);
+    if (at == suture.thread_order.end()) continue;
+    const bool known = point.bite < suture.bite.size();
+    const bool mucosa = known && (point.exit ? suture.bite[point.bite].exit_inside : suture.bite[point.bite].entry_inside);
+    hole.push_back({size_t(at - suture.thread_order.begin()), point.bite, point.wall, point.exit, mucosa});
+  }
+  std::stable_sort(hole.begin(), hole.end(), [](const Hole& a, const Hole& b) { return a.node < b.node; });
+  if (hole.empty()) return;
+  const auto fill = [&](size_t from, size_t to, uint8_t where) {
+    std::fill(outside.begin() + long(from), outside.begin() + long(to), where);
+  };
+  if (hole.front().mucosa) fill(0, hole.front().node + 1, kThroughWalls);
+  for (size_t i = 0; i < hole.size(); ++i) {
+    const Hole& a = hole[i];
+    if (i + 1 == hole.size()) {
+      // After the last hole; a bite under way has no exit yet and is inside as far as the needle.
+      if (a.mucosa || !a.exit) fill(a.node + 1, n, kThroughWalls);
+      if (a.mucosa) outside[a.node] = kThroughWalls;
+      break;
+    }
+    const Hole& b = hole[i + 1];
+    if (a.bite == b.bite) {
+      const uint8_t where = a.wall == b.wall ? kInWall : kThroughWalls;
+      if (b.node > a.node + 1) fill(a.node + 1, b.node, where);
+      else outside[a.node] = outside[b.node] = where;  // neighbors: the span between them is inside although both ends are not
+    } else if (a.mucosa || b.mucosa) {
+      fill(a.node, b.node + 1, kThroughWalls);
+    }
   }
 }
 
