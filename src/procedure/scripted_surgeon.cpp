@@ -12,6 +12,7 @@ namespace catgut {
 SurgeonSkill skill_of(const SceneSpec& scene) {
   const SurgeonSpec& s = scene.surgeon;
   SurgeonSkill k;
+  if (scene.solver.preset == "paper") k.most_load = 0;
   k.bites = s.bites;
   k.edge_distance = s.edge_distance;
   k.bite_length = s.bite_length;

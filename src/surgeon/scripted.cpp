@@ -9,7 +9,6 @@
 namespace catgut {
 namespace {
 
-constexpr float kMostLoad = 2.8f;     // [N] at a suture point; human small bowel begins to tear at 3.2 N
 constexpr float kCounterHold = 0.8f;  // [N]
 constexpr float kTighten = 0.15f;     // of the free speed: the thread runs through two dozen holes, and tissue follows it late
 constexpr float kSecure = 0.985f;     // fraction of a closure that counts as closed
@@ -394,7 +393,8 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   // Thread that cannot be pulled further is left: the last pull takes up the slack. So is one that would tear its bites.
   float load = 0;  // [N]
   for (const SuturePointView& p : seen.active().suture_point) load = std::max({load, p.tension_needle, p.tension_free});
-  if (slack <= 0 || load > kMostLoad * strength_ || distance(hand_[kForceps].pose.p, pull_from_.p) > 0.29f || !patience(12))
+  if (slack <= 0 || (skill_.most_load > 0 && load > skill_.most_load * strength_) ||
+      distance(hand_[kForceps].pose.p, pull_from_.p) > 0.29f || !patience(12))
     return true;
   // Decelerate before the thread is taut, and when it pulls back: a jerk would tear tissue.
   const float gently = std::clamp(2.0f * strength_ - length(seen.tool[kForceps].force), 0.02f, 1.0f);

@@ -75,8 +75,10 @@ bool Scripted::lay_tail(const Snapshot& seen) {
   const Vec3 place = from + std::min(kTailAside, 0.8f * tail) * normalized(way);
   // The tail of a locked throw gives nothing: where it is taut, it is laid down there.
   const float pull = length(seen.tool[kNeedleHolder].force);
-  if (pull > 2 * kTautTail && !seen.active().knot.empty()) return true;
-  return move(kNeedleHolder, {place, hand_[kNeedleHolder].pose.q}, skill_.speed * std::clamp(1.5f - pull, 0.1f, 1.0f));
+  const bool gentle = skill_.most_load > 0;
+  if (gentle && pull > 2 * kTautTail && !seen.active().knot.empty()) return true;
+  const float speed = gentle ? skill_.speed * std::clamp(1.5f - pull, 0.1f, 1.0f) : skill_.speed;
+  return move(kNeedleHolder, {place, hand_[kNeedleHolder].pose.q}, speed);
 }
 
 void Scripted::choose_grasp(const Snapshot& seen) {
@@ -185,9 +187,10 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
       // A throw that does not come down in time hangs on a tail that lies under an edge: the tail is raised out of there.
       const float rise = patience(kThrowComesDown) ? 0.35f : 2.0f;
       const Vec3 right = normalized(Vec3{side, rise, 0.1f + front}), left = normalized(Vec3{-side, 0.35f, 0.1f - front});
-      if (locked && length(driver.force) > kTautTail) {  // a locked throw gives no more thread: the hand gives way
+      const bool gentle = skill_.most_load > 0;
+      if (locked && gentle && length(driver.force) > kTautTail) {  // a locked throw gives no more thread: the hand gives way
         move(kNeedleHolder, {stitch(seen), hand_[kNeedleHolder].pose.q}, 0.5f * skill_.speed);
-      } else if (!locked) {
+      } else if (!locked || !gentle) {
         move(kNeedleHolder, {pull_from_.p + right * 0.08f, hand_[kNeedleHolder].pose.q}, gently(kNeedleHolder));
         carry_swage(seen, winding_.start + (own_strand ? Vec3{0, 1, 0} : left) * (0.9f * winding_.reach), gently(kForceps));
       }
