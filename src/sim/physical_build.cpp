@@ -97,7 +97,7 @@ void add_bodies(const Model& model, PhysicalModel& made) {
     throw InputError(name_of(model.scene), "it has more than 16 instruments and needles",
                      "physical mechanics have room for 16: remove some");
   bodies.gravity = model.scene.solver.gravity;
-  bodies.pair_contact = false;  // the scripted surgeon's instruments meet at the needle: his plan does not keep them apart
+  bodies.pair_contact = false;  // not tried in scenes yet: the scripted plan does not keep instruments apart
   for (const InstrumentModel& kind : model.suture.instrument) bodies.body.push_back(body_of(model, kind));
   const std::vector<SutureSpec> sutures = sutures_of(model.scene);
   for (uint32_t k = 0; k < sutures.size(); ++k) {
