@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "device/both_hands.h"
 #include "exchange/strand.h"
 #include "exchange/tying.h"
 
@@ -81,12 +80,7 @@ std::vector<ScreenPoint> work_points(const Snapshot& seen, const PictureModel& p
   add(stitch_place(picture, seen));
   for (size_t k = 0; k < 2; ++k)
     for (const float back : {0.0f, 0.5f, 1.0f}) add(seen.tool[k].pose.p + rotate(seen.tool[k].pose.q, {0, 0, back * kJaw}));
-  // Where the tail is grasped, and its free end.
-  if (!suture.suture_point.empty() && !suture.thread_order.empty()) {
-    add(node_at(seen, 0));
-    TailGrip grip;
-    if (tail_grip(picture, seen, 0, grip)) add(grip.pose.p);
-  }
+  if (!suture.suture_point.empty() && !suture.thread_order.empty()) add(node_at(seen, 0));  // the tail's free end
   if (guide) add(entry_of(*guide)), add(exit_of(*guide));
   return out;
 }
@@ -101,11 +95,12 @@ std::vector<PlacedPanel> place_panels(std::span<const Panel> panels, float width
     const auto was = std::find_if(before.begin(), before.end(), [&](const PlacedPanel& b) { return b.name == p.name; });
     Candidate best;
     // All lines, or the first ones; in several widths if it may be wrapped.
-    for (int part = 0; part < (p.keep ? 3 : 1) && best.line.empty(); ++part) {
-      const size_t shown = part == 0 ? p.line.size() : part == 1 ? std::min(p.keep, p.line.size()) : 1;
+    for (int part = 0; part < (p.keep ? 4 : 1) && best.line.empty(); ++part) {
+      const size_t shown = part == 0 ? p.line.size() : part < 3 ? std::min(p.keep, p.line.size()) : 1;
       std::vector<size_t> columns{std::min(widest, p.columns ? p.columns : widest)};
       if (p.columns)
-        columns = {std::min(widest, p.columns), std::min(widest, p.columns * 2 / 3), std::min(widest, p.columns / 2), widest};
+        columns = {std::min(widest, p.columns), std::min(widest, p.columns * 2 / 3), std::min(widest, p.columns / 2),
+                   std::min(widest, p.columns / 3), widest};
       for (size_t c = 0; c < columns.size(); ++c) {
         std::vector<PanelLine> line = wrapped({p.line.data(), shown}, columns[c]);
         PanelRect r = box(line, p.progress >= 0, text);
