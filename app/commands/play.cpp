@@ -142,12 +142,7 @@ void add_play(CLI::App& app, int& exit_code) {
     if (!o->play.scene.empty()) read_scene(o->play.scene);  // reports errors before a window opens
     if (o->play.register_arms && (!o->play.headset || o->play.live.haptics.empty()))
       throw InputError("--register-arms", "a headset and haptic arms are needed", "add --headset and --haptics");
-    if (!o->play.trainee.empty() && !is_pseudonym(o->play.trainee))
-      throw InputError("--trainee " + o->play.trainee, "this is not a pseudonym",
-                       "use letters, digits, dot, dash and underscore, at most 64");
-    if (!o->play.trainee.empty() && !can_keep())
-      throw InputError("--trainee", "this program was built without the store", "build with -DCATGUT_STORE=ON");
-    if (!o->play.survey.empty()) open_survey(o->play.survey);  // reports errors before a window opens
+    check_keeping(o->play.trainee, o->play.survey);  // reports errors before a window opens
     o->play.live.say = [](const std::string& line) { std::fprintf(stderr, "catgut: %s\n", line.c_str()); };
     check_suffix(o->play.live.record, ".cgrec", "--record");
     check_suffix(o->play.json, ".json", "--json");

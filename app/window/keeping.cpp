@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "core/check.h"
+#include "window/settings.h"
 #ifdef CATGUT_WITH_STORE
 #include "commands/keep.h"
 #include "report/survey.h"
@@ -18,6 +19,15 @@ namespace catgut {
 bool SurveyForm::complete() const {
   const bool rated = std::all_of(question.begin(), question.end(), [](const Question& q) { return q.free || q.rating > 0; });
   return rated && (groups.empty() || !group.empty());
+}
+
+void check_keeping(const std::string& trainee, const std::string& survey) {
+  if (!trainee.empty() && !is_pseudonym(trainee))
+    throw InputError("--trainee " + trainee, "this is not a pseudonym",
+                     "use letters, digits, dot, dash and underscore, at most 64");
+  if (!trainee.empty() && !can_keep())
+    throw InputError("--trainee", "this program was built without the store", "build with -DCATGUT_STORE=ON");
+  if (!survey.empty()) open_survey(survey);
 }
 
 #ifdef CATGUT_WITH_STORE

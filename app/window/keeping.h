@@ -24,6 +24,8 @@ struct KeptSession {
 };
 
 bool can_keep();  // built with the store
+// Throws InputError when sessions of this trainee or answers to this survey cannot be kept; empty: nothing to keep.
+void check_keeping(const std::string& trainee, const std::string& survey);
 // Never throws: a fault is the line.
 KeptSession keep_session(const LiveResult& result, const KeepOptions& options);
 

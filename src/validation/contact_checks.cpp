@@ -223,7 +223,7 @@ void ContactBench::event(float max_force, float max_speed) {
 }
 
 void check_contacts(Lines& out, bool nightly) {
-  const int events = nightly ? 10000 : 60;
+  const int events = nightly ? 10000 : 24;
   ContactBench bench(11);
   float deepest[3] = {};
   int passed[3] = {}, folded = 0;

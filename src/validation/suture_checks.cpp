@@ -59,7 +59,7 @@ void check_interrupted(Lines& out, bool nightly) {
     out.add(std::string("closure/interrupted/") + name + ", hands gone 4 s: opens again, 1 for yes", 1,
             o.away > square.away + 1e-3f ? 1 : 0, 0, "", "a knot that does not hold; gap beyond the square knot's by 1 mm");
   };
-  grows("one throw", single_throw(), 0.3f, 3);
+  if (nightly) grows("one throw", single_throw(), 0.3f, 3);
   if (nightly) grows("granny, friction 0.1, 2 N", granny(), 0.1f, 2);
   if (nightly) grows("two throws, square, friction 0.1, 2 N", validation::square(), 0.1f, 2);
 }

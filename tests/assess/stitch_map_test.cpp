@@ -133,7 +133,7 @@ TEST(StitchMap, numbers_that_no_bite_has_are_left_alone) {
 }
 
 TEST(StitchMap, a_surgeons_bites_are_where_he_was_told_to_make_them) {
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#ifdef CATGUT_SANITIZED
   GTEST_SKIP() << "twenty seconds of a surgeon take minutes under a sanitizer";
 #endif
   const SceneSpec scene = read_scene("purse_string");

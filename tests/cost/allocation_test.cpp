@@ -22,7 +22,7 @@
 #include "validation/knot_scenes.h"
 #include "validation/suture_scenes.h"
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if defined(__GLIBC__) && !defined(CATGUT_SANITIZED)
 #define CATGUT_COUNTS_ALLOCATIONS 1
 #endif
 

@@ -388,7 +388,8 @@ TEST(Haptics, H6_garbage) {
     SCOPED_TRACE(k);
     Bench b;
     if (k >= bad.size()) b.unkind = touch_like(), b.unkind.late = 0.02f;
-    const auto& [fault, spoil] = bad[k % bad.size()];
+    const uint32_t fault = bad[k % bad.size()].first;
+    const auto& spoil = bad[k % bad.size()].second;
     b.path = [](float t) { return Vec3{0, 0.005f - 0.012f * smooth(t / 0.4f), 0}; };
     b.warm_up({0, 0.005f, 0});
     b.run(0.6f);

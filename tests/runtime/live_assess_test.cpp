@@ -43,7 +43,7 @@ TEST(LiveAssessment, equals_that_of_the_recording) {
   ASSERT_EQ(options.rubric.size(), 1u);
   Live live(scene, options);
   std::vector<assess::Remark> remarks;
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#ifdef CATGUT_SANITIZED
   constexpr uint64_t kTicks = 240;  // a bite is out of reach under a sanitizer
 #else
   constexpr uint64_t kTicks = 2400;

@@ -325,7 +325,7 @@ TEST(Live, what_cannot_be_recorded_is_refused_before_it_starts) {
 
 // A whole bite by hands that publish like any device; then it is undone.
 TEST(Live, a_bite_can_be_taken_back) {
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#ifdef CATGUT_SANITIZED
   GTEST_SKIP() << "a bite in real time is out of reach under a sanitizer";
 #endif
   const SceneSpec scene = read_scene("purse_string");
