@@ -30,7 +30,8 @@
   }
   // The items of the rubric, as catgut assess scored them.
   function items(score) {
-    return table(`Items of the rubric ${score.title || ""}, version ${score.version || ""}`, [
+    const stages = score.items.some((i) => i.stage) ? [{title: "stage", value: (i) => i.stage}] : [];
+    return table(`Items of the rubric ${score.title || ""}, version ${score.version || ""}`, [...stages,
       {title: "item", value: (i) => i.title || words(i.item)},
       {title: "measured", value: (i) => i.value, cell: (i) => (i.observed === false ? "not observed" : number(i.value, 3) + unit(i.unit)), number: true},
       {title: "points", value: (i) => i.points, cell: (i) => `${number(i.points, 3)} of ${number(i.of, 3)}`, number: true},

@@ -83,6 +83,7 @@ Json score_json(const Score& s) {
                      {"title", i.title},
                      {"metric", i.metric},
                      {"unit", i.unit},
+                     {"stage", i.stage},
                      {"value", i.value},
                      {"points", i.points},
                      {"of", i.of},

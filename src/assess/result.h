@@ -93,6 +93,7 @@ struct LostPoint {
 
 struct ItemScore {
   std::string item, title, metric, unit;
+  std::string stage;            // of the operation, as in the rubric
   double value = kNotObserved;  // summary of the metric
   double points = 0, of = 0;
   bool observed = true, passed = true;

@@ -77,9 +77,9 @@ struct Reader {
   }
 };
 
-const std::vector<std::string> kTop{"title", "technique", "version", "pass", "every_item", "item"};
-const std::vector<std::string> kItem{"key",  "title", "metric",   "weight",    "full",   "half", "critical",
-                                     "each", "pass",  "required", "validated", "source", "why"};
+const std::vector<std::string> kTop{"title", "technique", "version", "pass", "every_item", "needs_stitch", "item"};
+const std::vector<std::string> kItem{"key",      "title", "metric", "stage",    "weight",    "full",   "half",
+                                     "critical", "each",  "pass",   "required", "validated", "source", "why"};
 
 RubricItem read_item(const Reader& in, const toml::table& t) {
   in.only(t, kItem, "an item");
@@ -99,6 +99,7 @@ RubricItem read_item(const Reader& in, const toml::table& t) {
   }
   item.key = in.text(t, "key", item.metric);
   item.title = in.text(t, "title", row->name);
+  item.stage = in.text(t, "stage", "");
   item.weight = in.number(t, "weight", 1, 0, 1000);
   item.pass = in.number(t, "pass", 0.5, 0, 1);
   const bool one = row->summary == Summary::count || row->summary == Summary::spread || row->summary == Summary::only;
@@ -187,6 +188,7 @@ Rubric parse_rubric(const std::string& text, const std::string& filename) {
     throw InputError(filename, "the rubric has no version", "add version = \"1\", and raise it with every change");
   r.pass = in.number(table, "pass", 70, 0, 100);
   r.every_item = in.flag(table, "every_item", false);
+  r.needs_stitch = in.flag(table, "needs_stitch", true);
   const toml::node* items = table.get("item");
   const toml::array* list = items ? items->as_array() : nullptr;
   if (!list || list->empty()) throw InputError(filename, "the rubric has no items", "add [[item]] tables");
@@ -202,16 +204,47 @@ Rubric parse_rubric(const std::string& text, const std::string& filename) {
   return r;
 }
 
+namespace {
+
+bool nothing_sewn(const Result& result) {
+  const Metric* bites = result.find("bites");
+  return bites && bites->value == 0 && result.knot.empty();
+}
+
+// Most items count errors, and an idle session has none. Without this rule it has half of the points.
+Score mark_nothing(Score s, const Rubric& rubric, const Result& result) {
+  for (const RubricItem& item : rubric.item) {
+    ItemScore out;
+    out.item = item.key, out.title = item.title, out.stage = item.stage, out.metric = item.metric,
+    out.unit = find_metric(item.metric)->unit;
+    out.validated = item.validated, out.source = item.source;
+    out.observed = out.passed = false;
+    out.of = item.required ? item.weight : 0;
+    s.of += out.of;
+    s.item.push_back(out);
+  }
+  LostPoint lost;
+  lost.item = "bites", lost.value = kNotObserved, lost.points = s.of, lost.critical = true;
+  lost.tick = result.ticks, lost.time_s = static_cast<double>(result.ticks) * result.tick_s;
+  lost.why = "no bite was completed and no throw was locked: there is nothing to judge, so there are no points";
+  s.lost.push_back(lost);
+  s.verdict = "failed: no stitch";
+  return s;
+}
+
+}  // namespace
+
 Score mark(const Rubric& rubric, const Result& result) {
   Score s;
   s.rubric = rubric.name, s.title = rubric.title, s.version = rubric.version, s.rubric_hash = rubric.hash;
   s.pass = rubric.pass, s.every_item = rubric.every_item;
+  if (rubric.needs_stitch && nothing_sewn(result)) return mark_nothing(std::move(s), rubric, result);
   size_t failed = 0, critical = 0;
   for (const RubricItem& item : rubric.item) {
     const MetricRow* row = find_metric(item.metric);
     const Metric* metric = result.find(item.metric);
     ItemScore out;
-    out.item = item.key, out.title = item.title, out.metric = item.metric, out.unit = row->unit;
+    out.item = item.key, out.title = item.title, out.stage = item.stage, out.metric = item.metric, out.unit = row->unit;
     out.validated = item.validated, out.source = item.source;
     out.value = metric ? metric->value : kNotObserved;
     out.of = item.weight;
@@ -251,6 +284,7 @@ Score mark(const Rubric& rubric, const Result& result) {
       if (item.required) {
         LostPoint lost;
         lost.item = item.key, lost.value = kNotObserved, lost.points = item.weight;
+        lost.critical = item.has_critical, critical += item.has_critical;  // a knot that was not tied does not hold
         lost.tick = result.ticks, lost.time_s = static_cast<double>(result.ticks) * result.tick_s;
         lost.why = fmt::format("{}: not observed in this session, required {}", item.title, band_text(item.full, row->unit));
         s.lost.push_back(lost);
@@ -278,10 +312,18 @@ Score mark(const Rubric& rubric, const Result& result) {
 std::string score_text(const Score& s) {
   std::string out = fmt::format("{} (rubric {}, version {})\n{}\n{:.1f} of {} points\n\n", s.title, s.rubric, s.version,
                                 s.verdict, s.points, s.of);
-  for (const ItemScore& i : s.item)
+  for (size_t k = 0; k < s.item.size(); ++k) {
+    const ItemScore& i = s.item[k];
+    if (!i.stage.empty() && (k == 0 || s.item[k - 1].stage != i.stage)) {
+      double points = 0, of = 0;
+      for (const ItemScore& other : s.item)
+        if (other.stage == i.stage) points += other.points, of += other.of;
+      out += fmt::format(" {}: {:.1f} of {}\n", i.stage, points, of);
+    }
     out += fmt::format("  {:<34} {:>10} {:<4} {:>6.2f} of {:<5} {}{}\n", i.title,
                        std::isfinite(i.value) ? short_number(i.value) : "-", i.unit, i.points, i.of,
                        i.observed ? i.passed ? "" : "below the limit" : "not observed", i.validated ? "" : "  *");
+  }
   out += "  * no study with people has validated this band\n";
   if (!s.lost.empty()) out += "\nLost points\n";
   for (const LostPoint& l : s.lost)

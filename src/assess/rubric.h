@@ -16,10 +16,11 @@ struct Band {
 
 struct RubricItem {
   std::string key, title, metric;
+  std::string stage;  // of the operation, for sums by stage; empty: none
   double weight = 1;  // points
   Band full, half;    // all, or half of the points; beyond: none. half contains full
   bool has_critical = false;
-  Band critical;           // outside it the session fails
+  Band critical;           // outside it the session fails; also where a required item was not observed
   bool each = true;        // every sample is judged, and has its share of the points; else the summary
   double pass = 0.5;       // part of the points that the item needs, where every item must pass
   bool required = true;    // without an observation the points are lost; else the item does not count
@@ -33,6 +34,7 @@ struct Rubric {
   uint64_t hash = 0;  // of the file
   double pass = 70;   // [%] of the points
   bool every_item = false;
+  bool needs_stitch = true;  // a session without a completed bite and without a throw has no points
   std::vector<RubricItem> item;
 };
 

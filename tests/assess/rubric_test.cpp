@@ -33,7 +33,7 @@ Result with(const char* key, std::vector<Sample> samples, double value) {
 
 TEST(Rubric, every_technique_has_a_valid_one) {
   const std::vector<std::string> names = rubric_names();
-  EXPECT_GE(names.size(), 5u);
+  EXPECT_GE(names.size(), 6u);
   for (const std::string& name : names) {
     const Rubric r = read_rubric(name);
     EXPECT_FALSE(r.version.empty());
@@ -123,6 +123,75 @@ TEST(Rubric, what_was_not_observed_is_lost_or_left_out) {
   const Score out = mark(parse_rubric(rubric(item + "required = false\n"), "my.toml"), none);
   EXPECT_DOUBLE_EQ(out.of, 0);
   EXPECT_TRUE(out.lost.empty());
+}
+
+// The metrics of an idle session: counts are zero, nothing else was observed.
+Result idle_session() {
+  Result r;
+  r.ticks = 600;
+  for (const MetricRow& row : metric_rows())
+    r.metric.push_back({row.key, row.summary == Summary::count ? 0.0 : kNotObserved, {}});
+  return r;
+}
+
+TEST(Rubric, a_session_without_a_stitch_has_no_points_and_the_reason) {
+  for (const std::string& name : rubric_names()) {
+    const Score s = mark(read_rubric(name), idle_session());
+    EXPECT_EQ(s.percent, 0) << name;
+    EXPECT_GT(s.of, 0) << name;
+    EXPECT_FALSE(s.passed) << name;
+    EXPECT_EQ(s.verdict, "failed: no stitch");
+    ASSERT_EQ(s.lost.size(), 1u) << name;
+    EXPECT_TRUE(s.lost[0].critical);
+    EXPECT_DOUBLE_EQ(s.lost[0].points, s.of);
+    EXPECT_NE(s.lost[0].why.find("no bite was completed"), std::string::npos);
+    EXPECT_EQ(s.item.size(), read_rubric(name).item.size());
+  }
+  // An exercise without sewing says so, and is judged as usual.
+  const std::string item = "[[item]]\nmetric = \"slips\"\nfull = [0, 0]\n";
+  EXPECT_EQ(mark(parse_rubric(rubric(item), "my.toml"), idle_session()).percent, 0);
+  EXPECT_EQ(mark(parse_rubric(rubric(item, "version = \"1\"\nneeds_stitch = false\n"), "my.toml"), idle_session()).percent,
+            100);
+}
+
+TEST(Rubric, points_are_summed_by_the_stages_of_an_operation) {
+  const Rubric r = read_rubric("altemeier");
+  std::vector<std::string> stages;
+  for (const RubricItem& i : r.item)
+    if (stages.empty() || stages.back() != i.stage) stages.push_back(i.stage);
+  EXPECT_EQ(stages, (std::vector<std::string>{"Field", "Anastomosis", "Knots", "Hands"}));  // each once: its items are together
+  // Twelve sutures without a fault, then with a granny and with a clamp that tore off.
+  Result run = idle_session();
+  const auto put = [&](const std::string& key, double value) {
+    for (Metric& m : run.metric)
+      if (m.key == key) m.value = value, m.sample.assign(1, Sample{value, 60, {}, {}});
+  };
+  for (const RubricItem& i : r.item) put(i.metric, i.full.low);
+  const Score good = mark(r, run);
+  EXPECT_TRUE(good.passed) << good.verdict;
+  EXPECT_EQ(good.percent, 100);
+  put("square", 0), put("tissue_slips", 1);
+  const Score bad = mark(r, run);
+  EXPECT_FALSE(bad.passed);
+  ASSERT_EQ(bad.lost.size(), 2u);
+  const std::string text = score_text(bad);
+  EXPECT_NE(text.find(" Field: 7.0 of 10\n"), std::string::npos) << text;
+  EXPECT_NE(text.find(" Anastomosis: 80.0 of 80\n"), std::string::npos) << text;
+  EXPECT_NE(text.find(" Knots: 26.0 of 38\n"), std::string::npos) << text;
+}
+
+TEST(Rubric, a_knot_that_was_not_tied_is_a_critical_error) {
+  const Rubric r = parse_rubric(rubric("[[item]]\nmetric = \"slips\"\nweight = 99\nfull = [0, 0]\n"
+                                       "[[item]]\nmetric = \"throws\"\nfull = [2, 6]\ncritical = [2, 99]\n"),
+                                "my.toml");
+  Result one_bite = idle_session();
+  for (Metric& m : one_bite.metric)
+    if (m.key == "bites") m.value = 1;
+  const Score s = mark(r, one_bite);
+  EXPECT_EQ(s.percent, 99);
+  EXPECT_FALSE(s.passed);
+  ASSERT_EQ(s.lost.size(), 1u);
+  EXPECT_TRUE(s.lost[0].critical);
 }
 
 TEST(Metrics, the_table_is_complete) {
