@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/store: nothing committed is lost. A child process stores sessions and reports each one after add() has returned; it is
 // killed at random moments, dies at a given byte of the file, finds the disk full or read-only. Afterwards every reported
-// session is there whole. CATGUT_LONG=1 (the nightly run) takes 200 kills, and every 61st byte instead of every 997th.
+// session is there whole. CATGUT_LONG=1 (the nightly run) takes 200 kills instead of 8, and every 61st byte instead of every
+// 4999th.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sched.h>
@@ -112,13 +113,13 @@ void kill_at_random_moments(const std::string& where, int kills) {
 
 TEST(Crash, kill_9_at_random_moments_loses_nothing_stored) {
   const Folder folder;
-  kill_at_random_moments(folder / "sessions.db", whole_range() ? 200 : 20);
+  kill_at_random_moments(folder / "sessions.db", whole_range() ? 200 : 8);
 }
 
 TEST(Crash, kill_9_at_random_moments_loses_nothing_stored_on_postgresql) {
   if (const std::string missing = Server::get().missing(); !missing.empty())
     GTEST_SKIP() << "left out on PostgreSQL: " << missing;
-  kill_at_random_moments(Server::get().fresh_url(), whole_range() ? 200 : 20);
+  kill_at_random_moments(Server::get().fresh_url(), whole_range() ? 200 : 8);
 }
 
 // The system kills a process that writes past this size of a file: the write is cut at exactly that byte, in the journal or in
@@ -130,7 +131,7 @@ TEST(Crash, death_at_any_byte_loses_nothing_stored) {
     Store store(at(start));
     for (int n = 0; n < 3; ++n) store.add(numbered(n));
   }
-  const uintmax_t size = fs::file_size(start), step = whole_range() ? 61 : 997;
+  const uintmax_t size = fs::file_size(start), step = whole_range() ? 61 : 4999;
   int died = 0, tries = 0;
   for (uintmax_t limit = 512; limit < size + 60000; limit += step, ++tries) {
     const std::string where = folder / "copy.db";

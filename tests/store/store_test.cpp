@@ -48,6 +48,15 @@ TEST_P(Stores, a_session_reads_back_as_it_was_stored) {
   EXPECT_EQ(again.people().size(), 1u);
 }
 
+// The stitches and the tension of a long operation.
+TEST_P(Stores, two_megabytes_of_details_read_back) {
+  Session s = some_session();
+  for (int k = 0; s.details.size() < 2u << 20; ++k)
+    s.details += "{\"tension\": " + std::to_string(k) + ", \"text\": \"\xc3\xa9'\\\\\"}";
+  Store store = open();
+  EXPECT_EQ(store.session(store.add(s)).details, s.details);
+}
+
 TEST_P(Stores, what_was_not_measured_stays_unknown) {
   Store store = open();
   Session s = some_session();
@@ -187,12 +196,12 @@ TEST_P(Stores, two_stations_write_at_once) {
   open();
   const auto work = [&](const std::string& who) {
     Store store = open();
-    for (int n = 0; n < 25; ++n) store.add(some_session(who, n));
+    for (int n = 0; n < 12; ++n) store.add(some_session(who, n));
   };
   std::thread a(work, "T01"), b(work, "T02"), c(work, "T01b");
   a.join(), b.join(), c.join();
   const Store store = open();
-  EXPECT_EQ(store.sessions().size(), 75u);
+  EXPECT_EQ(store.sessions().size(), 36u);
   for (const Session& s : store.sessions()) EXPECT_EQ(store.session(s.id).metric.size(), 3u);
 }
 
