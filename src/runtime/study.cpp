@@ -48,14 +48,28 @@ std::vector<std::string> words(const std::string& file, const toml::table& t, co
   return out;
 }
 
+// The abilities of one person on the way to those of an expert, as ratios. The person is drawn with the run's seed; the noise
+// of each session is its own.
+void practise(SceneSpec& scene, const StudyRun& run, double share, size_t session) {
+  SceneSpec expert = scene;
+  apply_ability(expert, "scripted:expert");
+  for (const AbilityRow& row : abilities()) {
+    const double from = static_cast<double>(scene.surgeon.*row.member), to = static_cast<double>(expert.surgeon.*row.member);
+    if (from > 0 && to > 0) scene.surgeon.*row.member = static_cast<float>(from * std::pow(to / from, share));
+  }
+  scene.seed = run.seed * 1000 + session;
+}
+
 // The scene of a run, ready.
 SceneSpec scene_of_run(const StudyPlan& plan, const StudyRun& run, std::string& surgeon) {
   SceneSpec scene = read_scene(run.scene);
   set_value(scene, fmt::format("seed={}", run.seed), "seed");
   surgeon = apply_ability(scene, run.surgeon);
-  for (const StudySetting& s : plan.setting)
-    if (s.name == run.setting)
-      for (const std::string& set : s.set) set_value(scene, set, "setting " + s.name);
+  for (const StudySetting& s : plan.setting) {
+    if (s.name != run.setting) continue;
+    if (s.practice >= 0) practise(scene, run, s.practice, static_cast<size_t>(&s - plan.setting.data()) + 1);
+    for (const std::string& set : s.set) set_value(scene, set, "setting " + s.name);
+  }
   return scene;
 }
 
@@ -171,9 +185,16 @@ StudyPlan parse_study(const std::string& text, const std::string& file) {
       const toml::table* s = row.as_table();
       if (!s) throw InputError(at(file, row), "a setting is not a table", "write [[setting]]");
       for (const auto& [key, node] : *s)
-        if (key.str() != "name" && key.str() != "set")
-          throw InputError(at(file, node), fmt::format("a setting has no key \"{}\"", key.str()), "it has name and set");
-      p.setting.push_back({(*s)["name"].value_or(fmt::format("setting {}", p.setting.size() + 1)), words(file, *s, "set")});
+        if (key.str() != "name" && key.str() != "set" && key.str() != "practice")
+          throw InputError(at(file, node), fmt::format("a setting has no key \"{}\"", key.str()),
+                           "it has name, set and practice");
+      StudySetting made{(*s)["name"].value_or(fmt::format("setting {}", p.setting.size() + 1)), words(file, *s, "set")};
+      if (const toml::node* share = s->get("practice")) {
+        made.practice = share->value<double>().value_or(-1);
+        if (!(made.practice >= 0 && made.practice <= 1))
+          throw InputError(at(file, *share), "practice is not a share", "0: as the level was drawn; 1: as an expert");
+      }
+      p.setting.push_back(made);
     }
   }
   if (p.setting.empty()) p.setting.push_back({"default", {}});

@@ -13,6 +13,8 @@ namespace catgut {
 struct StudySetting {
   std::string name;
   std::vector<std::string> set;  // as `--set`
+  // 0..1: the abilities lie between those of the run's level and an expert's, and each setting has its own noise; -1: as drawn.
+  double practice = -1;
 };
 
 struct StudyPlan {

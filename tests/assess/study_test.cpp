@@ -77,6 +77,39 @@ TEST(Study, runs_are_divided_resumed_and_repeated_to_the_bit) {
   EXPECT_EQ(make_runs(longer, o).made, 4u);
 }
 
+TEST(Study, the_studies_of_the_pages_are_valid) {
+  const std::string folder = CATGUT_SOURCE_DIR "/studies/";
+  EXPECT_EQ(runs_of(read_study(folder + "levels.toml")).size(), 480u);
+  EXPECT_EQ(runs_of(read_study(folder + "cohort.toml")).size(), 1200u);
+}
+
+// A cohort: seeds are trainees, settings are sessions.
+TEST(Study, practice_leads_from_the_drawn_abilities_to_those_of_an_expert) {
+  std::string text = "scenes = [\"stay\"]\nsurgeons = [\"scripted:novice\"]\nseeds = [1, 2]\nseconds = 6\n";
+  for (const char* share : {"0.0", "1.0"})
+    text += std::string("[[setting]]\nname = \"") + share + "\"\npractice = " + share + "\n";
+  const StudyPlan plan = parse_study(text, "cohort.toml");
+  EXPECT_NE(fault_of(text + "[[setting]]\npractice = 2\n").find("practice is not a share"), std::string::npos);
+  const Folder folder;
+  StudyOptions o;
+  o.folder = folder.path;
+  EXPECT_EQ(make_runs(plan, o).made, 4u);
+  std::istringstream table(study_table(plan, folder.path));
+  std::vector<double> tremor[2];
+  size_t column = 0, row = 0;
+  for (std::string line; std::getline(table, line); ++row) {
+    std::vector<std::string> cell{""};
+    for (const char c : line) c == ',' ? cell.emplace_back() : (cell.back() += c, cell.back());
+    if (row == 0) column = static_cast<size_t>(std::find(cell.begin(), cell.end(), "tremor") - cell.begin());
+    else tremor[cell[2] == "1.0"].push_back(std::stod(cell[column]));
+  }
+  ASSERT_EQ(tremor[0].size(), 2u);
+  ASSERT_EQ(tremor[1].size(), 2u);
+  // A novice's hand trembles four times as much as an expert's.
+  for (size_t k = 0; k < 2; ++k) EXPECT_GT(tremor[0][k], 1.5 * tremor[1][k]) << k;
+  EXPECT_NE(tremor[0][0], tremor[0][1]);
+}
+
 TEST(Study, area_under_the_curve) {
   EXPECT_DOUBLE_EQ(area_under_curve({1, 2, 3}, {4, 5}), 1);
   EXPECT_DOUBLE_EQ(area_under_curve({4, 5}, {1, 2, 3}), 0);
