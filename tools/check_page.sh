@@ -16,4 +16,4 @@ mkdir -p "$work"
 cp "$root"/tests/page/{package.json,package-lock.json,page.mjs} "$work/"
 [ -d "$work/node_modules" ] && cmp -s "$work/package-lock.json" "$work/installed.json" ||
   { (cd "$work" && npm ci --no-audit --no-fund --ignore-scripts >npm.log 2>&1) || { tail -n 5 "$work/npm.log" >&2; exit 1; }; cp "$work/package-lock.json" "$work/installed.json"; }
-cd "$work" && exec node page.mjs "$program" "$out/run" "$(command -v chromium)"
+cd "$work" && exec node page.mjs "$program" "$out/run" "$(command -v chromium)" "$root/tests/page/runs.csv"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reports and the educator's page in a real browser: a cohort of 60 trainees with 20 sessions each, every page at the size of a
 // phone, of a laptop and of paper, the accessibility check of axe-core, forms, roles, hostile texts.
-//   node page.mjs PROGRAM OUT_FOLDER [CHROMIUM]
+//   node page.mjs PROGRAM OUT_FOLDER CHROMIUM RUNS
 import {strict as assert} from "node:assert";
 import {execFileSync, spawn} from "node:child_process";
 import fs from "node:fs";
@@ -9,26 +9,42 @@ import path from "node:path";
 import {createRequire} from "node:module";
 import {chromium} from "playwright-core";
 
-const [program, out, browserPath = "/usr/bin/chromium"] = process.argv.slice(2);
+const [program, out, browserPath, runsFile] = process.argv.slice(2);
 const axeSource = fs.readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 fs.rmSync(out, {recursive: true, force: true});
 fs.mkdirSync(out, {recursive: true});
 const store = path.join(out, "sessions.db");
 const run = (args, input) => execFileSync(program, args, {env: {...process.env, CATGUT_STORE: store}, input, encoding: "utf8", stdio: ["pipe", "pipe", "inherit"]});
 
-// Synthetic trainees: a learning curve 45 -> 85 points with noise of a fixed seed. Not a model of people.
+// A cohort drawn from real runs of scripted surgeons (runs.csv: `catgut study studies/levels.toml --out`). With practice, 1 - exp(-k / 6)
+// after k sessions, a session becomes less often a novice's run and more often an expert's. Not a model of people.
+const real = {};
+const [heading, ...lines] = fs.readFileSync(runsFile, "utf8").trim().split(/\r?\n/).map((line) => line.split(","));
+for (const line of lines) {
+  const run = Object.fromEntries(heading.map((key, i) => [key, line[i]]));
+  ((real[run.scene] ??= {})[run.surgeon.split(":")[1]] ??= []).push(run);
+}
+function correlation(a, b) {
+  const mean = (v) => v.reduce((x, y) => x + y, 0) / v.length, ma = mean(a), mb = mean(b);
+  const sum = (f) => a.reduce((t, _, i) => t + f(a[i] - ma, b[i] - mb), 0);
+  return sum((x, y) => x * y) / Math.sqrt(sum((x) => x * x) * sum((_, y) => y * y));
+}
+const practice = (k) => 1 - Math.exp(-k / 6);
 function cohort(trainees, each) {
   let seed = 7;
   const uniform = () => (seed = (seed * 1103515245 + 12345) % 2147483648) / 2147483648;
   const gauss = () => Math.sqrt(-2 * Math.log(uniform() + 1e-12)) * Math.cos(2 * Math.PI * uniform());
+  const shown = [["edge_in", "mm", 2, 5], ["spacing", "mm", null, 5], ["gap", "mm", null, 1], ["path", "m", null, null], ["bites", "1", null, null], ["tremor", "mm", null, 0.2], ["hesitations", "1", null, 2]];
   const sessions = [];
   for (let k = 0; k < each; ++k) for (let p = 0; p < trainees; ++p) {
-    const score = Math.max(0, Math.min(100, 45 + 8 * (p % 3) + 40 * (1 - Math.exp(-k / 6)) + 6 * gauss()));
+    const task = p % 10 === 9 ? "stay" : "purse_string", w = practice(k);
+    const level = uniform() < Math.abs(2 * w - 1) ? (w < 0.5 ? "novice" : "expert") : "intermediate", of = real[task][level];
+    const run = of[Math.floor(uniform() * of.length)], score = Number(run.score);
     const times = [...Array(300).keys()];
-    sessions.push({catgut_session: 1, uid: `s${p}-${k}`, trainee: `T${String(p + 1).padStart(2, "0")}`, task: p % 10 === 9 ? "stay" : "purse_string",
+    sessions.push({catgut_session: 1, uid: `s${p}-${k}`, trainee: `T${String(p + 1).padStart(2, "0")}`, task,
       started: `2026-${String(1 + Math.floor(k / 2)).padStart(2, "0")}-${String(1 + (k % 2) * 14).padStart(2, "0")}T08:${String(p).padStart(2, "0")}:00Z`,
-      duration_s: 300 + 200 * Math.exp(-k / 6) + 20 * gauss(), score, score_max: 100, passed: score >= 75, rubric: "purse_string 1", program: "0.1.0",
-      metrics: [["spacing", 4 + gauss(), "mm", 3, 5], ["edge_in", 4 + gauss(), "mm", 3, 5], ["gap", Math.abs(gauss()), "mm", null, 1], ["path", 6 + gauss(), "m", null, null], ["bites", 12, "1", 10, null]].map(([name, value, unit, low, high]) => ({name, value, unit, low, high})),
+      duration_s: Number(run.time), score, score_max: 100, passed: run.passed === "1", rubric: `${task} 2`, program: "0.1.0",
+      metrics: shown.filter(([name]) => run[name]).map(([name, unit, low, high]) => ({name, value: Number(run[name]), unit, low, high})),
       lost: [{item: "spacing", reason: "bites 3 and 4 are 7.1 mm apart", place: "bite 4", points: 5, at_s: 44, critical: false}],
       events: [{at_s: 20, kind: "bite_completed", text: ""}],
       details: {lines: [{length_mm: 126}], bites: [...Array(12).keys()].map((b) => ({wall: 0, time_s: 20 * b, along_mm: [10 * b + 1, 10 * b + 5], edge_mm: [4 + gauss(), 4 + gauss()], spacing_mm: 5})),
@@ -125,7 +141,7 @@ for (const name of ["session", "trainee", "survey"]) await look(`file://${path.r
 {
   const page = await open(await browser.newContext(), `file://${path.resolve(out)}/odd.html`, "file://");
   check((await page.locator("text=unknown form").count()) === 3, "three parts of an odd session are left out, the rest is shown");
-  check((await page.locator("section[aria-label='Metrics'] tbody tr").count()) === 5 && page.faults.length === 0, "its metrics are there");
+  check((await page.locator("section[aria-label='Metrics'] tbody tr").count()) === 6 && page.faults.length === 0, "its metrics are there");
 }
 
 // The educator's page, without logins, on this machine.
@@ -171,12 +187,20 @@ await look(server.url + "survey/rectal_prolapse/results", "results", server.url)
   await curve.locator("summary").click();
   const shown = Number(await curve.locator("tbody tr").first().locator("td").nth(1).textContent());
   check(Math.abs(shown - median) < 0.01, `median of the first attempt: ${shown}, expected ${median}`);
+  // The curve follows the abilities that were put in: at each attempt between novices and experts as the practice says.
+  const middle = (level) => real.purse_string[level].map((r) => Number(r.score)).sort((a, b) => a - b)[real.purse_string[level].length >> 1];
+  const medians = [];
+  for (const row of await curve.locator("tbody tr").all()) medians.push(Number(await row.locator("td").nth(1).textContent()));
+  check(medians.length >= 20, `the curve has ${medians.length} attempts`);
+  check(Math.abs(medians[0] - middle("novice")) < 6 && Math.abs(medians[19] - middle("expert")) < 6, `curve from ${medians[0]} to ${medians[19]}, expected ${middle("novice")} to ${middle("expert")}`);
+  const rise = correlation(medians.slice(0, 20), medians.slice(0, 20).map((_, k) => practice(k)));
+  check(rise > 0.9, `correlation of the curve with the practice: ${rise}`);
   await page.selectOption("#cohort", "");
   // Groups by a metric, which is fetched.
-  await page.selectOption("#metric", "gap");
-  await page.waitForSelector("svg[aria-label^='gap']");
+  await page.selectOption("#metric", "path");
+  await page.waitForSelector("svg[aria-label^='path']");
   await page.selectOption("#by", "level");
-  check(await page.locator("svg[aria-label^='gap'] rect").count() === 4, "three levels, and none");
+  check(await page.locator("svg[aria-label^='path'] rect").count() === 4, "three levels, and none");
   // Assign a task, see it, remove it.
   await page.fill("#a-cohort", "autumn 2026");
   await page.fill("#a-task", "purse_string");
