@@ -237,6 +237,7 @@ class Window {
     live.rubric = rubrics_for("", scene);
     live.remarks = true;  // they are shown as far as the settings want them
     leave();
+    live.hands = hands_.begin(scene, settings_);
     visit_ = std::make_unique<Visit>(scene, live, events_, [this](const Event& e) {
       if (options_.on_event) options_.on_event(e);
       if (wearer_) wearer_->feel(e);
@@ -245,12 +246,12 @@ class Window {
     tutorial_ = live.tutorial;
     source_ = {name, procedure, stage, tutorial};
     places_ = bite_places(scene, visit_->live.picture());
+    hands_.steering = start_steering(visit_->live.picture(), settings_.left_handed);
     cue_source_ = assess::cue_source(visit_->live.picture(), assess_setup(scene).wall);
     rubric_ = live.rubric;
     asked_ = false;
     shown_stage_ = 0;
     used_keys_ = {};
-    hands_.begin(visit_->live.picture(), settings_);
     stage_picture(visit_->live.picture());
     go(Screen::practice);
   }
@@ -560,7 +561,7 @@ class Window {
           wear();
         } else {
           wearer_.reset();
-          worn_ = had_worn_ = false;
+          worn_ = false;
           headset_line_.clear();
         }
         break;
@@ -718,7 +719,7 @@ class Window {
     const LiveStatus& status = v.live.status();
     if (status.epoch != v.epoch) {
       v.epoch = status.epoch;
-      hands_.jumped(v.live.picture(), v.seen, settings_, status.metrics.time_s == 0 && !status.prepared);
+      hands_.jumped();
       if (wearer_) wearer_->jumped(v.seen);
     }
     if (!status.fault.empty() && screen_ == Screen::practice) go(Screen::pause);
@@ -734,19 +735,15 @@ class Window {
       return;
     }
     used_keys_.note(in);
-    hands_.steering.guide = next_bite(places_, v.live.picture(), v.seen);
     std::optional<std::array<ToolInput, 2>> worn;
     if (wearer_) {
       worn = wearer_->hands(v.seen, space_hands(), {status.arm[0], status.arm[1]});
-      // When the headset is gone, the mouse continues from where the instruments are.
-      if (had_worn_ && !worn) hands_.jumped(v.live.picture(), v.seen, settings_, false);
-      had_worn_ = worn.has_value();
       if (Pose head; wearer_->head(head)) v.live.head(head);
     }
-    auto hands = hands_.move(in, settings_, view, v.live.picture(), v.seen, dt);
+    std::array<bool, 2> elsewhere{};  // a hand without a controller stays with the mouse
     for (size_t k = 0; worn && k < 2; ++k)
-      if ((*worn)[k].connected) hands[k] = (*worn)[k];  // a hand without a controller stays with the mouse
-    for (size_t k = 0; k < 2; ++k) v.live.hand(k, hands[k]);
+      if ((elsewhere[k] = (*worn)[k].connected)) v.live.hand(k, (*worn)[k]);
+    hands_.move(in, settings_, view, elsewhere, dt, status.epoch);
     if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_, worn_look()}))
       quit_ = true;
   }
@@ -906,7 +903,7 @@ class Window {
   bool worn_ = false;                   // the headset wants this frame
   bool headset_offered_ = false;
   std::string headset_line_;  // its last report
-  bool had_worn_ = false, board_styled_ = false, on_board_ = false;
+  bool board_styled_ = false, on_board_ = false;
   double mirrored_ = 0;  // [s]
   WindowEvents events_in_;
   Settings settings_, kept_, at_start_;  // current; stored in the file; at the last check

@@ -18,8 +18,9 @@ constexpr float kGoesOn = 0.012f;      // [m]
 constexpr float kSpeed = 0.15f, kLift = 0.1f, kCareful = 0.06f, kTurn = 4.0f;  // [m/s], [m/s], [rad/s]
 constexpr float kLongestDraw = 0.05f;                                          // [s] of motion in one frame of drawing
 constexpr float kDrawPerRad = 0.012f;                          // [m] per radian of the gesture by which the hands move apart
-constexpr float kGiveInTissue = 0.010f, kGiveAtKnot = 0.002f;  // [m] that a hand may pull a taut strand
-constexpr float kCounterHold = 0.8f;                           // [N] above this the thread sticks in its holes
+constexpr float kGiveInTissue = 0.010f, kGiveAtKnot = 0.002f;  // [m] that a hand may pull a taut strand, and
+constexpr float kGiveToThrow = 0.040f;  // [m] one whose throw is not locked: its loop still has thread to give
+constexpr float kCounterHold = 0.8f;    // [N] above this the thread sticks in its holes
 
 enum { lift, lay, beside, wind };  // stages of winding
 
@@ -158,7 +159,9 @@ Vec3 on_leash(const PictureModel& picture, const Snapshot& seen, size_t who, Vec
   const float pair = seen.active().thread_rest / static_cast<float>(std::max<size_t>(1, whole_pairs(seen)));
   const Vec3 off = end + (p - tool.pose.p) - anchor;
   const float most = static_cast<float>(std::max(from, held) - std::min(from, held)) * pair +
-                     (seen.active().knot.empty() ? kGiveInTissue : kGiveAtKnot);
+                     (seen.active().knot.empty()                                 ? kGiveInTissue
+                      : seen.active().knot.back().phase == KnotPhase::tightening ? kGiveToThrow
+                                                                                 : kGiveAtKnot);
   const float far = length(off);
   return far > most ? p - off * ((far - most) / far) : p;
 }

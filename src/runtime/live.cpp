@@ -112,6 +112,10 @@ void Live::Work::tick(bool let_in) {
     published.shown = published.shown || (published.demonstrating && hands.done());
   } else if (let_in) {
     for (Command c; input.commands.count < CommandList::kCapacity && orders.pop(c);) input.commands.push(c);
+    std::array<ToolInput, 2> steered{no_hand(), no_hand()};
+    if (options.hands)
+      steered = options.hands(
+          {picture, now, static_cast<float>(dt), published.epoch, published.metrics.time_s == 0 && !published.prepared});
     for (size_t k = 0; k < kMaxHands; ++k) {
       ++unheard[k];
       if (hand_box[k].update()) {
@@ -125,6 +129,13 @@ void Live::Work::tick(bool let_in) {
         const ToolInput wanted = haptics->hand(static_cast<size_t>(arm));
         add_commands(input.commands, k, down | (wanted.buttons & ~std::exchange(arm_buttons[k], wanted.buttons)), now);
         hand = hand_toward(hand, wanted, kArmSpeed, 10 * options.hand_turn, static_cast<float>(dt));
+        continue;
+      }
+      if (k < 2 && steered[k].connected) {
+        add_commands(input.commands, k, steered[k].buttons & ~std::exchange(arm_buttons[k], steered[k].buttons), now);
+        hand = hand_toward(hand, steered[k], options.hand_speed, options.hand_turn, static_cast<float>(dt));
+        fresh = std::max(fresh, steered[k].time_ns > published.input_time_ns[k] ? steered[k].time_ns : 0);
+        published.input_time_ns[k] = steered[k].time_ns;
         continue;
       }
       // A message from before a jump in time refers to other tool poses: the hand stays until a newer one arrives.

@@ -48,6 +48,15 @@ enum class LiveCommand : uint8_t {
 };
 constexpr std::array<float, 4> kLiveSpeeds{1.0f, 0.5f, 0.25f, 0.1f};  // of real time
 
+// What steers the hands of the next tick.
+struct HandsMoment {
+  const PictureModel& picture;
+  const Snapshot& seen;
+  float dt;        // [s]
+  uint32_t epoch;  // a new one: the tools have jumped
+  bool at_start;   // to the settled scene
+};
+
 struct LiveOptions {
   int threads = 1;             // of the solver
   std::string record;          // recording to write; empty: none. See LiveResult::recorded
@@ -71,6 +80,9 @@ struct LiveOptions {
   std::string haptics_log;                  // as HapticsOptions::log
   std::array<uint8_t, 2> arm_hand{0, 1};    // tool moved by the device in the right hand, in the left; {1, 0}: left-handed
   std::array<float, 2> arm_strength{1, 1};  // gain of the force in the right hand and in the left, as HapticsOptions::strength
+  // Hands that are steered tick by tick (device/paced_hands). The physics thread calls it before every tick in which the user
+  // has the tools. A hand that it returns not connected is the one of hand(). Empty: hand() alone.
+  std::function<std::array<ToolInput, 2>(const HandsMoment&)> hands;
   std::function<void(const std::string&)> say;  // receives lines about the devices, from any thread; empty: lines are dropped
 };
 

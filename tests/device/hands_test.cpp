@@ -280,6 +280,10 @@ TEST(Help, an_end_is_not_drawn_farther_than_it_is_long) {
   EXPECT_NEAR(distance(swage_with(on_leash(d.picture, d.seen, 1, far)), stitch), strand + 0.01f, 1e-4f);
   d.seen.active().knot.resize(1);
   d.seen.active().knot[0].position = stitch;
+  d.seen.active().knot[0].phase = KnotPhase::tightening;
+  EXPECT_GT(distance(swage_with(on_leash(d.picture, d.seen, 1, far)), stitch), strand + 0.015f)
+      << "an open throw comes down only as far as the hand moves, and its loop has thread to give";
+  d.seen.active().knot[0].phase = KnotPhase::locked;
   EXPECT_NEAR(distance(swage_with(on_leash(d.picture, d.seen, 1, far)), stitch), strand + 0.002f, 1e-4f) << "nothing slides";
   EXPECT_TRUE(on_leash(d.picture, d.seen, 0, far) == far) << "an empty hand goes where it likes";
 }

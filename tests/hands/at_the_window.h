@@ -96,6 +96,8 @@ class AtTheWindow : public WorkQueue {
       showing_ = now.status.demonstrating;
       reading_ = now.status.reading && !now.status.demonstrating;
       bites_ = now.status.metrics.bites;
+      tick_ = now.status.tick;
+      standing_ = now.status.paused || now.status.reading;
       ++pictures_;
       changed_.notify_all();
       return !gone_ && Clock::now() < until_;
@@ -113,11 +115,16 @@ class AtTheWindow : public WorkQueue {
 
  protected:
   virtual void do_it(const Act& act) = 0;
-  // Until so many frames have been drawn since: the last of them includes everything before the call.
+  // Until so many frames have passed since, and the hands have moved: the last frame includes everything before the call. While
+  // time stands still, only frames count.
   bool see(size_t pictures) {
     std::unique_lock lock(mutex_);
     const size_t from = pictures_;
-    changed_.wait(lock, [&] { return closed_ || pictures_ >= from + pictures; });
+    const uint64_t tick = tick_;
+    changed_.wait(lock, [&] {
+      return closed_ || (pictures_ >= from + pictures && (tick_ >= tick + kTicksToSee || tick_ < tick || standing_)) ||
+             pictures_ >= from + kFramesToSee;
+    });
     const auto now = Clock::now();
     const float passed = std::chrono::duration<float>(now - seen_at_).count();
     seen_at_ = now;
@@ -148,6 +155,8 @@ class AtTheWindow : public WorkQueue {
   std::atomic<uint32_t> bites_{0};
 
  private:
+  static constexpr uint64_t kTicksToSee = 3;  // a motion is read, carried out and displayed; faster than a user reacts
+  static constexpr size_t kFramesToSee = 400;
   const char* scene_;
   float pace_;
   Clock::time_point until_, seen_at_ = Clock::now();
@@ -155,7 +164,8 @@ class AtTheWindow : public WorkQueue {
   std::condition_variable changed_;
   Look newest_;
   size_t pictures_ = 0;
-  bool closed_ = false;
+  uint64_t tick_ = 0;
+  bool closed_ = false, standing_ = false;
   std::atomic<bool> gone_{false};
   std::array<std::atomic<size_t>, static_cast<size_t>(EventKind::count_)> happened_{};
 };

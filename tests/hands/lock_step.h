@@ -2,6 +2,8 @@
 // tests/hands: a workstation without a window: device rooms and the simulation alone, in lock step.
 #pragma once
 #include "device/gamepad.h"
+#include "device/mouse.h"
+#include "device/paced_hands.h"
 #include "exchange/buttons.h"
 #include "person.h"
 #include "procedure/scene_file.h"
@@ -30,7 +32,7 @@ class LockStep : public WorkQueue {
         state_(initial_state(*model_)),
         picture_(picture_model(*model_)) {
     places_ = bite_places(scene_, picture_);
-    look_.steering = start_steering(picture_, false);
+    look_.steering = hands_.steering = start_steering(picture_, false);
     look_.dt = kTick * static_cast<float>(ticks);
     const Vec3 target = picture_.focus + Vec3{0.01f, 0, 0};
     look_.view = view_frame(target + Vec3{0.06f, 0.16f, 0.16f}, target, {0, 1, 0}, 30, 360);
@@ -42,12 +44,18 @@ class LockStep : public WorkQueue {
   const Look& look() const override { return look_; }
   size_t count(EventKind kind) const override { return happened_[static_cast<size_t>(kind)]; }
   bool act(const Act& act) override {
-    look_.steering.guide = next_bite(places_, picture_, look_.seen);
-    const auto hand = steer(look_.steering, moved(act), look_.view, picture_, look_.seen, look_.dt, 0);
+    HandOrder order;
+    order.motion = moved(act);
+    for (size_t k = 0; k < 2; ++k) {
+      SteeredHand& hand = look_.steering.hand[k];
+      order.closed[k] = hand.closed, order.opening[k] = hand.opening, order.buttons[k] = std::exchange(hand.buttons, 0);
+    }
+    order.view = look_.view;
+    hear(hands_, order, look_.seen);
     for (int i = 0; i < ticks_; ++i) {
-      for (size_t k = 0; k < 2; ++k)
-        in_.hand[k] =
-            started_ ? hand_toward(in_.hand[k], hand[k], 0.6f, 12, kTick, hand_share(static_cast<float>(ticks_))) : hand[k];
+      hands_.steering.guide = next_bite(places_, picture_, look_.seen);
+      const auto hand = tick(hands_, picture_, look_.seen, kTick);
+      for (size_t k = 0; k < 2; ++k) in_.hand[k] = started_ ? hand_toward(in_.hand[k], hand[k], 0.6f, 12, kTick) : hand[k];
       started_ = true;
       in_.commands.clear();
       for (size_t k = 0; k < 2; ++k)
@@ -57,6 +65,7 @@ class LockStep : public WorkQueue {
       for (const Event& e : look_.seen.event) ++happened_[static_cast<size_t>(e.kind)];
       if (after_tick) after_tick(look_.seen);
     }
+    look_.steering = hands_.steering;
     return look_.seen.time_s < 400;
   }
 
@@ -94,6 +103,7 @@ class LockStep : public WorkQueue {
   PictureModel picture_;
   BitePlaces places_;
   Look look_;
+  PacedHands hands_;
   TickInput in_;
   bool started_ = false;
   std::array<uint32_t, 2> buttons_{};
