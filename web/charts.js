@@ -39,7 +39,7 @@ const catgut = (() => {
     const fill = (list) => body.replaceChildren(...list.map((row) => el("tr", {}, columns.map((c, i) => {
       const content = c.cell ? c.cell(row) : c.number ? number(c.value(row)) : c.value(row);
       return i === 0 ? el("th", {scope: "row", class: c.number ? "number" : null}, content)
-                     : el("td", {class: c.number ? "number" : null}, content);
+                     : el("td", {class: c.number ? "number" : c.day ? "day" : null}, content);
     }))));
     const heads = columns.map((c) => {
       const head = el("th", {scope: "col", class: c.number ? "number" : null});
@@ -68,7 +68,8 @@ const catgut = (() => {
               table(caption, heads.map((title, i) => ({title, value: (r) => r[i], number: i > 0 || rows.every((r) => typeof r[0] === "number")})), rows));
   }
 
-  const width = 720, margin = {top: 14, right: 18, bottom: 44, left: 60};
+  // Units of a drawing, scaled to the width of the page: fewer on a phone, so that texts stay readable.
+  const width = matchMedia("(max-width: 40rem)").matches ? 480 : 720, margin = {top: 14, right: 18, bottom: 44, left: 60};
   function frame(label, height) {
     const svg = d3.create("svg").attr("viewBox", `0 0 ${width} ${height}`).attr("role", "img").attr("aria-label", label);
     return svg;
@@ -110,7 +111,6 @@ const catgut = (() => {
     for (const [i, l] of (o.levels || []).entries()) {
       svg.append("line").attr("x1", margin.left).attr("x2", width - margin.right).attr("y1", y(l.y)).attr("y2", y(l.y))
          .attr("stroke", colors[(i + 1) % colors.length]).attr("stroke-width", 1.5).attr("stroke-dasharray", dashes[i + 1]);
-      svg.append("text").attr("x", width - margin.right).attr("y", y(l.y) - 4).attr("text-anchor", "end").text(l.name);
     }
     let shown = 0;
     for (const s of o.series) {
@@ -125,6 +125,9 @@ const catgut = (() => {
            .attr("d", d3.symbol().type(marks[i % marks.length]).size(48)).attr("transform", (p) => `translate(${x(p[0])},${y(p[1])})`)
            .append("title").text((p) => `${s.name}: ${number(p[0])}, ${number(p[1])}`);
     }
+    // Above the lines, with a border of paper.
+    for (const l of o.levels || [])
+      svg.append("text").attr("class", "above").attr("x", width - margin.right).attr("y", y(l.y) - 4).attr("text-anchor", "end").text(l.name);
     const named = o.series.filter((s) => !s.quiet && s.name);
     if (named.length > 1) {
       const key = svg.append("g");

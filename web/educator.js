@@ -47,7 +47,7 @@
       {title: "sessions", value: (r) => r.n, number: true}, {title: "first", value: (r) => r.first, number: true}, {title: "last", value: (r) => r.last, number: true},
       {title: "best", value: (r) => r.best, number: true}, {title: "passed", value: (r) => r.passed, number: true},
       {title: "scores", value: (r) => (r.last || 0) - (r.first || 0), cell: (r) => (r.scores.length > 1 ? spark(r.scores) : "–")},
-      {title: "newest", value: (r) => r.when, cell: (r) => r.when.slice(0, 10)}], rows, true);
+      {title: "newest", day: true, value: (r) => r.when, cell: (r) => r.when.slice(0, 10)}], rows, true);
   }
 
   function curves(list) {
