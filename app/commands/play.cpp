@@ -159,6 +159,7 @@ void add_view(CLI::App& app, int& exit_code) {
   auto o = std::make_shared<WindowCommand>();
   CLI::App* command = app.add_subcommand("view", "open a recording in the window");
   command->add_option("file", o->play.view, "recording to open")->required()->type_name("FILE.cgrec");
+  command->add_flag("--headset", o->play.headset, "draw for a headset (OpenXR) too: the wearer walks around the field");
   add_window_options(*command, *o);
   command->callback([o, &exit_code] {
     read_window_options(*o);

@@ -38,6 +38,7 @@
 #include "window/latency.h"
 #include "window/panels.h"
 #include "window/sdl_window.h"
+#include "window/stitch_labels.h"
 #include "window/visit.h"
 #include "window/widgets.h"
 #include "window/work_text.h"
@@ -268,6 +269,7 @@ class Window {
   void stage_picture(const PictureModel& picture) {
     renderer_->stage(&picture, settings_.quality);
     if (wearer_) wearer_->stage(&picture, settings_.quality);
+    rest_ = rest_tissue(picture);
     if (coarse_ < 1) renderer_->set_resolution_scale(coarse_);
     orbit_set_ = false;
     have_last_ = false;
@@ -674,10 +676,13 @@ class Window {
     eyes.snapshot = seen;
     eyes.working = screen_ == Screen::practice;
     eyes.walk = screen_ == Screen::results || screen_ == Screen::view;
-    eyes.suture_points =
-        settings_.suture_points || (visit_ && settings_.guidance == Guidance::learn) || screen_ == Screen::results;
+    eyes.suture_points = settings_.suture_points || (visit_ && settings_.guidance == Guidance::learn) || eyes.walk;
     for (const PlacedPanel& p : board_placed_)  // as drawn last
       if (eyes.working && p.name == "procedure") eyes.caption = {p.rect.x, p.rect.y, p.rect.x + p.rect.w, p.rect.y + p.rect.h};
+    std::vector<xr::StitchMark> stitch;
+    const LiveResult* result = screen_ == Screen::results ? results_.result : viewing_ ? &viewing_->result : nullptr;
+    if (eyes.walk && seen && result) stitch = stitch_marks(result->map, rest_, *seen, colored_by_);
+    eyes.stitch = stitch;
     eyes.panels = [&] {
       if (!std::exchange(board_styled_, true)) style_panels(1.4f);
       on_board_ = true;
@@ -687,6 +692,7 @@ class Window {
     eyes.status = visit_ ? &visit_->live.status() : nullptr;
     eyes.copy = options_.eye_pictures;
     wearer_->draw(eyes);
+    if (options_.watch_eyes) options_.watch_eyes(wearer_->look());
   }
 
   const Snapshot* shown() const {
@@ -730,7 +736,8 @@ class Window {
     v.live.arm_strength(0, settings_.force_right), v.live.arm_strength(1, settings_.force_left);
     if (reading()) {  // nothing moves while the user reads; a click begins
       if (in.mouse.jaw_presses > 0 || (in.has_pad && in.pad.both)) v.live.command(LiveCommand::begin_stage);
-      if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_, worn_look()}))
+      if (options_.watch &&
+          !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_, worn_look(), board_placed_}))
         quit_ = true;
       return;
     }
@@ -744,7 +751,8 @@ class Window {
     for (size_t k = 0; worn && k < 2; ++k)
       if ((elsewhere[k] = (*worn)[k].connected)) v.live.hand(k, (*worn)[k]);
     hands_.move(in, settings_, view, elsewhere, dt, status.epoch);
-    if (options_.watch && !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_, worn_look()}))
+    if (options_.watch &&
+        !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_, worn_look(), board_placed_}))
       quit_ = true;
   }
 
@@ -933,6 +941,7 @@ class Window {
   ResultView results_;
   BiteColor colored_by_ = BiteColor::spacing;
   Snapshot last_;  // behind the results
+  RestTissue rest_;
   bool have_last_ = false;
   WindowHands hands_;
   BitePlaces places_;

@@ -3,6 +3,7 @@
 // mouse, keyboard and gamepad.
 #pragma once
 #include <functional>
+#include <span>
 #include <string>
 
 #include "device/mouse.h"
@@ -22,6 +23,7 @@ struct WindowLook {
   const LiveStatus& status;
   const std::vector<PlacedPanel>& panels;   // as drawn last
   const xr::WearerLook* headset = nullptr;  // the frame that was submitted before this one; null: none
+  std::span<const PlacedPanel> board{};     // panels of a headset's board, as drawn last
 };
 
 struct PlayOptions {
@@ -51,15 +53,16 @@ struct PlayOptions {
   // window; and every event.
   std::function<bool(const WindowLook&)> watch;
   std::function<void(const Event&)> on_event;
-  std::string trainee;         // pseudonym: sessions are stored; empty: the setting
-  std::string store;           // where; empty: the default
-  std::string feedback;        // silent, stitch or live; empty: the setting
-  std::string survey;          // asked after a session; empty: the setting
-  bool headset = false;        // draws for a headset too, and takes its wearer's hands
-  std::string room = "room";   // whose table height and registration apply
-  bool register_arms = false;  // registers haptic arms to the headset's space
-  bool eye_pictures = false;   // for an observer: copies of both eyes' images (slow)
-  int stall_ms = 0;            // for tests: blocks the loop for this time, every two seconds
+  std::function<void(const xr::WearerLook&)> watch_eyes;  // after every frame of a headset, on any screen
+  std::string trainee;                                    // pseudonym: sessions are stored; empty: the setting
+  std::string store;                                      // where; empty: the default
+  std::string feedback;                                   // silent, stitch or live; empty: the setting
+  std::string survey;                                     // asked after a session; empty: the setting
+  bool headset = false;                                   // draws for a headset too, and takes its wearer's hands
+  std::string room = "room";                              // whose table height and registration apply
+  bool register_arms = false;                             // registers haptic arms to the headset's space
+  bool eye_pictures = false;                              // for an observer: copies of both eyes' images (slow)
+  int stall_ms = 0;                                       // for tests: blocks the loop for this time, every two seconds
 };
 
 // Runs until the window is closed. Throws InputError, also without a display.

@@ -27,7 +27,7 @@ float pixels_across(const Board& b) { return (b.part[2] - b.part[0]) * EyeRender
 
 }  // namespace
 
-Vec3 eyes_at(const Place& stand) { return stand.at + rotate(turn_of(stand), {0, -stand.height, kAhead}); }
+Vec3 eyes_at(const Place& stand) { return stand.at + rotate(turn_of(stand), {0, -stand.height, stand.reach}); }
 
 Board board_at(const Place& stand, const Place& place, bool working) {
   Board b;

@@ -35,7 +35,7 @@
 namespace catgut::xr {
 namespace {
 
-constexpr double kRetry = 2;            // [s] between attempts to find a lost headset again
+constexpr double kRetry = 1;            // [s] between attempts to find a lost headset again
 constexpr int64_t kSrgb = 0x8C43;       // GL_SRGB8_ALPHA8
 constexpr double kImagePatience = 0.5;  // [s] for an image that the runtime still reads
 constexpr double kEnding = 1;           // [s] for the runtime to end the session
@@ -571,7 +571,7 @@ void Headset::submit(const HeadsetFrame& frame, EyeRenderer::Frame picture, cons
   const double now = wall_seconds(), spent = now - w.waited_at;
   const auto period = static_cast<double>(frame.period_ns) * 1e-9, shown = static_cast<double>(frame.shown_ns) * 1e-9;
   const int64_t step = w.frame_state.predictedDisplayTime - std::exchange(w.shown_before, w.frame_state.predictedDisplayTime);
-  if (drawn && c.frames > 1) c.late += now > shown || static_cast<double>(step) > 1.5e9 * period;
+  if (drawn && c.frames > 1) c.late += is_late(now, shown, 1e-9 * static_cast<double>(step), period);
   if (drawn && !w.options.whole_resolution) w.resolution.note(static_cast<float>(spent), static_cast<float>(period));
   c.resolution = w.resolution.part;
   const auto recent = [](float& value, double fresh) {

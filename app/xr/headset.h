@@ -66,7 +66,7 @@ class Headset {
   Headset(const Headset&) = delete;
   Headset& operator=(const Headset&) = delete;
 
-  // Handles the runtime's events; looks again for a lost headset every two seconds. True: frames are due, call wait().
+  // Handles the runtime's events; looks again for a lost headset every second. True: frames are due, call wait().
   bool poll();
   HeadsetState state() const;
   bool failed() const;  // there was no runtime, or no headset, from the start

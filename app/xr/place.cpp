@@ -23,7 +23,7 @@ void recenter(Place& place, const Pose& head) {
   ahead.y = 0;
   ahead = normalized(ahead, {0, 0, -1});
   place.yaw = std::atan2(ahead.x, -ahead.z);
-  place.at = head.p + ahead * kAhead + Vec3{0, place.height, 0};
+  place.at = head.p + ahead * place.reach + Vec3{0, place.height, 0};
 }
 
 bool move_table(Place& place, float step, const Pose& head) {
@@ -31,6 +31,14 @@ bool move_table(Place& place, float step, const Pose& head) {
   if ((next - now) * step <= 0) return false;
   place.at.y += next - now;
   place.height = next;
+  return true;
+}
+
+bool move_reach(Place& place, float step) {
+  const float next = std::clamp(place.reach + step, kNearest, kFarthest), moved = next - place.reach;
+  if (moved * step <= 0) return false;
+  place.at += rotate(conjugate(turn(place.yaw)), {0, 0, -moved});
+  place.reach = next;
   return true;
 }
 

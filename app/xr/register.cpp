@@ -73,6 +73,7 @@ RoomSettings load_room(const std::string& path, const std::string& room) {
     return static_cast<float>((*table)[key].value_or(static_cast<double>(otherwise)));
   };
   out.height = std::clamp(number("height", out.height), kLowest, kHighest);
+  out.reach = std::clamp(number("reach", out.reach), kNearest, kFarthest);
   out.loupe = std::clamp(number("loupe", out.loupe), 1.0f, 4.0f);
   if (const toml::array* at = (*table)["arms_at"].as_array(); at && at->size() == 3) {
     Place arms;
@@ -96,6 +97,7 @@ void save_room(const std::string& path, const std::string& room, const RoomSetti
   const auto number = [](float v) { return std::round(1e5 * static_cast<double>(v)) / 1e5; };
   toml::table table;
   table.insert("height", number(settings.height));
+  table.insert("reach", number(settings.reach));
   table.insert("loupe", number(settings.loupe));
   if (settings.arms) {
     table.insert("arms_at", toml::array{number(settings.arms->at.x), number(settings.arms->at.y), number(settings.arms->at.z)});

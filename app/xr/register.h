@@ -24,6 +24,7 @@ bool is_plausible(const ArmFit& fit);
 // What is kept per room: rooms.toml in the folder of the settings.
 struct RoomSettings {
   float height = -kBelow;  // [m] of the table relative to the eyes
+  float reach = kAhead;    // [m] of the table ahead of the eyes
   float loupe = 1;
   std::optional<Place> arms;  // valid only while the runtime's floor frame is the same
   float arms_rms = 0;         // [m]

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/xr: resolution of the eyes' images by the time that frames take. Pure.
+// app/xr: resolution of the eyes' images by the time that frames take, and which frames are late. Pure.
 #pragma once
 #include <algorithm>
 
@@ -17,5 +17,11 @@ struct Resolution {
     else if (++calm >= 90) part = std::min(1.0f, 1.05f * part), calm = 0;
   }
 };
+
+// A picture that is submitted after the display time it was drawn for, or before which the runtime left out a period.
+// step: between its display time and the previous one's. All in [s].
+inline bool is_late(double submitted, double shown, double step, double period) {
+  return submitted > shown || step > 1.5 * period;
+}
 
 }  // namespace catgut::xr

@@ -15,7 +15,6 @@ namespace {
 
 constexpr float kHold = 0.8f;         // [s] of the menu button: recenters
 constexpr float kTableSpeed = 0.08f;  // [m/s]
-constexpr float kFade = 0.5f;         // [s] from black after the place has changed
 constexpr float kStick = 0.7f;        // of a stick's range
 constexpr size_t kMostSamples = 100000;
 
@@ -27,12 +26,14 @@ Wearer::Wearer(const WearerOptions& options)
     room_ = load_room(given_.room_file, given_.room);
   } catch (const InputError& error) { report(error.what()); }
   place_.height = room_.height;
+  place_.reach = room_.reach;
   place_.loupe = room_.loupe;
 }
 
 Wearer::~Wearer() {
   if (!placed_) return;
   room_.height = place_.height;
+  room_.reach = place_.reach;
   if (!arms_) room_.loupe = place_.loupe;
   try {
     save_room(given_.room_file, given_.room, room_);
@@ -48,7 +49,7 @@ void Wearer::settle_place() {
   }
   stand_ = place_;
   placed_ = true;
-  brightness_ = 0;
+  fade_.cut();
 }
 
 // A controller's front at a stylus: one point in both frames.
@@ -94,8 +95,11 @@ bool Wearer::begin() {
   const auto lead = static_cast<float>(std::clamp(shown - began_, 0.0, 0.2));
   lead_ += (lead_ == 0 ? 1 : 0.02f) * (lead - lead_);
   moment_ = shown - static_cast<double>(lead_);
+  if (fade_.step(dt_)) {
+    if (std::exchange(recenter_wanted_, false) && frame_.posed) settle_place();
+    if (const int step = std::exchange(loupe_wanted_, 0)) change_loupe(place_, step);
+  }
   if (frame_.posed && (!placed_ || frame_.recentered)) settle_place();
-  brightness_ = std::min(1.0f, brightness_ + dt_ / kFade);
   buttons(dt_);
   carry_field();
   return true;
@@ -114,11 +118,11 @@ void Wearer::stage(const PictureModel* model, Quality quality) {
 
 void Wearer::buttons(float dt) {
   bool menu = false;
-  float up = 0, flick = 0;
+  float up = 0, ahead = 0, flick = 0;
   for (size_t side = 0; side < 2; ++side) {
     const HandState& h = frame_.hand[side];
     menu = menu || h.menu;
-    if (std::abs(h.stick_y) > kStick) up += h.stick_y;
+    if (std::abs(h.stick_y) > kStick) (side == 0 ? ahead : up) += h.stick_y;
     if (std::abs(h.stick_x) > kStick && std::abs(h.stick_y) < 0.5f) flick = h.stick_x;
     wish_.swap[tool_of(side, options_.left_handed)] |= h.swap && !swap_was_[side];
     swap_was_[side] = h.swap;
@@ -126,8 +130,8 @@ void Wearer::buttons(float dt) {
   if (menu) {
     menu_held_ += dt;
     if (menu_held_ >= kHold && !menu_used_ && frame_.posed) {
-      settle_place();
-      menu_used_ = true;
+      recenter_wanted_ = menu_used_ = true;
+      fade_.out();
     }
   } else {
     if (menu_held_ > 0 && !menu_used_) wish_.pause = true;
@@ -136,7 +140,14 @@ void Wearer::buttons(float dt) {
   }
   if (up != 0 && frame_.posed && move_table(place_, kTableSpeed * dt * up, frame_.head))
     stand_.at.y = place_.at.y, stand_.height = place_.height;
-  if (flick != 0 && !flick_was_ && change_loupe(place_, flick > 0 ? 1 : -1)) brightness_ = 0;
+  if (ahead != 0 && placed_) {
+    const float before = stand_.reach;
+    if (move_reach(stand_, kTableSpeed * dt * ahead)) move_reach(place_, stand_.reach - before);
+  }
+  if (flick != 0 && !flick_was_) {
+    Place next = place_;
+    if (const int step = flick > 0 ? 1 : -1; change_loupe(next, step)) loupe_wanted_ = step, fade_.out();
+  }
   flick_was_ = flick != 0;
 }
 
@@ -212,7 +223,7 @@ void Wearer::draw(const Picture& picture) {
   EyeRenderer::Frame frame;
   frame.snapshot = picture.snapshot;
   frame.suture_points = picture.suture_points;
-  frame.brightness = brightness_;
+  frame.brightness = fade_.brightness;
   frame.dt = dt_;
   frame.board = board_at(stand_, place_, picture.working);
   if (picture.caption[2] > picture.caption[0]) frame.caption = caption_at(stand_, place_, picture.caption);
@@ -221,11 +232,16 @@ void Wearer::draw(const Picture& picture) {
   frame.panels = picture.panels;
   if (picture.copy) frame.copy = &picture_;
   const Vec3 eye = place_.to_world(frame_.head.p);
+  const std::vector<Label> label = place_labels(picture.stitch, place_, eye);
+  frame.label = label;
   headset_.submit(frame_, frame, place_, std::max(0.05f, distance(eye, place_.focus)));
 
   look_.state = headset_.state();
   look_.frame = frame_;
   look_.place = place_;
+  look_.board = *frame.board;
+  look_.pointer = frame.pointer;
+  look_.brightness = frame.brightness;
   look_.counts = headset_.counts();
   look_.picture = picture.copy && frame_.render && frame_.posed ? &picture_ : nullptr;
   if (!picture.status || picture.status->moved_ns == 0 || picture.status->moved_ns == moved_ns_ || all_.size() >= kMostSamples)

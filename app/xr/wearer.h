@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "runtime/live.h"
+#include "xr/fade.h"
 #include "xr/headset.h"
+#include "xr/labels.h"
 #include "xr/register.h"
 
 namespace catgut::xr {
@@ -34,6 +36,9 @@ struct WearerLook {
   HeadsetState state = HeadsetState::off;
   HeadsetFrame frame;
   Place place;
+  Board board;
+  std::optional<std::array<float, 2>> pointer;  // [pixels] of the board where a ray points
+  float brightness = 0;                         // 0: black, 1: no fade
   HeadsetCounts counts;
   std::array<Vibration, 2> vibration;             // per tool, of this frame
   const std::array<Image, 2>* picture = nullptr;  // of both eyes, if it was requested
@@ -76,6 +81,7 @@ class Wearer {
     bool working = false;  // the hands hold instruments: the board stands beside the field and cannot be pointed at
     bool walk = false;     // results or a replay: a hand with the clutch pressed takes hold of the field and carries it
     bool suture_points = false;
+    std::span<const StitchMark> stitch;  // labels of results and replays
     std::function<void()> panels;
     std::array<float, 4> caption{};      // [pixels] part of the board that is shown near the work; empty: none
     const LiveStatus* status = nullptr;  // for the budget; null: none
@@ -118,7 +124,10 @@ class Wearer {
   std::array<Image, 2> picture_;
   const PictureModel* model_ = nullptr;
   double began_ = 0, before_ = 0, moment_ = 0;  // [s]
-  float dt_ = 1.0f / 60, lead_ = 0, brightness_ = 0, menu_held_ = 0;
+  float dt_ = 1.0f / 60, lead_ = 0, menu_held_ = 0;
+  Fade fade_;
+  bool recenter_wanted_ = false;
+  int loupe_wanted_ = 0;  // steps; both are done in a black frame
   bool menu_used_ = false;
   std::array<bool, 2> swap_was_{};
   bool flick_was_ = false, panels_drawn_ = false;

@@ -43,11 +43,22 @@ struct Board {
   std::array<float, 4> part{0, 0, 1, 1};  // of the panels' picture: left, top, right, bottom
 };
 
+// A small board with two lines of text, and a thin rod from it to each of two points.
+struct Label {
+  Pose pose;                        // as of a Board
+  float width = 0.04f;              // [m] in the world
+  std::array<Vec3, 2> point;        // [m] ends of the rods: entry (yellow), exit (cyan)
+  std::array<std::string, 2> text;  // lines
+  uint32_t color = 0xffffffffu;     // of its left edge; ImGui's order: 0xAABBGGRR
+};
+
 // Belongs to the thread that created it.
 class EyeRenderer {
  public:
   static constexpr int kBoardWidth = 1280, kBoardHeight = 720;  // [pixels]
   static constexpr float kBoardText = 22;                       // [pixels] line height
+  static constexpr int kLabelWidth = 250, kLabelHeight = 50;    // [pixels]
+  static constexpr size_t kMostLabels = 30;                     // per frame; more are not drawn
   virtual ~EyeRenderer() = default;
 
   virtual GlHandles handles() const = 0;
@@ -67,10 +78,11 @@ class EyeRenderer {
     std::array<uint32_t, 2> image{};     // index of set_images
     int width = 0, height = 0;           // [pixels] the part of the image, from its lower left corner
     bool suture_points = false;
-    float brightness = 1;                         // rises from 0 after the wearer's place has changed; below 0.5: dark
+    float brightness = 1;                         // 0: black, boards included
     float dt = 1.0f / 90;                         // [s] since the last frame, for the panels
     std::optional<Board> board;                   // none: not shown
     std::optional<Board> caption;                 // a second one with the same contents; its ray is not drawn
+    std::span<const Label> label;                 // shown while there are panels
     std::function<void()> panels;                 // calls ImGui; empty: the board keeps its previous contents
     std::optional<std::array<float, 2>> pointer;  // [pixels] of the board, from its upper left corner
     bool pressed = false;                         // the pointer's button

@@ -92,6 +92,7 @@ class Eyes : public testing::TestWithParam<GlBinding> {
   void panels_are_upright();
   void caption_shows_its_part();
   void part_of_the_image_is_drawn();
+  void labels_show_their_own_lines();
 
   std::unique_ptr<XServer> x_;
   std::unique_ptr<EyeRenderer> eyes_;
@@ -130,15 +131,23 @@ void Eyes::board_is_where_geometry_puts_it() {
       for (int i = 0; i < 2; ++i)
         write_png(image[size_t(i)],
                   std::string(folder) + (field ? "/board_field_" : "/board_") + (i ? "right.png" : "left.png"));
-    if (field) {  // after a recenter: dark, with the board
-      std::array<Image, 2> black;
-      EyeRenderer::Frame faded = frame;
-      faded.brightness = 0, faded.copy = &black;
-      ASSERT_TRUE(eyes_->draw(faded));
+    // Around a recenter: darker, then black everywhere, in both eyes, with and without a field.
+    std::array<Image, 2> dark;
+    EyeRenderer::Frame faded = frame;
+    faded.brightness = 0.5f, faded.copy = &dark;
+    ASSERT_TRUE(eyes_->draw(faded));
+    if (field) {
       EXPECT_GT(pixel(image[0], 20, kTall - 20)[1], 80) << "the drape";
-      EXPECT_LT(pixel(black[0], 20, kTall - 20)[1], 40);
-      EXPECT_GT(white(black[0]).area, 500);
+      EXPECT_GT(pixel(dark[0], 20, kTall - 20)[1], 15) << "a fade, not a cut";
+      EXPECT_LT(pixel(dark[0], 20, kTall - 20)[1], 0.8 * pixel(image[0], 20, kTall - 20)[1]);
     }
+    faded.brightness = 0;
+    ASSERT_TRUE(eyes_->draw(faded));
+    int brightest = 0;
+    for (const Image& one : dark)
+      for (size_t i = 0; i < one.rgba.size(); ++i)
+        if (i % 4 < 3) brightest = std::max<int>(brightest, one.rgba[i]);
+    EXPECT_LE(brightest, 2) << "the board too";
     const Center left = white(image[0]), right = white(image[1]);
     const Center want_left = expected(eye[0], kLeft, board), want_right = expected(eye[1], kRight, board);
     ASSERT_GT(left.area, 500);
@@ -209,11 +218,56 @@ void Eyes::caption_shows_its_part() {
   EXPECT_NEAR(c.area, kWide * (0.2 / 0.5 / 2) * kTall * (tall / 0.5 / 1.6), 0.12 * c.area) << "all of it is white";
 }
 
+// Two labels of one width: each shows its own part of the sheet, and a rod leads to each of its points.
+void Eyes::labels_show_their_own_lines() {
+  EyeRenderer::Frame frame;
+  const Frustum f{-1, 1, -0.8f, 0.8f};
+  frame.camera = {eye_camera({}, f, 0.5f), eye_camera({}, f, 0.5f)};
+  frame.width = kWide, frame.height = kTall;
+  std::array<Label, 2> label;
+  for (size_t k = 0; k < 2; ++k) {
+    label[k].pose = {{k == 0 ? -0.25f : 0.25f, 0.1f, -0.5f}, {}};
+    label[k].width = 0.45f;
+    label[k].point = {Vec3{label[k].pose.p.x - 0.1f, -0.2f, -0.5f}, Vec3{label[k].pose.p.x + 0.1f, -0.2f, -0.5f}};
+    label[k].text = {k == 0 ? "1: edge 5.0 | 4.8 mm" : "", "depth 1.5"};
+    label[k].color = k == 0 ? 0xff0000ffu : 0xff00ff00u;  // red, green
+  }
+  frame.label = label;
+  frame.panels = [] { ImGui::GetBackgroundDrawList()->AddRectFilled({0, 0}, {1280, 720}, 0xffffffffu); };
+  std::array<Image, 2> image;
+  frame.copy = &image;
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(eyes_->draw(frame));
+  EXPECT_LT(white(image[0]).area, 1000) << "letters, and no part of the panels: the labels have 4500 pixels";
+  struct Count {
+    int red = 0, green = 0, yellow = 0, cyan = 0, pale = 0;
+  };
+  std::array<Count, 2> half;  // of the picture: left, right
+  for (int y = 0; y < kTall; ++y)
+    for (int x = 0; x < kWide; ++x) {
+      const uint8_t* p = &image[0].rgba[4 * (size_t(y) * kWide + size_t(x))];
+      Count& c = half[x < kWide / 2 ? 0 : 1];
+      c.red += p[0] > p[1] + 50 && p[0] > p[2] + 50, c.green += p[1] > p[0] + 50 && p[1] > p[2] + 50;
+      if (y < kTall / 2) c.pale += p[0] > 110 && p[1] > 110 && p[2] > 100;
+      if (y > kTall * 6 / 10)
+        c.yellow += p[0] > 150 && p[1] > 130 && p[2] < 110, c.cyan += p[0] < 110 && p[1] > 130 && p[2] > 130;
+    }
+  EXPECT_GT(half[0].red, 3);
+  EXPECT_EQ(half[0].green, 0);
+  EXPECT_GT(half[1].green, 3);
+  EXPECT_EQ(half[1].red, 0);
+  EXPECT_GT(half[0].pale, half[1].pale * 5 / 4) << "the first has one line more";
+  for (const Count& c : half) {
+    EXPECT_GT(c.yellow, 5);
+    EXPECT_GT(c.cyan, 5);
+  }
+}
+
 // One test for each binding: an engine and its shaders take longer to start than all pictures.
 TEST_P(Eyes, show_boards_where_geometry_puts_them) {
   panels_are_upright();
   caption_shows_its_part();
   part_of_the_image_is_drawn();
+  labels_show_their_own_lines();
   board_is_where_geometry_puts_it();
 }
 

@@ -12,30 +12,75 @@ namespace {
 
 using xr::HeadsetState;
 
-// XR_KHR_opengl_enable with GLX, on the X server of the window.
-TEST_F(AtTheHeadset, a_session_by_x11_shows_both_eyes) {
+// XR_KHR_opengl_enable with GLX, on the X server of the window. Afterwards the wearer pauses, points the controller at the
+// board and pulls the trigger: the session resumes.
+TEST_F(AtTheHeadset, a_session_by_x11_shows_both_eyes_and_a_ray_presses_a_button) {
+  constexpr float kResume[] = {640, 212};  // [pixels] of the board: the pause panel's first button
   setenv("CATGUT_XR_BINDING", "xlib", 1);
   wearer_.head = {{0.1f, 1.55f, 0.2f}, axis_angle({1, 0, 0}, -0.7f)};
+  const Pose head = wearer_.head;
   PlayOptions options;
   options.scene = "stay";
   options.eye_pictures = true;
-  std::array<Image, 2> picture;
+  std::array<Image, 2> picture, paused;
   xr::WearerLook look;
-  int shown = 0;
+  int shown = 0, pressed = 0, without_work = 0, pointing = 0;
   double since = 0;
+  bool resumed = false, late_shown = false, points_at_work = false;
+  std::optional<std::array<float, 2>> pointer;
+  xr::HandState buttons;
+  float reach = 0;
+  options.watch_eyes = [&](const xr::WearerLook& now) {
+    if (++without_work < 4 || pressed == 0 || !now.frame.hand[1].tracked) return;
+    if (now.picture) paused = *now.picture;
+    const xr::HandState& hand = now.frame.hand[1];
+    const Vec3 on{now.board.width * (kResume[0] / EyeRenderer::kBoardWidth - 0.5f),
+                  height_of(now.board) * (0.5f - kResume[1] / EyeRenderer::kBoardHeight), 0};
+    const Vec3 z = normalized(hand.aim.p - now.place.to_room(transform(now.board.pose, on)));
+    const Vec3 x = normalized(cross({0, 1, 0}, z));
+    wearer_.hand[1].pose.q = normalized(from_axes(x, cross(z, x), z) * conjugate(conjugate(hand.grip.q) * hand.aim.q));
+    RemoteHand& left = wearer_.hand[0];
+    left.a = left.b = left.stick = pointing < 6;
+    left.squeeze = left.stick_y = pointing < 6 ? 1 : 0;
+    if (++pointing == 6) buttons = now.frame.hand[0], reach = now.place.reach;
+    if (pointing == 12) pointer = now.pointer;
+    wearer_.hand[1].trigger = pointing > 11 && pointing < 15 ? 1 : 0;
+    remote_->set(wearer_);
+  };
   testing::internal::CaptureStderr();
-  EXPECT_EQ(sit(options, 60,
+  EXPECT_EQ(sit(options, 30,
                 [&](const WindowLook& now) {
+                  if (pointing > 11) resumed = true;
+                  without_work = 0;
                   if (!now.headset || now.headset->state != HeadsetState::focused || !now.headset->picture) return true;
+                  points_at_work = points_at_work || (pressed == 0 && now.headset->pointer);
+                  for (const PlacedPanel& p : now.board)
+                    for (const PanelLine& l : p.line) late_shown = late_shown || l.text.find(" late") != std::string::npos;
                   if (shown++ == 0) since = wall_seconds();
-                  look = *now.headset, picture = *now.headset->picture;
-                  return wall_seconds() - since < 0.6 || shown < 4;  // past the dark start
+                  if (wall_seconds() - since < 0.6 || shown < 4) {  // past the dark start
+                    look = *now.headset, picture = *now.headset->picture;
+                    return true;
+                  }
+                  for (RemoteHand& h : wearer_.hand) h.trackpad_force = pressed < 3 ? 1 : 0;
+                  ++pressed;
+                  return !resumed;
                 }),
             0);
   const std::string said = testing::internal::GetCapturedStderr();
   EXPECT_NE(said.find("(OpenGL by X11)"), std::string::npos) << said;
   ASSERT_GE(shown, 4);
-  expect_both_eyes_right(*layer_, look, picture, wearer_.head, "x11");
+  expect_both_eyes_right(*layer_, look, picture, head, "x11");
+  if (const char* folder = std::getenv("CATGUT_PICTURES"))
+    for (size_t i = 0; i < 2; ++i) write_png(paused[i], std::string(folder) + (i ? "/pause_right.png" : "/pause_left.png"));
+  EXPECT_TRUE(late_shown) << "late pictures are on a panel";
+  EXPECT_FALSE(points_at_work) << "while instruments are in use the trigger is the jaw";
+  ASSERT_TRUE(pointer.has_value()) << "the ray meets the board";
+  EXPECT_NEAR((*pointer)[0], kResume[0], 12);
+  EXPECT_NEAR((*pointer)[1], kResume[1], 12);
+  EXPECT_TRUE(buttons.cut && buttons.new_suture && buttons.swap && buttons.clutch) << "the left controller's buttons";
+  EXPECT_GT(buttons.stick_y, 0.9f);
+  EXPECT_GT(reach, xr::kAhead) << "its stick moves the table away";
+  EXPECT_TRUE(resumed) << "the trigger pressed the button";
 }
 
 // XR_EXT_hand_tracking: the runtime's driver bends simulated fingers. Without a controller the pinch holds the instrument.

@@ -178,7 +178,8 @@ TEST_F(Stitch, a_whole_session) {
   ASSERT_GE(shown, 8);
   EXPECT_GE(layer_->projections, 8u);
   expect_both_eyes_right(*layer_, look, picture, head, "egl");
-  EXPECT_LT(darkest, 0.5f * mean_luma(picture[0])) << "after a recenter it is dark for a moment";
+  EXPECT_LT(darkest, 2) << "the field moves in a black picture";
+  EXPECT_GT(mean_luma(picture[0]), 20);
   EXPECT_LT(distance(look.place.to_room(look.place.focus), head.p), 0.65f) << "and lies ahead of the wearer";
 
   EXPECT_TRUE(stayed) << "without the input focus instruments stay";

@@ -12,6 +12,7 @@
 #include "render/camera.h"
 #include "sim/simulation.h"
 #include "xr/boards.h"
+#include "xr/fade.h"
 #include "xr/register.h"
 #include "xr/resolution.h"
 #include "xr/space_hands.h"
@@ -76,6 +77,45 @@ TEST(Place, the_table_stays_within_reach) {
   EXPECT_NEAR(place.at.y - head.p.y, kHighest, 1e-5f);
   recenter(place, head_at({0, 1.2f, 0}, 1, 0));  // seated
   EXPECT_NEAR(place.at.y - 1.2f, kHighest, 1e-5f) << "the height is kept";
+}
+
+// The two settings of the table are independent of each other and of where the wearer looks.
+TEST(Place, the_reach_moves_the_field_ahead_of_the_wearer_and_is_kept) {
+  Place place;
+  place.focus = {0.1f, 0.2f, -0.3f};
+  const Pose head = head_at({1, 1.6f, -2}, 2.5f, -0.5f);
+  recenter(place, head);
+  ASSERT_TRUE(move_reach(place, 0.1f));
+  const Vec3 way = place.focus - place.to_world(head.p);
+  EXPECT_NEAR(way.x, 0, 1e-5f);
+  EXPECT_NEAR(-way.z, kAhead + 0.1f, 1e-5f);
+  EXPECT_NEAR(-way.y, kBelow, 1e-5f);
+  for (int i = 0; i < 100; ++i) move_reach(place, 0.01f);
+  EXPECT_FALSE(move_reach(place, 0.01f));
+  recenter(place, head_at({0, 1.2f, 0}, -1, 0));
+  EXPECT_NEAR(std::hypot(place.at.x, place.at.z), kFarthest, 1e-5f) << "kept";
+}
+
+// The wearer's place changes only in a black frame, and never by a jump of brightness that a frame's time does not explain.
+TEST(Comfort, a_fade_hides_every_change_of_place) {
+  for (const float dt : {1.0f / 120, 1.0f / 45, 0.25f}) {
+    Fade fade;
+    int changes = 0, asked = 0;
+    float before = fade.brightness, time = 0;
+    for (int i = 0; i < 400; ++i) {
+      if (fade.brightness == 1 && asked < 3) fade.out(), ++asked;
+      if (fade.step(dt)) {
+        ++changes;
+        EXPECT_EQ(fade.brightness, 0);
+      }
+      EXPECT_LE(std::abs(fade.brightness - before), dt / std::min(kFadeOut, kFadeIn) + 1e-5f);
+      before = fade.brightness, time += fade.brightness < 1 ? dt : 0;
+    }
+    EXPECT_EQ(asked, 3);
+    EXPECT_EQ(changes, 3);
+    EXPECT_EQ(fade.brightness, 1);
+    if (dt < 0.1f) { EXPECT_NEAR(time, 3 * (kFadeOut + kFadeIn) + kFadeIn, 8 * dt); }
+  }
 }
 
 // A result is carried around: the point in the hand stays in the hand, and the field stays level.
@@ -339,6 +379,7 @@ TEST(Register, is_kept_per_room) {
   EXPECT_EQ(load_room(file, "a").height, -kBelow);
   RoomSettings a, b;
   a.height = -0.3f;
+  a.reach = 0.5f;
   a.arms = Place{};
   a.arms->at = {1, 2, 3};
   a.arms->yaw = 0.25f;
@@ -354,9 +395,17 @@ TEST(Register, is_kept_per_room) {
   EXPECT_NEAR(again.arms_rms, 0.0012f, 1e-5f);
   EXPECT_FALSE(load_room(file, "b").arms.has_value());
   EXPECT_EQ(load_room(file, "b").loupe, 2);
+  EXPECT_NEAR(again.reach, 0.5f, 1e-5f);
   std::ofstream(file) << "no [toml";
   EXPECT_ANY_THROW(load_room(file, "a"));
   std::filesystem::remove_all(folder);
+}
+
+TEST(Late, is_a_picture_after_its_display_time_or_after_a_gap) {
+  constexpr double kPeriod = 1.0 / 90;
+  EXPECT_FALSE(is_late(1.009, 1.010, kPeriod, kPeriod));
+  EXPECT_TRUE(is_late(1.011, 1.010, kPeriod, kPeriod));
+  EXPECT_TRUE(is_late(1.009, 1.010, 2 * kPeriod, kPeriod)) << "one period was left out";
 }
 
 TEST(Resolution, falls_with_late_frames_and_recovers) {

@@ -41,7 +41,13 @@ namespace {
 
 using filament::Texture;
 
-constexpr float kBlink = 0.5f;  // brightness below which the field is not shown: an exposure alone does not reach black
+// Boards and labels are parts of one picture: the panels above, below them a grid of labels.
+constexpr int kSheetHeight = 1024, kLabelColumns = EyeRenderer::kBoardWidth / EyeRenderer::kLabelWidth;  // [pixels]
+static_assert(kSheetHeight - EyeRenderer::kBoardHeight >=
+              int(EyeRenderer::kMostLabels) / kLabelColumns * EyeRenderer::kLabelHeight);
+const Vec3 kYellow = srgb(250, 215, 60), kCyan = srgb(60, 220, 235);  // entry and exit, as in theatre.cpp
+constexpr float kRod = 0.012f;                                        // of a label's width: thickness of its rods
+constexpr float kShell = 0.5f;  // [m] half width of the box around the head that fades the picture
 
 // The runtime's context; Filament's engine shares its textures.
 class Context {
@@ -165,9 +171,10 @@ class FilamentEyes final : public EyeRenderer {
       const BoardContext own(imgui_);
       panels_.reset();  // destroys the ImGui context
     }
-    for (GpuMesh* mesh : {&board_, &caption_, &ray_}) destroy_mesh(*engine_, *lobby_, *mesh);
-    engine_->destroy(board_look_);
-    engine_->destroy(ray_look_);
+    for (GpuMesh* mesh : {&board_, &caption_, &ray_, &shell_}) destroy_mesh(*engine_, *lobby_, *mesh);
+    for (LabelMesh& label : label_)
+      for (GpuMesh* mesh : {&label.square, &label.rod[0], &label.rod[1]}) destroy_mesh(*engine_, *lobby_, *mesh);
+    for (filament::MaterialInstance* look : {board_look_, ray_look_, shell_look_}) engine_->destroy(look);
     for (filament::Material* m : material_) engine_->destroy(m);
     engine_->destroy(panel_target_);
     engine_->destroy(panel_texture_);
@@ -235,17 +242,20 @@ class FilamentEyes final : public EyeRenderer {
   bool draw(const Frame& frame) override {
     for (size_t i = 0; i < 2; ++i)
       if (frame.image[i] >= images_[i].target.size()) return false;
+    // Before the frame begins: the engine uploads parameters then. Light as it is seen is about the square root of light as it
+    // is calculated.
+    shell_look_->setParameter("dark", 1 - frame.brightness * frame.brightness);
     bool begun = false;
     for (int i = 0; i < 20 && !begun; ++i)
       if (!(begun = renderer_->beginFrame(chain_))) engine_->flushAndWait();
     if (!begun) return false;
-    const bool field = theatre_ && frame.snapshot && frame.brightness >= kBlink;
-    if (field) {
-      theatre_->set_brightness(frame.brightness);
-      theatre_->show(*frame.snapshot, frame.camera, frame.width, frame.height, frame.suture_points);
-    }
-    place_board(frame, field ? theatre_->scene() : *lobby_);
-    if ((frame.board || frame.caption) && frame.panels) draw_panels(frame);
+    const bool field = theatre_ && frame.snapshot;
+    if (field) theatre_->show(*frame.snapshot, frame.camera, frame.width, frame.height, frame.suture_points);
+    filament::Scene& scene = field ? theatre_->scene() : *lobby_;
+    place_board(frame, scene);
+    place_labels(frame, scene);
+    fade(frame, scene);
+    if ((frame.board || frame.caption || !frame.label.empty()) && frame.panels) draw_panels(frame);
     for (size_t i = 0; i < 2; ++i) {
       filament::View* view = field ? theatre_->view(int(i)) : lobby_view_[i];
       if (!field) aim_lobby(i, frame);
@@ -277,10 +287,15 @@ class FilamentEyes final : public EyeRenderer {
     int width = 0, height = 0;
   };
 
+  struct LabelMesh {
+    GpuMesh square;
+    std::array<GpuMesh, 2> rod;
+  };
+
   void make_board(const std::string& font) {
     panel_texture_ = Texture::Builder()
                          .width(kBoardWidth)
-                         .height(kBoardHeight)
+                         .height(kSheetHeight)
                          .levels(5)
                          .usage(Texture::Usage::COLOR_ATTACHMENT | Texture::Usage::SAMPLEABLE)
                          .format(Texture::InternalFormat::RGBA8)
@@ -292,7 +307,7 @@ class FilamentEyes final : public EyeRenderer {
     panel_view_->setPostProcessingEnabled(false);
     panel_view_->setShadowingEnabled(false);
     panel_view_->setBlendMode(filament::View::BlendMode::OPAQUE);
-    panel_view_->setViewport({0, 0, kBoardWidth, kBoardHeight});
+    panel_view_->setViewport({0, 0, kBoardWidth, kSheetHeight});
     panel_view_->setRenderTarget(panel_target_);
     imgui_ = ImGui::CreateContext();
     const BoardContext own(imgui_);
@@ -304,7 +319,7 @@ class FilamentEyes final : public EyeRenderer {
     if (!font.empty() && std::filesystem::exists(font)) letters.AddFontFromFileTTF(font.c_str(), kBoardText);
     else letters.AddFontDefault(&built_in);
     panels_->createAtlasTexture(engine_);
-    panels_->setDisplaySize(kBoardWidth, kBoardHeight);
+    panels_->setDisplaySize(kBoardWidth, kSheetHeight);
     ImGui::GetIO().MouseDrawCursor = true;
     ImGui::GetIO().IniFilename = nullptr;
   }
@@ -325,34 +340,45 @@ class FilamentEyes final : public EyeRenderer {
       bloom.strength = 0.02f, bloom.resolution = 16, bloom.levels = 3;
       lobby_view_[i]->setBloomOptions(bloom);
     }
-    // A unit square that faces +z, and a rod of unit length along +z; scaled when they are placed.
     board_look_ = instance_of(board_material());
     filament::TextureSampler sharp(filament::TextureSampler::MinFilter::LINEAR_MIPMAP_LINEAR,
                                    filament::TextureSampler::MagFilter::LINEAR);
     sharp.setAnisotropy(8);
     board_look_->setParameter("panels", panel_texture_, sharp);
     ray_look_ = instance_of(marker_material());
-    Shape square;
-    square.position = {{-0.5f, -0.5f, 0}, {0.5f, -0.5f, 0}, {0.5f, 0.5f, 0}, {-0.5f, 0.5f, 0}};
-    square.normal.assign(4, {0, 0, 1});
-    square.tangent.assign(4, {1, 0, 0});
-    square.uv = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};  // images start at their upper left corner
-    square.color.assign(4, {1, 1, 1});
-    square.triangle = {{0, 1, 2}, {0, 2, 3}};
-    board_ = make_mesh(*engine_, *lobby_, square, board_look_, false);
-    caption_ = make_mesh(*engine_, *lobby_, square, board_look_, false);
+    shell_look_ = instance_of(fade_material());
+    square_.position = {{-0.5f, -0.5f, 0}, {0.5f, -0.5f, 0}, {0.5f, 0.5f, 0}, {-0.5f, 0.5f, 0}};
+    square_.normal.assign(4, {0, 0, 1});
+    square_.tangent.assign(4, {1, 0, 0});
+    square_.uv = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};  // images start at their upper left corner
+    square_.color.assign(4, {1, 1, 1});
+    square_.triangle = {{0, 1, 2}, {0, 2, 3}};
+    board_ = make_mesh(*engine_, *lobby_, square_, board_look_, false);
+    caption_ = make_mesh(*engine_, *lobby_, square_, board_look_, false);
     show_part(board_, {0, 0, 1, 1});
+    ray_ = make_rod(kCyan);
+    Shape shell;
+    add_ball(shell, {}, kShell, {0, 0, 0});
+    shell_ = make_mesh(*engine_, *lobby_, shell, shell_look_, false);
+    for (const GpuMesh* mesh : {&board_, &caption_, &shell_}) lobby_->remove(mesh->entity);
+  }
+
+  // Of unit length along +z, and of unit thickness; in no scene.
+  GpuMesh make_rod(Vec3 color) {
     Shape rod;
     const Vec3 ends[] = {{0, 0, 0}, {0, 0, 1}};
     const float radius[] = {0.5f, 0.5f};
-    add_tube(rod, ends, radius, 6, srgb(60, 220, 235));
-    ray_ = make_mesh(*engine_, *lobby_, rod, ray_look_, false);
-    for (const GpuMesh* mesh : {&board_, &caption_, &ray_}) lobby_->remove(mesh->entity);
+    add_tube(rod, ends, radius, 6, color);
+    const GpuMesh mesh = make_mesh(*engine_, *lobby_, rod, ray_look_, false);
+    lobby_->remove(mesh.entity);
+    return mesh;
   }
 
   // part: left, top, right, bottom of the panels' picture.
   void show_part(const GpuMesh& mesh, const std::array<float, 4>& part) {
-    const float u[] = {part[0], part[2], part[2], part[0]}, v[] = {part[3], part[3], part[1], part[1]};
+    constexpr float kTall = float(kBoardHeight) / kSheetHeight;
+    const float u[] = {part[0], part[2], part[2], part[0]},
+                v[] = {kTall * part[3], kTall * part[3], kTall * part[1], kTall * part[1]};
     std::vector<VertexLook> look;
     for (size_t i = 0; i < 4; ++i) look.push_back({{1, 1, 1, 1}, {u[i], v[i]}, {0, 0}});
     set_look(*engine_, mesh, look);
@@ -365,7 +391,9 @@ class FilamentEyes final : public EyeRenderer {
 
   void hide_board() {
     for (filament::Scene* scene : {lobby_, theatre_ ? &theatre_->scene() : lobby_}) {
-      for (const GpuMesh* mesh : {&board_, &caption_, &ray_}) scene->remove(mesh->entity);
+      for (const GpuMesh* mesh : {&board_, &caption_, &ray_, &shell_}) scene->remove(mesh->entity);
+      for (const LabelMesh& label : label_)
+        for (const GpuMesh* mesh : {&label.square, &label.rod[0], &label.rod[1]}) scene->remove(mesh->entity);
     }
   }
 
@@ -389,12 +417,58 @@ class FilamentEyes final : public EyeRenderer {
     const Board& b = *frame.board;
     place(board_, b.pose, {b.width, height_of(b), b.width});
     scene.addEntity(board_.entity);
-    const Vec3 along = b.ray_to - b.ray_from;
+    place_rod(ray_, b.ray_from, b.ray_to, 0.006f * b.width, scene);
+  }
+
+  void place_rod(const GpuMesh& rod, Vec3 from, Vec3 to, float thickness, filament::Scene& scene) {
+    const Vec3 along = to - from;
     if (length(along) < 1e-4f) return;
     const Vec3 z = normalized(along), x = any_perpendicular(z);
-    const float thin = 0.006f * b.width;
-    place(ray_, {b.ray_from, from_axes(x, cross(z, x), z)}, {thin, thin, length(along)});
-    scene.addEntity(ray_.entity);
+    place(rod, {from, from_axes(x, cross(z, x), z)}, {thickness, thickness, length(along)});
+    scene.addEntity(rod.entity);
+  }
+
+  // [pixels] of the sheet: upper left corner of a label.
+  static std::array<int, 2> corner_of(size_t label) {
+    return {int(label) % kLabelColumns * kLabelWidth, kBoardHeight + int(label) / kLabelColumns * kLabelHeight};
+  }
+
+  void place_labels(const Frame& frame, filament::Scene& scene) {
+    const size_t count = frame.panels ? std::min(frame.label.size(), kMostLabels) : 0;
+    while (label_.size() < count) {
+      const auto at = corner_of(label_.size());
+      const float left = float(at[0]) / kBoardWidth, top = float(at[1]) / kBoardHeight;
+      LabelMesh fresh{make_mesh(*engine_, *lobby_, square_, board_look_, false), {make_rod(kYellow), make_rod(kCyan)}};
+      lobby_->remove(fresh.square.entity);
+      show_part(fresh.square, {left, top, left + float(kLabelWidth) / kBoardWidth, top + float(kLabelHeight) / kBoardHeight});
+      label_.push_back(fresh);
+    }
+    for (size_t i = 0; i < count; ++i) {
+      const Label& label = frame.label[i];
+      place(label_[i].square, label.pose, {label.width, label.width * kLabelHeight / kLabelWidth, label.width});
+      scene.addEntity(label_[i].square.entity);
+      for (size_t k = 0; k < 2; ++k) place_rod(label_[i].rod[k], label.pose.p, label.point[k], kRod * label.width, scene);
+    }
+  }
+
+  void write_labels(std::span<const Label> labels) {
+    ImDrawList& list = *ImGui::GetForegroundDrawList();
+    for (size_t i = 0; i < std::min(labels.size(), kMostLabels); ++i) {
+      const auto corner = corner_of(i);
+      const ImVec2 at{float(corner[0]), float(corner[1])}, end{at.x + kLabelWidth, at.y + kLabelHeight};
+      list.AddRectFilled(at, end, 0xff140d09u);
+      list.AddRectFilled(at, {at.x + 8, end.y}, labels[i].color);
+      for (size_t k = 0; k < 2; ++k)
+        list.AddText({at.x + 14, at.y + 3 + kBoardText * float(k)}, k == 0 ? 0xfff2f2edu : 0xffc9c4b2u,
+                     labels[i].text[k].c_str());
+    }
+  }
+
+  // A dark shell around the head covers everything, boards too.
+  void fade(const Frame& frame, filament::Scene& scene) {
+    if (frame.brightness >= 1) return;
+    place(shell_, {0.5f * (frame.camera[0].eye + frame.camera[1].eye), {}}, {1, 1, 1});
+    scene.addEntity(shell_.entity);
   }
 
   void draw_panels(const Frame& frame) {
@@ -402,7 +476,12 @@ class FilamentEyes final : public EyeRenderer {
     ImGuiIO& io = ImGui::GetIO();
     io.MousePos = frame.pointer ? ImVec2((*frame.pointer)[0], (*frame.pointer)[1]) : ImVec2(-1e6f, -1e6f);
     io.MouseDown[0] = frame.pointer && frame.pressed;
-    panels_->render(frame.dt, [&](filament::Engine*, filament::View*) { frame.panels(); });
+    panels_->render(frame.dt, [&](filament::Engine*, filament::View*) {
+      io.DisplaySize.y = kBoardHeight;  // panels fill their part of the sheet
+      frame.panels();
+      io.DisplaySize.y = kSheetHeight;
+      write_labels(frame.label);
+    });
     renderer_->render(panel_view_);
     panel_texture_->generateMipmaps(*engine_);
   }
@@ -439,8 +518,10 @@ class FilamentEyes final : public EyeRenderer {
   std::array<filament::Camera*, 2> lobby_camera_{};
   std::array<utils::Entity, 2> lobby_entity_;
   std::vector<filament::Material*> material_;
-  filament::MaterialInstance *board_look_ = nullptr, *ray_look_ = nullptr;
-  GpuMesh board_, caption_, ray_;
+  filament::MaterialInstance *board_look_ = nullptr, *ray_look_ = nullptr, *shell_look_ = nullptr;
+  Shape square_;  // of unit size; faces +z
+  GpuMesh board_, caption_, ray_, shell_;
+  std::vector<LabelMesh> label_;
   std::array<float, 4> caption_part_{};
 };
 

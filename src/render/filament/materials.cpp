@@ -28,6 +28,9 @@ constexpr uint8_t kMark[] = {
 constexpr uint8_t kBoard[] = {
 #include "board.inc"
 };
+constexpr uint8_t kFade[] = {
+#include "fade.inc"
+};
 }  // namespace
 
 std::span<const uint8_t> tissue_material() { return kTissue; }
@@ -38,5 +41,6 @@ std::span<const uint8_t> shadow_material() { return kShadow; }
 std::span<const uint8_t> marker_material() { return kMarker; }
 std::span<const uint8_t> mark_material() { return kMark; }
 std::span<const uint8_t> board_material() { return kBoard; }
+std::span<const uint8_t> fade_material() { return kFade; }
 
 }  // namespace catgut

@@ -14,5 +14,6 @@ std::span<const uint8_t> shadow_material();
 std::span<const uint8_t> marker_material();
 std::span<const uint8_t> mark_material();
 std::span<const uint8_t> board_material();
+std::span<const uint8_t> fade_material();
 
 }  // namespace catgut

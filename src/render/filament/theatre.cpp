@@ -12,6 +12,7 @@
 
 #include "exchange/strand.h"
 #include "render/filament/materials.h"
+#include "render/room_shape.h"
 
 namespace catgut {
 namespace {
@@ -39,6 +40,7 @@ Theatre::Theatre(filament::Engine& engine, const PictureModel& model, Quality qu
   set_light(quality);
   make_materials();
   make_stage();
+  if (eyes > 1) make_room();
   thread_ = make_thread_view(engine_, *scene_, model_, thread_material_);
   set_cloth(thread_, std::move(cloth_position_), std::move(cloth_normal_));
   for (const ToolView3d& tool : tool_) thread_.hull.push_back(tool_hull(tool.shape));
@@ -142,10 +144,6 @@ void Theatre::set_resolution_scale(float part) {
   coarse.minScale = coarse.maxScale = {part, part};
   coarse.quality = filament::View::QualityLevel::LOW;
   for (const Eye& eye : eye_) eye.view->setDynamicResolutionOptions(coarse);
-}
-
-void Theatre::set_brightness(float part) {
-  for (const Eye& eye : eye_) eye.camera->setExposure(16.0f, 1.0f / 125, 100 * std::max(part, 1e-4f));
 }
 
 void Theatre::set_quality(filament::View& view, Quality quality) {
@@ -285,6 +283,13 @@ void Theatre::make_scenery(std::span<const Vec3> tissue) {
         break;
     }
   }
+}
+
+// Only for a headset: a window's camera stays near the field.
+void Theatre::make_room() {
+  const Shape room =
+      room_shape({model_.focus.x, model_.drape, model_.focus.z}, normalized(-kLampDirection), model_.scenery.empty());
+  scenery_.push_back(make_mesh(engine_, *scene_, room, marker_material_, false));
 }
 
 void Theatre::make_needles_and_tools() {

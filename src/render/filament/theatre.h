@@ -46,7 +46,6 @@ class Theatre {
   // Renders the field at `part` of the resolution in each direction and upscales it: for windows on machines without a graphics
   // card.
   void set_resolution_scale(float part);
-  void set_brightness(float part);  // 1: normal, 0: black
   filament::Scene& scene() const { return *scene_; }
   filament::View* view(int eye = 0) const { return eye_[size_t(eye)].view; }
 
@@ -62,6 +61,7 @@ class Theatre {
   void make_materials();
   void make_stage();
   void make_scenery(std::span<const Vec3> tissue);
+  void make_room();
   void make_needles_and_tools();
   // Rebuilds the tissue's surface after a cut has changed it.
   void follow_topology(const TopologyView& topology);
