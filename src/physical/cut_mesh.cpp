@@ -56,14 +56,16 @@ std::array<std::array<float, 2>, 81> smoothed(const wall::Topology& t, uint32_t 
 
 }  // namespace
 
-CutMesh make_cut_mesh(const Model& m, const State& s) {
+CutMesh make_cut_mesh(const Model& m, const State& s, bool layers) {
   const wall::Topology& t = s.wall.topology;
   const Surface& surface = surface_of(m, s);
   CutMesh out;
   out.version = t.version;
   // Borders of the layers, from the inner face.
   std::vector<float> level{-1};
-  for (const TearModel::LayerShare& l : m.tear.layer) level.push_back(l.top);
+  for (const TearModel::LayerShare& l : m.tear.layer)
+    if (layers) level.push_back(l.top);
+  if (!layers) level.push_back(1);
   level.back() = 1;
   const uint32_t faces = static_cast<uint32_t>(m.wall.lane_of_face.size());
   std::array<std::array<float, 2>, 81> at{};

@@ -27,6 +27,7 @@ struct CutMesh {
   std::vector<Face> face;
   std::vector<uint32_t> hidden;  // divided faces of the wall, in order
 };
-CutMesh make_cut_mesh(const Model& model, const State& state);
+// layers: false leaves out the vertices between the two faces on cut edges; their triangles then reach from face to face.
+CutMesh make_cut_mesh(const Model& model, const State& state, bool layers = true);
 
 }  // namespace catgut::physical

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "exchange/strand.h"
+#include "runtime/cut_measures.h"
 
 namespace catgut {
 
@@ -177,6 +178,11 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   v["thread_length_error_passing"] = length_error_passing_;
   v["order_errors"] = order_errors_;
   v["state_valid"] = valid_ ? 1 : 0;
+  const CutMeasures cut = measure_cut(scene_, last);
+  v["pieces"] = cut.pieces;
+  v["cut_deviation"] = cut.deviation;
+  v["specimen_way"] = cut.way;
+  v["drawn_mass"] = cut.mass;
   v["simulated_s"] = result.simulated_s;
   v["ticks"] = static_cast<double>(result.ticks);
   v.try_emplace("surgeon_retries", 0);

@@ -16,6 +16,7 @@
 #include "exchange/tool_input.h"
 #include "physical/physical.h"
 #include "physical/reflect.h"
+#include "sim/cutting.h"
 #include "solver/reflect.h"
 
 namespace catgut {
@@ -48,12 +49,13 @@ struct PhysicalScratch;
 struct PhysicalState {
   physical::State world;  // bodies: instruments, then the needle of every suture
   std::vector<PhysicalSuture> suture;
+  Cutting cutting;
   std::shared_ptr<PhysicalScratch> scratch;  // working memory; null: made by the next tick
 };
 // A guided scene has none of it: nothing is written, read or hashed.
 constexpr void reflect(auto& a, Like<PhysicalState> auto& p) {
-  if (p.world.thread.x.x.empty()) a.cache(p.world), a.cache(p.suture);
-  else a(p.world), a.column(p.suture, IndexOf::strand);
+  if (p.world.thread.x.x.empty()) a.cache(p.world), a.cache(p.suture), a.cache(p.cutting);
+  else a(p.world), a.column(p.suture, IndexOf::strand), a(p.cutting);
   a.cache(p.scratch);
 }
 

@@ -167,6 +167,7 @@ PhysicalState start_physical(const Model& model, const SolverState& solver) {
   for (size_t i = 0; i < s.world.bodies.body.size(); ++i)
     physical::place_body(model.physical->world.bodies.body[i], s.world.bodies.body[i], solver.body[i].pose(), kWideOpen);
   s.suture.resize(model.solver.strand.size());
+  s.cutting = start_cutting(model);
   for (size_t k = 0; k < s.suture.size(); ++k) s.suture[k].bed = solver.body[model.solver.needle_body(k)].pose();
   return s;
 }
@@ -239,6 +240,7 @@ bool physical_fits(const Model& model, const PhysicalState& state) {
         if (i < n.channels && hole != wall::kNone && hole >= s.hole.size()) return false;
     }
   }
+  if (!cutting_fits(model, state.cutting)) return false;
   for (const PhysicalSuture& u : state.suture)
     for (const uint32_t hole : u.hole)
       if (hole >= s.hole.size()) return false;

@@ -193,7 +193,7 @@ void show_grips(const Model& model, State& state, SutureContext& sewing) {
     } else if (now == Held::tissue) {
       const wall::Weights at = wall::weights(model.physical->world.wall, w.wall.topology, grip.point[0].tissue);
       const size_t most = static_cast<size_t>(std::max_element(at.weight.begin(), at.weight.end()) - at.weight.begin());
-      tool.slot = 2 * at.column[most] + (grip.point[0].tissue.zeta < 0 ? 1 : 0);
+      tool.slot = 2 * w.wall.topology.source[at.column[most]] + (grip.point[0].tissue.zeta < 0 ? 1 : 0);
     }
     if (now != Held::nothing && before != now)
       sewing.report_tool(now == Held::tissue ? 0 : tool.suture, kTaken[static_cast<size_t>(grip.what)], i,
@@ -363,7 +363,9 @@ void sum_haptics(const Model& model, State& state, const PhysicalScratch& k, int
 
 }  // namespace
 
-void step_physical(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times) {
+void step_physical(const Model& model, State& state, const TickInput& given, Jobs& jobs, StageTimes* times) {
+  TickInput input = given;
+  switch_pens(model, state, input);
   if (!state.physical.scratch) state.physical.scratch = std::make_shared<PhysicalScratch>(model, state.physical);
   PhysicalScratch& k = *state.physical.scratch;
   find_boxes(model.solver, state.solver, state.scratch, jobs, times);
@@ -386,6 +388,7 @@ void step_physical(const Model& model, State& state, const TickInput& input, Job
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));
     set_targets(model, state, input, k);
     lay_needles(model, state, k);
+    use_pens(model, state, k.world, model.solver.h);
     physical::step(model.physical->world, state.physical.world, k.world, hands, jobs);
     note_punctures(state, model.physical->world, k);
     sum_haptics(model, state, k, i);
@@ -394,6 +397,7 @@ void step_physical(const Model& model, State& state, const TickInput& input, Job
   show_grips(model, state, sewing);
   show_bites(model, state, sewing, k);
   show_points(model, state);
+  renew_cut_picture(model, state);
   remember_hands(state, input);
   ++state.tick;
   finish_haptics(model, state);

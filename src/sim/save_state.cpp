@@ -161,6 +161,7 @@ void load_state(const Model& model, State& state, const std::vector<std::byte>& 
   if (model.physical) restore_physical(model, fresh->physical);
   if (read.at != bytes.size() || !fits(current_model(model, *fresh), *fresh))
     throw InputError("saved state", "it does not fit this scene", "use the scene and the version it was saved with");
+  if (model.physical) renew_cut_picture(model, *fresh);
   state = std::move(*fresh);
 }
 

@@ -254,6 +254,9 @@ Plan simple_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
+// surgeon/excision carries it out: nothing of it is a task of the needle.
+Plan excision_plan(const PictureModel&, const SurgeonSkill&) { return {}; }
+
 // 2.5.4: single stitches through outer and inner layer round the ring, each tied and cut, with a new suture for the next.
 Plan lembert_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
@@ -321,7 +324,8 @@ constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
                              {"running", 1, running_plan},
                              {"interrupted", 2, interrupted_plan},
                              {"interrupted_tied", 2, interrupted_tied_plan},
-                             {"simple", 2, simple_plan}};
+                             {"simple", 2, simple_plan},
+                             {"excision", 1, excision_plan}};
 
 }  // namespace
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "surgeon/excision.h"
+
 namespace catgut {
 namespace {
 
@@ -522,6 +524,7 @@ std::unique_ptr<Surgeon> make_demonstrator(const std::string& plan, const Pictur
 }
 
 std::unique_ptr<Surgeon> make_surgeon(const std::string& plan, const PictureModel& picture, const SurgeonSkill& skill) {
+  if (plan == "excision") return make_plan(plan, picture, skill), std::make_unique<Excising>(picture, skill);
   return std::make_unique<Scripted>(plan, picture, skill);
 }
 

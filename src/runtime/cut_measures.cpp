@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// runtime: see cut_measures.h.
+#include "runtime/cut_measures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+namespace catgut {
+namespace {
+
+constexpr float kOnRim = 2e-4f;  // [m] a cut edge so near to an end of the organ is that end
+
+// Vertices that follow the same particles with the same weights are one: those of the wall's sides and of its edges.
+using Place = std::vector<std::pair<uint32_t, int>>;
+Place place_of(const VisibleMesh& mesh, uint32_t v) {
+  Place place;
+  for (size_t k = 0; k < 4; ++k)
+    if (const int w = static_cast<int>(std::lround(mesh.skin_weight[v][k] * 4096)); w > 0)
+      place.push_back({mesh.skin_particle[v][k], w});
+  std::sort(place.begin(), place.end());
+  return place;
+}
+
+}  // namespace
+
+CutMeasures measure_cut(const SceneSpec& scene, const Snapshot& seen) {
+  CutMeasures out;
+  if (!seen.topology.picture || scene.body.empty()) return out;
+  const BodySpec& first = scene.body.front();
+  const Vec3 axis = normalized(first.axis);
+  for (size_t b = 0; b < seen.topology.picture->body.size(); ++b) {
+    const VisibleMesh& mesh = seen.topology.picture->body[b];
+    std::map<Place, uint32_t> known;
+    std::vector<uint32_t> root(mesh.position.size());
+    for (uint32_t v = 0; v < root.size(); ++v) root[v] = known.try_emplace(place_of(mesh, v), v).first->second;
+    const auto find = [&](uint32_t v) {
+      while (root[v] != v) v = root[v] = root[root[v]];
+      return v;
+    };
+    for (const auto& t : mesh.triangle)
+      for (size_t k = 1; k < 3; ++k) {
+        const uint32_t a = find(t[0]), c = find(t[k]);
+        root[std::max(a, c)] = std::min(a, c);
+      }
+    std::vector<uint8_t> drawn(root.size(), 0);
+    for (const auto& t : mesh.triangle) {
+      drawn[find(t[0])] = 1;
+      out.mass += static_cast<double>(dot(mesh.position[t[0]], cross(mesh.position[t[1]], mesh.position[t[2]])) *
+                                      scene.body[std::min(b, scene.body.size() - 1)].density / 6);
+    }
+    const uint32_t here = static_cast<uint32_t>(std::count(drawn.begin(), drawn.end(), 1));
+    out.pieces += here;
+    if (b > 0) continue;
+    const auto depth = [&](uint32_t v) { return dot(first.position - mesh.position[v], axis); };
+    uint32_t top = 0;  // a vertex at the rim
+    for (uint32_t v = 0; v < root.size(); ++v) {
+      if (depth(v) < depth(top)) top = v;
+      if (mesh.layer[v] != TissueLayer::cut_edge || depth(v) < kOnRim || depth(v) > first.length - kOnRim) continue;
+      out.deviation = std::max(out.deviation, static_cast<double>(std::abs(depth(v) - scene.surgeon.edge_distance)));
+    }
+    if (here < 2) continue;
+    Vec3 way{};
+    float count = 0;
+    for (uint32_t v = 0; v < root.size(); ++v) {
+      if (find(v) != find(top)) continue;
+      Vec3 now{};
+      for (size_t k = 0; k < 4; ++k) now += seen.particle[mesh.skin_particle[v][k]] * mesh.skin_weight[v][k];
+      way += now - mesh.position[v], ++count;
+    }
+    out.way = static_cast<double>(length(way / std::max(count, 1.0f)));
+  }
+  return out;
+}
+
+}  // namespace catgut

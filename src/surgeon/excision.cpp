@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// surgeon/excision: see the header.
+#include "surgeon/excision.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace catgut {
+namespace {
+
+constexpr size_t kPen = 0, kHolder = 1;
+constexpr float kClear = 0.008f;      // [m] of the tip from the surface before it touches
+constexpr float kTraction = 0.0005f;  // [m] by which the rim is raised while it is cut
+constexpr float kOverlap = 0.12f;     // [rad] beyond a full turn: the line closes on its start
+constexpr float kCarried = 0.0035f;   // [m] from the line to the tissue that carries it: farther than an element
+constexpr int kMostRounds = 3, kMostMisses = 8;
+
+}  // namespace
+
+Excising::Excising(const PictureModel& picture, const SurgeonSkill& skill)
+    : picture_(picture), skill_(skill), opening_(opening_shape(picture, 0)), random_(skill.seed) {
+  // The left hand is at angle pi, the pen begins at 0.
+  u_ = normalized(Vec3{1, 0, 0} - opening_.axis * opening_.axis.x, any_perpendicular(opening_.axis));
+  v_ = cross(opening_.axis, u_);
+  for (uint32_t i = 0; i < picture.particle_rest.size(); i += 2) {  // even: on the outer side
+    if (i >= picture.wall.size() || picture.wall[i] != 0) continue;
+    const float depth = dot(opening_.center - picture.particle_rest[i], opening_.axis) - skill.edge_distance;
+    if (depth > kCarried && depth < 3 * kCarried) below_.push_back(i);
+  }
+  hand_[kPen].pose = {picture.focus + Vec3{0.06f, 0.08f, 0.05f}, {}};
+  hand_[kHolder].pose = {picture.focus + Vec3{-0.08f, 0.08f, 0.06f}, {}};
+}
+
+std::string Excising::doing() const {
+  static constexpr const char* kName[] = {"grasp the rim",
+                                          "grasp the rim",
+                                          "grasp the rim",
+                                          "grasp the rim",
+                                          "go to the line",
+                                          "go to the line",
+                                          "cut round the bowel",
+                                          "switch the pen off",
+                                          "lift the specimen",
+                                          "lay the specimen aside",
+                                          "hold",
+                                          "done"};
+  const std::string doing = kName[stage_];
+  return gave_up_ ? "gave up: " + doing + (pieces_ < 2 && stage_ >= off ? ", it is still attached" : "") : doing;
+}
+
+Excising::OnLine Excising::on_line(const Snapshot& seen, float angle) const {
+  const Vec3 out = radial(angle), rest = opening_.center + out * opening_.radius - opening_.axis * skill_.edge_distance;
+  constexpr size_t kNear = 6;
+  std::array<std::pair<float, uint32_t>, kNear> near;
+  near.fill({1e9f, 0});
+  for (const uint32_t i : below_) {
+    std::pair<float, uint32_t> p{length2(picture_.particle_rest[i] - rest), i};
+    for (auto& n : near)
+      if (p.first < n.first) std::swap(p, n);
+  }
+  OnLine line{};
+  float weight = 0;
+  for (const auto& [d2, i] : near) {
+    if (d2 > 1) continue;
+    const float w = 1 / (d2 * d2 + 1e-14f);
+    const Quat q = seen.rotation[i];
+    line.at += (seen.particle[i] + rotate(q, rest - picture_.particle_rest[i])) * w;
+    line.out += rotate(q, out) * w, line.up += rotate(q, opening_.axis) * w;
+    weight += w;
+  }
+  if (weight > 0) line.at = line.at / weight;
+  else line.at = rest;
+  line.out = normalized(line.out, out), line.up = normalized(line.up, opening_.axis);
+  return line;
+}
+
+Pose Excising::pen_at(const OnLine& line, float above) const {
+  // Nearly square to the wall, the shaft a little toward the rim.
+  const Vec3 z = normalized(line.out + line.up * 0.25f), x = normalized(cross(line.up, z), any_perpendicular(z));
+  return {line.at + line.out * above, from_axes(x, cross(z, x), z)};
+}
+
+Pose Excising::grasp_at(float raised) const {
+  const Vec3 out = radial(kPi), z = opening_.axis, x = out;
+  const Vec3 rim = opening_.center + out * (opening_.radius - 0.5f * skill_.wall);
+  return {rim + z * (raised - 0.0015f), from_axes(x, cross(z, x), z)};
+}
+
+void Excising::act(const Snapshot& seen) {
+  ScriptedHand &pen = hand_[kPen], &holder = hand_[kHolder];
+  const float slow = 0.35f * skill_.speed;
+  pieces_ = seen.topology.pieces;
+  switch (stage_) {
+    case over_rim:
+      move_jaw(holder, 1, dt_);
+      move_toward(pen, {picture_.focus + u_ * 0.06f + opening_.axis * 0.04f, pen_at(on_line(seen, 0), 0).q}, skill_.speed, dt_);
+      if (move_toward(holder, grasp_at(0.03f), skill_.speed, dt_)) go(down);
+      return;
+    case down:
+      if (move_toward(holder, grasp_at(0), slow, dt_)) go(close);
+      return;
+    case close:
+      if (!move_jaw(holder, 0, dt_) || waited_ < 0.5f) return;
+      if (seen.tool[kHolder].held == Held::tissue) return go(tighten);
+      ++retries_;
+      if (++misses_ > kMostMisses) gave_up_ = true;
+      return go(over_rim);
+    case tighten:
+      if (move_toward(holder, grasp_at(kTraction), 0.1f * skill_.speed, dt_)) go(to_line);
+      return;
+    case to_line:
+      if (move_toward(pen, pen_at(on_line(seen, angle_), kClear), skill_.speed, dt_)) go(touch);
+      return;
+    case touch:
+      if (!move_toward(pen, pen_at(on_line(seen, angle_), 0), slow, dt_)) return;
+      switch_pen();
+      ++rounds_;
+      return go(round);
+    case round: {
+      angle_ += skill_.drive_speed / opening_.radius * dt_;
+      // A hand that draws a line strays from it slowly.
+      const float keep = portable::exp(-0.5f * dt_);
+      aim_ = aim_ * keep + skill_.aim_error * std::sqrt(1 - keep * keep) * random_.normal();
+      OnLine line = on_line(seen, angle_);
+      line.at += line.up * aim_;
+      move_toward(pen, pen_at(line, 0), 2 * skill_.drive_speed + 0.02f, dt_);
+      if (angle_ >= 2 * kPi * static_cast<float>(rounds_) + kOverlap) switch_pen(), go(off);
+      return;
+    }
+    case off:
+      if (!move_toward(pen, pen_at(on_line(seen, angle_), 0.02f), skill_.speed, dt_)) return;
+      if (seen.topology.pieces > 1) return go(lift);
+      ++retries_;
+      if (rounds_ >= kMostRounds) gave_up_ = true;
+      else go(to_line);
+      return;
+    case lift:
+      if (move_toward(holder, grasp_at(0.035f), slow, dt_)) go(aside);
+      return;
+    case aside: {
+      Pose goal = grasp_at(0.035f);
+      goal.p -= u_ * 0.04f;
+      if (move_toward(holder, goal, skill_.speed, dt_)) go(hold);
+      return;
+    }
+    case hold:
+      if (waited_ > 1) go(finished);
+      return;
+    case finished:
+      return;
+  }
+}
+
+TickInput Excising::operate(const Snapshot& seen, float dt) {
+  const std::array<Pose, 2> before{hand_[0].pose, hand_[1].pose};
+  commands_.clear();
+  dt_ = dt, waited_ += dt;
+  if (!done()) act(seen);
+  TickInput out;
+  out.commands = commands_;
+  for (size_t k = 0; k < 2; ++k) {
+    tremble(hand_[k], skill_.tremor, random_, dt);
+    out.hand[k] = as_input(hand_[k], before[k], dt, sequence_);
+  }
+  ++sequence_;
+  return out;
+}
+
+}  // namespace catgut

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// surgeon/excision: the scripted surgeon cuts the end of a bowel off. The left hand grasps the rim; the right hand leads an
+// electrosurgical pen once round the organ, `edge_distance` from the rim; the left hand lifts the specimen away. Reads
+// Snapshots only. The line is carried by the tissue that stays: the specimen moves as soon as it is partly free.
+#pragma once
+#include <array>
+#include <string>
+#include <vector>
+
+#include "core/random.h"
+#include "surgeon/hands.h"
+#include "surgeon/sight.h"
+#include "surgeon/surgeon.h"
+
+namespace catgut {
+
+class Excising final : public Surgeon {
+ public:
+  Excising(const PictureModel& picture, const SurgeonSkill& skill);
+  TickInput operate(const Snapshot& seen, float dt) override;
+  bool done() const override { return stage_ == finished || gave_up_; }
+  bool gave_up() const override { return gave_up_; }
+  int retries() const override { return retries_; }
+  std::string doing() const override;
+
+ private:
+  enum Stage { over_rim, down, close, tighten, to_line, touch, round, off, lift, aside, hold, finished };
+  void act(const Snapshot& seen);
+  void go(Stage stage) { stage_ = stage, waited_ = 0; }
+  // The line on the organ's outer side at an angle [rad], now: position, outward, toward the rim.
+  struct OnLine {
+    Vec3 at, out, up;
+  };
+  OnLine on_line(const Snapshot& seen, float angle) const;
+  Vec3 radial(float angle) const { return u_ * portable::cos(angle) + v_ * portable::sin(angle); }
+  Pose pen_at(const OnLine& line, float above) const;  // tip `above` the surface [m]
+  Pose grasp_at(float raised) const;                   // jaws about the rim, raised along the axis [m]
+  void switch_pen() { commands_.push({CommandKind::cut, 0, 0}); }
+
+  PictureModel picture_;
+  SurgeonSkill skill_;
+  OpeningShape opening_;
+  Vec3 u_, v_;
+  std::vector<uint32_t> below_;  // particles that carry the line
+  Random random_;
+  std::array<ScriptedHand, 2> hand_;
+  CommandList commands_;
+  Stage stage_ = over_rim;
+  float waited_ = 0, dt_ = 1.0f / 60, angle_ = 0, aim_ = 0;
+  int misses_ = 0, rounds_ = 0, retries_ = 0;
+  bool gave_up_ = false;
+  uint32_t sequence_ = 0, pieces_ = 0;
+};
+
+}  // namespace catgut
