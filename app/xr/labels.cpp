@@ -9,8 +9,8 @@
 namespace catgut::xr {
 namespace {
 
-// [m] room. A pixel of 0.2 mm makes lines of 0.45 degrees at the usual distance of the field.
-constexpr float kPixel = 0.0002f, kWidth = kPixel * EyeRenderer::kLabelWidth;
+// [m] room. A pixel of 0.3 mm makes lines of 0.65 degrees at the usual distance of the field.
+constexpr float kPixel = 0.0003f, kWidth = kPixel * EyeRenderer::kLabelWidth;
 constexpr float kAway = 0.045f;          // from the outermost suture point to the ring
 constexpr float kAbove = 0.008f;         // of the ring above the highest suture point
 constexpr float kMostRadius = 0.24f;     // of the ring, unless the suture points are further out; more labels become smaller
