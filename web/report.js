@@ -85,7 +85,7 @@
       const sorted = d.lost.slice().sort((a, b) => Number(b.critical) - Number(a.critical) || b.points - a.points);
       parts.push(section("What to improve", el("ol", {class: "lost"}, sorted.map((l) => el("li", {},
         el("strong", {}, words(l.item)), l.critical ? el("strong", {class: "bad"}, " (critical error)") : null, `: ${l.reason}`,
-        l.place ? ` (${l.place})` : "", ` – ${number(l.points)} points.`, known(l.at_s) ? replay(l.at_s) || el("span", {class: "quiet"}, ` At ${time(l.at_s)}.`) : null, attempt(() => clip(l.at_s)))))));
+        l.place && !l.reason.startsWith(l.place) ? ` (${l.place})` : "", ` – ${number(l.points)} points.`, known(l.at_s) ? replay(l.at_s) || el("span", {class: "quiet"}, ` At ${time(l.at_s)}.`) : null, attempt(() => clip(l.at_s)))))));
     } else if (known(s.score)) parts.push(section("What to improve", el("p", {}, "No points were lost.")));
     const map = attempt(() => stitchMap(d.details.bites || [], d.details.lines));
     if (map) parts.push(section("Stitch map", map));

@@ -151,13 +151,15 @@ int store_info(const StoreCommand& o) {
 
 int store_list(const StoreCommand& o) {
   const Store store = open_store(o.store);
-  std::printf("%6s  %-20s  %-16s  %-16s  %8s  %8s  %s\n", "id", "start", "trainee", "task", "time s", "score", "verdict");
-  for (const Session& s : store.sessions(o.filter))
-    std::printf("%6lld  %-20s  %-16s  %-16s  %8.1f  %8s  %s\n", static_cast<long long>(s.id), s.started.c_str(),
-                s.trainee.c_str(), s.task.c_str(), s.duration_s, csv_number(s.score).c_str(),
+  std::printf("%6s  %-20s  %-16s  %-16s  %8s  %10s  %s\n", "id", "start", "trainee", "task", "time s", "score", "verdict");
+  for (const Session& s : store.sessions(o.filter)) {
+    const std::string of = std::isfinite(s.score) && std::isfinite(s.score_max) ? "/" + csv_number(s.score_max) : "";
+    std::printf("%6lld  %-20s  %-16s  %-16s  %8.1f  %10s  %s\n", static_cast<long long>(s.id), s.started.c_str(),
+                s.trainee.c_str(), s.task.c_str(), s.duration_s, (csv_number(s.score) + of).c_str(),
                 s.passed < 0 ? "-"
                 : s.passed   ? "passed"
                              : "not passed");
+  }
   return 0;
 }
 
