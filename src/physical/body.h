@@ -73,13 +73,13 @@ struct GripPoint {
 };
 struct Grip {
   Gripped what = Gripped::nothing;
-  uint32_t count = 0;              // of points
-  uint32_t body = 0;               // needle: its body
+  uint32_t count = 0;              // of points; thread: of strands, 1 or 2
+  uint32_t body = 0;               // needle: its body; thread: node of the second strand, which holds point[1]
   uint32_t node = 0;               // thread
   float force = 0;                 // [N] normal force of the jaws
   float size = 0;                  // [m] thickness between the jaws
   float slid = 0;                  // [m] by which the held thing has slipped since it was gripped
-  std::array<GripPoint, 4> point;  // thread: the first one's in_tool
+  std::array<GripPoint, 4> point;  // thread: in_tool of each strand
 };
 
 struct Body {

@@ -145,6 +145,15 @@ void take_thread_forces(const BodiesModel& model, Bodies& bodies, BodiesScratch&
         }
       continue;
     }
+    // The same for jaws on a thread: a short strand between them and a hole is as stiff as the grip.
+    const uint32_t strand = i > 0 && k.hold_body[i - 1] == index ? 1 : 0;
+    const auto row = std::find_if(k.row.begin(), k.row.end(),
+                                  [&](const Row& r) { return r.key == key_of(kThreadGripRow, index, strand, 0); });
+    if (row != k.row.end()) {
+      row->soft = row->soft_across = 1 / (k.hold[i].stiffness * k.step * k.step);
+      row->wanted = point_speed(k.moving[index], row->ra) - k.hold[i].force * (k.step * row->soft);
+      continue;
+    }
     const Vec3 at = transform(b.pose, k.hold_at[i]) - k.moving[index].center;
     b.thread_force -= k.hold[i].force, b.thread_torque -= cross(at, k.hold[i].force);
   }

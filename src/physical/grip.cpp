@@ -10,6 +10,8 @@
 namespace catgut::physical {
 namespace {
 
+constexpr uint32_t kOtherStrand = 12;  // nodes apart along the thread: two places between the same jaws are two strands
+
 // The nearest point of the wall's surface to p among all faces.
 Foot nearest_surface(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
                      float within) {
@@ -80,18 +82,31 @@ void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::Sta
           grip.size = size;
         }
       }
+      bool strand_between = false;  // jaws that close on thread meet it before the tissue under it
       if (grip.what == Gripped::nothing && (target[b].may_hold & 2)) {
         const float size = thread_diameter;
         for (uint32_t i = 0; i < thread.nodes(); ++i) {
           const Vec3 p = thread.position(i), in = to_local(body.pose, p);
-          if (length2(in) > 25e-6f || length(in) > best || !in_jaws(in, size) || !closed_on(in.z, size)) continue;
+          if (length2(in) > 25e-6f || length(in) > best || !in_jaws(in, size)) continue;
+          strand_between = true;
+          if (!closed_on(in.z, size)) continue;
           best = length(in);
           grip = {};
           grip.what = Gripped::thread, grip.count = 1, grip.node = i, grip.size = size;
           grip.point[0].in_tool = in;
         }
+        // Another strand between the same jaws, such as the crossing of a throw: both are pinched.
+        best = 1e9f;
+        for (uint32_t i = 0; i < thread.nodes() && grip.what == Gripped::thread; ++i) {
+          const Vec3 in = to_local(body.pose, thread.position(i));
+          if (length2(in) > 4e-6f || length(in) > best || !in_jaws(in, size) || !closed_on(in.z, size)) continue;
+          if (std::max(i, grip.node) - std::min(i, grip.node) < kOtherStrand) continue;
+          best = length(in);
+          grip.count = 2, grip.body = i, grip.point[1].in_tool = in;
+          grip.size = 2.6f * size;  // twisted strands lie on each other somewhere in the width of the jaws
+        }
       }
-      if (grip.what == Gripped::nothing && (target[b].may_hold & 4) && closed_on(0, wm.laminate.thickness)) {
+      if (grip.what == Gripped::nothing && !strand_between && (target[b].may_hold & 4) && closed_on(0, wm.laminate.thickness)) {
         const Foot foot = nearest_surface(wm, ws, surface, k, body.pose.p, 3e-3f);
         if (foot.gap < 1.2e-3f || (foot.gap < 1e8f && dot(body.pose.p - foot.at, foot.facing) < 0 && foot.gap < 2e-3f)) {
           grip = {};
@@ -121,12 +136,21 @@ void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::Sta
     const float pinch = grip.force, part = 1.0f / static_cast<float>(grip.count);
     const Vec3 x = rotate(body.pose.q, {1, 0, 0}), center = k.moving[b].center;
     if (grip.what == Gripped::thread) {
-      thread::Hold hold;
-      hold.node = grip.node;
-      hold.from = transform(body.shown, grip.point[0].in_tool);
-      hold.limit = std::max(1e-3f, 2 * m.grip_friction * pinch);
-      hold.stiffness = hold.limit / kThreadGripGive;
-      k.hold.push_back(hold), k.hold_body.push_back(b), k.hold_at.push_back(grip.point[0].in_tool);
+      for (uint32_t i = 0; i < grip.count; ++i) {
+        thread::Hold hold;
+        hold.node = i == 0 ? grip.node : grip.body;
+        hold.from = transform(body.shown, grip.point[i].in_tool);
+        hold.limit = std::max(1e-3f, 2 * m.grip_friction * pinch * part);
+        hold.stiffness = hold.limit / kThreadGripGive;
+        k.hold.push_back(hold), k.hold_body.push_back(b), k.hold_at.push_back(grip.point[i].in_tool);
+        if (k.row.size() >= kMaxRows) continue;
+        Row row;
+        row.kind = Row::Kind::spring, row.key = key_of(kThreadGripRow, b, i, 0), row.a = b, row.axis = {1, 0, 0};
+        row.ra = transform(body.pose, grip.point[i].in_tool) - k.moving[b].center;
+        row.across_limit = hold.limit * h;
+        row.impulse = grip.point[i].impulse;
+        k.row.push_back(row);
+      }
       continue;
     }
     for (uint32_t i = 0; i < grip.count && k.row.size() < kMaxRows; ++i) {
@@ -157,19 +181,19 @@ void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::Sta
 
 namespace {
 
-void slip_thread(const BodyModel& m, Body& b, const thread::Hold& hold, const thread::State& t) {
-  Grip& grip = b.grip;
-  GripPoint& g = grip.point[0];
-  const Vec3 node = t.position(hold.node), give = hold.to - node;
+// The node and its place in the jaws after a step; true when the thread has left the jaws.
+bool slip_thread(const BodyModel& m, const Body& b, const thread::Hold& hold, const thread::State& t, uint32_t& node,
+                 Vec3& in_tool, float& slid) {
+  const Vec3 at = t.position(hold.node), give = hold.to - at;
   const float size = length(give);
   if (size > kThreadGripGive) {
     const Vec3 slip = give * (1 - kThreadGripGive / size);
-    grip.slid += length(slip);
-    g.in_tool = g.in_tool - rotate(conjugate(b.shown.q), slip);
+    slid += length(slip);
+    in_tool = in_tool - rotate(conjugate(b.shown.q), slip);
   }
   // The neighbor that is nearer to the middle of the jaws takes over, with the same give.
-  const Vec3 middle{0, 0, std::clamp(g.in_tool.z, -0.5f * m.jaw_length, 0.5f * m.jaw_length)};
-  float best = distance(to_local(b.shown, node), middle);
+  const Vec3 middle{0, 0, std::clamp(in_tool.z, -0.5f * m.jaw_length, 0.5f * m.jaw_length)};
+  float best = distance(to_local(b.shown, at), middle);
   for (const int d : {-1, 1}) {
     const int64_t i = static_cast<int64_t>(hold.node) + d;
     if (i < 0 || i >= static_cast<int64_t>(t.nodes()) || t.broken[static_cast<size_t>(std::min<int64_t>(i, hold.node))])
@@ -177,12 +201,23 @@ void slip_thread(const BodyModel& m, Body& b, const thread::Hold& hold, const th
     const Vec3 other = t.position(static_cast<size_t>(i));
     const float far = distance(to_local(b.shown, other), middle);
     if (far > best - 0.02e-3f) continue;
-    best = far, grip.node = static_cast<uint32_t>(i);
-    g.in_tool = to_local(b.shown, other + clamped(give, kThreadGripGive));
+    best = far, node = static_cast<uint32_t>(i);
+    in_tool = to_local(b.shown, other + clamped(give, kThreadGripGive));
   }
   // The thread's end has left the jaws, or they were torn off.
-  const bool end = grip.node == 0 || grip.node + 1 == t.nodes() || t.broken[grip.node - 1] || t.broken[grip.node];
-  if (best > (end ? 0.6f : 2.0f) * m.jaw_length) grip = {};
+  const bool end = node == 0 || node + 1 == t.nodes() || t.broken[node - 1] || t.broken[node];
+  return best > (end ? 0.6f : 2.0f) * m.jaw_length;
+}
+
+// Both strands; where one has left the jaws, the other remains.
+void slip_strands(const BodyModel& m, Body& b, std::span<const thread::Hold> hold, const thread::State& t) {
+  Grip& grip = b.grip;
+  uint32_t* const node[] = {&grip.node, &grip.body};
+  bool out[2] = {};
+  for (uint32_t i = 0; i < grip.count; ++i) out[i] = slip_thread(m, b, hold[i], t, *node[i], grip.point[i].in_tool, grip.slid);
+  if (grip.count == 2 && out[0] && !out[1]) grip.node = grip.body, grip.point[0] = grip.point[1], out[0] = false, out[1] = true;
+  if (grip.count == 2 && out[1]) grip.count = 1, grip.body = 0, grip.point[1] = {};
+  if (out[0]) grip = {};
 }
 
 }  // namespace
@@ -191,10 +226,14 @@ void settle_grips(const BodiesModel& model, const wall::Model& wm, const wall::S
                   Bodies& bodies, BodiesScratch& k) {
   for (size_t i = 0; i < k.hold.size(); ++i) {
     const uint32_t b = k.hold_body[i];
+    if (i > 0 && k.hold_body[i - 1] == b) continue;  // the second strand of the same jaws
+    const size_t strands = i + 1 < k.hold.size() && k.hold_body[i + 1] == b ? 2 : 1;
     if (model.body[b].hinge_z > 0 && bodies.body[b].grip.what == Gripped::thread)
-      slip_thread(model.body[b], bodies.body[b], k.hold[i], t);
+      slip_strands(model.body[b], bodies.body[b], std::span(k.hold).subspan(i, strands), t);
   }
   for (const Row& row : k.row) {
+    for (uint32_t i = 0; i < 2; ++i)
+      if (row.key == key_of(kThreadGripRow, row.a, i, 0)) bodies.body[row.a].grip.point[i].impulse = row.impulse;
     if (row.kind != Row::Kind::grip) continue;
     Body& body = bodies.body[row.a];
     Grip& grip = body.grip;

@@ -213,7 +213,7 @@ bool physical_fits(const Model& model, const PhysicalState& state) {
     if (!good_point(hole.place) || !good_point(hole.made)) return false;
   if (s.contact.size() > 4 * nodes || s.lip.size() > 16 * columns) return false;
   for (size_t i = 0; i < s.contact.size(); ++i)
-    if (s.contact[i].node >= nodes || (i > 0 && s.contact[i].node <= s.contact[i - 1].node)) return false;
+    if (s.contact[i].node >= nodes || (i > 0 && s.contact[i].node < s.contact[i - 1].node)) return false;  // two in a fold
   for (size_t i = 1; i < s.lip.size(); ++i)
     if (s.lip[i].key < s.lip[i - 1].key) return false;
   if (s.bodies.body.size() != start.bodies.body.size() || s.needle.size() != start.needle.size() ||
@@ -223,7 +223,8 @@ bool physical_fits(const Model& model, const PhysicalState& state) {
     const physical::Grip& g = b.grip;
     if (g.count > g.point.size() || g.what > physical::Gripped::tissue) return false;
     if (g.what == physical::Gripped::needle && g.body >= s.bodies.body.size()) return false;
-    if (g.what == physical::Gripped::thread && g.node >= nodes) return false;
+    if (g.what == physical::Gripped::thread && (g.node >= nodes || g.count > 2 || (g.count == 2 && g.body >= nodes)))
+      return false;
     for (const physical::GripPoint& p : g.point)
       if (!good_point(p.tissue)) return false;
   }

@@ -190,6 +190,11 @@ void show_grips(const Model& model, State& state, SutureContext& sewing) {
       tool.slot = model.solver.tissue + grip.node;
       tool.suture = model.solver.strand_of(tool.slot);
       state.solver.strand[tool.suture].hold.push_back({tool.slot, static_cast<int>(i), grip.point[0].in_tool, HoldKind::jaw});
+      if (grip.count == 2) {
+        const uint32_t slot = model.solver.tissue + grip.body;
+        state.solver.strand[model.solver.strand_of(slot)].hold.push_back(
+            {slot, static_cast<int>(i), grip.point[1].in_tool, HoldKind::jaw});
+      }
     } else if (now == Held::tissue) {
       const wall::Weights at = wall::weights(model.physical->world.wall, w.wall.topology, grip.point[0].tissue);
       const size_t most = static_cast<size_t>(std::max_element(at.weight.begin(), at.weight.end()) - at.weight.begin());
@@ -349,6 +354,7 @@ void sum_haptics(const Model& model, State& state, const PhysicalScratch& k, int
       const Vec3 force = row.impulse / h, normal = row.axis * dot(force, row.axis);
       if (row.kind == physical::Row::Kind::contact)
         t.pressing += normal, t.rubbing += force - normal, t.pressed += length(normal);
+      else if (row.kind == physical::Row::Kind::spring) t.thread += force;  // jaws on a thread
       else (row.on_wall ? t.held : t.needle) += force;
     }
     t.thread += body.thread_force;

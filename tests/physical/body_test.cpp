@@ -292,6 +292,65 @@ TEST(Tool, jaws_hold_a_thread_up_to_twice_friction_times_force) {
   }
 }
 
+// Two strands between the same jaws, such as the crossing of a throw: each carries half of the friction. The thread turns back
+// 6 mm behind the jaws.
+TEST(Tool, jaws_pinch_both_strands_that_lie_between_them) {
+  Bench bench;
+  std::vector<Vec3> path;
+  const auto add = [&](Vec3 to) {
+    while (distance(path.back(), to) > 0.75e-3f) path.push_back(path.back() + normalized(to - path.back()) * 0.5e-3f);
+  };
+  path.push_back({0, 0.01f + 0.18e-3f, 0.03f});
+  add({0.02f, 0.01f + 0.18e-3f, 0.03f}), add({0.024f, 0.012f, 0.03f}), add({0.026f, 0.010f, 0.03f});
+  add({0.024f, 0.008f, 0.03f}), add({0.02f, 0.01f - 0.18e-3f, 0.03f}), add({0, 0.01f - 0.18e-3f, 0.03f});
+  bench.state.thread = thread::make_state(path);
+  const Pose pose{{0.015f, 0.01f, 0.03f}, axis_angle({0, 0, 1}, 0.5f * kPi)};  // jaws open along y
+  const uint32_t t = bench.add(make_tool({}), pose, 0.06f);
+  bench.start();
+  for (int i = 0; i < 60; ++i) bench.target[t] = {pose, true, 0, 8}, bench.step();
+  ASSERT_EQ(bench.body(t).grip.what, Gripped::thread);
+  ASSERT_EQ(bench.body(t).grip.count, 2u);
+  Vec3 felt{};
+  const uint32_t last = static_cast<uint32_t>(path.size()) - 1;
+  for (int i = 0; i < 1000; ++i) {
+    const float pull = 2 * std::min(1.0f, static_cast<float>(i) / 800);
+    const thread::Pull ends[] = {{0, {-pull, 0, 0}}, {last, {-pull, 0, 0}}};
+    Hands hands;
+    hands.targets = bench.target, hands.pulls = ends;
+    physical::step(bench.model, bench.state, *bench.scratch, hands, *bench.jobs);
+    if (i >= 900) felt += bench.body(t).force * 0.01f;
+  }
+  EXPECT_EQ(bench.body(t).grip.count, 2u);
+  EXPECT_NEAR(felt.x, -4, 0.15f) << "one strand alone slides out at 2.8 N";
+}
+
+// A strand of 3 mm between jaws and a fixed place is stiffer than the grip: the jaws stay still on it.
+TEST(Tool, jaws_on_a_short_taut_strand_are_still) {
+  Bench bench;
+  lay_thread(bench, 0.03f);
+  Pose pose{{0.015f, 0.01f, 0.03f}, axis_angle({0, 0, 1}, 0.5f * kPi)};
+  const uint32_t t = bench.add(make_tool({}), pose, 0.06f);
+  bench.start();
+  for (int i = 0; i < 60; ++i) bench.target[t] = {pose, true, 0, 8}, bench.step();
+  ASSERT_EQ(bench.body(t).grip.what, Gripped::thread);
+  thread::Hold fixed;
+  fixed.node = bench.body(t).grip.node + 6;
+  fixed.from = fixed.to = bench.state.thread.position(fixed.node);
+  float least = 1e9f, most = 0;
+  for (int i = 0; i < 600; ++i) {
+    Pose at = pose;
+    at.p.x -= 2e-3f * std::min(1.0f, static_cast<float>(i) / 300);
+    bench.target[t] = {at, true, 0, 8};
+    Hands hands;
+    hands.targets = bench.target, hands.holds = {&fixed, 1};
+    physical::step(bench.model, bench.state, *bench.scratch, hands, *bench.jobs);
+    if (i >= 500) least = std::min(least, bench.body(t).force.x), most = std::max(most, bench.body(t).force.x);
+  }
+  EXPECT_GT(least, 0.5f);
+  EXPECT_LT(most - least, 0.02f * most);
+  EXPECT_LT(bench.body(t).grip.slid, 0.1e-3f);
+}
+
 TEST(Tool, jaws_lift_the_wall_and_slide_off_above_their_friction) {
   for (const float grip : {20.0f, 2.0f}) {  // 14 N, 1.4 N
     Bench bench;
