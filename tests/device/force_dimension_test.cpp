@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <mutex>
 #include <thread>
 
 #include "device/dhd_api.h"
@@ -77,6 +78,7 @@ struct FakeDhd {
 // Both arms on servos, a millisecond at a time.
 struct Two {
   FakeDhd fake;
+  std::mutex guard;                // of what the servo threads and the test share, below
   float wall = 0;                  // [N/m] of a wall at the height 0, for the right hand
   std::array<ArmForce, 2> more{};  // torque and grip at jaw 0.1, besides
   std::vector<std::string> messages;
@@ -93,6 +95,7 @@ struct Two {
 
   static ArmForce step(void* user, size_t k, const ArmSample& s) {
     Two& t = *static_cast<Two*>(user);
+    const std::scoped_lock lock(t.guard);
     t.now_ns[k] = t.fake.now(t.fake.device(k));
     t.sample[k] = s;
     ForcePatch p;
@@ -121,6 +124,7 @@ struct Two {
   void run(int ms, const F& each) {
     for (int k = 0; k < ms; ++k) {
       ASSERT_TRUE(fake.step(1));
+      const std::scoped_lock lock(guard);
       each(k);
     }
   }
