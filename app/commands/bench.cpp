@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // app: `catgut bench`: time per stage; scaling with suture count (limits.cpp), the paper's tables
-// (paper.cpp), scaling with particle count (scale.cpp), cost of a frame (frame.cpp), force feedback (haptics.cpp).
+// (paper.cpp), scaling with particle count (scale.cpp), cost of a frame (frame.cpp), rate of pictures (pictures.cpp), force
+// feedback (haptics.cpp).
 #include <cstdio>
 #include <memory>
 
 #include "commands/commands.h"
+#include "commands/pictures.h"
 #include "core/check.h"
 #include "core/file.h"
 #include "procedure/scene_file.h"
@@ -67,6 +69,7 @@ int bench(const BenchOptions& o) {
   if (o.what == "stages") return bench_stages(o);
   if (o.what == "frame")
     return bench_frame({o.scene.empty() ? "lembert" : o.scene[0], o.json, o.set, o.seconds > 0 ? o.seconds : 30});
+  if (o.what == "pictures") return bench_pictures(o.scene.empty() ? "stay" : o.scene[0]);
   if (o.what == "paper") {
     const std::vector<std::string> four{"purse_string", "connell", "stay", "lembert"};
     return bench_paper({o.scene.empty() ? four : o.scene, o.set, o.out, o.executions, o.threads});
@@ -88,10 +91,10 @@ void add_bench(CLI::App& app, int& exit_code) {
           "what", o->what,
           "paper: tables 1 to 4 beside the paper's; stages: time per stage; limits: marginal cost per suture; scale: 1, 4 "
           "and 16 times the particles, one thread and several; frame: CPU time of a stereo frame without rasterization; "
-          "haptics: comparison of rendering methods")
+          "pictures: rate of pictures by size and quality; haptics: comparison of rendering methods")
       ->required()
-      ->check(CLI::IsMember({"paper", "limits", "scale", "stages", "frame", "haptics"}))
-      ->type_name("paper|limits|scale|stages|frame|haptics");
+      ->check(CLI::IsMember({"paper", "limits", "scale", "stages", "frame", "pictures", "haptics"}))
+      ->type_name("paper|limits|scale|stages|frame|pictures|haptics");
   command->add_option("--json", o->json, "stages, scale, frame: results as JSON; -: standard output")->type_name("FILE|-");
   command->add_option("--repeat", o->repeat, "stages, scale: runs; reports the one with the lowest median")
       ->check(CLI::Range(1, 1000))

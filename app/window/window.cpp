@@ -270,9 +270,20 @@ class Window {
     renderer_->stage(&picture, settings_.quality);
     if (wearer_) wearer_->stage(&picture, settings_.quality);
     rest_ = rest_tissue(picture);
-    if (coarse_ < 1) renderer_->set_resolution_scale(coarse_);
+    staged_ = settings_.quality;
+    if (coarse_ < 1 && staged_ == Quality::low) renderer_->set_resolution_scale(coarse_);
     orbit_set_ = false;
     have_last_ = false;
+  }
+
+  // Another quality shows with the next frame, behind the settings; the camera stays.
+  void restage_if_changed() {
+    if (!(visit_ || viewing_) || staged_ == settings_.quality) return;
+    const bool set = orbit_set_;
+    stage_picture(picture());
+    orbit_set_ = set;
+    pictures_so_ = 0;
+    picture_s_ = picture_count_ = 0;
   }
 
   // Closes the open scene or recording.
@@ -617,6 +628,7 @@ class Window {
     turn_orbit(orbit_, screen_ == Screen::view && in.arrow_presses ? 0 : in.orbit_right, in.orbit_up, in.closer);
     if (in.camera_home && (visit_ || viewing_)) orbit_set_ = false;
 
+    restage_if_changed();
     Choice choice;
     Image copy;
     WindowRenderer::Frame frame;
@@ -911,6 +923,7 @@ class Window {
   bool worn_ = false;                   // the headset wants this frame
   bool headset_offered_ = false;
   std::string headset_line_;  // its last report
+  Quality staged_ = Quality::low;  // of the displayed scene
   bool board_styled_ = false, on_board_ = false;
   double mirrored_ = 0;  // [s]
   WindowEvents events_in_;

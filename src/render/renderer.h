@@ -31,6 +31,8 @@ class Renderer {
   virtual Image render(const Snapshot& snapshot, const Camera& camera, const Overlay& overlay = {}) = 0;
   // The same without the pixels; returns when rendering is complete. For measurements.
   virtual void draw(const Snapshot& snapshot, const Camera& camera) = 0;
+  // Pictures are rendered at `part` (0.25 .. 1) of the resolution in each direction, and enlarged.
+  virtual void set_resolution_scale(float part) = 0;
 };
 
 // Throws std::runtime_error with one line: no EGL driver on this machine, or a build without rendering.

@@ -42,6 +42,7 @@ class FilamentRenderer final : public Renderer {
     Image one = make_image(1, 1, {0, 0, 0, 255});  // reading any pixel waits for all of them
     draw_into(snapshot, camera, false, 1, 1, one);
   }
+  void set_resolution_scale(float part) override { theatre_->set_resolution_scale(part); }
 
  private:
   void draw_into(const Snapshot& snapshot, const Camera& camera, bool suture_points, int read_width, int read_height,

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// app: `catgut bench pictures`.
+#pragma once
+#include <string>
+
+namespace catgut {
+
+// Rate of pictures of a scene by window size, quality and the fraction of the resolution that a slow window falls back to.
+// Prints a table. Throws InputError without a driver.
+int bench_pictures(const std::string& scene);
+
+}  // namespace catgut
