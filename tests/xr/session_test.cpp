@@ -39,17 +39,17 @@ TEST_F(AtTheHeadset, a_session_by_x11_shows_both_eyes_and_a_ray_presses_a_button
     const Vec3 x = normalized(cross({0, 1, 0}, z));
     wearer_.hand[1].pose.q = normalized(from_axes(x, cross(z, x), z) * conjugate(conjugate(hand.grip.q) * hand.aim.q));
     RemoteHand& left = wearer_.hand[0];
-    left.a = left.b = left.stick = pointing < 6;
-    left.squeeze = left.stick_y = pointing < 6 ? 1 : 0;
-    if (++pointing == 6) buttons = now.frame.hand[0], reach = now.place.reach;
-    if (pointing == 12) pointer = now.pointer;
-    wearer_.hand[1].trigger = pointing > 11 && pointing < 15 ? 1 : 0;
+    left.a = left.b = left.stick = pointing < 4;
+    left.squeeze = left.stick_y = pointing < 4 ? 1 : 0;
+    if (++pointing == 4) buttons = now.frame.hand[0], reach = now.place.reach;
+    if (pointing == 8) pointer = now.pointer;
+    wearer_.hand[1].trigger = pointing > 7 && pointing < 10 ? 1 : 0;
     remote_->set(wearer_);
   };
   testing::internal::CaptureStderr();
   EXPECT_EQ(sit(options, 30,
                 [&](const WindowLook& now) {
-                  if (pointing > 11) resumed = true;
+                  if (pointing > 7) resumed = true;
                   without_work = 0;
                   if (!now.headset || now.headset->state != HeadsetState::focused || !now.headset->picture) return true;
                   points_at_work = points_at_work || (pressed == 0 && now.headset->pointer);
