@@ -192,7 +192,7 @@ TEST(Cutting, an_unfinished_circle_that_is_pulled_stays_one_piece) {
   Field f(800);
   const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(f.scene, picture_model(*f.model));
   int switched = 0;
-  while (!surgeon->done() && f.state->tick < 4000) {
+  while (!surgeon->done() && f.state->tick < 6000) {
     TickInput wanted = surgeon->operate(f.seen, f.model->dt);
     f.input.hand = wanted.hand;
     // The pen goes off after two thirds of the circle, and stays off.
