@@ -73,8 +73,10 @@ TEST(Latest, no_value_is_ever_torn) {
   };
   constexpr uint64_t kRounds = 20000;
   Latest<Payload> box;
+  std::atomic<bool> begun{false};  // the reader has a value: the second half is written while it reads
   std::thread writer([&] {
     for (uint64_t i = 1; i <= kRounds; ++i) {
+      while (i > kRounds / 2 && !begun) std::this_thread::yield();
       Payload& p = box.draft();
       p.hand.sequence = static_cast<uint32_t>(i);
       p.word.fill(i);
@@ -97,6 +99,7 @@ TEST(Latest, no_value_is_ever_torn) {
     older += now <= last;
     last = now;
     ++read;
+    begun = true;
   }
   writer.join();
   EXPECT_EQ(torn, 0u);
