@@ -9,6 +9,11 @@
 #include "runtime/guide.h"
 
 namespace catgut {
+namespace {
+
+constexpr float kClosedJaw = 0.4f;  // 0 closed .. 1 open, as in resume_steering
+
+}  // namespace
 
 // Shared by the two threads.
 struct WindowHands::Link {
@@ -50,14 +55,15 @@ std::function<std::array<ToolInput, 2>(const HandsMoment&)> WindowHands::begin(c
   mouse = {};
   pad = {};
   known_ = false;
+  elsewhere_ = {};
   link_ = std::make_shared<Link>();
   link_->scene = scene;
   link_->left_handed = settings.left_handed;
   return [link = link_](const HandsMoment& now) { return link->tick(now); };
 }
 
-void WindowHands::move(const WindowInput& in, const Settings& settings, const ViewFrame& view, std::array<bool, 2> elsewhere,
-                       float dt, uint32_t epoch) {
+void WindowHands::move(const WindowInput& in, const Settings& settings, const ViewFrame& view, const Snapshot& seen,
+                       std::array<bool, 2> elsewhere, float dt, uint32_t epoch) {
   mouse.hold_to_close = settings.hold_to_close;
   if (in.speed >= 0) speed = static_cast<size_t>(in.speed);
   mouse.speed = kMouseSpeeds[speed] * settings.mouse_speed;
@@ -73,7 +79,10 @@ void WindowHands::move(const WindowInput& in, const Settings& settings, const Vi
     SteeredHand& hand = steering.hand[k];
     if (!adopt) hand.closed = closed_[k], hand.opening = opening_[k];
     hand.buttons = 0;
+    // What the other device held stays held when it is gone.
+    if (elsewhere_[k] || elsewhere[k]) hand.closed = seen.tool[k].jaw < kClosedJaw, hand.opening = 1;
   }
+  elsewhere_ = elsewhere;
   HandOrder order;
   order.motion = mouse_motion(mouse, steering, in.mouse, view, dt);
   if (in.has_pad) {

@@ -28,14 +28,15 @@ class WindowHands {
   std::function<std::array<ToolInput, 2>(const HandsMoment&)> begin(const SceneSpec& scene, const Settings& settings);
   void jumped() { mouse.was_down = false; }  // the tools are elsewhere: a restart, an undone bite
   // elsewhere: hands that another device moves. epoch: of the newest status.
-  void move(const WindowInput& in, const Settings& settings, const ViewFrame& view, std::array<bool, 2> elsewhere, float dt,
-            uint32_t epoch);
+  void move(const WindowInput& in, const Settings& settings, const ViewFrame& view, const Snapshot& seen,
+            std::array<bool, 2> elsewhere, float dt, uint32_t epoch);
 
  private:
   struct Link;
   std::shared_ptr<Link> link_;
   std::array<bool, 2> closed_{};
   std::array<float, 2> opening_{1, 1};
+  std::array<bool, 2> elsewhere_{};
   bool known_ = false;  // that was adopted from the tools, of
   uint32_t epoch_ = 0;
 };

@@ -762,7 +762,7 @@ class Window {
     std::array<bool, 2> elsewhere{};  // a hand without a controller stays with the mouse
     for (size_t k = 0; worn && k < 2; ++k)
       if ((elsewhere[k] = (*worn)[k].connected)) v.live.hand(k, (*worn)[k]);
-    hands_.move(in, settings_, view, elsewhere, dt, status.epoch);
+    hands_.move(in, settings_, view, v.seen, elsewhere, dt, status.epoch);
     if (options_.watch &&
         !options_.watch({v.seen, view, hands_.steering, hands_.mouse, status, placed_, worn_look(), board_placed_}))
       quit_ = true;
