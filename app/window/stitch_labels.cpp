@@ -52,7 +52,7 @@ std::vector<xr::StitchMark> stitch_marks(const StitchMap& map, const RestTissue&
       mark.at[end] = nearest->position;
       tension = std::max({tension, nearest->tension_needle, nearest->tension_free});
     }
-    mark.text[0] = fmt::format("{}: {} {} | {} mm", k + 1, tr("edge"), millimeters(b.entry_edge), millimeters(b.exit_edge));
+    mark.text[0] = fmt::format("{}: {} {}|{} mm", k + 1, tr("edge"), millimeters(b.entry_edge), millimeters(b.exit_edge));
     mark.text[1] = fmt::format("{} {}", tr("depth"), millimeters(b.depth));
     if (tension >= 0) mark.text[1] += fmt::format("  {:.2f} N", tension);
     bool known = false;

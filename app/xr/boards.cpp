@@ -3,6 +3,7 @@
 #include "xr/boards.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace catgut::xr {
 namespace {
@@ -34,6 +35,19 @@ Board board_at(const Place& stand, const Place& place, bool working) {
   b.pose = facing(stand, place, stand.at + rotate(turn_of(stand), working ? kBeside : kAbove));
   b.width = (working ? kBesideWidth : kAboveWidth) / place.loupe;
   return b;
+}
+
+Place walked_stand(const Place& stand, int& turn, Vec3 head) {
+  constexpr float kQuarter = kPi / 2, kChange = 1.1f;  // [rad] beyond which it follows: later than half a quarter
+  const Vec3 d = head - stand.at;
+  if (std::hypot(d.x, d.z) > 0.1f) {
+    const float walked = std::atan2(-d.x, d.z) - stand.yaw;
+    if (std::cos(walked - kQuarter * static_cast<float>(turn)) < std::cos(kChange))
+      turn = static_cast<int>(std::lround(walked / kQuarter));
+  }
+  Place out = stand;
+  out.yaw += kQuarter * static_cast<float>(turn);
+  return out;
 }
 
 Board caption_at(const Place& stand, const Place& place, const std::array<float, 4>& part) {

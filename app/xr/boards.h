@@ -14,6 +14,11 @@ Vec3 eyes_at(const Place& place);
 // working: instruments are in use, and the board is right of the field; else it is above it.
 Board board_at(const Place& stand, const Place& place, bool working);
 
+// The stand that a board belongs to while the wearer walks around the field: the board then stands on the far side of it, so
+// that it is never seen from behind and never lies between the eyes and the field. It follows in quarter turns. turn:
+// [quarters] kept by the caller, 0 at first. head: [m] room.
+Place walked_stand(const Place& stand, int& turn, Vec3 head);
+
 // part: of the board's picture [pixels], shown behind the field and above it.
 Board caption_at(const Place& stand, const Place& place, const std::array<float, 4>& part);
 

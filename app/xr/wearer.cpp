@@ -225,7 +225,8 @@ void Wearer::draw(const Picture& picture) {
   frame.suture_points = picture.suture_points;
   frame.brightness = fade_.brightness;
   frame.dt = dt_;
-  frame.board = board_at(stand_, place_, picture.working);
+  if (!picture.walk) board_turn_ = 0;
+  frame.board = board_at(picture.walk ? walked_stand(stand_, board_turn_, frame_.head.p) : stand_, place_, picture.working);
   if (picture.caption[2] > picture.caption[0]) frame.caption = caption_at(stand_, place_, picture.caption);
   walk_ = picture.walk;
   if (!picture.working) point(frame, *frame.board);

@@ -112,6 +112,7 @@ class Wearer {
   bool placed_ = false, open_ = false, walk_ = false;
   std::optional<Pose> carried_;  // room: the hand that holds the field, in the last frame
   size_t carrier_ = 0;
+  int board_turn_ = 0;  // [quarters] see walked_stand
   SpaceHands hands_;
   SpaceHandOptions options_;
   RoomSettings room_;

@@ -125,7 +125,7 @@ TEST(Labels, state_the_numbers_of_the_stitch_map_at_the_suture_points) {
   ASSERT_EQ(mark.size(), 1u) << "the second one is not complete yet at this moment";
   EXPECT_LT(distance(mark[0].at[0], transform(motion, b.entry)), 1e-5f);
   EXPECT_LT(distance(mark[0].at[1], transform(motion, b.exit)), 1e-5f);
-  EXPECT_EQ(mark[0].text[0], "1: edge 5.2 | - mm");
+  EXPECT_EQ(mark[0].text[0], "1: edge 5.2|- mm");
   EXPECT_EQ(mark[0].text[1], "depth 1.8") << "without a thread there is no tension";
   SuturePointView point;
   point.position = transform(motion, b.entry) + Vec3{0.0005f, 0, 0};

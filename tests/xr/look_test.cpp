@@ -101,12 +101,13 @@ TEST_F(Look, around_the_results) {
   ResultView view;
   view.scene = &scene, view.result = &result;
   bool styled = false;
+  int quarter = 0;
   const auto shoot = [&](const Pose& at) {
     std::vector<xr::StitchMark> mark;
     EyeRenderer::Frame frame;
     frame.snapshot = &seen;
     frame.suture_points = true;
-    frame.board = board_at(stand, place, false);
+    frame.board = board_at(walked_stand(stand, quarter, at.p), place, false);
     frame.panels = [&] {
       if (!std::exchange(styled, true)) style_panels(1.4f);
       if (mark.empty()) mark = stitch_marks(result.map, rest, seen, by);

@@ -162,6 +162,25 @@ TEST(Boards, are_legible_and_never_over_the_field) {
     }
 }
 
+// Twice around the field, and back: the board shows its front, stands beyond the field, and moves in few steps.
+TEST(Boards, of_results_stand_on_the_far_side_of_a_wearer_who_walks) {
+  Place stand;
+  stand.focus = {0.1f, 0.05f, 0};
+  recenter(stand, head_at({0.2f, 1.5f, 0.3f}, 1.1f, -0.6f));
+  int turn = 0, steps = 0;
+  for (int i = -700; i <= 1400; ++i) {
+    const float angle = 0.009f * static_cast<float>(std::abs(i));
+    const Vec3 head = stand.at + Vec3{0.5f * std::sin(angle - stand.yaw), 0.4f, 0.5f * std::cos(angle - stand.yaw)};
+    const int before = turn;
+    const Board b = board_at(walked_stand(stand, turn, head), stand, false);
+    steps += turn != before;
+    const Vec3 eye = stand.to_world(head), to = b.pose.p - eye, field = stand.focus - eye;
+    ASSERT_GT(dot(rotate(b.pose.q, {0, 0, 1}), normalized(-to)), 0.3f) << "its front, from " << angle;
+    ASSERT_GT(std::hypot(to.x, to.z), std::hypot(field.x, field.z)) << "beyond the field, from " << angle;
+  }
+  EXPECT_LE(steps, 14) << "three turns of four quarters each, at most one more at each end";
+}
+
 TEST(SpaceHands, a_pinch_lies_between_the_finger_tips_and_closes_the_jaws) {
   // Right hand ahead of the wearer, palm to the left: thumb below the index finger.
   const auto fingers = [](float apart) {

@@ -8,6 +8,7 @@
 #include <epoxy/glx.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <stdexcept>
 #include <vector>
@@ -447,7 +448,12 @@ class FilamentEyes final : public EyeRenderer {
       const Label& label = frame.label[i];
       place(label_[i].square, label.pose, {label.width, label.width * kLabelHeight / kLabelWidth, label.width});
       scene.addEntity(label_[i].square.entity);
-      for (size_t k = 0; k < 2; ++k) place_rod(label_[i].rod[k], label.pose.p, label.point[k], kRod * label.width, scene);
+      // From the edge that is nearer to the point, so that no rod crosses the text.
+      const float half = 0.5f * label.width * kLabelHeight / kLabelWidth;
+      for (size_t k = 0; k < 2; ++k) {
+        const float edge = std::copysign(half, to_local(label.pose, label.point[k]).y);
+        place_rod(label_[i].rod[k], transform(label.pose, {0, edge, 0}), label.point[k], kRod * label.width, scene);
+      }
     }
   }
 
