@@ -922,7 +922,7 @@ class Window {
   std::unique_ptr<xr::Wearer> wearer_;  // null: no headset was requested
   bool worn_ = false;                   // the headset wants this frame
   bool headset_offered_ = false;
-  std::string headset_line_;  // its last report
+  std::string headset_line_;       // its last report
   Quality staged_ = Quality::low;  // of the displayed scene
   bool board_styled_ = false, on_board_ = false;
   double mirrored_ = 0;  // [s]
