@@ -2,6 +2,7 @@
 // procedure: makes the surgeon from a scene's tables; see scripted_surgeon.h.
 #include "procedure/scripted_surgeon.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "core/check.h"
@@ -41,6 +42,14 @@ std::unique_ptr<Surgeon> scripted_surgeon(const SceneSpec& scene, const PictureM
   const std::string plan = plan_of(scene);
   if (plan.empty())
     throw InputError("--surgeon scripted", "the scene has no technique to carry out", "use --surgeon none, or a recording");
+  if (plan == "excision") {
+    const bool pen = std::any_of(scene.instrument.begin(), scene.instrument.end(),
+                                 [](const InstrumentSpec& i) { return i.kind == "cautery" && i.where == "right"; });
+    if (scene.mechanics.kind != "physical" || !pen)
+      throw InputError("surgeon.plan = \"excision\"",
+                       pen ? "a wall of guided mechanics cannot be cut" : "the right hand holds no electrosurgical pen",
+                       pen ? "set mechanics.kind = \"physical\"" : "add [[instrument]] kind = \"cautery\", where = \"right\"");
+  }
   try {
     return make_surgeon(plan, picture, skill_of(scene));
   } catch (const std::invalid_argument&) {

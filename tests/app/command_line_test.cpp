@@ -34,6 +34,7 @@ TEST_F(CommandLine, a_file_name_says_what_it_holds) {
   expect_refused("run small.toml --surgeon none --video x.png", "does not end in .mp4");
   expect_refused("run small.toml --surgeon none --contact-sheet x.pdf", "does not end in .png");
   expect_refused("run small.toml --surgeon none --record x.json", "does not end in .cgrec");
+  expect_refused("run excision --set mechanics.kind=guided", "a wall of guided mechanics cannot be cut");
   expect_refused("run small.toml --surgeon none --json x.cgrec", "does not end in .json");
   expect_refused("validate --json x.png", "does not end in .json");
   expect_refused("bench stages --scene small.toml --json x.png", "does not end in .json");

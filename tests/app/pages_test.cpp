@@ -64,7 +64,7 @@ TEST_F(CommandLine, every_line_of_the_pages_is_understood) {
     std::istringstream in(l.arguments);
     std::vector<std::string> word;
     for (std::string w; in >> w;) word.push_back(w);
-    if (word.back() == "S") word.pop_back(), word.pop_back();  // an option with a number, as a placeholder
+    if (word.back() == "S") word.pop_back(), word.pop_back();  // "--seconds S": S stands for a number
     if (word[0] == "demo" || word[0] == "test") continue;      // of the launcher
     if (l.arguments.find_first_of("|[<…") != std::string::npos || l.arguments.find("...") != std::string::npos) continue;
     for (size_t k = 0; k < word.size(); ++k) {

@@ -126,7 +126,7 @@ TEST(Labels, state_the_numbers_of_the_stitch_map_at_the_suture_points) {
   EXPECT_LT(distance(mark[0].at[0], transform(motion, b.entry)), 1e-5f);
   EXPECT_LT(distance(mark[0].at[1], transform(motion, b.exit)), 1e-5f);
   EXPECT_EQ(mark[0].text[0], "1: edge 5.2|- mm");
-  EXPECT_EQ(mark[0].text[1], "depth 1.8") << "without a thread there is no tension";
+  EXPECT_EQ(mark[0].text[1], "depth 1.8") << "tension is left out without a thread";
   SuturePointView point;
   point.position = transform(motion, b.entry) + Vec3{0.0005f, 0, 0};
   point.tension_needle = 0.4f, point.tension_free = 0.73f;
