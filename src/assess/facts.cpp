@@ -366,6 +366,7 @@ void note(Facts& f, const PictureModel& picture, const Snapshot& seen, const Tic
   follow_bites(f, picture, seen);
   for (size_t k = 0; k < f.hand.size(); ++k) note_hand(f, k, picture, seen, input);
   note_tension(f, seen);
+  note_pen(f.pen, picture, seen, input, f.setup.tick_s);
 }
 
 void rewind(Facts& f, const Tally& then) {

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "assess/cut.h"
 #include "assess/result.h"
 #include "assess/stitch_map.h"
 #include "assess/surface.h"
@@ -82,6 +83,7 @@ struct Tally {
   std::vector<OpenBite> open;
   std::array<HandFacts, 2> hand;  // right, left
   std::vector<SutureFacts> suture;
+  PenFacts pen;
   // Happenings, each with its place and moment.
   std::vector<Sample> missed_grasp, needle_slip, tissue_slip, withdrawn, undone_throw, rejected_loop, order_error, fault, tail,
       overload, tissue_grasp;

@@ -87,6 +87,12 @@ constexpr MetricRow kRow[] = {
     {"faults", "other faults", "line", "", lower, count, "knot without a bite, needle in tissue, thread cut in a stitch or before a knot, too few throws", kErrors},
     {"tension_spread", "evenness of the line's tension", "line", "N", lower, spread, "larger tension at each suture point at the end", "force in thread: Horeman 2013, 10.1371/journal.pone.0084466"},
 
+    {"cut_edge", "cut from the edge", "cut", "mm", target, mean, "distance of the cut from the rim, on the tissue at rest; one per millimeter of the rim", kOwn},
+    {"cut_spread", "evenness of the cut", "cut", "mm", lower, spread, "as cut_edge; a spiral is uneven", kOwn},
+    {"bridges", "bridges left", "cut", "mm", lower, sum, "stretch of the rim beside which the wall is not divided; a single 0: divided all round", kOwn},
+    {"pieces", "pieces of tissue", "cut", "", target, only, "connected parts of all walls at the end", kOwn},
+    {"energy_time", "time with energy", "cut", "s", lower, only, "an electrosurgical pen is switched on", kOwn},
+
     {"thread_force", "peak force at a bite", "tissue", "N", lower, maximum, "largest tension of a suture's thread at a suture point", "tear-out: Gong 2023, 10.1115/1.4063951"},
     {"thread_impulse", "integrated force at bites", "tissue", "N s", lower, sum, "integral over time of a suture's largest tension at a suture point", "force metrics: 10.3389/fmed.2022.897219"},
     {"overloads", "overloads of a bite", "tissue", "", lower, count, "tension at a suture point above 3.22 N, where human small bowel begins to tear", "tear-out: Gong 2023, 10.1115/1.4063951"},
@@ -313,6 +319,16 @@ void measure_line(const Facts& f, const PictureModel& picture, const Snapshot& s
   sheet.add_all("faults", f.fault);
 }
 
+void measure_cuts(const Facts& f, const PictureModel& picture, const Snapshot& seen, Sheet& sheet) {
+  if (!has_pen(picture)) return;
+  if (f.begun) sheet.add("energy_time", f.pen.seconds, f.last, {});
+  if (seen.topology.pieces > 0) sheet.add("pieces", seen.topology.pieces, seen.tick, {});
+  const CutPlaces cut = cut_places(f.edge, f.rest[0], seen);
+  sheet.add_all("cut_edge", cut.distance);
+  sheet.add_all("cut_spread", cut.distance);
+  sheet.add_all("bridges", cut.bridge);
+}
+
 void measure_tissue(const Facts& f, Sheet& sheet) {
   for (size_t k = 0; k < f.suture.size(); ++k) {
     const SutureFacts& s = f.suture[k];
@@ -430,6 +446,7 @@ Result measure(const Facts& f, const PictureModel& picture, const Snapshot& seen
   measure_bites(f, sheet);
   measure_knots(f, sheet);
   measure_line(f, picture, seen, sheet);
+  measure_cuts(f, picture, seen, sheet);
   measure_tissue(f, sheet);
   measure_hands(f, sheet);
   r.metric = sheet.take();

@@ -19,7 +19,7 @@ const char* summary_name(Summary summary);
 struct MetricRow {
   const char* key;
   const char* name;
-  const char* group;  // bite, needle, knot, line, tissue, hands
+  const char* group;  // bite, needle, knot, line, cut, tissue, hands
   const char* unit;   // "" for counts and ratios
   Better better;
   Summary summary;
