@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "core/check.h"
 
@@ -208,6 +209,12 @@ Json json_of(const Session& s) {
   return j;
 }
 
+// Version 4, as the store makes it.
+bool is_uuid(const std::string& uid) {
+  return uid.size() == 32 && uid.find_first_not_of("0123456789abcdef") == std::string::npos && uid[12] == '4' &&
+         std::string_view("89ab").find(uid[16]) != std::string_view::npos;
+}
+
 std::string pretty(const Json& j) { return j.dump(1, ' ', false, Json::error_handler_t::replace) + "\n"; }
 
 }  // namespace
@@ -270,15 +277,15 @@ std::string sessions_to_xapi(const Store& store, const SessionFilter& filter, co
     if (std::isfinite(s.score)) {
       result["score"] = {{"raw", s.score}};
       if (std::isfinite(s.score_max) && s.score_max > 0) {
-        result["score"]["min"] = 0;
-        result["score"]["max"] = s.score_max;
+        if (s.score >= 0 && s.score <= s.score_max)  // the standard wants raw between them
+          result["score"]["min"] = 0, result["score"]["max"] = s.score_max;
         // The standard limits it to [-1, 1].
         result["score"]["scaled"] = std::min(1.0, std::max(-1.0, s.score / s.score_max));
       }
     }
     // xAPI wants a UUID: the identifier of the session where it is one, else left to the receiver.
     Json statement;
-    if (s.uid.size() == 32 && s.uid.find_first_not_of("0123456789abcdef") == std::string::npos)
+    if (is_uuid(s.uid))
       statement["id"] = fmt::format("{}-{}-{}-{}-{}", s.uid.substr(0, 8), s.uid.substr(8, 4), s.uid.substr(12, 4),
                                     s.uid.substr(16, 4), s.uid.substr(20));
     statement["actor"] = {{"objectType", "Agent"}, {"account", {{"homePage", home}, {"name", s.trainee}}}};

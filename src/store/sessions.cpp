@@ -17,10 +17,12 @@ using soci::use;
 constexpr size_t kMostRows = 100000;        // of metrics, events or lost points in a session
 constexpr size_t kMostDetails = 64u << 20;  // [bytes]
 
-std::string random_uid() {
+std::string random_uid() {  // a UUID of version 4 without dashes
   std::random_device device;
   std::string uid;
   for (int i = 0; i < 4; ++i) uid += fmt::format("{:08x}", device());
+  uid[12] = '4';
+  uid[16] = "89ab"[device() % 4];
   return uid;
 }
 
