@@ -4,12 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 
 #include "assess/metrics.h"
 #include "assess/rubric.h"
 #include "procedure/scene_file.h"
+#include "runtime/assessment.h"
 #include "sim/simulation.h"
 
 namespace catgut::assess {
@@ -160,6 +163,34 @@ TEST(Cuts, the_time_in_which_the_pen_is_switched_on) {
   ticks(60, {{CommandKind::cut, 0, 0}});
   rewind(f, then);
   EXPECT_NEAR(seconds(), 2.5, 1e-9);
+}
+
+// The scripted surgeon's excision: all of it a minute of simulated time, so for the nightly tests.
+TEST(Cuts, an_excision_is_measured_on_the_tissue_that_was_cut) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  const SceneSpec& scene = world().scene;
+  SessionOptions options;
+  SessionHooks hooks;
+  Assessor assessor(scene);
+  assessor.attach(hooks);
+  const RunResult run = run_session(scene, options, hooks);
+  const Result r = assessor.finish(run, {read_rubric("excision")});
+  EXPECT_EQ(r.value("pieces"), 2);
+  EXPECT_EQ(r.value("bridges"), 0);
+  const double line = static_cast<double>(scene.surgeon.edge_distance) * 1000;
+  EXPECT_NEAR(r.value("cut_edge"), line, 0.3);
+  for (const Metric& m : r.metric) {
+    if (m.key != "cut_edge") continue;
+    for (const Sample& s : m.sample) EXPECT_NEAR(s.value, line, 1.5) << s.of << ": the scene's own limit";
+  }
+  // Once round at the surgeon's speed, and the overlap.
+  const double round_s = 6.2832 * static_cast<double>(scene.body[0].radius / scene.surgeon.drive_speed);
+  EXPECT_GT(r.value("energy_time"), round_s);
+  EXPECT_LT(r.value("energy_time"), 1.2 * round_s);
+  EXPECT_TRUE(r.score[0].passed) << r.score[0].verdict;
+  std::printf("%.1f %%; cut at %.2f mm (spread %.2f mm), bridges %.1f mm, %.0f pieces, energy for %.1f s\n", r.score[0].percent,
+              r.value("cut_edge"), r.value("cut_spread"), r.value("bridges"), r.value("pieces"), r.value("energy_time"));
+  for (const LostPoint& l : r.score[0].lost) std::printf("  -%.1f %s\n", l.points, l.why.c_str());
 }
 
 }  // namespace
