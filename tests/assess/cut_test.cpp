@@ -69,7 +69,8 @@ Snapshot with_cut(const std::function<double(double)>& depth) {
   }
   Snapshot seen = world().start;
   for (Vec3& p : seen.particle) p = rotate(axis_angle({0.3f, 1, 0.2f}, 0.4f), p) + Vec3{0.03f, -0.02f, 0.05f};
-  seen.topology = {1, 2, picture};
+  seen.topology.version = 1, seen.topology.pieces = 2;
+  seen.topology.picture = decltype(seen.topology.picture)(std::shared_ptr<const PictureModel>(picture));
   return seen;
 }
 
