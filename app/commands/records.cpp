@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "commands/commands.h"
 #include "commands/keep.h"
@@ -134,7 +135,9 @@ int store_import(const StoreCommand& o) {
   std::vector<std::string> notes;
   store.add_all(all, &notes);
   for (const Person& p : people) store.put_person(p);
-  std::printf("%zu trainees, %zu sessions, %zu of them new, in %s\n", people.size(), all.size(), all.size() - notes.size(),
+  std::set<std::string> trainees;  // a table may have a row per session
+  for (const Session& s : all) trainees.insert(s.trainee);
+  std::printf("%zu trainees, %zu sessions, %zu of them new, in %s\n", trainees.size(), all.size(), all.size() - notes.size(),
               store.name().c_str());
   return 0;
 }
