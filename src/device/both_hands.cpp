@@ -221,8 +221,8 @@ void go_along(BothHands& b, size_t who, std::array<Pose, 2>& hand, const Pose& g
   glide(hand[needle], carrying(picture.suture[seen.active_suture], grip, above, -side), 2 * kSpeed, kTurn, dt);
 }
 
-bool tail_grip(const PictureModel& picture, const Snapshot& seen, size_t who, TailGrip& out) {
-  return best_tail_grip(picture, seen, who, side_of(seen.tool[who].pose), kTailByHand, nullptr, out) && out.tail >= 0.004f;
+bool tail_grip(const PictureModel& picture, const Snapshot& seen, size_t who, TailGrip& out, std::span<const Vec3> tried) {
+  return best_tail_grip(picture, seen, who, side_of(seen.tool[who].pose), kTailByHand, tried, out) && out.tail >= 0.004f;
 }
 
 }  // namespace catgut

@@ -3,6 +3,7 @@
 #include "device/steer.h"
 
 #include <cmath>
+#include <span>
 
 #include "exchange/strand.h"
 
@@ -21,6 +22,7 @@ constexpr float kBefore = 0.45f;                          // [rad] of the needle
 constexpr float kBesideTissue = 0.022f;                   // [m] where it arrives first
 constexpr float kHelpSpeed = 0.2f, kHelpTurn = 5.0f;      // [m/s], [rad/s] of a tool that moves a needle there
 constexpr float kAboveTail = 0.012f;                      // [m]
+constexpr float kBlocked = 0.3f;                          // [s] that jaws are stopped before they go elsewhere on the tail
 constexpr float kLoopSpeed = 0.1f;                        // [m/s] of a tool that carries a loop
 constexpr float kKeepsLoop = 0.7f;                        // opening of a jaw that releases without shaking off a loop
 constexpr float kReach = 0.35f;                           // [m] from the field's center: limit of the hands
@@ -109,8 +111,9 @@ void help_to_bite(Steering& steering, size_t who, const ViewFrame& view, const P
 }
 
 // Whether the assist moves the tool now.
-void help(Steering& steering, size_t who, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen) {
+void help(Steering& steering, size_t who, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen, float dt) {
   SteeredHand& hand = steering.hand[who];
+  if (!hand.snapped || hand.at != HelpAt::tail || seen.tool[who].held != Held::nothing) hand.misses = 0, hand.blocked = 0;
   if (steering.assist && seen.tool[who].held == Held::needle) return help_to_bite(steering, who, view, picture, seen);
   const bool open = !hand.closed && hand.opening > 0.5f;
   if (!steering.assist || seen.tool[who].held != Held::nothing || (!open && !hand.snapped)) {
@@ -126,9 +129,18 @@ void help(Steering& steering, size_t who, const ViewFrame& view, const PictureMo
   float nearest = 1;
   hand.snapped = false;
   TailGrip tail;
-  if (other_has && !seen.active().needle.in_tissue && tail_grip(picture, seen, who, tail)) {
+  // Jaws that tissue stops on their way down do not press on: they go to the next best position.
+  const bool at_tail = was && hand.at == HelpAt::tail;
+  const bool stopped = at_tail && hand.hovered && distance(hand.sent.pose.p, hand.help.p) < kThere &&
+                       distance(seen.tool[who].pose.p, hand.help.p) > kThere;
+  hand.blocked = stopped ? hand.blocked + dt : 0;
+  const bool elsewhere = hand.blocked > kBlocked && hand.misses < hand.missed.size();
+  if (elsewhere) hand.missed[hand.misses++] = hand.help.p, hand.blocked = 0;
+  const std::span<const Vec3> tried{hand.missed.data(), hand.misses};
+  if (other_has && !seen.active().needle.in_tissue && tail_grip(picture, seen, who, tail, tried)) {
     // Hysteresis: it stays with its particle even if another one is slightly better.
-    if (was && hand.at == HelpAt::tail) tail.slot = hand.tail_slot, tail.pose.p = seen.particle[tail.slot];
+    if (elsewhere) hand.hovered = false, hand.pose.p = tail.pose.p;
+    else if (at_tail) tail.slot = hand.tail_slot, tail.pose.p = seen.particle[tail.slot];
     if (near_on_screen(view, hand.pose.p, tail.pose.p, reach(HelpAt::tail), there)) {
       // Along the shaft, from above: objects beside the tail are not pushed aside.
       const Pose above{tail.pose.p + rotate(tail.pose.q, {0, 0, kAboveTail}), tail.pose.q};
@@ -257,7 +269,7 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
       const bool pulls = steering.assist && seen.tool[k].held != Held::nothing;
       move(hand, motion[k], view, picture, pulls ? seen.tool[k].force : Vec3{});
       if (pulls) hand.pose.p = on_leash(picture, seen, k, hand.pose.p);
-      help(steering, k, view, picture, seen);
+      help(steering, k, view, picture, seen, dt);
     }
 
     ToolInput in;

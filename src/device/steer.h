@@ -48,13 +48,16 @@ struct SteeredHand {
   Pose grip;             // tool in the needle's frame, from the moment it was grasped
   bool snapped = false;  // the assist moves the tool, at
   HelpAt at = HelpAt::needle;
-  Pose help;               // valid while snapped: its pose
-  uint32_t tail_slot = 0;  // the tail's particle
-  BiteGuide bite;          // the one that it is at: not affected by tissue deformation
-  bool hovered = false;    // the needle has approached the bite from outside the tissue, the jaws from above the tail
-  float driven = 0;        // [rad] of the needle since then
-  float waited = 0;        // [s] that the jaw was kept open until the tool arrived
-  ToolInput sent;          // last
+  Pose help;                     // valid while snapped: its pose
+  uint32_t tail_slot = 0;        // the tail's particle
+  std::array<Vec3, 3> missed{};  // [m] positions on the tail where tissue stopped the jaws, and
+  uint32_t misses = 0;           // their number
+  float blocked = 0;             // [s] that tissue has stopped them now
+  BiteGuide bite;                // the one that it is at: not affected by tissue deformation
+  bool hovered = false;          // the needle has approached the bite from outside the tissue, the jaws from above the tail
+  float driven = 0;              // [rad] of the needle since then
+  float waited = 0;              // [s] that the jaw was kept open until the tool arrived
+  ToolInput sent;                // last
 };
 
 struct Steering {

@@ -97,7 +97,7 @@ Vec3 strand_above(const Winding& w, const AcrossTool& across, Vec3 turns) {
 }
 
 bool best_tail_grip(const PictureModel& picture, const Snapshot& seen, size_t who, float side, TailDepth depth,
-                    const Vec3* tried, TailGrip& out) {
+                    std::span<const Vec3> tried, TailGrip& out) {
   if (seen.active().suture_point.empty() || seen.active().thread_order.size() < 3) return false;
   const Vec3 knot = stitch_place(picture, seen);
   const size_t point = first_point_node(seen), root = node_along(seen, point, distance(node_at(seen, point), knot), -1);
@@ -128,7 +128,8 @@ bool best_tail_grip(const PictureModel& picture, const Snapshot& seen, size_t wh
       // A tail that has slipped down between the edges is grasped only near the top: below, hands and needle touch tissue.
       good -= depth.worse * std::max(0.0f, knot.y - depth.easy - tip.y);
       // Near the knot there are few obstacles. A position that failed before is skipped.
-      good -= 12 * distance(tip, knot) + (tried && distance(tip, *tried) < 0.004f ? 0.5f : 0.0f);
+      const bool failed = std::any_of(tried.begin(), tried.end(), [&](Vec3 p) { return distance(tip, p) < 0.004f; });
+      good -= 12 * distance(tip, knot) + (failed ? 0.5f : 0.0f);
       if (good > best) best = good, out = {seen.active().thread_order[i], {tip, from_tool_axis(z)}, tail};
     }
   }

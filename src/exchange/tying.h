@@ -17,10 +17,11 @@
 //   w.wound += turn;                                    // and w.free -= kTieWound * turn
 //   // when the loop is there: the tail, with the needle going along at strand_above()
 //   TailGrip grip;
-//   best_tail_grip(picture, seen, hand, 1, kTailByHand, nullptr, grip);
+//   best_tail_grip(picture, seen, hand, 1, kTailByHand, {}, grip);
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
@@ -90,14 +91,14 @@ struct TailDepth {
 constexpr TailDepth kTailByScript{0.010f, 50}, kTailByHand{0.006f, 30};
 
 // Best position for tool `who`, coming from `side`, to grasp the tail: clear of the other strand, no tissue in the path of
-// its shaft, near the knot, not deep below it, within the range of a loop on the tool; `tried` (may be null): [m] the last
-// failed position. False: there is no tail.
+// its shaft, near the knot, not deep below it, within the range of a loop on the tool; `tried`: [m] positions that
+// failed before. False: there is no tail.
 struct TailGrip {
   uint32_t slot = 0;  // of the thread
   Pose pose;
   float tail = 0;  // [m] of thread beyond the knot
 };
 bool best_tail_grip(const PictureModel& picture, const Snapshot& seen, size_t who, float side, TailDepth depth,
-                    const Vec3* tried, TailGrip& out);
+                    std::span<const Vec3> tried, TailGrip& out);
 
 }  // namespace catgut

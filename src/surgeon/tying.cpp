@@ -83,7 +83,7 @@ bool Scripted::lay_tail(const Snapshot& seen) {
 
 void Scripted::choose_grasp(const Snapshot& seen) {
   TailGrip grip;
-  if (best_tail_grip(picture_, seen, kNeedleHolder, 1, kTailByScript, misses_ > 0 ? &tried_ : nullptr, grip))
+  if (best_tail_grip(picture_, seen, kNeedleHolder, 1, kTailByScript, {&tried_, misses_ > 0 ? 1u : 0u}, grip))
     take_slot_ = grip.slot, take_turn_ = grip.pose.q;
   tried_ = node_at(seen, node_of(seen, take_slot_));
 }

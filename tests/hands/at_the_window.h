@@ -174,15 +174,20 @@ class XMouse : public AtTheWindow {
  public:
   XMouse(const std::string& display, int seconds, float pace = 1, const char* scene = "stay")
       : AtTheWindow(seconds, scene, pace), x_(display) {}
+  // The server keeps what is pressed: the next window would start with a gesture under way.
+  ~XMouse() override { let_go(); }
   bool ready() const { return x_.ready(); }
   void press(const std::string& key) { x_.key(key, true), x_.key(key, false); }
   void begin_again() override {
-    if (turn_) x_.button(3, turn_ = false);
-    if (both_) x_.key("w", both_ = false);
+    let_go();
     press("F5");
   }
 
  private:
+  void let_go() {
+    if (turn_) x_.button(3, turn_ = false);
+    if (both_) x_.key("w", both_ = false);
+  }
   void do_it(const Act& act) override {
     for (int i = 0; reading_ && i < 40; ++i) {  // a new stage
       if (i % 8 == 0) press("Return");

@@ -241,6 +241,7 @@ bool Person::draw_together() {
 
 bool Person::wind(int way) {
   doing_ = "wind the strand";
+  locked_ = desk_.count(EventKind::throw_locked);
   if (both(
           4.0f * static_cast<float>(way), [&] { return seen().tool[0].loop_wraps > 0; }, 12))
     return true;
@@ -251,8 +252,8 @@ bool Person::wind(int way) {
 
 bool Person::set_throw() {
   doing_ = "draw the throw down";
-  const size_t locked = desk_.count(EventKind::throw_locked);
-  const auto set = [&] { return desk_.count(EventKind::throw_locked) > locked; };
+  // A short throw may have locked while the tail was taken.
+  const auto set = [&] { return desk_.count(EventKind::throw_locked) > locked_; };
   if (!both(4, [&] { return set() || seen().tool[0].held == Held::nothing; }) || !set()) return false;
   doing_ = "lay the tail down";
   return lay_tail();

@@ -70,6 +70,7 @@ class Person {
 
   WorkQueue& desk_;
   std::string doing_;
+  size_t locked_ = 0;  // throws, before the strand was wound
   std::vector<std::string> repeated_;
 };
 
