@@ -16,8 +16,10 @@ Choice developer_panel(const WorkView& v, bool can_touch) {
   begin_at("inside", 1, 1, 0.86f);
   text(kAccent, "Profiler (F3)");
   ImGui::SameLine();
-  text(kQuiet, fmt::format("{} particles ({} thread), {} clusters, {} contacts, {} dropped ticks", m.particles,
-                           m.thread_particles, m.clusters, m.contacts, v.status->late));
+  if (m.particles == 0) text(kQuiet, "measured while time runs: Esc");
+  else
+    text(kQuiet, fmt::format("{} particles ({} thread), {} clusters, {} contacts, {} dropped ticks", m.particles,
+                             m.thread_particles, m.clusters, m.contacts, v.status->late));
   float most = 0.05f, all = 0;
   for (float ms : m.stage_ms) most = std::max(most, ms), all += ms;
   if (ImGui::BeginTable("inside", 2, ImGuiTableFlags_SizingFixedFit)) {

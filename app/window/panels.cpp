@@ -262,7 +262,9 @@ TextSize panel_text_size() {
 
 Choice pause_panel(const WorkView& view) {
   Choice choice;
-  begin_at("pause", 0.5f, 0.42f, 0.94f);
+  // Beside the profiler, which fills the lower right corner.
+  if (view.inside) begin_at("pause", 0, 0, 0.94f);
+  else begin_at("pause", 0.5f, 0.42f, 0.94f);
   text(kAccent, "Pause");
   const std::string& fault = view.status->fault;
   if (!fault.empty()) {

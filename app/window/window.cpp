@@ -50,6 +50,7 @@ namespace {
 constexpr const char* kFont = "fonts/truetype/dejavu/DejaVuSansMono.ttf";  // in a share folder
 constexpr double kMostPictures = 150;                                      // [1/s]
 constexpr double kSlowPicture = 0.07;                                      // [s] a slower frame reduces the resolution
+constexpr double kFarTooSlow = 0.25;                                       // [s] reduces it by half, without a long look
 constexpr const char* kFirstLesson = "first_stitch";                       // of procedures/
 constexpr double kMirrorEvery = 1.0 / 20;                                  // [s] of the window's picture beside a headset
 constexpr double kSlowMirror = 0.5;  // [s] where the headset's frames take their whole period
@@ -83,9 +84,14 @@ std::string of_visit(const std::string& path, int visit) {
   return (p.parent_path() / (p.stem().string() + fmt::format("_visit{}", visit) + p.extension().string())).string();
 }
 
-std::string free_name(const char* pattern) {
+// A new file in the data folder; in the working folder when there is no home.
+std::string free_name(const Settings& settings, const char* pattern) {
+  const std::string folder = data_folder(settings);
+  std::error_code error;
+  if (!folder.empty()) std::filesystem::create_directories(folder, error);
   std::string name;
-  for (int i = 1; name.empty() || std::filesystem::exists(name); ++i) name = fmt::format(fmt::runtime(pattern), i);
+  for (int i = 1; name.empty() || std::filesystem::exists(name, error); ++i)
+    name = (folder.empty() ? "" : folder + "/") + fmt::format(fmt::runtime(pattern), i);
   return name;
 }
 
@@ -426,7 +432,7 @@ class Window {
         break;
       case Chosen::settings:
         if (options_.kiosk) break;
-        settings_from_ = screen_ == Screen::practice ? Screen::pause : screen_;
+        settings_from_ = screen_;
         go(Screen::settings);
         break;
       case Chosen::leave_settings:
@@ -479,9 +485,9 @@ class Window {
           break;
         }
         try {
-          const std::string name = free_name("catgut_result_{}.json");
+          const std::string name = free_name(settings_, "catgut_result_{}.json");
           write_output(name, session_json(scene_, *results_.result));
-          results_.saved = "Saved: " + name;
+          results_.saved = "Saved: " + short_name(name);
         } catch (const InputError& error) { results_.saved = error.what(); }
         break;
       case Chosen::change:
@@ -715,8 +721,8 @@ class Window {
   const PictureModel& picture() const { return visit_ ? visit_->live.picture() : viewing_->playback.picture(); }
 
   void save_picture(const Image& image) {
-    const std::string name = free_name("catgut_{}.png");
-    LogLine line{visit_ ? visit_->seen.time_s : 0, "screenshot: " + name, false};
+    const std::string name = free_name(settings_, "catgut_{}.png");
+    LogLine line{visit_ ? visit_->seen.time_s : 0, "screenshot: " + short_name(name), false};
     try {
       write_png(image, name);
     } catch (const std::runtime_error& error) { line.text = error.what(), line.bad = true; }
@@ -908,8 +914,10 @@ class Window {
   void coarser_if_slow() {
     const float least = std::clamp(180.0f / static_cast<float>(height_), 0.25f, 1.0f);
     if (!(visit_ || viewing_) || settings_.quality != Quality::low || coarse_ <= least || !options_.screenshot.empty()) return;
-    if (++pictures_so_ < 12 || picture_s_ < picture_count_ * kSlowPicture) return;
-    coarse_ = std::max(least, 0.7f * coarse_);
+    // The first pictures were drawn before the last change took effect, or compiled the materials.
+    const double took = picture_s_ / std::max(picture_count_, 1e-3);
+    if (++pictures_so_ < 3 || took < kSlowPicture || (pictures_so_ < 12 && took < kFarTooSlow)) return;
+    coarse_ = std::max(least, (took < kFarTooSlow ? 0.7f : 0.5f) * coarse_);
     renderer_->set_resolution_scale(coarse_);
     pictures_so_ = 0;
     picture_s_ = picture_count_ = 0;

@@ -333,7 +333,7 @@ TEST_F(Window, settings_are_kept) {
   xdo("key F2");
   EXPECT_TRUE(happens("settings")) << said();
   xdo("key Escape");
-  EXPECT_TRUE(happens("pause")) << said();
+  EXPECT_TRUE(happens("practice", 2)) << said();
   kill(app_, SIGTERM);
   EXPECT_EQ(exit_code(), 130);
   EXPECT_NE(read_file(file).find("assist = false"), std::string::npos) << read_file(file);
