@@ -43,6 +43,14 @@ std::string fault_words(Fault fault) {
       return "cut before knot";
     case Fault::too_few_throws:
       return "too few throws";
+    case Fault::cut_off_line:
+      return "cut off the line";
+    case Fault::pulled_attached:
+      return "pulled while still attached";
+    case Fault::cut_at_suture:
+      return "wall cut at a suture";
+    case Fault::bite_in_char:
+      return "bite in charred tissue";
     default:
       return fault_name(fault);
   }
@@ -140,6 +148,16 @@ std::string words_for(const Event& e, bool& bad) {
     case EventKind::technique_fault:
       bad = true;
       return fault_words(e.fault);
+    case EventKind::pen_activated:
+      return fmt::format("pen on, {:.0f} W", e.value);
+    case EventKind::pen_deactivated:
+      return fmt::format("pen off after {:.1f} s", e.value);
+    case EventKind::wall_scored:
+      return fmt::format("wall scored {:.1f} mm deep, not cut through", 1000 * e.value);
+    case EventKind::wall_cut_through:
+      return e.value < 0 ? "wall cut through" : fmt::format("wall cut through, {:.1f} mm from the line", 1000 * e.value);
+    case EventKind::piece_freed:
+      return fmt::format("specimen free, {:.1f} g", 1000 * e.value);
     default:
       return "";
   }

@@ -45,6 +45,12 @@ enum class EventKind : uint8_t {
   instrument_parked,     // who: hand, which: instrument; it stays on what it holds
   instrument_refused,    // who: hand, which: instrument; the command could not be carried out
   technique_fault,       // fault, which: bite, knot or suture (see Fault); nothing is corrected
+  pen_activated,         // who: hand, which: instrument, value: power [W]
+  pen_deactivated,       // who: hand, which: instrument, value: time since pen_activated [s]
+  wall_scored,           // who: hand, which: instrument, value: greatest depth [m]; a pen was deactivated before it was through
+  wall_cut_through,      // who: hand, which: instrument, value: distance from the planned line [m], -1: none; first place
+                         // where the pen is through since it was activated
+  piece_freed,           // who: hand, which: pieces of the tissue now, value: mass of the freed one [kg], where: its center
   count_
 };
 
@@ -59,6 +65,10 @@ enum class Fault : uint8_t {
   cut_in_stitch,      // which: slot; the thread was cut between suture points or knots: the stitch is open
   cut_before_knot,    // which: slot; the thread was cut before a knot was tied
   too_few_throws,     // which: knot; it was cut or left with too few throws to hold
+  cut_off_line,       // which: instrument, value: distance from the planned line [m]; once until the cut is back on the line
+  pulled_attached,    // which: instrument, value: pull [N] on a specimen whose circle is incomplete; once per grasp
+  cut_at_suture,      // which: suture; the wall was cut through beside one of its holes; once per suture
+  bite_in_char,       // which: bite; its entry or exit lies in charred tissue
   count_
 };
 const char* fault_name(Fault fault);

@@ -25,7 +25,11 @@ struct VisibleMesh {
   std::vector<std::array<uint32_t, 3>> triangle;       // counter-clockwise seen from outside
   std::vector<std::array<uint32_t, 4>> skin_particle;  // indices into Snapshot::particle
   std::vector<std::array<float, 4>> skin_weight;       // sum 1
+  // Of a wall that a pen has touched, else empty:
+  std::vector<uint32_t> scar;  // per vertex: index in Snapshot::scar; kNoScar: none
+  std::vector<float> through;  // per vertex: 0 at the outer face of the wall .. 1 at the inner one
 };
+constexpr uint32_t kNoScar = ~uint32_t{0};
 
 // What surrounds the organ: a surface that does not move and that nothing touches.
 enum class SceneryKind : uint8_t { skin, anoderm, drape, steel, elastic };

@@ -16,8 +16,8 @@ constexpr void reflect(auto& a, Like<KnotThrow> auto& t) {
 }
 
 constexpr void reflect(auto& a, Like<Event> auto& e) {
-  a.at_most(e.kind, EventKind::technique_fault), a(e.who), a(e.which), a(e.value), a(e.where);
-  a.at_most(e.fault, Fault::too_few_throws), a.at_most(e.reason, LoopReason::too_deep), a(e.suture), a(e.tick);
+  a.at_most(e.kind, EventKind::piece_freed), a(e.who), a(e.which), a(e.value), a(e.where);
+  a.at_most(e.fault, Fault::bite_in_char), a.at_most(e.reason, LoopReason::too_deep), a(e.suture), a(e.tick);
 }
 constexpr void reflect(auto& a, Like<EventList> auto& e) { a(e.tick), a(e.list); }
 
@@ -52,10 +52,11 @@ constexpr void reflect(auto& a, Like<SutureView> auto& s) {
   a(s.suture_point), a(s.knot), a(s.bite), a(s.seam);
 }
 constexpr void reflect(auto& a, Like<TopologyView> auto& t) { a(t.version), a(t.pieces), a.cache(t.picture); }
+constexpr void reflect(auto& a, Like<Scar> auto& s) { a(s.burnt), a(s.depth); }
 constexpr void reflect(auto& a, Like<Snapshot> auto& s) {
   a(s.tick), a(s.time_s), a(s.topology), a(s.particle), a(s.rotation), a(s.tool), a(s.instrument), a(s.suture),
       a(s.active_suture), a(s.settled);
-  a(s.opening_area), a(s.closure), a(s.event), a(s.patch);
+  a(s.opening_area), a(s.closure), a(s.event), a(s.patch), a(s.scar);
 }
 
 }  // namespace catgut

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/math.h"
+#include "exchange/divided_picture.h"
 #include "exchange/event.h"
 #include "exchange/force_patch.h"
 #include "exchange/instrument.h"
@@ -117,14 +118,18 @@ struct SutureView {
   std::vector<SeamView> seam;
 };
 
-struct PictureModel;
-
 // Effect of cuts on the tissue.
 struct TopologyView {
   uint32_t version = 0;  // counts changes; 0: as built
   uint32_t pieces = 0;   // connected ones
-  // Replaces the scene's model after a division: the same indices, then copies. Constant; null: as built.
-  std::shared_ptr<const PictureModel> picture;
+  // Replaces the scene's model after a division: the same indices, then copies. Constant; false: as built.
+  DividedPicture picture;
+};
+
+// What an electrosurgical pen has done to a place of the surface.
+struct Scar {
+  uint8_t burnt = 0;  // char, 0 .. 255
+  uint8_t depth = 0;  // [0.01 mm] of the groove; 0 where it is through
 };
 
 struct Snapshot {
@@ -142,6 +147,7 @@ struct Snapshot {
   float closure = 0;                        // 0 open .. 1 at the anvil
   std::vector<Event> event;                 // of this tick
   std::array<ForcePatch, kMaxHands> patch;  // force patch of each hand until the next tick
+  std::vector<Scar> scar;                   // VisibleMesh::scar of topology.picture has indices of these
 
   // The active suture.
   const SutureView& active() const { return suture[active_suture]; }

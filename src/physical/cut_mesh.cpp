@@ -56,9 +56,52 @@ std::array<std::array<float, 2>, 81> smoothed(const wall::Topology& t, uint32_t 
 
 }  // namespace
 
-CutMesh make_cut_mesh(const Model& m, const State& s, bool layers) {
-  const wall::Topology& t = s.wall.topology;
-  const Surface& surface = surface_of(m, s);
+const LatticeTable& lattice(bool quad) {
+  static const auto make = [](bool q) {
+    LatticeTable out;
+    const wall::Raster& r = wall::raster(q);
+    for (uint32_t cell = 0; cell < wall::kCells; ++cell) {
+      std::array<LatticePoint, 4> c;
+      out.corners = corners_of_cell(q, r, cell, c);
+      for (uint32_t k = 0; k < out.corners; ++k) out.corner[cell][k] = static_cast<uint8_t>(key_of(c[k]));
+    }
+    for (uint32_t e = 0; e < r.edges; ++e)
+      for (uint32_t k = 0; k <= wall::kRaster; ++k)
+        out.on_edge[e][k] = static_cast<uint8_t>(key_of(wall::on_edge(q, e, static_cast<int32_t>(k) * kUnit)));
+    for (uint32_t l = 0; l < r.links; ++l) {
+      if (l >= r.inner) {
+        const uint32_t e = (l - r.inner) / wall::kRaster, k = (l - r.inner) % wall::kRaster;
+        out.border[l] = {out.on_edge[e][k], out.on_edge[e][k + 1]};
+        continue;
+      }
+      LatticePoint a, b;
+      wall::border_of(q, r.link[l], a, b);
+      out.border[l] = {static_cast<uint8_t>(key_of(a)), static_cast<uint8_t>(key_of(b))};
+    }
+    return out;
+  };
+  static const LatticeTable quads = make(true), triangles = make(false);
+  return quad ? quads : triangles;
+}
+
+namespace {
+
+// Where a strip lies on the face's own edges. kNone: within the face.
+struct OnEdge {
+  uint32_t edge = wall::kNone, piece = 0;
+};
+OnEdge edge_of(const LatticeTable& lattice, uint32_t edges, uint32_t a, uint32_t b) {
+  for (uint32_t e = 0; e < edges; ++e)
+    for (uint32_t k = 0; k < wall::kRaster; ++k) {
+      const uint32_t from = lattice.on_edge[e][k], to = lattice.on_edge[e][k + 1];
+      if ((from == a && to == b) || (from == b && to == a)) return {e, k};
+    }
+  return {};
+}
+
+}  // namespace
+
+CutMesh make_cut_mesh(const Model& m, const wall::Topology& t, const Surface& surface, bool layers) {
   CutMesh out;
   out.version = t.version;
   // Borders of the layers, from the inner face.
@@ -84,6 +127,7 @@ CutMesh make_cut_mesh(const Model& m, const State& s, bool layers) {
       CutMesh::Vertex v;
       v.point = {part.face, 0, 0, level[l]};
       wall::to_natural(quad, r.center[cell], v.point.xi, v.point.eta);  // in this part
+      v.lattice = key_of(p);
       v.at = wall::weights(m.wall, t, v.point);
       const auto [xi, eta] = at[key_of(p)];
       if (quad)
@@ -98,6 +142,7 @@ CutMesh make_cut_mesh(const Model& m, const State& s, bool layers) {
       if (!(part.cells >> cell & 1)) continue;
       std::array<LatticePoint, 4> c;
       const uint32_t n = corners_of_cell(quad, r, cell, c);
+      if (n == 4 && (c[0].u + c[0].v) / kUnit % 2) std::rotate(c.begin(), c.begin() + 1, c.end());  // the other diagonal
       for (uint32_t k = 1; k + 1 < n; ++k) {
         out.face.push_back(
             {{vertex(c[0], top, cell), vertex(c[k], top, cell), vertex(c[k + 1], top, cell)}, CutSide::outer, 0});
@@ -107,24 +152,25 @@ CutMesh make_cut_mesh(const Model& m, const State& s, bool layers) {
     for (uint32_t q = surface.first_of_face[e]; q < surface.first_of_face[e + 1]; ++q) {
       const Patch& p = surface.patch[q];
       if (p.side != 0) continue;
-      const auto lattice = [&](std::array<float, 2> x) {
+      const auto to_lattice_point = [&](std::array<float, 2> x) {
         const float half = 0.5f * wall::kRaster, off = quad ? 1.0f : 0.0f;
         return LatticePoint{static_cast<int32_t>((x[0] + off) * half + 0.5f) * kUnit,
                             static_cast<int32_t>((x[1] + off) * half + 0.5f) * kUnit};
       };
-      const LatticePoint a = lattice(p.at[0]), b = lattice(p.at[1]);
+      const LatticePoint a = to_lattice_point(p.at[0]), b = to_lattice_point(p.at[1]);
       const uint32_t cell = wall::cell_at(quad, p.at[2][0], p.at[2][1]);
-      bool rim = false;  // of the uncut wall
-      for (uint32_t k = 0; k < r.edges; ++k)
-        for (uint32_t i = 0; i < wall::kRaster && m.wall.neighbor[part.face][k] == wall::kNone; ++i)
-          rim |= r.link[r.over_edge(k, i)].a == cell &&
-                 key_of(wall::on_edge(quad, k, static_cast<int32_t>(i) * kUnit)) == key_of(a);
+      const OnEdge on = edge_of(lattice(quad), r.edges, key_of(a), key_of(b));
+      const bool rim = on.edge != wall::kNone && m.wall.neighbor[part.face][on.edge] == wall::kNone;  // of the uncut wall
+      // The same diagonal as on the other lip.
+      const bool forward = on.edge == wall::kNone
+                               ? key_of(a) < key_of(b)
+                               : (lattice(quad).on_edge[on.edge][on.piece] == key_of(a)) == (on.piece % 2 == 0);
       for (size_t l = 0; l < top; ++l) {
         const CutSide side = rim ? CutSide::rim : CutSide::cut_edge;
         const uint32_t a0 = vertex(a, l, cell), b0 = vertex(b, l, cell), a1 = vertex(a, l + 1, cell),
                        b1 = vertex(b, l + 1, cell);
-        out.face.push_back({{a0, b0, b1}, side, static_cast<uint8_t>(l)});
-        out.face.push_back({{a0, b1, a1}, side, static_cast<uint8_t>(l)});
+        out.face.push_back({forward ? std::array{a0, b0, b1} : std::array{a0, b0, a1}, side, static_cast<uint8_t>(l)});
+        out.face.push_back({forward ? std::array{a0, b1, a1} : std::array{b0, b1, a1}, side, static_cast<uint8_t>(l)});
       }
     }
   }

@@ -8,8 +8,9 @@
 namespace catgut::physical {
 namespace {
 
-constexpr float kApart = 0.25e-3f;  // [m] between points of the path
-constexpr size_t kRecent = 12;      // points behind the tip that it does not fall back to
+constexpr float kApart = 0.25e-3f;   // [m] between points of the path
+constexpr size_t kRecent = 12;       // points behind the tip that it does not fall back to
+constexpr float kString = 0.25e-3f;  // [m] the tip's direction is that of this length: a tremor does not reverse it
 
 bool is_quad(const wall::Model& m, uint32_t face) { return m.mesh.face[face][3] != wall::kNone; }
 
@@ -80,15 +81,16 @@ void char_around(const wall::Model& m, Excision& e, uint32_t face, Vec3 tip, flo
 
 }  // namespace
 
-wall::CutResult use_pen(const ExciseModel& law, const Model& m, State& s, Scratch& k, Excision& e, const Pen& pen, float h) {
-  if (!(pen.power > 0)) return e.touching = false, wall::CutResult{};
+PenStep use_pen(const ExciseModel& law, const Model& m, State& s, Scratch& k, Excision& e, const Pen& pen, float h) {
+  PenStep out;
+  if (!(pen.power > 0)) return e.touching = false, out;
   const Foot foot = under(m, s, pen.tip, law.reach);
-  if (foot.gap > law.reach) return e.touching = false, wall::CutResult{};
+  if (foot.gap > law.reach) return e.touching = false, out;
   reserve(m.wall, e);
   const bool outer = foot.point.zeta >= 0;
   wall::Point now = foot.point;
   now.zeta = outer ? 1.0f : -1.0f;
-  const Vec3 place = wall::rest_place(m.wall, now), heading = e.touching ? place - e.place : Vec3{};
+  const Vec3 place = wall::rest_place(m.wall, now), heading = e.touching ? place - e.trail : Vec3{};
   Vec3 tip = place;
 
   // An older groove takes the tip.
@@ -119,7 +121,8 @@ wall::CutResult use_pen(const ExciseModel& law, const Model& m, State& s, Scratc
       e.groove.push_back({mark.face, mark.link, tip});
     }
   }
-  e.touching = true, e.last = now, e.place = place;
+  e.trail = e.touching ? place - heading * std::min(1.0f, kString / std::max(length(heading), 1e-9f)) : place;
+  e.touching = true, e.last = now;
 
   const float thickness = m.wall.laminate.thickness, share = pen.coagulate ? 0.1f * law.efficiency : law.efficiency;
   const float deeper = share * pen.power * h / (law.energy * law.kerf * law.window);
@@ -130,23 +133,27 @@ wall::CutResult use_pen(const ExciseModel& law, const Model& m, State& s, Scratc
     // Behind the tip: what it has just passed, once.
     if (g.through || length2(g.at - place) > law.window * law.window || dot(g.at - place, heading) > 0) continue;
     (outer ? g.outer : g.inner) += deeper;
+    out.deepest = std::max(out.deepest, std::min(g.outer + g.inner, thickness));
     if (g.outer + g.inner < thickness) continue;
     g.through = true;
     marks.push_back({g.face, g.link});
+    const wall::Raster& r = wall::raster(is_quad(m.wall, g.face));
+    wall::Point at{g.face, 0, 0, now.zeta};
+    wall::to_natural(is_quad(m.wall, g.face), r.center[r.link[g.link].a], at.xi, at.eta);
+    ++out.through, out.at = at;
     // A vessel, at the same place in every run.
     const float chance = law.kerf / law.vessel_spacing;
     const uint32_t dice = mixed(g.face, g.link);
     if (static_cast<float>(dice >> 8) < chance * 16777216.0f && e.bleed.size() < kMaxBleed && !pen.coagulate) {
-      wall::Point at{g.face, 0, 0, 0};
-      const wall::Raster& r = wall::raster(is_quad(m.wall, g.face));
-      wall::to_natural(is_quad(m.wall, g.face), r.center[r.link[g.link].a], at.xi, at.eta);
+      at.zeta = 0;
       e.bleed.push_back({at, law.vessel_flow * static_cast<float>(1 + (dice & 7)) / 8});
     }
   }
   for (Bleed& b : e.bleed)
     if (pen.coagulate && b.flow > 0 && length2(wall::rest_place(m.wall, b.at) - tip) < law.char_coagulate * law.char_coagulate)
       b.flow = std::max(0.0f, b.flow - law.vessel_flow * h / law.seal_time);
-  return marks.empty() ? wall::CutResult{} : cut(m, s, k, marks);
+  if (!marks.empty()) out.cut = cut(m, s, k, marks);
+  return out;
 }
 
 float burnt_at(const Model& m, const Excision& e, const wall::Point& p) {

@@ -3,11 +3,10 @@
 // bleeding points, and removes links of the wall (wall/cut) where a groove has become as deep as the wall is thick.
 //
 // Depth. The power that evaporates tissue makes a groove: depth = efficiency P / (energy kerf speed), from the side where the
-// tip is. `energy` is the heat that takes tissue from 37 to 100 degrees and evaporates its water: 1050 kg/m3 (3600 J/(kg K) 63
-// K
-// + 0.75 2.257 MJ/kg) = 2.0 GJ/m3. Assumptions: efficiency, kerf, the widths of char, and where vessels are. Grooves from both
-// faces of the wall add up. A tip that comes back beside a groove falls into it (`snap`), so that a second pass deepens the
-// first and a circle closes on its start.
+// tip is. `energy` is the heat that takes tissue from 37 to 100 degrees and evaporates its water:
+// 1050 kg/m3 (3600 J/(kg K) 63 K + 0.75 2.257 MJ/kg) = 2.0 GJ/m3. Assumptions: efficiency, kerf, the widths of char, and where
+// vessels are. Grooves from both faces of the wall add up. A tip that comes back beside a groove falls into it (`snap`), so
+// that a second pass deepens the first and a circle closes on its start.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -54,7 +53,7 @@ struct Bleed {
 struct Excision {
   bool touching = false;
   wall::Point last;  // in the groove; meaningful while touching, as the next
-  Vec3 place;        // [m] of the tip itself, on the mid-surface at rest
+  Vec3 trail;        // [m] what the tip drags behind it on a short string, on the mid-surface at rest
   std::vector<Groove> groove;
   std::vector<wall::FaceCut> passed;                   // per face: links that are in `groove`
   std::vector<wall::Point> path;                       // places of the tip, a quarter of a millimeter apart
@@ -67,12 +66,19 @@ constexpr size_t kMaxGroove = 8192, kMaxTipPath = 4096, kMaxBleed = 256;
 constexpr void reflect(auto& a, Like<Groove> auto& g) { a(g.face), a(g.link), a(g.at), a(g.outer), a(g.inner), a(g.through); }
 constexpr void reflect(auto& a, Like<Bleed> auto& b) { a(b.at), a(b.flow); }
 constexpr void reflect(auto& a, Like<Excision> auto& e) {
-  a(e.touching), a(e.last), a(e.place), a(e.groove), a(e.passed), a(e.path), a(e.burnt), a(e.bleed), a(e.overflow);
+  a(e.touching), a(e.last), a(e.trail), a(e.groove), a(e.passed), a(e.path), a(e.burnt), a(e.bleed), a(e.overflow);
 }
 
+// What the pen did in a step.
+struct PenStep {
+  wall::CutResult cut;
+  float deepest = 0;     // [m] of the grooves that became deeper, from both faces together; 0: none did
+  uint32_t through = 0;  // links that are cut through now
+  wall::Point at;        // of the last of them, on the side of the tip
+};
 // One step of h seconds, before physical::step. Allocates once, on first use; a cut itself may allocate (wall/cut).
-wall::CutResult use_pen(const ExciseModel& law, const Model& model, State& state, Scratch& scratch, Excision& excision,
-                        const Pen& pen, float h);
+PenStep use_pen(const ExciseModel& law, const Model& model, State& state, Scratch& scratch, Excision& excision, const Pen& pen,
+                float h);
 
 // Char at a material point, 0 .. 1.
 float burnt_at(const Model& model, const Excision& excision, const wall::Point& point);

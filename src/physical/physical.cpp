@@ -64,7 +64,11 @@ void cut_changed(const Model& m, State& s) {
 
 wall::CutResult cut(const Model& m, State& s, Scratch& k, std::span<const wall::Mark> marks) {
   const wall::CutResult result = wall::cut_links(m.wall, s.wall, k.wall, marks);
-  if (result.divided) cut_changed(m, s);
+  // A cut along an edge of a face changes the surface before it divides anything: the same as after a load.
+  const auto on_edge = [&](const wall::Mark& mark) {
+    return mark.link >= wall::raster(m.wall.mesh.face[mark.face][3] != wall::kNone).inner;
+  };
+  if (result.divided || std::any_of(marks.begin(), marks.end(), on_edge)) cut_changed(m, s);
   return result;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // sim/cut_picture: the visible surface of a wall that a pen has touched, made from the wall's faces: whole ones in a few parts,
-// touched ones cell by cell, divided ones with their cut edges. Each vertex follows the columns of its own side of a cut.
-// Declared in sim/cutting.
+// touched ones cell by cell, divided ones with their cut edges. Each vertex follows the columns of its own side of a cut. A
+// tick only notes what a picture depends on; the first reader of the picture makes it. Declared in sim/cutting.
 #include <algorithm>
 #include <array>
 
@@ -33,12 +33,21 @@ bool is_open(const wall::Model& m, const wall::Topology& t, uint32_t face, uint3
          t.cut[over / 4].has(wall::raster(is_quad(m, over / 4)).over_edge(over % 4, there));
 }
 
+// Faces that show traces of a pen: they are drawn cell by cell.
+void find_touched(const physical::Excision& e, std::vector<uint32_t>& touched) {
+  constexpr float kVisible = 0.04f;  // of char
+  touched.clear();
+  for (uint32_t f = 0; f < e.passed.size(); ++f) {
+    float burnt = 0;
+    for (const float b : e.burnt[f]) burnt = std::max(burnt, b);
+    if (e.passed[f].any() || burnt > kVisible) touched.push_back(f);
+  }
+}
+
 // What the shape of the picture depends on.
 uint64_t shape_of(const wall::Model& wall, const State& state) {
-  const physical::Excision& e = state.physical.cutting.excision;
-  uint64_t h = hash_bytes(nullptr, 0, 1);
-  for (uint32_t f = 0; f < e.passed.size(); ++f)
-    if (e.passed[f].any()) h = hash_bytes(&f, sizeof f, h);
+  const std::vector<uint32_t>& touched = state.physical.cutting.touched;
+  uint64_t h = hash_bytes(touched.data(), touched.size() * sizeof(uint32_t), 1);
   const std::vector<wall::FaceCut>& cut = state.physical.world.wall.topology.cut;
   for (uint32_t f = 0; f < cut.size(); ++f) {
     if (!cut[f].any()) continue;
@@ -54,11 +63,6 @@ uint64_t shape_of(const wall::Model& wall, const State& state) {
 }
 
 uint32_t columns_at_rest(const Model& model) { return model.solver.tissue / 2; }
-// Index in Snapshot::particle: the tissue as built, threads, copies.
-uint32_t particle_of(const Model& model, uint32_t column, bool inner) {
-  const uint32_t rest = columns_at_rest(model);
-  return (column < rest ? 2 * column : model.solver.count + 2 * (column - rest)) + (inner ? 1 : 0);
-}
 
 // Texture coordinates of a body, as its own picture has them: along the organ, and round it.
 class Texture {
@@ -73,73 +77,114 @@ class Texture {
     const float angle = portable::atan2(dot(d, cross(axis_, e1_)), dot(d, e1_)) / (2 * kPi);
     return {along, turn_ * (angle < 0 ? angle + 1 : angle)};
   }
-  // The same place of the texture, not a turn away from `near`.
-  std::array<float, 2> unwrapped(std::array<float, 2> uv, std::array<float, 2> near) const {
-    if (turn_ > 0) uv[1] -= turn_ * std::round((uv[1] - near[1]) / turn_);
-    return uv;
-  }
+  float turn() const { return turn_; }  // of v; 0: it does not close
 
  private:
   BodySpec body_;
   Vec3 axis_, e1_;
-  float turn_ = 0;  // of v
+  float turn_ = 0;
 };
+
+}  // namespace
+
+// Constant: what every picture of a scene needs.
+struct CutPictureSource {
+  std::shared_ptr<const PhysicalModel> physical;
+  PictureModel whole;                    // its bodies without their surfaces
+  std::vector<uint8_t> layer, wall;      // per tissue particle, as in Model
+  uint32_t tissue = 0, count = 0;        // particles: of the tissue, all
+  std::vector<std::array<float, 2>> uv;  // per column at rest, on the outer side
+  std::vector<uint32_t> body;            // per column at rest
+  std::vector<float> turn;               // per body: Texture::turn
+};
+
+namespace {
+
+std::shared_ptr<const CutPictureSource> make_source(const Model& model) {
+  auto made = std::make_shared<CutPictureSource>();
+  made->physical = model.physical;
+  made->whole = model.picture;
+  for (VisibleMesh& mesh : made->whole.body) mesh = {};
+  made->layer = model.layer, made->wall = model.wall;
+  made->tissue = model.solver.tissue, made->count = model.solver.count;
+  uint32_t end = 0;
+  for (uint32_t b = 0; b < model.scene.body.size(); ++b) {
+    const Texture texture(model.scene.body[b]);
+    made->turn.push_back(texture.turn());
+    end += static_cast<uint32_t>(model.scene.body[b].particles);
+    while (made->uv.size() < (b + 1 < model.scene.body.size() ? end / 2 : columns_at_rest(model))) {
+      made->uv.push_back(texture.at(model.physical->world.wall.mesh.outer[made->uv.size()]));
+      made->body.push_back(b);
+    }
+  }
+  return made;
+}
+
+// What a picture shows: a copy, which no tick changes.
+struct CutShape {
+  std::shared_ptr<const CutPictureSource> source;
+  wall::Topology topology;                           // only what a picture needs
+  std::shared_ptr<const physical::Surface> divided;  // null: nothing is divided
+  std::vector<uint32_t> trace;                       // per face: its place among the touched ones; kNone: whole and coarse
+  const wall::Model& wall() const { return source->physical->world.wall; }
+  const physical::Surface& surface() const { return divided ? *divided : source->physical->world.surface; }
+  // Index in Snapshot::particle: the tissue as built, threads, copies.
+  uint32_t particle_of(uint32_t column, bool inner) const {
+    const uint32_t rest = source->tissue / 2;
+    return (column < rest ? 2 * column : source->count + 2 * (column - rest)) + (inner ? 1 : 0);
+  }
+};
+
+uint32_t scar_of(uint32_t trace, uint32_t lattice, bool inner) {
+  return (trace * physical::kLatticePoints + lattice) * 2 + (inner ? 1 : 0);
+}
 
 class Builder {
  public:
-  Builder(const Model& model, const State& state, PictureModel& picture)
-      : model_(model),
-        world_(model.physical->world),
-        state_(state.physical.world),
-        excision_(state.physical.cutting.excision),
-        picture_(picture) {
-    uint32_t end = 0;
-    for (const BodySpec& b : model.scene.body)
-      texture_.emplace_back(b), end_.push_back(end += static_cast<uint32_t>(b.particles));
+  Builder(const CutShape& shape, PictureModel& picture)
+      : shape_(shape), source_(*shape.source), wall_(shape.wall()), topology_(shape.topology), picture_(picture) {
     normal_.resize(picture.body.size());
-    for (VisibleMesh& mesh : picture.body) mesh = {};
   }
 
   void build() {
-    const wall::Model& w = world_.wall;
-    for (uint32_t f = 0; f < w.mesh.face.size(); ++f)
-      if (!is_divided(state_.wall.topology, f)) add_whole(f);
+    for (uint32_t f = 0; f < wall_.mesh.face.size(); ++f)
+      if (!is_divided(topology_, f)) add_whole(f);
     add_divided();
     for (size_t b = 0; b < normal_.size(); ++b)
       for (size_t v = 0; v < normal_[b].size(); ++v) picture_.body[b].normal[v] = normalized(normal_[b][v], {0, 1, 0});
   }
 
  private:
-  size_t body_of(uint32_t face) const {
-    const uint32_t particle = 2 * world_.wall.mesh.face[face][0];
-    size_t b = 0;
-    while (b + 1 < end_.size() && particle >= end_[b]) ++b;
-    return b;
-  }
+  size_t body_of(uint32_t face) const { return source_.body[wall_.mesh.face[face][0]]; }
 
-  // A vertex on the outer or the inner side. edge: of a cut or a rim; its normal is that of its triangles.
-  uint32_t add_vertex(const wall::Point& point, const wall::Weights& w, bool inner, bool edge) {
-    const wall::Mesh& rest = world_.wall.mesh;
-    const std::vector<uint32_t>& source = state_.wall.topology.source;
+  // A vertex on the outer or the inner side. edge: of a cut or a rim; its normal is that of its triangles. lattice: of the
+  // face; kNone: between the lattice points.
+  uint32_t add_vertex(const wall::Point& point, const wall::Weights& w, bool inner, bool edge, uint32_t lattice) {
+    const wall::Mesh& rest = wall_.mesh;
     const size_t b = body_of(point.face);
     VisibleMesh& mesh = picture_.body[b];
     const uint32_t first = rest.face[point.face][0];
-    const std::array<float, 2> near = texture_[b].at(rest.outer[first]);
+    const std::array<float, 2> near = source_.uv[first];
     Vec3 at{}, out{};
     std::array<float, 2> uv{};
     std::array<uint32_t, 4> particle{};
     for (size_t k = 0; k < 4; ++k) {
-      const uint32_t c = w.weight[k] != 0 ? w.column[k] : w.column[0], s = source[c];
+      const uint32_t c = w.weight[k] != 0 ? w.column[k] : w.column[0], s = topology_.source[c];
       at += (inner ? rest.inner[s] : rest.outer[s]) * w.weight[k];
       out += (rest.outer[s] - rest.inner[s]) * w.weight[k];
-      const std::array<float, 2> here = texture_[b].unwrapped(texture_[b].at(rest.outer[s]), near);
+      std::array<float, 2> here = source_.uv[s];
+      if (const float turn = source_.turn[b]; turn > 0) here[1] -= turn * std::round((here[1] - near[1]) / turn);
       for (size_t i = 0; i < 2; ++i) uv[i] += here[i] * w.weight[k];
-      particle[k] = particle_of(model_, c, inner);
+      particle[k] = shape_.particle_of(c, inner);
     }
     mesh.position.push_back(at), mesh.uv.push_back(uv);
-    mesh.layer.push_back(edge ? TissueLayer::cut_edge : static_cast<TissueLayer>(model_.layer[2 * first + (inner ? 1 : 0)]));
+    mesh.layer.push_back(edge ? TissueLayer::cut_edge : static_cast<TissueLayer>(source_.layer[2 * first + (inner ? 1 : 0)]));
     mesh.skin_particle.push_back(particle), mesh.skin_weight.push_back(w.weight);
     mesh.normal.push_back({});
+    const uint32_t trace = shape_.trace[point.face];
+    mesh.scar.push_back(trace == wall::kNone || lattice == wall::kNone ? kNoScar : scar_of(trace, lattice, inner));
+    // The renderer's layers of a cut edge lie strictly between 0 and 1.
+    mesh.through.push_back(edge ? (inner ? 0.999f : 0.001f) : (inner ? 1.0f : 0.0f));
     normal_[b].push_back(edge ? Vec3{} : inner ? -out : out);
     return static_cast<uint32_t>(mesh.position.size()) - 1;
   }
@@ -153,16 +198,16 @@ class Builder {
   }
 
   void add_whole(uint32_t face) {
-    const wall::Topology& t = state_.wall.topology;
-    const bool quad = is_quad(world_.wall, face);
+    const wall::Topology& t = topology_;
+    const bool quad = is_quad(wall_, face);
     const size_t edges = quad ? 4 : 3;
     const auto is_cut = [&](size_t e) {
       bool cut = false;
-      for (uint32_t k = 0; k < wall::kRaster && world_.wall.neighbor[face][e] != wall::kNone; ++k)
-        cut = cut || is_open(world_.wall, t, face, static_cast<uint32_t>(e), k);
+      for (uint32_t k = 0; k < wall::kRaster && wall_.neighbor[face][e] != wall::kNone; ++k)
+        cut = cut || is_open(wall_, t, face, static_cast<uint32_t>(e), k);
       return cut;
     };
-    bool fine = excision_.passed[face].any();
+    bool fine = shape_.trace[face] != wall::kNone;
     for (size_t e = 0; e < edges; ++e) fine = fine || is_cut(e);
     const int n = fine ? wall::kRaster : kCoarse;
     const auto natural = [&](int i, int j) {
@@ -172,7 +217,9 @@ class Builder {
     const auto add = [&](int i, int j, bool inner, bool edge) {
       wall::Point p = natural(i, j);
       p.zeta = inner ? -1.0f : 1.0f;
-      return add_vertex(p, wall::weights(world_.wall, t, p), inner, edge);
+      const uint32_t lattice =
+          n == wall::kRaster ? static_cast<uint32_t>(j) * physical::kLatticeSide + static_cast<uint32_t>(i) : wall::kNone;
+      return add_vertex(p, wall::weights(wall_, t, p), inner, edge, lattice);
     };
     std::vector<uint32_t> row(static_cast<size_t>((n + 1) * (n + 1)));
     for (const bool inner : {false, true}) {
@@ -184,16 +231,21 @@ class Builder {
       };
       for (int j = 0; j < n; ++j)
         for (int i = 0; i < (quad ? n : n - j); ++i) {
-          triangle(at(i, j), at(i + 1, j), quad ? at(i + 1, j + 1) : at(i, j + 1));
-          if (quad) triangle(at(i, j), at(i + 1, j + 1), at(i, j + 1));
-          else if (i + j + 1 < n) triangle(at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+          if (!quad) {
+            triangle(at(i, j), at(i + 1, j), at(i, j + 1));
+            if (i + j + 1 < n) triangle(at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+          } else if ((i + j) % 2 == 0) {  // the diagonals of physical/cut_mesh
+            triangle(at(i, j), at(i + 1, j), at(i + 1, j + 1)), triangle(at(i, j), at(i + 1, j + 1), at(i, j + 1));
+          } else {
+            triangle(at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)), triangle(at(i + 1, j), at(i, j + 1), at(i, j));
+          }
         }
     }
     // Rims of the organ, and cuts along the face's own edges.
     const std::array<std::array<int, 2>, 4> corner = quad ? std::array<std::array<int, 2>, 4>{{{0, 0}, {n, 0}, {n, n}, {0, n}}}
                                                           : std::array<std::array<int, 2>, 4>{{{0, 0}, {n, 0}, {0, n}, {0, 0}}};
     for (size_t e = 0; e < edges; ++e) {
-      if (world_.wall.neighbor[face][e] != wall::kNone && !is_cut(e)) continue;
+      if (wall_.neighbor[face][e] != wall::kNone && !is_cut(e)) continue;
       const auto from = corner[e], to = corner[(e + 1) % edges];
       const auto place = [&](int k, size_t d) { return from[d] + (to[d] - from[d]) * k / n; };
       std::array<uint32_t, 2> before{};
@@ -203,22 +255,22 @@ class Builder {
       };
       for (int k = 0; k < n; ++k) {
         const uint32_t piece = static_cast<uint32_t>(k * wall::kRaster / n);
-        if (!is_open(world_.wall, t, face, static_cast<uint32_t>(e), piece)) continue;
+        if (!is_open(wall_, t, face, static_cast<uint32_t>(e), piece)) continue;
         if (known != k) before = vertices(k);
         const std::array<uint32_t, 2> now = vertices(k + 1);
-        add_strip(face, before, now);
+        add_strip(face, before, now, k % 2 == 0);
         before = now, known = k + 1;
       }
     }
   }
   // a, b: inner and outer vertex at the ends of a piece of an edge, in the order of the face's corners.
-  void add_strip(uint32_t face, std::array<uint32_t, 2> a, std::array<uint32_t, 2> b) {
-    add_triangle(face, {a[0], b[0], b[1]}, true);
-    add_triangle(face, {a[0], b[1], a[1]}, true);
+  void add_strip(uint32_t face, std::array<uint32_t, 2> a, std::array<uint32_t, 2> b, bool forward) {
+    add_triangle(face, {a[0], b[0], forward ? b[1] : a[1]}, true);
+    add_triangle(face, {forward ? a[0] : b[0], b[1], a[1]}, true);
   }
 
   void add_divided() {
-    const physical::CutMesh cut = make_cut_mesh(world_, state_, false);
+    const physical::CutMesh cut = make_cut_mesh(source_.physical->world, topology_, shape_.surface(), false);
     // Edges have vertices of their own, for their normals and their layer.
     std::array<std::vector<uint32_t>, 2> number;
     for (auto& list : number) list.assign(cut.vertex.size(), wall::kNone);
@@ -228,22 +280,94 @@ class Builder {
       for (size_t k = 0; k < 3; ++k) {
         const physical::CutMesh::Vertex& v = cut.vertex[f.vertex[k]];
         uint32_t& known = number[edge ? 1 : 0][f.vertex[k]];
-        if (known == wall::kNone) known = add_vertex(v.point, v.at, v.point.zeta < 0, edge);
+        if (known == wall::kNone) known = add_vertex(v.point, v.at, v.point.zeta < 0, edge, v.lattice);
         t[k] = known;
       }
       add_triangle(cut.vertex[f.vertex[0]].point.face, t, edge);
     }
   }
 
-  const Model& model_;
-  const physical::Model& world_;
-  const physical::State& state_;
-  const physical::Excision& excision_;
+  const CutShape& shape_;
+  const CutPictureSource& source_;
+  const wall::Model& wall_;
+  const wall::Topology& topology_;
   PictureModel& picture_;
-  std::vector<Texture> texture_;           // per body
-  std::vector<uint32_t> end_;              // per body: particles up to its last
   std::vector<std::vector<Vec3>> normal_;  // per body and vertex, not yet unit
 };
+
+PictureModel draw(const CutShape& shape) {
+  const CutPictureSource& source = *shape.source;
+  PictureModel picture = source.whole;
+  const wall::Mesh& rest = shape.wall().mesh;
+  const std::vector<uint32_t>& columns = shape.topology.source;
+  picture.particle_rest.resize(source.count), picture.wall.resize(source.count);
+  for (size_t i = source.tissue / 2; i < columns.size(); ++i) {
+    picture.particle_rest.push_back(rest.outer[columns[i]]), picture.particle_rest.push_back(rest.inner[columns[i]]);
+    picture.wall.insert(picture.wall.end(), 2, source.wall[2 * columns[i]]);
+  }
+  Builder(shape, picture).build();
+  return picture;
+}
+
+// Char and depth of the grooves at the lattice points of the touched faces.
+void find_scars(const Model& model, const Cutting& c, std::vector<Scar>& out) {
+  const wall::Model& m = model.physical->world.wall;
+  constexpr uint32_t kPoints = physical::kLatticePoints;
+  struct Point {
+    float burnt = 0, depth[2] = {0, 0};  // [m] from the outer and from the inner face
+    bool through = false;
+  };
+  std::vector<Point> point(c.touched.size() * kPoints);
+  std::vector<uint32_t> trace(m.mesh.face.size(), wall::kNone);
+  for (uint32_t i = 0; i < c.touched.size(); ++i) {
+    const uint32_t f = c.touched[i];
+    trace[f] = i;
+    std::array<float, kPoints> count{};
+    const physical::LatticeTable& lattice = physical::lattice(is_quad(m, f));
+    for (uint32_t cell = 0; cell < wall::kCells; ++cell)
+      for (uint32_t k = 0; k < lattice.corners; ++k) {
+        const uint32_t at = lattice.corner[cell][k];
+        point[i * kPoints + at].burnt += c.excision.burnt[f][cell], ++count[at];
+      }
+    for (uint32_t k = 0; k < kPoints; ++k) point[i * kPoints + k].burnt /= std::max(count[k], 1.0f);
+  }
+  for (const physical::Groove& g : c.excision.groove) {
+    if (trace[g.face] == wall::kNone) continue;
+    for (const uint32_t end : physical::lattice(is_quad(m, g.face)).border[g.link]) {
+      Point& p = point[trace[g.face] * kPoints + end];
+      p.depth[0] = std::max(p.depth[0], g.outer), p.depth[1] = std::max(p.depth[1], g.inner);
+      p.through = p.through || g.through;
+    }
+  }
+  // Faces that meet show the same on their common edge; where they meet a coarse one, nothing is carved. Twice: corners.
+  for (int pass = 0; pass < 2; ++pass)
+    for (const uint32_t f : c.touched)
+      for (uint32_t e = 0; e < wall::raster(is_quad(m, f)).edges; ++e) {
+        const uint32_t over = m.neighbor[f][e];
+        const bool fine = over != wall::kNone && trace[over / 4] != wall::kNone;
+        const bool turned = over != wall::kNone && m.mesh.face[over / 4][over % 4] != m.mesh.face[f][e];
+        for (uint32_t k = 0; k <= wall::kRaster; ++k) {
+          const auto at = [&](uint32_t face, uint32_t edge, uint32_t along) -> Point& {
+            return point[trace[face] * kPoints + physical::lattice(is_quad(m, face)).on_edge[edge][along]];
+          };
+          Point& a = at(f, e, k);
+          if (!fine) {
+            a.through = true;
+            continue;
+          }
+          Point& b = at(over / 4, over % 4, turned ? wall::kRaster - k : k);
+          a.burnt = b.burnt = std::max(a.burnt, b.burnt), a.through = b.through = a.through || b.through;
+          for (size_t d = 0; d < 2; ++d) a.depth[d] = b.depth[d] = std::max(a.depth[d], b.depth[d]);
+        }
+      }
+  out.resize(point.size() * 2);
+  for (size_t i = 0; i < point.size(); ++i)
+    for (size_t d = 0; d < 2; ++d) {
+      Scar& scar = out[2 * i + d];
+      scar.burnt = static_cast<uint8_t>(std::min(255.0f, 255 * point[i].burnt));
+      scar.depth = point[i].through ? uint8_t{0} : static_cast<uint8_t>(std::min(255.0f, point[i].depth[d] * 1e5f));
+    }
+}
 
 // Rotation of each column since rest: mean over its elements of the turn of director and edge.
 std::vector<Quat> rotations(const wall::Model& m, const wall::State& s) {
@@ -280,21 +404,26 @@ std::vector<Quat> rotations(const wall::Model& m, const wall::State& s) {
 void renew_cut_picture(const Model& model, State& state) {
   Cutting& c = state.physical.cutting;
   if (c.mode.empty() || c.excision.passed.empty()) {
-    c.picture.reset(), c.picture_of = 0;
+    c.picture = {}, c.picture_of = 0;
     return;
   }
+  // Only an active pen changes the wall.
+  if (c.picture && std::all_of(c.mode.begin(), c.mode.end(), [](PenMode m) { return m == PenMode::off; })) return;
+  find_touched(c.excision, c.touched);
+  find_scars(model, c, c.scar);
   const uint64_t shape = shape_of(model.physical->world.wall, state);
   if (c.picture && c.picture_of == shape) return;
-  auto picture = std::make_shared<PictureModel>(model.picture);
-  const wall::Mesh& rest = model.physical->world.wall.mesh;
-  const std::vector<uint32_t>& source = state.physical.world.wall.topology.source;
-  picture->particle_rest.resize(model.solver.count), picture->wall.resize(model.solver.count);
-  for (size_t i = columns_at_rest(model); i < source.size(); ++i) {
-    picture->particle_rest.push_back(rest.outer[source[i]]), picture->particle_rest.push_back(rest.inner[source[i]]);
-    picture->wall.insert(picture->wall.end(), 2, model.wall[2 * source[i]]);
-  }
-  Builder(model, state, *picture).build();
-  c.picture = std::move(picture), c.picture_of = shape;
+  if (!c.source) c.source = make_source(model);
+  const wall::Topology& t = state.physical.world.wall.topology;
+  CutShape seen;
+  seen.source = c.source;
+  seen.topology.version = t.version, seen.topology.corners = t.corners, seen.topology.source = t.source;
+  seen.topology.cut = t.cut, seen.topology.first_fragment = t.first_fragment, seen.topology.fragment = t.fragment;
+  seen.divided = state.physical.world.cut_surface;
+  seen.trace.assign(model.physical->world.wall.mesh.face.size(), wall::kNone);
+  for (uint32_t i = 0; i < c.touched.size(); ++i) seen.trace[c.touched[i]] = i;
+  c.picture = DividedPicture([shape = std::move(seen)] { return draw(shape); });
+  c.picture_of = shape;
 }
 
 void publish_cut(const Model& model, const State& state, Snapshot& out) {
@@ -302,9 +431,9 @@ void publish_cut(const Model& model, const State& state, Snapshot& out) {
   const wall::State& wall = state.physical.world.wall;
   const uint32_t rest = columns_at_rest(model);
   const std::vector<Quat> turned = rotations(model.physical->world.wall, wall);
-  uint32_t version = static_cast<uint32_t>(wall.topology.fragment.size());
-  for (const wall::FaceCut& f : c.excision.passed) version += f.any();
+  const uint32_t version = static_cast<uint32_t>(wall.topology.fragment.size() + c.touched.size());
   out.topology = {version, c.pieces, c.picture};
+  out.scar = c.scar;
   out.rotation.assign(model.solver.count, {});
   for (uint32_t i = 0; i < rest; ++i) out.rotation[2 * i] = out.rotation[2 * i + 1] = turned[i];
   for (uint32_t i = rest; i < turned.size(); ++i) {

@@ -13,6 +13,105 @@ namespace {
 
 constexpr physical::ExciseModel kLaw;
 
+uint8_t hand_of(const State& state, size_t instrument) { return state.suture.instrument[instrument].hand; }
+
+void report(State& state, EventKind kind, size_t instrument, uint32_t which, float value, Vec3 where,
+            Fault fault = Fault::none) {
+  Event e;
+  e.kind = kind, e.who = hand_of(state, instrument), e.which = which, e.value = value, e.where = where, e.fault = fault;
+  state.event.add(e);
+}
+
+bool has_line(const Model& model) { return model.scene.surgeon.plan == "excision" && !model.scene.body.empty(); }
+
+// [m] from the rim of the first body, along its axis, at rest.
+float from_rim(const Model& model, const wall::Point& point) {
+  const BodySpec& body = model.scene.body.front();
+  return dot(body.position - wall::rest_place(model.physical->world.wall, point), normalized(body.axis));
+}
+
+// [m] from the planned line; -1: there is none for this place.
+float from_line(const Model& model, const wall::Point& point) {
+  const uint32_t column = model.physical->world.wall.mesh.face[point.face][0];
+  if (!has_line(model) || 2 * column >= static_cast<uint32_t>(model.scene.body.front().particles)) return -1;
+  return std::abs(from_rim(model, point) - model.scene.surgeon.edge_distance);
+}
+
+Vec3 place_of(const Model& model, const State& state, const wall::Point& point) {
+  const wall::State& wall = state.physical.world.wall;
+  return wall::place(wall::weights(model.physical->world.wall, wall.topology, point), wall.motion);
+}
+
+const std::vector<uint32_t>& pieces_of(const Model& model, const State& state) {
+  return physical::surface_of(model.physical->world, state.physical.world).piece;
+}
+uint32_t count_pieces(const Model& model, const State& state) {
+  const std::vector<uint32_t>& piece = pieces_of(model, state);
+  uint32_t count = 0;
+  for (uint32_t c = 0; c < piece.size(); ++c) count += piece[c] == c;
+  return count;
+}
+
+// Of the pieces beside the last cut: the lightest that nothing holds, with its mass and its center of mass.
+void report_freed(const Model& model, State& state, size_t instrument, uint32_t face) {
+  const wall::Model& m = model.physical->world.wall;
+  const wall::State& wall = state.physical.world.wall;
+  const wall::Topology& t = wall.topology;
+  const std::vector<uint32_t>& piece = pieces_of(model, state);
+  struct Piece {
+    bool beside = false, held = false;
+    float mass = 0;
+    Vec3 moment;
+  };
+  std::vector<Piece> of(piece.size());
+  for (uint32_t c = 0; c < piece.size(); ++c) {
+    Piece& p = of[piece[c]];
+    p.held = p.held || t.slot[c] == wall::kNone;
+    p.mass += t.mass[c], p.moment += wall::vec3(wall.motion.x[2 * c]) * t.mass[c];
+    const auto& corner = m.mesh.face[face];
+    p.beside = p.beside || std::find(corner.begin(), corner.end(), t.source[c]) != corner.end();
+  }
+  const Piece* freed = nullptr;
+  for (const Piece& p : of)
+    if (p.beside && !p.held && p.mass > 0 && (!freed || p.mass < freed->mass)) freed = &p;
+  if (freed)
+    report(state, EventKind::piece_freed, instrument, state.physical.cutting.pieces, freed->mass, freed->moment / freed->mass);
+}
+
+// Sutures whose thread runs through a hole near a place that was cut through.
+void watch_sutures(const Model& model, State& state, size_t instrument, const wall::Point& at) {
+  const wall::Model& m = model.physical->world.wall;
+  const thread::State& t = state.physical.world.thread;
+  const Vec3 cut = wall::rest_place(m, at);
+  for (const thread::Eyelet& e : t.eyelet) {
+    const physical::Hole& hole = state.physical.world.hole[e.point];
+    if (hole.out || length2(wall::rest_place(m, hole.place) - cut) > kBesideSuture * kBesideSuture) continue;
+    const uint32_t suture = model.solver.strand_of(model.solver.tissue + e.segment);
+    uint8_t& reported = state.physical.cutting.cut_at_suture[suture];
+    if (!reported)
+      report(state, EventKind::technique_fault, instrument, suture, 0, place_of(model, state, at), Fault::cut_at_suture);
+    reported = 1;
+  }
+}
+
+void switch_on(State& state, size_t instrument, PenMode mode) {
+  Cutting& c = state.physical.cutting;
+  c.mode[instrument] = mode;
+  c.stroke = {state.tick, 0, false, false};
+  report(state, EventKind::pen_activated, instrument, static_cast<uint32_t>(instrument),
+         mode == PenMode::cut ? kCutPower : kCoagulatePower, state.physical.world.bodies.body[instrument].pose.p);
+}
+void switch_off(const Model& model, State& state, size_t instrument) {
+  Cutting& c = state.physical.cutting;
+  if (c.mode[instrument] == PenMode::off) return;
+  const Vec3 tip = state.physical.world.bodies.body[instrument].pose.p;
+  const uint32_t which = static_cast<uint32_t>(instrument);
+  if (c.mode[instrument] == PenMode::cut && c.stroke.deepest > 0 && !c.stroke.through)
+    report(state, EventKind::wall_scored, instrument, which, c.stroke.deepest, tip);
+  c.mode[instrument] = PenMode::off;
+  report(state, EventKind::pen_deactivated, instrument, which, static_cast<float>(state.tick - c.stroke.began) * model.dt, tip);
+}
+
 }  // namespace
 
 Cutting start_cutting(const Model& model) {
@@ -20,6 +119,7 @@ Cutting start_cutting(const Model& model) {
   const std::vector<InstrumentModel>& kind = model.suture.instrument;
   if (std::none_of(kind.begin(), kind.end(), [](const InstrumentModel& k) { return k.can(kCauterize); })) return c;
   c.mode.assign(kind.size(), PenMode::off);
+  c.pulled.assign(kind.size(), 0), c.cut_at_suture.assign(model.solver.strand.size(), 0);
   c.pieces = wall::count_pieces(model.physical->start.wall);
   return c;
 }
@@ -35,7 +135,8 @@ bool cutting_fits(const Model& model, const Cutting& c) {
   const auto good_groove = [&](const physical::Groove& g) {
     return g.face < faces && g.link < wall::raster(wall.mesh.face[g.face][3] != wall::kNone).links;
   };
-  if (c.mode.size() != model.suture.instrument.size() || e.passed.size() != e.burnt.size() ||
+  if (c.mode.size() != model.suture.instrument.size() || c.pulled.size() != c.mode.size() ||
+      c.cut_at_suture.size() != model.solver.strand.size() || e.passed.size() != e.burnt.size() ||
       (!e.passed.empty() && e.passed.size() != faces))
     return false;
   for (const PenMode mode : c.mode)
@@ -61,16 +162,15 @@ void switch_pens(const Model& model, State& state, TickInput& input) {
       others.push(command);
       continue;
     }
-    PenMode& mode = c.mode[static_cast<size_t>(held)];
-    const PenMode next = mode == wanted ? PenMode::off : wanted;
-    std::fill(c.mode.begin(), c.mode.end(), PenMode::off);
-    mode = next;
+    const bool stop = c.mode[static_cast<size_t>(held)] == wanted;
+    for (size_t i = 0; i < c.mode.size(); ++i) switch_off(model, state, i);
+    if (!stop) switch_on(state, static_cast<size_t>(held), wanted);
   }
   input.commands = others;
   // A pen that was laid down, or whose hand is gone, is off.
   for (uint32_t i = 0; i < c.mode.size(); ++i) {
     const InstrumentState& tool = state.suture.instrument[i];
-    if (tool.place != InstrumentPlace::hand || !input.hand[tool.hand].connected) c.mode[i] = PenMode::off;
+    if (tool.place != InstrumentPlace::hand || !input.hand[tool.hand].connected) switch_off(model, state, i);
   }
 }
 
@@ -78,14 +178,58 @@ void use_pens(const Model& model, State& state, physical::Scratch& scratch, floa
   Cutting& c = state.physical.cutting;
   if (c.mode.empty()) return;
   physical::Pen pen;
+  size_t active = 0;
   for (size_t i = 0; i < c.mode.size(); ++i) {
     if (c.mode[i] == PenMode::off) continue;
+    active = i;
     pen.tip = state.physical.world.bodies.body[i].pose.p;
     pen.coagulate = c.mode[i] == PenMode::coagulate;
     pen.power = pen.coagulate ? kCoagulatePower : kCutPower;
   }
-  if (use_pen(kLaw, model.physical->world, state.physical.world, scratch, c.excision, pen, h).divided)
-    c.pieces = wall::count_pieces(state.physical.world.wall);
+  const physical::PenStep did = use_pen(kLaw, model.physical->world, state.physical.world, scratch, c.excision, pen, h);
+  c.stroke.deepest = std::max(c.stroke.deepest, did.deepest);
+  if (did.through == 0) return;
+  const float off = from_line(model, did.at);
+  if (!c.stroke.through)
+    report(state, EventKind::wall_cut_through, active, static_cast<uint32_t>(active), off, place_of(model, state, did.at));
+  c.stroke.through = c.opened = true;
+  if (off > kOffLine && !c.stroke.off_line)
+    report(state, EventKind::technique_fault, active, static_cast<uint32_t>(active), off, place_of(model, state, did.at),
+           Fault::cut_off_line);
+  c.stroke.off_line = off > (c.stroke.off_line ? 0.8f : 1.0f) * kOffLine;
+  watch_sutures(model, state, active, did.at);
+  if (!did.cut.divided) return;
+  const uint32_t before = c.pieces;
+  c.pieces = count_pieces(model, state);
+  if (c.pieces > before) report_freed(model, state, active, did.at.face);
+}
+
+void watch_pulls(const Model& model, State& state) {
+  Cutting& c = state.physical.cutting;
+  if (!c.opened || !has_line(model)) return;
+  if (std::any_of(c.mode.begin(), c.mode.end(), [](PenMode m) { return m != PenMode::off; })) return;  // traction while cutting
+  const wall::Topology& t = state.physical.world.wall.topology;
+  for (size_t i = 0; i < c.pulled.size(); ++i) {
+    const physical::Body& body = state.physical.world.bodies.body[i];
+    if (body.grip.what != physical::Gripped::tissue) c.pulled[i] = 0;
+    if (body.grip.what != physical::Gripped::tissue || c.pulled[i]) continue;
+    const float force = length(body.hand_force);
+    const wall::Point& held = body.grip.point[0].tissue;
+    if (force < kPulledForce || from_line(model, held) < 0 || from_rim(model, held) > model.scene.surgeon.edge_distance)
+      continue;
+    // Attached: its piece of the wall is one with tissue that is held in place.
+    const std::vector<uint32_t>& piece = pieces_of(model, state);
+    const uint32_t own = piece[wall::weights(model.physical->world.wall, t, held).column[0]];
+    bool attached = false;
+    for (uint32_t k = 0; k < piece.size() && !attached; ++k) attached = piece[k] == own && t.slot[k] == wall::kNone;
+    if (!attached) continue;
+    c.pulled[i] = 1;
+    report(state, EventKind::technique_fault, i, static_cast<uint32_t>(i), force, body.pose.p, Fault::pulled_attached);
+  }
+}
+
+bool is_charred(const Model& model, const State& state, const wall::Point& point) {
+  return burnt_at(model.physical->world, state.physical.cutting.excision, point) > kCharred;
 }
 
 }  // namespace catgut

@@ -10,6 +10,7 @@
 #include <memory>
 #include <vector>
 
+#include "exchange/divided_picture.h"
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "exchange/tool_input.h"
@@ -24,18 +25,40 @@ struct State;
 enum class PenMode : uint8_t { off, cut, coagulate };
 constexpr float kCutPower = 40, kCoagulatePower = 30;  // [W] within the settings of general surgery (chosen)
 
+// What a pen has done since it was activated.
+struct Stroke {
+  uint64_t began = 0;     // tick
+  float deepest = 0;      // [m] of its grooves
+  bool through = false;   // at one place at least
+  bool off_line = false;  // the last place where it went through is off the line
+};
+constexpr void reflect(auto& a, Like<Stroke> auto& s) { a(s.began), a(s.deepest), a(s.through), a(s.off_line); }
+
+struct CutPictureSource;
 struct Cutting {
   std::vector<PenMode> mode;  // per instrument; empty: the scene has no electrosurgical pen
   physical::Excision excision;
-  uint32_t pieces = 0;      // of the wall
-  uint64_t picture_of = 0;  // what `picture` shows
-  std::shared_ptr<const PictureModel> picture;
+  uint32_t pieces = 0;  // of the wall
+  Stroke stroke;        // of the active pen, or the last one
+  bool opened = false;  // the wall is cut through somewhere
+  // Faults that are reported already: per suture, and per instrument until it lets go.
+  std::vector<uint8_t> cut_at_suture, pulled;
+  // Follows from the above (sim/cut_picture).
+  std::vector<uint32_t> touched;  // faces that show a pen's traces, in order
+  std::vector<Scar> scar;         // as Snapshot::scar
+  uint64_t picture_of = 0;        // what `picture` shows
+  DividedPicture picture;
+  std::shared_ptr<const CutPictureSource> source;  // null until a pen has touched the wall
 };
 // A scene without a pen has none of it.
 constexpr void reflect(auto& a, Like<Cutting> auto& c) {
-  if (c.mode.empty()) a.cache(c.mode), a.cache(c.excision), a.cache(c.pieces);
-  else a(c.mode), a(c.excision), a(c.pieces);
-  a.cache(c.picture_of), a.cache(c.picture);
+  if (c.mode.empty()) {
+    a.cache(c.mode), a.cache(c.excision), a.cache(c.pieces), a.cache(c.stroke), a.cache(c.opened), a.cache(c.cut_at_suture);
+    a.cache(c.pulled);
+  } else {
+    a(c.mode), a(c.excision), a(c.pieces), a(c.stroke), a(c.opened), a(c.cut_at_suture), a(c.pulled);
+  }
+  a.cache(c.touched), a.cache(c.scar), a.cache(c.picture_of), a.cache(c.picture), a.cache(c.source);
 }
 
 // --- building, saving --------------------------------------------------------------------------------------------------
@@ -44,15 +67,26 @@ Cutting start_cutting(const Model& model);
 bool cutting_fits(const Model& model, const Cutting& cutting);
 
 // --- stages of a tick ----------------------------------------------------------------------------------------------------
-// Once: switches pens, and removes their commands from the list.
+// Once: switches pens, and removes their commands from the list. Events: pen_activated, pen_deactivated, wall_scored.
 void switch_pens(const Model& model, State& state, TickInput& input);
-// In every step of h seconds, before physical::step.
+// In every step of h seconds, before physical::step. Events: wall_cut_through, piece_freed, cut_off_line, cut_at_suture.
 void use_pens(const Model& model, State& state, physical::Scratch& scratch, float h);
+// Once, after the steps: the fault pulled_attached.
+void watch_pulls(const Model& model, State& state);
+// Whether a material point lies in charred tissue.
+bool is_charred(const Model& model, const State& state, const wall::Point& point);
+
+// The planned line is a circle on the first body, `surgeon.edge_distance` from its rim, with the plan "excision".
+constexpr float kOffLine = 2e-3f;       // [m] farther from the line is a fault (chosen)
+constexpr float kBesideSuture = 1e-3f;  // [m] from a hole with thread, likewise
+constexpr float kPulledForce = 1;       // [N] on the hand, likewise
+constexpr float kCharred = 0.5f;        // of Excision::burnt, likewise
 
 // --- sim/cut_picture -----------------------------------------------------------------------------------------------------
-// Once per tick and after a load: a new picture if the shape of the drawn wall has changed.
+// Once per tick and after a load: notes what a new picture shows if the shape of the drawn wall has changed. The picture is
+// made by the first who looks at it (exchange/divided_picture).
 void renew_cut_picture(const Model& model, State& state);
-// Adds copies of columns, rotations and the picture to a snapshot of the tissue as built.
+// Adds copies of columns, rotations, scars and the picture to a snapshot of the tissue as built.
 void publish_cut(const Model& model, const State& state, Snapshot& snapshot);
 
 }  // namespace catgut

@@ -268,6 +268,8 @@ void show_bites(const Model& model, State& state, SutureContext& sewing, const P
       suture.open.push_back({which, NeedlePhase::tip_in});
       report(EventKind::tip_entered, which, portable::acos(std::clamp(-dot(heading, normal), -1.0f, 1.0f)),
              position_of(bite.entry.point, x));
+      if (is_charred(model, state, p.entry))
+        sewing.report_fault(p.needle, Fault::bite_in_char, kNoHand, which, position_of(bite.entry.point, x));
     }
     if (suture.open.empty()) continue;
     if (p.events & physical::kLeft) {
@@ -277,6 +279,8 @@ void show_bites(const Model& model, State& state, SutureContext& sewing, const P
       bite.has_exit = true;
       newest.phase = NeedlePhase::through;
       report(EventKind::tip_exited, newest.bite, bite.depth, position_of(bite.exit.point, x));
+      if (is_charred(model, state, p.exit))
+        sewing.report_fault(p.needle, Fault::bite_in_char, kNoHand, newest.bite, position_of(bite.exit.point, x));
     }
     if (p.events & physical::kWithdrawn) {
       const uint32_t which = suture.open.back().bite;
@@ -403,6 +407,7 @@ void step_physical(const Model& model, State& state, const TickInput& given, Job
   show_grips(model, state, sewing);
   show_bites(model, state, sewing, k);
   show_points(model, state);
+  watch_pulls(model, state);
   renew_cut_picture(model, state);
   remember_hands(state, input);
   ++state.tick;

@@ -159,8 +159,9 @@ void publish(const Model& built, const State& state, Snapshot& out) {
   const SolverState& s = state.solver;
   out.tick = state.tick;
   out.time_s = static_cast<double>(state.tick) / model.scene.solver.tick_rate;
-  out.topology = {state.topology.version, model.pieces, nullptr};
-  if (state.divided) out.topology.picture = {state.divided, &state.divided->picture};
+  out.topology = {state.topology.version, model.pieces, {}};
+  if (state.divided)
+    out.topology.picture = DividedPicture(std::shared_ptr<const PictureModel>(state.divided, &state.divided->picture));
   out.particle.resize(m.count);
   for (uint32_t i = 0; i < m.count; ++i) out.particle[i] = xyz(s.x[i]);
   out.rotation.resize(m.tissue);
@@ -178,6 +179,7 @@ void publish(const Model& built, const State& state, Snapshot& out) {
   out.closure = 0;
   for (const ClosurePlan& plan : state.plan) out.closure = std::max(out.closure, plan.progress);
   out.event = state.event.list;
+  out.scar.clear();
   if (state.physical.cutting.picture) publish_cut(model, state, out);
   if (!model.source.empty()) use_public_numbers(built, model, out);
 }

@@ -25,10 +25,11 @@ struct VertexLook {
   float uv1[2];
 };
 
-// Slowly changing attributes of a vertex, each 0..255: ischemia by tension, and blood on
-// it. Meshes with these are created with `live`.
+// Slowly changing attributes of a vertex, each 0..255: ischemia by tension, blood on it, and char.
+// Meshes with these are created with `live`.
 struct VertexLive {
-  uint8_t blanched = 0, bloody = 0, spare[2] = {};
+  uint8_t blanched = 0, bloody = 0, charred = 0;
+  uint8_t listed = 0;  // 1: in TissueView::pressed; the shader does not read it
 };
 
 struct GpuMesh {

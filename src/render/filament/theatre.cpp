@@ -129,7 +129,7 @@ void Theatre::follow_topology(const TopologyView& topology) {
   for (TissueView& t : tissue_) destroy_mesh(engine_, *scene_, t.gpu);
   tissue_.clear();
   for (const VisibleMesh& mesh : (divided_ ? *divided_ : model_).body)
-    tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_));
+    tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_, sky_known_));
   // They refer to vertices of the old surface.
   thread_.on_tissue.clear();
   mark_.on_tissue.clear();
@@ -219,7 +219,7 @@ void Theatre::make_materials() {
 void Theatre::make_stage() {
   std::vector<Vec3> all;
   for (const VisibleMesh& mesh : model_.body) {
-    tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_));
+    tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_, sky_known_));
     all.insert(all.end(), mesh.position.begin(), mesh.position.end());
   }
   if (!model_.scenery.empty()) {

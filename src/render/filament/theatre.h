@@ -72,8 +72,9 @@ class Theatre {
   void show_markers(const Snapshot& snapshot, bool wanted);
 
   float coarse_ = 1;
-  const PictureModel model_;                     // a copy: the theatre outlives its source
-  std::shared_ptr<const PictureModel> divided_;  // of the snapshot that was shown last; null: model_
+  const PictureModel model_;  // a copy: the theatre outlives its source
+  SkyCache sky_known_;
+  DividedPicture divided_;  // of the snapshot that was shown last; false: model_
   filament::Engine& engine_;
   filament::Scene* scene_ = nullptr;
   std::vector<Eye> eye_;

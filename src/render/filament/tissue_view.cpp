@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <unordered_map>
 
+#include "core/hash.h"
+
 namespace catgut {
 namespace {
 
@@ -72,7 +74,7 @@ Unwrapped unwrap(const VisibleMesh& mesh) {
 
 // Ambient visibility of each vertex at rest: rays through a coarse grid of occupied cells. The deformed organ
 // keeps it; its purpose is an inside darker than the rim, at every quality.
-std::vector<float> baked_sky(const VisibleMesh& mesh) {
+std::vector<float> baked_sky(const VisibleMesh& mesh, SkyCache& known) {
   std::vector<float> sky(mesh.position.size(), 1);
   if (mesh.position.empty()) return sky;
   const Box3 box = bounds(mesh.position);
@@ -96,6 +98,12 @@ std::vector<float> baked_sky(const VisibleMesh& mesh) {
     ray[size_t(i)] = {r * std::cos(a), y, r * std::sin(a)};
   }
   for (size_t v = 0; v < sky.size(); ++v) {
+    const std::array<Vec3, 2> key{mesh.position[v], mesh.normal[v]};
+    const auto [at, fresh] = known.try_emplace(hash_bytes(key.data(), sizeof key, 1), 0.0f);
+    if (!fresh) {
+      sky[v] = at->second;
+      continue;
+    }
     float seen = 0, all = 0;
     for (const Vec3 d : ray) {
       const float weight = dot(d, mesh.normal[v]);
@@ -107,7 +115,7 @@ std::vector<float> baked_sky(const VisibleMesh& mesh) {
       seen += open ? weight : 0;
     }
     // Surfaces that face the ground still receive light reflected by the drape.
-    sky[v] = all > 0 ? 0.15f + 0.85f * seen / all : 0.3f;
+    sky[v] = at->second = all > 0 ? 0.15f + 0.85f * seen / all : 0.3f;
   }
   return sky;
 }
@@ -115,6 +123,7 @@ std::vector<float> baked_sky(const VisibleMesh& mesh) {
 // Position of a vertex of the cut between the organ's outside (0) and its inside (1), which selects the visible
 // layer of the wall.
 std::vector<float> baked_depth(const VisibleMesh& mesh) {
+  if (!mesh.through.empty()) return mesh.through;
   std::vector<float> depth(mesh.position.size(), 0);
   std::vector<Vec3> outside, inside;
   std::vector<size_t> cut;
@@ -199,9 +208,33 @@ void reach_from(TissueView& view, Vec3 point, std::vector<Reached>& out) {
   }
 }
 
+// Char where a pen has been.
+bool scorch(TissueView& view, const Snapshot& snapshot) {
+  bool changed = false;
+  for (size_t i = 0; i < view.scarred.size(); ++i) {
+    const uint32_t v = view.scarred[i], scar = view.mesh->scar[view.source[v]];
+    const uint8_t burnt = scar < snapshot.scar.size() ? snapshot.scar[scar].burnt : 0;
+    changed = changed || view.live[v].charred != burnt;
+    view.live[v].charred = burnt;
+  }
+  return changed;
+}
+
+// A groove goes down into the wall, across the surface.
+void carve(TissueView& view, const Motions& motion, const Snapshot& snapshot, const Surface& surface) {
+  for (const uint32_t v : view.scarred) {
+    const uint32_t scar = view.mesh->scar[view.source[v]];
+    if (scar >= snapshot.scar.size() || snapshot.scar[scar].depth == 0) continue;
+    if (view.mesh->layer[view.source[v]] == TissueLayer::cut_edge) continue;
+    const Vec3 normal = rotate(follow(view.vertex[v], motion.of).frame, {0, 0, 1});
+    view.drawn[v] -= normal * (1e-5f * float(snapshot.scar[scar].depth));
+    surface.position[v] = view.drawn[v];
+  }
+}
+
 // Tension whitens the tissue round every suture point, gradually over several frames, like blood flow.
 void blanch(filament::Engine& engine, TissueView& view, const Snapshot& snapshot) {
-  bool changed = false;
+  bool changed = scorch(view, snapshot);
   const bool first = !view.shown;
   view.shown = true;
   view.reached.resize(snapshot.suture.size());
@@ -221,8 +254,8 @@ void blanch(filament::Engine& engine, TissueView& view, const Snapshot& snapshot
   for (const uint32_t v : view.pressed) view.press[v] = 0;
   const auto add = [&](const std::vector<Reached>& reached, float white) {
     for (const Reached& r : reached) {
-      if (!view.live[r.vertex].spare[0]) view.pressed.push_back(r.vertex);
-      view.live[r.vertex].spare[0] = 1;  // it is in the list
+      if (!view.live[r.vertex].listed) view.pressed.push_back(r.vertex);
+      view.live[r.vertex].listed = 1;
       view.press[r.vertex] = std::max(view.press[r.vertex], r.weight * white);
     }
   };
@@ -241,7 +274,7 @@ void blanch(filament::Engine& engine, TissueView& view, const Snapshot& snapshot
   }
   std::erase_if(view.pressed, [&](uint32_t v) {
     if (view.press[v] > 0 || view.live[v].blanched > 0) return false;
-    view.live[v].spare[0] = 0;
+    view.live[v].listed = 0;
     return true;
   });
   if (changed) set_live(engine, view.gpu, view.live);
@@ -298,7 +331,7 @@ void pucker(TissueView& view, const Motions& motion, const Surface& surface) {
 }  // namespace
 
 TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, const VisibleMesh& mesh,
-                            filament::MaterialInstance* material) {
+                            filament::MaterialInstance* material, SkyCache& known) {
   TissueView view;
   view.mesh = &mesh;
   const Unwrapped flat = unwrap(mesh);
@@ -321,7 +354,7 @@ TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, co
     if ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) < 0)
       for (const uint32_t v : t) view.mirrored[v] = 1;
   }
-  const std::vector<float> sky = baked_sky(mesh), depth = baked_depth(mesh);
+  const std::vector<float> sky = baked_sky(mesh, known), depth = baked_depth(mesh);
   std::vector<VertexLook> look(n);
   view.vertex.resize(n);
   for (size_t i = 0; i < n; ++i) {
@@ -336,6 +369,8 @@ TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, co
   view.drawn = view.position;
   view.live.resize(n);
   view.press.assign(n, 0);
+  for (uint32_t i = 0; i < uint32_t(n); ++i)
+    if (flat.source[i] < mesh.scar.size() && mesh.scar[flat.source[i]] != kNoScar) view.scarred.push_back(i);
   view.gpu = make_mesh(engine, scene, look, flat.triangle, material, true, true);
   return view;
 }
@@ -353,6 +388,7 @@ void move_tissue(filament::Engine& engine, TissueView& view, const Motions& moti
   view.drawn = view.position;
   find_gathers(view, snapshot);
   pucker(view, motion, surface);
+  carve(view, motion, snapshot, surface);
   // Of the particles, which are fewer: no vertex is farther from them than this.
   constexpr Vec3 margin{0.006f, 0.006f, 0.006f};
   const Box3 box = bounds(motion.seen);

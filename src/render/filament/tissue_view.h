@@ -3,6 +3,7 @@
 // Reads the model's VisibleMesh once and a snapshot per frame; writes its own buffers.
 #pragma once
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "exchange/picture.h"
@@ -30,7 +31,8 @@ struct TissueView {
   std::vector<Gather> gather;
   std::vector<PackedFrame> frame;
   std::vector<VertexLive> live;
-  std::vector<float> press;  // per vertex, of this frame
+  std::vector<float> press;       // per vertex, of this frame
+  std::vector<uint32_t> scarred;  // vertices with a place in Snapshot::scar
   // Where thread passes through the wall, found on first use: by suture and number of the suture point.
   std::vector<std::vector<std::vector<Reached>>> reached;  // per suture
   std::vector<uint32_t> pressed;                           // vertices with a nonzero `press`
@@ -38,8 +40,10 @@ struct TissueView {
   GpuMesh gpu;
 };
 
+// Ambient visibility by position and normal. A cut renews the surface many times a second, and leaves most of it as it was.
+using SkyCache = std::unordered_map<uint64_t, float>;
 TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, const VisibleMesh& mesh,
-                            filament::MaterialInstance* material);
+                            filament::MaterialInstance* material, SkyCache& known);
 void move_tissue(filament::Engine& engine, TissueView& view, const Motions& motion, const Snapshot& snapshot);
 
 // The drawn vertex nearest to a point, among all bodies; -1: none within `reach` [m].
