@@ -17,8 +17,13 @@ enum class CommandKind : uint8_t {
   unpark,      // the empty hand takes the parked instrument `argument` in its present pose
   new_suture,  // replaces suture `argument` by a new needle and thread
   cut,         // cuts the thread of suture `argument` at the jaws
+  // Physical mechanics: the clamp on the fixed end of bowel `argument` moves during this tick, toward its opening and back to
+  // where the scene has it.
+  advance_clamp,
+  retract_clamp,
   count_
 };
+constexpr float kClampSpeed = 0.004f, kClampRange = 0.005f;  // [m/s], [m]
 
 struct Command {
   CommandKind kind = CommandKind::none;

@@ -77,6 +77,8 @@ void lay_down(const Model& model, State& state, size_t hand) {
 
 bool carry_out(const Model& model, State& state, const TickInput& input, const Command& c) {
   if (c.kind == CommandKind::cut || c.kind == CommandKind::new_suture) return true;  // stages of their own
+  if (c.kind == CommandKind::advance_clamp || c.kind == CommandKind::retract_clamp)  // before each step
+    return has_clamp(model, c.argument);
   const size_t hand = c.hand, i = c.argument;
   if (hand >= kMaxHands || !input.hand[hand].connected) return false;
   HandState& h = state.hand[hand];

@@ -72,6 +72,8 @@ PhysicalState start_physical(const Model& model, const SolverState& solver);
 
 // --- running -----------------------------------------------------------------------------------------------------------
 void step_physical(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times);
+// Whether body `body` is a bowel end whose fixed end a command can move.
+bool has_clamp(const Model& model, size_t body);
 // After a load: what follows from the cuts of the wall.
 void restore_physical(const Model& model, PhysicalState& state);
 // Whether a loaded state has sizes and indices that a step can work with.

@@ -169,13 +169,14 @@ TEST(PhysicalScene, jaws_carry_thread_and_its_length_stays) {
 }
 
 // Save, load elsewhere and continue, with another number of workers: the same as the run itself. With an instrument that
-// presses the wall and drags thread, so that every list of contacts is in use.
+// presses the wall and drags thread, so that every list of contacts is in use, while a clamp moves.
 TEST(PhysicalScene, a_loaded_state_continues_to_the_bit) {
   Field f;
   StatePtr other = initial_state(*f.model);
   Jobs two(2);
   f.move_right(f.top + Vec3{0, 0.004f, 0}, 0.2f, 1);
   f.move_right(f.top - Vec3{0, 0.002f, 0}, 0.2f, 1);
+  f.input.commands.push({CommandKind::advance_clamp, 2, 0});
   for (int i = 0; i < 40; ++i) {
     f.input.hand[0].pose.p.x += 0.0003f;
     f.input.hand[0].jaw = i < 20 ? 1.0f : 0.0f;
@@ -231,6 +232,50 @@ TEST(PhysicalScene, a_needle_leads_its_thread_through_both_walls) {
   EXPECT_EQ(seen.active().suture_point.size(), 4u);
   EXPECT_EQ(state->physical.world.thread.eyelet.size(), 4u) << "the thread runs through all holes at the end";
   for (const uint8_t broken : seen.active().thread_cut) EXPECT_FALSE(broken);
+}
+
+// [m] between the outer edges of the two bowel ends along x, at the top of their rims (z = 0).
+float gap_at_top(const PictureModel& picture, const Snapshot& seen) {
+  float x[2];
+  for (const size_t k : {0u, 1u}) {
+    Vec3 behind{0, 0, -1}, front{0, 0, 1};
+    for (const uint32_t i : picture.rim[k]) {
+      const Vec3 p = seen.particle[i];
+      if (p.y < 0) continue;
+      if (p.z <= 0 && p.z > behind.z) behind = p;
+      if (p.z > 0 && p.z < front.z) front = p;
+    }
+    x[k] = behind.x + (front.x - behind.x) * -behind.z / (front.z - behind.z);
+  }
+  return x[1] - x[0];
+}
+
+TEST(PhysicalScene, clamps_bring_the_ends_together_and_go_back_to_where_they_were) {
+  Field f;
+  const PictureModel picture = picture_model(*f.model);
+  const auto clamps = [&](CommandKind kind, float seconds) {
+    f.input.commands.clear();
+    for (const uint16_t body : {0, 1}) f.input.commands.push({kind, 2, body});
+    for (int i = 0; i < static_cast<int>(std::lround(seconds / f.model->dt)); ++i) {
+      f.tick();
+      for (const Event& e : f.seen.event) EXPECT_NE(e.kind, EventKind::instrument_refused);
+    }
+    f.input.commands.clear();
+  };
+  const float before = gap_at_top(picture, f.seen);
+  const uint32_t clamped = static_cast<uint32_t>(f.nearest_tissue(f.scene.body[1].position + Vec3{0.038f, 0.0125f, 0}));
+  const Vec3 start = f.seen.particle[clamped];
+  clamps(CommandKind::advance_clamp, 0.25f);
+  EXPECT_NEAR(distance(f.seen.particle[clamped], start), 0.25f * kClampSpeed, 2e-5f);
+  for (int i = 0; i < 20; ++i) f.tick();
+  EXPECT_NEAR(distance(f.seen.particle[clamped], start), 0.25f * kClampSpeed, 2e-5f) << "it stays where it was moved to";
+  EXPECT_NEAR(before - gap_at_top(picture, f.seen), 2 * 0.25f * kClampSpeed, 1e-4f);
+  clamps(CommandKind::retract_clamp, 0.4f);
+  EXPECT_LT(distance(f.seen.particle[clamped], start), 1e-6f) << "never farther than where the scene has it";
+  f.input.commands.push({CommandKind::advance_clamp, 2, 7});
+  f.tick();
+  ASSERT_FALSE(f.seen.event.empty());
+  EXPECT_EQ(f.seen.event.back().kind, EventKind::instrument_refused) << "there is no body 7";
 }
 
 // Two throws with real instruments: what the hands wound, drew and pulled is a square knot. It holds no wound: see
