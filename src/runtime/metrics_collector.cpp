@@ -50,7 +50,7 @@ double tail_asymmetry(const Snapshot& seen, size_t which) {
 }  // namespace
 
 MetricsCollector::MetricsCollector(const SceneSpec& scene, const PictureModel& picture)
-    : scene_(scene), suture_(picture.suture), tail_asymmetry_(picture.suture.size(), -1) {}
+    : scene_(scene), suture_(picture.suture), rim_(picture.rim), tail_asymmetry_(picture.suture.size(), -1) {}
 
 void MetricsCollector::open() { opening_wanted_ = true; }
 
@@ -70,6 +70,29 @@ void MetricsCollector::tick(const Snapshot& seen) {
   float& worst = passing ? length_error_passing_ : length_error_;
   worst = std::max(worst, error);
   order_errors_ = std::max(order_errors_, count_order_errors(seen));
+  for (const SutureView& suture : seen.suture)
+    for (const float tension : suture.thread_tension) thread_force_ = std::max(thread_force_, tension);
+  const bool held = std::any_of(seen.tool.begin(), seen.tool.end(), [](const ToolView& t) { return t.held != Held::nothing; });
+  if (held_ && !held) let_go_s_ = seen.time_s, let_go_gap_ = wound_gap(seen);
+  held_ = held;
+}
+
+// Where the active suture crosses from one wall to the other: from the first edge's point that is nearest to the stitch to the
+// other edge. Edges are polygons through the outer particles of a rim.
+double MetricsCollector::wound_gap(const Snapshot& seen) const {
+  const std::vector<SuturePointView>& point = seen.active().suture_point;
+  if (rim_.size() != 2 || point.empty() || point.front().wall == point.back().wall) return 0;
+  const auto nearest = [&](const std::vector<uint32_t>& rim, Vec3 p) {
+    Vec3 best = seen.particle[rim[0]];
+    for (size_t i = 0; i < rim.size(); ++i) {
+      const Vec3 a = seen.particle[rim[i]], way = seen.particle[rim[(i + 1) % rim.size()]] - a;
+      const Vec3 q = a + way * std::clamp(dot(p - a, way) / std::max(1e-12f, length2(way)), 0.0f, 1.0f);
+      if (distance(q, p) < distance(best, p)) best = q;
+    }
+    return best;
+  };
+  const Vec3 a = nearest(rim_[0], 0.5f * (point.front().position + point.back().position));
+  return distance(a, nearest(rim_[1], a));
 }
 
 void MetricsCollector::measure_seam(const Snapshot& last, std::map<std::string, double>& v) const {
@@ -161,6 +184,10 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   v["last_knot_throws"] = counts_.last_knot_throws;
   v["sutures"] = static_cast<double>(last.settled.size() + counts_.tied());
   measure_seam(last, v);
+  v["wound_gap"] = wound_gap(last);
+  v["wound_gap_change"] = held_ ? 0 : wound_gap(last) - let_go_gap_;
+  v["hands_off"] = held_ ? 0 : last.time_s - let_go_s_;
+  v["thread_force"] = thread_force_;
   v["needle_detached"] = static_cast<double>(off);
   double& held = v["held_ends"] = 0;
   for (const ToolView& tool : last.tool) held = std::max(held, static_cast<double>(tool.held_strands));

@@ -69,12 +69,17 @@ class MetricsCollector {
  private:
   float thread_length_error(const Snapshot& seen) const;
   uint32_t count_order_errors(const Snapshot& seen);
+  double wound_gap(const Snapshot& seen) const;
   void measure_seam(const Snapshot& last, std::map<std::string, double>& value) const;
 
   const SceneSpec& scene_;
   const std::vector<SuturePicture> suture_;
+  const std::vector<std::vector<uint32_t>> rim_;
   std::vector<uint8_t> seen_slot_;
   bool opening_wanted_ = true, valid_ = true;
+  bool held_ = false;                     // by an instrument, in the last tick
+  double let_go_s_ = 0, let_go_gap_ = 0;  // when the last instrument let go
+  float thread_force_ = 0;                // [N]
   float opening_at_start_ = 0, length_error_ = 0, length_error_passing_ = 0;
   uint32_t order_errors_ = 0, contacts_ = 0;
   Counts counts_;                       // a Snapshot does not list baked knots
