@@ -321,6 +321,13 @@ TEST_F(Window, a_recording_is_looked_at_and_what_was_sewn_is_shown) {
 }
 
 // A setting changed in the window persists, and an invalid file does not prevent the start.
+// The error ends the program before the first frame, while the driver still uploads the glyphs.
+TEST_F(Window, an_unknown_surgeon_is_refused_in_one_line) {
+  start({"play", "stay", "--surgeon", "nonsense", "--size", "640x360", "--quality", "low"});
+  EXPECT_EQ(exit_code(), 2) << said();
+  EXPECT_NE(said().find("nonsense"), std::string::npos) << said();
+}
+
 TEST_F(Window, settings_are_kept) {
   const fs::path file = folder_ / "catgut" / "settings.toml", events = folder_ / "events";
   fs::create_directories(file.parent_path());

@@ -53,6 +53,8 @@ class FilamentWindow final : public WindowRenderer {
   }
 
   ~FilamentWindow() override {
+    // The driver may still read the glyphs, which the panels own: before the first frame nothing has waited for it.
+    engine_->flushAndWait();
     panels_.reset();
     theatre_.reset();
     engine_->destroy(panel_view_);
