@@ -14,9 +14,11 @@ namespace catgut {
 namespace {
 
 constexpr int kBitesPerThread = 10;
-constexpr float kRow = 0.004f;         // [m] between two rows of bites
-constexpr float kStaysApart = 0.012f;  // [m] round the bowel, between stay sutures
-constexpr float kPull = 1.7f;          // [N] on each strand of a physical throw: below what the bites bear
+constexpr float kRow = 0.004f;          // [m] between two rows of bites
+constexpr float kStaysApart = 0.012f;   // [m] round the bowel, between stay sutures
+constexpr float kPull = 1.7f;           // [N] on each strand of a physical throw: below what the bites bear
+constexpr float kApproximate = 0.002f;  // [m] of each clamp: the edges touch after 1.5 mm
+constexpr int kThrows = 2;
 constexpr float kFreeDepth = 0.0045f;  // [m] depth below the rims of a sweep through two layers
 
 // Depth of the needle's circle below a surface of radius `curved` [m] whose chord is `length`.
@@ -230,13 +232,16 @@ Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
-// The same, tied with a square knot of two single throws.
+// The same, tied with a square knot of single throws while clamps hold the ends together.
 Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan = interrupted_plan(picture, skill);
   plan.pull = kPull;
+  plan.approximate = kApproximate;
   plan.task.pop_back();
-  for (int i = 0; i < 2; ++i) add(plan, TaskKind::throw_, 1, 1);
-  add(plan, TaskKind::rest);
+  add(plan, TaskKind::approximate);
+  for (int i = 0; i < kThrows; ++i) add(plan, TaskKind::throw_, 1, 1);
+  add(plan, TaskKind::release);
+  add(plan, TaskKind::leave);
   return plan;
 }
 
@@ -339,9 +344,10 @@ std::span<const char* const> plan_names() {
 }
 
 std::span<const char* const> task_names() {
-  static constexpr const char* kName[] = {"pick_up",    "bite",      "pull_tail", "pull_slack",  "pull_together", "hand_back",
-                                          "regrip",     "draw",      "throw",     "lock_strand", "cut_long",      "cut_tail",
-                                          "cut_needle", "take_both", "discard",   "fresh",       "rest"};
+  static constexpr const char* kName[] = {"pick_up",   "bite",        "pull_tail",  "pull_slack", "pull_together",
+                                          "hand_back", "regrip",      "draw",       "throw",      "lock_strand",
+                                          "cut_long",  "cut_tail",    "cut_needle", "take_both",  "discard",
+                                          "fresh",     "approximate", "release",    "leave",      "rest"};
   static_assert(std::size(kName) == static_cast<size_t>(TaskKind::rest) + 1);
   return kName;
 }

@@ -47,6 +47,9 @@ enum class TaskKind {
   take_both,      // the needle holder takes both strands of the knot between its jaws
   discard,        // the forceps lays a needle that was cut off beside the field
   fresh,          // a new suture
+  approximate,    // the assistant brings the clamped bowel ends together, so that a knot is tied without tension
+  release,        // and moves the clamps back
+  leave,          // the forceps lays the needle down; no hand holds anything, and the tissue settles
   rest            // hands off; the tissue settles
 };
 
@@ -66,6 +69,7 @@ struct Plan {
   // Where the needle holder grips the needle, as a fraction of its arc from the swage; how far beyond the bite a sweep turns
   // the needle before the forceps takes the tip [rad].
   float driver_at = 0.35f, beyond = 0.72f;
+  float approximate = 0;  // [m] travel of each clamp
   float pull = 0;  // [N] of each strand when a throw is pulled tight, with physical mechanics; 0: throws of guided mechanics
 };
 

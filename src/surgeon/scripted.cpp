@@ -227,6 +227,15 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
     case TaskKind::fresh:
       doing_ = "load a new suture";
       return fresh(seen);
+    case TaskKind::approximate:
+      doing_ = "bring the bowel ends together";
+      return move_clamps(true);
+    case TaskKind::release:
+      doing_ = "move the clamps back";
+      return move_clamps(false);
+    case TaskKind::leave:
+      doing_ = "hands away";
+      return leave(seen);
     case TaskKind::rest:
       doing_ = "hold";
       // Without pulling: a suture is measured at rest.

@@ -139,6 +139,11 @@ class Scripted final : public Surgeon {
   // The needle's own strand is laid between the needle holder's jaws, past the loop.
   bool take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again);
 
+  // --- the end of a stitch with physical mechanics ----------------------------------------------------------------------
+  bool move_clamps(bool advance);
+  // The needle is laid beside the bowel as far as its strand reaches; then both hands are away for the time of a measurement.
+  bool leave(const Snapshot& seen);
+
   // --- both hands on the thread -----------------------------------------------------------------------------------------
   // The needle holder grasps the tail, then both pull until everything is closed.
   bool draw(const Snapshot& seen);

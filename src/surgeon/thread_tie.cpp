@@ -20,7 +20,15 @@ constexpr float kLoose = 0.95f;      // of the strand that is left: nearly taut
 constexpr float kWinding = 0.25f;    // [N] above which the winding hand yields
 constexpr float kTailEnd = 6e-3f;    // [m] from the tail's end, where it is taken
 constexpr float kHalfOpen = 0.8f;    // of the jaws, to take the tail
-constexpr float kLow = 4e-3f;        // [m] above the stitch, where strands are pulled
+constexpr float kNarrow = 0.5f;      // of the jaws with a turn on them: in a wider gap it falls between them, near the hinge
+constexpr float kTaut = 1.2f;        // [N] above which a strand gives no more thread to crossing hands
+constexpr float kReach = 0.85f;      // of the tail's length
+constexpr float kSlideOff = 1.4f;    // [s]
+// Of the strand's length: where it is wound. Lower, the needle that goes round would meet the tail, which stands up from a
+// knot.
+constexpr float kHigh = 0.62f;
+constexpr float kDrawn = 0.5f;  // of the strand's length: height to which the tail is drawn at most
+constexpr float kLow = 4e-3f;   // [m] above the stitch, where strands are pulled
 
 Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
 // Unit, across the shaft; 0: toward the viewer, pi/2: above.
@@ -91,7 +99,7 @@ void ThreadTie::begin(const Snapshot& seen, int wraps, int sense, bool first) {
   const size_t last = seen.active().thread_order.size() - 1;
   strand_ = length_between(seen, last_point_node(seen), last) - (first ? 0.0f : 3e-3f);
   tail_ = length_between(seen, 0, first_point_node(seen)) - (first ? 0.0f : 3e-3f);
-  height_ = (wraps > 1 ? 0.42f : 0.5f) * strand_;
+  height_ = (wraps > 1 ? 0.42f : kHigh) * strand_;
   go(seen, first ? to_tail : to_work);
 }
 
@@ -176,9 +184,10 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
     case open:
       break;
     case draw: {
-      drawn_ = 0;
-      const Vec3 to = work + shaft * 34e-3f;
-      tip_from_ = tip_, tip_to_ = to;
+      drawn_ = slid_ = 0;
+      // Out of the turn, no farther than the tail reaches.
+      const Vec3 out = around(side_, 0.5f * kPi) * (kDrawn * strand_) + shaft * 16e-3f;
+      tip_from_ = tip_, tip_to_ = origin_ + normalized(out) * std::min(length(out), kReach * (tail_ - kTailEnd));
       break;
     }
     case cross_up:
@@ -269,7 +278,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     }
     case open:
-      if (move_jaw(holder, kHalfOpen, dt)) go(seen, fetch);
+      if (move_jaw(holder, std::min(kHalfOpen, kNarrow + 0.1f * static_cast<float>(misses_)), dt)) go(seen, fetch);
       break;
     case fetch: {
       const Vec3 goal = tail_node(seen, kTailEnd + 2e-3f * static_cast<float>(misses_)), way = goal - tip_;
@@ -285,29 +294,29 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     }
     case draw: {
-      const float far = distance(tip_from_, tip_to_);
-      if (tail_felt_ > 2 * kWinding && drawn_ > 0.5f * far) {
-        go(seen, cross_up);
-        break;
-      }
+      const float far = std::max(1e-3f, distance(tip_from_, tip_to_));
+      const bool taut = tail_felt_ > 2 * kWinding;
       const float speed =
           std::min(0.7f * how_.speed, 0.02f + 4 * (far - drawn_)) * std::clamp(1.5f - tail_felt_ / 0.1f, 0.15f, 1.0f);
-      drawn_ += speed * dt;
-      const float e = std::min(1.0f, drawn_ / far);
-      tip_ = lerp(tip_from_, tip_to_, e);
+      if (!taut) drawn_ = std::min(far, drawn_ + speed * dt);
+      tip_ = lerp(tip_from_, tip_to_, drawn_ / far);
+      // The winding hand pulls the turn off the jaws, which have gone on.
+      slid_ = std::min(1.0f, slid_ + dt / kSlideOff);
       const float turn = sense_ * 0.5f * kPi;
-      const Vec3 middle = tip_from_ + shaft * kWindAt, past = middle - shaft * 14e-3f + Vec3{0, 8e-3f, 0};
+      const Vec3 middle = tip_from_ + shaft * kWindAt, past = middle - shaft * 26e-3f + Vec3{0, 8e-3f, 0};
       if (felt_ > 0.1f) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
       else if (felt_ < 0.01f) radius_ = std::min(0.6f * strand_, radius_ + 0.02f * dt);
-      hand_ = lerp(middle, past, e) + around(side_, angle_ + turn * e) * radius_;
-      if (drawn_ >= far) go(seen, cross_up);
+      hand_ = lerp(middle, past, slid_) + around(side_, angle_ + turn * slid_) * radius_;
+      if (slid_ >= 1 && (taut || drawn_ >= far || waited_ > 5)) go(seen, cross_up);
       break;
     }
     case cross_up:
-      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f))) go(seen, cross_down);
+      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f)) || std::max(felt_, tail_felt_) > kTaut)
+        go(seen, cross_down);
       break;
     case cross_down:
-      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f)) || std::min(felt_, tail_felt_) > 0.5f)
+      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f)) || std::min(felt_, tail_felt_) > 0.5f ||
+          std::max(felt_, tail_felt_) > kTaut)
         go(seen, pull);
       break;
     case pull: {

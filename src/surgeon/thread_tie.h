@@ -83,7 +83,7 @@ class ThreadTie {
   float angle_from_ = 0, angle_to_ = 0, done_ = 0, seconds_ = 0;
   // Winding.
   float strand_ = 0, tail_ = 0, height_ = 0, angle_ = 0, turned_ = 0, radius_ = 0, slack_ = 0;
-  float felt_ = 0, tail_felt_ = 0, pulled_ = 0, steady_ = 0, drawn_ = 0;
+  float felt_ = 0, tail_felt_ = 0, pulled_ = 0, steady_ = 0, drawn_ = 0, slid_ = 0;
 };
 
 }  // namespace catgut

@@ -17,7 +17,12 @@ constexpr float kTailAside = 0.030f;          // [m] from the stitch, where the 
 constexpr Vec3 kAside{-0.10f, 0.03f, 0.05f};  // [m] from the center of the field, where a used needle is put down
 constexpr float kTieCrossing = 0.3f;          // fraction of the path of crossed hands, forward and backward
 constexpr float kThrowComesDown = 3;          // [s] in which a throw reaches the tissue; most take less than one
-constexpr float kTyingAt = 0.12f;             // position on the needle's arc: behind the swage
+constexpr float kHandsAway = 5;               // [s]
+constexpr float kSlackStrand = 0.8f;          // of the strand's length: where its needle is laid down
+constexpr float kTautStrand = 0.2f;           // [N]
+constexpr Vec3 kLaidDown{-0.6f, -0.3f, 0.75f};
+constexpr uint8_t kAssistant = 2;
+constexpr float kTyingAt = 0.12f;  // position on the needle's arc: behind the swage
 
 }  // namespace
 
@@ -229,6 +234,36 @@ bool Scripted::tie_thread(const Task& task, const Snapshot& seen) {
   doing_ = "throw: " + thread_tie_->doing();
   if (over && thread_tie_->failed()) gave_up_ = true;
   return over;
+}
+
+bool Scripted::move_clamps(bool advance) {
+  const CommandKind kind = advance ? CommandKind::advance_clamp : CommandKind::retract_clamp;
+  for (uint16_t body = 0; body < 2; ++body) commands_.push({kind, kAssistant, body});
+  // The clamps stop by themselves where the scene had them; their way there is a little longer than their way in.
+  return waited_ > (advance ? 1.0f : 1.2f) * plan_.approximate / kClampSpeed;
+}
+
+bool Scripted::leave(const Snapshot& seen) {
+  enum { lower, open, away };
+  const Vec3 from = stitch(seen);
+  switch (stage_) {
+    case lower: {
+      const size_t last = seen.active().thread_order.size() - 1;
+      const float reach = kSlackStrand * length_between(seen, last_point_node(seen), last);
+      const Vec3 beside = normalized(kLaidDown) * reach;
+      const float gently = std::clamp(1 - 4 * needle_tension(seen), 0.0f, 1.0f);
+      const bool there = carry_swage(seen, from + beside, std::max(1e-3f, gently * skill_.speed));
+      if (there || needle_tension(seen) > kTautStrand || !patience(4)) go(open);
+      return false;
+    }
+    case open:
+      if (jaw(kForceps, 1)) go(away);
+      return false;
+    default:
+      rest_aside(seen, kNeedleHolder);
+      rest_aside(seen, kForceps);
+      return waited_ > kHandsAway;
+  }
 }
 
 bool Scripted::take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again) {
