@@ -69,13 +69,10 @@ class AtTheWindow : public WorkQueue {
   int width = 320, height = 200;                                  // [pixels]
   std::string lesson = "first_stitch";                            // of sit(..., true)
   const ProcedureRun& lesson_run() const { return lesson_run_; }  // after sit()
-  std::function<void(PlayOptions&)> prepare;                      // changes the options of sit()
-  std::function<void()> arrive;                                   // what the user does before there is a field
 
   // Opens the window and performs `work`; true when it was completed within the time limit.
   bool sit(const std::function<void()>& work, bool teach = false) {
     std::thread person([&] {
-      if (arrive) arrive();
       if (see(3)) work();
       gone_ = true;
     });
@@ -106,7 +103,6 @@ class AtTheWindow : public WorkQueue {
       return !gone_ && Clock::now() < until_;
     };
     options.on_event = [&](const Event& e) { ++happened_[static_cast<size_t>(e.kind)]; };
-    if (prepare) prepare(options);
     const int code = play(options);
     {
       const std::lock_guard lock(mutex_);
@@ -182,14 +178,6 @@ class XMouse : public AtTheWindow {
   ~XMouse() override { let_go(); }
   bool ready() const { return x_.ready(); }
   void press(const std::string& key) { x_.key(key, true), x_.key(key, false); }
-  // A click on a panel. [pixels] of the X server's screen, from its corner.
-  void click_at(int x, int y) {
-    x_.motion(-5000, -5000), x_.motion(x, y);
-    std::this_thread::sleep_for(std::chrono::milliseconds(400));  // a slow frame sees the pointer, then the button
-    x_.button(1, true);
-    std::this_thread::sleep_for(std::chrono::milliseconds(400));
-    x_.button(1, false);
-  }
   void begin_again() override {
     let_go();
     press("F5");
