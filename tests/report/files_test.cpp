@@ -2,13 +2,13 @@
 // tests/report: files from outside. Tables, questionnaires, session files: right ones read exactly, wrong ones are one line,
 // and random damage never gives anything else.
 #include <gtest/gtest.h>
+#include <regex.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <random>
-#include <regex>
 #include <set>
 #include <sstream>
 
@@ -417,7 +417,12 @@ void expect_valid(const nlohmann::json& s) {
     for (const auto& [key, value] : j.items()) EXPECT_TRUE(keys.count(key)) << key;
   };
   const auto matches = [](const nlohmann::json& j, const char* form) {
-    return j.is_string() && std::regex_match(j.get<std::string>(), std::regex(form));
+    regex_t compiled;  // POSIX: GCC 12 warns about its own std::regex under sanitizers
+    if (!j.is_string() || regcomp(&compiled, ("^(" + std::string(form) + ")$").c_str(), REG_EXTENDED | REG_NOSUB) != 0)
+      return false;
+    const bool found = regexec(&compiled, j.get<std::string>().c_str(), 0, nullptr, 0) == 0;
+    regfree(&compiled);
+    return found;
   };
   constexpr const char* kIri = "[a-z]+://[^ <>\"]+";
   only(s, {"id", "actor", "verb", "object", "result", "context", "timestamp"});
