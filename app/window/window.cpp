@@ -84,7 +84,7 @@ std::string of_visit(const std::string& path, int visit) {
   return (p.parent_path() / (p.stem().string() + fmt::format("_visit{}", visit) + p.extension().string())).string();
 }
 
-// A new file in the data folder; in the working folder when there is no home.
+// Unused file name in the data folder, or in the working directory if there is none.
 std::string free_name(const Settings& settings, const char* pattern) {
   const std::string folder = data_folder(settings);
   std::error_code error;

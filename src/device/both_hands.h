@@ -36,7 +36,7 @@ void go_along(BothHands& b, size_t who, std::array<Pose, 2>& hand, const Pose& g
               const Snapshot& seen, float dt);
 
 // Best position for hand `who` to grasp the tail of the thread: clear of the other strand, no tissue in the path of its shaft,
-// near the knot, within the range of the loop on it. tried: [m] positions that failed before. False: there is no tail.
+// near the knot, within the range of the loop on it. tried: [m] rejected positions. Returns false if no position is found.
 bool tail_grip(const PictureModel& picture, const Snapshot& seen, size_t who, TailGrip& out, std::span<const Vec3> tried = {});
 
 // Without force feedback a jerk would tear a stitch. A hand that holds an end of the thread is limited to slightly more than

@@ -23,7 +23,7 @@ const PictureModel& DividedPicture::operator*() const {
   if (made_) return *made_;
   std::call_once(later_->once, [this] {
     later_->picture = later_->make();
-    later_->make = nullptr;  // what it was made from is no longer needed
+    later_->make = nullptr;  // frees the captured source data
   });
   return later_->picture;
 }

@@ -92,7 +92,7 @@ constexpr TailDepth kTailByScript{0.010f, 50}, kTailByHand{0.006f, 30};
 
 // Best position for tool `who`, coming from `side`, to grasp the tail: clear of the other strand, no tissue in the path of
 // its shaft, near the knot, not deep below it, within the range of a loop on the tool; `tried`: [m] positions that
-// failed before. False: there is no tail.
+// failed before. Returns false if no position is found.
 struct TailGrip {
   uint32_t slot = 0;  // of the thread
   Pose pose;

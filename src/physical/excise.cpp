@@ -8,9 +8,9 @@
 namespace catgut::physical {
 namespace {
 
-constexpr float kApart = 0.25e-3f;   // [m] between points of the path
-constexpr size_t kRecent = 12;       // points behind the tip that it does not fall back to
-constexpr float kString = 0.25e-3f;  // [m] the tip's direction is that of this length: a tremor does not reverse it
+constexpr float kApart = 0.25e-3f;      // [m] between points of the path
+constexpr size_t kRecent = 12;          // points behind the tip that it does not fall back to
+constexpr float kSmoothing = 0.25e-3f;  // [m] length over which the tip's direction is averaged, against tremor
 
 bool is_quad(const wall::Model& m, uint32_t face) { return m.mesh.face[face][3] != wall::kNone; }
 
@@ -121,7 +121,7 @@ PenStep use_pen(const ExciseModel& law, const Model& m, State& s, Scratch& k, Ex
       e.groove.push_back({mark.face, mark.link, tip});
     }
   }
-  e.trail = e.touching ? place - heading * std::min(1.0f, kString / std::max(length(heading), 1e-9f)) : place;
+  e.trail = e.touching ? place - heading * std::min(1.0f, kSmoothing / std::max(length(heading), 1e-9f)) : place;
   e.touching = true, e.last = now;
 
   const float thickness = m.wall.laminate.thickness, share = pen.coagulate ? 0.1f * law.efficiency : law.efficiency;

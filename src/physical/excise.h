@@ -53,7 +53,7 @@ struct Bleed {
 struct Excision {
   bool touching = false;
   wall::Point last;  // in the groove; meaningful while touching, as the next
-  Vec3 trail;        // [m] what the tip drags behind it on a short string, on the mid-surface at rest
+  Vec3 trail;        // [m] a point that follows the tip at kSmoothing; their difference is its direction
   std::vector<Groove> groove;
   std::vector<wall::FaceCut> passed;                   // per face: links that are in `groove`
   std::vector<wall::Point> path;                       // places of the tip, a quarter of a millimeter apart
