@@ -200,7 +200,7 @@ TEST(Cutting, a_cut_off_the_line_is_a_fault_once) {
   f.cut(0, 0.8f, 0.006f);
   ASSERT_EQ(f.of(Fault::cut_off_line).size(), 1u);
   EXPECT_NEAR(f.of(Fault::cut_off_line)[0].value, 0.0035f, 0.0006f);
-  // Without a plan there is no line to stray from.
+  // Without a plan no deviation is reported.
   Field free;
   free.scene.surgeon.plan.clear();
   free.model = build_model(free.scene), free.state = initial_state(*free.model);

@@ -391,7 +391,7 @@ TEST(Export, csv_reads_back_to_the_bit) {
     EXPECT_EQ(std::stod(row[gap]), 0.1 * static_cast<double>(n));
     EXPECT_EQ(row[passed], n == 3 ? "" : n % 2 ? "1" : "0");
     EXPECT_EQ(row[score].empty(), n == 3);
-    EXPECT_EQ(row[lumen].empty(), n != 2) << "was not measured, and is no zero";
+    EXPECT_EQ(row[lumen].empty(), n != 2) << "a missing value is empty, not 0";
     if (n != 3) { EXPECT_EQ(std::stod(row[score]), all[n].score); }
     if (n == 2) { EXPECT_EQ(std::stod(row[lumen]), 1.0 / 3); }
     EXPECT_EQ(row[column("cohort")], n % 2 ? "autumn, \xc3\xa9" : "'=1+1") << "a spreadsheet must not compute it";

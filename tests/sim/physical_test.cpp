@@ -275,7 +275,7 @@ TEST(PhysicalScene, clamps_bring_the_ends_together_and_go_back_to_where_they_wer
   f.input.commands.push({CommandKind::advance_clamp, 2, 7});
   f.tick();
   ASSERT_FALSE(f.seen.event.empty());
-  EXPECT_EQ(f.seen.event.back().kind, EventKind::instrument_refused) << "there is no body 7";
+  EXPECT_EQ(f.seen.event.back().kind, EventKind::instrument_refused) << "body 7 does not exist";
 }
 
 // Surgery with real instruments, seen from outside: after the hands are away the thread alone holds the wound, and without the
