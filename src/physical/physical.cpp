@@ -43,9 +43,7 @@ Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wal
   const size_t n = thread::kMaxSoftPoints, columns = wall::columns(s.wall);
   contact.reserve(2 * n), foot.reserve(2 * n), moved.reserve(n), tilt.reserve(16 * n);
   coupling.reserve(n);
-  lips.contact.reserve(3 * columns), lips.last.reserve(3 * columns), lips.points.reserve(6 * columns);
-  for (auto* list : {&lips.speed, &lips.change, &lips.before, &lips.onward}) list->reserve(3 * columns);
-  lips.w.reserve(9 * columns * columns);
+  lips.reserve(3 * columns);
   search.reserve(m.wall, s.wall, s.thread.nodes());
   bodies.reserve(m.wall, s.wall);
   holds.reserve(256);

@@ -5,16 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/clones.h"
 #include "thread/thread.h"
-
-// Plain loops over columns, compiled for several instruction sets. Without fused multiply-add (see CMakeLists.txt) every one of
-// them gives the same bits.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define CATGUT_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define CATGUT_CLONES
-#endif
 
 namespace catgut::thread {
 

@@ -10,37 +10,41 @@
 namespace catgut::thread {
 namespace {
 
-// Three columns.
-struct View {
-  float *x, *y, *z;
-};
-View view(Columns3& c, size_t from) { return {c.x.data() + from, c.y.data() + from, c.z.data() + from}; }
-View view(Padded3& c, size_t from) { return {c.x.data() + from, c.y.data() + from, c.z.data() + from}; }
+// Every loop without branches and with a pointer for each column: otherwise GCC does not vectorize it.
 
-// inverse: 0 where a node does not touch. bound: offset of the plane and radius of the thread.
-CATGUT_CLONES void find(size_t nodes, Vec3 n, float offset, float radius, float ready, View at, View u,
-                        const float* __restrict w, float* __restrict level, float* __restrict inverse, float* __restrict ln,
-                        View lt, View drift) {
-  const float* __restrict x = at.x, * __restrict y = at.y, * __restrict z = at.z;
-  const float* __restrict ux = u.x, * __restrict uy = u.y, * __restrict uz = u.z;
-  float* __restrict lx = lt.x, * __restrict ly = lt.y, * __restrict lz = lt.z;
-  float* __restrict dx = drift.x, * __restrict dy = drift.y, * __restrict dz = drift.z;
+// inverse: 0 where a node does not touch.
+CATGUT_CLONES void find(size_t nodes, Vec3 n, float offset, float radius, float ready, const float* __restrict x,
+                        const float* __restrict y, const float* __restrict z, const float* __restrict ux,
+                        const float* __restrict uy, const float* __restrict uz, const float* __restrict w,
+                        float* __restrict level, float* __restrict inverse, float* __restrict ln) {
   for (size_t i = 0; i < nodes; ++i) {
     const float moves = n.x * ux[i] + n.y * uy[i] + n.z * uz[i];
     const float gap = n.x * x[i] + n.y * y[i] + n.z * z[i] - offset - radius + moves;
-    const bool on = gap <= ready && w[i] > 0;
+    const float movable = w[i] > 0 ? w[i] : 1.0f, may = w[i] > 0 ? 1.0f : 0.0f, on = gap <= ready ? may : 0.0f;
     level[i] = gap - moves;
-    inverse[i] = on ? 1 / w[i] : 0.0f;
-    ln[i] = on ? ln[i] : 0.0f;
-    const float along = lx[i] * n.x + ly[i] * n.y + lz[i] * n.z;
-    lx[i] = on ? lx[i] - n.x * along : 0.0f, ly[i] = on ? ly[i] - n.y * along : 0.0f, lz[i] = on ? lz[i] - n.z * along : 0.0f;
-    dx[i] = on ? dx[i] : 0.0f, dy[i] = on ? dy[i] : 0.0f, dz[i] = on ? dz[i] : 0.0f;
+    inverse[i] = on / movable;
+    ln[i] = on > 0 ? ln[i] : 0.0f;
   }
 }
 
-CATGUT_CLONES void warm(size_t nodes, Vec3 n, const float* __restrict w, const float* __restrict ln, View lt, View u) {
-  const float* __restrict lx = lt.x, * __restrict ly = lt.y, * __restrict lz = lt.z;
-  float* __restrict ux = u.x, * __restrict uy = u.y, * __restrict uz = u.z;
+// What a node remembers of a contact: nothing where it does not touch.
+CATGUT_CLONES void forget_free(size_t nodes, const float* __restrict inverse, float* __restrict x, float* __restrict y,
+                               float* __restrict z) {
+  for (size_t i = 0; i < nodes; ++i) {
+    const bool on = inverse[i] > 0;
+    x[i] = on ? x[i] : 0.0f, y[i] = on ? y[i] : 0.0f, z[i] = on ? z[i] : 0.0f;
+  }
+}
+CATGUT_CLONES void flatten(size_t nodes, Vec3 n, float* __restrict x, float* __restrict y, float* __restrict z) {
+  for (size_t i = 0; i < nodes; ++i) {
+    const float along = x[i] * n.x + y[i] * n.y + z[i] * n.z;
+    x[i] -= n.x * along, y[i] -= n.y * along, z[i] -= n.z * along;
+  }
+}
+
+CATGUT_CLONES void warm(size_t nodes, Vec3 n, const float* __restrict w, const float* __restrict ln,
+                        const float* __restrict lx, const float* __restrict ly, const float* __restrict lz,
+                        float* __restrict ux, float* __restrict uy, float* __restrict uz) {
   for (size_t i = 0; i < nodes; ++i) {
     ux[i] += (n.x * ln[i] + lx[i]) * w[i];
     uy[i] += (n.y * ln[i] + ly[i]) * w[i];
@@ -49,11 +53,10 @@ CATGUT_CLONES void warm(size_t nodes, Vec3 n, const float* __restrict w, const f
 }
 
 CATGUT_CLONES void sweep(size_t nodes, Vec3 n, float mu, float anchor, const float* __restrict w, const float* __restrict level,
-                         const float* __restrict inverse, float* __restrict normal_impulse, float* __restrict slipped, View lt,
-                         View drift, View u) {
-  float* __restrict lx = lt.x, * __restrict ly = lt.y, * __restrict lz = lt.z;
-  const float* __restrict dx = drift.x, * __restrict dy = drift.y, * __restrict dz = drift.z;
-  float* __restrict ux = u.x, * __restrict uy = u.y, * __restrict uz = u.z;
+                         const float* __restrict inverse, float* __restrict normal_impulse, float* __restrict slipped,
+                         float* __restrict lx, float* __restrict ly, float* __restrict lz, const float* __restrict dx,
+                         const float* __restrict dy, const float* __restrict dz, float* __restrict ux, float* __restrict uy,
+                         float* __restrict uz) {
   for (size_t i = 0; i < nodes; ++i) {
     const float along = n.x * ux[i] + n.y * uy[i] + n.z * uz[i];
     const float pressed = normal_impulse[i] - (level[i] + along) * inverse[i], ln = pressed > 0 ? pressed : 0.0f;
@@ -62,7 +65,7 @@ CATGUT_CLONES void sweep(size_t nodes, Vec3 n, float mu, float anchor, const flo
     float z = lz[i] - (uz[i] - n.z * along + anchor * dz[i]) * inverse[i];
     const float limit = mu * ln, size2 = x * x + y * y + z * z;
     const bool slips = size2 > limit * limit;
-    const float part = slips ? limit / std::sqrt(size2) : 1.0f;
+    const float top = slips ? limit : 1.0f, below = slips ? size2 : 1.0f, part = top / std::sqrt(below);
     x *= part, y *= part, z *= part;
     const float change = ln - normal_impulse[i];
     ux[i] += (n.x * change + (x - lx[i])) * w[i];
@@ -73,14 +76,14 @@ CATGUT_CLONES void sweep(size_t nodes, Vec3 n, float mu, float anchor, const flo
 }
 
 CATGUT_CLONES void remember(size_t nodes, Vec3 n, float limit, const float* __restrict ln, const float* __restrict slipped,
-                            View drift, View u) {
-  float* __restrict dx = drift.x, * __restrict dy = drift.y, * __restrict dz = drift.z;
-  const float* __restrict ux = u.x, * __restrict uy = u.y, * __restrict uz = u.z;
+                            float* __restrict dx, float* __restrict dy, float* __restrict dz, const float* __restrict ux,
+                            const float* __restrict uy, const float* __restrict uz) {
   for (size_t i = 0; i < nodes; ++i) {
     const float x = dx[i] + ux[i], y = dy[i] + uy[i], z = dz[i] + uz[i], along = x * n.x + y * n.y + z * n.z;
     const float tx = x - n.x * along, ty = y - n.y * along, tz = z - n.z * along, size = std::sqrt(tx * tx + ty * ty + tz * tz);
-    const bool sticks = ln[i] > 0 && slipped[i] == 0;
-    const float part = sticks ? (size > limit ? limit / size : 1.0f) : 0.0f;
+    const bool far = size > limit;
+    const float top = far ? limit : 1.0f, below = far ? size : 1.0f, pressed = ln[i] > 0 ? top / below : 0.0f;
+    const float part = slipped[i] > 0 ? 0.0f : pressed;
     dx[i] = tx * part, dy[i] = ty * part, dz[i] = tz * part;
   }
 }
@@ -90,8 +93,12 @@ CATGUT_CLONES void remember(size_t nodes, Vec3 n, float limit, const float* __re
 void begin_plane(const Settings& settings, State& state, Scratch& s, const Plane& plane) {
   const float d = settings.material.diameter;
   const size_t n = state.nodes();
-  find(n, plane.normal, plane.offset, 0.5f * d, kReady * d, view(state.x, 0), view(s.u, 0), s.w.data(), s.plane_level.data(),
-       s.plane_inverse.data(), state.plane_normal.data(), view(state.plane_friction, 0), view(state.plane_drift, 0));
+  find(n, plane.normal, plane.offset, 0.5f * d, kReady * d, state.x.x.data(), state.x.y.data(), state.x.z.data(), s.u.x.data(),
+       s.u.y.data(), s.u.z.data(), s.w.data(), s.plane_level.data(), s.plane_inverse.data(), state.plane_normal.data());
+  Columns3 &friction = state.plane_friction, &drift = state.plane_drift;
+  flatten(n, plane.normal, friction.x.data(), friction.y.data(), friction.z.data());
+  forget_free(n, s.plane_inverse.data(), friction.x.data(), friction.y.data(), friction.z.data());
+  forget_free(n, s.plane_inverse.data(), drift.x.data(), drift.y.data(), drift.z.data());
   const float* on = s.plane_inverse.data();
   size_t &first = s.plane_first, &end = s.plane_end;
   for (end = n; end > 0 && on[end - 1] == 0; --end) continue;
@@ -100,21 +107,26 @@ void begin_plane(const Settings& settings, State& state, Scratch& s, const Plane
 
 void warm_plane(State& state, Scratch& s, const Plane& plane) {
   const size_t a = s.plane_first;
-  warm(s.plane_end - a, plane.normal, s.w.data() + a, state.plane_normal.data() + a, view(state.plane_friction, a),
-       view(s.u, a));
+  const Columns3& friction = state.plane_friction;
+  warm(s.plane_end - a, plane.normal, s.w.data() + a, state.plane_normal.data() + a, friction.x.data() + a,
+       friction.y.data() + a, friction.z.data() + a, s.u.x.data() + a, s.u.y.data() + a, s.u.z.data() + a);
 }
 
 void sweep_plane(const Settings& settings, State& state, Scratch& s, const Plane& plane) {
   const size_t a = s.plane_first;
+  Columns3 &friction = state.plane_friction, &drift = state.plane_drift;
   sweep(s.plane_end - a, plane.normal, plane.friction, settings.anchor, s.w.data() + a, s.plane_level.data() + a,
-        s.plane_inverse.data() + a, state.plane_normal.data() + a, s.plane_slipped.data() + a, view(state.plane_friction, a),
-        view(state.plane_drift, a), view(s.u, a));
+        s.plane_inverse.data() + a, state.plane_normal.data() + a, s.plane_slipped.data() + a, friction.x.data() + a,
+        friction.y.data() + a, friction.z.data() + a, drift.x.data() + a, drift.y.data() + a, drift.z.data() + a,
+        s.u.x.data() + a, s.u.y.data() + a, s.u.z.data() + a);
 }
 
 void end_plane(const Settings& settings, State& state, Scratch& s, Plane& plane) {
   const size_t a = s.plane_first;
+  Columns3& drift = state.plane_drift;
   remember(s.plane_end - a, plane.normal, 0.2f * settings.material.diameter, state.plane_normal.data() + a,
-           s.plane_slipped.data() + a, view(state.plane_drift, a), view(s.u, a));
+           s.plane_slipped.data() + a, drift.x.data() + a, drift.y.data() + a, drift.z.data() + a, s.u.x.data() + a,
+           s.u.y.data() + a, s.u.z.data() + a);
   Vec3 sum{};
   for (size_t i = a; i < s.plane_end; ++i) {
     sum += plane.normal * state.plane_normal[i] + state.plane_friction.at(i);

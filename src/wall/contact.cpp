@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/clones.h"
 #include "wall/patch.h"
 
 namespace catgut::wall {
@@ -131,6 +132,22 @@ void warm_start(const Model& m, Scratch& scratch, ContactSolver& solver) {
   }
 }
 
+void ContactSolver::reserve(size_t n) {
+  contact.reserve(n), last.reserve(n), points.reserve(2 * n), w.reserve(n * n), known.reserve(n);
+  for (auto* list : {&self, &ux, &uy, &uz}) list->reserve(n);
+  for (auto* list : {&change, &before, &onward}) list->reserve(n);
+}
+
+namespace {
+
+// All contacts answer an impulse on one of them.
+CATGUT_CLONES void answer(size_t n, Vec3 d, const float* __restrict w, float* __restrict x, float* __restrict y,
+                          float* __restrict z) {
+  for (size_t j = 0; j < n; ++j) x[j] += d.x * w[j], y[j] += d.y * w[j], z[j] += d.z * w[j];
+}
+
+}  // namespace
+
 void solve_contacts(const Model& m, State& s, Scratch& scratch, std::span<const Obstacle> obstacle, ContactSolver& solver) {
   const size_t n = solver.contact.size();
   solver.force.assign(obstacle.size(), {}), solver.torque.assign(obstacle.size(), {});
@@ -141,8 +158,9 @@ void solve_contacts(const Model& m, State& s, Scratch& scratch, std::span<const 
     if (c.self) solver.points.push_back(c.other);
   }
   solver.inverse.need(s.topology, solver.points);
-  solver.w.resize(n * n);
-  solver.speed.resize(n), solver.change.assign(n, {});
+  solver.w.resize(n * n), solver.known.assign(n, 0), solver.self.resize(n);
+  for (auto* u : {&solver.ux, &solver.uy, &solver.uz}) u->resize(n);
+  solver.change.assign(n, {});
   const auto compliance = [&](const Contact& a, const Contact& b) {
     float w = solver.inverse.compliance(s.topology, a.point, b.point);
     if (b.self) w -= solver.inverse.compliance(s.topology, a.point, b.other);
@@ -152,13 +170,25 @@ void solve_contacts(const Model& m, State& s, Scratch& scratch, std::span<const 
   };
   for (size_t i = 0; i < n; ++i) {
     const Contact& c = solver.contact[i];
-    for (size_t j = 0; j <= i; ++j) solver.w[i * n + j] = solver.w[j * n + i] = compliance(c, solver.contact[j]);
-    solver.speed[i] = velocity(c.point, s.motion) - c.speed;
-    if (c.self) solver.speed[i] = solver.speed[i] - velocity(c.other, s.motion);
+    solver.self[i] = compliance(c, c);
+    Vec3 u = velocity(c.point, s.motion) - c.speed;
+    if (c.self) u = u - velocity(c.other, s.motion);
+    solver.ux[i] = u.x, solver.uy[i] = u.y, solver.uz[i] = u.z;
   }
+  // Most candidates never touch: the row of a contact is made when its impulse first changes.
+  const auto row_of = [&](size_t i) {
+    float* row = solver.w.data() + i * n;
+    if (solver.known[i]) return row;
+    solver.known[i] = 1;
+    for (size_t j = 0; j < n; ++j)
+      row[j] = j == i ? solver.self[i]
+               : solver.known[j] ? solver.w[j * n + i]
+                                 : compliance(solver.contact[std::max(i, j)], solver.contact[std::min(i, j)]);
+    return row;
+  };
   const auto give = [&](size_t i, Vec3 d) {
     solver.change[i] += d;
-    for (size_t j = 0; j < n; ++j) solver.speed[j] += d * solver.w[i * n + j];
+    answer(n, d, row_of(i), solver.ux.data(), solver.uy.data(), solver.uz.data());
   };
   solver.before.resize(n), solver.onward.assign(n, {});
   float last2 = 0;
@@ -166,9 +196,9 @@ void solve_contacts(const Model& m, State& s, Scratch& scratch, std::span<const 
     for (size_t i = 0; i < n; ++i) solver.before[i] = solver.contact[i].impulse;
     for (size_t i = 0; i < n; ++i) {
       Contact& c = solver.contact[i];
-      const float self = solver.w[i * n + i];
+      const float self = solver.self[i];
       if (!(self > 0)) continue;
-      const Vec3 u = solver.speed[i];
+      const Vec3 u{solver.ux[i], solver.uy[i], solver.uz[i]};
       // gap + h u >= 0; an overlap is undone at a limited speed.
       const float wanted = c.gap >= 0 ? -c.gap / m.step : std::min(-c.gap / m.step, solver.push_out);
       const float pressed = dot(c.impulse, c.normal);

@@ -48,9 +48,13 @@ struct ContactSolver {
   std::vector<Vec3> force, torque;     // per obstacle: [N] and [N m] about the scene's origin, of the wall on it
   Inverse inverse{512};
   // Workspace.
-  std::vector<float> w;
-  std::vector<Vec3> speed, change, before, onward;
+  std::vector<float> w;               // [1/kg] n x n; a row is made when its contact's impulse first changes
+  std::vector<uint8_t> known;         // per row of w
+  std::vector<float> self;            // [1/kg] diagonal of w
+  std::vector<float> ux, uy, uz;      // [m/s] per contact, of the wall relative to what it touches
+  std::vector<Vec3> change, before, onward;
   std::vector<Weights> points;
+  void reserve(size_t contacts);
 };
 
 // Before begin_step: finds candidates and applies last step's impulses to the wall (scratch.external). The caller may then add
