@@ -102,25 +102,29 @@ void BodiesScratch::reserve(const wall::Model& wm, const wall::State& ws) {
   row.reserve(kMaxRows), points.reserve(kMaxRows), wall_row.reserve(kMaxRows), w.reserve(kMaxRows * kMaxRows);
   for (auto* list : {&speed, &change, &before, &onward}) list->reserve(kMaxRows);
   face_center.reserve(faces), face_radius.reserve(faces), near.reserve(faces);
+  around.resize(kMaxBodies);
+  for (Around& a : around) a.face.reserve(faces);
   moving.reserve(64), tool.reserve(kMaxThreadCapsules), tool_body.reserve(kMaxThreadCapsules);
   hold.reserve(64), hold_body.reserve(64), hold_at.reserve(64);
 }
 
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
-                        const Bodies& bodies, float h, BodiesScratch& k) {
+                        const Bodies& bodies, float h, const SurfaceSearch& search, BodiesScratch& k) {
   const uint32_t faces = wall::elements(wm, ws.topology);
-  k.face_center.resize(faces), k.face_radius.resize(faces);
+  k.face_center.resize(faces), k.face_radius.resize(faces), k.around.resize(kMaxBodies);
   for (uint32_t f = 0; f < faces; ++f) {
     const Corners c = corners_of(wm, ws.topology, f);
+    const float part = 1.0f / static_cast<float>(c.count);
     Vec3 center{};
-    for (uint32_t i = 0; i < c.count; ++i) center += wall::vec3(ws.motion.x[2 * c.column[i]]) / static_cast<float>(c.count);
+    for (uint32_t i = 0; i < c.count; ++i) center += wall::vec3(ws.motion.x[2 * c.column[i]]) * part;
     float radius2 = 0;
     for (uint32_t i = 0; i < c.count; ++i)
       radius2 = std::max(radius2, length2(wall::vec3(ws.motion.x[2 * c.column[i]]) - center));
     k.face_center[f] = center;
     k.face_radius[f] = std::sqrt(radius2) + length(wall::vec3(ws.motion.x[2 * c.column[0] + 1])) * 1.2f;
   }
-  const float wall_speed = 1.0f;  // [m/s] of the wall, for the search alone
+  constexpr float kAhead = 4e-3f;  // [m] by which lists of elements reach beyond what a step needs
+  const float wall_speed = 1.0f;   // [m/s] of the wall, for the search alone
   for (uint32_t b = 0; b < bodies.body.size(); ++b) {
     const BodyModel& m = model.body[b];
     const Body& body = bodies.body[b];
@@ -134,13 +138,24 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     }
     const float fast = std::max(length(moving.v), length(body.velocity));
     const float margin = model.reach + 2 * h * (fast + wall_speed);
-    k.near.clear();
-    for (uint32_t f = 0; f < faces; ++f) {
+    const auto within = [&](uint32_t f, float more) {
       const Vec3 c = k.face_center[f];
-      const float r = k.face_radius[f] + margin;
-      if (c.x > low.x - r && c.y > low.y - r && c.z > low.z - r && c.x < high.x + r && c.y < high.y + r && c.z < high.z + r)
-        k.near.push_back(f);
+      const float r = k.face_radius[f] + margin + more;
+      return c.x > low.x - r && c.y > low.y - r && c.z > low.z - r && c.x < high.x + r && c.y < high.y + r && c.z < high.z + r;
+    };
+    BodiesScratch::Around& a = k.around[b];
+    const float grown = std::max({a.low.x - low.x, a.low.y - low.y, a.low.z - low.z, high.x - a.high.x, high.y - a.high.y,
+                                  high.z - a.high.z, 0.0f}) +
+                        margin - a.margin + 5 * static_cast<float>(search.moved - a.moved);
+    if (!a.made || a.version != ws.topology.version || grown > kAhead) {
+      a.low = low, a.high = high, a.margin = margin, a.moved = search.moved, a.version = ws.topology.version, a.made = true;
+      a.face.clear();
+      for (uint32_t f = 0; f < faces; ++f)
+        if (within(f, kAhead)) a.face.push_back(f);
     }
+    k.near.clear();
+    for (const uint32_t f : a.face)
+      if (within(f, 0)) k.near.push_back(f);
     if (k.near.empty()) continue;
     const Grip& grip = body.grip;
     const bool holds_tissue = grip.what == Gripped::tissue;

@@ -162,6 +162,16 @@ struct BodiesScratch {
   std::vector<Vec3> face_center;
   std::vector<float> face_radius;
   std::vector<uint32_t> near;
+  // Elements within some millimeters of a body. A list is kept until body and wall may have come nearer by that much.
+  struct Around {
+    Vec3 low, high;    // [m] of the body then
+    float margin = 0;  // [m]
+    double moved = 0;  // SurfaceSearch::moved
+    uint32_t version = 0;
+    bool made = false;
+    std::vector<uint32_t> face;
+  };
+  std::vector<Around> around;
   struct Moving {
     Vec3 v, w, center;
     float inv_mass = 0, inv_inertia = 0;
@@ -204,7 +214,7 @@ void predict_bodies(const BodiesModel& model, const Bodies& bodies, std::span<co
 void find_pair_contacts(const BodiesModel& model, const Bodies& bodies, float h, BodiesScratch& k);
 // Contacts with the wall.
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
-                        const Bodies& bodies, float h, BodiesScratch& k);
+                        const Bodies& bodies, float h, const SurfaceSearch& search, BodiesScratch& k);
 // Jaws close, grip and let go; rows of held needles and tissue, holds of held thread.
 void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
                 const thread::State& thread, float thread_diameter, Bodies& bodies, std::span<const HandTarget> target, float h,

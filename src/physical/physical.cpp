@@ -150,9 +150,12 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
     const bool two = memory && old + 1 < s.contact.size() && s.contact[old + 1].node == i;
     if (two && s.contact[old + 1].normal_impulse > memory->normal_impulse) ++memory;  // the one that presses
     const Vec3 p = s.thread.position(i);
+    if (!memory && k.search.moved + static_cast<double>(distance(p, k.search.node_seen[i]) + 1.5f * h * k.search.speed) <
+                       k.search.node_due[i])
+      continue;
     Foot best;
     best.gap = 1e9f;
-    float facing = -1;
+    float facing = -1, nearest_box = 1e9f;
     const auto look = [&](uint32_t patch) {
       const Foot foot = nearest_on_patch(m.wall, s.wall, surface, patch, p);
       // A node that was pressed to one side is never looked at from the other.
@@ -168,10 +171,15 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
       // A node with a memory may be deep inside; another one counts only where it can touch within the step.
       const float reach = memory ? 2 * k.search.margin : r + far_move + 1.5f * h * box.speed;
-      if (least_distance(box, p, 0) > std::min(reach, std::abs(best.gap) + 1e-6f)) continue;
+      const float far = least_distance(box, p, 0);
+      nearest_box = std::min(nearest_box, far);
+      if (far > std::min(reach, std::abs(best.gap) + 1e-6f)) continue;
       for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q)
         if (q != known && least_distance(box, p, surface.patch[q].side) <= std::min(reach, std::abs(best.gap) + 1e-6f)) look(q);
     }
+    constexpr float kSpare = 0.2e-3f;  // [m]
+    k.search.node_seen[i] = p;
+    k.search.node_due[i] = k.search.moved + static_cast<double>(nearest_box - r - far_move - kSpare);
     const wall::Weights w = best.gap < 1e8f ? wall::weights(m.wall, s.wall.topology, best.point) : wall::Weights{};
     if (best.gap > 1e8f || (!memory && best.gap < -d)) continue;  // a node deep inside was never outside
     const float closing = dot(wall::velocity(w, s.wall.motion), best.normal);
@@ -212,7 +220,7 @@ void begin_bodies(const Model& m, State& s, Scratch& k, const Hands& hands) {
   predict_bodies(m.bodies, s.bodies, hands.targets, h, k.bodies);
   skip_channels(m.needles, m.wall, s.wall, s.needle, s.bodies);
   find_pair_contacts(m.bodies, s.bodies, h, k.bodies);
-  find_body_contacts(m.bodies, m.wall, s.wall, surface, s.bodies, h, k.bodies);
+  find_body_contacts(m.bodies, m.wall, s.wall, surface, s.bodies, h, k.search, k.bodies);
   find_grips(m.bodies, m.wall, s.wall, surface, s.thread, m.thread.material.diameter, s.bodies, hands.targets, h, k.bodies);
   find_needle_rows(m.needles, m.bodies, m.wall, s.wall, surface, s.thread, s.bodies, s.needle, h, k.bodies);
   warm_bodies(m.bodies, s.bodies, hands.targets, k.wall, h, k.bodies);
@@ -231,6 +239,7 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
   const Surface& surface = surface_of(m, s);
   s.contact.reserve(2 * thread::kMaxSoftPoints), s.lip.reserve(3 * wall::columns(s.wall));
   for (const Hands::WallPull& pull : hands.wall_pulls) wall::add_to(k.wall.external, pull.at, pull.force);
+  watch_wall(s.wall, k.search);
   if (m.surface_contact || m.lip_contact) find_near(m.wall, s.wall, surface, s.thread, k.search);
   if (m.lip_contact) {
     k.lips.contact.assign(s.lip.begin(), s.lip.end());

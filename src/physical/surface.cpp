@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/clones.h"
 #include "wall/cut.h"
 #include "wall/patch.h"
 
@@ -342,6 +343,40 @@ void SurfaceSearch::reserve(const wall::Model& m, const wall::State& s, size_t n
   node_first.reserve(nodes + 1), node_face.reserve(64 * nodes);
   column_first.reserve(2 * columns + 1), column_face.reserve(64 * columns);
   box.resize(faces);
+  seen.reserve(2 * columns), column_due.reserve(2 * columns), node_due.reserve(nodes), node_seen.reserve(nodes);
+}
+
+namespace {
+
+// The largest square of a change since the last step, and of a speed: mid-surface points and directors in turn.
+CATGUT_CLONES void largest_squares(size_t n, const float* __restrict x, const float* __restrict v, float* __restrict seen,
+                                   float* __restrict most) {
+  float change[16] = {}, speed[16] = {};
+  for (size_t i = 0; i < n; i += 8)  // a column: 4 numbers of its mid-surface point, 4 of its director
+    for (size_t k = 0; k < 8; ++k) {
+      const float d = x[i + k] - seen[i + k], d2 = d * d, v2 = v[i + k] * v[i + k];
+      change[k] = d2 > change[k] ? d2 : change[k];
+      speed[k] = v2 > speed[k] ? v2 : speed[k];
+      seen[i + k] = x[i + k];
+    }
+  for (size_t k = 0; k < 8; ++k) most[k] = change[k], most[8 + k] = speed[k];
+}
+// [m] or [m/s] of any point of the wall, from the largest squares of each coordinate.
+float bound_of(const float* most) {
+  return 1.001f * (std::sqrt(most[0] + most[1] + most[2]) + std::sqrt(most[4] + most[5] + most[6]));
+}
+
+}  // namespace
+
+void watch_wall(const wall::State& s, SurfaceSearch& k) {
+  const size_t n = s.motion.x.size();
+  if (k.seen.size() != n) {
+    k.seen.assign(s.motion.x.begin(), s.motion.x.end());
+    k.moved += 1e3;  // everything is searched
+  }
+  float most[16];
+  largest_squares(4 * n, &s.motion.x[0].x, &s.motion.v[0].x, &k.seen[0].x, most);
+  k.moved += static_cast<double>(bound_of(most)), k.speed = bound_of(most + 8);
 }
 
 const FaceBox& box_of(const wall::Model& m, const wall::State& s, SurfaceSearch& k, uint32_t face) {
@@ -349,9 +384,9 @@ const FaceBox& box_of(const wall::Model& m, const wall::State& s, SurfaceSearch&
   if (box.step == k.step) return box;
   box.step = k.step;
   const Corners c = corners_of(m, s.topology, face);
+  const float part = 1.0f / static_cast<float>(c.count());
   Vec3 center{}, up{};
-  for (uint32_t i = 0; i < c.count(); ++i)
-    center += mid(s, c.column[i]) / static_cast<float>(c.count()), up += director(s, c.column[i]);
+  for (uint32_t i = 0; i < c.count(); ++i) center += mid(s, c.column[i]) * part, up += director(s, c.column[i]);
   box.center = center, box.n = normalized(up, {0, 0, 1});
   const Vec3 along = mid(s, c.column[1]) - mid(s, c.column[0]);
   box.a = normalized(along - box.n * dot(along, box.n), any_perpendicular(box.n));
@@ -394,6 +429,7 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
   for (uint32_t c = 0; c < columns && !stale; ++c) stale = length2(mid(s, c) - k.wall_listed[c]) > limit2;
   if (!stale) return;
   k.version = s.topology.version;
+  k.column_due.assign(columns, 0), k.node_due.assign(nodes, 0), k.node_seen.assign(nodes, {});
   k.node_listed.resize(nodes), k.wall_listed.resize(columns), k.center.resize(faces), k.radius.resize(faces);
   for (size_t i = 0; i < nodes; ++i) k.node_listed[i] = thread.x.at(i);
   for (uint32_t c = 0; c < columns; ++c) k.wall_listed[c] = mid(s, c);
@@ -457,10 +493,13 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
 
 void find_lips(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search, float friction,
                wall::ContactSolver& solver) {
-  constexpr float kDeep = 1e-3f;  // [m] a point so far inside was never outside
+  constexpr float kDeep = 1e-3f;     // [m] a point so far inside was never outside
+  constexpr float kApart = 1.3e-3f;  // [m] a point so far from a face has no contact with it
   const uint32_t columns = wall::columns(s);
+  const bool fast = solver.reach + 4 * m.step * search.speed > kDeep;
   for (uint32_t c = 0; c < columns; ++c) {
-    if (search.column_first[c] == search.column_first[c + 1]) continue;
+    if (search.column_first[c] == search.column_first[c + 1] || (!fast && search.moved < search.column_due[c])) continue;
+    float nearest_box = 1e9f;
     for (const float zeta : {-1.0f, 0.0f, 1.0f}) {
       if (zeta == 0 && !surface.at_rim[c]) continue;
       const wall::Weights w = wall::at_column(c, zeta);
@@ -474,7 +513,9 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
         const FaceBox& box = box_of(m, s, search, face);
         const float reach =
             std::min(std::abs(best.gap), std::max(kDeep, solver.reach + 2 * m.step * (box.speed + speed))) + 1e-6f;
-        if (least_distance(box, p, 0) > reach) continue;
+        const float far = least_distance(box, p, 0);
+        nearest_box = std::min(nearest_box, far);
+        if (far > reach) continue;
         for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
           if (least_distance(box, p, surface.patch[q].side) > reach) continue;
           const Foot foot = nearest_on_patch(m, s, surface, q, p);
@@ -497,6 +538,7 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       k.normal = best.normal, k.gap = best.gap, k.friction = friction;
       solver.contact.push_back(k);
     }
+    search.column_due[c] = search.moved + 0.5 * static_cast<double>(nearest_box - kApart);  // both may move
   }
 }
 

@@ -78,12 +78,21 @@ struct SurfaceSearch {
   uint32_t version = 0;
   uint32_t step = 0;         // counts steps, for the boxes
   std::vector<FaceBox> box;  // per face, made on first use in a step
+  // What was far from everything is not searched again before the wall may have come near.
+  std::vector<wall::Float4> seen;  // the wall in the last step
+  double moved = 0;                // [m] the longest path that any point of the wall has traveled so far; only grows
+  float speed = 0;                 // [m/s] maximum of any point of the wall
+  std::vector<double> column_due;  // per column: `moved` at which its lips are searched again
+  std::vector<double> node_due;    // per node: the same, less the node's own motion
+  std::vector<Vec3> node_seen;     // [m] per node: where it was when it was searched
   void reserve(const wall::Model& model, const wall::State& state, size_t nodes);
 };
 const FaceBox& box_of(const wall::Model& model, const wall::State& state, SurfaceSearch& search, uint32_t face);
 // At most the distance [m] from p to the face's patches of one side: -1 inner, 1 outer, 0 any.
 float least_distance(const FaceBox& box, Vec3 p, int side);
 
+// Once per step, before everything below: how far the wall moves.
+void watch_wall(const wall::State& state, SurfaceSearch& search);
 // Once per step, before the searches of that step.
 void find_near(const wall::Model& model, const wall::State& state, const Surface& surface, const thread::State& thread,
                SurfaceSearch& search);

@@ -42,9 +42,9 @@ CATGUT_CLONES void flatten(size_t nodes, Vec3 n, float* __restrict x, float* __r
   }
 }
 
-CATGUT_CLONES void warm(size_t nodes, Vec3 n, const float* __restrict w, const float* __restrict ln,
-                        const float* __restrict lx, const float* __restrict ly, const float* __restrict lz,
-                        float* __restrict ux, float* __restrict uy, float* __restrict uz) {
+CATGUT_CLONES void warm(size_t nodes, Vec3 n, const float* __restrict w, const float* __restrict ln, const float* __restrict lx,
+                        const float* __restrict ly, const float* __restrict lz, float* __restrict ux, float* __restrict uy,
+                        float* __restrict uz) {
   for (size_t i = 0; i < nodes; ++i) {
     ux[i] += (n.x * ln[i] + lx[i]) * w[i];
     uy[i] += (n.y * ln[i] + ly[i]) * w[i];

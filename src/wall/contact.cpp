@@ -133,9 +133,9 @@ void warm_start(const Model& m, Scratch& scratch, ContactSolver& solver) {
 }
 
 void ContactSolver::reserve(size_t n) {
-  contact.reserve(n), last.reserve(n), points.reserve(2 * n), w.reserve(n * n), known.reserve(n);
-  for (auto* list : {&self, &ux, &uy, &uz}) list->reserve(n);
-  for (auto* list : {&change, &before, &onward}) list->reserve(n);
+  contact.reserve(n), last.reserve(n), points.reserve(2 * n), terms.reserve(2 * n), trial.reserve(n);
+  w.reserve(n * n), known.reserve(n), change.reserve(n);
+  for (auto* list : {&ux, &uy, &uz}) list->reserve(n);
 }
 
 namespace {
@@ -158,52 +158,59 @@ void solve_contacts(const Model& m, State& s, Scratch& scratch, std::span<const 
     if (c.self) solver.points.push_back(c.other);
   }
   solver.inverse.need(s.topology, solver.points);
-  solver.w.resize(n * n), solver.known.assign(n, 0), solver.self.resize(n);
+  solver.w.resize(n * n), solver.known.assign(n, 0), solver.terms.resize(2 * n), solver.trial.resize(n);
   for (auto* u : {&solver.ux, &solver.uy, &solver.uz}) u->resize(n);
   solver.change.assign(n, {});
-  const auto compliance = [&](const Contact& a, const Contact& b) {
-    float w = solver.inverse.compliance(s.topology, a.point, b.point);
-    if (b.self) w -= solver.inverse.compliance(s.topology, a.point, b.other);
-    if (a.self) w -= solver.inverse.compliance(s.topology, a.other, b.point);
-    if (a.self && b.self) w += solver.inverse.compliance(s.topology, a.other, b.other);
+  for (size_t i = 0; i < n; ++i) {
+    const Contact& c = solver.contact[i];
+    solver.terms[2 * i] = solver.inverse.terms(s.topology, c.point);
+    if (c.self) solver.terms[2 * i + 1] = solver.inverse.terms(s.topology, c.other);
+  }
+  const auto compliance = [&](size_t i, size_t j) {
+    const bool a_self = solver.contact[i].self, b_self = solver.contact[j].self;
+    const Terms *a = &solver.terms[2 * i], *b = &solver.terms[2 * j];
+    float w = solver.inverse.compliance(s.topology, a[0], b[0]);
+    if (b_self) w -= solver.inverse.compliance(s.topology, a[0], b[1]);
+    if (a_self) w -= solver.inverse.compliance(s.topology, a[1], b[0]);
+    if (a_self && b_self) w += solver.inverse.compliance(s.topology, a[1], b[1]);
     return w;
   };
   for (size_t i = 0; i < n; ++i) {
     const Contact& c = solver.contact[i];
-    solver.self[i] = compliance(c, c);
     Vec3 u = velocity(c.point, s.motion) - c.speed;
     if (c.self) u = u - velocity(c.other, s.motion);
     solver.ux[i] = u.x, solver.uy[i] = u.y, solver.uz[i] = u.z;
+    // gap + h u >= 0; an overlap is undone at a limited speed.
+    const float wanted = c.gap >= 0 ? -c.gap / m.step : std::min(-c.gap / m.step, solver.push_out);
+    solver.trial[i] = {c.normal, wanted, compliance(i, i), c.friction, c.impulse, {}, {}};
   }
   // Most candidates never touch: the row of a contact is made when its impulse first changes.
   const auto row_of = [&](size_t i) {
     float* row = solver.w.data() + i * n;
     if (solver.known[i]) return row;
     solver.known[i] = 1;
-    for (size_t j = 0; j < n; ++j)
-      row[j] = j == i ? solver.self[i]
-               : solver.known[j] ? solver.w[j * n + i]
-                                 : compliance(solver.contact[std::max(i, j)], solver.contact[std::min(i, j)]);
+    for (size_t j = 0; j < n; ++j) {
+      if (j == i) row[j] = solver.trial[i].self;
+      else row[j] = solver.known[j] ? solver.w[j * n + i] : compliance(std::max(i, j), std::min(i, j));
+    }
     return row;
   };
   const auto give = [&](size_t i, Vec3 d) {
     solver.change[i] += d;
     answer(n, d, row_of(i), solver.ux.data(), solver.uy.data(), solver.uz.data());
   };
-  solver.before.resize(n), solver.onward.assign(n, {});
   float last2 = 0;
   for (solver.swept = 0;;) {
-    for (size_t i = 0; i < n; ++i) solver.before[i] = solver.contact[i].impulse;
     for (size_t i = 0; i < n; ++i) {
-      Contact& c = solver.contact[i];
-      const float self = solver.self[i];
-      if (!(self > 0)) continue;
+      ContactSolver::Trial& c = solver.trial[i];
+      c.before = c.impulse;
+      if (!(c.self > 0)) continue;
       const Vec3 u{solver.ux[i], solver.uy[i], solver.uz[i]};
-      // gap + h u >= 0; an overlap is undone at a limited speed.
-      const float wanted = c.gap >= 0 ? -c.gap / m.step : std::min(-c.gap / m.step, solver.push_out);
+      const float closing = dot(u, c.normal) - c.wanted;
+      if (closing >= 0 && c.impulse == Vec3{}) continue;  // apart, and stays so
       const float pressed = dot(c.impulse, c.normal);
-      const float press = std::max(0.0f, pressed - (dot(u, c.normal) - wanted) / self);
-      Vec3 across = c.impulse - c.normal * pressed - (u - c.normal * dot(u, c.normal)) / self;
+      const float press = std::max(0.0f, pressed - closing / c.self);
+      Vec3 across = c.impulse - c.normal * pressed - (u - c.normal * dot(u, c.normal)) / c.self;
       const float most = c.friction * press, drags = length(across);
       if (drags > most) across = across * (drags > 0 ? most / drags : 0);
       const Vec3 impulse = c.normal * press + across, d = impulse - c.impulse;
@@ -212,28 +219,31 @@ void solve_contacts(const Model& m, State& s, Scratch& scratch, std::span<const 
       give(i, d);
     }
     float changed2 = 0, largest2 = 0, sum2 = 0;
-    for (size_t i = 0; i < n; ++i) {
-      const float d2 = length2(solver.contact[i].impulse - solver.before[i]);
+    for (const ContactSolver::Trial& c : solver.trial) {
+      if (c.impulse == Vec3{} && c.before == Vec3{}) continue;
+      const float d2 = length2(c.impulse - c.before);
       changed2 = std::max(changed2, d2), sum2 += d2;
-      largest2 = std::max(largest2, length2(solver.contact[i].impulse));
+      largest2 = std::max(largest2, length2(c.impulse));
     }
     if (++solver.swept >= solver.sweeps || changed2 <= solver.accuracy * solver.accuracy * largest2) break;
     // The next sweep starts from an extrapolation of the last ones; sweeps project any overshoot back.
     const float beta = last2 > 0 ? sum2 / last2 : 0;
     last2 = sum2;
     for (size_t i = 0; i < n; ++i) {
-      const Vec3 d = solver.contact[i].impulse - solver.before[i];
+      ContactSolver::Trial& c = solver.trial[i];
+      const Vec3 d = c.impulse - c.before;
       if (beta >= 1 || beta == 0) {
-        solver.onward[i] = beta == 0 ? d : Vec3{};
+        c.onward = beta == 0 ? d : Vec3{};
         continue;
       }
-      const Vec3 more = solver.onward[i] * beta;
-      solver.onward[i] = more + d;
+      const Vec3 more = c.onward * beta;
+      c.onward = more + d;
       if (more == Vec3{}) continue;
-      solver.contact[i].impulse += more;
+      c.impulse += more;
       give(i, more);
     }
   }
+  for (size_t i = 0; i < n; ++i) solver.contact[i].impulse = solver.trial[i].impulse;
   std::fill(scratch.external.begin(), scratch.external.end(), Float4{});
   for (size_t i = 0; i < n; ++i) {
     const Contact& c = solver.contact[i];

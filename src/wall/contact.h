@@ -48,12 +48,20 @@ struct ContactSolver {
   std::vector<Vec3> force, torque;     // per obstacle: [N] and [N m] about the scene's origin, of the wall on it
   Inverse inverse{512};
   // Workspace.
-  std::vector<float> w;               // [1/kg] n x n; a row is made when its contact's impulse first changes
-  std::vector<uint8_t> known;         // per row of w
-  std::vector<float> self;            // [1/kg] diagonal of w
-  std::vector<float> ux, uy, uz;      // [m/s] per contact, of the wall relative to what it touches
-  std::vector<Vec3> change, before, onward;
+  struct Trial {  // a contact during the iteration
+    Vec3 normal;
+    float wanted = 0;  // [m/s] speed along the normal at which it would just touch at the end of the step
+    float self = 0;    // [1/kg] its own compliance
+    float friction = 0;
+    Vec3 impulse, before, onward;  // [N s] now, before this sweep, and by which the last extrapolation led on
+  };
+  std::vector<Trial> trial;
+  std::vector<float> w;           // [1/kg] n x n; a row is made when its contact's impulse first changes
+  std::vector<uint8_t> known;     // per row of w
+  std::vector<float> ux, uy, uz;  // [m/s] per contact, of the wall relative to what it touches
+  std::vector<Vec3> change;       // [N s] since the last step
   std::vector<Weights> points;
+  std::vector<Terms> terms;  // two per contact: point and other
   void reserve(size_t contacts);
 };
 

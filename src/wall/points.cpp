@@ -142,18 +142,28 @@ void Inverse::need(const Topology& t, std::span<const Weights> points) {
   if (count > 0) compute();
 }
 
-float Inverse::compliance(const Topology& t, const Weights& a, const Weights& b) const {
+Terms Inverse::terms(const Topology& t, const Weights& w) const {
+  Terms out;
+  out.zeta = w.zeta;
+  for (size_t k = 0; k < 4; ++k) {
+    const uint32_t c = w.column[k], slot = t.slot[c];
+    if (w.weight[k] == 0 || slot == kNone) continue;
+    out.column[out.count] = c, out.slot[out.count] = slot, out.weight[out.count] = w.weight[k];
+    out.row[out.count] = value_.data() + size_t{entry_[slot]} * rows_;
+    ++out.count;
+  }
+  return out;
+}
+
+float Inverse::compliance(const Topology& t, const Terms& a, const Terms& b) const {
   float sum = 0;
-  for (int i = 0; i < 4; ++i) {
+  for (uint32_t i = 0; i < a.count; ++i) {
     const uint32_t ci = a.column[i];
-    if (a.weight[i] == 0 || t.slot[ci] == kNone) continue;
-    const float* column = value_.data() + size_t{entry_[t.slot[ci]]} * rows_;
     float part = 0;
-    for (int j = 0; j < 4; ++j) {
+    for (uint32_t j = 0; j < b.count; ++j) {
       const uint32_t cj = b.column[j];
-      if (b.weight[j] == 0 || t.slot[cj] == kNone) continue;
-      float v = column[t.slot[cj]];
-      if (t.slot[ci] == t.slot[cj]) {
+      float v = a.row[i][b.slot[j]];
+      if (a.slot[i] == b.slot[j]) {
         // Copies of a cut column, and the director of the same column.
         v += (ci == cj ? t.relative[ci] : 0) - t.share[ci] * t.relative[ci] - t.share[cj] * t.relative[cj] + t.spread[ci];
         if (ci == cj) v += a.zeta * b.zeta * t.inv_dir[ci];
@@ -193,6 +203,7 @@ void Coupling::set_points(const Model& m, const Topology& t, std::span<const Poi
 void Coupling::reserve(size_t n) {
   material_.reserve(n), point.reserve(n), at.reserve(n), speed.reserve(n), impulse.reserve(n), w.reserve(n * n);
   offset.reserve(n), axis.reserve(n), lever_.reserve(n), tilt_first.reserve(n + 1), tilt.reserve(16 * n);
+  terms_.reserve(n);
 }
 
 void Coupling::begin(const Model& m, const State& s) {
@@ -202,8 +213,10 @@ void Coupling::begin(const Model& m, const State& s) {
     version = s.topology.version;
     for (size_t i = 0; i < n; ++i) point[i] = weights(m, s.topology, material_[i]);
     inverse.need(s.topology, point);
+    terms_.clear();
+    for (size_t i = 0; i < n; ++i) terms_.push_back(inverse.terms(s.topology, point[i]));
     for (size_t i = 0; i < n; ++i)
-      for (size_t j = 0; j <= i; ++j) w[i * n + j] = w[j * n + i] = inverse.compliance(s.topology, point[i], point[j]);
+      for (size_t j = 0; j <= i; ++j) w[i * n + j] = w[j * n + i] = inverse.compliance(s.topology, terms_[i], terms_[j]);
   }
   for (size_t i = 0; i < n; ++i) {
     at[i] = place(point[i], s.motion), speed[i] = velocity(point[i], s.motion), impulse[i] = {};
@@ -235,18 +248,22 @@ Vec3 Coupling::now(size_t i, const State& s) const {
   return offset[i] == 0 ? at_i : at_i + normalized(sum_of(point[i], s.motion.x, 1)) * offset[i];
 }
 
-void Coupling::end(State& s, Scratch& k) {
-  std::fill(k.external.begin(), k.external.end(), Float4{});
+void Coupling::spread(Column<Float4>& to) const {
+  std::fill(to.begin(), to.end(), Float4{});
   for (size_t i = 0; i < point.size(); ++i) {
-    add_to(k.external, point[i], impulse[i]);
+    add_to(to, point[i], impulse[i]);
     if (offset[i] == 0 || i >= tilting) continue;
     const Vec3 moment = (impulse[i] - axis[i] * dot(impulse[i], axis[i])) * lever_[i];
     for (int c = 0; c < 4; ++c) {
       if (point[i].weight[c] == 0) continue;
-      Float4& dir = k.external[2 * point[i].column[c] + 1];
+      Float4& dir = to[2 * point[i].column[c] + 1];
       dir = float4(vec3(dir) + moment * point[i].weight[c]);
     }
   }
+}
+
+void Coupling::end(State& s, Scratch& k) {
+  spread(k.external);
   apply_impulses(s, k, k.external);
   std::fill(k.external.begin(), k.external.end(), Float4{});
 }

@@ -37,6 +37,15 @@ Point nearest_point(const Model& model, const State& state, Vec3 p, float zeta);
 // Adds an impulse or force on a point to lists of 2 per column.
 void add_to(Column<Float4>& list, const Weights& w, Vec3 amount);
 
+// What a compliance needs of a point: weights of 0 and held columns are left out.
+struct Terms {
+  uint32_t count = 0;
+  std::array<uint32_t, 4> column{}, slot{};
+  std::array<float, 4> weight{};
+  std::array<const float*, 4> row{};  // of A^-1
+  float zeta = 0;
+};
+
 // Columns of A^-1 for mid-surface points, computed on first use and cached. The cache never changes a result.
 class Inverse {
  public:
@@ -45,7 +54,12 @@ class Inverse {
   // Computes missing columns of these points; clears the cache when the topology has changed.
   void need(const Topology& topology, std::span<const Weights> points);
   // [1/kg] between two points whose columns have been requested.
-  float compliance(const Topology& topology, const Weights& a, const Weights& b) const;
+  float compliance(const Topology& topology, const Weights& a, const Weights& b) const {
+    return compliance(topology, terms(topology, a), terms(topology, b));
+  }
+  // The same in two steps, for points that take part in many pairs. Valid until the next call of `need`.
+  Terms terms(const Topology& topology, const Weights& point) const;
+  float compliance(const Topology& topology, const Terms& a, const Terms& b) const;
   // The column of a slot of the factor, which has been requested.
   const float* column(uint32_t slot) const { return value_.data() + size_t{entry_[slot]} * rows_; }
   uint32_t kept() const { return static_cast<uint32_t>(slot_.size()); }
@@ -113,11 +127,14 @@ struct Coupling {
     }
   }
   void end(State& state, Scratch& scratch);
+  // The impulses on the points as impulses on columns, 2 per column: what `end` applies.
+  void spread(Column<Float4>& to) const;
   Vec3 now(size_t i, const State& state) const;  // where point i is [m]
 
  private:
   std::vector<Point> material_;
   std::vector<float> lever_;  // offset over the length of the director, of this step
+  std::vector<Terms> terms_;
 };
 
 // Points with prescribed positions within the step, such as a grip. softness [m/N]: 0 is rigid. Returns forces [N] on the
