@@ -19,6 +19,9 @@ constexpr float kStaysApart = 0.012f;   // [m] round the bowel, between stay sut
 constexpr float kPull = 1.7f;           // [N] on each strand of a physical throw: below what the bites bear
 constexpr float kApproximate = 0.002f;  // [m] of each clamp: the edges touch after 1.5 mm
 constexpr int kThrows = 2;
+// [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is square
+// to it. Less deep, it slid along the serosa and came out through the cut edge.
+constexpr float kYields = 0.002f;
 constexpr float kFreeDepth = 0.0045f;  // [m] depth below the rims of a sweep through two layers
 
 // Depth of the needle's circle below a surface of radius `curved` [m] whose chord is `length`.
@@ -209,7 +212,7 @@ Plan stay_plan(const PictureModel& picture, const SurgeonSkill& skill) {
 
 // One stitch over the gap between two bowel ends, without a technique: the needle enters `edge_distance` from the edge on one
 // side, passes through the whole wall into the gap, and comes out on the other side at the same distance.
-Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+Plan stitch_over_gap(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;
   // A deep bite: a third of the arc from the swage, the jaws would press on the tissue before the tip is out.
@@ -232,10 +235,17 @@ Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
+// With physical mechanics.
+Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan = stitch_over_gap(picture, skill);
+  plan.place[0].depth += kYields;
+  plan.pull = kPull;
+  return plan;
+}
+
 // The same, tied with a square knot of single throws while clamps hold the ends together.
 Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan = interrupted_plan(picture, skill);
-  plan.pull = kPull;
   plan.approximate = kApproximate;
   plan.task.pop_back();
   add(plan, TaskKind::approximate);
@@ -247,7 +257,7 @@ Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skil
 
 // A simple interrupted suture over a slit: one sweep through both edges, tied with two throws, both ends cut.
 Plan simple_plan(const PictureModel& picture, const SurgeonSkill& skill) {
-  Plan plan = interrupted_plan(picture, skill);
+  Plan plan = stitch_over_gap(picture, skill);
   plan.task.pop_back();  // rest
   add(plan, TaskKind::draw);
   add(plan, TaskKind::regrip);

@@ -16,6 +16,8 @@ constexpr float kTighten = 0.15f;     // of the free speed: the thread runs thro
 constexpr float kSecure = 0.985f;     // fraction of a closure that counts as closed
 constexpr float kMissBy = 0.008f;     // [m] along the shaft
 constexpr float kForcepsAt = 0.93f;   // position on the needle's arc: behind the tip
+constexpr float kTipUp = -2.2f;       // [rad] angle of the needle's circle at which its tip is up
+constexpr float kStraight = 0.93f;    // of the strand's length
 
 }  // namespace
 
@@ -420,6 +422,16 @@ float Scripted::open_seam(const Snapshot& seen) {
   return open;
 }
 
+void Scripted::hold_strand_straight(const Snapshot& seen, BiteFrame& f) const {
+  const size_t from = last_point_node(seen);
+  const float want = kStraight * length_between(seen, from, seen.active().thread_order.size() - 1);
+  const Vec3 hole = node_at(seen, from);
+  for (int i = 0; i < 4; ++i) {
+    const Vec3 end = transform(needle_at(f, kTipUp), {shape().needle_radius, 0, 0});
+    f.at += f.out * (want - distance(end, hole));
+  }
+}
+
 bool Scripted::take_back(const Snapshot& seen, bool present) {
   enum { bring, over, down, close, give, clear };
   switch (stage_) {
@@ -434,7 +446,8 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
       // reach.
       BiteFrame f = present ? frame(seen, next) : BiteFrame{stitch(seen), {0, 1, 0}, {0, 0, -1}, {1, 0, 0}};
       f.at += f.out * (present ? 0.03f : 0.045f) + f.up * (present ? 1.7f * plan_.lift : 0.0f);
-      if (move(kForceps, holding(kForceps, needle_at(f, present ? -half_bite_angle() - 0.7f : -2.2f)), skill_.speed)) go(over);
+      if (!present && plan_.pull > 0) hold_strand_straight(seen, f);
+      if (move(kForceps, holding(kForceps, needle_at(f, present ? -half_bite_angle() - 0.7f : kTipUp)), skill_.speed)) go(over);
       else if (!patience(6)) gave_up_ = true;
       return false;
     }

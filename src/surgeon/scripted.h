@@ -108,6 +108,8 @@ class Scripted final : public Surgeon {
   // [m] maximum remaining distance of the midpoints; 0 once all count as closed.
   static float open_seam(const Snapshot& seen);
 
+  // Raises the place where a needle is presented until its strand is nearly taut: slack thread drifts into the jaws.
+  void hold_strand_straight(const Snapshot& seen, BiteFrame& f) const;
   // The needle holder takes the needle from the forceps; with `present` the forceps first moves it beside the next bite.
   bool take_back(const Snapshot& seen, bool present);
 

@@ -60,7 +60,8 @@ bool Scripted::regrip(const Snapshot& seen) {
       go(give);
       return false;
     default:
-      jaw(kNeedleHolder, 1);
+      // Physical jaws hold until they are half open: a hand that leaves earlier pulls at the other one with 8 N.
+      if (!jaw(kNeedleHolder, 1) && plan_.pull > 0) return waited_ = 0, false;
       return move(kNeedleHolder, raised(hand_[kNeedleHolder].pose, 0.02f), skill_.speed) || waited_ > 0.6f;
   }
 }
