@@ -168,6 +168,37 @@ TEST(PhysicalScene, jaws_carry_thread_and_its_length_stays) {
   EXPECT_TRUE(state_is_valid(*f.model, *f.state));
 }
 
+// The jaws lift one of the two pieces; the other one stays on the drape.
+TEST(PhysicalScene, scissors_divide_the_thread) {
+  Field f;
+  const std::vector<uint32_t>& order = f.seen.active().thread_order;
+  const Vec3 start = f.seen.particle[order[100]];
+  f.move_right(start + Vec3{0, 0.03f, 0}, 0.1f, 1);
+  f.move_right(start + Vec3{0, 0.001f, 0}, 0.3f, 1);
+  f.move_right(start + Vec3{0, 0.001f, 0}, 0.1f, 0);
+  ASSERT_EQ(f.seen.tool[0].held, Held::thread);
+  f.input.commands.push({CommandKind::cut, 0, 0});
+  f.tick();
+  f.input.commands.clear();
+  bool reported = false;
+  for (const Event& e : f.seen.event) reported |= e.kind == EventKind::thread_cut;
+  EXPECT_TRUE(reported);
+  const std::vector<uint8_t> cut = f.seen.active().thread_cut;
+  ASSERT_EQ(std::count(cut.begin(), cut.end(), 1), 1);
+  const size_t at = static_cast<size_t>(std::find(cut.begin(), cut.end(), 1) - cut.begin());
+  EXPECT_NEAR(static_cast<double>(at), 100, 2);
+  const StatePtr other = initial_state(*f.model);
+  load_state(*f.model, *other, save_state(*f.model, *f.state));
+  f.move_right(start + Vec3{0, 0.02f, 0}, 0.4f, 0);
+  EXPECT_EQ(f.seen.tool[0].held, Held::thread);
+  EXPECT_GT(std::abs(f.seen.particle[order[at]].y - f.seen.particle[order[at + 1]].y), 0.012f);
+  EXPECT_EQ(f.seen.active().thread_cut, cut) << "nothing else broke";
+  EXPECT_TRUE(state_is_valid(*f.model, *f.state));
+  Snapshot loaded;
+  publish(*f.model, *other, loaded);
+  EXPECT_EQ(loaded.active().thread_cut, cut);
+}
+
 // Save, load elsewhere and continue, with another number of workers: the same as the run itself. With an instrument that
 // presses the wall and drags thread, so that every list of contacts is in use, while a clamp moves.
 TEST(PhysicalScene, a_loaded_state_continues_to_the_bit) {
