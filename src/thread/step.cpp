@@ -183,13 +183,25 @@ void warm_masses(const Settings& settings, State& state, Scratch& s) {
 }
 
 // A mean tension above its strength breaks a segment: the one with the largest load relative to its strength. Contact bends it
-// and lowers the strength to that of a knot.
+// and lowers the strength to that of a knot. What counts is the tension over kSpan segments to either side: the simulated mass
+// is hundreds of times the real one, and a jerk of a few nodes has peaks of inertia that no real thread has.
+constexpr size_t kSpan = 4;
+float load_beside(const State& state, size_t segment, int way) {
+  float sum = 0;
+  size_t count = 0;
+  for (size_t i = segment; count < kSpan && i < state.segments() && !state.broken[i]; i += static_cast<size_t>(way))
+    sum += state.tension[i], ++count;
+  return count == kSpan ? sum / static_cast<float>(kSpan) : 0;
+}
+
 void break_overloaded(const Settings& settings, State& state) {
   float worst = 1;
   size_t where = state.segments();
   for (size_t i = 0; i < state.segments(); ++i) {
     const bool knotted = std::max(state.warm[i], state.warm[i + 1]) > 0.5f;
-    const float share = state.tension[i] / (knotted ? settings.material.knot_strength : settings.material.straight_strength);
+    const float strength = knotted ? settings.material.knot_strength : settings.material.straight_strength;
+    if (state.tension[i] <= strength) continue;
+    const float share = std::min(state.tension[i], std::max(load_beside(state, i, -1), load_beside(state, i, 1))) / strength;
     if (share > worst && !state.broken[i]) worst = share, where = i;
   }
   if (where == state.segments()) return;
