@@ -14,6 +14,8 @@ constexpr float kTautMass = 5e-3f;     // [kg] sqrt(line mass * EA) h: what move
 constexpr float kSlackMass = 0.1e-3f;  // [kg] of a few nodes
 constexpr float kLineMass = 0.05f;     // [kg/m]
 
+constexpr float kOpenForce = 2;  // [N] at the tips, maximum with which jaws open against thread round them
+
 // Velocity of the hand's target, from the target of the last step.
 struct Wish {
   Vec3 away, speed, turn, spin;  // [m], [m/s], [rad], [rad/s]
@@ -119,8 +121,33 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, float h, BodiesScratc
   }
 }
 
+// Jaws that open against a strand round them do so with a limited force: at half of it half as fast, above it they yield.
+static void yield_to_thread(const BodiesModel& model, const Bodies& bodies, BodiesScratch& k) {
+  std::array<float, kMaxBodies> closing{};  // [N] of the thread, at the tips
+  uint32_t part = 0;
+  for (size_t i = 0; i < k.tool.size(); ++i) {
+    const uint32_t b = k.tool_body[i];
+    part = i > 0 && k.tool_body[i - 1] == b ? part + 1 : 0;
+    const BodyModel& m = model.body[b];
+    const BodySphere &a = m.sphere[m.thread_capsule[part].a], &z = m.sphere[m.thread_capsule[part].b];
+    if (m.hinge_z <= 0 || a.jaw == 0) continue;
+    const Vec3 inward = rotate(bodies.body[b].pose.q, {-static_cast<float>(a.jaw), 0, 0});
+    closing[b] += (dot(k.tool[i].force_a, inward) * (m.hinge_z - a.at.z) +
+                   dot(k.tool[i].force_b, inward) * (m.hinge_z - z.at.z)) /
+                  m.hinge_z;
+  }
+  for (size_t b = 0; b < bodies.body.size(); ++b) {
+    BodiesScratch::Moving& moving = k.moving[b];
+    const float now = bodies.body[b].opening;
+    if (model.body[b].hinge_z <= 0 || moving.opening <= now || closing[b] <= 0) continue;
+    const float free = std::max(-1.0f, 1 - closing[b] / kOpenForce);
+    moving.opening = std::max(0.0f, now + (moving.opening - now) * free);
+  }
+}
+
 void take_thread_forces(const BodiesModel& model, Bodies& bodies, BodiesScratch& k) {
   for (Body& b : bodies.body) b.thread_force = b.thread_torque = {};
+  yield_to_thread(model, bodies, k);
   for (size_t i = 0; i < k.tool.size(); ++i) {
     Body& b = bodies.body[k.tool_body[i]];
     const Vec3 c = k.moving[k.tool_body[i]].center;
