@@ -30,7 +30,7 @@ class Scripted final : public Surgeon {
 
   bool done() const override { return gave_up_ || task_ >= plan_.task.size(); }
   bool gave_up() const override { return gave_up_; }
-  int retries() const override { return retries_; }
+  int retries() const override { return retries_ + (thread_tie_ ? thread_tie_->retries() : 0); }
 
   std::string doing() const override;
 

@@ -29,6 +29,7 @@ constexpr float kSlideOff = 1.4f;    // [s]
 constexpr float kHigh = 0.62f;
 constexpr float kDrawn = 0.5f;  // of the strand's length: height to which the tail is drawn at most
 constexpr float kLow = 4e-3f;   // [m] above the stitch, where strands are pulled
+constexpr int kAgain = 3;       // times that a throw is wound again
 
 Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
 // Unit, across the shaft; 0: toward the viewer, pi/2: above.
@@ -44,6 +45,21 @@ Quat holder_turn(float side) {
 float smooth(float s) {
   s = std::clamp(s, 0.0f, 1.0f);
   return s * s * (3 - 2 * s);
+}
+
+// [turns] by which tail and strand twist about each other: Gauss's linking integral, of strands that are not drawn tight yet.
+float twist(const Snapshot& seen) {
+  const size_t last = seen.active().thread_order.size() - 1, first = first_point_node(seen);
+  float sum = 0;
+  for (size_t i = 0; i < first; ++i) {
+    const Vec3 a = node_at(seen, i), da = node_at(seen, i + 1) - a;
+    for (size_t k = last_point_node(seen); k < last; ++k) {
+      const Vec3 b = node_at(seen, k), db = node_at(seen, k + 1) - b, off = a + 0.5f * da - b - 0.5f * db;
+      const float far2 = std::max(length2(off), 1e-8f);
+      sum += dot(off, cross(da, db)) / (far2 * std::sqrt(far2));
+    }
+  }
+  return sum / (4 * kPi);
 }
 
 }  // namespace
@@ -79,8 +95,30 @@ Vec3 ThreadTie::tail_node(const Snapshot& seen, float from_end) const {
   return node_at(seen, node_along(seen, 0, from_end, 1));
 }
 
+// [rad] of the strand round jaws and shaft of the needle holder, in the sense of the throw. What has slid past the tips does
+// not count.
+float ThreadTie::wound(const Snapshot& seen) const {
+  const Pose& tool = seen.tool[kHolder].pose;
+  float sum = 0;
+  Vec3 before;
+  bool on = false;
+  for (size_t i = last_point_node(seen); i < seen.active().thread_order.size(); ++i) {
+    const Vec3 p = to_local(tool, node_at(seen, i)), flat{p.x, p.y, 0};
+    if (on && p.z > -2e-3f) sum += portable::atan2(before.x * flat.y - before.y * flat.x, dot(before, flat));
+    before = flat, on = p.z > -2e-3f;
+  }
+  return -side_ * sense_ * sum;
+}
+
+void ThreadTie::again(const Snapshot& seen, Stage after) {
+  ++retries_, misses_ = 0;
+  if (++tries_ > kAgain) failed_ = true, stage_ = done;
+  else go(seen, after);
+}
+
 void ThreadTie::begin(const Snapshot& seen, int wraps, int sense, bool first) {
-  wraps_ = wraps, sense_ = static_cast<float>(sense), first_ = first, failed_ = false, misses_ = 0;
+  wraps_ = wraps, sense_ = static_cast<float>(sense), first_ = first, failed_ = false, misses_ = 0, tries_ = 0;
+  twist_before_ = twist(seen);
   origin_ = 0.5f * (seen.active().suture_point.front().position + seen.active().suture_point.back().position);
   const Vec3 swage = needle_swage(picture_, seen);
   // The long strand is on the side of its hole for the first throw; then the ends have crossed.
@@ -118,6 +156,12 @@ bool ThreadTie::glide(float dt) {
   done_ += dt / seconds_;
   const float e = smooth(done_);
   tip_ = lerp(tip_from_, tip_to_, e), hand_ = lerp(hand_from_, hand_to_, e);
+  if (stage_ == to_tail || stage_ == to_work) {
+    // Over the stitch, the strand nearly taut all the way: slack thread that lags behind drifts between the jaws.
+    const Vec3 from = hand_from_ - origin_, to = hand_to_ - origin_;
+    const Vec3 way = lerp(normalized(from), normalized(to), e) + Vec3{0, 1.2f * e * (1 - e), 0};
+    hand_ = origin_ + normalized(way) * (length(from) + (length(to) - length(from)) * e);
+  }
   holder_turn_ = nlerp(holder_from_, holder_to_, e);
   forceps_angle_ = angle_from_ + (angle_to_ - angle_from_) * e;
   return done_ >= 1;
@@ -151,7 +195,7 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
     case to_tail:
     case take_tail: {  // once, to lay the tail straight on the side away from the needle; it hangs in front
       const Vec3 at = tail_node(seen, kTailEnd + 3e-3f * static_cast<float>(misses_));
-      const Vec3 aside = origin_ + Vec3{side_ * 0.25f, 0.45f, -0.65f} * strand_;  // behind the work
+      const Vec3 aside = origin_ + Vec3{side_ * 0.28f, 0.50f, -0.72f} * strand_;  // behind the work
       const Vec3 z = normalized(Vec3{0.1f * side_, 0.35f, 0.93f}),
                  along = node_at(seen, node_along(seen, 0, kTailEnd + 6e-3f, 1)) - tail_node(seen, kTailEnd);
       const Vec3 x = normalized(cross(z, along), {1, 0, 0});
@@ -220,6 +264,10 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
   const Vec3 shaft = shaft_from(side_);
   ScriptedHand& holder = hands_[kHolder];
   const bool holds = seen.tool[kHolder].held == Held::thread;
+  if (seen.tool[kForceps].held != Held::needle) {
+    failed_ = true, stage_ = done;
+    return true;
+  }
   switch (stage_) {
     case to_tail:
       move_jaw(holder, kHalfOpen, dt);
@@ -234,10 +282,13 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       }
       const bool shut = move_jaw(holder, 0, dt);
       if (holds && waited_ > 0.3f) {
-        go(seen, stage_ == take_tail ? lift_tail : draw);
+        if (stage_ == take_tail) go(seen, lift_tail);
+        else if (wound(seen) < 2 * kPi * static_cast<float>(wraps_) - 2) again(seen, drop_tail);  // a turn has slid off
+        else go(seen, draw);
       } else if (shut && waited_ > 0.5f) {
-        if (++misses_ > 6) failed_ = true, stage_ = done;
-        else go(seen, stage_ == take_tail ? to_tail : open);
+        const bool laying = stage_ == take_tail;
+        if (++misses_ <= 6) go(seen, laying ? to_tail : open);
+        else again(seen, laying ? to_tail : drop_tail);
       }
       break;
     }
@@ -290,10 +341,14 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       else if (felt_ < 0.02f) radius_ = std::min(0.5f * strand_, radius_ + 0.01f * dt);
       hand_ = tip_ + shaft * kWindAt + around(side_, angle_) * radius_;
       if (left < 0.6e-3f) go(seen, close);
-      else if (waited_ > 6) failed_ = true, stage_ = done;
+      else if (waited_ > 6) again(seen, drop_tail);
       break;
     }
     case draw: {
+      if (!holds && waited_ > 0.2f) {  // the tail has slipped out
+        again(seen, drop_tail);
+        break;
+      }
       const float far = std::max(1e-3f, distance(tip_from_, tip_to_));
       const bool taut = tail_felt_ > 2 * kWinding;
       const float speed =
@@ -307,7 +362,11 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       if (felt_ > 0.1f) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
       else if (felt_ < 0.01f) radius_ = std::min(0.6f * strand_, radius_ + 0.02f * dt);
       hand_ = lerp(middle, past, slid_) + around(side_, angle_ + turn * slid_) * radius_;
-      if (slid_ >= 1 && (taut || drawn_ >= far || waited_ > 5)) go(seen, cross_up);
+      if (slid_ < 1 || (!taut && drawn_ < far && waited_ <= 5)) break;
+      // A throw of one wrap gives 1.3 to 1.6 turns here, none at all less than half a turn.
+      const float turns = std::abs(twist(seen) - twist_before_);
+      if (turns > static_cast<float>(wraps_) - 0.2f) go(seen, cross_up);
+      else again(seen, drop_tail);
       break;
     }
     case cross_up:

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // surgeon/thread_tie: an instrument tie with physical mechanics. The forceps holds the needle near its swage and winds the
-// strand round the needle holder, which takes the tail, draws it through the turns and pulls against the forceps. Nothing
-// watches for a loop: the turns are thread on a shaft, and a throw that fails shows in the knot. Reads Snapshots; moves two
-// scripted hands.
+// strand round the needle holder, which takes the tail, draws it through the turns and pulls against the forceps. The turns are
+// thread on a shaft. The surgeon looks whether they are still there when the tail is taken, and whether the strands twist about
+// each other when it is drawn through; otherwise the throw is wound again, up to kAgain times. Reads Snapshots; moves two scripted
+// hands.
 //
 // x along the stitch, y up, z toward the viewer. `side` +1: the long strand is on the right, and the needle holder comes from
 // there. The sides alternate from throw to throw; winding in the same sense then makes a square knot.
@@ -31,6 +32,7 @@ class ThreadTie {
   // Every tick, until it returns true.
   bool operate(const Snapshot& seen, float dt);
   bool failed() const { return failed_; }
+  int retries() const { return retries_; }  // throws wound again so far
   std::string doing() const;
   float pulled() const { return pulled_; }  // [N] the smaller tension of both strands when the throw was pulled tight
 
@@ -63,12 +65,15 @@ class ThreadTie {
   void feel(const Snapshot& seen);
   void place();
   Vec3 tail_node(const Snapshot& seen, float from_end) const;
+  // Winds again, after the stage that lets everything go; or fails.
+  void again(const Snapshot& seen, Stage after);
+  float wound(const Snapshot& seen) const;
 
   const PictureModel& picture_;
   std::array<ScriptedHand, 2>& hands_;
   ThreadTieSettings how_;
   Stage stage_ = done;
-  int wraps_ = 1, misses_ = 0;
+  int wraps_ = 1, misses_ = 0, retries_ = 0, tries_ = 0;
   float side_ = 1, sense_ = 1, waited_ = 0;
   bool first_ = false, failed_ = false;
   Vec3 origin_;        // the middle of the stitch
@@ -84,6 +89,7 @@ class ThreadTie {
   // Winding.
   float strand_ = 0, tail_ = 0, height_ = 0, angle_ = 0, turned_ = 0, radius_ = 0, slack_ = 0;
   float felt_ = 0, tail_felt_ = 0, pulled_ = 0, steady_ = 0, drawn_ = 0, slid_ = 0;
+  float twist_before_ = 0;  // [turns] of tail and strand about each other before this throw
 };
 
 }  // namespace catgut

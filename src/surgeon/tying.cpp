@@ -23,6 +23,9 @@ constexpr float kTautStrand = 0.2f;           // [N]
 constexpr Vec3 kLaidDown{-0.6f, -0.3f, 0.75f};
 constexpr uint8_t kAssistant = 2;
 constexpr float kTyingAt = 0.12f;  // position on the needle's arc: behind the swage
+// The same with physical mechanics. The forceps lies along the needle, whose swage stands out beyond the tips: a strand that is
+// wound then turns in front of the jaws, and never between them and the needle.
+constexpr float kTyingAlong = 0.16f;
 
 }  // namespace
 
@@ -39,10 +42,14 @@ bool Scripted::regrip(const Snapshot& seen) {
     go(over);
     return false;
   }
-  const float phi = kTyingAt * shape().needle_arc;
-  const Vec3 place =
-      transform(seen.active().needle.pose, shape().needle_radius * Vec3{portable::cos(phi), portable::sin(phi), 0});
-  const Pose grip = tying_pose(kForceps, place);
+  const float phi = (plan_.pull > 0 ? kTyingAlong : kTyingAt) * shape().needle_arc;
+  const Pose& needle = seen.active().needle.pose;
+  const Vec3 place = transform(needle, shape().needle_radius * Vec3{portable::cos(phi), portable::sin(phi), 0});
+  Pose grip = tying_pose(kForceps, place);
+  if (plan_.pull > 0) {
+    const Vec3 z = rotate(needle.q, {-portable::sin(phi), portable::cos(phi), 0}), x = rotate(needle.q, {0, 0, 1});
+    grip.q = from_axes(x, cross(z, x), z);
+  }
   switch (stage_) {
     case over:
       jaw(kForceps, 1);
