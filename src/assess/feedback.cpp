@@ -124,6 +124,7 @@ std::vector<Cue> cues_now(const Rubric& rubric, const CueSource& source, const P
 
 std::vector<Remark> remarks_since(const Rubric& rubric, const Facts& facts, uint64_t after) {
   Rubric part = rubric;
+  part.whole = {};  // each stitch for itself
   std::erase_if(part.item, [](const RubricItem& i) {
     const MetricRow* row = find_metric(i.metric);
     return !i.each || !row || !of_a_stitch(row->group);

@@ -110,6 +110,7 @@ Json score_json(const Score& s) {
           {"percent", s.percent},
           {"pass_percent", s.pass},
           {"every_item", s.every_item},
+          {"completed", s.completed},
           {"passed", s.passed},
           {"verdict", s.verdict},
           {"items", items},

@@ -106,6 +106,7 @@ struct Score {
   uint64_t rubric_hash = 0;                          // of the file's text
   double points = 0, of = 0, percent = 0, pass = 0;  // pass: [%] required
   bool every_item = false;                           // every item must pass
+  double completed = 1;                              // part of the task, 0..1; all points are earned in this part
   bool passed = false;
   std::string verdict;  // one sentence
   std::vector<ItemScore> item;

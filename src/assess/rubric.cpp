@@ -77,7 +77,8 @@ struct Reader {
   }
 };
 
-const std::vector<std::string> kTop{"title", "technique", "version", "pass", "every_item", "needs_stitch", "item"};
+const std::vector<std::string> kTop{"title", "technique", "version", "pass", "every_item", "needs_stitch", "whole", "item"};
+const std::vector<std::string> kWhole{"bites", "throws", "cuts", "closure", "cut"};
 const std::vector<std::string> kItem{"key",      "title", "metric", "stage",    "weight",    "full",   "half",
                                      "critical", "each",  "pass",   "required", "validated", "source", "why"};
 
@@ -189,6 +190,13 @@ Rubric parse_rubric(const std::string& text, const std::string& filename) {
   r.pass = in.number(table, "pass", 70, 0, 100);
   r.every_item = in.flag(table, "every_item", false);
   r.needs_stitch = in.flag(table, "needs_stitch", true);
+  if (const toml::node* whole = table.get("whole")) {
+    const toml::table* t = whole->as_table();
+    if (!t) throw InputError(in.at(*whole), "whole is not a table", "write whole = {bites = 2, throws = 2}");
+    in.only(*t, kWhole, "whole");
+    r.whole = {in.number(*t, "bites", 0, 0, 1000), in.number(*t, "throws", 0, 0, 1000), in.number(*t, "cuts", 0, 0, 1000),
+               in.number(*t, "closure", 0, 0, 1), in.number(*t, "cut", 0, 0, 10000)};
+  }
   const toml::node* items = table.get("item");
   const toml::array* list = items ? items->as_array() : nullptr;
   if (!list || list->empty()) throw InputError(filename, "the rubric has no items", "add [[item]] tables");
@@ -229,20 +237,57 @@ Score mark_nothing(Score s, const Rubric& rubric, const Result& result) {
   lost.why = "no bite was completed and no throw was locked: there is nothing to judge, so there are no points";
   s.lost.push_back(lost);
   s.verdict = "failed: no stitch";
+  s.completed = 0;
   return s;
 }
 
+double sum_of(const Result& result, std::string_view key) {
+  const Metric* m = result.find(key);
+  double total = 0;
+  if (m)
+    for (const Sample& sample : m->sample) total += sample.value;
+  return total;
+}
+
 }  // namespace
+
+double completed(const WholeTask& whole, const Result& result, std::string* reason) {
+  const auto value = [&](std::string_view key) { return std::isfinite(result.value(key)) ? result.value(key) : 0.0; };
+  const auto samples = [&](std::string_view key) {
+    const Metric* m = result.find(key);
+    return m ? static_cast<double>(m->sample.size()) : 0.0;
+  };
+  const struct {
+    double done, all;
+    const char* unit;
+  } part[] = {{value("bites"), whole.bites, "bites"},
+              {sum_of(result, "throws"), whole.throws, "throws"},
+              {samples("tail"), whole.cuts, "cuts of the thread"},
+              {value("closure"), whole.closure, "closure"},
+              {samples("cut_edge"), whole.cut, "mm of the cut"}};  // one per millimeter
+  double done = 0, all = 0;
+  std::string text;
+  for (const auto& p : part) {
+    done += std::clamp(p.done, 0.0, p.all), all += p.all;
+    if (p.all > 0 && p.done < p.all)
+      text += fmt::format("{}{} of {} {}", text.empty() ? "" : ", ", short_number(p.done), short_number(p.all), p.unit);
+  }
+  if (reason) *reason = text;
+  return all > 0 ? done / all : 1;
+}
 
 Score mark(const Rubric& rubric, const Result& result) {
   Score s;
   s.rubric = rubric.name, s.title = rubric.title, s.version = rubric.version, s.rubric_hash = rubric.hash;
   s.pass = rubric.pass, s.every_item = rubric.every_item;
   if (rubric.needs_stitch && nothing_sewn(result)) return mark_nothing(std::move(s), rubric, result);
+  std::string missing;
+  s.completed = completed(rubric.whole, result, &missing);
   size_t failed = 0, critical = 0;
   for (const RubricItem& item : rubric.item) {
     const MetricRow* row = find_metric(item.metric);
     const Metric* metric = result.find(item.metric);
+    const double weight = s.completed * item.weight;  // work that was not done has no errors and takes no time
     ItemScore out;
     out.item = item.key, out.title = item.title, out.stage = item.stage, out.metric = item.metric, out.unit = row->unit;
     out.validated = item.validated, out.source = item.source;
@@ -266,7 +311,7 @@ Score mark(const Rubric& rubric, const Result& result) {
     };
     const bool count = row->summary == Summary::count;
     if (item.each && metric && !metric->sample.empty()) {
-      for (const Sample& sample : metric->sample) judge(sample, item.weight / static_cast<double>(metric->sample.size()));
+      for (const Sample& sample : metric->sample) judge(sample, weight / static_cast<double>(metric->sample.size()));
     } else if (!item.each && metric && std::isfinite(metric->value)) {
       // Shown at the sample that is furthest from the band; of counts the first.
       Sample sample{metric->value, result.ticks, {}, {}};
@@ -278,12 +323,12 @@ Score mark(const Rubric& rubric, const Result& result) {
         sample.tick = worst->tick, sample.where = worst->where;
         if (count || row->summary == Summary::maximum) sample.of = worst->of;
       }
-      judge(sample, item.weight);
+      judge(sample, weight);
     } else {
       out.observed = false;
       if (item.required) {
         LostPoint lost;
-        lost.item = item.key, lost.value = kNotObserved, lost.points = item.weight;
+        lost.item = item.key, lost.value = kNotObserved, lost.points = weight;
         lost.critical = item.has_critical, critical += item.has_critical;  // a knot that was not tied does not hold
         lost.tick = result.ticks, lost.time_s = static_cast<double>(result.ticks) * result.tick_s;
         lost.why = fmt::format("{}: not observed in this session, required {}", item.title, band_text(item.full, row->unit));
@@ -297,10 +342,20 @@ Score mark(const Rubric& rubric, const Result& result) {
     s.points += out.points, s.of += out.of;
     s.item.push_back(out);
   }
+  if (s.completed < 1) {
+    LostPoint lost;
+    lost.item = "whole_task", lost.value = s.completed, lost.points = (1 - s.completed) * s.of;
+    lost.tick = result.ticks, lost.time_s = static_cast<double>(result.ticks) * result.tick_s;
+    lost.why =
+        fmt::format("the task is not complete: {}; every item earns {:.0f} % of its points, the part of the task that was done",
+                    missing, 100 * s.completed);
+    s.lost.push_back(lost);
+  }
   s.percent = s.of > 0 ? 100 * s.points / s.of : 0;
-  s.passed = s.percent >= s.pass && critical == 0 && (!s.every_item || failed == 0);
+  s.passed = s.percent >= s.pass && critical == 0 && s.completed >= 1 && (!s.every_item || failed == 0);
   const bool unproven = std::any_of(s.item.begin(), s.item.end(), [](const ItemScore& i) { return !i.validated; });
   s.verdict = critical > 0         ? fmt::format("failed: {} critical {}", critical, critical == 1 ? "error" : "errors")
+              : s.completed < 1    ? fmt::format("failed: the task is not complete: {}", missing)
               : s.percent < s.pass ? fmt::format("failed: {:.1f} % of the points, {} % required", s.percent, s.pass)
               : !s.passed ? fmt::format("failed: {} of {} items below their limit, every item must pass", failed, s.item.size())
                           : fmt::format("passed: {:.1f} % of the points", s.percent);

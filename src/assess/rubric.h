@@ -29,12 +29,21 @@ struct RubricItem {
   std::string why;  // for the learner: what is wrong with a value outside the band
 };
 
+// The whole task, in completed work. A session that did a part of it earns that part of every item's points. 0: not counted.
+struct WholeTask {
+  double bites = 0, throws = 0;  // completed and locked
+  double cuts = 0;               // of a tied suture's thread
+  double closure = 0;            // of the opening, 0..1
+  double cut = 0;                // [mm] of the rim
+};
+
 struct Rubric {
   std::string name, title, technique, version;
   uint64_t hash = 0;  // of the file
   double pass = 70;   // [%] of the points
   bool every_item = false;
   bool needs_stitch = true;  // a session without a completed bite and without a throw has no points
+  WholeTask whole;
   std::vector<RubricItem> item;
 };
 
@@ -45,6 +54,9 @@ std::string rubrics_folder();             // empty: not found
 std::vector<std::string> rubric_names();  // sorted
 // The rubric of a technique; empty: there is none.
 std::string rubric_for(const std::string& technique);
+
+// Part of the task that was done, 0..1, with the reason of a part: "1 of 2 bites, 0 of 2 throws". 1: none is stated.
+double completed(const WholeTask& whole, const Result& result, std::string* reason = nullptr);
 
 Score mark(const Rubric& rubric, const Result& result);
 

@@ -212,7 +212,7 @@ const TechniqueRow kStay{
     .name = "stay",
     .title = "stay suture",
     .description = "one bite through each of two bowel ends, tied; both ends are held (section 2.5.3)",
-    .hint = "one bite through each end, pull even, tie two throws",
+    .hint = "one bite through each end, pull even, tie two throws, cut",
     .plan = "stay",
     .walls = 2,
     .missing = kNoEnds,

@@ -113,6 +113,21 @@ TEST(Cuts, bridges_are_found_with_their_lengths) {
   EXPECT_NEAR(scored.value("bridges"), 2 * 3.14159 * radius, 1);
 }
 
+TEST(Cuts, a_cut_that_stops_early_scores_its_part) {
+  const Rubric rubric = read_rubric("excision");
+  double before = 0;
+  for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+    Snapshot seen = with_cut([&](double angle) { return angle < 6.2832 * share ? 6.0 : -1.0; });
+    if (share < 1) seen.topology.pieces = 1;
+    const Score s = mark(rubric, measure(facts(), world().picture, seen));
+    EXPECT_GE(s.percent, before) << share;
+    EXPECT_NEAR(s.completed, std::min(1.0, share * 78 / 70), 0.03) << share;
+    EXPECT_TRUE(share > 0 || s.percent == 0);
+    EXPECT_TRUE(share == 1 || !s.passed) << share;
+    before = s.percent;
+  }
+}
+
 TEST(Cuts, without_a_cut_nothing_is_observed) {
   const Result r = measure(facts(), world().picture, world().start);
   for (const char* key : {"cut_edge", "cut_spread", "bridges", "energy_time"}) EXPECT_TRUE(std::isnan(r.value(key))) << key;
