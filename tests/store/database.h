@@ -37,24 +37,35 @@ inline std::string newest_postgres() {  // folder of its programs; empty: not in
   return newest;
 }
 
-// One server for the whole program, on a socket in a folder of its own: it listens on no port.
+// A server on a socket in a folder of its own: it listens on no port.
 class Server {
  public:
-  static Server& get() {
+  static Server& get() {  // one for the whole program
     static Server server;
     return server;
   }
+  // Of another one, a folder `small` is a file system of this size, in a mount namespace of the server's own.
+  explicit Server(int small_megabytes = 0) { start(small_megabytes); }
+  ~Server() {
+    if (running_ && std::system(as("pg_ctl -s -m immediate -D " + (folder_ / "data") + " stop >/dev/null 2>&1").c_str()))
+      std::fputs("the PostgreSQL server of the tests could not be stopped\n", stderr);
+  }
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+  bool run(const std::string& sql) const {
+    return std::system(as("psql -q -h " + folder_.path.string() + " -U postgres -d postgres -c \"" + sql + "\"").c_str()) == 0;
+  }
+  std::string url(const std::string& name) const { return "postgresql://postgres@/" + name + "?host=" + folder_.path.string(); }
+  std::string small() const { return folder_ / "small"; }
   const std::string& missing() const { return missing_; }  // why there is none; empty: it runs
   std::string fresh_url() {
     const std::string name = "t" + std::to_string(getpid()) + "_" + std::to_string(++count_);
-    if (std::system(
-            as("psql -q -h " + folder_.path.string() + " -U postgres -d postgres -c 'CREATE DATABASE " + name + "'").c_str()))
-      throw std::runtime_error("no database");
-    return "postgresql://postgres@/" + name + "?host=" + folder_.path.string();
+    if (!run("CREATE DATABASE " + name)) throw std::runtime_error("no database");
+    return url(name);
   }
 
  private:
-  Server() {
+  void start(int small_megabytes) {
     bin_ = newest_postgres();
     if (bin_.empty()) {
       missing_ = "postgresql is not installed";
@@ -66,18 +77,19 @@ class Server {
       if (std::system(("chown postgres " + folder_.path.string()).c_str())) missing_ = "there is no user postgres";
     }
     const std::string data = folder_ / "data", log = folder_ / "server.log";
+    std::string begin = as("pg_ctl -s -w -D " + data + " -l " + log + " -o \"-c listen_addresses= -k " + folder_.path.string() +
+                           "\" start >/dev/null 2>&1");
+    if (small_megabytes > 0) {
+      fs::create_directory(small());
+      begin = "unshare -m sh -c 'mount -t tmpfs -o size=" + std::to_string(small_megabytes) + "m none " + small() +
+              " 2>/dev/null && chown postgres " + small() + " && " + begin + "' 2>/dev/null";
+    }
     if (!missing_.empty() || std::system(as("initdb -A trust -U postgres -N -D " + data + " >/dev/null 2>&1").c_str()) ||
-        std::system(as("pg_ctl -s -w -D " + data + " -l " + log + " -o \"-c listen_addresses= -k " + folder_.path.string() +
-                       "\" start >/dev/null 2>&1")
-                        .c_str())) {
+        std::system(begin.c_str())) {
       if (missing_.empty()) missing_ = "the server does not start";
       return;
     }
     running_ = true;
-  }
-  ~Server() {
-    if (running_ && std::system(as("pg_ctl -s -m immediate -D " + (folder_ / "data") + " stop >/dev/null 2>&1").c_str()))
-      std::fputs("the PostgreSQL server of the tests could not be stopped\n", stderr);
   }
   std::string as(const std::string& command) const { return "cd / && " + user_ + bin_ + "/" + command; }
 

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <random>
 #include <thread>
 
 #include "database.h"
@@ -238,6 +240,80 @@ TEST_P(Stores, a_backup_is_a_store_and_restores_into_an_empty_one) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Databases, Stores, testing::Values("sqlite", "postgresql"), [](const auto& all) { return all.param; });
+
+class OnServer : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (const std::string missing = Server::get().missing(); !missing.empty())
+      GTEST_SKIP() << "left out on PostgreSQL: " << missing;
+  }
+  static StoreOptions at(const std::string& url) {
+    StoreOptions options;
+    options.where = url;
+    return options;
+  }
+};
+
+TEST_F(OnServer, a_store_of_every_older_schema_is_migrated_on_postgresql) {
+  for (int version = 1; version < schema_version(); ++version) {
+    const std::string url = Server::get().fresh_url();
+    create_store_of_schema(url, version);
+    StoreOptions reading = at(url);
+    reading.read_only = true;
+    EXPECT_NE(fault_of([&] { Store store(reading); }).find("has the older schema"), std::string::npos) << version;
+    Store store(at(url));
+    store.add(some_session());
+    store.log("E1", "export", "T01");
+    EXPECT_EQ(store.sessions().size(), 1u);
+  }
+  const std::string url = Server::get().fresh_url();
+  create_store_of_schema(url, 99);
+  EXPECT_NE(fault_of([&] { Store store(at(url)); }).find("was written by a newer Catgut (schema 10"), std::string::npos);
+}
+
+TEST_F(OnServer, a_read_only_server_refuses_changes_in_one_line_on_postgresql) {
+  const std::string url = Server::get().fresh_url(), name = url.substr(url.find("@/") + 2, url.find('?') - url.find("@/") - 2);
+  { Store(at(url)).add(some_session("T01", 0)); }
+  ASSERT_TRUE(Server::get().run("ALTER DATABASE " + name + " SET default_transaction_read_only = on"));
+  StoreOptions reading = at(url);
+  reading.read_only = true;
+  EXPECT_EQ(Store(reading).sessions().size(), 1u);
+  const std::string fault = fault_of([&] { Store(at(url)).add(some_session("T01", 1)); });
+  EXPECT_NE(fault.find("the server accepts no changes: it is read-only; use the main server"), std::string::npos) << fault;
+  EXPECT_EQ(fault.find('\n'), std::string::npos);
+  EXPECT_EQ(Store(reading).sessions().size(), 1u);
+}
+
+// The database in a file system of 16 MB, which ends with its server.
+TEST_F(OnServer, a_full_disk_is_one_line_and_loses_nothing_on_postgresql) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "another server: set CATGUT_LONG=1 (the nightly run)";
+  Server server(16);
+  if (!server.missing().empty()) GTEST_SKIP() << "left out: this user may not mount a file system";
+  ASSERT_TRUE(server.run("CREATE TABLESPACE small LOCATION '" + server.small() + "'"));
+  ASSERT_TRUE(server.run("CREATE DATABASE sessions TABLESPACE small"));
+  Store store(at(server.url("sessions")));
+  size_t stored = 0;
+  std::minstd_rand letter(1);  // text that cannot be compressed
+  const std::string fault = fault_of([&] {
+    for (; stored < 1000; ++stored) {
+      Session s = some_session("T01", static_cast<int>(stored));
+      for (size_t k = 0; k < 200000; ++k) s.details += static_cast<char>('0' + letter() % 64);
+      store.add(s);
+    }
+  });
+  EXPECT_NE(fault.find("the server's disk is full, so the last change was not stored; free some space"), std::string::npos)
+      << fault;
+  EXPECT_EQ(fault.find('\n'), std::string::npos);
+  EXPECT_GT(stored, 3u);
+  EXPECT_EQ(Store(at(server.url("sessions"))).sessions().size(), stored);
+  for (const Session& s : store.sessions())
+    expect_equal(some_session("T01", std::stoi(s.uid.substr(4))), [&] {
+      Session whole = store.session(s.id);
+      EXPECT_EQ(whole.details.size(), 200000u);
+      whole.details.clear();
+      return whole;
+    }());
+}
 
 TEST(Postgres, a_server_that_is_not_there_is_one_line_without_the_password) {
   StoreOptions options;
