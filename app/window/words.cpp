@@ -51,6 +51,10 @@ std::string fault_words(Fault fault) {
       return "wall cut at a suture";
     case Fault::bite_in_char:
       return "bite in charred tissue";
+    case Fault::inner_wall_cut:
+      return "inner wall cut";
+    case Fault::clamp_torn_out:
+      return "clamp torn out";
     default:
       return fault_name(fault);
   }
@@ -158,6 +162,13 @@ std::string words_for(const Event& e, bool& bad) {
       return e.value < 0 ? "wall cut through" : fmt::format("wall cut through, {:.1f} mm from the line", 1000 * e.value);
     case EventKind::piece_freed:
       return fmt::format("specimen free, {:.1f} g", 1000 * e.value);
+    case EventKind::tissue_snipped:
+      return fmt::format("tissue cut over {:.0f} mm", 1000 * e.value);
+    case EventKind::bleeding_started:
+      bad = true;
+      return fmt::format("bleeding, {:.1f} ml/min", 6e7 * static_cast<double>(e.value));
+    case EventKind::bleeding_stopped:
+      return "bleeding stopped";
     default:
       return "";
   }

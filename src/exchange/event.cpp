@@ -13,7 +13,8 @@ const char* event_name(EventKind kind) {
       "loop_rejected",        "loop_released",     "throw_started",      "throw_locked",    "throw_undone",
       "thread_cut",           "suture_loaded",     "suture_baked",       "seam_closed",     "instrument_taken",
       "instrument_laid_down", "instrument_parked", "instrument_refused", "technique_fault", "pen_activated",
-      "pen_deactivated",      "wall_scored",       "wall_cut_through",   "piece_freed"};
+      "pen_deactivated",      "wall_scored",       "wall_cut_through",   "piece_freed",     "tissue_snipped",
+      "tissue_crushed",       "bleeding_started",  "bleeding_stopped"};
   static_assert(sizeof(kName) / sizeof(kName[0]) == static_cast<size_t>(EventKind::count_));
   return kind < EventKind::count_ ? kName[static_cast<int>(kind)] : "unknown";
 }
@@ -22,7 +23,7 @@ const char* fault_name(Fault fault) {
   static constexpr const char* kName[] = {
       "none",          "wrong_body",      "wrong_layer",    "one_wall_only", "knot_without_bite", "needle_in_tissue",
       "cut_in_stitch", "cut_before_knot", "too_few_throws", "cut_off_line",  "pulled_attached",   "cut_at_suture",
-      "bite_in_char"};
+      "bite_in_char",  "inner_wall_cut",  "clamp_torn_out"};
   static_assert(sizeof(kName) / sizeof(kName[0]) == static_cast<size_t>(Fault::count_));
   return fault < Fault::count_ ? kName[static_cast<int>(fault)] : "unknown";
 }

@@ -51,6 +51,10 @@ enum class EventKind : uint8_t {
   wall_cut_through,      // who: hand, which: instrument, value: distance from the planned line [m], -1: none; first place
                          // where the pen is through since it was activated
   piece_freed,           // who: hand, which: pieces of the tissue now, value: mass of the freed one [kg], where: its center
+  tissue_snipped,        // who: hand, which: instrument, value: length of the cut that scissors have made [m]
+  tissue_crushed,        // who: hand, which: instrument, value: pressure of a clamp's jaws [Pa]; once per closing
+  bleeding_started,      // which: bleeding point, value: flow [m^3/s]
+  bleeding_stopped,      // which: bleeding point, value: blood that it has lost [m^3]
   count_
 };
 
@@ -69,6 +73,8 @@ enum class Fault : uint8_t {
   pulled_attached,    // which: instrument, value: pull [N] on a specimen whose circle is incomplete; once per grasp
   cut_at_suture,      // which: suture; the wall was cut through beside one of its holes; once per suture
   bite_in_char,       // which: bite; its entry or exit lies in charred tissue
+  inner_wall_cut,     // which: instrument; another body than the planned one was cut through before its specimen was free
+  clamp_torn_out,     // which: instrument, value: force [N]; a closed clamp lost its tissue
   count_
 };
 const char* fault_name(Fault fault);

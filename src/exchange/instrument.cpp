@@ -22,6 +22,8 @@ const char* capability_name(uint32_t capability) {
       return "cauterize";
     case kRetract:
       return "retract";
+    case kAbsorb:
+      return "absorb";
     default:
       return "";
   }

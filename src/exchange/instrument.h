@@ -20,6 +20,7 @@ enum Capability : uint32_t {
   kCutTissue = 1u << 5,
   kCauterize = 1u << 6,
   kRetract = 1u << 7,
+  kAbsorb = 1u << 8,  // takes up blood, and stops bleeding by pressure
 };
 // "hold_needle", ...; "" unless it is exactly one capability.
 const char* capability_name(uint32_t capability);

@@ -130,6 +130,20 @@ struct TopologyView {
 struct Scar {
   uint8_t burnt = 0;  // char, 0 .. 255
   uint8_t depth = 0;  // [0.01 mm] of the groove; 0 where it is through
+  uint8_t blood = 0;  // that lies on it, 0 .. 255
+};
+
+// A vessel that a cut has opened.
+struct BleedingView {
+  Vec3 at;         // [m]
+  float flow = 0;  // [m^3/s] now; 0: stopped
+  float lost = 0;  // [m^3] so far
+};
+// Damage of the tissue beside what was intended.
+struct WoundView {
+  std::vector<BleedingView> bleeding;
+  float thermal_spread = 0;  // [m] largest distance of heat-damaged tissue from the path of the pen's tip
+  float damaged = 0;         // [m^2] heat-damaged tissue
 };
 
 struct Snapshot {
@@ -148,6 +162,7 @@ struct Snapshot {
   std::vector<Event> event;                 // of this tick
   std::array<ForcePatch, kMaxHands> patch;  // force patch of each hand until the next tick
   std::vector<Scar> scar;                   // VisibleMesh::scar of topology.picture has indices of these
+  WoundView wound;
 
   // The active suture.
   const SutureView& active() const { return suture[active_suture]; }

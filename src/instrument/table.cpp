@@ -66,7 +66,7 @@ std::vector<InstrumentModel> make_table() {
                15,
                12});
   t.push_back({"scissors",
-               "Suture scissors",
+               "Scissors",
                kCutThread | kCutTissue,
                steel(0.045f, 0.030f, 0.0014f, 0.032f, 0.120f, 0.0025f),
                {0.040f},
@@ -82,6 +82,8 @@ std::vector<InstrumentModel> make_table() {
                0,
                0});
   t.push_back({"retractor", "Retractor", kRetract, steel(0.060f, 0.025f, 0.0030f, 0.027f, 0.120f, 0.0030f), {}, 0, 0, 0});
+  // A folded gauze in a ring forceps: a ball of 10 mm across.
+  t.push_back({"swab", "Swab on a holder", kAbsorb, steel(0.040f, 0.004f, 0.0050f, 0.012f, 0.120f, 0.0025f), {}, 0, 0, 0});
   return t;
 }
 

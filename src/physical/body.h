@@ -105,6 +105,7 @@ struct HandTarget {
   float opening = 0;       // [rad] of each jaw
   float grip = 0;          // [N] normal force of closing jaws; 0: they let go
   uint32_t may_hold = 7;   // bits: 1 needle, 2 thread, 4 tissue
+  Vec3 load{};             // [N] on the center of a body that no hand holds, such as the weight of a parked clamp
 };
 
 // Impulse of a contact, grip point or channel point in the last step: start of the next solve.

@@ -38,6 +38,7 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
   out.center = center_of(m, b), out.held = t && t->connected;
   if (!out.held) {
     if (m.falls) push += model.gravity * (m.mass * h);
+    if (t) push += t->load * h;
     const float keep = m.falls ? 1 - 2 * h : 1 - 50 * h;
     out.inv_mass = 1 / m.mass, out.inv_inertia = 1 / m.inertia;
     out.v = b.velocity * keep + push * out.inv_mass, out.w = b.spin * keep + twist * out.inv_inertia;

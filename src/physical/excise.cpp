@@ -14,43 +14,11 @@ constexpr float kSmoothing = 0.25e-3f;  // [m] length over which the tip's direc
 
 bool is_quad(const wall::Model& m, uint32_t face) { return m.mesh.face[face][3] != wall::kNone; }
 
-// The surface point under the tip.
-Foot under(const Model& m, const State& s, Vec3 tip, float reach) {
-  const Surface& surface = surface_of(m, s);
-  const wall::Topology& t = s.wall.topology;
-  Foot best;
-  best.gap = 1e9f;
-  for (uint32_t e = 0; e + 1 < surface.first_of_face.size(); ++e) {
-    if (surface.first_of_face[e] == surface.first_of_face[e + 1]) continue;
-    const uint32_t lane = wall::lane_of_element(m.wall, t, e), block = lane / wall::kLanesOfBlock,
-                   in = lane % wall::kLanesOfBlock;
-    Vec3 center{};
-    for (const auto& column : t.corners[block].column) center += wall::vec3(s.wall.motion.x[2 * column[in]]) * 0.25f;
-    float far2 = 0;
-    for (const auto& column : t.corners[block].column)
-      far2 = std::max(far2, length2(wall::vec3(s.wall.motion.x[2 * column[in]]) - center));
-    const float r = std::sqrt(far2) + m.wall.laminate.thickness + reach;
-    if (length2(tip - center) > r * r) continue;
-    for (uint32_t q = surface.first_of_face[e]; q < surface.first_of_face[e + 1]; ++q) {
-      Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, tip);
-      // A tip that has sunk into its own groove is still on the face that it came from.
-      const float far = distance(foot.at, tip);
-      if (far < best.gap) best = foot, best.gap = far;
-    }
-  }
-  return best;
-}
-
-uint32_t mixed(uint32_t a, uint32_t b) {
-  uint32_t h = a * 0x9e3779b1u ^ (b + 0x7f4a7c15u) * 0x85ebca6bu;
-  h ^= h >> 15, h *= 0x2c1b3c6du, h ^= h >> 12;
-  return h * 0x297a2d39u ^ h >> 16;
-}
-
 void reserve(const wall::Model& m, Excision& e) {
   if (!e.passed.empty()) return;
   e.passed.assign(m.lane_of_face.size(), {}), e.burnt.assign(m.lane_of_face.size(), {});
-  e.groove.reserve(kMaxGroove), e.path.reserve(kMaxTipPath), e.bleed.reserve(kMaxBleed);
+  e.groove.reserve(kMaxGroove), e.path.reserve(kMaxTipPath), e.bleed.reserve(kMaxBleed),
+      e.heat.warm.reserve(m.lane_of_face.size());
 }
 
 void char_around(const wall::Model& m, Excision& e, uint32_t face, Vec3 tip, float width, float part) {
@@ -81,10 +49,36 @@ void char_around(const wall::Model& m, Excision& e, uint32_t face, Vec3 tip, flo
 
 }  // namespace
 
+Foot nearest_foot(const Model& m, const State& s, Vec3 tip, float reach) {
+  const Surface& surface = surface_of(m, s);
+  const wall::Topology& t = s.wall.topology;
+  Foot best;
+  best.gap = 1e9f;
+  for (uint32_t e = 0; e + 1 < surface.first_of_face.size(); ++e) {
+    if (surface.first_of_face[e] == surface.first_of_face[e + 1]) continue;
+    const uint32_t lane = wall::lane_of_element(m.wall, t, e), block = lane / wall::kLanesOfBlock,
+                   in = lane % wall::kLanesOfBlock;
+    Vec3 center{};
+    for (const auto& column : t.corners[block].column) center += wall::vec3(s.wall.motion.x[2 * column[in]]) * 0.25f;
+    float far2 = 0;
+    for (const auto& column : t.corners[block].column)
+      far2 = std::max(far2, length2(wall::vec3(s.wall.motion.x[2 * column[in]]) - center));
+    const float r = std::sqrt(far2) + m.wall.laminate.thickness + reach;
+    if (length2(tip - center) > r * r) continue;
+    for (uint32_t q = surface.first_of_face[e]; q < surface.first_of_face[e + 1]; ++q) {
+      Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, tip);
+      // A tip that has sunk into its own groove is still on the face that it came from.
+      const float far = distance(foot.at, tip);
+      if (far < best.gap) best = foot, best.gap = far;
+    }
+  }
+  return best;
+}
+
 PenStep use_pen(const ExciseModel& law, const Model& m, State& s, Scratch& k, Excision& e, const Pen& pen, float h) {
   PenStep out;
   if (!(pen.power > 0)) return e.touching = false, out;
-  const Foot foot = under(m, s, pen.tip, law.reach);
+  const Foot foot = nearest_foot(m, s, pen.tip, law.reach);
   if (foot.gap > law.reach) return e.touching = false, out;
   reserve(m.wall, e);
   const bool outer = foot.point.zeta >= 0;
@@ -141,18 +135,31 @@ PenStep use_pen(const ExciseModel& law, const Model& m, State& s, Scratch& k, Ex
     wall::Point at{g.face, 0, 0, now.zeta};
     wall::to_natural(is_quad(m.wall, g.face), r.center[r.link[g.link].a], at.xi, at.eta);
     ++out.through, out.at = at;
-    // A vessel, at the same place in every run.
-    const float chance = law.kerf / law.vessel_spacing;
-    const uint32_t dice = mixed(g.face, g.link);
-    if (static_cast<float>(dice >> 8) < chance * 16777216.0f && e.bleed.size() < kMaxBleed && !pen.coagulate) {
-      at.zeta = 0;
-      e.bleed.push_back({at, law.vessel_flow * static_cast<float>(1 + (dice & 7)) / 8});
-    }
+    if (!pen.coagulate) open_vessel(law.bleed, m.wall, marks.back(), true, e.bleed);
   }
-  for (Bleed& b : e.bleed)
-    if (pen.coagulate && b.flow > 0 && length2(wall::rest_place(m.wall, b.at) - tip) < law.char_coagulate * law.char_coagulate)
-      b.flow = std::max(0.0f, b.flow - law.vessel_flow * h / law.seal_time);
+  if (pen.coagulate) coagulate(law.bleed, m.wall, tip, h, e.bleed);
+  heat_at(law.heat, m.wall, now, pen.power, pen.coagulate, h, e.heat);
   if (!marks.empty()) out.cut = cut(m, s, k, marks);
+  return out;
+}
+
+SnipStep snip(const ExciseModel& law, const Model& m, State& s, Scratch& k, Excision& e, std::span<const wall::Point> path) {
+  SnipStep out;
+  reserve(m.wall, e);
+  std::vector<wall::Mark> marks;
+  for (size_t i = 0; i + 1 < path.size(); ++i) wall::trace(m.wall, path[i], path[i + 1], marks);
+  if (marks.empty()) return out;
+  const std::vector<wall::FaceCut> before = s.wall.topology.cut;
+  out.cut = cut(m, s, k, marks);
+  const std::vector<wall::FaceCut>& after = s.wall.topology.cut;
+  for (const wall::Mark& mark : marks) {
+    const bool was = !before.empty() && before[mark.face].has(mark.link);
+    if (was || after.empty() || !after[mark.face].has(mark.link)) continue;
+    open_vessel(law.bleed, m.wall, mark, false, e.bleed);
+  }
+  for (size_t i = 0; i + 1 < path.size(); ++i)
+    out.length += distance(wall::rest_place(m.wall, path[i]), wall::rest_place(m.wall, path[i + 1]));
+  out.at = path.back();
   return out;
 }
 

@@ -4,15 +4,19 @@
 //
 // Depth. The power that evaporates tissue makes a groove: depth = efficiency P / (energy kerf speed), from the side where the
 // tip is. `energy` is the heat that takes tissue from 37 to 100 degrees and evaporates its water:
-// 1050 kg/m3 (3600 J/(kg K) 63 K + 0.75 2.257 MJ/kg) = 2.0 GJ/m3. Assumptions: efficiency, kerf, the widths of char, and where
-// vessels are. Grooves from both faces of the wall add up. A tip that comes back beside a groove falls into it (`snap`), so
-// that a second pass deepens the first and a circle closes on its start.
+// 1050 kg/m3 (3600 J/(kg K) 63 K + 0.75 2.257 MJ/kg) = 2.0 GJ/m3. Assumptions: efficiency, kerf and the widths of char. Heat
+// beside the groove: physical/heat. Vessels that it opens: physical/bleed. Grooves from both faces of the wall add up. A tip
+// that comes back beside a groove falls into it (`snap`), so that a second pass deepens the first and a circle closes on its
+// start.
 #pragma once
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/reflect.h"
+#include "physical/bleed.h"
+#include "physical/heat.h"
 #include "physical/physical.h"
 
 namespace catgut::physical {
@@ -26,10 +30,9 @@ struct ExciseModel {
   float reach = 0.5e-3f;     // [m] a tip farther from the wall does nothing
   float char_cut = 0.3e-3f;  // [m] width of the char on each side
   float char_coagulate = 1.5e-3f;
-  float char_time = 0.05f;       // [s] in which the char forms
-  float vessel_spacing = 6e-3f;  // [m] of a cut between vessels, on average
-  float vessel_flow = 2e-8f;     // [m3/s] of the largest
-  float seal_time = 0.5f;        // [s] of coagulation beside a vessel that closes it
+  float char_time = 0.05f;  // [s] in which the char forms
+  BleedModel bleed;
+  HeatModel heat;
 };
 
 struct Pen {
@@ -45,10 +48,6 @@ struct Groove {
   float outer = 0, inner = 0;  // [m] depth from each face
   bool through = false;
 };
-struct Bleed {
-  wall::Point at;
-  float flow = 0;  // [m3/s]; 0: sealed
-};
 
 struct Excision {
   bool touching = false;
@@ -59,15 +58,18 @@ struct Excision {
   std::vector<wall::Point> path;                       // places of the tip, a quarter of a millimeter apart
   std::vector<std::array<float, wall::kCells>> burnt;  // per face: char, 0 .. 1
   std::vector<Bleed> bleed;
+  Heat heat;
   uint32_t overflow = 0;  // links that found no room
 };
-constexpr size_t kMaxGroove = 8192, kMaxTipPath = 4096, kMaxBleed = 256;
+constexpr size_t kMaxGroove = 8192, kMaxTipPath = 4096;
 
 constexpr void reflect(auto& a, Like<Groove> auto& g) { a(g.face), a(g.link), a(g.at), a(g.outer), a(g.inner), a(g.through); }
-constexpr void reflect(auto& a, Like<Bleed> auto& b) { a(b.at), a(b.flow); }
 constexpr void reflect(auto& a, Like<Excision> auto& e) {
-  a(e.touching), a(e.last), a(e.trail), a(e.groove), a(e.passed), a(e.path), a(e.burnt), a(e.bleed), a(e.overflow);
+  a(e.touching), a(e.last), a(e.trail), a(e.groove), a(e.passed), a(e.path), a(e.burnt), a(e.bleed), a(e.heat), a(e.overflow);
 }
+
+// The nearest point of the wall's surface, whatever its side; `gap` is the distance. More than `within` [m]: not searched.
+Foot nearest_foot(const Model& model, const State& state, Vec3 p, float within);
 
 // What the pen did in a step.
 struct PenStep {
@@ -79,6 +81,15 @@ struct PenStep {
 // One step of h seconds, before physical::step. Allocates once, on first use; a cut itself may allocate (wall/cut).
 PenStep use_pen(const ExciseModel& law, const Model& model, State& state, Scratch& scratch, Excision& excision, const Pen& pen,
                 float h);
+
+// Scissors: what their closed blades divide, from one place of the wall to the next. `Excision` gets its traces and vessels.
+struct SnipStep {
+  wall::CutResult cut;
+  float length = 0;  // [m]
+  wall::Point at;    // the last place
+};
+SnipStep snip(const ExciseModel& law, const Model& model, State& state, Scratch& scratch, Excision& excision,
+              std::span<const wall::Point> path);
 
 // Char at a material point, 0 .. 1.
 float burnt_at(const Model& model, const Excision& excision, const wall::Point& point);

@@ -67,7 +67,7 @@ const Field kField[] = {
     {"body", "folded", "", 0, 0, nullptr, "the two tubes are one wall, folded at the near end: a prolapse before it is cut", BODY(folded)},
 
     {"instrument", "name", "", 0, 0, nullptr, "name in this scene; empty: that of its kind", INSTRUMENT(name)},
-    {"instrument", "kind", "", 0, 0, nullptr, "needle_holder, forceps, debakey, allis, scissors, cautery, retractor, or a kind of the host program", INSTRUMENT(kind)},
+    {"instrument", "kind", "", 0, 0, nullptr, "needle_holder, forceps, debakey, allis, scissors, cautery, retractor, swab, or a kind of the host program", INSTRUMENT(kind)},
     {"instrument", "where", "", 0, 0, "tray|right|left|assistant_right|assistant_left|parked", "on the tray, in a hand, or (a clamp) closed on tissue without a hand", INSTRUMENT(where)},
     {"instrument", "at", "m", -1, 1, nullptr, "parked: point whose nearest tissue surface is held", INSTRUMENT(at)},
     {"instrument", "pull", "N", -100, 100, nullptr, "parked: traction force instead of the weight; zero: the weight", INSTRUMENT(pull)},
@@ -138,7 +138,7 @@ const Field kField[] = {
     {"technique", "step", "m", 0.0001, 0.1, nullptr, "spacing of the pairs between two midpoints (dist_threshold of section 2.5.2)", TOP(technique.step)},
     {"technique", "throws", "", 1, 8, nullptr, "minimum throws of a secure knot", TOP(technique.throws)},
 
-    {"surgeon", "plan", "", 0, 0, &plan_choices, "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel. interrupted: one stitch over a gap, without a technique. simple: the same, tied and cut. excision: the end of a bowel is cut off with an electrosurgical pen", TOP(surgeon.plan)},
+    {"surgeon", "plan", "", 0, 0, &plan_choices, "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel. interrupted: one stitch over a gap, without a technique. simple: the same, tied and cut. excision: the end of a bowel is cut off with an electrosurgical pen. slit: its opening is lengthened with scissors", TOP(surgeon.plan)},
     {"surgeon", "bites", "", 0, 1000, nullptr, "number of bites", TOP(surgeon.bites)},
     {"surgeon", "edge_distance", "m", 0, 0.1, nullptr, "distance of the bites from the rim", TOP(surgeon.edge_distance)},
     {"surgeon", "bite_length", "m", 0, 0.1, nullptr, "bite length along the rim", TOP(surgeon.bite_length)},
@@ -328,6 +328,10 @@ const std::vector<ResultName>& result_names() {
          "largest distance of a cut edge from the line edge_distance away from the first body's rim, at rest"},
         {"specimen_way", "m", "displacement of the piece with the first body's rim; 0 while it is one with the rest"},
         {"drawn_mass", "kg", "what the drawn tissue encloses at rest, once a pen has touched it; 0 before"},
+        {"blood_loss", "m3", "blood lost from vessels that a cut has opened"},
+        {"bleeding", "", "vessels that still bleed at the end"},
+        {"thermal_spread", "m", "largest distance of heat-damaged tissue from the path of the pen's tip, at rest"},
+        {"burnt_area", "m2", "heat-damaged tissue, at rest"},
         {"simulated_s", "s", "simulated time including settling"},
         {"ticks", "", "ticks including settling"},
         {"surgeon_retries", "", "bites, grasps, throws and cuts that the surgeon tried again"},

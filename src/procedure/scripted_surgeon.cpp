@@ -50,6 +50,16 @@ std::unique_ptr<Surgeon> scripted_surgeon(const SceneSpec& scene, const PictureM
                        pen ? "a wall of guided mechanics cannot be cut" : "the right hand holds no electrosurgical pen",
                        pen ? "set mechanics.kind = \"physical\"" : "add [[instrument]] kind = \"cautery\", where = \"right\"");
   }
+  if (plan == "slit") {
+    const auto has = [&](const char* kind, const char* where) {
+      return std::any_of(scene.instrument.begin(), scene.instrument.end(),
+                         [&](const InstrumentSpec& i) { return i.kind == kind && i.where == where; });
+    };
+    if (scene.mechanics.kind != "physical" || !has("scissors", "right") || !has("swab", "tray") || !has("cautery", "tray"))
+      throw InputError("surgeon.plan = \"slit\"",
+                       "it needs physical mechanics, scissors in the right hand, swab and pen on the tray",
+                       "set mechanics.kind = \"physical\", and add the missing [[instrument]]");
+  }
   try {
     return make_surgeon(plan, picture, skill_of(scene));
   } catch (const std::invalid_argument&) {

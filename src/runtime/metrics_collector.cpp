@@ -210,6 +210,10 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   v["cut_deviation"] = cut.deviation;
   v["specimen_way"] = cut.way;
   v["drawn_mass"] = cut.mass;
+  double &lost = v["blood_loss"] = 0, &bleeding = v["bleeding"] = 0;
+  for (const BleedingView& b : last.wound.bleeding) lost += static_cast<double>(b.lost), bleeding += b.flow > 0 ? 1 : 0;
+  v["thermal_spread"] = static_cast<double>(last.wound.thermal_spread);
+  v["burnt_area"] = static_cast<double>(last.wound.damaged);
   v["simulated_s"] = result.simulated_s;
   v["ticks"] = static_cast<double>(result.ticks);
   v.try_emplace("surgeon_retries", 0);

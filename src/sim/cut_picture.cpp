@@ -4,6 +4,7 @@
 // tick only notes what a picture depends on; the first reader of the picture makes it. Declared in sim/cutting.
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "core/hash.h"
 #include "physical/cut_mesh.h"
@@ -33,14 +34,36 @@ bool is_open(const wall::Model& m, const wall::Topology& t, uint32_t face, uint3
          t.cut[over / 4].has(wall::raster(is_quad(m, over / 4)).over_edge(over % 4, there));
 }
 
-// Faces that show traces of a pen: they are drawn cell by cell.
-void find_touched(const physical::Excision& e, std::vector<uint32_t>& touched) {
+Vec3 middle_of(const wall::Model& m, uint32_t face) {
+  Vec3 sum{};
+  const uint32_t n = is_quad(m, face) ? 4 : 3;
+  for (uint32_t k = 0; k < n; ++k) sum += m.mesh.outer[m.mesh.face[face][k]] + m.mesh.inner[m.mesh.face[face][k]];
+  return sum / static_cast<float>(2 * n);
+}
+// [m] no point of the face is farther from its middle.
+float size_of(const wall::Model& m, uint32_t face) {
+  const Vec3 middle = middle_of(m, face);
+  float far2 = 0;
+  for (uint32_t k = 0; k < (is_quad(m, face) ? 4u : 3u); ++k)
+    far2 = std::max(far2, length2(m.mesh.outer[m.mesh.face[face][k]] - middle));
+  return std::sqrt(far2);
+}
+
+// Faces that show traces of a cut: they are drawn cell by cell.
+void find_touched(const wall::Model& m, const physical::Excision& e, std::vector<uint32_t>& touched) {
   constexpr float kVisible = 0.04f;  // of char
   touched.clear();
   for (uint32_t f = 0; f < e.passed.size(); ++f) {
     float burnt = 0;
     for (const float b : e.burnt[f]) burnt = std::max(burnt, b);
-    if (e.passed[f].any() || burnt > kVisible) touched.push_back(f);
+    bool stained = false;
+    for (size_t i = 0; i < e.bleed.size() && !stained; ++i) {
+      const physical::Bleed& b = e.bleed[i];
+      if (!(b.on_wall > 0)) continue;
+      const float reach = physical::stain_reach(kExciseLaw.bleed, b.on_wall) + size_of(m, f);
+      stained = length2(middle_of(m, f) - wall::rest_place(m, b.at)) < reach * reach;
+    }
+    if (e.passed[f].any() || burnt > kVisible || stained) touched.push_back(f);
   }
 }
 
@@ -143,7 +166,7 @@ class Builder {
  public:
   Builder(const CutShape& shape, PictureModel& picture)
       : shape_(shape), source_(*shape.source), wall_(shape.wall()), topology_(shape.topology), picture_(picture) {
-    normal_.resize(picture.body.size());
+    normal_.resize(picture.body.size()), inward_.resize(picture.body.size());
   }
 
   void build() {
@@ -151,7 +174,13 @@ class Builder {
       if (!is_divided(topology_, f)) add_whole(f);
     add_divided();
     for (size_t b = 0; b < normal_.size(); ++b)
-      for (size_t v = 0; v < normal_[b].size(); ++v) picture_.body[b].normal[v] = normalized(normal_[b][v], {0, 1, 0});
+      for (size_t v = 0; v < normal_[b].size(); ++v) {
+        VisibleMesh& mesh = picture_.body[b];
+        mesh.normal[v] = normalized(normal_[b][v], {0, 1, 0});
+        if (mesh.through[v] < 0.5f || length2(inward_[b][v]) == 0) continue;
+        const Vec3 inward = normalized(inward_[b][v]) * (wall_.laminate.thickness / kTexture);
+        mesh.uv[v][0] += inward.x, mesh.uv[v][1] += inward.y;
+      }
   }
 
  private:
@@ -185,7 +214,7 @@ class Builder {
     mesh.scar.push_back(trace == wall::kNone || lattice == wall::kNone ? kNoScar : scar_of(trace, lattice, inner));
     // The renderer's layers of a cut edge lie strictly between 0 and 1.
     mesh.through.push_back(edge ? (inner ? 0.999f : 0.001f) : (inner ? 1.0f : 0.0f));
-    normal_[b].push_back(edge ? Vec3{} : inner ? -out : out);
+    normal_[b].push_back(edge ? Vec3{} : inner ? -out : out), inward_[b].push_back({});
     return static_cast<uint32_t>(mesh.position.size()) - 1;
   }
   void add_triangle(uint32_t face, std::array<uint32_t, 3> t, bool edge) {
@@ -193,8 +222,18 @@ class Builder {
     VisibleMesh& mesh = picture_.body[b];
     const Vec3 n = cross(mesh.position[t[1]] - mesh.position[t[0]], mesh.position[t[2]] - mesh.position[t[0]]);
     mesh.triangle.push_back(t);
-    for (const uint32_t v : t)
-      if (edge) normal_[b][v] += n;
+    if (!edge) return;
+    for (const uint32_t v : t) normal_[b][v] += n;
+    // Across the wall the texture goes on at a right angle to the edge, so that it is not stretched over the cut. The third
+    // vertex lies to the left of an edge from vertex to vertex.
+    for (size_t k = 0; k < 3; ++k) {
+      const uint32_t from = t[k], to = t[(k + 1) % 3];
+      if (mesh.through[from] != mesh.through[to]) continue;
+      const float left = mesh.through[from] < 0.5f ? 1.0f : -1.0f, du = mesh.uv[to][0] - mesh.uv[from][0];
+      float dv = mesh.uv[to][1] - mesh.uv[from][1];
+      if (const float turn = source_.turn[b]; turn > 0) dv -= turn * std::round(dv / turn);
+      for (const uint32_t v : t) inward_[b][v] += Vec3{-dv * left, du * left, 0};
+    }
   }
 
   void add_whole(uint32_t face) {
@@ -293,6 +332,7 @@ class Builder {
   const wall::Topology& topology_;
   PictureModel& picture_;
   std::vector<std::vector<Vec3>> normal_;  // per body and vertex, not yet unit
+  std::vector<std::vector<Vec3>> inward_;  // of edges: in texture coordinates, toward the inner face
 };
 
 PictureModel draw(const CutShape& shape) {
@@ -365,8 +405,41 @@ void find_scars(const Model& model, const Cutting& c, std::vector<Scar>& out) {
     for (size_t d = 0; d < 2; ++d) {
       Scar& scar = out[2 * i + d];
       scar.burnt = static_cast<uint8_t>(std::min(255.0f, 255 * point[i].burnt));
+      scar.blood = 0;
       scar.depth = point[i].through ? uint8_t{0} : static_cast<uint8_t>(std::min(255.0f, point[i].depth[d] * 1e5f));
     }
+}
+
+// Blood at the same points: on the outer face it runs down, the cut edge and the mucosa get only the drop round the vessel.
+void find_stains(const Model& model, const Cutting& c, std::vector<Scar>& out) {
+  const wall::Model& m = model.physical->world.wall;
+  const Vec3 down = normalized(model.scene.solver.gravity, {0, -1, 0});
+  for (const physical::Bleed& b : c.excision.bleed) {
+    if (!(b.on_wall > 0)) continue;
+    const Vec3 vessel = wall::rest_place(m, b.at);
+    const float reach = physical::stain_reach(kExciseLaw.bleed, b.on_wall);
+    for (uint32_t i = 0; i < c.touched.size(); ++i) {
+      const uint32_t f = c.touched[i];
+      const float far = reach + size_of(m, f);
+      if (length2(middle_of(m, f) - vessel) > far * far) continue;
+      const bool quad = is_quad(m, f);
+      for (uint32_t k = 0; k < physical::kLatticePoints; ++k) {
+        const int32_t u = static_cast<int32_t>(k % physical::kLatticeSide),
+                      v = static_cast<int32_t>(k / physical::kLatticeSide);
+        if (!quad && u + v > wall::kRaster) continue;
+        wall::Point p{f, 0, 0, 0};
+        constexpr int32_t kUnit = wall::kLattice / wall::kRaster;
+        wall::to_natural(quad, {u * kUnit, v * kUnit}, p.xi, p.eta);
+        const Vec3 place = wall::rest_place(m, p);
+        const float outside = physical::blood_at(kExciseLaw.bleed, vessel, b.on_wall, down, place);
+        const bool near = length2(place - vessel) < kExciseLaw.bleed.stain * kExciseLaw.bleed.stain;
+        for (size_t side = 0; side < 2; ++side) {
+          uint8_t& blood = out[2 * (i * physical::kLatticePoints + k) + side].blood;
+          if (side == 0 || near) blood = std::max(blood, static_cast<uint8_t>(230 * outside));
+        }
+      }
+    }
+  }
 }
 
 // Rotation of each column since rest: mean over its elements of the turn of director and edge.
@@ -407,10 +480,16 @@ void renew_cut_picture(const Model& model, State& state) {
     c.picture = {}, c.picture_of = 0;
     return;
   }
-  // Only an active pen changes the wall.
-  if (c.picture && std::all_of(c.mode.begin(), c.mode.end(), [](PenMode m) { return m == PenMode::off; })) return;
-  find_touched(c.excision, c.touched);
+  // An active pen, scissors and blood change the wall's look. Blood does so slowly.
+  constexpr uint64_t kEvery = 6;  // ticks
+  const bool cuts = std::any_of(c.mode.begin(), c.mode.end(), [](PenMode m) { return m != PenMode::off; }) ||
+                    state.physical.world.wall.topology.version != c.picture_version;
+  const bool bleeds = state.tick % kEvery == 0 && !c.excision.bleed.empty();
+  if (c.picture && !cuts && !bleeds) return;
+  c.picture_version = state.physical.world.wall.topology.version;
+  find_touched(model.physical->world.wall, c.excision, c.touched);
   find_scars(model, c, c.scar);
+  find_stains(model, c, c.scar);
   const uint64_t shape = shape_of(model.physical->world.wall, state);
   if (c.picture && c.picture_of == shape) return;
   if (!c.source) c.source = make_source(model);
@@ -434,6 +513,10 @@ void publish_cut(const Model& model, const State& state, Snapshot& out) {
   const uint32_t version = static_cast<uint32_t>(wall.topology.fragment.size() + c.touched.size());
   out.topology = {version, c.pieces, c.picture};
   out.scar = c.scar;
+  for (const physical::Bleed& b : c.excision.bleed)
+    out.wound.bleeding.push_back(
+        {wall::place(wall::weights(model.physical->world.wall, wall.topology, b.at), wall.motion), b.flow, b.lost});
+  out.wound.thermal_spread = c.excision.heat.spread, out.wound.damaged = c.excision.heat.area;
   out.rotation.assign(model.solver.count, {});
   for (uint32_t i = 0; i < rest; ++i) out.rotation[2 * i] = out.rotation[2 * i + 1] = turned[i];
   for (uint32_t i = rest; i < turned.size(); ++i) {

@@ -11,8 +11,6 @@
 namespace catgut {
 namespace {
 
-constexpr physical::ExciseModel kLaw;
-
 uint8_t hand_of(const State& state, size_t instrument) { return state.suture.instrument[instrument].hand; }
 
 void report(State& state, EventKind kind, size_t instrument, uint32_t which, float value, Vec3 where,
@@ -78,6 +76,17 @@ void report_freed(const Model& model, State& state, size_t instrument, uint32_t 
     report(state, EventKind::piece_freed, instrument, state.physical.cutting.pieces, freed->mass, freed->moment / freed->mass);
 }
 
+// What has come free has no supply: its vessels are empty.
+void starve(const Model& model, State& state) {
+  const wall::Topology& t = state.physical.world.wall.topology;
+  const std::vector<uint32_t>& piece = pieces_of(model, state);
+  std::vector<uint8_t> supplied(piece.size(), 0);
+  for (uint32_t c = 0; c < piece.size(); ++c)
+    if (t.slot[c] == wall::kNone) supplied[piece[c]] = 1;
+  for (physical::Bleed& b : state.physical.cutting.excision.bleed)
+    if (!supplied[piece[wall::weights(model.physical->world.wall, t, b.at).column[0]]]) b.open = 0;
+}
+
 // Sutures whose thread runs through a hole near a place that was cut through.
 void watch_sutures(const Model& model, State& state, size_t instrument, const wall::Point& at) {
   const wall::Model& m = model.physical->world.wall;
@@ -94,10 +103,31 @@ void watch_sutures(const Model& model, State& state, size_t instrument, const wa
   }
 }
 
+// A place where the wall is cut through now, and what is wrong with it.
+void report_through(const Model& model, State& state, size_t instrument, const wall::Point& at, bool divided) {
+  Cutting& c = state.physical.cutting;
+  const uint32_t which = static_cast<uint32_t>(instrument);
+  const float off = from_line(model, at);
+  const auto fault = [&](Fault kind, float value) {
+    report(state, EventKind::technique_fault, instrument, which, value, place_of(model, state, at), kind);
+  };
+  if (!c.stroke.through) report(state, EventKind::wall_cut_through, instrument, which, off, place_of(model, state, at));
+  c.stroke.through = c.opened = true;
+  if (off > kOffLine && !c.stroke.off_line) fault(Fault::cut_off_line, off);
+  c.stroke.off_line = off > (c.stroke.off_line ? 0.8f : 1.0f) * kOffLine;
+  if (off < 0 && has_line(model) && !c.stroke.inner && c.pieces <= model.scene.body.size())
+    c.stroke.inner = true, fault(Fault::inner_wall_cut, 0);
+  watch_sutures(model, state, instrument, at);
+  if (!divided) return;
+  const uint32_t before = c.pieces;
+  c.pieces = count_pieces(model, state);
+  if (c.pieces > before) report_freed(model, state, instrument, at.face), starve(model, state);
+}
+
 void switch_on(State& state, size_t instrument, PenMode mode) {
   Cutting& c = state.physical.cutting;
   c.mode[instrument] = mode;
-  c.stroke = {state.tick, 0, false, false};
+  c.stroke = {state.tick, 0, false, false, false};
   report(state, EventKind::pen_activated, instrument, static_cast<uint32_t>(instrument),
          mode == PenMode::cut ? kCutPower : kCoagulatePower, state.physical.world.bodies.body[instrument].pose.p);
 }
@@ -117,8 +147,8 @@ void switch_off(const Model& model, State& state, size_t instrument) {
 Cutting start_cutting(const Model& model) {
   Cutting c;
   const std::vector<InstrumentModel>& kind = model.suture.instrument;
-  if (std::none_of(kind.begin(), kind.end(), [](const InstrumentModel& k) { return k.can(kCauterize); })) return c;
-  c.mode.assign(kind.size(), PenMode::off);
+  if (std::none_of(kind.begin(), kind.end(), [](const InstrumentModel& k) { return k.can(kCutTissue); })) return c;
+  c.mode.assign(kind.size(), PenMode::off), c.shut.assign(kind.size(), 1);
   c.pulled.assign(kind.size(), 0), c.cut_at_suture.assign(model.solver.strand.size(), 0);
   c.pieces = wall::count_pieces(model.physical->start.wall);
   return c;
@@ -135,10 +165,13 @@ bool cutting_fits(const Model& model, const Cutting& c) {
   const auto good_groove = [&](const physical::Groove& g) {
     return g.face < faces && g.link < wall::raster(wall.mesh.face[g.face][3] != wall::kNone).links;
   };
-  if (c.mode.size() != model.suture.instrument.size() || c.pulled.size() != c.mode.size() ||
+  if (c.mode.size() != model.suture.instrument.size() || c.shut.size() != c.mode.size() || c.pulled.size() != c.mode.size() ||
       c.cut_at_suture.size() != model.solver.strand.size() || e.passed.size() != e.burnt.size() ||
-      (!e.passed.empty() && e.passed.size() != faces))
+      (!e.passed.empty() && e.passed.size() != faces) || e.heat.warmer.size() != e.heat.damage.size() ||
+      (!e.heat.warmer.empty() && e.heat.warmer.size() != faces) || e.heat.warm.size() > faces)
     return false;
+  for (size_t i = 0; i < e.heat.warm.size(); ++i)
+    if (e.heat.warmer.empty() || e.heat.warm[i] >= faces || (i > 0 && e.heat.warm[i] <= e.heat.warm[i - 1])) return false;
   for (const PenMode mode : c.mode)
     if (mode > PenMode::coagulate) return false;
   if (e.passed.empty() && (!e.groove.empty() || !e.path.empty() || !e.bleed.empty() || e.touching)) return false;
@@ -186,22 +219,50 @@ void use_pens(const Model& model, State& state, physical::Scratch& scratch, floa
     pen.coagulate = c.mode[i] == PenMode::coagulate;
     pen.power = pen.coagulate ? kCoagulatePower : kCutPower;
   }
-  const physical::PenStep did = use_pen(kLaw, model.physical->world, state.physical.world, scratch, c.excision, pen, h);
+  const physical::PenStep did = use_pen(kExciseLaw, model.physical->world, state.physical.world, scratch, c.excision, pen, h);
   c.stroke.deepest = std::max(c.stroke.deepest, did.deepest);
-  if (did.through == 0) return;
-  const float off = from_line(model, did.at);
-  if (!c.stroke.through)
-    report(state, EventKind::wall_cut_through, active, static_cast<uint32_t>(active), off, place_of(model, state, did.at));
-  c.stroke.through = c.opened = true;
-  if (off > kOffLine && !c.stroke.off_line)
-    report(state, EventKind::technique_fault, active, static_cast<uint32_t>(active), off, place_of(model, state, did.at),
-           Fault::cut_off_line);
-  c.stroke.off_line = off > (c.stroke.off_line ? 0.8f : 1.0f) * kOffLine;
-  watch_sutures(model, state, active, did.at);
-  if (!did.cut.divided) return;
-  const uint32_t before = c.pieces;
-  c.pieces = count_pieces(model, state);
-  if (c.pieces > before) report_freed(model, state, active, did.at.face);
+  if (did.through > 0) report_through(model, state, active, did.at, did.cut.divided);
+}
+
+void use_scissors(const Model& model, State& state, physical::Scratch& scratch) {
+  Cutting& c = state.physical.cutting;
+  const physical::Model& m = model.physical->world;
+  for (size_t i = 0; i < c.mode.size(); ++i) {
+    const InstrumentModel& kind = model.suture.instrument[i];
+    if (!kind.can(kCutTissue) || kind.can(kCauterize)) continue;
+    const InstrumentState& tool = state.suture.instrument[i];
+    if (tool.place != InstrumentPlace::hand) c.shut[i] = 1;
+    else if (tool.jaw >= kind.jaw.open) c.shut[i] = 0;
+    if (c.shut[i] || tool.jaw > kind.jaw.closed) continue;
+    c.shut[i] = 1;
+    // The blades meet along the tool's axis, from the pivot to the tips. What of it lies in the wall is divided.
+    const Pose& pose = state.physical.world.bodies.body[i].pose;
+    std::vector<wall::Point> path;
+    physical::SnipStep did;
+    bool cut = false, divided = false;
+    const auto divide = [&] {
+      if (path.size() > 1) {
+        const physical::SnipStep part = snip(kExciseLaw, m, state.physical.world, scratch, c.excision, path);
+        did.length += part.length, did.at = part.at, cut = cut || part.length > 0, divided = divided || part.cut.divided;
+      }
+      path.clear();
+    };
+    constexpr float kApart = 0.2e-3f, kBeside = 0.3e-3f;  // [m] between places; outside the wall, still between the blades
+    for (float z = kind.body.capsule.front().b.z; z > 0; z -= kApart) {
+      const Vec3 p = transform(pose, {0, 0, z});
+      wall::Point at = physical::nearest_foot(m, state.physical.world, p, kBeside).point;
+      at.zeta = 0;
+      if (distance(place_of(model, state, at), p) < 0.5f * m.wall.laminate.thickness + kBeside) path.push_back(at);
+      else divide();
+    }
+    divide();
+    if (!cut) continue;
+    const Stroke pen = c.stroke;
+    c.stroke = {};
+    report(state, EventKind::tissue_snipped, i, static_cast<uint32_t>(i), did.length, place_of(model, state, did.at));
+    report_through(model, state, i, did.at, divided);
+    c.stroke = pen;
+  }
 }
 
 void watch_pulls(const Model& model, State& state) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/cutting: the stage of physical mechanics in which an active electrosurgical pen divides the wall. Reads commands and the
-// poses of instruments; writes the wall's topology (physical/excise) and the picture of a wall that a pen has touched.
-// docs/wall.md.
+// sim/cutting: the stages of physical mechanics in which an active electrosurgical pen or closing scissors divide the wall, and
+// in which what they opened bleeds. Reads commands and the poses of instruments; writes the wall's topology (physical/excise)
+// and the picture of a wall that was cut. docs/wall.md.
 //
 // The tip is the origin of the tool frame. Depth follows from power and time. One pen is active at a time: there is one tip.
 // Commands of a hand that holds an instrument which cauterizes: `cut` switches cutting on and off, `new_suture` coagulation.
@@ -31,12 +31,14 @@ struct Stroke {
   float deepest = 0;      // [m] of its grooves
   bool through = false;   // at one place at least
   bool off_line = false;  // the last place where it went through is off the line
+  bool inner = false;     // it has gone through another body than the planned one
 };
-constexpr void reflect(auto& a, Like<Stroke> auto& s) { a(s.began), a(s.deepest), a(s.through), a(s.off_line); }
+constexpr void reflect(auto& a, Like<Stroke> auto& s) { a(s.began), a(s.deepest), a(s.through), a(s.off_line), a(s.inner); }
 
 struct CutPictureSource;
 struct Cutting {
-  std::vector<PenMode> mode;  // per instrument; empty: the scene has no electrosurgical pen
+  std::vector<PenMode> mode;  // per instrument; empty: no instrument of the scene cuts tissue
+  std::vector<uint8_t> shut;  // per instrument: scissors that have not opened since they closed, or were taken
   physical::Excision excision;
   uint32_t pieces = 0;  // of the wall
   Stroke stroke;        // of the active pen, or the last one
@@ -47,18 +49,19 @@ struct Cutting {
   std::vector<uint32_t> touched;  // faces that show a pen's traces, in order
   std::vector<Scar> scar;         // as Snapshot::scar
   uint64_t picture_of = 0;        // what `picture` shows
+  uint32_t picture_version = 0;   // of the wall's topology then
   DividedPicture picture;
   std::shared_ptr<const CutPictureSource> source;  // null until a pen has touched the wall
 };
-// A scene without a pen has none of it.
+// A scene without pen and scissors has none of it.
 constexpr void reflect(auto& a, Like<Cutting> auto& c) {
   if (c.mode.empty()) {
     a.cache(c.mode), a.cache(c.excision), a.cache(c.pieces), a.cache(c.stroke), a.cache(c.opened), a.cache(c.cut_at_suture);
-    a.cache(c.pulled);
+    a.cache(c.pulled), a.cache(c.shut);
   } else {
-    a(c.mode), a(c.excision), a(c.pieces), a(c.stroke), a(c.opened), a(c.cut_at_suture), a(c.pulled);
+    a(c.mode), a(c.shut), a(c.excision), a(c.pieces), a(c.stroke), a(c.opened), a(c.cut_at_suture), a(c.pulled);
   }
-  a.cache(c.touched), a.cache(c.scar), a.cache(c.picture_of), a.cache(c.picture), a.cache(c.source);
+  a.cache(c.touched), a.cache(c.scar), a.cache(c.picture_of), a.cache(c.picture_version), a.cache(c.picture), a.cache(c.source);
 }
 
 // --- building, saving --------------------------------------------------------------------------------------------------
@@ -71,6 +74,11 @@ bool cutting_fits(const Model& model, const Cutting& cutting);
 void switch_pens(const Model& model, State& state, TickInput& input);
 // In every step of h seconds, before physical::step. Events: wall_cut_through, piece_freed, cut_off_line, cut_at_suture.
 void use_pens(const Model& model, State& state, physical::Scratch& scratch, float h);
+// Once, before the steps: scissors whose jaws have closed divide the wall between their blades. Events: tissue_snipped, and as
+// for pens.
+void use_scissors(const Model& model, State& state, physical::Scratch& scratch);
+// Once, after the steps (sim/bleeding): blood flows, heat spreads. Events: bleeding_started, bleeding_stopped.
+void bleed(const Model& model, State& state);
 // Once, after the steps: the fault pulled_attached.
 void watch_pulls(const Model& model, State& state);
 // Whether a material point lies in charred tissue.
@@ -81,6 +89,7 @@ constexpr float kOffLine = 2e-3f;       // [m] farther from the line is a fault 
 constexpr float kBesideSuture = 1e-3f;  // [m] from a hole with thread, likewise
 constexpr float kPulledForce = 1;       // [N] on the hand, likewise
 constexpr float kCharred = 0.5f;        // of Excision::burnt, likewise
+constexpr physical::ExciseModel kExciseLaw;
 
 // --- sim/cut_picture -----------------------------------------------------------------------------------------------------
 // Once per tick and after a load: notes what a new picture shows if the shape of the drawn wall has changed. The picture is

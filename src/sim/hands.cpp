@@ -159,6 +159,8 @@ void lay_out_instruments(const Model& model, State& state) {
   }
 }
 
+void drop_instrument(const Model& model, State& state, size_t i) { put_on_tray(model, state, i); }
+
 void meet_hands(State& state, const TickInput& input) {
   for (size_t k = 0; k < kMaxHands; ++k) {
     HandState& hand = state.hand[k];

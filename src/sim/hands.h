@@ -17,6 +17,8 @@ void meet_hands(State& state, const TickInput& input);
 // Once per tick: processes take, swap, lay_down, park and unpark in order. Each emits an event. A command that is invalid
 // (hand not empty or not connected, instrument in use or out of reach, not a clamp, nothing held) emits instrument_refused.
 void handle_instruments(const Model& model, State& state, const TickInput& input);
+// Without a hand it falls: it is back on its tray, open.
+void drop_instrument(const Model& model, State& state, size_t instrument);
 // Before every substep: an instrument follows its hand through a spring. `part` (0..1) is the fraction of the tick; the hand
 // pose is interpolated linearly over the tick.
 void follow_hands(const Model& model, State& state, const TickInput& input, float part);

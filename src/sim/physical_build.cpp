@@ -2,6 +2,7 @@
 // sim/physical_build: the physical model of a scene, its first state, and the check of a loaded one. See the header.
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "anatomy/body.h"
 #include "core/check.h"
@@ -80,7 +81,10 @@ physical::BodyModel body_of(const Model& model, const InstrumentModel& kind) {
     shape.mass = 1 / kind.body.inv_mass;
     m = physical::make_tool(shape);
   } else {
-    for (const Capsule& c : kind.body.capsule) physical::add_capsule(m, c.a, c.b, c.radius, c.radius, 0, 2 * c.radius);
+    // Blades of scissors pass into the tissue that they divide: only the shaft has contact.
+    const bool blades = kind.can(kCutTissue) && !kind.can(kCauterize);
+    for (const Capsule& c : std::span(kind.body.capsule).subspan(blades ? 1 : 0))
+      physical::add_capsule(m, c.a, c.b, c.radius, c.radius, 0, 2 * c.radius);
     m.mass = 1 / kind.body.inv_mass;
     m.inertia = m.mass * 0.02f * 0.02f;
     m.center = {0, 0, 0.06f};
@@ -166,6 +170,12 @@ PhysicalState start_physical(const Model& model, const SolverState& solver) {
   s.world = model.physical->start;
   for (size_t i = 0; i < s.world.bodies.body.size(); ++i)
     physical::place_body(model.physical->world.bodies.body[i], s.world.bodies.body[i], solver.body[i].pose(), kWideOpen);
+  // A parked clamp is about to close on its tissue.
+  for (const ParkedStart& p : model.parked) {
+    const physical::BodyModel& m = model.physical->world.bodies.body[p.instrument];
+    const float thickness = model.physical->world.wall.laminate.thickness;
+    if (m.hinge_z > 0) s.world.bodies.body[p.instrument].opening = 0.5f * thickness / m.hinge_z;
+  }
   s.suture.resize(model.solver.strand.size());
   s.cutting = start_cutting(model);
   for (size_t k = 0; k < s.suture.size(); ++k) s.suture[k].bed = solver.body[model.solver.needle_body(k)].pose();

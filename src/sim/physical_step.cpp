@@ -74,8 +74,15 @@ void set_targets(const Model& model, State& state, const TickInput& input, Physi
     InstrumentState& tool = state.suture.instrument[i];
     const InstrumentModel& kind = model.suture.instrument[i];
     const Weld& weld = state.solver.weld[i];
+    t.load = {};
     t.connected = tool.place == InstrumentPlace::hand && state.solver.body_collides[i] != 0;
-    if (!t.connected) continue;
+    if (tool.place == InstrumentPlace::parked) {
+      // The ratchet keeps the force of the jaws. A clamp that the scene begins with closes on its tissue in the first tick.
+      const bool closes = state.tick == 0 && state.physical.world.bodies.body[i].grip.what == physical::Gripped::nothing;
+      t.load = state.solver.body_force[i], t.connected = closes, t.pose = state.solver.body[i].pose(), t.opening = 0;
+      t.grip = closes ? pinch(kind, physical::Gripped::tissue, bodies.body[i].grip_friction) : 0, t.may_hold = 4;
+    }
+    if (tool.place != InstrumentPlace::hand || !t.connected) continue;
     t.pose = weld.target * inverse(weld.local_a);
     if (input.hand[tool.hand].connected) tool.jaw = input.hand[tool.hand].jaw;
     const physical::Gripped what = state.physical.world.bodies.body[i].grip.what;
@@ -197,6 +204,26 @@ constexpr EventKind kTaken[] = {EventKind::count_, EventKind::needle_grasped, Ev
                                EventKind::tissue_released};
 constexpr Held kHeld[] = {Held::nothing, Held::needle, Held::thread, Held::tissue};
 
+// A tissue clamp with a ratchet: a needle holder is none.
+bool is_clamp(const Model& model, uint32_t i) {
+  const InstrumentModel& kind = model.suture.instrument[i];
+  return kind.can(kClamp) && !kind.can(kHoldNeedle);
+}
+
+// A closed clamp has lost its tissue. A parked one falls, and is put back on the tray.
+void report_torn_out(const Model& model, State& state, uint32_t i) {
+  const physical::Body& body = state.physical.world.bodies.body[i];
+  Event e;
+  e.kind = EventKind::technique_fault, e.fault = Fault::clamp_torn_out;
+  e.who = state.suture.instrument[i].hand, e.which = i, e.where = body.pose.p;
+  const bool parked = state.suture.instrument[i].place == InstrumentPlace::parked;
+  e.value = length(parked ? state.solver.body_force[i] : body.hand_force);
+  state.event.add(e);
+  if (!parked) return;
+  drop_instrument(model, state, i);
+  physical::move_body(model.physical->world, state.physical.world, i, model.tray[i], kWideOpen);
+}
+
 // What jaws hold, with the events of taking and losing it.
 void show_grips(const Model& model, State& state, SutureContext& sewing) {
   const physical::State& w = state.physical.world;
@@ -210,6 +237,8 @@ void show_grips(const Model& model, State& state, SutureContext& sewing) {
     if (before != Held::nothing && before != now) {
       const bool slipped = tool.jaw <= model.suture.instrument[i].jaw.closed;
       const size_t kind = static_cast<size_t>(std::find(std::begin(kHeld), std::end(kHeld), before) - std::begin(kHeld));
+      const bool clamp = is_clamp(model, i) && before == Held::tissue;
+      if (clamp && (tool.place == InstrumentPlace::parked || slipped)) report_torn_out(model, state, i);
       sewing.report_tool(before == Held::tissue ? 0 : tool.suture, kLost[kind], i, before == Held::needle ? 0 : tool.slot,
                          slipped ? length(body.force) : 0, body.pose.p);
     }
@@ -232,6 +261,11 @@ void show_grips(const Model& model, State& state, SutureContext& sewing) {
       const wall::Weights at = wall::weights(model.physical->world.wall, w.wall.topology, grip.point[0].tissue);
       const size_t most = static_cast<size_t>(std::max_element(at.weight.begin(), at.weight.end()) - at.weight.begin());
       tool.slot = 2 * w.wall.topology.source[at.column[most]] + (grip.point[0].tissue.zeta < 0 ? 1 : 0);
+    }
+    // A ratchet closes as far as it can: teeth bruise what they hold.
+    if (now == Held::tissue && (before != now || state.tick == 0) && is_clamp(model, i)) {
+      const physical::BodyModel& m = model.physical->world.bodies.body[i];
+      sewing.report_tool(0, EventKind::tissue_crushed, i, i, grip.force / (2 * m.jaw_width * m.jaw_length), body.pose.p);
     }
     if (now != Held::nothing && before != now)
       sewing.report_tool(now == Held::tissue ? 0 : tool.suture, kTaken[static_cast<size_t>(grip.what)], i,
@@ -429,6 +463,7 @@ void step_physical(const Model& model, State& state, const TickInput& given, Job
   find_candidates(model.solver, state.solver, state.scratch, std::clamp(0.5f * model.dt, 0.002f, 0.008f), times);
   begin_haptics(state);
   k.puncture.clear(), std::fill(k.depth.begin(), k.depth.end(), 0.0f);
+  use_scissors(model, state, k.world);
   physical::Hands hands;
   hands.targets = k.target, hands.plane = &k.drape;
   for (int i = 1; i <= model.substeps; ++i) {
@@ -448,6 +483,7 @@ void step_physical(const Model& model, State& state, const TickInput& given, Job
   show_bites(model, state, sewing, k);
   show_points(model, state);
   watch_pulls(model, state);
+  bleed(model, state);
   renew_cut_picture(model, state);
   remember_hands(state, input);
   ++state.tick;

@@ -180,6 +180,7 @@ void publish(const Model& built, const State& state, Snapshot& out) {
   for (const ClosurePlan& plan : state.plan) out.closure = std::max(out.closure, plan.progress);
   out.event = state.event.list;
   out.scar.clear();
+  out.wound = {};
   if (state.physical.cutting.picture) publish_cut(model, state, out);
   if (!model.source.empty()) use_public_numbers(built, model, out);
 }

@@ -13,7 +13,8 @@ constexpr float kClear = 0.008f;      // [m] of the tip from the surface before 
 constexpr float kTraction = 0.0005f;  // [m] by which the rim is raised while it is cut
 constexpr float kOverlap = 0.12f;     // [rad] beyond a full turn: the line closes on its start
 constexpr float kCarried = 0.0035f;   // [m] from the line to the tissue that carries it: farther than an element
-constexpr int kMostRounds = 3, kMostMisses = 8;
+constexpr int kMostRounds = 3, kMostMisses = 8, kMostAttempts = 40;
+constexpr float kPatience = 2;  // [s] of coagulation on one vessel
 
 }  // namespace
 
@@ -42,6 +43,9 @@ std::string Excising::doing() const {
                                           "switch the pen off",
                                           "lift the specimen",
                                           "lay the specimen aside",
+                                          "go to a bleeding vessel",
+                                          "coagulate",
+                                          "coagulate",
                                           "hold",
                                           "done"};
   const std::string doing = kName[stage_];
@@ -78,6 +82,18 @@ Pose Excising::pen_at(const OnLine& line, float above) const {
   // Nearly square to the wall, the shaft a little toward the rim.
   const Vec3 z = normalized(line.out + line.up * 0.25f), x = normalized(cross(line.up, z), any_perpendicular(z));
   return {line.at + line.out * above, from_axes(x, cross(z, x), z)};
+}
+
+// From the side, on the outer face beside the vessel.
+Pose Excising::pen_on(const BleedingView& vessel, float above) const {
+  const Vec3 from = vessel.at - opening_.center, out = normalized(from - opening_.axis * dot(from, opening_.axis), u_);
+  return pen_at({vessel.at + out * (0.5f * skill_.wall), out, opening_.axis}, above);
+}
+
+bool Excising::choose_vessel(const Snapshot& seen) {
+  for (uint32_t i = 0; i < seen.wound.bleeding.size(); ++i)
+    if (seen.wound.bleeding[i].flow > 0) return vessel_ = i, true;
+  return false;
 }
 
 Pose Excising::grasp_at(float raised) const {
@@ -140,9 +156,29 @@ void Excising::act(const Snapshot& seen) {
     case aside: {
       Pose goal = grasp_at(0.035f);
       goal.p -= u_ * 0.04f;
-      if (move_toward(holder, goal, skill_.speed, dt_)) go(hold);
+      if (move_toward(holder, goal, skill_.speed, dt_)) go(to_vessel);
       return;
     }
+    case to_vessel:
+      if (waited_ <= dt_ && (!choose_vessel(seen) || attempts_++ > kMostAttempts)) return go(hold);
+      if (!move_toward(pen, pen_on(seen.wound.bleeding[vessel_], pen_is_near_ ? 0 : kClear), pen_is_near_ ? slow : skill_.speed,
+                       dt_))
+        return;
+      if (!pen_is_near_) {
+        pen_is_near_ = true;
+        return;
+      }
+      commands_.push({CommandKind::new_suture, 0, 0});
+      return go(coagulate);
+    case coagulate:
+      move_toward(pen, pen_on(seen.wound.bleeding[vessel_], 0), slow, dt_);
+      if (seen.wound.bleeding[vessel_].flow > 0 && waited_ < kPatience) return;
+      commands_.push({CommandKind::new_suture, 0, 0});
+      return go(leave);
+    case leave:
+      pen_is_near_ = false;
+      if (move_toward(pen, pen_on(seen.wound.bleeding[vessel_], 0.02f), skill_.speed, dt_)) go(to_vessel);
+      return;
     case hold:
       if (waited_ > 1) go(finished);
       return;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // surgeon/excision: the scripted surgeon cuts the end of a bowel off. The left hand grasps the rim; the right hand leads an
-// electrosurgical pen once round the organ, `edge_distance` from the rim; the left hand lifts the specimen away. Reads
-// Snapshots only. The line is carried by the tissue that stays: the specimen moves as soon as it is partly free.
+// electrosurgical pen once round the organ, `edge_distance` from the rim; the left hand lifts the specimen away. Then the pen
+// coagulates what still bleeds. Reads Snapshots only. The line is carried by the tissue that stays: the specimen moves as soon
+// as it is partly free.
 #pragma once
 #include <array>
 #include <string>
@@ -24,7 +25,23 @@ class Excising final : public Surgeon {
   std::string doing() const override;
 
  private:
-  enum Stage { over_rim, down, close, tighten, to_line, touch, round, off, lift, aside, hold, finished };
+  enum Stage {
+    over_rim,
+    down,
+    close,
+    tighten,
+    to_line,
+    touch,
+    round,
+    off,
+    lift,
+    aside,
+    to_vessel,
+    coagulate,
+    leave,
+    hold,
+    finished
+  };
   void act(const Snapshot& seen);
   void go(Stage stage) { stage_ = stage, waited_ = 0; }
   // The line on the organ's outer side at an angle [rad], now: position, outward, toward the rim.
@@ -34,7 +51,9 @@ class Excising final : public Surgeon {
   OnLine on_line(const Snapshot& seen, float angle) const;
   Vec3 radial(float angle) const { return u_ * portable::cos(angle) + v_ * portable::sin(angle); }
   Pose pen_at(const OnLine& line, float above) const;  // tip `above` the surface [m]
-  Pose grasp_at(float raised) const;                   // jaws about the rim, raised along the axis [m]
+  Pose pen_on(const BleedingView& vessel, float above) const;
+  bool choose_vessel(const Snapshot& seen);  // the next that bleeds; false: none
+  Pose grasp_at(float raised) const;         // jaws about the rim, raised along the axis [m]
   void switch_pen() { commands_.push({CommandKind::cut, 0, 0}); }
 
   PictureModel picture_;
@@ -48,8 +67,9 @@ class Excising final : public Surgeon {
   Stage stage_ = over_rim;
   float waited_ = 0, dt_ = 1.0f / 60, angle_ = 0, aim_ = 0;
   int misses_ = 0, rounds_ = 0, retries_ = 0;
-  bool gave_up_ = false;
-  uint32_t sequence_ = 0, pieces_ = 0;
+  int attempts_ = 0;  // to coagulate
+  bool gave_up_ = false, pen_is_near_ = false;
+  uint32_t sequence_ = 0, pieces_ = 0, vessel_ = 0;
 };
 
 }  // namespace catgut

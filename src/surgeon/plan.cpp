@@ -269,7 +269,7 @@ Plan simple_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
-// surgeon/excision carries it out: nothing of it is a task of the needle.
+// surgeon/excision and surgeon/slit carry them out: nothing of them is a task of the needle.
 Plan excision_plan(const PictureModel&, const SurgeonSkill&) { return {}; }
 
 // 2.5.4: single stitches through outer and inner layer round the ring, each tied and cut, with a new suture for the next.
@@ -340,7 +340,8 @@ constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
                              {"interrupted", 2, interrupted_plan},
                              {"interrupted_tied", 2, interrupted_tied_plan},
                              {"simple", 2, simple_plan},
-                             {"excision", 1, excision_plan}};
+                             {"excision", 1, excision_plan},
+                             {"slit", 1, excision_plan}};
 
 }  // namespace
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "surgeon/excision.h"
+#include "surgeon/slit.h"
 
 namespace catgut {
 namespace {
@@ -547,6 +548,7 @@ std::unique_ptr<Surgeon> make_demonstrator(const std::string& plan, const Pictur
 
 std::unique_ptr<Surgeon> make_surgeon(const std::string& plan, const PictureModel& picture, const SurgeonSkill& skill) {
   if (plan == "excision") return make_plan(plan, picture, skill), std::make_unique<Excising>(picture, skill);
+  if (plan == "slit") return make_plan(plan, picture, skill), std::make_unique<Slitting>(picture, skill);
   return std::make_unique<Scripted>(plan, picture, skill);
 }
 

@@ -9,96 +9,13 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "core/random.h"
-#include "procedure/scene_file.h"
+#include "field.h"
 #include "procedure/scripted_surgeon.h"
-#include "runtime/cut_measures.h"
 #include "runtime/session.h"
-#include "sim/model.h"
 #include "sim/recording.h"
-#include "sim/state.h"
 
 namespace catgut {
 namespace {
-
-constexpr float kLine = 0.006f;  // [m] from the rim
-
-// The scene, and a right hand that draws lines with the pen.
-struct Field {
-  static SceneSpec scene_of(int particles) {
-    SceneSpec s = read_scene("excision");
-    s.body[0].particles = particles;
-    return s;
-  }
-  SceneSpec scene;
-  std::shared_ptr<const Model> model = build_model(scene);
-  StatePtr state = initial_state(*model);
-  Jobs jobs{1};
-  TickInput input;
-  Snapshot seen;
-  std::vector<Event> events;  // of all ticks
-  float line = kLine;         // [m] from the rim
-
-  explicit Field(int particles = 400) : scene(scene_of(particles)) {
-    for (ToolInput& h : input.hand) h.connected = 0;
-    publish(*model, *state, seen);
-  }
-  void tick() {
-    input.tick = state->tick;
-    step(*model, *state, input, jobs);
-    input.commands.clear();
-    publish(*model, *state, seen);
-    events.insert(events.end(), seen.event.begin(), seen.event.end());
-  }
-  std::vector<Event> of(EventKind kind, Fault fault = Fault::none) const {
-    std::vector<Event> out;
-    for (const Event& e : events)
-      if (e.kind == kind && e.fault == fault) out.push_back(e);
-    return out;
-  }
-  std::vector<Event> of(Fault fault) const { return of(EventKind::technique_fault, fault); }
-  // The tip on the outer side at an angle about the axis, the shaft outward.
-  void hold(float angle, float above = 0) {
-    const Vec3 out{portable::cos(angle), 0, portable::sin(angle)};
-    const Vec3 x = normalized(cross({0, 1, 0}, out));
-    input.hand[0].connected = 1;
-    input.hand[0].pose = {out * (scene.body[0].radius + above) - Vec3{0, line, 0}, from_axes(x, cross(out, x), out)};
-  }
-  void switch_pen() { input.commands.push({CommandKind::cut, 0, 0}); }
-  // Along the line, at `speed` [m/s]; false: stopped after `ticks`.
-  void draw(float from, float to, float speed) {
-    const float step = speed * model->dt / scene.body[0].radius;
-    const int ticks = static_cast<int>(std::lround(std::abs(to - from) / step));
-    for (int i = 0; i <= ticks; ++i) hold(from + (to - from) * static_cast<float>(i) / static_cast<float>(ticks)), tick();
-  }
-  void cut(float from, float to, float speed) {
-    hold(from, 0.004f), tick(), tick();
-    hold(from), tick(), tick();
-    switch_pen();
-    draw(from, to, speed);
-    switch_pen();
-    hold(to), tick();
-    hold(to, 0.004f), tick(), tick();
-  }
-  const physical::Excision& excision() const { return state->physical.cutting.excision; }
-  double mass() const {
-    double sum = 0;
-    for (const float m : state->physical.world.wall.topology.mass) sum += static_cast<double>(m);
-    return sum;
-  }
-};
-
-// Area vector of the drawn surface at rest over its area: 0 where it is closed.
-double opening_of(const PictureModel& picture) {
-  Vec3 sum{};
-  float area = 0;
-  for (const VisibleMesh& mesh : picture.body)
-    for (const auto& t : mesh.triangle) {
-      const Vec3 n = cross(mesh.position[t[1]] - mesh.position[t[0]], mesh.position[t[2]] - mesh.position[t[0]]);
-      sum += n, area += length(n);
-    }
-  return static_cast<double>(length(sum) / area);
-}
 
 TEST(Cutting, power_and_time_decide_whether_the_wall_is_scored_or_divided) {
   Field f;
@@ -244,96 +161,6 @@ TEST(Cutting, a_cut_beside_a_suture_is_a_fault_once) {
     for (const Event& e : f.state->event) faults += e.fault == Fault::cut_at_suture;
     EXPECT_EQ(faults, beside > 0 ? 0u : 1u);
   }
-}
-
-// A path of the tip: angle [rad] and depth below the rim [m].
-std::vector<std::array<float, 2>> random_path(Random& random, int kind) {
-  std::vector<std::array<float, 2>> path;
-  const auto draw = [&](float low, float high) { return low + (high - low) * random.uniform(); };
-  const float at = draw(-3, 3), depth = draw(0.005f, 0.009f);
-  switch (kind % 5) {
-    case 0:  // a spiral inward
-      for (float t = 0; t < 14; t += 0.02f)
-        path.push_back({at + 0.02f * t * portable::cos(t), depth + 0.25e-3f * t * portable::sin(t)});
-      break;
-    case 1: {  // back over itself
-      const float far = draw(0.3f, 0.8f), aside = draw(-2e-3f, 2e-3f);
-      for (float t = 0; t < 2; t += 0.01f) path.push_back({at + far * std::min(t, 2 - t), depth + aside * std::min(t, 2 - t)});
-      break;
-    }
-    case 2:  // along the rim, half of the time beyond it
-      for (float t = 0; t < 1; t += 0.005f) path.push_back({at + t, 0.3e-3f + 0.8e-3f * portable::sin(9 * t)});
-      break;
-    case 3:  // a figure of eight: it crosses itself, and frees two pieces
-      for (float t = 0; t < 6.6f; t += 0.01f)
-        path.push_back({at + 0.35f * portable::sin(t), depth + 2.5e-3f * portable::sin(2 * t)});
-      break;
-    default: {  // back and forth at random
-      std::array<float, 2> p{at, depth};
-      for (int i = 0; i < 6; ++i) {
-        const std::array<float, 2> q{p[0] + draw(-0.4f, 0.4f), std::clamp(p[1] + draw(-4e-3f, 4e-3f), 0.001f, 0.013f)};
-        for (float t = 0; t < 1; t += 0.02f) path.push_back({p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])});
-        p = q;
-      }
-    }
-  }
-  return path;
-}
-
-TEST(Cutting, free_paths_are_drawn_closed_with_their_mass_and_pieces) {
-  Field f;
-  const float radius = f.scene.body[0].radius;
-  const int paths = std::getenv("CATGUT_LONG") ? 100 : 5;
-  double worst_mass = 0, worst_opening = 0, whole = 0;
-  uint32_t freed = 0, divided = 0;
-  for (int seed = 0; seed < paths; ++seed) {
-    Random random(static_cast<uint64_t>(seed) + 1);
-    StatePtr state = initial_state(*f.model);
-    physical::State& world = state->physical.world;
-    physical::Scratch scratch(f.model->physical->world, world);
-    state->physical.cutting.mode[0] = PenMode::cut;
-    state->event.start(0);
-    const float speed = random.uniform() < 0.3f ? 0.012f : 0.005f;  // [m/s] some are only scored
-    const auto path = random_path(random, seed);
-    for (size_t i = 0; i + 1 < path.size(); ++i) {
-      const float along = std::hypot((path[i + 1][0] - path[i][0]) * radius, path[i + 1][1] - path[i][1]);
-      const int steps = std::max(1, static_cast<int>(along / (speed * 0.004f)));
-      for (int k = 0; k < steps; ++k) {
-        const float t = static_cast<float>(k) / static_cast<float>(steps);
-        f.line = path[i][1] + t * (path[i + 1][1] - path[i][1]);
-        f.hold(path[i][0] + t * (path[i + 1][0] - path[i][0]));
-        world.bodies.body[0].pose = f.input.hand[0].pose;
-        use_pens(*f.model, *state, scratch, along / speed / static_cast<float>(steps));
-        if (whole == 0 && !state->physical.cutting.excision.passed.empty()) {  // touched, nothing divided yet
-          ASSERT_TRUE(world.wall.topology.fragment.empty());
-          renew_cut_picture(*f.model, *state);
-          publish(*f.model, *state, f.seen);
-          whole = measure_cut(f.scene, f.seen).mass;
-        }
-      }
-    }
-    renew_cut_picture(*f.model, *state);
-    publish(*f.model, *state, f.seen);
-    const CutMeasures drawn = measure_cut(f.scene, f.seen);
-    const uint32_t pieces = wall::count_pieces(world.wall);
-    EXPECT_EQ(drawn.pieces, pieces) << "path " << seed;
-    worst_mass = std::max(worst_mass, std::abs(drawn.mass / whole - 1));
-    worst_opening = std::max(worst_opening, opening_of(*f.seen.topology.picture));
-    divided += !world.wall.topology.fragment.empty(), freed += pieces > 1;
-    if (seed % 10 != 3) continue;
-    StatePtr other = initial_state(*f.model);
-    load_state(*f.model, *other, save_state(*f.model, *state));
-    EXPECT_EQ(hash_state(*f.model, *other), hash_state(*f.model, *state)) << "path " << seed;
-    Snapshot loaded;
-    publish(*f.model, *other, loaded);
-    EXPECT_EQ(loaded.topology.picture->body[0].triangle, f.seen.topology.picture->body[0].triangle) << "path " << seed;
-  }
-  std::printf("%d paths: %u divide the wall, %u free a piece; drawn mass differs by %.1e at most, opening %.1e\n", paths,
-              divided, freed, worst_mass, worst_opening);
-  EXPECT_GT(divided, 0u);
-  EXPECT_GT(freed, 0u);
-  EXPECT_LT(worst_mass, 1e-6);
-  EXPECT_LT(worst_opening, 1e-6);
 }
 
 TEST(Cutting, buttons_of_a_hand_without_a_pen_do_not_cut_tissue) {

@@ -100,7 +100,7 @@ TEST(Instrument, every_row_of_the_table_can_be_in_a_scene) {
     f.run(30);
     EXPECT_TRUE(state_is_valid(*f.model, *f.state)) << kind.name;
     EXPECT_LT(distance(f.seen.tool[0].pose.p, f.input.hand[0].pose.p), 1e-3f) << kind.name << " does not follow its hand";
-    for (uint32_t bit = 1; bit <= kRetract; bit <<= 1) EXPECT_STRNE(capability_name(bit), "");
+    for (uint32_t bit = 1; bit <= kAbsorb; bit <<= 1) EXPECT_STRNE(capability_name(bit), "");
   }
 }
 

@@ -208,14 +208,17 @@ void reach_from(TissueView& view, Vec3 point, std::vector<Reached>& out) {
   }
 }
 
-// Char where a pen has been.
+// Char where a pen has been, and blood from vessels that a cut has opened.
 bool scorch(TissueView& view, const Snapshot& snapshot) {
   bool changed = false;
   for (size_t i = 0; i < view.scarred.size(); ++i) {
     const uint32_t v = view.scarred[i], scar = view.mesh->scar[view.source[v]];
-    const uint8_t burnt = scar < snapshot.scar.size() ? snapshot.scar[scar].burnt : 0;
-    changed = changed || view.live[v].charred != burnt;
-    view.live[v].charred = burnt;
+    const Scar now = scar < snapshot.scar.size() ? snapshot.scar[scar] : Scar{};
+    VertexLive& live = view.live[v];
+    uint8_t& before = view.stained[i];  // wiped blood disappears, that of a puncture stays
+    changed = changed || live.charred != now.burnt || before != now.blood;
+    if (before != now.blood) live.bloody = now.blood;
+    live.charred = now.burnt, before = now.blood;
   }
   return changed;
 }
@@ -371,6 +374,7 @@ TissueView make_tissue_view(filament::Engine& engine, filament::Scene& scene, co
   view.press.assign(n, 0);
   for (uint32_t i = 0; i < uint32_t(n); ++i)
     if (flat.source[i] < mesh.scar.size() && mesh.scar[flat.source[i]] != kNoScar) view.scarred.push_back(i);
+  view.stained.assign(view.scarred.size(), 0);
   view.gpu = make_mesh(engine, scene, look, flat.triangle, material, true, true);
   return view;
 }

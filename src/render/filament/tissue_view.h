@@ -33,6 +33,7 @@ struct TissueView {
   std::vector<VertexLive> live;
   std::vector<float> press;       // per vertex, of this frame
   std::vector<uint32_t> scarred;  // vertices with a place in Snapshot::scar
+  std::vector<uint8_t> stained;   // per scarred vertex: its blood in the last frame
   // Where thread passes through the wall, found on first use: by suture and number of the suture point.
   std::vector<std::vector<std::vector<Reached>>> reached;  // per suture
   std::vector<uint32_t> pressed;                           // vertices with a nonzero `press`
