@@ -224,7 +224,7 @@ class Builder {
     mesh.triangle.push_back(t);
     if (!edge) return;
     for (const uint32_t v : t) normal_[b][v] += n;
-    // Across the wall the texture goes on at a right angle to the edge, so that it is not stretched over the cut. The third
+    // Across the wall the texture continues at a right angle to the edge, so that it is not stretched over the cut. The third
     // vertex lies to the left of an edge from vertex to vertex.
     for (size_t k = 0; k < 3; ++k) {
       const uint32_t from = t[k], to = t[(k + 1) % 3];
