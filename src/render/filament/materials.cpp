@@ -16,8 +16,14 @@ constexpr uint8_t kMetal[] = {
 constexpr uint8_t kDrape[] = {
 #include "drape.inc"
 };
-constexpr uint8_t kShadow[] = {
-#include "shadow.inc"
+constexpr uint8_t kTissueLow[] = {
+#include "tissue_low.inc"
+};
+constexpr uint8_t kThreadLow[] = {
+#include "thread_low.inc"
+};
+constexpr uint8_t kMetalLow[] = {
+#include "metal_low.inc"
 };
 constexpr uint8_t kMarker[] = {
 #include "marker.inc"
@@ -37,7 +43,9 @@ std::span<const uint8_t> tissue_material() { return kTissue; }
 std::span<const uint8_t> thread_material() { return kThread; }
 std::span<const uint8_t> metal_material() { return kMetal; }
 std::span<const uint8_t> drape_material() { return kDrape; }
-std::span<const uint8_t> shadow_material() { return kShadow; }
+std::span<const uint8_t> tissue_low_material() { return kTissueLow; }
+std::span<const uint8_t> thread_low_material() { return kThreadLow; }
+std::span<const uint8_t> metal_low_material() { return kMetalLow; }
 std::span<const uint8_t> marker_material() { return kMarker; }
 std::span<const uint8_t> mark_material() { return kMark; }
 std::span<const uint8_t> board_material() { return kBoard; }

@@ -20,10 +20,21 @@ namespace {
 // From the main lamp, over the surgeon's right shoulder.
 constexpr Vec3 kLampDirection{-0.30f, -1.0f, -0.50f};
 
+// How much of the lamp reaches p past points of tissue, 0..1.
+float lit_past(Vec3 p, Vec3 toward_lamp, std::span<const Vec3> tissue) {
+  constexpr float dark = 0.002f, bright = 0.007f, beside = 0.003f;  // [m] from the ray; p itself touches what is this near
+  float least = bright * bright;
+  for (const Vec3 t : tissue) {
+    const float along = dot(t - p, toward_lamp);
+    if (along > beside) least = std::min(least, length2(t - p) - along * along);
+  }
+  return std::clamp((std::sqrt(std::max(0.0f, least)) - dark) / (bright - dark), 0.0f, 1.0f);
+}
+
 }  // namespace
 
 Theatre::Theatre(filament::Engine& engine, const PictureModel& model, Quality quality, int eyes)
-    : model_(model), engine_(engine) {
+    : plain_(quality == Quality::low && eyes == 1), model_(model), engine_(engine) {
   scene_ = engine_.createScene();
   grading_ = filament::ColorGrading::Builder()
                  .toneMapping(filament::ColorGrading::ToneMapping::ACES)
@@ -61,7 +72,6 @@ Theatre::~Theatre() {
   engine_.destroy(needle_material_);
   engine_.destroy(tool_material_);
   engine_.destroy(drape_material_);
-  engine_.destroy(shadow_material_);
   engine_.destroy(marker_material_);
   engine_.destroy(mark_material_);
   for (filament::Material* m : material_) engine_.destroy(m);
@@ -123,13 +133,19 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
   show_markers(snapshot, suture_points);
 }
 
+void Theatre::add_tissue(const VisibleMesh& mesh) {
+  tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_, sky_known_));
+  filament::RenderableManager& manager = engine_.getRenderableManager();
+  // Two thirds of the shadow map's cost. Its shadow on cloth is computed once instead, see add_cloth.
+  if (plain_) manager.setCastShadows(manager.getInstance(tissue_.back().gpu.entity), false);
+}
+
 void Theatre::follow_topology(const TopologyView& topology) {
   if (topology.picture == divided_) return;
   divided_ = topology.picture;
   for (TissueView& t : tissue_) destroy_mesh(engine_, *scene_, t.gpu);
   tissue_.clear();
-  for (const VisibleMesh& mesh : (divided_ ? *divided_ : model_).body)
-    tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_, sky_known_));
+  for (const VisibleMesh& mesh : (divided_ ? *divided_ : model_).body) add_tissue(mesh);
   // They refer to vertices of the old surface.
   thread_.on_tissue.clear();
   mark_.on_tissue.clear();
@@ -144,12 +160,22 @@ void Theatre::set_resolution_scale(float part) {
   coarse.minScale = coarse.maxScale = {part, part};
   coarse.quality = filament::View::QualityLevel::LOW;
   for (const Eye& eye : eye_) eye.view->setDynamicResolutionOptions(coarse);
+  if (plain_) set_tones();
+}
+
+// Scaling needs post-processing, which converts tones as well.
+void Theatre::set_tones() {
+  const bool whole = coarse_ >= 1;
+  eye_[0].view->setPostProcessingEnabled(!whole);
+  for (filament::MaterialInstance* m : {tissue_material_, thread_material_, needle_material_, tool_material_, drape_material_,
+                                        marker_material_, mark_material_})
+    m->setParameter("tones", whole ? 1.0f : 0.0f);
 }
 
 void Theatre::set_quality(filament::View& view, Quality quality) {
   const bool good = quality == Quality::high;
   view.setSampleCount(quality == Quality::low ? 1 : 4);
-  view.setAntiAliasing(filament::View::AntiAliasing::FXAA);
+  view.setAntiAliasing(plain_ ? filament::View::AntiAliasing::NONE : filament::View::AntiAliasing::FXAA);
   view.setDithering(filament::View::Dithering::NONE);
   filament::View::AmbientOcclusionOptions ao;
   ao.enabled = good;
@@ -198,28 +224,32 @@ filament::MaterialInstance* Theatre::instance_of(std::span<const uint8_t> packag
 
 void Theatre::make_materials() {
   textures_ = make_tissue_textures(engine_);
-  filament::TextureSampler repeat(filament::TextureSampler::MinFilter::LINEAR_MIPMAP_LINEAR,
+  filament::TextureSampler repeat(plain_ ? filament::TextureSampler::MinFilter::LINEAR_MIPMAP_NEAREST
+                                         : filament::TextureSampler::MinFilter::LINEAR_MIPMAP_LINEAR,
                                   filament::TextureSampler::MagFilter::LINEAR, filament::TextureSampler::WrapMode::REPEAT);
-  tissue_material_ = instance_of(tissue_material());
+  tissue_material_ = instance_of(plain_ ? tissue_low_material() : tissue_material());
   tissue_material_->setParameter("pattern", textures_.pattern, repeat);
   tissue_material_->setParameter("bumps", textures_.bumps, repeat);
   const Vec3 lamp = normalized(-kLampDirection);
   tissue_material_->setParameter("lamp", filament::math::float3{lamp.x, lamp.y, lamp.z});
-  thread_material_ = instance_of(thread_material());
-  needle_material_ = instance_of(metal_material());
+  thread_material_ = instance_of(plain_ ? thread_low_material() : thread_material());
+  needle_material_ = instance_of(plain_ ? metal_low_material() : metal_material());
   needle_material_->setParameter("roughness", 0.22f);
   tool_material_ = material_.back()->createInstance();
   tool_material_->setParameter("roughness", 0.34f);
   drape_material_ = instance_of(drape_material());
-  shadow_material_ = instance_of(shadow_material());
   marker_material_ = instance_of(marker_material());
   mark_material_ = instance_of(mark_material());
+  if (!plain_) return;
+  for (filament::MaterialInstance* m : {thread_material_, needle_material_, tool_material_})
+    m->setParameter("lamp", filament::math::float3{lamp.x, lamp.y, lamp.z});
+  set_tones();
 }
 
 void Theatre::make_stage() {
   std::vector<Vec3> all;
   for (const VisibleMesh& mesh : model_.body) {
-    tissue_.push_back(make_tissue_view(engine_, *scene_, mesh, tissue_material_, sky_known_));
+    add_tissue(mesh);
     all.insert(all.end(), mesh.position.begin(), mesh.position.end());
   }
   if (!model_.scenery.empty()) {
@@ -307,22 +337,19 @@ void Theatre::make_needles_and_tools() {
 // A cloth's share of lamp and room light, computed once (see drape.mat): the room is darker low down beside tissue.
 void Theatre::add_cloth(const Shape& cloth, float threads_per_cm, std::span<const Vec3> tissue, bool casts_shadow) {
   std::vector<VertexLook> look(cloth.position.size());
+  const Vec3 toward = normalized(-kLampDirection);
   for (size_t i = 0; i < look.size(); ++i) {
     const Vec3 c = cloth.color[i], p = cloth.position[i], n = cloth.normal[i];
     float near = 1;
     for (const Vec3 t : tissue) near = std::min(near, length2(t - p));
     const float open = 1 - 0.5f * std::exp(-std::sqrt(near) / 0.012f);
-    const float lamp = 0.86f * std::max(0.0f, dot(n, normalized(-kLampDirection))), room = 0.42f * open * (0.5f + 0.5f * n.y);
+    const float lamp = 0.86f * std::max(0.0f, dot(n, toward)) * (plain_ ? lit_past(p, toward, tissue) : 1),
+                room = 0.42f * open * (0.5f + 0.5f * n.y);
     look[i] = {{c.x, c.y, c.z, threads_per_cm}, {cloth.uv[i][0], cloth.uv[i][1]}, {lamp + room, lamp / (lamp + room)}};
   }
   cloth_position_.insert(cloth_position_.end(), cloth.position.begin(), cloth.position.end());
   cloth_normal_.insert(cloth_normal_.end(), cloth.normal.begin(), cloth.normal.end());
   cloth_.push_back(make_mesh(engine_, *scene_, cloth, drape_material_, casts_shadow));
-  set_look(engine_, cloth_.back(), look);
-  Shape over = cloth;
-  for (size_t i = 0; i < look.size(); ++i)
-    over.position[i] += cloth.normal[i] * 0.0001f;  // never coplanar with the cloth, to avoid z-fighting
-  cloth_.push_back(make_mesh(engine_, *scene_, over, shadow_material_, false));
   set_look(engine_, cloth_.back(), look);
 }
 

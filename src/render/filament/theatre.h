@@ -57,12 +57,14 @@ class Theatre {
   };
   void set_quality(filament::View& view, Quality quality);
   void set_light(Quality quality);
+  void set_tones();
   filament::MaterialInstance* instance_of(std::span<const uint8_t> package);
   void make_materials();
   void make_stage();
   void make_scenery(std::span<const Vec3> tissue);
   void make_room();
   void make_needles_and_tools();
+  void add_tissue(const VisibleMesh& mesh);
   // Rebuilds the tissue's surface after a cut has changed it.
   void follow_topology(const TopologyView& topology);
   void add_cloth(const Shape& cloth, float threads_per_cm, std::span<const Vec3> tissue, bool casts_shadow);
@@ -72,6 +74,9 @@ class Theatre {
   void show_markers(const Snapshot& snapshot, bool wanted);
 
   float coarse_ = 1;
+  // Low quality in a window: materials of one lamp that convert to the screen's colors themselves, without passes over the
+  // whole picture.
+  const bool plain_;
   const PictureModel model_;  // a copy: the theatre outlives its source
   SkyCache sky_known_;
   DividedPicture divided_;  // of the snapshot that was shown last; false: model_
@@ -86,8 +91,7 @@ class Theatre {
   TissueTextures textures_;
   std::vector<filament::Material*> material_;
   filament::MaterialInstance *tissue_material_ = nullptr, *thread_material_ = nullptr, *needle_material_ = nullptr,
-                             *tool_material_ = nullptr, *drape_material_ = nullptr, *shadow_material_ = nullptr,
-                             *marker_material_ = nullptr, *mark_material_ = nullptr;
+                             *tool_material_ = nullptr, *drape_material_ = nullptr, *marker_material_ = nullptr, *mark_material_ = nullptr;
   Motions motion_;  // of every particle, in the current frame
   std::vector<TissueView> tissue_;
   ThreadView thread_;
@@ -97,7 +101,7 @@ class Theatre {
   std::vector<float> needle_least_;  // [m] minimum radius of each as drawn
   GpuMesh bed_;
   std::vector<GpuMesh> scenery_;
-  std::vector<GpuMesh> cloth_;                       // each with the shadows on it
+  std::vector<GpuMesh> cloth_;
   std::vector<Vec3> cloth_position_, cloth_normal_;  // of all cloth, until the thread has them
   std::vector<GpuMesh> marker_;
 };
