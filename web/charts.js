@@ -35,14 +35,16 @@ const catgut = (() => {
 
   // columns: [{title, value(row), cell(row)?, number?}]. sortable: buttons in the heading.
   function table(caption, columns, rows, sortable) {
-    const body = el("tbody");
-    const fill = (list) => body.replaceChildren(...list.map((row) => el("tr", {}, columns.map((c, i) => {
+    const wide = columns.length > 3;  // on a phone every row is a block of its own, with the titles beside the values; see style.css
+    const role = (name) => (wide ? name : null);  // such a block is no table for a screen reader, so that the roles are stated
+    const body = el("tbody", {role: role("rowgroup")});
+    const fill = (list) => body.replaceChildren(...list.map((row) => el("tr", {role: role("row")}, columns.map((c, i) => {
       const content = c.cell ? c.cell(row) : c.number ? number(c.value(row)) : c.value(row);
-      return i === 0 ? el("th", {scope: "row", class: c.number ? "number" : null}, content)
-                     : el("td", {class: c.number ? "number" : c.day ? "day" : null}, content);
+      return i === 0 ? el("th", {scope: "row", role: role("rowheader"), class: c.number ? "number" : null}, content)
+                     : el("td", {role: role("cell"), "data-title": c.title, class: c.number ? "number" : c.day ? "day" : null}, content);
     }))));
     const heads = columns.map((c) => {
-      const head = el("th", {scope: "col", class: c.number ? "number" : null});
+      const head = el("th", {scope: "col", role: role("columnheader"), class: c.number ? "number" : null});
       if (!sortable) head.append(c.title);
       else head.append(el("button", {type: "button", onclick: () => {
         const up = head.getAttribute("aria-sort") !== "ascending";
@@ -60,7 +62,7 @@ const catgut = (() => {
     });
     fill(rows);
     return el("div", {class: "scroll", tabindex: "0", role: "region", "aria-label": "table: " + caption},
-              el("table", {}, el("caption", {}, caption), el("thead", {}, el("tr", {}, heads)), body));
+              el("table", {class: wide ? "wide" : null, role: role("table")}, el("caption", {}, caption), el("thead", {role: role("rowgroup")}, el("tr", {role: role("row")}, heads)), body));
   }
 
   function asTable(caption, heads, rows) {

@@ -112,6 +112,7 @@ async function look(address, name, allowed = address.replace(/[^/]*$/, ""), read
     const page = await open(context, address, allowed);
     await page.waitForSelector(ready);
     expect(await page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth), `${name}, ${size}: the page is wider than the screen`);
+    if (size === "phone") expect(await page.evaluate(() => [...document.querySelectorAll(".scroll")].every((t) => t.scrollWidth <= t.clientWidth + 1)), `${name}: a table's columns are beyond the screen of a phone`);
     expect(await page.evaluate(() => window.hacked === undefined), `${name}: a text was run as a script`);
     await page.screenshot({path: path.join(out, `${name}_${size}.png`), fullPage: true});
     await accessible(page, `${name}, ${size}`);
