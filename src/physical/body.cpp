@@ -123,6 +123,15 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     k.face_center[f] = center;
     k.face_radius[f] = std::sqrt(radius2) + length(wall::vec3(ws.motion.x[2 * c.column[0] + 1])) * 1.2f;
   }
+  SurfaceSearch& boxes = const_cast<SurfaceSearch&>(search);  // a cache
+  if (boxes.box.size() < faces) boxes.box.resize(faces);
+  // A box that is made here is not for later searches of the step: the wall's speed in it is that before the forces.
+  const auto box_here = [&](uint32_t f) -> const FaceBox& {
+    constexpr uint32_t kHere = 1u << 31;
+    if (boxes.box[f].step != (boxes.step | kHere) && boxes.box[f].step != boxes.step)
+      box_of(wm, ws, boxes, f), boxes.box[f].step = boxes.step | kHere;
+    return boxes.box[f];
+  };
   constexpr float kAhead = 4e-3f;  // [m] by which lists of elements reach beyond what a step needs
   const float wall_speed = 1.0f;   // [m/s] of the wall, for the search alone
   for (uint32_t b = 0; b < bodies.body.size(); ++b) {
@@ -209,7 +218,11 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       for (const uint32_t f : k.near) {
         const float r = k.face_radius[f] + reach;
         if (length2(k.face_center[f] - p) > r * r) continue;
+        // Beyond this, in front of a face or behind it, `add` has no use for it.
+        const FaceBox& box = box_here(f);
+        const float useful = 1.05f * std::max(reach, 0.9f * wm.laminate.thickness);
         for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
+          if (least_distance(box, p, surface.patch[q].side) > useful) continue;
           const Foot foot = outer_foot(wm, ws, surface, q, p);
           if (foot.gap - s.radius > margin || (foot.on_edge && foot.gap < 0)) continue;
           add(i, foot, p, s.radius, jaw_speed, 1);

@@ -369,6 +369,7 @@ float bound_of(const float* most) {
 }  // namespace
 
 void watch_wall(const wall::State& s, SurfaceSearch& k) {
+  ++k.step;
   const size_t n = s.motion.x.size();
   if (k.seen.size() != n) {
     k.seen.assign(s.motion.x.begin(), s.motion.x.end());
@@ -421,22 +422,21 @@ float least_distance(const FaceBox& box, Vec3 p, int side) {
 void find_near(const wall::Model& m, const wall::State& s, const Surface& surface, const thread::State& thread,
                SurfaceSearch& k) {
   const size_t nodes = thread.nodes(), columns = wall::columns(s), faces = wall::elements(m, s.topology);
-  ++k.step;
   k.box.resize(faces);
-  bool stale = k.node_listed.size() != nodes || k.wall_listed.size() != columns || k.version != s.topology.version;
-  const float limit2 = 0.25f * k.margin * k.margin * 0.25f;  // both may move: a quarter of the margin each
+  const float limit2 = 0.25f * k.margin * k.margin * 0.25f;  // all may move: a quarter of the margin each
+  bool wall_stale = k.wall_listed.size() != columns || k.version != s.topology.version;
+  for (uint32_t c = 0; c < columns && !wall_stale; ++c) wall_stale = length2(mid(s, c) - k.wall_listed[c]) > limit2;
+  bool stale = wall_stale || k.node_listed.size() != nodes;
   for (size_t i = 0; i < nodes && !stale; ++i) stale = length2(thread.x.at(i) - k.node_listed[i]) > limit2;
-  for (uint32_t c = 0; c < columns && !stale; ++c) stale = length2(mid(s, c) - k.wall_listed[c]) > limit2;
   if (!stale) return;
-  k.version = s.topology.version;
-  k.column_due.assign(columns, 0), k.node_due.assign(nodes, 0), k.node_seen.assign(nodes, {});
-  k.node_listed.resize(nodes), k.wall_listed.resize(columns), k.center.resize(faces), k.radius.resize(faces);
+  k.node_due.assign(nodes, 0), k.node_seen.assign(nodes, {});
+  k.node_listed.resize(nodes), k.center.resize(faces), k.radius.resize(faces);
   for (size_t i = 0; i < nodes; ++i) k.node_listed[i] = thread.x.at(i);
-  for (uint32_t c = 0; c < columns; ++c) k.wall_listed[c] = mid(s, c);
   for (uint32_t f = 0; f < faces; ++f) {
     const Corners c = corners_of(m, s.topology, f);
+    const float part = 1.0f / static_cast<float>(c.count());
     Vec3 center{};
-    for (uint32_t i = 0; i < c.count(); ++i) center += mid(s, c.column[i]) / static_cast<float>(c.count());
+    for (uint32_t i = 0; i < c.count(); ++i) center += mid(s, c.column[i]) * part;
     float radius = 0;
     for (uint32_t i = 0; i < c.count(); ++i)
       radius = std::max(radius, distance(center, mid(s, c.column[i])) + length(director(s, c.column[i])));
@@ -466,7 +466,11 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
     }
   }
   k.node_first.push_back(static_cast<uint32_t>(k.node_face.size()));
-  k.column_first.clear(), k.column_face.clear();
+  if (!wall_stale) return;  // only the thread has moved
+  k.version = s.topology.version;
+  k.wall_listed.resize(columns);
+  for (uint32_t c = 0; c < columns; ++c) k.wall_listed[c] = mid(s, c);
+  k.column_due.assign(columns, 0), k.column_first.clear(), k.column_face.clear();
   const auto rest = [&](uint32_t column) {
     const uint32_t source = s.topology.source[column];
     return (m.mesh.outer[source] + m.mesh.inner[source]) * 0.5f;
