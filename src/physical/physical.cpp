@@ -55,6 +55,7 @@ void cut_changed(const Model& m, State& s) {
   s.cut_surface = std::make_shared<const Surface>(make_surface(m.wall, s.wall));
   // Impulses that were remembered for columns that have other numbers now.
   s.lip.clear();
+  after_cut(m, s);
   std::erase_if(s.bodies.memory, [](const RowMemory& r) { return r.key >> 60 < 3; });
   for (thread::SoftContact& c : s.contact) c.patch = wall::kNone;
 }
@@ -90,6 +91,7 @@ uint64_t hash_state(const State& s) {
   }
   for (const thread::SoftContact& c : s.contact) h = hash_bytes(&c.normal_impulse, sizeof c.normal_impulse, h);
   for (const wall::Contact& c : s.lip) h = hash_bytes(&c.impulse, sizeof c.impulse, h);
+  h = hash_bytes(&s.sleep.quiet, sizeof s.sleep.quiet, h);
   if (!s.bodies.body.empty()) {
     Hasher hasher;
     Writer<Hasher> write(hasher);
@@ -233,26 +235,8 @@ void end_bodies(const Model& m, State& s, Scratch& k) {
   lace_threads(m, s);
 }
 
-}  // namespace
-
-void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) {
-  const Surface& surface = surface_of(m, s);
-  s.contact.reserve(2 * thread::kMaxSoftPoints), s.lip.reserve(3 * wall::columns(s.wall));
-  for (const Hands::WallPull& pull : hands.wall_pulls) wall::add_to(k.wall.external, pull.at, pull.force);
-  watch_wall(s.wall, k.search);
-  if (m.surface_contact || m.lip_contact) find_near(m.wall, s.wall, surface, s.thread, k.search);
-  if (m.lip_contact) {
-    k.lips.contact.assign(s.lip.begin(), s.lip.end());
-    wall::find_contacts(m.wall, s.wall, {}, k.lips);
-    find_lips(m.wall, s.wall, surface, k.search, m.lip_friction, k.lips);
-    wall::warm_start(m.wall, k.wall, k.lips);
-  }
-  const bool bodies = !s.bodies.body.empty();
-  if (bodies) begin_bodies(m, s, k, hands);
-  wall::begin_step(m.wall, s.wall, k.wall, jobs);
-
-  // The thread in its holes and on the surface, on points that travel with the wall.
-  k.point.clear(), k.offset.clear(), k.contact.clear();
+// The thread in its holes and on the surface, on points that travel with the wall.
+void step_thread(const Model& m, State& s, Scratch& k, const Hands& hands) {
   for (const Hole& hole : s.hole) k.point.push_back(hole.place), k.offset.push_back(mouth_offset(m, hole));
   if (m.surface_contact) find_contacts(m, s, k);
   // Friction on the surface acts at the mid-surface: its small moment would couple every contact to every other.
@@ -268,21 +252,48 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
   k.moved.resize(k.point.size());
   soft.moved = k.moved;
   thread::Surroundings around;
-  k.holds.assign(hands.holds.begin(), hands.holds.end());
   around.plane = hands.plane;
+  around.tools = k.bodies.tool;
+  around.holds = k.holds, around.pulls = hands.pulls, around.soft = &soft, around.soft_contacts = k.contact;
+  k.thread.step(m.thread, s.thread, around);
+  const bool quiet = has_been_quiet(m, s, hands);
+  k.coupling.end(s.wall, k.wall);
+  if (quiet) fall_asleep(m, s, k.coupling, k.wall, k.holds, k.bodies.tool);
+  if (m.tear.on && m.surface_contact) tear_bites(m, s, {k.coupling.impulse.data(), s.hole.size()}, k.search);
+  s.contact.assign(k.contact.begin(), k.contact.end());
+}
+
+}  // namespace
+
+void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) {
+  const Surface& surface = surface_of(m, s);
+  s.contact.reserve(2 * thread::kMaxSoftPoints), s.lip.reserve(3 * wall::columns(s.wall));
+  reserve(s, s.sleep);
+  for (const Hands::WallPull& pull : hands.wall_pulls) wall::add_to(k.wall.external, pull.at, pull.force);
+  watch_wall(s.wall, k.search);
+  if (m.surface_contact || m.lip_contact) find_near(m.wall, s.wall, surface, s.thread, k.search);
+  if (m.lip_contact) {
+    k.lips.contact.assign(s.lip.begin(), s.lip.end());
+    wall::find_contacts(m.wall, s.wall, {}, k.lips);
+    find_lips(m.wall, s.wall, surface, k.search, m.lip_friction, k.lips);
+    wall::warm_start(m.wall, k.wall, k.lips);
+  }
+  const bool bodies = !s.bodies.body.empty();
+  if (bodies) begin_bodies(m, s, k, hands);
+  wall::begin_step(m.wall, s.wall, k.wall, jobs);
+
+  k.point.clear(), k.offset.clear(), k.contact.clear();
+  k.holds.assign(hands.holds.begin(), hands.holds.end());
   if (bodies) {
     show_bodies(m.bodies, s.bodies, m.wall.step, k.bodies);
     k.holds.insert(k.holds.end(), k.bodies.hold.begin(), k.bodies.hold.end());
-    around.tools = k.bodies.tool;
   }
-  around.holds = k.holds, around.pulls = hands.pulls, around.soft = &soft, around.soft_contacts = k.contact;
-  k.thread.step(m.thread, s.thread, around);
+  if (s.sleep.asleep && !sleeps_on(m, s, hands, k.holds, k.bodies.tool)) wake(s.sleep);
+  if (s.sleep.asleep) hold_still(s.sleep, s.wall, k.wall, k.holds, k.bodies.tool);
+  else step_thread(m, s, k, hands);
   for (size_t i = 0; i < k.holds.size(); ++i)
     (i < hands.holds.size() ? hands.holds[i] : k.bodies.hold[i - hands.holds.size()]).force = k.holds[i].force;
   if (bodies) take_thread_forces(m.bodies, s.bodies, k.bodies);
-  k.coupling.end(s.wall, k.wall);
-  if (m.tear.on && m.surface_contact) tear_bites(m, s, {k.coupling.impulse.data(), s.hole.size()}, k.search);
-  s.contact.assign(k.contact.begin(), k.contact.end());
 
   if (m.lip_contact) {
     wall::solve_contacts(m.wall, s.wall, k.wall, {}, k.lips);

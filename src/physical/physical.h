@@ -13,6 +13,7 @@
 
 #include "physical/body.h"
 #include "physical/needle.h"
+#include "physical/sleep.h"
 #include "physical/surface.h"
 #include "physical/tear.h"
 #include "thread/thread.h"
@@ -45,6 +46,7 @@ struct Model {
   BodiesModel bodies;             // rigid tools and needles
   NeedlesModel needles;
   TearModel tear;
+  SleepModel sleep;
 };
 
 struct State {
@@ -55,6 +57,7 @@ struct State {
   std::vector<wall::Contact> lip;            // memory of wall on wall
   Bodies bodies;
   std::vector<Needle> needle;
+  Sleep sleep;                                 // of the thread
   std::shared_ptr<const Surface> cut_surface;  // of a wall that was cut; follows from wall.topology.cut
 };
 inline const Surface& surface_of(const Model& m, const State& s) { return s.cut_surface ? *s.cut_surface : m.surface; }

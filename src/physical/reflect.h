@@ -56,6 +56,10 @@ constexpr void reflect(auto& a, Like<Needle> auto& n) {
 constexpr void reflect(auto& a, Like<Hole> auto& h) {
   a(h.place), a(h.within), a(h.deepest), a(h.made), a(h.torn), a(h.out), a(h.load);
 }
+constexpr void reflect(auto& a, Like<Sleep::Load> auto& l) { a(l.at), a(l.impulse); }
+constexpr void reflect(auto& a, Like<Sleep> auto& z) {
+  a(z.asleep), a(z.quiet), a(z.from), a(z.tension), a(z.load), a(z.wall), a(z.may_move), a(z.hold), a(z.tool);
+}
 constexpr void reflect(auto& a, Like<State> auto& s) {
   auto& t = s.wall.topology;
   a.cache(t.version), a.cache(t.corners), a.cache(t.source), a.cache(t.mass), a.cache(t.inv_dir), a.cache(t.slot);
@@ -64,7 +68,7 @@ constexpr void reflect(auto& a, Like<State> auto& s) {
   a(t.cut), a(t.factored);
   a.cache(t.first_fragment), a.cache(t.fragment), a.cache(t.extra);
   a(s.wall.motion), a(s.thread), a(s.hole), a(s.contact), a(s.lip);
-  a(s.bodies), a(s.needle);
+  a(s.bodies), a(s.needle), a(s.sleep);
   a.cache(s.cut_surface);
 }
 }  // namespace catgut::physical

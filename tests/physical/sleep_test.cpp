@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// tests/physical: a sleeping thread beside one that never sleeps: a tool, a load and a hand that moves find the same thread.
+#include "physical/sleep.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "physical/physical.h"
+#include "validation/suture_scenes.h"
+
+namespace catgut::physical {
+namespace {
+
+using validation::Sewn;
+
+// A small piece of wall, held, far away from everything.
+wall::Wall far_wall() {
+  wall::SheetShape shape;
+  shape.width = 0.02f, shape.height = 0.02f, shape.columns = 5, shape.rows = 5;
+  wall::Spec spec;
+  spec.mesh = wall::sheet(shape);
+  for (size_t c = 0; c < spec.mesh.held.size(); ++c) {
+    spec.mesh.held[c] = 1;
+    spec.mesh.outer[c].z -= 1, spec.mesh.inner[c].z -= 1;
+  }
+  spec.mesh.held[12] = 0;
+  return wall::build_wall(spec);
+}
+
+// 30 mm of thread on a plane, and a tool above it whose tip points down.
+struct OnDrape {
+  Model model;
+  State state;
+  std::unique_ptr<Scratch> scratch;
+  Jobs jobs{1};
+  thread::Plane drape;
+  std::vector<HandTarget> target;
+  explicit OnDrape(bool sleep) {
+    const wall::Wall w = far_wall();
+    model = make_model(w, validation::knot_settings(0.3f));
+    model.thread.gravity = {0, -2, 0}, model.sleep.on = sleep;
+    model.bodies.body.push_back(make_tool({}));
+    state.wall = w.state;
+    std::vector<Vec3> path;
+    for (int i = 0; i <= 60; ++i) path.push_back({0.5e-3f * static_cast<float>(i), 0.175e-3f, 0});
+    state.thread = thread::make_state(path);
+    state.bodies.body.resize(1);
+    drape.offset = 0, drape.friction = 0.3f;
+    target.resize(1);
+    target[0].connected = true;
+    place({0.015f, 0.02f, -0.01f});
+    place_body(model.bodies.body[0], state.bodies.body[0], target[0].pose, 0);
+    scratch = std::make_unique<Scratch>(model, state);
+  }
+  void place(Vec3 p) { target[0].pose = {p, axis_angle({1, 0, 0}, -0.5f * kPi)}; }
+  void step() {
+    Hands hands;
+    hands.targets = target, hands.plane = &drape;
+    physical::step(model, state, *scratch, hands, jobs);
+  }
+  void rest(int steps) {
+    for (int i = 0; i < steps; ++i) step();
+  }
+  // Down to the drape beside the thread, then across it by 6 mm.
+  void sweep() {
+    for (int i = 0; i <= 100; ++i) place({0.015f, 0.02f - 0.0175f * static_cast<float>(i) / 100, -0.01f}), step();
+    for (int i = 0; i <= 200; ++i) place({0.015f, 0.0025f, -0.01f + 0.016f * static_cast<float>(i) / 200}), step();
+  }
+};
+
+TEST(Sleep, a_tool_moves_a_sleeping_thread_as_it_moves_one_that_is_awake) {
+  OnDrape asleep(true), awake(false);
+  asleep.rest(600), awake.rest(600);
+  EXPECT_TRUE(asleep.state.sleep.asleep);
+  EXPECT_FALSE(awake.state.sleep.asleep);
+  asleep.sweep(), awake.sweep();
+  EXPECT_FALSE(asleep.state.sleep.asleep);
+  float moved = 0, apart = 0;
+  for (size_t i = 0; i < awake.state.thread.nodes(); ++i) {
+    moved = std::max(moved, awake.state.thread.position(i).z);
+    apart = std::max(apart, distance(awake.state.thread.position(i), asleep.state.thread.position(i)));
+  }
+  EXPECT_GT(moved, 3e-3f);
+  EXPECT_LT(apart, 0.03f * moved);
+  asleep.place({0.015f, 0.03f, 0.006f});
+  asleep.rest(900);
+  EXPECT_TRUE(asleep.state.sleep.asleep);
+}
+
+// A square knot, tightened; then both load ends are drawn apart by springs.
+struct Knotted {
+  Sewn s;
+  uint32_t load_a, load_b;
+  explicit Knotted(bool sleep) {
+    const thread::Settings settings = validation::knot_settings(0.3f);
+    validation::Tightened tight(validation::lay_knot(validation::square(), settings.material.diameter, 0.5e-3f));
+    validation::tighten(settings, tight, 2);
+    const validation::LaidKnot& knot = tight.knot;
+    const wall::Wall w = far_wall();
+    s.model = make_model(w, settings);
+    // A loaded knot creeps by some micrometers in a window, for seconds: here it may sleep in spite of that.
+    s.model.sleep.on = sleep, s.model.sleep.still = 20e-6f, s.model.sleep.steady = 0.02f;
+    s.state.wall = w.state, s.state.thread = knot.state;
+    s.start();
+    load_a = knot.load_a, load_b = knot.load_b;
+    s.hold.clear();
+    for (const uint32_t node : {load_a, load_b, knot.tail_a(), knot.tail_b()}) {
+      thread::Hold h;  // the tails gently: they would swing for seconds
+      h.node = node, h.from = h.to = knot.state.position(node), h.stiffness = s.hold.size() < 2 ? 500.0f : 20.0f;
+      s.hold.push_back(h);
+    }
+    const Vec3 apart = normalized(s.hold[0].to - s.hold[1].to) * 2e-3f;
+    const Vec3 loaded[2] = {s.hold[0].to + apart, s.hold[1].to - apart};
+    s.move_holds(loaded, 0.1f);
+    s.run(1.0f);
+  }
+  // Draws the load ends apart; returns the force [N] at each step.
+  std::vector<float> draw() {
+    std::vector<float> force;
+    for (int i = 0; i < 250; ++i) {
+      for (size_t k = 0; k < 2; ++k) {
+        thread::Hold& h = s.hold[k];
+        const Vec3 out = normalized(s.hold[k].to - s.hold[1 - k].to);
+        h.from = h.to, h.to = h.to + out * 2e-5f;
+      }
+      s.run(0.001f);
+      force.push_back(s.end_force(0));
+    }
+    return force;
+  }
+};
+
+TEST(Sleep, a_sleeping_knot_holds_as_one_that_is_awake) {
+  Knotted asleep(true), awake(false);
+  EXPECT_TRUE(asleep.s.state.sleep.asleep);
+  EXPECT_FALSE(awake.s.state.sleep.asleep);
+  const std::vector<float> a = asleep.draw(), b = awake.draw();
+  EXPECT_FALSE(asleep.s.state.sleep.asleep);
+  const float most = *std::max_element(b.begin(), b.end());
+  EXPECT_GT(most, 0.5f);
+  EXPECT_NEAR(*std::max_element(a.begin(), a.end()), most, 0.02f * most);
+  EXPECT_NEAR(a.back(), b.back(), 0.02f * most);
+}
+
+// A stitch whose ends are held taut: its force on the wall lasts while it sleeps.
+TEST(Sleep, a_taut_stitch_holds_the_wall_where_it_was_and_a_copy_wakes_to_the_bit) {
+  Sewn s = validation::interrupted({});
+  s.model.lip_contact = false;
+  const Vec3 to[2] = {s.hold[0].to + Vec3{1.5e-3f, 0, 0}, s.hold[1].to + Vec3{1.5e-3f, 0, 0}};
+  s.move_holds(to, 0.05f);
+  for (int i = 0; i < 30 && !s.state.sleep.asleep; ++i) s.run(0.1f);
+  ASSERT_TRUE(s.state.sleep.asleep);
+  const float force = s.end_force(0);
+  EXPECT_GT(force, 0.05f);
+  const wall::Column<wall::Float4> before = s.state.wall.motion.x;
+  s.run(0.5f);
+  EXPECT_TRUE(s.state.sleep.asleep);
+  for (size_t i = 0; i < before.size(); ++i)
+    EXPECT_LT(distance(wall::vec3(before[i]), wall::vec3(s.state.wall.motion.x[i])), 2e-6f);
+
+  Sewn copy = validation::interrupted({});
+  copy.model.lip_contact = false;
+  copy.state = s.state, copy.hold = s.hold;
+  copy.scratch = std::make_unique<Scratch>(copy.model, copy.state);
+  copy.jobs = std::make_unique<Jobs>(2);
+  const Vec3 on[2] = {to[0] + Vec3{0.5e-3f, 0, 0}, to[1]};
+  for (Sewn* w : {&s, &copy}) {
+    w->move_holds(on, 0.02f);
+    EXPECT_FALSE(w->state.sleep.asleep);
+  }
+  EXPECT_EQ(hash_state(s.state), hash_state(copy.state));
+  EXPECT_GT(s.end_force(0), force);
+}
+
+}  // namespace
+}  // namespace catgut::physical
