@@ -8,9 +8,12 @@
 #include "window/language.h"
 #include "window/panels.h"
 #include "window/widgets.h"
+#include "window/window.h"
 
 namespace catgut {
 namespace {
+
+std::vector<PanelRect> moments;  // the buttons of lost points, as drawn last
 
 std::string millimeters(float meters) { return meters < 0 ? "-" : fmt::format("{:.1f}", 1000 * meters); }
 
@@ -58,6 +61,7 @@ void bite_table(const StitchMap& map) {
 // The score, why points were lost, and the scores before. A lost point plays its moment, where there is a recording of it.
 void score_list(const ResultView& v, Choice& choice) {
   const assess::Result& a = v.result->assessment;
+  moments.clear();
   for (const assess::Score& s : a.score) {
     text(s.passed ? kAccent : kBad, fmt::format("{} {:.0f} %", s.passed ? "+" : "!", s.percent));
     ImGui::SameLine();
@@ -77,6 +81,9 @@ void score_list(const ResultView& v, Choice& choice) {
       if (file.empty() || v.from_recording) text(kQuiet, name.substr(0, name.find("##")));
       else if (ImGui::Button(name.c_str(), {8.5f * em(), 0})) choice = {Chosen::moment, static_cast<size_t>(l.tick), file};
       ImGui::PopStyleVar();
+      const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
+      if (!file.empty() && !v.from_recording && ImGui::IsItemVisible())
+        moments.push_back({low.x, low.y, high.x - low.x, high.y - low.y});
       if (ImGui::IsItemHovered() && !file.empty()) ImGui::SetTooltip("play this moment");
       ImGui::SameLine();
       ImGui::PushStyleColor(ImGuiCol_Text, l.critical ? kBad : kText);
@@ -107,6 +114,8 @@ void event_list(const std::vector<LogLine>& log) {
 }
 
 }  // namespace
+
+std::span<const PanelRect> drawn_moments() { return moments; }
 
 std::string recording_of(const LiveResult& result, uint64_t tick) {
   std::string file;

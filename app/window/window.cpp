@@ -177,6 +177,7 @@ class Window {
       }
       if (frame(dt)) {
         ++pictures_;
+        if (options_.on_frame && !options_.on_frame(screen_name(screen_))) break;
         const double drawn = wall_seconds(), keep = std::exp(-(drawn - drawn_at));
         picture_s_ = picture_s_ * keep + (drawn - drawn_at);
         picture_count_ = picture_count_ * keep + 1;

@@ -53,6 +53,7 @@ struct PlayOptions {
   // window; and every event.
   std::function<bool(const WindowLook&)> watch;
   std::function<void(const Event&)> on_event;
+  std::function<bool(const char* screen)> on_frame;       // after every drawn frame, on any screen; false closes the window
   std::function<void(const xr::WearerLook&)> watch_eyes;  // after every frame of a headset, on any screen
   std::string trainee;                                    // pseudonym: sessions are stored; empty: the setting
   std::string store;                                      // where; empty: the default
@@ -64,6 +65,9 @@ struct PlayOptions {
   bool eye_pictures = false;                              // for an observer: copies of both eyes' images (slow)
   int stall_ms = 0;                                       // for tests: blocks the loop for this time, every two seconds
 };
+
+// For an observer in on_frame: the buttons on the results that play the moment of a lost point, as drawn last.
+std::span<const PanelRect> drawn_moments();
 
 // Runs until the window is closed. Throws InputError, also without a display.
 int play(const PlayOptions& options);

@@ -69,11 +69,32 @@ class AtTheWindow : public WorkQueue {
   int width = 320, height = 200;                                  // [pixels]
   std::string lesson = "first_stitch";                            // of sit(..., true)
   const ProcedureRun& lesson_run() const { return lesson_run_; }  // after sit()
+  std::function<void(PlayOptions&)> prepare;                      // changes the options of sit()
+  std::function<bool()> arrive;  // what the user does before there is a field; false: the user leaves
+
+  // Until so many more frames were drawn, on any screen. False: the window was closed.
+  bool frames(size_t n) {
+    std::unique_lock lock(mutex_);
+    const size_t from = drawn_;
+    changed_.wait(lock, [&] { return closed_ || drawn_ >= from + n; });
+    return !closed_;
+  }
+  // The button of the costliest lost point; empty: none is in sight.
+  PanelRect moment() {
+    const std::lock_guard lock(mutex_);
+    return moment_;
+  }
+  // Until a frame of this screen was drawn.
+  bool shows(const std::string& screen, double seconds = 90) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return closed_ || screen_ == screen; }) &&
+           !closed_;
+  }
 
   // Opens the window and performs `work`; true when it was completed within the time limit.
   bool sit(const std::function<void()>& work, bool teach = false) {
     std::thread person([&] {
-      if (see(3)) work();
+      if ((!arrive || arrive()) && see(3)) work();
       gone_ = true;
     });
     PlayOptions options;
@@ -102,7 +123,16 @@ class AtTheWindow : public WorkQueue {
       changed_.notify_all();
       return !gone_ && Clock::now() < until_;
     };
+    options.on_frame = [&](const char* screen) {
+      const std::lock_guard lock(mutex_);
+      ++drawn_;
+      screen_ = screen;
+      moment_ = screen_ == "results" && !drawn_moments().empty() ? drawn_moments()[0] : PanelRect{};
+      changed_.notify_all();
+      return !gone_ && Clock::now() < until_;
+    };
     options.on_event = [&](const Event& e) { ++happened_[static_cast<size_t>(e.kind)]; };
+    if (prepare) prepare(options);
     const int code = play(options);
     {
       const std::lock_guard lock(mutex_);
@@ -163,7 +193,10 @@ class AtTheWindow : public WorkQueue {
   std::mutex mutex_;
   std::condition_variable changed_;
   Look newest_;
-  size_t pictures_ = 0;
+  size_t pictures_ = 0;  // of the field
+  size_t drawn_ = 0;     // on all screens
+  std::string screen_;
+  PanelRect moment_;
   uint64_t tick_ = 0;
   bool closed_ = false, standing_ = false;
   std::atomic<bool> gone_{false};
@@ -178,6 +211,16 @@ class XMouse : public AtTheWindow {
   ~XMouse() override { let_go(); }
   bool ready() const { return x_.ready(); }
   void press(const std::string& key) { x_.key(key, true), x_.key(key, false); }
+  // A click on a panel. [pixels] of the X server's screen, from its corner. The pointer rests until each of its states was
+  // drawn.
+  bool click_at(int x, int y) {
+    x_.motion(-5000, -5000), x_.motion(x, y);
+    if (!frames(2)) return false;
+    x_.button(1, true);
+    const bool held = frames(2);
+    x_.button(1, false);
+    return held && frames(2);
+  }
   void begin_again() override {
     let_go();
     press("F5");

@@ -38,6 +38,7 @@ class WorkQueue {
   virtual size_t count(EventKind kind) const = 0;  // so far
 };
 
+inline namespace hands {  // the store has a Person too
 class Person {
  public:
   explicit Person(WorkQueue& desk) : desk_(desk) {}
@@ -73,6 +74,7 @@ class Person {
   size_t locked_ = 0;  // throws, before the strand was wound
   std::vector<std::string> repeated_;
 };
+}  // namespace hands
 
 // The events of the mouse for this motion, in whole pixels and notches.
 MouseInput by_mouse(const Act& act, const Look& look, float speed);
