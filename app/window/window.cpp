@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -49,14 +50,17 @@ namespace {
 
 constexpr const char* kFont = "fonts/truetype/dejavu/DejaVuSansMono.ttf";  // in a share folder
 constexpr double kMostPictures = 150;                                      // [1/s]
-constexpr double kSlowPicture = 0.07;                                      // [s] a slower frame reduces the resolution
-constexpr double kFarTooSlow = 0.25;                                       // [s] reduces it by half, without a long look
-constexpr const char* kFirstLesson = "first_stitch";                       // of procedures/
-constexpr double kMirrorEvery = 1.0 / 20;                                  // [s] of the window's picture beside a headset
-constexpr double kSlowMirror = 0.5;  // [s] where the headset's frames take their whole period
-constexpr double kStallEvery = 2;    // [s] of --stall-ms
-constexpr double kBeforeMoment = 3;  // [s] that are played before the moment of a lost point
-constexpr double kIdle = 180;        // [s] without input, until a kiosk shows its start screen
+constexpr double kSlowPicture = 0.08;                                      // [s] a slower frame reduces the resolution
+constexpr double kQuickPicture = 0.045;  // [s] a faster one raises it: a step costs less than 1.6 times
+constexpr std::array<float, 5> kResolutions{1, 0.6f, 0.45f, 0.35f,
+                                            0.25f};   // 0.7 would need post-processing, so it costs as much as 1
+constexpr double kFarTooSlow = 0.25;                  // [s] reduces it by half, without a long look
+constexpr const char* kFirstLesson = "first_stitch";  // of procedures/
+constexpr double kMirrorEvery = 1.0 / 20;             // [s] of the window's picture beside a headset
+constexpr double kSlowMirror = 0.5;                   // [s] where the headset's frames take their whole period
+constexpr double kStallEvery = 2;                     // [s] of --stall-ms
+constexpr double kBeforeMoment = 3;                   // [s] that are played before the moment of a lost point
+constexpr double kIdle = 180;                         // [s] without input, until a kiosk shows its start screen
 
 std::vector<SceneChoice> scene_choices() {
   // The scene of each technique, simplest first; then all others.
@@ -182,7 +186,7 @@ class Window {
         picture_s_ = picture_s_ * keep + (drawn - drawn_at);
         picture_count_ = picture_count_ * keep + 1;
         drawn_at = drawn;
-        coarser_if_slow();
+        fit_resolution();
         // Without vertical synchronization a limit is needed, or rendering would take the processor from the physics.
         const double left = 1.0 / kMostPictures - (drawn - now);
         if (left > 0 && !worn_) SDL_Delay(static_cast<uint32_t>(1000 * left));
@@ -910,15 +914,22 @@ class Window {
     style_panels(scale);
   }
 
-  // Without a graphics card: lower resolution instead of a lower frame rate, if the low quality was selected. A
-  // saved screenshot may take longer.
-  void coarser_if_slow() {
+  // Without a graphics card: lower resolution instead of a lower frame rate, if the low quality was selected; back up when
+  // the processor is free again. A saved screenshot may take longer.
+  void fit_resolution() {
     const float least = std::clamp(180.0f / static_cast<float>(height_), 0.25f, 1.0f);
-    if (!(visit_ || viewing_) || settings_.quality != Quality::low || coarse_ <= least || !options_.screenshot.empty()) return;
+    if (!(visit_ || viewing_) || settings_.quality != Quality::low || !options_.screenshot.empty()) return;
     // The first pictures were drawn before the last change took effect, or compiled the materials.
     const double took = picture_s_ / std::max(picture_count_, 1e-3);
-    if (++pictures_so_ < 3 || took < kSlowPicture || (pictures_so_ < 12 && took < kFarTooSlow)) return;
-    coarse_ = std::max(least, (took < kFarTooSlow ? 0.7f : 0.5f) * coarse_);
+    if (++pictures_so_ < 3 || (pictures_so_ < 12 && took < kFarTooSlow)) return;
+    const auto at = std::find_if(kResolutions.begin(), kResolutions.end(), [&](float part) { return part <= coarse_ + 0.01f; });
+    float part = coarse_;
+    if (took > kFarTooSlow) part *= 0.5f;
+    else if (took > kSlowPicture && at + 1 != kResolutions.end()) part = at[1];
+    else if (took < kQuickPicture && pictures_so_ > 40 && at != kResolutions.begin()) part = at[-1];
+    part = std::max(least, part);
+    if (part == coarse_) return;
+    coarse_ = part;
     renderer_->set_resolution_scale(coarse_);
     pictures_so_ = 0;
     picture_s_ = picture_count_ = 0;

@@ -118,6 +118,32 @@ TEST(Pictures, ThreadThatSankIntoTheWallIsDrawnOnIt) {
   EXPECT_GT(count(0.0192f), 0.8f * float(on_it));  // 0.8 mm below the surface
 }
 
+// While the needle is in the wall, nothing but the thread is drawn in its color, unless the guide of preset `paper` is wanted.
+TEST(Pictures, NoSecondStrandRunsBesideTheNeedleInTheWall) {
+  NEEDS_RENDERER();
+  Stage& s = stage();
+  Snapshot bite = s.field.snapshot;
+  bite.tool = {};
+  for (InstrumentView& tool : bite.instrument) tool.pose.p = {0, 5, 0};
+  bite.active().thread_order.clear();  // no thread: what remains in its color is a second strand
+  bite.active().needle.in_tissue = true;
+  bite.active().needle.bite = 0;
+  bite.active().bite.resize(1);
+  const float toward = std::atan2(s.camera.eye.x, s.camera.eye.z);
+  bite.active().bite[0].entry = {0.0204f * std::sin(toward), -0.010f, 0.0204f * std::cos(toward)};
+  const auto count = [&](Renderer& renderer) {
+    const Image picture = renderer.render(bite, s.camera);
+    int blue = 0;
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) blue += bluish(pixel(picture, x, y));
+    return blue;
+  };
+  PictureModel guided = s.field.model;
+  guided.visual_guide = true;
+  EXPECT_GT(count(*make_renderer(guided, kWidth, kHeight, Quality::low)), 10) << "the test's camera does not see the strand";
+  EXPECT_LT(count(*s.renderer), 3);
+}
+
 TEST(Pictures, TheNeedleIsALineFromFarAway) {
   NEEDS_RENDERER();
   Stage& s = stage();
