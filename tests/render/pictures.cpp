@@ -118,6 +118,37 @@ TEST(Pictures, ThreadThatSankIntoTheWallIsDrawnOnIt) {
   EXPECT_GT(count(0.0192f), 0.8f * float(on_it));  // 0.8 mm below the surface
 }
 
+// Physics has no cloth: a slack thread falls through the drape's plane.
+TEST(Pictures, ThreadThatSankIntoTheDrapeIsDrawnOnIt) {
+  NEEDS_RENDERER();
+  Stage& s = stage();
+  Snapshot sunk = s.field.snapshot;
+  sunk.tool = {};
+  for (InstrumentView& tool : sunk.instrument) tool.pose.p = {0, 5, 0};
+  sunk.active().needle.pose.p = {0, 5, 0};
+  sunk.active().suture_point.clear();
+  // The drape as seen in the left of the picture, clear of the organ.
+  const Vec3 ahead = normalized(s.camera.target - s.camera.eye), right = normalized(cross(ahead, s.camera.up));
+  const float tall = std::tan(0.5f * s.camera.fov_deg * kPi / 180);
+  const Vec3 ray = ahead - right * (0.65f * tall * kWidth / kHeight);
+  const Vec3 middle = s.camera.eye + ray * ((s.field.model.drape - s.camera.eye.y) / ray.y);
+  const auto count = [&](float height) {
+    const auto& order = sunk.active().thread_order;
+    for (size_t i = 0; i < order.size(); ++i) {
+      const float t = float(i) / float(order.size() - 1) - 0.5f;
+      sunk.particle[order[i]] = middle + right * (0.03f * t) + Vec3{0, height, 0};
+    }
+    const Image picture = s.renderer->render(sunk, s.camera);
+    int blue = 0;
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) blue += bluish(pixel(picture, x, y));
+    return blue;
+  };
+  const int on_it = count(0.001f);
+  ASSERT_GT(on_it, 20);
+  EXPECT_GT(count(-0.003f), 0.8f * float(on_it));  // 3 mm below the cloth
+}
+
 // While the needle is in the wall, nothing but the thread is drawn in its color, unless the guide of preset `paper` is wanted.
 TEST(Pictures, NoSecondStrandRunsBesideTheNeedleInTheWall) {
   NEEDS_RENDERER();
