@@ -10,11 +10,15 @@
 namespace catgut {
 namespace {
 
-constexpr float kTautInTissue = 0.9f;  // where only friction holds the thread, and one jerk would pull it all through
-constexpr float kLeastLoose = 0.4f;    // the needle is not pulled down into the wound with it
-constexpr float kWindRate = 2.2f;      // [rad/s] maximum, or the strand becomes slack or cuts the corner
-constexpr float kOver = 1.5f;          // [rad] beyond whole turns: thread that crosses itself
-constexpr float kGoesOn = 0.012f;      // [m]
+constexpr float kTautInTissue = 0.9f;           // where only friction holds the thread, and one jerk would pull it all through
+constexpr float kLeastLoose = 0.4f;             // the needle is not pulled down into the wound with it
+constexpr float kWindRate = 2.2f;               // [rad/s] maximum, or the strand becomes slack or cuts the corner
+constexpr float kOver = 1.5f;                   // [rad] beyond whole turns: thread that crosses itself
+constexpr float kSlack = 0.05f, kRise = 0.03f;  // [N], [m/s] below and at which the needle rises over a loop
+constexpr float kWithdraw = 1.5f;               // [rad/s] of a needle that entered the tissue by mistake
+constexpr float kCarried = 2.2f;                // [rad] from the vertical to the radius of the needle's swage
+constexpr float kOutward = 1.75f;               // [rad] maximum between that radius and the strand that leaves
+constexpr float kGoesOn = 0.012f;               // [m]
 constexpr float kSpeed = 0.15f, kLift = 0.1f, kCareful = 0.06f, kTurn = 4.0f;  // [m/s], [m/s], [rad/s]
 constexpr float kLongestDraw = 0.05f;                                          // [s] of motion in one frame of drawing
 constexpr float kDrawPerRad = 0.012f;                          // [m] per radian of the gesture by which the hands move apart
@@ -33,10 +37,12 @@ size_t whole_pairs(const Snapshot& seen) {
 }
 
 // The tool that holds the needle by `grip`, given the position of the needle's swage: its tip up and out of reach, the shaft on
-// `side`.
-Pose carrying(const SuturePicture& suture, const Pose& grip, Vec3 swage_at, float side) {
-  const float u = rotate(grip.q, {0, 0, 1}).z * side >= 0 ? 1.0f : -1.0f;
-  const Vec3 up{u, 0, 0}, along{0, 0, -u}, x = Vec3{0, std::cos(-2.2f), 0} - along * std::sin(-2.2f);
+// `side`. Jaws near the tip stand opposite to the swage, where a strand that leaves across the needle's circle would catch on
+// them. So the tool rolls about its shaft while the needle moves round the other one, and the strand always leaves outward.
+Pose carrying(const SuturePicture& suture, const Pose& grip, Vec3 swage_at, float side, float way = 0, float wound = 0) {
+  const float u = rotate(grip.q, {0, 0, 1}).z * side >= 0 ? 1.0f : -1.0f, sense = side * way;
+  const float roll = -kCarried * u + sense * std::max(0.0f, wound - (kPi - kCarried) * u * sense - kOutward);
+  const Vec3 up{u, 0, 0}, x{0, portable::cos(roll), portable::sin(roll)};
   const Quat q = from_axes(x, cross(up, x), up);
   return Pose{swage_at - rotate(q, {suture.needle_radius, 0, 0}), q} * grip;
 }
@@ -66,7 +72,8 @@ void wind_on(BothHands& b, size_t winder, std::array<Pose, 2>& hand, const Pose&
   const float behind = distance(needle_swage(picture, seen), swage_at(w.wound));
   if (b.stage >= beside) feel_winding(w, seen, across, behind, room, dt);
   const auto carry = [&](float speed) {
-    return glide(hand[winder], carrying(picture.suture[seen.active_suture], grip, swage_at(w.wound), -side), speed, kTurn, dt);
+    return glide(hand[winder], carrying(picture.suture[seen.active_suture], grip, swage_at(w.wound), -side, w.way, w.wound),
+                 speed, kTurn, dt);
   };
   b.held_for += dt;
   switch (b.stage) {
@@ -123,14 +130,15 @@ void draw_on(const BothHands& b, float amount, size_t needle, std::array<Pose, 2
   // The force that slows the hand is that of the last frame: at few frames per second a whole step at full speed would jerk the
   // tail out.
   const float most = 0.6f * kSpeed * std::min(dt, kLongestDraw), far = std::clamp(amount * kDrawPerRad, -most, most);
+  const size_t held = node_of(seen, seen.tool[tail].held_slot);
+  const float pull = held < seen.active().thread_tension.size() ? seen.active().thread_tension[held] : 0;
   for (const size_t k : {needle, tail}) {
-    // The hand slows in proportion to the tension.
-    const float gently = amount > 0 ? std::clamp(1.5f - length(seen.tool[k].force), 0.03f, 1.0f) : 1.0f;
+    // The hand slows in proportion to the tension, and to what stops it; not to tissue that pushes the jaws out.
+    const float load = std::max(k == tail ? pull : needle_tension(seen), -dot(seen.tool[k].force, way[k]));
+    const float gently = amount > 0 ? std::clamp(1.5f - load, 0.03f, 1.0f) : 1.0f;
     hand[k].p = on_leash(picture, seen, k, hand[k].p + way[k] * (far * gently));
   }
   // Before a knot, the tail's hand only applies counter-traction: if both sides are pulled hard, the tissue follows instead.
-  const size_t held = node_of(seen, seen.tool[tail].held_slot);
-  const float pull = held < seen.active().thread_tension.size() ? seen.active().thread_tension[held] : 0;
   if (b.winding.way == 0 && pull > kCounterHold) hand[tail].p += normalized(knot - hand[tail].p) * (0.3f * kSpeed * dt);
 }
 
@@ -178,6 +186,12 @@ bool glide(Pose& pose, const Pose& goal, float speed, float turn, float dt) {
 BothDo both_hands(BothHands& b, float amount, std::array<Pose, 2>& hand, const Pose& grip, const PictureModel& picture,
                   const Snapshot& seen, float dt) {
   const size_t needle = seen.tool[0].held == Held::needle ? 0 : 1, other = 1 - needle;
+  const bool ties = !seen.active().knot.empty() || b.winding.way != 0;
+  if (seen.tool[needle].held == Held::needle && seen.active().needle.in_tissue && ties && amount != 0) {
+    const Pose back{{}, axis_angle({0, 0, 1}, -std::min(std::abs(amount), kWithdraw * dt))};
+    hand[needle] = hand[needle] * inverse(grip) * back * grip;
+    return b.doing = BothDo::withdraw;
+  }
   const bool holds =
       seen.tool[needle].held == Held::needle && !seen.active().needle.in_tissue && !seen.active().suture_point.empty();
   b.follows = false;
@@ -215,7 +229,9 @@ void go_along(BothHands& b, size_t who, std::array<Pose, 2>& hand, const Pose& g
   b.follows = true;
   const Pose& tool = seen.tool[who].pose;
   const float tension = needle_tension(seen), side = side_of(tool);
+  // Slack again, it rises again: a needle that stays low enters the tissue on the way to the tail.
   if (tension > kTieTooTaut) b.winding.free = std::max(kLeastLoose * strand, feel_strand(b.winding.free, tension, dt));
+  else if (tension < kSlack) b.winding.free = std::min(kTieLoose * strand, b.winding.free + kRise * dt);
   const Vec3 turns = tool.p + rotate(tool.q, {0, 0, kTieWindAt});
   const Vec3 above = strand_above(b.winding, AcrossTool(tying_axis(side)), turns);
   glide(hand[needle], carrying(picture.suture[seen.active_suture], grip, above, -side), 2 * kSpeed, kTurn, dt);

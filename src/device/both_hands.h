@@ -12,7 +12,7 @@
 
 namespace catgut {
 
-enum class BothDo : uint8_t { nothing, wind, draw };
+enum class BothDo : uint8_t { nothing, wind, draw, withdraw };
 
 // State of a two-handed action, kept between calls.
 struct BothHands {
@@ -27,7 +27,8 @@ struct BothHands {
 
 // hand: tool poses of the hands, moved here within the limits of dt. grip: of the hand that holds the needle, tool in the
 // needle's frame. amount: [rad] of the gesture. Its sign selects the sense when winding starts. Returns what was done:
-// nothing, if the hands do not hold what is needed.
+// nothing, if the hands do not hold what is needed. A needle that has entered the tissue while the thread is tied is withdrawn
+// along its curve first.
 BothDo both_hands(BothHands& b, float amount, std::array<Pose, 2>& hand, const Pose& grip, const PictureModel& picture,
                   const Snapshot& seen, float dt);
 

@@ -8,6 +8,8 @@
 #include "device/gamepad.h"
 #include "device/mouse.h"
 #include "device/tray.h"
+#include "exchange/strand.h"
+#include "exchange/tying.h"
 #include "procedure/scene_file.h"
 #include "runtime/live.h"
 #include "sim/simulation.h"
@@ -267,6 +269,56 @@ TEST(Help, one_gesture_moves_both_hands_unless_it_is_switched_off) {
     EXPECT_EQ(d.steering.both.winding.way, assist ? 1.0f : 0.0f);
     EXPECT_LT(d.out[0].jaw, assist ? 0.71f : 1.1f) << "a jaw wide open would shake the loop off";
   }
+}
+
+// Jaws behind the needle's tip stand opposite to its swage. A strand that crossed the needle's circle caught on them, became
+// slack and slid off the tool: wound the other way, the second throw had no loop.
+TEST(Help, a_strand_that_is_wound_stays_clear_of_the_jaws_at_the_tip) {
+  for (const float way : {60.0f, -60.0f})
+    for (const float side : {1.0f, -1.0f}) {
+      WorkQueue d;
+      with_a_stitch(d);
+      Snapshot& seen = d.seen;
+      for (float& t : seen.active().thread_tension) t = 0.05f;  // [N] just taut
+      const Pose needle = seen.active().needle.pose;
+      seen.tool[1].pose = d.steering.hand[1].pose = {on_needle(d.picture, needle, 0.93f), needle.q};
+      d.steering.hand[0].pose.q = from_tool_axis(tying_axis(side));
+      MouseInput in = moved(way, 0);
+      in.both = true;
+      float clear = 1, wound = 0;
+      for (int i = 0; i < 1200 && wound < 2 * kPi; ++i) {
+        d.turn(in);
+        for (size_t k = 0; k < 2; ++k) seen.tool[k].pose = d.out[k].pose;
+        seen.active().needle.pose = d.out[1].pose * inverse(d.steering.hand[1].grip);
+        const Vec3 stitch = seen.particle[15], swage = needle_swage(d.picture, seen);
+        for (size_t n = 16; n <= 40; ++n) seen.particle[n] = stitch + (swage - stitch) * (static_cast<float>(n - 15) / 25);
+        wound = d.steering.both.winding.wound;
+        if (wound < 0.2f) continue;
+        const Vec3 jaws = d.out[1].pose.p, turns = d.out[0].pose.p + rotate(d.out[0].pose.q, {0, 0, kTieWindAt});
+        const float at = std::clamp(dot(jaws - swage, turns - swage) / length2(turns - swage), 0.0f, 1.0f);
+        clear = std::min(clear, distance(jaws, swage + (turns - swage) * at));
+      }
+      EXPECT_GE(wound, 2 * kPi);
+      EXPECT_GT(clear, d.picture.suture[0].needle_radius) << "way " << way << ", side " << side;
+    }
+}
+
+TEST(Help, a_needle_that_entered_the_tissue_while_tying_is_withdrawn) {
+  WorkQueue d;
+  with_a_stitch(d);
+  MouseInput in = moved(10, 0);
+  in.both = true;
+  d.seen.active().needle.in_tissue = true;
+  const Pose before = d.seen.active().needle.pose;
+  d.turn(in);
+  EXPECT_EQ(d.steering.both.doing, BothDo::nothing) << "a bite under way is not undone";
+  d.seen.active().knot.resize(1);
+  for (int i = 0; i < 10; ++i) d.turn(in);
+  EXPECT_EQ(d.steering.both.doing, BothDo::withdraw);
+  const Pose needle = d.out[1].pose * inverse(d.steering.hand[1].grip);
+  const float turned = 10 * 1.5f * kDt;  // [rad]
+  EXPECT_LT(distance(on_needle(d.picture, needle, 1), on_needle(d.picture, before, 1 - turned / kPi)), 1e-4f)
+      << "backward along its own curve";
 }
 
 TEST(Help, an_end_is_not_drawn_farther_than_it_is_long) {

@@ -331,7 +331,7 @@ class SdlPad : public AtTheWindow {
 // Grasps the needle, sutures both bowel ends, pulls the thread through, approximates, ties. False: it stopped at me.doing().
 inline bool sew_and_tie_once(AtTheWindow& desk, Person& me, int throws, bool cut) {
   const auto sewn = [&] { return desk.count(EventKind::bite_completed) >= 2; };
-  return me.take_needle() && me.bite() && (sewn() || (me.hand_back() && me.bite())) && me.pull_tail(0.1f) &&
+  return me.take_needle() && me.bite() && (sewn() || (me.hand_back() && me.bite())) && me.pull_tail(0.08f) &&
          me.draw_together() && me.tie(1) && (throws < 2 || me.tie(-1)) && (!cut || me.cut_needle());
 }
 

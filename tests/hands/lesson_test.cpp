@@ -45,7 +45,7 @@ TEST(Lessons, each_stage_is_done_by_mouse_and_shown) {
   ASSERT_EQ(at(), "second bite");
   ASSERT_TRUE(me.bite());
   ASSERT_EQ(at(), "pull");
-  ASSERT_TRUE(me.pull_tail(0.09f));
+  ASSERT_TRUE(me.pull_tail(0.075f));
   ASSERT_EQ(at(), "approximate");
   ASSERT_TRUE(me.draw_together());
   ASSERT_EQ(at(), "first wrap");
@@ -75,6 +75,32 @@ TEST(Lessons, each_stage_is_done_by_mouse_and_shown) {
                           [&](const Snapshot& seen) { return update_run(shown, lesson, seen), shown.stage > k; }))
         << lesson.stage[k].name << ", from " << lesson.stage[lesson.stage[k].demo_from].name;
   }
+}
+
+// The first exercise of a course: skin.
+TEST(Lessons, the_simple_suture_in_skin_is_done_by_mouse) {
+  AtTheMouse desk(1, "skin");
+  const Procedure lesson = read_procedure("simple_suture");
+  ProcedureRun run;
+  begin_run(run, lesson, desk.look().seen, 1.0 / 60);
+  desk.after_tick = [&](const Snapshot& seen) { update_run(run, lesson, seen); };
+  Person me(desk);
+  const auto at = [&] { return run.stage < lesson.stage.size() ? lesson.stage[run.stage].name : "done"; };
+  ASSERT_TRUE(me.take_needle());
+  ASSERT_EQ(at(), "sweep");
+  ASSERT_TRUE(me.bite()) << me.doing();
+  ASSERT_EQ(at(), "pull");
+  ASSERT_TRUE(me.pull_tail(0.045f) && me.draw_together()) << me.doing();
+  ASSERT_EQ(at(), "first wrap");
+  ASSERT_TRUE(me.tie(1)) << me.doing() << " at " << at();
+  ASSERT_EQ(at(), "second wrap");
+  ASSERT_TRUE(me.tie(-1)) << me.doing() << " at " << at();
+  ASSERT_EQ(at(), "cut needle end");
+  ASSERT_TRUE(me.cut_needle());
+  ASSERT_EQ(at(), "cut tail");
+  ASSERT_TRUE(me.cut_tail());
+  EXPECT_TRUE(finished(run, lesson)) << run_table(run, lesson);
+  EXPECT_TRUE(run.error.empty()) << run_table(run, lesson);
 }
 
 }  // namespace

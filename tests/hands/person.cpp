@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "exchange/tying.h"
+
 namespace catgut {
 namespace {
 
@@ -266,6 +268,27 @@ bool Person::cut_needle() {
   act.cut = true;
   if (!desk_.act(act)) return false;
   return wait(3, [&] { return !seen().active().needle_on_thread; }, {1, {}, false});
+}
+
+bool Person::cut_tail() {
+  doing_ = "cut the tail";
+  const auto cuts = [&] { return desk_.count(EventKind::thread_cut); };
+  const size_t before = cuts();
+  for (float far = 0.009f; far < 0.02f && cuts() == before; far += 0.003f) {
+    const auto place = [&] {
+      const Vec3 knot = stitch_place(desk_.picture(), seen());
+      size_t i = first_point_node(seen());
+      while (i > 1 && distance(node_at(seen(), i), knot) < far) --i;
+      return node_at(seen(), i);
+    };
+    point(
+        0, place, [&] { return distance(seen().tool[0].pose.p, place()) < 0.002f; }, true, 6);
+    Act act;
+    act.cut = true;
+    if (!desk_.act(act)) return false;
+    wait(0.5f, [&] { return cuts() > before; });
+  }
+  return cuts() > before;
 }
 
 bool Person::tie(int way) {

@@ -53,6 +53,7 @@ class Person {
   bool take_tail();
   bool set_throw();
   bool cut_needle();  // off the thread, by the hand that holds it
+  bool cut_tail();    // near the knot, by the empty needle holder
   std::string doing() const { return doing_; }
   const std::vector<std::string>& repeated() const { return repeated_; }  // actions that failed and were tried again
 

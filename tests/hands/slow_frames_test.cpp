@@ -2,7 +2,8 @@
 // tests/hands: the first lesson at few and irregular frames per second, as on a busy machine without a graphics card. In lock
 // step and reproducible by its number, so a failure of the window can be repeated here: the user sees every second frame, as in
 // at_the_window.h. A quarter of a minute for every ten runs, so for the nightly tests (CATGUT_LONG=1); CATGUT_LESSON_RUNS is
-// the number of runs, CATGUT_LESSON_FIRST the number of the first.
+// the number of runs, CATGUT_LESSON_FIRST the number of the first, CATGUT_LESSON_TICKS (3: a fast machine) the usual length of
+// a frame in ticks.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -25,6 +26,7 @@ class SlowFrames : public AtTheMouse {
     const Camera camera = camera_of(start_orbit(picture_, look_.seen.active().needle.pose.p));
     look_.view = view_frame(camera.eye, camera.target, camera.up, camera.fov_deg, number % 2 ? 720 : 360);
     usual_ = std::uniform_int_distribution<int>(4, 24)(random_);  // 15 to 2.5 frames per second
+    if (const char* ticks = std::getenv("CATGUT_LESSON_TICKS")) usual_ = std::atoi(ticks);
   }
   bool act(const Act& act) override {
     Act after;
@@ -43,7 +45,7 @@ class SlowFrames : public AtTheMouse {
   // The length of the next one: usual, up to twice that, and sometimes a second.
   float frame() {
     const bool stalls = std::uniform_int_distribution<int>(0, 99)(random_) == 0;
-    ticks_ = stalls ? 60 : std::uniform_int_distribution<int>(usual_ / 2, 2 * usual_)(random_);
+    ticks_ = stalls ? 60 : std::uniform_int_distribution<int>(std::max(1, usual_ / 2), 2 * usual_)(random_);
     const float dt = kTick * static_cast<float>(ticks_);
     look_.dt = std::clamp(dt, 1e-3f, 0.25f);
     return dt;
@@ -67,7 +69,7 @@ TEST(SlowFrames, the_lesson_succeeds_at_the_first_try) {
     begin_run(run, lesson, desk.look().seen, 1.0 / 60);
     desk.after_tick = [&](const Snapshot& seen) { update_run(run, lesson, seen); };
     Person me(desk);
-    bool ok = me.take_needle() && me.bite() && me.hand_back() && me.bite() && me.pull_tail(0.1f) && me.draw_together() &&
+    bool ok = me.take_needle() && me.bite() && me.hand_back() && me.bite() && me.pull_tail(0.08f) && me.draw_together() &&
               me.tie(1) && me.tie(-1) && me.cut_needle();
     ok = ok && finished(run, lesson);
     done += ok;

@@ -42,7 +42,7 @@ TEST_F(StitchAtTheWindow, by_mouse_and_keyboard) {
   if (!desk.ready()) GTEST_SKIP() << "no XTest here";
   Person me(desk);
   bool bitten = false;
-  desk.sit([&] { bitten = me.take_needle() && me.bite() && me.hand_back() && me.bite() && me.pull_tail(0.1f); }, true);
+  desk.sit([&] { bitten = me.take_needle() && me.bite() && me.hand_back() && me.bite() && me.pull_tail(0.08f); }, true);
   EXPECT_TRUE(bitten) << me.doing();
   EXPECT_GE(desk.count(EventKind::needle_grasped), 2u);
   EXPECT_EQ(desk.count(EventKind::bite_completed), 2u);
