@@ -32,10 +32,13 @@ void swatch(const StitchBite& b, BiteColor by, const std::string& number) {
 }
 
 void bite_table(const StitchMap& map) {
-  constexpr ImGuiTableFlags kFlags = ImGuiTableFlags_ScrollY | ImGuiTableFlags_RowBg | ImGuiTableFlags_SizingStretchProp;
+  constexpr ImGuiTableFlags kFlags = ImGuiTableFlags_ScrollY | ImGuiTableFlags_RowBg;
   if (!ImGui::BeginTable("bites", 7, kFlags)) return;
   ImGui::TableSetupScrollFreeze(0, 1);
-  for (const char* name : {"", "time", "wall", "spacing", "depth", "edge", "length"}) ImGui::TableSetupColumn(tr(name).c_str());
+  // Widths are given: those that follow from the contents are unknown in the first picture.
+  constexpr std::pair<const char*, float> kColumn[] = {{"", 1},      {"time", 2}, {"wall", 2},  {"spacing", 3},
+                                                       {"depth", 3}, {"edge", 4}, {"length", 3}};
+  for (const auto& [name, part] : kColumn) ImGui::TableSetupColumn(tr(name).c_str(), ImGuiTableColumnFlags_WidthStretch, part);
   ImGui::TableHeadersRow();
   for (size_t k = 0; k < map.bite.size(); ++k) {
     const StitchBite& b = map.bite[k];

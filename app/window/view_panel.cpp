@@ -102,8 +102,8 @@ Choice view_panel(const PlayedView& v, const Settings& settings) {
   ImGui::SameLine();
   if (ImGui::Button("5 s >>", {4.5f * em(), 0})) choice = {Chosen::go_by, 0, "", static_cast<int64_t>(5 / s.tick_s)};
   ImGui::SameLine(0, em());
-  text(fmt::format("{} / {}", clock_text(static_cast<double>(s.at) * s.tick_s),
-                   clock_text(static_cast<double>(s.ticks) * s.tick_s)));
+  text(fmt::format("{} / {}", clock_text(static_cast<double>(s.first + s.at) * s.tick_s),
+                   clock_text(static_cast<double>(s.first + s.ticks) * s.tick_s)));
   ImGui::SameLine(0, em());
   for (const float speed : kSpeeds) {
     const bool on = std::abs(s.speed - speed) < 0.01f;

@@ -826,9 +826,9 @@ class Window {
       developer_ = wanted == "developer";
     } else if (viewing_) {
       const PlaybackStatus& s = viewing_->playback.status();
-      const auto to = static_cast<uint64_t>(std::llround(options_.at / s.tick_s));
+      const uint64_t to = ticks_to(s, options_.at);
       if (s.known < s.ticks) return;
-      if (s.at != std::min(to, s.ticks)) return viewing_->playback.go_to(to);
+      if (s.at != to) return viewing_->playback.go_to(to);
       if (wanted == "results") carry_out({Chosen::sewn});
     }
     if (wanted == "settings") carry_out({Chosen::settings});

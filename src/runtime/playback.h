@@ -6,6 +6,8 @@
 // Only one thread (the window's) may call a Playback's functions; none waits for the simulation, except the
 // constructor and the destructor.
 #pragma once
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -30,6 +32,12 @@ struct PlaybackStatus {
   std::string fault;                   // not empty: the replay has stopped, and why
   uint64_t gathered = 0;               // counts updates of result()
 };
+
+// Ticks to play up to a time of the session [s], as its clock shows it: a recording may start in the middle.
+inline uint64_t ticks_to(const PlaybackStatus& s, double time_s) {
+  const double ticks = time_s / s.tick_s - static_cast<double>(s.first);
+  return static_cast<uint64_t>(std::llround(std::clamp(ticks, 0.0, static_cast<double>(s.ticks))));
+}
 
 class Playback {
  public:

@@ -83,6 +83,14 @@ TEST(Playback, any_place_in_any_order_is_what_was_there) {
   EXPECT_TRUE(p.status().fault.empty());
 }
 
+TEST(Playback, a_time_is_that_of_the_session_also_where_the_recording_began_later) {
+  PlaybackStatus s;
+  s.ticks = 600, s.first = 402;
+  EXPECT_EQ(ticks_to(s, 33.0), 600u);
+  EXPECT_EQ(ticks_to(s, 10.0), 198u);
+  EXPECT_EQ(ticks_to(s, 1.0), 0u);
+}
+
 TEST(Playback, it_plays_at_the_speed_that_was_asked_for_and_stops_at_the_end) {
   Playback p(poked(), "poked");
   Snapshot seen;
