@@ -133,9 +133,9 @@ static void yield_to_thread(const BodiesModel& model, const Bodies& bodies, Bodi
     const BodySphere &a = m.sphere[m.thread_capsule[part].a], &z = m.sphere[m.thread_capsule[part].b];
     if (m.hinge_z <= 0 || a.jaw == 0) continue;
     const Vec3 inward = rotate(bodies.body[b].pose.q, {-static_cast<float>(a.jaw), 0, 0});
-    closing[b] += (dot(k.tool[i].force_a, inward) * (m.hinge_z - a.at.z) +
-                   dot(k.tool[i].force_b, inward) * (m.hinge_z - z.at.z)) /
-                  m.hinge_z;
+    closing[b] +=
+        (dot(k.tool[i].force_a, inward) * (m.hinge_z - a.at.z) + dot(k.tool[i].force_b, inward) * (m.hinge_z - z.at.z)) /
+        m.hinge_z;
   }
   for (size_t b = 0; b < bodies.body.size(); ++b) {
     BodiesScratch::Moving& moving = k.moving[b];

@@ -19,8 +19,8 @@ constexpr float kStaysApart = 0.012f;   // [m] round the bowel, between stay sut
 constexpr float kPull = 1.7f;           // [N] on each strand of a physical throw: below what the bites bear
 constexpr float kApproximate = 0.002f;  // [m] of each clamp: the edges touch after 1.5 mm
 constexpr int kThrows = 2;
-// [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is square
-// to it. Less deep, it slid along the serosa and came out through the cut edge.
+// [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
+// square to it. Less deep, it slid along the serosa and came out through the cut edge.
 constexpr float kYields = 0.002f;
 constexpr float kFreeDepth = 0.0045f;  // [m] depth below the rims of a sweep through two layers
 

@@ -2,8 +2,8 @@
 // surgeon/thread_tie: an instrument tie with physical mechanics. The forceps holds the needle near its swage and winds the
 // strand round the needle holder, which takes the tail, draws it through the turns and pulls against the forceps. The turns are
 // thread on a shaft. The surgeon looks whether they are still there when the tail is taken, and whether the strands twist about
-// each other when it is drawn through; otherwise the throw is wound again, up to kAgain times. Reads Snapshots; moves two scripted
-// hands.
+// each other when it is drawn through; otherwise the throw is wound again, up to kAgain times. Reads Snapshots; moves two
+// scripted hands.
 //
 // x along the stitch, y up, z toward the viewer. `side` +1: the long strand is on the right, and the needle holder comes from
 // there. The sides alternate from throw to throw; winding in the same sense then makes a square knot.

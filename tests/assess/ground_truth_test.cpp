@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/assess: a stitched session made by construction (made_session.h): its known numbers are measured, and 29 kinds of errors
-// are put in one by one and found.
+// tests/assess: a stitched session made by construction (made_session.h): its known numbers are measured, and 29 kinds of
+// errors are put in one by one and found.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -91,7 +91,8 @@ class Theatre {
   TissueTextures textures_;
   std::vector<filament::Material*> material_;
   filament::MaterialInstance *tissue_material_ = nullptr, *thread_material_ = nullptr, *needle_material_ = nullptr,
-                             *tool_material_ = nullptr, *drape_material_ = nullptr, *marker_material_ = nullptr, *mark_material_ = nullptr;
+                             *tool_material_ = nullptr, *drape_material_ = nullptr, *marker_material_ = nullptr,
+                             *mark_material_ = nullptr;
   Motions motion_;  // of every particle, in the current frame
   std::vector<TissueView> tissue_;
   ThreadView thread_;
