@@ -29,6 +29,7 @@ constexpr float kSlideOff = 1.4f;    // [s]
 constexpr float kHigh = 0.62f;
 constexpr float kDrawn = 0.5f;  // of the strand's length: height to which the tail is drawn at most
 constexpr float kLow = 4e-3f;   // [m] above the stitch, where strands are pulled
+constexpr float kKnot = 5e-3f;  // [m] from the middle of the stitch: thread nearer than this belongs to the knot
 constexpr int kAgain = 3;       // times that a throw is wound again
 
 Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
@@ -134,9 +135,18 @@ void ThreadTie::begin(const Snapshot& seen, int wraps, int sense, bool first) {
   } else {
     side_ = -side_;
   }
+  // Free thread beyond the knot, which takes up some millimeters with every throw.
   const size_t last = seen.active().thread_order.size() - 1;
-  strand_ = length_between(seen, last_point_node(seen), last) - (first ? 0.0f : 3e-3f);
-  tail_ = length_between(seen, 0, first_point_node(seen)) - (first ? 0.0f : 3e-3f);
+  size_t tail_at = first_point_node(seen), strand_at = last_point_node(seen);
+  const auto near = [&](size_t i) { return distance(node_at(seen, i), origin_) < kKnot; };
+  if (!first) {
+    for (size_t i = 0; i < tail_at; ++i)
+      if (near(i)) tail_at = i;
+    for (size_t i = last; i > strand_at; --i)
+      if (near(i)) strand_at = i;
+  }
+  const float out = first ? 0.0f : kKnot;
+  strand_ = length_between(seen, strand_at, last) + out, tail_ = length_between(seen, 0, tail_at) + out;
   height_ = (wraps > 1 ? 0.42f : kHigh) * strand_;
   go(seen, first ? to_tail : to_work);
 }
@@ -160,7 +170,7 @@ bool ThreadTie::glide(float dt) {
     // Over the stitch, the strand nearly taut all the way: slack thread that lags behind drifts between the jaws.
     const Vec3 from = hand_from_ - origin_, to = hand_to_ - origin_;
     const Vec3 way = lerp(normalized(from), normalized(to), e) + Vec3{0, 1.2f * e * (1 - e), 0};
-    hand_ = origin_ + normalized(way) * (length(from) + (length(to) - length(from)) * e);
+    hand_ = origin_ + normalized(way) * (length(from) + (length(to) - length(from)) * std::min(1.0f, 4 * e));
   }
   holder_turn_ = nlerp(holder_from_, holder_to_, e);
   forceps_angle_ = angle_from_ + (angle_to_ - angle_from_) * e;
@@ -235,8 +245,8 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       break;
     }
     case cross_up:
-      glide_to(origin_ + Vec3{side_ * 0.6f * tail_, 8e-3f + kLow, 0}, origin_ + Vec3{-side_ * 24e-3f, 12e-3f + kLow, 0},
-               0.6f * how_.speed, forceps_angle_);
+      glide_to(origin_ + Vec3{side_ * 0.6f * tail_, 8e-3f + kLow, 0},
+               origin_ + Vec3{-side_ * std::min(24e-3f, 0.5f * strand_), 12e-3f + kLow, 0}, 0.6f * how_.speed, forceps_angle_);
       break;
     case cross_down:
       glide_to(origin_ + Vec3{side_ * 0.75f * tail_, 2e-3f + kLow, 0}, origin_ + Vec3{-side_ * 0.6f * strand_, 4e-3f + kLow, 0},
@@ -362,6 +372,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       if (felt_ > 0.1f) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
       else if (felt_ < 0.01f) radius_ = std::min(0.6f * strand_, radius_ + 0.02f * dt);
       hand_ = lerp(middle, past, slid_) + around(side_, angle_ + turn * slid_) * radius_;
+      const Vec3 reach = hand_ - origin_;  // no farther than the strand, which is short for a late throw
+      if (length(reach) > kLoose * strand_) hand_ = origin_ + normalized(reach) * (kLoose * strand_);
       if (slid_ < 1 || (!taut && drawn_ < far && waited_ <= 5)) break;
       // A throw of one wrap gives 1.3 to 1.6 turns here, none at all less than half a turn.
       const float turns = std::abs(twist(seen) - twist_before_);
@@ -370,7 +382,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     }
     case cross_up:
-      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f)) || std::max(felt_, tail_felt_) > kTaut)
+      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f)) ||
+          (done_ > 0.6f && std::max(felt_, tail_felt_) > kTaut))
         go(seen, cross_down);
       break;
     case cross_down:
