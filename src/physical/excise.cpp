@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physical/near_faces.h"
+
 namespace catgut::physical {
 namespace {
 
@@ -22,17 +24,8 @@ void reserve(const wall::Model& m, Excision& e) {
 }
 
 void char_around(const wall::Model& m, Excision& e, uint32_t face, Vec3 tip, float width, float part) {
-  // The face and two rings of neighbors: some millimeters.
   std::array<uint32_t, 40> near;
-  size_t count = 0, done = 0;
-  near[count++] = face;
-  for (int ring = 0; ring < 2; ++ring)
-    for (const size_t end = count; done < end; ++done)
-      for (const uint32_t over : m.neighbor[near[done]])
-        if (over != wall::kNone && count < near.size() &&
-            std::find(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count), over / 4) ==
-                near.begin() + static_cast<std::ptrdiff_t>(count))
-          near[count++] = over / 4;
+  const size_t count = near_faces(m, face, near);
   for (size_t i = 0; i < count; ++i) {
     const bool quad = is_quad(m, near[i]);
     const wall::Raster& r = wall::raster(quad);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/elementary.h"
+#include "physical/near_faces.h"
 
 namespace catgut::physical {
 namespace {
@@ -46,20 +47,6 @@ void add_warm(std::vector<uint32_t>& warm, uint32_t face) {
   if (at == warm.end() || *at != face) warm.insert(at, face);
 }
 
-// The face and its neighbors, twice: some millimeters.
-size_t around(const wall::Model& m, uint32_t face, std::array<uint32_t, 40>& near) {
-  size_t count = 0, done = 0;
-  near[count++] = face;
-  for (int ring = 0; ring < 2; ++ring)
-    for (const size_t end = count; done < end; ++done)
-      for (const uint32_t over : m.neighbor[near[done]])
-        if (over != wall::kNone && count < near.size() &&
-            std::find(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count), over / 4) ==
-                near.begin() + static_cast<std::ptrdiff_t>(count))
-          near[count++] = over / 4;
-  return count;
-}
-
 Vec3 center_of(const wall::Model& m, uint32_t face, uint32_t cell) {
   wall::Point p{face, 0, 0, 0};
   wall::to_natural(is_quad(m, face), wall::raster(is_quad(m, face)).center[cell], p.xi, p.eta);
@@ -75,7 +62,7 @@ void heat_at(const HeatModel& law, const wall::Model& m, const wall::Point& tip,
   const float radius = coagulate ? law.radius_coagulate : law.radius_cut;
   const float energy = (coagulate ? law.share_coagulate : law.share_cut) * power * h;
   std::array<uint32_t, 40> near;
-  const size_t count = around(m, tip.face, near);
+  const size_t count = near_faces(m, tip.face, near);
   wall::Point mid = tip;
   mid.zeta = 0;
   const Vec3 at = wall::rest_place(m, mid);

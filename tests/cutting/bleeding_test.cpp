@@ -339,13 +339,13 @@ TEST(WrongSurgery, a_bite_through_char_is_reported) {
   const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*model));
   Jobs jobs(1);
   Snapshot seen;
-  TickInput input, nobody;
-  for (ToolInput& hand : nobody.hand) hand.connected = 0;
+  TickInput input, no_hands;
+  for (ToolInput& hand : no_hands.hand) hand.connected = 0;
   publish(*model, *state, seen);
   uint32_t entered = 0, faults = 0;
   uint64_t t = 0;
   for (; t < 900 && entered == 0; ++t) {
-    input = t < 5 ? nobody : surgeon->operate(seen, model->dt);
+    input = t < 5 ? no_hands : surgeon->operate(seen, model->dt);
     input.tick = t;
     step(*model, *state, input, jobs);
     publish(*model, *state, seen);

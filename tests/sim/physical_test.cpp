@@ -246,11 +246,11 @@ TEST(PhysicalScene, a_needle_leads_its_thread_through_both_walls) {
   const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*model));
   Jobs jobs(2);
   Snapshot seen;
-  TickInput input, nobody;
-  for (ToolInput& hand : nobody.hand) hand.connected = 0;
+  TickInput input, no_hands;
+  for (ToolInput& hand : no_hands.hand) hand.connected = 0;
   publish(*model, *state, seen);
   for (uint64_t t = 0; t < 60 * 20 && !surgeon->done(); ++t) {
-    input = t < 30 ? nobody : surgeon->operate(seen, model->dt);
+    input = t < 30 ? no_hands : surgeon->operate(seen, model->dt);
     input.tick = t;
     step(*model, *state, input, jobs);
     publish(*model, *state, seen);
@@ -327,8 +327,8 @@ Closed sew_and_leave(const std::vector<size_t>& tasks) {
       tasks.empty() ? scripted_surgeon(scene, picture) : make_demonstrator(scene.surgeon.plan, picture, skill_of(scene), tasks);
   Jobs jobs(2);
   Snapshot seen;
-  TickInput nobody;
-  for (ToolInput& hand : nobody.hand) hand.connected = 0;
+  TickInput no_hands;
+  for (ToolInput& hand : no_hands.hand) hand.connected = 0;
   const auto tick = [&](TickInput in) {
     in.tick = state->tick;
     step(*model, *state, in, jobs);
@@ -339,7 +339,7 @@ Closed sew_and_leave(const std::vector<size_t>& tasks) {
   result.open = gap_at_top(picture, seen);
   uint64_t held = 0;  // tick in which an instrument last held anything
   for (int t = 0; t < 60 * 90 && !surgeon->done(); ++t) {
-    tick(t < 30 ? nobody : surgeon->operate(seen, model->dt));
+    tick(t < 30 ? no_hands : surgeon->operate(seen, model->dt));
     for (const ToolView& tool : seen.tool)
       if (tool.held != Held::nothing) held = state->tick, result.let_go = gap_at_top(picture, seen);
   }
@@ -351,7 +351,7 @@ Closed sew_and_leave(const std::vector<size_t>& tasks) {
   thread::State& thread = state->physical.world.thread;
   std::fill(thread.broken.begin(), thread.broken.end(), uint8_t{1});
   thread.eyelet.clear(), thread.travel = 1e9f;
-  for (int t = 0; t < 90; ++t) tick(nobody);
+  for (int t = 0; t < 90; ++t) tick(no_hands);
   result.removed = gap_at_top(picture, seen);
   std::printf("gap %.2f mm, hands away %.2f, seconds later %.2f, without the thread %.2f; %s, %u throws\n",
               1e3 * static_cast<double>(result.open), 1e3 * static_cast<double>(result.let_go),
