@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "assess/motion.h"
 #include "core/elementary.h"
 
 namespace catgut::assess {
@@ -17,14 +18,26 @@ constexpr double kSampleRate = 60;  // [1/s] of the hands, at least
 constexpr float kOpenJaw = 0.5f, kClosedJaw = 0.15f;
 constexpr double kTremorApart = 1.0 / 30;  // [s]
 constexpr double kGraspTime = 0.1;         // [s] closed on nothing; a surgeon who sees it opens the jaws at once
+constexpr double kLeastTurn = 0.2;         // [rad] a needle that turned less was pushed
 
 double degrees_to_surface(Vec3 direction, Vec3 normal) {
   return portable::asin(std::min(1.0, std::abs(static_cast<double>(dot(direction, normal))))) * kDegrees;
 }
 
-double angle_between(Quat a, Quat b) {  // [rad]
+double angle_between(Quat a, Quat b) {  // [rad]; also where rounding has changed their lengths
   const Quat d = conjugate(a) * b;
-  return 2 * portable::acos(std::min(1.0, std::abs(static_cast<double>(d.w))));
+  return 2 * portable::atan2(static_cast<double>(length(Vec3{d.x, d.y, d.z})), std::abs(static_cast<double>(d.w)));
+}
+
+// Every `step` seconds of `ticks`.
+bool sampled(const Facts& f, uint64_t ticks, double step) {
+  const auto every = std::max<uint64_t>(1, static_cast<uint64_t>(step / f.setup.tick_s + 0.5));
+  return ticks % every == 0;
+}
+double turn_since(Quat& last, Quat now) {  // [rad]
+  const double turn = angle_between(last, now);
+  last = now;
+  return turn;
 }
 
 double wander_of(const std::vector<Vec3>& center) {  // [m]
@@ -50,6 +63,23 @@ double tremor_of(const std::vector<Vec3>& center, double tick_s) {  // [m]
   for (size_t i = apart; i + apart < center.size(); ++i)
     squares += static_cast<double>(length2(center[i] - 0.5f * (center[i - apart] + center[i + apart])));
   return std::sqrt(squares / static_cast<double>(center.size() - 2 * apart));
+}
+
+// Path of the tip over its distance, from where it last came nearer than kApproach to its place now.
+double approach_of(const std::vector<Vec3>& tip) {
+  double path = 0;
+  if (tip.empty()) return kNotObserved;
+  for (size_t i = tip.size() - 1; i > 0; --i) {
+    path += static_cast<double>(distance(tip[i], tip[i - 1]));
+    const float left = distance(tip[i - 1], tip.back());
+    if (left >= kApproach) return path / static_cast<double>(left);
+  }
+  return kNotObserved;
+}
+
+Vec3 tip_of(const NeedleView& needle, const SuturePicture& shape) {
+  return transform(needle.pose,
+                   shape.needle_radius * Vec3{portable::cos(shape.needle_arc), portable::sin(shape.needle_arc), 0});
 }
 
 SutureFacts& suture_of(Facts& f, uint32_t which) {
@@ -87,7 +117,9 @@ void start_bite(Facts& f, const PictureModel& picture, const Snapshot& seen, con
   OpenBite open;
   open.suture = e.suture, open.number = e.which, open.entered = e.tick;
   open.entry_angle = angle_of(f, picture, seen, view.needle, bite.wall, bite.entry);
-  open.turned = view.needle.pose.q;
+  open.turned = open.turning = view.needle.pose.q;
+  open.hole = bite.entry;
+  open.approach = approach_of(suture.tip);
   for (const ToolView& tool : seen.tool)
     if (tool.held == Held::needle && tool.held_suture == e.suture && e.suture < picture.suture.size()) {
       open.grasp_at = static_cast<double>(tool.held_at);
@@ -101,15 +133,32 @@ void start_bite(Facts& f, const PictureModel& picture, const Snapshot& seen, con
   f.open.push_back(open);
 }
 
+// The way of each needle's tip to its next entry.
+void follow_tips(Facts& f, const PictureModel& picture, const Snapshot& seen) {
+  const auto most = static_cast<size_t>(kApproachTime / f.setup.tick_s);
+  for (uint32_t k = 0; k < seen.suture.size() && k < picture.suture.size(); ++k) {
+    std::vector<Vec3>& tip = suture_of(f, k).tip;
+    if (seen.suture[k].needle.in_tissue) {
+      tip.clear();
+      continue;
+    }
+    if (tip.size() >= 2 * most) tip.erase(tip.begin(), tip.end() - static_cast<std::ptrdiff_t>(most));
+    tip.push_back(tip_of(seen.suture[k].needle, picture.suture[k]));
+  }
+}
+
 void follow_bites(Facts& f, const PictureModel& picture, const Snapshot& seen) {
   for (OpenBite& open : f.open) {
-    if (open.suture >= seen.suture.size() || open.suture >= picture.suture.size() || open.out) continue;
+    if (open.suture >= seen.suture.size() || open.suture >= picture.suture.size()) continue;
     const SutureView& view = seen.suture[open.suture];
     if (open.number >= view.bite.size()) continue;
+    open.shift = std::max(open.shift, distance(view.bite[open.number].entry, open.hole));
+    if (open.out) continue;
     const SuturePicture& shape = picture.suture[open.suture];
     open.center.push_back(view.needle.pose.p);
-    const Vec3 tip = transform(view.needle.pose,
-                               shape.needle_radius * Vec3{portable::cos(shape.needle_arc), portable::sin(shape.needle_arc), 0});
+    if (sampled(f, seen.tick - open.entered, kTurnStep)) open.turn += turn_since(open.turning, view.needle.pose.q);
+    const Vec3 tip = tip_of(view.needle, shape);
+    open.tip.push_back(tip);
     const uint32_t wall = view.bite[open.number].wall;
     const SurfacePoint s = f.rest[0].serosa(wall, at_rest(picture, seen, wall, tip));
     if (s.valid) open.depth = std::max(open.depth, s.below);
@@ -138,6 +187,12 @@ void finish_bite(Facts& f, const PictureModel& picture, const Snapshot& seen, co
     b.drive_speed = open->drive_speed;
     b.wander = wander_of(open->center) * kMm;
     b.tremor = tremor_of(open->center, f.setup.tick_s) * kMm;
+    b.ldlj = ldlj(low_pass(open->tip, kMotionCutoff, 1 / f.setup.tick_s), 1 / f.setup.tick_s);
+    const double net = angle_between(open->turned, open->turning);
+    if (net > kLeastTurn) b.turn_excess = open->turn / net;
+    b.approach = open->approach;
+    b.shift = static_cast<double>(open->shift) * kMm;
+    if (open->out) b.withdrawal = static_cast<double>(e.tick - open->left) * f.setup.tick_s;
     f.open.erase(open);
   } else {
     b.entered = e.tick;
@@ -214,6 +269,7 @@ void note_event(Facts& f, const PictureModel& picture, const Snapshot& seen, con
             o.drive_speed = angle_between(o.turned, needle.pose.q) *
                             static_cast<double>(picture.suture[e.suture].needle_radius) * kMm /
                             (static_cast<double>(e.tick - o.entered) * f.setup.tick_s);
+          if (!o.out) o.left = e.tick;
           o.out = true;
         }
       return;
@@ -236,7 +292,8 @@ void note_event(Facts& f, const PictureModel& picture, const Snapshot& seen, con
       f.rejected_loop.push_back(happening(e, loop_reason_name(e.reason)));
       return;
     case EventKind::thread_cut:
-      if (e.value >= 0 && suture_of(f, e.suture).tied) f.tail.push_back(happening(e, {}, static_cast<double>(e.value) * kMm));
+      if (e.value >= 0 && (f.setup.physical || suture_of(f, e.suture).tied))
+        f.tail.push_back(happening(e, {}, static_cast<double>(e.value) * kMm));
       return;
     case EventKind::suture_loaded: {
       SutureFacts& s = suture_of(f, e.suture);
@@ -281,6 +338,8 @@ void note_hand(Facts& f, size_t k, const PictureModel& picture, const Snapshot& 
     const bool here = input.hand[k].connected != 0;
     f.path[k].push_back(here || f.path[k].empty() ? input.hand[k].pose.p : f.path[k].back());
   }
+  if (seen.tick == f.first) hand.turning = input.hand[k].pose.q;
+  else if (sampled(f, seen.tick - f.first, kTurnStep)) hand.turn += turn_since(hand.turning, input.hand[k].pose.q);
   const float strain = length(tool.force);
   if (strain > hand.strain) hand.strain = strain, hand.strain_tick = seen.tick, hand.strain_where = tool.pose.p;
   const size_t which = static_cast<size_t>(tool.instrument);
@@ -312,6 +371,11 @@ void note_tension(Facts& f, const Snapshot& seen) {
       if (t > most) most = t, where = p.position;
     }
     suture.impulse += static_cast<double>(most) * f.setup.tick_s;
+    if (sampled(f, seen.tick - f.first, kForceStep)) {
+      const double change = static_cast<double>(most - suture.before) / kForceStep;
+      if (most > 0 || suture.before > 0) suture.change2 += change * change, ++suture.changes;
+      suture.before = most;
+    }
     if (most > suture.peak) suture.peak = most, suture.peak_tick = seen.tick, suture.peak_where = where;
     if (most > kTearForce && !suture.overloaded) f.overload.push_back({static_cast<double>(most), seen.tick, where, "thread"});
     if (most > kTearForce) suture.overloaded = true;
@@ -364,6 +428,7 @@ void note(Facts& f, const PictureModel& picture, const Snapshot& seen, const Tic
   f.last = seen.tick;
   for (const Event& e : seen.event) note_event(f, picture, seen, e);
   follow_bites(f, picture, seen);
+  follow_tips(f, picture, seen);
   for (size_t k = 0; k < f.hand.size(); ++k) note_hand(f, k, picture, seen, input);
   note_tension(f, seen);
   note_pen(f.pen, picture, seen, input, f.setup.tick_s);

@@ -27,10 +27,17 @@ namespace catgut::assess {
 // 2023, 10.1115/1.4063951).
 constexpr float kTearForce = 3.22f;  // [N]
 
+// Turns are summed between samples so far apart: rounding of an orientation counts for nothing.
+constexpr double kTurnStep = 0.1;    // [s]
+constexpr float kApproach = 0.010f;  // [m] of the way to an entry that is judged
+constexpr double kApproachTime = 5;  // [s] at most
+constexpr double kForceStep = 0.1;   // [s] as long as the filter of motion at 10 Hz
+
 struct Setup {
   double tick_s = 1.0 / 60;
   double wall = 2.5;      // [mm] thickness
   std::string technique;  // of the scene
+  bool physical = false;  // mechanics: throws are not locked by events, but seen in the thread's shape (assess/tied.h)
 };
 
 // A bite in progress.
@@ -40,9 +47,15 @@ struct OpenBite {
   float depth = 0;  // [m]
   double entry_angle = kNotObserved, exit_angle = kNotObserved, grasp_at = kNotObserved, grasp_angle = kNotObserved;
   std::vector<Vec3> center;  // [m] of the needle's circle, one per tick
+  std::vector<Vec3> tip;     // [m] likewise
   Quat turned;               // the needle's orientation at entry
-  double drive_speed = kNotObserved;
-  bool out = false;  // the tip has left
+  Quat turning;              // and at the last sample of its turn, one per kTurnStep
+  double turn = 0;           // [rad] sum over these samples
+  Vec3 hole;                 // [m] the entry, as the tip entered
+  float shift = 0;           // [m] largest distance of the entry from there
+  double drive_speed = kNotObserved, approach = kNotObserved;
+  bool out = false;   // the tip has left
+  uint64_t left = 0;  // the tick of that
 };
 
 struct HandFacts {
@@ -53,6 +66,8 @@ struct HandFacts {
   float strain = 0;    // [N] largest force on the hand
   uint64_t strain_tick = 0;
   Vec3 strain_where;
+  Quat turning;     // orientation of the hand at the last sample of its turn, one per kTurnStep
+  double turn = 0;  // [rad] sum over these samples
   // To find grasps of nothing.
   bool was_open = false;
   double closed_for = 0;  // [s]
@@ -64,12 +79,17 @@ struct SutureFacts {
   uint32_t entries = 0;  // of the tip since the last completed bite
   uint32_t grasps = 0;   // of the needle since the last completed bite
   uint64_t throw_began = 0;
+  std::vector<Vec3> tip;  // [m] of the needle outside of tissue, one per tick of the last kApproachTime
   bool tied = false;
   float peak = 0;  // [N] largest tension at a suture point
   uint64_t peak_tick = 0;
   Vec3 peak_where;
   double impulse = 0;  // [N s]
   bool overloaded = false;
+  // Change of that tension, one sample per kForceStep in which the thread pulls.
+  float before = 0;    // [N] at the last sample
+  double change2 = 0;  // [(N/s)^2] sum
+  uint32_t changes = 0;
 };
 
 // What a session has come to, without what never changes and without the paths of the hands.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "assess/motion.h"
+#include "assess/tied.h"
 #include "core/elementary.h"
 
 namespace catgut::assess {
@@ -27,6 +28,9 @@ constexpr const char* kMotion = "hand motion: Sensors 2023 23:3146 and Singh 202
 constexpr const char* kStay = "hand-sutured anastomosis: Sankaranarayanan 2023, 10.1007/s00464-022-09584-1";
 constexpr const char* kDatta = "number of movements and time in bowel anastomosis: Datta 2001, 10.1016/s1072-7515(01)01041-9";
 constexpr const char* kTracked = "velocity, acceleration, jerk of tracked hands: PMC12953238";
+constexpr const char* kPhases = "segments of a suturing task: Farcas 2017, Surg Endosc 31(8)";
+constexpr const char* kJudkins = "curvature of paths: Judkins 2009, 10.1007/s00464-008-9933-9";
+constexpr const char* kTrejos = "integral and derivative of force: Trejos 2014, 10.1007/s00464-014-3442-9";
 constexpr const char* kOwn = "Catgut";
 
 // clang-format off
@@ -55,6 +59,11 @@ constexpr MetricRow kRow[] = {
     {"bite_time", "time for a bite", "needle", "s", lower, mean, "from the bite or knot before, or the start, until the bite is complete", kDatta},
     {"needle_wander", "needle off its curve", "needle", "mm", lower, mean, "root mean square distance of the needle circle's center from its mean while the tip is in tissue", kSeki},
     {"needle_tremor", "tremor of the needle", "needle", "mm", lower, mean, "root mean square distance of the needle circle's center from the middle of its places 1/30 s before and after, while the tip is in tissue", "Riviere 1997, kilthub.cmu.edu/articles/6621335"},
+    {"drive_ldlj", "smoothness of driving", "needle", "", higher, mean, "log dimensionless jerk of the needle's tip from its entry to its exit", kEase},
+    {"drive_turn", "turn of the needle over what is needed", "needle", "", lower, mean, "sum of the needle's turns, every 0.1 s from the tip's entry to its exit, over its net turn; 1: in one sweep", kEase},
+    {"handling_time", "time of needle handling", "needle", "s", lower, mean, "from the bite or knot before, or the start, until the tip enters", kPhases},
+    {"withdrawal_time", "time of withdrawal", "needle", "s", lower, mean, "from the tip's exit until the needle has left the wall", kPhases},
+    {"approach", "approach to the entry", "needle", "", lower, mean, "path of the needle's tip over the last 10 mm to its entry, over the distance; 1: straight", kOwn},
     {"attempts", "attempts per bite", "needle", "", lower, mean, "entries of the tip until the bite is complete", kErrors},
     {"withdrawn", "withdrawn bites", "needle", "", lower, count, "the needle was withdrawn from an unfinished bite", kErrors},
     {"needle_grasps", "grasps of the needle per bite", "needle", "", lower, mean, "times that a jaw closed on the needle since the bite before", kErrors},
@@ -72,6 +81,7 @@ constexpr MetricRow kRow[] = {
     {"tail", "length of tails", "knot", "mm", target, mean, "thread from a cut to the nearest suture point or knot of a tied suture", "3 to 5 mm on bowel: unpublished convention"},
     {"throw_time", "time of a throw", "knot", "s", lower, mean, "from the pull through the loop to the lock", kMotion},
     {"knot_time", "time for a knot", "knot", "s", lower, mean, "from the last bite, or the knot before, to the lock of the last throw", kDatta},
+    {"finish_time", "time of finishing", "knot", "s", lower, mean, "from the lock of the last throw to the cut of the thread", kPhases},
     {"undone_throws", "lost loops and throws", "knot", "", lower, count, "a loop came off, or a throw was released before its lock", kErrors},
     {"rejected_loops", "failed loops", "knot", "", lower, count, "thread around an instrument that did not make a loop", kErrors},
 
@@ -92,9 +102,14 @@ constexpr MetricRow kRow[] = {
     {"bridges", "bridges left", "cut", "mm", lower, sum, "stretch of the rim beside which the wall is not divided; a single 0: divided all round", kOwn},
     {"pieces", "pieces of tissue", "cut", "", target, only, "connected parts of all walls at the end", kOwn},
     {"energy_time", "time with energy", "cut", "s", lower, only, "an electrosurgical pen is switched on", kOwn},
+    {"blood_loss", "blood loss", "cut", "ml", lower, sum, "from each vessel that a cut has opened", "intraoperative bleeding: Lewis 2017, 10.1016/j.surg.2016.09.022"},
+    {"thermal_spread", "thermal spread", "cut", "mm", lower, only, "largest distance of heat-damaged tissue from the path of the pen's tip", "lateral thermal spread: Sutton 2010, 10.1002/bjs.6901"},
+    {"burnt_area", "burnt area", "cut", "mm^2", lower, only, "surface of heat-damaged tissue", kOwn},
 
     {"thread_force", "peak force at a bite", "tissue", "N", lower, maximum, "largest tension of a suture's thread at a suture point", "tear-out: Gong 2023, 10.1115/1.4063951"},
     {"thread_impulse", "integrated force at bites", "tissue", "N s", lower, sum, "integral over time of a suture's largest tension at a suture point", "force metrics: 10.3389/fmed.2022.897219"},
+    {"force_rate", "rate of force at bites", "tissue", "N/s", lower, maximum, "root mean square of the change of a suture's largest tension at a suture point, every 0.1 s while it pulls", kTrejos},
+    {"tissue_shift", "displacement of tissue", "tissue", "mm", lower, mean, "largest distance of a bite's entry, while the needle is in the wall, from where the tip entered", "deformation of the tissue: SutureCoach, 10.3389/fmed.2022.897219"},
     {"overloads", "overloads of a bite", "tissue", "", lower, count, "tension at a suture point above 3.22 N, where human small bowel begins to tear", "tear-out: Gong 2023, 10.1115/1.4063951"},
     {"grasp_force", "peak force of a grasp", "tissue", "N", lower, maximum, "of a hand's instrument on the tissue that it holds", kStay},
     {"grasp_impulse", "integrated force of grasps", "tissue", "N s", lower, sum, "integral over time of that force", "force metrics: 10.3389/fmed.2022.897219"},
@@ -116,6 +131,10 @@ constexpr MetricRow kRow[] = {
     {"ldlj", "log dimensionless jerk", "hands", "", higher, mean, "of each movement: a hand not idle for at least 0.3 s", kSmooth},
     {"sparc", "spectral arc length", "hands", "", higher, mean, "of each movement's speed, to 10 Hz, threshold 0.05", kSmooth},
     {"submovements", "speed peaks", "hands", "1/s", lower, mean, "maxima of a hand's speed in its movements that stand out by 5 % of the movement's peak, over their time", kSmooth},
+    {"curvature", "curvature of a hand's path", "hands", "1/m", lower, mean, "median of each movement", kJudkins},
+    {"directness", "directness of a hand's path", "hands", "", higher, mean, "distance from beginning to end of each movement over its path", kMotion},
+    {"rotation", "turn of a hand", "hands", "deg", lower, sum, "sum of a hand's turns, every 0.1 s", "rotation of the needle driver: SutureCoach, 10.3389/fmed.2022.897219"},
+    {"volume", "volume of motion", "hands", "cm^3", lower, sum, "ellipsoid of one standard deviation of a hand's places", "motion volume: PMC10359367"},
     {"tremor", "tremor", "hands", "mm", lower, mean, "root mean square of a hand's position less its path below 5 Hz, where the hand is idle for 0.1 s before and after", "Riviere 1997, kilthub.cmu.edu/articles/6621335"},
     {"bimanual", "bimanual coordination", "hands", "", higher, only, "Pearson's correlation of the speeds of voluntary motion of both hands, while any moves", kMotion},
     {"together", "both hands moving", "hands", "", higher, only, "time in which both hands move over the time in which any moves", kMotion},
@@ -196,6 +215,12 @@ void measure_bites(const Facts& f, Sheet& sheet) {
     for (const Knot& k : f.knot)
       if (k.tick <= b.tick) since = std::max(since, k.tick);
     add("bite_time", static_cast<double>(b.tick - since) * f.setup.tick_s);
+    add("handling_time", static_cast<double>(std::max(b.entered, since) - since) * f.setup.tick_s);
+    add("withdrawal_time", b.withdrawal);
+    add("approach", b.approach);
+    add("drive_ldlj", b.ldlj);
+    add("drive_turn", b.turn_excess);
+    add("tissue_shift", b.shift);
     add("needle_wander", b.wander);
     add("needle_tremor", b.tremor);
     add("attempts", b.attempts);
@@ -221,8 +246,8 @@ void measure_bites(const Facts& f, Sheet& sheet) {
   }
 }
 
-void measure_knots(const Facts& f, Sheet& sheet) {
-  for (const Knot& k : f.knot) {
+void measure_knots(const Facts& f, const std::vector<Knot>& knots, Sheet& sheet) {
+  for (const Knot& k : knots) {
     const std::string of = fmt::format("knot {} ({})", k.suture + k.load + k.number + 1, knot_kind_name(k.kind));
     sheet.add("throws", static_cast<double>(k.thrown.size()), k.tick, k.where, of);
     size_t opposite = 0;
@@ -239,13 +264,19 @@ void measure_knots(const Facts& f, Sheet& sheet) {
     uint64_t since = f.first;
     for (const Bite& b : f.bite)
       if (b.tick <= k.tick) since = std::max(since, b.tick);
-    for (const Knot& before : f.knot)
+    for (const Knot& before : knots)
       if (before.tick < k.tick) since = std::max(since, before.tick);
-    sheet.add("knot_time", static_cast<double>(k.tick - since) * f.setup.tick_s, k.tick, k.where, of);
+    if (!f.setup.physical) sheet.add("knot_time", static_cast<double>(k.tick - since) * f.setup.tick_s, k.tick, k.where, of);
     if (k.thrown.size() > 1)
       sheet.add("square", static_cast<double>(opposite) / static_cast<double>(k.thrown.size() - 1), k.tick, k.where, of);
   }
-  sheet.add_all("tail", f.tail);
+  if (!f.setup.physical || !knots.empty()) sheet.add_all("tail", f.tail);  // of a tied suture
+  for (const Sample& cut : f.tail) {
+    uint64_t locked = 0;
+    for (const Knot& k : f.knot)
+      if (k.tick <= cut.tick) locked = std::max(locked, k.tick);
+    if (locked > 0) sheet.add("finish_time", static_cast<double>(cut.tick - locked) * f.setup.tick_s, cut.tick, cut.where);
+  }
   sheet.add_all("undone_throws", f.undone_throw);
   sheet.add_all("rejected_loops", f.rejected_loop);
 }
@@ -323,6 +354,10 @@ void measure_cuts(const Facts& f, const PictureModel& picture, const Snapshot& s
   if (!has_pen(picture)) return;
   if (f.begun) sheet.add("energy_time", f.pen.seconds, f.last, {});
   if (seen.topology.pieces > 0) sheet.add("pieces", seen.topology.pieces, seen.tick, {});
+  for (const BleedingView& b : seen.wound.bleeding) sheet.add("blood_loss", static_cast<double>(b.lost) * 1e6, seen.tick, b.at);
+  if (f.begun && seen.wound.bleeding.empty()) sheet.add("blood_loss", 0, seen.tick, {});
+  if (f.begun) sheet.add("thermal_spread", static_cast<double>(seen.wound.thermal_spread) * kMm, seen.tick, {});
+  if (f.begun) sheet.add("burnt_area", static_cast<double>(seen.wound.damaged) * kMm * kMm, seen.tick, {});
   const CutPlaces cut = cut_places(f.edge, f.rest[0], seen);
   sheet.add_all("cut_edge", cut.distance);
   sheet.add_all("cut_spread", cut.distance);
@@ -335,6 +370,7 @@ void measure_tissue(const Facts& f, Sheet& sheet) {
     const std::string of = f.suture.size() > 1 ? fmt::format("suture {}", k + 1) : "";
     sheet.add("thread_force", static_cast<double>(s.peak), s.peak_tick, s.peak_where, of);
     sheet.add("thread_impulse", s.impulse, s.peak_tick, s.peak_where, of);
+    if (s.changes > 0) sheet.add("force_rate", std::sqrt(s.change2 / s.changes), s.peak_tick, s.peak_where, of);
   }
   for (size_t k = 0; k < f.hand.size(); ++k) {
     const HandFacts& h = f.hand[k];
@@ -379,6 +415,8 @@ void measure_hands(const Facts& f, Sheet& sheet) {
     const uint64_t end = tick_of(raw.size() - 1);
     sheet.add("path", own, end, raw.back(), of);
     sheet.add("idle", static_cast<double>(idle) / static_cast<double>(raw.size()), end, raw.back(), of);
+    sheet.add("rotation", f.hand[k].turn * kDegrees, end, raw.back(), of);
+    sheet.add("volume", ellipsoid_of(smooth) * 1e6, end, raw.back(), of);
     if (still > 0) sheet.add("tremor", std::sqrt(shake / static_cast<double>(still)) * kMm, end, raw.back(), of);
     for (const Stretch& m : movements(voluntary[k], rate)) {
       const size_t n = m.end - m.first;
@@ -389,6 +427,9 @@ void measure_hands(const Facts& f, Sheet& sheet) {
       sheet.add("jerk", rough.jerk, tick_of(m.first), smooth[m.first], of);
       sheet.add("ldlj", ldlj(std::span(smooth).subspan(m.first, n), rate), tick_of(m.first), smooth[m.first], of);
       sheet.add("sparc", sparc(std::span(speed[k]).subspan(m.first, n), rate), tick_of(m.first), smooth[m.first], of);
+      const Course course = course_of(std::span(smooth).subspan(m.first, n), rate);
+      sheet.add("curvature", course.curvature, tick_of(m.first), smooth[m.first], of);
+      sheet.add("directness", course.directness, tick_of(m.first), smooth[m.first], of);
       peaks += peaks_of(std::span(speed[k]).subspan(m.first, n), kPeakShare);
       moving += n;
     }
@@ -441,10 +482,10 @@ Result measure(const Facts& f, const PictureModel& picture, const Snapshot& seen
   r.time_s = f.begun ? static_cast<double>(f.last - f.first) * f.setup.tick_s : 0;
   r.filter = fmt::format("Butterworth, order 2, both ways, {} Hz", kMotionCutoff);
   r.bite = f.bite;
-  r.knot = f.knot;
+  r.knot = f.setup.physical ? tied_knots(picture, seen) : f.knot;
   Sheet sheet;
   measure_bites(f, sheet);
-  measure_knots(f, sheet);
+  measure_knots(f, r.knot, sheet);
   measure_line(f, picture, seen, sheet);
   measure_cuts(f, picture, seen, sheet);
   measure_tissue(f, sheet);
@@ -462,7 +503,7 @@ Result measure_stitches(const Facts& f) {
   r.ticks = f.last;
   Sheet sheet;
   measure_bites(f, sheet);
-  measure_knots(f, sheet);
+  measure_knots(f, f.knot, sheet);
   r.metric = sheet.take();
   return r;
 }

@@ -143,6 +143,49 @@ Roughness roughness(std::span<const Vec3> p, double rate) {
   return {speed, std::sqrt(second / intervals), std::sqrt(third / intervals)};
 }
 
+Course course_of(std::span<const Vec3> p, double rate) {
+  const size_t n = p.size();
+  if (n < 5) return {kNone, kNone};
+  double path = 0;
+  std::vector<double> curvature;
+  using Row = std::array<double, 3>;
+  const auto at = [&](size_t i) {
+    return Row{static_cast<double>(p[i].x), static_cast<double>(p[i].y), static_cast<double>(p[i].z)};
+  };
+  for (size_t i = 0; i + 1 < n; ++i) path += static_cast<double>(distance(p[i], p[i + 1]));
+  for (size_t i = 1; i + 1 < n; ++i) {
+    const Row a = at(i - 1), b = at(i), c = at(i + 1);
+    Row v, w;
+    for (size_t k = 0; k < 3; ++k) v[k] = 0.5 * (c[k] - a[k]) * rate, w[k] = (c[k] - 2 * b[k] + a[k]) * rate * rate;
+    const double speed = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    if (speed < kIdleSpeed) continue;
+    const Row turn{v[1] * w[2] - v[2] * w[1], v[2] * w[0] - v[0] * w[2], v[0] * w[1] - v[1] * w[0]};
+    curvature.push_back(std::sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]) / (speed * speed * speed));
+  }
+  if (curvature.empty() || !(path > 0)) return {kNone, kNone};
+  const auto middle = curvature.begin() + static_cast<std::ptrdiff_t>(curvature.size() / 2);
+  std::nth_element(curvature.begin(), middle, curvature.end());
+  return {*middle, static_cast<double>(distance(p.front(), p.back())) / path};
+}
+
+double ellipsoid_of(std::span<const Vec3> p) {
+  if (p.empty()) return kNone;
+  const double n = static_cast<double>(p.size());
+  std::array<double, 3> mean{};
+  std::array<std::array<double, 3>, 3> c{};
+  for (const Vec3& at : p)
+    for (int k = 0; k < 3; ++k) mean[static_cast<size_t>(k)] += static_cast<double>(at[k]) / n;
+  for (const Vec3& at : p)
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        c[static_cast<size_t>(i)][static_cast<size_t>(j)] += (static_cast<double>(at[i]) - mean[static_cast<size_t>(i)]) *
+                                                             (static_cast<double>(at[j]) - mean[static_cast<size_t>(j)]) / n;
+  const double determinant = c[0][0] * (c[1][1] * c[2][2] - c[1][2] * c[2][1]) -
+                             c[0][1] * (c[1][0] * c[2][2] - c[1][2] * c[2][0]) +
+                             c[0][2] * (c[1][0] * c[2][1] - c[1][1] * c[2][0]);
+  return 4.0 / 3.0 * kTurn / 2 * std::sqrt(std::max(0.0, determinant));
+}
+
 size_t peaks_of(std::span<const double> speed, double share) {
   if (speed.empty()) return 0;
   const double least = share * *std::max_element(speed.begin(), speed.end());

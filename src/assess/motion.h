@@ -39,6 +39,16 @@ struct Roughness {
 };
 Roughness roughness(std::span<const Vec3> position, double rate);
 
+// Median curvature where the motion is not idle, and distance of the ends over the path; not a number for fewer than 5 samples
+// or without motion. A straight line has 0 and 1, a circle the inverse of its radius and 0.
+struct Course {
+  double curvature, directness;  // [1/m], 0..1
+};
+Course course_of(std::span<const Vec3> position, double rate);
+
+// Volume of the ellipsoid whose half axes are the standard deviations of the places in three perpendicular directions [m^3].
+double ellipsoid_of(std::span<const Vec3> position);
+
 // Maxima that rise above the minima on both sides by at least `share` of the greatest value. Noise makes none.
 constexpr double kPeakShare = 0.05;  // as the threshold of the spectral arc length
 size_t peaks_of(std::span<const double> speed, double share);

@@ -47,6 +47,11 @@ struct Bite {
   double edge_angle = kNotObserved;                              // of the bite to the edge, 0 along it .. 90 across
   double wander = 0;                               // root mean square distance of the needle's center from its mean, in tissue
   double tremor = kNotObserved;                    // of that center, see metric needle_tremor
+  double ldlj = kNotObserved;                      // log dimensionless jerk of the tip in the wall
+  double turn_excess = kNotObserved;               // turn of the needle in the wall over its net turn
+  double approach = kNotObserved;                  // path of the tip before its entry, over its distance
+  double shift = kNotObserved;                     // largest distance of the entry from where the tip entered
+  double withdrawal = kNotObserved;                // [s] from the tip's exit to completion
   double seconds = 0;                              // [s] from the tip's entry to completion
   double drive_speed = kNotObserved;               // [mm/s] of the needle along its curve while the tip is in the wall
   double grasp_at = kNotObserved;                  // position of the jaws on the needle at entry, 0 swage .. 1 tip

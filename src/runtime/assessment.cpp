@@ -12,6 +12,7 @@ assess::Setup assess_setup(const SceneSpec& scene) {
   setup.tick_s = 1 / static_cast<double>(scene.solver.tick_rate);
   setup.wall = scene.body.empty() ? 0 : static_cast<double>(scene.body[0].wall) * 1000;
   setup.technique = scene.technique.name;
+  setup.physical = scene.mechanics.kind == "physical";
   return setup;
 }
 

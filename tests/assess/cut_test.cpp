@@ -181,6 +181,23 @@ TEST(Cuts, the_time_in_which_the_pen_is_switched_on) {
   EXPECT_NEAR(seconds(), 2.5, 1e-9);
 }
 
+TEST(Cuts, blood_and_burns_are_those_of_the_wound) {
+  Snapshot seen = with_cut([](double) { return 6.0; });
+  const auto value = [&](const char* key) {
+    Facts f = begin_facts(world().picture, {});
+    TickInput input;
+    input.hand[0].connected = 1;
+    note(f, world().picture, seen, input);
+    return measure(f, world().picture, seen).value(key);
+  };
+  EXPECT_EQ(value("blood_loss"), 0) << "no vessel was opened";
+  seen.wound.bleeding = {{{0.01f, 0, 0}, 2e-8f, 1.5e-6f}, {{0, 0.01f, 0}, 0, 0.25e-6f}};
+  seen.wound.thermal_spread = 1.2e-3f, seen.wound.damaged = 80e-6f;
+  EXPECT_NEAR(value("blood_loss"), 1.75, 1e-6);
+  EXPECT_NEAR(value("thermal_spread"), 1.2, 1e-6);
+  EXPECT_NEAR(value("burnt_area"), 80, 1e-4);
+}
+
 // The scripted surgeon's excision: all of it a minute of simulated time, so for the nightly tests.
 TEST(Cuts, an_excision_is_measured_on_the_tissue_that_was_cut) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
@@ -206,6 +223,8 @@ TEST(Cuts, an_excision_is_measured_on_the_tissue_that_was_cut) {
   EXPECT_TRUE(r.score[0].passed) << r.score[0].verdict;
   std::printf("%.1f %%; cut at %.2f mm (spread %.2f mm), bridges %.1f mm, %.0f pieces, energy for %.1f s\n", r.score[0].percent,
               r.value("cut_edge"), r.value("cut_spread"), r.value("bridges"), r.value("pieces"), r.value("energy_time"));
+  std::printf("blood %.2f ml, thermal spread %.2f mm, burnt %.0f mm^2\n", r.value("blood_loss"), r.value("thermal_spread"),
+              r.value("burnt_area"));
   for (const LostPoint& l : r.score[0].lost) std::printf("  -%.1f %s\n", l.points, l.why.c_str());
 }
 

@@ -92,6 +92,100 @@ TEST(GroundTruth, what_a_hand_holds) {
     }
 }
 
+// The phases of a bite and of a knot, in ticks of the made session.
+TEST(GroundTruth, times_of_phases) {
+  Session s;
+  const uint64_t start = s.facts().first;
+  Plan p;
+  s.bite(p);
+  const Result first = s.result();
+  EXPECT_NEAR(first.value("handling_time"), static_cast<double>(first.bite[0].entered - start) * kDt, 1e-9);
+  EXPECT_NEAR(first.value("handling_time"), 6 * kDt, 1e-9) << "a tick with the hands, five with the needle";
+  EXPECT_NEAR(first.value("withdrawal_time"), 20 * kDt, 1e-9) << "twenty ticks from the tip's exit to the end";
+  s.tick(90);
+  s.bite(p);
+  const Metric* handling = s.result().find("handling_time");
+  ASSERT_EQ(handling->sample.size(), 2u);
+  EXPECT_NEAR(handling->sample[1].value, (90 + 10) * kDt, 1e-9) << "from the end of the first bite";
+  EXPECT_TRUE(std::isnan(s.result().value("finish_time"))) << "nothing is cut";
+  s.knot(kSquare);
+  s.tick(120);
+  s.happen(EventKind::thread_cut, 0, 0.005f);
+  s.tick();
+  EXPECT_NEAR(s.result().value("finish_time"), 121 * kDt, 1e-9);
+}
+
+TEST(GroundTruth, tissue_that_moves_with_the_needle) {
+  for (const double shift : {0.0, 0.5, 3.0}) {
+    Session s;
+    Plan p;
+    p.shift = shift;
+    s.bite(p);
+    EXPECT_NEAR(s.result().value("tissue_shift"), shift, 0.01);
+  }
+}
+
+TEST(GroundTruth, smoothness_of_driving) {
+  Session smooth, shaken;
+  Plan p;
+  p.sweep = 100;  // far, for the rounding of positions
+  smooth.bite(p);
+  EXPECT_NEAR(smooth.result().value("drive_ldlj"), -std::log(204.8), 0.1) << "minimum jerk: Balasubramanian 2015";
+  p.wander = 0.3;
+  shaken.bite(p);
+  EXPECT_LT(shaken.result().value("drive_ldlj"), smooth.result().value("drive_ldlj") - 1);
+}
+
+TEST(GroundTruth, a_needle_that_is_turned_back_and_forth) {
+  for (const double rock : {10.0, 30.0}) {
+    Session s;
+    Plan p;
+    p.tilt = 60, p.rock = rock;  // in at 60 degrees and out at 60: 120 degrees of turn
+    s.bite(p);
+    EXPECT_NEAR(s.result().value("drive_turn"), (120 + 2 * rock) / 120, 0.01);
+  }
+}
+
+TEST(GroundTruth, approach_of_the_tip) {
+  // Two legs of 12 mm and 9 mm at a right angle: 21 mm for a distance of 15 mm.
+  for (const bool bent : {false, true}) {
+    Session s;
+    Pose& needle = s.seen().active().needle.pose;
+    const Vec3 from = needle.p;
+    for (int k = 1; k <= 21; ++k) {
+      const float a = static_cast<float>(bent ? std::min(k, 12) : k) * 1e-3f,
+                  b = static_cast<float>(bent ? std::max(k - 12, 0) : 0) * 1e-3f;
+      needle.p = from + Vec3{a, b, 0};
+      s.tick();
+    }
+    // The judged part begins where the tip is at least 10 mm away: at the corner's side, 5 mm before it.
+    const double distance = std::hypot(5.0, 9.0), expected = bent ? (5 + 9) / distance : 1;
+    s.happen(EventKind::tip_entered, 0);
+    s.seen().active().bite.emplace_back();
+    s.seen().active().bite.back().entry = needle.p;
+    s.tick();
+    ASSERT_EQ(s.facts().open.size(), 1u);
+    EXPECT_NEAR(s.facts().open[0].approach, expected, 1e-3);
+  }
+}
+
+TEST(GroundTruth, change_of_force_and_turn_of_a_hand) {
+  Session s;
+  s.twist = 0.01f;  // [rad] per tick
+  // Up to 4 N and down again, 2 N/s: in steps of 0.1 s.
+  for (int k = 0; k <= 240; ++k) {
+    SuturePointView p;
+    p.position = s.moved({});
+    p.tension_needle = static_cast<float>(2 * (k < 120 ? k : 240 - k)) / 60;
+    s.seen().active().suture_point.assign(1, p);
+    s.tick();
+  }
+  EXPECT_NEAR(s.result().value("force_rate"), 2, 0.05);
+  EXPECT_NEAR(s.result().value("thread_impulse"), 0.5 * 4 * 4, 0.05) << "4 s, 4 N at their middle";
+  const double turned = static_cast<double>(s.facts().last - s.facts().first) * 0.01 * 57.29577951308232;
+  EXPECT_NEAR(s.result().value("rotation"), turned, 4) << "samples every 0.1 s: up to 5 ticks, 2.9 degrees, are not in it";
+}
+
 // --- injected errors ---------------------------------------------------------------------------------------------------
 
 struct Injected {

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "assess/facts.h"
+#include "assess/metrics.h"
 #include "core/random.h"
 #include "thread/observe.h"
 #include "validation/knot_scenes.h"
@@ -91,6 +92,50 @@ TEST(Knots, a_hundred_ties_by_the_mechanics_slide_when_one_strand_was_held_taut)
   std::printf("%d of %d ties named right, %d of them sliding\n", right, ties, kinds[KnotKind::sliding]);
   if (!all) return;
   EXPECT_EQ(kinds.size(), 5u);  // granny, square, surgeon's, mixed, sliding
+}
+
+// A session of physical mechanics ends with this thread: no throw was locked by an event.
+Result ended_with(const thread::State& thread) {
+  PictureModel picture;
+  picture.suture[0].thread_radius = 0.175e-3f;
+  Snapshot seen;
+  seen.suture.assign(1, {});
+  SutureView& suture = seen.suture[0];
+  for (uint32_t i = 0; i < thread.nodes(); ++i) {
+    seen.particle.push_back(thread.position(i)), suture.thread_order.push_back(i);
+    if (i + 1 < thread.nodes()) suture.thread_cut.push_back(thread.broken[i]);
+  }
+  Setup setup;
+  setup.physical = true, setup.technique = "none";
+  const Facts f = begin_facts(picture, setup);
+  return measure(f, picture, seen);
+}
+
+TEST(Knots, of_physical_mechanics_are_seen_in_the_thread) {
+  const struct {
+    validation::Throws laid;
+    KnotKind kind;
+    double throws, wraps, square;
+  } row[] = {{validation::square(), KnotKind::square, 2, 1, 1},
+             {validation::granny(), KnotKind::granny, 2, 1, 0},
+             {validation::surgeons_211(), KnotKind::surgeons, 3, 2, 1},
+             {validation::single_throw(), KnotKind::single_throw, 1, 1, -1}};
+  for (const auto& expected : row) {
+    const Result r = ended_with(validation::lay_knot(expected.laid, 0.35e-3f, 0.49e-3f).state);
+    ASSERT_EQ(r.knot.size(), 1u);
+    EXPECT_EQ(r.knot[0].kind, expected.kind) << knot_kind_name(r.knot[0].kind);
+    EXPECT_EQ(r.value("throws"), expected.throws);
+    EXPECT_EQ(r.value("first_wraps"), expected.wraps);
+    if (expected.square >= 0) { EXPECT_EQ(r.value("square"), expected.square); }
+    EXPECT_TRUE(std::isnan(r.value("knot_tension"))) << "not observed";
+    EXPECT_TRUE(std::isnan(r.value("knot_time")));
+  }
+  // Without a knot there is none, and a rubric's required throws are lost.
+  std::vector<Vec3> line;
+  for (int i = 0; i < 50; ++i) line.push_back({5e-4f * static_cast<float>(i), 0, 0});
+  const Result none = ended_with(thread::make_state(line));
+  EXPECT_TRUE(none.knot.empty());
+  EXPECT_TRUE(std::isnan(none.value("throws")));
 }
 
 TEST(Knots, a_strand_that_stays_straight_slides) {

@@ -46,6 +46,9 @@ struct Plan {
   bool through = false;  // exits on the mucosa
   double wander = 0;     // [mm] of the needle's center
   double grasp_at = 0.35, grasp_angle = 90;
+  double shift = 0;  // [mm] of the entry while the needle is in the wall
+  double sweep = 0;  // [mm] straight path of the tip in the wall, with least jerk; 0: it waits
+  double rock = 0;   // [deg] by which the needle turns forward and back before it passes; 0: it passes at once
 };
 
 // One session, built tick by tick from happenings.
@@ -80,6 +83,7 @@ class Session {
         // 8 Hz, 0.5 mm
         p.z += shake * static_cast<float>(std::sin(6.2831853 * 8 * static_cast<double>(seen_.tick) * kDt));
         input_.hand[k].pose.p = p;
+        if (k == 0 && twist != 0) input_.hand[k].pose.q = axis_angle({0, 1, 0}, twist * static_cast<float>(seen_.tick));
       }
       note(facts_, world().picture, seen_, input_);
       seen_.event.clear();
@@ -130,6 +134,18 @@ class Session {
     const Pose entered = s.needle.pose;
     for (int k = 0; k < 400; ++k) {
       s.needle.pose = k == 200 ? tip_at(tip, entered.q) : entered;
+      if (p.sweep > 0) {
+        const double t = k / 399.0, x = p.sweep * 1e-3 * t * t * t * (10 - 15 * t + 6 * t * t);
+        s.needle.pose = entered;
+        s.needle.pose.p += turned({static_cast<float>(x), 0, 0});
+      }
+      if (p.rock > 0) {
+        const Pose out_pose = needle_through(out, p.angle_out, in - out, p.tilt, false);
+        const float a = static_cast<float>(p.rock / 180 * 3.14159265358979);
+        s.needle.pose = k < 100 || (k >= 200 && k < 300) ? entered : out_pose;
+        if (k >= 100 && k < 200) s.needle.pose.q = entered.q * axis_angle({0, 0, 1}, a);
+      }
+      s.bite[number].entry = moved(in) + (k >= 200 ? turned({0, 0, static_cast<float>(p.shift * 1e-3)}) : Vec3{});
       if (k != 200) s.needle.pose.p += turned({static_cast<float>((k % 2 ? 1 : -1) * p.wander * 1e-3), 0, 0});
       tick();
     }
@@ -224,6 +240,7 @@ class Session {
   }
   bool all_idle = false;
   float shake = 0;  // [m]
+  float twist = 0;  // [rad] of the right hand, per tick
 
  private:
   void begin_bite(const Plan& p, Vec3 in, Vec3 out) {

@@ -117,6 +117,33 @@ TEST(Motion, roughness_of_a_circle_is_that_of_the_formula) {
   EXPECT_NEAR(r.jerk, 0.05 * 248.05, 0.5);
 }
 
+TEST(Motion, course_of_a_circle_and_of_a_line) {
+  std::vector<Vec3> half, line;  // half a circle of 50 mm in a second
+  for (int i = 0; i <= 120; ++i) {
+    const double a = 3.141592653589793 * i / 120;
+    half.push_back({static_cast<float>(0.05 * std::cos(a)), static_cast<float>(0.05 * std::sin(a)), 0});
+    line.push_back({static_cast<float>(0.001 * i), 0, static_cast<float>(0.002 * i)});
+  }
+  EXPECT_NEAR(course_of(half, 120).curvature, 20, 0.1);
+  EXPECT_NEAR(course_of(half, 120).directness, 2 / 3.141592653589793, 1e-3);
+  EXPECT_NEAR(course_of(line, 120).curvature, 0, 0.05);
+  EXPECT_NEAR(course_of(line, 120).directness, 1, 1e-6);
+}
+
+TEST(Motion, volume_of_motion_is_an_ellipsoid_of_standard_deviations) {
+  // The corners of a box: their standard deviations are half its edges. Turned and moved, it is the same.
+  const Quat turn = axis_angle(normalized(Vec3{1, 2, 3}), 0.7f);
+  std::vector<Vec3> box, turned, flat;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 p{i & 1 ? 0.01f : -0.01f, i & 2 ? 0.02f : -0.02f, i & 4 ? 0.03f : -0.03f};
+    box.push_back(p), turned.push_back(rotate(turn, p) + Vec3{0.1f, 0.2f, -0.1f}), flat.push_back({p.x, p.y, 0});
+  }
+  const double volume = 4.0 / 3 * 3.141592653589793 * 0.01 * 0.02 * 0.03;
+  EXPECT_NEAR(ellipsoid_of(box), volume, 1e-4 * volume);
+  EXPECT_NEAR(ellipsoid_of(turned), volume, 1e-3 * volume);
+  EXPECT_LT(ellipsoid_of(flat), 1e-6 * volume);
+}
+
 TEST(Motion, only_peaks_that_stand_out_are_counted) {
   std::vector<double> v;
   for (int i = 0; i < 300; ++i) {
