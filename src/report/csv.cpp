@@ -10,6 +10,7 @@
 #include <ctime>
 #include <map>
 #include <set>
+#include <sstream>
 
 #include "core/check.h"
 #include "procedure/toml.h"
@@ -134,6 +135,23 @@ double number(const std::string& text, const std::string& where, const std::stri
   return value;
 }
 
+// Seconds, also written as minutes:seconds or hours:minutes:seconds.
+double seconds(const std::string& text, const std::string& where, const std::string& column) {
+  if (text.find(':') == std::string::npos) return number(text, where, column);
+  double total = 0;
+  size_t parts = 0;
+  std::istringstream rest(text + ":");
+  for (std::string part; std::getline(rest, part, ':'); ++parts) {
+    const bool digits = !part.empty() && part.size() <= 6 && part.find_first_not_of("0123456789.") == std::string::npos;
+    const double value = digits ? number(part, where, column) : kUnknown;
+    if (!std::isfinite(value) || parts > 2 || (parts > 0 && value >= 60))
+      throw InputError(where, fmt::format("\"{:.40}\" in column {} is not a time", text, column),
+                       "write seconds, 9:55 or 1:09:55, or leave it empty");
+    total = 60 * total + value;
+  }
+  return total;
+}
+
 // Pseudonyms and tasks take plain characters only.
 std::string plain_name(const std::string& text) {
   std::string out;
@@ -247,11 +265,12 @@ std::vector<Session> sessions_of_table(const std::string& csv, const std::string
       if (score.given()) s.score = number(table.text(row, score, n), here, "score"), s.score_max = most;
       if (std::isfinite(s.score) && std::isfinite(pass_at)) s.passed = s.score >= pass_at;
       if (duration.given()) {
-        const double seconds = number(table.text(row, duration, n), here, "duration");
-        if (std::isfinite(seconds)) s.duration_s = seconds;
+        const double taken = seconds(table.text(row, duration, n), here, "duration");
+        if (std::isfinite(taken)) s.duration_s = taken;
       }
       for (const Column& c : metrics) {
-        const double value = number(table.cell(row, c.column, n), here, c.column);
+        const std::string& cell = table.cell(row, c.column, n);
+        const double value = c.unit == "s" ? seconds(cell, here, c.column) : number(cell, here, c.column);
         if (std::isfinite(value)) s.metric.push_back({c.name, value, c.unit, kUnknown, kUnknown});
       }
       if (s.metric.empty() && !std::isfinite(s.score)) continue;  // the trainee missed this session

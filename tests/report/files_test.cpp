@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/report: files from outside. Tables, questionnaires, session files: right ones read exactly, wrong ones are one line,
 // and random damage never gives anything else.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <regex.h>
 
@@ -149,6 +150,60 @@ TEST(Table, a_wide_table_of_a_learning_curve_is_imported_by_its_mapping_alone) {
   EXPECT_EQ(store.person("P3").cohort, "novice");
   EXPECT_EQ(store.add_all(all).size(), all.size());
   EXPECT_EQ(store.sessions().size(), all.size()) << "the same table again adds nothing";
+}
+
+// The columns of a published learning curve of suturing (Pavlidis et al. 2019, 10.1038/s41598-019-38727-z: fifteen students,
+// five sessions, one row per student, times as minutes:seconds, a remark in the last column). The values are made up.
+TEST(Table, the_columns_of_a_published_learning_curve_are_imported_by_a_mapping_alone) {
+  std::string csv = "Subject,Age,MS-Year,Sex";
+  for (int n = 1; n <= 5; ++n) csv += fmt::format(",Cutting Time {0},Suturing Time {0},Sutures {0},Score {0}", n);
+  csv += ",Comments\n";
+  for (int subject = 1; subject <= 15; ++subject) {
+    csv += fmt::format("{},23,1,{}", subject, 1 + subject % 2);
+    for (int n = 1; n <= 5; ++n)
+      csv += fmt::format(",{}:{:02},{}:{:02},{},{}", 9 - n, subject, 20 - n, 2 * subject, 1.5 * n - 0.5, 10 + 2 * n);
+    csv += subject == 3 ? ",\"left early, came back\"\n" : ",\n";
+  }
+  const std::string mapping =
+      "title = \"Microsurgery\"\ntask = \"microsurgical_suturing\"\ntrainee = { column = \"Subject\", prefix = \"S\" }\n"
+      "level = { column = \"MS-Year\", prefix = \"MS\" }\nsessions = 5\nscore = { column = \"Score {n}\" }\nscore_max = 30\n"
+      "duration = { column = \"Suturing Time {n}\" }\n[[metric]]\ncolumn = \"Cutting Time {n}\"\nname = \"cutting_time\"\n"
+      "unit = \"s\"\n[[metric]]\ncolumn = \"Sutures {n}\"\nname = \"sutures\"\n";
+  std::vector<Person> people;
+  const std::vector<Session> all = sessions_of_table(csv, "curve.csv", mapping, "curve.toml", &people);
+  ASSERT_EQ(all.size(), 75u);
+  ASSERT_EQ(people.size(), 15u);
+  EXPECT_EQ(people[2].level, "MS1");
+  const Scratch scratch;
+  Store store = scratch.store();
+  store.add_all(all);
+  SessionFilter one;
+  one.trainee = "S4";
+  const auto cutting = store.values("cutting_time", one), sutures = store.values("sutures", one);
+  const std::vector<Session> rows = store.sessions(one);
+  ASSERT_EQ(rows.size(), 5u);
+  for (size_t k = 0; k < 5; ++k) {
+    const double n = static_cast<double>(k) + 1;
+    EXPECT_EQ(cutting[k].value, (9 - n) * 60 + 4);
+    EXPECT_EQ(rows[k].duration_s, (20 - n) * 60 + 8);
+    EXPECT_EQ(rows[k].score, 10 + 2 * n);
+    EXPECT_EQ(sutures[k].value, 1.5 * n - 0.5);
+  }
+}
+
+TEST(Table, times_are_seconds_or_have_colons) {
+  const std::string mapping =
+      "task = \"t\"\ntrainee = { column = \"who\" }\nsession = { column = \"n\" }\nscore = { column = \"s\" }\n"
+      "duration = { column = \"t\" }\n";
+  const auto duration = [&](const std::string& cell) {
+    return sessions_of_table("who,n,s,t\nA,1,5," + cell + "\n", "t.csv", mapping, "t.toml", nullptr)[0].duration_s;
+  };
+  EXPECT_EQ(duration("95.5"), 95.5);
+  EXPECT_EQ(duration("9:55"), 595);
+  EXPECT_EQ(duration("0:09.5"), 9.5);
+  EXPECT_EQ(duration("1:02:03"), 3723);
+  for (const char* bad : {"9:75", "9:", ":30", "1:2:3:4", "9:-5", "a:30", "1:60:00"})
+    EXPECT_NE(fault_of([&] { duration(bad); }).find("is not a time"), std::string::npos) << bad;
 }
 
 TEST(Table, a_long_table_is_in_the_order_of_its_sessions) {
