@@ -88,6 +88,10 @@ void add_play(CLI::App& app, int& exit_code) {
                     "keep no recording; default: every session, in the data folder of the settings");
   command->add_flag("--kiosk", o->play.kiosk,
                     "whole screen, for a stand: cannot be left but by Ctrl+Shift+Q; start screen after three idle minutes");
+  command->add_option("--idle", o->play.idle_s, "kiosk: time without input until the start screen is shown")
+      ->type_name("SECONDS")
+      ->check(CLI::Range(1.0, 86400.0))
+      ->capture_default_str();
   command->add_flag("--left-handed", o->play.left_handed, "needle holder in the left hand");
   command->add_option("--surgeon", o->play.live.surgeon, "watch the scripted surgeon, or the hands of a recording")
       ->type_name("scripted|FILE");

@@ -25,8 +25,12 @@ SdlWindow::SdlWindow(int width, int height, bool whole_screen) {
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
   if (SDL_Init(SDL_INIT_VIDEO | SDL_INIT_GAMECONTROLLER) != 0)
     throw InputError("window", fmt::format("no display ({})", SDL_GetError()), kHeadless);
+  int left = SDL_WINDOWPOS_CENTERED, top = SDL_WINDOWPOS_CENTERED;
+  // A stand may run without a window manager, and only that would enlarge the window.
+  if (SDL_DisplayMode screen; whole_screen && SDL_GetDesktopDisplayMode(0, &screen) == 0)
+    left = top = 0, width = screen.w, height = screen.h;
   window = SDL_CreateWindow(
-      "Catgut", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
+      "Catgut", left, top, width, height,
       SDL_WINDOW_RESIZABLE | SDL_WINDOW_SHOWN | static_cast<Uint32>(whole_screen ? SDL_WINDOW_FULLSCREEN_DESKTOP : 0));
   SDL_SysWMinfo info;
   SDL_VERSION(&info.version);

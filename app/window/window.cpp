@@ -60,7 +60,6 @@ constexpr double kMirrorEvery = 1.0 / 20;             // [s] of the window's pic
 constexpr double kSlowMirror = 0.5;                   // [s] where the headset's frames take their whole period
 constexpr double kStallEvery = 2;                     // [s] of --stall-ms
 constexpr double kBeforeMoment = 3;                   // [s] that are played before the moment of a lost point
-constexpr double kIdle = 180;                         // [s] without input, until a kiosk shows its start screen
 
 std::vector<SceneChoice> scene_choices() {
   // The scene of each technique, simplest first; then all others.
@@ -607,7 +606,7 @@ class Window {
     const WindowInput in = events_in_.read(working, dt, screen_ == Screen::view || (working && visit_ && visit_->watching));
     quit_ = quit_ || (options_.kiosk ? leaves_kiosk() : in.quit);
     if (in.any) active_s_ = wall_seconds();
-    if (options_.kiosk && screen_ != Screen::start && wall_seconds() - active_s_ > kIdle) show_start();
+    if (options_.kiosk && screen_ != Screen::start && wall_seconds() - active_s_ > options_.idle_s) show_start();
     if (in.resized) resized();
     ScreenFacts facts;
     facts.screen = screen_;

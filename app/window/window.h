@@ -48,6 +48,7 @@ struct PlayOptions {
   std::string csv;             // the same as a table
   bool keep_sessions = false;  // records every session into the data folder, as the settings want
   bool kiosk = false;          // whole screen, cannot be left; back to the start screen after a time without input
+  double idle_s = 180;         // [s] that time
   double seconds = 0;          // [s] of wall time, then quit; 0: until the user quits
   // For an observer within the program (a test that simulates a user): every such frame, false closes the
   // window; and every event.

@@ -380,6 +380,55 @@ TEST_F(Window, a_trainees_session_is_stored_and_the_survey_is_asked) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "recordings"), {}), 1) << "the recording is kept beside the store";
 }
 
+// A visitor of a stand: the window fills the screen, no key of its own leaves it, the settings are locked, and it returns to
+// its start screen when it is left alone, but not before. The staff's keys end it.
+TEST_F(Window, a_kiosk_fills_the_screen_cannot_be_left_and_returns_when_idle) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1 (the nightly run)";
+  constexpr int kIdle = 8;  // [s]
+  start({"play", "stay", "--kiosk", "--idle", std::to_string(kIdle), "--size", "640x360", "--quality", "low", "--no-record",
+         "--events", (folder_ / "events").string(), "--seconds", "300"});
+  ASSERT_TRUE(happens("practice", 1, 60)) << said();
+  const std::string size = (folder_ / "size").string();
+  xdo("search --name Catgut getwindowgeometry --shell > '" + size + "' ; DISPLAY=" + x_->display +
+      " xdotool getdisplaygeometry --shell >> '" + size + "' ; true");
+  const std::string sizes = read_file(size);
+  const auto number_after = [&](const std::string& key, size_t from) {
+    const size_t at = sizes.find(key, from);
+    return at == std::string::npos ? -1 : std::atoi(sizes.c_str() + at + key.size());
+  };
+  const size_t screen = sizes.rfind("WIDTH=");
+  EXPECT_GT(number_after("WIDTH=", 0), 640) << sizes;
+  EXPECT_EQ(number_after("WIDTH=", 0), number_after("WIDTH=", screen)) << sizes;
+  EXPECT_EQ(number_after("HEIGHT=", 0), number_after("HEIGHT=", screen)) << sizes;
+
+  // Busy for longer than the idle time: it stays.
+  for (int k = 0; k < 2 * kIdle; ++k) {
+    drag(k % 2 ? 12 : -12, 4, 3);
+    pause(500);
+  }
+  EXPECT_EQ(count("\"start\""), 0u) << said();
+  xdo("key F2");
+  xdo("key Escape");
+  EXPECT_TRUE(happens("pause")) << said();
+  EXPECT_EQ(count("\"settings\""), 0u) << "the settings are locked: " << said();
+  // Left alone.
+  const auto left = std::chrono::steady_clock::now();
+  ASSERT_TRUE(happens("start", 1, kIdle + 30)) << said();
+  EXPECT_GT(std::chrono::duration<double>(std::chrono::steady_clock::now() - left).count(), 0.8 * kIdle);
+  for (const char* key : {"Escape", "Escape", "q", "ctrl+q", "alt+F4", "ctrl+c"}) {
+    xdo(std::string("key ") + key);
+    pause(400);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(app_, &status, WNOHANG), 0) << "still open after every key: " << said();
+  xdo("key 1");
+  EXPECT_TRUE(happens("practice", 2, 60)) << "the next visitor begins: " << said();
+  xdo("keydown ctrl keydown shift keydown q");
+  EXPECT_EQ(exit_code(), 0) << said();
+  app_ = -1;
+  xdo("keyup q keyup shift keyup ctrl");
+}
+
 TEST_F(Window, a_screenshot_shows_the_field) {
   const fs::path picture = folder_ / "s.png";
   start({"play", "purse_string", "--size", "640x360", "--screenshot", picture.string(), "--after", "3"});
