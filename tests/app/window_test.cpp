@@ -429,6 +429,26 @@ TEST_F(Window, a_kiosk_fills_the_screen_cannot_be_left_and_returns_when_idle) {
   xdo("keyup q keyup shift keyup ctrl");
 }
 
+// F12: into the data folder, not where the program was started.
+TEST_F(Window, a_screenshot_by_key_goes_to_the_data_folder) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1 (the nightly run)";
+  start({"play", "stay", "--size", "640x360", "--quality", "low", "--no-record", "--events", (folder_ / "events").string(),
+         "--seconds", "120"});
+  ASSERT_TRUE(happens("practice", 1, 60)) << said();
+  xdo("key F12");
+  const auto pictures_in = [](const fs::path& place) {
+    size_t n = 0;
+    if (fs::exists(place))
+      for (const auto& entry : fs::recursive_directory_iterator(place)) n += entry.path().extension() == ".png";
+    return n;
+  };
+  for (int i = 0; i < 400 && pictures_in(folder_ / "data") == 0; ++i) pause(50);
+  EXPECT_EQ(pictures_in(folder_ / "data"), 1u) << said();
+  EXPECT_EQ(pictures_in(folder_), 1u) << "and nowhere else";
+  kill(app_, SIGTERM);
+  EXPECT_EQ(exit_code(), 130) << said();
+}
+
 TEST_F(Window, a_screenshot_shows_the_field) {
   const fs::path picture = folder_ / "s.png";
   start({"play", "purse_string", "--size", "640x360", "--screenshot", picture.string(), "--after", "3"});
