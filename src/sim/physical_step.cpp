@@ -457,6 +457,9 @@ void step_physical(const Model& model, State& state, const TickInput& given, Job
   place_again(model, state, k);
   SutureContext sewing{model.solver, state.solver, state.scratch, model.suture, state.suture, state.event};
   cut(sewing, input);
+  // Knots are thread here, no objects of the suture: whether a cut end was tied is a question to thread/observe.
+  std::erase_if(state.event.list,
+                [](const Event& e) { return e.kind == EventKind::technique_fault && e.fault == Fault::cut_before_knot; });
   for (const Command& c : input.commands)
     if (c.kind == CommandKind::new_suture) sewing.refuse(c);  // not with physical mechanics yet
   cut_thread(model, state);

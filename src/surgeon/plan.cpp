@@ -17,7 +17,7 @@ constexpr int kBitesPerThread = 10;
 constexpr float kRow = 0.004f;          // [m] between two rows of bites
 constexpr float kStaysApart = 0.012f;   // [m] round the bowel, between stay sutures
 constexpr float kPull = 1.7f;           // [N] on each strand of a physical throw: below what the bites bear
-constexpr float kApproximate = 0.002f;  // [m] of each clamp: the edges touch after 1.5 mm
+constexpr float kApproximate = 0.003f;  // [m] of each clamp: the edges touch after 1.5 mm
 constexpr int kThrows = 2;
 // [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
 // square to it. Less deep, it slid along the serosa and came out through the cut edge.
@@ -249,8 +249,10 @@ Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skil
   plan.approximate = kApproximate;
   plan.task.pop_back();
   add(plan, TaskKind::approximate);
-  for (int i = 0; i < kThrows; ++i) add(plan, TaskKind::throw_, 1, 1);
-  add(plan, TaskKind::release);
+  // The first two throws make the knot that the load locks. The hands hold it tight until the clamps have put the load on it.
+  for (int i = 0; i < kThrows; ++i) plan.task.push_back({TaskKind::throw_, 1, 1, i == 1});
+  add(plan, TaskKind::cut_tail);
+  add(plan, TaskKind::cut_long);
   add(plan, TaskKind::leave);
   return plan;
 }
@@ -358,7 +360,7 @@ std::span<const char* const> task_names() {
   static constexpr const char* kName[] = {"pick_up",   "bite",        "pull_tail",  "pull_slack", "pull_together",
                                           "hand_back", "regrip",      "draw",       "throw",      "lock_strand",
                                           "cut_long",  "cut_tail",    "cut_needle", "take_both",  "discard",
-                                          "fresh",     "approximate", "release",    "leave",      "rest"};
+                                          "fresh",     "approximate", "leave",      "rest"};
   static_assert(std::size(kName) == static_cast<size_t>(TaskKind::rest) + 1);
   return kName;
 }

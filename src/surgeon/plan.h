@@ -48,7 +48,6 @@ enum class TaskKind {
   discard,        // the forceps lays a needle that was cut off beside the field
   fresh,          // a new suture
   approximate,    // the assistant brings the clamped bowel ends together, so that a knot is tied without tension
-  release,        // and moves the clamps back
   leave,          // the forceps lays the needle down; no hand holds anything, and the tissue settles
   rest            // hands off; the tissue settles
 };
@@ -57,6 +56,7 @@ struct Task {
   TaskKind kind = TaskKind::rest;
   int which = 0;  // see TaskKind
   int way = 1;
+  bool release = false;  // of a throw_: the clamps go back while both strands are held taut
 };
 
 struct Plan {

@@ -232,10 +232,8 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
       return fresh(seen);
     case TaskKind::approximate:
       doing_ = "bring the bowel ends together";
-      return move_clamps(true);
-    case TaskKind::release:
-      doing_ = "move the clamps back";
-      return move_clamps(false);
+      order_clamps(true);
+      return waited_ > plan_.approximate / kClampSpeed;
     case TaskKind::leave:
       doing_ = "hands away";
       return leave(seen);

@@ -142,7 +142,7 @@ class Scripted final : public Surgeon {
   bool take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again);
 
   // --- the end of a stitch with physical mechanics ----------------------------------------------------------------------
-  bool move_clamps(bool advance);
+  void order_clamps(bool advance);
   // The needle is laid beside the bowel as far as its strand reaches; then both hands are away for the time of a measurement.
   bool leave(const Snapshot& seen);
 
@@ -191,6 +191,7 @@ class Scripted final : public Surgeon {
   Quat take_turn_;
   Vec3 tried_;
   std::optional<ThreadTie> thread_tie_;  // with physical mechanics, from the first throw on
+  float clamped_ = 0;                    // [s] that the clamps still move back, within a throw
   uint32_t sequence_ = 0;
 };
 

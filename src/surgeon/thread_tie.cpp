@@ -27,10 +27,19 @@ constexpr float kSlideOff = 1.4f;    // [s]
 // Of the strand's length: where it is wound. Lower, the needle that goes round would meet the tail, which stands up from a
 // knot.
 constexpr float kHigh = 0.62f;
-constexpr float kDrawn = 0.5f;  // of the strand's length: height to which the tail is drawn at most
-constexpr float kLow = 4e-3f;   // [m] above the stitch, where strands are pulled
-constexpr float kKnot = 5e-3f;  // [m] from the middle of the stitch: thread nearer than this belongs to the knot
-constexpr int kAgain = 3;       // times that a throw is wound again
+constexpr float kDrawn = 0.5f;         // of the strand's length: height to which the tail is drawn at most
+constexpr float kLow = 4e-3f;          // [m] above the stitch, where strands are pulled
+constexpr float kKnot = 5e-3f;         // [m] from the middle of the stitch: thread nearer than this belongs to the knot
+constexpr float kTouching = 0.8e-3f;   // [m] between the nodes of two strands in contact
+constexpr float kNearStitch = 12e-3f;  // [m] of its knot from the middle of the stitch
+// [N] of either strand before the pull. One strand that is tauter than the other straightens in the throws below, and the other
+// one winds round it: they capsize into half hitches, which slide.
+constexpr float kEasy = 0.12f;
+constexpr float kGives = 0.2f;        // [m/s] per newton above that, by which a hand gives way
+constexpr float kMostGiven = 20e-3f;  // [m]
+constexpr float kLead = 0.08f;        // [N] by which a strand may be tauter than the other in a pull
+constexpr float kSeated = 0.6f;       // [s] of full tension
+constexpr int kAgain = 3;             // times that a throw is wound again
 
 Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
 // Unit, across the shaft; 0: toward the viewer, pi/2: above.
@@ -46,6 +55,20 @@ Quat holder_turn(float side) {
 float smooth(float s) {
   s = std::clamp(s, 0.0f, 1.0f);
   return s * s * (3 - 2 * s);
+}
+
+// Middle of what tail and strand have in contact: the knot. `fallback` if they do not touch.
+Vec3 knot_center(const Snapshot& seen, Vec3 fallback) {
+  const size_t last = seen.active().thread_order.size() - 1, first = first_point_node(seen);
+  Vec3 sum;
+  float count = 0;
+  for (size_t i = 0; i < first; ++i)
+    for (size_t k = last_point_node(seen) + 1; k <= last; ++k) {
+      const Vec3 a = node_at(seen, i), b = node_at(seen, k);
+      if (distance(a, b) > kTouching || distance(a, fallback) > kNearStitch) continue;
+      sum += 0.5f * (a + b), count += 1;
+    }
+  return count > 0 ? sum / count : fallback;
 }
 
 // [turns] by which tail and strand twist about each other: Gauss's linking integral, of strands that are not drawn tight yet.
@@ -85,6 +108,7 @@ std::string ThreadTie::doing() const {
                                           "cross the hands",
                                           "lower the hands",
                                           "pull",
+                                          "hold both strands",
                                           "lay the tail",
                                           "let go",
                                           "leave",
@@ -117,10 +141,12 @@ void ThreadTie::again(const Snapshot& seen, Stage after) {
   else go(seen, after);
 }
 
-void ThreadTie::begin(const Snapshot& seen, int wraps, int sense, bool first) {
+void ThreadTie::begin(const Snapshot& seen, int wraps, int sense, bool first, bool keep) {
+  keep_ = keep;
   wraps_ = wraps, sense_ = static_cast<float>(sense), first_ = first, failed_ = false, misses_ = 0, tries_ = 0;
   twist_before_ = twist(seen);
   origin_ = 0.5f * (seen.active().suture_point.front().position + seen.active().suture_point.back().position);
+  if (++throws_ > 2) origin_ = knot_center(seen, origin_);
   const Vec3 swage = needle_swage(picture_, seen);
   // The long strand is on the side of its hole for the first throw; then the ends have crossed.
   if (first) {
@@ -196,8 +222,14 @@ void ThreadTie::place() {
   hands_[kForceps].pose = {hand_ - rotate(turn, swage_in_forceps_), turn};
 }
 
+// Toward the knot, by as much as the strand in this hand asks for.
+Vec3 ThreadTie::give(Vec3 at, float felt, float& given, float dt) const {
+  given = std::clamp(given + dt * std::clamp(kGives * (felt - kEasy), -0.03f, 0.06f), 0.0f, kMostGiven);
+  return at + normalized(origin_ - at) * given;
+}
+
 void ThreadTie::go(const Snapshot& seen, Stage stage) {
-  stage_ = stage, waited_ = 0;
+  stage_ = stage, waited_ = 0, tail_given_ = strand_given_ = 0;
   const Vec3 shaft = shaft_from(side_);
   const Vec3 work = origin_ + around(side_, 0.5f * kPi) * height_ - shaft * kStrandAt;
   const float toward = side_ > 0 ? kPi - 0.15f : 0.15f;  // the forceps faces the needle holder
@@ -257,7 +289,8 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       break;
     case lay:
       pulled_ = std::min(felt_, tail_felt_);
-      glide_to(tip_ - Vec3{side_ * 2e-3f, 3e-3f, 0}, hand_, 0.2f * how_.speed, forceps_angle_);
+      // Both strands alike, and slowly.
+      glide_to(tip_ - Vec3{side_ * 2e-3f, 3e-3f, 0}, hand_ + Vec3{side_ * 2e-3f, 0, 0}, 0.06f * how_.speed, forceps_angle_);
       break;
     case away:
       glide_to(tip_ + shaft * 0.06f, hand_, how_.speed, forceps_angle_);
@@ -360,11 +393,12 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
         break;
       }
       const float far = std::max(1e-3f, distance(tip_from_, tip_to_));
-      const bool taut = tail_felt_ > 2 * kWinding;
+      const bool taut = tail_felt_ > (throws_ > 1 ? 2 * kEasy : 2 * kWinding);
       const float speed =
           std::min(0.7f * how_.speed, 0.02f + 4 * (far - drawn_)) * std::clamp(1.5f - tail_felt_ / 0.1f, 0.15f, 1.0f);
       if (!taut) drawn_ = std::min(far, drawn_ + speed * dt);
       tip_ = lerp(tip_from_, tip_to_, drawn_ / far);
+      if (throws_ > 1) tip_ = give(tip_, tail_felt_, tail_given_, dt);
       // The winding hand pulls the turn off the jaws, which have gone on.
       slid_ = std::min(1.0f, slid_ + dt / kSlideOff);
       const float turn = sense_ * 0.5f * kPi;
@@ -382,31 +416,32 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     }
     case cross_up:
-      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f)) ||
-          (done_ > 0.6f && std::max(felt_, tail_felt_) > kTaut))
-        go(seen, cross_down);
+    case cross_down: {
+      const float most = std::max(felt_, tail_felt_);
+      const bool there = glide(dt * std::clamp(1.2f - most / (4 * kEasy), 0.1f, 1.0f));
+      tip_ = give(tip_, tail_felt_, tail_given_, dt), hand_ = give(hand_, felt_, strand_given_, dt);
+      if (stage_ == cross_up && (there || (done_ > 0.6f && most > kTaut))) go(seen, cross_down);
+      else if (stage_ == cross_down && (there || std::min(felt_, tail_felt_) > 0.5f || most > kTaut)) go(seen, pull);
       break;
-    case cross_down:
-      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_), 0.1f, 1.0f)) || std::min(felt_, tail_felt_) > 0.5f ||
-          std::max(felt_, tail_felt_) > kTaut)
-        go(seen, pull);
-      break;
-    case pull: {
+    }
+    case pull:
+    case hold: {
       // Neither pulls harder than the other: a strand that is tight while the other is slack becomes a post.
       const auto pace = [&](float felt, float other) {
-        const float want = std::min(how_.pull, other + 0.3f);
-        return dt * std::clamp(0.03f * (want - felt), -0.02f, 0.02f);
+        const float want = std::min(how_.pull, 1.2f * other + kLead);
+        return dt * std::clamp((felt < kEasy ? 0.1f : 0.03f) * (want - felt), -0.02f, 0.02f);
       };
       tip_.x += side_ * pace(tail_felt_, felt_), hand_.x -= side_ * pace(felt_, tail_felt_);
       steady_ = std::min(tail_felt_, felt_) > 0.9f * how_.pull ? steady_ + dt : 0;
-      if (steady_ > 0.3f || waited_ > 8) go(seen, lay);
-      else if (!holds && waited_ > 0.2f) go(seen, lay);
+      const bool lost = !holds && waited_ > 0.2f;
+      if (stage_ == pull && (steady_ > kSeated || waited_ > 12 || lost)) go(seen, hold);
+      else if (stage_ == hold && (!keep_ || waited_ > 12)) go(seen, lay);
       break;
     }
     case lay:
-      if (glide(dt)) go(seen, let_go);
+      if (glide(dt)) go(seen, release);
       break;
-    case let_go:
+    case release:
       if (move_jaw(holder, kHalfOpen, dt)) go(seen, away);
       break;
     case away:

@@ -27,11 +27,14 @@ class ThreadTie {
   // hands: the needle holder, which is empty, and the forceps, which holds the needle.
   ThreadTie(const PictureModel& picture, std::array<ScriptedHand, 2>& hands, const ThreadTieSettings& settings);
 
-  // A throw of `wraps` turns; sense +1: over the top. The first one also lays the tail.
-  void begin(const Snapshot& seen, int wraps, int sense, bool first);
+  // A throw of `wraps` turns; sense +1: over the top. The first one also lays the tail. keep: both strands stay taut, once the
+  // throw is seated, until let_go().
+  void begin(const Snapshot& seen, int wraps, int sense, bool first, bool keep = false);
   // Every tick, until it returns true.
   bool operate(const Snapshot& seen, float dt);
   bool failed() const { return failed_; }
+  bool keeping() const { return stage_ == hold; }
+  void let_go() { keep_ = false; }
   int retries() const { return retries_; }  // throws wound again so far
   std::string doing() const;
   float pulled() const { return pulled_; }  // [N] the smaller tension of both strands when the throw was pulled tight
@@ -54,8 +57,9 @@ class ThreadTie {
     cross_up,
     cross_down,
     pull,
+    hold,
     lay,
-    let_go,
+    release,
     away,
     done
   };
@@ -63,6 +67,7 @@ class ThreadTie {
   void glide_to(Vec3 tip, Vec3 hand, float speed, float angle);
   bool glide(float dt);
   void feel(const Snapshot& seen);
+  Vec3 give(Vec3 at, float felt, float& given, float dt) const;
   void place();
   Vec3 tail_node(const Snapshot& seen, float from_end) const;
   // Winds again, after the stage that lets everything go; or fails.
@@ -73,9 +78,9 @@ class ThreadTie {
   std::array<ScriptedHand, 2>& hands_;
   ThreadTieSettings how_;
   Stage stage_ = done;
-  int wraps_ = 1, misses_ = 0, retries_ = 0, tries_ = 0;
+  int wraps_ = 1, misses_ = 0, retries_ = 0, tries_ = 0, throws_ = 0;
   float side_ = 1, sense_ = 1, waited_ = 0;
-  bool first_ = false, failed_ = false;
+  bool first_ = false, failed_ = false, keep_ = false;
   Vec3 origin_;        // the middle of the stitch
   Vec3 tip_, hand_;    // where the needle holder's jaws and the needle's swage shall be
   Quat holder_turn_;   // of the needle holder
@@ -89,7 +94,8 @@ class ThreadTie {
   // Winding.
   float strand_ = 0, tail_ = 0, height_ = 0, angle_ = 0, turned_ = 0, radius_ = 0, slack_ = 0;
   float felt_ = 0, tail_felt_ = 0, pulled_ = 0, steady_ = 0, drawn_ = 0, slid_ = 0;
-  float twist_before_ = 0;  // [turns] of tail and strand about each other before this throw
+  float tail_given_ = 0, strand_given_ = 0;  // [m] by which the hands have given way
+  float twist_before_ = 0;                   // [turns] of tail and strand about each other before this throw
 };
 
 }  // namespace catgut

@@ -22,10 +22,36 @@ constexpr float kSlackStrand = 0.8f;          // of the strand's length: where i
 constexpr float kTautStrand = 0.2f;           // [N]
 constexpr Vec3 kLaidDown{-0.6f, -0.3f, 0.75f};
 constexpr uint8_t kAssistant = 2;
-constexpr float kTyingAt = 0.12f;  // position on the needle's arc: behind the swage
+constexpr float kClampsBack = 1.2f;  // of the time that the clamps took in: they stop by themselves where the scene had them
+constexpr float kTyingAt = 0.12f;    // position on the needle's arc: behind the swage
 // The same with physical mechanics. The forceps lies along the needle, whose swage stands out beyond the tips: a strand that is
 // wound then turns in front of the jaws, and never between them and the needle.
 constexpr float kTyingAlong = 0.16f;
+constexpr float kShortStump = 0.005f;  // [m] of thread left on a knot with physical mechanics, beyond where the strands touch
+constexpr float kStrandsTouch = 1e-3f, kKnotEnds = 4e-3f;  // [m] apart; of free thread
+constexpr float kStumpClear = 2e-3f;                       // [m] of the blades from the stitch
+constexpr Vec3 kCutFrom{0, 0.6f, 0.8f};                    // unit, from the blades along the shaft
+
+// The outermost node of a knot on the tail or on the needle's strand: within the knot the two touch each other.
+size_t knot_end(const Snapshot& seen, bool tail) {
+  const size_t last = seen.active().thread_order.size() - 1, first = first_point_node(seen), end = last_point_node(seen);
+  const auto touches = [&](size_t i) {
+    for (size_t k = tail ? end + 1 : 0; k < (tail ? last + 1 : first); ++k)
+      if (distance(node_at(seen, i), node_at(seen, k)) < kStrandsTouch) return true;
+    return false;
+  };
+  size_t found = tail ? first : end;
+  bool met = false;
+  float free = 0;
+  for (size_t i = found; tail ? i > 0 : i < last;) {
+    const size_t next = tail ? i - 1 : i + 1;
+    free += distance(node_at(seen, i), node_at(seen, next));
+    i = next;
+    if (touches(i)) found = i, met = true, free = 0;
+    else if (met && free > kKnotEnds) break;
+  }
+  return found;
+}
 
 }  // namespace
 
@@ -235,20 +261,25 @@ bool Scripted::tie_thread(const Task& task, const Snapshot& seen) {
   if (stage_ == start) {
     const bool first = !thread_tie_;
     if (first) thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull});
-    thread_tie_->begin(seen, task.which, task.way, first);
+    thread_tie_->begin(seen, task.which, task.way, first, task.release);
+    clamped_ = kClampsBack * plan_.approximate / kClampSpeed;
     go(work);
   }
   const bool over = thread_tie_->operate(seen, dt_);
   doing_ = "throw: " + thread_tie_->doing();
+  if (thread_tie_->keeping()) {
+    doing_ = "throw: hold both strands while the clamps go back";
+    order_clamps(false);
+    clamped_ -= dt_;
+    if (clamped_ < 0) thread_tie_->let_go();
+  }
   if (over && thread_tie_->failed()) gave_up_ = true;
   return over;
 }
 
-bool Scripted::move_clamps(bool advance) {
+void Scripted::order_clamps(bool advance) {
   const CommandKind kind = advance ? CommandKind::advance_clamp : CommandKind::retract_clamp;
   for (uint16_t body = 0; body < 2; ++body) commands_.push({kind, kAssistant, body});
-  // The clamps stop by themselves where the scene had them; their way there is a little longer than their way in.
-  return waited_ > (advance ? 1.0f : 1.2f) * plan_.approximate / kClampSpeed;
 }
 
 bool Scripted::leave(const Snapshot& seen) {
@@ -319,16 +350,24 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
   const bool tail = kind == TaskKind::cut_tail;
   // Not too near to the knot, where the scissors could cut the stitch itself; after a miss further out, with more room.
   const size_t first = first_point_node(seen), end = last_point_node(seen);
+  const bool physical = plan_.pull > 0;
+  const size_t from = physical ? knot_end(seen, tail) : tail ? first : end;
+  const float wanted = physical ? kStumpClear : kTieClear;
   size_t at = last;
   float clearest = 0;
-  const float near = kStump + 0.004f * static_cast<float>(misses_);
-  for (float far = near; far < near + 3 * kStump && clearest < kTieClear; far += 0.002f) {
-    const size_t i = std::clamp<size_t>(node_along(seen, tail ? first : end, far, tail ? -1 : 1), 1, last - 1);
-    float clear = kTieClear;
+  const float near = (physical ? kShortStump : kStump) + 0.004f * static_cast<float>(misses_);
+  for (float far = near; far < near + 3 * kStump && clearest < wanted; far += 0.002f) {
+    const size_t i = std::clamp<size_t>(node_along(seen, from, far, tail ? -1 : 1), 1, last - 1);
+    float clear = wanted;
     for (size_t k = first; k <= end; ++k) clear = std::min(clear, distance(node_at(seen, i), node_at(seen, k)));
     if (clear > clearest) clearest = clear, at = i;
   }
-  const Pose goal = tying_pose(kNeedleHolder, node_at(seen, std::clamp<size_t>(at, 1, last - 1)));
+  at = std::clamp<size_t>(at, 1, last - 1);
+  Pose goal = tying_pose(kNeedleHolder, node_at(seen, at));
+  if (physical) {  // from above, the strand between the jaws
+    const Vec3 x = normalized(cross(kCutFrom, node_at(seen, at + 1) - node_at(seen, at - 1)), {1, 0, 0});
+    goal.q = from_axes(x, cross(kCutFrom, x), kCutFrom);
+  }
   switch (stage_) {
     case over:
       cuts_before_ = count_cuts(seen);
