@@ -58,6 +58,19 @@ void add_active(const Settings& settings, Scratch& s, Active c, float gap, Vec3 
   s.active.push_back(c);
 }
 
+Vec3 direction(const Scratch& s, size_t i) { return normalized(s.e.at(i) + s.u.at(i + 1) - s.u.at(i), Vec3{1, 0, 0}); }
+
+// A contact of a polygon stands for the arc on which a real thread would bear: there the normals turn, and the sum of their
+// magnitudes, on which friction acts, exceeds their vector sum N. A tension T that bears N turns by an angle 2 a with
+// sin a = N / (2 T), and its normal forces add up to 2 a T. Returns their ratio a / sin a, at most 1.5. The polygon's own angle
+// bounds a: a strand that is squeezed but straight does not turn.
+float arc_factor(const State& state, const Scratch& s, uint32_t i, float normal_force) {
+  const float tension = state.tension[i];
+  if (tension <= 0 || i == 0 || i + 1 == state.segments() || state.broken[i - 1] || state.broken[i + 1]) return 1;
+  const float x = std::min(0.5f * length(direction(s, i + 1) - direction(s, i - 1)), normal_force / (2 * tension));
+  return 3 / (2 + std::sqrt(std::max(0.0f, 1 - x * x)));  // a / sin a within 1 % to 70 degrees (Snell)
+}
+
 // Geometry of one pair at the predicted positions. Returns the motion after which the pair must be evaluated
 // again.
 float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& around, float time, size_t k) {
@@ -95,17 +108,21 @@ float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& 
     c.normal_impulse = 0, c.friction_impulse = {}, c.drift = {}, c.touch = Touch::apart;
     return c.gap - ready;
   }
+  const float h2 = settings.substep * settings.substep, normal_force = c.normal_impulse / h2;
+  float arc = arc_factor(state, s, i, normal_force);
   Active active;
   active.i = i, active.wi0 = 1 - c.s, active.wi1 = c.s, active.normal = four(c.normal),
   active.crossing = static_cast<uint32_t>(k);
   if (other < kTool) {
     active.j = other, active.wj0 = c.t - 1, active.wj1 = -c.t, active.mu = settings.material.friction;
+    arc = std::max(arc, arc_factor(state, s, other, normal_force));
   } else {
     active.j = i;
     active.mu = around.tools[other - kTool].friction;
-    active.most = kToolPress * settings.substep * settings.substep;
+    active.most = kToolPress * h2;
     active.partner = four(lerp(s.tool_move[2 * (other - kTool)], s.tool_move[2 * (other - kTool) + 1], c.t));
   }
+  active.mu *= arc;
   add_active(settings, s, active, c.gap, c.drift, c.normal_impulse, c.friction_impulse);
   return 0;
 }
@@ -156,13 +173,14 @@ void end_contacts(const Settings& settings, State& state, Scratch& s, Surroundin
   for (const Active& c : s.active) {
     const Vec3 went = three(motion(s, c)), normal = three(c.normal), moved = tangential(went, normal);
     const Vec3 impulse = three(c.normal * c.ln + c.lt);
-    if (c.ln > 0) s.touched[c.i] = s.touched[c.i + 1] = s.touched[c.j] = s.touched[c.j + 1] = 1;
+    const uint32_t other = partner_of(state.key[c.crossing]);
+    if (c.ln > 0)
+      for (uint32_t i : {c.i, c.i + 1, c.j, c.j + 1}) s.touched[i] |= other < kTool ? kOnThread : kOnOther;
     Crossing& crossing = state.crossing[c.crossing];
     crossing.drift = new_drift(settings, c, crossing.drift, moved);
     crossing.normal_impulse = c.ln, crossing.friction_impulse = three(c.lt);
     crossing.gap = c.level + dot(normal, went);
     crossing.touch = c.ln <= 0 ? Touch::apart : c.slipped ? Touch::slip : Touch::stick;
-    const uint32_t other = partner_of(state.key[c.crossing]);
     if (other >= kTool) {
       ToolCapsule& tool = around.tools[other - kTool];
       tool.force_a -= impulse * (newtons * (1 - crossing.t));

@@ -206,7 +206,7 @@ void find_corners(const State& state, Scratch& s, const SoftPoints& soft) {
     look(state, s, soft, e, s.corner[e]);
     const size_t k = state.eyelet[e].segment;
     s.n.set(k, s.corner[e].in);
-    s.touched[k] = s.touched[k + 1] = 1;
+    s.touched[k] |= kOnOther, s.touched[k + 1] |= kOnOther;
   }
 }
 

@@ -89,6 +89,8 @@ inline Vec3 new_drift(const Settings& settings, const AnyActive& c, Vec3 drift, 
   return size > limit ? d * (limit / size) : d;
 }
 
+constexpr uint8_t kOnOther = 1, kOnThread = 2;  // bits of Scratch::touched: with load on a tool, plane, wall; on thread
+
 struct Scratch {
   size_t max_nodes = 0, max_crossings = 0;
   // Per node.
@@ -109,7 +111,7 @@ struct Scratch {
   // Contact with the plane: nodes that may touch it, and columns over all nodes.
   size_t plane_first = 0, plane_end = 0;
   Padded plane_level, plane_inverse, plane_slipped;  // [m], [kg] 0: does not touch, 0 or 1
-  std::vector<uint8_t> touched;                      // per node, in this substep
+  std::vector<uint8_t> touched;                      // per node, in this substep: kOnThread, kOnOther, or both
   // Pair list under construction, and what finds it.
   std::vector<uint32_t> new_key;
   Column new_budget;

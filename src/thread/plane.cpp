@@ -131,7 +131,7 @@ void end_plane(const Settings& settings, State& state, Scratch& s, Plane& plane)
   for (size_t i = a; i < s.plane_end; ++i) {
     sum += plane.normal * state.plane_normal[i] + state.plane_friction.at(i);
     if (state.plane_normal[i] <= 0) continue;
-    s.touched[i] = 1, s.touched[i + 1 < state.nodes() ? i + 1 : i - 1] = 1;
+    s.touched[i] |= kOnOther, s.touched[i + 1 < state.nodes() ? i + 1 : i - 1] |= kOnOther;
   }
   plane.force -= sum * (1 / (settings.substep * settings.substep * static_cast<float>(settings.substeps)));
 }

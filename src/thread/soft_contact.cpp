@@ -66,7 +66,7 @@ void end_soft_contacts(const Settings& settings, State&, Scratch& s, Surrounding
   for (const Scratch::SoftActive& a : s.soft_active) {
     SoftContact& c = around.soft_contacts[a.contact];
     const Vec3 went = three(motion(s, a)), moved = tangential(went, c.normal);
-    if (a.ln > 0) s.touched[a.node] = 1;
+    if (a.ln > 0) s.touched[a.node] |= kOnOther;
     c.gap = dot(c.normal, went) + a.before;
     c.normal_impulse = a.ln, c.friction_impulse = three(a.lt);
     c.drift = new_drift(settings, a, c.drift, moved);
