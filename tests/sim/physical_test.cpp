@@ -319,7 +319,7 @@ struct Closed {
   float away_for = 0;                                 // [s]
   thread::SeenKnot knot;
 };
-// Tasks of the plan, by number; empty: all of them.
+// Tasks of the plan, by number; empty: all of them. Otherwise the clamps go back at the end.
 Closed sew_and_leave(const std::vector<size_t>& tasks) {
   const SceneSpec scene = read_scene("interrupted_tied");
   const std::shared_ptr<const Model> model = build_model(scene);
@@ -346,6 +346,11 @@ Closed sew_and_leave(const std::vector<size_t>& tasks) {
       if (tool.held != Held::nothing) held = state->tick, result.let_go = gap_at_top(picture, seen);
   }
   result.done = surgeon->done() && !surgeon->gave_up();
+  for (int t = 0; t < 120 && !tasks.empty(); ++t) {
+    TickInput in = no_hands;
+    for (uint16_t body = 0; body < 2; ++body) in.commands.push({CommandKind::retract_clamp, 2, body});
+    tick(in);
+  }
   result.away_for = static_cast<float>(state->tick - held) * model->dt;
   result.away = gap_at_top(picture, seen);
   // The knot of the piece that is left in the wound.
@@ -390,7 +395,7 @@ TEST(PhysicalScene, the_thread_alone_closes_a_wound) {
 // The same with a single throw: nothing holds it, and the wound opens when the clamps go back.
 TEST(PhysicalScene, one_throw_does_not_hold_a_wound) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "forty seconds of surgery: set CATGUT_LONG=1";
-  const Closed r = sew_and_leave({0, 1, 2, 3, 4, 6, 9});
+  const Closed r = sew_and_leave({0, 1, 2, 3, 4, 5, 9});
   ASSERT_TRUE(r.done);
   EXPECT_EQ(r.cuts, 0);
   EXPECT_GT(r.away, 2e-3f);
