@@ -221,7 +221,8 @@ Surface make_surface(const wall::Model& m, const wall::State& s) {
       const float at = std::clamp(dot(p, along) / std::max(length2(along), 1e-20f), 0.0f, 1.0f);
       nearest = std::min(nearest, length(p - along * at));
     }
-    out.edge_distance.push_back(nearest);
+    // A corner beyond the cut: negative, so that the distance falls to zero at the cut edge, which lies between corners.
+    out.edge_distance.push_back(out.ghost[column] ? -nearest : nearest);
   }
   return out;
 }

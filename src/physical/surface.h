@@ -30,8 +30,8 @@ struct Surface {
   std::vector<uint8_t> ghost;           // per column: only a corner of fragments whose cells do not reach it
   std::vector<uint8_t> at_rim;          // per column
   std::vector<uint32_t> piece;          // per column: its connected part of the wall
-  std::vector<float> edge_distance;     // [m] per column: to the nearest edge of its part of the wall, at rest
-  std::vector<float> face_radius;       // [m] at rest, about the middle of its corners, thickness included
+  std::vector<float> edge_distance;  // [m] per column: to the nearest edge of its part of the wall, at rest; ghosts: negative
+  std::vector<float> face_radius;    // [m] at rest, about the middle of its corners, thickness included
 };
 Surface make_surface(const wall::Model& model, const wall::State& state);
 
