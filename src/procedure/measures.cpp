@@ -96,6 +96,25 @@ std::vector<Measure> table() {
        [](Seen s, Run) { return worst_seam(s, true); }},
       {"opening", "%", "area of the opening, of that at the start",
        [](Seen s, Run r) { return r.opening_start > 0 ? 100 * static_cast<double>(s.opening_area / r.opening_start) : 100; }},
+      {"pieces", "", "connected pieces of the tissue", [](Seen s, Run) { return double{1} * s.topology.pieces; }},
+      {"bleeding", "", "vessels that bleed",
+       [](Seen s, Run) {
+         return static_cast<double>(
+             std::count_if(s.wound.bleeding.begin(), s.wound.bleeding.end(), [](const BleedingView& b) { return b.flow > 0; }));
+       }},
+      {"specimen_mm", "mm", "from where a piece came free to the nearest instrument that holds tissue; 0: none did",
+       [](Seen s, Run r) {
+         if (r.freed_at == Vec3{}) return 0.0;
+         double least = kNone;
+         for (const InstrumentView& i : s.instrument)
+           if (i.held == Held::tissue) least = std::min(least, mm(distance(i.pose.p, r.freed_at)));
+         return least;
+       }},
+      {"stitch_mm", "mm", "distance of the first and the last suture point of the suture in hand",
+       [](Seen s, Run) {
+         const auto& p = s.active().suture_point;
+         return p.size() < 2 ? kNone : mm(distance(p.front().position, p.back().position));
+       }},
       {"bite_mm", "mm", "length of the last bite, entry to exit", [](Seen, Run r) { return mm(r.bite_length); }},
       {"bite_depth_mm", "mm", "maximum depth of the last bite below the surface", [](Seen, Run r) { return mm(r.bite_depth); }},
       {"entry_angle", "degrees", "angle of the needle to the surface normal at the last entry",

@@ -326,6 +326,8 @@ const std::vector<ResultName>& result_names() {
         {"pieces", "", "connected pieces of the drawn tissue at the end, once a pen has touched it; 0 before"},
         {"cut_deviation", "m",
          "largest distance of a cut edge from the line edge_distance away from the first body's rim, at rest"},
+        {"ring_gap", "m", "largest gap round the rim of the second body to the cut edge of the first; 0 without such an edge"},
+        {"stitch_gap", "m", "the same where a stitch crosses from one wall to the other; 0 without such a stitch"},
         {"specimen_way", "m", "displacement of the piece with the first body's rim; 0 while it is one with the rest"},
         {"drawn_mass", "kg", "what the drawn tissue encloses at rest, once a pen has touched it; 0 before"},
         {"blood_loss", "m3", "blood lost from vessels that a cut has opened"},

@@ -60,6 +60,16 @@ std::unique_ptr<Surgeon> scripted_surgeon(const SceneSpec& scene, const PictureM
                        "it needs physical mechanics, scissors in the right hand, swab and pen on the tray",
                        "set mechanics.kind = \"physical\", and add the missing [[instrument]]");
   }
+  if (plan == "altemeier") {
+    const auto on_tray = [&](const char* kind) {
+      return std::count_if(scene.instrument.begin(), scene.instrument.end(),
+                           [&](const InstrumentSpec& i) { return i.kind == kind && i.where == "tray"; });
+    };
+    if (scene.mechanics.kind != "physical" || on_tray("allis") == 0 || on_tray("cautery") == 0 || on_tray("needle_holder") == 0)
+      throw InputError("surgeon.plan = \"altemeier\"",
+                       "it needs physical mechanics, and allis, cautery and needle_holder on the tray",
+                       "set mechanics.kind = \"physical\", and add the missing [[instrument]]");
+  }
   try {
     return make_surgeon(plan, picture, skill_of(scene));
   } catch (const std::invalid_argument&) {

@@ -23,6 +23,29 @@ Place place_of(const VisibleMesh& mesh, uint32_t v) {
   return place;
 }
 
+// From the rim of the second body to an edge, given by its vertices.
+void measure_ring(const std::vector<uint32_t>& rim, const std::vector<Vec3>& edge, const Snapshot& seen, CutMeasures& out) {
+  if (rim.empty() || edge.empty()) return;
+  const auto gap = [&](Vec3 p) {
+    float least = 1e9f;
+    for (const Vec3& e : edge) least = std::min(least, distance(e, p));
+    return static_cast<double>(least);
+  };
+  for (const uint32_t i : rim) out.ring_gap = std::max(out.ring_gap, gap(seen.particle[i]));
+  for (const SutureView& suture : seen.suture) {
+    const auto& point = suture.suture_point;
+    if (point.empty() || point.front().wall == point.back().wall) continue;
+    const Vec3 middle = 0.5f * (point.front().position + point.back().position);
+    Vec3 on = seen.particle[rim[0]];
+    for (size_t i = 0; i < rim.size(); ++i) {
+      const Vec3 a = seen.particle[rim[i]], way = seen.particle[rim[(i + 1) % rim.size()]] - a;
+      const Vec3 p = a + way * std::clamp(dot(middle - a, way) / std::max(1e-12f, length2(way)), 0.0f, 1.0f);
+      if (distance(p, middle) < distance(on, middle)) on = p;
+    }
+    out.stitch_gap = std::max(out.stitch_gap, gap(on));
+  }
+}
+
 }  // namespace
 
 CutMeasures measure_cut(const SceneSpec& scene, const Snapshot& seen) {
@@ -63,13 +86,15 @@ CutMeasures measure_cut(const SceneSpec& scene, const Snapshot& seen) {
     if (here < 2) continue;
     Vec3 way{};
     float count = 0;
+    std::vector<Vec3> edge;  // of what stays
     for (uint32_t v = 0; v < root.size(); ++v) {
-      if (find(v) != find(top)) continue;
       Vec3 now{};
       for (size_t k = 0; k < 4; ++k) now += seen.particle[mesh.skin_particle[v][k]] * mesh.skin_weight[v][k];
-      way += now - mesh.position[v], ++count;
+      if (find(v) == find(top)) way += now - mesh.position[v], ++count;
+      else if (mesh.layer[v] == TissueLayer::cut_edge && depth(v) < first.length - kOnRim) edge.push_back(now);
     }
     out.way = static_cast<double>(length(way / std::max(count, 1.0f)));
+    if (seen.topology.picture->rim.size() > 1) measure_ring(seen.topology.picture->rim[1], edge, seen, out);
   }
   return out;
 }

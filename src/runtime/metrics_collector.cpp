@@ -208,6 +208,8 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   const CutMeasures cut = measure_cut(scene_, last);
   v["pieces"] = cut.pieces;
   v["cut_deviation"] = cut.deviation;
+  v["ring_gap"] = cut.ring_gap;
+  v["stitch_gap"] = cut.stitch_gap;
   v["specimen_way"] = cut.way;
   v["drawn_mass"] = cut.mass;
   double &lost = v["blood_loss"] = 0, &bleeding = v["bleeding"] = 0;

@@ -345,7 +345,8 @@ void add_body(Model& m, const BodySpec& spec, Tissue& all) {
   if (lies(spec)) {
     for (const Vec3& p : r.position) bottom = std::min(bottom, p.y - kDrapeBelowBody);
   }
-  all.drape = std::min(all.drape, bottom);
+  // Of bodies that stand up through the drape the first one decides: another may stand inside it, and end lower.
+  if (lies(spec) || all.rest.empty()) all.drape = std::min(all.drape, bottom);
   double spacing = 0;
   size_t edges = 0;
   for (const Triangle& t : r.surface)

@@ -20,7 +20,10 @@ void report(State& state, EventKind kind, size_t instrument, uint32_t which, flo
   state.event.add(e);
 }
 
-bool has_line(const Model& model) { return model.scene.surgeon.plan == "excision" && !model.scene.body.empty(); }
+bool has_line(const Model& model) {
+  const std::string& plan = model.scene.surgeon.plan;
+  return (plan == "excision" || plan == "altemeier") && !model.scene.body.empty();
+}
 
 // [m] from the rim of the first body, along its axis, at rest.
 float from_rim(const Model& model, const wall::Point& point) {

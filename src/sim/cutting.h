@@ -84,7 +84,8 @@ void watch_pulls(const Model& model, State& state);
 // Whether a material point lies in charred tissue.
 bool is_charred(const Model& model, const State& state, const wall::Point& point);
 
-// The planned line is a circle on the first body, `surgeon.edge_distance` from its rim, with the plan "excision".
+// The planned line is a circle on the first body, `surgeon.edge_distance` from its rim, with the plan "excision"
+// or "altemeier".
 constexpr float kOffLine = 2e-3f;       // [m] farther from the line is a fault (chosen)
 constexpr float kBesideSuture = 1e-3f;  // [m] from a hole with thread, likewise
 constexpr float kPulledForce = 1;       // [N] on the hand, likewise

@@ -32,6 +32,12 @@ Excising::Excising(const PictureModel& picture, const SurgeonSkill& skill)
   hand_[kHolder].pose = {picture.focus + Vec3{-0.08f, 0.08f, 0.06f}, {}};
 }
 
+void Excising::take_over(const ScriptedHand& pen, const ScriptedHand& holder, size_t hand) {
+  hand_ = {pen, holder};
+  holder_ = hand, took_over_ = true, held_at_ = holder.pose;
+  go(tighten);
+}
+
 std::string Excising::doing() const {
   static constexpr const char* kName[] = {"grasp the rim",
                                           "grasp the rim",
@@ -97,6 +103,7 @@ bool Excising::choose_vessel(const Snapshot& seen) {
 }
 
 Pose Excising::grasp_at(float raised) const {
+  if (took_over_) return {held_at_.p + opening_.axis * raised, held_at_.q};
   const Vec3 out = radial(kPi), z = opening_.axis, x = out;
   const Vec3 rim = opening_.center + out * (opening_.radius - 0.5f * skill_.wall);
   return {rim + z * (raised - 0.0015f), from_axes(x, cross(z, x), z)};
@@ -117,7 +124,7 @@ void Excising::act(const Snapshot& seen) {
       return;
     case close:
       if (!move_jaw(holder, 0, dt_) || waited_ < 0.5f) return;
-      if (seen.tool[kHolder].held == Held::tissue) return go(tighten);
+      if (seen.tool[holder_].held == Held::tissue) return go(tighten);
       ++retries_;
       if (++misses_ > kMostMisses) gave_up_ = true;
       return go(over_rim);
@@ -196,7 +203,7 @@ TickInput Excising::operate(const Snapshot& seen, float dt) {
   out.commands = commands_;
   for (size_t k = 0; k < 2; ++k) {
     tremble(hand_[k], skill_.tremor, random_, dt);
-    out.hand[k] = as_input(hand_[k], before[k], dt, sequence_);
+    out.hand[k == kHolder ? holder_ : k] = as_input(hand_[k], before[k], dt, sequence_);
   }
   ++sequence_;
   return out;

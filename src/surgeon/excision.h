@@ -18,6 +18,8 @@ namespace catgut {
 class Excising final : public Surgeon {
  public:
   Excising(const PictureModel& picture, const SurgeonSkill& skill);
+  // Begins at the line: `hand` holds the specimen already, with an instrument that it commands as in `holder`.
+  void take_over(const ScriptedHand& pen, const ScriptedHand& holder, size_t hand);
   TickInput operate(const Snapshot& seen, float dt) override;
   bool done() const override { return stage_ == finished || gave_up_; }
   bool gave_up() const override { return gave_up_; }
@@ -53,7 +55,7 @@ class Excising final : public Surgeon {
   Pose pen_at(const OnLine& line, float above) const;  // tip `above` the surface [m]
   Pose pen_on(const BleedingView& vessel, float above) const;
   bool choose_vessel(const Snapshot& seen);  // the next that bleeds; false: none
-  Pose grasp_at(float raised) const;         // jaws about the rim, raised along the axis [m]
+  Pose grasp_at(float raised) const;         // the hand that holds the specimen, raised along the axis [m]
   void switch_pen() { commands_.push({CommandKind::cut, 0, 0}); }
 
   PictureModel picture_;
@@ -63,6 +65,9 @@ class Excising final : public Surgeon {
   std::vector<uint32_t> below_;  // particles that carry the line
   Random random_;
   std::array<ScriptedHand, 2> hand_;
+  size_t holder_ = 1;  // hand of the second one
+  bool took_over_ = false;
+  Pose held_at_;  // of that hand when it took over
   CommandList commands_;
   Stage stage_ = over_rim;
   float waited_ = 0, dt_ = 1.0f / 60, angle_ = 0, aim_ = 0;

@@ -271,6 +271,41 @@ Plan simple_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
+// Anastomosis of a cut edge with the inner tube's rim, after surgeon/operation has excised the prolapse: with each suture of
+// the scene one stitch, from outside through the outer tube into the gap, and through the inner tube into the lumen. All are at
+// the same angle: the surgeon turns the field.
+Plan altemeier_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan;
+  plan.forceps_side = -1;
+  plan.driver_at = 0.15f, plan.beyond = 0.8f;
+  plan.tip_lean = 1.6f, plan.tip_psi = 1.2f;  // the tip is in the lumen: from above, over the edges
+  plan.pull = kPull, plan.slide = 1, plan.rise = true;
+  const OpeningShape outer = opening_shape(picture, 0), inner = opening_shape(picture, 1);
+  const Vec3 radial = -normalized(Vec3{1, 0, 0} - inner.axis * inner.axis.x, any_perpendicular(inner.axis));
+  BitePlace p;
+  p.at = inner.center + radial * (0.5f * (outer.radius + inner.radius - skill.wall));
+  p.out = inner.axis;
+  p.up = cross(-radial, inner.axis);  // so that cross(out, up) points inward
+  p.length = outer.radius - inner.radius + skill.wall;
+  p.depth = kFreeDepth + 0.5f * kYields;
+  p.wall = 1;
+  p.walls = 2;
+  for (uint32_t s = 0; s < picture.suture.size(); ++s) {
+    const int which = static_cast<int>(s);
+    p.suture = s;
+    plan.place.push_back(p);
+    add(plan, TaskKind::pick_up, which);
+    add(plan, TaskKind::bite, which);
+    add(plan, TaskKind::pull_tail);
+    add(plan, TaskKind::regrip);
+    for (int i = 0; i < kThrows; ++i) add(plan, TaskKind::throw_, 1, 1);
+    add(plan, TaskKind::cut_tail);
+    add(plan, TaskKind::cut_long);
+    add(plan, TaskKind::leave);
+  }
+  return plan;
+}
+
 // surgeon/excision and surgeon/slit carry them out: nothing of them is a task of the needle.
 Plan excision_plan(const PictureModel&, const SurgeonSkill&) { return {}; }
 
@@ -343,7 +378,8 @@ constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
                              {"interrupted_tied", 2, interrupted_tied_plan},
                              {"simple", 2, simple_plan},
                              {"excision", 1, excision_plan},
-                             {"slit", 1, excision_plan}};
+                             {"slit", 1, excision_plan},
+                             {"altemeier", 2, altemeier_plan}};
 
 }  // namespace
 

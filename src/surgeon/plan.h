@@ -69,7 +69,12 @@ struct Plan {
   // Where the needle holder grips the needle, as a fraction of its arc from the swage; how far beyond the bite a sweep turns
   // the needle before the forceps takes the tip [rad].
   float driver_at = 0.35f, beyond = 0.72f;
+  // The forceps comes for the tip from its side, leaning by `tip_lean` toward the outside of the tissue when the tip is
+  // `tip_psi` past the deepest point [rad].
+  float tip_lean = 0.8f, tip_psi = 2.6f;
   float approximate = 0;  // [m] travel of each clamp
+  float slide = 0;        // [s] ThreadTieSettings
+  bool rise = false;      // the needle is lifted over the edges on its way to where it is laid down
   float pull = 0;  // [N] of each strand when a throw is pulled tight, with physical mechanics; 0: throws of guided mechanics
 };
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "surgeon/excision.h"
+#include "surgeon/operation.h"
 #include "surgeon/slit.h"
 
 namespace catgut {
@@ -180,7 +181,7 @@ Pose Scripted::driver_grip(const Pose& needle) const {
 }
 
 Pose Scripted::forceps_grip(const Pose& needle) const {
-  return grip_at(needle, kForcepsAt, plan_.forceps_side, plan_.lift > 0 ? 0.3f : 0.8f, 2.6f);
+  return grip_at(needle, kForcepsAt, plan_.forceps_side, plan_.lift > 0 ? 0.3f : plan_.tip_lean, plan_.tip_psi);
 }
 
 void Scripted::aim() {
@@ -547,6 +548,7 @@ std::unique_ptr<Surgeon> make_demonstrator(const std::string& plan, const Pictur
 std::unique_ptr<Surgeon> make_surgeon(const std::string& plan, const PictureModel& picture, const SurgeonSkill& skill) {
   if (plan == "excision") return make_plan(plan, picture, skill), std::make_unique<Excising>(picture, skill);
   if (plan == "slit") return make_plan(plan, picture, skill), std::make_unique<Slitting>(picture, skill);
+  if (plan == "altemeier") return make_plan(plan, picture, skill), std::make_unique<Operating>(picture, skill);
   return std::make_unique<Scripted>(plan, picture, skill);
 }
 

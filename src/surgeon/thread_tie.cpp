@@ -412,7 +412,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       // A throw of one wrap gives 1.3 to 1.6 turns here, none at all less than half a turn.
       const float turns = std::abs(twist(seen) - twist_before_);
       if (turns > static_cast<float>(wraps_) - 0.2f) go(seen, cross_up);
-      else again(seen, drop_tail);
+      else if (how_.slide <= 0 || waited_ > kSlideOff + how_.slide) again(seen, drop_tail);
       break;
     }
     case cross_up:

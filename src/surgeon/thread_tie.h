@@ -20,6 +20,7 @@ namespace catgut {
 struct ThreadTieSettings {
   float speed = 0.15f;  // [m/s] maximum of the hands
   float pull = 2.5f;    // [N] with which both strands are pulled tight
+  float slide = 0;      // [s] that a turn which is still on the jaws has to slide off, before the throw is wound again
 };
 
 class ThreadTie {

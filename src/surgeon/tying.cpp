@@ -20,6 +20,7 @@ constexpr float kThrowComesDown = 3;          // [s] in which a throw reaches th
 constexpr float kHandsAway = 5;               // [s]
 constexpr float kSlackStrand = 0.8f;          // of the strand's length: where its needle is laid down
 constexpr float kTautStrand = 0.2f;           // [N]
+constexpr float kOverDrape = 0.004f;          // [m] of a needle that is laid down
 constexpr Vec3 kLaidDown{-0.6f, -0.3f, 0.75f};
 constexpr uint8_t kAssistant = 2;
 constexpr float kClampsBack = 1.2f;  // of the time that the clamps took in: they stop by themselves where the scene had them
@@ -260,7 +261,7 @@ bool Scripted::tie_thread(const Task& task, const Snapshot& seen) {
   enum { start, work };
   if (stage_ == start) {
     const bool first = !thread_tie_;
-    if (first) thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull});
+    if (first) thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull, plan_.slide});
     thread_tie_->begin(seen, task.which, task.way, first, task.release);
     clamped_ = kClampsBack * plan_.approximate / kClampSpeed;
     go(work);
@@ -283,15 +284,22 @@ void Scripted::order_clamps(bool advance) {
 }
 
 bool Scripted::leave(const Snapshot& seen) {
-  enum { lower, open, away };
+  enum { lower, open, away, rise };
   const Vec3 from = stitch(seen);
+  if (stage_ == lower && waited_ <= dt_ && plan_.rise && attempts_++ == 0) go(rise);
   switch (stage_) {
+    case rise: {  // over the edges: the straight way would lead through them
+      const float reach = 0.7f * length_between(seen, last_point_node(seen), seen.active().thread_order.size() - 1);
+      if (carry_swage(seen, from + Vec3{0, reach, 0.3f * reach}, 0.5f * skill_.speed) || !patience(3)) go(lower);
+      return false;
+    }
     case lower: {
       const size_t last = seen.active().thread_order.size() - 1;
       const float reach = kSlackStrand * length_between(seen, last_point_node(seen), last);
-      const Vec3 beside = normalized(kLaidDown) * reach;
+      Vec3 down = from + normalized(kLaidDown) * reach;
+      down.y = std::max(down.y, picture_.drape + kOverDrape);
       const float gently = std::clamp(1 - 4 * needle_tension(seen), 0.0f, 1.0f);
-      const bool there = carry_swage(seen, from + beside, std::max(1e-3f, gently * skill_.speed));
+      const bool there = carry_swage(seen, down, std::max(1e-3f, gently * skill_.speed));
       if (there || needle_tension(seen) > kTautStrand || !patience(4)) go(open);
       return false;
     }

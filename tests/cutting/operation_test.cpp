@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// tests/cutting: the scene "altemeier". A clamp is taken from the tray, closed on the rim and parked; its crush and its hold
+// are measured. With CATGUT_LONG the scripted surgeon does the whole operation: the results of the scene, every stage of its
+// procedure without an error, a replay to the bit, and a state saved before the stitch from which a surgeon continues.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+#include "field.h"
+#include "procedure/manager.h"
+#include "procedure/procedure_file.h"
+#include "procedure/scripted_surgeon.h"
+#include "runtime/session.h"
+#include "sim/recording.h"
+
+namespace catgut {
+namespace {
+
+SceneSpec small_scene() {
+  SceneSpec s = read_scene("altemeier");
+  s.body[0].particles = 600, s.body[1].particles = 240;
+  s.thread.particles = 40;
+  return s;
+}
+
+TEST(Operation, a_clamp_from_the_tray_is_parked_on_the_rim_and_holds_it) {
+  SceneSpec spec = small_scene();
+  std::erase_if(spec.instrument, [](const InstrumentSpec& i) { return i.kind == "allis" && i.name != "clamp 3"; });
+  Field f(spec);
+  const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(spec, picture_model(*f.model));
+  const auto parked = [&] { return f.of(EventKind::instrument_parked).size(); };
+  while (parked() == 0 && f.state->tick < 400) {
+    f.input = surgeon->operate(f.seen, f.model->dt);
+    f.tick();
+  }
+  ASSERT_EQ(parked(), 1u) << surgeon->doing();
+  ASSERT_EQ(f.of(EventKind::tissue_crushed).size(), 1u);
+  EXPECT_NEAR(f.of(EventKind::tissue_crushed)[0].where.y, 0, 0.004f) << "at the rim";
+  f.input = {};
+  for (ToolInput& h : f.input.hand) h.connected = 0;
+  for (int i = 0; i < 60; ++i) f.tick();
+  const uint32_t clamp = f.of(EventKind::instrument_parked)[0].which;
+  EXPECT_EQ(f.seen.instrument[clamp].held, Held::tissue);
+  EXPECT_TRUE(f.of(Fault::clamp_torn_out).empty());
+  // Its cord pulls 0.1 N: the rim has followed, and stays.
+  const Vec3 jaws = f.seen.instrument[clamp].pose.p;
+  for (int i = 0; i < 30; ++i) f.tick();
+  EXPECT_LT(distance(jaws, f.seen.instrument[clamp].pose.p), 0.5e-3f);
+}
+
+TEST(Operation, the_scripted_surgeon_carries_it_out_and_a_replay_repeats_it) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "CATGUT_LONG=1 runs it";
+  const SceneSpec scene = read_scene("altemeier");
+  SessionOptions options;
+  options.surgeon = "scripted";
+  options.record = testing::TempDir() + "altemeier.cgrec";
+  const RunResult run = run_session(scene, options, {});
+  for (const ExpectationResult& e : run.expect) EXPECT_TRUE(e.ok) << e.want.name << " " << e.got;
+  EXPECT_TRUE(run.faults.empty());
+  const Recording recording = read_recording(options.record);
+  const ReplayResult again = replay_session(recording, "recording", true, 2, {});
+  EXPECT_EQ(again.run.state_hash, run.state_hash);
+  EXPECT_EQ(again.run.events, run.events);
+}
+
+TEST(Operation, a_stage_begins_from_a_saved_state) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "CATGUT_LONG=1 runs it";
+  const SceneSpec scene = read_scene("altemeier");
+  const Procedure procedure = read_procedure("altemeier");
+  Field f(scene);
+  // Before the bite the state is saved and loaded, and a second surgeon begins with what he sees.
+  ProcedureRun run;
+  begin_run(run, procedure, f.seen, static_cast<double>(f.model->dt));
+  std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*f.model));
+  bool again = false;
+  while (!surgeon->done() && !finished(run, procedure) && f.state->tick < 9000) {
+    f.input = surgeon->operate(f.seen, f.model->dt);
+    f.tick();
+    if (!update_run(run, procedure, f.seen) || procedure.stage[std::min<size_t>(run.stage, 4)].name != "bite" || again)
+      continue;
+    again = true;
+    const std::vector<std::byte> saved = save_state(*f.model, *f.state);
+    f.state = initial_state(*f.model);
+    load_state(*f.model, *f.state, saved);
+    publish(*f.model, *f.state, f.seen);
+    surgeon = scripted_surgeon(scene, picture_model(*f.model));
+  }
+  EXPECT_TRUE(again);
+  EXPECT_FALSE(surgeon->gave_up()) << surgeon->doing();
+  EXPECT_TRUE(finished(run, procedure)) << run_table(run, procedure);
+  EXPECT_TRUE(run.error.empty()) << run_table(run, procedure);
+}
+
+}  // namespace
+}  // namespace catgut
