@@ -156,8 +156,13 @@ void seam(const SeamModel& model, SeamState& state, const TechniqueView& view, C
     float wanted = pair.progress;
     if (leader.hold == SeamHold::nothing) {
       wanted = 0;
-    } else if (r >= state.first_row && row.point < view.point.size()) {
-      const float to = pair.end + kRoom, room = row.from - to, span = view.point[row.point].span;
+    } else if (r >= state.first_row && row.point + 1 < view.point.size()) {
+      const StitchPoint &a = view.point[row.point], &b = view.point[row.point + 1];
+      const float to = pair.end + kRoom, span = a.span;
+      // The last pull of the needle strains the thread between the points. Until it has closed anything, the thread counts as
+      // straight at the greatest length that was.
+      if (pair.progress == 0) row.from = std::max(row.from, std::min(span, distance(a.at, b.at)));
+      const float room = row.from - to;
       wanted = room > 1e-6f ? std::clamp((row.from - span) / room, 0.0f, 1.0f) : 1.0f;
       if (leader.hold == SeamHold::knot) wanted = std::max(wanted, pair.progress);
     }

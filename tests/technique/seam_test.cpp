@@ -95,6 +95,22 @@ TEST(Midpoint, waits_for_the_bite_to_be_complete) {
   EXPECT_EQ(t.plan.pair.size(), 1u);
 }
 
+// The needle strains the thread as it leaves: the span is short then, and springs back to the distance of the edges. Measured at
+// that moment alone, no pull would ever count.
+TEST(Midpoint, closes_after_the_needle_strained_the_thread) {
+  TwoEdges t;
+  t.through_first(t.p[2]);
+  t.pass(1, t.p[10], kOut, t.p[14], kIn, 0.008f);  // between edges 9 mm apart
+  t.tick();
+  float& span = t.point[3].span;
+  span = 0.0092f;
+  t.tick(60);
+  EXPECT_EQ(t.plan.pair[0].progress, 0);
+  span = 0.0085f;  // drawn through by half a millimeter
+  t.tick(60);
+  EXPECT_GT(t.plan.pair[0].progress, 0.05f);
+}
+
 // "Each pair is pulled to the midpoint of the pair as the needle pulls the thread through."
 TEST(Midpoint, follows_the_thread_both_ways_and_never_faster_than_tissue) {
   TwoEdges t;
