@@ -25,6 +25,7 @@ namespace {
 constexpr float kPaperSubstep = 1.0f / 480;    // [s] substep for which the paper's deformation resistance is defined
 constexpr float kDrapeBelowRim = 0.035f;       // [m] below the rim, where a body stands up through the drape
 constexpr float kDrapeBelowBody = 0.010f;      // [m] below the body, where it lies on the drape
+constexpr float kDrapeBelowPad = 0.006f;       // [m] below a pad of skin: as thick as the fat that it lies on
 constexpr float kRow = 0.07f, kTurn = 0.005f;  // [m] of a thread on the drape: length of a row, radius of its turns
 
 std::string name_of(const SceneSpec& scene) { return scene.name.empty() ? "scene" : scene.name; }
@@ -342,7 +343,9 @@ void add_body(Model& m, const BodySpec& spec, Tissue& all) {
   if (is_physical(m.scene)) add_wall(m.scene, spec, r, all.wall);
   const uint32_t first = static_cast<uint32_t>(all.rest.size());
   float bottom = spec.position.y - kDrapeBelowRim;
-  if (lies(spec)) {
+  if (spec.kind == "pad") {
+    bottom = spec.position.y - spec.wall - kDrapeBelowPad;
+  } else if (lies(spec)) {
     for (const Vec3& p : r.position) bottom = std::min(bottom, p.y - kDrapeBelowBody);
   }
   // Of bodies that stand up through the drape the first one decides: another may stand inside it, and end lower.

@@ -77,6 +77,16 @@ TEST(Lessons, each_stage_is_done_by_mouse_and_shown) {
   }
 }
 
+// A pad over nothing let the tail slide into the open slit and hang 3 cm below it, where no jaws reach.
+TEST(LessonData, thread_in_the_slit_stays_within_reach_of_the_jaws) {
+  const auto model = build_model(read_scene("skin"));
+  const PictureModel picture = picture_model(*model);
+  float top = -1;
+  for (const Vec3& p : picture.particle_rest) top = std::max(top, p.y);
+  EXPECT_LT(top - picture.drape, 0.012f);
+  EXPECT_GT(top - picture.drape, 0.004f) << "the skin lies above the drape, not in it";
+}
+
 // The first exercise of a course: skin.
 TEST(Lessons, the_simple_suture_in_skin_is_done_by_mouse) {
   AtTheMouse desk(1, "skin");
