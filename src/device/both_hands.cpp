@@ -16,6 +16,7 @@ constexpr float kWindRate = 2.2f;               // [rad/s] maximum, or the stran
 constexpr float kOver = 1.5f;                   // [rad] beyond whole turns: thread that crosses itself
 constexpr float kSlack = 0.05f, kRise = 0.03f;  // [N], [m/s] below and at which the needle rises over a loop
 constexpr float kWithdraw = 1.5f;               // [rad/s] of a needle that entered the tissue by mistake
+constexpr float kDrivenIn = 0.5f;               // [s] from the gesture to the needle's entry
 constexpr float kCarried = 2.2f;                // [rad] from the vertical to the radius of the needle's swage
 constexpr float kOutward = 1.75f;               // [rad] maximum between that radius and the strand that leaves
 constexpr float kGoesOn = 0.012f;               // [m]
@@ -24,6 +25,8 @@ constexpr float kLongestDraw = 0.05f;                                          /
 constexpr float kDrawPerRad = 0.012f;                          // [m] per radian of the gesture by which the hands move apart
 constexpr float kGiveInTissue = 0.010f, kGiveAtKnot = 0.002f;  // [m] that a hand may pull a taut strand, and
 constexpr float kGiveToThrow = 0.040f;  // [m] one whose throw is not locked: its loop still has thread to give
+constexpr float kShortTail = 0.030f, kSettle = 0.7f, kLeastPull = 0.006f;  // [m], [s], [m/s]: see spare_tail
+constexpr size_t kFirstStitch = 4;                                         // suture points: at most two bites
 constexpr float kCounterHold = 0.8f;    // [N] above this the thread sticks in its holes
 
 enum { lift, lay, beside, wind };  // stages of winding
@@ -174,6 +177,20 @@ Vec3 on_leash(const PictureModel& picture, const Snapshot& seen, size_t who, Vec
   return far > most ? p - off * ((far - most) / far) : p;
 }
 
+Vec3 spare_tail(const PictureModel& picture, const Snapshot& seen, size_t who, Vec3 from, Vec3 p, float dt) {
+  const SutureView& s = seen.active();
+  if (seen.tool[who].held != Held::needle || s.needle.in_tissue || !s.needle_on_thread || !s.knot.empty() ||
+      s.suture_point.empty() || s.suture_point.size() > kFirstStitch || seen.tool[1 - who].held == Held::thread)
+    return p;
+  const Vec3 swage = needle_swage(picture, seen), anchor = node_at(seen, last_point_node(seen));
+  const bool taut = distance(swage, anchor) > kTautInTissue * length_between(seen, last_point_node(seen), s.thread_order.size() - 1);
+  const float tail = length_between(seen, 0, first_point_node(seen));
+  const float most = std::max(kLeastPull, (tail - kShortTail) / kSettle) * dt;
+  const Vec3 away = normalized(swage - anchor);
+  const float far = dot(p - from, away);
+  return taut && far > most ? p - away * (far - most) : p;
+}
+
 bool glide(Pose& pose, const Pose& goal, float speed, float turn, float dt) {
   const Vec3 way = goal.p - pose.p, about = rotation_vector(goal.q * conjugate(pose.q));
   const float far = length(way), angle = length(about);
@@ -187,7 +204,8 @@ BothDo both_hands(BothHands& b, float amount, std::array<Pose, 2>& hand, const P
                   const Snapshot& seen, float dt) {
   const size_t needle = seen.tool[0].held == Held::needle ? 0 : 1, other = 1 - needle;
   const bool ties = !seen.active().knot.empty() || b.winding.way != 0;
-  if (seen.tool[needle].held == Held::needle && seen.active().needle.in_tissue && ties && amount != 0) {
+  const bool strayed = seen.active().needle.in_tissue && b.not_driven > kDrivenIn;
+  if (seen.tool[needle].held == Held::needle && strayed && ties && amount != 0) {
     const Pose back{{}, axis_angle({0, 0, 1}, -std::min(std::abs(amount), kWithdraw * dt))};
     hand[needle] = hand[needle] * inverse(grip) * back * grip;
     return b.doing = BothDo::withdraw;

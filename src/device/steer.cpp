@@ -169,7 +169,11 @@ void both(Steering& steering, const std::array<HandMotion, 2>& motion, const Pic
   if (!steering.assist) return;
   std::array<Pose, 2> pose{steering.hand[0].pose, steering.hand[1].pose};
   const size_t needle = seen.tool[0].held == Held::needle ? 0 : 1;
-  const Pose& grip = steering.hand[needle].grip;
+  const SteeredHand& holder = steering.hand[needle];
+  const Pose& grip = holder.grip;
+  const bool at_bite = holder.snapped && holder.at == HelpAt::bite && holder.driven > 0;
+  if (!seen.active().needle.in_tissue)
+    steering.both.not_driven = at_bite || motion[needle].drive != 0 ? 0 : steering.both.not_driven + dt;
   if (motion[0].together || motion[1].together) {
     const BothDo done = both_hands(steering.both, motion[0].both + motion[1].both, pose, grip, picture, seen, dt);
     if (done != BothDo::nothing) steering.hand[0].snapped = steering.hand[1].snapped = false;
@@ -206,6 +210,7 @@ Steering start_steering(const PictureModel& picture, bool left_handed) {
 
 void resume_steering(Steering& steering, const Snapshot& seen) {
   steering.both = {};
+  if (seen.active().needle.in_tissue) steering.both.not_driven = 0;  // perhaps a bite
   for (size_t k = 0; k < 2; ++k) {
     SteeredHand& hand = steering.hand[k];
     hand.pose = seen.tool[k].hand;
@@ -267,8 +272,9 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
     const bool together = motion[k].together && steering.assist && steering.both.doing != BothDo::nothing;
     if (!together) {
       const bool pulls = steering.assist && seen.tool[k].held != Held::nothing;
+      const Vec3 from = hand.pose.p;
       move(hand, motion[k], view, picture, pulls ? seen.tool[k].force : Vec3{});
-      if (pulls) hand.pose.p = on_leash(picture, seen, k, hand.pose.p);
+      if (pulls) hand.pose.p = on_leash(picture, seen, k, spare_tail(picture, seen, k, from, hand.pose.p, dt));
       help(steering, k, view, picture, seen, dt);
     }
 

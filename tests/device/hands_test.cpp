@@ -311,7 +311,7 @@ TEST(Help, a_needle_that_entered_the_tissue_while_tying_is_withdrawn) {
   d.seen.active().needle.in_tissue = true;
   const Pose before = d.seen.active().needle.pose;
   d.turn(in);
-  EXPECT_EQ(d.steering.both.doing, BothDo::nothing) << "a bite under way is not undone";
+  EXPECT_EQ(d.steering.both.doing, BothDo::nothing) << "nothing is tied: it is a bite";
   d.seen.active().knot.resize(1);
   for (int i = 0; i < 10; ++i) d.turn(in);
   EXPECT_EQ(d.steering.both.doing, BothDo::withdraw);
@@ -319,6 +319,23 @@ TEST(Help, a_needle_that_entered_the_tissue_while_tying_is_withdrawn) {
   const float turned = 10 * 1.5f * kDt;  // [rad]
   EXPECT_LT(distance(on_needle(d.picture, needle, 1), on_needle(d.picture, before, 1 - turned / kPi)), 1e-4f)
       << "backward along its own curve";
+}
+
+// A running suture has a knot at its beginning, and more bites to come.
+TEST(Help, a_bite_under_way_is_not_withdrawn_after_a_knot) {
+  WorkQueue d;
+  with_a_stitch(d);
+  d.seen.active().knot.resize(1);
+  MouseInput drive = moved(10, 0), both = moved(10, 0);
+  drive.turn = both.both = true;
+  drive.hand_changes = 1;  // to the forceps, which holds the needle
+  d.turn(drive);
+  d.seen.active().needle.in_tissue = true;
+  for (int i = 0; i < 100; ++i) d.turn({});
+  const Pose hand = d.out[1].pose;
+  for (int i = 0; i < 10; ++i) d.turn(both);
+  EXPECT_EQ(d.steering.both.doing, BothDo::nothing);
+  EXPECT_LT(distance(d.out[1].pose.p, hand.p), 1e-6f);
 }
 
 TEST(Help, an_end_is_not_drawn_farther_than_it_is_long) {
@@ -338,6 +355,30 @@ TEST(Help, an_end_is_not_drawn_farther_than_it_is_long) {
   d.seen.active().knot[0].phase = KnotPhase::locked;
   EXPECT_NEAR(distance(swage_with(on_leash(d.picture, d.seen, 1, far)), stitch), strand + 0.002f, 1e-4f) << "nothing slides";
   EXPECT_TRUE(on_leash(d.picture, d.seen, 0, far) == far) << "an empty hand goes where it likes";
+}
+
+// At two frames per second a stroke of the mouse lasts half a second: the whole thread would be out before the next look.
+TEST(Help, a_free_end_that_becomes_short_slows_the_hand_that_pulls_it) {
+  const auto pulled = [](bool assist) {  // [m] in half a second
+    WorkQueue d;
+    with_a_stitch(d);
+    d.steering.assist = assist;
+    const Vec3 from = d.seen.tool[1].pose.p;
+    MouseInput in = moved(-40, 0);
+    in.hand_changes = 1;
+    for (int i = 0; i < 30; ++i) {
+      d.turn(in);
+      in.hand_changes = 0;
+      // Nothing holds the thread: it follows.
+      const Vec3 moved_by = d.out[1].pose.p - d.seen.tool[1].pose.p;
+      d.seen.tool[1].pose = d.out[1].pose;
+      d.seen.active().needle.pose.p += moved_by;
+      for (size_t n = 0; n <= 40; ++n) d.seen.particle[n] += moved_by;
+    }
+    return from.x - d.out[1].pose.p.x;  // along the strand
+  };
+  EXPECT_LT(pulled(true), 0.005f) << "3 cm are left";
+  EXPECT_GT(pulled(false), 0.1f) << "switched off";
 }
 
 TEST(Help, the_jaws_find_the_tail_while_the_other_hand_has_the_needle) {
