@@ -11,6 +11,9 @@
 
 namespace catgut {
 
+// The procedure that a beginner is offered first: T on the start screen, catgut play --teach.
+inline constexpr const char* kFirstLesson = "first_stitch";
+
 // name_or_path: "stay" (from the procedures folder) or the path of a .toml file. Its scene is checked too.
 Procedure read_procedure(const std::string& name_or_path);
 Procedure parse_procedure(const std::string& text, const std::string& filename);

@@ -67,7 +67,7 @@ class AtTheWindow : public WorkQueue {
   }
 
   int width = 320, height = 200;                                  // [pixels]
-  std::string lesson = "first_stitch";                            // of sit(..., true)
+  std::string lesson = "first_stitch";                            // of sit(..., true); its scene is the constructor's
   const ProcedureRun& lesson_run() const { return lesson_run_; }  // after sit()
   std::function<void(PlayOptions&)> prepare;                      // changes the options of sit()
   std::function<bool()> arrive;  // what the user does before there is a field; false: the user leaves

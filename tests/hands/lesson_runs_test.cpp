@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/hands: the first lesson again and again, by mouse and keyboard events in the window, in real time: how often it is
 // completed at the first try, and where tries failed. Half an hour, so for the nightly tests (CATGUT_LONG=1);
-// CATGUT_LESSON_RUNS is the number of runs in each size of the window, CATGUT_LESSON_PACE their speed.
+// CATGUT_LESSON_RUNS is the number of runs in each size of the window, CATGUT_LESSON_PACE their speed,
+// CATGUT_LESSON another lesson than the first.
 #ifdef CATGUT_TESTS_WINDOW
 #include <gtest/gtest.h>
 
@@ -22,20 +23,23 @@ TEST_F(StitchAtTheWindow, the_lesson_succeeds_at_the_first_try) {
   const char* wanted = std::getenv("CATGUT_LESSON_RUNS");
   const char* pace = std::getenv("CATGUT_LESSON_PACE");
   const int runs = wanted ? std::atoi(wanted) : 10;
-  const Procedure lesson = read_procedure("first_stitch");
+  const char* which = std::getenv("CATGUT_LESSON");
+  const std::string name = which ? which : kFirstLesson;
+  const Procedure lesson = read_procedure(name);
   int done = 0, all = 0;
   std::map<std::string, int> again;
   double slowest_min = 0;
   std::printf("%-10s %4s %-9s %8s  %-24s %s\n", "window", "run", "result", "time", "stopped at", "repeated, errors");
   for (const auto& [w, h] : {std::pair{1280, 720}, {640, 360}})
     for (int run = 0; run < runs; ++run) {
-      XMouse desk(x_->display, static_cast<int>(60 * kMostMinutes), pace ? static_cast<float>(std::atof(pace)) : 1.0f);
+      XMouse desk(x_->display, static_cast<int>(60 * kMostMinutes), pace ? static_cast<float>(std::atof(pace)) : 1.0f,
+                  lesson.scene.c_str());
       if (!desk.ready()) GTEST_SKIP() << "no XTest here";
-      desk.width = w, desk.height = h;
+      desk.width = w, desk.height = h, desk.lesson = name;
       Person me(desk);
       bool ok = false;
       const auto begin = Clock::now();
-      desk.sit([&] { ok = sew_and_tie_once(desk, me, 2, true); }, true);
+      desk.sit([&] { ok = me.carry_out(name); }, true);
       const double minutes = std::chrono::duration<double>(Clock::now() - begin).count() / 60;
       const ProcedureRun& seen = desk.lesson_run();
       ok = ok && finished(seen, lesson);

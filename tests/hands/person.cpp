@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "exchange/tying.h"
 
@@ -124,8 +125,12 @@ void Person::aside(size_t k) {
 bool Person::drive(size_t k, const std::function<bool()>& done) {
   Act act;
   act.hand = k;
-  const double until = seen().time_s + static_cast<double>(kPatience);
+  // A sweep through two layers is longer than one through one: patience ends when nothing more happens.
+  double until = seen().time_s + static_cast<double>(kPatience);
+  size_t progress = 0;
   while (!done()) {
+    const size_t now = desk_.count(EventKind::tip_entered) + desk_.count(EventKind::tip_exited);
+    if (now > std::exchange(progress, now)) until = seen().time_s + static_cast<double>(kPatience);
     act.motion.drive = std::min(0.1f, 3.0f * desk_.look().dt);  // observes between the steps
     if (seen().time_s > until || !desk_.act(act)) return done();
   }
@@ -141,6 +146,14 @@ bool Person::both(float amount, const std::function<bool()>& done, float patienc
     if (seen().time_s > until || !desk_.act(act)) return done();
   }
   return true;
+}
+
+bool Person::carry_out(const std::string& lesson) {
+  const bool skin = lesson == "simple_suture";
+  if (!take_needle() || !bite()) return false;
+  // One sweep may pass both edges of skin, or both bowel ends.
+  if (desk_.count(EventKind::bite_completed) < 2 && !(hand_back() && bite())) return false;
+  return pull_tail(skin ? 0.045f : 0.08f) && draw_together() && tie(1) && tie(-1) && cut_needle() && (!skin || cut_tail());
 }
 
 bool Person::take_needle() {

@@ -43,6 +43,8 @@ class Person {
  public:
   explicit Person(WorkQueue& desk) : desk_(desk) {}
 
+  bool carry_out(const std::string& lesson);  // first_stitch or simple_suture, from beginning to end
+
   bool take_needle();
   bool bite();       // the needle holder holds the needle; afterwards the forceps has pulled it through
   bool hand_back();  // the needle holder takes it from the forceps

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // tests/hands: the first lesson at few and irregular frames per second, as on a busy machine without a graphics card. In lock
 // step and reproducible by its number, so a failure of the window can be repeated here: the user sees every second frame, as in
-// at_the_window.h. A quarter of a minute for every ten runs, so for the nightly tests (CATGUT_LONG=1); CATGUT_LESSON_RUNS is
+// at_the_window.h. A minute for every ten runs, so for the nightly tests (CATGUT_LONG=1); CATGUT_LESSON_RUNS is
 // the number of runs, CATGUT_LESSON_FIRST the number of the first, CATGUT_LESSON_TICKS (3: a fast machine) the usual length of
-// a frame in ticks.
+// a frame in ticks, CATGUT_LESSON another lesson than the first (first_stitch, simple_suture).
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -60,22 +60,18 @@ TEST(SlowFrames, the_lesson_succeeds_at_the_first_try) {
   const char* from = std::getenv("CATGUT_LESSON_FIRST");
   const int runs = wanted ? std::atoi(wanted) : 20, first = from ? std::atoi(from) : 1;
   const char* which = std::getenv("CATGUT_LESSON");
-  const bool skin = which && std::string(which) == "simple_suture";
-  const Procedure lesson = read_procedure(skin ? "simple_suture" : "first_stitch");
+  const std::string name = which ? which : kFirstLesson;
+  const Procedure lesson = read_procedure(name);
   int done = 0;
   std::map<std::string, int> again;
   std::printf("%4s %5s %-7s %8s  %-40s %s\n", "run", "ticks", "result", "time", "stopped at", "repeated, errors");
   for (int number = first; number < first + runs; ++number) {
-    SlowFrames desk(static_cast<unsigned>(number), skin ? "skin" : "stay");
+    SlowFrames desk(static_cast<unsigned>(number), lesson.scene);
     ProcedureRun run;
     begin_run(run, lesson, desk.look().seen, 1.0 / 60);
     desk.after_tick = [&](const Snapshot& seen) { update_run(run, lesson, seen); };
     Person me(desk);
-    bool ok = me.take_needle() && me.bite();
-    if (skin) ok = ok && me.pull_tail(0.045f);
-    else ok = ok && me.hand_back() && me.bite() && me.pull_tail(0.08f);
-    ok = ok && me.draw_together() && me.tie(1) && me.tie(-1) && me.cut_needle() && (!skin || me.cut_tail());
-    ok = ok && finished(run, lesson);
+    const bool ok = me.carry_out(name) && finished(run, lesson);
     done += ok;
     std::string notes;
     for (const std::string& r : me.repeated()) notes += (notes.empty() ? "" : ", ") + r, ++again[r];
