@@ -108,7 +108,7 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_option("--mode", *mode, "tutorial: time stands still at a new stage, with demonstrations; exam: no feedback")
       ->check(CLI::IsMember({"tutorial", "practice", "exam"}))
       ->type_name("tutorial|practice|exam");
-  command->add_flag("--teach", *teach, "tutorial: first stitch, step by step (--procedure first_stitch --mode tutorial)");
+  command->add_flag("--teach", *teach, std::string("tutorial: first stitch, step by step (--procedure ") + kFirstLesson + " --mode tutorial)");
   // One by default: a tick is short, and waiting workers take processor time from rendering.
   command->add_option("--threads", o->play.live.threads, "solver threads")->check(CLI::Range(1, 64))->capture_default_str();
   std::string drivers;
@@ -128,7 +128,7 @@ void add_play(CLI::App& app, int& exit_code) {
   command->callback([o, mode, teach, unrecorded, &exit_code] {
     read_window_options(*o);
     read_arm_choice(o->play.live.haptics);  // reports errors before a window opens
-    if (*teach && o->play.procedure.empty()) o->play.procedure = "first_stitch", *mode = "tutorial";
+    if (*teach && o->play.procedure.empty()) o->play.procedure = kFirstLesson, *mode = "tutorial";
     o->play.tutorial = *mode == "tutorial";
     o->play.exam = *mode == "exam";
     if (o->play.procedure.empty() && (!o->play.stage.empty() || *mode != "practice"))

@@ -34,7 +34,7 @@ struct WindowHands::Link {
   std::array<ToolInput, 2> tick(const HandsMoment& now) {
     if (!places || epoch != now.epoch) {
       if (!places) places = bite_places(scene, now.picture);
-      if (now.at_start || !hands.heard) hands.steering = start_steering(now.picture, left_handed);
+      if (now.at_start) hands.steering = start_steering(now.picture, left_handed);
       else resume_steering(hands.steering, now.seen);
       hands.left = {};
       epoch = now.epoch;

@@ -81,7 +81,8 @@ Choice start_panel(const StartView& v, Settings& settings, bool& watch) {
   if (!v.message.empty()) bad_text(v.message);
   const float foot = 3.0f * em();
   ImGui::BeginChild("procedures", {0.53f * wide, -foot});
-  if (ImGui::Button(tr("T  Tutorial: first stitch").c_str(), {-1.0f, 1.75f * em()})) choice.what = Chosen::teach;
+  if (ImGui::Button(tr("T  First lesson: a stitch in skin").c_str(), {-1.0f, 1.75f * em()})) choice = {Chosen::teach, 0};
+  if (ImGui::Button(tr("   Next lesson: two bowel ends").c_str(), {-1.0f, 1.75f * em()})) choice = {Chosen::teach, 1};
   gap(0.3f);
   heading("Scenes");
   for (size_t i = 0; i < v.scenes->size(); ++i) {

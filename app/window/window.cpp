@@ -55,18 +55,30 @@ constexpr double kQuickPicture = 0.045;  // [s] a faster one raises it: a step c
 constexpr std::array<float, 5> kResolutions{1, 0.6f, 0.45f, 0.35f,
                                             0.25f};   // 0.7 would need post-processing, so it costs as much as 1
 constexpr double kFarTooSlow = 0.25;                  // [s] reduces it by half, without a long look
-constexpr const char* kFirstLesson = "first_stitch";  // of procedures/
 constexpr double kMirrorEvery = 1.0 / 20;             // [s] of the window's picture beside a headset
 constexpr double kSlowMirror = 0.5;                   // [s] where the headset's frames take their whole period
 constexpr double kStallEvery = 2;                     // [s] of --stall-ms
 constexpr double kBeforeMoment = 3;                   // [s] that are played before the moment of a lost point
 
+bool has_procedure(const std::string& name) {
+  const std::vector<std::string> names = procedure_names();
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// The procedure of a scene in the list: the one of its name, or the first lesson; empty: none.
+std::string procedure_for(const std::string& scene) {
+  for (const std::string& name : {scene, std::string(kFirstLesson)})
+    if (has_procedure(name) && read_procedure(name).scene == scene) return name;
+  return "";
+}
+
 std::vector<SceneChoice> scene_choices() {
-  // The scene of each technique, simplest first; then all others.
+  // The first lesson's; the scene of each technique, simplest first; then all others.
   std::vector<std::string> names = scene_names();
-  const auto rank = [](const std::string& name) {
+  const std::string first = has_procedure(kFirstLesson) ? read_procedure(kFirstLesson).scene : "";
+  const auto rank = [&](const std::string& name) {
     const auto all = techniques();
-    return std::find(all.begin(), all.end(), find_technique(name)) - all.begin();
+    return name == first ? -1 : std::find(all.begin(), all.end(), find_technique(name)) - all.begin();
   };
   std::stable_sort(names.begin(), names.end(), [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
   std::vector<SceneChoice> out;
@@ -112,12 +124,6 @@ Quality measured_quality(int width, int height) {
   Snapshot seen;
   publish(*model, *initial_state(*model), seen);
   return choose_quality(picture_model(*model), seen, width, height).quality;
-}
-
-// The procedure of a scene in the list: the one of its name; empty: none.
-std::string procedure_for(const std::string& scene) {
-  const std::vector<std::string> names = procedure_names();
-  return std::find(names.begin(), names.end(), scene) != names.end() && read_procedure(scene).scene == scene ? scene : "";
 }
 
 class Window {
@@ -420,7 +426,7 @@ class Window {
         message_.clear();
         break;
       case Chosen::teach:
-        open("", kFirstLesson, "", true);
+        open("", kLessons[choice.which], "", true);
         message_.clear();
         break;
       case Chosen::show_me:

@@ -2,6 +2,7 @@
 // procedure: reads procedures/NAME.toml. Every error is an InputError of one line that names file:line, the error and the most
 // similar valid word.
 #pragma once
+#include <array>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,9 @@
 
 namespace catgut {
 
-// The procedure that a beginner is offered first: T on the start screen, catgut play --teach.
-inline constexpr const char* kFirstLesson = "first_stitch";
+// The lessons of the start screen, in their order. T, and catgut play --teach, open the first.
+inline constexpr std::array<const char*, 2> kLessons{"simple_suture", "first_stitch"};
+inline constexpr const char* kFirstLesson = kLessons[0];
 
 // name_or_path: "stay" (from the procedures folder) or the path of a .toml file. Its scene is checked too.
 Procedure read_procedure(const std::string& name_or_path);

@@ -62,20 +62,21 @@ TEST(Languages, mistakes_name_their_line) {
   EXPECT_NE(refused("[words\n").find(".toml:1:"), std::string::npos);
 }
 
-TEST(Languages, german_names_all_of_the_first_lesson) {
+TEST(Languages, german_names_all_of_both_lessons) {
   const Language de = read_language("de");
   const auto expect = [&](const std::string& text) {
     if (!text.empty()) { EXPECT_NE(translated(de, text), text) << "not in languages/de.toml"; }
   };
-  for (const char* name : {"simple_suture", "first_stitch"}) {
+  for (const char* name : kLessons) {
     const Procedure p = read_procedure(name);
+    expect(p.title), expect(p.text);
     for (const ProcedureStage& s : p.stage) {
       expect(s.title), expect(s.text), expect(s.skip_text), expect(s.guard_text);
       for (const StageHint& h : s.hint) expect(h.text);
     }
     for (const StageError& e : p.error) expect(e.text), expect(e.why);
   }
-  const Procedure lesson = read_procedure("first_stitch");
+  const Procedure lesson = read_procedure(kFirstLesson);
   // All panels at every stage.
   const SceneSpec scene = scene_of(lesson);
   const PictureModel picture;

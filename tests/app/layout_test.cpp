@@ -4,6 +4,7 @@
 #ifdef CATGUT_TESTS_WINDOW
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <map>
 #include <set>
 
@@ -39,11 +40,11 @@ std::string shown(const std::vector<PlacedPanel>& panels, const std::string& nam
   return "";
 }
 
-TEST(Layout, needle_points_and_jaws_are_uncovered_at_every_step_in_every_size) {
+void expect_all_uncovered(const char* which) {
   std::vector<Size> sizes;
   for (const auto& [w, h] : {std::pair{1280, 720}, {640, 360}, {3840, 2160}, {1024, 768}})
     for (const float text : {0.8f, 1.0f, 1.5f, 2.0f}) sizes.push_back({static_cast<float>(w), static_cast<float>(h), text});
-  const Procedure lesson = read_procedure("first_stitch");
+  const Procedure lesson = read_procedure(which);
   const SceneSpec scene = scene_of(lesson);
   const auto model = build_model(scene);
   const PictureModel picture = picture_model(*model);
@@ -143,6 +144,13 @@ TEST(Layout, needle_points_and_jaws_are_uncovered_at_every_step_in_every_size) {
   std::printf("%zu points covered without regard to the work; ", covered);
   std::printf("%zu pictures, %zu sizes, the instruction changed its place %zu times at 640x360\n", samples, sizes.size(),
               moves);
+}
+
+TEST(Layout, needle_points_and_jaws_are_uncovered_at_every_step_in_every_size) { expect_all_uncovered(kLessons[0]); }
+
+TEST(Layout, so_they_are_in_the_second_lesson) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  expect_all_uncovered(kLessons[1]);
 }
 
 TEST(Layout, text_is_wrapped_by_characters) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/hands: the first lesson: every stage is recognized when completed by mouse, one after the other; and the scripted
+// tests/hands: the lessons: every stage is recognized when completed by mouse, one after the other; and the scripted
 // surgeon demonstrates each from the learner's state.
 #include <gtest/gtest.h>
+
+#include <cstdlib>
 
 #include "lock_step.h"
 #include "procedure/manager.h"
@@ -11,32 +13,86 @@ namespace catgut {
 namespace {
 
 TEST(LessonData, every_stage_says_what_to_do_and_who_shows_it) {
-  const Procedure lesson = read_procedure("first_stitch");
-  ASSERT_GE(lesson.stage.size(), 12u);
-  for (const ProcedureStage& s : lesson.stage) {
-    EXPECT_FALSE(s.hint.empty() || s.demo.empty()) << s.name;
-    EXPECT_LE(s.text.size(), 110u) << s.name << ": one sentence";
-    ASSERT_TRUE(s.hint.empty() || s.hint.back().when.empty()) << s.name << ": a hint for every state";
+  for (const char* name : kLessons) {
+    const Procedure lesson = read_procedure(name);
+    ASSERT_GE(lesson.stage.size(), 12u);
+    for (const ProcedureStage& s : lesson.stage) {
+      EXPECT_FALSE(s.hint.empty() || s.demo.empty()) << s.name;
+      EXPECT_LE(s.text.size(), 110u) << s.name << ": one sentence";
+      ASSERT_TRUE(s.hint.empty() || s.hint.back().when.empty()) << s.name << ": a hint for every state";
+    }
   }
 }
 
-TEST(Lessons, each_stage_is_done_by_mouse_and_shown) {
-  AtTheMouse desk(1);
-  const Procedure lesson = read_procedure("first_stitch");
-  const size_t stages = lesson.stage.size();
+struct Moment {
+  std::vector<std::byte> state;
   ProcedureRun run;
-  begin_run(run, lesson, desk.look().seen, 1.0 / 60);
-  struct Moment {
-    std::vector<std::byte> state;
-    ProcedureRun run;
-  };
-  std::vector<Moment> begun(stages);
-  begun[0] = {desk.save(), run};
-  desk.after_tick = [&](const Snapshot& seen) {
-    if (update_run(run, lesson, seen) && run.stage < stages) begun[run.stage] = {desk.save(), run};
-  };
-  Person me(desk);
-  const auto at = [&] { return run.stage < stages ? lesson.stage[run.stage].name : "done"; };
+};
+
+// A user at the mouse does every stage; then the scripted surgeon shows each from where it began.
+class Lessons : public testing::Test {
+ protected:
+  Lessons(const std::string& name, const std::string& scene) : desk(1, scene), lesson(read_procedure(name)), me(desk) {
+    begin_run(run, lesson, desk.look().seen, 1.0 / 60);
+    begun.resize(lesson.stage.size());
+    begun[0] = {desk.save(), run};
+    desk.after_tick = [this](const Snapshot& seen) {
+      if (update_run(run, lesson, seen) && run.stage < lesson.stage.size()) begun[run.stage] = {desk.save(), run};
+    };
+  }
+  std::string at() const { return run.stage < lesson.stage.size() ? lesson.stage[run.stage].name : "done"; }
+  void expect_done_and_shown() {
+    EXPECT_TRUE(finished(run, lesson)) << run_table(run, lesson);
+    EXPECT_TRUE(run.error.empty()) << run_table(run, lesson);
+    for (size_t k = 0; k < lesson.stage.size(); ++k) {
+      EXPECT_NE(run.record[k].state, StageState::waiting) << lesson.stage[k].name;
+      EXPECT_NE(run.record[k].state, StageState::skipped) << lesson.stage[k].name;
+    }
+    desk.after_tick = nullptr;
+    for (size_t k = 0; k < lesson.stage.size(); ++k) {
+      const Moment& from = begun[lesson.stage[k].demo_from];
+      if (from.state.empty()) continue;  // a stage that was already reached has no begin of its own
+      desk.load(from.state);
+      ProcedureRun shown = from.run;
+      EXPECT_TRUE(desk.show(demo_tasks(lesson, k, desk.scene(), desk.picture()),
+                            [&](const Snapshot& seen) { return update_run(shown, lesson, seen), shown.stage > k; }))
+          << lesson.stage[k].name << ", from " << lesson.stage[lesson.stage[k].demo_from].name;
+    }
+  }
+  AtTheMouse desk;
+  const Procedure lesson;
+  ProcedureRun run;
+  std::vector<Moment> begun;
+  Person me;
+};
+
+struct SkinLesson : Lessons {
+  SkinLesson() : Lessons("simple_suture", "skin") {}
+};
+struct BowelLesson : Lessons {
+  BowelLesson() : Lessons("first_stitch", "stay") {}
+};
+
+TEST_F(SkinLesson, each_stage_is_done_by_mouse_and_shown) {
+  ASSERT_TRUE(me.take_needle());
+  ASSERT_EQ(at(), "sweep");
+  ASSERT_TRUE(me.bite()) << me.doing();
+  ASSERT_EQ(at(), "pull");
+  ASSERT_TRUE(me.pull_tail(0.045f) && me.draw_together()) << me.doing();
+  ASSERT_EQ(at(), "first wrap");
+  ASSERT_TRUE(me.tie(1)) << me.doing() << " at " << at();
+  ASSERT_EQ(at(), "second wrap") << "the tail was laid down";
+  ASSERT_TRUE(me.tie(-1)) << me.doing() << " at " << at();
+  ASSERT_EQ(at(), "cut needle end");
+  ASSERT_TRUE(me.cut_needle());
+  ASSERT_EQ(at(), "cut tail");
+  ASSERT_TRUE(me.cut_tail());
+  expect_done_and_shown();
+}
+
+// Eight seconds, so for the nightly tests.
+TEST_F(BowelLesson, each_stage_is_done_by_mouse_and_shown) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
   ASSERT_TRUE(me.take_needle());
   ASSERT_EQ(at(), "first bite");
   ASSERT_TRUE(me.bite());
@@ -58,23 +114,7 @@ TEST(Lessons, each_stage_is_done_by_mouse_and_shown) {
   ASSERT_TRUE(me.tie(-1)) << me.doing();
   ASSERT_EQ(at(), "cut");
   ASSERT_TRUE(me.cut_needle());
-  EXPECT_TRUE(finished(run, lesson));
-  for (size_t k = 0; k < stages; ++k) {
-    EXPECT_NE(run.record[k].state, StageState::waiting) << lesson.stage[k].name;
-    EXPECT_NE(run.record[k].state, StageState::skipped) << lesson.stage[k].name;
-  }
-  EXPECT_TRUE(run.error.empty()) << run_table(run, lesson);
-  // Every demonstration, from where it begins.
-  desk.after_tick = nullptr;
-  for (size_t k = 0; k < stages; ++k) {
-    const Moment& from = begun[lesson.stage[k].demo_from];
-    if (from.state.empty()) continue;  // a stage that was already reached has no begin of its own
-    desk.load(from.state);
-    ProcedureRun shown = from.run;
-    EXPECT_TRUE(desk.show(demo_tasks(lesson, k, desk.scene(), desk.picture()),
-                          [&](const Snapshot& seen) { return update_run(shown, lesson, seen), shown.stage > k; }))
-        << lesson.stage[k].name << ", from " << lesson.stage[lesson.stage[k].demo_from].name;
-  }
+  expect_done_and_shown();
 }
 
 // A pad over nothing let the tail slide into the open slit and hang 3 cm below it, where no jaws reach.
@@ -85,32 +125,6 @@ TEST(LessonData, thread_in_the_slit_stays_within_reach_of_the_jaws) {
   for (const Vec3& p : picture.particle_rest) top = std::max(top, p.y);
   EXPECT_LT(top - picture.drape, 0.012f);
   EXPECT_GT(top - picture.drape, 0.004f) << "the skin lies above the drape, not in it";
-}
-
-// The first exercise of a course: skin.
-TEST(Lessons, the_simple_suture_in_skin_is_done_by_mouse) {
-  AtTheMouse desk(1, "skin");
-  const Procedure lesson = read_procedure("simple_suture");
-  ProcedureRun run;
-  begin_run(run, lesson, desk.look().seen, 1.0 / 60);
-  desk.after_tick = [&](const Snapshot& seen) { update_run(run, lesson, seen); };
-  Person me(desk);
-  const auto at = [&] { return run.stage < lesson.stage.size() ? lesson.stage[run.stage].name : "done"; };
-  ASSERT_TRUE(me.take_needle());
-  ASSERT_EQ(at(), "sweep");
-  ASSERT_TRUE(me.bite()) << me.doing();
-  ASSERT_EQ(at(), "pull");
-  ASSERT_TRUE(me.pull_tail(0.045f) && me.draw_together()) << me.doing();
-  ASSERT_EQ(at(), "first wrap");
-  ASSERT_TRUE(me.tie(1)) << me.doing() << " at " << at();
-  ASSERT_EQ(at(), "second wrap");
-  ASSERT_TRUE(me.tie(-1)) << me.doing() << " at " << at();
-  ASSERT_EQ(at(), "cut needle end");
-  ASSERT_TRUE(me.cut_needle());
-  ASSERT_EQ(at(), "cut tail");
-  ASSERT_TRUE(me.cut_tail());
-  EXPECT_TRUE(finished(run, lesson)) << run_table(run, lesson);
-  EXPECT_TRUE(run.error.empty()) << run_table(run, lesson);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <sstream>
 
 #include "at_the_window.h"
+#include "procedure/procedure_file.h"
 
 namespace catgut {
 namespace {
@@ -28,7 +29,8 @@ TEST_F(StitchAtTheWindow, a_trainee_starts_practices_sees_why_repeats_and_has_a_
   fs::create_directories(folder);
   setenv("XDG_CONFIG_HOME", folder.c_str(), 1), setenv("XDG_DATA_HOME", folder.c_str(), 1);
   const std::string store = (folder / "sessions.db").string();
-  XMouse desk(x_->display, 900);
+  const Procedure lesson = read_procedure(kFirstLesson);
+  XMouse desk(x_->display, 900, 1, lesson.scene.c_str());
   if (!desk.ready()) GTEST_SKIP() << "no XTest here";
   desk.width = kWide, desk.height = kHigh;
   const auto sessions = [&] {  // as the program exports them
@@ -53,7 +55,7 @@ TEST_F(StitchAtTheWindow, a_trainee_starts_practices_sees_why_repeats_and_has_a_
   std::string stopped_at = "the start screen";
   desk.sit([&] {
     Person me(desk);
-    whole = sew_and_tie_once(desk, me, 2, true);
+    whole = me.carry_out(kFirstLesson);
     bites = desk.count(EventKind::bite_completed) >= 2;
     stopped_at = me.doing();
     desk.press("F10");
@@ -92,7 +94,7 @@ TEST_F(StitchAtTheWindow, a_trainee_starts_practices_sees_why_repeats_and_has_a_
   double practice_s = 0;
   std::vector<double> curve;
   for (const nlohmann::json& s : stored) {
-    EXPECT_EQ(s["task"], "first_stitch");
+    EXPECT_EQ(s["task"], kFirstLesson);
     ASSERT_TRUE(s["score"].is_number() && s["score_max"].get<double>() > 0) << s["score"];
     curve.push_back(100 * s["score"].get<double>() / s["score_max"].get<double>());
     ASSERT_FALSE(s["lost"].empty());
@@ -102,7 +104,7 @@ TEST_F(StitchAtTheWindow, a_trainee_starts_practices_sees_why_repeats_and_has_a_
     std::printf("session of %.0f s: %.1f %%, %zu reasons, the first: %s\n", s["duration_s"].get<double>(), curve.back(),
                 s["lost"].size(), s["lost"][0]["reason"].get<std::string>().c_str());
   }
-  EXPECT_GT(curve[0], curve[1]) << "one bite scores less than two";
+  EXPECT_GT(curve[0], curve[1]) << "a stitch that is not tied scores less";
   // The wall time depends on the machine; the practice itself does not.
   std::printf("%.1f min from the start screen to the second score, %.1f min of it practice\n", minutes, practice_s / 60);
   EXPECT_LT(practice_s, 60 * kMinutes);

@@ -8,9 +8,12 @@
 
 #include "at_the_window.h"
 #include "procedure/procedure_file.h"
+#include "window/hands.h"
 
 namespace catgut {
 namespace {
+
+constexpr float kDt = 1.0f / 60;  // [s]
 
 // Three attempts: hands that depend on frame timing are not deterministic. lesson_runs_test counts first tries.
 void sew_and_tie(AtTheWindow& desk, std::string& stopped_at, int throws, bool cut = false) {
@@ -33,6 +36,28 @@ void expect_a_stitch(AtTheWindow& desk, const std::string& stopped_at) {
   EXPECT_GE(desk.count(EventKind::loop_formed), 1u);
   EXPECT_GE(desk.count(EventKind::throw_started), 1u);
   EXPECT_GE(desk.count(EventKind::throw_locked), 1u);
+}
+
+// `play --stage`: the scripted surgeon has left the needle in the needle holder.
+TEST(WindowHands, jaws_that_hold_something_stay_closed_when_a_later_stage_begins) {
+  const SceneSpec scene = read_scene("skin");
+  const auto model = build_model(scene);
+  const PictureModel picture = picture_model(*model);
+  Snapshot seen;
+  publish(*model, *initial_state(*model), seen);
+  seen.tool[0].held = Held::needle, seen.tool[0].jaw = 0;
+  seen.tool[0].pose = seen.tool[0].hand = {{0.05f, 0.06f, 0.02f}, {}};
+  WindowHands hands;
+  const auto tick = hands.begin(scene, {});
+  const ViewFrame view = view_frame({0, 0.3f, 0.3f}, {}, {0, 1, 0}, 30, 720);
+  std::array<ToolInput, 2> out;
+  for (int i = 0; i < 3; ++i) {
+    out = tick({picture, seen, kDt, 1, false});
+    hands.move({}, {}, view, seen, {}, kDt, 1);
+  }
+  ASSERT_TRUE(out[0].connected);
+  EXPECT_EQ(out[0].jaw, 0);
+  EXPECT_LT(distance(out[0].pose.p, seen.tool[0].pose.p), 0.001f);
 }
 
 // With the lesson open: follows its instructions to the end of the first bite, twice as fast as real time. The rest needs most
