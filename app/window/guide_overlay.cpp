@@ -13,15 +13,16 @@ constexpr float kAside = 0.0015f;  // [m] from the target: within tolerance
 
 }  // namespace
 
-void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen, float width,
-                   float height) {
+void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen,
+                   const PanelRect& area) {
   ImDrawList* draw = ImGui::GetBackgroundDrawList();
+  draw->PushClipRect({area.x, area.y}, {area.x + area.w, area.y + area.h});
   const auto at = [&](Vec3 p) -> std::optional<ImVec2> {
     const Vec3 d = p - view.eye;
     const float deep = dot(d, view.ahead);
     if (deep < 0.01f) return {};
     const float scale = 1 / (view.pixel * deep);
-    return ImVec2(0.5f * width + dot(d, view.right) * scale, 0.5f * height - dot(d, view.up) * scale);
+    return ImVec2(area.x + 0.5f * area.w + dot(d, view.right) * scale, area.y + 0.5f * area.h - dot(d, view.up) * scale);
   };
   // Path of the tip: dashed above the tissue and below it, drawn over the tissue.
   const float half = half_bite(picture, g), from = -half - 0.5f, to = half + 0.6f;
@@ -42,6 +43,7 @@ void guide_overlay(const BiteGuide& g, const ViewFrame& view, const PictureModel
   if (const auto p = at(entry_of(g)))
     draw->AddCircle(*p, 7, good ? IM_COL32(115, 190, 255, 255) : IM_COL32(255, 168, 64, 255), 20, 2);
   if (const auto p = at(exit_of(g))) draw->AddCircleFilled(*p, 3, IM_COL32(115, 190, 255, 255));
+  draw->PopClipRect();
 }
 
 }  // namespace catgut

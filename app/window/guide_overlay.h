@@ -3,11 +3,12 @@
 // within tolerance, orange: outside).
 #pragma once
 #include "device/steer.h"
+#include "window/layout.h"
 
 namespace catgut {
 
-// width, height: of the window [pixels].
+// area: of the window, which `view` fills.
 void guide_overlay(const BiteGuide& guide, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen,
-                   float width, float height);
+                   const PanelRect& area);
 
 }  // namespace catgut

@@ -138,4 +138,28 @@ std::vector<PlacedPanel> place_panels(std::span<const Panel> panels, float width
   return out;
 }
 
+std::optional<PanelRect> place_inset(float side, float width, float height, ScreenPoint tip, std::span<const ScreenPoint> clear,
+                                     std::span<const PlacedPanel> panels, const std::optional<PanelRect>& before) {
+  constexpr int kSteps = 16;
+  const float edge = 0.012f * height, margin = 0.06f * side;
+  const float free_x = width - 2 * edge - side, free_y = height - 2 * edge - side;
+  if (free_x < 0 || free_y < 0) return {};
+  const auto fits = [&](const PanelRect& r) {
+    return std::none_of(panels.begin(), panels.end(), [&](const PlacedPanel& p) { return r.meets(p.rect, 0.5f * edge); }) &&
+           std::none_of(clear.begin(), clear.end(), [&](const ScreenPoint& s) { return r.holds(s[0], s[1], margin); });
+  };
+  if (before && before->w == side && before->x + side <= width && before->y + side <= height && fits(*before)) return before;
+  std::optional<PanelRect> best;
+  float least = std::numeric_limits<float>::max();
+  for (int i = 0; i <= kSteps; ++i)
+    for (int j = 0; j <= kSteps; ++j) {
+      if (i != 0 && j != 0 && i != kSteps && j != kSteps) continue;
+      const PanelRect r{std::floor(edge + free_x * static_cast<float>(i) / kSteps),
+                        std::floor(edge + free_y * static_cast<float>(j) / kSteps), side, side};
+      const float away = std::hypot(r.x + 0.5f * side - tip[0], r.y + 0.5f * side - tip[1]);
+      if (away < least && fits(r)) least = away, best = r;
+    }
+  return best;
+}
+
 }  // namespace catgut

@@ -3,6 +3,7 @@
 // the user looks at. Pure: the window draws the result, a headset may draw it in space, tests compare rectangles.
 #pragma once
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -64,6 +65,11 @@ bool on_screen(Vec3 p, const ViewFrame& view, float width, float height, ScreenP
 // uncovered. before: the last result; a panel stays in its place as long as it covers nothing.
 std::vector<PlacedPanel> place_panels(std::span<const Panel> panels, float width, float height, const TextSize& text,
                                       std::span<const ScreenPoint> clear, std::span<const PlacedPanel> before = {});
+
+// Place of the square magnifier: at the window's border, near the needle's tip, over no panel and no point of `clear`. It stays
+// where it was as long as it covers nothing. None: there is no room.
+std::optional<PanelRect> place_inset(float side, float width, float height, ScreenPoint tip, std::span<const ScreenPoint> clear,
+                                     std::span<const PlacedPanel> panels, const std::optional<PanelRect>& before = {});
 
 std::vector<PanelLine> wrapped(std::span<const PanelLine> lines, size_t columns);
 size_t letters(const std::string& utf8);  // characters, not bytes

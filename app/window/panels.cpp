@@ -229,6 +229,8 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& f
     ImGui::Checkbox(tr("suture points (M)").c_str(), &s.suture_points);
     ImGui::SameLine();
     ImGui::Checkbox(tr("keys (F1)").c_str(), &s.hints);
+    ImGui::SameLine();
+    ImGui::Checkbox(tr("magnifier").c_str(), &s.inset);
     ImGui::EndTable();
   }
   if (working) text(kQuiet, "graphics and hands: from next scene");

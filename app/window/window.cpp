@@ -653,6 +653,8 @@ class Window {
     frame.suture_points = settings_.suture_points || (visit_ && settings_.guidance == Guidance::learn);
     frame.dt = dt;
     frame.panels = [&] { choice = panels(); };
+    inset_drawn_ = inset_ && seen && visit_ && screen_ == Screen::practice;
+    if (inset_drawn_) magnify(*seen, frame);
     const bool last = !options_.screenshot.empty() && posed_ && posed_for_ + 1 >= options_.after;
     if (last || picture_wanted_) frame.copy = &copy;
     if (worn_) {
@@ -897,11 +899,17 @@ class Window {
     }
     const float w = static_cast<float>(width_), h = static_cast<float>(height_);
     const ViewFrame frame = this->view();
-    if (work.guide) guide_overlay(*work.guide, frame, *view.picture, *view.seen, w, h);
+    if (work.guide) guide_overlay(*work.guide, frame, *view.picture, *view.seen, {0, 0, w, h});
     const BiteGuide* planned = work.guide ? &*work.guide : nullptr;
-    placed_ = place_panels(work_panels(work, shown), w, h, panel_text_size(),
-                           work_points(*view.seen, *view.picture, frame, w, h, planned), placed_);
+    const std::vector<ScreenPoint> points = work_points(*view.seen, *view.picture, frame, w, h, planned);
+    placed_ = place_panels(work_panels(work, shown), w, h, panel_text_size(), points, placed_);
     draw_panels(placed_);
+    if (inset_drawn_) {
+      if (planned) guide_overlay(*planned, inset_frame_, *view.picture, *view.seen, *inset_);
+      const ImVec2 corner{inset_->x, inset_->y}, far{inset_->x + inset_->w, inset_->y + inset_->h};
+      ImGui::GetBackgroundDrawList()->AddRect(corner, far, IM_COL32(230, 236, 238, 200), 0, 0, 2);
+    }
+    place_magnifier(*view.seen, frame, points);
     Choice choice;
     if (developer_) choice = developer_panel(view, screen_ == Screen::pause);
     if (screen_ == Screen::pause)
@@ -909,7 +917,26 @@ class Window {
     return choice;
   }
 
+  // The magnifier's place in the next frame. Only where the picture is coarse.
+  void place_magnifier(const Snapshot& seen, const ViewFrame& frame, std::span<const ScreenPoint> points) {
+    const std::optional<PanelRect> before = std::exchange(inset_, std::nullopt);
+    if (!settings_.inset || coarse_ >= 1 || staged_ != Quality::low || screen_ != Screen::practice) return;
+    const float w = static_cast<float>(width_), h = static_cast<float>(height_);
+    ScreenPoint tip;
+    if (!on_screen(tip_of(seen), frame, w, h, tip)) return;
+    inset_ = place_inset(static_cast<float>(inset_side(width_, height_)), w, h, tip, points, placed_, before);
+  }
+
+  Vec3 tip_of(const Snapshot& seen) const { return on_needle(picture(), seen.active().needle.pose, 1, seen.active_suture); }
+
+  void magnify(const Snapshot& seen, WindowRenderer::Frame& frame) {
+    const Camera c = magnified(frame.camera, tip_of(seen), kInsetHalf);
+    inset_frame_ = view_frame(c.eye, c.target, c.up, c.fov_deg, inset_->h);
+    frame.inset = Inset{c, static_cast<int>(inset_->x), static_cast<int>(inset_->y), static_cast<int>(inset_->w)};
+  }
+
   void resized() {
+    inset_.reset();
     SDL_GetWindowSize(sdl_.window, &width_, &height_);
     renderer_->resize(width_, height_);
     const float fits = std::min(static_cast<float>(height_) / 720, static_cast<float>(width_) / 1280);
@@ -973,6 +1000,9 @@ class Window {
   uint32_t shown_stage_ = 0;  // reported last, from 1
   UsedKeys used_keys_;
   std::vector<PlacedPanel> placed_, board_placed_;
+  std::optional<PanelRect> inset_;  // of the magnifier; none: it is not shown
+  ViewFrame inset_frame_;
+  bool inset_drawn_ = false;  // in this frame
   int opened_ = 0;
   SceneSpec scene_;  // of the results
   LiveResult result_;

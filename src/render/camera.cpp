@@ -99,11 +99,32 @@ Interest decisive(const PictureModel& model, const Snapshot& snapshot) {
   }
   for (const ToolView& tool : snapshot.tool) {
     if (tool.loop_wraps == 0) continue;
-    for (const float z : {-0.002f, 0.006f, 0.014f}) interest.add(transform(tool.pose, {0, 0, z}), 1);
+    for (const float z : {-0.002f, 0.008f}) interest.add(transform(tool.pose, {0, 0, z}), 1);
+    // The turns themselves: from a good side more of them lie before the tool than behind it.
+    if (tool.loop_suture < snapshot.suture.size()) {
+      const std::vector<uint32_t>& order = snapshot.suture[tool.loop_suture].thread_order;
+      auto a = std::find(order.begin(), order.end(), tool.loop_first),
+           b = std::find(order.begin(), order.end(), tool.loop_last);
+      if (b < a) std::swap(a, b);
+      if (b != order.end())
+        for (int i = 0; i <= 6; ++i) {
+          const uint32_t slot = a[(b - a) * i / 6];
+          if (slot < snapshot.particle.size()) interest.add(snapshot.particle[slot], 1);
+        }
+    }
     if (!active.suture_point.empty()) interest.add(active.suture_point.back().position, 0.5f);
     return interest;
   }
   if (!active.knot.empty() && active.knot.back().phase == KnotPhase::tightening) {
+    interest.add(active.knot.back().position, 1);
+    for (const SuturePointView& point : active.suture_point)
+      if (distance(point.position, active.knot.back().position) < 0.02f) interest.add(point.position, 0.5f);
+    return interest;
+  }
+  // Of several separate stitches the newest: all of them together are too small.
+  const auto tied =
+      std::count_if(snapshot.suture.begin(), snapshot.suture.end(), [](const SutureView& s) { return !s.knot.empty(); });
+  if ((tied > 1 || !snapshot.settled.empty()) && !active.knot.empty()) {
     interest.add(active.knot.back().position, 1);
     for (const SuturePointView& point : active.suture_point)
       if (distance(point.position, active.knot.back().position) < 0.02f) interest.add(point.position, 0.5f);
@@ -149,6 +170,11 @@ Vec3 gaze_point(const Pose& head, const PictureModel& picture, const Snapshot& s
     if (deep > 0 && (least == 0 || deep < least) && length(d - ahead * deep) < kNear * deep) least = deep;
   }
   return head.p + ahead * (least > 0 ? least : distance(head.p, picture.focus));
+}
+
+Camera magnified(const Camera& camera, Vec3 point, float half_height) {
+  const float away = std::max(0.01f, distance(camera.eye, point));
+  return {camera.eye, point, camera.up, 2 * std::atan(half_height / away) * 180 / kPi, {}};
 }
 
 Camera overview(const PictureModel& model) {

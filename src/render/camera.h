@@ -31,6 +31,9 @@ Camera eye_camera(const Pose& eye, const Frustum& frustum, float work);
 // degrees of it, else the point at the distance of the field's center.
 Vec3 gaze_point(const Pose& head, const PictureModel& picture, const Snapshot& seen);
 
+// From the same eye, only `half_height` [m] round a point: what a magnifier shows.
+Camera magnified(const Camera& camera, Vec3 point, float half_height);
+
 // The whole operating field from the surgeon's side.
 Camera overview(const PictureModel& model);
 

@@ -114,8 +114,10 @@ Shape wound_bed_shape(Vec3 center, float radius) {
     return 2.6f * mm * std::sqrt(big) + 0.7f * mm * std::sqrt(small);
   };
   const auto place = [&](float s, float t) {
-    const float a = 2 * kPi * t, r = hole_radius(radius, a) * (0.45f + 0.55f * s), x = r * std::cos(a), z = -r * std::sin(a);
-    return center + Vec3{x, height(x, z) - 2.5f * mm, z};
+    // On under the drape, as far as one can look below its edge.
+    const float a = 2 * kPi * t, edge = hole_radius(radius, a), r = 0.45f * edge + (0.55f * edge + 18 * mm) * s;
+    const float x = r * std::cos(a), z = -r * std::sin(a), under = std::max(0.0f, r - edge);
+    return center + Vec3{x, height(x, z) - 2.5f * mm - 0.2f * under, z};
   };
   Shape shape;
   add_grid(shape, 30, 110, 0.04f, place, [&](Vec3 p) {

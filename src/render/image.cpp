@@ -73,7 +73,8 @@ Image contact_sheet(std::span<const SheetCell> cells, int columns) {
   columns = std::clamp(columns, 1, std::max(1, int(cells.size())));
   int w = 1, h = 1;
   for (const SheetCell& cell : cells) w = std::max(w, cell.picture.width), h = std::max(h, cell.picture.height);
-  constexpr int gap = 6, caption = 16;
+  // Letters that can be read where the sheet is shown at half its size.
+  const int gap = 6, large = std::max(1, w / 240), caption = kLetterHeight * large + 8;
   const int rows = (int(cells.size()) + columns - 1) / columns;
   Image sheet = make_image(gap + columns * (w + gap), gap + rows * (h + caption + gap), {24, 28, 30, 255});
   for (int i = 0; i < int(cells.size()); ++i) {
@@ -81,7 +82,9 @@ Image contact_sheet(std::span<const SheetCell> cells, int columns) {
     paste(sheet, cells[size_t(i)].picture, x, y);
     // A caption wider than its image would overlap the next cell's.
     const std::string_view text = cells[size_t(i)].caption;
-    draw_text(sheet, x + 2, y + h + 5, text.substr(0, size_t(w / kLetterWidth)), {235, 238, 232, 255});
+    int scale = large;
+    while (scale > 1 && text_width(text, scale) > w - 4) --scale;
+    draw_text(sheet, x + 2, y + h + 5, text.substr(0, size_t(w / (kLetterWidth * scale))), {235, 238, 232, 255}, scale);
   }
   return sheet;
 }

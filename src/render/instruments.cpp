@@ -216,6 +216,28 @@ ToolShape scissors() {
   return tool;
 }
 
+// A ball of folded gauze between the rings of a sponge forceps.
+ToolShape swab() {
+  const Vec3 steel = srgb(214, 217, 222), gauze = srgb(232, 230, 220), damp = srgb(214, 176, 164);
+  ToolShape tool;
+  tool.pivot = 45 * mm;
+  add_ball(tool.gauze, {0, 0, 4.4f * mm}, 4.4f * mm, gauze);
+  for (int i = 0; i < 9; ++i) {  // folds
+    const float a = 2.4f * float(i), z = (1.2f + 0.8f * float(i)) * mm,
+                r = 2.4f * mm * std::sqrt(1 - std::pow(float(i) / 4.6f - 0.9f, 2.0f));
+    add_ball(tool.gauze, {r * std::cos(a), r * std::sin(a), z}, 2.3f * mm, i < 3 ? damp : gauze);
+  }
+  mark_hatched(tool.gauze, 1);  // dull
+  const Vec3 arm[] = {{3.9f * mm, 0, 2.5f * mm},
+                      {4.6f * mm, 0, 7 * mm},
+                      {4.2f * mm, 0, 13 * mm},
+                      {2.4f * mm, 0, 24 * mm},
+                      {1.5f * mm, 0, 44 * mm}};
+  add_line_tube(tool.half, arm, 0.8f * mm, 1.6f * mm, steel);
+  add_ring_handles(tool, 45 * mm, 170 * mm, steel, steel, true);
+  return tool;
+}
+
 // A pencil of plastic with a flat steel tip, its buttons and its cable.
 ToolShape cautery() {
   const Vec3 plastic = srgb(34, 84, 150), tip = srgb(190, 188, 180), yellow = srgb(236, 200, 60), blue = srgb(90, 170, 230);
@@ -267,7 +289,7 @@ Shape needle_shape(const SuturePicture& model, float least_radius) {
     // The swage is drilled and slightly thicker than its thread; the last fifth tapers to the point.
     const float to_tip = (1 - s) / 0.2f;
     const float taper = to_tip < 1 ? 0.04f + 0.96f * std::sqrt(to_tip) * (1.5f - 0.5f * to_tip) : s < 0.06f ? 1.08f : 1.0f;
-    radius.push_back(std::max(wire * taper, least_radius * (0.5f + 0.5f * taper)));
+    radius.push_back(std::max(wire * taper, least_radius * std::min(0.5f + 0.5f * taper, 0.1f + 8 * to_tip)));
   }
   Shape shape;
   add_tube(shape, center, radius, 12, srgb(228, 230, 234));
@@ -280,8 +302,8 @@ ToolShape tool_shape(const InstrumentPicture& instrument) {
     ToolShape (*shape)();
   };
   static constexpr Row kRow[] = {
-      {"needle_holder", needle_driver}, {"forceps", forceps}, {"debakey", debakey},    {"allis", allis},
-      {"scissors", scissors},           {"cautery", cautery}, {"retractor", retractor}};
+      {"needle_holder", needle_driver}, {"forceps", forceps}, {"debakey", debakey},     {"allis", allis},
+      {"scissors", scissors},           {"cautery", cautery}, {"retractor", retractor}, {"swab", swab}};
   for (const Row& row : kRow)
     if (instrument.kind == row.kind) return row.shape();
   ToolShape tool;

@@ -48,6 +48,7 @@ Shape needle_shape(const SuturePicture& model, float least_radius = 0);
 // The other half is the mirror image. The halves rotate about the y axis at z = pivot by up to `opening` radians each.
 struct ToolShape {
   Shape body, half;
+  Shape gauze;        // fixed part, not of metal
   float pivot = 0;    // [m]
   float opening = 0;  // [rad]
 };

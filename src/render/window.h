@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
@@ -32,6 +33,7 @@ class WindowRenderer {
     const Snapshot* snapshot = nullptr;  // null: the field is not drawn
     Camera camera;
     bool suture_points = false;
+    std::optional<Inset> inset;
     float dt = 1.0f / 60;          // [s] since the last frame, for the panels
     std::function<void()> panels;  // calls ImGui
     Image* copy = nullptr;         // not null: receives a copy of the window's image

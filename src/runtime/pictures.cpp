@@ -58,7 +58,7 @@ struct Pictures::Studio {
   Snapshot last;  // of the run so far, for the sheet's last cell
   std::string last_caption;
   const PictureModel model;
-  std::unique_ptr<Renderer> still_renderer;
+  std::unique_ptr<Renderer> still_renderer, sheet_renderer;
 
   Studio(const PictureOptions& o, const PictureModel& m) : options(o), follow(m), camera(overview(m)), model(m) {
     std::sort(options.still.begin(), options.still.end(), std::greater<>());  // the next one last
@@ -72,8 +72,14 @@ struct Pictures::Studio {
     return caption.empty() ? fmt::format("{:6.1f} s", seen.time_s) : fmt::format("{:6.1f} s   {}", seen.time_s, caption);
   }
 
+  // For the few pictures that are looked at longer than a film's.
+  Renderer& smooth() {
+    if (!sheet_renderer) sheet_renderer = make_renderer(model, options.width, options.height, Quality::medium);
+    return *sheet_renderer;
+  }
+
   // Without caption: the caller adds it where it is shown once.
-  Image take(const Snapshot& seen) {
+  Image take(const Snapshot& seen, bool sheet) {
     // The camera eases in film time: its motion is smooth at any time-lapse factor.
     const double dt = last_s < 0 ? 0 : (seen.time_s - last_s) / options.speed;
     last_s = seen.time_s;
@@ -81,7 +87,7 @@ struct Pictures::Studio {
              : fixed                     ? *fixed
              : options.camera == "close" ? close_up(model, seen)
                                          : follow.update(seen, static_cast<float>(dt));
-    Image picture = renderer->render(seen, camera, {});
+    Image picture = (sheet ? smooth() : *renderer).render(seen, camera, {});
     if (gaze) draw_gaze(picture, gaze_point(*gaze, model, seen));
     return picture;
   }
@@ -131,7 +137,7 @@ struct Pictures::Studio {
     const bool frame_due = (film || !options.frames.empty()) && seen.time_s >= next_s;
     if (sheet || frame_due) {
       const std::string caption = caption_of(seen, doing);
-      Image picture = take(seen);
+      Image picture = take(seen, sheet && !frame_due);
       if (sheet) keep(picture, caption), last_moment_s = seen.time_s;
       if (frame_due) {
         next_s += options.speed / options.rate;
@@ -152,7 +158,7 @@ struct Pictures::Studio {
   }
 
   // The state at the end, in close-up: one picture, held.
-  Image last_picture() { return renderer->render(last, head || fixed ? camera : close_up(model, last)); }
+  Image last_picture() { return smooth().render(last, head || fixed ? camera : close_up(model, last)); }
 
   void finish() {
     if ((film || !options.frames.empty()) && last.tick > 0 && options.end_s > 0) {

@@ -67,6 +67,8 @@ void expect_all_uncovered(const char* which) {
   begin_run(status.procedure, lesson, seen, 1.0 / 60);
 
   std::vector<std::vector<PlacedPanel>> before(sizes.size());
+  std::vector<std::optional<PanelRect>> inset(sizes.size());
+  size_t insets = 0, tips = 0, inset_moves = 0;  // at 1280x720, text 1
   std::map<std::pair<uint32_t, size_t>, int> looked;
   size_t moves = 0, samples = 0, covered = 0;
   const auto look = [&] {
@@ -95,6 +97,25 @@ void expect_all_uncovered(const char* which) {
         for (const PlacedPanel& panel : placed)
           ASSERT_FALSE(panel.rect.holds(x, y)) << panel.name << " covers the " << name << " at step "
                                                << status.procedure.stage + 1 << ", " << w << "x" << h << ", text " << text;
+      }
+      // The magnifier.
+      const auto was = std::exchange(inset[i], std::nullopt);
+      if (ScreenPoint tip; on_screen(points[0].second, frame, w, h, tip)) {
+        const auto side = static_cast<float>(inset_side(static_cast<int>(w), static_cast<int>(h)));
+        inset[i] = place_inset(side, w, h, tip, work_points(seen, picture, frame, w, h, guide), placed, was);
+        if (i == 1)
+          ++tips, insets += inset[i].has_value(),
+              inset_moves += was && inset[i] && (was->x != inset[i]->x || was->y != inset[i]->y);
+      }
+      if (inset[i]) {
+        const PanelRect& r = *inset[i];
+        ASSERT_TRUE(r.x >= 0 && r.y >= 0 && r.x + r.w <= w && r.y + r.h <= h);
+        for (const PlacedPanel& panel : placed) ASSERT_FALSE(r.meets(panel.rect)) << "magnifier over " << panel.name;
+        for (const auto& [name, p] : points) {
+          ScreenPoint at;
+          if (!on_screen(p, frame, w, h, at)) continue;
+          ASSERT_FALSE(r.holds(at[0], at[1])) << "magnifier over the " << name << ", " << w << "x" << h << ", text " << text;
+        }
       }
       for (const PlacedPanel& a : placed) {
         EXPECT_GE(a.rect.x, 0) << a.name;
@@ -141,6 +162,9 @@ void expect_all_uncovered(const char* which) {
   for (const auto& [key, n] : looked) stages.insert(key.first);
   EXPECT_GE(stages.size(), lesson.stage.size()) << "every step was looked at";
   EXPECT_GT(covered, 0u) << "without the help something would be covered";
+  EXPECT_GT(static_cast<double>(insets), 0.9 * static_cast<double>(tips)) << "no room for the magnifier at 1280x720";
+  std::printf("magnifier at 1280x720: shown in %zu of %zu pictures with the tip in view, moved %zu times\n", insets, tips,
+              inset_moves);
   std::printf("%zu points covered without regard to the work; ", covered);
   std::printf("%zu pictures, %zu sizes, the instruction changed its place %zu times at 640x360\n", samples, sizes.size(),
               moves);

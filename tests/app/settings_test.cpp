@@ -47,7 +47,7 @@ Settings all_changed() {
   s.quality = Quality::high;
   s.guidance = Guidance::exam;
   s.left_handed = s.hold_to_close = s.suture_points = true;
-  s.assist = s.hints = false;
+  s.assist = s.hints = s.inset = false;
   s.record = false;
   s.data_folder = "~/my \"sessions\\";
   s.language = "de";

@@ -190,6 +190,43 @@ TEST(Pictures, TheNeedleIsALineFromFarAway) {
   EXPECT_GT(difference(bare, picture), int(0.5f * pixels));
 }
 
+TEST(Pictures, TheInsetMagnifiesTheNeedleAndLeavesTheRestAlone) {
+  NEEDS_RENDERER();
+  Stage& s = stage();
+  constexpr int side = 80;
+  const SuturePicture& suture = s.field.model.suture[0];
+  const Vec3 tip = transform(s.field.snapshot.active().needle.pose, {suture.needle_radius * std::cos(suture.needle_arc),
+                                                                     suture.needle_radius * std::sin(suture.needle_arc), 0});
+  Snapshot without = s.field.snapshot;
+  without.active().needle.pose.p = {0, 5, 0};
+  Overlay over;
+  over.inset = Inset{magnified(s.camera, tip, kInsetHalf), kWidth - side - 4, 6, side};
+  const auto inside = [&](size_t i) {
+    const int x = static_cast<int>(i / 4) % kWidth, y = static_cast<int>(i / 4) / kWidth;
+    return x >= over.inset->x && x < over.inset->x + side && y >= over.inset->y && y < over.inset->y + side;
+  };
+  const auto renderer = make_renderer(s.field.model, kWidth, kHeight, Quality::low);
+  for (const float part : {0.5f, 1.0f, 0.5f}) {
+    renderer->set_resolution_scale(part);
+    const Image plain = renderer->render(s.field.snapshot, s.camera), with = renderer->render(s.field.snapshot, s.camera, over),
+                bare = renderer->render(without, s.camera, over);
+    size_t outside = 0, magnified_pixels = 0, coarse_pixels = 0;
+    for (size_t i = 0; i < plain.rgba.size(); i += 4) {
+      const auto off = [&](const Image& a, const Image& b) {
+        return std::abs(a.rgba[i] - b.rgba[i]) + std::abs(a.rgba[i + 1] - b.rgba[i + 1]) > 24;
+      };
+      if (!inside(i)) outside += off(plain, with), coarse_pixels += off(with, bare);
+      else magnified_pixels += off(with, bare);
+    }
+    // At whole resolution without an inset the materials convert the tones themselves, nearly the same.
+    if (part < 1) { EXPECT_LT(outside, 20u) << "resolution " << part; }
+    // Half its height of needle at least, as thick as the wire.
+    const float thick = suture.needle_wire_radius / kInsetHalf * side;
+    EXPECT_GT(static_cast<float>(magnified_pixels), 0.5f * side * thick) << "resolution " << part;
+    EXPECT_GT(coarse_pixels, 0u);
+  }
+}
+
 TEST(Pictures, MovingAParticleMovesThePicture) {
   NEEDS_RENDERER();
   Stage& s = stage();

@@ -32,28 +32,30 @@ class FilamentRenderer final : public Renderer {
 
   Image render(const Snapshot& snapshot, const Camera& camera, const Overlay& overlay) override {
     Image image = make_image(width_, height_, {0, 0, 0, 255});
-    draw_into(snapshot, camera, overlay.suture_points, width_, height_, image);
+    draw_into(snapshot, camera, overlay, width_, height_, image);
     for (size_t i = 3; i < image.rgba.size(); i += 4) image.rgba[i] = 255;
     draw_caption(image, overlay.caption);
     return image;
   }
 
-  void draw(const Snapshot& snapshot, const Camera& camera) override {
+  void draw(const Snapshot& snapshot, const Camera& camera, const Overlay& overlay) override {
     Image one = make_image(1, 1, {0, 0, 0, 255});  // reading any pixel waits for all of them
-    draw_into(snapshot, camera, false, 1, 1, one);
+    draw_into(snapshot, camera, overlay, 1, 1, one);
   }
   void set_resolution_scale(float part) override { theatre_->set_resolution_scale(part); }
 
  private:
-  void draw_into(const Snapshot& snapshot, const Camera& camera, bool suture_points, int read_width, int read_height,
+  void draw_into(const Snapshot& snapshot, const Camera& camera, const Overlay& overlay, int read_width, int read_height,
                  Image& image) {
-    theatre_->show(snapshot, camera, width_, height_, suture_points);
+    theatre_->show(snapshot, camera, width_, height_, overlay.suture_points);
+    theatre_->set_inset(overlay.inset, height_);
     // Filament may request to skip a frame when the driver is behind; a requested image is always rendered.
     bool begun = false;
     for (int i = 0; i < 20 && !begun; ++i)
       if (!(begun = renderer_->beginFrame(chain_))) engine_->flushAndWait();
     if (!begun) throw std::runtime_error("no picture: the graphics driver does not accept a frame");
     renderer_->render(theatre_->view());
+    if (filament::View* inset = theatre_->inset_view()) renderer_->render(inset);
     renderer_->readPixels(
         0, 0, uint32_t(read_width), uint32_t(read_height),
         {image.rgba.data(), image.rgba.size(), filament::Texture::Format::RGBA, filament::Texture::Type::UBYTE});

@@ -3,6 +3,7 @@
 #include "render/filament/theatre.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <filament/LightManager.h>
 #include <filament/RenderableManager.h>
@@ -40,14 +41,7 @@ Theatre::Theatre(filament::Engine& engine, const PictureModel& model, Quality qu
                  .toneMapping(filament::ColorGrading::ToneMapping::ACES)
                  .quality(filament::ColorGrading::QualityLevel::MEDIUM)
                  .build(engine_);
-  for (int i = 0; i < eyes; ++i) {
-    Eye eye{engine_.createView(), nullptr, utils::EntityManager::get().create()};
-    eye.camera = engine_.createCamera(eye.entity);
-    eye.view->setScene(scene_);
-    eye.view->setCamera(eye.camera);
-    set_quality(*eye.view, quality);
-    eye_.push_back(eye);
-  }
+  for (int i = 0; i < eyes; ++i) eye_.push_back(make_eye(quality));
   set_light(quality);
   make_materials();
   make_stage();
@@ -62,6 +56,8 @@ Theatre::~Theatre() {
   for (TissueView& t : tissue_) destroy_mesh(engine_, *scene_, t.gpu);
   for (ToolView3d& t : tool_)
     for (GpuMesh& m : t.part) destroy_mesh(engine_, *scene_, m);
+  if (!scissors_.shape.half.position.empty())
+    for (GpuMesh& m : scissors_.part) destroy_mesh(engine_, *scene_, m);
   for (GpuMesh& m : scenery_) destroy_mesh(engine_, *scene_, m);
   for (GpuMesh& m : needle_) destroy_mesh(engine_, *scene_, m);
   for (GpuMesh* m : {&bed_, &thread_.gpu, &mark_.gpu}) destroy_mesh(engine_, *scene_, *m);
@@ -83,6 +79,7 @@ Theatre::~Theatre() {
   engine_.destroy(grading_);
   engine_.destroy(lamp_);
   utils::EntityManager::get().destroy(lamp_);
+  if (inset_.view) eye_.push_back(inset_);
   for (const Eye& eye : eye_) {
     engine_.destroyCameraComponent(eye.entity);
     utils::EntityManager::get().destroy(eye.entity);
@@ -130,6 +127,7 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
     if (is_finite(pose.p)) widen_needle(i, 0.9f * pixel * std::max(0.0f, dot(pose.p - cameras[0].eye, ahead)));
   }
   for (size_t i = 0; i < std::min(tool_.size(), snapshot.instrument.size()); ++i) move_tool(tool_[i], snapshot.instrument[i]);
+  show_scissors(snapshot);
   show_markers(snapshot, suture_points);
 }
 
@@ -163,13 +161,40 @@ void Theatre::set_resolution_scale(float part) {
   if (plain_) set_tones();
 }
 
-// Scaling needs post-processing, which converts tones as well.
+void Theatre::set_inset(const std::optional<Inset>& inset, int height) {
+  const bool shown = inset.has_value() && inset->side > 0;
+  if (shown) {
+    if (!inset_.view) {
+      inset_ = make_eye(Quality::low);
+      inset_.view->setSampleCount(4);
+      inset_.view->setShadowingEnabled(false);  // each view with shadows draws its own shadow map
+    }
+    const int low = height - inset->y - inset->side;
+    inset_.view->setViewport({inset->x, low, uint32_t(inset->side), uint32_t(inset->side)});
+    const Camera& c = inset->camera;
+    inset_.camera->setProjection(double(c.fov_deg), 1.0, double(0.1f * std::max(0.01f, distance(c.eye, c.target))), 3.0,
+                                 filament::Camera::Fov::VERTICAL);
+    inset_.camera->lookAt({c.eye.x, c.eye.y, c.eye.z}, {c.target.x, c.target.y, c.target.z}, {c.up.x, c.up.y, c.up.z});
+  }
+  if (std::exchange(inset_shown_, shown) != shown && plain_) set_tones();
+}
+
+// Scaling needs post-processing, which converts tones as well. So does a second view: without, its beginning clears the first.
 void Theatre::set_tones() {
-  const bool whole = coarse_ >= 1;
+  const bool whole = coarse_ >= 1 && !inset_shown_;
   eye_[0].view->setPostProcessingEnabled(!whole);
   for (filament::MaterialInstance* m : {tissue_material_, thread_material_, needle_material_, tool_material_, drape_material_,
                                         marker_material_, mark_material_})
     m->setParameter("tones", whole ? 1.0f : 0.0f);
+}
+
+Theatre::Eye Theatre::make_eye(Quality quality) {
+  Eye eye{engine_.createView(), nullptr, utils::EntityManager::get().create()};
+  eye.camera = engine_.createCamera(eye.entity);
+  eye.view->setScene(scene_);
+  eye.view->setCamera(eye.camera);
+  set_quality(*eye.view, quality);
+  return eye;
 }
 
 void Theatre::set_quality(filament::View& view, Quality quality) {
@@ -271,8 +296,7 @@ void Theatre::make_stage() {
     ground.z = 0.5f * (box.low.z + box.high.z);
     for (const Vec3 p : through) hole = std::max(hole, std::hypot(p.x - ground.x, p.z - ground.z));
     hole += 0.01f;
-    bed_ = make_mesh(engine_, *scene_, wound_bed_shape(ground - Vec3{0, 0.0035f, 0}, hole + 0.004f), tissue_material_, false,
-                     true);
+    bed_ = make_mesh(engine_, *scene_, wound_bed_shape(ground - Vec3{0, 0.0035f, 0}, hole), tissue_material_, false, true);
   }
   add_cloth(drape_shape(ground, hole, 0.7f), 22, sample, false);
   for (const VisibleMesh& mesh : model_.body) {
@@ -325,13 +349,32 @@ void Theatre::make_room() {
 void Theatre::make_needles_and_tools() {
   for (const SuturePicture& suture : model_.suture)
     needle_.push_back(make_mesh(engine_, *scene_, needle_shape(suture), needle_material_, true));
-  tool_.resize(model_.instrument.size());
-  for (size_t i = 0; i < tool_.size(); ++i) {
-    tool_[i].shape = tool_shape(model_.instrument[i]);
-    tool_[i].part = {make_mesh(engine_, *scene_, tool_[i].shape.body, tool_material_, true),
-                     make_mesh(engine_, *scene_, tool_[i].shape.half, tool_material_, true),
-                     make_mesh(engine_, *scene_, mirrored_x(tool_[i].shape.half), tool_material_, true)};
+  for (const InstrumentPicture& instrument : model_.instrument) tool_.push_back(make_tool(instrument));
+}
+
+ToolView3d Theatre::make_tool(const InstrumentPicture& instrument) {
+  ToolView3d tool;
+  tool.shape = tool_shape(instrument);
+  tool.part = {make_mesh(engine_, *scene_, tool.shape.body, tool_material_, true),
+               make_mesh(engine_, *scene_, tool.shape.half, tool_material_, true),
+               make_mesh(engine_, *scene_, mirrored_x(tool.shape.half), tool_material_, true),
+               make_mesh(engine_, *scene_, tool.shape.gauze, thread_material_, true)};
+  return tool;
+}
+
+void Theatre::show_scissors(const Snapshot& snapshot) {
+  const std::optional<InstrumentView> seen = assistants_scissors(cuts_, model_, snapshot);
+  if (seen && scissors_.shape.half.position.empty()) {
+    InstrumentPicture kind;
+    kind.kind = "scissors";
+    scissors_ = make_tool(kind);
   }
+  if (scissors_.shape.half.position.empty()) return;
+  for (const GpuMesh& m : scissors_.part) {
+    scene_->remove(m.entity);
+    if (seen) scene_->addEntity(m.entity);
+  }
+  if (seen) move_tool(scissors_, *seen);
 }
 
 // A cloth's share of lamp and room light, computed once (see drape.mat): the room is darker low down beside tissue.
@@ -364,7 +407,7 @@ void Theatre::widen_needle(size_t i, float least_radius) {
 }
 
 void Theatre::move_tool(const ToolView3d& view, const InstrumentView& tool) {
-  catgut::set_pose(engine_, view.part[0], tool.pose);
+  for (const size_t fixed : {0u, 3u}) catgut::set_pose(engine_, view.part[fixed], tool.pose);
   for (const float side : {1.0f, -1.0f}) {
     // The jaws lie on the -z side of the hinge: rotation about +y moves points at -z toward -x.
     const Quat turn = axis_angle({0, 1, 0}, -side * view.shape.opening * std::clamp(tool.jaw, 0.0f, 1.0f));

@@ -16,6 +16,7 @@
 #include <filament/Skybox.h>
 #include <filament/View.h>
 
+#include "render/assistant.h"
 #include "render/filament/environment.h"
 #include "render/filament/mesh.h"
 #include "render/filament/thread_view.h"
@@ -26,7 +27,7 @@ namespace catgut {
 
 struct ToolView3d {
   ToolShape shape;
-  std::array<GpuMesh, 3> part;  // body, the half toward +x, the half toward -x
+  std::array<GpuMesh, 4> part;  // body, the half toward +x, the half toward -x, gauze
 };
 
 class Theatre {
@@ -46,6 +47,9 @@ class Theatre {
   // Renders the field at `part` of the resolution in each direction and upscales it: for windows on machines without a graphics
   // card.
   void set_resolution_scale(float part);
+  // From the next frame on; the caller renders inset_view() after view(). height: [pixels] of the whole picture.
+  void set_inset(const std::optional<Inset>& inset, int height);
+  filament::View* inset_view() const { return inset_shown_ ? inset_.view : nullptr; }
   filament::Scene& scene() const { return *scene_; }
   filament::View* view(int eye = 0) const { return eye_[size_t(eye)].view; }
 
@@ -55,6 +59,7 @@ class Theatre {
     filament::Camera* camera = nullptr;
     utils::Entity entity;
   };
+  Eye make_eye(Quality quality);
   void set_quality(filament::View& view, Quality quality);
   void set_light(Quality quality);
   void set_tones();
@@ -71,6 +76,8 @@ class Theatre {
   // Without multisampling a thin wire far away would show as dots, or not at all.
   void widen_needle(size_t i, float least_radius);
   void move_tool(const ToolView3d& view, const InstrumentView& tool);
+  ToolView3d make_tool(const InstrumentPicture& instrument);
+  void show_scissors(const Snapshot& snapshot);
   void show_markers(const Snapshot& snapshot, bool wanted);
 
   float coarse_ = 1;
@@ -83,6 +90,8 @@ class Theatre {
   filament::Engine& engine_;
   filament::Scene* scene_ = nullptr;
   std::vector<Eye> eye_;
+  Eye inset_;  // made when it is needed
+  bool inset_shown_ = false;
   utils::Entity lamp_;
   filament::LightManager::ShadowOptions shadow_;
   filament::ColorGrading* grading_ = nullptr;
@@ -97,7 +106,9 @@ class Theatre {
   std::vector<TissueView> tissue_;
   ThreadView thread_;
   MarkView mark_;
-  std::vector<ToolView3d> tool_;     // like PictureModel::instrument
+  std::vector<ToolView3d> tool_;  // like PictureModel::instrument
+  ToolView3d scissors_;           // the assistant's; made at the first cut
+  CutWatch cuts_;
   std::vector<GpuMesh> needle_;      // per suture
   std::vector<float> needle_least_;  // [m] minimum radius of each as drawn
   GpuMesh bed_;

@@ -128,7 +128,7 @@ void lift_piece(ThreadView& view, const Lift& lift) {
   }
   const auto out_of_tools = [&] {
     for (size_t i = 0; i < n; ++i) {
-      if (view.outside[i] != kOutside) continue;
+      if (view.outside[i] == kInWall) continue;  // in the lumen, or from it on, there are instruments too
       Vec3& p = view.moved[i];
       for (const ToolView& tool : lift.snapshot->tool) {
         if (tool.instrument < 0 || size_t(tool.instrument) >= view.hull.size()) continue;
@@ -147,7 +147,7 @@ void lift_piece(ThreadView& view, const Lift& lift) {
     Vec3 before = n > 0 ? view.moved[0] : Vec3{};
     for (size_t i = 1; i + 1 < n; ++i) {
       const Vec3 here = view.moved[i];
-      if (view.outside[i - 1] == kOutside && view.outside[i] == kOutside && view.outside[i + 1] == kOutside &&
+      if (view.outside[i - 1] != kInWall && view.outside[i] != kInWall && view.outside[i + 1] != kInWall &&
           (distance(view.moved[i], view.piece[i]) > lift.width || distance(view.moved[i + 1], view.piece[i + 1]) > lift.width))
         view.moved[i] = 0.25f * before + 0.5f * here + 0.25f * view.moved[i + 1];
       before = here;

@@ -321,13 +321,20 @@ void pucker(TissueView& view, const Motions& motion, const Surface& surface) {
     if (std::abs(fold.out) < 1e-5f && std::abs(fold.slope) < 0.02f) continue;
     const Skinned here = follow(view.vertex[i], motion.of);
     const Vec3 out = rotate(here.frame * conjugate(view.vertex[i].frame), view.round.outward[v]);
-    const Vec3 normal = rotate(here.frame, {0, 0, 1}), along = normalized(step, {1, 0, 0});
-    const Vec3 turned = normalized(normal - along * (fold.slope * dot(normal, out)), normal), axis = cross(normal, turned);
     view.drawn[i] += out * fold.out;
     surface.position[i] = view.drawn[i];
-    if (const float sine = length(axis); sine > 1e-4f)
-      surface.frame[i] =
-          pack_frame(axis_angle(axis / sine, std::atan2(sine, dot(normal, turned))) * here.frame, view.mirrored[i]);
+  }
+  // Where the wall is crumpled, rotations of particles say little about its faces: normals of the drawn triangles instead.
+  std::vector<Vec3> normal(view.mesh->position.size());
+  for (const auto& t : view.mesh->triangle) {
+    const Vec3 n = cross(view.drawn[t[1]] - view.drawn[t[0]], view.drawn[t[2]] - view.drawn[t[0]]);
+    for (const uint32_t v : t) normal[v] += n;
+  }
+  for (size_t i = 0; i < view.vertex.size(); ++i) {
+    const Vec3 n = normal[view.source[i]];
+    if (!(length2(n) > 1e-20f)) continue;
+    const Quat frame = follow(view.vertex[i], motion.of).frame;
+    surface.frame[i] = pack_frame(frame_of(normalized(n), rotate(frame, {1, 0, 0})), view.mirrored[i]);
   }
 }
 

@@ -100,12 +100,14 @@ class FilamentWindow final : public WindowRenderer {
     const bool field = theatre_ && frame.snapshot;
     if (field) sharpen(frame);
     if (field) theatre_->show(*frame.snapshot, frame.camera, width_, height_, frame.suture_points);
+    if (field) theatre_->set_inset(frame.inset, height_);
     // Without a field, the panels' view clears the previous image.
     panel_view_->setBlendMode(field ? filament::View::BlendMode::TRANSLUCENT : filament::View::BlendMode::OPAQUE);
     panels_->render(frame.dt, [&](filament::Engine*, filament::View*) {
       if (frame.panels) frame.panels();
     });
     if (field) renderer_->render(theatre_->view());
+    if (filament::View* inset = field ? theatre_->inset_view() : nullptr) renderer_->render(inset);
     renderer_->render(panel_view_);
     if (frame.copy) {
       Image& image = *frame.copy;
