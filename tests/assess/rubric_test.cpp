@@ -166,7 +166,8 @@ TEST(Rubric, points_are_summed_by_the_stages_of_an_operation) {
   std::vector<std::string> stages;
   for (const RubricItem& i : r.item)
     if (stages.empty() || stages.back() != i.stage) stages.push_back(i.stage);
-  EXPECT_EQ(stages, (std::vector<std::string>{"Field", "Anastomosis", "Knots", "Hands"}));  // each once: its items are together
+  // Each once: its items are together.
+  EXPECT_EQ(stages, (std::vector<std::string>{"Field", "Excision", "Anastomosis", "Knots", "Hands"}));
   // Four sutures without a fault, then with a granny and with a clamp that tore off.
   Result run = idle_session();
   const auto put = [&](const std::string& key, double value) {
@@ -183,6 +184,7 @@ TEST(Rubric, points_are_summed_by_the_stages_of_an_operation) {
   ASSERT_EQ(bad.lost.size(), 2u);
   const std::string text = score_text(bad);
   EXPECT_NE(text.find(" Field: 7.0 of 10\n"), std::string::npos) << text;
+  EXPECT_NE(text.find(" Excision: 22.0 of 22\n"), std::string::npos) << text;
   EXPECT_NE(text.find(" Anastomosis: 80.0 of 80\n"), std::string::npos) << text;
   EXPECT_NE(text.find(" Knots: 26.0 of 38\n"), std::string::npos) << text;
 }
