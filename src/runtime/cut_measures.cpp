@@ -32,9 +32,16 @@ void measure_ring(const std::vector<uint32_t>& rim, const std::vector<Vec3>& edg
     return static_cast<double>(least);
   };
   for (const uint32_t i : rim) out.ring_gap = std::max(out.ring_gap, gap(seen.particle[i]));
+  bool any = false;
   for (const SutureView& suture : seen.suture) {
     const auto& point = suture.suture_point;
     if (point.empty() || point.front().wall == point.back().wall) continue;
+    for (size_t k = 0; k + 1 < point.size(); ++k) {
+      if (point[k].wall == point[k + 1].wall) continue;
+      const double here = static_cast<double>(std::max(point[k].tension_needle, point[k + 1].tension_free));
+      out.stitch_tension = any ? std::min(out.stitch_tension, here) : here;
+      any = true;
+    }
     const Vec3 middle = 0.5f * (point.front().position + point.back().position);
     Vec3 on = seen.particle[rim[0]];
     for (size_t i = 0; i < rim.size(); ++i) {

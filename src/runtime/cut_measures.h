@@ -14,8 +14,9 @@ struct CutMeasures {
   double way = 0;        // [m] displacement of the piece with the first body's rim
   double mass = 0;       // [kg] what the surface encloses at rest, all pieces
   // An anastomosis: from the rim of the second body to the cut edge of the first, without the piece that has its rim.
-  double ring_gap = 0;    // [m] the largest, round the rim; 0 with one body, or one piece
-  double stitch_gap = 0;  // [m] the largest where a stitch crosses from one wall to the other
+  double ring_gap = 0;        // [m] the largest, round the rim; 0 with one body, or one piece
+  double stitch_gap = 0;      // [m] the largest where a stitch crosses from one wall to the other
+  double stitch_tension = 0;  // [N] of the thread where it crosses, the smallest of all stitches; 0 without one
 };
 CutMeasures measure_cut(const SceneSpec& scene, const Snapshot& seen);
 

@@ -406,7 +406,8 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   // Thread that cannot be pulled further is left: the last pull takes up the slack. So is one that would tear its bites.
   float load = 0;  // [N]
   for (const SuturePointView& p : seen.active().suture_point) load = std::max({load, p.tension_needle, p.tension_free});
-  if (slack <= 0 || (skill_.most_load > 0 && load > skill_.most_load * strength_) ||
+  overloaded_ = load > skill_.most_load * strength_ ? overloaded_ + dt_ : 0;
+  if (slack <= 0 || (skill_.most_load > 0 && overloaded_ > plan_.jerk) ||
       distance(hand_[kForceps].pose.p, pull_from_.p) > 0.29f || !patience(12))
     return true;
   // Decelerate before the thread is taut, and when it pulls back: a jerk would tear tissue.

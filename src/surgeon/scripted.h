@@ -184,6 +184,7 @@ class Scripted final : public Surgeon {
   float miss_by_ = 0;     // [m] distance by which this grasp misses
   float depth_fix_ = 0;   // [m] correction from failed attempts at this bite; positive: shallower
   Pose pull_from_;
+  float overloaded_ = 0;  // [s] that a pull has had more than the maximum load
   // A throw.
   Winding winding_;  // computed by exchange/tying, as for assisted hands
   size_t cuts_before_ = 0, settled_before_ = 0;
