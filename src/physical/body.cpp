@@ -109,7 +109,7 @@ void BodiesScratch::reserve(const wall::Model& wm, const wall::State& ws) {
 }
 
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
-                        const Bodies& bodies, float h, const SurfaceSearch& search, BodiesScratch& k) {
+                        const Bodies& bodies, float h, SurfaceSearch& search, BodiesScratch& k) {
   const uint32_t faces = wall::elements(wm, ws.topology);
   k.face_center.resize(faces), k.face_radius.resize(faces), k.around.resize(kMaxBodies);
   for (uint32_t f = 0; f < faces; ++f) {
@@ -123,14 +123,13 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     k.face_center[f] = center;
     k.face_radius[f] = std::sqrt(radius2) + length(wall::vec3(ws.motion.x[2 * c.column[0] + 1])) * 1.2f;
   }
-  SurfaceSearch& boxes = const_cast<SurfaceSearch&>(search);  // a cache
-  if (boxes.box.size() < faces) boxes.box.resize(faces);
+  if (search.box.size() < faces) search.box.resize(faces);
   // A box that is made here is not for later searches of the step: the wall's speed in it is that before the forces.
   const auto box_here = [&](uint32_t f) -> const FaceBox& {
     constexpr uint32_t kHere = 1u << 31;
-    if (boxes.box[f].step != (boxes.step | kHere) && boxes.box[f].step != boxes.step)
-      box_of(wm, ws, boxes, f), boxes.box[f].step = boxes.step | kHere;
-    return boxes.box[f];
+    if (search.box[f].step != (search.step | kHere) && search.box[f].step != search.step)
+      box_of(wm, ws, search, f), search.box[f].step = search.step | kHere;
+    return search.box[f];
   };
   constexpr float kAhead = 4e-3f;  // [m] by which lists of elements reach beyond what a step needs
   const float wall_speed = 1.0f;   // [m/s] of the wall, for the search alone

@@ -215,7 +215,7 @@ void predict_bodies(const BodiesModel& model, const Bodies& bodies, std::span<co
 void find_pair_contacts(const BodiesModel& model, const Bodies& bodies, float h, BodiesScratch& k);
 // Contacts with the wall.
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
-                        const Bodies& bodies, float h, const SurfaceSearch& search, BodiesScratch& k);
+                        const Bodies& bodies, float h, SurfaceSearch& search, BodiesScratch& k);
 // Jaws close, grip and let go; rows of held needles and tissue, holds of held thread.
 void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
                 const thread::State& thread, float thread_diameter, Bodies& bodies, std::span<const HandTarget> target, float h,

@@ -68,7 +68,7 @@ float arc_factor(const State& state, const Scratch& s, uint32_t i, float normal_
   const float tension = state.tension[i];
   if (tension <= 0 || i == 0 || i + 1 == state.segments() || state.broken[i - 1] || state.broken[i + 1]) return 1;
   const float x = std::min(0.5f * length(direction(s, i + 1) - direction(s, i - 1)), normal_force / (2 * tension));
-  return 3 / (2 + std::sqrt(std::max(0.0f, 1 - x * x)));  // a / sin a within 1 % to 70 degrees (Snell)
+  return 3 / (2 + std::sqrt(std::max(0.0f, 1 - x * x)));  // a / sin a within 1 % to 60 degrees (Snell)
 }
 
 // Geometry of one pair at the predicted positions. Returns the motion after which the pair must be evaluated

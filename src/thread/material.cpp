@@ -11,6 +11,7 @@
 // 2023, 10.1126/sciadv.adg8861): ESTIMATE for silk and polyglactin. Friction: braids hold more than monofilaments and coating
 // lowers it (Surg Gynecol Obstet 1985;161:12 gives the order). The values are ESTIMATES in the range 0.15-0.3 of capstan rigs
 // (Zhang et al. 2017, 10.1007/s40544-017-0140-3) and nitinol knots (0.119; Jawed et al. 2015, 10.1103/PhysRevLett.115.118302).
+// Polypropylene has the value at which five throws hold here and four slide; monofilaments need about six.
 // docs/thread.md says at which friction each knot locks here.
 #include "thread/material.h"
 
@@ -52,7 +53,7 @@ constexpr std::array<Family, 4> kFamily{{
      {"polypropylene 4-0", "polypropylene 3-0", "polypropylene 2-0", "polypropylene 0"},
      2.0e9f,
      910,
-     0.17f,
+     0.20f,
      false,
      false},
 }};

@@ -320,20 +320,29 @@ void check_shaking(Lines& out, bool nightly) {
   }
 }
 
-// Friction at which each knot starts to hold 8 N: a record, with the band in which two adjacent friction values can change
-// order.
+// Holds `limit` [N] with free tails, wherever its nodes lie along the thread: three places.
+bool holds_anywhere(const Throws& throws, const Settings& settings, float limit) {
+  const float d = settings.material.diameter, l = 1.43f * d;
+  for (int k = 0; k < 3; ++k) {
+    Tightened t(lay_knot(throws, d, l, 15e-3f + l * static_cast<float>(k) / 3));
+    tighten(settings, t, 2);
+    if (!pull_apart(settings, t, 0, 0.02f, limit).held) return false;
+  }
+  return true;
+}
+
+// On record: the friction from which each knot holds 8 N, and how many throws of each thread hold.
 void check_locking(Lines& out) {
   struct Expected {
     Kind kind;
     double friction;
   };
-  for (const Expected& e : {Expected{{"granny", granny()}, 0.42}, Expected{{"square", square()}, 0.30}}) {
-    double lock = 0;
-    for (float mu = 0.16f; mu < 0.45f && lock == 0; mu += 0.02f)
-      if (hold_knot(e.kind.throws, knot_settings(mu), 0).held && hold_knot(e.kind.throws, knot_settings(mu + 0.02f), 0).held)
-        lock = double{mu};
-    out.add(std::string("knot/") + e.kind.name + ", friction at which it holds 8 N (segments of 1.43 diameters)", e.friction,
-            lock, 0.25, "", "on record: docs/thread.md");
+  for (const Expected& e : {Expected{{"granny", granny()}, 0.34}, Expected{{"square", square()}, 0.30}}) {
+    int percent = 44;  // downward, because single frictions below the threshold may hold by chance
+    while (percent > 16 && holds_anywhere(e.kind.throws, knot_settings(0.01f * static_cast<float>(percent - 2)), 8))
+      percent -= 2;
+    out.add(std::string("knot/") + e.kind.name + ", friction from which it holds 8 N (segments of 1.43 diameters)", e.friction,
+            0.01 * percent, 0.15, "", "on record: docs/thread.md");
   }
 
   // Throws of a square knot that hold 5 N in each material of 3-0, laid, tightened at 2 N, free tails; 7: none up to six.
@@ -350,7 +359,7 @@ void check_locking(Lines& out) {
     bool held = false;
     while (!held && throws.size() < 7) {
       throws.push_back({3, -throws.back().hand});
-      held = throws.size() < 7 && hold_knot(throws, settings, 0, Drawing::flat, 5).held;
+      held = throws.size() < 7 && holds_anywhere(throws, settings, 5);
     }
     out.add("knot/throws of " + std::string(settings.material.name) + " that hold 5 N (7: more than six)", e.throws,
             static_cast<double>(throws.size()), 0.25, "", "on record: docs/thread.md");
