@@ -66,7 +66,8 @@ Vec3 direction(const Scratch& s, size_t i) { return normalized(s.e.at(i) + s.u.a
 // bounds a: a strand that is squeezed but straight does not turn.
 float arc_factor(const State& state, const Scratch& s, uint32_t i, float normal_force) {
   const float tension = state.tension[i];
-  if (tension <= 0 || i == 0 || i + 1 == state.segments() || state.broken[i - 1] || state.broken[i + 1]) return 1;
+  if (normal_force <= 0 || tension <= 0 || i == 0 || i + 1 == state.segments() || state.broken[i - 1] || state.broken[i + 1])
+    return 1;
   const float x = std::min(0.5f * length(direction(s, i + 1) - direction(s, i - 1)), normal_force / (2 * tension));
   return 3 / (2 + std::sqrt(std::max(0.0f, 1 - x * x)));  // a / sin a within 1 % to 60 degrees (Snell)
 }
