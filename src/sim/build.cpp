@@ -25,7 +25,7 @@ namespace {
 constexpr float kPaperSubstep = 1.0f / 480;    // [s] substep for which the paper's deformation resistance is defined
 constexpr float kDrapeBelowRim = 0.035f;       // [m] below the rim, where a body stands up through the drape
 constexpr float kDrapeBelowBody = 0.010f;      // [m] below the body, where it lies on the drape
-constexpr float kDrapeBelowPad = 0.006f;       // [m] below a pad of skin: as thick as the fat that it lies on
+constexpr float kDrapeBelowPad = 0.001f;       // [m] below a pad of skin: thread in its slit stays within reach
 constexpr float kRow = 0.07f, kTurn = 0.005f;  // [m] of a thread on the drape: length of a row, radius of its turns
 
 std::string name_of(const SceneSpec& scene) { return scene.name.empty() ? "scene" : scene.name; }

@@ -17,6 +17,8 @@ constexpr float kCounterHold = 0.8f;  // [N]
 constexpr float kTighten = 0.15f;     // of the free speed: the thread runs through two dozen holes, and tissue follows it late
 constexpr float kSecure = 0.985f;     // fraction of a closure that counts as closed
 constexpr float kMissBy = 0.008f;     // [m] along the shaft
+constexpr float kRoomToTie = 0.42f;   // of the needle's arc: least position of a needle holder that hands over near the swage
+constexpr float kClear = 0.4f;        // [s] that the forceps backs out before anything else moves
 constexpr float kForcepsAt = 0.93f;   // position on the needle's arc: behind the tip
 constexpr float kTipUp = -2.2f;       // [rad] angle of the needle's circle at which its tip is up
 constexpr float kStraight = 0.93f;    // of the strand's length
@@ -176,8 +178,8 @@ Pose Scripted::grip_at(const Pose& needle, float s, float side, float lean, floa
   return {needle.p + radial * shape().needle_radius, from_axes(x, y, z)};
 }
 
-Pose Scripted::driver_grip(const Pose& needle) const {
-  return grip_at(needle, plan_.driver_at, plan_.driver_side, plan_.lift > 0 ? 0.0f : 0.7f, 0.2f);
+Pose Scripted::driver_grip(const Pose& needle, float least) const {
+  return grip_at(needle, std::max(plan_.driver_at, least), plan_.driver_side, plan_.lift > 0 ? 0.0f : 0.7f, 0.2f);
 }
 
 Pose Scripted::forceps_grip(const Pose& needle) const {
@@ -435,6 +437,9 @@ void Scripted::hold_strand_straight(const Snapshot& seen, BiteFrame& f) const {
 
 bool Scripted::take_back(const Snapshot& seen, bool present) {
   enum { bring, over, down, close, give, clear };
+  // To tie, the forceps takes the needle near its swage: the holder leaves it room. Drawn jaws are 3 mm wide, and wider open.
+  const bool guided = plan_.pull <= 0;
+  const float least = !present && guided ? kRoomToTie : 0;
   switch (stage_) {
     case bring: {
       // It is taken from the needle holder's side: the holder waits there, or its path would cross the forceps.
@@ -454,10 +459,10 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
     }
     case over:
       jaw(kNeedleHolder, 1);
-      if (move(kNeedleHolder, raised(driver_grip(seen.active().needle.pose), 0.025f), skill_.speed)) go_down(down);
+      if (move(kNeedleHolder, raised(driver_grip(seen.active().needle.pose, least), 0.025f), skill_.speed)) go_down(down);
       return false;
     case down:
-      if (move(kNeedleHolder, short_of(driver_grip(seen.active().needle.pose)), careful())) go(close);
+      if (move(kNeedleHolder, short_of(driver_grip(seen.active().needle.pose, least)), careful())) go(close);
       return false;
     case close:
       if (!jaw(kNeedleHolder, 0) || waited_ < 0.3f) return false;
@@ -466,10 +471,10 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
       go(give);
       return false;
     case give:
-      if (jaw(kForceps, 1)) go(clear);
+      if (jaw(kForceps, guided ? kJustOpen : 1.0f)) go(clear);
       return false;
     default:  // back out along its own shaft first: the tools are close to each other, and rigid
-      return move(kForceps, raised(hand_[kForceps].pose, 0.01f), skill_.speed) || waited_ > 0.2f;
+      return move(kForceps, raised(hand_[kForceps].pose, 0.01f), skill_.speed) || waited_ > (guided ? kClear : 0.2f);
   }
 }
 

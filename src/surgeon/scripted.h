@@ -20,6 +20,8 @@ namespace catgut {
 
 constexpr size_t kNeedleHolder = 0, kForceps = 1;
 constexpr int kAttempts = 8;  // per bite, per grasp, per throw
+constexpr float kJustOpen =
+    0.6f;  // of jaws beside the other instrument: they release at half, and wide open they would meet it
 
 class Scripted final : public Surgeon {
  public:
@@ -78,7 +80,7 @@ class Scripted final : public Surgeon {
   // A tool frame that grips the needle (at `needle`) at fraction s of its arc: the shaft leaves the needle's plane on `side`,
   // leans by `lean` toward the outside of the tissue when the tip is `psi` past the deepest point.
   Pose grip_at(const Pose& needle, float s, float side, float lean, float psi) const;
-  Pose driver_grip(const Pose& needle) const;
+  Pose driver_grip(const Pose& needle, float least = 0) const;  // least: of the arc
   Pose forceps_grip(const Pose& needle) const;
 
   // Samples the errors of the next bite.

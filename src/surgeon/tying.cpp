@@ -79,7 +79,7 @@ bool Scripted::regrip(const Snapshot& seen) {
   }
   switch (stage_) {
     case over:
-      jaw(kForceps, 1);
+      jaw(kForceps, plan_.pull > 0 ? 1.0f : kJustOpen);
       if (move(kForceps, raised(grip, 0.025f), skill_.speed)) go(down);
       else if (!patience(6)) gave_up_ = true;
       return false;

@@ -123,7 +123,7 @@ TEST(LessonData, thread_in_the_slit_stays_within_reach_of_the_jaws) {
   const PictureModel picture = picture_model(*model);
   float top = -1;
   for (const Vec3& p : picture.particle_rest) top = std::max(top, p.y);
-  EXPECT_LT(top - picture.drape, 0.012f);
+  EXPECT_LT(top - picture.drape, 0.006f);
   EXPECT_GT(top - picture.drape, 0.004f) << "the skin lies above the drape, not in it";
 }
 
