@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Makes docs/media/before_after_NAME.jpg: on the left a picture of an older version, on the right the same moment of the same scene
-# with this program. The last three show the window; they need Xvfb and xdotool. About five minutes without a graphics card.
+# with this program. The last three show the window; they need Xvfb and xdotool. About five
+# minutes without a graphics card; on a busy machine WAIT=45 gives the window more time to open [s].
 #   tools/make_before_after.sh FOLDER [NAME ...]     FOLDER with the older pictures, NAME.jpg; only these names
 set -euo pipefail
 quick="${CATGUT:-}"
@@ -55,13 +56,15 @@ window() {
   DO="$*" PICTURE="$after/$name.png" STAGE="$stage" CATGUT="$catgut" xvfb-run -a -s "-screen 0 1280x720x24" bash -c '
     "$CATGUT" play --procedure first_stitch --mode tutorial --stage "$STAGE" --size 1280x720 2>/dev/null & child=$!
     trap "kill $child" EXIT
-    sleep 12; kill -0 $child || exit 1
+    sleep "${WAIT:-12}"; kill -0 $child || exit 1
     eval "$DO"
     ffmpeg -v error -y -f x11grab -video_size 1280x720 -i "$DISPLAY" -frames:v 1 "$PICTURE"'
   beside "$name" "$older" "$after/$name.png" 640:360
 }
 key='xdotool key' move='xdotool mousemove'
 window overlap worst_overlap "first bite" "$key Return; sleep 2; for i in 1 2 3 4 5 6 7 8; do xdotool mousemove_relative -- -6 -4; sleep 0.3; done; sleep 2"
-window winding worst_winding_behind_panel "first tail" "$key Return; sleep 4"
-window switch live_switch_to_high_looks_low "second wrap" "$key F2; sleep 2; $move 645 266 click 1; sleep 4; $key Escape; sleep 8"
+window winding worst_winding_behind_panel "first tail" "sleep 1"
+# Slow enough for a picture that takes seconds.
+window switch live_switch_to_high_looks_low "second wrap" \
+  "$key F2; sleep 3; $move 645 266; sleep 1; xdotool mousedown 1; sleep 3; xdotool mouseup 1; sleep 10; $key Escape; sleep 20"
 ls -l "$root"/docs/media/before_after_*.jpg

@@ -33,7 +33,7 @@ wanted=("$@")
 shoot screen_start 1280x720 play --screen start
 shoot screen_settings 1280x720 play --screen settings
 shoot screen_practice 1280x720 play purse_string --screen practice --at 1
-shoot screen_lesson 1280x720 play --teach --stage "first tail"
+shoot screen_lesson 1280x720 play --procedure first_stitch --mode tutorial --stage "first tail"
 shoot screen_pause 1280x720 play stay --surgeon scripted --screen pause --at 7
 shoot screen_developer 1280x720 play stay --surgeon scripted --screen developer --at 5
 shoot screen_results 1280x720 view "$recording" --screen results
