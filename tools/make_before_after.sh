@@ -44,27 +44,27 @@ still bite worst_pale_ghost_strand purse_string close 21.35
 still purse_string purse_finish purse_string close 105.1
 still lembert lembert_finish lembert close 153.8
 
-# The window: NAME OLDER STAGE, then what xdotool does.
+# The window: NAME OLDER STAGE SIZE, then what xdotool does.
 window() {
-  local name="$1" older="$2" stage="$3"
-  shift 3
+  local name="$1" older="$2" stage="$3" size="$4"
+  shift 4
   is_wanted "$name" || return 0
   export HOME="$after/home" SDL_VIDEODRIVER=x11
   unset XDG_CONFIG_HOME XDG_DATA_HOME
   rm -rf "$HOME" && mkdir -p "$HOME/.config/catgut"
   echo 'quality = "low"' >"$HOME/.config/catgut/settings.toml"
-  DO="$*" PICTURE="$after/$name.png" STAGE="$stage" CATGUT="$catgut" xvfb-run -a -s "-screen 0 1280x720x24" bash -c '
-    "$CATGUT" play --procedure first_stitch --mode tutorial --stage "$STAGE" --size 1280x720 2>/dev/null & child=$!
-    trap "kill $child" EXIT
+  DO="$*" PICTURE="$after/$name.png" STAGE="$stage" CATGUT="$catgut" SIZE="$size" xvfb-run -a -s "-screen 0 ${size}x24" bash -c '
+    "$CATGUT" play --procedure first_stitch --mode tutorial --stage "$STAGE" --size "$SIZE" 2>/dev/null & child=$!
+    trap "kill -9 $child" EXIT
     sleep "${WAIT:-12}"; kill -0 $child || exit 1
     eval "$DO"
-    ffmpeg -v error -y -f x11grab -video_size 1280x720 -i "$DISPLAY" -frames:v 1 "$PICTURE"'
+    ffmpeg -v error -y -f x11grab -video_size "$SIZE" -i "$DISPLAY" -frames:v 1 "$PICTURE"'
   beside "$name" "$older" "$after/$name.png" 640:360
 }
 key='xdotool key' move='xdotool mousemove'
-window overlap worst_overlap "first bite" "$key Return; sleep 2; for i in 1 2 3 4 5 6 7 8; do xdotool mousemove_relative -- -6 -4; sleep 0.3; done; sleep 2"
-window winding worst_winding_behind_panel "first tail" "sleep 1"
-# Slow enough for a picture that takes seconds.
-window switch live_switch_to_high_looks_low "second wrap" \
-  "$key F2; sleep 3; $move 645 266; sleep 1; xdotool mousedown 1; sleep 3; xdotool mouseup 1; sleep 10; $key Escape; sleep 20"
+window overlap worst_overlap "first bite" 1280x720 "$key Return; sleep 2; for i in 1 2 3 4 5 6 7 8; do xdotool mousemove_relative -- -6 -4; sleep 0.3; done; sleep 2"
+window winding worst_winding_behind_panel "first tail" 1280x720 "sleep 1"
+# Slow enough for a picture of high quality that takes seconds.
+window switch live_switch_to_high_looks_low "second wrap" 640x360 \
+  "$key F2; sleep 3; $move 317 122; sleep 1; xdotool mousedown 1; sleep 2; xdotool mouseup 1; sleep 6; xdotool keydown Escape; sleep 2; xdotool keyup Escape; sleep 10"
 ls -l "$root"/docs/media/before_after_*.jpg
