@@ -3,6 +3,7 @@
 #include "render/assistant.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace catgut {
 namespace {
@@ -32,18 +33,22 @@ std::optional<InstrumentView> assistants_scissors(CutWatch& watch, const Picture
   watch.cut.resize(seen.suture.size());
   for (size_t s = 0; s < seen.suture.size(); ++s) {
     const SutureView& suture = seen.suture[s];
-    const size_t pairs = std::min(suture.thread_cut.size(), suture.thread_order.size() - !suture.thread_order.empty());
-    for (size_t i = 0; i < pairs; ++i) {
-      const uint32_t a = suture.thread_order[i], b = suture.thread_order[i + 1];
-      if (!suture.thread_cut[i] || std::max(a, b) >= seen.particle.size()) continue;
+    const size_t nodes = suture.thread_order.size();
+    std::vector<uint8_t> cut(suture.thread_cut.begin(),
+                             suture.thread_cut.begin() + long(std::min(suture.thread_cut.size(), nodes - (nodes > 0))));
+    cut.push_back(!suture.needle_on_thread);
+    for (size_t i = 0; i < cut.size() && nodes > 1; ++i) {
+      const size_t at = std::min(i, nodes - 2);
+      const uint32_t a = suture.thread_order[at], b = suture.thread_order[at + 1];
+      if (!cut[i] || std::max(a, b) >= seen.particle.size()) continue;
       const bool now = std::any_of(seen.event.begin(), seen.event.end(), [&](const Event& e) {
-        return e.kind == EventKind::thread_cut && e.suture == s && e.which == a;
+        return e.kind == EventKind::thread_cut && e.suture == s && (e.which == a || e.which == b);
       });
-      if (!now && (!known || i >= watch.cut[s].size() || watch.cut[s][i])) continue;
+      if (!now && (!known || cut.size() != watch.cut[s].size() || watch.cut[s][i])) continue;
       if (!is_finite(seen.particle[a]) || !is_finite(seen.particle[b])) continue;
       watch.since_s = seen.time_s, watch.pose = beside(model, seen.particle[a], seen.particle[b]);
     }
-    watch.cut[s] = suture.thread_cut;
+    watch.cut[s] = std::move(cut);
   }
   const double t = seen.time_s - watch.since_s;
   if (watch.since_s < 0 || t < 0 || t > kGone) return {};

@@ -12,8 +12,9 @@
 namespace catgut {
 
 struct CutWatch {
-  std::vector<std::vector<uint8_t>> cut;  // SutureView::thread_cut of the last snapshot, per suture
-  uint64_t tick = 0;                      // of the last snapshot
+  // Per suture: SutureView::thread_cut of the last snapshot, and last whether the thread was off its needle.
+  std::vector<std::vector<uint8_t>> cut;
+  uint64_t tick = 0;  // of the last snapshot
   double time_s = 0;
   bool started = false;
   double since_s = -1;  // simulated time of the last cut that was seen; below 0: none
