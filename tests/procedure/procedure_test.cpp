@@ -145,7 +145,12 @@ TEST_P(EveryProcedure, is_carried_out_by_the_scripted_surgeon_without_an_error) 
   const auto surgeon = scripted_surgeon(field.scene, field.picture);
   field.carry_out(*surgeon);
   EXPECT_TRUE(faultless(field.run, field.procedure)) << run_table(field.run, field.procedure);
-  for (const StageRecord& r : field.run.record) EXPECT_EQ(r.state, StageState::done) << "one stage after the other";
+  // Pulling the thread through may close the lips of the skin before the stage that asks for it.
+  for (size_t k = 0; k < field.procedure.stage.size(); ++k) {
+    const bool early = field.procedure.scene == "skin" && field.procedure.stage[k].name == "approximate";
+    const StageState state = field.run.record[k].state;
+    EXPECT_TRUE(state == StageState::done || (early && state == StageState::met)) << field.procedure.stage[k].name;
+  }
 }
 INSTANTIATE_TEST_SUITE_P(Procedures, EveryProcedure, testing::ValuesIn(procedure_names()),
                          [](const auto& i) { return i.param; });
