@@ -108,7 +108,8 @@ void add_play(CLI::App& app, int& exit_code) {
   command->add_option("--mode", *mode, "tutorial: time stands still at a new stage, with demonstrations; exam: no feedback")
       ->check(CLI::IsMember({"tutorial", "practice", "exam"}))
       ->type_name("tutorial|practice|exam");
-  command->add_flag("--teach", *teach, std::string("tutorial: first stitch, step by step (--procedure ") + kFirstLesson + " --mode tutorial)");
+  command->add_flag("--teach", *teach,
+                    std::string("tutorial: first stitch, step by step (--procedure ") + kFirstLesson + " --mode tutorial)");
   // One by default: a tick is short, and waiting workers take processor time from rendering.
   command->add_option("--threads", o->play.live.threads, "solver threads")->check(CLI::Range(1, 64))->capture_default_str();
   std::string drivers;

@@ -53,12 +53,12 @@ constexpr double kMostPictures = 150;                                      // [1
 constexpr double kSlowPicture = 0.08;                                      // [s] a slower frame reduces the resolution
 constexpr double kQuickPicture = 0.045;  // [s] a faster one raises it: a step costs less than 1.6 times
 constexpr std::array<float, 5> kResolutions{1, 0.6f, 0.45f, 0.35f,
-                                            0.25f};   // 0.7 would need post-processing, so it costs as much as 1
-constexpr double kFarTooSlow = 0.25;                  // [s] reduces it by half, without a long look
-constexpr double kMirrorEvery = 1.0 / 20;             // [s] of the window's picture beside a headset
-constexpr double kSlowMirror = 0.5;                   // [s] where the headset's frames take their whole period
-constexpr double kStallEvery = 2;                     // [s] of --stall-ms
-constexpr double kBeforeMoment = 3;                   // [s] that are played before the moment of a lost point
+                                            0.25f};  // 0.7 would need post-processing, so it costs as much as 1
+constexpr double kFarTooSlow = 0.25;                 // [s] reduces it by half, without a long look
+constexpr double kMirrorEvery = 1.0 / 20;            // [s] of the window's picture beside a headset
+constexpr double kSlowMirror = 0.5;                  // [s] where the headset's frames take their whole period
+constexpr double kStallEvery = 2;                    // [s] of --stall-ms
+constexpr double kBeforeMoment = 3;                  // [s] that are played before the moment of a lost point
 
 bool has_procedure(const std::string& name) {
   const std::vector<std::string> names = procedure_names();

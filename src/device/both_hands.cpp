@@ -25,9 +25,10 @@ constexpr float kLongestDraw = 0.05f;                                          /
 constexpr float kDrawPerRad = 0.012f;                          // [m] per radian of the gesture by which the hands move apart
 constexpr float kGiveInTissue = 0.010f, kGiveAtKnot = 0.002f;  // [m] that a hand may pull a taut strand, and
 constexpr float kGiveToThrow = 0.040f;  // [m] one whose throw is not locked: its loop still has thread to give
-constexpr float kShortTail = 0.030f, kSettle = 0.7f, kLeastPull = 0.006f;  // [m], [s], [m/s]: see spare_tail
-constexpr size_t kFirstStitch = 4;                                         // suture points: at most two bites
-constexpr float kCounterHold = 0.8f;    // [N] above this the thread sticks in its holes
+constexpr float kLongTail = 0.080f, kShortTail = 0.030f, kSettle = 0.7f,
+                kLeastPull = 0.006f;  // [m], [m], [s], [m/s]: see spare_tail
+constexpr size_t kFirstStitch = 4;    // suture points: at most two bites
+constexpr float kCounterHold = 0.8f;  // [N] above this the thread sticks in its holes
 
 enum { lift, lay, beside, wind };  // stages of winding
 
@@ -183,8 +184,10 @@ Vec3 spare_tail(const PictureModel& picture, const Snapshot& seen, size_t who, V
       s.suture_point.empty() || s.suture_point.size() > kFirstStitch || seen.tool[1 - who].held == Held::thread)
     return p;
   const Vec3 swage = needle_swage(picture, seen), anchor = node_at(seen, last_point_node(seen));
-  const bool taut = distance(swage, anchor) > kTautInTissue * length_between(seen, last_point_node(seen), s.thread_order.size() - 1);
+  const bool taut =
+      distance(swage, anchor) > kTautInTissue * length_between(seen, last_point_node(seen), s.thread_order.size() - 1);
   const float tail = length_between(seen, 0, first_point_node(seen));
+  if (tail > kLongTail) return p;
   const float most = std::max(kLeastPull, (tail - kShortTail) / kSettle) * dt;
   const Vec3 away = normalized(swage - anchor);
   const float far = dot(p - from, away);

@@ -95,8 +95,8 @@ TEST(Midpoint, waits_for_the_bite_to_be_complete) {
   EXPECT_EQ(t.plan.pair.size(), 1u);
 }
 
-// The needle strains the thread as it leaves: the span is short then, and springs back to the distance of the edges. Measured at
-// that moment alone, no pull would ever count.
+// The needle strains the thread as it leaves: the span is short then, and springs back to the distance of the edges. Measured
+// at that moment alone, no pull would ever count.
 TEST(Midpoint, closes_after_the_needle_strained_the_thread) {
   TwoEdges t;
   t.through_first(t.p[2]);
