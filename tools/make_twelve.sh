@@ -9,7 +9,7 @@ folder="${1:-out/twelve}" catgut="${CATGUT:-./catgut}"
 mkdir -p "$folder" docs/media
 
 # Scene and its three moments [simulated s] of the scripted surgeon with seed 1.
-shots=(stay:9.92:24.6:33.6 connell:12.68:30.5:84.5 lembert:4.5:16.2:153.8 purse_string:30.15:103:105.1)
+shots=(stay:9.92:25:33.6 connell:12.68:30.5:82.9 lembert:4.3:16.2:150.2 purse_string:31:104.4:105.1)
 for shot in "${shots[@]}"; do
   IFS=: read -r name needle throw finished <<<"$shot"
   "$catgut" run "$name" --seed 1 --headless --no-expect --camera close --size 1920x1080 \
