@@ -66,8 +66,8 @@ bool on_screen(Vec3 p, const ViewFrame& view, float width, float height, ScreenP
 std::vector<PlacedPanel> place_panels(std::span<const Panel> panels, float width, float height, const TextSize& text,
                                       std::span<const ScreenPoint> clear, std::span<const PlacedPanel> before = {});
 
-// Place of the square magnifier: at the window's border, near the needle's tip, over no panel and no point of `clear`. It stays
-// where it was as long as it covers nothing. None: there is no room.
+// Place of the square magnifier: at the window's border, near the needle's tip, over no panel and no point of `clear`. It keeps
+// its last place while that is free. Empty if no place is free.
 std::optional<PanelRect> place_inset(float side, float width, float height, ScreenPoint tip, std::span<const ScreenPoint> clear,
                                      std::span<const PlacedPanel> panels, const std::optional<PanelRect>& before = {});
 

@@ -28,7 +28,8 @@ CATGUT_CLONES void move(size_t nodes, float keep, const float* __restrict u, flo
 
 // Neighbors exchange a part of their velocity difference: damps waves shorter than resolved, conserves momentum. More of it
 // where thread bears on thread: vibration there makes contacts near their limit of friction slip now and then, and a knot
-// creeps (by up to 0.5 mm/s at 1 N, measured). Not on tools: thread that slides round them would be braked.
+// creeps (with the friction of the arc alone by up to 0.5 mm/s at 1 N, measured). Not on tools: thread that slides round them
+// would be braked.
 constexpr float kTouchDamping = 1600;  // [1/s]
 CATGUT_CLONES void calm(size_t nodes, float share, float touch_share, const uint8_t* __restrict touched,
                         const float* __restrict mass, const float* __restrict w, const float* __restrict keep,

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <map>
 
+#include "../render/winding.h"
 #include "geometry/closest.h"
 #include "procedure/scene_file.h"
 #include "procedure/scripted_surgeon.h"
@@ -22,18 +23,6 @@ namespace {
 constexpr float kTick = 1.0f / 60;       // [s]
 constexpr float kFront = 0.08f;          // [m] of an instrument from its tips, that can meet the other one
 constexpr float kMostOverlap = 0.0005f;  // [m]
-
-// Times that closed surfaces wrap round p, from the solid angles of their triangles: 0 outside, 1 or more inside.
-float winding(const Shape& shape, Vec3 p) {
-  double sum = 0;
-  for (const auto& t : shape.triangle) {
-    const Vec3 a = shape.position[t[0]] - p, b = shape.position[t[1]] - p, c = shape.position[t[2]] - p;
-    const float la = length(a), lb = length(b), lc = length(c);
-    const float above = dot(a, cross(b, c)), below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
-    sum += 2 * std::atan2(double(above), double(below));
-  }
-  return float(sum / (4 * double(kPi)));
-}
 
 struct Drawn {
   ToolShape shape;
