@@ -38,27 +38,26 @@ void store_motion(Scratch& s) {
     s.u.x[i] = u[0], s.u.y[i] = u[1], s.u.z[i] = u[2];
   }
 }
+template <typename AnyColumns>
+Four four_at(const AnyColumns& c, size_t i) {
+  return Four{c.x[i], c.y[i], c.z[i], 0};
+}
+Four tangential(Four v, Four n) { return v - n * dot(v, n); }
+
 void use_node(Scratch& s, uint32_t i) {
   if (s.touched[i]) return;
   s.touched[i] = 1;
   s.contact_node.push_back(i);
-  s.contact_u[i] = Four{s.u.x[i], s.u.y[i], s.u.z[i], 0};
+  s.contact_u[i] = four_at(s.u, i);
 }
 
-void add_active(const Settings& settings, Scratch& s, Active c, float gap, Vec3 drift, float ln, Vec3 lt) {
-  c.mi0 = c.wi0 * s.w[c.i], c.mi1 = c.wi1 * s.w[c.i + 1], c.mj0 = c.wj0 * s.w[c.j], c.mj1 = c.wj1 * s.w[c.j + 1];
-  const float w = c.wi0 * c.mi0 + c.wi1 * c.mi1 + c.wj0 * c.mj0 + c.wj1 * c.mj1;
-  if (w <= 0) return;
-  for (uint32_t i : {c.i, c.i + 1, c.j, c.j + 1}) use_node(s, i);
-  c.inverse = 1 / w;
-  c.level = gap - dot(c.normal, motion(s, c));
-  c.pull_back = four(settings.anchor * drift);
-  c.ln = ln;
-  c.lt = four(tangential(lt, three(c.normal)));
-  s.active.push_back(c);
+// Segment i at the predicted positions.
+Four edge(const Scratch& s, size_t i) { return four_at(s.e, i) + four_at(s.u, i + 1) - four_at(s.u, i); }
+Four direction(const Scratch& s, size_t i) {
+  const Four e = edge(s, i);
+  const float l = std::sqrt(dot(e, e));
+  return l > 1e-20f ? e * (1 / l) : Four{1, 0, 0, 0};
 }
-
-Vec3 direction(const Scratch& s, size_t i) { return normalized(s.e.at(i) + s.u.at(i + 1) - s.u.at(i), Vec3{1, 0, 0}); }
 
 // A contact of a polygon stands for the arc on which a real thread would bear: there the normals turn, and the sum of their
 // magnitudes, on which friction acts, exceeds their vector sum N. A tension T that bears N turns by an angle 2 a with
@@ -68,7 +67,8 @@ float arc_factor(const State& state, const Scratch& s, uint32_t i, float normal_
   const float tension = state.tension[i];
   if (normal_force <= 0 || tension <= 0 || i == 0 || i + 1 == state.segments() || state.broken[i - 1] || state.broken[i + 1])
     return 1;
-  const float x = std::min(0.5f * length(direction(s, i + 1) - direction(s, i - 1)), normal_force / (2 * tension));
+  const Four turn = direction(s, i + 1) - direction(s, i - 1);
+  const float x = std::min(0.5f * std::sqrt(dot(turn, turn)), normal_force / (2 * tension));
   return 3 / (2 + std::sqrt(std::max(0.0f, 1 - x * x)));  // a / sin a within 1 % to 60 degrees (Snell)
 }
 
@@ -78,77 +78,100 @@ float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& 
   const uint32_t key = state.key[k], i = segment_of(key), other = partner_of(key);
   Crossing& c = state.crossing[k];
   const float d = settings.material.diameter, ready = kReady * d;
-  const Vec3 a = s.e.at(i) + s.u.at(i + 1) - s.u.at(i);
-  Vec3 p, b, base;
+  const Four a = edge(s, i);
+  Four p, b;
   float surface = d;
   if (other < kTool) {
-    p = between(state, i, other) + s.u.at(i) - s.u.at(other);
-    b = s.e.at(other) + s.u.at(other + 1) - s.u.at(other);
+    p = (four_at(state.x, i) - four_at(state.x, other)) + (four_at(state.fine, i) - four_at(state.fine, other)) +
+        four_at(s.u, i) - four_at(s.u, other);
+    b = edge(s, other);
   } else {
     const ToolCapsule& tool = around.tools[other - kTool];
-    base = lerp(tool.a, tool.to_a, time);
-    p = (state.x.at(i) - base) + state.fine.at(i) + s.u.at(i);
-    b = lerp(tool.b, tool.to_b, time) - base;
-    if (length2(b) < 1e-12f) b = {1e-6f, 0, 0};
+    const Vec3 base = lerp(tool.a, tool.to_a, time);
+    p = (four_at(state.x, i) - four(base)) + four_at(state.fine, i) + four_at(s.u, i);
+    b = four(lerp(tool.b, tool.to_b, time) - base);
+    if (dot(b, b) < 1e-12f) b = Four{1e-6f, 0, 0, 0};
     surface = tool.radius + 0.5f * d;
   }
   closest_points(p, a, b, c.s, c.t);
-  const Vec3 apart = p + a * c.s - b * c.t;
-  float far = length(apart);
+  const Four apart = p + a * c.s - b * c.t;
+  float far = std::sqrt(dot(apart, apart));
+  Four normal = four(c.normal);
   if (c.touch == Touch::unknown) {
-    c.normal = normalized(apart, any_perpendicular(normalized(a, {1, 0, 0})));
+    normal = four(normalized(three(apart), any_perpendicular(normalized(three(a), {1, 0, 0}))));
     c.touch = Touch::apart;
   } else if (far > 1e-9f) {
-    Vec3 n = apart / far;
+    Four n = apart * (1 / far);
     // At a distance below one diameter a normal cannot reverse within one substep: the strands have passed into each other.
-    if (other < kTool && far < d && dot(n, c.normal) < -0.3f) n = -n, far = -far;
-    c.normal = n;
+    if (other < kTool && far < d && dot(n, normal) < -0.3f) n = -n, far = -far;
+    normal = n;
   }
+  c.normal = three(normal);
   c.gap = far - surface;
   if (c.gap > ready) {
     c.normal_impulse = 0, c.friction_impulse = {}, c.drift = {}, c.touch = Touch::apart;
     return c.gap - ready;
   }
+  const float wi0 = 1 - c.s, wi1 = c.s, mi0 = wi0 * s.w[i], mi1 = wi1 * s.w[i + 1];
+  float w = wi0 * mi0 + wi1 * mi1;
+  const bool thread = other < kTool;
+  const float wj0 = thread ? c.t - 1 : 0.0f, wj1 = thread ? -c.t : 0.0f;
+  const uint32_t j = thread ? other : i;
+  const float mj0 = wj0 * s.w[j], mj1 = wj1 * s.w[j + 1];
+  w = w + wj0 * mj0 + wj1 * mj1;
+  if (w <= 0) return 0;
   const float h2 = settings.substep * settings.substep, normal_force = c.normal_impulse / h2;
   float arc = arc_factor(state, s, i, normal_force);
-  Active active;
-  active.i = i, active.wi0 = 1 - c.s, active.wi1 = c.s, active.normal = four(c.normal),
-  active.crossing = static_cast<uint32_t>(k);
-  if (other < kTool) {
-    active.j = other, active.wj0 = c.t - 1, active.wj1 = -c.t, active.mu = settings.material.friction;
+  Active& active = s.active.emplace_back();
+  active.normal = normal;
+  active.wi0 = wi0, active.wi1 = wi1, active.wj0 = wj0, active.wj1 = wj1;
+  active.mi0 = mi0, active.mi1 = mi1, active.mj0 = mj0, active.mj1 = mj1;
+  active.i = i, active.j = j, active.crossing = static_cast<uint32_t>(k);
+  if (thread) {
+    active.mu = settings.material.friction;
     arc = std::max(arc, arc_factor(state, s, other, normal_force));
   } else {
-    active.j = i;
     active.mu = around.tools[other - kTool].friction;
     active.most = kToolPress * h2;
     active.partner = four(lerp(s.tool_move[2 * (other - kTool)], s.tool_move[2 * (other - kTool) + 1], c.t));
   }
   active.mu *= arc;
-  add_active(settings, s, active, c.gap, c.drift, c.normal_impulse, c.friction_impulse);
+  for (uint32_t node : {i, i + 1, j, j + 1}) use_node(s, node);
+  active.inverse = 1 / w;
+  active.level = c.gap - dot(normal, motion(s, active));
+  active.pull_back = settings.anchor * four(c.drift);
+  active.ln = c.normal_impulse;
+  active.lt = tangential(four(c.friction_impulse), normal);
   return 0;
+}
+
+// Takes the motion of the last substep from the budgets. Partners behind the segments are tools.
+CATGUT_CLONES void spend(size_t pairs, uint32_t tools_at, const uint32_t* __restrict key, const float* __restrict moved,
+                         float* __restrict budget) {
+  for (size_t k = 0; k < pairs; ++k) {
+    const uint32_t other = key[k] & 0xffff;
+    const int first = static_cast<int>(key[k] >> 16),
+              partner = static_cast<int>(other < kTool ? other : other - kTool + tools_at);
+    budget[k] = budget[k] - moved[first] - moved[partner];
+  }
 }
 
 }  // namespace
 
 void begin_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around, float time) {
   s.active.clear(), s.contact_node.clear();
-  const float* moved = s.segment_move.data();
+  float* moved = s.segment_move.data();
   const size_t pairs = state.key.size();
+  const uint32_t tools_at = static_cast<uint32_t>(s.max_nodes);
   for (size_t k = 0; k < around.tools.size(); ++k) {
     const float part = 1.0f / static_cast<float>(settings.substeps);
     s.tool_move[2 * k] = (around.tools[k].to_a - around.tools[k].a) * part;
     s.tool_move[2 * k + 1] = (around.tools[k].to_b - around.tools[k].b) * part;
+    moved[tools_at + k] = std::sqrt(std::max(length2(s.tool_move[2 * k]), length2(s.tool_move[2 * k + 1])));
   }
-  for (size_t k = 0; k < pairs; ++k) {
-    const uint32_t key = state.key[k], other = partner_of(key);
-    const float partner =
-        other < kTool
-            ? moved[other]
-            : std::sqrt(std::max(length2(s.tool_move[2 * (other - kTool)]), length2(s.tool_move[2 * (other - kTool) + 1])));
-    float left = state.budget[k] - moved[segment_of(key)] - partner;
-    if (left <= 0) left = look_at(settings, state, s, around, time, k);
-    state.budget[k] = left;
-  }
+  spend(pairs, tools_at, state.key.data(), moved, state.budget.data());
+  for (size_t k = 0; k < pairs; ++k)
+    if (state.budget[k] <= 0) state.budget[k] = look_at(settings, state, s, around, time, k);
   if (around.plane) begin_plane(settings, state, s, *around.plane);
   for (uint32_t i : s.contact_node) s.touched[i] = 0;
   for (const Active& c : s.active) apply(s, c, c.normal * c.ln + c.lt);
@@ -162,7 +185,9 @@ void sweep_contacts(const Settings& settings, State& state, Scratch& s, const Su
   const size_t count = s.active.size();
   for (size_t k = 0; k < count; ++k) {
     Active& c = s.active[backward ? count - 1 - k : k];
-    apply(s, c, correct(c, motion(s, c)));
+    const Four moved = motion(s, c);
+    if (stays_apart(c, moved)) continue;
+    apply(s, c, correct(c, moved));
   }
   store_motion(s);
   if (around.plane && !backward) sweep_plane(settings, state, s, *around.plane);
@@ -172,17 +197,20 @@ void end_contacts(const Settings& settings, State& state, Scratch& s, Surroundin
   const float newtons = 1 / (settings.substep * settings.substep * static_cast<float>(settings.substeps));
   load_motion(s);  // with what the plane has done
   for (const Active& c : s.active) {
-    const Vec3 went = three(motion(s, c)), normal = three(c.normal), moved = tangential(went, normal);
-    const Vec3 impulse = three(c.normal * c.ln + c.lt);
-    const uint32_t other = partner_of(state.key[c.crossing]);
-    if (c.ln > 0)
-      for (uint32_t i : {c.i, c.i + 1, c.j, c.j + 1}) s.touched[i] |= other < kTool ? kOnThread : kOnOther;
+    const Four went = motion(s, c);
     Crossing& crossing = state.crossing[c.crossing];
-    crossing.drift = new_drift(settings, c, crossing.drift, moved);
+    crossing.gap = c.level + dot(c.normal, went);
+    if (c.ln <= 0) {
+      crossing.normal_impulse = 0, crossing.friction_impulse = {}, crossing.drift = {}, crossing.touch = Touch::apart;
+      continue;
+    }
+    const uint32_t other = partner_of(state.key[c.crossing]);
+    for (uint32_t i : {c.i, c.i + 1, c.j, c.j + 1}) s.touched[i] |= other < kTool ? kOnThread : kOnOther;
+    crossing.drift = new_drift(settings, c, crossing.drift, three(tangential(went, c.normal)));
     crossing.normal_impulse = c.ln, crossing.friction_impulse = three(c.lt);
-    crossing.gap = c.level + dot(normal, went);
-    crossing.touch = c.ln <= 0 ? Touch::apart : c.slipped ? Touch::slip : Touch::stick;
+    crossing.touch = c.slipped ? Touch::slip : Touch::stick;
     if (other >= kTool) {
+      const Vec3 impulse = three(c.normal * c.ln + c.lt);
       ToolCapsule& tool = around.tools[other - kTool];
       tool.force_a -= impulse * (newtons * (1 - crossing.t));
       tool.force_b -= impulse * (newtons * crossing.t);

@@ -79,6 +79,11 @@ inline Four correct(AnyActive& c, Four moved) {
   c.ln = ln, c.lt = lt;
   return change;
 }
+// Without load, and with none after `correct`: most of the contacts near a knot.
+template <typename AnyActive>
+inline bool stays_apart(const AnyActive& c, Four moved) {
+  return c.ln == 0 && (c.level + dot(c.normal, moved)) * c.inverse >= 0;
+}
 inline Vec3 tangential(Vec3 v, Vec3 n) { return v - n * dot(v, n); }
 // Friction memory after a substep: the drift while sticking.
 template <typename AnyActive>
@@ -90,6 +95,8 @@ inline Vec3 new_drift(const Settings& settings, const AnyActive& c, Vec3 drift, 
 }
 
 constexpr uint8_t kOnOther = 1, kOnThread = 2;  // bits of Scratch::touched: with load on a tool, plane, wall; on thread
+
+constexpr size_t kMaxTools = 64;  // of one step
 
 struct Scratch {
   size_t max_nodes = 0, max_crossings = 0;
@@ -103,7 +110,8 @@ struct Scratch {
   Padded3 e;       // [m] edge vectors at the beginning of the substep
   Padded3 n;       // unit directions, of the stretch solve
   Padded3 moment;  // per node: B times curvature over length [N]
-  Padded rest, inverse_rest, keep, alpha, lambda, step, residual, diag, off, tension_sum, segment_move;
+  Padded rest, inverse_rest, keep, alpha, lambda, step, residual, diag, off, tension_sum;
+  Padded segment_move;  // [m] in the last substep; behind the segments, from max_nodes on, those of the tools
   LaneSystem lanes;
   std::vector<Active> active;
   std::vector<Four> contact_u;         // u of the nodes below, node by node
@@ -147,6 +155,18 @@ struct Scratch {
   std::vector<SoftActive> soft_active;
 };
 
+inline float clamp01(float v) { return v < 0 ? 0 : v > 1 ? 1 : v; }
+// Closest points of segments p + s a and q + t b, with r = p - q.
+template <typename Vector>
+inline void closest_points(Vector r, Vector a, Vector b, float& s, float& t) {
+  const float aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), ar = dot(a, r), br = dot(b, r);
+  const float det = aa * bb - ab * ab;
+  s = det > 1e-7f * aa * bb ? clamp01((ab * br - bb * ar) / det) : 0.5f;
+  t = (ab * s + br) / bb;
+  if (t < 0) t = 0, s = clamp01(-ar / aa);
+  else if (t > 1) t = 1, s = clamp01((ab - ar) / aa);
+}
+
 inline Vec3 between(const State& s, size_t i, size_t j) {  // node i - node j, to full resolution
   return (s.x.at(i) - s.x.at(j)) + (s.fine.at(i) - s.fine.at(j));
 }
@@ -155,8 +175,6 @@ inline Vec3 between(const State& s, size_t i, size_t j) {  // node i - node j, t
 constexpr float kReady = 0.15f;  // of the diameter: pairs with a smaller gap are solved
 uint32_t skipped_neighbors(const Settings& settings, const State& state);
 void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span<const ToolCapsule> tools, float time);
-// Closest points of segments p + s a and q + t b, with r = p - q.
-void closest_points(Vec3 r, Vec3 a, Vec3 b, float& s, float& t);
 
 // stretch.cpp
 void find_edges(const State& state, Scratch& s);

@@ -14,8 +14,6 @@ namespace {
 
 constexpr size_t kBlock = 8;  // segments that share a bounding sphere
 
-float clamp01(float v) { return v < 0 ? 0 : v > 1 ? 1 : v; }
-
 CATGUT_CLONES void middles(size_t segments, const float* __restrict x, float* __restrict middle) {
   for (size_t i = 0; i < segments; ++i) middle[i] = 0.5f * (x[i] + x[i + 1]);
 }
@@ -30,15 +28,6 @@ CATGUT_CLONES void near_middles(const float* __restrict x, const float* __restri
 }
 
 }  // namespace
-
-void closest_points(Vec3 r, Vec3 a, Vec3 b, float& s, float& t) {
-  const float aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), ar = dot(a, r), br = dot(b, r);
-  const float det = aa * bb - ab * ab;
-  s = det > 1e-7f * aa * bb ? clamp01((ab * br - bb * ar) / det) : 0.5f;
-  t = (ab * s + br) / bb;
-  if (t < 0) t = 0, s = clamp01(-ar / aa);
-  else if (t > 1) t = 1, s = clamp01((ab - ar) / aa);
-}
 
 uint32_t skipped_neighbors(const Settings& settings, const State& state) {
   // A strand that turns back at its minimum radius (its own) needs this much length in between.

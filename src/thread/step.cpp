@@ -243,18 +243,18 @@ Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_un
   Scratch& s = *scratch_;
   s.max_nodes = max_nodes, s.max_crossings = max_crossings;
   for (Padded3* c : {&s.u, &s.force, &s.e, &s.n, &s.moment, &s.middle}) c->resize(max_nodes);
-  for (Padded* c : {&s.mass,          &s.w,     &s.move,        &s.rest,          &s.inverse_rest,
-                    &s.keep,          &s.alpha, &s.lambda,      &s.step,          &s.residual,
-                    &s.diag,          &s.off,   &s.tension_sum, &s.segment_move,  &s.half,
-                    &s.least_density, &s.span,  &s.plane_level, &s.plane_inverse, &s.plane_slipped})
+  for (Padded* c :
+       {&s.mass, &s.w, &s.move, &s.rest, &s.inverse_rest, &s.keep, &s.alpha, &s.lambda, &s.step, &s.residual, &s.diag, &s.off,
+        &s.tension_sum, &s.half, &s.least_density, &s.span, &s.plane_level, &s.plane_inverse, &s.plane_slipped})
     c->resize(max_nodes);
+  s.segment_move.resize(max_nodes + kMaxTools);
   s.lanes.resize(max_nodes);
   s.contact_u.resize(max_nodes + 1), s.contact_node.reserve(max_nodes + 1);
   s.active.reserve(max_crossings), s.touched.assign(max_nodes + 1, 0);
   s.new_key.reserve(max_crossings), s.new_budget.reserve(max_crossings), s.new_crossing.reserve(max_crossings);
   s.block_middle.resize(max_nodes / 8 + 2), s.block_radius.resize(max_nodes / 8 + 2);
   s.block_tools.resize(max_nodes / 8 + 2);
-  s.tool_move.resize(2 * 64);
+  s.tool_move.resize(2 * kMaxTools);
   s.spike_right.resize(max_nodes), s.spike_left.resize(max_nodes);
   s.soft_moved.resize(kMaxSoftPoints), s.soft_before.resize(kMaxSoftPoints), s.soft_active.reserve(2 * kMaxSoftPoints);
   s.corner.reserve(kMaxEyelets), s.reduced.resize(kMaxEyelets * kMaxEyelets), s.right.resize(kMaxEyelets);
@@ -265,7 +265,7 @@ Stepper::Stepper(Stepper&&) noexcept = default;
 void Stepper::step(const Settings& settings, State& state, Surroundings& around) {
   Scratch& s = *scratch_;
   const size_t n = state.nodes(), m = state.segments();
-  CATGUT_CHECK(n <= s.max_nodes && around.tools.size() <= s.tool_move.size() / 2);
+  CATGUT_CHECK(n <= s.max_nodes && around.tools.size() <= kMaxTools);
   state.key.reserve(s.max_crossings), state.budget.reserve(s.max_crossings), state.crossing.reserve(s.max_crossings);
   const float h = settings.substep, part = 1.0f / static_cast<float>(settings.substeps);
   const float keep = std::max(0.0f, 1 - settings.damping * h) / h, limit = settings.max_move * settings.material.diameter;
