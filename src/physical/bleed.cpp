@@ -90,29 +90,11 @@ void bleed_on(const BleedModel& law, const wall::Model& m, std::span<const Press
   }
 }
 
-namespace {
-
-// [m] that a stain reaches down, and its radius.
-std::array<float, 2> stain_of(const BleedModel& law, float on_wall) {
-  const float radius = std::sqrt(on_wall / (kPi * law.film));
-  if (radius <= law.stain) return {0, radius};
-  return {std::min(law.run, (on_wall / law.film - kPi * law.stain * law.stain) / (2 * law.stain)), law.stain};
-}
-
-}  // namespace
-
-float blood_at(const BleedModel& law, Vec3 vessel, float on_wall, Vec3 down, Vec3 place) {
-  if (!(on_wall > 0)) return 0;
-  const auto [run, radius] = stain_of(law, on_wall);
-  const Vec3 off = place - vessel;
-  const float t = std::clamp(dot(off, down), 0.0f, run), far = length(off - down * t);
-  // Full within, with a border a quarter of the radius wide.
-  return std::clamp((radius - far) / (0.25f * radius + 1e-9f), 0.0f, 1.0f);
-}
-
-float stain_reach(const BleedModel& law, float on_wall) {
-  const auto [run, radius] = stain_of(law, std::max(on_wall, 0.0f));
-  return run + radius;
+Stain stain_of(const BleedModel& law, Vec3 vessel, float on_wall, Vec3 down) {
+  const float radius = std::sqrt(std::max(on_wall, 0.0f) / (kPi * law.film));
+  if (radius <= law.stain) return {vessel, down, 0, radius};
+  const float run = (on_wall / law.film - kPi * law.stain * law.stain) / (2 * law.stain);
+  return {vessel, down, std::min(law.run, run), law.stain};
 }
 
 }  // namespace catgut::physical

@@ -7,7 +7,9 @@
 // 2017, 10.1016/j.surg.2016.09.022) 1-5 ml/min is mild bleeding and 5-10 ml/min moderate. Assumptions: spacing, diameters and
 // length of the vessels, clotting time, film thickness, and the diameter up to which the heat of a cut closes a vessel.
 #pragma once
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -66,9 +68,20 @@ struct Pressure {
 void bleed_on(const BleedModel& law, const wall::Model& wall, std::span<const Pressure> pressure, float h,
               std::vector<Bleed>& bleed);
 
-// Blood on the wall at a place of its surface at rest, 0 .. 1. down: unit, the direction of gravity.
-// A drop of constant thickness that grows round the vessel, then a strip that runs down.
-float blood_at(const BleedModel& law, Vec3 vessel, float on_wall, Vec3 down, Vec3 place);
-float stain_reach(const BleedModel& law, float on_wall);  // [m] from the vessel: no blood beyond
+// Blood on the wall at rest: a drop of constant thickness that grows round the vessel, then a strip that runs down.
+struct Stain {
+  Vec3 vessel, down;          // down: unit, the direction of gravity
+  float run = 0, radius = 0;  // [m] of the strip: its length, half its width
+  // [m2] square of the distance from the strip's middle line.
+  float away2(Vec3 place) const {
+    const Vec3 off = place - vessel;
+    return length2(off - down * std::clamp(dot(off, down), 0.0f, run));
+  }
+};
+Stain stain_of(const BleedModel& law, Vec3 vessel, float on_wall, Vec3 down);
+// 0 .. 1: full within, with a border a quarter of the radius wide.
+inline float blood_at(const Stain& s, Vec3 place) {
+  return std::clamp((s.radius - std::sqrt(s.away2(place))) / (0.25f * s.radius + 1e-9f), 0.0f, 1.0f);
+}
 
 }  // namespace catgut::physical

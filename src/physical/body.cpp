@@ -102,6 +102,7 @@ void BodiesScratch::reserve(const wall::Model& wm, const wall::State& ws) {
   row.reserve(kMaxRows), points.reserve(kMaxRows), wall_row.reserve(kMaxRows), w.reserve(kMaxRows * kMaxRows);
   for (auto* list : {&speed, &change, &before, &onward}) list->reserve(kMaxRows);
   face_center.reserve(faces), face_radius.reserve(faces), near.reserve(faces);
+  near_rim.reserve(faces), near_run.reserve(faces);
   around.resize(kMaxBodies);
   for (Around& a : around) a.face.reserve(faces);
   moving.reserve(64), tool.reserve(kMaxThreadCapsules), tool_body.reserve(kMaxThreadCapsules);
@@ -124,6 +125,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     k.face_radius[f] = std::sqrt(radius2) + length(wall::vec3(ws.motion.x[2 * c.column[0] + 1])) * 1.2f;
   }
   if (search.box.size() < faces) search.box.resize(faces);
+  if (search.ball.size() < surface.patch.size()) search.ball.resize(surface.patch.size());
   // A box that is made here is not for later searches of the step: the wall's speed in it is that before the forces.
   const auto box_here = [&](uint32_t f) -> const FaceBox& {
     constexpr uint32_t kHere = 1u << 31;
@@ -131,6 +133,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       box_of(wm, ws, search, f), search.box[f].step = search.step | kHere;
     return search.box[f];
   };
+  constexpr uint32_t kRun = 8;     // spheres
   constexpr float kAhead = 4e-3f;  // [m] by which lists of elements reach beyond what a step needs
   const float wall_speed = 1.0f;   // [m/s] of the wall, for the search alone
   for (uint32_t b = 0; b < bodies.body.size(); ++b) {
@@ -208,20 +211,33 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     };
     for (uint32_t i = 0; i < m.sphere.size(); ++i) {
       const BodySphere& s = m.sphere[i];
+      if (i % kRun == 0) {
+        // Of the elements near the body, those near this run of spheres.
+        Vec3 first = transform(body.pose, local(m, s, body.opening));
+        float around = s.radius;
+        for (uint32_t j = i + 1; j < std::min<size_t>(i + kRun, m.sphere.size()); ++j)
+          around =
+              std::max(around, distance(transform(body.pose, local(m, m.sphere[j], body.opening)), first) + m.sphere[j].radius);
+        k.near_run.clear();
+        for (const uint32_t f : k.near) {
+          const float r = 1.001f * (k.face_radius[f] + around + margin);
+          if (length2(k.face_center[f] - first) <= r * r) k.near_run.push_back(f);
+        }
+      }
       if (s.radius <= 0 || skipped(i)) continue;
       const Vec3 in_body = local(m, s, body.opening);
       const Vec3 p = transform(body.pose, in_body);
       if (holds_tissue && s.jaw != 0 && distance(p, jaws) < 6e-3f) continue;
       const Vec3 jaw_speed = s.jaw == 0 ? Vec3{} : rotate(body.pose.q, (local(m, s, moving.opening) - in_body) * (1 / h));
       const float reach = s.radius + margin;
-      for (const uint32_t f : k.near) {
+      for (const uint32_t f : k.near_run) {
         const float r = k.face_radius[f] + reach;
         if (length2(k.face_center[f] - p) > r * r) continue;
         // Beyond this, in front of a face or behind it, `add` has no use for it.
         const FaceBox& box = box_here(f);
         const float useful = 1.05f * std::max(reach, 0.9f * wm.laminate.thickness);
         for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
-          if (least_distance(box, p, surface.patch[q].side) > useful) continue;
+          if (least_distance(wm, ws, surface, search, box, q, p) > useful) continue;
           const Foot foot = outer_foot(wm, ws, surface, q, p);
           if (foot.gap - s.radius > margin || (foot.on_edge && foot.gap < 0)) continue;
           add(i, foot, p, s.radius, jaw_speed, 1);
@@ -229,6 +245,10 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       }
     }
     // A sharp edge of the wall between two spheres.
+    k.near_rim.clear();
+    for (const uint32_t f : k.near)
+      if (surface.first_of_face[f] < surface.first_of_face[f + 1] && surface.patch[surface.first_of_face[f + 1] - 1].side == 0)
+        k.near_rim.push_back(f);
     for (uint32_t i = 0; i < m.capsule.size(); ++i) {
       const BodySphere &sa = m.sphere[m.capsule[i].a], &sb = m.sphere[m.capsule[i].b];
       if (sa.radius <= 0 || sb.radius <= 0 || skipped(m.capsule[i].a) || skipped(m.capsule[i].b)) continue;
@@ -237,14 +257,15 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       if (holds_tissue && sa.jaw != 0 && distance((pa + pb) * 0.5f, jaws) < 6e-3f) continue;
       const Vec3 middle = (pa + pb) * 0.5f;
       const float reach = 0.5f * distance(pa, pb) + std::max(sa.radius, sb.radius) + margin;
-      for (const uint32_t f : k.near) {
+      for (const uint32_t f : k.near_rim) {
         const uint32_t last = surface.first_of_face[f + 1];
         uint32_t strip = surface.first_of_face[f];
         while (strip < last && surface.patch[strip].side != 0) ++strip;
         if (strip == last) continue;
         const float r = k.face_radius[f] + reach;
         if (length2(k.face_center[f] - middle) > r * r) continue;
-        for (uint32_t q = strip; q < last; ++q)
+        for (uint32_t q = strip; q < last; ++q) {
+          if (least_distance(wm, ws, surface, search, box_here(f), q, middle) > 1.001f * reach) continue;
           for (const float zeta : {-1.0f, 1.0f}) {
             const auto [ea, eb, up] = strip_ends(wm, ws, surface, q, zeta);
             float t = 0, u = 0;
@@ -263,6 +284,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
             foot.patch = 2 * q + (zeta > 0 ? 1 : 0);
             add(i, foot, on, radius, jaw_speed, 2);
           }
+        }
       }
     }
   }

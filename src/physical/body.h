@@ -162,7 +162,8 @@ struct BodiesScratch {
   std::vector<Vec3> speed, change, before, onward;
   std::vector<Vec3> face_center;
   std::vector<float> face_radius;
-  std::vector<uint32_t> near;
+  std::vector<uint32_t> near, near_rim;  // elements near a body; those of them that have strips
+  std::vector<uint32_t> near_run;        // elements near a run of its spheres
   // Elements within some millimeters of a body. A list is kept until body and wall may have come nearer by that much.
   struct Around {
     Vec3 low, high;    // [m] of the body then

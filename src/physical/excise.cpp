@@ -27,6 +27,7 @@ void char_around(const wall::Model& m, Excision& e, uint32_t face, Vec3 tip, flo
   std::array<uint32_t, 40> near;
   const size_t count = near_faces(m, face, near);
   for (size_t i = 0; i < count; ++i) {
+    if (is_beyond(m, near[i], tip, 3 * width)) continue;
     const bool quad = is_quad(m, near[i]);
     const wall::Raster& r = wall::raster(quad);
     for (uint32_t c = 0; c < wall::kCells; ++c) {
@@ -59,7 +60,9 @@ Foot nearest_foot(const Model& m, const State& s, Vec3 tip, float reach) {
     const float r = std::sqrt(far2) + m.wall.laminate.thickness + reach;
     if (length2(tip - center) > r * r) continue;
     for (uint32_t q = surface.first_of_face[e]; q < surface.first_of_face[e + 1]; ++q) {
-      Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, tip);
+      const Patch& patch = surface.patch[q];
+      if (patch.part && ball_of(m.wall, s.wall, patch).least_distance(tip) > best.gap) continue;
+      const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, tip);
       // A tip that has sunk into its own groove is still on the face that it came from.
       const float far = distance(foot.at, tip);
       if (far < best.gap) best = foot, best.gap = far;
@@ -95,7 +98,8 @@ PenStep use_pen(const ExciseModel& law, const Model& m, State& s, Scratch& k, Ex
       (!e.touching || e.path.empty() || length2(wall::rest_place(m.wall, e.path.back()) - tip) > kApart * kApart))
     e.path.push_back(now);
 
-  std::vector<wall::Mark> marks;
+  std::vector<wall::Mark>& marks = k.marks;
+  marks.clear();
   if (e.touching) {
     wall::trace(m.wall, e.last, now, marks);
     for (const wall::Mark& mark : marks) {

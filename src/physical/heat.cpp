@@ -74,6 +74,7 @@ void heat_at(const HeatModel& law, const wall::Model& m, const wall::Point& tip,
   size_t spots = 0;
   float sum = 0;
   for (size_t i = 0; i < count; ++i) {
+    if (is_beyond(m, near[i], at, 2 * radius)) continue;
     const CellSize size = cell_size(m, near[i]);
     for (uint32_t c = 0; c < wall::kCells && spots < spot.size(); ++c) {
       const float d2 = length2(center_of(m, near[i], c) - at) / (radius * radius);
@@ -91,14 +92,17 @@ void heat_at(const HeatModel& law, const wall::Model& m, const wall::Point& tip,
 }
 
 void conduct(const HeatModel& law, const wall::Model& m, const wall::Topology& t, std::span<const wall::Point> path, float h,
-             Heat& heat) {
+             HeatScratch& scratch, Heat& heat) {
   if (heat.warm.empty()) return;
   // Heat enters the neighbors of warm faces.
-  std::vector<uint32_t> active = heat.warm;
+  std::vector<uint32_t>& active = scratch.active;
+  active.reserve(m.mesh.face.size()), scratch.next.reserve(m.mesh.face.size());
+  active.assign(heat.warm.begin(), heat.warm.end());
   for (const uint32_t f : heat.warm)
     for (const uint32_t over : m.neighbor[f])
       if (over != wall::kNone) add_warm(active, over / 4);
-  std::vector<std::array<float, wall::kCells>> next(active.size());
+  std::vector<std::array<float, wall::kCells>>& next = scratch.next;
+  next.resize(active.size());
   for (size_t i = 0; i < active.size(); ++i) {
     const uint32_t f = active[i];
     const bool quad = is_quad(m, f);

@@ -39,8 +39,13 @@ constexpr void reflect(auto& a, Like<Heat> auto& h) { a(h.warmer), a(h.damage), 
 // The tip at a material point for h seconds.
 void heat_at(const HeatModel& law, const wall::Model& wall, const wall::Point& tip, float power, bool coagulate, float h,
              Heat& heat);
+// Working memory of `conduct`.
+struct HeatScratch {
+  std::vector<uint32_t> active;                       // warm faces and their neighbors
+  std::vector<std::array<float, wall::kCells>> next;  // [K] of them
+};
 // Conduction, cooling and damage in h seconds. path: places of the tip.
 void conduct(const HeatModel& law, const wall::Model& wall, const wall::Topology& topology, std::span<const wall::Point> path,
-             float h, Heat& heat);
+             float h, HeatScratch& scratch, Heat& heat);
 
 }  // namespace catgut::physical

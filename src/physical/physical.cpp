@@ -46,7 +46,7 @@ Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wal
   lips.reserve(3 * columns);
   search.reserve(m.wall, s.wall, s.thread.nodes());
   bodies.reserve(m.wall, s.wall);
-  holds.reserve(256);
+  holds.reserve(256), marks.reserve(1024);
   point.reserve(thread::kMaxSoftPoints), offset.reserve(thread::kMaxSoftPoints);
 }
 
@@ -177,7 +177,9 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       nearest_box = std::min(nearest_box, far);
       if (far > std::min(reach, std::abs(best.gap) + 1e-6f)) continue;
       for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q)
-        if (q != known && least_distance(box, p, surface.patch[q].side) <= std::min(reach, std::abs(best.gap) + 1e-6f)) look(q);
+        if (q != known &&
+            least_distance(m.wall, s.wall, surface, k.search, box, q, p) <= std::min(reach, std::abs(best.gap) + 1e-6f))
+          look(q);
     }
     constexpr float kSpare = 0.2e-3f;  // [m]
     k.search.node_seen[i] = p;
@@ -205,7 +207,7 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
         const int side = surface.patch[q].side;
         if (q == best.patch || (side != 0 && dot(box.n, best.normal) * static_cast<float>(side) > 0.97f) ||
-            least_distance(box, p, side) > second.gap)
+            least_distance(m.wall, s.wall, surface, k.search, box, q, p) > second.gap)
           continue;
         const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p);
         if (!foot.on_edge && foot.gap > 0 && foot.gap < second.gap && dot(foot.facing, best.normal) < 0.95f) second = foot;

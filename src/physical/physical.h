@@ -92,6 +92,7 @@ struct Scratch {
   std::vector<thread::SoftPoints::Tilt> tilt;
   BodiesScratch bodies;
   std::vector<thread::Hold> holds;  // those of the hands, then those of the bodies
+  std::vector<wall::Mark> marks;    // of a pen (physical/excise)
   explicit Scratch(const Model& model, const State& state);
 };
 

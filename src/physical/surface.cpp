@@ -344,7 +344,8 @@ void SurfaceSearch::reserve(const wall::Model& m, const wall::State& s, size_t n
   node_first.reserve(nodes + 1), node_face.reserve(64 * nodes);
   column_first.reserve(2 * columns + 1), column_face.reserve(64 * columns);
   box.resize(faces);
-  seen.reserve(2 * columns), column_due.reserve(2 * columns), node_due.reserve(nodes), node_seen.reserve(nodes);
+  lip_patch.reserve(6 * columns), seen.reserve(2 * columns), column_due.reserve(2 * columns), node_due.reserve(nodes),
+      node_seen.reserve(nodes);
 }
 
 namespace {
@@ -420,10 +421,34 @@ float least_distance(const FaceBox& box, Vec3 p, int side) {
   return std::sqrt(da * da + db * db + dn * dn) * 0.9999f;
 }
 
+PatchBall ball_of(const wall::Model& m, const wall::State& s, const Patch& patch) {
+  const Corners c = corners_of(m, s.topology, patch.face);
+  std::array<Vec3, 4> corner;
+  const uint32_t count = patch.side == 0 || patch.quad ? 4 : 3;
+  for (uint32_t i = 0; i < count; ++i)
+    corner[i] = patch.side != 0 ? place_on(s, c, patch.at[i], static_cast<float>(patch.side))
+                                : place_on(s, c, patch.at[i % 2], i < 2 ? -1.0f : 1.0f);
+  PatchBall ball;
+  for (uint32_t i = 0; i < count; ++i) ball.center += corner[i] / static_cast<float>(count);
+  for (uint32_t i = 0; i < count; ++i) ball.radius = std::max(ball.radius, distance(corner[i], ball.center));
+  ball.radius *= 1.0001f;
+  return ball;
+}
+
+float least_distance(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& k, const FaceBox& box,
+                     uint32_t index, Vec3 p) {
+  const Patch& patch = surface.patch[index];
+  const float far = least_distance(box, p, patch.side);
+  if (!patch.part) return far;
+  PatchBall& ball = k.ball[index];
+  if (ball.step != k.step) ball = ball_of(m, s, patch), ball.step = k.step;
+  return std::max(far, ball.least_distance(p));
+}
+
 void find_near(const wall::Model& m, const wall::State& s, const Surface& surface, const thread::State& thread,
                SurfaceSearch& k) {
   const size_t nodes = thread.nodes(), columns = wall::columns(s), faces = wall::elements(m, s.topology);
-  k.box.resize(faces);
+  k.box.resize(faces), k.ball.resize(surface.patch.size());
   const float limit2 = 0.25f * k.margin * k.margin * 0.25f;  // all may move: a quarter of the margin each
   bool wall_stale = k.wall_listed.size() != columns || k.version != s.topology.version;
   for (uint32_t c = 0; c < columns && !wall_stale; ++c) wall_stale = length2(mid(s, c) - k.wall_listed[c]) > limit2;
@@ -472,6 +497,7 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
   k.wall_listed.resize(columns);
   for (uint32_t c = 0; c < columns; ++c) k.wall_listed[c] = mid(s, c);
   k.column_due.assign(columns, 0), k.column_first.clear(), k.column_face.clear();
+  k.lip_patch.assign(3 * columns, wall::kNone);
   const auto rest = [&](uint32_t column) {
     const uint32_t source = s.topology.source[column];
     return (m.mesh.outer[source] + m.mesh.inner[source]) * 0.5f;
@@ -513,24 +539,33 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       const float speed = length(wall::velocity(w, s.motion));
       Foot best;
       best.gap = 1e9f;
+      const auto look = [&](const FaceBox& box, uint32_t q) {
+        const float reach =
+            std::min(std::abs(best.gap), std::max(kDeep, solver.reach + 2 * m.step * (box.speed + speed))) + 1e-6f;
+        if (least_distance(m, s, surface, search, box, q, p) > reach) return;
+        const Foot foot = nearest_on_patch(m, s, surface, q, p);
+        if (foot.gap < -kDeep || std::abs(foot.gap) > std::abs(best.gap)) return;
+        if (std::abs(foot.gap) == std::abs(best.gap) && q < best.patch) return;  // whatever was looked at first
+        if (foot.gap < 0 && foot.on_edge) return;
+        // The wall of the point itself lies behind it, outside the other part: the inner side for a point of a face.
+        if (!surface.at_rim[c] && dot(foot.normal, up) * zeta > -0.3f * length(up)) return;
+        best = foot;
+      };
+      // Most likely still the nearest: the others need not be searched.
+      uint32_t& known = search.lip_patch[3 * c + static_cast<uint32_t>(zeta + 1)];
+      const uint32_t first = known;
+      if (first != wall::kNone) look(box_of(m, s, search, surface.patch[first].face), first);
       for (uint32_t i = search.column_first[c]; i < search.column_first[c + 1]; ++i) {
         const uint32_t face = search.column_face[i];
         const FaceBox& box = box_of(m, s, search, face);
-        const float reach =
-            std::min(std::abs(best.gap), std::max(kDeep, solver.reach + 2 * m.step * (box.speed + speed))) + 1e-6f;
         const float far = least_distance(box, p, 0);
         nearest_box = std::min(nearest_box, far);
-        if (far > reach) continue;
-        for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
-          if (least_distance(box, p, surface.patch[q].side) > reach) continue;
-          const Foot foot = nearest_on_patch(m, s, surface, q, p);
-          if (foot.gap < -kDeep || std::abs(foot.gap) > std::abs(best.gap)) continue;
-          if (foot.gap < 0 && foot.on_edge) continue;
-          // The wall of the point itself lies behind it, outside the other part: the inner side for a point of a face.
-          if (!surface.at_rim[c] && dot(foot.normal, up) * zeta > -0.3f * length(up)) continue;
-          best = foot;
-        }
+        if (far > std::min(std::abs(best.gap), std::max(kDeep, solver.reach + 2 * m.step * (box.speed + speed))) + 1e-6f)
+          continue;
+        for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q)
+          if (q != first) look(box, q);
       }
+      known = best.gap > 1e8f ? wall::kNone : best.patch;
       if (best.gap > 1e8f) continue;
       wall::Contact k;
       k.self = true;

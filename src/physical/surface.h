@@ -66,6 +66,14 @@ struct FaceBox {
   float low[2]{}, high[2]{};     // [m] along n: of the inner and of the outer face
   float speed = 0;               // [m/s] maximum of its corners
 };
+// The same about one patch of a fragment: its face is often much larger.
+struct PatchBall {
+  uint32_t step = 0;
+  Vec3 center;
+  float radius = 0;                                                                      // [m]
+  float least_distance(Vec3 p) const { return distance(center, p) * 0.9999f - radius; }  // [m] at most
+};
+PatchBall ball_of(const wall::Model& model, const wall::State& state, const Patch& patch);
 
 // Which faces are near which nodes and columns. Lists are kept until something has moved half their margin.
 struct SurfaceSearch {
@@ -76,8 +84,10 @@ struct SurfaceSearch {
   std::vector<Vec3> center;                         // [m] per face
   std::vector<float> radius;
   uint32_t version = 0;
-  uint32_t step = 0;         // counts steps, for the boxes
-  std::vector<FaceBox> box;  // per face, made on first use in a step
+  uint32_t step = 0;                // counts steps, for the boxes
+  std::vector<FaceBox> box;         // per face, made on first use in a step
+  std::vector<PatchBall> ball;      // per patch, likewise; only of fragments
+  std::vector<uint32_t> lip_patch;  // per column and zeta: the nearest patch of the last search, which is looked at first
   // What was far from everything is not searched again before the wall may have come near.
   std::vector<wall::Float4> seen;  // the wall in the last step
   double moved = 0;                // [m] the longest path that any point of the wall has traveled so far; only grows
@@ -90,6 +100,9 @@ struct SurfaceSearch {
 const FaceBox& box_of(const wall::Model& model, const wall::State& state, SurfaceSearch& search, uint32_t face);
 // At most the distance [m] from p to the face's patches of one side: -1 inner, 1 outer, 0 any.
 float least_distance(const FaceBox& box, Vec3 p, int side);
+// The same of one patch, whose face has this box.
+float least_distance(const wall::Model& model, const wall::State& state, const Surface& surface, SurfaceSearch& search,
+                     const FaceBox& box, uint32_t patch, Vec3 p);
 
 // Once per step, before everything below: how far the wall moves.
 void watch_wall(const wall::State& state, SurfaceSearch& search);

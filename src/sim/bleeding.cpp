@@ -15,10 +15,10 @@ constexpr float kSwabReach = 5e-3f;   // [m] round the middle of a swab; its rad
 constexpr float kSwabForce = 0.1f;    // [N] on a swab: the pressure of small arteries on 12 mm^2
 constexpr float kSwabBeside = 1e-3f;  // [m] from the wall: it touches
 
-std::vector<physical::Pressure> pressures(const Model& model, const State& state) {
+void find_pressures(const Model& model, const State& state, std::vector<physical::Pressure>& out) {
   const physical::Model& m = model.physical->world;
   const physical::State& world = state.physical.world;
-  std::vector<physical::Pressure> out;
+  out.clear();
   for (uint32_t i = 0; i < model.solver.instruments(); ++i) {
     const physical::Body& body = world.bodies.body[i];
     if (body.grip.what == physical::Gripped::tissue) {
@@ -39,24 +39,24 @@ std::vector<physical::Pressure> pressures(const Model& model, const State& state
       }
     }
   }
-  return out;
 }
 
 }  // namespace
 
-void bleed(const Model& model, State& state) {
+void bleed(const Model& model, State& state, CutScratch& k) {
   Cutting& c = state.physical.cutting;
   if (c.mode.empty()) return;
   const wall::Model& wall = model.physical->world.wall;
   physical::Excision& e = c.excision;
-  physical::conduct(kExciseLaw.heat, wall, state.physical.world.wall.topology, e.path, model.dt, e.heat);
+  physical::conduct(kExciseLaw.heat, wall, state.physical.world.wall.topology, e.path, model.dt, k.heat, e.heat);
   if (e.bleed.empty()) return;
-  std::vector<float> before;
-  for (const physical::Bleed& b : e.bleed) before.push_back(b.flow);
-  physical::bleed_on(kExciseLaw.bleed, wall, pressures(model, state), model.dt, e.bleed);
-  for (size_t i = 0; i < before.size(); ++i) {
+  k.flow.clear();
+  for (const physical::Bleed& b : e.bleed) k.flow.push_back(b.flow);
+  find_pressures(model, state, k.pressure);
+  physical::bleed_on(kExciseLaw.bleed, wall, k.pressure, model.dt, e.bleed);
+  for (size_t i = 0; i < k.flow.size(); ++i) {
     const physical::Bleed& b = e.bleed[i];
-    if ((before[i] > 0) == (b.flow > 0)) continue;
+    if ((k.flow[i] > 0) == (b.flow > 0)) continue;
     Event event;
     event.kind = b.flow > 0 ? EventKind::bleeding_started : EventKind::bleeding_stopped;
     event.who = kNoHand, event.which = static_cast<uint32_t>(i), event.value = b.flow > 0 ? b.flow : b.lost;

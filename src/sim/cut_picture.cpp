@@ -49,24 +49,6 @@ float size_of(const wall::Model& m, uint32_t face) {
   return std::sqrt(far2);
 }
 
-// Faces that show traces of a cut: they are drawn cell by cell.
-void find_touched(const wall::Model& m, const physical::Excision& e, std::vector<uint32_t>& touched) {
-  constexpr float kVisible = 0.04f;  // of char
-  touched.clear();
-  for (uint32_t f = 0; f < e.passed.size(); ++f) {
-    float burnt = 0;
-    for (const float b : e.burnt[f]) burnt = std::max(burnt, b);
-    bool stained = false;
-    for (size_t i = 0; i < e.bleed.size() && !stained; ++i) {
-      const physical::Bleed& b = e.bleed[i];
-      if (!(b.on_wall > 0)) continue;
-      const float reach = physical::stain_reach(kExciseLaw.bleed, b.on_wall) + size_of(m, f);
-      stained = length2(middle_of(m, f) - wall::rest_place(m, b.at)) < reach * reach;
-    }
-    if (e.passed[f].any() || burnt > kVisible || stained) touched.push_back(f);
-  }
-}
-
 // What the shape of the picture depends on.
 uint64_t shape_of(const wall::Model& wall, const State& state) {
   const std::vector<uint32_t>& touched = state.physical.cutting.touched;
@@ -110,6 +92,15 @@ class Texture {
 
 }  // namespace
 
+// Lattice points of a face.
+struct FaceAtRest {
+  Vec3 middle;     // [m]
+  float size = 0;  // [m] no point of the face is farther from its middle
+  uint32_t points = 0;
+  std::array<uint8_t, physical::kLatticePoints> number{};
+  std::array<Vec3, physical::kLatticePoints> lattice{};  // [m]
+};
+
 // Constant: what every picture of a scene needs.
 struct CutPictureSource {
   std::shared_ptr<const PhysicalModel> physical;
@@ -119,9 +110,25 @@ struct CutPictureSource {
   std::vector<std::array<float, 2>> uv;  // per column at rest, on the outer side
   std::vector<uint32_t> body;            // per column at rest
   std::vector<float> turn;               // per body: Texture::turn
+  std::vector<FaceAtRest> rest;          // per face of the wall
 };
 
 namespace {
+
+FaceAtRest at_rest(const wall::Model& m, uint32_t face) {
+  FaceAtRest out;
+  const bool quad = is_quad(m, face);
+  out.middle = middle_of(m, face), out.size = size_of(m, face);
+  constexpr int32_t kUnit = wall::kLattice / wall::kRaster;
+  for (uint32_t k = 0; k < physical::kLatticePoints; ++k) {
+    const int32_t u = static_cast<int32_t>(k % physical::kLatticeSide), v = static_cast<int32_t>(k / physical::kLatticeSide);
+    if (!quad && u + v > wall::kRaster) continue;
+    wall::Point p{face, 0, 0, 0};
+    wall::to_natural(quad, {u * kUnit, v * kUnit}, p.xi, p.eta);
+    out.lattice[out.points] = wall::rest_place(m, p), out.number[out.points++] = static_cast<uint8_t>(k);
+  }
+  return out;
+}
 
 std::shared_ptr<const CutPictureSource> make_source(const Model& model) {
   auto made = std::make_shared<CutPictureSource>();
@@ -140,6 +147,8 @@ std::shared_ptr<const CutPictureSource> make_source(const Model& model) {
       made->body.push_back(b);
     }
   }
+  const wall::Model& m = model.physical->world.wall;
+  for (uint32_t f = 0; f < m.mesh.face.size(); ++f) made->rest.push_back(at_rest(m, f));
   return made;
 }
 
@@ -349,16 +358,52 @@ PictureModel draw(const CutShape& shape) {
   return picture;
 }
 
+// Faces that show traces of a cut: they are drawn cell by cell. all: false adds only those that a pen has passed.
+void find_touched(const CutPictureSource& source, const physical::Excision& e, const std::vector<physical::Stain>& stain,
+                  const std::vector<uint32_t>& was, std::vector<uint32_t>& touched, bool all) {
+  constexpr float kVisible = 0.04f;  // of char
+  touched.clear();
+  size_t next = 0;  // of `was`
+  for (uint32_t f = 0; f < e.passed.size(); ++f) {
+    while (next < was.size() && was[next] < f) ++next;
+    bool shows = e.passed[f].any();
+    if (!shows && !all) {
+      shows = next < was.size() && was[next] == f;
+    } else if (!shows) {
+      const auto reaches = [&](const physical::Stain& s) {
+        const float far = s.radius + source.rest[f].size;
+        return s.away2(source.rest[f].middle) < far * far;
+      };
+      shows = std::any_of(e.burnt[f].begin(), e.burnt[f].end(), [](float b) { return b > kVisible; }) ||
+              std::any_of(stain.begin(), stain.end(), reaches);
+    }
+    if (shows) touched.push_back(f);
+  }
+}
+
+constexpr uint32_t kScarsOfFace = 2 * physical::kLatticePoints;
+
+// The scars of faces that were touched before; new ones have none yet.
+void carry_scars(const std::vector<uint32_t>& was, const std::vector<uint32_t>& touched, const std::vector<Scar>& from,
+                 std::vector<Scar>& to) {
+  to.assign(touched.size() * kScarsOfFace, {});
+  size_t k = 0;
+  for (size_t i = 0; i < touched.size(); ++i) {
+    while (k < was.size() && was[k] < touched[i]) ++k;
+    if (k == was.size() || was[k] != touched[i]) continue;
+    const auto first = from.begin() + static_cast<std::ptrdiff_t>(k * kScarsOfFace);
+    std::copy(first, first + kScarsOfFace, to.begin() + static_cast<std::ptrdiff_t>(i * kScarsOfFace));
+  }
+}
+
 // Char and depth of the grooves at the lattice points of the touched faces.
-void find_scars(const Model& model, const Cutting& c, std::vector<Scar>& out) {
+void find_scars(const Model& model, const Cutting& c, CutScratch& scratch, std::vector<Scar>& out) {
   const wall::Model& m = model.physical->world.wall;
   constexpr uint32_t kPoints = physical::kLatticePoints;
-  struct Point {
-    float burnt = 0, depth[2] = {0, 0};  // [m] from the outer and from the inner face
-    bool through = false;
-  };
-  std::vector<Point> point(c.touched.size() * kPoints);
-  std::vector<uint32_t> trace(m.mesh.face.size(), wall::kNone);
+  using Point = CutScratch::ScarPoint;
+  std::vector<Point>& point = scratch.point;
+  std::vector<uint32_t>& trace = scratch.trace;
+  point.assign(c.touched.size() * kPoints, {}), trace.assign(m.mesh.face.size(), wall::kNone);
   for (uint32_t i = 0; i < c.touched.size(); ++i) {
     const uint32_t f = c.touched[i];
     trace[f] = i;
@@ -400,43 +445,35 @@ void find_scars(const Model& model, const Cutting& c, std::vector<Scar>& out) {
           for (size_t d = 0; d < 2; ++d) a.depth[d] = b.depth[d] = std::max(a.depth[d], b.depth[d]);
         }
       }
-  out.resize(point.size() * 2);
   for (size_t i = 0; i < point.size(); ++i)
     for (size_t d = 0; d < 2; ++d) {
       Scar& scar = out[2 * i + d];
       scar.burnt = static_cast<uint8_t>(std::min(255.0f, 255 * point[i].burnt));
-      scar.blood = 0;
       scar.depth = point[i].through ? uint8_t{0} : static_cast<uint8_t>(std::min(255.0f, point[i].depth[d] * 1e5f));
     }
 }
 
 // Blood at the same points: on the outer face it runs down, the cut edge and the mucosa get only the drop round the vessel.
-void find_stains(const Model& model, const Cutting& c, std::vector<Scar>& out) {
-  const wall::Model& m = model.physical->world.wall;
-  const Vec3 down = normalized(model.scene.solver.gravity, {0, -1, 0});
-  for (const physical::Bleed& b : c.excision.bleed) {
-    if (!(b.on_wall > 0)) continue;
-    const Vec3 vessel = wall::rest_place(m, b.at);
-    const float reach = physical::stain_reach(kExciseLaw.bleed, b.on_wall);
-    for (uint32_t i = 0; i < c.touched.size(); ++i) {
-      const uint32_t f = c.touched[i];
-      const float far = reach + size_of(m, f);
-      if (length2(middle_of(m, f) - vessel) > far * far) continue;
-      const bool quad = is_quad(m, f);
-      for (uint32_t k = 0; k < physical::kLatticePoints; ++k) {
-        const int32_t u = static_cast<int32_t>(k % physical::kLatticeSide),
-                      v = static_cast<int32_t>(k / physical::kLatticeSide);
-        if (!quad && u + v > wall::kRaster) continue;
-        wall::Point p{f, 0, 0, 0};
-        constexpr int32_t kUnit = wall::kLattice / wall::kRaster;
-        wall::to_natural(quad, {u * kUnit, v * kUnit}, p.xi, p.eta);
-        const Vec3 place = wall::rest_place(m, p);
-        const float outside = physical::blood_at(kExciseLaw.bleed, vessel, b.on_wall, down, place);
-        const bool near = length2(place - vessel) < kExciseLaw.bleed.stain * kExciseLaw.bleed.stain;
-        for (size_t side = 0; side < 2; ++side) {
-          uint8_t& blood = out[2 * (i * physical::kLatticePoints + k) + side].blood;
-          if (side == 0 || near) blood = std::max(blood, static_cast<uint8_t>(230 * outside));
-        }
+// Only of faces that are due.
+template <typename Due>
+void find_stains(const CutPictureSource& source, const std::vector<uint32_t>& touched,
+                 const std::vector<physical::Stain>& stains, std::vector<Scar>& out, Due due) {
+  constexpr float kDrop = kExciseLaw.bleed.stain;
+  for (uint32_t i = 0; i < touched.size(); ++i) {
+    if (!due(touched[i])) continue;
+    const FaceAtRest& face = source.rest[touched[i]];
+    Scar* scar = out.data() + size_t{i} * kScarsOfFace;
+    for (uint32_t k = 0; k < kScarsOfFace; ++k) scar[k].blood = 0;
+    for (const physical::Stain& s : stains) {
+      const float far = s.radius + face.size;
+      if (s.away2(face.middle) > far * far) continue;
+      for (uint32_t k = 0; k < face.points; ++k) {
+        const Vec3 place = face.lattice[k];
+        if (s.away2(place) >= s.radius * s.radius) continue;
+        const uint8_t blood = static_cast<uint8_t>(230 * blood_at(s, place));
+        Scar* at = scar + 2 * face.number[k];
+        at[0].blood = std::max(at[0].blood, blood);
+        if (length2(place - s.vessel) < kDrop * kDrop) at[1].blood = std::max(at[1].blood, blood);
       }
     }
   }
@@ -474,25 +511,40 @@ std::vector<Quat> rotations(const wall::Model& m, const wall::State& s) {
 
 }  // namespace
 
-void renew_cut_picture(const Model& model, State& state) {
+void renew_cut_picture(const Model& model, State& state, CutScratch& k) {
   Cutting& c = state.physical.cutting;
   if (c.mode.empty() || c.excision.passed.empty()) {
     c.picture = {}, c.picture_of = 0;
     return;
   }
-  // An active pen, scissors and blood change the wall's look. Blood does so slowly.
+  // An active pen, scissors and blood change the wall's look. Blood does so slowly: a sixth of the faces in every
+  // tick, and every sixth tick it may reach another face.
   constexpr uint64_t kEvery = 6;  // ticks
-  const bool cuts = std::any_of(c.mode.begin(), c.mode.end(), [](PenMode m) { return m != PenMode::off; }) ||
+  const bool first = !c.picture;
+  const bool cuts = first || std::any_of(c.mode.begin(), c.mode.end(), [](PenMode m) { return m != PenMode::off; }) ||
                     state.physical.world.wall.topology.version != c.picture_version;
-  const bool bleeds = state.tick % kEvery == 0 && !c.excision.bleed.empty();
-  if (c.picture && !cuts && !bleeds) return;
+  if (!cuts && c.excision.bleed.empty()) return;
   c.picture_version = state.physical.world.wall.topology.version;
-  find_touched(model.physical->world.wall, c.excision, c.touched);
-  find_scars(model, c, c.scar);
-  find_stains(model, c, c.scar);
+  if (!c.source) c.source = make_source(model);
+  const size_t faces = c.excision.passed.size();
+  c.touched.reserve(faces), k.was.reserve(faces);
+  const Vec3 down = normalized(model.scene.solver.gravity, {0, -1, 0});
+  k.stain.clear();
+  for (const physical::Bleed& b : c.excision.bleed)
+    if (b.on_wall > 0)
+      k.stain.push_back(stain_of(kExciseLaw.bleed, wall::rest_place(model.physical->world.wall, b.at), b.on_wall, down));
+  const auto due = [&](uint32_t f) { return first || f % kEvery == state.tick % kEvery; };
+  k.was.assign(c.touched.begin(), c.touched.end());
+  if (first) k.was.clear();
+  find_touched(*c.source, c.excision, k.stain, k.was, c.touched, first || state.tick % kEvery == 0);
+  const bool same = !first && k.was == c.touched;
+  if (!same) carry_scars(k.was, c.touched, c.scar, k.scar), c.scar.swap(k.scar);
+  if (cuts || !same) find_scars(model, c, k, c.scar);
+  find_stains(*c.source, c.touched, k.stain, c.scar,
+              [&](uint32_t f) { return due(f) || (!same && !std::binary_search(k.was.begin(), k.was.end(), f)); });
+  if (same && !cuts && state.tick % kEvery != 0) return;
   const uint64_t shape = shape_of(model.physical->world.wall, state);
   if (c.picture && c.picture_of == shape) return;
-  if (!c.source) c.source = make_source(model);
   const wall::Topology& t = state.physical.world.wall.topology;
   CutShape seen;
   seen.source = c.source;
@@ -503,6 +555,11 @@ void renew_cut_picture(const Model& model, State& state) {
   for (uint32_t i = 0; i < c.touched.size(); ++i) seen.trace[c.touched[i]] = i;
   c.picture = DividedPicture([shape = std::move(seen)] { return draw(shape); });
   c.picture_of = shape;
+}
+
+void renew_cut_picture(const Model& model, State& state) {
+  CutScratch scratch;
+  renew_cut_picture(model, state, scratch);
 }
 
 void publish_cut(const Model& model, const State& state, Snapshot& out) {

@@ -35,6 +35,22 @@ struct Stroke {
 };
 constexpr void reflect(auto& a, Like<Stroke> auto& s) { a(s.began), a(s.deepest), a(s.through), a(s.off_line), a(s.inner); }
 
+// Working memory of the stages below: its contents never affect their results.
+struct CutScratch {
+  physical::HeatScratch heat;
+  std::vector<physical::Pressure> pressure;
+  std::vector<float> flow;  // [m3/s] per vessel, before the tick
+  // Of the picture.
+  struct ScarPoint {
+    float burnt = 0, depth[2] = {0, 0};  // [m] from the outer and from the inner face
+    bool through = false;
+  };
+  std::vector<ScarPoint> point;      // per lattice point of the touched faces
+  std::vector<uint32_t> trace, was;  // per face: its place among the touched ones; those of the last tick
+  std::vector<physical::Stain> stain;
+  std::vector<Scar> scar;
+};
+
 struct CutPictureSource;
 struct Cutting {
   std::vector<PenMode> mode;  // per instrument; empty: no instrument of the scene cuts tissue
@@ -78,7 +94,7 @@ void use_pens(const Model& model, State& state, physical::Scratch& scratch, floa
 // for pens.
 void use_scissors(const Model& model, State& state, physical::Scratch& scratch);
 // Once, after the steps (sim/bleeding): blood flows, heat spreads. Events: bleeding_started, bleeding_stopped.
-void bleed(const Model& model, State& state);
+void bleed(const Model& model, State& state, CutScratch& scratch);
 // Once, after the steps: the fault pulled_attached.
 void watch_pulls(const Model& model, State& state);
 // Whether a material point lies in charred tissue.
@@ -95,6 +111,7 @@ constexpr physical::ExciseModel kExciseLaw;
 // --- sim/cut_picture -----------------------------------------------------------------------------------------------------
 // Once per tick and after a load: notes what a new picture shows if the shape of the drawn wall has changed. The picture is
 // made by the first who looks at it (exchange/divided_picture).
+void renew_cut_picture(const Model& model, State& state, CutScratch& scratch);
 void renew_cut_picture(const Model& model, State& state);
 // Adds copies of columns, rotations, scars and the picture to a snapshot of the tissue as built.
 void publish_cut(const Model& model, const State& state, Snapshot& snapshot);

@@ -24,6 +24,7 @@ struct PhysicalScratch {
   std::vector<Puncture> puncture;
   std::vector<float> depth;  // [m] per needle: largest depth of its tip in the tissue in this tick
   thread::Plane drape;
+  CutScratch cut;
   PhysicalScratch(const Model& model, const PhysicalState& state) : world(model.physical->world, state.world) {
     target.resize(state.world.bodies.body.size());
     was.resize(model.solver.instruments());
@@ -486,8 +487,8 @@ void step_physical(const Model& model, State& state, const TickInput& given, Job
   show_bites(model, state, sewing, k);
   show_points(model, state);
   watch_pulls(model, state);
-  bleed(model, state);
-  renew_cut_picture(model, state);
+  bleed(model, state, k.cut);
+  renew_cut_picture(model, state, k.cut);
   remember_hands(state, input);
   ++state.tick;
   finish_haptics(model, state);

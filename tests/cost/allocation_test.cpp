@@ -217,6 +217,43 @@ TEST(Allocation, a_stitch_that_is_drawn_asks_for_none) {
   EXPECT_EQ(count, 0u) << sites();
 }
 
+// Tissue that is warm and bleeds, after a pen. A tick in which the drawn surface gets another shape allocates that picture.
+TEST(Allocation, a_tick_of_warm_and_bleeding_tissue_asks_for_none) {
+#ifndef CATGUT_COUNTS_ALLOCATIONS
+  GTEST_SKIP() << "allocations are not counted here";
+#endif
+  void* room[4];
+  backtrace(room, 4);
+  const std::shared_ptr<const Model> model = build_model(read_scene("excision"));
+  const StatePtr state = initial_state(*model);
+  const physical::Model& world = model->physical->world;
+  Cutting& c = state->physical.cutting;
+  physical::Scratch scratch(world, state->physical.world);
+  const wall::Weights at = wall::weights(world.wall, state->physical.world.wall.topology, {40, 0, 0, 1});
+  physical::Pen pen;
+  pen.tip = wall::place(at, state->physical.world.wall.motion), pen.power = 30, pen.coagulate = true;
+  for (int i = 0; i < 100; ++i) physical::use_pen(kExciseLaw, world, state->physical.world, scratch, c.excision, pen, 0.001f);
+  for (const uint32_t face : {38u, 40u, 60u}) {
+    physical::Bleed b;
+    b.at = {face, 0, 0, 0}, b.open = physical::vessel_flow(kExciseLaw.bleed, 0.2e-3f), b.on_wall = 1e-10f;
+    c.excision.bleed.push_back(b);
+  }
+  Jobs jobs(1);
+  uint64_t ticks = 0, count = 0;
+  std::string first;
+  for (TickInput input; input.tick < 90; ++input.tick) {
+    const DividedPicture before = c.picture;
+    const uint64_t n = allocations_of([&] { step(*model, *state, input, jobs); });
+    if (input.tick < 6 || !(c.picture == before)) continue;
+    ++ticks, count += n;
+    if (n > 0 && first.empty()) first = "tick " + std::to_string(input.tick) + "\n" + sites();
+  }
+  EXPECT_GT(ticks, 45u);
+  EXPECT_FALSE(c.excision.heat.warm.empty());
+  EXPECT_GT(c.excision.bleed.front().lost, 0.0f);
+  EXPECT_EQ(count, 0u) << first;
+}
+
 // Tool and needle on the wall, and a thread across the tool's way.
 TEST(Allocation, tools_and_a_needle_on_the_wall_ask_for_none) {
 #ifndef CATGUT_COUNTS_ALLOCATIONS

@@ -201,6 +201,7 @@ TEST(Heat, a_hot_spot_spreads_as_the_diffusion_equation_says) {
     const wall::Topology& whole = model->physical->start.wall.topology;
     const physical::HeatModel law;
     physical::Heat heat;
+    physical::HeatScratch scratch;
     const wall::Point tip = wall::nearest_point(wall, model->physical->start.wall, {0.0115f, -0.012f, 0}, 0);
     heat_at(law, wall, tip, 30, true, 0.05f, heat);  // 1.5 J, half of it into the tissue: some 20 K
     const auto moments = [&] {
@@ -218,7 +219,7 @@ TEST(Heat, a_hot_spot_spreads_as_the_diffusion_equation_says) {
     };
     const auto before = moments();
     constexpr float kTime = 2;
-    for (int i = 0; i < 120; ++i) conduct(law, wall, whole, std::span(&tip, 1), kTime / 120, heat);
+    for (int i = 0; i < 120; ++i) conduct(law, wall, whole, std::span(&tip, 1), kTime / 120, scratch, heat);
     const auto after = moments();
     const double expected = 2 * 1.4e-7 * static_cast<double>(kTime);
     std::printf("%d particles: variance grew by %.3f mm2, expected %.3f; heat %.3f of its own\n", particles,
