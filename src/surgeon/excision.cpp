@@ -12,6 +12,8 @@ constexpr size_t kPen = 0, kHolder = 1;
 constexpr float kClear = 0.008f;      // [m] of the tip from the surface before it touches
 constexpr float kTraction = 0.0005f;  // [m] by which the rim is raised while it is cut
 constexpr float kOverlap = 0.12f;     // [rad] beyond a full turn: the line closes on its start
+constexpr float kSteer = 0.6f;        // [rad] before the end of the first round, in which the pen returns to where it began
+constexpr float kNearLine = 0.004f;   // [m] from the line: a cut edge there is this cut's
 constexpr float kCarried = 0.0035f;   // [m] from the line to the tissue that carries it: farther than an element
 constexpr int kMostRounds = 3, kMostMisses = 8, kMostAttempts = 40;
 constexpr float kPatience = 2;  // [s] of coagulation on one vessel
@@ -55,7 +57,7 @@ std::string Excising::doing() const {
                                           "hold",
                                           "done"};
   const std::string doing = kName[stage_];
-  return gave_up_ ? "gave up: " + doing + (pieces_ < 2 && stage_ >= off ? ", it is still attached" : "") : doing;
+  return gave_up_ ? "gave up: " + doing + (!freed_ && stage_ >= off ? ", it is still attached" : "") : doing;
 }
 
 Excising::OnLine Excising::on_line(const Snapshot& seen, float angle) const {
@@ -82,6 +84,35 @@ Excising::OnLine Excising::on_line(const Snapshot& seen, float angle) const {
   else line.at = rest;
   line.out = normalized(line.out, out), line.up = normalized(line.up, opening_.axis);
   return line;
+}
+
+float Excising::stray() {
+  const auto bearing = [](float angle) {
+    const float turns = angle / (2 * kPi), part = turns - std::floor(turns);
+    return std::min(kBearings - 1, static_cast<size_t>(part * static_cast<float>(kBearings)));
+  };
+  if (rounds_ > 1) return strayed_[bearing(angle_)];
+  // A hand that draws a line strays from it slowly.
+  const float keep = portable::exp(-0.5f * dt_);
+  aim_ = aim_ * keep + skill_.aim_error * std::sqrt(1 - keep * keep) * random_.normal();
+  const float to_end = std::clamp((2 * kPi - angle_) / kSteer, 0.0f, 1.0f), there = aim_ * to_end + strayed_[0] * (1 - to_end);
+  if (angle_ < 2 * kPi) strayed_[bearing(angle_)] = there;
+  return there;
+}
+
+float Excising::closed_at(const Snapshot& seen) const {
+  if (!seen.topology.picture) return 0;
+  std::array<uint8_t, kBearings> open{};
+  const VisibleMesh& mesh = seen.topology.picture->body.front();
+  for (size_t v = 0; v < mesh.position.size(); ++v) {
+    const Vec3 from = mesh.position[v] - opening_.center;
+    if (mesh.layer[v] != TissueLayer::cut_edge || std::abs(dot(from, opening_.axis) + skill_.edge_distance) > kNearLine)
+      continue;
+    const float turns = portable::atan2(dot(from, v_), dot(from, u_)) / (2 * kPi), part = turns - std::floor(turns);
+    open[std::min(kBearings - 1, static_cast<size_t>(part * static_cast<float>(kBearings)))] = 1;
+  }
+  const auto closed = std::find(open.begin(), open.end(), uint8_t{0});
+  return closed == open.end() ? 0 : 2 * kPi * static_cast<float>(closed - open.begin()) / static_cast<float>(kBearings);
 }
 
 Pose Excising::pen_at(const OnLine& line, float above) const {
@@ -112,7 +143,7 @@ Pose Excising::grasp_at(float raised) const {
 void Excising::act(const Snapshot& seen) {
   ScriptedHand &pen = hand_[kPen], &holder = hand_[kHolder];
   const float slow = 0.35f * skill_.speed;
-  pieces_ = seen.topology.pieces;
+  freed_ = freed(seen);
   switch (stage_) {
     case over_rim:
       move_jaw(holder, 1, dt_);
@@ -141,22 +172,20 @@ void Excising::act(const Snapshot& seen) {
       return go(round);
     case round: {
       angle_ += skill_.drive_speed / opening_.radius * dt_;
-      // A hand that draws a line strays from it slowly.
-      const float keep = portable::exp(-0.5f * dt_);
-      aim_ = aim_ * keep + skill_.aim_error * std::sqrt(1 - keep * keep) * random_.normal();
       OnLine line = on_line(seen, angle_);
-      line.at += line.up * aim_;
+      line.at += line.up * stray();
       move_toward(pen, pen_at(line, 0), 2 * skill_.drive_speed + 0.02f, dt_);
-      if (angle_ >= 2 * kPi * static_cast<float>(rounds_) + kOverlap) switch_pen(), go(off);
+      // Later rounds end where the last bridge is gone.
+      if (angle_ >= began_ + 2 * kPi + kOverlap || (rounds_ > 1 && freed_)) switch_pen(), go(off);
       return;
     }
     case off:
       if (!move_toward(pen, pen_at(on_line(seen, angle_), 0.02f), skill_.speed, dt_)) return;
-      if (seen.topology.pieces > 1) return go(lift);
+      if (freed(seen)) return go(lift);
       ++retries_;
       if (rounds_ >= kMostRounds) gave_up_ = true;
-      else go(to_line);
-      return;
+      angle_ = began_ = closed_at(seen) - kOverlap;
+      return go(to_line);
     case lift:
       if (move_toward(holder, grasp_at(0.035f), slow, dt_)) go(aside);
       return;

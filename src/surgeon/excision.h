@@ -2,7 +2,8 @@
 // surgeon/excision: the scripted surgeon cuts the end of a bowel off. The left hand grasps the rim; the right hand leads an
 // electrosurgical pen once round the organ, `edge_distance` from the rim; the left hand lifts the specimen away. Then the pen
 // coagulates what still bleeds. Reads Snapshots only. The line is carried by the tissue that stays: the specimen moves as soon
-// as it is partly free.
+// as it is partly free. Near the end of the circle the pen steers to where it began. Where the wall still holds, it begins a
+// further round at the first place that is not open to the eye, and follows its own line there.
 #pragma once
 #include <array>
 #include <string>
@@ -27,6 +28,7 @@ class Excising final : public Surgeon {
   std::string doing() const override;
 
  private:
+  static constexpr size_t kBearings = 96;  // 1 mm apart, on a bowel of 30 mm
   enum Stage {
     over_rim,
     down,
@@ -56,6 +58,11 @@ class Excising final : public Surgeon {
   Pose pen_on(const BleedingView& vessel, float above) const;
   bool choose_vessel(const Snapshot& seen);  // the next that bleeds; false: none
   Pose grasp_at(float raised) const;         // the hand that holds the specimen, raised along the axis [m]
+  // [rad] the first angle at which the wall is still closed; 0, where the line began, if it is open all round.
+  float closed_at(const Snapshot& seen) const;
+  bool freed(const Snapshot& seen) const { return seen.topology.pieces > picture_.body.size(); }
+  // [m] by which the pen leaves the planned line: it strays slowly in the first round, and follows its groove afterwards.
+  float stray();
   void switch_pen() { commands_.push({CommandKind::cut, 0, 0}); }
 
   PictureModel picture_;
@@ -70,11 +77,13 @@ class Excising final : public Surgeon {
   Pose held_at_;  // of that hand when it took over
   CommandList commands_;
   Stage stage_ = over_rim;
-  float waited_ = 0, dt_ = 1.0f / 60, angle_ = 0, aim_ = 0;
+  float waited_ = 0, dt_ = 1.0f / 60, angle_ = 0, began_ = 0, aim_ = 0;
+  std::array<float, kBearings> strayed_{};  // [m] of the first round, at each bearing
   int misses_ = 0, rounds_ = 0, retries_ = 0;
   int attempts_ = 0;  // to coagulate
   bool gave_up_ = false, pen_is_near_ = false;
-  uint32_t sequence_ = 0, pieces_ = 0, vessel_ = 0;
+  bool freed_ = false;
+  uint32_t sequence_ = 0, vessel_ = 0;
 };
 
 }  // namespace catgut

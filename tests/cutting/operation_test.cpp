@@ -50,6 +50,40 @@ TEST(Operation, a_clamp_from_the_tray_is_parked_on_the_rim_and_holds_it) {
   EXPECT_LT(distance(jaws, f.seen.instrument[clamp].pose.p), 0.5e-3f);
 }
 
+// The hand slips off the line for a moment: a bridge of wall is left. Another body is in the field, as in the whole operation.
+TEST(Operation, a_bridge_left_in_the_circle_is_cut_before_the_specimen_is_lifted) {
+  SceneSpec spec = small_scene();
+  std::erase_if(spec.instrument, [](const InstrumentSpec& i) { return i.kind == "allis"; });
+  for (InstrumentSpec& i : spec.instrument)
+    if (i.kind == "cautery") i.where = "right";
+  spec.surgeon.plan = "excision", spec.surgeon.drive_speed = 0.005f;
+  Field f(spec);
+  const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(spec, picture_model(*f.model));
+  constexpr float kFrom = 2.0f, kTo = 2.25f;  // [rad] round the opening, as the pen goes
+  while (!surgeon->done() && f.of(EventKind::piece_freed).empty() && f.state->tick < 4000) {
+    f.input = surgeon->operate(f.seen, f.model->dt);
+    Vec3& pen = f.input.hand[0].pose.p;
+    const float angle = portable::atan2(-pen.z, pen.x);
+    if (f.of(EventKind::pen_activated).size() == 1 && angle > kFrom && angle < kTo)
+      pen += normalized(Vec3{pen.x, 0, pen.z}) * 3e-3f;
+    f.tick();
+  }
+  ASSERT_EQ(f.of(EventKind::piece_freed).size(), 1u) << surgeon->doing();
+  const std::vector<Event> on = f.of(EventKind::pen_activated);
+  ASSERT_EQ(on.size(), 2u) << "one round, and the bridge";
+  const Vec3 begin = on[1].where;
+  EXPECT_NEAR(portable::atan2(-begin.z, begin.x), kFrom, 0.3f) << "the second round begins at the bridge";
+  EXPECT_LT(static_cast<float>(f.of(EventKind::piece_freed)[0].tick - on[1].tick) * f.model->dt, 3);
+  EXPECT_TRUE(f.of(Fault::pulled_attached).empty());
+  while (!surgeon->done() && f.seen.topology.pieces == 3 && f.state->tick < 4500 &&
+         surgeon->doing() != "lay the specimen aside") {
+    f.input = surgeon->operate(f.seen, f.model->dt);
+    f.tick();
+  }
+  EXPECT_EQ(surgeon->doing(), "lay the specimen aside");
+  EXPECT_TRUE(f.of(Fault::pulled_attached).empty());
+}
+
 TEST(Operation, the_scripted_surgeon_carries_it_out_and_a_replay_repeats_it) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "CATGUT_LONG=1 runs it";
   const SceneSpec scene = read_scene("altemeier");
