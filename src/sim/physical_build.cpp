@@ -160,7 +160,11 @@ std::shared_ptr<const PhysicalModel> make_physical(const Model& model, const wal
   const std::vector<Vec3> path(first, model.start.end());
   made->start.thread = thread::make_state(path, 8192);
   for (const StrandModel& strand : model.solver.strand)
-    if (strand.first_slot > model.solver.tissue) made->start.thread.broken[strand.first_slot - model.solver.tissue - 1] = 1;
+    if (strand.first_slot > model.solver.tissue) {
+      const size_t between = strand.first_slot - model.solver.tissue - 1;
+      made->start.thread.broken[between] = 1;
+      made->start.thread.rest[between] = strand.spacing;  // the ends would weigh what lies between them
+    }
   add_bodies(model, *made);
   return made;
 }

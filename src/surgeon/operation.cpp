@@ -71,7 +71,7 @@ std::string Operating::doing() const {
     case sew:
       return "stitch " + std::to_string(stitched_ + 1) + ": " + sewing_->doing();
     case finished:
-      return "done";
+      return untied_ > 0 ? "gave up: stitches without a knot: " + std::to_string(untied_) : "done";
   }
   return gave_up_ ? "gave up: " + doing : doing;
 }
@@ -135,20 +135,54 @@ void Operating::join(const TickInput& part, std::initializer_list<size_t> hands)
   for (const size_t k : hands) led_[k] = 1, hand_[k].pose = part.hand[k].pose, hand_[k].jaw = part.hand[k].jaw;
 }
 
-void Operating::begin_stitch() {
-  // The places of all stitches are at one angle of a field that is turned.
-  const size_t sutures = picture_.suture.size(), tasks = make_plan("altemeier", picture_, skill_).task.size() / sutures;
-  sewing_.emplace("altemeier", picture_, skill_);
+// The places of all stitches are at one angle of a field that is turned: the tissue at rest turns too.
+void Operating::begin_stitch(TaskKind from) {
+  const size_t sutures = picture_.suture.size();
+  turn_ = -2 * kPi * static_cast<float>(place_of_stitch(stitched_)) / static_cast<float>(sutures);
+  PictureModel picture = picture_;
+  const Quat q = axis_angle(opening_.axis, turn_);
+  for (Vec3& p : picture.particle_rest) p = opening_.center + rotate(q, p - opening_.center);
+  const std::vector<Task> task = make_plan("altemeier", picture, skill_).task;
+  const size_t tasks = task.size() / sutures;
   std::vector<size_t> mine;
-  for (size_t t = 0; t < tasks; ++t) mine.push_back(stitched_ * tasks + t);
+  for (size_t t = stitched_ * tasks; t < (stitched_ + 1) * tasks; ++t)
+    if (!mine.empty() || task[t].kind == from) mine.push_back(t);
+  sewing_.emplace("altemeier", picture, skill_);
   sewing_->take_over_for(mine);
+}
+
+// Each stitch as far from those before it as it can be: opposite first, then halving the gaps.
+size_t Operating::place_of_stitch(size_t stitch) const {
+  const size_t n = picture_.suture.size();
+  std::vector<size_t> taken{0};
+  while (taken.size() <= stitch) {
+    size_t best = 0, far = 0;
+    for (size_t i = 0; i < n; ++i) {
+      size_t least = n;
+      for (const size_t t : taken) least = std::min({least, (i + n - t) % n, (t + n - i) % n});
+      if (least > far) far = least, best = i;
+    }
+    taken.push_back(best);
+  }
+  return taken[stitch];
+}
+
+// The needle has made both bites of this stitch, and the forceps holds it.
+bool Operating::pulled_through(const Snapshot& seen) const {
+  const ToolView& forceps = seen.tool[kLeft];
+  const auto& bite = seen.suture[stitched_].bite;
+  return forceps.held == Held::needle && forceps.held_suture == stitched_ &&
+         std::count_if(bite.begin(), bite.end(), [](const BiteView& b) { return b.complete; }) >= 2;
 }
 
 void Operating::look(const Snapshot& seen) {
   for (size_t k = 0; k < hand_.size(); ++k) hand_[k].pose = seen.tool[k].hand, hand_[k].jaw = seen.tool[k].jaw;
   const auto holds = [&](uint16_t i) { return seen.instrument[i].held == Held::tissue; };
   clamped_ = static_cast<size_t>(std::count_if(clamp_.begin(), clamp_.end(), holds));
-  if (seen.topology.pieces > picture_.body.size()) go(take_holder);
+  const auto cut_off = [](const SutureView& u) { return !u.needle_on_thread; };
+  stitched_ = static_cast<size_t>(std::count_if(seen.suture.begin(), seen.suture.end(), cut_off));
+  if (stitched_ == seen.suture.size()) go(finished);
+  else if (seen.topology.pieces > picture_.body.size()) go(take_holder);
   else if (clamped_ == clamp_.size()) go(seen.tool[kAssistant].instrument < 0 ? to_assistant : take_pen);
 }
 
@@ -222,18 +256,25 @@ void Operating::act(const Snapshot& seen) {
       return;
     case take_holder:
       swap_for(seen, kHoldNeedle, sew);
-      if (stage_ == sew) begin_stitch();
+      if (stage_ == sew) begin_stitch(pulled_through(seen) ? TaskKind::throw_ : TaskKind::pick_up);
       return;
     case sew: {
-      const float by = -2 * kPi * static_cast<float>(stitched_) / static_cast<float>(picture_.suture.size());
-      TickInput part = sewing_->operate(by == 0 ? seen : turned(seen, by), dt_);
-      if (by != 0) turn_back(part, by);
+      TickInput part = sewing_->operate(turn_ == 0 ? seen : turned(seen, turn_), dt_);
+      if (turn_ != 0) turn_back(part, turn_);
       join(part, {kRight, kLeft});
-      gave_up_ = sewing_->gave_up();
-      if (!sewing_->done() || gave_up_) return;
+      if (!sewing_->done()) return;
       retries_of_parts_ += sewing_->retries();
-      if (++stitched_ >= picture_.suture.size()) sewing_.reset(), go(finished);
-      else begin_stitch(), go(sew);
+      if (sewing_->gave_up() && (leaves_untied_ || !pulled_through(seen))) {
+        gave_up_ = true;
+      } else if (sewing_->gave_up()) {  // the knot failed: the needle is laid down, and the next stitch begins
+        ++untied_, leaves_untied_ = true;
+        begin_stitch(TaskKind::leave);
+      } else if (leaves_untied_ = false; ++stitched_ < picture_.suture.size()) {
+        begin_stitch(TaskKind::pick_up);
+      } else {
+        sewing_.reset(), gave_up_ = untied_ > 0;
+        go(finished);
+      }
       return;
     }
     case finished:

@@ -51,7 +51,9 @@ class Operating final : public Surgeon {
   Vec3 radial(float angle) const { return u_ * portable::cos(angle) + v_ * portable::sin(angle); }
   Pose clamp_at(float angle, float raised) const;  // jaws about the rim
   void swap_for(const Snapshot& seen, uint32_t capability, Stage next);
-  void begin_stitch();
+  bool pulled_through(const Snapshot& seen) const;
+  void begin_stitch(TaskKind from);
+  size_t place_of_stitch(size_t stitch) const;  // of as many places round the opening as there are sutures
   // The field as a surgeon sees it who stands where the next stitch is on his left; and his hands, back in the scene.
   Snapshot turned(const Snapshot& seen, float by) const;
   void turn_back(TickInput& input, float by) const;
@@ -67,7 +69,9 @@ class Operating final : public Surgeon {
   Random random_;
   Stage stage_ = take_clamp;
   float waited_ = 0, dt_ = 1.0f / 60;
-  size_t clamped_ = 0, stitched_ = 0;
+  float turn_ = 0;  // [rad] of the field, for this stitch
+  size_t clamped_ = 0, stitched_ = 0, untied_ = 0;
+  bool leaves_untied_ = false;  // the stitch in hand
   int misses_ = 0, retries_ = 0, retries_of_parts_ = 0;
   bool gave_up_ = false;
   uint32_t sequence_ = 0;

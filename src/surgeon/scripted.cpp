@@ -368,6 +368,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       return false;
     default: {
       doing_ = name_of_bite() + "pull the needle through";
+      if (!holds_needle(seen, kForceps)) return miss(over), false;  // it has slipped out
       rest_aside(seen, kNeedleHolder);
       psi_ = std::min(psi_ + 2 * skill_.drive_speed / shape().needle_radius * dt_, psi_bite + kPi + 0.5f);
       BiteFrame f = frame_;
