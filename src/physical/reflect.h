@@ -22,7 +22,7 @@ constexpr void reflect(auto& a, Like<SoftContact> auto& c) {
 }
 constexpr void reflect(auto& a, Like<State> auto& s) {
   a(s.x), a(s.fine), a(s.v), a(s.warm), a(s.rest), a(s.tension), a(s.broken), a(s.key), a(s.budget), a(s.crossing);
-  a(s.plane_normal), a(s.plane_friction), a(s.plane_drift), a(s.eyelet), a(s.listed), a(s.travel), a(s.substeps_done);
+  a(s.plane_normal), a(s.plane_friction), a(s.plane_drift), a(s.eyelet), a(s.listed), a(s.travel);
   a(s.overflow), a(s.refreshes);
 }
 

@@ -100,7 +100,6 @@ struct State {
   std::vector<Eyelet> eyelet;  // by segment; at most one in a segment
   Columns3 listed;             // [m] positions of the nodes when the pairs were listed
   float travel = 0;            // [m] motion of the tools since then; huge: the list is outdated
-  uint32_t substeps_done = 0;  // parity decides the order of a sweep
   uint32_t overflow = 0;       // pairs dropped because the list was full
   uint32_t refreshes = 0;
 
@@ -119,7 +118,7 @@ void reflect(Archive& archive, AnyState& s) {
   archive("key", s.key), archive("budget", s.budget), archive("crossing", s.crossing);
   archive("plane_normal", s.plane_normal);
   archive("eyelet", s.eyelet);
-  archive("travel", s.travel), archive("substeps_done", s.substeps_done), archive("overflow", s.overflow);
+  archive("travel", s.travel), archive("overflow", s.overflow);
   archive("refreshes", s.refreshes);
 }
 uint64_t hash_state(const State& state);
