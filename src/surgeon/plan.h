@@ -74,7 +74,6 @@ struct Plan {
   float tip_lean = 0.8f, tip_psi = 2.6f;
   float approximate = 0;  // [m] travel of each clamp
   float jerk = 0;         // [s] of more than the maximum load after which thread is not pulled further: a jerk is shorter
-  float slide = 0;        // [s] ThreadTieSettings
   bool rise = false;      // the needle is lifted over the edges on its way to where it is laid down
   float pull = 0;  // [N] of each strand when a throw is pulled tight, with physical mechanics; 0: throws of guided mechanics
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "exchange/strand.h"
 #include "exchange/tying.h"
@@ -14,16 +15,24 @@ namespace {
 constexpr size_t kHolder = 0, kForceps = 1;
 constexpr float kStrandAt = 18e-3f;  // [m] of the shaft, from the grasp point: above the wound
 constexpr float kWindAt = 9e-3f;     // [m] of the shaft: plane of the winding hand, nearer the tip than the strand
-constexpr float kShaft = 2.2e-3f;    // [m] radius that the turns lie on
-constexpr float kNearest = 9e-3f;    // [m] of the winding hand from the shaft
-constexpr float kLoose = 0.95f;      // of the strand that is left: nearly taut
-constexpr float kWinding = 0.25f;    // [N] above which the winding hand yields
-constexpr float kTailEnd = 6e-3f;    // [m] from the tail's end, where it is taken
-constexpr float kHalfOpen = 0.8f;    // of the jaws, to take the tail
-constexpr float kNarrow = 0.5f;      // of the jaws with a turn on them: in a wider gap it falls between them, near the hinge
-constexpr float kTaut = 1.2f;        // [N] above which a strand gives no more thread to crossing hands
-constexpr float kReach = 0.85f;      // of the tail's length
-constexpr float kSlideOff = 1.4f;    // [s]
+constexpr float kSteepAtTail = 1;  // rise of the shaft at the tail, which lies along it: a turn between them would push it away
+constexpr float kLeans = 60;       // [1/m] of the shaft toward a tail that lies on a slope in front or behind
+constexpr float kTurns = 3;        // [1/s]
+constexpr float kShaft = 2.2e-3f;  // [m] radius that the turns lie on
+constexpr float kNearest = 9e-3f;  // [m] of the winding hand from the shaft
+constexpr float kLoose = 0.95f;    // of the strand that is left: nearly taut
+constexpr float kWinding = 0.25f;  // [N] above which the winding hand yields
+constexpr float kTailEnd = 6e-3f;  // [m] from the tail's end, where it is taken
+constexpr float kBetweenJaws = 0.6e-3f;  // [m] from the middle of the jaws: they close on the tail there
+constexpr float kHeldWell = 1.5e-3f;     // [m] the same of a tail that turns slide over; between jaws and tail they come off
+constexpr float kBeside = 4e-3f;         // [m] of tail, on either side of the jaws
+constexpr float kPatience = 2;           // [s]; then they close where they are
+constexpr float kAhead = 4e-3f;          // [m] of the hand before the jaws, at most
+constexpr float kHalfOpen = 0.8f;        // of the jaws, to take the tail
+constexpr float kNarrow = 0.5f;    // of the jaws with a turn on them: in a wider gap it falls between them, near the hinge
+constexpr float kTaut = 1.2f;      // [N] above which a strand gives no more thread to crossing hands
+constexpr float kReach = 0.85f;    // of the tail's length
+constexpr float kSlideOff = 1.4f;  // [s]
 // Of the strand's length: where it is wound. Lower, the needle that goes round would meet the tail, which stands up from a
 // knot.
 constexpr float kHigh = 0.62f;
@@ -37,19 +46,25 @@ constexpr float kNearStitch = 12e-3f;  // [m] of its knot from the middle of the
 constexpr float kEasy = 0.12f;
 constexpr float kGives = 0.2f;        // [m/s] per newton above that, by which a hand gives way
 constexpr float kMostGiven = 20e-3f;  // [m]
-constexpr float kLead = 0.08f;        // [N] by which a strand may be tauter than the other in a pull
+constexpr float kLead = 0.05f;        // [N] by which a strand may be tauter than the other in a pull
+constexpr float kEvens = 1.5f;        // [1/s] of what one strand has more slack than the other
+constexpr float kFastest = 30e-3f;    // [m/s]
 constexpr float kSeated = 0.6f;       // [s] of full tension
-constexpr int kAgain = 3;             // times that a throw is wound again
+constexpr int kAgain = 5;             // times that a throw is wound again
+constexpr int kMostMisses = 3;        // grasps at the tail with a turn on the jaws
+constexpr float kDeep = 4e-3f;        // [m] below the stitch: a tail there is taken from above
+constexpr float kBears = 3;           // [N] on a bite, above which the hands give way
+constexpr float kSwing = 0.8f;        // [turns] of the linking integral along a strand, within a throw
 
 Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
 // Unit, across the shaft; 0: toward the viewer, pi/2: above.
-Vec3 around(float side, float angle) {
-  const Vec3 shaft = shaft_from(side), up{-shaft.y * side, shaft.x * side, 0};
-  return Vec3{0, 0, 1} * portable::cos(angle) + up * portable::sin(angle);
+Vec3 around(float side, float angle, Vec3 shaft) {
+  const Vec3 front = normalized(Vec3{0, 0, 1} - shaft * shaft.z), up = side * cross(front, shaft);
+  return front * portable::cos(angle) + up * portable::sin(angle);
 }
-// The needle holder along a shaft; its jaws open across the pull.
-Quat holder_turn(float side) {
-  const Vec3 z = shaft_from(side), x{0, 0, 1};
+// The needle holder along a shaft; its jaws open along x as nearly as it allows.
+Quat holder_turn(Vec3 z, Vec3 x = {0, 0, 1}) {
+  x = normalized(x - z * dot(x, z));
   return from_axes(x, cross(z, x), z);
 }
 float smooth(float s) {
@@ -71,19 +86,41 @@ Vec3 knot_center(const Snapshot& seen, Vec3 fallback) {
   return count > 0 ? sum / count : fallback;
 }
 
-// [turns] by which tail and strand twist about each other: Gauss's linking integral, of strands that are not drawn tight yet.
-float twist(const Snapshot& seen) {
-  const size_t last = seen.active().thread_order.size() - 1, first = first_point_node(seen);
-  float sum = 0;
-  for (size_t i = 0; i < first; ++i) {
+// How a sum along a strand rises and falls: each swing of at least kSwing is a throw, of the other sense than the one before.
+struct Swings {
+  float sum = 0, extreme = 0, way = 0;  // way: +1, -1 of the last one
+  int count = 0;
+  void add(float x) {
+    sum += x;
+    if (count == 0 ? std::abs(sum) > kSwing : way * (extreme - sum) > kSwing)
+      way = count == 0 ? std::copysign(1.0f, sum) : -way, extreme = sum, ++count;
+    else if (way * (sum - extreme) > 0) extreme = sum;
+  }
+};
+
+// What tail and strand show of the knot, drawn tight or not: its throws of alternating sense. From Gauss's linking integral,
+// along either of them from its hole outward.
+struct Twist {
+  float way = 0;  // sense of the outermost throw
+  int throws = 0;
+};
+Twist look(const Snapshot& seen) {
+  const size_t last = seen.active().thread_order.size() - 1, first = first_point_node(seen), from = last_point_node(seen);
+  std::vector<float> of_strand(last - from, 0.0f);
+  Swings tail, strand;
+  for (size_t i = first; i-- > 0;) {
     const Vec3 a = node_at(seen, i), da = node_at(seen, i + 1) - a;
-    for (size_t k = last_point_node(seen); k < last; ++k) {
+    float sum = 0;
+    for (size_t k = from; k < last; ++k) {
       const Vec3 b = node_at(seen, k), db = node_at(seen, k + 1) - b, off = a + 0.5f * da - b - 0.5f * db;
       const float far2 = std::max(length2(off), 1e-8f);
-      sum += dot(off, cross(da, db)) / (far2 * std::sqrt(far2));
+      const float here = dot(off, cross(da, db)) / (4 * kPi * far2 * std::sqrt(far2));
+      sum += here, of_strand[k - from] += here;
     }
+    tail.add(sum);
   }
-  return sum / (4 * kPi);
+  for (const float x : of_strand) strand.add(x);
+  return {tail.way, std::min(tail.count, strand.count)};
 }
 
 }  // namespace
@@ -116,6 +153,13 @@ std::string ThreadTie::doing() const {
   return kName[stage_];
 }
 
+// [m] of tail or strand from its hole to its hand, beyond the straight way from the stitch.
+float ThreadTie::slack_of(const Snapshot& seen, bool tail) const {
+  const size_t hand = tail ? node_of(seen, seen.tool[kHolder].held_slot) : seen.active().thread_order.size() - 1;
+  return length_between(seen, tail ? first_point_node(seen) : last_point_node(seen), hand) -
+         distance(node_at(seen, hand), origin_);
+}
+
 Vec3 ThreadTie::tail_node(const Snapshot& seen, float from_end) const {
   return node_at(seen, node_along(seen, 0, from_end, 1));
 }
@@ -137,14 +181,44 @@ float ThreadTie::wound(const Snapshot& seen) const {
 
 void ThreadTie::again(const Snapshot& seen, Stage after) {
   ++retries_, misses_ = 0;
+  lost_ = after == drop_tail;
   if (++tries_ > kAgain) failed_ = true, stage_ = done;
   else go(seen, after);
 }
 
+// The other side, and the free thread beyond the knot, which takes up some millimeters with every throw.
+void ThreadTie::measure(const Snapshot& seen) {
+  const size_t last = seen.active().thread_order.size() - 1;
+  size_t tail_at = first_point_node(seen), strand_at = last_point_node(seen);
+  const auto near = [&](size_t i) { return distance(node_at(seen, i), origin_) < kKnot; };
+  if (!first_) {
+    for (size_t i = 0; i < tail_at; ++i)
+      if (near(i)) tail_at = i;
+    for (size_t i = last; i > strand_at; --i)
+      if (near(i)) strand_at = i;
+  }
+  const float out = first_ ? 0.0f : kKnot;
+  strand_ = length_between(seen, strand_at, last) + out, tail_ = length_between(seen, 0, tail_at) + out;
+  height_ = (wraps_ > 1 ? 0.42f : kHigh) * strand_;
+}
+
+// The throw is pulled tight and both hands have let go of it: winds again what is not there.
+void ThreadTie::seated(const Snapshot& seen) {
+  const Twist knot = look(seen);
+  if (knot.throws >= wanted_) {
+    stage_ = done;
+    return;
+  }
+  side_ = -side_;
+  laid_ = knot.throws > 0 ? -knot.way : side_;
+  sense_ = laid_ * side_;
+  measure(seen);
+  again(seen, to_work);
+}
+
 void ThreadTie::begin(const Snapshot& seen, int wraps, int sense, bool first, bool keep) {
   keep_ = keep;
-  wraps_ = wraps, sense_ = static_cast<float>(sense), first_ = first, failed_ = false, misses_ = 0, tries_ = 0;
-  twist_before_ = twist(seen);
+  wraps_ = wraps, first_ = first, failed_ = false, misses_ = 0, tries_ = 0;
   origin_ = 0.5f * (seen.active().suture_point.front().position + seen.active().suture_point.back().position);
   if (++throws_ > 2) origin_ = knot_center(seen, origin_);
   const Vec3 swage = needle_swage(picture_, seen);
@@ -161,27 +235,19 @@ void ThreadTie::begin(const Snapshot& seen, int wraps, int sense, bool first, bo
   } else {
     side_ = -side_;
   }
-  // Free thread beyond the knot, which takes up some millimeters with every throw.
-  const size_t last = seen.active().thread_order.size() - 1;
-  size_t tail_at = first_point_node(seen), strand_at = last_point_node(seen);
-  const auto near = [&](size_t i) { return distance(node_at(seen, i), origin_) < kKnot; };
-  if (!first) {
-    for (size_t i = 0; i < tail_at; ++i)
-      if (near(i)) tail_at = i;
-    for (size_t i = last; i > strand_at; --i)
-      if (near(i)) strand_at = i;
-  }
-  const float out = first ? 0.0f : kKnot;
-  strand_ = length_between(seen, strand_at, last) + out, tail_ = length_between(seen, 0, tail_at) + out;
-  height_ = (wraps > 1 ? 0.42f : kHigh) * strand_;
+  const float way = static_cast<float>(sense);
+  sense_ = first ? way : -way * laid_ * side_;
+  laid_ = side_ * sense_;
+  if (first || sense > 0) ++wanted_;
+  measure(seen);
   go(seen, first ? to_tail : to_work);
 }
 
 void ThreadTie::glide_to(Vec3 tip, Vec3 hand, float speed, float angle) {
   tip_from_ = tip_, tip_to_ = tip, hand_from_ = hand_, hand_to_ = hand;
-  holder_from_ = holder_turn_, holder_to_ = holder_turn(side_);
+  holder_from_ = holder_turn_, holder_to_ = holder_turn(shaft_from(side_));
   angle_from_ = forceps_angle_, angle_to_ = angle;
-  done_ = 0;
+  done_ = 0, shaft_ = shaft_from(side_);
   const float turn = length(rotation_vector(holder_to_ * conjugate(holder_from_)));
   const float far =
       std::max({distance(tip_, tip), distance(hand_, hand), 0.03f * turn, 0.03f * std::abs(angle - forceps_angle_)});
@@ -231,37 +297,40 @@ Vec3 ThreadTie::give(Vec3 at, float felt, float& given, float dt) const {
 void ThreadTie::go(const Snapshot& seen, Stage stage) {
   stage_ = stage, waited_ = 0, tail_given_ = strand_given_ = 0;
   const Vec3 shaft = shaft_from(side_);
-  const Vec3 work = origin_ + around(side_, 0.5f * kPi) * height_ - shaft * kStrandAt;
-  const float toward = side_ > 0 ? kPi - 0.15f : 0.15f;  // the forceps faces the needle holder
+  const Vec3 work = origin_ + around(side_, 0.5f * kPi, shaft) * height_ - shaft * kStrandAt;
+  const Vec3 aside = origin_ + Vec3{side_ * 0.28f, 0.50f, -0.72f} * strand_;  // of the strand: behind the work
+  const float toward = side_ > 0 ? kPi - 0.15f : 0.15f;                       // the forceps faces the needle holder
   switch (stage) {
     case to_tail:
-    case take_tail: {  // once, to lay the tail straight on the side away from the needle; it hangs in front
+    case take_tail: {  // to lay the tail straight on the side away from the needle; it hangs in front, or down between walls
       const Vec3 at = tail_node(seen, kTailEnd + 3e-3f * static_cast<float>(misses_));
-      const Vec3 aside = origin_ + Vec3{side_ * 0.28f, 0.50f, -0.72f} * strand_;  // behind the work
-      const Vec3 z = normalized(Vec3{0.1f * side_, 0.35f, 0.93f}),
+      const Vec3 z = at.y > origin_.y - kDeep ? normalized(Vec3{0.1f * side_, 0.35f, 0.93f})
+                                              : normalized(Vec3{0.1f * side_, 1, 0.3f}),
                  along = node_at(seen, node_along(seen, 0, kTailEnd + 6e-3f, 1)) - tail_node(seen, kTailEnd);
       const Vec3 x = normalized(cross(z, along), {1, 0, 0});
+      lost_ = false;
       glide_to(stage == to_tail ? at + z * 0.03f : at, aside, stage == to_tail ? how_.speed : 0.5f * how_.speed,
                forceps_angle_);
       holder_to_ = from_axes(x, cross(z, x), z);
       break;
     }
     case lift_tail:
-      glide_to(origin_ + Vec3{-side_ * 0.5f * tail_, 0.5f * tail_, 0.5f * tail_}, hand_, 0.5f * how_.speed, forceps_angle_);
+      glide_to(origin_ + Vec3{-side_ * 0.5f * tail_, 0.5f * tail_, 0.5f * tail_}, aside, 0.5f * how_.speed, forceps_angle_);
       break;
-    case lay_tail:
-      glide_to(seen.active().suture_point.front().position + Vec3{-side_ * (tail_ - kTailEnd - 2e-3f), 1e-3f, 0}, hand_,
-               0.4f * how_.speed, forceps_angle_);
+    case lay_tail: {
+      const Vec3 root = first_ ? seen.active().suture_point.front().position : origin_;
+      glide_to(root + Vec3{-side_ * (tail_ - kTailEnd - 2e-3f), 1e-3f, 0}, hand_, 0.4f * how_.speed, forceps_angle_);
       break;
+    }
     case off_tail:
-      glide_to(tip_ + shaft * 0.03f, hand_, how_.speed, forceps_angle_);
+      glide_to(tip_ + shaft * (lost_ ? 0.06f : 0.03f), hand_, how_.speed, forceps_angle_);
       break;
     case to_work: {
       angle_ = sense_ > 0 ? 0 : kPi, turned_ = 0, slack_ = 1;
       const float drop = kStrandAt - kWindAt, taut = kLoose * strand_;
       radius_ = std::sqrt(std::max(kNearest * kNearest, taut * taut - height_ * height_ - drop * drop));
       // The needle holder comes from far behind: nothing of it touches the strand on the way.
-      glide_to(work + shaft * 0.06f, work + shaft * kWindAt + around(side_, angle_) * radius_, how_.speed, toward);
+      glide_to(work + shaft * 0.06f, work + shaft * kWindAt + around(side_, angle_, shaft) * radius_, how_.speed, toward);
       break;
     }
     case into_work:
@@ -272,7 +341,7 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
     case draw: {
       drawn_ = slid_ = 0;
       // Out of the turn, no farther than the tail reaches.
-      const Vec3 out = around(side_, 0.5f * kPi) * (kDrawn * strand_) + shaft * 16e-3f;
+      const Vec3 out = around(side_, 0.5f * kPi, shaft) * (kDrawn * strand_) + shaft * 16e-3f;
       tip_from_ = tip_, tip_to_ = origin_ + normalized(out) * std::min(length(out), kReach * (tail_ - kTailEnd));
       break;
     }
@@ -304,7 +373,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
   if (stage_ == done) return true;
   feel(seen);
   waited_ += dt;
-  const Vec3 shaft = shaft_from(side_);
+  const Vec3 shaft = shaft_;
   ScriptedHand& holder = hands_[kHolder];
   const bool holds = seen.tool[kHolder].held == Held::thread;
   if (seen.tool[kForceps].held != Held::needle) {
@@ -324,28 +393,29 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
         break;
       }
       const bool shut = move_jaw(holder, 0, dt);
-      if (holds && waited_ > 0.3f) {
-        if (stage_ == take_tail) go(seen, lift_tail);
-        else if (wound(seen) < 2 * kPi * static_cast<float>(wraps_) - 2) again(seen, drop_tail);  // a turn has slid off
+      const bool laying = stage_ == take_tail;
+      const bool well =
+          laying || distance(node_at(seen, node_of(seen, seen.tool[kHolder].held_slot)), seen.tool[kHolder].pose.p) < kHeldWell;
+      if (holds && well && waited_ > 0.3f) {
+        if (laying) go(seen, lift_tail);
+        else if (wound(seen) < 2 * kPi * static_cast<float>(wraps_) - 2) again(seen, lift_tail);  // a turn has slid off
         else go(seen, draw);
       } else if (shut && waited_ > 0.5f) {
-        const bool laying = stage_ == take_tail;
-        if (++misses_ <= 6) go(seen, laying ? to_tail : open);
+        if (++misses_ <= (laying ? 6 : kMostMisses)) go(seen, laying ? to_tail : open);
         else again(seen, laying ? to_tail : drop_tail);
       }
       break;
     }
     case lift_tail:
-      if (glide(dt)) go(seen, lay_tail);
-      break;
-    case lay_tail:
-      if (glide(dt)) go(seen, drop_tail);
+    case lay_tail:  // no farther than both strands give way
+      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_) / kWinding, 0.0f, 1.0f)) || waited_ > kPatience)
+        go(seen, stage_ == lift_tail ? lay_tail : drop_tail);
       break;
     case drop_tail:
       if (move_jaw(holder, kHalfOpen, dt) && waited_ > 0.2f) go(seen, off_tail);
       break;
     case off_tail:
-      if (glide(dt) && move_jaw(holder, 0, dt)) go(seen, to_work);
+      if (glide(dt) && move_jaw(holder, 0, dt)) go(seen, lost_ ? to_tail : to_work);
       break;
     case to_work:
       move_jaw(holder, 0, dt);
@@ -367,7 +437,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       turned_ = std::min(want, turned_ + 0.8f * calm * how_.speed * dt / radius_);
       angle_ = (sense_ > 0 ? 0 : kPi) + sense_ * turned_;
       const float at = kWindAt - 3e-3f * std::max(0.0f, -portable::sin(angle_));
-      hand_ = tip_ + shaft * at + around(side_, angle_) * radius_;
+      hand_ = tip_ + shaft * at + around(side_, angle_, shaft) * radius_;
       if (turned_ >= want) go(seen, open);
       break;
     }
@@ -375,16 +445,24 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       if (move_jaw(holder, std::min(kHalfOpen, kNarrow + 0.1f * static_cast<float>(misses_)), dt)) go(seen, fetch);
       break;
     case fetch: {
-      const Vec3 goal = tail_node(seen, kTailEnd + 2e-3f * static_cast<float>(misses_)), way = goal - tip_;
+      // By sight of the jaws, which lag behind the hand.
+      const Vec3 goal = tail_node(seen, kTailEnd + 2e-3f * static_cast<float>(misses_)), jaws = seen.tool[kHolder].pose.p;
+      const Vec3 way = goal - jaws;
       const float left = length(way),
                   speed = std::min(0.7f * how_.speed, 0.01f + 4 * left) * (felt_ > 2 * kWinding ? 0.3f : 1.0f);
       tip_ += way * (std::min(speed * dt, left) / std::max(left, 1e-6f));
+      // Steeper, across the slope that the tail lies on, and turned until it passes between the jaws.
+      const Vec3 from{side_, kSteepAtTail, std::clamp(kLeans * (goal.z - origin_.z), -0.8f, 0.8f)};
+      shaft_ = normalized(lerp(shaft_, normalized(from), std::min(1.0f, kTurns * dt)));
+      const Vec3 along = tail_node(seen, kTailEnd + kBeside) - tail_node(seen, kTailEnd - kBeside);
+      const Vec3 across = normalized(cross(shaft_, along), {0, 0, 1});
+      holder_turn_ = nlerp(holder_turn_, holder_turn(shaft_, across.z < 0 ? -across : across), std::min(1.0f, kTurns * dt));
+      tip_ = jaws + (tip_ - jaws) * std::min(1.0f, kAhead / std::max(distance(tip_, jaws), 1e-6f));
       // The winding hand goes along and keeps the turns on the jaws.
       if (felt_ > kWinding) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
       else if (felt_ < 0.02f) radius_ = std::min(0.5f * strand_, radius_ + 0.01f * dt);
-      hand_ = tip_ + shaft * kWindAt + around(side_, angle_) * radius_;
-      if (left < 0.6e-3f) go(seen, close);
-      else if (waited_ > 6) again(seen, drop_tail);
+      hand_ = tip_ + shaft * kWindAt + around(side_, angle_, shaft) * radius_;
+      if (left < kBetweenJaws || waited_ > kPatience) go(seen, close);
       break;
     }
     case draw: {
@@ -405,14 +483,10 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const Vec3 middle = tip_from_ + shaft * kWindAt, past = middle - shaft * 26e-3f + Vec3{0, 8e-3f, 0};
       if (felt_ > 0.1f) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
       else if (felt_ < 0.01f) radius_ = std::min(0.6f * strand_, radius_ + 0.02f * dt);
-      hand_ = lerp(middle, past, slid_) + around(side_, angle_ + turn * slid_) * radius_;
+      hand_ = lerp(middle, past, slid_) + around(side_, angle_ + turn * slid_, shaft) * radius_;
       const Vec3 reach = hand_ - origin_;  // no farther than the strand, which is short for a late throw
       if (length(reach) > kLoose * strand_) hand_ = origin_ + normalized(reach) * (kLoose * strand_);
-      if (slid_ < 1 || (!taut && drawn_ < far && waited_ <= 5)) break;
-      // A throw of one wrap gives 1.3 to 1.6 turns here, none at all less than half a turn.
-      const float turns = std::abs(twist(seen) - twist_before_);
-      if (turns > static_cast<float>(wraps_) - 0.2f) go(seen, cross_up);
-      else if (how_.slide <= 0 || waited_ > kSlideOff + how_.slide) again(seen, drop_tail);
+      if (slid_ >= 1 && (taut || drawn_ >= far || waited_ > 5)) go(seen, cross_up);
       break;
     }
     case cross_up:
@@ -421,20 +495,30 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const bool there = glide(dt * std::clamp(1.2f - most / (4 * kEasy), 0.1f, 1.0f));
       tip_ = give(tip_, tail_felt_, tail_given_, dt), hand_ = give(hand_, felt_, strand_given_, dt);
       if (stage_ == cross_up && (there || (done_ > 0.6f && most > kTaut))) go(seen, cross_down);
-      else if (stage_ == cross_down && (there || std::min(felt_, tail_felt_) > 0.5f || most > kTaut)) go(seen, pull);
+      else if (stage_ == cross_down && (there || std::min(felt_, tail_felt_) > 0.5f || most > kTaut)) {
+        // A turn that slid off without the tail in it, and a throw below that came undone, are seen before they are pulled on.
+        if (look(seen).throws >= wanted_) go(seen, pull);
+        else again(seen, lift_tail);
+      }
       break;
     }
     case pull:
     case hold: {
       // Neither pulls harder than the other: a strand that is tight while the other is slack becomes a post.
+      float load = 0;  // [N] on a bite
+      for (const SuturePointView& p : seen.active().suture_point) load = std::max({load, p.tension_needle, p.tension_free});
       const auto pace = [&](float felt, float other) {
-        const float want = std::min(how_.pull, 1.2f * other + kLead);
-        return dt * std::clamp((felt < kEasy ? 0.1f : 0.03f) * (want - felt), -0.02f, 0.02f);
+        const float want = load > kBears ? 0.8f * felt : std::min(how_.pull, 1.2f * other + kLead);
+        return dt * std::clamp((felt < kEasy ? 0.25f : 0.03f) * (want - felt), -0.02f, 0.02f);
       };
-      tip_.x += side_ * pace(tail_felt_, felt_), hand_.x -= side_ * pace(felt_, tail_felt_);
+      // Before either is taut, the one with more slack is drawn in and the other one waits for it, for the same reason.
+      const float easy = std::clamp(1 - std::min(felt_, tail_felt_) / kEasy, 0.0f, 1.0f);
+      const float more = slack_of(seen, true) - slack_of(seen, false);
+      const float even = stage_ == pull ? dt * std::clamp(kEvens * more, -kFastest, kFastest) * easy : 0.0f;
+      tip_.x += side_ * (pace(tail_felt_, felt_) + even), hand_.x -= side_ * (pace(felt_, tail_felt_) - even);
       steady_ = std::min(tail_felt_, felt_) > 0.9f * how_.pull ? steady_ + dt : 0;
       const bool lost = !holds && waited_ > 0.2f;
-      if (stage_ == pull && (steady_ > kSeated || waited_ > 12 || lost)) go(seen, hold);
+      if (stage_ == pull && (steady_ > kSeated || waited_ > 12 || lost)) go(seen, look(seen).throws >= wanted_ ? hold : lay);
       else if (stage_ == hold && (!keep_ || waited_ > 12)) go(seen, lay);
       break;
     }
@@ -445,7 +529,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       if (move_jaw(holder, kHalfOpen, dt)) go(seen, away);
       break;
     case away:
-      if (glide(dt)) stage_ = done;
+      if (glide(dt)) seated(seen);
       break;
     default:
       break;

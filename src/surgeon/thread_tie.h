@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // surgeon/thread_tie: an instrument tie with physical mechanics. The forceps holds the needle near its swage and winds the
 // strand round the needle holder, which takes the tail, draws it through the turns and pulls against the forceps. The turns are
-// thread on a shaft. The surgeon looks whether they are still there when the tail is taken, and whether the strands twist about
-// each other when it is drawn through; otherwise the throw is wound again, up to kAgain times. Reads Snapshots; moves two
-// scripted hands.
+// thread on a shaft. The surgeon looks whether they are still there when the tail is taken, and counts the throws that strand
+// and tail show before he pulls and after. If one is missing, he lays the tail again and winds again, up to kAgain times. Reads
+// Snapshots; moves two scripted hands.
 //
 // x along the stitch, y up, z toward the viewer. `side` +1: the long strand is on the right, and the needle holder comes from
 // there. The sides alternate from throw to throw; winding in the same sense then makes a square knot.
@@ -20,7 +20,6 @@ namespace catgut {
 struct ThreadTieSettings {
   float speed = 0.15f;  // [m/s] maximum of the hands
   float pull = 2.5f;    // [N] with which both strands are pulled tight
-  float slide = 0;      // [s] that a turn which is still on the jaws has to slide off, before the throw is wound again
 };
 
 class ThreadTie {
@@ -70,9 +69,12 @@ class ThreadTie {
   void feel(const Snapshot& seen);
   Vec3 give(Vec3 at, float felt, float& given, float dt) const;
   void place();
+  float slack_of(const Snapshot& seen, bool tail) const;
   Vec3 tail_node(const Snapshot& seen, float from_end) const;
   // Winds again, after the stage that lets everything go; or fails.
   void again(const Snapshot& seen, Stage after);
+  void measure(const Snapshot& seen);
+  void seated(const Snapshot& seen);
   float wound(const Snapshot& seen) const;
 
   const PictureModel& picture_;
@@ -81,13 +83,17 @@ class ThreadTie {
   Stage stage_ = done;
   int wraps_ = 1, misses_ = 0, retries_ = 0, tries_ = 0, throws_ = 0;
   float side_ = 1, sense_ = 1, waited_ = 0;
+  int wanted_ = 0;  // throws that the knot shall have
   bool first_ = false, failed_ = false, keep_ = false;
+  bool lost_ = false;  // the tail: it is taken and laid again first
+  float laid_ = 1;     // sense in which this throw twists the strands
   Vec3 origin_;        // the middle of the stitch
   Vec3 tip_, hand_;    // where the needle holder's jaws and the needle's swage shall be
   Quat holder_turn_;   // of the needle holder
   Quat forceps_rest_;  // forceps at angle 0, as it held the needle
   Vec3 swage_in_forceps_;
   float forceps_angle_ = 0;
+  Vec3 shaft_;  // of the needle holder
   // A movement of both hands.
   Vec3 tip_from_, tip_to_, hand_from_, hand_to_;
   Quat holder_from_, holder_to_;
@@ -96,7 +102,6 @@ class ThreadTie {
   float strand_ = 0, tail_ = 0, height_ = 0, angle_ = 0, turned_ = 0, radius_ = 0, slack_ = 0;
   float felt_ = 0, tail_felt_ = 0, pulled_ = 0, steady_ = 0, drawn_ = 0, slid_ = 0;
   float tail_given_ = 0, strand_given_ = 0;  // [m] by which the hands have given way
-  float twist_before_ = 0;                   // [turns] of tail and strand about each other before this throw
 };
 
 }  // namespace catgut

@@ -261,7 +261,7 @@ bool Scripted::tie_thread(const Task& task, const Snapshot& seen) {
   enum { start, work };
   if (stage_ == start) {
     const bool first = !thread_tie_;
-    if (first) thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull, plan_.slide});
+    if (first) thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull});
     thread_tie_->begin(seen, task.which, task.way, first, task.release);
     clamped_ = kClampsBack * plan_.approximate / kClampSpeed;
     go(work);
