@@ -9,6 +9,7 @@ namespace {
 
 constexpr float kBehind = 0.2e-3f;  // [m] the thread's end is this far past a hole when it gets its Eyelet
 constexpr float kDone = 1.2e-3f;    // [m] and this far when the bite is complete
+constexpr float kTaken = 0.01f;     // [m/s] with which a segment that was made longer becomes as long as it was
 
 bool has_eyelet(const thread::State& t, uint32_t hole) {
   return std::any_of(t.eyelet.begin(), t.eyelet.end(), [&](const thread::Eyelet& e) { return e.point == hole; });
@@ -71,6 +72,10 @@ void move_body(const Model& m, State& s, uint32_t body, const Pose& pose, float 
 void lace_threads(const Model& m, State& s) {
   for (size_t i = 0; i < s.needle.size(); ++i) {
     Needle& n = s.needle[i];
+    if (n.thread_node != wall::kNone && n.thread_node > 1) {
+      float& last = s.thread.rest[n.thread_node - 1];
+      last = std::max(std::min(last, s.thread.rest[n.thread_node - 2]), last - kTaken * m.wall.step);
+    }
     if (n.channels == 0) continue;
     const NeedleModel& nm = m.needles.needle[i];
     const Pose& pose = s.bodies.body[nm.body].pose;

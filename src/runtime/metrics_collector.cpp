@@ -57,6 +57,7 @@ void MetricsCollector::open() { opening_wanted_ = true; }
 void MetricsCollector::tick(const Snapshot& seen) {
   if (opening_wanted_) opening_at_start_ = seen.opening_area;
   opening_wanted_ = false;
+  least_opening_ = std::min(least_opening_, seen.opening_area);
   bool passing = false;
   for (const Event& e : seen.event) {
     count(counts_, e);
@@ -73,12 +74,12 @@ void MetricsCollector::tick(const Snapshot& seen) {
   for (const SutureView& suture : seen.suture)
     for (const float tension : suture.thread_tension) thread_force_ = std::max(thread_force_, tension);
   const bool held = std::any_of(seen.tool.begin(), seen.tool.end(), [](const ToolView& t) { return t.held != Held::nothing; });
-  if (held_ && !held) let_go_s_ = seen.time_s, let_go_gap_ = wound_gap(seen);
+  if (held_ && !held) let_go_s_ = seen.time_s, let_go_gap_ = wound_gap(seen), let_go_opening_ = seen.opening_area;
   held_ = held;
 }
 
-// Where the active suture crosses from one wall to the other: from the first edge's point that is nearest to the stitch to the
-// other edge. Edges are polygons through the outer particles of a rim.
+// Where the active suture crosses from one wall to the other, the largest: from the first edge's point that is nearest to the
+// crossing to the other edge. Edges are polygons through the outer particles of a rim.
 double MetricsCollector::wound_gap(const Snapshot& seen) const {
   const std::vector<SuturePointView>& point = seen.active().suture_point;
   if (rim_.size() != 2 || point.empty() || point.front().wall == point.back().wall) return 0;
@@ -91,8 +92,16 @@ double MetricsCollector::wound_gap(const Snapshot& seen) const {
     }
     return best;
   };
-  const Vec3 a = nearest(rim_[0], 0.5f * (point.front().position + point.back().position));
-  return distance(a, nearest(rim_[1], a));
+  const auto gap = [&](Vec3 p) {
+    const Vec3 a = nearest(rim_[0], p);
+    return distance(a, nearest(rim_[1], a));
+  };
+  float most = 0;
+  size_t crossings = 0;
+  for (size_t k = 0; k + 1 < point.size(); ++k)
+    if (point[k].wall != point[k + 1].wall)
+      most = std::max(most, gap(0.5f * (point[k].position + point[k + 1].position))), ++crossings;
+  return crossings > 1 ? most : gap(0.5f * (point.front().position + point.back().position));
 }
 
 void MetricsCollector::measure_seam(const Snapshot& last, std::map<std::string, double>& v) const {
@@ -199,7 +208,10 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
     v["fault_" + name] = static_cast<double>(counts_.faults[k]);
   }
   v["particles"] = static_cast<double>(result.particles);
-  v["opening_ratio"] = opening_at_start_ > 0 ? static_cast<double>(last.opening_area) / opening_at_start_ : 1;
+  const double start = opening_at_start_;
+  v["opening_ratio"] = start > 0 ? static_cast<double>(last.opening_area) / start : 1;
+  v["opening_ratio_least"] = start > 0 ? static_cast<double>(least_opening_) / start : 1;
+  v["opening_ratio_change"] = start > 0 && !held_ ? static_cast<double>(last.opening_area - let_go_opening_) / start : 0;
   v["closure"] = last.closure;
   v["thread_length_error"] = length_error_;
   v["thread_length_error_passing"] = length_error_passing_;

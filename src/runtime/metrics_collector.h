@@ -77,9 +77,10 @@ class MetricsCollector {
   const std::vector<std::vector<uint32_t>> rim_;
   std::vector<uint8_t> seen_slot_;
   bool opening_wanted_ = true, valid_ = true;
-  bool held_ = false;                     // by an instrument, in the last tick
-  double let_go_s_ = 0, let_go_gap_ = 0;  // when the last instrument let go
-  float thread_force_ = 0;                // [N]
+  bool held_ = false;                                // by an instrument, in the last tick
+  double let_go_s_ = 0, let_go_gap_ = 0;             // when the last instrument let go
+  float thread_force_ = 0;                           // [N]
+  float least_opening_ = 1e9f, let_go_opening_ = 0;  // [m2] at any time; when the last instrument let go
   float opening_at_start_ = 0, length_error_ = 0, length_error_passing_ = 0;
   uint32_t order_errors_ = 0, contacts_ = 0;
   Counts counts_;                       // a Snapshot does not list baked knots

@@ -14,10 +14,15 @@ namespace catgut {
 namespace {
 
 constexpr int kBitesPerThread = 10;
-constexpr float kRow = 0.004f;          // [m] between two rows of bites
-constexpr float kStaysApart = 0.012f;   // [m] round the bowel, between stay sutures
-constexpr float kPull = 1.7f;           // [N] on each strand of a physical throw: below what the bites bear
-constexpr float kApproximate = 0.003f;  // [m] of each clamp: the edges touch after 1.5 mm
+constexpr float kRow = 0.004f;            // [m] between two rows of bites
+constexpr float kStaysApart = 0.012f;     // [m] round the bowel, between stay sutures
+constexpr float kStitchesApart = 0.005f;  // [m] round the bowel
+constexpr float kPull = 1.7f;             // [N] on each strand of a physical throw: below what the bites bear
+constexpr float kApproximate = 0.003f;    // [m] of each clamp: the edges touch after 1.5 mm
+// A shallow bite in a wall that is held by its edge: it gives way by so much before the tip enters, and then the needle is
+// lifted.
+constexpr float kGivesWay = 0.002f, kScoop = 0.003f;  // [m]
+constexpr float kGather = 2.0f;                       // [N] of each end of a physical purse-string
 constexpr int kThrows = 2;
 // [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
 // square to it. Less deep, it slid along the serosa and came out through the cut edge.
@@ -43,7 +48,8 @@ void settle_on_serosa(const VisibleMesh& mesh, Vec3 on_rim, Vec3 axis, Vec3 side
 }
 
 // `bites` bites round an opening, `edge` from the rim, evenly spaced in length, not in angle: an organ's rim is not circular.
-void places_round(const PictureModel& picture, const SurgeonSkill& skill, int bites, float edge, Plan& plan) {
+// The first is `ahead` of a space beyond +x.
+void places_round(const PictureModel& picture, const SurgeonSkill& skill, int bites, float edge, Plan& plan, float ahead = 0) {
   const OpeningShape o = opening_shape(picture, 0);
   const std::vector<uint32_t>& rim = picture.rim[0];
   const std::vector<Vec3>& rest = picture.particle_rest;
@@ -61,7 +67,7 @@ void places_round(const PictureModel& picture, const SurgeonSkill& skill, int bi
   std::vector<float> run{0};
   for (size_t i = 0; i < n; ++i) run.push_back(run.back() + distance(rim_at(i), rim_at(i + 1)));
   for (int b = 0; b < bites; ++b) {
-    const float want = run.back() * static_cast<float>(b) / static_cast<float>(bites);
+    const float want = run.back() * (static_cast<float>(b) + ahead) / static_cast<float>(bites);
     size_t i = 0;
     while (i + 1 < n && run[i + 1] <= want) ++i;
     const Vec3 on_rim = lerp(rim_at(i), rim_at(i + 1), (want - run[i]) / std::max(run[i + 1] - run[i], 1e-6f));
@@ -103,6 +109,33 @@ Plan purse_string_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   }
   add(plan, TaskKind::draw);
   add(plan, TaskKind::rest);
+  return plan;
+}
+
+// The same with physical mechanics: the forceps holds the rim against the needle, and the thread alone gathers it. The knot's
+// place, between the last bite and the first one, is where the guided plan begins.
+Plan purse_string_thread_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan;
+  plan.lift = 0.012f;
+  plan.driver_at = 0.2f, plan.beyond = 0.6f;
+  plan.scoop = kScoop;
+  plan.pull = kGather, plan.jerk = 0.1f;
+  places_round(picture, skill, skill.bites, skill.edge_distance, plan, 0.5f);
+  // The wall gives way by kGivesWay before the tip enters.
+  const float radius = picture.suture[0].needle_radius;
+  for (BitePlace& p : plan.place) {
+    p.depth += kGivesWay;
+    p.length = 2 * std::sqrt(p.depth * (2 * radius - p.depth));
+  }
+  add(plan, TaskKind::pick_up);
+  for (int b = 0; b < skill.bites; ++b) {
+    add(plan, TaskKind::hold_edge, b);
+    add(plan, TaskKind::bite, b);
+    add(plan, b == 0 ? TaskKind::pull_tail : TaskKind::pull_slack);
+    if (b + 1 < skill.bites) add(plan, TaskKind::hand_back);
+  }
+  add(plan, TaskKind::gather);
+  add(plan, TaskKind::leave);
   return plan;
 }
 
@@ -243,7 +276,40 @@ Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
-// The same, tied with a square knot of single throws while clamps hold the ends together.
+// Over and over with physical mechanics: `bites` stitches side by side, each one sweep through both walls, from the near side
+// to the far one, from which the forceps comes. Clamps hold the ends together while both ends of the thread are drawn.
+Plan over_and_over_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan = interrupted_plan(picture, skill);
+  plan.task.clear();
+  const BitePlace middle = plan.place[0];
+  plan.place.clear();
+  const float turn = kStitchesApart / opening_shape(picture, 0).radius;
+  for (int s = 0; s < skill.bites; ++s) {
+    const Quat by =
+        axis_angle(cross(middle.out, middle.up), turn * (0.5f * static_cast<float>(skill.bites - 1) - static_cast<float>(s)));
+    const Vec3 center = middle.at - middle.out * opening_shape(picture, 0).radius;
+    BitePlace p = middle;
+    p.at = center + rotate(by, middle.at - center), p.out = rotate(by, middle.out), p.up = rotate(by, middle.up);
+    plan.place.push_back(p);
+  }
+  add(plan, TaskKind::pick_up);
+  for (int s = 0; s < skill.bites; ++s) {
+    add(plan, TaskKind::bite, s);
+    add(plan, s == 0 ? TaskKind::pull_tail : TaskKind::pull_slack);
+    if (s + 1 < skill.bites) add(plan, TaskKind::hand_back);
+  }
+  plan.approximate = kApproximate;
+  add(plan, TaskKind::approximate);
+  add(plan, TaskKind::gather);
+  add(plan, TaskKind::regrip);
+  for (int i = 0; i < kThrows; ++i) plan.task.push_back({TaskKind::throw_, 1, 1, i == 1});
+  add(plan, TaskKind::cut_tail);
+  add(plan, TaskKind::cut_long);
+  add(plan, TaskKind::leave);
+  return plan;
+}
+
+// One stitch, tied with a square knot of single throws while clamps hold the ends together.
 Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan = interrupted_plan(picture, skill);
   plan.approximate = kApproximate;
@@ -376,6 +442,8 @@ constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
                              {"running", 1, running_plan},
                              {"interrupted", 2, interrupted_plan},
                              {"interrupted_tied", 2, interrupted_tied_plan},
+                             {"over_and_over", 2, over_and_over_plan},
+                             {"purse_string_thread", 1, purse_string_thread_plan},
                              {"simple", 2, simple_plan},
                              {"excision", 1, excision_plan},
                              {"slit", 1, excision_plan},
@@ -393,10 +461,10 @@ std::span<const char* const> plan_names() {
 }
 
 std::span<const char* const> task_names() {
-  static constexpr const char* kName[] = {"pick_up",   "bite",        "pull_tail",  "pull_slack", "pull_together",
-                                          "hand_back", "regrip",      "draw",       "throw",      "lock_strand",
-                                          "cut_long",  "cut_tail",    "cut_needle", "take_both",  "discard",
-                                          "fresh",     "approximate", "leave",      "rest"};
+  static constexpr const char* kName[] = {"pick_up",     "hold_edge",  "bite",      "pull_tail", "pull_slack",  "pull_together",
+                                          "hand_back",   "regrip",     "draw",      "throw",     "lock_strand", "cut_long",
+                                          "cut_tail",    "cut_needle", "take_both", "discard",   "fresh",       "gather",
+                                          "approximate", "leave",      "rest"};
   static_assert(std::size(kName) == static_cast<size_t>(TaskKind::rest) + 1);
   return kName;
 }

@@ -32,6 +32,7 @@ BiteFrame bite_frame(const PictureModel& picture, const Snapshot& seen, const Bi
 
 enum class TaskKind {
   pick_up,        // the needle holder takes the needle of suture `which` from the drape
+  hold_edge,      // the forceps grasps the rim at place[which], against the needle
   bite,           // one sweep of the needle at place[which]; the forceps pulls it out
   pull_tail,      // the forceps pulls thread through until the tail has the planned length
   pull_slack,     // until the span before the last bite has no slack
@@ -47,6 +48,7 @@ enum class TaskKind {
   take_both,      // the needle holder takes both strands of the knot between its jaws
   discard,        // the forceps lays a needle that was cut off beside the field
   fresh,          // a new suture
+  gather,         // the needle holder takes the tail; both hands pull with Plan::pull and hold both ends
   approximate,    // the assistant brings the clamped bowel ends together, so that a knot is tied without tension
   leave,          // the forceps lays the needle down; no hand holds anything, and the tissue settles
   rest            // hands off; the tissue settles
@@ -72,6 +74,7 @@ struct Plan {
   // The forceps comes for the tip from its side, leaning by `tip_lean` toward the outside of the tissue when the tip is
   // `tip_psi` past the deepest point [rad].
   float tip_lean = 0.8f, tip_psi = 2.6f;
+  float scoop = 0;        // [m] by which the needle is lifted once it is deep enough in the wall, at most
   float approximate = 0;  // [m] travel of each clamp
   float jerk = 0;         // [s] of more than the maximum load after which thread is not pulled further: a jerk is shorter
   bool rise = false;      // the needle is lifted over the edges on its way to where it is laid down

@@ -13,15 +13,23 @@
 namespace catgut {
 namespace {
 
-constexpr float kCounterHold = 0.8f;  // [N]
-constexpr float kTighten = 0.15f;     // of the free speed: the thread runs through two dozen holes, and tissue follows it late
-constexpr float kSecure = 0.985f;     // fraction of a closure that counts as closed
-constexpr float kMissBy = 0.008f;     // [m] along the shaft
-constexpr float kRoomToTie = 0.42f;   // of the needle's arc: least position of a needle holder that hands over near the swage
-constexpr float kClear = 0.4f;        // [s] that the forceps backs out before anything else moves
-constexpr float kForcepsAt = 0.93f;   // position on the needle's arc: behind the tip
-constexpr float kTipUp = -2.2f;       // [rad] angle of the needle's circle at which its tip is up
-constexpr float kStraight = 0.93f;    // of the strand's length
+constexpr float kCounterHold = 0.8f;   // [N]
+constexpr float kTighten = 0.15f;      // of the free speed: the thread runs through two dozen holes, and tissue follows it late
+constexpr float kSecure = 0.985f;      // fraction of a closure that counts as closed
+constexpr float kMissBy = 0.008f;      // [m] along the shaft
+constexpr float kRoomToTie = 0.42f;    // of the needle's arc: least position of a needle holder that hands over near the swage
+constexpr float kClear = 0.4f;         // [s] that the forceps backs out before anything else moves
+constexpr float kForcepsAt = 0.93f;    // position on the needle's arc: behind the tip
+constexpr float kTipUp = -2.2f;        // [rad] angle of the needle's circle at which its tip is up
+constexpr float kStraight = 0.93f;     // of the strand's length
+constexpr float kEdgeGrip = 0.003f;    // [m] of the rim between the forceps' jaws
+constexpr float kGathering = 0.03f;    // [m/s] at most of hands that draw a purse-string
+constexpr float kGatherPatience = 25;  // [s]
+constexpr float kDeepEnough = 0.5f;    // of the wall, for a shallow bite
+constexpr float kScoopSpeed = 0.7f;    // of the needle's speed, with which it is lifted then
+constexpr float kFeel = 0.2f;          // share of a new value per tick
+constexpr float kLoose = 0.05f;        // [N] of thread that is let go
+constexpr float kGathered = 1;         // [s] of full tension on both ends
 
 }  // namespace
 
@@ -104,6 +112,7 @@ void Scripted::begin() {
   misses_ = 0;
   attempts_ = 0;
   depth_fix_ = 0;
+  steady_ = 0;
   // Exponentially distributed, without the long tail.
   if (skill_.pause > 0) pause_left_ = skill_.pause * std::min(4.0f, -portable::log(std::max(1e-6f, 1 - ability_.uniform())));
   if (skill_.tension_error > 0) strength_ = portable::exp(skill_.tension_error * ability_.normal());
@@ -148,7 +157,7 @@ void Scripted::rest_aside(const Snapshot& seen, size_t hand) {
   const Vec3 lateral = plan_.forceps_side == plan_.driver_side ? f.along * (hand == kNeedleHolder ? -0.05f : 0.05f) : Vec3{};
   const Vec3 p = picture_.focus + f.out * 0.07f + f.up * (0.09f * side) + lateral;
   move(hand, {p, hand_[hand].pose.q}, skill_.speed);
-  jaw(hand, 1);
+  if (!holds_needle(seen, hand) || hand != kNeedleHolder) jaw(hand, 1);
 }
 
 BiteFrame Scripted::frame(const Snapshot& seen, size_t place) const {
@@ -199,6 +208,10 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
       doing_ = "pick up the needle";
       suture_ = static_cast<size_t>(task.which);
       return pick_up(seen);
+    case TaskKind::hold_edge:
+      place_ = static_cast<size_t>(task.which);
+      doing_ = name_of_bite() + "hold the edge";
+      return hold_edge(seen);
     case TaskKind::bite:
       place_ = static_cast<size_t>(task.which);
       return make_bite(seen);
@@ -216,6 +229,9 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
     case TaskKind::draw:
       doing_ = "tighten the suture";
       return draw(seen);
+    case TaskKind::gather:
+      doing_ = "draw both ends";
+      return gather(seen);
     case TaskKind::throw_:
     case TaskKind::lock_strand:
       return plan_.pull > 0 ? tie_thread(task, seen) : tie(task, seen);
@@ -280,15 +296,43 @@ int Scripted::passages(const Snapshot& seen, bool complete) const {
   return count;
 }
 
+void Scripted::hold_or_rest(const Snapshot& seen) {
+  if (seen.tool[kForceps].held != Held::tissue) rest_aside(seen, kForceps);
+}
+
+bool Scripted::hold_edge(const Snapshot& seen) {
+  enum { over, down, close };
+  rest_aside(seen, kNeedleHolder);
+  BiteFrame f = frame(seen, place_);
+  f.at -= f.along * (0.5f * bite().length);  // where the needle enters
+  const Pose grip{f.at + f.up * (skill_.edge_distance - kEdgeGrip) - f.out * (0.5f * skill_.wall),
+                  from_axes(f.out, cross(f.up, f.out), f.up)};
+  switch (stage_) {
+    case over:
+      jaw(kForceps, 1);
+      if (move(kForceps, raised(grip, 0.02f), skill_.speed)) go_down(down);
+      else if (!patience(6)) gave_up_ = true;
+      return false;
+    case down:
+      if (move(kForceps, short_of(grip), careful())) go(close);
+      else if (!patience(4)) gave_up_ = true;
+      return false;
+    default:
+      if (!jaw(kForceps, 0) || waited_ < 0.3f) return false;
+      if (seen.tool[kForceps].held != Held::tissue) return miss(over), false;
+      return true;
+  }
+}
+
 bool Scripted::make_bite(const Snapshot& seen) {
-  enum { hover, approach, drive, withdraw, over, down, close, release, retreat, bring };
+  enum { hover, approach, drive, withdraw, let_go, over, down, close, release, retreat, bring };
   const float speed = skill_.speed, psi_bite = half_bite_angle();
   const Pose& needle = seen.active().needle.pose;
   if (stage_ == hover && waited_ <= dt_) aim();
   switch (stage_) {
     case hover: {  // to a position beside the bite, clear of the organ
       doing_ = name_of_bite() + "approach";
-      rest_aside(seen, kForceps);
+      hold_or_rest(seen);
       BiteFrame f = frame(seen, place_);
       f.at += f.out * 0.022f + f.up * plan_.lift;
       if (move(kNeedleHolder, holding(kNeedleHolder, needle_at(f, -psi_bite - 0.7f)), speed)) go(approach);
@@ -296,7 +340,8 @@ bool Scripted::make_bite(const Snapshot& seen) {
       return false;
     }
     case approach: {
-      rest_aside(seen, kForceps);
+      hold_or_rest(seen);
+      scooped_ = 0;
       frame_ = frame(seen, place_);
       frame_.at += frame_.along * aim_along_ + frame_.up * aim_up_;
       if (aim_turn_ != 0) {
@@ -314,12 +359,17 @@ bool Scripted::make_bite(const Snapshot& seen) {
     }
     case drive: {
       doing_ = name_of_bite() + "drive the needle";
-      rest_aside(seen, kForceps);
+      hold_or_rest(seen);
       psi_ += skill_.drive_speed / shape().needle_radius * dt_;
+      // Square to the wall until the tip is deep enough in it, then shallow.
+      if (plan_.scoop > 0 && seen.active().needle.in_tissue && seen.active().bite.back().depth > kDeepEnough * skill_.wall) {
+        const float up = std::min(plan_.scoop - scooped_, kScoopSpeed * skill_.drive_speed * dt_);
+        frame_.at += frame_.out * up, scooped_ += up;
+      }
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
       const int passed = passages(seen, false);
       if (passed >= bite().walls && psi_ > psi_bite + plan_.beyond) {
-        go(over);
+        go(seen.tool[kForceps].held == Held::tissue ? let_go : over);
       } else if (psi_ > psi_bite + 1.1f) {
         // The tip is misplaced: it did not enter, is not deep enough, or is too deep to exit.
         // Through the first wall but not the second, which was pushed away by millimeters, as soft walls are.
@@ -331,7 +381,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
     }
     case withdraw: {  // back along the same arc, then the same bite again
       doing_ = name_of_bite() + "withdraw and retry";
-      rest_aside(seen, kForceps);
+      hold_or_rest(seen);
       psi_ = std::max(psi_ - 2 * skill_.drive_speed / shape().needle_radius * dt_, -psi_bite - 0.7f);
       BiteFrame f = frame_;
       if (!patience(1.5f)) f.at += f.out * std::min(0.01f, 0.01f * (waited_ - 1.5f));  // stuck: move away from the wall
@@ -345,6 +395,10 @@ bool Scripted::make_bite(const Snapshot& seen) {
       }
       return false;
     }
+    case let_go:  // of the edge, and off it
+      if (seen.tool[kForceps].held == Held::tissue || !jaw(kForceps, 1)) jaw(kForceps, 1), waited_ = 0;
+      else if (move(kForceps, raised(hand_[kForceps].pose, 0.02f), skill_.speed) || waited_ > 0.15f) go(over);
+      return false;
     case over:
       doing_ = name_of_bite() + "grasp the tip";
       jaw(kForceps, 1);
@@ -396,12 +450,14 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
     slack = length_between(seen, 0, first_point_node(seen)) - skill_.tail;
   } else if (kind == TaskKind::pull_slack) {
     // In the last span from one bite to the next, or from one bowel end to the other: length of thread minus distance.
+    int spans = bite().walls;
     for (size_t k = n - 1; k-- > 0;) {
       const SuturePointView &a = seen.active().suture_point[k], &b = seen.active().suture_point[k + 1];
-      if (a.bite == b.bite || (plan_.lift == 0 && a.wall == b.wall)) continue;
-      slack = length_between(seen, node_of(seen, a.anchored), node_of(seen, b.anchored)) -
-              1.1f * distance(a.position, b.position) - 0.001f;
-      break;
+      if (a.bite == b.bite || (plan_.lift == 0 && plan_.pull <= 0 && a.wall == b.wall)) continue;
+      slack += length_between(seen, node_of(seen, a.anchored), node_of(seen, b.anchored)) -
+               1.1f * distance(a.position, b.position) - 0.001f;
+      // With physical mechanics a sweep through several walls leaves as many spans.
+      if (--spans <= 0 || plan_.pull <= 0) break;
     }
   } else if (kind == TaskKind::pull_together) {
     slack = open_seam(seen);
@@ -479,33 +535,40 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
   }
 }
 
+// Both draw() and gather() begin with these stages.
+bool Scripted::grasp_tail(const Snapshot& seen) {
+  enum { over, down, close };
+  const size_t first = first_point_node(seen);
+  const BiteFrame f = frame(seen, first_place());
+  // A position on the tail a short distance from the first bite, seen from outside; after a miss a different one.
+  const float away = 0.019f + 0.005f * static_cast<float>(misses_ % 4);
+  const Vec3 thread = node_at(seen, node_along(seen, first, std::min(away, 0.6f * length_between(seen, 0, first)), -1));
+  const Vec3 z = plan_.lift > 0 ? normalized(f.out * 0.6f + f.up) : normalized(f.out + Vec3{0.6f, 0, 0.2f});
+  const Vec3 x = normalized(f.along - z * dot(f.along, z), any_perpendicular(z));
+  const Pose goal{thread, from_axes(x, cross(z, x), z)};
+  if (stage_ == over) {
+    jaw(kNeedleHolder, 1);
+    if (move(kNeedleHolder, raised(goal, 0.03f), skill_.speed)) go(down);
+    else if (!patience(8)) gave_up_ = true;
+  } else if (stage_ == down) {
+    if (move(kNeedleHolder, goal, careful())) go(close);
+    else if (!patience(4)) gave_up_ = true;
+  } else if (jaw(kNeedleHolder, 0) && waited_ > 0.3f) {
+    if (seen.tool[kNeedleHolder].held == Held::thread) return true;
+    miss(over);
+  }
+  return false;
+}
+
 bool Scripted::draw(const Snapshot& seen) {
   enum { over, down, close, tighten, lay, open };
-  const size_t first = first_point_node(seen);
   const BiteFrame f = frame(seen, first_place());
   switch (stage_) {
     case over:
     case down:
-    case close: {
-      // A position on the tail a short distance from the first bite, seen from outside; after a miss a different one.
-      const float away = 0.019f + 0.005f * static_cast<float>(misses_ % 4);
-      const Vec3 thread = node_at(seen, node_along(seen, first, std::min(away, 0.6f * length_between(seen, 0, first)), -1));
-      const Vec3 z = plan_.lift > 0 ? normalized(f.out * 0.6f + f.up) : normalized(f.out + Vec3{0.6f, 0, 0.2f});
-      const Vec3 x = normalized(f.along - z * dot(f.along, z), any_perpendicular(z));
-      const Pose goal{thread, from_axes(x, cross(z, x), z)};
-      if (stage_ == over) {
-        jaw(kNeedleHolder, 1);
-        if (move(kNeedleHolder, raised(goal, 0.03f), skill_.speed)) go(down);
-        else if (!patience(8)) gave_up_ = true;
-      } else if (stage_ == down) {
-        if (move(kNeedleHolder, goal, careful())) go(close);
-        else if (!patience(4)) gave_up_ = true;
-      } else if (jaw(kNeedleHolder, 0) && waited_ > 0.3f) {
-        if (seen.tool[kNeedleHolder].held != Held::thread) return miss(over), false;
-        go(tighten);
-      }
+    case close:
+      if (grasp_tail(seen)) go(tighten);
       return false;
-    }
     case tighten: {
       // Force feedback: the hand slows in proportion to the thread's tension.
       auto gently = [&](size_t hand) {
@@ -542,6 +605,48 @@ bool Scripted::draw(const Snapshot& seen) {
       if (plan_.lift > 0) return true;  // a purse-string stays in the hands
       jaw(kNeedleHolder, 1);
       return move(kNeedleHolder, raised(hand_[kNeedleHolder].pose, 0.02f), skill_.speed) || waited_ > 0.8f;
+  }
+}
+
+bool Scripted::gather(const Snapshot& seen) {
+  enum { over, down, close, tighten, slacken, open };
+  if (stage_ < tighten) {
+    if (grasp_tail(seen)) steady_ = 0, felt_ = {}, go(tighten);
+    return false;
+  }
+  const BiteFrame f = frame(seen, first_place());
+  // Each end is drawn on beyond the other one's hole, low, as strands cross in a throw.
+  const SutureView& s = seen.active();
+  const Vec3 tail_at = s.suture_point.front().position, end_at = s.suture_point.back().position;
+  const Vec3 between = normalized(end_at - tail_at, -f.along), out = normalized(f.out * 0.6f + f.up * 0.3f);
+  const size_t held = node_of(seen, seen.tool[kNeedleHolder].held_slot);
+  const float now[2] = {held + 2 < s.thread_tension.size() ? s.thread_tension[held + 2] : 0, needle_tension(seen)};
+  for (size_t k = 0; k < 2; ++k) felt_[k] += kFeel * (now[k] - felt_[k]);
+  const float tail = felt_[kNeedleHolder], end = felt_[kForceps];
+  // Evenly: neither hand leads.
+  const auto pace = [&](float felt, float other) {
+    const float want = std::min(plan_.pull * strength_, 1.2f * other + 0.1f);
+    return kGathering * std::clamp(2 * (want - felt), -1.0f, 1.0f);
+  };
+  const auto draw = [&](size_t hand, Vec3 way, float speed) {
+    const Vec3 p = hand_[hand].pose.p;
+    move(hand, {p + (speed > 0 ? way : -way) * 0.05f, hand_[hand].pose.q}, std::abs(speed));
+  };
+  const Vec3 right = normalized(between * 0.8f + out), left = normalized(between * -0.8f + out);
+  switch (stage_) {
+    case tighten:
+      draw(kNeedleHolder, right, pace(tail, end)), draw(kForceps, left, pace(end, tail));
+      steady_ = std::min(tail, end) > 0.9f * plan_.pull * strength_ ? steady_ + dt_ : 0;
+      if (steady_ > kGathered || !patience(kGatherPatience)) go(slacken);
+      return false;
+    case slacken:  // both ends at once
+      if (tail > kLoose) draw(kNeedleHolder, right, -kGathering);
+      if (end > kLoose) draw(kForceps, left, -kGathering);
+      if (std::max(tail, end) < kLoose || !patience(5)) go(open);
+      return false;
+    default:
+      doing_ = "let go of both ends";
+      return jaw(kNeedleHolder, 1);
   }
 }
 

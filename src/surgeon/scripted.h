@@ -100,6 +100,9 @@ class Scripted final : public Surgeon {
 
   bool pick_up(const Snapshot& seen);
 
+  bool hold_edge(const Snapshot& seen);
+  // The forceps keeps an edge that it holds, else it waits clear of the work.
+  void hold_or_rest(const Snapshot& seen);
   bool make_bite(const Snapshot& seen);
   // Walls that the needle has passed since this bite began; complete: with its back end too. A withdrawn bite stays listed
   // and counts for nothing.
@@ -150,7 +153,10 @@ class Scripted final : public Surgeon {
 
   // --- both hands on the thread -----------------------------------------------------------------------------------------
   // The needle holder grasps the tail, then both pull until everything is closed.
+  bool grasp_tail(const Snapshot& seen);
   bool draw(const Snapshot& seen);
+  // The same with physical mechanics, until both ends are taut with Plan::pull.
+  bool gather(const Snapshot& seen);
 
   // --- scissors ---------------------------------------------------------------------------------------------------------
   bool cut(TaskKind kind, const Snapshot& seen);
@@ -186,7 +192,10 @@ class Scripted final : public Surgeon {
   float miss_by_ = 0;     // [m] distance by which this grasp misses
   float depth_fix_ = 0;   // [m] correction from failed attempts at this bite; positive: shallower
   Pose pull_from_;
-  float overloaded_ = 0;  // [s] that a pull has had more than the maximum load
+  float scooped_ = 0;            // [m] by which this bite was lifted
+  float steady_ = 0;             // [s] of full tension
+  std::array<float, 2> felt_{};  // [N] in the strands of a hand, smoothed
+  float overloaded_ = 0;         // [s] that a pull has had more than the maximum load
   // A throw.
   Winding winding_;  // computed by exchange/tying, as for assisted hands
   size_t cuts_before_ = 0, settled_before_ = 0;

@@ -401,6 +401,49 @@ TEST(PhysicalScene, one_throw_does_not_hold_a_wound) {
   EXPECT_GT(r.away, 2e-3f);
 }
 
+// A purse-string of six bites with one needle, drawn by both hands: its thread alone gathers the opening. Cut while both hands
+// hold it, or let go untied, it opens again.
+TEST(PhysicalScene, a_purse_string_gathers_by_its_thread_alone) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "ninety seconds of surgery: set CATGUT_LONG=1";
+  const SceneSpec scene = read_scene("purse_string_thread");
+  const std::shared_ptr<const Model> model = build_model(scene);
+  const StatePtr state = initial_state(*model), drawn = initial_state(*model);
+  const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*model));
+  Jobs jobs(2);
+  Snapshot seen;
+  TickInput no_hands, held;
+  for (ToolInput& hand : no_hands.hand) hand.connected = 0;
+  const auto tick = [&](State& s, TickInput in) {
+    in.tick = s.tick;
+    step(*model, s, in, jobs);
+    publish(*model, s, seen);
+  };
+  publish(*model, *state, seen);
+  const float open = seen.opening_area;
+  float least = open;
+  for (int t = 0; t < 60 * 120 && !surgeon->done(); ++t) {
+    const TickInput in = t < 30 ? no_hands : surgeon->operate(seen, model->dt);
+    tick(*state, in);
+    if (seen.opening_area >= least || surgeon->doing() != "draw both ends") continue;
+    least = seen.opening_area, held = in;
+    load_state(*model, *drawn, save_state(*model, *state));
+  }
+  ASSERT_TRUE(surgeon->done() && !surgeon->gave_up()) << surgeon->doing();
+  for (const physical::Hole& hole : state->physical.world.hole) EXPECT_EQ(hole.torn, 0);
+  const float away = seen.opening_area;
+  held.commands.clear();
+  thread::State& thread = drawn->physical.world.thread;
+  std::fill(thread.broken.begin(), thread.broken.end(), uint8_t{1});
+  thread.eyelet.clear(), thread.travel = 1e9f;
+  for (int t = 0; t < 90; ++t) tick(*drawn, held);
+  std::printf("opening: drawn %.1f %%, thread cut while it is held %.1f %%, let go untied %.1f %%\n",
+              static_cast<double>(100 * least / open), static_cast<double>(100 * seen.opening_area / open),
+              static_cast<double>(100 * away / open));
+  EXPECT_LT(least, 0.3f * open);
+  EXPECT_GT(seen.opening_area, 0.95f * open);
+  EXPECT_GT(away, 0.9f * open);
+}
+
 TEST(PhysicalScene, a_guided_scene_has_no_physical_state) {
   const std::shared_ptr<const Model> model = build_model(read_scene("stay"));
   const StatePtr state = initial_state(*model);
