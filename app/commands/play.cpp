@@ -61,7 +61,7 @@ void read_window_options(WindowCommand& o) {
 
 int play_without_arguments() {
   PlayOptions options;
-  options.keep_sessions = true;
+  options.keep_sessions = options.sound = true;
   return play(options);
 }
 
@@ -155,6 +155,7 @@ void add_play(CLI::App& app, int& exit_code) {
     check_suffix(o->play.screenshot, ".png", "--screenshot");
     for (const std::string& path : {o->play.live.record, o->play.json, o->play.csv, o->play.events, o->play.screenshot})
       check_output(path);
+    o->play.sound = o->play.screenshot.empty();
     o->play.keep_sessions = !*unrecorded && o->play.screenshot.empty();
     exit_code = play(o->play);
   });

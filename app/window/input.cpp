@@ -63,6 +63,8 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
     space_ = down;
   }
   if (code == SDLK_c) cut_ = down, in.mouse.cut = in.mouse.cut || down;
+  if (code == SDLK_F7) cut_pedal_ = down;
+  if (code == SDLK_F8) coagulate_pedal_ = down;
   if (code == SDLK_n) fresh_ = down, in.mouse.fresh = in.mouse.fresh || down;
   if (!down || e.repeat) return;
   if (code == SDLK_TAB) ++in.mouse.hand_changes;
@@ -120,6 +122,12 @@ void WindowEvents::read_pad(GamepadInput& pad) const {
   pad.slow = SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_X);
 }
 
+int WindowEvents::shoulders() const {
+  const auto down = [&](SDL_GameControllerButton which) { return SDL_GameControllerGetButton(pad_, which) != 0; };
+  return kFromPad + (down(SDL_CONTROLLER_BUTTON_LEFTSHOULDER) ? kLeftShoulder : 0) +
+         (down(SDL_CONTROLLER_BUTTON_RIGHTSHOULDER) ? kRightShoulder : 0);
+}
+
 // Keys that edit a text field. True: one of them, and a field has them.
 bool WindowEvents::edit_text(const SDL_KeyboardEvent& e) {
   constexpr std::pair<SDL_Keycode, ImGuiKey_> kEditing[] = {
@@ -156,6 +164,7 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
             e.window.event == SDL_WINDOWEVENT_HIDDEN) {
           in.left = true;
           left_ = right_ = middle_ = space_ = cut_ = fresh_ = roll_left_ = roll_right_ = both_ = false;
+          cut_pedal_ = coagulate_pedal_ = false;
           arrow_x_ = arrow_y_ = zoom_ = 0;
         }
         break;
@@ -213,8 +222,8 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
         break;
       case SDL_CONTROLLERBUTTONDOWN:
         if (e.cbutton.button == SDL_CONTROLLER_BUTTON_START) keys_.push_back({Key::escape, 0});
-        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_DPAD_UP) keys_.push_back({Key::next_instrument, 0});
-        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_DPAD_DOWN) keys_.push_back({Key::park, 0});
+        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_DPAD_UP) keys_.push_back({Key::next_instrument, shoulders()});
+        if (e.cbutton.button == SDL_CONTROLLER_BUTTON_DPAD_DOWN) keys_.push_back({Key::park, shoulders()});
         if (e.cbutton.button == SDL_CONTROLLER_BUTTON_BACK) keys_.push_back({Key::take_back, 0});
         break;
       default:
@@ -226,6 +235,7 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
     keys_.pop_front();
   }
   const SDL_Keymod mod = SDL_GetModState();
+  in.pedal = cut_pedal_ ? PenMode::cut : coagulate_pedal_ ? PenMode::coagulate : PenMode::off;
   in.mouse.turn = right_;
   in.mouse.both = both_;
   in.mouse.free_turn = mod & KMOD_CTRL;
@@ -236,7 +246,12 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
   in.orbit_up += static_cast<float>(arrow_y_) * kOrbitRate * dt;
   in.closer += static_cast<float>(zoom_) * kZoomRate * dt;
   in.has_pad = pad_ != nullptr;
-  if (pad_) read_pad(in.pad);
+  if (pad_) {
+    read_pad(in.pad);
+    in.orbit_right += static_cast<float>(SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_DPAD_RIGHT) -
+                                         SDL_GameControllerGetButton(pad_, SDL_CONTROLLER_BUTTON_DPAD_LEFT)) *
+                      kOrbitRate * dt;
+  }
   int x = 0, y = 0;
   SDL_GetMouseState(&x, &y);
   io.MousePos = working ? ImVec2(-1, -1) : ImVec2(static_cast<float>(x), static_cast<float>(y));

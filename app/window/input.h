@@ -28,8 +28,8 @@ enum class Key {
   points,
   hints,
   help_at_needle,
-  next_instrument,  // from the tray into the active hand
-  park,             // parks the active hand's clamp, or takes one
+  next_instrument,  // from the tray into the active hand; from a gamepad, see kFromPad
+  park,             // parks the hand's clamp, lays down its instrument, or takes a parked one
   arms_off,
   finish,
   digit,
@@ -44,14 +44,18 @@ enum class Key {
   record
 };
 
+// WindowInput::digit of a gamepad's button: which shoulder buttons were pressed with it.
+constexpr int kFromPad = 1, kLeftShoulder = 2, kRightShoulder = 4;
+
 struct WindowInput {
   MouseInput mouse;
   GamepadInput pad;
   bool has_pad = false;
   float orbit_right = 0, orbit_up = 0, closer = 0;  // of the camera, see turn_orbit
   bool camera_home = false;
-  int speed = -1;       // of kMouseSpeeds, when a speed key was pressed
-  Key key = Key::none;  // one per call: two presses between two frames are reported in sequence
+  PenMode pedal = PenMode::off;  // that is held down: F7 cut, F8 coagulate; a footswitch sends these keys
+  int speed = -1;                // of kMouseSpeeds, when a speed key was pressed
+  Key key = Key::none;           // one per call: two presses between two frames are reported in sequence
   int digit = 0;
   int arrow_presses = 0;  // right minus left, repeats included
   bool any = false;       // a key, a button, a motion
@@ -78,13 +82,14 @@ class WindowEvents {
   void key(const SDL_KeyboardEvent& e, WindowInput& in);
   static bool edit_text(const SDL_KeyboardEvent& e);
   void read_pad(GamepadInput& pad) const;
+  int shoulders() const;
 
   std::deque<std::pair<Key, int>> keys_;  // with the digit, not reported yet
   SDL_GameController* pad_ = nullptr;
   std::string pad_name_;
   bool clicked_ = false;  // the left button was pressed since the panels were last drawn
   bool left_ = false, right_ = false, middle_ = false, space_ = false, cut_ = false, fresh_ = false;
-  bool roll_left_ = false, roll_right_ = false, both_ = false;
+  bool roll_left_ = false, roll_right_ = false, both_ = false, cut_pedal_ = false, coagulate_pedal_ = false;
   int arrow_x_ = 0, arrow_y_ = 0, zoom_ = 0;
 };
 

@@ -231,9 +231,11 @@ Choice settings_panel(Settings& s, const std::string& file, const std::string& f
     ImGui::Checkbox(tr("keys (F1)").c_str(), &s.hints);
     ImGui::SameLine();
     ImGui::Checkbox(tr("magnifier").c_str(), &s.inset);
+    row("sound");
+    ImGui::Checkbox(tr("tone of the active pen").c_str(), &s.sound);
     ImGui::EndTable();
   }
-  if (working) text(kQuiet, "graphics and hands: from next scene");
+  if (working) text(kQuiet, "hands: from next scene");
   text(kQuiet, file.empty() ? "not saved: no config directory" : "Saved in " + file);
   ImGui::Separator();
   if (wide_button("Done (Esc)", 11)) choice.what = Chosen::leave_settings;

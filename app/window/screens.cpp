@@ -58,9 +58,9 @@ Choice choice_of_key(const WindowInput& in, const ScreenFacts& f) {
     case Key::help_at_needle:
       return when(field, Chosen::help_at_needle);
     case Key::next_instrument:
-      return when(practice, Chosen::next_instrument);
+      return practice ? Choice{Chosen::next_instrument, static_cast<size_t>(in.digit)} : Choice{};
     case Key::park:
-      return when(practice, Chosen::park);
+      return practice ? Choice{Chosen::park, static_cast<size_t>(in.digit)} : Choice{};
     case Key::arms_off:
       return when(field, Chosen::arms_off);
     case Key::settings:

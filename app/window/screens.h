@@ -47,9 +47,9 @@ enum class Chosen {
   points,
   hints,
   help_at_needle,
-  next_instrument,
-  park,
-  arms_off,  // switches force of haptic devices off, or on
+  next_instrument,  // which: as WindowInput::digit
+  park,             // likewise
+  arms_off,         // switches force of haptic devices off, or on
   developer,
   headset,  // connects to one, or leaves it
   picture,

@@ -130,6 +130,7 @@ const std::vector<Key>& keys() {
       flag("suture_points", &Settings::suture_points),
       flag("hints", &Settings::hints),
       flag("inset", &Settings::inset),
+      flag("sound", &Settings::sound),
       number("mouse_speed", "write a number from 0.2 to 4", &Settings::mouse_speed, 0.2, 4),
       flag("steady_hands", &Settings::steady_hands),
       number("hand_scale", "write a number from 0.2 to 1", &Settings::hand_scale, 0.2, 1),

@@ -30,6 +30,7 @@ struct Settings {
   bool assist = true;          // an open jaw snaps to the needle
   bool suture_points = false;
   bool hints = true;                      // the list of keys
+  bool sound = true;                      // tone of an active pen
   bool inset = true;                      // magnifies the needle's tip where the resolution has been lowered
   float mouse_speed = 1;                  // 0.2 .. 4, of tool to mouse
   bool steady_hands = true;               // headset: removes the tremor of the wearer's hands

@@ -39,6 +39,7 @@
 #include "window/latency.h"
 #include "window/panels.h"
 #include "window/sdl_window.h"
+#include "window/sound.h"
 #include "window/stitch_labels.h"
 #include "window/visit.h"
 #include "window/widgets.h"
@@ -344,6 +345,8 @@ class Window {
     std::swap(last_, visit_->seen);
     have_last_ = have;
     visit_.reset();
+    pen_sound_.set(PenMode::off);
+    pedal_ = PenMode::off;
     return result;
   }
 
@@ -571,10 +574,10 @@ class Window {
         settings_.assist = !settings_.assist;
         break;
       case Chosen::next_instrument:
-        instrument(next_from_tray(visit_->seen, hands_.mouse.active));
+        instrument(next_from_tray(visit_->seen, hand_meant(choice.which)));
         break;
       case Chosen::park:
-        instrument(park_or_take_up(visit_->seen, hands_.mouse.active));
+        instrument(park_or_take_up(visit_->seen, hand_meant(choice.which)));
         break;
       case Chosen::record:
         if (live) live->command(LiveCommand::record);
@@ -742,6 +745,32 @@ class Window {
     else std::fprintf(stderr, "catgut: %s\n", line.text.c_str());
   }
 
+  // Of a key that is reported once: the hand of the mouse. Of a gamepad's button: the second hand with the shoulder above its
+  // stick, else the first.
+  size_t hand_meant(size_t digit) const {
+    if (!(digit & kFromPad)) return hands_.mouse.active;
+    return digit & (settings_.left_handed ? kRightShoulder : kLeftShoulder) ? 1 : 0;
+  }
+
+  // A pedal switches the pen, in whichever hand it is.
+  void use_pedal(PenMode wanted) {
+    if (std::exchange(pedal_, wanted) == wanted) return;
+    for (size_t k = 0; k < 2; ++k) {
+      const int i = visit_->seen.tool[k].instrument;
+      if (i >= 0 && visit_->live.picture().instrument[static_cast<size_t>(i)].can(kCauterize))
+        instrument({CommandKind::set_pen, static_cast<uint8_t>(k), static_cast<uint16_t>(wanted)});
+    }
+  }
+
+  // Silent while time stands still.
+  void sound_pen() {
+    PenMode mode = PenMode::off;
+    if (screen_ == Screen::practice && !reading())
+      for (const InstrumentView& i : visit_->seen.instrument) mode = std::max(mode, i.pen);
+    if (mode != PenMode::off && options_.sound && settings_.sound) pen_sound_.open();
+    pen_sound_.set(options_.sound && settings_.sound ? mode : PenMode::off);
+  }
+
   void instrument(const Command& command) {
     if (command.kind != CommandKind::none) visit_->live.instrument(command);
   }
@@ -760,6 +789,8 @@ class Window {
     }
     if (!status.fault.empty() && screen_ == Screen::practice) go(Screen::pause);
     report_stage(status);
+    sound_pen();
+    if (v.have && !v.watching) use_pedal(screen_ == Screen::practice && !reading() ? in.pedal : PenMode::off);
     if (screen_ != Screen::practice || status.settling || !v.have || v.watching) return;
     const Camera camera = camera_of(orbit_);
     const ViewFrame view = view_frame(camera.eye, camera.target, camera.up, camera.fov_deg, static_cast<float>(height_));
@@ -999,6 +1030,8 @@ class Window {
   bool tutorial_ = false, demonstrating_ = false;
   uint32_t shown_stage_ = 0;  // reported last, from 1
   UsedKeys used_keys_;
+  PenSound pen_sound_;
+  PenMode pedal_ = PenMode::off;  // that is pressed
   std::vector<PlacedPanel> placed_, board_placed_;
   std::optional<PanelRect> inset_;  // of the magnifier; none: it is not shown
   ViewFrame inset_frame_;

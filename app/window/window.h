@@ -46,6 +46,7 @@ struct PlayOptions {
   double at = 0;               // [s] of the session, or of the recording
   std::string json;            // results, written when a scene is closed; "-"
   std::string csv;             // the same as a table
+  bool sound = false;          // the pen's tone, as the settings want
   bool keep_sessions = false;  // records every session into the data folder, as the settings want
   bool kiosk = false;          // whole screen, cannot be left; back to the start screen after a time without input
   double idle_s = 180;         // [s] that time

@@ -225,6 +225,7 @@ std::vector<std::string> tray_lines(const Snapshot& seen, const PictureModel& pi
   const bool clamps = park.kind == CommandKind::park && picture.instrument[park.argument].can(kClamp);
   if (park.kind == CommandKind::unpark) lines.push_back("K  take up " + title(park.argument));
   if (clamps && seen.tool[hand].held != Held::nothing) lines.push_back("K  park " + title(park.argument));
+  if (park.kind == CommandKind::lay_down) lines.push_back("K  lay down " + title(park.argument));
   return lines;
 }
 

@@ -34,8 +34,8 @@ constexpr KeyLine kKeys[] = {
     {"W                both hands: wrap, pull apart",
      [](const WindowInput& in) { return in.mouse.both && in.mouse.right != 0; }},
     {"Tab              other hand", [](const WindowInput& in) { return in.mouse.hand_changes > 0; }},
-    {"C  N             cut thread, new suture", [](const WindowInput& in) { return in.mouse.cut || in.mouse.fresh; }},
-    {"I  K             next instrument, park clamp",
+    {"C  N             cut thread or pen, new suture", [](const WindowInput& in) { return in.mouse.cut || in.mouse.fresh; }},
+    {"I  K             next instrument, park or lay down",
      [](const WindowInput& in) { return in.key == Key::next_instrument || in.key == Key::park; }},
     {"1 2 3            fine, normal, fast", [](const WindowInput& in) { return in.speed >= 0; }},
     {"middle, arrows   orbit; Ctrl+wheel: zoom",
@@ -117,7 +117,16 @@ Panel hand_panel(const WorkView& v, const Settings& settings) {
     const HelpAt at = v.steering->hand[k].at;
     p.line.push_back({Tone::accent, at == HelpAt::needle ? "needle: close jaws"
                                     : at == HelpAt::tail ? "tail: close jaws"
-                                                         : "bite: drive needle"});
+                                    : at == HelpAt::bite ? "bite: drive needle"
+                                    : at == HelpAt::rim  ? "wall: close jaws"
+                                                         : "tip on tissue; wheel: lift it"});
+  }
+  if (const int i = v.seen->tool[k].instrument; i >= 0 && v.picture->instrument[static_cast<size_t>(i)].can(kCauterize)) {
+    const PenMode mode = v.seen->instrument[static_cast<size_t>(i)].pen;
+    p.line.push_back({mode == PenMode::cut ? Tone::bad : Tone::quiet, mode == PenMode::cut ? "C  cutting: on" : "C  cut: off"});
+    p.line.push_back({mode == PenMode::coagulate ? Tone::bad : Tone::quiet,
+                      mode == PenMode::coagulate ? "N  coagulating: on" : "N  coagulate: off"});
+    p.line.push_back({Tone::quiet, "F7 F8  pedals: cut, coagulate"});
   }
   for (const std::string& text : tray_lines(*v.seen, *v.picture, k)) p.line.push_back({Tone::quiet, text});
   if (!v.pad.empty()) p.line.push_back({Tone::quiet, v.pad});

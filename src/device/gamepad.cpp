@@ -49,8 +49,9 @@ std::array<HandMotion, 2> gamepad_motion(GamepadHand& pad, Steering& steering, c
       pad.trigger[k] = pulled;
     }
   }
-  if (input.cut) steering.hand[0].buttons |= kButtonCut;
-  if (input.fresh) steering.hand[0].buttons |= kButtonNewSuture;
+  SteeredHand& meant = steering.hand[(pad.left_handed ? input.right : input.left).shoulder ? 1 : 0];
+  if (input.cut) meant.buttons |= kButtonCut;
+  if (input.fresh) meant.buttons |= kButtonNewSuture;
   return motion;
 }
 

@@ -18,7 +18,7 @@ struct GamepadSide {
 
 struct GamepadInput {
   GamepadSide left, right;
-  bool cut = false, fresh = false;  // A, Y
+  bool cut = false, fresh = false;  // A, Y: of the first hand, or of the second with the shoulder above its stick
   bool slow = false;                // X: a third of the speed
   bool both = false;                // B: the needle holder's stick, sideways, controls both hands (device/both_hands)
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 
+#include "device/wall_spot.h"
 #include "exchange/strand.h"
 
 namespace catgut {
@@ -25,6 +26,9 @@ constexpr float kAboveTail = 0.012f;                      // [m]
 constexpr float kBlocked = 0.3f;                          // [s] that jaws are stopped before they go elsewhere on the tail
 constexpr float kLoopSpeed = 0.1f;                        // [m/s] of a tool that carries a loop
 constexpr float kKeepsLoop = 0.7f;                        // opening of a jaw that releases without shaking off a loop
+constexpr float kOverRim = 0.025f;                        // [m] from where jaws and blades come down on a rim
+constexpr float kSwab = 0.0045f;                          // [m] radius of its gauze, less what it presses
+constexpr float kPressed = 0.001f, kLifted = 0.05f;       // [m] that the wheel moves a tip into the tissue, or off it
 constexpr float kReach = 0.35f;                           // [m] from the field's center: limit of the hands
 
 Vec3 shaft_of(const Pose& tool) { return rotate(tool.q, {0, 0, 1}); }
@@ -110,16 +114,51 @@ void help_to_bite(Steering& steering, size_t who, const ViewFrame& view, const P
   hand.help = hand.hovered ? needle_on(picture, g, psi + hand.driven) * hand.grip : beside;
 }
 
-// Whether the assist moves the tool now.
-void help(Steering& steering, size_t who, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen, float dt) {
+// Instruments that work on the wall. Jaws and blades come from above the rim. was: it was there in the last tick; open: the
+// jaws are; ahead: [m] of the wheel. Snapped only where tissue is under the pointer.
+void help_to_wall(SteeredHand& hand, uint32_t can, bool was, bool open, float ahead, const ViewFrame& view,
+                  const PictureModel& picture, const Snapshot& seen) {
+  const bool tip = can & (kCauterize | kAbsorb), blades = !tip && can & kCutTissue;
+  const bool jaws = can & kHoldTissue && (can & (kHoldNeedle | kClamp)) != (kHoldNeedle | kClamp);
+  if (!tip && !(blades && (was || open)) && !(jaws && (was || open))) return;
+  const auto spot =
+      jaws ? rim_beside(view, hand.pose.p, was ? kLetGo : kCatch, picture, seen) : wall_under(view, hand.pose.p, picture, seen);
+  if (!spot || (!was && std::abs(dot(spot->at - hand.pose.p, view.ahead)) > kCatchDeep)) return;
+  Vec3 there;
+  near_on_screen(view, hand.pose.p, spot->at, 1, there);
+  hand.pose.p = there;
+  hand.snapped = true, hand.at = tip ? HelpAt::face : HelpAt::rim;
+  if (!was) hand.hovered = false, hand.lift = 0;
+  if (tip) {
+    hand.lift = std::clamp(hand.lift - ahead, -kPressed, kLifted);
+    hand.help = tip_on(*spot, hand.lift + (can & kAbsorb ? kSwab : 0));
+    return;
+  }
+  hand.help = jaws ? jaws_at(*spot) : blades_at(*spot);
+  if (hand.hovered) return;
+  // Down along its own shaft: no blade passes through tissue on its way.
+  Pose above = hand.help;
+  const Vec3 z = shaft_of(above);
+  const auto rim = blades ? rim_beside(view, hand.pose.p, 1, picture, seen) : std::nullopt;
+  above.p += z * (kOverRim + (rim ? std::max(0.0f, dot(rim->at - above.p, z)) : 0));
+  const Pose& at = hand.sent.pose;
+  hand.hovered = distance(at.p, above.p) < 0.003f && length(rotation_vector(at.q * conjugate(above.q))) < 0.1f;
+  if (!hand.hovered) hand.help = above;
+}
+
+// At needle, tail or bite.
+void help_to_suture(Steering& steering, size_t who, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen,
+                    float dt) {
   SteeredHand& hand = steering.hand[who];
   if (!hand.snapped || hand.at != HelpAt::tail || seen.tool[who].held != Held::nothing) hand.misses = 0, hand.blocked = 0;
   if (steering.assist && seen.tool[who].held == Held::needle) return help_to_bite(steering, who, view, picture, seen);
   const bool open = !hand.closed && hand.opening > 0.5f;
-  if (!steering.assist || seen.tool[who].held != Held::nothing || (!open && !hand.snapped)) {
+  const int instrument = seen.tool[who].instrument;
+  if (!steering.assist || instrument < 0 || seen.tool[who].held != Held::nothing || (!open && !hand.snapped)) {
     hand.snapped = false;
     return;
   }
+  const InstrumentPicture& tool = picture.instrument[static_cast<size_t>(instrument)];
   if (hand.snapped && hand.at == HelpAt::bite) hand.snapped = false;
   const bool was = hand.snapped;
   const auto reach = [&](HelpAt at) { return was && hand.at == at ? kLetGo : kCatch; };
@@ -137,7 +176,7 @@ void help(Steering& steering, size_t who, const ViewFrame& view, const PictureMo
   const bool elsewhere = hand.blocked > kBlocked && hand.misses < hand.missed.size();
   if (elsewhere) hand.missed[hand.misses++] = hand.help.p, hand.blocked = 0;
   const std::span<const Vec3> tried{hand.missed.data(), hand.misses};
-  if (other_has && !seen.active().needle.in_tissue && tail_grip(picture, seen, who, tail, tried)) {
+  if (other_has && tool.can(kHoldThread) && !seen.active().needle.in_tissue && tail_grip(picture, seen, who, tail, tried)) {
     // Hysteresis: it stays with its particle even if another one is slightly better.
     if (elsewhere) hand.hovered = false, hand.pose.p = tail.pose.p;
     else if (at_tail) tail.slot = hand.tail_slot, tail.pose.p = seen.particle[tail.slot];
@@ -152,7 +191,7 @@ void help(Steering& steering, size_t who, const ViewFrame& view, const PictureMo
     }
   }
   // Any needle may be taken; the nearest on the screen is meant.
-  for (size_t k = 0; k < seen.suture.size() && !loop; ++k) {
+  for (size_t k = 0; k < seen.suture.size() && !loop && tool.can(kHoldNeedle); ++k) {
     const Pose grip = good_grip(picture, seen, who, shaft_of(hand.pose), hand.pose.p, static_cast<int>(k));
     if (!near_on_screen(view, hand.pose.p, grip.p, reach(HelpAt::needle), there) || distance(there, grip.p) >= nearest)
       continue;
@@ -161,6 +200,23 @@ void help(Steering& steering, size_t who, const ViewFrame& view, const PictureMo
   }
   // The hand keeps the depth of the assist, or the tool would jump back on release.
   if (hand.snapped) hand.pose.p = best;
+}
+
+// Whether the assist moves the tool now. ahead: [m] of this hand's motion along the view axis.
+void help(Steering& steering, size_t who, float ahead, const ViewFrame& view, const PictureModel& picture, const Snapshot& seen,
+          float dt) {
+  SteeredHand& hand = steering.hand[who];
+  const bool at_wall = hand.snapped && hand.at >= HelpAt::rim;
+  if (at_wall) hand.snapped = false;
+  help_to_suture(steering, who, view, picture, seen, dt);
+  const ToolView& tool = seen.tool[who];
+  if (steering.assist && !hand.snapped && tool.instrument >= 0 && tool.held == Held::nothing)
+    help_to_wall(hand, picture.instrument[static_cast<size_t>(tool.instrument)].capabilities, at_wall,
+                 !hand.closed && hand.opening > 0.5f, ahead, view, picture, seen);
+  if (!at_wall || (hand.snapped && hand.at >= HelpAt::rim)) return;
+  // It leaves the wall as it was held there, or with what it has grasped.
+  hand.pose.q = hand.sent.pose.q;
+  if (tool.held == Held::tissue) hand.pose.p = hand.sent.pose.p;
 }
 
 // Two-handed actions, and the hand that follows the other.
@@ -275,16 +331,16 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
       const Vec3 from = hand.pose.p;
       move(hand, motion[k], view, picture, pulls ? seen.tool[k].force : Vec3{});
       if (pulls) hand.pose.p = on_leash(picture, seen, k, spare_tail(picture, seen, k, from, hand.pose.p, dt));
-      help(steering, k, view, picture, seen, dt);
+      help(steering, k, motion[k].ahead, view, picture, seen, dt);
     }
 
     ToolInput in;
     in.pose = hand.snapped ? hand.help : hand.pose;
     const bool loop = steering.assist && seen.tool[k].loop_wraps > 0;
     if (hand.sent.connected && steering.sequence > 0) {
-      // Slow for a needle on its way to a bite and for a tool with a loop.
+      // Slow for a needle on its way to a bite, at the wall, and for a tool with a loop.
       Pose from = hand.sent.pose;
-      if (hand.snapped && hand.at == HelpAt::bite) {
+      if (hand.snapped && hand.at >= HelpAt::bite) {
         glide(from, in.pose, kHelpSpeed, kHelpTurn, dt);
         in.pose = from;
       } else if (loop && !together) {
@@ -297,7 +353,8 @@ std::array<ToolInput, 2> steer(Steering& steering, const std::array<HandMotion, 
     // A jaw closed on the way to the needle closes on arrival.
     const bool at_jaw = hand.snapped && hand.at != HelpAt::bite;
     const bool coming = at_jaw && hand.closed &&
-                        (distance(seen.tool[k].pose.p, hand.help.p) > kThere || (hand.at == HelpAt::tail && !hand.hovered));
+                        (distance(seen.tool[k].pose.p, hand.help.p) > kThere ||
+                         ((hand.at == HelpAt::tail || hand.at == HelpAt::rim) && !hand.hovered));
     const bool sent_there = distance(in.pose.p, hand.help.p) < kThere;
     hand.waited = coming ? hand.waited + (sent_there ? dt : 0) : 0;
     if (coming && hand.waited < kPatience) in.jaw = 1;

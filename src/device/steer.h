@@ -6,8 +6,8 @@
 // circle, which passes through tissue without tearing it.
 //
 // Assists compensate for the flat screen and for one hand at a time (Steering::assist switches them off). An open jaw snaps to
-// the best grasp of needle or tail, a held needle to the start of the next bite. A two-handed action is one gesture
-// (device/both_hands).
+// the best grasp of needle or tail, a held needle to the start of the next bite; clamp, pen, swab and scissors to the tissue
+// under the pointer (device/wall_spot). A two-handed action is one gesture (device/both_hands).
 #pragma once
 #include <array>
 #include <cstdint>
@@ -37,7 +37,8 @@ struct HandMotion {
   float both = 0;                      // [rad] amount: see device/both_hands
 };
 
-enum class HelpAt : uint8_t { needle, tail, bite };  // target of the assist
+// Target of the assist. rim: jaws or blades astride the wall; face: a tip on it.
+enum class HelpAt : uint8_t { needle, tail, bite, rim, face };
 
 struct SteeredHand {
   Pose pose;             // pose of the hand, before any assist
@@ -54,9 +55,10 @@ struct SteeredHand {
   uint32_t misses = 0;           // their number
   float blocked = 0;             // [s] that tissue has stopped them now
   BiteGuide bite;                // the one that it is at: not affected by tissue deformation
-  bool hovered = false;          // the needle has approached the bite from outside the tissue, the jaws from above the tail
+  bool hovered = false;          // the needle has approached the bite from outside the tissue, jaws from above the tail or rim
   float driven = 0;              // [rad] of the needle since then
   float waited = 0;              // [s] that the jaw was kept open until the tool arrived
+  float lift = 0;                // [m] of a tip off the face that it is at, by the wheel
   ToolInput sent;                // last
 };
 

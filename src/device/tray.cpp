@@ -18,7 +18,9 @@ Command next_from_tray(const Snapshot& seen, size_t hand) {
 
 Command park_or_take_up(const Snapshot& seen, size_t hand) {
   const ToolView& tool = seen.tool[hand];
-  if (tool.instrument >= 0) return {CommandKind::park, static_cast<uint8_t>(hand), static_cast<uint16_t>(tool.instrument)};
+  if (tool.instrument >= 0)
+    return {tool.held == Held::nothing ? CommandKind::lay_down : CommandKind::park, static_cast<uint8_t>(hand),
+            static_cast<uint16_t>(tool.instrument)};
   Command found;
   float best = 1e30f;
   for (size_t i = 0; i < seen.instrument.size(); ++i) {

@@ -21,6 +21,7 @@ enum class CommandKind : uint8_t {
   // where the scene has it.
   advance_clamp,
   retract_clamp,
+  set_pen,  // switches the electrosurgical pen in the hand: argument is its PenMode. Pedals, which are pressed and released
   count_
 };
 constexpr float kClampSpeed = 0.004f, kClampRange = 0.005f;  // [m/s], [m]

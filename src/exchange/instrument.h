@@ -31,6 +31,9 @@ enum class InstrumentPlace : uint32_t {
   parked,  // closed on tissue without a hand: loaded by its weight, or by the force given in the scene
 };
 
+// Of an electrosurgical pen.
+enum class PenMode : uint8_t { off, cut, coagulate };
+
 enum class Held : uint8_t { nothing, needle, thread, tissue };
 
 constexpr uint8_t kNoHand = 0xff;

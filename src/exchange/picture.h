@@ -70,6 +70,8 @@ struct PictureModel {
   // numbered: one per bowel end, and two (outer, inner) for a bowel folded into itself.
   std::vector<std::vector<uint32_t>> rim;
   std::vector<uint8_t> wall;  // as particle_rest
+  // Physical mechanics: places of the wall. Particles 2i and 2i + 1 are the outer and the inner face of place i.
+  uint32_t columns = 0;
 };
 
 }  // namespace catgut

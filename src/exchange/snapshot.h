@@ -45,6 +45,8 @@ struct InstrumentView {
   Held held = Held::nothing;
   uint32_t held_slot = 0;  // as ToolView::held_slot
   Vec3 pull;               // [N] on the tissue that it holds
+  PenMode pen = PenMode::off;
+  float burning = 0;  // [s] since the pen was switched on, while its tip is in tissue; 0: it is not
 };
 
 struct NeedleView {

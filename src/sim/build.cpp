@@ -505,7 +505,7 @@ std::shared_ptr<const Model> build_model(const SceneSpec& scene, std::span<const
   add_instruments(m, scene, rim, where);
   // Two ends are joined on top, where their rims face each other.
   describe_picture(m, sutures, two ? rim + Vec3{0, tube, 0} : rim, tube);
-  if (is_physical(scene)) m.physical = make_physical(m, tissue.wall);
+  if (is_physical(scene)) m.physical = make_physical(m, tissue.wall), m.picture.columns = m.solver.tissue / 2;
   return model;
 }
 

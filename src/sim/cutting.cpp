@@ -189,18 +189,21 @@ void switch_pens(const Model& model, State& state, TickInput& input) {
   if (c.mode.empty()) return;
   CommandList others;
   for (const Command& command : input.commands) {
-    const PenMode wanted = command.kind == CommandKind::cut          ? PenMode::cut
-                           : command.kind == CommandKind::new_suture ? PenMode::coagulate
-                                                                     : PenMode::off;
-    const bool known = wanted != PenMode::off && command.hand < kMaxHands && input.hand[command.hand].connected;
+    const bool toggles = command.kind == CommandKind::cut || command.kind == CommandKind::new_suture;
+    const bool pedal = command.kind == CommandKind::set_pen && command.argument <= static_cast<int>(PenMode::coagulate);
+    const PenMode wanted = pedal                              ? static_cast<PenMode>(command.argument)
+                           : command.kind == CommandKind::cut ? PenMode::cut
+                                                              : PenMode::coagulate;
+    const bool known = (toggles || pedal) && command.hand < kMaxHands && input.hand[command.hand].connected;
     const int held = known ? state.hand[command.hand].instrument : -1;
     if (held < 0 || !model.suture.instrument[static_cast<size_t>(held)].can(kCauterize)) {
       others.push(command);
       continue;
     }
-    const bool stop = c.mode[static_cast<size_t>(held)] == wanted;
+    const bool on = c.mode[static_cast<size_t>(held)] == wanted;
+    if (pedal && on) continue;
     for (size_t i = 0; i < c.mode.size(); ++i) switch_off(model, state, i);
-    if (!stop) switch_on(state, static_cast<size_t>(held), wanted);
+    if (!on && wanted != PenMode::off) switch_on(state, static_cast<size_t>(held), wanted);
   }
   input.commands = others;
   // A pen that was laid down, or whose hand is gone, is off.

@@ -5,7 +5,7 @@
 //
 // The tip is the origin of the tool frame. Depth follows from power and time. One pen is active at a time: there is one tip.
 // Commands of a hand that holds an instrument which cauterizes: `cut` switches cutting on and off, `new_suture` coagulation.
-// So the buttons of every device work, and a recording repeats them.
+// So the buttons of every device work, and a recording repeats them. `set_pen` is a pedal's: it switches, and does not toggle.
 #pragma once
 #include <memory>
 #include <vector>
@@ -22,7 +22,6 @@ namespace catgut {
 struct Model;
 struct State;
 
-enum class PenMode : uint8_t { off, cut, coagulate };
 constexpr float kCutPower = 40, kCoagulatePower = 30;  // [W] within the settings of general surgery (chosen)
 
 // What a pen has done since it was activated.

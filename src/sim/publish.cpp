@@ -181,7 +181,13 @@ void publish(const Model& built, const State& state, Snapshot& out) {
   out.event = state.event.list;
   out.scar.clear();
   out.wound = {};
-  if (state.physical.cutting.picture) publish_cut(model, state, out);
+  const Cutting& cutting = state.physical.cutting;
+  if (cutting.picture) publish_cut(model, state, out);
+  for (size_t i = 0; i < cutting.mode.size(); ++i) {
+    out.instrument[i].pen = cutting.mode[i];
+    const bool burns = cutting.mode[i] != PenMode::off && cutting.excision.touching;
+    out.instrument[i].burning = burns ? static_cast<float>(state.tick - cutting.stroke.began) * model.dt : 0;
+  }
   if (!model.source.empty()) use_public_numbers(built, model, out);
 }
 

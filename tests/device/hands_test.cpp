@@ -677,6 +677,8 @@ TEST(Tray, the_key_goes_round_what_lies_there) {
   c = park_or_take_up(seen, 0);
   EXPECT_EQ(c.kind, CommandKind::unpark);
   EXPECT_EQ(c.argument, 2);
+  EXPECT_EQ(park_or_take_up(seen, 1).kind, CommandKind::lay_down);
+  seen.tool[1].held = Held::tissue;
   EXPECT_EQ(park_or_take_up(seen, 1).kind, CommandKind::park);
   seen.instrument[0].place = seen.instrument[3].place = InstrumentPlace::hand;
   EXPECT_EQ(next_from_tray(seen, 1).kind, CommandKind::none);

@@ -253,6 +253,15 @@ class XMouse : public AtTheWindow {
     for (int i = 0; i < std::abs(notches); ++i) click(notches > 0 ? 4 : 5);
     if (in.jaw_presses) click(1);
     if (in.cut) press("c");
+    if (in.fresh) press("n");
+    if (act.next) press("i");
+    if (act.park) press("k");
+    if (act.orbit != 0) {
+      const std::string arrow = act.orbit > 0 ? "Right" : "Left";
+      x_.key(arrow, true);
+      see(1);
+      x_.key(arrow, false);
+    }
   }
   void click(unsigned which) { x_.button(which, true), x_.button(which, false); }
 
@@ -307,7 +316,19 @@ class SdlPad : public AtTheWindow {
     SDL_PushEvent(&e);
   }
   void do_it(const Act& act) override {
-    if (stick_) send(by_pad(act, look_, pad_));
+    if (!stick_) return;
+    send(by_pad(act, look_, pad_));
+    if (act.next) tap(SDL_CONTROLLER_BUTTON_DPAD_UP);
+    if (act.park) tap(SDL_CONTROLLER_BUTTON_DPAD_DOWN);
+    if (act.orbit != 0) hold(act.orbit > 0 ? SDL_CONTROLLER_BUTTON_DPAD_RIGHT : SDL_CONTROLLER_BUTTON_DPAD_LEFT);
+  }
+  void hold(SDL_GameControllerButton which) {  // for a picture
+    for (const bool down : {true, false}) {
+      SDL_LockJoysticks();
+      SDL_JoystickSetVirtualButton(stick_, which, down);
+      SDL_UnlockJoysticks();
+      if (down) see(1);
+    }
   }
   void send(const GamepadInput& pad) {
     const auto axis = [&](int which, float value) {
@@ -322,6 +343,7 @@ class SdlPad : public AtTheWindow {
     button(SDL_CONTROLLER_BUTTON_LEFTSHOULDER, pad.left.shoulder);
     button(SDL_CONTROLLER_BUTTON_RIGHTSHOULDER, pad.right.shoulder);
     button(SDL_CONTROLLER_BUTTON_B, pad.both);
+    button(SDL_CONTROLLER_BUTTON_A, pad.cut), button(SDL_CONTROLLER_BUTTON_Y, pad.fresh);
   }
   GamepadInput pad_;
   int index_ = -1;

@@ -4,6 +4,7 @@
 #include "device/gamepad.h"
 #include "device/mouse.h"
 #include "device/paced_hands.h"
+#include "device/tray.h"
 #include "exchange/buttons.h"
 #include "person.h"
 #include "procedure/scene_file.h"
@@ -34,8 +35,8 @@ class LockStep : public WorkQueue {
     places_ = bite_places(scene_, picture_);
     look_.steering = hands_.steering = start_steering(picture_, false);
     look_.dt = kTick * static_cast<float>(ticks);
-    const Vec3 target = picture_.focus + Vec3{0.01f, 0, 0};
-    look_.view = view_frame(target + Vec3{0.06f, 0.16f, 0.16f}, target, {0, 1, 0}, 30, 360);
+    target_ = picture_.focus + Vec3{0.01f, 0, 0};
+    look_.view = view_frame(target_ + Vec3{0.06f, 0.16f, 0.16f}, target_, {0, 1, 0}, 30, 360);
     for (int i = 0; i < 30; ++i) step(*model_, *state_, nobody(), jobs_);
     publish(*model_, *state_, look_.seen);
   }
@@ -50,14 +51,21 @@ class LockStep : public WorkQueue {
       SteeredHand& hand = look_.steering.hand[k];
       order.closed[k] = hand.closed, order.opening[k] = hand.opening, order.buttons[k] = std::exchange(hand.buttons, 0);
     }
+    if (act.orbit != 0) {
+      const Quat turn = axis_angle({0, 1, 0}, std::clamp(act.orbit, -1.2f * look_.dt, 1.2f * look_.dt));
+      look_.view = view_frame(target_ + rotate(turn, look_.view.eye - target_), target_, {0, 1, 0}, 30, 360);
+    }
     order.view = look_.view;
+    CommandList wanted;  // of keys
+    if (act.next) wanted.push(next_from_tray(look_.seen, act.hand));
+    if (act.park) wanted.push(park_or_take_up(look_.seen, act.hand));
     hear(hands_, order, look_.seen);
     for (int i = 0; i < ticks_; ++i) {
       hands_.steering.guide = next_bite(places_, picture_, look_.seen);
       const auto hand = tick(hands_, picture_, look_.seen, kTick);
       for (size_t k = 0; k < 2; ++k) in_.hand[k] = started_ ? hand_toward(in_.hand[k], hand[k], 0.6f, 12, kTick) : hand[k];
       started_ = true;
-      in_.commands.clear();
+      in_.commands = std::exchange(wanted, {});
       for (size_t k = 0; k < 2; ++k)
         add_commands(in_.commands, k, hand[k].buttons & ~std::exchange(buttons_[k], hand[k].buttons), look_.seen);
       step(*model_, *state_, in_, jobs_);
@@ -103,6 +111,7 @@ class LockStep : public WorkQueue {
   PictureModel picture_;
   BitePlaces places_;
   Look look_;
+  Vec3 target_;  // of the view
   PacedHands hands_;
   TickInput in_;
   bool started_ = false;

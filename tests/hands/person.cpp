@@ -15,6 +15,9 @@ constexpr float kPatience = 25;  // [s] simulated, for one gesture
 
 Vec3 aside_of(size_t k) { return k == 0 ? Vec3{0.07f, 0.06f, 0.04f} : Vec3{-0.07f, 0.06f, 0.04f}; }
 
+// Unit, round the axis of an opening that looks up: 0 at the right, counter-clockwise from above.
+Vec3 direction(float angle) { return {std::cos(angle), 0, -std::sin(angle)}; }
+
 }  // namespace
 
 MouseInput by_mouse(const Act& act, const Look& look, float speed) {
@@ -34,7 +37,7 @@ MouseInput by_mouse(const Act& act, const Look& look, float speed) {
     in.wheel = std::round(m.ahead / (0.002f * speed));
   }
   in.jaw_presses = act.click;
-  in.cut = act.cut;
+  in.cut = act.cut, in.fresh = act.coagulate;
   return in;
 }
 
@@ -61,6 +64,9 @@ GamepadInput by_pad(const Act& act, const Look& look, GamepadInput& pad) {
     side.y = -stick(m.up, 0.08f);
   }
   if (act.click) side.trigger = side.trigger > 0.5f ? 0.0f : 1.0f;
+  // Buttons are for the first hand, or for the second with its shoulder.
+  pad.cut = act.cut, pad.fresh = act.coagulate;
+  if (act.hand == 1 && (act.cut || act.coagulate || act.next || act.park)) side.shoulder = true;
   return pad;
 }
 
@@ -315,6 +321,203 @@ bool Person::tie(int way) {
     aside(0);
   }
   return false;
+}
+
+Vec3 Person::rim_at(float angle) const {
+  const std::vector<uint32_t>& rim = desk_.picture().rim[0];
+  Vec3 center{}, best{};
+  for (const uint32_t i : rim) center += desk_.picture().particle_rest[i] / static_cast<float>(rim.size());
+  float most = -1;
+  for (const uint32_t i : rim) {
+    const float along = dot(normalized(desk_.picture().particle_rest[i] - center), direction(angle));
+    if (along > most) most = along, best = seen().particle[i];
+  }
+  return best;
+}
+
+// On the tissue that stays: the other side of a cut moves away.
+Vec3 Person::line_at(float angle, float edge) const {
+  const PictureModel& p = desk_.picture();
+  float top = -1e9f, radius = 0;
+  Vec3 center{};
+  for (const uint32_t i : p.rim[0]) {
+    center += p.particle_rest[i] / static_cast<float>(p.rim[0].size());
+    top = std::max(top, p.particle_rest[i].y);
+  }
+  for (const uint32_t i : p.rim[0]) radius += distance(p.particle_rest[i], center) / static_cast<float>(p.rim[0].size());
+  const Vec3 rest = center + direction(angle) * radius - Vec3{0, edge, 0};
+  Vec3 sum{};
+  float weight = 0;
+  for (uint32_t i = 0; i < 2 * p.columns; i += 2) {
+    const float below = top - p.particle_rest[i].y - edge;
+    if (p.wall[i] != 0 || below < 0.0035f || below > 0.0105f) continue;
+    const float d2 = length2(p.particle_rest[i] - rest), w = 1 / (d2 * d2 + 1e-14f);
+    sum += w * (seen().particle[i] + rotate(seen().rotation[i], rest - p.particle_rest[i])), weight += w;
+  }
+  return sum / weight;
+}
+
+bool Person::face(float angle) {
+  const auto off = [&] {
+    const Vec3 eye = desk_.look().view.eye - desk_.picture().focus;
+    return std::remainder(angle - std::atan2(-eye.z, eye.x), 2 * kPi);
+  };
+  Act act;
+  for (int i = 0; std::abs(off()) > 0.15f; ++i) {
+    act.orbit = off();
+    if (i > 2000 || !desk_.act(act)) return false;
+  }
+  return true;
+}
+
+bool Person::take_instrument(size_t k, const std::string& kind) {
+  doing_ = "take " + kind;
+  const auto has = [&] {
+    const int i = seen().tool[k].instrument;
+    return i >= 0 && desk_.picture().instrument[static_cast<size_t>(i)].kind == kind;
+  };
+  for (size_t tries = 0; !has(); ++tries) {
+    if (tries > seen().instrument.size()) return false;
+    const int before = seen().tool[k].instrument;
+    Act act;
+    act.hand = k, act.next = true;
+    if (!desk_.act(act)) return false;
+    if (!wait(2, [&] { return seen().tool[k].instrument != before; }, {k, {}, false})) return false;
+  }
+  if (hand(k).closed) return wait(1, [&] { return !hand(k).closed; }, {k, {}, true});
+  return true;
+}
+
+bool Person::park(size_t k) {
+  doing_ = "park it";
+  Act act;
+  act.hand = k, act.park = true;
+  if (!desk_.act(act)) return false;
+  return wait(2, [&] { return seen().tool[k].instrument < 0; }, {k, {}, false});
+}
+
+bool Person::lay_down(size_t k) {
+  doing_ = "lay it down";
+  if (hand(k).closed && !let_go(k)) return false;
+  Act act;
+  act.hand = k, act.park = true;
+  if (!desk_.act(act)) return false;
+  return wait(2, [&] { return seen().tool[k].instrument < 0; }, {k, {}, false});
+}
+
+bool Person::take_up(size_t k, size_t instrument) {
+  doing_ = "take up a clamp";
+  if (!hand(k).closed) wait(1, [&] { return hand(k).closed; }, {k, {}, true});  // a hand that is open would open it
+  const auto place = [&] { return transform(seen().instrument[instrument].pose, {0, 0, 0.05f}); };
+  if (!point(
+          k, place, [&] { return distance(seen().tool[k].hand.p, place()) < 0.012f; }, true))
+    return false;
+  Act act;
+  act.hand = k, act.park = true;
+  if (!desk_.act(act)) return false;
+  return wait(2, [&] { return seen().tool[k].instrument == static_cast<int>(instrument); }, {k, {}, false});
+}
+
+bool Person::grasp_rim(size_t k, float angle) {
+  doing_ = "close it on the rim";
+  const auto place = [&] { return rim_at(angle); };
+  const auto over = [&] { return hand(k).snapped && hand(k).at == HelpAt::rim; };
+  for (int attempt = 0; attempt < 4; ++attempt) {
+    if (attempt > 0) repeated_.push_back(doing_);
+    const auto there = [&] {
+      return over() && hand(k).hovered && distance(hand(k).help.p, place()) < 0.006f &&
+             distance(seen().tool[k].pose.p, hand(k).help.p) < 0.0015f;
+    };
+    if (!point(k, place, there)) return false;
+    if (wait(3, [&] { return seen().tool[k].held == Held::tissue; }, {k, {}, true})) return true;
+    if (!let_go(k)) return false;
+  }
+  return false;
+}
+
+bool Person::snip(size_t k, float angle, float down) {
+  doing_ = "cut with scissors";
+  if (!face(angle)) return false;
+  const size_t before = desk_.count(EventKind::tissue_snipped);
+  const auto place = [&] { return line_at(angle, down); };
+  const auto there = [&] {
+    return hand(k).snapped && hand(k).at == HelpAt::rim && hand(k).hovered &&
+           distance(seen().tool[k].pose.p, hand(k).help.p) < 0.0015f && distance(hand(k).help.p, place()) < 0.003f;
+  };
+  if (!point(k, place, there)) return false;
+  if (!wait(2, [&] { return desk_.count(EventKind::tissue_snipped) > before; }, {k, {}, true})) return false;
+  return wait(2, [&] { return !hand(k).closed && seen().tool[k].jaw > 0.8f; }, {k, {}, true});
+}
+
+bool Person::pen(size_t k, PenMode mode) {
+  const auto now = [&] { return seen().instrument[static_cast<size_t>(seen().tool[k].instrument)].pen; };
+  if (now() == mode) return true;
+  Act act;
+  act.hand = k;
+  (mode == PenMode::cut || now() == PenMode::cut ? act.cut : act.coagulate) = true;
+  if (!desk_.act(act)) return false;
+  return wait(2, [&] { return now() == mode; }, {k, {}, false});
+}
+
+bool Person::score(size_t k, float edge, float from, float to) {
+  constexpr float kPenSpeed = 0.006f;  // [m/s]: slow enough to go through
+  if (!face(0.5f * (from + to))) return false;
+  doing_ = "put the pen on the line";
+  float angle = from;
+  const auto place = [&] { return line_at(angle, edge); };
+  const auto on_it = [&] {
+    return hand(k).snapped && hand(k).at == HelpAt::face && distance(seen().tool[k].pose.p, place()) < 0.0012f;
+  };
+  if (!point(k, place, on_it)) return false;
+  doing_ = "cut along the line";
+  if (!pen(k, PenMode::cut)) return false;
+  const float radius = distance(place(), line_at(angle + kPi, edge)) / 2;
+  const bool went = point(k, place, [&] {
+    angle = std::min(to, angle + kPenSpeed / radius * desk_.look().dt);
+    return angle >= to;
+  });
+  return pen(k, PenMode::off) && went;
+}
+
+bool Person::cut_round(size_t k, float edge) {
+  constexpr int kStrokes = 6;
+  constexpr float kOverlap = 0.15f;  // [rad]
+  const uint32_t before = seen().topology.pieces;
+  for (int stroke = 0; stroke < 2 * kStrokes; ++stroke) {
+    const float from = 2 * kPi * static_cast<float>(stroke) / kStrokes;
+    if (stroke == kStrokes) repeated_.push_back("cut round");
+    if (!score(k, edge, from - kOverlap, from + 2 * kPi / kStrokes + kOverlap)) return false;
+    if (seen().topology.pieces > before && desk_.count(EventKind::piece_freed) > 0) return true;
+  }
+  return false;
+}
+
+bool Person::carry(size_t k, Vec3 by) {
+  doing_ = "carry it away";
+  const Vec3 place = hand(k).pose.p + by;
+  return point(
+      k, [=] { return place; }, [&] { return distance(hand(k).pose.p, place) < 0.008f; }, true);
+}
+
+size_t Person::coagulate(size_t k) {
+  doing_ = "coagulate";
+  size_t done = 0;
+  for (size_t i = 0; i < seen().wound.bleeding.size(); ++i) {
+    if (!(seen().wound.bleeding[i].flow > 0)) continue;
+    Vec3 off{};  // from the vessel to where the pointer has to be, so that the tip is at the vessel
+    const auto vessel = [&] { return seen().wound.bleeding[i].at; };
+    const auto place = [&] { return vessel() + off; };
+    const auto stopped = [&] { return !(seen().wound.bleeding[i].flow > 0); };
+    const Vec3 from = vessel() - desk_.picture().focus;
+    if (!face(std::atan2(-from.z, from.x))) return done;
+    point(
+        k, place, [&] { return distance(seen().tool[k].pose.p, vessel()) < 0.003f; }, false, 2);
+    if (!pen(k, PenMode::coagulate)) return done;
+    for (int look = 0; look < 3 && !point(k, place, stopped, false, 1); ++look) off += vessel() - seen().tool[k].pose.p;
+    done += stopped();
+    if (!pen(k, PenMode::off)) return done;
+  }
+  return done;
 }
 
 }  // namespace catgut

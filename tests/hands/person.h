@@ -25,7 +25,11 @@ struct Act {
   size_t hand = 0;
   HandMotion motion;
   bool click = false;  // close the jaw, or open it
-  bool cut = false;    // the thread
+  bool cut = false;    // the thread, or the pen on or off
+  bool coagulate = false;
+  bool next = false;  // instrument from the tray
+  bool park = false;  // or lay down, or take up
+  float orbit = 0;    // [rad] of the camera round the field, to the right
 };
 
 class WorkQueue {
@@ -56,6 +60,19 @@ class Person {
   bool set_throw();
   bool cut_needle();  // off the thread, by the hand that holds it
   bool cut_tail();    // near the knot, by the empty needle holder
+
+  // An operation: what the user sees is where rim and line are.
+  bool take_instrument(size_t k, const std::string& kind);
+  bool lay_down(size_t k);                       // what the hand has
+  bool take_up(size_t k, size_t instrument);     // a parked one
+  bool grasp_rim(size_t k, float angle);         // with the instrument in the hand, at this angle round the opening
+  bool park(size_t k);                           // what the hand has closed on tissue
+  bool snip(size_t k, float angle, float down);  // one cut from the rim, `down` [m] long
+  // The pen goes round on the line, stroke by stroke, until a piece is free.
+  bool cut_round(size_t k, float edge);
+  bool score(size_t k, float edge, float from, float to);  // one stroke
+  bool carry(size_t k, Vec3 by);                           // what the hand holds
+  size_t coagulate(size_t k);                              // every vessel that bleeds, once; the number that stopped
   std::string doing() const { return doing_; }
   const std::vector<std::string>& repeated() const { return repeated_; }  // actions that failed and were tried again
 
@@ -71,6 +88,10 @@ class Person {
   bool drive(size_t k, const std::function<bool()>& done);
   bool both(float amount, const std::function<bool()>& done, float patience = 25);
   bool lay_tail();
+  bool face(float angle);  // the camera
+  bool pen(size_t k, PenMode mode);
+  Vec3 rim_at(float angle) const;
+  Vec3 line_at(float angle, float edge) const;
 
   WorkQueue& desk_;
   std::string doing_;
