@@ -70,6 +70,9 @@ std::string Operating::doing() const {
       break;
     case sew:
       return "stitch " + std::to_string(stitched_ + 1) + ": " + sewing_->doing();
+    case carry_needle:
+      doing = "stitch " + std::to_string(stitched_ + 1) + ": carry the needle to the right";
+      break;
     case finished:
       return untied_ > 0 ? "gave up: stitches without a knot: " + std::to_string(untied_) : "done";
   }
@@ -136,7 +139,7 @@ void Operating::join(const TickInput& part, std::initializer_list<size_t> hands)
 }
 
 // The places of all stitches are at one angle of a field that is turned: the tissue at rest turns too.
-void Operating::begin_stitch(TaskKind from) {
+void Operating::begin_stitch(const Snapshot& seen, TaskKind from) {
   const size_t sutures = picture_.suture.size();
   turn_ = -2 * kPi * static_cast<float>(place_of_stitch(stitched_)) / static_cast<float>(sutures);
   PictureModel picture = picture_;
@@ -144,8 +147,11 @@ void Operating::begin_stitch(TaskKind from) {
   for (Vec3& p : picture.particle_rest) p = opening_.center + rotate(q, p - opening_.center);
   const std::vector<Task> task = make_plan("altemeier", picture, skill_).task;
   const size_t tasks = task.size() / sutures;
+  // The thread follows its needle. From the left it would lie under the forceps.
+  const Vec3 needle = rotate(q, seen.suture[stitched_].needle.pose.p - opening_.center);
+  carries_ = from == TaskKind::pick_up && dot(needle, u_) < 0;
   std::vector<size_t> mine;
-  for (size_t t = stitched_ * tasks; t < (stitched_ + 1) * tasks; ++t)
+  for (size_t t = stitched_ * tasks; t < (stitched_ + 1) * tasks && !(carries_ && mine.size() == 1); ++t)
     if (!mine.empty() || task[t].kind == from) mine.push_back(t);
   sewing_.emplace("altemeier", picture, skill_);
   sewing_->take_over_for(mine);
@@ -256,7 +262,7 @@ void Operating::act(const Snapshot& seen) {
       return;
     case take_holder:
       swap_for(seen, kHoldNeedle, sew);
-      if (stage_ == sew) begin_stitch(pulled_through(seen) ? TaskKind::throw_ : TaskKind::pick_up);
+      if (stage_ == sew) begin_stitch(seen, pulled_through(seen) ? TaskKind::throw_ : TaskKind::pick_up);
       return;
     case sew: {
       TickInput part = sewing_->operate(turn_ == 0 ? seen : turned(seen, turn_), dt_);
@@ -266,16 +272,27 @@ void Operating::act(const Snapshot& seen) {
       retries_of_parts_ += sewing_->retries();
       if (sewing_->gave_up() && (leaves_untied_ || !pulled_through(seen))) {
         gave_up_ = true;
+      } else if (carries_) {
+        way_ = 0, go(carry_needle);
       } else if (sewing_->gave_up()) {  // the knot failed: the needle is laid down, and the next stitch begins
         ++untied_, leaves_untied_ = true;
-        begin_stitch(TaskKind::leave);
+        begin_stitch(seen, TaskKind::leave);
       } else if (leaves_untied_ = false; ++stitched_ < picture_.suture.size()) {
-        begin_stitch(TaskKind::pick_up);
+        begin_stitch(seen, TaskKind::pick_up);
       } else {
         sewing_.reset(), gave_up_ = untied_ > 0;
         go(finished);
       }
       return;
+    }
+    case carry_needle: {  // round in front of the field, and from the right to the bite
+      constexpr std::array<Vec3, 3> kWay{Vec3{-0.07f, 0.05f, 0.09f}, {0.03f, 0.06f, 0.12f}, {0.14f, 0.06f, 0.07f}};
+      const Vec3 to = u_ * kWay[way_].x + opening_.axis * kWay[way_].y - v_ * kWay[way_].z;
+      const Pose goal{opening_.center + rotate(axis_angle(opening_.axis, -turn_), to), right.pose.q};
+      if (!move_toward(right, goal, skill_.speed, dt_)) return;
+      if (++way_ < kWay.size()) return;
+      begin_stitch(seen, TaskKind::bite);
+      return go(sew);
     }
     case finished:
       return;

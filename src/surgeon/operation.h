@@ -42,6 +42,7 @@ class Operating final : public Surgeon {
     carry,
     take_holder,
     sew,
+    carry_needle,
     finished
   };
   void look(const Snapshot& seen);  // what is done already: a stage may be practiced alone, from a saved state
@@ -52,7 +53,7 @@ class Operating final : public Surgeon {
   Pose clamp_at(float angle, float raised) const;  // jaws about the rim
   void swap_for(const Snapshot& seen, uint32_t capability, Stage next);
   bool pulled_through(const Snapshot& seen) const;
-  void begin_stitch(TaskKind from);
+  void begin_stitch(const Snapshot& seen, TaskKind from);
   size_t place_of_stitch(size_t stitch) const;  // of as many places round the opening as there are sutures
   // The field as a surgeon sees it who stands where the next stitch is on his left; and his hands, back in the scene.
   Snapshot turned(const Snapshot& seen, float by) const;
@@ -71,7 +72,9 @@ class Operating final : public Surgeon {
   float waited_ = 0, dt_ = 1.0f / 60;
   float turn_ = 0;  // [rad] of the field, for this stitch
   size_t clamped_ = 0, stitched_ = 0, untied_ = 0;
+  size_t way_ = 0;
   bool leaves_untied_ = false;  // the stitch in hand
+  bool carries_ = false;        // its needle lies on the left, and is carried to the right first
   int misses_ = 0, retries_ = 0, retries_of_parts_ = 0;
   bool gave_up_ = false;
   uint32_t sequence_ = 0;
