@@ -14,6 +14,7 @@ constexpr float kAbove = 0.03f;      // [m] over the rim, on the way to it and b
 constexpr float kBite = 0.002f;      // [m] of the jaws, from the rim
 constexpr float kLean = 0.3f;        // of a clamp's shaft, outward
 constexpr float kGrasped = 0.4f;     // [s] of closed jaws
+constexpr float kLeftOf = 0.03f;     // [m] of the opening's center: a needle farther to the left is carried to the right first
 constexpr int kMostMisses = 8;
 constexpr Vec3 kAside{-0.20f, 0.10f, -0.20f};  // [m] from the focus: where the assistant keeps the specimen
 
@@ -149,7 +150,7 @@ void Operating::begin_stitch(const Snapshot& seen, TaskKind from) {
   const size_t tasks = task.size() / sutures;
   // The thread follows its needle. From the left it would lie under the forceps.
   const Vec3 needle = rotate(q, seen.suture[stitched_].needle.pose.p - opening_.center);
-  carries_ = from == TaskKind::pick_up && dot(needle, u_) < 0;
+  carries_ = from == TaskKind::pick_up && dot(needle, u_) < -kLeftOf;
   std::vector<size_t> mine;
   for (size_t t = stitched_ * tasks; t < (stitched_ + 1) * tasks && !(carries_ && mine.size() == 1); ++t)
     if (!mine.empty() || task[t].kind == from) mine.push_back(t);
