@@ -109,10 +109,11 @@ TEST(Operation, a_stage_begins_from_a_saved_state) {
   begin_run(run, procedure, f.seen, static_cast<double>(f.model->dt));
   std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*f.model));
   bool again = false;
-  while (!surgeon->done() && !finished(run, procedure) && f.state->tick < 9000) {
+  while (!surgeon->done() && !finished(run, procedure) && f.state->tick < 20000) {
     f.input = surgeon->operate(f.seen, f.model->dt);
     f.tick();
-    if (!update_run(run, procedure, f.seen) || procedure.stage[std::min<size_t>(run.stage, 4)].name != "bite" || again)
+    if (!update_run(run, procedure, f.seen) ||
+        procedure.stage[std::min<size_t>(run.stage, procedure.stage.size() - 1)].name != "bite" || again)
       continue;
     again = true;
     const std::vector<std::byte> saved = save_state(*f.model, *f.state);
