@@ -23,7 +23,8 @@ constexpr float kNearest = 9e-3f;  // [m] of the winding hand from the shaft
 constexpr float kLoose = 0.95f;    // of the strand that is left: nearly taut
 constexpr float kWinding = 0.25f;  // [N] above which the winding hand yields
 constexpr float kTailEnd = 6e-3f;  // [m] from the tail's end, where it is taken
-constexpr float kBetweenJaws = 0.6e-3f;  // [m] from the middle of the jaws: they close on the tail there
+constexpr float kBetweenJaws = 0.6e-3f;  // [m] from the line midway between the jaws: they close on the tail there
+constexpr float kJaws = 3e-3f;           // [m] their length that holds
 constexpr float kHeldWell = 1.5e-3f;     // [m] the same of a tail that turns slide over; between jaws and tail they come off
 constexpr float kBeside = 4e-3f;         // [m] of tail, on either side of the jaws
 constexpr float kPatience = 2;           // [s]; then they close where they are
@@ -66,6 +67,12 @@ Vec3 around(float side, float angle, Vec3 shaft) {
 Quat holder_turn(Vec3 z, Vec3 x = {0, 0, 1}) {
   x = normalized(x - z * dot(x, z));
   return from_axes(x, cross(z, x), z);
+}
+// [m] to `p` from the nearest point midway between the jaws, which are kJaws long.
+Vec3 from_jaws(const ToolView& tool, Vec3 p) {
+  Vec3 at = to_local(tool.pose, p);
+  at.z -= std::clamp(at.z, -0.5f * kJaws, 0.5f * kJaws);
+  return rotate(tool.pose.q, at);
 }
 float smooth(float s) {
   s = std::clamp(s, 0.0f, 1.0f);
@@ -394,8 +401,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       }
       const bool shut = move_jaw(holder, 0, dt);
       const bool laying = stage_ == take_tail;
-      const bool well =
-          laying || distance(node_at(seen, node_of(seen, seen.tool[kHolder].held_slot)), seen.tool[kHolder].pose.p) < kHeldWell;
+      const ToolView& jaws = seen.tool[kHolder];
+      const bool well = laying || length(from_jaws(jaws, node_at(seen, node_of(seen, jaws.held_slot)))) < kHeldWell;
       if (holds && well && waited_ > 0.3f) {
         if (laying) go(seen, lift_tail);
         else if (wound(seen) < 2 * kPi * static_cast<float>(wraps_) - 2) again(seen, lift_tail);  // a turn has slid off
@@ -408,7 +415,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
     }
     case lift_tail:
     case lay_tail:  // no farther than both strands give way
-      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_) / kWinding, 0.0f, 1.0f)) || waited_ > kPatience)
+      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_) / kWinding, 0.0f, 1.0f)) || waited_ > 2 * kPatience)
         go(seen, stage_ == lift_tail ? lay_tail : drop_tail);
       break;
     case drop_tail:
@@ -447,7 +454,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
     case fetch: {
       // By sight of the jaws, which lag behind the hand.
       const Vec3 goal = tail_node(seen, kTailEnd + 2e-3f * static_cast<float>(misses_)), jaws = seen.tool[kHolder].pose.p;
-      const Vec3 way = goal - jaws;
+      const Vec3 way = from_jaws(seen.tool[kHolder], goal);
       const float left = length(way),
                   speed = std::min(0.7f * how_.speed, 0.01f + 4 * left) * (felt_ > 2 * kWinding ? 0.3f : 1.0f);
       tip_ += way * (std::min(speed * dt, left) / std::max(left, 1e-6f));
