@@ -129,6 +129,7 @@ struct Scratch {
   std::vector<Vec3> block_middle;
   Column block_radius;
   std::vector<uint64_t> block_tools;
+  std::vector<uint32_t> near_block;
   std::vector<Vec3> tool_move;  // per substep, of both ends of every tool
   // Soft points: motion since the step began, now and at the beginning of the substep.
   Padded3 soft_moved, soft_before;

@@ -77,11 +77,22 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
     }
   }
   int near[kBlock];
+  size_t near_blocks = 0;
   for (size_t i = 0; i < m; ++i) {
+    // Blocks that any segment of this one's block can reach.
+    if (const size_t own = i / kBlock; i % kBlock == 0) {
+      near_blocks = 0;
+      for (size_t b = own; b < blocks; ++b) {
+        const float r = 1.001f * (reach + s.block_radius[own] + s.block_radius[b]);
+        if (length2(s.block_middle[b] - s.block_middle[own]) <= r * r) s.near_block[near_blocks++] = static_cast<uint32_t>(b);
+      }
+    }
     if (state.broken[i]) continue;
     const Vec3 at = s.middle.at(i), a = between(state, i + 1, i);
     const float half = s.half[i];
-    for (size_t b = (i + skip + 1) / kBlock; b < blocks; ++b) {
+    for (size_t n = 0; n < near_blocks; ++n) {
+      const size_t b = s.near_block[n];
+      if (b < (i + skip + 1) / kBlock) continue;
       const float r = reach + half + s.block_radius[b];
       if (length2(s.block_middle[b] - at) > r * r) continue;
       const size_t first = b * kBlock;

@@ -72,56 +72,79 @@ namespace {
 constexpr size_t kLanes = LaneSystem::kLanes;
 size_t rows_of_lane(size_t m) { return m < kLanes ? 1 : m / kLanes; }
 
+// One number of each lane. By reference: how a function returns so wide a register depends on the instruction set.
+using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
+#define CATGUT_INLINE inline __attribute__((always_inline))
+CATGUT_INLINE void load(const float* from, Lanes& v) { __builtin_memcpy(&v, from, sizeof v); }
+CATGUT_INLINE void store(const Lanes& v, float* to) { __builtin_memcpy(to, &v, sizeof v); }
+// From and to columns in the order of the rows.
+CATGUT_INLINE void gather(const float* from, size_t stride, Lanes& v) {
+  v = Lanes{from[0],          from[stride],     from[2 * stride], from[3 * stride],
+            from[4 * stride], from[5 * stride], from[6 * stride], from[7 * stride]};
+}
+CATGUT_INLINE void scatter(const Lanes& v, size_t stride, float* to) {
+  for (size_t c = 0; c < kLanes; ++c) to[c * stride] = v[c];
+}
+
 CATGUT_CLONES void eliminate(size_t rows, const float* __restrict diag, const float* __restrict off, float* __restrict down,
                              float* __restrict inverse, float* __restrict first, float* __restrict left) {
   const size_t stride = rows + 1;
-  float spike[kLanes], inv[kLanes];
-  for (size_t c = 0; c < kLanes; ++c) {
-    spike[c] = c == 0 ? 0.0f : off[static_cast<ptrdiff_t>(c * stride) - 1];
-    inverse[c] = inv[c] = 1 / diag[c * stride];
-    first[c] = spike[c];
+  Lanes spike{}, inv{}, o{}, diagonal{}, d{}, part{};
+  gather(off - 1, stride, spike);
+  spike[0] = 0;
+  gather(diag, stride, diagonal);
+  inv = 1 / diagonal;
+  store(inv, inverse), store(spike, first);
+  for (size_t a = 1; a < rows; ++a) {
+    gather(off + a - 1, stride, o), gather(diag + a, stride, diagonal);
+    d = o * inv;
+    inv = 1 / (diagonal - d * o);
+    spike = -d * spike;
+    store(d, down + a * kLanes), store(inv, inverse + a * kLanes), store(spike, first + a * kLanes);
   }
-  for (size_t a = 1; a < rows; ++a)
-    for (size_t c = 0; c < kLanes; ++c) {
-      const float o = off[c * stride + a - 1], d = o * inv[c];
-      inv[c] = 1 / (diag[c * stride + a] - d * o);
-      spike[c] = -d * spike[c];
-      down[a * kLanes + c] = d, inverse[a * kLanes + c] = inv[c], first[a * kLanes + c] = spike[c];
-    }
-  for (size_t c = 0; c < kLanes; ++c) left[(rows - 1) * kLanes + c] = spike[c] = spike[c] * inv[c];
-  for (size_t a = rows - 1; a-- > 0;)
-    for (size_t c = 0; c < kLanes; ++c)
-      left[a * kLanes + c] = spike[c] = first[a * kLanes + c] * inverse[a * kLanes + c] - down[(a + 1) * kLanes + c] * spike[c];
+  spike = spike * inv;
+  store(spike, left + (rows - 1) * kLanes);
+  for (size_t a = rows - 1; a-- > 0;) {
+    load(first + a * kLanes, part), load(inverse + a * kLanes, inv), load(down + (a + 1) * kLanes, d);
+    spike = part * inv - d * spike;
+    store(spike, left + a * kLanes);
+  }
 }
 
 CATGUT_CLONES void forward(size_t rows, const float* __restrict down, const float* __restrict left, const float* __restrict y,
                            float* __restrict swept, float* __restrict begin, float* __restrict end) {
   const size_t stride = rows + 1;
-  float run[kLanes], sum[kLanes];
-  for (size_t c = 0; c < kLanes; ++c) {
-    swept[c] = run[c] = y[c * stride];
-    sum[c] = left[c] * run[c];
+  Lanes run{}, sum{}, v{}, part{};
+  gather(y, stride, run), load(left, part);
+  store(run, swept);
+  sum = part * run;
+  for (size_t a = 1; a < rows; ++a) {
+    gather(y + a, stride, v), load(left + a * kLanes, part);
+    sum += part * v;
+    load(down + a * kLanes, part);
+    run = v - part * run;
+    store(run, swept + a * kLanes);
   }
-  for (size_t a = 1; a < rows; ++a)
-    for (size_t c = 0; c < kLanes; ++c) {
-      const float v = y[c * stride + a];
-      sum[c] += left[a * kLanes + c] * v;
-      swept[a * kLanes + c] = run[c] = v - down[a * kLanes + c] * run[c];
-    }
-  for (size_t c = 0; c < kLanes; ++c) begin[c] = sum[c], end[c] = run[c];
+  store(sum, begin), store(run, end);
 }
 
 CATGUT_CLONES void backward(size_t rows, const float* __restrict down, const float* __restrict inverse,
                             const float* __restrict first, const float* __restrict swept, const float* __restrict before,
                             const float* __restrict behind, float* __restrict x) {
   const size_t stride = rows + 1, last = (rows - 1) * kLanes;
-  float run[kLanes];
-  for (size_t c = 0; c < kLanes; ++c)
-    x[c * stride + rows - 1] = run[c] = (swept[last + c] - first[last + c] * before[c] - behind[c]) * inverse[last + c];
-  for (size_t a = rows - 1; a-- > 0;)
-    for (size_t c = 0; c < kLanes; ++c)
-      x[c * stride + a] = run[c] = (swept[a * kLanes + c] - first[a * kLanes + c] * before[c]) * inverse[a * kLanes + c] -
-                                   down[(a + 1) * kLanes + c] * run[c];
+  Lanes run{}, from{}, spike{}, inv{}, entry{}, exit{};
+  load(before, entry), load(behind, exit);
+  load(swept + last, from), load(first + last, spike), load(inverse + last, inv);
+  run = (from - spike * entry - exit) * inv;
+  scatter(run, stride, x + rows - 1);
+  for (size_t a = rows - 1; a-- > 0;) {
+    const size_t at = a * kLanes;
+    load(swept + at, from), load(first + at, spike), load(inverse + at, inv);
+    from = (from - spike * entry) * inv;
+    load(down + at + kLanes, spike);
+    run = from - spike * run;
+    scatter(run, stride, x + a);
+  }
 }
 
 }  // namespace
