@@ -213,7 +213,7 @@ void check_capstan(Lines& out, bool nightly) {
   };
   for (float coarse : {1.0f, 1.43f, 2.0f})
     out.add("capstan/180 deg over a thread, mu 0.3, 2 N, drawn, segments of " + number(double{coarse}) + " diameters", 1,
-            over_thread_exponent(coarse, 0.3f), 0.25, "exponent", "Euler-Eytelwein; two to four contacts for the whole arc");
+            over_thread_exponent(coarse, 0.3f), 0.15, "exponent", "Euler-Eytelwein; two to four contacts for the whole arc");
   if (!nightly) {
     line(90, 0.1f, 0.5f, true), line(180, 0.4f, 10, false), line(360, 0.2f, 2, true), line(360, 0.3f, 2, false),
         line(720, 0.3f, 10, true);
@@ -255,8 +255,8 @@ void check_holding(Lines& out, bool nightly) {
   // Halving the substep: force while it slides, with 0.2 N on the tails (free tails make the result bistable).
   for (const Kind& kind : {Kind{"granny", granny()}, Kind{"square", square()}}) {
     if (!nightly && kind.throws[1].hand < 0) continue;
-    for (float m : {0.1f, 0.2f}) {
-      if (!nightly && m > 0.15f) continue;
+    for (float m : {0.1f, 0.12f}) {  // from 0.15 on it depends on trifles whether they lock, and a locked knot tests nothing
+      if (!nightly && m > 0.11f) continue;
       Settings whole = knot_settings(m), half = whole;
       half.substep *= 0.5f, half.substeps *= 2;
       const float expected = hold_knot(kind.throws, whole, 0.2f).mean, got = hold_knot(kind.throws, half, 0.2f).mean;
@@ -287,7 +287,8 @@ void check_holding(Lines& out, bool nightly) {
                 number(double{coarse}) + " diameters",
             0, 1e6 * creep(held, t, load, seconds, seconds / 2), 1, "um/s", "a knot that holds does not creep");
   };
-  creeps(1.43f, 3, nightly ? 60 : 2), creeps(2, 1, nightly ? 60 : 2);
+  // It may settle in the first seconds.
+  creeps(1.43f, 3, nightly ? 60 : 8), creeps(2, 1, nightly ? 60 : 8);
   if (nightly) creeps(1.43f, 1, 60), creeps(2, 3, 60), creeps(1.43f, 0.3f, 60), creeps(2, 0.3f, 60);
 
   // Square knots of the friction of silk, laid with their nodes at different places along the thread.
