@@ -26,6 +26,8 @@ constexpr float kEdgeGrip = 0.003f;    // [m] of the rim between the forceps' ja
 constexpr float kGathering = 0.03f;    // [m/s] at most of hands that draw a purse-string
 constexpr float kGatherPatience = 25;  // [s]
 constexpr float kDeepEnough = 0.5f;    // of the wall, for a shallow bite
+constexpr float kTooShallow = 0.4f;    // likewise
+constexpr float kDeeper = 0.0005f;     // [m]
 constexpr float kScoopSpeed = 0.7f;    // of the needle's speed, with which it is lifted then
 constexpr float kFeel = 0.2f;          // share of a new value per tick
 constexpr float kLoose = 0.05f;        // [N] of thread that is let go
@@ -368,7 +370,11 @@ bool Scripted::make_bite(const Snapshot& seen) {
       }
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
       const int passed = passages(seen, false);
-      if (passed >= bite().walls && psi_ > psi_bite + plan_.beyond) {
+      // A shallow bite that holds too little is made again, deeper.
+      if (plan_.scoop > 0 && passed > 0 && seen.active().bite.back().depth < kTooShallow * skill_.wall) {
+        depth_fix_ -= kDeeper;
+        go(withdraw);
+      } else if (passed >= bite().walls && psi_ > psi_bite + plan_.beyond) {
         go(seen.tool[kForceps].held == Held::tissue ? let_go : over);
       } else if (psi_ > psi_bite + 1.1f) {
         // The tip is misplaced: it did not enter, is not deep enough, or is too deep to exit.
@@ -482,12 +488,12 @@ float Scripted::open_seam(const Snapshot& seen) {
   return open;
 }
 
-void Scripted::hold_strand_straight(const Snapshot& seen, BiteFrame& f) const {
+void Scripted::hold_strand_straight(const Snapshot& seen, BiteFrame& f, float psi) const {
   const size_t from = last_point_node(seen);
   const float want = kStraight * length_between(seen, from, seen.active().thread_order.size() - 1);
   const Vec3 hole = node_at(seen, from);
   for (int i = 0; i < 4; ++i) {
-    const Vec3 end = transform(needle_at(f, kTipUp), {shape().needle_radius, 0, 0});
+    const Vec3 end = transform(needle_at(f, psi), {shape().needle_radius, 0, 0});
     f.at += f.out * (want - distance(end, hole));
   }
 }
@@ -509,8 +515,9 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
       // reach.
       BiteFrame f = present ? frame(seen, next) : BiteFrame{stitch(seen), {0, 1, 0}, {0, 0, -1}, {1, 0, 0}};
       f.at += f.out * (present ? 0.03f : 0.045f) + f.up * (present ? 1.7f * plan_.lift : 0.0f);
-      if (!present && plan_.pull > 0) hold_strand_straight(seen, f);
-      if (move(kForceps, holding(kForceps, needle_at(f, present ? -half_bite_angle() - 0.7f : kTipUp)), skill_.speed)) go(over);
+      const float psi = present ? -half_bite_angle() - 0.7f : kTipUp;
+      if (plan_.pull > 0 && plan_.lift == 0) hold_strand_straight(seen, f, psi);
+      if (move(kForceps, holding(kForceps, needle_at(f, psi)), skill_.speed)) go(over);
       else if (!patience(6)) gave_up_ = true;
       return false;
     }

@@ -114,7 +114,8 @@ class Scripted final : public Surgeon {
   static float open_seam(const Snapshot& seen);
 
   // Raises the place where a needle is presented until its strand is nearly taut: slack thread drifts into the jaws.
-  void hold_strand_straight(const Snapshot& seen, BiteFrame& f) const;
+  // psi: of the needle there.
+  void hold_strand_straight(const Snapshot& seen, BiteFrame& f, float psi) const;
   // The needle holder takes the needle from the forceps; with `present` the forceps first moves it beside the next bite.
   bool take_back(const Snapshot& seen, bool present);
 
