@@ -91,9 +91,9 @@ void compare_sutures() {
   for (const int count : {1, 2, 4, 8, 16}) {
     Sewn s = ring_of_stitches(count);
     s.run(1.5f);
-    const bool asleep = s.state.sleep.asleep;
     std::array<double, 3> ms{};
     ms[0] = median_step(s);
+    const bool asleep = s.state.sleep.asleep;
     thread::Hold end;
     end.stiffness = 200, end.limit = 0.1f, end.from = end.to = s.state.thread.position(0) + Vec3{0.01f, 0, 0};
     s.hold = {end};
