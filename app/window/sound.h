@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// app/window: the tone of an active electrosurgical pen, as its generator has to give: lower for cutting, higher for coagulation.
-// The window's thread sets the mode, the sound card's reads it.
+// app/window: the tone of an active electrosurgical pen, as its generator has to give: lower for cutting, higher for
+// coagulation. The window's thread sets the mode, the sound card's reads it.
 #pragma once
 #include <SDL.h>
 

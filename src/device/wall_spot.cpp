@@ -43,7 +43,8 @@ Vec3 turned(const Snapshot& seen, uint32_t particle, Vec3 rest) {
 }
 
 bool known(const PictureModel& picture, const Snapshot& seen) {
-  return picture.columns > 0 && !picture.rim.empty() && seen.particle.size() >= 2 * picture.columns && picture.wall.size() >= 2 * picture.columns;
+  return picture.columns > 0 && !picture.rim.empty() && seen.particle.size() >= 2 * picture.columns &&
+         picture.wall.size() >= 2 * picture.columns;
 }
 
 Pose frame_at(Vec3 at, Vec3 x, Vec3 z) {

@@ -31,6 +31,9 @@ constexpr uint8_t kMarker[] = {
 constexpr uint8_t kMark[] = {
 #include "mark.inc"
 };
+constexpr uint8_t kSmoke[] = {
+#include "smoke.inc"
+};
 constexpr uint8_t kBoard[] = {
 #include "board.inc"
 };
@@ -48,6 +51,7 @@ std::span<const uint8_t> thread_low_material() { return kThreadLow; }
 std::span<const uint8_t> metal_low_material() { return kMetalLow; }
 std::span<const uint8_t> marker_material() { return kMarker; }
 std::span<const uint8_t> mark_material() { return kMark; }
+std::span<const uint8_t> smoke_material() { return kSmoke; }
 std::span<const uint8_t> board_material() { return kBoard; }
 std::span<const uint8_t> fade_material() { return kFade; }
 

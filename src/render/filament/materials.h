@@ -15,6 +15,7 @@ std::span<const uint8_t> thread_low_material();
 std::span<const uint8_t> metal_low_material();
 std::span<const uint8_t> marker_material();
 std::span<const uint8_t> mark_material();
+std::span<const uint8_t> smoke_material();
 std::span<const uint8_t> board_material();
 std::span<const uint8_t> fade_material();
 

@@ -50,6 +50,7 @@ Theatre::Theatre(filament::Engine& engine, const PictureModel& model, Quality qu
   set_cloth(thread_, std::move(cloth_position_), std::move(cloth_normal_));
   for (const ToolView3d& tool : tool_) thread_.hull.push_back(tool_hull(tool.shape));
   mark_ = make_mark_view(engine_, *scene_, mark_material_);
+  make_smoke();
 }
 
 Theatre::~Theatre() {
@@ -60,7 +61,7 @@ Theatre::~Theatre() {
     for (GpuMesh& m : scissors_.part) destroy_mesh(engine_, *scene_, m);
   for (GpuMesh& m : scenery_) destroy_mesh(engine_, *scene_, m);
   for (GpuMesh& m : needle_) destroy_mesh(engine_, *scene_, m);
-  for (GpuMesh* m : {&bed_, &thread_.gpu, &mark_.gpu}) destroy_mesh(engine_, *scene_, *m);
+  for (GpuMesh* m : {&bed_, &thread_.gpu, &mark_.gpu, &smoke_}) destroy_mesh(engine_, *scene_, *m);
   for (GpuMesh& m : cloth_) destroy_mesh(engine_, *scene_, m);
   for (GpuMesh& m : marker_) destroy_mesh(engine_, *scene_, m);
   engine_.destroy(tissue_material_);
@@ -70,6 +71,7 @@ Theatre::~Theatre() {
   engine_.destroy(drape_material_);
   engine_.destroy(marker_material_);
   engine_.destroy(mark_material_);
+  engine_.destroy(smoke_material_);
   for (filament::Material* m : material_) engine_.destroy(m);
   engine_.destroy(textures_.pattern);
   engine_.destroy(textures_.bumps);
@@ -129,6 +131,7 @@ void Theatre::show(const Snapshot& snapshot, std::span<const Camera> cameras, in
   for (size_t i = 0; i < std::min(tool_.size(), snapshot.instrument.size()); ++i) move_tool(tool_[i], snapshot.instrument[i]);
   show_scissors(snapshot);
   show_markers(snapshot, suture_points);
+  show_smoke(snapshot, cameras[0]);
 }
 
 void Theatre::add_tissue(const VisibleMesh& mesh) {
@@ -184,7 +187,7 @@ void Theatre::set_tones() {
   const bool whole = coarse_ >= 1 && !inset_shown_;
   eye_[0].view->setPostProcessingEnabled(!whole);
   for (filament::MaterialInstance* m : {tissue_material_, thread_material_, needle_material_, tool_material_, drape_material_,
-                                        marker_material_, mark_material_})
+                                        marker_material_, mark_material_, smoke_material_})
     m->setParameter("tones", whole ? 1.0f : 0.0f);
 }
 
@@ -265,6 +268,7 @@ void Theatre::make_materials() {
   drape_material_ = instance_of(drape_material());
   marker_material_ = instance_of(marker_material());
   mark_material_ = instance_of(mark_material());
+  smoke_material_ = instance_of(smoke_material());
   if (!plain_) return;
   for (filament::MaterialInstance* m : {thread_material_, needle_material_, tool_material_})
     m->setParameter("lamp", filament::math::float3{lamp.x, lamp.y, lamp.z});
@@ -414,6 +418,42 @@ void Theatre::move_tool(const ToolView3d& view, const InstrumentView& tool) {
     const Pose hinge{Vec3{0, 0, view.shape.pivot} - rotate(turn, {0, 0, view.shape.pivot}), turn};
     catgut::set_pose(engine_, view.part[side > 0 ? 1 : 2], tool.pose * hinge);
   }
+}
+
+void Theatre::make_smoke() {
+  if (std::none_of(model_.instrument.begin(), model_.instrument.end(), [](const auto& i) { return i.can(kCauterize); })) return;
+  puff_look_.assign(4 * kMostPuffs, {{0.58f, 0.58f, 0.56f, 0}, {0, 0}, {0, 0}});
+  std::vector<std::array<uint32_t, 3>> triangle;
+  for (uint32_t k = 0; k < kMostPuffs; ++k) {
+    for (uint32_t c = 0; c < 4; ++c)
+      puff_look_[4 * k + c].uv0[0] = c == 1 || c == 2 ? 1.0f : 0.0f, puff_look_[4 * k + c].uv0[1] = c >= 2 ? 1.0f : 0.0f;
+    triangle.push_back({4 * k, 4 * k + 1, 4 * k + 2}), triangle.push_back({4 * k, 4 * k + 2, 4 * k + 3});
+  }
+  smoke_ = make_mesh(engine_, *scene_, puff_look_, triangle, smoke_material_, false);
+  scene_->remove(smoke_.entity);
+}
+
+void Theatre::show_smoke(const Snapshot& snapshot, const Camera& camera) {
+  if (!smoke_.vertices) return;
+  smoke_of(snapshot, puff_);
+  scene_->remove(smoke_.entity);
+  if (puff_.empty()) return;
+  scene_->addEntity(smoke_.entity);
+  const Vec3 ahead = normalized(camera.target - camera.eye, {0, 0, -1});
+  const Vec3 right = normalized(cross(ahead, camera.up), any_perpendicular(ahead)), up = cross(right, ahead);
+  // Far ones first: each hides what is behind it.
+  std::sort(puff_.begin(), puff_.end(), [&](const Puff& a, const Puff& b) { return dot(a.at, ahead) > dot(b.at, ahead); });
+  const Surface s = new_surface(4 * kMostPuffs);
+  const PackedFrame frame = pack_frame(frame_of(-ahead, right));
+  for (size_t i = 0; i < 4 * kMostPuffs; ++i) {
+    const Puff& p = puff_[std::min(i / 4, puff_.size() - 1)];
+    const float x = puff_look_[i].uv0[0] - 0.5f, y = puff_look_[i].uv0[1] - 0.5f;
+    s.position[i] = p.at + (right * x + up * y) * (2 * p.radius), s.frame[i] = frame;
+    puff_look_[i].color[3] = i / 4 < puff_.size() ? p.alpha : 0;
+  }
+  upload_surface(engine_, smoke_, s, bounds(s.position));
+  set_look(engine_, smoke_, puff_look_);
+  set_drawn(engine_, smoke_, static_cast<uint32_t>(2 * puff_.size()));
 }
 
 // Markers follow the suture points; they are few, so each is a separate drawable, hidden when unused.

@@ -22,6 +22,7 @@
 #include "render/filament/thread_view.h"
 #include "render/filament/tissue_view.h"
 #include "render/renderer.h"
+#include "render/smoke.h"
 
 namespace catgut {
 
@@ -78,6 +79,8 @@ class Theatre {
   void move_tool(const ToolView3d& view, const InstrumentView& tool);
   ToolView3d make_tool(const InstrumentPicture& instrument);
   void show_scissors(const Snapshot& snapshot);
+  void make_smoke();
+  void show_smoke(const Snapshot& snapshot, const Camera& camera);
   void show_markers(const Snapshot& snapshot, bool wanted);
 
   float coarse_ = 1;
@@ -101,7 +104,7 @@ class Theatre {
   std::vector<filament::Material*> material_;
   filament::MaterialInstance *tissue_material_ = nullptr, *thread_material_ = nullptr, *needle_material_ = nullptr,
                              *tool_material_ = nullptr, *drape_material_ = nullptr, *marker_material_ = nullptr,
-                             *mark_material_ = nullptr;
+                             *mark_material_ = nullptr, *smoke_material_ = nullptr;
   Motions motion_;  // of every particle, in the current frame
   std::vector<TissueView> tissue_;
   ThreadView thread_;
@@ -116,6 +119,9 @@ class Theatre {
   std::vector<GpuMesh> cloth_;
   std::vector<Vec3> cloth_position_, cloth_normal_;  // of all cloth, until the thread has them
   std::vector<GpuMesh> marker_;
+  GpuMesh smoke_;  // squares, four vertices each; only of a scene with a pen
+  std::vector<Puff> puff_;
+  std::vector<VertexLook> puff_look_;
 };
 
 }  // namespace catgut
