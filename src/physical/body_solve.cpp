@@ -107,7 +107,6 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, float h, BodiesScratc
     next.q = turned(body.pose.q, clamped(moving.w, kMaxSpin) * h);
     next.p = moving.center + clamped(moving.v, kMaxSpeed) * h - rotate(next.q, m.center);
     for (const BodyCapsule& c : m.thread_capsule) {
-      if (k.tool.size() >= kMaxThreadCapsules) break;
       const BodySphere &a = m.sphere[c.a], &z = m.sphere[c.b];
       thread::ToolCapsule t;
       t.a = transform(body.shown, local(m, a, body.shown_opening)),

@@ -9,9 +9,9 @@
 namespace catgut {
 namespace {
 
-constexpr double kEvery = 0.045, kLife = 1.5;  // [s] between puffs, and of each
-constexpr float kRise = 0.032f;                // [m/s] at first; it slows
-constexpr float kDrift = 0.006f;               // [m/s] sideways, at most
+constexpr double kEvery = 0.045, kLife = 1.5;        // [s] between puffs, and of each
+constexpr float kRise = 0.032f;                      // [m/s] at first; it slows
+constexpr float kDrift = 0.006f;                     // [m/s] sideways, at most
 constexpr float kSmall = 0.0012f, kGrowth = 0.006f;  // [m], [m/s] of the radius
 constexpr float kThick = 0.26f;                      // largest alpha
 

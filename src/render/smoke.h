@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// render/smoke: the plume above the tip of a pen that burns tissue. A function of the Snapshot alone: a still shows the same as a
-// film. The simulation does not know it.
+// render/smoke: the plume above the tip of a pen that burns tissue. A function of the Snapshot alone: a still shows the same as
+// a film. The simulation does not know it.
 #pragma once
 #include <vector>
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <span>
 
+#include <fmt/format.h>
+
 #include "anatomy/body.h"
 #include "core/check.h"
 #include "sim/model.h"
@@ -98,8 +100,8 @@ physical::BodyModel body_of(const Model& model, const InstrumentModel& kind) {
 void add_bodies(const Model& model, PhysicalModel& made) {
   physical::BodiesModel& bodies = made.world.bodies;
   if (model.solver.body.size() > physical::kMaxBodies)
-    throw InputError(name_of(model.scene), "it has more than 16 instruments and needles",
-                     "physical mechanics have room for 16: remove some");
+    throw InputError(name_of(model.scene), fmt::format("it has more than {} instruments and needles", physical::kMaxBodies),
+                     "physical mechanics have no room for more: remove some");
   bodies.gravity = model.scene.solver.gravity;
   bodies.pair_contact = false;  // not tried in scenes yet: the scripted plan does not keep instruments apart
   for (const InstrumentModel& kind : model.suture.instrument) bodies.body.push_back(body_of(model, kind));
@@ -117,6 +119,11 @@ void add_bodies(const Model& model, PhysicalModel& made) {
     needle.thread_node = strand.first_slot - model.solver.tissue + strand.count - 1;
     made.start.needle.push_back(needle);
   }
+  size_t capsules = 0;
+  for (const physical::BodyModel& body : bodies.body) capsules += body.thread_capsule.size();
+  if (capsules > physical::kMaxThreadCapsules)
+    throw InputError(name_of(model.scene), "its instruments and needles have too many parts that thread can touch",
+                     "physical mechanics have no room for more: remove an instrument or a suture");
   made.start.bodies.body.resize(bodies.body.size());
   made.world.needles.thread_friction = model.scene.solver.friction_thread;
 }

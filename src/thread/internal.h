@@ -96,7 +96,7 @@ inline Vec3 new_drift(const Settings& settings, const AnyActive& c, Vec3 drift, 
 
 constexpr uint8_t kOnOther = 1, kOnThread = 2;  // bits of Scratch::touched: with load on a tool, plane, wall; on thread
 
-constexpr size_t kMaxTools = 64;  // of one step
+constexpr size_t kMaxTools = 128;  // of one step
 
 struct Scratch {
   size_t max_nodes = 0, max_crossings = 0;
@@ -128,7 +128,7 @@ struct Scratch {
   Padded half;
   std::vector<Vec3> block_middle;
   Column block_radius;
-  std::vector<uint64_t> block_tools;
+  std::vector<std::array<uint64_t, kMaxTools / 64>> block_tools;
   std::vector<uint32_t> near_block;
   std::vector<Vec3> tool_move;  // per substep, of both ends of every tool
   // Soft points: motion since the step began, now and at the beginning of the substep.

@@ -66,14 +66,14 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
     s.new_crossing.push_back(known ? state.crossing[old] : Crossing{});
   };
   // Tools near a block, as bits.
-  std::fill_n(s.block_tools.begin(), blocks, uint64_t{0});
+  std::fill_n(s.block_tools.begin(), blocks, std::array<uint64_t, kMaxTools / 64>{});
   for (size_t k = 0; k < tools.size(); ++k) {
     const Vec3 from = lerp(tools[k].a, tools[k].to_a, time), along = lerp(tools[k].b, tools[k].to_b, time) - from;
     const float size2 = std::max(length2(along), 1e-12f), far = tools[k].radius + reach;
     for (size_t b = 0; b < blocks; ++b) {
       const Vec3 off = s.block_middle[b] - from;
       const float r = 1.001f * (far + s.block_radius[b]);
-      if (length2(off - along * clamp01(dot(off, along) / size2)) < r * r) s.block_tools[b] |= uint64_t{1} << k;
+      if (length2(off - along * clamp01(dot(off, along) / size2)) < r * r) s.block_tools[b][k / 64] |= uint64_t{1} << k % 64;
     }
   }
   int near[kBlock];
@@ -106,16 +106,18 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
         if (length2(p + a * u - c * v) < reach * reach) keep(static_cast<uint32_t>(i << 16 | j));
       }
     }
-    for (uint64_t left = s.block_tools[i / kBlock]; left != 0; left &= left - 1) {
-      const size_t k = static_cast<size_t>(std::countr_zero(left));
-      const ToolCapsule& tool = tools[k];
-      const Vec3 ta = lerp(tool.a, tool.to_a, time), tb = lerp(tool.b, tool.to_b, time);
-      const float far = tool.radius + 0.5f * settings.material.diameter + settings.list_margin;
-      const Vec3 p = state.position(i) - ta, c = tb - ta;
-      float u, v;
-      closest_points(p, a, length2(c) > 1e-12f ? c : Vec3{1e-6f, 0, 0}, u, v);
-      if (length2(p + a * u - c * v) < far * far) keep(static_cast<uint32_t>(i << 16 | (kTool + k)));
-    }
+    const std::array<uint64_t, kMaxTools / 64>& tools_here = s.block_tools[i / kBlock];
+    for (size_t word = 0; word < tools_here.size(); ++word)
+      for (uint64_t left = tools_here[word]; left != 0; left &= left - 1) {
+        const size_t k = 64 * word + static_cast<size_t>(std::countr_zero(left));
+        const ToolCapsule& tool = tools[k];
+        const Vec3 ta = lerp(tool.a, tool.to_a, time), tb = lerp(tool.b, tool.to_b, time);
+        const float far = tool.radius + 0.5f * settings.material.diameter + settings.list_margin;
+        const Vec3 p = state.position(i) - ta, c = tb - ta;
+        float u, v;
+        closest_points(p, a, length2(c) > 1e-12f ? c : Vec3{1e-6f, 0, 0}, u, v);
+        if (length2(p + a * u - c * v) < far * far) keep(static_cast<uint32_t>(i << 16 | (kTool + k)));
+      }
   }
   state.key.assign(s.new_key.begin(), s.new_key.end());
   state.budget.assign(s.new_budget.begin(), s.new_budget.end());
