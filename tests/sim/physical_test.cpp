@@ -392,6 +392,20 @@ TEST(PhysicalScene, the_thread_alone_closes_a_wound) {
   EXPECT_GT(r.removed, 2.5e-3f) << "something other than the thread held it";
 }
 
+// Three stitches with one thread, over and over, tied once.
+TEST(PhysicalScene, an_over_and_over_suture_closes_a_wound) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "ninety seconds of surgery: set CATGUT_LONG=1";
+  const Closed r = sew_and_leave({}, "over_and_over");
+  ASSERT_TRUE(r.done);
+  EXPECT_EQ(r.cuts, 2) << "both ends are cut, and the thread broke nowhere";
+  EXPECT_GT(r.away_for, 4.0f) << "hands away";
+  EXPECT_EQ(r.knot.throws, kThrowsOfThePlan);
+  EXPECT_NEAR(r.open, 3e-3f, 0.1e-3f);
+  EXPECT_LT(r.away, 1e-3f);
+  EXPECT_NEAR(r.away, r.let_go, 0.2e-3f);
+  EXPECT_GT(r.removed, 2.5e-3f) << "something other than the thread held it";
+}
+
 // The same as the tied stitch with a single throw: nothing holds it, and the wound opens when the clamps go back.
 TEST(PhysicalScene, one_throw_does_not_hold_a_wound) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "forty seconds of surgery: set CATGUT_LONG=1";
