@@ -11,7 +11,7 @@
 namespace catgut {
 namespace {
 
-constexpr float kCutTone = 440, kCoagulateTone = 660;  // [Hz] chosen: far enough apart to be told apart
+constexpr float kCutTone = 440, kCoagulateTone = 660;  // [Hz] chosen: distinct by ear
 constexpr float kLoudness = 0.12f;                     // of the whole range
 constexpr float kFade = 0.008f;                        // [s]
 

@@ -211,6 +211,22 @@ class XMouse : public AtTheWindow {
   ~XMouse() override { let_go(); }
   bool ready() const { return x_.ready(); }
   void press(const std::string& key) { x_.key(key, true), x_.key(key, false); }
+  // A pedal is a key: pressed until the pen has this mode, then released until it is off.
+  bool pedal(const std::string& key, PenMode mode) {
+    const auto until = [&](PenMode wanted) {
+      for (int i = 0; i < 300; ++i) {
+        PenMode now = PenMode::off;
+        for (const InstrumentView& v : look_.seen.instrument) now = std::max(now, v.pen);
+        if (now == wanted) return true;
+        if (!see(1)) return false;
+      }
+      return false;
+    };
+    x_.key(key, true);
+    const bool on = until(mode);
+    x_.key(key, false);
+    return until(PenMode::off) && on;
+  }
   // A click on a panel. [pixels] of the X server's screen, from its corner. The pointer rests until each of its states was
   // drawn.
   bool click_at(int x, int y) {

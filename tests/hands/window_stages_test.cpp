@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: Apache-2.0
+// tests/hands: the stages of an operation in the window itself: by events of the X server, by a virtual gamepad, by simulated
+// haptic devices. All waits are for observed states. stages_test has the same in lock step, to the end of each stage.
+#ifdef CATGUT_TESTS_WINDOW
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "../device/fake_hd/load.h"
+#include "at_the_window.h"
+#include "device/wall_spot.h"
+#include "render/smoke.h"
+#include "runtime/session.h"
+#include "sim/recording.h"
+#include "window/sound.h"
+
+namespace catgut {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr float kLine = 0.025f;                          // [m] from the rim, in scene altemeier
+constexpr float kFrom = -0.5f * kPi, kTo = kFrom + 0.35f;  // [rad] of a stroke toward the user: 5 mm
+
+
+// Cutting and coagulation are distinct by ear; neither begins nor ends with a click.
+TEST(PenTone, has_the_pitch_of_its_mode_and_fades) {
+  PenTone tone;
+  std::vector<float> s(kSoundRate / 10);
+  for (const PenMode mode : {PenMode::cut, PenMode::coagulate}) {
+    tone.fill(s, mode);
+    float step = std::abs(s[0]);
+    for (size_t i = 1; i < s.size(); ++i) step = std::max(step, std::abs(s[i] - s[i - 1]));
+    tone.fill(s, mode);
+    size_t rising = 0;
+    for (size_t i = 1; i < s.size(); ++i) rising += s[i - 1] < 0 && s[i] >= 0;
+    EXPECT_NEAR(static_cast<float>(rising) * 10, tone_of(mode), 10);
+    EXPECT_LT(step, 0.03f) << "a click";
+    tone.fill(s, PenMode::off);
+    EXPECT_EQ(s.back(), 0);
+  }
+}
+
+// Only while the tip burns tissue; the same from the same Snapshot.
+TEST(Smoke, rises_from_a_tip_that_burns) {
+  Snapshot seen;
+  seen.time_s = 10, seen.instrument.resize(1);
+  InstrumentView& pen = seen.instrument[0];
+  pen.pose.p = {0.01f, 0.02f, 0.03f};
+  std::vector<Puff> puff, again;
+  smoke_of(seen, puff);
+  EXPECT_TRUE(puff.empty());
+  pen.pen = PenMode::cut;
+  smoke_of(seen, puff);
+  EXPECT_TRUE(puff.empty()) << "in the air";
+  pen.burning = 5;
+  smoke_of(seen, puff);
+  smoke_of(seen, again);
+  ASSERT_GT(puff.size(), 10u);
+  ASSERT_EQ(puff.size(), again.size());
+  for (size_t i = 0; i < puff.size(); ++i) {
+    EXPECT_EQ(puff[i].at.y, again[i].at.y);
+    EXPECT_GE(puff[i].at.y, pen.pose.p.y);
+    EXPECT_LT(distance(puff[i].at, pen.pose.p), 0.06f);
+  }
+}
+
+// A clamp from the tray, closed on the rim and parked; then the pen, one stroke, and it is laid down.
+bool clamp_and_score(Person& me) {
+  return me.take_instrument(0, "allis") && me.grasp_rim(0, 0) && me.park(0) && me.carry(0, {0.02f, 0.05f, 0}) &&
+         me.take_instrument(0, "cautery") && me.score(0, kLine, kFrom, kTo) && me.lay_down(0);
+}
+
+void expect_clamp_and_score(const AtTheWindow& desk) {
+  EXPECT_EQ(desk.count(EventKind::instrument_parked), 1u);
+  EXPECT_GE(desk.count(EventKind::pen_activated), 1u);
+  EXPECT_EQ(desk.count(EventKind::pen_activated), desk.count(EventKind::pen_deactivated));
+  EXPECT_GE(desk.count(EventKind::wall_scored) + desk.count(EventKind::wall_cut_through), 1u);
+  EXPECT_GE(desk.count(EventKind::instrument_laid_down), 1u);
+}
+
+
+TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_mouse_and_keyboard) {
+  XMouse desk(x_->display, 400, 1, "altemeier");
+  if (!desk.ready()) GTEST_SKIP() << "no XTest here";
+  Person me(desk);
+  bool done = false, by_pedal = false;
+  desk.sit([&] {
+    done = clamp_and_score(me) && me.take_instrument(0, "cautery");
+    if (done) by_pedal = desk.pedal("F8", PenMode::coagulate) && desk.pedal("F7", PenMode::cut);
+  });
+  EXPECT_TRUE(done) << me.doing();
+  EXPECT_TRUE(by_pedal) << "on while it is pressed, off when it is released";
+  expect_clamp_and_score(desk);
+}
+
+TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_gamepad) {
+  SdlPad desk(400, "altemeier");
+  Person me(desk);
+  bool done = false;
+  desk.sit([&] { done = desk.plug_in() && clamp_and_score(me); });
+  EXPECT_TRUE(done) << me.doing();
+  expect_clamp_and_score(desk);
+}
+
+// The end of a bowel is cut off, held by the forceps in the other hand. Minutes, so for the nightly tests.
+TEST_F(StitchAtTheWindow, an_end_is_cut_off_and_carried_away_by_mouse) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  XMouse desk(x_->display, 900, 1, "excision");
+  if (!desk.ready()) GTEST_SKIP() << "no XTest here";
+  Person me(desk);
+  bool done = false;
+  desk.sit([&] { done = me.grasp_rim(1, kPi) && me.cut_round(0, 0.006f) && me.carry(1, {-0.10f, 0.06f, 0}); });
+  EXPECT_TRUE(done) << me.doing();
+  EXPECT_EQ(desk.count(EventKind::piece_freed), 1u);
+}
+
+TEST_F(StitchAtTheWindow, an_end_is_cut_off_and_carried_away_by_gamepad) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  SdlPad desk(900, "excision");
+  Person me(desk);
+  bool done = false;
+  desk.sit([&] {
+    done = desk.plug_in() && me.grasp_rim(1, kPi) && me.cut_round(0, 0.006f) && me.carry(1, {-0.10f, 0.06f, 0});
+  });
+  EXPECT_TRUE(done) << me.doing();
+  EXPECT_EQ(desk.count(EventKind::piece_freed), 1u);
+}
+
+TEST_F(StitchAtTheWindow, scissors_cut_by_mouse) {
+  XMouse desk(x_->display, 300, 1, "slit");
+  if (!desk.ready()) GTEST_SKIP() << "no XTest here";
+  Person me(desk);
+  bool done = false;
+  desk.sit([&] { done = me.snip(0, kFrom, 0.008f); });
+  EXPECT_TRUE(done) << me.doing();
+  EXPECT_GE(desk.count(EventKind::tissue_snipped), 1u);
+}
+
+// F10 in the middle of the first stage, a clamp in the hand and one parked. The report says how far it came; the recording has
+// all of it, and its replay comes to the same state.
+TEST_F(StitchAtTheWindow, an_aborted_operation_is_reported_and_recorded) {
+  XMouse desk(x_->display, 400, 1, "altemeier");
+  if (!desk.ready()) GTEST_SKIP() << "no XTest here";
+  const fs::path folder = fs::path(testing::TempDir()) / ("catgut_aborted_" + std::to_string(getpid()));
+  fs::create_directories(folder);
+  const std::string json = (folder / "report.json").string(), file = (folder / "session.cgrec").string();
+  desk.lesson = "altemeier";
+  desk.prepare = [&](PlayOptions& options) {
+    options.tutorial = false;
+    options.json = json, options.live.record = file, options.live.record_at_once = true;
+  };
+  Person me(desk);
+  bool done = false, left = false;
+  size_t parked = 0;
+  desk.sit(
+      [&] {
+        done = me.take_instrument(0, "allis") && me.grasp_rim(0, 0) && me.park(0) && me.carry(0, {0.02f, 0.05f, 0}) &&
+               me.take_instrument(0, "allis") && me.grasp_rim(0, 0.5f * kPi);
+        parked = desk.count(EventKind::instrument_parked);
+        desk.press("F10");
+        left = desk.shows("results");
+      },
+      true);
+  ASSERT_TRUE(done) << me.doing();
+  EXPECT_TRUE(left);
+  EXPECT_EQ(parked, 1u);
+  const nlohmann::json report = nlohmann::json::parse(std::ifstream(json));
+  EXPECT_EQ(report["procedure"]["finished"], false);
+  EXPECT_EQ(report["procedure"]["stages"][0]["name"], "clamp");
+  EXPECT_EQ(report["procedure"]["stages"][0]["state"], "active");
+  EXPECT_EQ(report["procedure"]["stages"][1]["state"], "waiting");
+  const Recording recording = read_recording(file);
+  EXPECT_FALSE(recording.truncated) << recording.fault;
+  size_t held = 0;
+  SessionHooks hooks;
+  hooks.on_tick = [&](const Snapshot& seen, const std::string&) {
+    held = 0;
+    for (const InstrumentView& i : seen.instrument) held += i.held == Held::tissue;
+  };
+  const ReplayResult again = replay_session(recording, file, true, 1, hooks);
+  EXPECT_FALSE(again.differs_at) << "tick " << again.differs_at.value_or(0);
+  EXPECT_EQ(held, 2u) << "the parked clamp, and the one in the hand";
+  fs::remove_all(folder);
+}
+
+// A user with a stylus in the right hand sees how far the tool is from where it should be, and moves on.
+class Stylus {
+ public:
+  Stylus(AtTheWindow& desk, const FakeHd& arm) : desk_(desk), arm_(arm), wish_(arm.position(0)) {}
+  const Snapshot& seen() const { return desk_.look().seen; }
+  bool until(const std::function<bool()>& done) {
+    for (int i = 0; i < 200; ++i)
+      if (done()) return true;
+      else if (!desk_.act({})) return false;
+    return false;
+  }
+  bool go(const std::function<Pose()>& to, float near) {
+    return until([&] {
+      const Pose goal = to();
+      const Vec3 off = goal.p - seen().tool[0].hand.p;
+      wish_ += off * (0.6f * std::min(1.0f, 0.02f / std::max(length(off), 1e-6f)));
+      turn_ = goal.q;
+      arm_.wish(0, wish_, turn_, 0);
+      return length(off) < near && distance(seen().tool[0].pose.p, goal.p) < near;
+    });
+  }
+  // Until `done`: buttons as the devices have them, 1 the jaw's, 2 beside it; pressed so many times in half a second.
+  bool press(int button, int times, const std::function<bool()>& done) {
+    for (int attempt = 0; attempt < 3; ++attempt) {
+      for (int i = 0; i < times; ++i)
+        for (const int down : {button, 0}) {
+          arm_.wish(0, wish_, turn_, down);
+          std::this_thread::sleep_for(std::chrono::milliseconds(60));
+        }
+      for (int i = 0; i < 60; ++i)
+        if (done()) return true;
+        else if (!desk_.act({})) return false;
+    }
+    return false;
+  }
+
+ private:
+  AtTheWindow& desk_;
+  const FakeHd& arm_;
+  Vec3 wish_;
+  Quat turn_;
+};
+
+TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_simulated_arms) {
+  XMouse desk(x_->display, 500, 1, "altemeier");
+  if (!desk.ready()) GTEST_SKIP() << "no XTest here";
+  FakeHd fake(false);
+  desk.prepare = [](PlayOptions& options) {
+    options.live.haptics = "touch";
+    options.live.say = [](const std::string&) {};
+  };
+  std::string stopped_at;
+  desk.sit([&] {
+    Stylus me(desk, fake);
+    const auto step = [&](const char* what, bool done) {
+      if (!done && stopped_at.empty()) stopped_at = what;
+      return done;
+    };
+    const auto at_front = [&](float down) {
+      Vec3 place = desk.picture().focus;
+      for (const uint32_t i : desk.picture().rim[0])
+        if (const Vec3 p = me.seen().particle[i]; p.z > place.z) place = p;
+      return place - Vec3{0, down, 0};
+    };
+    const auto jaws = [&](float above) {
+      Pose p = jaws_at(*rim_beside(desk.look().view, at_front(0), 0.01f, desk.picture(), me.seen()));
+      p.p += rotate(p.q, {0, 0, above});
+      return p;
+    };
+    float along = 0, above = 0.02f;
+    const auto tip = [&] {
+      const Vec3 place = at_front(kLine) + Vec3{along, 0, 0};
+      const auto spot = wall_under(desk.look().view, place, desk.picture(), me.seen());
+      return spot ? tip_on(*spot, above) : Pose{place, {}};
+    };
+    const auto instrument = [&] { return me.seen().tool[0].instrument; };
+    const auto take = [&](const char* kind) {
+      for (int i = 0; i < 8; ++i) {
+        if (instrument() >= 0 && desk.picture().instrument[static_cast<size_t>(instrument())].kind == kind) return true;
+        const int before = instrument();
+        desk.press("i");
+        if (!me.until([&] { return instrument() != before; })) return false;
+      }
+      return false;
+    };
+    const auto pen = [&] { return me.seen().instrument[static_cast<size_t>(instrument())].pen; };
+    if (!step("take a clamp", take("allis")) || !step("over the rim", me.go([&] { return jaws(0.03f); }, 0.004f)) ||
+        !step("on the rim", me.go([&] { return jaws(0); }, 0.0025f)) ||
+        !step("close it", me.press(1, 1, [&] { return me.seen().tool[0].held == Held::tissue; })))
+      return;
+    desk.press("k");
+    if (!step("park it", me.until([&] { return instrument() < 0; })) ||
+        !step("away", me.go([&] { return jaws(0.05f); }, 1.0f)) || !step("take the pen", take("cautery")) ||
+        !step("to the line", me.go(tip, 0.004f)))
+      return;
+    above = 0;
+    if (!step("touch the line", me.go(tip, 0.0025f)) ||
+        !step("switch it on", me.press(2, 2, [&] { return pen() == PenMode::cut; })))
+      return;
+    for (; along < 0.004f; along += 0.0005f) me.go(tip, 0.0025f);
+    step("switch it off", me.press(2, 2, [&] { return pen() == PenMode::off; }));
+    desk.press("k");
+    step("lay it down", me.until([&] { return instrument() < 0; }));
+  });
+  EXPECT_EQ(stopped_at, "");
+  expect_clamp_and_score(desk);
+}
+
+}  // namespace
+}  // namespace catgut
+#endif
