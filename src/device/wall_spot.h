@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// device: the place of the wall that a pointer is at. On a flat screen nobody sees how deep an instrument is: pen, swab and
+// device: the place of the wall that a pointer is at. A flat screen does not show how deep an instrument is: pen, swab and
 // scissors go to the tissue under the pointer, the jaws of clamps and forceps to the rim beside it. Pure functions. Physical
 // mechanics only, whose wall consists of columns.
 #pragma once

@@ -35,7 +35,7 @@ constexpr void reflect(auto& a, Like<ToolView> auto& t) {
   a(t.loop_wraps), a(t.loop_handed), a(t.loop_suture), a(t.loop_first), a(t.loop_last), a(t.force), a(t.torque);
 }
 constexpr void reflect(auto& a, Like<InstrumentView> auto& i) {
-  a(i.pose), a(i.jaw), a(i.place), a(i.hand), a(i.held), a(i.held_slot), a(i.pull);
+  a(i.pose), a(i.jaw), a(i.place), a(i.hand), a(i.held), a(i.held_slot), a(i.pull), a(i.pen), a(i.burning);
 }
 constexpr void reflect(auto& a, Like<NeedleView> auto& n) { a(n.pose), a(n.in_tissue), a(n.bite); }
 constexpr void reflect(auto& a, Like<SuturePointView> auto& p) {

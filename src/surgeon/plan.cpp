@@ -19,7 +19,7 @@ constexpr float kStaysApart = 0.012f;     // [m] round the bowel, between stay s
 constexpr float kStitchesApart = 0.005f;  // [m] round the bowel
 constexpr float kPull = 1.7f;             // [N] on each strand of a physical throw: below what the bites bear
 constexpr float kApproximate = 0.003f;    // [m] of each clamp: the edges touch after 1.5 mm
-// A shallow bite in a wall that is held by its edge: it gives way by so much before the tip enters, and then the needle is
+// A shallow bite in a wall that is held by its edge: it gives way by this much before the tip enters, and then the needle is
 // lifted.
 constexpr float kGivesWay = 0.002f, kScoop = 0.003f;  // [m]
 constexpr float kGather = 2.0f;                       // [N] of each end of a physical purse-string

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// surgeon/scripted: tasks, bites and pulling thread; see scripted.h.
+// surgeon/scripted: tasks and pulling thread; see scripted.h. Bites are in biting.cpp.
 #include "surgeon/scripted.h"
 
 #include <algorithm>
@@ -17,18 +17,9 @@ constexpr float kCounterHold = 0.8f;   // [N]
 constexpr float kTighten = 0.15f;      // of the free speed: the thread runs through two dozen holes, and tissue follows it late
 constexpr float kSecure = 0.985f;      // fraction of a closure that counts as closed
 constexpr float kMissBy = 0.008f;      // [m] along the shaft
-constexpr float kRoomToTie = 0.42f;    // of the needle's arc: least position of a needle holder that hands over near the swage
-constexpr float kClear = 0.4f;         // [s] that the forceps backs out before anything else moves
 constexpr float kForcepsAt = 0.93f;    // position on the needle's arc: behind the tip
-constexpr float kTipUp = -2.2f;        // [rad] angle of the needle's circle at which its tip is up
-constexpr float kStraight = 0.93f;     // of the strand's length
-constexpr float kEdgeGrip = 0.003f;    // [m] of the rim between the forceps' jaws
 constexpr float kGathering = 0.03f;    // [m/s] at most of hands that draw a purse-string
 constexpr float kGatherPatience = 25;  // [s]
-constexpr float kDeepEnough = 0.5f;    // of the wall, for a shallow bite
-constexpr float kTooShallow = 0.4f;    // likewise
-constexpr float kDeeper = 0.0005f;     // [m]
-constexpr float kScoopSpeed = 0.7f;    // of the needle's speed, with which it is lifted then
 constexpr float kFeel = 0.2f;          // share of a new value per tick
 constexpr float kLoose = 0.05f;        // [N] of thread that is let go
 constexpr float kGathered = 1;         // [s] of full tension on both ends
@@ -271,180 +262,6 @@ std::string Scripted::name_of_bite() const {
   return "bite " + std::to_string(place_ + 1) + " of " + std::to_string(plan_.place.size()) + ": ";
 }
 
-bool Scripted::pick_up(const Snapshot& seen) {
-  enum { over, down, close };
-  const Pose grip = driver_grip(seen.suture[suture_].needle.pose);
-  if (stage_ != over || seen.tick > 0) rest_aside(seen, kForceps);
-  switch (stage_) {
-    case over:
-      jaw(kNeedleHolder, 1);
-      if (move(kNeedleHolder, raised(grip, 0.03f), skill_.speed)) go_down(down);
-      return false;
-    case down:
-      if (move(kNeedleHolder, short_of(grip), careful())) go(close);
-      return false;
-    default:
-      if (!jaw(kNeedleHolder, 0) || waited_ < 0.35f) return false;
-      if (!holds_needle(seen, kNeedleHolder)) return miss(over), false;
-      remember_grip(seen, kNeedleHolder);
-      return true;
-  }
-}
-
-int Scripted::passages(const Snapshot& seen, bool complete) const {
-  int count = 0;
-  for (size_t b = bites_before_; b < seen.active().bite.size(); ++b)
-    count += complete ? seen.active().bite[b].complete : seen.active().bite[b].has_exit;
-  return count;
-}
-
-void Scripted::hold_or_rest(const Snapshot& seen) {
-  if (seen.tool[kForceps].held != Held::tissue) rest_aside(seen, kForceps);
-}
-
-bool Scripted::hold_edge(const Snapshot& seen) {
-  enum { over, down, close };
-  rest_aside(seen, kNeedleHolder);
-  BiteFrame f = frame(seen, place_);
-  f.at -= f.along * (0.5f * bite().length);  // where the needle enters
-  const Pose grip{f.at + f.up * (skill_.edge_distance - kEdgeGrip) - f.out * (0.5f * skill_.wall),
-                  from_axes(f.out, cross(f.up, f.out), f.up)};
-  switch (stage_) {
-    case over:
-      jaw(kForceps, 1);
-      if (move(kForceps, raised(grip, 0.02f), skill_.speed)) go_down(down);
-      else if (!patience(6)) gave_up_ = true;
-      return false;
-    case down:
-      if (move(kForceps, short_of(grip), careful())) go(close);
-      else if (!patience(4)) gave_up_ = true;
-      return false;
-    default:
-      if (!jaw(kForceps, 0) || waited_ < 0.3f) return false;
-      if (seen.tool[kForceps].held != Held::tissue) return miss(over), false;
-      return true;
-  }
-}
-
-bool Scripted::make_bite(const Snapshot& seen) {
-  enum { hover, approach, drive, withdraw, let_go, over, down, close, release, retreat, bring };
-  const float speed = skill_.speed, psi_bite = half_bite_angle();
-  const Pose& needle = seen.active().needle.pose;
-  if (stage_ == hover && waited_ <= dt_) aim();
-  switch (stage_) {
-    case hover: {  // to a position beside the bite, clear of the organ
-      doing_ = name_of_bite() + "approach";
-      hold_or_rest(seen);
-      BiteFrame f = frame(seen, place_);
-      f.at += f.out * 0.022f + f.up * plan_.lift;
-      if (move(kNeedleHolder, holding(kNeedleHolder, needle_at(f, -psi_bite - 0.7f)), speed)) go(approach);
-      else if (!patience(6)) gave_up_ = true;
-      return false;
-    }
-    case approach: {
-      hold_or_rest(seen);
-      scooped_ = 0;
-      frame_ = frame(seen, place_);
-      frame_.at += frame_.along * aim_along_ + frame_.up * aim_up_;
-      if (aim_turn_ != 0) {
-        const Quat turn = axis_angle(frame_.out, aim_turn_);
-        frame_.along = rotate(turn, frame_.along), frame_.up = rotate(turn, frame_.up);
-      }
-      psi_ = -psi_bite - 0.45f;
-      if (move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), careful())) {
-        bites_before_ = seen.active().bite.size();
-        go(drive);
-      } else if (!patience(5)) {
-        gave_up_ = true;
-      }
-      return false;
-    }
-    case drive: {
-      doing_ = name_of_bite() + "drive the needle";
-      hold_or_rest(seen);
-      psi_ += skill_.drive_speed / shape().needle_radius * dt_;
-      // Square to the wall until the tip is deep enough in it, then shallow.
-      if (plan_.scoop > 0 && seen.active().needle.in_tissue && seen.active().bite.back().depth > kDeepEnough * skill_.wall) {
-        const float up = std::min(plan_.scoop - scooped_, kScoopSpeed * skill_.drive_speed * dt_);
-        frame_.at += frame_.out * up, scooped_ += up;
-      }
-      move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
-      const int passed = passages(seen, false);
-      // A shallow bite that holds too little is made again, deeper.
-      if (plan_.scoop > 0 && passed > 0 && seen.active().bite.back().depth < kTooShallow * skill_.wall) {
-        depth_fix_ -= kDeeper;
-        go(withdraw);
-      } else if (passed >= bite().walls && psi_ > psi_bite + plan_.beyond) {
-        go(seen.tool[kForceps].held == Held::tissue ? let_go : over);
-      } else if (psi_ > psi_bite + 1.1f) {
-        // The tip is misplaced: it did not enter, is not deep enough, or is too deep to exit.
-        // Through the first wall but not the second, which was pushed away by millimeters, as soft walls are.
-        const bool gave_way = passed > 0 && passed < bite().walls;
-        depth_fix_ += gave_way ? -0.0008f : passed > 0 || !seen.active().needle.in_tissue ? -0.0003f : 0.0003f;
-        go(withdraw);
-      }
-      return false;
-    }
-    case withdraw: {  // back along the same arc, then the same bite again
-      doing_ = name_of_bite() + "withdraw and retry";
-      hold_or_rest(seen);
-      psi_ = std::max(psi_ - 2 * skill_.drive_speed / shape().needle_radius * dt_, -psi_bite - 0.7f);
-      BiteFrame f = frame_;
-      if (!patience(1.5f)) f.at += f.out * std::min(0.01f, 0.01f * (waited_ - 1.5f));  // stuck: move away from the wall
-      move(kNeedleHolder, holding(kNeedleHolder, needle_at(f, psi_)), 2 * speed);
-      if (psi_ <= -psi_bite - 0.7f && !seen.active().needle.in_tissue) {
-        ++retries_;
-        if (++attempts_ > kAttempts) gave_up_ = true;
-        go(hover);
-      } else if (!patience(8)) {
-        gave_up_ = true;
-      }
-      return false;
-    }
-    case let_go:  // of the edge, and off it
-      if (seen.tool[kForceps].held == Held::tissue || !jaw(kForceps, 1)) jaw(kForceps, 1), waited_ = 0;
-      else if (move(kForceps, raised(hand_[kForceps].pose, 0.02f), skill_.speed) || waited_ > 0.15f) go(over);
-      return false;
-    case over:
-      doing_ = name_of_bite() + "grasp the tip";
-      jaw(kForceps, 1);
-      if (move(kForceps, raised(forceps_grip(needle), 0.025f), speed)) go_down(down);
-      return false;
-    case down:
-      if (move(kForceps, short_of(forceps_grip(needle)), careful())) go(close);
-      return false;
-    case close:
-      if (!jaw(kForceps, 0) || waited_ < 0.3f) return false;
-      if (!holds_needle(seen, kForceps)) return miss(over), false;
-      misses_ = 0;
-      remember_grip(seen, kForceps);
-      go(release);
-      return false;
-    case release:
-      if (jaw(kNeedleHolder, 1)) go(retreat);
-      return false;
-    case retreat:
-      if (move(kNeedleHolder, raised(hand_[kNeedleHolder].pose, 0.01f), speed) || waited_ > 0.25f) go(bring);
-      return false;
-    default: {
-      doing_ = name_of_bite() + "pull the needle through";
-      if (!holds_needle(seen, kForceps)) return miss(over), false;  // it has slipped out
-      rest_aside(seen, kNeedleHolder);
-      psi_ = std::min(psi_ + 2 * skill_.drive_speed / shape().needle_radius * dt_, psi_bite + kPi + 0.5f);
-      BiteFrame f = frame_;
-      if (!patience(3))  // stuck: an outward pull frees the back end
-        f.at += (f.out + (plan_.lift > 0 ? 0.4f : 0.0f) * f.up) * std::min(0.02f, 0.01f * (waited_ - 3));
-      move(kForceps, holding(kForceps, needle_at(f, psi_)), 2 * speed);
-      if (!seen.active().needle.in_tissue && passages(seen, true) >= bite().walls) {
-        pull_from_ = hand_[kForceps].pose;
-        return true;
-      }
-      if (!patience(8)) gave_up_ = true;
-      return false;
-    }
-  }
-}
-
 bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   rest_aside(seen, kNeedleHolder);
   if (seen.active().suture_point.empty()) return true;
@@ -486,60 +303,6 @@ float Scripted::open_seam(const Snapshot& seen) {
   for (const SeamView& s : seen.active().seam)
     if (s.midpoint && s.progress < kSecure) open = std::max(open, (1 - s.progress) * s.start);
   return open;
-}
-
-void Scripted::hold_strand_straight(const Snapshot& seen, BiteFrame& f, float psi) const {
-  const size_t from = last_point_node(seen);
-  const float want = kStraight * length_between(seen, from, seen.active().thread_order.size() - 1);
-  const Vec3 hole = node_at(seen, from);
-  for (int i = 0; i < 4; ++i) {
-    const Vec3 end = transform(needle_at(f, psi), {shape().needle_radius, 0, 0});
-    f.at += f.out * (want - distance(end, hole));
-  }
-}
-
-bool Scripted::take_back(const Snapshot& seen, bool present) {
-  enum { bring, over, down, close, give, clear };
-  // To tie, the forceps takes the needle near its swage: the holder leaves it room. Drawn jaws are 3 mm wide, and wider open.
-  const bool guided = plan_.pull <= 0;
-  const float least = !present && guided ? kRoomToTie : 0;
-  switch (stage_) {
-    case bring: {
-      // It is taken from the needle holder's side: the holder waits there, or its path would cross the forceps.
-      if (present) rest_aside(seen, kNeedleHolder);
-      else
-        move(kNeedleHolder, {stitch(seen) + Vec3{0.09f * plan_.driver_side, 0.09f, 0}, tying_pose(kNeedleHolder, {}).q},
-             skill_.speed);
-      const size_t next = std::min(place_ + 1, plan_.place.size() - 1);
-      // Before a bite the needle is moved beside its target; before a knot high above the stitch, with its tip up and out of
-      // reach.
-      BiteFrame f = present ? frame(seen, next) : BiteFrame{stitch(seen), {0, 1, 0}, {0, 0, -1}, {1, 0, 0}};
-      f.at += f.out * (present ? 0.03f : 0.045f) + f.up * (present ? 1.7f * plan_.lift : 0.0f);
-      const float psi = present ? -half_bite_angle() - 0.7f : kTipUp;
-      if (plan_.pull > 0 && plan_.lift == 0) hold_strand_straight(seen, f, psi);
-      if (move(kForceps, holding(kForceps, needle_at(f, psi)), skill_.speed)) go(over);
-      else if (!patience(6)) gave_up_ = true;
-      return false;
-    }
-    case over:
-      jaw(kNeedleHolder, 1);
-      if (move(kNeedleHolder, raised(driver_grip(seen.active().needle.pose, least), 0.025f), skill_.speed)) go_down(down);
-      return false;
-    case down:
-      if (move(kNeedleHolder, short_of(driver_grip(seen.active().needle.pose, least)), careful())) go(close);
-      return false;
-    case close:
-      if (!jaw(kNeedleHolder, 0) || waited_ < 0.3f) return false;
-      if (!holds_needle(seen, kNeedleHolder)) return miss(over), false;
-      remember_grip(seen, kNeedleHolder);
-      go(give);
-      return false;
-    case give:
-      if (jaw(kForceps, guided ? kJustOpen : 1.0f)) go(clear);
-      return false;
-    default:  // back out along its own shaft first: the tools are close to each other, and rigid
-      return move(kForceps, raised(hand_[kForceps].pose, 0.01f), skill_.speed) || waited_ > (guided ? kClear : 0.2f);
-  }
 }
 
 // Both draw() and gather() begin with these stages.

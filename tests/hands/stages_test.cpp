@@ -48,7 +48,7 @@ TEST_P(Stages, four_clamps_are_closed_on_the_rim_and_parked) {
   EXPECT_EQ(holding, 4u);
 }
 
-// The operation is left after its first stage, saved, and resumed at the other device: the procedure goes on with its cut.
+// The operation is left after its first stage, saved, and resumed at the other device: the procedure continues with its cut.
 TEST_P(Stages, a_saved_stage_is_resumed) {
   std::vector<std::byte> saved;
   {

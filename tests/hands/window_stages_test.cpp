@@ -22,9 +22,8 @@ namespace catgut {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr float kLine = 0.025f;                          // [m] from the rim, in scene altemeier
+constexpr float kLine = 0.025f;                            // [m] from the rim, in scene altemeier
 constexpr float kFrom = -0.5f * kPi, kTo = kFrom + 0.35f;  // [rad] of a stroke toward the user: 5 mm
-
 
 // Cutting and coagulation are distinct by ear; neither begins nor ends with a click.
 TEST(PenTone, has_the_pitch_of_its_mode_and_fades) {
@@ -82,7 +81,6 @@ void expect_clamp_and_score(const AtTheWindow& desk) {
   EXPECT_GE(desk.count(EventKind::instrument_laid_down), 1u);
 }
 
-
 TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_mouse_and_keyboard) {
   XMouse desk(x_->display, 400, 1, "altemeier");
   if (!desk.ready()) GTEST_SKIP() << "no XTest here";
@@ -98,6 +96,7 @@ TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_mouse_and_keyboard) {
 }
 
 TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_gamepad) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
   SdlPad desk(400, "altemeier");
   Person me(desk);
   bool done = false;
@@ -231,6 +230,7 @@ class Stylus {
 };
 
 TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_simulated_arms) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
   XMouse desk(x_->display, 500, 1, "altemeier");
   if (!desk.ready()) GTEST_SKIP() << "no XTest here";
   FakeHd fake(false);
