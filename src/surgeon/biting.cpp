@@ -8,15 +8,15 @@
 namespace catgut {
 namespace {
 
-constexpr float kRoomToTie = 0.42f;    // of the needle's arc: least position of a needle holder that hands over near the swage
-constexpr float kClear = 0.4f;         // [s] that the forceps backs out before anything else moves
-constexpr float kTipUp = -2.2f;        // [rad] angle of the needle's circle at which its tip is up
-constexpr float kStraight = 0.93f;     // of the strand's length
-constexpr float kEdgeGrip = 0.003f;    // [m] of the rim between the forceps' jaws
-constexpr float kDeepEnough = 0.5f;    // of the wall, for a shallow bite
-constexpr float kTooShallow = 0.4f;    // likewise
-constexpr float kDeeper = 0.0005f;     // [m]
-constexpr float kScoopSpeed = 0.7f;    // of the needle's speed, with which it is lifted then
+constexpr float kRoomToTie = 0.42f;  // of the needle's arc: least position of a needle holder that hands over near the swage
+constexpr float kClear = 0.4f;       // [s] that the forceps backs out before anything else moves
+constexpr float kTipUp = -2.2f;      // [rad] angle of the needle's circle at which its tip is up
+constexpr float kStraight = 0.93f;   // of the strand's length
+constexpr float kEdgeGrip = 0.003f;  // [m] of the rim between the forceps' jaws
+constexpr float kDeepEnough = 0.5f;  // of the wall, for a shallow bite
+constexpr float kTooShallow = 0.4f;  // likewise
+constexpr float kDeeper = 0.0005f;   // [m]
+constexpr float kScoopSpeed = 0.7f;  // of the needle's speed, with which it is lifted then
 
 }  // namespace
 
