@@ -97,16 +97,22 @@ BitePlace on_top(const PictureModel& picture, uint32_t wall, float angle, float 
 
 void add(Plan& plan, TaskKind kind, int which = 0, int way = 1) { plan.task.push_back({kind, which, way}); }
 
+// One bite after the other with the same needle. held: the forceps holds the edge against it.
+void add_bites(Plan& plan, int bites, bool held) {
+  add(plan, TaskKind::pick_up);
+  for (int b = 0; b < bites; ++b) {
+    if (held) add(plan, TaskKind::hold_edge, b);
+    add(plan, TaskKind::bite, b);
+    add(plan, b == 0 ? TaskKind::pull_tail : TaskKind::pull_slack);
+    if (b + 1 < bites) add(plan, TaskKind::hand_back);
+  }
+}
+
 Plan purse_string_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.lift = 0.012f;
   places_round(picture, skill, skill.bites, skill.edge_distance, plan);
-  add(plan, TaskKind::pick_up);
-  for (int b = 0; b < skill.bites; ++b) {
-    add(plan, TaskKind::bite, b);
-    add(plan, b == 0 ? TaskKind::pull_tail : TaskKind::pull_slack);
-    if (b + 1 < skill.bites) add(plan, TaskKind::hand_back);
-  }
+  add_bites(plan, skill.bites, false);
   add(plan, TaskKind::draw);
   add(plan, TaskKind::rest);
   return plan;
@@ -127,13 +133,7 @@ Plan purse_string_thread_plan(const PictureModel& picture, const SurgeonSkill& s
     p.depth += kGivesWay;
     p.length = 2 * std::sqrt(p.depth * (2 * radius - p.depth));
   }
-  add(plan, TaskKind::pick_up);
-  for (int b = 0; b < skill.bites; ++b) {
-    add(plan, TaskKind::hold_edge, b);
-    add(plan, TaskKind::bite, b);
-    add(plan, b == 0 ? TaskKind::pull_tail : TaskKind::pull_slack);
-    if (b + 1 < skill.bites) add(plan, TaskKind::hand_back);
-  }
+  add_bites(plan, skill.bites, true);
   add(plan, TaskKind::gather);
   add(plan, TaskKind::leave);
   return plan;

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "core/check.h"
 #include "field.h"
 #include "procedure/manager.h"
 #include "procedure/procedure_file.h"
@@ -23,6 +24,15 @@ SceneSpec small_scene() {
   s.body[0].particles = 600, s.body[1].particles = 240;
   s.thread.particles = 40;
   return s;
+}
+
+// Nine needles have more parts than thread can be in contact with: refused, and not left out in silence.
+TEST(Operation, sutures_that_thread_could_not_touch_are_refused) {
+  SceneSpec s = small_scene();
+  s.suture.resize(8, s.suture.front());
+  EXPECT_NO_THROW(build_model(s));
+  s.suture.push_back(s.suture.front());
+  EXPECT_THROW(build_model(s), InputError);
 }
 
 TEST(Operation, a_clamp_from_the_tray_is_parked_on_the_rim_and_holds_it) {
