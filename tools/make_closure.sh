@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Makes docs/media/purse_string_thread.jpg: the rim gathered by its thread, and let go. One minute.
+#   tools/make_closure.sh [FOLDER]     folder of the PNGs (default out/closure)
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+folder="${1:-out/closure}" catgut="${CATGUT:-./catgut}"
+mkdir -p "$folder"
+"$catgut" run purse_string_thread --seed 1 --seconds 78.5 --headless --no-expect --camera close --size 960x540 \
+  --still "75:$folder/drawn.png" --still "78:$folder/let_go.png"
+ffmpeg -v error -y -i "$folder/drawn.png" -i "$folder/let_go.png" -filter_complex hstack,scale=1280:360 -frames:v 1 -q:v 4 \
+  docs/media/purse_string_thread.jpg
