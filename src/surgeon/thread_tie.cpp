@@ -55,7 +55,6 @@ constexpr int kAgain = 5;             // times that a throw is wound again
 constexpr int kMostMisses = 3;        // grasps at the tail with a turn on the jaws
 constexpr float kDeep = 4e-3f;        // [m] below the stitch: a tail there is taken from above
 constexpr float kBears = 3;           // [N] on a bite, above which the hands give way
-constexpr float kSwing = 0.8f;        // [turns] of the linking integral along a strand, within a throw
 
 Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
 // Unit, across the shaft; 0: toward the viewer, pi/2: above.
@@ -93,41 +92,10 @@ Vec3 knot_center(const Snapshot& seen, Vec3 fallback) {
   return count > 0 ? sum / count : fallback;
 }
 
-// How a sum along a strand rises and falls: each swing of at least kSwing is a throw, of the other sense than the one before.
-struct Swings {
-  float sum = 0, extreme = 0, way = 0;  // way: +1, -1 of the last one
-  int count = 0;
-  void add(float x) {
-    sum += x;
-    if (count == 0 ? std::abs(sum) > kSwing : way * (extreme - sum) > kSwing)
-      way = count == 0 ? std::copysign(1.0f, sum) : -way, extreme = sum, ++count;
-    else if (way * (sum - extreme) > 0) extreme = sum;
-  }
-};
-
-// What tail and strand show of the knot, drawn tight or not: its throws of alternating sense. From Gauss's linking integral,
-// along either of them from its hole outward.
-struct Twist {
-  float way = 0;  // sense of the outermost throw
-  int throws = 0;
-};
-Twist look(const Snapshot& seen) {
-  const size_t last = seen.active().thread_order.size() - 1, first = first_point_node(seen), from = last_point_node(seen);
-  std::vector<float> of_strand(last - from, 0.0f);
-  Swings tail, strand;
-  for (size_t i = first; i-- > 0;) {
-    const Vec3 a = node_at(seen, i), da = node_at(seen, i + 1) - a;
-    float sum = 0;
-    for (size_t k = from; k < last; ++k) {
-      const Vec3 b = node_at(seen, k), db = node_at(seen, k + 1) - b, off = a + 0.5f * da - b - 0.5f * db;
-      const float far2 = std::max(length2(off), 1e-8f);
-      const float here = dot(off, cross(da, db)) / (4 * kPi * far2 * std::sqrt(far2));
-      sum += here, of_strand[k - from] += here;
-    }
-    tail.add(sum);
-  }
-  for (const float x : of_strand) strand.add(x);
-  return {tail.way, std::min(tail.count, strand.count)};
+SeenThrows look(const Snapshot& seen) {
+  std::vector<Vec3> thread;
+  for (size_t i = 0; i < seen.active().thread_order.size(); ++i) thread.push_back(node_at(seen, i));
+  return see_throws(thread);
 }
 
 }  // namespace
@@ -209,16 +177,21 @@ void ThreadTie::measure(const Snapshot& seen) {
   height_ = (wraps_ > 1 ? 0.42f : kHigh) * strand_;
 }
 
+// What the knot lacks is wound from this side.
+void ThreadTie::wind_next(const SeenThrows& knot) {
+  laid_ = knot.next(first_laid_);
+  sense_ = laid_ * side_;
+}
+
 // The throw is pulled tight and both hands have let go of it: winds again what is not there.
 void ThreadTie::seated(const Snapshot& seen) {
-  const Twist knot = look(seen);
-  if (knot.throws >= wanted_) {
+  const SeenThrows knot = look(seen);
+  if (knot.alternating() >= wanted_) {
     stage_ = done;
     return;
   }
   side_ = -side_;
-  laid_ = knot.throws > 0 ? -knot.way : side_;
-  sense_ = laid_ * side_;
+  wind_next(knot);
   measure(seen);
   again(seen, to_work);
 }
@@ -245,6 +218,7 @@ void ThreadTie::begin(const Snapshot& seen, int wraps, int sense, bool first, bo
   const float way = static_cast<float>(sense);
   sense_ = first ? way : -way * laid_ * side_;
   laid_ = side_ * sense_;
+  if (first) first_laid_ = laid_;
   if (first || sense > 0) ++wanted_;
   measure(seen);
   go(seen, first ? to_tail : to_work);
@@ -504,8 +478,9 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       if (stage_ == cross_up && (there || (done_ > 0.6f && most > kTaut))) go(seen, cross_down);
       else if (stage_ == cross_down && (there || std::min(felt_, tail_felt_) > 0.5f || most > kTaut)) {
         // A turn that slid off without the tail in it, and a throw below that came undone, are seen before they are pulled on.
-        if (look(seen).throws >= wanted_) go(seen, pull);
-        else again(seen, lift_tail);
+        const SeenThrows knot = look(seen);
+        if (knot.alternating() < wanted_) wind_next(knot), again(seen, lift_tail);
+        else go(seen, pull);
       }
       break;
     }
@@ -525,7 +500,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       tip_.x += side_ * (pace(tail_felt_, felt_) + even), hand_.x -= side_ * (pace(felt_, tail_felt_) - even);
       steady_ = std::min(tail_felt_, felt_) > 0.9f * how_.pull ? steady_ + dt : 0;
       const bool lost = !holds && waited_ > 0.2f;
-      if (stage_ == pull && (steady_ > kSeated || waited_ > 12 || lost)) go(seen, look(seen).throws >= wanted_ ? hold : lay);
+      if (stage_ == pull && (steady_ > kSeated || waited_ > 12 || lost))
+        go(seen, look(seen).alternating() >= wanted_ ? hold : lay);
       else if (stage_ == hold && (!keep_ || waited_ > 12)) go(seen, lay);
       break;
     }

@@ -14,6 +14,7 @@
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "surgeon/hands.h"
+#include "surgeon/throws.h"
 
 namespace catgut {
 
@@ -74,6 +75,7 @@ class ThreadTie {
   // Winds again, after the stage that lets everything go; or fails.
   void again(const Snapshot& seen, Stage after);
   void measure(const Snapshot& seen);
+  void wind_next(const SeenThrows& knot);
   void seated(const Snapshot& seen);
   float wound(const Snapshot& seen) const;
 
@@ -85,12 +87,12 @@ class ThreadTie {
   float side_ = 1, sense_ = 1, waited_ = 0;
   int wanted_ = 0;  // throws that the knot shall have
   bool first_ = false, failed_ = false, keep_ = false;
-  bool lost_ = false;  // the tail: it is taken and laid again first
-  float laid_ = 1;     // sense in which this throw twists the strands
-  Vec3 origin_;        // the middle of the stitch
-  Vec3 tip_, hand_;    // where the needle holder's jaws and the needle's swage shall be
-  Quat holder_turn_;   // of the needle holder
-  Quat forceps_rest_;  // forceps at angle 0, as it held the needle
+  bool lost_ = false;                // the tail: it is taken and laid again first
+  float laid_ = 1, first_laid_ = 1;  // hand of this throw, of the first: +1 right
+  Vec3 origin_;                      // the middle of the stitch
+  Vec3 tip_, hand_;                  // where the needle holder's jaws and the needle's swage shall be
+  Quat holder_turn_;                 // of the needle holder
+  Quat forceps_rest_;                // forceps at angle 0, as it held the needle
   Vec3 swage_in_forceps_;
   float forceps_angle_ = 0;
   Vec3 shaft_;  // of the needle holder

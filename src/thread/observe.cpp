@@ -17,15 +17,6 @@ constexpr float kSliding = 0.55f;  // in 100 ties: up to 0.34 drawn flat, from 0
 constexpr float kOwn = 7;          // diameters of each strand that a snug single throw takes up; half as much more per wrap
 constexpr size_t kMaxOrders = 5000;
 
-// Fixed and spread over the sphere: where the open ends are led to before they are joined.
-constexpr Vec3 kAway[] = {{0.36f, 0.48f, 0.8f},   {-0.8f, 0.36f, 0.48f},  {0.48f, -0.8f, 0.36f}, {-0.36f, -0.48f, 0.8f},
-                          {0.8f, -0.36f, -0.48f}, {-0.48f, 0.8f, -0.36f}, {0.36f, 0.48f, -0.8f}, {-0.64f, -0.6f, -0.48f}};
-
-struct Vote {
-  KnotType type;
-  float share = 0;  // of the closures
-};
-
 class Looker {
  public:
   explicit Looker(const State& state) : state_(state) {
@@ -42,20 +33,17 @@ class Looker {
     if (broken > 0) below_ = normalized(cuts / static_cast<float>(2 * broken) - ends * 0.5f, {0, -1, 0}) * far_;
   }
 
-  // The knot in nodes i..j: what most closures make of it.
-  Vote vote(size_t i, size_t j, bool quick) {
-    std::vector<KnotType> seen;
-    Vote best;
-    size_t most = 0, total = 0;
-    for (const Vec3& away : kAway) {
-      seen.push_back(type(i, j, away * far_));
-      ++total;
-      const size_t count = static_cast<size_t>(std::count(seen.begin(), seen.end(), seen.back()));
-      if (count > most) most = count, best.type = seen.back();
-      if (quick && total == 3 && most == 3) break;
+  // The knot in nodes i..j.
+  KnotVote vote(size_t i, size_t j, bool quick) {
+    curve_.clear();
+    for (size_t k = i; k <= j; ++k) {
+      curve_.push_back(state_.position(k));
+      if (k < j && state_.broken[k]) {  // two threads: joined below, where the tails do not go
+        curve_.push_back(state_.position(k) + below_);
+        curve_.push_back(state_.position(k + 1) + below_);
+      }
     }
-    best.share = static_cast<float>(most) / static_cast<float>(total);
-    return best;
+    return vote_knot(curve_, far_, quick);
   }
 
   float length_of(size_t i, size_t j) const {
@@ -74,20 +62,6 @@ class Looker {
   }
 
  private:
-  KnotType type(size_t i, size_t j, Vec3 away) {
-    curve_.clear();
-    for (size_t k = i; k <= j; ++k) {
-      curve_.push_back(state_.position(k));
-      if (k < j && state_.broken[k]) {  // two threads: joined below, where the tails do not go
-        curve_.push_back(state_.position(k) + below_);
-        curve_.push_back(state_.position(k + 1) + below_);
-      }
-    }
-    curve_.push_back(state_.position(j) + away);
-    curve_.push_back(state_.position(i) + away);
-    return knot_type(curve_);
-  }
-
   const State& state_;
   Vec3 below_;     // [m]
   float far_ = 1;  // [m]
@@ -135,7 +109,7 @@ SeenKnot observe(const Settings& settings, const State& state, float tight_loop)
   SeenKnot knot;
   const size_t n = state.nodes();
   Looker look(state);
-  const Vote whole = look.vote(0, n - 1, false);
+  const KnotVote whole = look.vote(0, n - 1, false);
   knot.confidence = whole.share;
   if (!whole.type.known || whole.type.factors.size() > kMaxThrows) {
     knot.name = KnotName::other;
@@ -154,7 +128,7 @@ SeenKnot observe(const Settings& settings, const State& state, float tight_loop)
   };
   const size_t first = last_true(0, n - 1, [&](size_t i) { return look.vote(i, n - 1, true).type == whole.type; });
   const size_t last = n - 1 - last_true(0, n - 1, [&](size_t i) { return look.vote(0, n - 1 - i, true).type == whole.type; });
-  auto knotted = [](const Vote& v) { return !v.type.known || !v.type.factors.empty(); };
+  auto knotted = [](const KnotVote& v) { return !v.type.known || !v.type.factors.empty(); };
   const size_t first_in = last_true(first, n - 1, [&](size_t i) { return knotted(look.vote(i, n - 1, true)); });
   const size_t last_in =
       n - 1 - last_true(n - 1 - last, n - 1, [&](size_t i) { return knotted(look.vote(0, n - 1 - i, true)); });
@@ -162,7 +136,7 @@ SeenKnot observe(const Settings& settings, const State& state, float tight_loop)
   // Shortened from one end only, node by node, one throw after the other comes undone, from the outermost to the bite's.
   struct Step {
     size_t node;
-    Vote vote;
+    KnotVote vote;
   };
   std::vector<Step> path[2];
   for (size_t i = first; i <= first_in; ++i) path[0].push_back({i, look.vote(i, n - 1, true)});

@@ -288,6 +288,26 @@ KnotType knot_type(std::span<const Vec3> closed) {
   return type;
 }
 
+KnotVote vote_knot(std::span<const Vec3> open, float far, bool quick) {
+  // Fixed and spread over the sphere.
+  constexpr Vec3 kAway[] = {{0.36f, 0.48f, 0.8f},   {-0.8f, 0.36f, 0.48f},  {0.48f, -0.8f, 0.36f}, {-0.36f, -0.48f, 0.8f},
+                            {0.8f, -0.36f, -0.48f}, {-0.48f, 0.8f, -0.36f}, {0.36f, 0.48f, -0.8f}, {-0.64f, -0.6f, -0.48f}};
+  std::vector<Vec3> closed(open.begin(), open.end());
+  closed.resize(open.size() + 2);
+  std::vector<KnotType> seen;
+  KnotVote best;
+  size_t most = 0;
+  for (const Vec3& away : kAway) {
+    closed[open.size()] = open.back() + away * far, closed[open.size() + 1] = open.front() + away * far;
+    seen.push_back(knot_type(closed));
+    const size_t count = static_cast<size_t>(std::count(seen.begin(), seen.end(), seen.back()));
+    if (count > most) most = count, best.type = seen.back();
+    if (quick && seen.size() == 3 && most == 3) break;
+  }
+  best.share = static_cast<float>(most) / static_cast<float>(seen.size());
+  return best;
+}
+
 double mean_writhe(std::span<const Vec3> closed) {
   const Vec3 views[] = {{0.1f, 0.2f, 1}, {1, 0.15f, 0.1f}, {0.2f, 1, 0.1f}, {1, 1, 0.2f},
                         {-1, 1, 0.3f},   {1, 0.1f, 1},     {-1, 0.2f, 1}};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// thread/topology: the knot type of a curve from its shape alone: for tests and scoring, never for the mechanics.
+// thread/topology: the knot type of a curve from its shape alone: for tests, scoring and a surgeon's eyes, never for
+// the mechanics.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -39,6 +40,14 @@ struct KnotType {
   friend bool operator==(const KnotType&, const KnotType&) = default;
 };
 KnotType knot_type(std::span<const Vec3> closed);
+
+// The knot in a thread with open ends: both are led away in one direction, `far` [m] and well beyond the thread, and joined
+// there. What most of eight directions make of it; their share.
+struct KnotVote {
+  KnotType type;
+  float share = 0;
+};
+KnotVote vote_knot(std::span<const Vec3> open, float far, bool quick = false);  // quick: three directions if they agree
 
 // A thread whose ends are extended in the given directions and joined far below (-y).
 std::vector<Vec3> close_curve(std::span<const Vec3> thread, Vec3 first_away, Vec3 last_away);
