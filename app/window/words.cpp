@@ -55,6 +55,12 @@ std::string fault_words(Fault fault) {
       return "inner wall cut";
     case Fault::clamp_torn_out:
       return "clamp torn out";
+    case Fault::bite_torn:
+      return "thread tears the wall";
+    case Fault::bite_torn_out:
+      return "bite torn out";
+    case Fault::thread_broken:
+      return "thread broken";
     default:
       return fault_name(fault);
   }

@@ -46,6 +46,7 @@ constexpr void reflect(auto& a, Like<SettledView> auto& s) { a(s.node), a(s.knot
 constexpr void reflect(auto& a, Like<SeamView> auto& s) { a(s.a), a(s.b), a(s.start), a(s.progress), a(s.midpoint); }
 constexpr void reflect(auto& a, Like<BiteView> auto& b) {
   a(b.entry), a(b.exit), a(b.depth), a(b.has_exit), a(b.complete), a(b.wall), a(b.entry_inside), a(b.exit_inside);
+  a(b.entry_made), a(b.exit_made), a(b.torn), a(b.torn_out);
 }
 constexpr void reflect(auto& a, Like<SutureView> auto& s) {
   a(s.needle), a(s.thread_order), a(s.thread_tension), a(s.thread_cut), a(s.thread_rest), a(s.needle_on_thread);

@@ -104,6 +104,10 @@ struct BiteView {
   bool has_exit = false, complete = false;
   uint32_t wall = 0;                               // as in SuturePointView
   bool entry_inside = false, exit_inside = false;  // that end lies on the mucosa
+  // A slit that the thread has torn leads from here to `entry` or `exit`. Not torn: the same place.
+  Vec3 entry_made, exit_made;  // [m]
+  float torn = 0;              // [m] length of the slit
+  bool torn_out = false;       // it has reached an edge: the thread is no longer in the wall
 };
 
 // One needle with its thread, and what has been sutured with it.

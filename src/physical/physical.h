@@ -32,7 +32,7 @@ struct Hole {
   wall::Point made{};  // meaningful where torn > 0
   float torn = 0;      // [m]
   bool out = false;    // the bite has come out at the edge; the thread is no longer in it
-  Vec3 load{};         // [N] on the bite that begins here, smoothed
+  Vec3 load{};         // [N] on the bite that begins here, smoothed; once it tears, also at its other end
 };
 
 struct Model {

@@ -97,7 +97,7 @@ bool tear_bites(const Model& m, State& s, std::span<const Vec3> impulse, Surface
     const float by = std::min(kMost, excess / m.tear.viscosity * h);
     const Vec3 move = normalized(a.load - n * dot(a.load, n)) * by;
     drag(m, s, search, a.place, move), drag(m, s, search, b.place, move);
-    a.torn += by, b.torn += by;
+    a.torn += by, b.torn += by, b.load = a.load;
     if (edge_distance(m, s, a.place) > kOut && edge_distance(m, s, b.place) > kOut) continue;
     a.out = b.out = out = true;
     t.eyelet.erase(t.eyelet.begin() + static_cast<std::ptrdiff_t>(e), t.eyelet.begin() + static_cast<std::ptrdiff_t>(e) + 2);

@@ -231,6 +231,9 @@ void count_changes(State& state) {
       case EventKind::suture_loaded:
         felt.fill(true);
         break;
+      case EventKind::technique_fault:
+        if (e.fault == Fault::thread_broken || e.fault == Fault::bite_torn_out) felt.fill(true);
+        break;
       default:
         break;
     }

@@ -2,6 +2,7 @@
 // sim/physical_step: THE stage list of physical mechanics, as sim/step is of guided ones. See the header.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "sim/hands.h"
 #include "sim/model.h"
@@ -166,6 +167,16 @@ void note_punctures(const State& state, const physical::Model& m, PhysicalScratc
   }
 }
 
+// Segment i of a strand has broken under load: its value is the tension of the tick before.
+void report_broken(State& state, size_t n, size_t i) {
+  const Strand& strand = state.solver.strand[n];
+  Event e;
+  e.kind = EventKind::technique_fault, e.fault = Fault::thread_broken;
+  e.who = kNoHand, e.which = strand.order[i], e.value = strand.tension[i], e.suture = static_cast<uint16_t>(n);
+  e.where = xyz(state.solver.x[strand.order[i]]);
+  state.event.add(e);
+}
+
 // Positions, velocities and tensions.
 void show(const Model& model, State& state) {
   SolverState& s = state.solver;
@@ -186,6 +197,7 @@ void show(const Model& model, State& state) {
     const size_t first = model.solver.strand[n].first_slot - model.solver.tissue;
     for (size_t i = 0; i < strand.rest.size(); ++i) {
       strand.rest[i] = t.rest[first + i];
+      if (t.broken[first + i] && !strand.cut[i]) report_broken(state, n, i);
       strand.tension[i] = t.tension[first + i];
       strand.cut[i] = t.broken[first + i];
     }
@@ -384,6 +396,39 @@ void show_bites(const Model& model, State& state, SutureContext& sewing, const P
   }
 }
 
+// [m] of a slit from which on a bite counts as torn.
+constexpr float kTorn = 0.001f;
+
+// Bites whose thread tears the wall: their ends move with the slit. One that is torn out has no suture points any more.
+void show_tears(const Model& model, State& state, SutureContext& sewing) {
+  for (uint32_t n = 0; n < state.suture.suture.size(); ++n) {
+    Suture& suture = state.suture.suture[n];
+    Strand& strand = state.solver.strand[n];
+    std::vector<uint32_t>& known = state.physical.suture[n].hole;
+    for (size_t i = known.size(); i-- > 0;) {
+      if (known[i] >= state.physical.world.hole.size()) continue;
+      const physical::Hole& hole = state.physical.world.hole[known[i]];
+      const SuturePoint point = suture.point[i];
+      Bite& bite = suture.bite[point.bite];
+      if (hole.torn == 0) continue;
+      if (bite.torn == 0) bite.entry_made = bite.entry, bite.exit_made = bite.exit;
+      BiteEnd& end = point.exit ? bite.exit : bite.entry;
+      end = bite_end(model, state, hole.place);
+      strand.anchor[point.anchor].point = end.point;
+      const auto report = [&](Fault fault) {
+        sewing.report(n, EventKind::technique_fault, kNoHand, point.bite, length(hole.load),
+                      position_of(end.point, state.solver.x.data()), fault);
+      };
+      if (std::exchange(bite.torn, hole.torn) < kTorn && bite.torn >= kTorn) report(Fault::bite_torn);
+      if (!hole.out) continue;
+      if (!std::exchange(bite.torn_out, true)) report(Fault::bite_torn_out);
+      erase_anchor(strand, suture, point.anchor);
+      suture.point.erase(suture.point.begin() + static_cast<std::ptrdiff_t>(i));
+      known.erase(known.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+  }
+}
+
 // Where the thread runs through its holes now, and how taut it is there. A point whose hole the thread has left again is gone.
 void show_points(const Model& model, State& state) {
   const thread::State& t = state.physical.world.thread;
@@ -485,6 +530,7 @@ void step_physical(const Model& model, State& state, const TickInput& given, Job
   show(model, state);
   show_grips(model, state, sewing);
   show_bites(model, state, sewing, k);
+  show_tears(model, state, sewing);
   show_points(model, state);
   watch_pulls(model, state);
   bleed(model, state, k.cut);

@@ -90,8 +90,12 @@ void publish_bites(const Model& model, const State& state, size_t which, SutureV
   for (const Bite& b : suture.bite) {
     const uint32_t in = surface[b.entry.triangle][0], through = surface[b.exit.triangle][0];
     const auto inside = [&](uint32_t i) { return model.layer[i] == static_cast<uint8_t>(TissueLayer::mucosa); };
-    out.bite.push_back({position_of(b.entry.point, x), position_of(b.exit.point, x), b.depth, b.has_exit, b.complete,
-                        model.wall[in], inside(in), inside(through)});
+    const Vec3 entry = position_of(b.entry.point, x), exit = position_of(b.exit.point, x);
+    out.bite.push_back({entry, exit, b.depth, b.has_exit, b.complete, model.wall[in], inside(in), inside(through), entry, exit,
+                        b.torn, b.torn_out});
+    if (b.torn > 0)
+      out.bite.back().entry_made = position_of(b.entry_made.point, x),
+      out.bite.back().exit_made = position_of(b.exit_made.point, x);
   }
   out.seam.clear();
   for (const ClosurePlan::Pair& p : state.plan[which].pair)

@@ -239,7 +239,8 @@ bool names_particle(const Event& event) {
     case EventKind::thread_cut:
       return true;
     case EventKind::technique_fault:
-      return event.fault == Fault::cut_in_stitch || event.fault == Fault::cut_before_knot;
+      return event.fault == Fault::cut_in_stitch || event.fault == Fault::cut_before_knot ||
+             event.fault == Fault::thread_broken;
     default:
       return false;
   }

@@ -10,7 +10,8 @@ namespace catgut {
 constexpr void reflect(auto& a, Like<BiteEnd> auto& e) { a.index(e.triangle, IndexOf::triangle), a(e.weight), a(e.point); }
 
 constexpr void reflect(auto& a, Like<Bite> auto& b) {
-  a(b.entry), a(b.exit), a(b.depth), a(b.has_exit), a(b.complete), a(b.canceled), a.index(b.nearest, IndexOf::tissue);
+  a(b.entry), a(b.exit), a(b.depth), a(b.has_exit), a(b.complete), a(b.canceled), a(b.entry_made), a(b.exit_made), a(b.torn),
+      a(b.torn_out), a.index(b.nearest, IndexOf::tissue);
 }
 
 constexpr void reflect(auto& a, Like<OpenBite> auto& o) {

@@ -32,6 +32,10 @@ struct Bite {
   bool has_exit = false;
   bool complete = false;
   bool canceled = false;
+  // Torn by its thread: entry and exit have moved away from where the needle made them.
+  BiteEnd entry_made, exit_made;  // meaningful where torn > 0
+  float torn = 0;                 // [m]
+  bool torn_out = false;
   uint32_t nearest = 0;  // the paper's p7: nearest particle at entry of the tip
 };
 

@@ -267,6 +267,69 @@ TEST(PhysicalScene, a_needle_leads_its_thread_through_both_walls) {
   for (const uint8_t broken : seen.active().thread_cut) EXPECT_FALSE(broken);
 }
 
+// Two hands pull both ends of a stitch until it tears out: the slit is reported, then the bite is gone, and its slit stays.
+TEST(PhysicalScene, a_bite_that_tears_out_is_reported_and_its_slit_stays) {
+  const SceneSpec scene = read_scene("interrupted");
+  const std::shared_ptr<const Model> model = build_model(scene);
+  const StatePtr state = initial_state(*model);
+  const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*model));
+  Jobs jobs(1);
+  Snapshot seen;
+  TickInput input, no_hands;
+  for (ToolInput& hand : no_hands.hand) hand.connected = 0;
+  publish(*model, *state, seen);
+  const auto tick = [&] {
+    input.tick = state->tick;
+    step(*model, *state, input, jobs);
+    publish(*model, *state, seen);
+  };
+  for (int t = 0; t < 60 * 20 && !surgeon->done(); ++t) input = t < 30 ? no_hands : surgeon->operate(seen, model->dt), tick();
+  ASSERT_EQ(seen.active().suture_point.size(), 4u);
+  ASSERT_EQ(seen.tool[1].held, Held::needle);
+  // The right hand takes the thread 12 mm from its outermost hole. Then both pull upward.
+  const std::vector<uint32_t>& order = seen.active().thread_order;
+  const size_t hole =
+      static_cast<size_t>(std::find(order.begin(), order.end(), seen.active().suture_point.front().anchored) - order.begin());
+  const size_t away = static_cast<size_t>(0.012f / scene.thread.spacing);
+  ASSERT_LT(hole, order.size());
+  ASSERT_GT(hole, away);
+  const uint32_t node = order[hole - away];
+  input.commands.clear();
+  std::vector<Event> fault;
+  const auto move = [&](Vec3 right, Vec3 left, float seconds, float jaw) {
+    const int ticks = static_cast<int>(seconds / model->dt);
+    const Vec3 from[2] = {input.hand[0].pose.p, input.hand[1].pose.p}, to[2] = {right, left};
+    input.hand[0].connected = 1, input.hand[0].jaw = jaw, input.hand[0].pose.q = kDown;
+    for (int i = 1; i <= ticks; ++i) {
+      for (const size_t k : {0u, 1u})
+        input.hand[k].pose.p = from[k] + (to[k] - from[k]) * smooth(static_cast<float>(i) / static_cast<float>(ticks));
+      tick();
+      for (const Event& e : seen.event)
+        if (e.kind == EventKind::technique_fault) fault.push_back(e);
+    }
+  };
+  const Vec3 stays = input.hand[1].pose.p, up{0, 0.003f, 0};
+  move(seen.particle[node] + Vec3{0, 0.03f, 0}, stays, 0.5f, 1);
+  move(seen.particle[node], stays, 0.5f, 1);
+  move(seen.particle[node], stays, 0.2f, 0);
+  ASSERT_EQ(seen.tool[0].held, Held::thread);
+  const auto torn_out = [](const Event& e) { return e.fault == Fault::bite_torn_out; };
+  for (int i = 0; i < 30 && std::none_of(fault.begin(), fault.end(), torn_out); ++i)
+    move(input.hand[0].pose.p + up, input.hand[1].pose.p + up, 0.2f, 0);
+  for (const Event& e : fault)
+    std::printf("%s of bite %u at %.2f N, tick %llu\n", fault_name(e.fault), e.which, static_cast<double>(e.value),
+                static_cast<unsigned long long>(e.tick));
+  ASSERT_FALSE(fault.empty());
+  EXPECT_EQ(fault.front().fault, Fault::bite_torn);
+  EXPECT_EQ(fault.back().fault, Fault::bite_torn_out);
+  const BiteView& bite = seen.active().bite[fault.back().which];
+  EXPECT_TRUE(bite.torn_out);
+  EXPECT_GT(bite.torn, 0.002f);
+  EXPECT_GT(distance(bite.entry, bite.entry_made), 0.001f);
+  for (const SuturePointView& p : seen.active().suture_point) EXPECT_NE(p.bite, fault.back().which);
+  EXPECT_TRUE(state_is_valid(*model, *state));
+}
+
 // [m] between the outer edges of the two bowel ends along x, at the top of their rims (z = 0).
 float gap_at_top(const PictureModel& picture, const Snapshot& seen) {
   float x[2];

@@ -406,28 +406,56 @@ MarkView make_mark_view(filament::Engine& engine, filament::Scene& scene, filame
   return view;
 }
 
+namespace {
+
+// What suture points show, then the slits of bites that are torn out. At most kMostMarks; the first ones are kept.
+void find_punctures(const Snapshot& snapshot, std::vector<Puncture>& out) {
+  out.clear();
+  const auto add = [&](const Puncture& p) {
+    if (out.size() < kMostMarks && is_finite(p.position) && is_finite(p.made)) out.push_back(p);
+  };
+  for (const SutureView& suture : snapshot.suture)
+    for (const SuturePointView& p : suture.suture_point) {
+      const BiteView* bite = p.bite < suture.bite.size() ? &suture.bite[p.bite] : nullptr;
+      const bool torn = bite && bite->torn > 0;
+      add({p.position,
+           !torn    ? p.position
+           : p.exit ? bite->exit_made
+                    : bite->entry_made,
+           std::max(p.tension_needle, p.tension_free)});
+    }
+  for (const SutureView& suture : snapshot.suture)
+    for (const BiteView& bite : suture.bite)
+      if (bite.torn_out) add({bite.entry, bite.entry_made, 0}), add({bite.exit, bite.exit_made, 0});
+}
+
+}  // namespace
+
 void move_marks(filament::Engine& engine, MarkView& view, const Snapshot& snapshot, std::span<const TissueView> tissue,
                 const Motions& motion) {
-  const uint32_t count = uint32_t(std::min<size_t>(suture_point_count(snapshot), kMostMarks));
+  find_punctures(snapshot, view.puncture);
+  const uint32_t count = uint32_t(view.puncture.size());
   set_drawn(engine, view.gpu, count * kMarkSides * 3);
   if (count == 0) return;
   const Surface surface = new_surface(count * kMarkCorners);
   for (uint32_t m = 0; m < count; ++m) {
-    const SuturePointView& point = suture_point_at(snapshot, m);
+    const Puncture& point = view.puncture[m];
     const Nearest at = tissue_at(view.on_tissue, m, point.position, 0.003f, tissue);
     const Vec3 out = normal_at(at, tissue, motion);
     Vec3 center = point.position;
     // On the drawn surface, which may differ slightly from the particles'.
     if (at.body >= 0) center -= out * dot(center - tissue[size_t(at.body)].position[at.vertex], out);
     center += out * 0.00012f;
-    const Vec3 x = any_perpendicular(out), y = cross(out, x);
+    // A slit: the far half of the disc lies where the needle went in.
+    const Vec3 slit = point.made - point.position, along = slit - out * dot(slit, out);
+    const Vec3 x = normalized(along, any_perpendicular(out)), y = cross(out, x);
     // Tension pulls the puncture open.
-    const float pulled = std::max(point.tension_needle, point.tension_free),
-                inner = 0.00017f + 0.00010f * std::min(2.0f, pulled);
+    const float inner = 0.00017f + 0.00010f * std::min(2.0f, point.pulled);
     for (uint32_t i = 0; i < kMarkCorners; ++i) {
       const float a = 2 * kPi * float((i + kMarkSides - 1) % kMarkSides) / kMarkSides;
       const float r = i == 0 ? 0 : i <= kMarkSides ? inner : 0.00062f;
-      surface.position[m * kMarkCorners + i] = center + r * (x * std::cos(a) + y * std::sin(a));
+      const float far = i == 0 ? 0.5f : std::cos(a) > 0 ? 1.0f : 0.0f;
+      surface.position[m * kMarkCorners + i] = center + far * along + r * (x * std::cos(a) + y * std::sin(a));
       surface.frame[m * kMarkCorners + i] = pack_frame(Quat{});
     }
   }

@@ -38,8 +38,15 @@ void set_cloth(ThreadView& view, std::vector<Vec3> position, std::vector<Vec3> n
 void move_thread(filament::Engine& engine, ThreadView& view, const PictureModel& model, const Snapshot& snapshot,
                  std::span<const TissueView> tissue, const Motions& motion, const Camera& camera, float pixel);
 
-// The punctures: where the thread enters and leaves the wall.
+// Where the thread enters or leaves the wall, or did before its bite was torn out.
+struct Puncture {
+  Vec3 position, made;  // [m] a slit leads from `made` to `position`; not torn: the same place
+  float pulled = 0;     // [N] tension of the thread in it
+};
+
+// The punctures and slits.
 struct MarkView {
+  std::vector<Puncture> puncture;  // of this frame
   std::vector<Nearest> on_tissue;  // per suture point
   GpuMesh gpu;
 };
