@@ -19,7 +19,7 @@ namespace catgut::physical {
 
 constexpr size_t kMaxBodies = 24;
 constexpr size_t kMaxRows = 192;            // contacts, grip points and channel points of one step
-constexpr size_t kMaxThreadCapsules = 128;  // of all bodies together
+constexpr size_t kMaxThreadCapsules = 192;  // of all bodies together
 
 // Geometry: spheres, and capsules between two of them.
 struct BodySphere {

@@ -183,6 +183,9 @@ StrandModel make_strand(const SceneSpec& scene, const ThreadSpec& spec, uint32_t
   return t;
 }
 
+constexpr size_t kInRow = 4;       // sutures on the drape
+constexpr float kNextRow = 0.12f;  // [m] a thread leads kRow away from its needle
+
 // [m] along x that a suture takes on the drape, with room for a hand's jaws beside the needle.
 float room_for(const SutureSpec& suture) {
   const float length = static_cast<float>(suture.thread.particles) * suture.thread.spacing;
@@ -190,13 +193,15 @@ float room_for(const SutureSpec& suture) {
 }
 
 // Needles and threads lie on the drape side by side, to the right of the organ. Each needle's circle lies flat and its thread
-// leads away from its swage. Two bowel ends lie along x, with the needles in front of them, from right to left.
+// leads away from its swage; four in a row, each row in front of the last. Two bowel ends lie along x, with all needles in
+// front of them, from right to left.
 void lay_out_sutures(Model& m, const std::vector<SutureSpec>& sutures, Vec3 rim, bool two, float tube) {
   const Pose flat{{}, axis_angle({1, 0, 0}, -0.5f * kPi)};  // body z up: the circle lies in the plane of the drape
   Vec3 beside = two ? Vec3{0.02f, 0, tube + 0.03f} : Vec3{tube + 0.03f, 0, 0.01f};
   for (size_t k = 0; k < sutures.size(); ++k) {
     const NeedleSpec& needle = sutures[k].needle;
     if (k > 0) beside.x += two ? -room_for(sutures[k]) : room_for(sutures[k - 1]);
+    if (!two && k > 0 && k % kInRow == 0) beside.x = tube + 0.03f, beside.z += kNextRow;
     const float wire = m.solver.ground + needle.wire_radius + 0.0002f;
     const Pose start{Vec3{rim.x + beside.x, wire, rim.z + beside.z}, flat.q};
     m.needle_start.push_back(start);

@@ -14,6 +14,8 @@ constexpr float kOpenWeld = -1;  // Weld::compliance of an instrument without a 
 // [m] from the hand to the grasp point of a parked instrument that it takes. The handles are a shaft's length away from
 // the jaws. Chosen.
 constexpr float kReach = 0.15f;
+// [m] between grasp points: nearer to a parked instrument, a hand has no room for another one. Chosen.
+constexpr float kRoom = 0.02f;
 
 void place_at(RigidBody& body, const Pose& pose) {
   body = {};
@@ -85,6 +87,12 @@ bool carry_out(const Model& model, State& state, const TickInput& input, const C
   const auto is_at = [&](InstrumentPlace place) {
     return i < state.suture.instrument.size() && state.suture.instrument[i].place == place;
   };
+  const auto has_room = [&] {
+    for (size_t p = 0; p < state.suture.instrument.size(); ++p)
+      if (state.suture.instrument[p].place == InstrumentPlace::parked && distance(state.solver.body[p].x, h.pose.p) < kRoom)
+        return false;
+    return true;
+  };
   const auto take = [&](const Pose& pose) {
     put_in_hand(state, i, hand, pose, input.hand[hand].jaw);
     state.solver.body_collides[i] = 1;
@@ -99,11 +107,11 @@ bool carry_out(const Model& model, State& state, const TickInput& input, const C
         const Pose pose = state.solver.body[i].pose();
         return distance(pose.p, h.pose.p) <= kReach && take(pose);
       }
-      if (c.kind == CommandKind::unpark || !is_at(InstrumentPlace::tray)) return false;
+      if (c.kind == CommandKind::unpark || !is_at(InstrumentPlace::tray) || !has_room()) return false;
       place_at(state.solver.body[i], h.pose);
       return take(h.pose);
     case CommandKind::swap:
-      if (!is_at(InstrumentPlace::tray)) return false;
+      if (!is_at(InstrumentPlace::tray) || !has_room()) return false;
       if (h.instrument >= 0) lay_down(model, state, hand);
       place_at(state.solver.body[i], h.pose);
       return take(h.pose);

@@ -96,7 +96,7 @@ inline Vec3 new_drift(const Settings& settings, const AnyActive& c, Vec3 drift, 
 
 constexpr uint8_t kOnOther = 1, kOnThread = 2;  // bits of Scratch::touched: with load on a tool, plane, wall; on thread
 
-constexpr size_t kMaxTools = 128;  // of one step
+constexpr size_t kMaxTools = 192;  // of one step
 
 struct Scratch {
   size_t max_nodes = 0, max_crossings = 0;

@@ -26,13 +26,34 @@ SceneSpec small_scene() {
   return s;
 }
 
-// Nine needles have more parts than thread can be in contact with: refused, and not left out in silence.
+// Sixteen needles have more parts than thread can be in contact with: refused, and not left out in silence.
 TEST(Operation, sutures_that_thread_could_not_touch_are_refused) {
   SceneSpec s = small_scene();
-  s.suture.resize(8, s.suture.front());
+  s.suture.resize(15, s.suture.front());
   EXPECT_NO_THROW(build_model(s));
   s.suture.push_back(s.suture.front());
   EXPECT_THROW(build_model(s), InputError);
+}
+
+// Twelve sutures wait on the drape: no needle in or beside another one's thread, none under the specimen, all within reach.
+TEST(Operation, twelve_sutures_lie_apart_on_the_drape) {
+  SceneSpec s = small_scene();
+  s.suture.resize(12, s.suture.front());
+  s.thread.particles = 200;
+  const Field f(s);
+  for (size_t k = 0; k < 12; ++k) {
+    const SutureView& one = f.seen.suture[k];
+    EXPECT_LT(distance(one.needle.pose.p, s.body[0].position), 0.4f) << k;
+    float nearest = 1, inward = 1;
+    for (const uint32_t slot : one.thread_order) {
+      const Vec3 p = f.seen.particle[slot];
+      inward = std::min(inward, std::hypot(p.x, p.z) - s.body[0].radius);
+      for (size_t other = 0; other < 12; ++other)
+        if (other != k) nearest = std::min(nearest, distance(p, f.seen.suture[other].needle.pose.p) - s.needle.radius);
+    }
+    EXPECT_GT(nearest, 0.005f) << k;
+    EXPECT_GT(inward, 0.01f) << k;
+  }
 }
 
 TEST(Operation, a_clamp_from_the_tray_is_parked_on_the_rim_and_holds_it) {
@@ -58,6 +79,20 @@ TEST(Operation, a_clamp_from_the_tray_is_parked_on_the_rim_and_holds_it) {
   const Vec3 jaws = f.seen.instrument[clamp].pose.p;
   for (int i = 0; i < 30; ++i) f.tick();
   EXPECT_LT(distance(jaws, f.seen.instrument[clamp].pose.p), 0.5e-3f);
+  // A hand that has just parked it has no room there for what lies on the tray; beside it, it has.
+  uint16_t pen = 0;
+  while (f.model->suture.instrument[pen].name != "cautery") ++pen;
+  f.input.hand[0].connected = 1, f.input.hand[0].pose = f.seen.instrument[clamp].pose;
+  f.tick();
+  f.input.commands.push({CommandKind::take, 0, pen});
+  f.tick();
+  EXPECT_EQ(f.of(EventKind::instrument_refused).size(), 1u);
+  EXPECT_EQ(f.seen.tool[0].instrument, -1);
+  f.input.hand[0].pose.p += Vec3{0, 0.03f, 0};
+  f.tick();
+  f.input.commands.push({CommandKind::take, 0, pen});
+  f.tick();
+  EXPECT_EQ(f.seen.tool[0].instrument, static_cast<int>(pen));
 }
 
 // The hand slips off the line for a moment: a bridge of wall is left. Another body is in the field, as in the whole operation.
