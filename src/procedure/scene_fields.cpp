@@ -333,6 +333,9 @@ const std::vector<ResultName>& result_names() {
         {"stitch_gap", "m", "the same where a stitch crosses from one wall to the other; 0 without such a stitch"},
         {"stitch_tension", "N",
          "tension of the thread there at the end, the smallest of all stitches; a knot that holds keeps one"},
+        {"edge_eversion", "rad",
+         "largest angle by which the cut edge that stays is turned outward against rest; mucosa that lies outside does not "
+         "heal"},
         {"specimen_way", "m", "displacement of the piece with the first body's rim; 0 while it is one with the rest"},
         {"drawn_mass", "kg", "what the drawn tissue encloses at rest, once a pen has touched it; 0 before"},
         {"blood_loss", "m3", "blood lost from vessels that a cut has opened"},

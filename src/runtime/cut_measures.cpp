@@ -53,6 +53,23 @@ void measure_ring(const std::vector<uint32_t>& rim, const std::vector<Vec3>& edg
   }
 }
 
+// [rad] by which the wall at a triangle of the cut edge is turned outward, toward its outer face, against rest. axis: from the
+// edge to what was cut off.
+double turned_outward(const VisibleMesh& mesh, const std::array<uint32_t, 3>& t, Vec3 axis, const std::vector<Vec3>& now) {
+  Vec3 rest{}, turned{};
+  for (size_t k = 0; k < 3; ++k) {
+    uint32_t a = t[k], b = t[(k + 1) % 3];
+    if ((mesh.through[a] < 0.5f) == (mesh.through[b] < 0.5f)) continue;
+    if (mesh.through[a] > 0.5f) std::swap(a, b);  // b: on the inner face
+    const Vec3 across = mesh.position[a] - mesh.position[b];
+    if (length2(rest) > 0 && length2(across) > length2(rest)) continue;  // the diagonal
+    rest = across, turned = now[a] - now[b];
+  }
+  const Vec3 out = normalized(rest - axis * dot(rest, axis));
+  const auto angle = [&](Vec3 d) { return std::atan2(-dot(d, axis), dot(d, out)); };
+  return static_cast<double>(angle(turned) - angle(rest));
+}
+
 }  // namespace
 
 CutMeasures measure_cut(const SceneSpec& scene, const Snapshot& seen) {
@@ -93,13 +110,17 @@ CutMeasures measure_cut(const SceneSpec& scene, const Snapshot& seen) {
     if (here < 2) continue;
     Vec3 way{};
     float count = 0;
-    std::vector<Vec3> edge;  // of what stays
+    std::vector<Vec3> edge, now(root.size());  // edge: of what stays
+    const auto stays = [&](uint32_t v) {
+      return find(v) != find(top) && mesh.layer[v] == TissueLayer::cut_edge && depth(v) < first.length - kOnRim;
+    };
     for (uint32_t v = 0; v < root.size(); ++v) {
-      Vec3 now{};
-      for (size_t k = 0; k < 4; ++k) now += seen.particle[mesh.skin_particle[v][k]] * mesh.skin_weight[v][k];
-      if (find(v) == find(top)) way += now - mesh.position[v], ++count;
-      else if (mesh.layer[v] == TissueLayer::cut_edge && depth(v) < first.length - kOnRim) edge.push_back(now);
+      for (size_t k = 0; k < 4; ++k) now[v] += seen.particle[mesh.skin_particle[v][k]] * mesh.skin_weight[v][k];
+      if (find(v) == find(top)) way += now[v] - mesh.position[v], ++count;
+      else if (stays(v)) edge.push_back(now[v]);
     }
+    for (const auto& t : mesh.triangle)
+      if (stays(t[0]) && stays(t[1]) && stays(t[2])) out.eversion = std::max(out.eversion, turned_outward(mesh, t, axis, now));
     out.way = static_cast<double>(length(way / std::max(count, 1.0f)));
     if (seen.topology.picture->rim.size() > 1) measure_ring(seen.topology.picture->rim[1], edge, seen, out);
   }

@@ -13,6 +13,7 @@ struct CutMeasures {
   double deviation = 0;  // [m] largest distance of a cut edge from the line, at rest
   double way = 0;        // [m] displacement of the piece with the first body's rim
   double mass = 0;       // [kg] what the surface encloses at rest, all pieces
+  double eversion = 0;   // [rad] by which the cut edge that stays is turned outward against rest, at most; 0 with one piece
   // An anastomosis: from the rim of the second body to the cut edge of the first, without the piece that has its rim.
   double ring_gap = 0;        // [m] the largest, round the rim; 0 with one body, or one piece
   double stitch_gap = 0;      // [m] the largest where a stitch crosses from one wall to the other

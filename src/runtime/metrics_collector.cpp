@@ -223,6 +223,7 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   v["ring_gap"] = cut.ring_gap;
   v["stitch_gap"] = cut.stitch_gap;
   v["stitch_tension"] = cut.stitch_tension;
+  v["edge_eversion"] = cut.eversion;
   v["specimen_way"] = cut.way;
   v["drawn_mass"] = cut.mass;
   double &lost = v["blood_loss"] = 0, &bleeding = v["bleeding"] = 0;

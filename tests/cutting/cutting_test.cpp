@@ -195,6 +195,28 @@ TEST(Cutting, the_scripted_surgeon_excises_the_end_and_a_replay_repeats_it) {
   EXPECT_TRUE(run.faults.empty());
 }
 
+// All round; then the tissue near the edge is turned over, as a whole, about a circle in the wall.
+TEST(Cutting, an_edge_that_is_turned_outward_is_measured) {
+  Field f;
+  f.cut(0, 2 * kPi + 0.1f, 0.006f);
+  ASSERT_EQ(f.of(EventKind::piece_freed).size(), 1u);
+  EXPECT_LT(measure_cut(f.scene, f.seen).eversion, 0.3) << "lips open by themselves";
+  const BodySpec& body = f.scene.body[0];
+  const float hinge = body.radius - 0.5f * body.wall, below = body.position.y - kLine - 0.004f;
+  Snapshot turned = f.seen;
+  for (const float angle : {1.0f, -0.5f}) {
+    for (size_t i = 0; i < turned.particle.size(); ++i) {
+      const Vec3 p = f.seen.particle[i], out = normalized(Vec3{p.x, 0, p.z}, {1, 0, 0});
+      const float r = std::hypot(p.x, p.z) - hinge, y = p.y - below;
+      if (y < 0) continue;
+      const float c = portable::cos(angle), s = portable::sin(angle);
+      turned.particle[i] = out * (hinge + r * c + y * s) + Vec3{0, below + y * c - r * s, 0};
+    }
+    const double before = measure_cut(f.scene, f.seen).eversion, after = measure_cut(f.scene, turned).eversion;
+    EXPECT_NEAR(after, std::max(0.0, before + static_cast<double>(angle)), 0.02) << angle;
+  }
+}
+
 TEST(Cutting, an_unfinished_circle_that_is_pulled_stays_one_piece) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "CATGUT_LONG=1 runs it";
   Field f(800);
