@@ -24,6 +24,7 @@ constexpr float kApproximate = 0.003f;    // [m] of each clamp: the edges touch 
 constexpr float kGivesWay = 0.002f, kScoop = 0.003f;  // [m]
 constexpr float kGather = 2.0f;                       // [N] of each end of a physical purse-string
 constexpr int kThrows = 2;
+constexpr int kRingThrows = 3;  // where no clamp draws the edges apart again: only a taut loop keeps two throws from opening
 // [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
 // square to it. Less deep, it slid along the serosa and came out through the cut edge.
 constexpr float kYields = 0.002f;
@@ -364,7 +365,7 @@ Plan altemeier_plan(const PictureModel& picture, const SurgeonSkill& skill) {
     add(plan, TaskKind::bite, which);
     add(plan, TaskKind::pull_tail);
     add(plan, TaskKind::regrip);
-    for (int i = 0; i < kThrows; ++i) add(plan, TaskKind::throw_, 1, 1);
+    for (int i = 0; i < kRingThrows; ++i) add(plan, TaskKind::throw_, 1, 1);
     add(plan, TaskKind::cut_tail);
     add(plan, TaskKind::cut_long);
     add(plan, TaskKind::leave);
