@@ -66,4 +66,12 @@ size_t last_point_node(const Snapshot& seen) {
   return node;
 }
 
+bool is_cut_off(const SutureView& suture) {
+  if (suture.suture_point.empty()) return false;
+  const auto hole = std::find(suture.thread_order.begin(), suture.thread_order.end(), suture.suture_point.back().anchored);
+  const auto& cut = suture.thread_cut;
+  const auto from = std::min(hole - suture.thread_order.begin(), static_cast<std::ptrdiff_t>(cut.size()));
+  return std::find(cut.begin() + from, cut.end(), 1) != cut.end();
+}
+
 }  // namespace catgut

@@ -9,7 +9,7 @@
 
 namespace catgut {
 
-// All but the next two refer to the active suture. Positions along its thread_order.
+// All but three refer to the active suture. Positions along its thread_order.
 size_t node_of(const Snapshot& seen, uint32_t slot);
 Vec3 node_at(const Snapshot& seen, size_t node);
 // [m] path length along the thread between two nodes (in any order).
@@ -20,6 +20,8 @@ size_t node_along(const Snapshot& seen, size_t from, float far, int way);
 // Suture points of all sutures, one suture after the other.
 size_t suture_point_count(const Snapshot& seen);
 const SuturePointView& suture_point_at(const Snapshot& seen, size_t i);
+// The thread is cut between its last hole and the needle: the stitch is finished.
+bool is_cut_off(const SutureView& suture);
 // [N] in the thread's last pair, at the needle: the load of a hand that holds the needle.
 float needle_tension(const Snapshot& seen);
 uint32_t locked_throws(const Snapshot& seen);  // of the active suture; not those that are not locked yet

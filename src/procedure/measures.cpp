@@ -56,6 +56,8 @@ std::vector<Measure> table() {
       {"needle_in_tissue", "0 or 1", "the needle is in tissue", [](Seen s, Run) { return flag(s.active().needle.in_tissue); }},
       {"needle_detached", "0 or 1", "the thread was cut off the needle",
        [](Seen s, Run) { return flag(!s.active().needle_on_thread); }},
+      {"stitches_cut_off", "", "stitches whose thread is cut between its last hole and the needle",
+       [](Seen s, Run) { return static_cast<double>(std::count_if(s.suture.begin(), s.suture.end(), is_cut_off)); }},
       {"holder_holds_thread", "0 or 1", "the needle holder holds thread",
        [](Seen s, Run) { return flag(s.tool[0].held == Held::thread); }},
       {"forceps_holds_thread", "0 or 1", "the forceps holds thread",

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "exchange/strand.h"
+
 namespace catgut {
 namespace {
 
@@ -186,8 +188,7 @@ void Operating::look(const Snapshot& seen) {
   for (size_t k = 0; k < hand_.size(); ++k) hand_[k].pose = seen.tool[k].hand, hand_[k].jaw = seen.tool[k].jaw;
   const auto holds = [&](uint16_t i) { return seen.instrument[i].held == Held::tissue; };
   clamped_ = static_cast<size_t>(std::count_if(clamp_.begin(), clamp_.end(), holds));
-  const auto cut_off = [](const SutureView& u) { return !u.needle_on_thread; };
-  stitched_ = static_cast<size_t>(std::count_if(seen.suture.begin(), seen.suture.end(), cut_off));
+  stitched_ = static_cast<size_t>(std::count_if(seen.suture.begin(), seen.suture.end(), is_cut_off));
   if (stitched_ == seen.suture.size()) go(finished);
   else if (seen.topology.pieces > picture_.body.size()) go(take_holder);
   else if (clamped_ == clamp_.size()) go(seen.tool[kAssistant].instrument < 0 ? to_assistant : take_pen);
