@@ -89,7 +89,8 @@ void add_bench(CLI::App& app, int& exit_code) {
   command
       ->add_option(
           "what", o->what,
-          "paper: tables 1 to 4 beside the paper's; stages: time per stage; limits: marginal cost per suture; scale: 1, 4 "
+          "paper: tables 1 to 4 beside the paper's, and of a procedure by its stages; stages: time per stage; limits: marginal "
+          "cost per suture; scale: 1, 4 "
           "and 16 times the particles, one thread and several; frame: CPU time of a stereo frame without rasterization; "
           "pictures: rate of pictures by size and quality; haptics: comparison of rendering methods")
       ->required()

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <optional>
 #include <stdexcept>
 
 #include "commands/commands.h"
 #include "core/check.h"
+#include "procedure/procedure_file.h"
 #include "procedure/scene_file.h"
 #include "runtime/paper_tables.h"
 #include "technique/technique.h"
@@ -28,11 +30,16 @@ std::function<PictureCost(const PictureModel&)> picture_cost() {
 
 int bench_paper(const PaperOptions& o) {
   std::vector<SceneSpec> scenes;
+  std::vector<std::optional<Procedure>> procedure;  // of a scene without a technique
   for (const std::string& name : o.scene) {
     scenes.push_back(read_scene(name));
+    procedure.emplace_back();
     for (const std::string& setting : o.set) set_value(scenes.back(), setting);
-    if (scenes.back().technique.name == kNoTechnique)
-      throw InputError(name, "it has no technique for the scripted surgeon", "name purse_string, connell, stay or lembert");
+    if (scenes.back().technique.name != kNoTechnique) continue;
+    if (scenes.back().surgeon.plan.empty())
+      throw InputError(name, "it has no technique for the scripted surgeon",
+                       "name purse_string, connell, stay, lembert or altemeier");
+    procedure.back() = read_procedure(name);
   }
   if (!o.out.empty())
     for (const char* name : {"/tables.md", "/tables.csv"}) prepare_output(o.out + name);
@@ -48,9 +55,10 @@ int bench_paper(const PaperOptions& o) {
   std::fputs(about.c_str(), stdout);
   std::string markdown = about, csv = paper_csv_header();
   bool all_sewn = true, interrupted = false;
-  for (const SceneSpec& scene : scenes) {
+  for (size_t i = 0; i < scenes.size(); ++i) {
     hooks.on_progress = progress_line();
-    const PaperTable table = measure_paper(scene, o.executions, o.threads, picture, hooks);
+    const PaperTable table =
+        measure_paper(scenes[i], o.executions, o.threads, picture, hooks, procedure[i] ? &*procedure[i] : nullptr);
     end_progress_line();
     const std::string text = paper_markdown(table);
     std::fputs(text.c_str(), stdout);

@@ -103,9 +103,10 @@ std::string PaperPhase::operator()(std::span<const Event> events, bool settled, 
 }
 
 PaperTable measure_paper(SceneSpec scene, int executions, int threads,
-                         const std::function<PictureCost(const PictureModel&)>& picture_ms, const SessionHooks& hooks) {
+                         const std::function<PictureCost(const PictureModel&)>& picture_ms, const SessionHooks& hooks,
+                         const Procedure* procedure) {
   PaperTable table;
-  table.technique = scene.technique.name;
+  table.technique = procedure ? procedure->scene : scene.technique.name;
   table.preset = scene.solver.preset;
   table.substeps = scene.solver.substeps;
   table.tick_rate = static_cast<double>(scene.solver.tick_rate);
@@ -114,6 +115,7 @@ PaperTable measure_paper(SceneSpec scene, int executions, int threads,
   for (int i = 0; i < executions; ++i) {
     scene.seed = first_seed + static_cast<uint64_t>(i);
     PaperPhase phase_of(paper_figure(table.technique, "Suture #1") != nullptr);
+    ProcedureRun stages;
     std::vector<Ticks> ticks;
     PictureCost picture;
     bool done = false;
@@ -121,8 +123,16 @@ PaperTable measure_paper(SceneSpec scene, int executions, int threads,
     SessionHooks own = hooks;
     if (picture_ms) own.on_start = [&](const PictureModel& model) { picture = picture_ms(model); };
     own.on_tick = [&](const Snapshot&, const std::string& doing) { done = doing == "done"; };
+    const auto phase_now = [&](const Snapshot& seen) -> std::string {
+      const bool settled = seen.time_s > static_cast<double>(scene.settle);
+      if (!procedure) return phase_of(seen.event, settled, done);
+      if (!stages.begun) begin_run(stages, *procedure, seen, 1 / table.tick_rate);
+      else update_run(stages, *procedure, seen);
+      if (!settled) return "Start";
+      return done || finished(stages, *procedure) ? "After completion" : procedure->stage[stages.stage].name;
+    };
     own.on_cost = [&](const Snapshot& seen, const StageTimes& times, double tick_ms) {
-      Ticks& t = of_phase(ticks, phase_of(seen.event, seen.time_s > static_cast<double>(scene.settle), done));
+      Ticks& t = of_phase(ticks, phase_now(seen));
       t.solver_ms.push_back(static_cast<float>(times.solver_ms()));
       t.tick_ms.push_back(static_cast<float>(tick_ms));
       if (picture && n++ % kPictureEvery == 0) t.picture_ms.push_back(static_cast<float>(picture(seen)));

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "procedure/manager.h"
 #include "runtime/session.h"
 
 namespace catgut {
@@ -44,11 +45,13 @@ struct PaperTable {
   std::vector<PhaseCost> phase;  // in order of appearance
 };
 
+// procedure: its stages by name are the phases after "Start", instead of those of a technique; null: a technique.
 // picture_ms: called at the start of an execution, returns a function that renders a snapshot and returns the time [ms], called
 // every fourth tick. If empty, frames are not measured. Throws InputError (a scene without a script for its technique).
 using PictureCost = std::function<double(const Snapshot&)>;
 PaperTable measure_paper(SceneSpec scene, int executions, int threads,
-                         const std::function<PictureCost(const PictureModel&)>& picture_ms, const SessionHooks& hooks = {});
+                         const std::function<PictureCost(const PictureModel&)>& picture_ms, const SessionHooks& hooks = {},
+                         const Procedure* procedure = nullptr);
 
 // As Markdown: a row for each phase; mean and standard deviation over the executions, the paper's figure beside them.
 std::string paper_markdown(const PaperTable& table);

@@ -2,6 +2,7 @@
 // tests/runtime: the paper's tables: the phase of a tick, and the positions of the figures.
 #include <gtest/gtest.h>
 
+#include "procedure/procedure_file.h"
 #include "procedure/scene_file.h"
 #include "runtime/paper_tables.h"
 
@@ -75,6 +76,21 @@ TEST(PaperTables, executions_are_measured_phase_by_phase) {
       EXPECT_GT(p.frame_ms[i], 100 + p.solver_ms[i] * 0.5);
     }
   }
+}
+
+// A procedure's stages are the phases.
+TEST(PaperTables, a_procedure_is_measured_stage_by_stage) {
+  SceneSpec scene = read_scene("purse_string");
+  set_value(scene, "duration=4");
+  const Procedure procedure = read_procedure("purse_string");
+  ASSERT_EQ(procedure.scene, "purse_string");
+  const PaperTable table = measure_paper(scene, 1, 1, {}, {}, &procedure);
+  EXPECT_EQ(table.technique, "purse_string");
+  ASSERT_GE(table.phase.size(), 3u);
+  EXPECT_EQ(table.phase[0].phase, "Start");
+  EXPECT_EQ(table.phase[1].phase, procedure.stage[0].name);
+  EXPECT_EQ(table.phase[2].phase, procedure.stage[1].name);
+  for (const PhaseCost& p : table.phase) EXPECT_EQ(p.solver_ms.size(), 1u);
 }
 
 }  // namespace
