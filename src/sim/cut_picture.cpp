@@ -521,10 +521,10 @@ void renew_cut_picture(const Model& model, State& state, CutScratch& k) {
   // tick, and every sixth tick it may reach another face.
   constexpr uint64_t kEvery = 6;  // ticks
   const bool first = !c.picture;
+  // A snip along an edge of the mesh cuts without dividing anything: the topology's version does not show it.
   const bool cuts = first || std::any_of(c.mode.begin(), c.mode.end(), [](PenMode m) { return m != PenMode::off; }) ||
-                    state.physical.world.wall.topology.version != c.picture_version;
+                    shape_of(model.physical->world.wall, state) != c.picture_of;
   if (!cuts && c.excision.bleed.empty()) return;
-  c.picture_version = state.physical.world.wall.topology.version;
   if (!c.source) c.source = make_source(model);
   const size_t faces = c.excision.passed.size();
   c.touched.reserve(faces), k.was.reserve(faces);

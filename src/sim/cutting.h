@@ -64,7 +64,6 @@ struct Cutting {
   std::vector<uint32_t> touched;  // faces that show a pen's traces, in order
   std::vector<Scar> scar;         // as Snapshot::scar
   uint64_t picture_of = 0;        // what `picture` shows
-  uint32_t picture_version = 0;   // of the wall's topology then
   DividedPicture picture;
   std::shared_ptr<const CutPictureSource> source;  // null until a pen has touched the wall
 };
@@ -76,7 +75,7 @@ constexpr void reflect(auto& a, Like<Cutting> auto& c) {
   } else {
     a(c.mode), a(c.shut), a(c.excision), a(c.pieces), a(c.stroke), a(c.opened), a(c.cut_at_suture), a(c.pulled);
   }
-  a.cache(c.touched), a.cache(c.scar), a.cache(c.picture_of), a.cache(c.picture_version), a.cache(c.picture), a.cache(c.source);
+  a.cache(c.touched), a.cache(c.scar), a.cache(c.picture_of), a.cache(c.picture), a.cache(c.source);
 }
 
 // --- building, saving --------------------------------------------------------------------------------------------------

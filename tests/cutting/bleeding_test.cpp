@@ -4,6 +4,7 @@
 // equation, and the force at which a clamp is torn out against its grip.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -123,6 +124,35 @@ TEST(Bleeding, scissors_divide_the_wall_between_their_blades_and_it_bleeds) {
   uint32_t stained = 0;
   for (const Scar& scar : f.seen.scar) stained += scar.blood > 100;
   EXPECT_GT(stained, 0u) << "the blood is drawn";
+}
+
+// Shorter than the edge of the mesh that it follows: no face is divided, and yet the cut is drawn.
+TEST(Bleeding, a_snip_along_an_edge_that_divides_nothing_is_drawn) {
+  Field f(with("scissors"));
+  const auto edges = [&] {
+    const auto& layer = f.seen.topology.picture->body[0].layer;
+    return std::count(layer.begin(), layer.end(), TissueLayer::cut_edge);
+  };
+  const auto divided = [&] {
+    const wall::Topology& t = f.state->physical.world.wall.topology;
+    return std::pair{t.fragment.size(), t.source.size()};
+  };
+  snip_at(f, 0.3f, 0.008f);  // from here on there is a picture of cuts
+  const PictureModel picture = picture_model(*f.model);
+  size_t along = 0;
+  for (const uint32_t i : picture.rim[0]) {
+    const Vec3 p = picture.particle_rest[i];
+    if (p.x > 0) continue;
+    const auto before = divided();
+    const auto drawn = edges();
+    const size_t snips = f.of(EventKind::tissue_snipped).size();
+    snip_at(f, portable::atan2(p.z, p.x), 0.002f);
+    if (divided() != before || f.of(EventKind::tissue_snipped).size() == snips) continue;
+    ++along;
+    EXPECT_GT(edges(), drawn);
+    EXPECT_LT(opening_of(*f.seen.topology.picture), 1e-6);
+  }
+  EXPECT_GT(along, 0u);
 }
 
 TEST(Bleeding, coagulation_closes_a_vessel_and_heats_the_tissue_round_it) {
