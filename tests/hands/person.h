@@ -5,6 +5,7 @@
 #pragma once
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -68,7 +69,7 @@ class Person {
   bool grasp_rim(size_t k, float angle);         // with the instrument in the hand, at this angle round the opening
   bool park(size_t k);                           // what the hand has closed on tissue
   bool snip(size_t k, float angle, float down);  // one cut from the rim, `down` [m] long
-  // The pen goes round on the line, stroke by stroke, until a piece is free.
+  // The pen goes round on the line, stroke by stroke, until the user sees that the rim is free.
   bool cut_round(size_t k, float edge);
   bool score(size_t k, float edge, float from, float to);  // one stroke
   bool carry(size_t k, Vec3 by);                           // what the hand holds
@@ -91,6 +92,7 @@ class Person {
   bool face(float angle);  // the camera
   bool pen(size_t k, PenMode mode);
   Vec3 rim_at(float angle) const;
+  std::optional<float> bridge(float edge) const;  // [rad]; none: the end is free
   Vec3 line_at(float angle, float edge) const;
 
   WorkQueue& desk_;
