@@ -297,7 +297,13 @@ bool Scripted::leave(const Snapshot& seen) {
       const size_t last = seen.active().thread_order.size() - 1;
       const float reach = kSlackStrand * length_between(seen, last_point_node(seen), last);
       Vec3 down = from + normalized(kLaidDown) * reach;
-      down.y = std::max(down.y, picture_.drape + kOverDrape);
+      // As far as the strand lets it; the needle of a cut strand is laid on the drape, for dropped onto its thread it would
+      // jerk it.
+      const auto& cut = seen.active().thread_cut;
+      const bool off = std::any_of(cut.begin() + static_cast<std::ptrdiff_t>(last_point_node(seen)), cut.end(),
+                                   [](uint8_t c) { return c != 0; });
+      const float drape = picture_.drape + kOverDrape;
+      down.y = off ? drape : std::max(down.y, drape);
       const float gently = std::clamp(1 - 4 * needle_tension(seen), 0.0f, 1.0f);
       const bool there = carry_swage(seen, down, std::max(1e-3f, gently * skill_.speed));
       if (there || needle_tension(seen) > kTautStrand || !patience(4)) go(open);
