@@ -39,11 +39,15 @@ struct Contact {
 struct ContactSolver {
   float reach = 0.0003f;  // [m] margin: gaps up to this plus two steps of relative motion are candidates
   float push_out = 0.2f;  // [m/s] maximum speed at which overlap is resolved
-  // Adjacent contacts are strongly coupled, so plain sweeps converge slowly. They are accelerated as nonsmooth nonlinear
-  // conjugate gradients (Silcowitz, Niebe, Erleben 2010, doi 10.1007/s00371-010-0502-6). At rest the warm start suffices.
-  int sweeps = 100;                    // maximum
-  float accuracy = 1e-4f;              // relative to the largest impulse: iteration stops when a sweep changes less
-  int swept = 0;                       // sweeps of the last step
+  // Sweeps come first: at rest, with the warm start, one suffices. Adjacent contacts are strongly coupled, and sweeps alone
+  // converge slowly. Then all contacts that touch are solved together (ADMM for Coulomb friction: Tasora, Mangoni,
+  // Benatti, Garziera 2021, doi 10.1002/nme.6693), and sweeps follow, which find what touches in addition.
+  int sweeps = 3;          // at a time, maximum
+  int rounds = 4;          // maximum
+  int iterations = 40;     // of the joint solve, per round, maximum
+  float accuracy = 1e-4f;  // relative to the largest impulse: sweeps stop when one changes less
+  float joint_accuracy = 1e-3f;
+  int swept = 0, iterated = 0;         // sweeps and iterations of the last step
   std::vector<Contact> contact, last;  // of this step and of the last one, in the order of their keys
   std::vector<Vec3> force, torque;     // per obstacle: [N] and [N m] about the scene's origin, of the wall on it
   Inverse inverse{512};
@@ -53,15 +57,29 @@ struct ContactSolver {
     float wanted = 0;  // [m/s] speed along the normal at which it would just touch at the end of the step
     float self = 0;    // [1/kg] its own compliance
     float friction = 0;
-    Vec3 impulse, before, onward;  // [N s] now, before this sweep, and by which the last extrapolation led on
+    Vec3 impulse, before;  // [N s] now, and before this sweep
   };
   std::vector<Trial> trial;
   std::vector<float> w;           // [1/kg] n x n; a row is made when its contact's impulse first changes
   std::vector<uint8_t> known;     // per row of w
+  std::vector<float> slots;       // per slot of the factor: what an impulse on one contact does
+  std::vector<uint32_t> mark;     // per slot: 1 + the contact that acts there
   std::vector<float> ux, uy, uz;  // [m/s] per contact, of the wall relative to what it touches
   std::vector<Vec3> change;       // [N s] since the last step
   std::vector<Weights> points;
   std::vector<Terms> terms;  // two per contact: point and other
+  // The joint solve, per contact that takes part: columns of one number each.
+  struct Joint {
+    std::vector<uint32_t> contact;
+    std::vector<uint8_t> has;    // per contact of the solver
+    std::vector<float> inverse;  // [kg] n x n
+    std::vector<float> friction, wanted, change;
+    std::vector<float> n[3];                 // normal
+    std::vector<float> start[3], free[3];    // [N s], [m/s] before the solve
+    std::vector<float> impulse[3], slip[3];  // [N s] within the cone; [m/s] estimate of the velocity beyond the wanted one
+    std::vector<float> right[3], answer[3];  // of an iteration
+    void resize(size_t size);
+  } joint;
   void reserve(size_t contacts);
 };
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "core/clones.h"
 
 namespace catgut::wall {
 
@@ -155,23 +156,41 @@ Terms Inverse::terms(const Topology& t, const Weights& w) const {
   return out;
 }
 
+namespace {
+// Copies of a cut column, and the director of the same column.
+float shared_of(const Topology& t, uint32_t a, uint32_t b, float zetas) {
+  float v = (a == b ? t.relative[a] : 0) - t.share[a] * t.relative[a] - t.share[b] * t.relative[b] + t.spread[a];
+  if (a == b) v += zetas * t.inv_dir[a];
+  return v;
+}
+CATGUT_CLONES void add_scaled(size_t n, float f, const float* __restrict from, float* __restrict to) {
+  for (size_t i = 0; i < n; ++i) to[i] += f * from[i];
+}
+}  // namespace
+
 float Inverse::compliance(const Topology& t, const Terms& a, const Terms& b) const {
   float sum = 0;
   for (uint32_t i = 0; i < a.count; ++i) {
-    const uint32_t ci = a.column[i];
     float part = 0;
     for (uint32_t j = 0; j < b.count; ++j) {
-      const uint32_t cj = b.column[j];
       float v = a.row[i][b.slot[j]];
-      if (a.slot[i] == b.slot[j]) {
-        // Copies of a cut column, and the director of the same column.
-        v += (ci == cj ? t.relative[ci] : 0) - t.share[ci] * t.relative[ci] - t.share[cj] * t.relative[cj] + t.spread[ci];
-        if (ci == cj) v += a.zeta * b.zeta * t.inv_dir[ci];
-      }
+      if (a.slot[i] == b.slot[j]) v += shared_of(t, a.column[i], b.column[j], a.zeta * b.zeta);
       part += b.weight[j] * v;
     }
     sum += a.weight[i] * part;
   }
+  return sum;
+}
+
+void Inverse::add_answer(const Terms& a, float sign, std::span<float> slots) const {
+  for (uint32_t i = 0; i < a.count; ++i) add_scaled(slots.size(), sign * a.weight[i], a.row[i], slots.data());
+}
+
+float Inverse::shared(const Topology& t, const Terms& a, const Terms& b) {
+  float sum = 0;
+  for (uint32_t i = 0; i < a.count; ++i)
+    for (uint32_t j = 0; j < b.count; ++j)
+      if (a.slot[i] == b.slot[j]) sum += a.weight[i] * b.weight[j] * shared_of(t, a.column[i], b.column[j], a.zeta * b.zeta);
   return sum;
 }
 

@@ -60,8 +60,13 @@ class Inverse {
   // The same in two steps, for points that take part in many pairs. Valid until the next call of `need`.
   Terms terms(const Topology& topology, const Weights& point) const;
   float compliance(const Topology& topology, const Terms& a, const Terms& b) const;
+  // Its two parts: what goes through the factor, for a unit on one point, in every slot (added, times `sign`); and what
+  // points on copies of the same column share in addition.
+  void add_answer(const Terms& a, float sign, std::span<float> slots) const;
+  static float shared(const Topology& topology, const Terms& a, const Terms& b);
   // The column of a slot of the factor, which has been requested.
   const float* column(uint32_t slot) const { return value_.data() + size_t{entry_[slot]} * rows_; }
+  uint32_t rows() const { return rows_; }
   uint32_t kept() const { return static_cast<uint32_t>(slot_.size()); }
 
  private:
