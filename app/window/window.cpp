@@ -264,6 +264,7 @@ class Window {
     tutorial_ = live.tutorial;
     source_ = {name, procedure, stage, tutorial};
     places_ = bite_places(scene, visit_->live.picture());
+    line_ = PlannedLine(scene, visit_->live.picture());
     hands_.steering = start_steering(visit_->live.picture(), settings_.left_handed);
     cue_source_ = assess::cue_source(visit_->live.picture(), assess_setup(scene).wall);
     rubric_ = live.rubric;
@@ -931,6 +932,8 @@ class Window {
     const float w = static_cast<float>(width_), h = static_cast<float>(height_);
     const ViewFrame frame = this->view();
     if (work.guide) guide_overlay(*work.guide, frame, *view.picture, *view.seen, {0, 0, w, h});
+    if ((settings_.guidance != Guidance::exam || tutorial_) && !view.watching && !view.status->settling)
+      line_overlay(line_.on(*view.picture, *view.seen), frame, {0, 0, w, h});
     const BiteGuide* planned = work.guide ? &*work.guide : nullptr;
     const std::vector<ScreenPoint> points = work_points(*view.seen, *view.picture, frame, w, h, planned);
     placed_ = place_panels(work_panels(work, shown), w, h, panel_text_size(), points, placed_);
@@ -1046,6 +1049,7 @@ class Window {
   bool have_last_ = false;
   WindowHands hands_;
   BitePlaces places_;
+  PlannedLine line_;
   std::vector<assess::Rubric> rubric_;  // of the session; the first one judges
   assess::CueSource cue_source_;
   std::vector<assess::Cue> cues_;

@@ -20,22 +20,17 @@ void report(State& state, EventKind kind, size_t instrument, uint32_t which, flo
   state.event.add(e);
 }
 
-bool has_line(const Model& model) {
-  const std::string& plan = model.scene.surgeon.plan;
-  return (plan == "excision" || plan == "altemeier") && !model.scene.body.empty();
-}
-
 // [m] from the rim of the first body, along its axis, at rest.
-float from_rim(const Model& model, const wall::Point& point) {
-  const BodySpec& body = model.scene.body.front();
-  return dot(body.position - wall::rest_place(model.physical->world.wall, point), normalized(body.axis));
+float from_rim(const CutLine& line, const Model& model, const wall::Point& point) {
+  return dot(line.rim - wall::rest_place(model.physical->world.wall, point), line.axis);
 }
 
 // [m] from the planned line; -1: there is none for this place.
 float from_line(const Model& model, const wall::Point& point) {
+  const std::optional<CutLine> line = cut_line(model.scene);
   const uint32_t column = model.physical->world.wall.mesh.face[point.face][0];
-  if (!has_line(model) || 2 * column >= static_cast<uint32_t>(model.scene.body.front().particles)) return -1;
-  return std::abs(from_rim(model, point) - model.scene.surgeon.edge_distance);
+  if (!line || 2 * column >= static_cast<uint32_t>(model.scene.body.front().particles)) return -1;
+  return std::abs(from_rim(*line, model, point) - line->from_rim);
 }
 
 Vec3 place_of(const Model& model, const State& state, const wall::Point& point) {
@@ -118,7 +113,7 @@ void report_through(const Model& model, State& state, size_t instrument, const w
   c.stroke.through = c.opened = true;
   if (off > kOffLine && !c.stroke.off_line) fault(Fault::cut_off_line, off);
   c.stroke.off_line = off > (c.stroke.off_line ? 0.8f : 1.0f) * kOffLine;
-  if (off < 0 && has_line(model) && !c.stroke.inner && c.pieces <= model.scene.body.size())
+  if (off < 0 && cut_line(model.scene) && !c.stroke.inner && c.pieces <= model.scene.body.size())
     c.stroke.inner = true, fault(Fault::inner_wall_cut, 0);
   watch_sutures(model, state, instrument, at);
   if (!divided) return;
@@ -273,7 +268,8 @@ void use_scissors(const Model& model, State& state, physical::Scratch& scratch) 
 
 void watch_pulls(const Model& model, State& state) {
   Cutting& c = state.physical.cutting;
-  if (!c.opened || !has_line(model)) return;
+  const std::optional<CutLine> line = cut_line(model.scene);
+  if (!c.opened || !line) return;
   if (std::any_of(c.mode.begin(), c.mode.end(), [](PenMode m) { return m != PenMode::off; })) return;  // traction while cutting
   const wall::Topology& t = state.physical.world.wall.topology;
   for (size_t i = 0; i < c.pulled.size(); ++i) {
@@ -282,8 +278,7 @@ void watch_pulls(const Model& model, State& state) {
     if (body.grip.what != physical::Gripped::tissue || c.pulled[i]) continue;
     const float force = length(body.hand_force);
     const wall::Point& held = body.grip.point[0].tissue;
-    if (force < kPulledForce || from_line(model, held) < 0 || from_rim(model, held) > model.scene.surgeon.edge_distance)
-      continue;
+    if (force < kPulledForce || from_line(model, held) < 0 || from_rim(*line, model, held) > line->from_rim) continue;
     // Attached: its piece of the wall is one with tissue that is held in place.
     const std::vector<uint32_t>& piece = pieces_of(model, state);
     const uint32_t own = piece[wall::weights(model.physical->world.wall, t, held).column[0]];
@@ -293,6 +288,11 @@ void watch_pulls(const Model& model, State& state) {
     c.pulled[i] = 1;
     report(state, EventKind::technique_fault, i, static_cast<uint32_t>(i), force, body.pose.p, Fault::pulled_attached);
   }
+}
+
+std::optional<CutLine> cut_line(const SceneSpec& scene) {
+  if ((scene.surgeon.plan != "excision" && scene.surgeon.plan != "altemeier") || scene.body.empty()) return {};
+  return CutLine{scene.body.front().position, normalized(scene.body.front().axis), scene.surgeon.edge_distance};
 }
 
 bool is_charred(const Model& model, const State& state, const wall::Point& point) {

@@ -8,6 +8,7 @@
 // So the buttons of every device work, and a recording repeats them. `set_pen` is a pedal's: it switches, and does not toggle.
 #pragma once
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "exchange/divided_picture.h"
@@ -20,6 +21,7 @@
 namespace catgut {
 
 struct Model;
+struct SceneSpec;
 struct State;
 
 constexpr float kCutPower = 40, kCoagulatePower = 30;  // [W] within the settings of general surgery (chosen)
@@ -98,8 +100,12 @@ void watch_pulls(const Model& model, State& state);
 // Whether a material point lies in charred tissue.
 bool is_charred(const Model& model, const State& state, const wall::Point& point);
 
-// The planned line is a circle on the first body, `surgeon.edge_distance` from its rim, with the plan "excision"
-// or "altemeier".
+// The planned line: a circle on the first body, with the plan "excision" or "altemeier".
+struct CutLine {
+  Vec3 rim, axis;      // [m] middle of the rim at rest; unit, out of the opening
+  float from_rim = 0;  // [m]
+};
+std::optional<CutLine> cut_line(const SceneSpec& scene);
 constexpr float kOffLine = 2e-3f;       // [m] farther from the line is a fault (chosen)
 constexpr float kBesideSuture = 1e-3f;  // [m] from a hole with thread, likewise
 constexpr float kPulledForce = 1;       // [N] on the hand, likewise

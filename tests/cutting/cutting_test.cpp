@@ -11,6 +11,7 @@
 
 #include "field.h"
 #include "procedure/scripted_surgeon.h"
+#include "runtime/planned_line.h"
 #include "runtime/session.h"
 #include "sim/recording.h"
 
@@ -126,6 +127,53 @@ TEST(Cutting, a_cut_off_the_line_is_a_fault_once) {
   ASSERT_EQ(free.of(EventKind::wall_cut_through).size(), 1u);
   EXPECT_EQ(free.of(EventKind::wall_cut_through)[0].value, -1);
   EXPECT_TRUE(free.of(Fault::cut_off_line).empty());
+}
+
+// The drawn line: a pen that follows it is on the line that faults are measured from, and what it has burnt is no longer drawn.
+TEST(Cutting, the_planned_line_is_drawn_where_deviations_are_measured) {
+  for (const char* name : {"excision", "altemeier"}) {
+    SceneSpec scene = read_scene(name);
+    scene.body[0].particles = 600;
+    for (InstrumentSpec& i : scene.instrument)
+      if (i.kind == "cautery") i.where = "right";
+    Field f(scene);
+    f.line = scene.surgeon.edge_distance;
+    const PictureModel picture = picture_model(*f.model);
+    PlannedLine line(scene, picture);
+    double length_all = 0;
+    for (const LinePiece& p : line.on(picture, f.seen)) {
+      EXPECT_NEAR(p.a.y, -f.line, 1e-4f);
+      EXPECT_GT(dot(p.out, p.a), 0);
+      length_all += static_cast<double>(length(p.b - p.a));
+    }
+    EXPECT_NEAR(length_all / (2 * static_cast<double>(kPi * scene.body[0].radius)), 1, 0.03) << "all round, once";
+    const float from = 0.3f, to = 1.1f;
+    const auto angle = [](Vec3 p) { return portable::atan2(p.z, p.x); };
+    const auto follow = [&](float at) {
+      f.hold(at);
+      float nearest = 10;
+      for (const LinePiece& p : line.on(picture, f.seen))
+        if (const float off = std::abs(angle(p.a) - at); off < nearest) nearest = off, f.input.hand[0].pose.p = p.a;
+      f.tick();
+    };
+    f.hold(from, 0.004f), f.tick(), f.tick();
+    follow(from);
+    f.switch_pen();
+    // The line burns away under the pen: he aims a little ahead.
+    for (float at = from; at < to; at += 0.005f / 60 / scene.body[0].radius) follow(at);
+    ASSERT_EQ(f.of(EventKind::wall_cut_through).size(), 1u);
+    EXPECT_LT(f.of(EventKind::wall_cut_through)[0].value, 0.5e-3f);
+    EXPECT_TRUE(f.of(Fault::cut_off_line).empty());
+    size_t cut = 0, left = 0;
+    for (const LinePiece& p : line.on(picture, f.seen)) {
+      const float at = angle(0.5f * (p.a + p.b));
+      if (at > from + 0.1f && at < to - 0.1f) ++cut;
+      if (at > to + 0.3f || at < from - 0.3f) ++left;
+    }
+    std::printf("%s: %zu pieces drawn where it was cut, %zu elsewhere\n", name, cut, left);
+    EXPECT_EQ(cut, 0u);
+    EXPECT_GT(left, 50u);
+  }
 }
 
 TEST(Cutting, a_cut_beside_a_suture_is_a_fault_once) {
