@@ -4,6 +4,7 @@
 #ifdef CATGUT_TESTS_WINDOW
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <map>
 #include <set>
@@ -237,6 +238,22 @@ TEST(Layout, a_later_stage_counts_the_bites_before_it) {
   for (const Panel& panel : work_panels({&view, &p, true, {}, {}}, {}))
     for (const PanelLine& l : panel.line) all += l.text + "\n";
   EXPECT_NE(all.find("bites 2"), std::string::npos) << all;
+}
+
+TEST(Layout, wrong_surgery_is_named_on_the_screen_with_its_reason) {
+  const Procedure p = read_procedure("altemeier");
+  Snapshot seen;
+  for (const char* name : {"inner tube", "off the line", "attached", "clamp torn out", "stitch over char"}) {
+    const auto error = std::find_if(p.error.begin(), p.error.end(), [&](const auto& e) { return e.name == name; });
+    ASSERT_NE(error, p.error.end()) << name;
+    LiveStatus status;
+    begin_run(status.procedure, p, seen, 1.0 / 60);
+    status.procedure.error.push_back({0, 0, static_cast<uint32_t>(error - p.error.begin())});
+    std::string text;
+    for (const PanelLine& l : procedure_panel(p, status, seen, Guidance::practice, false).line) text += l.text + "\n";
+    EXPECT_NE(text.find("! " + error->text + " " + error->why), std::string::npos) << text;
+    EXPECT_GT(error->why.size(), 20u);
+  }
 }
 
 // What a panel of a stage says.

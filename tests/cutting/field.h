@@ -2,6 +2,7 @@
 // tests/cutting: the scene "excision", a right hand that leads its pen, and measures of the drawn surface.
 #pragma once
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -29,6 +30,7 @@ struct Field {
   Snapshot seen;
   std::vector<Event> events;  // of all ticks
   float line = kLine;         // [m] from the rim
+  std::function<void()> after_tick;
 
   explicit Field(int particles = 400) : Field(scene_of(particles)) {}
   explicit Field(const SceneSpec& with) : scene(with) {
@@ -41,6 +43,7 @@ struct Field {
     input.commands.clear();
     publish(*model, *state, seen);
     events.insert(events.end(), seen.event.begin(), seen.event.end());
+    if (after_tick) after_tick();
   }
   std::vector<Event> of(EventKind kind, Fault fault = Fault::none) const {
     std::vector<Event> out;
