@@ -380,10 +380,12 @@ struct Closed {
   int cuts = 0;                                       // pairs of the thread that are cut or broken
   float open = 0, let_go = 0, away = 0, removed = 0;  // [m] gap at first, when the last hand let go, later, without the thread
   float away_for = 0;                                 // [s]
+  int retries = 0;                                    // throws wound again
   thread::SeenKnot knot;
 };
-// Tasks of the plan, by number; empty: all of them. Otherwise the clamps go back at the end.
-Closed sew_and_leave(const std::vector<size_t>& tasks, const char* name = "interrupted_tied") {
+// Tasks of the plan, by number; empty: all of them. Otherwise the clamps go back at the end. slip: number of the throw whose
+// tail slips out of the needle holder while it is drawn through, 0: none.
+Closed sew_and_leave(const std::vector<size_t>& tasks, const char* name = "interrupted_tied", int slip = 0) {
   const SceneSpec scene = read_scene(name);
   const std::shared_ptr<const Model> model = build_model(scene);
   const PictureModel picture = picture_model(*model);
@@ -402,13 +404,19 @@ Closed sew_and_leave(const std::vector<size_t>& tasks, const char* name = "inter
   publish(*model, *state, seen);
   Closed result;
   result.open = gap_at_top(picture, seen);
-  uint64_t held = 0;  // tick in which an instrument last held anything
+  uint64_t held = 0;           // tick in which an instrument last held anything
+  int drawn = 0, drawing = 0;  // times that the tail was drawn through; ticks of the last one
   for (int t = 0; t < 60 * 120 && !surgeon->done(); ++t) {
-    tick(t < 30 ? no_hands : surgeon->operate(seen, model->dt));
+    TickInput in = t < 30 ? no_hands : surgeon->operate(seen, model->dt);
+    drawing = surgeon->doing() == "throw: draw the tail through" ? drawing + 1 : 0;
+    if (drawing == 1) ++drawn;
+    if (slip > 0 && drawn == slip && drawing > 20 && drawing < 40) in.hand[0].jaw = 0.8f;
+    tick(in);
     for (const ToolView& tool : seen.tool)
       if (tool.held != Held::nothing) held = state->tick, result.let_go = gap_at_top(picture, seen);
   }
   result.done = surgeon->done() && !surgeon->gave_up();
+  result.retries = surgeon->retries();
   for (int t = 0; t < 120 && !tasks.empty(); ++t) {
     TickInput in = no_hands;
     for (uint16_t body = 0; body < 2; ++body) in.commands.push({CommandKind::retract_clamp, 2, body});
@@ -453,6 +461,19 @@ TEST(PhysicalScene, the_thread_alone_closes_a_wound) {
   EXPECT_LT(r.away, 1e-3f);
   EXPECT_NEAR(r.away, r.let_go, 0.2e-3f);
   EXPECT_GT(r.removed, 2.5e-3f) << "something other than the thread held it";
+}
+
+// The tail slips out of the jaws while it is drawn through the second throw: it is laid again, and the throw wound again.
+TEST(PhysicalScene, a_throw_that_slips_is_wound_again) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "seventy seconds of surgery: set CATGUT_LONG=1";
+  const Closed r = sew_and_leave({}, "interrupted_tied", 2);
+  ASSERT_TRUE(r.done);
+  EXPECT_EQ(r.retries, 1);
+  EXPECT_EQ(r.cuts, 2);
+  EXPECT_EQ(r.knot.name, thread::KnotName::square);
+  EXPECT_EQ(r.knot.throws, kThrowsOfThePlan);
+  EXPECT_LT(r.away, 1e-3f);
+  EXPECT_NEAR(r.away, r.let_go, 0.2e-3f);
 }
 
 // Three stitches with one thread, over and over, tied once.
