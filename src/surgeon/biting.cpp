@@ -222,7 +222,7 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
       BiteFrame f = present ? frame(seen, next) : BiteFrame{stitch(seen), {0, 1, 0}, {0, 0, -1}, {1, 0, 0}};
       f.at += f.out * (present ? 0.03f : 0.045f) + f.up * (present ? 1.7f * plan_.lift : 0.0f);
       const float psi = present ? -half_bite_angle() - 0.7f : kTipUp;
-      if (plan_.pull > 0 && plan_.lift == 0) hold_strand_straight(seen, f, psi);
+      if (plan_.pull > 0 && (plan_.lift == 0 || !present)) hold_strand_straight(seen, f, psi);
       if (move(kForceps, holding(kForceps, needle_at(f, psi)), skill_.speed)) go(over);
       else if (!patience(6)) gave_up_ = true;
       return false;

@@ -23,6 +23,7 @@ constexpr float kApproximate = 0.003f;    // [m] of each clamp: the edges touch 
 // lifted.
 constexpr float kGivesWay = 0.002f, kScoop = 0.003f;  // [m]
 constexpr float kGather = 2.0f;                       // [N] of each end of a physical purse-string
+constexpr float kGatherByThrow = 3.2f;                // [N] the same through a throw, whose friction takes a part
 constexpr int kThrows = 2;
 constexpr int kRingThrows = 3;  // where no clamp draws the edges apart again: only a taut loop keeps two throws from opening
 // [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
@@ -119,9 +120,9 @@ Plan purse_string_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   return plan;
 }
 
-// The same with physical mechanics: the forceps holds the rim against the needle, and the thread alone gathers it. The knot's
-// place, between the last bite and the first one, is where the guided plan begins.
-Plan purse_string_thread_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+// The bites of the same with physical mechanics: the forceps holds the rim against the needle. The knot's place, between the
+// last bite and the first one, is where the guided plan begins.
+Plan sewn_round(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.lift = 0.012f;
   plan.driver_at = 0.2f, plan.beyond = 0.6f;
@@ -135,7 +136,28 @@ Plan purse_string_thread_plan(const PictureModel& picture, const SurgeonSkill& s
     p.length = 2 * std::sqrt(p.depth * (2 * radius - p.depth));
   }
   add_bites(plan, skill.bites, true);
+  return plan;
+}
+
+// The thread alone gathers it, and is let go untied.
+Plan purse_string_thread_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan = sewn_round(picture, skill);
   add(plan, TaskKind::gather);
+  add(plan, TaskKind::leave);
+  return plan;
+}
+
+// Tied with two throws. The first one gathers the rim; the assistant's forceps holds it until the second one lies on it. The
+// knot is on the right.
+Plan purse_string_tied_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan = sewn_round(picture, skill);
+  plan.pull = kGatherByThrow;
+  plan.knot_turn = 0.5f * kPi;
+  add(plan, TaskKind::regrip);
+  plan.task.push_back({TaskKind::throw_, 1, 1, false, 1});
+  plan.task.push_back({TaskKind::throw_, 1, 1, false, -1});
+  add(plan, TaskKind::cut_tail);
+  add(plan, TaskKind::cut_long);
   add(plan, TaskKind::leave);
   return plan;
 }
@@ -445,6 +467,7 @@ constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
                              {"interrupted_tied", 2, interrupted_tied_plan},
                              {"over_and_over", 2, over_and_over_plan},
                              {"purse_string_thread", 1, purse_string_thread_plan},
+                             {"purse_string_tied", 1, purse_string_tied_plan},
                              {"simple", 2, simple_plan},
                              {"excision", 1, excision_plan},
                              {"slit", 1, excision_plan},

@@ -59,6 +59,8 @@ struct Task {
   int which = 0;  // see TaskKind
   int way = 1;
   bool release = false;  // of a throw_: the clamps go back while both strands are held taut
+  int assistant =
+      0;  // of a throw_, while both strands are held taut: +1 the assistant's forceps takes it; -1 leaves the one below
 };
 
 struct Plan {
@@ -78,6 +80,7 @@ struct Plan {
   float approximate = 0;  // [m] travel of each clamp
   float jerk = 0;         // [s] of more than the maximum load after which thread is not pulled further: a jerk is shorter
   bool rise = false;      // the needle is lifted over the edges on its way to where it is laid down
+  float knot_turn = 0;    // [rad] about y: where a physical knot is tied, 0 toward the viewer, positive to the right
   float pull = 0;  // [N] of each strand when a throw is pulled tight, with physical mechanics; 0: throws of guided mechanics
 };
 

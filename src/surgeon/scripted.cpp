@@ -67,6 +67,7 @@ void Scripted::take_over(const Snapshot& seen) {
 TickInput Scripted::operate(const Snapshot& seen, float dt) {
   if (takes_over_) take_over(seen);
   const std::array<Pose, 2> before{hand_[0].pose, hand_[1].pose};
+  const Pose assistant_before = assistant_[0].pose;
   commands_.clear();
   if (!done() && pause_left_ > 0) {
     pause_left_ -= dt;
@@ -89,6 +90,10 @@ TickInput Scripted::operate(const Snapshot& seen, float dt) {
     if (seen.tool[k].instrument < 0) continue;
     ScriptedHand& hand = assistant_[k - 2];
     if (sequence_ == 0) hand.pose = seen.tool[k].hand;
+    if (k == 2 && assisting_ > 0) {
+      out.hand[k] = as_input(hand, assistant_before, dt, sequence_);
+      continue;
+    }
     const Pose from = hand.pose;
     const Vec3 z = normalized(Vec3{k == 2 ? 0.4f : -0.4f, 0.6f, -0.7f}), x = normalized(cross({0, 1, 0}, z));
     const Vec3 at = picture_.focus + Vec3{k == 2 ? 0.25f : -0.25f, 0.35f, -0.5f} * picture_.field;

@@ -143,6 +143,9 @@ class Scripted final : public Surgeon {
   bool tie(const Task& task, const Snapshot& seen);
   // The same with physical mechanics.
   bool tie_thread(const Task& task, const Snapshot& seen);
+  // The assistant's forceps closes on the crossing of the throw that both hands hold taut, or leaves it. True when it has.
+  bool take_crossing(const Snapshot& seen);
+  bool leave_crossing(const Snapshot& seen);
 
   // The needle's own strand is laid between the needle holder's jaws, past the loop.
   bool take_strand(const Snapshot& seen, const Pose& lying, int close, int tighten, int again);
@@ -204,7 +207,8 @@ class Scripted final : public Surgeon {
   Quat take_turn_;
   Vec3 tried_;
   std::optional<ThreadTie> thread_tie_;  // with physical mechanics, from the first throw on
-  float clamped_ = 0;                    // [s] that the clamps still move back, within a throw
+  float clamped_ = 0;                    // [s] that both strands are still held taut, within a throw: the clamps move back
+  int assisting_ = 0;  // stage of the assistant's hand at the crossing of a throw; 0: it waits beyond the field
   uint32_t sequence_ = 0;
 };
 

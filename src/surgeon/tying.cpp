@@ -32,6 +32,11 @@ constexpr float kShortStump = 0.005f;  // [m] of thread left on a knot with phys
 constexpr float kStrandsTouch = 1e-3f, kKnotEnds = 4e-3f;  // [m] apart; of free thread
 constexpr float kStumpClear = 2e-3f;                       // [m] of the blades from the stitch
 constexpr Vec3 kCutFrom{0, 0.6f, 0.8f};                    // unit, from the blades along the shaft
+constexpr Vec3 kFromFront{0, 0.28f, 0.96f};       // the same of the assistant's forceps: lower than the strand that is wound
+constexpr float kReleases = 0.5f, kAjar = 0.36f;  // of jaws within a throw, which wide open would break it
+constexpr float kBetweenJaws = 0.4e-3f;           // [m] of a crossing from the middle of the jaws that close on it
+constexpr float kGathers = 6;                     // [s] in which a rim follows both strands
+constexpr float kNearStitch = 12e-3f;             // [m] of a crossing from the middle of the stitch
 
 // The outermost node of a knot on the tail or on the needle's strand: within the knot the two touch each other.
 size_t knot_end(const Snapshot& seen, bool tail) {
@@ -52,6 +57,33 @@ size_t knot_end(const Snapshot& seen, bool tail) {
     else if (met && free > kKnotEnds) break;
   }
   return found;
+}
+
+// What is seen, turned.
+Snapshot turned(const Snapshot& seen, Quat by) {
+  const auto turn = [&](Pose& pose) { pose = {rotate(by, pose.p), by * pose.q}; };
+  Snapshot out = seen;
+  for (Vec3& p : out.particle) p = rotate(by, p);
+  for (ToolView& tool : out.tool) turn(tool.pose);
+  for (SutureView& suture : out.suture) {
+    turn(suture.needle.pose);
+    for (SuturePointView& p : suture.suture_point) p.position = rotate(by, p.position);
+  }
+  return out;
+}
+
+// Middle of what tail and strand have in contact; `fallback` if they do not touch.
+Vec3 crossing(const Snapshot& seen, Vec3 fallback) {
+  const size_t last = seen.active().thread_order.size() - 1, first = first_point_node(seen);
+  Vec3 sum;
+  float count = 0;
+  for (size_t i = 0; i < first; ++i)
+    for (size_t k = last_point_node(seen) + 1; k <= last; ++k) {
+      const Vec3 a = node_at(seen, i), b = node_at(seen, k);
+      if (distance(a, b) > kStrandsTouch || distance(a, fallback) > kNearStitch) continue;
+      sum += 0.5f * (a + b), count += 1;
+    }
+  return count > 0 ? sum / count : fallback;
 }
 
 }  // namespace
@@ -259,23 +291,74 @@ bool Scripted::tie(const Task& task, const Snapshot& seen) {
 
 bool Scripted::tie_thread(const Task& task, const Snapshot& seen) {
   enum { start, work };
+  // ThreadTie sees its stitch along x, from the viewer's side.
+  const Quat from_knot = axis_angle({0, 1, 0}, plan_.knot_turn), to_knot = conjugate(from_knot);
+  const auto turn_hands = [&](Quat by) {
+    for (ScriptedHand& hand : hand_) hand.pose = {rotate(by, hand.pose.p), by * hand.pose.q};
+  };
+  const bool turns = plan_.knot_turn != 0;
+  const Snapshot copy = turns ? turned(seen, to_knot) : Snapshot{};
+  const Snapshot& at_knot = turns ? copy : seen;
+  if (turns) turn_hands(to_knot);
   if (stage_ == start) {
     const bool first = !thread_tie_;
     if (first) thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull});
-    thread_tie_->begin(seen, task.which, task.way, first, task.release);
-    clamped_ = kClampsBack * plan_.approximate / kClampSpeed;
+    thread_tie_->begin(at_knot, task.which, task.way, first, task.release || task.assistant != 0);
+    clamped_ = task.assistant > 0 ? kGathers : kClampsBack * plan_.approximate / kClampSpeed;
     go(work);
   }
-  const bool over = thread_tie_->operate(seen, dt_);
+  const bool over = thread_tie_->operate(at_knot, dt_);
+  if (turns) turn_hands(from_knot);
   doing_ = "throw: " + thread_tie_->doing();
   if (thread_tie_->keeping()) {
-    doing_ = "throw: hold both strands while the clamps go back";
-    order_clamps(false);
+    doing_ = task.assistant > 0   ? "throw: hold both strands while the assistant takes them"
+             : task.assistant < 0 ? "throw: hold both strands while the assistant lets go"
+                                  : "throw: hold both strands while the clamps go back";
+    if (task.assistant == 0) order_clamps(false);
     clamped_ -= dt_;
-    if (clamped_ < 0) thread_tie_->let_go();
+    if (clamped_ < 0 && (task.assistant == 0 || (task.assistant > 0 ? take_crossing(seen) : leave_crossing(seen))))
+      thread_tie_->let_go();
   }
   if (over && thread_tie_->failed()) gave_up_ = true;
   return over;
+}
+
+bool Scripted::take_crossing(const Snapshot& seen) {
+  enum { wait, over, down, close };
+  ScriptedHand& hand = assistant_[0];
+  const ToolView& tool = seen.tool[kAssistant];
+  const Quat turn = axis_angle({0, 1, 0}, plan_.knot_turn);
+  const Pose goal{crossing(seen, stitch(seen)), turn * from_axes(cross({1, 0, 0}, kFromFront), {1, 0, 0}, kFromFront)};
+  const Vec3 off = goal.p - tool.pose.p;  // by sight of the jaws, which tissue and thread push aside
+  switch (assisting_) {
+    case wait:
+      assisting_ = over;
+      return false;
+    case over:
+      if (move_jaw(hand, kHalfOpen, dt_) && move_toward(hand, raised(goal, 0.025f), skill_.speed, dt_)) assisting_ = down;
+      return false;
+    case down:
+      move_toward(hand, {hand.pose.p + off, goal.q}, careful(), dt_);
+      if (length(off) < kBetweenJaws) assisting_ = close, steady_ = 0;
+      return false;
+    default:
+      steady_ += dt_;
+      if (!move_jaw(hand, 0, dt_)) return false;
+      if (tool.held == Held::thread && tool.held_strands > 1) return true;
+      if (steady_ > 0.5f) assisting_ = over;
+      return false;
+  }
+}
+
+bool Scripted::leave_crossing(const Snapshot& seen) {
+  ScriptedHand& hand = assistant_[0];
+  if (assisting_ == 0) return true;
+  if (seen.tool[kAssistant].held != Held::nothing) return move_jaw(hand, kReleases, dt_), false;
+  hand.jaw = kAjar;
+  const Vec3 away = hand.pose.p - crossing(seen, stitch(seen));
+  move_toward(hand, raised(hand.pose, 0.02f), skill_.speed, dt_);
+  if (length(away) > 0.03f) assisting_ = 0;
+  return false;
 }
 
 void Scripted::order_clamps(bool advance) {

@@ -542,6 +542,43 @@ TEST(PhysicalScene, a_purse_string_gathers_by_its_thread_alone) {
   EXPECT_GT(away, 0.9f * open);
 }
 
+// The same purse-string, tied with an assistant's forceps on the first throw: its thread alone keeps it gathered once every
+// hand is away. Without the thread it opens.
+TEST(PhysicalScene, a_tied_purse_string_stays_gathered) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "two minutes of surgery: set CATGUT_LONG=1";
+  const SceneSpec scene = read_scene("purse_string_tied");
+  const std::shared_ptr<const Model> model = build_model(scene);
+  const StatePtr state = initial_state(*model);
+  const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*model));
+  Jobs jobs(2);
+  Snapshot seen;
+  TickInput no_hands;
+  for (ToolInput& hand : no_hands.hand) hand.connected = 0;
+  const auto tick = [&](TickInput in) {
+    in.tick = state->tick;
+    step(*model, *state, in, jobs);
+    publish(*model, *state, seen);
+  };
+  publish(*model, *state, seen);
+  const float open = seen.opening_area;
+  for (int t = 0; t < 60 * 150 && !surgeon->done(); ++t) tick(t < 30 ? no_hands : surgeon->operate(seen, model->dt));
+  ASSERT_TRUE(surgeon->done() && !surgeon->gave_up()) << surgeon->doing();
+  for (const physical::Hole& hole : state->physical.world.hole) EXPECT_EQ(hole.torn, 0);
+  const float away = seen.opening_area;
+  for (int t = 0; t < 120; ++t) tick(no_hands);
+  const float later = seen.opening_area;
+  thread::State& thread = state->physical.world.thread;
+  std::fill(thread.broken.begin(), thread.broken.end(), uint8_t{1});
+  thread.eyelet.clear(), thread.travel = 1e9f;
+  for (int t = 0; t < 90; ++t) tick(no_hands);
+  std::printf("opening: hands away %.1f %%, two seconds later %.1f %%, without the thread %.1f %%\n",
+              static_cast<double>(100 * away / open), static_cast<double>(100 * later / open),
+              static_cast<double>(100 * seen.opening_area / open));
+  EXPECT_LT(away, 0.5f * open);
+  EXPECT_NEAR(later, away, 0.02f * open);
+  EXPECT_GT(seen.opening_area, 0.95f * open);
+}
+
 TEST(PhysicalScene, a_guided_scene_has_no_physical_state) {
   const std::shared_ptr<const Model> model = build_model(read_scene("stay"));
   const StatePtr state = initial_state(*model);
