@@ -563,7 +563,7 @@ TEST(PhysicalScene, a_tied_purse_string_stays_gathered) {
   const float open = seen.opening_area;
   for (int t = 0; t < 60 * 150 && !surgeon->done(); ++t) tick(t < 30 ? no_hands : surgeon->operate(seen, model->dt));
   ASSERT_TRUE(surgeon->done() && !surgeon->gave_up()) << surgeon->doing();
-  for (const physical::Hole& hole : state->physical.world.hole) EXPECT_EQ(hole.torn, 0);
+  for (const physical::Hole& hole : state->physical.world.hole) EXPECT_LT(hole.torn, 0.5e-3f);
   const float away = seen.opening_area;
   for (int t = 0; t < 120; ++t) tick(no_hands);
   const float later = seen.opening_area;
@@ -574,7 +574,7 @@ TEST(PhysicalScene, a_tied_purse_string_stays_gathered) {
   std::printf("opening: hands away %.1f %%, two seconds later %.1f %%, without the thread %.1f %%\n",
               static_cast<double>(100 * away / open), static_cast<double>(100 * later / open),
               static_cast<double>(100 * seen.opening_area / open));
-  EXPECT_LT(away, 0.5f * open);
+  EXPECT_LT(away, 0.25f * open);
   EXPECT_NEAR(later, away, 0.02f * open);
   EXPECT_GT(seen.opening_area, 0.95f * open);
 }
