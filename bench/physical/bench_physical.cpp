@@ -3,6 +3,7 @@
 //   bench_physical             a stitch that is drawn, the same tied, a purse-string that is drawn
 //   bench_physical purse       the purse-string alone
 //   bench_physical sutures     1 to 16 stitches side by side: all asleep, one of them drawn, all awake; each against the first
+//   bench_physical waiting     a stitch that is drawn while 0 to 49 other strands wait: asleep, awake; each against none
 #include <time.h>
 
 #include <algorithm>
@@ -93,7 +94,7 @@ void compare_sutures() {
     s.run(1.5f);
     std::array<double, 3> ms{};
     ms[0] = median_step(s);
-    const bool asleep = s.state.sleep.asleep;
+    const bool asleep = s.state.sleep.all();
     thread::Hold end;
     end.stiffness = 200, end.limit = 0.1f, end.from = end.to = s.state.thread.position(0) + Vec3{0.01f, 0, 0};
     s.hold = {end};
@@ -108,10 +109,63 @@ void compare_sutures() {
         ms[1] / first[1], ms[2], ms[2] / first[2]);
   }
 }
+// A stitch with both ends held, and strands of 60 nodes beside the tubes that nothing touches.
+Sewn with_waiting(int count) {
+  Sewn s = interrupted({});
+  const thread::State& stitch = s.state.thread;
+  std::vector<Vec3> path;
+  std::vector<int32_t> hole;
+  size_t eyelet = 0;
+  for (uint32_t i = 0; i < stitch.nodes(); ++i) {
+    path.push_back(stitch.position(i)), hole.push_back(-1);
+    if (eyelet == stitch.eyelet.size() || stitch.eyelet[eyelet].segment != i) continue;
+    hole.push_back(static_cast<int32_t>(stitch.eyelet[eyelet].point));
+    path.push_back(mouth(s.model, s.state, s.state.hole[stitch.eyelet[eyelet++].point]));
+  }
+  for (int k = 0; k < count; ++k)
+    for (int i = 0; i < 60; ++i)
+      path.push_back({0.1f + 0.01f * static_cast<float>(k), 0.5e-3f * static_cast<float>(i), 0}), hole.push_back(-1);
+  const size_t first = stitch.nodes();
+  s.state.thread = thread::make_laced_state(path, hole, Stitch{}.hole_friction);
+  for (size_t k = 0; k < static_cast<size_t>(count); ++k) {
+    s.state.thread.broken[first - 1 + 60 * k] = 1;
+    s.state.thread.rest[first - 1 + 60 * k] = 0.5e-3f;
+  }
+  const std::vector<thread::Hold> hold = s.hold;
+  s.start();
+  s.hold = hold;
+  return s;
+}
+void compare_waiting() {
+  std::array<double, 2> first{};
+  for (const int count : {0, 4, 9, 24, 49}) {
+    std::array<double, 2> ms{};
+    size_t asleep = 0;
+    for (const bool sleep : {true, false}) {
+      Sewn s = with_waiting(count);
+      s.model.sleep.on = sleep;
+      s.run(0.6f);
+      std::vector<double> each;
+      for (int i = 0; i < 200; ++i) {
+        s.hold[0].from = s.hold[0].to, s.hold[0].to.x += 1e-5f;
+        const double start = milliseconds();
+        s.run(0.001f);
+        each.push_back(milliseconds() - start);
+      }
+      std::sort(each.begin(), each.end());
+      ms[sleep ? 0 : 1] = each[100];
+      for (const physical::Sleep::Strand& k : s.state.sleep.strand) asleep += k.asleep;
+    }
+    if (count == 0) first = ms;
+    std::printf("%2d strands wait, %2zu asleep: %.3f ms (x %.2f), none asleep %.3f (x %.2f)\n", count, asleep, ms[0],
+                ms[0] / first[0], ms[1], ms[1] / first[1]);
+  }
+}
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc == 2 && std::string_view(argv[1]) == "sutures") return compare_sutures(), 0;
+  if (argc == 2 && std::string_view(argv[1]) == "waiting") return compare_waiting(), 0;
   if (argc < 2 || std::string_view(argv[1]) != "purse") {
     Sewn stitch = interrupted({});
     Tying t;

@@ -47,6 +47,7 @@ Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wal
   search.reserve(m.wall, s.wall, s.thread.nodes());
   bodies.reserve(m.wall, s.wall);
   holds.reserve(256), marks.reserve(1024);
+  awake.reserve(s);
   point.reserve(thread::kMaxSoftPoints), offset.reserve(thread::kMaxSoftPoints);
 }
 
@@ -91,7 +92,7 @@ uint64_t hash_state(const State& s) {
   }
   for (const thread::SoftContact& c : s.contact) h = hash_bytes(&c.normal_impulse, sizeof c.normal_impulse, h);
   for (const wall::Contact& c : s.lip) h = hash_bytes(&c.impulse, sizeof c.impulse, h);
-  h = hash_bytes(&s.sleep.quiet, sizeof s.sleep.quiet, h);
+  for (const Sleep::Strand& k : s.sleep.strand) h = hash_bytes(&k.quiet, sizeof k.quiet, h);
   if (!s.bodies.body.empty()) {
     Hasher hasher;
     Writer<Hasher> write(hasher);
@@ -122,7 +123,8 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       c.normal_impulse = memory->normal_impulse;
       c.friction_impulse = memory->friction_impulse, c.drift = memory->drift;
     }
-    if (may_share && shared > 0 && shared < 3 && last_node + 1 == node && dot(k.contact[group].normal, c.normal) > 0.95f) {
+    if (may_share && shared > 0 && shared < 3 && last_node + 1 == node && !s.thread.broken[last_node] &&
+        dot(k.contact[group].normal, c.normal) > 0.95f) {
       c.point = k.contact[group].point;
       ++shared;
     } else {
@@ -137,7 +139,9 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
     if (may_share) last_node = node;
     k.contact.push_back(c), k.foot.push_back(foot);
   };
+  const bool asleep = s.sleep.any();
   for (uint32_t i = 0; i < s.thread.nodes(); ++i) {
+    if (asleep && s.sleep.at(i)) continue;
     while (eyelet < s.thread.eyelet.size() && s.thread.eyelet[eyelet].segment < i) ++eyelet;
     // Between the mouths of a channel; also where the end of the thread has already left the first of them, or the last.
     const uint32_t behind = eyelet < s.thread.eyelet.size() ? s.thread.eyelet[eyelet].point : 0;
@@ -239,14 +243,27 @@ void end_bodies(const Model& m, State& s, Scratch& k) {
 
 // The thread in its holes and on the surface, on points that travel with the wall.
 void step_thread(const Model& m, State& s, Scratch& k, const Hands& hands) {
-  for (const Hole& hole : s.hole) k.point.push_back(hole.place), k.offset.push_back(mouth_offset(m, hole));
+  AwakeThread& awake = k.awake;
+  const bool some_asleep = s.sleep.any();
+  if (some_asleep) gather(s, awake);
+  thread::State& t = some_asleep ? awake.part : s.thread;
+  // Points of the holes; those of sleeping strands need none.
+  awake.point_of.assign(s.hole.size(), wall::kNone);
+  for (const thread::Eyelet& e : t.eyelet) awake.point_of[e.point] = 0;
+  for (uint32_t i = 0; i < s.hole.size(); ++i) {
+    if (some_asleep && awake.point_of[i] == wall::kNone) continue;
+    awake.point_of[i] = static_cast<uint32_t>(k.point.size());
+    k.point.push_back(s.hole[i].place), k.offset.push_back(mouth_offset(m, s.hole[i]));
+  }
+  const size_t holes = k.point.size();
+  for (thread::Eyelet& e : t.eyelet) e.point = awake.point_of[e.point];
   if (m.surface_contact) find_contacts(m, s, k);
   // Friction on the surface acts at the mid-surface: its small moment would couple every contact to every other.
-  k.coupling.set_points(m.wall, s.wall.topology, k.point, k.offset, s.hole.size());
+  k.coupling.set_points(m.wall, s.wall.topology, k.point, k.offset, holes);
   k.coupling.begin(m.wall, s.wall);
   for (size_t i = 0; i < k.contact.size(); ++i) k.contact[i].offset = k.foot[i].at - k.coupling.at[k.contact[i].point];
   k.tilt.clear();
-  for (const wall::Coupling::Tilt& t : k.coupling.tilt) k.tilt.push_back({t.other, t.value});
+  for (const wall::Coupling::Tilt& tilt : k.coupling.tilt) k.tilt.push_back({tilt.other, tilt.value});
   thread::SoftPoints soft;
   soft.step = m.wall.step;
   soft.at = k.coupling.at, soft.speed = k.coupling.speed, soft.axis = k.coupling.axis, soft.w = k.coupling.w;
@@ -255,14 +272,42 @@ void step_thread(const Model& m, State& s, Scratch& k, const Hands& hands) {
   soft.moved = k.moved;
   thread::Surroundings around;
   around.plane = hands.plane;
-  around.tools = k.bodies.tool;
-  around.holds = k.holds, around.pulls = hands.pulls, around.soft = &soft, around.soft_contacts = k.contact;
-  k.thread.step(m.thread, s.thread, around);
-  const bool quiet = has_been_quiet(m, s, hands);
+  around.tools = k.bodies.tool, around.soft = &soft, around.soft_contacts = k.contact;
+  around.holds = k.holds, around.pulls = hands.pulls;
+  if (some_asleep) {
+    show_awake(k.holds, hands.pulls, k.contact, awake);
+    around.holds = awake.hold, around.pulls = awake.pull;
+  }
+  k.thread.step(m.thread, t, around);
+  // Back to the numbers of the whole thread.
+  awake.hole_of.assign(holes, 0);
+  for (uint32_t i = 0; i < s.hole.size(); ++i)
+    if (awake.point_of[i] != wall::kNone) awake.hole_of[awake.point_of[i]] = i;
+  for (thread::Eyelet& e : t.eyelet) e.point = awake.hole_of[e.point];
+  if (some_asleep) {
+    scatter(s, awake);
+    for (thread::SoftContact& c : k.contact) c.node = awake.node[c.node];
+    for (size_t i = 0; i < awake.hold.size(); ++i) k.holds[awake.hold_of[i]].force = awake.hold[i].force;
+  }
+  if (some_asleep) hold_asleep(s.sleep, k.holds, k.bodies.tool);
+  const bool quiet = find_quiet(m, s, hands, awake);
   k.coupling.end(s.wall, k.wall);
-  if (quiet) fall_asleep(m, s, k.coupling, k.wall, k.holds, k.bodies.tool);
-  if (m.tear.on && m.surface_contact) tear_bites(m, s, {k.coupling.impulse.data(), s.hole.size()}, k.search);
-  s.contact.assign(k.contact.begin(), k.contact.end());
+  if (quiet) fall_asleep(m, s, k.coupling, k.wall, awake, k.contact, k.holds, k.bodies.tool);
+  if (m.tear.on && m.surface_contact) {
+    awake.impulse.assign(s.hole.size(), {});
+    for (size_t i = 0; i < holes; ++i) awake.impulse[awake.hole_of[i]] = k.coupling.impulse[i];
+    tear_bites(m, s, awake.impulse, k.search);
+  }
+  // Contacts of sleeping strands stay as they are.
+  awake.contact.clear();
+  size_t old = 0;
+  const auto keep_until = [&](uint32_t node) {
+    for (; old < s.contact.size() && s.contact[old].node < node; ++old)
+      if (some_asleep && awake.part_node[s.contact[old].node] == wall::kNone) awake.contact.push_back(s.contact[old]);
+  };
+  for (const thread::SoftContact& c : k.contact) keep_until(c.node), awake.contact.push_back(c);
+  keep_until(wall::kNone);
+  s.contact.assign(awake.contact.begin(), awake.contact.end());
 }
 
 }  // namespace
@@ -290,8 +335,9 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
     show_bodies(m.bodies, s.bodies, m.wall.step, k.bodies);
     k.holds.insert(k.holds.end(), k.bodies.hold.begin(), k.bodies.hold.end());
   }
-  if (s.sleep.asleep && !sleeps_on(m, s, hands, k.holds, k.bodies.tool)) wake(s.sleep);
-  if (s.sleep.asleep) hold_still(s.sleep, s.wall, k.wall, k.holds, k.bodies.tool);
+  wake_strands(m, s, hands, k.holds, k.bodies.tool, k.search.moved, k.awake);
+  press_asleep(s.sleep, s.wall, k.wall);
+  if (s.sleep.all()) hold_asleep(s.sleep, k.holds, k.bodies.tool);
   else step_thread(m, s, k, hands);
   for (size_t i = 0; i < k.holds.size(); ++i)
     (i < hands.holds.size() ? hands.holds[i] : k.bodies.hold[i - hands.holds.size()]).force = k.holds[i].force;

@@ -57,7 +57,7 @@ struct State {
   std::vector<wall::Contact> lip;            // memory of wall on wall
   Bodies bodies;
   std::vector<Needle> needle;
-  Sleep sleep;                                 // of the thread
+  Sleep sleep;                                 // of the thread's strands
   std::shared_ptr<const Surface> cut_surface;  // of a wall that was cut; follows from wall.topology.cut
 };
 inline const Surface& surface_of(const Model& m, const State& s) { return s.cut_surface ? *s.cut_surface : m.surface; }
@@ -93,6 +93,7 @@ struct Scratch {
   BodiesScratch bodies;
   std::vector<thread::Hold> holds;  // those of the hands, then those of the bodies
   std::vector<wall::Mark> marks;    // of a pen (physical/excise)
+  AwakeThread awake;
   explicit Scratch(const Model& model, const State& state);
 };
 

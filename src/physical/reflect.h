@@ -56,9 +56,17 @@ constexpr void reflect(auto& a, Like<Needle> auto& n) {
 constexpr void reflect(auto& a, Like<Hole> auto& h) {
   a(h.place), a(h.within), a(h.deepest), a(h.made), a(h.torn), a(h.out), a(h.load);
 }
-constexpr void reflect(auto& a, Like<Sleep::Load> auto& l) { a(l.at), a(l.impulse); }
+constexpr void reflect(auto& a, Like<Sleep::Strand> auto& k) { a(k.first), a(k.last), a(k.quiet), a(k.asleep); }
+constexpr void reflect(auto& a, Like<Sleep::Load> auto& l) { a(l.strand), a(l.at), a(l.impulse); }
+constexpr void reflect(auto& a, Like<Sleep::Watched> auto& w) {
+  a(w.strand), a(w.column), a(w.mid), a(w.director), a(w.may_move);
+}
+constexpr void reflect(auto& a, Like<Sleep::Held> auto& h) { a(h.strand), a(h.node), a(h.to), a(h.force); }
+constexpr void reflect(auto& a, Like<Sleep::Touched> auto& t) {
+  a(t.strand), a(t.tool), a(t.a), a(t.b), a(t.force_a), a(t.force_b);
+}
 constexpr void reflect(auto& a, Like<Sleep> auto& z) {
-  a(z.asleep), a(z.quiet), a(z.from), a(z.tension), a(z.load), a(z.wall), a(z.may_move), a(z.hold), a(z.tool);
+  a(z.strand), a(z.holes), a(z.from), a(z.tension), a(z.load), a(z.watched), a(z.held), a(z.touched);
 }
 constexpr void reflect(auto& a, Like<State> auto& s) {
   auto& t = s.wall.topology;

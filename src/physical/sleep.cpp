@@ -26,18 +26,18 @@ float to_segment(Vec3 p, Vec3 a, Vec3 b) {
 
 // Calls visit(first node of a block, its last node, length of thread [m] from the first one to any other).
 template <typename Visit>
-bool any_block(const thread::State& t, Visit visit) {
-  for (size_t first = 0; first < t.nodes(); first += kBlock) {
-    const size_t last = std::min(first + kBlock, t.nodes() - 1);
+bool any_block(const thread::State& t, const Sleep::Strand& strand, Visit visit) {
+  for (size_t first = strand.first; first <= strand.last; first += kBlock) {
+    const size_t last = std::min(first + kBlock, size_t{strand.last});
     float reach = 0;
-    for (size_t i = first; i < last; ++i) reach += t.broken[i] ? distance(t.x.at(i), t.x.at(i + 1)) : 1.05f * t.rest[i];
+    for (size_t i = first; i < last; ++i) reach += 1.05f * t.rest[i];
     if (visit(first, last, reach)) return true;
   }
   return false;
 }
 
-bool touches(const thread::State& t, Vec3 a, Vec3 b, float reach) {
-  return any_block(t, [&](size_t first, size_t last, float around) {
+bool touches(const thread::State& t, const Sleep::Strand& strand, Vec3 a, Vec3 b, float reach) {
+  return any_block(t, strand, [&](size_t first, size_t last, float around) {
     if (to_segment(t.x.at(first), a, b) > around + reach) return false;
     for (size_t i = first; i <= last; ++i) {
       const float half = 0.55f * std::max(i < t.segments() ? t.rest[i] : 0.0f, i > 0 ? t.rest[i - 1] : 0.0f);
@@ -47,114 +47,435 @@ bool touches(const thread::State& t, Vec3 a, Vec3 b, float reach) {
   });
 }
 
-// Where the wall is, and how far each column may move until it could touch the thread.
-void note_wall(const Model& m, State& s) {
-  Sleep& z = s.sleep;
-  const uint32_t columns = wall::columns(s.wall);
-  z.wall.resize(2 * columns), z.may_move.resize(columns);
-  for (uint32_t c = 0; c < columns; ++c) {
-    z.wall[2 * c] = mid(s.wall, c), z.wall[2 * c + 1] = director(s.wall, c);
-    float far = 1;
-    any_block(s.thread, [&](size_t first, size_t, float around) {
-      far = std::min(far, distance(s.thread.x.at(first), z.wall[2 * c]) - around);
+// Half a segment beside a node: nothing of the strand is farther from its nearest node.
+float half_at(const thread::State& t, size_t i) {
+  return 0.55f * std::max(i < t.segments() ? t.rest[i] : 0.0f, i > 0 ? t.rest[i - 1] : 0.0f);
+}
+
+AwakeThread::Box box_of(const thread::State& t, const Sleep::Strand& strand) {
+  AwakeThread::Box box{t.x.at(strand.first), t.x.at(strand.first)};
+  float half = 0;
+  for (size_t i = strand.first; i <= strand.last; ++i) {
+    const Vec3 p = t.x.at(i);
+    box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
+    box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
+    half = std::max(half, half_at(t, i));
+  }
+  const Vec3 around{half, half, half};
+  return {box.low - around, box.high + around};
+}
+bool apart(const AwakeThread::Box& a, const AwakeThread::Box& b, float reach) {
+  return a.low.x > b.high.x + reach || b.low.x > a.high.x + reach || a.low.y > b.high.y + reach || b.low.y > a.high.y + reach ||
+         a.low.z > b.high.z + reach || b.low.z > a.high.z + reach;
+}
+
+// Whether two strands may be nearer to each other than `reach`.
+bool near(const thread::State& t, const Sleep::Strand& a, const Sleep::Strand& b, float reach) {
+  return any_block(t, a, [&](size_t a_first, size_t a_last, float a_around) {
+    return any_block(t, b, [&](size_t b_first, size_t b_last, float b_around) {
+      if (distance(t.x.at(a_first), t.x.at(b_first)) > a_around + b_around + reach) return false;
+      for (size_t i = a_first; i <= a_last; ++i)
+        for (size_t j = b_first; j <= b_last; ++j)
+          if (distance(t.x.at(i), t.x.at(j)) < half_at(t, i) + half_at(t, j) + reach) return true;
       return false;
     });
-    z.may_move[c] = std::max(m.sleep.nearby, 0.3f * (far - kAway));
+  });
+}
+
+float strand_reach(const Model& m, const State& s, const Sleep::Strand& strand) {
+  float speed2 = 0;
+  for (size_t i = strand.first; i <= strand.last; ++i) speed2 = std::max(speed2, length2(s.thread.v.at(i)));
+  return m.thread.material.diameter + kMargin + 2 * m.wall.step * std::sqrt(speed2);
+}
+
+// A list whose entries name their strands, without those of one strand.
+template <typename Entries>
+void forget(Entries& entries, uint32_t strand) {
+  std::erase_if(entries, [&](const auto& e) { return e.strand == strand; });
+}
+
+constexpr float kWatched = 5e-3f;  // [m] beyond kAway: columns nearer than that are watched one by one
+
+// How far [m] a column is from being near a strand.
+float away_from(const State& s, const Sleep::Strand& strand, uint32_t column) {
+  float far = 1;
+  const Vec3 at = mid(s.wall, column);
+  any_block(s.thread, strand, [&](size_t first, size_t, float around) {
+    far = std::min(far, distance(s.thread.x.at(first), at) - around);
+    return false;
+  });
+  return far - kAway;
+}
+
+void wake_one(State& s, uint32_t strand) {
+  Sleep& z = s.sleep;
+  if (z.strand[strand].asleep) s.thread.travel = std::max(s.thread.travel, 1.0f);  // its pairs are listed again
+  z.strand[strand].asleep = false, z.strand[strand].quiet = 0;
+  forget(z.load, strand), forget(z.watched, strand), forget(z.held, strand), forget(z.touched, strand);
+}
+
+// The strands of the thread. Those that are what they were sleep on.
+void list_strands(State& s) {
+  Sleep& z = s.sleep;
+  const thread::State& t = s.thread;
+  const uint32_t n = static_cast<uint32_t>(t.nodes());
+  size_t k = 0;
+  bool same = !z.strand.empty() && z.from.size() == n;
+  uint32_t first = 0;
+  for (uint32_t i = 0; i < n && same; ++i) {
+    if (i + 1 < n && !t.broken[i]) continue;
+    same = k < z.strand.size() && z.strand[k].first == first && z.strand[k].last == i;
+    ++k, first = i + 1;
   }
+  if (same && k == z.strand.size()) return;
+  wake(s);
+  z.strand.clear(), first = 0;
+  for (uint32_t i = 0; i < n; ++i) {
+    if (i + 1 < n && !t.broken[i]) continue;
+    z.strand.push_back({first, i}), first = i + 1;
+  }
+  z.from.resize(n), z.tension.resize(t.segments());
+}
+
+// Where the wall near a strand is, and how far each column may move until it could touch the strand.
+void note_wall(const Model& m, State& s, uint32_t strand) {
+  Sleep& z = s.sleep;
+  forget(z.watched, strand);
+  for (uint32_t c = 0; c < wall::columns(s.wall); ++c) {
+    const float far = away_from(s, z.strand[strand], c);
+    if (far > kWatched) continue;
+    z.watched.push_back({strand, c, mid(s.wall, c), director(s.wall, c), std::max(m.sleep.nearby, 0.3f * far)});
+  }
+}
+
+bool sleeps_on(const Model& m, const State& s, uint32_t strand, std::span<const thread::Hold> holds,
+               std::span<const thread::ToolCapsule> tools, double wall_moved, AwakeThread& awake) {
+  const Sleep& z = s.sleep;
+  const Sleep::Strand& me = z.strand[strand];
+  const float touched2 = m.sleep.touched * m.sleep.touched;
+  if (awake.disturbed[strand]) return false;
+  size_t held = 0;
+  for (const Sleep::Held& h : z.held) held += h.strand == strand;
+  for (const thread::Hold& hold : holds) {
+    if (hold.node < me.first || hold.node > me.last) continue;
+    const auto known = std::find_if(z.held.begin(), z.held.end(), [&](const Sleep::Held& h) { return h.node == hold.node; });
+    if (known == z.held.end() || length2(hold.to - known->to) > touched2) return false;
+    --held;
+  }
+  if (held != 0) return false;
+  for (const Sleep::Touched& c : z.touched)
+    if (c.strand == strand && (c.tool >= tools.size() || length2(tools[c.tool].to_a - c.a) > touched2 ||
+                               length2(tools[c.tool].to_b - c.b) > touched2))
+      return false;
+  for (uint32_t i = 0; i < tools.size(); ++i) {
+    const thread::ToolCapsule& c = tools[i];
+    const float step = std::max(distance(c.a, c.to_a), distance(c.b, c.to_b));
+    const float reach = c.radius + 0.5f * m.thread.material.diameter + kMargin + step;
+    const AwakeThread::Box box{{std::min(c.to_a.x, c.to_b.x), std::min(c.to_a.y, c.to_b.y), std::min(c.to_a.z, c.to_b.z)},
+                               {std::max(c.to_a.x, c.to_b.x), std::max(c.to_a.y, c.to_b.y), std::max(c.to_a.z, c.to_b.z)}};
+    if (apart(box, awake.box[strand], reach) || !touches(s.thread, me, c.to_a, c.to_b, reach)) continue;
+    if (std::none_of(z.touched.begin(), z.touched.end(),
+                     [&](const Sleep::Touched& t) { return t.strand == strand && t.tool == i; }))
+      return false;
+  }
+  if (wall_moved < awake.far_due[strand]) return true;
+  float least = 1;
+  const auto watched = [&](uint32_t c) {
+    return std::any_of(z.watched.begin(), z.watched.end(),
+                       [&](const Sleep::Watched& w) { return w.strand == strand && w.column == c; });
+  };
+  for (uint32_t c = 0; c < wall::columns(s.wall); ++c)
+    if (const float far = away_from(s, me, c); far < least && !watched(c)) least = far;
+  awake.far_due[strand] = wall_moved + static_cast<double>(least);
+  return least > 0;
+}
+
+template <typename To, typename From>
+void take(To& to, const From& from, std::span<const uint32_t> node) {
+  to.resize(node.size());
+  for (size_t i = 0; i < node.size(); ++i) to[i] = from[node[i]];
+}
+template <typename To, typename From>
+void put(To& to, const From& from, std::span<const uint32_t> node, size_t count) {
+  for (size_t i = 0; i < count; ++i) to[node[i]] = from[i];
+}
+// The columns of nodes in both threads.
+template <typename Visit>
+void each_node_column(thread::State& to, const thread::State& from, Visit visit) {
+  using thread::Columns3;
+  using thread::State;
+  for (Columns3 State::*c : {&State::x, &State::fine, &State::v, &State::plane_friction, &State::plane_drift, &State::listed})
+    for (thread::Column Columns3::*d : {&Columns3::x, &Columns3::y, &Columns3::z}) visit((to.*c).*d, (from.*c).*d);
+  visit(to.warm, from.warm), visit(to.plane_normal, from.plane_normal);
 }
 
 }  // namespace
 
+bool Sleep::any() const {
+  return std::any_of(strand.begin(), strand.end(), [](const Strand& k) { return k.asleep; });
+}
+bool Sleep::all() const {
+  return !strand.empty() && std::all_of(strand.begin(), strand.end(), [](const Strand& k) { return k.asleep; });
+}
+bool Sleep::at(uint32_t node) const {
+  const auto after = std::partition_point(strand.begin(), strand.end(), [&](const Strand& k) { return k.last < node; });
+  return after != strand.end() && after->asleep;
+}
+
+void AwakeThread::reserve(const State& s) {
+  const size_t nodes = s.thread.nodes(), pairs = std::max<size_t>(4096, s.thread.key.capacity());
+  each_node_column(part, part, [&](thread::Column& c, const thread::Column&) { c.reserve(nodes); });
+  part.rest.reserve(nodes), part.tension.reserve(nodes), part.broken.reserve(nodes);
+  part.key.reserve(pairs), part.budget.reserve(pairs), part.crossing.reserve(pairs), part.eyelet.reserve(thread::kMaxEyelets);
+  node.reserve(nodes), part_node.reserve(nodes), hold.reserve(256), hold_of.reserve(256), pull.reserve(256);
+  point_of.reserve(thread::kMaxEyelets), hole_of.reserve(thread::kMaxEyelets), impulse.reserve(thread::kMaxEyelets);
+  key.reserve(2 * pairs), budget.reserve(2 * pairs), crossing.reserve(2 * pairs), eyelet.reserve(thread::kMaxEyelets);
+  contact.reserve(2 * thread::kMaxSoftPoints), ready.reserve(nodes), disturbed.reserve(nodes), box.reserve(nodes),
+      far_due.reserve(nodes);
+}
+
 void reserve(const State& s, Sleep& z) {
-  const size_t nodes = s.thread.nodes(), columns = wall::columns(s.wall), room = columns + columns / 3 + 64;
-  z.from.reserve(nodes), z.tension.reserve(nodes), z.load.reserve(2 * room), z.wall.reserve(2 * room);
-  z.may_move.reserve(room), z.hold.reserve(2 * 256), z.tool.reserve(4 * kMaxThreadCapsules);
+  const size_t nodes = s.thread.nodes(), columns = wall::columns(s.wall);
+  z.from.reserve(nodes), z.tension.reserve(nodes), z.strand.reserve(nodes);
+  z.load.reserve(4 * columns + 64), z.watched.reserve(16 * columns + 64), z.held.reserve(256), z.touched.reserve(1024);
 }
 
-void wake(Sleep& z) {
-  z.asleep = false, z.quiet = 0;
-  z.load.clear(), z.wall.clear(), z.may_move.clear(), z.hold.clear(), z.tool.clear();
+void wake(State& s) {
+  Sleep& z = s.sleep;
+  if (z.any()) s.thread.travel = std::max(s.thread.travel, 1.0f);  // its pairs are listed again
+  for (Sleep::Strand& k : z.strand) k.asleep = false, k.quiet = 0;
+  z.load.clear(), z.watched.clear(), z.held.clear(), z.touched.clear();
 }
 
-bool sleeps_on(const Model& m, const State& s, const Hands& hands, std::span<const thread::Hold> holds,
-               std::span<const thread::ToolCapsule> tools) {
-  const Sleep& z = s.sleep;
-  const thread::State& t = s.thread;
-  const uint32_t columns = wall::columns(s.wall);
-  const float touched2 = m.sleep.touched * m.sleep.touched;
-  if (!m.sleep.on || !hands.pulls.empty() || t.travel > 1e8f) return false;  // pulled, cut, or a tool was put elsewhere
-  if (z.wall.size() != 2 * columns || z.hold.size() != 2 * holds.size() || z.tool.size() != 4 * tools.size()) return false;
-  for (size_t i = 0; i < holds.size(); ++i)
-    if (length2(holds[i].to - z.hold[2 * i]) > touched2) return false;
-  for (uint32_t c = 0; c < columns; ++c) {
-    const float most2 = z.may_move[c] * z.may_move[c];
-    if (length2(mid(s.wall, c) - z.wall[2 * c]) > most2 || length2(director(s.wall, c) - z.wall[2 * c + 1]) > most2)
-      return false;
+void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const thread::Hold> holds,
+                  std::span<const thread::ToolCapsule> tools, double wall_moved, AwakeThread& awake) {
+  Sleep& z = s.sleep;
+  const uint32_t holes = static_cast<uint32_t>(s.thread.eyelet.size());
+  list_strands(s);
+  // Pulled, cut, laced, or a tool was put elsewhere.
+  if (!m.sleep.on || !hands.pulls.empty() || s.thread.travel > 1e8f || holes != z.holes) wake(s);
+  z.holes = holes;
+  if (!z.any()) return;
+  const uint32_t n = static_cast<uint32_t>(z.strand.size());
+  if (awake.far_due.size() != n) awake.far_due.assign(n, -1);
+  awake.box.resize(n);
+  for (uint32_t k = 0; k < n; ++k) awake.box[k] = box_of(s.thread, z.strand[k]);
+  awake.disturbed.assign(n, 0);
+  for (const Sleep::Watched& w : z.watched) {
+    const float most2 = w.may_move * w.may_move;
+    if (w.column >= wall::columns(s.wall) || length2(mid(s.wall, w.column) - w.mid) > most2 ||
+        length2(director(s.wall, w.column) - w.director) > most2)
+      awake.disturbed[w.strand] = 1;
   }
-  for (size_t i = 0; i < tools.size(); ++i) {
-    const thread::ToolCapsule& c = tools[i];
-    if (length2(c.to_a - z.tool[4 * i]) <= touched2 && length2(c.to_b - z.tool[4 * i + 1]) <= touched2) continue;
-    const float step = std::max(distance(c.a, c.to_a), distance(c.b, c.to_b));
-    if (touches(t, c.to_a, c.to_b, c.radius + 0.5f * m.thread.material.diameter + kMargin + step)) return false;
+  for (uint32_t k = 0; k < n; ++k)
+    if (z.strand[k].asleep && !sleeps_on(m, s, k, holds, tools, wall_moved, awake)) wake_one(s, k);
+  for (bool more = true; more;) {
+    more = false;
+    for (uint32_t a = 0; a < n; ++a) {
+      if (z.strand[a].asleep) continue;
+      const float reach = strand_reach(m, s, z.strand[a]);
+      for (uint32_t b = 0; b < n; ++b) {
+        if (!z.strand[b].asleep || apart(awake.box[a], awake.box[b], reach)) continue;
+        if (near(s.thread, z.strand[a], z.strand[b], reach)) wake_one(s, b), more = true;
+      }
+    }
   }
-  return true;
 }
 
-void hold_still(const Sleep& z, wall::State& wall, wall::Scratch& k, std::span<thread::Hold> holds,
-                std::span<thread::ToolCapsule> tools) {
-  for (size_t i = 0; i < holds.size(); ++i) holds[i].force = z.hold[2 * i + 1];
-  for (size_t i = 0; i < tools.size(); ++i) tools[i].force_a = z.tool[4 * i + 2], tools[i].force_b = z.tool[4 * i + 3];
+void press_asleep(const Sleep& z, wall::State& wall, wall::Scratch& k) {
   if (z.load.empty()) return;
   std::fill(k.external.begin(), k.external.end(), wall::Float4{});
-  for (const Sleep::Load& load : z.load) k.external[load.at] = wall::float4(load.impulse);
+  for (const Sleep::Load& load : z.load) k.external[load.at] = wall::float4(wall::vec3(k.external[load.at]) + load.impulse);
   wall::apply_impulses(wall, k, k.external);
   std::fill(k.external.begin(), k.external.end(), wall::Float4{});
 }
 
-bool has_been_quiet(const Model& m, State& s, const Hands& hands) {
+void hold_asleep(const Sleep& z, std::span<thread::Hold> holds, std::span<thread::ToolCapsule> tools) {
+  if (z.all()) {  // nothing was stepped
+    for (thread::Hold& hold : holds) hold.force = {};
+    for (thread::ToolCapsule& tool : tools) tool.force_a = tool.force_b = {};
+  }
+  for (const Sleep::Held& h : z.held)
+    for (thread::Hold& hold : holds)
+      if (hold.node == h.node) hold.force = h.force;
+  for (const Sleep::Touched& t : z.touched) tools[t.tool].force_a += t.force_a, tools[t.tool].force_b += t.force_b;
+}
+
+void gather(const State& s, AwakeThread& k) {
+  const thread::State& t = s.thread;
+  thread::State& p = k.part;
+  k.node.clear(), k.part_node.assign(t.nodes(), wall::kNone);
+  for (const Sleep::Strand& strand : s.sleep.strand)
+    for (uint32_t i = strand.first; i <= strand.last && !strand.asleep; ++i)
+      k.part_node[i] = static_cast<uint32_t>(k.node.size()), k.node.push_back(i);
+  each_node_column(p, t, [&](thread::Column& to, const thread::Column& from) { take(to, from, k.node); });
+  const size_t segments = k.node.size() - 1;
+  p.rest.resize(segments), p.tension.resize(segments), p.broken.resize(segments);
+  for (size_t i = 0; i < segments; ++i)
+    p.rest[i] = t.rest[k.node[i]], p.tension[i] = t.tension[k.node[i]], p.broken[i] = t.broken[k.node[i]];
+  p.key.clear(), p.budget.clear(), p.crossing.clear(), p.eyelet.clear();
+  for (size_t i = 0; i < t.key.size(); ++i) {
+    const uint32_t first = k.part_node[thread::segment_of(t.key[i])], other = thread::partner_of(t.key[i]);
+    const uint32_t second = other < thread::kTool ? k.part_node[other] : other;
+    if (first == wall::kNone || second == wall::kNone) continue;
+    p.key.push_back(first << 16 | second), p.budget.push_back(t.budget[i]), p.crossing.push_back(t.crossing[i]);
+  }
+  for (thread::Eyelet e : t.eyelet)
+    if (k.part_node[e.segment] != wall::kNone) e.segment = k.part_node[e.segment], p.eyelet.push_back(e);
+  p.travel = t.travel, p.overflow = t.overflow, p.refreshes = t.refreshes;
+}
+
+void show_awake(std::span<const thread::Hold> holds, std::span<const thread::Pull> pulls,
+                std::span<thread::SoftContact> contacts, AwakeThread& k) {
+  k.hold.clear(), k.hold_of.clear(), k.pull.clear();
+  for (uint32_t i = 0; i < holds.size(); ++i) {
+    if (k.part_node[holds[i].node] == wall::kNone) continue;
+    k.hold.push_back(holds[i]), k.hold_of.push_back(i);
+    k.hold.back().node = k.part_node[holds[i].node];
+  }
+  for (const thread::Pull& pull : pulls) k.pull.push_back({k.part_node[pull.node], pull.force});  // all are awake then
+  for (thread::SoftContact& c : contacts) c.node = k.part_node[c.node];
+}
+
+void scatter(State& s, AwakeThread& k) {
+  thread::State& t = s.thread;
+  thread::State& p = k.part;
+  each_node_column(t, p, [&](thread::Column& to, const thread::Column& from) { put(to, from, k.node, k.node.size()); });
+  for (size_t i = 0; i + 1 < k.node.size(); ++i) t.tension[k.node[i]] = p.tension[i], t.broken[k.node[i]] = p.broken[i];
+  // The pairs of sleeping strands stay as they are; both lists are sorted.
+  k.key.clear(), k.budget.clear(), k.crossing.clear();
+  size_t old = 0;
+  const auto keep_until = [&](uint32_t end) {
+    for (; old < t.key.size() && t.key[old] < end; ++old) {
+      const uint32_t other = thread::partner_of(t.key[old]);
+      const bool awake = k.part_node[thread::segment_of(t.key[old])] != wall::kNone;
+      if (awake && (other >= thread::kTool || k.part_node[other] != wall::kNone)) continue;
+      k.key.push_back(t.key[old]), k.budget.push_back(t.budget[old]), k.crossing.push_back(t.crossing[old]);
+    }
+  };
+  for (size_t i = 0; i < p.key.size(); ++i) {
+    const uint32_t other = thread::partner_of(p.key[i]);
+    const uint32_t key = k.node[thread::segment_of(p.key[i])] << 16 | (other < thread::kTool ? k.node[other] : other);
+    keep_until(key);
+    k.key.push_back(key), k.budget.push_back(p.budget[i]), k.crossing.push_back(p.crossing[i]);
+  }
+  keep_until(UINT32_MAX);
+  t.key.assign(k.key.begin(), k.key.end()), t.budget.assign(k.budget.begin(), k.budget.end());
+  t.crossing.assign(k.crossing.begin(), k.crossing.end());
+  k.eyelet.assign(t.eyelet.begin(), t.eyelet.end());
+  t.eyelet.clear();
+  size_t mine = 0;
+  const auto mine_until = [&](uint32_t segment) {
+    for (; mine < p.eyelet.size() && k.node[p.eyelet[mine].segment] < segment; ++mine) {
+      thread::Eyelet e = p.eyelet[mine];
+      e.segment = k.node[e.segment], t.eyelet.push_back(e);
+    }
+  };
+  for (const thread::Eyelet& e : k.eyelet)
+    if (k.part_node[e.segment] == wall::kNone) mine_until(e.segment), t.eyelet.push_back(e);
+  mine_until(UINT32_MAX);
+  t.travel = p.travel, t.overflow = p.overflow, t.refreshes = p.refreshes;
+}
+
+bool find_quiet(const Model& m, State& s, const Hands& hands, AwakeThread& awake) {
   Sleep& z = s.sleep;
   const thread::State& t = s.thread;
-  if (!m.sleep.on || !hands.pulls.empty() || t.travel > 1e8f) return z.quiet = 0, false;
-  const bool begun = z.quiet > 0 && z.from.size() == t.nodes();
-  if (begun && ++z.quiet <= m.sleep.window) return false;
-  bool quiet = begun;
-  for (size_t i = 0; i < t.nodes() && quiet; ++i)
-    quiet = length2(t.position(i) - z.from[i]) <= m.sleep.still * m.sleep.still && length(t.v.at(i)) < kQuietSpeed;
-  for (size_t i = 0; i < t.segments() && quiet; ++i)
-    quiet = std::abs(t.tension[i] - z.tension[i]) <= m.sleep.steady + 0.01f * std::abs(z.tension[i]);
-  if (quiet) return true;
-  z.quiet = 1;  // a new window
-  z.from.resize(t.nodes());
-  for (size_t i = 0; i < t.nodes(); ++i) z.from[i] = t.position(i);
-  z.tension.assign(t.tension.begin(), t.tension.end());
-  return false;
+  awake.ready.assign(z.strand.size(), 0);
+  const bool disturbed = !m.sleep.on || !hands.pulls.empty() || t.travel > 1e8f;
+  bool any = false;
+  for (uint32_t k = 0; k < z.strand.size(); ++k) {
+    Sleep::Strand& strand = z.strand[k];
+    if (strand.asleep) continue;
+    if (disturbed) {
+      strand.quiet = 0;
+      continue;
+    }
+    const bool begun = strand.quiet > 0;
+    if (begun && ++strand.quiet <= m.sleep.window) continue;
+    bool quiet = begun;
+    for (size_t i = strand.first; i <= strand.last && quiet; ++i)
+      quiet = length2(t.position(i) - z.from[i]) <= m.sleep.still * m.sleep.still && length(t.v.at(i)) < kQuietSpeed;
+    for (size_t i = strand.first; i < strand.last && quiet; ++i)
+      quiet = std::abs(t.tension[i] - z.tension[i]) <= m.sleep.steady + 0.01f * std::abs(z.tension[i]);
+    awake.ready[k] = quiet, any |= quiet;
+    if (quiet) continue;
+    strand.quiet = 1;  // a new window
+    for (size_t i = strand.first; i <= strand.last; ++i) z.from[i] = t.position(i);
+    for (size_t i = strand.first; i < strand.last; ++i) z.tension[i] = t.tension[i];
+  }
+  // A strand beside one that moves waits for it.
+  for (bool more = any; more;) {
+    more = false;
+    for (uint32_t a = 0; a < z.strand.size(); ++a) {
+      if (z.strand[a].asleep || awake.ready[a]) continue;
+      const float reach = 1.5f * strand_reach(m, s, z.strand[a]);
+      for (uint32_t b = 0; b < z.strand.size(); ++b)
+        if (awake.ready[b] && near(t, z.strand[a], z.strand[b], reach)) awake.ready[b] = 0, more = true;
+    }
+  }
+  return std::any_of(awake.ready.begin(), awake.ready.end(), [](uint8_t r) { return r != 0; });
 }
 
 void after_cut(const Model& m, State& s) {
-  if (!s.sleep.asleep) return;
-  if (s.sleep.load.empty()) note_wall(m, s);  // columns may have other numbers now
-  else wake(s.sleep);
+  Sleep& z = s.sleep;
+  if (!z.load.empty()) wake(s);
+  for (uint32_t k = 0; k < z.strand.size(); ++k)
+    if (z.strand[k].asleep) note_wall(m, s, k);  // columns may have other numbers now
 }
 
-void fall_asleep(const Model& m, State& s, const wall::Coupling& coupling, wall::Scratch& k,
-                 std::span<const thread::Hold> holds, std::span<const thread::ToolCapsule> tools) {
-  wake(s.sleep);
+void fall_asleep(const Model& m, State& s, wall::Coupling& coupling, wall::Scratch& k, AwakeThread& awake,
+                 std::span<const thread::SoftContact> contacts, std::span<const thread::Hold> holds,
+                 std::span<const thread::ToolCapsule> tools) {
   Sleep& z = s.sleep;
-  z.asleep = true;
-  note_wall(m, s);
-  const uint32_t columns = wall::columns(s.wall);
-  coupling.spread(k.external);
-  for (uint32_t i = 0; i < 2 * columns; ++i) {
-    const Vec3 impulse = wall::vec3(k.external[i]);
-    if (impulse == Vec3{}) continue;
-    z.load.push_back({i, impulse});
-    z.may_move[i / 2] = m.sleep.touched;
+  const thread::State& t = s.thread;
+  const float newtons = 1 / (m.thread.substep * m.thread.substep);
+  for (uint32_t strand = 0; strand < z.strand.size(); ++strand) {
+    const uint32_t columns = wall::columns(s.wall);
+    // Without room for what it would remember it stays awake.
+    const auto full = [](const auto& list, size_t more) { return list.size() + more > list.capacity(); };
+    if (!awake.ready[strand] || full(z.watched, columns) || full(z.load, 2 * columns) || full(z.held, holds.size()) ||
+        full(z.touched, tools.size()))
+      continue;
+    Sleep::Strand& me = z.strand[strand];
+    me.asleep = true;
+    if (strand < awake.far_due.size()) awake.far_due[strand] = -1;
+    const auto has = [&](uint32_t node) { return node >= me.first && node <= me.last; };
+    const size_t noted = z.watched.size();
+    note_wall(m, s, strand);
+    // Its own impulses.
+    awake.impulse.assign(coupling.impulse.begin(), coupling.impulse.end());
+    std::fill(coupling.impulse.begin(), coupling.impulse.end(), Vec3{});
+    for (const thread::Eyelet& e : t.eyelet)
+      if (has(e.segment) && awake.point_of[e.point] != wall::kNone)
+        coupling.impulse[awake.point_of[e.point]] = awake.impulse[awake.point_of[e.point]];
+    for (const thread::SoftContact& c : contacts)
+      if (has(c.node)) coupling.impulse[c.point] = awake.impulse[c.point];
+    coupling.spread(k.external);
+    std::copy(awake.impulse.begin(), awake.impulse.end(), coupling.impulse.begin());
+    for (uint32_t i = 0; i < 2 * columns; ++i)
+      if (const Vec3 impulse = wall::vec3(k.external[i]); !(impulse == Vec3{})) z.load.push_back({strand, i, impulse});
+    for (size_t i = noted; i < z.watched.size(); ++i) {
+      const uint32_t at = 2 * z.watched[i].column;
+      if (!(wall::vec3(k.external[at]) == Vec3{}) || !(wall::vec3(k.external[at + 1]) == Vec3{}))
+        z.watched[i].may_move = m.sleep.touched;
+    }
+    std::fill(k.external.begin(), k.external.end(), wall::Float4{});
+    for (const thread::Hold& hold : holds)
+      if (has(hold.node)) z.held.push_back({strand, hold.node, hold.to, hold.force});
+    for (uint32_t i = 0; i < tools.size(); ++i) {
+      const thread::ToolCapsule& c = tools[i];
+      if (!touches(t, me, c.to_a, c.to_b, c.radius + 0.5f * m.thread.material.diameter + 2 * kMargin)) continue;
+      Sleep::Touched touched{strand, i, c.to_a, c.to_b, {}, {}};
+      for (size_t q = 0; q < t.key.size(); ++q) {
+        if (thread::partner_of(t.key[q]) != thread::kTool + i || !has(thread::segment_of(t.key[q]))) continue;
+        const thread::Crossing& x = t.crossing[q];
+        const Vec3 force = (x.normal * x.normal_impulse + x.friction_impulse) * -newtons;
+        touched.force_a += force * (1 - x.t), touched.force_b += force * x.t;
+      }
+      z.touched.push_back(touched);
+    }
+    for (size_t i = me.first; i <= me.last; ++i) s.thread.v.set(i, {});
   }
-  std::fill(k.external.begin(), k.external.end(), wall::Float4{});
-  for (const thread::Hold& hold : holds) z.hold.push_back(hold.to), z.hold.push_back(hold.force);
-  for (const thread::ToolCapsule& tool : tools)
-    for (const Vec3 v : {tool.to_a, tool.to_b, tool.force_a, tool.force_b}) z.tool.push_back(v);
-  for (thread::Column* v : {&s.thread.v.x, &s.thread.v.y, &s.thread.v.z}) std::fill(v->begin(), v->end(), 0.0f);
 }
 
 }  // namespace catgut::physical

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// physical/sleep: a thread that has been quiet is not stepped any more. It keeps its shape and tension, and its forces on the
-// wall, on holds and on tools stay what they were. It wakes when the wall near it, a hold or a tool moves, when a hole is
-// added, or when it is cut. Reads wall, holds and tools of a step; writes State::sleep. docs/physical.md, "Cost".
+// physical/sleep: a strand of the thread (between broken segments) that has been quiet is not stepped any more. It keeps its
+// shape and tension, and its forces on the wall, on holds and on tools stay what they were. It wakes when the wall near it, a
+// hold, a tool or an awake strand moves there, when a hole is added, or when thread is cut. While some strands sleep, the
+// others are gathered into a thread of their own for the step. Reads wall, holds and tools of a step; writes State::sleep.
+// docs/physical.md, "Cost".
 #pragma once
 #include <cstdint>
 #include <span>
@@ -22,42 +24,94 @@ struct SleepModel {
   uint32_t window = 250;  // steps
   float still = 1e-6f;    // [m] no node is farther from where it was at the beginning of the window
   float steady = 5e-3f;   // [N] no tension has changed by more, plus a hundredth of it
-  float touched = 2e-6f;  // [m] motion of a hold, a tool or a loaded column that wakes the thread
-  float nearby = 50e-6f;  // [m] the same for a column near the thread that it does not load
+  float touched = 2e-6f;  // [m] motion of a hold, a tool or a loaded column that wakes the strand
+  float nearby = 50e-6f;  // [m] the same for a column near the strand that it does not load
 };
 
 struct Sleep {
-  bool asleep = false;
-  uint32_t quiet = 0;          // steps since the window began
-  std::vector<Vec3> from;      // [m] per node, at the beginning of the window
+  struct Strand {
+    uint32_t first = 0, last = 0;  // nodes
+    uint32_t quiet = 0;            // steps since its window began
+    bool asleep = false;
+  };
+  std::vector<Strand> strand;  // all of the thread, in order
+  uint32_t holes = 0;          // of the thread, when the strands were listed
+  std::vector<Vec3> from;      // [m] per node, at the beginning of its strand's window
   std::vector<float> tension;  // [N] per segment, likewise
-  // While asleep; empty otherwise.
+  // Of sleeping strands, each with the number of its strand.
   struct Load {
-    uint32_t at = 0;  // 2 * column: its mid-surface point; + 1: its director
-    Vec3 impulse;     // [N s] of every step
+    uint32_t strand = 0, at = 0;  // 2 * column: its mid-surface point; + 1: its director
+    Vec3 impulse;                 // [N s] of every step
+  };
+  struct Watched {
+    uint32_t strand = 0, column = 0;
+    Vec3 mid, director;  // [m] when the strand fell asleep
+    float may_move = 0;  // [m] by which it may have moved since
+  };
+  struct Held {
+    uint32_t strand = 0, node = 0;
+    Vec3 to, force;  // [m], [N]
+  };
+  struct Touched {  // a tool's capsule nearby
+    uint32_t strand = 0, tool = 0;
+    Vec3 a, b, force_a, force_b;  // [m], [N]
   };
   std::vector<Load> load;
-  std::vector<Vec3> wall;       // [m] 2 per column, when the thread fell asleep
-  std::vector<float> may_move;  // [m] per column: by which it may have moved since
-  std::vector<Vec3> hold;       // per hold: its target [m], its force on the thread [N]
-  std::vector<Vec3> tool;       // per capsule: its ends [m], forces on them [N]
+  std::vector<Watched> watched;
+  std::vector<Held> held;
+  std::vector<Touched> touched;
+
+  bool any() const;              // a strand sleeps
+  bool all() const;              // nothing is awake
+  bool at(uint32_t node) const;  // whether the node's strand sleeps
+};
+
+// Workspace: the awake strands as a thread of their own.
+struct AwakeThread {
+  thread::State part;
+  std::vector<uint32_t> node;       // of the whole thread, per node of the part
+  std::vector<uint32_t> part_node;  // and back; kNone: asleep
+  std::vector<thread::Hold> hold;
+  std::vector<uint32_t> hold_of;  // their places in the list
+  std::vector<thread::Pull> pull;
+  std::vector<uint32_t> point_of;  // per hole: its soft point; kNone: none
+  std::vector<uint32_t> hole_of;   // per soft point
+  std::vector<uint32_t> key;       // merged lists
+  std::vector<float> budget;
+  std::vector<thread::Crossing> crossing;
+  std::vector<thread::Eyelet> eyelet;
+  std::vector<thread::SoftContact> contact;
+  std::vector<Vec3> impulse;              // [N s] per hole
+  std::vector<uint8_t> ready, disturbed;  // per strand: it may sleep; the wall has moved under it
+  struct Box {
+    Vec3 low, high;  // [m]
+  };
+  std::vector<Box> box;         // per strand, with its nodes' half segments
+  std::vector<double> far_due;  // per strand: SurfaceSearch::moved before which no column that is not watched can come near
+  void reserve(const State& state);
 };
 
 // Room for everything, so that no step allocates.
 void reserve(const State& state, Sleep& sleep);
-void wake(Sleep& sleep);
-// The wall has been cut: a thread that presses on nothing sleeps on.
+void wake(State& state);
+// The wall has been cut: a strand that presses on nothing sleeps on.
 void after_cut(const Model& model, State& state);
-// Whether a sleeping thread sleeps on; with holds and tools of the step.
-bool sleeps_on(const Model& model, const State& state, const Hands& hands, std::span<const thread::Hold> holds,
-               std::span<const thread::ToolCapsule> tools);
-// What a sleeping thread does in a step: forces of holds and tools, impulses on the wall.
-void hold_still(const Sleep& sleep, wall::State& wall, wall::Scratch& scratch, std::span<thread::Hold> holds,
-                std::span<thread::ToolCapsule> tools);
-// After a step of the thread: whether it has been quiet for the whole window.
-bool has_been_quiet(const Model& model, State& state, const Hands& hands);
-// coupling: of this step, after its `end`.
-void fall_asleep(const Model& model, State& state, const wall::Coupling& coupling, wall::Scratch& scratch,
-                 std::span<const thread::Hold> holds, std::span<const thread::ToolCapsule> tools);
+// At the beginning of a step: lists the strands again after a cut, and wakes those that no longer can sleep.
+void wake_strands(const Model& model, State& state, const Hands& hands, std::span<const thread::Hold> holds,
+                  std::span<const thread::ToolCapsule> tools, double wall_moved, AwakeThread& awake);
+// What sleeping strands do in a step: impulses on the wall, before the others are stepped; forces of holds and tools, after it.
+void press_asleep(const Sleep& sleep, wall::State& wall, wall::Scratch& scratch);
+void hold_asleep(const Sleep& sleep, std::span<thread::Hold> holds, std::span<thread::ToolCapsule> tools);
+// Strands that are awake, out of the thread and back into it; and what acts on them, by the part's numbers.
+void gather(const State& state, AwakeThread& awake);
+void show_awake(std::span<const thread::Hold> holds, std::span<const thread::Pull> pulls,
+                std::span<thread::SoftContact> contacts, AwakeThread& awake);
+void scatter(State& state, AwakeThread& awake);
+// After the step of the thread. Which strands have been quiet for their whole window, as have all those near them.
+bool find_quiet(const Model& model, State& state, const Hands& hands, AwakeThread& awake);
+// Those fall asleep. coupling: of this step, after its `end`; hole_of: holes of its first points; contacts: with their points.
+void fall_asleep(const Model& model, State& state, wall::Coupling& coupling, wall::Scratch& scratch, AwakeThread& awake,
+                 std::span<const thread::SoftContact> contacts, std::span<const thread::Hold> holds,
+                 std::span<const thread::ToolCapsule> tools);
 
 }  // namespace catgut::physical

@@ -84,7 +84,7 @@ bool tear_bites(const Model& m, State& s, std::span<const Vec3> impulse, Surface
   for (size_t e = 0; e + 1 < t.eyelet.size(); ++e) {
     const uint32_t entry = t.eyelet[e].point, exit = t.eyelet[e + 1].point;
     Hole &a = s.hole[entry], &b = s.hole[exit];
-    if (!a.within || std::max(entry, exit) >= impulse.size()) continue;
+    if (!a.within || std::max(entry, exit) >= impulse.size() || s.sleep.at(t.eyelet[e].segment)) continue;
     const wall::Weights w = wall::weights(m.wall, s.wall.topology, a.place);
     wall::Weights up = w, middle = w;
     up.zeta = 1, middle.zeta = 0;

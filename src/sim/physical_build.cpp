@@ -233,13 +233,22 @@ bool physical_fits(const Model& model, const PhysicalState& state) {
   for (const physical::Hole& hole : s.hole)
     if (!good_point(hole.place) || !good_point(hole.made)) return false;
   const physical::Sleep& z = s.sleep;
-  const size_t while_asleep = z.asleep ? columns : 0;
   if ((!z.from.empty() && z.from.size() != nodes) || (!z.tension.empty() && z.tension.size() != segments) ||
-      z.wall.size() != 2 * while_asleep || z.may_move.size() != while_asleep || z.load.size() > 2 * while_asleep ||
-      z.from.empty() != z.tension.empty())
+      z.from.empty() != z.tension.empty() || z.strand.size() > nodes)
     return false;
+  for (size_t k = 0; k < z.strand.size(); ++k)
+    if (z.strand[k].first != (k > 0 ? z.strand[k - 1].last + 1 : 0) || z.strand[k].last < z.strand[k].first ||
+        z.strand[k].last >= nodes)
+      return false;
+  const auto sleeps = [&](uint32_t strand) { return strand < z.strand.size() && z.strand[strand].asleep; };
   for (const physical::Sleep::Load& load : z.load)
-    if (load.at >= 2 * columns) return false;
+    if (!sleeps(load.strand) || load.at >= 2 * columns) return false;
+  for (const physical::Sleep::Watched& w : z.watched)
+    if (!sleeps(w.strand) || w.column >= columns) return false;
+  for (const physical::Sleep::Held& h : z.held)
+    if (!sleeps(h.strand) || h.node >= nodes) return false;
+  for (const physical::Sleep::Touched& c : z.touched)
+    if (!sleeps(c.strand) || c.tool >= capsules) return false;
   if (s.contact.size() > 4 * nodes || s.lip.size() > 16 * columns) return false;
   for (size_t i = 0; i < s.contact.size(); ++i)
     if (s.contact[i].node >= nodes || (i > 0 && s.contact[i].node < s.contact[i - 1].node)) return false;  // two in a fold

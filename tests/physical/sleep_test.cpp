@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "physical/physical.h"
@@ -73,10 +74,10 @@ struct OnDrape {
 TEST(Sleep, a_tool_moves_a_sleeping_thread_as_it_moves_one_that_is_awake) {
   OnDrape asleep(true), awake(false);
   asleep.rest(600), awake.rest(600);
-  EXPECT_TRUE(asleep.state.sleep.asleep);
-  EXPECT_FALSE(awake.state.sleep.asleep);
+  EXPECT_TRUE(asleep.state.sleep.all());
+  EXPECT_FALSE(awake.state.sleep.all());
   asleep.sweep(), awake.sweep();
-  EXPECT_FALSE(asleep.state.sleep.asleep);
+  EXPECT_FALSE(asleep.state.sleep.all());
   float moved = 0, apart = 0;
   for (size_t i = 0; i < awake.state.thread.nodes(); ++i) {
     moved = std::max(moved, awake.state.thread.position(i).z);
@@ -86,7 +87,7 @@ TEST(Sleep, a_tool_moves_a_sleeping_thread_as_it_moves_one_that_is_awake) {
   EXPECT_LT(apart, 0.03f * moved);
   asleep.place({0.015f, 0.03f, 0.006f});
   asleep.rest(900);
-  EXPECT_TRUE(asleep.state.sleep.asleep);
+  EXPECT_TRUE(asleep.state.sleep.all());
 }
 
 // A square knot, tightened; then both load ends are drawn apart by springs.
@@ -134,10 +135,10 @@ struct Knotted {
 
 TEST(Sleep, a_sleeping_knot_holds_as_one_that_is_awake) {
   Knotted asleep(true), awake(false);
-  EXPECT_TRUE(asleep.s.state.sleep.asleep);
-  EXPECT_FALSE(awake.s.state.sleep.asleep);
+  EXPECT_TRUE(asleep.s.state.sleep.all());
+  EXPECT_FALSE(awake.s.state.sleep.all());
   const std::vector<float> a = asleep.draw(), b = awake.draw();
-  EXPECT_FALSE(asleep.s.state.sleep.asleep);
+  EXPECT_FALSE(asleep.s.state.sleep.all());
   const float most = *std::max_element(b.begin(), b.end());
   EXPECT_GT(most, 0.5f);
   EXPECT_NEAR(*std::max_element(a.begin(), a.end()), most, 0.02f * most);
@@ -150,13 +151,13 @@ TEST(Sleep, a_taut_stitch_holds_the_wall_where_it_was_and_a_copy_wakes_to_the_bi
   s.model.lip_contact = false;
   const Vec3 to[2] = {s.hold[0].to + Vec3{1.5e-3f, 0, 0}, s.hold[1].to + Vec3{1.5e-3f, 0, 0}};
   s.move_holds(to, 0.05f);
-  for (int i = 0; i < 30 && !s.state.sleep.asleep; ++i) s.run(0.1f);
-  ASSERT_TRUE(s.state.sleep.asleep);
+  for (int i = 0; i < 30 && !s.state.sleep.all(); ++i) s.run(0.1f);
+  ASSERT_TRUE(s.state.sleep.all());
   const float force = s.end_force(0);
   EXPECT_GT(force, 0.05f);
   const wall::Column<wall::Float4> before = s.state.wall.motion.x;
   s.run(0.5f);
-  EXPECT_TRUE(s.state.sleep.asleep);
+  EXPECT_TRUE(s.state.sleep.all());
   for (size_t i = 0; i < before.size(); ++i)
     EXPECT_LT(distance(wall::vec3(before[i]), wall::vec3(s.state.wall.motion.x[i])), 2e-6f);
 
@@ -168,10 +169,137 @@ TEST(Sleep, a_taut_stitch_holds_the_wall_where_it_was_and_a_copy_wakes_to_the_bi
   const Vec3 on[2] = {to[0] + Vec3{0.5e-3f, 0, 0}, to[1]};
   for (Sewn* w : {&s, &copy}) {
     w->move_holds(on, 0.02f);
-    EXPECT_FALSE(w->state.sleep.asleep);
+    EXPECT_FALSE(w->state.sleep.all());
   }
   EXPECT_EQ(hash_state(s.state), hash_state(copy.state));
   EXPECT_GT(s.end_force(0), force);
+}
+
+// Two sheets 0.1 m apart, held at their short sides, each with a strand through two holes; hands on the ends of both.
+struct TwoSutures {
+  Sewn s;
+  explicit TwoSutures(bool sleep) {
+    wall::SheetShape shape;
+    shape.width = 0.03f, shape.height = 0.02f, shape.columns = 13, shape.rows = 9;
+    wall::Spec spec;
+    spec.mesh = wall::sheet(shape);
+    wall::Mesh other = wall::sheet(shape);
+    for (size_t c = 0; c < other.outer.size(); ++c) other.outer[c].y += 0.1f, other.inner[c].y += 0.1f;
+    wall::append(spec.mesh, other);
+    for (size_t c = 0; c < spec.mesh.held.size(); ++c) spec.mesh.held[c] = std::abs(spec.mesh.outer[c].x - 0.015f) > 0.0149f;
+    spec.drag = 20;
+    const wall::Wall w = wall::build_wall(spec);
+    s.model = make_model(w, validation::knot_settings(0.3f));
+    s.model.sleep.on = sleep;
+    s.state.wall = w.state;
+    std::vector<Vec3> path;
+    std::vector<int32_t> hole;
+    size_t first_nodes = 0;
+    std::vector<uint32_t> ends;
+    for (const float y : {0.0103f, 0.1103f}) {
+      std::vector<Vec3> stop;
+      for (const auto& [x, zeta] : {std::pair{0.011f, 1.0f}, {0.011f, -1.0f}, {0.019f, -1.0f}, {0.019f, 1.0f}}) {
+        Hole h = validation::hole_at(w, {x, y, 0.00125f * zeta}, zeta);
+        h.within = (x < 0.015f) == (zeta > 0);
+        stop.push_back(mouth(s.model, s.state, h)), s.state.hole.push_back(h);
+      }
+      stop.insert(stop.begin(), stop[0] + Vec3{-0.005f, 0, 0.02f}), stop.push_back(stop.back() + Vec3{0.005f, 0, 0.02f});
+      ends.push_back(static_cast<uint32_t>(std::count(hole.begin(), hole.end(), -1)));
+      for (size_t i = 0; i + 1 < stop.size(); ++i) {
+        const int parts = std::max(3, static_cast<int>(distance(stop[i], stop[i + 1]) / 0.5e-3f));
+        for (int n = i == 0 ? 0 : 1; n < parts; ++n)
+          path.push_back(lerp(stop[i], stop[i + 1], static_cast<float>(n) / static_cast<float>(parts))), hole.push_back(-1);
+        path.push_back(stop[i + 1]);
+        hole.push_back(i + 2 < stop.size() ? static_cast<int32_t>(s.state.hole.size() - 4 + i) : -1);
+      }
+      ends.push_back(static_cast<uint32_t>(std::count(hole.begin(), hole.end(), -1) - 1));
+      if (first_nodes == 0) first_nodes = ends.back() + 1;
+    }
+    s.state.thread = thread::make_laced_state(path, hole, 0.15f);
+    s.state.thread.broken[first_nodes - 1] = 1, s.state.thread.rest[first_nodes - 1] = 0.5e-3f;
+    s.start();
+    s.hold.clear();
+    for (const uint32_t node : ends) {
+      thread::Hold h;
+      h.node = node, h.from = h.to = s.state.thread.position(node), h.stiffness = 500;
+      s.hold.push_back(h);
+    }
+  }
+  // Draws one end out by 4 mm; the force [N] on it and on its other end, step by step.
+  std::vector<float> draw(size_t end) {
+    std::vector<float> force;
+    for (int i = 0; i < 200; ++i) {
+      s.hold[end].from = s.hold[end].to, s.hold[end].to.z += 2e-5f;
+      s.run(0.001f);
+      force.push_back(s.end_force(static_cast<int>(end))), force.push_back(s.end_force(static_cast<int>(end ^ 1)));
+    }
+    return force;
+  }
+};
+
+TEST(Sleep, a_suture_is_drawn_beside_one_that_sleeps_as_if_none_slept_and_then_the_other_wakes) {
+  TwoSutures some(true), none(false);
+  for (TwoSutures* t : {&some, &none}) t->s.run(1);
+  ASSERT_TRUE(some.s.state.sleep.all());
+  for (const size_t end : {size_t{3}, size_t{1}}) {
+    const std::vector<float> a = some.draw(end), b = none.draw(end);
+    const Sleep& z = some.s.state.sleep;
+    ASSERT_EQ(z.strand.size(), 2u);
+    EXPECT_FALSE(z.strand[end / 2].asleep);
+    EXPECT_EQ(z.strand[1 - end / 2].asleep, end == 3);  // the first has been at rest for too short a time
+    const float most = *std::max_element(b.begin(), b.end());
+    EXPECT_GT(most, 0.1f);
+    float off = 0;
+    for (size_t i = 0; i < a.size(); ++i) off = std::max(off, std::abs(a[i] - b[i]));
+    std::printf("largest force %.3f N, difference %.4f N\n", static_cast<double>(most), static_cast<double>(off));
+    EXPECT_LT(off, 0.02f * most);
+  }
+  // A copy gives the same bits with another number of workers.
+  TwoSutures copy(true);
+  copy.s.state = some.s.state, copy.s.hold = some.s.hold;
+  copy.s.scratch = std::make_unique<Scratch>(copy.s.model, copy.s.state);
+  copy.s.jobs = std::make_unique<Jobs>(2);
+  some.s.run(0.6f), copy.s.run(0.6f);
+  EXPECT_EQ(hash_state(some.s.state), hash_state(copy.s.state));
+}
+
+// Two strands on the drape, 3 mm apart. Forceps draw the middle of one across the other.
+std::vector<Vec3> drag_across(bool sleep) {
+  OnDrape d(sleep);
+  std::vector<Vec3> path;
+  for (int k = 0; k < 2; ++k)
+    for (int i = 0; i <= 60; ++i) path.push_back({0.5e-3f * static_cast<float>(i), 0.175e-3f, 3e-3f * static_cast<float>(k)});
+  d.state.thread = thread::make_state(path);
+  d.state.thread.broken[60] = 1, d.state.thread.rest[60] = 0.5e-3f;
+  d.scratch = std::make_unique<Scratch>(d.model, d.state);
+  d.rest(600);
+  EXPECT_EQ(d.state.sleep.all(), sleep);
+  std::vector<thread::Hold> hold(1);
+  hold[0].node = 30, hold[0].stiffness = 200, hold[0].to = d.state.thread.position(30);
+  bool alone = false;
+  for (int i = 0; i < 300; ++i) {
+    hold[0].from = hold[0].to, hold[0].to.z += 2e-5f;
+    Hands hands;
+    hands.targets = d.target, hands.plane = &d.drape, hands.holds = hold;
+    step(d.model, d.state, *d.scratch, hands, d.jobs);
+    if (i == 20) alone = d.state.sleep.any();  // 0.4 mm: only the first strand has moved
+  }
+  EXPECT_EQ(alone, sleep);
+  EXPECT_FALSE(d.state.sleep.any());
+  std::vector<Vec3> at;
+  for (size_t i = 61; i < 122; ++i) at.push_back(d.state.thread.position(i));
+  return at;
+}
+
+TEST(Sleep, a_strand_that_is_drawn_across_a_sleeping_one_takes_it_along) {
+  const std::vector<Vec3> asleep = drag_across(true), awake = drag_across(false);
+  float moved = 0, apart = 0;
+  for (size_t i = 0; i < awake.size(); ++i) {
+    moved = std::max(moved, awake[i].z - 3e-3f), apart = std::max(apart, distance(awake[i], asleep[i]));
+  }
+  std::printf("moved %.2f mm, difference %.3f mm\n", 1e3 * static_cast<double>(moved), 1e3 * static_cast<double>(apart));
+  EXPECT_GT(moved, 1e-3f);
+  EXPECT_LT(apart, 0.05f * moved);
 }
 
 }  // namespace
