@@ -932,10 +932,15 @@ class Window {
     const float w = static_cast<float>(width_), h = static_cast<float>(height_);
     const ViewFrame frame = this->view();
     if (work.guide) guide_overlay(*work.guide, frame, *view.picture, *view.seen, {0, 0, w, h});
+    std::span<const LinePiece> line;
     if ((settings_.guidance != Guidance::exam || tutorial_) && !view.watching && !view.status->settling)
-      line_overlay(line_.on(*view.picture, *view.seen), frame, {0, 0, w, h});
+      line = line_.on(*view.picture, *view.seen);
+    line_overlay(line, frame, {0, 0, w, h});
     const BiteGuide* planned = work.guide ? &*work.guide : nullptr;
-    const std::vector<ScreenPoint> points = work_points(*view.seen, *view.picture, frame, w, h, planned);
+    std::vector<ScreenPoint> points = work_points(*view.seen, *view.picture, frame, w, h, planned);
+    for (size_t i = 0; i < line.size(); i += 8)
+      if (ScreenPoint at; dot(line[i].out, line[i].a - frame.eye) < 0 && on_screen(line[i].a, frame, w, h, at))
+        points.push_back(at);
     placed_ = place_panels(work_panels(work, shown), w, h, panel_text_size(), points, placed_);
     draw_panels(placed_);
     if (inset_drawn_) {
