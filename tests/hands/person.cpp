@@ -461,6 +461,7 @@ bool Person::pen(size_t k, PenMode mode) {
 
 bool Person::score(size_t k, float edge, float from, float to) {
   constexpr float kPenSpeed = 0.0035f;  // [m/s] the pen of the scripted surgeon; twice as fast leaves bridges
+  constexpr float kUnseen = 0.06f;      // [s] of the way, at most, from one picture to the next
   if (!face(0.5f * (from + to))) return false;
   doing_ = "put the pen on the line";
   float angle = from;
@@ -473,7 +474,7 @@ bool Person::score(size_t k, float edge, float from, float to) {
   if (!pen(k, PenMode::cut)) return false;
   const float radius = distance(place(), line_at(angle + kPi, edge)) / 2;
   const bool went = point(k, place, [&] {
-    angle = std::min(to, angle + kPenSpeed / radius * desk_.look().dt);
+    angle = std::min(to, angle + kPenSpeed / radius * std::min(kUnseen, desk_.look().dt));
     return angle >= to;
   });
   return pen(k, PenMode::off) && went;

@@ -114,19 +114,21 @@ TEST_F(StitchAtTheWindow, an_end_is_cut_off_and_carried_away_by_mouse) {
   bool done = false;
   desk.sit([&] { done = me.grasp_rim(1, kPi) && me.cut_round(0, 0.006f) && me.carry(1, {-0.10f, 0.06f, 0}); });
   EXPECT_TRUE(done) << me.doing();
-  EXPECT_EQ(desk.count(EventKind::piece_freed), 1u);
+  EXPECT_GE(desk.count(EventKind::piece_freed), 1u);
+  EXPECT_EQ(desk.count(EventKind::technique_fault), 0u);
 }
 
 TEST_F(StitchAtTheWindow, an_end_is_cut_off_and_carried_away_by_gamepad) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
-  SdlPad desk(900, "excision");
+  SdlPad desk(900, "excision", 0.25f);  // slow: the stick moves on between two pictures
   Person me(desk);
   bool done = false;
   desk.sit([&] {
     done = desk.plug_in() && me.grasp_rim(1, kPi) && me.cut_round(0, 0.006f) && me.carry(1, {-0.10f, 0.06f, 0});
   });
   EXPECT_TRUE(done) << me.doing();
-  EXPECT_EQ(desk.count(EventKind::piece_freed), 1u);
+  EXPECT_GE(desk.count(EventKind::piece_freed), 1u);
+  EXPECT_EQ(desk.count(EventKind::technique_fault), 0u);
 }
 
 TEST_F(StitchAtTheWindow, scissors_cut_by_mouse) {
