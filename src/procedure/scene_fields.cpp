@@ -138,7 +138,7 @@ const Field kField[] = {
     {"technique", "step", "m", 0.0001, 0.1, nullptr, "spacing of the pairs between two midpoints (dist_threshold of section 2.5.2)", TOP(technique.step)},
     {"technique", "throws", "", 1, 8, nullptr, "minimum throws of a secure knot", TOP(technique.throws)},
 
-    {"surgeon", "plan", "", 0, 0, &plan_choices, "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel. interrupted: one stitch over a gap, without a technique. simple: the same, tied and cut. over_and_over: a running suture over a gap. purse_string_thread: a purse-string that its thread alone draws. purse_string_tied: the same, tied with an assistant's forceps on the first throw. excision: the end of a bowel is cut off with an electrosurgical pen. slit: its opening is lengthened with scissors", TOP(surgeon.plan)},
+    {"surgeon", "plan", "", 0, 0, &plan_choices, "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel. interrupted: one stitch over a gap, without a technique. simple: the same, tied and cut. over_and_over: a running suture over a gap. lembert_thread: a stitch that turns the edges inward. purse_string_thread: a purse-string that its thread alone draws. purse_string_tied: the same, tied with an assistant's forceps on the first throw. excision: the end of a bowel is cut off with an electrosurgical pen. slit: its opening is lengthened with scissors", TOP(surgeon.plan)},
     {"surgeon", "bites", "", 0, 1000, nullptr, "number of bites", TOP(surgeon.bites)},
     {"surgeon", "edge_distance", "m", 0, 0.1, nullptr, "distance of the bites from the rim", TOP(surgeon.edge_distance)},
     {"surgeon", "bite_length", "m", 0, 0.1, nullptr, "bite length along the rim", TOP(surgeon.bite_length)},
@@ -311,6 +311,13 @@ const std::vector<ResultName>& result_names() {
         {"wound_gap", "m",
          "largest gap at the end between the edges of two walls where a stitch crosses it; 0 without such a stitch"},
         {"wound_gap_change", "m", "change of wound_gap since the last instrument let go"},
+        {"edge_inversion", "m",
+         "how far the edges of two walls lie inward of the line between the holes on either side, where a stitch crosses; the "
+         "least; 0 without such a stitch"},
+        {"edge_inversion_most", "m", "the largest at any time"},
+        {"bite_depth_least", "", "depth of the shallowest complete bite, as part of the wall's thickness; 1 through all of it"},
+        {"bite_depth_most", "", "likewise of the deepest"},
+        {"full_thickness_bites", "", "complete bites with an end on the inner face: errors of a seromuscular suture"},
         {"hands_off", "s", "time at the end since the last instrument let go"},
         {"thread_force", "N", "largest tension of a thread"},
         {"needle_detached", "", "1 if the needle is cut off the thread at the end, else 0"},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "exchange/strand.h"
 #include "runtime/cut_measures.h"
@@ -47,6 +48,17 @@ double tail_asymmetry(const Snapshot& seen, size_t which) {
   return tail + needle_side > 0 ? std::abs(tail - needle_side) / (tail + needle_side) : 0;
 }
 
+// Of an edge, a polygon through the outer particles of a rim.
+Vec3 nearest_on_edge(const Snapshot& seen, const std::vector<uint32_t>& rim, Vec3 p) {
+  Vec3 best = seen.particle[rim[0]];
+  for (size_t i = 0; i < rim.size(); ++i) {
+    const Vec3 a = seen.particle[rim[i]], way = seen.particle[rim[(i + 1) % rim.size()]] - a;
+    const Vec3 q = a + way * std::clamp(dot(p - a, way) / std::max(1e-12f, length2(way)), 0.0f, 1.0f);
+    if (distance(q, p) < distance(best, p)) best = q;
+  }
+  return best;
+}
+
 }  // namespace
 
 MetricsCollector::MetricsCollector(const SceneSpec& scene, const PictureModel& picture)
@@ -73,28 +85,20 @@ void MetricsCollector::tick(const Snapshot& seen) {
   order_errors_ = std::max(order_errors_, count_order_errors(seen));
   for (const SutureView& suture : seen.suture)
     for (const float tension : suture.thread_tension) thread_force_ = std::max(thread_force_, tension);
+  most_inversion_ = std::max(most_inversion_, edge_inversion(seen));
   const bool held = std::any_of(seen.tool.begin(), seen.tool.end(), [](const ToolView& t) { return t.held != Held::nothing; });
   if (held_ && !held) let_go_s_ = seen.time_s, let_go_gap_ = wound_gap(seen), let_go_opening_ = seen.opening_area;
   held_ = held;
 }
 
 // Where the active suture crosses from one wall to the other, the largest: from the first edge's point that is nearest to the
-// crossing to the other edge. Edges are polygons through the outer particles of a rim.
+// crossing to the other edge.
 double MetricsCollector::wound_gap(const Snapshot& seen) const {
   const std::vector<SuturePointView>& point = seen.active().suture_point;
   if (rim_.size() != 2 || point.empty() || point.front().wall == point.back().wall) return 0;
-  const auto nearest = [&](const std::vector<uint32_t>& rim, Vec3 p) {
-    Vec3 best = seen.particle[rim[0]];
-    for (size_t i = 0; i < rim.size(); ++i) {
-      const Vec3 a = seen.particle[rim[i]], way = seen.particle[rim[(i + 1) % rim.size()]] - a;
-      const Vec3 q = a + way * std::clamp(dot(p - a, way) / std::max(1e-12f, length2(way)), 0.0f, 1.0f);
-      if (distance(q, p) < distance(best, p)) best = q;
-    }
-    return best;
-  };
   const auto gap = [&](Vec3 p) {
-    const Vec3 a = nearest(rim_[0], p);
-    return distance(a, nearest(rim_[1], a));
+    const Vec3 a = nearest_on_edge(seen, rim_[0], p);
+    return distance(a, nearest_on_edge(seen, rim_[1], a));
   };
   float most = 0;
   size_t crossings = 0;
@@ -102,6 +106,40 @@ double MetricsCollector::wound_gap(const Snapshot& seen) const {
     if (point[k].wall != point[k + 1].wall)
       most = std::max(most, gap(0.5f * (point[k].position + point[k + 1].position))), ++crossings;
   return crossings > 1 ? most : gap(0.5f * (point.front().position + point.back().position));
+}
+
+// How far the edges lie inward of the line from the last hole in one wall to the first one in the other, the least of all
+// crossings and both edges. Outward is away from the middle of both openings.
+double MetricsCollector::edge_inversion(const Snapshot& seen) const {
+  const std::vector<SuturePointView>& point = seen.active().suture_point;
+  if (rim_.size() != 2) return 0;
+  Vec3 middle;
+  for (const std::vector<uint32_t>& rim : rim_)
+    for (const uint32_t i : rim) middle += seen.particle[i] / (2 * static_cast<float>(rim.size()));
+  float least = std::numeric_limits<float>::max();
+  for (size_t k = 0; k + 1 < point.size(); ++k) {
+    const Vec3 a = point[k].position, b = point[k + 1].position, at = 0.5f * (a + b), across = normalized(b - a, {1, 0, 0});
+    if (point[k].wall == point[k + 1].wall) continue;
+    const Vec3 out = normalized(at - middle - across * dot(at - middle, across), {0, 1, 0});
+    for (const std::vector<uint32_t>& rim : rim_) least = std::min(least, dot(at - nearest_on_edge(seen, rim, at), out));
+  }
+  return least < std::numeric_limits<float>::max() ? least : 0;
+}
+
+// Depth of the bites, as part of the wall's thickness, and those that reach the inner face.
+void MetricsCollector::measure_depth(const Snapshot& last, std::map<std::string, double>& v) const {
+  double least = 0, most = 0, through = 0;
+  bool any = false;
+  for (const SutureView& suture : last.suture)
+    for (const BiteView& b : suture.bite) {
+      if (!b.complete || b.wall >= scene_.body.size()) continue;
+      const double part = b.entry_inside != b.exit_inside ? 1 : static_cast<double>(b.depth / scene_.body[b.wall].wall);
+      least = any ? std::min(least, part) : part, most = std::max(most, part), any = true;
+      through += b.entry_inside || b.exit_inside;
+    }
+  v["bite_depth_least"] = least;
+  v["bite_depth_most"] = most;
+  v["full_thickness_bites"] = through;
 }
 
 void MetricsCollector::measure_seam(const Snapshot& last, std::map<std::string, double>& v) const {
@@ -193,6 +231,9 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   v["last_knot_throws"] = counts_.last_knot_throws;
   v["sutures"] = static_cast<double>(last.settled.size() + counts_.tied());
   measure_seam(last, v);
+  measure_depth(last, v);
+  v["edge_inversion"] = edge_inversion(last);
+  v["edge_inversion_most"] = most_inversion_;
   v["wound_gap"] = wound_gap(last);
   v["wound_gap_change"] = held_ ? 0 : wound_gap(last) - let_go_gap_;
   v["hands_off"] = held_ ? 0 : last.time_s - let_go_s_;

@@ -70,6 +70,8 @@ class MetricsCollector {
   float thread_length_error(const Snapshot& seen) const;
   uint32_t count_order_errors(const Snapshot& seen);
   double wound_gap(const Snapshot& seen) const;
+  double edge_inversion(const Snapshot& seen) const;
+  void measure_depth(const Snapshot& last, std::map<std::string, double>& value) const;
   void measure_seam(const Snapshot& last, std::map<std::string, double>& value) const;
 
   const SceneSpec& scene_;
@@ -79,6 +81,7 @@ class MetricsCollector {
   bool opening_wanted_ = true, valid_ = true;
   bool held_ = false;                                // by an instrument, in the last tick
   double let_go_s_ = 0, let_go_gap_ = 0;             // when the last instrument let go
+  double most_inversion_ = 0;                        // [m]
   float thread_force_ = 0;                           // [N]
   float least_opening_ = 1e9f, let_go_opening_ = 0;  // [m2] at any time; when the last instrument let go
   float opening_at_start_ = 0, length_error_ = 0, length_error_passing_ = 0;

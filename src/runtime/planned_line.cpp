@@ -33,7 +33,8 @@ void PlannedLine::find(const PictureModel& picture) {
     const auto& t = mesh.triangle[i];
     if (mesh.layer[t[0]] == TissueLayer::cut_edge) continue;
     const Vec3 a = mesh.position[t[0]], from = a - line_->rim;
-    if (dot(cross(mesh.position[t[1]] - a, mesh.position[t[2]] - a), from - line_->axis * dot(from, line_->axis)) <= 0) continue;
+    if (dot(cross(mesh.position[t[1]] - a, mesh.position[t[2]] - a), from - line_->axis * dot(from, line_->axis)) <= 0)
+      continue;
     Crossing c;
     c.triangle = i;
     size_t n = 0;

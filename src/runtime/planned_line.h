@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// runtime: the line of the planned cut as it lies on the drawn tissue, for display: the circle from which the deviation of a cut
-// is measured (sim/cutting), carried by the tissue.
+// runtime: the line of the planned cut as it lies on the drawn tissue, for display: the circle from which the deviation of a
+// cut is measured (sim/cutting), carried by the tissue.
 #pragma once
 #include <array>
 #include <optional>

@@ -13,8 +13,7 @@ constexpr float kClear = 0.4f;       // [s] that the forceps backs out before an
 constexpr float kTipUp = -2.2f;      // [rad] angle of the needle's circle at which its tip is up
 constexpr float kStraight = 0.93f;   // of the strand's length
 constexpr float kEdgeGrip = 0.003f;  // [m] of the rim between the forceps' jaws
-constexpr float kDeepEnough = 0.5f;  // of the wall, for a shallow bite
-constexpr float kTooShallow = 0.4f;  // likewise
+constexpr float kTooShallow = 0.4f;  // of the wall, for a shallow bite
 constexpr float kDeeper = 0.0005f;   // [m]
 constexpr float kScoopSpeed = 0.7f;  // of the needle's speed, with which it is lifted then
 
@@ -113,7 +112,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       hold_or_rest(seen);
       psi_ += skill_.drive_speed / shape().needle_radius * dt_;
       // Square to the wall until the tip is deep enough in it, then shallow.
-      if (plan_.scoop > 0 && seen.active().needle.in_tissue && seen.active().bite.back().depth > kDeepEnough * skill_.wall) {
+      if (plan_.scoop > 0 && seen.active().needle.in_tissue && seen.active().bite.back().depth > bite().deep * skill_.wall) {
         const float up = std::min(plan_.scoop - scooped_, kScoopSpeed * skill_.drive_speed * dt_);
         frame_.at += frame_.out * up, scooped_ += up;
       }

@@ -18,12 +18,17 @@ constexpr float kRow = 0.004f;            // [m] between two rows of bites
 constexpr float kStaysApart = 0.012f;     // [m] round the bowel, between stay sutures
 constexpr float kStitchesApart = 0.005f;  // [m] round the bowel
 constexpr float kPull = 1.7f;             // [N] on each strand of a physical throw: below what the bites bear
-constexpr float kApproximate = 0.003f;    // [m] of each clamp: the edges touch after 1.5 mm
+// [N] the same for bites through half of the wall: both strands pull at each, and with 1.7 N one tore out.
+constexpr float kPullShallow = 0.9f;
+constexpr float kApproximate = 0.003f;  // [m] of each clamp: the edges touch after 1.5 mm
 // A shallow bite in a wall that is held by its edge: it gives way by this much before the tip enters, and then the needle is
 // lifted.
 constexpr float kGivesWay = 0.002f, kScoop = 0.003f;  // [m]
-constexpr float kGather = 2.0f;                       // [N] of each end of a physical purse-string
-constexpr float kGatherByThrow = 3.2f;                // [N] the same through a throw, whose friction takes a part
+// Of the wall, where a Lembert bite is lifted. Far from the edge the wall springs back onto the needle when the tip is in.
+constexpr float kDeepFar = 0.25f, kDeepNear = 0.45f;
+constexpr float kMobile = 0.0021f;      // [m] that a Lembert suture takes of each end: inverted edges make it shorter
+constexpr float kGather = 2.0f;         // [N] of each end of a physical purse-string
+constexpr float kGatherByThrow = 3.2f;  // [N] the same through a throw, whose friction takes a part
 constexpr int kThrows = 2;
 constexpr int kRingThrows = 3;  // where no clamp draws the edges apart again: only a taut loop keeps two throws from opening
 // [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
@@ -108,6 +113,15 @@ void add_bites(Plan& plan, int bites, bool held) {
     add(plan, b == 0 ? TaskKind::pull_tail : TaskKind::pull_slack);
     if (b + 1 < bites) add(plan, TaskKind::hand_back);
   }
+}
+
+// A square knot of single throws while clamps hold the edges together, which go back in the last one; hands away.
+void tie_and_leave(Plan& plan) {
+  add(plan, TaskKind::regrip);
+  for (int i = 0; i < kThrows; ++i) plan.task.push_back({TaskKind::throw_, 1, 1, i + 1 == kThrows});
+  add(plan, TaskKind::cut_tail);
+  add(plan, TaskKind::cut_long);
+  add(plan, TaskKind::leave);
 }
 
 Plan purse_string_plan(const PictureModel& picture, const SurgeonSkill& skill) {
@@ -324,11 +338,7 @@ Plan over_and_over_plan(const PictureModel& picture, const SurgeonSkill& skill) 
   plan.approximate = kApproximate;
   add(plan, TaskKind::approximate);
   add(plan, TaskKind::gather);
-  add(plan, TaskKind::regrip);
-  for (int i = 0; i < kThrows; ++i) plan.task.push_back({TaskKind::throw_, 1, 1, i == 1});
-  add(plan, TaskKind::cut_tail);
-  add(plan, TaskKind::cut_long);
-  add(plan, TaskKind::leave);
+  tie_and_leave(plan);
   return plan;
 }
 
@@ -343,6 +353,33 @@ Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skil
   add(plan, TaskKind::cut_tail);
   add(plan, TaskKind::cut_long);
   add(plan, TaskKind::leave);
+  return plan;
+}
+
+// Lembert stitches with physical mechanics, side by side from the near side to the far one, with one thread. Each is a bite in
+// and out on the outer face of one bowel end, across the wound, then one of the other end: far, near, near, far. The thread
+// passes over both edges, which turn inward when it is drawn.
+Plan lembert_thread_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan;
+  plan.forceps_side = -1;
+  plan.driver_at = 0.15f, plan.beyond = 0.5f;
+  plan.scoop = kScoop, plan.pull = kPullShallow, plan.jerk = 0.1f;
+  const float radius = picture.suture[0].needle_radius, turn = kStitchesApart / opening_shape(picture, 0).radius;
+  const int bites = 2 * skill.bites;
+  for (int b = 0; b < bites; ++b) {
+    const float angle = turn * (0.5f * static_cast<float>(skill.bites - 1) - static_cast<float>(b / 2));
+    BitePlace p = on_top(picture, static_cast<uint32_t>(b % 2), angle, skill.edge_distance + 0.5f * skill.bite_length);
+    p.up = cross(Vec3{1, 0, 0}, p.out);  // so that cross(out, up) leads across
+    p.depth = depth_of(skill.bite_length, radius, 1e9f) + kGivesWay;
+    p.deep = b % 2 == 0 ? kDeepFar : kDeepNear;
+    p.length = 2 * std::sqrt(p.depth * (2 * radius - p.depth));
+    plan.place.push_back(p);
+  }
+  add_bites(plan, bites, false);
+  plan.approximate = kApproximate, plan.stay = kMobile;
+  add(plan, TaskKind::approximate);
+  if (skill.bites > 1) add(plan, TaskKind::gather);
+  tie_and_leave(plan);
   return plan;
 }
 
@@ -468,6 +505,7 @@ constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
                              {"over_and_over", 2, over_and_over_plan},
                              {"purse_string_thread", 1, purse_string_thread_plan},
                              {"purse_string_tied", 1, purse_string_tied_plan},
+                             {"lembert_thread", 2, lembert_thread_plan},
                              {"simple", 2, simple_plan},
                              {"excision", 1, excision_plan},
                              {"slit", 1, excision_plan},

@@ -20,6 +20,7 @@ struct BitePlace {
   float depth = 0;      // [m]
   uint32_t wall = 0;    // whose tissue carries it
   bool level = false;   // hands keep the circle nearly square to `up` where the tissue is inclined
+  float deep = 0.5f;    // of the wall, at which a needle that is scooped is lifted
   int walls = 1;        // passages through a wall that the sweep makes
   uint32_t suture = 0;  // that makes it
 };
@@ -78,6 +79,7 @@ struct Plan {
   float tip_lean = 0.8f, tip_psi = 2.6f;
   float scoop = 0;        // [m] by which the needle is lifted once it is deep enough in the wall, at most
   float approximate = 0;  // [m] travel of each clamp
+  float stay = 0;         // [m] of it by which the clamp stays advanced: the ends are mobile
   float jerk = 0;         // [s] of more than the maximum load after which thread is not pulled further: a jerk is shorter
   bool rise = false;      // the needle is lifted over the edges on its way to where it is laid down
   float knot_turn = 0;    // [rad] about y: where a physical knot is tied, 0 toward the viewer, positive to the right

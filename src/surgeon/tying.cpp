@@ -304,7 +304,7 @@ bool Scripted::tie_thread(const Task& task, const Snapshot& seen) {
     const bool first = !thread_tie_;
     if (first) thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull});
     thread_tie_->begin(at_knot, task.which, task.way, first, task.release || task.assistant != 0);
-    clamped_ = task.assistant > 0 ? kGathers : kClampsBack * plan_.approximate / kClampSpeed;
+    clamped_ = task.assistant > 0 ? kGathers : (kClampsBack * plan_.approximate - plan_.stay) / kClampSpeed;
     go(work);
   }
   const bool over = thread_tie_->operate(at_knot, dt_);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/cutting: wrong surgery in the scene "altemeier", by hands that a test leads: it stays wrong, and the procedure reports it
-// once, with the reason, where a trainee reads it: in the results here; tests/app has the panel.
+// tests/cutting: wrong surgery in the scene "altemeier", by hands that a test leads: it stays wrong, and the procedure reports
+// it once, with the reason, where a trainee reads it: in the results here; tests/app has the panel.
 #include <gtest/gtest.h>
 
 #include <utility>
@@ -111,7 +111,8 @@ TEST(WrongAltemeier, an_incomplete_circle_is_pulled) {
 TEST(WrongAltemeier, a_clamp_is_torn_out) {
   SceneSpec scene = with("allis");
   for (InstrumentSpec& i : scene.instrument)
-    if (i.kind == "allis") i.where = "parked", i.at = {scene.body[0].radius - 0.5f * scene.body[0].wall, 0, 0}, i.pull = {0, 20, 0};
+    if (i.kind == "allis")
+      i.where = "parked", i.at = {scene.body[0].radius - 0.5f * scene.body[0].wall, 0, 0}, i.pull = {0, 20, 0};
   Trainee t(scene);
   for (int i = 0; i < 60 && t.f.of(Fault::clamp_torn_out).empty(); ++i) t.f.tick();
   ASSERT_EQ(t.f.of(Fault::clamp_torn_out).size(), 1u);
@@ -125,8 +126,7 @@ TEST(WrongAltemeier, a_stitch_goes_through_char) {
   auto& burnt = t.f.state->physical.cutting.excision.burnt;
   burnt.resize(t.f.model->physical->world.wall.mesh.face.size());
   for (auto& face : burnt) face.fill(1);
-  const std::unique_ptr<Surgeon> surgeon =
-      make_demonstrator("altemeier", picture_model(*t.f.model), skill_of(scene), {0, 1});
+  const std::unique_ptr<Surgeon> surgeon = make_demonstrator("altemeier", picture_model(*t.f.model), skill_of(scene), {0, 1});
   while (t.f.of(EventKind::tip_entered).empty() && t.f.state->tick < 900) {
     t.f.input = surgeon->operate(t.f.seen, t.f.model->dt);
     t.f.tick();

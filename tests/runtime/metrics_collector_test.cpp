@@ -87,6 +87,45 @@ TEST(MetricsCollector, knots_of_two_sutures_are_counted_apart) {
   EXPECT_EQ(j.result().value["sutures"], 2) << "one baked, one tied";
 }
 
+// Two square openings face to face, 2 mm apart, with a stitch over the gap on their outer faces.
+TEST(MetricsCollector, edges_that_turn_in_and_bites_that_are_too_deep_are_measured) {
+  Judged j;
+  j.scene.body.assign(2, {});
+  for (BodySpec& b : j.scene.body) b.wall = 0.002f;
+  j.picture.rim.resize(2);
+  for (uint32_t rim = 0; rim < 2; ++rim)
+    for (const Vec3 corner : {Vec3{0, 0.010f, 0}, Vec3{0, 0, 0.010f}, Vec3{0, -0.010f, 0}, Vec3{0, 0, -0.010f}}) {
+      j.picture.rim[rim].push_back(static_cast<uint32_t>(j.seen.particle.size()));
+      j.seen.particle.push_back(corner + Vec3{rim == 0 ? -0.001f : 0.001f, 0, 0});
+    }
+  j.collector = std::make_unique<MetricsCollector>(j.scene, j.picture);
+  EXPECT_EQ(j.result().value["edge_inversion"], 0) << "nothing crosses the gap";
+  for (uint32_t wall = 0; wall < 2; ++wall) {
+    SuturePointView point;
+    point.position = {wall == 0 ? -0.005f : 0.005f, 0.010f, 0};
+    point.wall = wall;
+    j.seen.active().suture_point.push_back(point);
+    BiteView bite;
+    bite.wall = wall, bite.complete = true, bite.depth = wall == 0 ? 0.001f : 0.0012f;
+    j.seen.active().bite.push_back(bite);
+  }
+  EXPECT_NEAR(j.result().value["edge_inversion"], 0, 1e-6);
+  Vec3 &left = j.seen.particle[j.picture.rim[0][0]], &right = j.seen.particle[j.picture.rim[1][0]];
+  left.y = 0.007f, right.y = 0.008f;
+  EXPECT_NEAR(j.result().value["edge_inversion"], 0.002, 1e-5) << "the edge that has turned in less";
+  right.y = 0.011f;
+  EXPECT_LT(j.result().value["edge_inversion"], -0.0004) << "one is turned out";
+
+  RunResult r = j.result();
+  EXPECT_NEAR(r.value["bite_depth_least"], 0.5, 1e-5);
+  EXPECT_NEAR(r.value["bite_depth_most"], 0.6, 1e-5);
+  EXPECT_EQ(r.value["full_thickness_bites"], 0);
+  j.seen.active().bite[0].exit_inside = true;
+  r = j.result();
+  EXPECT_EQ(r.value["full_thickness_bites"], 1);
+  EXPECT_NEAR(r.value["bite_depth_most"], 1, 1e-6);
+}
+
 TEST(MetricsCollector, gaps_are_the_widest_at_the_end_and_the_narrowest_at_the_start) {
   Judged j;
   EXPECT_EQ(j.result().value["seam_gap_start"], 0);
