@@ -285,7 +285,7 @@ TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_simulated_arms) {
       return;
     desk.press("k");
     if (!step("park it", me.until([&] { return instrument() < 0; })) ||
-        !step("away", me.go([&] { return jaws(0.05f); }, 1.0f)) || !step("take the pen", take("cautery")) ||
+        !step("away", me.go([&] { return jaws(0.05f); }, 0.02f)) || !step("take the pen", take("cautery")) ||
         !step("to the line", me.go(tip, 0.004f)))
       return;
     above = 0;
