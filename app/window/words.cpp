@@ -154,7 +154,7 @@ std::string words_for(const Event& e, bool& bad) {
       return "clamp parked";
     case EventKind::instrument_refused:
       bad = true;
-      return "instrument unavailable";
+      return e.value > 0 ? "no room beside the parked clamp: move the hand away first" : "instrument unavailable";
     case EventKind::technique_fault:
       bad = true;
       return fault_words(e.fault);

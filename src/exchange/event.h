@@ -43,7 +43,7 @@ enum class EventKind : uint8_t {
   instrument_taken,      // who: hand, which: instrument
   instrument_laid_down,  // who: hand, which: instrument
   instrument_parked,     // who: hand, which: instrument; it stays on what it holds
-  instrument_refused,    // who: hand, which: instrument; the command could not be carried out
+  instrument_refused,    // who: hand, which: instrument, value: 1 if the hand is too near a parked one; nothing was done
   technique_fault,       // fault, which: bite, knot or suture (see Fault); nothing is corrected
   pen_activated,         // who: hand, which: instrument, value: power [W]
   pen_deactivated,       // who: hand, which: instrument, value: time since pen_activated [s]

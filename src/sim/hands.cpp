@@ -23,10 +23,10 @@ void place_at(RigidBody& body, const Pose& pose) {
   body.q = body.prev_q = pose.q;
 }
 
-void report(State& state, EventKind kind, uint8_t hand, size_t instrument) {
+void report(State& state, EventKind kind, uint8_t hand, size_t instrument, float value = 0) {
   const bool known = instrument < state.suture.instrument.size();
-  state.event.add(
-      {kind, hand, static_cast<uint32_t>(instrument), 0, known ? state.solver.body[instrument].x : state.hand[hand].pose.p});
+  state.event.add({kind, hand, static_cast<uint32_t>(instrument), value,
+                   known ? state.solver.body[instrument].x : state.hand[hand].pose.p});
 }
 
 void put_on_tray(const Model& model, State& state, size_t i) {
@@ -77,6 +77,13 @@ void lay_down(const Model& model, State& state, size_t hand) {
   state.hand[hand].grip = {};
 }
 
+bool has_room(const State& state, const HandState& hand) {
+  for (size_t p = 0; p < state.suture.instrument.size(); ++p)
+    if (state.suture.instrument[p].place == InstrumentPlace::parked && distance(state.solver.body[p].x, hand.pose.p) < kRoom)
+      return false;
+  return true;
+}
+
 bool carry_out(const Model& model, State& state, const TickInput& input, const Command& c) {
   if (c.kind == CommandKind::cut || c.kind == CommandKind::new_suture) return true;  // stages of their own
   if (c.kind == CommandKind::advance_clamp || c.kind == CommandKind::retract_clamp)  // before each step
@@ -86,12 +93,6 @@ bool carry_out(const Model& model, State& state, const TickInput& input, const C
   HandState& h = state.hand[hand];
   const auto is_at = [&](InstrumentPlace place) {
     return i < state.suture.instrument.size() && state.suture.instrument[i].place == place;
-  };
-  const auto has_room = [&] {
-    for (size_t p = 0; p < state.suture.instrument.size(); ++p)
-      if (state.suture.instrument[p].place == InstrumentPlace::parked && distance(state.solver.body[p].x, h.pose.p) < kRoom)
-        return false;
-    return true;
   };
   const auto take = [&](const Pose& pose) {
     put_in_hand(state, i, hand, pose, input.hand[hand].jaw);
@@ -107,11 +108,11 @@ bool carry_out(const Model& model, State& state, const TickInput& input, const C
         const Pose pose = state.solver.body[i].pose();
         return distance(pose.p, h.pose.p) <= kReach && take(pose);
       }
-      if (c.kind == CommandKind::unpark || !is_at(InstrumentPlace::tray) || !has_room()) return false;
+      if (c.kind == CommandKind::unpark || !is_at(InstrumentPlace::tray) || !has_room(state, h)) return false;
       place_at(state.solver.body[i], h.pose);
       return take(h.pose);
     case CommandKind::swap:
-      if (!is_at(InstrumentPlace::tray) || !has_room()) return false;
+      if (!is_at(InstrumentPlace::tray) || !has_room(state, h)) return false;
       if (h.instrument >= 0) lay_down(model, state, hand);
       place_at(state.solver.body[i], h.pose);
       return take(h.pose);
@@ -186,7 +187,11 @@ void meet_hands(State& state, const TickInput& input) {
 
 void handle_instruments(const Model& model, State& state, const TickInput& input) {
   for (const Command& c : input.commands)
-    if (!carry_out(model, state, input, c)) report(state, EventKind::instrument_refused, c.hand % kMaxHands, c.argument);
+    if (!carry_out(model, state, input, c)) {
+      const auto hand = static_cast<uint8_t>(c.hand % kMaxHands);
+      const bool from_tray = c.kind == CommandKind::take || c.kind == CommandKind::swap;
+      report(state, EventKind::instrument_refused, hand, c.argument, from_tray && !has_room(state, state.hand[hand]) ? 1 : 0);
+    }
 }
 
 void follow_hands(const Model& model, State& state, const TickInput& input, float part) {

@@ -86,7 +86,8 @@ TEST(Operation, a_clamp_from_the_tray_is_parked_on_the_rim_and_holds_it) {
   f.tick();
   f.input.commands.push({CommandKind::take, 0, pen});
   f.tick();
-  EXPECT_EQ(f.of(EventKind::instrument_refused).size(), 1u);
+  ASSERT_EQ(f.of(EventKind::instrument_refused).size(), 1u);
+  EXPECT_EQ(f.of(EventKind::instrument_refused)[0].value, 1) << "the screen says why";
   EXPECT_EQ(f.seen.tool[0].instrument, -1);
   f.input.hand[0].pose.p += Vec3{0, 0.03f, 0};
   f.tick();
