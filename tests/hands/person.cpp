@@ -461,7 +461,7 @@ bool Person::pen(size_t k, PenMode mode) {
 
 bool Person::score(size_t k, float edge, float from, float to) {
   constexpr float kPenSpeed = 0.0035f;  // [m/s] the pen of the scripted surgeon; twice as fast leaves bridges
-  constexpr float kUnseen = 0.06f;      // [s] of the way, at most, from one picture to the next
+  constexpr double kUnseen = 0.06;      // [s] of the way, at most, from one picture to the next
   if (!face(0.5f * (from + to))) return false;
   doing_ = "put the pen on the line";
   float angle = from;
@@ -473,8 +473,12 @@ bool Person::score(size_t k, float edge, float from, float to) {
   doing_ = "cut along the line";
   if (!pen(k, PenMode::cut)) return false;
   const float radius = distance(place(), line_at(angle + kPi, edge)) / 2;
+  // Simulated time: where the machine is late, tissue burns as slowly as the hand moves.
+  double last = seen().time_s;
   const bool went = point(k, place, [&] {
-    angle = std::min(to, angle + kPenSpeed / radius * std::min(kUnseen, desk_.look().dt));
+    const double passed = std::min(kUnseen, seen().time_s - last);
+    last = seen().time_s;
+    angle = std::min(to, angle + kPenSpeed / radius * static_cast<float>(passed));
     return angle >= to;
   });
   return pen(k, PenMode::off) && went;

@@ -193,10 +193,10 @@ class Stylus {
  public:
   Stylus(AtTheWindow& desk, const FakeHd& arm) : desk_(desk), arm_(arm), wish_(arm.position(0)) {}
   const Snapshot& seen() const { return desk_.look().seen; }
-  bool until(const std::function<bool()>& done) {
+  bool until(const std::function<bool()>& done, double patience = 10) {  // [s] simulated
     const double from = seen().time_s;
     while (!done())
-      if (seen().time_s > from + kPatience || !desk_.act({})) return done();
+      if (seen().time_s > from + patience || !desk_.act({})) return done();
     return true;
   }
   bool go(const std::function<Pose()>& to, float near) {
@@ -216,21 +216,19 @@ class Stylus {
   }
   // Until `done`: buttons as the devices have them, 1 the jaw's, 2 beside it; pressed so many times in half a second.
   bool press(int button, int times, const std::function<bool()>& done) {
-    for (int attempt = 0; attempt < 3; ++attempt) {
+    for (int attempt = 0; attempt < 5; ++attempt) {  // a double press may come late where the machine is late
       for (int i = 0; i < times; ++i)
         for (const int down : {button, 0}) {
           arm_.wish(0, wish_, turn_, down);
           std::this_thread::sleep_for(std::chrono::milliseconds(60));
         }
-      for (int i = 0; i < 60; ++i)
-        if (done()) return true;
-        else if (!desk_.act({})) return false;
+      if (until(done, 2)) return true;
     }
     return false;
   }
 
  private:
-  static constexpr double kPatience = 10, kReaction = 0.05;  // [s] simulated
+  static constexpr double kReaction = 0.05;  // [s] simulated
   AtTheWindow& desk_;
   const FakeHd& arm_;
   Vec3 wish_;
