@@ -210,7 +210,7 @@ class Tying {
     around.holds = hold_, around.tools = tool_;
     stepper_->step(settings_, knot_.state, around);
     ++ticks_;
-    felt_ += 0.2f * (length(hold_[3].force) - felt_);
+    felt_ += 0.2f * (strand_pull() - felt_);
     tail_felt_ += 0.2f * ((gripped_ ? length(hold_[2].force) : 0.0f) - tail_felt_);
     for (const Hold* h : {&hold_[3], gripped_ ? &hold_[2] : &hold_[3]})
       knot_.fastest = std::max(knot_.fastest, distance(h->from, h->to) / kTick);
@@ -220,8 +220,10 @@ class Tying {
     if (watcher_) watcher_(knot_.state, tool_, 1e-3 * static_cast<double>(ticks_), phase);
   }
 
-  void rest(const std::string& phase, double seconds) {
-    for (int i = 0; i < static_cast<int>(1000 * seconds); ++i) tick(phase);
+  // Of the strand from the wound, on the hand. Fingers that push the strand back after it has slipped feel no pull.
+  float strand_pull() const {
+    const Vec3 along = knot_.state.position(hold_[3].node) - knot_.state.position(hold_[3].node - 4);
+    return std::max(0.0f, dot(hold_[3].force, normalized(along)));
   }
 
   // Both hands to their places in the time that the farther one needs.
