@@ -36,12 +36,18 @@ VectorXd element_force_of(const wall::ElementRest& e, const VectorXd& x, Turn<do
   const auto get = [&](uint32_t k) { return e.constant[k]; };
   const auto modes = n == 4 ? wall::scalar::quad_modes(mid, dir, 0.25) : wall::scalar::triangle_modes(mid, dir, 0.5, 1.0 / 3);
   const auto f = wall::scalar::element_force(get, modes, turn, 5, &energy);
-  if (n == 4) wall::scalar::quad_corners(f, 0.25, mid, dir);
-  else wall::scalar::triangle_corners(f, 0.5, 1.0 / 3, mid, dir);
+  Double3 fm[4], fd[4];
+  if (n == 4) {
+    wall::scalar::quad_corners(f, 0.25, fm, fd);
+    wall::scalar::guard_corners<4>(get, mid, dir, fm, fd, &energy);
+  } else {
+    wall::scalar::triangle_corners(f, 0.5, 1.0 / 3, fm, fd);
+    wall::scalar::guard_corners<3>(get, mid, dir, fm, fd, &energy);
+  }
   VectorXd out(x.size());
   for (long i = 0; i < n; ++i) {
-    out.segment<3>(6 * i) << mid[i].x, mid[i].y, mid[i].z;
-    out.segment<3>(6 * i + 3) << dir[i].x, dir[i].y, dir[i].z;
+    out.segment<3>(6 * i) << fm[i].x, fm[i].y, fm[i].z;
+    out.segment<3>(6 * i + 3) << fd[i].x, fd[i].y, fd[i].z;
   }
   return out;
 }

@@ -48,6 +48,7 @@ inline double above(double a, double b) { return a > b ? 1 : 0; }
 inline double absolute(double a) { return std::abs(a); }
 inline double larger(double a, double b) { return a > b ? a : b; }
 inline double square_root(double a) { return std::sqrt(a); }
+inline bool any(double a) { return a > 0; }
 #include "wall/element_formula.h"
 }  // namespace scalar
 

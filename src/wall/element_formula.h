@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // wall/element_formula: the element's energy and force, written once for any number type. This file has no include guard. It is
-// included inside a namespace that defines above, absolute, larger and square_root for the number type: once for doubles
+// included inside a namespace that defines above, absolute, larger, square_root and any for the number type: once for doubles
 // (element.h) and once for each instruction set (force.cpp). Formulas and sources: element.h.
 
 template <class S>
@@ -222,4 +222,43 @@ inline Modes<S> element_force(const Get& c, const Modes<S>& m, Turn<S>& q, int s
   const Vec3Of<S> w1 = to_world(r, l1) * minus, w2 = to_world(r, l2) * minus;
   return {w1 * g11 + w2 * g12,     w1 * g21 + w2 * g22,     to_world(r, l3) * minus, to_world(r, r1) * minus,
           to_world(r, r2) * minus, to_world(r, r3) * minus, to_world(r, r4) * minus};
+}
+
+// No formula above bounds a corner's volume: pressed or bent far enough, it turns inside out, and nothing can lie against it.
+// So the volume that its edges and its director span resists below a part of what it is at rest, four times as stiff as the
+// thickness. Adds to the forces on the element's N corners, and to the energy.
+constexpr float kLeastVolume = 0.5f, kGuard = 4;
+template <size_t N, class S, class Get>
+inline void guard_corners(const Get& c, const Vec3Of<S> (&mid)[4], const Vec3Of<S> (&dir)[4], Vec3Of<S> (&mid_force)[4],
+                          Vec3Of<S> (&dir_force)[4], S* energy = nullptr) {
+  // Few elements need more than the first test, against the volume at rest in their middle.
+  const S zero(0.0f), span(4.0f);
+  const S middle = span * (c(kA1x) * c(kA2y) - c(kA1y) * c(kA2x)) * c(kD0z);
+  Vec3Of<S> area[N];
+  S volume[N], low(0.0f);
+  for (size_t k = 0; k < N; ++k) {
+    area[k] = cross(mid[(k + 1) % N] - mid[k], mid[(k + N - 1) % N] - mid[k]);
+    volume[k] = dot(area[k], dir[k]);
+    low = low + above(middle * S(0.8f), volume[k]);
+  }
+  if (!any(low)) return;
+  constexpr float kXi[] = {-1, 1, 1, -1}, kEta[] = {-1, -1, 1, 1};
+  for (size_t k = 0; k < N; ++k) {
+    S rest = middle;
+    if (N == 4) {
+      const S xi(kXi[k]), eta(kEta[k]), both(kXi[k] * kEta[k]);
+      const Vec3Of<S> h1{c(kH1x), c(kH1y), c(kH1z)}, h4{c(kH4x), c(kH4y), c(kH4z)};
+      const Vec3Of<S> d0{c(kD0x), c(kD0y), c(kD0z)}, h2{c(kH2x), c(kH2y), c(kH2z)}, h3{c(kH3x), c(kH3y), c(kH3z)};
+      const Vec3Of<S> a1{c(kA1x), c(kA1y), zero}, a2{c(kA2x), c(kA2y), zero};
+      rest = span * dot(cross(a1 + h1 * eta, a2 + h1 * xi), d0 + h2 * xi + h3 * eta + h4 * both);
+    }
+    const S missing = larger(S(kLeastVolume) * rest - volume[k], zero);
+    const S stiff = S(kGuard / static_cast<float>(N)) * c(kThick) / larger(rest * rest, S(1e-30f)), f = stiff * missing;
+    const size_t next = (k + 1) % N, last = (k + N - 1) % N;
+    const Vec3Of<S> on_next = cross(mid[last] - mid[k], dir[k]) * f, on_last = cross(dir[k], mid[next] - mid[k]) * f;
+    dir_force[k] = dir_force[k] + area[k] * f;
+    mid_force[next] = mid_force[next] + on_next, mid_force[last] = mid_force[last] + on_last;
+    mid_force[k] = mid_force[k] - on_next - on_last;
+    if (energy) *energy = *energy + S(0.5f) * f * missing;
+  }
 }

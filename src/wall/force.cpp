@@ -29,6 +29,7 @@ HWY_INLINE Wide above(Wide a, Wide b) { return hn::IfThenElseZero(hn::Gt(a.v, b.
 HWY_INLINE Wide absolute(Wide a) { return hn::Abs(a.v); }
 HWY_INLINE Wide larger(Wide a, Wide b) { return hn::Max(a.v, b.v); }
 HWY_INLINE Wide square_root(Wide a) { return hn::Sqrt(a.v); }
+HWY_INLINE bool any(Wide a) { return !hn::AllFalse(D(), hn::Gt(a.v, hn::Zero(D()))); }
 
 #include "wall/element_formula.h"
 
@@ -65,12 +66,18 @@ void BlockForces(const ElementBlock* block, const BlockCorners* corners, const F
           element_force(constants, quads ? quad_modes(mid, dir, quarter) : triangle_modes(mid, dir, half, third), q, 1);
       hn::Store(q.x.v, d, frame.x.data() + part), hn::Store(q.y.v, d, frame.y.data() + part);
       hn::Store(q.z.v, d, frame.z.data() + part), hn::Store(q.w.v, d, frame.w.data() + part);
-      if (quads) quad_corners(f, quarter, mid, dir);
-      else triangle_corners(f, half, third, mid, dir);
+      Vec3W fm[4], fd[4];
+      if (quads) {
+        quad_corners(f, quarter, fm, fd);
+        guard_corners<4>(constants, mid, dir, fm, fd);
+      } else {
+        triangle_corners(f, half, third, fm, fd);
+        guard_corners<3>(constants, mid, dir, fm, fd);
+      }
       const auto zero = hn::Zero(d);
       for (size_t k = 0; k < 4; ++k) {
-        hn::StoreInterleaved4(mid[k].x.v, mid[k].y.v, mid[k].z.v, zero, d, &force[b].mid[k][part].x);
-        hn::StoreInterleaved4(dir[k].x.v, dir[k].y.v, dir[k].z.v, zero, d, &force[b].dir[k][part].x);
+        hn::StoreInterleaved4(fm[k].x.v, fm[k].y.v, fm[k].z.v, zero, d, &force[b].mid[k][part].x);
+        hn::StoreInterleaved4(fd[k].x.v, fd[k].y.v, fd[k].z.v, zero, d, &force[b].dir[k][part].x);
       }
     }
 }

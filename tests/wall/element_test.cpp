@@ -55,12 +55,18 @@ Vector force(const ElementRest& e, const Vector& x, Turn<double>& turn, double* 
   const bool four = n == 4;
   const auto modes = four ? scalar::quad_modes(mid, dir, 0.25) : scalar::triangle_modes(mid, dir, 0.5, 1.0 / 3);
   const auto f = scalar::element_force(get, modes, turn, 30, energy);
-  if (four) scalar::quad_corners(f, 0.25, mid, dir);
-  else scalar::triangle_corners(f, 0.5, 1.0 / 3, mid, dir);
+  Double3 fm[4], fd[4];
+  if (four) {
+    scalar::quad_corners(f, 0.25, fm, fd);
+    scalar::guard_corners<4>(get, mid, dir, fm, fd, energy);
+  } else {
+    scalar::triangle_corners(f, 0.5, 1.0 / 3, fm, fd);
+    scalar::guard_corners<3>(get, mid, dir, fm, fd, energy);
+  }
   Vector out(x.size());
   for (size_t i = 0; i < n; ++i) {
-    out.segment<3>(6 * i) << mid[i].x, mid[i].y, mid[i].z;
-    out.segment<3>(6 * i + 3) << dir[i].x, dir[i].y, dir[i].z;
+    out.segment<3>(6 * i) << fm[i].x, fm[i].y, fm[i].z;
+    out.segment<3>(6 * i + 3) << fd[i].x, fd[i].y, fd[i].z;
   }
   return out;
 }
@@ -71,6 +77,12 @@ Vector deformed(const Shape& s) {
   Eigen::Matrix3d f = Eigen::Matrix3d::Identity() + 0.2 * Eigen::Matrix3d::Random();
   f = Eigen::AngleAxisd(2.0, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix() * f;
   for (int i = 0; i < x.size(); i += 3) x.segment<3>(i) = f * x.segment<3>(i) + 2e-4 * Eigen::Vector3d::Random();
+  return x;
+}
+// The same, one corner nearly flat and another inside out.
+Vector folded(const Shape& s) {
+  Vector x = deformed(s);
+  x.segment<3>(9) *= 0.1, x.segment<3>(15) *= -0.2;
   return x;
 }
 
@@ -91,35 +103,51 @@ TEST_P(AnElement, is_at_rest_where_it_was_made_wherever_it_is_turned) {
 }
 
 TEST_P(AnElement, exerts_no_force_and_no_torque_on_itself) {
-  const Vector x = deformed(shape);
-  Turn<double> turn = rest.turn;
-  const Vector f = force(rest, x, turn);
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), torque = sum;
-  double size = 0;
-  for (int i = 0; i < x.size(); i += 3) {
-    const Eigen::Vector3d p = x.segment<3>(i), g = f.segment<3>(i);
-    if (i % 6 == 0) sum += g;
-    torque += p.cross(g), size += p.norm() * g.norm();
+  for (const Vector& x : {deformed(shape), folded(shape)}) {
+    Turn<double> turn = rest.turn;
+    const Vector f = force(rest, x, turn);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero(), torque = sum;
+    double size = 0;
+    for (int i = 0; i < x.size(); i += 3) {
+      const Eigen::Vector3d p = x.segment<3>(i), g = f.segment<3>(i);
+      if (i % 6 == 0) sum += g;
+      torque += p.cross(g), size += p.norm() * g.norm();
+    }
+    EXPECT_LT(sum.norm(), 1e-12 * f.norm());
+    EXPECT_LT(torque.norm(), 1e-9 * size);
   }
-  EXPECT_LT(sum.norm(), 1e-12 * f.norm());
-  EXPECT_LT(torque.norm(), 1e-9 * size);
 }
 
 TEST_P(AnElement, has_a_force_that_is_the_gradient_of_its_energy_and_a_symmetric_jacobian) {
-  const Vector x = deformed(shape);
-  const double eps = 1e-8;  // [m]
-  Turn<double> turn = rest.turn;
-  const Vector f = force(rest, x, turn);
-  Eigen::MatrixXd jacobian(x.size(), x.size());
-  for (int i = 0; i < x.size(); ++i) {
-    double up = 0, down = 0;
-    Vector a = x, b = x;
-    a[i] += eps, b[i] -= eps;
-    const Vector fa = force(rest, a, turn, &up), fb = force(rest, b, turn, &down);
-    jacobian.col(i) = (fa - fb) / (2 * eps);
-    EXPECT_NEAR(-(up - down) / (2 * eps), f[i], 1e-5 * f.norm());
+  for (const Vector& x : {deformed(shape), folded(shape)}) {
+    const double eps = 1e-8;  // [m]
+    Turn<double> turn = rest.turn;
+    const Vector f = force(rest, x, turn);
+    Eigen::MatrixXd jacobian(x.size(), x.size());
+    for (int i = 0; i < x.size(); ++i) {
+      double up = 0, down = 0;
+      Vector a = x, b = x;
+      a[i] += eps, b[i] -= eps;
+      const Vector fa = force(rest, a, turn, &up), fb = force(rest, b, turn, &down);
+      jacobian.col(i) = (fa - fb) / (2 * eps);
+      EXPECT_NEAR(-(up - down) / (2 * eps), f[i], 1e-5 * f.norm());
+    }
+    EXPECT_LT((jacobian - jacobian.transpose()).norm(), 1e-6 * jacobian.norm());
   }
-  EXPECT_LT((jacobian - jacobian.transpose()).norm(), 1e-6 * jacobian.norm());
+}
+
+// The force that the guard adds at a corner that is inside out turns it back.
+TEST_P(AnElement, resists_at_a_corner_that_turns_inside_out) {
+  Vector x = positions(shape);
+  const Eigen::Vector3d out = x.segment<3>(3).normalized();
+  x.segment<3>(3) *= 0.6;
+  Turn<double> turn = rest.turn;
+  const double at_60 = force(rest, x, turn).segment<3>(3).dot(out);
+  x.segment<3>(3) *= -1;
+  turn = rest.turn;
+  const double inside_out = force(rest, x, turn).segment<3>(3).dot(out);
+  EXPECT_GT(at_60, 0);
+  EXPECT_GT(inside_out, 8 * at_60);  // without the guard four times: from a compression of 0.4 to one of 1.6
 }
 
 TEST_P(AnElement, has_six_rigid_motions_and_no_other_motion_without_stiffness) {
@@ -162,31 +190,32 @@ TEST_P(AnElement, stores_the_laminate_s_energy_under_an_affine_map) {
 }
 
 TEST_P(AnElement, has_the_same_forces_in_the_simd_kernel) {
-  const Vector x = deformed(shape);
-  Turn<double> turn = rest.turn;
-  const Vector want = force(rest, x, turn);
-  ElementBlock block;
-  BlockCorners corners;
-  BlockTurn frame;
-  frame.w.fill(1);
-  corners.quads = shape.mid.size() == 4;
-  const uint32_t lane = 5;
-  for (uint32_t k = 0; k < kConstants; ++k) block.constant[k][lane] = static_cast<float>(rest.constant[k]);
-  frame.x[lane] = static_cast<float>(rest.turn.x), frame.y[lane] = static_cast<float>(rest.turn.y);
-  frame.z[lane] = static_cast<float>(rest.turn.z), frame.w[lane] = static_cast<float>(rest.turn.w);
-  Column<Float4> y;
-  for (int i = 0; i < x.size(); i += 3)
-    y.push_back({static_cast<float>(x[i]), static_cast<float>(x[i + 1]), static_cast<float>(x[i + 2]), 0});
-  for (uint32_t k = 0; k < 4; ++k) corners.column[k][lane] = std::min<uint32_t>(k, static_cast<uint32_t>(y.size() / 2) - 1);
-  BlockForce out;
-  for (int i = 0; i < 12; ++i) block_forces(&block, &corners, y.data(), &frame, &out, 0, 1);  // the frame turns step by step
-  for (size_t k = 0; k < shape.mid.size(); ++k)
-    for (int i = 0; i < 3; ++i) {
-      EXPECT_NEAR(vec3(out.mid[k][lane])[i], want[6 * k + i], 1e-4 * want.norm());
-      EXPECT_NEAR(vec3(out.dir[k][lane])[i], want[6 * k + 3 + i], 1e-4 * want.norm());
-    }
-  for (uint32_t other = 0; other < kLanesOfBlock; ++other)
-    if (other != lane) { EXPECT_EQ(out.mid[0][other], Float4{}); }
+  for (const Vector& x : {deformed(shape), folded(shape)}) {
+    Turn<double> turn = rest.turn;
+    const Vector want = force(rest, x, turn);
+    ElementBlock block;
+    BlockCorners corners;
+    BlockTurn frame;
+    frame.w.fill(1);
+    corners.quads = shape.mid.size() == 4;
+    const uint32_t lane = 5;
+    for (uint32_t k = 0; k < kConstants; ++k) block.constant[k][lane] = static_cast<float>(rest.constant[k]);
+    frame.x[lane] = static_cast<float>(rest.turn.x), frame.y[lane] = static_cast<float>(rest.turn.y);
+    frame.z[lane] = static_cast<float>(rest.turn.z), frame.w[lane] = static_cast<float>(rest.turn.w);
+    Column<Float4> y;
+    for (int i = 0; i < x.size(); i += 3)
+      y.push_back({static_cast<float>(x[i]), static_cast<float>(x[i + 1]), static_cast<float>(x[i + 2]), 0});
+    for (uint32_t k = 0; k < 4; ++k) corners.column[k][lane] = std::min<uint32_t>(k, static_cast<uint32_t>(y.size() / 2) - 1);
+    BlockForce out;
+    for (int i = 0; i < 12; ++i) block_forces(&block, &corners, y.data(), &frame, &out, 0, 1);  // the frame turns step by step
+    for (size_t k = 0; k < shape.mid.size(); ++k)
+      for (int i = 0; i < 3; ++i) {
+        EXPECT_NEAR(vec3(out.mid[k][lane])[i], want[6 * k + i], 1e-4 * want.norm());
+        EXPECT_NEAR(vec3(out.dir[k][lane])[i], want[6 * k + 3 + i], 1e-4 * want.norm());
+      }
+    for (uint32_t other = 0; other < kLanesOfBlock; ++other)
+      if (other != lane) { EXPECT_EQ(out.mid[0][other], Float4{}); }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Quad, AnElement, testing::Values(true));
