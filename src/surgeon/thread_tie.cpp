@@ -19,10 +19,11 @@ constexpr float kSteepAtTail = 1;  // rise of the shaft at the tail, which lies 
 constexpr float kLeans = 60;       // [1/m] of the shaft toward a tail that lies on a slope in front or behind
 constexpr float kTurns = 3;        // [1/s]
 constexpr float kShaft = 2.2e-3f;  // [m] radius that the turns lie on
-constexpr float kNearest = 9e-3f;  // [m] of the winding hand from the shaft
-constexpr float kLoose = 0.95f;    // of the strand that is left: nearly taut
-constexpr float kWinding = 0.25f;  // [N] above which the winding hand yields
-constexpr float kTailEnd = 6e-3f;  // [m] from the tail's end, where it is taken
+constexpr float kJawsRound = 1.7e-3f;    // [m] the same of two turns, which take up no more than they must: round the jaws
+constexpr float kNearest = 9e-3f;        // [m] of the winding hand from the shaft
+constexpr float kLoose = 0.95f;          // of the strand that is left: nearly taut
+constexpr float kWinding = 0.25f;        // [N] above which the winding hand yields
+constexpr float kTailEnd = 6e-3f;        // [m] from the tail's end, where it is taken
 constexpr float kBetweenJaws = 0.6e-3f;  // [m] from the line midway between the jaws: they close on the tail there
 constexpr float kJaws = 3e-3f;           // [m] their length that holds
 constexpr float kHeldWell = 1.5e-3f;     // [m] the same of a tail that turns slide over; between jaws and tail they come off
@@ -37,6 +38,9 @@ constexpr float kSlideOff = 1.4f;  // [s]
 // Of the strand's length: where it is wound. Lower, the needle that goes round would meet the tail, which stands up from a
 // knot.
 constexpr float kHigh = 0.62f;
+// The same for two turns, which need more of it. Half of the strand's length or less, and the hand meets the tail on the
+// tissue.
+constexpr float kHighTwice = 0.57f;
 constexpr float kDrawn = 0.5f;         // of the strand's length: height to which the tail is drawn at most
 constexpr float kLow = 4e-3f;          // [m] above the stitch, where strands are pulled
 constexpr float kKnot = 5e-3f;         // [m] from the middle of the stitch: thread nearer than this belongs to the knot
@@ -174,7 +178,7 @@ void ThreadTie::measure(const Snapshot& seen) {
   }
   const float out = first_ ? 0.0f : kKnot;
   strand_ = length_between(seen, strand_at, last) + out, tail_ = length_between(seen, 0, tail_at) + out;
-  height_ = (wraps_ > 1 ? 0.42f : kHigh) * strand_;
+  height_ = (wraps_ > 1 ? kHighTwice : kHigh) * strand_;
 }
 
 // What the knot lacks is wound from this side.
@@ -408,7 +412,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
     case wind: {
       const float want = 2 * kPi * static_cast<float>(wraps_);
       if (felt_ > kWinding) slack_ = std::max(0.7f, slack_ - 0.3f * dt);
-      const float left = strand_ - height_ - kShaft * turned_;
+      const float left = strand_ - height_ - (wraps_ > 1 ? kJawsRound : kShaft) * turned_;
       const float goal = std::max(kNearest, slack_ * kLoose * left);
       // From the straight strand at the beginning to one that leaves the shaft.
       const float direct = std::min(1.0f, turned_ / 1.5f);

@@ -16,8 +16,10 @@ float SeenThrows::next(float first) const { return right > left ? -1.0f : right 
 
 SeenThrows see_throws(std::span<const Vec3> thread) {
   SeenThrows seen;
-  for (const thread::KnotFactor& f : thread::vote_knot(thread, kFar, true).type.factors)
+  for (const thread::KnotFactor& f : thread::vote_knot(thread, kFar, true).type.factors) {
     ++(f.hand > 0 ? seen.right : seen.left);
+    seen.turns = std::max(seen.turns, int{f.wraps});
+  }
   return seen;
 }
 

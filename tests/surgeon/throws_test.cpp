@@ -96,6 +96,21 @@ TEST(Throws, are_counted_whether_tight_wide_or_tilted) {
     }
 }
 
+TEST(Throws, a_surgeons_throw_is_told_from_a_single_one) {
+  for (const float radius : {0.4e-3f, 6e-3f})
+    for (const float tilt : {0.0f, -1.2f}) {
+      const auto turns = [&](const std::vector<Laid>& throws) {
+        return see_throws(bent(tied(throws, 20e-3f, 60e-3f), tilt, tilt)).turns;
+      };
+      SCOPED_TRACE(testing::Message() << "radius " << radius << ", tilt " << tilt);
+      EXPECT_EQ(turns({}), 0);
+      EXPECT_EQ(turns({{3, -1, radius}}), 1);
+      EXPECT_EQ(turns({{5, -1, radius}}), 2) << "two turns";
+      EXPECT_EQ(turns({{3, 1, radius}, {3, -1}}), 1) << "a square knot";
+      EXPECT_EQ(turns({{5, 1, radius}, {3, -1}, {3, 1}}), 2) << "2-1-1";
+    }
+}
+
 // The strand is wound round the tail and pulled off its end: no throw.
 TEST(Throws, turns_that_the_tail_was_not_drawn_through_are_none) {
   std::vector<Vec3> thread;
