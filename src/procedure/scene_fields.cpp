@@ -63,6 +63,7 @@ const Field kField[] = {
     {"body", "modulus_along", "Pa", 1000, 1e9, nullptr, "physical mechanics: Young's modulus of the wall along the organ", BODY(modulus_along)},
     {"body", "modulus_around", "Pa", 1000, 1e9, nullptr, "physical mechanics: Young's modulus of the wall around the organ", BODY(modulus_around)},
     {"body", "poisson", "", 0, 0.49, nullptr, "physical mechanics: Poisson's ratio of the wall, contraction around when stretched along", BODY(poisson)},
+    {"body", "foundation", "Pa/m", 0, 1e9, nullptr, "physical mechanics: an elastic bed under the wall, its modulus over its thickness; 0: none", BODY(foundation)},
     {"body", "inner_radius", "m", 0, 1, nullptr, "outer radius of a second tube inside the first, as in a prolapse; 0: none", BODY(inner_radius)},
     {"body", "folded", "", 0, 0, nullptr, "the two tubes are one wall, folded at the near end: a prolapse before it is cut", BODY(folded)},
 

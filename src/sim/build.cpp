@@ -24,7 +24,7 @@ namespace {
 
 constexpr float kPaperSubstep = 1.0f / 480;    // [s] substep for which the paper's deformation resistance is defined
 constexpr float kDrapeBelowRim = 0.035f;       // [m] below the rim, where a body stands up through the drape
-constexpr float kDrapeBelowBody = 0.010f;      // [m] below the body, where it lies on the drape
+constexpr float kDrapeBelowBody = 0.010f;      // [m] below the body, where it lies on the drape, or on a bed
 constexpr float kDrapeBelowPad = 0.001f;       // [m] below a pad of skin: thread in its slit stays within reach
 constexpr float kRow = 0.07f, kTurn = 0.005f;  // [m] of a thread on the drape: length of a row, radius of its turns
 
@@ -349,7 +349,7 @@ void add_body(Model& m, const BodySpec& spec, Tissue& all) {
   const uint32_t first = static_cast<uint32_t>(all.rest.size());
   float bottom = spec.position.y - kDrapeBelowRim;
   if (spec.kind == "pad") {
-    bottom = spec.position.y - spec.wall - kDrapeBelowPad;
+    bottom = spec.position.y - spec.wall - (spec.foundation > 0 ? kDrapeBelowBody : kDrapeBelowPad);
   } else if (lies(spec)) {
     for (const Vec3& p : r.position) bottom = std::min(bottom, p.y - kDrapeBelowBody);
   }

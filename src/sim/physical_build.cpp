@@ -147,6 +147,7 @@ void add_wall(const SceneSpec& scene, const BodySpec& spec, const BodyRest& body
     if (t[0] % 2 == 0 && t[1] % 2 == 0 && t[2] % 2 == 0) face.push_back({t[0] / 2, t[1] / 2, t[2] / 2});
   wall::Mesh part = wall::from_triangles(outer, inner, face, spec.axis, spec.name);
   for (size_t c = 0; c < outer.size(); ++c) part.held[c] = body.pinned[2 * c];
+  part.foundation.assign(outer.size(), spec.foundation);
   if (mesh.outer.empty()) mesh = std::move(part);
   else wall::append(mesh, part);
 }

@@ -33,6 +33,8 @@ struct BodySpec {
   float modulus_along = 6e5f;    // [Pa] Young's modulus along the organ; this and the next two: physical mechanics only
   float modulus_around = 6e5f;   // [Pa] around it
   float poisson = 0.45f;         // contraction around when stretched along
+  float foundation =
+      0;  // [Pa/m] of an elastic bed that the wall lies on: its modulus over its thickness; physical mechanics only
 };
 
 // One instrument of the scene. A scene that names none has a needle holder in the right hand and forceps in the left.

@@ -175,6 +175,9 @@ void append(Mesh& mesh, const Mesh& more) {
   mesh.outer.insert(mesh.outer.end(), more.outer.begin(), more.outer.end());
   mesh.inner.insert(mesh.inner.end(), more.inner.begin(), more.inner.end());
   mesh.held.insert(mesh.held.end(), more.held.begin(), more.held.end());
+  mesh.foundation.resize(first, 0),
+      mesh.foundation.insert(mesh.foundation.end(), more.foundation.begin(), more.foundation.end());
+  mesh.foundation.resize(mesh.outer.size(), 0);
   mesh.along.insert(mesh.along.end(), more.along.begin(), more.along.end());
   for (auto f : more.face) {
     for (uint32_t& c : f)

@@ -20,6 +20,7 @@ struct Mesh {
   std::vector<std::array<uint32_t, 4>> face;  // columns, counter-clockwise seen from outside; [3] is kNone for a triangle
   std::vector<Vec3> along;                    // per face: the direction "along" of the laminate
   std::vector<uint8_t> held;                  // per column: 1 where it is fixed
+  std::vector<float> foundation;              // [Pa/m] per column, of the bed it lies on; 0: none; an empty list: no bed
 };
 
 // Columns in order round each opening, counter-clockwise seen from outside the wall's outer side; the longest rim first.

@@ -43,6 +43,10 @@ void check(const Spec& spec) {
   if (n < 3 || n > 1000000) fail(std::to_string(n) + " columns make no wall", "give 3 to 1000000");
   if (spec.mesh.inner.size() != n || spec.mesh.held.size() != n)
     fail("lists of columns of different lengths", "give one entry a column");
+  if (!spec.mesh.foundation.empty() && spec.mesh.foundation.size() != n)
+    fail("a foundation for some columns only", "give one entry a column");
+  for (const float k : spec.mesh.foundation)
+    if (!(k >= 0 && k <= 1e9f)) fail("a foundation of " + std::to_string(k) + " Pa/m", "give 0 to 1e9");
   if (spec.mesh.face.empty() || spec.mesh.along.size() != spec.mesh.face.size())
     fail("no faces, or faces without directions", "give one direction a face");
   if (!(spec.step >= 1e-5f && spec.step <= 0.02f))
@@ -83,6 +87,20 @@ void all_forces(const ElementBlock* whole, const ElementBlock* extra, uint32_t w
                  last - wholes);
 }
 
+// Of the bed in a column's inertia, relative to its mass.
+float bed_inertia(const Model& m, const Topology& t, uint32_t c) {
+  return m.bed.empty() ? 0 : m.step * m.step * m.bed[t.source[c]].stiffness;
+}
+
+// The bed's force on a column's mid-surface point that is `displaced` from its place at rest. Across the normal it is a third
+// of that along it, as the shear modulus of an incompressible material is of Young's modulus.
+Lanes bed_force(const Model& m, const Topology& t, uint32_t c, Lanes displaced) {
+  const Model::Bed& b = m.bed[t.source[c]];
+  const Lanes n = load(b.normal);
+  const float along = displaced[0] * n[0] + displaced[1] * n[1] + displaced[2] * n[2], k = b.stiffness * t.mass[c];
+  return splat(-k / 3) * (displaced + splat(2 * along) * n);
+}
+
 // Rows of the factor for every column that is not held, and the factor.
 void factor_again(const Model& m, Topology& t) {
   const uint32_t n = static_cast<uint32_t>(t.source.size());
@@ -93,7 +111,7 @@ void factor_again(const Model& m, Topology& t) {
   const double scale = static_cast<double>(m.step) * m.step * m.report.scale;
   std::vector<Entry> entry;
   for (uint32_t c = 0; c < n; ++c)
-    if (row[c] != kNone) entry.push_back({row[c], row[c], t.mass[c]});
+    if (row[c] != kNone) entry.push_back({row[c], row[c], t.mass[c] * (1 + bed_inertia(m, t, c))});
   each_element(m, t, [&](uint32_t lane, const Model::LaneInertia& inertia, float part) {
     for (int e = 0; e < 6; ++e) {
       const double w = scale * static_cast<double>(inertia.edge[e] * part);
@@ -217,7 +235,7 @@ void renew_topology(const Model& m, Topology& t, bool again) {
     for (uint32_t c : group) mass += t.mass[c];
     for (uint32_t c : group) {
       t.share[c] = t.mass[c] / mass;
-      t.relative[c] = 1 / (t.mass[c] + 3 * scale * diagonal[c]);
+      t.relative[c] = 1 / (t.mass[c] * (1 + bed_inertia(m, t, c)) + 3 * scale * diagonal[c]);
       t.group_member.push_back(c);
     }
     float spread = 0;
@@ -286,6 +304,9 @@ Wall build_wall(const Spec& spec) {
   }
   t.source.resize(n);
   for (uint32_t c = 0; c < n; ++c) t.source[c] = c;
+  if (std::any_of(m.mesh.foundation.begin(), m.mesh.foundation.end(), [](float k) { return k > 0; }))
+    for (uint32_t c = 0; c < n; ++c)
+      m.bed.push_back({float4(mid[c]), float4(normalized(dir[c])), m.mesh.foundation[c] / (2 * length(dir[c]) * spec.density)});
   m.neighbor = neighbors(m.mesh);
   Motion& motion = w.state.motion;
   const size_t room = n + n / 3 + 32;
@@ -321,6 +342,7 @@ void elastic_forces(const Model& m, State& s, Scratch& k, int turns) {
   for (uint32_t c = 0; c < columns(s); ++c) {
     Lanes mid, dir;
     gather_forces(s.topology, k.block_force, c, mid, dir);
+    if (!m.bed.empty()) mid = mid + bed_force(m, s.topology, c, load(s.motion.x[2 * c]) - load(m.bed[s.topology.source[c]].at));
     store(k.force[2 * c], mid), store(k.force[2 * c + 1], dir);
   }
 }
@@ -343,6 +365,7 @@ void begin_step(const Model& m, State& s, Scratch& k, Jobs& jobs) {
     for (size_t c = first; c < last; ++c) {
       Lanes mid, dir;
       gather_forces(t, k.block_force, static_cast<uint32_t>(c), mid, dir);
+      if (!m.bed.empty()) mid = mid + bed_force(m, t, static_cast<uint32_t>(c), load(k.y[2 * c]) - load(m.bed[t.source[c]].at));
       store(k.force[2 * c], mid + load(k.external[2 * c]) + splat(t.mass[c]) * gravity);
       store(k.force[2 * c + 1], dir + load(k.external[2 * c + 1]));
       store(k.external[2 * c], splat(0)), store(k.external[2 * c + 1], splat(0));
@@ -414,6 +437,7 @@ float largest_eigenvalue(const Model& m, const State& state, Scratch& k, bool st
         if (t.slot[c] == kNone) continue;
         Lanes mid, dir;
         gather_forces(t, k.block_force, c, mid, dir);
+        if (!m.bed.empty()) mid = mid + bed_force(m, t, c, splat(sign * eps) * load(v[2 * c]));
         store(kv[2 * c], load(kv[2 * c]) - splat(sign * 0.5f / eps) * mid);
         store(kv[2 * c + 1], load(kv[2 * c + 1]) - splat(sign * 0.5f / eps) * dir);
       }

@@ -8,6 +8,9 @@
 //   impulses of everything else: v += A^-1 J^T p
 //   x = x + h v
 //
+// A mesh may lie on an elastic bed (Winkler): each column is drawn back to its place at rest with k per area and distance along
+// the normal, k / 3 across it. In A the bed has h^2 k area: implicit, so that a stiff bed does not limit the step.
+//
 // A resting state has zero force for any A, so neither step nor mesh changes the stiffness. L does not act on rigid
 // translation: mass and linear momentum are exact. c is chosen at build time so that the largest eigenvalue of h^2 A^-1 K is at
 // most 1.05. It stays below about 1.2 when the wall is cut (the step is stable below 2.67). Frames: positions in the scene's
@@ -60,6 +63,12 @@ struct Model {
     float dir;      // [N/m] per corner, of directors
   };
   std::vector<LaneInertia> inertia;
+  // Of a column that lies on a bed, by `source`; an empty list: no bed.
+  struct Bed {
+    Float4 at, normal;    // [m], unit: of the mid-surface at rest
+    float stiffness = 0;  // [1/s^2] k per mass of wall above it
+  };
+  std::vector<Bed> bed;
   std::vector<std::array<uint32_t, 4>> neighbor;  // per face, over each edge: 4 * face + edge on the other side; kNone: a rim
   InertiaReport report;
 };

@@ -315,6 +315,29 @@ TEST(Cut, moves_no_column_and_no_material_point) {
     EXPECT_EQ(place(weights(w.model, w.state.topology, point[i]), w.state.motion), before[i]);
 }
 
+// A bed that is far stiffer than the wall, and a sheet cut in two on it, the second time with a new factor: each half sinks by
+// the pressure over the bed's modulus, and no eigenvalue comes near the limit of the step.
+TEST(Cut, leaves_both_halves_of_a_sheet_on_their_bed) {
+  for (const bool again : {false, true}) {
+    Spec s;
+    SheetShape shape;
+    shape.columns = shape.rows = 9;
+    s.mesh = sheet(shape);
+    s.mesh.foundation.assign(s.mesh.outer.size(), 1e8f);
+    s.gravity = {0, 0, -9.81f};
+    Wall w = build_wall(s);
+    std::vector<std::array<uint32_t, 2>> edge;
+    for (uint32_t i = 0; i < 8; ++i) edge.push_back({4 + 9 * i, 4 + 9 * (i + 1)});
+    EXPECT_EQ(cut(w.model, w.state, w.scratch, edge), 9u);
+    if (again) refactor(w.model, w.state, w.scratch);
+    EXPECT_LT(largest_eigenvalue(w.model, w.state, w.scratch, true), 1.3f);
+    Jobs jobs(1);
+    for (int i = 0; i < 2000; ++i) step(w, jobs);
+    const float depth = 9.81f * 1050 * shape.thickness / 1e8f;  // 0.26 um
+    for (uint32_t c = 0; c < columns(w.state); ++c) EXPECT_NEAR(-w.state.motion.x[2 * c].z, depth, 0.02f * depth);
+  }
+}
+
 TEST(Mesh, of_the_bowel_generator_becomes_quads_with_its_two_rims) {
   BowelShape shape;
   const BodyRest body = make_bowel(shape);
