@@ -88,8 +88,10 @@ void look(const State& state, const Scratch& s, const SoftPoints& soft, size_t e
   c.length_in = length(in), c.length_out = length(out);
   c.near_in = c.length_in < near && k > 0 && joined(state, k - 1);
   c.near_out = c.length_out < near && joined(state, k + 1);
-  c.in = normalized(c.near_in ? from_before(state, s, soft, e) : in, normalized(out, {1, 0, 0}));
-  c.out = normalized(c.near_out ? to_behind(state, s, soft, e) : out, c.in);
+  // The nearer, the more along the span: a direction that changed at once would change the length at once.
+  const auto toward = [&](Vec3 to_node, Vec3 span) { return to_node / near + normalized(span) * (1 - length(to_node) / near); };
+  c.in = normalized(c.near_in ? toward(in, from_before(state, s, soft, e)) : in, normalized(out, {1, 0, 0}));
+  c.out = normalized(c.near_out ? toward(out, to_behind(state, s, soft, e)) : out, c.in);
   if (c.near_in) c.length_in = dot(in, c.in);
   if (c.near_out) c.length_out = dot(out, c.out);
 }
@@ -103,11 +105,15 @@ void measure(const State& state, const Scratch& s, const SoftPoints& soft, size_
   c.length_out = c.near_out ? dot(out, c.out) : length(out);
 }
 
-// A node has come through the hole: its overshoot and its motion turn into the other span, and the hole takes the kick.
-void pass_node(State& state, Scratch& s, SoftPoints& soft, uint32_t point, size_t node, Vec3 from, Vec3 to, float substep) {
+// A node has come through the hole: its overshoot and its motion turn into the other span, and the hole takes the kick. A node
+// of slack thread passes beside the hole. The segment to the next node keeps the length that it had round the corner.
+void pass_node(State& state, Scratch& s, SoftPoints& soft, uint32_t point, size_t node, size_t next, Vec3 from, Vec3 to,
+               float length_before, float substep) {
   const Vec3 hole = soft.at[point], away = ((state.x.at(node) - hole) + state.fine.at(node)) - s.soft_moved.at(point);
   const Vec3 moved = turned(away, from, to) - away;
   state.fine.add(node, moved);
+  const Vec3 span = (state.x.at(next) - state.x.at(node)) + (state.fine.at(next) - state.fine.at(node));
+  state.fine.add(node, normalized(span) * (length(span) - length_before));
   const Vec3 v = state.v.at(node) - soft.speed[point], change = turned(v, from, to) - v;
   state.v.add(node, change);
   push_soft(s, soft, point, change * (-s.mass[node] * substep), substep);
@@ -170,16 +176,17 @@ void turn_corners(const Settings& settings, State& state, Scratch& s, Surroundin
     eyelet.slip = std::clamp(eyelet.slip - (inside - eyelet.before), -kBristle, kBristle);
     eyelet.before = inside;
     eyelet.angle = portable::acos(std::clamp(dot(c.in, c.out), -1.0f, 1.0f));
-    c.pass = portable::exp(eyelet.friction * eyelet.angle * eyelet.slip / kBristle);
+    // Thread that is pushed through the hole leaves it with all of the push: friction drives nothing.
+    c.pass = s.lambda[k] > 0 ? 1.0f : portable::exp(eyelet.friction * eyelet.angle * eyelet.slip / kBristle);
     const bool free_behind = e + 1 == state.eyelet.size() || state.eyelet[e + 1].segment != k + 1;
     const bool free_before = kept == 0 || state.eyelet[kept - 1].segment + 1 != k;
     if (c.near_out && c.length_out < 0 && free_behind) {
-      pass_node(state, s, soft, eyelet.point, k + 1, c.out, c.in, settings.substep);
+      pass_node(state, s, soft, eyelet.point, k + 1, k, c.out, c.in, c.length_in + c.length_out, settings.substep);
       leave(k + 1), leave(k + 2);
       eyelet.before -= state.rest[k];
       ++eyelet.segment;
     } else if (c.near_in && c.length_in < 0 && free_before) {
-      pass_node(state, s, soft, eyelet.point, k, c.in, c.out, settings.substep);
+      pass_node(state, s, soft, eyelet.point, k, k + 1, c.in, c.out, c.length_in + c.length_out, settings.substep);
       leave(k), leave(k - 1);  // k > 0: near_in
       --eyelet.segment;
       eyelet.before += state.rest[eyelet.segment];

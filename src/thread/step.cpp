@@ -101,6 +101,7 @@ void begin_step(const Settings& settings, const State& state, Scratch& s) {
     s.keep[i] = state.broken[i] ? 0.0f : 1.0f;
     s.alpha[i] = state.rest[i] / (settings.material.axial_stiffness * h * h);
     s.tension_sum[i] = 0;
+    s.lambda[i] = -state.tension[i] * h * h;
   }
   for (Padded* c : {&s.rest, &s.inverse_rest, &s.keep, &s.alpha}) (*c)[m] = 0;
   // Line density that bending and tension require of a segment; a node uses the larger one of its two segments.

@@ -209,6 +209,44 @@ Sewn interrupted(const Stitch& q) {
   return s;
 }
 
+Sewn ring_of_stitches(const Stitch& q, int count) {
+  Sewn s;
+  const wall::Wall w = two_tubes(q.gap, 48);
+  s.model = physical::make_model(w, knot_settings(q.friction));
+  s.state.wall = w.state;
+  std::vector<Vec3> path;
+  std::vector<int32_t> hole;
+  std::vector<size_t> ends;  // nodes so far at the end of each strand
+  const float z = 0.5f * q.gap + q.bite, tail = 0.012f;
+  for (int k = 0; k < count; ++k) {
+    const float angle = 2 * kPi * static_cast<float>(k) / static_cast<float>(count);
+    const Vec3 out{std::cos(angle), std::sin(angle), 0};
+    std::vector<Vec3> stop;
+    for (const int corner : {0, 1, 2, 3}) {
+      const bool outside = corner == 0 || corner == 3;
+      physical::Hole h =
+          hole_at(w, out * (outside ? 0.02f : 0.0175f) + Vec3{0, 0, corner < 2 ? z : -z}, outside ? 1.0f : -1.0f);
+      h.within = corner == 0 || corner == 2;
+      stop.push_back(mouth(s.model, s.state, h));
+      s.state.hole.push_back(h);
+    }
+    stop.insert(stop.begin(), stop[0] + out * tail), stop.push_back(stop.back() + out * tail);
+    for (size_t i = 0; i + 1 < stop.size(); ++i) {
+      const int parts = std::max(3, static_cast<int>(distance(stop[i], stop[i + 1]) / q.segment));
+      for (int n = i == 0 ? 0 : 1; n < parts; ++n) {
+        path.push_back(lerp(stop[i], stop[i + 1], static_cast<float>(n) / static_cast<float>(parts))), hole.push_back(-1);
+      }
+      path.push_back(stop[i + 1]), hole.push_back(i + 2 < stop.size() ? 4 * k + static_cast<int32_t>(i) : -1);
+    }
+    ends.push_back(static_cast<size_t>(std::count(hole.begin(), hole.end(), -1)));
+  }
+  s.state.thread = thread::make_laced_state(path, hole, q.hole_friction);
+  for (size_t k = 0; k + 1 < ends.size(); ++k) s.state.thread.broken[ends[k] - 1] = 1;
+  s.start();
+  s.hold.clear();
+  return s;
+}
+
 Sewn purse_string(const Stitch& q, int passages) {
   Sewn s;
   wall::TubeShape shape;

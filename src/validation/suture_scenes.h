@@ -62,6 +62,8 @@ struct Stitch {
   float friction = 0.3f, hole_friction = 0.15f;
 };
 Sewn interrupted(const Stitch& stitch);
+// Such stitches side by side round the tubes, with free tails of 12 mm: strands of one thread::State.
+Sewn ring_of_stitches(const Stitch& stitch, int count);
 // A running suture round the rim of one tube: `holes` passages through the wall (an even number), both ends outside.
 Sewn purse_string(const Stitch& stitch, int passages);
 
