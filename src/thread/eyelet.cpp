@@ -13,8 +13,9 @@
 namespace catgut::thread {
 namespace {
 
-constexpr float kMeet = 0.5f;  // of a segment: holes so near to each other are drawn together no further
-constexpr float kNear = 0.3f;  // of a segment: a node so near to the hole is measured along its span, not to the hole
+constexpr float kMeet = 0.5f;   // of a segment: holes so near to each other are drawn together no further
+constexpr float kSame = 0.02f;  // of a segment: holes so near to each other have no direction between them
+constexpr float kNear = 0.3f;   // of a segment: a node so near to the hole is measured along its span, not to the hole
 
 Vec3 hole_from(const State& state, const Scratch& s, const SoftPoints& soft, uint32_t point, size_t node) {
   return ((soft.at[point] - state.x.at(node)) - state.fine.at(node)) + (s.soft_moved.at(point) - s.u.at(node));
@@ -65,7 +66,7 @@ Vec3 from_before(const State& state, const Scratch& s, const SoftPoints& soft, s
   if (e > 0 && state.eyelet[e - 1].segment + 1 == eyelet.segment) {
     const Vec3 here = hole_from(state, s, soft, eyelet.point, eyelet.segment);
     const Vec3 between = here - hole_from(state, s, soft, state.eyelet[e - 1].point, eyelet.segment);
-    return length(between) < kMeet * state.rest[eyelet.segment] ? Vec3{} : between;
+    return length(between) < kSame * state.rest[eyelet.segment] ? Vec3{} : between;
   }
   return hole_from(state, s, soft, eyelet.point, eyelet.segment - 1);
 }
@@ -74,9 +75,21 @@ Vec3 to_behind(const State& state, const Scratch& s, const SoftPoints& soft, siz
   if (e + 1 < state.eyelet.size() && state.eyelet[e + 1].segment == eyelet.segment + 1) {
     const Vec3 here = hole_from(state, s, soft, eyelet.point, eyelet.segment);
     const Vec3 between = hole_from(state, s, soft, state.eyelet[e + 1].point, eyelet.segment) - here;
-    return length(between) < kMeet * state.rest[eyelet.segment] ? Vec3{} : between;
+    return length(between) < kSame * state.rest[eyelet.segment] ? Vec3{} : between;
   }
   return hole_from(state, s, soft, eyelet.point, eyelet.segment + 2) * -1.0f;
+}
+
+// The hole in the next segment that this one has met: the thread pushes both alike. None: itself.
+size_t met(const State& state, const Scratch& s, const SoftPoints& soft, size_t e) {
+  const auto meets = [&](size_t a, size_t b) {
+    return state.eyelet[a].segment + 1 == state.eyelet[b].segment &&
+           distance(soft.at[state.eyelet[a].point] + s.soft_moved.at(state.eyelet[a].point),
+                    soft.at[state.eyelet[b].point] + s.soft_moved.at(state.eyelet[b].point)) <
+               kMeet * state.rest[state.eyelet[b].segment];
+  };
+  if (e + 1 < state.eyelet.size() && meets(e, e + 1)) return e + 1;
+  return e > 0 && meets(e - 1, e) ? e - 1 : e;
 }
 
 // Directions and lengths on both sides of a corner.
@@ -86,12 +99,16 @@ void look(const State& state, const Scratch& s, const SoftPoints& soft, size_t e
   const Vec3 in = hole_from(state, s, soft, eyelet.point, k), out = hole_from(state, s, soft, eyelet.point, k + 1) * -1.0f;
   const float near = kNear * state.rest[k];
   c.length_in = length(in), c.length_out = length(out);
-  c.near_in = c.length_in < near && k > 0 && joined(state, k - 1);
-  c.near_out = c.length_out < near && joined(state, k + 1);
+  // A node that is through waits beyond the hole while its next segment has a hole already: up to a segment from it.
+  const bool waits_in = eyelet.before<0, waits_out = eyelet.before> state.rest[k];
+  c.near_in = (c.length_in < near || waits_in) && k > 0 && joined(state, k - 1);
+  c.near_out = (c.length_out < near || waits_out) && joined(state, k + 1);
   // The nearer, the more along the span: a direction that changed at once would change the length at once.
-  const auto toward = [&](Vec3 to_node, Vec3 span) { return to_node / near + normalized(span) * (1 - length(to_node) / near); };
-  c.in = normalized(c.near_in ? toward(in, from_before(state, s, soft, e)) : in, normalized(out, {1, 0, 0}));
-  c.out = normalized(c.near_out ? toward(out, to_behind(state, s, soft, e)) : out, c.in);
+  const auto toward = [&](Vec3 to_node, Vec3 span, bool waits) {
+    return waits ? span : to_node / near + normalized(span) * (1 - length(to_node) / near);
+  };
+  c.in = normalized(c.near_in ? toward(in, from_before(state, s, soft, e), waits_in) : in, normalized(out, {1, 0, 0}));
+  c.out = normalized(c.near_out ? toward(out, to_behind(state, s, soft, e), waits_out) : out, c.in);
   if (c.near_in) c.length_in = dot(in, c.in);
   if (c.near_out) c.length_out = dot(out, c.out);
 }
@@ -314,7 +331,10 @@ void apply_corners(const State& state, Scratch& s, SoftPoints& soft, float subst
     const size_t k = state.eyelet[e].segment;
     const float step = s.step[k];
     s.u.add(k + 1, (c.out * c.pass - c.in) * (s.w[k + 1] * step));
-    push_soft(s, soft, state.eyelet[e].point, (c.in - c.out * c.pass) * step, substep);
+    const Vec3 push = (c.in - c.out * c.pass) * step;
+    const size_t other = met(state, s, soft, e);
+    push_soft(s, soft, state.eyelet[e].point, other == e ? push : push * 0.5f, substep);
+    if (other != e) push_soft(s, soft, state.eyelet[other].point, push * 0.5f, substep);
   }
 }
 
