@@ -252,7 +252,8 @@ inline void guard_corners(const Get& c, const Vec3Of<S> (&mid)[4], const Vec3Of<
       const Vec3Of<S> a1{c(kA1x), c(kA1y), zero}, a2{c(kA2x), c(kA2y), zero};
       rest = span * dot(cross(a1 + h1 * eta, a2 + h1 * xi), d0 + h2 * xi + h3 * eta + h4 * both);
     }
-    const S missing = larger(S(kLeastVolume) * rest - volume[k], zero);
+    // A corner that is nearly flat already at rest is left as it is.
+    const S missing = larger(S(kLeastVolume) * rest - volume[k], zero) * above(rest, middle * S(0.3f));
     const S stiff = S(kGuard / static_cast<float>(N)) * c(kThick) / larger(rest * rest, S(1e-30f)), f = stiff * missing;
     const size_t next = (k + 1) % N, last = (k + N - 1) % N;
     const Vec3Of<S> on_next = cross(mid[last] - mid[k], dir[k]) * f, on_last = cross(dir[k], mid[next] - mid[k]) * f;
