@@ -35,7 +35,8 @@ struct Case {
   const char *scene, *preset;
   double seconds;  // [s] simulated, maximum
 };
-// The whole procedure of each technique, and ten seconds of repetitive scenes.
+// The whole procedure of each technique, ten seconds of repetitive scenes, and of the tied stitch the sewing and the first
+// throw.
 constexpr Case kCase[] = {{"purse_string", "default", 200},
                           {"connell", "default", 200},
                           {"stay", "default", 200},
@@ -43,6 +44,7 @@ constexpr Case kCase[] = {{"purse_string", "default", 200},
                           {"two_sutures", "default", 200},
                           {"stress_one_body", "default", 10},
                           {"stress_two_bodies", "default", 10},
+                          {"interrupted_tied", "default", 30},
                           {"purse_string", "paper", 10},
                           {"connell", "paper", 10},
                           {"stay", "paper", 10},
