@@ -56,7 +56,7 @@ count() {  # count FILE: writes "scene moment instructions-a-tick"
   fi
   [ -f "$root/build/CMakeCache.txt" ] || die "nothing is built yet: ./catgut test, or cmake --preset release"
   # Configured again, because the target exists only if valgrind is installed.
-  { cmake -S "$root" -B "$root/build" && cmake --build "$root/build" --target count_ticks bench_thread; } >"$work/build.log" 2>&1 ||
+  { cmake -S "$root" -B "$root/build" && cmake --build "$root/build" --target count_ticks bench_thread bench_physical; } >"$work/build.log" 2>&1 ||
     { tail -n 30 "$work/build.log" >&2; die "count_ticks cannot be built"; }
   local program="$root/build/bench/count_ticks"
   (cd "$root" && "$program" write "$work/ticks") || die "the scenes could not be sewn"
@@ -70,13 +70,16 @@ count() {  # count FILE: writes "scene moment instructions-a-tick"
     total="$(grep -a -m 1 '^totals: ' "$work/dump.$number" | cut -d ' ' -f 2)"
     echo "$scene $moment $((total / ticks))" >>"$1"
   done <"$work/moments"
-  # The physical thread: a millisecond with a 2-1-1 knot in 300 segments.
-  valgrind --tool=callgrind --instr-atstart=no --collect-atstart=no --callgrind-out-file="$work/thread" \
-    "$root/build/bench/bench_thread" count >"$work/moments" 2>"$work/valgrind.log" ||
-    { tail -n 30 "$work/valgrind.log" >&2; die "the thread could not be counted"; }
-  read -r scene moment ticks <"$work/moments"
-  total="$(grep -a -m 1 '^totals: ' "$work/thread.1" | cut -d ' ' -f 2)"
-  echo "$scene $moment $((total / ticks))" >>"$1"
+  # A millisecond of the physical thread, 300 segments with a 2-1-1 knot; of wall and thread, a stitch with a throw drawn tight.
+  local bench
+  for bench in bench_thread bench_physical; do
+    valgrind --tool=callgrind --instr-atstart=no --collect-atstart=no --callgrind-out-file="$work/$bench" \
+      "$root/build/bench/$bench" count >"$work/moments" 2>"$work/valgrind.log" ||
+      { tail -n 30 "$work/valgrind.log" >&2; die "$bench could not be counted"; }
+    read -r scene moment ticks <"$work/moments"
+    total="$(grep -a -m 1 '^totals: ' "$work/$bench.1" | cut -d ' ' -f 2)"
+    echo "$scene $moment $((total / ticks))" >>"$1"
+  done
 }
 
 case "${1:-}" in

@@ -2,6 +2,7 @@
 // bench/physical: processor time of a millisecond of wall and thread together, on one core: median and 99th percentile of 300.
 //   bench_physical             a stitch that is drawn, the same tied, a purse-string that is drawn
 //   bench_physical purse       the purse-string alone
+//   bench_physical count       ten steps of the drawn stitch between callgrind's marks, for tools/count_instructions.sh
 //   bench_physical sutures     1 to 16 stitches side by side: all asleep, one of them drawn, all awake; each against the first
 //   bench_physical waiting     a stitch that is drawn while 0 to 49 other strands wait: asleep, awake; each against none
 #include <time.h>
@@ -13,6 +14,9 @@
 #include <vector>
 
 #include "validation/suture_scenes.h"
+#ifdef CATGUT_CALLGRIND
+#include <valgrind/callgrind.h>
+#endif
 
 namespace {
 using namespace catgut;
@@ -120,6 +124,21 @@ void compare_waiting() {
                 ms[0] / first[0], ms[1], ms[1] / first[1]);
   }
 }
+void count(Sewn& s) {
+  constexpr int kSteps = 10;
+#ifdef CATGUT_CALLGRIND
+  CALLGRIND_ZERO_STATS;
+  CALLGRIND_START_INSTRUMENTATION;
+  CALLGRIND_TOGGLE_COLLECT;
+#endif
+  for (int i = 0; i < kSteps; ++i) s.run(0.001f);
+#ifdef CATGUT_CALLGRIND
+  CALLGRIND_TOGGLE_COLLECT;
+  CALLGRIND_STOP_INSTRUMENTATION;
+  CALLGRIND_DUMP_STATS;
+#endif
+  std::printf("stitch throw %d\n", kSteps);
+}
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -130,6 +149,7 @@ int main(int argc, char** argv) {
     Tying t;
     t.center = {0.0203f, 0, 0}, t.tension = 3;
     tie_throw(stitch, t, {3, 1});
+    if (argc == 2 && std::string_view(argv[1]) == "count") return count(stitch), 0;
     report("stitch, one throw drawn", stitch);
     tie_throw(stitch, t, {3, -1});
     let_go(stitch);
