@@ -146,14 +146,16 @@ static void yield_to_thread(const BodiesModel& model, const Bodies& bodies, Bodi
 }
 
 void take_thread_forces(const BodiesModel& model, Bodies& bodies, BodiesScratch& k) {
-  for (Body& b : bodies.body) b.thread_force = b.thread_torque = {};
+  // The mean over two steps. The force comes one step late: of turns of thread round a shaft, which weigh about what the shaft
+  // does near its tip, it would grow from step to step with alternating signs until they break.
+  for (Body& b : bodies.body) b.thread_force = 0.5f * b.thread_force, b.thread_torque = 0.5f * b.thread_torque;
   yield_to_thread(model, bodies, k);
   for (size_t i = 0; i < k.tool.size(); ++i) {
     Body& b = bodies.body[k.tool_body[i]];
     const Vec3 c = k.moving[k.tool_body[i]].center;
     const thread::ToolCapsule& t = k.tool[i];
-    b.thread_force += t.force_a + t.force_b;
-    b.thread_torque += cross(t.a - c, t.force_a) + cross(t.b - c, t.force_b);
+    b.thread_force += 0.5f * (t.force_a + t.force_b);
+    b.thread_torque += 0.5f * (cross(t.a - c, t.force_a) + cross(t.b - c, t.force_b));
   }
   for (size_t i = 0; i < k.hold.size(); ++i) {
     const uint32_t index = k.hold_body[i];
@@ -182,7 +184,7 @@ void take_thread_forces(const BodiesModel& model, Bodies& bodies, BodiesScratch&
       continue;
     }
     const Vec3 at = transform(b.pose, k.hold_at[i]) - k.moving[index].center;
-    b.thread_force -= k.hold[i].force, b.thread_torque -= cross(at, k.hold[i].force);
+    b.thread_force -= 0.5f * k.hold[i].force, b.thread_torque -= 0.5f * cross(at, k.hold[i].force);
   }
   // More than any thread bears: a tool was put on a thread from one step to the next.
   constexpr float kMost = 60;  // [N]
