@@ -373,6 +373,50 @@ TEST(Observe, calls_a_gap_between_throws_an_air_knot) {
 }
 
 // Hands that feel decide by the state of the thread; the same state must give the same tie.
+// A first throw on a rod, drawn with 1.7 N on each end. Then the hands keep 0.05 N, and what was drawn together goes apart by
+// 4 mm: the middle of the bite is drawn down. Largest and smallest tension of the bite over the last millimeter.
+struct Held {
+  float drawn = 0, most = 0, least = 1e9f;  // [N]
+};
+Held first_throw(int half_turns) {
+  const Settings settings = plain();
+  const validation::Throw one{half_turns, 1};
+  validation::LaidKnot k =
+      validation::lay_on_rod({&one, 1}, settings.material.diameter, 2 * settings.material.diameter, 20e-3f);
+  for (ToolCapsule& rod : k.rod) rod.friction = 0;
+  Stepper stepper(k.state.nodes());
+  Hold hold;
+  hold.node = k.load_a, hold.from = hold.to = k.state.position(k.load_a), hold.stiffness = 2000;
+  const Vec3 up{0, 0, 0.1f};
+  const auto tension = [&] { return 0.5f * (k.state.tension[k.load_a] + k.state.tension[k.load_a - 1]); };
+  Held result;
+  for (int i = 0; i < 1400; ++i) {
+    const float s = 1e-3f * static_cast<float>(i);
+    const float hand = s < 0.4f ? 1.7f * std::min(1.0f, s / 0.2f) : std::max(0.05f, 1.7f * (0.6f - s) / 0.2f);
+    if (i == 400) result.drawn = tension();
+    hold.from = hold.to;
+    if (i > 600) hold.to.z -= 5e-6f;
+    const Pull pull[] = {{k.tail_a(), normalized(k.tail_direction_a + up) * hand},
+                         {k.tail_b(), normalized(k.tail_direction_b + up) * hand}};
+    Surroundings around;
+    around.holds = {&hold, 1}, around.pulls = pull, around.tools = k.rod;
+    stepper.step(settings, k.state, around);
+    if (i >= 1200) result.most = std::max(result.most, tension()), result.least = std::min(result.least, tension());
+  }
+  return result;
+}
+
+TEST(FirstThrow, of_two_turns_locks_where_one_of_one_turn_slides_and_takes_more_pull) {
+  const Held single = first_throw(3), twice = first_throw(5);
+  std::printf("one turn: %.2f N of 1.7 drawn, then %.2f to %.2f N; two turns: %.2f N, then %.2f to %.2f N\n",
+              static_cast<double>(single.drawn), static_cast<double>(single.least), static_cast<double>(single.most),
+              static_cast<double>(twice.drawn), static_cast<double>(twice.least), static_cast<double>(twice.most));
+  EXPECT_LT(single.most, 0.7f) << "with two hands of 0.05 N one turn slides";
+  EXPECT_GT(twice.least, 1.5f) << "two turns do not";
+  // Capstan: a turn more is 2.6 rad more of one strand round the other (measured at friction 0.3).
+  EXPECT_NEAR(std::log(single.drawn / twice.drawn) / plain().material.friction, 2.6f, 0.6f);
+}
+
 TEST(ToolTies, are_the_same_to_the_bit_every_time) {
   const Settings settings = validation::knot_settings(0.25f);
   validation::TieSettings how;
