@@ -30,6 +30,7 @@ constexpr float kMobile = 0.0021f;      // [m] that a Lembert suture takes of ea
 constexpr float kGather = 2.0f;         // [N] of each end of a physical purse-string
 constexpr float kGatherByThrow = 3.2f;  // [N] the same through a throw, whose friction takes a part
 constexpr int kThrows = 2;
+constexpr int kFirstWraps = 2;  // turns of a surgeon's throw, the first of a knot: it gives back less when the hands let go
 constexpr int kRingThrows = 3;  // where no clamp draws the edges apart again: only a taut loop keeps two throws from opening
 // [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
 // square to it. Less deep, it slid along the serosa and came out through the cut edge.
@@ -342,14 +343,14 @@ Plan over_and_over_plan(const PictureModel& picture, const SurgeonSkill& skill) 
   return plan;
 }
 
-// One stitch, tied with a square knot of single throws while clamps hold the ends together.
+// One stitch, tied with a surgeon's knot while clamps hold the ends together.
 Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan = interrupted_plan(picture, skill);
   plan.approximate = kApproximate;
   plan.task.pop_back();
   add(plan, TaskKind::approximate);
   // The first two throws make the knot that the load locks. The hands hold it tight until the clamps have put the load on it.
-  for (int i = 0; i < kThrows; ++i) plan.task.push_back({TaskKind::throw_, 1, 1, i == 1});
+  for (int i = 0; i < kThrows; ++i) plan.task.push_back({TaskKind::throw_, i == 0 ? kFirstWraps : 1, 1, i == 1});
   add(plan, TaskKind::cut_tail);
   add(plan, TaskKind::cut_long);
   add(plan, TaskKind::leave);

@@ -455,7 +455,7 @@ TEST(PhysicalScene, the_thread_alone_closes_a_wound) {
   ASSERT_TRUE(r.done);
   EXPECT_EQ(r.cuts, 2) << "both ends are cut, and the thread broke nowhere";
   EXPECT_GT(r.away_for, 4.0f) << "hands away";
-  EXPECT_EQ(r.knot.name, thread::KnotName::square);
+  EXPECT_EQ(r.knot.name, thread::KnotName::surgeons);
   EXPECT_EQ(r.knot.throws, kThrowsOfThePlan);
   EXPECT_NEAR(r.open, 3e-3f, 0.1e-3f);
   EXPECT_LT(r.away, 1e-3f);
@@ -470,7 +470,7 @@ TEST(PhysicalScene, a_throw_that_slips_is_wound_again) {
   ASSERT_TRUE(r.done);
   EXPECT_EQ(r.retries, 1);
   EXPECT_EQ(r.cuts, 2);
-  EXPECT_EQ(r.knot.name, thread::KnotName::square);
+  EXPECT_EQ(r.knot.name, thread::KnotName::surgeons);
   EXPECT_EQ(r.knot.throws, kThrowsOfThePlan);
   EXPECT_LT(r.away, 1e-3f);
   EXPECT_NEAR(r.away, r.let_go, 0.2e-3f);
@@ -490,7 +490,8 @@ TEST(PhysicalScene, an_over_and_over_suture_closes_a_wound) {
   EXPECT_GT(r.removed, 2.5e-3f) << "something other than the thread held it";
 }
 
-// The same as the tied stitch with a single throw: nothing holds it, and the wound opens when the clamps go back.
+// The same as the tied stitch with its first throw alone, of two turns: nothing holds it, and the wound opens when the clamps go
+// back.
 TEST(PhysicalScene, one_throw_does_not_hold_a_wound) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "forty seconds of surgery: set CATGUT_LONG=1";
   const Closed r = sew_and_leave({0, 1, 2, 3, 4, 5, 9});
