@@ -179,6 +179,7 @@ struct BodiesScratch {
     float inv_mass = 0, inv_inertia = 0;
     bool held = false;
     float opening = 0;
+    float drag = 0, turn_drag = 0;  // [N s/m], [N m s/rad] of a hand whose tool bears on taut thread
   };
   std::vector<Moving> moving;
   std::vector<thread::ToolCapsule> tool;
@@ -209,9 +210,15 @@ inline Vec3 torque_about(const BodyModel& model, const Body& body, Vec3 point) {
 void place_body(const BodyModel& model, Body& body, const Pose& pose, float opening);
 
 // Stages of physical::step.
+// Before all others: the drag of hands whose tools bore on taut thread at the end of the last step.
+void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, float substep, float h,
+                 BodiesScratch& k);
 // Before wall::begin_step: velocities of the bodies without contact.
 void predict_bodies(const BodiesModel& model, const Bodies& bodies, std::span<const HandTarget> target, float h,
                     BodiesScratch& k);
+// Before any contact: jaws with thread on their outer side open slowly.
+void open_gently(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, float thread_diameter, float h,
+                 BodiesScratch& k);
 // Contacts of bodies with each other. Jaws that hold a needle have none with it.
 void find_pair_contacts(const BodiesModel& model, const Bodies& bodies, float h, BodiesScratch& k);
 // Contacts with the wall.

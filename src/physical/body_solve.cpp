@@ -45,26 +45,54 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
     return;
   }
   const Wish w = wish_of(m, b, *t, h);
-  const float mass = m.mass + h * m.damping + h * h * m.stiffness;
+  const float damping = m.damping + out.drag, turn_damping = m.turn_damping + out.turn_drag;
+  const float mass = m.mass + h * damping + h * h * m.stiffness;
   out.inv_mass = 1 / mass;
-  out.v = (b.velocity * m.mass + (w.away * m.stiffness + w.speed * m.damping) * h + push) / mass;
-  const Vec3 force = (w.away - out.v * h) * m.stiffness + (w.speed - out.v) * m.damping;
+  out.v = (b.velocity * m.mass + (w.away * m.stiffness + w.speed * damping) * h + push) / mass;
+  const Vec3 force = (w.away - out.v * h) * m.stiffness + (w.speed - out.v) * damping;
   if (length2(force) > m.max_force * m.max_force) {
     // A hand at its strongest: constant force, no stiffness; it still damps the motion.
-    out.inv_mass = 1 / (m.mass + h * m.damping);
-    out.v = (b.velocity * (m.mass + h * m.damping) + normalized(force) * (m.max_force * h) + push) * out.inv_mass;
+    out.inv_mass = 1 / (m.mass + h * damping);
+    out.v = (b.velocity * (m.mass + h * damping) + normalized(force) * (m.max_force * h) + push) * out.inv_mass;
   }
-  const float inertia = m.inertia + h * m.turn_damping + h * h * m.turn_stiffness;
+  const float inertia = m.inertia + h * turn_damping + h * h * m.turn_stiffness;
   out.inv_inertia = 1 / inertia;
-  out.w = (b.spin * m.inertia + (w.turn * m.turn_stiffness + w.spin * m.turn_damping) * h + twist) / inertia;
-  const Vec3 torque = (w.turn - out.w * h) * m.turn_stiffness + (w.spin - out.w) * m.turn_damping;
+  out.w = (b.spin * m.inertia + (w.turn * m.turn_stiffness + w.spin * turn_damping) * h + twist) / inertia;
+  const Vec3 torque = (w.turn - out.w * h) * m.turn_stiffness + (w.spin - out.w) * turn_damping;
   if (length2(torque) > m.max_torque * m.max_torque) {
-    out.inv_inertia = 1 / (m.inertia + h * m.turn_damping);
-    out.w = (b.spin * (m.inertia + h * m.turn_damping) + normalized(torque) * (m.max_torque * h) + twist) * out.inv_inertia;
+    out.inv_inertia = 1 / (m.inertia + h * turn_damping);
+    out.w = (b.spin * (m.inertia + h * turn_damping) + normalized(torque) * (m.max_torque * h) + twist) * out.inv_inertia;
   }
 }
 
 }  // namespace
+
+// The thread's force on a tool is one step late. A throw round the jaws holds them from all sides, with up to 1e6 N/m, and the
+// jaws' tips weigh 16 g to it: they would be thrown to and fro, in 20 steps with 50 N. A drag toward the hand's motion, as
+// great as the load, holds them; where nothing moves it does nothing.
+void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, float substep, float h,
+                 BodiesScratch& k) {
+  constexpr float kGive = 20e-6f;  // [m] by which a tool moves off thread that presses it, until the thread is slack
+  k.moving.resize(bodies.body.size());
+  for (BodiesScratch::Moving& m : k.moving) m.drag = m.turn_drag = 0;
+  std::array<uint32_t, kMaxBodies + 1> first{};  // of the capsules of a body, in the order of show_bodies
+  for (size_t b = 0; b < bodies.body.size(); ++b)
+    first[b + 1] = first[b] + static_cast<uint32_t>(model.body[b].thread_capsule.size());
+  for (size_t i = 0; i < thread.key.size(); ++i) {
+    const uint32_t partner = thread::partner_of(thread.key[i]);
+    const float load = thread.crossing[i].normal_impulse / (substep * substep);
+    if (partner < thread::kTool || load <= 0) continue;
+    const auto after = std::upper_bound(first.begin() + 1, first.begin() + bodies.body.size(), partner - thread::kTool);
+    const size_t b = static_cast<size_t>(after - first.begin()) - 1;
+    const BodyModel& m = model.body[b];
+    if (partner - thread::kTool - first[b] >= m.thread_capsule.size()) continue;
+    const BodyCapsule& c = m.thread_capsule[partner - thread::kTool - first[b]];
+    const Vec3 at = lerp(local(m, m.sphere[c.a], bodies.body[b].opening), local(m, m.sphere[c.b], bodies.body[b].opening),
+                         thread.crossing[i].t);
+    k.moving[b].drag += load * h / kGive;
+    k.moving[b].turn_drag += load * h / kGive * length2(at - m.center);
+  }
+}
 
 void predict_bodies(const BodiesModel& model, const Bodies& bodies, std::span<const HandTarget> target, float h,
                     BodiesScratch& k) {
@@ -326,9 +354,10 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
     body.hand_force = body.hand_torque = {};
     if (moving.held) {
       const Wish w = wish_of(m, body, target[b], h);
-      body.hand_force = clamped((w.away - moving.v * h) * m.stiffness + (w.speed - moving.v) * m.damping, m.max_force);
-      body.hand_torque =
-          clamped((w.turn - moving.w * h) * m.turn_stiffness + (w.spin - moving.w) * m.turn_damping, m.max_torque);
+      body.hand_force =
+          clamped((w.away - moving.v * h) * m.stiffness + (w.speed - moving.v) * (m.damping + moving.drag), m.max_force);
+      body.hand_torque = clamped(
+          (w.turn - moving.w * h) * m.turn_stiffness + (w.spin - moving.w) * (m.turn_damping + moving.turn_drag), m.max_torque);
       body.target_place = transform(target[b].pose, m.center), body.target_turn = target[b].pose.q;
     }
     body.held = moving.held;

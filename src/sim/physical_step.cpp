@@ -69,6 +69,8 @@ float pinch(const InstrumentModel& kind, physical::Gripped what, float friction)
   return pull / (2 * friction);
 }
 
+constexpr float kLetGo = 0.3e-3f;  // [m] by which jaws open to let go of what they hold
+
 void set_targets(const Model& model, State& state, const TickInput& input, PhysicalScratch& k) {
   const physical::BodiesModel& bodies = model.physical->world.bodies;
   for (uint32_t i = 0; i < model.solver.instruments(); ++i) {
@@ -88,7 +90,9 @@ void set_targets(const Model& model, State& state, const TickInput& input, Physi
     t.pose = weld.target * inverse(weld.local_a);
     if (input.hand[tool.hand].connected) tool.jaw = input.hand[tool.hand].jaw;
     const physical::Gripped what = state.physical.world.bodies.body[i].grip.what;
-    const bool grips = what != physical::Gripped::nothing ? tool.jaw < kind.jaw.open : tool.jaw <= kind.jaw.closed;
+    // Fingers that hold something rest where the jaws grasp: from there on they open them by what their stroke is worth.
+    const float gap = 2 * bodies.body[i].hinge_z * kWideOpen * (tool.jaw - kind.jaw.closed);
+    const bool grips = gap <= (what != physical::Gripped::nothing ? kLetGo : 0);
     t.opening = grips ? 0 : tool.jaw * kWideOpen;
     t.grip = grips ? pinch(kind, what, bodies.body[i].grip_friction) : 0;
     t.may_hold = (kind.can(kHoldNeedle) ? 1u : 0) | (kind.can(kHoldThread) ? 2u : 0) | (kind.can(kHoldTissue) ? 4u : 0);

@@ -3,6 +3,7 @@
 // where the holes are, what remains, and the bits of a copy.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -349,6 +350,58 @@ TEST(Tool, jaws_on_a_short_taut_strand_are_still) {
   EXPECT_GT(least, 0.5f);
   EXPECT_LT(most - least, 0.02f * most);
   EXPECT_LT(bench.body(t).grip.slid, 0.1e-3f);
+}
+
+// A tool high above the sheet whose jaws open along y, round which a thread along x is wound `turns` times. The thread's first
+// part lies between the jaws. Both ends are pulled, then fixed.
+struct WoundJaws {
+  Bench bench;
+  std::vector<Vec3> path;
+  uint32_t tool = 0;
+  thread::Hold fixed[2];
+  const Pose pose{{0.015f, 0.01f, 0.03f}, axis_angle({0, 0, 1}, 0.5f * kPi)};
+  void add(Vec3 to) {
+    while (distance(path.back(), to) > 0.75e-3f) path.push_back(path.back() + normalized(to - path.back()) * 0.5e-3f);
+  }
+  WoundJaws(float turns, float pull) {
+    path.push_back({-0.02f, 0.01f, 0.03f}), add({0.018f, 0.01f, 0.03f});
+    for (float a = 0; a < 2 * kPi * turns; a += 0.1f)
+      add({0.015f + 2.3e-3f * std::cos(a), 0.01f + 2.6e-3f * std::sin(a), 0.031f + 0.6e-3f * a / (2 * kPi)});
+    add({0.018f, 0.01f, path.back().z}), add({0.04f, 0.01f, path.back().z});
+    bench.state.thread = thread::make_state(path);
+    tool = bench.add(make_tool({}), pose, 0.03f);
+    bench.start();
+    const uint32_t last = static_cast<uint32_t>(path.size()) - 1;
+    for (int i = 0; i < 400; ++i) {
+      const float now = pull * std::min(1.0f, static_cast<float>(i) / 200);
+      const thread::Pull ends[] = {{0, {-now, 0, 0}}, {last, {now, 0, 0}}};
+      step(0, 8, {}, ends);
+    }
+    fixed[0].node = 0, fixed[1].node = last;
+    for (thread::Hold& f : fixed) f.from = f.to = bench.state.thread.position(f.node);
+  }
+  void step(float opening, float grip, std::span<thread::Hold> holds, std::span<const thread::Pull> pulls) {
+    bench.target[tool] = {pose, true, opening, grip};
+    Hands hands;
+    hands.targets = bench.target, hands.holds = holds, hands.pulls = pulls;
+    physical::step(bench.model, bench.state, *bench.scratch, hands, *bench.jobs);
+  }
+  float largest() const { return *std::max_element(bench.state.thread.tension.begin(), bench.state.thread.tension.end()); }
+};
+
+// A hand opens jaws at once, with 2 N at their tips. Each turn, 1.3 mm behind the tips' middle, pulls each jaw inward with at
+// least one strand, its lever to the hinge being 10.7 mm of 12: it can bear no more than 1.12 N, half of that in two turns.
+TEST(Tool, jaws_that_open_within_a_throw_load_its_thread_gently) {
+  for (const float turns : {0.0f, 1.0f, 2.0f}) {
+    WoundJaws wound(turns, 0.3f);
+    const Body& body = wound.bench.body(wound.tool);
+    ASSERT_EQ(body.grip.what, Gripped::thread);
+    float most = 0;
+    for (int i = 0; i < 500; ++i) wound.step(0.07f, 0, wound.fixed, {}), most = std::max(most, wound.largest());
+    EXPECT_EQ(body.grip.what, Gripped::nothing);
+    EXPECT_LT(most, turns > 0 ? 1.1f * 1.12f / turns : 0.6f) << turns << " turns";
+    if (turns == 0) { EXPECT_NEAR(body.opening, 0.07f, 1e-3f); }
+  }
 }
 
 TEST(Tool, jaws_lift_the_wall_and_slide_off_above_their_friction) {
