@@ -170,6 +170,23 @@ TEST(PhysicalScene, jaws_carry_thread_and_its_length_stays) {
   EXPECT_TRUE(state_is_valid(*f.model, *f.state));
 }
 
+// Fingers that hold something rest at a third of their stroke, where jaws grasp. There is room to tremble, but 0.4 mm more let
+// go.
+TEST(PhysicalScene, jaws_let_thread_go_when_they_are_a_little_wider) {
+  Field f;
+  const float closed = find_instrument("needle_holder")->jaw.closed;
+  const float stroke = 2 * f.model->physical->world.bodies.body[0].hinge_z * kWideOpen;  // [m] between the tips
+  const Vec3 start = f.seen.particle[f.seen.active().thread_order[100]];
+  f.move_right(start + Vec3{0, 0.03f, 0}, 0.1f, 1);
+  f.move_right(start + Vec3{0, 0.001f, 0}, 0.3f, 1);
+  f.move_right(start + Vec3{0, 0.001f, 0}, 0.1f, 0);
+  ASSERT_EQ(f.seen.tool[0].held, Held::thread);
+  f.move_right(start + Vec3{0, 0.001f, 0}, 0.2f, closed + 0.2e-3f / stroke);
+  EXPECT_EQ(f.seen.tool[0].held, Held::thread);
+  f.move_right(start + Vec3{0, 0.001f, 0}, 0.05f, closed + 0.4e-3f / stroke);
+  EXPECT_EQ(f.seen.tool[0].held, Held::nothing);
+}
+
 // The jaws lift one of the two pieces; the other one stays on the drape.
 TEST(PhysicalScene, scissors_divide_the_thread) {
   Field f;
