@@ -423,7 +423,8 @@ void show_tears(const Model& model, State& state, SutureContext& sewing) {
         sewing.report(n, EventKind::technique_fault, kNoHand, point.bite, length(hole.load),
                       position_of(end.point, state.solver.x.data()), fault);
       };
-      if (std::exchange(bite.torn, hole.torn) < kTorn && bite.torn >= kTorn) report(Fault::bite_torn);
+      // The larger one of its two slits.
+      if (std::exchange(bite.torn, std::max(bite.torn, hole.torn)) < kTorn && bite.torn >= kTorn) report(Fault::bite_torn);
       if (!hole.out) continue;
       if (!std::exchange(bite.torn_out, true)) report(Fault::bite_torn_out);
       erase_anchor(strand, suture, point.anchor);

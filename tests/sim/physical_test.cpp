@@ -339,6 +339,10 @@ TEST(PhysicalScene, a_bite_that_tears_out_is_reported_and_its_slit_stays) {
   ASSERT_FALSE(fault.empty());
   EXPECT_EQ(fault.front().fault, Fault::bite_torn);
   EXPECT_EQ(fault.back().fault, Fault::bite_torn_out);
+  for (const Event& a : fault)
+    EXPECT_EQ(
+        std::count_if(fault.begin(), fault.end(), [&](const Event& b) { return a.fault == b.fault && a.which == b.which; }), 1)
+        << fault_name(a.fault) << " of " << a.which << ", once for both of its ends";
   const BiteView& bite = seen.active().bite[fault.back().which];
   EXPECT_TRUE(bite.torn_out);
   EXPECT_GT(bite.torn, 0.002f);
@@ -507,8 +511,8 @@ TEST(PhysicalScene, an_over_and_over_suture_closes_a_wound) {
   EXPECT_GT(r.removed, 2.5e-3f) << "something other than the thread held it";
 }
 
-// The same as the tied stitch with its first throw alone, of two turns: nothing holds it, and the wound opens when the clamps go
-// back.
+// The same as the tied stitch with its first throw alone, of two turns: nothing holds it, and the wound opens when the clamps
+// go back.
 TEST(PhysicalScene, one_throw_does_not_hold_a_wound) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "forty seconds of surgery: set CATGUT_LONG=1";
   const Closed r = sew_and_leave({0, 1, 2, 3, 4, 5, 9});
