@@ -12,6 +12,7 @@ namespace {
 
 constexpr float kMargin = 0.6e-3f;    // [m] a tool that moves wakes a thread that it may touch within this distance
 constexpr float kQuietSpeed = 2e-3f;  // [m/s] at the end of the window: a swing that returns is not rest
+constexpr float kSettled = 0.1e-3f;   // [m] in a window: rest of a strand that carries nothing
 constexpr float kAway = 12e-3f;       // [m] corners of a face that the thread may touch are nearer than this
 constexpr size_t kBlock = 8;          // nodes that share a bound
 
@@ -86,6 +87,15 @@ float strand_reach(const Model& m, const State& s, const Sleep::Strand& strand) 
   float speed2 = 0;
   for (size_t i = strand.first; i <= strand.last; ++i) speed2 = std::max(speed2, length2(s.thread.v.at(i)));
   return m.thread.material.diameter + kMargin + 2 * m.wall.step * std::sqrt(speed2);
+}
+
+// Thread that lies about unloaded unbends for a minute, ever more slowly, because its drag is high. Nothing depends on where.
+bool carries_nothing(const Model& m, const thread::State& t, const Sleep::Strand& strand) {
+  for (const thread::Eyelet& e : t.eyelet)
+    if (e.segment >= strand.first && e.segment < strand.last) return false;
+  for (size_t i = strand.first; i < strand.last; ++i)
+    if (std::abs(t.tension[i]) > m.sleep.steady) return false;
+  return true;
 }
 
 // A list whose entries name their strands, without those of one strand.
@@ -393,8 +403,9 @@ bool find_quiet(const Model& m, State& s, const Hands& hands, AwakeThread& awake
     const bool begun = strand.quiet > 0;
     if (begun && ++strand.quiet <= m.sleep.window) continue;
     bool quiet = begun;
+    const float still = carries_nothing(m, t, strand) ? kSettled : m.sleep.still;
     for (size_t i = strand.first; i <= strand.last && quiet; ++i)
-      quiet = length2(t.position(i) - z.from[i]) <= m.sleep.still * m.sleep.still && length(t.v.at(i)) < kQuietSpeed;
+      quiet = length2(t.position(i) - z.from[i]) <= still * still && length(t.v.at(i)) < kQuietSpeed;
     for (size_t i = strand.first; i < strand.last && quiet; ++i)
       quiet = std::abs(t.tension[i] - z.tension[i]) <= m.sleep.steady + 0.01f * std::abs(z.tension[i]);
     awake.ready[k] = quiet, any |= quiet;

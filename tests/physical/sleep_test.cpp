@@ -3,6 +3,7 @@
 #include "physical/sleep.h"
 
 #include <gtest/gtest.h>
+#include <time.h>
 
 #include <algorithm>
 #include <cmath>
@@ -300,6 +301,52 @@ TEST(Sleep, a_strand_that_is_drawn_across_a_sleeping_one_takes_it_along) {
   std::printf("moved %.2f mm, difference %.3f mm\n", 1e3 * static_cast<double>(moved), 1e3 * static_cast<double>(apart));
   EXPECT_GT(moved, 1e-3f);
   EXPECT_LT(apart, 0.05f * moved);
+}
+
+// One strand is drawn over the drape while others wait, which were laid down bent, each 14 cm long. They unbend for tens of
+// seconds, ever more slowly, because the drag of scenes is high; but nothing depends on where they lie.
+TEST(Sleep, bent_strands_that_wait_sleep_soon_and_cost_little) {
+  const auto milliseconds = [](size_t waiting, size_t& asleep) {
+    OnDrape d(true);
+    d.model.thread.damping = 30, d.model.thread.gravity = {0, -0.1f, 0};
+    std::vector<Vec3> path;
+    for (size_t k = 0; k <= waiting; ++k)
+      for (int i = 0; i <= 200; ++i) {
+        const float along = 0.7e-3f * static_cast<float>(i),
+                    bend = k == 0 ? 0 : 10e-3f * std::sin(kPi * static_cast<float>(i) / 200);
+        path.push_back({along, 0.175e-3f, 0.02f * static_cast<float>(k) + bend});
+      }
+    d.state.thread = thread::make_state(path);
+    for (size_t k = 0; k < waiting; ++k) d.state.thread.broken[201 * k + 200] = 1, d.state.thread.rest[201 * k + 200] = 0.7e-3f;
+    d.place({0, 0.1f, -0.1f});
+    d.scratch = std::make_unique<Scratch>(d.model, d.state);
+    d.rest(1000);
+    std::vector<thread::Hold> hold(1);
+    hold[0].node = 0, hold[0].stiffness = 200, hold[0].to = d.state.thread.position(0);
+    asleep = static_cast<size_t>(std::count_if(d.state.sleep.strand.begin(), d.state.sleep.strand.end(),
+                                               [](const Sleep::Strand& k) { return k.asleep; }));
+    EXPECT_EQ(asleep, waiting + 1);
+    std::vector<double> ms;
+    for (int i = 0; i < 200; ++i) {
+      hold[0].from = hold[0].to, hold[0].to.x -= 2e-5f;
+      Hands hands;
+      hands.targets = d.target, hands.plane = &d.drape, hands.holds = hold;
+      timespec a, b;
+      clock_gettime(CLOCK_THREAD_CPUTIME_ID, &a);
+      step(d.model, d.state, *d.scratch, hands, d.jobs);
+      clock_gettime(CLOCK_THREAD_CPUTIME_ID, &b);
+      ms.push_back(1e3 * static_cast<double>(b.tv_sec - a.tv_sec) + 1e-6 * static_cast<double>(b.tv_nsec - a.tv_nsec));
+    }
+    asleep = 0;
+    for (const Sleep::Strand& k : d.state.sleep.strand) asleep += k.asleep;
+    std::sort(ms.begin(), ms.end());
+    return ms[100];
+  };
+  size_t asleep = 0;
+  const double alone = milliseconds(0, asleep), beside = milliseconds(8, asleep);
+  std::printf("%.3f ms, beside 8 that wait %.3f ms\n", alone, beside);
+  EXPECT_EQ(asleep, 8u);
+  EXPECT_LT(beside, 2 * alone);  // all awake: 9 times
 }
 
 }  // namespace
