@@ -46,6 +46,12 @@ int Scripted::passages(const Snapshot& seen, bool complete) const {
   return count;
 }
 
+bool Scripted::too_deep(const Snapshot& seen) const {
+  if (bite().deepest <= 0 || seen.active().bite.size() <= bites_before_) return false;
+  const BiteView& b = seen.active().bite.back();
+  return b.depth > bite().deepest * skill_.wall || b.entry_inside || (b.has_exit && b.exit_inside);
+}
+
 void Scripted::hold_or_rest(const Snapshot& seen) {
   if (seen.tool[kForceps].held != Held::tissue) rest_aside(seen, kForceps);
 }
@@ -118,6 +124,11 @@ bool Scripted::make_bite(const Snapshot& seen) {
       }
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
       const int passed = passages(seen, false);
+      if (too_deep(seen)) {
+        depth_fix_ += kDeeper;
+        go(withdraw);
+        return false;
+      }
       // A shallow bite that holds too little is made again, deeper.
       if (plan_.scoop > 0 && passed > 0 && seen.active().bite.back().depth < kTooShallow * skill_.wall) {
         depth_fix_ -= kDeeper;

@@ -26,6 +26,8 @@ constexpr float kApproximate = 0.003f;  // [m] of each clamp: the edges touch af
 constexpr float kGivesWay = 0.002f, kScoop = 0.003f;  // [m]
 // Of the wall, where a Lembert bite is lifted. Far from the edge the wall springs back onto the needle when the tip is in.
 constexpr float kDeepFar = 0.25f, kDeepNear = 0.45f;
+constexpr float kDeepest = 0.9f;        // of the wall: a deeper one is made again
+constexpr float kTouch = 0.0003f;       // [m] by which the sides of a slit in skin are brought further than they meet
 constexpr float kMobile = 0.0021f;      // [m] that a Lembert suture takes of each end: inverted edges make it shorter
 constexpr float kGather = 2.0f;         // [N] of each end of a physical purse-string
 constexpr float kGatherByThrow = 3.2f;  // [N] the same through a throw, whose friction takes a part
@@ -357,6 +359,16 @@ Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skil
   return plan;
 }
 
+// The same in a pad of skin. Flat edges that are pressed slide over each other: they are brought together until they touch.
+Plan skin_tied_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan = interrupted_tied_plan(picture, skill);
+  plan.flat = true;
+  for (Task& t : plan.task)
+    if (t.kind == TaskKind::throw_ && !t.release) t.which = 2;
+  plan.approximate = 0.5f * distance(opening_shape(picture, 0).center, opening_shape(picture, 1).center) + kTouch;
+  return plan;
+}
+
 // Lembert stitches with physical mechanics, side by side from the near side to the far one, with one thread. Each is a bite in
 // and out on the outer face of one bowel end, across the wound, then one of the other end: far, near, near, far. The thread
 // passes over both edges, which turn inward when it is drawn.
@@ -372,7 +384,7 @@ Plan lembert_thread_plan(const PictureModel& picture, const SurgeonSkill& skill)
     BitePlace p = on_top(picture, static_cast<uint32_t>(b % 2), angle, skill.edge_distance + 0.5f * skill.bite_length);
     p.up = cross(Vec3{1, 0, 0}, p.out);  // so that cross(out, up) leads across
     p.depth = depth_of(skill.bite_length, radius, 1e9f) + kGivesWay;
-    p.deep = b % 2 == 0 ? kDeepFar : kDeepNear;
+    p.deep = b % 2 == 0 ? kDeepFar : kDeepNear, p.deepest = kDeepest;
     p.length = 2 * std::sqrt(p.depth * (2 * radius - p.depth));
     plan.place.push_back(p);
   }
@@ -507,6 +519,7 @@ constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
                              {"purse_string_thread", 1, purse_string_thread_plan},
                              {"purse_string_tied", 1, purse_string_tied_plan},
                              {"lembert_thread", 2, lembert_thread_plan},
+                             {"skin_tied", 2, skin_tied_plan},
                              {"simple", 2, simple_plan},
                              {"excision", 1, excision_plan},
                              {"slit", 1, excision_plan},

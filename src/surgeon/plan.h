@@ -21,6 +21,7 @@ struct BitePlace {
   uint32_t wall = 0;    // whose tissue carries it
   bool level = false;   // hands keep the circle nearly square to `up` where the tissue is inclined
   float deep = 0.5f;    // of the wall, at which a needle that is scooped is lifted
+  float deepest = 0;    // of the wall: a deeper bite, or one that ends on the inner face, is made again; 0: may go through
   int walls = 1;        // passages through a wall that the sweep makes
   uint32_t suture = 0;  // that makes it
 };
@@ -82,6 +83,7 @@ struct Plan {
   float stay = 0;         // [m] of it by which the clamp stays advanced: the ends are mobile
   float jerk = 0;         // [s] of more than the maximum load after which thread is not pulled further: a jerk is shorter
   bool rise = false;      // the needle is lifted over the edges on its way to where it is laid down
+  bool flat = false;      // a pad: the tail lies on it
   float knot_turn = 0;    // [rad] about y: where a physical knot is tied, 0 toward the viewer, positive to the right
   float pull = 0;  // [N] of each strand when a throw is pulled tight, with physical mechanics; 0: throws of guided mechanics
 };

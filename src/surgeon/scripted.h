@@ -107,6 +107,8 @@ class Scripted final : public Surgeon {
   // Walls that the needle has passed since this bite began; complete: with its back end too. A withdrawn bite stays listed
   // and counts for nothing.
   int passages(const Snapshot& seen, bool complete) const;
+  // Of the bite in hand, where the plan asks for a part of the wall.
+  bool too_deep(const Snapshot& seen) const;
 
   bool pull(TaskKind kind, const Snapshot& seen);
 

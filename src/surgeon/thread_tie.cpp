@@ -16,6 +16,7 @@ constexpr size_t kHolder = 0, kForceps = 1;
 constexpr float kStrandAt = 18e-3f;  // [m] of the shaft, from the grasp point: above the wound
 constexpr float kWindAt = 9e-3f;     // [m] of the shaft: plane of the winding hand, nearer the tip than the strand
 constexpr float kSteepAtTail = 1;  // rise of the shaft at the tail, which lies along it: a turn between them would push it away
+constexpr float kSteepOnFlat = 3;  // the same on flat tissue: a jaw beside the tail, none under it
 constexpr float kLeans = 60;       // [1/m] of the shaft toward a tail that lies on a slope in front or behind
 constexpr float kTurns = 3;        // [1/s]
 constexpr float kShaft = 2.2e-3f;  // [m] radius that the turns lie on
@@ -437,7 +438,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
                   speed = std::min(0.7f * how_.speed, 0.01f + 4 * left) * (felt_ > 2 * kWinding ? 0.3f : 1.0f);
       tip_ += way * (std::min(speed * dt, left) / std::max(left, 1e-6f));
       // Steeper, across the slope that the tail lies on, and turned until it passes between the jaws.
-      const Vec3 from{side_, kSteepAtTail, std::clamp(kLeans * (goal.z - origin_.z), -0.8f, 0.8f)};
+      const Vec3 from = how_.flat ? Vec3{side_, kSteepOnFlat, 0}
+                                  : Vec3{side_, kSteepAtTail, std::clamp(kLeans * (goal.z - origin_.z), -0.8f, 0.8f)};
       shaft_ = normalized(lerp(shaft_, normalized(from), std::min(1.0f, kTurns * dt)));
       const Vec3 along = tail_node(seen, kTailEnd + kBeside) - tail_node(seen, kTailEnd - kBeside);
       const Vec3 across = normalized(cross(shaft_, along), {0, 0, 1});

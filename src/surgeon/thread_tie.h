@@ -21,6 +21,7 @@ namespace catgut {
 struct ThreadTieSettings {
   float speed = 0.15f;  // [m/s] maximum of the hands
   float pull = 2.5f;    // [N] with which both strands are pulled tight
+  bool flat = false;    // the tissue round the stitch is flat: the tail lies on it and hangs down nowhere
 };
 
 class ThreadTie {

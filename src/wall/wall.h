@@ -8,8 +8,8 @@
 //   impulses of everything else: v += A^-1 J^T p
 //   x = x + h v
 //
-// A mesh may lie on an elastic bed (Winkler): each column is drawn back to its place at rest with k per area and distance along
-// the normal, k / 3 across it. In A the bed has h^2 k area: implicit, so that a stiff bed does not limit the step.
+// A mesh may lie on an elastic bed (Winkler). It draws each column back to its place at rest, with k per area and distance
+// along the normal, and k / 3 across it. In A it has h^2 k area: it is implicit, and a stiff bed does not limit the step.
 //
 // A resting state has zero force for any A, so neither step nor mesh changes the stiffness. L does not act on rigid
 // translation: mass and linear momentum are exact. c is chosen at build time so that the largest eigenvalue of h^2 A^-1 K is at
