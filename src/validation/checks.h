@@ -64,6 +64,7 @@ void check_momentum(Lines& out);
 void check_rotation(Lines& out);
 void check_volume(Lines& out);
 void check_wall(Lines& out);
+void check_foundation(Lines& out);
 // src/thread. nightly: the whole range of each; otherwise a range that takes a few seconds.
 void check_capstan(Lines& out, bool nightly);
 void check_overhand(Lines& out, bool nightly);
