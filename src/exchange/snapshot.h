@@ -107,7 +107,7 @@ struct BiteView {
   // A slit that the thread has torn leads from here to `entry` or `exit`. Not torn: the same place.
   Vec3 entry_made, exit_made;  // [m]
   float torn = 0;              // [m] length of the slit
-  bool torn_out = false;       // it has reached an edge: the thread is no longer in the wall
+  bool torn_out = false;       // the slit extends to an edge: the thread has come out of the wall
 };
 
 // One needle with its thread, and what has been sutured with it.

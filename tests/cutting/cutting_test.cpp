@@ -129,7 +129,7 @@ TEST(Cutting, a_cut_off_the_line_is_a_fault_once) {
   EXPECT_TRUE(free.of(Fault::cut_off_line).empty());
 }
 
-// The drawn line: a pen that follows it is on the line that faults are measured from, and what it has burnt is no longer drawn.
+// A pen that follows the displayed line has no deviation from the planned cut; burnt parts of the line are not displayed.
 TEST(Cutting, the_planned_line_is_drawn_where_deviations_are_measured) {
   for (const char* name : {"excision", "altemeier"}) {
     SceneSpec scene = read_scene(name);

@@ -64,9 +64,10 @@ struct Trainee {
     EXPECT_NE(run_table(run, procedure).find(error.text + " " + error.why), std::string::npos) << run_table(run, procedure);
     EXPECT_FALSE(faultless(run, procedure));
     EXPECT_FALSE(finished(run, procedure));
-    bool told = false;
-    for (const Feedback& b : feedback(run, procedure)) told = told || (!b.well && b.text.find(error.text) != std::string::npos);
-    EXPECT_TRUE(told) << "in the results, stage by stage";
+    bool reported = false;
+    for (const Feedback& b : feedback(run, procedure))
+      reported = reported || (!b.well && b.text.find(error.text) != std::string::npos);
+    EXPECT_TRUE(reported) << "in the results, stage by stage";
   }
 };
 

@@ -146,7 +146,7 @@ TEST(Throws, the_next_one_has_the_other_hand) {
   EXPECT_EQ((SeenThrows{0, 0}).alternating(), 0);
   EXPECT_EQ((SeenThrows{1, 0}).alternating(), 1);
   EXPECT_EQ((SeenThrows{1, 1}).alternating(), 2);
-  EXPECT_EQ((SeenThrows{2, 0}).alternating(), 1) << "a granny is no two throws of a square knot";
+  EXPECT_EQ((SeenThrows{2, 0}).alternating(), 1) << "a granny knot: its throws have the same hand";
   EXPECT_EQ((SeenThrows{1, 2}).alternating(), 3);
   EXPECT_EQ((SeenThrows{1, 0}).next(1), -1);
   EXPECT_EQ((SeenThrows{1, 1}).next(1), 1);
