@@ -2,6 +2,7 @@
 // app/window: see hands.h.
 #include "window/hands.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "exchange/latest.h"
@@ -74,6 +75,9 @@ void WindowHands::move(const WindowInput& in, const Settings& settings, const Vi
   if (place.steering.sequence == 0 || place.epoch != epoch) return;
   steering = place.steering;
   const bool adopt = !known_ || epoch_ != epoch;
+  // A stick commands a velocity in the scene: where physics is slower than the clock, its hands are as slow as the tissue.
+  const auto passed = adopt ? 0.0f : std::clamp(static_cast<float>(seen.time_s - seen_s_), 0.0f, 0.25f);
+  seen_s_ = seen.time_s;
   known_ = true, epoch_ = epoch;
   for (size_t k = 0; k < 2; ++k) {
     SteeredHand& hand = steering.hand[k];
@@ -87,7 +91,7 @@ void WindowHands::move(const WindowInput& in, const Settings& settings, const Vi
   order.motion = mouse_motion(mouse, steering, in.mouse, view, dt);
   if (in.has_pad) {
     pad.left_handed = settings.left_handed;
-    const std::array<HandMotion, 2> more = gamepad_motion(pad, steering, in.pad, dt);
+    const std::array<HandMotion, 2> more = gamepad_motion(pad, steering, in.pad, passed);
     for (size_t k = 0; k < 2; ++k) {
       HandMotion &m = order.motion[k], n = more[k];
       m = {m.right + n.right, m.up + n.up,     m.ahead + n.ahead,        m.drive + n.drive, m.yaw + n.yaw,

@@ -39,6 +39,7 @@ class WindowHands {
   std::array<bool, 2> elsewhere_{};
   bool known_ = false;  // that was adopted from the tools, of
   uint32_t epoch_ = 0;
+  double seen_s_ = 0;  // [s] simulated, of the Snapshot before
 };
 
 }  // namespace catgut

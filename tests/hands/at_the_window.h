@@ -155,11 +155,11 @@ class AtTheWindow : public WorkQueue {
       return closed_ || (pictures_ >= from + pictures && (tick_ >= tick + kTicksToSee || tick_ < tick || standing_)) ||
              pictures_ >= from + kFramesToSee;
     });
-    const auto now = Clock::now();
-    const float passed = std::chrono::duration<float>(now - seen_at_).count();
-    seen_at_ = now;
+    const double before = look_.seen.time_s;
     look_ = newest_;
-    look_.dt = std::clamp(pace_ * passed, 0.02f, 0.25f);
+    // A stick moves on until the next picture, which may come later than this one did: the user expects it as late as the last.
+    const float passed = static_cast<float>(newest_.seen.time_s - before);
+    look_.dt = dt_ = std::clamp(std::max(passed, 0.5f * dt_), 0.02f, 0.25f);
     return !closed_;
   }
 
@@ -189,7 +189,8 @@ class AtTheWindow : public WorkQueue {
   static constexpr size_t kFramesToSee = 400;
   const char* scene_;
   float pace_;
-  Clock::time_point until_, seen_at_ = Clock::now();
+  Clock::time_point until_;
+  float dt_ = 0.02f;  // [s] simulated, between two pictures
   std::mutex mutex_;
   std::condition_variable changed_;
   Look newest_;

@@ -461,24 +461,34 @@ bool Person::pen(size_t k, PenMode mode) {
 
 bool Person::score(size_t k, float edge, float from, float to) {
   constexpr float kPenSpeed = 0.0035f;  // [m/s] the pen of the scripted surgeon; twice as fast leaves bridges
+  constexpr float kAhead = 0.002f;      // [m]
   constexpr double kUnseen = 0.06;      // [s] of the way, at most, from one picture to the next
   if (!face(0.5f * (from + to))) return false;
   doing_ = "put the pen on the line";
   float angle = from;
   const auto place = [&] { return line_at(angle, edge); };
   const auto on_it = [&] {
-    return hand(k).snapped && hand(k).at == HelpAt::face && distance(seen().tool[k].pose.p, place()) < 0.0012f;
+    const Vec3 off = seen().tool[k].pose.p - place(), ahead = desk_.look().view.ahead;  // depth cannot be seen
+    return hand(k).snapped && hand(k).at == HelpAt::face && length(off - ahead * dot(off, ahead)) < 0.0012f &&
+           distance(seen().tool[k].pose.p, hand(k).help.p) < 0.0005f;
   };
   if (!point(k, place, on_it)) return false;
   doing_ = "cut along the line";
   if (!pen(k, PenMode::cut)) return false;
+  // No smoke: the tip is not on the tissue yet.
+  const auto burns = [&] { return seen().instrument[static_cast<size_t>(seen().tool[k].instrument)].burning > 0; };
+  Act press;
+  press.hand = k, press.motion.ahead = 0.0004f;
+  wait(2, burns, press);
   const float radius = distance(place(), line_at(angle + kPi, edge)) / 2;
   // Simulated time: where the machine is late, tissue burns as slowly as the hand moves.
   double last = seen().time_s;
   const bool went = point(k, place, [&] {
     const double passed = std::min(kUnseen, seen().time_s - last);
     last = seen().time_s;
-    angle = std::min(to, angle + kPenSpeed / radius * static_cast<float>(passed));
+    // A user does not run ahead of the pen.
+    if (distance(seen().tool[k].pose.p, place()) < kAhead)
+      angle = std::min(to, angle + kPenSpeed / radius * static_cast<float>(passed));
     return angle >= to;
   });
   return pen(k, PenMode::off) && went;
