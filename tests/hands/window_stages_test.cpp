@@ -217,18 +217,37 @@ class Stylus {
   // Until `done`: buttons as the devices have them, 1 the jaw's, 2 beside it; pressed so many times in half a second.
   bool press(int button, int times, const std::function<bool()>& done) {
     for (int attempt = 0; attempt < 5; ++attempt) {  // a double press may come late where the machine is late
-      for (int i = 0; i < times; ++i)
-        for (const int down : {button, 0}) {
-          arm_.wish(0, wish_, turn_, down);
-          std::this_thread::sleep_for(std::chrono::milliseconds(60));
-        }
+      for (int i = 0; i < times; ++i) press_once(button);
       if (until(done, 2)) return true;
+    }
+    return false;
+  }
+  // Who closes the jaws on nothing opens them again and goes a millimetre deeper: a late machine leaves them short.
+  bool grasp(const std::function<Pose()>& to) {
+    const auto held = [&] { return seen().tool[0].held == Held::tissue; };
+    for (int deeper = 0; deeper < 4; ++deeper) {
+      const auto goal = [&] {
+        Pose p = to();
+        p.p += rotate(p.q, {0, 0, -0.001f * static_cast<float>(deeper)});
+        return p;
+      };
+      if (!go(goal, 0.0025f)) return false;
+      press_once(1);
+      if (until(held, 2)) return true;
+      press_once(1);
+      if (!until([&] { return seen().tool[0].jaw > 0.95f; }, 2)) return false;
     }
     return false;
   }
 
  private:
   static constexpr double kReaction = 0.05;  // [s] simulated
+  void press_once(int button) {
+    for (const int down : {button, 0}) {
+      arm_.wish(0, wish_, turn_, down);
+      std::this_thread::sleep_for(std::chrono::milliseconds(60));
+    }
+  }
   AtTheWindow& desk_;
   const FakeHd& arm_;
   Vec3 wish_;
@@ -278,8 +297,7 @@ TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_simulated_arms) {
     };
     const auto pen = [&] { return me.seen().instrument[static_cast<size_t>(instrument())].pen; };
     if (!step("take a clamp", take("allis")) || !step("over the rim", me.go([&] { return jaws(0.03f); }, 0.004f)) ||
-        !step("on the rim", me.go([&] { return jaws(0); }, 0.0025f)) ||
-        !step("close it", me.press(1, 1, [&] { return me.seen().tool[0].held == Held::tissue; })))
+        !step("close on the rim", me.grasp([&] { return jaws(0); })))
       return;
     desk.press("k");
     if (!step("park it", me.until([&] { return instrument() < 0; })) ||
