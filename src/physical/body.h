@@ -179,7 +179,10 @@ struct BodiesScratch {
     float inv_mass = 0, inv_inertia = 0;
     bool held = false;
     float opening = 0;
-    float drag = 0, turn_drag = 0;  // [N s/m], [N m s/rad] of a hand whose tool bears on taut thread
+    // [N s/m], [N m s/rad] of thread that presses the body. A tool keeps to its hand's motion, a loose needle to the thread's.
+    float drag = 0, turn_drag = 0;
+    Vec3 drag_speed, drag_spin;  // [m/s] of the center, [rad/s]: that motion of the thread
+    bool loose = false;          // a needle that is in no jaws and in no tissue
   };
   std::vector<Moving> moving;
   std::vector<thread::ToolCapsule> tool;
@@ -210,7 +213,7 @@ inline Vec3 torque_about(const BodyModel& model, const Body& body, Vec3 point) {
 void place_body(const BodyModel& model, Body& body, const Pose& pose, float opening);
 
 // Stages of physical::step.
-// Before all others: the drag of hands whose tools bore on taut thread at the end of the last step.
+// Before all others: the drag of bodies that bore on taut thread at the end of the last step.
 void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, float substep, float h,
                  BodiesScratch& k);
 // Before wall::begin_step: velocities of the bodies without contact.
@@ -221,6 +224,8 @@ void open_gently(const BodiesModel& model, const Bodies& bodies, const thread::S
                  BodiesScratch& k);
 // Contacts of bodies with each other. Jaws that hold a needle have none with it.
 void find_pair_contacts(const BodiesModel& model, const Bodies& bodies, float h, BodiesScratch& k);
+// Contacts of needles with the drape.
+void find_drape_contacts(const BodiesModel& model, const Bodies& bodies, const thread::Plane& drape, float h, BodiesScratch& k);
 // Contacts with the wall.
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
                         const Bodies& bodies, float h, SurfaceSearch& search, BodiesScratch& k);

@@ -39,7 +39,7 @@ inline void nearest_of_segments(Vec3 a, Vec3 b, Vec3 c, Vec3 d, float& s, float&
   s = uu > 0 ? std::clamp((uv * t - dot(u, r)) / uu, 0.0f, 1.0f) : 0.0f;
 }
 
-constexpr uint64_t kThreadGripRow = 6;  // kind of key: jaws on a thread
+constexpr uint64_t kThreadGripRow = 6, kDrapeRow = 7;  // kinds of key: jaws on a thread, a needle on the drape
 constexpr uint64_t key_of(uint64_t kind, uint64_t body, uint64_t part, uint64_t patch) {
   return kind << 60 | body << 52 | part << 36 | patch;
 }

@@ -142,4 +142,27 @@ void find_pair_contacts(const BodiesModel& model, const Bodies& bodies, float h,
     }
 }
 
+void find_drape_contacts(const BodiesModel& model, const Bodies& bodies, const thread::Plane& drape, float h,
+                         BodiesScratch& k) {
+  for (uint32_t b = 0; b < bodies.body.size(); ++b) {
+    const BodyModel& m = model.body[b];
+    if (!m.falls || k.moving[b].held) continue;
+    for (uint32_t i = 0; i < m.sphere.size(); ++i) {
+      const Vec3 at = transform(bodies.body[b].pose, m.sphere[i].at);
+      const float radius = std::abs(m.sphere[i].radius), gap = dot(drape.normal, at) - drape.offset - radius;
+      const Vec3 arm = at - drape.normal * radius - k.moving[b].center;
+      if (gap > model.reach - 1.5f * h * std::min(0.0f, dot(drape.normal, point_speed(k.moving[b], arm)))) continue;
+      if (k.row.size() >= kMaxRows) {
+        ++k.overflow;
+        return;
+      }
+      Row row;
+      row.key = key_of(kDrapeRow, b, i, 0), row.a = b, row.ra = arm, row.axis = drape.normal, row.gap = gap;
+      row.friction = drape.friction;
+      if (const RowMemory* memory = remembered(bodies, row.key)) row.impulse = memory->impulse;
+      k.row.push_back(row);
+    }
+  }
+}
+
 }  // namespace catgut::physical

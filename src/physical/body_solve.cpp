@@ -14,7 +14,8 @@ constexpr float kTautMass = 5e-3f;     // [kg] sqrt(line mass * EA) h: what move
 constexpr float kSlackMass = 0.1e-3f;  // [kg] of a few nodes
 constexpr float kLineMass = 0.05f;     // [kg/m]
 
-constexpr float kOpenForce = 2;  // [N] at the tips, maximum with which jaws open against thread round them
+constexpr float kLoosePress = 0.3f;  // [N] of a needle that nothing holds, on a segment; it weighs 2 mN
+constexpr float kOpenForce = 2;      // [N] at the tips, maximum with which jaws open against thread round them
 
 // Velocity of the hand's target, from the target of the last step.
 struct Wish {
@@ -40,8 +41,10 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
     if (m.falls) push += model.gravity * (m.mass * h);
     if (t) push += t->load * h;
     const float keep = m.falls ? 1 - 2 * h : 1 - 50 * h;
-    out.inv_mass = 1 / m.mass, out.inv_inertia = 1 / m.inertia;
-    out.v = b.velocity * keep + push * out.inv_mass, out.w = b.spin * keep + twist * out.inv_inertia;
+    const float drag = out.loose ? h * out.drag : 0, turn_drag = out.loose ? h * out.turn_drag : 0;
+    out.inv_mass = 1 / (m.mass + drag), out.inv_inertia = 1 / (m.inertia + turn_drag);
+    out.v = (b.velocity * (keep * m.mass) + out.drag_speed * drag + push) * out.inv_mass;
+    out.w = (b.spin * (keep * m.inertia) + out.drag_spin * turn_drag + twist) * out.inv_inertia;
     return;
   }
   const Wish w = wish_of(m, b, *t, h);
@@ -69,12 +72,18 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
 
 // The thread's force on a tool is one step late. A throw round the jaws holds them from all sides, with up to 1e6 N/m, and the
 // jaws' tips weigh 16 g to it: they would be thrown to and fro, in 20 steps with 50 N. A drag toward the hand's motion, as
-// great as the load, holds them; where nothing moves it does nothing.
+// great as the load, holds them; where nothing moves it does nothing. A needle weighs as much as a millimeter of the simulated
+// thread: one that falls on thread, or has it pulled against its side, would be thrown away likewise.
 void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, float substep, float h,
                  BodiesScratch& k) {
   constexpr float kGive = 20e-6f;  // [m] by which a tool moves off thread that presses it, until the thread is slack
   k.moving.resize(bodies.body.size());
-  for (BodiesScratch::Moving& m : k.moving) m.drag = m.turn_drag = 0;
+  for (size_t b = 0; b < bodies.body.size(); ++b) {
+    BodiesScratch::Moving& m = k.moving[b];
+    m.drag = m.turn_drag = 0, m.drag_speed = m.drag_spin = {};
+    const auto holds = [&](const Body& tool) { return tool.grip.what == Gripped::needle && tool.grip.body == b; };
+    m.loose = model.body[b].falls && bodies.body[b].skip == 0 && std::none_of(bodies.body.begin(), bodies.body.end(), holds);
+  }
   std::array<uint32_t, kMaxBodies + 1> first{};  // of the capsules of a body, in the order of show_bodies
   for (size_t b = 0; b < bodies.body.size(); ++b)
     first[b + 1] = first[b] + static_cast<uint32_t>(model.body[b].thread_capsule.size());
@@ -89,8 +98,24 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
     const BodyCapsule& c = m.thread_capsule[partner - thread::kTool - first[b]];
     const Vec3 at = lerp(local(m, m.sphere[c.a], bodies.body[b].opening), local(m, m.sphere[c.b], bodies.body[b].opening),
                          thread.crossing[i].t);
-    k.moving[b].drag += load * h / kGive;
-    k.moving[b].turn_drag += load * h / kGive * length2(at - m.center);
+    const float drag = load * h / kGive, arm2 = length2(at - m.center);
+    k.moving[b].drag += drag, k.moving[b].turn_drag += drag * arm2;
+    if (!k.moving[b].loose) continue;
+    const uint32_t node = thread::segment_of(thread.key[i]);
+    const Vec3 speed = lerp(thread.v.at(node), thread.v.at(node + 1), thread.crossing[i].s);
+    k.moving[b].drag_speed += drag * speed;
+    k.moving[b].drag_spin += drag * cross(rotate(bodies.body[b].pose.q, at - m.center), speed);
+  }
+  for (size_t b = 0; b < bodies.body.size(); ++b) {
+    BodiesScratch::Moving& m = k.moving[b];
+    if (!m.loose) continue;
+    const Body& body = bodies.body[b];
+    // Thread that leaves a wedge is faster than the needle was: a drag must not take it along.
+    if (m.drag > 0) m.drag_speed = clamped(m.drag_speed / m.drag, length(body.velocity));
+    if (m.turn_drag > 0) m.drag_spin = clamped(m.drag_spin / m.turn_drag, length(body.spin));
+    // The thread may have left it since then; what it did acts in this step all the same.
+    m.drag += length(body.thread_force) * h / kGive;
+    m.turn_drag += length(body.thread_torque) * h / kGive * std::sqrt(model.body[b].inertia / model.body[b].mass);
   }
 }
 
@@ -141,6 +166,7 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, float h, BodiesScratc
       t.b = transform(body.shown, local(m, z, body.shown_opening));
       t.to_a = transform(next, local(m, a, moving.opening)), t.to_b = transform(next, local(m, z, moving.opening));
       t.radius = std::min(std::abs(a.radius), std::abs(z.radius)), t.friction = m.thread_friction;
+      if (moving.loose) t.press = kLoosePress;
       k.tool.push_back(t), k.tool_body.push_back(b);
     }
     for (size_t i = 0; i < k.hold.size(); ++i)

@@ -230,6 +230,7 @@ void begin_bodies(const Model& m, State& s, Scratch& k, const Hands& hands) {
   open_gently(m.bodies, s.bodies, s.thread, m.thread.material.diameter, h, k.bodies);
   skip_channels(m.needles, m.wall, s.wall, s.needle, s.bodies);
   find_pair_contacts(m.bodies, s.bodies, h, k.bodies);
+  if (hands.plane) find_drape_contacts(m.bodies, s.bodies, *hands.plane, h, k.bodies);
   find_body_contacts(m.bodies, m.wall, s.wall, surface, s.bodies, h, k.search, k.bodies);
   find_grips(m.bodies, m.wall, s.wall, surface, s.thread, m.thread.material.diameter, s.bodies, hands.targets, h, k.bodies);
   find_needle_rows(m.needles, m.bodies, m.wall, s.wall, surface, s.thread, s.bodies, s.needle, h, k.bodies);

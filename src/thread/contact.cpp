@@ -14,8 +14,6 @@
 namespace catgut::thread {
 namespace {
 
-constexpr float kToolPress = 20;  // [N] maximum of a tool on a segment: thread wedged between two rigid tools yields
-
 Four motion(const Scratch& s, const Active& c) {
   const Four* u = s.contact_u.data();
   return (u[c.i] * c.wi0 + u[c.i + 1] * c.wi1) + (u[c.j] * c.wj0 + u[c.j + 1] * c.wj1) - c.partner;
@@ -132,7 +130,7 @@ float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& 
     arc = std::max(arc, arc_factor(state, s, other, normal_force));
   } else {
     active.mu = around.tools[other - kTool].friction;
-    active.most = kToolPress * h2;
+    active.most = around.tools[other - kTool].press * h2;
     active.partner = four(lerp(s.tool_move[2 * (other - kTool)], s.tool_move[2 * (other - kTool) + 1], c.t));
   }
   active.mu *= arc;

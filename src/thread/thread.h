@@ -143,6 +143,7 @@ struct ToolCapsule {
   float radius = 0;
   float friction = 0.15f;
   Vec3 force_a, force_b;  // [N] of the thread on the tool, split over its ends; mean over the last step; written by step
+  float press = 20;       // [N] maximum on a segment: thread wedged between two rigid tools yields
 };
 struct Plane {
   Vec3 normal{0, 1, 0};
