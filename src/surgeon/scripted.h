@@ -3,7 +3,7 @@
 // about its own circle. The forceps (left) grasps the tip, brings it through and pulls the thread; knots are instrument ties.
 // Reads Snapshots only; each step checks the actual state before the next begins. Failed steps are repeated. A bite whose tip
 // did not exit is withdrawn and driven slightly shallower or deeper, a missed grasp is approached again, a throw whose loop
-// did not hold is wound again. Bites are in scripted.cpp, knots and scissors in tying.cpp.
+// did not hold is wound again. Bites are in biting.cpp, knots in tying.cpp, scissors in finishing.cpp.
 #pragma once
 #include <array>
 #include <optional>
@@ -22,6 +22,8 @@ constexpr size_t kNeedleHolder = 0, kForceps = 1;
 constexpr int kAttempts = 8;  // per bite, per grasp, per throw
 constexpr float kJustOpen =
     0.6f;  // of jaws beside the other instrument: they release at half, and wide open they would meet it
+constexpr float kHalfOpen = 0.7f;       // of jaws that release without shaking off a loop
+constexpr float kStrandsTouch = 1e-3f;  // [m] between the nodes of two strands in contact
 
 class Scripted final : public Surgeon {
  public:
@@ -166,6 +168,8 @@ class Scripted final : public Surgeon {
 
   // --- scissors ---------------------------------------------------------------------------------------------------------
   bool cut(TaskKind kind, const Snapshot& seen);
+  // The needle holder carries the tail's piece away: left in the field it would lie between jaws and tissue at the next stitch.
+  bool take_piece(const Snapshot& seen);
   static size_t count_cuts(const Snapshot& seen);
 
   bool discard(const Snapshot& seen);
