@@ -27,6 +27,9 @@ bool RunResult::expectations_hold() const {
 
 namespace {
 
+// Of a result whose thing is not there, such as a gap where no stitch crosses: it meets no expectation.
+constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
+
 // |free end - needle end| / sum of the thread outside the first and the last suture point, along the thread. 0 without both.
 double tail_asymmetry(const Snapshot& seen, size_t which) {
   if (which >= seen.suture.size()) return 0;
@@ -85,7 +88,7 @@ void MetricsCollector::tick(const Snapshot& seen) {
   order_errors_ = std::max(order_errors_, count_order_errors(seen));
   for (const SutureView& suture : seen.suture)
     for (const float tension : suture.thread_tension) thread_force_ = std::max(thread_force_, tension);
-  most_inversion_ = std::max(most_inversion_, edge_inversion(seen));
+  if (const double now = edge_inversion(seen); now > most_inversion_) most_inversion_ = now;
   const bool held = std::any_of(seen.tool.begin(), seen.tool.end(), [](const ToolView& t) { return t.held != Held::nothing; });
   if (held_ && !held) let_go_s_ = seen.time_s, let_go_gap_ = wound_gap(seen), let_go_opening_ = seen.opening_area;
   held_ = held;
@@ -95,7 +98,7 @@ void MetricsCollector::tick(const Snapshot& seen) {
 // crossing to the other edge.
 double MetricsCollector::wound_gap(const Snapshot& seen) const {
   const std::vector<SuturePointView>& point = seen.active().suture_point;
-  if (rim_.size() != 2 || point.empty() || point.front().wall == point.back().wall) return 0;
+  if (rim_.size() != 2 || point.empty() || point.front().wall == point.back().wall) return kNotMeasured;
   const auto gap = [&](Vec3 p) {
     const Vec3 a = nearest_on_edge(seen, rim_[0], p);
     return distance(a, nearest_on_edge(seen, rim_[1], a));
@@ -112,7 +115,7 @@ double MetricsCollector::wound_gap(const Snapshot& seen) const {
 // crossings and both edges. Outward is away from the middle of both openings.
 double MetricsCollector::edge_inversion(const Snapshot& seen) const {
   const std::vector<SuturePointView>& point = seen.active().suture_point;
-  if (rim_.size() != 2) return 0;
+  if (rim_.size() != 2) return kNotMeasured;
   Vec3 middle;
   for (const std::vector<uint32_t>& rim : rim_)
     for (const uint32_t i : rim) middle += seen.particle[i] / (2 * static_cast<float>(rim.size()));
@@ -123,7 +126,7 @@ double MetricsCollector::edge_inversion(const Snapshot& seen) const {
     const Vec3 out = normalized(at - middle - across * dot(at - middle, across), {0, 1, 0});
     for (const std::vector<uint32_t>& rim : rim_) least = std::min(least, dot(at - nearest_on_edge(seen, rim, at), out));
   }
-  return least < std::numeric_limits<float>::max() ? least : 0;
+  return least < std::numeric_limits<float>::max() ? least : kNotMeasured;
 }
 
 // Depth of the bites, as part of the wall's thickness, and those that reach the inner face.
@@ -157,9 +160,9 @@ void MetricsCollector::measure_seam(const Snapshot& last, std::map<std::string, 
       any = true;
     }
   v["pairs"] = static_cast<double>(pairs);
-  v["seam_gap"] = gap;
-  v["seam_gap_all"] = all;
-  v["seam_gap_start"] = start;
+  v["seam_gap"] = any ? gap : kNotMeasured;
+  v["seam_gap_all"] = pairs > 0 ? all : kNotMeasured;
+  v["seam_gap_start"] = any ? start : kNotMeasured;
 }
 
 void MetricsCollector::time(const StageTimes& times, double tick_ms) {
@@ -235,14 +238,15 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   v["edge_inversion"] = edge_inversion(last);
   v["edge_inversion_most"] = most_inversion_;
   v["wound_gap"] = wound_gap(last);
-  v["wound_gap_change"] = held_ ? 0 : wound_gap(last) - let_go_gap_;
+  v["wound_gap_change"] = held_ ? kNotMeasured : wound_gap(last) - let_go_gap_;
   v["hands_off"] = held_ ? 0 : last.time_s - let_go_s_;
   v["thread_force"] = thread_force_;
   v["needle_detached"] = static_cast<double>(off);
   double& held = v["held_ends"] = 0;
   for (const ToolView& tool : last.tool) held = std::max(held, static_cast<double>(tool.held_strands));
-  double& uneven = v["tail_asymmetry"] = 0;
-  for (const double of_suture : tail_asymmetry_) uneven = std::max(uneven, of_suture);
+  double& uneven = v["tail_asymmetry"] = kNotMeasured;
+  for (const double of_suture : tail_asymmetry_)
+    if (of_suture >= 0) uneven = uneven >= of_suture ? uneven : of_suture;
   for (size_t k = 1; k < counts_.faults.size(); ++k) {
     const std::string name = fault_name(static_cast<Fault>(k));
     if (counts_.faults[k]) result.faults[name] = counts_.faults[k];

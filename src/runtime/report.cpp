@@ -252,11 +252,11 @@ std::string run_summary(const RunResult& r, bool judged) {
   out += fmt::format("  end: {}{}; state {:016x}\n", r.ended,
                      retries > 0 ? fmt::format(", {} {}", retries, retries == 1 ? "retry" : "retries") : "", r.state_hash);
   for (const ExpectationResult& e : r.expect)
-    out += fmt::format("  {} {} = {:.6g}, expected {}\n",
+    out += fmt::format("  {} {} = {}, expected {}\n",
                        e.ok     ? "ok     "
                        : judged ? "FAILED "
                                 : "differs",
-                       e.want.name, e.got, want_text(e.want));
+                       e.want.name, std::isnan(e.got) ? "not measured" : fmt::format("{:.6g}", e.got), want_text(e.want));
   return out;
 }
 
