@@ -14,7 +14,7 @@ constexpr float kTautMass = 5e-3f;     // [kg] sqrt(line mass * EA) h: what move
 constexpr float kSlackMass = 0.1e-3f;  // [kg] of a few nodes
 constexpr float kLineMass = 0.05f;     // [kg/m]
 
-constexpr float kLoosePress = 0.3f;  // [N] of a needle that nothing holds, on a segment; it weighs 2 mN
+constexpr float kLoosePress = 0.3f;  // [N] of a needle that nothing holds, on a segment; it weighs 20 mN
 constexpr float kOpenForce = 2;      // [N] at the tips, maximum with which jaws open against thread round them
 
 // Velocity of the hand's target, from the target of the last step.
@@ -72,8 +72,8 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
 
 // The thread's force on a tool is one step late. A throw round the jaws holds them from all sides, with up to 1e6 N/m, and the
 // jaws' tips weigh 16 g to it: they would be thrown to and fro, in 20 steps with 50 N. A drag toward the hand's motion, as
-// great as the load, holds them; where nothing moves it does nothing. A needle weighs as much as a millimeter of the simulated
-// thread: one that falls on thread, or has it pulled against its side, would be thrown away likewise.
+// great as the load, holds them; where nothing moves it does nothing. A needle that falls on thread, or has it pulled against
+// its side, would be thrown away likewise.
 void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, float substep, float h,
                  BodiesScratch& k) {
   constexpr float kGive = 20e-6f;  // [m] by which a tool moves off thread that presses it, until the thread is slack

@@ -8,6 +8,8 @@
 namespace catgut {
 namespace {
 
+constexpr float kDriveOn = 0.08f;  // [rad] per miss of the tip
+constexpr int kDriveOnAtMost = 4;
 constexpr float kRoomToTie = 0.42f;  // of the needle's arc: least position of a needle holder that hands over near the swage
 constexpr float kClear = 0.4f;       // [s] that the forceps backs out before anything else moves
 constexpr float kTipUp = -2.2f;      // [rad] angle of the needle's circle at which its tip is up
@@ -164,11 +166,18 @@ bool Scripted::make_bite(const Snapshot& seen) {
       if (seen.tool[kForceps].held == Held::tissue || !jaw(kForceps, 1)) jaw(kForceps, 1), waited_ = 0;
       else if (move(kForceps, raised(hand_[kForceps].pose, 0.02f), skill_.speed) || waited_ > 0.15f) go(over);
       return false;
-    case over:
+    case over: {
       doing_ = name_of_bite() + "grasp the tip";
       jaw(kForceps, 1);
+      // A tip that was missed is driven on: more of it is out then.
+      const float psi = psi_bite + plan_.beyond + kDriveOn * static_cast<float>(std::min(misses_, kDriveOnAtMost));
+      if (misses_ > 0 && psi_ < psi && holds_needle(seen, kNeedleHolder)) {
+        psi_ = std::min(psi, psi_ + skill_.drive_speed / shape().needle_radius * dt_);
+        move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
+      }
       if (move(kForceps, raised(forceps_grip(needle), 0.025f), speed)) go_down(down);
       return false;
+    }
     case down:
       if (move(kForceps, short_of(forceps_grip(needle)), careful())) go(close);
       return false;

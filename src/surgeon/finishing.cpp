@@ -15,15 +15,15 @@ constexpr float kSlackStrand = 0.8f;          // of the strand's length: where i
 constexpr float kTautStrand = 0.2f;           // [N]
 constexpr float kOverDrape = 0.004f;          // [m] of a needle that is laid down
 constexpr Vec3 kLaidDown{-0.6f, -0.3f, 0.75f};
-constexpr float kShortStump = 0.005f;  // [m] of thread left on a knot with physical mechanics, beyond where the strands touch
-constexpr float kKnotEnds = 4e-3f;  // [m] of free thread
-constexpr float kStumpClear = 2e-3f;                       // [m] of the blades from the stitch
-constexpr Vec3 kCutFrom{0, 0.6f, 0.8f};                    // unit, from the blades along the shaft
-constexpr int kPiece = 10;                        // first stage of carrying a cut-off tail away
-constexpr int kPieceMisses = 3;                   // then it is left where it fell
-constexpr float kPieceGrip = 0.008f;              // [m] of the jaws from where it was cut
-constexpr float kPieceUp = 0.06f;                 // [m] it is raised: longer than it is
-constexpr Vec3 kPieceAside{0.09f, 0, 0.07f};      // [m] from the center of the field, where it is laid down
+constexpr float kShortStump = 0.005f;    // [m] of thread left on a knot with physical mechanics, beyond where the strands touch
+constexpr float kKnotEnds = 4e-3f;       // [m] of free thread
+constexpr float kStumpClear = 2e-3f;     // [m] of the blades from the stitch
+constexpr Vec3 kCutFrom{0, 0.6f, 0.8f};  // unit, from the blades along the shaft
+constexpr int kPiece = 10;               // first stage of carrying a cut-off tail away
+constexpr int kPieceMisses = 3;          // then it is left where it fell
+constexpr float kPieceGrip = 0.008f;     // [m] of the jaws from where it was cut
+constexpr float kPieceUp = 0.06f;        // [m] it is raised: longer than it is
+constexpr Vec3 kPieceAside{0.09f, 0, 0.07f};  // [m] from the center of the field, where it is laid down
 
 // The outermost node of a knot on the tail or on the needle's strand: within the knot the two touch each other.
 size_t knot_end(const Snapshot& seen, bool tail) {
@@ -148,9 +148,10 @@ bool Scripted::take_piece(const Snapshot& seen) {
   enum { over = kPiece, down, close, lift, carry, lower, open };
   const auto& cut = seen.active().thread_cut;
   const size_t end = static_cast<size_t>(std::find(cut.begin(), cut.end(), 1) - cut.begin());  // of the tail's piece
-  if (misses_ > kPieceMisses || end >= cut.size()) return true;  // it lies where it fell
+  if (misses_ > kPieceMisses || end >= cut.size()) return true;                                // it lies where it fell
   const size_t at = node_along(seen, end, kPieceGrip + 0.004f * static_cast<float>(misses_), -1);
-  const Vec3 x = normalized(cross(kCutFrom, node_at(seen, std::min(at + 1, end)) - node_at(seen, at > 0 ? at - 1 : 0)), {1, 0, 0});
+  const Vec3 x =
+      normalized(cross(kCutFrom, node_at(seen, std::min(at + 1, end)) - node_at(seen, at > 0 ? at - 1 : 0)), {1, 0, 0});
   const Pose goal{node_at(seen, at), from_axes(x, cross(kCutFrom, x), kCutFrom)};
   const Vec3 place{picture_.focus.x + kPieceAside.x, picture_.drape + kOverDrape, picture_.focus.z + kPieceAside.z};
   const auto missed = [&] { ++retries_, ++misses_, go(over); };
@@ -173,7 +174,8 @@ bool Scripted::take_piece(const Snapshot& seen) {
         go(carry);
       return false;
     case carry:
-      if (move(kNeedleHolder, {place + Vec3{0, kPieceUp, 0}, hand_[kNeedleHolder].pose.q}, skill_.speed) || !patience(4)) go(lower);
+      if (move(kNeedleHolder, {place + Vec3{0, kPieceUp, 0}, hand_[kNeedleHolder].pose.q}, skill_.speed) || !patience(4))
+        go(lower);
       return false;
     case lower:
       if (move(kNeedleHolder, {place, hand_[kNeedleHolder].pose.q}, skill_.speed) || !patience(3)) go(open);

@@ -60,6 +60,9 @@ constexpr int kAgain = 5;             // times that a throw is wound again
 constexpr int kMostMisses = 3;        // grasps at the tail with a turn on the jaws
 constexpr float kDeep = 4e-3f;        // [m] below the stitch: a tail there is taken from above
 constexpr float kBears = 3;           // [N] on a bite, above which the hands give way
+constexpr float kOverDrape = 12e-3f;  // [m] of the swage: the needle, which hangs down from the forceps, would scrape on it
+constexpr float kRoom = 4e-3f;        // [m] from the tissue's particles: open jaws have none of it between them
+constexpr float kFarthest = 9e-3f;    // [m] of the place where a tail is taken, beyond kTailEnd
 
 Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
 // Unit, across the shaft; 0: toward the viewer, pi/2: above.
@@ -142,6 +145,24 @@ float ThreadTie::slack_of(const Snapshot& seen, bool tail) const {
 
 Vec3 ThreadTie::tail_node(const Snapshot& seen, float from_end) const {
   return node_at(seen, node_along(seen, 0, from_end, 1));
+}
+
+// [m] from the tail's end, where the jaws take it. A tail that hangs down between walls is taken where it is clear of them:
+// jaws that close on a wall's edge beside it tear the bites out.
+float ThreadTie::tail_place(const Snapshot& seen, float wanted) const {
+  if (tail_node(seen, wanted).y > origin_.y - kDeep) return wanted;
+  size_t threads = 0;
+  for (const SutureView& s : seen.suture) threads += s.thread_order.size();
+  const size_t tissue = 2 * size_t{picture_.columns};
+  float best = wanted, most = 0;
+  for (float at = wanted; at < wanted + kFarthest && at < tail_ - kKnot; at += 1e-3f) {
+    const Vec3 p = tail_node(seen, at);
+    float room = kRoom * kRoom;
+    for (size_t i = 0; i < seen.particle.size(); ++i)
+      if (i < tissue || i >= tissue + threads) room = std::min(room, length2(seen.particle[i] - p));
+    if (room > 1.1f * most) best = at, most = room;
+  }
+  return best;
 }
 
 // [rad] of the strand round jaws and shaft of the needle holder, in the sense of the throw. What has slid past the tips does
@@ -269,6 +290,7 @@ void ThreadTie::feel(const Snapshot& seen) {
 }
 
 void ThreadTie::place() {
+  hand_.y = std::max(hand_.y, picture_.drape + kOverDrape);
   hands_[kHolder].pose = {tip_, holder_turn_};
   const Quat turn = axis_angle({0, 0, 1}, forceps_angle_) * forceps_rest_;
   hands_[kForceps].pose = {hand_ - rotate(turn, swage_in_forceps_), turn};
@@ -289,7 +311,7 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
   switch (stage) {
     case to_tail:
     case take_tail: {  // to lay the tail straight on the side away from the needle; it hangs in front, or down between walls
-      const Vec3 at = tail_node(seen, kTailEnd + 3e-3f * static_cast<float>(misses_));
+      const Vec3 at = tail_node(seen, tail_place(seen, kTailEnd + 3e-3f * static_cast<float>(misses_)));
       const Vec3 z = at.y > origin_.y - kDeep ? normalized(Vec3{0.1f * side_, 0.35f, 0.93f})
                                               : normalized(Vec3{0.1f * side_, 1, 0.3f}),
                  along = node_at(seen, node_along(seen, 0, kTailEnd + 6e-3f, 1)) - tail_node(seen, kTailEnd);
@@ -432,7 +454,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     case fetch: {
       // By sight of the jaws, which lag behind the hand.
-      const Vec3 goal = tail_node(seen, kTailEnd + 2e-3f * static_cast<float>(misses_)), jaws = seen.tool[kHolder].pose.p;
+      const float place = tail_place(seen, kTailEnd + 2e-3f * static_cast<float>(misses_));
+      const Vec3 goal = tail_node(seen, place), jaws = seen.tool[kHolder].pose.p;
       const Vec3 way = from_jaws(seen.tool[kHolder], goal);
       const float left = length(way),
                   speed = std::min(0.7f * how_.speed, 0.01f + 4 * left) * (felt_ > 2 * kWinding ? 0.3f : 1.0f);
@@ -441,7 +464,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const Vec3 from = how_.flat ? Vec3{side_, kSteepOnFlat, 0}
                                   : Vec3{side_, kSteepAtTail, std::clamp(kLeans * (goal.z - origin_.z), -0.8f, 0.8f)};
       shaft_ = normalized(lerp(shaft_, normalized(from), std::min(1.0f, kTurns * dt)));
-      const Vec3 along = tail_node(seen, kTailEnd + kBeside) - tail_node(seen, kTailEnd - kBeside);
+      const Vec3 along = tail_node(seen, place + kBeside) - tail_node(seen, place - kBeside);
       const Vec3 across = normalized(cross(shaft_, along), {0, 0, 1});
       holder_turn_ = nlerp(holder_turn_, holder_turn(shaft_, across.z < 0 ? -across : across), std::min(1.0f, kTurns * dt));
       tip_ = jaws + (tip_ - jaws) * std::min(1.0f, kAhead / std::max(distance(tip_, jaws), 1e-6f));

@@ -145,7 +145,7 @@ TEST(Needle, let_go_it_lies_where_it_falls) {
 }
 
 // From 4 cm, in several positions, onto the drape or onto its own thread that lies there in a coil. Nothing of it may come
-// below the drape, and thread that is not held cannot be loaded by 0.2 g.
+// below the drape, and thread that nobody holds carries no more than the fall of its needle.
 TEST(Needle, dropped_on_the_drape_it_lies_there_and_does_not_jerk_its_thread) {
   for (const bool coil : {false, true})
     for (int turn = 0; turn < 6; ++turn) {
