@@ -236,8 +236,8 @@ void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::Sta
 // Impulses of the last step, to the wall's external forces and to the bodies.
 void warm_bodies(const BodiesModel& model, const Bodies& bodies, std::span<const HandTarget> target, wall::Scratch& ws, float h,
                  BodiesScratch& k);
-// Capsules of the bodies for the thread's step, and the forces that the thread left on them.
-void show_bodies(const BodiesModel& model, Bodies& bodies, float h, BodiesScratch& k);
+// Capsules of the bodies for the thread's step, and the forces that the thread left on them. drape: may be null.
+void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* drape, float h, BodiesScratch& k);
 void take_thread_forces(const BodiesModel& model, Bodies& bodies, BodiesScratch& k);
 // After the thread: solves, applies impulses to the wall, moves the bodies.
 void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& ws, wall::Scratch& wscratch, Bodies& bodies,

@@ -14,7 +14,10 @@ constexpr float kTautMass = 5e-3f;     // [kg] sqrt(line mass * EA) h: what move
 constexpr float kSlackMass = 0.1e-3f;  // [kg] of a few nodes
 constexpr float kLineMass = 0.05f;     // [kg/m]
 
-constexpr float kLoosePress = 0.3f;  // [N] of a needle that nothing holds, on a segment; it weighs 20 mN
+// [N] on a segment, of a needle that nothing holds, which weighs 20 mN, and of a tool that comes as near to the drape as
+// kOnDrape: cloth gives way, and thread between the two is not crushed.
+constexpr float kLoosePress = 0.3f;
+constexpr float kOnDrape = 0.4e-3f;  // [m]
 constexpr float kOpenForce = 2;      // [N] at the tips, maximum with which jaws open against thread round them
 
 // Velocity of the hand's target, from the target of the last step.
@@ -150,7 +153,7 @@ void warm_bodies(const BodiesModel& model, const Bodies& bodies, std::span<const
   }
 }
 
-void show_bodies(const BodiesModel& model, Bodies& bodies, float h, BodiesScratch& k) {
+void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* drape, float h, BodiesScratch& k) {
   k.tool.clear(), k.tool_body.clear();
   for (uint32_t b = 0; b < bodies.body.size(); ++b) {
     const BodyModel& m = model.body[b];
@@ -166,7 +169,8 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, float h, BodiesScratc
       t.b = transform(body.shown, local(m, z, body.shown_opening));
       t.to_a = transform(next, local(m, a, moving.opening)), t.to_b = transform(next, local(m, z, moving.opening));
       t.radius = std::min(std::abs(a.radius), std::abs(z.radius)), t.friction = m.thread_friction;
-      if (moving.loose) t.press = kLoosePress;
+      const auto on_drape = [&](Vec3 p) { return drape && dot(drape->normal, p) - drape->offset < t.radius + kOnDrape; };
+      if (moving.loose || on_drape(t.to_a) || on_drape(t.to_b)) t.press = kLoosePress;
       k.tool.push_back(t), k.tool_body.push_back(b);
     }
     for (size_t i = 0; i < k.hold.size(); ++i)

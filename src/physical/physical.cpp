@@ -335,7 +335,7 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
   k.point.clear(), k.offset.clear(), k.contact.clear();
   k.holds.assign(hands.holds.begin(), hands.holds.end());
   if (bodies) {
-    show_bodies(m.bodies, s.bodies, m.wall.step, k.bodies);
+    show_bodies(m.bodies, s.bodies, hands.plane, m.wall.step, k.bodies);
     k.holds.insert(k.holds.end(), k.bodies.hold.begin(), k.bodies.hold.end());
   }
   wake_strands(m, s, hands, k.holds, k.bodies.tool, k.search.moved, k.awake);

@@ -222,7 +222,7 @@ class Stylus {
     }
     return false;
   }
-  // Who closes the jaws on nothing opens them again and goes a millimetre deeper: a late machine leaves them short.
+  // Who closes the jaws on nothing opens them again and goes one millimeter deeper: a late machine leaves them short.
   bool grasp(const std::function<Pose()>& to) {
     const auto held = [&] { return seen().tool[0].held == Held::tissue; };
     for (int deeper = 0; deeper < 4; ++deeper) {
