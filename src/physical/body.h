@@ -224,7 +224,7 @@ void open_gently(const BodiesModel& model, const Bodies& bodies, const thread::S
                  BodiesScratch& k);
 // Contacts of bodies with each other. Jaws that hold a needle have none with it.
 void find_pair_contacts(const BodiesModel& model, const Bodies& bodies, float h, BodiesScratch& k);
-// Contacts of needles with the drape.
+// Contacts of loose needles with the drape.
 void find_drape_contacts(const BodiesModel& model, const Bodies& bodies, const thread::Plane& drape, float h, BodiesScratch& k);
 // Contacts with the wall.
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,

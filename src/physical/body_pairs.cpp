@@ -146,7 +146,7 @@ void find_drape_contacts(const BodiesModel& model, const Bodies& bodies, const t
                          BodiesScratch& k) {
   for (uint32_t b = 0; b < bodies.body.size(); ++b) {
     const BodyModel& m = model.body[b];
-    if (!m.falls || k.moving[b].held) continue;
+    if (!k.moving[b].loose || k.moving[b].held) continue;
     for (uint32_t i = 0; i < m.sphere.size(); ++i) {
       const Vec3 at = transform(bodies.body[b].pose, m.sphere[i].at);
       const float radius = std::abs(m.sphere[i].radius), gap = dot(drape.normal, at) - drape.offset - radius;
