@@ -106,6 +106,7 @@ void BodiesScratch::reserve(const wall::Model& wm, const wall::State& ws) {
   around.resize(kMaxBodies);
   for (Around& a : around) a.face.reserve(faces);
   moving.reserve(64), tool.reserve(kMaxThreadCapsules), tool_body.reserve(kMaxThreadCapsules);
+  loose.reserve(kMaxBodies), loose_body.reserve(kMaxBodies);
   hold.reserve(64), hold_body.reserve(64), hold_at.reserve(64);
 }
 
@@ -184,24 +185,27 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       const Vec3 u = wall::velocity(w, ws.motion);
       // As far as it may come near in this step, however it turns.
       const auto nearing = [&](Vec3 v) { return 1.5f * std::max(0.0f, -dot(v, foot.normal)) + 0.3f * length(v); };
-      if (gap > model.reach + h * std::max(nearing(point_speed(moving, r) + jaw_speed - u),
-                                           nearing(body.velocity + cross(body.spin, r) + jaw_speed - u)))
-        return;
-      // The same plane from two patches that meet there is one contact; and no more than the nearest four of a sphere.
+      const float closing = h * std::max(nearing(point_speed(moving, r) + jaw_speed - u),
+                                         nearing(body.velocity + cross(body.spin, r) + jaw_speed - u));
+      if (gap > model.reach + closing) return;
+      const float least = gap - closing;  // at the end of the step
+      // The same plane from two patches that meet there is one contact. Of a sphere no more than six, those that come nearest:
+      // in a pit of the wall there are as many.
       size_t same = 0, farthest = k.row.size();
       for (size_t i = k.row.size(); i-- > 0 && k.row[i].a == b && (k.row[i].key >> 36) == (key >> 36); ++same) {
         if (dot(k.row[i].axis, foot.normal) > 0.985f && std::abs(k.row[i].gap - gap) < 0.05e-3f) return;
-        if (farthest == k.row.size() || k.row[i].gap > k.row[farthest].gap) farthest = i;
+        if (farthest == k.row.size() || k.row[i].least > k.row[farthest].least) farthest = i;
       }
-      const bool replaces = same >= 4;
-      if (replaces && k.row[farthest].gap <= gap) return;
+      const bool replaces = same >= 12;
+      if (replaces && k.row[farthest].least <= least) return;
       if (!replaces && k.row.size() >= kMaxRows - 40 - 24 * std::min<size_t>(bodies.body.size() - 1 - b, 3)) {
         ++k.overflow;
         return;
       }
       Row row;
       row.key = key, row.a = b, row.on_wall = true, row.point = w;
-      row.ra = r, row.axis = foot.normal, row.gap = gap, row.speed = jaw_speed, row.friction = m.wall_friction;
+      row.ra = r, row.axis = foot.normal, row.gap = gap, row.least = least, row.speed = jaw_speed,
+      row.friction = m.wall_friction;
       if (memory) {
         const float press = std::max(0.0f, dot(memory->impulse, memory->axis));
         row.impulse = foot.normal * press + across(across(memory->impulse, memory->axis), foot.normal);

@@ -19,7 +19,7 @@ namespace catgut::physical {
 
 constexpr size_t kMaxBodies = 24;
 constexpr size_t kMaxRows = 192;            // contacts, grip points and channel points of one step
-constexpr size_t kMaxThreadCapsules = 192;  // of all bodies together
+constexpr size_t kMaxThreadCapsules = 224;  // of all bodies together
 
 // Geometry: spheres, and capsules between two of them.
 struct BodySphere {
@@ -128,6 +128,7 @@ struct Row {
   Vec3 speed;                               // [m/s] of a's point in addition to its rigid motion (jaws)
   Vec3 wanted;                              // [m/s] relative velocity of a that undoes an error; contact: along the axis only
   float gap = 0;                            // [m] contact
+  float least = 0;                          // [m] contact: the gap at the end of the step, at least
   float soft = 0;                           // [1/kg] compliance over h^2, of the bilateral directions
   float soft_across = 0;                    // [1/kg] spring: across the axis
   float friction = 0;                       // contact
@@ -179,14 +180,15 @@ struct BodiesScratch {
     float inv_mass = 0, inv_inertia = 0;
     bool held = false;
     float opening = 0;
-    // [N s/m], [N m s/rad] of thread that presses the body. A tool keeps to its hand's motion, a loose needle to the thread's.
-    float drag = 0, turn_drag = 0;
-    Vec3 drag_speed, drag_spin;  // [m/s] of the center, [rad/s]: that motion of the thread
-    bool loose = false;          // a needle that is in no jaws and in no tissue
+    float drag = 0, turn_drag = 0;   // [N s/m], [N m s/rad] toward the hand's motion, of thread that presses the tool
+    bool loose = false;              // a needle that is in no jaws and in no tissue: the thread moves it within the step
+    Vec3 thread_push, thread_twist;  // [N s], [N m s] of the thread in this step, on a loose needle
   };
   std::vector<Moving> moving;
   std::vector<thread::ToolCapsule> tool;
-  std::vector<uint32_t> tool_body;  // per capsule
+  std::vector<uint32_t> tool_body;      // per capsule
+  std::vector<thread::ToolBody> loose;  // needles that the thread moves
+  std::vector<uint32_t> loose_body;
   std::vector<thread::Hold> hold;
   std::vector<uint32_t> hold_body;
   std::vector<Vec3> hold_at;  // [m] where its force acts on the body

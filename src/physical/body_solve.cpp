@@ -14,9 +14,9 @@ constexpr float kTautMass = 5e-3f;     // [kg] sqrt(line mass * EA) h: what move
 constexpr float kSlackMass = 0.1e-3f;  // [kg] of a few nodes
 constexpr float kLineMass = 0.05f;     // [kg/m]
 
-// [N] on a segment, of a needle that nothing holds, which weighs 20 mN, and of a tool that comes as near to the drape as
-// kOnDrape: cloth gives way, and thread between the two is not crushed.
-constexpr float kLoosePress = 0.3f;
+// [N] on a segment, of a tool that comes as near to the drape as kOnDrape: cloth gives way, and thread between the two is not
+// crushed.
+constexpr float kDrapePress = 0.3f;
 constexpr float kOnDrape = 0.4e-3f;  // [m]
 constexpr float kOpenForce = 2;      // [N] at the tips, maximum with which jaws open against thread round them
 
@@ -44,10 +44,9 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
     if (m.falls) push += model.gravity * (m.mass * h);
     if (t) push += t->load * h;
     const float keep = m.falls ? 1 - 2 * h : 1 - 50 * h;
-    const float drag = out.loose ? h * out.drag : 0, turn_drag = out.loose ? h * out.turn_drag : 0;
-    out.inv_mass = 1 / (m.mass + drag), out.inv_inertia = 1 / (m.inertia + turn_drag);
-    out.v = (b.velocity * (keep * m.mass) + out.drag_speed * drag + push) * out.inv_mass;
-    out.w = (b.spin * (keep * m.inertia) + out.drag_spin * turn_drag + twist) * out.inv_inertia;
+    out.inv_mass = 1 / m.mass, out.inv_inertia = 1 / m.inertia;
+    out.v = b.velocity * keep + push * out.inv_mass;
+    out.w = b.spin * keep + twist * out.inv_inertia;
     return;
   }
   const Wish w = wish_of(m, b, *t, h);
@@ -75,15 +74,14 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
 
 // The thread's force on a tool is one step late. A throw round the jaws holds them from all sides, with up to 1e6 N/m, and the
 // jaws' tips weigh 16 g to it: they would be thrown to and fro, in 20 steps with 50 N. A drag toward the hand's motion, as
-// great as the load, holds them; where nothing moves it does nothing. A needle that falls on thread, or has it pulled against
-// its side, would be thrown away likewise.
+// great as the load, holds them; where nothing moves it does nothing.
 void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, float substep, float h,
                  BodiesScratch& k) {
   constexpr float kGive = 20e-6f;  // [m] by which a tool moves off thread that presses it, until the thread is slack
   k.moving.resize(bodies.body.size());
   for (size_t b = 0; b < bodies.body.size(); ++b) {
     BodiesScratch::Moving& m = k.moving[b];
-    m.drag = m.turn_drag = 0, m.drag_speed = m.drag_spin = {};
+    m.drag = m.turn_drag = 0, m.thread_push = m.thread_twist = {};
     const auto holds = [&](const Body& tool) { return tool.grip.what == Gripped::needle && tool.grip.body == b; };
     m.loose = model.body[b].falls && bodies.body[b].skip == 0 && std::none_of(bodies.body.begin(), bodies.body.end(), holds);
   }
@@ -103,22 +101,6 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
                          thread.crossing[i].t);
     const float drag = load * h / kGive, arm2 = length2(at - m.center);
     k.moving[b].drag += drag, k.moving[b].turn_drag += drag * arm2;
-    if (!k.moving[b].loose) continue;
-    const uint32_t node = thread::segment_of(thread.key[i]);
-    const Vec3 speed = lerp(thread.v.at(node), thread.v.at(node + 1), thread.crossing[i].s);
-    k.moving[b].drag_speed += drag * speed;
-    k.moving[b].drag_spin += drag * cross(rotate(bodies.body[b].pose.q, at - m.center), speed);
-  }
-  for (size_t b = 0; b < bodies.body.size(); ++b) {
-    BodiesScratch::Moving& m = k.moving[b];
-    if (!m.loose) continue;
-    const Body& body = bodies.body[b];
-    // Thread that leaves a wedge is faster than the needle was: a drag must not take it along.
-    if (m.drag > 0) m.drag_speed = clamped(m.drag_speed / m.drag, length(body.velocity));
-    if (m.turn_drag > 0) m.drag_spin = clamped(m.drag_spin / m.turn_drag, length(body.spin));
-    // The thread may have left it since then; what it did acts in this step all the same.
-    m.drag += length(body.thread_force) * h / kGive;
-    m.turn_drag += length(body.thread_torque) * h / kGive * std::sqrt(model.body[b].inertia / model.body[b].mass);
   }
 }
 
@@ -154,7 +136,7 @@ void warm_bodies(const BodiesModel& model, const Bodies& bodies, std::span<const
 }
 
 void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* drape, float h, BodiesScratch& k) {
-  k.tool.clear(), k.tool_body.clear();
+  k.tool.clear(), k.tool_body.clear(), k.loose.clear(), k.loose_body.clear();
   for (uint32_t b = 0; b < bodies.body.size(); ++b) {
     const BodyModel& m = model.body[b];
     Body& body = bodies.body[b];
@@ -168,13 +150,26 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* 
       t.a = transform(body.shown, local(m, a, body.shown_opening)),
       t.b = transform(body.shown, local(m, z, body.shown_opening));
       t.to_a = transform(next, local(m, a, moving.opening)), t.to_b = transform(next, local(m, z, moving.opening));
-      t.radius = std::min(std::abs(a.radius), std::abs(z.radius)), t.friction = m.thread_friction;
+      // A needle's point is a cone; jaws are cylinders within their cones, which leave the plane between closed jaws free.
+      t.radius = m.falls ? std::abs(a.radius) : std::min(std::abs(a.radius), std::abs(z.radius));
+      t.widens = m.falls ? std::abs(z.radius) - t.radius : 0;
+      t.friction = m.thread_friction;
       const auto on_drape = [&](Vec3 p) { return drape && dot(drape->normal, p) - drape->offset < t.radius + kOnDrape; };
-      if (moving.loose || on_drape(t.to_a) || on_drape(t.to_b)) t.press = kLoosePress;
+      // Of a needle in jaws or tissue the swage passes where its thread does, and the tip, driven on, would crush thread.
+      const bool end = m.falls && (&c == &m.thread_capsule.front() || &c == &m.thread_capsule.back());
+      if (moving.loose) t.body = static_cast<uint32_t>(k.loose.size());
+      else if (end) t.press = 0;
+      else if (on_drape(t.to_a) || on_drape(t.to_b)) t.press = kDrapePress;
       k.tool.push_back(t), k.tool_body.push_back(b);
     }
     for (size_t i = 0; i < k.hold.size(); ++i)
       if (k.hold_body[i] == b) k.hold[i].to = transform(next, k.hold_at[i]);
+    if (moving.loose) {
+      thread::ToolBody loose;
+      loose.center = transform(body.shown, m.center), loose.to_center = transform(next, m.center);
+      loose.inv_mass = moving.inv_mass, loose.inv_inertia = moving.inv_inertia;
+      k.loose.push_back(loose), k.loose_body.push_back(b);
+    }
     body.shown = next, body.shown_opening = moving.opening;
   }
 }
@@ -214,6 +209,17 @@ void take_thread_forces(const BodiesModel& model, Bodies& bodies, BodiesScratch&
     const thread::ToolCapsule& t = k.tool[i];
     b.thread_force += 0.5f * (t.force_a + t.force_b);
     b.thread_torque += 0.5f * (cross(t.a - c, t.force_a) + cross(t.b - c, t.force_b));
+  }
+  for (size_t i = 0; i < k.loose.size(); ++i) {
+    const thread::ToolBody& loose = k.loose[i];
+    Body& b = bodies.body[k.loose_body[i]];
+    BodiesScratch::Moving& moving = k.moving[k.loose_body[i]];
+    moving.thread_push = loose.impulse, moving.thread_twist = loose.twist;
+    moving.v += loose.impulse * moving.inv_mass, moving.w += loose.twist * moving.inv_inertia;
+    b.shown.q = turned(b.shown.q, loose.turned);
+    b.shown.p = loose.to_center + loose.moved - rotate(b.shown.q, model.body[k.loose_body[i]].center);
+    // What the capsules report beyond that comes from strands that sleep.
+    b.thread_force -= 0.5f * loose.impulse / k.step, b.thread_torque -= 0.5f * loose.twist / k.step;
   }
   for (size_t i = 0; i < k.hold.size(); ++i) {
     const uint32_t index = k.hold_body[i];
@@ -379,7 +385,8 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
       if (row.a == b) force += row.impulse / h, torque += cross(row.ra, row.impulse) / h;
       if (row.b == b) force -= row.impulse / h, torque -= cross(row.rb, row.impulse) / h;
     }
-    body.force = force + body.thread_force, body.torque = torque + body.thread_torque;
+    body.force = force + body.thread_force + moving.thread_push / h;
+    body.torque = torque + body.thread_torque + moving.thread_twist / h;
     moving.v = clamped(moving.v, kMaxSpeed), moving.w = clamped(moving.w, kMaxSpin);
     body.hand_force = body.hand_torque = {};
     if (moving.held) {

@@ -114,12 +114,14 @@ BodyModel make_needle_body(const NeedleShape& shape) {
     if (i > 0) m.capsule.push_back({static_cast<uint32_t>(i) - 1, static_cast<uint32_t>(i)});
   }
   m.sphere.back().radius = -kTipRadius;  // the tip has a row of its own
-  // Against the thread, from 2 mm before the swage, where its own thread begins.
+  // Against the thread. The first part is the swage, where its own thread begins, the last one the tip.
   const int first = 2, chunks = 9;
+  m.thread_capsule.push_back({0, static_cast<uint32_t>(first)});
   for (int i = 0; i < chunks; ++i) {
     const int a = first + (parts - 1 - first) * i / chunks, b = first + (parts - 1 - first) * (i + 1) / chunks;
     m.thread_capsule.push_back({static_cast<uint32_t>(a), static_cast<uint32_t>(b)});
   }
+  m.thread_capsule.push_back({static_cast<uint32_t>(parts) - 1, static_cast<uint32_t>(parts)});
   m.mass = shape.mass;
   const float middle2 = length2(n.circle);
   m.inertia = shape.mass * std::max(shape.radius * shape.radius - middle2, 0.2f * shape.radius * shape.radius);

@@ -214,11 +214,55 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
             least_distance(m.wall, s.wall, surface, k.search, box, q, p) > second.gap)
           continue;
         const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p);
-        if (!foot.on_edge && foot.gap > 0 && foot.gap < second.gap && dot(foot.facing, best.normal) < 0.95f) second = foot;
+        // A little behind it, too, where the two faces make a fold: each lies before the other, or they meet at the foot.
+        constexpr float kSame = 1e-6f;  // [m]
+        const Vec3 between = foot.at - best.at;
+        const bool fold = foot.gap <= 0 && foot.gap > -d && memory && dot(between, best.facing) > -kSame &&
+                          dot(between, foot.facing) < kSame && (!foot.on_edge || length2(between) < kSame * kSame);
+        if (((foot.gap > 0 && !foot.on_edge) || fold) && foot.gap < second.gap && dot(foot.facing, best.normal) < 0.95f)
+          second = foot;
       }
     }
     if (second.gap < r + far_move) add(i, second, memory_of(second.normal), false);
   }
+}
+
+constexpr float kOwnThread = 3e-3f;  // [m] of thread at a swage that has no contact with it
+
+// A thread node that has slid along the wall within the step gets the plane where it is now.
+struct SlidNodes {
+  const Model& m;
+  const State& s;
+  Scratch& k;
+  bool some_asleep;
+};
+void find_again(void* context, std::span<thread::SoftContact> contacts, size_t index, Vec3 node) {
+  const SlidNodes& slid = *static_cast<const SlidNodes*>(context);
+  const Surface& surface = surface_of(slid.m, slid.s);
+  SurfaceSearch& search = slid.k.search;
+  thread::SoftContact& c = contacts[index];
+  Foot best = nearest_on_patch(slid.m.wall, slid.s.wall, surface, c.patch, node);
+  if (best.on_edge) {
+    // Beyond the patch: another one that continues it.
+    const uint32_t i = slid.some_asleep ? slid.k.awake.node[c.node] : c.node;
+    float facing = dot(normalized(node - best.at), best.facing);
+    for (uint32_t f = search.node_first[i]; f < search.node_first[i + 1]; ++f) {
+      const uint32_t face = search.node_face[f];
+      const FaceBox& box = box_of(slid.m.wall, slid.s.wall, search, face);
+      if (least_distance(box, node, 0) > std::abs(best.gap) + 1e-6f) continue;
+      for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
+        if (q == c.patch ||
+            least_distance(slid.m.wall, slid.s.wall, surface, search, box, q, node) > std::abs(best.gap) + 1e-6f)
+          continue;
+        const Foot foot = nearest_on_patch(slid.m.wall, slid.s.wall, surface, q, node);
+        if (c.normal_impulse > 0 && dot(foot.facing, c.normal) < 0.3f) continue;
+        const float far = std::abs(foot.gap), front = dot(normalized(node - foot.at), foot.facing);
+        if (far > std::abs(best.gap) + 1e-7f || (far > std::abs(best.gap) - 1e-7f && front < facing)) continue;
+        best = foot, facing = front;
+      }
+    }
+  }
+  c.offset = best.at - slid.k.coupling.at[c.point], c.normal = best.normal, c.patch = best.patch;
 }
 
 void begin_bodies(const Model& m, State& s, Scratch& k, const Hands& hands) {
@@ -273,10 +317,27 @@ void step_thread(const Model& m, State& s, Scratch& k, const Hands& hands) {
   soft.tilt_first = k.coupling.tilt_first, soft.tilt = k.tilt, soft.impulse = k.coupling.impulse;
   k.moved.resize(k.point.size());
   soft.moved = k.moved;
+  // A needle's swage has no contact with the thread that begins in it.
+  for (size_t i = 0; i < k.bodies.tool.size(); ++i)
+    for (uint32_t n = 0; n < s.needle.size(); ++n) {
+      const bool swage =
+          k.bodies.tool_body[i] == m.needles.needle[n].body && (i == 0 || k.bodies.tool_body[i - 1] != k.bodies.tool_body[i]);
+      const uint32_t node = s.needle[n].thread_node;
+      if (!swage || node == wall::kNone || node == 0) continue;
+      const uint32_t last = (some_asleep ? awake.part_node[node] : node);
+      if (last == wall::kNone || last == 0) continue;
+      thread::ToolCapsule& tool = k.bodies.tool[i];
+      tool.own_last = last - 1;
+      float length = t.rest[last - 1];
+      for (tool.own_first = last - 1; tool.own_first > 0 && length < kOwnThread; --tool.own_first)
+        length += t.rest[tool.own_first - 1];
+    }
   thread::Surroundings around;
   around.plane = hands.plane;
-  around.tools = k.bodies.tool, around.soft = &soft, around.soft_contacts = k.contact;
+  around.tools = k.bodies.tool, around.bodies = k.bodies.loose, around.soft = &soft, around.soft_contacts = k.contact;
   around.holds = k.holds, around.pulls = hands.pulls;
+  SlidNodes slid{m, s, k, some_asleep};
+  around.soft_surface = {&slid, find_again};
   if (some_asleep) {
     show_awake(k.holds, hands.pulls, k.contact, awake);
     around.holds = awake.hold, around.pulls = awake.pull;

@@ -16,7 +16,10 @@ namespace {
 
 Four motion(const Scratch& s, const Active& c) {
   const Four* u = s.contact_u.data();
-  return (u[c.i] * c.wi0 + u[c.i + 1] * c.wi1) + (u[c.j] * c.wj0 + u[c.j + 1] * c.wj1) - c.partner;
+  const Four moved = (u[c.i] * c.wi0 + u[c.i + 1] * c.wi1) + (u[c.j] * c.wj0 + u[c.j + 1] * c.wj1) - c.partner;
+  if (c.body == ToolCapsule::kNoBody) return moved;
+  const Scratch::MovedBody& b = s.body[c.body];
+  return moved - four((b.moved - b.moved_before) + cross(b.turned - b.turned_before, c.arm));
 }
 
 void apply(Scratch& s, const Active& c, Four impulse) {
@@ -25,6 +28,30 @@ void apply(Scratch& s, const Active& c, Four impulse) {
   u[c.i + 1] += impulse * c.mi1;
   u[c.j] += impulse * c.mj0;
   u[c.j + 1] += impulse * c.mj1;
+  if (c.body == ToolCapsule::kNoBody) return;
+  Scratch::MovedBody& b = s.body[c.body];
+  const Vec3 p = three(impulse), q = cross(c.arm, p);
+  b.moved -= p * b.per_impulse, b.turned -= q * b.per_twist;
+  b.impulse -= p, b.twist -= q;
+}
+
+// What the thread has done to the bodies of tools since the last substep moves their capsules.
+void move_tools(Scratch& s, Surroundings& around, float time) {
+  for (size_t k = 0; k < around.tools.size(); ++k) {
+    ToolCapsule& tool = around.tools[k];
+    if (tool.body == ToolCapsule::kNoBody) continue;
+    const Scratch::MovedBody& b = s.body[tool.body];
+    const Vec3 moved = b.moved - b.moved_before, turned = b.turned - b.turned_before;
+    const auto by = [&](Vec3 from, Vec3 to) { return moved + cross(turned, lerp(from, to, time) - b.center); };
+    const Vec3 at_a = by(tool.a, tool.to_a), at_b = by(tool.b, tool.to_b);
+    tool.a += at_a, tool.to_a += at_a, tool.b += at_b, tool.to_b += at_b;
+    s.pushed[k] = std::sqrt(std::max(length2(at_a), length2(at_b)));
+  }
+  for (size_t k = 0; k < s.body.size(); ++k) {
+    Scratch::MovedBody& b = s.body[k];
+    b.moved_before = b.moved, b.turned_before = b.turned;
+    b.center = lerp(around.bodies[k].center, around.bodies[k].to_center, time) + b.moved;
+  }
 }
 
 void load_motion(Scratch& s) {
@@ -89,9 +116,13 @@ float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& 
     p = (four_at(state.x, i) - four(base)) + four_at(state.fine, i) + four_at(s.u, i);
     b = four(lerp(tool.b, tool.to_b, time) - base);
     if (dot(b, b) < 1e-12f) b = Four{1e-6f, 0, 0, 0};
-    surface = tool.radius + 0.5f * d;
+    surface = 0.5f * d;  // and the radius where it touches
   }
   closest_points(p, a, b, c.s, c.t);
+  if (other >= kTool) {
+    const ToolCapsule& tool = around.tools[other - kTool];
+    surface += tool.radius + tool.widens * c.t;
+  }
   const Four apart = p + a * c.s - b * c.t;
   float far = std::sqrt(dot(apart, apart));
   Four normal = four(c.normal);
@@ -100,8 +131,10 @@ float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& 
     c.touch = Touch::apart;
   } else if (far > 1e-9f) {
     Four n = apart * (1 / far);
-    // At a distance below one diameter a normal cannot reverse within one substep: the strands have passed into each other.
-    if (other < kTool && far < d && dot(n, normal) < -0.3f) n = -n, far = -far;
+    // Of two that overlap a normal cannot reverse within one substep: they have passed into each other. A tool in a hand is left
+    // out: jaws are put on thread, or closed on it.
+    const bool both_yield = other < kTool || around.tools[other - kTool].body != ToolCapsule::kNoBody;
+    if (both_yield && far < surface && dot(n, normal) < -0.3f) n = -n, far = -far;
     normal = n;
   }
   c.normal = three(normal);
@@ -132,6 +165,14 @@ float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& 
     active.mu = around.tools[other - kTool].friction;
     active.most = around.tools[other - kTool].press * h2;
     active.partner = four(lerp(s.tool_move[2 * (other - kTool)], s.tool_move[2 * (other - kTool) + 1], c.t));
+    active.body = around.tools[other - kTool].body;
+    if (active.body != ToolCapsule::kNoBody) {
+      const Scratch::MovedBody& tool_body = s.body[active.body];
+      const ToolCapsule& tool = around.tools[other - kTool];
+      active.arm = lerp(lerp(tool.a, tool.to_a, time), lerp(tool.b, tool.to_b, time), c.t) + c.normal * (surface - 0.5f * d) -
+                   tool_body.center;
+      w += tool_body.per_impulse + length2(active.arm) * tool_body.per_twist;
+    }
   }
   active.mu *= arc;
   for (uint32_t node : {i, i + 1, j, j + 1}) use_node(s, node);
@@ -156,8 +197,30 @@ CATGUT_CLONES void spend(size_t pairs, uint32_t tools_at, const uint32_t* __rest
 
 }  // namespace
 
+void begin_bodies(const Settings& settings, Scratch& s, const Surroundings& around) {
+  s.body.assign(around.bodies.size(), {});
+  for (size_t k = 0; k < s.body.size(); ++k) {
+    s.body[k].per_impulse = around.bodies[k].inv_mass * static_cast<float>(settings.substeps);
+    s.body[k].per_twist = around.bodies[k].inv_inertia * static_cast<float>(settings.substeps);
+    s.body[k].center = around.bodies[k].center;
+  }
+  std::fill_n(s.pushed.begin(), around.tools.size(), 0.0f);
+}
+
+void end_bodies(const Settings& settings, State& state, Scratch& s, Surroundings& around) {
+  if (s.body.empty()) return;
+  move_tools(s, around, 1);
+  state.travel += *std::max_element(s.pushed.begin(), s.pushed.begin() + static_cast<std::ptrdiff_t>(around.tools.size()));
+  for (size_t k = 0; k < s.body.size(); ++k) {
+    ToolBody& body = around.bodies[k];
+    body.impulse = s.body[k].impulse / settings.substep, body.twist = s.body[k].twist / settings.substep;
+    body.moved = s.body[k].moved, body.turned = s.body[k].turned;
+  }
+}
+
 void begin_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around, float time) {
   s.active.clear(), s.contact_node.clear();
+  if (!s.body.empty()) move_tools(s, around, time);
   float* moved = s.segment_move.data();
   const size_t pairs = state.key.size();
   const uint32_t tools_at = static_cast<uint32_t>(s.max_nodes);
@@ -165,7 +228,7 @@ void begin_contacts(const Settings& settings, State& state, Scratch& s, Surround
     const float part = 1.0f / static_cast<float>(settings.substeps);
     s.tool_move[2 * k] = (around.tools[k].to_a - around.tools[k].a) * part;
     s.tool_move[2 * k + 1] = (around.tools[k].to_b - around.tools[k].b) * part;
-    moved[tools_at + k] = std::sqrt(std::max(length2(s.tool_move[2 * k]), length2(s.tool_move[2 * k + 1])));
+    moved[tools_at + k] = std::sqrt(std::max(length2(s.tool_move[2 * k]), length2(s.tool_move[2 * k + 1]))) + s.pushed[k];
   }
   spend(pairs, tools_at, state.key.data(), moved, state.budget.data());
   for (size_t k = 0; k < pairs; ++k)

@@ -62,6 +62,8 @@ struct Active {
   float level = 0;            // gap - normal . motion, at the moment of the geometry
   float ln = 0, most = 1e9f;  // [N.s2] normal impulse, and its maximum
   uint32_t crossing = 0;      // index in State
+  uint32_t body = ToolCapsule::kNoBody;
+  Vec3 arm;  // [m] from the body's center
   bool slipped = false;
 };
 
@@ -96,7 +98,7 @@ inline Vec3 new_drift(const Settings& settings, const AnyActive& c, Vec3 drift, 
 
 constexpr uint8_t kOnOther = 1, kOnThread = 2;  // bits of Scratch::touched: with load on a tool, plane, wall; on thread
 
-constexpr size_t kMaxTools = 192;  // of one step
+constexpr size_t kMaxTools = 256;  // of one step
 
 struct Scratch {
   size_t max_nodes = 0, max_crossings = 0;
@@ -154,6 +156,21 @@ struct Scratch {
     uint32_t contact = 0;
   };
   std::vector<SoftActive> soft_active;
+  // Bodies of tools: where the thread has moved them, and had at the beginning of the substep; the same per impulse.
+  struct MovedBody {
+    Vec3 moved, turned, moved_before, turned_before;
+    Vec3 center;                           // [m] at the end of the substep
+    float per_impulse = 0, per_twist = 0;  // [1/kg] and [1/(kg m2)], times step / substep
+    Vec3 impulse, twist;                   // sums of multipliers
+  };
+  std::vector<MovedBody> body;
+  std::vector<float> pushed;    // [m] per tool: by the thread in the last substep
+  std::vector<Vec3> soft_seen;  // [m] per contact: from its point to its node when the plane was found
+  struct Carried {
+    uint32_t node = 0;
+    Vec3 by;  // [m]
+  };
+  std::vector<Carried> carried;
 };
 
 inline float clamp01(float v) { return v < 0 ? 0 : v > 1 ? 1 : v; }
@@ -201,7 +218,11 @@ void apply_corners(const State& state, Scratch& s, SoftPoints& soft, float subst
 void push_soft(Scratch& s, SoftPoints& soft, uint32_t point, Vec3 multiplier, float substep);
 
 // soft_contact.cpp
+void see_soft_contacts(const State& state, Scratch& s, const Surroundings& around);  // of a step
 void begin_soft_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around);
+// Round the limit of motion: fast nodes that bear on a tool or on something soft move with it, and the limit is for the rest.
+void begin_carrying(Scratch& s, float limit);
+void end_carrying(Scratch& s);
 void sweep_soft_contacts(Scratch& s, SoftPoints& soft, float substep, bool backward);
 void end_soft_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around);
 
@@ -210,6 +231,8 @@ void add_bending(const Settings& settings, const State& state, Scratch& s);
 
 // contact.cpp
 // Finds contacts at the predicted positions and applies their impulses of the last substep.
+void begin_bodies(const Settings& settings, Scratch& s, const Surroundings& around);        // of a step
+void end_bodies(const Settings& settings, State& state, Scratch& s, Surroundings& around);  // of a step
 void begin_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around, float time);
 void sweep_contacts(const Settings& settings, State& state, Scratch& s, const Surroundings& around, bool backward);
 void end_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around);

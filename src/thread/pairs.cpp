@@ -69,7 +69,7 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
   std::fill_n(s.block_tools.begin(), blocks, std::array<uint64_t, kMaxTools / 64>{});
   for (size_t k = 0; k < tools.size(); ++k) {
     const Vec3 from = lerp(tools[k].a, tools[k].to_a, time), along = lerp(tools[k].b, tools[k].to_b, time) - from;
-    const float size2 = std::max(length2(along), 1e-12f), far = tools[k].radius + reach;
+    const float size2 = std::max(length2(along), 1e-12f), far = tools[k].radius + std::max(0.0f, tools[k].widens) + reach;
     for (size_t b = 0; b < blocks; ++b) {
       const Vec3 off = s.block_middle[b] - from;
       const float r = 1.001f * (far + s.block_radius[b]);
@@ -111,8 +111,9 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
       for (uint64_t left = tools_here[word]; left != 0; left &= left - 1) {
         const size_t k = 64 * word + static_cast<size_t>(std::countr_zero(left));
         const ToolCapsule& tool = tools[k];
+        if (i >= tool.own_first && i <= tool.own_last) continue;
         const Vec3 ta = lerp(tool.a, tool.to_a, time), tb = lerp(tool.b, tool.to_b, time);
-        const float far = tool.radius + 0.5f * settings.material.diameter + settings.list_margin;
+        const float far = tool.radius + std::max(0.0f, tool.widens) + 0.5f * settings.material.diameter + settings.list_margin;
         const Vec3 p = state.position(i) - ta, c = tb - ta;
         float u, v;
         closest_points(p, a, length2(c) > 1e-12f ? c : Vec3{1e-6f, 0, 0}, u, v);

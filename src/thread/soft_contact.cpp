@@ -10,7 +10,8 @@
 namespace catgut::thread {
 namespace {
 
-constexpr float kPushOut = 0.2f;  // [m/s]
+constexpr float kPushOut = 0.2f;   // [m/s]
+constexpr float kSlid = 0.15e-3f;  // [m] past its plane's foot, beyond which a node gets another plane: half a thread
 
 Four motion(const Scratch& s, const Scratch::SoftActive& c) {
   return Four{s.u.x[c.node], s.u.y[c.node], s.u.z[c.node], 0} - four(s.soft_moved.at(c.point) - s.soft_before.at(c.point));
@@ -29,6 +30,12 @@ void begin_soft_contacts(const Settings& settings, State& state, Scratch& s, Sur
   const size_t n = s.soft_points;
   for (uint32_t k = 0; k < around.soft_contacts.size(); ++k) {
     SoftContact& c = around.soft_contacts[k];
+    const Vec3 place =
+        (state.x.at(c.node) - soft.at[c.point]) + state.fine.at(c.node) + (s.u.at(c.node) - s.soft_moved.at(c.point));
+    if (around.soft_surface.find && length2(place - s.soft_seen[k]) > kSlid * kSlid) {
+      around.soft_surface.find(around.soft_surface.context, around.soft_contacts, k, soft.at[c.point] + place);
+      s.soft_seen[k] = place;
+    }
     const Vec3 from = ((state.x.at(c.node) - soft.at[c.point]) - c.offset + state.fine.at(c.node)) +
                       (s.u.at(c.node) - s.soft_moved.at(c.point));
     const float gap = dot(c.normal, from) - 0.5f * settings.material.diameter;
@@ -50,6 +57,34 @@ void begin_soft_contacts(const Settings& settings, State& state, Scratch& s, Sur
     s.soft_active.push_back(a);
   }
   for (const Scratch::SoftActive& a : s.soft_active) apply(s, *around.soft, a, a.normal * a.ln + a.lt, settings.substep);
+}
+
+void see_soft_contacts(const State& state, Scratch& s, const Surroundings& around) {
+  if (!around.soft) return;
+  s.soft_seen.resize(around.soft_contacts.size());
+  for (size_t k = 0; k < s.soft_seen.size(); ++k) {
+    const SoftContact& c = around.soft_contacts[k];
+    s.soft_seen[k] = (state.x.at(c.node) - around.soft->at[c.point]) + state.fine.at(c.node);
+  }
+}
+
+void begin_carrying(Scratch& s, float limit) {
+  s.carried.clear();
+  const auto carry = [&](uint32_t node, Vec3 by) {
+    if (length2(s.u.at(node)) <= limit * limit) return;
+    for (const Scratch::Carried& c : s.carried)
+      if (c.node == node) return;
+    s.carried.push_back({node, by});
+    s.u.add(node, -by);
+  };
+  for (const Scratch::SoftActive& a : s.soft_active)
+    if (a.ln > 0) carry(a.node, s.soft_moved.at(a.point) - s.soft_before.at(a.point));
+  for (const Active& a : s.active)
+    if (a.ln > 0 && a.i == a.j) carry(a.i, three(a.partner)), carry(a.i + 1, three(a.partner));
+}
+
+void end_carrying(Scratch& s) {
+  for (const Scratch::Carried& c : s.carried) s.u.add(c.node, c.by), s.move[c.node] = length(s.u.at(c.node));
 }
 
 void sweep_soft_contacts(Scratch& s, SoftPoints& soft, float substep, bool backward) {

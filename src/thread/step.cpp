@@ -255,9 +255,10 @@ Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_un
   s.new_key.reserve(max_crossings), s.new_budget.reserve(max_crossings), s.new_crossing.reserve(max_crossings);
   s.block_middle.resize(max_nodes / 8 + 2), s.block_radius.resize(max_nodes / 8 + 2);
   s.block_tools.resize(max_nodes / 8 + 2), s.near_block.resize(max_nodes / 8 + 2);
-  s.tool_move.resize(2 * kMaxTools);
+  s.tool_move.resize(2 * kMaxTools), s.pushed.resize(kMaxTools), s.body.reserve(kMaxTools);
   s.spike_right.resize(max_nodes), s.spike_left.resize(max_nodes);
   s.soft_moved.resize(kMaxSoftPoints), s.soft_before.resize(kMaxSoftPoints), s.soft_active.reserve(2 * kMaxSoftPoints);
+  s.soft_seen.reserve(2 * kMaxSoftPoints), s.carried.reserve(max_nodes);
   s.corner.reserve(kMaxEyelets), s.reduced.resize(kMaxEyelets * kMaxEyelets), s.right.resize(kMaxEyelets);
 }
 Stepper::~Stepper() = default;
@@ -275,6 +276,8 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
   if (around.plane) around.plane->force = {};
   begin_step(settings, state, s);
   begin_eyelets(settings, state, s, around);
+  begin_bodies(settings, s, around);
+  see_soft_contacts(state, s, around);
 
   std::fill_n(s.segment_move.data(), m, 0.0f);
   for (int sub = 0; sub < settings.substeps; ++sub) {
@@ -311,11 +314,14 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
     end_contacts(settings, state, s, around);
     end_soft_contacts(settings, state, s, around);
 
+    begin_carrying(s, limit);
     limit_motion(n, limit, s.u.x.data(), s.u.y.data(), s.u.z.data(), s.move.data());
+    end_carrying(s);
     record_hold_forces(settings, state, s, around.holds, sub);
     record(m, s.lambda.data(), s.move.data(), s.tension_sum.data(), s.segment_move.data());
     float tools_move = 0;
-    for (size_t k = 0; k < 2 * around.tools.size(); ++k) tools_move = std::max(tools_move, length(s.tool_move[k]));
+    for (size_t k = 0; k < 2 * around.tools.size(); ++k)
+      tools_move = std::max(tools_move, length(s.tool_move[k]) + s.pushed[k / 2]);
     state.travel += tools_move;
     move(n, keep, s.u.x.data(), state.x.x.data(), state.fine.x.data(), state.v.x.data());
     move(n, keep, s.u.y.data(), state.x.y.data(), state.fine.y.data(), state.v.y.data());
@@ -328,10 +334,12 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
     for (const Eyelet& e : state.eyelet) s.keep[e.segment] = state.broken[e.segment] ? 0.0f : 1.0f;
     warm_masses(settings, state, s);
   }
+  end_bodies(settings, state, s, around);
   // The budgets after the last substep's motion: nothing of a step remains in the work space.
   for (size_t k = 0; k < state.key.size(); ++k) {
     const uint32_t other = partner_of(state.key[k]);
-    state.budget[k] -= s.segment_move[segment_of(state.key[k])] + (other < kTool ? s.segment_move[other] : 0.0f);
+    state.budget[k] -=
+        s.segment_move[segment_of(state.key[k])] + (other < kTool ? s.segment_move[other] : s.pushed[other - kTool]);
   }
   if (around.soft)
     for (size_t i = 0; i < s.soft_points; ++i) around.soft->moved[i] = s.soft_moved.at(i);

@@ -136,14 +136,26 @@ struct Pull {
   uint32_t node = 0;
   Vec3 force;  // [N]
 };
+// A rigid body that tools are parts of and that the thread moves within the step. As with SoftPoints, an impulse displaces it
+// as if it acted for the whole step; its own motion is that of its capsules.
+struct ToolBody {
+  Vec3 center, to_center;               // [m] of mass, at the beginning and at the end of the step
+  float inv_mass = 0, inv_inertia = 0;  // [1/kg], [1/(kg m2)] the same about every axis
+  Vec3 impulse, twist;                  // [N s], [N m s] about the center, of the thread; written by step
+  Vec3 moved, turned;                   // [m], [rad] by the thread, at the end of the step; written by step
+};
 // Part of a tool: capsule about the segment a b. The points move linearly during a step.
 struct ToolCapsule {
-  Vec3 a, b;        // [m] at the beginning of the step
-  Vec3 to_a, to_b;  // at its end
-  float radius = 0;
+  static constexpr uint32_t kNoBody = 0xffffffff;
+  Vec3 a, b;         // [m] at the beginning of the step; step adds to all four what the thread does to its body
+  Vec3 to_a, to_b;   // at its end
+  float radius = 0;  // [m] at a
   float friction = 0.15f;
-  Vec3 force_a, force_b;  // [N] of the thread on the tool, split over its ends; mean over the last step; written by step
-  float press = 20;       // [N] maximum on a segment: thread wedged between two rigid tools yields
+  Vec3 force_a, force_b;    // [N] of the thread on the tool, split over its ends; mean over the last step; written by step
+  float press = 20;         // [N] maximum on a segment: thread wedged between two rigid tools yields
+  float widens = 0;         // [m] by which the radius at b is larger
+  uint32_t body = kNoBody;  // in Surroundings::bodies; none: nothing that the thread does moves it
+  uint32_t own_first = 1, own_last = 0;  // segments that begin in this part and have no contact with it
 };
 struct Plane {
   Vec3 normal{0, 1, 0};
@@ -180,13 +192,21 @@ struct SoftContact {
   Vec3 friction_impulse, drift;
   float gap = 0;  // [m] at the end of the step; written by step
 };
+// Finds the plane of a contact again for a node that has slid far within the step. `node`: where it is [m], in the soft thing
+// as it was at the beginning of the step. Writes the contact's normal, offset and patch, or leaves them.
+struct SoftSurface {
+  void* context = nullptr;
+  void (*find)(void* context, std::span<SoftContact> contacts, size_t contact, Vec3 node) = nullptr;
+};
 struct Surroundings {
   std::span<Hold> holds;
   std::span<const Pull> pulls;
   std::span<ToolCapsule> tools;  // the same ones in the same order at every step: contacts remember the index
+  std::span<ToolBody> bodies;    // of the tools
   Plane* plane = nullptr;
   SoftPoints* soft = nullptr;  // of State::eyelet and of the contacts
   std::span<SoftContact> soft_contacts;
+  SoftSurface soft_surface;  // none: planes stay for the whole step
 };
 
 struct Scratch;  // work space of a step; nothing in it outlives the step
