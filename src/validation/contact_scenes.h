@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// validation: a tube of bowel, open at one end, with a tool in a hand, a free needle and a thread across it. Random events.
+// validation: a body of tissue with a tool in a hand, a free needle and a thread across it, and random events. What happens is
+// judged from outside: from positions, the drawn outline of the bodies and the wall's faces.
 #pragma once
 #include <functional>
 #include <memory>
@@ -11,6 +12,16 @@
 
 namespace catgut::validation {
 
+// tube: one open bowel end. ends: two of them face to face. pads: two lips of skin. tubes: one tube within the other, as after
+// a prolapse was cut. bowel: with haustra, from the generator. organ: a bent pouch, imported from a mesh file.
+enum class ContactBody : uint8_t { tube, ends, pads, tubes, bowel, organ };
+constexpr int kContactBodies = 6;
+const char* name_of(ContactBody body);
+
+// Pairs that may overlap.
+enum ContactPair : uint8_t { tool_wall, needle_wall, thread_wall, tool_needle, tool_thread, needle_thread, kContactPairs };
+const char* name_of(ContactPair pair);
+
 struct ContactBench {
   physical::Model model;
   physical::State state, rest;
@@ -18,27 +29,46 @@ struct ContactBench {
   Jobs jobs{1};
   std::vector<physical::HandTarget> target;  // tool, needle
   std::vector<thread::Pull> pull;
+  std::vector<thread::Hold> hold;
   std::function<void()> watch;  // called after each step
   Random random;
   uint64_t seed = 0;
   int events = 0;
-  // Of the last event, per tool, needle and thread: overlap [m]; crossings of the wall's middle, at every fourth step.
-  float deepest[3] = {};
-  int passed[3] = {};
+  // Of the last event: overlap [m]; how often one was seen through the other.
+  float deepest[kContactPairs] = {};
+  int passed[kContactPairs] = {};
   int folded = 0;                    // spheres on faces that are folded upon themselves
   float fastest = 0, strongest = 0;  // [m/s] of a body, [N] on a body, over all events
-  explicit ContactBench(uint64_t s);
+  float tightest = 0;                // [N] of the thread
+  explicit ContactBench(uint64_t s, ContactBody body = ContactBody::tube);
   // 80 ms: the tool pushes and perhaps drags, the needle falls or is thrown, the thread's ends are pulled.
   void event(float max_force, float max_speed);
 
  private:
+  struct Bounds {              // of the faces
+    std::vector<Vec3> center;  // [m]
+    std::vector<float> radius;
+  };
+  struct Sphere {
+    Vec3 at;
+    float radius;
+  };
   Vec3 direction();
-  // The tool at this pose touches neither the needle nor the thread, as it is and as it was at rest.
-  bool clear(const Pose& tool, float opening) const;
+  void bound(const wall::State& ws, Bounds& bounds) const;
+  bool passes_wall(const wall::State& ws, const Bounds& bounds, Vec3 p, Vec3 q) const;
+  float wall_overlap(const wall::State& ws, const Bounds& bounds, Vec3 p, float r);
+  // The tool at this pose touches neither wall, needle nor thread, as they are and as they were at rest.
+  bool clear(const Pose& tool, float opening);
+  void forget();
   void step();
   void look();
-  std::vector<Vec3> center;  // [m] per face
-  std::vector<float> radius;
+  Bounds now, at_rest;
+  Vec3 low, high, middle;      // [m] of the wall at rest, of its free part
+  std::vector<uint32_t> free;  // faces that nothing holds
 };
+
+// Two strands hooked into each other, each a bight of 15 mm, pulled apart at random: with up to `max_force` [N] or at up to
+// `max_speed` [m/s]. Returns how often a segment passed through another; nearest: of both strands' centerlines, in diameters.
+int pull_hooked_bights(uint64_t seed, float max_force, float max_speed, float& nearest);
 
 }  // namespace catgut::validation
