@@ -23,7 +23,6 @@ using thread::ToolCapsule;
 constexpr float kTick = 1e-3f;       // [s]
 constexpr float kStrandAt = 20e-3f;  // [m] of the shaft, from the tip: above the wound
 constexpr float kWindAt = 10e-3f;    // [m] of the shaft: plane of the winding hand, nearer the tip than the strand
-constexpr float kHeld = 1.6e-3f;     // [m] a strand leaves the forceps this far in front of its tip
 constexpr float kGrip = 1.5e-3f;     // [m] and lies this far behind the tips of the needle holder
 constexpr float kOpen = 0.10f;       // [rad] each jaw, to take the tail
 constexpr float kClosed = -0.015f;   // [rad] on a thread, which lies between the two rods of each jaw
@@ -191,7 +190,7 @@ class Tying {
   Vec3 forceps() const { return {std::cos(forceps_angle_), std::sin(forceps_angle_), 0}; }
   void place_tools() {
     place_holder(tip_, shaft_, opening_, tool_);
-    tool_[kHolderParts].to_a = hand_ + forceps() * kHeld, tool_[kHolderParts].to_b = hand_ + forceps() * 80e-3f;
+    tool_[kHolderParts].to_a = hand_ + forceps() * kForcepsReach, tool_[kHolderParts].to_b = hand_ + forceps() * 80e-3f;
   }
 
   void tick(const std::string& phase) {

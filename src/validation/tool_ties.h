@@ -44,7 +44,9 @@ struct TiedKnot {
   int rewound = 0;     // turns wound again because one had slid off the jaws
 };
 
-// `each_tick`, if given, receives every state and the tools (for pictures).
+// `each_tick`, if given, receives every state and the tools (for pictures): capsules of the needle holder, then the forceps,
+// whose to_a is kForcepsReach behind the strand that it holds, then the rod.
+constexpr float kForcepsReach = 1.6e-3f;  // [m]
 using TieWatcher =
     std::function<void(const thread::State&, std::span<const thread::ToolCapsule>, double time, const std::string& phase)>;
 TiedKnot tie_with_tools(const thread::Settings& settings, const Tie& tie, const TieSettings& how,
