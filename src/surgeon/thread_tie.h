@@ -5,6 +5,9 @@
 // and tail show before he pulls and after. If one is missing, he lays the tail again and winds again, up to kAgain times. Reads
 // Snapshots; moves two scripted hands.
 //
+// A first throw opens while the second one is wound, and the second one, pulled by both hands, jams above the slack loop.
+// `slide`: the strand alone is pulled, as of a slip knot. It straightens, and the tail's turns slide down along it.
+//
 // x along the stitch, y up, z toward the viewer. `side` +1: the long strand is on the right, and the needle holder comes from
 // there. The sides alternate from throw to throw; winding in the same sense then makes a square knot.
 #pragma once
@@ -21,6 +24,7 @@ namespace catgut {
 struct ThreadTieSettings {
   float speed = 0.15f;  // [m/s] maximum of the hands
   float pull = 2.5f;    // [N] with which both strands are pulled tight
+  bool slide = false;   // the first two throws slide down the strand before the third locks them: nothing holds the edges
   bool flat = false;    // the tissue round the stitch is flat: the tail lies on it and hangs down nowhere
 };
 
@@ -35,7 +39,7 @@ class ThreadTie {
   // Every tick, until it returns true.
   bool operate(const Snapshot& seen, float dt);
   bool failed() const { return failed_; }
-  bool keeping() const { return stage_ == hold; }
+  bool keeping() const { return stage_ == hold || stage_ == set; }
   void let_go() { keep_ = false; }
   int retries() const { return retries_; }  // throws wound again so far
   std::string doing() const;
@@ -58,6 +62,8 @@ class ThreadTie {
     draw,
     cross_up,
     cross_down,
+    slide,
+    set,
     pull,
     hold,
     lay,
