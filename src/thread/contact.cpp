@@ -131,8 +131,8 @@ float look_at(const Settings& settings, State& state, Scratch& s, Surroundings& 
     c.touch = Touch::apart;
   } else if (far > 1e-9f) {
     Four n = apart * (1 / far);
-    // Of two that overlap a normal cannot reverse within one substep: they have passed into each other. A tool in a hand is left
-    // out: jaws are put on thread, or closed on it.
+    // Of two that overlap a normal cannot reverse within one substep: they have passed into each other. A tool in a hand is
+    // left out: jaws are put on thread, or closed on it.
     const bool both_yield = other < kTool || around.tools[other - kTool].body != ToolCapsule::kNoBody;
     if (both_yield && far < surface && dot(n, normal) < -0.3f) n = -n, far = -far;
     normal = n;
