@@ -11,11 +11,15 @@
 namespace catgut::thread {
 namespace {
 
-CATGUT_CLONES void moments(size_t nodes, float stiffness, const float* __restrict e, const float* __restrict rest,
-                           const float* __restrict inverse, const float* __restrict keep, float* __restrict moment) {
+CATGUT_CLONES void hinges(size_t nodes, float stiffness, const float* __restrict rest, const float* __restrict keep,
+                          float* __restrict hinge) {
+  for (size_t i = 1; i + 1 < nodes; ++i) hinge[i] = keep[i] * keep[i - 1] * 2 * stiffness / (rest[i] + rest[i - 1]);
+}
+CATGUT_CLONES void moments(size_t nodes, const float* __restrict hinge, const float* __restrict e,
+                           const float* __restrict inverse, float* __restrict moment) {
   for (size_t i = 1; i + 1 < nodes; ++i) {
     const float bend = e[i] * inverse[i] - e[i - 1] * inverse[i - 1];
-    moment[i] = keep[i] * keep[i - 1] * 2 * stiffness / (rest[i] + rest[i - 1]) * bend;
+    moment[i] = hinge[i] * bend;
   }
 }
 
@@ -28,14 +32,17 @@ CATGUT_CLONES void forces(size_t nodes, const float* __restrict moment, const fl
 
 }  // namespace
 
-void add_bending(const Settings& settings, const State& state, Scratch& s) {
+void begin_bending(const Settings& settings, const State& state, Scratch& s) {
+  hinges(state.nodes(), settings.material.bending_stiffness, s.rest.data(), s.keep.data(), s.hinge.data());
+}
+
+void add_bending(const State& state, Scratch& s) {
   const size_t nodes = state.nodes();
-  const float b = settings.material.bending_stiffness;
-  const float *rest = s.rest.data(), *inverse = s.inverse_rest.data(), *keep = s.keep.data();
+  const float* inverse = s.inverse_rest.data();
   for (auto [e, moment, f] : {std::tuple{&s.e.x, &s.moment.x, &s.force.x}, std::tuple{&s.e.y, &s.moment.y, &s.force.y},
                               std::tuple{&s.e.z, &s.moment.z, &s.force.z}}) {
     moment->operator[](nodes - 1) = moment->operator[](nodes) = 0;
-    moments(nodes, b, e->data(), rest, inverse, keep, moment->data());
+    moments(nodes, s.hinge.data(), e->data(), inverse, moment->data());
     // The corner in a hole is a hinge: bending spread over the nodes beside it would hold the thread wherever a node lies well.
     for (const Eyelet& eyelet : state.eyelet) moment->operator[](eyelet.segment) = moment->operator[](eyelet.segment + 1) = 0;
     forces(nodes, moment->data(), inverse, f->data());

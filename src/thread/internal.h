@@ -113,9 +113,24 @@ struct Scratch {
   Padded3 n;       // unit directions, of the stretch solve
   Padded3 moment;  // per node: B times curvature over length [N]
   Padded rest, inverse_rest, keep, alpha, lambda, step, residual, diag, off, tension_sum;
+  Padded hinge;         // per node: bending stiffness over length [N]; of the step
   Padded segment_move;  // [m] in the last substep; behind the segments, from max_nodes on, those of the tools
   LaneSystem lanes;
-  std::vector<Active> active;
+  // Contacts of the thread with itself and tools. Pairs under examination lie side by side; see contact.cpp.
+  struct Pairs {
+    static constexpr size_t kMost = 64;
+    std::array<uint32_t, kMost> index, first, second;  // in State; first nodes of both segments
+    Padded3 p, a, b, n;  // first node of the first segment from that of the second, both segments; direction between
+    Padded s, t, far;    // closest points, [m] between them
+  };
+  Pairs pairs;
+  Padded3 edge;              // per segment, at the predicted positions
+  Padded half_turn;          // per segment: half of the change of direction between its neighbors
+  bool knows_turns = false;  // of this substep
+  std::vector<Active> active_memory;
+  size_t actives = 0;
+  std::span<Active> active() { return {active_memory.data(), actives}; }
+  std::span<const Active> active() const { return {active_memory.data(), actives}; }
   std::vector<Four> contact_u;         // u of the nodes below, node by node
   std::vector<uint32_t> contact_node;  // nodes of active contacts, each once
   // Contact with the plane: nodes that may touch it, and columns over all nodes.
@@ -227,7 +242,8 @@ void sweep_soft_contacts(Scratch& s, SoftPoints& soft, float substep, bool backw
 void end_soft_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around);
 
 // bending.cpp
-void add_bending(const Settings& settings, const State& state, Scratch& s);
+void begin_bending(const Settings& settings, const State& state, Scratch& s);  // of a step
+void add_bending(const State& state, Scratch& s);
 
 // contact.cpp
 // Finds contacts at the predicted positions and applies their impulses of the last substep.

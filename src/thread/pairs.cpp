@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 #include "thread/internal.h"
@@ -14,13 +15,17 @@ namespace {
 
 constexpr size_t kBlock = 8;  // segments that share a bounding sphere
 
+CATGUT_CLONES void half_lengths(size_t segments, const float* __restrict x, const float* __restrict y,
+                                const float* __restrict z, float* __restrict half) {
+  for (size_t i = 0; i < segments; ++i) half[i] = 0.5f * std::sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+}
 CATGUT_CLONES void middles(size_t segments, const float* __restrict x, float* __restrict middle) {
   for (size_t i = 0; i < segments; ++i) middle[i] = 0.5f * (x[i] + x[i + 1]);
 }
 
-// Bit k: segment first + k has its midpoint within reach of p.
+// 1 for each segment with its midpoint within reach of p.
 CATGUT_CLONES void near_middles(const float* __restrict x, const float* __restrict y, const float* __restrict z,
-                                const float* __restrict half, Vec3 p, float reach, int* __restrict near) {
+                                const float* __restrict half, Vec3 p, float reach, uint8_t* __restrict near) {
   for (size_t k = 0; k < kBlock; ++k) {
     const float dx = x[k] - p.x, dy = y[k] - p.y, dz = z[k] - p.z, r = reach + half[k];
     near[k] = dx * dx + dy * dy + dz * dz < r * r;
@@ -42,7 +47,8 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
   middles(m, state.x.x.data(), s.middle.x.data());
   middles(m, state.x.y.data(), s.middle.y.data());
   middles(m, state.x.z.data(), s.middle.z.data());
-  for (size_t i = 0; i < m; ++i) s.half[i] = 0.5f * length(between(state, i + 1, i));
+  find_edges(state, s);
+  half_lengths(m, s.e.x.data(), s.e.y.data(), s.e.z.data(), s.half.data());
   for (size_t b = 0; b < blocks; ++b) {
     const size_t first = b * kBlock, end = std::min(m, first + kBlock);
     Vec3 center{};
@@ -76,7 +82,7 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
       if (length2(off - along * clamp01(dot(off, along) / size2)) < r * r) s.block_tools[b][k / 64] |= uint64_t{1} << k % 64;
     }
   }
-  int near[kBlock];
+  uint8_t near[kBlock];
   size_t near_blocks = 0;
   for (size_t i = 0; i < m; ++i) {
     // Blocks that any segment of this one's block can reach.
@@ -88,7 +94,7 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
       }
     }
     if (state.broken[i]) continue;
-    const Vec3 at = s.middle.at(i), a = between(state, i + 1, i);
+    const Vec3 at = s.middle.at(i), a = s.e.at(i);
     const float half = s.half[i];
     for (size_t n = 0; n < near_blocks; ++n) {
       const size_t b = s.near_block[n];
@@ -97,10 +103,13 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
       if (length2(s.block_middle[b] - at) > r * r) continue;
       const size_t first = b * kBlock;
       near_middles(&s.middle.x[first], &s.middle.y[first], &s.middle.z[first], &s.half[first], at, reach + half, near);
-      for (size_t k = 0; k < kBlock; ++k) {
-        const size_t j = first + k;
-        if (!near[k] || j <= i + skip || j >= m || state.broken[j]) continue;
-        const Vec3 p = between(state, i, j), c = between(state, j + 1, j);
+      uint64_t left;  // a byte for each
+      static_assert(sizeof left == kBlock && std::endian::native == std::endian::little);
+      std::memcpy(&left, near, sizeof left);
+      for (; left != 0; left &= left - 1) {
+        const size_t j = first + static_cast<size_t>(std::countr_zero(left)) / 8;
+        if (j <= i + skip || j >= m || state.broken[j]) continue;
+        const Vec3 p = between(state, i, j), c = s.e.at(j);
         float u, v;
         closest_points(p, a, c, u, v);
         if (length2(p + a * u - c * v) < reach * reach) keep(static_cast<uint32_t>(i << 16 | j));
@@ -120,9 +129,8 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
         if (length2(p + a * u - c * v) < far * far) keep(static_cast<uint32_t>(i << 16 | (kTool + k)));
       }
   }
-  state.key.assign(s.new_key.begin(), s.new_key.end());
-  state.budget.assign(s.new_budget.begin(), s.new_budget.end());
-  state.crossing.assign(s.new_crossing.begin(), s.new_crossing.end());
+  // All of them have the same capacity.
+  state.key.swap(s.new_key), state.budget.swap(s.new_budget), state.crossing.swap(s.new_crossing);
   for (auto [to, from] :
        {std::pair{&state.listed.x, &state.x.x}, std::pair{&state.listed.y, &state.x.y}, std::pair{&state.listed.z, &state.x.z}})
     to->assign(from->begin(), from->end());

@@ -79,7 +79,7 @@ void begin_carrying(Scratch& s, float limit) {
   };
   for (const Scratch::SoftActive& a : s.soft_active)
     if (a.ln > 0) carry(a.node, s.soft_moved.at(a.point) - s.soft_before.at(a.point));
-  for (const Active& a : s.active)
+  for (const Active& a : s.active())
     if (a.ln > 0 && a.i == a.j) carry(a.i, three(a.partner)), carry(a.i + 1, three(a.partner));
 }
 

@@ -13,7 +13,10 @@ namespace {
 
 CATGUT_CLONES void predict(size_t nodes, float h, float gravity, const float* __restrict v, const float* __restrict f,
                            const float* __restrict w, float* __restrict u) {
-  for (size_t i = 0; i < nodes; ++i) u[i] = w[i] > 0 ? h * (v[i] + h * (gravity + f[i] * w[i])) : 0.0f;
+  for (size_t i = 0; i < nodes; ++i) {
+    const float moves = h * (v[i] + h * (gravity + f[i] * w[i]));  // always: loads under a mask are slow
+    u[i] = w[i] > 0 ? moves : 0.0f;
+  }
 }
 
 CATGUT_CLONES void move(size_t nodes, float keep, const float* __restrict u, float* __restrict x, float* __restrict fine,
@@ -31,13 +34,16 @@ CATGUT_CLONES void move(size_t nodes, float keep, const float* __restrict u, flo
 // creeps (with the friction of the arc alone by up to 0.5 mm/s at 1 N, measured). Not on tools: thread that slides round them
 // would be braked.
 constexpr float kTouchDamping = 1600;  // [1/s]
-CATGUT_CLONES void calm(size_t nodes, float share, float touch_share, const uint8_t* __restrict touched,
-                        const float* __restrict mass, const float* __restrict w, const float* __restrict keep,
-                        float* __restrict flow, float* __restrict v) {
+CATGUT_CLONES void calming(size_t nodes, float share, float touch_share, const uint8_t* __restrict touched,
+                           const float* __restrict mass, const float* __restrict keep, float* __restrict exchange) {
   for (size_t i = 0; i + 1 < nodes; ++i) {
     const float both = touched[i] & touched[i + 1] & kOnThread ? touch_share : 0.0f;
-    flow[i] = keep[i] * (share + both) * (mass[i] < mass[i + 1] ? mass[i] : mass[i + 1]) * (v[i + 1] - v[i]);
+    exchange[i] = keep[i] * (share + both) * (mass[i] < mass[i + 1] ? mass[i] : mass[i + 1]);
   }
+}
+CATGUT_CLONES void calm(size_t nodes, const float* __restrict exchange, const float* __restrict w, float* __restrict flow,
+                        float* __restrict v) {
+  for (size_t i = 0; i + 1 < nodes; ++i) flow[i] = exchange[i] * (v[i + 1] - v[i]);
   for (size_t k = 0; k < nodes; ++k) v[k] += w[k] * (flow[k] - flow[static_cast<ptrdiff_t>(k) - 1]);
 }
 
@@ -67,9 +73,9 @@ float farthest(const State& s) {
 CATGUT_CLONES void limit_motion(size_t nodes, float limit, float* __restrict ux, float* __restrict uy, float* __restrict uz,
                                 float* __restrict moved) {
   for (size_t i = 0; i < nodes; ++i) {
-    const float size = std::sqrt(ux[i] * ux[i] + uy[i] * uy[i] + uz[i] * uz[i]);
-    const float part = size > limit ? limit / size : 1.0f;
-    ux[i] *= part, uy[i] *= part, uz[i] *= part;
+    const float x = ux[i], y = uy[i], z = uz[i], size = std::sqrt(x * x + y * y + z * z), shorter = limit / size;
+    const float part = shorter < 1 ? shorter : 1.0f;
+    ux[i] = x * part, uy[i] = y * part, uz[i] = z * part;
     moved[i] = size > limit ? limit : size;
   }
 }
@@ -160,7 +166,7 @@ void record_hold_forces(const Settings& settings, const State& state, const Scra
     Vec3 on_node = s.force.at(i) * part;
     if (i > 0) on_node += s.n.at(i - 1) * (s.lambda[i - 1] * per);
     if (i < state.segments()) on_node -= s.n.at(i) * (s.lambda[i] * per);
-    for (const Active& c : s.active) {
+    for (const Active& c : s.active()) {
       const Vec3 impulse = three(c.normal * c.ln + c.lt) * per;
       if (c.i == i) on_node += c.wi0 * impulse;
       if (c.i + 1 == i) on_node += c.wi1 * impulse;
@@ -181,13 +187,16 @@ struct Hasher {
   void operator()(const char*, uint32_t v) { hash = hash_bytes(&v, sizeof v, hash); }
 };
 
+CATGUT_CLONES void fade_warmth(size_t nodes, float fade, uint8_t* __restrict touched, float* __restrict warm) {
+  for (size_t i = 0; i < nodes; ++i) {
+    const float faded = warm[i] * fade, left = warm[i] > 1e-3f ? faded : 0.0f;
+    warm[i] = touched[i] ? 1.0f : left;
+  }
+}
 void warm_masses(const Settings& settings, State& state, Scratch& s) {
   const float fade = portable::exp(-settings.substep / settings.mass_decay);
-  const size_t n = state.nodes();
-  for (size_t i = 0; i < n; ++i) {
-    state.warm[i] = s.touched[i] ? 1.0f : state.warm[i] > 1e-3f ? state.warm[i] * fade : 0.0f;
-    s.touched[i] = 0;
-  }
+  fade_warmth(state.nodes(), fade, s.touched.data(), state.warm.data());
+  std::fill_n(s.touched.data(), state.nodes(), uint8_t{0});
 }
 
 // A mean tension above its strength breaks a segment: the one with the largest load relative to its strength. Contact bends it
@@ -243,15 +252,17 @@ uint64_t hash_state(const State& state) {
 Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_unique<Scratch>()) {
   Scratch& s = *scratch_;
   s.max_nodes = max_nodes, s.max_crossings = max_crossings;
-  for (Padded3* c : {&s.u, &s.force, &s.e, &s.n, &s.moment, &s.middle}) c->resize(max_nodes);
-  for (Padded* c :
-       {&s.mass, &s.w, &s.move, &s.rest, &s.inverse_rest, &s.keep, &s.alpha, &s.lambda, &s.step, &s.residual, &s.diag, &s.off,
-        &s.tension_sum, &s.half, &s.least_density, &s.span, &s.plane_level, &s.plane_inverse, &s.plane_slipped})
+  for (Padded3* c : {&s.u, &s.force, &s.e, &s.n, &s.moment, &s.middle, &s.edge}) c->resize(max_nodes);
+  for (Padded* c : {&s.mass,          &s.w,    &s.move,        &s.rest,          &s.inverse_rest,  &s.keep,        &s.alpha,
+                    &s.lambda,        &s.step, &s.residual,    &s.diag,          &s.off,           &s.tension_sum, &s.half,
+                    &s.least_density, &s.span, &s.plane_level, &s.plane_inverse, &s.plane_slipped, &s.half_turn,   &s.hinge})
     c->resize(max_nodes);
   s.segment_move.resize(max_nodes + kMaxTools);
+  for (Padded3* c : {&s.pairs.p, &s.pairs.a, &s.pairs.b, &s.pairs.n}) c->resize(Scratch::Pairs::kMost);
+  for (Padded* c : {&s.pairs.s, &s.pairs.t, &s.pairs.far}) c->resize(Scratch::Pairs::kMost);
   s.lanes.resize(max_nodes);
   s.contact_u.resize(max_nodes + 1), s.contact_node.reserve(max_nodes + 1);
-  s.active.reserve(max_crossings), s.touched.assign(max_nodes + 1, 0);
+  s.active_memory.resize(max_crossings), s.touched.assign(max_nodes + 8, 0);
   s.new_key.reserve(max_crossings), s.new_budget.reserve(max_crossings), s.new_crossing.reserve(max_crossings);
   s.block_middle.resize(max_nodes / 8 + 2), s.block_radius.resize(max_nodes / 8 + 2);
   s.block_tools.resize(max_nodes / 8 + 2), s.near_block.resize(max_nodes / 8 + 2);
@@ -275,6 +286,7 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
   for (ToolCapsule& tool : around.tools) tool.force_a = tool.force_b = {};
   if (around.plane) around.plane->force = {};
   begin_step(settings, state, s);
+  begin_bending(settings, state, s);
   begin_eyelets(settings, state, s, around);
   begin_bodies(settings, s, around);
   see_soft_contacts(state, s, around);
@@ -291,7 +303,7 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
     }
     find_edges(state, s);
     for (Padded* f : {&s.force.x, &s.force.y, &s.force.z}) std::fill_n(f->data(), n, 0.0f);
-    add_bending(settings, state, s);
+    add_bending(state, s);
     if (around.soft && settings.hole_grip > 0) grip_corners(settings, state, s, *around.soft);
     for (const Pull& pull : around.pulls) s.force.add(pull.node, pull.force);
     predict(n, h, settings.gravity.x, state.v.x.data(), s.force.x.data(), s.w.data(), s.u.x.data());
@@ -328,9 +340,8 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
     move(n, keep, s.u.z.data(), state.x.z.data(), state.fine.z.data(), state.v.z.data());
     // Across the corner in a hole the directions differ: an exchange would brake the thread that slides through.
     for (const Eyelet& e : state.eyelet) s.keep[e.segment] = 0;
-    for (Column* v : {&state.v.x, &state.v.y, &state.v.z})
-      calm(n, settings.inner_damping, kTouchDamping * h, s.touched.data(), s.mass.data(), s.w.data(), s.keep.data(),
-           s.step.data(), v->data());
+    calming(n, settings.inner_damping, kTouchDamping * h, s.touched.data(), s.mass.data(), s.keep.data(), s.residual.data());
+    for (Column* v : {&state.v.x, &state.v.y, &state.v.z}) calm(n, s.residual.data(), s.w.data(), s.step.data(), v->data());
     for (const Eyelet& e : state.eyelet) s.keep[e.segment] = state.broken[e.segment] ? 0.0f : 1.0f;
     warm_masses(settings, state, s);
   }

@@ -43,11 +43,15 @@ CATGUT_CLONES void residuals(size_t segments, const float* __restrict ex, const 
   }
 }
 
-CATGUT_CLONES void apply(size_t nodes, const float* __restrict nx, const float* __restrict step, const float* __restrict w,
-                         float* __restrict ux) {
-  for (size_t i = 0; i < nodes; ++i) {
-    const float before = nx[static_cast<ptrdiff_t>(i) - 1] * step[static_cast<ptrdiff_t>(i) - 1];
-    ux[i] += w[i] * (before - nx[i] * step[i]);
+// Moves the nodes by the multipliers' steps.
+CATGUT_CLONES void apply(size_t nodes, const float* __restrict nx, const float* __restrict ny, const float* __restrict nz,
+                         const float* __restrict step, const float* __restrict w, float* __restrict ux, float* __restrict uy,
+                         float* __restrict uz) {
+  for (size_t k = 0; k < nodes; ++k) {
+    const ptrdiff_t i = static_cast<ptrdiff_t>(k);
+    ux[i] += w[i] * (nx[i - 1] * step[i - 1] - nx[i] * step[i]);
+    uy[i] += w[i] * (ny[i - 1] * step[i - 1] - ny[i] * step[i]);
+    uz[i] += w[i] * (nz[i - 1] * step[i - 1] - nz[i] * step[i]);
   }
 }
 
@@ -212,9 +216,7 @@ void solve_stretch(const Settings& settings, const State& state, Scratch& s, Sof
   solve_tridiagonal(s, m, s.residual.data(), x);
   if (corners) solve_corners(state, s);
   accumulate(m, x, s.lambda.data());
-  apply(m + 1, s.n.x.data(), x, s.w.data(), s.u.x.data());
-  apply(m + 1, s.n.y.data(), x, s.w.data(), s.u.y.data());
-  apply(m + 1, s.n.z.data(), x, s.w.data(), s.u.z.data());
+  apply(m + 1, s.n.x.data(), s.n.y.data(), s.n.z.data(), x, s.w.data(), s.u.x.data(), s.u.y.data(), s.u.z.data());
   if (corners) apply_corners(state, s, *soft, settings.substep);
 }
 
