@@ -49,8 +49,9 @@ wall::Weights load_point(wall::Weights w, const wall::Motion& motion, Vec3 direc
   return w;
 }
 
-Foot outer_foot(const wall::Model& wm, const wall::State& ws, const Surface& surface, uint32_t patch, Vec3 p) {
-  Foot foot = nearest_on_patch(wm, ws, surface, patch, p);
+Foot outer_foot(const wall::Model& wm, const wall::State& ws, const Surface& surface, uint32_t patch, Vec3 p,
+                const Vec3* corner) {
+  Foot foot = nearest_on_patch(wm, ws, surface, patch, p, corner);
   const int side = surface.patch[patch].side;
   if (side == 0) return foot;
   wall::Weights w = wall::weights(wm, ws.topology, foot.point), mid = w;
@@ -126,7 +127,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     k.face_radius[f] = std::sqrt(radius2) + length(wall::vec3(ws.motion.x[2 * c.column[0] + 1])) * 1.2f;
   }
   if (search.box.size() < faces) search.box.resize(faces);
-  if (search.ball.size() < surface.patch.size()) search.ball.resize(surface.patch.size());
+  if (search.part.size() < surface.patch.size()) search.part.resize(surface.patch.size());
   // A box that is made here is not for later searches of the step: the wall's speed in it is that before the forces.
   const auto box_here = [&](uint32_t f) -> const FaceBox& {
     constexpr uint32_t kHere = 1u << 31;
@@ -241,8 +242,9 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
         const FaceBox& box = box_here(f);
         const float useful = 1.05f * std::max(reach, 0.9f * wm.laminate.thickness);
         for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
-          if (least_distance(wm, ws, surface, search, box, q, p) > useful) continue;
-          const Foot foot = outer_foot(wm, ws, surface, q, p);
+          if (least_distance(wm, ws, surface, search, box, q, p) > useful || least_of_part(surface, search, q, p) > useful)
+            continue;
+          const Foot foot = outer_foot(wm, ws, surface, q, p, corners_in(search, q));
           if (foot.gap - s.radius > margin || (foot.on_edge && foot.gap < 0)) continue;
           add(i, foot, p, s.radius, jaw_speed, 1);
         }
@@ -269,7 +271,9 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
         const float r = k.face_radius[f] + reach;
         if (length2(k.face_center[f] - middle) > r * r) continue;
         for (uint32_t q = strip; q < last; ++q) {
-          if (least_distance(wm, ws, surface, search, box_here(f), q, middle) > 1.001f * reach) continue;
+          if (least_distance(wm, ws, surface, search, box_here(f), q, middle) > 1.001f * reach ||
+              least_of_part(surface, search, q, middle) > 1.001f * reach)
+            continue;
           for (const float zeta : {-1.0f, 1.0f}) {
             const auto [ea, eb, up] = strip_ends(wm, ws, surface, q, zeta);
             float t = 0, u = 0;

@@ -203,7 +203,8 @@ struct BodiesScratch {
 wall::Weights load_point(wall::Weights w, const wall::Motion& motion, Vec3 direction);
 // As nearest_on_patch, for a sphere outside the wall: where a face is folded so sharply that its corners turn over, the
 // directors say which side is out.
-Foot outer_foot(const wall::Model& model, const wall::State& state, const Surface& surface, uint32_t patch, Vec3 p);
+Foot outer_foot(const wall::Model& model, const wall::State& state, const Surface& surface, uint32_t patch, Vec3 p,
+                const Vec3* corner = nullptr);
 // Positions.
 Vec3 local(const BodyModel& model, const BodySphere& sphere, float opening);  // [m] body frame
 inline Vec3 center_of(const BodyModel& model, const Body& body) { return transform(body.pose, model.center); }

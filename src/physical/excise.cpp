@@ -61,7 +61,7 @@ Foot nearest_foot(const Model& m, const State& s, Vec3 tip, float reach) {
     if (length2(tip - center) > r * r) continue;
     for (uint32_t q = surface.first_of_face[e]; q < surface.first_of_face[e + 1]; ++q) {
       const Patch& patch = surface.patch[q];
-      if (patch.part && ball_of(m.wall, s.wall, patch).least_distance(tip) > best.gap) continue;
+      if (patch.part && patch_box(m.wall, s.wall, patch).to_box(tip) > best.gap) continue;
       const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, tip);
       // A tip that has sunk into its own groove is still on the face that it came from.
       const float far = distance(foot.at, tip);

@@ -163,7 +163,8 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
     best.gap = 1e9f;
     float facing = -1, nearest_box = 1e9f;
     const auto look = [&](uint32_t patch) {
-      const Foot foot = nearest_on_patch(m.wall, s.wall, surface, patch, p);
+      if (least_of_part(surface, k.search, patch, p) > std::abs(best.gap) + 1e-6f) return;
+      const Foot foot = nearest_on_patch(m.wall, s.wall, surface, patch, p, corners_in(k.search, patch));
       // A node that was pressed to one side is never looked at from the other.
       if (memory && memory->normal_impulse > 0 && dot(foot.facing, memory->normal) < -0.2f) return;
       const float far = std::abs(foot.gap), front = dot(normalized(p - foot.at), foot.facing);
@@ -210,10 +211,12 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       if (least_distance(box, p, 0) > second.gap) continue;
       for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
         const int side = surface.patch[q].side;
+        const float useful = memory ? std::max(second.gap, d) : second.gap;  // in front of a face, or behind it in a fold
         if (q == best.patch || (side != 0 && dot(box.n, best.normal) * static_cast<float>(side) > 0.97f) ||
-            least_distance(m.wall, s.wall, surface, k.search, box, q, p) > second.gap)
+            least_distance(m.wall, s.wall, surface, k.search, box, q, p) > second.gap ||
+            least_of_part(surface, k.search, q, p) > useful + 1e-6f)
           continue;
-        const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p);
+        const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p, corners_in(k.search, q));
         // A little behind it, too, where the two faces make a fold: each lies before the other, or they meet at the foot.
         constexpr float kSame = 1e-6f;  // [m]
         const Vec3 between = foot.at - best.at;

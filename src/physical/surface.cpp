@@ -133,6 +133,18 @@ void add_fragment(const wall::Model& m, const wall::Topology& t, uint32_t elemen
     }
 }
 
+// Of a fragment's patch, in the order of wall::Patch.
+std::array<Vec3, 4> part_corners(const wall::State& s, const Corners& c, const Patch& patch) {
+  std::array<Vec3, 4> p{};
+  if (patch.side != 0) {
+    for (uint32_t k = 0; k < c.count(); ++k) p[k] = place_on(s, c, patch.at[k], static_cast<float>(patch.side));
+  } else {
+    p[0] = place_on(s, c, patch.at[0], -1), p[1] = place_on(s, c, patch.at[1], -1);
+    p[2] = place_on(s, c, patch.at[1], 1), p[3] = place_on(s, c, patch.at[0], 1);
+  }
+  return p;
+}
+
 // Nearest point of a patch, in its coordinates. Begins with the foot on a parallelogram.
 void nearest(const wall::Patch& patch, Vec3 target, float& xi, float& eta) {
   xi = eta = patch.quad ? 0.0f : 0.6f;
@@ -266,7 +278,8 @@ uint32_t column_of(const wall::Model& m, const wall::State& s, uint32_t face) {
   return corners_of(m, s.topology, face).column[0];
 }
 
-Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface& surface, uint32_t index, Vec3 p) {
+Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface& surface, uint32_t index, Vec3 p,
+                      const Vec3* corner) {
   const Patch& patch = surface.patch[index];
   const Corners c = corners_of(m, s.topology, patch.face);
   Foot foot;
@@ -278,9 +291,10 @@ Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface&
     constexpr float kWithin = 0.998f;
     const uint32_t face = wall::face_of_element(m, s.topology, patch.face);
     const auto& at = patch.at;
+    if (corner) std::copy_n(corner, 4, b.p);
+    else std::copy_n(part_corners(s, c, patch).data(), 4, b.p);
     if (patch.side != 0) {
       b.quad = patch.quad;
-      for (uint32_t k = 0; k < c.count(); ++k) b.p[k] = place_on(s, c, at[k], static_cast<float>(patch.side));
       nearest(b, p, xi, eta);
       foot.facing = cross(b.along_xi(eta), b.along_eta(xi)) * static_cast<float>(patch.side);
       if (b.quad) {
@@ -295,8 +309,6 @@ Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface&
       }
       foot.point.zeta = static_cast<float>(patch.side);
     } else {
-      b.p[0] = place_on(s, c, at[0], -1), b.p[1] = place_on(s, c, at[1], -1);
-      b.p[2] = place_on(s, c, at[1], 1), b.p[3] = place_on(s, c, at[0], 1);
       nearest(b, p, xi, eta);
       foot.facing = cross(b.along_xi(eta), b.along_eta(xi));
       foot.on_edge = std::max(std::abs(xi), std::abs(eta)) > 0.9999f;
@@ -421,18 +433,33 @@ float least_distance(const FaceBox& box, Vec3 p, int side) {
   return std::sqrt(da * da + db * db + dn * dn) * 0.9999f;
 }
 
-PatchBall ball_of(const wall::Model& m, const wall::State& s, const Patch& patch) {
+PatchBox patch_box(const wall::Model& m, const wall::State& s, const Patch& patch) {
   const Corners c = corners_of(m, s.topology, patch.face);
-  std::array<Vec3, 4> corner;
+  PatchBox box;
+  box.corner = part_corners(s, c, patch);
   const uint32_t count = patch.side == 0 || patch.quad ? 4 : 3;
+  // Both ends of a strip in the same order on either side.
   for (uint32_t i = 0; i < count; ++i)
-    corner[i] = patch.side != 0 ? place_on(s, c, patch.at[i], static_cast<float>(patch.side))
-                                : place_on(s, c, patch.at[i % 2], i < 2 ? -1.0f : 1.0f);
-  PatchBall ball;
-  for (uint32_t i = 0; i < count; ++i) ball.center += corner[i] / static_cast<float>(count);
-  for (uint32_t i = 0; i < count; ++i) ball.radius = std::max(ball.radius, distance(corner[i], ball.center));
-  ball.radius *= 1.0001f;
-  return ball;
+    box.center += box.corner[patch.side == 0 && i > 1 ? 5 - i : i] / static_cast<float>(count);
+  for (uint32_t i = 0; i < count; ++i) box.radius = std::max(box.radius, distance(box.corner[i], box.center));
+  box.radius *= 1.0001f;
+  const Vec3 along = box.corner[1] - box.corner[0], up = box.corner[count - 1] - box.corner[0];
+  box.n = normalized(cross(along, up), {0, 0, 1});
+  box.a = normalized(along, any_perpendicular(box.n));
+  box.b = cross(box.n, box.a);
+  for (uint32_t i = 0; i < count; ++i) {
+    const Vec3 q = box.corner[i] - box.center;
+    box.half_a = std::max(box.half_a, std::abs(dot(q, box.a))), box.half_b = std::max(box.half_b, std::abs(dot(q, box.b)));
+    box.half_n = std::max(box.half_n, std::abs(dot(q, box.n)));
+  }
+  return box;
+}
+
+float PatchBox::to_box(Vec3 p) const {
+  const Vec3 q = p - center;
+  const float da = std::max(0.0f, std::abs(dot(q, a)) - half_a), db = std::max(0.0f, std::abs(dot(q, b)) - half_b),
+              dn = std::max(0.0f, std::abs(dot(q, n)) - half_n);
+  return std::sqrt(da * da + db * db + dn * dn) * 0.9999f;
 }
 
 float least_distance(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& k, const FaceBox& box,
@@ -440,15 +467,15 @@ float least_distance(const wall::Model& m, const wall::State& s, const Surface& 
   const Patch& patch = surface.patch[index];
   const float far = least_distance(box, p, patch.side);
   if (!patch.part) return far;
-  PatchBall& ball = k.ball[index];
-  if (ball.step != k.step) ball = ball_of(m, s, patch), ball.step = k.step;
-  return std::max(far, ball.least_distance(p));
+  PatchBox& part = k.part[index];
+  if (part.step != k.step) part = patch_box(m, s, patch), part.step = k.step;
+  return std::max(far, part.to_ball(p));
 }
 
 void find_near(const wall::Model& m, const wall::State& s, const Surface& surface, const thread::State& thread,
                SurfaceSearch& k) {
   const size_t nodes = thread.nodes(), columns = wall::columns(s), faces = wall::elements(m, s.topology);
-  k.box.resize(faces), k.ball.resize(surface.patch.size());
+  k.box.resize(faces), k.part.resize(surface.patch.size());
   const float limit2 = 0.25f * k.margin * k.margin * 0.25f;  // all may move: a quarter of the margin each
   bool wall_stale = k.wall_listed.size() != columns || k.version != s.topology.version;
   for (uint32_t c = 0; c < columns && !wall_stale; ++c) wall_stale = length2(mid(s, c) - k.wall_listed[c]) > limit2;
@@ -542,8 +569,10 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       const auto look = [&](const FaceBox& box, uint32_t q) {
         const float reach =
             std::min(std::abs(best.gap), std::max(kDeep, solver.reach + 2 * m.step * (box.speed + speed))) + 1e-6f;
-        if (least_distance(m, s, surface, search, box, q, p) > reach) return;
-        const Foot foot = nearest_on_patch(m, s, surface, q, p);
+        if (least_distance(m, s, surface, search, box, q, p) > reach ||
+            least_of_part(surface, search, q, p) > std::abs(best.gap) + 1e-6f)
+          return;
+        const Foot foot = nearest_on_patch(m, s, surface, q, p, corners_in(search, q));
         if (foot.gap < -kDeep || std::abs(foot.gap) > std::abs(best.gap)) return;
         if (std::abs(foot.gap) == std::abs(best.gap) && q < best.patch) return;  // whatever was looked at first
         if (foot.gap < 0 && foot.on_edge) return;

@@ -56,7 +56,9 @@ struct Foot {
   float gap = 0;         // [m] negative inside
   bool on_edge = false;  // the foot lies on the patch's border
 };
-Foot nearest_on_patch(const wall::Model& model, const wall::State& state, const Surface& surface, uint32_t patch, Vec3 p);
+// corner: those of a patch of a fragment (PatchBox), where they are known.
+Foot nearest_on_patch(const wall::Model& model, const wall::State& state, const Surface& surface, uint32_t patch, Vec3 p,
+                      const Vec3* corner = nullptr);
 
 // A box about one face of the wall in the present step. A lower bound of a distance saves most exact searches.
 struct FaceBox {
@@ -66,14 +68,18 @@ struct FaceBox {
   float low[2]{}, high[2]{};     // [m] along n: of the inner and of the outer face
   float speed = 0;               // [m/s] maximum of its corners
 };
-// The same about one patch of a fragment: its face is often much larger.
-struct PatchBall {
+// The same about one patch of a fragment, with its corners in the order of wall::Patch: its face is often much larger.
+struct PatchBox {
   uint32_t step = 0;
-  Vec3 center;
-  float radius = 0;                                                                      // [m]
-  float least_distance(Vec3 p) const { return distance(center, p) * 0.9999f - radius; }  // [m] at most
+  std::array<Vec3, 4> corner;
+  Vec3 center, a, b, n;                      // [m]; unit axes
+  float half_a = 0, half_b = 0, half_n = 0;  // [m]
+  float radius = 0;                          // [m] of the ball about it
+  // [m] at most: to the ball, and to the box, which is tighter where a patch is narrow.
+  float to_ball(Vec3 p) const { return distance(center, p) * 0.9999f - radius; }
+  float to_box(Vec3 p) const;
 };
-PatchBall ball_of(const wall::Model& model, const wall::State& state, const Patch& patch);
+PatchBox patch_box(const wall::Model& model, const wall::State& state, const Patch& patch);
 
 // Which faces are near which nodes and columns. Lists are kept until something has moved half their margin.
 struct SurfaceSearch {
@@ -86,7 +92,7 @@ struct SurfaceSearch {
   uint32_t version = 0;
   uint32_t step = 0;                // counts steps, for the boxes
   std::vector<FaceBox> box;         // per face, made on first use in a step
-  std::vector<PatchBall> ball;      // per patch, likewise; only of fragments
+  std::vector<PatchBox> part;       // per patch, likewise; only of fragments
   std::vector<uint32_t> lip_patch;  // per column and zeta: the nearest patch of the last search, which is looked at first
   // What was far from everything is not searched again before the wall may have come near.
   std::vector<wall::Float4> seen;  // the wall in the last step
@@ -103,6 +109,16 @@ float least_distance(const FaceBox& box, Vec3 p, int side);
 // The same of one patch, whose face has this box.
 float least_distance(const wall::Model& model, const wall::State& state, const Surface& surface, SurfaceSearch& search,
                      const FaceBox& box, uint32_t patch, Vec3 p);
+
+// A bound tighter than least_distance, after it: of a fragment's patch; 0 of a whole face. Only for a search that has no use
+// for a patch beyond the limit: which patches within reach were looked at decides which of equally near ones is taken.
+inline float least_of_part(const Surface& surface, const SurfaceSearch& search, uint32_t patch, Vec3 p) {
+  return surface.patch[patch].part && search.part[patch].step == search.step ? search.part[patch].to_box(p) : 0.0f;
+}
+// The corners of a patch whose box was made in this step; nullptr: not known.
+inline const Vec3* corners_in(const SurfaceSearch& search, uint32_t patch) {
+  return patch < search.part.size() && search.part[patch].step == search.step ? search.part[patch].corner.data() : nullptr;
+}
 
 // Once per step, before everything below: how far the wall moves.
 void watch_wall(const wall::State& state, SurfaceSearch& search);
