@@ -180,9 +180,12 @@ struct BodiesScratch {
     float inv_mass = 0, inv_inertia = 0;
     bool held = false;
     float opening = 0;
-    float drag = 0, turn_drag = 0;   // [N s/m], [N m s/rad] toward the hand's motion, of thread that presses the tool
-    bool loose = false;              // a needle that is in no jaws and in no tissue: the thread moves it within the step
-    Vec3 thread_push, thread_twist;  // [N s], [N m s] of the thread in this step, on a loose needle
+    // [N s/m], [N m s/rad] of thread that presses the body. A tool keeps to its hand's motion, a loose needle to the thread's.
+    float drag = 0, turn_drag = 0;
+    Vec3 drag_speed, drag_spin;      // [m/s] of the center, [rad/s]: that motion of the thread
+    bool loose = false;              // a needle that is in no jaws and in no tissue
+    bool fast = false;               // such a needle: the thread moves it within the step
+    Vec3 thread_push, thread_twist;  // [N s], [N m s] of the thread in this step, on a fast needle
   };
   std::vector<Moving> moving;
   std::vector<thread::ToolCapsule> tool;

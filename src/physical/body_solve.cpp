@@ -14,9 +14,12 @@ constexpr float kTautMass = 5e-3f;     // [kg] sqrt(line mass * EA) h: what move
 constexpr float kSlackMass = 0.1e-3f;  // [kg] of a few nodes
 constexpr float kLineMass = 0.05f;     // [kg/m]
 
-// [N] on a segment, of a tool that comes as near to the drape as kOnDrape: cloth gives way, and thread between the two is not
-// crushed.
-constexpr float kDrapePress = 0.3f;
+// [N] on a segment, of a needle that nothing holds, which weighs 20 mN, and of a tool that comes as near to the drape as
+// kOnDrape: cloth gives way, and thread between the two is not crushed.
+constexpr float kLoosePress = 0.3f;
+// [m/s] A needle that nothing holds, and that is faster, is moved by the thread within the thread's step: it stops at a strand
+// or is thrown back, with any force. At rest on elastic coils it would be pushed about for seconds; there it has a drag.
+constexpr float kFast = 0.2f;
 constexpr float kOnDrape = 0.4e-3f;  // [m]
 constexpr float kOpenForce = 2;      // [N] at the tips, maximum with which jaws open against thread round them
 
@@ -44,9 +47,11 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
     if (m.falls) push += model.gravity * (m.mass * h);
     if (t) push += t->load * h;
     const float keep = m.falls ? 1 - 2 * h : 1 - 50 * h;
-    out.inv_mass = 1 / m.mass, out.inv_inertia = 1 / m.inertia;
-    out.v = b.velocity * keep + push * out.inv_mass;
-    out.w = b.spin * keep + twist * out.inv_inertia;
+    const bool slow = out.loose && !out.fast;
+    const float drag = slow ? h * out.drag : 0, turn_drag = slow ? h * out.turn_drag : 0;
+    out.inv_mass = 1 / (m.mass + drag), out.inv_inertia = 1 / (m.inertia + turn_drag);
+    out.v = (b.velocity * (keep * m.mass) + out.drag_speed * drag + push) * out.inv_mass;
+    out.w = (b.spin * (keep * m.inertia) + out.drag_spin * turn_drag + twist) * out.inv_inertia;
     return;
   }
   const Wish w = wish_of(m, b, *t, h);
@@ -74,16 +79,18 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
 
 // The thread's force on a tool is one step late. A throw round the jaws holds them from all sides, with up to 1e6 N/m, and the
 // jaws' tips weigh 16 g to it: they would be thrown to and fro, in 20 steps with 50 N. A drag toward the hand's motion, as
-// great as the load, holds them; where nothing moves it does nothing.
+// great as the load, holds them; where nothing moves it does nothing. A needle that falls on thread, or has it pulled against
+// its side, would be thrown away likewise.
 void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, float substep, float h,
                  BodiesScratch& k) {
   constexpr float kGive = 20e-6f;  // [m] by which a tool moves off thread that presses it, until the thread is slack
   k.moving.resize(bodies.body.size());
   for (size_t b = 0; b < bodies.body.size(); ++b) {
     BodiesScratch::Moving& m = k.moving[b];
-    m.drag = m.turn_drag = 0, m.thread_push = m.thread_twist = {};
+    m.drag = m.turn_drag = 0, m.drag_speed = m.drag_spin = m.thread_push = m.thread_twist = {};
     const auto holds = [&](const Body& tool) { return tool.grip.what == Gripped::needle && tool.grip.body == b; };
     m.loose = model.body[b].falls && bodies.body[b].skip == 0 && std::none_of(bodies.body.begin(), bodies.body.end(), holds);
+    m.fast = m.loose && length2(bodies.body[b].velocity) > kFast * kFast;
   }
   std::array<uint32_t, kMaxBodies + 1> first{};  // of the capsules of a body, in the order of show_bodies
   for (size_t b = 0; b < bodies.body.size(); ++b)
@@ -101,6 +108,22 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
                          thread.crossing[i].t);
     const float drag = load * h / kGive, arm2 = length2(at - m.center);
     k.moving[b].drag += drag, k.moving[b].turn_drag += drag * arm2;
+    if (!k.moving[b].loose || k.moving[b].fast) continue;
+    const uint32_t node = thread::segment_of(thread.key[i]);
+    const Vec3 speed = lerp(thread.v.at(node), thread.v.at(node + 1), thread.crossing[i].s);
+    k.moving[b].drag_speed += drag * speed;
+    k.moving[b].drag_spin += drag * cross(rotate(bodies.body[b].pose.q, at - m.center), speed);
+  }
+  for (size_t b = 0; b < bodies.body.size(); ++b) {
+    BodiesScratch::Moving& m = k.moving[b];
+    if (!m.loose || m.fast) continue;
+    const Body& body = bodies.body[b];
+    // Thread that leaves a wedge is faster than the needle was: a drag must not take it along.
+    if (m.drag > 0) m.drag_speed = clamped(m.drag_speed / m.drag, length(body.velocity));
+    if (m.turn_drag > 0) m.drag_spin = clamped(m.drag_spin / m.turn_drag, length(body.spin));
+    // The thread may have left it since then; what it did acts in this step all the same.
+    m.drag += length(body.thread_force) * h / kGive;
+    m.turn_drag += length(body.thread_torque) * h / kGive * std::sqrt(model.body[b].inertia / model.body[b].mass);
   }
 }
 
@@ -155,16 +178,16 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* 
       t.widens = m.falls ? std::abs(z.radius) - t.radius : 0;
       t.friction = m.thread_friction;
       const auto on_drape = [&](Vec3 p) { return drape && dot(drape->normal, p) - drape->offset < t.radius + kOnDrape; };
-      // Of a needle in jaws or tissue the swage passes where its thread does, and the tip, driven on, would crush thread.
+      // Of another needle the swage passes where its thread does, and the tip, driven on, would crush thread.
       const bool end = m.falls && (&c == &m.thread_capsule.front() || &c == &m.thread_capsule.back());
-      if (moving.loose) t.body = static_cast<uint32_t>(k.loose.size());
+      if (moving.fast) t.body = static_cast<uint32_t>(k.loose.size());
       else if (end) t.press = 0;
-      else if (on_drape(t.to_a) || on_drape(t.to_b)) t.press = kDrapePress;
+      else if (moving.loose || on_drape(t.to_a) || on_drape(t.to_b)) t.press = kLoosePress;
       k.tool.push_back(t), k.tool_body.push_back(b);
     }
     for (size_t i = 0; i < k.hold.size(); ++i)
       if (k.hold_body[i] == b) k.hold[i].to = transform(next, k.hold_at[i]);
-    if (moving.loose) {
+    if (moving.fast) {
       thread::ToolBody loose;
       loose.center = transform(body.shown, m.center), loose.to_center = transform(next, m.center);
       loose.inv_mass = moving.inv_mass, loose.inv_inertia = moving.inv_inertia;

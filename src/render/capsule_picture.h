@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // render/capsule_picture: an image of capsules (threads, tools) without a graphics card: parallel projection, one light from
 // the viewer's upper left, depth and shade per pixel. What lies close behind something is in its shadow, so that over and under
-// are told apart. For close-ups in documents, reports and tests.
+// are distinguished. For close-ups in documents, reports and tests.
 #pragma once
 #include <span>
 
