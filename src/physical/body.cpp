@@ -190,8 +190,8 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
                                          nearing(body.velocity + cross(body.spin, r) + jaw_speed - u));
       if (gap > model.reach + closing) return;
       const float least = gap - closing;  // at the end of the step
-      // The same plane from two patches that meet there is one contact. Of a sphere no more than six, those that come nearest:
-      // in a pit of the wall there are as many.
+      // The same plane from two patches that meet there is one contact. Of a sphere no more than twelve, those that come
+      // nearest: in a pit of a fine wall there are as many.
       size_t same = 0, farthest = k.row.size();
       for (size_t i = k.row.size(); i-- > 0 && k.row[i].a == b && (k.row[i].key >> 36) == (key >> 36); ++same) {
         if (dot(k.row[i].axis, foot.normal) > 0.985f && std::abs(k.row[i].gap - gap) < 0.05e-3f) return;
