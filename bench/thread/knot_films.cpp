@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <map>
 #include <span>
 #include <string>
@@ -223,10 +224,23 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "knot_films: no folder named; write: knot_films FOLDER [single|granny|square|surgeons...]\n");
     return 2;
   }
+  if (!std::filesystem::is_directory(argv[1])) {
+    std::fprintf(stderr, "knot_films: %s is no folder; make it first\n", argv[1]);
+    return 2;
+  }
+  const auto named = [&](int i) {
+    return [name = "knot_" + std::string(argv[i])](const KnotKind& kind) { return kind.file == name; };
+  };
+  const auto kinds = knot_kinds();
+  for (int i = 2; i < argc; ++i)
+    if (std::none_of(kinds.begin(), kinds.end(), named(i))) {
+      std::fprintf(stderr, "knot_films: there is no knot \"%s\"; the knots are: single, granny, square, surgeons\n", argv[i]);
+      return 2;
+    }
   try {
-    for (const KnotKind& kind : knot_kinds()) {
+    for (const KnotKind& kind : kinds) {
       bool wanted = argc == 2;
-      for (int i = 2; i < argc; ++i) wanted = wanted || kind.file == "knot_" + std::string(argv[i]);
+      for (int i = 2; i < argc; ++i) wanted = wanted || named(i)(kind);
       if (wanted) make_film(kind, argv[1]);
     }
   } catch (const std::exception& failure) {
