@@ -112,7 +112,7 @@ void BodiesScratch::reserve(const wall::Model& wm, const wall::State& ws) {
 }
 
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
-                        const Bodies& bodies, float h, SurfaceSearch& search, BodiesScratch& k) {
+                        Bodies& bodies, float h, SurfaceSearch& search, BodiesScratch& k) {
   const uint32_t faces = wall::elements(wm, ws.topology);
   k.face_center.resize(faces), k.face_radius.resize(faces), k.around.resize(kMaxBodies);
   for (uint32_t f = 0; f < faces; ++f) {
@@ -135,13 +135,20 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       box_of(wm, ws, search, f), search.box[f].step = search.step | kHere;
     return search.box[f];
   };
-  constexpr uint32_t kRun = 8;     // spheres
-  constexpr float kAhead = 4e-3f;  // [m] by which lists of elements reach beyond what a step needs
-  const float wall_speed = 1.0f;   // [m/s] of the wall, for the search alone
+  constexpr uint32_t kRun = 8;  // spheres
+  // Between closed jaws the wall is thinner than it is there. When they let go, it would have to leave both at once, with 40 N:
+  // until they have opened as far, they press it with no more than this.
+  constexpr float kParting = 0.2f;     // [N] of each contact
+  constexpr float kInside = 0.05e-3f;  // [m]
+  constexpr float kAhead = 4e-3f;      // [m] by which lists of elements reach beyond what a step needs
+  const float wall_speed = 1.0f;       // [m/s] of the wall, for the search alone
   for (uint32_t b = 0; b < bodies.body.size(); ++b) {
     const BodyModel& m = model.body[b];
-    const Body& body = bodies.body[b];
+    Body& body = bodies.body[b];
     const BodiesScratch::Moving& moving = k.moving[b];
+    const uint64_t before = body.skip;
+    const bool has_jaws = m.hinge_z > 0;
+    if (has_jaws) body.skip = 0;
     // The box of the body, then the faces in it.
     Vec3 low{1e9f, 1e9f, 1e9f}, high = -low;
     for (const BodySphere& s : m.sphere) {
@@ -173,9 +180,13 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     const Grip& grip = body.grip;
     const bool holds_tissue = grip.what == Gripped::tissue;
     const Vec3 jaws = body.pose.p;
-    const auto skipped = [&](uint32_t sphere) { return sphere < 64 && (body.skip >> sphere & 1) != 0; };
-    const auto add = [&](uint32_t part, const Foot& foot, Vec3 on_axis, float radius, Vec3 jaw_speed, uint64_t kind) {
+    const auto bit = [](uint32_t sphere) { return sphere < 64 ? uint64_t{1} << sphere : uint64_t{0}; };
+    const auto skipped = [&](uint32_t sphere) { return !has_jaws && (before & bit(sphere)) != 0; };
+    const auto parting = [&](uint32_t sphere) { return has_jaws && (before & bit(sphere)) != 0; };
+    const auto add = [&](uint32_t part, const Foot& foot, Vec3 on_axis, float radius, Vec3 jaw_speed, uint64_t kind,
+                         uint64_t inside) {
       const float gap = foot.gap - radius;
+      if (gap < -kInside && foot.gap > -0.9f * wm.laminate.thickness) body.skip |= inside;
       const uint64_t key = key_of(kind, b, part, foot.patch);
       const RowMemory* memory = remembered(bodies, key);
       const bool pressed = memory && dot(memory->impulse, memory->axis) > 0 && dot(memory->axis, foot.normal) > 0.3f;
@@ -207,6 +218,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       row.key = key, row.a = b, row.on_wall = true, row.point = w;
       row.ra = r, row.axis = foot.normal, row.gap = gap, row.least = least, row.speed = jaw_speed,
       row.friction = m.wall_friction;
+      if (inside) row.along_limit = kParting * h;
       if (memory) {
         const float press = std::max(0.0f, dot(memory->impulse, memory->axis));
         row.impulse = foot.normal * press + across(across(memory->impulse, memory->axis), foot.normal);
@@ -232,7 +244,11 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       if (s.radius <= 0 || skipped(i)) continue;
       const Vec3 in_body = local(m, s, body.opening);
       const Vec3 p = transform(body.pose, in_body);
-      if (holds_tissue && s.jaw != 0 && distance(p, jaws) < 6e-3f) continue;
+      if (holds_tissue && s.jaw != 0 && distance(p, jaws) < 6e-3f) {
+        body.skip |= bit(i);
+        continue;
+      }
+      const uint64_t inside = parting(i) ? bit(i) : 0;
       const Vec3 jaw_speed = s.jaw == 0 ? Vec3{} : rotate(body.pose.q, (local(m, s, moving.opening) - in_body) * (1 / h));
       const float reach = s.radius + margin;
       for (const uint32_t f : k.near_run) {
@@ -246,7 +262,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
             continue;
           const Foot foot = outer_foot(wm, ws, surface, q, p, corners_in(search, q));
           if (foot.gap - s.radius > margin || (foot.on_edge && foot.gap < 0)) continue;
-          add(i, foot, p, s.radius, jaw_speed, 1);
+          add(i, foot, p, s.radius, jaw_speed, 1, inside);
         }
       }
     }
@@ -261,6 +277,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       const Vec3 la = local(m, sa, body.opening), lb = local(m, sb, body.opening);
       const Vec3 pa = transform(body.pose, la), pb = transform(body.pose, lb);
       if (holds_tissue && sa.jaw != 0 && distance((pa + pb) * 0.5f, jaws) < 6e-3f) continue;
+      const uint64_t inside = has_jaws ? before & (bit(m.capsule[i].a) | bit(m.capsule[i].b)) : 0;
       const Vec3 middle = (pa + pb) * 0.5f;
       const float reach = 0.5f * distance(pa, pb) + std::max(sa.radius, sb.radius) + margin;
       for (const uint32_t f : k.near_rim) {
@@ -290,7 +307,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
                             : rotate(body.pose.q,
                                      lerp(local(m, sa, moving.opening) - la, local(m, sb, moving.opening) - lb, t) * (1 / h));
             foot.patch = 2 * q + (zeta > 0 ? 1 : 0);
-            add(i, foot, on, radius, jaw_speed, 2);
+            add(i, foot, on, radius, jaw_speed, 2, inside);
           }
         }
       }

@@ -91,7 +91,9 @@ struct Body {
   Vec3 target_place;  // [m] of the center, in the last step
   Quat target_turn;
   bool held = false;  // by a hand, in the last step
-  uint64_t skip = 0;  // bits: spheres without contact with the wall, the shaft of a needle in its channel
+  // Bits: spheres of a needle's shaft in its channel, which have no contact with the wall; those of jaws that hold tissue, or
+  // held it and have not left it.
+  uint64_t skip = 0;
   Grip grip;
   Vec3 thread_force, thread_torque;  // [N], [N m] about the center, of the thread in the last step
   // Results of the last step: of wall, thread and other bodies on this one, torque about the center; of the hand on it.
@@ -182,7 +184,8 @@ struct BodiesScratch {
     float opening = 0;
     // [N s/m], [N m s/rad] of thread that presses the body. A tool keeps to its hand's motion, a loose needle to the thread's.
     float drag = 0, turn_drag = 0;
-    Vec3 drag_speed, drag_spin;      // [m/s] of the center, [rad/s]: that motion of the thread
+    Vec3 drag_speed, drag_spin;      // [m/s] of the center, [rad/s]: that motion of the thread or of the needle's holder
+    uint32_t holder = wall::kNone;   // of a needle in jaws
     bool loose = false;              // a needle that is in no jaws and in no tissue
     bool fast = false;               // such a needle: the thread moves it within the step
     Vec3 thread_push, thread_twist;  // [N s], [N m s] of the thread in this step, on a fast needle
@@ -234,7 +237,7 @@ void find_pair_contacts(const BodiesModel& model, const Bodies& bodies, float h,
 void find_drape_contacts(const BodiesModel& model, const Bodies& bodies, const thread::Plane& drape, float h, BodiesScratch& k);
 // Contacts with the wall.
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
-                        const Bodies& bodies, float h, SurfaceSearch& search, BodiesScratch& k);
+                        Bodies& bodies, float h, SurfaceSearch& search, BodiesScratch& k);
 // Jaws close, grip and let go; rows of held needles and tissue, holds of held thread.
 void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
                 const thread::State& thread, float thread_diameter, Bodies& bodies, std::span<const HandTarget> target, float h,

@@ -17,6 +17,9 @@ constexpr float kLineMass = 0.05f;     // [kg/m]
 // [N] on a segment, of a needle that nothing holds, which weighs 20 mN, and of a tool that comes as near to the drape as
 // kOnDrape: cloth gives way, and thread between the two is not crushed.
 constexpr float kLoosePress = 0.3f;
+// [N] Instruments pass through each other here, which their hands would not let them: thread between two of them gives way.
+constexpr float kBetweenPress = 4;
+constexpr float kBetween = 0.4e-3f;  // [m] apart
 // [m/s] A needle that nothing holds, and that is faster, is moved by the thread within the thread's step: it stops at a strand
 // or is thrown back, with any force. At rest on elastic coils it would be pushed about for seconds; there it has a drag.
 constexpr float kFast = 0.2f;
@@ -47,8 +50,7 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
     if (m.falls) push += model.gravity * (m.mass * h);
     if (t) push += t->load * h;
     const float keep = m.falls ? 1 - 2 * h : 1 - 50 * h;
-    const bool slow = out.loose && !out.fast;
-    const float drag = slow ? h * out.drag : 0, turn_drag = slow ? h * out.turn_drag : 0;
+    const float drag = m.falls ? h * out.drag : 0, turn_drag = m.falls ? h * out.turn_drag : 0;
     out.inv_mass = 1 / (m.mass + drag), out.inv_inertia = 1 / (m.inertia + turn_drag);
     out.v = (b.velocity * (keep * m.mass) + out.drag_speed * drag + push) * out.inv_mass;
     out.w = (b.spin * (keep * m.inertia) + out.drag_spin * turn_drag + twist) * out.inv_inertia;
@@ -80,7 +82,7 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
 // The thread's force on a tool is one step late. A throw round the jaws holds them from all sides, with up to 1e6 N/m, and the
 // jaws' tips weigh 16 g to it: they would be thrown to and fro, in 20 steps with 50 N. A drag toward the hand's motion, as
 // great as the load, holds them; where nothing moves it does nothing. A needle that falls on thread, or has it pulled against
-// its side, would be thrown away likewise.
+// its side, would be thrown away likewise, and one in jaws turned to and fro in their grip: its drag is toward their motion.
 void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, float substep, float h,
                  BodiesScratch& k) {
   constexpr float kGive = 20e-6f;  // [m] by which a tool moves off thread that presses it, until the thread is slack
@@ -89,7 +91,10 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
     BodiesScratch::Moving& m = k.moving[b];
     m.drag = m.turn_drag = 0, m.drag_speed = m.drag_spin = m.thread_push = m.thread_twist = {};
     const auto holds = [&](const Body& tool) { return tool.grip.what == Gripped::needle && tool.grip.body == b; };
-    m.loose = model.body[b].falls && bodies.body[b].skip == 0 && std::none_of(bodies.body.begin(), bodies.body.end(), holds);
+    const auto holder = std::find_if(bodies.body.begin(), bodies.body.end(), holds);
+    m.holder =
+        model.body[b].falls && holder != bodies.body.end() ? static_cast<uint32_t>(holder - bodies.body.begin()) : wall::kNone;
+    m.loose = model.body[b].falls && bodies.body[b].skip == 0 && m.holder == wall::kNone;
     m.fast = m.loose && length2(bodies.body[b].velocity) > kFast * kFast;
   }
   std::array<uint32_t, kMaxBodies + 1> first{};  // of the capsules of a body, in the order of show_bodies
@@ -108,7 +113,7 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
                          thread.crossing[i].t);
     const float drag = load * h / kGive, arm2 = length2(at - m.center);
     k.moving[b].drag += drag, k.moving[b].turn_drag += drag * arm2;
-    if (!k.moving[b].loose || k.moving[b].fast) continue;
+    if (!model.body[b].falls || k.moving[b].fast || k.moving[b].holder != wall::kNone) continue;
     const uint32_t node = thread::segment_of(thread.key[i]);
     const Vec3 speed = lerp(thread.v.at(node), thread.v.at(node + 1), thread.crossing[i].s);
     k.moving[b].drag_speed += drag * speed;
@@ -116,7 +121,11 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
   }
   for (size_t b = 0; b < bodies.body.size(); ++b) {
     BodiesScratch::Moving& m = k.moving[b];
-    if (!m.loose || m.fast) continue;
+    if (!model.body[b].falls) continue;
+    if (m.fast) {
+      m.drag = m.turn_drag = 0;
+      continue;
+    }
     const Body& body = bodies.body[b];
     // Thread that leaves a wedge is faster than the needle was: a drag must not take it along.
     if (m.drag > 0) m.drag_speed = clamped(m.drag_speed / m.drag, length(body.velocity));
@@ -124,6 +133,10 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
     // The thread may have left it since then; what it did acts in this step all the same.
     m.drag += length(body.thread_force) * h / kGive;
     m.turn_drag += length(body.thread_torque) * h / kGive * std::sqrt(model.body[b].inertia / model.body[b].mass);
+    if (m.holder == wall::kNone) continue;
+    const Body& tool = bodies.body[m.holder];
+    m.drag_spin = tool.spin;
+    m.drag_speed = tool.velocity + cross(tool.spin, center_of(model.body[b], body) - center_of(model.body[m.holder], tool));
   }
 }
 
@@ -155,6 +168,25 @@ void warm_bodies(const BodiesModel& model, const Bodies& bodies, std::span<const
     start_motion(model, model.body[i], bodies.body[i], i < target.size() ? &target[i] : nullptr, h, push[i], twist[i],
                  k.moving[i]);
     k.moving[i].opening = opening;
+  }
+}
+
+// Where two instruments overlap, or are nearly in contact.
+static void yield_between(const BodiesModel& model, BodiesScratch& k) {
+  for (size_t i = 0; i < k.tool.size(); ++i) {
+    const BodyModel& mi = model.body[k.tool_body[i]];
+    thread::ToolCapsule& a = k.tool[i];
+    for (size_t j = 0; j < i && mi.hinge_z > 0; ++j) {
+      if (k.tool_body[j] == k.tool_body[i] || model.body[k.tool_body[j]].hinge_z <= 0) continue;
+      thread::ToolCapsule& b = k.tool[j];
+      const float near = a.radius + b.radius + kBetween,
+                  around = near + 0.5f * (distance(a.to_a, a.to_b) + distance(b.to_a, b.to_b));
+      if (length2((a.to_a + a.to_b) - (b.to_a + b.to_b)) > 4 * around * around) continue;
+      float s = 0, t = 0;
+      nearest_of_segments(a.to_a, a.to_b, b.to_a, b.to_b, s, t);
+      if (distance(lerp(a.to_a, a.to_b, s), lerp(b.to_a, b.to_b, t)) > near) continue;
+      a.press = std::min(a.press, kBetweenPress), b.press = std::min(b.press, kBetweenPress);
+    }
   }
 }
 
@@ -195,6 +227,7 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* 
     }
     body.shown = next, body.shown_opening = moving.opening;
   }
+  if (!model.pair_contact) yield_between(model, k);
 }
 
 // Jaws that open against a strand round them do so with a limited force: at half of it half as fast, above it they yield.

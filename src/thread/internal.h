@@ -236,7 +236,7 @@ void push_soft(Scratch& s, SoftPoints& soft, uint32_t point, Vec3 multiplier, fl
 void see_soft_contacts(const State& state, Scratch& s, const Surroundings& around);  // of a step
 void begin_soft_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around);
 // Round the limit of motion: fast nodes that bear on a tool or on something soft move with it, and the limit is for the rest.
-void begin_carrying(Scratch& s, float limit);
+void begin_carrying(const Settings& settings, Scratch& s, const Surroundings& around, float limit);
 void end_carrying(Scratch& s);
 void sweep_soft_contacts(Scratch& s, SoftPoints& soft, float substep, bool backward);
 void end_soft_contacts(const Settings& settings, State& state, Scratch& s, Surroundings& around);

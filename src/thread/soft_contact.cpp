@@ -68,7 +68,7 @@ void see_soft_contacts(const State& state, Scratch& s, const Surroundings& aroun
   }
 }
 
-void begin_carrying(Scratch& s, float limit) {
+void begin_carrying(const Settings& settings, Scratch& s, const Surroundings& around, float limit) {
   s.carried.clear();
   const auto carry = [&](uint32_t node, Vec3 by) {
     if (length2(s.u.at(node)) <= limit * limit) return;
@@ -77,8 +77,10 @@ void begin_carrying(Scratch& s, float limit) {
     s.carried.push_back({node, by});
     s.u.add(node, -by);
   };
+  // What the thread itself does to the wall within the step does not count: between a tool and the wall they would throw each
+  // other.
   for (const Scratch::SoftActive& a : s.soft_active)
-    if (a.ln > 0) carry(a.node, s.soft_moved.at(a.point) - s.soft_before.at(a.point));
+    if (a.ln > 0) carry(a.node, around.soft->speed[a.point] * settings.substep);
   for (const Active& a : s.active())
     if (a.ln > 0 && a.i == a.j) carry(a.i, three(a.partner)), carry(a.i + 1, three(a.partner));
 }

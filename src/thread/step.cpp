@@ -326,7 +326,7 @@ void Stepper::step(const Settings& settings, State& state, Surroundings& around)
     end_contacts(settings, state, s, around);
     end_soft_contacts(settings, state, s, around);
 
-    begin_carrying(s, limit);
+    begin_carrying(settings, s, around, limit);
     limit_motion(n, limit, s.u.x.data(), s.u.y.data(), s.u.z.data(), s.move.data());
     end_carrying(s);
     record_hold_forces(settings, state, s, around.holds, sub);

@@ -25,7 +25,7 @@ struct Bench {
   std::vector<HandTarget> target;
   float width = 0, height = 0;
 
-  explicit Bench(float w = 0.03f, float h = 0.02f) : width(w), height(h) {
+  explicit Bench(float w = 0.03f, float h = 0.02f, bool free_edge = false) : width(w), height(h) {
     wall::SheetShape shape;
     shape.width = w, shape.height = h;
     shape.columns = static_cast<int>(std::lround(w / 2.5e-3f)) + 1, shape.rows = static_cast<int>(std::lround(h / 2.5e-3f)) + 1;
@@ -33,7 +33,8 @@ struct Bench {
     spec.mesh = wall::sheet(shape);
     for (size_t c = 0; c < spec.mesh.held.size(); ++c) {
       const Vec3 p = spec.mesh.outer[c];
-      spec.mesh.held[c] = std::abs(p.x - 0.5f * w) > 0.5f * w - 1e-4f || std::abs(p.y - 0.5f * h) > 0.5f * h - 1e-4f;
+      const float across = free_edge ? std::max(0.0f, p.y - 0.5f * h) : std::abs(p.y - 0.5f * h);
+      spec.mesh.held[c] = std::abs(p.x - 0.5f * w) > 0.5f * w - 1e-4f || across > 0.5f * h - 1e-4f;
     }
     const wall::Wall wall = wall::build_wall(spec);
     model = make_model(wall, validation::knot_settings(0.3f));
@@ -538,6 +539,64 @@ TEST(Tool, jaws_lift_the_wall_and_slide_off_above_their_friction) {
     } else {
       EXPECT_LT(most, 1.5f);
     }
+  }
+}
+
+// Jaws hold the sheet's free edge thinner than it is, turn it, and let go of it slowly: what they store in it is small, so no
+// part of it flies off.
+TEST(Tool, jaws_that_let_go_of_an_edge_do_not_throw_it) {
+  for (const float turn : {0.0f, 0.3f, 0.6f}) {
+    Bench bench(0.03f, 0.02f, true);
+    const Vec3 at{0.015f, 0.0025f, 0.6e-3f};
+    const auto pose = [&](float angle) {
+      const Vec3 x{std::sin(angle), 0, std::cos(angle)}, z{0, -1, 0};
+      return Pose{at, from_axes(x, cross(z, x), z)};
+    };
+    const uint32_t t = bench.add(make_tool({}), pose(0), 0.15f);
+    bench.start();
+    for (int i = 0; i < 400; ++i) {
+      const float angle = turn * std::clamp(static_cast<float>(i - 150) / 200, 0.0f, 1.0f);
+      bench.target[t] = {pose(angle), true, 0, 20};
+      bench.step();
+    }
+    ASSERT_EQ(bench.body(t).grip.what, Gripped::tissue);
+    float fastest = 0;
+    for (int i = 0; i < 150; ++i) {
+      bench.target[t] = {pose(turn), true, std::min(0.2f, 0.04f + 2e-3f * static_cast<float>(i)), 0};
+      bench.step();
+      for (uint32_t c = 0; c < wall::columns(bench.state.wall); ++c)
+        for (const float side : {-1.0f, 1.0f})
+          fastest = std::max(fastest, length(wall::velocity(wall::at_column(c, side), bench.state.wall.motion)));
+    }
+    EXPECT_EQ(bench.body(t).grip.what, Gripped::nothing);
+    EXPECT_EQ(bench.body(t).skip, 0u) << "parted";
+    EXPECT_LT(fastest, 1.0f) << turn;
+  }
+}
+
+// Two hands push their instruments into each other, a strand between them. They pass through each other in scenes, so that the
+// strand is inside both: it gives way and does not break.
+TEST(Tool, thread_between_two_instruments_does_not_break) {
+  for (const float shift : {0.0f, 0.8e-3f, 1.6e-3f}) {
+    Bench bench;
+    bench.model.bodies.pair_contact = false;
+    std::vector<Vec3> path;
+    for (int i = 0; i < 60; ++i) path.push_back({1e-3f * static_cast<float>(i) - 0.015f, 0.01f, 0.02f});
+    bench.state.thread = thread::make_state(path);
+    const auto pose = [&](float side, float way) {
+      return Pose{{0.015f + 0.5f * side * shift, 0.01f + side * way, 0.02f}, {}};
+    };
+    const uint32_t a = bench.add(make_tool({}), pose(1, 4e-3f)), b = bench.add(make_tool({}), pose(-1, 4e-3f));
+    bench.start();
+    float most = 0;
+    for (int i = 0; i < 300; ++i) {
+      const float way = std::max(0.0f, 4e-3f - 5e-5f * static_cast<float>(i));
+      bench.target[a] = {pose(1, way), true, 0.1f}, bench.target[b] = {pose(-1, way), true, 0.1f};
+      bench.step();
+      for (const float t : bench.state.thread.tension) most = std::max(most, t);
+    }
+    EXPECT_EQ(std::count(bench.state.thread.broken.begin(), bench.state.thread.broken.end(), 1), 0);
+    EXPECT_LT(most, 12) << shift;
   }
 }
 
