@@ -127,16 +127,18 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
       continue;
     }
     const Body& body = bodies.body[b];
+    if (m.holder != wall::kNone) {
+      const Body& tool = bodies.body[m.holder];
+      m.drag_spin = tool.spin;
+      m.drag_speed = tool.velocity + cross(tool.spin, center_of(model.body[b], body) - center_of(model.body[m.holder], tool));
+      continue;
+    }
     // Thread that leaves a wedge is faster than the needle was: a drag must not take it along.
     if (m.drag > 0) m.drag_speed = clamped(m.drag_speed / m.drag, length(body.velocity));
     if (m.turn_drag > 0) m.drag_spin = clamped(m.drag_spin / m.turn_drag, length(body.spin));
     // The thread may have left it since then; what it did acts in this step all the same.
     m.drag += length(body.thread_force) * h / kGive;
     m.turn_drag += length(body.thread_torque) * h / kGive * std::sqrt(model.body[b].inertia / model.body[b].mass);
-    if (m.holder == wall::kNone) continue;
-    const Body& tool = bodies.body[m.holder];
-    m.drag_spin = tool.spin;
-    m.drag_speed = tool.velocity + cross(tool.spin, center_of(model.body[b], body) - center_of(model.body[m.holder], tool));
   }
 }
 
