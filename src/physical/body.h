@@ -182,6 +182,7 @@ struct BodiesScratch {
     float inv_mass = 0, inv_inertia = 0;
     bool held = false;
     float opening = 0;
+    float squeeze = 0;  // [N] at the tips, of jaws that close, on tissue between them
     // [N s/m], [N m s/rad] of thread that presses the body. A tool keeps to its hand's motion, a loose needle to the thread's.
     float drag = 0, turn_drag = 0;
     Vec3 drag_speed, drag_spin;      // [m/s] of the center, [rad/s]: that motion of the thread or of the needle's holder

@@ -25,6 +25,7 @@ constexpr float kBetween = 0.4e-3f;  // [m] apart
 constexpr float kFast = 0.2f;
 constexpr float kOnDrape = 0.4e-3f;  // [m]
 constexpr float kOpenForce = 2;      // [N] at the tips, maximum with which jaws open against thread round them
+constexpr float kCloseForce = 3;     // [N] at the tip of a jaw, maximum with which jaws close on tissue that they do not hold
 
 // Velocity of the hand's target, from the target of the last step.
 struct Wish {
@@ -127,30 +128,57 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
       continue;
     }
     const Body& body = bodies.body[b];
-    if (m.holder != wall::kNone) {
-      const Body& tool = bodies.body[m.holder];
-      m.drag_spin = tool.spin;
-      m.drag_speed = tool.velocity + cross(tool.spin, center_of(model.body[b], body) - center_of(model.body[m.holder], tool));
-      continue;
-    }
     // Thread that leaves a wedge is faster than the needle was: a drag must not take it along.
     if (m.drag > 0) m.drag_speed = clamped(m.drag_speed / m.drag, length(body.velocity));
     if (m.turn_drag > 0) m.drag_spin = clamped(m.drag_spin / m.turn_drag, length(body.spin));
     // The thread may have left it since then; what it did acts in this step all the same.
     m.drag += length(body.thread_force) * h / kGive;
     m.turn_drag += length(body.thread_torque) * h / kGive * std::sqrt(model.body[b].inertia / model.body[b].mass);
+    if (m.holder == wall::kNone) continue;
+    const Body& tool = bodies.body[m.holder];
+    m.drag_spin = tool.spin;
+    m.drag_speed = tool.velocity + cross(tool.spin, center_of(model.body[b], body) - center_of(model.body[m.holder], tool));
   }
+}
+
+// [N] with which the wall presses the inner side of each jaw, at the tips; negative: no contact.
+static std::array<float, 2> squeeze_of(const BodyModel& m, const Bodies& bodies, uint32_t b, float h) {
+  std::array<float, 2> force{-1, -1};
+  for (const uint64_t kind : {1, 2}) {
+    auto at = std::lower_bound(bodies.memory.begin(), bodies.memory.end(), key_of(kind, b, 0, 0),
+                               [](const RowMemory& r, uint64_t key) { return r.key < key; });
+    for (; at != bodies.memory.end() && at->key < key_of(kind, b + 1, 0, 0); ++at) {
+      const uint32_t part = static_cast<uint32_t>(at->key >> 36) & 0xffff;
+      const BodySphere& s = m.sphere[kind == 1 ? part : m.capsule[part].a];
+      if (s.jaw == 0) continue;
+      const Vec3 outward = rotate(bodies.body[b].pose.q, {static_cast<float>(s.jaw), 0, 0});
+      if (dot(at->axis, outward) < 0.3f) continue;
+      float& sum = force[s.jaw > 0 ? 1 : 0];
+      sum = std::max(sum, 0.0f) + std::max(dot(at->impulse, outward), 0.0f) / h * (m.hinge_z - s.at.z) / m.hinge_z;
+    }
+  }
+  return force;
 }
 
 void predict_bodies(const BodiesModel& model, const Bodies& bodies, std::span<const HandTarget> target, float h,
                     BodiesScratch& k) {
   k.moving.resize(bodies.body.size());
+  constexpr float kSlow = 0.15f;
   for (size_t i = 0; i < bodies.body.size(); ++i) {
     start_motion(model, model.body[i], bodies.body[i], i < target.size() ? &target[i] : nullptr, h, {}, {}, k.moving[i]);
+    k.moving[i].squeeze = 0;
     const Body& b = bodies.body[i];
     const BodyModel& m = model.body[i];
     float opening = i < target.size() && target[i].connected ? target[i].opening : b.opening;
     opening = std::clamp(opening, b.opening - m.jaw_speed * h, b.opening + m.jaw_speed * h);
+    if (m.hinge_z > 0 && opening < b.opening) {
+      // Jaws that close stop at tissue between them: slow where both meet it, at half of kCloseForce half as fast, above it
+      // they yield.
+      const std::array<float, 2> force = squeeze_of(m, bodies, static_cast<uint32_t>(i), h);
+      const float least = std::min(force[0], force[1]), most = std::max(force[0], force[1]);
+      if (least >= 0) opening = b.opening + (opening - b.opening) * (kSlow * std::max(-1.0f, 1 - most / kCloseForce));
+      k.moving[i].squeeze = std::max(0.0f, least);
+    }
     k.moving[i].opening = opening;
   }
   k.overflow = 0, k.step = h;
@@ -368,7 +396,7 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
     switch (row.kind) {
       case Row::Kind::contact: {
         const float wanted = row.gap >= 0 ? -row.gap / h : std::min(-row.gap / h, model.push_out);
-        float press = std::max(0.0f, pn - (un - wanted) / row.diagonal_along);
+        float press = std::max(0.0f, pn - (un - wanted + pn * row.soft) / (row.diagonal_along + row.soft));
         row.at_limit = row.along_limit > 0 && press >= row.along_limit;
         if (row.at_limit) press = row.along_limit;
         return row.axis * press + clamped(pt - ut / row.diagonal_across, row.friction * press);

@@ -10,6 +10,7 @@
 namespace catgut::physical {
 namespace {
 
+constexpr float kTake = 0.5f;          // [N] with which both jaws press tissue that they take
 constexpr uint32_t kOtherStrand = 12;  // nodes apart along the thread: two places between the same jaws are two strands
 
 // The nearest point of the wall's surface to p among all faces.
@@ -144,7 +145,8 @@ void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::Sta
           grip.size = 2.6f * size;  // twisted strands lie on each other somewhere in the width of the jaws
         }
       }
-      if (grip.what == Gripped::nothing && !strand_between && (target[b].may_hold & 4) && closed_on(0, wm.laminate.thickness)) {
+      const bool on_tissue = closed_on(0, wm.laminate.thickness) || k.moving[b].squeeze > kTake;
+      if (grip.what == Gripped::nothing && !strand_between && (target[b].may_hold & 4) && on_tissue) {
         const Foot foot = nearest_surface(wm, ws, surface, k, body.pose.p, 3e-3f);
         if (foot.gap < 1.2e-3f || (foot.gap < 1e8f && dot(body.pose.p - foot.at, foot.facing) < 0 && foot.gap < 2e-3f)) {
           grip = {};

@@ -9,6 +9,7 @@ namespace catgut::physical {
 namespace {
 
 constexpr float kBeside = 1.2e-3f;  // [m] of shaft outside a hole that does not touch the face: it leaves at a slant
+constexpr float kBackward = 5e-3f;  // [m/s]
 constexpr float kTipRadius = 0.08e-3f;
 
 Vec3 place_of(const wall::Model& wm, const wall::State& ws, const wall::Point& p) {
@@ -269,8 +270,10 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
     row.key = key(3, foot.patch), row.on_wall = true,
     row.point = load_point(wall::weights(wm, ws.topology, foot.point), ws.motion, foot.normal);
     row.axis = foot.normal, row.gap = foot.gap - kTipRadius, row.friction = law.tip_friction;
-    const bool enters =
-        surface.patch[foot.patch].side != 0 && -dot(tangent, foot.normal) > law.least_slope && n.channels < kMaxChannels;
+    // A tip that is drawn backward over a face scratches it and does not enter.
+    const Vec3 onward = body.velocity + cross(body.spin, tip - center) - wall::velocity(row.point, ws.motion);
+    const bool enters = surface.patch[foot.patch].side != 0 && -dot(tangent, foot.normal) > law.least_slope &&
+                        dot(onward, tangent) > -kBackward && n.channels < kMaxChannels;
     if (enters) row.along_limit = puncture_force(law, m.shape) * h;
     n.tip_row = static_cast<uint32_t>(k.row.size()), n.tip_on = foot.point;
     add(row, tip - foot.normal * kTipRadius);

@@ -11,6 +11,8 @@ namespace catgut::thread {
 namespace {
 
 constexpr float kPushOut = 0.2f;   // [m/s]
+constexpr float kDeep = 0.15e-3f;  // [m] inside, where a node comes that was in no contact
+constexpr float kDeepPress = 2;    // [N] then, at most
 constexpr float kSlid = 0.15e-3f;  // [m] past its plane's foot, beyond which a node gets another plane: half a thread
 
 Four motion(const Scratch& s, const Scratch::SoftActive& c) {
@@ -53,6 +55,9 @@ void begin_soft_contacts(const Settings& settings, State& state, Scratch& s, Sur
     // A node that was inside before the substep comes out at a limited speed.
     const float before = gap - dot(a.normal, motion(s, a)), target = std::min(0.0f, before + kPushOut * settings.substep);
     a.level = before - target, a.before = before;
+    // Thread in a bite that tore out lies within the wall, and both faces would push it out.
+    const float gentle = kDeepPress * settings.substep * settings.substep;
+    if (before < -kDeep && c.normal_impulse <= gentle) a.most = gentle;
     a.ln = c.normal_impulse, a.lt = four(tangential(c.friction_impulse, c.normal));
     s.soft_active.push_back(a);
   }

@@ -127,8 +127,10 @@ TEST(WrongAltemeier, a_stitch_goes_through_char) {
   auto& burnt = t.f.state->physical.cutting.excision.burnt;
   burnt.resize(t.f.model->physical->world.wall.mesh.face.size());
   for (auto& face : burnt) face.fill(1);
-  const std::unique_ptr<Surgeon> surgeon = make_demonstrator("altemeier", picture_model(*t.f.model), skill_of(scene), {0, 1});
-  while (t.f.of(EventKind::tip_entered).empty() && t.f.state->tick < 900) {
+  // Nothing is cut here, and the anastomosis' bites would be in the way: any bite in the wall does.
+  const std::unique_ptr<Surgeon> surgeon =
+      make_demonstrator("purse_string_thread", picture_model(*t.f.model), skill_of(scene), {0, 1, 2, 3});
+  while (t.f.of(EventKind::tip_entered).empty() && t.f.state->tick < 1500) {
     t.f.input = surgeon->operate(t.f.seen, t.f.model->dt);
     t.f.tick();
   }

@@ -297,7 +297,7 @@ TEST(Needle, jaws_hold_it_by_friction) {
     const Vec3 pull = arc_tangent(needle, pose, 1) * 2.0f;
     for (int i = 0; i < 60; ++i) {
       bench.target[t] = {jaws, true, 0, grip};
-      bench.body(n).thread_force = pull;  // as if a thread drew at the needle's center
+      bench.target[n].load = pull;  // at the needle's center
       bench.step();
     }
     const float moved = distance(to_local(bench.body(t).pose, bench.body(n).pose.p), before);
@@ -571,6 +571,32 @@ TEST(Tool, jaws_that_let_go_of_an_edge_do_not_throw_it) {
     EXPECT_EQ(bench.body(t).grip.what, Gripped::nothing);
     EXPECT_EQ(bench.body(t).skip, 0u) << "parted";
     EXPECT_LT(fastest, 1.0f) << turn;
+  }
+}
+
+// Jaws that close to take a thread, with the sheet's edge between them, stop at it: they squeeze it with a limited force.
+TEST(Tool, jaws_that_close_for_thread_do_not_crush_an_edge) {
+  for (const float turn : {0.0f, 0.3f, 0.6f}) {
+    Bench bench(0.03f, 0.02f, true);
+    const Vec3 at{0.015f, 0.0025f, 0.6e-3f}, x{std::sin(turn), 0, std::cos(turn)}, z{0, -1, 0};
+    const Pose pose{at, from_axes(x, cross(z, x), z)};
+    const uint32_t t = bench.add(make_tool({}), pose, 0.25f);
+    bench.start();
+    float fastest = 0, squeezed = 0;  // [m/s]; [N] by one jaw
+    for (int i = 0; i < 300; ++i) {
+      bench.target[t] = {pose, true, 0, 20, 2};
+      bench.step();
+      float now = 0;
+      for (const RowMemory& m : bench.state.bodies.memory) now += std::max(0.0f, dot(m.impulse, x)) / bench.model.wall.step;
+      squeezed = std::max(squeezed, now);
+      for (uint32_t c = 0; c < wall::columns(bench.state.wall); ++c)
+        for (const float side : {-1.0f, 1.0f})
+          fastest = std::max(fastest, length(wall::velocity(wall::at_column(c, side), bench.state.wall.motion)));
+    }
+    EXPECT_EQ(bench.body(t).grip.what, Gripped::nothing);
+    EXPECT_LT(fastest, 0.5f) << turn;
+    EXPECT_LT(bench.overlap(t), 0.3e-3f) << turn;
+    EXPECT_LT(squeezed, 10) << turn;
   }
 }
 
