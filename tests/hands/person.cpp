@@ -475,11 +475,11 @@ bool Person::score(size_t k, float edge, float from, float to) {
   if (!point(k, place, on_it)) return false;
   doing_ = "cut along the line";
   if (!pen(k, PenMode::cut)) return false;
-  // No smoke: the tip is not on the tissue yet.
+  // No smoke: the tip is not on the tissue yet, and the user presses on.
   const auto burns = [&] { return seen().instrument[static_cast<size_t>(seen().tool[k].instrument)].burning > 0; };
   Act press;
   press.hand = k, press.motion.ahead = 0.0004f;
-  wait(2, burns, press);
+  wait(6, burns, press);
   const float radius = distance(place(), line_at(angle + kPi, edge)) / 2;
   // Simulated time: where the machine is late, tissue burns as slowly as the hand moves.
   double last = seen().time_s;
