@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "exchange/latest.h"
 #include "exchange/ring.h"
@@ -103,7 +104,8 @@ void WindowHands::move(const WindowInput& in, const Settings& settings, const Vi
   for (size_t k = 0; k < 2; ++k) {
     closed_[k] = order.closed[k] = steering.hand[k].closed;
     opening_[k] = order.opening[k] = steering.hand[k].opening;
-    order.buttons[k] = steering.hand[k].buttons;
+    // Pressed since the last order: with fewer pictures than ticks, a button that is held would be pressed by every order.
+    order.buttons[k] = steering.hand[k].buttons & ~std::exchange(buttons_[k], steering.hand[k].buttons);
   }
   order.view = view;
   order.elsewhere = elsewhere;

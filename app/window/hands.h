@@ -36,6 +36,7 @@ class WindowHands {
   std::shared_ptr<Link> link_;
   std::array<bool, 2> closed_{};
   std::array<float, 2> opening_{1, 1};
+  std::array<uint32_t, 2> buttons_{};  // of the last order
   std::array<bool, 2> elsewhere_{};
   bool known_ = false;  // that was adopted from the tools, of
   uint32_t epoch_ = 0;

@@ -474,31 +474,23 @@ bool Person::score(size_t k, float edge, float from, float to) {
   };
   if (!point(k, place, on_it)) return false;
   doing_ = "cut along the line";
-  const auto instrument = [&]() -> const InstrumentView& {
-    return seen().instrument[static_cast<size_t>(seen().tool[k].instrument)];
-  };
-  const auto burns = [&] { return instrument().burning > 0; };
+  if (!pen(k, PenMode::cut)) return false;
+  // No smoke: the tip is not on the tissue yet.
+  const auto burns = [&] { return seen().instrument[static_cast<size_t>(seen().tool[k].instrument)].burning > 0; };
   Act press;
   press.hand = k, press.motion.ahead = 0.0004f;
+  wait(2, burns, press);
   const float radius = distance(place(), line_at(angle + kPi, edge)) / 2;
-  bool went = false;
-  // A pen that has gone off is switched on again where it stopped.
-  for (int i = 0; i < 3 && !went; ++i) {
-    if (!pen(k, PenMode::cut)) return false;
-    wait(6, burns, press);  // no smoke: the tip is not on the tissue yet
-    // Simulated time: where the machine is late, tissue burns as slowly as the hand moves.
-    double last = seen().time_s;
-    const bool there = point(k, place, [&] {
-      const double passed = std::min(kUnseen, seen().time_s - last);
-      last = seen().time_s;
-      // A user does not run ahead of the pen.
-      if (distance(seen().tool[k].pose.p, place()) < kAhead)
-        angle = std::min(to, angle + kPenSpeed / radius * static_cast<float>(passed));
-      return angle >= to || instrument().pen != PenMode::cut;
-    });
-    if (!there) break;
-    went = angle >= to;
-  }
+  // Simulated time: where the machine is late, tissue burns as slowly as the hand moves.
+  double last = seen().time_s;
+  const bool went = point(k, place, [&] {
+    const double passed = std::min(kUnseen, seen().time_s - last);
+    last = seen().time_s;
+    // A user does not run ahead of the pen.
+    if (distance(seen().tool[k].pose.p, place()) < kAhead)
+      angle = std::min(to, angle + kPenSpeed / radius * static_cast<float>(passed));
+    return angle >= to;
+  });
   return pen(k, PenMode::off) && went;
 }
 
