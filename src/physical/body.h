@@ -131,7 +131,7 @@ struct Row {
   Vec3 wanted;                              // [m/s] relative velocity of a that undoes an error; contact: along the axis only
   float gap = 0;                            // [m] contact
   float least = 0;                          // [m] contact: the gap at the end of the step, at least
-  float soft = 0;                           // [1/kg] compliance over h^2, of the bilateral directions
+  float soft = 0;                           // [1/kg] compliance over h^2, of bilateral directions and of a contact
   float soft_across = 0;                    // [1/kg] spring: across the axis
   float friction = 0;                       // contact
   float along_limit = 0, across_limit = 0;  // [N s]; contact: along 0 is unlimited

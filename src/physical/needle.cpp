@@ -9,7 +9,7 @@ namespace catgut::physical {
 namespace {
 
 constexpr float kBeside = 1.2e-3f;  // [m] of shaft outside a hole that does not touch the face: it leaves at a slant
-constexpr float kBackward = 5e-3f;  // [m/s]
+constexpr float kBackward = 5e-3f;  // [m/s] along its point, of a tip that scratches and does not enter
 constexpr float kTipRadius = 0.08e-3f;
 
 Vec3 place_of(const wall::Model& wm, const wall::State& ws, const wall::Point& p) {
