@@ -224,8 +224,8 @@ void place_body(const BodyModel& model, Body& body, const Pose& pose, float open
 
 // Stages of physical::step.
 // Before all others: the drag of bodies that bore on taut thread at the end of the last step.
-void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, float substep, float h,
-                 BodiesScratch& k);
+void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, const thread::Plane* drape,
+                 float substep, float h, BodiesScratch& k);
 // Before wall::begin_step: velocities of the bodies without contact.
 void predict_bodies(const BodiesModel& model, const Bodies& bodies, std::span<const HandTarget> target, float h,
                     BodiesScratch& k);

@@ -21,7 +21,8 @@ constexpr float kLoosePress = 0.3f;
 constexpr float kBetweenPress = 4;
 constexpr float kBetween = 0.4e-3f;  // [m] apart
 // [m/s] A needle that nothing holds, and that is faster, is moved by the thread within the thread's step: it stops at a strand
-// or is thrown back, with any force. At rest on elastic coils it would be pushed about for seconds; there it has a drag.
+// or is thrown back, with any force. So is one that thread presses with kLoosePress against tissue. At rest on elastic coils it
+// would be pushed about for seconds; there it has a drag.
 constexpr float kFast = 0.2f;
 constexpr float kOnDrape = 0.4e-3f;  // [m]
 constexpr float kOpenForce = 2;      // [N] at the tips, maximum with which jaws open against thread round them
@@ -78,14 +79,21 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
   }
 }
 
+bool is_on(const thread::Plane* drape, const BodyModel& model, const Body& body) {
+  return drape && std::any_of(model.sphere.begin(), model.sphere.end(), [&](const BodySphere& s) {
+           const Vec3 at = transform(body.pose, local(model, s, body.opening));
+           return dot(drape->normal, at) - drape->offset < std::abs(s.radius) + kOnDrape;
+         });
+}
+
 }  // namespace
 
 // The thread's force on a tool is one step late. A throw round the jaws holds them from all sides, with up to 1e6 N/m, and the
 // jaws' tips weigh 16 g to it: they would be thrown to and fro, in 20 steps with 50 N. A drag toward the hand's motion, as
 // great as the load, holds them; where nothing moves it does nothing. A needle that falls on thread, or has it pulled against
 // its side, would be thrown away likewise, and one in jaws turned to and fro in their grip: its drag is toward their motion.
-void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, float substep, float h,
-                 BodiesScratch& k) {
+void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, const thread::Plane* drape,
+                 float substep, float h, BodiesScratch& k) {
   constexpr float kGive = 20e-6f;  // [m] by which a tool moves off thread that presses it, until the thread is slack
   k.moving.resize(bodies.body.size());
   for (size_t b = 0; b < bodies.body.size(); ++b) {
@@ -114,6 +122,7 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
                          thread.crossing[i].t);
     const float drag = load * h / kGive, arm2 = length2(at - m.center);
     k.moving[b].drag += drag, k.moving[b].turn_drag += drag * arm2;
+    k.moving[b].fast |= k.moving[b].loose && load >= 0.99f * kLoosePress && !is_on(drape, m, bodies.body[b]);
     if (!model.body[b].falls || k.moving[b].fast || k.moving[b].holder != wall::kNone) continue;
     const uint32_t node = thread::segment_of(thread.key[i]);
     const Vec3 speed = lerp(thread.v.at(node), thread.v.at(node + 1), thread.crossing[i].s);
@@ -240,11 +249,11 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* 
       t.widens = m.falls ? std::abs(z.radius) - t.radius : 0;
       t.friction = m.thread_friction;
       const auto on_drape = [&](Vec3 p) { return drape && dot(drape->normal, p) - drape->offset < t.radius + kOnDrape; };
-      // Of another needle the swage passes where its thread does, and the tip, driven on, would crush thread.
-      const bool end = m.falls && (&c == &m.thread_capsule.front() || &c == &m.thread_capsule.back());
+      // Of a needle in jaws or tissue the swage passes where its thread does, and the tip, driven on, would crush thread.
+      const bool swage = m.falls && &c == &m.thread_capsule.front(), tip = m.falls && &c == &m.thread_capsule.back();
       if (moving.fast) t.body = static_cast<uint32_t>(k.loose.size());
-      else if (end) t.press = 0;
-      else if (moving.loose || on_drape(t.to_a) || on_drape(t.to_b)) t.press = kLoosePress;
+      else if (swage && !moving.loose) t.press = 0;
+      else if (moving.loose || tip || on_drape(t.to_a) || on_drape(t.to_b)) t.press = kLoosePress;
       k.tool.push_back(t), k.tool_body.push_back(b);
     }
     for (size_t i = 0; i < k.hold.size(); ++i)

@@ -272,7 +272,7 @@ void begin_bodies(const Model& m, State& s, Scratch& k, const Hands& hands) {
   const Surface& surface = surface_of(m, s);
   const float h = m.wall.step;
   s.bodies.memory.reserve(kMaxRows), s.hole.reserve(thread::kMaxEyelets);
-  feel_thread(m.bodies, s.bodies, s.thread, m.thread.substep, h, k.bodies);
+  feel_thread(m.bodies, s.bodies, s.thread, hands.plane, m.thread.substep, h, k.bodies);
   predict_bodies(m.bodies, s.bodies, hands.targets, h, k.bodies);
   open_gently(m.bodies, s.bodies, s.thread, m.thread.material.diameter, h, k.bodies);
   skip_channels(m.needles, m.wall, s.wall, s.needle, s.bodies);

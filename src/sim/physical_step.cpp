@@ -491,6 +491,39 @@ void sum_haptics(const Model& model, State& state, const PhysicalScratch& k, int
 
 }  // namespace
 
+// Particles move with the wall as it was built: near a cut edge, some of those round a bite have left with the specimen. Holes
+// and channels know their places on the cut wall.
+void publish_holes(const Model& model, const State& state, size_t which, SutureView& out) {
+  const physical::State& world = state.physical.world;
+  const Suture& suture = state.suture.suture[which];
+  const auto weights = [&](const wall::Point& p) { return wall::weights(model.physical->world.wall, world.wall.topology, p); };
+  const auto place = [&](const wall::Point& p) { return wall::place(weights(p), world.wall.motion); };
+  const auto organ = [&](const wall::Point& p) { return model.wall[2 * world.wall.topology.source[weights(p).column[0]]]; };
+  const auto show_entry = [&](BiteView& b, const wall::Point& p) {
+    b.entry = b.entry_made = place(p), b.entry_inside = p.zeta < 0, b.wall = organ(p);
+  };
+  const auto show_exit = [&](BiteView& b, const wall::Point& p) {
+    b.exit = b.exit_made = place(p), b.exit_inside = p.zeta < 0;
+  };
+  const physical::Needle& needle = world.needle[which];
+  for (size_t i = 0; i < std::min<size_t>(suture.open.size(), needle.channels); ++i) {  // both from the swage to the tip
+    const physical::Channel& c = needle.channel[i];
+    BiteView& b = out.bite[suture.open[i].bite];
+    show_entry(b, c.point[0]);
+    if (b.has_exit) show_exit(b, c.point[c.count - 1]);
+  }
+  const std::vector<uint32_t>& hole = state.physical.suture[which].hole;
+  for (size_t i = 0; i < hole.size(); ++i) {
+    const physical::Hole& h = world.hole[hole[i]];
+    SuturePointView& point = out.suture_point[i];
+    BiteView& b = out.bite[point.bite];
+    point.position = place(h.place), point.wall = organ(h.place);
+    if (point.exit) show_exit(b, h.place);
+    else show_entry(b, h.place);
+    if (h.torn > 0) (point.exit ? b.exit_made : b.entry_made) = place(h.made);
+  }
+}
+
 bool has_clamp(const Model& model, size_t body) {
   return model.physical && body < model.scene.body.size() && model.rim.size() == model.scene.body.size() &&
          model.scene.body[body].pinned_length > 0;

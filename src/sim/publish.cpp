@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "sim/model.h"
+#include "sim/physical.h"
 #include "sim/state.h"
 
 namespace catgut {
@@ -118,6 +119,7 @@ void publish_suture(const Model& model, const State& state, size_t which, Suture
     if (!strand.cut[i]) out.thread_rest += strand.rest[i];
   out.needle_on_thread = is_swaged(strand);
   publish_bites(model, state, which, out);
+  if (model.physical) publish_holes(model, state, which, out);
   publish_knots(state, which, out);
 }
 
