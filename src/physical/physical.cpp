@@ -152,9 +152,9 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       continue;
     if (k.search.node_first[i] == k.search.node_first[i + 1]) continue;
     while (old < s.contact.size() && s.contact[old].node < i) ++old;
-    const thread::SoftContact* memory = old < s.contact.size() && s.contact[old].node == i ? &s.contact[old] : nullptr;
-    const bool two = memory && old + 1 < s.contact.size() && s.contact[old + 1].node == i;
-    if (two && s.contact[old + 1].normal_impulse > memory->normal_impulse) ++memory;  // the one that presses
+    const thread::SoftContact* memory = nullptr;  // the one that presses most
+    for (size_t q = old; q < s.contact.size() && s.contact[q].node == i; ++q)
+      if (!memory || s.contact[q].normal_impulse > memory->normal_impulse) memory = &s.contact[q];
     const Vec3 p = s.thread.position(i);
     if (!memory && k.search.moved + static_cast<double>(distance(p, k.search.node_seen[i]) + 1.5f * h * k.search.speed) <
                        k.search.node_due[i])
@@ -202,31 +202,36 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       return found;
     };
     add(i, best, memory_of(best.normal), true);
-    // In a fold the node may touch a second face, in front of which it is, with another normal.
-    Foot second;
-    second.gap = r + far_move;
-    for (uint32_t f = k.search.node_first[i]; f < k.search.node_first[i + 1]; ++f) {
-      const uint32_t face = k.search.node_face[f];
-      const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
-      if (least_distance(box, p, 0) > second.gap) continue;
-      for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
-        const int side = surface.patch[q].side;
-        const float useful = memory ? std::max(second.gap, d) : second.gap;  // in front of a face, or behind it in a fold
-        if (q == best.patch || (side != 0 && dot(box.n, best.normal) * static_cast<float>(side) > 0.97f) ||
-            least_distance(m.wall, s.wall, surface, k.search, box, q, p) > second.gap ||
-            least_of_part(surface, k.search, q, p) > useful + 1e-6f)
-          continue;
-        const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p, corners_in(k.search, q));
-        // A little behind it, too, where the two faces make a fold: each lies before the other, or they meet at the foot.
-        constexpr float kSame = 1e-6f;  // [m]
-        const Vec3 between = foot.at - best.at;
-        const bool fold = foot.gap <= 0 && foot.gap > -d && memory && dot(between, best.facing) > -kSame &&
-                          dot(between, foot.facing) < kSame && (!foot.on_edge || length2(between) < kSame * kSame);
-        if (((foot.gap > 0 && !foot.on_edge) || fold) && foot.gap < second.gap && dot(foot.facing, best.normal) < 0.95f)
-          second = foot;
+    // In a fold the node may touch a second face, in front of which it is, with another normal; in a pit a third one.
+    Foot second, third;
+    for (Foot* other : {&second, &third}) {
+      other->gap = r + far_move;
+      const auto like = [&](Vec3 normal) {
+        return dot(normal, best.normal) >= 0.95f || (other == &third && dot(normal, second.normal) >= 0.95f);
+      };
+      for (uint32_t f = k.search.node_first[i]; f < k.search.node_first[i + 1]; ++f) {
+        const uint32_t face = k.search.node_face[f];
+        const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
+        if (least_distance(box, p, 0) > other->gap) continue;
+        for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
+          const int side = surface.patch[q].side;
+          const float useful = memory ? std::max(other->gap, d) : other->gap;  // in front of a face, or behind it in a fold
+          if (q == best.patch || (side != 0 && dot(box.n, best.normal) * static_cast<float>(side) > 0.97f) ||
+              least_distance(m.wall, s.wall, surface, k.search, box, q, p) > other->gap ||
+              least_of_part(surface, k.search, q, p) > useful + 1e-6f)
+            continue;
+          const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p, corners_in(k.search, q));
+          // A little behind it, too, where the two faces make a fold: each lies before the other, or they meet at the foot.
+          constexpr float kSame = 1e-6f;  // [m]
+          const Vec3 between = foot.at - best.at;
+          const bool fold = foot.gap <= 0 && foot.gap > -d && memory && dot(between, best.facing) > -kSame &&
+                            dot(between, foot.facing) < kSame && (!foot.on_edge || length2(between) < kSame * kSame);
+          if (((foot.gap > 0 && !foot.on_edge) || fold) && foot.gap < other->gap && !like(foot.facing)) *other = foot;
+        }
       }
+      if (other->gap >= r + far_move) break;
+      add(i, *other, memory_of(other->normal), false);
     }
-    if (second.gap < r + far_move) add(i, second, memory_of(second.normal), false);
   }
 }
 
