@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -58,9 +59,10 @@ struct Bench {
   }
   void start() { scratch = std::make_unique<Scratch>(model, state); }
   thread::Plane* drape = nullptr;
+  std::span<const thread::Pull> pulls;
   void step() {
     Hands hands;
-    hands.targets = target, hands.plane = drape;
+    hands.targets = target, hands.plane = drape, hands.pulls = pulls;
     physical::step(model, state, *scratch, hands, *jobs);
   }
   Body& body(uint32_t i) { return state.bodies.body[i]; }
@@ -188,6 +190,42 @@ TEST(Needle, dropped_on_the_drape_it_lies_there_and_does_not_jerk_its_thread) {
       EXPECT_LT(distance(bench.body(n).pose.p, before), 2.5e-3f) << "in half a second";
       EXPECT_LT(tension, 1.0f);
     }
+}
+
+// Thread across a needle that lies on tissue, drawn down on both sides: it presses the needle into the tissue, and stays above
+// it.
+TEST(Needle, thread_drawn_across_one_that_lies_on_tissue_does_not_pass_it) {
+  for (const float pull : {0.5f, 2.0f, 4.0f}) {
+    Bench bench;
+    const NeedleShape shape;
+    // On its side; its middle is the farthest from the middle of the sheet along x.
+    const uint32_t n = bench.add_needle(shape, {{0.015f, 0.01f, 1.25e-3f + shape.wire_radius}, {}});
+    const Vec3 top = arc_point(bench.model.needles.needle[0], bench.body(n).pose, 0.5f * shape.arc);
+    const Vec3 along = normalized(arc_tangent(bench.model.needles.needle[0], bench.body(n).pose, 0.5f * shape.arc));
+    const Vec3 across = cross({0, 0, 1}, along);
+    const float above = shape.wire_radius + 0.6f * bench.model.thread.material.diameter;
+    std::vector<Vec3> path;
+    for (int i = -20; i <= 20; ++i) path.push_back(top + across * (0.25e-3f * static_cast<float>(i)) + Vec3{0, 0, above});
+    bench.state.thread = thread::make_state(path);
+    bench.start();
+    std::array<thread::Pull, 2> pulls{{{0, {}}, {40, {}}}};
+    bench.pulls = pulls;
+    float least = 1;
+    for (int i = 0; i < 200; ++i) {
+      const Vec3 down = Vec3{0, 0, -1} * (pull * std::min(1.0f, 0.01f * static_cast<float>(i)));  // within a tenth of a second
+      pulls[0].force = down - across * (0.5f * length(down)), pulls[1].force = down + across * (0.5f * length(down));
+      bench.step();
+      for (int a = 3; a <= 54; ++a) {  // without the point, which is a cone
+        const Vec3 wire = arc_point(bench.model.needles.needle[0], bench.body(n).pose, shape.arc * static_cast<float>(a) / 60);
+        for (size_t k = 15; k < 25; ++k) {
+          const Vec3 from = bench.state.thread.position(k), way = bench.state.thread.position(k + 1) - from;
+          least = std::min(least, distance(wire, from + way * std::clamp(dot(wire - from, way) / length2(way), 0.0f, 1.0f)));
+        }
+      }
+    }
+    std::printf("%.1f N: the thread comes as near as %.2f mm to the middle of the wire\n", pull, 1e3f * least);
+    EXPECT_GT(least, shape.wire_radius + 0.5f * bench.model.thread.material.diameter - 0.3e-3f) << pull;
+  }
 }
 
 // A hand that loses its way pushes closed jaws 4 mm into the drape, on a thread that lies there.

@@ -282,6 +282,22 @@ TEST(PhysicalScene, a_needle_leads_its_thread_through_both_walls) {
   EXPECT_EQ(seen.active().suture_point.size(), 4u);
   EXPECT_EQ(state->physical.world.thread.eyelet.size(), 4u) << "the thread runs through all holes at the end";
   for (const uint8_t broken : seen.active().thread_cut) EXPECT_FALSE(broken);
+  const auto from_thread = [&](Vec3 p) {
+    const std::vector<uint32_t>& order = seen.active().thread_order;
+    float least = 1;
+    for (size_t i = 0; i + 1 < order.size(); ++i) {
+      const Vec3 a = seen.particle[order[i]], way = seen.particle[order[i + 1]] - a;
+      least = std::min(least, distance(p, a + way * std::clamp(dot(p - a, way) / length2(way), 0.0f, 1.0f)));
+    }
+    return least;
+  };
+  for (const SuturePointView& point : seen.active().suture_point) EXPECT_LT(from_thread(point.position), 0.5e-3f);
+  // Particles round a bite near a cut edge leave with the specimen. The bite stays where the thread is.
+  for (uint32_t i = 0; i < model->solver.tissue; i += 2) set(state->solver.x[i], xyz(state->solver.x[i]) + Vec3{0.1f, 0, 0});
+  publish(*model, *state, seen);
+  for (const SuturePointView& point : seen.active().suture_point) EXPECT_LT(from_thread(point.position), 0.5e-3f);
+  for (const BiteView& bite : seen.active().bite)
+    if (bite.complete) { EXPECT_LT(std::max(from_thread(bite.entry), from_thread(bite.exit)), 0.5e-3f); }
 }
 
 // Two hands pull both ends of a stitch until it tears out: the slit is reported, then the bite is gone, and its slit stays.
