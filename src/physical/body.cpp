@@ -210,12 +210,16 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
         if (dot(k.row[i].axis, foot.normal) > 0.985f && std::abs(k.row[i].gap - gap) < 0.05e-3f) return;
         if (farthest == k.row.size() || k.row[i].least > k.row[farthest].least) farthest = i;
       }
-      const bool replaces = same >= 12;
-      if (replaces && k.row[farthest].least <= least) return;
+      bool replaces = same >= 12;
       if (!replaces && k.row.size() >= kMaxRows - 40 - 24 * std::min<size_t>(bodies.body.size() - 1 - b, 3)) {
+        // Deep in soft tissue: of all contacts of the body, too, those that come nearest.
         ++k.overflow;
-        return;
+        for (size_t i = k.row.size(); i-- > 0 && k.row[i].a == b && k.row[i].on_wall;)
+          if (farthest == k.row.size() || k.row[i].least > k.row[farthest].least) farthest = i;
+        if (farthest == k.row.size()) return;
+        replaces = true;
       }
+      if (replaces && k.row[farthest].least <= least) return;
       Row row;
       row.key = key, row.a = b, row.on_wall = true, row.point = w;
       row.ra = r, row.axis = foot.normal, row.gap = gap, row.least = least, row.speed = jaw_speed,
