@@ -249,7 +249,7 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* 
       t.widens = m.falls ? std::abs(z.radius) - t.radius : 0;
       t.friction = m.thread_friction;
       const auto on_drape = [&](Vec3 p) { return drape && dot(drape->normal, p) - drape->offset < t.radius + kOnDrape; };
-      // Of a needle in jaws or tissue the swage passes where its thread does, and the tip, driven on, would crush thread.
+      // Of a needle in jaws or tissue the swage passes where its thread does. A tip, driven on, would crush thread: it yields.
       const bool swage = m.falls && &c == &m.thread_capsule.front(), tip = m.falls && &c == &m.thread_capsule.back();
       if (moving.fast) t.body = static_cast<uint32_t>(k.loose.size());
       else if (swage && !moving.loose) t.press = 0;

@@ -251,9 +251,8 @@ bool physical_fits(const Model& model, const PhysicalState& state) {
   for (const physical::Sleep::Touched& c : z.touched)
     if (!sleeps(c.strand) || c.tool >= capsules) return false;
   if (s.contact.size() > 4 * nodes || s.lip.size() > 16 * columns) return false;
-  for (size_t i = 0; i < s.contact.size(); ++i)
-    if (s.contact[i].node >= nodes || (i > 0 && s.contact[i].node < s.contact[i - 1].node))
-      return false;  // up to three in a pit
+  for (size_t i = 0; i < s.contact.size(); ++i)  // up to three of a node
+    if (s.contact[i].node >= nodes || (i > 0 && s.contact[i].node < s.contact[i - 1].node)) return false;
   for (size_t i = 1; i < s.lip.size(); ++i)
     if (s.lip[i].key < s.lip[i - 1].key) return false;
   if (s.bodies.body.size() != start.bodies.body.size() || s.needle.size() != start.needle.size() ||

@@ -133,8 +133,8 @@ bool fits(const Model& model, const State& s) {
   indices(s);
   if (!indices.good() || !hands_fit(model.solver.instruments(), s)) return false;
   for (size_t k = 0; k < s.solver.strand.size(); ++k)
-    if ((model.physical && s.physical.suture[k].hole.size() != s.suture.suture[k].point.size()) ||
-        !suture_fits(model.solver, s.solver, s.suture, k) ||
+    if (!suture_fits(model.solver, s.solver, s.suture, k) ||
+        (model.physical && s.physical.suture[k].hole.size() != s.suture.suture[k].point.size()) ||
         !technique_fits(model.technique, s.technique[k], s.plan[k].pair.size(), s.suture.suture[k].point.size()))
       return false;
   return true;

@@ -298,6 +298,11 @@ TEST(PhysicalScene, a_needle_leads_its_thread_through_both_walls) {
   for (const SuturePointView& point : seen.active().suture_point) EXPECT_LT(from_thread(point.position), 0.5e-3f);
   for (const BiteView& bite : seen.active().bite)
     if (bite.complete) { EXPECT_LT(std::max(from_thread(bite.entry), from_thread(bite.exit)), 0.5e-3f); }
+  // Every suture point has its hole. A state in which one is missing is refused.
+  const StatePtr loaded = initial_state(*model);
+  EXPECT_NO_THROW(load_state(*model, *loaded, save_state(*model, *state)));
+  state->physical.suture[0].hole.pop_back();
+  EXPECT_THROW(load_state(*model, *loaded, save_state(*model, *state)), InputError);
 }
 
 // Two hands pull both ends of a stitch until it tears out: the slit is reported, then the bite is gone, and its slit stays.
