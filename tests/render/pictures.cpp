@@ -19,13 +19,14 @@ constexpr int kWidth = 320, kHeight = 180;
 
 // One renderer and one picture for all tests: starting it takes longer than the pictures.
 struct Stage {
-  TestField field = make_test_field();
+  explicit Stage(const TestField& with) : field(with) {}
+  TestField field;
   std::unique_ptr<Renderer> renderer = make_renderer(field.model, kWidth, kHeight, Quality::low);
   Camera camera = overview(field.model);
   Image picture = renderer->render(field.snapshot, camera);
 };
 Stage& stage() {
-  static Stage the_stage;
+  static Stage the_stage{make_test_field()};
   return the_stage;
 }
 
@@ -116,6 +117,41 @@ TEST(Pictures, ThreadThatSankIntoTheWallIsDrawnOnIt) {
   const int on_it = count(0.0203f);
   ASSERT_GT(on_it, 20);
   EXPECT_GT(count(0.0192f), 0.8f * float(on_it));  // 0.8 mm below the surface
+}
+
+// From the lumen over the rim and down the outer side: what lies there belongs to the outer side, and is not drawn on the inner
+// one.
+TEST(Pictures, ThreadThatGoesOverTheRimIsDrawnOnTheOuterSide) {
+  NEEDS_RENDERER();
+  constexpr float kThin = 0.002f;  // [m] the inner side is within the reach of the search
+  Stage s{make_test_field(96, 40, kThin)};
+  Snapshot over = s.field.snapshot;
+  over.tool = {};
+  for (InstrumentView& tool : over.instrument) tool.pose.p = {0, 5, 0};
+  over.active().needle.pose.p = {0, 5, 0};
+  over.active().suture_point.clear();
+  const float toward = std::atan2(s.camera.eye.x, s.camera.eye.z), inner = 0.0197f - kThin;
+  const auto at = [&](float radius, float y) { return Vec3{radius * std::sin(toward), y, radius * std::cos(toward)}; };
+  // Blue pixels about the outer side, below the rim.
+  const auto count = [&](Vec3 from) {
+    const std::array<Vec3, 4> corner{from, at(0.5f * (0.0203f + inner), 0.0006f), at(0.0200f, 0.0002f), at(0.0199f, -0.010f)};
+    const size_t n = over.active().thread_order.size();
+    for (size_t i = 0; i < n; ++i) {
+      const float t = 3 * float(i) / float(n - 1);
+      const size_t k = std::min<size_t>(size_t(t), 2);
+      over.particle[over.active().thread_order[i]] = lerp(corner[k], corner[k + 1], t - float(k));
+    }
+    const Image picture = s.renderer->render(over, s.camera);
+    const auto [x0, top] = project(s.camera, at(0.0203f, -0.002f));
+    const auto [x1, bottom] = project(s.camera, at(0.0203f, -0.010f));
+    int blue = 0;
+    for (int y = std::max(top, 0); y < std::min(bottom, kHeight); ++y)
+      for (int x = x0 - 8; x < x0 + 8; ++x) blue += bluish(pixel(picture, x, y));
+    return blue;
+  };
+  const int from_outside = count(at(0.0203f, 0.002f));
+  ASSERT_GT(from_outside, 10);
+  EXPECT_GT(count(at(inner, -0.006f)), 0.8f * float(from_outside));
 }
 
 // Physics has no cloth: a slack thread falls through the drape's plane.

@@ -11,13 +11,13 @@ struct TestField {
   Snapshot snapshot;
 };
 
-// A tube 20 mm in radius with 3 mm walls, rim up at y = 0, 70 mm long. Each vertex follows the particle at its own ring and
-// side. `around` x `rows` sets how fine it is.
-inline TestField make_test_field(int around = 96, int rows = 40) {
+// A tube 20 mm in radius with walls of `wall` [m], rim up at y = 0, 70 mm long. Each vertex follows the particle at its own
+// ring and side. `around` x `rows` sets how fine it is.
+inline TestField make_test_field(int around = 96, int rows = 40, float wall = 0.003f) {
   TestField field;
   PictureModel& model = field.model;
   model.title = "test field";
-  const float outer = 0.020f, wall = 0.003f, length = 0.07f;
+  const float outer = 0.020f, length = 0.07f;
   constexpr int rings = 8, sides = 16;
   const auto on_tube = [](float r, float y, float a) { return Vec3{r * std::cos(a), y, -r * std::sin(a)}; };
   for (int i = 0; i < rings; ++i)

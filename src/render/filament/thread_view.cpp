@@ -41,29 +41,39 @@ constexpr uint8_t kThroughWalls = 0, kOutside = 1, kInWall = 2;
 constexpr float kTissueReach = 0.004f, kClothReach = 0.007f;  // [m] maximum depth of a thread that is lifted out
 
 // The tissue's surface near p: position and normal. `side`: the side of the wall that the thread lies on, updated. A thread
-// between the two sides of a wall belongs to the side that it was on before.
+// between the two sides of a wall belongs to the side that it was on before; one that has gone over an edge and lies on the
+// other side belongs to that.
 bool tissue_surface(const ThreadView& view, std::span<const TissueView> tissue, const Motions& motion, Vec3 p, int& side,
                     Vec3& at, Vec3& normal) {
   constexpr float other_side = 0.0025f;  // [m] how much farther the other side counts
-  float least = 1;
-  size_t body = 0;
-  uint32_t vertex = 0;
+  constexpr float sunk = 0.0004f;        // [m] the same for thread that lies on it, or so little below
+  struct Near {
+    float cost = 1;
+    size_t body = 0;
+    uint32_t vertex = 0;
+  } any, same;
+  const auto keep = [](Near& best, float cost, size_t body, uint32_t vertex) {
+    if (cost < best.cost) best = {cost, body, vertex};
+  };
   for (size_t b = 0; b < tissue.size(); ++b) {
     const std::vector<TissueLayer>& layer = tissue[b].mesh->layer;
     view.grid[b].near(p, [&](uint32_t v, float d2) {
       if (v >= layer.size()) return;  // the copy of a vertex on a texture seam
       const bool other = side >= 0 && layer[v] != TissueLayer::cut_edge && int(layer[v]) != side;
-      const float cost = d2 + (other ? other_side * other_side : 0);
-      if (cost < least) least = cost, body = b, vertex = v;
+      keep(any, d2, b, v), keep(same, d2 + (other ? other_side * other_side : 0), b, v);
     });
   }
-  if (least >= kTissueReach * kTissueReach) {
+  const auto frame_of = [&](const Near& near) { return follow(tissue[near.body].vertex[near.vertex], motion.of).frame; };
+  const auto height = [&](const Near& near) {
+    return dot(p - tissue[near.body].drawn[near.vertex], rotate(frame_of(near), {0, 0, 1}));
+  };
+  const Near& near = any.cost < kTissueReach * kTissueReach && height(any) > -sunk ? any : same;
+  if (near.cost >= kTissueReach * kTissueReach) {
     side = -1;
     return false;
   }
-  if (const TissueLayer layer = tissue[body].mesh->layer[vertex]; layer != TissueLayer::cut_edge) side = int(layer);
-  const Skinned here = follow(tissue[body].vertex[vertex], motion.of);
-  at = tissue[body].drawn[vertex], normal = rotate(here.frame, {0, 0, 1});
+  if (const TissueLayer layer = tissue[near.body].mesh->layer[near.vertex]; layer != TissueLayer::cut_edge) side = int(layer);
+  at = tissue[near.body].drawn[near.vertex], normal = rotate(frame_of(near), {0, 0, 1});
   return true;
 }
 
