@@ -417,6 +417,31 @@ TEST(FirstThrow, of_two_turns_locks_where_one_of_one_turn_slides_and_takes_more_
   EXPECT_NEAR(std::log(single.drawn / twice.drawn) / plain().material.friction, 2.6f, 0.6f);
 }
 
+// [m] by which a tied knot gives when its bite is loaded from nothing up to `load` [N], after both tails were pulled with
+// `tails` [N]; 12 mm: it slides.
+float gives(const validation::Throws& throws, float tails, float load) {
+  Settings settings = validation::knot_settings(0.30f);
+  settings.material = *find_material("silk 2-0");
+  settings.breaks = false;
+  validation::Tightened t(validation::lay_knot(throws, settings.material.diameter, 0.7e-3f));
+  const auto apart = [&] { return distance(t.knot.state.position(t.knot.load_a), t.knot.state.position(t.knot.load_b)); };
+  validation::tighten(settings, t, tails, validation::Drawing::flat, 0.6f);
+  const float before = apart();
+  validation::pull_apart(settings, t, 0, 0.01f, load, 12e-3f);
+  return apart() - before;
+}
+
+// Both ends pulled with 3.8 N tighten a square knot. A granny slides on, and so do throws that lie below another one: at
+// friction 0.3 the ends' tension does not get past the last throw. Each throw must be tight before the next.
+TEST(TiedKnot, gives_little_when_it_is_square_and_was_tightened) {
+  const float square = gives(validation::square(), 3.8f, 0.8f), granny = gives(validation::granny(), 3.8f, 0.8f);
+  const float three = gives(validation::three_throws(), 3.8f, 0.8f);
+  std::printf("up to 0.8 N: square %.2f mm, granny %.2f mm, three throws tightened at once %.2f mm\n",
+              1e3 * static_cast<double>(square), 1e3 * static_cast<double>(granny), 1e3 * static_cast<double>(three));
+  EXPECT_LT(square, 0.7e-3f) << "one segment";
+  EXPECT_GT(granny, 2 * square);
+}
+
 TEST(ToolTies, are_the_same_to_the_bit_every_time) {
   const Settings settings = validation::knot_settings(0.25f);
   validation::TieSettings how;
