@@ -46,7 +46,7 @@ constexpr float kTissueReach = 0.004f, kClothReach = 0.007f;  // [m] maximum dep
 bool tissue_surface(const ThreadView& view, std::span<const TissueView> tissue, const Motions& motion, Vec3 p, int& side,
                     Vec3& at, Vec3& normal) {
   constexpr float other_side = 0.0025f;  // [m] how much farther the other side counts
-  constexpr float sunk = 0.0004f;        // [m] the same for thread that lies on it, or so little below
+  constexpr float sunk = 0.0004f;        // [m] thread above the nearest surface, or less than this below it, lies on it
   struct Near {
     float cost = 1;
     size_t body = 0;
