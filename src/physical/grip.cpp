@@ -11,6 +11,7 @@ namespace catgut::physical {
 namespace {
 
 constexpr float kTake = 0.5f;          // [N] with which both jaws press tissue that they take
+constexpr float kSqueezed = 0.7f;      // of its thickness remains of a wall between closed jaws
 constexpr uint32_t kOtherStrand = 12;  // nodes apart along the thread: two places between the same jaws are two strands
 
 // The nearest point of the wall's surface to p among all faces.
@@ -27,6 +28,53 @@ Foot nearest_surface(const wall::Model& wm, const wall::State& ws, const Surface
     }
   }
   return best;
+}
+
+// The point nearest to p on the face, and on the side of it, where `foot` stands.
+Foot nearest_beside(const wall::Model& wm, const wall::State& ws, const Surface& surface, const Foot& foot, Vec3 p) {
+  Foot best;
+  float far = 1e9f;
+  const uint32_t face = surface.patch[foot.patch].face;
+  for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
+    if (surface.patch[q].side != surface.patch[foot.patch].side) continue;
+    const Foot here = nearest_on_patch(wm, ws, surface, q, p);
+    if (distance(here.at, p) < far) best = here, far = distance(here.at, p);
+  }
+  return best;
+}
+
+void add_point(const Body& tool, const Foot& foot, Grip& grip) {
+  grip.point[grip.count++] = {to_local(tool.pose, foot.at), {}, foot.point, {}};
+}
+
+// A wall between the jaws, held at three points round its nearest one.
+void grip_wall(const wall::Model& wm, const wall::State& ws, const Surface& surface, const Body& tool, const Foot& foot,
+               Grip& grip) {
+  grip = {};
+  grip.what = Gripped::tissue, grip.size = kSqueezed * wm.laminate.thickness;
+  const Vec3 u = any_perpendicular(foot.facing), v = cross(foot.facing, u);
+  for (const Vec3 off : {u * 0.8e-3f, v * 0.7e-3f - u * 0.4e-3f, -v * 0.7e-3f - u * 0.4e-3f})
+    add_point(tool, nearest_beside(wm, ws, surface, foot, foot.at + off), grip);
+}
+
+// Two walls between the jaws, such as two edges held together: each jaw holds its own at two points across the shaft.
+// False: there is only one, or a jaw bears on none.
+bool grip_walls(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, const Body& tool,
+                float gap, Grip& grip) {
+  constexpr float kReach = 1.2e-3f, kAside = 0.7e-3f;  // [m] from a jaw to its wall; of a point from the jaw's middle
+  std::array<Foot, 2> foot;
+  for (size_t i = 0; i < 2; ++i) {
+    foot[i] = nearest_surface(wm, ws, surface, k, transform(tool.pose, {(i == 0 ? -0.5f : 0.5f) * gap, 0, 0}), kReach);
+    if (foot[i].gap > kReach) return false;
+  }
+  if (distance(foot[0].at, foot[1].at) < 1.5f * wm.laminate.thickness) return false;
+  grip = {};
+  grip.what = Gripped::tissue, grip.size = std::min(gap, 2 * kSqueezed * wm.laminate.thickness);
+  for (const Foot& f : foot) {
+    const Vec3 along = normalized(across(rotate(tool.pose.q, {0, 0, 1}), f.facing), any_perpendicular(f.facing));
+    for (const float off : {-kAside, kAside}) add_point(tool, nearest_beside(wm, ws, surface, f, f.at + along * off), grip);
+  }
+  return true;
 }
 
 void grip_needle(const BodiesModel& model, const Bodies& bodies, uint32_t tool, uint32_t needle, Vec3 at, Vec3 tangent,
@@ -147,24 +195,10 @@ void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::Sta
       }
       const bool on_tissue = closed_on(0, wm.laminate.thickness) || k.moving[b].squeeze > kTake;
       if (grip.what == Gripped::nothing && !strand_between && (target[b].may_hold & 4) && on_tissue) {
-        const Foot foot = nearest_surface(wm, ws, surface, k, body.pose.p, 3e-3f);
-        if (foot.gap < 1.2e-3f || (foot.gap < 1e8f && dot(body.pose.p - foot.at, foot.facing) < 0 && foot.gap < 2e-3f)) {
-          grip = {};
-          grip.what = Gripped::tissue, grip.count = 3, grip.size = 0.7f * wm.laminate.thickness;
-          const Vec3 u = any_perpendicular(foot.facing), v = cross(foot.facing, u);
-          for (uint32_t i = 0; i < 3; ++i) {
-            const Vec3 off = i == 0 ? u * 0.8e-3f : i == 1 ? v * 0.7e-3f - u * 0.4e-3f : -v * 0.7e-3f - u * 0.4e-3f;
-            Foot at;
-            at.gap = 1e9f;
-            for (uint32_t q = surface.first_of_face[surface.patch[foot.patch].face];
-                 q < surface.first_of_face[surface.patch[foot.patch].face + 1]; ++q) {
-              if (surface.patch[q].side != surface.patch[foot.patch].side) continue;
-              const Foot here = nearest_on_patch(wm, ws, surface, q, foot.at + off);
-              if (distance(here.at, foot.at + off) < std::abs(at.gap)) at = here, at.gap = distance(here.at, foot.at + off);
-            }
-            grip.point[i].tissue = at.point;
-            grip.point[i].in_tool = to_local(body.pose, at.at);
-          }
+        if (k.moving[b].squeeze <= kTake || !grip_walls(wm, ws, surface, k, body, gap_at(0), grip)) {
+          const Foot foot = nearest_surface(wm, ws, surface, k, body.pose.p, 3e-3f);
+          if (foot.gap < 1.2e-3f || (foot.gap < 1e8f && dot(body.pose.p - foot.at, foot.facing) < 0 && foot.gap < 2e-3f))
+            grip_wall(wm, ws, surface, body, foot, grip);
         }
       }
     }
@@ -173,6 +207,12 @@ void find_grips(const BodiesModel& model, const wall::Model& wm, const wall::Sta
     // The jaws cannot close beyond what they hold.
     const float stop = std::min(0.5f, 0.5f * grip.size / m.hinge_z);
     k.moving[b].opening = std::max(k.moving[b].opening, stop);
+    if (grip.what == Gripped::tissue && grip.count == 4) {  // two walls: each jaw carries its own along
+      constexpr float kGather = 0.1f;                       // [rad/s]
+      k.moving[b].opening = std::max(k.moving[b].opening, body.opening - kGather * h);
+      for (uint32_t i = 0; i < 4; ++i)
+        grip.point[i].in_tool.x = (i < 2 ? -1.0f : 1.0f) * (m.hinge_z - grip.point[i].in_tool.z) * portable::sin(body.opening);
+    }
     const float pinch = grip.force, part = 1.0f / static_cast<float>(grip.count);
     const Vec3 x = rotate(body.pose.q, {1, 0, 0}), center = k.moving[b].center;
     if (grip.what == Gripped::thread) {

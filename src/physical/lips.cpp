@@ -17,7 +17,10 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
   constexpr float kDeep = 1e-3f;     // [m] a point so far inside was never outside
   constexpr float kApart = 1.3e-3f;  // [m] a point so far from a face has no contact with it
   const uint32_t columns = wall::columns(s);
+  constexpr float kTurned = 0.5f;    // cosine to the last normal: less is another side
+  constexpr float kRound = 0.3e-3f;  // [m] beyond a border
   const bool fast = solver.reach + 4 * m.step * search.speed > kDeep;
+  auto last = solver.last.begin();  // in the order of keys, as the points below
   for (uint32_t c = 0; c < columns; ++c) {
     if (search.column_first[c] == search.column_first[c + 1] || (!fast && search.moved < search.column_due[c])) continue;
     float nearest_box = 1e9f;
@@ -27,6 +30,9 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       const Vec3 p = wall::place(w, s.motion);
       const Vec3 up = director(s, c);
       const float speed = length(wall::velocity(w, s.motion));
+      const uint64_t key = (uint64_t{1} << 62) | (uint64_t{c} << 2) | static_cast<uint64_t>(zeta + 1);
+      while (last != solver.last.end() && last->key < key) ++last;
+      const wall::Contact* before = last != solver.last.end() && last->key == key ? &*last : nullptr;
       Foot best;
       best.gap = 1e9f;
       const auto look = [&](const FaceBox& box, uint32_t q) {
@@ -38,7 +44,10 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
         const Foot foot = nearest_on_patch(m, s, surface, q, p, corners_in(search, q));
         if (foot.gap < -kDeep || std::abs(foot.gap) > std::abs(best.gap)) return;
         if (std::abs(foot.gap) == std::abs(best.gap) && q < best.patch) return;  // whatever was looked at first
-        if (foot.gap < 0 && foot.on_edge) return;
+        // What was on one side of a wall stays there: the nearest side would let two edges hook into each other. An edge ends
+        // in a sharp border here; a real one is round, and what has come against it still meets it a little beyond.
+        if (before && dot(foot.normal, before->normal) < kTurned) return;
+        if (foot.gap < 0 && foot.on_edge && length2(cross(p - foot.at, foot.facing)) > (before ? kRound * kRound : 0)) return;
         // The wall of the point itself lies behind it, outside the other part: the inner side for a point of a face.
         if (!surface.at_rim[c] && dot(foot.normal, up) * zeta > -0.3f * length(up)) return;
         best = foot;
@@ -66,7 +75,7 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       if (best.gap > solver.reach &&
           best.gap > solver.reach + 2 * m.step * length(wall::velocity(w, s.motion) - wall::velocity(k.other, s.motion)))
         continue;
-      k.key = (uint64_t{1} << 62) | (uint64_t{c} << 2) | static_cast<uint64_t>(zeta + 1);
+      k.key = key;
       k.normal = best.normal, k.gap = best.gap, k.friction = friction;
       solver.contact.push_back(k);
     }

@@ -105,6 +105,18 @@ uint64_t hash_state(const State& s) {
 
 namespace {
 
+// The thread's end at a swage, where the needle has made its hole: it follows the needle in. With a contact there it would
+// stand before the hole and drag the wall along.
+bool before_its_hole(const Model& m, const State& s, uint32_t node) {
+  constexpr float kBeside = 1.2e-3f;  // [m] from the middle of the hole
+  for (const Needle& n : s.needle) {
+    if (n.thread_node != node || n.channels == 0 || n.channel[0].entry_hole != wall::kNone) continue;
+    const Vec3 hole = wall::place(wall::weights(m.wall, s.wall.topology, n.channel[0].point[0]), s.wall.motion);
+    return distance(hole, s.thread.position(node)) < kBeside;
+  }
+  return false;
+}
+
 // Nodes near the surface: each gets the nearest point of the wall, on the side where it was. Neighbors share a point of the
 // coupling, because every point answers every other.
 void find_contacts(const Model& m, const State& s, Scratch& k) {
@@ -192,6 +204,7 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
     const wall::Weights w = best.gap < 1e8f ? wall::weights(m.wall, s.wall.topology, best.point) : wall::Weights{};
     if (best.gap > 1e8f || (!memory && best.gap < -d)) continue;  // a node deep inside was never outside
     const float closing = dot(wall::velocity(w, s.wall.motion), best.normal);
+    if (before_its_hole(m, s, i)) continue;
     // A node can reach its limit of speed within a substep.
     if (best.gap - r > far_move + 1.5f * h * std::max(0.0f, closing)) continue;
     const auto memory_of = [&](Vec3 normal) -> const thread::SoftContact* {

@@ -268,18 +268,25 @@ TEST(Needle, enters_and_leaves_at_the_forces_of_the_law_and_the_thread_follows) 
   bench.state.needle[0].thread_node = 159;
   bench.start();
   std::vector<uint32_t> events;
+  float shaft = 0,
+        swage_in = 0;  // [N] of the wall on the needle, most: its shaft alone in both channels, and from its swage on
   while (angle < 6.5f) {
     angle += 1.5e-3f;
     bench.target[n] = {on_circle(needle, kCircle, angle), true};
     bench.step();
     const uint32_t e = bench.state.needle[0].events;
     if (e) events.push_back(e);
+    float& force = angle < kPi ? shaft : swage_in;
+    if (events.size() >= 4) force = std::max(force, length(bench.body(n).force));
     if (e & kEntered) {
       // The published 0.9 N is the component along the face's normal; the tip's friction adds to what the hand gives.
       EXPECT_NEAR(bench.state.needle[0].entry_peak, 0.9f * std::sqrt(1 + 0.25f), 0.12f);
     }
     if (e & kLeft) { EXPECT_NEAR(bench.state.needle[0].exit_peak, 0.54f, 0.01f); }
   }
+  // The thread's end follows the swage in; it does not stop before the hole (1.3 to 1.5 N then).
+  EXPECT_GT(shaft, 0.4f);
+  EXPECT_LT(swage_in, shaft + 0.1f);
   // Down and up through the sheet, and the thread behind the needle.
   EXPECT_EQ(events, (std::vector<uint32_t>{kEntered, kLeft, kEntered, kLeft, kThreadIn, kThreadOut, kThreadIn, kThreadOut}));
   ASSERT_EQ(bench.state.hole.size(), 4u);
@@ -636,6 +643,61 @@ TEST(Tool, jaws_that_close_for_thread_do_not_crush_an_edge) {
     EXPECT_LT(bench.overlap(t), 0.3e-3f) << turn;
     EXPECT_LT(squeezed, 10) << turn;
   }
+}
+
+// Two sheets face to face, 2 mm apart, their free edges between the jaws: closed, the jaws bring the edges together; drawn
+// back, they carry both along; opened, they let go of both.
+TEST(Tool, jaws_hold_both_of_two_edges_between_them) {
+  Bench bench(0.03f, 0.02f, true);
+  constexpr float kApart = 2e-3f;  // [m]
+  wall::SheetShape shape;
+  shape.width = 0.03f, shape.height = 0.02f, shape.columns = 13, shape.rows = 9;
+  wall::Spec spec;
+  spec.mesh = wall::sheet(shape);
+  wall::Mesh second = spec.mesh;
+  for (std::vector<Vec3>* side : {&second.outer, &second.inner})
+    for (Vec3& p : *side) p.z += shape.thickness + kApart;
+  const size_t columns = spec.mesh.outer.size();
+  wall::append(spec.mesh, second);
+  for (size_t c = 0; c < spec.mesh.held.size(); ++c) spec.mesh.held[c] = spec.mesh.outer[c].y > 0.5f * shape.height - 1e-4f;
+  const wall::Wall wall = wall::build_wall(spec);
+  bench.model = make_model(wall, validation::knot_settings(0.3f));
+  bench.state.wall = wall.state;
+  const float middle = 0.5f * (shape.thickness + kApart);
+  const auto pose = [&](float back) {
+    const Vec3 x{0, 0, 1}, z{0, -1, 0};
+    return Pose{Vec3{0.015f, 0.0025f - back, middle}, from_axes(x, cross(z, x), z)};
+  };
+  const uint32_t t = bench.add(make_tool({}), pose(0), 0.4f);
+  bench.start();
+  const auto at = [&](size_t sheet, size_t row) {  // [m] in the middle of the sheet's width; row 0 is the edge
+    return wall::place(wall::at_column(static_cast<uint32_t>(sheet * columns + 13 * row + 6), 0), bench.state.wall.motion);
+  };
+  const auto at_edge = [&](size_t sheet) { return at(sheet, 0); };
+  const std::array<Vec3, 2> before{at_edge(0), at_edge(1)};
+  float back = 0;  // [m] of the tool
+  const auto run = [&](int steps, float to, float opening, float grip) {
+    for (int i = 0; i < steps; ++i) {
+      back += std::clamp(to - back, -5e-6f, 5e-6f);
+      bench.target[t] = {pose(back), true, opening, grip};
+      bench.step();
+    }
+  };
+  run(800, 0, 0, 6);
+  ASSERT_EQ(bench.body(t).grip.what, Gripped::tissue);
+  const float gap = at_edge(1).z - at_edge(0).z - shape.thickness;
+  EXPECT_LT(gap, 0.2e-3f) << "closed";
+  EXPECT_GT(gap, -0.1e-3f) << "neither edge is in the other";
+  const std::array<Vec3, 3> held{at(0, 1), at(1, 1), bench.body(t).pose.p};
+  run(900, 1.5e-3f, 0, 6);
+  const float drawn = held[2].y - bench.body(t).pose.p.y;
+  EXPECT_GT(drawn, 0.5e-3f);
+  for (const size_t sheet : {size_t{0}, size_t{1}})
+    EXPECT_GT(held[sheet].y - at(sheet, 1).y, 0.8f * drawn) << "drawn along: sheet " << sheet;
+  run(1500, 1.5e-3f, 0.4f, 0);
+  EXPECT_EQ(bench.body(t).grip.what, Gripped::nothing);
+  for (const size_t sheet : {size_t{0}, size_t{1}})
+    EXPECT_LT(distance(before[sheet], at_edge(sheet)), 0.1e-3f) << "let go, neither is hooked into the other: sheet " << sheet;
 }
 
 // Two hands push their instruments into each other, a strand between them. They pass through each other in scenes, so that the
