@@ -32,8 +32,9 @@ constexpr float kMobile = 0.0021f;      // [m] that a Lembert suture takes of ea
 constexpr float kGather = 2.0f;         // [N] of each end of a physical purse-string
 constexpr float kGatherByThrow = 3.2f;  // [N] the same through a throw, whose friction takes a part
 constexpr int kThrows = 2;
-constexpr int kFirstWraps = 2;  // turns of a surgeon's throw, the first of a knot: it gives back less when the hands let go
-constexpr int kRingThrows = 5;  // where no clamp draws the edges apart again: only a taut loop keeps two throws from opening
+constexpr int kFirstWraps = 2;     // turns of a surgeon's throw, the first of a knot: it gives back less when the hands let go
+constexpr int kRingThrows = 5;     // where no clamp draws the edges apart again: only a taut loop keeps two throws from opening
+constexpr float kRingPull = 2.6f;  // [N] of its throws; with 1.7 N the loops are 0.2 mm wider
 // [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
 // square to it. Less deep, it slid along the serosa and came out through the cut edge.
 constexpr float kYields = 0.002f;
@@ -418,7 +419,7 @@ Plan altemeier_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   plan.forceps_side = -1;
   plan.driver_at = 0.15f, plan.beyond = 0.8f;
   plan.tip_lean = 1.6f, plan.tip_psi = 1.2f;  // the tip is in the lumen: from above, over the edges
-  plan.pull = kPull, plan.rise = true, plan.jerk = 0.1f, plan.slide = true;
+  plan.pull = kRingPull, plan.rise = true, plan.jerk = 0.1f, plan.slide = true;
   const OpeningShape outer = opening_shape(picture, 0), inner = opening_shape(picture, 1);
   const Vec3 radial = -normalized(Vec3{1, 0, 0} - inner.axis * inner.axis.x, any_perpendicular(inner.axis));
   BitePlace p;
