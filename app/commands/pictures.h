@@ -6,7 +6,7 @@
 namespace catgut {
 
 // Rate of pictures of a scene by window size, quality and the fraction of the resolution that a slow window falls back to.
-// Prints a table. Throws InputError without a driver.
+// Then of both eyes of a headset. Prints a table, with the card's name. Throws InputError without a driver.
 int bench_pictures(const std::string& scene);
 
 }  // namespace catgut

@@ -81,24 +81,31 @@ bool usable(EGLDisplay display) {
   return display != EGL_NO_DISPLAY && eglInitialize(display, nullptr, nullptr) && eglBindAPI(EGL_OPENGL_API);
 }
 
-// Mesa's surfaceless platform first (it works without a card), then the first card that responds.
+// A graphics card's device, if its driver answers. Mesa beside a vendor's driver offers the surfaceless platform too, and would
+// draw there on the processor while the card is idle.
+EGLDisplay open_card(const char* client) {
+  if (!has(client, "EGL_EXT_platform_device") || !has(client, "EGL_EXT_device_enumeration")) return EGL_NO_DISPLAY;
+  EGLDeviceEXT devices[16];
+  EGLint count = 0;
+  if (!eglQueryDevicesEXT(16, devices, &count)) return EGL_NO_DISPLAY;
+  for (EGLint i = 0; i < count; ++i) {
+    if (has(eglQueryDeviceStringEXT(devices[i], EGL_EXTENSIONS), "EGL_MESA_device_software")) continue;
+    const EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, devices[i], nullptr);
+    if (usable(display)) return display;
+  }
+  return EGL_NO_DISPLAY;
+}
+
+// A card first, then Mesa's surfaceless platform, which works without one.
 EGLDisplay open_display() {
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
   // eglGetPlatformDisplayEXT and not the core function: libepoxy aborts on that one while no display is current.
   if (!has(client, "EGL_EXT_platform_base"))
     throw std::runtime_error("no pictures: EGL on this machine has no platform displays");
+  if (const EGLDisplay display = open_card(client); display != EGL_NO_DISPLAY) return display;
   if (has(client, "EGL_MESA_platform_surfaceless")) {
     const EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
     if (usable(display)) return display;
-  }
-  if (has(client, "EGL_EXT_platform_device") && has(client, "EGL_EXT_device_enumeration")) {
-    EGLDeviceEXT devices[16];
-    EGLint count = 0;
-    if (eglQueryDevicesEXT(16, devices, &count))
-      for (EGLint i = 0; i < count; ++i) {
-        const EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, devices[i], nullptr);
-        if (usable(display)) return display;
-      }
   }
   throw std::runtime_error("no pictures: no EGL driver answers on this machine (Debian: apt install libgl1-mesa-dri libegl1)");
 }
