@@ -21,8 +21,9 @@ constexpr float kStumpClear = 2e-3f;     // [m] of the blades from the stitch
 constexpr Vec3 kCutFrom{0, 0.6f, 0.8f};  // unit, from the blades along the shaft
 constexpr int kPiece = 10;               // first stage of carrying a cut-off tail away
 constexpr int kPieceMisses = 3;          // then it is left where it fell
-constexpr float kPieceGrip = 0.008f;     // [m] of the jaws from where it was cut
-constexpr float kPieceUp = 0.06f;        // [m] it is raised: longer than it is
+constexpr float kPieceLoad = 1;  // [N] by which a stitch's thread becomes tauter while a loose piece is lifted: it is held too
+constexpr float kPieceGrip = 0.008f;          // [m] of the jaws from where it was cut
+constexpr float kPieceUp = 0.06f;             // [m] it is raised: longer than it is
 constexpr Vec3 kPieceAside{0.09f, 0, 0.07f};  // [m] from the center of the field, where it is laid down
 
 // The outermost node of a knot on the tail or on the needle's strand: within the knot the two touch each other.
@@ -145,7 +146,7 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
 }
 
 bool Scripted::take_piece(const Snapshot& seen) {
-  enum { over = kPiece, down, close, lift, carry, lower, open };
+  enum { over = kPiece, down, close, lift, carry, lower, open, let_go };
   const auto& cut = seen.active().thread_cut;
   const size_t end = static_cast<size_t>(std::find(cut.begin(), cut.end(), 1) - cut.begin());  // of the tail's piece
   if (misses_ > kPieceMisses || end >= cut.size()) return true;                                // it lies where it fell
@@ -154,7 +155,14 @@ bool Scripted::take_piece(const Snapshot& seen) {
       normalized(cross(kCutFrom, node_at(seen, std::min(at + 1, end)) - node_at(seen, at > 0 ? at - 1 : 0)), {1, 0, 0});
   const Pose goal{node_at(seen, at), from_axes(x, cross(kCutFrom, x), kCutFrom)};
   const Vec3 place{picture_.focus.x + kPieceAside.x, picture_.drape + kOverDrape, picture_.focus.z + kPieceAside.z};
-  const auto missed = [&] { ++retries_, ++misses_, go(over); };
+  const auto missed = [&] { ++retries_, ++misses_, go(let_go); };
+  const auto load = [&] {  // [N] largest tension of what is not the piece: the jaws may have closed on a stitch's strand too
+    float most = 0;
+    for (const SutureView& s : seen.suture)
+      for (size_t i = &s == &seen.active() ? end + 1 : 0; i < s.thread_tension.size(); ++i)
+        most = std::max(most, s.thread_tension[i]);
+    return most;
+  };
   switch (stage_) {
     case over:
       jaw(kNeedleHolder, kHalfOpen);
@@ -167,10 +175,12 @@ bool Scripted::take_piece(const Snapshot& seen) {
       if (!jaw(kNeedleHolder, 0) || waited_ < 0.3f) return false;
       if (seen.tool[kNeedleHolder].held != Held::thread || node_of(seen, seen.tool[kNeedleHolder].held_slot) > end)
         return missed(), false;
+      stitch_load_ = load();
       go(lift);
       return false;
     case lift:
-      if (move(kNeedleHolder, {stitch(seen) + Vec3{0, kPieceUp, 0}, hand_[kNeedleHolder].pose.q}, skill_.speed) || !patience(3))
+      if (load() > stitch_load_ + kPieceLoad) return missed(), false;
+      if (move(kNeedleHolder, {stitch(seen) + Vec3{0, kPieceUp, 0}, hand_[kNeedleHolder].pose.q}, careful()) || !patience(6))
         go(carry);
       return false;
     case carry:
@@ -179,6 +189,9 @@ bool Scripted::take_piece(const Snapshot& seen) {
       return false;
     case lower:
       if (move(kNeedleHolder, {place, hand_[kNeedleHolder].pose.q}, skill_.speed) || !patience(3)) go(open);
+      return false;
+    case let_go:
+      if (jaw(kNeedleHolder, kHalfOpen)) go(over);
       return false;
     default:
       if (!jaw(kNeedleHolder, 1)) return false;

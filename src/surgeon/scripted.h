@@ -206,6 +206,7 @@ class Scripted final : public Surgeon {
   float steady_ = 0;             // [s] of full tension
   std::array<float, 2> felt_{};  // [N] in the strands of a hand, smoothed
   float overloaded_ = 0;         // [s] that a pull has had more than the maximum load
+  float stitch_load_ = 0;        // [N] largest tension beside a cut-off tail when the jaws took it
   // A throw.
   Winding winding_;  // computed by exchange/tying, as for assisted hands
   size_t cuts_before_ = 0, settled_before_ = 0;

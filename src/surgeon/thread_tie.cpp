@@ -66,6 +66,8 @@ constexpr float kDeep = 4e-3f;        // [m] below the stitch: a tail there is t
 constexpr float kBears = 3;           // [N] on a bite, above which the hands give way
 constexpr float kOverDrape = 12e-3f;  // [m] of the swage: the needle, which hangs down from the forceps, would scrape on it
 constexpr float kRoom = 4e-3f;        // [m] from the tissue's particles: open jaws have none of it between them
+constexpr float kStrandRoom = 2e-3f;  // [m] the same from another stitch's thread
+constexpr float kForeign = 1;         // [N] more than a finished stitch bears while another is tied
 constexpr float kFarthest = 9e-3f;    // [m] of the place where a tail is taken, beyond kTailEnd
 
 Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
@@ -113,7 +115,10 @@ SeenThrows look(const Snapshot& seen) {
 }  // namespace
 
 ThreadTie::ThreadTie(const PictureModel& picture, std::array<ScriptedHand, 2>& hands, const ThreadTieSettings& settings)
-    : picture_(picture), hands_(hands), how_(settings) {}
+    : picture_(picture),
+      hands_(hands),
+      how_(settings),
+      line_{portable::cos(settings.aside), 0, portable::sin(settings.aside)} {}
 
 std::string ThreadTie::doing() const {
   static constexpr const char* kName[] = {"reach for the tail",
@@ -153,22 +158,38 @@ Vec3 ThreadTie::tail_node(const Snapshot& seen, float from_end) const {
   return node_at(seen, node_along(seen, 0, from_end, 1));
 }
 
-// [m] from the tail's end, where the jaws take it. A tail that hangs down between walls is taken where it is clear of them:
-// jaws that close on a wall's edge beside it tear the bites out.
+// [m] from the tail's end, where the jaws take it: clear of walls, if it hangs down between them, and of other stitches'
+// strands. Jaws that close on an edge or a strand beside it tear bites out.
 float ThreadTie::tail_place(const Snapshot& seen, float wanted) const {
-  if (tail_node(seen, wanted).y > origin_.y - kDeep) return wanted;
+  const size_t tissue = 2 * size_t{picture_.columns};
   size_t threads = 0;
   for (const SutureView& s : seen.suture) threads += s.thread_order.size();
-  const size_t tissue = 2 * size_t{picture_.columns};
+  const auto own = std::minmax_element(seen.active().thread_order.begin(), seen.active().thread_order.end());
+  const auto room_at = [&](Vec3 p, bool walls) {  // distance squared to what is not to come between the jaws
+    float room = kRoom * kRoom;
+    for (size_t i = 0; i < seen.particle.size(); ++i) {
+      const bool strand = i >= tissue && i < tissue + threads;
+      if (strand ? i >= *own.first && i <= *own.second : !walls) continue;
+      room = std::min(room, length2(seen.particle[i] - p));
+    }
+    return room;
+  };
+  const bool deep = tail_node(seen, wanted).y <= origin_.y - kDeep;
+  if (!deep && room_at(tail_node(seen, wanted), false) > kStrandRoom * kStrandRoom) return wanted;
   float best = wanted, most = 0;
   for (float at = wanted; at < wanted + kFarthest && at < tail_ - kKnot; at += 1e-3f) {
-    const Vec3 p = tail_node(seen, at);
-    float room = kRoom * kRoom;
-    for (size_t i = 0; i < seen.particle.size(); ++i)
-      if (i < tissue || i >= tissue + threads) room = std::min(room, length2(seen.particle[i] - p));
+    const float room = room_at(tail_node(seen, at), deep);
     if (room > 1.1f * most) best = at, most = room;
   }
   return best;
+}
+
+// [N] largest tension of another suture's thread: jaws that have closed on it, too, draw it along.
+float ThreadTie::foreign_load(const Snapshot& seen) const {
+  float most = 0;
+  for (const SutureView& s : seen.suture)
+    for (const float tension : s.thread_tension) most = &s == &seen.active() ? most : std::max(most, tension);
+  return most;
 }
 
 // [rad] of the strand round jaws and shaft of the needle holder, in the sense of the throw. What has slid past the tips does
@@ -333,7 +354,8 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       break;
     case lay_tail: {
       const Vec3 root = first_ ? seen.active().suture_point.front().position : origin_;
-      glide_to(root + Vec3{-side_ * (tail_ - kTailEnd - 2e-3f), 1e-3f, 0}, hand_, 0.4f * how_.speed, forceps_angle_);
+      glide_to(root - line_ * (side_ * (tail_ - kTailEnd - 2e-3f)) + Vec3{0, 1e-3f, 0}, hand_, 0.4f * how_.speed,
+               forceps_angle_);
       break;
     }
     case off_tail:
@@ -360,12 +382,13 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       break;
     }
     case cross_up:
-      glide_to(origin_ + Vec3{side_ * 0.6f * tail_, 8e-3f + kLow, 0},
-               origin_ + Vec3{-side_ * std::min(24e-3f, 0.5f * strand_), 12e-3f + kLow, 0}, 0.6f * how_.speed, forceps_angle_);
+      glide_to(origin_ + line_ * (side_ * 0.6f * tail_) + Vec3{0, 8e-3f + kLow, 0},
+               origin_ - line_ * (side_ * std::min(24e-3f, 0.5f * strand_)) + Vec3{0, 12e-3f + kLow, 0}, 0.6f * how_.speed,
+               forceps_angle_);
       break;
     case cross_down:
-      glide_to(origin_ + Vec3{side_ * 0.75f * tail_, 2e-3f + kLow, 0}, origin_ + Vec3{-side_ * 0.6f * strand_, 4e-3f + kLow, 0},
-               0.6f * how_.speed, forceps_angle_);
+      glide_to(origin_ + line_ * (side_ * 0.75f * tail_) + Vec3{0, 2e-3f + kLow, 0},
+               origin_ - line_ * (side_ * 0.6f * strand_) + Vec3{0, 4e-3f + kLow, 0}, 0.6f * how_.speed, forceps_angle_);
       break;
     case slide:
     case set:
@@ -375,7 +398,8 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
     case lay:
       pulled_ = std::min(felt_, tail_felt_);
       // Both strands alike, and slowly.
-      glide_to(tip_ - Vec3{side_ * 2e-3f, 3e-3f, 0}, hand_ + Vec3{side_ * 2e-3f, 0, 0}, 0.06f * how_.speed, forceps_angle_);
+      glide_to(tip_ - line_ * (side_ * 2e-3f) - Vec3{0, 3e-3f, 0}, hand_ + line_ * (side_ * 2e-3f), 0.06f * how_.speed,
+               forceps_angle_);
       break;
     case away:
       glide_to(tip_ + shaft * 0.06f, hand_, how_.speed, forceps_angle_);
@@ -484,7 +508,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     }
     case draw: {
-      if (!holds && waited_ > 0.2f) {  // the tail has slipped out
+      if ((!holds && waited_ > 0.2f) || foreign_load(seen) > kForeign) {  // the tail has slipped out; or more than it is held
         again(seen, drop_tail);
         break;
       }
@@ -527,7 +551,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
         return dt * std::clamp((felt < kEasy ? 0.25f : 0.03f) * (want - felt), -0.02f, 0.02f);
       };
       const float tail = stage_ == slide ? kSlides : kSets;
-      tip_.x += side_ * pace(tail_felt_, tail), hand_.x -= side_ * pace(felt_, how_.pull);
+      tip_ += line_ * (side_ * pace(tail_felt_, tail)), hand_ -= line_ * (side_ * pace(felt_, how_.pull));
       const bool there = stage_ == slide ? felt_ > 0.9f * how_.pull : tail_felt_ > 0.9f * tail;
       if (there) steady_ += dt;
       if (!holds && waited_ > 0.2f) go(seen, lay);
@@ -548,7 +572,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const float easy = std::clamp(1 - std::min(felt_, tail_felt_) / kEasy, 0.0f, 1.0f);
       const float more = slack_of(seen, true) - slack_of(seen, false);
       const float even = stage_ == pull ? dt * std::clamp(kEvens * more, -kFastest, kFastest) * easy : 0.0f;
-      tip_.x += side_ * (pace(tail_felt_, felt_) + even), hand_.x -= side_ * (pace(felt_, tail_felt_) - even);
+      tip_ += line_ * (side_ * (pace(tail_felt_, felt_) + even)), hand_ -= line_ * (side_ * (pace(felt_, tail_felt_) - even));
       steady_ = std::min(tail_felt_, felt_) > 0.9f * how_.pull ? steady_ + dt : 0;
       const bool lost = !holds && waited_ > 0.2f;
       if (stage_ == pull && (steady_ > kSeated || waited_ > 12 || lost))

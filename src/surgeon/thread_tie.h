@@ -26,6 +26,7 @@ struct ThreadTieSettings {
   float pull = 2.5f;    // [N] with which both strands are pulled tight
   bool slide = false;   // the first two throws slide down the strand before the third locks them: nothing holds the edges
   bool flat = false;    // the tissue round the stitch is flat: the tail lies on it and hangs down nowhere
+  float aside = 0;      // [rad] of the line on which tail and strand are drawn and laid, from the x axis toward z
 };
 
 class ThreadTie {
@@ -79,6 +80,7 @@ class ThreadTie {
   void place();
   float slack_of(const Snapshot& seen, bool tail) const;
   Vec3 tail_node(const Snapshot& seen, float from_end) const;
+  float foreign_load(const Snapshot& seen) const;
   float tail_place(const Snapshot& seen, float wanted) const;
   // Winds again, after the stage that lets everything go; or fails.
   void again(const Snapshot& seen, Stage after);
@@ -90,6 +92,7 @@ class ThreadTie {
   const PictureModel& picture_;
   std::array<ScriptedHand, 2>& hands_;
   ThreadTieSettings how_;
+  Vec3 line_;  // unit: from the strand's hand to the tail's, where side_ is +1
   Stage stage_ = done;
   int wraps_ = 1, misses_ = 0, retries_ = 0, tries_ = 0, throws_ = 0;
   float side_ = 1, sense_ = 1, waited_ = 0;
