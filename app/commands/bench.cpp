@@ -69,7 +69,7 @@ int bench(const BenchOptions& o) {
   if (o.what == "stages") return bench_stages(o);
   if (o.what == "frame")
     return bench_frame({o.scene.empty() ? "lembert" : o.scene[0], o.json, o.set, o.seconds > 0 ? o.seconds : 30});
-  if (o.what == "pictures") return bench_pictures(o.scene.empty() ? "stay" : o.scene[0]);
+  if (o.what == "pictures") return bench_pictures(o.scene.empty() ? "stay" : o.scene[0], o.set);
   if (o.what == "paper") {
     const std::vector<std::string> four{"purse_string", "connell", "stay", "lembert"};
     return bench_paper({o.scene.empty() ? four : o.scene, o.set, o.out, o.executions, o.threads});

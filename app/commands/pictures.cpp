@@ -138,11 +138,7 @@ Inset inset_at(const PictureModel& picture, const Snapshot& seen, const Camera& 
   return {magnified(camera, tip, kInsetHalf), 0, height - side, side};
 }
 
-}  // namespace
-
-namespace {
-
-int table(const std::string& name) {
+int table(const std::string& name, const std::vector<std::string>& set) {
   struct Size {
     int width, height;
   };
@@ -158,7 +154,9 @@ int table(const std::string& name) {
                            {"low", Quality::low, 0.7f},  {"low+inset", Quality::low, 0.7f, true},
                            {"low", Quality::low, 1.0f},  {"medium", Quality::medium, 1.0f},
                            {"high", Quality::high, 1.0f}};
-  const auto model = build_model(read_scene(name));
+  SceneSpec scene = read_scene(name);
+  for (const std::string& setting : set) set_value(scene, setting);
+  const auto model = build_model(scene);
   Snapshot seen;
   publish(*model, *initial_state(*model), seen);
   const PictureModel picture = picture_model(*model);
@@ -195,9 +193,9 @@ int table(const std::string& name) {
 
 }  // namespace
 
-int bench_pictures(const std::string& scene) {
+int bench_pictures(const std::string& scene, const std::vector<std::string>& set) {
   try {
-    return table(scene);
+    return table(scene, set);
   } catch (const InputError&) { throw; } catch (const std::runtime_error& error) {
     throw InputError("bench pictures", error.what(), "install a graphics driver");
   }
