@@ -54,6 +54,14 @@ float needle_tension(const Snapshot& seen) {
   return seen.active().thread_tension.empty() ? 0 : seen.active().thread_tension.back();
 }
 
+float largest_tension(const Snapshot& seen, size_t skip) {
+  float most = 0;
+  for (const SutureView& s : seen.suture)
+    for (size_t i = &s == &seen.active() ? skip : 0; i < s.thread_tension.size(); ++i)
+      most = std::max(most, s.thread_tension[i]);
+  return most;
+}
+
 size_t first_point_node(const Snapshot& seen) {
   size_t node = seen.active().thread_order.size();
   for (const SuturePointView& p : seen.active().suture_point) node = std::min(node, node_of(seen, p.anchored));

@@ -9,7 +9,7 @@
 
 namespace catgut {
 
-// All but three refer to the active suture. Positions along its thread_order.
+// All but four refer to the active suture. Positions along its thread_order.
 size_t node_of(const Snapshot& seen, uint32_t slot);
 Vec3 node_at(const Snapshot& seen, size_t node);
 // [m] path length along the thread between two nodes (in any order).
@@ -24,6 +24,9 @@ const SuturePointView& suture_point_at(const Snapshot& seen, size_t i);
 bool is_cut_off(const SutureView& suture);
 // [N] in the thread's last pair, at the needle: the load of a hand that holds the needle.
 float needle_tension(const Snapshot& seen);
+// [N] largest tension of all threads, without the first `skip` segments of the active suture. Above what a hand holds itself it
+// says that its jaws hold a strand of a stitch too.
+float largest_tension(const Snapshot& seen, size_t skip);
 uint32_t locked_throws(const Snapshot& seen);  // of the active suture; not those that are not locked yet
 // The first and the last suture point's nodes; both 0 when there is none.
 size_t first_point_node(const Snapshot& seen);

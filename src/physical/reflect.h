@@ -11,7 +11,8 @@ namespace catgut::thread {
 
 constexpr void reflect(auto& a, Like<Columns3> auto& c) { a(c.x), a(c.y), a(c.z); }
 constexpr void reflect(auto& a, Like<Crossing> auto& c) {
-  a(c.s), a(c.t), a(c.normal), a(c.gap), a(c.normal_impulse), a(c.friction_impulse), a(c.drift), a(c.touch), a(c.pad);
+  a(c.s), a(c.t), a(c.normal), a(c.gap), a(c.normal_impulse), a(c.friction_impulse), a(c.drift), a(c.touch), a(c.pad),
+      a(c.rest);
 }
 constexpr void reflect(auto& a, Like<Eyelet> auto& e) {
   a(e.point), a(e.segment), a(e.friction), a(e.slip), a(e.before), a(e.angle);

@@ -342,6 +342,9 @@ const std::vector<ResultName>& result_names() {
         {"stitch_gap", "m", "the same where a stitch crosses from one wall to the other; 0 without such a stitch"},
         {"stitch_tension", "N",
          "tension of the thread there at the end, the smallest of all stitches; a knot that holds keeps one"},
+        {"throws_held", "",
+         "throws that the thread of a finished stitch shows at the end, the fewest of all; 0 without one, and with guided "
+         "mechanics"},
         {"edge_eversion", "rad",
          "largest angle by which the cut edge that stays is turned outward against rest; mucosa that lies outside does not "
          "heal"},

@@ -7,6 +7,8 @@
 #include <map>
 #include <numeric>
 
+#include "geometry/closest.h"
+
 namespace catgut {
 namespace {
 
@@ -23,13 +25,15 @@ Place place_of(const VisibleMesh& mesh, uint32_t v) {
   return place;
 }
 
-// From the rim of the second body to an edge, given by its vertices.
-void measure_ring(const std::vector<uint32_t>& rim, const std::vector<Vec3>& edge, const Snapshot& seen, CutMeasures& out) {
+// From the rim of the second body to the surface of a cut edge. Its vertices alone lie up to a cell apart: they would show gaps
+// of half a cell where walls touch.
+void measure_ring(const std::vector<uint32_t>& rim, const std::vector<std::array<Vec3, 3>>& edge, const Snapshot& seen,
+                  CutMeasures& out) {
   if (rim.empty() || edge.empty()) return;
   const auto gap = [&](Vec3 p) {
     float least = 1e9f;
-    for (const Vec3& e : edge) least = std::min(least, distance(e, p));
-    return static_cast<double>(least);
+    for (const auto& [a, b, c] : edge) least = std::min(least, length2(closest_on_triangle(p, a, b, c).point - p));
+    return std::sqrt(static_cast<double>(least));
   };
   for (const uint32_t i : rim) out.ring_gap = std::max(out.ring_gap, gap(seen.particle[i]));
   bool any = false;
@@ -110,17 +114,20 @@ CutMeasures measure_cut(const SceneSpec& scene, const Snapshot& seen) {
     if (here < 2) continue;
     Vec3 way{};
     float count = 0;
-    std::vector<Vec3> edge, now(root.size());  // edge: of what stays
+    std::vector<Vec3> now(root.size());
+    std::vector<std::array<Vec3, 3>> edge;  // of what stays
     const auto stays = [&](uint32_t v) {
       return find(v) != find(top) && mesh.layer[v] == TissueLayer::cut_edge && depth(v) < first.length - kOnRim;
     };
     for (uint32_t v = 0; v < root.size(); ++v) {
       for (size_t k = 0; k < 4; ++k) now[v] += seen.particle[mesh.skin_particle[v][k]] * mesh.skin_weight[v][k];
       if (find(v) == find(top)) way += now[v] - mesh.position[v], ++count;
-      else if (stays(v)) edge.push_back(now[v]);
     }
     for (const auto& t : mesh.triangle)
-      if (stays(t[0]) && stays(t[1]) && stays(t[2])) out.eversion = std::max(out.eversion, turned_outward(mesh, t, axis, now));
+      if (stays(t[0]) && stays(t[1]) && stays(t[2])) {
+        edge.push_back({now[t[0]], now[t[1]], now[t[2]]});
+        out.eversion = std::max(out.eversion, turned_outward(mesh, t, axis, now));
+      }
     out.way = static_cast<double>(length(way / std::max(count, 1.0f)));
     if (seen.topology.picture->rim.size() > 1) measure_ring(seen.topology.picture->rim[1], edge, seen, out);
   }

@@ -12,6 +12,7 @@
 #include "exchange/picture.h"
 #include "exchange/snapshot.h"
 #include "runtime/session_metrics.h"
+#include "runtime/stitch_measures.h"
 #include "sim/scene.h"
 
 namespace catgut {
@@ -44,6 +45,7 @@ struct RunResult {
   std::map<std::string, uint64_t> events;        // by kind, only those that occurred
   std::map<std::string, uint64_t> faults;        // technique_fault events by name, only those that occurred
   std::map<std::string, double> value;           // every name of result_names
+  std::vector<StitchMeasures> stitch;            // physical mechanics: at the end
   std::vector<ExpectationResult> expect;
   uint64_t state_hash = 0;
   bool interrupted = false;

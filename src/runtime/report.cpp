@@ -84,6 +84,17 @@ Json json_of(const RunResult& r) {
     j[name] = number_json(value(r, name));
   j["events"] = r.events.empty() ? Json::object() : Json(r.events);
   j["faults"] = r.faults.empty() ? Json::object() : Json(r.faults);
+  j["stitches"] = Json::array();
+  for (const StitchMeasures& s : r.stitch)
+    j["stitches"].push_back({{"suture", s.suture},
+                             {"finished", s.finished},
+                             {"suture_points", s.points},
+                             {"throws", s.throws()},
+                             {"right", s.right},
+                             {"left", s.left},
+                             {"alternating", s.alternating},
+                             {"tension_n", s.tension},
+                             {"first_to_last_m", s.first_to_last}});
   j["expect"] = Json::object();
   for (const ExpectationResult& e : r.expect)
     j["expect"][e.want.name] = {{"want", want_json(e.want)}, {"got", number_json(e.got)}, {"ok", e.ok}};
@@ -247,6 +258,10 @@ std::string run_summary(const RunResult& r, bool judged) {
     out += fmt::format(", {} pairs, maximum gap {:.1f} mm", value(r, "pairs"), 1e3 * value(r, "seam_gap_all"));
   else out += fmt::format(", opening {:.1f} %", 100 * value(r, "opening_ratio"));
   out += "\n";
+  for (const StitchMeasures& s : r.stitch)
+    out += fmt::format("  suture {}: {} suture points, {} throw{} seen in its thread ({} right, {} left), {:.2f} N{}\n",
+                       s.suture + 1, s.points, s.throws(), s.throws() == 1 ? "" : "s", s.right, s.left, s.tension,
+                       s.finished ? "" : ", not cut off");
   for (const auto& [name, count] : r.faults) out += fmt::format("  fault: {} ({} x)\n", name, count);
   const double retries = value(r, "surgeon_retries");
   out += fmt::format("  end: {}{}; state {:016x}\n", r.ended,

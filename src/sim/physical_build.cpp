@@ -24,6 +24,8 @@ constexpr float kThreadDrag = 30;  // [1/s] on thread. At 0.1 m/s it is 0.15 N p
 // [N] with which tissue holds slack thread in a hole (an estimate). Without it the thread creeps into the lumen by its weight:
 // Coulomb friction needs tension.
 constexpr float kHoleGrip = 0.03f;
+// ESTIMATE, no source: friction of a knot that was left alone over that of one being tied. Threads bed into each other.
+constexpr float kRestFriction = 2;
 constexpr float kLyingForce = 0.05f;  // [N] with which the drape holds a needle that lies on it
 
 std::string name_of(const SceneSpec& scene) { return scene.name.empty() ? "scene" : scene.name; }
@@ -68,7 +70,7 @@ thread::Settings thread_of(const SceneSpec& scene, float step) {
   s.substeps = kThreadSubsteps;
   s.substep = step / kThreadSubsteps;
   s.gravity = scene.solver.gravity * kThreadGravity;
-  s.damping = kThreadDrag, s.hole_grip = kHoleGrip;
+  s.damping = kThreadDrag, s.hole_grip = kHoleGrip, s.rest_friction = kRestFriction;
   return s;
 }
 

@@ -156,13 +156,6 @@ bool Scripted::take_piece(const Snapshot& seen) {
   const Pose goal{node_at(seen, at), from_axes(x, cross(kCutFrom, x), kCutFrom)};
   const Vec3 place{picture_.focus.x + kPieceAside.x, picture_.drape + kOverDrape, picture_.focus.z + kPieceAside.z};
   const auto missed = [&] { ++retries_, ++misses_, go(let_go); };
-  const auto load = [&] {  // [N] largest tension of what is not the piece: the jaws may have closed on a stitch's strand too
-    float most = 0;
-    for (const SutureView& s : seen.suture)
-      for (size_t i = &s == &seen.active() ? end + 1 : 0; i < s.thread_tension.size(); ++i)
-        most = std::max(most, s.thread_tension[i]);
-    return most;
-  };
   switch (stage_) {
     case over:
       jaw(kNeedleHolder, kHalfOpen);
@@ -175,11 +168,11 @@ bool Scripted::take_piece(const Snapshot& seen) {
       if (!jaw(kNeedleHolder, 0) || waited_ < 0.3f) return false;
       if (seen.tool[kNeedleHolder].held != Held::thread || node_of(seen, seen.tool[kNeedleHolder].held_slot) > end)
         return missed(), false;
-      stitch_load_ = load();
+      stitch_load_ = largest_tension(seen, end + 1);
       go(lift);
       return false;
     case lift:
-      if (load() > stitch_load_ + kPieceLoad) return missed(), false;
+      if (largest_tension(seen, end + 1) > stitch_load_ + kPieceLoad) return missed(), false;
       if (move(kNeedleHolder, {stitch(seen) + Vec3{0, kPieceUp, 0}, hand_[kNeedleHolder].pose.q}, careful()) || !patience(6))
         go(carry);
       return false;

@@ -184,14 +184,6 @@ float ThreadTie::tail_place(const Snapshot& seen, float wanted) const {
   return best;
 }
 
-// [N] largest tension of another suture's thread: jaws that have closed on it, too, draw it along.
-float ThreadTie::foreign_load(const Snapshot& seen) const {
-  float most = 0;
-  for (const SutureView& s : seen.suture)
-    for (const float tension : s.thread_tension) most = &s == &seen.active() ? most : std::max(most, tension);
-  return most;
-}
-
 // [rad] of the strand round jaws and shaft of the needle holder, in the sense of the throw. What has slid past the tips does
 // not count.
 float ThreadTie::wound(const Snapshot& seen) const {
@@ -508,7 +500,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     }
     case draw: {
-      if ((!holds && waited_ > 0.2f) || foreign_load(seen) > kForeign) {  // the tail has slipped out; or more than it is held
+      if ((!holds && waited_ > 0.2f) || largest_tension(seen, seen.active().thread_tension.size()) >
+                                            kForeign) {  // the tail has slipped out; or more than it is held
         again(seen, drop_tail);
         break;
       }

@@ -80,7 +80,6 @@ class ThreadTie {
   void place();
   float slack_of(const Snapshot& seen, bool tail) const;
   Vec3 tail_node(const Snapshot& seen, float from_end) const;
-  float foreign_load(const Snapshot& seen) const;
   float tail_place(const Snapshot& seen, float wanted) const;
   // Winds again, after the stage that lets everything go; or fails.
   void again(const Snapshot& seen, Stage after);

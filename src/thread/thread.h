@@ -43,8 +43,11 @@ struct Settings {
   float anchor = 0.2f;          // fraction of the stored tangential drift that a sticking contact undoes per substep
   float list_margin = 0.6e-3f;  // pairs nearer than d + margin are listed [m]
   float max_move = 0.125f;      // of the diameter, per substep
-  float hole_grip = 0;          // [N] with which a hole holds thread that is slack, too; in addition to its Coulomb friction
-  Vec3 gravity{};               // [m/s2]
+  // Friction of thread on thread at rest, over material.friction, until it has slipped by rest_slip [m]: a knot that was left
+  // alone is firmer than one being tied. The caller sets Crossing::rest.
+  float rest_friction = 1, rest_slip = 100e-6f;
+  float hole_grip = 0;  // [N] with which a hole holds thread that is slack, too; in addition to its Coulomb friction
+  Vec3 gravity{};       // [m/s2]
   bool breaks = true;
 };
 
@@ -66,6 +69,7 @@ struct Crossing {
   Vec3 drift;                // [m] tangential motion that sticking has not undone; 0 after slip; at most 0.2 d
   Touch touch = Touch::unknown;
   std::array<uint8_t, 3> pad{};
+  float rest = 0;  // [m] of slip before it loses the friction of thread at rest; 0: it has not been at rest
 };
 
 // A hole in something soft through which the thread slides: it turns a corner there. The corner lies within one segment, whose

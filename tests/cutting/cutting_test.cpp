@@ -265,6 +265,39 @@ TEST(Cutting, an_edge_that_is_turned_outward_is_measured) {
   }
 }
 
+// Points 0.3 mm in front of the middle of every triangle of the edge that stays: some cells away from its vertices.
+TEST(Cutting, the_gap_of_an_anastomosis_is_measured_to_the_surface_of_the_cut_edge) {
+  Field f;
+  f.cut(0, 2 * kPi + 0.1f, 0.006f);
+  ASSERT_EQ(f.of(EventKind::piece_freed).size(), 1u);
+  EXPECT_EQ(measure_cut(f.scene, f.seen).ring_gap, 0) << "one body";
+  PictureModel picture = *f.seen.topology.picture;
+  const VisibleMesh& mesh = picture.body[0];
+  std::vector<Vec3> now(mesh.position.size());
+  for (size_t v = 0; v < now.size(); ++v)
+    for (size_t k = 0; k < 4; ++k) now[v] += f.seen.particle[mesh.skin_particle[v][k]] * mesh.skin_weight[v][k];
+  const float edge = f.scene.body[0].position.y - kLine;
+  std::vector<uint32_t> rim;
+  float widest = 0;
+  for (const auto& t : mesh.triangle) {
+    const auto of_edge = [&](uint32_t v) {
+      return mesh.layer[v] == TissueLayer::cut_edge && std::abs(mesh.position[v].y - edge) < 1e-3f;
+    };
+    if (!of_edge(t[0]) || !of_edge(t[1]) || !of_edge(t[2])) continue;
+    const Vec3 n = normalized(cross(now[t[1]] - now[t[0]], now[t[2]] - now[t[0]])),
+               middle = (now[t[0]] + now[t[1]] + now[t[2]]) / 3;
+    if (n.y < 0.9f || std::abs(middle.y - edge) > 1e-3f) continue;  // the edge of what was cut off, which has fallen
+    widest = std::max(widest, distance(middle, now[t[0]]));
+    rim.push_back(static_cast<uint32_t>(f.seen.particle.size()));
+    f.seen.particle.push_back(middle + n * 0.3e-3f);
+  }
+  ASSERT_GT(rim.size(), 40u);
+  EXPECT_GT(widest, 0.6e-3f);
+  picture.rim = {{}, rim};
+  f.seen.topology.picture = DividedPicture(std::make_shared<const PictureModel>(picture));
+  EXPECT_NEAR(measure_cut(f.scene, f.seen).ring_gap, 0.3e-3, 0.01e-3);
+}
+
 TEST(Cutting, an_unfinished_circle_that_is_pulled_stays_one_piece) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "CATGUT_LONG=1 runs it";
   Field f(800);

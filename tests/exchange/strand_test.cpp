@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/exchange: a stitch is finished when its thread is cut between its last hole and the needle.
+// tests/exchange: measures of the thread in a Snapshot.
 #include <gtest/gtest.h>
 
 #include "exchange/strand.h"
@@ -18,6 +18,21 @@ TEST(Strand, a_stitch_is_cut_off_between_its_last_hole_and_the_needle) {
   EXPECT_FALSE(is_cut_off(suture)) << "only its tail is cut";
   suture.thread_cut[7] = 1;
   EXPECT_TRUE(is_cut_off(suture));
+}
+
+TEST(Strand, largest_tension_leaves_out_what_the_hand_holds_itself) {
+  Snapshot seen;
+  seen.suture.resize(3);
+  seen.active_suture = 1;
+  seen.suture[0].thread_tension = {0.1f, 0.3f};
+  seen.suture[1].thread_tension = {5, 4, 0.7f, 0.2f};
+  seen.suture[2].thread_tension = {0.4f};
+  EXPECT_EQ(largest_tension(seen, 0), 5);
+  EXPECT_EQ(largest_tension(seen, 2), 0.7f);
+  EXPECT_EQ(largest_tension(seen, 4), 0.4f) << "of the other sutures";
+  seen.suture.assign(1, {});
+  seen.active_suture = 0;
+  EXPECT_EQ(largest_tension(seen, 0), 0) << "no thread";
 }
 
 }  // namespace

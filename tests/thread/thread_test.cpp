@@ -418,17 +418,28 @@ TEST(FirstThrow, of_two_turns_locks_where_one_of_one_turn_slides_and_takes_more_
 }
 
 // [m] by which a tied knot gives when its bite is loaded from nothing up to `load` [N], after both tails were pulled with
-// `tails` [N]; 12 mm: it slides.
-float gives(const validation::Throws& throws, float tails, float load) {
+// `tails` [N]; 12 mm: it slides. rest: Settings::rest_friction of a knot that was at rest in between; 0: it was not.
+float gives(const validation::Throws& throws, float tails, float load, float rest = 0) {
   Settings settings = validation::knot_settings(0.30f);
   settings.material = *find_material("silk 2-0");
   settings.breaks = false;
   validation::Tightened t(validation::lay_knot(throws, settings.material.diameter, 0.7e-3f));
   const auto apart = [&] { return distance(t.knot.state.position(t.knot.load_a), t.knot.state.position(t.knot.load_b)); };
   validation::tighten(settings, t, tails, validation::Drawing::flat, 0.6f);
+  size_t rested = 0;
+  if (rest > 0) {
+    settings.rest_friction = rest;
+    for (Crossing& c : t.knot.state.crossing)
+      if (c.touch == Touch::stick) c.rest = settings.rest_slip, ++rested;
+    EXPECT_GT(rested, 0u);
+  }
   const float before = apart();
   validation::pull_apart(settings, t, 0, 0.01f, load, 12e-3f);
-  return apart() - before;
+  const float gave = apart() - before;
+  const auto still =
+      std::count_if(t.knot.state.crossing.begin(), t.knot.state.crossing.end(), [](const Crossing& c) { return c.rest > 0; });
+  if (rest > 0 && gave > 5e-3f) { EXPECT_LT(still, static_cast<std::ptrdiff_t>(rested)) << "what slips is at rest no more"; }
+  return gave;
 }
 
 // Both ends pulled with 3.8 N tighten a square knot. A granny slides on, and so do throws that lie below another one: at
@@ -440,6 +451,16 @@ TEST(TiedKnot, gives_little_when_it_is_square_and_was_tightened) {
               1e3 * static_cast<double>(square), 1e3 * static_cast<double>(granny), 1e3 * static_cast<double>(three));
   EXPECT_LT(square, 0.7e-3f) << "one segment";
   EXPECT_GT(granny, 2 * square);
+}
+
+TEST(TiedKnot, holds_more_once_it_was_at_rest) {
+  const float tied = gives(validation::granny(), 3.8f, 0.8f), same = gives(validation::granny(), 3.8f, 0.8f, 1),
+              rested = gives(validation::granny(), 3.8f, 0.8f, 2);
+  std::printf("granny up to 0.8 N: %.2f mm, with the same friction at rest %.2f mm, with twice that %.2f mm\n",
+              1e3 * static_cast<double>(tied), 1e3 * static_cast<double>(same), 1e3 * static_cast<double>(rested));
+  EXPECT_EQ(same, tied);
+  EXPECT_GT(tied, 5e-3f);
+  EXPECT_LT(rested, 1.5e-3f);
 }
 
 TEST(ToolTies, are_the_same_to_the_bit_every_time) {
