@@ -294,7 +294,7 @@ void prepare_corners(const State& state, Scratch& s, const SoftPoints& soft) {
 }
 
 // After the spans' own solution in s.step, with 0 in the rows of the corners, whose residuals are in `right`.
-void solve_corners(const State& state, Scratch& s) {
+void solve_corners(const Settings& settings, const State& state, Scratch& s) {
   const size_t n = state.eyelet.size(), m = state.segments();
   float *x = s.step.data(), *y = s.right.data();
   const float* a = s.reduced.data();
@@ -304,6 +304,13 @@ void solve_corners(const State& state, Scratch& s) {
     if (k > 0) y[e] -= s.corner[e].sub_before * x[k - 1];
   }
   solve_columns(n, a, y);
+  // No more than the thread can bear. With friction the rows are not symmetric: at holes that nearly meet they can come near a
+  // singular system, whose solution would throw the wall about.
+  const float most = settings.material.straight_strength * settings.substep * settings.substep;
+  for (size_t e = 0; e < n && most > 0; ++e) {
+    const float before = s.lambda[state.eyelet[e].segment];
+    if (std::abs(before + y[e]) > most) y[e] = std::clamp(before + y[e], -most, most) - before;
+  }
   const float *right = s.spike_right.data(), *left = s.spike_left.data();
   size_t i = 0;
   for (size_t e = 0; e <= n; ++e) {

@@ -228,7 +228,7 @@ void grip_corners(const Settings& settings, const State& state, Scratch& s, Soft
 void find_corners(const State& state, Scratch& s, const SoftPoints& soft);
 void prepare_corners(const State& state, Scratch& s, const SoftPoints& soft);
 void take_corner_residuals(const State& state, Scratch& s, const SoftPoints& soft);
-void solve_corners(const State& state, Scratch& s);
+void solve_corners(const Settings& settings, const State& state, Scratch& s);
 void apply_corners(const State& state, Scratch& s, SoftPoints& soft, float substep);
 void push_soft(Scratch& s, SoftPoints& soft, uint32_t point, Vec3 multiplier, float substep);
 

@@ -214,7 +214,7 @@ void solve_stretch(const Settings& settings, const State& state, Scratch& s, Sof
   float* x = s.step.data();
   if (corners) take_corner_residuals(state, s, *soft);
   solve_tridiagonal(s, m, s.residual.data(), x);
-  if (corners) solve_corners(state, s);
+  if (corners) solve_corners(settings, state, s);
   accumulate(m, x, s.lambda.data());
   apply(m + 1, s.n.x.data(), s.n.y.data(), s.n.z.data(), x, s.w.data(), s.u.x.data(), s.u.y.data(), s.u.z.data());
   if (corners) apply_corners(state, s, *soft, settings.substep);

@@ -42,7 +42,8 @@ TEST(StitchMeasures, name_the_throws_of_the_thread_as_it_lies) {
     EXPECT_FLOAT_EQ(static_cast<float>(all[0].tension), 0.7f) << "between its holes, not that of a tail";
     return all[0];
   };
-  const StitchMeasures square = of(validation::square()), granny = of(validation::granny()), one = of(validation::single_throw());
+  const StitchMeasures square = of(validation::square()), granny = of(validation::granny()),
+                       one = of(validation::single_throw());
   EXPECT_EQ(square.throws(), 2);
   EXPECT_EQ(square.alternating, 2);
   EXPECT_EQ(granny.throws(), 2);
