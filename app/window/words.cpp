@@ -61,6 +61,8 @@ std::string fault_words(Fault fault) {
       return "bite torn out";
     case Fault::thread_broken:
       return "thread broken";
+    case Fault::needle_torn_out:
+      return "needle torn out of the wall";
     default:
       return fault_name(fault);
   }

@@ -21,9 +21,10 @@ const char* event_name(EventKind kind) {
 
 const char* fault_name(Fault fault) {
   static constexpr const char* kName[] = {
-      "none",          "wrong_body",      "wrong_layer",    "one_wall_only", "knot_without_bite", "needle_in_tissue",
-      "cut_in_stitch", "cut_before_knot", "too_few_throws", "cut_off_line",  "pulled_attached",   "cut_at_suture",
-      "bite_in_char",  "inner_wall_cut",  "clamp_torn_out", "bite_torn",     "bite_torn_out",     "thread_broken"};
+      "none",           "wrong_body",      "wrong_layer",    "one_wall_only", "knot_without_bite", "needle_in_tissue",
+      "cut_in_stitch",  "cut_before_knot", "too_few_throws", "cut_off_line",  "pulled_attached",   "cut_at_suture",
+      "bite_in_char",   "inner_wall_cut",  "clamp_torn_out", "bite_torn",     "bite_torn_out",     "thread_broken",
+      "needle_torn_out"};
   static_assert(sizeof(kName) / sizeof(kName[0]) == static_cast<size_t>(Fault::count_));
   return fault < Fault::count_ ? kName[static_cast<int>(fault)] : "unknown";
 }

@@ -78,6 +78,7 @@ enum class Fault : uint8_t {
   bite_torn,          // which: bite, value: load [N]; its thread has torn the wall by a millimeter; once per bite
   bite_torn_out,      // which: bite, value: load [N]; the slit extends to an edge: the thread has come out of the wall
   thread_broken,      // which: slot toward the free end, value: tension [N]; the thread broke under load
+  needle_torn_out,    // which: bite; its needle has left the wall sideways
   count_
 };
 const char* fault_name(Fault fault);

@@ -476,13 +476,17 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
     Body& body = bodies.body[b];
     BodiesScratch::Moving& moving = k.moving[b];
     Vec3 force{}, torque{};
+    bool gripped = false;
     for (const Row& row : k.row) {
+      gripped = gripped || (row.kind == Row::Kind::grip && (row.a == b || row.b == b));
       if (row.a == b) force += row.impulse / h, torque += cross(row.ra, row.impulse) / h;
       if (row.b == b) force -= row.impulse / h, torque -= cross(row.rb, row.impulse) / h;
     }
     body.force = force + body.thread_force + moving.thread_push / h;
     body.torque = torque + body.thread_torque + moving.thread_twist / h;
-    moving.v = clamped(moving.v, kMaxSpeed), moving.w = clamped(moving.w, kMaxSpin);
+    const bool loose = m.falls && !gripped;
+    if (loose && moving.held) moving.w = moving.w * (1 - kBedDrag * h);
+    moving.v = clamped(moving.v, loose ? kLooseSpeed : kMaxSpeed), moving.w = clamped(moving.w, loose ? kLooseSpin : kMaxSpin);
     body.hand_force = body.hand_torque = {};
     if (moving.held) {
       const Wish w = wish_of(m, body, target[b], h);

@@ -76,6 +76,8 @@ void lace_threads(const Model& m, State& s) {
       float& last = s.thread.rest[n.thread_node - 1];
       last = std::max(std::min(last, s.thread.rest[n.thread_node - 2]), last - kTaken * m.wall.step);
     }
+    // The thread comes out with the needle, where no later hole keeps its place in the list.
+    if (n.events & kTornOut && n.torn_hole != wall::kNone && n.torn_hole + 1 == s.hole.size()) unlace(s, n.torn_hole);
     if (n.channels == 0) continue;
     const NeedleModel& nm = m.needles.needle[i];
     const Pose& pose = s.bodies.body[nm.body].pose;

@@ -90,6 +90,28 @@ void start_channel(Needle& n, const wall::Point& at, float side) {
   n.events |= kEntered;
 }
 
+// [m] A shaft farther than this from all of a channel has left it sideways. Its thread follows it out of the exit: that far
+// behind the swage the channel may be.
+constexpr float kSideways = 2.5e-3f, kFollows = 10e-3f;
+
+void leave_channels(const NeedleModel& m, const wall::Model& wm, const wall::State& ws, const Pose& pose, Needle& n) {
+  for (uint32_t c = 0; c < n.channels; ++c) {
+    Channel& channel = n.channel[c];
+    const auto near = [&](const wall::Point& p) {
+      const Vec3 at = place_of(wm, ws, p);
+      const float angle = angle_of(m, pose, at), far = distance(at, arc_point(m, pose, std::clamp(angle, 0.0f, m.shape.arc)));
+      return far < (angle < 0 && channel.entry_hole != wall::kNone ? kFollows : kSideways);
+    };
+    if (std::any_of(channel.point.begin(), channel.point.begin() + channel.count, near)) continue;
+    n.torn = c, n.torn_hole = channel.exit_hole == wall::kNone ? channel.entry_hole : wall::kNone;
+    n.events |= kTornOut;
+    if (c + 1 == n.channels) n.inside = false;
+    std::copy(n.channel.begin() + c + 1, n.channel.begin() + n.channels, n.channel.begin() + c);
+    --n.channels;
+    return;  // the next one in the next step
+  }
+}
+
 }  // namespace
 
 float puncture_force(const PunctureLaw& law, const NeedleShape& shape) { return law.puncture * shape.wire_radius / 0.33e-3f; }
@@ -162,8 +184,8 @@ void skip_channels(const NeedlesModel& model, const wall::Model& wm, const wall:
 }
 
 void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wall::Model& wm, const wall::State& ws,
-                      const Surface& surface, const thread::State&, const Bodies& bodies, std::span<Needle> needle, float h,
-                      BodiesScratch& k) {
+                      const Surface& surface, const thread::State& thread, const Bodies& bodies, std::span<Needle> needle,
+                      float h, BodiesScratch& k) {
   const PunctureLaw& law = model.law;
   for (uint32_t i = 0; i < needle.size(); ++i) {
     const NeedleModel& m = model.needle[i];
@@ -187,8 +209,8 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
     };
     const auto key = [&](uint64_t kind, uint64_t part) { return (uint64_t{8} + kind) << 60 | uint64_t{i} << 36 | part; };
 
-    // The swage on its thread.
-    if (n.thread_node != wall::kNone) {
+    // The swage on its thread. A last node of which the thread has broken off is none: alone it would be thrown to and fro.
+    if (n.thread_node != wall::kNone && n.thread_node > 0 && !thread.broken[n.thread_node - 1]) {
       const Vec3 at = swage_of(m, body.pose);
       Row row;
       row.kind = Row::Kind::spring, row.key = key(0, 0), row.axis = {1, 0, 0};
@@ -289,6 +311,8 @@ void advance_needles(const NeedlesModel& model, const wall::Model& wm, const wal
     const Body& body = bodies.body[m.body];
     const Vec3 tip = tip_of(m, body.pose), tangent = arc_tangent(m, body.pose, m.shape.arc);
     const auto gave_way = [&](uint32_t row) { return row < k.row.size() && k.row[row].at_limit; };
+    leave_channels(m, wm, ws, body.pose, n);
+    if (n.events & kTornOut) continue;
     if (!n.inside) {
       if (gave_way(n.tip_row)) {
         const Row& row = k.row[n.tip_row];

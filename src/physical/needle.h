@@ -62,11 +62,12 @@ struct Channel {
 
 // What happened in the last step, as bits.
 enum NeedleEvent : uint32_t {
-  kEntered = 1,    // the tip made a hole
-  kLeft = 2,       // and another where it came out
-  kWithdrawn = 4,  // the tip went back out: nothing remains
-  kThreadIn = 8,   // the swage has passed the entry: an Eyelet
-  kThreadOut = 16  // and the exit: the bite is complete
+  kEntered = 1,     // the tip made a hole
+  kLeft = 2,        // and another where it came out
+  kWithdrawn = 4,   // the tip went back out: nothing remains
+  kThreadIn = 8,    // the swage has passed the entry: an Eyelet
+  kThreadOut = 16,  // and the exit: the bite is complete
+  kTornOut = 32     // the shaft has left one of its channels sideways
 };
 
 struct Needle {
@@ -77,7 +78,8 @@ struct Needle {
   wall::Point tip;                      // its material point while inside
   float entry_peak = 0, exit_peak = 0;  // [N] at the tip when it went in and out last
   uint32_t events = 0;
-  // Of the step: rows at the tip.
+  // Of the step: the channel that the shaft has left, which is there no more, and its entry hole; rows at the tip.
+  uint32_t torn = 0, torn_hole = wall::kNone;
   uint32_t tip_row = wall::kNone;
   uint32_t exit_row[2] = {wall::kNone, wall::kNone};
   wall::Point tip_on, exit_on[2];  // where they act

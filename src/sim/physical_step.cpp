@@ -18,7 +18,7 @@ struct PhysicalScratch {
   std::vector<Vec3> was;                     // [m] per instrument: its place before the hands of this tick
   // What a needle did in a step of this tick.
   struct Puncture {
-    uint32_t needle = 0, events = 0;
+    uint32_t needle = 0, events = 0, torn = 0;  // torn: the channel, see physical::Needle
     wall::Point entry, exit;
     uint32_t entry_hole = wall::kNone;  // of the first channel: it may be gone at the end of the tick
   };
@@ -163,7 +163,7 @@ void note_punctures(const State& state, const physical::Model& m, PhysicalScratc
     }
     if (!needle.events || k.puncture.size() == k.puncture.capacity()) continue;
     PhysicalScratch::Puncture& p = k.puncture.emplace_back();
-    p.needle = n, p.events = needle.events;
+    p.needle = n, p.events = needle.events, p.torn = needle.torn;
     if (needle.channels == 0) continue;
     const physical::Channel& c = needle.channel[needle.channels - 1];
     p.entry = c.point[0], p.exit = c.point[c.count - 1];
@@ -371,6 +371,12 @@ void show_bites(const Model& model, State& state, SutureContext& sewing, const P
       suture.bite[which].canceled = true, suture.bite[which].has_exit = false;
       suture.open.pop_back();
       report(EventKind::bite_withdrawn, which, suture.bite[which].depth, needle_tip(arc, body));
+    }
+    if ((p.events & physical::kTornOut) && p.torn < suture.open.size()) {
+      const uint32_t which = suture.open[p.torn].bite;
+      suture.bite[which].canceled = true, suture.bite[which].has_exit = false;
+      suture.open.erase(suture.open.begin() + p.torn);
+      sewing.report_fault(p.needle, Fault::needle_torn_out, kNoHand, which, needle_tip(arc, body));
     }
     if ((p.events & physical::kThreadIn) && !suture.open.empty() && p.entry_hole != wall::kNone) {
       suture.open.front().phase = NeedlePhase::back_in;

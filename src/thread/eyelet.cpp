@@ -304,10 +304,10 @@ void solve_corners(const Settings& settings, const State& state, Scratch& s) {
     if (k > 0) y[e] -= s.corner[e].sub_before * x[k - 1];
   }
   solve_columns(n, a, y);
-  // No more than the thread can bear. With friction the rows are not symmetric: at holes that nearly meet they can come near a
-  // singular system, whose solution would throw the wall about.
-  const float most = settings.material.straight_strength * settings.substep * settings.substep;
-  for (size_t e = 0; e < n && most > 0; ++e) {
+  // With friction the rows are not symmetric: at holes that nearly meet they can come near a singular system, whose solution
+  // would throw the wall about.
+  const float most = most_multiplier(settings);
+  for (size_t e = 0; e < n; ++e) {
     const float before = s.lambda[state.eyelet[e].segment];
     if (std::abs(before + y[e]) > most) y[e] = std::clamp(before + y[e], -most, most) - before;
   }

@@ -229,6 +229,13 @@ void find_corners(const State& state, Scratch& s, const SoftPoints& soft);
 void prepare_corners(const State& state, Scratch& s, const SoftPoints& soft);
 void take_corner_residuals(const State& state, Scratch& s, const SoftPoints& soft);
 void solve_corners(const Settings& settings, const State& state, Scratch& s);
+// [N s2] of a segment, either way. No segment bears more than twice its straight strength, beyond which it breaks within a
+// step: what moves a node faster than the limit of motion lets its neighbors follow would else load hands and tissue with
+// kilonewtons.
+inline float most_multiplier(const Settings& settings) {
+  const float strength = settings.material.straight_strength;
+  return strength > 0 ? 2 * strength * settings.substep * settings.substep : 1e9f;
+}
 void apply_corners(const State& state, Scratch& s, SoftPoints& soft, float substep);
 void push_soft(Scratch& s, SoftPoints& soft, uint32_t point, Vec3 multiplier, float substep);
 

@@ -55,8 +55,12 @@ CATGUT_CLONES void apply(size_t nodes, const float* __restrict nx, const float* 
   }
 }
 
-CATGUT_CLONES void accumulate(size_t segments, const float* __restrict step, float* __restrict lambda) {
-  for (size_t i = 0; i < segments; ++i) lambda[i] += step[i];
+CATGUT_CLONES void accumulate(size_t segments, float most, float* __restrict step, float* __restrict lambda) {
+  for (size_t i = 0; i < segments; ++i) {
+    const float sum = lambda[i] + step[i], within = std::min(most, std::max(-most, sum));
+    step[i] = within == sum ? step[i] : within - lambda[i];
+    lambda[i] = within;
+  }
 }
 
 }  // namespace
@@ -215,7 +219,7 @@ void solve_stretch(const Settings& settings, const State& state, Scratch& s, Sof
   if (corners) take_corner_residuals(state, s, *soft);
   solve_tridiagonal(s, m, s.residual.data(), x);
   if (corners) solve_corners(settings, state, s);
-  accumulate(m, x, s.lambda.data());
+  accumulate(m, most_multiplier(settings), x, s.lambda.data());
   apply(m + 1, s.n.x.data(), s.n.y.data(), s.n.z.data(), x, s.w.data(), s.u.x.data(), s.u.y.data(), s.u.z.data());
   if (corners) apply_corners(state, s, *soft, settings.substep);
 }
