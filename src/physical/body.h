@@ -188,7 +188,8 @@ struct BodiesScratch {
     Vec3 drag_speed, drag_spin;      // [m/s] of the center, [rad/s]: that motion of the thread or of the needle's holder
     uint32_t holder = wall::kNone;   // of a needle in jaws
     bool loose = false;              // a needle that is in no jaws and in no tissue
-    bool fast = false;               // such a needle: the thread moves it within the step
+    bool lies = false;               // such a needle on the drape
+    bool fast = false;               // one that does not lie there: the thread moves it within the step
     Vec3 thread_push, thread_twist;  // [N s], [N m s] of the thread in this step, on a fast needle
   };
   std::vector<Moving> moving;

@@ -12,9 +12,9 @@ constexpr float kMaxSpeed = 3, kMaxSpin = 150;  // [m/s], [rad/s]
 // The same of a needle that no jaws hold. Thread follows at 0.8 m/s at most (thread::Settings::max_move): a faster swage drew
 // itself along its thread.
 constexpr float kLooseSpeed = 0.5f, kLooseSpin = 20;
-constexpr float kBedDrag = 100;  // [1/s] of turns of a needle that lies on the drape: without it, it trembled at 10 to 30 rad/s
-constexpr float kCorrect = 0.2f;            // fraction of an error that a bilateral row undoes per step
-constexpr float kBristle = 0.1e-3f;         // [m] elastic give of a grip before it slips
+constexpr float kBedDrag = 100;      // [1/s] of a needle that lies on the drape: without it, it trembled at 10 to 30 rad/s
+constexpr float kCorrect = 0.2f;     // fraction of an error that a bilateral row undoes per step
+constexpr float kBristle = 0.1e-3f;  // [m] elastic give of a grip before it slips
 constexpr float kThreadGripGive = 0.2e-3f;  // [m] the same for thread
 
 inline Vec3 across(Vec3 v, Vec3 axis) { return v - axis * dot(v, axis); }

@@ -104,7 +104,9 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
     m.holder =
         model.body[b].falls && holder != bodies.body.end() ? static_cast<uint32_t>(holder - bodies.body.begin()) : wall::kNone;
     m.loose = model.body[b].falls && bodies.body[b].skip == 0 && m.holder == wall::kNone;
-    m.fast = m.loose && length2(bodies.body[b].velocity) > kFast * kFast;
+    // One that meets the drape squeezes thread against it with no more than one that lies there.
+    m.lies = m.loose && is_on(drape, model.body[b], bodies.body[b]);
+    m.fast = m.loose && !m.lies && length2(bodies.body[b].velocity) > kFast * kFast;
   }
   std::array<uint32_t, kMaxBodies + 1> first{};  // of the capsules of a body, in the order of show_bodies
   for (size_t b = 0; b < bodies.body.size(); ++b)
@@ -476,16 +478,15 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
     Body& body = bodies.body[b];
     BodiesScratch::Moving& moving = k.moving[b];
     Vec3 force{}, torque{};
-    bool gripped = false;
     for (const Row& row : k.row) {
-      gripped = gripped || (row.kind == Row::Kind::grip && (row.a == b || row.b == b));
       if (row.a == b) force += row.impulse / h, torque += cross(row.ra, row.impulse) / h;
       if (row.b == b) force -= row.impulse / h, torque -= cross(row.rb, row.impulse) / h;
     }
     body.force = force + body.thread_force + moving.thread_push / h;
     body.torque = torque + body.thread_torque + moving.thread_twist / h;
-    const bool loose = m.falls && !gripped;
-    if (loose && moving.held) moving.w = moving.w * (1 - kBedDrag * h);
+    const bool loose = m.falls && moving.holder == wall::kNone;
+    if (loose && (moving.held || moving.lies)) moving.w = moving.w * (1 - kBedDrag * h);
+    if (moving.lies) moving.v = moving.v * (1 - kBedDrag * h);
     moving.v = clamped(moving.v, loose ? kLooseSpeed : kMaxSpeed), moving.w = clamped(moving.w, loose ? kLooseSpin : kMaxSpin);
     body.hand_force = body.hand_torque = {};
     if (moving.held) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/sim: hands that do anything at any moment of a stitch. They reach for thread and tissue at up to 0.9 m/s, close and open
-// at random; then they go away. Whatever they tore, the state stays sane, and in the end nothing moves any more.
+// tests/sim: hands that do anything at any moment of a stitch. They reach for thread and tissue at up to 0.9 m/s, close and
+// open at random; then they go away. Whatever they tore, the state stays sane, and in the end nothing moves any more.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -133,8 +133,8 @@ void check(const char* name, uint64_t first, uint64_t every, int moments, int ti
       publish(*model, *state, seen);
     }
     for (uint32_t seed = 1; seed <= seeds; ++seed) {
-      const std::string at = std::string(name) + ", tick " + std::to_string(state->tick) + " (" + surgeon->doing() + "), seed " +
-                             std::to_string(seed);
+      const std::string at = std::string(name) + ", tick " + std::to_string(state->tick) + " (" + surgeon->doing() +
+                             "), seed " + std::to_string(seed);
       const Outcome out = let_loose(*model, save_state(*model, *state), 1000 * static_cast<uint32_t>(k) + seed, ticks);
       EXPECT_TRUE(out.valid) << at;
       EXPECT_LE(out.tension, 2.01f * bears) << at;
@@ -155,8 +155,8 @@ TEST(WildHands, leave_every_moment_of_a_stitch_sane) {
   check("purse_string_thread", 200, 400, 8, 300, 4);
 }
 
-// A needle holder that has driven the needle into the wall moves 20 mm across it, at 0.1 m/s: the needle cannot stay "in" tissue
-// that it has left.
+// A needle holder that has driven the needle into the wall moves 20 mm across it, at 0.1 m/s: the needle cannot stay "in"
+// tissue that it has left.
 TEST(WildHands, drag_a_needle_sideways_out_of_the_wall_and_it_is_reported) {
   const SceneSpec scene = read_scene("interrupted_tied");
   const auto model = build_model(scene);
@@ -190,9 +190,7 @@ TEST(WildHands, drag_a_needle_sideways_out_of_the_wall_and_it_is_reported) {
   for (int i = 0; i < 60; ++i) {
     if (i < 12) input.hand[hand].pose.p = input.hand[hand].pose.p + across * (0.1f / 60);
     tick();
-    if (i == 1) {
-      EXPECT_TRUE(faults.empty()) << "3 mm at the jaws bend the tissue";
-    }
+    if (i == 1) { EXPECT_TRUE(faults.empty()) << "3 mm at the jaws bend the tissue"; }
   }
   ASSERT_FALSE(faults.empty());
   EXPECT_EQ(faults.back().fault, Fault::needle_torn_out);
