@@ -112,32 +112,49 @@ Outcome let_loose(const Model& model, const std::vector<std::byte>& from, uint32
   return out;
 }
 
-// The scripted surgeon sews; from moment to moment a copy of his scene gets other hands.
-void check(const char* name, uint64_t first, uint64_t every, int moments, int ticks, uint32_t seeds) {
-  const SceneSpec scene = read_scene(name);
-  const auto model = build_model(scene);
+// A scene that the scripted surgeon sews.
+struct Sewing {
+  SceneSpec scene;
+  std::shared_ptr<const Model> model = build_model(scene);
   StatePtr state = initial_state(*model);
   Jobs jobs{1};
   Snapshot seen;
-  publish(*model, *state, seen);
-  const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*model));
-  const float bears = model->physical->world.thread.material.straight_strength;
+  std::unique_ptr<Surgeon> surgeon;
+  TickInput input;
+  std::vector<Event> faults;
+
+  explicit Sewing(const char* name) : scene(read_scene(name)) {
+    publish(*model, *state, seen);
+    surgeon = scripted_surgeon(scene, picture_model(*model));
+  }
+  void tick() {
+    input.tick = state->tick;
+    step(*model, *state, input, jobs);
+    input.commands.clear();
+    publish(*model, *state, seen);
+    for (const Event& e : seen.event)
+      if (e.kind == EventKind::technique_fault) faults.push_back(e);
+  }
+  void sew() {
+    input.hand = no_hands();
+    if (static_cast<float>(state->tick) * model->dt >= scene.settle) input = surgeon->operate(seen, model->dt);
+    tick();
+  }
+};
+
+// From moment to moment a copy of the scene gets other hands.
+void check(const char* name, uint64_t first, uint64_t every, int moments, int ticks, uint32_t seeds) {
+  Sewing s(name);
+  const float bears = s.model->physical->world.thread.material.straight_strength;
   ASSERT_GT(bears, 0);
   for (int k = 0; k < moments; ++k) {
-    for (; state->tick < first + static_cast<uint64_t>(k) * every && !surgeon->done();) {
-      TickInput input;
-      input.hand = no_hands();
-      if (static_cast<float>(state->tick) * model->dt >= scene.settle) input = surgeon->operate(seen, model->dt);
-      input.tick = state->tick;
-      step(*model, *state, input, jobs);
-      publish(*model, *state, seen);
-    }
+    while (s.state->tick < first + static_cast<uint64_t>(k) * every && !s.surgeon->done()) s.sew();
     for (uint32_t seed = 1; seed <= seeds; ++seed) {
-      const std::string at = std::string(name) + ", tick " + std::to_string(state->tick) + " (" + surgeon->doing() +
+      const std::string at = std::string(name) + ", tick " + std::to_string(s.state->tick) + " (" + s.surgeon->doing() +
                              "), seed " + std::to_string(seed);
-      const Outcome out = let_loose(*model, save_state(*model, *state), 1000 * static_cast<uint32_t>(k) + seed, ticks);
+      const Outcome out = let_loose(*s.model, save_state(*s.model, *s.state), 1000 * static_cast<uint32_t>(k) + seed, ticks);
       EXPECT_TRUE(out.valid) << at;
-      EXPECT_LE(out.tension, 2.01f * bears) << at;
+      EXPECT_LE(out.tension, 2.01f * bears) << at;  // the solver bounds it: this sees only whether the bound is there
       EXPECT_LT(out.wall, 0.1f) << at << ": the wall still moves";
       EXPECT_LT(out.needle, 0.3f) << at << ": the needle still moves";  // one that hangs may still swing
       EXPECT_LT(out.away, 0.25f) << at << ": the needle has flown away";
@@ -158,45 +175,25 @@ TEST(WildHands, leave_every_moment_of_a_stitch_sane) {
 // A needle holder that has driven the needle into the wall moves 20 mm across it, at 0.1 m/s: the needle cannot stay "in"
 // tissue that it has left.
 TEST(WildHands, drag_a_needle_sideways_out_of_the_wall_and_it_is_reported) {
-  const SceneSpec scene = read_scene("interrupted_tied");
-  const auto model = build_model(scene);
-  StatePtr state = initial_state(*model);
-  Jobs jobs{1};
-  Snapshot seen;
-  publish(*model, *state, seen);
-  const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*model));
-  const physical::Needle& needle = state->physical.world.needle[0];
-  TickInput input;
-  std::vector<Event> faults;
-  const auto tick = [&] {
-    input.tick = state->tick;
-    step(*model, *state, input, jobs);
-    input.commands.clear();
-    publish(*model, *state, seen);
-    for (const Event& e : seen.event)
-      if (e.kind == EventKind::technique_fault) faults.push_back(e);
-  };
-  while (state->tick < 600 && (!needle.inside || needle.channel[0].count < 3)) {
-    input.hand = no_hands();
-    if (static_cast<float>(state->tick) * model->dt >= scene.settle) input = surgeon->operate(seen, model->dt);
-    tick();
-  }
+  Sewing s("interrupted_tied");
+  const physical::Needle& needle = s.state->physical.world.needle[0];
+  while (s.state->tick < 600 && (!needle.inside || needle.channel[0].count < 3)) s.sew();
   ASSERT_TRUE(needle.inside);
-  const size_t hand = seen.tool[0].held == Held::needle ? 0 : 1;
-  ASSERT_EQ(seen.tool[hand].held, Held::needle);
-  EXPECT_TRUE(faults.empty());
+  const size_t hand = s.seen.tool[0].held == Held::needle ? 0 : 1;
+  ASSERT_EQ(s.seen.tool[hand].held, Held::needle);
+  EXPECT_TRUE(s.faults.empty());
   // Across the plane of its arc.
-  const Vec3 across = rotate(seen.active().needle.pose.q, {0, 0, 1});
+  const Vec3 across = rotate(s.seen.active().needle.pose.q, {0, 0, 1});
   for (int i = 0; i < 60; ++i) {
-    if (i < 12) input.hand[hand].pose.p = input.hand[hand].pose.p + across * (0.1f / 60);
-    tick();
-    if (i == 1) { EXPECT_TRUE(faults.empty()) << "3 mm at the jaws bend the tissue"; }
+    if (i < 12) s.input.hand[hand].pose.p = s.input.hand[hand].pose.p + across * (0.1f / 60);
+    s.tick();
+    if (i == 1) { EXPECT_TRUE(s.faults.empty()) << "3 mm at the jaws bend the tissue"; }
   }
-  ASSERT_FALSE(faults.empty());
-  EXPECT_EQ(faults.back().fault, Fault::needle_torn_out);
+  ASSERT_FALSE(s.faults.empty());
+  EXPECT_EQ(s.faults.back().fault, Fault::needle_torn_out);
   EXPECT_EQ(needle.channels, 0u);
   EXPECT_FALSE(needle.inside);
-  EXPECT_FALSE(seen.active().needle.in_tissue);
+  EXPECT_FALSE(s.seen.active().needle.in_tissue);
 }
 
 }  // namespace
