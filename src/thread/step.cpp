@@ -229,7 +229,7 @@ void break_overloaded(const Settings& settings, State& state) {
 }  // namespace
 
 State make_state(std::span<const Vec3> path, size_t crossings) {
-  CATGUT_CHECK(path.size() >= 4 && path.size() < kTool);
+  CATGUT_CHECK(path.size() >= kLeastNodes && path.size() < kTool);
   const size_t n = path.size();
   State s;
   for (Columns3* c : {&s.x, &s.fine, &s.v, &s.plane_friction, &s.plane_drift, &s.listed}) c->assign(n, 0);

@@ -215,6 +215,7 @@ struct Surroundings {
 
 struct Scratch;  // work space of a step; nothing in it outlives the step
 
+constexpr size_t kLeastNodes = 4;  // of a thread
 // Straight segments through `path`, with its segment lengths as rest lengths. capacity: of crossings.
 State make_state(std::span<const Vec3> path, size_t crossings = 4096);
 

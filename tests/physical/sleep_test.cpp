@@ -91,6 +91,26 @@ TEST(Sleep, a_tool_moves_a_sleeping_thread_as_it_moves_one_that_is_awake) {
   EXPECT_TRUE(asleep.state.sleep.all());
 }
 
+// The last segment of a thread broke: its last node falls alone while all other thread is asleep. It had no segment and so no
+// mass.
+TEST(Sleep, a_node_that_broke_off_falls_beside_a_thread_that_sleeps) {
+  OnDrape scene(true);
+  scene.rest(600);
+  ASSERT_TRUE(scene.state.sleep.all());
+  thread::State& thread = scene.state.thread;
+  const size_t last = thread.nodes() - 1;
+  thread.x.set(last, thread.x.at(last) + Vec3{0, 1, 0});
+  thread.broken[last - 1] = 1;
+  bool alone = false;
+  for (int i = 0; i < 6000 && !(i > 100 && scene.state.sleep.all()); ++i) {
+    scene.step();
+    ASSERT_TRUE(is_finite(thread.position(last))) << i;
+    alone = alone || (scene.state.sleep.strand[0].asleep && !scene.state.sleep.strand[1].asleep);
+  }
+  EXPECT_TRUE(alone);
+  EXPECT_NEAR(thread.position(last).y, 0.175e-3f, 0.1e-3f);
+}
+
 // A square knot, tightened; then both load ends are drawn apart by springs.
 struct Knotted {
   Sewn s;
