@@ -2,8 +2,11 @@
 // surgeon/finishing: the end of a stitch: scissors, what they cut off, hands away, a new suture; see scripted.h.
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "surgeon/scripted.h"
+#include "surgeon/throws.h"
 
 namespace catgut {
 namespace {
@@ -17,6 +20,8 @@ constexpr float kOverDrape = 0.004f;          // [m] of a needle that is laid do
 constexpr Vec3 kLaidDown{-0.6f, -0.3f, 0.75f};
 constexpr float kShortStump = 0.005f;    // [m] of thread left on a knot with physical mechanics, beyond where the strands touch
 constexpr float kKnotEnds = 4e-3f;       // [m] of free thread
+constexpr float kFarthestCut = 0.03f;    // [m] beyond that: a knot with wide loops
+constexpr float kWhole = 1;              // [m]: longer than a thread
 constexpr float kStumpClear = 2e-3f;     // [m] of the blades from the stitch
 constexpr Vec3 kCutFrom{0, 0.6f, 0.8f};  // unit, from the blades along the shaft
 constexpr int kPiece = 10;               // first stage of carrying a cut-off tail away
@@ -85,9 +90,36 @@ bool Scripted::leave(const Snapshot& seen) {
   }
 }
 
+size_t Scripted::node_to_cut(const Snapshot& seen, bool tail) const {
+  const size_t first = first_point_node(seen), end = last_point_node(seen), last = seen.active().thread_order.size() - 1;
+  const bool physical = plan_.pull > 0;
+  const size_t from = physical ? knot_end(seen, tail) : tail ? first : end;
+  const float wanted = physical ? kStumpClear : kTieClear;
+  // After a miss further out, with more room.
+  const float near = (physical ? kShortStump : kStump) + 0.004f * static_cast<float>(misses_);
+  const float far = near + (physical ? kFarthestCut : 3 * kStump);
+  // A knot of wide turns has loops in which the strand touches nothing: whether its throws stay shows where it ends.
+  const size_t begin = node_along(seen, first, kWhole, -1);  // a tail that is cut off already does not count
+  std::vector<Vec3> thread;
+  for (size_t i = begin; physical && i <= last; ++i) thread.push_back(node_at(seen, i));
+  const SeenThrows knot = see_throws(thread);
+  const auto keeps_throws = [&](size_t i) {
+    const std::span<const Vec3> whole(thread);
+    return see_throws(tail ? whole.subspan(i - begin) : whole.first(i - begin + 1)) == knot;
+  };
+  size_t at = tail ? 1 : last - 1;
+  float clearest = 0;
+  for (float out = near; out < far && clearest < wanted; out += 0.002f) {
+    const size_t i = std::clamp<size_t>(node_along(seen, from, out, tail ? -1 : 1), 1, last - 1);
+    float clear = wanted;
+    for (size_t k = first; k <= end; ++k) clear = std::min(clear, distance(node_at(seen, i), node_at(seen, k)));
+    if (clear > clearest && (!physical || keeps_throws(i))) clearest = clear, at = i;
+  }
+  return at;
+}
+
 bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
   enum { over, down, snip, away };
-  const size_t last = seen.active().thread_order.size() - 1;
   if (stage_ >= kPiece) return take_piece(seen);
   if (kind == TaskKind::cut_needle) {  // the forceps holds the needle by its end: cut right there
     if (stage_ == over) {
@@ -101,21 +133,9 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
     return false;
   }
   const bool tail = kind == TaskKind::cut_tail;
-  // Not too near to the knot, where the scissors could cut the stitch itself; after a miss further out, with more room.
-  const size_t first = first_point_node(seen), end = last_point_node(seen);
   const bool physical = plan_.pull > 0;
-  const size_t from = physical ? knot_end(seen, tail) : tail ? first : end;
-  const float wanted = physical ? kStumpClear : kTieClear;
-  size_t at = last;
-  float clearest = 0;
-  const float near = (physical ? kShortStump : kStump) + 0.004f * static_cast<float>(misses_);
-  for (float far = near; far < near + 3 * kStump && clearest < wanted; far += 0.002f) {
-    const size_t i = std::clamp<size_t>(node_along(seen, from, far, tail ? -1 : 1), 1, last - 1);
-    float clear = wanted;
-    for (size_t k = first; k <= end; ++k) clear = std::min(clear, distance(node_at(seen, i), node_at(seen, k)));
-    if (clear > clearest) clearest = clear, at = i;
-  }
-  at = std::clamp<size_t>(at, 1, last - 1);
+  if (!physical || (stage_ == over && waited_ <= dt_)) cut_at_ = node_to_cut(seen, tail);
+  const size_t at = cut_at_;
   Pose goal = tying_pose(kNeedleHolder, node_at(seen, at));
   if (physical) {  // from above, the strand between the jaws
     const Vec3 x = normalized(cross(kCutFrom, node_at(seen, at + 1) - node_at(seen, at - 1)), {1, 0, 0});

@@ -167,6 +167,7 @@ class Scripted final : public Surgeon {
   bool gather(const Snapshot& seen);
 
   // --- scissors ---------------------------------------------------------------------------------------------------------
+  size_t node_to_cut(const Snapshot& seen, bool tail) const;  // clear of the stitch, beyond the last throw of its knot
   bool cut(TaskKind kind, const Snapshot& seen);
   // The needle holder carries the tail's piece away: left in the field it would lie between jaws and tissue at the next stitch.
   bool take_piece(const Snapshot& seen);
@@ -209,7 +210,7 @@ class Scripted final : public Surgeon {
   float stitch_load_ = 0;        // [N] largest tension beside a cut-off tail when the jaws took it
   // A throw.
   Winding winding_;  // computed by exchange/tying, as for assisted hands
-  size_t cuts_before_ = 0, settled_before_ = 0;
+  size_t cuts_before_ = 0, cut_at_ = 0, settled_before_ = 0;  // cut_at_: node where the scissors go
   uint32_t throws_before_ = 0, take_slot_ = 0;
   Quat take_turn_;
   Vec3 tried_;

@@ -11,6 +11,7 @@ namespace catgut {
 struct SeenThrows {
   int right = 0, left = 0;  // handed
   int turns = 0;            // of the throw that has most
+  friend bool operator==(const SeenThrows&, const SeenThrows&) = default;
   // Throws of the longest knot that they can make with every throw of the other hand than the one below.
   int alternating() const;
   // Hand of the next one, +1 right; `first`: hand of the knot's first throw.
