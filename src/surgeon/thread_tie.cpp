@@ -243,7 +243,8 @@ void ThreadTie::seated(const Snapshot& seen) {
 
 void ThreadTie::begin(const Snapshot& seen, int wraps, int sense, bool first, bool keep) {
   keep_ = keep;
-  wraps_ = wraps, first_ = first, failed_ = false, misses_ = 0, tries_ = 0;
+  wraps_ = wraps, first_ = first, failed_ = seen.active().suture_point.empty(), misses_ = 0, tries_ = 0;
+  if (failed_) return void(stage_ = done);
   origin_ = 0.5f * (seen.active().suture_point.front().position + seen.active().suture_point.back().position);
   if (++throws_ > 2) origin_ = knot_center(seen, origin_);
   const Vec3 swage = needle_swage(picture_, seen);
@@ -408,9 +409,13 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
   const Vec3 shaft = shaft_;
   ScriptedHand& holder = hands_[kHolder];
   const bool holds = seen.tool[kHolder].held == Held::thread;
-  if (seen.tool[kForceps].held != Held::needle) {
+  if (seen.tool[kForceps].held != Held::needle || seen.active().suture_point.empty()) {  // lost, or the bites torn out
     failed_ = true, stage_ = done;
     return true;
+  }
+  if (holds && waited_ > 0.2f && (stage_ == to_work || stage_ == into_work || stage_ == wind)) {  // it stuck to the jaws
+    again(seen, drop_tail), lost_ = false;
+    return place(), stage_ == done;
   }
   switch (stage_) {
     case to_tail:
@@ -496,7 +501,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       if (felt_ > kWinding) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
       else if (felt_ < 0.02f) radius_ = std::min(0.5f * strand_, radius_ + 0.01f * dt);
       hand_ = tip_ + shaft * kWindAt + around(side_, angle_, shaft) * radius_;
-      if (left < kBetweenJaws || waited_ > kPatience) go(seen, close);
+      if (left < kBetweenJaws || waited_ > kPatience || felt_ > kTaut) go(seen, close);
       break;
     }
     case draw: {
