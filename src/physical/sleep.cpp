@@ -290,7 +290,7 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
       }
     }
   }
-  // A piece that broke off may be too short to be a thread by itself (thread::make_state): it takes others along.
+  // A piece that broke off may be too short for a thread (thread::make_state): it takes others along.
   uint32_t nodes = 0;
   for (const Sleep::Strand& k : z.strand) nodes += k.asleep ? 0 : k.last - k.first + 1;
   if (nodes > 0 && nodes < thread::kLeastNodes) wake(s);

@@ -85,7 +85,6 @@ struct Plan {
   bool rise = false;      // the needle is lifted over the edges on its way to where it is laid down
   bool flat = false;      // a pad: the tail lies on it
   float aside = 0;        // [rad] physical throws: turn of the line on which they are drawn, clear of the stitch opposite
-  bool slide = false;     // physical throws: the second one slides down with the first, as nothing else holds the edges
   float knot_turn = 0;    // [rad] about y: where a physical knot is tied, 0 toward the viewer, positive to the right
   float pull = 0;  // [N] of each strand when a throw is pulled tight, with physical mechanics; 0: throws of guided mechanics
 };

@@ -209,7 +209,7 @@ class Scripted final : public Surgeon {
   float overloaded_ = 0;         // [s] that a pull has had more than the maximum load
   float stitch_load_ = 0;        // [N] largest tension beside a cut-off tail when the jaws took it
   // A throw.
-  Winding winding_;  // computed by exchange/tying, as for assisted hands
+  Winding winding_;                                           // computed by exchange/tying, as for assisted hands
   size_t cuts_before_ = 0, cut_at_ = 0, settled_before_ = 0;  // cut_at_: node where the scissors go
   uint32_t throws_before_ = 0, take_slot_ = 0;
   Quat take_turn_;

@@ -56,10 +56,6 @@ constexpr float kLead = 0.05f;        // [N] by which a strand may be tauter tha
 constexpr float kEvens = 1.5f;        // [1/s] of what one strand has more slack than the other
 constexpr float kFastest = 30e-3f;    // [m/s]
 constexpr float kSeated = 0.6f;       // [s] of full tension
-// [N] of the tail while the knot slides: more, and its turns grip the strand. Then the turns are tightened: a tail as taut as
-// the strand opens the stitch.
-constexpr float kSlides = 0.15f, kSets = 0.4f;
-constexpr float kSlid = 1;            // [s] of full tension of the strand
 constexpr int kAgain = 5;             // times that a throw is wound again
 constexpr int kMostMisses = 3;        // grasps at the tail with a turn on the jaws
 constexpr float kDeep = 4e-3f;        // [m] below the stitch: a tail there is taken from above
@@ -136,8 +132,6 @@ std::string ThreadTie::doing() const {
                                           "draw the tail through",
                                           "cross the hands",
                                           "lower the hands",
-                                          "slide the knot down the strand",
-                                          "set the knot",
                                           "pull",
                                           "hold both strands",
                                           "lay the tail",
@@ -383,8 +377,6 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       glide_to(origin_ + line_ * (side_ * 0.75f * tail_) + Vec3{0, 2e-3f + kLow, 0},
                origin_ - line_ * (side_ * 0.6f * strand_) + Vec3{0, 4e-3f + kLow, 0}, 0.6f * how_.speed, forceps_angle_);
       break;
-    case slide:
-    case set:
     case pull:
       steady_ = 0;
       break;
@@ -539,22 +531,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
         // A turn that slid off without the tail in it, and a throw below that came undone, are seen before they are pulled on.
         const SeenThrows knot = look(seen);
         if (knot.alternating() < wanted_) wind_next(knot), again(seen, lift_tail);
-        else go(seen, how_.slide && throws_ == 2 ? slide : pull);
+        else go(seen, pull);
       }
-      break;
-    }
-    case slide:
-    case set: {
-      const auto pace = [&](float felt, float want) {
-        return dt * std::clamp((felt < kEasy ? 0.25f : 0.03f) * (want - felt), -0.02f, 0.02f);
-      };
-      const float tail = stage_ == slide ? kSlides : kSets;
-      tip_ += line_ * (side_ * pace(tail_felt_, tail)), hand_ -= line_ * (side_ * pace(felt_, how_.pull));
-      const bool there = stage_ == slide ? felt_ > 0.9f * how_.pull : tail_felt_ > 0.9f * tail;
-      if (there) steady_ += dt;
-      if (!holds && waited_ > 0.2f) go(seen, lay);
-      else if (stage_ == slide && (steady_ > kSlid || waited_ > 12)) go(seen, set);
-      else if (stage_ == set && ((steady_ > kSeated && !keep_) || waited_ > 12)) go(seen, lay);
       break;
     }
     case pull:

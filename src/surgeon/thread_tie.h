@@ -5,8 +5,7 @@
 // and tail show before he pulls and after. If one is missing, he lays the tail again and winds again, up to kAgain times. Reads
 // Snapshots; moves two scripted hands.
 //
-// A first throw opens while the second one is wound, and the second one, pulled by both hands, jams above the slack loop.
-// `slide`: the strand alone is pulled, as of a slip knot. It straightens, and the tail's turns slide down along it.
+// Throws of one turn open while the next one is wound: where nothing else holds the edges together, the first has two turns.
 //
 // x along the stitch, y up, z toward the viewer. `side` +1: the long strand is on the right, and the needle holder comes from
 // there. The sides alternate from throw to throw; winding in the same sense then makes a square knot.
@@ -24,7 +23,6 @@ namespace catgut {
 struct ThreadTieSettings {
   float speed = 0.15f;  // [m/s] maximum of the hands
   float pull = 2.5f;    // [N] with which both strands are pulled tight
-  bool slide = false;   // the first two throws slide down the strand before the third locks them: nothing holds the edges
   bool flat = false;    // the tissue round the stitch is flat: the tail lies on it and hangs down nowhere
   float aside = 0;      // [rad] of the line on which tail and strand are drawn and laid, from the x axis toward z
 };
@@ -40,7 +38,7 @@ class ThreadTie {
   // Every tick, until it returns true.
   bool operate(const Snapshot& seen, float dt);
   bool failed() const { return failed_; }
-  bool keeping() const { return stage_ == hold || stage_ == set; }
+  bool keeping() const { return stage_ == hold; }
   void let_go() { keep_ = false; }
   int retries() const { return retries_; }  // throws wound again so far
   std::string doing() const;
@@ -63,8 +61,6 @@ class ThreadTie {
     draw,
     cross_up,
     cross_down,
-    slide,
-    set,
     pull,
     hold,
     lay,

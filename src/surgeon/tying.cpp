@@ -269,8 +269,7 @@ bool Scripted::tie_thread(const Task& task, const Snapshot& seen) {
   if (turns) turn_hands(to_knot);
   if (stage_ == start) {
     const bool first = !thread_tie_;
-    if (first)
-      thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull, plan_.slide, plan_.flat, plan_.aside});
+    if (first) thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull, plan_.flat, plan_.aside});
     thread_tie_->begin(at_knot, task.which, task.way, first, task.release || task.assistant != 0);
     clamped_ = task.assistant > 0 ? kGathers : (kClampsBack * plan_.approximate - plan_.stay) / kClampSpeed;
     go(work);
