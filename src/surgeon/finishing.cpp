@@ -102,7 +102,7 @@ size_t Scripted::node_to_cut(const Snapshot& seen, bool tail) const {
   const size_t begin = node_along(seen, first, kWhole, -1);  // a tail that is cut off already does not count
   std::vector<Vec3> thread;
   for (size_t i = begin; physical && i <= last; ++i) thread.push_back(node_at(seen, i));
-  const SeenThrows knot = see_throws(thread);
+  const SeenThrows knot = physical ? see_throws(thread) : SeenThrows{};
   const auto keeps_throws = [&](size_t i) {
     const std::span<const Vec3> whole(thread);
     return see_throws(tail ? whole.subspan(i - begin) : whole.first(i - begin + 1)) == knot;
