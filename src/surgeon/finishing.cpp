@@ -101,13 +101,15 @@ size_t Scripted::node_to_cut(const Snapshot& seen, bool tail) const {
   // A knot of wide turns has loops in which the strand touches nothing: whether its throws stay shows where it ends.
   const size_t begin = node_along(seen, first, kWhole, -1);  // a tail that is cut off already does not count
   std::vector<Vec3> thread;
-  for (size_t i = begin; physical && i <= last; ++i) thread.push_back(node_at(seen, i));
-  const SeenThrows knot = physical ? see_throws(thread) : SeenThrows{};
+  const bool looks = physical && stage_ == 0 && waited_ <= dt_;  // once; then no nearer than that
+  for (size_t i = begin; looks && i <= last; ++i) thread.push_back(node_at(seen, i));
+  const SeenThrows knot = looks ? see_throws(thread) : SeenThrows{};
   const auto keeps_throws = [&](size_t i) {
+    if (!looks) return tail ? i <= cut_at_ : i >= cut_at_;
     const std::span<const Vec3> whole(thread);
     return see_throws(tail ? whole.subspan(i - begin) : whole.first(i - begin + 1)) == knot;
   };
-  size_t at = tail ? 1 : last - 1;
+  size_t at = looks || !physical ? (tail ? 1 : last - 1) : cut_at_;
   float clearest = 0;
   for (float out = near; out < far && clearest < wanted; out += 0.002f) {
     const size_t i = std::clamp<size_t>(node_along(seen, from, out, tail ? -1 : 1), 1, last - 1);
@@ -134,8 +136,8 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
   }
   const bool tail = kind == TaskKind::cut_tail;
   const bool physical = plan_.pull > 0;
-  if (!physical || (stage_ == over && waited_ <= dt_)) cut_at_ = node_to_cut(seen, tail);
-  const size_t at = cut_at_;
+  const size_t at = node_to_cut(seen, tail);
+  if (stage_ == over && waited_ <= dt_) cut_at_ = at;
   Pose goal = tying_pose(kNeedleHolder, node_at(seen, at));
   if (physical) {  // from above, the strand between the jaws
     const Vec3 x = normalized(cross(kCutFrom, node_at(seen, at + 1) - node_at(seen, at - 1)), {1, 0, 0});
