@@ -90,7 +90,7 @@ bool Scripted::leave(const Snapshot& seen) {
   }
 }
 
-size_t Scripted::node_to_cut(const Snapshot& seen, bool tail) const {
+size_t Scripted::node_to_cut(const Snapshot& seen, bool tail, bool begins) const {
   const size_t first = first_point_node(seen), end = last_point_node(seen), last = seen.active().thread_order.size() - 1;
   const bool physical = plan_.pull > 0;
   const size_t from = physical ? knot_end(seen, tail) : tail ? first : end;
@@ -101,7 +101,7 @@ size_t Scripted::node_to_cut(const Snapshot& seen, bool tail) const {
   // A knot of wide turns has loops in which the strand touches nothing: whether its throws stay shows where it ends.
   const size_t begin = node_along(seen, first, kWhole, -1);  // a tail that is cut off already does not count
   std::vector<Vec3> thread;
-  const bool looks = physical && stage_ == 0 && waited_ <= dt_;  // once; then no nearer than that
+  const bool looks = physical && begins;  // once; then no nearer than that
   for (size_t i = begin; looks && i <= last; ++i) thread.push_back(node_at(seen, i));
   const SeenThrows knot = looks ? see_throws(thread) : SeenThrows{};
   const auto keeps_throws = [&](size_t i) {
@@ -136,8 +136,9 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
   }
   const bool tail = kind == TaskKind::cut_tail;
   const bool physical = plan_.pull > 0;
-  const size_t at = node_to_cut(seen, tail);
-  if (stage_ == over && waited_ <= dt_) cut_at_ = at;
+  const bool begins = stage_ == over && waited_ <= dt_;
+  const size_t at = node_to_cut(seen, tail, begins);
+  if (begins) cut_at_ = at;
   Pose goal = tying_pose(kNeedleHolder, node_at(seen, at));
   if (physical) {  // from above, the strand between the jaws
     const Vec3 x = normalized(cross(kCutFrom, node_at(seen, at + 1) - node_at(seen, at - 1)), {1, 0, 0});

@@ -167,7 +167,8 @@ class Scripted final : public Surgeon {
   bool gather(const Snapshot& seen);
 
   // --- scissors ---------------------------------------------------------------------------------------------------------
-  size_t node_to_cut(const Snapshot& seen, bool tail) const;  // clear of the stitch, beyond the last throw of its knot
+  // Clear of the stitch, beyond the last throw of its knot: he looks at that when he begins.
+  size_t node_to_cut(const Snapshot& seen, bool tail, bool begins) const;
   bool cut(TaskKind kind, const Snapshot& seen);
   // The needle holder carries the tail's piece away: left in the field it would lie between jaws and tissue at the next stitch.
   bool take_piece(const Snapshot& seen);
