@@ -56,7 +56,7 @@ std::string fault_words(Fault fault) {
     case Fault::clamp_torn_out:
       return "clamp torn out";
     case Fault::bite_torn:
-      return "thread tears the wall";
+      return "thread or needle tears the wall";
     case Fault::bite_torn_out:
       return "bite torn out";
     case Fault::thread_broken:

@@ -75,7 +75,7 @@ enum class Fault : uint8_t {
   bite_in_char,       // which: bite; its entry or exit lies in charred tissue
   inner_wall_cut,     // which: instrument; another body than the planned one was cut through before its specimen was free
   clamp_torn_out,     // which: instrument, value: force [N]; a closed clamp lost its tissue
-  bite_torn,          // which: bite, value: load [N]; its thread has torn the wall by a millimeter; once per bite
+  bite_torn,          // which: bite, value: load [N]; thread or needle has torn the wall by a millimeter; once per bite
   bite_torn_out,      // which: bite, value: load [N]; the slit extends to an edge: the thread has come out of the wall
   thread_broken,      // which: slot toward the free end, value: tension [N]; the thread broke under load
   needle_torn_out,    // which: bite; its needle has left the wall sideways

@@ -16,14 +16,15 @@ bool has_eyelet(const thread::State& t, uint32_t hole) {
 }
 
 // A hole, unless it exists, and an Eyelet in the thread's last segment.
-bool lace(const Model& m, State& s, const Needle& n, const wall::Point& place, bool within, uint32_t& index) {
+bool lace(const Model& m, State& s, const Needle& n, const Channel& channel, bool entry, uint32_t& index) {
   thread::State& t = s.thread;
   const uint32_t segment = n.thread_node - 1;
   if (t.eyelet.size() >= thread::kMaxEyelets || s.hole.size() >= thread::kMaxEyelets || t.broken[segment]) return false;
   for (const thread::Eyelet& e : t.eyelet)
     if (e.segment == segment) return false;  // two holes need a segment between them
   Hole hole;
-  hole.place = place, hole.within = within;
+  hole.place = channel.point[entry ? 0 : channel.count - 1], hole.within = entry;
+  hole.made = channel.made[entry ? 0 : 1], hole.torn = channel.torn[entry ? 0 : 1];
   if (index == wall::kNone) {
     index = static_cast<uint32_t>(s.hole.size());
     s.hole.push_back(hole);
@@ -76,8 +77,11 @@ void lace_threads(const Model& m, State& s) {
       float& last = s.thread.rest[n.thread_node - 1];
       last = std::max(std::min(last, s.thread.rest[n.thread_node - 2]), last - kTaken * m.wall.step);
     }
-    // The thread comes out with the needle, where no later hole keeps its place in the list.
-    if (n.events & kTornOut && n.torn_hole != wall::kNone && n.torn_hole + 1 == s.hole.size()) unlace(s, n.torn_hole);
+    // The thread comes out with the needle. A hole that is not the last one keeps its place in the list.
+    if (n.events & kTornOut && n.torn_hole != wall::kNone) {
+      s.hole[n.torn_hole].out = true;
+      unlace(s, n.torn_hole);
+    }
     if (n.channels == 0) continue;
     const NeedleModel& nm = m.needles.needle[i];
     const Pose& pose = s.bodies.body[nm.body].pose;
@@ -93,11 +97,10 @@ void lace_threads(const Model& m, State& s) {
     const float entry = past(c.point[0]), exit = open ? -1.0f : past(c.point[c.count - 1]);
     if (threaded) {
       const bool in = c.entry_hole != wall::kNone, out = c.exit_hole != wall::kNone;
-      if (!in && entry > kBehind && lace(m, s, n, c.point[0], true, c.entry_hole)) n.events |= kThreadIn;
+      if (!in && entry > kBehind && lace(m, s, n, c, true, c.entry_hole)) n.events |= kThreadIn;
       else if (in && !out && entry > -kDone && entry < 0) unlace(s, c.entry_hole);
-      else if (in && entry > kBehind && !has_eyelet(s.thread, c.entry_hole)) lace(m, s, n, c.point[0], true, c.entry_hole);
-      else if (in && exit > kBehind && (!out || !has_eyelet(s.thread, c.exit_hole)))
-        lace(m, s, n, c.point[c.count - 1], false, c.exit_hole);
+      else if (in && entry > kBehind && !has_eyelet(s.thread, c.entry_hole)) lace(m, s, n, c, true, c.entry_hole);
+      else if (in && exit > kBehind && (!out || !has_eyelet(s.thread, c.exit_hole))) lace(m, s, n, c, false, c.exit_hole);
       if (c.entry_hole != wall::kNone) {
         float& deepest = s.hole[c.entry_hole].deepest = c.point[0].zeta;
         for (uint32_t k = 1; k < c.count; ++k)

@@ -26,29 +26,6 @@ float angle_of(const NeedleModel& n, const Pose& pose, Vec3 p) {
   return angle;
 }
 
-// The material point at p, among the faces near it. off: [m] from p to the point found.
-wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
-                   float& off) {
-  wall::Point best;
-  off = 1e9f;
-  for (uint32_t f = 0; f < k.face_center.size(); ++f) {
-    const float r = k.face_radius[f] + 1e-3f;
-    if (length2(k.face_center[f] - p) > r * r) continue;
-    // Outer face, then inner one; a fragment has several such pairs.
-    for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1] && surface.patch[q].side == 1; q += 2) {
-      const Foot out = nearest_on_patch(wm, ws, surface, q, p), in = nearest_on_patch(wm, ws, surface, q + 1, p);
-      const float above = dot(p - out.at, out.facing), below = dot(p - in.at, in.facing), sum = -(above + below);
-      if (!(sum > 1e-6f)) continue;
-      const float zeta = std::clamp((above - below) / sum, -1.0f, 1.0f), share = 0.5f * (1 + zeta);
-      const wall::Point at{out.point.face, in.point.xi + share * (out.point.xi - in.point.xi),
-                           in.point.eta + share * (out.point.eta - in.point.eta), zeta};
-      const float far = distance(place_of(wm, ws, at), p);
-      if (far < off) off = far, best = at;
-    }
-  }
-  return best;
-}
-
 Foot nearest_face(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
                   float within) {
   Foot best;
@@ -103,16 +80,44 @@ void leave_channels(const NeedleModel& m, const wall::Model& wm, const wall::Sta
       return far < (angle < 0 && channel.entry_hole != wall::kNone ? kFollows : kSideways);
     };
     if (std::any_of(channel.point.begin(), channel.point.begin() + channel.count, near)) continue;
-    n.torn = c, n.torn_hole = channel.exit_hole == wall::kNone ? channel.entry_hole : wall::kNone;
-    n.events |= kTornOut;
-    if (c + 1 == n.channels) n.inside = false;
-    std::copy(n.channel.begin() + c + 1, n.channel.begin() + n.channels, n.channel.begin() + c);
-    --n.channels;
+    leave_channel(n, c);
     return;  // the next one in the next step
   }
 }
 
 }  // namespace
+
+wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
+                   uint32_t piece, float& off) {
+  wall::Point best;
+  off = 1e9f;
+  for (uint32_t f = 0; f < k.face_center.size(); ++f) {
+    const float r = k.face_radius[f] + 1e-3f;
+    if (length2(k.face_center[f] - p) > r * r) continue;
+    if (piece != wall::kNone && surface.piece[column_of(wm, ws, f)] != piece) continue;
+    // Outer face, then inner one; a fragment has several such pairs.
+    for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1] && surface.patch[q].side == 1; q += 2) {
+      const Foot out = nearest_on_patch(wm, ws, surface, q, p), in = nearest_on_patch(wm, ws, surface, q + 1, p);
+      const float above = dot(p - out.at, out.facing), below = dot(p - in.at, in.facing), sum = -(above + below);
+      if (!(sum > 1e-6f)) continue;
+      const float zeta = std::clamp((above - below) / sum, -1.0f, 1.0f), share = 0.5f * (1 + zeta);
+      const wall::Point at{out.point.face, in.point.xi + share * (out.point.xi - in.point.xi),
+                           in.point.eta + share * (out.point.eta - in.point.eta), zeta};
+      const float far = distance(place_of(wm, ws, at), p);
+      if (far < off) off = far, best = at;
+    }
+  }
+  return best;
+}
+
+void leave_channel(Needle& n, uint32_t c) {
+  const Channel& channel = n.channel[c];
+  n.torn = c, n.torn_hole = channel.exit_hole == wall::kNone ? channel.entry_hole : wall::kNone;
+  n.events |= kTornOut;
+  if (c + 1 == n.channels) n.inside = false;
+  std::copy(n.channel.begin() + c + 1, n.channel.begin() + n.channels, n.channel.begin() + c);
+  --n.channels;
+}
 
 float puncture_force(const PunctureLaw& law, const NeedleShape& shape) { return law.puncture * shape.wire_radius / 0.33e-3f; }
 
@@ -237,15 +242,14 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
         const float angle = angle_of(m, body.pose, there);
         if (angle < 0 || angle > m.shape.arc) continue;
         const Vec3 at = arc_point(m, body.pose, angle);
-        row.kind = Row::Kind::channel, row.key = key(1, c * 64 + p), row.on_wall = true;
+        row.kind = Row::Kind::channel, row.key = channel_key(i, c, p), row.on_wall = true;
         row.axis = arc_tangent(m, body.pose, angle);
         row.point = across_load(row.point, ws.motion, row.axis);
-        row.wanted = (there - at) * (0.2f / h);
-        if (length(row.wanted) > bm.push_out) row.wanted = normalized(row.wanted) * bm.push_out;
+        row.wanted = (there - at) * (1 / h);  // implicit: with `soft` a spring of side_stiffness
         row.soft = 1 / (law.side_stiffness * h * h);
         // Friction of the shaft that this point stands for.
         const float before = p > 0 ? distance(there, way[p - 1]) : 0, after = p + 1 < ends ? distance(there, way[p + 1]) : 0;
-        row.along_limit = law.friction * 0.5f * (before + after) * h, row.friction = 1, row.across_limit = law.tear * h;
+        row.along_limit = law.friction * 0.5f * (before + after) * h, row.friction = 1, row.across_limit = law.most * h;
         add(row, at);
       }
       if (!open) continue;
@@ -254,13 +258,12 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
       Row row;
       row.point = wall::weights(wm, ws.topology, n.tip);
       const Vec3 there = wall::place(row.point, ws.motion);
-      row.kind = Row::Kind::channel, row.key = key(1, c * 64 + 63), row.on_wall = true;
+      row.kind = Row::Kind::channel, row.key = channel_key(i, c, 63), row.on_wall = true;
       row.axis = tangent;
       row.point = across_load(row.point, ws.motion, row.axis);
-      row.wanted = (there - tip) * (0.2f / h);
-      if (length(row.wanted) > bm.push_out) row.wanted = normalized(row.wanted) * bm.push_out;
+      row.wanted = (there - tip) * (1 / h);
       row.soft = 1 / (law.side_stiffness * h * h);
-      row.along_limit = law.cutting * h, row.friction = 0, row.across_limit = law.tear * h;
+      row.along_limit = law.cutting * h, row.friction = 0, row.across_limit = law.most * h;
       add(row, tip);
       // A face in front of the tip gives way at the force of an exit.
       for (uint32_t side = 0; side < 2; ++side) {
@@ -346,7 +349,7 @@ void advance_needles(const NeedlesModel& model, const wall::Model& wm, const wal
     const Vec3 there = place_of(wm, ws, n.tip);
     const float along = dot(tip - there, tangent);
     float off = 0;
-    const wall::Point at = locate(wm, ws, surface, k, there + tangent * along, off);
+    const wall::Point at = locate(wm, ws, surface, k, there + tangent * along, wall::kNone, off);
     if (off < 1e8f) n.tip = at;
     // Withdrawn: points ahead of the tip are gone, and with the first of them the channel.
     while (channel.count > 0 &&

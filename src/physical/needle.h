@@ -30,7 +30,7 @@ struct PunctureLaw {
   float cutting = 0.2f;          // [N] at the tip within the tissue
   float friction = 45;           // [N/m] along the shaft in its channel
   float side_stiffness = 2000;   // [N/m] of a point of the channel against the tissue around it
-  float tear = 6;                // [N] largest load of a point of the channel across the needle
+  float most = 6;                // [N] load of such a point; beyond the strength of the channel it tears (physical/tear)
   float least_slope = 0.25f;     // cosine between needle and inward normal below which the tip slides off
   float tip_friction = 0.5f;     // of a tip that has not entered
   float swage_stiffness = 8000;  // [N/m] between swage and thread
@@ -58,6 +58,11 @@ struct Channel {
   uint32_t count = 0;
   float entry_side = 1, exit_side = 0;                         // face: zeta +1 outer, -1 inner; exit 0: none yet
   uint32_t entry_hole = wall::kNone, exit_hole = wall::kNone;  // of State::hole, once thread runs through
+  // Tearing (physical/tear): its points move across the needle. The slit of a mouth, entry or exit, leads from `made` to its
+  // point.
+  std::array<wall::Point, 2> made{};  // meaningful where torn > 0
+  std::array<float, 2> torn{};        // [m]
+  Vec3 load;                          // [N] of the needle on the tissue, across it, smoothed
 };
 
 // What happened in the last step, as bits.
@@ -95,6 +100,16 @@ inline Vec3 swage_of(const NeedleModel& n, const Pose& pose) { return arc_point(
 float puncture_force(const PunctureLaw& law, const NeedleShape& shape);  // [N]
 
 // Stages of physical::step, in this order.
+// Row::key of a point of a channel; 63: the tip.
+inline uint64_t channel_key(uint32_t needle, uint32_t channel, uint32_t point) {
+  return uint64_t{9} << 60 | uint64_t{needle} << 36 | (uint64_t{channel} * 64 + point);
+}
+// The material point at p, among the faces near it; of one piece of the wall, or of any (kNone). off: [m] from p to it.
+wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
+                   uint32_t piece, float& off);
+// The shaft has left a channel sideways: kTornOut.
+void leave_channel(Needle& needle, uint32_t channel);
+
 void skip_channels(const NeedlesModel& model, const wall::Model& wm, const wall::State& ws, std::span<const Needle> needle,
                    Bodies& bodies);
 void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wall::Model& wm, const wall::State& ws,

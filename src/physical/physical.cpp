@@ -306,6 +306,7 @@ void end_bodies(const Model& m, State& s, Scratch& k) {
   const Surface& surface = surface_of(m, s);
   settle_grips(m.bodies, m.wall, s.wall, s.thread, s.bodies, k.bodies);
   advance_needles(m.needles, m.wall, s.wall, surface, s.bodies, s.needle, m.wall.step, k.bodies);
+  if (m.tear.on) tear_channels(m, s, k.bodies);
   lace_threads(m, s);
 }
 

@@ -49,6 +49,7 @@ constexpr void reflect(auto& a, Like<RowMemory> auto& m) { a(m.key), a(m.axis), 
 constexpr void reflect(auto& a, Like<Bodies> auto& b) { a(b.body), a(b.memory), a(b.overflow); }
 constexpr void reflect(auto& a, Like<Channel> auto& c) {
   a(c.point), a.at_most(c.count, uint32_t{kMaxPath}), a(c.entry_side), a(c.exit_side), a(c.entry_hole), a(c.exit_hole);
+  a(c.made), a(c.torn), a(c.load);
 }
 constexpr void reflect(auto& a, Like<Needle> auto& n) {
   a(n.thread_node), a(n.channel), a.at_most(n.channels, uint32_t{kMaxChannels}), a(n.inside), a(n.tip), a(n.entry_peak);

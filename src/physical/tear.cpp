@@ -106,4 +106,70 @@ bool tear_bites(const Model& m, State& s, std::span<const Vec3> impulse, Surface
   return out;
 }
 
+void tear_channels(const Model& m, State& s, const BodiesScratch& k) {
+  const float h = m.wall.step, part = std::min(1.0f, h / m.tear.smoothing);
+  const Surface& surface = surface_of(m, s);
+  const auto place = [&](const wall::Point& p) {
+    return wall::place(wall::weights(m.wall, s.wall.topology, p), s.wall.motion);
+  };
+  for (uint32_t i = 0; i < s.needle.size(); ++i) {
+    Needle& n = s.needle[i];
+    std::array<Vec3, kMaxChannels> load{};
+    for (const Row& row : k.row) {
+      if (row.kind != Row::Kind::channel || row.key < channel_key(i, 0, 0) || row.key >= channel_key(i, kMaxChannels, 0))
+        continue;
+      load[(row.key - channel_key(i, 0, 0)) / 64] -= (row.impulse - row.axis * dot(row.impulse, row.axis)) / h;
+    }
+    for (uint32_t c = 0; c < n.channels; ++c) {
+      Channel& channel = n.channel[c];
+      if (channel.exit_hole != wall::kNone) continue;  // its thread bears the load
+      const bool open = n.inside && c + 1 == n.channels;
+      channel.load += (load[c] - channel.load) * part;
+      float low = 1, high = -1, edge = 0, count = 0;
+      const auto take = [&](const wall::Point& p) {
+        low = std::min(low, p.zeta), high = std::max(high, p.zeta), edge += edge_distance(m, s, p), count += 1;
+      };
+      std::for_each(channel.point.begin(), channel.point.begin() + channel.count, take);
+      if (open) take(n.tip);
+      const float strength =
+          m.tear.strength * strength_share(m.tear, low, high) * std::min(1.0f, edge / count / m.tear.full_bite);
+      const float excess = length(channel.load) - strength;
+      if (excess <= 0) continue;
+      const wall::Weights w = wall::weights(m.wall, s.wall.topology, channel.point[0]);
+      wall::Weights up = w, middle = w;
+      up.zeta = 1, middle.zeta = 0;
+      const Vec3 normal = normalized(wall::place(up, s.wall.motion) - wall::place(middle, s.wall.motion));
+      const Vec3 across = channel.load - normal * dot(channel.load, normal);
+      if (length2(across) < 1e-12f) continue;
+      const float by = std::min(kMost, excess / m.tear.viscosity * h);
+      const auto drag = [&](wall::Point& p) {
+        float off = 0;
+        const wall::Point to =
+            locate(m.wall, s.wall, surface, k, place(p) + normalized(across) * by, surface.piece[w.column[0]], off);
+        const bool on_face = std::abs(p.zeta) == 1;
+        const float side = p.zeta;
+        if (off < 4 * kMost) p = to;
+        if (on_face) p.zeta = side;
+      };
+      const bool left = channel.exit_side != 0;
+      for (size_t mouth = 0; mouth < 2; ++mouth) {
+        if (mouth == 1 && !left) continue;
+        if (channel.torn[mouth] == 0) channel.made[mouth] = channel.point[mouth == 0 ? 0 : channel.count - 1];
+        channel.torn[mouth] += by;
+      }
+      std::for_each(channel.point.begin(), channel.point.begin() + channel.count, drag);
+      if (open) drag(n.tip);
+      if (channel.entry_hole != wall::kNone) {
+        Hole& hole = s.hole[channel.entry_hole];
+        hole.place = channel.point[0], hole.made = channel.made[0], hole.torn = channel.torn[0], hole.load = channel.load;
+      }
+      const float from_edge =
+          std::min(edge_distance(m, s, channel.point[0]), edge_distance(m, s, channel.point[channel.count - 1]));
+      if (from_edge > kOut) continue;
+      leave_channel(n, c);
+      break;  // the next one in the next step
+    }
+  }
+}
+
 }  // namespace catgut::physical

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// physical/tear: bites that tear through the wall. A bite is a channel with a mouth on each end. When the force on it
-// exceeds its strength, it moves through the tissue in the force's direction within the wall and leaves a slit. At the
-// edge it is out. Reads the thread's impulses on the holes; writes State::hole and takes torn bites off the thread.
+// physical/tear: bites that tear through the wall. A bite is a channel with a mouth on each end; thread or the needle lies in it.
+// When the force on it exceeds its strength, it moves through the tissue in the force's direction within the wall and leaves a
+// slit. At the edge it is out. Reads the impulses of thread and needle; writes State::hole and the needle's channels, and takes
+// torn bites off the thread.
 //
 // Strength [N]: 4.62 +- 1.40 for a full-thickness bite in human small bowel (803 tests; Gong et al.
 // 2023, 10.1115/1.4063951). Assumptions: layers carry in proportion to their stiffness, so a bite without submucosa and muscle
@@ -11,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "physical/needle.h"
 #include "physical/surface.h"
 #include "wall/laminate.h"
 
@@ -43,5 +45,8 @@ float bite_strength(const Model& model, const State& state, uint32_t entry, uint
 
 // After the thread's step. impulse [N s]: per hole, in this step. Returns true when a bite came out.
 bool tear_bites(const Model& model, State& state, std::span<const Vec3> impulse, SurfaceSearch& search);
+
+// After the bodies' step: the shaft of a needle tears the wall across its channel as the thread of a bite does.
+void tear_channels(const Model& model, State& state, const BodiesScratch& bodies);
 
 }  // namespace catgut::physical

@@ -409,18 +409,31 @@ void show_bites(const Model& model, State& state, SutureContext& sewing, const P
 // [m] of a slit from which on a bite counts as torn.
 constexpr float kTorn = 0.001f;
 
-// Bites whose thread tears the wall: their ends move with the slit. One that is torn out has no suture points any more.
+// Bites whose thread or needle tears the wall: their ends move with the slit. One that is torn out has no suture points any
+// more.
 void show_tears(const Model& model, State& state, SutureContext& sewing) {
   for (uint32_t n = 0; n < state.suture.suture.size(); ++n) {
     Suture& suture = state.suture.suture[n];
     Strand& strand = state.solver.strand[n];
+    const physical::Needle& needle = state.physical.world.needle[n];
+    for (uint32_t c = 0; c < std::min<size_t>(needle.channels, suture.open.size()); ++c) {
+      const physical::Channel& channel = needle.channel[c];
+      if (channel.torn[0] == 0) continue;
+      Bite& bite = suture.bite[suture.open[c].bite];
+      if (bite.torn == 0) bite.entry_made = bite.entry, bite.exit_made = bite.exit;
+      bite.entry = bite_end(model, state, channel.point[0]);
+      if (bite.has_exit) bite.exit = bite_end(model, state, channel.point[channel.count - 1]);
+      if (std::exchange(bite.torn, std::max(bite.torn, channel.torn[0])) >= kTorn || bite.torn < kTorn) continue;
+      sewing.report(n, EventKind::technique_fault, kNoHand, suture.open[c].bite, length(channel.load),
+                    position_of(bite.entry.point, state.solver.x.data()), Fault::bite_torn);
+    }
     std::vector<uint32_t>& known = state.physical.suture[n].hole;
     for (size_t i = known.size(); i-- > 0;) {
       if (known[i] >= state.physical.world.hole.size()) continue;
       const physical::Hole& hole = state.physical.world.hole[known[i]];
       const SuturePoint point = suture.point[i];
       Bite& bite = suture.bite[point.bite];
-      if (hole.torn == 0) continue;
+      if (hole.torn == 0 && !hole.out) continue;
       if (bite.torn == 0) bite.entry_made = bite.entry, bite.exit_made = bite.exit;
       BiteEnd& end = point.exit ? bite.exit : bite.entry;
       end = bite_end(model, state, hole.place);

@@ -323,6 +323,70 @@ TEST(Needle, withdrawn_from_a_started_channel_it_leaves_nothing) {
     EXPECT_NEAR(wall::outer(bench.state.wall, c).z, 1.25e-3f, 0.05e-3f);
 }
 
+// A hand moves a needle that is through the sheet once along y, across the plane of its arc, to the sheet's border. The tissue
+// is a spring between needle and channel. At the strength of a bite the needle tears a slit, which is as long as its way.
+TEST(Needle, drawn_across_its_channel_it_tears_a_slit_with_the_strength_of_a_bite) {
+  for (const float speed : {0.02f, 0.06f}) {
+    Bench bench;
+    const uint32_t n = bench.add_needle({}, {});
+    const NeedleModel& needle = bench.model.needles.needle[0];
+    const Needle& in = bench.state.needle[0];
+    const Model& m = bench.model;
+    float angle = 0.3f;
+    place_body(m.bodies.body[n], bench.body(n), on_circle(needle, kCircle, angle), 0);
+    bench.start();
+    const auto hold = [&](Vec3 center) {
+      bench.target[n] = {on_circle(needle, center, angle), true};
+      bench.step();
+    };
+    while (!(in.events & kLeft) && angle < 3) angle += 1.5e-3f, hold(kCircle);
+    for (int i = 0; i < 100; ++i) angle += 1.5e-3f, hold(kCircle);
+    for (int i = 0; i < 200; ++i) hold(kCircle);
+    ASSERT_EQ(in.channels, 1u);
+    const auto place = [&](const wall::Point& p) {
+      return wall::place(wall::weights(m.wall, bench.state.wall.topology, p), bench.state.wall.motion);
+    };
+    float most = 0, y = 0, slit = 0;
+    int compared = 0;
+    std::vector<float> while_far;  // [N] while the slit is longer than 1 mm and more than 5 mm from the border
+    while (in.channels > 0 && y < 0.03f) {
+      y += speed * m.wall.step;
+      hold(kCircle + Vec3{0, y, 0});
+      if (in.channels == 0) break;
+      const Channel& c = in.channel[0];
+      float across = 0;  // [m] sum over its points
+      for (uint32_t p = 0; p < c.count; ++p) {
+        const Vec3 at = place(c.point[p]);
+        Vec3 near = arc_point(needle, bench.body(n).pose, 0);
+        for (float a = 0; a < needle.shape.arc; a += 0.01f) {
+          const Vec3 on = arc_point(needle, bench.body(n).pose, a);
+          if (distance(on, at) < distance(near, at)) near = on;
+        }
+        across += near.y - at.y;
+      }
+      const float force = -bench.body(n).force.y;
+      most = std::max(most, force);
+      if (c.torn[0] == 0 && force > 1 && force < 3) {
+        EXPECT_NEAR(force, m.needles.law.side_stiffness * across, 0.1f * force);
+        ++compared;
+      }
+      const Vec3 entry = place(c.point[0]);
+      slit = c.torn[0] > 0 ? distance(place(c.made[0]), entry) : 0;
+      if (slit > 1e-3f && entry.y < 0.02f - 5e-3f) while_far.push_back(force);
+    }
+    std::sort(while_far.begin(), while_far.end());
+    const float median = while_far.empty() ? 0 : while_far[while_far.size() / 2];
+    std::printf("at %.0f mm/s: %zu steps, median %.2f N, at most %.2f N; slit of %.2f mm when the needle came out\n",
+                1e3 * static_cast<double>(speed), while_far.size(), static_cast<double>(median), static_cast<double>(most),
+                1e3 * static_cast<double>(slit));
+    EXPECT_GT(compared, 5);
+    EXPECT_NEAR(median, 4.62f, 1.4f) << speed;             // Gong et al. 2023, 10.1115/1.4063951: a bite of thread
+    EXPECT_NEAR(slit, 0.02f - kCircle.y, 2e-3f) << speed;  // the tissue gives before it tears
+    EXPECT_EQ(in.channels, 0u);
+    EXPECT_FALSE(in.inside);
+  }
+}
+
 TEST(Needle, jaws_hold_it_by_friction) {
   for (const float grip : {20.0f, 1.0f}) {
     Bench bench;
