@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// physical/tear: bites that tear through the wall. A bite is a channel with a mouth on each end; thread or the needle lies in it.
-// When the force on it exceeds its strength, it moves through the tissue in the force's direction within the wall and leaves a
-// slit. At the edge it is out. Reads the impulses of thread and needle; writes State::hole and the needle's channels, and takes
-// torn bites off the thread.
+// physical/tear: bites that tear through the wall. A bite is a channel with a mouth on each end; thread or the needle lies in
+// it. When the force on it exceeds its strength, it moves through the tissue in the force's direction within the wall and
+// leaves a slit. At the edge it is out. Reads the impulses of thread and needle; writes State::hole and the needle's channels,
+// and takes torn bites off the thread.
 //
 // Strength [N]: 4.62 +- 1.40 for a full-thickness bite in human small bowel (803 tests; Gong et al.
 // 2023, 10.1115/1.4063951). Assumptions: layers carry in proportion to their stiffness, so a bite without submucosa and muscle

@@ -44,7 +44,8 @@ wall::Spec wall_of(const SceneSpec& scene, const wall::Mesh& mesh, float step) {
   const BodySpec& first = scene.body.front();
   for (const BodySpec& b : scene.body)
     if (b.wall != first.wall || b.modulus_along != first.modulus_along || b.modulus_around != first.modulus_around ||
-        b.poisson != first.poisson || b.density != first.density)
+        b.poisson != first.poisson || b.density != first.density || b.stiff_along != first.stiff_along ||
+        b.stiff_around != first.stiff_around || b.knee != first.knee)
       throw InputError(name_of(scene), "its bodies differ in wall or material",
                        "physical mechanics have one material: give all bodies the same wall, moduli, poisson and density");
   wall::Spec spec;
@@ -52,6 +53,8 @@ wall::Spec wall_of(const SceneSpec& scene, const wall::Mesh& mesh, float step) {
   wall::Layer& layer = spec.layer.front();
   layer.thickness = first.wall;
   layer.e_along = first.modulus_along, layer.e_around = first.modulus_around, layer.poisson = first.poisson;
+  layer.stiff_along = first.stiff_along, layer.stiff_around = first.stiff_around;
+  layer.knee_along = layer.knee_around = first.knee;
   spec.density = first.density;
   spec.step = step;
   spec.drag = scene.solver.damping;

@@ -32,6 +32,9 @@ struct BodySpec {
   bool folded = false;           // the two tubes are one wall, folded at the near end: a prolapse before it is cut
   float modulus_along = 6e5f;    // [Pa] Young's modulus along the organ; this and the next two: physical mechanics only
   float modulus_around = 6e5f;   // [Pa] around it
+  float stiff_along = 0;         // [Pa] the same beyond the strain `knee`, where fibers are straight; 0: none
+  float stiff_around = 0;        // [Pa]
+  float knee = 0.3f;             // engineering strain
   float poisson = 0.45f;         // contraction around when stretched along
   float foundation =
       0;  // [Pa/m] of an elastic bed that the wall lies on: its modulus over its thickness; physical mechanics only

@@ -2,6 +2,7 @@
 // surgeon/biting: tasks of Scripted with the needle: picking it up, a bite, taking it back; see scripted.h.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "surgeon/scripted.h"
 
@@ -10,14 +11,15 @@ namespace {
 
 constexpr float kDriveOn = 0.08f;  // [rad] per miss of the tip
 constexpr int kDriveOnAtMost = 4;
-constexpr float kRoomToTie = 0.42f;  // of the needle's arc: least position of a needle holder that hands over near the swage
-constexpr float kClear = 0.4f;       // [s] that the forceps backs out before anything else moves
-constexpr float kTipUp = -2.2f;      // [rad] angle of the needle's circle at which its tip is up
-constexpr float kStraight = 0.93f;   // of the strand's length
-constexpr float kEdgeGrip = 0.003f;  // [m] of the rim between the forceps' jaws
-constexpr float kTooShallow = 0.4f;  // of the wall, for a shallow bite
-constexpr float kDeeper = 0.0005f;   // [m]
-constexpr float kScoopSpeed = 0.7f;  // of the needle's speed, with which it is lifted then
+constexpr float kRoomToTie = 0.42f;   // of the needle's arc: least position of a needle holder that hands over near the swage
+constexpr float kClear = 0.4f;        // [s] that the forceps backs out before anything else moves
+constexpr float kTipUp = -2.2f;       // [rad] angle of the needle's circle at which its tip is up
+constexpr float kStraight = 0.93f;    // of the strand's length
+constexpr float kEdgeGrip = 0.003f;   // [m] of the rim between the forceps' jaws
+constexpr float kEdgesGrip = 0.002f;  // [m] of the grasp point below two edges
+constexpr float kTooShallow = 0.4f;   // of the wall, for a shallow bite
+constexpr float kDeeper = 0.0005f;    // [m]
+constexpr float kScoopSpeed = 0.7f;   // of the needle's speed, with which it is lifted then
 
 }  // namespace
 
@@ -62,9 +64,13 @@ bool Scripted::hold_edge(const Snapshot& seen) {
   enum { over, down, close };
   rest_aside(seen, kNeedleHolder);
   BiteFrame f = frame(seen, place_);
-  f.at -= f.along * (0.5f * bite().length);  // where the needle enters
-  const Pose grip{f.at + f.up * (skill_.edge_distance - kEdgeGrip) - f.out * (0.5f * skill_.wall),
-                  from_axes(f.out, cross(f.up, f.out), f.up)};
+  Pose grip;
+  if (bite().walls > 1) {  // both edges between the jaws, above the needle's way
+    grip = {f.at - f.out * kEdgesGrip, from_axes(f.along, cross(f.out, f.along), f.out)};
+  } else {  // where the needle enters
+    grip = {f.at - f.along * (0.5f * bite().length) + f.up * (skill_.edge_distance - kEdgeGrip) - f.out * (0.5f * skill_.wall),
+            from_axes(f.out, cross(f.up, f.out), f.up)};
+  }
   switch (stage_) {
     case over:
       jaw(kForceps, 1);
@@ -127,13 +133,13 @@ bool Scripted::make_bite(const Snapshot& seen) {
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
       const int passed = passages(seen, false);
       if (too_deep(seen)) {
-        depth_fix_ += kDeeper;
+        next_fix_ = kDeeper;
         go(withdraw);
         return false;
       }
       // A shallow bite that holds too little is made again, deeper.
       if (plan_.scoop > 0 && passed > 0 && seen.active().bite.back().depth < kTooShallow * skill_.wall) {
-        depth_fix_ -= kDeeper;
+        next_fix_ = -kDeeper;
         go(withdraw);
       } else if (passed >= bite().walls && psi_ > psi_bite + plan_.beyond) {
         go(seen.tool[kForceps].held == Held::tissue ? let_go : over);
@@ -141,7 +147,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
         // The tip is misplaced: it did not enter, is not deep enough, or is too deep to exit.
         // Through the first wall but not the second, which was pushed away by millimeters, as soft walls are.
         const bool gave_way = passed > 0 && passed < bite().walls;
-        depth_fix_ += gave_way ? -0.0008f : passed > 0 || !seen.active().needle.in_tissue ? -0.0003f : 0.0003f;
+        next_fix_ = gave_way ? -0.0008f : passed > 0 || !seen.active().needle.in_tissue ? -0.0003f : 0.0003f;
         go(withdraw);
       }
       return false;
@@ -155,6 +161,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(f, psi_)), 2 * speed);
       if (psi_ <= -psi_bite - 0.7f && !seen.active().needle.in_tissue) {
         ++retries_;
+        depth_fix_ += std::exchange(next_fix_, 0.0f);
         if (++attempts_ > kAttempts) gave_up_ = true;
         go(hover);
       } else if (!patience(8)) {
@@ -168,7 +175,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       return false;
     case over: {
       doing_ = name_of_bite() + "grasp the tip";
-      jaw(kForceps, 1);
+      jaw(kForceps, plan_.tip_open);
       // A tip that was missed is driven on: more of it is out then.
       const float psi = psi_bite + plan_.beyond + kDriveOn * static_cast<float>(std::min(misses_, kDriveOnAtMost));
       if (misses_ > 0 && psi_ < psi && holds_needle(seen, kNeedleHolder)) {

@@ -293,7 +293,7 @@ void Operating::act(const Snapshot& seen) {
       const Pose goal{opening_.center + rotate(axis_angle(opening_.axis, -turn_), to), right.pose.q};
       if (!move_toward(right, goal, skill_.speed, dt_)) return;
       if (++way_ < kWay.size()) return;
-      begin_stitch(seen, TaskKind::bite);
+      begin_stitch(seen, TaskKind::hold_edge);
       return go(sew);
     }
     case finished:

@@ -418,7 +418,7 @@ Plan altemeier_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.forceps_side = -1;
   plan.driver_at = 0.15f, plan.beyond = 0.8f;
-  plan.tip_lean = 1.6f, plan.tip_psi = 1.2f;  // the tip is in the lumen: from above, over the edges
+  plan.tip_lean = 1.6f, plan.tip_psi = 1.2f, plan.tip_open = 0.4f;  // the tip is in the lumen: from above, over the edges
   plan.pull = kRingPull, plan.rise = true, plan.jerk = 0.1f, plan.aside = kPi / 8;
   const OpeningShape outer = opening_shape(picture, 0), inner = opening_shape(picture, 1);
   const Vec3 radial = -normalized(Vec3{1, 0, 0} - inner.axis * inner.axis.x, any_perpendicular(inner.axis));
@@ -427,7 +427,7 @@ Plan altemeier_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   p.out = inner.axis;
   p.up = cross(-radial, inner.axis);  // so that cross(out, up) points inward
   p.length = outer.radius - inner.radius + skill.wall;
-  p.depth = kFreeDepth + 0.5f * kYields;
+  p.depth = kFreeDepth + kYields;
   p.wall = 1;
   p.walls = 2;
   for (uint32_t s = 0; s < picture.suture.size(); ++s) {
@@ -435,6 +435,7 @@ Plan altemeier_plan(const PictureModel& picture, const SurgeonSkill& skill) {
     p.suture = s;
     plan.place.push_back(p);
     add(plan, TaskKind::pick_up, which);
+    add(plan, TaskKind::hold_edge, which);
     add(plan, TaskKind::bite, which);
     add(plan, TaskKind::pull_tail);
     add(plan, TaskKind::regrip);

@@ -76,6 +76,7 @@ struct Plan {
   // the needle before the forceps takes the tip [rad].
   float driver_at = 0.35f, beyond = 0.72f;
   // The forceps comes for the tip from its side, leaning by `tip_lean` toward the outside of the tissue when the tip is
+  float tip_open = 1;  // of the forceps' jaws on their way to the tip
   // `tip_psi` past the deepest point [rad].
   float tip_lean = 0.8f, tip_psi = 2.6f;
   float scoop = 0;        // [m] by which the needle is lifted once it is deep enough in the wall, at most

@@ -203,6 +203,7 @@ class Scripted final : public Surgeon {
   float strength_ = 1;    // of the pulls of this task, relative
   float miss_by_ = 0;     // [m] distance by which this grasp misses
   float depth_fix_ = 0;   // [m] correction from failed attempts at this bite; positive: shallower
+  float next_fix_ = 0;    // [m] of the attempt that is withdrawn, in addition
   Pose pull_from_;
   float scooped_ = 0;            // [m] by which this bite was lifted
   float steady_ = 0;             // [s] of full tension

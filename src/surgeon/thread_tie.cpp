@@ -8,6 +8,7 @@
 
 #include "exchange/strand.h"
 #include "exchange/tying.h"
+#include "surgeon/reach.h"
 
 namespace catgut {
 namespace {
@@ -56,6 +57,7 @@ constexpr float kLead = 0.05f;        // [N] by which a strand may be tauter tha
 constexpr float kEvens = 1.5f;        // [1/s] of what one strand has more slack than the other
 constexpr float kFastest = 30e-3f;    // [m/s]
 constexpr float kSeated = 0.6f;       // [s] of full tension
+constexpr float kTight = 0.8f;        // [s] of a strand that gives no way; then the tail lies as far as it can
 constexpr int kAgain = 5;             // times that a throw is wound again
 constexpr int kMostMisses = 3;        // grasps at the tail with a turn on the jaws
 constexpr float kDeep = 4e-3f;        // [m] below the stitch: a tail there is taken from above
@@ -63,8 +65,9 @@ constexpr float kBears = 3;           // [N] on a bite, above which the hands gi
 constexpr float kOverDrape = 12e-3f;  // [m] of the swage: the needle, which hangs down from the forceps, would scrape on it
 constexpr float kRoom = 4e-3f;        // [m] from the tissue's particles: open jaws have none of it between them
 constexpr float kStrandRoom = 2e-3f;  // [m] the same from another stitch's thread
-constexpr float kForeign = 1;         // [N] more than a finished stitch bears while another is tied
-constexpr float kFarthest = 9e-3f;    // [m] of the place where a tail is taken, beyond kTailEnd
+constexpr float kCaught = 1.5f, kCaughtFor = 0.2f;  // [N] on the hand more than the tail's tension, [s]
+constexpr float kForeign = 1;                       // [N] more than a finished stitch bears while another is tied
+constexpr float kFarthest = 9e-3f;                  // [m] of the place where a tail is taken, beyond kTailEnd
 
 Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
 // Unit, across the shaft; 0: toward the viewer, pi/2: above.
@@ -155,25 +158,12 @@ Vec3 ThreadTie::tail_node(const Snapshot& seen, float from_end) const {
 // [m] from the tail's end, where the jaws take it: clear of walls, if it hangs down between them, and of other stitches'
 // strands. Jaws that close on an edge or a strand beside it tear bites out.
 float ThreadTie::tail_place(const Snapshot& seen, float wanted) const {
-  const size_t tissue = 2 * size_t{picture_.columns};
-  size_t threads = 0;
-  for (const SutureView& s : seen.suture) threads += s.thread_order.size();
-  const auto own = std::minmax_element(seen.active().thread_order.begin(), seen.active().thread_order.end());
-  const auto room_at = [&](Vec3 p, bool walls) {  // distance squared to what is not to come between the jaws
-    float room = kRoom * kRoom;
-    for (size_t i = 0; i < seen.particle.size(); ++i) {
-      const bool strand = i >= tissue && i < tissue + threads;
-      if (strand ? i >= *own.first && i <= *own.second : !walls) continue;
-      room = std::min(room, length2(seen.particle[i] - p));
-    }
-    return room;
-  };
   const bool deep = tail_node(seen, wanted).y <= origin_.y - kDeep;
-  if (!deep && room_at(tail_node(seen, wanted), false) > kStrandRoom * kStrandRoom) return wanted;
+  if (!deep && room_at(picture_, seen, tail_node(seen, wanted), false, kRoom) > kStrandRoom) return wanted;
   float best = wanted, most = 0;
   for (float at = wanted; at < wanted + kFarthest && at < tail_ - kKnot; at += 1e-3f) {
-    const float room = room_at(tail_node(seen, at), deep);
-    if (room > 1.1f * most) best = at, most = room;
+    const float room = room_at(picture_, seen, tail_node(seen, at), deep, kRoom);
+    if (room > 1.05f * most) best = at, most = room;
   }
   return best;
 }
@@ -337,9 +327,11 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       break;
     }
     case lift_tail:
+      steady_ = 0;
       glide_to(origin_ + Vec3{-side_ * 0.5f * tail_, 0.5f * tail_, 0.5f * tail_}, aside, 0.5f * how_.speed, forceps_angle_);
       break;
     case lay_tail: {
+      steady_ = 0;
       const Vec3 root = first_ ? seen.active().suture_point.front().position : origin_;
       glide_to(root - line_ * (side_ * (tail_ - kTailEnd - 2e-3f)) + Vec3{0, 1e-3f, 0}, hand_, 0.4f * how_.speed,
                forceps_angle_);
@@ -359,8 +351,15 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
     case into_work:
       glide_to(work, hand_, how_.speed, toward);
       break;
-    case open:
+    case fetch: {  // across the slope that the tail lies on; steeper where walls or other stitches are in the way
+      const Vec3 goal = tail_node(seen, tail_place(seen, kTailEnd));
+      const float lean = std::clamp(kLeans * (goal.z - origin_.z), -0.8f, 0.8f);
+      const Vec3 from[] = {normalized(Vec3{side_, kSteepAtTail, lean}), normalized(Vec3{side_, 2, lean}),
+                           normalized(Vec3{side_, kSteepOnFlat, lean}), normalized(Vec3{side_, kSteepOnFlat, -lean}),
+                           normalized(Vec3{0.5f * side_, kSteepOnFlat, 0})};
+      approach_ = how_.flat ? normalized(Vec3{side_, kSteepOnFlat, 0}) : clear_shaft(picture_, seen, goal, from);
       break;
+    }
     case draw: {
       drawn_ = slid_ = 0;
       // Out of the turn, no farther than the tail reaches.
@@ -378,7 +377,7 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
                origin_ - line_ * (side_ * 0.6f * strand_) + Vec3{0, 4e-3f + kLow, 0}, 0.6f * how_.speed, forceps_angle_);
       break;
     case pull:
-      steady_ = 0;
+      steady_ = caught_ = 0;
       break;
     case lay:
       pulled_ = std::min(felt_, tail_felt_);
@@ -436,10 +435,12 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     }
     case lift_tail:
-    case lay_tail:  // no farther than both strands give way
-      if (glide(dt * std::clamp(1.5f - std::max(felt_, tail_felt_) / kWinding, 0.0f, 1.0f)) || waited_ > 2 * kPatience)
-        go(seen, stage_ == lift_tail ? lay_tail : drop_tail);
+    case lay_tail: {  // no farther than both strands give way
+      const float pace = std::clamp(1.5f - std::max(felt_, tail_felt_) / kWinding, 0.0f, 1.0f);
+      steady_ = pace < 0.05f ? steady_ + dt : 0;
+      if (glide(pace * dt) || steady_ > kTight || waited_ > 2 * kPatience) go(seen, stage_ == lift_tail ? lay_tail : drop_tail);
       break;
+    }
     case drop_tail:
       if (move_jaw(holder, kHalfOpen, dt) && waited_ > 0.2f) go(seen, off_tail);
       break;
@@ -481,10 +482,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const float left = length(way),
                   speed = std::min(0.7f * how_.speed, 0.01f + 4 * left) * (felt_ > 2 * kWinding ? 0.3f : 1.0f);
       tip_ += way * (std::min(speed * dt, left) / std::max(left, 1e-6f));
-      // Steeper, across the slope that the tail lies on, and turned until it passes between the jaws.
-      const Vec3 from = how_.flat ? Vec3{side_, kSteepOnFlat, 0}
-                                  : Vec3{side_, kSteepAtTail, std::clamp(kLeans * (goal.z - origin_.z), -0.8f, 0.8f)};
-      shaft_ = normalized(lerp(shaft_, normalized(from), std::min(1.0f, kTurns * dt)));
+      // Steeper, and turned until the tail passes between the jaws.
+      shaft_ = normalized(lerp(shaft_, approach_, std::min(1.0f, kTurns * dt)));
       const Vec3 along = tail_node(seen, place + kBeside) - tail_node(seen, place - kBeside);
       const Vec3 across = normalized(cross(shaft_, along), {0, 0, 1});
       holder_turn_ = nlerp(holder_turn_, holder_turn(shaft_, across.z < 0 ? -across : across), std::min(1.0f, kTurns * dt));
@@ -551,6 +550,12 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       tip_ += line_ * (side_ * (pace(tail_felt_, felt_) + even)), hand_ -= line_ * (side_ * (pace(felt_, tail_felt_) - even));
       steady_ = std::min(tail_felt_, felt_) > 0.9f * how_.pull ? steady_ + dt : 0;
       const bool lost = !holds && waited_ > 0.2f;
+      // More on the hand than on the tail: a turn has caught on the jaws, too.
+      caught_ = holds && length(seen.tool[kHolder].force) > how_.pull + kCaught ? caught_ + dt : 0;
+      if (caught_ > kCaughtFor) {
+        again(seen, drop_tail);
+        break;
+      }
       if (stage_ == pull && (steady_ > kSeated || waited_ > 12 || lost))
         go(seen, look(seen).alternating() >= wanted_ ? hold : lay);
       else if (stage_ == hold && (!keep_ || waited_ > 12)) go(seen, lay);

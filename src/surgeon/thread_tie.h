@@ -101,14 +101,15 @@ class ThreadTie {
   Quat forceps_rest_;                // forceps at angle 0, as it held the needle
   Vec3 swage_in_forceps_;
   float forceps_angle_ = 0;
-  Vec3 shaft_;  // of the needle holder
+  Vec3 shaft_;     // of the needle holder, from its tip
+  Vec3 approach_;  // the same at the tail
   // A movement of both hands.
   Vec3 tip_from_, tip_to_, hand_from_, hand_to_;
   Quat holder_from_, holder_to_;
   float angle_from_ = 0, angle_to_ = 0, done_ = 0, seconds_ = 0;
   // Winding.
   float strand_ = 0, tail_ = 0, height_ = 0, angle_ = 0, turned_ = 0, radius_ = 0, slack_ = 0;
-  float felt_ = 0, tail_felt_ = 0, pulled_ = 0, steady_ = 0, drawn_ = 0, slid_ = 0;
+  float felt_ = 0, tail_felt_ = 0, pulled_ = 0, steady_ = 0, drawn_ = 0, slid_ = 0, caught_ = 0;
   float tail_given_ = 0, strand_given_ = 0;  // [m] by which the hands have given way
 };
 

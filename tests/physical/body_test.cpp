@@ -387,6 +387,34 @@ TEST(Needle, drawn_across_its_channel_it_tears_a_slit_with_the_strength_of_a_bit
   }
 }
 
+// A needle that lies flat on the sheet is pressed on it with all that a hand can. The wall gives beside its elements (4 N/mm of
+// a contact), and still nothing passes.
+TEST(Needle, pressed_flat_on_the_wall_it_dents_it_and_does_not_pass) {
+  Bench bench;
+  const NeedleShape shape;
+  const Pose above{{0.015f, 0.01f, 1.25e-3f + shape.wire_radius + 0.2e-3f}, {}};
+  const uint32_t n = bench.add_needle(shape, above);
+  bench.start();
+  float gentle = 0, most = 0, force = 0;
+  for (const float down : {0.5e-3f, 20e-3f}) {
+    for (int i = 0; i < 600; ++i) {
+      Pose to = above;
+      to.p.z -= down;
+      bench.target[n] = {to, true};
+      bench.step();
+      if (i < 300) continue;
+      float& overlap = down < 1e-3f ? gentle : most;
+      overlap = std::max(overlap, bench.overlap(n));
+      force = length(bench.body(n).force);
+    }
+  }
+  std::printf("overlap %.3f mm, at %.1f N %.3f mm\n", 1e3 * static_cast<double>(gentle), static_cast<double>(force),
+              1e3 * static_cast<double>(most));
+  EXPECT_LT(gentle, 0.1e-3f);
+  EXPECT_NEAR(force, 8, 0.3f);
+  EXPECT_LT(most, 0.3e-3f);
+}
+
 TEST(Needle, jaws_hold_it_by_friction) {
   for (const float grip : {20.0f, 1.0f}) {
     Bench bench;

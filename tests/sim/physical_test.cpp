@@ -637,7 +637,48 @@ TEST(PhysicalScene, what_it_cannot_do_is_refused_with_one_message) {
   };
   refused([](SceneSpec& s) { s.body[0].particles = 601; });
   refused([](SceneSpec& s) { s.body[0].modulus_along = 1e6f; });
+  refused([](SceneSpec& s) { s.body[0].stiff_along = 2e6f; });  // the other one has none
+  refused([](SceneSpec& s) {
+    for (BodySpec& b : s.body) b.stiff_around = 0.5f * b.modulus_around;  // it would be softer
+  });
   refused([](SceneSpec& s) { s.thread.material = "catgut 9-0"; });
+}
+
+TEST(PhysicalScene, a_wall_with_straight_fibers_is_stiffer_beyond_the_knee_and_as_soft_before_it) {
+  // A pull on one bowel end, as a scene has it: the same under little force, less under much.
+  const auto stretch = [](float force, bool fibers) {
+    SceneSpec scene = read_scene("interrupted");
+    for (BodySpec& b : scene.body) {
+      b.modulus_along = b.modulus_around = 1e5f;
+      if (fibers) b.stiff_along = b.stiff_around = 2e6f, b.knee = 0.15f;
+    }
+    const std::shared_ptr<const Model> model = build_model(scene);
+    const StatePtr state = initial_state(*model);
+    const physical::Model& m = model->physical->world;
+    physical::State& s = state->physical.world;
+    physical::Scratch k(m, s);
+    Jobs jobs{1};
+    const uint32_t column = model->rim[0].outer.front() / 2;
+    const auto at = [&] { return wall::vec3(s.wall.motion.x[2 * column]); };
+    const Vec3 before = at(), way = model->scene.body[0].axis;
+    wall::Weights point;
+    point.column[0] = column, point.weight[0] = 1;
+    for (int i = 0; i < 1500; ++i) {
+      const physical::Hands::WallPull pull{point, way * force};
+      physical::Hands hands;
+      hands.wall_pulls = {&pull, 1};
+      physical::step(m, s, k, hands, jobs);
+    }
+    return dot(at() - before, way);
+  };
+  const float little = stretch(0.05f, false), little_fibers = stretch(0.05f, true);
+  EXPECT_GT(little, 0.1e-3f);
+  EXPECT_NEAR(little_fibers, little, 0.1f * little);
+  const float much = stretch(1.5f, false), much_fibers = stretch(1.5f, true);
+  std::printf("0.05 N: %.2f and %.2f mm; 1.5 N: %.2f and %.2f mm\n", 1e3 * static_cast<double>(little),
+              1e3 * static_cast<double>(little_fibers), 1e3 * static_cast<double>(much),
+              1e3 * static_cast<double>(much_fibers));
+  EXPECT_LT(much_fibers, 0.8f * much);
 }
 
 }  // namespace

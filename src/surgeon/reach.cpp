@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// surgeon/reach: see the header.
+#include "surgeon/reach.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace catgut {
+namespace {
+
+// Half the width of an instrument with open jaws: 3 mm at the tip, 6 mm at 50 mm from it. What it would push aside first lies
+// beyond the jaws, near which there is tissue in any direction.
+constexpr float kTipWidth = 3e-3f, kWidens = 0.06f, kBeyondJaws = 10e-3f, kShaftLength = 80e-3f;
+constexpr float kClear = 2e-3f;  // [m] of room that is enough
+
+struct OtherThings {  // indices of particles: walls, then all strands but the active one's
+  size_t tissue = 0, end = 0;
+  uint32_t own_first = 0, own_last = 0;
+  bool own(size_t i) const { return i >= own_first && i <= own_last; }
+};
+OtherThings other_things(const PictureModel& picture, const Snapshot& seen) {
+  OtherThings o;
+  o.tissue = o.end = 2 * size_t{picture.columns};
+  for (const SutureView& s : seen.suture) o.end += s.thread_order.size();
+  o.end = std::min(o.end, seen.particle.size());
+  const auto own = std::minmax_element(seen.active().thread_order.begin(), seen.active().thread_order.end());
+  o.own_first = *own.first, o.own_last = *own.second;
+  return o;
+}
+
+}  // namespace
+
+float room_at(const PictureModel& picture, const Snapshot& seen, Vec3 p, bool walls, float most) {
+  const OtherThings o = other_things(picture, seen);
+  float room2 = most * most;
+  for (size_t i = walls ? 0 : o.tissue; i < o.end; ++i)
+    if (!o.own(i)) room2 = std::min(room2, length2(seen.particle[i] - p));
+  return std::sqrt(room2);
+}
+
+Vec3 clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal, std::span<const Vec3> direction) {
+  const OtherThings o = other_things(picture, seen);
+  Vec3 best = direction[0];
+  float most = -1;
+  for (const Vec3 d : direction) {
+    float room = kClear;
+    for (size_t i = 0; i < o.end; ++i) {
+      if (o.own(i)) continue;
+      const Vec3 r = seen.particle[i] - goal;
+      const float along = dot(r, d);
+      if (along < kBeyondJaws || along > kShaftLength) continue;
+      room = std::min(room, length(r - d * along) - kTipWidth - kWidens * along);
+    }
+    if (room > most) best = d, most = room;
+    if (room >= kClear) break;
+  }
+  return best;
+}
+
+}  // namespace catgut

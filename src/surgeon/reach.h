@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// surgeon/reach: where jaws take the tail of a suture and from which direction they come, so that neither walls nor the strands
+// and knots of other stitches get between them or are pushed aside. From the Snapshot alone.
+#pragma once
+#include <span>
+
+#include "exchange/picture.h"
+#include "exchange/snapshot.h"
+
+namespace catgut {
+
+// [m] from p to the nearest strand of another suture, or wall too. Nothing beyond `most` counts.
+float room_at(const PictureModel& picture, const Snapshot& seen, Vec3 p, bool walls, float most);
+
+// Of the directions from the tip of an instrument to its hand (unit), the first along which its shaft is clear of walls and of
+// other stitches when its tip is at `goal`; if none is, the one with most room.
+Vec3 clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal, std::span<const Vec3> direction);
+
+}  // namespace catgut
