@@ -52,6 +52,8 @@ Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wal
 }
 
 namespace {
+
+constexpr float kFastestWall = 2;  // [m/s] that thread sees; hands move at 1 m/s
 void cut_changed(const Model& m, State& s) {
   s.cut_surface = std::make_shared<const Surface>(make_surface(m.wall, s.wall));
   // Impulses that were remembered for columns that have other numbers now.
@@ -333,6 +335,10 @@ void step_thread(const Model& m, State& s, Scratch& k, const Hands& hands) {
   for (size_t i = 0; i < k.contact.size(); ++i) k.contact[i].offset = k.foot[i].at - k.coupling.at[k.contact[i].point];
   k.tilt.clear();
   for (const wall::Coupling::Tilt& tilt : k.coupling.tilt) k.tilt.push_back({tilt.other, tilt.value});
+  // Before the bodies are solved, the wall may move as only their impulses of the last step would make it: jaws that let a fold
+  // slip have one side of a squeeze left, and 20 m/s. Thread that is carried along so fast breaks at once.
+  for (Vec3& v : k.coupling.speed)
+    if (length2(v) > kFastestWall * kFastestWall) v = normalized(v) * kFastestWall;
   thread::SoftPoints soft;
   soft.step = m.wall.step;
   soft.at = k.coupling.at, soft.speed = k.coupling.speed, soft.axis = k.coupling.axis, soft.w = k.coupling.w;
