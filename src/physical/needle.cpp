@@ -328,7 +328,7 @@ void advance_needles(const NeedlesModel& model, const wall::Model& wm, const wal
         if (last.exit_hole == wall::kNone && dot(tip - exit, tangent) < -0.1e-3f && distance(tip, exit) < 3e-3f) {
           n.tip = last.point[last.count - 1];
           if (last.count > 1) --last.count;
-          last.exit_side = 0, n.inside = true;
+          last.exit_side = 0, last.torn[1] = 0, n.inside = true;
         }
       }
       continue;

@@ -34,6 +34,18 @@ void drag(const Model& m, const State& s, SurfaceSearch& search, wall::Point& pl
   if (best.gap < 1e8f) place = best.point;
 }
 
+// [N] of the layers between two depths, at this distance from an edge.
+float strength_of(const TearModel& t, float low, float high, float edge) {
+  return t.strength * strength_share(t, low, high) * std::min(1.0f, edge / t.full_bite);
+}
+
+// Unit, out of the wall at a point.
+Vec3 normal_at(const Model& m, const State& s, const wall::Point& p) {
+  wall::Weights middle = wall::weights(m.wall, s.wall.topology, p), up = middle;
+  up.zeta = 1, middle.zeta = 0;
+  return normalized(wall::place(up, s.wall.motion) - wall::place(middle, s.wall.motion));
+}
+
 }  // namespace
 
 TearModel make_tear(std::span<const wall::Layer> layer) {
@@ -74,7 +86,7 @@ float bite_strength(const Model& m, const State& s, uint32_t entry, uint32_t exi
   const float deep = a.deepest >= -1 ? a.deepest : a.place.zeta * b.place.zeta > 0 ? 0.0f : b.place.zeta;
   const float low = std::min({a.place.zeta, b.place.zeta, deep}), high = std::max({a.place.zeta, b.place.zeta, deep});
   const float edge = 0.5f * (edge_distance(m, s, a.place) + edge_distance(m, s, b.place));
-  return m.tear.strength * strength_share(m.tear, low, high) * std::min(1.0f, edge / m.tear.full_bite);
+  return strength_of(m.tear, low, high, edge);
 }
 
 bool tear_bites(const Model& m, State& s, std::span<const Vec3> impulse, SurfaceSearch& search) {
@@ -85,10 +97,7 @@ bool tear_bites(const Model& m, State& s, std::span<const Vec3> impulse, Surface
     const uint32_t entry = t.eyelet[e].point, exit = t.eyelet[e + 1].point;
     Hole &a = s.hole[entry], &b = s.hole[exit];
     if (!a.within || std::max(entry, exit) >= impulse.size() || s.sleep.at(t.eyelet[e].segment)) continue;
-    const wall::Weights w = wall::weights(m.wall, s.wall.topology, a.place);
-    wall::Weights up = w, middle = w;
-    up.zeta = 1, middle.zeta = 0;
-    const Vec3 n = normalized(wall::place(up, s.wall.motion) - wall::place(middle, s.wall.motion));
+    const Vec3 n = normal_at(m, s, a.place);
     const Vec3 force = (impulse[entry] + impulse[exit]) / h;
     a.load += (force - a.load) * part;
     const float load = length(a.load), excess = load - bite_strength(m, s, entry, exit);
@@ -114,6 +123,7 @@ void tear_channels(const Model& m, State& s, const BodiesScratch& k) {
   };
   for (uint32_t i = 0; i < s.needle.size(); ++i) {
     Needle& n = s.needle[i];
+    if (n.channels == 0) continue;
     std::array<Vec3, kMaxChannels> load{};
     for (const Row& row : k.row) {
       if (row.kind != Row::Kind::channel || row.key < channel_key(i, 0, 0) || row.key >= channel_key(i, kMaxChannels, 0))
@@ -131,21 +141,16 @@ void tear_channels(const Model& m, State& s, const BodiesScratch& k) {
       };
       std::for_each(channel.point.begin(), channel.point.begin() + channel.count, take);
       if (open) take(n.tip);
-      const float strength =
-          m.tear.strength * strength_share(m.tear, low, high) * std::min(1.0f, edge / count / m.tear.full_bite);
-      const float excess = length(channel.load) - strength;
+      const float excess = length(channel.load) - strength_of(m.tear, low, high, edge / count);
       if (excess <= 0) continue;
-      const wall::Weights w = wall::weights(m.wall, s.wall.topology, channel.point[0]);
-      wall::Weights up = w, middle = w;
-      up.zeta = 1, middle.zeta = 0;
-      const Vec3 normal = normalized(wall::place(up, s.wall.motion) - wall::place(middle, s.wall.motion));
+      const Vec3 normal = normal_at(m, s, channel.point[0]);
+      const uint32_t piece = surface.piece[wall::weights(m.wall, s.wall.topology, channel.point[0]).column[0]];
       const Vec3 across = channel.load - normal * dot(channel.load, normal);
       if (length2(across) < 1e-12f) continue;
       const float by = std::min(kMost, excess / m.tear.viscosity * h);
       const auto drag = [&](wall::Point& p) {
         float off = 0;
-        const wall::Point to =
-            locate(m.wall, s.wall, surface, k, place(p) + normalized(across) * by, surface.piece[w.column[0]], off);
+        const wall::Point to = locate(m.wall, s.wall, surface, k, place(p) + normalized(across) * by, piece, off);
         const bool on_face = std::abs(p.zeta) == 1;
         const float side = p.zeta;
         if (off < 4 * kMost) p = to;

@@ -46,8 +46,9 @@ wall::Spec wall_of(const SceneSpec& scene, const wall::Mesh& mesh, float step) {
     if (b.wall != first.wall || b.modulus_along != first.modulus_along || b.modulus_around != first.modulus_around ||
         b.poisson != first.poisson || b.density != first.density || b.stiff_along != first.stiff_along ||
         b.stiff_around != first.stiff_around || b.knee != first.knee)
-      throw InputError(name_of(scene), "its bodies differ in wall or material",
-                       "physical mechanics have one material: give all bodies the same wall, moduli, poisson and density");
+      throw InputError(
+          name_of(scene), "its bodies differ in wall or material",
+          "physical mechanics have one material: give all bodies the same wall, moduli, knee, poisson and density");
   wall::Spec spec;
   spec.mesh = mesh;
   wall::Layer& layer = spec.layer.front();

@@ -30,7 +30,7 @@ struct BodySpec {
   float pinned_length = 0.035f;  // [m] length of the far end that is fixed
   float inner_radius = 0;        // [m] outer radius of a second tube inside the first (a bowel folded into itself); 0: none
   bool folded = false;           // the two tubes are one wall, folded at the near end: a prolapse before it is cut
-  float modulus_along = 6e5f;    // [Pa] Young's modulus along the organ; this and the next two: physical mechanics only
+  float modulus_along = 6e5f;    // [Pa] Young's modulus along the organ; this to poisson: physical mechanics only
   float modulus_around = 6e5f;   // [Pa] around it
   float stiff_along = 0;         // [Pa] the same beyond the strain `knee`, where fibers are straight; 0: none
   float stiff_around = 0;        // [Pa]
