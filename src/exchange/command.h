@@ -22,9 +22,14 @@ enum class CommandKind : uint8_t {
   advance_clamp,
   retract_clamp,
   set_pen,  // switches the electrosurgical pen in the hand: argument is its PenMode. Pedals, which are pressed and released
+  // Draws the clamp of bowel `argument` away from its opening, as retract_clamp and on by kClampRange, with at most kClampPull.
+  pull_clamp,
   count_
 };
-constexpr float kClampSpeed = 0.004f, kClampRange = 0.005f;  // [m/s], [m]
+constexpr float kClampSpeed = 0.004f, kClampRange = 0.005f, kClampPull = 2;  // [m/s], [m], [N]
+constexpr bool moves_clamp(CommandKind k) {
+  return k == CommandKind::advance_clamp || k == CommandKind::retract_clamp || k == CommandKind::pull_clamp;
+}
 
 struct Command {
   CommandKind kind = CommandKind::none;

@@ -8,11 +8,9 @@
 namespace catgut::physical {
 namespace {
 
-// Of the thread at a swage.
-constexpr float kTaut = 0.05f;         // [N]
-constexpr float kTautMass = 5e-3f;     // [kg] sqrt(line mass * EA) h: what moves with the end of a taut thread within a step
-constexpr float kSlackMass = 0.1e-3f;  // [kg] of a few nodes
-constexpr float kLineMass = 0.05f;     // [kg/m]
+// [kg] that the thread adds to a swage within a step, at most: more than the stiffness of their spring, times h^2.
+constexpr float kSwageMass = 20e-3f;
+constexpr float kCatchUp = 0.2f;  // in a step, of the way from where the thread sees a needle to where it is
 
 // [N] on a segment, of a needle that nothing holds, which weighs 20 mN, and of a tool that comes as near to the drape as
 // kOnDrape: cloth gives way, and thread between the two is not crushed.
@@ -231,6 +229,12 @@ static void yield_between(const BodiesModel& model, BodiesScratch& k) {
   }
 }
 
+// [m/s] of a needle if it moves on as before. Its rows of the last step do not tell: one of them may be gone, as where the
+// swage has passed a point of its channel, and the others would throw it aside.
+static Vec3 coasting(const BodiesModel& model, const Body& needle, const BodiesScratch::Moving& moving, float h) {
+  return moving.loose ? needle.velocity + model.gravity * h : needle.velocity;
+}
+
 void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* drape, float h, BodiesScratch& k) {
   k.tool.clear(), k.tool_body.clear(), k.loose.clear(), k.loose_body.clear();
   for (uint32_t b = 0; b < bodies.body.size(); ++b) {
@@ -238,8 +242,16 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* 
     Body& body = bodies.body[b];
     const BodiesScratch::Moving& moving = k.moving[b];
     Pose next;
-    next.q = turned(body.pose.q, clamped(moving.w, kMaxSpin) * h);
-    next.p = moving.center + clamped(moving.v, kMaxSpeed) * h - rotate(next.q, m.center);
+    if (m.falls && !moving.fast) {
+      next.q = turned(body.shown.q, clamped(body.spin, kMaxSpin) * h +
+                                        rotation_vector(normalized(body.pose.q * conjugate(body.shown.q))) * kCatchUp);
+      const Vec3 center = transform(body.shown, m.center);
+      next.p = center + clamped(coasting(model, body, moving, h), kMaxSpeed) * h + (moving.center - center) * kCatchUp -
+               rotate(next.q, m.center);
+    } else {
+      next.q = turned(body.pose.q, clamped(moving.w, kMaxSpin) * h);
+      next.p = moving.center + clamped(moving.v, kMaxSpeed) * h - rotate(next.q, m.center);
+    }
     for (const BodyCapsule& c : m.thread_capsule) {
       const BodySphere &a = m.sphere[c.a], &z = m.sphere[c.b];
       thread::ToolCapsule t;
@@ -322,16 +334,13 @@ void take_thread_forces(const BodiesModel& model, Bodies& bodies, BodiesScratch&
     const uint32_t index = k.hold_body[i];
     Body& b = bodies.body[index];
     if (model.body[index].hinge_z <= 0) {
-      // A swage gets the force within the same step, with what the thread would add if the needle moved otherwise than it has
-      // seen: along the thread its wave impedance times h where it is taut, across it that of the transverse wave. Needle and
-      // thread weigh about the same: with a force one step late, or springs toward each other's old place, they oscillate.
-      const float force = length(k.hold[i].force), h = k.step;
-      const float side = 0.5f * (kSlackMass + h * std::sqrt(kLineMass * force)), along = force > kTaut ? kTautMass : side;
+      // Needle and thread weigh about the same: the force goes with what the thread would add if the swage moved otherwise. The
+      // thread was led as the needle moved before, and slowly to where it has been moved since: so it does not give twice.
       for (Row& row : k.row)
         if (row.kind == Row::Kind::spring && row.a == index) {
-          row.axis = normalized(k.hold[i].force, {1, 0, 0});
-          row.soft = 1 / along, row.soft_across = 1 / side;
-          row.wanted = point_speed(k.moving[index], row.ra) - k.hold[i].force * (h * row.soft);
+          row.soft = row.soft_across = 1 / kSwageMass;
+          row.wanted =
+              coasting(model, b, k.moving[index], k.step) + cross(b.spin, row.ra) - k.hold[i].force * (k.step * row.soft);
         }
       continue;
     }

@@ -108,7 +108,8 @@ void lace_threads(const Model& m, State& s) {
       }
       if (c.exit_hole == wall::kNone || !has_eyelet(s.thread, c.exit_hole)) continue;
     }
-    if (exit < kDone) continue;
+    // Another wall may lie on the exit: its bite begins before this one's thread is far out.
+    if (exit < kDone && (n.channels == 1 || past(n.channel[1].point[0]) < 0)) continue;
     n.events |= kThreadOut;
     for (uint32_t k = 0; k + 1 < n.channels; ++k) n.channel[k] = n.channel[k + 1];
     --n.channels;

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+
+#include "physical/near_faces.h"
 
 namespace catgut::physical {
 namespace {
@@ -26,8 +29,9 @@ float angle_of(const NeedleModel& n, const Pose& pose, Vec3 p) {
   return angle;
 }
 
+// against: unit; only faces that face a motion along it. Zero: all.
 Foot nearest_face(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
-                  float within) {
+                  float within, Vec3 against, float least_slope) {
   Foot best;
   best.gap = 1e9f;
   float facing = -1;
@@ -37,6 +41,7 @@ Foot nearest_face(const wall::Model& wm, const wall::State& ws, const Surface& s
     for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
       const Foot foot = outer_foot(wm, ws, surface, q, p);
       if ((foot.on_edge && foot.gap < 0) || foot.gap < -0.35f * wm.laminate.thickness) continue;
+      if (length2(against) > 0 && -dot(against, foot.facing) < least_slope) continue;
       const float far = std::abs(foot.gap), front = dot(normalized(p - foot.at), foot.facing);
       if (far > std::abs(best.gap) + 1e-7f || (far > std::abs(best.gap) - 1e-7f && front < facing)) continue;
       best = foot, facing = front;
@@ -88,13 +93,17 @@ void leave_channels(const NeedleModel& m, const wall::Model& wm, const wall::Sta
 }  // namespace
 
 wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
-                   uint32_t piece, float& off) {
+                   const wall::Point& from, float& off) {
   wall::Point best;
   off = 1e9f;
-  for (uint32_t f = 0; f < k.face_center.size(); ++f) {
+  const auto piece_of = [&](const wall::Point& at) { return surface.piece[wall::weights(wm, ws.topology, at).column[0]]; };
+  const uint32_t piece = piece_of(from);
+  std::array<uint32_t, 40> near;
+  const size_t count = near_faces(wm, from.face, near);
+  std::sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count));
+  for (const uint32_t f : std::span(near.data(), count)) {
     const float r = k.face_radius[f] + 1e-3f;
     if (length2(k.face_center[f] - p) > r * r) continue;
-    if (piece != wall::kNone && surface.piece[column_of(wm, ws, f)] != piece) continue;
     // Outer face, then inner one; a fragment has several such pairs.
     for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1] && surface.patch[q].side == 1; q += 2) {
       const Foot out = nearest_on_patch(wm, ws, surface, q, p), in = nearest_on_patch(wm, ws, surface, q + 1, p);
@@ -104,7 +113,7 @@ wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& 
       const wall::Point at{out.point.face, in.point.xi + share * (out.point.xi - in.point.xi),
                            in.point.eta + share * (out.point.eta - in.point.eta), zeta};
       const float far = distance(place_of(wm, ws, at), p);
-      if (far < off) off = far, best = at;
+      if (far < off && piece_of(at) == piece) off = far, best = at;
     }
   }
   return best;
@@ -285,12 +294,11 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
     // The tip on a face: it enters at the puncture force.
     const Vec3 tip = tip_of(m, body.pose), tangent = arc_tangent(m, body.pose, m.shape.arc);
     const float margin = bm.reach + 2 * h * (std::max(length(k.moving[m.body].v), length(body.velocity)) + 1);
-    const Foot foot = nearest_face(wm, ws, surface, k, tip, margin);
+    // Just out of a hole, it has no contact with the face that it came through, but with another wall that lies on that face.
+    const Channel* last = n.channels > 0 ? &n.channel[n.channels - 1] : nullptr;
+    const bool just_out = last && distance(place_of(wm, ws, last->point[last->count - 1]), tip) < kBeside;
+    const Foot foot = nearest_face(wm, ws, surface, k, tip, margin, just_out ? tangent : Vec3{}, law.least_slope);
     if (foot.gap > margin) continue;
-    if (n.channels > 0) {  // beside its own last hole it has just come out
-      const Channel& last = n.channel[n.channels - 1];
-      if (distance(place_of(wm, ws, last.point[last.count - 1]), tip) < kBeside) continue;
-    }
     Row row;
     row.key = key(3, foot.patch), row.on_wall = true,
     row.point = load_point(wall::weights(wm, ws.topology, foot.point), ws.motion, foot.normal);
@@ -349,7 +357,7 @@ void advance_needles(const NeedlesModel& model, const wall::Model& wm, const wal
     const Vec3 there = place_of(wm, ws, n.tip);
     const float along = dot(tip - there, tangent);
     float off = 0;
-    const wall::Point at = locate(wm, ws, surface, k, there + tangent * along, wall::kNone, off);
+    const wall::Point at = locate(wm, ws, surface, k, there + tangent * along, n.tip, off);
     if (off < 1e8f) n.tip = at;
     // Withdrawn: points ahead of the tip are gone, and with the first of them the channel.
     while (channel.count > 0 &&

@@ -104,9 +104,10 @@ float puncture_force(const PunctureLaw& law, const NeedleShape& shape);  // [N]
 inline uint64_t channel_key(uint32_t needle, uint32_t channel, uint32_t point) {
   return uint64_t{9} << 60 | uint64_t{needle} << 36 | (uint64_t{channel} * 64 + point);
 }
-// The material point at p, among the faces near it; of one piece of the wall, or of any (kNone). off: [m] from p to it.
+// The material point at p, on the faces round that of `from` and of the same piece: another wall that touches it has none. off:
+// [m] from p to it.
 wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
-                   uint32_t piece, float& off);
+                   const wall::Point& from, float& off);
 // The shaft has left a channel sideways: kTornOut.
 void leave_channel(Needle& needle, uint32_t channel);
 

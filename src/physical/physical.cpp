@@ -112,9 +112,11 @@ namespace {
 bool before_its_hole(const Model& m, const State& s, uint32_t node) {
   constexpr float kBeside = 1.2e-3f;  // [m] from the middle of the hole
   for (const Needle& n : s.needle) {
-    if (n.thread_node != node || n.channels == 0 || n.channel[0].entry_hole != wall::kNone) continue;
-    const Vec3 hole = wall::place(wall::weights(m.wall, s.wall.topology, n.channel[0].point[0]), s.wall.motion);
-    return distance(hole, s.thread.position(node)) < kBeside;
+    if (n.thread_node != node) continue;
+    for (uint32_t c = 0; c < n.channels; ++c) {
+      const Vec3 hole = wall::place(wall::weights(m.wall, s.wall.topology, n.channel[c].point[0]), s.wall.motion);
+      if (n.channel[c].entry_hole == wall::kNone && distance(hole, s.thread.position(node)) < kBeside) return true;
+    }
   }
   return false;
 }

@@ -144,13 +144,12 @@ void tear_channels(const Model& m, State& s, const BodiesScratch& k) {
       const float excess = length(channel.load) - strength_of(m.tear, low, high, edge / count);
       if (excess <= 0) continue;
       const Vec3 normal = normal_at(m, s, channel.point[0]);
-      const uint32_t piece = surface.piece[wall::weights(m.wall, s.wall.topology, channel.point[0]).column[0]];
       const Vec3 across = channel.load - normal * dot(channel.load, normal);
       if (length2(across) < 1e-12f) continue;
       const float by = std::min(kMost, excess / m.tear.viscosity * h);
       const auto drag = [&](wall::Point& p) {
         float off = 0;
-        const wall::Point to = locate(m.wall, s.wall, surface, k, place(p) + normalized(across) * by, piece, off);
+        const wall::Point to = locate(m.wall, s.wall, surface, k, place(p) + normalized(across) * by, p, off);
         const bool on_face = std::abs(p.zeta) == 1;
         const float side = p.zeta;
         if (off < 4 * kMost) p = to;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "sim/clamps.h"
 #include "sim/model.h"
 #include "sim/state.h"
 
@@ -86,8 +87,7 @@ bool has_room(const State& state, const HandState& hand) {
 
 bool carry_out(const Model& model, State& state, const TickInput& input, const Command& c) {
   if (c.kind == CommandKind::cut || c.kind == CommandKind::new_suture) return true;  // stages of their own
-  if (c.kind == CommandKind::advance_clamp || c.kind == CommandKind::retract_clamp)  // before each step
-    return has_clamp(model, c.argument);
+  if (moves_clamp(c.kind)) return has_clamp(model, c.argument);                      // before each step
   const size_t hand = c.hand, i = c.argument;
   if (hand >= kMaxHands || !input.hand[hand].connected) return false;
   HandState& h = state.hand[hand];

@@ -74,8 +74,6 @@ PhysicalState start_physical(const Model& model, const SolverState& solver);
 void step_physical(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times);
 // Places the bites and suture points of suture `which` on the wall as it is cut now.
 void publish_holes(const Model& model, const State& state, size_t which, SutureView& out);
-// Whether body `body` is a bowel end whose fixed end a command can move.
-bool has_clamp(const Model& model, size_t body);
 // After a load: what follows from the cuts of the wall.
 void restore_physical(const Model& model, PhysicalState& state);
 // Whether a loaded state has sizes and indices that a step can work with.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "sim/clamps.h"
 #include "sim/hands.h"
 #include "sim/model.h"
 #include "sim/physical.h"
@@ -117,37 +118,6 @@ void lay_needles(const Model& model, State& state, PhysicalScratch& k) {
 }
 
 // --- clamps ------------------------------------------------------------------------------------------------------------
-
-// The fixed columns of bowel end `body`.
-template <typename Visit>
-void each_clamped(const Model& model, const wall::State& w, size_t body, Visit visit) {
-  for (uint32_t c = 0; c < wall::columns(w); ++c)
-    if (w.topology.slot[c] == wall::kNone && model.wall[2 * w.topology.source[c]] == body) visit(c);
-}
-
-// The clamps that a command moves have a velocity during its tick. Their place is that of their columns: nothing else is kept.
-void move_clamps(const Model& model, State& state, const TickInput& input, float h) {
-  wall::State& w = state.physical.world.wall;
-  const wall::Mesh& rest = model.physical->world.wall.mesh;
-  for (const Command& command : input.commands) {
-    const bool advance = command.kind == CommandKind::advance_clamp;
-    if ((!advance && command.kind != CommandKind::retract_clamp) || !has_clamp(model, command.argument)) continue;
-    const Vec3 axis = normalized(model.scene.body[command.argument].axis);
-    each_clamped(model, w, command.argument, [&](uint32_t c) {
-      const uint32_t r = w.topology.source[c];
-      const float at = dot(wall::vec3(w.motion.x[2 * c]) - 0.5f * (rest.outer[r] + rest.inner[r]), axis),
-                  left = advance ? std::max(0.0f, kClampRange - at) : std::max(0.0f, at),
-                  speed = std::min(kClampSpeed, left / h);
-      w.motion.v[2 * c] = wall::float4(axis * (advance ? speed : -speed));
-    });
-  }
-}
-void stop_clamps(const Model& model, State& state, const TickInput& input) {
-  wall::State& w = state.physical.world.wall;
-  for (const Command& command : input.commands)
-    if (command.kind == CommandKind::advance_clamp || command.kind == CommandKind::retract_clamp)
-      each_clamped(model, w, command.argument, [&](uint32_t c) { w.motion.v[2 * c] = {}; });
-}
 
 // --- what the world did, where everything else reads it ----------------------------------------------------------------
 
@@ -543,11 +513,6 @@ void publish_holes(const Model& model, const State& state, size_t which, SutureV
   }
 }
 
-bool has_clamp(const Model& model, size_t body) {
-  return model.physical && body < model.scene.body.size() && model.rim.size() == model.scene.body.size() &&
-         model.scene.body[body].pinned_length > 0;
-}
-
 void step_physical(const Model& model, State& state, const TickInput& given, Jobs& jobs, StageTimes* times) {
   TickInput input = given;
   switch_pens(model, state, input);
@@ -570,6 +535,7 @@ void step_physical(const Model& model, State& state, const TickInput& given, Job
   begin_haptics(state);
   k.puncture.clear(), std::fill(k.depth.begin(), k.depth.end(), 0.0f);
   use_scissors(model, state, k.world);
+  const MovingClamps clamps(model, state, input.commands, k.world.wall);
   physical::Hands hands;
   hands.targets = k.target, hands.plane = &k.drape;
   for (int i = 1; i <= model.substeps; ++i) {
@@ -578,12 +544,12 @@ void step_physical(const Model& model, State& state, const TickInput& given, Job
     set_targets(model, state, input, k);
     lay_needles(model, state, k);
     use_pens(model, state, k.world, model.solver.h);
-    move_clamps(model, state, input, model.solver.h);
+    clamps.move(model, state, model.solver.h);
     physical::step(model.physical->world, state.physical.world, k.world, hands, jobs);
     note_punctures(state, model.physical->world, k);
     sum_haptics(model, state, k, i);
   }
-  stop_clamps(model, state, input);
+  clamps.stop(model, state);
   show(model, state);
   show_grips(model, state, sewing);
   show_bites(model, state, sewing, k);

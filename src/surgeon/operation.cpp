@@ -18,6 +18,7 @@ constexpr float kLean = 0.3f;        // of a clamp's shaft, outward
 constexpr float kGrasped = 0.4f;     // [s] of closed jaws
 constexpr float kLeftOf = 0.03f;     // [m] of the opening's center: a needle farther to the left is carried to the right first
 constexpr int kMostMisses = 8;
+constexpr float kPulls = 4;                    // [s] the colon's clamp, at the end
 constexpr Vec3 kAside{-0.20f, 0.10f, -0.20f};  // [m] from the focus: where the assistant keeps the specimen
 
 }  // namespace
@@ -75,6 +76,9 @@ std::string Operating::doing() const {
       return "stitch " + std::to_string(stitched_ + 1) + ": " + sewing_->doing();
     case carry_needle:
       doing = "stitch " + std::to_string(stitched_ + 1) + ": carry the needle to the right";
+      break;
+    case pull:
+      doing = "the colon retracts";
       break;
     case finished:
       return untied_ > 0 ? "gave up: stitches without a knot: " + std::to_string(untied_) : "done";
@@ -282,8 +286,8 @@ void Operating::act(const Snapshot& seen) {
       } else if (leaves_untied_ = false; ++stitched_ < picture_.suture.size()) {
         begin_stitch(seen, TaskKind::pick_up);
       } else {
-        sewing_.reset(), gave_up_ = untied_ > 0;
-        go(finished);
+        sewing_.reset();
+        go(pull);
       }
       return;
     }
@@ -296,6 +300,10 @@ void Operating::act(const Snapshot& seen) {
       begin_stitch(seen, TaskKind::hold_edge);
       return go(sew);
     }
+    case pull:
+      commands_.push({CommandKind::pull_clamp, kAssistant, static_cast<uint16_t>(picture_.body.size() - 1)});
+      if (waited_ > kPulls) gave_up_ = untied_ > 0, go(finished);
+      return;
     case finished:
       return;
   }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // surgeon/operation: the scripted surgeon carries out the scene "altemeier". He closes Allis clamps on the rim of the prolapse
 // and parks them; an assistant takes one of them. Then he cuts the outer tube all round (surgeon/excision) and the assistant
-// carries the specimen away. With each suture of the scene he joins the cut edge to the inner tube (surgeon/scripted). Reads
+// carries the specimen away. With each suture of the scene he joins the cut edge to the inner tube (surgeon/scripted). When all
+// hands are away, the inner tube retracts by its clamp, as a colon does: only the stitches hold it. Reads
 // Snapshots only.
 #pragma once
 #include <array>
@@ -43,6 +44,7 @@ class Operating final : public Surgeon {
     take_holder,
     sew,
     carry_needle,
+    pull,
     finished
   };
   void look(const Snapshot& seen);  // what is done already: a stage may be practiced alone, from a saved state

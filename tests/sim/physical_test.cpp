@@ -416,6 +416,42 @@ TEST(PhysicalScene, clamps_bring_the_ends_together_and_go_back_to_where_they_wer
   EXPECT_EQ(f.seen.event.back().kind, EventKind::instrument_refused) << "body 7 does not exist";
 }
 
+// A clamp that pulls: free, the bowel follows it by its whole range. Held by its edge, it stays where the hand feels the pull.
+TEST(PhysicalScene, a_clamp_pulls_the_bowel_with_its_force_or_by_its_range) {
+  for (const bool held : {false, true}) {
+    Field f([](SceneSpec& s) { s.body[0].position.z = -0.08f; });
+    const BodySpec& right = f.scene.body[1];
+    const Vec3 edge = right.position + Vec3{0.003f, right.radius - 0.5f * right.wall, 0};
+    const size_t fixed = f.nearest_tissue(right.position + Vec3{0.038f, right.radius, 0});
+    const Vec3 start = f.seen.particle[fixed];
+    ToolInput& hand = f.input.hand[0];
+    hand.connected = 1, hand.pose = {edge, from_axes({0, 1, 0}, {0, 0, -1}, {-1, 0, 0})};
+    hand.pose.p.x -= 0.02f, hand.jaw = 1;
+    for (int i = 0; i < 20; ++i) f.tick();
+    for (int i = 0; i < 40; ++i) hand.pose.p.x += 0.0005f, f.tick();
+    if (held) hand.jaw = 0;
+    for (int i = 0; i < 20; ++i) f.tick();
+    ASSERT_EQ(f.seen.tool[0].held, held ? Held::tissue : Held::nothing);
+    f.input.commands.push({CommandKind::pull_clamp, 2, 1});
+    for (int i = 0; i < 180; ++i) f.tick();
+    const float way = f.seen.particle[fixed].x - start.x, force = f.seen.tool[0].force.x;
+    std::printf("%s: the clamp moved %.2f mm, %.2f N on the hand\n", held ? "held" : "free", 1e3 * static_cast<double>(way),
+                static_cast<double>(force));
+    if (held) {
+      EXPECT_EQ(f.seen.tool[0].held, Held::tissue);
+      EXPECT_NEAR(force, kClampPull, 0.05f * kClampPull);
+      EXPECT_LT(way, 0.9f * kClampRange);
+    } else {
+      EXPECT_NEAR(way, kClampRange, 1e-5f);
+      EXPECT_NEAR(f.seen.particle[f.nearest_tissue(edge)].x, edge.x, 0.003f);
+    }
+    f.input.commands.clear();
+    f.input.commands.push({CommandKind::advance_clamp, 2, 1});
+    for (int i = 0; i < 60; ++i) f.tick();
+    EXPECT_GT(start.x - f.seen.particle[fixed].x, -0.0012f) << "advanced again, by 4 mm/s";
+  }
+}
+
 // Surgery with real instruments, seen from outside.
 struct Closed {
   bool done = false;
