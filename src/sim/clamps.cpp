@@ -52,8 +52,7 @@ void MovingClamps::move(const Model& model, State& state, float h) const {
 
 void MovingClamps::stop(const Model& model, State& state) const {
   wall::State& w = state.physical.world.wall;
-  for (size_t i = 0; i < count_; ++i)
-    each_clamped(model, w, clamp_[i].body, [&](uint32_t c) { w.motion.v[2 * c] = {}; });
+  for (size_t i = 0; i < count_; ++i) each_clamped(model, w, clamp_[i].body, [&](uint32_t c) { w.motion.v[2 * c] = {}; });
 }
 
 }  // namespace catgut

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// sim/clamps: the clamps on the fixed ends of bowels, which commands move along the bowel's axis (exchange/command). The place of
-// a clamp is that of the columns it holds: nothing else is kept, so that a loaded state continues alike. Physical mechanics only.
+// sim/clamps: the clamps on the fixed ends of bowels, which commands move along the bowel's axis (exchange/command). The place
+// of a clamp is that of the columns it holds: nothing else is kept, so that a loaded state continues alike. Physical mechanics
+// only.
 #pragma once
 #include <array>
 
