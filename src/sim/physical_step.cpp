@@ -117,8 +117,6 @@ void lay_needles(const Model& model, State& state, PhysicalScratch& k) {
   }
 }
 
-// --- clamps ------------------------------------------------------------------------------------------------------------
-
 // --- what the world did, where everything else reads it ----------------------------------------------------------------
 
 // What a needle did in this step.

@@ -193,7 +193,7 @@ void Operating::look(const Snapshot& seen) {
   const auto holds = [&](uint16_t i) { return seen.instrument[i].held == Held::tissue; };
   clamped_ = static_cast<size_t>(std::count_if(clamp_.begin(), clamp_.end(), holds));
   stitched_ = static_cast<size_t>(std::count_if(seen.suture.begin(), seen.suture.end(), is_cut_off));
-  if (stitched_ == seen.suture.size()) go(finished);
+  if (stitched_ == seen.suture.size()) go(pull);
   else if (seen.topology.pieces > picture_.body.size()) go(take_holder);
   else if (clamped_ == clamp_.size()) go(seen.tool[kAssistant].instrument < 0 ? to_assistant : take_pen);
 }

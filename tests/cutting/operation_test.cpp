@@ -4,6 +4,7 @@
 // procedure without an error, a replay to the bit, and a state saved before the stitch from which a surgeon continues.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -13,6 +14,7 @@
 #include "procedure/manager.h"
 #include "procedure/procedure_file.h"
 #include "procedure/scripted_surgeon.h"
+#include "runtime/cut_measures.h"
 #include "runtime/session.h"
 #include "sim/recording.h"
 
@@ -129,6 +131,33 @@ TEST(Operation, a_bridge_left_in_the_circle_is_cut_before_the_specimen_is_lifted
   }
   EXPECT_EQ(surgeon->doing(), "lay the specimen aside");
   EXPECT_TRUE(f.of(Fault::pulled_attached).empty());
+}
+
+// Without a stitch: the gap at rest does not show it, the one while the colon retracts fails the scene.
+TEST(Operation, a_ring_without_stitches_gapes_when_the_colon_retracts) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  SceneSpec spec = small_scene();
+  std::erase_if(spec.instrument, [](const InstrumentSpec& i) { return i.kind == "allis"; });
+  for (InstrumentSpec& i : spec.instrument)
+    if (i.kind == "cautery") i.where = "right";
+  spec.surgeon.plan = "excision", spec.surgeon.drive_speed = 0.005f;
+  Field f(spec);
+  const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(spec, picture_model(*f.model));
+  while (!surgeon->done() && f.state->tick < 4500) {
+    f.input = surgeon->operate(f.seen, f.model->dt);
+    f.tick();
+  }
+  ASSERT_EQ(f.of(EventKind::piece_freed).size(), 1u) << surgeon->doing();
+  for (ToolInput& hand : f.input.hand) hand.connected = 0;
+  for (int i = 0; i < 60; ++i) f.tick();
+  const double before = measure_cut(spec, f.seen).ring_gap;
+  for (int i = 0; i < 150; ++i) f.input.commands.push({CommandKind::pull_clamp, 2, 1}), f.tick();
+  const double retracted = measure_cut(spec, f.seen).ring_gap;
+  const auto limit = std::find_if(spec.expect.begin(), spec.expect.end(), [](const auto& e) { return e.name == "ring_gap"; });
+  ASSERT_NE(limit, spec.expect.end());
+  std::printf("ring gap %.2f mm, retracted %.2f mm, limit %.2f mm\n", 1e3 * before, 1e3 * retracted, 1e3 * limit->max);
+  EXPECT_LT(before, limit->max);
+  EXPECT_GT(retracted, 2 * limit->max);
 }
 
 TEST(Operation, the_scripted_surgeon_carries_it_out_and_a_replay_repeats_it) {

@@ -88,6 +88,24 @@ struct Bench {
   }
 };
 
+// In place of the sheet, two of them: the second one by `up` [m] higher. held: by the place of a column's outer node.
+constexpr uint32_t kFacesOfSheet = 12 * 8;
+template <typename Held>
+void put_two_sheets(Bench& bench, float up, Held held) {
+  wall::SheetShape shape;
+  shape.width = 0.03f, shape.height = 0.02f, shape.columns = 13, shape.rows = 9;
+  wall::Spec spec;
+  spec.mesh = wall::sheet(shape);
+  wall::Mesh second = spec.mesh;
+  for (std::vector<Vec3>* side : {&second.outer, &second.inner})
+    for (Vec3& p : *side) p.z += up;
+  wall::append(spec.mesh, second);
+  for (size_t c = 0; c < spec.mesh.held.size(); ++c) spec.mesh.held[c] = held(shape, spec.mesh.outer[c]);
+  const wall::Wall wall = wall::build_wall(spec);
+  bench.model = make_model(wall, validation::knot_settings(0.3f));
+  bench.state.wall = wall.state;
+}
+
 // The needle with its circle in the plane y = const above the sheet; its tip goes down in front as the angle grows.
 Pose on_circle(const NeedleModel& n, Vec3 center, float angle) {
   const Vec3 x{std::cos(angle), 0, std::sin(angle)}, y{-std::sin(angle), 0, std::cos(angle)};
@@ -300,46 +318,61 @@ TEST(Needle, enters_and_leaves_at_the_forces_of_the_law_and_the_thread_follows) 
 }
 
 // Two sheets one above the other, as near to each other as walls that touch. A tip that comes out of the upper one is on the
-// lower one at once, and makes a channel there as well.
+// lower one at once, and makes a channel there as well. Thread follows through both, and nothing is jerked.
 TEST(Needle, makes_a_channel_in_each_of_two_walls_that_touch) {
   for (const float apart : {0.05e-3f, 0.4e-3f, 1.5e-3f}) {
     Bench bench;
-    wall::SheetShape shape;
-    shape.width = 0.03f, shape.height = 0.02f, shape.columns = 13, shape.rows = 9;
-    wall::Spec spec;
-    spec.mesh = wall::sheet(shape);
-    wall::Mesh second = spec.mesh;
-    for (std::vector<Vec3>* side : {&second.outer, &second.inner})
-      for (Vec3& p : *side) p.z -= shape.thickness + apart;
-    wall::append(spec.mesh, second);
-    for (size_t c = 0; c < spec.mesh.held.size(); ++c) {
-      const Vec3 p = spec.mesh.outer[c];
-      spec.mesh.held[c] = std::min({p.x, shape.width - p.x, p.y, shape.height - p.y}) < 1e-4f;
-    }
-    const wall::Wall wall = wall::build_wall(spec);
-    bench.model = make_model(wall, validation::knot_settings(0.3f));
-    bench.state.wall = wall.state;
+    const float down = wall::SheetShape{}.thickness + apart;
+    put_two_sheets(bench, -down, [](const wall::SheetShape& shape, Vec3 p) {
+      return std::min({p.x, shape.width - p.x, p.y, shape.height - p.y}) < 1e-4f;
+    });
     const uint32_t n = bench.add_needle({}, {});
     const NeedleModel& needle = bench.model.needles.needle[0];
-    const Vec3 circle = kCircle - Vec3{0, 0, shape.thickness + apart};
-    float angle = -0.35f;
+    const Vec3 circle = kCircle - Vec3{0, 0, down};
+    float angle = 0;  // both ends of the needle above the sheets
     place_body(bench.model.bodies.body[n], bench.body(n), on_circle(needle, circle, angle), 0);
+    const Vec3 swage = swage_of(needle, bench.body(n).pose);
+    std::vector<Vec3> path;
+    for (int i = 159; i >= 0; --i) path.push_back(swage + Vec3{0.48e-3f, 0, 0.14e-3f} * static_cast<float>(i));
+    bench.state.thread = thread::make_state(path);
+    bench.state.needle[0].thread_node = 159;
     bench.start();
     std::vector<uint32_t> events;
-    for (; angle < 1.8f && events.size() < 4; angle += 1.5e-3f) {
-      bench.target[n] = {on_circle(needle, circle, angle), true};
-      bench.step();
-      const Needle& now = bench.state.needle[0];
-      if (now.events) events.push_back(now.events);
-      if (now.events & kEntered) { EXPECT_NEAR(now.entry_peak, 0.9f, 0.15f) << "apart " << apart << ", wall " << now.channels; }
-    }
+    float tension = 0;  // [N] of the thread, most
+    const auto drive = [&](float to, size_t until) {
+      for (; angle < to && events.size() < until; angle += 1.5e-3f) {
+        bench.target[n] = {on_circle(needle, circle, angle), true};
+        bench.step();
+        const Needle& now = bench.state.needle[0];
+        for (uint32_t bit = 1; bit <= kTornOut; bit *= 2)
+          if (now.events & bit) events.push_back(bit);
+        if (now.events & kEntered && events.size() < 4) {
+          EXPECT_NEAR(now.entry_peak, 0.9f, 0.15f) << "apart " << apart << ", wall " << now.channels;
+        }
+        for (size_t i = 0; i < bench.state.thread.segments(); ++i) tension = std::max(tension, bench.state.thread.tension[i]);
+      }
+    };
+    drive(1.8f, 4);
     ASSERT_EQ(events, (std::vector<uint32_t>{kEntered, kLeft, kEntered, kLeft})) << "apart " << apart;
     for (uint32_t c = 0; c < 2; ++c) {
       const Channel& channel = bench.state.needle[0].channel[c];
       EXPECT_EQ(channel.entry_side, 1.0f);
       EXPECT_EQ(channel.exit_side, -1.0f);
-      for (uint32_t p = 0; p < channel.count; ++p) EXPECT_EQ(channel.point[p].face / (12 * 8), c) << "within one wall";
+      for (uint32_t p = 0; p < channel.count; ++p) EXPECT_EQ(channel.point[p].face / kFacesOfSheet, c) << "within one wall";
     }
+    drive(4.8f, 100);
+    const size_t in = static_cast<size_t>(std::count(events.begin(), events.end(), uint32_t{kThreadIn})),
+                 out = static_cast<size_t>(std::count(events.begin(), events.end(), uint32_t{kThreadOut}));
+    std::printf("apart %.2f mm: thread in %zu, out %zu, tension up to %.2f N\n", 1e3 * static_cast<double>(apart), in, out,
+                static_cast<double>(tension));
+    EXPECT_EQ(in, 2u);
+    EXPECT_EQ(out, 2u);
+    ASSERT_EQ(bench.state.thread.eyelet.size(), 4u) << "the thread runs through both walls";
+    for (size_t i = 0; i < 4; ++i)
+      EXPECT_EQ(bench.state.hole[bench.state.thread.eyelet[i].point].place.face / kFacesOfSheet, i / 2)
+          << "upper wall, then lower";
+    EXPECT_EQ(std::count(events.begin(), events.end(), uint32_t{kTornOut}), 0);
+    EXPECT_LT(tension, 1.0f) << "less than the needle needs";
   }
 }
 
@@ -828,20 +861,11 @@ TEST(Tool, jaws_that_close_for_thread_do_not_crush_an_edge) {
 TEST(Tool, jaws_hold_both_of_two_edges_between_them) {
   Bench bench(0.03f, 0.02f, true);
   constexpr float kApart = 2e-3f;  // [m]
-  wall::SheetShape shape;
-  shape.width = 0.03f, shape.height = 0.02f, shape.columns = 13, shape.rows = 9;
-  wall::Spec spec;
-  spec.mesh = wall::sheet(shape);
-  wall::Mesh second = spec.mesh;
-  for (std::vector<Vec3>* side : {&second.outer, &second.inner})
-    for (Vec3& p : *side) p.z += shape.thickness + kApart;
-  const size_t columns = spec.mesh.outer.size();
-  wall::append(spec.mesh, second);
-  for (size_t c = 0; c < spec.mesh.held.size(); ++c) spec.mesh.held[c] = spec.mesh.outer[c].y > 0.5f * shape.height - 1e-4f;
-  const wall::Wall wall = wall::build_wall(spec);
-  bench.model = make_model(wall, validation::knot_settings(0.3f));
-  bench.state.wall = wall.state;
-  const float middle = 0.5f * (shape.thickness + kApart);
+  constexpr float kThickness = wall::SheetShape{}.thickness;
+  put_two_sheets(bench, kThickness + kApart,
+                 [](const wall::SheetShape& shape, Vec3 p) { return p.y > 0.5f * shape.height - 1e-4f; });
+  const size_t columns = wall::columns(bench.state.wall) / 2;
+  const float middle = 0.5f * (kThickness + kApart);
   const auto pose = [&](float back) {
     const Vec3 x{0, 0, 1}, z{0, -1, 0};
     return Pose{Vec3{0.015f, 0.0025f - back, middle}, from_axes(x, cross(z, x), z)};
@@ -863,7 +887,7 @@ TEST(Tool, jaws_hold_both_of_two_edges_between_them) {
   };
   run(800, 0, 0, 6);
   ASSERT_EQ(bench.body(t).grip.what, Gripped::tissue);
-  const float gap = at_edge(1).z - at_edge(0).z - shape.thickness;
+  const float gap = at_edge(1).z - at_edge(0).z - kThickness;
   EXPECT_LT(gap, 0.2e-3f) << "closed";
   EXPECT_GT(gap, -0.1e-3f) << "neither edge is in the other";
   const std::array<Vec3, 3> held{at(0, 1), at(1, 1), bench.body(t).pose.p};

@@ -227,6 +227,7 @@ TEST(PhysicalScene, a_loaded_state_continues_to_the_bit) {
   f.move_right(f.top + Vec3{0, 0.004f, 0}, 0.2f, 1);
   f.move_right(f.top - Vec3{0, 0.002f, 0}, 0.2f, 1);
   f.input.commands.push({CommandKind::advance_clamp, 2, 0});
+  f.input.commands.push({CommandKind::pull_clamp, 2, 1});
   for (int i = 0; i < 40; ++i) {
     f.input.hand[0].pose.p.x += 0.0003f;
     f.input.hand[0].jaw = i < 20 ? 1.0f : 0.0f;
