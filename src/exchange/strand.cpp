@@ -74,6 +74,21 @@ size_t last_point_node(const Snapshot& seen) {
   return node;
 }
 
+Vec3 knot_center(const Snapshot& seen, Vec3 stitch) {
+  constexpr float kTouching = 0.8e-3f;   // [m] between the nodes of two strands in contact
+  constexpr float kNearStitch = 12e-3f;  // [m]
+  const size_t last = seen.active().thread_order.size() - 1, first = first_point_node(seen);
+  Vec3 sum;
+  float count = 0;
+  for (size_t i = 0; i < first; ++i)
+    for (size_t k = last_point_node(seen) + 1; k <= last; ++k) {
+      const Vec3 a = node_at(seen, i), b = node_at(seen, k);
+      if (distance(a, b) > kTouching || distance(a, stitch) > kNearStitch) continue;
+      sum += 0.5f * (a + b), count += 1;
+    }
+  return count > 0 ? sum / count : stitch;
+}
+
 bool is_cut_off(const SutureView& suture) {
   if (suture.suture_point.empty()) return false;
   const auto hole = std::find(suture.thread_order.begin(), suture.thread_order.end(), suture.suture_point.back().anchored);

@@ -31,5 +31,7 @@ uint32_t locked_throws(const Snapshot& seen);  // of the active suture; not thos
 // The first and the last suture point's nodes; both 0 when there is none.
 size_t first_point_node(const Snapshot& seen);
 size_t last_point_node(const Snapshot& seen);
+// [m] middle of what tail and strand have in contact near `stitch`: the knot. `stitch` if they do not touch there.
+Vec3 knot_center(const Snapshot& seen, Vec3 stitch);
 
 }  // namespace catgut

@@ -423,16 +423,6 @@ const FaceBox& box_of(const wall::Model& m, const wall::State& s, SurfaceSearch&
   return box;
 }
 
-float least_distance(const FaceBox& box, Vec3 p, int side) {
-  const Vec3 q = p - box.center;
-  const float h = dot(q, box.n), da = std::max(0.0f, std::abs(dot(q, box.a)) - box.half_a),
-              db = std::max(0.0f, std::abs(dot(q, box.b)) - box.half_b);
-  const float low = side > 0 ? box.low[1] : side < 0 ? box.low[0] : std::min(box.low[0], box.low[1]);
-  const float high = side > 0 ? box.high[1] : side < 0 ? box.high[0] : std::max(box.high[0], box.high[1]);
-  const float dn = std::max(0.0f, std::max(low - h, h - high));
-  return std::sqrt(da * da + db * db + dn * dn) * 0.9999f;
-}
-
 PatchBox patch_box(const wall::Model& m, const wall::State& s, const Patch& patch) {
   const Corners c = corners_of(m, s.topology, patch.face);
   PatchBox box;
@@ -460,16 +450,6 @@ float PatchBox::to_box(Vec3 p) const {
   const float da = std::max(0.0f, std::abs(dot(q, a)) - half_a), db = std::max(0.0f, std::abs(dot(q, b)) - half_b),
               dn = std::max(0.0f, std::abs(dot(q, n)) - half_n);
   return std::sqrt(da * da + db * db + dn * dn) * 0.9999f;
-}
-
-float least_distance(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& k, const FaceBox& box,
-                     uint32_t index, Vec3 p) {
-  const Patch& patch = surface.patch[index];
-  const float far = least_distance(box, p, patch.side);
-  if (!patch.part) return far;
-  PatchBox& part = k.part[index];
-  if (part.step != k.step) part = patch_box(m, s, patch), part.step = k.step;
-  return std::max(far, part.to_ball(p));
 }
 
 void find_near(const wall::Model& m, const wall::State& s, const Surface& surface, const thread::State& thread,

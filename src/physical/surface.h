@@ -105,10 +105,25 @@ struct SurfaceSearch {
 };
 const FaceBox& box_of(const wall::Model& model, const wall::State& state, SurfaceSearch& search, uint32_t face);
 // At most the distance [m] from p to the face's patches of one side: -1 inner, 1 outer, 0 any.
-float least_distance(const FaceBox& box, Vec3 p, int side);
+inline float least_distance(const FaceBox& box, Vec3 p, int side) {
+  const Vec3 q = p - box.center;
+  const float h = dot(q, box.n), da = std::max(0.0f, std::abs(dot(q, box.a)) - box.half_a),
+              db = std::max(0.0f, std::abs(dot(q, box.b)) - box.half_b);
+  const float low = side > 0 ? box.low[1] : side < 0 ? box.low[0] : std::min(box.low[0], box.low[1]);
+  const float high = side > 0 ? box.high[1] : side < 0 ? box.high[0] : std::max(box.high[0], box.high[1]);
+  const float dn = std::max(0.0f, std::max(low - h, h - high));
+  return std::sqrt(da * da + db * db + dn * dn) * 0.9999f;
+}
 // The same of one patch, whose face has this box.
-float least_distance(const wall::Model& model, const wall::State& state, const Surface& surface, SurfaceSearch& search,
-                     const FaceBox& box, uint32_t patch, Vec3 p);
+inline float least_distance(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search,
+                            const FaceBox& box, uint32_t index, Vec3 p) {
+  const Patch& patch = surface.patch[index];
+  const float far = least_distance(box, p, patch.side);
+  if (!patch.part) return far;
+  PatchBox& part = search.part[index];
+  if (part.step != search.step) part = patch_box(m, s, patch), part.step = search.step;
+  return std::max(far, part.to_ball(p));
+}
 
 // A bound tighter than least_distance, after it: of a fragment's patch; 0 of a whole face. Only for a search that has no use
 // for a patch beyond the limit: which patches within reach were looked at decides which of equally near ones is taken.

@@ -419,7 +419,7 @@ Plan altemeier_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   plan.forceps_side = -1;
   plan.driver_at = 0.15f, plan.beyond = 0.8f;
   plan.tip_lean = 1.6f, plan.tip_psi = 1.2f, plan.tip_open = 0.4f;  // the tip is in the lumen: from above, over the edges
-  plan.pull = kRingPull, plan.rise = true, plan.jerk = 0.1f, plan.aside = kPi / 8;
+  plan.pull = kRingPull, plan.rise = true, plan.jerk = 0.1f, plan.lumen = true, plan.aside = kPi / 8;
   const OpeningShape outer = opening_shape(picture, 0), inner = opening_shape(picture, 1);
   const Vec3 radial = -normalized(Vec3{1, 0, 0} - inner.axis * inner.axis.x, any_perpendicular(inner.axis));
   BitePlace p;

@@ -85,6 +85,7 @@ struct Plan {
   float jerk = 0;         // [s] of more than the maximum load after which thread is not pulled further: a jerk is shorter
   bool rise = false;      // the needle is lifted over the edges on its way to where it is laid down
   bool flat = false;      // a pad: the tail lies on it
+  bool lumen = false;     // the tail hangs into the lumen beside the stitch
   float aside = 0;        // [rad] physical throws: turn of the line on which they are drawn, clear of the stitch opposite
   float knot_turn = 0;    // [rad] about y: where a physical knot is tied, 0 toward the viewer, positive to the right
   float pull = 0;  // [N] of each strand when a throw is pulled tight, with physical mechanics; 0: throws of guided mechanics

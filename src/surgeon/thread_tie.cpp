@@ -32,22 +32,25 @@ constexpr float kHeldWell = 1.5e-3f;     // [m] the same of a tail that turns sl
 constexpr float kBeside = 4e-3f;         // [m] of tail, on either side of the jaws
 constexpr float kPatience = 2;           // [s]; then they close where they are
 constexpr float kAhead = 4e-3f;          // [m] of the hand before the jaws, at most
-constexpr float kHalfOpen = 0.8f;        // of the jaws, to take the tail
-constexpr float kNarrow = 0.5f;    // of the jaws with a turn on them: in a wider gap it falls between them, near the hinge
-constexpr float kTaut = 1.2f;      // [N] above which a strand gives no more thread to crossing hands
-constexpr float kReach = 0.85f;    // of the tail's length
-constexpr float kSlideOff = 1.4f;  // [s]
+// The same in a lumen: a wall or a finished stitch in the way bears 2.4 N.
+constexpr float kGentle = 0.8e-3f;
+constexpr float kNearTail = 20e-3f;  // [m] from the tail: a hand nearer than that is gentle
+constexpr float kStands = 0.985f;    // cosine of the shaft to the direction in which it goes down into a lumen
+constexpr float kAbove = 15e-3f;     // [m] from the tail, until then
+constexpr float kHalfOpen = 0.8f;    // of the jaws, to take the tail
+constexpr float kNarrow = 0.5f;      // of the jaws with a turn on them: in a wider gap it falls between them, near the hinge
+constexpr float kTaut = 1.2f;        // [N] above which a strand gives no more thread to crossing hands
+constexpr float kReach = 0.85f;      // of the tail's length
+constexpr float kSlideOff = 1.4f;    // [s]
 // Of the strand's length: where it is wound. Lower, the needle that goes round would meet the tail, which stands up from a
 // knot.
 constexpr float kHigh = 0.62f;
 // The same for two turns, which need more of it. Half of the strand's length or less, and the hand meets the tail on the
 // tissue.
 constexpr float kHighTwice = 0.57f;
-constexpr float kDrawn = 0.5f;         // of the strand's length: height to which the tail is drawn at most
-constexpr float kLow = 4e-3f;          // [m] above the stitch, where strands are pulled
-constexpr float kKnot = 5e-3f;         // [m] from the middle of the stitch: thread nearer than this belongs to the knot
-constexpr float kTouching = 0.8e-3f;   // [m] between the nodes of two strands in contact
-constexpr float kNearStitch = 12e-3f;  // [m] of its knot from the middle of the stitch
+constexpr float kDrawn = 0.5f;  // of the strand's length: height to which the tail is drawn at most
+constexpr float kLow = 4e-3f;   // [m] above the stitch, where strands are pulled
+constexpr float kKnot = 5e-3f;  // [m] from the middle of the stitch: thread nearer than this belongs to the knot
 // [N] of either strand before the pull. One strand that is tauter than the other straightens in the throws below, and the other
 // one winds round it: they capsize into half hitches, which slide.
 constexpr float kEasy = 0.12f;
@@ -60,7 +63,7 @@ constexpr float kSeated = 0.6f;       // [s] of full tension
 constexpr float kTight = 0.8f;        // [s] of a strand that gives no way; then the tail lies as far as it can
 constexpr int kAgain = 5;             // times that a throw is wound again
 constexpr int kMostMisses = 3;        // grasps at the tail with a turn on the jaws
-constexpr float kDeep = 4e-3f;        // [m] below the stitch: a tail there is taken from above
+constexpr float kDeep = 4e-3f;        // [m] below the stitch: walls are beside a tail there
 constexpr float kBears = 3;           // [N] on a bite, above which the hands give way
 constexpr float kOverDrape = 12e-3f;  // [m] of the swage: the needle, which hangs down from the forceps, would scrape on it
 constexpr float kRoom = 4e-3f;        // [m] from the tissue's particles: open jaws have none of it between them
@@ -89,20 +92,6 @@ Vec3 from_jaws(const ToolView& tool, Vec3 p) {
 float smooth(float s) {
   s = std::clamp(s, 0.0f, 1.0f);
   return s * s * (3 - 2 * s);
-}
-
-// Middle of what tail and strand have in contact: the knot. `fallback` if they do not touch.
-Vec3 knot_center(const Snapshot& seen, Vec3 fallback) {
-  const size_t last = seen.active().thread_order.size() - 1, first = first_point_node(seen);
-  Vec3 sum;
-  float count = 0;
-  for (size_t i = 0; i < first; ++i)
-    for (size_t k = last_point_node(seen) + 1; k <= last; ++k) {
-      const Vec3 a = node_at(seen, i), b = node_at(seen, k);
-      if (distance(a, b) > kTouching || distance(a, fallback) > kNearStitch) continue;
-      sum += 0.5f * (a + b), count += 1;
-    }
-  return count > 0 ? sum / count : fallback;
 }
 
 SeenThrows look(const Snapshot& seen) {
@@ -280,6 +269,11 @@ bool ThreadTie::glide(float dt) {
   return done_ >= 1;
 }
 
+// The hand goes no farther than this ahead of the jaws, which what lies in the way holds back.
+void ThreadTie::lead_by(float most, Vec3 jaws) {
+  tip_ = jaws + (tip_ - jaws) * std::min(1.0f, most / std::max(distance(tip_, jaws), 1e-6f));
+}
+
 void ThreadTie::feel(const Snapshot& seen) {
   const SutureView& s = seen.active();
   const float now = s.thread_tension[s.thread_order.size() - 3];
@@ -316,13 +310,16 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
     case to_tail:
     case take_tail: {  // to lay the tail straight on the side away from the needle; it hangs in front, or down between walls
       const Vec3 at = tail_node(seen, tail_place(seen, kTailEnd + 3e-3f * static_cast<float>(misses_)));
-      const Vec3 z = at.y > origin_.y - kDeep ? normalized(Vec3{0.1f * side_, 0.35f, 0.93f})
-                                              : normalized(Vec3{0.1f * side_, 1, 0.3f}),
+      // From the front where nothing stands there, else from above.
+      const Vec3 from[] = {normalized(Vec3{0.1f * side_, 0.35f, 0.93f}), normalized(Vec3{0.1f * side_, 1, 0.9f}),
+                           normalized(Vec3{0.1f * side_, 1, 0.3f}),      normalized(Vec3{0.1f * side_, 1, -0.3f}),
+                           normalized(Vec3{0.4f * side_, 1, 0}),         normalized(Vec3{-0.4f * side_, 1, 0})};
+      const Vec3 z = how_.flat ? from[0] : clear_shaft(picture_, seen, at, from),
                  along = node_at(seen, node_along(seen, 0, kTailEnd + 6e-3f, 1)) - tail_node(seen, kTailEnd);
       const Vec3 x = normalized(cross(z, along), {1, 0, 0});
       lost_ = false;
-      glide_to(stage == to_tail ? at + z * 0.03f : at, aside, stage == to_tail ? how_.speed : 0.5f * how_.speed,
-               forceps_angle_);
+      glide_to(stage == to_tail ? at + z * 0.03f : at, aside,
+               stage == to_tail ? how_.speed : (how_.lumen ? 0.25f : 0.5f) * how_.speed, forceps_angle_);
       holder_to_ = from_axes(x, cross(z, x), z);
       break;
     }
@@ -417,6 +414,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
     case close: {
       if (stage_ == take_tail && !glide(dt)) {
         move_jaw(holder, kHalfOpen, dt);
+        if (how_.lumen) lead_by(kGentle, seen.tool[kHolder].pose.p);
         waited_ = 0;
         break;
       }
@@ -477,7 +475,9 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
     case fetch: {
       // By sight of the jaws, which lag behind the hand.
       const float place = tail_place(seen, kTailEnd + 2e-3f * static_cast<float>(misses_));
-      const Vec3 goal = tail_node(seen, place), jaws = seen.tool[kHolder].pose.p;
+      // Not down into a lumen before the shaft stands as it shall.
+      const bool stands = !how_.lumen || dot(shaft_, approach_) > kStands;
+      const Vec3 goal = tail_node(seen, place) + (stands ? Vec3{} : approach_ * kAbove), jaws = seen.tool[kHolder].pose.p;
       const Vec3 way = from_jaws(seen.tool[kHolder], goal);
       const float left = length(way),
                   speed = std::min(0.7f * how_.speed, 0.01f + 4 * left) * (felt_ > 2 * kWinding ? 0.3f : 1.0f);
@@ -487,12 +487,12 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const Vec3 along = tail_node(seen, place + kBeside) - tail_node(seen, place - kBeside);
       const Vec3 across = normalized(cross(shaft_, along), {0, 0, 1});
       holder_turn_ = nlerp(holder_turn_, holder_turn(shaft_, across.z < 0 ? -across : across), std::min(1.0f, kTurns * dt));
-      tip_ = jaws + (tip_ - jaws) * std::min(1.0f, kAhead / std::max(distance(tip_, jaws), 1e-6f));
+      lead_by(how_.lumen && left < kNearTail ? kGentle : kAhead, jaws);
       // The winding hand goes along and keeps the turns on the jaws.
       if (felt_ > kWinding) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
       else if (felt_ < 0.02f) radius_ = std::min(0.5f * strand_, radius_ + 0.01f * dt);
       hand_ = tip_ + shaft * kWindAt + around(side_, angle_, shaft) * radius_;
-      if (left < kBetweenJaws || waited_ > kPatience || felt_ > kTaut) go(seen, close);
+      if ((stands && left < kBetweenJaws) || waited_ > (how_.lumen ? 1.5f : 1.0f) * kPatience || felt_ > kTaut) go(seen, close);
       break;
     }
     case draw: {

@@ -24,6 +24,7 @@ struct ThreadTieSettings {
   float speed = 0.15f;  // [m/s] maximum of the hands
   float pull = 2.5f;    // [N] with which both strands are pulled tight
   bool flat = false;    // the tissue round the stitch is flat: the tail lies on it and hangs down nowhere
+  bool lumen = false;   // beside the stitch is an open lumen: the jaws go down into it upright, and press on nothing
   float aside = 0;      // [rad] of the line on which tail and strand are drawn and laid, from the x axis toward z
 };
 
@@ -71,6 +72,7 @@ class ThreadTie {
   void go(const Snapshot& seen, Stage stage);
   void glide_to(Vec3 tip, Vec3 hand, float speed, float angle);
   bool glide(float dt);
+  void lead_by(float most, Vec3 jaws);
   void feel(const Snapshot& seen);
   Vec3 give(Vec3 at, float felt, float& given, float dt) const;
   void place();

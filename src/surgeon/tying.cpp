@@ -24,7 +24,6 @@ constexpr Vec3 kFromFront{0, 0.28f, 0.96f};       // the same of the assistant's
 constexpr float kReleases = 0.5f, kAjar = 0.36f;  // of jaws within a throw, which wide open would break it
 constexpr float kBetweenJaws = 0.4e-3f;           // [m] of a crossing from the middle of the jaws that close on it
 constexpr float kGathers = 6;                     // [s] in which a rim follows both strands
-constexpr float kNearStitch = 12e-3f;             // [m] of a crossing from the middle of the stitch
 
 // What is seen, turned.
 Snapshot turned(const Snapshot& seen, Quat by) {
@@ -37,20 +36,6 @@ Snapshot turned(const Snapshot& seen, Quat by) {
     for (SuturePointView& p : suture.suture_point) p.position = rotate(by, p.position);
   }
   return out;
-}
-
-// Middle of what tail and strand have in contact; `fallback` if they do not touch.
-Vec3 crossing(const Snapshot& seen, Vec3 fallback) {
-  const size_t last = seen.active().thread_order.size() - 1, first = first_point_node(seen);
-  Vec3 sum;
-  float count = 0;
-  for (size_t i = 0; i < first; ++i)
-    for (size_t k = last_point_node(seen) + 1; k <= last; ++k) {
-      const Vec3 a = node_at(seen, i), b = node_at(seen, k);
-      if (distance(a, b) > kStrandsTouch || distance(a, fallback) > kNearStitch) continue;
-      sum += 0.5f * (a + b), count += 1;
-    }
-  return count > 0 ? sum / count : fallback;
 }
 
 }  // namespace
@@ -269,7 +254,8 @@ bool Scripted::tie_thread(const Task& task, const Snapshot& seen) {
   if (turns) turn_hands(to_knot);
   if (stage_ == start) {
     const bool first = !thread_tie_;
-    if (first) thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull, plan_.flat, plan_.aside});
+    if (first)
+      thread_tie_.emplace(picture_, hand_, ThreadTieSettings{skill_.speed, plan_.pull, plan_.flat, plan_.lumen, plan_.aside});
     thread_tie_->begin(at_knot, task.which, task.way, first, task.release || task.assistant != 0);
     clamped_ = task.assistant > 0 ? kGathers : (kClampsBack * plan_.approximate - plan_.stay) / kClampSpeed;
     go(work);
@@ -295,7 +281,7 @@ bool Scripted::take_crossing(const Snapshot& seen) {
   ScriptedHand& hand = assistant_[0];
   const ToolView& tool = seen.tool[kAssistant];
   const Quat turn = axis_angle({0, 1, 0}, plan_.knot_turn);
-  const Pose goal{crossing(seen, stitch(seen)), turn * from_axes(cross({1, 0, 0}, kFromFront), {1, 0, 0}, kFromFront)};
+  const Pose goal{knot_center(seen, stitch(seen)), turn * from_axes(cross({1, 0, 0}, kFromFront), {1, 0, 0}, kFromFront)};
   const Vec3 off = goal.p - tool.pose.p;  // by sight of the jaws, which tissue and thread push aside
   switch (assisting_) {
     case wait:
@@ -322,7 +308,7 @@ bool Scripted::leave_crossing(const Snapshot& seen) {
   if (assisting_ == 0) return true;
   if (seen.tool[kAssistant].held != Held::nothing) return move_jaw(hand, kReleases, dt_), false;
   hand.jaw = kAjar;
-  const Vec3 away = hand.pose.p - crossing(seen, stitch(seen));
+  const Vec3 away = hand.pose.p - knot_center(seen, stitch(seen));
   move_toward(hand, raised(hand.pose, 0.02f), skill_.speed, dt_);
   if (length(away) > 0.03f) assisting_ = 0;
   return false;

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/surgeon: what a tie does when the stitch itself fails under it.
+// tests/surgeon: what a tie does when the stitch itself fails under it, and how it comes to a tail inside a bowel.
 #include "surgeon/thread_tie.h"
 
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
 
 namespace catgut {
 namespace {
@@ -45,6 +49,69 @@ TEST(ThreadTie, fails_at_once_when_there_is_no_stitch) {
   tie.begin(s.seen, 1, 1, true);
   EXPECT_TRUE(tie.operate(s.seen, 1.0f / 60));
   EXPECT_TRUE(tie.failed());
+}
+
+// A stitch on the left of an upright bowel of 24 mm, whose tail hangs into the lumen and ends in its middle, 7 mm below the
+// edge.
+struct StitchOfRing : Stitch {
+  StitchOfRing() {
+    constexpr int kRound = 60;
+    std::vector<Vec3> wall;
+    for (int y = 0; y < 12; ++y)
+      for (int i = 0; i < kRound; ++i) {
+        const float angle = 2 * kPi * static_cast<float>(i) / kRound;
+        wall.push_back({12e-3f * std::cos(angle), -2e-3f * static_cast<float>(y), 12e-3f * std::sin(angle)});
+      }
+    picture.columns = static_cast<uint32_t>(wall.size() / 2);
+    SutureView& s = seen.active();
+    for (uint32_t& slot : s.thread_order) slot += static_cast<uint32_t>(wall.size());
+    for (SuturePointView& p : s.suture_point) p.anchored += static_cast<uint32_t>(wall.size());
+    for (size_t i = 0; i < seen.particle.size(); ++i) {
+      const float along = (static_cast<float>(i) - 40) / 40;  // of the tail: -1 its end, 0 the stitch
+      seen.particle[i] = i < 40 ? Vec3{-12e-3f - 18e-3f * along, -7e-3f * along * along, 0}
+                                : Vec3{-12e-3f - 60e-3f * along / 2, 30e-3f * along / 2, 0};
+    }
+    s.suture_point[0].position = {-13e-3f, -3e-3f, 0}, s.suture_point[1].position = {-11e-3f, -3e-3f, 0};
+    s.needle.pose.p = seen.particle.back();
+    wall.insert(wall.end(), seen.particle.begin(), seen.particle.end());
+    seen.particle = wall;
+  }
+  // [m] of the needle holder's axis from the nearest of the wall, from 8 mm behind its tip.
+  float room() const {
+    const Pose& holder = seen.tool[0].pose;
+    const Vec3 axis = rotate(holder.q, {0, 0, 1});
+    float least = 1;
+    for (size_t i = 0; i < 2 * picture.columns; ++i)
+      for (float along = 8e-3f; along < 80e-3f; along += 1e-3f)
+        least = std::min(least, distance(seen.particle[i], holder.p + axis * along));
+    return least;
+  }
+  // The hands go where they want to. The least room until the jaws close on the tail.
+  float room_until_they_close(ThreadTie& tie) {
+    float least = 1;
+    for (int i = 0; i < 1200 && !(tie.doing() == "take the tail" && hands[0].jaw < 0.1f); ++i) {
+      if (tie.operate(seen, 1.0f / 60)) break;
+      seen.tool[0].pose = hands[0].pose;
+      least = std::min(least, room());
+    }
+    return least;
+  }
+  float from_tail() const {
+    float least = 1;
+    for (size_t i = 0; i < 40; ++i)
+      least = std::min(least, distance(seen.tool[0].pose.p, seen.particle[2 * picture.columns + i]));
+    return least;
+  }
+};
+
+// It came from the front, flat, through the wall, and pressed on it with 8 N.
+TEST(ThreadTie, takes_a_tail_in_the_lumen_from_above) {
+  StitchOfRing s;
+  ThreadTie tie(s.picture, s.hands, {});
+  s.hands[0].pose = s.seen.tool[0].pose = {{0, 0.08f, 0.08f}, from_axes({1, 0, 0}, {0, 0, -1}, {0, 1, 0})};
+  tie.begin(s.seen, 1, 1, true);
+  EXPECT_GT(s.room_until_they_close(tie), 4e-3f);
+  EXPECT_LT(s.from_tail(), 1e-3f);
 }
 
 }  // namespace
