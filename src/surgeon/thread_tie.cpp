@@ -412,9 +412,10 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     case take_tail:
     case close: {
-      if (stage_ == take_tail && !glide(dt)) {
+      const bool there = stage_ == close || glide(dt);
+      if (stage_ == take_tail && how_.lumen) lead_by(kGentle, seen.tool[kHolder].pose.p);
+      if (!there) {
         move_jaw(holder, kHalfOpen, dt);
-        if (how_.lumen) lead_by(kGentle, seen.tool[kHolder].pose.p);
         waited_ = 0;
         break;
       }

@@ -24,7 +24,7 @@ struct ThreadTieSettings {
   float speed = 0.15f;  // [m/s] maximum of the hands
   float pull = 2.5f;    // [N] with which both strands are pulled tight
   bool flat = false;    // the tissue round the stitch is flat: the tail lies on it and hangs down nowhere
-  bool lumen = false;   // beside the stitch is an open lumen: the jaws go down into it upright, and press on nothing
+  bool lumen = false;   // beside the stitch is an open lumen: the jaws go down into it upright and press with 2.4 N at most
   float aside = 0;      // [rad] of the line on which tail and strand are drawn and laid, from the x axis toward z
 };
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 namespace catgut {
@@ -112,6 +113,29 @@ TEST(ThreadTie, takes_a_tail_in_the_lumen_from_above) {
   tie.begin(s.seen, 1, 1, true);
   EXPECT_GT(s.room_until_they_close(tie), 4e-3f);
   EXPECT_LT(s.from_tail(), 1e-3f);
+}
+
+// Jaws that something holds back: the hand's spring pulls by how far it is ahead of them.
+TEST(ThreadTie, presses_gently_on_what_lies_between_the_jaws_and_a_tail_in_the_lumen) {
+  for (const char* stage : {"take the tail", "reach for the tail"}) {
+    SCOPED_TRACE(stage);
+    const bool winds = std::string(stage) != "take the tail";
+    StitchOfRing s;
+    ThreadTie tie(s.picture, s.hands, {.lumen = true});
+    s.hands[0].pose = s.seen.tool[0].pose = {{0, 0.08f, 0.08f}, from_axes({1, 0, 0}, {0, 0, -1}, {0, 1, 0})};
+    tie.begin(s.seen, 1, 1, true);
+    if (winds) tie.begin(s.seen, 1, 1, false);  // the tail is taken with a turn on the jaws
+    bool held_back = false;
+    float most = 0;
+    for (int i = 0, ticks = 0; i < 1200 && ticks < 60; ++i) {
+      ASSERT_FALSE(tie.operate(s.seen, 1.0f / 60));
+      if (held_back) ++ticks, most = std::max(most, distance(s.hands[0].pose.p, s.seen.tool[0].pose.p));
+      else s.seen.tool[0].pose = s.hands[0].pose, held_back = tie.doing() == stage && s.from_tail() < 12e-3f;
+    }
+    ASSERT_TRUE(held_back);
+    EXPECT_GT(most, 0.5e-3f);
+    EXPECT_LT(most, 0.81e-3f) << "2.4 N with the 3 N/mm of a hand";
+  }
 }
 
 }  // namespace
