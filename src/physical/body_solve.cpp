@@ -230,9 +230,10 @@ static void yield_between(const BodiesModel& model, BodiesScratch& k) {
 }
 
 // [m/s] of a needle if it moves on as before. Its rows of the last step do not tell: one of them may be gone, as where the
-// swage has passed a point of its channel, and the others would throw it aside.
+// swage has passed a point of its channel, and the others would throw it aside. One that is held in its place on the drape does
+// not fall: with the weight that the spring between them adds, it bounced there.
 static Vec3 coasting(const BodiesModel& model, const Body& needle, const BodiesScratch::Moving& moving, float h) {
-  return moving.loose ? needle.velocity + model.gravity * h : needle.velocity;
+  return moving.loose && !moving.held ? needle.velocity + model.gravity * h : needle.velocity;
 }
 
 void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* drape, float h, BodiesScratch& k) {

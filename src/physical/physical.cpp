@@ -121,6 +121,18 @@ bool before_its_hole(const Model& m, const State& s, uint32_t node) {
   return false;
 }
 
+constexpr float kCloseBy = 0.6e-3f;  // [m] beyond what can touch within a step: then a node's close faces are listed again
+
+// [m] by which a node and the wall may have come nearer since its close faces were listed.
+float way_since(const SurfaceSearch& k, uint32_t node, Vec3 p) {
+  return static_cast<float>(k.moved - k.close[node].moved) + distance(p, k.close[node].node);
+}
+// All faces near a node that may be nearer to it than `reach` [m]; more, where the close ones are not known.
+std::span<const uint32_t> faces_of(const SurfaceSearch& k, uint32_t node, Vec3 p, float reach) {
+  if (k.close[node].within - way_since(k, node, p) >= reach) return {&k.close_face[kClose * node], k.close[node].count};
+  return std::span(k.node_face).subspan(k.node_first[node], k.node_first[node + 1] - k.node_first[node]);
+}
+
 // Nodes near the surface: each gets the nearest point of the wall, on the side where it was. Neighbors share a point of the
 // coupling, because every point answers every other.
 void find_contacts(const Model& m, const State& s, Scratch& k) {
@@ -189,19 +201,30 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
     };
     const uint32_t known = memory && memory->patch < surface.patch.size() ? memory->patch : wall::kNone;
     if (known != wall::kNone) look(known);  // most likely still the nearest: the others need not be searched
-    for (uint32_t f = k.search.node_first[i]; f < k.search.node_first[i + 1]; ++f) {
-      const uint32_t face = k.search.node_face[f];
+    // A node with a memory may be deep inside; another one counts only where it can touch within the step.
+    const float fastest = memory ? 2 * k.search.margin : r + far_move + 1.5f * h * k.search.speed;
+    const std::span<const uint32_t> faces =
+        faces_of(k.search, i, p, std::max(r + far_move, std::min(fastest, std::abs(best.gap) + 1e-6f)));
+    SurfaceSearch::Close& close = k.search.close[i];
+    const bool all = faces.size() == k.search.node_first[i + 1] - k.search.node_first[i];
+    if (all) close = {p, k.search.moved, r + far_move + kCloseBy, 0};
+    else nearest_box = close.within - way_since(k.search, i, p);
+    for (const uint32_t face : faces) {
       const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
-      // A node with a memory may be deep inside; another one counts only where it can touch within the step.
       const float reach = memory ? 2 * k.search.margin : r + far_move + 1.5f * h * box.speed;
       const float far = least_distance(box, p, 0);
       nearest_box = std::min(nearest_box, far);
+      if (all && far < close.within) {
+        if (close.count < kClose) k.search.close_face[kClose * i + close.count] = face;
+        ++close.count;
+      }
       if (far > std::min(reach, std::abs(best.gap) + 1e-6f)) continue;
       for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q)
         if (q != known &&
             least_distance(m.wall, s.wall, surface, k.search, box, q, p) <= std::min(reach, std::abs(best.gap) + 1e-6f))
           look(q);
     }
+    if (all && close.count > kClose) close.within = 0;
     constexpr float kSpare = 0.2e-3f;  // [m]
     k.search.node_seen[i] = p;
     k.search.node_due[i] = k.search.moved + static_cast<double>(nearest_box - r - far_move - kSpare);
@@ -226,8 +249,7 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       const auto like = [&](Vec3 normal) {
         return dot(normal, best.normal) >= 0.95f || (other == &third && dot(normal, second.normal) >= 0.95f);
       };
-      for (uint32_t f = k.search.node_first[i]; f < k.search.node_first[i + 1]; ++f) {
-        const uint32_t face = k.search.node_face[f];
+      for (const uint32_t face : faces) {
         const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
         if (least_distance(box, p, 0) > other->gap) continue;
         for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
@@ -384,7 +406,7 @@ void step_thread(const Model& m, State& s, Scratch& k, const Hands& hands) {
     for (size_t i = 0; i < awake.hold.size(); ++i) k.holds[awake.hold_of[i]].force = awake.hold[i].force;
   }
   if (some_asleep) hold_asleep(s.sleep, k.holds, k.bodies.tool);
-  const bool quiet = find_quiet(m, s, hands, awake);
+  const bool quiet = find_quiet(m, s, hands, k.holds, k.bodies.tool, awake);
   k.coupling.end(s.wall, k.wall);
   if (quiet) fall_asleep(m, s, k.coupling, k.wall, awake, k.contact, k.holds, k.bodies.tool);
   if (m.tear.on && m.surface_contact) {
@@ -430,7 +452,7 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
     k.holds.insert(k.holds.end(), k.bodies.hold.begin(), k.bodies.hold.end());
   }
   wake_strands(m, s, hands, k.holds, k.bodies.tool, k.search.moved, k.awake);
-  press_asleep(s.sleep, s.wall, k.wall);
+  press_asleep(s.sleep, k.awake, s.wall, k.wall);
   if (s.sleep.all()) hold_asleep(s.sleep, k.holds, k.bodies.tool);
   else step_thread(m, s, k, hands);
   for (size_t i = 0; i < k.holds.size(); ++i)

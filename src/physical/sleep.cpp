@@ -4,14 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "physical/carry.h"
 #include "physical/physical.h"
 
 namespace catgut::physical {
 namespace {
 
 constexpr float kMargin = 0.6e-3f;    // [m] a tool that moves wakes a thread that it may touch within this distance
-constexpr float kQuietSpeed = 2e-3f;  // [m/s] at the end of the window: a swing that returns is not rest
+constexpr float kQuietSpeed = 5e-3f;  // [m/s] when it is looked at: a swing that returns is not rest
+constexpr uint32_t kLook = 50;        // [steps] after which it is looked at again within its window
 constexpr float kSettled = 0.1e-3f;   // [m] in a window: rest of a strand that carries nothing
 constexpr float kAway = 12e-3f;       // [m] corners of a face that the thread may touch are nearer than this
 constexpr size_t kBlock = 8;          // nodes that share a bound
@@ -35,17 +38,6 @@ bool any_block(const thread::State& t, const Sleep::Strand& strand, Visit visit)
     if (visit(first, last, reach)) return true;
   }
   return false;
-}
-
-bool touches(const thread::State& t, const Sleep::Strand& strand, Vec3 a, Vec3 b, float reach) {
-  return any_block(t, strand, [&](size_t first, size_t last, float around) {
-    if (to_segment(t.x.at(first), a, b) > around + reach) return false;
-    for (size_t i = first; i <= last; ++i) {
-      const float half = 0.55f * std::max(i < t.segments() ? t.rest[i] : 0.0f, i > 0 ? t.rest[i - 1] : 0.0f);
-      if (to_segment(t.x.at(i), a, b) < half + reach) return true;
-    }
-    return false;
-  });
 }
 
 // Half a segment beside a node: nothing of the strand is farther from its nearest node.
@@ -104,6 +96,7 @@ void forget(Entries& entries, uint32_t strand) {
   std::erase_if(entries, [&](const auto& e) { return e.strand == strand; });
 }
 
+constexpr float kPart = 0.03f;     // of its distance from the strand, by which such a column may move
 constexpr float kWatched = 5e-3f;  // [m] beyond kAway: columns nearer than that are watched one by one
 
 // How far [m] a column is from being near a strand.
@@ -117,15 +110,16 @@ float away_from(const State& s, const Sleep::Strand& strand, uint32_t column) {
   return far - kAway;
 }
 
-void wake_one(State& s, uint32_t strand) {
+void wake_one(const Model& m, State& s, uint32_t strand) {
   Sleep& z = s.sleep;
+  if (is_carried(s, strand)) turn_memory(s, strand, carry_of(m.sleep, z, s.wall, strand));
   if (z.strand[strand].asleep) s.thread.travel = std::max(s.thread.travel, 1.0f);  // its pairs are listed again
   z.strand[strand].asleep = false, z.strand[strand].quiet = 0;
   forget(z.load, strand), forget(z.watched, strand), forget(z.held, strand), forget(z.touched, strand);
 }
 
 // The strands of the thread. Those that are what they were sleep on.
-void list_strands(State& s) {
+void list_strands(const Model& m, State& s) {
   Sleep& z = s.sleep;
   const thread::State& t = s.thread;
   const uint32_t n = static_cast<uint32_t>(t.nodes());
@@ -138,7 +132,7 @@ void list_strands(State& s) {
     ++k, first = i + 1;
   }
   if (same && k == z.strand.size()) return;
-  wake(s);
+  wake(m, s);
   z.strand.clear(), first = 0;
   for (uint32_t i = 0; i < n; ++i) {
     if (i + 1 < n && !t.broken[i]) continue;
@@ -154,8 +148,62 @@ void note_wall(const Model& m, State& s, uint32_t strand) {
   for (uint32_t c = 0; c < wall::columns(s.wall); ++c) {
     const float far = away_from(s, z.strand[strand], c);
     if (far > kWatched) continue;
-    z.watched.push_back({strand, c, mid(s.wall, c), director(s.wall, c), std::max(m.sleep.nearby, 0.3f * far)});
+    z.watched.push_back(
+        {strand, c, mid(s.wall, c), director(s.wall, c), std::max({m.sleep.nearby, kPart * (far + kAway), 0.3f * far})});
   }
+}
+
+// [m/s] of the wall at a strand's holes.
+Vec3 wall_speed(const State& s, uint32_t strand) {
+  Vec3 sum{};
+  float count = 0;
+  for (const Sleep::Watched& w : s.sleep.watched)
+    if (w.strand == strand) sum += wall::vec3(s.wall.motion.v[2 * w.column]), ++count;
+  return count > 0 ? sum / count : Vec3{};
+}
+
+// The columns of a strand's holes, at the beginning of its window.
+void note_holes(const Model& m, State& s, uint32_t strand) {
+  Sleep& z = s.sleep;
+  forget(z.watched, strand);
+  for (const thread::Eyelet& e : s.thread.eyelet) {
+    if (e.segment < z.strand[strand].first || e.segment >= z.strand[strand].last) continue;
+    const wall::Weights w = wall::weights(m.wall, s.wall.topology, s.hole[e.point].place);
+    for (const uint32_t c : w.column)
+      if (z.watched.size() < z.watched.capacity()) z.watched.push_back({strand, c, mid(s.wall, c), director(s.wall, c), 0});
+  }
+}
+
+// The nodes of a strand between its tails: those that touch thread, and those in holes.
+std::pair<size_t, size_t> without_tails(const thread::State& t, const Sleep::Strand& strand) {
+  size_t low = strand.last, high = strand.first;
+  const auto take = [&](size_t segment) {
+    if (segment >= strand.first && segment < strand.last) low = std::min(low, segment), high = std::max(high, segment + 1);
+  };
+  for (const thread::Eyelet& e : t.eyelet) take(e.segment);
+  for (size_t i = 0; i < t.key.size(); ++i) {
+    if (t.crossing[i].normal_impulse <= 0) continue;
+    take(thread::segment_of(t.key[i]));
+    if (thread::partner_of(t.key[i]) < thread::kTool) take(thread::partner_of(t.key[i]));
+  }
+  return {low, high};
+}
+
+// Whether a strand has been quiet for its window, beside what a motion of the wall has done to it.
+bool is_quiet(const Model& m, const State& s, uint32_t k, const Carry& by) {
+  const Sleep& z = s.sleep;
+  const thread::State& t = s.thread;
+  const Sleep::Strand& strand = z.strand[k];
+  const float still = carries_nothing(m, t, strand) ? kSettled : m.sleep.still + by.strain;
+  const Vec3 speed = by.moves() ? wall_speed(s, k) : Vec3{};
+  const auto [low, high] = without_tails(t, strand);
+  for (size_t i = strand.first; i <= strand.last; ++i) {
+    const float most = i < low || i > high ? kSettled : still;
+    if (length2(t.position(i) - by.place(z.from[i])) > most * most || length(t.v.at(i) - speed) >= kQuietSpeed) return false;
+  }
+  for (size_t i = strand.first; i < strand.last; ++i)
+    if (std::abs(t.tension[i] - z.tension[i]) > m.sleep.steady + 0.05f * std::abs(z.tension[i])) return false;
+  return true;
 }
 
 bool sleeps_on(const Model& m, const State& s, uint32_t strand, std::span<const thread::Hold> holds,
@@ -221,6 +269,17 @@ void each_node_column(thread::State& to, const thread::State& from, Visit visit)
 
 }  // namespace
 
+bool touches(const thread::State& t, const Sleep::Strand& strand, Vec3 a, Vec3 b, float reach) {
+  return any_block(t, strand, [&](size_t first, size_t last, float around) {
+    if (to_segment(t.x.at(first), a, b) > around + reach) return false;
+    for (size_t i = first; i <= last; ++i) {
+      const float half = 0.55f * std::max(i < t.segments() ? t.rest[i] : 0.0f, i > 0 ? t.rest[i - 1] : 0.0f);
+      if (to_segment(t.x.at(i), a, b) < half + reach) return true;
+    }
+    return false;
+  });
+}
+
 bool Sleep::any() const {
   return std::any_of(strand.begin(), strand.end(), [](const Strand& k) { return k.asleep; });
 }
@@ -241,7 +300,7 @@ void AwakeThread::reserve(const State& s) {
   point_of.reserve(thread::kMaxEyelets), hole_of.reserve(thread::kMaxEyelets), impulse.reserve(thread::kMaxEyelets);
   key.reserve(2 * pairs), budget.reserve(2 * pairs), crossing.reserve(2 * pairs), eyelet.reserve(thread::kMaxEyelets);
   contact.reserve(2 * thread::kMaxSoftPoints), ready.reserve(nodes), disturbed.reserve(nodes), box.reserve(nodes),
-      far_due.reserve(nodes);
+      carry.reserve(nodes), far_due.reserve(nodes);
 }
 
 void reserve(const State& s, Sleep& z) {
@@ -250,8 +309,10 @@ void reserve(const State& s, Sleep& z) {
   z.load.reserve(4 * columns + 64), z.watched.reserve(16 * columns + 64), z.held.reserve(256), z.touched.reserve(1024);
 }
 
-void wake(State& s) {
+void wake(const Model& m, State& s) {
   Sleep& z = s.sleep;
+  for (uint32_t k = 0; k < z.strand.size(); ++k)
+    if (is_carried(s, k)) turn_memory(s, k, carry_of(m.sleep, z, s.wall, k));
   if (z.any()) s.thread.travel = std::max(s.thread.travel, 1.0f);  // its pairs are listed again
   for (Sleep::Strand& k : z.strand) k.asleep = false, k.quiet = 0;
   z.load.clear(), z.watched.clear(), z.held.clear(), z.touched.clear();
@@ -261,24 +322,41 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
                   std::span<const thread::ToolCapsule> tools, double wall_moved, AwakeThread& awake) {
   Sleep& z = s.sleep;
   const uint32_t holes = static_cast<uint32_t>(s.thread.eyelet.size());
-  list_strands(s);
+  list_strands(m, s);
   // Pulled, cut, laced, or a tool was put elsewhere.
-  if (!m.sleep.on || !hands.pulls.empty() || s.thread.travel > 1e8f || holes != z.holes) wake(s);
+  if (!m.sleep.on || !hands.pulls.empty() || s.thread.travel > 1e8f || holes != z.holes) wake(m, s);
   z.holes = holes;
   if (!z.any()) return;
   const uint32_t n = static_cast<uint32_t>(z.strand.size());
   if (awake.far_due.size() != n) awake.far_due.assign(n, -1);
-  awake.box.resize(n);
+  awake.box.resize(n), awake.carry.assign(n, {});
+  for (uint32_t k = 0; k < n; ++k) {
+    if (!is_carried(s, k)) continue;
+    awake.carry[k] = carry_of(m.sleep, z, s.wall, k);
+    carry(m, s, k, awake.carry[k]);
+  }
   for (uint32_t k = 0; k < n; ++k) awake.box[k] = box_of(s.thread, z.strand[k]);
   awake.disturbed.assign(n, 0);
   for (const Sleep::Watched& w : z.watched) {
-    const float most2 = w.may_move * w.may_move;
-    if (w.column >= wall::columns(s.wall) || length2(mid(s.wall, w.column) - w.mid) > most2 ||
-        length2(director(s.wall, w.column) - w.director) > most2)
+    const Carry& by = awake.carry[w.strand];
+    const bool loads = by.moves() && w.may_move < m.sleep.nearby;
+    const float most = loads ? m.sleep.strain : w.may_move, most2 = most * most;
+    if (w.column >= wall::columns(s.wall) || length2(mid(s.wall, w.column) - by.place(w.mid)) > most2 ||
+        length2(director(s.wall, w.column) - rotate(by.turn, w.director)) > most2)
       awake.disturbed[w.strand] = 1;
   }
+  // Of two that sleep beside each other the walls have moved differently.
+  for (uint32_t a = 0; a < n; ++a)
+    for (uint32_t b = 0; b < a; ++b) {
+      const Carry &by_a = awake.carry[a], &by_b = awake.carry[b];
+      if (!z.strand[a].asleep || !z.strand[b].asleep || (!by_a.moves() && !by_b.moves())) continue;
+      if (apart(awake.box[a], awake.box[b], m.thread.material.diameter + kMargin)) continue;
+      const Vec3 at = 0.5f * (awake.box[a].low + awake.box[a].high);
+      if (length2(by_a.before(at) - by_b.before(at)) > m.sleep.nearby * m.sleep.nearby)
+        awake.disturbed[a] = awake.disturbed[b] = 1;
+    }
   for (uint32_t k = 0; k < n; ++k)
-    if (z.strand[k].asleep && !sleeps_on(m, s, k, holds, tools, wall_moved, awake)) wake_one(s, k);
+    if (z.strand[k].asleep && !sleeps_on(m, s, k, holds, tools, wall_moved, awake)) wake_one(m, s, k);
   for (bool more = true; more;) {
     more = false;
     for (uint32_t a = 0; a < n; ++a) {
@@ -286,20 +364,21 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
       const float reach = strand_reach(m, s, z.strand[a]);
       for (uint32_t b = 0; b < n; ++b) {
         if (!z.strand[b].asleep || apart(awake.box[a], awake.box[b], reach)) continue;
-        if (near(s.thread, z.strand[a], z.strand[b], reach)) wake_one(s, b), more = true;
+        if (near(s.thread, z.strand[a], z.strand[b], reach)) wake_one(m, s, b), more = true;
       }
     }
   }
   // A piece that broke off may be too short for a thread (thread::make_state): it takes others along.
   uint32_t nodes = 0;
   for (const Sleep::Strand& k : z.strand) nodes += k.asleep ? 0 : k.last - k.first + 1;
-  if (nodes > 0 && nodes < thread::kLeastNodes) wake(s);
+  if (nodes > 0 && nodes < thread::kLeastNodes) wake(m, s);
 }
 
-void press_asleep(const Sleep& z, wall::State& wall, wall::Scratch& k) {
+void press_asleep(const Sleep& z, const AwakeThread& awake, wall::State& wall, wall::Scratch& k) {
   if (z.load.empty()) return;
   std::fill(k.external.begin(), k.external.end(), wall::Float4{});
-  for (const Sleep::Load& load : z.load) k.external[load.at] = wall::float4(wall::vec3(k.external[load.at]) + load.impulse);
+  for (const Sleep::Load& load : z.load)
+    k.external[load.at] = wall::float4(wall::vec3(k.external[load.at]) + rotate(awake.carry[load.strand].turn, load.impulse));
   wall::apply_impulses(wall, k, k.external);
   std::fill(k.external.begin(), k.external.end(), wall::Float4{});
 }
@@ -391,7 +470,8 @@ void scatter(State& s, AwakeThread& k) {
   t.travel = p.travel, t.overflow = p.overflow, t.refreshes = p.refreshes;
 }
 
-bool find_quiet(const Model& m, State& s, const Hands& hands, AwakeThread& awake) {
+bool find_quiet(const Model& m, State& s, const Hands& hands, std::span<const thread::Hold> holds,
+                std::span<const thread::ToolCapsule> tools, AwakeThread& awake) {
   Sleep& z = s.sleep;
   const thread::State& t = s.thread;
   awake.ready.assign(z.strand.size(), 0);
@@ -405,18 +485,17 @@ bool find_quiet(const Model& m, State& s, const Hands& hands, AwakeThread& awake
       continue;
     }
     const bool begun = strand.quiet > 0;
-    if (begun && ++strand.quiet <= m.sleep.window) continue;
-    bool quiet = begun;
-    const float still = carries_nothing(m, t, strand) ? kSettled : m.sleep.still;
-    for (size_t i = strand.first; i <= strand.last && quiet; ++i)
-      quiet = length2(t.position(i) - z.from[i]) <= still * still && length(t.v.at(i)) < kQuietSpeed;
-    for (size_t i = strand.first; i < strand.last && quiet; ++i)
-      quiet = std::abs(t.tension[i] - z.tension[i]) <= m.sleep.steady + 0.01f * std::abs(z.tension[i]);
+    if (begun && ++strand.quiet <= m.sleep.window && strand.quiet % kLook != 0) continue;
+    bool quiet = begun && is_quiet(m, s, k, {});
+    if (begun && !quiet && only_in_wall(m, s, strand, holds, tools, hands.plane))
+      if (const Carry by = carry_of(m.sleep, z, s.wall, k); by.strain <= m.sleep.strain) quiet = is_quiet(m, s, k, by);
+    if (quiet && strand.quiet <= m.sleep.window) continue;
     awake.ready[k] = quiet, any |= quiet;
     if (quiet) continue;
     strand.quiet = 1;  // a new window
     for (size_t i = strand.first; i <= strand.last; ++i) z.from[i] = t.position(i);
     for (size_t i = strand.first; i < strand.last; ++i) z.tension[i] = t.tension[i];
+    note_holes(m, s, k);
   }
   // A strand beside one that moves waits for it.
   for (bool more = any; more;) {
@@ -433,9 +512,11 @@ bool find_quiet(const Model& m, State& s, const Hands& hands, AwakeThread& awake
 
 void after_cut(const Model& m, State& s) {
   Sleep& z = s.sleep;
-  if (!z.load.empty()) wake(s);
-  for (uint32_t k = 0; k < z.strand.size(); ++k)
-    if (z.strand[k].asleep) note_wall(m, s, k);  // columns may have other numbers now
+  if (!z.load.empty()) wake(m, s);
+  for (uint32_t k = 0; k < z.strand.size(); ++k) {  // columns may have other numbers now
+    if (z.strand[k].asleep) note_wall(m, s, k);
+    else forget(z.watched, k), z.strand[k].quiet = 0;
+  }
 }
 
 void fall_asleep(const Model& m, State& s, wall::Coupling& coupling, wall::Scratch& k, AwakeThread& awake,
@@ -455,8 +536,10 @@ void fall_asleep(const Model& m, State& s, wall::Coupling& coupling, wall::Scrat
     me.asleep = true;
     if (strand < awake.far_due.size()) awake.far_due[strand] = -1;
     const auto has = [&](uint32_t node) { return node >= me.first && node <= me.last; };
+    forget(z.watched, strand);
     const size_t noted = z.watched.size();
     note_wall(m, s, strand);
+    for (size_t i = me.first; i <= me.last; ++i) z.from[i] = t.position(i);
     // Its own impulses.
     awake.impulse.assign(coupling.impulse.begin(), coupling.impulse.end());
     std::fill(coupling.impulse.begin(), coupling.impulse.end(), Vec3{});

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // physical/sleep: a strand of the thread (between broken segments) that has been quiet is not stepped any more. It keeps its
 // shape and tension, and its forces on the wall, on holds and on tools stay what they were. It wakes when the wall near it, a
-// hold, a tool or an awake strand moves there, when a hole is added, or when thread is cut. While some strands sleep, the
-// others are gathered into a thread of their own for the step. Reads wall, holds and tools of a step; writes State::sleep.
+// hold, a tool or an awake strand moves there, when a hole is added, or when thread is cut. A strand that only the wall holds
+// is carried along (physical/carry), and wakes when the wall there is strained. While some strands sleep, the others are
+// gathered into a thread of their own for the step. Reads wall, holds and tools of a step; writes State::sleep.
 // docs/physical.md, "Cost".
 #pragma once
 #include <cstdint>
@@ -22,10 +23,11 @@ struct Hands;
 struct SleepModel {
   bool on = true;
   uint32_t window = 250;  // steps
-  float still = 1e-6f;    // [m] no node is farther from where it was at the beginning of the window
-  float steady = 5e-3f;   // [N] no tension has changed by more, plus a hundredth of it
+  float still = 2e-6f;    // [m] no node is farther from where it was at the beginning of the window
+  float steady = 10e-3f;  // [N] no tension has changed by more, plus a twentieth of it
   float touched = 2e-6f;  // [m] motion of a hold, a tool or a loaded column that wakes the strand
   float nearby = 50e-6f;  // [m] the same for a column near the strand that it does not load
+  float strain = 20e-6f;  // [m] of a strand that is carried: a loaded column leaves the rigid motion by more
 };
 
 struct Sleep {
@@ -36,17 +38,18 @@ struct Sleep {
   };
   std::vector<Strand> strand;  // all of the thread, in order
   uint32_t holes = 0;          // of the thread, when the strands were listed
-  std::vector<Vec3> from;      // [m] per node, at the beginning of its strand's window
+  std::vector<Vec3> from;      // [m] per node, at the beginning of its strand's window; asleep: when it fell asleep
   std::vector<float> tension;  // [N] per segment, likewise
   // Of sleeping strands, each with the number of its strand.
   struct Load {
     uint32_t strand = 0, at = 0;  // 2 * column: its mid-surface point; + 1: its director
     Vec3 impulse;                 // [N s] of every step
   };
+  // Also of strands that are awake, but have been quiet: the columns of their holes, at the beginning of the window.
   struct Watched {
     uint32_t strand = 0, column = 0;
     Vec3 mid, director;  // [m] when the strand fell asleep
-    float may_move = 0;  // [m] by which it may have moved since
+    float may_move = 0;  // [m] by which it may have moved since; less than SleepModel::nearby: the strand loads it
   };
   struct Held {
     uint32_t strand = 0, node = 0;
@@ -66,6 +69,16 @@ struct Sleep {
   bool at(uint32_t node) const;  // whether the node's strand sleeps
 };
 
+// How the wall under a strand has moved since a moment that Sleep::watched remembers.
+struct Carry {
+  Vec3 from, to;  // [m] middle of the columns that the strand loads
+  Quat turn;
+  float strain = 0;  // [m] largest distance of such a column from where the rigid motion takes it
+  bool moves() const { return !(to == from) || !(turn == Quat{}); }
+  Vec3 place(Vec3 p) const { return to + rotate(turn, p - from); }
+  Vec3 before(Vec3 p) const { return from + rotate(conjugate(turn), p - to); }
+};
+
 // Workspace: the awake strands as a thread of their own.
 struct AwakeThread {
   thread::State part;
@@ -83,6 +96,7 @@ struct AwakeThread {
   std::vector<thread::SoftContact> contact;
   std::vector<Vec3> impulse;              // [N s] per hole
   std::vector<uint8_t> ready, disturbed;  // per strand: it may sleep; the wall has moved under it
+  std::vector<Carry> carry;               // per strand that sleeps: what the wall has done since
   struct Box {
     Vec3 low, high;  // [m]
   };
@@ -91,16 +105,19 @@ struct AwakeThread {
   void reserve(const State& state);
 };
 
+// Whether the strand may be nearer than `reach` [m] to the line from a to b.
+bool touches(const thread::State& thread, const Sleep::Strand& strand, Vec3 a, Vec3 b, float reach);
+
 // Room for everything, so that no step allocates.
 void reserve(const State& state, Sleep& sleep);
-void wake(State& state);
+void wake(const Model& model, State& state);
 // The wall has been cut: a strand that presses on nothing sleeps on.
 void after_cut(const Model& model, State& state);
 // At the beginning of a step: lists the strands again after a cut, and wakes those that no longer can sleep.
 void wake_strands(const Model& model, State& state, const Hands& hands, std::span<const thread::Hold> holds,
                   std::span<const thread::ToolCapsule> tools, double wall_moved, AwakeThread& awake);
 // What sleeping strands do in a step: impulses on the wall, before the others are stepped; forces of holds and tools, after it.
-void press_asleep(const Sleep& sleep, wall::State& wall, wall::Scratch& scratch);
+void press_asleep(const Sleep& sleep, const AwakeThread& awake, wall::State& wall, wall::Scratch& scratch);
 void hold_asleep(const Sleep& sleep, std::span<thread::Hold> holds, std::span<thread::ToolCapsule> tools);
 // Strands that are awake, out of the thread and back into it; and what acts on them, by the part's numbers.
 void gather(const State& state, AwakeThread& awake);
@@ -108,7 +125,8 @@ void show_awake(std::span<const thread::Hold> holds, std::span<const thread::Pul
                 std::span<thread::SoftContact> contacts, AwakeThread& awake);
 void scatter(State& state, AwakeThread& awake);
 // After the step of the thread. Which strands have been quiet for their whole window, as have all those near them.
-bool find_quiet(const Model& model, State& state, const Hands& hands, AwakeThread& awake);
+bool find_quiet(const Model& model, State& state, const Hands& hands, std::span<const thread::Hold> holds,
+                std::span<const thread::ToolCapsule> tools, AwakeThread& awake);
 // Those fall asleep. coupling: of this step, after its `end`; hole_of: holes of its first points; contacts: with their points.
 void fall_asleep(const Model& model, State& state, wall::Coupling& coupling, wall::Scratch& scratch, AwakeThread& awake,
                  std::span<const thread::SoftContact> contacts, std::span<const thread::Hold> holds,

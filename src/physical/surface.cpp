@@ -357,7 +357,7 @@ void SurfaceSearch::reserve(const wall::Model& m, const wall::State& s, size_t n
   column_first.reserve(2 * columns + 1), column_face.reserve(64 * columns);
   box.resize(faces);
   lip_patch.reserve(6 * columns), seen.reserve(2 * columns), column_due.reserve(2 * columns), node_due.reserve(nodes),
-      node_seen.reserve(nodes);
+      node_seen.reserve(nodes), close.reserve(nodes), close_face.reserve(kClose * nodes);
 }
 
 namespace {
@@ -463,6 +463,7 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
   for (size_t i = 0; i < nodes && !stale; ++i) stale = length2(thread.x.at(i) - k.node_listed[i]) > limit2;
   if (!stale) return;
   k.node_due.assign(nodes, 0), k.node_seen.assign(nodes, {});
+  k.close.assign(nodes, {}), k.close_face.resize(kClose * nodes);
   k.node_listed.resize(nodes), k.center.resize(faces), k.radius.resize(faces);
   for (size_t i = 0; i < nodes; ++i) k.node_listed[i] = thread.x.at(i);
   for (uint32_t f = 0; f < faces; ++f) {

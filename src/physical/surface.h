@@ -81,6 +81,7 @@ struct PatchBox {
 };
 PatchBox patch_box(const wall::Model& model, const wall::State& state, const Patch& patch);
 
+constexpr size_t kClose = 24;
 // Which faces are near which nodes and columns. Lists are kept until something has moved half their margin.
 struct SurfaceSearch {
   float margin = 2e-3f;  // [m]
@@ -101,6 +102,15 @@ struct SurfaceSearch {
   std::vector<double> column_due;  // per column: `moved` at which its lips are searched again
   std::vector<double> node_due;    // per node: the same, less the node's own motion
   std::vector<Vec3> node_seen;     // [m] per node: where it was when it was searched
+  // Of a node's faces those that were within `close`; kClose per node. The others are farther until node and wall have moved.
+  struct Close {
+    Vec3 node;         // [m] then
+    double moved = 0;  // then
+    float within = 0;  // [m]; 0: not known
+    uint32_t count = 0;
+  };
+  std::vector<Close> close;
+  std::vector<uint32_t> close_face;
   void reserve(const wall::Model& model, const wall::State& state, size_t nodes);
 };
 const FaceBox& box_of(const wall::Model& model, const wall::State& state, SurfaceSearch& search, uint32_t face);

@@ -251,7 +251,7 @@ bool physical_fits(const Model& model, const PhysicalState& state) {
   for (const physical::Sleep::Load& load : z.load)
     if (!sleeps(load.strand) || load.at >= 2 * columns) return false;
   for (const physical::Sleep::Watched& w : z.watched)
-    if (!sleeps(w.strand) || w.column >= columns) return false;
+    if (w.strand >= z.strand.size() || w.column >= columns) return false;
   for (const physical::Sleep::Held& h : z.held)
     if (!sleeps(h.strand) || h.node >= nodes) return false;
   for (const physical::Sleep::Touched& c : z.touched)

@@ -75,7 +75,8 @@ bool Scripted::leave(const Snapshot& seen) {
                                    [](uint8_t c) { return c != 0; });
       const float drape = picture_.drape + kOverDrape;
       down.y = off ? drape : std::max(down.y, drape);
-      const float gently = std::clamp(1 - 4 * needle_tension(seen), 0.0f, 1.0f);
+      // Slowly with a loose end behind the needle: where the hand stops, it would fly past and catch on the jaws.
+      const float gently = (off ? 0.5f : 1.0f) * std::clamp(1 - 4 * needle_tension(seen), 0.0f, 1.0f);
       const bool there = carry_swage(seen, down, std::max(1e-3f, gently * skill_.speed));
       if (there || needle_tension(seen) > kTautStrand || !patience(4)) go(open);
       return false;

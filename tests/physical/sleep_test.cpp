@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <vector>
 
+#include "physical/carry.h"
 #include "physical/physical.h"
 #include "validation/suture_scenes.h"
 
@@ -321,6 +323,114 @@ TEST(Sleep, a_strand_that_is_drawn_across_a_sleeping_one_takes_it_along) {
   std::printf("moved %.2f mm, difference %.3f mm\n", 1e3 * static_cast<double>(moved), 1e3 * static_cast<double>(apart));
   EXPECT_GT(moved, 1e-3f);
   EXPECT_LT(apart, 0.05f * moved);
+}
+
+// A strand through four holes near the free end of a sheet that is held at its other end. Its ends hang free.
+struct OnATongue {
+  Sewn s;
+  uint32_t tip = 0;  // column in the middle of the free edge
+  explicit OnATongue(bool sleep) {
+    wall::SheetShape shape;
+    shape.width = 0.05f, shape.height = 0.02f, shape.columns = 21, shape.rows = 9;
+    wall::Spec spec;
+    spec.mesh = wall::sheet(shape);
+    for (size_t c = 0; c < spec.mesh.held.size(); ++c) spec.mesh.held[c] = spec.mesh.outer[c].x < 1e-4f;
+    spec.drag = 20;
+    const wall::Wall w = wall::build_wall(spec);
+    s.model = make_model(w, validation::knot_settings(0.3f));
+    s.model.thread.hole_grip = 0.02f;  // as in scenes: slack thread stays in its holes
+    s.model.sleep.on = sleep;
+    s.state.wall = w.state;
+    std::vector<Vec3> path, stop;
+    std::vector<int32_t> hole;
+    for (const auto& [x, zeta] : {std::pair{0.038f, 1.0f}, {0.038f, -1.0f}, {0.046f, -1.0f}, {0.046f, 1.0f}}) {
+      Hole h = validation::hole_at(w, {x, 0.0101f, 0.00125f * zeta}, zeta);
+      h.within = (x < 0.04f) == (zeta > 0);
+      stop.push_back(mouth(s.model, s.state, h)), s.state.hole.push_back(h);
+    }
+    stop.insert(stop.begin(), stop[0] + Vec3{-0.002f, 0, 0.008f}), stop.push_back(stop.back() + Vec3{0.002f, 0, 0.008f});
+    for (size_t i = 0; i + 1 < stop.size(); ++i) {
+      const int parts = std::max(3, static_cast<int>(distance(stop[i], stop[i + 1]) / 0.5e-3f));
+      for (int n = i == 0 ? 0 : 1; n < parts; ++n)
+        path.push_back(lerp(stop[i], stop[i + 1], static_cast<float>(n) / static_cast<float>(parts))), hole.push_back(-1);
+      path.push_back(stop[i + 1]), hole.push_back(i + 2 < stop.size() ? static_cast<int32_t>(i) : -1);
+    }
+    s.state.thread = thread::make_laced_state(path, hole, 0.15f);
+    s.start();
+    s.hold.clear();
+    for (uint32_t c = 0; c < spec.mesh.outer.size(); ++c)
+      if (distance(spec.mesh.outer[c], {0.05f, 0.01f, 0}) < distance(spec.mesh.outer[tip], {0.05f, 0.01f, 0})) tip = c;
+  }
+  void pull(Vec3 force) { s.wall_pull = {{wall::at_column(tip, 0), force}}; }
+  Vec3 node(size_t i) const { return s.state.thread.position(i); }
+};
+
+// It rides on the tongue while it sleeps, as if it were awake, and a copy does so to the bit.
+TEST(Sleep, a_strand_that_sleeps_in_its_wall_is_carried_along) {
+  OnATongue asleep(true), awake(false);
+  for (OnATongue* t : {&asleep, &awake}) t->s.run(2);
+  ASSERT_TRUE(asleep.s.state.sleep.all());
+  const Vec3 start = asleep.node(0);
+  int slept = 0;
+  for (int i = 1; i <= 100; ++i) {  // slowly: thread that is awake has a drag
+    for (OnATongue* t : {&asleep, &awake}) t->pull({0, 0, 1.2e-5f * static_cast<float>(i)}), t->s.run(0.08f);
+    slept += asleep.s.state.sleep.all();
+  }
+  EXPECT_EQ(slept, 100);
+  OnATongue copy(true);
+  copy.s.state = asleep.s.state, copy.s.scratch = std::make_unique<Scratch>(copy.s.model, copy.s.state);
+  copy.s.jobs = std::make_unique<Jobs>(2), copy.s.wall_pull = asleep.s.wall_pull;
+  for (OnATongue* t : {&asleep, &awake, &copy}) t->s.run(0.5f);
+  EXPECT_EQ(hash_state(asleep.s.state), hash_state(copy.s.state));
+  const float way = distance(asleep.node(0), start);
+  float apart = 0;
+  // Between the holes. Tails that are awake do not turn with the wall at once: they lag by 1.6 mm, because of their drag.
+  const std::vector<thread::Eyelet>& hole = asleep.s.state.thread.eyelet;
+  for (size_t i = hole.front().segment + 1; i <= hole.back().segment; ++i)
+    apart = std::max(apart, distance(asleep.node(i), awake.node(i)));
+  std::printf("carried by %.2f mm, at most %.0f um from where it is awake\n", 1e3 * static_cast<double>(way),
+              1e6 * static_cast<double>(apart));
+  EXPECT_GT(way, 1e-3f);
+  EXPECT_LT(apart, 0.05f * way);
+  // It wakes where the wall is strained beside it, or a hand comes.
+  asleep.s.hold.resize(1);
+  asleep.s.hold[0].node = 0, asleep.s.hold[0].from = asleep.s.hold[0].to = asleep.node(0), asleep.s.hold[0].stiffness = 100;
+  asleep.s.run(0.001f);
+  EXPECT_FALSE(asleep.s.state.sleep.any());
+}
+
+TEST(Sleep, a_strand_wakes_when_the_wall_is_strained_beside_it) {
+  OnATongue t(true);
+  t.s.run(2);
+  ASSERT_TRUE(t.s.state.sleep.all());
+  t.pull({2, 0, 0});
+  t.s.run(0.1f);
+  EXPECT_FALSE(t.s.state.sleep.any());
+}
+
+// A rigid motion is found whole, and what is left is strain.
+TEST(Sleep, the_motion_of_a_wall_is_found_whole) {
+  OnATongue t(true);
+  t.s.run(2);
+  ASSERT_TRUE(t.s.state.sleep.all());
+  const SleepModel& model = t.s.model.sleep;
+  wall::State moved = t.s.state.wall;
+  const Quat turn = axis_angle(normalized(Vec3{1, 2, -1}), 0.4f);
+  const Vec3 by{0.003f, -0.002f, 0.004f};
+  for (size_t i = 0; i < moved.motion.x.size(); ++i) {
+    const Vec3 p = rotate(turn, wall::vec3(moved.motion.x[i]));
+    moved.motion.x[i] = wall::float4(i % 2 == 0 ? p + by : p);
+  }
+  const Carry c = carry_of(model, t.s.state.sleep, moved, 0);
+  const Vec3 node = t.node(3);
+  EXPECT_LT(distance(c.place(node), rotate(turn, node) + by), 0.5e-6f);
+  EXPECT_LT(distance(c.before(c.place(node)), node), 0.1e-6f);
+  EXPECT_LT(c.strain, 0.5e-6f);
+  const auto loaded = std::find_if(t.s.state.sleep.watched.begin(), t.s.state.sleep.watched.end(),
+                                   [&](const Sleep::Watched& w) { return w.may_move < model.nearby; });
+  ASSERT_NE(loaded, t.s.state.sleep.watched.end());
+  moved.motion.x[2 * loaded->column] = wall::float4(wall::vec3(moved.motion.x[2 * loaded->column]) + Vec3{0, 0, 1e-4f});
+  EXPECT_GT(carry_of(model, t.s.state.sleep, moved, 0).strain, 0.6e-4f);
 }
 
 // One strand is drawn over the drape while others wait, which were laid down bent, each 14 cm long. They unbend for tens of

@@ -453,6 +453,23 @@ TEST(PhysicalScene, a_clamp_pulls_the_bowel_with_its_force_or_by_its_range) {
   }
 }
 
+// A suture on the drape that is not in use yet. Its needle bounced on the drape, 0.2 mm high, and kept its thread awake.
+TEST(PhysicalScene, a_suture_that_waits_lies_still) {
+  Field f;
+  for (int i = 0; i < 180; ++i) f.tick();
+  const physical::State& w = f.state->physical.world;
+  float fastest = 0, moved = 0;
+  const Vec3 from = f.seen.active().needle.pose.p;
+  for (int i = 0; i < 60; ++i) {
+    f.tick();
+    fastest = std::max(fastest, length(w.bodies.body[f.model->solver.needle_body(0)].velocity));
+    moved = std::max(moved, distance(f.seen.active().needle.pose.p, from));
+  }
+  EXPECT_LT(fastest, 0.2e-3f);
+  EXPECT_LT(moved, 10e-6f);
+  EXPECT_TRUE(w.sleep.all());
+}
+
 // Surgery with real instruments, seen from outside.
 struct Closed {
   bool done = false;

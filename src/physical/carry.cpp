@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical/carry: see the header.
+#include "physical/carry.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/sym3.h"
+#include "physical/body_internal.h"
+#include "physical/physical.h"
+
+namespace catgut::physical {
+namespace {
+
+constexpr float kMoved = 0.5e-6f;   // [m] a strand is not moved for less: its nodes keep all of their bits
+constexpr float kToolNear = 1.2e-3f;  // [m] a tool within that distance counts as touching
+constexpr int kTurns = 4;           // of a Newton iteration that doubles the digits of a turn each time
+
+// a x = b for a positive definite matrix; nothing where it is singular.
+Vec3 solved(const Sym3& a, Vec3 b) {
+  const Vec3 x{a.xx, a.xy, a.xz}, y{a.xy, a.yy, a.yz}, z{a.xz, a.yz, a.zz};
+  const float volume = dot(x, cross(y, z));
+  if (!(std::abs(volume) > 1e-30f)) return {};
+  return (cross(y, z) * b.x + cross(z, x) * b.y + cross(x, y) * b.z) / volume;
+}
+
+bool in_holes(const thread::State& t, const Sleep::Strand& strand) {
+  return std::any_of(t.eyelet.begin(), t.eyelet.end(),
+                     [&](const thread::Eyelet& e) { return e.segment >= strand.first && e.segment < strand.last; });
+}
+
+}  // namespace
+
+Carry carry_of(const SleepModel& model, const Sleep& z, const wall::State& wall, uint32_t strand) {
+  const auto each = [&](auto visit) {
+    for (const Sleep::Watched& w : z.watched)
+      if (w.strand == strand && w.may_move < model.nearby)
+        visit(w.mid, w.director, wall::vec3(wall.motion.x[2 * w.column]), wall::vec3(wall.motion.x[2 * w.column + 1]));
+  };
+  Carry c;
+  float count = 0;
+  bool moved = false;
+  each([&](Vec3 mid, Vec3 director, Vec3 mid_now, Vec3 director_now) {
+    c.from += mid, c.to += mid_now, ++count;
+    moved |= !(mid == mid_now) || !(director == director_now);
+  });
+  if (count < 3) {
+    Carry none;
+    none.strain = moved ? 1.0f : 0.0f;
+    return none;
+  }
+  c.from = c.from / count, c.to = c.to / count;
+  if (!moved) {
+    c.to = c.from;
+    return c;
+  }
+  for (int i = 0; i < kTurns; ++i) {
+    Sym3 inertia;
+    Vec3 moment{};
+    const auto add = [&](Vec3 was, Vec3 is) {
+      const Vec3 arm = rotate(c.turn, was);
+      inertia += identity(length2(arm)) + outer(arm, -1);
+      moment += cross(arm, is - arm);
+    };
+    each([&](Vec3 mid, Vec3 director, Vec3 mid_now, Vec3 director_now) {
+      add(mid - c.from, mid_now - c.to), add(director, director_now);
+    });
+    c.turn = turned(c.turn, solved(inertia, moment));
+  }
+  each([&](Vec3 mid, Vec3 director, Vec3 mid_now, Vec3 director_now) {
+    c.strain = std::max({c.strain, distance(c.place(mid), mid_now), distance(rotate(c.turn, director), director_now)});
+  });
+  return c;
+}
+
+bool only_in_wall(const Model& m, const State& s, const Sleep::Strand& strand, std::span<const thread::Hold> holds,
+                  std::span<const thread::ToolCapsule> tools, const thread::Plane* drape) {
+  const thread::State& t = s.thread;
+  if (!in_holes(t, strand)) return false;
+  for (const thread::Hold& hold : holds)
+    if (hold.node >= strand.first && hold.node <= strand.last) return false;
+  for (size_t i = strand.first; i <= strand.last && drape; ++i)
+    if (dot(drape->normal, t.x.at(i)) - drape->offset < m.thread.material.diameter) return false;
+  return std::none_of(tools.begin(), tools.end(), [&](const thread::ToolCapsule& c) {
+    return touches(t, strand, c.to_a, c.to_b, c.radius + 0.5f * m.thread.material.diameter + kToolNear);
+  });
+}
+
+bool is_carried(const State& s, uint32_t strand) {
+  const Sleep& z = s.sleep;
+  const auto names = [&](const auto& list) {
+    return std::any_of(list.begin(), list.end(), [&](const auto& e) { return e.strand == strand; });
+  };
+  return z.strand[strand].asleep && in_holes(s.thread, z.strand[strand]) && !names(z.held) && !names(z.touched);
+}
+
+void carry(const Model& m, State& s, uint32_t strand, const Carry& by) {
+  thread::State& t = s.thread;
+  const Sleep::Strand& me = s.sleep.strand[strand];
+  const auto away = [&](size_t i) { return length2(by.place(s.sleep.from[i]) - t.x.at(i)) > kMoved * kMoved; };
+  if (!by.moves() || (!away(me.first) && !away(me.last) && !away((me.first + me.last) / 2))) {
+    for (size_t i = me.first; i <= me.last; ++i) t.v.set(i, {});
+    return;
+  }
+  for (size_t i = me.first; i <= me.last; ++i) {
+    const Vec3 p = by.place(s.sleep.from[i]);
+    t.v.set(i, (p - t.x.at(i)) / m.wall.step);
+    t.x.set(i, p), t.fine.set(i, {});
+  }
+}
+
+void turn_memory(State& s, uint32_t strand, const Carry& by) {
+  thread::State& t = s.thread;
+  const Sleep::Strand& me = s.sleep.strand[strand];
+  if (by.turn == Quat{}) return;
+  const auto turn = [&](Vec3& v) { v = rotate(by.turn, v); };
+  for (size_t i = 0; i < t.key.size(); ++i)
+    if (const uint32_t first = thread::segment_of(t.key[i]); first >= me.first && first < me.last)
+      turn(t.crossing[i].normal), turn(t.crossing[i].friction_impulse), turn(t.crossing[i].drift);
+  for (thread::SoftContact& c : s.contact)
+    if (c.node >= me.first && c.node <= me.last) turn(c.offset), turn(c.normal), turn(c.friction_impulse), turn(c.drift);
+}
+
+}  // namespace catgut::physical

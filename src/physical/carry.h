@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical/carry: a finished stitch that sleeps moves along with the wall round it, as a rigid body (docs/physical.md, "Cost").
+// Reads what Sleep remembers of the wall; moves the nodes of strands that sleep.
+//
+// Nothing is stored for it: the motion follows from Sleep::watched and the wall, so that a saved state continues to the bit.
+#pragma once
+#include <span>
+
+#include "core/math.h"
+#include "physical/sleep.h"
+
+namespace catgut::physical {
+
+// Of those columns that the strand loads: the best rigid motion, by least squares. Fewer than three: none.
+Carry carry_of(const SleepModel& model, const Sleep& sleep, const wall::State& wall, uint32_t strand);
+// Whether only the wall holds the strand: it is in holes, and no hand, tool or drape touches it.
+bool only_in_wall(const Model& model, const State& state, const Sleep::Strand& strand, std::span<const thread::Hold> holds,
+                  std::span<const thread::ToolCapsule> tools, const thread::Plane* drape);
+// Whether a strand that sleeps may be carried: it was only in the wall when it fell asleep.
+bool is_carried(const State& state, uint32_t strand);
+// Takes a strand along; it keeps its shape.
+void carry(const Model& model, State& state, uint32_t strand, const Carry& by);
+// Before it is stepped again: directions that contacts remember turn along.
+void turn_memory(State& state, uint32_t strand, const Carry& by);
+
+}  // namespace catgut::physical
