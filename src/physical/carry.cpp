@@ -3,6 +3,7 @@
 #include "physical/carry.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/sym3.h"
@@ -12,9 +13,9 @@
 namespace catgut::physical {
 namespace {
 
-constexpr float kMoved = 0.5e-6f;   // [m] a strand is not moved for less: its nodes keep all of their bits
+constexpr float kMoved = 0.5e-6f;     // [m] a strand is not moved for less: its nodes keep all of their bits
 constexpr float kToolNear = 1.2e-3f;  // [m] a tool within that distance counts as touching
-constexpr int kTurns = 4;           // of a Newton iteration that doubles the digits of a turn each time
+constexpr int kTurns = 4;             // of a Newton iteration that doubles the digits of a turn each time
 
 // a x = b for a positive definite matrix; nothing where it is singular.
 Vec3 solved(const Sym3& a, Vec3 b) {
@@ -31,11 +32,16 @@ bool in_holes(const thread::State& t, const Sleep::Strand& strand) {
 
 }  // namespace
 
-Carry carry_of(const SleepModel& model, const Sleep& z, const wall::State& wall, uint32_t strand) {
+Carry carry_of(const SleepModel& model, std::span<const Sleep::Watched> watched, const wall::State& wall, uint32_t strand) {
+  std::array<uint32_t, 512> loaded;  // the others are twenty times as many
+  size_t found = 0;
+  for (uint32_t i = 0; i < watched.size() && found < loaded.size(); ++i)
+    if (watched[i].strand == strand && watched[i].may_move < model.nearby) loaded[found++] = i;
   const auto each = [&](auto visit) {
-    for (const Sleep::Watched& w : z.watched)
-      if (w.strand == strand && w.may_move < model.nearby)
-        visit(w.mid, w.director, wall::vec3(wall.motion.x[2 * w.column]), wall::vec3(wall.motion.x[2 * w.column + 1]));
+    for (size_t i = 0; i < found; ++i) {
+      const Sleep::Watched& w = watched[loaded[i]];
+      visit(w.mid, w.director, wall::vec3(wall.motion.x[2 * w.column]), wall::vec3(wall.motion.x[2 * w.column + 1]));
+    }
   };
   Carry c;
   float count = 0;

@@ -11,8 +11,9 @@
 
 namespace catgut::physical {
 
-// Of those columns that the strand loads: the best rigid motion, by least squares. Fewer than three: none.
-Carry carry_of(const SleepModel& model, const Sleep& sleep, const wall::State& wall, uint32_t strand);
+// Of those columns that the strand loads: the best rigid motion, by least squares. Fewer than three: none. watched: of
+// Sleep::watched, the strand's own at least.
+Carry carry_of(const SleepModel& model, std::span<const Sleep::Watched> watched, const wall::State& wall, uint32_t strand);
 // Whether only the wall holds the strand: it is in holes, and no hand, tool or drape touches it.
 bool only_in_wall(const Model& model, const State& state, const Sleep::Strand& strand, std::span<const thread::Hold> holds,
                   std::span<const thread::ToolCapsule> tools, const thread::Plane* drape);

@@ -112,7 +112,7 @@ float away_from(const State& s, const Sleep::Strand& strand, uint32_t column) {
 
 void wake_one(const Model& m, State& s, uint32_t strand) {
   Sleep& z = s.sleep;
-  if (is_carried(s, strand)) turn_memory(s, strand, carry_of(m.sleep, z, s.wall, strand));
+  if (is_carried(s, strand)) turn_memory(s, strand, carry_of(m.sleep, z.watched, s.wall, strand));
   if (z.strand[strand].asleep) s.thread.travel = std::max(s.thread.travel, 1.0f);  // its pairs are listed again
   z.strand[strand].asleep = false, z.strand[strand].quiet = 0;
   forget(z.load, strand), forget(z.watched, strand), forget(z.held, strand), forget(z.touched, strand);
@@ -312,7 +312,7 @@ void reserve(const State& s, Sleep& z) {
 void wake(const Model& m, State& s) {
   Sleep& z = s.sleep;
   for (uint32_t k = 0; k < z.strand.size(); ++k)
-    if (is_carried(s, k)) turn_memory(s, k, carry_of(m.sleep, z, s.wall, k));
+    if (is_carried(s, k)) turn_memory(s, k, carry_of(m.sleep, z.watched, s.wall, k));
   if (z.any()) s.thread.travel = std::max(s.thread.travel, 1.0f);  // its pairs are listed again
   for (Sleep::Strand& k : z.strand) k.asleep = false, k.quiet = 0;
   z.load.clear(), z.watched.clear(), z.held.clear(), z.touched.clear();
@@ -330,9 +330,12 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
   const uint32_t n = static_cast<uint32_t>(z.strand.size());
   if (awake.far_due.size() != n) awake.far_due.assign(n, -1);
   awake.box.resize(n), awake.carry.assign(n, {});
-  for (uint32_t k = 0; k < n; ++k) {
+  for (size_t i = 0; i < z.watched.size();) {  // those of a strand stand together
+    const uint32_t k = z.watched[i].strand;
+    const size_t first = i;
+    while (i < z.watched.size() && z.watched[i].strand == k) ++i;
     if (!is_carried(s, k)) continue;
-    awake.carry[k] = carry_of(m.sleep, z, s.wall, k);
+    awake.carry[k] = carry_of(m.sleep, std::span(z.watched).subspan(first, i - first), s.wall, k);
     carry(m, s, k, awake.carry[k]);
   }
   for (uint32_t k = 0; k < n; ++k) awake.box[k] = box_of(s.thread, z.strand[k]);
@@ -488,7 +491,7 @@ bool find_quiet(const Model& m, State& s, const Hands& hands, std::span<const th
     if (begun && ++strand.quiet <= m.sleep.window && strand.quiet % kLook != 0) continue;
     bool quiet = begun && is_quiet(m, s, k, {});
     if (begun && !quiet && only_in_wall(m, s, strand, holds, tools, hands.plane))
-      if (const Carry by = carry_of(m.sleep, z, s.wall, k); by.strain <= m.sleep.strain) quiet = is_quiet(m, s, k, by);
+      if (const Carry by = carry_of(m.sleep, z.watched, s.wall, k); by.strain <= m.sleep.strain) quiet = is_quiet(m, s, k, by);
     if (quiet && strand.quiet <= m.sleep.window) continue;
     awake.ready[k] = quiet, any |= quiet;
     if (quiet) continue;

@@ -345,6 +345,7 @@ const std::vector<ResultName>& result_names() {
         {"stitch_gap", "m", "the same where a stitch crosses from one wall to the other; 0 without such a stitch"},
         {"stitch_tension", "N",
          "tension of the thread there at the end, the smallest of all stitches; a knot that holds keeps one"},
+        {"stitches_finished", "", "sutures of at least two points whose thread is cut off its needle; 0 with guided mechanics"},
         {"throws_held", "",
          "throws that the thread of a finished stitch shows at the end, the fewest of all; 0 without one, and with guided "
          "mechanics"},

@@ -269,7 +269,7 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   v["stitch_gap"] = cut.stitch_gap;
   v["stitch_tension"] = cut.stitch_tension;
   if (scene_.mechanics.kind == "physical") result.stitch = measure_stitches(last);
-  v["throws_held"] = throws_held(result.stitch);
+  v["throws_held"] = throws_held(result.stitch), v["stitches_finished"] = stitches_finished(result.stitch);
   v["edge_eversion"] = cut.eversion;
   v["specimen_way"] = cut.way;
   v["drawn_mass"] = cut.mass;

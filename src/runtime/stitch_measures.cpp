@@ -49,4 +49,8 @@ int throws_held(const std::vector<StitchMeasures>& stitches) {
   return fewest;
 }
 
+int stitches_finished(const std::vector<StitchMeasures>& stitches) {
+  return static_cast<int>(std::count_if(stitches.begin(), stitches.end(), [](const StitchMeasures& m) { return m.finished; }));
+}
+
 }  // namespace catgut

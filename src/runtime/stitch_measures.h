@@ -22,5 +22,6 @@ struct StitchMeasures {
 std::vector<StitchMeasures> measure_stitches(const Snapshot& seen);
 // The fewest throws of all finished stitches; 0 without one.
 int throws_held(const std::vector<StitchMeasures>& stitches);
+int stitches_finished(const std::vector<StitchMeasures>& stitches);
 
 }  // namespace catgut

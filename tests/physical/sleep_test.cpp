@@ -421,7 +421,7 @@ TEST(Sleep, the_motion_of_a_wall_is_found_whole) {
     const Vec3 p = rotate(turn, wall::vec3(moved.motion.x[i]));
     moved.motion.x[i] = wall::float4(i % 2 == 0 ? p + by : p);
   }
-  const Carry c = carry_of(model, t.s.state.sleep, moved, 0);
+  const Carry c = carry_of(model, t.s.state.sleep.watched, moved, 0);
   const Vec3 node = t.node(3);
   EXPECT_LT(distance(c.place(node), rotate(turn, node) + by), 0.5e-6f);
   EXPECT_LT(distance(c.before(c.place(node)), node), 0.1e-6f);
@@ -430,7 +430,7 @@ TEST(Sleep, the_motion_of_a_wall_is_found_whole) {
                                    [&](const Sleep::Watched& w) { return w.may_move < model.nearby; });
   ASSERT_NE(loaded, t.s.state.sleep.watched.end());
   moved.motion.x[2 * loaded->column] = wall::float4(wall::vec3(moved.motion.x[2 * loaded->column]) + Vec3{0, 0, 1e-4f});
-  EXPECT_GT(carry_of(model, t.s.state.sleep, moved, 0).strain, 0.6e-4f);
+  EXPECT_GT(carry_of(model, t.s.state.sleep.watched, moved, 0).strain, 0.6e-4f);
 }
 
 // One strand is drawn over the drape while others wait, which were laid down bent, each 14 cm long. They unbend for tens of

@@ -71,6 +71,8 @@ TEST(StitchMeasures, count_the_fewest_throws_of_finished_stitches) {
   waits.right = waits.left = 0, waits.finished = false;
   EXPECT_EQ(throws_held({more, all[0], waits}), 2) << "one that is not finished does not count";
   EXPECT_EQ(throws_held({waits}), 0);
+  EXPECT_EQ(stitches_finished({more, all[0], waits}), 2) << "so that one without a knot is missed";
+  EXPECT_EQ(stitches_finished({}), 0);
 }
 
 }  // namespace
