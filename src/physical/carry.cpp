@@ -33,7 +33,7 @@ bool in_holes(const thread::State& t, const Sleep::Strand& strand) {
 }  // namespace
 
 Carry carry_of(const SleepModel& model, std::span<const Sleep::Watched> watched, const wall::State& wall, uint32_t strand) {
-  std::array<uint32_t, 512> loaded;  // the others are twenty times as many
+  std::array<uint32_t, 512> loaded;  // a small part of them
   size_t found = 0;
   for (uint32_t i = 0; i < watched.size() && found < loaded.size(); ++i)
     if (watched[i].strand == strand && watched[i].may_move < model.nearby) loaded[found++] = i;
@@ -79,14 +79,19 @@ Carry carry_of(const SleepModel& model, std::span<const Sleep::Watched> watched,
   return c;
 }
 
+bool is_above(const thread::State& t, const Sleep::Strand& strand, const thread::Plane& drape, float height) {
+  for (size_t i = strand.first; i <= strand.last; ++i)
+    if (dot(drape.normal, t.x.at(i)) - drape.offset < height) return false;
+  return true;
+}
+
 bool only_in_wall(const Model& m, const State& s, const Sleep::Strand& strand, std::span<const thread::Hold> holds,
                   std::span<const thread::ToolCapsule> tools, const thread::Plane* drape) {
   const thread::State& t = s.thread;
   if (!in_holes(t, strand)) return false;
   for (const thread::Hold& hold : holds)
     if (hold.node >= strand.first && hold.node <= strand.last) return false;
-  for (size_t i = strand.first; i <= strand.last && drape; ++i)
-    if (dot(drape->normal, t.x.at(i)) - drape->offset < m.thread.material.diameter) return false;
+  if (drape && !is_above(t, strand, *drape, m.thread.material.diameter)) return false;
   return std::none_of(tools.begin(), tools.end(), [&](const thread::ToolCapsule& c) {
     return touches(t, strand, c.to_a, c.to_b, c.radius + 0.5f * m.thread.material.diameter + kToolNear);
   });

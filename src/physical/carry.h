@@ -17,6 +17,8 @@ Carry carry_of(const SleepModel& model, std::span<const Sleep::Watched> watched,
 // Whether only the wall holds the strand: it is in holes, and no hand, tool or drape touches it.
 bool only_in_wall(const Model& model, const State& state, const Sleep::Strand& strand, std::span<const thread::Hold> holds,
                   std::span<const thread::ToolCapsule> tools, const thread::Plane* drape);
+// Whether all nodes of the strand are higher than that over the drape [m].
+bool is_above(const thread::State& thread, const Sleep::Strand& strand, const thread::Plane& drape, float height);
 // Whether a strand that sleeps may be carried: it was only in the wall when it fell asleep.
 bool is_carried(const State& state, uint32_t strand);
 // Takes a strand along; it keeps its shape.

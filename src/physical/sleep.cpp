@@ -348,6 +348,9 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
         length2(director(s.wall, w.column) - rotate(by.turn, w.director)) > most2)
       awake.disturbed[w.strand] = 1;
   }
+  for (uint32_t k = 0; k < n && hands.plane; ++k)  // carried down onto the drape
+    if (awake.carry[k].moves() && !is_above(s.thread, z.strand[k], *hands.plane, 0.5f * m.thread.material.diameter))
+      awake.disturbed[k] = 1;
   // Of two that sleep beside each other the walls have moved differently.
   for (uint32_t a = 0; a < n; ++a)
     for (uint32_t b = 0; b < a; ++b) {

@@ -399,6 +399,30 @@ TEST(Sleep, a_strand_that_sleeps_in_its_wall_is_carried_along) {
   EXPECT_FALSE(asleep.s.state.sleep.any());
 }
 
+TEST(Sleep, a_strand_wakes_when_its_wall_carries_it_onto_the_drape) {
+  OnATongue t(true);
+  thread::Plane drape;
+  drape.normal = {0, 0, 1}, drape.offset = -2.6e-3f;  // below the thread on the sheet's lower face, by 1 mm
+  const auto run = [&](int steps) {
+    for (int i = 0; i < steps; ++i) {
+      Hands hands;
+      hands.plane = &drape, hands.wall_pulls = t.s.wall_pull;
+      step(t.s.model, t.s.state, *t.s.scratch, hands, *t.s.jobs);
+    }
+  };
+  run(2000);
+  ASSERT_TRUE(t.s.state.sleep.all());
+  float lowest = 1;
+  bool slept = true;
+  for (int i = 1; i <= 100; ++i) {
+    t.pull({0, 0, -2e-5f * static_cast<float>(i)}), run(50);
+    if (!t.s.state.sleep.all()) slept = false;
+    for (size_t k = 0; k < t.s.state.thread.nodes(); ++k) lowest = std::min(lowest, t.node(k).z - drape.offset);
+  }
+  EXPECT_FALSE(slept);
+  EXPECT_GT(lowest, 0.3f * t.s.model.thread.material.diameter) << "the drape holds it";
+}
+
 TEST(Sleep, a_strand_wakes_when_the_wall_is_strained_beside_it) {
   OnATongue t(true);
   t.s.run(2);
