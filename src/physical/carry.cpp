@@ -13,9 +13,8 @@
 namespace catgut::physical {
 namespace {
 
-constexpr float kMoved = 0.5e-6f;     // [m] a strand is not moved for less: its nodes keep all of their bits
-constexpr float kToolNear = 1.2e-3f;  // [m] a tool within that distance counts as touching
-constexpr int kTurns = 4;             // of a Newton iteration that doubles the digits of a turn each time
+constexpr float kMoved = 0.5e-6f;  // [m] a strand is not moved for less: its nodes keep all of their bits
+constexpr int kTurns = 4;          // of a Newton iteration that doubles the digits of a turn each time
 
 // a x = b for a positive definite matrix; nothing where it is singular.
 Vec3 solved(const Sym3& a, Vec3 b) {
@@ -93,7 +92,7 @@ bool only_in_wall(const Model& m, const State& s, const Sleep::Strand& strand, s
     if (hold.node >= strand.first && hold.node <= strand.last) return false;
   if (drape && !is_above(t, strand, *drape, m.thread.material.diameter)) return false;
   return std::none_of(tools.begin(), tools.end(), [&](const thread::ToolCapsule& c) {
-    return touches(t, strand, c.to_a, c.to_b, c.radius + 0.5f * m.thread.material.diameter + kToolNear);
+    return touches(t, strand, c.to_a, c.to_b, c.radius + 0.5f * m.thread.material.diameter + 2 * kToolMargin);
   });
 }
 

@@ -12,7 +12,6 @@
 namespace catgut::physical {
 namespace {
 
-constexpr float kMargin = 0.6e-3f;    // [m] a tool that moves wakes a thread that it may touch within this distance
 constexpr float kQuietSpeed = 5e-3f;  // [m/s] when it is looked at: a swing that returns is not rest
 constexpr uint32_t kLook = 50;        // [steps] after which it is looked at again within its window
 constexpr float kSettled = 0.1e-3f;   // [m] in a window: rest of a strand that carries nothing
@@ -78,7 +77,7 @@ bool near(const thread::State& t, const Sleep::Strand& a, const Sleep::Strand& b
 float strand_reach(const Model& m, const State& s, const Sleep::Strand& strand) {
   float speed2 = 0;
   for (size_t i = strand.first; i <= strand.last; ++i) speed2 = std::max(speed2, length2(s.thread.v.at(i)));
-  return m.thread.material.diameter + kMargin + 2 * m.wall.step * std::sqrt(speed2);
+  return m.thread.material.diameter + kToolMargin + 2 * m.wall.step * std::sqrt(speed2);
 }
 
 // Thread that lies about unloaded unbends for a minute, ever more slowly, because its drag is high. Nothing depends on where.
@@ -228,7 +227,7 @@ bool sleeps_on(const Model& m, const State& s, uint32_t strand, std::span<const 
   for (uint32_t i = 0; i < tools.size(); ++i) {
     const thread::ToolCapsule& c = tools[i];
     const float step = std::max(distance(c.a, c.to_a), distance(c.b, c.to_b));
-    const float reach = c.radius + 0.5f * m.thread.material.diameter + kMargin + step;
+    const float reach = c.radius + 0.5f * m.thread.material.diameter + kToolMargin + step;
     const AwakeThread::Box box{{std::min(c.to_a.x, c.to_b.x), std::min(c.to_a.y, c.to_b.y), std::min(c.to_a.z, c.to_b.z)},
                                {std::max(c.to_a.x, c.to_b.x), std::max(c.to_a.y, c.to_b.y), std::max(c.to_a.z, c.to_b.z)}};
     if (apart(box, awake.box[strand], reach) || !touches(s.thread, me, c.to_a, c.to_b, reach)) continue;
@@ -356,7 +355,7 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
     for (uint32_t b = 0; b < a; ++b) {
       const Carry &by_a = awake.carry[a], &by_b = awake.carry[b];
       if (!z.strand[a].asleep || !z.strand[b].asleep || (!by_a.moves() && !by_b.moves())) continue;
-      if (apart(awake.box[a], awake.box[b], m.thread.material.diameter + kMargin)) continue;
+      if (apart(awake.box[a], awake.box[b], m.thread.material.diameter + kToolMargin)) continue;
       const Vec3 at = 0.5f * (awake.box[a].low + awake.box[a].high);
       if (length2(by_a.before(at) - by_b.before(at)) > m.sleep.nearby * m.sleep.nearby)
         awake.disturbed[a] = awake.disturbed[b] = 1;
@@ -568,7 +567,7 @@ void fall_asleep(const Model& m, State& s, wall::Coupling& coupling, wall::Scrat
       if (has(hold.node)) z.held.push_back({strand, hold.node, hold.to, hold.force});
     for (uint32_t i = 0; i < tools.size(); ++i) {
       const thread::ToolCapsule& c = tools[i];
-      if (!touches(t, me, c.to_a, c.to_b, c.radius + 0.5f * m.thread.material.diameter + 2 * kMargin)) continue;
+      if (!touches(t, me, c.to_a, c.to_b, c.radius + 0.5f * m.thread.material.diameter + 2 * kToolMargin)) continue;
       Sleep::Touched touched{strand, i, c.to_a, c.to_b, {}, {}};
       for (size_t q = 0; q < t.key.size(); ++q) {
         if (thread::partner_of(t.key[q]) != thread::kTool + i || !has(thread::segment_of(t.key[q]))) continue;

@@ -20,11 +20,15 @@ struct Model;
 struct State;
 struct Hands;
 
+constexpr float kToolMargin = 0.6e-3f;  // [m] a tool that moves wakes a thread that it may touch within this distance
+
 struct SleepModel {
   bool on = true;
   uint32_t window = 250;  // steps
-  float still = 2e-6f;    // [m] no node is farther from where it was at the beginning of the window
-  float steady = 10e-3f;  // [N] no tension has changed by more, plus a twentieth of it
+  // At rest: no node between the tails is farther from where it was at the beginning of the window [m]; no tension has changed
+  // by more, plus a twentieth of it [N]. What creeps by less per window stands still from then on.
+  float still = 2e-6f;
+  float steady = 10e-3f;
   float touched = 2e-6f;  // [m] motion of a hold, a tool or a loaded column that wakes the strand
   float nearby = 50e-6f;  // [m] the same for a column near the strand that it does not load
   float strain = 20e-6f;  // [m] of a strand that is carried: a loaded column leaves the rigid motion by more
@@ -45,7 +49,7 @@ struct Sleep {
     uint32_t strand = 0, at = 0;  // 2 * column: its mid-surface point; + 1: its director
     Vec3 impulse;                 // [N s] of every step
   };
-  // Also of strands that are awake, but have been quiet: the columns of their holes, at the beginning of the window.
+  // Also of strands that are awake: the columns of their holes, at the beginning of the window.
   struct Watched {
     uint32_t strand = 0, column = 0;
     Vec3 mid, director;  // [m] when the strand fell asleep

@@ -22,6 +22,7 @@ struct StitchMeasures {
 std::vector<StitchMeasures> measure_stitches(const Snapshot& seen);
 // The fewest throws of all finished stitches; 0 without one.
 int throws_held(const std::vector<StitchMeasures>& stitches);
+// How many are finished: one that was left without its knot, on its needle, is not.
 int stitches_finished(const std::vector<StitchMeasures>& stitches);
 
 }  // namespace catgut
