@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <vector>
 
 #include "physical/carry.h"
@@ -329,7 +330,7 @@ TEST(Sleep, a_strand_that_is_drawn_across_a_sleeping_one_takes_it_along) {
 struct OnATongue {
   Sewn s;
   uint32_t tip = 0;  // column in the middle of the free edge
-  explicit OnATongue(bool sleep) {
+  explicit OnATongue(bool sleep, float tail = 0.008f) {
     wall::SheetShape shape;
     shape.width = 0.05f, shape.height = 0.02f, shape.columns = 21, shape.rows = 9;
     wall::Spec spec;
@@ -348,7 +349,7 @@ struct OnATongue {
       h.within = (x < 0.04f) == (zeta > 0);
       stop.push_back(mouth(s.model, s.state, h)), s.state.hole.push_back(h);
     }
-    stop.insert(stop.begin(), stop[0] + Vec3{-0.002f, 0, 0.008f}), stop.push_back(stop.back() + Vec3{0.002f, 0, 0.008f});
+    stop.insert(stop.begin(), stop[0] + Vec3{-0.002f, 0, tail}), stop.push_back(stop.back() + Vec3{0.002f, 0, tail});
     for (size_t i = 0; i + 1 < stop.size(); ++i) {
       const int parts = std::max(3, static_cast<int>(distance(stop[i], stop[i + 1]) / 0.5e-3f));
       for (int n = i == 0 ? 0 : 1; n < parts; ++n)
@@ -397,6 +398,59 @@ TEST(Sleep, a_strand_that_sleeps_in_its_wall_is_carried_along) {
   asleep.s.hold[0].node = 0, asleep.s.hold[0].from = asleep.s.hold[0].to = asleep.node(0), asleep.s.hold[0].stiffness = 100;
   asleep.s.run(0.001f);
   EXPECT_FALSE(asleep.s.state.sleep.any());
+}
+
+// A stitch that is tied on the tongue and let go is carried; then its holes are drawn apart. It bears what one bears that never
+// sleeps.
+TEST(Sleep, a_tied_stitch_that_was_carried_holds_as_one_that_is_awake) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "CATGUT_LONG=1 runs it";
+  OnATongue tied(false, 0.06f);
+  validation::Tying t;
+  t.center = {0.042f, 0.0101f, 0.0016f}, t.up = {0, 0, 1}, t.across = {-1, 0, 0}, t.tension = 1;
+  tied.s.hold.resize(2);
+  tied.s.hold[0].node = 0, tied.s.hold[1].node = static_cast<uint32_t>(tied.s.state.thread.nodes()) - 1;
+  for (thread::Hold& h : tied.s.hold) h.from = h.to = tied.s.state.thread.position(h.node);
+  for (const validation::Throw& one : validation::three_throws()) validation::tie_throw(tied.s, t, one);
+  validation::let_go(tied.s);
+  thread::State& whole = tied.s.state.thread;
+  whole.broken[60] = whole.broken[whole.segments() - 61] = 1;  // tails cut
+  tied.s.run(12);                                              // they unbend
+  float wider[2], way[2], tension[2];
+  int carried = 0;
+  for (const bool sleep : {false, true}) {
+    OnATongue o(sleep, 0.06f);
+    o.s.state = tied.s.state, o.s.scratch = std::make_unique<Scratch>(o.s.model, o.s.state);
+    o.s.run(1);
+    const auto place = [&](size_t hole) { return mouth(o.s.model, o.s.state, o.s.state.hole[hole]); };
+    const Vec3 start = place(3);
+    for (int i = 1; i <= 100; ++i) {
+      o.pull({0, 0, 8e-6f * static_cast<float>(i)}), o.s.run(0.03f);
+      carried +=
+          sleep && is_carried(o.s.state, o.s.state.sleep.strand.size() > 1 ? 1 : 0) && distance(place(3), start) > 50e-6f;
+    }
+    way[sleep] = distance(place(3), start);
+    const float before = distance(place(0), place(3));
+    for (int i = 1; i <= 100; ++i) {
+      const Vec3 apart = normalized(place(3) - place(0)) * (5e-3f * static_cast<float>(i));
+      o.pull({0, 0, 8e-4f});
+      for (const size_t hole : {0, 3})
+        o.s.wall_pull.push_back(
+            {wall::weights(o.s.model.wall, o.s.state.wall.topology, o.s.state.hole[hole].place), hole == 0 ? -apart : apart});
+      o.s.run(0.005f);
+    }
+    o.s.run(0.5f);
+    const thread::State& thread = o.s.state.thread;
+    wider[sleep] = distance(place(0), place(3)) - before;
+    tension[sleep] = thread.tension[(thread.eyelet[1].segment + thread.eyelet[2].segment) / 2];
+  }
+  std::printf(
+      "carried at %d of 100 looks, by %.2f mm (awake %.2f); 0.5 N: wider by %.3f mm (awake %.3f), %.3f N (awake %.3f)\n",
+      carried, 1e3 * static_cast<double>(way[1]), 1e3 * static_cast<double>(way[0]), 1e3 * static_cast<double>(wider[1]),
+      1e3 * static_cast<double>(wider[0]), static_cast<double>(tension[1]), static_cast<double>(tension[0]));
+  EXPECT_GE(carried, 5);
+  EXPECT_GT(tension[0], 0.2f);
+  EXPECT_NEAR(tension[1], tension[0], 0.03f * tension[0]);
+  EXPECT_NEAR(wider[1], wider[0], 0.15f * wider[0]);
 }
 
 TEST(Sleep, a_strand_wakes_when_its_wall_carries_it_onto_the_drape) {
