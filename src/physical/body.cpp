@@ -138,6 +138,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
   constexpr uint32_t kRun = 8;  // spheres
   // A wall gives in its thickness, which the solve does not know: jaws that close on it from both sides would need any force.
   constexpr float kJawWall = 60e3f;  // [N/m]
+  constexpr float kInner = 0.3f;     // of a contact's normal, along the way in which the jaw opens: on its inner side
   // Between closed jaws the wall is thinner than it is there. When they let go, it would have to leave both at once, with 40 N:
   // until they have opened as far, they press it with no more than this.
   constexpr float kParting = 0.2f;     // [N] of each contact
@@ -186,7 +187,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     const auto skipped = [&](uint32_t sphere) { return !has_jaws && (before & bit(sphere)) != 0; };
     const auto parting = [&](uint32_t sphere) { return has_jaws && (before & bit(sphere)) != 0; };
     const auto add = [&](uint32_t part, const Foot& foot, Vec3 on_axis, float radius, Vec3 jaw_speed, uint64_t kind,
-                         uint64_t inside, bool of_jaw) {
+                         uint64_t inside, int jaw) {
       const float gap = foot.gap - radius;
       if (gap < -kInside && foot.gap > -0.9f * wm.laminate.thickness) body.skip |= inside;
       const uint64_t key = key_of(kind, b, part, foot.patch);
@@ -225,7 +226,8 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       row.ra = r, row.axis = foot.normal, row.gap = gap, row.least = least, row.speed = jaw_speed,
       row.friction = m.wall_friction;
       if (inside) row.along_limit = kParting * h;
-      if (of_jaw) row.soft = 1 / (kJawWall * h * h);
+      const bool inner = jaw != 0 && dot(foot.normal, rotate(body.pose.q, {static_cast<float>(jaw), 0, 0})) > kInner;
+      if (inner) row.soft = 1 / (kJawWall * h * h);
       if (memory) {
         const float press = std::max(0.0f, dot(memory->impulse, memory->axis));
         row.impulse = foot.normal * press + across(across(memory->impulse, memory->axis), foot.normal);
@@ -269,7 +271,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
             continue;
           const Foot foot = outer_foot(wm, ws, surface, q, p, corners_in(search, q));
           if (foot.gap - s.radius > margin || (foot.on_edge && foot.gap < 0)) continue;
-          add(i, foot, p, s.radius, jaw_speed, 1, inside, s.jaw != 0);
+          add(i, foot, p, s.radius, jaw_speed, 1, inside, s.jaw);
         }
       }
     }
@@ -314,7 +316,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
                             : rotate(body.pose.q,
                                      lerp(local(m, sa, moving.opening) - la, local(m, sb, moving.opening) - lb, t) * (1 / h));
             foot.patch = 2 * q + (zeta > 0 ? 1 : 0);
-            add(i, foot, on, radius, jaw_speed, 2, inside, sa.jaw != 0);
+            add(i, foot, on, radius, jaw_speed, 2, inside, sa.jaw);
           }
         }
       }

@@ -24,6 +24,7 @@ constexpr float kBetween = 0.4e-3f;  // [m] apart
 constexpr float kFast = 0.2f;
 constexpr float kOnDrape = 0.4e-3f;  // [m]
 constexpr float kOpenForce = 2;      // [N] at the tips, maximum with which jaws open against thread round them
+constexpr float kSinks = 10e-6f;     // [m] in a step
 constexpr float kCloseForce = 3;     // [N] at the tip of a jaw, maximum with which jaws close on tissue that they do not hold
 
 // Velocity of the hand's target, from the target of the last step.
@@ -497,7 +498,16 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
     const bool loose = m.falls && moving.holder == wall::kNone;
     if (loose && (moving.held || moving.lies)) moving.w = moving.w * (1 - kBedDrag * h);
     if (moving.lies) moving.v = moving.v * (1 - kBedDrag * h);
-    moving.v = clamped(moving.v, loose ? kLooseSpeed : kMaxSpeed), moving.w = clamped(moving.w, loose ? kLooseSpin : kMaxSpin);
+    moving.v = clamped(moving.v, kMaxSpeed), moving.w = clamped(moving.w, kMaxSpin);
+    BodiesScratch::Moving slow = moving;
+    slow.v = clamped(moving.v, loose ? kLooseSpeed : kMaxSpeed), slow.w = clamped(moving.w, loose ? kLooseSpin : kMaxSpin);
+    // One that thread or a contact throws away faster than this would sink into it: it is slowed after its step.
+    const auto sinks = [&](const Row& row) {
+      if (row.kind != Row::Kind::contact || (row.a != b && row.b != b) || dot(row.impulse, row.axis) <= 0) return false;
+      const Vec3 r = row.a == b ? row.ra : row.rb, lost = point_speed(moving, r) - point_speed(slow, r);
+      return (row.a == b ? dot(lost, row.axis) : -dot(lost, row.axis)) * h > kSinks;
+    };
+    if (moving.thread_push == Vec3{} && std::none_of(k.row.begin(), k.row.end(), sinks)) moving.v = slow.v, moving.w = slow.w;
     body.hand_force = body.hand_torque = {};
     if (moving.held) {
       const Wish w = wish_of(m, body, target[b], h);
@@ -508,7 +518,7 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
       body.target_place = transform(target[b].pose, m.center), body.target_turn = target[b].pose.q;
     }
     body.held = moving.held;
-    body.velocity = moving.v, body.spin = moving.w, body.opening = moving.opening;
+    body.velocity = slow.v, body.spin = slow.w, body.opening = moving.opening;
     body.pose.q = turned(body.pose.q, moving.w * h);
     body.pose.p = moving.center + moving.v * h - rotate(body.pose.q, m.center);
   }

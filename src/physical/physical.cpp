@@ -121,6 +121,7 @@ bool before_its_hole(const Model& m, const State& s, uint32_t node) {
   return false;
 }
 
+constexpr float kSame = 1e-6f;       // [m] two places are one
 constexpr float kCloseBy = 0.6e-3f;  // [m] beyond what can touch within a step: then a node's close faces are listed again
 
 // [m] by which a node and the wall may have come nearer since its close faces were listed.
@@ -242,12 +243,13 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       return found;
     };
     add(i, best, memory_of(best.normal), true);
-    // In a fold the node may touch a second face, in front of which it is, with another normal; in a pit a third one.
-    Foot second, third;
-    for (Foot* other : {&second, &third}) {
+    // In a fold the node may touch a second face, in front of which it is, with another normal; in a pit more of them.
+    std::array<Foot, 3> more;
+    for (Foot* other = more.begin(); other < more.end(); ++other) {
       other->gap = r + far_move;
       const auto like = [&](Vec3 normal) {
-        return dot(normal, best.normal) >= 0.95f || (other == &third && dot(normal, second.normal) >= 0.95f);
+        return dot(normal, best.normal) >= 0.95f ||
+               std::any_of(more.begin(), other, [&](const Foot& foot) { return dot(normal, foot.normal) >= 0.95f; });
       };
       for (const uint32_t face : faces) {
         const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
@@ -261,7 +263,6 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
             continue;
           const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p, corners_in(k.search, q));
           // A little behind it, too, where the two faces make a fold: each lies before the other, or they meet at the foot.
-          constexpr float kSame = 1e-6f;  // [m]
           const Vec3 between = foot.at - best.at;
           const bool fold = foot.gap <= 0 && foot.gap > -d && memory && dot(between, best.facing) > -kSame &&
                             dot(between, foot.facing) < kSame && (!foot.on_edge || length2(between) < kSame * kSame);
@@ -288,9 +289,19 @@ void find_again(void* context, std::span<thread::SoftContact> contacts, size_t i
   const Surface& surface = surface_of(slid.m, slid.s);
   SurfaceSearch& search = slid.k.search;
   thread::SoftContact& c = contacts[index];
+  const auto other_has = [&](uint32_t patch) {
+    const auto has = [&](size_t i) { return contacts[i].node == c.node && contacts[i].patch == patch; };
+    for (size_t i = index; i-- > 0 && contacts[i].node == c.node;)
+      if (has(i)) return true;
+    for (size_t i = index + 1; i < contacts.size() && contacts[i].node == c.node; ++i)
+      if (has(i)) return true;
+    return false;
+  };
   Foot best = nearest_on_patch(slid.m.wall, slid.s.wall, surface, c.patch, node);
+  bool in_pit = false;
   if (best.on_edge) {
     // Beyond the patch: another one that continues it.
+    const Foot edge = best;
     const uint32_t i = slid.some_asleep ? slid.k.awake.node[c.node] : c.node;
     float facing = dot(normalized(node - best.at), best.facing);
     for (uint32_t f = search.node_first[i]; f < search.node_first[i + 1]; ++f) {
@@ -303,13 +314,18 @@ void find_again(void* context, std::span<thread::SoftContact> contacts, size_t i
           continue;
         const Foot foot = nearest_on_patch(slid.m.wall, slid.s.wall, surface, q, node);
         if (c.normal_impulse > 0 && dot(foot.facing, c.normal) < 0.3f) continue;
+        // In a pit the node touches several faces. If two contacts took the same one, it would pass the others.
+        if (dot(foot.at - edge.at, edge.facing) > kSame && other_has(q)) {
+          in_pit = true;
+          continue;
+        }
         const float far = std::abs(foot.gap), front = dot(normalized(node - foot.at), foot.facing);
         if (far > std::abs(best.gap) + 1e-7f || (far > std::abs(best.gap) - 1e-7f && front < facing)) continue;
         best = foot, facing = front;
       }
     }
   }
-  c.offset = best.at - slid.k.coupling.at[c.point], c.normal = best.normal, c.patch = best.patch;
+  c.offset = best.at - slid.k.coupling.at[c.point], c.normal = in_pit ? best.facing : best.normal, c.patch = best.patch;
 }
 
 void begin_bodies(const Model& m, State& s, Scratch& k, const Hands& hands) {

@@ -38,6 +38,7 @@ constexpr float kRingPull = 2.6f;  // [N] of its throws; with 1.7 N the loops ar
 // [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
 // square to it. Less deep, it slid along the serosa and came out through the cut edge.
 constexpr float kYields = 0.002f;
+constexpr float kRingYields = 0.001f;  // 2 mm, and the two tubes lay 1 mm farther apart beside the stitches
 constexpr float kFreeDepth = 0.0045f;  // [m] depth below the rims of a sweep through two layers
 
 // Depth of the needle's circle below a surface of radius `curved` [m] whose chord is `length`.
@@ -427,7 +428,7 @@ Plan altemeier_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   p.out = inner.axis;
   p.up = cross(-radial, inner.axis);  // so that cross(out, up) points inward
   p.length = outer.radius - inner.radius + skill.wall;
-  p.depth = kFreeDepth + kYields;
+  p.depth = kFreeDepth + kRingYields;
   p.wall = 1;
   p.walls = 2;
   for (uint32_t s = 0; s < picture.suture.size(); ++s) {

@@ -174,6 +174,23 @@ Face face_of(const wall::Model& wm, const wall::State& ws, uint32_t f) {
   return face;
 }
 
+// A quadrilateral is a bilinear patch: where it is warped, two triangles are up to a quarter of the warp beside it.
+bool crosses_face(Vec3 p, Vec3 q, const Face& face) {
+  const auto& c = face.corner;
+  if (face.count == 3) return crosses(p, q, c[0], c[1], c[2]);
+  constexpr float kFlat = 0.1e-3f;  // [m]
+  const int parts = length2(c[0] - c[1] + c[2] - c[3]) < kFlat * kFlat ? 1 : 6;
+  const auto at = [&](int i, int j) {
+    const float s = static_cast<float>(i) / static_cast<float>(parts), t = static_cast<float>(j) / static_cast<float>(parts);
+    return lerp(lerp(c[0], c[1], s), lerp(c[3], c[2], s), t);
+  };
+  for (int i = 0; i < parts; ++i)
+    for (int j = 0; j < parts; ++j)
+      if (crosses(p, q, at(i, j), at(i + 1, j), at(i + 1, j + 1)) || crosses(p, q, at(i, j), at(i + 1, j + 1), at(i, j + 1)))
+        return true;
+  return false;
+}
+
 Vec3 place_at(const wall::Model& wm, const wall::State& ws, wall::Point p, float zeta) {
   p.zeta = zeta;
   return wall::place(wall::weights(wm, ws.topology, p), ws.motion);
@@ -264,8 +281,7 @@ bool ContactBench::passes_wall(const wall::State& ws, const Bounds& bounds, Vec3
   for (uint32_t f = 0; f < bounds.center.size(); ++f) {
     if (length2(bounds.center[f] - between) > (bounds.radius[f] + half) * (bounds.radius[f] + half)) continue;
     const Face face = face_of(model.wall, ws, f);
-    if (crosses(p, q, face.corner[0], face.corner[1], face.corner[2])) return true;
-    if (face.count == 4 && crosses(p, q, face.corner[0], face.corner[2], face.corner[3])) return true;
+    if (crosses_face(p, q, face)) return true;
   }
   return false;
 }
@@ -286,6 +302,8 @@ float ContactBench::wall_overlap(const wall::State& ws, const Bounds& bounds, Ve
   }
   // Outside, beyond an edge, where no facing decides.
   if (far > 0.9f || (best.on_edge && best.gap < 0)) return 0;
+  // Within the wall no place is as far from all faces: this one is behind a fold, and outside.
+  if (best.gap < 0 && far > 0.75f * wm.laminate.thickness) return 0;
   // A face folded or sheared so far that its directors lie in it has no inside.
   const float height = std::abs(dot(place_at(wm, ws, best.point, 1) - place_at(wm, ws, best.point, 0), best.facing));
   if (model.surface.patch[best.patch].side != 0 && height < 0.05f * wm.laminate.thickness) {

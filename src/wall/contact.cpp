@@ -204,24 +204,25 @@ CATGUT_CLONES void ask(size_t n, float rho, const float* __restrict nx, const fl
   }
 }
 
-// The impulse next to the answer within the cone of friction, and the velocity that it leaves.
-CATGUT_CLONES void project(size_t n, float rho, const float* __restrict nx, const float* __restrict ny,
+// The impulse next to the answer within the cone of friction, and the velocity that it leaves. A contact that yields by `soft`
+// [1/kg] along its normal: the same, of a cone whose height is scaled.
+CATGUT_CLONES void project(size_t n, float rho, float soft, const float* __restrict nx, const float* __restrict ny,
                            const float* __restrict nz, const float* __restrict friction, const float* __restrict startx,
                            const float* __restrict starty, const float* __restrict startz, const float* __restrict ax,
                            const float* __restrict ay, const float* __restrict az, float* __restrict px, float* __restrict py,
                            float* __restrict pz, float* __restrict sx, float* __restrict sy, float* __restrict sz,
                            float* __restrict change) {
-  const float softness = 1 / rho;
+  const float softness = 1 / rho, scale = std::sqrt(1 + soft / rho);
   for (size_t i = 0; i < n; ++i) {
     const float x = startx[i] + ax[i], y = starty[i] + ay[i], z = startz[i] + az[i];
     const float hx = kRelax * x + (1 - kRelax) * px[i], hy = kRelax * y + (1 - kRelax) * py[i],
                 hz = kRelax * z + (1 - kRelax) * pz[i];
     const float wx = hx - sx[i] * softness, wy = hy - sy[i] * softness, wz = hz - sz[i] * softness;
-    const float along = wx * nx[i] + wy * ny[i] + wz * nz[i], mu = friction[i];
-    const float tx = wx - along * nx[i], ty = wy - along * ny[i], tz = wz - along * nz[i];
+    const float front = wx * nx[i] + wy * ny[i] + wz * nz[i], along = front / scale, mu = friction[i] / scale;
+    const float tx = wx - front * nx[i], ty = wy - front * ny[i], tz = wz - front * nz[i];
     const float drag = std::sqrt(tx * tx + ty * ty + tz * tz), edge = (along + mu * drag) / (1 + mu * mu);
     const bool sticks = drag <= mu * along, apart = mu * drag <= -along;
-    const float press = apart ? 0.0f : sticks ? along : edge;
+    const float press = (apart ? 0.0f : sticks ? along : edge) / scale;
     const float part = apart ? 0.0f : sticks ? 1.0f : mu * edge / (drag + 1e-30f);
     const float qx = press * nx[i] + part * tx, qy = press * ny[i] + part * ty, qz = press * nz[i] + part * tz;
     sx[i] -= rho * (hx - qx), sy[i] -= rho * (hy - qy), sz[i] -= rho * (hz - qz);
@@ -237,6 +238,7 @@ struct Problem {
   const State& s;
   ContactSolver& k;
   size_t n;
+  float soft;  // [1/kg] along the normal: across it, what sticks would creep
 
   float compliance(size_t i, size_t j) const {
     const bool a_self = k.contact[i].self, b_self = k.contact[j].self;
@@ -305,8 +307,8 @@ struct Problem {
       if (!touches(i)) continue;
       c.before = c.impulse;
       const Vec3 u{k.ux[i], k.uy[i], k.uz[i]};
-      const float closing = dot(u, c.normal) - c.wanted, pressed = dot(c.impulse, c.normal);
-      const float press = std::max(0.0f, pressed - closing / c.self);
+      const float pressed = dot(c.impulse, c.normal), closing = dot(u, c.normal) + soft * pressed - c.wanted;
+      const float press = std::max(0.0f, pressed - closing / (c.self + soft));
       Vec3 across = c.impulse - c.normal * pressed - (u - c.normal * dot(u, c.normal)) / c.self;
       const float most = c.friction * press, drags = length(across);
       if (drags > most) across = across * (drags > 0 ? most / drags : 0);
@@ -359,9 +361,10 @@ struct Problem {
           q.slip[1].data(), q.slip[2].data(), q.free[0].data(), q.free[1].data(), q.free[2].data(), q.right[0].data(),
           q.right[1].data(), q.right[2].data());
       for (size_t d = 0; d < 3; ++d) multiply(m, q.inverse.data(), q.right[d].data(), q.answer[d].data());
-      project(m, rho, q.n[0].data(), q.n[1].data(), q.n[2].data(), q.friction.data(), q.start[0].data(), q.start[1].data(),
-              q.start[2].data(), q.answer[0].data(), q.answer[1].data(), q.answer[2].data(), q.impulse[0].data(),
-              q.impulse[1].data(), q.impulse[2].data(), q.slip[0].data(), q.slip[1].data(), q.slip[2].data(), q.change.data());
+      project(m, rho, soft, q.n[0].data(), q.n[1].data(), q.n[2].data(), q.friction.data(), q.start[0].data(),
+              q.start[1].data(), q.start[2].data(), q.answer[0].data(), q.answer[1].data(), q.answer[2].data(),
+              q.impulse[0].data(), q.impulse[1].data(), q.impulse[2].data(), q.slip[0].data(), q.slip[1].data(),
+              q.slip[2].data(), q.change.data());
       float changed2 = 0, largest2 = 0;
       for (size_t a = 0; a < m; ++a) {
         changed2 = std::max(changed2, q.change[a]);
@@ -399,7 +402,7 @@ void solve_contacts(const Model& m, State& s, Scratch& scratch, std::span<const 
     solver.terms[2 * i] = solver.inverse.terms(s.topology, c.point);
     if (c.self) solver.terms[2 * i + 1] = solver.inverse.terms(s.topology, c.other);
   }
-  Problem problem{s, solver, n};
+  Problem problem{s, solver, n, solver.softness / (m.step * m.step)};
   for (size_t i = 0; i < n; ++i) {
     const Contact& c = solver.contact[i];
     Vec3 u = velocity(c.point, s.motion) - c.speed;
