@@ -136,7 +136,8 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     return search.box[f];
   };
   constexpr uint32_t kRun = 8;  // spheres
-  // A wall gives in its thickness, which the solve does not know: jaws that close on it from both sides would need any force.
+  // A wall gives in its thickness, which the solve does not know: jaws that close on it from both sides would need any force,
+  // and so would jaws that open between walls.
   constexpr float kJawWall = 60e3f;  // [N/m]
   constexpr float kInner = 0.3f;     // of a contact's normal, along the way in which the jaw opens: on its inner side
   // Between closed jaws the wall is thinner than it is there. When they let go, it would have to leave both at once, with 40 N:
@@ -226,8 +227,8 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       row.ra = r, row.axis = foot.normal, row.gap = gap, row.least = least, row.speed = jaw_speed,
       row.friction = m.wall_friction;
       if (inside) row.along_limit = kParting * h;
-      const bool inner = jaw != 0 && dot(foot.normal, rotate(body.pose.q, {static_cast<float>(jaw), 0, 0})) > kInner;
-      if (inner) row.soft = 1 / (kJawWall * h * h);
+      const bool inner = dot(foot.normal, rotate(body.pose.q, {static_cast<float>(jaw), 0, 0})) > kInner;
+      if (jaw != 0 && (inner || moving.opening != body.opening)) row.soft = 1 / (kJawWall * h * h);
       if (memory) {
         const float press = std::max(0.0f, dot(memory->impulse, memory->axis));
         row.impulse = foot.normal * press + across(across(memory->impulse, memory->axis), foot.normal);

@@ -22,10 +22,11 @@ constexpr float kBetween = 0.4e-3f;  // [m] apart
 // or is thrown back, with any force. So is one that thread presses with kLoosePress against tissue. At rest on elastic coils it
 // would be pushed about for seconds; there it has a drag.
 constexpr float kFast = 0.2f;
-constexpr float kOnDrape = 0.4e-3f;  // [m]
-constexpr float kOpenForce = 2;      // [N] at the tips, maximum with which jaws open against thread round them
-constexpr float kSinks = 10e-6f;     // [m] in a step
-constexpr float kCloseForce = 3;     // [N] at the tip of a jaw, maximum with which jaws close on tissue that they do not hold
+constexpr float kOnDrape = 0.4e-3f;   // [m]
+constexpr float kOpenForce = 2;       // [N] at the tips, maximum with which jaws open against thread round them
+constexpr float kSinks = 10e-6f;      // [m] in a step
+constexpr float kThreadSpeed = 0.8f;  // [m/s] of a node at most: thread::Settings::max_move
+constexpr float kCloseForce = 3;      // [N] at the tip of a jaw, maximum with which jaws close on tissue that they do not hold
 
 // Velocity of the hand's target, from the target of the last step.
 struct Wish {
@@ -501,13 +502,19 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
     moving.v = clamped(moving.v, kMaxSpeed), moving.w = clamped(moving.w, kMaxSpin);
     BodiesScratch::Moving slow = moving;
     slow.v = clamped(moving.v, loose ? kLooseSpeed : kMaxSpeed), slow.w = clamped(moving.w, loose ? kLooseSpin : kMaxSpin);
-    // One that thread or a contact throws away faster than this would sink into it: it is slowed after its step.
+    // One that thread or a contact throws away faster than this would sink into it: it is slowed after its step, unless its
+    // swage would outrun its thread.
     const auto sinks = [&](const Row& row) {
       if (row.kind != Row::Kind::contact || (row.a != b && row.b != b) || dot(row.impulse, row.axis) <= 0) return false;
       const Vec3 r = row.a == b ? row.ra : row.rb, lost = point_speed(moving, r) - point_speed(slow, r);
       return (row.a == b ? dot(lost, row.axis) : -dot(lost, row.axis)) * h > kSinks;
     };
-    if (moving.thread_push == Vec3{} && std::none_of(k.row.begin(), k.row.end(), sinks)) moving.v = slow.v, moving.w = slow.w;
+    const auto outruns = [&](const Row& row) {
+      return row.kind == Row::Kind::spring && row.a == b && length2(point_speed(moving, row.ra)) > kThreadSpeed * kThreadSpeed;
+    };
+    if ((moving.thread_push == Vec3{} && std::none_of(k.row.begin(), k.row.end(), sinks)) ||
+        std::any_of(k.row.begin(), k.row.end(), outruns))
+      moving.v = slow.v, moving.w = slow.w;
     body.hand_force = body.hand_torque = {};
     if (moving.held) {
       const Wish w = wish_of(m, body, target[b], h);
