@@ -24,7 +24,7 @@ constexpr float kBetween = 0.4e-3f;  // [m] apart
 constexpr float kFast = 0.2f;
 constexpr float kOnDrape = 0.4e-3f;   // [m]
 constexpr float kOpenForce = 2;       // [N] at the tips, maximum with which jaws open against thread round them
-constexpr float kSinks = 10e-6f;      // [m] in a step
+constexpr float kSinks = 10e-6f;      // [m] in a step, by which a slowed needle would come deeper than the solve allows
 constexpr float kThreadSpeed = 0.8f;  // [m/s] of a node at most: thread::Settings::max_move
 constexpr float kCloseForce = 3;      // [N] at the tip of a jaw, maximum with which jaws close on tissue that they do not hold
 
@@ -512,8 +512,9 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
     const auto outruns = [&](const Row& row) {
       return row.kind == Row::Kind::spring && row.a == b && length2(point_speed(moving, row.ra)) > kThreadSpeed * kThreadSpeed;
     };
-    if ((moving.thread_push == Vec3{} && std::none_of(k.row.begin(), k.row.end(), sinks)) ||
-        std::any_of(k.row.begin(), k.row.end(), outruns))
+    const bool too_fast = !(slow.v == moving.v && slow.w == moving.w);
+    if (too_fast && ((moving.thread_push == Vec3{} && std::none_of(k.row.begin(), k.row.end(), sinks)) ||
+                     std::any_of(k.row.begin(), k.row.end(), outruns)))
       moving.v = slow.v, moving.w = slow.w;
     body.hand_force = body.hand_torque = {};
     if (moving.held) {

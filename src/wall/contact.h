@@ -36,11 +36,14 @@ struct Contact {
   Vec3 impulse;  // [N s] on `point`
 };
 
+// [N/m] of a contact, by which the wall gives in its thickness: estimated. The solve knows columns as stiff in it.
+constexpr float kThicknessStiffness = 60e3f;
+
 struct ContactSolver {
   float reach = 0.0003f;  // [m] margin: gaps up to this plus two steps of relative motion are candidates
   // [m/N] of a contact. Without it, a point and a face that share columns, as in a crease, press each other with 1000 N: the
   // wall between them cannot yield in its thickness.
-  float softness = 1 / 60e3f;
+  float softness = 1 / kThicknessStiffness;
   float push_out = 0.2f;  // [m/s] maximum speed at which overlap is resolved
   // Sweeps come first: at rest, with the warm start, one suffices. Adjacent contacts are strongly coupled, and sweeps alone
   // converge slowly. Then all contacts that touch are solved together (ADMM for Coulomb friction: Tasora, Mangoni,
