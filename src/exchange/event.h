@@ -19,7 +19,7 @@ enum class EventKind : uint8_t {
   particle_attached,  // which: particle (paper 2.2, fig. 4), value: its distance to the tip [m]
   particle_released,  // which: particle, value: its displacement [m] (fig. 5b)
   tip_exited,         // which: bite
-  bite_withdrawn,     // the needle was withdrawn; which: bite
+  bite_withdrawn,     // the needle was withdrawn, or the thread drawn out of the bite; which: bite
   suture_point,       // which: suture point, value: index of the bite
   bite_completed,     // which: bite, value: length from entry to exit [m]
   particle_passed,    // which: suture point, value: +1 toward the needle, -1 toward the free end (figs. 7, 8)

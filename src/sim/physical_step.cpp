@@ -422,7 +422,7 @@ void show_tears(const Model& model, State& state, SutureContext& sewing) {
 }
 
 // Where the thread runs through its holes now, and how taut it is there. A point whose hole the thread has left again is gone.
-void show_points(const Model& model, State& state) {
+void show_points(const Model& model, State& state, SutureContext& sewing) {
   const thread::State& t = state.physical.world.thread;
   for (uint32_t n = 0; n < state.suture.suture.size(); ++n) {
     Suture& suture = state.suture.suture[n];
@@ -434,15 +434,28 @@ void show_points(const Model& model, State& state) {
       suture.point.pop_back(), hole.pop_back();
       if (!suture.open.empty()) suture.open.front().phase = NeedlePhase::through;
     }
-    for (size_t i = 0; i < hole.size(); ++i) {
+    for (size_t i = 0; i < hole.size();) {
       const auto e =
           std::find_if(t.eyelet.begin(), t.eyelet.end(), [&](const thread::Eyelet& x) { return x.point == hole[i]; });
-      if (e == t.eyelet.end()) continue;
+      if (e == t.eyelet.end()) {  // its end was drawn through
+        const uint32_t which = suture.point[i].bite;
+        Bite& bite = suture.bite[which];
+        erase_anchor(strand, suture, suture.point[i].anchor);
+        suture.point.erase(suture.point.begin() + static_cast<std::ptrdiff_t>(i));
+        hole.erase(hole.begin() + static_cast<std::ptrdiff_t>(i));
+        const auto in_it = [&](const SuturePoint& p) { return p.bite == which; };
+        if (!bite.complete || std::any_of(suture.point.begin(), suture.point.end(), in_it)) continue;
+        bite.canceled = true, bite.complete = bite.has_exit = false;
+        sewing.report(n, EventKind::bite_withdrawn, kNoHand, which, bite.depth,
+                      position_of(bite.entry.point, state.solver.x.data()));
+        continue;
+      }
       ThreadAnchor& a = strand.anchor[suture.point[i].anchor];
       const uint32_t node = e->segment - (first - model.solver.tissue);
       a.slot = first + std::clamp(node, 1u, count - 2);
       a.tension_free = node > 0 ? strand.tension[node - 1] : 0;
       a.tension_needle = node + 1 < strand.tension.size() ? strand.tension[node + 1] : 0;
+      ++i;
     }
   }
 }
@@ -552,7 +565,7 @@ void step_physical(const Model& model, State& state, const TickInput& given, Job
   show_grips(model, state, sewing);
   show_bites(model, state, sewing, k);
   show_tears(model, state, sewing);
-  show_points(model, state);
+  show_points(model, state, sewing);
   watch_pulls(model, state);
   bleed(model, state, k.cut);
   renew_cut_picture(model, state, k.cut);

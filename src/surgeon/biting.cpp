@@ -19,6 +19,10 @@ constexpr float kEdgeGrip = 0.003f;   // [m] of the rim between the forceps' jaw
 constexpr float kEdgesGrip = 0.002f;  // [m] of the grasp point below two edges
 constexpr float kTooShallow = 0.4f;   // of the wall, for a shallow bite
 constexpr float kDeeper = 0.0005f;    // [m]
+constexpr float kOutFor = 0.3f;       // [s] that a needle is out of the tissue before its bite counts as failed
+constexpr int kAgain = 2;             // times that a bite is made again from the start
+constexpr float kBeside = 0.002f;     // [m] from the place where it failed
+constexpr float kDrawOut = 20;        // [s] to draw a thread out
 constexpr float kScoopSpeed = 0.7f;   // of the needle's speed, with which it is lifted then
 
 }  // namespace
@@ -92,7 +96,10 @@ bool Scripted::make_bite(const Snapshot& seen) {
   enum { hover, approach, drive, withdraw, let_go, over, down, close, release, retreat, bring };
   const float speed = skill_.speed, psi_bite = half_bite_angle();
   const Pose& needle = seen.active().needle.pose;
-  if (stage_ == hover && waited_ <= dt_) aim();
+  if (stage_ == hover && waited_ <= dt_) {
+    aim();
+    aim_up_ += kBeside * static_cast<float>(again_), depth_fix_ -= kDeeper * static_cast<float>(again_);  // clear of the slit
+  }
   switch (stage_) {
     case hover: {  // to a position beside the bite, clear of the organ
       doing_ = name_of_bite() + "approach";
@@ -115,6 +122,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       psi_ = -psi_bite - 0.45f;
       if (move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), careful())) {
         bites_before_ = seen.active().bite.size();
+        points_before_ = seen.active().suture_point.size();
         go(drive);
       } else if (!patience(5)) {
         gave_up_ = true;
@@ -210,14 +218,53 @@ bool Scripted::make_bite(const Snapshot& seen) {
       if (!patience(3))  // stuck: an outward pull frees the back end
         f.at += (f.out + (plan_.lift > 0 ? 0.4f : 0.0f) * f.up) * std::min(0.02f, 0.01f * (waited_ - 3));
       move(kForceps, holding(kForceps, needle_at(f, psi_)), 2 * speed);
-      if (!seen.active().needle.in_tissue && passages(seen, true) >= bite().walls) {
-        pull_from_ = hand_[kForceps].pose;
+      const bool out = !seen.active().needle.in_tissue, complete = passages(seen, true) >= bite().walls;
+      if (out) pull_from_ = hand_[kForceps].pose;
+      if (out && complete) {
+        if (task_ + 1 == plan_.task.size() || plan_.task[task_ + 1].kind != TaskKind::pull_tail) again_ = 0;
         return true;
       }
+      steady_ = out ? steady_ + dt_ : 0;
+      if (steady_ > kOutFor) return bite_again(seen);
       if (!patience(8)) gave_up_ = true;
       return false;
     }
   }
+}
+
+bool Scripted::bite_again(const Snapshot& seen) {
+  // Thread cannot be drawn out of one bite alone.
+  const bool threaded = seen.active().suture_point.size() > points_before_;
+  if (++again_ > kAgain || (threaded && points_before_ > 0)) return gave_up_ = true, false;
+  ++retries_;
+  const int which = static_cast<int>(place_);
+  std::vector<Task> task;
+  if (threaded) task.push_back({TaskKind::draw_out});
+  task.push_back({TaskKind::hand_back});
+  const auto holds = [&](const Task& t) { return t.kind == TaskKind::hold_edge && t.which == which; };
+  if (std::any_of(plan_.task.begin(), plan_.task.end(), holds)) task.push_back({TaskKind::hold_edge, which});
+  task.push_back({TaskKind::bite, which});
+  if (plan_.task[task_].kind == TaskKind::pull_tail) task.push_back({TaskKind::pull_tail});
+  plan_.task.insert(plan_.task.begin() + static_cast<std::ptrdiff_t>(task_) + 1, task.begin(), task.end());
+  return true;
+}
+
+bool Scripted::draw_out(const Snapshot& seen) {
+  rest_aside(seen, kNeedleHolder);
+  if (seen.active().suture_point.size() <= points_before_) return true;
+  if (!holds_needle(seen, kForceps) || !patience(kDrawOut)) return gave_up_ = true, false;
+  enum { sweep, lift };
+  if (stage_ == sweep && task_ > 0 && plan_.task[task_ - 1].kind == TaskKind::pull_tail) go(lift);
+  if (stage_ == sweep) {  // on along its arc: it may still lie between two edges
+    const float end = half_bite_angle() + kPi + 0.5f;
+    psi_ = std::min(psi_ + 2 * skill_.drive_speed / shape().needle_radius * dt_, end);
+    move(kForceps, holding(kForceps, needle_at(frame_, psi_)), skill_.speed);
+    if (psi_ >= end && waited_ > 0.5f) go(lift);
+    return false;
+  }
+  const float gently = std::clamp(1.5f - length(seen.tool[kForceps].force), 0.02f, 1.0f);
+  move(kForceps, {pull_from_.p + frame_.out * 0.3f, hand_[kForceps].pose.q}, gently * 0.5f * skill_.speed);
+  return false;
 }
 
 void Scripted::hold_strand_straight(const Snapshot& seen, BiteFrame& f, float psi) const {
@@ -242,7 +289,7 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
       else
         move(kNeedleHolder, {stitch(seen) + Vec3{0.09f * plan_.driver_side, 0.09f, 0}, tying_pose(kNeedleHolder, {}).q},
              skill_.speed);
-      const size_t next = std::min(place_ + 1, plan_.place.size() - 1);
+      const size_t next = again_ > 0 ? place_ : std::min(place_ + 1, plan_.place.size() - 1);
       // Before a bite the needle is moved beside its target; before a knot high above the stitch, with its tip up and out of
       // reach.
       BiteFrame f = present ? frame(seen, next) : BiteFrame{stitch(seen), {0, 1, 0}, {0, 0, -1}, {1, 0, 0}};

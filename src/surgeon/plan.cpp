@@ -542,10 +542,10 @@ std::span<const char* const> plan_names() {
 }
 
 std::span<const char* const> task_names() {
-  static constexpr const char* kName[] = {"pick_up",     "hold_edge",  "bite",      "pull_tail", "pull_slack",  "pull_together",
-                                          "hand_back",   "regrip",     "draw",      "throw",     "lock_strand", "cut_long",
-                                          "cut_tail",    "cut_needle", "take_both", "discard",   "fresh",       "gather",
-                                          "approximate", "leave",      "rest"};
+  static constexpr const char* kName[] = {"pick_up",       "hold_edge",   "bite",       "draw_out",  "pull_tail", "pull_slack",
+                                          "pull_together", "hand_back",   "regrip",     "draw",      "throw",     "lock_strand",
+                                          "cut_long",      "cut_tail",    "cut_needle", "take_both", "discard",   "fresh",
+                                          "gather",        "approximate", "leave",      "rest"};
   static_assert(std::size(kName) == static_cast<size_t>(TaskKind::rest) + 1);
   return kName;
 }

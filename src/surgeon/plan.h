@@ -36,6 +36,7 @@ enum class TaskKind {
   pick_up,        // the needle holder takes the needle of suture `which` from the drape
   hold_edge,      // the forceps grasps the rim at place[which], against the needle
   bite,           // one sweep of the needle at place[which]; the forceps pulls it out
+  draw_out,       // the forceps draws the thread out of a bite that has missed a wall
   pull_tail,      // the forceps pulls thread through until the tail has the planned length
   pull_slack,     // until the span before the last bite has no slack
   pull_together,  // until the last midpoint is closed

@@ -213,11 +213,17 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
     case TaskKind::bite:
       place_ = static_cast<size_t>(task.which);
       return make_bite(seen);
+    case TaskKind::draw_out:
+      doing_ = name_of_bite() + "draw the thread out";
+      return draw_out(seen);
     case TaskKind::pull_tail:
     case TaskKind::pull_slack:
     case TaskKind::pull_together:
       doing_ = name_of_bite() + "pull the thread";
-      return pull(task.kind, seen);
+      if (!pull(task.kind, seen)) return false;
+      if (plan_.pull > 0 && task.kind == TaskKind::pull_tail && !is_sound(seen)) return bite_again(seen);
+      again_ = 0;
+      return true;
     case TaskKind::hand_back:
       doing_ = name_of_bite() + "return the needle";
       return take_back(seen, true);

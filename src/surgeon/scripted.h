@@ -106,6 +106,13 @@ class Scripted final : public Surgeon {
   // The forceps keeps an edge that it holds, else it waits clear of the work.
   void hold_or_rest(const Snapshot& seen);
   bool make_bite(const Snapshot& seen);
+  // The needle is out, and a wall has no thread in it. Inserts the tasks that make the bite again, up to twice; false: it
+  // cannot be done.
+  bool bite_again(const Snapshot& seen);
+  bool is_sound(const Snapshot& seen) const {  // thread runs through every wall of the bite
+    return seen.active().suture_point.size() >= points_before_ + 2 * static_cast<size_t>(bite().walls);
+  }
+  bool draw_out(const Snapshot& seen);
   // Walls that the needle has passed since this bite began; complete: with its back end too. A withdrawn bite stays listed
   // and counts for nothing.
   int passages(const Snapshot& seen, bool complete) const;
@@ -199,11 +206,13 @@ class Scripted final : public Surgeon {
   size_t place_ = 0, bites_before_ = 0;
   BiteFrame frame_;
   float psi_ = 0, aim_along_ = 0, aim_up_ = 0, depth_error_ = 0, aim_turn_ = 0;
-  float pause_left_ = 0;  // [s] of thought before this task
-  float strength_ = 1;    // of the pulls of this task, relative
-  float miss_by_ = 0;     // [m] distance by which this grasp misses
-  float depth_fix_ = 0;   // [m] correction from failed attempts at this bite; positive: shallower
-  float next_fix_ = 0;    // [m] of the attempt that is withdrawn, in addition
+  float pause_left_ = 0;      // [s] of thought before this task
+  float strength_ = 1;        // of the pulls of this task, relative
+  float miss_by_ = 0;         // [m] distance by which this grasp misses
+  float depth_fix_ = 0;       // [m] correction from failed attempts at this bite; positive: shallower
+  float next_fix_ = 0;        // [m] of the attempt that is withdrawn, in addition
+  int again_ = 0;             // times that this bite is made again from the start
+  size_t points_before_ = 0;  // suture points of the suture, when the sweep began
   Pose pull_from_;
   float scooped_ = 0;            // [m] by which this bite was lifted
   float steady_ = 0;             // [s] of full tension
