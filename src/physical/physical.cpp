@@ -144,6 +144,7 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
   // Contacts that share a point: the first of them, how many, the node of the last one.
   size_t group = 0, shared = 0;
   uint32_t last_node = 0;
+  constexpr float kApart = 0.1e-3f;  // [m]
   k.foot.clear();
   const auto add = [&](uint32_t node, const Foot& foot, const thread::SoftContact* memory, bool may_share) {
     thread::SoftContact c;
@@ -152,7 +153,9 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       c.normal_impulse = memory->normal_impulse;
       c.friction_impulse = memory->friction_impulse, c.drift = memory->drift;
     }
-    if (may_share && shared > 0 && shared < 3 && last_node + 1 == node && !s.thread.broken[last_node] &&
+    // A contact that presses has a point of its own: its friction elsewhere would turn the wall without turning the thread.
+    const bool touches = c.normal_impulse > 0 || foot.gap - r < kApart;
+    if (may_share && !touches && shared > 0 && shared < 3 && last_node + 1 == node && !s.thread.broken[last_node] &&
         dot(k.contact[group].normal, c.normal) > 0.95f) {
       c.point = k.contact[group].point;
       ++shared;
@@ -369,8 +372,7 @@ void step_thread(const Model& m, State& s, Scratch& k, const Hands& hands) {
   const size_t holes = k.point.size();
   for (thread::Eyelet& e : t.eyelet) e.point = awake.point_of[e.point];
   if (m.surface_contact) find_contacts(m, s, k);
-  // Friction on the surface acts at the mid-surface: its small moment would couple every contact to every other.
-  k.coupling.set_points(m.wall, s.wall.topology, k.point, k.offset, holes);
+  k.coupling.set_points(m.wall, s.wall.topology, k.point, k.offset);
   k.coupling.begin(m.wall, s.wall);
   for (size_t i = 0; i < k.contact.size(); ++i) k.contact[i].offset = k.foot[i].at - k.coupling.at[k.contact[i].point];
   k.tilt.clear();
@@ -424,7 +426,8 @@ void step_thread(const Model& m, State& s, Scratch& k, const Hands& hands) {
   if (some_asleep) hold_asleep(s.sleep, k.holds, k.bodies.tool);
   const bool quiet = find_quiet(m, s, hands, k.holds, k.bodies.tool, awake);
   k.coupling.end(s.wall, k.wall);
-  if (quiet) fall_asleep(m, s, k.coupling, k.wall, awake, k.contact, k.holds, k.bodies.tool);
+  note_loads(m, s, k.coupling, k.wall, awake, k.contact);
+  if (quiet) fall_asleep(m, s, awake, k.holds, k.bodies.tool);
   if (m.tear.on && m.surface_contact) {
     awake.impulse.assign(s.hole.size(), {});
     for (size_t i = 0; i < holes; ++i) awake.impulse[awake.hole_of[i]] = k.coupling.impulse[i];
@@ -482,6 +485,14 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
   if (bodies) solve_bodies(m.bodies, m.wall, s.wall, k.wall, s.bodies, hands.targets, k.bodies);
   wall::finish_step(m.wall, s.wall, jobs);
   if (bodies) end_bodies(m, s, k);
+  // Lips and bodies have moved the wall after the thread saw it move. To a node on it, that is drift: its friction returns it.
+  size_t at = 0;
+  for (const thread::SoftContact& c : k.contact) {
+    while (s.contact[at].node < c.node) ++at;
+    const Vec3 beside = k.coupling.now(c.point, s.wall) - (k.coupling.at[c.point] + k.moved[c.point]);
+    if (c.normal_impulse > 0) s.contact[at].drift -= beside - c.normal * dot(beside, c.normal);
+    ++at;
+  }
   k.landing = 0;
   for (size_t i = 0; i < k.point.size(); ++i)
     k.landing = std::max(k.landing, distance(k.coupling.now(i, s.wall), k.coupling.at[i] + k.moved[i]));

@@ -12,11 +12,13 @@
 namespace catgut::physical {
 namespace {
 
-constexpr float kQuietSpeed = 5e-3f;  // [m/s] when it is looked at: a swing that returns is not rest
-constexpr uint32_t kLook = 50;        // [steps] after which it is looked at again within its window
-constexpr float kSettled = 0.1e-3f;   // [m] in a window: rest of a strand that carries nothing
-constexpr float kAway = 12e-3f;       // [m] corners of a face that the thread may touch are nearer than this
-constexpr size_t kBlock = 8;          // nodes that share a bound
+constexpr float kQuietSpeed = 20e-3f;  // [m/s] when it is looked at: a swing that returns is not rest
+constexpr float kInBite = 40e-6f;      // [m] in a window, of thread in a bite
+constexpr size_t kBeside = 3;          // [nodes] beyond its holes
+constexpr uint32_t kLook = 50;         // [steps] after which it is looked at again within its window
+constexpr float kSettled = 0.1e-3f;    // [m] in a window: rest of a strand that carries nothing
+constexpr float kAway = 12e-3f;        // [m] corners of a face that the thread may touch are nearer than this
+constexpr size_t kBlock = 8;           // nodes that share a bound
 
 Vec3 mid(const wall::State& w, uint32_t column) { return wall::vec3(w.motion.x[2 * column]); }
 Vec3 director(const wall::State& w, uint32_t column) { return wall::vec3(w.motion.x[2 * column + 1]); }
@@ -89,6 +91,12 @@ bool carries_nothing(const Model& m, const thread::State& t, const Sleep::Strand
   return true;
 }
 
+// Steps of a strand's window in which its impulses were noted so far.
+uint32_t steps_noted(const SleepModel& m, const Sleep::Strand& strand) {
+  const uint32_t before = m.window > kLook ? m.window - kLook : 0;
+  return strand.quiet > before ? strand.quiet - before : 0;
+}
+
 // A list whose entries name their strands, without those of one strand.
 template <typename Entries>
 void forget(Entries& entries, uint32_t strand) {
@@ -152,15 +160,6 @@ void note_wall(const Model& m, State& s, uint32_t strand) {
   }
 }
 
-// [m/s] of the wall at a strand's holes.
-Vec3 wall_speed(const State& s, uint32_t strand) {
-  Vec3 sum{};
-  float count = 0;
-  for (const Sleep::Watched& w : s.sleep.watched)
-    if (w.strand == strand) sum += wall::vec3(s.wall.motion.v[2 * w.column]), ++count;
-  return count > 0 ? sum / count : Vec3{};
-}
-
 // The columns of a strand's holes, at the beginning of its window.
 void note_holes(const Model& m, State& s, uint32_t strand) {
   Sleep& z = s.sleep;
@@ -193,11 +192,17 @@ bool is_quiet(const Model& m, const State& s, uint32_t k, const Carry& by) {
   const Sleep& z = s.sleep;
   const thread::State& t = s.thread;
   const Sleep::Strand& strand = z.strand[k];
-  const float still = carries_nothing(m, t, strand) ? kSettled : m.sleep.still + by.strain;
-  const Vec3 speed = by.moves() ? wall_speed(s, k) : Vec3{};
+  const float still = carries_nothing(m, t, strand) ? kSettled : m.sleep.still + 2 * by.strain;
+  const Vec3 speed = (by.to - by.from) / (static_cast<float>(strand.quiet) * m.wall.step);  // of the wall
   const auto [low, high] = without_tails(t, strand);
+  // Thread in a bite creeps to and fro in its holes when the wall beside it is strained. Its tension says what that does.
+  size_t bite_low = strand.last + 1, bite_high = strand.first;
+  for (const thread::Eyelet& e : t.eyelet)
+    if (by.moves() && e.segment >= strand.first && e.segment < strand.last)
+      bite_low = std::min(bite_low, e.segment - std::min(kBeside, size_t{e.segment})), bite_high = e.segment + 1 + kBeside;
   for (size_t i = strand.first; i <= strand.last; ++i) {
-    const float most = i < low || i > high ? kSettled : still;
+    const bool tail = i < low || i > high, bite = i >= bite_low && i <= bite_high;
+    const float most = tail ? kSettled : bite ? std::max(still, kInBite) : still;
     if (length2(t.position(i) - by.place(z.from[i])) > most * most || length(t.v.at(i) - speed) >= kQuietSpeed) return false;
   }
   for (size_t i = strand.first; i < strand.last; ++i)
@@ -247,25 +252,6 @@ bool sleeps_on(const Model& m, const State& s, uint32_t strand, std::span<const 
   return least > 0;
 }
 
-template <typename To, typename From>
-void take(To& to, const From& from, std::span<const uint32_t> node) {
-  to.resize(node.size());
-  for (size_t i = 0; i < node.size(); ++i) to[i] = from[node[i]];
-}
-template <typename To, typename From>
-void put(To& to, const From& from, std::span<const uint32_t> node, size_t count) {
-  for (size_t i = 0; i < count; ++i) to[node[i]] = from[i];
-}
-// The columns of nodes in both threads.
-template <typename Visit>
-void each_node_column(thread::State& to, const thread::State& from, Visit visit) {
-  using thread::Columns3;
-  using thread::State;
-  for (Columns3 State::*c : {&State::x, &State::fine, &State::v, &State::plane_friction, &State::plane_drift, &State::listed})
-    for (thread::Column Columns3::*d : {&Columns3::x, &Columns3::y, &Columns3::z}) visit((to.*c).*d, (from.*c).*d);
-  visit(to.warm, from.warm), visit(to.plane_normal, from.plane_normal);
-}
-
 }  // namespace
 
 bool touches(const thread::State& t, const Sleep::Strand& strand, Vec3 a, Vec3 b, float reach) {
@@ -290,22 +276,10 @@ bool Sleep::at(uint32_t node) const {
   return after != strand.end() && after->asleep;
 }
 
-void AwakeThread::reserve(const State& s) {
-  const size_t nodes = s.thread.nodes(), pairs = std::max<size_t>(4096, s.thread.key.capacity());
-  each_node_column(part, part, [&](thread::Column& c, const thread::Column&) { c.reserve(nodes); });
-  part.rest.reserve(nodes), part.tension.reserve(nodes), part.broken.reserve(nodes);
-  part.key.reserve(pairs), part.budget.reserve(pairs), part.crossing.reserve(pairs), part.eyelet.reserve(thread::kMaxEyelets);
-  node.reserve(nodes), part_node.reserve(nodes), hold.reserve(256), hold_of.reserve(256), pull.reserve(256);
-  point_of.reserve(thread::kMaxEyelets), hole_of.reserve(thread::kMaxEyelets), impulse.reserve(thread::kMaxEyelets);
-  key.reserve(2 * pairs), budget.reserve(2 * pairs), crossing.reserve(2 * pairs), eyelet.reserve(thread::kMaxEyelets);
-  contact.reserve(2 * thread::kMaxSoftPoints), ready.reserve(nodes), disturbed.reserve(nodes), box.reserve(nodes),
-      carry.reserve(nodes), far_due.reserve(nodes);
-}
-
 void reserve(const State& s, Sleep& z) {
   const size_t nodes = s.thread.nodes(), columns = wall::columns(s.wall);
   z.from.reserve(nodes), z.tension.reserve(nodes), z.strand.reserve(nodes);
-  z.load.reserve(4 * columns + 64), z.watched.reserve(16 * columns + 64), z.held.reserve(256), z.touched.reserve(1024);
+  z.load.reserve(8 * columns + 64), z.watched.reserve(16 * columns + 64), z.held.reserve(256), z.touched.reserve(1024);
 }
 
 void wake(const Model& m, State& s) {
@@ -380,10 +354,11 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
 }
 
 void press_asleep(const Sleep& z, const AwakeThread& awake, wall::State& wall, wall::Scratch& k) {
-  if (z.load.empty()) return;
+  if (z.load.empty() || !z.any()) return;
   std::fill(k.external.begin(), k.external.end(), wall::Float4{});
   for (const Sleep::Load& load : z.load)
-    k.external[load.at] = wall::float4(wall::vec3(k.external[load.at]) + rotate(awake.carry[load.strand].turn, load.impulse));
+    if (z.strand[load.strand].asleep)
+      k.external[load.at] = wall::float4(wall::vec3(k.external[load.at]) + rotate(awake.carry[load.strand].turn, load.impulse));
   wall::apply_impulses(wall, k, k.external);
   std::fill(k.external.begin(), k.external.end(), wall::Float4{});
 }
@@ -399,82 +374,6 @@ void hold_asleep(const Sleep& z, std::span<thread::Hold> holds, std::span<thread
   for (const Sleep::Touched& t : z.touched) tools[t.tool].force_a += t.force_a, tools[t.tool].force_b += t.force_b;
 }
 
-void gather(const State& s, AwakeThread& k) {
-  const thread::State& t = s.thread;
-  thread::State& p = k.part;
-  k.node.clear(), k.part_node.assign(t.nodes(), wall::kNone);
-  for (const Sleep::Strand& strand : s.sleep.strand)
-    for (uint32_t i = strand.first; i <= strand.last && !strand.asleep; ++i)
-      k.part_node[i] = static_cast<uint32_t>(k.node.size()), k.node.push_back(i);
-  each_node_column(p, t, [&](thread::Column& to, const thread::Column& from) { take(to, from, k.node); });
-  const size_t segments = k.node.size() - 1;
-  p.rest.resize(segments), p.tension.resize(segments), p.broken.resize(segments);
-  for (size_t i = 0; i < segments; ++i)
-    p.rest[i] = t.rest[k.node[i]], p.tension[i] = t.tension[k.node[i]], p.broken[i] = t.broken[k.node[i]];
-  p.key.clear(), p.budget.clear(), p.crossing.clear(), p.eyelet.clear();
-  for (size_t i = 0; i < t.key.size(); ++i) {
-    const uint32_t first = k.part_node[thread::segment_of(t.key[i])], other = thread::partner_of(t.key[i]);
-    const uint32_t second = other < thread::kTool ? k.part_node[other] : other;
-    if (first == wall::kNone || second == wall::kNone) continue;
-    p.key.push_back(first << 16 | second), p.budget.push_back(t.budget[i]), p.crossing.push_back(t.crossing[i]);
-  }
-  for (thread::Eyelet e : t.eyelet)
-    if (k.part_node[e.segment] != wall::kNone) e.segment = k.part_node[e.segment], p.eyelet.push_back(e);
-  p.travel = t.travel, p.overflow = t.overflow, p.refreshes = t.refreshes;
-}
-
-void show_awake(std::span<const thread::Hold> holds, std::span<const thread::Pull> pulls,
-                std::span<thread::SoftContact> contacts, AwakeThread& k) {
-  k.hold.clear(), k.hold_of.clear(), k.pull.clear();
-  for (uint32_t i = 0; i < holds.size(); ++i) {
-    if (k.part_node[holds[i].node] == wall::kNone) continue;
-    k.hold.push_back(holds[i]), k.hold_of.push_back(i);
-    k.hold.back().node = k.part_node[holds[i].node];
-  }
-  for (const thread::Pull& pull : pulls) k.pull.push_back({k.part_node[pull.node], pull.force});  // all are awake then
-  for (thread::SoftContact& c : contacts) c.node = k.part_node[c.node];
-}
-
-void scatter(State& s, AwakeThread& k) {
-  thread::State& t = s.thread;
-  thread::State& p = k.part;
-  each_node_column(t, p, [&](thread::Column& to, const thread::Column& from) { put(to, from, k.node, k.node.size()); });
-  for (size_t i = 0; i + 1 < k.node.size(); ++i) t.tension[k.node[i]] = p.tension[i], t.broken[k.node[i]] = p.broken[i];
-  // The pairs of sleeping strands stay as they are; both lists are sorted.
-  k.key.clear(), k.budget.clear(), k.crossing.clear();
-  size_t old = 0;
-  const auto keep_until = [&](uint32_t end) {
-    for (; old < t.key.size() && t.key[old] < end; ++old) {
-      const uint32_t other = thread::partner_of(t.key[old]);
-      const bool awake = k.part_node[thread::segment_of(t.key[old])] != wall::kNone;
-      if (awake && (other >= thread::kTool || k.part_node[other] != wall::kNone)) continue;
-      k.key.push_back(t.key[old]), k.budget.push_back(t.budget[old]), k.crossing.push_back(t.crossing[old]);
-    }
-  };
-  for (size_t i = 0; i < p.key.size(); ++i) {
-    const uint32_t other = thread::partner_of(p.key[i]);
-    const uint32_t key = k.node[thread::segment_of(p.key[i])] << 16 | (other < thread::kTool ? k.node[other] : other);
-    keep_until(key);
-    k.key.push_back(key), k.budget.push_back(p.budget[i]), k.crossing.push_back(p.crossing[i]);
-  }
-  keep_until(UINT32_MAX);
-  t.key.assign(k.key.begin(), k.key.end()), t.budget.assign(k.budget.begin(), k.budget.end());
-  t.crossing.assign(k.crossing.begin(), k.crossing.end());
-  k.eyelet.assign(t.eyelet.begin(), t.eyelet.end());
-  t.eyelet.clear();
-  size_t mine = 0;
-  const auto mine_until = [&](uint32_t segment) {
-    for (; mine < p.eyelet.size() && k.node[p.eyelet[mine].segment] < segment; ++mine) {
-      thread::Eyelet e = p.eyelet[mine];
-      e.segment = k.node[e.segment], t.eyelet.push_back(e);
-    }
-  };
-  for (const thread::Eyelet& e : k.eyelet)
-    if (k.part_node[e.segment] == wall::kNone) mine_until(e.segment), t.eyelet.push_back(e);
-  mine_until(UINT32_MAX);
-  t.travel = p.travel, t.overflow = p.overflow, t.refreshes = p.refreshes;
-}
-
 bool find_quiet(const Model& m, State& s, const Hands& hands, std::span<const thread::Hold> holds,
                 std::span<const thread::ToolCapsule> tools, AwakeThread& awake) {
   Sleep& z = s.sleep;
@@ -486,7 +385,7 @@ bool find_quiet(const Model& m, State& s, const Hands& hands, std::span<const th
     Sleep::Strand& strand = z.strand[k];
     if (strand.asleep) continue;
     if (disturbed) {
-      strand.quiet = 0;
+      strand.quiet = 0, forget(z.load, k);
       continue;
     }
     const bool begun = strand.quiet > 0;
@@ -497,7 +396,7 @@ bool find_quiet(const Model& m, State& s, const Hands& hands, std::span<const th
     if (quiet && strand.quiet <= m.sleep.window) continue;
     awake.ready[k] = quiet, any |= quiet;
     if (quiet) continue;
-    strand.quiet = 1;  // a new window
+    strand.quiet = 1, forget(z.load, k);  // a new window
     for (size_t i = strand.first; i <= strand.last; ++i) z.from[i] = t.position(i);
     for (size_t i = strand.first; i < strand.last; ++i) z.tension[i] = t.tension[i];
     note_holes(m, s, k);
@@ -517,15 +416,51 @@ bool find_quiet(const Model& m, State& s, const Hands& hands, std::span<const th
 
 void after_cut(const Model& m, State& s) {
   Sleep& z = s.sleep;
-  if (!z.load.empty()) wake(m, s);
+  if (std::any_of(z.load.begin(), z.load.end(), [&](const Sleep::Load& l) { return z.strand[l.strand].asleep; })) wake(m, s);
   for (uint32_t k = 0; k < z.strand.size(); ++k) {  // columns may have other numbers now
     if (z.strand[k].asleep) note_wall(m, s, k);
-    else forget(z.watched, k), z.strand[k].quiet = 0;
+    else forget(z.watched, k), forget(z.load, k), z.strand[k].quiet = 0;
   }
 }
 
-void fall_asleep(const Model& m, State& s, wall::Coupling& coupling, wall::Scratch& k, AwakeThread& awake,
-                 std::span<const thread::SoftContact> contacts, std::span<const thread::Hold> holds,
+void note_loads(const Model& m, State& s, wall::Coupling& coupling, wall::Scratch& k, AwakeThread& awake,
+                std::span<const thread::SoftContact> contacts) {
+  Sleep& z = s.sleep;
+  const uint32_t columns = wall::columns(s.wall);
+  for (uint32_t strand = 0; strand < z.strand.size(); ++strand) {
+    Sleep::Strand& me = z.strand[strand];
+    if (me.asleep || steps_noted(m.sleep, me) == 0) continue;
+    if (z.load.size() + 2 * columns > z.load.capacity()) {  // without room it stays awake
+      me.quiet = 0, forget(z.load, strand);
+      continue;
+    }
+    const auto has = [&](uint32_t node) { return node >= me.first && node <= me.last; };
+    awake.impulse.assign(coupling.impulse.begin(), coupling.impulse.end());
+    std::fill(coupling.impulse.begin(), coupling.impulse.end(), Vec3{});
+    for (const thread::Eyelet& e : s.thread.eyelet)
+      if (has(e.segment) && awake.point_of[e.point] != wall::kNone)
+        coupling.impulse[awake.point_of[e.point]] = awake.impulse[awake.point_of[e.point]];
+    for (const thread::SoftContact& c : contacts)
+      if (has(c.node)) coupling.impulse[c.point] = awake.impulse[c.point];
+    coupling.spread(k.external);
+    std::copy(awake.impulse.begin(), awake.impulse.end(), coupling.impulse.begin());
+    awake.load_at.assign(2 * columns, wall::kNone);
+    bool first = true;
+    for (uint32_t i = 0; i < z.load.size(); ++i)
+      if (z.load[i].strand == strand) awake.load_at[z.load[i].at] = i, first = false;
+    for (uint32_t i = 0; i < 2 * columns; ++i) {
+      const Vec3 impulse = wall::vec3(k.external[i]);
+      if (impulse == Vec3{}) continue;
+      if (first) me.quiet = 1 + (m.sleep.window > kLook ? m.sleep.window - kLook : 0);  // a state from before this was noted
+      first = false;
+      if (awake.load_at[i] == wall::kNone) z.load.push_back({strand, i, impulse});
+      else z.load[awake.load_at[i]].impulse += impulse;
+    }
+    std::fill(k.external.begin(), k.external.end(), wall::Float4{});
+  }
+}
+
+void fall_asleep(const Model& m, State& s, AwakeThread& awake, std::span<const thread::Hold> holds,
                  std::span<const thread::ToolCapsule> tools) {
   Sleep& z = s.sleep;
   const thread::State& t = s.thread;
@@ -534,35 +469,27 @@ void fall_asleep(const Model& m, State& s, wall::Coupling& coupling, wall::Scrat
     const uint32_t columns = wall::columns(s.wall);
     // Without room for what it would remember it stays awake.
     const auto full = [](const auto& list, size_t more) { return list.size() + more > list.capacity(); };
-    if (!awake.ready[strand] || full(z.watched, columns) || full(z.load, 2 * columns) || full(z.held, holds.size()) ||
+    Sleep::Strand& me = z.strand[strand];
+    const uint32_t noted = steps_noted(m.sleep, me);
+    if (!awake.ready[strand] || noted == 0 || full(z.watched, columns) || full(z.held, holds.size()) ||
         full(z.touched, tools.size()))
       continue;
-    Sleep::Strand& me = z.strand[strand];
     me.asleep = true;
     if (strand < awake.far_due.size()) awake.far_due[strand] = -1;
     const auto has = [&](uint32_t node) { return node >= me.first && node <= me.last; };
     forget(z.watched, strand);
-    const size_t noted = z.watched.size();
+    const size_t remembered = z.watched.size();
     note_wall(m, s, strand);
     for (size_t i = me.first; i <= me.last; ++i) z.from[i] = t.position(i);
-    // Its own impulses.
-    awake.impulse.assign(coupling.impulse.begin(), coupling.impulse.end());
-    std::fill(coupling.impulse.begin(), coupling.impulse.end(), Vec3{});
-    for (const thread::Eyelet& e : t.eyelet)
-      if (has(e.segment) && awake.point_of[e.point] != wall::kNone)
-        coupling.impulse[awake.point_of[e.point]] = awake.impulse[awake.point_of[e.point]];
-    for (const thread::SoftContact& c : contacts)
-      if (has(c.node)) coupling.impulse[c.point] = awake.impulse[c.point];
-    coupling.spread(k.external);
-    std::copy(awake.impulse.begin(), awake.impulse.end(), coupling.impulse.begin());
-    for (uint32_t i = 0; i < 2 * columns; ++i)
-      if (const Vec3 impulse = wall::vec3(k.external[i]); !(impulse == Vec3{})) z.load.push_back({strand, i, impulse});
-    for (size_t i = noted; i < z.watched.size(); ++i) {
+    // The mean of its last steps: nodes beside each other take turns in pressing.
+    awake.load_at.assign(2 * columns, wall::kNone);
+    for (uint32_t i = 0; i < z.load.size(); ++i)
+      if (z.load[i].strand == strand)
+        z.load[i].impulse = z.load[i].impulse / static_cast<float>(noted), awake.load_at[z.load[i].at] = i;
+    for (size_t i = remembered; i < z.watched.size(); ++i) {
       const uint32_t at = 2 * z.watched[i].column;
-      if (!(wall::vec3(k.external[at]) == Vec3{}) || !(wall::vec3(k.external[at + 1]) == Vec3{}))
-        z.watched[i].may_move = m.sleep.touched;
+      if (awake.load_at[at] != wall::kNone || awake.load_at[at + 1] != wall::kNone) z.watched[i].may_move = m.sleep.touched;
     }
-    std::fill(k.external.begin(), k.external.end(), wall::Float4{});
     for (const thread::Hold& hold : holds)
       if (has(hold.node)) z.held.push_back({strand, hold.node, hold.to, hold.force});
     for (uint32_t i = 0; i < tools.size(); ++i) {

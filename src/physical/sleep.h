@@ -47,7 +47,7 @@ struct Sleep {
   // Of sleeping strands, each with the number of its strand.
   struct Load {
     uint32_t strand = 0, at = 0;  // 2 * column: its mid-surface point; + 1: its director
-    Vec3 impulse;                 // [N s] of every step
+    Vec3 impulse;                 // [N s] of every step; awake: their sum over the last steps of its window
   };
   // Also of strands that are awake: the columns of their holes, at the beginning of the window.
   struct Watched {
@@ -99,6 +99,7 @@ struct AwakeThread {
   std::vector<thread::Eyelet> eyelet;
   std::vector<thread::SoftContact> contact;
   std::vector<Vec3> impulse;              // [N s] per hole
+  std::vector<uint32_t> load_at;          // per column and director: of Sleep::load; kNone: none
   std::vector<uint8_t> ready, disturbed;  // per strand: it may sleep; the wall has moved under it
   std::vector<Carry> carry;               // per strand that sleeps: what the wall has done since
   struct Box {
@@ -131,9 +132,11 @@ void scatter(State& state, AwakeThread& awake);
 // After the step of the thread. Which strands have been quiet for their whole window, as have all those near them.
 bool find_quiet(const Model& model, State& state, const Hands& hands, std::span<const thread::Hold> holds,
                 std::span<const thread::ToolCapsule> tools, AwakeThread& awake);
-// Those fall asleep. coupling: of this step, after its `end`; hole_of: holes of its first points; contacts: with their points.
-void fall_asleep(const Model& model, State& state, wall::Coupling& coupling, wall::Scratch& scratch, AwakeThread& awake,
-                 std::span<const thread::SoftContact> contacts, std::span<const thread::Hold> holds,
+// Adds to the impulses of strands that may sleep soon. coupling: of this step, after its `end`; contacts: with their points.
+void note_loads(const Model& model, State& state, wall::Coupling& coupling, wall::Scratch& scratch, AwakeThread& awake,
+                std::span<const thread::SoftContact> contacts);
+// Those that have been quiet fall asleep.
+void fall_asleep(const Model& model, State& state, AwakeThread& awake, std::span<const thread::Hold> holds,
                  std::span<const thread::ToolCapsule> tools);
 
 }  // namespace catgut::physical

@@ -204,9 +204,7 @@ Vec3 sum_of(const Weights& w, const Column<Float4>& of, uint32_t which) {
 }
 }  // namespace
 
-void Coupling::set_points(const Model& m, const Topology& t, std::span<const Point> points, std::span<const float> offsets,
-                          size_t tilting_points) {
-  tilting = std::min(tilting_points, points.size());
+void Coupling::set_points(const Model& m, const Topology& t, std::span<const Point> points, std::span<const float> offsets) {
   material_.assign(points.begin(), points.end());
   const size_t n = points.size();
   point.resize(n), at.assign(n, {}), speed.assign(n, {}), impulse.assign(n, {}), w.assign(n * n, 0);
@@ -225,6 +223,18 @@ void Coupling::reserve(size_t n) {
   terms_.reserve(n);
 }
 
+namespace {
+// 1 where a director stands on its face, 0 where it is tilted by more than 72 degrees: the wall's formula has no stiffness left
+// there, and a load would lay the director into the face.
+float upright(const Weights& w, const Motion& motion, Vec3 axis) {
+  constexpr float kLow = 0.3f, kHigh = 0.6f;
+  const Vec3 a = vec3(motion.x[2 * w.column[0]]), b = vec3(motion.x[2 * w.column[1]]), c = vec3(motion.x[2 * w.column[2]]);
+  const Vec3 n = cross(b - a, c - a);
+  const float size = length(n);
+  return size > 0 ? std::clamp((std::abs(dot(n, axis)) / size - kLow) / (kHigh - kLow), 0.0f, 1.0f) : 1.0f;
+}
+}  // namespace
+
 void Coupling::begin(const Model& m, const State& s) {
   const size_t n = point.size();
   step = m.step;
@@ -242,14 +252,15 @@ void Coupling::begin(const Model& m, const State& s) {
     if (offset[i] == 0) continue;
     const Vec3 director = sum_of(point[i], s.motion.x, 1), turn = sum_of(point[i], s.motion.v, 1);
     const float size = std::max(length(director), 1e-9f);
-    axis[i] = director / size, lever_[i] = offset[i] / size;
+    axis[i] = director / size;
     at[i] += axis[i] * offset[i];
+    lever_[i] = offset[i] / size * upright(point[i], s.motion, axis[i]);
     speed[i] += (turn - axis[i] * dot(turn, axis[i])) * lever_[i];
   }
   tilt.clear();
   for (size_t i = 0; i < n; ++i) {
     tilt_first[i] = static_cast<uint32_t>(tilt.size());
-    for (size_t j = 0; i < tilting && offset[i] != 0 && j < n; ++j) {
+    for (size_t j = 0; offset[i] != 0 && j < n; ++j) {
       if (offset[j] == 0) continue;
       float sum = 0;
       for (int a = 0; a < 4; ++a)
@@ -271,7 +282,7 @@ void Coupling::spread(Column<Float4>& to) const {
   std::fill(to.begin(), to.end(), Float4{});
   for (size_t i = 0; i < point.size(); ++i) {
     add_to(to, point[i], impulse[i]);
-    if (offset[i] == 0 || i >= tilting) continue;
+    if (offset[i] == 0) continue;
     const Vec3 moment = (impulse[i] - axis[i] * dot(impulse[i], axis[i])) * lever_[i];
     for (int c = 0; c < 4; ++c) {
       if (point[i].weight[c] == 0) continue;

@@ -104,17 +104,15 @@ struct Coupling {
   std::vector<Vec3> at, speed;  // [m], [m/s]
   std::vector<Vec3> impulse;    // [N s] in this step so far
   std::vector<float> w;         // [1/kg] n x n
-  size_t tilting = 0;           // the first points; an impulse on a later one moves the column without tilting it
   std::vector<uint32_t> tilt_first;
   std::vector<Tilt> tilt;
   Inverse inverse{512};
   float step = 0;        // [s]
   uint32_t version = 0;  // of the topology that w belongs to
 
-  // offsets: none, or one for each point. tilting_points: how many of the first tilt their columns. Allocates nothing once it
-  // has had as many points.
+  // offsets: none, or one for each point. Allocates nothing once it has had as many points.
   void set_points(const Model& model, const Topology& topology, std::span<const Point> points,
-                  std::span<const float> offsets = {}, size_t tilting_points = SIZE_MAX);
+                  std::span<const float> offsets = {});
   void reserve(size_t points);
   // After the wall's begin_step. The points given to set_points are looked up again when the topology has changed.
   void begin(const Model& model, const State& state);

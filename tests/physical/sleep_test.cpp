@@ -413,18 +413,18 @@ TEST(Sleep, a_tied_stitch_that_was_carried_holds_as_one_that_is_awake) {
   for (const validation::Throw& one : validation::three_throws()) validation::tie_throw(tied.s, t, one);
   validation::let_go(tied.s);
   thread::State& whole = tied.s.state.thread;
-  whole.broken[60] = whole.broken[whole.segments() - 61] = 1;  // tails cut
+  whole.broken[88] = whole.broken[whole.segments() - 89] = 1;  // tails cut
   tied.s.run(12);                                              // they unbend
   float wider[2], way[2], tension[2];
   int carried = 0;
   for (const bool sleep : {false, true}) {
     OnATongue o(sleep, 0.06f);
     o.s.state = tied.s.state, o.s.scratch = std::make_unique<Scratch>(o.s.model, o.s.state);
-    o.s.run(1);
+    o.s.run(3);
     const auto place = [&](size_t hole) { return mouth(o.s.model, o.s.state, o.s.state.hole[hole]); };
     const Vec3 start = place(3);
     for (int i = 1; i <= 100; ++i) {
-      o.pull({0, 0, 8e-6f * static_cast<float>(i)}), o.s.run(0.03f);
+      o.pull({0, 0, 8e-6f * static_cast<float>(i)}), o.s.run(0.06f);
       carried +=
           sleep && is_carried(o.s.state, o.s.state.sleep.strand.size() > 1 ? 1 : 0) && distance(place(3), start) > 50e-6f;
     }
