@@ -144,7 +144,7 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
   // Contacts that share a point: the first of them, how many, the node of the last one.
   size_t group = 0, shared = 0;
   uint32_t last_node = 0;
-  constexpr float kApart = 0.1e-3f;  // [m]
+  constexpr float kApart = 0.01e-3f;  // [m]
   k.foot.clear();
   const auto add = [&](uint32_t node, const Foot& foot, const thread::SoftContact* memory, bool may_share) {
     thread::SoftContact c;
@@ -165,7 +165,10 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       up.zeta = 1, middle.zeta = 0;
       const float half = distance(wall::place(up, s.wall.motion), wall::place(middle, s.wall.motion));
       c.point = static_cast<uint32_t>(k.point.size());
-      k.point.push_back(foot.point), k.offset.push_back(foot.point.zeta * half);
+      // One that does not press yet has no lever: most of the points are such.
+      const bool presses = c.normal_impulse > 0;
+      k.point.push_back(foot.point), k.offset.push_back(presses ? foot.point.zeta * half : 0);
+      if (!presses) k.point.back().zeta = 0;
       if (may_share) group = k.contact.size(), shared = 1;
     }
     if (may_share) last_node = node;
