@@ -91,9 +91,10 @@ bool carries_nothing(const Model& m, const thread::State& t, const Sleep::Strand
   return true;
 }
 
-// Steps of a strand's window in which its impulses were noted so far.
+// Steps of a strand's window before its impulses are noted, and those in which they were noted so far.
+uint32_t steps_before(const SleepModel& m) { return m.window > kLook ? m.window - kLook : 0; }
 uint32_t steps_noted(const SleepModel& m, const Sleep::Strand& strand) {
-  const uint32_t before = m.window > kLook ? m.window - kLook : 0;
+  const uint32_t before = steps_before(m);
   return strand.quiet > before ? strand.quiet - before : 0;
 }
 
@@ -451,7 +452,7 @@ void note_loads(const Model& m, State& s, wall::Coupling& coupling, wall::Scratc
     for (uint32_t i = 0; i < 2 * columns; ++i) {
       const Vec3 impulse = wall::vec3(k.external[i]);
       if (impulse == Vec3{}) continue;
-      if (first) me.quiet = 1 + (m.sleep.window > kLook ? m.sleep.window - kLook : 0);  // a state from before this was noted
+      if (first) me.quiet = steps_before(m.sleep) + 1;  // a state from before this was noted
       first = false;
       if (awake.load_at[i] == wall::kNone) z.load.push_back({strand, i, impulse});
       else z.load[awake.load_at[i]].impulse += impulse;

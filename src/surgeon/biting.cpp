@@ -98,7 +98,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
   const Pose& needle = seen.active().needle.pose;
   if (stage_ == hover && waited_ <= dt_) {
     aim();
-    aim_up_ += kBeside * static_cast<float>(again_), depth_fix_ -= kDeeper * static_cast<float>(again_);  // clear of the slit
+    aim_up_ += kBeside * static_cast<float>(again_), depth_error_ -= kDeeper * static_cast<float>(again_);  // clear of the slit
   }
   switch (stage_) {
     case hover: {  // to a position beside the bite, clear of the organ
