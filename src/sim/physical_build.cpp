@@ -248,8 +248,8 @@ bool physical_fits(const Model& model, const PhysicalState& state) {
         z.strand[k].last >= nodes)
       return false;
   const auto sleeps = [&](uint32_t strand) { return strand < z.strand.size() && z.strand[strand].asleep; };
-  for (const physical::Sleep::Load& load : z.load)
-    if (!sleeps(load.strand) || load.at >= 2 * columns) return false;
+  for (const physical::Sleep::Load& load : z.load)  // also of a strand that is about to sleep
+    if (load.strand >= z.strand.size() || load.at >= 2 * columns) return false;
   for (const physical::Sleep::Watched& w : z.watched)
     if (w.strand >= z.strand.size() || w.column >= columns) return false;
   for (const physical::Sleep::Held& h : z.held)

@@ -192,5 +192,32 @@ TEST(Reflect, types_without_padding_are_copied_whole_and_others_are_not) {
   EXPECT_FALSE(kPacked<Event>);
 }
 
+// A strand that will sleep soon has noted what it presses on, and so has one that sleeps.
+TEST(SaveLoad, thread_that_falls_asleep_is_saved_at_any_tick) {
+  const SceneSpec scene = read_scene("interrupted");
+  const std::shared_ptr<const Model> model = build_model(scene);
+  const Hands hands = make_hands("scripted", scene, picture_model(*model));
+  StatePtr state = initial_state(*model), other = initial_state(*model);
+  Jobs one(1), two(2);
+  Snapshot seen;
+  publish(*model, *state, seen);
+  TickInput rest;
+  for (ToolInput& hand : rest.hand) hand.connected = 0;
+  int before = 0, asleep = 0;
+  for (int t = 0; t < 60 * 40 && asleep == 0; ++t) {
+    TickInput input = t < 30 || hands.surgeon->done() ? rest : hands.surgeon->operate(seen, model->dt);
+    input.tick = state->tick;
+    const physical::Sleep& sleep = state->physical.world.sleep;
+    const bool noted = !sleep.load.empty(), sleeps = noted && sleep.strand[sleep.load[0].strand].asleep;
+    before += noted && !sleeps, asleep += sleeps;
+    if (noted) ASSERT_NO_FATAL_FAILURE(step_both(*model, *state, input, one, two, other));
+    else step(*model, *state, input, one);
+    publish(*model, *state, seen);
+  }
+  std::printf("%d ticks before it sleeps, %d asleep\n", before, asleep);
+  EXPECT_GT(before, 5);
+  EXPECT_GT(asleep, 0);
+}
+
 }  // namespace
 }  // namespace catgut
