@@ -78,8 +78,22 @@ Carry carry_of(const SleepModel& model, std::span<const Sleep::Watched> watched,
   return c;
 }
 
-bool is_above(const thread::State& t, const Sleep::Strand& strand, const thread::Plane& drape, float height) {
-  for (size_t i = strand.first; i <= strand.last; ++i)
+std::pair<size_t, size_t> without_tails(const thread::State& t, const Sleep::Strand& strand) {
+  size_t low = strand.last, high = strand.first;
+  const auto take = [&](size_t segment) {
+    if (segment >= strand.first && segment < strand.last) low = std::min(low, segment), high = std::max(high, segment + 1);
+  };
+  for (const thread::Eyelet& e : t.eyelet) take(e.segment);
+  for (size_t i = 0; i < t.key.size(); ++i) {
+    if (t.crossing[i].normal_impulse <= 0) continue;
+    take(thread::segment_of(t.key[i]));
+    if (thread::partner_of(t.key[i]) < thread::kTool) take(thread::partner_of(t.key[i]));
+  }
+  return {low, high};
+}
+
+bool is_above(const thread::State& t, size_t first, size_t last, const thread::Plane& drape, float height) {
+  for (size_t i = first; i <= last; ++i)
     if (dot(drape.normal, t.x.at(i)) - drape.offset < height) return false;
   return true;
 }
@@ -90,7 +104,10 @@ bool only_in_wall(const Model& m, const State& s, const Sleep::Strand& strand, s
   if (!in_holes(t, strand)) return false;
   for (const thread::Hold& hold : holds)
     if (hold.node >= strand.first && hold.node <= strand.last) return false;
-  if (drape && !is_above(t, strand, *drape, m.thread.material.diameter)) return false;
+  if (drape) {
+    const auto [low, high] = without_tails(t, strand);
+    if (!is_above(t, low, high, *drape, m.thread.material.diameter)) return false;
+  }
   return std::none_of(tools.begin(), tools.end(), [&](const thread::ToolCapsule& c) {
     return touches(t, strand, c.to_a, c.to_b, c.radius + 0.5f * m.thread.material.diameter + 2 * kToolMargin);
   });

@@ -5,6 +5,7 @@
 // Nothing is stored for it: the motion follows from Sleep::watched and the wall, so that a saved state continues to the bit.
 #pragma once
 #include <span>
+#include <utility>
 
 #include "core/math.h"
 #include "physical/sleep.h"
@@ -14,11 +15,13 @@ namespace catgut::physical {
 // Of those columns that the strand loads: the best rigid motion, by least squares. Fewer than three: none. watched: of
 // Sleep::watched, the strand's own at least.
 Carry carry_of(const SleepModel& model, std::span<const Sleep::Watched> watched, const wall::State& wall, uint32_t strand);
-// Whether only the wall holds the strand: it is in holes, and no hand, tool or drape touches it.
+// Whether only the wall holds the strand: it is in holes, and no hand or tool touches it, and no drape but at its tails.
 bool only_in_wall(const Model& model, const State& state, const Sleep::Strand& strand, std::span<const thread::Hold> holds,
                   std::span<const thread::ToolCapsule> tools, const thread::Plane* drape);
-// Whether all nodes of the strand are higher than that over the drape [m].
-bool is_above(const thread::State& thread, const Sleep::Strand& strand, const thread::Plane& drape, float height);
+// The nodes of a strand between its tails: those that touch thread, and those in holes. First and last.
+std::pair<size_t, size_t> without_tails(const thread::State& thread, const Sleep::Strand& strand);
+// Whether these nodes are higher than that over the drape [m].
+bool is_above(const thread::State& thread, size_t first, size_t last, const thread::Plane& drape, float height);
 // Whether a strand that sleeps may be carried: it was only in the wall when it fell asleep.
 bool is_carried(const State& state, uint32_t strand);
 // Takes a strand along; it keeps its shape.

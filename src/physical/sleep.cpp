@@ -16,6 +16,7 @@ constexpr float kQuietSpeed = 20e-3f;  // [m/s] when it is looked at: a swing th
 constexpr float kInBite = 40e-6f;      // [m] in a window, of thread in a bite
 constexpr size_t kBeside = 3;          // [nodes] beyond its holes
 constexpr uint32_t kLook = 50;         // [steps] after which it is looked at again within its window
+constexpr float kIntoDrape = 0.1e-3f;  // [m] to which a tail that lies on the drape is carried into it
 constexpr float kSettled = 0.1e-3f;    // [m] in a window: rest of a strand that carries nothing
 constexpr float kAway = 12e-3f;        // [m] corners of a face that the thread may touch are nearer than this
 constexpr size_t kBlock = 8;           // nodes that share a bound
@@ -63,23 +64,35 @@ bool apart(const AwakeThread::Box& a, const AwakeThread::Box& b, float reach) {
          a.low.z > b.high.z + reach || b.low.z > a.high.z + reach;
 }
 
-// Whether two strands may be nearer to each other than `reach`.
-bool near(const thread::State& t, const Sleep::Strand& a, const Sleep::Strand& b, float reach) {
+// How far [m] thread reaches beyond its axis: what it may touch in this step or the next.
+struct Reach {
+  float still, seconds;
+  float of(float speed) const { return still + seconds * speed; }
+};
+Reach reach_of(const Model& m, float share) {
+  return {share * (m.thread.material.diameter + kToolMargin), 2 * share * m.wall.step};
+}
+float fastest(const thread::State& t, size_t first, size_t last) {
+  float speed2 = 0;
+  for (size_t i = first; i <= last; ++i) speed2 = std::max(speed2, length2(t.v.at(i)));
+  return std::sqrt(speed2);
+}
+
+// Whether strand a, which moves, may touch strand b.
+bool near(const thread::State& t, const Sleep::Strand& a, const Sleep::Strand& b, Reach reach) {
   return any_block(t, a, [&](size_t a_first, size_t a_last, float a_around) {
+    const float most = reach.of(fastest(t, a_first, a_last));
     return any_block(t, b, [&](size_t b_first, size_t b_last, float b_around) {
-      if (distance(t.x.at(a_first), t.x.at(b_first)) > a_around + b_around + reach) return false;
-      for (size_t i = a_first; i <= a_last; ++i)
+      if (distance(t.x.at(a_first), t.x.at(b_first)) > a_around + b_around + most) return false;
+      for (size_t i = a_first; i <= a_last; ++i) {
+        // A segment is as fast as the faster one of its nodes.
+        const float far = half_at(t, i) + reach.of(fastest(t, i > a_first ? i - 1 : i, std::min(i + 1, a_last)));
         for (size_t j = b_first; j <= b_last; ++j)
-          if (distance(t.x.at(i), t.x.at(j)) < half_at(t, i) + half_at(t, j) + reach) return true;
+          if (distance(t.x.at(i), t.x.at(j)) < far + half_at(t, j)) return true;
+      }
       return false;
     });
   });
-}
-
-float strand_reach(const Model& m, const State& s, const Sleep::Strand& strand) {
-  float speed2 = 0;
-  for (size_t i = strand.first; i <= strand.last; ++i) speed2 = std::max(speed2, length2(s.thread.v.at(i)));
-  return m.thread.material.diameter + kToolMargin + 2 * m.wall.step * std::sqrt(speed2);
 }
 
 // Thread that lies about unloaded unbends for a minute, ever more slowly, because its drag is high. Nothing depends on where.
@@ -171,21 +184,6 @@ void note_holes(const Model& m, State& s, uint32_t strand) {
     for (const uint32_t c : w.column)
       if (z.watched.size() < z.watched.capacity()) z.watched.push_back({strand, c, mid(s.wall, c), director(s.wall, c), 0});
   }
-}
-
-// The nodes of a strand between its tails: those that touch thread, and those in holes.
-std::pair<size_t, size_t> without_tails(const thread::State& t, const Sleep::Strand& strand) {
-  size_t low = strand.last, high = strand.first;
-  const auto take = [&](size_t segment) {
-    if (segment >= strand.first && segment < strand.last) low = std::min(low, segment), high = std::max(high, segment + 1);
-  };
-  for (const thread::Eyelet& e : t.eyelet) take(e.segment);
-  for (size_t i = 0; i < t.key.size(); ++i) {
-    if (t.crossing[i].normal_impulse <= 0) continue;
-    take(thread::segment_of(t.key[i]));
-    if (thread::partner_of(t.key[i]) < thread::kTool) take(thread::partner_of(t.key[i]));
-  }
-  return {low, high};
 }
 
 // Whether a strand has been quiet for its window, beside what a motion of the wall has done to it.
@@ -322,9 +320,14 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
         length2(director(s.wall, w.column) - rotate(by.turn, w.director)) > most2)
       awake.disturbed[w.strand] = 1;
   }
-  for (uint32_t k = 0; k < n && hands.plane; ++k)  // carried down onto the drape
-    if (awake.carry[k].moves() && !is_above(s.thread, z.strand[k], *hands.plane, 0.5f * m.thread.material.diameter))
+  for (uint32_t k = 0; k < n && hands.plane; ++k) {  // carried down onto the drape
+    if (!awake.carry[k].moves()) continue;
+    const float touching = 0.5f * m.thread.material.diameter;
+    const auto [low, high] = without_tails(s.thread, z.strand[k]);
+    if (!is_above(s.thread, low, high, *hands.plane, touching) ||
+        !is_above(s.thread, z.strand[k].first, z.strand[k].last, *hands.plane, touching - kIntoDrape))
       awake.disturbed[k] = 1;
+  }
   // Of two that sleep beside each other the walls have moved differently.
   for (uint32_t a = 0; a < n; ++a)
     for (uint32_t b = 0; b < a; ++b) {
@@ -341,9 +344,10 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
     more = false;
     for (uint32_t a = 0; a < n; ++a) {
       if (z.strand[a].asleep) continue;
-      const float reach = strand_reach(m, s, z.strand[a]);
+      const Reach reach = reach_of(m, 1);
+      const float most = reach.of(fastest(s.thread, z.strand[a].first, z.strand[a].last));
       for (uint32_t b = 0; b < n; ++b) {
-        if (!z.strand[b].asleep || apart(awake.box[a], awake.box[b], reach)) continue;
+        if (!z.strand[b].asleep || apart(awake.box[a], awake.box[b], most)) continue;
         if (near(s.thread, z.strand[a], z.strand[b], reach)) wake_one(m, s, b), more = true;
       }
     }
@@ -407,7 +411,7 @@ bool find_quiet(const Model& m, State& s, const Hands& hands, std::span<const th
     more = false;
     for (uint32_t a = 0; a < z.strand.size(); ++a) {
       if (z.strand[a].asleep || awake.ready[a]) continue;
-      const float reach = 1.5f * strand_reach(m, s, z.strand[a]);
+      const Reach reach = reach_of(m, 1.5f);
       for (uint32_t b = 0; b < z.strand.size(); ++b)
         if (awake.ready[b] && near(t, z.strand[a], z.strand[b], reach)) awake.ready[b] = 0, more = true;
     }
