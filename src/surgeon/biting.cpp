@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "surgeon/reach.h"
 #include "surgeon/scripted.h"
 
 namespace catgut {
@@ -20,6 +21,8 @@ constexpr float kEdgesGrip = 0.002f;  // [m] of the grasp point below two edges
 constexpr float kTooShallow = 0.4f;   // of the wall, for a shallow bite
 constexpr float kDeeper = 0.0005f;    // [m]
 constexpr float kOutFor = 0.3f;       // [s] that a needle is out of the tissue before its bite counts as failed
+constexpr float kSlit = 0.001f;       // [m] torn by the needle on its way: it lies at an edge, or only in the surface
+constexpr int kMostMisses = 6;        // grasps at a tip that walls cover
 constexpr int kAgain = 2;             // times that a bite is made again from the start
 constexpr float kBeside = 0.002f;     // [m] from the place where it failed
 constexpr float kDrawOut = 20;        // [s] to draw a thread out
@@ -58,6 +61,16 @@ bool Scripted::too_deep(const Snapshot& seen) const {
   if (bite().deepest <= 0 || seen.active().bite.size() <= bites_before_) return false;
   const BiteView& b = seen.active().bite.back();
   return b.depth > bite().deepest * skill_.wall || b.entry_inside || (b.has_exit && b.exit_inside);
+}
+
+bool Scripted::holds_well(const Snapshot& seen, size_t hand) const {
+  return holds_needle(seen, hand) && (plan_.pull <= 0 || !catches_thread(picture_, seen, seen.tool[hand]));
+}
+
+bool Scripted::tears(const Snapshot& seen) const {
+  const auto& bite = seen.active().bite;
+  return std::any_of(bite.begin() + static_cast<std::ptrdiff_t>(std::min(bites_before_, bite.size())), bite.end(),
+                     [](const BiteView& b) { return b.torn > kSlit; });
 }
 
 void Scripted::hold_or_rest(const Snapshot& seen) {
@@ -145,6 +158,11 @@ bool Scripted::make_bite(const Snapshot& seen) {
         go(withdraw);
         return false;
       }
+      if (plan_.pull > 0 && tears(seen)) {
+        next_fix_ = -kDeeper;
+        go(withdraw);
+        return false;
+      }
       // A shallow bite that holds too little is made again, deeper.
       if (plan_.scoop > 0 && passed > 0 && seen.active().bite.back().depth < kTooShallow * skill_.wall) {
         next_fix_ = -kDeeper;
@@ -171,6 +189,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
         ++retries_;
         depth_fix_ += std::exchange(next_fix_, 0.0f);
         if (++attempts_ > kAttempts) gave_up_ = true;
+        if (holds_edge(place_) && seen.tool[kForceps].held != Held::tissue) return bite_again(seen);
         go(hover);
       } else if (!patience(8)) {
         gave_up_ = true;
@@ -198,7 +217,11 @@ bool Scripted::make_bite(const Snapshot& seen) {
       return false;
     case close:
       if (!jaw(kForceps, 0) || waited_ < 0.3f) return false;
-      if (!holds_needle(seen, kForceps)) return miss(over), false;
+      if (!holds_well(seen, kForceps)) {
+        miss(over);
+        if (plan_.pull > 0 && misses_ > kMostMisses && holds_needle(seen, kNeedleHolder)) misses_ = 0, go(withdraw);
+        return false;
+      }
       misses_ = 0;
       remember_grip(seen, kForceps);
       go(release);
@@ -232,6 +255,11 @@ bool Scripted::make_bite(const Snapshot& seen) {
   }
 }
 
+bool Scripted::holds_edge(size_t place) const {
+  return std::any_of(plan_.task.begin(), plan_.task.end(),
+                     [&](const Task& t) { return t.kind == TaskKind::hold_edge && t.which == static_cast<int>(place); });
+}
+
 bool Scripted::bite_again(const Snapshot& seen) {
   // Thread cannot be drawn out of one bite alone.
   const bool threaded = seen.active().suture_point.size() > points_before_;
@@ -240,9 +268,8 @@ bool Scripted::bite_again(const Snapshot& seen) {
   const int which = static_cast<int>(place_);
   std::vector<Task> task;
   if (threaded) task.push_back({TaskKind::draw_out});
-  task.push_back({TaskKind::hand_back});
-  const auto holds = [&](const Task& t) { return t.kind == TaskKind::hold_edge && t.which == which; };
-  if (std::any_of(plan_.task.begin(), plan_.task.end(), holds)) task.push_back({TaskKind::hold_edge, which});
+  if (holds_needle(seen, kForceps)) task.push_back({TaskKind::hand_back});
+  if (holds_edge(place_)) task.push_back({TaskKind::hold_edge, which});
   task.push_back({TaskKind::bite, which});
   if (plan_.task[task_].kind == TaskKind::pull_tail) task.push_back({TaskKind::pull_tail});
   plan_.task.insert(plan_.task.begin() + static_cast<std::ptrdiff_t>(task_) + 1, task.begin(), task.end());
@@ -309,7 +336,7 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
       return false;
     case close:
       if (!jaw(kNeedleHolder, 0) || waited_ < 0.3f) return false;
-      if (!holds_needle(seen, kNeedleHolder)) return miss(over), false;
+      if (!holds_well(seen, kNeedleHolder)) return miss(over), false;
       remember_grip(seen, kNeedleHolder);
       go(give);
       return false;

@@ -16,4 +16,7 @@ float room_at(const PictureModel& picture, const Snapshot& seen, Vec3 p, bool wa
 // other stitches when its tip is at `goal`; if none is, the one with most room.
 Vec3 clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal, std::span<const Vec3> direction);
 
+// Thread lies between the closed jaws of an instrument, behind what it grasps: it would be pulled along.
+bool catches_thread(const PictureModel& picture, const Snapshot& seen, const ToolView& tool);
+
 }  // namespace catgut

@@ -18,6 +18,7 @@ constexpr float kTighten = 0.15f;      // of the free speed: the thread runs thr
 constexpr float kSecure = 0.985f;      // fraction of a closure that counts as closed
 constexpr float kMissBy = 0.008f;      // [m] along the shaft
 constexpr float kForcepsAt = 0.93f;    // position on the needle's arc: behind the tip
+constexpr float kOtherLean = 0.2f;     // of the forceps' lean at a tip, less with every miss
 constexpr float kGathering = 0.03f;    // [m/s] at most of hands that draw a purse-string
 constexpr float kGatherPatience = 25;  // [s]
 constexpr float kFeel = 0.2f;          // share of a new value per tick
@@ -190,7 +191,9 @@ Pose Scripted::driver_grip(const Pose& needle, float least) const {
 }
 
 Pose Scripted::forceps_grip(const Pose& needle) const {
-  return grip_at(needle, kForcepsAt, plan_.forceps_side, plan_.lift > 0 ? 0.3f : plan_.tip_lean, plan_.tip_psi);
+  // After a miss from another side: thread may be in the way.
+  const float lean = plan_.pull > 0 ? plan_.tip_lean * (1 - kOtherLean * static_cast<float>(misses_ % 4)) : plan_.tip_lean;
+  return grip_at(needle, kForcepsAt, plan_.forceps_side, plan_.lift > 0 ? 0.3f : lean, plan_.tip_psi);
 }
 
 void Scripted::aim() {

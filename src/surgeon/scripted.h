@@ -106,8 +106,8 @@ class Scripted final : public Surgeon {
   // The forceps keeps an edge that it holds, else it waits clear of the work.
   void hold_or_rest(const Snapshot& seen);
   bool make_bite(const Snapshot& seen);
-  // The needle is out, and a wall has no thread in it. Inserts the tasks that make the bite again, up to twice; false: it
-  // cannot be done.
+  // The needle is out, and a wall has no thread in it or is not held any more. Inserts the tasks that make the bite again, up
+  // to twice; false: it cannot be done.
   bool bite_again(const Snapshot& seen);
   bool is_sound(const Snapshot& seen) const {  // thread runs through every wall of the bite
     return seen.active().suture_point.size() >= points_before_ + 2 * static_cast<size_t>(bite().walls);
@@ -118,6 +118,12 @@ class Scripted final : public Surgeon {
   int passages(const Snapshot& seen, bool complete) const;
   // Of the bite in hand, where the plan asks for a part of the wall.
   bool too_deep(const Snapshot& seen) const;
+  // Jaws that hold the needle, and no thread beside it.
+  bool holds_well(const Snapshot& seen, size_t hand) const;
+  // The needle slits a wall of the bite in hand.
+  bool tears(const Snapshot& seen) const;
+  // The forceps holds the edge for this bite.
+  bool holds_edge(size_t place) const;
 
   bool pull(TaskKind kind, const Snapshot& seen);
 

@@ -29,6 +29,7 @@ constexpr float kTailEnd = 6e-3f;        // [m] from the tail's end, where it is
 constexpr float kBetweenJaws = 0.6e-3f;  // [m] from the line midway between the jaws: they close on the tail there
 constexpr float kJaws = 3e-3f;           // [m] their length that holds
 constexpr float kHeldWell = 1.5e-3f;     // [m] the same of a tail that turns slide over; between jaws and tail they come off
+constexpr float kPinched = 0.8e-3f;      // [m] from there, a strand is held with the tail: a turn on the jaws is farther away
 constexpr float kBeside = 4e-3f;         // [m] of tail, on either side of the jaws
 constexpr float kPatience = 2;           // [s]; then they close where they are
 constexpr float kAhead = 4e-3f;          // [m] of the hand before the jaws, at most
@@ -193,6 +194,13 @@ void ThreadTie::measure(const Snapshot& seen) {
   const float out = first_ ? 0.0f : kKnot;
   strand_ = length_between(seen, strand_at, last) + out, tail_ = length_between(seen, 0, tail_at) + out;
   height_ = (wraps_ > 1 ? kHighTwice : kHigh) * strand_;
+}
+
+// The jaws hold the long strand, too: drawn with the tail, it would tear its bites out.
+bool ThreadTie::pinches_strand(const Snapshot& seen) const {
+  for (size_t i = last_point_node(seen) + 1; i < seen.active().thread_order.size(); ++i)
+    if (length2(from_jaws(seen.tool[kHolder], node_at(seen, i))) < kPinched * kPinched) return true;
+  return false;
 }
 
 // What the knot lacks is wound from this side.
@@ -422,7 +430,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const bool shut = move_jaw(holder, 0, dt);
       const bool laying = stage_ == take_tail;
       const ToolView& jaws = seen.tool[kHolder];
-      const bool well = laying || length(from_jaws(jaws, node_at(seen, node_of(seen, jaws.held_slot)))) < kHeldWell;
+      const bool well = (laying || length(from_jaws(jaws, node_at(seen, node_of(seen, jaws.held_slot)))) < kHeldWell) &&
+                        !pinches_strand(seen);
       if (holds && well && waited_ > 0.3f) {
         if (laying) go(seen, lift_tail);
         else if (wound(seen) < 2 * kPi * static_cast<float>(wraps_) - 2) again(seen, lift_tail);  // a turn has slid off

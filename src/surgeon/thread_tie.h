@@ -85,6 +85,7 @@ class ThreadTie {
   void wind_next(const SeenThrows& knot);
   void seated(const Snapshot& seen);
   float wound(const Snapshot& seen) const;
+  bool pinches_strand(const Snapshot& seen) const;
 
   const PictureModel& picture_;
   std::array<ScriptedHand, 2>& hands_;

@@ -73,7 +73,7 @@ bool Scripted::regrip(const Snapshot& seen) {
       return false;
     case close:
       if (!jaw(kForceps, 0) || waited_ < 0.3f) return false;
-      if (!holds_needle(seen, kForceps)) return miss(over), false;
+      if (!holds_well(seen, kForceps)) return miss(over), false;
       remember_grip(seen, kForceps);
       go(give);
       return false;

@@ -1,64 +1,132 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/surgeon: a bite that fails. The needle tears out of the second wall while it is pulled through: the thread is drawn
-// out of the first one, nothing of the bite is left, and the next sweep goes through both.
+// tests/surgeon: a bite that fails. The wall gives way under the needle, while it is driven or while it is pulled through: the
+// surgeon withdraws it, nothing of the bite is left, and the next sweep goes through both walls.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 
 #include "procedure/scene_file.h"
 #include "procedure/scripted_surgeon.h"
 #include "sim/model.h"
 #include "sim/state.h"
+#include "surgeon/reach.h"
 
 namespace catgut {
 namespace {
 
-TEST(Surgeon, draws_the_thread_out_of_a_bite_that_failed_and_makes_it_again) {
-  const SceneSpec scene = read_scene("interrupted");
-  const std::shared_ptr<const Model> model = build_model(scene);
-  const StatePtr state = initial_state(*model);
-  const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*model));
-  Jobs jobs(2);
+// The scripted surgeon makes the stitch of the scene `interrupted`, and something happens in its second wall.
+struct OneStitch {
+  const std::shared_ptr<const Model> model;
+  const StatePtr state;
+  const std::unique_ptr<Surgeon> surgeon;
   Snapshot seen;
-  TickInput no_hands;
-  for (ToolInput& hand : no_hands.hand) hand.connected = 0;
-  publish(*model, *state, seen);
-  bool torn = false, drawn_out = false;
-  int withdrawn = 0;
-  for (uint64_t t = 0; t < 60 * 60 && !surgeon->done(); ++t) {
-    TickInput input = t < 30 ? no_hands : surgeon->operate(seen, model->dt);
-    input.tick = t;
-    physical::Needle& needle = state->physical.world.needle[0];
-    const bool pulled = surgeon->doing().find("pull the needle through") != std::string::npos;
-    if (!torn && pulled && needle.channels == 2)  // what lies between its channel and the edge gives way
-      needle.channel[1].load = {seen.active().bite.back().exit.x > 0 ? -40.0f : 40.0f, 0, 0};
-    step(*model, *state, input, jobs);
+  int withdrawn = 0, slit = 0, torn_out = 0;
+
+  explicit OneStitch(const SceneSpec& scene)
+      : model(build_model(scene)), state(initial_state(*model)), surgeon(scripted_surgeon(scene, picture_model(*model))) {
     publish(*model, *state, seen);
-    for (const Event& e : seen.event) {
-      if (e.kind == EventKind::technique_fault && e.fault == Fault::needle_torn_out) torn = true;
-      if (e.kind == EventKind::bite_withdrawn) ++withdrawn;
-      ASSERT_FALSE(e.kind == EventKind::technique_fault && e.fault == Fault::thread_broken);
-    }
-    if (torn && !drawn_out && seen.active().suture_point.empty() && withdrawn > 0) {
-      drawn_out = true;
-      EXPECT_TRUE(state->physical.world.thread.eyelet.empty()) << "no thread is left in the wall";
-      const auto complete = [](const BiteView& b) { return b.complete; };
-      EXPECT_TRUE(std::none_of(seen.active().bite.begin(), seen.active().bite.end(), complete));
-      const StatePtr loaded = initial_state(*model);
-      EXPECT_NO_THROW(load_state(*model, *loaded, save_state(*model, *state)));
-    }
   }
-  std::printf("%.1f s, %d retries\n", static_cast<double>(seen.tick) * static_cast<double>(model->dt), surgeon->retries());
-  EXPECT_TRUE(torn);
+
+  physical::Needle& needle() { return state->physical.world.needle[0]; }
+  bool doing(const char* what) const { return surgeon->doing().find(what) != std::string::npos; }
+  // What lies between the needle's second channel and the edge bears this load [N].
+  void load_second_channel(float load) {
+    if (needle().channels < 2) return;
+    const BiteView& bite = seen.active().bite.back();
+    needle().channel[1].load = {bite.entry.x > 0 ? -load : load, 0, 0};
+  }
+  long complete() const {
+    return std::count_if(seen.active().bite.begin(), seen.active().bite.end(), [](const BiteView& b) { return b.complete; });
+  }
+  // Until the surgeon is done. before: a step, after: what it did.
+  void sew(const std::function<void()>& before, const std::function<void()>& after) {
+    Jobs jobs(2);
+    TickInput no_hands;
+    for (ToolInput& hand : no_hands.hand) hand.connected = 0;
+    for (uint64_t t = 0; t < 60 * 60 && !surgeon->done(); ++t) {
+      TickInput input = t < 30 ? no_hands : surgeon->operate(seen, model->dt);
+      input.tick = t;
+      before();
+      step(*model, *state, input, jobs);
+      publish(*model, *state, seen);
+      for (const Event& e : seen.event) {
+        withdrawn += e.kind == EventKind::bite_withdrawn;
+        if (e.kind != EventKind::technique_fault) continue;
+        slit += e.fault == Fault::bite_torn, torn_out += e.fault == Fault::needle_torn_out;
+        ASSERT_NE(e.fault, Fault::thread_broken);
+      }
+      after();
+    }
+    std::printf("%.1f s, %d retries\n", static_cast<double>(seen.tick) * static_cast<double>(model->dt), surgeon->retries());
+  }
+  void expect_a_stitch() {
+    EXPECT_FALSE(surgeon->gave_up()) << surgeon->doing();
+    EXPECT_GE(surgeon->retries(), 1);
+    EXPECT_EQ(seen.active().suture_point.size(), 4u);
+    EXPECT_EQ(state->physical.world.thread.eyelet.size(), 4u);
+    EXPECT_EQ(complete(), 2);
+  }
+};
+
+TEST(Surgeon, draws_the_thread_out_of_a_bite_that_failed_and_makes_it_again) {
+  OneStitch stitch(read_scene("interrupted"));
+  bool drawn_out = false;
+  const auto pull = [&] {
+    if (stitch.torn_out == 0 && stitch.doing("pull the needle through")) stitch.load_second_channel(40);
+  };
+  stitch.sew(pull, [&] {
+    if (stitch.torn_out == 0 || drawn_out || !stitch.seen.active().suture_point.empty() || stitch.withdrawn == 0) return;
+    drawn_out = true;
+    EXPECT_TRUE(stitch.state->physical.world.thread.eyelet.empty()) << "no thread is left in the wall";
+    EXPECT_EQ(stitch.complete(), 0);
+    const StatePtr loaded = initial_state(*stitch.model);
+    EXPECT_NO_THROW(load_state(*stitch.model, *loaded, save_state(*stitch.model, *stitch.state)));
+  });
+  EXPECT_GT(stitch.torn_out, 0);
   EXPECT_TRUE(drawn_out);
-  EXPECT_EQ(withdrawn, 1);
-  EXPECT_FALSE(surgeon->gave_up()) << surgeon->doing();
-  EXPECT_GE(surgeon->retries(), 1);
-  EXPECT_EQ(seen.active().suture_point.size(), 4u);
-  EXPECT_EQ(state->physical.world.thread.eyelet.size(), 4u);
-  EXPECT_EQ(std::count_if(seen.active().bite.begin(), seen.active().bite.end(), [](const BiteView& b) { return b.complete; }),
-            2);
+  EXPECT_EQ(stitch.withdrawn, 1);
+  stitch.expect_a_stitch();
+}
+
+TEST(Surgeon, withdraws_the_needle_when_it_slits_the_wall_instead_of_driving_it_on) {
+  OneStitch stitch(read_scene("interrupted"));
+  bool withdraws = false;
+  float slit = 0;  // [m] at most, before the needle was withdrawn
+  const auto drive = [&] {
+    if (!withdraws && stitch.doing("drive the needle")) stitch.load_second_channel(20);
+  };
+  stitch.sew(drive, [&] {
+    withdraws |= stitch.doing("withdraw and retry");
+    if (!withdraws && !stitch.seen.active().bite.empty()) slit = std::max(slit, stitch.seen.active().bite.back().torn);
+  });
+  EXPECT_EQ(stitch.slit, 1);
+  EXPECT_TRUE(withdraws);
+  EXPECT_GT(slit, 1e-3f);
+  EXPECT_LT(slit, 4e-3f);
+  stitch.expect_a_stitch();
+}
+
+// Thread that runs between closed jaws behind what they hold is pulled along with it.
+TEST(Surgeon, sees_thread_between_its_jaws) {
+  PictureModel picture;
+  Snapshot seen;
+  seen.suture.resize(1);
+  for (uint32_t i = 0; i < 21; ++i) {
+    seen.suture[0].thread_order.push_back(i);
+    seen.particle.push_back({0.001f * (static_cast<float>(i) - 10), 0, 0});
+  }
+  ToolView jaws;
+  const auto at = [&](Vec3 p) {
+    jaws.pose.p = p;
+    return catches_thread(picture, seen, jaws);
+  };
+  EXPECT_TRUE(at({0, 0, -0.013f})) << "13 mm behind the tip";
+  EXPECT_FALSE(at({0, 0, -0.001f})) << "what the tip holds";
+  EXPECT_FALSE(at({0, 0, 0.013f})) << "before the tip";
+  EXPECT_FALSE(at({0, 0.0014f, -0.013f})) << "on the jaws";
+  EXPECT_FALSE(at({0.02f, 0, -0.013f})) << "beyond the thread's end";
 }
 
 }  // namespace
