@@ -63,6 +63,7 @@ constexpr float kFastest = 30e-3f;    // [m/s]
 constexpr float kSeated = 0.6f;       // [s] of full tension
 constexpr float kTight = 0.8f;        // [s] of a strand that gives no way; then the tail lies as far as it can
 constexpr int kAgain = 5;             // times that a throw is wound again
+constexpr int kEnough = 3;            // throws of a knot that holds; a further one that fails is left
 constexpr int kMostMisses = 3;        // grasps at the tail with a turn on the jaws
 constexpr float kDeep = 4e-3f;        // [m] below the stitch: walls are beside a tail there
 constexpr float kBears = 3;           // [N] on a bite, above which the hands give way
@@ -176,8 +177,15 @@ float ThreadTie::wound(const Snapshot& seen) const {
 void ThreadTie::again(const Snapshot& seen, Stage after) {
   ++retries_, misses_ = 0;
   lost_ = after == drop_tail;
-  if (++tries_ > kAgain) failed_ = true, stage_ = done;
-  else go(seen, after);
+  if (++tries_ <= kAgain) return go(seen, after);
+  failed_ = !leaves_it(look(seen)), stage_ = done;
+}
+
+// A throw fails again and again: the knot may do without it.
+bool ThreadTie::leaves_it(const SeenThrows& knot) {
+  if (knot.alternating() < kEnough) return false;
+  wanted_ = std::min(wanted_, knot.alternating());
+  return true;
 }
 
 // The other side, and the free thread beyond the knot, which takes up some millimeters with every throw.
@@ -212,7 +220,7 @@ void ThreadTie::wind_next(const SeenThrows& knot) {
 // The throw is pulled tight and both hands have let go of it: winds again what is not there.
 void ThreadTie::seated(const Snapshot& seen) {
   const SeenThrows knot = look(seen);
-  if (knot.alternating() >= wanted_) {
+  if (knot.alternating() >= wanted_ || (tries_ >= kAgain && leaves_it(knot))) {
     stage_ = done;
     return;
   }
@@ -539,7 +547,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       else if (stage_ == cross_down && (there || std::min(felt_, tail_felt_) > 0.5f || most > kTaut)) {
         // A turn that slid off without the tail in it, and a throw below that came undone, are seen before they are pulled on.
         const SeenThrows knot = look(seen);
-        if (knot.alternating() < wanted_) wind_next(knot), again(seen, lift_tail);
+        const bool last = tries_ >= kAgain && knot.alternating() >= kEnough;  // what there is of it is pulled tight
+        if (knot.alternating() < wanted_ && !last) wind_next(knot), again(seen, lift_tail);
         else go(seen, pull);
       }
       break;
