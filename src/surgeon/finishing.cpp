@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "surgeon/reach.h"
 #include "surgeon/scripted.h"
 #include "surgeon/throws.h"
 
@@ -18,11 +19,13 @@ constexpr float kSlackStrand = 0.8f;          // of the strand's length: where i
 constexpr float kTautStrand = 0.2f;           // [N]
 constexpr float kOverDrape = 0.004f;          // [m] of a needle that is laid down
 constexpr Vec3 kLaidDown{-0.6f, -0.3f, 0.75f};
-constexpr float kShortStump = 0.005f;    // [m] of thread left on a knot with physical mechanics, beyond where the strands touch
-constexpr float kKnotEnds = 4e-3f;       // [m] of free thread
-constexpr float kFarthestCut = 0.03f;    // [m] beyond that: a knot with wide loops
-constexpr float kWhole = 1;              // [m]: longer than a thread
-constexpr float kStumpClear = 2e-3f;     // [m] of the blades from the stitch
+constexpr float kShortStump = 0.005f;  // [m] of thread left on a knot with physical mechanics, beyond where the strands touch
+constexpr float kKnotEnds = 4e-3f;     // [m] of free thread
+constexpr float kFarthestCut = 0.03f;  // [m] beyond that: a knot with wide loops
+constexpr float kWhole = 1;            // [m]: longer than a thread
+// [m] of the blades from the stitch and from any other thread: of two strands between them they cut the wrong one.
+constexpr float kStumpClear = 2e-3f;
+constexpr size_t kRunsOn = 8;            // nodes
 constexpr Vec3 kCutFrom{0, 0.6f, 0.8f};  // unit, from the blades along the shaft
 constexpr int kPiece = 10;               // first stage of carrying a cut-off tail away
 constexpr int kPieceMisses = 3;          // then it is left where it fell
@@ -50,6 +53,14 @@ size_t knot_end(const Snapshot& seen, bool tail) {
     else if (met && free > kKnotEnds) break;
   }
   return found;
+}
+
+// [m] from a node to the nearest thread of its suture, but for what runs on from it.
+float own_room(const Snapshot& seen, size_t node) {
+  float room = kWhole;
+  for (size_t k = 0; k < seen.active().thread_order.size(); ++k)
+    if (k + kRunsOn < node || k > node + kRunsOn) room = std::min(room, distance(node_at(seen, node), node_at(seen, k)));
+  return room;
 }
 
 }  // namespace
@@ -116,6 +127,7 @@ size_t Scripted::node_to_cut(const Snapshot& seen, bool tail, bool begins) const
     const size_t i = std::clamp<size_t>(node_along(seen, from, out, tail ? -1 : 1), 1, last - 1);
     float clear = wanted;
     for (size_t k = first; k <= end; ++k) clear = std::min(clear, distance(node_at(seen, i), node_at(seen, k)));
+    if (physical) clear = std::min({clear, own_room(seen, i), room_at(picture_, seen, node_at(seen, i), false, wanted)});
     if (clear > clearest && (!physical || keeps_throws(i))) clearest = clear, at = i;
   }
   return at;
