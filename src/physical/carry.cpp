@@ -104,9 +104,9 @@ bool only_in_wall(const Model& m, const State& s, const Sleep::Strand& strand, s
   if (!in_holes(t, strand)) return false;
   for (const thread::Hold& hold : holds)
     if (hold.node >= strand.first && hold.node <= strand.last) return false;
-  if (drape) {
+  if (const float clear = m.thread.material.diameter; drape && !is_above(t, strand.first, strand.last, *drape, clear)) {
     const auto [low, high] = without_tails(t, strand);
-    if (!is_above(t, low, high, *drape, m.thread.material.diameter)) return false;
+    if (!is_above(t, low, high, *drape, clear)) return false;
   }
   return std::none_of(tools.begin(), tools.end(), [&](const thread::ToolCapsule& c) {
     return touches(t, strand, c.to_a, c.to_b, c.radius + 0.5f * m.thread.material.diameter + 2 * kToolMargin);

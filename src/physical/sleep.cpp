@@ -16,7 +16,7 @@ constexpr float kQuietSpeed = 20e-3f;  // [m/s] when it is looked at: a swing th
 constexpr float kInBite = 40e-6f;      // [m] in a window, of thread in a bite
 constexpr size_t kBeside = 3;          // [nodes] beyond its holes
 constexpr uint32_t kLook = 50;         // [steps] after which it is looked at again within its window
-constexpr float kIntoDrape = 0.1e-3f;  // [m] to which a tail that lies on the drape is carried into it
+constexpr float kIntoDrape = 0.1e-3f;  // [m] by which the wall may press a tail into the drape
 constexpr float kSettled = 0.1e-3f;    // [m] in a window: rest of a strand that carries nothing
 constexpr float kAway = 12e-3f;        // [m] corners of a face that the thread may touch are nearer than this
 constexpr size_t kBlock = 8;           // nodes that share a bound
@@ -321,12 +321,14 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
       awake.disturbed[w.strand] = 1;
   }
   for (uint32_t k = 0; k < n && hands.plane; ++k) {  // carried down onto the drape
-    if (!awake.carry[k].moves()) continue;
     const float touching = 0.5f * m.thread.material.diameter;
-    const auto [low, high] = without_tails(s.thread, z.strand[k]);
-    if (!is_above(s.thread, low, high, *hands.plane, touching) ||
-        !is_above(s.thread, z.strand[k].first, z.strand[k].last, *hands.plane, touching - kIntoDrape))
-      awake.disturbed[k] = 1;
+    const auto above = [&](size_t first, size_t last, float height) {
+      return is_above(s.thread, first, last, *hands.plane, height);
+    };
+    const Sleep::Strand& strand = z.strand[k];
+    if (!awake.carry[k].moves() || above(strand.first, strand.last, touching)) continue;
+    const auto [low, high] = without_tails(s.thread, strand);
+    if (!above(low, high, touching) || !above(strand.first, strand.last, touching - kIntoDrape)) awake.disturbed[k] = 1;
   }
   // Of two that sleep beside each other the walls have moved differently.
   for (uint32_t a = 0; a < n; ++a)

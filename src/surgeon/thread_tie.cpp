@@ -178,15 +178,13 @@ void ThreadTie::again(const Snapshot& seen, Stage after) {
   ++retries_, misses_ = 0;
   lost_ = after == drop_tail;
   if (++tries_ <= kAgain) return go(seen, after);
-  failed_ = !leaves_it(look(seen)), stage_ = done;
+  const SeenThrows knot = look(seen);
+  failed_ = !is_enough(knot), stage_ = done;
+  wanted_ = std::min(wanted_, knot.alternating());
 }
 
-// A throw fails again and again: the knot may do without it.
-bool ThreadTie::leaves_it(const SeenThrows& knot) {
-  if (knot.alternating() < kEnough) return false;
-  wanted_ = std::min(wanted_, knot.alternating());
-  return true;
-}
+// A throw has failed again and again, and the knot holds without it.
+bool ThreadTie::is_enough(const SeenThrows& knot) const { return tries_ >= kAgain && knot.alternating() >= kEnough; }
 
 // The other side, and the free thread beyond the knot, which takes up some millimeters with every throw.
 void ThreadTie::measure(const Snapshot& seen) {
@@ -220,8 +218,8 @@ void ThreadTie::wind_next(const SeenThrows& knot) {
 // The throw is pulled tight and both hands have let go of it: winds again what is not there.
 void ThreadTie::seated(const Snapshot& seen) {
   const SeenThrows knot = look(seen);
-  if (knot.alternating() >= wanted_ || (tries_ >= kAgain && leaves_it(knot))) {
-    stage_ = done;
+  if (knot.alternating() >= wanted_ || is_enough(knot)) {
+    wanted_ = std::min(wanted_, knot.alternating()), stage_ = done;
     return;
   }
   side_ = -side_;
@@ -547,8 +545,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       else if (stage_ == cross_down && (there || std::min(felt_, tail_felt_) > 0.5f || most > kTaut)) {
         // A turn that slid off without the tail in it, and a throw below that came undone, are seen before they are pulled on.
         const SeenThrows knot = look(seen);
-        const bool last = tries_ >= kAgain && knot.alternating() >= kEnough;  // what there is of it is pulled tight
-        if (knot.alternating() < wanted_ && !last) wind_next(knot), again(seen, lift_tail);
+        if (knot.alternating() < wanted_ && !is_enough(knot)) wind_next(knot), again(seen, lift_tail);
         else go(seen, pull);
       }
       break;

@@ -84,7 +84,7 @@ class ThreadTie {
   void measure(const Snapshot& seen);
   void wind_next(const SeenThrows& knot);
   void seated(const Snapshot& seen);
-  bool leaves_it(const SeenThrows& knot);
+  bool is_enough(const SeenThrows& knot) const;
   float wound(const Snapshot& seen) const;
   bool pinches_strand(const Snapshot& seen) const;
 

@@ -364,6 +364,11 @@ struct OnATongue {
   }
   void pull(Vec3 force) { s.wall_pull = {{wall::at_column(tip, 0), force}}; }
   Vec3 node(size_t i) const { return s.state.thread.position(i); }
+  void run_over(thread::Plane& drape, int steps) {
+    Hands hands;
+    hands.plane = &drape, hands.wall_pulls = s.wall_pull;
+    for (int i = 0; i < steps; ++i) step(s.model, s.state, *s.scratch, hands, *s.jobs);
+  }
 };
 
 // It rides on the tongue while it sleeps, as if it were awake, and a copy does so to the bit.
@@ -457,13 +462,7 @@ TEST(Sleep, a_strand_wakes_when_its_wall_carries_it_onto_the_drape) {
   OnATongue t(true);
   thread::Plane drape;
   drape.normal = {0, 0, 1}, drape.offset = -2.6e-3f;  // below the thread on the sheet's lower face, by 1 mm
-  const auto run = [&](int steps) {
-    for (int i = 0; i < steps; ++i) {
-      Hands hands;
-      hands.plane = &drape, hands.wall_pulls = t.s.wall_pull;
-      step(t.s.model, t.s.state, *t.s.scratch, hands, *t.s.jobs);
-    }
-  };
+  const auto run = [&](int steps) { t.run_over(drape, steps); };
   run(2000);
   ASSERT_TRUE(t.s.state.sleep.all());
   float lowest = 1;
@@ -475,45 +474,6 @@ TEST(Sleep, a_strand_wakes_when_its_wall_carries_it_onto_the_drape) {
   }
   EXPECT_FALSE(slept);
   EXPECT_GT(lowest, 0.3f * t.s.model.thread.material.diameter) << "the drape holds it";
-}
-
-// Tails that lie on the drape slide over it with the wall; pushed into it, they wake.
-TEST(Sleep, a_strand_is_carried_along_with_its_tails_on_the_drape) {
-  OnATongue t(true);
-  thread::Plane drape;  // upside down, on the tails, which have fallen onto the sheet's upper face
-  drape.normal = {0, 0, -1}, drape.offset = -1;
-  const auto deepest = [&] {
-    float least = 1;
-    for (size_t k = 0; k < t.s.state.thread.nodes(); ++k) least = std::min(least, -t.node(k).z - drape.offset);
-    return least;
-  };
-  const auto run = [&](int steps) {
-    for (int i = 0; i < steps; ++i) {
-      Hands hands;
-      hands.plane = &drape, hands.wall_pulls = t.s.wall_pull;
-      step(t.s.model, t.s.state, *t.s.scratch, hands, *t.s.jobs);
-    }
-  };
-  run(2000);
-  drape.offset += deepest() - 0.4f * t.s.model.thread.material.diameter;
-  run(2000);
-  ASSERT_TRUE(t.s.state.sleep.all());
-  ASSERT_LT(deepest(), 0.6f * t.s.model.thread.material.diameter) << "a tail touches the drape";
-  const Vec3 before = t.node(0);
-  for (int i = 1; i <= 40; ++i) {
-    t.pull({0, 0, -1e-5f * static_cast<float>(i)}), run(50);
-    ASSERT_TRUE(t.s.state.sleep.all()) << i;
-  }
-  std::printf("carried by %.2f mm\n", static_cast<double>(1e3f * distance(t.node(0), before)));
-  EXPECT_GT(distance(t.node(0), before), 0.3e-3f);
-  bool slept = true;
-  float least = 1;
-  for (int i = 1; i <= 100; ++i) {
-    t.pull({0, 0, 2e-5f * static_cast<float>(i)}), run(50);
-    slept &= t.s.state.sleep.all(), least = std::min(least, deepest());
-  }
-  EXPECT_FALSE(slept);
-  EXPECT_GT(least, -0.1e-3f) << "the drape holds it";
 }
 
 TEST(Sleep, a_strand_wakes_when_the_wall_is_strained_beside_it) {
