@@ -179,8 +179,9 @@ void ThreadTie::again(const Snapshot& seen, Stage after) {
   lost_ = after == drop_tail;
   if (++tries_ <= kAgain) return go(seen, after);
   const SeenThrows knot = look(seen);
-  failed_ = !is_enough(knot), stage_ = done;
+  failed_ = !is_enough(knot), ends_ = true;
   wanted_ = std::min(wanted_, knot.alternating());
+  go(seen, drop_tail);  // or hands that go away take it along
 }
 
 // A throw has failed again and again, and the knot holds without it.
@@ -230,7 +231,7 @@ void ThreadTie::seated(const Snapshot& seen) {
 
 void ThreadTie::begin(const Snapshot& seen, int wraps, int sense, bool first, bool keep) {
   keep_ = keep;
-  wraps_ = wraps, first_ = first, failed_ = seen.active().suture_point.empty(), misses_ = 0, tries_ = 0;
+  wraps_ = wraps, first_ = first, failed_ = seen.active().suture_point.empty(), ends_ = false, misses_ = 0, tries_ = 0;
   if (failed_) return void(stage_ = done);
   origin_ = 0.5f * (seen.active().suture_point.front().position + seen.active().suture_point.back().position);
   if (++throws_ > 2) origin_ = knot_center(seen, origin_);
@@ -459,7 +460,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       if (move_jaw(holder, kHalfOpen, dt) && waited_ > 0.2f) go(seen, off_tail);
       break;
     case off_tail:
-      if (glide(dt) && move_jaw(holder, 0, dt)) go(seen, lost_ ? to_tail : to_work);
+      if (glide(dt) && move_jaw(holder, 0, dt)) go(seen, ends_ ? done : lost_ ? to_tail : to_work);
       break;
     case to_work:
       move_jaw(holder, 0, dt);

@@ -98,6 +98,7 @@ class ThreadTie {
   int wanted_ = 0;  // throws that the knot shall have
   bool first_ = false, failed_ = false, keep_ = false;
   bool lost_ = false;                // the tail: it is taken and laid again first
+  bool ends_ = false;                // no more throws: everything is let go
   float laid_ = 1, first_laid_ = 1;  // hand of this throw, of the first: +1 right
   Vec3 origin_;                      // the middle of the stitch
   Vec3 tip_, hand_;                  // where the needle holder's jaws and the needle's swage shall be

@@ -52,6 +52,30 @@ TEST(ThreadTie, fails_at_once_when_there_is_no_stitch) {
   EXPECT_TRUE(tie.failed());
 }
 
+// Its turns slide off again and again. It gave up with the tail in its jaws, and the hands, which went away, tore the bites
+// out.
+TEST(ThreadTie, lets_the_tail_go_before_it_gives_up) {
+  Stitch s;
+  ThreadTie tie(s.picture, s.hands, {});
+  tie.begin(s.seen, 1, 1, true);
+  ToolView& holder = s.seen.tool[0];
+  bool over = false;
+  int grasps = 0;
+  for (int i = 0; i < 20000 && !over; ++i) {
+    over = tie.operate(s.seen, 1.0f / 60);
+    holder.pose = s.hands[0].pose;
+    if (s.hands[0].jaw > 0.3f) holder.held = Held::nothing;
+    else if (s.hands[0].jaw < 0.01f && holder.held == Held::nothing)
+      for (uint32_t node = 0; node < 30; ++node)
+        if (distance(holder.pose.p, s.seen.particle[node]) < 1e-3f)
+          holder.held = Held::thread, holder.held_slot = node, ++grasps;
+  }
+  ASSERT_TRUE(over);
+  EXPECT_TRUE(tie.failed());
+  EXPECT_GT(grasps, 5);
+  EXPECT_EQ(holder.held, Held::nothing);
+}
+
 // A stitch on the left of an upright bowel of 24 mm, whose tail hangs into the lumen and ends in its middle, 7 mm below the
 // edge.
 struct StitchOfRing : Stitch {
