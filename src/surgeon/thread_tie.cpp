@@ -9,6 +9,7 @@
 #include "exchange/strand.h"
 #include "exchange/tying.h"
 #include "surgeon/reach.h"
+#include "surgeon/tie_geometry.h"
 
 namespace catgut {
 namespace {
@@ -27,7 +28,8 @@ constexpr float kLoose = 0.95f;          // of the strand that is left: nearly t
 constexpr float kWinding = 0.25f;        // [N] above which the winding hand yields
 constexpr float kTailEnd = 6e-3f;        // [m] from the tail's end, where it is taken
 constexpr float kBetweenJaws = 0.6e-3f;  // [m] from the line midway between the jaws: they close on the tail there
-constexpr float kJaws = 3e-3f;           // [m] their length that holds
+constexpr float kJaws = 3e-3f;           // [m] of their length, that a tail is taken with
+constexpr float kBite = 5e-3f;           // [m] of their length, that thread is held by
 constexpr float kHeldWell = 1.5e-3f;     // [m] the same of a tail that turns slide over; between jaws and tail they come off
 constexpr float kPinched = 0.8e-3f;      // [m] from there, a strand is held with the tail: a turn on the jaws is farther away
 constexpr float kBeside = 4e-3f;         // [m] of tail, on either side of the jaws
@@ -73,28 +75,6 @@ constexpr float kStrandRoom = 2e-3f;  // [m] the same from another stitch's thre
 constexpr float kCaught = 1.5f, kCaughtFor = 0.2f;  // [N] on the hand more than the tail's tension, [s]
 constexpr float kForeign = 1;                       // [N] more than a finished stitch bears while another is tied
 constexpr float kFarthest = 9e-3f;                  // [m] of the place where a tail is taken, beyond kTailEnd
-
-Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
-// Unit, across the shaft; 0: toward the viewer, pi/2: above.
-Vec3 around(float side, float angle, Vec3 shaft) {
-  const Vec3 front = normalized(Vec3{0, 0, 1} - shaft * shaft.z), up = side * cross(front, shaft);
-  return front * portable::cos(angle) + up * portable::sin(angle);
-}
-// The needle holder along a shaft; its jaws open along x as nearly as it allows.
-Quat holder_turn(Vec3 z, Vec3 x = {0, 0, 1}) {
-  x = normalized(x - z * dot(x, z));
-  return from_axes(x, cross(z, x), z);
-}
-// [m] to `p` from the nearest point midway between the jaws, which are kJaws long.
-Vec3 from_jaws(const ToolView& tool, Vec3 p) {
-  Vec3 at = to_local(tool.pose, p);
-  at.z -= std::clamp(at.z, -0.5f * kJaws, 0.5f * kJaws);
-  return rotate(tool.pose.q, at);
-}
-float smooth(float s) {
-  s = std::clamp(s, 0.0f, 1.0f);
-  return s * s * (3 - 2 * s);
-}
 
 SeenThrows look(const Snapshot& seen) {
   std::vector<Vec3> thread;
@@ -206,7 +186,7 @@ void ThreadTie::measure(const Snapshot& seen) {
 // The jaws hold the long strand, too: drawn with the tail, it would tear its bites out.
 bool ThreadTie::pinches_strand(const Snapshot& seen) const {
   for (size_t i = last_point_node(seen) + 1; i < seen.active().thread_order.size(); ++i)
-    if (length2(from_jaws(seen.tool[kHolder], node_at(seen, i))) < kPinched * kPinched) return true;
+    if (length2(from_jaws(seen.tool[kHolder], node_at(seen, i), kBite)) < kPinched * kPinched) return true;
   return false;
 }
 
@@ -412,11 +392,12 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
   const Vec3 shaft = shaft_;
   ScriptedHand& holder = hands_[kHolder];
   const bool holds = seen.tool[kHolder].held == Held::thread;
+  const bool tail = holds && node_of(seen, seen.tool[kHolder].held_slot) < first_point_node(seen);
   if (seen.tool[kForceps].held != Held::needle || seen.active().suture_point.empty()) {  // lost, or the bites torn out
     failed_ = true, stage_ = done;
     return true;
   }
-  if (holds && waited_ > 0.2f && (stage_ == to_work || stage_ == into_work || stage_ == wind)) {  // it stuck to the jaws
+  if (holds && (stage_ == to_work || stage_ == into_work || stage_ == wind)) {  // it stuck to the jaws
     again(seen, drop_tail), lost_ = false;
     return place(), stage_ == done;
   }
@@ -437,9 +418,9 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const bool shut = move_jaw(holder, 0, dt);
       const bool laying = stage_ == take_tail;
       const ToolView& jaws = seen.tool[kHolder];
-      const bool well = (laying || length(from_jaws(jaws, node_at(seen, node_of(seen, jaws.held_slot)))) < kHeldWell) &&
+      const bool well = (laying || length(from_jaws(jaws, node_at(seen, node_of(seen, jaws.held_slot)), kJaws)) < kHeldWell) &&
                         !pinches_strand(seen);
-      if (holds && well && waited_ > 0.3f) {
+      if (tail && well && waited_ > 0.3f) {
         if (laying) go(seen, lift_tail);
         else if (wound(seen) < 2 * kPi * static_cast<float>(wraps_) - 2) again(seen, lift_tail);  // a turn has slid off
         else go(seen, draw);
@@ -460,7 +441,9 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       if (move_jaw(holder, kHalfOpen, dt) && waited_ > 0.2f) go(seen, off_tail);
       break;
     case off_tail:
-      if (glide(dt) && move_jaw(holder, 0, dt)) go(seen, ends_ ? done : lost_ ? to_tail : to_work);
+      if (!glide(dt) || !move_jaw(holder, 0, dt)) break;
+      if (holds && ++misses_ <= kMostMisses) go(seen, drop_tail);  // thread has stayed between the jaws
+      else misses_ = 0, go(seen, ends_ ? done : lost_ ? to_tail : to_work);
       break;
     case to_work:
       move_jaw(holder, 0, dt);
@@ -495,7 +478,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       // Not down into a lumen before the shaft stands as it shall.
       const bool stands = !how_.lumen || dot(shaft_, approach_) > kStands;
       const Vec3 goal = tail_node(seen, place) + (stands ? Vec3{} : approach_ * kAbove), jaws = seen.tool[kHolder].pose.p;
-      const Vec3 way = from_jaws(seen.tool[kHolder], goal);
+      const Vec3 way = from_jaws(seen.tool[kHolder], goal, kJaws);
       const float left = length(way),
                   speed = std::min(0.7f * how_.speed, 0.01f + 4 * left) * (felt_ > 2 * kWinding ? 0.3f : 1.0f);
       tip_ += way * (std::min(speed * dt, left) / std::max(left, 1e-6f));
@@ -507,7 +490,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       lead_by(how_.lumen && left < kNearTail ? kGentle : kAhead, jaws);
       // The winding hand goes along and keeps the turns on the jaws.
       if (felt_ > kWinding) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
-      else if (felt_ < 0.02f) radius_ = std::min(0.5f * strand_, radius_ + 0.01f * dt);
+      else if (felt_ < 0.02f) radius_ = std::min(0.5f * strand_, radius_ + 0.1f * dt);
       hand_ = tip_ + shaft * kWindAt + around(side_, angle_, shaft) * radius_;
       if ((stands && left < kBetweenJaws) || waited_ > (how_.lumen ? 1.5f : 1.0f) * kPatience || felt_ > kTaut) go(seen, close);
       break;
@@ -530,7 +513,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const float turn = sense_ * 0.5f * kPi;
       const Vec3 middle = tip_from_ + shaft * kWindAt, past = middle - shaft * 26e-3f + Vec3{0, 8e-3f, 0};
       if (felt_ > 0.1f) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
-      else if (felt_ < 0.01f) radius_ = std::min(0.6f * strand_, radius_ + 0.02f * dt);
+      else if (felt_ < 0.02f) radius_ = std::min(0.6f * strand_, radius_ + 0.2f * dt);
       hand_ = lerp(middle, past, slid_) + around(side_, angle_ + turn * slid_, shaft) * radius_;
       const Vec3 reach = hand_ - origin_;  // no farther than the strand, which is short for a late throw
       if (length(reach) > kLoose * strand_) hand_ = origin_ + normalized(reach) * (kLoose * strand_);

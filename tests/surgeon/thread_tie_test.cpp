@@ -76,6 +76,46 @@ TEST(ThreadTie, lets_the_tail_go_before_it_gives_up) {
   EXPECT_EQ(holder.held, Held::nothing);
 }
 
+// Jaws that have closed on the strand were taken for jaws with the tail: the hands drew them apart with 8 N (altemeier, seed
+// 2).
+TEST(ThreadTie, does_not_take_the_strand_for_the_tail) {
+  Stitch s;
+  ThreadTie tie(s.picture, s.hands, {});
+  tie.begin(s.seen, 1, 1, true);
+  ToolView& holder = s.seen.tool[0];
+  int grasps = 0;
+  for (int i = 0; i < 2000; ++i) {
+    ASSERT_FALSE(tie.operate(s.seen, 1.0f / 60));
+    ASSERT_NE(tie.doing(), "lift the tail");
+    holder.pose = s.hands[0].pose;
+    if (s.hands[0].jaw > 0.3f) holder.held = Held::nothing;
+    else if (tie.doing() == "take the tail" && s.hands[0].jaw < 0.01f && holder.held == Held::nothing)
+      holder.held = Held::thread, holder.held_slot = 60, ++grasps;
+  }
+  EXPECT_GT(grasps, 1);
+}
+
+// Jaws that go down to the tail slacken the strand: a loose turn falls between them, or off them beside the tail.
+TEST(ThreadTie, takes_in_the_slack_while_the_jaws_go_down_to_the_tail) {
+  const auto moves_apart = [](float tension) {  // [m] both hands, in the first quarter of a second
+    Stitch s;
+    ThreadTie tie(s.picture, s.hands, {});
+    tie.begin(s.seen, 1, 1, true);
+    tie.begin(s.seen, 1, 1, false);
+    float before = 0;
+    for (int ticks = 0, after = 0; ticks < 2000 && after < 15; ++ticks) {
+      EXPECT_FALSE(tie.operate(s.seen, 1.0f / 60));
+      s.seen.tool[0].pose = s.hands[0].pose;
+      if (tie.doing() == "reach for the tail") s.seen.active().thread_tension.assign(119, tension), ++after;
+      else before = distance(s.hands[0].pose.p, s.hands[1].pose.p);
+    }
+    EXPECT_EQ(tie.doing(), "reach for the tail");
+    return distance(s.hands[0].pose.p, s.hands[1].pose.p) - before;
+  };
+  EXPECT_GT(moves_apart(0), 4e-3f);
+  EXPECT_LT(moves_apart(0.1f), 0.5e-3f) << "a taut strand is not pulled";
+}
+
 // A stitch on the left of an upright bowel of 24 mm, whose tail hangs into the lumen and ends in its middle, 7 mm below the
 // edge.
 struct StitchOfRing : Stitch {
