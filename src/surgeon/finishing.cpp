@@ -181,12 +181,26 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
   }
 }
 
+// A node of the cut-off tail that ends with node `end`: as near to the cut as no other thread would come between the jaws, too.
+size_t Scripted::piece_grip(const Snapshot& seen, size_t end) const {
+  size_t at = end;
+  float most = -1;
+  for (float out = kPieceGrip + 0.004f * static_cast<float>(misses_); most < kStumpClear; out += 0.002f) {
+    const size_t i = node_along(seen, end, out, -1);
+    const float room = std::min(own_room(seen, i), room_at(picture_, seen, node_at(seen, i), false, kStumpClear));
+    if (room > most) most = room, at = i;
+    if (i == 0) break;
+  }
+  return at;
+}
+
 bool Scripted::take_piece(const Snapshot& seen) {
   enum { over = kPiece, down, close, lift, carry, lower, open, let_go };
   const auto& cut = seen.active().thread_cut;
   const size_t end = static_cast<size_t>(std::find(cut.begin(), cut.end(), 1) - cut.begin());  // of the tail's piece
   if (misses_ > kPieceMisses || end >= cut.size()) return true;                                // it lies where it fell
-  const size_t at = node_along(seen, end, kPieceGrip + 0.004f * static_cast<float>(misses_), -1);
+  if (stage_ == over && waited_ <= dt_) cut_at_ = piece_grip(seen, end);
+  const size_t at = cut_at_;
   const Vec3 x =
       normalized(cross(kCutFrom, node_at(seen, std::min(at + 1, end)) - node_at(seen, at > 0 ? at - 1 : 0)), {1, 0, 0});
   const Pose goal{node_at(seen, at), from_axes(x, cross(kCutFrom, x), kCutFrom)};
@@ -202,7 +216,8 @@ bool Scripted::take_piece(const Snapshot& seen) {
       return false;
     case close:
       if (!jaw(kNeedleHolder, 0) || waited_ < 0.3f) return false;
-      if (seen.tool[kNeedleHolder].held != Held::thread || node_of(seen, seen.tool[kNeedleHolder].held_slot) > end)
+      if (seen.tool[kNeedleHolder].held != Held::thread || node_of(seen, seen.tool[kNeedleHolder].held_slot) > end ||
+          catches_other_thread(picture_, seen, seen.tool[kNeedleHolder]))
         return missed(), false;
       stitch_load_ = largest_tension(seen, end + 1);
       go(lift);

@@ -12,9 +12,9 @@ namespace {
 // beyond the jaws, near which there is tissue in any direction.
 constexpr float kTipWidth = 3e-3f, kWidens = 0.06f, kBeyondJaws = 10e-3f, kShaftLength = 80e-3f;
 constexpr float kClear = 2e-3f;  // [m] of room that is enough
-// Thread nearer to an instrument's axis than this lies between its jaws: on them it is farther away. The jaws grasp with the
-// first millimeters, and are at most this long.
-constexpr float kBetween = 0.8e-3f, kGrasp = 4e-3f, kLongest = 0.15f;
+// Thread nearer to an instrument's axis than this lies between its jaws: on them it is farther away. From the middle of the
+// jaws along the shaft: their tips, what is behind a needle in them, and more than they are long.
+constexpr float kBetween = 0.8e-3f, kTips = -2.5e-3f, kGrasp = 4e-3f, kLongest = 0.15f;
 
 struct OtherThings {  // indices of particles: walls, then all strands but the active one's
   size_t tissue = 0, end = 0;
@@ -29,6 +29,11 @@ OtherThings other_things(const PictureModel& picture, const Snapshot& seen) {
   const auto own = std::minmax_element(seen.active().thread_order.begin(), seen.active().thread_order.end());
   o.own_first = *own.first, o.own_last = *own.second;
   return o;
+}
+
+bool between(const ToolView& tool, Vec3 particle, float behind) {
+  const Vec3 p = to_local(tool.pose, particle);
+  return p.z > behind && p.z < kLongest && p.x * p.x + p.y * p.y < kBetween * kBetween;
 }
 
 }  // namespace
@@ -62,10 +67,15 @@ Vec3 clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal, s
 
 bool catches_thread(const PictureModel& picture, const Snapshot& seen, const ToolView& tool) {
   const OtherThings o = other_things(picture, seen);
-  for (size_t i = o.tissue; i < o.end; ++i) {
-    const Vec3 p = to_local(tool.pose, seen.particle[i]);
-    if (p.z > kGrasp && p.z < kLongest && p.x * p.x + p.y * p.y < kBetween * kBetween) return true;
-  }
+  for (size_t i = o.tissue; i < o.end; ++i)
+    if (between(tool, seen.particle[i], kGrasp)) return true;
+  return false;
+}
+
+bool catches_other_thread(const PictureModel& picture, const Snapshot& seen, const ToolView& tool) {
+  const OtherThings o = other_things(picture, seen);
+  for (size_t i = o.tissue; i < o.end; ++i)
+    if (!o.own(i) && between(tool, seen.particle[i], kTips)) return true;
   return false;
 }
 

@@ -16,7 +16,9 @@ float room_at(const PictureModel& picture, const Snapshot& seen, Vec3 p, bool wa
 // other stitches when its tip is at `goal`; if none is, the one with most room.
 Vec3 clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal, std::span<const Vec3> direction);
 
-// Thread lies between the closed jaws of an instrument, behind what it grasps: it would be pulled along.
+// Thread lies between the closed jaws of an instrument, behind the needle that they hold: it would be pulled along.
 bool catches_thread(const PictureModel& picture, const Snapshot& seen, const ToolView& tool);
+// The same of another suture's thread, anywhere between jaws that hold thread of the active one.
+bool catches_other_thread(const PictureModel& picture, const Snapshot& seen, const ToolView& tool);
 
 }  // namespace catgut

@@ -184,6 +184,7 @@ class Scripted final : public Surgeon {
   size_t node_to_cut(const Snapshot& seen, bool tail, bool begins) const;
   bool cut(TaskKind kind, const Snapshot& seen);
   // The needle holder carries the tail's piece away: left in the field it would lie between jaws and tissue at the next stitch.
+  size_t piece_grip(const Snapshot& seen, size_t end) const;
   bool take_piece(const Snapshot& seen);
   static size_t count_cuts(const Snapshot& seen);
 

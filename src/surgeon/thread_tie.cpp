@@ -419,7 +419,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const bool laying = stage_ == take_tail;
       const ToolView& jaws = seen.tool[kHolder];
       const bool well = (laying || length(from_jaws(jaws, node_at(seen, node_of(seen, jaws.held_slot)), kJaws)) < kHeldWell) &&
-                        !pinches_strand(seen);
+                        !pinches_strand(seen) && !catches_other_thread(picture_, seen, jaws);
       if (tail && well && waited_ > 0.3f) {
         if (laying) go(seen, lift_tail);
         else if (wound(seen) < 2 * kPi * static_cast<float>(wraps_) - 2) again(seen, lift_tail);  // a turn has slid off

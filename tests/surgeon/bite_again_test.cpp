@@ -129,5 +129,25 @@ TEST(Surgeon, sees_thread_between_its_jaws) {
   EXPECT_FALSE(at({0.02f, 0, -0.013f})) << "beyond the thread's end";
 }
 
+// A cut-off tail was carried away with the tail of a finished stitch, whose knot came undone (altemeier, seed 3).
+TEST(Surgeon, sees_thread_of_another_suture_between_its_jaws) {
+  PictureModel picture;
+  Snapshot seen;
+  seen.suture.resize(2);
+  for (uint32_t i = 0; i < 42; ++i) {  // 10 mm apart
+    seen.suture[i / 21].thread_order.push_back(i);
+    seen.particle.push_back({0.001f * (static_cast<float>(i % 21) - 10), 0.01f * static_cast<float>(i / 21), 0});
+  }
+  ToolView jaws;
+  const auto at = [&](Vec3 p) {
+    jaws.pose.p = p;
+    return catches_other_thread(picture, seen, jaws);
+  };
+  EXPECT_FALSE(at({0, 0, -0.001f})) << "its own";
+  EXPECT_TRUE(at({0, 0.01f, -0.001f})) << "in the tips";
+  EXPECT_TRUE(at({0, 0.01f, -0.013f})) << "13 mm behind them";
+  EXPECT_FALSE(at({0, 0.0086f, -0.001f})) << "beside them";
+}
+
 }  // namespace
 }  // namespace catgut
