@@ -65,6 +65,8 @@ void WindowEvents::key(const SDL_KeyboardEvent& e, WindowInput& in) {
   if (code == SDLK_c) cut_ = down, in.mouse.cut = in.mouse.cut || down;
   if (code == SDLK_F7) cut_pedal_ = down;
   if (code == SDLK_F8) coagulate_pedal_ = down;
+  if (code == SDLK_F4) together_ = down;
+  if (code == SDLK_F6) apart_ = down;
   if (code == SDLK_n) fresh_ = down, in.mouse.fresh = in.mouse.fresh || down;
   if (!down || e.repeat) return;
   if (code == SDLK_TAB) ++in.mouse.hand_changes;
@@ -164,7 +166,7 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
             e.window.event == SDL_WINDOWEVENT_HIDDEN) {
           in.left = true;
           left_ = right_ = middle_ = space_ = cut_ = fresh_ = roll_left_ = roll_right_ = both_ = false;
-          cut_pedal_ = coagulate_pedal_ = false;
+          cut_pedal_ = coagulate_pedal_ = together_ = apart_ = false;
           arrow_x_ = arrow_y_ = zoom_ = 0;
         }
         break;
@@ -236,6 +238,7 @@ WindowInput WindowEvents::read(bool working, float dt, bool look_round) {
   }
   const SDL_Keymod mod = SDL_GetModState();
   in.pedal = cut_pedal_ ? PenMode::cut : coagulate_pedal_ ? PenMode::coagulate : PenMode::off;
+  in.clamps = int{together_} - int{apart_};
   in.mouse.turn = right_;
   in.mouse.both = both_;
   in.mouse.free_turn = mod & KMOD_CTRL;

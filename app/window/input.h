@@ -53,6 +53,7 @@ struct WindowInput {
   bool has_pad = false;
   float orbit_right = 0, orbit_up = 0, closer = 0;  // of the camera, see turn_orbit
   bool camera_home = false;
+  int clamps = 0;                // F4 held: the assistant brings the clamped ends together, +1; F6: draws them apart, -1
   PenMode pedal = PenMode::off;  // that is held down: F7 cut, F8 coagulate; a footswitch sends these keys
   int speed = -1;                // of kMouseSpeeds, when a speed key was pressed
   Key key = Key::none;           // one per call: two presses between two frames are reported in sequence
@@ -90,6 +91,7 @@ class WindowEvents {
   bool clicked_ = false;  // the left button was pressed since the panels were last drawn
   bool left_ = false, right_ = false, middle_ = false, space_ = false, cut_ = false, fresh_ = false;
   bool roll_left_ = false, roll_right_ = false, both_ = false, cut_pedal_ = false, coagulate_pedal_ = false;
+  bool together_ = false, apart_ = false;
   int arrow_x_ = 0, arrow_y_ = 0, zoom_ = 0;
 };
 

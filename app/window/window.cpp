@@ -763,6 +763,13 @@ class Window {
     }
   }
 
+  // An assistant's hands on the clamps of the fixed ends, for one tick.
+  void move_clamps(int way) {
+    if (way == 0 || !joins_clamped_ends(visit_->scene)) return;
+    for (uint16_t body = 0; body < visit_->scene.body.size(); ++body)
+      instrument({way > 0 ? CommandKind::advance_clamp : CommandKind::pull_clamp, kMaxHands - 1, body});
+  }
+
   // Silent while time stands still.
   void sound_pen() {
     PenMode mode = PenMode::off;
@@ -792,6 +799,7 @@ class Window {
     report_stage(status);
     sound_pen();
     if (v.have && !v.watching) use_pedal(screen_ == Screen::practice && !reading() ? in.pedal : PenMode::off);
+    if (v.have && !v.watching && screen_ == Screen::practice && !reading()) move_clamps(in.clamps);
     if (screen_ != Screen::practice || status.settling || !v.have || v.watching) return;
     const Camera camera = camera_of(orbit_);
     const ViewFrame view = view_frame(camera.eye, camera.target, camera.up, camera.fov_deg, static_cast<float>(height_));

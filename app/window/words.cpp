@@ -223,6 +223,12 @@ std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot&
   return lines;
 }
 
+bool joins_clamped_ends(const SceneSpec& scene) {
+  const auto clamped =
+      std::count_if(scene.body.begin(), scene.body.end(), [](const BodySpec& b) { return b.pinned_length > 0; });
+  return scene.mechanics.kind == "physical" && clamped > 1;
+}
+
 std::vector<std::string> tray_lines(const Snapshot& seen, const PictureModel& picture, size_t hand) {
   std::vector<std::string> lines;
   const Command next = next_from_tray(seen, hand), park = park_or_take_up(seen, hand);

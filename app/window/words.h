@@ -24,6 +24,8 @@ bool repeated_exit(const std::vector<Event>& events, size_t i);
 std::vector<std::string> technique_lines(const SceneSpec& scene, const Snapshot& seen, const SessionMetrics& metrics);
 
 // What lies on the tray, and what the keys I and K do for this hand.
+// Two fixed ends of bowel that an assistant can bring together and draw apart by their clamps.
+bool joins_clamped_ends(const SceneSpec& scene);
 std::vector<std::string> tray_lines(const Snapshot& seen, const PictureModel& picture, size_t hand);
 
 struct ResultRow {

@@ -128,6 +128,7 @@ Panel hand_panel(const WorkView& v, const Settings& settings) {
                       mode == PenMode::coagulate ? "N  coagulating: on" : "N  coagulate: off"});
     p.line.push_back({Tone::quiet, "F7 F8  pedals: cut, coagulate"});
   }
+  if (joins_clamped_ends(*v.scene)) p.line.push_back({Tone::quiet, "F4 F6  assistant: ends together, apart"});
   for (const std::string& text : tray_lines(*v.seen, *v.picture, k)) p.line.push_back({Tone::quiet, text});
   if (!v.pad.empty()) p.line.push_back({Tone::quiet, v.pad});
   return p;

@@ -228,6 +228,25 @@ class XMouse : public AtTheWindow {
     x_.key(key, false);
     return until(PenMode::off) && on;
   }
+  bool press_for(const std::string& key, double seconds) {
+    x_.key(key, true);
+    const double until = look_.seen.time_s + seconds;
+    bool open = true;
+    while (open && look_.seen.time_s < until) open = see(1);
+    x_.key(key, false);
+    return open;
+  }
+  // [m] between the middles of two walls.
+  float walls_apart() {
+    see(1);
+    std::array<Vec3, 2> middle{};
+    std::array<float, 2> count{};
+    for (size_t i = 0; i < picture_.wall.size(); ++i) {
+      const size_t wall = picture_.wall[i];
+      if (wall < 2) middle[wall] += look_.seen.particle[i], ++count[wall];
+    }
+    return distance(middle[0] / count[0], middle[1] / count[1]);
+  }
   // A click on a panel. [pixels] of the X server's screen, from its corner. The pointer rests until each of its states was
   // drawn.
   bool click_at(int x, int y) {

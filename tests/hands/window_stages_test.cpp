@@ -96,6 +96,24 @@ TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_mouse_and_keyboard) {
   expect_clamp_and_score(desk);
 }
 
+// The clamps move by 4 mm/s. Both ends are free, and so go where their clamps go.
+TEST_F(StitchAtTheWindow, an_assistant_brings_clamped_ends_together_and_draws_them_apart) {
+  XMouse desk(x_->display, 200, 1, "interrupted_tied");
+  if (!desk.ready()) GTEST_SKIP() << "no XTest here";
+  float before = 0, together = 0, apart = 0;
+  bool pressed = false;
+  desk.sit([&] {
+    before = desk.walls_apart();
+    pressed = desk.press_for("F4", 0.5);
+    together = desk.walls_apart();
+    pressed = pressed && desk.press_for("F6", 1);
+    apart = desk.walls_apart();
+  });
+  EXPECT_TRUE(pressed);
+  EXPECT_LT(together, before - 1e-3f);
+  EXPECT_GT(apart, together + 2e-3f);
+}
+
 TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_gamepad) {
   SdlPad desk(400, "altemeier");
   Person me(desk);
