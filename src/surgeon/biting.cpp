@@ -17,6 +17,7 @@ constexpr float kClear = 0.4f;        // [s] that the forceps backs out before a
 constexpr float kTipUp = -2.2f;       // [rad] angle of the needle's circle at which its tip is up
 constexpr float kStraight = 0.93f;    // of the strand's length
 constexpr float kEdgeGrip = 0.003f;   // [m] of the rim between the forceps' jaws
+constexpr float kEdgesLean = 0.6f;    // of the forceps at two edges
 constexpr float kEdgesGrip = 0.002f;  // [m] of the grasp point below two edges
 constexpr float kTooShallow = 0.4f;   // of the wall, for a shallow bite
 constexpr float kDeeper = 0.0005f;    // [m]
@@ -83,7 +84,10 @@ bool Scripted::hold_edge(const Snapshot& seen) {
   BiteFrame f = frame(seen, place_);
   Pose grip;
   if (bite().walls > 1) {  // both edges between the jaws, above the needle's way
-    grip = {f.at - f.out * kEdgesGrip, from_axes(f.along, cross(f.out, f.along), f.out)};
+    // It leans away from the needle holder, which passes above it as the needle is driven.
+    const Vec3 side = cross(f.along, f.out), holder = rotate(holding(kNeedleHolder, needle_at(f, 0)).q, {0, 0, 1});
+    const Vec3 z = normalized(f.out + side * (dot(holder, side) > 0 ? -kEdgesLean : kEdgesLean));
+    grip = {f.at - f.out * kEdgesGrip, from_axes(f.along, cross(z, f.along), z)};
   } else {  // where the needle enters
     grip = {f.at - f.along * (0.5f * bite().length) + f.up * (skill_.edge_distance - kEdgeGrip) - f.out * (0.5f * skill_.wall),
             from_axes(f.out, cross(f.up, f.out), f.up)};
@@ -127,6 +131,8 @@ bool Scripted::make_bite(const Snapshot& seen) {
       hold_or_rest(seen);
       scooped_ = 0;
       frame_ = frame(seen, place_);
+      if (bite().walls > 1 && seen.tool[kForceps].held == Held::tissue)  // midway between both edges, where it holds them
+        frame_.at += frame_.along * dot(seen.tool[kForceps].pose.p - frame_.at, frame_.along);
       frame_.at += frame_.along * aim_along_ + frame_.up * aim_up_;
       if (aim_turn_ != 0) {
         const Quat turn = axis_angle(frame_.out, aim_turn_);
