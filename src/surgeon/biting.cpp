@@ -115,6 +115,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
   const Pose& needle = seen.active().needle.pose;
   if (stage_ == hover && waited_ <= dt_) {
     aim();
+    tip_misses_ = 0;
     aim_up_ += kBeside * static_cast<float>(again_), depth_error_ -= kDeeper * static_cast<float>(again_);  // clear of the slit
   }
   switch (stage_) {
@@ -208,10 +209,11 @@ bool Scripted::make_bite(const Snapshot& seen) {
       return false;
     case over: {
       doing_ = name_of_bite() + "grasp the tip";
+      if (plan_.lumen && waited_ <= dt_) choose_tip_way(seen);
       jaw(kForceps, plan_.tip_open);
       // A tip that was missed is driven on: more of it is out then.
-      const float psi = psi_bite + plan_.beyond + kDriveOn * static_cast<float>(std::min(misses_, kDriveOnAtMost));
-      if (misses_ > 0 && psi_ < psi && holds_needle(seen, kNeedleHolder)) {
+      const float psi = psi_bite + plan_.beyond + kDriveOn * static_cast<float>(std::min(tip_misses_, kDriveOnAtMost));
+      if (tip_misses_ > 0 && psi_ < psi && holds_needle(seen, kNeedleHolder)) {
         psi_ = std::min(psi, psi_ + skill_.drive_speed / shape().needle_radius * dt_);
         move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
       }
@@ -224,6 +226,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
     case close:
       if (!jaw(kForceps, 0) || waited_ < 0.3f) return false;
       if (!holds_well(seen, kForceps)) {
+        if (!holds_needle(seen, kForceps)) ++tip_misses_;  // else it held thread, too
         miss(over);
         if (plan_.pull > 0 && misses_ > kMostMisses && holds_needle(seen, kNeedleHolder)) misses_ = 0, go(withdraw);
         return false;

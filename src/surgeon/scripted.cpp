@@ -3,21 +3,27 @@
 #include "surgeon/scripted.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
 #include "surgeon/excision.h"
 #include "surgeon/operation.h"
+#include "surgeon/reach.h"
 #include "surgeon/slit.h"
 
 namespace catgut {
 namespace {
 
-constexpr float kCounterHold = 0.8f;   // [N]
-constexpr float kTighten = 0.15f;      // of the free speed: the thread runs through two dozen holes, and tissue follows it late
-constexpr float kSecure = 0.985f;      // fraction of a closure that counts as closed
-constexpr float kMissBy = 0.008f;      // [m] along the shaft
-constexpr float kForcepsAt = 0.93f;    // position on the needle's arc: behind the tip
+constexpr float kCounterHold = 0.8f;  // [N]
+constexpr float kTighten = 0.15f;     // of the free speed: the thread runs through two dozen holes, and tissue follows it late
+constexpr float kSecure = 0.985f;     // fraction of a closure that counts as closed
+constexpr float kMissBy = 0.008f;     // [m] along the shaft
+constexpr float kForcepsAt = 0.93f;   // position on the needle's arc: behind the tip
+// Ways of the forceps to a tip in a lumen: of the plan's lean, [rad] more than its angle.
+constexpr struct TipWay {
+  float lean, psi;
+} kTipWay[] = {{1, 0}, {0.6f, 0}, {1.8f, 0}, {1, 0.5f}, {1, -0.5f}, {0.6f, 0.5f}, {0.6f, -0.5f}, {0.35f, 0}};
 constexpr float kOtherLean = 0.2f;     // of the forceps' lean at a tip, less with every miss
 constexpr float kGathering = 0.03f;    // [m/s] at most of hands that draw a purse-string
 constexpr float kGatherPatience = 25;  // [s]
@@ -191,9 +197,25 @@ Pose Scripted::driver_grip(const Pose& needle, float least) const {
 }
 
 Pose Scripted::forceps_grip(const Pose& needle) const {
+  if (plan_.lumen) return tip_grip(needle, tip_way_);
   // After a miss from another side: thread may be in the way.
   const float lean = plan_.pull > 0 ? plan_.tip_lean * (1 - kOtherLean * static_cast<float>(misses_ % 4)) : plan_.tip_lean;
   return grip_at(needle, kForcepsAt, plan_.forceps_side, plan_.lift > 0 ? 0.3f : lean, plan_.tip_psi);
+}
+
+Pose Scripted::tip_grip(const Pose& needle, size_t way) const {
+  const TipWay& w = kTipWay[way % std::size(kTipWay)];
+  return grip_at(needle, kForcepsAt, plan_.forceps_side, plan_.tip_lean * w.lean, plan_.tip_psi + w.psi);
+}
+
+// The first way to the tip on which no wall and no stitch is between the blades or in front of them; after a miss another one.
+void Scripted::choose_tip_way(const Snapshot& seen) {
+  const Pose& needle = seen.active().needle.pose;
+  std::array<Vec3, std::size(kTipWay)> from;
+  for (size_t i = 0; i < from.size(); ++i) from[i] = rotate(tip_grip(needle, i + static_cast<size_t>(misses_)).q, {0, 0, 1});
+  const Vec3 best = clear_shaft(picture_, seen, tip_grip(needle, 0).p, from);
+  for (size_t i = from.size(); i-- > 0;)
+    if (from[i] == best) tip_way_ = (i + static_cast<size_t>(misses_)) % from.size();
 }
 
 void Scripted::aim() {

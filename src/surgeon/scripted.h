@@ -84,6 +84,8 @@ class Scripted final : public Surgeon {
   Pose grip_at(const Pose& needle, float s, float side, float lean, float psi) const;
   Pose driver_grip(const Pose& needle, float least = 0) const;  // least: of the arc
   Pose forceps_grip(const Pose& needle) const;
+  Pose tip_grip(const Pose& needle, size_t way) const;
+  void choose_tip_way(const Snapshot& seen);
 
   // Samples the errors of the next bite.
   void aim();
@@ -228,6 +230,8 @@ class Scripted final : public Surgeon {
   float stitch_load_ = 0;        // [N] largest tension beside a cut-off tail when the jaws took it
   // A throw.
   Winding winding_;                                           // computed by exchange/tying, as for assisted hands
+  size_t tip_way_ = 0;                                        // of kTipWay
+  int tip_misses_ = 0;                                        // of this bite
   size_t cuts_before_ = 0, cut_at_ = 0, settled_before_ = 0;  // cut_at_: node where the scissors go
   uint32_t throws_before_ = 0, take_slot_ = 0;
   Quat take_turn_;
