@@ -46,11 +46,12 @@ float room_at(const PictureModel& picture, const Snapshot& seen, Vec3 p, bool wa
   return std::sqrt(room2);
 }
 
-Vec3 clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal, std::span<const Vec3> direction) {
+size_t clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal, std::span<const Vec3> direction) {
   const OtherThings o = other_things(picture, seen);
-  Vec3 best = direction[0];
+  size_t best = 0;
   float most = -1;
-  for (const Vec3 d : direction) {
+  for (size_t way = 0; way < direction.size(); ++way) {
+    const Vec3 d = direction[way];
     float room = kClear;
     for (size_t i = 0; i < o.end; ++i) {
       if (o.own(i)) continue;
@@ -59,7 +60,7 @@ Vec3 clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal, s
       if (along < kBeyondJaws || along > kShaftLength) continue;
       room = std::min(room, length(r - d * along) - kTipWidth - kWidens * along);
     }
-    if (room > most) best = d, most = room;
+    if (room > most) best = way, most = room;
     if (room >= kClear) break;
   }
   return best;

@@ -12,9 +12,9 @@ namespace catgut {
 // [m] from p to the nearest strand of another suture, or wall too. Nothing beyond `most` counts.
 float room_at(const PictureModel& picture, const Snapshot& seen, Vec3 p, bool walls, float most);
 
-// Of the directions from the tip of an instrument to its hand (unit), the first along which its shaft is clear of walls and of
-// other stitches when its tip is at `goal`; if none is, the one with most room.
-Vec3 clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal, std::span<const Vec3> direction);
+// Of the directions from the tip of an instrument to its hand (unit), the number of the first along which its shaft is clear of
+// walls and of other stitches when its tip is at `goal`; if none is, of the one with most room.
+size_t clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal, std::span<const Vec3> direction);
 
 // Thread lies between the closed jaws of an instrument, behind the needle that they hold: it would be pulled along.
 bool catches_thread(const PictureModel& picture, const Snapshot& seen, const ToolView& tool);

@@ -213,9 +213,7 @@ void Scripted::choose_tip_way(const Snapshot& seen) {
   const Pose& needle = seen.active().needle.pose;
   std::array<Vec3, std::size(kTipWay)> from;
   for (size_t i = 0; i < from.size(); ++i) from[i] = rotate(tip_grip(needle, i + static_cast<size_t>(misses_)).q, {0, 0, 1});
-  const Vec3 best = clear_shaft(picture_, seen, tip_grip(needle, 0).p, from);
-  for (size_t i = from.size(); i-- > 0;)
-    if (from[i] == best) tip_way_ = (i + static_cast<size_t>(misses_)) % from.size();
+  tip_way_ = clear_shaft(picture_, seen, tip_grip(needle, 0).p, from) + static_cast<size_t>(misses_);
 }
 
 void Scripted::aim() {

@@ -309,7 +309,7 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       const Vec3 from[] = {normalized(Vec3{0.1f * side_, 0.35f, 0.93f}), normalized(Vec3{0.1f * side_, 1, 0.9f}),
                            normalized(Vec3{0.1f * side_, 1, 0.3f}),      normalized(Vec3{0.1f * side_, 1, -0.3f}),
                            normalized(Vec3{0.4f * side_, 1, 0}),         normalized(Vec3{-0.4f * side_, 1, 0})};
-      const Vec3 z = how_.flat ? from[0] : clear_shaft(picture_, seen, at, from),
+      const Vec3 z = how_.flat ? from[0] : from[clear_shaft(picture_, seen, at, from)],
                  along = node_at(seen, node_along(seen, 0, kTailEnd + 6e-3f, 1)) - tail_node(seen, kTailEnd);
       const Vec3 x = normalized(cross(z, along), {1, 0, 0});
       lost_ = false;
@@ -349,7 +349,7 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       const Vec3 from[] = {normalized(Vec3{side_, kSteepAtTail, lean}), normalized(Vec3{side_, 2, lean}),
                            normalized(Vec3{side_, kSteepOnFlat, lean}), normalized(Vec3{side_, kSteepOnFlat, -lean}),
                            normalized(Vec3{0.5f * side_, kSteepOnFlat, 0})};
-      approach_ = how_.flat ? normalized(Vec3{side_, kSteepOnFlat, 0}) : clear_shaft(picture_, seen, goal, from);
+      approach_ = how_.flat ? normalized(Vec3{side_, kSteepOnFlat, 0}) : from[clear_shaft(picture_, seen, goal, from)];
       break;
     }
     case draw: {
