@@ -12,22 +12,23 @@ namespace {
 
 constexpr float kDriveOn = 0.08f;  // [rad] per miss of the tip
 constexpr int kDriveOnAtMost = 4;
-constexpr float kRoomToTie = 0.42f;   // of the needle's arc: least position of a needle holder that hands over near the swage
-constexpr float kClear = 0.4f;        // [s] that the forceps backs out before anything else moves
-constexpr float kTipUp = -2.2f;       // [rad] angle of the needle's circle at which its tip is up
-constexpr float kStraight = 0.93f;    // of the strand's length
-constexpr float kEdgeGrip = 0.003f;   // [m] of the rim between the forceps' jaws
-constexpr float kEdgesLean = 0.6f;    // of the forceps at two edges
-constexpr float kEdgesGrip = 0.002f;  // [m] of the grasp point below two edges
-constexpr float kTooShallow = 0.4f;   // of the wall, for a shallow bite
-constexpr float kDeeper = 0.0005f;    // [m]
-constexpr float kOutFor = 0.3f;       // [s] that a needle is out of the tissue before its bite counts as failed
-constexpr float kSlit = 0.001f;       // [m] torn by the needle on its way: it lies at an edge, or only in the surface
-constexpr int kMostMisses = 6;        // grasps at a tip that walls cover
-constexpr int kAgain = 2;             // times that a bite is made again from the start
-constexpr float kBeside = 0.002f;     // [m] from the place where it failed
-constexpr float kDrawOut = 20;        // [s] to draw a thread out
-constexpr float kScoopSpeed = 0.7f;   // of the needle's speed, with which it is lifted then
+constexpr float kRoomToTie = 0.42f;     // of the needle's arc: least position of a needle holder that hands over near the swage
+constexpr float kClear = 0.4f;          // [s] that the forceps backs out before anything else moves
+constexpr float kTipUp = -2.2f;         // [rad] angle of the needle's circle at which its tip is up
+constexpr float kStraight = 0.93f;      // of the strand's length
+constexpr float kEdgeGrip = 0.003f;     // [m] of the rim between the forceps' jaws
+constexpr float kEdgesLean = 0.6f;      // of the forceps at two edges
+constexpr float kYieldsBack = 0.0007f;  // [m] by which the needle is pushed back before it enters a wall
+constexpr float kEdgesGrip = 0.002f;    // [m] of the grasp point below two edges
+constexpr float kTooShallow = 0.4f;     // of the wall, for a shallow bite
+constexpr float kDeeper = 0.0005f;      // [m]
+constexpr float kOutFor = 0.3f;         // [s] that a needle is out of the tissue before its bite counts as failed
+constexpr float kSlit = 0.001f;         // [m] torn by the needle on its way: it lies at an edge, or only in the surface
+constexpr int kMostMisses = 6;          // grasps at a tip that walls cover
+constexpr int kAgain = 2;               // times that a bite is made again from the start
+constexpr float kBeside = 0.002f;       // [m] from the place where it failed
+constexpr float kDrawOut = 20;          // [s] to draw a thread out
+constexpr float kScoopSpeed = 0.7f;     // of the needle's speed, with which it is lifted then
 
 }  // namespace
 
@@ -133,7 +134,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
       scooped_ = 0;
       frame_ = frame(seen, place_);
       if (bite().walls > 1 && seen.tool[kForceps].held == Held::tissue)  // midway between both edges, where it holds them
-        frame_.at += frame_.along * dot(seen.tool[kForceps].pose.p - frame_.at, frame_.along);
+        frame_.at += frame_.along * (dot(seen.tool[kForceps].pose.p - frame_.at, frame_.along) + kYieldsBack);
       frame_.at += frame_.along * aim_along_ + frame_.up * aim_up_;
       if (aim_turn_ != 0) {
         const Quat turn = axis_angle(frame_.out, aim_turn_);

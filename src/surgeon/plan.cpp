@@ -40,7 +40,7 @@ constexpr float kRingPull = 2.6f;  // [N] of its throws; with 1.7 N the loops ar
 constexpr float kYields = 0.002f;
 // The same between the two cut ends: with 2 mm their stitches gaped more when the bowel was pulled (docs/operation.md,
 // Shallower bites).
-constexpr float kRingYields = 0.001f;
+constexpr float kRingYields = 0.00075f;
 constexpr float kFreeDepth = 0.0045f;  // [m] depth below the rims of a sweep through two layers
 
 // Depth of the needle's circle below a surface of radius `curved` [m] whose chord is `length`.
