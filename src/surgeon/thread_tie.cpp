@@ -21,7 +21,8 @@ constexpr float kSteepAtTail = 1;  // rise of the shaft at the tail, which lies 
 constexpr float kSteepOnFlat = 3;  // the same on flat tissue: a jaw beside the tail, none under it
 constexpr float kLeans = 60;       // [1/m] of the shaft toward a tail that lies on a slope in front or behind
 constexpr float kTurns = 3;        // [1/s]
-constexpr float kTurn = 2 * kPi - 2;     // [rad] round the shaft, of a turn whose strands lead away to the knot and to the hand
+constexpr float kTurnLeft =
+    2 * kPi - 2;                         // [rad] round the shaft, of a turn whose strands lead away to the knot and to the hand
 constexpr float kShaft = 2.2e-3f;        // [m] radius that the turns lie on
 constexpr float kJawsRound = 1.7e-3f;    // [m] the same of two turns, which take up no more than they must: round the jaws
 constexpr float kNearest = 9e-3f;        // [m] of the winding hand from the shaft
@@ -423,7 +424,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
                         !pinches_strand(seen) && !catches_other_thread(picture_, seen, jaws);
       if (tail && well && waited_ > 0.3f) {
         if (laying) go(seen, lift_tail);
-        else if (wound(seen) < kTurn * static_cast<float>(wraps_)) again(seen, lift_tail);  // a turn has slid off
+        else if (wound(seen) < kTurnLeft * static_cast<float>(wraps_)) again(seen, lift_tail);  // a turn has slid off
         else go(seen, draw);
       } else if (shut && waited_ > 0.5f) {
         if (++misses_ <= (laying ? 6 : kMostMisses)) go(seen, laying ? to_tail : open);
