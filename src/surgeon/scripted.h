@@ -232,7 +232,7 @@ class Scripted final : public Surgeon {
   Winding winding_;                                           // computed by exchange/tying, as for assisted hands
   size_t tip_way_ = 0;                                        // of kTipWay
   int tip_misses_ = 0;                                        // of this bite
-  size_t cuts_before_ = 0, cut_at_ = 0, settled_before_ = 0;  // cut_at_: node where the scissors go
+  size_t cuts_before_ = 0, cut_at_ = 0, settled_before_ = 0;  // cut_at_: node for the scissors, or for the jaws on a piece
   uint32_t throws_before_ = 0, take_slot_ = 0;
   Quat take_turn_;
   Vec3 tried_;
