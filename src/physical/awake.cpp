@@ -24,7 +24,7 @@ void each_node_column(thread::State& to, const thread::State& from, Visit visit)
   using thread::State;
   for (Columns3 State::*c : {&State::x, &State::fine, &State::v, &State::plane_friction, &State::plane_drift, &State::listed})
     for (thread::Column Columns3::*d : {&Columns3::x, &Columns3::y, &Columns3::z}) visit((to.*c).*d, (from.*c).*d);
-  visit(to.warm, from.warm), visit(to.plane_normal, from.plane_normal);
+  visit(to.warm, from.warm), visit(to.kept, from.kept), visit(to.plane_normal, from.plane_normal);
 }
 
 }  // namespace

@@ -18,6 +18,8 @@ constexpr float kLoosePress = 0.3f;
 // [N] Instruments pass through each other here, which their hands would not let them: thread between two of them gives way.
 constexpr float kBetweenPress = 4;
 constexpr float kBetween = 0.4e-3f;  // [m] apart
+// [rad] Jaws that close below this leave no room for a kink of thread between them. It gives way likewise, until they hold it.
+constexpr float kShutting = 0.02f;
 // [m/s] A needle that nothing holds, and that is faster, is moved by the thread within the thread's step: it stops at a strand
 // or is thrown back, with any force. So is one that thread presses with kLoosePress against tissue. At rest on elastic coils it
 // would be pushed about for seconds; there it has a drag.
@@ -271,6 +273,7 @@ void show_bodies(const BodiesModel& model, Bodies& bodies, const thread::Plane* 
       if (moving.fast) t.body = static_cast<uint32_t>(k.loose.size());
       else if (swage && !moving.loose) t.press = 0;
       else if (moving.loose || tip || on_drape(t.to_a) || on_drape(t.to_b)) t.press = kLoosePress;
+      else if (a.jaw != 0 && moving.opening < kShutting) t.press = kBetweenPress;
       k.tool.push_back(t), k.tool_body.push_back(b);
     }
     for (size_t i = 0; i < k.hold.size(); ++i)

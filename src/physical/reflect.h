@@ -11,8 +11,7 @@ namespace catgut::thread {
 
 constexpr void reflect(auto& a, Like<Columns3> auto& c) { a(c.x), a(c.y), a(c.z); }
 constexpr void reflect(auto& a, Like<Crossing> auto& c) {
-  a(c.s), a(c.t), a(c.normal), a(c.gap), a(c.normal_impulse), a(c.friction_impulse), a(c.drift), a(c.touch), a(c.pad),
-      a(c.rest);
+  a(c.s), a(c.t), a(c.normal), a(c.gap), a(c.normal_impulse), a(c.friction_impulse), a(c.drift), a(c.touch), a(c.pad);
 }
 constexpr void reflect(auto& a, Like<Eyelet> auto& e) {
   a(e.point), a(e.segment), a(e.friction), a(e.slip), a(e.before), a(e.angle);
@@ -22,7 +21,7 @@ constexpr void reflect(auto& a, Like<SoftContact> auto& c) {
   a(c.drift), a(c.gap);
 }
 constexpr void reflect(auto& a, Like<State> auto& s) {
-  a(s.x), a(s.fine), a(s.v), a(s.warm), a(s.rest), a(s.tension), a(s.broken), a(s.key), a(s.budget), a(s.crossing);
+  a(s.x), a(s.fine), a(s.v), a(s.warm), a(s.kept), a(s.rest), a(s.tension), a(s.broken), a(s.key), a(s.budget), a(s.crossing);
   a(s.plane_normal), a(s.plane_friction), a(s.plane_drift), a(s.eyelet), a(s.listed), a(s.travel);
   a(s.overflow), a(s.refreshes);
 }

@@ -512,12 +512,6 @@ void fall_asleep(const Model& m, State& s, AwakeThread& awake, std::span<const t
       z.touched.push_back(touched);
     }
     for (size_t i = me.first; i <= me.last; ++i) s.thread.v.set(i, {});
-    // A knot at rest is firmer than one being tied (Settings::rest_friction).
-    for (size_t q = 0; q < t.key.size(); ++q) {
-      thread::Crossing& x = s.thread.crossing[q];
-      if (x.touch == thread::Touch::stick && has(thread::segment_of(t.key[q])) && has(thread::partner_of(t.key[q])))
-        x.rest = m.thread.rest_slip;
-    }
   }
 }
 

@@ -24,8 +24,6 @@ constexpr float kThreadDrag = 30;  // [1/s] on thread. At 0.1 m/s it is 0.15 N p
 // [N] with which tissue holds slack thread in a hole (an estimate). Without it the thread creeps into the lumen by its weight:
 // Coulomb friction needs tension.
 constexpr float kHoleGrip = 0.03f;
-// ESTIMATE, no source: friction of a knot that was left alone over that of one being tied. Threads bed into each other.
-constexpr float kRestFriction = 2;
 constexpr float kLyingForce = 0.05f;  // [N] with which the drape holds a needle that lies on it
 
 std::string name_of(const SceneSpec& scene) { return scene.name.empty() ? "scene" : scene.name; }
@@ -74,7 +72,7 @@ thread::Settings thread_of(const SceneSpec& scene, float step) {
   s.substeps = kThreadSubsteps;
   s.substep = step / kThreadSubsteps;
   s.gravity = scene.solver.gravity * kThreadGravity;
-  s.damping = kThreadDrag, s.hole_grip = kHoleGrip, s.rest_friction = kRestFriction;
+  s.damping = kThreadDrag, s.hole_grip = kHoleGrip;
   return s;
 }
 
@@ -219,8 +217,9 @@ bool physical_fits(const Model& model, const PhysicalState& state) {
     return false;
   for (const thread::Columns3* c : {&t.x, &t.fine, &t.v, &t.plane_friction, &t.plane_drift, &t.listed})
     if (c->x.size() != nodes || c->y.size() != nodes || c->z.size() != nodes) return false;
-  if (t.warm.size() != nodes || t.plane_normal.size() != nodes || t.rest.size() != segments || t.tension.size() != segments ||
-      t.broken.size() != segments || t.budget.size() != t.key.size() || t.crossing.size() != t.key.size())
+  if (t.warm.size() != nodes || t.kept.size() != nodes || t.plane_normal.size() != nodes || t.rest.size() != segments ||
+      t.tension.size() != segments || t.broken.size() != segments || t.budget.size() != t.key.size() ||
+      t.crossing.size() != t.key.size())
     return false;
   for (const float rest : t.rest)
     if (!(rest > 1e-6f && rest < 1)) return false;

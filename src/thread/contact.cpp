@@ -218,7 +218,7 @@ inline __attribute__((always_inline)) float look_at(const Settings& settings, St
   }
   c.gap = far - surface;
   if (c.gap > ready) {
-    c.normal_impulse = 0, c.friction_impulse = {}, c.drift = {}, c.touch = Touch::apart, c.rest = 0;
+    c.normal_impulse = 0, c.friction_impulse = {}, c.drift = {}, c.touch = Touch::apart;
     return c.gap - ready;
   }
   const float *mobile = s.w.data() + i, wi0 = 1 - c.s, wi1 = c.s, mi0 = wi0 * mobile[0], mi1 = wi1 * mobile[1];
@@ -243,8 +243,7 @@ inline __attribute__((always_inline)) float look_at(const Settings& settings, St
   active.mi0 = mi0, active.mi1 = mi1, active.mj0 = mj0, active.mj1 = mj1;
   active.i = i, active.j = j, active.crossing = k;
   if (thread) {
-    active.mu = settings.material.friction * (c.rest > 0 ? settings.rest_friction : 1.0f), active.most = 1e9f,
-    active.partner = Four{}, active.body = ToolCapsule::kNoBody;
+    active.mu = settings.material.friction, active.most = 1e9f, active.partner = Four{}, active.body = ToolCapsule::kNoBody;
   } else {
     active.mu = around.tools[other - kTool].friction;
     active.most = around.tools[other - kTool].press * h2;
@@ -402,7 +401,6 @@ void end_contacts(const Settings& settings, State& state, Scratch& s, Surroundin
     crossing.gap = c.level + dot(c.normal, went);
     if (c.ln <= 0) {
       crossing.normal_impulse = 0, crossing.friction_impulse = {}, crossing.drift = {}, crossing.touch = Touch::apart;
-      crossing.rest = 0;
       continue;
     }
     const uint32_t other = partner_of(state.key[c.crossing]);
@@ -410,7 +408,6 @@ void end_contacts(const Settings& settings, State& state, Scratch& s, Surroundin
     crossing.drift = new_drift(settings, c, crossing.drift, three(tangential(went, c.normal)));
     crossing.normal_impulse = c.ln, crossing.friction_impulse = three(c.lt);
     crossing.touch = c.slipped ? Touch::slip : Touch::stick;
-    if (c.slipped) crossing.rest = std::max(0.0f, crossing.rest - length(three(tangential(went, c.normal))));
     if (other >= kTool) {
       const Vec3 impulse = three(c.normal * c.ln + c.lt);
       ToolCapsule& tool = around.tools[other - kTool];

@@ -114,6 +114,7 @@ struct Scratch {
   Padded3 moment;  // per node: B times curvature over length [N]
   Padded rest, inverse_rest, keep, alpha, lambda, step, residual, diag, off, tension_sum;
   Padded hinge;         // per node: bending stiffness over length [N]; of the step
+  Padded yields;        // per node: bend beyond which more of it stays, as State::kept; of the step
   Padded segment_move;  // [m] in the last substep; behind the segments, from max_nodes on, those of the tools
   LaneSystem lanes;
   // Contacts of the thread with itself and tools. Pairs under examination lie side by side; see contact.cpp.
@@ -250,7 +251,7 @@ void end_soft_contacts(const Settings& settings, State& state, Scratch& s, Surro
 
 // bending.cpp
 void begin_bending(const Settings& settings, const State& state, Scratch& s);  // of a step
-void add_bending(const State& state, Scratch& s);
+void add_bending(State& state, Scratch& s);
 
 // contact.cpp
 // Finds contacts at the predicted positions and applies their impulses of the last substep.

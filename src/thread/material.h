@@ -21,6 +21,7 @@ struct Properties {
   float line_density = 0;       // [kg/m] real; the simulation uses more (Settings::free_density)
   float axial_stiffness = 0;    // EA [N]
   float bending_stiffness = 0;  // B [N.m2]
+  float elastic_curvature = 0;  // [1/m] of the sharpest bend that springs back; more of it stays. 0: every bend springs back
   float friction = 0;           // thread on thread, Coulomb
   float knot_strength = 0;      // knot-pull strength [N]: a thread bent by a contact breaks at this tension
   float straight_strength = 0;  // [N]

@@ -233,7 +233,7 @@ State make_state(std::span<const Vec3> path, size_t crossings) {
   const size_t n = path.size();
   State s;
   for (Columns3* c : {&s.x, &s.fine, &s.v, &s.plane_friction, &s.plane_drift, &s.listed}) c->assign(n, 0);
-  s.warm.assign(n, 0), s.plane_normal.assign(n, 0);
+  s.warm.assign(n, 0), s.kept.assign(n, 0), s.plane_normal.assign(n, 0);
   for (size_t i = 0; i < n; ++i) s.x.set(i, path[i]);
   for (size_t i = 0; i + 1 < n; ++i) s.rest.push_back(distance(path[i], path[i + 1]));
   s.tension.assign(n - 1, 0), s.broken.assign(n - 1, 0);
@@ -253,9 +253,10 @@ Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_un
   Scratch& s = *scratch_;
   s.max_nodes = max_nodes, s.max_crossings = max_crossings;
   for (Padded3* c : {&s.u, &s.force, &s.e, &s.n, &s.moment, &s.middle, &s.edge}) c->resize(max_nodes);
-  for (Padded* c : {&s.mass,          &s.w,    &s.move,        &s.rest,          &s.inverse_rest,  &s.keep,        &s.alpha,
-                    &s.lambda,        &s.step, &s.residual,    &s.diag,          &s.off,           &s.tension_sum, &s.half,
-                    &s.least_density, &s.span, &s.plane_level, &s.plane_inverse, &s.plane_slipped, &s.half_turn,   &s.hinge})
+  for (Padded* c : {&s.mass,          &s.w,         &s.move,          &s.rest,     &s.inverse_rest, &s.keep,
+                    &s.alpha,         &s.lambda,    &s.step,          &s.residual, &s.diag,         &s.off,
+                    &s.tension_sum,   &s.half,      &s.least_density, &s.span,     &s.plane_level,  &s.plane_inverse,
+                    &s.plane_slipped, &s.half_turn, &s.hinge,         &s.yields})
     c->resize(max_nodes);
   s.segment_move.resize(max_nodes + kMaxTools);
   for (Padded3* c : {&s.pairs.p, &s.pairs.a, &s.pairs.b, &s.pairs.n}) c->resize(Scratch::Pairs::kMost);

@@ -43,11 +43,8 @@ struct Settings {
   float anchor = 0.2f;          // fraction of the stored tangential drift that a sticking contact undoes per substep
   float list_margin = 0.6e-3f;  // pairs nearer than d + margin are listed [m]
   float max_move = 0.125f;      // of the diameter, per substep
-  // Friction of thread on thread at rest, over material.friction, until it has slipped by rest_slip [m]: a knot that was left
-  // alone is firmer than one being tied. The caller sets Crossing::rest.
-  float rest_friction = 1, rest_slip = 100e-6f;
-  float hole_grip = 0;  // [N] with which a hole holds thread that is slack, too; in addition to its Coulomb friction
-  Vec3 gravity{};       // [m/s2]
+  float hole_grip = 0;          // [N] with which a hole holds thread that is slack, too; in addition to its Coulomb friction
+  Vec3 gravity{};               // [m/s2]
   bool breaks = true;
 };
 
@@ -69,7 +66,6 @@ struct Crossing {
   Vec3 drift;                // [m] tangential motion that sticking has not undone; 0 after slip; at most 0.2 d
   Touch touch = Touch::unknown;
   std::array<uint8_t, 3> pad{};
-  float rest = 0;  // [m] of slip before it loses the friction of thread at rest; 0: it has not been at rest
 };
 
 // A hole in something soft through which the thread slides: it turns a corner there. The corner lies within one segment, whose
@@ -90,6 +86,7 @@ struct State {
   Columns3 x, fine;  // position [m] = x + fine; written by the substep
   Columns3 v;        // [m/s]
   Column warm;       // 0 free .. 1 in contact with something loaded
+  Column kept;       // bend that stays without load, as the difference of the unit directions before and behind the node
   // Per segment: segment i joins nodes i and i + 1.
   Column rest;                  // [m]
   Column tension;               // [N] mean over the last step; negative: pushed
@@ -118,7 +115,8 @@ void reflect(Archive& archive, AnyState& s) {
   for (auto* c : {&s.x, &s.fine, &s.v, &s.plane_friction, &s.plane_drift, &s.listed}) {
     archive("x", c->x), archive("y", c->y), archive("z", c->z);
   }
-  archive("warm", s.warm), archive("rest", s.rest), archive("tension", s.tension), archive("broken", s.broken);
+  archive("warm", s.warm), archive("kept", s.kept), archive("rest", s.rest), archive("tension", s.tension),
+      archive("broken", s.broken);
   archive("key", s.key), archive("budget", s.budget), archive("crossing", s.crossing);
   archive("plane_normal", s.plane_normal);
   archive("eyelet", s.eyelet);

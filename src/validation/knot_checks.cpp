@@ -137,6 +137,7 @@ struct Overhand {
 Overhand tighten_overhand(int n, float mu, double end) {
   Settings settings = knot_settings(mu);
   settings.material.bending_stiffness = 1e-5f;
+  settings.material.elastic_curvature = 0;  // as in the formula
   settings.substep = 25e-6f, settings.substeps = 40, settings.iterations = 2;
   const float d = settings.material.diameter, l = 1e-3f, loop = 0.2f, big = loop / (2 * kPi), r = 0.7f * d;
   const float turns = static_cast<float>(2 * n + 1) * kPi;
@@ -248,13 +249,19 @@ void check_overhand(Lines& out, bool nightly) {
 
 void check_holding(Lines& out, bool nightly) {
   // Below the friction at which they lock, with free tails: only the knot holds.
-  const float mu = 0.2f;
+  // A knot's peak depends on where its nodes lie: mean of three places.
+  const float mu = 0.14f;
   const Settings settings = knot_settings(mu);
-  const float single = hold_knot(single_throw(), settings, 0).peak, two_granny = hold_knot(granny(), settings, 0).peak;
-  const float two = hold_knot(square(), settings, 0).peak, three = hold_knot(three_throws(), settings, 0).peak;
+  const auto peak = [&](const Throws& throws) {
+    float sum = 0;
+    for (const float place : {0.0f, 0.33f, 0.67f}) sum += hold_knot(throws, settings, 0, Drawing::flat, 8, place).peak / 3;
+    return sum;
+  };
+  const float single = peak(single_throw()), two_granny = peak(granny()), two = peak(square()), three = peak(three_throws());
   const std::string source = "order known to every surgeon; Patil et al. 2020, 10.1126/science.aaz0135";
   auto below = [&](const std::string& name, float less, float more) {
-    out.add("knot/" + name + ", share of the stronger at mu 0.2", 0, double{less / more}, 0.9, "", source);
+    out.add("knot/" + name + ", share of the stronger at mu 0.14, mean of three places of the nodes", 0, double{less / more},
+            0.9, "", source);
   };
   below("single throw below granny", single, two_granny);
   below("granny below square", two_granny, two);
@@ -263,8 +270,8 @@ void check_holding(Lines& out, bool nightly) {
   // Halving the substep: force while it slides, with 0.2 N on the tails (free tails make the result bistable).
   for (const Kind& kind : {Kind{"granny", granny()}, Kind{"square", square()}}) {
     if (!nightly && kind.throws[1].hand < 0) continue;
-    for (float m : {0.1f, 0.12f}) {  // from 0.15 on it depends on trifles whether they lock, and a locked knot tests nothing
-      if (!nightly && m > 0.11f) continue;
+    for (float m : {0.08f, 0.1f}) {  // near 0.15 it depends on trifles whether they lock, and a locked knot tests nothing
+      if (!nightly && m < 0.09f) continue;
       Settings whole = knot_settings(m), half = whole;
       half.substep *= 0.5f, half.substeps *= 2;
       const float expected = hold_knot(kind.throws, whole, 0.2f).mean, got = hold_knot(kind.throws, half, 0.2f).mean;
@@ -273,23 +280,29 @@ void check_holding(Lines& out, bool nightly) {
     }
   }
 
-  // Drabble et al. 2021: flat 1.2 mm, hands uncrossed 18.5 mm, tied under tension 50.6 mm of slip. Here at most 8 mm, mean of
-  // four frictions between which the square knot locks.
+  // Drabble et al. 2021, polyglactin 2-0: flat 1.2 mm, hands uncrossed 18.5 mm, tied under tension 50.6 mm of slip. Here at
+  // most 8 mm; mean of five frictions round that at which the square knot locks, and of places of its nodes.
   const std::string drabble = "order of Drabble et al. 2021, 10.1136/bmjsit-2021-000091: 1.2, 18.5, 50.6 mm";
-  for (const float place : {0.0f, 0.5f}) {
-    if (!nightly && place > 0) continue;
-    auto slip = [&](Drawing drawing) {
-      double sum = 0;
-      for (float m : {0.25f, 0.3f, 0.35f, 0.4f})
-        sum += 250 * double{hold_knot(square(), knot_settings(m), 0, drawing, 3, place).slip};
-      return sum;
-    };
-    const double flat = slip(Drawing::flat), uncrossed = slip(Drawing::uncrossed), tense = slip(Drawing::under_tension);
-    const std::string where = place > 0 ? ", nodes half a segment farther" : "";
-    out.add("knot/slip to 3 N, mm: flat square " + number(flat) + " as a share of uncrossed " + number(uncrossed) + where, 0,
-            flat / uncrossed, 0.9, "", drabble);
-    out.add("knot/slip to 3 N, mm: uncrossed as a share of tied under tension " + number(tense) + where, 0, uncrossed / tense,
-            place > 0 ? 1 : 0.9, "", drabble);
+  const int placed = nightly ? 6 : 2;
+  auto slip = [&](Drawing drawing) {
+    double sum = 0;
+    for (float m : {0.2f, 0.25f, 0.3f, 0.35f, 0.4f})
+      for (int k = 0; k < placed; ++k) {
+        Settings braid;
+        braid.material = thread::properties(thread::Material::polyglactin_910, thread::Size::usp_2_0);
+        braid.material.friction = m, braid.breaks = false;
+        const float place = static_cast<float>(k) / static_cast<float>(placed);
+        sum += 1e3 * double{hold_knot(square(), braid, 0, drawing, 3, place).slip};
+      }
+    return sum / (5 * placed);
+  };
+  const double flat = slip(Drawing::flat), uncrossed = slip(Drawing::uncrossed);
+  out.add("knot/slip to 3 N, mm: flat square " + number(flat) + " as a share of uncrossed " + number(uncrossed), 0,
+          flat / uncrossed, 0.9, "", drabble);
+  if (nightly) {  // the two differ by less than single knots do
+    const double tense = slip(Drawing::under_tension);
+    out.add("knot/slip to 3 N, mm: uncrossed as a share of tied under tension " + number(tense), 0, uncrossed / tense, 0.9, "",
+            drabble);
   }
 
   const Settings held = knot_settings(0.3f);
@@ -331,8 +344,7 @@ void check_shaking(Lines& out, bool nightly) {
     const int cycles = nightly ? 100 : 6;
     const Shaken shaken = shake(settings, t, cycles, 0.5f, 5);
     const std::string name = std::string("knot/") + kind.name + " shaken " + number(cycles) + " times at 0.5 m/s and 5 N, ";
-    out.add(name + "determinant", static_cast<double>(shaken.before), static_cast<double>(shaken.after), 0, "",
-            "a knot is a knot");
+    out.add(name + "strands that pass through each other", 0, shaken.passes, 0, "", "motion of every pair in every substep");
     out.add(name + "strands nearer than a diameter by", 0, 1 - double{shaken.nearest}, 0.2, "diameters", "nothing passes");
   }
 }
@@ -360,8 +372,8 @@ void check_locking(Lines& out) {
   };
   const Kind two{"square", square()}, slip{"granny", granny()};
   for (const Expected& e :
-       {Expected{two, 4, 2, 1, 0.28, 0.30}, Expected{two, 4, 2, 1.43f, 0.24, 0.30}, Expected{two, 4, 2, 2, 0.24, 0.24},
-        Expected{slip, 3, 4, 1, 0.34, 0.38}, Expected{slip, 3, 4, 1.43f, 0.26, 0.34}, Expected{slip, 3, 4, 2, 0.26, 0.30}}) {
+       {Expected{two, 4, 2, 1, 0.24, 0.26}, Expected{two, 4, 2, 1.43f, 0.22, 0.28}, Expected{two, 4, 2, 2, 0.22, 0.22},
+        Expected{slip, 3, 4, 1, 0.34, 0.38}, Expected{slip, 3, 4, 1.43f, 0.26, 0.30}, Expected{slip, 3, 4, 2, 0.22, 0.30}}) {
     // Downward, because single frictions below the threshold may hold by chance.
     const int first = e.step == 2 ? 38 : 42;
     int one = first, all = first;
@@ -384,8 +396,8 @@ void check_locking(Lines& out) {
     thread::Material material;
     double throws, coarser;  // with segments of 1.43 and of 2 diameters
   };
-  for (const Held& e : {Held{thread::Material::silk, 2, 2}, Held{thread::Material::polyglactin_910, 4, 2},
-                        Held{thread::Material::polypropylene, 5, 5}, Held{thread::Material::polydioxanone, 7, 7}})
+  for (const Held& e : {Held{thread::Material::silk, 2, 2}, Held{thread::Material::polyglactin_910, 2, 2},
+                        Held{thread::Material::polypropylene, 7, 3}, Held{thread::Material::polydioxanone, 7, 7}})
     for (const float coarse : {1.43f, 2.0f}) {
       Settings settings;
       settings.material = thread::properties(e.material, thread::Size::usp_3_0);

@@ -45,7 +45,8 @@ LaidKnot lay_on_rod(std::span<const Throw> throws, float diameter, float segment
 // Both strands as one closed curve: joined below the knot, the tails led far away.
 std::vector<Vec3> closed_curve(const LaidKnot& knot);
 
-// The settings of the holding tests: thread of 0.35 mm, EA 500 N, B 1e-8 N.m2, segments of 1.4 diameters.
+// The settings of the holding tests: thread of 0.35 mm, EA 500 N, B 1e-8 N.m2, bends sharper than four diameters stay; segments
+// of 1.4 diameters.
 thread::Settings knot_settings(float friction);
 
 struct Tightened {
@@ -74,9 +75,9 @@ Holding pull_apart(const thread::Settings& settings, Tightened& t, float tails =
 double creep(const thread::Settings& settings, Tightened& t, float load, double seconds, double window);
 
 struct Shaken {
-  uint64_t before = 0, after = 0;  // determinants
-  float nearest = 1;               // smallest distance between touching strands, in diameters
-  float peak = 0;                  // [N] largest tension
+  int passes = 0;     // pairs of segments that passed through each other
+  float nearest = 1;  // smallest distance between touching strands, in diameters
+  float peak = 0;     // [N] largest tension
 };
 // Shakes one load end by +-10 mm at up to `speed` [m/s], across and along the strands in turn, while the other is
 // pulled.

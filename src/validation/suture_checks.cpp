@@ -49,8 +49,9 @@ Outcome tie_stitch(Throws throws, float friction, float tension, bool remove) {
 
 void check_interrupted(Lines& out, bool nightly) {
   // Silk. Below 0.26 two throws of this polygon do not lock (docs/thread.md), and the stitch gives back tension.
-  const std::string who = "closure/interrupted/three throws, square, friction 0.3, 3 N, ";
-  const Outcome square = tie_stitch(three_throws(), 0.3f, 3, true);
+  // Drawn with 3 N and more, both ends may tear these bites out, whatever the thread.
+  const std::string who = "closure/interrupted/three throws, square, friction 0.3, 2.5 N, ";
+  const Outcome square = tie_stitch(three_throws(), 0.3f, 2.5f, true);
   out.add(who + "gap at the stitch, hands gone 4 s", 0, wide(square.away), 1e-3, "m", "closed: at most 1 mm");
   out.add(who + "change of the gap since the hands let go", 0, wide(square.away - square.tied), 0.2e-3, "m", "holds: 0.2 mm");
   out.add(who + "gap with the thread removed", wide(square.laid), wide(square.removed), 0.05, "m", "as it was before");
@@ -59,7 +60,7 @@ void check_interrupted(Lines& out, bool nightly) {
     out.add(std::string("closure/interrupted/") + name + ", hands gone 4 s: opens again, 1 for yes", 1,
             o.away > square.away + 1e-3f ? 1 : 0, 0, "", "a knot that does not hold; gap beyond the square knot's by 1 mm");
   };
-  if (nightly) grows("one throw", single_throw(), 0.3f, 3);
+  if (nightly) grows("one throw", single_throw(), 0.3f, 2.5f);
   if (nightly) grows("granny, friction 0.1, 2 N", granny(), 0.1f, 2);
   if (nightly) grows("two throws, square, friction 0.1, 2 N", validation::square(), 0.1f, 2);
 }

@@ -314,11 +314,12 @@ class Tying {
       place_hand();
       tick("fetch");
     }
-    // They keep to the tail while they close: it swings.
+    // They keep to the tail while they close: it swings. The strand stays taut: a slack turn slides off past the tail's end.
     for (int i = 1; i <= 120; ++i) {
       opening_ = kOpen + (kClosed - kOpen) * static_cast<float>(i) / 120;
       const Vec3 way = knot_.state.position(hold_[2].node) - shaft_ * kGrip - tip_;
       tip_ += way * std::min(0.02f, 0.5f * how_.speed * kTick / std::max(1e-6f, length(way)));
+      feel(kWinding);
       place_hand();
       tick("close");
     }

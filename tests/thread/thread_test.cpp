@@ -83,6 +83,47 @@ TEST(Thread, a_clamped_end_bends_as_the_elastica_of_its_stiffness) {
   }
 }
 
+// Bent to an arc, bent back by most of the elastic curvature, then let go: from there it springs without yielding again. What
+// is lost of the curvature is the elastic one, whatever the length of the segments; a bend that is less sharp springs back
+// whole.
+TEST(Thread, springs_back_from_a_bend_by_its_elastic_curvature) {
+  Settings settings = plain();
+  const float elastic = 1 / (4 * settings.material.diameter);  // [1/m]
+  settings.material.elastic_curvature = elastic;
+  settings.damping = 500;  // no swing past where it springs to: a bend that is drawn straight is forgotten
+  for (const float segment : {0.25e-3f, 0.5e-3f})
+    for (const float sharp : {0.7f, 1.4f, 2.0f}) {
+      const size_t nodes = 2 + static_cast<size_t>(0.9f * kPi / (sharp * elastic * segment));
+      const auto arc = [&](float curvature, size_t i) {
+        const float a = curvature * segment * static_cast<float>(i), r = 1 / curvature;
+        return Vec3{r * std::sin(a), r * (1 - std::cos(a)), 0};
+      };
+      State state = make_state(line(nodes, {}, {segment, 0, 0}));
+      Stepper stepper(nodes);
+      std::vector<Hold> hold(nodes);
+      for (uint32_t i = 0; i < nodes; ++i) hold[i].node = i, hold[i].to = state.position(i);
+      Surroundings around;
+      around.holds = hold;
+      const auto bend_to = [&](float from, float to) {
+        for (int k = 1; k <= 101; ++k) {  // the last one at rest
+          const float part = std::min(1.0f, 0.01f * static_cast<float>(k));
+          for (size_t i = 0; i < nodes; ++i) hold[i].from = hold[i].to, hold[i].to = arc(from + (to - from) * part, i);
+          stepper.step(settings, state, around);
+        }
+      };
+      const auto bend_of_middle = [&] {
+        const size_t i = nodes / 2;
+        return length(state.position(i + 1) - state.position(i) * 2.0f + state.position(i - 1)) / (segment * segment);
+      };
+      bend_to(0, sharp * elastic);
+      const float bent = bend_of_middle();
+      bend_to(sharp * elastic, sharp * elastic - std::min(0.8f, 0.5f * sharp) * elastic);
+      around.holds = {};
+      for (int i = 0; i < 2000; ++i) stepper.step(settings, state, around);
+      EXPECT_NEAR(bend_of_middle(), std::max(0.0f, bent - elastic), 0.03f * elastic) << segment << " " << sharp;
+    }
+}
+
 TEST(Thread, keeps_its_momentum_when_it_hits_itself) {
   Settings settings = plain();
   settings.damping = 0;
@@ -199,7 +240,7 @@ TEST(Thread, holds_a_meter_from_the_origin) {
   for (size_t i = 0; i < laid.state.nodes(); ++i) laid.state.x.add(i, {1.3f, -0.9f, 1.1f});
   validation::Tightened t(std::move(laid));
   validation::tighten(settings, t, 2);
-  EXPECT_LT(std::abs(validation::creep(settings, t, 3, 3, 1)), 1e-6);
+  EXPECT_LT(std::abs(validation::creep(settings, t, 3, 8, 2)), 1e-6) << "it settles within six seconds";
 }
 
 std::vector<Vec3> closed(const validation::Throws& throws) {
@@ -370,7 +411,7 @@ TEST(Observe, names_what_was_wound_and_what_is_tight) {
       {validation::surgeons_211(), KnotName::surgeons, 3, 4}};
   const Settings settings = validation::knot_settings(0.3f);
   for (const Named& n : all) {
-    validation::Tightened t(validation::lay_knot(n.throws, settings.material.diameter, 0.5e-3f));
+    validation::Tightened t(validation::lay_on_rod(n.throws, settings.material.diameter, 0.5e-3f));
     for (const bool tight : {false, true}) {
       if (tight) validation::tighten(settings, t, 2);
       const SeenKnot seen = observe(settings, t.knot.state);
@@ -391,7 +432,7 @@ TEST(Observe, names_what_was_wound_and_what_is_tight) {
 TEST(Observe, tells_half_hitches_from_flat_throws) {
   const Settings settings = validation::knot_settings(0.3f);
   for (const validation::Throws& throws : {validation::three_throws(), validation::surgeons_211()}) {
-    validation::Tightened t(validation::lay_knot(throws, settings.material.diameter, 0.5e-3f));
+    validation::Tightened t(validation::lay_on_rod(throws, settings.material.diameter, 0.5e-3f));
     validation::tighten(settings, t, 2, validation::Drawing::under_tension);
     EXPECT_TRUE(observe(settings, t.knot.state).sliding);
   }
@@ -469,28 +510,17 @@ TEST(FirstThrow, of_two_turns_locks_where_one_of_one_turn_slides_and_takes_more_
 }
 
 // [m] by which a tied knot gives when its bite is loaded from nothing up to `load` [N], after both tails were pulled with
-// `tails` [N]; 12 mm: it slides. rest: Settings::rest_friction of a knot that was at rest in between; 0: it was not.
-float gives(const validation::Throws& throws, float tails, float load, float rest = 0) {
+// `tails` [N]; 12 mm: it slides.
+float gives(const validation::Throws& throws, float tails, float load) {
   Settings settings = validation::knot_settings(0.30f);
   settings.material = *find_material("silk 2-0");
   settings.breaks = false;
   validation::Tightened t(validation::lay_knot(throws, settings.material.diameter, 0.7e-3f));
   const auto apart = [&] { return distance(t.knot.state.position(t.knot.load_a), t.knot.state.position(t.knot.load_b)); };
   validation::tighten(settings, t, tails, validation::Drawing::flat, 0.6f);
-  size_t rested = 0;
-  if (rest > 0) {
-    settings.rest_friction = rest;
-    for (Crossing& c : t.knot.state.crossing)
-      if (c.touch == Touch::stick) c.rest = settings.rest_slip, ++rested;
-    EXPECT_GT(rested, 0u);
-  }
   const float before = apart();
   validation::pull_apart(settings, t, 0, 0.01f, load, 12e-3f);
-  const float gave = apart() - before;
-  const auto still =
-      std::count_if(t.knot.state.crossing.begin(), t.knot.state.crossing.end(), [](const Crossing& c) { return c.rest > 0; });
-  if (rest > 0 && gave > 5e-3f) { EXPECT_LT(still, static_cast<std::ptrdiff_t>(rested)) << "what slips is at rest no more"; }
-  return gave;
+  return apart() - before;
 }
 
 // Both ends pulled with 3.8 N tighten a square knot. A granny slides on, and so do throws that lie below another one: at
@@ -504,14 +534,53 @@ TEST(TiedKnot, gives_little_when_it_is_square_and_was_tightened) {
   EXPECT_GT(granny, 2 * square);
 }
 
-TEST(TiedKnot, holds_more_once_it_was_at_rest) {
-  const float tied = gives(validation::granny(), 3.8f, 0.8f), same = gives(validation::granny(), 3.8f, 0.8f, 1),
-              rested = gives(validation::granny(), 3.8f, 0.8f, 2);
-  std::printf("granny up to 0.8 N: %.2f mm, with the same friction at rest %.2f mm, with twice that %.2f mm\n",
-              1e3 * static_cast<double>(tied), 1e3 * static_cast<double>(same), 1e3 * static_cast<double>(rested));
-  EXPECT_EQ(same, tied);
-  EXPECT_GT(tied, 5e-3f);
-  EXPECT_LT(rested, 1.5e-3f);
+// A square knot that nothing loads: what the bite goes round has given way. A bar rubs across its strands and back, twice a
+// second for 15 s, with at most 0.5 N on a segment; its lower side is at `height` [m] from the knot's middle. Returns the
+// throws that are left.
+uint32_t rubbed(float elastic_curvature, float height) {
+  Settings settings = validation::knot_settings(0.30f);
+  settings.material = *find_material("silk 2-0");
+  settings.material.elastic_curvature = elastic_curvature;
+  settings.breaks = false;
+  settings.gravity = {0, 0, -0.1f}, settings.damping = 30;
+  const float segment = 0.7e-3f, gave = 0.3e-3f;
+  validation::Tightened t(validation::lay_on_rod(validation::square(), settings.material.diameter, segment));
+  validation::tighten(settings, t, 2, validation::Drawing::flat, 0.6f);
+  EXPECT_EQ(observe(settings, t.knot.state).throws, 2u);
+  std::vector<ToolCapsule> tools = t.knot.rod;
+  const uint32_t quarter = static_cast<uint32_t>(0.5f * kPi * tools[0].radius / segment);
+  Hold hold[3];  // below the rod and beside it
+  for (uint32_t k = 0; k < 3; ++k) {
+    hold[k].node = t.knot.load_a + quarter * k - quarter;
+    hold[k].from = t.knot.state.position(hold[k].node), hold[k].to = hold[k].from + Vec3{0, 0, k == 1 ? 0.0f : gave};
+  }
+  tools[0].radius -= gave;
+  ToolCapsule bar;
+  bar.radius = 1e-3f, bar.press = 0.5f;
+  const auto place = [&](int tick) {
+    return Vec3{4e-3f * std::sin(4 * kPi * 1e-3f * static_cast<float>(tick)), 0, height + bar.radius};
+  };
+  const Vec3 half{0, 6e-3f, 0};
+  tools.push_back(bar);
+  for (int i = 0; i < 15000; ++i) {
+    ToolCapsule& b = tools.back();
+    b.a = place(i) - half, b.b = place(i) + half, b.to_a = place(i + 1) - half, b.to_b = place(i + 1) + half;
+    Surroundings around;
+    around.tools = tools, around.holds = hold;
+    t.stepper.step(settings, t.knot.state, around);
+    for (Hold& h : hold) h.from = h.to;
+  }
+  return observe(settings, t.knot.state).throws;
+}
+
+TEST(TiedKnot, keeps_its_throws_without_load_because_bends_stay) {
+  const float sharpest = find_material("silk 2-0")->elastic_curvature;
+  for (const float height : {-0.7e-3f, -1.3e-3f}) {
+    const uint32_t kept = rubbed(sharpest, height), sprung = rubbed(0, height);
+    std::printf("of 2 throws %u are left, and %u of an elastic thread\n", kept, sprung);
+    EXPECT_EQ(kept, 2u);
+    EXPECT_LT(sprung, 2u) << "the bar is too gentle to tell the two apart";
+  }
 }
 
 TEST(ToolTies, are_the_same_to_the_bit_every_time) {
