@@ -60,8 +60,9 @@ void add_bending(State& state, Scratch& s) {
   bends(nodes, s.e.x.data(), s.e.y.data(), s.e.z.data(), inverse, s.hinge.data(), s.yields.data(), state.kept.data(),
         s.moment.x.data(), s.moment.y.data(), s.moment.z.data());
   // The corner in a hole is a hinge: bending spread over the nodes beside it would hold the thread wherever a node lies well.
+  // None is kept there: the nodes do not know how sharply the thread turns in the hole.
   for (const Eyelet& eyelet : state.eyelet)
-    for (const size_t i : {eyelet.segment, eyelet.segment + 1}) s.moment.set(i, {});
+    for (const size_t i : {eyelet.segment, eyelet.segment + 1}) s.moment.set(i, {}), state.kept[i] = 0;
   for (auto [moment, f] :
        {std::tuple{&s.moment.x, &s.force.x}, std::tuple{&s.moment.y, &s.force.y}, std::tuple{&s.moment.z, &s.force.z}}) {
     (*moment)[nodes - 1] = (*moment)[nodes] = 0;

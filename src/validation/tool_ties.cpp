@@ -344,21 +344,23 @@ class Tying {
   }
 
   // The needle holder goes back with the tail. The other hand keeps the strand and continues over the top, past the tip: the
-  // turns slide off the jaws and along the tail.
+  // turns slide off the jaws and along the tail. A short tail stops the needle holder, but not the hand: turns that stay on the
+  // jaws would be lost where the hands cross.
   void draw(Vec3 work, float sense) {
     const Vec3 from = tip_, to = work + shaft_ * 34e-3f + tremor();
     const Vec3 middle = tip_ + shaft_ * wind_at_, past = middle - shaft_ * 14e-3f + Vec3{0, 8e-3f, 0};
     const float angle_from = angle_, turn = sense * 0.5f * kPi;
     const float far = distance(from, to);
-    float done = 0, speed = 0;
-    for (int guard = 0; done < far && guard < 20000; ++guard) {
+    float done = 0, speed = 0, passed = 0, passing = 0;
+    for (int guard = 0; std::min(done, passed) < far && guard < 20000; ++guard) {
       // No farther than the tail lets it: a tight tail would open the throws below.
-      if (tail_felt_ > 2 * kWinding && done > 0.5f * far) break;
-      const float want = std::min(how_.speed, 0.02f + 10 * (far - done)) * std::clamp(1.5f - tail_felt_ / kDrawing, 0.1f, 1.0f);
-      speed += std::clamp(want - speed, -20 * kTick, 5 * kTick);
-      done += speed * kTick;
-      const float e = std::min(1.0f, done / far);
-      tip_ = lerp(from, to, e);
+      if (tail_felt_ > 2 * kWinding && done > 0.5f * far && passed >= far) break;
+      const auto pace = [&](float way) { return std::min(how_.speed, 0.02f + 10 * std::max(0.0f, far - way)); };
+      speed += std::clamp(pace(done) * std::clamp(1.5f - tail_felt_ / kDrawing, 0.1f, 1.0f) - speed, -20 * kTick, 5 * kTick);
+      passing += std::clamp(pace(passed) - passing, -20 * kTick, 5 * kTick);
+      done += speed * kTick, passed += passing * kTick;
+      const float e = std::min(1.0f, passed / far);
+      tip_ = lerp(from, to, std::min(1.0f, done / far));
       angle_ = angle_from + turn * e;
       feel(kDrawing);
       hand_ = lerp(middle, past, e) + around(side_, angle_) * radius_;

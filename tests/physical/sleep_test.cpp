@@ -139,7 +139,7 @@ struct Knotted {
     const Vec3 apart = normalized(s.hold[0].to - s.hold[1].to) * 2e-3f;
     const Vec3 loaded[2] = {s.hold[0].to + apart, s.hold[1].to - apart};
     s.move_holds(loaded, 0.1f);
-    s.run(6.0f);
+    s.run(4.0f);
   }
   // Draws the load ends apart; returns the force [N] at each step.
   std::vector<float> draw() {
