@@ -623,6 +623,36 @@ TEST(Tool, jaws_hold_a_thread_up_to_twice_friction_times_force) {
   }
 }
 
+// A zigzag of thread, 4 mm behind the tips, where the jaws shut without holding it. It gives way: otherwise they would stretch it
+// with 14 N and more.
+TEST(Tool, jaws_that_shut_on_a_kink_of_thread_do_not_stretch_it) {
+  float most = 0;
+  for (const int folds : {1, 2, 3}) {
+    Bench bench;
+    const float l = 0.5e-3f;
+    std::vector<Vec3> path;
+    for (int i = 0; i < 40; ++i) path.push_back({0.015f - l * static_cast<float>(40 - i), 0.01f, 0.03f});
+    const auto add = [&](Vec3 way) { path.push_back(path.back() + way * l); };
+    for (int i = 0; i < 4 * folds; ++i) add(normalized(Vec3{0.1f, i / 2 % 2 ? -0.7f : 0.7f, 0.7f}));
+    for (int i = 0; i < 40; ++i) add({1, 0, 0});
+    bench.state.thread = thread::make_state(path);
+    const Pose pose{{0.015f, 0.01f, 0.026f}, axis_angle({0, 0, 1}, 0.5f * kPi)};  // jaws open along y
+    const uint32_t t = bench.add(make_tool({}), pose, 0.06f);
+    const uint32_t last = static_cast<uint32_t>(path.size()) - 1;
+    const thread::Pull ends[] = {{0, {-0.2f, 0, 0}}, {last, {0.2f, 0, 0}}};
+    bench.pulls = ends;
+    bench.start();
+    for (int i = 0; i < 400; ++i) {
+      bench.target[t] = {pose, true, 0, 4}, bench.step();
+      if (bench.body(t).opening < 0.01f)
+        for (const float tension : bench.state.thread.tension) most = std::max(most, tension);
+    }
+    EXPECT_LT(bench.body(t).opening, 0.01f) << "they have shut";
+  }
+  EXPECT_LT(most, 6);
+  EXPECT_GT(most, 1) << "there was something between them";
+}
+
 // Two strands between the same jaws, such as the crossing of a throw: each carries half of the friction. The thread turns back
 // 6 mm behind the jaws.
 TEST(Tool, jaws_pinch_both_strands_that_lie_between_them) {
