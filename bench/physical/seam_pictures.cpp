@@ -67,7 +67,7 @@ int main(int argc, char** argv) {
   stitch.friction = 0.25f;
   Sewn s = interrupted(stitch);
   Tying t;
-  t.center = {0.0203f, 0, 0}, t.tension = 3;
+  t.center = {0.0203f, 0, 0}, t.tension = 2.5f;
   const Throws throws = three_throws();
   tie_throw(s, t, throws[0]);
   picture(s, "first throw, 3 N", outside), picture(s, "the same, along the wound", along);
