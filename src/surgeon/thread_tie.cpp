@@ -65,6 +65,9 @@ constexpr float kLead = 0.05f;        // [N] by which a strand may be tauter tha
 constexpr float kEvens = 1.5f;        // [1/s] of what one strand has more slack than the other
 constexpr float kFastest = 30e-3f;    // [m/s]
 constexpr float kSeated = 0.6f;       // [s] of full tension
+// The same of a ring's first throw, whose jaws go down to the stitch meanwhile. Hands above it hold the loop up, which is slack
+// by as much when they let go; and thread slides through two turns for seconds.
+constexpr float kSeatedFirst = 4, kLevel = 1e-3f, kLowers = 5e-3f;  // [s], [m], [m/s]
 constexpr float kTight = 0.8f;        // [s] of a strand that gives no way; then the tail lies as far as it can
 constexpr int kAgain = 5;             // times that a throw is wound again
 constexpr int kEnough = 3;            // throws of a knot that holds; a further one that fails is left
@@ -551,6 +554,9 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const float even = stage_ == pull ? dt * std::clamp(kEvens * more, -kFastest, kFastest) * easy : 0.0f;
       tip_ += line_ * (side_ * (pace(tail_felt_, felt_) + even)), hand_ -= line_ * (side_ * (pace(felt_, tail_felt_) - even));
       steady_ = std::min(tail_felt_, felt_) > 0.9f * how_.pull ? steady_ + dt : 0;
+      const bool down = how_.lumen && throws_ == 1;
+      if (down && stage_ == pull && std::min(felt_, tail_felt_) > 0.7f * how_.pull)
+        tip_.y = std::max(std::min(tip_.y, origin_.y + kLevel), tip_.y - kLowers * dt);
       const bool lost = !holds && waited_ > 0.2f;
       // More on the hand than on the tail: a turn has caught on the jaws, too.
       caught_ = holds && length(seen.tool[kHolder].force) > how_.pull + kCaught ? caught_ + dt : 0;
@@ -558,7 +564,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
         again(seen, drop_tail);
         break;
       }
-      if (stage_ == pull && (steady_ > kSeated || waited_ > 12 || lost))
+      if (stage_ == pull && (steady_ > (down ? kSeatedFirst : kSeated) || waited_ > 12 || lost))
         go(seen, look(seen).alternating() >= wanted_ ? hold : lay);
       else if (stage_ == hold && (!keep_ || waited_ > 12)) go(seen, lay);
       break;
