@@ -18,7 +18,7 @@ constexpr float kLoosePress = 0.3f;
 // [N] Instruments pass through each other here, which their hands would not let them: thread between two of them gives way.
 constexpr float kBetweenPress = 4;
 constexpr float kBetween = 0.4e-3f;  // [m] apart
-// [rad] Jaws that close below this leave no room for a kink of thread between them. It gives way likewise, until they hold it.
+// [rad] Jaws that are less open leave no room for a kink of thread between them. It gives way likewise.
 constexpr float kShutting = 0.02f;
 // [m/s] A needle that nothing holds, and that is faster, is moved by the thread within the thread's step: it stops at a strand
 // or is thrown back, with any force. So is one that thread presses with kLoosePress against tissue. At rest on elastic coils it

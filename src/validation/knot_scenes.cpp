@@ -254,7 +254,6 @@ Shaken shake(const Settings& settings, Tightened& t, int cycles, float speed, fl
     for (size_t c = 0; c < k.state.key.size(); ++c)
       if (k.state.crossing[c].normal_impulse > 0)
         result.nearest = std::min(result.nearest, 1 + k.state.crossing[c].gap / settings.material.diameter);
-    for (float tension : k.state.tension) result.peak = std::max(result.peak, tension);
   }
   return result;
 }

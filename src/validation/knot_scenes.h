@@ -77,7 +77,6 @@ double creep(const thread::Settings& settings, Tightened& t, float load, double 
 struct Shaken {
   int passes = 0;     // pairs of segments that passed through each other
   float nearest = 1;  // smallest distance between touching strands, in diameters
-  float peak = 0;     // [N] largest tension
 };
 // Shakes one load end by +-10 mm at up to `speed` [m/s], across and along the strands in turn, while the other is
 // pulled.

@@ -624,7 +624,7 @@ TEST(Tool, jaws_hold_a_thread_up_to_twice_friction_times_force) {
 }
 
 // A zigzag of thread, 4 mm behind the tips, where the jaws shut without holding it. It gives way: otherwise they would stretch
-// it with 14 N and more.
+// it with up to 16 N.
 TEST(Tool, jaws_that_shut_on_a_kink_of_thread_do_not_stretch_it) {
   float most = 0;
   for (const int folds : {1, 2, 3}) {
