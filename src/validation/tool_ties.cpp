@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "thread/observe.h"
 #include "thread/topology.h"
 #include "validation/knot_scenes.h"
 
@@ -118,6 +119,25 @@ class Tying {
 
   // side: +1 the long strand is on the right. sense: +1 over the top from the viewer's side.
   void make_throw(float side, float sense, int wraps) {
+    ++throws_;
+    for (int i = 0; i < 3 && !throw_once(side, sense, wraps); ++i) ++knot_.rewound;
+  }
+
+  TiedKnot finish() {
+    std::vector<Vec3> curve;
+    for (size_t i = 0; i < knot_.state.nodes(); ++i) curve.push_back(knot_.state.position(i));
+    const float tail_side = curve.front().x < 0 ? -1 : 1;
+    const std::vector<Vec3> closed = thread::close_curve(curve, {tail_side, 0, 0.1f}, {-tail_side, 0, -0.1f});
+    knot_.determinant = thread::knot_determinant(closed);
+    knot_.writhe = thread::mean_writhe(closed);
+    knot_.seconds = 1e-3 * static_cast<double>(ticks_);
+    knot_.tension = tension_;
+    return std::move(knot_);
+  }
+
+ private:
+  // False: no throw came of it, as is seen before it is pulled. The tail lies where it was then.
+  bool throw_once(float side, float sense, int wraps) {
     take_strand(strand_for(wraps));
     side_ = side;
     const Vec3 shaft = shaft_from(side), work = work_place(side, wraps) + tremor();
@@ -144,30 +164,26 @@ class Tying {
     // Low and level, each end to its own side, before either is pulled.
     move("cross", {side * 0.6f * tail_, 8e-3f, 0}, Vec3{-side * 24e-3f, 12e-3f, 0} + tremor());
     move("cross", {side * 0.75f * tail_, 2e-3f, 0}, {-side * 36e-3f, 2e-3f, 0});
+    if (thread::observe(settings_, knot_.state).throws < throws_) {
+      move("lay", laid_tail(side) - shaft_ * kGrip, hand_ + Vec3{0, 10e-3f, 0});
+      leave_tail();
+      return false;
+    }
     pull(side);
     strand_ = distance(knot_.state.position(hold_[3].node), knot_.state.position(knot_.bite_b));  // taut
     tail_ = distance(knot_.state.position(0), knot_.state.position(knot_.bite_a));
     tension_ = 0.5f * (length(hold_[2].force) + length(hold_[3].force));
     move("lay", laid_tail(-side) - shaft_ * kGrip, hand_ + Vec3{side * 4e-3f, 2e-3f, 0});
+    leave_tail();
+    return true;
+  }
+  void leave_tail() {
     lay_down();
     open("let go", kOpen);
-    move("let go", tip_ + shaft * 60e-3f, hand_);
+    move("let go", tip_ + shaft_ * 60e-3f, hand_);
     opening_ = 0;
   }
 
-  TiedKnot finish() {
-    std::vector<Vec3> curve;
-    for (size_t i = 0; i < knot_.state.nodes(); ++i) curve.push_back(knot_.state.position(i));
-    const float tail_side = curve.front().x < 0 ? -1 : 1;
-    const std::vector<Vec3> closed = thread::close_curve(curve, {tail_side, 0, 0.1f}, {-tail_side, 0, -0.1f});
-    knot_.determinant = thread::knot_determinant(closed);
-    knot_.writhe = thread::mean_writhe(closed);
-    knot_.seconds = 1e-3 * static_cast<double>(ticks_);
-    knot_.tension = tension_;
-    return std::move(knot_);
-  }
-
- private:
   Vec3 tremor() {
     if (how_.seed == 0) return {};
     return Vec3{random_.uniform() - 0.5f, random_.uniform() - 0.5f, random_.uniform() - 0.5f} * 2e-3f;
@@ -308,7 +324,9 @@ class Tying {
       const Vec3 goal = knot_.state.position(hold_[2].node) - shaft_ * kGrip + off, way = goal - tip_;
       const float left = length(way);
       if (left < 0.4e-3f) break;
-      speed += std::clamp(std::min(how_.speed, 0.01f + 12 * left) - speed, -20 * kTick, 5 * kTick);
+      // No faster than the hand takes in the strand, which the way to the wound slackens: a slack turn slides off the jaws.
+      const float want = std::min(how_.speed, 0.01f + 12 * left) * std::clamp(2 * felt_ / kWinding, 0.15f, 1.0f);
+      speed += std::clamp(want - speed, -20 * kTick, 5 * kTick);
       tip_ += way * (std::min(speed * kTick, left) / left);
       feel(kWinding);
       place_hand();
@@ -383,6 +401,7 @@ class Tying {
   float felt_ = 0, tail_felt_ = 0;                               // [N] tension of strand and tail, smoothed over 5 ms
   float tension_ = 0, strand_ = 0, tail_ = 0;                    // the free lengths of both strands [m]
   bool gripped_ = false;
+  uint32_t throws_ = 0;  // made and begun
   long ticks_ = 0;
 };
 

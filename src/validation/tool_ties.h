@@ -41,7 +41,7 @@ struct TiedKnot {
   float tension = 0;   // [N] of the hands at the end, mean
   float fastest = 0;   // [m/s] of either hand
   int missed = 0;      // throws whose tail was not between the jaws when they closed
-  int rewound = 0;     // turns wound again because one had slid off the jaws
+  int rewound = 0;     // turns and throws made again because a turn had slid off the jaws
 };
 
 // `each_tick`, if given, receives every state and the tools (for pictures): capsules of the needle holder, then the forceps,
