@@ -9,11 +9,12 @@
 // GPa, polydioxanone 1 GPa: ESTIMATES from supplier data. Bending: a monofilament is a solid rod, B = E pi d^4 / 64. A braid
 // bends like its loose fibres: 1 % of the solid value, as measured on a polyethylene braid (data beside Johanns et al.
 // 2023, 10.1126/sciadv.adg8861): ESTIMATE for silk and polyglactin. Sharpest bend that springs back: a radius of four
-// diameters, an ESTIMATE for all; docs/thread.md says what it is judged by. Friction: braids hold more than monofilaments and
-// coating lowers it (Surg Gynecol Obstet 1985;161:12 gives the order). The values are ESTIMATES in the range 0.15-0.3 of
-// capstan rigs (Zhang et al. 2017, 10.1007/s40544-017-0140-3) and nitinol knots (0.119; Jawed et al.
-// 2015, 10.1103/PhysRevLett.115.118302). Polypropylene has the value at which five throws of an elastic thread hold and four
-// slide; monofilaments need about six. docs/thread.md says at which friction each knot locks here.
+// diameters, an ESTIMATE for all; docs/thread.md says what it is judged by. Friction: braids hold more than monofilaments,
+// coating lowers it, and it falls with tension (Surg Gynecol Obstet 1985;161:12 gives the order). The values are ESTIMATES in
+// the range 0.15-0.3 of capstan rigs (Zhang et al. 2017, 10.1007/s40544-017-0140-3) and nitinol knots (0.119; Jawed et al.
+// 2015, 10.1103/PhysRevLett.115.118302), taken at a load of 0.3 N: an ESTIMATE. Polypropylene has the value at which five
+// throws of an elastic thread hold and four slide; monofilaments need about six. docs/thread.md says at which friction each
+// knot locks here.
 #include "thread/material.h"
 
 #include <array>
@@ -25,7 +26,8 @@ constexpr float kPi = 3.14159265f;
 constexpr std::array<float, 4> kDiameter{0.175e-3f, 0.225e-3f, 0.32e-3f, 0.375e-3f};
 constexpr std::array<float, 4> kAbsorbable{9.3f, 17.4f, 26.3f, 38.2f}, kNonabsorbable{5.9f, 9.4f, 14.1f, 21.2f};
 constexpr float kKnotEfficiency = 0.85f, kBraidBending = 0.01f;
-constexpr float kElasticRadius = 4;  // diameters
+constexpr float kElasticRadius = 4;    // diameters
+constexpr float kFrictionLoad = 0.3f;  // [N]
 
 struct Family {
   Material material;
@@ -76,6 +78,7 @@ constexpr std::array<Properties, 16> make_table() {
       p.bending_stiffness = family.modulus * kPi * d * d * d * d / 64 * (family.braided ? kBraidBending : 1.0f);
       p.elastic_curvature = 1 / (kElasticRadius * d);
       p.friction = family.friction;
+      p.friction_load = kFrictionLoad;
       p.knot_strength = (family.absorbable ? kAbsorbable : kNonabsorbable)[s];
       p.straight_strength = p.knot_strength / kKnotEfficiency;
       p.braided = family.braided;

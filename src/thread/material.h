@@ -22,7 +22,9 @@ struct Properties {
   float axial_stiffness = 0;    // EA [N]
   float bending_stiffness = 0;  // B [N.m2]
   float elastic_curvature = 0;  // [1/m] of the sharpest bend that springs back; more of it stays. 0: every bend springs back
-  float friction = 0;           // thread on thread, Coulomb
+  float friction = 0;           // coefficient, thread on thread, where it is pressed with `friction_load`
+  // [N] Friction grows with less than the load: F = friction N (friction_load / N)^(1/8). 0: Coulomb's, in proportion.
+  float friction_load = 0;
   float knot_strength = 0;      // knot-pull strength [N]: a thread bent by a contact breaks at this tension
   float straight_strength = 0;  // [N]
   bool braided = false;

@@ -64,6 +64,7 @@ double capstan_exponent(float degrees, float mu, float load, bool drawn, float s
 // bear the load. Returns the exponent as above.
 double over_thread_exponent(float coarse, float mu) {
   Settings settings = knot_settings(mu);
+  settings.material.friction_load = 0;
   settings.material.bending_stiffness = 1e-9f;
   settings.damping = 0;
   const float d = settings.material.diameter, l = coarse * d;
@@ -94,6 +95,44 @@ double over_thread_exponent(float coarse, float mu) {
     if (i >= 250) sum += double{length(hold[bar].force)};
   }
   return std::log(sum / 350 / double{weight}) / double{mu * kPi};
+}
+
+// Thread bent by 60 degrees over a straight, fixed thread and drawn at 5 mm/s against `weight` [N]. Returns friction over
+// mu N (0.3 N / N)^(1/8), where N bears the two tensions.
+double power_law_ratio(float weight) {
+  constexpr float kMu = 0.3f, kAngle = kPi / 3, kSpeed = 5e-3f;
+  Settings settings = knot_settings(kMu);
+  settings.material.bending_stiffness = 1e-11f, settings.material.elastic_curvature = 0;
+  settings.damping = 0;
+  const float d = settings.material.diameter, l = 1.43f * d, sine = std::sin(kAngle / 2), cosine = std::cos(kAngle / 2);
+  const Vec3 top{0, d / cosine, 0}, right{cosine, -sine, 0}, left{-cosine, -sine, 0};
+  const uint32_t bar = 41;
+  std::vector<Vec3> path, fine;
+  for (uint32_t i = 0; i < bar; ++i) path.push_back({0, 0, l * (static_cast<float>(i) - 19.63f)});
+  for (int i = 0; i < 2000; ++i) fine.push_back(top + right * (15e-3f * (1 - static_cast<float>(i) / 2000)));
+  for (int i = 0; i <= 2000; ++i) fine.push_back(top + left * (25e-3f * static_cast<float>(i) / 2000));
+  for (const Vec3& p : resample(fine, l)) path.push_back(p);
+  State state = thread::make_state(path);
+  state.broken[bar - 1] = 1;
+  Stepper stepper(path.size());
+  std::vector<Hold> hold(bar + 1);  // of the bar; of the drawn end
+  for (uint32_t i = 0; i <= bar; ++i) hold[i].node = i, hold[i].from = hold[i].to = path[i];
+  const Pull pull{static_cast<uint32_t>(path.size()) - 1, left * weight};
+  Surroundings around;
+  around.holds = hold, around.pulls = {&pull, 1};
+  // It slides all round after 1 mm. Then six nodes pass the bar.
+  const int rest = 100, slide = static_cast<int>(1 / kSpeed), count = static_cast<int>(6000 * l / kSpeed);
+  double taut = 0;
+  for (int i = 0; i < rest + slide + count; ++i) {
+    hold[bar].from = hold[bar].to;
+    if (i >= rest) hold[bar].to += right * (1e-3f * kSpeed);
+    stepper.step(settings, state, around);
+    if (i >= rest + slide) taut += double{length(hold[bar].force)} / count;
+  }
+  // The normal forces of the arc add up to angle T, their vector sum N is 2 sin(angle / 2) T.
+  const double slack = double{weight}, exponent = std::log(taut / slack);
+  const double load = (taut + slack) * double{sine};
+  return exponent / (double{kMu * kAngle} * std::pow(0.3 / load, 0.125));
 }
 
 std::string number(double v) {
@@ -137,7 +176,7 @@ struct Overhand {
 Overhand tighten_overhand(int n, float mu, double end) {
   Settings settings = knot_settings(mu);
   settings.material.bending_stiffness = 1e-5f;
-  settings.material.elastic_curvature = 0;  // as in the formula
+  settings.material.elastic_curvature = 0, settings.material.friction_load = 0;  // as in the formula
   settings.substep = 25e-6f, settings.substeps = 40, settings.iterations = 2;
   const float d = settings.material.diameter, l = 1e-3f, loop = 0.2f, big = loop / (2 * kPi), r = 0.7f * d;
   const float turns = static_cast<float>(2 * n + 1) * kPi;
@@ -219,6 +258,10 @@ void check_capstan(Lines& out, bool nightly) {
   for (float coarse : {1.0f, 1.43f, 2.0f})
     out.add("capstan/180 deg over a thread, mu 0.3, 2 N, drawn, segments of " + number(double{coarse}) + " diameters", 1,
             over_thread_exponent(coarse, 0.3f), 0.15, "exponent", "Euler-Eytelwein; two to four contacts for the whole arc");
+  for (const float weight : {0.2f, 0.8f, 3.2f})
+    out.add(
+        "capstan/60 deg over a thread, friction as load to the power 7/8, mu 0.3 at 0.3 N, " + number(double{weight}) + " N", 1,
+        power_law_ratio(weight), 0.05, "", "F = mu N (0.3 N / N)^(1/8); Howell and Mazur 1953");
   if (!nightly) {
     line(90, 0.1f, 0.5f, true), line(180, 0.4f, 10, false), line(360, 0.2f, 2, true), line(360, 0.3f, 2, false),
         line(720, 0.3f, 10, true);
@@ -320,17 +363,18 @@ void check_holding(Lines& out, bool nightly) {
       else if (coarse == 1.43f ? load == 3 : coarse == 2 && load == 1) creeps(coarse, load, 8);
     }
 
-  // Square knots of the friction of silk, laid with their nodes at different places along the thread.
+  // Square knots of the friction from which all hold, laid with their nodes at different places along the thread.
+  const Settings locks = knot_settings(0.34f);
   int count = 0, kept = 0;
   for (float coarse : {1.0f, 1.43f, 2.0f})
     for (int k = 0; k < 4; ++k) {
       if (!nightly && (coarse < 1.2f || k % 2 > 0)) continue;
-      const float d = held.material.diameter, l = coarse * d;
+      const float d = locks.material.diameter, l = coarse * d;
       Tightened t(lay_knot(square(), d, l, 15e-3f + 0.25f * static_cast<float>(k) * l));
-      tighten(held, t, 2);
-      kept += pull_apart(held, t).held, ++count;
+      tighten(locks, t, 2);
+      kept += pull_apart(locks, t).held, ++count;
     }
-  out.add("knot/square knots at mu 0.3 that hold 8 N, of " + number(count) + ": segments of " +
+  out.add("knot/square knots at mu 0.34 that hold 8 N, of " + number(count) + ": segments of " +
               (nightly ? "1, 1.43 and 2" : "1.43 and 2") + " diameters, nodes at different places",
           count, kept, 0, "", "holding does not depend on the segments");
 }
@@ -372,8 +416,8 @@ void check_locking(Lines& out) {
   };
   const Kind two{"square", square()}, slip{"granny", granny()};
   for (const Expected& e :
-       {Expected{two, 4, 2, 1, 0.24, 0.26}, Expected{two, 4, 2, 1.43f, 0.22, 0.28}, Expected{two, 4, 2, 2, 0.22, 0.22},
-        Expected{slip, 3, 4, 1, 0.34, 0.38}, Expected{slip, 3, 4, 1.43f, 0.26, 0.30}, Expected{slip, 3, 4, 2, 0.22, 0.30}}) {
+       {Expected{two, 4, 2, 1, 0.28, 0.30}, Expected{two, 4, 2, 1.43f, 0.26, 0.34}, Expected{two, 4, 2, 2, 0.22, 0.26},
+        Expected{slip, 3, 4, 1, 0.38, 0.42}, Expected{slip, 3, 4, 1.43f, 0.34, 0.34}, Expected{slip, 3, 4, 2, 0.34, 0.34}}) {
     // Downward, because single frictions below the threshold may hold by chance.
     const int first = e.step == 2 ? 38 : 42;
     int one = first, all = first;
@@ -396,8 +440,8 @@ void check_locking(Lines& out) {
     thread::Material material;
     double throws, coarser;  // with segments of 1.43 and of 2 diameters
   };
-  for (const Held& e : {Held{thread::Material::silk, 2, 2}, Held{thread::Material::polyglactin_910, 2, 2},
-                        Held{thread::Material::polypropylene, 7, 3}, Held{thread::Material::polydioxanone, 7, 7}})
+  for (const Held& e : {Held{thread::Material::silk, 2, 2}, Held{thread::Material::polyglactin_910, 3, 2},
+                        Held{thread::Material::polypropylene, 6, 5}, Held{thread::Material::polydioxanone, 7, 7}})
     for (const float coarse : {1.43f, 2.0f}) {
       Settings settings;
       settings.material = thread::properties(e.material, thread::Size::usp_3_0);
@@ -530,7 +574,7 @@ void check_ties(Lines& out, bool nightly) {
       for (int speed = 1; speed <= 5; ++speed) row(c, speed, kTies * speed, kTies);
   }
   out.add("knot/named right of " + number(ties) + " ties with tools, of which " + number(sliding) +
-              " seen to have capsized into half hitches; turns wound again: " + number(rewound),
+              " seen to have capsized into half hitches; made again: " + number(rewound),
           ties, named, 0, "", "throws and wraps that the hands made");
   out.add("knot/jaws closed beside the tail, in all ties", 0, missed, 0, "",
           "the needle holder takes what lies between its jaws");

@@ -136,6 +136,7 @@ Settings knot_settings(float friction) {
   s.material.bending_stiffness = 1e-8f;
   s.material.elastic_curvature = 1 / (4 * s.material.diameter);
   s.material.friction = friction;
+  s.material.friction_load = 0.3f;
   s.breaks = false;
   return s;
 }

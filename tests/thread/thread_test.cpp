@@ -470,8 +470,9 @@ TEST(Observe, calls_a_gap_between_throws_an_air_knot) {
 struct Held {
   float drawn = 0, most = 0, least = 1e9f;  // [N]
 };
-Held first_throw(int half_turns) {
-  const Settings settings = plain();
+Held first_throw(int half_turns, float friction_load) {
+  Settings settings = plain();
+  settings.material.friction_load = friction_load;
   const validation::Throw one{half_turns, 1};
   validation::LaidKnot k =
       validation::lay_on_rod({&one, 1}, settings.material.diameter, 2 * settings.material.diameter, 20e-3f);
@@ -499,28 +500,35 @@ Held first_throw(int half_turns) {
 }
 
 TEST(FirstThrow, of_two_turns_locks_where_one_of_one_turn_slides_and_takes_more_pull) {
-  const Held single = first_throw(3), twice = first_throw(5);
+  const Held single = first_throw(3, 0.3f), twice = first_throw(5, 0.3f);
   std::printf("one turn: %.2f N of 1.7 drawn, then %.2f to %.2f N; two turns: %.2f N, then %.2f to %.2f N\n",
               static_cast<double>(single.drawn), static_cast<double>(single.least), static_cast<double>(single.most),
               static_cast<double>(twice.drawn), static_cast<double>(twice.least), static_cast<double>(twice.most));
   EXPECT_LT(single.most, 0.7f) << "with two hands of 0.05 N one turn slides";
   EXPECT_GT(twice.least, 1.5f) << "two turns do not";
-  // Capstan: a turn more is 2.6 rad more of one strand round the other (measured at friction 0.3).
-  EXPECT_NEAR(std::log(single.drawn / twice.drawn) / plain().material.friction, 2.6f, 0.6f);
+  // Capstan, where friction is in proportion to the load: a turn more is 2.6 rad more of one strand round the other (measured
+  // at friction 0.3).
+  EXPECT_NEAR(std::log(first_throw(3, 0).drawn / first_throw(5, 0).drawn) / plain().material.friction, 2.6f, 0.6f);
 }
 
 // [m] by which a tied knot gives when its bite is loaded from nothing up to `load` [N], after both tails were pulled with
-// `tails` [N]; 12 mm: it slides.
+// `tails` [N]; 12 mm: it slides. The mean of three places of the nodes along the thread.
 float gives(const validation::Throws& throws, float tails, float load) {
   Settings settings = validation::knot_settings(0.30f);
   settings.material = *find_material("silk 2-0");
   settings.breaks = false;
-  validation::Tightened t(validation::lay_knot(throws, settings.material.diameter, 0.7e-3f));
-  const auto apart = [&] { return distance(t.knot.state.position(t.knot.load_a), t.knot.state.position(t.knot.load_b)); };
-  validation::tighten(settings, t, tails, validation::Drawing::flat, 0.6f);
-  const float before = apart();
-  validation::pull_apart(settings, t, 0, 0.01f, load, 12e-3f);
-  return apart() - before;
+  const float segment = 0.7e-3f;
+  float sum = 0;
+  for (int k = 0; k < 3; ++k) {
+    const float length = 15e-3f + static_cast<float>(k) * segment / 3;
+    validation::Tightened t(validation::lay_knot(throws, settings.material.diameter, segment, length));
+    const auto apart = [&] { return distance(t.knot.state.position(t.knot.load_a), t.knot.state.position(t.knot.load_b)); };
+    validation::tighten(settings, t, tails, validation::Drawing::flat, 0.6f);
+    const float before = apart();
+    validation::pull_apart(settings, t, 0, 0.01f, load, 12e-3f);
+    sum += apart() - before;
+  }
+  return sum / 3;
 }
 
 // Both ends pulled with 3.8 N tighten a square knot. A granny slides on, and so do throws that lie below another one: at
@@ -530,8 +538,8 @@ TEST(TiedKnot, gives_little_when_it_is_square_and_was_tightened) {
   const float three = gives(validation::three_throws(), 3.8f, 0.8f);
   std::printf("up to 0.8 N: square %.2f mm, granny %.2f mm, three throws tightened at once %.2f mm\n",
               1e3 * static_cast<double>(square), 1e3 * static_cast<double>(granny), 1e3 * static_cast<double>(three));
-  EXPECT_LT(square, 0.7e-3f) << "one segment";
-  EXPECT_GT(granny, 2 * square);
+  EXPECT_LT(square, 0.8e-3f) << "a segment is 0.7 mm";
+  EXPECT_GT(granny, 1.3f * square);
 }
 
 // A square knot that nothing loads: what the bite goes round has given way. A bar rubs across its strands and back, twice a
@@ -541,6 +549,7 @@ uint32_t rubbed(float elastic_curvature, float height) {
   Settings settings = validation::knot_settings(0.30f);
   settings.material = *find_material("silk 2-0");
   settings.material.elastic_curvature = elastic_curvature;
+  settings.material.friction_load = 0;  // in proportion to the load; more friction at small loads holds an elastic knot, too
   settings.breaks = false;
   settings.gravity = {0, 0, -0.1f}, settings.damping = 30;
   const float segment = 0.7e-3f, gave = 0.3e-3f;
